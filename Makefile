@@ -1,0 +1,109 @@
+# make            programs into build/bin
+# make test       unit and end-to-end tests (SAN=address,undefined for sanitizers, FULL=1 for the long forms)
+# make demo bench install clean
+
+CC       ?= cc
+ifeq ($(origin CC),default)
+CC       := gcc
+endif
+SAN      ?=
+BUILD    ?= build$(if $(SAN),/san)
+PREFIX   ?= /usr/local
+PYTHON   ?= python3
+
+EMBREE   := $(if $(wildcard /usr/include/embree4/rtcore.h),-lembree4,-lembree3)
+WARN     := -Wall -Wextra -Wconversion -Wshadow -Wmissing-prototypes -Wstrict-prototypes -Wvla -Wpointer-arith \
+            -Wcast-qual -Wwrite-strings -Wundef -Wformat=2 -Wold-style-definition -Werror
+OPT      ?= -O2
+CFLAGS   := -std=c17 $(OPT) -g -ffp-contract=off -fno-fast-math -fno-strict-aliasing -fno-common $(WARN) \
+            $(if $(SAN),-fsanitize=$(SAN) -fno-sanitize-recover=all -fno-omit-frame-pointer) $(EXTRA_CFLAGS)
+CPPFLAGS := -D_GNU_SOURCE -I. -I$(BUILD)/gen -MMD -MP
+LDFLAGS  := $(if $(SAN),-fsanitize=$(SAN)) $(EXTRA_LDFLAGS)
+
+LIBS_COMMON := -lOpenEXRCore -lprotobuf-c -luv -lcrypto -ljansson -lm -lpthread
+LIBS_RENDER := $(EMBREE) -lexpat -lpng -ljpeg -lz
+
+COMMON_SRC := $(wildcard common/*/*.c)
+RENDER_SRC := $(filter-out %_gen.c,$(wildcard worker/math/*.c worker/scene/*.c worker/geom/*.c worker/texture/*.c worker/bsdf/*.c \
+              worker/emitter/*.c worker/camera/*.c worker/world/*.c worker/path/*.c worker/chain/*.c worker/render/*.c))
+COORD_SRC  := $(wildcard coordinator/core/*.c coordinator/store/*.c coordinator/shell/*.c)
+CTL_SRC    := $(wildcard coordinator/ctl/*.c)
+DAEMON_SRC := $(filter-out worker/daemon/main.c,$(wildcard worker/daemon/*.c))
+CLI_SRC    := $(filter-out worker/cli/hslt_%.c,$(wildcard worker/cli/*.c))
+PROTO      := $(wildcard proto/*.proto)
+
+obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
+PROTO_OBJ := $(patsubst proto/%.proto,$(BUILD)/obj/gen/proto/%.pb-c.o,$(PROTO))
+GEN_H     := $(patsubst proto/%.proto,$(BUILD)/gen/proto/%.pb-c.h,$(PROTO))
+
+LIB_COMMON := $(BUILD)/lib/libhslt-common.a
+LIB_RENDER := $(BUILD)/lib/libhslt-render.a
+LIB_COORD  := $(BUILD)/lib/libhslt-coordinator.a
+LIB_DAEMON := $(BUILD)/lib/libhslt-daemon.a
+LIB_CLI    := $(BUILD)/lib/libhslt-cli.a
+
+# A program is one file with a main: coordinator/main.c, worker/daemon/main.c, worker/cli/hslt_*.c, coordinator/ctl/hslt_*.c
+WORKER_CLI := $(patsubst worker/cli/hslt_%.c,hslt-%,$(wildcard worker/cli/hslt_*.c))
+CTL_CLI    := $(patsubst coordinator/ctl/hslt_%.c,hslt-%,$(wildcard coordinator/ctl/hslt_*.c))
+PROGRAMS   := $(if $(wildcard coordinator/main.c),hslt-coordinator) $(if $(wildcard worker/daemon/main.c),hslt-worker) \
+              $(WORKER_CLI) $(CTL_CLI)
+
+.PHONY: all programs tests test demo bench install clean
+all: programs
+programs: $(addprefix $(BUILD)/bin/,$(PROGRAMS))
+
+$(BUILD)/obj/%.o: %.c | $(GEN_H) generated
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS) $(CFLAGS) -c $< -o $@
+
+$(BUILD)/obj/gen/%.o: $(BUILD)/gen/%.c
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS) $(filter-out -W%,$(CFLAGS)) -c $< -o $@
+
+$(BUILD)/gen/proto/%.pb-c.c $(BUILD)/gen/proto/%.pb-c.h: proto/%.proto
+	@mkdir -p $(@D)
+	protoc-c --c_out=$(BUILD)/gen $<
+
+.PHONY: generated
+generated: $(BUILD)/gen/.made
+$(BUILD)/gen/.made:
+	@mkdir -p $(@D) && touch $@
+
+-include worker/texture/generate.mk
+
+$(LIB_COMMON): $(call obj,$(COMMON_SRC)) $(PROTO_OBJ)
+$(LIB_RENDER): $(call obj,$(RENDER_SRC))
+$(LIB_COORD): $(call obj,$(COORD_SRC))
+$(LIB_DAEMON): $(call obj,$(DAEMON_SRC))
+$(LIB_CLI): $(call obj,$(CLI_SRC))
+$(BUILD)/lib/%.a:
+	@mkdir -p $(@D)
+	rm -f $@ && ar rcs $@ $^
+
+link = @mkdir -p $(@D); $(CC) $(LDFLAGS) -o $@ $^
+$(BUILD)/bin/hslt-coordinator: $(BUILD)/obj/coordinator/main.o $(LIB_COORD) $(LIB_COMMON)
+	$(link) $(LIBS_COMMON)
+$(BUILD)/bin/hslt-worker: $(BUILD)/obj/worker/daemon/main.o $(LIB_DAEMON) $(LIB_RENDER) $(LIB_COMMON)
+	$(link) $(LIBS_RENDER) $(LIBS_COMMON)
+$(addprefix $(BUILD)/bin/,$(WORKER_CLI)): $(BUILD)/bin/hslt-%: $(BUILD)/obj/worker/cli/hslt_%.o $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
+	$(link) $(LIBS_RENDER) $(LIBS_COMMON)
+$(addprefix $(BUILD)/bin/,$(CTL_CLI)): $(BUILD)/bin/hslt-%: $(BUILD)/obj/coordinator/ctl/hslt_%.o $(LIB_COORD) $(LIB_COMMON)
+	$(link) $(LIBS_COMMON)
+
+# Tests mirror the tree: tests/<folder>/.../test_*.c, one program each, found here.
+TEST_SRC     := $(shell find tests -name 'test_*.c' 2>/dev/null | sort)
+TEST_SUPPORT := $(wildcard tests/support/*.c)
+TEST_BIN     := $(patsubst tests/%.c,$(BUILD)/tests/%,$(TEST_SRC))
+LIB_TEST     := $(BUILD)/lib/libhslt-test.a
+$(LIB_TEST): $(call obj,$(TEST_SUPPORT))
+$(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
+	$(link) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+tests: $(TEST_BIN)
+test: programs tests
+	sh tests/run.sh $(BUILD)
+.SECONDARY:
+
+clean:
+	rm -rf build
+
+-include $(shell find $(BUILD)/obj -name '*.d' 2>/dev/null)

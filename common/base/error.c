@@ -1,0 +1,31 @@
+#include "common/base/error.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+int error_set(struct error *e, int errno_value, const char *format, ...)
+{
+	if (e) {
+		va_list ap;
+		va_start(ap, format);
+		vsnprintf(e->text, sizeof e->text, format, ap);
+		va_end(ap);
+	}
+	return -errno_value;
+}
+
+int error_prefix(struct error *e, int code, const char *format, ...)
+{
+	if (e) {
+		char tail[sizeof e->text];
+		memcpy(tail, e->text, sizeof tail);
+		va_list ap;
+		va_start(ap, format);
+		int n = vsnprintf(e->text, sizeof e->text, format, ap);
+		va_end(ap);
+		if (n >= 0 && (size_t)n < sizeof e->text)
+			snprintf(e->text + n, sizeof e->text - (size_t)n, ": %s", tail);
+	}
+	return code;
+}

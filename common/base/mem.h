@@ -1,0 +1,18 @@
+/*
+ * The one door for memory. A test makes the n-th allocation fail and sees that nothing leaks or crashes.
+ * Returned memory is zeroed. Any thread.
+ */
+#ifndef COMMON_BASE_MEM_H
+#define COMMON_BASE_MEM_H
+
+#include <stddef.h>
+
+void *mem_alloc(size_t count, size_t size);               /* NULL when count * size overflows or memory is out */
+void *mem_grow(void *p, size_t old_size, size_t new_size); /* as realloc; the new part is zeroed; p lives on failure */
+char *mem_strdup(const char *s);
+void mem_free(void *p);
+
+/* Tests only: the allocation after `n` successful ones fails, once; n < 0 switches this off. */
+void mem_fail_after(long n);
+
+#endif

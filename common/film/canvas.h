@@ -1,0 +1,52 @@
+/*
+ * The merged films of a job: one film a group, sums on an integer grid, so that adding is order-free (contract section 1).
+ * Round r's batches go into the open film of r; when all have come the round is closed and its sums move into the prefix.
+ * The published image is the prefix of complete rounds. Two rounds may be open: the first incomplete one and the next.
+ * Memory: 8 bytes x 3 channels x pixels x groups x 3, in mapped files below `folder` (unlinked at once) or, with folder
+ * NULL, in anonymous memory; pages that no batch touched cost nothing. One thread at a time.
+ */
+#ifndef COMMON_FILM_CANVAS_H
+#define COMMON_FILM_CANVAS_H
+
+#include "common/film/batch.h"
+#include "common/film/exact_sum.h"
+
+struct canvas;
+
+struct bootstrap_result { /* of all groups, from the weights in index order: see bootstrap_merge */
+	double b[PLAN_MAX_GROUPS];
+	double b_pooled;
+	double beyond_share; /* of the energy, in paths too long for the chains' state */
+	bool black;          /* no sample carried light */
+};
+
+/* The grid: quantum 2^exponent. For chains fixed (values are of order 1 per mutation); for samples from b. */
+int canvas_grid_exponent(const struct plan *p, double b_pooled, double brightest);
+
+int canvas_new(struct canvas **c, const struct plan *p, int grid_exponent, const char *folder, struct error *e);
+void canvas_free(struct canvas *c);
+
+/* Bootstrap batches add only their independent sums. Counters and sums of render batches are those of their round.
+ * -EEXIST: merged already; -EAGAIN: round not open; -ERANGE: a sum left the grid (an error of the job). */
+int canvas_add(struct canvas *c, const struct batch *b, struct error *e);
+bool canvas_has(const struct canvas *c, const struct lease_key *k); /* merged already */
+uint64_t canvas_rounds(const struct canvas *c);                     /* complete rounds */
+uint64_t canvas_merged(const struct canvas *c); /* render leases merged, open rounds too */
+
+struct canvas_image {
+	uint32_t width, height; /* crop */
+	float *rgb;   /* linear Rec. 709, [height][width][3]; from the prefix of complete rounds */
+	float *error; /* one standard error, same shape and units; NULL when groups < 2 */
+	double rel_mse;         /* estimated relMSE of rgb at this resolution; NAN when groups < 2 */
+	double rel_mse_upper;   /* upper end of its 90 % interval */
+	double b, b_error;      /* pooled b and its standard error (chains) */
+	double beyond_share;
+	uint64_t samples, rounds;
+	uint64_t counters[BATCH_COUNTERS]; /* of the prefix */
+	bool black;
+};
+/* Allocates img's arrays; canvas_image_fini frees them. open_rounds: a preview with all that has come. */
+int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e);
+void canvas_image_fini(struct canvas_image *img);
+
+#endif

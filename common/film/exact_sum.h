@@ -1,0 +1,21 @@
+/*
+ * A sum of doubles without rounding: the same for any order (a Kulisch accumulator; 64-bit words over the whole range of
+ * double). Adding canonical zeros, infinities and NaN: refused, counted by the caller. No allocation.
+ */
+#ifndef COMMON_FILM_EXACT_SUM_H
+#define COMMON_FILM_EXACT_SUM_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { EXACT_SUM_WORDS = 36 };
+
+struct exact_sum {
+	uint64_t word[EXACT_SUM_WORDS]; /* two's complement, least significant first, unit 2^-1074 */
+};
+
+bool exact_sum_add(struct exact_sum *s, double x); /* false: x is not finite */
+void exact_sum_merge(struct exact_sum *s, const struct exact_sum *other);
+double exact_sum_value(const struct exact_sum *s); /* rounded once, to nearest even */
+
+#endif

@@ -1,0 +1,85 @@
+/*
+ * A job's plan (contract section 1): fixed when the job starts, the same for hslt-render and the farm, never a function
+ * of workers or threads. Pure; any thread.
+ *
+ * Work is cut into leases. A lease is (kind, group, part, epoch); its result depends on the plan and on these alone.
+ *   bootstrap, kind BOOTSTRAP: group g, part p owns the index range plan_bootstrap_range(); epoch is 0.
+ *   samples (path, bdpt), kind RENDER: group g draws the sample indices of round r that are congruent to g modulo
+ *     `groups`; part p owns a strip of rows.
+ *   chains (pssmlt), kind RENDER: chain c belongs to group c mod groups; part p owns plan_chain_range() of them; epoch r.
+ */
+#ifndef COMMON_PLAN_PLAN_H
+#define COMMON_PLAN_PLAN_H
+
+#include "common/base/error.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum plan_kind { PLAN_SAMPLES, PLAN_CHAINS };
+enum lease_kind { LEASE_BOOTSTRAP = 1, LEASE_RENDER = 2 };
+
+enum {
+	PLAN_MAX_GROUPS = 64,
+	PLAN_MAX_PIXELS = 1 << 24, /* of the crop: bounds a batch */
+	PLAN_MAX_SIZE = 65536,     /* width, height of the full film */
+};
+
+struct plan_request {
+	char integrator[16];
+	enum plan_kind kind;
+	uint32_t width, height;                       /* full film */
+	uint32_t crop_x, crop_y, crop_width, crop_height; /* width 0: the full film */
+	uint32_t border;                              /* pixels by which samples extend beyond the crop (filter) */
+	uint64_t seed;
+	uint64_t spp;        /* 0: none */
+	uint64_t mutations;  /* 0: none; as spp x pixels */
+	double seconds;      /* 0: none */
+	double target_error; /* 0: none */
+	uint32_t min_depth, max_depth; /* edges */
+	uint32_t chains, groups;       /* 0: by the rule */
+	uint64_t bootstrap, epoch;     /* 0: by the rule; epoch: mutations per chain or samples per pixel and group */
+};
+
+struct plan {
+	char integrator[16];
+	enum plan_kind kind;
+	uint32_t width, height, crop_x, crop_y, crop_width, crop_height, border;
+	uint64_t seed;
+	uint32_t groups, parts; /* leases per round = groups x parts */
+	uint32_t chains;        /* 0 for PLAN_SAMPLES; a multiple of groups x parts */
+	uint64_t bootstrap;     /* a multiple of groups x parts */
+	uint64_t epoch;         /* mutations per chain and epoch, or samples per pixel, group and round */
+	uint64_t rounds;        /* after which the job ends; UINT64_MAX: only time or error end it */
+	double seconds, target_error;
+	uint32_t min_depth, max_depth;
+};
+
+/* Checks the request (sizes, crop, counts) and fills in what it leaves open. -EINVAL with a sentence. */
+int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
+/* Every plan from the wire passes here before it is believed. */
+int plan_check(const struct plan *p, struct error *e);
+/* "1024 chains in 16 groups ..., 8 rounds ...": what was chosen and by which rule; for logs. */
+void plan_describe(const struct plan *p, char *text, size_t size);
+
+/* Half open ranges. */
+struct plan_range {
+	uint64_t begin, end;
+};
+struct plan_range plan_bootstrap_range(const struct plan *p, uint32_t group, uint32_t part);
+/* k-th chain of part `part`: group + groups * k for k in the range. */
+struct plan_range plan_chain_range(const struct plan *p, uint32_t part);
+/* Rows of the crop extended by the border, counted from the top of the extended crop: a part's strip. */
+struct plan_range plan_row_range(const struct plan *p, uint32_t part);
+uint64_t plan_round_mutations(const struct plan *p); /* samples or mutations in one round, all groups */
+uint64_t plan_extended_pixels(const struct plan *p); /* (crop + 2 border) in each direction */
+
+/* Systematic resampling of a group's seeds over its bootstrap weights, in index order (contract section 2).
+ * weight[i] >= 0 and finite, i in the group's range; writes `count` bootstrap indices. false: all weights are 0. */
+bool plan_resample(const struct plan *p, uint32_t group, const float *weight, uint64_t weight_count, double u,
+		   uint32_t count, uint64_t *index);
+/* The u above: a pure function of seed and group. */
+double plan_resample_u(const struct plan *p, uint32_t group);
+
+#endif

@@ -1,0 +1,82 @@
+/*
+ * Bidirectional scattering. One file per plug-in and one line in bsdf_list.h; the generic tests pick it up.
+ *
+ * Directions are unit vectors in the local shading frame (z = shading normal), both pointing AWAY from the surface.
+ * wo is where the path came from when sampling, wi where it goes; eval and pdf take any pair.
+ * `eval` is f (1/sr), without a cosine; delta lobes contribute nothing to eval and pdf.
+ * Transport: radiance travelling along wi -> wo is scaled by (n_wo/n_wi)^2 when refracted (n_x: index on the side of
+ * x; Walter 2007 eq. 21 with Veach 1997 sec. 5.2), importance is not: f_radiance(wo,wi) / f_importance(wo,wi) is that.
+ * Measure of densities: solid angle; for delta lobes the probability of choosing the lobe.
+ * Immutable after creation; any thread; nothing here allocates after create.
+ */
+#ifndef WORKER_BSDF_BSDF_H
+#define WORKER_BSDF_BSDF_H
+
+#include "worker/math/vec3.h"
+#include "worker/texture/texture.h"
+
+enum bsdf_mode {
+	BSDF_REFLECT = 1,
+	BSDF_TRANSMIT = 2,
+	BSDF_DELTA = 4, /* with one of the two above */
+};
+
+/* Which quantity the path carries while it is being followed: a camera sub-path carries importance backwards and so
+ * gathers radiance; bsdf values for it are those of TRANSPORT_RADIANCE. */
+enum transport { TRANSPORT_RADIANCE, TRANSPORT_IMPORTANCE };
+
+struct bsdf_point {
+	double u, v;
+	const struct wavelengths *w;
+	enum transport transport;
+};
+
+struct bsdf_sample {
+	vec3 wi;
+	unsigned mode;   /* of enum bsdf_mode */
+	double pdf;      /* solid angle of all non-delta lobes together, or the probability of the delta lobe */
+	spectrum f;      /* eval(wo, wi), or for a delta lobe f such that f / pdf is the weight of the path:
+			    the cosine |wi.z| is already divided out: weight = f |wi.z| / pdf in both cases */
+	double eta;      /* index on wi's side over the one on wo's side; 1 when reflected */
+};
+
+struct bsdf;
+
+struct bsdf_build {
+	const struct asset_source *assets;
+	struct arena *arena;
+	bool dialect_3;
+	/* Builds the nested BSDF of `n` (for twosided). */
+};
+
+struct bsdf_ops {
+	const char *type;
+	const struct param *params;
+	unsigned nested_classes; /* of struct plugin_decl */
+	int (*create)(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
+	spectrum (*eval)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+	double (*pdf_solid)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+	/* u[0], u[1]: direction; u[2]: lobe. false: absorbed. */
+	bool (*sample)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out);
+};
+
+struct bsdf {
+	const struct bsdf_ops *ops;
+	unsigned modes;    /* union of all modes it can have (REFLECT|DELTA and REFLECT may both be there: then both bits) */
+	bool has_smooth;   /* some lobe is not delta: eval is not identically 0 */
+	bool has_delta;
+	double alpha;      /* least roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
+	double eta;        /* index below the surface (against the normal) over the one above; 1: opaque or none */
+	bool two_sided;    /* scatters light that arrives from below the normal */
+	bool textured;
+	enum color_shape shape; /* CONSTANT: carries no colour */
+	void *data;
+};
+
+int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
+void bsdf_black(struct bsdf *b); /* absorbs everything; for emitters without a BSDF */
+void bsdf_default(struct bsdf *b); /* diffuse 0.5, what Mitsuba gives a shape without a BSDF */
+
+extern const struct bsdf_ops *const bsdf_registry[]; /* ends with NULL */
+
+#endif

@@ -1,0 +1,90 @@
+/*
+ * Radiance, reflectance or importance at the wavelengths a path carries: four lanes that travel together where
+ * nothing disperses (hero wavelength, Wilkie et al. 2014, with equal weights because all densities agree).
+ * In a grey scene (struct wavelengths.grey) all lanes are equal and stand for the common illuminant's shape.
+ */
+#ifndef WORKER_MATH_SPECTRUM_H
+#define WORKER_MATH_SPECTRUM_H
+
+#include <math.h>
+#include <stdbool.h>
+
+enum { SPECTRUM_LANES = 4 };
+#define WAVELENGTH_MIN 360.0 /* nm */
+#define WAVELENGTH_MAX 830.0
+
+typedef struct {
+	double v[SPECTRUM_LANES];
+} spectrum;
+
+struct wavelengths {
+	double nm[SPECTRUM_LANES];
+	bool grey; /* the scene carries no colour: nm is not to be read */
+};
+
+static inline spectrum spectrum_of(double x)
+{
+	return (spectrum){{x, x, x, x}};
+}
+
+static inline spectrum spectrum_add(spectrum a, spectrum b)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		a.v[i] += b.v[i];
+	return a;
+}
+
+static inline spectrum spectrum_mul(spectrum a, spectrum b)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		a.v[i] *= b.v[i];
+	return a;
+}
+
+static inline spectrum spectrum_scale(double s, spectrum a)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		a.v[i] *= s;
+	return a;
+}
+
+static inline bool spectrum_is_zero(spectrum a)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		if (a.v[i] != 0)
+			return false;
+	return true;
+}
+
+static inline double spectrum_max(spectrum a)
+{
+	double m = a.v[0];
+	for (int i = 1; i < SPECTRUM_LANES; i++)
+		m = a.v[i] > m ? a.v[i] : m;
+	return m;
+}
+
+static inline double spectrum_mean(spectrum a)
+{
+	double m = 0;
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		m += a.v[i];
+	return m / SPECTRUM_LANES;
+}
+
+static inline bool spectrum_is_valid(spectrum a) /* finite and nowhere negative */
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		if (!(a.v[i] >= 0) || !isfinite(a.v[i]))
+			return false;
+	return true;
+}
+
+/* u in [0,1) -> the first wavelength uniform over the range, the others rotated by quarters of it. */
+struct wavelengths wavelengths_sample(double u);
+
+/* The CIE 1931 colour of a spectrum estimated from its four lanes (one-sample estimate of the integral of
+ * L x_bar / 106.857 nm, so that an emitter of rgb 1 has Y = 1). Not for grey: the film has its own factor. */
+void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3]);
+
+#endif

@@ -1,0 +1,65 @@
+/*
+ * The renderer: a library without network. This is its one public header for the daemon and the command line.
+ * A world is immutable and shared by all threads; a lease is run by one thread.
+ */
+#ifndef WORKER_RENDER_RENDER_H
+#define WORKER_RENDER_RENDER_H
+
+#include "common/film/batch.h"
+#include "worker/scene/settings.h"
+
+#include <stdatomic.h>
+
+struct world;
+
+/* All plug-in declarations, for scene_read. */
+const struct plugin_decl *render_plugins(void);
+
+/* One effect, on or off, and why: "dispersion", false, "no dielectric has an index that varies with wavelength". */
+struct effect_line {
+	const char *name;
+	bool on;
+	char why[160];
+};
+enum { RENDER_EFFECTS_MAX = 24 };
+size_t render_effects(const struct scene *s, struct effect_line lines[RENDER_EFFECTS_MAX]);
+
+struct render_integrator {
+	const char *name, *summary;
+	enum plan_kind kind;
+	uint32_t max_depth; /* edges its state holds */
+};
+/* NULL when there is none of that name; index from 0, NULL at the end. */
+const struct render_integrator *render_integrator_find(const char *name);
+const struct render_integrator *render_integrator_at(size_t index);
+#define RENDER_INTEGRATOR_DEFAULT "pssmlt"
+
+/* What hslt-submit and hslt-render let the user override; all zero: as the scene says. */
+struct render_options {
+	uint32_t width, height;
+};
+
+/* Builds Embree's scene. The scene description may be freed afterwards. */
+int world_new(struct world **w, const struct scene *s, const struct asset_source *assets, const struct render_options *o,
+	      struct error *e);
+void world_free(struct world *w);
+/* Upper bound of |value| of one sample, for canvas_grid_exponent when the bootstrap is black. */
+double world_brightest(const struct world *w);
+size_t world_embree_bytes(const struct world *w);
+
+/* Seeds of a lease at epoch 0 (bootstrap indices, one a chain) or the states after the epoch before. */
+struct lease_input {
+	uint32_t chain_count;
+	const uint64_t *seeds;             /* NULL from epoch 1 on */
+	const struct chain_state *states;  /* NULL at epoch 0 */
+};
+
+enum lease_end { LEASE_DONE, LEASE_STOPPED };
+
+/* Runs one lease and fills the batch (batch_fini frees it). `stop` may become true at any time: the lease is given up.
+ * -ENOMEM, -EBADMSG (states that do not parse), -EINVAL (plan and world do not fit). Traps on invalid operations are on
+ * inside. */
+int render_lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
+		 const atomic_bool *stop, enum lease_end *end, struct batch *out, struct error *e);
+
+#endif

@@ -1,0 +1,28 @@
+/*
+ * Where a scene's files come from: a folder (hslt-render, hslt-submit) or a content-addressed store (workers).
+ * Names are those in the scene file, with '/' between parts.
+ */
+#ifndef WORKER_SCENE_ASSET_H
+#define WORKER_SCENE_ASSET_H
+
+#include "common/base/error.h"
+
+#include <stddef.h>
+
+struct asset {
+	const unsigned char *bytes;
+	size_t size;
+	void *handle;
+};
+
+struct asset_source {
+	void *user;
+	/* Maps the whole file. 0 or negative errno with a sentence. Any thread. */
+	int (*open)(void *user, const char *name, struct asset *out, struct error *e);
+	void (*close)(void *user, struct asset *a);
+};
+
+/* A folder: names must stay below it (no absolute paths, no "..", regular files only). `folder` must outlive it. */
+struct asset_source asset_folder(const char *folder);
+
+#endif

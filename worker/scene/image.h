@@ -1,0 +1,20 @@
+/* Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, EXR, Radiance HDR by content. */
+#ifndef WORKER_SCENE_IMAGE_H
+#define WORKER_SCENE_IMAGE_H
+
+#include "common/base/arena.h"
+#include "worker/scene/asset.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct image {
+	uint32_t width, height, channels; /* channels: 1 or 3 (alpha is dropped) */
+	float *pixels;                    /* [height][width][channels], finite, in the arena */
+};
+
+/* raw: no sRGB decoding of 8-bit data. At most 2^28 pixels. */
+int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
+	       struct error *e);
+
+#endif

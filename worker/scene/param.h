@@ -1,0 +1,61 @@
+/*
+ * Parameter tables: what a plug-in understands, declared where it is implemented, read by the scene reader.
+ * Names are those of Mitsuba 3 (to_world, int_ior, max_depth); 0.5/0.6 names are the same in camelCase and are
+ * converted on reading (toWorld, intIOR, maxDepth).
+ */
+#ifndef WORKER_SCENE_PARAM_H
+#define WORKER_SCENE_PARAM_H
+
+enum value_type {
+	VALUE_BOOL = 1 << 0,
+	VALUE_INT = 1 << 1,
+	VALUE_FLOAT = 1 << 2,
+	VALUE_STRING = 1 << 3,
+	VALUE_POINT = 1 << 4, /* point and vector */
+	VALUE_RGB = 1 << 5,   /* also sRGB "#rrggbb" of 0.6, made linear on reading */
+	VALUE_SPECTRUM = 1 << 6,
+	VALUE_TRANSFORM = 1 << 7,
+	VALUE_NODE = 1 << 8, /* a nested or referenced object, by name: a texture, a BSDF */
+};
+/* What a colour may be given as: a number, rgb, a spectrum, a texture. */
+#define VALUE_COLOR (VALUE_FLOAT | VALUE_INT | VALUE_RGB | VALUE_SPECTRUM)
+#define VALUE_TEXTURE (VALUE_COLOR | VALUE_NODE)
+
+enum param_class {
+	PARAM_UNDERSTOOD,
+	PARAM_IGNORED, /* has no effect on light: reported once, with file and line */
+	PARAM_REFUSED, /* would change light: the scene is refused, with what is supported */
+};
+
+struct param {
+	const char *name;
+	unsigned types; /* of enum value_type */
+	enum param_class status;
+	double min, max;    /* for VALUE_INT and VALUE_FLOAT when min < max: outside is an error */
+	const char *choices; /* for VALUE_STRING: "beckmann|ggx", NULL: any */
+};
+
+enum plugin_class {
+	PLUGIN_SHAPE,
+	PLUGIN_BSDF,
+	PLUGIN_TEXTURE,
+	PLUGIN_EMITTER,
+	PLUGIN_SENSOR,
+	PLUGIN_FILM,
+	PLUGIN_RFILTER,
+	PLUGIN_SAMPLER,
+	PLUGIN_INTEGRATOR,
+	PLUGIN_MEDIUM,
+	PLUGIN_CLASSES,
+};
+
+/* Children that are not named (a BSDF in a shape, a film in a sensor) go by class; nested_classes lists which. */
+struct plugin_decl {
+	enum plugin_class cls;
+	const char *type;            /* as written in type="..." */
+	const struct param *params;  /* ends with a NULL name */
+	unsigned nested_classes;     /* bits 1 << enum plugin_class */
+	enum param_class status;     /* IGNORED: the whole plug-in has no effect (samplers); REFUSED never listed: unknown is refused */
+};
+
+#endif

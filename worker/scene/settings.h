@@ -1,0 +1,33 @@
+/*
+ * What sensor, film, filter, sampler and integrator of a scene say, as plain numbers: for hslt-submit, hslt-render and
+ * the world. Needs no Embree and opens no asset.
+ */
+#ifndef WORKER_SCENE_SETTINGS_H
+#define WORKER_SCENE_SETTINGS_H
+
+#include "worker/scene/scene.h"
+
+enum filter_kind { FILTER_BOX, FILTER_TENT, FILTER_GAUSSIAN };
+
+struct scene_settings {
+	uint32_t width, height; /* film, 1..PLAN_MAX_SIZE each */
+	enum filter_kind filter;
+	double filter_radius, filter_stddev; /* pixels; Mitsuba's defaults: box 0.5, tent 1, gaussian 0.5 and 4 x that */
+	uint32_t border;                     /* whole pixels by which the kernel reaches beyond a pixel: ceil(radius - 0.5) */
+	uint64_t spp;                        /* sampleCount; 0: none given */
+	uint32_t max_depth;                  /* edges, 1..128 (-1 and more become 128); 128 when none is given */
+	char integrator[32];                 /* the scene's own ("" none): ignored but for its depth */
+	/* perspective */
+	mat4 to_world; /* camera: +z forward, +x LEFT on the image, +y up; any scale is removed */
+	double fov;    /* degrees, along fov_axis */
+	char fov_axis[16]; /* x, y, diagonal, smaller, larger: resolved against the film size by the camera */
+	double near_clip, far_clip;
+};
+
+/* width, height: override the film's (0: keep). Exactly one sensor must be there. */
+int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, struct scene_settings *out, struct error *e);
+
+/* Declarations of perspective, hdrfilm, ldrfilm, box, tent, gaussian, all samplers, all integrators; NULL type ends. */
+extern const struct plugin_decl setting_decls[];
+
+#endif

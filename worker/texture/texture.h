@@ -1,0 +1,48 @@
+/*
+ * Textures: a colour that may depend on (u,v). One file per plug-in and one line in texture_list.h.
+ * Immutable after creation; any thread.
+ */
+#ifndef WORKER_TEXTURE_TEXTURE_H
+#define WORKER_TEXTURE_TEXTURE_H
+
+#include "worker/texture/color.h"
+#include "worker/scene/image.h"
+
+struct texture;
+
+struct texture_ops {
+	const char *type;
+	const struct param *params;
+	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role, const struct asset_source *assets,
+		      bool dialect_3, struct arena *arena, struct error *e);
+	spectrum (*eval)(const struct texture *t, double u, double v, const struct wavelengths *w);
+	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
+	enum color_shape (*shape)(const struct texture *t);
+};
+
+struct texture {
+	const struct texture_ops *ops; /* NULL: constant, `color` below */
+	struct color color;
+	void *data;
+};
+
+/* Property `name` of node n: a colour or a nested texture; `fallback` where it is absent. */
+int texture_from_node(struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		      enum color_role role, const struct asset_source *assets, bool dialect_3, struct arena *arena,
+		      struct error *e);
+
+static inline spectrum texture_eval(const struct texture *t, double u, double v, const struct wavelengths *w)
+{
+	return t->ops ? t->ops->eval(t, u, v, w) : color_eval(&t->color, w);
+}
+
+double texture_max(const struct texture *t);
+enum color_shape texture_shape(const struct texture *t);
+static inline bool texture_is_constant(const struct texture *t)
+{
+	return !t->ops;
+}
+
+extern const struct texture_ops *const texture_registry[]; /* ends with NULL */
+
+#endif
