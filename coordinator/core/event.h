@@ -1,0 +1,72 @@
+/*
+ * What happened, told to the coordinator's core (farm.h). The caller owns everything in an event; the core copies what it
+ * keeps. Times are seconds on a clock that never goes back (the core treats an earlier time as "no time passed").
+ */
+#ifndef COORDINATOR_CORE_EVENT_H
+#define COORDINATOR_CORE_EVENT_H
+
+#include "common/film/batch.h"
+#include "common/plan/plan.h"
+
+enum event_kind {
+	EVENT_TICK,           /* nothing but time: at update.wake at the latest */
+	EVENT_JOINED,         /* join */
+	EVENT_LEFT,           /* peer: its connection is gone */
+	EVENT_HEARD,          /* peer: a heartbeat (every other event of a peer counts as one) */
+	EVENT_REQUEST,        /* peer, want */
+	EVENT_BATCH,          /* peer, key, valid, text: the result of a lease */
+	EVENT_LEASE_FAILED,   /* peer, key, text: the worker tried and could not */
+	EVENT_LEASE_RETURNED, /* peer, key: given up unfinished (the worker is stopping); nobody's fault */
+	EVENT_SUBMIT,         /* tag, submit */
+	EVENT_CANCEL,         /* tag, job */
+	EVENT_PREPARED,       /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
+	EVENT_ERROR_KNOWN,    /* error_known: the answer to ACTION_EVALUATE_ERROR */
+	EVENT_JOB_BROKEN,     /* job, text: the shell cannot go on with it (a sum left the grid, the disk is full) */
+};
+
+struct event_join {
+	uint64_t peer; /* chosen by the shell, not 0, never used twice while the farm lives */
+	const char *name;
+	const char *fingerprint; /* compared as a whole */
+	uint32_t threads;
+};
+
+struct event_submit {
+	const struct plan *plan; /* checked by plan_check */
+	const char *name;
+	int priority;   /* -100..100 */
+	uint64_t owner; /* the shell's handle for who submitted; the core only keeps it */
+	bool mixed;     /* workers of any numeric fingerprint */
+};
+
+struct event {
+	enum event_kind kind;
+	double time;
+	uint64_t peer;
+	uint64_t job;
+	uint64_t tag; /* of SUBMIT and CANCEL: comes back in their answer */
+	const char *text;
+	union {
+		struct event_join join;
+		/* How many leases the worker wants to hold at once, those that it has included: its threads, one more to
+		 * hide the network's latency, 0 when it is stopping. Remembered until the next request, so that nothing
+		 * depends on how requests and leases cross on the wire. */
+		uint32_t want;
+		struct {
+			struct lease_key key;
+			bool valid; /* BATCH: batch_check and the frame's own checks passed; else text says what is wrong */
+		} lease;
+		struct event_submit submit;
+		struct {
+			uint64_t job;
+			bool ok; /* else text says why the job cannot go on */
+			bool black;
+		} prepared;
+		struct {
+			uint64_t job, rounds;
+			double rel_error; /* sqrt of the upper end of the estimated relMSE; NAN: cannot be known */
+		} error_known;
+	};
+};
+
+#endif

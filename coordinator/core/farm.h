@@ -1,0 +1,106 @@
+/*
+ * The coordinator's core: a pure state machine. No I/O, clock, threads; time is a field of the event.
+ * One thread at a time. Allocates when a worker joins or a job is submitted, never later: those two can be refused, so a
+ * step cannot fail. Memory: O(groups x parts) per live job, O(leases held) per worker, nothing per merged lease.
+ *
+ * Rules (each has a transcript in tests/coordinator/core):
+ *  - A batch is merged iff its (job, kind, group, part, epoch) is open, not merged yet, its content is valid and its
+ *    sender has the job's fingerprint, whoever holds the lease by now. A repeat is counted and dropped.
+ *  - Epoch e + 1 of a (group, part) opens when its epoch e is merged and round e + 1 is at most one ahead of the first
+ *    incomplete round: two rounds are open.
+ *  - Higher priority first; among equals the job with the fewest leases out, then the older one.
+ *  - A job belongs to the fingerprint of its first worker (again free while nothing is merged and no lease is out).
+ *  - A lease goes back to the pool when its holder leaves, is silent, fails or returns it. After 10 x the job's median
+ *    lease time (at least 60 s; doubled each time for the same lease) it is handed out again, the first answer wins.
+ *    A worker without other work gets a second copy of a lease of the first incomplete round that takes longer
+ *    than 1.5 medians; never more than two workers are on one lease otherwise.
+ *  - Invalid content is its sender's fault; after three faults in a row the worker gets no more leases.
+ *    A failed lease is tried elsewhere; its worker waits 10, 20, 40 ... s before it gets more of this job. The job fails
+ *    when nothing was ever merged and three leases failed, or one lease failed on three workers, or six times in all.
+ *  - Bounds are tested after complete rounds only. The target error is evaluated after rounds 1, 2, 3, 4, 5, 7, 9, 12 ...
+ *    (each >= 1.25 x the last) and when another bound ends the job. From the end on nothing is merged: the image is exactly the
+ *    prefix that met the bound, and depends on workers and order only if the bound is a time.
+ */
+#ifndef COORDINATOR_CORE_FARM_H
+#define COORDINATOR_CORE_FARM_H
+
+#include "coordinator/core/event.h"
+#include "coordinator/core/update.h"
+
+struct farm_config {
+	uint64_t first_job;       /* ids from here on, counted up, never reused */
+	uint32_t max_jobs;        /* not ended */
+	uint32_t max_ended;       /* remembered for status */
+	uint32_t max_peers;
+	uint32_t max_peer_leases; /* held by one worker */
+	uint32_t max_slots;       /* groups x parts of one job */
+	uint32_t max_faults;      /* of a worker in a row */
+	double silent_after;      /* s without a word: leases taken back */
+	double forget_after;      /* s without a word: hung up */
+	double first_timeout;     /* of a lease before the job has a median */
+	double min_timeout;
+	double preview_interval;  /* between previews of one job; 0: none */
+};
+void farm_config_init(struct farm_config *c); /* first_job 1 and sane limits */
+
+struct farm;
+int farm_new(struct farm **f, const struct farm_config *c, struct error *e); /* -EINVAL, -ENOMEM */
+void farm_free(struct farm *f);
+void farm_step(struct farm *f, const struct event *ev, struct update *u);
+
+/* Questions, for status. Pointers inside are valid until the next step. */
+struct job_status {
+	uint64_t id, owner;
+	const char *name;
+	int priority;
+	bool mixed;
+	const struct plan *plan;
+	enum job_state state;
+	enum job_end end;
+	const char *fingerprint; /* "" while it belongs to none */
+	double submitted, started, ended; /* started: the first lease sent; NAN when it has not come yet */
+	double progress;                  /* [0,1], never falls */
+	double rate;                      /* merged mutations (bootstrap: samples) a second, over the last half minute */
+	double eta;                       /* s; NAN: unknown */
+	double rel_error;                 /* last evaluated; NAN: none */
+	uint64_t rel_error_rounds;
+	uint64_t rounds;                  /* complete */
+	uint64_t bootstrap_merged, leases_merged, mutations; /* leases_merged: render leases, open rounds too */
+	uint32_t leases_out;
+	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
+	char text[256];    /* why it failed, or the last failure of a lease */
+	char waiting[256]; /* why nothing is being done for it; "" when something is */
+};
+
+enum peer_state { PEER_ACTIVE, PEER_SILENT, PEER_ASIDE };
+struct peer_status {
+	uint64_t id;
+	const char *name, *fingerprint;
+	uint32_t threads, want, leases;
+	enum peer_state state;
+	double joined, heard;
+	uint64_t merged, repeats, refused, faults, failures, timeouts;
+	char text[256]; /* its last fault or failure */
+};
+
+struct lease_status {
+	struct lease_key key;
+	uint64_t peer;
+	double sent, deadline;
+	bool overdue; /* handed out again; an answer still counts if it is the first */
+};
+
+/* The smallest id above `after` (start with 0); 0: no more. */
+uint64_t farm_next_job(const struct farm *f, uint64_t after);
+uint64_t farm_next_peer(const struct farm *f, uint64_t after);
+bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s);   /* false: unknown */
+bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s);
+bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s); /* i-th lease of a worker */
+
+bool job_state_is_end(enum job_state s);
+const char *job_state_name(enum job_state s); /* as in the status: "queued" ... */
+const char *job_end_name(enum job_end e);     /* "mutations" ... */
+/* Of a program that waited for the job: 0 done, 3 failed or cancelled, 4 a bound came before the target error. */
+int job_exit_code(const struct job_status *s);
+
+#endif
