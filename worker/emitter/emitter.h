@@ -21,7 +21,7 @@ struct emitter_point {
 struct emitter_surface {
 	bool is_sphere;
 	vec3 center;
-	double radius, normal_sign; /* sphere; -1: normals point inwards. Triangles: by winding */
+	double radius, normal_sign; /* -1: normals point inwards */
 	uint32_t triangle_count;
 	const float (*position)[3];
 	const uint32_t (*index)[3];

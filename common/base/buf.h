@@ -1,0 +1,23 @@
+/*
+ * Bytes that grow up to a hard limit. One thread at a time. Zeroed memory with `limit` set is an empty buffer.
+ */
+#ifndef COMMON_BASE_BUF_H
+#define COMMON_BASE_BUF_H
+
+#include <stdbool.h>
+#include <stddef.h>
+
+struct buf {
+	unsigned char *bytes;
+	size_t size, capacity;
+	size_t limit; /* never more than this many bytes */
+};
+
+/* Room for `count` bytes more. false: the limit or memory is out; the buffer is unchanged. */
+bool buf_reserve(struct buf *b, size_t count);
+bool buf_append(struct buf *b, const void *bytes, size_t count);
+/* Formatted text without its final zero. */
+__attribute__((format(printf, 2, 3))) bool buf_print(struct buf *b, const char *format, ...);
+void buf_fini(struct buf *b); /* the limit stays */
+
+#endif

@@ -1,0 +1,63 @@
+/*
+ * Log lines of the daemons: one logfmt line an event on stderr, "time=... level=... event=... key=value ...".
+ * The vocabulary is the table below: what is not in it is not logged, so that a line can be searched for by name.
+ * Any thread (one write a line). Libraries do not log.
+ */
+#ifndef COMMON_BASE_LOG_H
+#define COMMON_BASE_LOG_H
+
+#include <stddef.h>
+
+#define LOG_EVENTS(X) \
+	X(START, "start", INFO) \
+	X(LISTEN, "listen", INFO) \
+	X(STOP, "stop", INFO) \
+	X(PEER_ACCEPT, "peer_accept", DEBUG) \
+	X(PEER_HELLO, "peer_hello", INFO) \
+	X(PEER_REFUSED, "peer_refused", WARN) \
+	X(PEER_CLOSED, "peer_closed", INFO) \
+	X(PEER_FAULT, "peer_fault", WARN) \
+	X(CONNECT, "connect", INFO) \
+	X(CONNECT_FAILED, "connect_failed", WARN) \
+	X(JOB_SUBMIT, "job_submit", INFO) \
+	X(JOB_STATE, "job_state", INFO) \
+	X(JOB_NOTE, "job_note", INFO) \
+	X(JOB_DONE, "job_done", INFO) \
+	X(JOB_FAILED, "job_failed", ERROR) \
+	X(LEASE_GRANTED, "lease_granted", DEBUG) \
+	X(LEASE_TAKEN_BACK, "lease_taken_back", INFO) \
+	X(LEASE_FAILED, "lease_failed", WARN) \
+	X(BATCH_MERGED, "batch_merged", DEBUG) \
+	X(BATCH_REPEATED, "batch_repeated", INFO) \
+	X(BATCH_REFUSED, "batch_refused", WARN) \
+	X(BLOB_STORED, "blob_stored", DEBUG) \
+	X(BLOB_EVICTED, "blob_evicted", INFO) \
+	X(WORLD_BUILT, "world_built", INFO) \
+	X(WORLD_FAILED, "world_failed", ERROR) \
+	X(SPOOL_READ, "spool_read", INFO) \
+	X(SPOOL_FAULT, "spool_fault", ERROR)
+
+enum log_event {
+#define LOG_ENUM(name, text, level) LOG_##name,
+	LOG_EVENTS(LOG_ENUM)
+#undef LOG_ENUM
+};
+
+enum log_level { LOG_LEVEL_DEBUG, LOG_LEVEL_INFO, LOG_LEVEL_WARN, LOG_LEVEL_ERROR };
+
+void log_set_level(enum log_level least); /* INFO at first */
+
+/* fields: "job=j%llu name=%s"; texts from outside go through log_quote. A line is at most 2,047 bytes. */
+__attribute__((format(printf, 2, 3))) void log_event(enum log_event event, const char *fields, ...);
+
+enum { LOG_VALUE_MAX = 512 };
+struct log_value {
+	char text[LOG_VALUE_MAX];
+};
+/* "text" with quotes, and without control characters, cut to fit. */
+struct log_value log_quote(const char *text);
+
+/* The line as log_event writes it, without the newline; for logs of jobs. Returns its length. */
+size_t log_format(char *line, size_t size, enum log_event event, const char *fields);
+
+#endif

@@ -1,0 +1,387 @@
+#include "common/blob/blob.h"
+
+#include "common/base/mem.h"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <openssl/evp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <time.h>
+#include <unistd.h>
+
+struct entry {
+	struct blob_hash hash;
+	uint64_t size, used; /* used: a counter that grows with every use */
+	unsigned holds;
+};
+
+struct blob_store {
+	char *folder;
+	int fd;
+	uint64_t limit, bytes, clock;
+	uint64_t temporary; /* number of the last temporary file */
+	struct entry *entries;
+	size_t count, capacity;
+};
+
+struct blob_writer {
+	struct blob_store *store;
+	struct blob_hash hash;
+	uint64_t size, at;
+	int fd;
+	char name[48];
+	EVP_MD_CTX *md;
+};
+
+/* ---- hashes ---- */
+
+int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struct error *e)
+{
+	unsigned n = 0;
+	if (EVP_Digest(bytes, size, out->bytes, &n, EVP_sha256(), NULL) != 1 || n != BLOB_HASH_SIZE)
+		return error_set(e, EIO, "SHA-256 failed");
+	return 0;
+}
+
+int blob_hash_file(const char *path, struct blob_hash *out, uint64_t *size, struct error *e)
+{
+	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	if (fd < 0)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	EVP_MD_CTX *md = EVP_MD_CTX_new();
+	unsigned char *chunk = mem_alloc(1, 1 << 16);
+	int rc = md && chunk && EVP_DigestInit_ex(md, EVP_sha256(), NULL) == 1
+			 ? 0
+			 : error_set(e, ENOMEM, "%s: SHA-256 cannot start", path);
+	ssize_t n = 1;
+	*size = 0;
+	while (!rc && (n = read(fd, chunk, 1 << 16)) > 0) {
+		*size += (uint64_t)n;
+		if (EVP_DigestUpdate(md, chunk, (size_t)n) != 1)
+			rc = error_set(e, EIO, "%s: SHA-256 failed", path);
+	}
+	if (!rc && n < 0)
+		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	if (!rc && EVP_DigestFinal_ex(md, out->bytes, NULL) != 1)
+		rc = error_set(e, EIO, "%s: SHA-256 failed", path);
+	mem_free(chunk);
+	EVP_MD_CTX_free(md);
+	close(fd);
+	return rc;
+}
+
+void blob_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE])
+{
+	for (int i = 0; i < BLOB_HASH_SIZE; i++)
+		snprintf(hex + 2 * i, 3, "%02x", h->bytes[i]);
+}
+
+static int digit(char c)
+{
+	return c >= '0' && c <= '9' ? c - '0' : c >= 'a' && c <= 'f' ? c - 'a' + 10 : -1;
+}
+
+static bool from_hex(const char *hex, struct blob_hash *h)
+{
+	if (strlen(hex) != 2 * BLOB_HASH_SIZE)
+		return false;
+	for (int i = 0; i < BLOB_HASH_SIZE; i++) {
+		int high = digit(hex[2 * i]), low = digit(hex[2 * i + 1]);
+		if (high < 0 || low < 0)
+			return false;
+		h->bytes[i] = (uint8_t)(high << 4 | low);
+	}
+	return true;
+}
+
+bool blob_hash_equal(const struct blob_hash *a, const struct blob_hash *b)
+{
+	return memcmp(a->bytes, b->bytes, BLOB_HASH_SIZE) == 0;
+}
+
+/* ---- the store ---- */
+
+static struct entry *find(struct blob_store *s, const struct blob_hash *h)
+{
+	for (size_t i = 0; i < s->count; i++)
+		if (blob_hash_equal(&s->entries[i].hash, h))
+			return &s->entries[i];
+	return NULL;
+}
+
+static int add_entry(struct blob_store *s, const struct blob_hash *h, uint64_t size, unsigned holds, struct error *e)
+{
+	if (s->count == s->capacity) {
+		size_t want = s->capacity ? 2 * s->capacity : 64;
+		struct entry *grown = mem_grow(s->entries, s->capacity * sizeof *grown, want * sizeof *grown);
+		if (!grown)
+			return error_set(e, ENOMEM, "no memory for the list of blobs");
+		s->entries = grown;
+		s->capacity = want;
+	}
+	s->entries[s->count++] = (struct entry){*h, size, ++s->clock, holds};
+	s->bytes += size;
+	return 0;
+}
+
+struct found {
+	struct blob_hash hash;
+	uint64_t size;
+	struct timespec used;
+};
+
+static int by_age(const void *a, const void *b)
+{
+	const struct found *x = a, *y = b;
+	if (x->used.tv_sec != y->used.tv_sec)
+		return x->used.tv_sec < y->used.tv_sec ? -1 : 1;
+	return (x->used.tv_nsec > y->used.tv_nsec) - (x->used.tv_nsec < y->used.tv_nsec);
+}
+
+/* The folder's files, oldest use first, so that the order of use outlives a restart. */
+static int read_folder(struct blob_store *s, struct error *e)
+{
+	struct found *all = NULL;
+	size_t count = 0, capacity = 0;
+	int rc = 0, copy = dup(s->fd);
+	DIR *d = copy < 0 ? NULL : fdopendir(copy);
+	if (!d)
+		return error_set(e, errno, "%s: %s", s->folder, strerror(errno));
+	for (struct dirent *f; !rc && (f = readdir(d));) {
+		struct stat st;
+		struct blob_hash h;
+		if (strncmp(f->d_name, "tmp.", 4) == 0)
+			unlinkat(s->fd, f->d_name, 0);
+		if (!from_hex(f->d_name, &h) || fstatat(s->fd, f->d_name, &st, AT_SYMLINK_NOFOLLOW) || !S_ISREG(st.st_mode))
+			continue;
+		if (count == capacity) {
+			size_t want = capacity ? 2 * capacity : 64;
+			struct found *grown = mem_grow(all, capacity * sizeof *all, want * sizeof *all);
+			if (!grown) {
+				rc = error_set(e, ENOMEM, "%s: no memory for its list of files", s->folder);
+				break;
+			}
+			all = grown;
+			capacity = want;
+		}
+		all[count++] = (struct found){h, (uint64_t)st.st_size, st.st_mtim};
+	}
+	closedir(d);
+	if (count)
+		qsort(all, count, sizeof *all, by_age);
+	for (size_t i = 0; !rc && i < count; i++)
+		rc = add_entry(s, &all[i].hash, all[i].size, 0, e);
+	mem_free(all);
+	return rc;
+}
+
+/* Forgets blobs that nobody holds until `need` bytes more fit. */
+static int make_room(struct blob_store *s, uint64_t need, struct error *e)
+{
+	while (s->limit && (need > s->limit || s->bytes > s->limit - need)) {
+		struct entry *oldest = NULL;
+		for (size_t i = 0; i < s->count; i++)
+			if (!s->entries[i].holds && (!oldest || s->entries[i].used < oldest->used))
+				oldest = &s->entries[i];
+		if (!oldest)
+			return error_set(e, EFBIG,
+					 "%s: %llu bytes more do not fit below its limit of %llu beside what is in use",
+					 s->folder, (unsigned long long)need, (unsigned long long)s->limit);
+		char hex[BLOB_HEX_SIZE];
+		blob_hex(&oldest->hash, hex);
+		unlinkat(s->fd, hex, 0);
+		s->bytes -= oldest->size;
+		*oldest = s->entries[--s->count];
+	}
+	return 0;
+}
+
+int blob_store_open(struct blob_store **out, const char *folder, uint64_t limit, struct error *e)
+{
+	struct blob_store *s = mem_alloc(1, sizeof *s);
+	if (!s || !(s->folder = mem_strdup(folder))) {
+		mem_free(s);
+		return error_set(e, ENOMEM, "no memory for a blob store");
+	}
+	s->limit = limit;
+	int rc = 0;
+	if (mkdir(folder, 0700) && errno != EEXIST)
+		rc = error_set(e, errno, "%s: %s", folder, strerror(errno));
+	s->fd = rc ? -1 : open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+	if (!rc && s->fd < 0)
+		rc = error_set(e, errno, "%s: %s", folder, strerror(errno));
+	if (!rc)
+		rc = read_folder(s, e);
+	if (!rc)
+		rc = make_room(s, 0, e);
+	if (rc)
+		blob_store_close(s);
+	else
+		*out = s;
+	return rc;
+}
+
+void blob_store_close(struct blob_store *s)
+{
+	if (!s)
+		return;
+	if (s->fd >= 0)
+		close(s->fd);
+	mem_free(s->entries);
+	mem_free(s->folder);
+	mem_free(s);
+}
+
+uint64_t blob_store_bytes(const struct blob_store *s)
+{
+	return s->bytes;
+}
+
+static struct entry *touch(struct blob_store *s, const struct blob_hash *h)
+{
+	struct entry *n = find(s, h);
+	if (!n)
+		return NULL;
+	char hex[BLOB_HEX_SIZE];
+	blob_hex(h, hex);
+	n->used = ++s->clock;
+	if (s->limit)
+		utimensat(s->fd, hex, NULL, 0);
+	return n;
+}
+
+bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size)
+{
+	struct entry *n = find(s, h);
+	if (n && size)
+		*size = n->size;
+	return n != NULL;
+}
+
+bool blob_hold(struct blob_store *s, const struct blob_hash *h)
+{
+	struct entry *n = touch(s, h);
+	if (n)
+		n->holds++;
+	return n != NULL;
+}
+
+void blob_release(struct blob_store *s, const struct blob_hash *h)
+{
+	struct entry *n = find(s, h);
+	if (n && n->holds)
+		n->holds--;
+}
+
+int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e)
+{
+	char hex[BLOB_HEX_SIZE];
+	blob_hex(h, hex);
+	struct entry *n = touch(s, h);
+	int fd = n ? openat(s->fd, hex, O_RDONLY | O_CLOEXEC | O_NOFOLLOW) : -1;
+	if (fd < 0)
+		return error_set(e, ENOENT, "there is no blob %s", hex);
+	*size = n->size;
+	return fd;
+}
+
+/* ---- writing ---- */
+
+int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struct blob_hash *h, uint64_t size,
+		     struct error *e)
+{
+	int rc = make_room(s, size, e);
+	if (rc)
+		return rc;
+	struct blob_writer *w = mem_alloc(1, sizeof *w);
+	if (!w)
+		return error_set(e, ENOMEM, "no memory for a blob");
+	w->store = s;
+	w->hash = *h;
+	w->size = size;
+	w->md = EVP_MD_CTX_new();
+	snprintf(w->name, sizeof w->name, "tmp.%ld.%llu", (long)getpid(), (unsigned long long)++s->temporary);
+	w->fd = openat(s->fd, w->name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+	if (w->fd < 0)
+		rc = error_set(e, errno, "%s: %s", s->folder, strerror(errno));
+	else if (!w->md || EVP_DigestInit_ex(w->md, EVP_sha256(), NULL) != 1)
+		rc = error_set(e, ENOMEM, "SHA-256 cannot start");
+	if (rc)
+		blob_write_abort(w);
+	else
+		*out = w;
+	return rc;
+}
+
+uint64_t blob_write_at(const struct blob_writer *w)
+{
+	return w->at;
+}
+
+int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct error *e)
+{
+	if (size > w->size - w->at)
+		return error_set(e, EFBIG, "more bytes than were announced");
+	if (EVP_DigestUpdate(w->md, bytes, size) != 1)
+		return error_set(e, EIO, "SHA-256 failed");
+	for (const char *p = bytes; size;) {
+		ssize_t n = write(w->fd, p, size);
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n < 0)
+			return error_set(e, errno, "%s: %s", w->store->folder, strerror(errno));
+		p += n;
+		size -= (size_t)n;
+		w->at += (uint64_t)n;
+	}
+	return 0;
+}
+
+static int finish(struct blob_writer *w, struct error *e)
+{
+	struct blob_store *s = w->store;
+	struct blob_hash got;
+	char hex[BLOB_HEX_SIZE];
+	if (w->at != w->size)
+		return error_set(e, EBADMSG, "a blob of %llu bytes instead of %llu", (unsigned long long)w->at,
+				 (unsigned long long)w->size);
+	if (EVP_DigestFinal_ex(w->md, got.bytes, NULL) != 1)
+		return error_set(e, EIO, "SHA-256 failed");
+	blob_hex(&w->hash, hex);
+	if (!blob_hash_equal(&got, &w->hash))
+		return error_set(e, EBADMSG, "the bytes are not those of the blob %s", hex);
+	if (blob_hold(s, &w->hash)) { /* somebody else brought it in the meantime */
+		unlinkat(s->fd, w->name, 0);
+		return 0;
+	}
+	if (fsync(w->fd) || renameat(s->fd, w->name, s->fd, hex))
+		return error_set(e, errno, "%s: %s", s->folder, strerror(errno));
+	return add_entry(s, &w->hash, w->size, 1, e);
+}
+
+static void writer_free(struct blob_writer *w)
+{
+	if (w->fd >= 0)
+		close(w->fd);
+	EVP_MD_CTX_free(w->md);
+	mem_free(w);
+}
+
+int blob_write_commit(struct blob_writer *w, struct error *e)
+{
+	int rc = finish(w, e);
+	if (rc)
+		unlinkat(w->store->fd, w->name, 0);
+	writer_free(w);
+	return rc;
+}
+
+void blob_write_abort(struct blob_writer *w)
+{
+	if (w->fd >= 0)
+		unlinkat(w->store->fd, w->name, 0);
+	writer_free(w);
+}

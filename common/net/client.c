@@ -1,0 +1,369 @@
+#include "common/net/client.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+
+#include <assert.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum {
+	HEADER_LIMIT = 1 << 22,
+	PAYLOAD_LIMIT = 1 << 21,
+	WAITING_MAX = 4096, /* messages not yet asked for */
+	ANSWER_SECONDS = 60,
+	HELLO_SECONDS = 10,
+};
+
+struct waiting {
+	struct waiting *next;
+	struct client_message message;
+};
+
+struct client {
+	uv_loop_t loop;
+	uv_timer_t timeout, heartbeat;
+	struct conn *conn; /* NULL: closed */
+	struct waiting *first, **last;
+	unsigned waiting_count;
+	bool opened, timed_out;
+	char why[256];
+};
+
+static void on_opened(void *user)
+{
+	struct client *cl = user;
+	cl->opened = true;
+}
+
+static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	struct client *cl = user;
+	struct waiting *w = mem_alloc(1, sizeof *w);
+	if (env->message->body_case == FARM__ENVELOPE__BODY_HEARTBEAT || !w) {
+		mem_free(w);
+		return;
+	}
+	w->message.payload.limit = size;
+	if (++cl->waiting_count > WAITING_MAX || !buf_append(&w->message.payload, payload, size)) {
+		mem_free(w);
+		conn_close(cl->conn, "no memory for what the coordinator sends");
+		return;
+	}
+	w->message.envelope = *env;
+	memset(env, 0, sizeof *env);
+	*cl->last = w;
+	cl->last = &w->next;
+}
+
+static void on_closed(void *user, const char *why)
+{
+	struct client *cl = user;
+	cl->conn = NULL;
+	text_copy(cl->why, sizeof cl->why, why);
+}
+
+static const struct conn_events events = {on_opened, on_message, NULL, on_closed};
+
+static void on_timeout(uv_timer_t *t)
+{
+	struct client *cl = t->data;
+	cl->timed_out = true;
+}
+
+static void on_heartbeat(uv_timer_t *t)
+{
+	struct client *cl = t->data;
+	Farm__Heartbeat beat;
+	farm__heartbeat__init(&beat);
+	Farm__Envelope m;
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
+	m.heartbeat = &beat;
+	if (cl->conn)
+		conn_send(cl->conn, &m, NULL, 0);
+}
+
+static void start_clock(struct client *cl, double seconds)
+{
+	cl->timed_out = false;
+	uv_timer_stop(&cl->timeout);
+	uv_update_time(&cl->loop);
+	if (seconds >= 0)
+		uv_timer_start(&cl->timeout, on_timeout, (uint64_t)(1000 * seconds), 0);
+}
+
+int client_send(struct client *cl, const Farm__Envelope *m, const void *payload, size_t size, struct error *e)
+{
+	if (cl->conn)
+		conn_send(cl->conn, m, payload, size);
+	start_clock(cl, ANSWER_SECONDS);
+	while (cl->conn && conn_unsent(cl->conn) && !cl->timed_out)
+		uv_run(&cl->loop, UV_RUN_ONCE);
+	if (!cl->conn && !cl->first)
+		return error_set(e, ECONNRESET, "the connection to the coordinator is gone: %s", cl->why);
+	return cl->timed_out ? error_set(e, ETIMEDOUT, "the coordinator does not take what is sent to it") : 0;
+}
+
+int client_wait(struct client *cl, double seconds, struct client_message *m, struct error *e)
+{
+	memset(m, 0, sizeof *m);
+	start_clock(cl, seconds);
+	while (!cl->first && cl->conn && !cl->timed_out)
+		uv_run(&cl->loop, UV_RUN_ONCE);
+	struct waiting *w = cl->first;
+	if (!w && !cl->conn)
+		return error_set(e, ECONNRESET, "the connection to the coordinator is gone: %s", cl->why);
+	if (!w)
+		return error_set(e, ETIMEDOUT, "the coordinator did not answer in time");
+	*m = w->message;
+	cl->first = w->next;
+	if (!cl->first)
+		cl->last = &cl->first;
+	cl->waiting_count--;
+	mem_free(w);
+	if (m->envelope.message->body_case != FARM__ENVELOPE__BODY_FAULT)
+		return 0;
+	error_set(e, EPROTO, "the coordinator says: %s", m->envelope.message->fault->text);
+	client_message_fini(m);
+	return -EPROTO;
+}
+
+int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__BodyCase want, struct client_message *answer,
+		struct error *e)
+{
+	memset(answer, 0, sizeof *answer);
+	int rc = client_send(cl, m, NULL, 0, e);
+	if (!rc)
+		rc = client_wait(cl, ANSWER_SECONDS, answer, e);
+	if (!rc && answer->envelope.message->body_case != want) {
+		client_message_fini(answer);
+		rc = error_set(e, EPROTO, "the coordinator's answer is not to the question");
+	}
+	return rc;
+}
+
+void client_message_fini(struct client_message *m)
+{
+	envelope_fini(&m->envelope);
+	buf_fini(&m->payload);
+}
+
+static int say_hello(struct client *cl, const char *host_port, const char *name, struct error *e)
+{
+	Farm__Hello hello;
+	farm__hello__init(&hello);
+	Farm__Envelope m;
+	farm__envelope__init(&m);
+	char own[128];
+	struct client_message answer;
+	text_copy(own, sizeof own, name);
+	hello.version = FARM_VERSION;
+	hello.role = FARM__ROLE__ROLE_CLIENT;
+	hello.name = own;
+	m.body_case = FARM__ENVELOPE__BODY_HELLO;
+	m.hello = &hello;
+	int rc = client_send(cl, &m, NULL, 0, e);
+	if (!rc)
+		rc = client_wait(cl, HELLO_SECONDS, &answer, e);
+	if (rc)
+		return rc == -EPROTO ? rc : error_set(e, ECONNREFUSED, "no coordinator answers at %s", host_port);
+	const Farm__Envelope *a = answer.envelope.message;
+	if (a->body_case != FARM__ENVELOPE__BODY_HELLO_ACK)
+		rc = error_set(e, ECONNREFUSED, "what answers at %s is no coordinator", host_port);
+	else if (!a->hello_ack->accepted)
+		rc = error_set(e, EPROTO, "the coordinator at %s refuses: %s", host_port, a->hello_ack->text);
+	else if (a->hello_ack->heartbeat_ms >= 10)
+		uv_timer_start(&cl->heartbeat, on_heartbeat, a->hello_ack->heartbeat_ms, a->hello_ack->heartbeat_ms);
+	client_message_fini(&answer);
+	return rc;
+}
+
+int client_open(struct client **out, const char *host_port, bool insecure, const char *name, struct error *e)
+{
+	struct net_addr a;
+	int rc = net_addr_resolve(&a, host_port, e);
+	if (!rc)
+		rc = net_addr_allow(&a, host_port, insecure, e);
+	if (rc)
+		return rc;
+	struct client *cl = mem_alloc(1, sizeof *cl);
+	if (!cl)
+		return error_set(e, ENOMEM, "no memory for a connection");
+	signal(SIGPIPE, SIG_IGN);
+	cl->last = &cl->first;
+	rc = uv_loop_init(&cl->loop);
+	if (rc) {
+		mem_free(cl);
+		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
+	}
+	uv_timer_init(&cl->loop, &cl->timeout);
+	uv_timer_init(&cl->loop, &cl->heartbeat);
+	cl->timeout.data = cl->heartbeat.data = cl;
+	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, 1 << 23, 30, 0};
+	rc = conn_connect(&cl->conn, &cl->loop, &a, &config, &events, cl, e);
+	start_clock(cl, HELLO_SECONDS);
+	while (!rc && cl->conn && !cl->opened && !cl->timed_out)
+		uv_run(&cl->loop, UV_RUN_ONCE);
+	if (!rc && !cl->opened)
+		rc = error_set(e, ECONNREFUSED, "no coordinator at %s: %s", host_port,
+			       cl->timed_out ? "no answer in time" : cl->why);
+	if (!rc)
+		rc = say_hello(cl, host_port, name, e);
+	if (rc)
+		client_close(cl);
+	else
+		*out = cl;
+	return rc;
+}
+
+void client_close(struct client *cl)
+{
+	if (!cl)
+		return;
+	if (cl->conn)
+		conn_close(cl->conn, "done");
+	uv_close((uv_handle_t *)&cl->timeout, NULL);
+	uv_close((uv_handle_t *)&cl->heartbeat, NULL);
+	uv_run(&cl->loop, UV_RUN_DEFAULT);
+	int rc = uv_loop_close(&cl->loop);
+	assert(rc == 0);
+	(void)rc;
+	while (cl->first) {
+		struct waiting *next = cl->first->next;
+		client_message_fini(&cl->first->message);
+		mem_free(cl->first);
+		cl->first = next;
+	}
+	mem_free(cl);
+}
+
+int client_exit_code(int rc)
+{
+	if (rc == -ECONNREFUSED || rc == -ECONNRESET || rc == -ETIMEDOUT || rc == -EHOSTUNREACH)
+		return 75;
+	if (rc == -EINVAL || rc == -EPERM)
+		return 2;
+	return rc == -EACCES || rc == -EPROTO ? 6 : 1;
+}
+
+/* ---- fetching ---- */
+
+static int fetch_chunk(struct client *cl, uint64_t job, Farm__What what, uint64_t offset, struct client_message *answer,
+		       struct error *e)
+{
+	Farm__Fetch fetch;
+	farm__fetch__init(&fetch);
+	Farm__Envelope m;
+	farm__envelope__init(&m);
+	fetch.job = job;
+	fetch.what = what;
+	fetch.offset = offset;
+	m.body_case = FARM__ENVELOPE__BODY_FETCH;
+	m.fetch = &fetch;
+	int rc = client_call(cl, &m, FARM__ENVELOPE__BODY_FETCH_CHUNK, answer, e);
+	if (rc)
+		return rc;
+	const Farm__FetchChunk *c = answer->envelope.message->fetch_chunk;
+	if (*c->error)
+		rc = error_set(e, ENOENT, "%s", c->error);
+	else if (c->offset != offset || (answer->payload.size == 0 && offset < c->size) ||
+		 answer->payload.size > c->size - offset)
+		rc = error_set(e, EPROTO, "the coordinator sends other bytes than those asked for");
+	if (rc)
+		client_message_fini(answer);
+	return rc;
+}
+
+static int write_all(int fd, const unsigned char *bytes, size_t size, struct error *e)
+{
+	while (size) {
+		ssize_t n = write(fd, bytes, size);
+		if (n < 0 && errno != EINTR)
+			return error_set(e, errno, "cannot write: %s", strerror(errno));
+		if (n > 0) {
+			bytes += n;
+			size -= (size_t)n;
+		}
+	}
+	return 0;
+}
+
+static int fetch_rest(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, int fd,
+		      struct error *e)
+{
+	uint64_t size = first->envelope.message->fetch_chunk->size, at = first->payload.size;
+	int rc = write_all(fd, first->payload.bytes, first->payload.size, e);
+	while (!rc && at < size) {
+		struct client_message more;
+		rc = fetch_chunk(cl, job, what, at, &more, e);
+		if (rc)
+			break;
+		if (more.envelope.message->fetch_chunk->size < size)
+			rc = error_set(e, EPROTO, "the file changed while it was fetched");
+		if (!rc)
+			rc = write_all(fd, more.payload.bytes, more.payload.size, e);
+		at += more.payload.size;
+		client_message_fini(&more);
+	}
+	return rc;
+}
+
+int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e)
+{
+	struct client_message first;
+	int rc = fetch_chunk(cl, job, what, 0, &first, e);
+	if (rc)
+		return rc;
+	rc = fetch_rest(cl, &first, job, what, fd, e);
+	client_message_fini(&first);
+	return rc;
+}
+
+static int fetch_file(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, const char *path,
+		      struct error *e)
+{
+	char temporary[4096];
+	int n = snprintf(temporary, sizeof temporary, "%s.XXXXXX", path);
+	if (n < 0 || (size_t)n >= sizeof temporary)
+		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
+	int fd = mkstemp(temporary);
+	if (fd < 0)
+		return error_set(e, errno, "%s: cannot make a file there: %s", path, strerror(errno));
+	mode_t mask = umask(0);
+	umask(mask);
+	int rc = fetch_rest(cl, first, job, what, fd, e);
+	if (!rc && (fchmod(fd, 0666 & ~mask) || fsync(fd)))
+		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	if (close(fd) && !rc)
+		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	if (!rc && rename(temporary, path))
+		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	if (rc)
+		unlink(temporary);
+	return rc;
+}
+
+int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, char *output, size_t output_size,
+		 struct error *e)
+{
+	struct client_message first;
+	int rc = fetch_chunk(cl, job, what, 0, &first, e);
+	if (rc)
+		return rc;
+	if (!path || !*path)
+		path = first.envelope.message->fetch_chunk->output;
+	if (!*path)
+		rc = error_set(e, EINVAL, "the job has no default name for its result: give one with -o FILE");
+	if (!rc && output)
+		text_copy(output, output_size, path);
+	if (!rc)
+		rc = fetch_file(cl, &first, job, what, path, e);
+	client_message_fini(&first);
+	return rc;
+}

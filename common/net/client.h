@@ -1,0 +1,43 @@
+/*
+ * The client's side of the conversation (hslt-submit, hslt-job): says hello, then sends and waits, one step at a time,
+ * with a loop of its own. One thread.
+ */
+#ifndef COMMON_NET_CLIENT_H
+#define COMMON_NET_CLIENT_H
+
+#include "common/base/buf.h"
+#include "common/net/conn.h"
+
+struct client;
+
+struct client_message { /* fini with client_message_fini */
+	struct envelope envelope;
+	struct buf payload;
+};
+
+/* Connects and exchanges hello. -ECONNREFUSED when nobody is there (also what is not one of ours: nothing else answers
+ * in time), -EPROTO when hello is refused. */
+int client_open(struct client **cl, const char *host_port, bool insecure, const char *name, struct error *e);
+void client_close(struct client *cl);
+
+/* Sends and waits until it is with the kernel. */
+int client_send(struct client *cl, const Farm__Envelope *m, const void *payload, size_t size, struct error *e);
+/* The next message. -ETIMEDOUT after `seconds` (< 0: waits for ever), -ECONNRESET when the connection is gone, -EPROTO
+ * when the coordinator found fault with us. */
+int client_wait(struct client *cl, double seconds, struct client_message *m, struct error *e);
+/* Sends, and waits for a message of this kind; any other is -EPROTO. */
+int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__BodyCase want, struct client_message *answer,
+		struct error *e);
+void client_message_fini(struct client_message *m);
+
+/* Fetches a job's result or log piece by piece into the file: temporary file beside it, then rename. `output`
+ * (may be NULL): the name that hslt-submit gave, when path is NULL or "". */
+int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, char *output, size_t output_size,
+		 struct error *e);
+/* The same, to a stream. */
+int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e);
+
+/* The exit code for a failure of the functions above: 75 unreachable, 6 refused, else 1. */
+int client_exit_code(int rc);
+
+#endif

@@ -1,0 +1,50 @@
+/*
+ * One connection: frames in and out over a TCP stream of libuv, with limits. All calls and callbacks on the loop's thread.
+ * The connection owns its memory: after conn_close (or a fault) `closed` comes exactly once, from the loop and never from
+ * inside another call, and the connection is gone when it returns; no other callback comes in between.
+ */
+#ifndef COMMON_NET_CONN_H
+#define COMMON_NET_CONN_H
+
+#include "common/net/addr.h"
+#include "common/wire/envelope.h"
+#include "common/wire/frame.h"
+
+#include <uv.h>
+
+struct conn;
+
+struct conn_events {
+	void (*opened)(void *user); /* conn_connect only; may be NULL */
+	/* The envelope may be taken (copied and zeroed); the payload is there during the call only. */
+	void (*message)(void *user, struct envelope *env, const unsigned char *payload, size_t payload_size);
+	void (*drained)(void *user); /* all that was sent is with the kernel; may be NULL */
+	void (*closed)(void *user, const char *why);
+};
+
+struct conn_config {
+	struct frame_limits limits;
+	size_t send_limit;    /* bytes waiting to be sent; a peer that lets more pile up is cut off */
+	double stall_seconds; /* a frame that has begun must be whole after this long + 1 s per 64 KB */
+	double quiet_seconds; /* nothing heard for so long: cut off; 0: never */
+};
+
+/* -errno when not even an attempt could be made; else opened or closed comes later. */
+int conn_connect(struct conn **c, uv_loop_t *loop, const struct net_addr *a, const struct conn_config *config,
+		 const struct conn_events *events, void *user, struct error *e);
+int conn_accept(struct conn **c, uv_stream_t *listener, const struct conn_config *config,
+		const struct conn_events *events, void *user, struct error *e);
+
+void conn_set_limits(struct conn *c, struct frame_limits limits);
+void conn_set_quiet(struct conn *c, double seconds);
+void conn_peer_name(const struct conn *c, char *text, size_t size); /* numeric HOST:PORT */
+
+/* Packs and sends; the payload is copied. A failure closes the connection, so callers need not look. */
+void conn_send(struct conn *c, const Farm__Envelope *message, const void *payload, size_t payload_size);
+void conn_send_frame(struct conn *c, unsigned char *frame, size_t size); /* takes the mem_alloc'd frame */
+size_t conn_unsent(const struct conn *c);
+
+void conn_close(struct conn *c, const char *why);
+void conn_close_when_sent(struct conn *c, const char *why); /* nothing is read any more; at most 5 s */
+
+#endif

@@ -1,0 +1,350 @@
+#include "common/wire/batch_wire.h"
+
+#include "common/base/mem.h"
+#include "common/film/exr.h"
+
+#include <string.h>
+
+enum { PAYLOAD_MOST = 1 << 30 };
+
+static uint32_t chains_per_lease(const struct plan *p)
+{
+	return p->kind == PLAN_CHAINS ? p->chains / (p->groups * p->parts) : 0;
+}
+
+uint32_t states_payload_max(const struct plan *p)
+{
+	uint64_t n = (uint64_t)chains_per_lease(p) * CHAIN_STATE_MAX;
+	return n < PAYLOAD_MOST ? (uint32_t)n : PAYLOAD_MOST;
+}
+
+uint32_t batch_payload_max(const struct plan *p)
+{
+	uint64_t across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE, down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
+	uint64_t tiles = across * down * exr_tile_size_max(TILE_SIZE, TILE_SIZE);
+	uint64_t render = tiles + states_payload_max(p);
+	uint64_t weights = p->bootstrap / ((uint64_t)p->groups * p->parts) * sizeof(float);
+	uint64_t n = render > weights ? render : weights;
+	return n < PAYLOAD_MOST ? (uint32_t)n : PAYLOAD_MOST;
+}
+
+/* ---- packing ---- */
+
+struct packing {
+	unsigned char **tile_bytes;
+	uint32_t *tile_sizes, *state_sizes;
+	size_t payload;
+};
+
+static void packing_fini(struct packing *k, uint32_t tiles)
+{
+	for (uint32_t i = 0; k->tile_bytes && i < tiles; i++)
+		mem_free(k->tile_bytes[i]);
+	mem_free(k->tile_bytes);
+	mem_free(k->tile_sizes);
+	mem_free(k->state_sizes);
+}
+
+static int packing_init(struct packing *k, const struct batch *b, const struct plan *p, struct error *e)
+{
+	memset(k, 0, sizeof *k);
+	k->tile_bytes = mem_alloc(b->tile_count, sizeof *k->tile_bytes);
+	k->tile_sizes = mem_alloc(b->tile_count, sizeof *k->tile_sizes);
+	k->state_sizes = mem_alloc(b->state_count, sizeof *k->state_sizes);
+	if (!k->tile_bytes || !k->tile_sizes || !k->state_sizes)
+		return error_set(e, ENOMEM, "no memory to pack a batch");
+	for (uint32_t i = 0; i < b->tile_count; i++) {
+		size_t n;
+		int rc = exr_tile_write(&b->tiles[i], p->width, p->height, &k->tile_bytes[i], &n, e);
+		if (rc)
+			return rc;
+		k->tile_sizes[i] = (uint32_t)n;
+		k->payload += n;
+	}
+	for (uint32_t i = 0; i < b->state_count; i++) {
+		k->state_sizes[i] = b->states[i].size;
+		k->payload += b->states[i].size;
+	}
+	k->payload += b->weight_count * sizeof(float);
+	return 0;
+}
+
+/* IEEE floats little endian, whatever the machine. */
+static void write_floats(unsigned char *out, const float *v, uint64_t count)
+{
+	for (uint64_t i = 0; i < count; i++, out += 4) {
+		uint32_t bits;
+		memcpy(&bits, &v[i], sizeof bits);
+		for (int k = 0; k < 4; k++)
+			out[k] = (unsigned char)(bits >> 8 * k);
+	}
+}
+
+static void read_floats(const unsigned char *in, float *v, uint64_t count)
+{
+	for (uint64_t i = 0; i < count; i++, in += 4) {
+		uint32_t bits = in[0] | (uint32_t)in[1] << 8 | (uint32_t)in[2] << 16 | (uint32_t)in[3] << 24;
+		memcpy(&v[i], &bits, sizeof bits);
+	}
+}
+
+static void write_payload(unsigned char *at, const struct batch *b, const struct packing *k)
+{
+	for (uint32_t i = 0; i < b->tile_count; i++) {
+		memcpy(at, k->tile_bytes[i], k->tile_sizes[i]);
+		at += k->tile_sizes[i];
+	}
+	for (uint32_t i = 0; i < b->state_count; i++) {
+		if (b->states[i].size)
+			memcpy(at, b->states[i].bytes, b->states[i].size);
+		at += b->states[i].size;
+	}
+	write_floats(at, b->weights, b->weight_count);
+}
+
+int batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size, struct error *e)
+{
+	struct packing k;
+	uint64_t counters[BATCH_COUNTERS];
+	memcpy(counters, b->counters, sizeof counters);
+	int rc = packing_init(&k, b, p, e);
+	if (!rc) {
+		Farm__LeaseKey key;
+		Farm__LeaseResult m;
+		farm__lease_result__init(&m);
+		Farm__Envelope env;
+		farm__envelope__init(&env);
+		lease_key_to_wire(&b->key, &key);
+		m.key = &key;
+		m.n_counters = BATCH_COUNTERS;
+		m.counters = counters;
+		m.independent_sum = b->independent_sum;
+		m.independent_square = b->independent_square;
+		m.beyond_sum = b->beyond_sum;
+		m.cpu_seconds = b->cpu_seconds;
+		m.n_tile_sizes = b->tile_count;
+		m.tile_sizes = k.tile_sizes;
+		m.n_state_sizes = b->state_count;
+		m.state_sizes = k.state_sizes;
+		m.weight_count = b->weight_count;
+		env.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
+		env.lease_result = &m;
+		rc = envelope_pack(&env, NULL, k.payload, frame, size, e);
+		if (!rc)
+			write_payload(*frame + *size - k.payload, b, &k);
+	}
+	packing_fini(&k, b->tile_count);
+	return rc;
+}
+
+/* ---- unpacking ---- */
+
+/* Cuts `size` bytes off the front of a payload. */
+struct cutter {
+	const unsigned char *at;
+	size_t left;
+};
+
+static const unsigned char *cut(struct cutter *c, size_t size)
+{
+	if (size > c->left)
+		return NULL;
+	const unsigned char *p = c->at;
+	c->at += size;
+	c->left -= size;
+	return p;
+}
+
+static int cut_states(struct cutter *c, const uint32_t *sizes, size_t count, struct chain_state **out, struct error *e)
+{
+	struct chain_state *states = mem_alloc(count, sizeof *states);
+	*out = states;
+	if (!states)
+		return error_set(e, ENOMEM, "no memory for %zu chain states", count);
+	for (size_t i = 0; i < count; i++) {
+		const unsigned char *from = sizes[i] <= CHAIN_STATE_MAX ? cut(c, sizes[i]) : NULL;
+		if (!from)
+			return error_set(e, EBADMSG, "chain state %zu of %u bytes does not fit", i, sizes[i]);
+		if (sizes[i] == 0)
+			continue;
+		states[i].bytes = mem_alloc(sizes[i], 1);
+		if (!states[i].bytes)
+			return error_set(e, ENOMEM, "no memory for a chain state");
+		memcpy(states[i].bytes, from, sizes[i]);
+		states[i].size = sizes[i];
+	}
+	return 0;
+}
+
+static int cut_tiles(struct cutter *c, const Farm__LeaseResult *m, const struct plan *p, struct batch *b, struct error *e)
+{
+	b->tiles = mem_alloc(m->n_tile_sizes, sizeof *b->tiles);
+	if (!b->tiles)
+		return error_set(e, ENOMEM, "no memory for %zu tiles", m->n_tile_sizes);
+	for (size_t i = 0; i < m->n_tile_sizes; i++) {
+		const unsigned char *from = cut(c, m->tile_sizes[i]);
+		if (!from)
+			return error_set(e, EBADMSG, "tile %zu of %u bytes does not fit", i, m->tile_sizes[i]);
+		int rc = exr_tile_read(from, m->tile_sizes[i], p->width, p->height, &b->tiles[i], e);
+		if (rc)
+			return error_prefix(e, rc, "tile %zu", i);
+		b->tile_count++;
+	}
+	return 0;
+}
+
+static int cut_weights(struct cutter *c, uint64_t count, struct batch *b, struct error *e)
+{
+	if (count > c->left / sizeof(float) || count * sizeof(float) != c->left)
+		return error_set(e, EBADMSG, "%llu weights do not fit the payload", (unsigned long long)count);
+	if (count == 0)
+		return 0;
+	b->weights = mem_alloc(count, sizeof *b->weights);
+	if (!b->weights)
+		return error_set(e, ENOMEM, "no memory for %llu weights", (unsigned long long)count);
+	read_floats(c->at, b->weights, count);
+	b->weight_count = count;
+	return 0;
+}
+
+int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult *m, const unsigned char *payload,
+		 size_t payload_size, struct error *e)
+{
+	struct cutter c = {payload, payload_size};
+	memset(b, 0, sizeof *b);
+	int rc = lease_key_from_wire(m->key, &b->key, e);
+	if (!rc && m->n_counters != BATCH_COUNTERS)
+		rc = error_set(e, EBADMSG, "a batch with %zu counters", m->n_counters);
+	/* As many as the plan allows, before memory is asked for. */
+	if (!rc && m->n_state_sizes > chains_per_lease(p))
+		rc = error_set(e, EBADMSG, "a batch with %zu chain states", m->n_state_sizes);
+	if (!rc) {
+		memcpy(b->counters, m->counters, sizeof b->counters);
+		b->independent_sum = m->independent_sum;
+		b->independent_square = m->independent_square;
+		b->beyond_sum = m->beyond_sum;
+		b->cpu_seconds = m->cpu_seconds;
+		rc = cut_tiles(&c, m, p, b, e);
+	}
+	if (!rc) {
+		b->state_count = (uint32_t)m->n_state_sizes;
+		rc = cut_states(&c, m->state_sizes, m->n_state_sizes, &b->states, e);
+	}
+	if (!rc)
+		rc = cut_weights(&c, m->weight_count, b, e);
+	if (!rc)
+		rc = batch_check(b, p, e);
+	if (rc)
+		batch_fini(b);
+	return rc;
+}
+
+const unsigned char *batch_tile_bytes(const Farm__LeaseResult *m, const unsigned char *payload, size_t index, size_t *size)
+{
+	for (size_t i = 0; i < index; i++)
+		payload += m->tile_sizes[i];
+	*size = m->tile_sizes[index];
+	return payload;
+}
+
+/* ---- grants ---- */
+
+int grant_pack(const struct lease_key *k, const uint64_t *seeds, const struct chain_state *states, uint32_t chain_count,
+	       unsigned char **frame, size_t *size, struct error *e)
+{
+	Farm__LeaseKey key;
+	Farm__LeaseGrant m;
+	farm__lease_grant__init(&m);
+	Farm__Envelope env;
+	farm__envelope__init(&env);
+	uint64_t *seed_copy = seeds ? mem_alloc(chain_count, sizeof *seed_copy) : NULL;
+	uint32_t *sizes = states ? mem_alloc(chain_count, sizeof *sizes) : NULL;
+	size_t payload = 0;
+	int rc = (seeds && !seed_copy) || (states && !sizes) ? error_set(e, ENOMEM, "no memory to pack a lease") : 0;
+	if (!rc) {
+		if (seeds)
+			memcpy(seed_copy, seeds, chain_count * sizeof *seeds);
+		for (uint32_t i = 0; states && i < chain_count; i++)
+			payload += sizes[i] = states[i].size;
+		lease_key_to_wire(k, &key);
+		m.key = &key;
+		m.n_seeds = seeds ? chain_count : 0;
+		m.seeds = seed_copy;
+		m.n_state_sizes = states ? chain_count : 0;
+		m.state_sizes = sizes;
+		env.body_case = FARM__ENVELOPE__BODY_LEASE_GRANT;
+		env.lease_grant = &m;
+		rc = envelope_pack(&env, NULL, payload, frame, size, e);
+	}
+	if (!rc && states) {
+		unsigned char *at = *frame + *size - payload;
+		for (uint32_t i = 0; i < chain_count; at += states[i++].size)
+			if (states[i].size)
+				memcpy(at, states[i].bytes, states[i].size);
+	}
+	mem_free(seed_copy);
+	mem_free(sizes);
+	return rc;
+}
+
+int grant_unpack(struct grant *g, const Farm__LeaseGrant *m, const unsigned char *payload, size_t payload_size,
+		 struct error *e)
+{
+	struct cutter c = {payload, payload_size};
+	memset(g, 0, sizeof *g);
+	int rc = lease_key_from_wire(m->key, &g->key, e);
+	if (!rc && m->n_seeds && m->n_state_sizes)
+		rc = error_set(e, EBADMSG, "a lease with both seeds and states");
+	if (!rc && m->n_seeds) {
+		g->seeds = mem_alloc(m->n_seeds, sizeof *g->seeds);
+		if (!g->seeds)
+			rc = error_set(e, ENOMEM, "no memory for %zu seeds", m->n_seeds);
+		else
+			memcpy(g->seeds, m->seeds, m->n_seeds * sizeof *g->seeds);
+		g->chain_count = (uint32_t)m->n_seeds;
+	}
+	if (!rc && m->n_state_sizes) {
+		g->chain_count = (uint32_t)m->n_state_sizes;
+		rc = cut_states(&c, m->state_sizes, m->n_state_sizes, &g->states, e);
+	}
+	if (!rc && c.left)
+		rc = error_set(e, EBADMSG, "%zu bytes too many behind a lease", c.left);
+	if (rc)
+		grant_fini(g);
+	return rc;
+}
+
+void grant_fini(struct grant *g)
+{
+	mem_free(g->seeds);
+	states_fini(g->states, g->chain_count);
+	memset(g, 0, sizeof *g);
+}
+
+int states_copy(struct chain_state **out, const struct chain_state *states, uint32_t count, struct error *e)
+{
+	struct chain_state *s = mem_alloc(count, sizeof *s);
+	*out = s;
+	if (!s)
+		return error_set(e, ENOMEM, "no memory for %u chain states", count);
+	for (uint32_t i = 0; i < count; i++) {
+		if (states[i].size == 0)
+			continue;
+		s[i].bytes = mem_alloc(states[i].size, 1);
+		if (!s[i].bytes) {
+			states_fini(s, count);
+			*out = NULL;
+			return error_set(e, ENOMEM, "no memory for a chain state");
+		}
+		s[i].size = states[i].size;
+		memcpy(s[i].bytes, states[i].bytes, states[i].size);
+	}
+	return 0;
+}
+
+void states_fini(struct chain_state *states, uint32_t count)
+{
+	for (uint32_t i = 0; states && i < count; i++)
+		mem_free(states[i].bytes);
+	mem_free(states);
+}

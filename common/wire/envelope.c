@@ -1,0 +1,164 @@
+#include "common/wire/envelope.h"
+
+#include "common/base/mem.h"
+#include "common/wire/frame.h"
+
+#include <stdalign.h>
+#include <stdint.h>
+#include <string.h>
+
+enum {
+	BLOCK_BYTES = 1 << 14,
+	AMPLIFICATION = 16, /* memory per byte of a message; honest ones need at most 8 (packed varints of one byte) */
+	LEAST_BYTES = 1 << 16,
+};
+
+struct envelope_block {
+	struct envelope_block *next;
+	size_t size, used;
+	alignas(16) unsigned char bytes[];
+};
+
+static void *take(void *user, size_t size)
+{
+	struct envelope *env = user;
+	size_t need = (size + 15) & ~(size_t)15;
+	if (need < size || need > env->limit - env->used)
+		return NULL;
+	struct envelope_block *b = env->blocks;
+	if (!b || b->size - b->used < need) {
+		size_t room = need > BLOCK_BYTES ? need : BLOCK_BYTES;
+		b = mem_alloc(1, sizeof *b + room);
+		if (!b)
+			return NULL;
+		b->size = room;
+		b->next = env->blocks;
+		env->blocks = b;
+	}
+	void *p = b->bytes + b->used;
+	b->used += need;
+	env->used += need;
+	return p;
+}
+
+static void give_back(void *user, void *p)
+{
+	(void)user;
+	(void)p;
+}
+
+static bool is_known(const ProtobufCMessage *m);
+
+/* A sub-message field: absent, one, or many. */
+static bool field_is_known(const ProtobufCMessage *m, const ProtobufCFieldDescriptor *f)
+{
+	const char *base = (const char *)m;
+	const void *at = base + f->offset;
+	if (f->label == PROTOBUF_C_LABEL_REPEATED) {
+		size_t count = *(const size_t *)(const void *)(base + f->quantifier_offset);
+		ProtobufCMessage *const *many = *(ProtobufCMessage *const *const *)at;
+		for (size_t i = 0; i < count; i++)
+			if (!is_known(many[i]))
+				return false;
+		return true;
+	}
+	if ((f->flags & PROTOBUF_C_FIELD_FLAG_ONEOF) &&
+	    *(const uint32_t *)(const void *)(base + f->quantifier_offset) != f->id)
+		return true;
+	const ProtobufCMessage *one = *(ProtobufCMessage *const *)at;
+	return !one || is_known(one);
+}
+
+/* The schema is not recursive, so this is at most as deep as the schema. */
+static bool is_known(const ProtobufCMessage *m)
+{
+	if (m->n_unknown_fields)
+		return false;
+	for (unsigned i = 0; i < m->descriptor->n_fields; i++) {
+		const ProtobufCFieldDescriptor *f = &m->descriptor->fields[i];
+		if (f->type == PROTOBUF_C_TYPE_MESSAGE && !field_is_known(m, f))
+			return false;
+	}
+	return true;
+}
+
+int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t size, struct error *e)
+{
+	memset(env, 0, sizeof *env);
+	env->limit = LEAST_BYTES + AMPLIFICATION * size;
+	ProtobufCAllocator allocator = {take, give_back, env};
+	Farm__Envelope *m = farm__envelope__unpack(&allocator, size, bytes);
+	const char *fault = NULL;
+	if (!m)
+		fault = "a message that does not parse";
+	else if (!is_known(&m->base))
+		fault = "a message with fields that version 1 of the protocol does not know";
+	else if (m->body_case == FARM__ENVELOPE__BODY__NOT_SET)
+		fault = "an envelope without a message";
+	if (fault) {
+		envelope_fini(env);
+		return error_set(e, EBADMSG, "%s", fault);
+	}
+	env->message = m;
+	return 0;
+}
+
+void envelope_fini(struct envelope *env)
+{
+	while (env->blocks) {
+		struct envelope_block *next = env->blocks->next;
+		mem_free(env->blocks);
+		env->blocks = next;
+	}
+	memset(env, 0, sizeof *env);
+}
+
+int envelope_pack(const Farm__Envelope *message, const void *payload, size_t payload_size, unsigned char **bytes,
+		  size_t *size, struct error *e)
+{
+	size_t header = farm__envelope__get_packed_size(message);
+	if (header == 0 || header > UINT32_MAX || payload_size > UINT32_MAX)
+		return error_set(e, EMSGSIZE, "a message of %zu + %zu bytes does not fit into a frame", header,
+				 payload_size);
+	size_t all = FRAME_PREFIX + header + payload_size;
+	unsigned char *p = mem_alloc(all, 1);
+	if (!p)
+		return error_set(e, ENOMEM, "no memory for a frame of %zu bytes", all);
+	frame_prefix_write(p, (uint32_t)header, (uint32_t)payload_size);
+	farm__envelope__pack(message, p + FRAME_PREFIX);
+	if (payload && payload_size)
+		memcpy(p + FRAME_PREFIX + header, payload, payload_size);
+	*bytes = p;
+	*size = all;
+	return 0;
+}
+
+/* Length of the UTF-8 sequence at p (1..4), 0 when it is none: RFC 3629, no surrogates, shortest form. */
+static size_t utf8_length(const unsigned char *p)
+{
+	if (p[0] < 0x80)
+		return 1;
+	size_t n = p[0] >= 0xF0 ? 4 : p[0] >= 0xE0 ? 3 : 2;
+	if (p[0] < 0xC2 || p[0] > 0xF4)
+		return 0;
+	for (size_t i = 1; i < n; i++)
+		if ((p[i] & 0xC0) != 0x80)
+			return 0;
+	if ((p[0] == 0xE0 && p[1] < 0xA0) || (p[0] == 0xED && p[1] > 0x9F) || (p[0] == 0xF0 && p[1] < 0x90) ||
+	    (p[0] == 0xF4 && p[1] > 0x8F))
+		return 0;
+	return n;
+}
+
+bool envelope_text_ok(const char *text, size_t max)
+{
+	if (!text || strnlen(text, max + 1) > max)
+		return false;
+	for (const unsigned char *p = (const unsigned char *)text; *p;) {
+		size_t n = utf8_length(p);
+		if (n == 0 || (n == 1 && (*p < 32 || *p == 127)))
+			return false;
+		p += n;
+	}
+	return true;
+}

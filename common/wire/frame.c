@@ -1,0 +1,102 @@
+#include "common/wire/frame.h"
+
+#include <string.h>
+
+static uint32_t read_u32(const unsigned char *p)
+{
+	return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
+}
+
+static void write_u32(unsigned char *p, uint32_t v)
+{
+	p[0] = (unsigned char)(v >> 24);
+	p[1] = (unsigned char)(v >> 16);
+	p[2] = (unsigned char)(v >> 8);
+	p[3] = (unsigned char)v;
+}
+
+void frame_prefix_write(unsigned char out[FRAME_PREFIX], uint32_t header_size, uint32_t payload_size)
+{
+	write_u32(out, header_size);
+	write_u32(out + 4, payload_size);
+}
+
+void frame_reader_init(struct frame_reader *r, struct frame_limits limits)
+{
+	memset(r, 0, sizeof *r);
+	r->limits = limits;
+}
+
+void frame_reader_fini(struct frame_reader *r)
+{
+	buf_fini(&r->header);
+	buf_fini(&r->payload);
+}
+
+static bool is_whole(const struct frame_reader *r)
+{
+	return r->prefix_size == FRAME_PREFIX && r->header.size == r->header_size && r->payload.size == r->payload_size;
+}
+
+bool frame_reader_is_midway(const struct frame_reader *r)
+{
+	return r->prefix_size && !is_whole(r);
+}
+
+/* Big buffers are given back: a connection at rest holds little. */
+static void start_frame(struct frame_reader *r)
+{
+	enum { KEEP = 1 << 16 };
+	if (r->header.capacity > KEEP)
+		buf_fini(&r->header);
+	if (r->payload.capacity > KEEP)
+		buf_fini(&r->payload);
+	r->header.size = r->payload.size = 0;
+	r->prefix_size = r->header_size = r->payload_size = 0;
+}
+
+static int take_prefix(struct frame_reader *r, struct error *e)
+{
+	r->header_size = read_u32(r->prefix);
+	r->payload_size = read_u32(r->prefix + 4);
+	if (r->header_size == 0)
+		return error_set(e, EBADMSG, "a frame without a header");
+	if (r->header_size > r->limits.header)
+		return error_set(e, EMSGSIZE, "a header of %u bytes, at most %u are allowed now", r->header_size,
+				 r->limits.header);
+	if (r->payload_size > r->limits.payload)
+		return error_set(e, EMSGSIZE, "a payload of %u bytes, at most %u are allowed now", r->payload_size,
+				 r->limits.payload);
+	r->header.limit = r->header.capacity > r->header_size ? r->header.capacity : r->header_size;
+	r->payload.limit = r->payload.capacity > r->payload_size ? r->payload.capacity : r->payload_size;
+	return 0;
+}
+
+static int take_part(struct buf *b, size_t want, const unsigned char *bytes, size_t count, size_t *used, struct error *e)
+{
+	size_t n = want - b->size < count - *used ? want - b->size : count - *used;
+	if (!buf_append(b, bytes + *used, n))
+		return error_set(e, ENOMEM, "no memory for a frame of %zu bytes", want);
+	*used += n;
+	return 0;
+}
+
+int frame_reader_take(struct frame_reader *r, const unsigned char *bytes, size_t count, size_t *used, struct error *e)
+{
+	*used = 0;
+	if (is_whole(r))
+		start_frame(r);
+	if (r->prefix_size < FRAME_PREFIX) {
+		while (r->prefix_size < FRAME_PREFIX && *used < count)
+			r->prefix[r->prefix_size++] = bytes[(*used)++];
+		if (r->prefix_size < FRAME_PREFIX)
+			return 0;
+		int rc = take_prefix(r, e);
+		if (rc)
+			return rc;
+	}
+	int rc = take_part(&r->header, r->header_size, bytes, count, used, e);
+	if (!rc)
+		rc = take_part(&r->payload, r->payload_size, bytes, count, used, e);
+	return rc ? rc : is_whole(r);
+}

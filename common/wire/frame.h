@@ -1,0 +1,37 @@
+/*
+ * Frames: u32 BE header length (1..), u32 BE payload length, header, payload. Read piece by piece; lengths are held
+ * against limits before anything is allocated, and memory grows with the bytes that have come, not with what a peer
+ * promises. No I/O; one thread at a time.
+ */
+#ifndef COMMON_WIRE_FRAME_H
+#define COMMON_WIRE_FRAME_H
+
+#include "common/base/buf.h"
+#include "common/base/error.h"
+
+#include <stdint.h>
+
+enum { FRAME_PREFIX = 8 };
+
+struct frame_limits {
+	uint32_t header, payload;
+};
+
+struct frame_reader {
+	struct frame_limits limits; /* may be changed between frames */
+	unsigned char prefix[FRAME_PREFIX];
+	uint32_t prefix_size, header_size, payload_size;
+	struct buf header, payload;
+};
+
+void frame_reader_init(struct frame_reader *r, struct frame_limits limits);
+void frame_reader_fini(struct frame_reader *r);
+
+/* Takes bytes up to the end of a frame; *used says how many. 1: a frame is whole (header, payload hold it until the next
+ * call), 0: more bytes are needed, -EMSGSIZE: a length is over its limit, -EBADMSG: no header, -ENOMEM. */
+int frame_reader_take(struct frame_reader *r, const unsigned char *bytes, size_t count, size_t *used, struct error *e);
+bool frame_reader_is_midway(const struct frame_reader *r); /* part of a frame has come */
+
+void frame_prefix_write(unsigned char out[FRAME_PREFIX], uint32_t header_size, uint32_t payload_size);
+
+#endif

@@ -1,0 +1,22 @@
+/*
+ * Plans, plan requests and lease keys between memory and messages. What comes from a message is checked by plan_check or
+ * plan_make before it is believed; here only what does not fit into the structures is refused. Any thread.
+ */
+#ifndef COMMON_WIRE_PLAN_WIRE_H
+#define COMMON_WIRE_PLAN_WIRE_H
+
+#include "common/film/batch.h"
+#include "common/plan/plan.h"
+#include "common/wire/envelope.h"
+
+/* The message borrows the plan's text. */
+void plan_to_wire(const struct plan *p, Farm__Plan *out);
+int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e); /* ends with plan_check */
+
+void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out);
+int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, struct error *e);
+
+void lease_key_to_wire(const struct lease_key *k, Farm__LeaseKey *out);
+int lease_key_from_wire(const Farm__LeaseKey *m, struct lease_key *k, struct error *e);
+
+#endif

@@ -1,0 +1,139 @@
+/* The store keeps what it was given under its true name, refuses what is not it, and forgets the oldest first. */
+#include "common/blob/blob.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static char folder[64];
+
+static int set_up(void **state)
+{
+	(void)state;
+	strcpy(folder, "/tmp/hslt-blob.XXXXXX");
+	return mkdtemp(folder) ? 0 : -1;
+}
+
+static int tear_down(void **state)
+{
+	(void)state;
+	char command[128];
+	snprintf(command, sizeof command, "rm -rf '%s'", folder);
+	return system(command);
+}
+
+static struct blob_hash put(struct blob_store *s, const char *text)
+{
+	struct blob_hash h;
+	struct blob_writer *w;
+	struct error e;
+	assert_int_equal(blob_hash_bytes(text, strlen(text), &h, &e), 0);
+	assert_int_equal(blob_write_begin(&w, s, &h, strlen(text), &e), 0);
+	assert_int_equal(blob_write_add(w, text, 1, &e), 0);
+	assert_int_equal(blob_write_at(w), 1);
+	assert_int_equal(blob_write_add(w, text + 1, strlen(text) - 1, &e), 0);
+	assert_int_equal(blob_write_commit(w, &e), 0);
+	return h;
+}
+
+/* FIPS 180-2, appendix B.1. */
+static void knows_sha_256(void **state)
+{
+	(void)state;
+	struct blob_hash h;
+	struct error e;
+	char hex[BLOB_HEX_SIZE];
+	assert_int_equal(blob_hash_bytes("abc", 3, &h, &e), 0);
+	blob_hex(&h, hex);
+	assert_string_equal(hex, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+}
+
+static void keeps_and_reads_back(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct error e;
+	uint64_t size;
+	char text[16] = "";
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	struct blob_hash h = put(s, "hello, farm");
+	blob_store_close(s);
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0); /* another life */
+	assert_true(blob_has(s, &h, &size));
+	assert_int_equal(size, 11);
+	int fd = blob_open(s, &h, &size, &e);
+	assert_true(fd >= 0);
+	assert_int_equal(read(fd, text, sizeof text), 11);
+	assert_string_equal(text, "hello, farm");
+	close(fd);
+	struct blob_hash other = h;
+	other.bytes[0] ^= 1;
+	assert_int_equal(blob_open(s, &other, &size, &e), -ENOENT);
+	put(s, "hello, farm"); /* twice is as once */
+	assert_int_equal(blob_store_bytes(s), 11);
+	blob_store_close(s);
+}
+
+static void refuses_false_bytes(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct blob_writer *w;
+	struct blob_hash h;
+	struct error e;
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	assert_int_equal(blob_hash_bytes("true", 4, &h, &e), 0);
+	assert_int_equal(blob_write_begin(&w, s, &h, 5, &e), 0);
+	assert_int_equal(blob_write_add(w, "false", 5, &e), 0);
+	assert_int_equal(blob_write_add(w, "!", 1, &e), -EFBIG);
+	assert_int_equal(blob_write_commit(w, &e), -EBADMSG);
+	assert_int_equal(blob_write_begin(&w, s, &h, 4, &e), 0);
+	assert_int_equal(blob_write_add(w, "tru", 3, &e), 0);
+	assert_int_equal(blob_write_commit(w, &e), -EBADMSG); /* short */
+	assert_false(blob_has(s, &h, NULL));
+	blob_store_close(s);
+	char command[128];
+	snprintf(command, sizeof command, "test -z \"$(ls -A '%s')\"", folder);
+	assert_int_equal(system(command), 0); /* no temporary file stays */
+}
+
+static void forgets_the_oldest_that_nobody_holds(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct blob_writer *w;
+	struct error e;
+	assert_int_equal(blob_store_open(&s, folder, 30, &e), 0);
+	struct blob_hash a = put(s, "0123456789"), b = put(s, "abcdefghij"), c = put(s, "ABCDEFGHIJ");
+	blob_release(s, &a);
+	blob_release(s, &b);
+	assert_true(blob_hold(s, &a)); /* a is now younger than b */
+	blob_release(s, &a);
+	struct blob_hash d = put(s, "!@#$%^&*()");
+	assert_false(blob_has(s, &b, NULL));
+	assert_true(blob_has(s, &a, NULL) && blob_has(s, &c, NULL) && blob_has(s, &d, NULL));
+	assert_int_equal(blob_store_bytes(s), 30);
+	assert_true(blob_hold(s, &a));
+	assert_int_equal(blob_write_begin(&w, s, &b, 10, &e), -EFBIG); /* all in use */
+	assert_int_equal(blob_write_begin(&w, s, &b, 31, &e), -EFBIG);
+	blob_store_close(s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(knows_sha_256),
+		cmocka_unit_test_setup_teardown(keeps_and_reads_back, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(refuses_false_bytes, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(forgets_the_oldest_that_nobody_holds, set_up, tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

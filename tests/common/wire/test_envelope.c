@@ -1,0 +1,114 @@
+/* Messages go out and come in again; unknown fields, memory bombs and broken bytes do not. */
+#include "common/wire/envelope.h"
+#include "common/wire/frame.h"
+#include "common/base/mem.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <stdlib.h>
+#include <string.h>
+
+static unsigned char *pack_hello(size_t *size)
+{
+	Farm__Hello hello;
+	Farm__Envelope m;
+	struct error e;
+	unsigned char *bytes;
+	char name[] = "w1", print[] = "0123";
+	farm__hello__init(&hello);
+	farm__envelope__init(&m);
+	hello.version = 1;
+	hello.role = FARM__ROLE__ROLE_WORKER;
+	hello.name = name;
+	hello.fingerprint = print;
+	m.body_case = FARM__ENVELOPE__BODY_HELLO;
+	m.hello = &hello;
+	assert_int_equal(envelope_pack(&m, "tail", 4, &bytes, size, &e), 0);
+	return bytes;
+}
+
+static void goes_out_and_comes_in(void **state)
+{
+	(void)state;
+	size_t size;
+	unsigned char *bytes = pack_hello(&size);
+	struct envelope env;
+	struct error e;
+	assert_memory_equal(bytes + size - 4, "tail", 4);
+	assert_int_equal(bytes[3], size - 8 - 4);
+	assert_int_equal(envelope_unpack(&env, bytes + FRAME_PREFIX, size - FRAME_PREFIX - 4, &e), 0);
+	assert_int_equal(env.message->body_case, FARM__ENVELOPE__BODY_HELLO);
+	assert_string_equal(env.message->hello->name, "w1");
+	assert_int_equal(env.message->hello->role, FARM__ROLE__ROLE_WORKER);
+	envelope_fini(&env);
+	for (size_t n = 0; n < size - FRAME_PREFIX - 4; n++) { /* cut anywhere: refused or another message, never a crash */
+		if (envelope_unpack(&env, bytes + FRAME_PREFIX, n, &e) == 0)
+			envelope_fini(&env);
+		assert_null(env.blocks);
+	}
+	mem_free(bytes);
+}
+
+static int answer(const char *bytes, size_t size)
+{
+	struct envelope env;
+	struct error e;
+	int rc = envelope_unpack(&env, (const unsigned char *)bytes, size, &e);
+	envelope_fini(&env);
+	return rc;
+}
+
+static void what_is_not_known_is_refused(void **state)
+{
+	(void)state;
+	assert_int_equal(answer("", 0), -EBADMSG);
+	assert_int_equal(answer("\x1a\x00", 2), 0);                    /* a heartbeat */
+	assert_int_equal(answer("\x1a\x02\x78\x01", 4), -EBADMSG);     /* with an unknown field 15 inside */
+	assert_int_equal(answer("\x1a\x00\xf8\x3f\x01", 5), -EBADMSG); /* and beside it */
+	/* Submit{files{unknown}}: deep inside a repeated field (Submit is field 40, files is field 8) */
+	assert_int_equal(answer("\xc2\x02\x02\x42\x00", 5), 0);
+	assert_int_equal(answer("\xc2\x02\x04\x42\x02\x78\x01", 7), -EBADMSG);
+}
+
+/* A megabyte of empty strings would take some 60 MB: cut off at 16 bytes a byte. */
+static void a_bomb_is_defused(void **state)
+{
+	(void)state;
+	enum { INNER = 1 << 20 };
+	char *bytes = calloc(1, INNER + 16);
+	assert_non_null(bytes);
+	char head[] = {(char)0xc2, 0x02, (char)0x80, (char)0x80, 0x40}; /* Submit of 2^20 bytes */
+	memcpy(bytes, head, sizeof head);
+	for (size_t i = 0; i < INNER; i += 2)
+		bytes[sizeof head + i] = 0x1a; /* an empty Define */
+	assert_int_equal(answer(bytes, sizeof head + INNER), -EBADMSG);
+	free(bytes);
+}
+
+static void text_is_checked(void **state)
+{
+	(void)state;
+	assert_true(envelope_text_ok("", 0));
+	assert_true(envelope_text_ok("gr\xc3\xbcn \xf0\x9f\x98\x80", 20));
+	assert_false(envelope_text_ok("abc", 2));
+	assert_false(envelope_text_ok("a\nb", 9));
+	assert_false(envelope_text_ok("\xc0\xaf", 9));     /* overlong */
+	assert_false(envelope_text_ok("\xed\xa0\x80", 9)); /* a surrogate */
+	assert_false(envelope_text_ok("\xe2\x82", 9));     /* cut */
+	assert_false(envelope_text_ok("\xff", 9));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(goes_out_and_comes_in),
+		cmocka_unit_test(what_is_not_known_is_refused),
+		cmocka_unit_test(a_bomb_is_defused),
+		cmocka_unit_test(text_is_checked),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,90 @@
+/* Frames come out whole however the bytes are cut, and nothing beyond the limits is believed. */
+#include "common/wire/frame.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <string.h>
+
+static const unsigned char two_frames[] = {0, 0, 0, 2, 0, 0, 0, 3, 'h', 'i', 'a', 'b', 'c', /* */
+					   0, 0, 0, 1, 0, 0, 0, 0, 'x'};
+
+static void any_cut_gives_the_same_frames(void **state)
+{
+	(void)state;
+	for (size_t piece = 1; piece <= sizeof two_frames; piece++) {
+		struct frame_reader r;
+		struct error e;
+		int frames = 0;
+		frame_reader_init(&r, (struct frame_limits){16, 16});
+		for (size_t at = 0; at < sizeof two_frames;) {
+			size_t n = piece < sizeof two_frames - at ? piece : sizeof two_frames - at, used;
+			int rc = frame_reader_take(&r, two_frames + at, n, &used, &e);
+			assert_true(rc >= 0 && used <= n);
+			at += used;
+			if (rc == 0)
+				continue;
+			assert_false(frame_reader_is_midway(&r));
+			if (frames++ == 0) {
+				assert_int_equal(r.header.size, 2);
+				assert_memory_equal(r.header.bytes, "hi", 2);
+				assert_int_equal(r.payload.size, 3);
+				assert_memory_equal(r.payload.bytes, "abc", 3);
+			} else {
+				assert_int_equal(r.header.size, 1);
+				assert_memory_equal(r.header.bytes, "x", 1);
+				assert_int_equal(r.payload.size, 0);
+			}
+		}
+		assert_int_equal(frames, 2);
+		frame_reader_fini(&r);
+	}
+}
+
+static int first_answer(const unsigned char prefix[8], struct frame_limits limits)
+{
+	struct frame_reader r;
+	struct error e;
+	size_t used;
+	frame_reader_init(&r, limits);
+	int rc = frame_reader_take(&r, prefix, 8, &used, &e);
+	size_t held = r.header.capacity + r.payload.capacity;
+	frame_reader_fini(&r);
+	assert_true(rc <= 0 && held == 0); /* nothing is allocated for a promise */
+	return rc;
+}
+
+static void lengths_are_held_against_limits(void **state)
+{
+	(void)state;
+	struct frame_limits l = {16, 32};
+	assert_int_equal(first_answer((const unsigned char[]){0, 0, 0, 16, 0, 0, 0, 32}, l), 0);
+	assert_int_equal(first_answer((const unsigned char[]){0, 0, 0, 17, 0, 0, 0, 0}, l), -EMSGSIZE);
+	assert_int_equal(first_answer((const unsigned char[]){0, 0, 0, 16, 0, 0, 0, 33}, l), -EMSGSIZE);
+	assert_int_equal(first_answer((const unsigned char[]){0, 0, 0, 0, 0, 0, 0, 1}, l), -EBADMSG);
+	assert_int_equal(first_answer((const unsigned char *)"GET / HT", l), -EMSGSIZE);
+	assert_int_equal(first_answer((const unsigned char[]){255, 255, 255, 255, 255, 255, 255, 255}, l), -EMSGSIZE);
+	struct frame_limits all = {UINT32_MAX, UINT32_MAX};
+	assert_int_equal(first_answer((const unsigned char[]){255, 255, 255, 255, 255, 255, 255, 255}, all), 0);
+}
+
+static void the_prefix_is_what_is_read(void **state)
+{
+	(void)state;
+	unsigned char p[FRAME_PREFIX];
+	frame_prefix_write(p, 0x01020304, 0xA0B0C0D0);
+	assert_memory_equal(p, "\x01\x02\x03\x04\xA0\xB0\xC0\xD0", 8);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(any_cut_gives_the_same_frames),
+		cmocka_unit_test(lengths_are_held_against_limits),
+		cmocka_unit_test(the_prefix_is_what_is_read),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
