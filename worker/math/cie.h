@@ -1,0 +1,14 @@
+/*
+ * The CIE's published tables at 1 nm, 360-830 nm: 1931 2-degree observer and illuminant D65 (100 at 560 nm).
+ * Generated from worker/math/data at build time. Constants; any thread.
+ */
+#ifndef WORKER_MATH_CIE_H
+#define WORKER_MATH_CIE_H
+
+enum { CIE_FIRST_NM = 360, CIE_LAST_NM = 830, CIE_COUNT = CIE_LAST_NM - CIE_FIRST_NM + 1 };
+#define CIE_Y_SUM 106.857 /* nm: the integral of y_bar */
+
+extern const double cie_observer[CIE_COUNT][3];
+extern const double cie_d65[CIE_COUNT];
+
+#endif

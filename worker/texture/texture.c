@@ -1,0 +1,50 @@
+#include "worker/texture/texture.h"
+
+#include <string.h>
+
+#define TEXTURE(name) extern const struct texture_ops texture_ops_##name;
+#include "worker/texture/texture_list.h"
+#undef TEXTURE
+
+const struct texture_ops *const texture_registry[] = {
+#define TEXTURE(name) &texture_ops_##name,
+#include "worker/texture/texture_list.h"
+#undef TEXTURE
+	NULL,
+};
+
+static int create_nested(struct texture *t, const struct scene_node *n, enum color_role role,
+			 const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e)
+{
+	for (const struct texture_ops *const *ops = texture_registry; *ops; ops++)
+		if (n->cls == PLUGIN_TEXTURE && strcmp((*ops)->type, n->type) == 0) {
+			*t = (struct texture){.ops = *ops};
+			return (*ops)->create(t, n, role, assets, dialect_3, arena, e);
+		}
+	return node_error(n, e, ENOTSUP, "\"%s\" is no texture that is supported", n->type);
+}
+
+int texture_from_node(struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		      enum color_role role, const struct asset_source *assets, bool dialect_3, struct arena *arena,
+		      struct error *e)
+{
+	const struct value absent = {.type = VALUE_FLOAT, .as.number = fallback};
+	const struct property *p = node_find(n, name);
+	const struct value *v = p ? &p->value : &absent;
+	*t = (struct texture){.ops = NULL};
+	if (v->type == VALUE_NODE)
+		return create_nested(t, v->as.node, role, assets, dialect_3, arena, e);
+	struct error reason;
+	int code = color_from_value(v, role, arena, &t->color, &reason);
+	return code ? node_error(n, e, -code, "%s: %s", name, reason.text) : 0;
+}
+
+double texture_max(const struct texture *t)
+{
+	return t->ops ? t->ops->max(t) : color_max(&t->color);
+}
+
+enum color_shape texture_shape(const struct texture *t)
+{
+	return t->ops ? t->ops->shape(t) : t->color.shape;
+}

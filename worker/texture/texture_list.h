@@ -1,0 +1,1 @@
+/* One line a texture: its const struct texture_ops is texture_ops_NAME. */
