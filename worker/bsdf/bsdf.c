@@ -1,0 +1,77 @@
+#include "worker/bsdf/bsdf.h"
+
+#include "worker/bsdf/create.h"
+
+#include <string.h>
+
+#define BSDF(name) extern const struct bsdf_ops bsdf_ops_##name;
+#include "worker/bsdf/bsdf_list.h"
+#undef BSDF
+
+const struct bsdf_ops *const bsdf_registry[] = {
+#define BSDF(name) &bsdf_ops_##name,
+#include "worker/bsdf/bsdf_list.h"
+#undef BSDF
+	NULL,
+};
+
+int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	for (const struct bsdf_ops *const *ops = bsdf_registry; *ops; ops++)
+		if (strcmp((*ops)->type, n->type) == 0) {
+			*b = (struct bsdf){.ops = *ops, .alpha = INFINITY, .eta = 1, .shape = COLOR_SHAPE_CONSTANT};
+			return (*ops)->create(b, n, build, e);
+		}
+	return node_error(n, e, ENOTSUP, "\"%s\" is no BSDF that is supported", n->type);
+}
+
+void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size, struct error *e)
+{
+	b->data = arena_alloc(build->arena, 1, size);
+	if (!b->data)
+		node_error(n, e, ENOMEM, "out of memory");
+	return b->data;
+}
+
+void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
+{
+	if (shape != COLOR_SHAPE_CONSTANT)
+		b->shape = COLOR_SHAPE_OTHER;
+}
+
+int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		 const struct bsdf_build *build, struct error *e)
+{
+	int code = texture_from_node(t, n, name, fallback, COLOR_REFLECTANCE, build->assets, build->dialect_3, build->arena, e);
+	if (code)
+		return code;
+	bsdf_add_shape(b, texture_shape(t));
+	b->textured |= !texture_is_constant(t);
+	return 0;
+}
+
+static spectrum black_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return spectrum_of(0);
+}
+
+static double black_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return 0;
+}
+
+static bool black_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			 struct bsdf_sample *out)
+{
+	(void)b, (void)p, (void)wo, (void)u, (void)out;
+	return false;
+}
+
+void bsdf_black(struct bsdf *b)
+{
+	static const struct bsdf_ops ops = {
+		.type = "black", .eval = black_eval, .pdf_solid = black_pdf, .sample = black_sample};
+	*b = (struct bsdf){.ops = &ops, .alpha = INFINITY, .eta = 1, .shape = COLOR_SHAPE_CONSTANT};
+}

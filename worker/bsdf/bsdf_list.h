@@ -1,0 +1,4 @@
+/* One line a BSDF: its const struct bsdf_ops is bsdf_ops_NAME. */
+BSDF(diffuse)
+BSDF(conductor)
+BSDF(roughconductor)

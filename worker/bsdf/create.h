@@ -1,0 +1,17 @@
+/* What the creation of every BSDF shares. Private to worker/bsdf. */
+#ifndef WORKER_BSDF_CREATE_H
+#define WORKER_BSDF_CREATE_H
+
+#include "worker/bsdf/bsdf.h"
+
+/* Zeroed room for b->data; NULL after an error. */
+void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size, struct error *e);
+
+/* Reads a reflectance and enters its colour and texture into b. */
+int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		 const struct bsdf_build *build, struct error *e);
+
+/* Enters that a part of b has this colour. */
+void bsdf_add_shape(struct bsdf *b, enum color_shape shape);
+
+#endif

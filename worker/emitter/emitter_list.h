@@ -1,0 +1,2 @@
+/* One line an emitter: its const struct emitter_ops is emitter_ops_NAME. */
+EMITTER(constant)
