@@ -92,7 +92,7 @@ $(addprefix $(BUILD)/bin/,$(CTL_CLI)): $(BUILD)/bin/hslt-%: $(BUILD)/obj/coordin
 
 # Tests mirror the tree: tests/<folder>/.../test_*.c, one program each, found here.
 TEST_SRC     := $(shell find tests -name 'test_*.c' 2>/dev/null | sort)
-TEST_SUPPORT := $(wildcard tests/support/*.c)
+TEST_SUPPORT := $(wildcard tests/support/*.c tests/sim/sim_*.c)
 TEST_BIN     := $(patsubst tests/%.c,$(BUILD)/tests/%,$(TEST_SRC))
 LIB_TEST     := $(BUILD)/lib/libhslt-test.a
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))

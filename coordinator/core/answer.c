@@ -1,0 +1,178 @@
+/* What workers send back: merged, repeated, refused, failed. */
+#include "coordinator/core/state.h"
+
+#include <math.h>
+#include <stdio.h>
+
+enum { FAILURES_FATAL = 3, SLOT_FAILURES_FATAL = 6 };
+
+enum verdict { MERGE, REPEAT, REFUSE, FAULT };
+
+static struct slot *slot_of(const struct job *j, const struct lease_key *k)
+{
+	if ((k->kind != LEASE_BOOTSTRAP && k->kind != LEASE_RENDER) || k->group >= j->plan.groups ||
+	    k->part >= j->plan.parts)
+		return NULL;
+	uint64_t limit = k->kind == LEASE_BOOTSTRAP ? 1 : j->plan.rounds;
+	return k->epoch < limit ? job_slot(j, k->group, k->part) : NULL;
+}
+
+static bool is_next(const struct job *j, const struct slot *s, const struct lease_key *k)
+{
+	return s && k->kind == j->kind && k->epoch == s->next;
+}
+
+/* The prefix that is being evaluated must stay what it is. */
+static bool would_complete(const struct job *j, const struct slot *s)
+{
+	return s->next == j->rounds && j->done + 1 == j->slot_count;
+}
+
+static enum verdict judge(const struct peer *p, const struct job *j, const struct event *ev, const char **why)
+{
+	const struct lease_key *k = &ev->lease.key;
+	*why = !p ? "unknown worker" : !j ? "no such job" : !job_is_live(j) ? "the job is over" : "";
+	if (**why)
+		return REFUSE;
+	const struct slot *s = slot_of(j, k);
+	if (!s) {
+		*why = "not a lease of this job";
+		return FAULT;
+	}
+	if (!ev->lease.valid) {
+		*why = ev->text ? ev->text : "invalid content";
+		return FAULT;
+	}
+	if (!job_takes(j, p)) {
+		*why = "the job belongs to workers with another fingerprint";
+		return REFUSE;
+	}
+	if (k->kind != j->kind && k->kind == LEASE_RENDER) {
+		*why = "the bootstrap is not complete";
+		return REFUSE;
+	}
+	if (k->kind != j->kind || k->epoch < s->next) {
+		*why = "merged already";
+		return REPEAT;
+	}
+	if (j->ending != END_NONE)
+		*why = "the job is ending";
+	else if (k->epoch > s->next || s->next - j->rounds > 1)
+		*why = "the epoch is not open";
+	else if (j->evaluating && would_complete(j, s))
+		*why = "the job's error is being estimated";
+	return **why ? REFUSE : MERGE;
+}
+
+static void acknowledge(struct farm *f, const struct event *ev, enum ack ack, const char *text)
+{
+	snprintf(f->text, sizeof f->text, "%s", text);
+	struct action *a = update_add(f, ACTION_ACK);
+	a->peer = ev->peer;
+	a->key = ev->lease.key;
+	a->job = a->key.job;
+	a->ack = ack;
+	a->text = f->text;
+}
+
+static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s, const struct event *ev)
+{
+	struct action *a = update_add(f, ACTION_MERGE);
+	a->peer = p->id;
+	a->key = ev->lease.key;
+	a->job = j->id;
+	acknowledge(f, ev, ACK_MERGED, "");
+	struct lease *l = lease_of(s, p);
+	double duration = l ? f->now - l->sent : NAN;
+	if (l)
+		lease_drop(f, l);
+	lease_revoke_slot(f, s);
+	peer_succeeded(p, j->id);
+	if (!j->mixed)
+		job_pin(j, p->class);
+	if (job_merge(j, s, f->now, duration))
+		rounds_complete(f, j);
+}
+
+static void count(struct peer *p, struct job *j, enum verdict v)
+{
+	if (p) {
+		p->repeats += v == REPEAT;
+		p->refused += v == REFUSE || v == FAULT;
+	}
+	if (j) {
+		j->repeats += v == REPEAT;
+		j->refused += v == REFUSE || v == FAULT;
+		j->faults += v == FAULT;
+	}
+}
+
+void answer_batch(struct farm *f, const struct event *ev)
+{
+	struct peer *p = farm_find_peer(f, ev->peer);
+	struct job *j = farm_find_job(f, ev->lease.key.job);
+	const char *why;
+	enum verdict v = judge(p, j, ev, &why);
+	struct slot *s = j && job_is_live(j) ? slot_of(j, &ev->lease.key) : NULL;
+	if (v == MERGE) {
+		merge(f, p, j, s, ev);
+		return;
+	}
+	count(p, j, v);
+	acknowledge(f, ev, v == REPEAT ? ACK_REPEAT : ACK_REFUSED, why);
+	struct lease *l = p && is_next(j, s, &ev->lease.key) ? lease_of(s, p) : NULL;
+	if (l)
+		lease_drop(f, l);
+	if (v == FAULT)
+		peer_fault(f, p, f->text);
+}
+
+static uint32_t failers(struct slot *s, uint64_t peer)
+{
+	uint32_t n = 0;
+	while (n < SLOT_FAILERS && s->failed_on[n] && s->failed_on[n] != peer)
+		n++;
+	if (n < SLOT_FAILERS)
+		s->failed_on[n] = peer;
+	while (n < SLOT_FAILERS && s->failed_on[n])
+		n++;
+	return n;
+}
+
+static struct lease *held(const struct farm *f, const struct event *ev)
+{
+	struct peer *p = farm_find_peer(f, ev->peer);
+	struct job *j = farm_find_job(f, ev->lease.key.job);
+	if (!p || !j || !job_is_live(j))
+		return NULL;
+	struct slot *s = slot_of(j, &ev->lease.key);
+	return is_next(j, s, &ev->lease.key) ? lease_of(s, p) : NULL;
+}
+
+void answer_failed(struct farm *f, const struct event *ev)
+{
+	struct lease *l = held(f, ev);
+	if (!l)
+		return;
+	struct peer *p = l->peer;
+	struct job *j = l->job;
+	struct slot *s = l->slot;
+	lease_drop(f, l);
+	peer_failed(p, j->id, f->now);
+	snprintf(p->text, sizeof p->text, "%s", ev->text ? ev->text : "");
+	snprintf(f->text, sizeof f->text, "%s: %.180s", p->name, p->text);
+	snprintf(j->text, sizeof j->text, "%s", f->text);
+	j->failures++;
+	s->failures++;
+	bool never = j->bootstrap_merged + j->leases_merged == 0;
+	if (failers(s, p->id) >= FAILURES_FATAL || s->failures >= SLOT_FAILURES_FATAL ||
+	    (never && j->failures >= FAILURES_FATAL))
+		rounds_end(f, j, END_FAILED, f->text);
+}
+
+void answer_returned(struct farm *f, const struct event *ev)
+{
+	struct lease *l = held(f, ev);
+	if (l)
+		lease_drop(f, l);
+}

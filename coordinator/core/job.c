@@ -1,0 +1,208 @@
+#include "coordinator/core/job.h"
+
+#include "common/base/mem.h"
+#include "coordinator/core/state.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { TIMEOUT_MEDIANS = 10, TIMEOUT_DOUBLINGS = 16 };
+static const double straggler_medians = 1.5;
+
+static void begin(struct job *j, enum lease_kind kind, uint64_t limit, double now)
+{
+	j->kind = kind;
+	j->limit = limit;
+	j->rounds = 0;
+	j->done = j->ahead = 0;
+	j->duration_count = 0;
+	j->median = NAN;
+	rate_init(&j->rate, now);
+	for (uint32_t i = 0; i < j->slot_count; i++) {
+		struct slot *s = &j->slots[i];
+		assert(!s->leases);
+		s->next = 0;
+		job_place(j, s);
+	}
+}
+
+static void init(struct job *j, const struct event_submit *e, double now)
+{
+	snprintf(j->name, sizeof j->name, "%s", e->name);
+	j->owner = e->owner;
+	j->priority = e->priority;
+	j->mixed = e->mixed;
+	j->plan = *e->plan;
+	j->submitted = now;
+	j->started = j->ended = j->rel_error = NAN;
+	j->published = now;
+	j->next_evaluation = 1;
+	for (int i = 0; i < 2; i++) {
+		list_init(&j->ready[i]);
+		list_init(&j->out[i]);
+	}
+	list_init(&j->blocked);
+	for (uint32_t i = 0; i < j->slot_count; i++)
+		list_init(&j->slots[i].link);
+	begin(j, LEASE_BOOTSTRAP, 1, now);
+}
+
+struct job *job_new(struct farm *f, const struct event_submit *e, const char **refused)
+{
+	uint64_t slots = (uint64_t)e->plan->groups * e->plan->parts;
+	if (slots == 0 || slots > f->config.max_slots) {
+		*refused = "the plan has more leases in a round than the coordinator takes";
+		return NULL;
+	}
+	struct job *j = mem_alloc(1, sizeof *j);
+	if (j)
+		j->slots = mem_alloc(slots, sizeof *j->slots);
+	if (!j || !j->slots) {
+		job_free(j);
+		*refused = "the coordinator has no memory for another job";
+		return NULL;
+	}
+	j->slot_count = (uint32_t)slots;
+	init(j, e, f->now);
+	return j;
+}
+
+void job_free(struct job *j)
+{
+	if (!j)
+		return;
+	mem_free(j->slots);
+	mem_free(j);
+}
+
+bool job_state_is_end(enum job_state s)
+{
+	return s == JOB_DONE || s == JOB_FAILED || s == JOB_CANCELLED;
+}
+
+bool job_is_live(const struct job *j)
+{
+	return !job_state_is_end(j->state);
+}
+
+bool job_is_open(const struct job *j)
+{
+	return job_is_live(j) && !j->preparing && j->ending == END_NONE;
+}
+
+struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part)
+{
+	return &j->slots[(size_t)group * j->plan.parts + part];
+}
+
+struct slot *job_ready(const struct job *j)
+{
+	for (int i = 0; i < 2; i++)
+		if (!list_is_empty(&j->ready[i]))
+			return list_entry(j->ready[i].next, struct slot, link);
+	return NULL;
+}
+
+void job_place(struct job *j, struct slot *s)
+{
+	list_remove(&s->link);
+	if (s->next >= j->limit || s->holders > 1)
+		return;
+	uint64_t ahead = s->next - j->rounds;
+	if (ahead > 1)
+		list_append(&j->blocked, &s->link);
+	else
+		list_append(s->holders ? &j->out[ahead] : &j->ready[ahead], &s->link);
+}
+
+double job_lease_timeout(const struct farm_config *c, const struct job *j, const struct slot *s)
+{
+	double t = isnan(j->median) ? c->first_timeout : fmax(c->min_timeout, TIMEOUT_MEDIANS * j->median);
+	return ldexp(t, s->timeouts < TIMEOUT_DOUBLINGS ? (int)s->timeouts : TIMEOUT_DOUBLINGS);
+}
+
+double job_straggles_at(const struct job *j, const struct slot *s)
+{
+	return isnan(j->median) ? INFINITY : s->since + straggler_medians * j->median;
+}
+
+double job_lease_mutations(const struct job *j)
+{
+	uint64_t n = j->kind == LEASE_BOOTSTRAP ? j->plan.bootstrap : plan_round_mutations(&j->plan);
+	return (double)n / j->slot_count;
+}
+
+static void add_duration(struct job *j, double duration)
+{
+	j->durations[j->duration_count++ % JOB_DURATIONS] = duration;
+	uint32_t n = j->duration_count < JOB_DURATIONS ? j->duration_count : JOB_DURATIONS;
+	double sorted[JOB_DURATIONS] = { 0 };
+	for (uint32_t i = 0; i < n; i++) {
+		uint32_t k = i;
+		for (; k > 0 && sorted[k - 1] > j->durations[i]; k--)
+			sorted[k] = sorted[k - 1];
+		sorted[k] = j->durations[i];
+	}
+	j->median = sorted[n / 2];
+}
+
+bool job_merge(struct job *j, struct slot *s, double now, double duration)
+{
+	assert(!s->leases && s->next - j->rounds <= 1);
+	if (s->next++ == j->rounds)
+		j->done++;
+	else
+		j->ahead++;
+	s->failures = s->timeouts = 0;
+	memset(s->failed_on, 0, sizeof s->failed_on);
+	if (j->kind == LEASE_BOOTSTRAP)
+		j->bootstrap_merged++;
+	else
+		j->leases_merged++;
+	if (!isnan(duration))
+		add_duration(j, duration);
+	rate_add(&j->rate, now, job_lease_mutations(j));
+	bool complete = j->done == j->slot_count;
+	if (complete) {
+		j->rounds++;
+		j->done = j->ahead;
+		j->ahead = 0;
+		list_remove(&s->link);
+		assert(list_is_empty(&j->ready[0]) && list_is_empty(&j->out[0]));
+		list_join(&j->ready[0], &j->ready[1]);
+		list_join(&j->out[0], &j->out[1]);
+		list_join(&j->ready[1], &j->blocked);
+	}
+	job_place(j, s);
+	return complete;
+}
+
+void job_open_rounds(struct job *j, double now)
+{
+	begin(j, LEASE_RENDER, j->plan.rounds, now);
+}
+
+void job_pin(struct job *j, struct peer_class *c)
+{
+	if (j->class)
+		return;
+	j->class = c;
+	c->uses++;
+	memcpy(j->fingerprint, c->fingerprint, sizeof j->fingerprint);
+}
+
+void job_unpin_if_untouched(struct job *j)
+{
+	if (!j->class || j->leases_out || j->bootstrap_merged || j->leases_merged)
+		return;
+	peer_class_drop(j->class);
+	j->class = NULL;
+	j->fingerprint[0] = 0;
+}
+
+bool job_takes(const struct job *j, const struct peer *p)
+{
+	return j->mixed || !j->class || j->class == p->class;
+}

@@ -1,0 +1,84 @@
+/* A job and its slots. A slot is one (group, part): the chain of leases of which exactly one is next. */
+#ifndef COORDINATOR_CORE_JOB_H
+#define COORDINATOR_CORE_JOB_H
+
+#include "coordinator/core/farm.h"
+#include "coordinator/core/lease.h"
+#include "coordinator/core/list.h"
+#include "coordinator/core/peer.h"
+#include "coordinator/core/rate.h"
+
+enum { JOB_NAME = 128, JOB_DURATIONS = 31, SLOT_FAILERS = 3 };
+
+struct slot {
+	struct link link;     /* one of the job's lists, or alone: two holders, or nothing left to do */
+	struct lease *leases; /* overdue ones too */
+	uint64_t next;        /* the first epoch that is not merged */
+	double since;         /* when the lease that is out was sent */
+	uint64_t failed_on[SLOT_FAILERS]; /* workers that failed with the next epoch */
+	uint32_t holders, failures, timeouts;
+};
+
+struct job {
+	uint64_t id, owner;
+	char name[JOB_NAME];
+	int priority;
+	bool mixed;
+	struct plan plan;
+	enum job_state state;
+	enum job_end end;
+	struct peer_class *class; /* whose it is; NULL: nobody's yet, or ended */
+	char fingerprint[FINGERPRINT_SIZE];
+	double submitted, started, ended;
+
+	uint32_t slot_count;
+	struct slot *slots;       /* [groups][parts]; NULL when ended */
+	enum lease_kind kind;     /* of the leases that are open */
+	uint64_t rounds;          /* complete, of this kind */
+	uint64_t limit;           /* rounds of this kind */
+	uint32_t done, ahead;     /* slots that have merged round `rounds`; the one after it too */
+	struct link ready[2], out[2]; /* by round: the first incomplete one and the next; `out` has one holder */
+	struct link blocked;      /* the round after those */
+	uint32_t leases_out;
+
+	bool preparing, evaluating;
+	enum job_end ending; /* the bound that is met, while the error is evaluated once more */
+	uint64_t next_evaluation;
+	double published;
+
+	double durations[JOB_DURATIONS]; /* of merged leases of this kind */
+	uint32_t duration_count;
+	double median; /* NAN: none yet */
+	struct rate rate;
+	double progress_floor, rel_error;
+	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
+	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
+	char text[256];
+};
+
+/* NULL with a sentence when it is refused. */
+struct job *job_new(struct farm *f, const struct event_submit *e, const char **refused);
+void job_free(struct job *j);
+
+bool job_is_live(const struct job *j);
+bool job_is_open(const struct job *j); /* leases may be handed out and merged */
+struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part);
+struct slot *job_ready(const struct job *j); /* NULL: none */
+/* Puts the slot into the list where it belongs after its holders or its next epoch changed. */
+void job_place(struct job *j, struct slot *s);
+double job_lease_timeout(const struct farm_config *c, const struct job *j, const struct slot *s);
+double job_straggles_at(const struct job *j, const struct slot *s); /* INFINITY: nobody knows */
+double job_lease_mutations(const struct job *j);
+
+/* The slot's next epoch is merged. true: its round is complete now. */
+bool job_merge(struct job *j, struct slot *s, double now, double duration);
+void job_open_rounds(struct job *j, double now); /* render leases after the bootstrap */
+/* Belongs to this class from now on; free again when nothing is merged and no lease is out. */
+void job_pin(struct job *j, struct peer_class *c);
+void job_unpin_if_untouched(struct job *j);
+bool job_takes(const struct job *j, const struct peer *p);
+
+double job_progress(const struct job *j, double now);
+double job_eta(const struct job *j, double now);
+
+#endif

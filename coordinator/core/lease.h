@@ -1,0 +1,36 @@
+/* One worker's hold on one open lease. Lives in its worker's table; linked to its slot. */
+#ifndef COORDINATOR_CORE_LEASE_H
+#define COORDINATOR_CORE_LEASE_H
+
+#include "common/film/batch.h"
+
+#include <stdbool.h>
+
+struct farm;
+struct job;
+struct peer;
+struct slot;
+
+struct lease {
+	bool used;
+	bool overdue; /* counts no longer as held: handed out again */
+	struct peer *peer;
+	struct job *job;
+	struct slot *slot; /* the key is that of the slot's next epoch: a merge ends all leases of the slot */
+	double sent, deadline;
+	struct lease *next; /* of the same slot */
+};
+
+struct lease_key lease_key(const struct lease *l);
+struct lease *lease_of(const struct slot *s, const struct peer *p); /* NULL: holds none */
+
+/* Hands the slot's open lease to a worker that has a wish, and says so. */
+void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s);
+/* Takes it out of all lists; the slot goes back to where it belongs. */
+void lease_drop(struct farm *f, struct lease *l);
+void lease_revoke(struct farm *f, struct lease *l); /* the same, and tells the worker */
+/* Its time is over: the slot is free for others, an answer still counts. */
+void lease_expire(struct farm *f, struct lease *l);
+void lease_revoke_slot(struct farm *f, struct slot *s); /* all holders */
+
+#endif

@@ -1,0 +1,201 @@
+#include "coordinator/core/peer.h"
+
+#include "common/base/mem.h"
+#include "coordinator/core/state.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { FIRST_PAUSE = 10, PAUSE_DOUBLINGS = 10 }; /* seconds away from a job after a failed lease */
+
+struct peer_class *peer_class_use(struct farm *f, const char *fingerprint)
+{
+	for (struct link *l = f->classes.next; l != &f->classes; l = l->next) {
+		struct peer_class *c = list_entry(l, struct peer_class, link);
+		if (strcmp(c->fingerprint, fingerprint) == 0) {
+			c->uses++;
+			return c;
+		}
+	}
+	struct peer_class *c = mem_alloc(1, sizeof *c);
+	if (!c)
+		return NULL;
+	snprintf(c->fingerprint, sizeof c->fingerprint, "%s", fingerprint);
+	c->uses = 1;
+	list_init(&c->waiting);
+	list_append(&f->classes, &c->link);
+	return c;
+}
+
+void peer_class_drop(struct peer_class *c)
+{
+	if (--c->uses)
+		return;
+	list_remove(&c->link);
+	mem_free(c);
+}
+
+static struct peer *make(struct farm *f, const struct event_join *e, uint32_t limit)
+{
+	if (update_reserve(f, limit) < 0)
+		return NULL;
+	struct peer *p = mem_alloc(1, sizeof *p + limit * sizeof *p->leases);
+	if (!p)
+		return NULL;
+	p->class = peer_class_use(f, e->fingerprint);
+	if (!p->class) {
+		mem_free(p);
+		return NULL;
+	}
+	p->lease_limit = limit;
+	return p;
+}
+
+struct peer *peer_join(struct farm *f, const struct event_join *e, const char **refused)
+{
+	if (f->peer_count == f->config.max_peers) {
+		*refused = "the farm has as many workers as it takes";
+		return NULL;
+	}
+	if (e->threads == 0 || strlen(e->fingerprint) >= FINGERPRINT_SIZE) {
+		*refused = e->threads ? "the fingerprint is too long" : "a worker without threads";
+		return NULL;
+	}
+	/* Room for a lease and a half per thread and some that are overdue. */
+	uint32_t limit = f->config.max_peer_leases;
+	if (e->threads < limit / 2)
+		limit = 2 * e->threads < 4 ? (limit < 4 ? limit : 4) : 2 * e->threads;
+	struct peer *p = make(f, e, limit);
+	if (!p) {
+		*refused = "the coordinator has no memory for another worker";
+		return NULL;
+	}
+	p->id = e->peer;
+	snprintf(p->name, sizeof p->name, "%s", e->name);
+	p->threads = e->threads;
+	p->joined = p->heard = f->now;
+	p->class->active++;
+	list_init(&p->waiting);
+	f->lease_limit += limit;
+	if (f->now + f->config.silent_after < f->check_at)
+		f->check_at = f->now + f->config.silent_after;
+	uint32_t i = f->peer_count++;
+	for (; i > 0 && f->peers[i - 1]->id > p->id; i--)
+		f->peers[i] = f->peers[i - 1];
+	f->peers[i] = p;
+	return p;
+}
+
+void peer_leave(struct farm *f, struct peer *p)
+{
+	p->want = 0;
+	peer_requeue(f, p);
+	peer_drop_leases(f, p, false);
+	if (p->state == PEER_ACTIVE)
+		p->class->active--;
+	peer_class_drop(p->class);
+	f->lease_limit -= p->lease_limit;
+	uint32_t i = 0;
+	while (f->peers[i] != p)
+		i++;
+	f->peer_count--;
+	memmove(&f->peers[i], &f->peers[i + 1], (f->peer_count - i) * sizeof *f->peers);
+	mem_free(p);
+}
+
+void peer_set_state(struct farm *f, struct peer *p, enum peer_state s)
+{
+	if (p->state == PEER_ACTIVE && s != PEER_ACTIVE)
+		p->class->active--;
+	if (p->state != PEER_ACTIVE && s == PEER_ACTIVE)
+		p->class->active++;
+	p->state = s;
+	peer_requeue(f, p);
+}
+
+void peer_heard(struct farm *f, struct peer *p)
+{
+	p->heard = f->now;
+	if (p->state == PEER_SILENT)
+		peer_set_state(f, p, p->aside ? PEER_ASIDE : PEER_ACTIVE);
+}
+
+void peer_drop_leases(struct farm *f, struct peer *p, bool revoke)
+{
+	for (uint32_t i = 0; i < p->lease_limit; i++) {
+		struct lease *l = &p->leases[i];
+		if (!l->used)
+			continue;
+		if (revoke)
+			lease_revoke(f, l);
+		else
+			lease_drop(f, l);
+	}
+}
+
+bool peer_has_wish(const struct peer *p)
+{
+	return p->state == PEER_ACTIVE && p->held < p->want;
+}
+
+void peer_requeue(struct farm *f, struct peer *p)
+{
+	if (!list_is_empty(&p->waiting)) {
+		list_remove(&p->waiting);
+		f->waiting--;
+	}
+	if (peer_has_wish(p)) {
+		list_append(&p->class->waiting, &p->waiting);
+		p->queued = f->queued++;
+		f->waiting++;
+	}
+}
+
+void peer_fault(struct farm *f, struct peer *p, const char *text)
+{
+	p->faults++;
+	p->faults_in_row++;
+	snprintf(p->text, sizeof p->text, "%s", text);
+	if (p->faults_in_row >= f->config.max_faults && !p->aside) {
+		p->aside = true;
+		peer_set_state(f, p, PEER_ASIDE);
+		peer_drop_leases(f, p, true);
+	}
+}
+
+void peer_failed(struct peer *p, uint64_t job, double now)
+{
+	struct peer_avoid *a = &p->avoid[0];
+	for (int i = 0; i < PEER_AVOIDED; i++) {
+		if (p->avoid[i].job == job) {
+			a = &p->avoid[i];
+			break;
+		}
+		if (p->avoid[i].until < a->until)
+			a = &p->avoid[i];
+	}
+	if (a->job != job)
+		*a = (struct peer_avoid){ .job = job };
+	uint32_t doublings = a->failures < PAUSE_DOUBLINGS ? a->failures : PAUSE_DOUBLINGS;
+	a->failures++;
+	a->until = now + ldexp(FIRST_PAUSE, (int)doublings);
+	p->failures++;
+}
+
+void peer_succeeded(struct peer *p, uint64_t job)
+{
+	p->merged++;
+	p->faults_in_row = 0;
+	for (int i = 0; i < PEER_AVOIDED; i++)
+		if (p->avoid[i].job == job)
+			p->avoid[i] = (struct peer_avoid){ 0 };
+}
+
+double peer_avoids_until(const struct peer *p, uint64_t job)
+{
+	for (int i = 0; i < PEER_AVOIDED; i++)
+		if (p->avoid[i].job == job)
+			return p->avoid[i].until;
+	return -INFINITY;
+}

@@ -1,0 +1,64 @@
+/* A worker as the core sees it. Waiting workers queue by fingerprint, the one that has waited longest first. */
+#ifndef COORDINATOR_CORE_PEER_H
+#define COORDINATOR_CORE_PEER_H
+
+#include "coordinator/core/farm.h"
+#include "coordinator/core/lease.h"
+#include "coordinator/core/list.h"
+
+enum { PEER_AVOIDED = 4, PEER_NAME = 64, FINGERPRINT_SIZE = 128 };
+
+/* Workers with the same numeric fingerprint. */
+struct peer_class {
+	struct link link;    /* farm.classes */
+	struct link waiting; /* peers that have a wish */
+	uint32_t uses;       /* workers and live jobs */
+	uint32_t active;     /* workers that may get leases */
+	char fingerprint[FINGERPRINT_SIZE];
+};
+
+/* After a failed lease the worker stays away from that job for a while. */
+struct peer_avoid {
+	uint64_t job; /* 0: free */
+	uint32_t failures;
+	double until;
+};
+
+struct peer {
+	uint64_t id;
+	char name[PEER_NAME];
+	struct peer_class *class;
+	uint32_t threads, want;
+	uint32_t held; /* leases that are not overdue */
+	enum peer_state state;
+	bool aside; /* too many faults: for good, silent or not */
+	struct link waiting;
+	uint64_t queued; /* when it began to wait, as a number */
+	double joined, heard;
+	uint32_t faults_in_row;
+	uint64_t merged, repeats, refused, faults, failures, timeouts;
+	struct peer_avoid avoid[PEER_AVOIDED];
+	char text[256];
+	uint32_t lease_limit;
+	struct lease leases[];
+};
+
+struct peer_class *peer_class_use(struct farm *f, const char *fingerprint); /* NULL: no memory */
+void peer_class_drop(struct peer_class *c);
+
+/* NULL with a sentence when it is refused. */
+struct peer *peer_join(struct farm *f, const struct event_join *e, const char **refused);
+void peer_leave(struct farm *f, struct peer *p);
+void peer_set_state(struct farm *f, struct peer *p, enum peer_state s);
+void peer_heard(struct farm *f, struct peer *p);
+void peer_drop_leases(struct farm *f, struct peer *p, bool revoke);
+/* Queues it or takes it out of the queue after its wish, leases or state changed; at the end of the queue if queued. */
+void peer_requeue(struct farm *f, struct peer *p);
+bool peer_has_wish(const struct peer *p);
+
+void peer_fault(struct farm *f, struct peer *p, const char *text);
+void peer_failed(struct peer *p, uint64_t job, double now);
+void peer_succeeded(struct peer *p, uint64_t job);
+double peer_avoids_until(const struct peer *p, uint64_t job); /* -INFINITY: does not */
+
+#endif

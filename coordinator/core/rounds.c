@@ -1,0 +1,219 @@
+/* What a job goes through: submitted, bootstrap, rounds, the bounds, its end. */
+#include "coordinator/core/state.h"
+
+#include "common/base/mem.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { PRIORITY_MAX = 100 };
+
+static struct action *about_job(struct farm *f, enum action_kind kind, const struct job *j)
+{
+	struct action *a = update_add(f, kind);
+	a->job = j->id;
+	a->rounds = j->kind == LEASE_RENDER ? j->rounds : 0;
+	return a;
+}
+
+static void job_changed(struct farm *f, const struct job *j)
+{
+	struct action *a = about_job(f, ACTION_JOB_CHANGED, j);
+	a->state = j->state;
+	a->end = j->end;
+	a->text = j->text;
+}
+
+static void reject(struct farm *f, const struct event *ev, const char *text)
+{
+	struct action *a = update_add(f, ACTION_REJECTED);
+	a->tag = ev->tag;
+	a->job = ev->job;
+	a->text = text;
+}
+
+static void enlist(struct farm *f, struct job *j)
+{
+	f->jobs[f->job_count++] = j;
+	uint32_t i = f->live_count++;
+	for (; i > 0 && f->live[i - 1]->priority < j->priority; i--)
+		f->live[i] = f->live[i - 1];
+	f->live[i] = j;
+}
+
+void rounds_submit(struct farm *f, const struct event *ev)
+{
+	const struct event_submit *e = &ev->submit;
+	if (e->priority < -PRIORITY_MAX || e->priority > PRIORITY_MAX) {
+		reject(f, ev, "a priority is from -100 to 100");
+		return;
+	}
+	if (f->live_count == f->config.max_jobs) {
+		reject(f, ev, "the coordinator has as many jobs as it takes");
+		return;
+	}
+	const char *refused = "";
+	struct job *j = job_new(f, e, &refused);
+	if (!j) {
+		reject(f, ev, refused);
+		return;
+	}
+	j->id = f->next_job++;
+	enlist(f, j);
+	struct action *a = about_job(f, ACTION_SUBMITTED, j);
+	a->tag = ev->tag;
+	job_changed(f, j);
+}
+
+void rounds_started(struct farm *f, struct job *j)
+{
+	if (isnan(j->started))
+		j->started = f->now;
+	if (j->state == JOB_QUEUED) {
+		j->state = JOB_BOOTSTRAP;
+		job_changed(f, j);
+	}
+}
+
+static void forget_oldest(struct farm *f)
+{
+	if (f->job_count - f->live_count <= f->config.max_ended)
+		return;
+	uint32_t oldest = UINT32_MAX;
+	for (uint32_t i = 0; i < f->job_count; i++)
+		if (!job_is_live(f->jobs[i]) && (oldest == UINT32_MAX || f->jobs[i]->ended < f->jobs[oldest]->ended))
+			oldest = i;
+	assert(oldest != UINT32_MAX);
+	struct job *j = f->jobs[oldest];
+	about_job(f, ACTION_JOB_FORGOTTEN, j);
+	f->job_count--;
+	memmove(&f->jobs[oldest], &f->jobs[oldest + 1], (f->job_count - oldest) * sizeof *f->jobs);
+	job_free(j);
+}
+
+static void revoke_all(struct farm *f, struct job *j)
+{
+	for (uint32_t i = 0; i < j->slot_count; i++)
+		lease_revoke_slot(f, &j->slots[i]);
+}
+
+void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *text)
+{
+	revoke_all(f, j);
+	j->progress_floor = job_progress(j, f->now);
+	j->state = end == END_CANCELLED ? JOB_CANCELLED : end == END_FAILED ? JOB_FAILED : JOB_DONE;
+	j->end = end;
+	j->ended = f->now;
+	snprintf(j->text, sizeof j->text, "%s", text);
+	if (j->class)
+		peer_class_drop(j->class);
+	j->class = NULL;
+	mem_free(j->slots);
+	j->slots = NULL;
+	j->slot_count = 0;
+	uint32_t i = 0;
+	while (f->live[i] != j)
+		i++;
+	f->live_count--;
+	memmove(&f->live[i], &f->live[i + 1], (f->live_count - i) * sizeof *f->live);
+	if (j->state == JOB_DONE)
+		about_job(f, ACTION_PUBLISH, j)->final = true;
+	job_changed(f, j);
+	forget_oldest(f);
+}
+
+void rounds_cancel(struct farm *f, const struct event *ev)
+{
+	struct job *j = farm_find_job(f, ev->job);
+	if (!j || !job_is_live(j)) {
+		reject(f, ev, j ? "the job is over" : "no such job");
+		return;
+	}
+	struct action *a = about_job(f, ACTION_CANCELLED, j);
+	a->tag = ev->tag;
+	rounds_end(f, j, END_CANCELLED, "cancelled");
+}
+
+static void evaluate(struct farm *f, struct job *j)
+{
+	j->evaluating = true;
+	about_job(f, ACTION_EVALUATE_ERROR, j);
+}
+
+static void preview(struct farm *f, struct job *j)
+{
+	if (f->config.preview_interval > 0 && f->now - j->published >= f->config.preview_interval) {
+		j->published = f->now;
+		about_job(f, ACTION_PUBLISH, j);
+	}
+}
+
+static void round_complete(struct farm *f, struct job *j)
+{
+	about_job(f, ACTION_ROUND_DONE, j);
+	enum job_end end = END_NONE;
+	if (j->rounds >= j->plan.rounds)
+		end = END_MUTATIONS;
+	else if (j->plan.seconds > 0 && f->now - j->started >= j->plan.seconds)
+		end = END_TIME;
+	bool wants_error = j->plan.target_error > 0;
+	if (end != END_NONE && !wants_error) {
+		rounds_end(f, j, end, "");
+	} else if (end != END_NONE) {
+		j->ending = end;
+		revoke_all(f, j);
+		evaluate(f, j);
+	} else {
+		if (wants_error && j->rounds >= j->next_evaluation)
+			evaluate(f, j);
+		preview(f, j);
+	}
+}
+
+void rounds_complete(struct farm *f, struct job *j)
+{
+	if (j->kind == LEASE_RENDER) {
+		round_complete(f, j);
+		return;
+	}
+	j->preparing = true;
+	about_job(f, ACTION_BOOTSTRAP_DONE, j);
+}
+
+void rounds_prepared(struct farm *f, const struct event *ev)
+{
+	struct job *j = farm_find_job(f, ev->prepared.job);
+	if (!j || !job_is_live(j) || !j->preparing)
+		return;
+	j->preparing = false;
+	if (!ev->prepared.ok) {
+		rounds_end(f, j, END_FAILED, ev->text ? ev->text : "");
+		return;
+	}
+	job_open_rounds(j, f->now);
+	if (ev->prepared.black) {
+		rounds_end(f, j, END_BLACK, "no bootstrap sample carried light");
+		return;
+	}
+	j->state = JOB_RUNNING;
+	job_changed(f, j);
+}
+
+void rounds_error_known(struct farm *f, const struct event *ev)
+{
+	struct job *j = farm_find_job(f, ev->error_known.job);
+	if (!j || !job_is_live(j) || !j->evaluating || ev->error_known.rounds != j->rounds)
+		return;
+	j->evaluating = false;
+	j->progress_floor = job_progress(j, f->now);
+	j->rel_error = ev->error_known.rel_error;
+	j->rel_error_rounds = j->rounds;
+	if (j->rel_error <= j->plan.target_error)
+		rounds_end(f, j, END_ERROR, "");
+	else if (j->ending != END_NONE)
+		rounds_end(f, j, j->ending, "");
+	else
+		j->next_evaluation = j->rounds + (j->rounds + 3) / 4;
+}

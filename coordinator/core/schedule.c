@@ -1,0 +1,147 @@
+/* Who gets what, and what has been out for too long. */
+#include "coordinator/core/state.h"
+
+#include <math.h>
+
+static void call_again(struct farm *f, double at)
+{
+	if (at < f->schedule_at)
+		f->schedule_at = at;
+}
+
+/* The worker that has waited longest and does not hold the slot; one that holds it overdue if `again` and no other does. */
+static struct peer *waiting_in(struct farm *f, const struct peer_class *c, const struct job *j, const struct slot *s,
+			       bool again)
+{
+	struct peer *second = NULL;
+	for (struct link *k = c->waiting.next; k != &c->waiting; k = k->next) {
+		struct peer *p = list_entry(k, struct peer, waiting);
+		double until = peer_avoids_until(p, j->id);
+		if (until > f->now) {
+			call_again(f, until);
+			continue;
+		}
+		const struct lease *l = lease_of(s, p);
+		if (!l)
+			return p;
+		if (again && l->overdue && !second)
+			second = p;
+	}
+	return second;
+}
+
+static struct peer *waiting_for(struct farm *f, const struct job *j, const struct slot *s, bool again)
+{
+	if (j->class && !j->mixed)
+		return waiting_in(f, j->class, j, s, again);
+	struct peer *first = NULL;
+	for (struct link *k = f->classes.next; k != &f->classes; k = k->next) {
+		struct peer *p = waiting_in(f, list_entry(k, struct peer_class, link), j, s, again);
+		if (p && (!first || p->queued < first->queued))
+			first = p;
+	}
+	return first;
+}
+
+static void hand_out(struct farm *f, struct peer *p, struct job *j, struct slot *s)
+{
+	rounds_started(f, j);
+	lease_send(f, p, j, s);
+}
+
+/* Among jobs of the highest priority that can use a waiting worker the one with the fewest leases out. */
+static bool hand_out_ready(struct farm *f)
+{
+	struct job *best = NULL;
+	struct slot *slot = NULL;
+	struct peer *peer = NULL;
+	for (uint32_t i = 0; i < f->live_count; i++) {
+		struct job *j = f->live[i];
+		if (best && j->priority < best->priority)
+			break;
+		if (!job_is_open(j) || (best && j->leases_out >= best->leases_out))
+			continue;
+		struct slot *s = job_ready(j);
+		struct peer *p = s ? waiting_for(f, j, s, true) : NULL;
+		if (p) {
+			best = j;
+			slot = s;
+			peer = p;
+		}
+	}
+	if (best)
+		hand_out(f, peer, best, slot);
+	return best;
+}
+
+/* A second copy of what holds up a round. */
+static bool hand_out_copy(struct farm *f)
+{
+	for (uint32_t i = 0; i < f->live_count; i++) {
+		struct job *j = f->live[i];
+		if (!job_is_open(j))
+			continue;
+		for (struct link *k = j->out[0].next; k != &j->out[0]; k = k->next) {
+			struct slot *s = list_entry(k, struct slot, link);
+			double at = job_straggles_at(j, s);
+			if (at > f->now) {
+				call_again(f, at);
+				break;
+			}
+			struct peer *p = waiting_for(f, j, s, false);
+			if (p) {
+				hand_out(f, p, j, s);
+				return true;
+			}
+		}
+	}
+	return false;
+}
+
+void schedule(struct farm *f)
+{
+	f->schedule_at = INFINITY;
+	while (f->waiting && hand_out_ready(f))
+		;
+	while (f->waiting && hand_out_copy(f))
+		;
+}
+
+static void expire_leases(struct farm *f, struct peer *p)
+{
+	for (uint32_t i = 0; i < p->lease_limit; i++) {
+		struct lease *l = &p->leases[i];
+		if (!l->used || l->overdue)
+			continue;
+		if (l->deadline <= f->now)
+			lease_expire(f, l);
+		else
+			f->check_at = fmin(f->check_at, l->deadline);
+	}
+}
+
+void schedule_expire(struct farm *f)
+{
+	if (f->now < f->check_at)
+		return;
+	f->check_at = INFINITY;
+	for (uint32_t i = f->peer_count; i-- > 0;) {
+		struct peer *p = f->peers[i];
+		if (p->heard + f->config.forget_after <= f->now) {
+			struct action *a = update_add(f, ACTION_CLOSE_PEER);
+			a->peer = p->id;
+			a->text = "nothing heard for too long";
+			peer_leave(f, p);
+			continue;
+		}
+		if (p->state != PEER_SILENT && p->heard + f->config.silent_after <= f->now) {
+			peer_set_state(f, p, PEER_SILENT);
+			peer_drop_leases(f, p, false);
+		}
+		double patience = p->state == PEER_SILENT ? f->config.forget_after : f->config.silent_after;
+		f->check_at = fmin(f->check_at, p->heard + patience);
+		expire_leases(f, p);
+	}
+	/* All of this is a scan; once a second is enough for it. */
+	f->check_at = fmax(f->check_at, f->now + 1);
+}

@@ -1,0 +1,57 @@
+/* What the farm holds; for the files of the core alone. */
+#ifndef COORDINATOR_CORE_STATE_H
+#define COORDINATOR_CORE_STATE_H
+
+#include "coordinator/core/farm.h"
+#include "coordinator/core/job.h"
+#include "coordinator/core/lease.h"
+#include "coordinator/core/peer.h"
+
+struct farm {
+	struct farm_config config;
+	double now;
+	uint64_t next_job;
+	struct job **jobs; /* by id; ended ones too */
+	uint32_t job_count;
+	struct job **live; /* by priority, then id */
+	uint32_t live_count;
+	struct peer **peers; /* by id */
+	uint32_t peer_count;
+	struct link classes;
+	uint32_t waiting; /* workers with a wish */
+	uint64_t queued;  /* counts who began to wait */
+	double check_at;  /* something may be silent or overdue then, not before */
+	double schedule_at; /* handing out may be possible then though nothing else happens */
+	struct action *actions;
+	size_t action_count, action_limit;
+	size_t lease_limit; /* of all workers */
+	char text[256];     /* of the answer to this event */
+};
+
+/* update.c: room is made when workers join, so that saying something cannot fail. */
+int update_reserve(struct farm *f, size_t more_leases);
+struct action *update_add(struct farm *f, enum action_kind kind);
+void update_lease(struct farm *f, enum action_kind kind, const struct lease *l);
+
+struct job *farm_find_job(const struct farm *f, uint64_t id);
+struct peer *farm_find_peer(const struct farm *f, uint64_t id);
+
+/* rounds.c: what a job goes through. */
+void rounds_submit(struct farm *f, const struct event *ev);
+void rounds_cancel(struct farm *f, const struct event *ev);
+void rounds_started(struct farm *f, struct job *j); /* a lease of it is about to be sent */
+void rounds_complete(struct farm *f, struct job *j);
+void rounds_prepared(struct farm *f, const struct event *ev);
+void rounds_error_known(struct farm *f, const struct event *ev);
+void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *text);
+
+/* answer.c: what workers send back. */
+void answer_batch(struct farm *f, const struct event *ev);
+void answer_failed(struct farm *f, const struct event *ev);
+void answer_returned(struct farm *f, const struct event *ev);
+
+/* schedule.c */
+void schedule(struct farm *f);
+void schedule_expire(struct farm *f); /* silence and overdue leases */
+
+#endif

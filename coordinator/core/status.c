@@ -1,0 +1,178 @@
+/* Answers to questions about the farm. */
+#include "coordinator/core/state.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+const char *job_state_name(enum job_state s)
+{
+	static const char *const names[] = { [JOB_QUEUED] = "queued",   [JOB_BOOTSTRAP] = "bootstrap",
+					     [JOB_RUNNING] = "running", [JOB_HELD] = "held",
+					     [JOB_DONE] = "done",       [JOB_FAILED] = "failed",
+					     [JOB_CANCELLED] = "cancelled" };
+	return names[s];
+}
+
+const char *job_end_name(enum job_end e)
+{
+	static const char *const names[] = { [END_NONE] = "none",   [END_MUTATIONS] = "mutations",
+					     [END_TIME] = "time",   [END_ERROR] = "error",
+					     [END_BLACK] = "black", [END_CANCELLED] = "cancelled",
+					     [END_FAILED] = "failed" };
+	return names[e];
+}
+
+int job_exit_code(const struct job_status *s)
+{
+	if (s->state != JOB_DONE)
+		return 3;
+	bool missed = s->plan->target_error > 0 && s->end != END_ERROR && s->end != END_BLACK;
+	return missed ? 4 : 0;
+}
+
+/* The job that keeps workers of this class busy: the one with the most leases. */
+static const struct job *busy_with(const struct farm *f, const struct job *j)
+{
+	const struct job *most = NULL;
+	for (uint32_t i = 0; i < f->live_count; i++) {
+		const struct job *o = f->live[i];
+		if (o != j && o->leases_out && (!j->class || o->mixed || j->mixed || o->class == j->class) &&
+		    (!most || o->leases_out > most->leases_out))
+			most = o;
+	}
+	return most;
+}
+
+static uint32_t active_workers(const struct farm *f)
+{
+	uint32_t n = 0;
+	for (struct link *k = f->classes.next; k != &f->classes; k = k->next)
+		n += list_entry(k, struct peer_class, link)->active;
+	return n;
+}
+
+static bool someone_avoids(const struct farm *f, const struct job *j)
+{
+	for (uint32_t i = 0; i < f->peer_count; i++)
+		if (job_takes(j, f->peers[i]) && peer_avoids_until(f->peers[i], j->id) > f->now)
+			return true;
+	return false;
+}
+
+static void why_waiting(const struct farm *f, const struct job *j, char *text, size_t size)
+{
+	text[0] = 0;
+	if (!job_is_live(j) || j->leases_out)
+		return;
+	uint32_t active = active_workers(f);
+	const struct job *other = busy_with(f, j);
+	if (j->preparing)
+		snprintf(text, size, "the bootstrap is being evaluated");
+	else if (j->evaluating && (j->ending != END_NONE || !job_ready(j)))
+		snprintf(text, size, "its error is being estimated");
+	else if (f->peer_count == 0)
+		snprintf(text, size, "no worker");
+	else if (active == 0)
+		snprintf(text, size, "no worker that answers and is trusted (%u are known)", f->peer_count);
+	else if (j->class && !j->mixed && j->class->active == 0)
+		snprintf(text, size, "no worker with fingerprint %s (%u with others)", j->fingerprint, active);
+	else if (someone_avoids(f, j))
+		snprintf(text, size, "its workers failed and pause before they try again");
+	else if (other)
+		snprintf(text, size, "workers busy with j%llu (priority %d)", (unsigned long long)other->id,
+			 other->priority);
+	else
+		snprintf(text, size, "no worker asks for work");
+}
+
+static void fill_counts(const struct job *j, struct job_status *s)
+{
+	s->rounds = j->kind == LEASE_RENDER ? j->rounds : 0;
+	s->bootstrap_merged = j->bootstrap_merged;
+	s->leases_merged = j->leases_merged;
+	double slots = (double)j->plan.groups * j->plan.parts;
+	s->mutations = (uint64_t)((double)j->leases_merged * ((double)plan_round_mutations(&j->plan) / slots));
+	s->leases_out = j->leases_out;
+	s->repeats = j->repeats;
+	s->refused = j->refused;
+	s->faults = j->faults;
+	s->failures = j->failures;
+	s->timeouts = j->timeouts;
+	s->duplicates = j->duplicates;
+}
+
+bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s)
+{
+	const struct job *j = farm_find_job(f, id);
+	if (!j)
+		return false;
+	*s = (struct job_status){
+		.id = j->id,
+		.owner = j->owner,
+		.name = j->name,
+		.priority = j->priority,
+		.mixed = j->mixed,
+		.plan = &j->plan,
+		.state = j->state,
+		.end = j->end,
+		.fingerprint = j->fingerprint,
+		.submitted = j->submitted,
+		.started = j->started,
+		.ended = j->ended,
+		.progress = job_progress(j, now),
+		.rate = job_is_live(j) ? rate_value(&j->rate, now) : 0,
+		.eta = job_eta(j, now),
+		.rel_error = j->rel_error,
+		.rel_error_rounds = j->rel_error_rounds,
+	};
+	fill_counts(j, s);
+	memcpy(s->text, j->text, sizeof s->text);
+	why_waiting(f, j, s->waiting, sizeof s->waiting);
+	return true;
+}
+
+bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)
+{
+	const struct peer *p = farm_find_peer(f, id);
+	if (!p)
+		return false;
+	*s = (struct peer_status){
+		.id = p->id,
+		.name = p->name,
+		.fingerprint = p->class->fingerprint,
+		.threads = p->threads,
+		.want = p->want,
+		.leases = p->held,
+		.state = p->state,
+		.joined = p->joined,
+		.heard = p->heard,
+		.merged = p->merged,
+		.repeats = p->repeats,
+		.refused = p->refused,
+		.faults = p->faults,
+		.failures = p->failures,
+		.timeouts = p->timeouts,
+	};
+	memcpy(s->text, p->text, sizeof s->text);
+	return true;
+}
+
+bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s)
+{
+	const struct peer *p = farm_find_peer(f, peer);
+	for (uint32_t k = 0; p && k < p->lease_limit; k++) {
+		const struct lease *l = &p->leases[k];
+		if (!l->used || i-- > 0)
+			continue;
+		*s = (struct lease_status){
+			.key = lease_key(l),
+			.peer = peer,
+			.sent = l->sent,
+			.deadline = l->deadline,
+			.overdue = l->overdue,
+		};
+		return true;
+	}
+	return false;
+}

@@ -1,0 +1,39 @@
+#include "coordinator/core/update.h"
+
+#include "common/base/mem.h"
+#include "coordinator/core/state.h"
+
+#include <assert.h>
+
+/* In one step each lease is revoked at most once and replaced at most once, a worker that is full of overdue leases loses
+ * some more, each worker is hung up once, and a job says a handful of things. */
+int update_reserve(struct farm *f, size_t more_leases)
+{
+	size_t leases = f->lease_limit + more_leases;
+	size_t want = 3 * leases + f->config.max_peers + 8 * (size_t)f->config.max_jobs + 64;
+	if (want <= f->action_limit)
+		return 0;
+	want += want / 2;
+	void *p = mem_grow(f->actions, f->action_limit * sizeof *f->actions, want * sizeof *f->actions);
+	if (!p)
+		return -ENOMEM;
+	f->actions = p;
+	f->action_limit = want;
+	return 0;
+}
+
+struct action *update_add(struct farm *f, enum action_kind kind)
+{
+	assert(f->action_count < f->action_limit);
+	struct action *a = &f->actions[f->action_count++];
+	*a = (struct action){ .kind = kind, .text = "" };
+	return a;
+}
+
+void update_lease(struct farm *f, enum action_kind kind, const struct lease *l)
+{
+	struct action *a = update_add(f, kind);
+	a->peer = l->peer->id;
+	a->key = lease_key(l);
+	a->job = a->key.job;
+}
