@@ -14,6 +14,7 @@ struct emitter_point {
 	vec3 p;        /* position, or direction towards the emitter when infinite */
 	vec3 n;        /* unit normal on the emitting side; unused when infinite */
 	double u, v;   /* texture coordinates */
+	uint32_t prim; /* triangle of the surface; 0 on a sphere; unused when infinite */
 	bool infinite;
 };
 

@@ -1,2 +1,3 @@
 /* One line an emitter: its const struct emitter_ops is emitter_ops_NAME. */
+EMITTER(area)
 EMITTER(constant)

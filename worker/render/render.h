@@ -22,7 +22,6 @@ struct effect_line {
 	char why[160];
 };
 enum { RENDER_EFFECTS_MAX = 24 };
-size_t render_effects(const struct scene *s, struct effect_line lines[RENDER_EFFECTS_MAX]);
 
 struct render_integrator {
 	const char *name, *summary;
@@ -34,15 +33,31 @@ const struct render_integrator *render_integrator_find(const char *name);
 const struct render_integrator *render_integrator_at(size_t index);
 #define RENDER_INTEGRATOR_DEFAULT "pssmlt"
 
+/* Of the libraries that decide bits, for the numeric fingerprint: "embree 3.13.5 avx2". */
+const char *render_numeric_version(void);
+
 /* What hslt-submit and hslt-render let the user override; all zero: as the scene says. */
 struct render_options {
 	uint32_t width, height;
 };
 
+struct render_summary {
+	struct scene_settings settings; /* with the overrides of the options */
+	struct effect_line lines[RENDER_EFFECTS_MAX];
+	size_t line_count;
+	uint64_t shapes, triangles;
+};
+
+/* Reads every mesh, texture and material and says what the scene calls for; all but Embree's own building. What passes
+ * here is a scene that workers can render. */
+int render_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
+		 struct render_summary *out, struct error *e);
+
 /* Builds Embree's scene. The scene description may be freed afterwards. */
 int world_new(struct world **w, const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 	      struct error *e);
 void world_free(struct world *w);
+void world_summary(const struct world *w, struct render_summary *out);
 /* Upper bound of |value| of one sample, for canvas_grid_exponent when the bootstrap is black. */
 double world_brightest(const struct world *w);
 size_t world_embree_bytes(const struct world *w);

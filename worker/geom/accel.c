@@ -1,0 +1,334 @@
+#include "worker/geom/accel.h"
+
+#include "common/base/mem.h"
+#include "worker/geom/embree.h"
+#include "worker/math/fptrap.h"
+
+#include <float.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <sys/types.h>
+
+struct sphere_prim {
+	vec3 center;
+	double radius;
+	uint32_t shape;
+};
+
+struct accel {
+	RTCDevice device;
+	RTCScene scene;
+	uint32_t sphere_count;
+	struct sphere_prim *spheres;
+	atomic_size_t bytes;
+	vec3 low, high;
+};
+
+/* What a query carries into Embree's callbacks. */
+struct query {
+	embree_context context;
+	vec3 o, d; /* spheres are solved with these, in double */
+	double t_min;
+	struct prim_ref from, to;
+};
+
+static bool memory_monitor(void *user, ssize_t bytes, bool post)
+{
+	(void)post;
+	struct accel *a = user;
+	atomic_fetch_add(&a->bytes, (size_t)bytes);
+	return true;
+}
+
+static void filter_self(const struct RTCFilterFunctionNArguments *args)
+{
+	const struct query *q = (const struct query *)(const void *)args->context;
+	/* Single rays only (N = 1): the accessors of packets exist in C++ alone. */
+	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
+	if ((hit->geomID == q->from.shape && hit->primID == q->from.prim) ||
+	    (hit->geomID == q->to.shape && hit->primID == q->to.prim))
+		args->valid[0] = 0;
+}
+
+static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
+{
+	const struct sphere_prim *s = args->geometryUserPtr;
+	/* One part in 2^20 outwards: more than float rounding of the box and of Embree's slab test can take away. */
+	double r = s->radius * (1 + 0x1p-20) + 0x1p-20 * (fabs(s->center.x) + fabs(s->center.y) + fabs(s->center.z));
+	struct RTCBounds *b = args->bounds_o;
+	b->lower_x = (float)(s->center.x - r);
+	b->lower_y = (float)(s->center.y - r);
+	b->lower_z = (float)(s->center.z - r);
+	b->upper_x = (float)(s->center.x + r);
+	b->upper_y = (float)(s->center.y + r);
+	b->upper_z = (float)(s->center.z + r);
+}
+
+/* The nearest admissible root of |o + t d - c|^2 = r^2 in (t_min, t_max). Where the ray starts on the sphere one root is 0,
+ * where a segment ends on it one root is 1: the other follows from Vieta without cancellation. Else the discriminant comes
+ * from the distance of the line to the centre (Haines et al. 2019, Ray Tracing Gems ch. 7). */
+static bool sphere_root(const struct sphere_prim *s, const struct query *q, double t_max, double *t)
+{
+	vec3 oc = vec3_sub(q->o, s->center);
+	double a = vec3_dot(q->d, q->d), b = vec3_dot(oc, q->d);
+	double length = vec3_length(oc), c = (length - s->radius) * (length + s->radius);
+	bool starts = q->from.shape == s->shape, ends = q->to.shape == s->shape;
+	if (starts && ends)
+		return false;
+	if (starts || ends) {
+		*t = starts ? -2 * b / a : c / a;
+		return *t > q->t_min && *t < (ends ? 1.0 : t_max);
+	}
+	vec3 nearest = vec3_madd(oc, -b / a, q->d);
+	double disc = s->radius * s->radius - vec3_dot(nearest, nearest);
+	if (!(disc >= 0))
+		return false;
+	double k = -b - copysign(sqrt(disc * a), b);
+	double t0 = k / a, t1 = k != 0 ? c / k : t0;
+	double first = fmin(t0, t1), second = fmax(t0, t1);
+	*t = first > q->t_min ? first : second;
+	return *t > q->t_min && *t < t_max;
+}
+
+static void sphere_intersect(const struct RTCIntersectFunctionNArguments *args)
+{
+	if (!args->valid[0])
+		return;
+	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct sphere_prim *s = args->geometryUserPtr;
+	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit;
+	double t;
+	if (!sphere_root(s, q, (double)rh->ray.tfar, &t))
+		return;
+	rh->ray.tfar = (float)t;
+	rh->hit.geomID = s->shape;
+	rh->hit.primID = 0;
+	rh->hit.u = rh->hit.v = 0;
+}
+
+static void sphere_occluded(const struct RTCOccludedFunctionNArguments *args)
+{
+	if (!args->valid[0])
+		return;
+	const struct query *q = (const struct query *)(const void *)args->context;
+	struct RTCRay *ray = (struct RTCRay *)(void *)args->ray;
+	double t;
+	if (sphere_root(args->geometryUserPtr, q, (double)ray->tfar, &t))
+		ray->tfar = -INFINITY;
+}
+
+static void attach(struct accel *a, RTCGeometry g, uint32_t id)
+{
+	rtcSetGeometryMask(g, 0xFFFFFFFFu);
+	rtcCommitGeometry(g);
+	rtcAttachGeometryByID(a->scene, g, id);
+	rtcReleaseGeometry(g);
+}
+
+static int attach_triangles(struct accel *a, const struct accel_shape *s, uint32_t id)
+{
+	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+	if (!g)
+		return -ENOMEM;
+	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, s->position, 0, sizeof s->position[0],
+				   s->vertex_count);
+	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, s->index, 0, sizeof s->index[0],
+				   s->triangle_count);
+	rtcSetGeometryIntersectFilterFunction(g, filter_self);
+	rtcSetGeometryOccludedFilterFunction(g, filter_self);
+	attach(a, g, id);
+	return 0;
+}
+
+static int attach_sphere(struct accel *a, const struct accel_shape *s, uint32_t id)
+{
+	struct sphere_prim *prim = &a->spheres[a->sphere_count++];
+	*prim = (struct sphere_prim){s->center, s->radius, id};
+	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
+	if (!g)
+		return -ENOMEM;
+	rtcSetGeometryUserPrimitiveCount(g, 1);
+	rtcSetGeometryUserData(g, prim);
+	rtcSetGeometryBoundsFunction(g, sphere_bounds, NULL);
+	rtcSetGeometryIntersectFunction(g, sphere_intersect);
+	rtcSetGeometryOccludedFunction(g, sphere_occluded);
+	attach(a, g, id);
+	return 0;
+}
+
+/* One instruction set for all machines that have it, so that farms of mixed processors agree on bits. */
+static bool has_avx2(void)
+{
+#if defined(__x86_64__)
+	return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+#else
+	return false;
+#endif
+}
+
+const char *accel_version(void)
+{
+#define TEXT_(x) #x
+#define TEXT(x) TEXT_(x)
+#define EMBREE_TEXT "embree " TEXT(RTC_VERSION_MAJOR) "." TEXT(RTC_VERSION_MINOR) "." TEXT(RTC_VERSION_PATCH)
+	return has_avx2() ? EMBREE_TEXT " avx2" : EMBREE_TEXT " native";
+}
+
+static int embree_failure(RTCDevice device, struct error *e)
+{
+	enum RTCError code = rtcGetDeviceError(device);
+	if (code == RTC_ERROR_NONE)
+		return 0;
+	return error_set(e, code == RTC_ERROR_OUT_OF_MEMORY ? ENOMEM : EIO, "Embree reports error %d while building", (int)code);
+}
+
+static int build(struct accel *a, const struct accel_shape *shapes, uint32_t count, struct error *e)
+{
+	a->device = rtcNewDevice(has_avx2() ? "threads=1,isa=avx2" : "threads=1");
+	if (!a->device)
+		return error_set(e, EIO, "Embree's device cannot be created");
+	rtcSetDeviceMemoryMonitorFunction(a->device, memory_monitor, a);
+	a->scene = rtcNewScene(a->device);
+	if (!a->scene)
+		return error_set(e, ENOMEM, "Embree's scene cannot be created");
+	rtcSetSceneFlags(a->scene, RTC_SCENE_FLAG_ROBUST);
+	rtcSetSceneBuildQuality(a->scene, RTC_BUILD_QUALITY_MEDIUM);
+	for (uint32_t i = 0; i < count; i++) {
+		int rc = shapes[i].is_sphere ? attach_sphere(a, &shapes[i], i) : attach_triangles(a, &shapes[i], i);
+		if (rc)
+			return error_set(e, -rc, "Embree's geometry cannot be created");
+	}
+	rtcCommitScene(a->scene);
+	int rc = embree_failure(a->device, e);
+	if (rc || count == 0)
+		return rc;
+	struct RTCBounds b;
+	rtcGetSceneBounds(a->scene, &b);
+	a->low = (vec3){(double)b.lower_x, (double)b.lower_y, (double)b.lower_z};
+	a->high = (vec3){(double)b.upper_x, (double)b.upper_y, (double)b.upper_z};
+	return 0;
+}
+
+int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t count, struct error *e)
+{
+	*out = NULL;
+	struct accel *a = mem_alloc(1, sizeof *a);
+	if (!a)
+		return error_set(e, ENOMEM, "out of memory");
+	a->spheres = mem_alloc(count, sizeof *a->spheres);
+	unsigned trap = fptrap_mask();
+	int rc = a->spheres ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
+	fptrap_restore(trap);
+	if (rc)
+		accel_free(a);
+	else
+		*out = a;
+	return rc;
+}
+
+void accel_free(struct accel *a)
+{
+	if (!a)
+		return;
+	unsigned trap = fptrap_mask();
+	if (a->scene)
+		rtcReleaseScene(a->scene);
+	if (a->device)
+		rtcReleaseDevice(a->device);
+	fptrap_restore(trap);
+	mem_free(a->spheres);
+	mem_free(a);
+}
+
+size_t accel_bytes(const struct accel *a)
+{
+	return atomic_load(&a->bytes);
+}
+
+/* How far float rounding of a point at p, and of the edges that Embree's robust test forms with it, can carry it: half a
+ * unit in the last place of each coordinate for the point, as much again for the differences, times four. */
+static double rounding_reach(vec3 p)
+{
+	return 0x1p-21 * fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z)));
+}
+
+static vec3 lifted(vec3 p, vec3 ng, vec3 d)
+{
+	return vec3_madd(p, copysign(rounding_reach(p), vec3_dot(ng, d)), ng);
+}
+
+/* Rays from far outside enter the scene's box in double: Embree's floats never see the distance. In units of |d|. */
+static double entry_distance(const struct accel *a, vec3 o, vec3 d)
+{
+	const double lo[3] = {a->low.x, a->low.y, a->low.z}, hi[3] = {a->high.x, a->high.y, a->high.z};
+	const double p[3] = {o.x, o.y, o.z}, w[3] = {d.x, d.y, d.z};
+	double enter = 0, size = hi[0] - lo[0] + hi[1] - lo[1] + hi[2] - lo[2];
+	for (int i = 0; i < 3; i++) {
+		double outside = w[i] > 0 ? lo[i] - size - p[i] : p[i] - hi[i] - size;
+		if (outside > 0 && fabs(w[i]) * 0x1p60 > outside)
+			enter = fmax(enter, outside / fabs(w[i]));
+	}
+	return enter;
+}
+
+static void fill_ray(struct RTCRay *ray, vec3 o, vec3 d, double t_min, double t_max)
+{
+	*ray = (struct RTCRay){.org_x = (float)o.x,
+			       .org_y = (float)o.y,
+			       .org_z = (float)o.z,
+			       .tnear = (float)t_min,
+			       .dir_x = (float)d.x,
+			       .dir_y = (float)d.y,
+			       .dir_z = (float)d.z,
+			       .tfar = (float)fmin(t_max, (double)FLT_MAX),
+			       .mask = 0xFFFFFFFFu};
+}
+
+bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max, struct ray_hit *hit)
+{
+	double enter = entry_distance(a, from->p, d);
+	if (enter >= t_max)
+		return false;
+	struct query q = {.o = vec3_madd(from->p, enter, d), .d = d, .t_min = fmax(t_min - enter, 0), .from = from->prim,
+			  .to = PRIM_NONE};
+	struct RTCRayHit rh;
+	fill_ray(&rh.ray, lifted(q.o, from->ng, d), d, q.t_min, t_max - enter);
+	rh.hit.geomID = rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+	unsigned trap = fptrap_mask();
+	EMBREE_INIT_CONTEXT(&q.context);
+	embree_intersect(a->scene, &q.context, &rh);
+	fptrap_restore(trap);
+	if (rh.hit.geomID == RTC_INVALID_GEOMETRY_ID)
+		return false;
+	*hit = (struct ray_hit){{rh.hit.geomID, rh.hit.primID}, enter + (double)rh.ray.tfar, (double)rh.hit.u, (double)rh.hit.v};
+	return true;
+}
+
+static bool occluded(const struct accel *a, struct query *q, vec3 o, vec3 d, double t_max)
+{
+	struct RTCRay ray;
+	fill_ray(&ray, o, d, 0, t_max);
+	unsigned trap = fptrap_mask();
+	EMBREE_INIT_CONTEXT(&q->context);
+	embree_occluded(a->scene, &q->context, &ray);
+	fptrap_restore(trap);
+	return ray.tfar < 0;
+}
+
+bool accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to)
+{
+	vec3 d = vec3_sub(to->p, from->p);
+	double enter = entry_distance(a, from->p, d);
+	if (enter >= 1)
+		return false;
+	vec3 start = vec3_madd(from->p, enter, d);
+	struct query q = {.o = start, .d = vec3_scale(1 - enter, d), .from = from->prim, .to = to->prim};
+	vec3 o = lifted(start, from->ng, d), end = lifted(to->p, to->ng, vec3_neg(d));
+	return occluded(a, &q, o, vec3_sub(end, o), 1 - 0x1p-20);
+}
+
+bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d)
+{
+	struct query q = {.o = from->p, .d = d, .from = from->prim, .to = PRIM_NONE};
+	return occluded(a, &q, lifted(from->p, from->ng, d), d, (double)FLT_MAX);
+}

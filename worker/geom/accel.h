@@ -1,0 +1,66 @@
+/*
+ * The one door to Embree (3.13 or 4). Rays in double go in, primitives come out; where on the primitive the ray met it is
+ * solved again in double by surface.h.
+ *
+ * Self-intersection: a ray names the primitive it starts on (and, for a segment, the one it ends on). A plane triangle
+ * cannot be met again from itself, so it is filtered; on a sphere the root that is the start (or the end) is divided out
+ * of the quadratic. Against neighbours the origin that Embree gets in float is moved off the surface by what rounding can
+ * do at its place, never by an absolute length.
+ *
+ * Embree runs in robust mode with one build thread. It raises INVALID on ordinary rays: traps are masked inside.
+ * Immutable after creation: any thread. Lengths: the rescaled world, whose radius is about 1.
+ */
+#ifndef WORKER_GEOM_ACCEL_H
+#define WORKER_GEOM_ACCEL_H
+
+#include "common/base/error.h"
+#include "worker/math/vec3.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct accel;
+
+struct accel_shape {
+	bool is_sphere;
+	vec3 center; /* sphere */
+	double radius;
+	uint32_t vertex_count, triangle_count; /* else triangles; arrays must outlive the accel, readable 16 bytes from
+						  the start of the last vertex */
+	const float (*position)[3];
+	const uint32_t (*index)[3];
+};
+
+struct prim_ref {
+	uint32_t shape, prim;
+};
+#define PRIM_NONE ((struct prim_ref){UINT32_MAX, UINT32_MAX})
+
+/* An end of a ray or segment: where, on which primitive, and the unit geometric normal there (0: free in space). */
+struct ray_end {
+	vec3 p, ng;
+	struct prim_ref prim;
+};
+
+struct ray_hit {
+	struct prim_ref prim;
+	double t;    /* about */
+	double u, v; /* Embree's barycentrics, for rays that lie in the triangle's plane */
+};
+
+int accel_new(struct accel **a, const struct accel_shape *shapes, uint32_t count, struct error *e);
+void accel_free(struct accel *a);
+size_t accel_bytes(const struct accel *a); /* what Embree allocated, without our vertices and indices */
+
+/* Closest hit along the unit direction d, in (t_min, t_max). */
+bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max, struct ray_hit *hit);
+/* Something lies between the two ends. */
+bool accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to);
+/* Something lies along the unit direction d, to infinity. */
+bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d);
+
+/* Version and instruction set, for the numeric fingerprint: "embree 3.13.5 avx2". */
+const char *accel_version(void);
+
+#endif

@@ -1,0 +1,105 @@
+#include "worker/geom/surface.h"
+
+static vec3 at(const float (*a)[3], uint32_t i)
+{
+	return (vec3){(double)a[i][0], (double)a[i][1], (double)a[i][2]};
+}
+
+/* Barycentrics of the ray's crossing with the triangle's plane, clamped to the triangle: Embree said that it was met.
+ * false: the ray lies in the plane. */
+static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1, double *b2)
+{
+	vec3 h = vec3_cross(d, e2), s = vec3_sub(o, v0), q = vec3_cross(s, e1);
+	double det = vec3_dot(e1, h);
+	if (det == 0)
+		return false;
+	double u = vec3_dot(s, h) / det, v = vec3_dot(d, q) / det;
+	if (!isfinite(u) || !isfinite(v))
+		return false;
+	u = fmin(fmax(u, 0), 1);
+	*b1 = u;
+	*b2 = fmin(fmax(v, 0), 1 - u);
+	return true;
+}
+
+/* dp/du from the texture coordinates; the first edge where there are none or they are degenerate. */
+static vec3 tangent(const struct geom_shape *s, const uint32_t i[3], vec3 e1, vec3 e2)
+{
+	if (!s->uv)
+		return e1;
+	double du1 = (double)s->uv[i[1]][0] - (double)s->uv[i[0]][0], dv1 = (double)s->uv[i[1]][1] - (double)s->uv[i[0]][1];
+	double du2 = (double)s->uv[i[2]][0] - (double)s->uv[i[0]][0], dv2 = (double)s->uv[i[2]][1] - (double)s->uv[i[0]][1];
+	double det = du1 * dv2 - dv1 * du2;
+	if (det == 0)
+		return e1;
+	vec3 t = vec3_scale(1 / det, vec3_sub(vec3_scale(dv2, e1), vec3_scale(dv1, e2)));
+	return vec3_is_finite(t) && vec3_dot(t, t) > 0 ? t : e1;
+}
+
+void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2, struct surface_point *x)
+{
+	const uint32_t *i = s->index[prim.prim];
+	vec3 v0 = at(s->position, i[0]);
+	vec3 e1 = vec3_sub(at(s->position, i[1]), v0), e2 = vec3_sub(at(s->position, i[2]), v0);
+	double b0 = 1 - b1 - b2;
+	x->prim = prim;
+	x->p = vec3_madd(vec3_madd(v0, b1, e1), b2, e2);
+	x->ng = vec3_normalize(vec3_cross(e1, e2));
+	x->dpdu = tangent(s, i, e1, e2);
+	vec3 n = x->ng;
+	if (s->normal) {
+		vec3 m = vec3_scale(b0, at(s->normal, i[0]));
+		m = vec3_madd(vec3_madd(m, b1, at(s->normal, i[1])), b2, at(s->normal, i[2]));
+		/* Normals that turn to the back somewhere inside the triangle say nothing about this side: shade flat. */
+		if (vec3_dot(m, x->ng) > 0)
+			n = vec3_normalize(m);
+	}
+	x->sh = frame_along(n, x->dpdu);
+	x->u = b1;
+	x->v = b2;
+	if (s->uv) {
+		x->u = b0 * (double)s->uv[i[0]][0] + b1 * (double)s->uv[i[1]][0] + b2 * (double)s->uv[i[2]][0];
+		x->v = b0 * (double)s->uv[i[0]][1] + b1 * (double)s->uv[i[1]][1] + b2 * (double)s->uv[i[2]][1];
+	}
+}
+
+void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
+{
+	vec3 l = frame_to_local(&s->sphere_axes, w);
+	x->prim = prim;
+	x->p = vec3_madd(s->center, s->radius, w);
+	x->ng = vec3_scale(s->normal_sign, w);
+	/* du of the longitude: axis x normal; undefined at the poles, where frame_along picks a frame of its own. */
+	x->dpdu = vec3_scale(2 * M_PI * s->radius, vec3_cross(s->sphere_axes.n, w));
+	x->sh = frame_along(x->ng, x->dpdu);
+	double phi = atan2(l.y, l.x);
+	x->u = (phi < 0 ? phi + 2 * M_PI : phi) / (2 * M_PI);
+	x->v = acos(fmin(fmax(l.z, -1), 1)) / M_PI;
+}
+
+/* The hit in double: the root nearest to the one that Embree's search settled on. */
+static vec3 sphere_direction(const struct geom_shape *s, vec3 o, vec3 d, double t)
+{
+	vec3 oc = vec3_sub(o, s->center);
+	double b = vec3_dot(oc, d), l = vec3_length(oc), c = (l - s->radius) * (l + s->radius);
+	vec3 nearest = vec3_madd(oc, -b, d);
+	double disc = fmax(s->radius * s->radius - vec3_dot(nearest, nearest), 0);
+	double k = -b - copysign(sqrt(disc), b);
+	double other = k != 0 ? c / k : k;
+	double root = fabs(k - t) < fabs(other - t) ? k : other;
+	return vec3_normalize(vec3_madd(oc, root, d));
+}
+
+void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x)
+{
+	if (s->is_sphere) {
+		surface_on_sphere(s, hit->prim, sphere_direction(s, o, d, hit->t), x);
+		return;
+	}
+	const uint32_t *i = s->index[hit->prim.prim];
+	vec3 v0 = at(s->position, i[0]);
+	vec3 e1 = vec3_sub(at(s->position, i[1]), v0), e2 = vec3_sub(at(s->position, i[2]), v0);
+	double b1 = fmin(fmax(hit->u, 0), 1), b2 = fmin(fmax(hit->v, 0), 1 - b1);
+	solve_triangle(o, d, v0, e1, e2, &b1, &b2);
+	surface_on_triangle(s, hit->prim, b1, b2, x);
+}

@@ -1,0 +1,40 @@
+/*
+ * A point on a primitive, in double: positions solved from the primitive itself (triangles in the plane of their float
+ * vertices, spheres analytically), geometric normal, interpolated shading frame, texture coordinates.
+ * The geometric normal is by winding; the world winds triangles so that it agrees with the vertex normals.
+ * Pure; any thread.
+ */
+#ifndef WORKER_GEOM_SURFACE_H
+#define WORKER_GEOM_SURFACE_H
+
+#include "worker/geom/accel.h"
+#include "worker/math/frame.h"
+
+/* A shape in the rescaled world. Floats are what rays meet; everything else derives from them. */
+struct geom_shape {
+	bool is_sphere;
+	vec3 center;
+	double radius, normal_sign;
+	struct frame sphere_axes; /* of the (u,v) parametrisation: n is the pole */
+	uint32_t vertex_count, triangle_count;
+	float (*position)[3];
+	uint32_t (*index)[3];
+	float (*normal)[3]; /* NULL: flat */
+	float (*uv)[2];     /* NULL: barycentrics stand in */
+};
+
+struct surface_point {
+	vec3 p, ng;
+	struct frame sh; /* sh.n is the shading normal */
+	double u, v;
+	vec3 dpdu;
+	struct prim_ref prim;
+};
+
+/* Where the ray o + t d meets the primitive named by the hit. */
+void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x);
+/* The point of barycentrics (b1, b2) on a triangle, or at unit normal direction w from a sphere's centre. */
+void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2, struct surface_point *x);
+void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x);
+
+#endif

@@ -1,0 +1,28 @@
+/*
+ * Techniques: a path of k edges can be made from s vertices of a light sub-path and t = k + 1 - s of a camera sub-path.
+ * x_0 lies on the emitter, x_k is the pinhole. Densities multiply (Veach 1997, sec. 10.2); the balance heuristic compares
+ * them for one given path. s = 0: the camera sub-path found the emitter; s = 1: the emitter's point was drawn as seen from
+ * x_1 (next event estimation); t = 1: the light sub-path is connected to the pinhole; t = 0 cannot happen.
+ */
+#ifndef WORKER_PATH_CONNECT_H
+#define WORKER_PATH_CONNECT_H
+
+#include "worker/path/path.h"
+
+/* A path put together from sub-paths, light to camera. */
+struct joined_path {
+	unsigned edges, s;
+	const struct path_vertex *v[PATH_MAX_EDGES + 2];
+};
+
+/* Density of technique j for this path over the density of the technique s that made it: 0 where j cannot make it.
+ * Fills ratio[0..edges]; techniques with more than max_s light vertices are left out (0). */
+void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio);
+/* Weight of the balance heuristic: 1 / sum of the ratios. */
+double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s);
+
+/* Contribution f / p of joining the first s vertices of c->light with the first t of c->camera, already weighted among the
+ * techniques up to max_s. s <= 1 needs no light sub-path. film: where it lands when t = 1 (else unchanged). */
+spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned max_s, double film[2]);
+
+#endif

@@ -1,0 +1,40 @@
+/*
+ * Bidirectional path tracing (Veach 1997, ch. 10): every way of joining a light with a camera sub-path, by the balance
+ * heuristic. One light sub-path a camera sub-path; those that are joined to the pinhole land anywhere on the film.
+ */
+#include "worker/path/connect.h"
+#include "worker/path/integrator.h"
+
+void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	double film[2];
+	out->count = 0;
+	out->intensity = 0;
+	unsigned camera = path_walk_camera(c, s, c->max_depth + 1, film);
+	unsigned light = path_walk_light(c, s, c->max_depth);
+	spectrum sum = spectrum_of(0);
+	for (unsigned t = 2; t <= camera; t++) {
+		for (unsigned j = 0; j <= (light > 1 ? light : 1) && t + j - 1 <= c->max_depth; j++) {
+			if (t + j - 1 < c->min_depth)
+				continue;
+			spectrum l = path_connect(c, j, t, PATH_MAX_EDGES, film);
+			if (path_accept(c, l))
+				sum = spectrum_add(sum, l);
+		}
+	}
+	path_splat(c, out, film[0], film[1], sum);
+	for (unsigned j = 2; j <= light && j <= c->max_depth; j++) {
+		double at[2];
+		if (j < c->min_depth)
+			continue;
+		spectrum l = path_connect(c, j, 1, PATH_MAX_EDGES, at);
+		if (!spectrum_is_zero(l))
+			path_splat(c, out, at[0], at[1], l);
+	}
+}
+
+const struct integrator integrator_bdpt = {
+	.face = {"bdpt", "bidirectional path tracing, all techniques, balance heuristic", PLAN_SAMPLES, PATH_MAX_EDGES},
+	.stream = RNG_BDPT,
+	.evaluate = path_trace_both_ways,
+};

@@ -1,0 +1,32 @@
+/*
+ * The path tracer: a camera sub-path, at each vertex next event estimation and the emitter met by chance, weighted against
+ * each other by the balance heuristic (Veach 1997, sec. 9.2.4). The reference for all other integrators.
+ */
+#include "worker/path/connect.h"
+#include "worker/path/integrator.h"
+
+void path_trace(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	double film[2];
+	unsigned n = path_walk_camera(c, s, c->max_depth + 1, film);
+	spectrum sum = spectrum_of(0);
+	for (unsigned t = 2; t <= n; t++) {
+		for (unsigned j = 0; j <= 1; j++) {
+			unsigned edges = t + j - 1;
+			if (edges < c->min_depth || edges > c->max_depth)
+				continue;
+			spectrum l = path_connect(c, j, t, 1, film);
+			if (path_accept(c, l))
+				sum = spectrum_add(sum, l);
+		}
+	}
+	out->count = 0;
+	out->intensity = 0;
+	path_splat(c, out, film[0], film[1], sum);
+}
+
+const struct integrator integrator_path = {
+	.face = {"path", "path tracing with next event estimation and multiple importance sampling", PLAN_SAMPLES, PATH_MAX_EDGES},
+	.stream = RNG_PATH,
+	.evaluate = path_trace,
+};

@@ -1,0 +1,5 @@
+/* One line an integrator: INTEGRATOR(name) stands for `const struct integrator integrator_<name>`. */
+INTEGRATOR(path)
+INTEGRATOR(bdpt)
+INTEGRATOR(pssmlt)
+INTEGRATOR(pssmlt_path)

@@ -1,0 +1,86 @@
+/*
+ * Paths as vertices with explicit densities (Veach 1997, ch. 8 and 10).
+ *
+ * The integrand over area measure: L_e prod G prod F W_e, all G with geometric normals, and at each inner vertex
+ * F = f_radiance(to camera, to light) |ns . to light| / |ng . to light|: what a path tracer that starts at the camera
+ * realises with shading normals, whichever way the path was sampled.
+ * Directions on different sides of the shading and the geometric normal are refused (as Mitsuba's strictNormals).
+ *
+ * Densities of vertices: per area of the rescaled world; per solid angle for a vertex at infinity; times a delta
+ * distribution in the projected direction towards the light where scattering is exactly specular (it cancels between all
+ * techniques of one path). Roulette is not part of them. The film is sampled with density 1 / pixels (struct film_window).
+ */
+#ifndef WORKER_PATH_PATH_H
+#define WORKER_PATH_PATH_H
+
+#include "common/film/batch.h"
+#include "worker/path/sampler.h"
+#include "worker/world/world.h"
+
+enum { PATH_MAX_EDGES = 128, PATH_MAX_SPLATS = PATH_MAX_EDGES + 2 };
+
+enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINITE };
+
+struct path_vertex {
+	enum vertex_kind kind;
+	bool delta;              /* its own sub-path left it by an exactly specular lobe */
+	int32_t emitter;         /* shines: index; -1 */
+	const struct bsdf *bsdf; /* VERTEX_SURFACE */
+	struct surface_point x;  /* VERTEX_INFINITE: p is the unit direction towards the emitter */
+	vec3 to_prev;            /* unit; towards the vertex before it on its own sub-path */
+	spectrum beta;           /* carried to this vertex over the density of getting here */
+	double pdf;              /* of this vertex from its own sub-path, see above */
+	double pdf_rev;          /* of this vertex as generated from the next two of its own sub-path */
+	double next_event[3];    /* random numbers kept for next event estimation */
+};
+
+/* The film points that are sampled: the crop and its border, in pixels. */
+struct film_window {
+	double x, y, width, height;
+};
+
+/* One evaluation's surroundings; one a thread. */
+struct path_context {
+	const struct world *w;
+	struct film_window window;
+	struct wavelengths wl;
+	uint32_t min_depth, max_depth; /* edges */
+	bool roulette;
+	uint64_t *counters; /* of enum batch_counter */
+	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
+};
+
+/* What one evaluation brings to the film: f / p over the whole window, as CIE XYZ. */
+struct splat {
+	double x, y, xyz[3];
+};
+struct path_sample {
+	uint32_t count;
+	double intensity; /* I: sum of X + Y + Z */
+	struct splat splats[PATH_MAX_SPLATS];
+};
+
+struct film_window film_window_of(const struct plan *p);
+
+/* Camera sub-path: vertex 0 is the pinhole. Returns the number of vertices; an escaped path may end in VERTEX_INFINITE.
+ * film: the film point that was drawn. */
+unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned max_vertices, double film[2]);
+/* Light sub-path: vertex 0 lies on an emitter. 0: no emitter, or it could not be sampled. */
+unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max_vertices);
+
+/* Density with which `next` is generated from `at` having come from `prev` (unused for camera and emitters). */
+double path_pdf(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
+		const struct path_vertex *next, enum transport transport);
+
+/* F of the head comment at a surface vertex for unit directions towards camera and light. */
+spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light);
+
+/* Unit direction and squared distance from a to b; b may lie at infinity (distance 1). */
+vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2);
+
+/* Adds L (f / p) at a film point; NaN, infinite and negative ones are counted and left out. */
+void path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l);
+/* false: L is zero, or was counted as invalid. */
+bool path_accept(const struct path_context *c, spectrum l);
+
+#endif

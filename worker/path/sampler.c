@@ -1,0 +1,21 @@
+#include "worker/path/sampler.h"
+
+void sampler_fill(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, enum sampler_side side,
+		  unsigned vertex, double out[SAMPLER_BLOCK])
+{
+	uint64_t block = ((uint64_t)vertex * SAMPLER_SIDES + (uint64_t)side) * 2;
+	rng_uniform4(seed, stream, index, step, block, out);
+	rng_uniform4(seed, stream, index, step, block + 1, out + 4);
+}
+
+static const double *random_block(struct sampler *base, enum sampler_side side, unsigned vertex)
+{
+	struct sampler_random *s = (struct sampler_random *)(void *)base;
+	sampler_fill(s->seed, s->stream, s->index, s->step, side, vertex, s->value[side]);
+	return s->value[side];
+}
+
+void sampler_random_init(struct sampler_random *s, uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step)
+{
+	*s = (struct sampler_random){.base = {random_block}, .seed = seed, .stream = stream, .index = index, .step = step};
+}

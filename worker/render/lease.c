@@ -1,0 +1,276 @@
+#include "worker/render/render.h"
+
+#include "common/base/mem.h"
+#include "worker/chain/chain.h"
+#include "worker/math/fptrap.h"
+#include "worker/render/sums.h"
+
+#include <float.h>
+#include <string.h>
+#include <time.h>
+
+/* Everything one lease works with. */
+struct job {
+	const struct plan *plan;
+	const struct lease_key *key;
+	const struct integrator *integrator;
+	const atomic_bool *stop;
+	struct path_context context;
+	struct path_sample sample;
+	struct film_sums film;
+	struct chain chain;
+	struct batch *out;
+	struct error *e;
+};
+
+enum { STOP_INTERVAL = 256 }; /* samples between looks at the stop flag */
+enum { BEYOND_INTERVAL = 16 }; /* one bootstrap sample in so many also estimates paths too long for a chain's state */
+
+const char *render_numeric_version(void)
+{
+	return accel_version();
+}
+
+static bool stopped(const struct job *j)
+{
+	return j->stop && atomic_load_explicit(j->stop, memory_order_relaxed);
+}
+
+static double thread_seconds(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* Stratified over pixels: block 0 of the camera with the film point moved into one pixel. */
+struct pixel_sampler {
+	struct sampler_random random;
+	double x, y, width, height; /* the pixel in units of the window, and a pixel's size */
+};
+
+static const double *pixel_block(struct sampler *base, enum sampler_side side, unsigned vertex)
+{
+	struct pixel_sampler *s = (struct pixel_sampler *)(void *)base;
+	struct sampler_random *r = &s->random;
+	double *u = r->value[side];
+	sampler_fill(r->seed, r->stream, r->index, r->step, side, vertex, u);
+	if (side == SIDE_CAMERA && vertex == 0) {
+		u[DIM_FILM_X] = s->x + u[DIM_FILM_X] * s->width;
+		u[DIM_FILM_Y] = s->y + u[DIM_FILM_Y] * s->height;
+	}
+	return u;
+}
+
+/* A pixel's number does not depend on the crop, so that a crop has the full render's samples. */
+static uint64_t pixel_index(const struct film_window *w, uint64_t column, uint64_t row)
+{
+	enum { BORDER = 1 << 10 };
+	uint64_t x = (uint64_t)(w->x + BORDER) + column, y = (uint64_t)(w->y + BORDER) + row;
+	return y << 32 | x;
+}
+
+static void sample_pixel(struct job *j, uint64_t column, uint64_t row)
+{
+	const struct plan *p = j->plan;
+	const struct film_window *w = &j->context.window;
+	double area = w->width * w->height;
+	struct pixel_sampler s = {.x = (double)column / w->width, .y = (double)row / w->height, .width = 1 / w->width,
+				  .height = 1 / w->height};
+	for (uint64_t i = 0; i < p->epoch; i++) {
+		uint64_t index = (j->key->epoch * p->epoch + i) * p->groups + j->key->group;
+		sampler_random_init(&s.random, p->seed, j->integrator->stream, pixel_index(w, column, row), index);
+		s.random.base.block = pixel_block;
+		j->integrator->evaluate(&j->context, &s.random.base, &j->sample);
+		for (uint32_t k = 0; k < j->sample.count; k++)
+			film_sums_splat(&j->film, &j->sample.splats[k], 1 / area);
+		j->out->independent_sum += j->sample.intensity;
+		j->out->independent_square += j->sample.intensity * j->sample.intensity;
+	}
+	j->out->counters[COUNT_SAMPLES] += p->epoch;
+	j->out->counters[COUNT_INDEPENDENT] += p->epoch;
+}
+
+static enum lease_end run_samples(struct job *j)
+{
+	struct plan_range rows = plan_row_range(j->plan, j->key->part);
+	for (uint64_t row = rows.begin; row < rows.end; row++)
+		for (uint64_t column = 0; column < (uint64_t)j->context.window.width; column++) {
+			if (column % STOP_INTERVAL == 0 && stopped(j))
+				return LEASE_STOPPED;
+			sample_pixel(j, column, row);
+		}
+	return LEASE_DONE;
+}
+
+/* Energy in paths longer than a chain's state: path tracing from random numbers of its own, with roulette. */
+static double beyond(struct job *j, uint64_t index)
+{
+	struct path_context *c = &j->context;
+	uint32_t min = c->min_depth, max = c->max_depth;
+	struct sampler_random s;
+	sampler_random_init(&s, j->plan->seed, RNG_BEYOND, index, 0);
+	c->min_depth = c->max_depth + 1 > min ? c->max_depth + 1 : min;
+	c->max_depth = j->plan->max_depth;
+	c->roulette = true;
+	path_trace(c, &s.base, &j->sample);
+	c->min_depth = min;
+	c->max_depth = max;
+	c->roulette = false;
+	return j->sample.intensity * BEYOND_INTERVAL;
+}
+
+static enum lease_end run_bootstrap(struct job *j)
+{
+	struct plan_range r = plan_bootstrap_range(j->plan, j->key->group, j->key->part);
+	struct batch *out = j->out;
+	bool longer = j->plan->kind == PLAN_CHAINS && j->plan->max_depth > j->context.max_depth;
+	for (uint64_t i = r.begin; i < r.end; i++) {
+		if (i % STOP_INTERVAL == 0 && stopped(j))
+			return LEASE_STOPPED;
+		struct sampler_random s;
+		sampler_random_init(&s, j->plan->seed, RNG_BOOTSTRAP, i, 0);
+		j->integrator->evaluate(&j->context, &s.base, &j->sample);
+		double intensity = j->sample.intensity;
+		if (intensity > (double)FLT_MAX) {
+			out->counters[COUNT_INFINITE]++;
+			intensity = 0;
+		}
+		out->weights[i - r.begin] = (float)intensity;
+		out->independent_sum += intensity;
+		out->independent_square += intensity * intensity;
+		out->counters[COUNT_SAMPLES]++;
+		out->counters[COUNT_INDEPENDENT]++;
+		if (longer && i % BEYOND_INTERVAL == 0)
+			out->beyond_sum += beyond(j, i);
+	}
+	return LEASE_DONE;
+}
+
+static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, uint64_t id, enum lease_end *end)
+{
+	struct chain *c = &j->chain;
+	*c = (struct chain){.integrator = j->integrator, .context = &j->context, .film = &j->film, .seed = j->plan->seed, .id = id};
+	bool ok = in->states ? chain_resume(c, &in->states[k]) : chain_start(c, in->seeds[k]);
+	if (!ok)
+		return error_set(j->e, EBADMSG, "chain %llu of group %u does not resume: its state is not one of this plan",
+				 (unsigned long long)id, j->key->group);
+	struct chain_sums sums = {0, 0};
+	uint64_t accepted = j->out->counters[COUNT_ACCEPTED];
+	for (uint64_t i = 0; i < j->plan->epoch; i++) {
+		if (i % STOP_INTERVAL == 0 && stopped(j)) {
+			*end = LEASE_STOPPED;
+			return 0;
+		}
+		chain_step(c, &sums);
+	}
+	chain_flush(c);
+	j->out->counters[COUNT_STUCK] += j->out->counters[COUNT_ACCEPTED] == accepted;
+	j->out->independent_sum += sums.sum;
+	j->out->independent_square += sums.square;
+	return chain_save(c, &j->out->states[k]);
+}
+
+static int run_chains(struct job *j, const struct lease_input *in, enum lease_end *end)
+{
+	struct plan_range r = plan_chain_range(j->plan, j->key->part);
+	if (!in || in->chain_count != r.end - r.begin || (!in->seeds && !in->states))
+		return error_set(j->e, EINVAL, "a lease of %llu chains came without as many states",
+				 (unsigned long long)(r.end - r.begin));
+	*end = LEASE_DONE;
+	for (uint64_t k = r.begin; k < r.end && *end == LEASE_DONE; k++) {
+		int rc = run_chain(j, in, (uint32_t)(k - r.begin), j->key->group + j->plan->groups * k, end);
+		if (rc)
+			return rc == -ENOMEM ? error_set(j->e, ENOMEM, "out of memory for chain states") : rc;
+	}
+	return 0;
+}
+
+static int check(const struct world *w, const struct plan *p, const struct integrator *i, struct error *e)
+{
+	if (!i)
+		return error_set(e, EINVAL, "no integrator is called '%s'", p->integrator);
+	if (i->face.kind != p->kind)
+		return error_set(e, EINVAL, "integrator '%s' and the plan differ in kind", p->integrator);
+	if (p->width != w->settings.width || p->height != w->settings.height || p->border != w->settings.border)
+		return error_set(e, EINVAL, "the plan's film is %u x %u with a border of %u pixels, the scene's %u x %u with %u",
+				 p->width, p->height, p->border, w->settings.width, w->settings.height, w->settings.border);
+	if (p->max_depth < 1 || p->max_depth > PATH_MAX_EDGES)
+		return error_set(e, EINVAL, "a depth of %u edges is not within 1 and %d", p->max_depth, PATH_MAX_EDGES);
+	return 0;
+}
+
+static int prepare(struct job *j, const struct world *w, struct error *e)
+{
+	const struct plan *p = j->plan;
+	uint32_t depth = p->max_depth < j->integrator->face.max_depth ? p->max_depth : j->integrator->face.max_depth;
+	j->context.w = w;
+	j->context.window = film_window_of(p);
+	j->context.min_depth = p->min_depth;
+	j->context.max_depth = depth;
+	j->context.roulette = p->kind == PLAN_SAMPLES;
+	j->context.counters = j->out->counters;
+	if (j->key->kind == LEASE_BOOTSTRAP) {
+		struct plan_range r = plan_bootstrap_range(p, j->key->group, j->key->part);
+		j->out->weight_count = r.end - r.begin;
+		j->out->weights = mem_alloc(j->out->weight_count, sizeof *j->out->weights);
+		return j->out->weights ? 0 : error_set(e, ENOMEM, "out of memory for %llu weights", (unsigned long long)(r.end - r.begin));
+	}
+	if (p->kind == PLAN_CHAINS) {
+		struct plan_range r = plan_chain_range(p, j->key->part);
+		j->out->state_count = (uint32_t)(r.end - r.begin);
+		j->out->states = mem_alloc(j->out->state_count, sizeof *j->out->states);
+		if (!j->out->states)
+			return error_set(e, ENOMEM, "out of memory for chain states");
+	}
+	return film_sums_init(&j->film, p, &w->settings, e);
+}
+
+static int run(struct job *j, const struct lease_input *in, enum lease_end *end)
+{
+	if (j->key->kind == LEASE_BOOTSTRAP) {
+		*end = run_bootstrap(j);
+		return 0;
+	}
+	int rc = 0;
+	if (j->plan->kind == PLAN_SAMPLES)
+		*end = run_samples(j);
+	else
+		rc = run_chains(j, in, end);
+	if (rc || *end == LEASE_STOPPED)
+		return rc;
+	return film_sums_take(&j->film, j->out, j->e);
+}
+
+int render_lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
+		 const atomic_bool *stop, enum lease_end *end, struct batch *out, struct error *e)
+{
+	*out = (struct batch){.key = *k};
+	*end = LEASE_DONE;
+	const struct integrator *integrator = integrator_find(p->integrator);
+	int rc = check(w, p, integrator, e);
+	if (rc)
+		return rc;
+	struct job *j = mem_alloc(1, sizeof *j);
+	if (!j)
+		return error_set(e, ENOMEM, "out of memory for a lease");
+	j->plan = p;
+	j->key = k;
+	j->integrator = integrator;
+	j->stop = stop;
+	j->out = out;
+	j->e = e;
+	double start = thread_seconds();
+	rc = prepare(j, w, e);
+	if (!rc) {
+		unsigned trap = fptrap_enable();
+		rc = run(j, in, end);
+		fptrap_restore(trap);
+	}
+	film_sums_fini(&j->film);
+	mem_free(j);
+	out->cpu_seconds = thread_seconds() - start;
+	if (rc || *end == LEASE_STOPPED)
+		batch_fini(out);
+	return rc;
+}

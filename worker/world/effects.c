@@ -1,0 +1,77 @@
+#include "worker/world/effects.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+
+__attribute__((format(printf, 4, 5))) static void line(struct effects *fx, const char *name, bool on, const char *why, ...)
+{
+	struct effect_line *l = &fx->lines[fx->line_count++];
+	l->name = name;
+	l->on = on;
+	va_list ap;
+	va_start(ap, why);
+	vsnprintf(l->why, sizeof l->why, why, ap);
+	va_end(ap);
+}
+
+struct census {
+	size_t specular, glossy, diffuse, transmission, textured, coloured, environment, area, textured_light, shape[3];
+};
+
+static struct census take(const struct bsdf *b, size_t bn, const struct emitter *em, size_t en)
+{
+	struct census c = {0};
+	for (size_t i = 0; i < bn; i++) {
+		c.specular += b[i].has_delta;
+		c.glossy += b[i].has_smooth && isfinite(b[i].alpha);
+		c.diffuse += b[i].has_smooth && !isfinite(b[i].alpha);
+		c.transmission += (b[i].modes & BSDF_TRANSMIT) != 0;
+		c.textured += b[i].textured;
+		c.coloured += b[i].shape != COLOR_SHAPE_CONSTANT;
+	}
+	for (size_t i = 0; i < en; i++) {
+		c.environment += em[i].infinite;
+		c.area += !em[i].infinite;
+		c.textured_light += em[i].textured;
+		c.shape[em[i].shape]++;
+	}
+	return c;
+}
+
+static void colour(struct effects *fx, const struct census *c, size_t emitters)
+{
+	bool one_shape = c->shape[COLOR_SHAPE_OTHER] == 0 && (!c->shape[COLOR_SHAPE_CONSTANT] || !c->shape[COLOR_SHAPE_D65]);
+	fx->colour = c->coloured > 0 || !one_shape;
+	fx->illuminant = c->shape[COLOR_SHAPE_CONSTANT] ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_D65;
+	if (c->coloured)
+		line(fx, "colour", true, "%zu materials vary with wavelength", c->coloured);
+	else if (!one_shape)
+		line(fx, "colour", true, "the %zu emitters differ in spectrum or are coloured", emitters);
+	else
+		line(fx, "colour", false, "all materials are grey and all emitters have one spectrum: no wavelength is drawn");
+}
+
+void effects_analyse(struct effects *fx, const struct scene_settings *settings, const struct bsdf *bsdfs, size_t bsdf_count,
+		     const struct emitter *emitters, size_t emitter_count)
+{
+	*fx = (struct effects){.max_depth = settings->max_depth};
+	struct census c = take(bsdfs, bsdf_count, emitters, emitter_count);
+	colour(fx, &c, emitter_count);
+	line(fx, "dispersion", false, "no index of refraction varies with wavelength: wavelengths travel together");
+	line(fx, "aperture", false, "the sensor is a pinhole");
+	fx->specular = c.specular > 0;
+	line(fx, "specular", fx->specular, "%zu materials have exactly specular lobes", c.specular);
+	fx->glossy = c.glossy > 0;
+	line(fx, "glossy", fx->glossy, "%zu materials have rough lobes of finite width", c.glossy);
+	fx->diffuse = c.diffuse > 0;
+	line(fx, "diffuse", fx->diffuse, "%zu materials scatter diffusely only", c.diffuse);
+	fx->transmission = c.transmission > 0;
+	line(fx, "transmission", fx->transmission, "%zu materials let light through", c.transmission);
+	fx->textures = c.textured + c.textured_light > 0;
+	line(fx, "textures", fx->textures, "%zu materials and %zu emitters are textured", c.textured, c.textured_light);
+	fx->environment = c.environment > 0;
+	line(fx, "environment", fx->environment, c.environment ? "an emitter lies at infinity" : "no emitter lies at infinity");
+	fx->area_light = c.area > 0;
+	line(fx, "area-light", fx->area_light, "%zu surfaces emit", c.area);
+	line(fx, "depth", settings->max_depth > 1, "paths have at most %u edges", settings->max_depth);
+}

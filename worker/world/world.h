@@ -1,0 +1,45 @@
+/*
+ * The world that all threads share: built once from a description, immutable then. Lengths are rescaled in double by a
+ * power of two so that the scene's radius lies in (1/2, 1], and moved so that its box is centred: floats begin after that.
+ */
+#ifndef WORKER_WORLD_WORLD_H
+#define WORKER_WORLD_WORLD_H
+
+#include "worker/camera/camera.h"
+#include "worker/geom/surface.h"
+#include "worker/world/effects.h"
+
+struct world_shape {
+	uint32_t bsdf;
+	int32_t emitter; /* -1: does not shine */
+};
+
+struct world {
+	struct arena arena;
+	struct scene_settings settings;
+	struct effects effects;
+	struct camera camera;
+	vec3 center;
+	double scale, radius; /* of the rescaled bounding sphere around the origin */
+	uint32_t shape_count, bsdf_count, emitter_count;
+	struct geom_shape *shapes;
+	struct world_shape *parts; /* one a shape */
+	struct bsdf *bsdfs;
+	struct emitter *emitters;
+	uint32_t *emitter_shape; /* on which it lies; UINT32_MAX at infinity */
+	double *emitter_pdf, *emitter_cdf; /* choice among emitters by power */
+	int32_t environment;               /* index of the emitter at infinity; -1: none */
+	double grey_xyz[3];                /* CIE XYZ of grey value 1 */
+	struct accel *accel;
+};
+
+/* Which emitter a number in [0,1) chooses; -1 when there is none. */
+int32_t world_pick_emitter(const struct world *w, double u);
+
+/* A hit on a shape as a point of its emitter. */
+static inline struct emitter_point world_emitter_point(const struct surface_point *x)
+{
+	return (struct emitter_point){x->p, x->ng, x->u, x->v, x->prim.prim, false};
+}
+
+#endif
