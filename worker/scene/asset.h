@@ -17,12 +17,13 @@ struct asset {
 
 struct asset_source {
 	void *user;
-	/* Maps the whole file. 0 or negative errno with a sentence. Any thread. */
+	/* The whole file, in memory. 0 or negative errno with a sentence. Any thread. */
 	int (*open)(void *user, const char *name, struct asset *out, struct error *e);
 	void (*close)(void *user, struct asset *a);
 };
 
-/* A folder: names must stay below it (no absolute paths, no "..", regular files only). `folder` must outlive it. */
+/* A folder: names must stay below it (no absolute paths, no "..", no symbolic links that
+ * lead out of it, regular files only, at most 4 GB). `folder` must outlive it. */
 struct asset_source asset_folder(const char *folder);
 
 #endif

@@ -1,4 +1,8 @@
-/* Triangles in world space (to_world applied, not yet rescaled), in double. */
+/*
+ * Triangles in world space (to_world applied, not yet rescaled), in double. They are wound counter-clockwise as seen
+ * from outside. v = 0 is the top row of a picture, as in both Mitsubas (obj files count from the bottom and are turned
+ * round unless flip_tex_coords is false).
+ */
 #ifndef WORKER_SCENE_MESH_H
 #define WORKER_SCENE_MESH_H
 

@@ -2,6 +2,7 @@
  * Parameter tables: what a plug-in understands, declared where it is implemented, read by the scene reader.
  * Names are those of Mitsuba 3 (to_world, int_ior, max_depth); 0.5/0.6 names are the same in camelCase and are
  * converted on reading (toWorld, intIOR, maxDepth).
+ * The name or type "*" stands for all that the table does not list.
  */
 #ifndef WORKER_SCENE_PARAM_H
 #define WORKER_SCENE_PARAM_H
@@ -55,7 +56,8 @@ struct plugin_decl {
 	const char *type;            /* as written in type="..." */
 	const struct param *params;  /* ends with a NULL name */
 	unsigned nested_classes;     /* bits 1 << enum plugin_class */
-	enum param_class status;     /* IGNORED: the whole plug-in has no effect (samplers); REFUSED never listed: unknown is refused */
+	enum param_class status;     /* IGNORED: has no effect but for its understood parameters (samplers), all else in it is
+					skipped; REFUSED never listed: unknown is refused */
 };
 
 #endif

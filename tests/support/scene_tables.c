@@ -1,0 +1,69 @@
+#include "tests/support/scene_tables.h"
+
+#include <assert.h>
+
+#define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
+#define END {NULL, 0, 0, 0, 0, NULL}
+
+static const struct param diffuse[] = {{"reflectance", UNDERSTOOD(VALUE_TEXTURE)}, END};
+static const struct param rough[] = {
+	{"alpha", VALUE_FLOAT, PARAM_UNDERSTOOD, 1e-4, 1, NULL},
+	{"distribution", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "beckmann|ggx"},
+	{"material", UNDERSTOOD(VALUE_STRING)},
+	{"eta", UNDERSTOOD(VALUE_COLOR)},
+	{"k", UNDERSTOOD(VALUE_COLOR)},
+	{"ext_eta", UNDERSTOOD(VALUE_FLOAT)},
+	{"int_ior", UNDERSTOOD(VALUE_FLOAT | VALUE_STRING)},
+	{"ext_ior", UNDERSTOOD(VALUE_FLOAT | VALUE_STRING)},
+	{"specular_reflectance", UNDERSTOOD(VALUE_TEXTURE)},
+	{"sample_visible", 0, PARAM_IGNORED, 0, 0, NULL},
+	{"nonlinear", 0, PARAM_REFUSED, 0, 0, NULL},
+	END,
+};
+static const struct param phong[] = {
+	{"diffuse_reflectance", UNDERSTOOD(VALUE_TEXTURE)},
+	{"specular_reflectance", UNDERSTOOD(VALUE_TEXTURE)},
+	{"exponent", UNDERSTOOD(VALUE_FLOAT)},
+	END,
+};
+static const struct param bitmap[] = {
+	{"filename", UNDERSTOOD(VALUE_STRING)},
+	{"uvscale", UNDERSTOOD(VALUE_FLOAT)},
+	{"raw", UNDERSTOOD(VALUE_BOOL)},
+	{"gamma", 0, PARAM_IGNORED, 0, 0, NULL},
+	END,
+};
+static const struct param checkerboard[] = {
+	{"color0", UNDERSTOOD(VALUE_TEXTURE)},
+	{"color1", UNDERSTOOD(VALUE_TEXTURE)},
+	END,
+};
+static const struct param area[] = {{"radiance", UNDERSTOOD(VALUE_COLOR)}, END};
+static const struct param none[] = {END};
+
+static const struct plugin_decl own[] = {
+	{PLUGIN_BSDF, "diffuse", diffuse, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_BSDF, "roughconductor", rough, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_BSDF, "dielectric", rough, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_BSDF, "roughdielectric", rough, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_BSDF, "phong", phong, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_BSDF, "twosided", none, 1u << PLUGIN_BSDF, PARAM_UNDERSTOOD},
+	{PLUGIN_TEXTURE, "bitmap", bitmap, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_TEXTURE, "checkerboard", checkerboard, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_EMITTER, "area", area, 0, PARAM_UNDERSTOOD},
+};
+
+const struct plugin_decl *scene_tables(void)
+{
+	static struct plugin_decl all[64];
+	size_t n = 0;
+	for (size_t i = 0; i < sizeof own / sizeof *own; i++)
+		all[n++] = own[i];
+	for (const struct plugin_decl *d = shape_decls; d->type; d++)
+		all[n++] = *d;
+	for (const struct plugin_decl *d = setting_decls; d->type; d++)
+		all[n++] = *d;
+	assert(n < sizeof all / sizeof *all);
+	all[n] = (struct plugin_decl){0};
+	return all;
+}

@@ -1,0 +1,11 @@
+/* Small tables of plug-ins, enough for the public scenes: tests of the reader need no renderer. */
+#ifndef TESTS_SUPPORT_SCENE_TABLES_H
+#define TESTS_SUPPORT_SCENE_TABLES_H
+
+#include "worker/scene/mesh.h"
+#include "worker/scene/settings.h"
+
+/* Shapes and settings of the program, materials, textures and emitters of the test. Ends with a NULL type. */
+const struct plugin_decl *scene_tables(void);
+
+#endif

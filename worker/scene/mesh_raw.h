@@ -1,0 +1,33 @@
+/*
+ * Meshes while they are built: object space, normals perhaps missing. One thread; arrays in the arena given.
+ */
+#ifndef WORKER_SCENE_MESH_RAW_H
+#define WORKER_SCENE_MESH_RAW_H
+
+#include "common/base/arena.h"
+#include "worker/scene/mesh.h"
+
+enum { MESH_TRIANGLES_MAX = 1 << 27 };
+#define MESH_COORDINATE_MAX 1e60 /* so that squares of areas stay finite */
+
+/* Allocates the arrays; false: out of memory. */
+bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool normals, bool uv, struct arena *arena);
+
+struct mesh_finish {
+	mat4 to_world;
+	bool flip_normals, face_normals;
+};
+
+/*
+ * From object to world space. Drops triangles without area. Where normals are not unit vectors they count as missing and
+ * are computed from the triangles around, weighted by their angles there; face_normals: there are none after all.
+ * The outside stays the outside under mirrors. Triangles are wound counter-clockwise as seen from outside, which is
+ * the side of their vertices' normals.
+ */
+int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped, const struct scene_node *n,
+		struct error *e);
+
+int mesh_read_obj(const struct scene_node *n, const struct asset_source *assets, struct arena *arena, struct mesh *m,
+		  struct error *e);
+
+#endif

@@ -1,0 +1,562 @@
+#include "worker/scene/scene.h"
+
+#include "worker/scene/plugin.h"
+#include "worker/scene/value.h"
+#include "worker/scene/xml.h"
+
+#include <assert.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { NOTES_MAX = 256, NOTE_MAX = 512 };
+
+struct id_entry {
+	const char *id;
+	struct xml_element *element;
+};
+
+/* Reads one scene; all pointers lead into the scene's arena. */
+struct maker {
+	struct scene *scene;
+	const struct plugin_decl *decls;
+	struct error *error;
+	struct xml_tree *tree;
+	struct id_entry *ids; /* sorted */
+	size_t id_count;
+	const char **notes, **note_keys; /* NOTES_MAX */
+	const char **assets;
+	size_t asset_count, asset_room;
+	int depth;
+};
+
+/* A node while it grows. */
+struct draft {
+	struct scene_node *node;
+	const struct plugin_decl *decl;
+	struct property *properties;
+	const struct scene_node **children;
+};
+
+static int out_of_memory(struct maker *m)
+{
+	return error_set(m->error, ENOMEM, "out of memory, or the scene files take more than %d MB of it", XML_MEMORY_MAX >> 20);
+}
+
+static void *allocate(struct maker *m, size_t count, size_t size)
+{
+	return arena_alloc(&m->scene->arena, count, size);
+}
+
+/* One note for each kind of thing, where it is met first. */
+__attribute__((format(printf, 4, 5))) static int note(struct maker *m, const struct xml_element *el, const char *property,
+						      const char *format, ...)
+{
+	char key[NOTE_MAX], text[NOTE_MAX];
+	const char *type = xml_attribute(el, "type");
+	snprintf(key, sizeof key, "%.64s/%.64s/%.64s", el->name, type ? type : "", property);
+	struct scene *s = m->scene;
+	for (uint32_t i = 0; i < s->note_count; i++)
+		if (strcmp(m->note_keys[i], key) == 0)
+			return 0;
+	if (s->note_count == NOTES_MAX)
+		return 0;
+	va_list ap;
+	va_start(ap, format);
+	vsnprintf(text, sizeof text, format, ap);
+	va_end(ap);
+	if (s->note_count == NOTES_MAX - 1)
+		snprintf(text, sizeof text, "%s: more is ignored than is listed here", el->file);
+	m->notes[s->note_count] = arena_strdup(&s->arena, text);
+	m->note_keys[s->note_count] = arena_strdup(&s->arena, key);
+	if (!m->notes[s->note_count] || !m->note_keys[s->note_count])
+		return out_of_memory(m);
+	s->note_count++;
+	return 0;
+}
+
+static int note_property(struct maker *m, const struct xml_element *owner, const struct xml_element *el, const char *name)
+{
+	return note(m, owner, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` has no effect on light and is ignored", el->file,
+		    el->line, owner->name, xml_attribute(owner, "type"), name);
+}
+
+static int note_foreign(struct maker *m, const struct xml_element *el)
+{
+	return note(m, el, "", "%s:%d: <%.64s> and all inside it is ignored", el->file, el->line, el->name);
+}
+
+static int add_asset(struct maker *m, const char *name)
+{
+	if (m->asset_count == m->asset_room) {
+		size_t room = m->asset_room ? 2 * m->asset_room : 64;
+		const char **more = allocate(m, room, sizeof *more);
+		if (!more)
+			return out_of_memory(m);
+		if (m->asset_count)
+			memcpy(more, m->assets, m->asset_count * sizeof *more);
+		m->assets = more;
+		m->asset_room = room;
+	}
+	m->assets[m->asset_count++] = name;
+	return 0;
+}
+
+static const char *property_name(struct maker *m, const struct xml_element *el, const char *name)
+{
+	if (!el->snake)
+		return name;
+	char *snake = allocate(m, 2 * strlen(name) + 1, 1);
+	if (snake)
+		spelling_snake(name, snake);
+	return snake;
+}
+
+static int refuse_property(const struct draft *d, const struct xml_element *el, const char *name, const struct param *p,
+			   struct error *e)
+{
+	char list[512], hint[128] = "";
+	plugin_list_params(d->decl, list, sizeof list);
+	if (p)
+		return xml_error(el, e, EINVAL, "`%.64s` of <%s type=\"%.64s\"> would change the image and is not supported; "
+				 "supported: %s", name, plugin_class_name(d->node->cls), d->node->type, list);
+	struct spelling s = {.wanted = name};
+	plugin_offer_params(d->decl, &s);
+	return xml_error(el, e, EINVAL, "<%s type=\"%.64s\"> has no `%.64s`%s (supported: %s)", plugin_class_name(d->node->cls),
+			 d->node->type, name, spelling_hint(&s, hint, sizeof hint), list);
+}
+
+static int refuse_choice(const struct xml_element *el, const struct param *p, const char *given, struct error *e)
+{
+	char one[64], names[16][64], hint[128], list[512] = "";
+	struct spelling s = {.wanted = given};
+	size_t n = 0;
+	for (const char *rest = p->choices; n < 16 && (rest = value_next_name(rest, one, sizeof one)); n++) {
+		memcpy(names[n], one, sizeof one);
+		spelling_offer(&s, names[n]);
+	}
+	for (const char *rest = p->choices; (rest = value_next_name(rest, one, sizeof one));)
+		spelling_list(list, sizeof list, one);
+	return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not supported%s (supported: %s)", p->name, given,
+			 spelling_hint(&s, hint, sizeof hint), list);
+}
+
+static int check_value(const struct xml_element *el, const struct param *p, struct value *v, struct error *e)
+{
+	if (v->type == VALUE_INT && !(p->types & VALUE_INT) && (p->types & VALUE_FLOAT)) {
+		double x = (double)v->as.integer;
+		v->type = VALUE_FLOAT;
+		v->as.number = x;
+	}
+	if (!(v->type & p->types)) {
+		char list[256];
+		value_type_names(p->types, list, sizeof list);
+		return xml_error(el, e, EINVAL, "`%s` cannot be given like this (supported: %s)", p->name, list);
+	}
+	if (p->min < p->max && (v->type == VALUE_INT || v->type == VALUE_FLOAT)) {
+		double x = v->type == VALUE_INT ? (double)v->as.integer : v->as.number;
+		if (!(x >= p->min && x <= p->max))
+			return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", p->name, x, p->min, p->max);
+	}
+	if (v->type == VALUE_STRING && p->choices) {
+		char one[64];
+		for (const char *rest = p->choices; (rest = value_next_name(rest, one, sizeof one));)
+			if (strcmp(one, v->as.string) == 0)
+				return 0;
+		return refuse_choice(el, p, v->as.string, e);
+	}
+	return 0;
+}
+
+static int add_property(struct draft *d, const struct xml_element *el, const struct param *p, struct value v, struct error *e)
+{
+	int r = check_value(el, p, &v, e);
+	if (r)
+		return r;
+	const struct property *before = node_find(d->node, p->name);
+	if (before)
+		return xml_error(el, e, EINVAL, "`%s` is given twice (first in line %d)", p->name, before->line);
+	d->properties[d->node->property_count++] = (struct property){p->name, el->line, v};
+	return 0;
+}
+
+/* What the table says of a name: *p understood, or NULL with the matter settled (ignored, or an error). */
+static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner, const struct xml_element *el,
+		   const char *name, const struct param **p)
+{
+	const struct param *found = plugin_param(d->decl, name);
+	*p = NULL;
+	if (d->decl->status == PARAM_IGNORED) {
+		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
+		return 0;
+	}
+	if (!found || found->status == PARAM_REFUSED)
+		return refuse_property(d, el, name, found, m->error);
+	if (found->status == PARAM_IGNORED)
+		return note_property(m, owner, el, name);
+	*p = found;
+	return 0;
+}
+
+static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el)
+{
+	const char *written = xml_attribute(el, "name");
+	if (!written)
+		return xml_error(el, m->error, EINVAL, "needs an attribute `name`");
+	const char *name = property_name(m, el, written);
+	if (!name)
+		return out_of_memory(m);
+	const struct param *p;
+	int r = look_up(m, d, owner, el, name, &p);
+	if (r || !p)
+		return r;
+	struct value v;
+	r = value_read(el, &m->scene->arena, &v, m->error);
+	if (!r)
+		r = add_property(d, el, p, v, m->error);
+	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
+		r = *v.as.string ? add_asset(m, v.as.string) : xml_error(el, m->error, EINVAL, "an empty file name");
+	return r;
+}
+
+static int compare_ids(const void *a, const void *b)
+{
+	const struct id_entry *x = a, *y = b;
+	return strcmp(x->id, y->id);
+}
+
+static int find_object(struct maker *m, const struct xml_element *el, const char *attribute, struct xml_element **out)
+{
+	const char *id = xml_attribute(el, attribute);
+	if (!id)
+		return xml_error(el, m->error, EINVAL, "needs an attribute `%s`", attribute);
+	struct id_entry key = {id, NULL};
+	const struct id_entry *found = bsearch(&key, m->ids, m->id_count, sizeof key, compare_ids);
+	if (found) {
+		*out = found->element;
+		return 0;
+	}
+	char hint[128];
+	struct spelling s = {.wanted = id};
+	for (size_t i = 0; i < m->id_count; i++)
+		spelling_offer(&s, m->ids[i].id);
+	return xml_error(el, m->error, ENOENT, "there is no object with id \"%.64s\"%s", id, spelling_hint(&s, hint, sizeof hint));
+}
+
+static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out);
+
+/* An object inside another or referred to there: by its name where the table has it, by its class else. */
+static int read_object(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el,
+		       struct xml_element *target)
+{
+	enum plugin_class cls;
+	bool is_class = plugin_class_find(target->name, &cls);
+	assert(is_class);
+	const char *written = xml_attribute(el, "name");
+	const struct param *p = NULL;
+	bool nested = d->decl->nested_classes >> cls & 1;
+	if (written) {
+		const char *name = property_name(m, el, written);
+		if (!name)
+			return out_of_memory(m);
+		const struct param *found = plugin_param(d->decl, name);
+		if (found || !nested) {
+			int r = look_up(m, d, owner, el, name, &p);
+			if (r || !p)
+				return r;
+			nested = false;
+		}
+	}
+	if (!p && !nested) {
+		if (d->decl->status == PARAM_IGNORED)
+			return 0;
+		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">", plugin_class_name(cls),
+				 written ? "" : " without a name", owner->name, d->node->type);
+	}
+	if (p && (p->types & VALUE_COLOR) && cls != PLUGIN_TEXTURE)
+		return xml_error(el, m->error, EINVAL, "`%s` may be a texture, but not a %s", p->name, plugin_class_name(cls));
+	const struct scene_node *child;
+	int r = make_node(m, target, &child);
+	if (r)
+		return r;
+	if (p)
+		return add_property(d, el, p, (struct value){.type = VALUE_NODE, .as.node = child}, m->error);
+	if (!(d->node->cls == PLUGIN_BSDF && cls == PLUGIN_BSDF) && node_child(d->node, cls, 0))
+		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">", plugin_class_name(cls), owner->name,
+				 d->node->type);
+	d->children[d->node->child_count++] = child;
+	return 0;
+}
+
+static int refuse_element(const struct xml_element *el, struct error *e)
+{
+	char hint[128];
+	struct spelling s = {.wanted = el->name};
+	plugin_offer_classes(&s);
+	value_offer_elements(&s);
+	spelling_offer(&s, "ref");
+	spelling_offer(&s, "include");
+	spelling_offer(&s, "default");
+	spelling_offer(&s, "alias");
+	return xml_error(el, e, EINVAL, "has no place in <%.64s>, or is not supported%s", el->parent ? el->parent->name : "",
+			 spelling_hint(&s, hint, sizeof hint));
+}
+
+static int read_content(struct maker *m, struct draft *d, const struct xml_element *owner, struct xml_element *el)
+{
+	enum plugin_class cls;
+	if (el->ignored)
+		return note_foreign(m, el);
+	if (value_is_element(el->name))
+		return read_property(m, d, owner, el);
+	if (plugin_class_find(el->name, &cls))
+		return read_object(m, d, owner, el, el);
+	if (strcmp(el->name, "default") == 0)
+		return 0;
+	if (strcmp(el->name, "ref") != 0)
+		return d->decl->status == PARAM_IGNORED ? 0 : refuse_element(el, m->error);
+	if (d->decl->status == PARAM_IGNORED && !d->decl->nested_classes)
+		return 0;
+	struct xml_element *target;
+	int r = value_check_element(el, "id|name", false, m->error);
+	if (!r)
+		r = find_object(m, el, "id", &target);
+	return r ? r : read_object(m, d, owner, el, target);
+}
+
+static int refuse_type(struct maker *m, const struct xml_element *el, enum plugin_class cls, const char *type)
+{
+	char hint[128], list[512];
+	struct spelling s = {.wanted = type};
+	plugin_offer_types(m->decls, cls, &s);
+	plugin_list_types(m->decls, cls, list, sizeof list);
+	return xml_error(el, m->error, EINVAL, "there is no %s of this type%s (supported: %s)", plugin_class_name(cls),
+			 spelling_hint(&s, hint, sizeof hint), list);
+}
+
+static int note_ignored_plugin(struct maker *m, const struct xml_element *el, const struct plugin_decl *decl)
+{
+	char list[256];
+	plugin_list_params(decl, list, sizeof list);
+	return note(m, el, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored but for: %s", el->file, el->line, el->name,
+		    xml_attribute(el, "type"), list);
+}
+
+static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
+{
+	size_t n = 0;
+	for (const struct xml_element *c = el->first; c; c = c->next)
+		n++;
+	d->properties = allocate(m, n, sizeof *d->properties);
+	d->children = allocate(m, n, sizeof *d->children);
+	if (!d->properties || !d->children)
+		return out_of_memory(m);
+	d->node->properties = d->properties;
+	d->node->children = d->children;
+	for (struct xml_element *c = el->first; c; c = c->next) {
+		int r = read_content(m, d, el, c);
+		if (r)
+			return r;
+	}
+	return 0;
+}
+
+static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
+{
+	if (el->node) {
+		*out = el->node;
+		return 0;
+	}
+	if (el->busy)
+		return xml_error(el, m->error, ELOOP, "refers to itself");
+	if (m->depth >= XML_DEPTH_MAX)
+		return xml_error(el, m->error, ELOOP, "objects refer to each other more than %d deep", XML_DEPTH_MAX);
+	enum plugin_class cls;
+	plugin_class_find(el->name, &cls);
+	int r = value_check_element(el, "type|id|name", true, m->error);
+	if (r)
+		return r;
+	const char *type = xml_attribute(el, "type");
+	if (!type)
+		return xml_error(el, m->error, EINVAL, "needs an attribute `type`");
+	const struct plugin_decl *decl = plugin_find(m->decls, cls, type);
+	if (!decl)
+		return refuse_type(m, el, cls, type);
+	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(m, el, decl)))
+		return r;
+	struct draft d = {.node = allocate(m, 1, sizeof *d.node), .decl = decl};
+	if (!d.node)
+		return out_of_memory(m);
+	*d.node = (struct scene_node){.cls = cls, .type = type, .id = xml_attribute(el, "id"), .file = el->file,
+				      .line = el->line, .decl = decl};
+	el->busy = true;
+	m->depth++;
+	r = fill_node(m, &d, el);
+	m->depth--;
+	el->busy = false;
+	el->node = *out = d.node;
+	return r;
+}
+
+static struct xml_element *next_element(struct xml_element *el)
+{
+	if (el->first)
+		return el->first;
+	while (el && !el->next)
+		el = el->parent;
+	return el ? el->next : NULL;
+}
+
+static int check_unique(struct maker *m)
+{
+	qsort(m->ids, m->id_count, sizeof *m->ids, compare_ids);
+	for (size_t i = 1; i < m->id_count; i++) {
+		const struct xml_element *a = m->ids[i - 1].element, *b = m->ids[i].element;
+		if (strcmp(m->ids[i - 1].id, m->ids[i].id) == 0) {
+			bool b_later = b->line > a->line;
+			return xml_error(b_later ? b : a, m->error, EINVAL, "the id \"%.64s\" is given twice (also in %s:%d)",
+					 m->ids[i].id, a->file, b_later ? a->line : b->line);
+		}
+	}
+	return 0;
+}
+
+/* An alias may name an alias that stands before it. */
+static int read_alias(struct maker *m, const struct xml_element *el)
+{
+	const char *as = xml_attribute(el, "as");
+	struct xml_element *target;
+	if (!as)
+		return xml_error(el, m->error, EINVAL, "needs an attribute `as`");
+	int r = value_check_element(el, "id|as", false, m->error);
+	if (!r)
+		r = find_object(m, el, "id", &target);
+	if (r)
+		return r;
+	size_t at = m->id_count;
+	while (at > 0 && strcmp(m->ids[at - 1].id, as) > 0)
+		at--;
+	if (at > 0 && strcmp(m->ids[at - 1].id, as) == 0)
+		return xml_error(el, m->error, EINVAL, "the id \"%.64s\" is given twice (also in %s:%d)", as,
+				 m->ids[at - 1].element->file, m->ids[at - 1].element->line);
+	memmove(m->ids + at + 1, m->ids + at, (m->id_count - at) * sizeof *m->ids);
+	m->ids[at] = (struct id_entry){as, target};
+	m->id_count++;
+	return 0;
+}
+
+/* Objects may be referred to before they stand in the file, as 3.x allows and 0.6 does not. */
+static int collect_ids(struct maker *m)
+{
+	enum { ALIASES_MAX = 256 };
+	enum plugin_class cls;
+	size_t n = 0, aliases = 0;
+	for (struct xml_element *el = m->tree->root; el; el = next_element(el))
+		n += xml_attribute(el, "id") != NULL;
+	m->ids = allocate(m, n, sizeof *m->ids);
+	if (!m->ids)
+		return out_of_memory(m);
+	for (struct xml_element *el = m->tree->root; el; el = next_element(el)) {
+		const char *id = xml_attribute(el, "id");
+		if (id && !el->ignored && plugin_class_find(el->name, &cls))
+			m->ids[m->id_count++] = (struct id_entry){id, el};
+	}
+	int r = check_unique(m);
+	for (struct xml_element *el = m->tree->root; el && !r; el = next_element(el)) {
+		if (el->ignored || strcmp(el->name, "alias") != 0)
+			continue;
+		if (++aliases > ALIASES_MAX)
+			return xml_error(el, m->error, E2BIG, "more than %d aliases", ALIASES_MAX);
+		r = read_alias(m, el);
+	}
+	return r;
+}
+
+static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects);
+
+static int read_include(struct maker *m, const struct xml_element *el, const struct scene_node **objects)
+{
+	int r = value_check_element(el, "filename", true, m->error);
+	return r ? r : read_top(m, el->first, objects);
+}
+
+static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects)
+{
+	int r = value_check_element(scene, "version", true, m->error);
+	for (struct xml_element *el = scene->first; el && !r; el = el->next) {
+		enum plugin_class cls;
+		if (el->ignored)
+			r = note_foreign(m, el);
+		else if (plugin_class_find(el->name, &cls))
+			r = make_node(m, el, &objects[m->scene->object_count++]);
+		else if (strcmp(el->name, "include") == 0)
+			r = read_include(m, el, objects);
+		else if (strcmp(el->name, "default") == 0)
+			r = value_check_element(el, "name|value", false, m->error);
+		else if (strcmp(el->name, "alias") != 0)
+			r = refuse_element(el, m->error);
+	}
+	return r;
+}
+
+static int compare_names(const void *a, const void *b)
+{
+	const char *const *x = a, *const *y = b;
+	return strcmp(*x, *y);
+}
+
+static int list_assets(struct maker *m)
+{
+	for (uint32_t i = 0; i < m->tree->include_count; i++) {
+		int r = add_asset(m, m->tree->includes[i]);
+		if (r)
+			return r;
+	}
+	uint32_t n = 0;
+	if (m->asset_count)
+		qsort(m->assets, m->asset_count, sizeof *m->assets, compare_names);
+	for (size_t i = 0; i < m->asset_count; i++)
+		if (n == 0 || strcmp(m->assets[n - 1], m->assets[i]) != 0)
+			m->assets[n++] = m->assets[i];
+	m->scene->assets = m->assets;
+	m->scene->asset_count = n;
+	return 0;
+}
+
+static int make_scene(struct maker *m)
+{
+	struct scene *s = m->scene;
+	m->notes = allocate(m, NOTES_MAX, sizeof *m->notes);
+	m->note_keys = allocate(m, NOTES_MAX, sizeof *m->note_keys);
+	const struct scene_node **objects = allocate(m, m->tree->element_count, sizeof *objects);
+	if (!m->notes || !m->note_keys || !objects)
+		return out_of_memory(m);
+	s->dialect_3 = m->tree->dialect_3;
+	s->notes = m->notes;
+	s->objects = objects;
+	int r = collect_ids(m);
+	if (!r)
+		r = read_top(m, m->tree->root, objects);
+	return r ? r : list_assets(m);
+}
+
+int scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
+	       const struct scene_define *defines, size_t define_count, struct error *e)
+{
+	*s = (struct scene){.arena.limit = XML_MEMORY_MAX};
+	struct maker m = {.scene = s, .decls = decls, .error = e};
+	m.tree = allocate(&m, 1, sizeof *m.tree);
+	int r = m.tree ? xml_read(m.tree, assets, name, defines, define_count, &s->arena, e) : out_of_memory(&m);
+	if (!r)
+		r = make_scene(&m);
+	if (r)
+		scene_fini(s);
+	return r;
+}
+
+void scene_fini(struct scene *s)
+{
+	arena_fini(&s->arena);
+	*s = (struct scene){0};
+}

@@ -1,0 +1,24 @@
+/* Values of the scene language from their elements: <float>, <rgb>, <transform> ... One thread; allocates in the arena. */
+#ifndef WORKER_SCENE_VALUE_H
+#define WORKER_SCENE_VALUE_H
+
+#include "worker/scene/xml.h"
+
+enum { VALUE_SPECTRUM_MAX = 65536 }; /* pairs in a spectrum */
+
+/* Is it the name of a value's element (float, rgb, ... also those that are refused, like blackbody)? */
+bool value_is_element(const char *name);
+/* Hands all these names to a suggestion. */
+struct spelling;
+void value_offer_elements(struct spelling *s);
+
+int value_read(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e);
+
+/* "float", "rgb" ... for messages; types: any of the bits, as a list. */
+void value_type_names(unsigned types, char *text, size_t size);
+
+/* Refuses attributes that are not in `known` (a list with '|' between), text and, unless `children`, elements inside. */
+int value_check_element(const struct xml_element *el, const char *known, bool children, struct error *e);
+const char *value_next_name(const char *list, char *name, size_t size); /* walks such a list; NULL at the end */
+
+#endif
