@@ -2,3 +2,7 @@
 BSDF(diffuse)
 BSDF(conductor)
 BSDF(roughconductor)
+BSDF(dielectric)
+BSDF(roughdielectric)
+BSDF(phong)
+BSDF(twosided)

@@ -4,18 +4,21 @@
 
 #include <math.h>
 
-/* eta: index beyond over index here. *cos_t: cosine beyond, 0 at total reflection. */
-static inline double fresnel_dielectric(double c, double eta, double *cos_t)
+/* Shares of light; both keep their digits where they are small. */
+struct fresnel {
+	double reflected, transmitted;
+	double cos_t; /* cosine beyond, 0 at total reflection */
+};
+
+/* eta: index beyond over index here. */
+static inline struct fresnel fresnel_dielectric(double c, double eta)
 {
 	double s2 = (1 - c) * (1 + c), t2 = 1 - s2 / (eta * eta);
-	if (!(t2 > 0)) {
-		*cos_t = 0;
-		return 1;
-	}
-	double t = sqrt(t2);
-	*cos_t = t;
-	double rs = (c - eta * t) / (c + eta * t), rp = (eta * c - t) / (eta * c + t);
-	return 0.5 * (rs * rs + rp * rp);
+	if (!(t2 > 0))
+		return (struct fresnel){1, 0, 0};
+	double t = sqrt(t2), s = 1 / (c + eta * t), p = 1 / (eta * c + t);
+	double rs = (c - eta * t) * s, rp = (eta * c - t) * p;
+	return (struct fresnel){0.5 * (rs * rs + rp * rp), 2 * c * eta * t * (s * s + p * p), t};
 }
 
 /* Index eta - i k beyond, over the index here. eta = 0, k = 1 is a perfect mirror. */

@@ -1,0 +1,75 @@
+#include "tests/support/nodes.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static void *room(struct arena *a, size_t count, size_t size)
+{
+	void *p = arena_alloc(a, count, size);
+	if (!p)
+		abort();
+	return p;
+}
+
+static void add(struct arena *a, struct scene_node *n, const char *name, struct value v)
+{
+	struct property *all = room(a, n->property_count + 1, sizeof *all);
+	if (n->property_count)
+		memcpy(all, n->properties, n->property_count * sizeof *all);
+	all[n->property_count] = (struct property){.name = arena_strdup(a, name), .line = 1, .value = v};
+	n->properties = all;
+	n->property_count++;
+}
+
+static struct value parse_value(struct arena *a, const char *text)
+{
+	struct value v = {.type = VALUE_RGB};
+	char *end;
+	if (sscanf(text, "rgb(%lf,%lf,%lf)", &v.as.rgb[0], &v.as.rgb[1], &v.as.rgb[2]) == 3)
+		return v;
+	double x = strtod(text, &end);
+	if (end != text && *end == 0)
+		return (struct value){.type = VALUE_FLOAT, .as.number = x};
+	if (strcmp(text, "true") == 0 || strcmp(text, "false") == 0)
+		return (struct value){.type = VALUE_BOOL, .as.boolean = *text == 't'};
+	char *s = arena_strdup(a, text);
+	for (char *p = s; *p; p++)
+		if (*p == '_')
+			*p = ' ';
+	return (struct value){.type = VALUE_STRING, .as.string = s};
+}
+
+struct scene_node *node_make(struct arena *a, enum plugin_class cls, const char *text)
+{
+	struct scene_node *n = room(a, 1, sizeof *n);
+	char *copy = arena_strdup(a, text), *rest = copy;
+	*n = (struct scene_node){.cls = cls, .type = strtok_r(copy, " ", &rest), .file = "test", .line = 1};
+	for (char *word; (word = strtok_r(NULL, " ", &rest));) {
+		char *equals = strchr(word, '=');
+		if (!equals)
+			abort();
+		*equals = 0;
+		add(a, n, word, parse_value(a, equals + 1));
+	}
+	return n;
+}
+
+void node_add_child(struct arena *a, struct scene_node *n, const struct scene_node *child)
+{
+	const struct scene_node **all = room(a, n->child_count + 1, sizeof *all);
+	for (uint32_t i = 0; i < n->child_count; i++)
+		all[i] = n->children[i];
+	all[n->child_count++] = child;
+	n->children = all;
+}
+
+void node_add_ref(struct arena *a, struct scene_node *n, const char *name, const struct scene_node *child)
+{
+	add(a, n, name, (struct value){.type = VALUE_NODE, .as.node = child});
+}
+
+void node_add_transform(struct arena *a, struct scene_node *n, const char *name, mat4 transform)
+{
+	add(a, n, name, (struct value){.type = VALUE_TRANSFORM, .as.transform = transform});
+}

@@ -1,0 +1,16 @@
+/*
+ * Scene nodes without a scene file: "roughconductor alpha=0.1 distribution=ggx eta=rgb(0.2,0.9,1.1) on=true". Values are
+ * numbers, booleans, rgb(r,g,b), or else strings (no spaces; '_' in a string becomes a space). Everything lives in the
+ * arena; out of memory or bad text aborts. One thread.
+ */
+#ifndef TESTS_SUPPORT_NODES_H
+#define TESTS_SUPPORT_NODES_H
+
+#include "worker/scene/scene.h"
+
+struct scene_node *node_make(struct arena *a, enum plugin_class cls, const char *text);
+void node_add_child(struct arena *a, struct scene_node *n, const struct scene_node *child); /* without a name */
+void node_add_ref(struct arena *a, struct scene_node *n, const char *name, const struct scene_node *child);
+void node_add_transform(struct arena *a, struct scene_node *n, const char *name, mat4 transform);
+
+#endif

@@ -1,0 +1,67 @@
+/*
+ * The BSDFs that the generic tests run over: several parameter sets each, as text (see tests/support/nodes.h), nested
+ * ones after '|'. A BSDF of the registry without a set here fails the tests.
+ */
+#ifndef TESTS_WORKER_BSDF_BSDF_CASES_H
+#define TESTS_WORKER_BSDF_BSDF_CASES_H
+
+#include "tests/support/nodes.h"
+#include "worker/bsdf/bsdf.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const char *const bsdf_cases[] = {
+	"diffuse",
+	"diffuse reflectance=rgb(0.8,0.2,0.1)",
+	"conductor material=none",
+	"conductor material=Au specular_reflectance=0.7",
+	"roughconductor material=none alpha=0.3",
+	"roughconductor material=none alpha=0.3 distribution=ggx",
+	"roughconductor material=Au alpha=0.05",
+	"roughconductor material=Ag alpha=0.05 distribution=ggx specular_reflectance=rgb(0.5,0.6,0.7)",
+	"roughconductor alpha=1 eta=rgb(0.2,0.9,1.1) k=rgb(3.9,2.4,2.1)",
+	"roughconductor alpha=1 eta=0.2 k=3 distribution=ggx",
+	"dielectric",
+	"dielectric int_ior=water ext_ior=diamond specular_transmittance=rgb(0.9,0.8,0.7)",
+	"roughdielectric int_ior=1.5 ext_ior=1 alpha=0.3",
+	"roughdielectric int_ior=1.5 ext_ior=1 alpha=0.3 distribution=ggx",
+	"roughdielectric int_ior=1 ext_ior=1.5 alpha=0.1 distribution=ggx",
+	"roughdielectric int_ior=2.4 ext_ior=1 alpha=1",
+	"roughdielectric int_ior=2.4 ext_ior=1 alpha=1 distribution=ggx specular_transmittance=rgb(0.9,0.8,0.7)",
+	"roughdielectric int_ior=1.1 ext_ior=1 alpha=0.5",
+	"phong",
+	"phong exponent=0 specular_reflectance=0.9 diffuse_reflectance=0.4",
+	"phong exponent=300 diffuse_reflectance=0 specular_reflectance=1",
+	"phong exponent=5 diffuse_reflectance=rgb(0.1,0.3,0.2)",
+	"twosided | diffuse reflectance=0.9",
+	"twosided | roughconductor alpha=0.2 material=Cu | phong exponent=10",
+	"twosided | diffuse | conductor material=Cr",
+};
+enum { BSDF_CASES = sizeof bsdf_cases / sizeof *bsdf_cases };
+
+static inline int bsdf_try(struct arena *a, const char *text, bool dialect_3, struct bsdf *b, struct error *e)
+{
+	char copy[256], *rest = copy;
+	snprintf(copy, sizeof copy, "%s", text);
+	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(copy, "|", &rest));
+	for (char *child; (child = strtok_r(NULL, "|", &rest));)
+		node_add_child(a, n, node_make(a, PLUGIN_BSDF, child));
+	const struct bsdf_build build = {.arena = a, .dialect_3 = dialect_3};
+	return bsdf_create(b, n, &build, e);
+}
+
+static inline void bsdf_make(struct arena *a, const char *text, struct bsdf *b)
+{
+	struct error e;
+	if (bsdf_try(a, text, true, b, &e))
+		fail_msg("%s: %s", text, e.text);
+}
+
+#endif
