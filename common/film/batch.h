@@ -33,7 +33,7 @@ enum { CHAIN_STATE_MAX = 1 << 16 };
 
 enum { BATCH_COUNTERS = 16 };
 enum batch_counter {
-	COUNT_SAMPLES,        /* samples or mutations made */
+	COUNT_SAMPLES,        /* samples or mutations made; dead chains make none */
 	COUNT_ACCEPTED,       /* accepted mutations */
 	COUNT_INDEPENDENT,    /* independent proposals (bootstrap samples, large steps) */
 	COUNT_NAN,            /* contributions refused: not a number */
@@ -48,8 +48,9 @@ enum batch_counter {
 struct batch {
 	struct lease_key key;
 	uint64_t counters[BATCH_COUNTERS];
-	/* Sums over independent proposals of I = X+Y+Z of the whole sample, zeros counted in COUNT_INDEPENDENT;
-	 * `beyond` is the part from paths longer than the integrator's state holds. */
+	/* Sums over independent proposals of I = X+Y+Z of the whole sample, zeros counted in COUNT_INDEPENDENT.
+	 * beyond_sum: the same from paths longer than the integrator's state holds, estimated by the bootstrap and not in
+	 * independent_sum (b is the integral of what the chains can reach). */
 	double independent_sum, independent_square, beyond_sum;
 	double cpu_seconds; /* not part of the result's bits */
 	uint32_t tile_count;
@@ -63,7 +64,8 @@ struct batch {
 void batch_fini(struct batch *b);
 
 /* All that can be checked without the scene: key inside the plan, tiles inside the crop, aligned, once, in order, values
- * finite, counts as the plan says, states bounded, weights >= 0. -EBADMSG with a sentence. */
+ * finite, counts as the plan says (COUNT_SAMPLES of a render lease and COUNT_INDEPENDENT of a bootstrap lease exactly),
+ * states bounded, weights >= 0. -EBADMSG with a sentence. */
 int batch_check(const struct batch *b, const struct plan *p, struct error *e);
 
 #endif

@@ -24,6 +24,11 @@ enum {
 	PLAN_MAX_GROUPS = 64,
 	PLAN_MAX_PIXELS = 1 << 24, /* of the crop: bounds a batch */
 	PLAN_MAX_SIZE = 65536,     /* width, height of the full film */
+	PLAN_MAX_BORDER = 256,
+	PLAN_MAX_PARTS = 64,
+	PLAN_MAX_CHAINS = 1 << 20,
+	PLAN_MAX_BOOTSTRAP = 1 << 26,
+	PLAN_MAX_DEPTH = 128,      /* edges */
 };
 
 struct plan_request {
@@ -62,6 +67,10 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
 int plan_check(const struct plan *p, struct error *e);
 /* "1024 chains in 16 groups ..., 8 rounds ...": what was chosen and by which rule; for logs. */
 void plan_describe(const struct plan *p, char *text, size_t size);
+/* What plan_make changed of the values asked for ("chains 100 -> 128: ..."); empty: nothing. */
+void plan_describe_changes(const struct plan_request *r, const struct plan *p, char *text, size_t size);
+/* The options that make the same bits again when `rounds` rounds are done, whatever bound ended this job. */
+void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size);
 
 /* Half open ranges. */
 struct plan_range {

@@ -1,0 +1,142 @@
+#include "common/film/batch.h"
+
+#include "common/base/mem.h"
+
+#include <math.h>
+#include <string.h>
+
+void batch_fini(struct batch *b)
+{
+	for (uint32_t i = 0; b->tiles && i < b->tile_count; i++)
+		mem_free(b->tiles[i].xyz);
+	for (uint32_t i = 0; b->states && i < b->state_count; i++)
+		mem_free(b->states[i].bytes);
+	mem_free(b->tiles);
+	mem_free(b->states);
+	mem_free(b->weights);
+	*b = (struct batch){0};
+}
+
+static int check_key(const struct lease_key *k, const struct plan *p, struct error *e)
+{
+	if (k->kind != LEASE_BOOTSTRAP && k->kind != LEASE_RENDER)
+		return error_set(e, EBADMSG, "unknown kind of lease %d", (int)k->kind);
+	if (k->group >= p->groups || k->part >= p->parts)
+		return error_set(e, EBADMSG, "no group %u with a part %u in this plan", k->group, k->part);
+	uint64_t epochs = k->kind == LEASE_BOOTSTRAP ? 1 : p->rounds;
+	if (k->epoch >= epochs)
+		return error_set(e, EBADMSG, "epoch %llu of %llu", (unsigned long long)k->epoch, (unsigned long long)epochs);
+	return 0;
+}
+
+static bool all_finite(const float *v, size_t n)
+{
+	/* An exponent of all ones is an infinity or NaN; one test for all values, so that the loop has no branch. */
+	uint32_t bad = 0;
+	for (size_t i = 0; i < n; i++) {
+		uint32_t bits;
+		memcpy(&bits, v + i, sizeof bits);
+		bad |= (uint32_t)((bits & 0x7f800000u) == 0x7f800000u);
+	}
+	return !bad;
+}
+
+static int check_tiles(const struct batch *b, const struct plan *p, struct error *e)
+{
+	uint32_t across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE;
+	int64_t last = -1;
+	if (b->tile_count && b->key.kind == LEASE_BOOTSTRAP)
+		return error_set(e, EBADMSG, "a bootstrap batch with tiles");
+	for (uint32_t i = 0; i < b->tile_count; i++) {
+		const struct tile *t = &b->tiles[i];
+		if (t->x < p->crop_x || t->y < p->crop_y || t->x - p->crop_x >= p->crop_width ||
+		    t->y - p->crop_y >= p->crop_height)
+			return error_set(e, EBADMSG, "a tile at %u,%u outside the crop", t->x, t->y);
+		uint32_t x = t->x - p->crop_x, y = t->y - p->crop_y;
+		uint32_t w = p->crop_width - x < TILE_SIZE ? p->crop_width - x : TILE_SIZE;
+		uint32_t h = p->crop_height - y < TILE_SIZE ? p->crop_height - y : TILE_SIZE;
+		if (x % TILE_SIZE || y % TILE_SIZE || t->width != w || t->height != h || !t->xyz)
+			return error_set(e, EBADMSG, "a tile of %ux%u at %u,%u is not one of the film's", t->width, t->height,
+					 t->x, t->y);
+		int64_t index = (int64_t)(y / TILE_SIZE) * across + x / TILE_SIZE;
+		if (index <= last)
+			return error_set(e, EBADMSG, "the tile at %u,%u comes twice or out of order", t->x, t->y);
+		last = index;
+		if (!all_finite(t->xyz, (size_t)w * h * TILE_CHANNELS))
+			return error_set(e, EBADMSG, "the tile at %u,%u holds a value that is not finite", t->x, t->y);
+	}
+	return 0;
+}
+
+static int check_states(const struct batch *b, const struct plan *p, uint64_t *live, struct error *e)
+{
+	struct plan_range chains = plan_chain_range(p, b->key.part);
+	bool has = p->kind == PLAN_CHAINS && b->key.kind == LEASE_RENDER;
+	uint64_t expected = has ? chains.end - chains.begin : 0;
+	*live = 0;
+	if (b->state_count != expected)
+		return error_set(e, EBADMSG, "%u chain states where there should be %llu", b->state_count,
+				 (unsigned long long)expected);
+	for (uint32_t i = 0; i < b->state_count; i++) {
+		const struct chain_state *s = &b->states[i];
+		if (s->size > CHAIN_STATE_MAX || (s->size && !s->bytes))
+			return error_set(e, EBADMSG, "a chain state of %u bytes; at most %d", s->size, CHAIN_STATE_MAX);
+		*live += s->size > 0;
+	}
+	return 0;
+}
+
+static int check_weights(const struct batch *b, const struct plan *p, struct error *e)
+{
+	struct plan_range r = plan_bootstrap_range(p, b->key.group, b->key.part);
+	uint64_t expected = b->key.kind == LEASE_BOOTSTRAP ? r.end - r.begin : 0;
+	if (b->weight_count != expected || (expected && !b->weights))
+		return error_set(e, EBADMSG, "%llu bootstrap weights where there should be %llu",
+				 (unsigned long long)b->weight_count, (unsigned long long)expected);
+	for (uint64_t i = 0; i < b->weight_count; i++)
+		if (!(b->weights[i] >= 0) || !isfinite(b->weights[i]))
+			return error_set(e, EBADMSG, "a bootstrap weight is negative or not finite");
+	return 0;
+}
+
+static int check_counts(const struct batch *b, const struct plan *p, uint64_t live, struct error *e)
+{
+	const uint64_t *c = b->counters;
+	struct plan_range rows = plan_row_range(p, b->key.part);
+	uint64_t samples;
+	if (b->key.kind == LEASE_BOOTSTRAP)
+		samples = b->weight_count;
+	else if (p->kind == PLAN_CHAINS)
+		samples = live * p->epoch;
+	else
+		samples = (rows.end - rows.begin) * (p->crop_width + 2 * (uint64_t)p->border) * p->epoch;
+	if (b->key.kind == LEASE_BOOTSTRAP ? c[COUNT_INDEPENDENT] != samples : c[COUNT_SAMPLES] != samples)
+		return error_set(e, EBADMSG, "%llu samples where the plan has %llu",
+				 (unsigned long long)c[b->key.kind == LEASE_BOOTSTRAP ? COUNT_INDEPENDENT : COUNT_SAMPLES],
+				 (unsigned long long)samples);
+	if (c[COUNT_SAMPLES] > samples || c[COUNT_INDEPENDENT] > samples || c[COUNT_ACCEPTED] > samples ||
+	    c[COUNT_STUCK] > b->state_count)
+		return error_set(e, EBADMSG, "more accepted, independent or stuck than there are");
+	for (int i = 0; i < BATCH_COUNTERS; i++)
+		if (c[i] >> 56)
+			return error_set(e, EBADMSG, "counter %d is %llu, more than a lease can count", i,
+					 (unsigned long long)c[i]);
+	const double sums[] = {b->independent_sum, b->independent_square, b->beyond_sum, b->cpu_seconds};
+	for (int i = 0; i < 4; i++)
+		if (!isfinite(sums[i]) || sums[i] < 0)
+			return error_set(e, EBADMSG, "a sum over independent samples is negative or not finite");
+	return 0;
+}
+
+int batch_check(const struct batch *b, const struct plan *p, struct error *e)
+{
+	uint64_t live;
+	int rc = check_key(&b->key, p, e);
+	if (rc == 0)
+		rc = check_tiles(b, p, e);
+	if (rc == 0)
+		rc = check_states(b, p, &live, e);
+	if (rc == 0)
+		rc = check_weights(b, p, e);
+	return rc ? rc : check_counts(b, p, live, e);
+}

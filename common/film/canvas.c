@@ -1,0 +1,346 @@
+#include "common/film/canvas_private.h"
+
+#include "common/base/mem.h"
+
+#include <assert.h>
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <unistd.h>
+
+/* The prefix and both open rounds together stay below 2^62 in every pixel, so that closing a round cannot fail. */
+#define SUM_MOST (UINT64_C(1) << 62)
+#define VALUE_MOST 0x1p61
+
+enum {
+	CHAIN_EXPONENT = -32,  /* a chain adds about 1 a mutation: 2^30 of them fit into one pixel */
+	SAMPLE_BITS = 28,      /* below a group's mean pixel sum in one round */
+	BLACK_BITS = 40,       /* below the brightest sample */
+	EXPONENT_MOST = 900,
+};
+
+int canvas_grid_exponent(const struct plan *p, double b_pooled, double brightest)
+{
+	double value = b_pooled / (double)plan_extended_pixels(p) * (double)p->epoch;
+	int bits = SAMPLE_BITS;
+	if (p->kind == PLAN_CHAINS)
+		return CHAIN_EXPONENT;
+	if (!(value > 0) || !isfinite(value)) {
+		value = brightest;
+		bits = BLACK_BITS;
+	}
+	if (!(value > 0) || !isfinite(value))
+		return CHAIN_EXPONENT;
+	int exponent;
+	frexp(value, &exponent);
+	exponent -= bits;
+	return exponent < -EXPONENT_MOST ? -EXPONENT_MOST : exponent > EXPONENT_MOST ? EXPONENT_MOST : exponent;
+}
+
+static int open_unlinked(const char *folder, struct error *e)
+{
+	int fd = open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+	if (fd >= 0)
+		return fd;
+	char path[4096];
+	int n = snprintf(path, sizeof path, "%s/canvas-XXXXXX", folder);
+	if (n < 0 || (size_t)n >= sizeof path)
+		return error_set(e, ENAMETOOLONG, "%s: the folder's name is too long", folder);
+	fd = mkostemp(path, O_CLOEXEC);
+	if (fd < 0) {
+		int code = errno;
+		return error_set(e, code, "%s: cannot make a file for the films: %s", folder, strerror(code));
+	}
+	unlink(path);
+	return fd;
+}
+
+static int map_sums(struct canvas *c, const char *folder, struct error *e)
+{
+	int flags = MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE;
+	if (folder) {
+		c->fd = open_unlinked(folder, e);
+		if (c->fd < 0)
+			return c->fd;
+		if (ftruncate(c->fd, (off_t)c->bytes) != 0) {
+			int code = errno;
+			return error_set(e, code, "%s: a file of %zu bytes for the films: %s", folder, c->bytes, strerror(code));
+		}
+		flags = MAP_SHARED;
+	}
+	void *map = mmap(NULL, c->bytes, PROT_READ | PROT_WRITE, flags, c->fd, 0);
+	if (map == MAP_FAILED) {
+		int code = errno;
+		return error_set(e, code, "cannot map %zu bytes for the films: %s", c->bytes, strerror(code));
+	}
+	c->sums = map;
+	return 0;
+}
+
+int canvas_new(struct canvas **out, const struct plan *p, int grid_exponent, const char *folder, struct error *e)
+{
+	assert(grid_exponent >= -EXPONENT_MOST && grid_exponent <= EXPONENT_MOST);
+	*out = NULL;
+	struct canvas *c = mem_alloc(1, sizeof *c);
+	if (!c)
+		return error_set(e, ENOMEM, "no memory for the films");
+	c->plan = *p;
+	c->fd = -1;
+	c->scale = ldexp(1, -grid_exponent);
+	c->quantum = ldexp(1, grid_exponent);
+	c->tiles_across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE;
+	c->tiles_down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
+	size_t films = (size_t)p->groups * FILMS;
+	c->bytes = films * canvas_tiles(c) * SLOT * sizeof *c->sums;
+	c->flags = mem_alloc(films * canvas_tiles(c), 1);
+	c->bound = mem_alloc(films, sizeof *c->bound);
+	c->has = mem_alloc((size_t)(1 + OPEN_ROUNDS) * p->groups * p->parts, 1);
+	int rc = c->flags && c->bound && c->has ? map_sums(c, folder, e) : error_set(e, ENOMEM, "no memory for the films");
+	if (rc) {
+		canvas_free(c);
+		return rc;
+	}
+	*out = c;
+	return 0;
+}
+
+void canvas_free(struct canvas *c)
+{
+	if (!c)
+		return;
+	if (c->sums)
+		munmap(c->sums, c->bytes);
+	if (c->fd >= 0)
+		close(c->fd);
+	mem_free(c->flags);
+	mem_free(c->bound);
+	mem_free(c->has);
+	mem_free(c);
+}
+
+static uint32_t parity(uint64_t round)
+{
+	return (uint32_t)(round % OPEN_ROUNDS);
+}
+
+static uint32_t lease_set(const struct lease_key *k)
+{
+	return k->kind == LEASE_BOOTSTRAP ? 0 : 1 + parity(k->epoch);
+}
+
+bool canvas_has(const struct canvas *c, const struct lease_key *k)
+{
+	if (k->kind == LEASE_RENDER && k->epoch < c->rounds)
+		return true;
+	if (k->kind == LEASE_RENDER && k->epoch >= c->rounds + OPEN_ROUNDS)
+		return false;
+	return canvas_lease_merged(c, lease_set(k), k->group, k->part);
+}
+
+uint64_t canvas_rounds(const struct canvas *c)
+{
+	return c->rounds;
+}
+
+uint64_t canvas_merged(const struct canvas *c)
+{
+	return c->rounds * c->plan.groups * c->plan.parts + c->merged[0] + c->merged[1];
+}
+
+/* ---- pixels */
+
+/* To the nearest integer, ties to even. Above 2^51 a float is an integer many times over already. */
+static int64_t round_to_grid(double x)
+{
+	if (fabs(x) < 0x1p51) {
+		double shifted = x + 0x1.8p52;
+		int64_t bits;
+		memcpy(&bits, &shifted, sizeof bits);
+		return bits - INT64_C(0x4338000000000000);
+	}
+	return (int64_t)x;
+}
+
+/* Adds (sign 1) or takes back (sign -1) a tile. False, with some values added: a value or sum is out of range; the number
+ * of values done is then in *done, so that the same call with sign -1 restores them. */
+static bool add_tile(const struct canvas *c, int64_t *slot, const struct tile *t, int64_t sign, size_t *done, uint64_t *bound)
+{
+	size_t row = (size_t)t->width * TILE_CHANNELS, limit = *done;
+	uint64_t highest = *bound;
+	const float *v = t->xyz;
+	for (size_t y = 0, made = 0; y < t->height && made < limit; y++, v += row) {
+		int64_t *s = slot + y * SLOT_ROW;
+		for (size_t x = 0; x < row && made < limit; x++, made++) {
+			double d = (double)v[x] * c->scale;
+			if (!(fabs(d) < VALUE_MOST)) {
+				*done = made;
+				return false;
+			}
+			int64_t sum = s[x] + sign * round_to_grid(d);
+			s[x] = sum;
+			uint64_t magnitude = sum < 0 ? 0 - (uint64_t)sum : (uint64_t)sum;
+			highest = magnitude > highest ? magnitude : highest;
+			if (magnitude > SUM_MOST) {
+				*done = made + 1;
+				return false;
+			}
+		}
+	}
+	*bound = highest;
+	return true;
+}
+
+/* A page of a sparse file that the disk has no room for would be a signal, not an error: reserve before touching. */
+static int back_tile(struct canvas *c, size_t film, size_t tile, struct error *e)
+{
+	uint8_t *flags = canvas_flags(c, film, tile);
+	if (!(*flags & TILE_BACKED) && c->fd >= 0) {
+		off_t at = (off_t)((film * canvas_tiles(c) + tile) * SLOT * sizeof *c->sums);
+		int code = posix_fallocate(c->fd, at, SLOT * sizeof *c->sums);
+		if (code)
+			return error_set(e, code, "no room on the disk for the films: %s", strerror(code));
+	}
+	*flags |= TILE_BACKED;
+	return 0;
+}
+
+static size_t tile_index(const struct canvas *c, const struct tile *t)
+{
+	return (size_t)((t->y - c->plan.crop_y) / TILE_SIZE) * c->tiles_across + (t->x - c->plan.crop_x) / TILE_SIZE;
+}
+
+static size_t tile_values(const struct tile *t)
+{
+	return (size_t)t->width * t->height * TILE_CHANNELS;
+}
+
+static int add_tiles(struct canvas *c, const struct batch *b, struct error *e)
+{
+	size_t prefix = canvas_film(b->key.group, FILM_PREFIX), open = prefix + FILM_OPEN + parity(b->key.epoch);
+	int rc = 0;
+	for (uint32_t i = 0; i < b->tile_count && rc == 0; i++) {
+		size_t tile = tile_index(c, &b->tiles[i]);
+		assert(tile < canvas_tiles(c));
+		rc = back_tile(c, open, tile, e);
+		if (rc == 0)
+			rc = back_tile(c, prefix, tile, e);
+	}
+	if (rc)
+		return rc;
+	uint64_t bound = c->bound[open], old = bound, ignored = 0;
+	uint32_t i = 0;
+	size_t done = 0;
+	for (; i < b->tile_count; i++) {
+		size_t tile = tile_index(c, &b->tiles[i]);
+		done = tile_values(&b->tiles[i]);
+		if (!add_tile(c, canvas_slot(c, open, tile), &b->tiles[i], 1, &done, &bound))
+			break;
+		*canvas_flags(c, open, tile) |= TILE_USED;
+	}
+	uint64_t others = c->bound[prefix] + c->bound[prefix + FILM_OPEN] + c->bound[prefix + FILM_OPEN + 1] - old;
+	c->bound[open] = bound;
+	if (i == b->tile_count && bound + others <= SUM_MOST)
+		return 0;
+	/* Take all back: the tile that failed as far as it came, and those before it whole. */
+	if (i < b->tile_count)
+		add_tile(c, canvas_slot(c, open, tile_index(c, &b->tiles[i])), &b->tiles[i], -1, &done, &ignored);
+	while (i-- > 0) {
+		done = tile_values(&b->tiles[i]);
+		add_tile(c, canvas_slot(c, open, tile_index(c, &b->tiles[i])), &b->tiles[i], -1, &done, &ignored);
+	}
+	c->bound[open] = old;
+	return error_set(e, ERANGE, "a pixel's sum left the film's range (quantum %g)", c->quantum);
+}
+
+static void close_tile(struct canvas *c, size_t prefix, size_t open, size_t tile, uint64_t *bound)
+{
+	int64_t *to = canvas_slot(c, prefix, tile), *from = canvas_slot(c, open, tile);
+	for (size_t i = 0; i < SLOT; i++) {
+		to[i] += from[i];
+		uint64_t magnitude = to[i] < 0 ? 0 - (uint64_t)to[i] : (uint64_t)to[i];
+		*bound = magnitude > *bound ? magnitude : *bound;
+	}
+	memset(from, 0, SLOT * sizeof *from);
+	*canvas_flags(c, prefix, tile) |= TILE_USED;
+	*canvas_flags(c, open, tile) &= (uint8_t)~TILE_USED;
+}
+
+/* ---- what goes with the pixels */
+
+static void merge_counters(uint64_t to[BATCH_COUNTERS], const uint64_t from[BATCH_COUNTERS])
+{
+	for (int i = 0; i < BATCH_COUNTERS; i++) {
+		if (i == COUNT_LONGEST_STUCK)
+			to[i] = from[i] > to[i] ? from[i] : to[i];
+		else
+			to[i] = to[i] > UINT64_MAX - from[i] ? UINT64_MAX : to[i] + from[i];
+	}
+}
+
+static void tally_batch(struct tally *t, const struct batch *b)
+{
+	merge_counters(t->counters, b->counters);
+	uint32_t g = b->key.group;
+	t->group[g].samples += b->counters[COUNT_SAMPLES];
+	t->group[g].independent += b->counters[COUNT_INDEPENDENT];
+	bool finite = exact_sum_add(&t->group[g].sum, b->independent_sum) && exact_sum_add(&t->group[g].beyond, b->beyond_sum);
+	assert(finite); /* batch_check */
+	(void)finite;
+}
+
+static void tally_merge(struct tally *to, const struct tally *from, uint32_t groups)
+{
+	merge_counters(to->counters, from->counters);
+	for (uint32_t g = 0; g < groups; g++) {
+		to->group[g].samples += from->group[g].samples;
+		to->group[g].independent += from->group[g].independent;
+		exact_sum_merge(&to->group[g].sum, &from->group[g].sum);
+		exact_sum_merge(&to->group[g].beyond, &from->group[g].beyond);
+	}
+}
+
+static void close_round(struct canvas *c)
+{
+	uint32_t open = parity(c->rounds), leases = c->plan.groups * c->plan.parts;
+	for (uint32_t g = 0; g < c->plan.groups; g++) {
+		size_t prefix = canvas_film(g, FILM_PREFIX), from = prefix + FILM_OPEN + open;
+		for (size_t t = 0; t < canvas_tiles(c); t++)
+			if (*canvas_flags(c, from, t) & TILE_USED)
+				close_tile(c, prefix, from, t, &c->bound[prefix]);
+		c->bound[from] = 0;
+	}
+	tally_merge(&c->prefix, &c->open[open], c->plan.groups);
+	c->open[open] = (struct tally){0};
+	c->merged[open] = 0;
+	memset(c->has + (size_t)(1 + open) * leases, 0, leases);
+	c->rounds++;
+}
+
+int canvas_add(struct canvas *c, const struct batch *b, struct error *e)
+{
+	const struct lease_key *k = &b->key;
+	assert(k->group < c->plan.groups && k->part < c->plan.parts);
+	if (canvas_has(c, k))
+		return error_set(e, EEXIST, "the lease is merged already");
+	uint8_t *has = &c->has[((size_t)lease_set(k) * c->plan.groups + k->group) * c->plan.parts + k->part];
+	if (k->kind == LEASE_BOOTSTRAP) {
+		tally_batch(&c->bootstrap, b);
+		*has = 1;
+		return 0;
+	}
+	if (k->epoch >= c->rounds + OPEN_ROUNDS || k->epoch >= c->plan.rounds)
+		return error_set(e, EAGAIN, "round %llu is not open yet: %llu are complete", (unsigned long long)k->epoch,
+				 (unsigned long long)c->rounds);
+	int rc = add_tiles(c, b, e);
+	if (rc)
+		return rc;
+	tally_batch(&c->open[parity(k->epoch)], b);
+	*has = 1;
+	c->merged[parity(k->epoch)]++;
+	while (c->merged[parity(c->rounds)] == c->plan.groups * c->plan.parts)
+		close_round(c);
+	return 0;
+}

@@ -1,0 +1,264 @@
+/*
+ * From integer sums to an image, its error and the estimate of its relMSE. All loops run in a fixed order over exact
+ * inputs, so that equal films give equal bits.
+ */
+#include "common/film/canvas_private.h"
+#include "common/film/color.h"
+
+#include "common/base/mem.h"
+
+#include <math.h>
+
+struct making {
+	const struct canvas *c;
+	struct canvas_image *img;
+	bool open_rounds;
+	struct tally *all;                /* prefix, bootstrap and, for a preview, the open rounds */
+	double factor[PLAN_MAX_GROUPS];   /* grid units to the group's image; 0: the group has nothing */
+	double pooled_factor;
+	double b[PLAN_MAX_GROUPS];
+	double distance[PLAN_MAX_GROUPS]; /* mean over pixels of the weighted square distance of a group's image */
+};
+
+static void add_tally(struct tally *to, const struct tally *from, uint32_t groups, bool all)
+{
+	for (uint32_t g = 0; g < groups; g++) {
+		if (all)
+			to->group[g].samples += from->group[g].samples;
+		to->group[g].independent += from->group[g].independent;
+		exact_sum_merge(&to->group[g].sum, &from->group[g].sum);
+		exact_sum_merge(&to->group[g].beyond, &from->group[g].beyond);
+	}
+	for (int i = 0; i < BATCH_COUNTERS; i++) {
+		bool refused = i == COUNT_NAN || i == COUNT_INFINITE || i == COUNT_NEGATIVE;
+		if (i == COUNT_LONGEST_STUCK && all)
+			to->counters[i] = from->counters[i] > to->counters[i] ? from->counters[i] : to->counters[i];
+		else if (all || refused)
+			to->counters[i] += from->counters[i];
+	}
+}
+
+static double ratio(double a, double b)
+{
+	return b > 0 ? a / b : 0;
+}
+
+/* b of each group and of all, and from the spread of the groups its standard error. */
+static void find_b(struct making *m)
+{
+	uint32_t groups = m->c->plan.groups;
+	struct exact_sum sum = {0}, beyond = {0}, bootstrap = {0};
+	uint64_t independent = 0;
+	double mean = 0, square = 0;
+	for (uint32_t g = 0; g < groups; g++) {
+		m->b[g] = ratio(exact_sum_value(&m->all->group[g].sum), (double)m->all->group[g].independent);
+		exact_sum_merge(&sum, &m->all->group[g].sum);
+		exact_sum_merge(&beyond, &m->c->bootstrap.group[g].beyond);
+		exact_sum_merge(&bootstrap, &m->c->bootstrap.group[g].sum);
+		independent += m->all->group[g].independent;
+		mean += m->b[g] / groups;
+	}
+	for (uint32_t g = 0; g < groups; g++)
+		square += (m->b[g] - mean) * (m->b[g] - mean);
+	m->img->b = ratio(exact_sum_value(&sum), (double)independent);
+	m->img->b_error = groups > 1 ? sqrt(square / groups / (groups - 1)) : NAN;
+	double outside = exact_sum_value(&beyond);
+	m->img->beyond_share = ratio(outside, outside + exact_sum_value(&bootstrap));
+}
+
+static void find_factors(struct making *m)
+{
+	const struct plan *p = &m->c->plan;
+	uint64_t samples = 0;
+	for (uint32_t g = 0; g < p->groups; g++)
+		samples += m->all->group[g].samples;
+	m->img->samples = samples;
+	for (uint32_t g = 0; g < p->groups; g++) {
+		double n = p->kind == PLAN_CHAINS ? (double)m->all->group[g].samples
+						  : (double)p->epoch * (double)m->c->rounds;
+		m->factor[g] = (p->kind == PLAN_CHAINS ? m->b[g] : 1) * ratio(m->c->quantum, n);
+	}
+	double n = p->kind == PLAN_CHAINS ? (double)samples : (double)p->groups * (double)p->epoch * (double)m->c->rounds;
+	m->pooled_factor = (p->kind == PLAN_CHAINS ? m->img->b : 1) * ratio(m->c->quantum, n);
+}
+
+/* A group's sum at value i of a tile. */
+static double sum_at(const struct making *m, uint32_t group, size_t tile, size_t i)
+{
+	int64_t sum = 0;
+	for (uint32_t which = 0; which < (m->open_rounds ? FILMS : 1); which++) {
+		size_t film = canvas_film(group, which);
+		if (*canvas_flags(m->c, film, tile) & TILE_USED)
+			sum += canvas_slot(m->c, film, tile)[i];
+	}
+	return (double)sum;
+}
+
+/* A preview of samples: parts of the picture have come more often than others. Leases merged of the strip that holds a row
+ * of the crop, by group; the rows that the filter shares between strips are slightly off. */
+static double preview_leases(const struct canvas *c, uint32_t row)
+{
+	uint32_t part = 0;
+	while (plan_row_range(&c->plan, part).end <= row + c->plan.border)
+		part++;
+	uint64_t n = c->rounds * c->plan.groups;
+	for (uint32_t set = 1; set <= OPEN_ROUNDS; set++)
+		for (uint32_t g = 0; g < c->plan.groups; g++)
+			n += canvas_lease_merged(c, set, g, part);
+	return (double)n;
+}
+
+static void pool_tile(struct making *m, uint32_t tx, uint32_t ty)
+{
+	const struct plan *p = &m->c->plan;
+	size_t tile = (size_t)ty * m->c->tiles_across + tx;
+	for (uint32_t y = ty * TILE_SIZE; y < p->crop_height && y < (ty + 1) * TILE_SIZE; y++) {
+		double factor = m->pooled_factor;
+		if (m->open_rounds && p->kind == PLAN_SAMPLES)
+			factor = ratio(m->c->quantum, preview_leases(m->c, y) * (double)p->epoch);
+		for (uint32_t x = tx * TILE_SIZE; x < p->crop_width && x < (tx + 1) * TILE_SIZE; x++) {
+			size_t at = (size_t)(y % TILE_SIZE) * SLOT_ROW + (size_t)(x % TILE_SIZE) * TILE_CHANNELS;
+			double xyz[3] = {0}, rgb[3];
+			for (uint32_t g = 0; g < p->groups; g++)
+				for (size_t k = 0; k < 3; k++)
+					xyz[k] += sum_at(m, g, tile, at + k);
+			for (int k = 0; k < 3; k++)
+				xyz[k] *= factor;
+			rec709_from_xyz(xyz, rgb);
+			float *out = m->img->rgb + ((size_t)y * p->crop_width + x) * 3;
+			for (int k = 0; k < 3; k++)
+				out[k] = (float)rgb[k];
+		}
+	}
+}
+
+static void pixel_error(struct making *m, size_t tile, size_t at, size_t pixel, double floor_square)
+{
+	uint32_t groups = m->c->plan.groups;
+	double rgb[PLAN_MAX_GROUPS][3], mean[3] = {0};
+	for (uint32_t g = 0; g < groups; g++) {
+		double xyz[3];
+		for (size_t k = 0; k < 3; k++)
+			xyz[k] = sum_at(m, g, tile, at + k) * m->factor[g];
+		rec709_from_xyz(xyz, rgb[g]);
+		for (int k = 0; k < 3; k++)
+			mean[k] += rgb[g][k] / groups;
+	}
+	for (int k = 0; k < 3; k++) {
+		double b = (double)m->img->rgb[pixel * 3 + (size_t)k], weight = 1 / (b * b + floor_square), square = 0;
+		for (uint32_t g = 0; g < groups; g++) {
+			double d = (rgb[g][k] - mean[k]) * (rgb[g][k] - mean[k]);
+			square += d;
+			m->distance[g] += d * weight;
+		}
+		m->img->error[pixel * 3 + (size_t)k] = (float)sqrt(square / groups / (groups - 1));
+	}
+}
+
+static void error_tile(struct making *m, uint32_t tx, uint32_t ty, double floor_square)
+{
+	const struct plan *p = &m->c->plan;
+	size_t tile = (size_t)ty * m->c->tiles_across + tx;
+	for (uint32_t y = ty * TILE_SIZE; y < p->crop_height && y < (ty + 1) * TILE_SIZE; y++)
+		for (uint32_t x = tx * TILE_SIZE; x < p->crop_width && x < (tx + 1) * TILE_SIZE; x++)
+			pixel_error(m, tile, (size_t)(y % TILE_SIZE) * SLOT_ROW + (size_t)(x % TILE_SIZE) * TILE_CHANNELS,
+				    (size_t)y * p->crop_width + x, floor_square);
+}
+
+/* Student's t, 95 % quantile (the upper end of a two-sided 90 % interval), by degrees of freedom. Hill 1970's expansion,
+ * good to 1e-3 from 3 on; 1 and 2 exactly. */
+static double t95(uint32_t n)
+{
+	if (n <= 1)
+		return 6.313751514675;
+	if (n == 2)
+		return 2.919985580353;
+	const double z = 1.6448536269514722, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
+	double v = n;
+	return z + (z3 + z) / (4 * v) + (5 * z5 + 16 * z3 + 3 * z) / (96 * v * v) +
+	       (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * v * v * v);
+}
+
+/*
+ * The estimate: mean over pixels and channels of the squared standard error over B^2 + (0.01 m)^2, with B the pooled image
+ * itself. (B's own noise makes the weight a little too small where B is too bright and too large where it is too dark;
+ * the floor bounds this. It is no concern while errors are small, which is when the target is met.)
+ *
+ * It equals the mean over groups of distance[g], over groups - 1. The interval is Student's on the logarithm of that mean,
+ * the groups' distances being its independent parts (jackknife by groups). Two groups have one distance between them: then
+ * the 5 % point of chi-square with one degree of freedom.
+ */
+static void find_rel_mse(struct making *m)
+{
+	uint32_t groups = m->c->plan.groups;
+	double mean = 0, square = 0;
+	for (uint32_t g = 0; g < groups; g++)
+		mean += m->distance[g] / groups;
+	m->img->rel_mse = m->img->rel_mse_upper = mean / (groups - 1);
+	if (!(mean > 0))
+		return;
+	if (groups == 2) {
+		m->img->rel_mse_upper = m->img->rel_mse / 0.00393214;
+		return;
+	}
+	for (uint32_t g = 0; g < groups; g++)
+		square += (m->distance[g] / mean - 1) * (m->distance[g] / mean - 1);
+	m->img->rel_mse_upper *= exp(t95(groups - 1) * sqrt(square / groups / (groups - 1)));
+}
+
+static void make_error(struct making *m)
+{
+	size_t values = (size_t)m->img->width * m->img->height * 3;
+	double mean = 0;
+	for (size_t i = 0; i < values; i++)
+		mean += (double)m->img->rgb[i];
+	mean /= (double)values;
+	for (uint32_t ty = 0; ty < m->c->tiles_down; ty++)
+		for (uint32_t tx = 0; tx < m->c->tiles_across; tx++)
+			error_tile(m, tx, ty, 1e-4 * mean * mean);
+	for (uint32_t g = 0; g < m->c->plan.groups; g++)
+		m->distance[g] /= (double)values;
+	if (mean != 0) /* a black image has no relative error */
+		find_rel_mse(m);
+}
+
+int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e)
+{
+	const struct plan *p = &c->plan;
+	*img = (struct canvas_image){.width = p->crop_width, .height = p->crop_height, .rel_mse = NAN, .rel_mse_upper = NAN,
+				     .rounds = c->rounds};
+	struct making m = {.c = c, .img = img, .open_rounds = open_rounds, .all = mem_alloc(1, sizeof *m.all)};
+	bool errors = p->groups > 1 && !open_rounds;
+	img->rgb = mem_alloc((size_t)img->width * img->height * 3, sizeof *img->rgb);
+	img->error = errors ? mem_alloc((size_t)img->width * img->height * 3, sizeof *img->error) : NULL;
+	if (!m.all || !img->rgb || (errors && !img->error)) {
+		canvas_image_fini(img);
+		mem_free(m.all);
+		return error_set(e, ENOMEM, "no memory for an image of %ux%u", p->crop_width, p->crop_height);
+	}
+	add_tally(m.all, &c->bootstrap, p->groups, false);
+	add_tally(m.all, &c->prefix, p->groups, true);
+	for (uint32_t i = 0; open_rounds && i < OPEN_ROUNDS; i++)
+		add_tally(m.all, &c->open[i], p->groups, true);
+	find_b(&m);
+	find_factors(&m);
+	for (int i = 0; i < BATCH_COUNTERS; i++)
+		img->counters[i] = m.all->counters[i];
+	for (uint32_t ty = 0; ty < c->tiles_down; ty++)
+		for (uint32_t tx = 0; tx < c->tiles_across; tx++)
+			pool_tile(&m, tx, ty);
+	img->black = true;
+	for (size_t i = 0; i < (size_t)img->width * img->height * 3 && img->black; i++)
+		img->black = img->rgb[i] == 0;
+	if (errors)
+		make_error(&m);
+	mem_free(m.all);
+	return 0;
+}
+
+void canvas_image_fini(struct canvas_image *img)
+{
+	mem_free(img->rgb);
+	mem_free(img->error);
+	img->rgb = img->error = NULL;
+}

@@ -1,0 +1,138 @@
+#include "common/film/merge.h"
+
+#include "common/base/mem.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+struct bootstrap {
+	struct plan plan;
+	float *weights;        /* [bootstrap], in index order */
+	struct batch *batches; /* [group][part]: key, counters and sums only */
+	uint32_t missing;
+};
+
+int bootstrap_new(struct bootstrap **out, const struct plan *p, struct error *e)
+{
+	*out = NULL;
+	struct bootstrap *s = mem_alloc(1, sizeof *s);
+	if (s) {
+		s->plan = *p;
+		s->missing = p->groups * p->parts;
+		s->weights = mem_alloc(p->bootstrap, sizeof *s->weights);
+		s->batches = mem_alloc(s->missing, sizeof *s->batches);
+	}
+	if (!s || !s->weights || !s->batches) {
+		bootstrap_free(s);
+		return error_set(e, ENOMEM, "no memory for %llu bootstrap weights", (unsigned long long)p->bootstrap);
+	}
+	*out = s;
+	return 0;
+}
+
+void bootstrap_free(struct bootstrap *s)
+{
+	if (!s)
+		return;
+	mem_free(s->weights);
+	mem_free(s->batches);
+	mem_free(s);
+}
+
+static struct batch *batch_of(const struct bootstrap *s, uint32_t group, uint32_t part)
+{
+	return s->batches + (size_t)group * s->plan.parts + part;
+}
+
+bool bootstrap_has(const struct bootstrap *s, uint32_t group, uint32_t part)
+{
+	return batch_of(s, group, part)->key.kind == LEASE_BOOTSTRAP;
+}
+
+uint32_t bootstrap_missing(const struct bootstrap *s)
+{
+	return s->missing;
+}
+
+int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
+{
+	const struct lease_key *k = &b->key;
+	struct plan_range r = plan_bootstrap_range(&s->plan, k->group, k->part);
+	assert(k->kind == LEASE_BOOTSTRAP && b->weight_count == r.end - r.begin);
+	if (bootstrap_has(s, k->group, k->part))
+		return error_set(e, EEXIST, "the bootstrap lease is merged already");
+	memcpy(s->weights + r.begin, b->weights, b->weight_count * sizeof *b->weights);
+	struct batch *kept = batch_of(s, k->group, k->part);
+	kept->key = *k;
+	memcpy(kept->counters, b->counters, sizeof kept->counters);
+	kept->independent_sum = b->independent_sum;
+	kept->independent_square = b->independent_square;
+	kept->beyond_sum = b->beyond_sum;
+	s->missing--;
+	return 0;
+}
+
+void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r)
+{
+	assert(s->missing == 0);
+	*r = (struct bootstrap_result){0};
+	struct exact_sum all = {0}, beyond = {0};
+	uint64_t all_count = 0;
+	for (uint32_t g = 0; g < s->plan.groups; g++) {
+		struct exact_sum sum = {0};
+		uint64_t count = 0;
+		for (uint32_t part = 0; part < s->plan.parts; part++) {
+			const struct batch *b = batch_of(s, g, part);
+			exact_sum_add(&sum, b->independent_sum);
+			exact_sum_add(&beyond, b->beyond_sum);
+			count += b->counters[COUNT_INDEPENDENT];
+		}
+		r->b[g] = exact_sum_value(&sum) / (double)count;
+		exact_sum_merge(&all, &sum);
+		all_count += count;
+	}
+	double inside = exact_sum_value(&all), outside = exact_sum_value(&beyond);
+	r->b_pooled = inside / (double)all_count;
+	r->beyond_share = outside > 0 ? outside / (inside + outside) : 0;
+	r->black = !(inside > 0);
+}
+
+bool bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index)
+{
+	assert(s->missing == 0 && s->plan.kind == PLAN_CHAINS);
+	uint64_t first = plan_bootstrap_range(&s->plan, group, 0).begin, count = s->plan.bootstrap / s->plan.groups;
+	return plan_resample(&s->plan, group, s->weights + first, count, plan_resample_u(&s->plan, group),
+			     s->plan.chains / s->plan.groups, index);
+}
+
+void bootstrap_to_canvas(const struct bootstrap *s, struct canvas *c)
+{
+	assert(s->missing == 0);
+	for (uint32_t i = 0; i < s->plan.groups * s->plan.parts; i++) {
+		int rc = canvas_add(c, s->batches + i, NULL);
+		assert(rc == 0 || rc == -EEXIST);
+		(void)rc;
+	}
+}
+
+bool merge_error_due(const struct plan *p, uint64_t rounds)
+{
+	if (!(p->target_error > 0) || rounds == 0)
+		return false;
+	uint64_t due = 1;
+	while (due < rounds)
+		due += due < 4 ? 1 : due / 4;
+	return due == rounds;
+}
+
+enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img)
+{
+	if (img && p->target_error > 0 && sqrt(img->rel_mse_upper) <= p->target_error) /* false for NaN */
+		return MERGE_ERROR;
+	if (rounds >= p->rounds)
+		return MERGE_ROUNDS;
+	if (p->seconds > 0 && rounds > 0 && seconds >= p->seconds)
+		return MERGE_TIME;
+	return MERGE_GOES_ON;
+}

@@ -1,0 +1,36 @@
+/*
+ * What the coordinator and hslt-render do alike: gather the bootstrap in any order, draw the chains' seeds from it, and
+ * decide after complete rounds whether the job is done. Depends on the plan and on batches alone, so that both sides give
+ * the same bits. One thread at a time.
+ */
+#ifndef COMMON_FILM_MERGE_H
+#define COMMON_FILM_MERGE_H
+
+#include "common/film/canvas.h"
+
+struct bootstrap;
+
+int bootstrap_new(struct bootstrap **s, const struct plan *p, struct error *e);
+void bootstrap_free(struct bootstrap *s);
+/* A batch that passed batch_check, of kind LEASE_BOOTSTRAP; copies what it needs. -EEXIST: here already. */
+int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e);
+bool bootstrap_has(const struct bootstrap *s, uint32_t group, uint32_t part);
+uint32_t bootstrap_missing(const struct bootstrap *s); /* leases */
+/* When complete: b by group and pooled, from the weights in index order. */
+void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r);
+/* Seeds of all chains of a group, chains / groups of them: the k-th belongs to chain group + groups * k, and a lease's
+ * are those of plan_chain_range(). false: the group's bootstrap is black and its chains are dead. */
+bool bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index);
+/* Adds the independent sums of all batches to a new canvas. */
+void bootstrap_to_canvas(const struct bootstrap *s, struct canvas *c);
+
+/* Which bound ended the job. Time and error are looked at after complete rounds only. */
+enum merge_end { MERGE_GOES_ON, MERGE_ROUNDS, MERGE_TIME, MERGE_ERROR };
+
+/* Rounds at which the error is looked at: a geometric ladder (1 2 3 4 5 6 7 8 10 12 15 ...), a function of the count alone,
+ * since each look costs an image and tests the target once more. */
+bool merge_error_due(const struct plan *p, uint64_t rounds);
+/* img: of the complete rounds, or NULL when the error is not due. */
+enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img);
+
+#endif

@@ -1,0 +1,333 @@
+#include "common/plan/plan.h"
+
+#include <Random123/threefry.h>
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+typedef unsigned __int128 wide;
+
+enum {
+	DEFAULT_GROUPS = 16,
+	DEFAULT_PARTS = 4,
+	DEFAULT_CHAINS = 1024,
+	DEFAULT_BOOTSTRAP = 1000000,
+	LEAST_BOOTSTRAP = 16384,
+	MUTATIONS_PER_CHAIN = 2048, /* fewer chains before chains become shorter than this */
+	AIM_ROUNDS = 8,
+	LEASE_SAMPLES_MOST = 1 << 20, /* chains: mutations in one lease */
+	LEASE_SAMPLES_OPEN = 1 << 18, /* chains without a bound on mutations */
+	STRIP_SAMPLES_MOST = 1 << 17, /* samples in one lease */
+	STREAM_RESAMPLING = 5,        /* RNG_RESAMPLING of the renderer's random numbers */
+};
+#define TOTAL_MOST (UINT64_C(1) << 62)
+#define LEASE_MOST (UINT64_C(1) << 40)
+
+static wide wide_ceil_div(wide a, wide b)
+{
+	return (a + b - 1) / b;
+}
+
+static uint64_t ceil_div(uint64_t a, uint64_t b)
+{
+	return a / b + (a % b != 0);
+}
+
+static uint64_t clamp(uint64_t x, uint64_t low, uint64_t high)
+{
+	return x < low ? low : x > high ? high : x;
+}
+
+static uint64_t crop_pixels(const struct plan *p)
+{
+	return (uint64_t)p->crop_width * p->crop_height;
+}
+
+uint64_t plan_extended_pixels(const struct plan *p)
+{
+	return ((uint64_t)p->crop_width + 2 * (uint64_t)p->border) * ((uint64_t)p->crop_height + 2 * (uint64_t)p->border);
+}
+
+uint64_t plan_round_mutations(const struct plan *p)
+{
+	if (p->kind == PLAN_CHAINS)
+		return p->chains * p->epoch;
+	return p->groups * p->epoch * plan_extended_pixels(p);
+}
+
+static struct plan_range split(uint64_t total, uint32_t part, uint32_t parts)
+{
+	return (struct plan_range){(uint64_t)((wide)total * part / parts), (uint64_t)((wide)total * (part + 1) / parts)};
+}
+
+struct plan_range plan_bootstrap_range(const struct plan *p, uint32_t group, uint32_t part)
+{
+	uint64_t n = p->bootstrap / ((uint64_t)p->groups * p->parts);
+	uint64_t lease = (uint64_t)group * p->parts + part;
+	return (struct plan_range){lease * n, (lease + 1) * n};
+}
+
+struct plan_range plan_chain_range(const struct plan *p, uint32_t part)
+{
+	return split(p->chains / p->groups, part, p->parts);
+}
+
+struct plan_range plan_row_range(const struct plan *p, uint32_t part)
+{
+	return split((uint64_t)p->crop_height + 2 * (uint64_t)p->border, part, p->parts);
+}
+
+/* ---- making a plan */
+
+static int check_film(const struct plan *p, struct error *e)
+{
+	if (p->width < 1 || p->height < 1 || p->width > PLAN_MAX_SIZE || p->height > PLAN_MAX_SIZE)
+		return error_set(e, EINVAL, "the film is %ux%u pixels; each side must be 1 to %d", p->width, p->height,
+				 PLAN_MAX_SIZE);
+	if (p->crop_width < 1 || p->crop_height < 1 || p->crop_x >= p->width || p->crop_y >= p->height ||
+	    p->crop_width > p->width - p->crop_x || p->crop_height > p->height - p->crop_y)
+		return error_set(e, EINVAL, "the crop %u,%u,%u,%u (x,y,width,height) does not lie inside the film of %ux%u",
+				 p->crop_x, p->crop_y, p->crop_width, p->crop_height, p->width, p->height);
+	if (crop_pixels(p) > PLAN_MAX_PIXELS)
+		return error_set(e, EINVAL, "the image has %llu pixels; at most %d are supported (crop it)",
+				 (unsigned long long)crop_pixels(p), PLAN_MAX_PIXELS);
+	if (p->border > PLAN_MAX_BORDER)
+		return error_set(e, EINVAL, "the filter reaches %u pixels beyond the image; at most %d", p->border,
+				 PLAN_MAX_BORDER);
+	return 0;
+}
+
+/* 0: no bound. Else the samples or mutations asked for, the least of the bounds given. */
+static int asked_total(const struct plan_request *r, const struct plan *p, uint64_t *total, struct error *e)
+{
+	*total = 0;
+	if (r->spp) {
+		wide n = (wide)r->spp * crop_pixels(p);
+		if (n > TOTAL_MOST)
+			return error_set(e, EINVAL, "%llu samples per pixel are more than can be counted",
+					 (unsigned long long)r->spp);
+		*total = (uint64_t)n;
+	}
+	if (r->mutations > TOTAL_MOST)
+		return error_set(e, EINVAL, "%llu mutations are more than can be counted", (unsigned long long)r->mutations);
+	if (r->mutations && (!*total || r->mutations < *total))
+		*total = r->mutations;
+	return 0;
+}
+
+static uint32_t power_of_two_below(uint64_t x)
+{
+	uint32_t p = 1;
+	while (p <= x / 2 && p < 1u << 31)
+		p *= 2;
+	return p;
+}
+
+static int make_chains(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
+{
+	p->groups = r->groups ? r->groups : DEFAULT_GROUPS;
+	uint64_t chains = r->chains;
+	if (!chains)
+		chains = total ? power_of_two_below(clamp(total / MUTATIONS_PER_CHAIN, 16, DEFAULT_CHAINS)) : DEFAULT_CHAINS;
+	uint64_t per_group = ceil_div(chains, p->groups);
+	p->parts = (uint32_t)clamp(per_group, 1, DEFAULT_PARTS);
+	chains = ceil_div(chains, (uint64_t)p->groups * p->parts) * p->groups * p->parts;
+	if (chains > PLAN_MAX_CHAINS)
+		return error_set(e, EINVAL, "%llu chains; at most %d", (unsigned long long)chains, PLAN_MAX_CHAINS);
+	p->chains = (uint32_t)chains;
+	uint64_t per_lease = chains / ((uint64_t)p->groups * p->parts);
+	p->epoch = r->epoch;
+	if (!p->epoch && total) {
+		uint64_t longest = LEASE_SAMPLES_MOST / per_lease;
+		p->epoch = clamp(ceil_div(total, chains * AIM_ROUNDS), 1, longest ? longest : 1);
+	} else if (!p->epoch) {
+		p->epoch = clamp(LEASE_SAMPLES_OPEN / per_lease, 1, LEASE_SAMPLES_OPEN);
+	}
+	if (p->epoch > LEASE_MOST / per_lease)
+		return error_set(e, EINVAL, "an epoch of %llu mutations is too long", (unsigned long long)p->epoch);
+	p->rounds = total ? ceil_div(total, chains * p->epoch) : UINT64_MAX;
+	return 0;
+}
+
+static int make_samples(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
+{
+	uint64_t rows = (uint64_t)p->crop_height + 2 * (uint64_t)p->border;
+	uint64_t groups = r->groups ? r->groups : DEFAULT_GROUPS;
+	p->parts = (uint32_t)clamp(rows, 1, DEFAULT_PARTS);
+	uint64_t spp = ceil_div(total, crop_pixels(p)); /* 0: no bound */
+	uint64_t k = r->epoch;
+	if (!k) {
+		k = clamp((uint64_t)STRIP_SAMPLES_MOST * p->parts / plan_extended_pixels(p), 1, STRIP_SAMPLES_MOST);
+		if (spp)
+			k = clamp(ceil_div(spp, groups * AIM_ROUNDS), 1, k);
+	}
+	if (k > LEASE_MOST / plan_extended_pixels(p))
+		return error_set(e, EINVAL, "an epoch of %llu samples per pixel is too long", (unsigned long long)k);
+	p->rounds = UINT64_MAX;
+	if (spp) {
+		p->rounds = (uint64_t)wide_ceil_div(spp, (wide)groups * k);
+		if (!r->epoch)
+			k = (uint64_t)wide_ceil_div(spp, (wide)groups * p->rounds);
+		if (!r->groups)
+			groups = (uint64_t)wide_ceil_div(spp, (wide)p->rounds * k);
+	}
+	p->groups = (uint32_t)groups;
+	p->epoch = k;
+	p->chains = 0;
+	return 0;
+}
+
+static int make_bootstrap(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
+{
+	uint64_t n = r->bootstrap;
+	if (!n && p->kind == PLAN_SAMPLES)
+		n = LEAST_BOOTSTRAP;
+	else if (!n)
+		n = total ? clamp(total / 8, LEAST_BOOTSTRAP, DEFAULT_BOOTSTRAP) : DEFAULT_BOOTSTRAP;
+	if (n > PLAN_MAX_BOOTSTRAP / 2)
+		return error_set(e, EINVAL, "%llu bootstrap samples; at most %d", (unsigned long long)n,
+				 PLAN_MAX_BOOTSTRAP / 2);
+	uint64_t leases = (uint64_t)p->groups * p->parts;
+	p->bootstrap = ceil_div(n, leases) * leases;
+	return 0;
+}
+
+int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
+{
+	*p = (struct plan){
+		.kind = r->kind,
+		.width = r->width,
+		.height = r->height,
+		.crop_x = r->crop_x,
+		.crop_y = r->crop_y,
+		.crop_width = r->crop_width,
+		.crop_height = r->crop_height,
+		.border = r->border,
+		.seed = r->seed,
+		.seconds = r->seconds,
+		.target_error = r->target_error,
+		.min_depth = r->min_depth,
+		.max_depth = r->max_depth,
+	};
+	memcpy(p->integrator, r->integrator, sizeof p->integrator);
+	if (r->crop_width == 0) {
+		p->crop_x = p->crop_y = 0;
+		p->crop_width = r->width;
+		p->crop_height = r->height;
+	}
+	uint64_t total = 0;
+	int rc = check_film(p, e);
+	if (rc == 0 && r->groups > PLAN_MAX_GROUPS)
+		rc = error_set(e, EINVAL, "%u groups; at most %d", r->groups, PLAN_MAX_GROUPS);
+	if (rc == 0)
+		rc = asked_total(r, p, &total, e);
+	if (rc == 0 && !total && !(r->seconds > 0) && !(r->target_error > 0))
+		rc = error_set(e, EINVAL, "nothing says when to end: give samples per pixel, mutations, seconds or an error");
+	if (rc == 0)
+		rc = r->kind == PLAN_CHAINS ? make_chains(r, p, total, e) : make_samples(r, p, total, e);
+	if (rc == 0)
+		rc = make_bootstrap(r, p, total, e);
+	return rc ? rc : plan_check(p, e);
+}
+
+/* ---- checking a plan */
+
+static int check_integrator(const struct plan *p, struct error *e)
+{
+	size_t n = strnlen(p->integrator, sizeof p->integrator);
+	if (n == 0 || n == sizeof p->integrator)
+		return error_set(e, EINVAL, "the integrator's name is empty or too long");
+	if (strspn(p->integrator, "abcdefghijklmnopqrstuvwxyz0123456789_-") != n)
+		return error_set(e, EINVAL, "the integrator's name has characters that no integrator's name has");
+	return 0;
+}
+
+static int check_cut(const struct plan *p, struct error *e)
+{
+	if (p->kind != PLAN_CHAINS && p->kind != PLAN_SAMPLES)
+		return error_set(e, EINVAL, "unknown kind of plan %d", (int)p->kind);
+	if (p->groups < 1 || p->groups > PLAN_MAX_GROUPS || p->parts < 1 || p->parts > PLAN_MAX_PARTS)
+		return error_set(e, EINVAL, "%u groups of %u parts; 1 to %d of 1 to %d", p->groups, p->parts, PLAN_MAX_GROUPS,
+				 PLAN_MAX_PARTS);
+	uint64_t leases = (uint64_t)p->groups * p->parts;
+	if (p->bootstrap < 1 || p->bootstrap > PLAN_MAX_BOOTSTRAP || p->bootstrap % leases)
+		return error_set(e, EINVAL, "%llu bootstrap samples are not a multiple of %llu up to %d",
+				 (unsigned long long)p->bootstrap, (unsigned long long)leases, PLAN_MAX_BOOTSTRAP);
+	uint64_t lease_unit;
+	if (p->kind == PLAN_CHAINS) {
+		if (p->chains < 1 || p->chains > PLAN_MAX_CHAINS || p->chains % leases)
+			return error_set(e, EINVAL, "%u chains are not a multiple of %llu up to %d", p->chains,
+					 (unsigned long long)leases, PLAN_MAX_CHAINS);
+		lease_unit = p->chains / leases;
+	} else {
+		if (p->chains)
+			return error_set(e, EINVAL, "a plan without chains names %u of them", p->chains);
+		if (p->parts > p->crop_height + 2 * p->border)
+			return error_set(e, EINVAL, "%u parts of %u rows", p->parts, p->crop_height + 2 * p->border);
+		lease_unit = plan_extended_pixels(p);
+	}
+	if (p->epoch < 1 || p->epoch > LEASE_MOST / lease_unit)
+		return error_set(e, EINVAL, "an epoch of %llu is not possible", (unsigned long long)p->epoch);
+	return 0;
+}
+
+static int check_end(const struct plan *p, struct error *e)
+{
+	if (!isfinite(p->seconds) || p->seconds < 0 || !isfinite(p->target_error) || p->target_error < 0)
+		return error_set(e, EINVAL, "the time and the target error must be finite and not negative");
+	if (p->rounds == UINT64_MAX) {
+		if (!(p->seconds > 0) && !(p->target_error > 0))
+			return error_set(e, EINVAL, "nothing says when the plan ends");
+	} else if (p->rounds < 1 || (wide)p->rounds * plan_round_mutations(p) > TOTAL_MOST * 2) {
+		return error_set(e, EINVAL, "%llu rounds are not possible", (unsigned long long)p->rounds);
+	}
+	if (p->max_depth < 1 || p->max_depth > PLAN_MAX_DEPTH || p->min_depth > p->max_depth)
+		return error_set(e, EINVAL, "path lengths from %u to %u edges; at most %d", p->min_depth, p->max_depth,
+				 PLAN_MAX_DEPTH);
+	return 0;
+}
+
+int plan_check(const struct plan *p, struct error *e)
+{
+	int rc = check_integrator(p, e);
+	if (rc == 0)
+		rc = check_film(p, e);
+	if (rc == 0)
+		rc = check_cut(p, e);
+	return rc ? rc : check_end(p, e);
+}
+
+/* ---- seeds */
+
+double plan_resample_u(const struct plan *p, uint32_t group)
+{
+	threefry4x64_key_t key = {{p->seed, STREAM_RESAMPLING, 0, 0}};
+	threefry4x64_ctr_t counter = {{group, 0, 0, 0}};
+	return (double)(threefry4x64(counter, key).v[0] >> 11) * 0x1p-53;
+}
+
+bool plan_resample(const struct plan *p, uint32_t group, const float *weight, uint64_t weight_count, double u,
+		   uint32_t count, uint64_t *index)
+{
+	double total = 0;
+	uint64_t last = 0;
+	for (uint64_t i = 0; i < weight_count; i++) {
+		total += (double)weight[i];
+		if (weight[i] > 0)
+			last = i;
+	}
+	if (!(total > 0))
+		return false;
+	uint64_t first = plan_bootstrap_range(p, group, 0).begin;
+	double sum = (double)weight[0];
+	uint64_t i = 0;
+	for (uint32_t k = 0; k < count; k++) {
+		double at = ((double)k + u) / count * total;
+		/* `last` stands for the rounding of `at` up to the total; an index of weight 0 is never chosen. */
+		while (i < last && sum <= at)
+			sum += (double)weight[++i];
+		index[k] = first + i;
+	}
+	return true;
+}

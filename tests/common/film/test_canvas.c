@@ -1,0 +1,418 @@
+#include "common/film/canvas.h"
+
+#include "common/base/mem.h"
+#include "common/film/merge.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <setjmp.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+static uint64_t state;
+
+static uint64_t next(void)
+{
+	state ^= state << 13;
+	state ^= state >> 7;
+	return state ^= state << 17;
+}
+
+static double uniform(void)
+{
+	return (double)(next() >> 11) * 0x1p-53;
+}
+
+static double normal(void)
+{
+	return sqrt(-2 * log(1 - uniform())) * cos(6.283185307179586 * uniform());
+}
+
+static struct plan make_plan(enum plan_kind kind, uint32_t width, uint32_t height, uint32_t groups, uint32_t parts)
+{
+	struct plan p = {.integrator = "path", .kind = kind, .width = width + 3, .height = height + 2, .crop_x = 3, .crop_y = 2,
+			 .crop_width = width, .crop_height = height, .groups = groups, .parts = parts, .epoch = 4,
+			 .rounds = UINT64_MAX, .seconds = 1, .max_depth = 8};
+	p.bootstrap = (uint64_t)groups * parts * 8;
+	if (kind == PLAN_CHAINS)
+		p.chains = groups * parts * 2;
+	return p;
+}
+
+/* A batch whose tiles are all `tiles` leading ones of the film, filled by `value`. */
+static struct batch make_batch(const struct plan *p, uint64_t epoch, uint32_t group, uint32_t part, uint32_t tiles,
+			       float (*value)(void))
+{
+	struct batch b = {.key = {1, LEASE_RENDER, group, part, epoch}, .tile_count = tiles};
+	uint32_t across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE;
+	struct plan_range rows = plan_row_range(p, part);
+	b.tiles = mem_alloc(tiles, sizeof *b.tiles);
+	for (uint32_t i = 0; i < tiles; i++) {
+		uint32_t x = i % across * TILE_SIZE, y = i / across * TILE_SIZE;
+		uint32_t w = p->crop_width - x < TILE_SIZE ? p->crop_width - x : TILE_SIZE;
+		uint32_t h = p->crop_height - y < TILE_SIZE ? p->crop_height - y : TILE_SIZE;
+		b.tiles[i] = (struct tile){p->crop_x + x, p->crop_y + y, w, h, mem_alloc((size_t)w * h * 3, sizeof(float))};
+		for (size_t k = 0; k < (size_t)w * h * 3; k++)
+			b.tiles[i].xyz[k] = value();
+	}
+	b.counters[COUNT_SAMPLES] = (rows.end - rows.begin) * p->crop_width * p->epoch;
+	if (p->kind == PLAN_CHAINS) {
+		b.state_count = 2;
+		b.states = mem_alloc(2, sizeof *b.states);
+		for (int i = 0; i < 2; i++) {
+			b.states[i].bytes = mem_alloc(8, 1);
+			b.states[i].size = 8;
+		}
+		b.counters[COUNT_SAMPLES] = 2 * p->epoch;
+		b.counters[COUNT_INDEPENDENT] = p->epoch;
+		b.independent_sum = uniform() * (double)p->epoch;
+	}
+	return b;
+}
+
+static float wide_value(void)
+{
+	double exponent = -30 + 42 * uniform(); /* 1e-30 .. 1e12 */
+	return (float)((next() & 7 ? 1 : -1) * pow(10, exponent));
+}
+
+static float one(void)
+{
+	return 1;
+}
+
+static void shuffle(uint32_t *order, uint32_t n)
+{
+	for (uint32_t i = n - 1; i > 0; i--) {
+		uint32_t j = (uint32_t)(next() % (i + 1)), t = order[i];
+		order[i] = order[j];
+		order[j] = t;
+	}
+}
+
+static int scaled(int n)
+{
+	const char *s = getenv("HSLT_TEST_SCALE");
+	int scale = s ? atoi(s) : 1;
+	return scale > 1 ? n / scale : n;
+}
+
+static void bits_do_not_depend_on_the_order(void **unused)
+{
+	(void)unused;
+	/* 64 leases a round; rounds 2r and 2r+1 are open at the same time and arrive mixed. 10048 batches in all. */
+	enum { LEASES = 64 };
+	struct plan p = make_plan(PLAN_SAMPLES, 5, 4, 16, 4);
+	struct canvas_image first = {0};
+	for (int order_seed = 0; order_seed < 3; order_seed++) {
+		struct canvas *c;
+		assert_int_equal(canvas_new(&c, &p, -8, order_seed == 2 ? "/tmp" : NULL, NULL), 0);
+		for (int pair = 0; pair < scaled(79); pair++) {
+			struct batch batches[2 * LEASES];
+			uint32_t order[2 * LEASES];
+			for (uint32_t i = 0; i < 2 * LEASES; i++) {
+				state = 1000003u * (uint32_t)(pair * 2 * LEASES + (int)i + 1);
+				batches[i] = make_batch(&p, (uint64_t)pair * 2 + i / LEASES, i % 16, i / 16 % 4, 1, wide_value);
+				order[i] = i;
+			}
+			state = (uint64_t)(77 + order_seed * 1000 + pair);
+			if (order_seed)
+				shuffle(order, 2 * LEASES);
+			for (uint32_t i = 0; i < 2 * LEASES; i++) {
+				struct error e;
+				if (canvas_add(c, &batches[order[i]], &e) != 0)
+					fail_msg("%s", e.text);
+			}
+			for (uint32_t i = 0; i < 2 * LEASES; i++)
+				batch_fini(&batches[i]);
+			assert_int_equal(canvas_rounds(c), (uint64_t)pair * 2 + 2);
+		}
+		struct canvas_image img;
+		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		if (order_seed == 0) {
+			first = img;
+		} else {
+			assert_memory_equal(img.rgb, first.rgb, 5 * 4 * 3 * sizeof(float));
+			assert_memory_equal(img.error, first.error, 5 * 4 * 3 * sizeof(float));
+			assert_true(img.rel_mse == first.rel_mse && img.rel_mse_upper == first.rel_mse_upper);
+			canvas_image_fini(&img);
+		}
+		canvas_free(c);
+	}
+	canvas_image_fini(&first);
+}
+
+static float huge(void)
+{
+	return 1e12f;
+}
+
+static void a_sum_beyond_the_grid_adds_nothing(void **unused)
+{
+	(void)unused;
+	struct plan p = make_plan(PLAN_SAMPLES, 100, 70, 1, 1);
+	struct canvas *c;
+	struct canvas_image before, after;
+	assert_int_equal(canvas_new(&c, &p, -20, NULL, NULL), 0); /* 1e12 x 2^20 = 1.05e18 = 2^59.9 */
+	struct batch b = make_batch(&p, 0, 0, 0, 4, one);
+	assert_int_equal(canvas_add(c, &b, NULL), 0);
+	batch_fini(&b);
+	uint64_t rounds = 1;
+	int rc = 0;
+	assert_int_equal(canvas_image(c, false, &before, NULL), 0);
+	while (rc == 0 && rounds < 20) {
+		canvas_image_fini(&before);
+		assert_int_equal(canvas_image(c, false, &before, NULL), 0);
+		b = make_batch(&p, rounds, 0, 0, 4, one);
+		b.tiles[2].xyz[100] = huge();
+		rc = canvas_add(c, &b, NULL);
+		rounds += rc == 0;
+		batch_fini(&b);
+	}
+	assert_int_equal(rc, -ERANGE);
+	assert_int_equal(rounds, 5); /* four of them fit below 2^62 */
+	assert_int_equal(canvas_rounds(c), rounds);
+	assert_int_equal(canvas_image(c, false, &after, NULL), 0);
+	assert_memory_equal(before.rgb, after.rgb, 100 * 70 * 3 * sizeof(float));
+	/* The same lease with values that fit is still welcome, and so the bits are those of a run without the bad one. */
+	b = make_batch(&p, rounds, 0, 0, 4, one);
+	assert_int_equal(canvas_add(c, &b, NULL), 0);
+	batch_fini(&b);
+	b = make_batch(&p, rounds + 1, 0, 0, 1, one);
+	b.tiles[0].xyz[7] = 3e38f;
+	assert_int_equal(canvas_add(c, &b, NULL), -ERANGE);
+	batch_fini(&b);
+	canvas_image_fini(&before);
+	canvas_image_fini(&after);
+	canvas_free(c);
+}
+
+static void only_complete_rounds_are_published(void **unused)
+{
+	(void)unused;
+	struct plan p = make_plan(PLAN_SAMPLES, 8, 8, 2, 2);
+	struct canvas *c;
+	struct canvas_image img;
+	assert_int_equal(canvas_new(&c, &p, -20, NULL, NULL), 0);
+	/* All of round 1 and all but one lease of round 0. */
+	for (uint32_t i = 0; i < 7; i++) {
+		struct batch b = make_batch(&p, 1 - (i >= 4), i % 2, i / 2 % 2, 1, one);
+		b.counters[COUNT_NAN] = 1;
+		assert_int_equal(canvas_add(c, &b, NULL), 0);
+		assert_int_equal(canvas_add(c, &b, NULL), -EEXIST);
+		assert_true(canvas_has(c, &b.key));
+		batch_fini(&b);
+	}
+	assert_int_equal(canvas_rounds(c), 0);
+	assert_int_equal(canvas_merged(c), 7);
+	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_true(img.black && img.counters[COUNT_NAN] == 0 && isnan(img.rel_mse));
+	canvas_image_fini(&img);
+	assert_int_equal(canvas_image(c, true, &img, NULL), 0);
+	assert_false(img.black);
+	canvas_image_fini(&img);
+	struct batch b = make_batch(&p, 2, 0, 0, 1, one);
+	assert_int_equal(canvas_add(c, &b, NULL), -EAGAIN);
+	batch_fini(&b);
+	b = make_batch(&p, 0, 1, 1, 1, one); /* the last one closes both */
+	assert_int_equal(canvas_add(c, &b, NULL), 0);
+	assert_true(canvas_has(c, &b.key));
+	b.key.epoch = 2;
+	assert_false(canvas_has(c, &b.key));
+	batch_fini(&b);
+	assert_int_equal(canvas_rounds(c), 2);
+	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_int_equal(img.counters[COUNT_NAN], 7);
+	/* Sums of 1 from two parts, 4 samples a pixel and round: XYZ = 0.5, whose Y is 0.5. */
+	double y = 0.2126729 * (double)img.rgb[0] + 0.7151522 * (double)img.rgb[1] + 0.0721750 * (double)img.rgb[2];
+	assert_true(fabs(y - 0.5) < 1e-6);
+	canvas_image_fini(&img);
+	canvas_free(c);
+}
+
+/* Chains: the group's image by the group's b, the published one by the pooled b, independent samples of the bootstrap and of
+ * complete rounds only. */
+static void chains_are_scaled_by_b(void **unused)
+{
+	(void)unused;
+	struct plan p = make_plan(PLAN_CHAINS, 4, 4, 2, 1);
+	struct canvas *c;
+	struct canvas_image img;
+	assert_int_equal(canvas_new(&c, &p, canvas_grid_exponent(&p, 1, 1), NULL, NULL), 0);
+	for (uint32_t g = 0; g < 2; g++) {
+		struct batch boot = {.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .independent_sum = g ? 24 : 8, .beyond_sum = 8};
+		boot.counters[COUNT_INDEPENDENT] = 8;
+		boot.counters[COUNT_SAMPLES] = 8;
+		assert_int_equal(canvas_add(c, &boot, NULL), 0);
+		assert_int_equal(canvas_add(c, &boot, NULL), -EEXIST);
+		struct batch b = make_batch(&p, 0, g, 0, 1, one);
+		b.counters[COUNT_INDEPENDENT] = 8;
+		b.independent_sum = g ? 40 : 8;
+		assert_int_equal(canvas_add(c, &b, NULL), 0);
+		batch_fini(&b);
+	}
+	/* Of an open round: counts nothing. */
+	struct batch early = make_batch(&p, 1, 0, 0, 1, one);
+	early.independent_sum = 1e9;
+	assert_int_equal(canvas_add(c, &early, NULL), 0);
+	batch_fini(&early);
+	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	/* b: group 0 16/16, group 1 64/16, pooled 80/32; standard error |4 - 1| / 2. 8 mutations a group. */
+	assert_true(img.b == 2.5 && fabs(img.b_error - 1.5) < 1e-12);
+	assert_int_equal(img.samples, 16);
+	assert_true(fabs(img.beyond_share - 16.0 / 48) < 1e-12);
+	double y = 0.2126729 * (double)img.rgb[0] + 0.7151522 * (double)img.rgb[1] + 0.0721750 * (double)img.rgb[2];
+	assert_true(fabs(y - 2.5 * 2 / 16) < 1e-6);
+	/* Group images are 1/8 and 4/8 in each of X, Y, Z: error 3/16 of the white of XYZ (1,1,1). */
+	double white = 3.2404541621141054 - 1.5371385127977166 - 0.4985314095560162;
+	assert_true(fabs((double)img.error[0] / (3.0 / 16 * white) - 1) < 1e-6);
+	canvas_image_fini(&img);
+	canvas_free(c);
+}
+
+static void grids_fit_their_values(void **unused)
+{
+	(void)unused;
+	struct plan p = make_plan(PLAN_SAMPLES, 10, 10, 16, 4);
+	/* b = 100 over 100 pixels, 4 samples: sums of 4, in units of 2^-28 of that (or half) */
+	assert_int_equal(canvas_grid_exponent(&p, 100, 0), 3 - 28);
+	assert_int_equal(canvas_grid_exponent(&p, 0, 1), 1 - 40);
+	assert_int_equal(canvas_grid_exponent(&p, 0, 0), -32);
+	assert_int_equal(canvas_grid_exponent(&p, NAN, INFINITY), -32);
+	assert_int_equal(canvas_grid_exponent(&p, 1e-300, 0), -900);
+	p = make_plan(PLAN_CHAINS, 10, 10, 16, 4);
+	assert_int_equal(canvas_grid_exponent(&p, 1e9, 1e9), -32);
+}
+
+static double group_offset; /* shared by all pixels of a group: an error of b looks so */
+static double pixel_noise;
+
+static float noisy(void)
+{
+	return (float)(4 * (1 + group_offset + pixel_noise * normal()));
+}
+
+/* 400 images with known true relMSE, 16 groups: the upper end must lie above the truth in 95 % of the runs, the estimate's
+ * mean must be the truth. Level: fewer than 89 % (binomial, p = 0.95, n = 400) has probability below 1e-6; the mean of 400
+ * estimates has a standard error of at most 1.8 %, so 10 % off has a probability below 1e-7. Power: coverage of 80 % (an
+ * interval forgotten gives 50 %) is found with certainty. Correlated errors are the hard case: there Student's interval on
+ * the logarithm covers about 93 %. */
+static void estimated_error_covers_the_truth(void **unused)
+{
+	(void)unused;
+	struct plan p = make_plan(PLAN_SAMPLES, 6, 6, 16, 1);
+	for (int correlated = 0; correlated < 2; correlated++) {
+		double each = 0.08, truth = 0, mean_estimate = 0;
+		int covered = 0;
+		enum { RUNS = 400 };
+		/* The mean of 16 groups has a variance of each^2/16 per pixel, relative to B = 1, in X, Y and Z alike when
+		 * correlated; the expected relMSE is compared with (rgb - truth)^2 realised over the runs. */
+		for (int run = 0; run < RUNS; run++) {
+			struct canvas *c;
+			struct canvas_image img;
+			state = (uint64_t)(run * 2 + correlated + 12345);
+			assert_int_equal(canvas_new(&c, &p, -28, NULL, NULL), 0);
+			for (uint32_t g = 0; g < 16; g++) {
+				group_offset = correlated ? each * normal() : 0;
+				pixel_noise = correlated ? 0 : each;
+				struct batch b = make_batch(&p, 0, g, 0, 1, noisy);
+				assert_int_equal(canvas_add(c, &b, NULL), 0);
+				batch_fini(&b);
+			}
+			assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+			double exact[3] = {3.2404541621141054 - 1.5371385127977166 - 0.4985314095560162,
+					   -0.9692660305051868 + 1.8760108454466942 + 0.0415560175303498,
+					   0.0556434309591147 - 0.2040259135167538 + 1.0572251882231791};
+			double variance = 0;
+			const double m[3][3] = {{3.2404541621141054, 1.5371385127977166, 0.4985314095560162},
+						{0.9692660305051868, 1.8760108454466942, 0.0415560175303498},
+						{0.0556434309591147, 0.2040259135167538, 1.0572251882231791}};
+			for (int k = 0; k < 3; k++) {
+				double square = correlated ? exact[k] * exact[k]
+							   : m[k][0] * m[k][0] + m[k][1] * m[k][1] + m[k][2] * m[k][2];
+				variance += each * each / 16 * square / (exact[k] * exact[k]) / 3;
+			}
+			truth = variance;
+			covered += img.rel_mse_upper >= truth;
+			mean_estimate += img.rel_mse / RUNS;
+			canvas_image_fini(&img);
+			canvas_free(c);
+		}
+		print_message("correlated %d: covered %d of %d, mean estimate / truth %.4f\n", correlated, covered, RUNS,
+			      mean_estimate / truth);
+		assert_true(covered >= 356);
+		assert_true(fabs(mean_estimate / truth - 1) < 0.1);
+	}
+}
+
+static void black_canvas_has_no_error(void **unused)
+{
+	(void)unused;
+	struct plan p = make_plan(PLAN_CHAINS, 4, 4, 2, 1);
+	struct canvas *c;
+	struct canvas_image img;
+	assert_int_equal(canvas_new(&c, &p, -32, NULL, NULL), 0);
+	for (uint32_t g = 0; g < 2; g++) {
+		struct batch b = make_batch(&p, 0, g, 0, 0, one);
+		b.independent_sum = 0;
+		b.counters[COUNT_SAMPLES] = 0;
+		assert_int_equal(canvas_add(c, &b, NULL), 0);
+		batch_fini(&b);
+	}
+	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_true(img.black && img.b == 0 && isnan(img.rel_mse) && img.rounds == 1);
+	struct plan with_target = p;
+	with_target.target_error = 0.1;
+	assert_int_equal(merge_end_of(&with_target, 1, 0, &img), MERGE_GOES_ON);
+	canvas_image_fini(&img);
+	canvas_free(c);
+}
+
+static void failing_allocations_leak_nothing(void **unused)
+{
+	(void)unused;
+	struct plan p = make_plan(PLAN_SAMPLES, 8, 8, 2, 2);
+	int rc = -1;
+	for (long n = 0; rc != 0; n++) {
+		struct canvas *c;
+		struct canvas_image img;
+		mem_fail_after(n);
+		rc = canvas_new(&c, &p, -20, NULL, NULL);
+		if (rc == 0) {
+			rc = canvas_image(c, false, &img, NULL);
+			if (rc == 0)
+				canvas_image_fini(&img);
+		}
+		mem_fail_after(-1);
+		canvas_free(c);
+	}
+}
+
+static void a_folder_that_is_not_there_is_an_error(void **unused)
+{
+	(void)unused;
+	struct plan p = make_plan(PLAN_SAMPLES, 8, 8, 2, 2);
+	struct canvas *c;
+	struct error e;
+	assert_int_equal(canvas_new(&c, &p, -20, "/nonexistent/folder", &e), -ENOENT);
+	assert_null(c);
+	assert_non_null(strstr(e.text, "/nonexistent/folder"));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(bits_do_not_depend_on_the_order),
+		cmocka_unit_test(a_sum_beyond_the_grid_adds_nothing),
+		cmocka_unit_test(only_complete_rounds_are_published),
+		cmocka_unit_test(chains_are_scaled_by_b),
+		cmocka_unit_test(grids_fit_their_values),
+		cmocka_unit_test(estimated_error_covers_the_truth),
+		cmocka_unit_test(black_canvas_has_no_error),
+		cmocka_unit_test(failing_allocations_leak_nothing),
+		cmocka_unit_test(a_folder_that_is_not_there_is_an_error),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
