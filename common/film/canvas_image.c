@@ -165,18 +165,11 @@ static void error_tile(struct making *m, uint32_t tx, uint32_t ty, double floor_
 				    (size_t)y * p->crop_width + x, floor_square);
 }
 
-/* Student's t, 95 % quantile (the upper end of a two-sided 90 % interval), by degrees of freedom. Hill 1970's expansion,
- * good to 1e-3 from 3 on; 1 and 2 exactly. */
-static double t95(uint32_t n)
+/* 5 % quantile of chi-square (Wilson and Hilferty 1931): the lower end of a two-sided 90 % interval. */
+static double chi_square_5(double degrees)
 {
-	if (n <= 1)
-		return 6.313751514675;
-	if (n == 2)
-		return 2.919985580353;
-	const double z = 1.6448536269514722, z3 = z * z * z, z5 = z3 * z * z, z7 = z5 * z * z;
-	double v = n;
-	return z + (z3 + z) / (4 * v) + (5 * z5 + 16 * z3 + 3 * z) / (96 * v * v) +
-	       (3 * z7 + 19 * z5 + 17 * z3 - 15 * z) / (384 * v * v * v);
+	double s = 2 / (9 * degrees), root = 1 - s - 1.6448536269514722 * sqrt(s);
+	return root > 0 ? degrees * root * root * root : 0;
 }
 
 /*
@@ -184,26 +177,26 @@ static double t95(uint32_t n)
  * itself. (B's own noise makes the weight a little too small where B is too bright and too large where it is too dark;
  * the floor bounds this. It is no concern while errors are small, which is when the target is met.)
  *
- * It equals the mean over groups of distance[g], over groups - 1. The interval is Student's on the logarithm of that mean,
- * the groups' distances being its independent parts (jackknife by groups). Two groups have one distance between them: then
- * the 5 % point of chi-square with one degree of freedom.
+ * It equals the mean over groups of distance[g], over groups - 1. Its degrees of freedom are those of the chi-square with
+ * the spread that the distances show among the groups (Satterthwaite 1946): groups - 1 when all pixels err together, as by an
+ * error of b; many more when they err apart. (groups + 2) / groups undoes the bias that dividing by the mean distance has
+ * in the first case. Two groups have one distance between them, so one degree of freedom is taken.
  */
 static void find_rel_mse(struct making *m)
 {
-	uint32_t groups = m->c->plan.groups;
-	double mean = 0, square = 0;
-	for (uint32_t g = 0; g < groups; g++)
+	double groups = m->c->plan.groups, mean = 0, square = 0;
+	for (uint32_t g = 0; g < m->c->plan.groups; g++)
 		mean += m->distance[g] / groups;
 	m->img->rel_mse = m->img->rel_mse_upper = mean / (groups - 1);
 	if (!(mean > 0))
 		return;
-	if (groups == 2) {
-		m->img->rel_mse_upper = m->img->rel_mse / 0.00393214;
-		return;
-	}
-	for (uint32_t g = 0; g < groups; g++)
+	for (uint32_t g = 0; g < m->c->plan.groups; g++)
 		square += (m->distance[g] / mean - 1) * (m->distance[g] / mean - 1);
-	m->img->rel_mse_upper *= exp(t95(groups - 1) * sqrt(square / groups / (groups - 1)));
+	double spread = square / (groups - 1) * (groups + 2) / groups;
+	if (m->c->plan.groups == 2)
+		m->img->rel_mse_upper /= 0.00393214;
+	else if (spread > 0)
+		m->img->rel_mse_upper *= 2 * (groups - 1) / spread / chi_square_5(2 * (groups - 1) / spread);
 }
 
 static void make_error(struct making *m)

@@ -294,11 +294,11 @@ static float noisy(void)
 	return (float)(4 * (1 + group_offset + pixel_noise * normal()));
 }
 
-/* 400 images with known true relMSE, 16 groups: the upper end must lie above the truth in 95 % of the runs, the estimate's
- * mean must be the truth. Level: fewer than 89 % (binomial, p = 0.95, n = 400) has probability below 1e-6; the mean of 400
- * estimates has a standard error of at most 1.8 %, so 10 % off has a probability below 1e-7. Power: coverage of 80 % (an
- * interval forgotten gives 50 %) is found with certainty. Correlated errors are the hard case: there Student's interval on
- * the logarithm covers about 93 %. */
+/* 400 images with known true relMSE, 16 groups: the upper end is to lie above the truth in 95 % of the runs, the estimate's
+ * mean is to be the truth. Level: an interval that covers 92 % or more (the Satterthwaite approximation is allowed as much)
+ * fails the limit of 85 % with a probability below 1e-6; the mean of 400 estimates has a standard error of at most 1.8 %, so
+ * 10 % off has a probability below 1e-7. Power: a coverage of 78 % (an interval forgotten gives about 50 %) is found with more
+ * than 99.9 %. Errors common to all pixels are the hard case. */
 static void estimated_error_covers_the_truth(void **unused)
 {
 	(void)unused;
@@ -312,7 +312,7 @@ static void estimated_error_covers_the_truth(void **unused)
 		for (int run = 0; run < RUNS; run++) {
 			struct canvas *c;
 			struct canvas_image img;
-			state = (uint64_t)(run * 2 + correlated + 12345);
+			state = (uint64_t)(run * 2 + correlated + 1) * UINT64_C(0x9e3779b97f4a7c15);
 			assert_int_equal(canvas_new(&c, &p, -28, NULL, NULL), 0);
 			for (uint32_t g = 0; g < 16; g++) {
 				group_offset = correlated ? each * normal() : 0;
@@ -342,7 +342,7 @@ static void estimated_error_covers_the_truth(void **unused)
 		}
 		print_message("correlated %d: covered %d of %d, mean estimate / truth %.4f\n", correlated, covered, RUNS,
 			      mean_estimate / truth);
-		assert_true(covered >= 356);
+		assert_true(covered >= 340);
 		assert_true(fabs(mean_estimate / truth - 1) < 0.1);
 	}
 }
