@@ -1,0 +1,44 @@
+/* Every plug-in that a scene may name, gathered from the registries: the one list for the scene reader. */
+#include "worker/render/render.h"
+
+#include "worker/bsdf/bsdf.h"
+#include "worker/emitter/emitter.h"
+#include "worker/scene/mesh.h"
+
+#include <assert.h>
+#include <pthread.h>
+
+enum { PLUGINS_MAX = 128 };
+
+static struct plugin_decl decls[PLUGINS_MAX];
+static size_t count;
+
+static void add(struct plugin_decl d)
+{
+	assert(count + 1 < PLUGINS_MAX);
+	decls[count++] = d;
+}
+
+static void gather(void)
+{
+	for (const struct plugin_decl *d = shape_decls; d->type; d++)
+		add(*d);
+	for (const struct plugin_decl *d = setting_decls; d->type; d++)
+		add(*d);
+	for (size_t i = 0; bsdf_registry[i]; i++)
+		add((struct plugin_decl){PLUGIN_BSDF, bsdf_registry[i]->type, bsdf_registry[i]->params,
+					 bsdf_registry[i]->nested_classes, PARAM_UNDERSTOOD});
+	for (size_t i = 0; texture_registry[i]; i++)
+		add((struct plugin_decl){PLUGIN_TEXTURE, texture_registry[i]->type, texture_registry[i]->params, 0,
+					 PARAM_UNDERSTOOD});
+	for (size_t i = 0; emitter_registry[i]; i++)
+		add((struct plugin_decl){PLUGIN_EMITTER, emitter_registry[i]->type, emitter_registry[i]->params,
+					 emitter_registry[i]->nested_classes, PARAM_UNDERSTOOD});
+}
+
+const struct plugin_decl *render_plugins(void)
+{
+	static pthread_once_t once = PTHREAD_ONCE_INIT;
+	pthread_once(&once, gather);
+	return decls;
+}
