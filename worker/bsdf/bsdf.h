@@ -77,6 +77,10 @@ int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_bu
 void bsdf_black(struct bsdf *b); /* absorbs everything; for emitters without a BSDF */
 void bsdf_default(struct bsdf *b); /* diffuse 0.5, what Mitsuba gives a shape without a BSDF */
 
+/* Makes an opaque BSDF scatter on its back as on its front. Mitsuba leaves backs black; public scenes of this language are
+ * written for renderers that do not (the walls of `cornell-box` face outwards), and no scene gains from black backs. */
+int bsdf_mirror_back(struct bsdf *b, struct arena *arena, struct error *e);
+
 extern const struct bsdf_ops *const bsdf_registry[]; /* ends with NULL */
 
 #endif

@@ -1,6 +1,8 @@
 /* One or two opaque BSDFs: the first on the side of the normal, the second (or the first again) on the other. */
 #include "worker/bsdf/create.h"
 
+extern const struct bsdf_ops bsdf_ops_twosided;
+
 struct twosided {
 	struct bsdf side[2]; /* front, back */
 };
@@ -36,6 +38,20 @@ static bool twosided_sample(const struct bsdf *b, const struct bsdf_point *p, ve
 		return false;
 	out->wi = mirror(out->wi);
 	return true;
+}
+
+int bsdf_mirror_back(struct bsdf *b, struct arena *arena, struct error *e)
+{
+	if (b->two_sided || (b->modes & BSDF_TRANSMIT) || !b->modes)
+		return 0;
+	struct twosided *t = arena_alloc(arena, 1, sizeof *t);
+	if (!t)
+		return error_set(e, ENOMEM, "out of memory");
+	t->side[0] = t->side[1] = *b;
+	b->data = t;
+	b->ops = &bsdf_ops_twosided;
+	b->two_sided = true;
+	return 0;
 }
 
 static int twosided_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)

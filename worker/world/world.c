@@ -206,6 +206,8 @@ static int create_bsdfs(struct builder *b)
 			bsdf_black(&w->bsdfs[k]);
 		else
 			bsdf_default(&w->bsdfs[k]);
+		if (!rc)
+			rc = bsdf_mirror_back(&w->bsdfs[k], &w->arena, b->e);
 		if (rc)
 			return rc;
 	}
