@@ -90,6 +90,7 @@ static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s,
 	peer_succeeded(p, j->id);
 	if (!j->mixed)
 		job_pin(j, p->class);
+	j->progress_floor = job_progress(j, f->now);
 	if (job_merge(j, s, f->now, duration))
 		rounds_complete(f, j);
 }

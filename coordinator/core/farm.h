@@ -30,7 +30,7 @@
 struct farm_config {
 	uint64_t first_job;       /* ids from here on, counted up, never reused */
 	uint32_t max_jobs;        /* not ended */
-	uint32_t max_ended;       /* remembered for status */
+	uint32_t max_ended;       /* remembered for status; at least 1 */
 	uint32_t max_peers;
 	uint32_t max_peer_leases; /* held by one worker */
 	uint32_t max_slots;       /* groups x parts of one job */

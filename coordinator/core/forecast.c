@@ -25,7 +25,8 @@ static double work_of_rounds(const struct job *j, double rounds)
 	return bootstrap_total(j) + rounds * (double)plan_round_mutations(&j->plan);
 }
 
-/* All samples and mutations that the job will need: by the plan, or by the error so far, which falls as 1/sqrt(rounds). */
+/* All samples and mutations that the job will need: by the plan, or by the error so far, which falls as 1/sqrt(rounds);
+ * more than the two open rounds hold. */
 static double work_total(const struct job *j)
 {
 	double total = INFINITY;
@@ -33,7 +34,7 @@ static double work_total(const struct job *j)
 		total = work_of_rounds(j, (double)j->plan.rounds);
 	if (j->plan.target_error > 0 && !isnan(j->rel_error)) {
 		double factor = j->rel_error / j->plan.target_error;
-		double rounds = fmax((double)j->rel_error_rounds * factor * factor, (double)j->rounds + 1);
+		double rounds = fmax((double)j->rel_error_rounds * factor * factor, (double)j->rounds + 2);
 		total = fmin(total, work_of_rounds(j, rounds));
 	}
 	return total;

@@ -77,14 +77,17 @@ void rounds_started(struct farm *f, struct job *j)
 	}
 }
 
-static void forget_oldest(struct farm *f)
+/* `latest` has just ended: the update still points to what it says. */
+static void forget_oldest(struct farm *f, const struct job *latest)
 {
 	if (f->job_count - f->live_count <= f->config.max_ended)
 		return;
 	uint32_t oldest = UINT32_MAX;
-	for (uint32_t i = 0; i < f->job_count; i++)
-		if (!job_is_live(f->jobs[i]) && (oldest == UINT32_MAX || f->jobs[i]->ended < f->jobs[oldest]->ended))
+	for (uint32_t i = 0; i < f->job_count; i++) {
+		const struct job *j = f->jobs[i];
+		if (!job_is_live(j) && j != latest && (oldest == UINT32_MAX || j->ended < f->jobs[oldest]->ended))
 			oldest = i;
+	}
 	assert(oldest != UINT32_MAX);
 	struct job *j = f->jobs[oldest];
 	about_job(f, ACTION_JOB_FORGOTTEN, j);
@@ -121,7 +124,7 @@ void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *tex
 	if (j->state == JOB_DONE)
 		about_job(f, ACTION_PUBLISH, j)->final = true;
 	job_changed(f, j);
-	forget_oldest(f);
+	forget_oldest(f, j);
 }
 
 void rounds_cancel(struct farm *f, const struct event *ev)
