@@ -1,0 +1,238 @@
+/* How a job ends, as transcripts; and what is said about it on the way. */
+#include "tests/support/transcript.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* One worker, one slot: the leases follow each other. */
+#define START(options)                                                 \
+	"[0] submit groups=1 " options " -> j1 submitted, j1 is queued", \
+	"[0] w1 joins A threads=1 -> -",                               \
+	"[10] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",   \
+	"[11] w1 batch j1 g0 p0 boot -> merge, merged, j1 prepare"
+
+static void expect_end(struct farm *f, enum job_state state, enum job_end end, int code)
+{
+	struct job_status s;
+	assert_true(farm_job(f, 1, 1000, &s));
+	assert_int_equal(s.state, state);
+	assert_int_equal(s.end, end);
+	assert_int_equal(job_exit_code(&s), code);
+	if (state == JOB_DONE)
+		assert_true(s.progress == 1);
+	farm_free(f);
+}
+
+static void by_time(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=inf seconds=5"),
+		"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[14.9] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
+		/* the time is tested when a round is complete, and runs from the first bootstrap lease */
+		"[15.5] tick -> -",
+		"[16] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (time)",
+		NULL });
+	expect_end(f, JOB_DONE, END_TIME, 0);
+}
+
+static void by_error(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=inf target=0.1"),
+		"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
+		/* what would change the prefix in question waits; so does an answer about another prefix */
+		"[14] w1 batch j1 g0 p0 e1 -> refused: the job's error is being estimated, w1 gets j1 g0 p0 e1",
+		"[14] error j1 2 0.01 -> -",
+		"[14] error j1 1 nan -> -",
+		"[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
+		"[15] error j1 2 0.5 -> -",
+		"[16] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 evaluate 3, w1 gets j1 g0 p0 e3",
+		"[16] error j1 3 0.3 -> -",
+		"[17] w1 batch j1 g0 p0 e3 -> merge, merged, j1 round 4, j1 evaluate 4, w1 gets j1 g0 p0 e4",
+		"[17] error j1 4 0.2 -> -",
+		"[18] w1 batch j1 g0 p0 e4 -> merge, merged, j1 round 5, j1 evaluate 5, w1 gets j1 g0 p0 e5",
+		"[18] error j1 5 0.2 -> -",
+		"[19] w1 batch j1 g0 p0 e5 -> merge, merged, j1 round 6, w1 gets j1 g0 p0 e6",
+		"[20] w1 batch j1 g0 p0 e6 -> merge, merged, j1 round 7, j1 evaluate 7, w1 gets j1 g0 p0 e7",
+		"[21] error j1 7 0.1 -> w1 loses j1 g0 p0 e7, j1 publish 7, j1 is done (error)",
+		"[22] w1 batch j1 g0 p0 e7 -> refused: the job is over",
+		NULL });
+	expect_end(f, JOB_DONE, END_ERROR, 0);
+}
+
+static void bound_before_error(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=2 rounds=7 seconds=3 target=0.1 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=2 -> -",
+		"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged",
+		"[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
+		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0",
+		"[3] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
+		/* the end is decided: nothing more is handed out or merged while the error is evaluated once more */
+		"[4] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w1 loses j1 g0 p0 e1, j1 evaluate 1",
+		"[4] w1 batch j1 g0 p0 e1 -> refused: the job is ending",
+		"[4] error j1 1 0.4 -> j1 publish 1, j1 is done (time)",
+		NULL });
+	expect_end(f, JOB_DONE, END_TIME, 4);
+}
+
+static void error_with_the_last_round(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=1 target=0.1"),
+		"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1",
+		"[13] error j1 1 0.05 -> j1 publish 1, j1 is done (error)",
+		NULL });
+	expect_end(f, JOB_DONE, END_ERROR, 0);
+}
+
+static void black(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=1"),
+		"[12] prepared j1 black -> j1 publish 0, j1 is done (black: no bootstrap sample carried light)",
+		NULL });
+	expect_end(f, JOB_DONE, END_BLACK, 0);
+}
+
+static void cannot_be_prepared(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=1"), "[12] prepared j1 bad no space left -> j1 is failed (failed: no space left)", NULL });
+	expect_end(f, JOB_FAILED, END_FAILED, 3);
+}
+
+static void broken(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=1"),
+		"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[13] broken j1 a sum left the grid -> w1 loses j1 g0 p0 e0, j1 is failed (failed: a sum left the grid)",
+		NULL });
+	expect_end(f, JOB_FAILED, END_FAILED, 3);
+}
+
+static void previews(void **state)
+{
+	(void)state;
+	struct farm_config c;
+	struct farm *f;
+	farm_config_init(&c);
+	c.preview_interval = 10;
+	assert_int_equal(farm_new(&f, &c, NULL), 0);
+	transcript_play(f, (const char *const[]){
+		START("rounds=4"),
+		"[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[12] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 preview 1, w1 gets j1 g0 p0 e1",
+		"[13] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
+		"[22] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 preview 3, w1 gets j1 g0 p0 e3",
+		"[32] w1 batch j1 g0 p0 e3 -> merge, merged, j1 round 4, j1 publish 4, j1 is done (mutations)",
+		NULL });
+	farm_free(f);
+}
+
+static struct job_status ask(const struct farm *f, double now)
+{
+	struct job_status s;
+	assert_true(farm_job(f, 1, now, &s));
+	return s;
+}
+
+static void near(double a, double b)
+{
+	if (!(fabs(a - b) <= 1e-9 * fabs(b)))
+		fail_msg("%.17g is not %.17g", a, b);
+}
+
+static void progress_and_rate(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	/* 1000 bootstrap samples and 10 rounds of 400 mutations */
+	transcript_play(f, (const char *const[]){
+		START("rounds=10"), "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0", NULL });
+	near(ask(f, 11).progress, 1000.0 / 5000);
+	assert_true(isnan(ask(f, 11).eta));
+	transcript_play(f, (const char *const[]){
+		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
+		"[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
+		NULL });
+	struct job_status s = ask(f, 15);
+	near(s.progress, 1800.0 / 5000);
+	near(s.rate, 200);
+	near(s.eta, 16);
+	assert_int_equal(s.mutations, 800);
+	assert_true(s.started == 10 && s.submitted == 0);
+	farm_free(f);
+}
+
+static void progress_of_errors(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=inf target=0.1"),
+		"[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
+		"[13] error j1 1 0.2 -> -", NULL });
+	/* twice the error: four rounds; and when that turns out to be too few, progress stays */
+	near(ask(f, 13).progress, 1400.0 / 2600);
+	near(ask(f, 13).eta, 1200 / 200.0);
+	transcript_play(f, (const char *const[]){
+		"[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
+		"[15] error j1 2 0.9 -> -", NULL });
+	near(ask(f, 15).progress, 1800.0 / 2600);
+	farm_free(f);
+}
+
+static void progress_of_time(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){ START("rounds=inf seconds=20"), NULL });
+	near(ask(f, 15).progress, 5.0 / 20);
+	near(ask(f, 15).eta, 15);
+	near(ask(f, 100).progress, 1);
+	farm_free(f);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(by_time),
+		cmocka_unit_test(by_error),
+		cmocka_unit_test(bound_before_error),
+		cmocka_unit_test(error_with_the_last_round),
+		cmocka_unit_test(black),
+		cmocka_unit_test(cannot_be_prepared),
+		cmocka_unit_test(broken),
+		cmocka_unit_test(previews),
+		cmocka_unit_test(progress_and_rate),
+		cmocka_unit_test(progress_of_errors),
+		cmocka_unit_test(progress_of_time),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,273 @@
+/* What is merged, repeated, refused and handed out again, as transcripts. */
+#include "tests/support/transcript.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+
+#include <cmocka.h>
+
+#define START_TWO                                                                      \
+	"[0] submit -> j1 submitted, j1 is queued",                                    \
+	"[0] w1 joins A threads=1 -> -", "[0] w2 joins A threads=1 -> -",              \
+	"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",                    \
+	"[0] w2 wants 1 -> w2 gets j1 g1 p0 boot",                                     \
+	"[1] w1 batch j1 g0 p0 boot -> merge, merged",                                 \
+	"[1] w2 batch j1 g1 p0 boot -> merge, merged, j1 prepare",                     \
+	"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w2 gets j1 g1 p0 e0"
+
+static void whole_job(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START_TWO,
+		"[2] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
+		"[2] w2 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w2 gets j1 g1 p0 e1",
+		"[3] w2 batch j1 g1 p0 e1 -> merge, merged",
+		"[3] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (mutations)",
+		"[4] w1 batch j1 g0 p0 e1 -> refused: the job is over",
+		NULL });
+}
+
+static void two_rounds_open(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit rounds=9 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=2 -> -",
+		"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged",
+		"[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
+		"[1] w1 batch j1 g0 p0 e0 -> refused: the bootstrap is not complete",
+		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0",
+		"[1] w1 batch j1 g0 p0 e1 -> refused: the epoch is not open",
+		"[1] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
+		"[1] w1 batch j1 g0 p0 e1 -> merge, merged",
+		"[1] w1 batch j1 g0 p0 e2 -> refused: the epoch is not open",
+		"[1] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g1 p0 e1, w1 gets j1 g0 p0 e2",
+		"[2] w1 batch j1 g0 p0 e2 -> merge, merged",
+		"[2] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g1 p0 e2, w1 gets j1 g0 p0 e3",
+		NULL });
+}
+
+static void repeats(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START_TWO,
+		"[2] w1 batch j1 g0 p0 boot -> repeat: merged already",
+		"[2] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
+		"[2] w1 batch j1 g0 p0 e0 -> repeat: merged already",
+		"[2] w2 batch j1 g0 p0 e0 -> repeat: merged already",
+		/* whoever holds the lease: the first valid answer is the one */
+		"[2] w2 batch j1 g0 p0 e1 -> merge, merged, w1 loses j1 g0 p0 e1",
+		"[2] w1 batch j1 g0 p0 e1 -> repeat: merged already",
+		NULL });
+}
+
+static void refused(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START_TWO,
+		"[2] w9 batch j1 g0 p0 e0 -> refused: unknown worker",
+		"[2] w1 batch j2 g0 p0 e0 -> refused: no such job",
+		"[2] cancel j2 -> rejected: no such job",
+		"[2] cancel j1 -> j1 cancelled, w1 loses j1 g0 p0 e0, w2 loses j1 g1 p0 e0, j1 is cancelled (cancelled: cancelled)",
+		"[3] w1 batch j1 g0 p0 e0 -> refused: the job is over",
+		"[3] cancel j1 -> rejected: the job is over",
+		NULL });
+}
+
+static void set_aside_after_faults(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START_TWO,
+		"[2] w1 batch j1 g0 p0 e0 bad tile 3 holds a NaN -> refused: tile 3 holds a NaN, w1 gets j1 g0 p0 e0",
+		"[3] w1 batch j1 g7 p0 e0 -> refused: not a lease of this job",
+		"[4] w1 batch j1 g0 p0 e0 bad torn -> refused: torn",
+		"[5] w1 wants 1 -> -",
+		/* its last lease is somebody else's now */
+		"[5] w2 batch j1 g1 p0 e0 -> merge, merged, w2 gets j1 g0 p0 e0",
+		"[6] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w2 gets j1 g1 p0 e1",
+		/* silence and a word do not wash it clean */
+		"[33] w2 heard -> -", "[36] tick -> -", "[40] w1 wants 1 -> -",
+		NULL });
+	struct peer_status p;
+	assert_true(farm_peer(f, 1, &p));
+	assert_int_equal(p.state, PEER_ASIDE);
+	assert_int_equal(p.faults, 3);
+	assert_string_equal(p.text, "torn");
+	struct job_status j;
+	assert_true(farm_job(f, 1, 40, &j));
+	assert_int_equal(j.faults, 3);
+	farm_free(f);
+}
+
+static void worker_gone(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START_TWO,
+		"[2] w3 joins A threads=1 -> -",
+		"[2] w3 wants 1 -> -",
+		"[2.4] w1 leaves -> w3 gets j1 g0 p0 e0",
+		/* silent: taken back, but what it made is still good */
+		"[20] w3 heard -> -",
+		"[31] tick -> -",
+		"[31] w3 wants 2 -> w3 gets j1 g1 p0 e0",
+		"[32] w2 batch j1 g1 p0 e0 -> merge, merged, w3 loses j1 g1 p0 e0, w2 gets j1 g1 p0 e1",
+		NULL });
+}
+
+static void hung_up(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] w1 joins A threads=1 -> -", "[0] wake -> 30", "[30] tick -> -", "[30] wake -> 300", "[299] tick -> -", "[300] tick -> close w1",
+		"[300] w1 wants 1 -> -", NULL });
+}
+
+static void timeout(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=3 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=4 -> -",
+		"[0] w1 wants 3 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged",
+		"[1] w1 batch j1 g1 p0 boot -> merge, merged",
+		/* nothing was known of durations when it was sent: 600 s */
+		"[599] w1 heard -> -",
+		"[600] tick -> w1 gets j1 g2 p0 boot",
+		"[601] w1 batch j1 g2 p0 boot -> merge, merged, j1 prepare",
+		"[601] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0, w1 gets j1 g2 p0 e0",
+		"[602] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
+		"[602] w1 batch j1 g0 p0 e1 -> merge, merged",
+		NULL });
+}
+
+static void timeout_after_median(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=3 rounds=9 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot",
+		"[2] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j1 g2 p0 boot",
+		"[30] w1 heard -> -", "[59] w1 heard -> -",
+		/* ten medians are 10 s, so the least of 60 s; the second time 120 s */
+		"[62] tick -> w1 gets j1 g2 p0 boot",
+		"[62] wake -> 89",
+		"[85] w1 heard -> -", "[110] w1 heard -> -", "[130] w1 heard -> -", "[150] w1 heard -> -", "[175] w1 heard -> -",
+		"[181] tick -> -",
+		"[182] tick -> w1 gets j1 g2 p0 boot",
+		"[183] w1 batch j1 g2 p0 boot -> merge, merged, j1 prepare",
+		NULL });
+}
+
+static void straggler(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START_TWO,
+		"[1] w3 joins A threads=1 -> -", "[1] w3 wants 1 -> -",
+		"[3] w2 batch j1 g1 p0 e0 -> merge, merged, w3 gets j1 g1 p0 e1",
+		"[3] w3 batch j1 g1 p0 e1 -> merge, merged",
+		/* the median is 2 s: after 3 s a second worker, never a third */
+		"[3.9] tick -> -",
+		"[3.9] wake -> 4",
+		"[4] tick -> w2 gets j1 g0 p0 e0",
+		"[9] w3 heard -> -",
+		"[9] w2 batch j1 g0 p0 e0 -> merge, merged, w1 loses j1 g0 p0 e0, j1 round 1, w3 gets j1 g0 p0 e1",
+		"[9] w1 batch j1 g0 p0 e0 -> repeat: merged already",
+		NULL });
+	struct job_status j;
+	assert_true(farm_job(f, 1, 9, &j));
+	assert_int_equal(j.duplicates, 1);
+	assert_int_equal(j.repeats, 1);
+	farm_free(f);
+}
+
+static void failed_lease(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START_TWO,
+		"[2] w1 fails j1 g0 p0 e0 out of memory -> -",
+		"[3] w2 batch j1 g1 p0 e0 -> merge, merged, w2 gets j1 g0 p0 e0",
+		"[4] w1 fails j1 g0 p0 e0 stale -> -",
+		"[11.9] tick -> -",
+		/* ten seconds of pause */
+		"[12] tick -> w1 gets j1 g1 p0 e1",
+		"[13] w2 fails j1 g0 p0 e0 out of memory -> -",
+		"[14] w3 joins A threads=1 -> -",
+		"[14] w3 wants 1 -> w3 gets j1 g0 p0 e0",
+		"[15] w3 fails j1 g0 p0 e0 out of memory -> w1 loses j1 g1 p0 e1, j1 is failed (failed: w3: out of memory)",
+		NULL });
+}
+
+static void never_a_success(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[1] w1 fails j1 g0 p0 boot no such file -> -",
+		"[1] wake -> 11",
+		"[11] tick -> w1 gets j1 g1 p0 boot",
+		"[12] w1 fails j1 g1 p0 boot no such file -> -",
+		"[31] tick -> -",
+		"[32] tick -> w1 gets j1 g0 p0 boot",
+		"[33] w1 fails j1 g0 p0 boot no such file -> j1 is failed (failed: w1: no such file)",
+		NULL });
+}
+
+static void returned_lease(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START_TWO,
+		"[2] w1 wants 0 -> -",
+		"[2] w2 wants 2 -> -",
+		"[2] w1 returns j1 g0 p0 e0 -> w2 gets j1 g0 p0 e0",
+		NULL });
+}
+
+static void bounded_wish(void **state)
+{
+	(void)state;
+	/* leases are bounded by what the worker wants, and by its threads */
+	transcript((const char *const[]){
+		"[0] submit groups=8 parts=4 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1000 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g0 p1 boot, w1 gets j1 g0 p2 boot, w1 gets j1 g0 p3 boot",
+		"[0] w1 wants 1 -> -",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged",
+		NULL });
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(whole_job),
+		cmocka_unit_test(two_rounds_open),
+		cmocka_unit_test(repeats),
+		cmocka_unit_test(refused),
+		cmocka_unit_test(set_aside_after_faults),
+		cmocka_unit_test(worker_gone),
+		cmocka_unit_test(hung_up),
+		cmocka_unit_test(timeout),
+		cmocka_unit_test(timeout_after_median),
+		cmocka_unit_test(straggler),
+		cmocka_unit_test(failed_lease),
+		cmocka_unit_test(never_a_success),
+		cmocka_unit_test(returned_lease),
+		cmocka_unit_test(bounded_wish),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,203 @@
+/* Several jobs and several kinds of workers: priority, fairness, fingerprints, limits, and why a job waits. */
+#include "tests/support/transcript.h"
+
+#include "common/base/mem.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const char *waiting(const struct farm *f, uint64_t job)
+{
+	static struct job_status s;
+	assert_true(farm_job(f, job, 1000, &s));
+	return s.waiting;
+}
+
+static void priority(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> -",
+		"[0] submit priority=101 -> rejected: a priority is from -100 to 100",
+		"[0] submit priority=-1 groups=4 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[0] submit groups=4 -> j2 submitted, j2 is queued",
+		"[0] submit priority=5 groups=1 -> j3 submitted, j3 is queued",
+		NULL });
+	assert_string_equal(waiting(f, 3), "workers busy with j1 (priority -1)");
+	transcript_play(f, (const char *const[]){
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged, j3 is bootstrap, w1 gets j3 g0 p0 boot",
+		"[2] w1 batch j3 g0 p0 boot -> merge, merged, j3 prepare, j2 is bootstrap, w1 gets j2 g0 p0 boot",
+		NULL });
+	assert_string_equal(waiting(f, 3), "the bootstrap is being evaluated");
+	assert_string_equal(waiting(f, 2), "");
+	transcript_play(f, (const char *const[]){
+		"[2] prepared j3 -> j3 is running",
+		"[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j3 g0 p0 e0", NULL });
+	farm_free(f);
+}
+
+static void fair_sharing(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=9 -> j1 submitted, j1 is queued",
+		"[0] submit groups=9 -> j2 submitted, j2 is queued",
+		"[0] w1 joins A threads=4 -> -",
+		"[0] w1 wants 4 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j2 g1 p0 boot",
+		"[1] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j2 g2 p0 boot",
+		"[2] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g2 p0 boot",
+		NULL });
+}
+
+static void workers_take_turns(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] w1 joins A threads=2 -> -", "[0] w2 joins A threads=2 -> -",
+		"[0] w1 wants 2 -> -", "[0] w2 wants 2 -> -",
+		"[0] submit groups=4 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot, w2 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w2 gets j1 g3 p0 boot",
+		NULL });
+}
+
+static void fingerprints(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=3 -> j1 submitted, j1 is queued", NULL });
+	assert_string_equal(waiting(f, 1), "no worker");
+	transcript_play(f, (const char *const[]){
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w2 joins B threads=1 -> -", NULL });
+	assert_string_equal(waiting(f, 1), "no worker asks for work");
+	transcript_play(f, (const char *const[]){
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[0] w2 wants 1 -> -",
+		"[1] w2 batch j1 g0 p0 boot -> refused: the job belongs to workers with another fingerprint",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot",
+		"[1] w1 leaves -> -", NULL });
+	assert_string_equal(waiting(f, 1), "no worker with fingerprint A (1 with others)");
+	transcript_play(f, (const char *const[]){
+		"[2] submit mixed groups=1 rounds=1 -> j2 submitted, j2 is queued, j2 is bootstrap, w2 gets j2 g0 p0 boot",
+		"[3] w3 joins A threads=1 -> -",
+		"[3] w3 wants 1 -> w3 gets j1 g2 p0 boot",
+		"[3] w2 batch j2 g0 p0 boot -> merge, merged, j2 prepare",
+		"[3] w3 batch j1 g2 p0 boot -> merge, merged, w3 gets j1 g1 p0 boot",
+		"[4] prepared j2 -> j2 is running, w2 gets j2 g0 p0 e0",
+		"[4] w3 batch j2 g0 p0 e0 -> merge, merged, w2 loses j2 g0 p0 e0, j2 round 1, j2 publish 1, j2 is done (mutations)",
+		NULL });
+	farm_free(f);
+}
+
+static void free_again_while_untouched(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 -> -", "[0] w2 joins B threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[0] w2 wants 1 -> -",
+		"[1] w1 leaves -> w2 gets j1 g1 p0 boot",
+		NULL });
+}
+
+static void nobody_is_trusted(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -", "[30] tick -> -", NULL });
+	assert_string_equal(waiting(f, 1), "no worker that answers and is trusted (1 are known)");
+	transcript_play(f, (const char *const[]){
+		"[30] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[31] w1 fails j1 g0 p0 boot no such file -> -", NULL });
+	assert_string_equal(waiting(f, 1), "its workers failed and pause before they try again");
+	farm_free(f);
+}
+
+static void limits(void **state)
+{
+	(void)state;
+	struct farm_config c;
+	struct farm *f;
+	farm_config_init(&c);
+	c.max_jobs = 2;
+	c.max_ended = 1;
+	c.max_peers = 1;
+	c.max_slots = 4;
+	c.first_job = 7;
+	assert_int_equal(farm_new(&f, &c, NULL), 0);
+	transcript_play(f, (const char *const[]){
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w2 joins A threads=1 -> rejected: the farm has as many workers as it takes",
+		"[0] submit groups=5 -> rejected: the plan has more leases in a round than the coordinator takes",
+		"[0] submit -> j7 submitted, j7 is queued",
+		"[0] submit -> j8 submitted, j8 is queued",
+		"[0] submit -> rejected: the coordinator has as many jobs as it takes",
+		"[0] cancel j7 -> j7 cancelled, j7 is cancelled (cancelled: cancelled)",
+		"[1] submit -> j9 submitted, j9 is queued",
+		"[1] cancel j9 -> j9 cancelled, j9 is cancelled (cancelled: cancelled), j7 forgotten",
+		"[1] cancel j7 -> rejected: no such job",
+		NULL });
+	assert_int_equal(farm_next_job(f, 0), 8);
+	assert_int_equal(farm_next_job(f, 8), 9);
+	assert_int_equal(farm_next_job(f, 9), 0);
+	/* both ended in the same moment: the one that ends now stays */
+	transcript_play(f, (const char *const[]){
+		"[1] cancel j8 -> j8 cancelled, j8 is cancelled (cancelled: cancelled), j9 forgotten", NULL });
+	assert_int_equal(farm_next_peer(f, 0), 1);
+	assert_int_equal(farm_next_peer(f, 1), 0);
+	farm_free(f);
+	c.max_peers = 0;
+	assert_int_equal(farm_new(&f, &c, NULL), -EINVAL);
+}
+
+static void memory_runs_out(void **state)
+{
+	(void)state;
+	struct farm_config c;
+	struct farm *f;
+	farm_config_init(&c);
+	for (long n = 0; n < 5; n++) {
+		mem_fail_after(n);
+		assert_int_equal(farm_new(&f, &c, NULL), -ENOMEM);
+	}
+	mem_fail_after(-1);
+	f = transcript_farm();
+	mem_fail_after(1);
+	transcript_play(f, (const char *const[]){
+		"[0] submit -> rejected: the coordinator has no memory for another job", NULL });
+	mem_fail_after(1);
+	transcript_play(f, (const char *const[]){
+		"[0] w1 joins A threads=1 -> rejected: the coordinator has no memory for another worker", NULL });
+	mem_fail_after(-1);
+	transcript_play(f, (const char *const[]){
+		"[0] submit -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot", NULL });
+	struct lease_status l;
+	assert_true(farm_lease(f, 1, 0, &l));
+	assert_int_equal(l.key.job, 1);
+	assert_false(farm_lease(f, 1, 1, &l));
+	farm_free(f);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(priority),
+		cmocka_unit_test(fair_sharing),
+		cmocka_unit_test(workers_take_turns),
+		cmocka_unit_test(fingerprints),
+		cmocka_unit_test(free_again_while_untouched),
+		cmocka_unit_test(nobody_is_trusted),
+		cmocka_unit_test(limits),
+		cmocka_unit_test(memory_runs_out),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

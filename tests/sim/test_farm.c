@@ -1,0 +1,57 @@
+/* Many seeds of the farm's simulator; FULL=1: more of them; HSLT_SIM_SEED=N: that one, with everything that is said. */
+#include "tests/sim/sim_world.h"
+
+#include <inttypes.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SEEDS = 200, SEEDS_FULL = 10000 };
+
+static void add(struct sim_result *sum, const struct sim_result *r)
+{
+	sum->steps += r->steps;
+	sum->merged += r->merged;
+	sum->repeats += r->repeats;
+	sum->refused += r->refused;
+	sum->crashes += r->crashes;
+	sum->done += r->done;
+	sum->failed += r->failed;
+	sum->cancelled += r->cancelled;
+	sum->copies += r->copies;
+	sum->timeouts += r->timeouts;
+}
+
+static void simulate(void **state)
+{
+	(void)state;
+	const char *one = getenv("HSLT_SIM_SEED"), *full = getenv("FULL");
+	uint64_t first = one ? strtoull(one, NULL, 10) : 1;
+	uint64_t count = one ? 1 : full && strcmp(full, "1") == 0 ? SEEDS_FULL : SEEDS;
+	struct sim_result sum = { 0 }, r;
+	for (uint64_t seed = first; seed < first + count; seed++) {
+		const char *wrong = sim_run(seed, one != NULL, &r);
+		if (wrong)
+			fail_msg("HSLT_SIM_SEED=%" PRIu64 ": %s", seed, wrong);
+		add(&sum, &r);
+	}
+	print_message("%" PRIu64 " steps, %" PRIu64 " merged, %" PRIu64 " repeats, %" PRIu64 " refused, %" PRIu64 " crashes, "
+		      "%" PRIu64 " copies, %" PRIu64 " timeouts; jobs: %" PRIu64 " done, %" PRIu64 " failed, %" PRIu64 " cancelled\n",
+		      sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.copies, sum.timeouts, sum.done,
+		      sum.failed, sum.cancelled);
+	/* The worlds must be wild enough to mean something. */
+	if (!one) {
+		assert_true(sum.repeats > count && sum.copies > count / 4 && sum.timeouts > count / 4);
+		assert_true(sum.crashes > count && sum.done > count && sum.cancelled > count / 20);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = { cmocka_unit_test(simulate) };
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

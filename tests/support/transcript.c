@@ -1,0 +1,284 @@
+#include "tests/support/transcript.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+struct said {
+	char text[4096];
+	size_t used;
+};
+
+__attribute__((format(printf, 2, 3))) static void say(struct said *s, const char *format, ...)
+{
+	va_list ap;
+	va_start(ap, format);
+	int n = vsnprintf(s->text + s->used, sizeof s->text - s->used, format, ap);
+	va_end(ap);
+	assert_true(n >= 0 && s->used + (size_t)n < sizeof s->text);
+	s->used += (size_t)n;
+}
+
+static void say_key(struct said *s, const struct lease_key *k)
+{
+	say(s, "j%" PRIu64 " g%u p%u ", k->job, k->group, k->part);
+	if (k->kind == LEASE_BOOTSTRAP)
+		say(s, "boot");
+	else
+		say(s, "e%" PRIu64, k->epoch);
+}
+
+static void say_ack(struct said *s, const struct action *a)
+{
+	static const char *const names[] = { "merged", "repeat", "refused" };
+	say(s, "%s%s%s", names[a->ack], *a->text ? ": " : "", a->text);
+}
+
+static void say_changed(struct said *s, const struct action *a)
+{
+	say(s, "j%" PRIu64 " is %s", a->job, job_state_name(a->state));
+	if (a->end != END_NONE)
+		say(s, " (%s%s%s)", job_end_name(a->end), *a->text ? ": " : "", a->text);
+}
+
+static void say_action(struct said *s, const struct action *a)
+{
+	switch (a->kind) {
+	case ACTION_SUBMITTED: say(s, "j%" PRIu64 " submitted", a->job); break;
+	case ACTION_CANCELLED: say(s, "j%" PRIu64 " cancelled", a->job); break;
+	case ACTION_REJECTED: say(s, "rejected: %s", a->text); break;
+	case ACTION_SEND_LEASE:
+	case ACTION_REVOKE:
+		say(s, "w%" PRIu64 " %s ", a->peer, a->kind == ACTION_REVOKE ? "loses" : "gets");
+		say_key(s, &a->key);
+		break;
+	case ACTION_MERGE: say(s, "merge"); break;
+	case ACTION_ACK: say_ack(s, a); break;
+	case ACTION_BOOTSTRAP_DONE: say(s, "j%" PRIu64 " prepare", a->job); break;
+	case ACTION_ROUND_DONE: say(s, "j%" PRIu64 " round %" PRIu64, a->job, a->rounds); break;
+	case ACTION_EVALUATE_ERROR: say(s, "j%" PRIu64 " evaluate %" PRIu64, a->job, a->rounds); break;
+	case ACTION_PUBLISH:
+		say(s, "j%" PRIu64 " %s %" PRIu64, a->job, a->final ? "publish" : "preview", a->rounds);
+		break;
+	case ACTION_JOB_CHANGED: say_changed(s, a); break;
+	case ACTION_JOB_FORGOTTEN: say(s, "j%" PRIu64 " forgotten", a->job); break;
+	case ACTION_CLOSE_PEER: say(s, "close w%" PRIu64, a->peer); break;
+	}
+}
+
+/* ---- reading */
+
+static bool take(const char **at, const char *word)
+{
+	size_t n = strlen(word);
+	if (strncmp(*at, word, n) != 0)
+		return false;
+	*at += n;
+	while (**at == ' ')
+		++*at;
+	return true;
+}
+
+static double take_number(const char **at)
+{
+	char *end;
+	double x = strtod(*at, &end);
+	if (end == *at)
+		fail_msg("a number is missing: %s", *at);
+	*at = end;
+	while (**at == ' ')
+		++*at;
+	return x;
+}
+
+static uint64_t take_count(const char **at)
+{
+	return (uint64_t)take_number(at);
+}
+
+static uint64_t take_id(const char **at, const char *letter)
+{
+	if (!take(at, letter))
+		fail_msg("'%s' is missing: %s", letter, *at);
+	return take_count(at);
+}
+
+static struct lease_key take_key(const char **at)
+{
+	struct lease_key k = { .job = take_id(at, "j"), .kind = LEASE_RENDER };
+	k.group = (uint32_t)take_id(at, "g");
+	k.part = (uint32_t)take_id(at, "p");
+	if (take(at, "boot"))
+		k.kind = LEASE_BOOTSTRAP;
+	else
+		k.epoch = take_id(at, "e");
+	return k;
+}
+
+static void take_submit(const char **at, struct event *ev, struct plan *p)
+{
+	*p = (struct plan){ .kind = PLAN_CHAINS, .width = 8, .height = 8, .crop_width = 8, .crop_height = 8,
+			    .groups = 2, .parts = 1, .rounds = 2, .epoch = 100, .bootstrap = 1000 };
+	ev->kind = EVENT_SUBMIT;
+	ev->tag = 7;
+	ev->submit = (struct event_submit){ .plan = p, .name = "job" };
+	while (**at && **at != '-') {
+		if (take(at, "priority="))
+			ev->submit.priority = (int)take_number(at);
+		else if (take(at, "mixed"))
+			ev->submit.mixed = true;
+		else if (take(at, "groups="))
+			p->groups = (uint32_t)take_count(at);
+		else if (take(at, "parts="))
+			p->parts = (uint32_t)take_count(at);
+		else if (take(at, "rounds=inf"))
+			p->rounds = UINT64_MAX;
+		else if (take(at, "rounds="))
+			p->rounds = take_count(at);
+		else if (take(at, "seconds="))
+			p->seconds = take_number(at);
+		else if (take(at, "target="))
+			p->target_error = take_number(at);
+		else if (take(at, "boot="))
+			p->bootstrap = take_count(at);
+		else
+			fail_msg("not an option of submit: %s", *at);
+	}
+	p->chains = p->groups * p->parts * 4;
+}
+
+static void take_worker(const char **at, struct event *ev, char *name, char *fingerprint)
+{
+	ev->peer = take_id(at, "w");
+	if (take(at, "joins")) {
+		ev->kind = EVENT_JOINED;
+		int n = 0;
+		if (sscanf(*at, "%31s threads=%u%n", fingerprint, &ev->join.threads, &n) != 2)
+			fail_msg("F threads=T is missing: %s", *at);
+		*at += n;
+		take(at, " ");
+		snprintf(name, 32, "w%" PRIu64, ev->peer);
+		ev->join.peer = ev->peer;
+		ev->join.name = name;
+		ev->join.fingerprint = fingerprint;
+		ev->peer = 0;
+	} else if (take(at, "leaves")) {
+		ev->kind = EVENT_LEFT;
+	} else if (take(at, "heard")) {
+		ev->kind = EVENT_HEARD;
+	} else if (take(at, "wants")) {
+		ev->kind = EVENT_REQUEST;
+		ev->want = (uint32_t)take_count(at);
+	} else {
+		ev->kind = take(at, "batch") ? EVENT_BATCH : take(at, "fails") ? EVENT_LEASE_FAILED : EVENT_LEASE_RETURNED;
+		if (ev->kind == EVENT_LEASE_RETURNED && !take(at, "returns"))
+			fail_msg("no such event: %s", *at);
+		ev->lease.key = take_key(at);
+		ev->lease.valid = !take(at, "bad");
+	}
+}
+
+static void take_job(const char **at, struct event *ev)
+{
+	if (take(at, "cancel")) {
+		ev->kind = EVENT_CANCEL;
+		ev->job = take_id(at, "j");
+	} else if (take(at, "prepared")) {
+		ev->kind = EVENT_PREPARED;
+		ev->prepared.job = take_id(at, "j");
+		ev->prepared.black = take(at, "black");
+		ev->prepared.ok = !take(at, "bad");
+	} else if (take(at, "error")) {
+		ev->kind = EVENT_ERROR_KNOWN;
+		ev->error_known.job = take_id(at, "j");
+		ev->error_known.rounds = take_count(at);
+		ev->error_known.rel_error = take_number(at);
+	} else if (take(at, "broken")) {
+		ev->kind = EVENT_JOB_BROKEN;
+		ev->job = take_id(at, "j");
+	} else if (!take(at, "tick")) {
+		fail_msg("no such event: %s", *at);
+	}
+}
+
+static double last_wake;
+
+static bool play_wake(const char *line, const char *expected)
+{
+	char text[32];
+	snprintf(text, sizeof text, "%g", last_wake);
+	if (strcmp(text, expected) == 0)
+		return true;
+	print_error("%s\n        but it is %s\n", line, text);
+	return false;
+}
+
+static bool play_line(struct farm *f, const char *line)
+{
+	const char *at = line, *arrow = strstr(line, "-> ");
+	char name[32], fingerprint[32], text[256];
+	struct plan plan;
+	struct event ev = { .kind = EVENT_TICK };
+	if (!arrow || !take(&at, "["))
+		fail_msg("not a line of a transcript: %s", line);
+	ev.time = take_number(&at);
+	take(&at, "]");
+	if (take(&at, "wake"))
+		return play_wake(line, arrow + 3);
+	if (*at == 'w')
+		take_worker(&at, &ev, name, fingerprint);
+	else if (take(&at, "submit"))
+		take_submit(&at, &ev, &plan);
+	else
+		take_job(&at, &ev);
+	snprintf(text, sizeof text, "%.*s", at < arrow ? (int)(arrow - at) - 1 : 0, at);
+	ev.text = text;
+
+	struct update u;
+	farm_step(f, &ev, &u);
+	last_wake = u.wake;
+	struct said s = { .used = 0 };
+	for (size_t i = 0; i < u.count; i++) {
+		say(&s, "%s", i ? ", " : "");
+		say_action(&s, &u.actions[i]);
+	}
+	if (u.count == 0)
+		say(&s, "-");
+	if (strcmp(s.text, arrow + 3) == 0)
+		return true;
+	print_error("\"%.*s%s\",\n", (int)(arrow + 3 - line), line, s.text);
+	print_error("        but expected: %s\n", arrow + 3);
+	return false;
+}
+
+struct farm *transcript_farm(void)
+{
+	struct farm_config c;
+	struct farm *f = NULL;
+	struct error e;
+	farm_config_init(&c);
+	c.preview_interval = 0;
+	assert_int_equal(farm_new(&f, &c, &e), 0);
+	return f;
+}
+
+void transcript_play(struct farm *f, const char *const *lines)
+{
+	int wrong = 0;
+	for (; *lines; lines++)
+		wrong += !play_line(f, *lines);
+	assert_int_equal(wrong, 0);
+}
+
+void transcript(const char *const *lines)
+{
+	struct farm *f = transcript_farm();
+	transcript_play(f, lines);
+	farm_free(f);
+}

@@ -1,0 +1,24 @@
+/*
+ * Conversations with the coordinator's core as readable text, one line an event and all that the core says to it:
+ *
+ *   [110] w2 batch j1 g3 p0 e1 -> merge, merged, w2 gets j1 g3 p0 e2
+ *
+ * Events:
+ *   wN joins F threads=T | wN leaves | wN heard | wN wants N
+ *   wN batch KEY [bad TEXT] | wN fails KEY TEXT | wN returns KEY        KEY: j1 g0 p0 e0, or j1 g0 p0 boot
+ *   submit [NAME=VALUE ...]: priority mixed groups parts rounds seconds target boot chains
+ *   cancel J | prepared J [black | bad TEXT] | error J R E | broken J TEXT | tick
+ * "[0] wake -> T": when the core wants to be called again, as it said last.
+ * "-> -" is silence. A line that does not fit is printed beside what was said, and the test fails at the end.
+ */
+#ifndef TESTS_SUPPORT_TRANSCRIPT_H
+#define TESTS_SUPPORT_TRANSCRIPT_H
+
+#include "coordinator/core/farm.h"
+
+struct farm *transcript_farm(void); /* default configuration, no previews */
+void transcript_play(struct farm *f, const char *const *lines); /* up to NULL */
+/* Both, and frees the farm. */
+void transcript(const char *const *lines);
+
+#endif
