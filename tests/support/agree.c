@@ -1,0 +1,263 @@
+#include "tests/support/agree.h"
+
+#include "common/film/merge.h"
+#include "tests/support/stats.h"
+
+#include <pthread.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* Comparisons in the whole suite, at most: the family-wise level of 1e-4 is shared among them. */
+enum { COMPARISONS = 64 };
+#define LEVEL (1e-4 / COMPARISONS)
+
+/* One group: its own bootstrap (chains), all its leases of all rounds. */
+struct group_run {
+	const struct world *w;
+	const struct plan *p;
+	uint32_t group;
+	double *mean;
+	double sum[AGREE_CELLS + 1];
+	double independent, count;
+	uint64_t counters[BATCH_COUNTERS];
+	char failure[256];
+};
+
+static uint32_t cell_of(const struct plan *p, uint32_t x, uint32_t y)
+{
+	return (y * AGREE_BLOCKS / p->height) * AGREE_BLOCKS + x * AGREE_BLOCKS / p->width;
+}
+
+static void take(struct group_run *g, const struct batch *b)
+{
+	for (uint32_t t = 0; t < b->tile_count; t++) {
+		const struct tile *tile = &b->tiles[t];
+		for (uint32_t i = 0; i < tile->width * tile->height; i++) {
+			const float *v = tile->xyz + 3 * (size_t)i;
+			double s = (double)v[0] + (double)v[1] + (double)v[2];
+			g->sum[cell_of(g->p, tile->x + i % tile->width, tile->y + i / tile->width)] += s;
+			g->sum[AGREE_CELLS] += s;
+		}
+	}
+	g->independent += b->independent_sum;
+	g->count += (double)b->counters[COUNT_INDEPENDENT];
+	for (int i = 0; i < BATCH_COUNTERS; i++)
+		g->counters[i] += b->counters[i];
+}
+
+static bool lease(struct group_run *g, const struct lease_key *k, const struct lease_input *in, struct batch *b)
+{
+	struct error e = {""};
+	enum lease_end end;
+	if (render_lease(g->w, g->p, k, in, NULL, &end, b, &e) == 0)
+		return true;
+	snprintf(g->failure, sizeof g->failure, "%.250s", e.text);
+	return false;
+}
+
+static bool bootstrap(struct group_run *g, uint64_t *seeds)
+{
+	const struct plan *p = g->p;
+	float *weights = calloc(p->bootstrap / p->groups, sizeof *weights);
+	uint64_t n = 0;
+	for (uint32_t part = 0; part < p->parts; part++) {
+		struct lease_key k = {1, LEASE_BOOTSTRAP, g->group, part, 0};
+		struct batch b;
+		if (!lease(g, &k, NULL, &b)) {
+			free(weights);
+			return false;
+		}
+		memcpy(weights + n, b.weights, b.weight_count * sizeof *weights);
+		n += b.weight_count;
+		take(g, &b);
+		batch_fini(&b);
+	}
+	memset(g->counters, 0, sizeof g->counters);
+	bool lit = plan_resample(p, g->group, weights, n, plan_resample_u(p, g->group), p->chains / p->groups, seeds);
+	free(weights);
+	if (!lit)
+		snprintf(g->failure, sizeof g->failure, "the bootstrap is black");
+	return lit;
+}
+
+static bool run_part(struct group_run *g, uint32_t part, const uint64_t *seeds)
+{
+	struct plan_range r = plan_chain_range(g->p, part);
+	struct batch before = {.state_count = 0};
+	bool ok = true;
+	for (uint64_t epoch = 0; epoch < g->p->rounds && ok; epoch++) {
+		struct lease_key k = {1, LEASE_RENDER, g->group, part, epoch};
+		struct lease_input in = {(uint32_t)(r.end - r.begin), epoch ? NULL : seeds + r.begin, before.states};
+		struct batch b;
+		ok = lease(g, &k, g->p->kind == PLAN_CHAINS ? &in : NULL, &b);
+		batch_fini(&before);
+		before = (struct batch){.state_count = 0};
+		if (ok) {
+			take(g, &b);
+			before = b;
+		}
+	}
+	batch_fini(&before);
+	return ok;
+}
+
+static void *run_group(void *arg)
+{
+	struct group_run *g = arg;
+	const struct plan *p = g->p;
+	uint64_t *seeds = calloc((size_t)p->chains / p->groups + 1, sizeof *seeds);
+	bool ok = p->kind == PLAN_SAMPLES || bootstrap(g, seeds);
+	for (uint32_t part = 0; part < p->parts && ok; part++)
+		ok = run_part(g, part, seeds);
+	free(seeds);
+	double pixels = (double)p->width * p->height, samples = (double)(p->epoch * p->rounds), scale = 1 / samples;
+	if (p->kind == PLAN_CHAINS)
+		scale = g->independent / g->count / (samples * p->chains / p->groups);
+	for (int c = 0; c <= AGREE_CELLS; c++)
+		g->mean[c] = g->sum[c] * scale / (c < AGREE_CELLS ? pixels / AGREE_CELLS : pixels);
+	return NULL;
+}
+
+static void make_plan(const struct world *w, const char *test, const char *side, const struct agree_side *how, struct plan *p)
+{
+	const struct render_integrator *i = render_integrator_find(how->integrator);
+	assert_non_null(i);
+	const char *scale = getenv("HSLT_TEST_SCALE");
+	uint64_t spp = how->spp / (scale && atoi(scale) > 0 ? (uint64_t)atoi(scale) : 1);
+	char name[128];
+	snprintf(name, sizeof name, "%s %s", test, side);
+	uint64_t pixels = (uint64_t)w->settings.width * w->settings.height;
+	uint32_t groups = how->groups;
+	*p = (struct plan){.kind = i->kind, .width = w->settings.width, .height = w->settings.height,
+			   .crop_width = w->settings.width, .crop_height = w->settings.height, .border = w->settings.border,
+			   .seed = stats_seed(name), .groups = groups, .parts = 1, .rounds = 2,
+			   .min_depth = how->min_depth ? how->min_depth : 1,
+			   .max_depth = how->max_depth ? how->max_depth : w->settings.max_depth};
+	strcpy(p->integrator, how->integrator);
+	p->chains = i->kind == PLAN_CHAINS ? groups * 8 : 0;
+	p->bootstrap = (uint64_t)groups * 2048;
+	uint64_t per = i->kind == PLAN_CHAINS ? spp * pixels / p->chains : spp / groups;
+	p->epoch = per / 2 ? per / 2 : 1;
+	struct error e = {""};
+	if (plan_check(p, &e))
+		fail_msg("%s", e.text);
+}
+
+void agree_render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+		  struct agree_image *out)
+{
+	static struct group_run runs[AGREE_MAX_GROUPS];
+	struct plan p;
+	make_plan(w, test, side, how, &p);
+	memset(runs, 0, sizeof runs);
+	*out = (struct agree_image){.groups = p.groups};
+	for (uint32_t g = 0; g < p.groups; g++)
+		runs[g] = (struct group_run){.w = w, .p = &p, .group = g, .mean = out->mean[g]};
+	for (uint32_t g = 0; g < p.groups; g += 2) {
+		pthread_t other;
+		bool two = g + 1 < p.groups && pthread_create(&other, NULL, run_group, &runs[g + 1]) == 0;
+		run_group(&runs[g]);
+		if (two)
+			pthread_join(other, NULL);
+	}
+	for (uint32_t g = 0; g < p.groups; g++) {
+		if (runs[g].failure[0])
+			fail_msg("%s: %s", how->integrator, runs[g].failure);
+		for (int i = 0; i < BATCH_COUNTERS; i++)
+			out->counters[i] += runs[g].counters[i];
+	}
+	assert_int_equal(out->counters[COUNT_NAN] + out->counters[COUNT_INFINITE] + out->counters[COUNT_NEGATIVE], 0);
+}
+
+struct cell {
+	double mean, error2, degrees; /* squared standard error */
+};
+
+static struct cell cell_stats(const struct agree_image *a, int c)
+{
+	double n = a->groups, m = 0, s = 0;
+	for (uint32_t g = 0; g < a->groups; g++)
+		m += a->mean[g][c] / n;
+	for (uint32_t g = 0; g < a->groups; g++)
+		s += (a->mean[g][c] - m) * (a->mean[g][c] - m) / (n - 1);
+	return (struct cell){m, s / n, n - 1};
+}
+
+static double critical_t(double level, double degrees)
+{
+	double lo = 0, hi = 1e4;
+	for (int i = 0; i < 80; i++) {
+		double mid = 0.5 * (lo + hi);
+		if (stats_student_t_p(mid, degrees) > level)
+			lo = mid;
+		else
+			hi = mid;
+	}
+	return hi;
+}
+
+struct verdict {
+	double difference, error, degrees; /* relative to the second mean */
+};
+
+static struct verdict compare(const struct cell *a, const struct cell *b)
+{
+	double v = a->error2 + b->error2, reference = fabs(b->mean);
+	double da = a->degrees > 0 ? a->error2 * a->error2 / a->degrees : 0;
+	double db = b->degrees > 0 ? b->error2 * b->error2 / b->degrees : 0;
+	return (struct verdict){(a->mean - b->mean) / reference, sqrt(v) / reference, da + db > 0 ? v * v / (da + db) : 30};
+}
+
+/* Holm over the cells; the power is that of the strictest step. */
+static void judge(const char *test, const struct verdict *v)
+{
+	const char *scale = getenv("HSLT_TEST_SCALE");
+	bool weak_allowed = scale && atoi(scale) > 1;
+	int cells = AGREE_CELLS + 1;
+	double worst_block = 0, mean_power = 0;
+	for (int c = 0; c < cells; c++) {
+		double t = critical_t(LEVEL / cells, v[c].degrees), least = (t + 1.645) * v[c].error;
+		double p = v[c].error > 0 ? stats_student_t_p(v[c].difference / v[c].error, v[c].degrees) : v[c].difference == 0;
+		if (c < AGREE_CELLS)
+			worst_block = fmax(worst_block, least);
+		else
+			mean_power = least;
+		/* A bias of twice the least that is found must be found here and now. */
+		double planted = v[c].difference + copysign(2 * least, v[c].difference);
+		if (v[c].error > 0 && stats_student_t_p(planted / v[c].error, v[c].degrees) > LEVEL / cells)
+			fail_msg("%s: cell %d does not see a planted bias of %.2g %%", test, c, 200 * least);
+		/* Holm's first step: the smallest of the p-values against level / cells. */
+		if (p < LEVEL / cells)
+			fail_msg("%s: cell %d differs by %.3g %% +- %.2g %% (p = %.1e)", test, c, 100 * v[c].difference,
+				 100 * v[c].error, p);
+	}
+	print_message("%s: mean differs by %+.3f %% +- %.3f %%; finds with 95 %%: %.2f %% on a block, %.2f %% on the mean\n", test,
+		      100 * v[AGREE_CELLS].difference, 100 * v[AGREE_CELLS].error, 100 * worst_block, 100 * mean_power);
+	if (!weak_allowed && (worst_block > 0.02 || mean_power > 0.005))
+		fail_msg("%s: too weak", test);
+}
+
+void agree_check(const char *test, const struct agree_image *a, const struct agree_image *b)
+{
+	struct verdict v[AGREE_CELLS + 1];
+	for (int c = 0; c <= AGREE_CELLS; c++) {
+		struct cell x = cell_stats(a, c), y = cell_stats(b, c);
+		v[c] = compare(&x, &y);
+	}
+	judge(test, v);
+}
+
+void agree_expect(const char *test, const struct agree_image *a, double expected)
+{
+	struct verdict v[AGREE_CELLS + 1];
+	for (int c = 0; c <= AGREE_CELLS; c++) {
+		struct cell x = cell_stats(a, c), y = {expected, 0, 0};
+		v[c] = compare(&x, &y);
+	}
+	judge(test, v);
+}

@@ -1,0 +1,39 @@
+/*
+ * Do two integrators make the same image? (contract, section 7.) Each side is rendered as 16 or more independent groups,
+ * with a seed of its own; blocks of the image and the mean are compared by Welch's t between the groups' means.
+ *
+ * Level: 1e-4 over all tests of the suite, shared equally among comparisons and by Holm's method within one. Power: the
+ * smallest bias found with 95 % probability is printed; more than 2 % on a block or 0.5 % on the mean is a failure, as is
+ * a planted bias of twice the smallest that goes unseen.
+ */
+#ifndef TESTS_SUPPORT_AGREE_H
+#define TESTS_SUPPORT_AGREE_H
+
+#include "worker/world/world.h"
+
+enum { AGREE_BLOCKS = 2, AGREE_CELLS = AGREE_BLOCKS * AGREE_BLOCKS, AGREE_MAX_GROUPS = 64 };
+
+struct agree_side {
+	const char *integrator;
+	uint64_t spp;
+	uint32_t groups; /* 16..64 */
+	uint32_t min_depth, max_depth; /* 0: 1 and the scene's */
+};
+
+/* Per group: the mean of X+Y+Z over each block, then over the whole film. */
+struct agree_image {
+	uint32_t groups;
+	double mean[AGREE_MAX_GROUPS][AGREE_CELLS + 1];
+	uint64_t counters[BATCH_COUNTERS];
+};
+
+void agree_render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+		  struct agree_image *out);
+
+/* Fails the test when the images differ, or when the comparison is too weak to tell. */
+void agree_check(const char *test, const struct agree_image *a, const struct agree_image *b);
+
+/* Fails unless every cell's mean is `expected` (same level and power, one-sample t). */
+void agree_expect(const char *test, const struct agree_image *a, double expected);
+
+#endif

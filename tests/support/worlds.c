@@ -1,0 +1,52 @@
+#include "tests/support/worlds.h"
+
+#include "tests/support/memory_assets.h"
+
+#include <stdarg.h>
+#include <setjmp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static struct world *build(const struct asset_source *assets, const char *name, uint32_t width, uint32_t height)
+{
+	struct error e = {""};
+	struct scene s;
+	struct world *w = NULL;
+	struct render_options o = {width, height};
+	int rc = scene_read(&s, assets, name, render_plugins(), NULL, 0, &e);
+	if (!rc) {
+		rc = world_new(&w, &s, assets, &o, &e);
+		scene_fini(&s);
+	}
+	if (rc)
+		fail_msg("%s", e.text);
+	return w;
+}
+
+struct world *world_of_text(uint32_t width, uint32_t height, const char *format, ...)
+{
+	static char body[1 << 16], text[sizeof body + 64];
+	va_list ap;
+	va_start(ap, format);
+	int n = vsnprintf(body, sizeof body, format, ap);
+	va_end(ap);
+	assert_true(n > 0 && (size_t)n < sizeof body);
+	int m = snprintf(text, sizeof text, "<scene version='3.0.0'>%s</scene>", body);
+	const struct memory_file files[] = {{"test.xml", text, (size_t)m}, {NULL, NULL, 0}};
+	struct asset_source assets = memory_assets(files);
+	return build(&assets, "test.xml", width, height);
+}
+
+struct world *world_of_public_scene(const char *folder, const char *file, uint32_t width, uint32_t height)
+{
+	const char *scenes = getenv("HSLT_SCENES");
+	if (!scenes)
+		return NULL;
+	char path[4096];
+	snprintf(path, sizeof path, "%s/%s", scenes, folder);
+	struct asset_source assets = asset_folder(path);
+	return build(&assets, file, width, height);
+}
