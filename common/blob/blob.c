@@ -288,6 +288,13 @@ int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, s
 	return fd;
 }
 
+void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path, size_t size)
+{
+	char hex[BLOB_HEX_SIZE];
+	blob_hex(h, hex);
+	snprintf(path, size, "%s/%s", s->folder, hex);
+}
+
 /* ---- writing ---- */
 
 int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struct blob_hash *h, uint64_t size,

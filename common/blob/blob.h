@@ -38,6 +38,9 @@ void blob_release(struct blob_store *s, const struct blob_hash *h);
 /* A file descriptor to read from, or -ENOENT. The caller closes it. */
 int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e);
 
+/* The file of a blob that is held, for those who map it. */
+void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path, size_t size);
+
 /* Writing: begin, add in order, commit. -EFBIG: more than was announced or than the limit; -EBADMSG: the bytes are not
  * those of that name. A writer ends with commit or abort. What is committed is held once. */
 struct blob_writer;

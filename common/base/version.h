@@ -1,0 +1,7 @@
+/* The project's version, as --version prints it. */
+#ifndef COMMON_BASE_VERSION_H
+#define COMMON_BASE_VERSION_H
+
+#define HSLT_VERSION "0.1.0"
+
+#endif
