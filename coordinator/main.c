@@ -1,0 +1,90 @@
+#include "common/base/log.h"
+#include "common/base/version.h"
+#include "coordinator/shell/server.h"
+
+#include <argp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *argp_program_version = "hslt-coordinator " HSLT_VERSION;
+
+static const char doc[] =
+	"Takes render jobs, hands their work to workers, merges what they send back into one image."
+	"\v"
+	"Examples:\n"
+	"  hslt-coordinator --listen 127.0.0.1:7700 --spool ~/farm --status-socket ~/farm/status\n"
+	"  hslt-coordinator --listen 0.0.0.0:7700 --insecure --spool /var/lib/hslt\n"
+	"\n"
+	"The spool keeps the jobs' results; one coordinator works with a spool at a time. A line of the log is written to "
+	"stderr for every event.\n"
+	"Exit codes: 0 stopped by SIGTERM or SIGINT, 1 failed, 2 usage.";
+
+enum { OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT };
+
+static const struct argp_option options[] = {
+	{"listen", 'l', "HOST:PORT", 0, "Where workers and clients connect (127.0.0.1:7700; port 0: any free one)", 0},
+	{"spool", OPTION_SPOOL, "DIR", 0, "The folder of blobs, jobs and results", 0},
+	{"status-socket", OPTION_STATUS, "PATH", 0, "Unix socket for hslt-status (or $HSLT_STATUS_SOCKET)", 0},
+	{"keep-partials", OPTION_PARTIALS, "DIR", 0, "Write every partial EXR tile that is merged into DIR", 0},
+	{"port-file", OPTION_PORT_FILE, "FILE", 0, "Write the port that was bound into FILE", 0},
+	{"heartbeat", OPTION_HEARTBEAT, "SECONDS", 0, "How often workers must be heard (5)", 0},
+	{"insecure", OPTION_INSECURE, NULL, 0, "Listen on other than loopback addresses without encryption", 0},
+	{"verbose", 'v', NULL, 0, "Log every lease, too", 0},
+	{0},
+};
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+	struct server_config *c = state->input;
+	char *end;
+	switch (key) {
+	case 'l':
+		c->listen = arg;
+		return 0;
+	case OPTION_SPOOL:
+		c->spool = arg;
+		return 0;
+	case OPTION_STATUS:
+		c->status_socket = arg;
+		return 0;
+	case OPTION_PARTIALS:
+		c->keep_partials = arg;
+		return 0;
+	case OPTION_PORT_FILE:
+		c->port_file = arg;
+		return 0;
+	case OPTION_HEARTBEAT:
+		c->heartbeat_seconds = strtod(arg, &end);
+		if (*end || end == arg || !(c->heartbeat_seconds >= 0.05 && c->heartbeat_seconds <= 3600))
+			argp_error(state, "--heartbeat takes 0.05 to 3600 seconds, not '%s'", arg);
+		return 0;
+	case OPTION_INSECURE:
+		c->insecure = true;
+		return 0;
+	case 'v':
+		log_set_level(LOG_LEVEL_DEBUG);
+		return 0;
+	case ARGP_KEY_END:
+		if (!c->spool)
+			argp_error(state, "--spool DIR is needed");
+		return 0;
+	default:
+		return ARGP_ERR_UNKNOWN;
+	}
+}
+
+int main(int argc, char **argv)
+{
+	struct server_config c;
+	struct error e;
+	server_config_init(&c);
+	c.status_socket = getenv("HSLT_STATUS_SOCKET");
+	argp_err_exit_status = 2;
+	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &c);
+	log_event(LOG_START, "program=hslt-coordinator version=%s", HSLT_VERSION);
+	int rc = server_run(&c, &e);
+	if (rc)
+		fprintf(stderr, "hslt-coordinator: %s\n", e.text);
+	return rc == 0 ? 0 : rc == -EPERM || rc == -EINVAL ? 2 : 1;
+}

@@ -1,0 +1,273 @@
+/* A client's side of a session: submit, list, cancel, watch, fetch. */
+#include "coordinator/shell/session.h"
+#include "coordinator/shell/upload.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+
+#include <fcntl.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { CHUNK = 1 << 20, HEADER_LIMIT = 1 << 20 };
+
+/* ---- submit ---- */
+
+static void answer_submit(struct session *p, uint64_t job, const char *refusal, const struct upload *u)
+{
+	Farm__SubmitAnswer answer;
+	Farm__Envelope m;
+	char text[1024] = "", plan[1024] = "";
+	struct blob_hash *hashes = NULL;
+	ProtobufCBinaryData *list = NULL;
+	farm__submit_answer__init(&answer);
+	farm__envelope__init(&m);
+	text_copy(text, sizeof text, refusal);
+	if (u)
+		plan_describe(&u->plan, plan, sizeof plan);
+	if (u && !job) {
+		hashes = mem_alloc(u->missing_count, sizeof *hashes);
+		list = mem_alloc(u->missing_count, sizeof *list);
+	}
+	if (hashes && list) {
+		answer.n_missing = upload_missing(u, hashes);
+		for (size_t i = 0; i < answer.n_missing; i++)
+			list[i] = (ProtobufCBinaryData){BLOB_HASH_SIZE, hashes[i].bytes};
+		answer.missing = list;
+	}
+	answer.job = job;
+	answer.refusal = text;
+	answer.plan = plan;
+	m.body_case = FARM__ENVELOPE__BODY_SUBMIT_ANSWER;
+	m.submit_answer = &answer;
+	session_send(p, &m, NULL, 0);
+	mem_free(hashes);
+	mem_free(list);
+}
+
+void session_upload_abort(struct session *p)
+{
+	if (p->upload)
+		upload_free(p->upload);
+	p->upload = NULL;
+	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, 0});
+}
+
+/* Every blob is there: the core decides. */
+static void submit(struct session *p)
+{
+	const Farm__Submit *m = p->upload->submit.message->submit;
+	char name[128];
+	text_copy(name, sizeof name, m->name);
+	struct event ev = {.kind = EVENT_SUBMIT,
+			   .tag = p->id,
+			   .submit = {.plan = &p->upload->plan,
+				      .name = name,
+				      .priority = m->priority,
+				      .owner = p->id,
+				      .mixed = m->mixed}};
+	p->rejected[0] = 0;
+	p->answered_job = 0;
+	p->server->submitter = p;
+	server_step(p->server, &ev);
+	p->server->submitter = NULL;
+	answer_submit(p, *p->rejected ? 0 : p->answered_job, p->rejected, *p->rejected ? NULL : p->upload);
+	session_upload_abort(p);
+}
+
+static void take_submit(struct session *p, struct envelope *env)
+{
+	struct error e;
+	if (p->upload) {
+		session_fault(p, "one submission at a time");
+		return;
+	}
+	if (upload_new(&p->upload, env, p->server->blobs, &e)) {
+		p->upload = NULL;
+		answer_submit(p, 0, e.text, NULL);
+		return;
+	}
+	if (p->upload->missing_count == 0) {
+		submit(p);
+		return;
+	}
+	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, CHUNK});
+	answer_submit(p, 0, "", p->upload);
+}
+
+static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
+{
+	struct error e;
+	if (!p->upload) {
+		session_fault(p, "a blob without a submission");
+		return;
+	}
+	int rc = upload_add(p->upload, c, payload, size, &e);
+	if (rc < 0) {
+		answer_submit(p, 0, e.text, NULL);
+		session_upload_abort(p);
+	} else if (rc && p->upload->missing_count == 0) {
+		submit(p);
+	}
+}
+
+/* ---- the rest ---- */
+
+static void take_list(struct session *p)
+{
+	struct job_view *views;
+	size_t count = server_views(p->server, &views);
+	Farm__JobStatus *status = mem_alloc(count, sizeof *status), **list = mem_alloc(count, sizeof *list);
+	Farm__JobListAnswer answer;
+	Farm__Envelope m;
+	farm__job_list_answer__init(&answer);
+	farm__envelope__init(&m);
+	for (size_t i = 0; status && list && i < count; i++) {
+		view_to_wire(&views[i], &status[i]);
+		list[i] = &status[i];
+		answer.n_jobs++;
+	}
+	answer.jobs = list;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_LIST_ANSWER;
+	m.job_list_answer = &answer;
+	session_send(p, &m, NULL, 0);
+	mem_free(status);
+	mem_free(list);
+	mem_free(views);
+}
+
+static void take_cancel(struct session *p, uint64_t job)
+{
+	struct event ev = {.kind = EVENT_CANCEL, .tag = p->id, .job = job};
+	Farm__Done done;
+	Farm__Envelope m;
+	p->rejected[0] = 0;
+	server_step(p->server, &ev);
+	farm__done__init(&done);
+	farm__envelope__init(&m);
+	done.ok = !*p->rejected;
+	done.text = p->rejected;
+	m.body_case = FARM__ENVELOPE__BODY_DONE;
+	m.done = &done;
+	session_send(p, &m, NULL, 0);
+}
+
+static void take_watch(struct session *p, uint64_t job)
+{
+	struct job_view v;
+	if (!server_view(p->server, job, &v)) {
+		session_fault(p, "there is no job j%llu", (unsigned long long)job);
+		return;
+	}
+	p->watched = job;
+	mem_free(p->shown);
+	p->shown = NULL;
+	session_tick(p);
+}
+
+static int read_chunk(const char *path, uint64_t offset, unsigned char *bytes, size_t *count, uint64_t *size,
+		      struct error *e)
+{
+	struct stat st;
+	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	int rc = fd < 0 || fstat(fd, &st) ? error_set(e, errno, "%s", strerror(errno)) : 0;
+	if (!rc && offset > (uint64_t)st.st_size)
+		rc = error_set(e, EINVAL, "the file is shorter than that");
+	ssize_t n = rc ? 0 : pread(fd, bytes, CHUNK, (off_t)offset);
+	if (n < 0)
+		rc = error_set(e, errno, "%s", strerror(errno));
+	if (!rc) {
+		*count = (size_t)n;
+		*size = (uint64_t)st.st_size;
+		if (*count > *size - offset) /* a log that has grown in between */
+			*size = offset + *count;
+	}
+	if (fd >= 0)
+		close(fd);
+	return rc;
+}
+
+static const char *file_of(Farm__What what)
+{
+	switch (what) {
+	case FARM__WHAT__WHAT_RESULT:
+		return "result.exr";
+	case FARM__WHAT__WHAT_LOG:
+		return "log";
+	case FARM__WHAT__WHAT_PREVIEW:
+		return "preview.exr";
+	default:
+		return NULL; /* a number from outside */
+	}
+}
+
+static int fetch(struct session *p, const Farm__Fetch *f, Farm__FetchChunk *chunk, struct job_view *v, unsigned char *bytes,
+		 size_t *count, struct error *e)
+{
+	char path[SPOOL_PATH_MAX];
+	const char *file = file_of(f->what);
+	if (!server_view(p->server, f->job, v))
+		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)f->job);
+	if (!file)
+		return error_set(e, EINVAL, "there is nothing of that kind to fetch");
+	if (f->what == FARM__WHAT__WHAT_RESULT && !v->record.has_result)
+		return error_set(e, ENOENT, "job j%llu is %s: it has no result", (unsigned long long)f->job, v->record.state);
+	spool_job_path(p->server->spool, f->job, file, path);
+	int rc = bytes ? read_chunk(path, f->offset, bytes, count, &chunk->size, e) : error_set(e, ENOMEM, "no memory");
+	return rc == -ENOENT ? error_set(e, ENOENT, "job j%llu has no %s yet", (unsigned long long)f->job, file) : rc;
+}
+
+static void take_fetch(struct session *p, const Farm__Fetch *f)
+{
+	Farm__FetchChunk chunk;
+	Farm__Envelope m;
+	struct job_view v;
+	struct error e = {""};
+	unsigned char *bytes = mem_alloc(CHUNK, 1);
+	size_t count = 0;
+	farm__fetch_chunk__init(&chunk);
+	farm__envelope__init(&m);
+	chunk.job = f->job;
+	chunk.what = f->what;
+	chunk.offset = f->offset;
+	chunk.error = e.text;
+	if (fetch(p, f, &chunk, &v, bytes, &count, &e) == 0)
+		chunk.output = v.record.output;
+	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
+	m.fetch_chunk = &chunk;
+	session_send(p, &m, bytes, count);
+	mem_free(bytes);
+}
+
+void session_client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	const Farm__Envelope *m = env->message;
+	switch (m->body_case) {
+	case FARM__ENVELOPE__BODY_HEARTBEAT:
+		break;
+	case FARM__ENVELOPE__BODY_SUBMIT:
+		take_submit(p, env);
+		break;
+	case FARM__ENVELOPE__BODY_BLOB_CHUNK:
+		take_blob(p, m->blob_chunk, payload, size);
+		break;
+	case FARM__ENVELOPE__BODY_JOB_LIST:
+		take_list(p);
+		break;
+	case FARM__ENVELOPE__BODY_CANCEL:
+		take_cancel(p, m->cancel->job);
+		break;
+	case FARM__ENVELOPE__BODY_WATCH:
+		take_watch(p, m->watch->job);
+		break;
+	case FARM__ENVELOPE__BODY_FETCH:
+		take_fetch(p, m->fetch);
+		break;
+	case FARM__ENVELOPE__BODY_BYE:
+		conn_close(p->conn, "the client said goodbye");
+		break;
+	default:
+		session_fault(p, "not a message that a client says");
+	}
+}

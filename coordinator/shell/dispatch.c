@@ -1,0 +1,259 @@
+#include "coordinator/shell/dispatch.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "common/film/exr.h"
+#include "coordinator/shell/publish.h"
+#include "coordinator/shell/upload.h"
+
+#include <assert.h>
+#include <fcntl.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static unsigned long long number(uint64_t n)
+{
+	return n;
+}
+
+/* ---- jobs ---- */
+
+static void submitted(struct server *s, const struct action *a)
+{
+	struct session *p = s->submitter;
+	struct order *o;
+	struct error e;
+	assert(p && p->upload && p->id == a->tag);
+	const Farm__Submit *m = p->upload->submit.message->submit;
+	p->answered_job = a->job;
+	int rc = spool_take_job(s->spool, a->job, &e);
+	if (!rc)
+		rc = order_new(&o, a->job, &p->upload->submit, &p->upload->plan, s->spool, &e);
+	if (rc) {
+		text_copy(p->rejected, sizeof p->rejected, e.text);
+		server_job_broken(s, a->job, e.text);
+		return;
+	}
+	o->next = s->orders;
+	s->orders = o;
+	char plan[1024];
+	plan_describe(&o->plan, plan, sizeof plan);
+	order_log(o, LOG_JOB_SUBMIT, "name=%s client=%s plan=%s", log_quote(o->record.name).text, p->address,
+		  log_quote(plan).text);
+	for (size_t i = 0; i < m->n_notes; i++)
+		order_log(o, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
+	for (size_t i = 0; i < m->n_effects; i++)
+		order_log(o, LOG_JOB_NOTE, "effect=%s on=%d why=%s", log_quote(m->effects[i]->name).text,
+			  (int)m->effects[i]->on, log_quote(m->effects[i]->why).text);
+}
+
+static void rejected(struct server *s, const struct action *a)
+{
+	struct session *p = session_find(s, a->tag ? a->tag : a->peer);
+	if (p)
+		text_copy(p->rejected, sizeof p->rejected, *a->text ? a->text : "refused");
+}
+
+static void job_changed(struct server *s, const struct action *a)
+{
+	struct order *o = server_order(s, a->job);
+	if (!o)
+		return;
+	order_log(o, a->state == JOB_FAILED ? LOG_JOB_FAILED : a->state == JOB_DONE ? LOG_JOB_DONE : LOG_JOB_STATE,
+		  "state=%s reason=%s rounds=%llu text=%s", job_state_name(a->state),
+		  a->end == END_NONE ? "none" : job_end_name(a->end), number(a->rounds), log_quote(a->text).text);
+	o->ended = job_state_is_end(a->state);
+}
+
+static void bootstrap_done(struct server *s, const struct action *a)
+{
+	struct order *o = server_order(s, a->job);
+	struct error e = {""};
+	int rc = order_prepare(o, spool_canvas(s->spool), &e);
+	if (!rc)
+		order_log(o, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d", o->lit.b_pooled,
+			  o->lit.beyond_share, (int)o->lit.black);
+	struct event ev = {.kind = EVENT_PREPARED,
+			   .job = a->job,
+			   .text = e.text,
+			   .prepared = {.job = a->job, .ok = rc == 0, .black = o->lit.black}};
+	server_defer(s, &ev);
+}
+
+/* ---- batches ---- */
+
+static void keep_partials(const struct server *s, const struct lease_key *k)
+{
+	for (size_t i = 0; i < s->result->n_tile_sizes; i++) {
+		char path[SPOOL_PATH_MAX];
+		size_t size;
+		const unsigned char *bytes = batch_tile_bytes(s->result, s->payload, i, &size);
+		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", s->config.keep_partials, number(k->job),
+			 number(k->epoch), k->group, k->part, s->batch->tiles[i].x, s->batch->tiles[i].y);
+		int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+		if (fd < 0 || write(fd, bytes, size) != (ssize_t)size)
+			log_event(LOG_SPOOL_FAULT, "path=%s text=%s", log_quote(path).text, log_quote(strerror(errno)).text);
+		if (fd >= 0)
+			close(fd);
+	}
+}
+
+static void merge(struct server *s, const struct action *a)
+{
+	struct order *o = server_order(s, a->job);
+	struct error e;
+	assert(o && s->batch && !o->busy);
+	if (s->config.keep_partials)
+		keep_partials(s, &a->key);
+	if (order_merge(o, s->batch, &e))
+		server_job_broken(s, a->job, e.text);
+	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
+		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
+}
+
+static void acknowledge(struct server *s, const struct action *a)
+{
+	struct session *p = session_find(s, a->peer);
+	if (p)
+		session_send_ack(p, &a->key, a->ack, a->text);
+	if (a->ack != ACK_MERGED)
+		log_event(a->ack == ACK_REPEAT ? LOG_BATCH_REPEATED : LOG_BATCH_REFUSED,
+			  "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu text=%s", number(a->job),
+			  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch),
+			  log_quote(a->text).text);
+}
+
+/* ---- leases and peers ---- */
+
+static void send_lease(struct server *s, const struct action *a)
+{
+	struct session *p = session_find(s, a->peer);
+	struct order *o = server_order(s, a->job);
+	if (!p || !o)
+		return;
+	order_count_worker(o, a->peer);
+	session_send_lease(p, o, &a->key);
+	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
+		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
+}
+
+static void revoke_lease(struct server *s, const struct action *a)
+{
+	struct session *p = session_find(s, a->peer);
+	if (p)
+		session_send_revoke(p, &a->key);
+	log_event(LOG_LEASE_GRANTED, "revoked=1 job=j%llu peer=%llu group=%u part=%u epoch=%llu", number(a->job),
+		  number(a->peer), a->key.group, a->key.part, number(a->key.epoch));
+}
+
+static void close_peer(struct server *s, const struct action *a)
+{
+	struct session *p = session_find(s, a->peer);
+	if (!p)
+		return;
+	p->joined = false;
+	session_fault(p, "%s", a->text);
+}
+
+void dispatch_update(struct server *s, const struct update *u)
+{
+	for (size_t i = 0; i < u->count; i++) {
+		const struct action *a = &u->actions[i];
+		switch (a->kind) {
+		case ACTION_SUBMITTED:
+			submitted(s, a);
+			break;
+		case ACTION_CANCELLED:
+			break;
+		case ACTION_REJECTED:
+			rejected(s, a);
+			break;
+		case ACTION_SEND_LEASE:
+			send_lease(s, a);
+			break;
+		case ACTION_REVOKE:
+			revoke_lease(s, a);
+			break;
+		case ACTION_MERGE:
+			merge(s, a);
+			break;
+		case ACTION_ACK:
+			acknowledge(s, a);
+			break;
+		case ACTION_BOOTSTRAP_DONE:
+			bootstrap_done(s, a);
+			break;
+		case ACTION_ROUND_DONE:
+			break;
+		case ACTION_EVALUATE_ERROR:
+			publish_start(s, server_order(s, a->job), PUBLISH_ERROR_ONLY, a->rounds);
+			break;
+		case ACTION_PUBLISH:
+			publish_start(s, server_order(s, a->job), a->final ? PUBLISH_RESULT : PUBLISH_PREVIEW, a->rounds);
+			break;
+		case ACTION_JOB_CHANGED:
+			job_changed(s, a);
+			break;
+		case ACTION_JOB_FORGOTTEN:
+			break;
+		case ACTION_CLOSE_PEER:
+			close_peer(s, a);
+			break;
+		}
+	}
+}
+
+/* ---- the end of an order ---- */
+
+static void remember(struct server *s, const struct job_record *r)
+{
+	if (s->ended_count == ENDED_MAX)
+		memmove(s->ended, s->ended + 1, --s->ended_count * sizeof *s->ended);
+	s->ended[s->ended_count++] = *r;
+}
+
+static void finish(struct server *s, struct order *o)
+{
+	struct job_view v;
+	struct error e;
+	struct timespec now;
+	clock_gettime(CLOCK_REALTIME, &now);
+	server_view(s, o->id, &v);
+	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+	if (spool_write_record(s->spool, &v.record, &e))
+		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	remember(s, &v.record);
+	for (struct session *p = s->sessions; p; p = p->next)
+		if (p->state == SESSION_WORKER)
+			session_send_job_end(p, o->id);
+	order_release_blobs(order_submit(o), s->blobs);
+	struct order **at = &s->orders;
+	while (*at != o)
+		at = &(*at)->next;
+	*at = o->next;
+	struct waiting_batch *late = o->waiting;
+	o->waiting = NULL;
+	o->waiting_last = &o->waiting;
+	order_free(o);
+	while (late) { /* the core says that the job is over */
+		struct waiting_batch *next = late->next;
+		server_result(s, late->peer, &late->envelope, late->payload, late->payload_size);
+		waiting_batch_free(late);
+		late = next;
+	}
+}
+
+void dispatch_finish_orders(struct server *s)
+{
+	for (struct order *o = s->orders, *next; o; o = next) {
+		next = o->next;
+		if (o->ended && !o->busy) {
+			finish(s, o);
+			next = s->orders; /* late batches may have ended others */
+		}
+	}
+	for (struct session *p = s->sessions; p; p = p->next)
+		if (p->watched && p->shown && !server_order(s, p->watched))
+			session_tick(p);
+}

@@ -1,0 +1,11 @@
+/* What the core's update asks for, carried out action by action. The loop's thread. */
+#ifndef COORDINATOR_SHELL_DISPATCH_H
+#define COORDINATOR_SHELL_DISPATCH_H
+
+#include "coordinator/shell/server.h"
+
+void dispatch_update(struct server *s, const struct update *u);
+/* Orders that the core has ended and whose canvas is free: written down, told to the workers, let go. */
+void dispatch_finish_orders(struct server *s);
+
+#endif

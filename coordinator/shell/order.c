@@ -1,0 +1,227 @@
+#include "coordinator/shell/order.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+
+#include <assert.h>
+#include <stdarg.h>
+#include <string.h>
+#include <time.h>
+
+const Farm__Submit *order_submit(const struct order *o)
+{
+	return o->submit.message->submit;
+}
+
+static void begin_record(struct order *o)
+{
+	const Farm__Submit *m = order_submit(o);
+	struct job_record *r = &o->record;
+	struct timespec now;
+	clock_gettime(CLOCK_REALTIME, &now);
+	r->id = o->id;
+	text_copy(r->name, sizeof r->name, m->name);
+	text_copy(r->integrator, sizeof r->integrator, o->plan.integrator);
+	text_copy(r->state, sizeof r->state, "queued");
+	text_copy(r->output, sizeof r->output, m->output);
+	r->priority = m->priority;
+	r->rel_error = -1;
+	r->submitted = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+}
+
+int order_new(struct order **out, uint64_t id, struct envelope *submit, const struct plan *plan, struct spool *s,
+	      struct error *e)
+{
+	struct order *o = mem_alloc(1, sizeof *o);
+	if (!o)
+		return error_set(e, ENOMEM, "no memory for a job");
+	o->id = id;
+	o->plan = *plan;
+	o->submit = *submit;
+	memset(submit, 0, sizeof *submit);
+	o->waiting_last = &o->waiting;
+	begin_record(o);
+	o->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->states);
+	o->group_dead = mem_alloc(plan->groups, sizeof *o->group_dead);
+	if (plan->kind == PLAN_CHAINS) {
+		o->chains_per_lease = plan->chains / (plan->groups * plan->parts);
+		o->seeds = mem_alloc(plan->chains, sizeof *o->seeds);
+	}
+	int rc = 0;
+	if (!o->states || !o->group_dead || (plan->kind == PLAN_CHAINS && !o->seeds))
+		rc = error_set(e, ENOMEM, "no memory for a job");
+	if (!rc)
+		rc = bootstrap_new(&o->bootstrap, plan, e);
+	if (!rc)
+		rc = spool_write_record(s, &o->record, e);
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(s, id, "log", path);
+	o->log = rc ? NULL : fopen(path, "ae");
+	if (!rc && !o->log)
+		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	if (rc) {
+		*submit = o->submit;
+		memset(&o->submit, 0, sizeof o->submit);
+		order_free(o);
+		return rc;
+	}
+	setvbuf(o->log, NULL, _IOLBF, 0);
+	*out = o;
+	return 0;
+}
+
+void order_free(struct order *o)
+{
+	assert(!o->busy);
+	for (struct waiting_batch *w; (w = order_take_waiting(o));)
+		waiting_batch_free(w);
+	for (uint32_t i = 0; o->states && i < o->plan.groups * o->plan.parts; i++)
+		states_fini(o->states[i], o->chains_per_lease);
+	mem_free(o->states);
+	mem_free(o->group_dead);
+	mem_free(o->seeds);
+	bootstrap_free(o->bootstrap);
+	canvas_free(o->canvas);
+	if (o->log)
+		fclose(o->log);
+	envelope_fini(&o->submit);
+	mem_free(o);
+}
+
+void order_log(struct order *o, enum log_event event, const char *fields, ...)
+{
+	enum { TEXT = 1800 };
+	char text[TEXT], line[TEXT + 200];
+	va_list ap;
+	va_start(ap, fields);
+	vsnprintf(text, sizeof text, fields, ap);
+	va_end(ap);
+	log_event(event, "job=j%llu %s", (unsigned long long)o->id, text);
+	log_format(line, sizeof line, event, text);
+	fprintf(o->log, "%s\n", line);
+}
+
+/* ---- merging ---- */
+
+static struct chain_state **states_at(const struct order *o, const struct lease_key *k)
+{
+	return &o->states[(size_t)k->group * o->plan.parts + k->part];
+}
+
+int order_merge(struct order *o, struct batch *b, struct error *e)
+{
+	o->cpu_seconds += b->cpu_seconds;
+	if (b->key.kind == LEASE_BOOTSTRAP)
+		return bootstrap_add(o->bootstrap, b, e);
+	int rc = canvas_add(o->canvas, b, e);
+	if (!rc && o->plan.kind == PLAN_CHAINS) {
+		struct chain_state **at = states_at(o, &b->key);
+		states_fini(*at, o->chains_per_lease);
+		*at = b->states;
+		b->states = NULL;
+		b->state_count = 0;
+	}
+	return rc;
+}
+
+int order_prepare(struct order *o, const char *canvas_folder, struct error *e)
+{
+	bootstrap_merge(o->bootstrap, &o->lit);
+	/* A black job ends before anything is drawn: then the grid does not matter. */
+	int rc = canvas_new(&o->canvas, &o->plan, canvas_grid_exponent(&o->plan, o->lit.b_pooled, 0), canvas_folder, e);
+	if (rc)
+		return rc;
+	bootstrap_to_canvas(o->bootstrap, o->canvas);
+	uint32_t per_group = o->plan.kind == PLAN_CHAINS ? o->plan.chains / o->plan.groups : 0;
+	for (uint32_t g = 0; o->seeds && g < o->plan.groups; g++)
+		o->group_dead[g] = !bootstrap_seeds(o->bootstrap, g, o->seeds + (size_t)g * per_group);
+	bootstrap_free(o->bootstrap);
+	o->bootstrap = NULL;
+	return 0;
+}
+
+int order_pack_lease(const struct order *o, const struct lease_key *k, unsigned char **frame, size_t *size, struct error *e)
+{
+	if (k->kind == LEASE_BOOTSTRAP || o->plan.kind != PLAN_CHAINS)
+		return grant_pack(k, NULL, NULL, 0, frame, size, e);
+	if (k->epoch > 0)
+		return grant_pack(k, NULL, *states_at(o, k), o->chains_per_lease, frame, size, e);
+	struct plan_range r = plan_chain_range(&o->plan, k->part);
+	assert(r.end - r.begin == o->chains_per_lease);
+	if (!o->group_dead[k->group]) {
+		const uint64_t *seeds = o->seeds + (size_t)k->group * (o->plan.chains / o->plan.groups) + r.begin;
+		return grant_pack(k, seeds, NULL, o->chains_per_lease, frame, size, e);
+	}
+	/* Dead chains have empty states from the start. */
+	struct chain_state *dead = mem_alloc(o->chains_per_lease, sizeof *dead);
+	if (!dead)
+		return error_set(e, ENOMEM, "no memory to pack a lease");
+	int rc = grant_pack(k, NULL, dead, o->chains_per_lease, frame, size, e);
+	mem_free(dead);
+	return rc;
+}
+
+void order_count_worker(struct order *o, uint64_t peer)
+{
+	enum { KNOWN = sizeof o->last_workers / sizeof *o->last_workers };
+	for (uint32_t i = 0; i < KNOWN; i++)
+		if (o->last_workers[i] == peer)
+			return;
+	o->last_workers[o->worker_count++ % KNOWN] = peer;
+}
+
+/* ---- results that wait ---- */
+
+bool order_put_off(struct order *o, uint64_t peer, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	struct waiting_batch *w = mem_alloc(1, sizeof *w);
+	unsigned char *copy = mem_alloc(size, 1);
+	if (!w || !copy) {
+		mem_free(w);
+		mem_free(copy);
+		return false;
+	}
+	if (size)
+		memcpy(copy, payload, size);
+	*w = (struct waiting_batch){NULL, peer, *env, copy, size};
+	memset(env, 0, sizeof *env);
+	*o->waiting_last = w;
+	o->waiting_last = &w->next;
+	return true;
+}
+
+struct waiting_batch *order_take_waiting(struct order *o)
+{
+	struct waiting_batch *w = o->waiting;
+	if (!w)
+		return NULL;
+	o->waiting = w->next;
+	if (!o->waiting)
+		o->waiting_last = &o->waiting;
+	return w;
+}
+
+void waiting_batch_free(struct waiting_batch *w)
+{
+	envelope_fini(&w->envelope);
+	mem_free(w->payload);
+	mem_free(w);
+}
+
+/* ---- bundle ---- */
+
+struct blob_hash order_file_hash(const Farm__File *f)
+{
+	struct blob_hash h;
+	assert(f->hash.len == BLOB_HASH_SIZE);
+	memcpy(h.bytes, f->hash.data, BLOB_HASH_SIZE);
+	return h;
+}
+
+void order_release_blobs(const Farm__Submit *m, struct blob_store *s)
+{
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = order_file_hash(m->files[i]);
+		blob_release(s, &h);
+	}
+}

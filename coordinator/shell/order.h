@@ -1,0 +1,74 @@
+/*
+ * An order: a live job with all its weight, beside the few numbers that the core (coordinator/core) keeps of it. Scene
+ * bundle as submitted, bootstrap, canvas, seeds, the chain states of each (group, part)'s last merged epoch, its log.
+ * The loop's thread, but while `busy` a thread of the pool has the canvas and nobody else touches it.
+ */
+#ifndef COORDINATOR_SHELL_ORDER_H
+#define COORDINATOR_SHELL_ORDER_H
+
+#include "common/base/log.h"
+#include "common/blob/blob.h"
+#include "common/film/merge.h"
+#include "common/wire/batch_wire.h"
+#include "coordinator/shell/view.h"
+#include "coordinator/store/spool.h"
+
+#include <stdio.h>
+
+/* A result that came while the canvas was busy. */
+struct waiting_batch {
+	struct waiting_batch *next;
+	uint64_t peer;
+	struct envelope envelope;
+	unsigned char *payload;
+	size_t payload_size;
+};
+
+struct order {
+	struct order *next;
+	uint64_t id;
+	struct envelope submit; /* owned */
+	struct plan plan;
+	struct job_record record;
+	struct bootstrap *bootstrap; /* until the canvas is there */
+	struct canvas *canvas;       /* from then on */
+	struct bootstrap_result lit;
+	uint64_t *seeds;             /* [groups][chains / groups]; NULL for samples */
+	bool *group_dead;            /* [groups]: its bootstrap was black */
+	struct chain_state **states; /* [groups x parts]; NULL entries: no epoch merged yet */
+	uint32_t chains_per_lease;
+	FILE *log;
+	bool busy, ended;
+	double render_begun, cpu_seconds; /* s on the loop's clock; of all merged batches */
+	uint32_t worker_count;            /* who had leases of it */
+	uint64_t last_workers[64];
+	struct waiting_batch *waiting, **waiting_last;
+};
+
+/* Takes the submission, makes the job's folder and its record. */
+int order_new(struct order **o, uint64_t id, struct envelope *submit, const struct plan *plan, struct spool *s, struct error *e);
+/* Frees the memory; blobs and files stay. Not while busy. */
+void order_free(struct order *o);
+
+const Farm__Submit *order_submit(const struct order *o);
+__attribute__((format(printf, 3, 4))) void order_log(struct order *o, enum log_event event, const char *fields, ...);
+
+/* A batch that the core has accepted. Takes its states out of it. */
+int order_merge(struct order *o, struct batch *b, struct error *e);
+/* All bootstrap batches are in: b, seeds, canvas. */
+int order_prepare(struct order *o, const char *canvas_folder, struct error *e);
+/* The lease as a frame for a worker. */
+int order_pack_lease(const struct order *o, const struct lease_key *k, unsigned char **frame, size_t *size, struct error *e);
+void order_count_worker(struct order *o, uint64_t peer);
+
+/* false: memory is out. */
+bool order_put_off(struct order *o, uint64_t peer, struct envelope *env, const unsigned char *payload, size_t size);
+struct waiting_batch *order_take_waiting(struct order *o); /* NULL: none */
+void waiting_batch_free(struct waiting_batch *w);
+
+/* Lets go of the bundle's blobs. */
+void order_release_blobs(const Farm__Submit *m, struct blob_store *s);
+/* A file's hash in a message of which the length was checked. */
+struct blob_hash order_file_hash(const Farm__File *f);
+
+#endif

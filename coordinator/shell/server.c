@@ -1,0 +1,405 @@
+#include "coordinator/shell/server.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/shell/dispatch.h"
+#include "coordinator/shell/session.h"
+#include "coordinator/shell/status.h"
+
+#include <assert.h>
+#include <fcntl.h>
+#include <math.h>
+#include <signal.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { BACKLOG = 128, TICK_MS = 200 };
+
+void server_config_init(struct server_config *c)
+{
+	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .max_connections = 1024};
+}
+
+double server_now(const struct server *s)
+{
+	(void)s;
+	return (double)uv_hrtime() * 1e-9;
+}
+
+/* ---- the core ---- */
+
+void server_defer(struct server *s, const struct event *ev)
+{
+	struct deferred *d = mem_alloc(1, sizeof *d);
+	if (!d) /* 300 bytes: without them nothing can go on */
+		abort();
+	d->event = *ev;
+	text_copy(d->text, sizeof d->text, ev->text ? ev->text : "");
+	d->event.text = d->text;
+	*s->deferred_last = d;
+	s->deferred_last = &d->next;
+}
+
+void server_job_broken(struct server *s, uint64_t job, const char *text)
+{
+	struct event ev = {.kind = EVENT_JOB_BROKEN, .job = job, .text = text};
+	server_defer(s, &ev);
+}
+
+static void on_wake(uv_timer_t *t);
+
+static void one_step(struct server *s, struct event *ev)
+{
+	struct update u;
+	ev->time = server_now(s);
+	farm_step(s->farm, ev, &u);
+	s->changes++;
+	dispatch_update(s, &u);
+	if (isfinite(u.wake) && !s->stopping) {
+		double ms = ceil(1000 * (u.wake - server_now(s)));
+		uv_timer_start(&s->wake, on_wake, ms > 1 ? (uint64_t)ms : 1, 0);
+	} else {
+		uv_timer_stop(&s->wake);
+	}
+}
+
+void server_step(struct server *s, struct event *ev)
+{
+	if (s->stepping) { /* what sessions say while an update is carried out */
+		server_defer(s, ev);
+		return;
+	}
+	s->stepping = true;
+	one_step(s, ev);
+	s->batch = NULL;
+	s->result = NULL;
+	while (s->deferred) {
+		struct deferred *d = s->deferred;
+		s->deferred = d->next;
+		if (!s->deferred)
+			s->deferred_last = &s->deferred;
+		one_step(s, &d->event);
+		mem_free(d);
+	}
+	s->stepping = false;
+	dispatch_finish_orders(s);
+}
+
+static void on_wake(uv_timer_t *t)
+{
+	struct event ev = {.kind = EVENT_TICK};
+	server_step(t->data, &ev);
+}
+
+/* ---- orders ---- */
+
+struct order *server_order(const struct server *s, uint64_t job)
+{
+	for (struct order *o = s->orders; o; o = o->next)
+		if (o->id == job)
+			return o;
+	return NULL;
+}
+
+static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult *m, const unsigned char *payload,
+			size_t size)
+{
+	struct event ev = {.kind = EVENT_BATCH, .peer = peer, .lease = {.valid = true}};
+	struct error e = {""};
+	struct batch batch = {0};
+	if (lease_key_from_wire(m->key, &ev.lease.key, &e)) {
+		struct session *p = session_find(s, peer);
+		if (p)
+			session_fault(p, "%s", e.text);
+		return;
+	}
+	ev.job = ev.lease.key.job;
+	struct order *o = server_order(s, ev.job);
+	int rc = o ? batch_unpack(&batch, &o->plan, m, payload, size, &e) : 0;
+	if (rc == -ENOMEM) {
+		server_job_broken(s, ev.job, e.text);
+		ev.kind = EVENT_HEARD;
+	}
+	ev.lease.valid = rc == 0;
+	ev.text = e.text;
+	s->batch = &batch;
+	s->result = m;
+	s->payload = payload;
+	server_step(s, &ev);
+	batch_fini(&batch);
+}
+
+void server_result(struct server *s, uint64_t peer, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	const Farm__LeaseResult *m = env->message->lease_result;
+	struct order *o = m->key ? server_order(s, m->key->job) : NULL;
+	if (!o || !o->busy) {
+		take_result(s, peer, m, payload, size);
+	} else if (!order_put_off(o, peer, env, payload, size)) {
+		struct session *p = session_find(s, peer);
+		if (p)
+			session_fault(p, "no memory for a result");
+	}
+}
+
+void server_order_free_again(struct server *s, struct order *o)
+{
+	o->busy = false;
+	uint64_t id = o->id;
+	for (struct waiting_batch *w; (o = server_order(s, id)) && !o->busy && (w = order_take_waiting(o));) {
+		server_result(s, w->peer, &w->envelope, w->payload, w->payload_size);
+		waiting_batch_free(w);
+	}
+	dispatch_finish_orders(s);
+}
+
+/* ---- views ---- */
+
+static void view_order(struct server *s, const struct order *o, struct job_view *v)
+{
+	struct job_status status;
+	view_of_record(v, &o->record);
+	if (!farm_job(s->farm, o->id, server_now(s), &status))
+		return;
+	view_add_status(v, &status);
+	if (o->record.exit_code) { /* the core's job is done, but its image could not be written */
+		text_copy(v->record.state, sizeof v->record.state, "failed");
+		text_copy(v->record.why, sizeof v->record.why, o->record.why);
+		v->record.exit_code = o->record.exit_code;
+	} else if (o->ended && o->busy) { /* not before its image is there */
+		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
+		v->record.reason[0] = 0;
+		v->record.exit_code = 0;
+	}
+}
+
+bool server_view(struct server *s, uint64_t job, struct job_view *v)
+{
+	struct job_record r;
+	struct order *o = server_order(s, job);
+	if (o) {
+		view_order(s, o, v);
+		return true;
+	}
+	for (size_t i = 0; i < s->ended_count; i++)
+		if (s->ended[i].id == job) {
+			view_of_record(v, &s->ended[i]);
+			return true;
+		}
+	if (spool_read_record(s->spool, job, &r, NULL))
+		return false;
+	view_of_record(v, &r);
+	return true;
+}
+
+static int by_id(const void *a, const void *b)
+{
+	const struct job_view *x = a, *y = b;
+	return (x->record.id > y->record.id) - (x->record.id < y->record.id);
+}
+
+size_t server_views(struct server *s, struct job_view **views)
+{
+	size_t count = s->ended_count, n = 0;
+	for (struct order *o = s->orders; o; o = o->next)
+		count++;
+	*views = mem_alloc(count, sizeof **views);
+	if (!*views)
+		return 0;
+	for (size_t i = 0; i < s->ended_count; i++)
+		view_of_record(&(*views)[n++], &s->ended[i]);
+	for (struct order *o = s->orders; o; o = o->next)
+		view_order(s, o, &(*views)[n++]);
+	qsort(*views, count, sizeof **views, by_id);
+	return count;
+}
+
+/* ---- start ---- */
+
+/* Jobs of an earlier life. Those that had not ended cannot go on. */
+static int read_ended(struct server *s, struct error *e)
+{
+	uint64_t ids[ENDED_MAX];
+	size_t count = spool_jobs(s->spool, ids, ENDED_MAX);
+	s->ended = mem_alloc(ENDED_MAX, sizeof *s->ended);
+	if (!s->ended)
+		return error_set(e, ENOMEM, "no memory for the list of jobs");
+	for (size_t i = 0; i < count; i++) {
+		struct job_record *r = &s->ended[s->ended_count];
+		struct error fault;
+		if (spool_read_record(s->spool, ids[i], r, &fault)) {
+			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)ids[i],
+				  log_quote(fault.text).text);
+			continue;
+		}
+		if (!record_is_ended(r)) {
+			text_copy(r->state, sizeof r->state, "failed");
+			text_copy(r->reason, sizeof r->reason, job_end_name(END_FAILED));
+			text_copy(r->why, sizeof r->why, "the coordinator stopped before the job was done");
+			r->exit_code = 3;
+			if (spool_write_record(s->spool, r, &fault))
+				log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(fault.text).text);
+		}
+		s->ended_count++;
+	}
+	log_event(LOG_SPOOL_READ, "path=%s jobs=%zu next=j%llu", log_quote(s->config.spool).text, s->ended_count,
+		  (unsigned long long)spool_next_job(s->spool));
+	return 0;
+}
+
+static void on_connection(uv_stream_t *listener, int status)
+{
+	struct server *s = listener->data;
+	if (status == 0 && !s->stopping)
+		session_accept(s);
+}
+
+static int write_port(const char *path, unsigned port, struct error *e)
+{
+	char text[16], temporary[4096];
+	int n = snprintf(text, sizeof text, "%u\n", port);
+	snprintf(temporary, sizeof temporary, "%s.tmp", path);
+	int fd = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+	int rc = fd < 0 || write(fd, text, (size_t)n) != n ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	if (fd >= 0)
+		close(fd);
+	if (!rc && rename(temporary, path))
+		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	return rc;
+}
+
+static int start_listening(struct server *s, struct error *e)
+{
+	struct net_addr a, bound;
+	char text[80];
+	int length = sizeof bound.storage;
+	int rc = net_addr_resolve(&a, s->config.listen, e);
+	if (!rc)
+		rc = net_addr_allow(&a, s->config.listen, s->config.insecure, e);
+	if (rc)
+		return rc;
+	memset(&bound, 0, sizeof bound);
+	rc = uv_tcp_bind(&s->listener, (const struct sockaddr *)&a.storage, 0);
+	if (!rc)
+		rc = uv_listen((uv_stream_t *)&s->listener, BACKLOG, on_connection);
+	if (!rc)
+		rc = uv_tcp_getsockname(&s->listener, (struct sockaddr *)&bound.storage, &length);
+	if (rc)
+		return error_set(e, -rc, "cannot listen at %s: %s", s->config.listen, uv_strerror(rc));
+	net_addr_format(&bound, text, sizeof text);
+	log_event(LOG_LISTEN, "address=%s", text);
+	return s->config.port_file ? write_port(s->config.port_file, net_addr_port(&bound), e) : 0;
+}
+
+static void on_tick(uv_timer_t *t)
+{
+	struct server *s = t->data;
+	for (struct session *p = s->sessions; p; p = p->next)
+		session_tick(p);
+	status_tick(s->status);
+}
+
+static void stop(struct server *s)
+{
+	if (s->stopping)
+		return;
+	s->stopping = true;
+	uv_close((uv_handle_t *)&s->listener, NULL);
+	uv_close((uv_handle_t *)&s->wake, NULL);
+	uv_close((uv_handle_t *)&s->tick, NULL);
+	uv_close((uv_handle_t *)&s->on_term, NULL);
+	uv_close((uv_handle_t *)&s->on_int, NULL);
+	for (struct session *p = s->sessions; p; p = p->next)
+		conn_close(p->conn, "the coordinator stops");
+	status_close(s->status);
+	s->status = NULL;
+}
+
+static void on_signal(uv_signal_t *h, int number)
+{
+	log_event(LOG_STOP, "signal=%d", number);
+	stop(h->data);
+}
+
+static int open_stores(struct server *s, struct error *e)
+{
+	struct farm_config config;
+	int rc = spool_open(&s->spool, s->config.spool, e);
+	if (!rc)
+		rc = blob_store_open(&s->blobs, spool_blobs(s->spool), 0, e);
+	if (!rc)
+		rc = read_ended(s, e);
+	if (rc)
+		return rc;
+	if (s->config.keep_partials && mkdir(s->config.keep_partials, 0777) && errno != EEXIST)
+		return error_set(e, errno, "%s: %s", s->config.keep_partials, strerror(errno));
+	farm_config_init(&config);
+	config.first_job = spool_next_job(s->spool);
+	config.silent_after = 3 * s->config.heartbeat_seconds;
+	config.forget_after = 6 * s->config.heartbeat_seconds;
+	return farm_new(&s->farm, &config, e);
+}
+
+static void init_handles(struct server *s)
+{
+	uv_tcp_init(&s->loop, &s->listener);
+	uv_timer_init(&s->loop, &s->wake);
+	uv_timer_init(&s->loop, &s->tick);
+	uv_signal_init(&s->loop, &s->on_term);
+	uv_signal_init(&s->loop, &s->on_int);
+	s->listener.data = s->wake.data = s->tick.data = s->on_term.data = s->on_int.data = s;
+	uv_signal_start(&s->on_term, on_signal, SIGTERM);
+	uv_signal_start(&s->on_int, on_signal, SIGINT);
+	uv_timer_start(&s->tick, on_tick, TICK_MS, TICK_MS);
+}
+
+static void close_stores(struct server *s)
+{
+	while (s->orders) {
+		struct order *next = s->orders->next;
+		order_free(s->orders);
+		s->orders = next;
+	}
+	while (s->deferred) {
+		struct deferred *next = s->deferred->next;
+		mem_free(s->deferred);
+		s->deferred = next;
+	}
+	if (s->farm)
+		farm_free(s->farm);
+	blob_store_close(s->blobs);
+	spool_close(s->spool);
+	mem_free(s->ended);
+}
+
+int server_run(const struct server_config *c, struct error *e)
+{
+	struct server *s = mem_alloc(1, sizeof *s);
+	if (!s)
+		return error_set(e, ENOMEM, "no memory for the server");
+	signal(SIGPIPE, SIG_IGN);
+	s->config = *c;
+	s->deferred_last = &s->deferred;
+	int rc = uv_loop_init(&s->loop);
+	if (rc) {
+		mem_free(s);
+		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
+	}
+	init_handles(s);
+	rc = open_stores(s, e);
+	if (!rc && c->status_socket)
+		rc = status_open(&s->status, s, c->status_socket, e);
+	if (!rc)
+		rc = start_listening(s, e);
+	if (rc)
+		stop(s);
+	uv_run(&s->loop, UV_RUN_DEFAULT);
+	int closed = uv_loop_close(&s->loop);
+	assert(closed == 0);
+	(void)closed;
+	close_stores(s);
+	mem_free(s);
+	return rc;
+}

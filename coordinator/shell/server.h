@@ -1,0 +1,85 @@
+/*
+ * The coordinator's shell: carries out what the core says. One loop, one thread; heavy work on films goes to the pool.
+ * server_run returns when a signal has stopped it.
+ */
+#ifndef COORDINATOR_SHELL_SERVER_H
+#define COORDINATOR_SHELL_SERVER_H
+
+#include "common/blob/blob.h"
+#include "common/net/conn.h"
+#include "coordinator/core/farm.h"
+#include "coordinator/shell/order.h"
+#include "coordinator/store/spool.h"
+
+struct server_config {
+	const char *listen, *spool;
+	const char *status_socket; /* NULL: none */
+	const char *keep_partials; /* NULL: none */
+	const char *port_file;     /* NULL: none; the port that was bound is written there */
+	bool insecure;
+	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
+	unsigned max_connections;
+};
+void server_config_init(struct server_config *c);
+
+int server_run(const struct server_config *c, struct error *e);
+
+/* ---- for the parts of the shell ---- */
+
+struct session;
+struct status_socket;
+
+/* An event for the core that came up while its last update was carried out. */
+struct deferred {
+	struct deferred *next;
+	struct event event;
+	char text[256];
+};
+
+enum { ENDED_MAX = 200 /* ended jobs in the lists; older ones can still be fetched */ };
+
+struct server {
+	struct server_config config;
+	uv_loop_t loop;
+	uv_tcp_t listener;
+	uv_timer_t wake, tick;
+	uv_signal_t on_term, on_int;
+	struct farm *farm;
+	struct spool *spool;
+	struct blob_store *blobs;
+	struct session *sessions;
+	unsigned session_count;
+	struct order *orders;
+	struct job_record *ended; /* ENDED_MAX, oldest first */
+	size_t ended_count;
+	struct deferred *deferred, **deferred_last;
+	uint64_t last_peer;
+	struct status_socket *status;
+	bool stepping, stopping;
+	uint64_t changes; /* grows with whatever the status shows */
+	/* What the current event brought; NULL when it did not. */
+	struct batch *batch;
+	const Farm__LeaseResult *result;
+	const unsigned char *payload;
+	struct session *submitter;
+};
+
+double server_now(const struct server *s);
+/* Gives the event to the core and carries out the update and all that follows from it. */
+void server_step(struct server *s, struct event *ev);
+/* Later, when the current update is carried out. Copies the text. */
+void server_defer(struct server *s, const struct event *ev);
+void server_job_broken(struct server *s, uint64_t job, const char *text);
+
+struct order *server_order(const struct server *s, uint64_t job);
+/* The order's canvas is free again: what waited goes on. */
+void server_order_free_again(struct server *s, struct order *o);
+/* A result from a worker: now, or when the canvas is free. */
+void server_result(struct server *s, uint64_t peer, struct envelope *env, const unsigned char *payload, size_t size);
+
+/* false: no such job. Looks at living jobs, then at ended ones, then into the spool. */
+bool server_view(struct server *s, uint64_t job, struct job_view *v);
+/* All that are listed, ascending by id; mem_alloc'd. */
+size_t server_views(struct server *s, struct job_view **views);
+
+#endif

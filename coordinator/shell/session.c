@@ -1,0 +1,406 @@
+#include "coordinator/shell/session.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum {
+	HELLO_HEADER = 4096,
+	HEADER_LIMIT = 1 << 20,
+	SEND_LIMIT = 1 << 29, /* leases on their way to one worker */
+};
+static const double hello_seconds = 10, stall_seconds = 30;
+
+void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size)
+{
+	conn_send(p->conn, m, payload, size);
+}
+
+void session_fault(struct session *p, const char *format, ...)
+{
+	char text[512];
+	Farm__Fault fault;
+	Farm__Envelope m;
+	va_list ap;
+	va_start(ap, format);
+	vsnprintf(text, sizeof text, format, ap);
+	va_end(ap);
+	farm__fault__init(&fault);
+	farm__envelope__init(&m);
+	fault.text = text;
+	m.body_case = FARM__ENVELOPE__BODY_FAULT;
+	m.fault = &fault;
+	log_event(LOG_PEER_FAULT, "peer=%llu address=%s text=%s", (unsigned long long)p->id, p->address,
+		  log_quote(text).text);
+	session_send(p, &m, NULL, 0);
+	p->state = SESSION_LEAVING;
+	conn_close_when_sent(p->conn, text);
+}
+
+struct session *session_find(const struct server *s, uint64_t id)
+{
+	for (struct session *p = s->sessions; p; p = p->next)
+		if (p->id == id)
+			return p;
+	return NULL;
+}
+
+/* ---- hello ---- */
+
+static void send_hello_ack(struct session *p, const char *refusal)
+{
+	char text[256];
+	Farm__HelloAck ack;
+	Farm__Envelope m;
+	farm__hello_ack__init(&ack);
+	farm__envelope__init(&m);
+	text_copy(text, sizeof text, refusal ? refusal : "");
+	ack.accepted = !refusal;
+	ack.text = text;
+	ack.version = FARM_VERSION;
+	ack.heartbeat_ms = (uint32_t)(1000 * p->server->config.heartbeat_seconds);
+	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
+	m.hello_ack = &ack;
+	session_send(p, &m, NULL, 0);
+	if (refusal) {
+		log_event(LOG_PEER_REFUSED, "peer=%llu address=%s text=%s", (unsigned long long)p->id, p->address,
+			  log_quote(refusal).text);
+		p->state = SESSION_LEAVING;
+		conn_close_when_sent(p->conn, refusal);
+	}
+}
+
+static void join(struct session *p, const Farm__Hello *h)
+{
+	struct event ev = {.kind = EVENT_JOINED,
+			   .peer = p->id,
+			   .join = {.peer = p->id, .name = p->name, .fingerprint = h->fingerprint, .threads = h->threads}};
+	p->rejected[0] = 0;
+	p->joined = true;
+	server_step(p->server, &ev);
+	if (*p->rejected) {
+		p->joined = false;
+		send_hello_ack(p, p->rejected);
+		return;
+	}
+	p->state = SESSION_WORKER;
+	log_event(LOG_PEER_HELLO, "peer=%llu address=%s role=worker name=%s threads=%u fingerprint=%s",
+		  (unsigned long long)p->id, p->address, log_quote(p->name).text, h->threads, log_quote(h->fingerprint).text);
+	send_hello_ack(p, NULL);
+}
+
+static void take_hello(struct session *p, const Farm__Hello *h)
+{
+	char text[128];
+	if (h->version != FARM_VERSION) {
+		snprintf(text, sizeof text, "version %u of the protocol is spoken here, not %u", FARM_VERSION, h->version);
+		send_hello_ack(p, text);
+		return;
+	}
+	if (!envelope_text_ok(h->name, sizeof p->name - 1) || !envelope_text_ok(h->fingerprint, 255) ||
+	    h->threads > 4096) {
+		send_hello_ack(p, "a name or a number in hello is out of bounds");
+		return;
+	}
+	text_copy(p->name, sizeof p->name, h->name);
+	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, 0});
+	conn_set_quiet(p->conn, 6 * p->server->config.heartbeat_seconds);
+	if (h->role == FARM__ROLE__ROLE_WORKER) {
+		join(p, h);
+	} else if (h->role == FARM__ROLE__ROLE_CLIENT) {
+		p->state = SESSION_CLIENT;
+		send_hello_ack(p, NULL);
+	} else {
+		send_hello_ack(p, "hello must say whether it is a worker or a client");
+	}
+}
+
+/* ---- a worker speaks ---- */
+
+/* Results of this job may come from now on, and they may be so long. */
+static void allow_results(struct session *p, const struct order *o)
+{
+	uint32_t need = batch_payload_max(&o->plan);
+	if (need > p->payload_limit) {
+		p->payload_limit = need;
+		conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, need});
+	}
+}
+
+static void send_job_info(struct session *p, uint64_t job)
+{
+	const struct order *o = server_order(p->server, job);
+	if (!o) {
+		session_send_job_end(p, job);
+		return;
+	}
+	allow_results(p, o);
+	const Farm__Submit *from = order_submit(o);
+	Farm__JobInfo info;
+	Farm__Plan plan;
+	Farm__Envelope m;
+	farm__job_info__init(&info);
+	farm__envelope__init(&m);
+	plan_to_wire(&o->plan, &plan);
+	info.job = job;
+	info.name = from->name;
+	info.scene = from->scene;
+	info.n_defines = from->n_defines;
+	info.defines = from->defines;
+	info.render_width = from->render_width;
+	info.render_height = from->render_height;
+	info.plan = &plan;
+	info.n_files = from->n_files;
+	info.files = from->files;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_INFO;
+	m.job_info = &info;
+	session_send(p, &m, NULL, 0);
+}
+
+static void take_lease_failed(struct session *p, const Farm__LeaseFailed *f)
+{
+	struct error e;
+	struct event ev = {.kind = *f->text ? EVENT_LEASE_FAILED : EVENT_LEASE_RETURNED, .peer = p->id, .text = f->text};
+	if (lease_key_from_wire(f->key, &ev.lease.key, &e) || !envelope_text_ok(f->text, 2048)) {
+		session_fault(p, "a lease cannot fail like this");
+		return;
+	}
+	ev.job = ev.lease.key.job;
+	struct order *o = server_order(p->server, ev.job);
+	if (o && *f->text)
+		order_log(o, LOG_LEASE_FAILED, "worker=%s text=%s", log_quote(p->name).text, log_quote(f->text).text);
+	server_step(p->server, &ev);
+}
+
+enum { BLOB_CHUNK = 1 << 20 };
+
+static void take_blob_get(struct session *p, const Farm__BlobGet *g)
+{
+	Farm__BlobChunk chunk;
+	Farm__Envelope m;
+	struct error e = {""};
+	struct blob_hash h;
+	uint64_t size = 0;
+	if (g->hash.len != BLOB_HASH_SIZE) {
+		session_fault(p, "a blob's name has %zu bytes", g->hash.len);
+		return;
+	}
+	memcpy(h.bytes, g->hash.data, sizeof h.bytes);
+	farm__blob_chunk__init(&chunk);
+	farm__envelope__init(&m);
+	unsigned char *bytes = mem_alloc(BLOB_CHUNK, 1);
+	ssize_t n = 0;
+	int fd = blob_open(p->server->blobs, &h, &size, &e);
+	if (fd >= 0 && bytes)
+		n = pread(fd, bytes, BLOB_CHUNK, g->offset <= size ? (off_t)g->offset : 0);
+	if (fd >= 0 && (!bytes || n < 0 || g->offset > size))
+		error_set(&e, EIO, "the blob cannot be read there");
+	chunk.hash = g->hash;
+	chunk.offset = g->offset;
+	chunk.size = size;
+	chunk.error = e.text;
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+	m.blob_chunk = &chunk;
+	session_send(p, &m, bytes, *e.text ? 0 : (size_t)n);
+	if (fd >= 0)
+		close(fd);
+	mem_free(bytes);
+}
+
+static void worker_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	struct event ev = {.kind = EVENT_HEARD, .peer = p->id};
+	const Farm__Envelope *m = env->message;
+	switch (m->body_case) {
+	case FARM__ENVELOPE__BODY_HEARTBEAT: /* answered, so that a worker notices a connection that is dead */
+		session_send(p, m, NULL, 0);
+		server_step(p->server, &ev);
+		break;
+	case FARM__ENVELOPE__BODY_LEASE_REQUEST:
+		ev.kind = EVENT_REQUEST;
+		ev.want = m->lease_request->want;
+		server_step(p->server, &ev);
+		break;
+	case FARM__ENVELOPE__BODY_LEASE_RESULT:
+		server_step(p->server, &ev);
+		if (p->joined)
+			server_result(p->server, p->id, env, payload, size);
+		break;
+	case FARM__ENVELOPE__BODY_LEASE_FAILED:
+		take_lease_failed(p, m->lease_failed);
+		break;
+	case FARM__ENVELOPE__BODY_JOB_GET:
+		send_job_info(p, m->job_get->job);
+		break;
+	case FARM__ENVELOPE__BODY_BLOB_GET:
+		take_blob_get(p, m->blob_get);
+		break;
+	case FARM__ENVELOPE__BODY_BYE:
+		conn_close(p->conn, "the worker said goodbye");
+		break;
+	default:
+		session_fault(p, "not a message that a worker says");
+	}
+}
+
+/* ---- the connection ---- */
+
+static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	struct session *p = user;
+	if (p->state == SESSION_NEW && env->message->body_case == FARM__ENVELOPE__BODY_HELLO)
+		take_hello(p, env->message->hello);
+	else if (p->state == SESSION_NEW)
+		session_fault(p, "the first word must be hello");
+	else if (p->state == SESSION_WORKER)
+		worker_message(p, env, payload, size);
+	else if (p->state == SESSION_CLIENT)
+		session_client_message(p, env, payload, size);
+}
+
+static void on_closed(void *user, const char *why)
+{
+	struct session *p = user;
+	struct server *s = p->server;
+	struct session **at = &s->sessions;
+	while (*at != p)
+		at = &(*at)->next;
+	*at = p->next;
+	s->session_count--;
+	session_upload_abort(p);
+	log_event(p->state == SESSION_WORKER ? LOG_PEER_CLOSED : LOG_PEER_ACCEPT, "peer=%llu address=%s name=%s text=%s",
+		  (unsigned long long)p->id, p->address, log_quote(p->name).text, log_quote(why).text);
+	if (p->joined && !s->stopping) {
+		struct event ev = {.kind = EVENT_LEFT, .peer = p->id, .text = why};
+		server_step(s, &ev);
+	}
+	mem_free(p->shown);
+	mem_free(p);
+}
+
+static const struct conn_events events = {NULL, on_message, NULL, on_closed};
+
+static void on_refused(void *user, const char *why)
+{
+	(void)user;
+	(void)why;
+}
+static const struct conn_events refused_events = {NULL, NULL, NULL, on_refused};
+
+void session_accept(struct server *s)
+{
+	struct conn_config config = {{HELLO_HEADER, 0}, SEND_LIMIT, stall_seconds, hello_seconds};
+	struct error e;
+	struct session *p = s->session_count < s->config.max_connections ? mem_alloc(1, sizeof *p) : NULL;
+	struct conn *c;
+	if (!p) {
+		log_event(LOG_PEER_REFUSED, "text=\"as many connections as are allowed\"");
+		if (conn_accept(&c, (uv_stream_t *)&s->listener, &config, &refused_events, NULL, &e) == 0)
+			conn_close(c, "as many connections as are allowed");
+		return;
+	}
+	p->server = s;
+	p->id = ++s->last_peer;
+	if (conn_accept(&p->conn, (uv_stream_t *)&s->listener, &config, &events, p, &e)) {
+		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(e.text).text);
+		mem_free(p);
+		return;
+	}
+	conn_peer_name(p->conn, p->address, sizeof p->address);
+	p->next = s->sessions;
+	s->sessions = p;
+	s->session_count++;
+	log_event(LOG_PEER_ACCEPT, "peer=%llu address=%s", (unsigned long long)p->id, p->address);
+}
+
+/* ---- the core speaks to a worker ---- */
+
+void session_send_lease(struct session *p, const struct order *o, const struct lease_key *k)
+{
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	allow_results(p, o);
+	if (order_pack_lease(o, k, &frame, &size, &e))
+		conn_close(p->conn, e.text);
+	else
+		conn_send_frame(p->conn, frame, size);
+}
+
+void session_send_revoke(struct session *p, const struct lease_key *k)
+{
+	Farm__LeaseKey key;
+	Farm__LeaseRevoke revoke;
+	Farm__Envelope m;
+	lease_key_to_wire(k, &key);
+	farm__lease_revoke__init(&revoke);
+	farm__envelope__init(&m);
+	revoke.key = &key;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_REVOKE;
+	m.lease_revoke = &revoke;
+	session_send(p, &m, NULL, 0);
+}
+
+void session_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text)
+{
+	static const Farm__Verdict verdicts[] = {[ACK_MERGED] = FARM__VERDICT__VERDICT_MERGED,
+						 [ACK_REPEAT] = FARM__VERDICT__VERDICT_REPEATED,
+						 [ACK_REFUSED] = FARM__VERDICT__VERDICT_REFUSED};
+	char copy[512];
+	Farm__LeaseKey key;
+	Farm__LeaseAck answer;
+	Farm__Envelope m;
+	lease_key_to_wire(k, &key);
+	farm__lease_ack__init(&answer);
+	farm__envelope__init(&m);
+	text_copy(copy, sizeof copy, text);
+	answer.key = &key;
+	answer.verdict = verdicts[ack];
+	answer.text = copy;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_ACK;
+	m.lease_ack = &answer;
+	session_send(p, &m, NULL, 0);
+}
+
+void session_send_job_end(struct session *p, uint64_t job)
+{
+	Farm__JobEnd end;
+	Farm__Envelope m;
+	farm__job_end__init(&end);
+	farm__envelope__init(&m);
+	end.job = job;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_END;
+	m.job_end = &end;
+	session_send(p, &m, NULL, 0);
+}
+
+/* ---- watchers ---- */
+
+void session_tick(struct session *p)
+{
+	struct job_view v;
+	Farm__JobStatus status;
+	Farm__Envelope m;
+	if (!p->watched || p->state != SESSION_CLIENT || conn_unsent(p->conn))
+		return;
+	if (!server_view(p->server, p->watched, &v)) {
+		session_fault(p, "the job is no longer known");
+		return;
+	}
+	if (p->shown && memcmp(p->shown, &v, sizeof v) == 0)
+		return;
+	if (!p->shown && !(p->shown = mem_alloc(1, sizeof v)))
+		return;
+	*p->shown = v;
+	farm__envelope__init(&m);
+	view_to_wire(&v, &status);
+	m.body_case = FARM__ENVELOPE__BODY_JOB_STATUS;
+	m.job_status = &status;
+	session_send(p, &m, NULL, 0);
+	if (record_is_ended(&v.record))
+		p->watched = 0;
+}

@@ -1,0 +1,49 @@
+/*
+ * One peer's conversation: hello, then as a worker or as a client. Limits depend on where the conversation is. The
+ * session belongs to its connection and goes with it.
+ */
+#ifndef COORDINATOR_SHELL_SESSION_H
+#define COORDINATOR_SHELL_SESSION_H
+
+#include "coordinator/shell/server.h"
+
+enum session_state { SESSION_NEW, SESSION_WORKER, SESSION_CLIENT, SESSION_LEAVING };
+
+struct upload;
+
+struct session {
+	struct session *next;
+	struct server *server;
+	struct conn *conn;
+	uint64_t id; /* the core's peer id, and the tag of its requests */
+	enum session_state state;
+	bool joined; /* the core knows it */
+	char name[128], address[64];
+	uint32_t payload_limit;
+	struct upload *upload; /* a submission that waits for blobs */
+	uint64_t watched;      /* job; 0: none */
+	struct job_view *shown; /* what the watcher saw last */
+	char rejected[256];    /* why the core refused; "" it did not */
+	uint64_t answered_job; /* SUBMITTED or CANCELLED came for it */
+};
+
+void session_accept(struct server *s);
+struct session *session_find(const struct server *s, uint64_t id);
+void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size);
+/* Says why and hangs up. */
+__attribute__((format(printf, 2, 3))) void session_fault(struct session *p, const char *format, ...);
+
+/* What the core wants said to workers. */
+void session_send_lease(struct session *p, const struct order *o, const struct lease_key *k);
+void session_send_revoke(struct session *p, const struct lease_key *k);
+void session_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text);
+void session_send_job_end(struct session *p, uint64_t job);
+
+/* Watchers hear of what changed. */
+void session_tick(struct session *p);
+
+/* client.c */
+void session_client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size);
+void session_upload_abort(struct session *p);
+
+#endif

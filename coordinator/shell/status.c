@@ -1,0 +1,347 @@
+#include "coordinator/shell/status.h"
+
+#include "common/base/mem.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { READERS_MAX = 64, LINE_BYTES = 4096, UNREAD_MAX = 1 << 20, BACKLOG = 16 };
+
+enum topic { TOPIC_JOBS = 1, TOPIC_WORKERS = 2, TOPIC_SNAPSHOT = 4 };
+
+struct reader {
+	struct reader *next;
+	struct status_socket *socket;
+	uv_pipe_t pipe;
+	unsigned topics;
+	bool closing;
+	size_t line_size;
+	char line[LINE_BYTES];
+};
+
+
+struct status_socket {
+	struct server *server;
+	uv_pipe_t listener;
+	struct reader *readers;
+	unsigned reader_count;
+	struct job_view *shown; /* as the subscribers saw the jobs last */
+	size_t shown_count;
+	uint64_t shown_changes; /* of the server, at the last tick */
+	char *path;
+};
+
+/* ---- lines ---- */
+
+static json_t *object(const char *type)
+{
+	struct timespec now;
+	clock_gettime(CLOCK_REALTIME, &now);
+	return json_pack("{s:i s:s s:f}", "schema", 1, "type", type, "time",
+			 (double)now.tv_sec + 1e-9 * (double)now.tv_nsec);
+}
+
+static json_t *job_json(struct server *s, const struct job_view *v)
+{
+	const struct order *o = server_order(s, v->record.id);
+	return view_to_json(v, o ? order_submit(o) : NULL);
+}
+
+static json_t *jobs_json(struct server *s, const struct job_view *views, size_t count)
+{
+	json_t *list = json_array();
+	for (size_t i = 0; i < count; i++)
+		json_array_append_new(list, job_json(s, &views[i]));
+	return list;
+}
+
+static void add_workers(struct server *s, json_t *o)
+{
+	json_t *workers = json_array(), *leases = json_array();
+	struct peer_status p;
+	struct lease_status l;
+	double now = server_now(s);
+	for (uint64_t id = 0; (id = farm_next_peer(s->farm, id));) {
+		if (!farm_peer(s->farm, id, &p))
+			continue;
+		json_array_append_new(workers, view_peer_to_json(&p, now));
+		for (uint32_t i = 0; farm_lease(s->farm, id, i, &l); i++)
+			json_array_append_new(leases, view_lease_to_json(&l, p.name, now));
+	}
+	json_object_set_new(o, "workers", workers);
+	json_object_set_new(o, "leases", leases);
+}
+
+static json_t *snapshot(struct server *s)
+{
+	struct job_view *views;
+	size_t count = server_views(s, &views);
+	json_t *o = object("snapshot");
+	json_object_set_new(o, "jobs", jobs_json(s, views, count));
+	add_workers(s, o);
+	mem_free(views);
+	return o;
+}
+
+/* ---- writing ---- */
+
+struct sending {
+	uv_write_t request;
+	char *text; /* jansson's */
+};
+
+static void on_reader_closed(uv_handle_t *h)
+{
+	struct reader *r = h->data;
+	mem_free(r);
+}
+
+static void drop(struct reader *r)
+{
+	if (r->closing)
+		return;
+	r->closing = true;
+	struct reader **at = &r->socket->readers;
+	while (*at != r)
+		at = &(*at)->next;
+	*at = r->next;
+	r->socket->reader_count--;
+	uv_close((uv_handle_t *)&r->pipe, on_reader_closed);
+}
+
+static void on_written(uv_write_t *w, int status)
+{
+	struct sending *s = w->data;
+	struct reader *r = w->handle->data;
+	free(s->text);
+	mem_free(s);
+	if (status)
+		drop(r);
+}
+
+/* Takes the object. */
+static void say(struct reader *r, json_t *o)
+{
+	char *text = json_dumps(o, JSON_COMPACT);
+	struct sending *s = text ? mem_alloc(1, sizeof *s) : NULL;
+	json_decref(o);
+	size_t size = text ? strlen(text) : 0;
+	if (!s || uv_stream_get_write_queue_size((uv_stream_t *)&r->pipe) > UNREAD_MAX) {
+		mem_free(s);
+		free(text);
+		drop(r);
+		return;
+	}
+	s->text = text;
+	s->request.data = s;
+	static char newline[] = "\n";
+	uv_buf_t parts[2] = {uv_buf_init(text, (unsigned)size), uv_buf_init(newline, 1)};
+	if (uv_write(&s->request, (uv_stream_t *)&r->pipe, parts, 2, on_written)) {
+		free(text);
+		mem_free(s);
+		drop(r);
+	}
+}
+
+/* ---- reading ---- */
+
+static void say_error(struct reader *r, const char *text)
+{
+	json_t *o = object("error");
+	json_object_set_new(o, "text", json_string(text));
+	say(r, o);
+}
+
+static void take_line(struct reader *r, size_t size)
+{
+	static const struct {
+		const char *name;
+		enum topic topic;
+	} topics[] = {{"jobs", TOPIC_JOBS}, {"workers", TOPIC_WORKERS}, {"snapshot", TOPIC_SNAPSHOT}};
+	json_error_t fault;
+	json_t *o = json_loadb(r->line, size, JSON_REJECT_DUPLICATES, &fault);
+	const json_t *list = json_object_get(o, "subscribe");
+	unsigned wanted = 0;
+	bool known = json_is_array(list);
+	for (size_t i = 0; i < json_array_size(list); i++) {
+		const char *name = json_string_value(json_array_get(list, i));
+		unsigned found = 0;
+		for (size_t k = 0; name && k < sizeof topics / sizeof *topics; k++)
+			if (strcmp(name, topics[k].name) == 0)
+				found = topics[k].topic;
+		known = known && found;
+		wanted |= found;
+	}
+	json_decref(o);
+	if (known)
+		r->topics |= wanted;
+	else
+		say_error(r, "expected {\"subscribe\":[...]} with jobs, workers, snapshot");
+}
+
+static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
+{
+	(void)suggested;
+	struct reader *r = h->data;
+	*out = uv_buf_init(r->line + r->line_size, (unsigned)(LINE_BYTES - r->line_size));
+}
+
+static void on_read(uv_stream_t *stream, ssize_t count, const uv_buf_t *b)
+{
+	(void)b;
+	struct reader *r = stream->data;
+	if (count < 0) {
+		drop(r);
+		return;
+	}
+	r->line_size += (size_t)count;
+	for (char *end; !r->closing && (end = memchr(r->line, '\n', r->line_size));) {
+		size_t n = (size_t)(end - r->line);
+		take_line(r, n);
+		r->line_size -= n + 1;
+		memmove(r->line, end + 1, r->line_size);
+	}
+	if (!r->closing && r->line_size == LINE_BYTES)
+		drop(r);
+}
+
+static void on_connection(uv_stream_t *listener, int status)
+{
+	struct status_socket *t = listener->data;
+	struct reader *r = status ? NULL : mem_alloc(1, sizeof *r);
+	if (!r)
+		return;
+	uv_pipe_init(listener->loop, &r->pipe, 0);
+	r->pipe.data = r;
+	r->socket = t;
+	r->next = t->readers;
+	t->readers = r;
+	t->reader_count++;
+	if (uv_accept(listener, (uv_stream_t *)&r->pipe) || t->reader_count > READERS_MAX ||
+	    uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read)) {
+		drop(r);
+		return;
+	}
+	say(r, snapshot(t->server));
+}
+
+/* ---- changes ---- */
+
+static const struct job_view *shown_before(const struct status_socket *t, uint64_t id)
+{
+	for (size_t i = 0; i < t->shown_count; i++)
+		if (t->shown[i].record.id == id)
+			return &t->shown[i];
+	return NULL;
+}
+
+static void tell(struct status_socket *t, enum topic topic, json_t *o)
+{
+	for (struct reader *r = t->readers, *next; r; r = next) {
+		next = r->next;
+		if (r->topics & topic)
+			say(r, json_incref(o));
+	}
+	json_decref(o);
+}
+
+void status_tick(struct status_socket *t)
+{
+	unsigned topics = 0;
+	if (!t)
+		return;
+	for (struct reader *r = t->readers; r; r = r->next)
+		topics |= r->topics;
+	if (!topics || t->shown_changes == t->server->changes)
+		return;
+	t->shown_changes = t->server->changes;
+	struct job_view *views;
+	size_t count = server_views(t->server, &views);
+	for (size_t i = 0; i < count && (topics & TOPIC_JOBS); i++) {
+		const struct job_view *before = shown_before(t, views[i].record.id);
+		if (before && memcmp(before, &views[i], sizeof *before) == 0)
+			continue;
+		json_t *o = object("job");
+		json_object_set_new(o, "job", job_json(t->server, &views[i]));
+		tell(t, TOPIC_JOBS, o);
+	}
+	mem_free(t->shown);
+	t->shown = views;
+	t->shown_count = count;
+	if (topics & TOPIC_WORKERS) {
+		json_t *o = object("workers");
+		add_workers(t->server, o);
+		tell(t, TOPIC_WORKERS, o);
+	}
+	if (topics & TOPIC_SNAPSHOT)
+		tell(t, TOPIC_SNAPSHOT, snapshot(t->server));
+}
+
+/* ---- life ---- */
+
+/* A socket that nobody answers is left from an earlier life. */
+static int remove_stale(const char *path, struct error *e)
+{
+	struct sockaddr_un a = {.sun_family = AF_UNIX};
+	struct stat st;
+	if (strlen(path) >= sizeof a.sun_path)
+		return error_set(e, ENAMETOOLONG, "%s: at most %zu bytes for a socket's path", path, sizeof a.sun_path - 1);
+	if (lstat(path, &st))
+		return 0;
+	if (!S_ISSOCK(st.st_mode))
+		return error_set(e, EEXIST, "%s: is there already and is no socket", path);
+	memcpy(a.sun_path, path, strlen(path));
+	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+	bool alive = fd >= 0 && connect(fd, (struct sockaddr *)&a, sizeof a) == 0;
+	if (fd >= 0)
+		close(fd);
+	if (alive)
+		return error_set(e, EADDRINUSE, "%s: somebody else answers there", path);
+	return unlink(path) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+}
+
+int status_open(struct status_socket **out, struct server *s, const char *path, struct error *e)
+{
+	int rc = remove_stale(path, e);
+	if (rc)
+		return rc;
+	struct status_socket *t = mem_alloc(1, sizeof *t);
+	if (!t || !(t->path = mem_strdup(path))) {
+		mem_free(t);
+		return error_set(e, ENOMEM, "no memory for the status socket");
+	}
+	t->server = s;
+	uv_pipe_init(&s->loop, &t->listener, 0);
+	t->listener.data = t;
+	*out = t;
+	mode_t mask = umask(0177); /* from its first moment on */
+	rc = uv_pipe_bind(&t->listener, path);
+	umask(mask);
+	if (!rc)
+		rc = uv_listen((uv_stream_t *)&t->listener, BACKLOG, on_connection);
+	return rc ? error_set(e, -rc, "%s: %s", path, uv_strerror(rc)) : 0;
+}
+
+static void on_closed(uv_handle_t *h)
+{
+	struct status_socket *t = h->data;
+	mem_free(t->shown);
+	mem_free(t->path);
+	mem_free(t);
+}
+
+void status_close(struct status_socket *t)
+{
+	if (!t)
+		return;
+	while (t->readers)
+		drop(t->readers);
+	unlink(t->path);
+	uv_close((uv_handle_t *)&t->listener, on_closed);
+}

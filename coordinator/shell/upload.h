@@ -1,0 +1,29 @@
+/*
+ * A submission that is on its way: checked, and waiting for the blobs that the spool misses. When the last one is there
+ * the job is given to the core. Belongs to its session. The loop's thread.
+ */
+#ifndef COORDINATOR_SHELL_UPLOAD_H
+#define COORDINATOR_SHELL_UPLOAD_H
+
+#include "coordinator/shell/session.h"
+
+struct upload {
+	struct envelope submit; /* owned */
+	struct plan plan;
+	struct blob_store *blobs;
+	bool *held;           /* a file's blob is there and held */
+	size_t missing_count; /* files not held */
+	struct blob_writer *writer;
+	struct blob_hash writing;
+};
+
+/* Takes the envelope of a Submit. -EINVAL with a sentence for the client. */
+int upload_new(struct upload **u, struct envelope *submit, struct blob_store *blobs, struct error *e);
+void upload_free(struct upload *u); /* lets go of the blobs that it holds */
+
+/* One chunk from the client. 1: a blob is complete. */
+int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e);
+/* Each missing hash once. Returns how many; hashes has room for missing_count. */
+size_t upload_missing(const struct upload *u, struct blob_hash *hashes);
+
+#endif

@@ -1,0 +1,149 @@
+#include "coordinator/shell/view.h"
+
+#include "common/base/text.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+void view_of_record(struct job_view *v, const struct job_record *r)
+{
+	memset(v, 0, sizeof *v);
+	v->record = *r;
+	v->eta = record_is_ended(r) ? 0 : -1;
+}
+
+/* A text that was cut in the middle of a character would make the whole object fail. */
+static const char *shown(const char *text, char out[256])
+{
+	if (envelope_text_ok(text, 4096))
+		return text;
+	text_copy(out, 256, text);
+	for (char *c = out; *c; c++)
+		if ((unsigned char)*c < 32 || (unsigned char)*c >= 127)
+			*c = '?';
+	return out;
+}
+
+void view_add_status(struct job_view *v, const struct job_status *s)
+{
+	struct job_record *r = &v->record;
+	char text[256];
+	text_copy(r->state, sizeof r->state, job_state_name(s->state));
+	text_copy(r->reason, sizeof r->reason, s->end == END_NONE ? "" : job_end_name(s->end));
+	text_copy(r->why, sizeof r->why, shown(s->text, text));
+	r->priority = s->priority;
+	r->progress = s->progress;
+	r->rounds = s->rounds;
+	r->mutations = s->mutations;
+	r->rel_error = isnan(s->rel_error) ? -1 : s->rel_error;
+	r->exit_code = job_state_is_end(s->state) ? (uint32_t)job_exit_code(s) : 0;
+	v->rate = isfinite(s->rate) ? s->rate : 0;
+	v->eta = isfinite(s->eta) ? s->eta : -1;
+	v->leases = s->leases_out;
+	v->leases_merged = s->leases_merged;
+	v->repeats = s->repeats;
+	v->refused = s->refused;
+	v->failures = s->failures;
+	v->duplicates = s->duplicates;
+	v->timeouts = s->timeouts;
+	text_copy(v->waiting, sizeof v->waiting, shown(s->waiting, text));
+}
+
+const char *view_why(const struct job_view *v)
+{
+	return *v->waiting ? v->waiting : v->record.why;
+}
+
+static char *borrow(const char *text)
+{
+	union {
+		const char *from;
+		char *to;
+	} u = {text}; /* generated structures have no const */
+	return u.to;
+}
+
+void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
+{
+	const struct job_record *r = &v->record;
+	farm__job_status__init(out);
+	out->job = r->id;
+	out->name = borrow(r->name);
+	out->state = borrow(r->state);
+	out->progress = r->progress;
+	out->rate = v->rate;
+	out->eta = v->eta;
+	out->rounds = r->rounds;
+	out->error = r->rel_error;
+	out->why = borrow(view_why(v));
+	out->reason = borrow(r->reason);
+	out->output = borrow(r->output);
+	out->priority = r->priority;
+	out->leases = v->leases;
+	out->fetchable = r->has_result;
+	out->ended = record_is_ended(r);
+	out->exit_code = r->exit_code;
+}
+
+static json_t *effects_to_json(const Farm__Submit *m)
+{
+	json_t *list = json_array();
+	for (size_t i = 0; i < m->n_effects; i++)
+		json_array_append_new(list, json_pack("{s:s s:b s:s}", "name", m->effects[i]->name, "on",
+						      (int)m->effects[i]->on, "why", m->effects[i]->why));
+	return list;
+}
+
+static json_t *number_or_null(double x, bool known)
+{
+	return known && isfinite(x) ? json_real(x) : json_null();
+}
+
+json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit)
+{
+	const struct job_record *r = &v->record;
+	char id[32];
+	snprintf(id, sizeof id, "j%llu", (unsigned long long)r->id);
+	json_t *o = json_pack("{s:s s:s s:s s:s s:i s:f s:f s:I s:I s:s s:s s:s s:s s:b s:i s:f s:f}", /* */
+			      "id", id, "name", r->name, "state", r->state, "integrator", r->integrator, /* */
+			      "priority", r->priority, "progress", r->progress, "rate", v->rate, /* */
+			      "rounds", (json_int_t)r->rounds, "mutations", (json_int_t)r->mutations, /* */
+			      "why", view_why(v), "waiting", v->waiting, "reason", r->reason, "output", r->output, /* */
+			      "result", (int)r->has_result, "leases", (int)v->leases, "submitted", r->submitted, /* */
+			      "ended", r->ended);
+	if (!o)
+		return NULL;
+	json_object_set_new(o, "eta", number_or_null(v->eta, v->eta >= 0));
+	json_object_set_new(o, "error", number_or_null(r->rel_error, r->rel_error >= 0));
+	json_object_set_new(o, "counts",
+			    json_pack("{s:I s:I s:I s:I s:I s:I}", "merged", (json_int_t)v->leases_merged, "repeats",
+				      (json_int_t)v->repeats, "refused", (json_int_t)v->refused, "failures",
+				      (json_int_t)v->failures, "duplicates", (json_int_t)v->duplicates, "timeouts",
+				      (json_int_t)v->timeouts));
+	if (submit)
+		json_object_set_new(o, "effects", effects_to_json(submit));
+	return o;
+}
+
+json_t *view_peer_to_json(const struct peer_status *p, double now)
+{
+	char text[256];
+	static const char *const states[] = {"active", "silent", "aside"};
+	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:s}", /* */
+			 "id", (json_int_t)p->id, "name", p->name, "state", states[p->state], /* */
+			 "fingerprint", p->fingerprint, "threads", (int)p->threads, "want", (int)p->want, /* */
+			 "leases", (int)p->leases, "connected", now - p->joined, "heard", now - p->heard, /* */
+			 "merged", (json_int_t)p->merged, "repeats", (json_int_t)p->repeats, /* */
+			 "refused", (json_int_t)p->refused, "failures", (json_int_t)p->failures, "text", shown(p->text, text));
+}
+
+json_t *view_lease_to_json(const struct lease_status *l, const char *worker, double now)
+{
+	char id[32];
+	snprintf(id, sizeof id, "j%llu", (unsigned long long)l->key.job);
+	return json_pack("{s:s s:s s:i s:i s:I s:s s:f s:b}", "job", id, "kind",
+			 l->key.kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", "group", (int)l->key.group, "part",
+			 (int)l->key.part, "epoch", (json_int_t)l->key.epoch, "worker", worker, "age", now - l->sent,
+			 "overdue", (int)l->overdue);
+}

@@ -1,0 +1,33 @@
+/*
+ * A job as it is shown: on the wire (JobStatus), on the status socket (JSON), in the spool (its record). Pure but for
+ * memory; the loop's thread.
+ */
+#ifndef COORDINATOR_SHELL_VIEW_H
+#define COORDINATOR_SHELL_VIEW_H
+
+#include "common/wire/envelope.h"
+#include "coordinator/core/farm.h"
+#include "coordinator/store/record.h"
+
+#include <jansson.h>
+
+/* A record, and what only a living job has. */
+struct job_view {
+	struct job_record record;
+	double rate, eta;  /* eta negative: not known */
+	uint32_t leases;   /* out at workers */
+	uint64_t leases_merged, repeats, refused, failures, duplicates, timeouts;
+	char waiting[256]; /* why nothing is being done for it */
+};
+
+void view_of_record(struct job_view *v, const struct job_record *r);
+/* Puts the core's view of a living job into v, whose record has the job's names and times already. */
+void view_add_status(struct job_view *v, const struct job_status *s);
+const char *view_why(const struct job_view *v);
+
+void view_to_wire(const struct job_view *v, Farm__JobStatus *out); /* borrows v's texts */
+json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit); /* submit: NULL for jobs of earlier lives */
+json_t *view_peer_to_json(const struct peer_status *p, double now);
+json_t *view_lease_to_json(const struct lease_status *l, const char *worker, double now);
+
+#endif

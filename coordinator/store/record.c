@@ -1,0 +1,65 @@
+#include "coordinator/store/record.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+
+#include <jansson.h>
+#include <stdlib.h>
+#include <string.h>
+
+char *record_to_json(const struct job_record *r)
+{
+	json_t *o = json_pack("{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:I s:I}", /* */
+			      "schema", 1, "id", (json_int_t)r->id, "name", r->name, "integrator", r->integrator, /* */
+			      "state", r->state, "reason", r->reason, "why", r->why, "output", r->output, /* */
+			      "priority", r->priority, "exitCode", (int)r->exit_code, "result", (int)r->has_result, /* */
+			      "submitted", r->submitted, "ended", r->ended, "progress", r->progress, /* */
+			      "relError", r->rel_error, "rounds", (json_int_t)r->rounds, /* */
+			      "mutations", (json_int_t)r->mutations);
+	char *text = o ? json_dumps(o, JSON_INDENT(2)) : NULL;
+	json_decref(o);
+	char *copy = text ? mem_strdup(text) : NULL;
+	free(text);
+	return copy;
+}
+
+static void take_text(const json_t *o, const char *key, char *out, size_t size)
+{
+	const char *text = json_string_value(json_object_get(o, key));
+	text_copy(out, size, text ? text : "");
+}
+
+int record_from_json(const char *text, size_t size, struct job_record *r, struct error *e)
+{
+	json_error_t fault;
+	json_t *o = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
+	memset(r, 0, sizeof *r);
+	if (!json_is_object(o) || json_integer_value(json_object_get(o, "schema")) != 1) {
+		int rc = error_set(e, EBADMSG, "not the record of a job: %s", o ? "another schema" : fault.text);
+		json_decref(o);
+		return rc;
+	}
+	r->id = (uint64_t)json_integer_value(json_object_get(o, "id"));
+	take_text(o, "name", r->name, sizeof r->name);
+	take_text(o, "integrator", r->integrator, sizeof r->integrator);
+	take_text(o, "state", r->state, sizeof r->state);
+	take_text(o, "reason", r->reason, sizeof r->reason);
+	take_text(o, "why", r->why, sizeof r->why);
+	take_text(o, "output", r->output, sizeof r->output);
+	r->priority = (int)json_integer_value(json_object_get(o, "priority"));
+	r->exit_code = (uint32_t)json_integer_value(json_object_get(o, "exitCode"));
+	r->has_result = json_is_true(json_object_get(o, "result"));
+	r->submitted = json_number_value(json_object_get(o, "submitted"));
+	r->ended = json_number_value(json_object_get(o, "ended"));
+	r->progress = json_number_value(json_object_get(o, "progress"));
+	r->rel_error = json_number_value(json_object_get(o, "relError"));
+	r->rounds = (uint64_t)json_integer_value(json_object_get(o, "rounds"));
+	r->mutations = (uint64_t)json_integer_value(json_object_get(o, "mutations"));
+	json_decref(o);
+	return 0;
+}
+
+bool record_is_ended(const struct job_record *r)
+{
+	return strcmp(r->state, "done") == 0 || strcmp(r->state, "failed") == 0 || strcmp(r->state, "cancelled") == 0;
+}

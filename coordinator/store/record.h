@@ -1,0 +1,36 @@
+/*
+ * What is remembered of a job in its spool folder (jobs/jN/job.json): enough to list it and to fetch its result after a
+ * restart. Pure but for memory.
+ */
+#ifndef COORDINATOR_STORE_RECORD_H
+#define COORDINATOR_STORE_RECORD_H
+
+#include "common/base/error.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+struct job_record {
+	uint64_t id;
+	char name[128];
+	char integrator[16];
+	char state[16];    /* as in the status */
+	char reason[16];   /* which bound ended it */
+	char why[256];     /* why it failed */
+	char output[1024]; /* where the client wants it */
+	int priority;
+	uint32_t exit_code; /* of a program that waited */
+	bool has_result;
+	double submitted, ended; /* seconds since 1970; 0: not yet */
+	double progress;
+	double rel_error; /* negative: not known */
+	uint64_t rounds, mutations;
+};
+
+char *record_to_json(const struct job_record *r); /* mem_alloc'd; NULL when memory is out */
+/* -EBADMSG when it is not a record. */
+int record_from_json(const char *text, size_t size, struct job_record *r, struct error *e);
+bool record_is_ended(const struct job_record *r);
+
+#endif

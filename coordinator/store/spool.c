@@ -1,0 +1,307 @@
+#include "coordinator/store/spool.h"
+
+#include "common/base/mem.h"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { RECORD_MAX = 1 << 16, FOLDER_MAX = SPOOL_PATH_MAX - 128 };
+
+struct spool {
+	char *folder, *blobs, *canvas;
+	int lock;
+	uint64_t next;
+};
+
+static char *join(const char *folder, const char *name)
+{
+	size_t size = strlen(folder) + strlen(name) + 2;
+	char *path = mem_alloc(size, 1);
+	if (path)
+		snprintf(path, size, "%s/%s", folder, name);
+	return path;
+}
+
+static int make_folder(const char *path, struct error *e)
+{
+	if (mkdir(path, 0700) && errno != EEXIST)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	return 0;
+}
+
+static int take_lock(struct spool *s, struct error *e)
+{
+	char *path = join(s->folder, "lock");
+	if (!path)
+		return error_set(e, ENOMEM, "no memory for the spool");
+	s->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+	int rc = 0;
+	if (s->lock < 0)
+		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	else if (flock(s->lock, LOCK_EX | LOCK_NB))
+		rc = errno == EWOULDBLOCK
+			     ? error_set(e, EBUSY, "%s: another coordinator works with this spool", s->folder)
+			     : error_set(e, errno, "%s: %s", path, strerror(errno));
+	mem_free(path);
+	return rc;
+}
+
+static int sync_folder(const char *path, struct error *e)
+{
+	int fd = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+	int rc = fd < 0 || fsync(fd) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	if (fd >= 0)
+		close(fd);
+	return rc;
+}
+
+static int write_all(int fd, const char *bytes, size_t size)
+{
+	while (size) {
+		ssize_t n = write(fd, bytes, size);
+		if (n < 0 && errno != EINTR)
+			return -errno;
+		if (n > 0) {
+			bytes += n;
+			size -= (size_t)n;
+		}
+	}
+	return 0;
+}
+
+/* folder/name appears with these bytes, or not at all. */
+static int write_file(const char *folder, const char *name, const void *bytes, size_t size, struct error *e)
+{
+	char path[SPOOL_PATH_MAX], temporary[SPOOL_PATH_MAX + 8];
+	snprintf(path, sizeof path, "%s/%s", folder, name);
+	snprintf(temporary, sizeof temporary, "%s.tmp", path);
+	int fd = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+	int rc = fd < 0 ? -errno : write_all(fd, bytes, size);
+	if (!rc && fsync(fd))
+		rc = -errno;
+	if (fd >= 0 && close(fd) && !rc)
+		rc = -errno;
+	if (!rc && rename(temporary, path))
+		rc = -errno;
+	if (rc) {
+		if (fd >= 0)
+			unlink(temporary);
+		return error_set(e, -rc, "%s: %s", path, strerror(-rc));
+	}
+	return sync_folder(folder, e);
+}
+
+static int read_file(const char *path, char **text, size_t *size, struct error *e)
+{
+	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	if (fd < 0)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	char *bytes = mem_alloc(RECORD_MAX, 1);
+	ssize_t n = 0;
+	*size = 0;
+	while (bytes && *size < RECORD_MAX && (n = read(fd, bytes + *size, RECORD_MAX - *size)) > 0)
+		*size += (size_t)n;
+	int rc = !bytes ? error_set(e, ENOMEM, "no memory to read %s", path)
+		 : n < 0 ? error_set(e, errno, "%s: %s", path, strerror(errno))
+		 : *size == RECORD_MAX ? error_set(e, EFBIG, "%s: too long", path)
+				       : 0;
+	close(fd);
+	if (rc)
+		mem_free(bytes);
+	else
+		*text = bytes;
+	return rc;
+}
+
+/* ---- ids ---- */
+
+static bool is_job_folder(const char *name, uint64_t *id)
+{
+	char again[32];
+	char *end;
+	if (name[0] != 'j')
+		return false;
+	*id = strtoull(name + 1, &end, 10);
+	snprintf(again, sizeof again, "j%llu", (unsigned long long)*id);
+	return *id && strcmp(again, name) == 0;
+}
+
+static int by_id(const void *a, const void *b)
+{
+	uint64_t x, y;
+	memcpy(&x, a, sizeof x);
+	memcpy(&y, b, sizeof y);
+	return (x > y) - (x < y);
+}
+
+/* A full array gives up its smallest id. */
+size_t spool_jobs(const struct spool *s, uint64_t *ids, size_t max)
+{
+	char *path = join(s->folder, "jobs");
+	DIR *d = path ? opendir(path) : NULL;
+	size_t count = 0;
+	mem_free(path);
+	for (struct dirent *f; d && (f = readdir(d));) {
+		uint64_t id;
+		if (!is_job_folder(f->d_name, &id) || max == 0)
+			continue;
+		if (count < max) {
+			ids[count++] = id;
+			continue;
+		}
+		size_t least = 0;
+		for (size_t i = 1; i < count; i++)
+			if (ids[i] < ids[least])
+				least = i;
+		if (id > ids[least])
+			ids[least] = id;
+	}
+	if (d)
+		closedir(d);
+	if (count)
+		qsort(ids, count, sizeof *ids, by_id);
+	return count;
+}
+
+static int read_counter(struct spool *s, struct error *e)
+{
+	char *path = join(s->folder, "next-job"), *text;
+	size_t size;
+	uint64_t greatest = 0;
+	s->next = 1;
+	if (!path)
+		return error_set(e, ENOMEM, "no memory for the spool");
+	int rc = read_file(path, &text, &size, e);
+	if (!rc) {
+		unsigned long long n = 0;
+		char digits[24] = "";
+		memcpy(digits, text, size < sizeof digits ? size : sizeof digits - 1);
+		if (sscanf(digits, "%llu", &n) != 1 || n == 0)
+			rc = error_set(e, EBADMSG, "%s: no job number in it", path);
+		s->next = n;
+		mem_free(text);
+	} else if (rc == -ENOENT) {
+		rc = 0;
+	}
+	mem_free(path);
+	if (!rc && spool_jobs(s, &greatest, 1) && greatest >= s->next)
+		s->next = greatest + 1;
+	return rc;
+}
+
+/* ---- life ---- */
+
+int spool_open(struct spool **out, const char *folder, struct error *e)
+{
+	if (strlen(folder) > FOLDER_MAX)
+		return error_set(e, ENAMETOOLONG, "%s: the name is too long", folder);
+	struct spool *s = mem_alloc(1, sizeof *s);
+	if (!s)
+		return error_set(e, ENOMEM, "no memory for the spool");
+	s->lock = -1;
+	s->folder = mem_strdup(folder);
+	s->blobs = join(folder, "blobs");
+	s->canvas = join(folder, "canvas");
+	char *jobs = join(folder, "jobs");
+	int rc = !s->folder || !s->blobs || !s->canvas || !jobs ? error_set(e, ENOMEM, "no memory for the spool")
+								: make_folder(folder, e);
+	if (!rc)
+		rc = take_lock(s, e);
+	if (!rc)
+		rc = make_folder(jobs, e);
+	if (!rc)
+		rc = make_folder(s->canvas, e);
+	if (!rc)
+		rc = read_counter(s, e);
+	mem_free(jobs);
+	if (rc)
+		spool_close(s);
+	else
+		*out = s;
+	return rc;
+}
+
+void spool_close(struct spool *s)
+{
+	if (!s)
+		return;
+	if (s->lock >= 0)
+		close(s->lock);
+	mem_free(s->folder);
+	mem_free(s->blobs);
+	mem_free(s->canvas);
+	mem_free(s);
+}
+
+uint64_t spool_next_job(const struct spool *s)
+{
+	return s->next;
+}
+
+int spool_take_job(struct spool *s, uint64_t id, struct error *e)
+{
+	char text[32], path[SPOOL_PATH_MAX];
+	int n = snprintf(text, sizeof text, "%llu\n", (unsigned long long)id + 1);
+	if (id >= s->next) {
+		int rc = write_file(s->folder, "next-job", text, (size_t)n, e);
+		if (rc)
+			return rc;
+		s->next = id + 1;
+	}
+	spool_job_path(s, id, NULL, path);
+	return make_folder(path, e);
+}
+
+const char *spool_blobs(const struct spool *s)
+{
+	return s->blobs;
+}
+
+const char *spool_canvas(const struct spool *s)
+{
+	return s->canvas;
+}
+
+void spool_job_path(const struct spool *s, uint64_t id, const char *file, char path[SPOOL_PATH_MAX])
+{
+	snprintf(path, SPOOL_PATH_MAX, "%s/jobs/j%llu%s%s", s->folder, (unsigned long long)id, file ? "/" : "",
+		 file ? file : "");
+}
+
+int spool_write(const struct spool *s, uint64_t id, const char *file, const void *bytes, size_t size, struct error *e)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(s, id, NULL, path);
+	return write_file(path, file, bytes, size, e);
+}
+
+int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e)
+{
+	char *text = record_to_json(r);
+	if (!text)
+		return error_set(e, ENOMEM, "no memory for the record of a job");
+	int rc = spool_write(s, r->id, "job.json", text, strlen(text), e);
+	mem_free(text);
+	return rc;
+}
+
+int spool_read_record(const struct spool *s, uint64_t id, struct job_record *r, struct error *e)
+{
+	char path[SPOOL_PATH_MAX], *text;
+	size_t size;
+	spool_job_path(s, id, "job.json", path);
+	int rc = read_file(path, &text, &size, e);
+	if (rc)
+		return rc == -ENOENT ? error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)id) : rc;
+	rc = record_from_json(text, size, r, e);
+	mem_free(text);
+	if (!rc && r->id != id)
+		rc = error_set(e, EBADMSG, "the record of another job");
+	return rc ? error_prefix(e, rc, "%s", path) : 0;
+}

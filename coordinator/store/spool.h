@@ -1,0 +1,35 @@
+/*
+ * The coordinator's folder: lock, next-job, blobs/, canvas/, jobs/jN/{job.json, result.exr, log}. One coordinator a spool
+ * (a lock that the kernel drops when its holder dies). Files appear whole: temporary file, fsync, rename, fsync of the
+ * folder. spool_write from any thread (of different files); the rest from one.
+ */
+#ifndef COORDINATOR_STORE_SPOOL_H
+#define COORDINATOR_STORE_SPOOL_H
+
+#include "coordinator/store/record.h"
+
+struct spool;
+
+/* Makes the folder if need be. -EBUSY: another coordinator has it. */
+int spool_open(struct spool **s, const char *folder, struct error *e);
+void spool_close(struct spool *s);
+
+/* Ids from here on were never given out. Reads the counter and the folders' names, whichever is more. */
+uint64_t spool_next_job(const struct spool *s);
+/* The id is given out: makes the job's folder and moves the counter beyond it, for good, before it returns. */
+int spool_take_job(struct spool *s, uint64_t id, struct error *e);
+
+/* "blobs", "canvas": a path below the spool, made if need be. The text is valid until spool_close. */
+const char *spool_blobs(const struct spool *s);
+const char *spool_canvas(const struct spool *s);
+enum { SPOOL_PATH_MAX = 4096 };
+void spool_job_path(const struct spool *s, uint64_t id, const char *file, char path[SPOOL_PATH_MAX]);
+
+int spool_write(const struct spool *s, uint64_t id, const char *file, const void *bytes, size_t size, struct error *e);
+int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e);
+/* -ENOENT: there is no such job. */
+int spool_read_record(const struct spool *s, uint64_t id, struct job_record *r, struct error *e);
+/* Ids that have a folder, ascending; the greatest `max` of them. Returns how many. */
+size_t spool_jobs(const struct spool *s, uint64_t *ids, size_t max);
+
+#endif

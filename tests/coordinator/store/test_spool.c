@@ -1,0 +1,110 @@
+/* A spool has one master, never gives an id twice, and remembers its jobs. */
+#include "coordinator/store/spool.h"
+#include "common/base/mem.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static char folder[64];
+
+static int set_up(void **state)
+{
+	(void)state;
+	strcpy(folder, "/tmp/hslt-spool.XXXXXX");
+	return mkdtemp(folder) ? 0 : -1;
+}
+
+static int tear_down(void **state)
+{
+	(void)state;
+	char command[128];
+	snprintf(command, sizeof command, "rm -rf '%s'", folder);
+	return system(command);
+}
+
+static void one_master(void **state)
+{
+	(void)state;
+	struct spool *a, *b;
+	struct error e;
+	assert_int_equal(spool_open(&a, folder, &e), 0);
+	assert_int_equal(spool_open(&b, folder, &e), -EBUSY);
+	spool_close(a);
+	assert_int_equal(spool_open(&b, folder, &e), 0);
+	spool_close(b);
+}
+
+static void ids_are_never_given_twice(void **state)
+{
+	(void)state;
+	struct spool *s;
+	struct error e;
+	char command[256];
+	assert_int_equal(spool_open(&s, folder, &e), 0);
+	assert_int_equal(spool_next_job(s), 1);
+	assert_int_equal(spool_take_job(s, 1, &e), 0);
+	assert_int_equal(spool_take_job(s, 2, &e), 0);
+	spool_close(s);
+	snprintf(command, sizeof command, "rm -rf '%s/jobs/j2'", folder); /* the counter remembers */
+	assert_int_equal(system(command), 0);
+	assert_int_equal(spool_open(&s, folder, &e), 0);
+	assert_int_equal(spool_next_job(s), 3);
+	spool_close(s);
+	snprintf(command, sizeof command, "rm '%s/next-job' && mkdir '%s/jobs/j41'", folder, folder); /* the folders, too */
+	assert_int_equal(system(command), 0);
+	assert_int_equal(spool_open(&s, folder, &e), 0);
+	assert_int_equal(spool_next_job(s), 42);
+	uint64_t ids[4];
+	assert_int_equal(spool_jobs(s, ids, 4), 2);
+	assert_int_equal(ids[0], 1);
+	assert_int_equal(ids[1], 41);
+	assert_int_equal(spool_jobs(s, ids, 1), 1);
+	assert_int_equal(ids[0], 41);
+	spool_close(s);
+}
+
+static void records_come_back(void **state)
+{
+	(void)state;
+	struct spool *s;
+	struct error e;
+	struct job_record r = {.id = 7, .priority = -3, .exit_code = 4, .has_result = true, .submitted = 1.5e9,
+			       .ended = 1.5e9 + 1, .progress = 0.1, .rel_error = 1.0 / 3, .rounds = 12, .mutations = 1u << 31};
+	struct job_record back;
+	strcpy(r.name, "gr\xc3\xbcn \"quoted\"");
+	strcpy(r.state, "done");
+	strcpy(r.reason, "time");
+	strcpy(r.output, "a b.exr");
+	assert_int_equal(spool_open(&s, folder, &e), 0);
+	assert_int_equal(spool_take_job(s, 7, &e), 0);
+	assert_int_equal(spool_write_record(s, &r, &e), 0);
+	assert_int_equal(spool_read_record(s, 7, &back, &e), 0);
+	assert_string_equal(back.name, r.name);
+	assert_string_equal(back.output, r.output);
+	assert_true(back.rel_error == r.rel_error && back.progress == r.progress && back.ended == r.ended);
+	assert_true(back.rounds == 12 && back.mutations == 1u << 31 && back.priority == -3 && back.exit_code == 4);
+	assert_true(back.has_result && record_is_ended(&back));
+	assert_int_equal(spool_read_record(s, 8, &back, &e), -ENOENT);
+	assert_int_equal(spool_write(s, 7, "job.json", "{}", 2, &e), 0);
+	assert_int_equal(spool_read_record(s, 7, &back, &e), -EBADMSG);
+	assert_int_equal(spool_write(s, 7, "job.json", "[", 1, &e), 0);
+	assert_int_equal(spool_read_record(s, 7, &back, &e), -EBADMSG);
+	spool_close(s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(one_master, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(ids_are_never_given_twice, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(records_come_back, set_up, tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
