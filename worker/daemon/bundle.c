@@ -1,0 +1,253 @@
+#include "worker/daemon/bundle.h"
+
+#include "common/base/mem.h"
+
+#include <assert.h>
+#include <fcntl.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { PATH_BYTES = 4200, DEFINES_MAX = 256 };
+
+static const Farm__JobInfo *info_of(const struct bundle *b)
+{
+	return b->info.message->job_info;
+}
+
+static struct blob_hash hash_of(const Farm__File *f)
+{
+	struct blob_hash h;
+	assert(f->hash.len == BLOB_HASH_SIZE);
+	memcpy(h.bytes, f->hash.data, BLOB_HASH_SIZE);
+	return h;
+}
+
+int bundle_new(struct bundle **out, uint64_t job, struct blob_store *blobs, struct error *e)
+{
+	struct bundle *b = mem_alloc(1, sizeof *b);
+	if (!b)
+		return error_set(e, ENOMEM, "no memory for a job");
+	b->job = job;
+	b->blobs = blobs;
+	*out = b;
+	return 0;
+}
+
+void bundle_free(struct bundle *b)
+{
+	assert(b->state != BUNDLE_BUILDING);
+	if (b->writer)
+		blob_write_abort(b->writer);
+	for (size_t i = 0; b->info.message && b->held && i < info_of(b)->n_files; i++) {
+		struct blob_hash h = hash_of(info_of(b)->files[i]);
+		if (b->held[i])
+			blob_release(b->blobs, &h);
+		if (b->paths)
+			mem_free(b->paths[i]);
+	}
+	mem_free(b->held);
+	mem_free(b->paths);
+	if (b->world)
+		world_free(b->world);
+	envelope_fini(&b->info);
+	mem_free(b);
+}
+
+static int check_info(const Farm__JobInfo *m, struct error *e)
+{
+	bool ok = envelope_text_ok(m->name, 1024) && envelope_text_ok(m->scene, 1024) && m->n_defines <= DEFINES_MAX;
+	for (size_t i = 0; ok && i < m->n_files; i++)
+		ok = envelope_text_ok(m->files[i]->name, 1024) && m->files[i]->hash.len == BLOB_HASH_SIZE;
+	return ok ? 0 : error_set(e, EBADMSG, "the coordinator's description of the job is not in order");
+}
+
+int bundle_set_info(struct bundle *b, struct envelope *info, struct error *e)
+{
+	const Farm__JobInfo *m = info->message->job_info;
+	int rc = check_info(m, e);
+	if (!rc)
+		rc = plan_from_wire(m->plan, &b->plan, e);
+	if (rc)
+		return rc;
+	bool *held = mem_alloc(m->n_files, sizeof *held);
+	char **paths = mem_alloc(m->n_files, sizeof *paths);
+	if (!held || !paths) {
+		mem_free(held);
+		mem_free(paths);
+		return error_set(e, ENOMEM, "no memory for a job");
+	}
+	b->held = held;
+	b->paths = paths;
+	b->info = *info;
+	memset(info, 0, sizeof *info);
+	b->state = BUNDLE_FETCHING;
+	return 0;
+}
+
+bool bundle_next_missing(struct bundle *b, uint64_t *offset)
+{
+	*offset = b->writer ? blob_write_at(b->writer) : 0;
+	if (b->writer)
+		return true;
+	for (size_t i = 0; i < info_of(b)->n_files; i++) {
+		b->wanted = hash_of(info_of(b)->files[i]);
+		if (!b->held[i])
+			b->held[i] = blob_hold(b->blobs, &b->wanted);
+		if (!b->held[i])
+			return true;
+	}
+	return false;
+}
+
+int bundle_add(struct bundle *b, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e)
+{
+	int rc = 0;
+	if (*c->error)
+		return error_set(e, EIO, "the coordinator has a file of the scene no more: %s", c->error);
+	if (!b->writer)
+		rc = blob_write_begin(&b->writer, b->blobs, &b->wanted, c->size, e);
+	if (!rc && c->offset != blob_write_at(b->writer))
+		rc = error_set(e, EBADMSG, "a blob came out of order");
+	if (!rc && size == 0 && c->offset < c->size)
+		rc = error_set(e, EBADMSG, "a blob ended too early");
+	if (!rc)
+		rc = blob_write_add(b->writer, payload, size, e);
+	if (rc || blob_write_at(b->writer) < c->size)
+		return rc;
+	struct blob_hash got = b->wanted;
+	rc = blob_write_commit(b->writer, e);
+	b->writer = NULL;
+	if (!rc) {
+		uint64_t offset;
+		bundle_next_missing(b, &offset); /* holds it for its file */
+		blob_release(b->blobs, &got);
+	}
+	return rc;
+}
+
+/* ---- assets: the builder's thread ---- */
+
+struct mapping {
+	void *at;
+	size_t size;
+};
+
+static int open_asset(void *user, const char *name, struct asset *out, struct error *e)
+{
+	const struct bundle *b = user;
+	const Farm__JobInfo *m = info_of(b);
+	size_t i = 0;
+	while (i < m->n_files && strcmp(m->files[i]->name, name) != 0)
+		i++;
+	if (i == m->n_files)
+		return error_set(e, ENOENT, "%s: the file was not sent with the job", name);
+	int fd = open(b->paths[i], O_RDONLY | O_CLOEXEC);
+	struct stat st;
+	if (fd < 0 || fstat(fd, &st)) {
+		int rc = error_set(e, errno, "%s: %s", name, strerror(errno));
+		if (fd >= 0)
+			close(fd);
+		return rc;
+	}
+	struct mapping *map = mem_alloc(1, sizeof *map);
+	void *at = MAP_FAILED;
+	if (map && st.st_size > 0)
+		at = mmap(NULL, (size_t)st.st_size, PROT_READ, MAP_PRIVATE, fd, 0);
+	close(fd);
+	if (!map || (st.st_size > 0 && at == MAP_FAILED)) {
+		mem_free(map);
+		return error_set(e, ENOMEM, "%s: cannot be mapped", name);
+	}
+	*map = (struct mapping){st.st_size > 0 ? at : NULL, (size_t)st.st_size};
+	*out = (struct asset){st.st_size > 0 ? at : (const unsigned char *)"", (size_t)st.st_size, map};
+	return 0;
+}
+
+static void close_asset(void *user, struct asset *a)
+{
+	(void)user;
+	struct mapping *map = a->handle;
+	if (map && map->at)
+		munmap(map->at, map->size);
+	mem_free(map);
+	memset(a, 0, sizeof *a);
+}
+
+/* ---- the world ---- */
+
+/* What this worker reads must be what the client read, or the image would not be the one that was planned. */
+static int check_plan(const struct bundle *b, const struct scene *s, const struct render_options *o, struct error *e)
+{
+	struct scene_settings set;
+	const struct plan *p = &b->plan;
+	int rc = scene_settings_read(s, o->width, o->height, &set, e);
+	if (rc)
+		return rc;
+	if (set.width != p->width || set.height != p->height || set.border != p->border)
+		return error_set(e, EINVAL,
+				 "this worker reads a film of %ux%u with a border of %u from the scene, the plan says %ux%u "
+				 "and %u: other versions?",
+				 set.width, set.height, set.border, p->width, p->height, p->border);
+	const struct render_integrator *i = render_integrator_find(p->integrator);
+	if (!i || i->kind != p->kind)
+		return error_set(e, EINVAL, "this worker has no integrator '%s' of that kind", p->integrator);
+	if (p->max_depth > i->max_depth)
+		return error_set(e, EINVAL, "'%s' holds paths of %u edges, the plan says %u", p->integrator, i->max_depth,
+				 p->max_depth);
+	return 0;
+}
+
+static int build(struct bundle *b, struct error *e)
+{
+	const Farm__JobInfo *m = info_of(b);
+	struct scene_define defines[DEFINES_MAX];
+	struct asset_source assets = {b, open_asset, close_asset};
+	struct render_options options = {m->render_width, m->render_height};
+	struct scene scene;
+	for (size_t i = 0; i < m->n_defines; i++)
+		defines[i] = (struct scene_define){m->defines[i]->name, m->defines[i]->value};
+	int rc = scene_read(&scene, &assets, m->scene, render_plugins(), defines, m->n_defines, e);
+	if (rc)
+		return rc;
+	rc = check_plan(b, &scene, &options, e);
+	if (!rc)
+		rc = world_new(&b->world, &scene, &assets, &options, e);
+	scene_fini(&scene);
+	return rc;
+}
+
+static void run(struct task *t)
+{
+	struct bundle *b = (struct bundle *)t; /* its first member */
+	uint64_t begun = uv_hrtime();
+	if (build(b, &b->error))
+		b->world = NULL;
+	b->build_seconds = (double)(uv_hrtime() - begun) * 1e-9;
+}
+
+static void done(struct task *t)
+{
+	struct bundle *b = (struct bundle *)t;
+	b->state = b->world ? BUNDLE_READY : BUNDLE_FAILED;
+	b->built(b);
+}
+
+int bundle_build(struct bundle *b, struct crew *c, struct error *e)
+{
+	const Farm__JobInfo *m = info_of(b);
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = hash_of(m->files[i]);
+		if (!b->paths[i])
+			b->paths[i] = mem_alloc(PATH_BYTES, 1);
+		if (!b->paths[i])
+			return error_set(e, ENOMEM, "no memory for a job");
+		blob_path(b->blobs, &h, b->paths[i], PATH_BYTES);
+	}
+	b->state = BUNDLE_BUILDING;
+	b->task.run = run;
+	b->task.done = done;
+	crew_add(c, &b->task);
+	return 0;
+}

@@ -1,0 +1,56 @@
+/*
+ * A job at a worker: what it is (JobInfo), its files in the cache, its world. The world is built on a thread of the crew
+ * and shared by all leases; everything else is the loop's thread.
+ */
+#ifndef WORKER_DAEMON_BUNDLE_H
+#define WORKER_DAEMON_BUNDLE_H
+
+#include "common/wire/plan_wire.h"
+#include "worker/daemon/cache.h"
+#include "worker/daemon/crew.h"
+#include "worker/render/render.h"
+
+enum bundle_state {
+	BUNDLE_ASKED,    /* JobGet was sent */
+	BUNDLE_FETCHING, /* files are missing */
+	BUNDLE_BUILDING, /* its world is being built */
+	BUNDLE_READY,
+	BUNDLE_FAILED, /* error says why */
+};
+
+struct bundle {
+	struct task task; /* building */
+	struct bundle *next;
+	uint64_t job;
+	enum bundle_state state;
+	struct envelope info; /* JobInfo, owned */
+	struct plan plan;
+	struct blob_store *blobs;
+	bool *held;   /* by file: in the cache, held */
+	char **paths; /* by file, for the builder's thread */
+	struct blob_writer *writer;
+	struct blob_hash wanted; /* the blob that is being fetched */
+	struct world *world;
+	unsigned users;     /* leases that need it */
+	uint64_t last_used; /* counter */
+	bool ended;         /* the coordinator needs it no more */
+	double build_seconds;
+	void *owner;
+	void (*built)(struct bundle *); /* on the loop's thread: READY or FAILED */
+	struct error error;
+};
+
+int bundle_new(struct bundle **b, uint64_t job, struct blob_store *blobs, struct error *e);
+/* Not while BUILDING. */
+void bundle_free(struct bundle *b);
+
+/* Takes the answer to JobGet; then bundle_next_missing. -EBADMSG. */
+int bundle_set_info(struct bundle *b, struct envelope *info, struct error *e);
+/* The next hash to fetch, into b->wanted, and from which byte on. false: all files are there. */
+bool bundle_next_missing(struct bundle *b, uint64_t *offset);
+/* A chunk of b->wanted. */
+int bundle_add(struct bundle *b, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e);
+/* All files are there: builds the world on the crew. */
+int bundle_build(struct bundle *b, struct crew *c, struct error *e);
+
+#endif

@@ -1,0 +1,76 @@
+#include "worker/daemon/cache.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { PATH_BYTES = 4096, SLOTS = 256 };
+
+static int make_folders(char *path, struct error *e)
+{
+	for (char *p = path + 1;; p++) {
+		if (*p && *p != '/')
+			continue;
+		char keep = *p;
+		*p = 0;
+		if (mkdir(path, 0700) && errno != EEXIST)
+			return error_set(e, errno, "%s: %s", path, strerror(errno));
+		*p = keep;
+		if (!keep)
+			return 0;
+	}
+}
+
+static int base_folder(const char *folder, char path[PATH_BYTES], struct error *e)
+{
+	const char *xdg = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
+	int n;
+	if (folder)
+		n = snprintf(path, PATH_BYTES, "%s", folder);
+	else if (xdg && *xdg == '/')
+		n = snprintf(path, PATH_BYTES, "%s/hslt", xdg);
+	else if (home && *home == '/')
+		n = snprintf(path, PATH_BYTES, "%s/.cache/hslt", home);
+	else
+		return error_set(e, EINVAL, "no folder for the cache: there is no $HOME; say --cache DIR");
+	if (n <= 0 || n >= PATH_BYTES - 32)
+		return error_set(e, EINVAL, "the name of the cache's folder is empty or too long");
+	return make_folders(path, e);
+}
+
+int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error *e)
+{
+	char base[PATH_BYTES], path[PATH_BYTES + 32];
+	c->blobs = NULL;
+	c->lock = -1;
+	int rc = base_folder(folder, base, e);
+	for (int slot = 0; !rc && slot < SLOTS; slot++) {
+		snprintf(path, sizeof path, "%s/slot-%d.lock", base, slot);
+		c->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+		if (c->lock < 0)
+			return error_set(e, errno, "%s: %s", path, strerror(errno));
+		if (flock(c->lock, LOCK_EX | LOCK_NB) == 0) {
+			snprintf(path, sizeof path, "%s/slot-%d", base, slot);
+			rc = blob_store_open(&c->blobs, path, limit, e);
+			if (rc)
+				cache_close(c);
+			return rc;
+		}
+		close(c->lock);
+		c->lock = -1;
+	}
+	return rc ? rc : error_set(e, EBUSY, "%s: %d workers use this cache already", base, SLOTS);
+}
+
+void cache_close(struct cache *c)
+{
+	blob_store_close(c->blobs);
+	if (c->lock >= 0)
+		close(c->lock);
+	c->blobs = NULL;
+	c->lock = -1;
+}

@@ -1,0 +1,19 @@
+/*
+ * Where a worker keeps blobs between jobs and lives: a folder with a slot for each worker of this machine that runs at the
+ * same time, each a blob store with its own lock. The loop's thread.
+ */
+#ifndef WORKER_DAEMON_CACHE_H
+#define WORKER_DAEMON_CACHE_H
+
+#include "common/blob/blob.h"
+
+struct cache {
+	struct blob_store *blobs;
+	int lock;
+};
+
+/* folder NULL: $XDG_CACHE_HOME/hslt or ~/.cache/hslt. limit: bytes of one slot. */
+int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error *e);
+void cache_close(struct cache *c);
+
+#endif

@@ -1,0 +1,29 @@
+/*
+ * The render threads: a queue of tasks to them, a queue of finished ones back to the loop through one uv_async_t. All
+ * calls on the loop's thread; `run` alone is called on a thread of the crew. Signals go to the loop's thread.
+ */
+#ifndef WORKER_DAEMON_CREW_H
+#define WORKER_DAEMON_CREW_H
+
+#include "common/base/error.h"
+
+#include <stdbool.h>
+#include <uv.h>
+
+struct task {
+	struct task *next;
+	void (*run)(struct task *);
+	void (*done)(struct task *); /* on the loop's thread */
+};
+
+struct crew;
+
+int crew_new(struct crew **c, uv_loop_t *loop, unsigned threads, struct error *e);
+void crew_add(struct crew *c, struct task *t);
+/* true: it had not begun and is the caller's again. */
+bool crew_take_back(struct crew *c, struct task *t);
+unsigned crew_pending(const struct crew *c); /* tasks that are not done yet */
+/* Waits for what runs; `done` is not called any more. The memory goes when the loop has closed its handle. */
+void crew_close(struct crew *c);
+
+#endif

@@ -1,0 +1,104 @@
+#include "worker/daemon/fingerprint.h"
+
+#include "common/base/version.h"
+#include "worker/render/render.h"
+
+#include <elf.h>
+#include <gnu/libc-version.h>
+#include <link.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { INPUTS = 512, ID_BYTES = 20 };
+
+static void mix(uint64_t *hash, double x)
+{
+	unsigned char bytes[sizeof x];
+	memcpy(bytes, &x, sizeof x);
+	for (size_t i = 0; i < sizeof bytes; i++)
+		*hash = (*hash ^ bytes[i]) * 0x100000001b3u;
+}
+
+uint64_t fingerprint_self_test(void)
+{
+	uint64_t hash = 0xcbf29ce484222325u;
+	/* volatile: computed by the library that is there, not by the compiler that was */
+	volatile double seed = 0.123456789;
+	double x = seed;
+	for (int i = 0; i < INPUTS; i++) {
+		x = x * 3.9 * (1 - x); /* chaotic in (0,1): any bit of difference grows */
+		mix(&hash, sin(100 * x));
+		mix(&hash, cos(100 * x));
+		mix(&hash, tan(x));
+		mix(&hash, exp(20 * x - 10));
+		mix(&hash, log(x));
+		mix(&hash, pow(x, 2.2));
+		mix(&hash, atan2(x, 1 - x));
+		mix(&hash, acos(x));
+		mix(&hash, sinh(x));
+		mix(&hash, cbrt(x));
+		mix(&hash, erf(x));
+		mix(&hash, hypot(x, 0.3));
+		mix(&hash, fma(x, x, -0.1));
+		mix(&hash, (double)expf((float)x));
+		mix(&hash, (double)powf((float)x, 0.45f));
+	}
+	return hash;
+}
+
+struct build_id {
+	unsigned char bytes[ID_BYTES];
+	size_t size;
+};
+
+static void find_note(const char *at, size_t size, struct build_id *id)
+{
+	while (size >= sizeof(ElfW(Nhdr))) {
+		ElfW(Nhdr) note;
+		memcpy(&note, at, sizeof note);
+		size_t name = (note.n_namesz + 3u) & ~3u, content = (note.n_descsz + 3u) & ~3u;
+		size_t all = sizeof note + name + content;
+		if (all > size)
+			return;
+		if (note.n_type == NT_GNU_BUILD_ID && note.n_namesz == 4 && memcmp(at + sizeof note, "GNU", 4) == 0) {
+			id->size = note.n_descsz < ID_BYTES ? note.n_descsz : ID_BYTES;
+			memcpy(id->bytes, at + sizeof note + name, id->size);
+			return;
+		}
+		at += all;
+		size -= all;
+	}
+}
+
+/* The first object is the program itself. */
+static int look_at_program(struct dl_phdr_info *info, size_t size, void *user)
+{
+	(void)size;
+	for (int i = 0; i < info->dlpi_phnum; i++) {
+		const ElfW(Phdr) *h = &info->dlpi_phdr[i];
+		if (h->p_type == PT_NOTE)
+			find_note((const char *)(uintptr_t)(info->dlpi_addr + h->p_vaddr), h->p_memsz, user);
+	}
+	return 1;
+}
+
+static int has_fma(void)
+{
+#if defined(__x86_64__) || defined(__i386__)
+	return __builtin_cpu_supports("fma") ? 1 : 0;
+#else
+	return 1;
+#endif
+}
+
+void fingerprint_make(char text[FINGERPRINT_MAX])
+{
+	struct build_id id = {.size = 0};
+	char build[2 * ID_BYTES + 1] = HSLT_VERSION; /* linked without an id: better than nothing */
+	dl_iterate_phdr(look_at_program, &id);
+	for (size_t i = 0; i < id.size; i++)
+		snprintf(build + 2 * i, 3, "%02x", id.bytes[i]);
+	snprintf(text, FINGERPRINT_MAX, "build=%s %s libc=%s fma=%d self=%016llx", build, render_numeric_version(),
+		 gnu_get_libc_version(), has_fma(), (unsigned long long)fingerprint_self_test());
+}

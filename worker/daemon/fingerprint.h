@@ -1,0 +1,20 @@
+/*
+ * The numeric fingerprint (contract section 1): what decides the bits of a result beside plan and scene. Workers with
+ * equal texts give equal bits. Any thread.
+ */
+#ifndef WORKER_DAEMON_FINGERPRINT_H
+#define WORKER_DAEMON_FINGERPRINT_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+enum { FINGERPRINT_MAX = 256 };
+
+/* "build=... embree=... libc=... fma=1 self=...": build id of this program, Embree with its instruction set, libm's
+ * version, and a hash of what it computes here. */
+void fingerprint_make(char text[FINGERPRINT_MAX]);
+
+/* FNV-1a over the results of libm's functions on fixed inputs, about a millisecond. */
+uint64_t fingerprint_self_test(void);
+
+#endif
