@@ -1,4 +1,8 @@
-/* Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, EXR, Radiance HDR by content. */
+/*
+ * Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, EXR, Radiance HDR by content. PNG (8 and 16
+ * bits) and JPEG are sRGB, whatever gamma they claim. Damaged files are an error, never half an image. Any thread, each
+ * with its own arena.
+ */
 #ifndef WORKER_SCENE_IMAGE_H
 #define WORKER_SCENE_IMAGE_H
 
@@ -13,7 +17,7 @@ struct image {
 	float *pixels;                    /* [height][width][channels], finite, in the arena */
 };
 
-/* raw: no sRGB decoding of 8-bit data. At most 2^28 pixels. */
+/* raw: no sRGB decoding of integer data. At most 2^28 pixels. */
 int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
 	       struct error *e);
 

@@ -50,12 +50,11 @@ static void *allocate(struct maker *m, size_t count, size_t size)
 }
 
 /* One note for each kind of thing, where it is met first. */
-__attribute__((format(printf, 4, 5))) static int note(struct maker *m, const struct xml_element *el, const char *property,
-						      const char *format, ...)
+__attribute__((format(printf, 5, 6))) static int note(struct maker *m, const struct xml_element *el, const char *type,
+						      const char *property, const char *format, ...)
 {
 	char key[NOTE_MAX], text[NOTE_MAX];
-	const char *type = xml_attribute(el, "type");
-	snprintf(key, sizeof key, "%.64s/%.64s/%.64s", el->name, type ? type : "", property);
+	snprintf(key, sizeof key, "%.64s/%.64s/%.64s", el->name, type, property);
 	struct scene *s = m->scene;
 	for (uint32_t i = 0; i < s->note_count; i++)
 		if (strcmp(m->note_keys[i], key) == 0)
@@ -78,13 +77,14 @@ __attribute__((format(printf, 4, 5))) static int note(struct maker *m, const str
 
 static int note_property(struct maker *m, const struct xml_element *owner, const struct xml_element *el, const char *name)
 {
-	return note(m, owner, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` has no effect on light and is ignored", el->file,
-		    el->line, owner->name, xml_attribute(owner, "type"), name);
+	const char *type = xml_attribute(owner, "type");
+	return note(m, owner, type, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` has no effect on light and is ignored", el->file,
+		    el->line, owner->name, type, name);
 }
 
 static int note_foreign(struct maker *m, const struct xml_element *el)
 {
-	return note(m, el, "", "%s:%d: <%.64s> and all inside it is ignored", el->file, el->line, el->name);
+	return note(m, el, "", "", "%s:%d: <%.64s> and all inside it is ignored", el->file, el->line, el->name);
 }
 
 static int add_asset(struct maker *m, const char *name)
@@ -338,9 +338,10 @@ static int refuse_type(struct maker *m, const struct xml_element *el, enum plugi
 static int note_ignored_plugin(struct maker *m, const struct xml_element *el, const struct plugin_decl *decl)
 {
 	char list[256];
+	const char *type = xml_attribute(el, "type");
 	plugin_list_params(decl, list, sizeof list);
-	return note(m, el, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored but for: %s", el->file, el->line, el->name,
-		    xml_attribute(el, "type"), list);
+	return note(m, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored but for: %s", el->file, el->line, el->name, type,
+		    list);
 }
 
 static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)

@@ -1,0 +1,284 @@
+/* Every bad input is answered with an error that names the place, and what would be right where that is known. */
+#include "common/base/mem.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/scene_tables.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static int read_files(const struct memory_file *files, struct error *e)
+{
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	int r = scene_read(&s, &assets, files[0].name, scene_tables(), NULL, 0, e);
+	if (!r)
+		scene_fini(&s);
+	else if (s.arena.blocks || s.objects)
+		fail_msg("the scene is not empty after: %s", e->text);
+	return r;
+}
+
+static int read_text(const char *xml, struct error *e)
+{
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+	return read_files(files, e);
+}
+
+static void refuses(const char *xml, const char *text)
+{
+	struct error e = {"no error at all"};
+	int r = read_text(xml, &e);
+	if (r >= 0 || !strstr(e.text, text))
+		fail_msg("%.200s\n  gave %d: %s\n  not: %s", xml, r, e.text, text);
+}
+
+#define S "<scene version='3.0.0'>"
+#define END "</scene>"
+#define BSDF(x) S "<bsdf type='roughconductor'>" x "</bsdf>" END
+#define SHAPE(x) S "<shape type='cube'><transform name='to_world'>" x "</transform></shape>" END
+
+static void test_broken_xml(void **state)
+{
+	(void)state;
+	refuses("", "s.xml:1: no element found");
+	refuses("hello", "s.xml:1: syntax error");
+	refuses(S "\n<shape type='cube'>\n", "s.xml:3: no element found in <shape>");
+	refuses(S "\n<shape type='cube'></bsdf>" END, "s.xml:2: mismatched tag in <shape>");
+	refuses(S "<shape type='cube' type='obj'/>" END, "duplicate attribute");
+	refuses(S "<shape type='cube'/>" END "<x/>", "junk after document element");
+	refuses(S "\xff\xfe" END, "not well-formed");
+	refuses(S "&unknown;" END, "undefined entity");
+	refuses(S "words" END, "text has no meaning here");
+	refuses("<scenes version='3.0.0'/>", "a scene file begins with <scene");
+	refuses("<scene/>", "needs version=");
+	refuses("<scene version='three'/>", "needs version=");
+	refuses("<scene version='3.0.0' verzion='1'/>", "has no attribute `verzion`; did you mean `version`?");
+}
+
+static void test_entity_bomb(void **state)
+{
+	(void)state;
+	refuses("<?xml version='1.0'?>\n<!DOCTYPE scene [<!ENTITY a 'aaaaaaaaaaaaaaaa'><!ENTITY b '&a;&a;&a;&a;&a;&a;&a;&a;'>"
+		"<!ENTITY c '&b;&b;&b;&b;&b;&b;&b;&b;'>]><scene version='3.0.0'>&c;</scene>", "s.xml:2: <!DOCTYPE>");
+	refuses("<!DOCTYPE scene SYSTEM 'file:///etc/passwd'><scene version='3.0.0'/>", "<!DOCTYPE>");
+}
+
+/* The same with parameters: each twice the one before. */
+static void test_parameter_bomb(void **state)
+{
+	(void)state;
+	static char xml[1 << 16];
+	size_t n = (size_t)snprintf(xml, sizeof xml, S "<default name='a0' value='0123456789012345'/>");
+	for (int i = 1; i < 40; i++)
+		n += (size_t)snprintf(xml + n, sizeof xml - n, "<default name='a%d' value='$a%d$a%d'/>", i, i - 1, i - 1);
+	snprintf(xml + n, sizeof xml - n, END);
+	refuses(xml, "a value of more than");
+}
+
+static void test_deep_nesting(void **state)
+{
+	(void)state;
+	static char xml[1 << 20];
+	char *p = xml;
+	p += sprintf(p, S "\n");
+	for (int i = 0; i < 5000; i++)
+		p += sprintf(p, "<bsdf type='twosided'>");
+	refuses(xml, "s.xml:2: <bsdf>: elements are nested more than 64 deep");
+	p = xml;
+	p += sprintf(p, S "<bsdf type='diffuse' id='m5000'/>");
+	for (int i = 4999; i >= 0; i--)
+		p += sprintf(p, "<bsdf type='twosided' id='m%d'><ref id='m%d'/></bsdf>", i, i + 1);
+	sprintf(p, END);
+	assert_int_equal(read_text(xml, NULL), 0); /* each is made when those it refers to are there */
+	p = xml;
+	p += sprintf(p, S);
+	for (int i = 0; i < 5000; i++)
+		p += sprintf(p, "<bsdf type='twosided' id='m%d'><ref id='m%d'/></bsdf>", i, i + 1);
+	sprintf(p, "<bsdf type='diffuse' id='m5000'/>" END);
+	refuses(xml, "objects refer to each other more than 64 deep");
+}
+
+static void test_too_many_elements(void **state)
+{
+	(void)state;
+	size_t n = (1 << 20) + 16, size = n * 4 + 128;
+	char *xml = mem_alloc(size, 1), *p = xml;
+	p += sprintf(p, S "<mode>");
+	for (size_t i = 0; i < n; i++, p += 4)
+		memcpy(p, "<m/>", 4);
+	sprintf(p, "</mode>" END);
+	refuses(xml, "more than 1048576 elements");
+	mem_free(xml);
+}
+
+static void test_unknown_names(void **state)
+{
+	(void)state;
+	refuses(S "\n<bsdf type='difuse'/>" END, "s.xml:2: <bsdf type=\"difuse\">: there is no bsdf of this type; did you mean "
+						"`diffuse`? (supported: diffuse, ");
+	refuses(S "<bsdf type='hair'/>" END, "supported: diffuse, roughconductor");
+	refuses(S "<medium type='homogeneous'/>" END, "supported: none");
+	refuses(S "<bdsf type='diffuse'/>" END, "did you mean `bsdf`?");
+	refuses(S "<luminaire type='area'/>" END, "<luminaire");
+	refuses(S "<float name='a' value='1'/>" END, "has no place in <scene>");
+	refuses(S "<bsdf/>" END, "needs an attribute `type`");
+	refuses(S "<sensor type='thinlens'/>" END, "supported: perspective");
+	refuses(S "<sensor type='perspective'><film type='hdrfilm'><rfilter type='mitchell'/></film></sensor>" END,
+		"supported: box, tent, gaussian");
+	refuses(BSDF("\n<float name='alhpa' value='1'/>"), "s.xml:2: <float>: <bsdf type=\"roughconductor\"> has no `alhpa`; "
+							  "did you mean `alpha`? (supported: alpha, ");
+	refuses(BSDF("<boolean name='nonlinear' value='true'/>"), "would change the image and is not supported; supported: alpha");
+	refuses(BSDF("<string name='distribution' value='beckman'/>"), "did you mean `beckmann`? (supported: beckmann, ggx)");
+	refuses(BSDF("<flaot name='alpha' value='1'/>"), "did you mean `float`?");
+}
+
+static void test_bad_values(void **state)
+{
+	(void)state;
+	refuses(BSDF("<float name='alpha' value='nan'/>"), "`nan` is not a (finite) number");
+	refuses(BSDF("<float name='alpha' value='1e999'/>"), "is not a (finite) number");
+	refuses(BSDF("<float name='alpha' value='0,1'/>"), "is not a (finite) number");
+	refuses(BSDF("<float name='alpha' value='1.5'/>"), "alpha=1.5 is outside [0.0001, 1]");
+	refuses(BSDF("<float name='alpha'/>"), "needs an attribute `value`");
+	refuses(BSDF("<float value='1'/>"), "needs an attribute `name`");
+	refuses(BSDF("<float name='alpha' valeu='1'/>"), "has no attribute `valeu`; did you mean `value`?");
+	refuses(BSDF("<float name='alpha' value='$x'/>"), "$x is not defined");
+	refuses(BSDF("<float name='alpha' value='0.1'/><float name='alpha' value='0.2'/>"), "given twice");
+	refuses(BSDF("<string name='alpha' value='0.1'/>"), "`alpha` cannot be given like this (supported: float)");
+	refuses(BSDF("<float name='alpha' value='.1'><x/></float>"), "has no place in <float>");
+	refuses(BSDF("<rgb name='eta' value='1, 2'/>"), "neither three numbers nor one");
+	refuses(BSDF("<rgb name='eta' value='1, inf, 2'/>"), "neither three numbers nor one");
+	refuses(BSDF("<rgb name='eta' value='#ff0000'/>"), "#rrggbb belongs into <srgb>");
+	refuses(BSDF("<srgb name='eta' value='#ff00gg'/>"), "nor #rrggbb");
+	refuses(BSDF("<spectrum name='eta' value='400:1'/>"), "one pair");
+	refuses(BSDF("<spectrum name='eta' value='500:1, 400:1'/>"), "must be positive and ascend");
+	refuses(BSDF("<spectrum name='eta' value='400:1, 500'/>"), "neither a number nor a list");
+	refuses(BSDF("<spectrum name='eta' value='1, 2, 3'/>"), "three numbers belong into <rgb>");
+	refuses(BSDF("<spectrum name='eta' filename='x.spd'/>"), "spectra from files are not supported");
+	refuses(BSDF("<blackbody name='eta' temperature='5000'/>"), "is not supported; supported: boolean");
+	refuses(S "<shape type='sphere'><boolean name='flip_normals' value='yes'/></shape>" END, "neither true nor false");
+	refuses(S "<shape type='sphere'><float name='radius' value='0'/></shape>" END, "outside");
+	refuses(S "<shape type='sphere'><float name='radius' value='-1'/></shape>" END, "outside");
+	refuses(S "<shape type='obj'><string name='filename' value=''/></shape>" END, "an empty file name");
+}
+
+static void test_bad_transforms(void **state)
+{
+	(void)state;
+	refuses(SHAPE("<matrix value='1 2 3'/>"), "with 16 or 9 numbers");
+	refuses(SHAPE("<matrix value='1 0 0 0 0 1 0 0 0 0 1 0 0 0 0 2'/>"), "the last row must be 0 0 0 1");
+	refuses(SHAPE("<rotate angle='90' x='0'/>"), "has no axis");
+	refuses(SHAPE("<rotate x='1'/>"), "needs an angle");
+	refuses(SHAPE("<translate/>"), "needs either x, y, z or value");
+	refuses(SHAPE("<translate x='1' value='1 2 3'/>"), "needs either x, y, z or value");
+	refuses(SHAPE("<skale x='1'/>"), "did you mean `scale`?");
+	refuses(SHAPE("<lookat origin='0 0 0' target='0 0 0' up='0 1 0'/>"), "one point");
+	refuses(SHAPE("<lookat origin='0 0 0' target='0 1 0' up='0 1 0'/>"), "up points along the view");
+	refuses(SHAPE("<lookat origin='0 0 0' target='0 1 0'/>"), "needs an attribute `up`");
+	refuses(SHAPE("<scale value='1e300'/><scale value='1e300'/>"), "leaves the range");
+}
+
+static void test_bad_references(void **state)
+{
+	(void)state;
+	refuses(S "<bsdf type='diffuse' id='wall'/><shape type='cube'>\n<ref id='wal'/></shape>" END,
+		"s.xml:2: <ref>: there is no object with id \"wal\"; did you mean `wall`?");
+	refuses(S "<shape type='cube'><ref/></shape>" END, "needs an attribute `id`");
+	refuses(S "<bsdf type='twosided' id='a'><ref id='a'/></bsdf>" END, "refers to itself");
+	refuses(S "<bsdf type='twosided' id='a'><ref id='b'/></bsdf><bsdf type='twosided' id='b'><ref id='a'/></bsdf>" END,
+		"refers to itself");
+	refuses(S "<bsdf type='diffuse' id='a'/>\n<bsdf type='diffuse' id='a'/>" END,
+		"s.xml:2: <bsdf type=\"diffuse\">: the id \"a\" is given twice");
+	refuses(S "<alias id='a' as='b'/>" END, "there is no object with id \"a\"");
+	refuses(S "<bsdf type='diffuse' id='a'/><alias id='a' as='a'/>" END, "given twice");
+	refuses(S "<shape type='cube'><film type='hdrfilm'/></shape>" END, "a film without a name has no place in <shape");
+	refuses(S "<shape type='cube'><bsdf type='diffuse'/><bsdf type='diffuse'/></shape>" END, "a second bsdf");
+	refuses(S "<bsdf type='diffuse' id='a'/><bsdf type='diffuse'><ref name='reflectance' id='a'/></bsdf>" END,
+		"`reflectance` may be a texture, but not a bsdf");
+	refuses(S "<bsdf type='diffuse'><bsdf type='diffuse' name='nested'/></bsdf>" END, "has no `nested`");
+}
+
+static void test_bad_includes(void **state)
+{
+	(void)state;
+	refuses(S "\n<include filename='x.xml'/>" END, "s.xml:2: <include>: x.xml: no such file");
+	refuses(S "<include/>" END, "needs filename");
+	refuses(S "<bsdf type='diffuse'><include filename='s.xml'/></bsdf>" END, "directly in <scene> only");
+	refuses(S "<include filename='s.xml'/>" END, "files include each other more than 8 deep");
+	static const char main_file[] = S "<include filename='i.xml'/>" END, old[] = "<scene version='0.6.0'/>",
+			  broken[] = S "\n\n<bsdf type='difuse'/>" END, doctype[] = "<!DOCTYPE scene><scene version='3.0.0'/>";
+	static const struct {
+		const char *bytes, *text;
+	} cases[] = {{old, "i.xml:1: <scene>: version 0.6.0: an included file must be of the same dialect"},
+		     {broken, "i.xml:3: <bsdf type=\"difuse\">"},
+		     {doctype, "i.xml:1: <!DOCTYPE>"}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		const struct memory_file files[] = {{"s.xml", main_file, sizeof main_file - 1},
+						    {"i.xml", cases[i].bytes, strlen(cases[i].bytes)}, {0}};
+		struct error e = {""};
+		assert_true(read_files(files, &e) < 0);
+		if (!strstr(e.text, cases[i].text))
+			fail_msg("%s\n  not: %s", e.text, cases[i].text);
+	}
+}
+
+static void test_bad_films(void **state)
+{
+	(void)state;
+#define FILM(x) S "<sensor type='perspective'>\n<film type='hdrfilm'>" x "</film></sensor>" END
+	refuses(FILM("<integer name='width' value='0'/>"), "s.xml:2: <integer>: width=0 is outside [1, 65536]");
+	refuses(FILM("<integer name='height' value='1000000000'/>"), "height=1e+09 is outside");
+	refuses(FILM("<integer name='width' value='-5'/>"), "outside");
+	refuses(FILM("<integer name='width' value='99999999999999999999999'/>"), "is not a whole number");
+	refuses(FILM("<integer name='crop_width' value='5'/>"), "would change the image and is not supported");
+#undef FILM
+}
+
+/* Every allocation fails once; nothing may leak (the sanitizers see it), crash, or pass for a success. */
+static void test_memory_runs_out(void **state)
+{
+	(void)state;
+	static const char xml[] = "<scene version='0.6.0'><default name='d' value='diffuse'/><include filename='i.xml'/>"
+				  "<texture type='bitmap' id='t'><string name='filename' value='a.png'/></texture>"
+				  "<bsdf type='$d' id='m'><ref name='reflectance' id='t'/></bsdf><alias id='m' as='k'/>"
+				  "<shape type='sphere'><ref id='k'/><transform name='toWorld'><scale value='2'/></transform>"
+				  "</shape></scene>";
+	static const char good[] = "<scene version='0.6.0'><bsdf type='roughconductor'><spectrum name='eta' value='1:2,3:4'/>"
+				   "</bsdf></scene>";
+	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {"i.xml", good, sizeof good - 1}, {0}};
+	long n = 0;
+	struct error e = {""};
+	int r;
+	do {
+		mem_fail_after(n++);
+		r = read_files(files, &e);
+		assert_true(r == 0 || r == -ENOMEM);
+	} while (r && n < 10000);
+	mem_fail_after(-1);
+	assert_int_equal(r, 0);
+	assert_true(n > 5);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_broken_xml),
+		cmocka_unit_test(test_entity_bomb),
+		cmocka_unit_test(test_parameter_bomb),
+		cmocka_unit_test(test_deep_nesting),
+		cmocka_unit_test(test_too_many_elements),
+		cmocka_unit_test(test_unknown_names),
+		cmocka_unit_test(test_bad_values),
+		cmocka_unit_test(test_bad_transforms),
+		cmocka_unit_test(test_bad_references),
+		cmocka_unit_test(test_bad_includes),
+		cmocka_unit_test(test_bad_films),
+		cmocka_unit_test(test_memory_runs_out),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

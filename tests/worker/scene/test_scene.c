@@ -1,0 +1,291 @@
+/* What the reader makes of each feature of the language. */
+#include "tests/support/memory_assets.h"
+#include "tests/support/scene_tables.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static struct memory_file files[4];
+
+static int read_with(struct scene *s, const char *xml, const struct scene_define *defines, size_t n, struct error *e)
+{
+	files[0] = (struct memory_file){"s.xml", xml, strlen(xml)};
+	struct asset_source assets = memory_assets(files);
+	return scene_read(s, &assets, "s.xml", scene_tables(), defines, n, e);
+}
+
+static struct scene read_ok(const char *xml)
+{
+	struct scene s;
+	struct error e;
+	if (read_with(&s, xml, NULL, 0, &e))
+		fail_msg("%s", e.text);
+	return s;
+}
+
+/* The content of one <bsdf type="roughconductor"> or of another element, at the top of a scene. */
+static struct scene read_inside(const char *version, const char *begin, const char *content, const char *end)
+{
+	char xml[4096];
+	snprintf(xml, sizeof xml, "<scene version=\"%s\">%s%s%s</scene>", version, begin, content, end);
+	return read_ok(xml);
+}
+
+static struct scene read_bsdf(const char *version, const char *content)
+{
+	return read_inside(version, "<bsdf type=\"roughconductor\">", content, "</bsdf>");
+}
+
+static void assert_rgb(const struct scene *s, double r, double g, double b)
+{
+	const struct property *p = node_find(s->objects[0], "eta");
+	assert_non_null(p);
+	assert_int_equal(p->value.type, VALUE_RGB);
+	const double want[3] = {r, g, b};
+	for (int i = 0; i < 3; i++)
+		if (!(fabs(p->value.as.rgb[i] - want[i]) < 1e-12))
+			fail_msg("component %d is %.17g, not %.17g", i, p->value.as.rgb[i], want[i]);
+}
+
+static void test_rgb(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *version, *element;
+		double r, g, b;
+	} cases[] = {
+		{"3.0.0", "<rgb name='eta' value='0.1, 0.2, 0.3'/>", .1, .2, .3},
+		{"0.6.0", "<rgb name='eta' value='.1 .2 .3'/>", .1, .2, .3},
+		{"0.6.0", "<rgb name='eta' value='.73'/>", .73, .73, .73},
+		{"0.6.0", "<srgb name='eta' value='#ff8000'/>", 1, 0.21586050011389926, 0},
+		{"0.6.0", "<rgb name='eta' value='#ff8000'/>", 1, 128 / 255.0, 0},
+		{"3.0.0", "<srgb name='eta' value='0.5, 0, 1'/>", 0.21404114048223255, 0, 1},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct scene s = read_bsdf(cases[i].version, cases[i].element);
+		assert_rgb(&s, cases[i].r, cases[i].g, cases[i].b);
+		scene_fini(&s);
+	}
+}
+
+static void test_spectra(void **state)
+{
+	(void)state;
+	struct scene s = read_bsdf("3.0.0", "<spectrum name='eta' value='400:0.5, 500:1.5 ,600:2e0'/>"
+					    "<spectrum name='k' value='0.25'/>");
+	const struct value *eta = &node_find(s.objects[0], "eta")->value, *k = &node_find(s.objects[0], "k")->value;
+	assert_int_equal(eta->type, VALUE_SPECTRUM);
+	assert_int_equal(eta->as.spectrum.count, 3);
+	assert_true(eta->as.spectrum.nm[1] == 500 && eta->as.spectrum.value[2] == 2);
+	assert_int_equal(k->as.spectrum.count, 1);
+	assert_true(k->as.spectrum.value[0] == 0.25);
+	scene_fini(&s);
+}
+
+static void test_plain_values(void **state)
+{
+	(void)state;
+	struct scene s = read_inside("0.6.0", "<shape type='sphere'>",
+				     "<point name='center' x='1' z='-3'/><float name='radius' value='2'/>"
+				     "<boolean name='flipNormals' value='true'/>", "</shape>");
+	const struct scene_node *n = s.objects[0];
+	vec3 c = node_find(n, "center")->value.as.point;
+	assert_true(c.x == 1 && c.y == 0 && c.z == -3);
+	assert_true(node_float(n, "radius", 0) == 2);
+	assert_true(node_bool(n, "flip_normals", false));
+	assert_int_equal(node_int(n, "absent", 7), 7);
+	assert_string_equal(node_string(n, "absent", "fallback"), "fallback");
+	scene_fini(&s);
+	s = read_inside("3.0.0", "<shape type='sphere'>", "<point name='center' value='1, 2, 3'/><integer name='radius' value='2'/>",
+			"</shape>");
+	assert_true(node_find(s.objects[0], "center")->value.as.point.z == 3);
+	assert_int_equal(node_find(s.objects[0], "radius")->value.type, VALUE_FLOAT);
+	scene_fini(&s);
+}
+
+static void check_transform(const char *content, vec3 p, vec3 want)
+{
+	char all[1024];
+	snprintf(all, sizeof all, "<transform name='toWorld'>%s</transform>", content);
+	struct scene s = read_inside("0.6.0", "<shape type='cube'>", all, "</shape>");
+	mat4 m = node_transform(s.objects[0], "to_world");
+	vec3 d = vec3_sub(mat4_point(&m, p), want);
+	if (!(vec3_length(d) < 1e-12))
+		fail_msg("%s is off by (%g, %g, %g)", content, d.x, d.y, d.z);
+	scene_fini(&s);
+}
+
+static void test_transforms(void **state)
+{
+	(void)state;
+	vec3 p = {1, 2, 3};
+	check_transform("", p, p);
+	check_transform("<translate x='1' z='-1'/>", p, (vec3){2, 2, 2});
+	check_transform("<translate value='1 2 3'/>", p, (vec3){2, 4, 6});
+	check_transform("<scale value='2'/>", p, (vec3){2, 4, 6});
+	check_transform("<scale x='151' z='60' y='1'/>", p, (vec3){151, 2, 180});
+	check_transform("<scale x='3'/>", p, (vec3){3, 2, 3});
+	check_transform("<scale value='1, 2, 3'/>", p, (vec3){1, 4, 9});
+	check_transform("<rotate z='1' angle='90'/>", p, (vec3){-2, 1, 3});
+	check_transform("<rotate value='0, 0, 1' angle='90'/>", p, (vec3){-2, 1, 3});
+	check_transform("<matrix value='1 0 0 10 0 0 1 20 0 -1 0 30 0 0 0 1'/>", p, (vec3){11, 23, 28});
+	check_transform("<matrix value='0 1 0, 0 0 1, 1 0 0'/>", p, (vec3){2, 3, 1});
+	/* In the order in which they stand. */
+	check_transform("<scale value='2'/><translate x='1'/>", p, (vec3){3, 4, 6});
+	check_transform("<translate x='1'/><scale value='2'/>", p, (vec3){4, 4, 6});
+	check_transform("<translate x='1'/><rotate z='1' angle='90'/>", p, (vec3){-2, 2, 3});
+	check_transform("<lookAt origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){0, 0, 1}, (vec3){0, 0, 4});
+	check_transform("<lookat origin='0,0,5' target='0,0,4' up='0 1 0'/>", (vec3){1, 0, 0}, (vec3){-1, 0, 5});
+}
+
+static void test_dialects(void **state)
+{
+	(void)state;
+	struct scene s = read_bsdf("0.5.0", "<float name='extEta' value='1'/>");
+	assert_false(s.dialect_3);
+	assert_true(node_float(s.objects[0], "ext_eta", 0) == 1);
+	scene_fini(&s);
+	s = read_bsdf("2.1.0", "<float name='ext_eta' value='1'/>");
+	assert_true(s.dialect_3);
+	scene_fini(&s);
+	/* 3.x does not know the old names. */
+	struct error e;
+	assert_int_equal(read_with(&s, "<scene version='3.0.0'><bsdf type='roughconductor'><float name='extEta' value='1'/>"
+				       "</bsdf></scene>", NULL, 0, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "did you mean `ext_eta`?"));
+}
+
+static void test_nesting_and_references(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<scene version='3.0.0'>"
+				 "<texture type='bitmap' id='t'><string name='filename' value='a/b.png'/></texture>"
+				 "<bsdf type='twosided' id='m'><bsdf type='diffuse'><ref name='reflectance' id='t'/></bsdf></bsdf>"
+				 "<shape type='cube'><ref id='m'/><emitter type='area'><rgb name='radiance' value='1'/></emitter></shape>"
+				 "<shape type='rectangle'><ref id='m'/></shape>"
+				 "<shape type='rectangle'><bsdf type='diffuse'><texture type='checkerboard' name='reflectance'>"
+				 "<rgb name='color0' value='1'/><ref id='t' name='color1'/></texture></bsdf></shape>"
+				 "</scene>");
+	assert_int_equal(s.object_count, 5);
+	const struct scene_node *t = s.objects[0], *m = s.objects[1], *cube = s.objects[2];
+	assert_string_equal(m->id, "m");
+	const struct scene_node *diffuse = node_child(m, PLUGIN_BSDF, 0);
+	assert_ptr_equal(node_ref(diffuse, "reflectance"), t);
+	assert_ptr_equal(node_child(cube, PLUGIN_BSDF, 0), m);
+	assert_ptr_equal(node_child(s.objects[3], PLUGIN_BSDF, 0), m);
+	assert_string_equal(node_child(cube, PLUGIN_EMITTER, 0)->type, "area");
+	assert_null(node_child(cube, PLUGIN_EMITTER, 1));
+	const struct scene_node *checker = node_ref(node_child(s.objects[4], PLUGIN_BSDF, 0), "reflectance");
+	assert_ptr_equal(node_ref(checker, "color1"), t);
+	assert_int_equal(s.asset_count, 1);
+	assert_string_equal(s.assets[0], "a/b.png");
+	scene_fini(&s);
+}
+
+static void test_forward_references_and_aliases(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<scene version='3.0.0'><shape type='cube'><ref id='other'/></shape>"
+				 "<bsdf type='diffuse' id='m'/><alias id='m' as='other'/><alias id='other' as='third'/>"
+				 "<shape type='cube'><ref id='third'/></shape></scene>");
+	assert_ptr_equal(node_child(s.objects[0], PLUGIN_BSDF, 0), s.objects[1]);
+	assert_ptr_equal(node_child(s.objects[2], PLUGIN_BSDF, 0), s.objects[1]);
+	scene_fini(&s);
+}
+
+static void test_parameters(void **state)
+{
+	(void)state;
+	const char *xml = "<scene version='3.0.0'><default name='a' value='0.25'/><default name='dir' value='x$a'/>"
+			  "<bsdf type='roughconductor'><float name='alpha' value='$a'/></bsdf>"
+			  "<texture type='bitmap'><string name='filename' value='$dir/$a.png'/></texture></scene>";
+	struct scene s = read_ok(xml);
+	assert_true(node_float(s.objects[0], "alpha", 0) == 0.25);
+	assert_string_equal(s.assets[0], "x0.25/0.25.png");
+	scene_fini(&s);
+	struct scene_define d[] = {{"a", "0.5"}, {"dir", "y"}};
+	struct error e;
+	assert_int_equal(read_with(&s, xml, d, 2, &e), 0);
+	assert_true(node_float(s.objects[0], "alpha", 0) == 0.5);
+	assert_string_equal(s.assets[0], "y/0.5.png");
+	scene_fini(&s);
+	struct scene_define wrong[] = {{"aa", "0.5"}};
+	assert_int_equal(read_with(&s, xml, wrong, 1, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "did you mean `a`?"));
+}
+
+static void test_include(void **state)
+{
+	(void)state;
+	static const char inner[] = "<scene version='3.0.0'><default name='x' value='diffuse'/>"
+				    "<bsdf type='$x' id='m'/></scene>";
+	files[1] = (struct memory_file){"parts/m.xml", inner, sizeof inner - 1};
+	struct scene s = read_ok("<scene version='3.0.0'><shape type='cube'><ref id='m'/></shape>"
+				 "<include filename='parts/m.xml'/><bsdf type='$x'/></scene>");
+	assert_int_equal(s.object_count, 3);
+	assert_string_equal(s.objects[1]->file, "parts/m.xml");
+	assert_string_equal(s.objects[2]->file, "s.xml");
+	assert_string_equal(s.objects[2]->type, "diffuse");
+	assert_ptr_equal(node_child(s.objects[0], PLUGIN_BSDF, 0), s.objects[1]);
+	assert_int_equal(s.asset_count, 1);
+	assert_string_equal(s.assets[0], "parts/m.xml");
+	scene_fini(&s);
+	files[1] = (struct memory_file){0};
+}
+
+static void test_ignored_is_noted_once(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<scene version='0.5.0'>\n<mode type='x'><junk/>words</mode><mode/>\n"
+				 "<integrator type='unheard'><float name='q' value='nan'/><integer name='maxDepth' value='7'/>"
+				 "<junk/></integrator>\n"
+				 "<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
+				 "<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
+				 "<dpt/></scene>");
+	assert_int_equal(s.note_count, 4);
+	assert_string_equal(s.notes[0], "s.xml:2: <mode> and all inside it is ignored");
+	assert_string_equal(s.notes[1], "s.xml:3: <integrator type=\"unheard\"> is ignored but for: max_depth");
+	assert_non_null(strstr(s.notes[2], "s.xml:4: <bsdf type=\"roughdielectric\">: `sample_visible`"));
+	assert_non_null(strstr(s.notes[3], "s.xml:6: <dpt>"));
+	assert_int_equal(node_int(s.objects[0], "max_depth", 0), 7);
+	assert_int_equal(s.objects[0]->property_count, 1);
+	scene_fini(&s);
+}
+
+static void test_assets_are_sorted_and_unique(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<scene version='3.0.0'>"
+				 "<shape type='obj'><string name='filename' value='b.obj'/></shape>"
+				 "<shape type='obj'><string name='filename' value='a.obj'/></shape>"
+				 "<shape type='obj'><string name='filename' value='b.obj'/></shape>"
+				 "<sensor type='perspective'><film type='hdrfilm'><string name='filename' value='out.exr'/></film></sensor>"
+				 "</scene>");
+	assert_int_equal(s.asset_count, 2);
+	assert_string_equal(s.assets[0], "a.obj");
+	assert_string_equal(s.assets[1], "b.obj");
+	scene_fini(&s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_rgb),
+		cmocka_unit_test(test_spectra),
+		cmocka_unit_test(test_plain_values),
+		cmocka_unit_test(test_transforms),
+		cmocka_unit_test(test_dialects),
+		cmocka_unit_test(test_nesting_and_references),
+		cmocka_unit_test(test_forward_references_and_aliases),
+		cmocka_unit_test(test_parameters),
+		cmocka_unit_test(test_include),
+		cmocka_unit_test(test_ignored_is_noted_once),
+		cmocka_unit_test(test_assets_are_sorted_and_unique),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,175 @@
+#include "tests/support/memory_assets.h"
+#include "tests/support/scene_tables.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static int read_scene(const char *xml, uint32_t width, uint32_t height, struct scene_settings *set, struct error *e)
+{
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	int r = scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, e);
+	if (r)
+		fail_msg("%s", e->text);
+	r = scene_settings_read(&s, width, height, set, e);
+	scene_fini(&s);
+	return r;
+}
+
+/* before: in <scene>, in the old dialect; content: in <sensor>. */
+static struct scene_settings read_ok(const char *before, const char *content)
+{
+	char xml[2048];
+	struct scene_settings set;
+	struct error e;
+	snprintf(xml, sizeof xml, "<scene version='0.6.0'>%s<sensor type='perspective'>%s</sensor></scene>", before, content);
+	if (read_scene(xml, 0, 0, &set, &e))
+		fail_msg("%s", e.text);
+	return set;
+}
+
+static void refuses(const char *content, const char *text)
+{
+	char xml[2048];
+	struct scene_settings set;
+	struct error e = {""};
+	snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", content);
+	int r = read_scene(xml, 0, 0, &set, &e);
+	if (r >= 0 || !strstr(e.text, text))
+		fail_msg("%s\n gave %d: %s\n not: %s", content, r, e.text, text);
+}
+
+static void test_defaults(void **state)
+{
+	(void)state;
+	struct scene_settings s = read_ok("", "");
+	assert_int_equal(s.width, 768);
+	assert_int_equal(s.height, 576);
+	assert_int_equal(s.filter, FILTER_GAUSSIAN);
+	assert_true(s.filter_stddev == 0.5 && s.filter_radius == 2);
+	assert_int_equal(s.border, 2);
+	assert_int_equal(s.spp, 0);
+	assert_int_equal(s.max_depth, 128);
+	assert_string_equal(s.integrator, "");
+	assert_true(s.near_clip == 0.01 && s.far_clip == 1e4);
+	/* 50 mm before 24 x 36 mm */
+	assert_string_equal(s.fov_axis, "diagonal");
+	assert_true(fabs(s.fov - 46.79300334396557) < 1e-12);
+}
+
+static void test_filters(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *filter;
+		enum filter_kind kind;
+		double radius;
+		uint32_t border;
+	} cases[] = {
+		{"<rfilter type='box'/>", FILTER_BOX, 0.5, 0},
+		{"<rfilter type='tent'/>", FILTER_TENT, 1, 1},
+		{"<rfilter type='tent'><float name='radius' value='2.5'/></rfilter>", FILTER_TENT, 2.5, 2},
+		{"<rfilter type='gaussian'><float name='stddev' value='1'/></rfilter>", FILTER_GAUSSIAN, 4, 4},
+		{"<rfilter type='gaussian'><float name='radius' value='1.5'/></rfilter>", FILTER_GAUSSIAN, 1.5, 1},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char film[512];
+		snprintf(film, sizeof film, "<film type='ldrfilm'>%s</film>", cases[i].filter);
+		struct scene_settings s = read_ok("", film);
+		assert_int_equal(s.filter, cases[i].kind);
+		assert_true(s.filter_radius == cases[i].radius);
+		assert_int_equal(s.border, cases[i].border);
+	}
+}
+
+static void test_sampler_and_integrator(void **state)
+{
+	(void)state;
+	struct scene_settings s = read_ok("<integrator type='bdpt'><integer name='maxDepth' value='9'/><integer name='rrDepth' "
+					  "value='3'/></integrator>",
+					  "<sampler type='sobol'><integer name='sampleCount' value='17'/>"
+					  "<integer name='scramble' value='4'/></sampler>");
+	assert_int_equal(s.max_depth, 9);
+	assert_string_equal(s.integrator, "bdpt");
+	assert_int_equal(s.spp, 17);
+	static const struct {
+		const char *depth;
+		uint32_t want;
+	} depths[] = {{"-1", 128}, {"500", 128}, {"128", 128}, {"127", 127}, {"1", 1}};
+	for (size_t i = 0; i < sizeof depths / sizeof *depths; i++) {
+		char before[256];
+		snprintf(before, sizeof before, "<integrator type='irrcache'><integrator type='path'><integer name='maxDepth' "
+			 "value='%s'/></integrator></integrator>", depths[i].depth);
+		assert_int_equal(read_ok(before, "").max_depth, depths[i].want);
+	}
+}
+
+static void test_camera(void **state)
+{
+	(void)state;
+	struct scene_settings s = read_ok("", "<float name='fov' value='35'/><string name='fovAxis' value='smaller'/>"
+					      "<float name='nearClip' value='1'/><float name='farClip' value='2'/>"
+					      "<transform name='toWorld'><scale value='3'/><rotate z='1' angle='90'/>"
+					      "<translate x='5'/></transform>");
+	assert_true(s.fov == 35 && s.near_clip == 1 && s.far_clip == 2);
+	assert_string_equal(s.fov_axis, "smaller");
+	static const double want[3][4] = {{0, -1, 0, 5}, {1, 0, 0, 0}, {0, 0, 1, 0}};
+	for (int i = 0; i < 3; i++)
+		for (int j = 0; j < 4; j++)
+			assert_true(fabs(s.to_world.m[i][j] - want[i][j]) < 1e-15);
+	s = read_ok("", "<transform name='toWorld'><scale x='-2' y='2' z='2'/></transform>");
+	assert_true(s.to_world.m[0][0] == -1 && s.to_world.m[1][1] == 1); /* a mirror stays one */
+	s = read_ok("", "<string name='focalLength' value='24mm'/>");
+	assert_true(fabs(s.fov - 2 * atan(43.266615305567875 / 48) * 180 / 3.14159265358979323846) < 1e-12);
+}
+
+static void test_size_is_overridden(void **state)
+{
+	(void)state;
+	struct scene_settings s;
+	struct error e;
+	const char *xml = "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'><integer name='width' "
+			  "value='100'/><integer name='height' value='50'/></film></sensor></scene>";
+	assert_int_equal(read_scene(xml, 0, 0, &s, &e), 0);
+	assert_true(s.width == 100 && s.height == 50);
+	assert_int_equal(read_scene(xml, 7, 8, &s, &e), 0);
+	assert_true(s.width == 7 && s.height == 8);
+	assert_int_equal(read_scene(xml, 70000, 8, &s, &e), -ERANGE);
+}
+
+static void test_refused(void **state)
+{
+	(void)state;
+#define SENSOR(x) "<sensor type='perspective'>" x "</sensor>"
+	refuses("", "the scene has no <sensor>");
+	refuses(SENSOR("") SENSOR(""), "a second sensor");
+	refuses(SENSOR("<film type='hdrfilm'><integer name='width' value='32000'/><integer name='height' value='32000'/></film>"),
+		"a film of 32000 x 32000 pixels");
+	refuses(SENSOR("") "<integrator type='path'><integer name='max_depth' value='0'/></integrator>", "a depth of 0");
+	refuses(SENSOR("") "<integrator type='path'/><integrator type='path'/>", "a second integrator");
+	refuses(SENSOR("<float name='fov' value='40'/><string name='focal_length' value='50mm'/>"), "give one");
+	refuses(SENSOR("<string name='focal_length' value='50'/>"), "is not a length");
+	refuses(SENSOR("<string name='focal_length' value='-1mm'/>"), "is not a length");
+	refuses(SENSOR("<float name='near_clip' value='5'/><float name='far_clip' value='5'/>"), "is not below far_clip");
+	refuses(SENSOR("<transform name='to_world'><matrix value='1 0.5 0 0 1 0 0 0 1'/></transform>"), "must only turn");
+	refuses(SENSOR("<transform name='to_world'><scale z='0'/></transform>"), "must only turn");
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_defaults),
+		cmocka_unit_test(test_filters),
+		cmocka_unit_test(test_sampler_and_integrator),
+		cmocka_unit_test(test_camera),
+		cmocka_unit_test(test_size_is_overridden),
+		cmocka_unit_test(test_refused),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

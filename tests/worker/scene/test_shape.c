@@ -1,0 +1,333 @@
+#include "common/base/mem.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/scene_tables.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+struct built {
+	struct scene scene;
+	struct arena arena;
+	struct shape_geometry g;
+	uint64_t dropped;
+	struct error error;
+	int result;
+};
+
+/* One shape: type, what is in its element, and the text of m.obj. */
+static struct built build(const char *type, const char *content, const char *obj)
+{
+	char xml[2048];
+	snprintf(xml, sizeof xml, "<scene version='3.0.0'>\n<shape type='%s'>%s%s</shape></scene>", type,
+		 obj ? "<string name='filename' value='m.obj'/>" : "", content);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {obj ? "m.obj" : NULL, obj, obj ? strlen(obj) : 0}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct built b = {0};
+	if (scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error))
+		fail_msg("%s", b.error.text);
+	b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &b.dropped, &b.error);
+	return b;
+}
+
+static void release(struct built *b)
+{
+	arena_fini(&b->arena);
+	scene_fini(&b->scene);
+}
+
+static struct built build_ok(const char *type, const char *content, const char *obj)
+{
+	struct built b = build(type, content, obj);
+	if (b.result)
+		fail_msg("%s", b.error.text);
+	return b;
+}
+
+static vec3 at(const double v[3])
+{
+	return (vec3){v[0], v[1], v[2]};
+}
+
+static vec3 triangle_normal(const struct mesh *m, uint32_t i)
+{
+	vec3 a = at(m->position[m->index[i][0]]), b = at(m->position[m->index[i][1]]), c = at(m->position[m->index[i][2]]);
+	return vec3_normalize(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)));
+}
+
+static void assert_vec3(vec3 a, double x, double y, double z)
+{
+	if (!(vec3_length(vec3_sub(a, (vec3){x, y, z})) < 1e-12))
+		fail_msg("(%g, %g, %g) is not (%g, %g, %g)", a.x, a.y, a.z, x, y, z);
+}
+
+/* All triangles and normals of a closed body around the origin look away from it, or all towards it. */
+static void assert_facing(const struct mesh *m, double sign)
+{
+	for (uint32_t i = 0; i < m->triangle_count; i++) {
+		vec3 g = triangle_normal(m, i);
+		for (int k = 0; k < 3; k++) {
+			vec3 p = at(m->position[m->index[i][k]]);
+			assert_true(sign * vec3_dot(g, p) > 0);
+			if (m->normal) {
+				assert_true(sign * vec3_dot(at(m->normal[m->index[i][k]]), p) > 0);
+				assert_true(fabs(vec3_length(at(m->normal[m->index[i][k]])) - 1) < 1e-12);
+			}
+		}
+	}
+}
+
+static void test_rectangle(void **state)
+{
+	(void)state;
+	struct built b = build_ok("rectangle", "", NULL);
+	const struct mesh *m = &b.g.mesh;
+	assert_int_equal(m->triangle_count, 2);
+	for (uint32_t i = 0; i < 4; i++) {
+		assert_true(fabs(m->position[i][0]) == 1 && fabs(m->position[i][1]) == 1 && m->position[i][2] == 0);
+		assert_true(m->uv[i][0] == (m->position[i][0] + 1) / 2 && m->uv[i][1] == (m->position[i][1] + 1) / 2);
+		assert_vec3(at(m->normal[i]), 0, 0, 1);
+	}
+	assert_vec3(triangle_normal(m, 0), 0, 0, 1);
+	assert_vec3(triangle_normal(m, 1), 0, 0, 1);
+	release(&b);
+	b = build_ok("rectangle", "<boolean name='flip_normals' value='true'/>", NULL);
+	assert_vec3(at(b.g.mesh.normal[0]), 0, 0, -1);
+	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, -1);
+	release(&b);
+}
+
+static void test_cube(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *content;
+		double sign;
+	} cases[] = {{"", 1},
+		     {"<boolean name='flip_normals' value='true'/>", -1},
+		     {"<transform name='to_world'><scale x='-2' y='1' z='3'/></transform>", 1},
+		     {"<transform name='to_world'><matrix value='0 1 0 1 0 0 0 0 1'/></transform>", 1},
+		     {"<transform name='to_world'><scale value='1e-60'/></transform>", 1},
+		     {"<transform name='to_world'><scale x='-1'/></transform><boolean name='flip_normals' value='true'/>", -1}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct built b = build_ok("cube", cases[i].content, NULL);
+		assert_int_equal(b.g.mesh.triangle_count, 12);
+		assert_facing(&b.g.mesh, cases[i].sign);
+		release(&b);
+	}
+}
+
+/* Mitsuba's parametrisation of two of the faces. */
+static void test_cube_uv(void **state)
+{
+	(void)state;
+	struct built b = build_ok("cube", "", NULL);
+	const struct mesh *m = &b.g.mesh;
+	for (uint32_t i = 0; i < 24; i++) {
+		const double *p = m->position[i], *n = m->normal[i], *uv = m->uv[i];
+		if (n[2] == 1)
+			assert_true(uv[0] == (p[1] + 1) / 2 && uv[1] == (p[0] + 1) / 2);
+		if (n[1] == 1)
+			assert_true(uv[0] == (1 - p[0]) / 2 && uv[1] == (1 - p[2]) / 2);
+	}
+	release(&b);
+}
+
+static void test_sphere(void **state)
+{
+	(void)state;
+	struct built b = build_ok("sphere", "<point name='center' x='1' y='2' z='3'/><float name='radius' value='0.5'/>"
+					    "<transform name='to_world'><rotate z='1' angle='90'/><scale value='2'/>"
+					    "<translate x='10'/></transform>", NULL);
+	assert_int_equal(b.g.kind, SHAPE_SPHERE);
+	assert_vec3(b.g.sphere.center, 6, 2, 6);
+	assert_true(fabs(b.g.sphere.radius - 1) < 1e-15);
+	assert_false(b.g.sphere.flip_normals);
+	assert_vec3(mat4_vector(&b.g.sphere.to_world, (vec3){1, 0, 0}), 0, 1, 0);
+	release(&b);
+	b = build("sphere", "<transform name='to_world'><scale x='2'/></transform>", NULL);
+	assert_int_equal(b.result, -EINVAL);
+	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"sphere\">: to_world must turn, move and scale"));
+	release(&b);
+	b = build("sphere", "<transform name='to_world'><matrix value='1 0.1 0 0 1 0 0 0 1'/></transform>", NULL);
+	assert_int_equal(b.result, -EINVAL);
+	release(&b);
+}
+
+#define SQUARE "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
+
+static void test_obj_polygons(void **state)
+{
+	(void)state;
+	struct built b = build_ok("obj", "", "# a comment\no x\n" SQUARE "g a\nusemtl b\ns 1\nf 1 2 3 4\n");
+	assert_int_equal(b.g.mesh.triangle_count, 2);
+	assert_int_equal(b.g.mesh.vertex_count, 4);
+	assert_null(b.g.mesh.uv);
+	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, 1);
+	assert_vec3(triangle_normal(&b.g.mesh, 1), 0, 0, 1);
+	assert_vec3(at(b.g.mesh.normal[2]), 0, 0, 1);
+	release(&b);
+	/* Backwards indices, joined lines, blanks, carriage returns, colours after positions. */
+	b = build_ok("obj", "", "v 0 0 0 1 1 1\r\nv 1 0 \\\r\n 0\r\n  v\t1 1 0\r\nf -3 \\\n -2 -1 # end");
+	assert_int_equal(b.g.mesh.triangle_count, 1);
+	assert_vec3(at(b.g.mesh.position[b.g.mesh.index[0][1]]), 1, 0, 0);
+	release(&b);
+}
+
+static void test_obj_attributes(void **state)
+{
+	(void)state;
+	const char *obj = SQUARE "vt 0 0.25\nvt 1 0\nvt 1 1 0\nvn 0 0 2\nvn 0 3 4\nf 1/1/1 2/2/1 3/3/1\nf 1/1/2 3/3/1 4//1\n";
+	struct built b = build_ok("obj", "", obj);
+	const struct mesh *m = &b.g.mesh;
+	assert_int_equal(m->vertex_count, 5); /* 1 appears with two normals */
+	const uint32_t *t = m->index[0], *s = m->index[1];
+	assert_true(m->uv[t[0]][0] == 0 && m->uv[t[0]][1] == 0.75); /* v runs downwards in pictures */
+	assert_true(m->uv[t[1]][1] == 1);
+	assert_int_equal(t[2], s[1]);
+	assert_int_not_equal(t[0], s[0]);
+	assert_vec3(at(m->normal[t[0]]), 0, 0, 1);
+	assert_vec3(at(m->normal[s[0]]), 0, 0.6, 0.8);
+	release(&b);
+	b = build_ok("obj", "<boolean name='flip_tex_coords' value='false'/>", obj);
+	assert_true(b.g.mesh.uv[b.g.mesh.index[0][0]][1] == 0.25);
+	release(&b);
+	b = build_ok("obj", "<boolean name='face_normals' value='true'/>", obj);
+	assert_null(b.g.mesh.normal);
+	release(&b);
+}
+
+#define OCTAHEDRON                                                                                                             \
+	"v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n"                                                           \
+	"f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n"
+
+static void test_smooth_normals(void **state)
+{
+	(void)state;
+	struct built b = build_ok("obj", "", OCTAHEDRON);
+	assert_facing(&b.g.mesh, 1);
+	for (uint32_t i = 0; i < 6; i++) /* by symmetry the normal of a corner is its place */
+		assert_vec3(at(b.g.mesh.normal[i]), b.g.mesh.position[i][0], b.g.mesh.position[i][1], b.g.mesh.position[i][2]);
+	release(&b);
+	b = build_ok("obj", "<transform name='to_world'><scale x='-1' y='2' z='3'/></transform>", OCTAHEDRON);
+	assert_facing(&b.g.mesh, 1);
+	release(&b);
+	b = build_ok("obj", "<boolean name='flip_normals' value='true'/>", OCTAHEDRON);
+	assert_facing(&b.g.mesh, -1);
+	release(&b);
+}
+
+/* Two right angles against one: weights are angles, not areas or counts. */
+static void test_normals_are_weighted_by_angle(void **state)
+{
+	(void)state;
+	struct built b = build_ok("obj", "", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 9\nv 0.5 0.5 0\nf 1 2 5\nf 1 5 3\nf 1 3 4\n");
+	vec3 n = at(b.g.mesh.normal[b.g.mesh.index[0][0]]);
+	assert_vec3(n, sqrt(0.5), 0, sqrt(0.5));
+	release(&b);
+}
+
+static void test_normals_decide_the_outside(void **state)
+{
+	(void)state;
+	struct built b = build_ok("obj", "", SQUARE "vn 0 0 -1\nf 1//1 2//1 3//1\n");
+	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, -1);
+	release(&b);
+	b = build_ok("obj", "<transform name='to_world'><scale z='-1'/></transform>", SQUARE "vn 0 0 -1\nf 1//1 2//1 3//1\n");
+	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, 1);
+	assert_vec3(at(b.g.mesh.normal[0]), 0, 0, 1);
+	release(&b);
+}
+
+static void test_flat_triangles_are_dropped(void **state)
+{
+	(void)state;
+	struct built b = build_ok("obj", "", SQUARE "f 1 2 3\nf 1 1 2\nf 1 2 2\nv 2 0 0\nf 1 2 5\n");
+	assert_int_equal(b.g.mesh.triangle_count, 1);
+	assert_int_equal(b.dropped, 3);
+	release(&b);
+}
+
+static void refuses(const char *content, const char *obj, const char *text)
+{
+	struct built b = build("obj", content, obj);
+	if (b.result >= 0 || !strstr(b.error.text, text))
+		fail_msg("%s\n gave %d: %s\n not: %s", obj, b.result, b.error.text, text);
+	release(&b);
+}
+
+static void test_bad_objs(void **state)
+{
+	(void)state;
+	refuses("", "", "m.obj: has no faces");
+	refuses("", SQUARE, "has no faces");
+	refuses("", "v 0 0 nan\n", "s.xml:2: <shape type=\"obj\">: m.obj:1: `v` needs 3 finite numbers");
+	refuses("", "v 0 0 inf\n", "finite numbers");
+	refuses("", "v 0 0 1e99\n", "finite numbers");
+	refuses("", "v 0 0\nv 1 1 1\n", "m.obj:1: `v` needs");
+	refuses("", "v 0 0 0x\n", "m.obj:1: `v` needs");
+	refuses("", SQUARE "vn 0 0 NaN\n", "m.obj:5: `vn` needs");
+	refuses("", SQUARE "vt\n", "`vt` needs 1");
+	refuses("", SQUARE "\nf 1 2 5\n", "m.obj:6: vertex 5 is out of range; there are 4");
+	refuses("", SQUARE "f 0 1 2\n", "vertex 0 is out of range");
+	refuses("", SQUARE "f -5 1 2\n", "vertex -5 is out of range");
+	refuses("", SQUARE "f 1 2 99999999999999999999\n", "m.obj:5: a face's corners");
+	refuses("", SQUARE "f 1/1 2/1 3/1\n", "texture coordinate 1 is out of range; there are 0");
+	refuses("", SQUARE "f 1//1 2//1 3//1\n", "normal 1 is out of range");
+	refuses("", SQUARE "f 1 2\n", "a face of 2 corners");
+	refuses("", SQUARE "f 1/ 2/ 3/\n", "a face's corners are");
+	refuses("", SQUARE "f 1/x 2 3\n", "a face's corners are");
+	refuses("", SQUARE "f 1.5 2 3\n", "a face's corners are");
+	refuses("", SQUARE "f 1 1 1\n", "has no triangle with an area");
+	refuses("<transform name='to_world'><scale z='0'/></transform>", SQUARE "f 1 2 3\n", "to_world flattens the shape");
+	refuses("<transform name='to_world'><scale value='1e70'/></transform>", SQUARE "f 1 2 3\n", "a vertex lies beyond");
+	struct built b = build("obj", "<string name='filename' value='none.obj'/>", NULL);
+	assert_int_equal(b.result, -ENOENT);
+	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"obj\">: none.obj: no such file"));
+	release(&b);
+}
+
+static void test_memory_runs_out(void **state)
+{
+	(void)state;
+	struct built b = build_ok("obj", "", OCTAHEDRON);
+	const struct memory_file files[] = {{"m.obj", OCTAHEDRON, sizeof OCTAHEDRON - 1}, {0}};
+	struct asset_source assets = memory_assets(files);
+	int r = -1;
+	long n;
+	for (n = 0; r && n < 1000; n++) {
+		struct arena arena = {0};
+		struct shape_geometry g;
+		mem_fail_after(n);
+		r = shape_build(b.scene.objects[0], &assets, &arena, &g, &b.dropped, &b.error);
+		mem_fail_after(-1);
+		assert_true(r == 0 || r == -ENOMEM);
+		arena_fini(&arena);
+	}
+	assert_int_equal(r, 0);
+	assert_true(n > 4);
+	release(&b);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_rectangle),
+		cmocka_unit_test(test_cube),
+		cmocka_unit_test(test_cube_uv),
+		cmocka_unit_test(test_sphere),
+		cmocka_unit_test(test_obj_polygons),
+		cmocka_unit_test(test_obj_attributes),
+		cmocka_unit_test(test_smooth_normals),
+		cmocka_unit_test(test_normals_are_weighted_by_angle),
+		cmocka_unit_test(test_normals_decide_the_outside),
+		cmocka_unit_test(test_flat_triangles_are_dropped),
+		cmocka_unit_test(test_bad_objs),
+		cmocka_unit_test(test_memory_runs_out),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
