@@ -7,27 +7,39 @@ struct roughconductor {
 	struct microfacet facets;
 };
 
-static spectrum roughconductor_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+/* The facet between the two: its cosine against them, and D G1(wo) / 4 wo.z, the density of wi. */
+static bool facet_of(const struct roughconductor *r, vec3 wo, vec3 wi, double *cosine, double *pdf)
 {
-	const struct roughconductor *r = b->data;
 	vec3 h;
 	if (!(wo.z > 0 && wi.z > 0) || !microfacet_half(vec3_add(wo, wi), &h))
-		return spectrum_of(0);
+		return false;
+	*cosine = vec3_dot(wo, h);
 	double d = microfacet_d(&r->facets, h);
-	if (d == 0)
+	if (!(d > 0))
+		return false;
+	*pdf = 0.25 * d * microfacet_g1_over_cos(&r->facets, wo);
+	return *pdf > 0;
+}
+
+static spectrum facet_f(const struct bsdf *b, const struct bsdf_point *p, vec3 wi, double cosine, double pdf)
+{
+	const struct roughconductor *r = b->data;
+	return spectrum_scale(pdf * microfacet_g1_over_cos(&r->facets, wi), metal_fresnel(&r->metal, p, cosine));
+}
+
+static spectrum roughconductor_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	double cosine, pdf;
+	if (!facet_of(b->data, wo, wi, &cosine, &pdf))
 		return spectrum_of(0);
-	double g = microfacet_g1_over_cos(&r->facets, wo) * microfacet_g1_over_cos(&r->facets, wi);
-	return spectrum_scale(0.25 * d * g, metal_fresnel(&r->metal, p, vec3_dot(wo, h)));
+	return facet_f(b, p, wi, cosine, pdf);
 }
 
 static double roughconductor_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	(void)p;
-	const struct roughconductor *r = b->data;
-	vec3 h;
-	if (!(wo.z > 0 && wi.z > 0) || !microfacet_half(vec3_add(wo, wi), &h))
-		return 0;
-	return 0.25 * microfacet_d(&r->facets, h) * microfacet_g1_over_cos(&r->facets, wo);
+	double cosine, pdf;
+	return facet_of(b->data, wo, wi, &cosine, &pdf) ? pdf : 0;
 }
 
 static bool roughconductor_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -38,11 +50,11 @@ static bool roughconductor_sample(const struct bsdf *b, const struct bsdf_point 
 		return false;
 	vec3 h = microfacet_sample_visible(&r->facets, wo, u[0], u[1]);
 	vec3 wi = vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(wo, h), h), wo));
-	double pdf = roughconductor_pdf(b, p, wo, wi);
-	if (!(pdf > 0))
+	double cosine, pdf;
+	if (!facet_of(r, wo, wi, &cosine, &pdf))
 		return false;
 	*out = (struct bsdf_sample){.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf,
-				    .f = roughconductor_eval(b, p, wo, wi), .eta = 1};
+				    .f = facet_f(b, p, wi, cosine, pdf), .eta = 1};
 	return true;
 }
 

@@ -74,6 +74,18 @@ spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelength
 	return s;
 }
 
+spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths *w)
+{
+	double largest = fmax(rgb[0], fmax(rgb[1], rgb[2]));
+	if (largest == 0 || w->grey)
+		return spectrum_of(largest);
+	const double unit[3] = {rgb[0] / largest, rgb[1] / largest, rgb[2] / largest};
+	spectrum s = color_eval_rgb_reflectance(unit, w);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		s.v[i] *= largest * color_d65(w->nm[i]);
+	return s;
+}
+
 struct color color_constant(double x)
 {
 	return (struct color){.shape = COLOR_SHAPE_CONSTANT, .scale = x};
@@ -88,6 +100,15 @@ static struct color color_white(double x, enum color_role role)
 		c.d65 = true;
 	}
 	return c;
+}
+
+/* From the polynomial in t to the one in nm. */
+static void coefficients_in_nm(const double t[3], double nm[3])
+{
+	const double center = UPSAMPLE_CENTER_NM, r = 1 / UPSAMPLE_HALF_NM;
+	nm[0] = t[0] * r * r;
+	nm[1] = t[1] * r - 2 * t[0] * r * r * center;
+	nm[2] = t[0] * r * r * center * center - t[1] * r * center + t[2];
 }
 
 int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
@@ -111,10 +132,7 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 	struct upsample s;
 	upsample_init(&s, 1);
 	upsample_fit(&s, unit, 1e-9, c);
-	const double center = UPSAMPLE_CENTER_NM, r = 1 / UPSAMPLE_HALF_NM;
-	out->coefficient[0] = c[0] * r * r;
-	out->coefficient[1] = c[1] * r - 2 * c[0] * r * r * center;
-	out->coefficient[2] = c[0] * r * r * center * center - c[1] * r * center + c[2];
+	coefficients_in_nm(c, out->coefficient);
 	return 0;
 }
 
@@ -238,6 +256,24 @@ static double sigmoid_max(const double c[3])
 	return m;
 }
 
+double color_max_rgb_reflectance(const double rgb[3])
+{
+	if (rgb[0] == rgb[1] && rgb[1] == rgb[2])
+		return rgb[0];
+	double t[3], c[3];
+	table_lookup(rgb, t);
+	coefficients_in_nm(t, c);
+	return sigmoid_max(c);
+}
+
+double color_max_d65(void)
+{
+	double largest = 0;
+	for (int nm = CIE_FIRST_NM; nm <= CIE_LAST_NM; nm++)
+		largest = fmax(largest, color_d65(nm));
+	return largest;
+}
+
 double color_max(const struct color *c)
 {
 	double m = c->scale;
@@ -249,12 +285,8 @@ double color_max(const struct color *c)
 			largest = fmax(largest, c->value[i]);
 		m *= largest;
 	}
-	if (c->d65) {
-		double largest = 0;
-		for (int nm = CIE_FIRST_NM; nm <= CIE_LAST_NM; nm++)
-			largest = fmax(largest, color_d65(nm));
-		m *= largest;
-	}
+	if (c->d65)
+		m *= color_max_d65();
 	return m;
 }
 

@@ -37,6 +37,10 @@ double color_mean(const struct color *c); /* over wavelengths, to choose among e
 
 /* Fast reflectance of many rgb values (textures): from a table of coefficients made at build time. rgb in [0,1]. */
 spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelengths *w);
+double color_max_rgb_reflectance(const double rgb[3]); /* of that spectrum */
+/* The same for emitters: largest component x reflectance x D65. rgb >= 0. */
+spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths *w);
+double color_max_d65(void);
 
 /* D65 normalised so that an emitter of this spectrum has Rec. 709 (1,1,1); by linear interpolation. */
 double color_d65(double nm);

@@ -1,1 +1,2 @@
 /* One line a texture: its const struct texture_ops is texture_ops_NAME. */
+TEXTURE(checkerboard)
