@@ -1,0 +1,31 @@
+/*
+ * An image as a function on the plane: u to the right, v DOWN, the unit square is the image once. Pixel centres lie at
+ * ((i + 1/2) / width, (j + 1/2) / height). Immutable; any thread.
+ */
+#ifndef WORKER_TEXTURE_RASTER_H
+#define WORKER_TEXTURE_RASTER_H
+
+#include "worker/scene/image.h"
+#include "worker/scene/scene.h"
+
+enum raster_wrap { RASTER_REPEAT, RASTER_MIRROR, RASTER_CLAMP };
+
+struct raster {
+	struct image image;
+	enum raster_wrap wrap_u, wrap_v;
+	bool nearest; /* else bilinear */
+};
+
+/* Reads the property `filename` of n; pixels are clamped to [0, largest]. Parameters raw and gamma. */
+int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets, double largest,
+		struct arena *arena, struct error *e);
+#define RASTER_PARAMS                                                                                                  \
+	{.name = "filename", .types = VALUE_STRING}, {.name = "raw", .types = VALUE_BOOL},                             \
+	{.name = "gamma", .types = VALUE_FLOAT | VALUE_INT}, {.name = "cache", .types = VALUE_BOOL, .status = PARAM_IGNORED}
+
+void raster_eval(const struct raster *r, double u, double v, double rgb[3]);
+void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3]);
+bool raster_is_grey(const struct raster *r);
+double raster_max(const struct raster *r);
+
+#endif
