@@ -46,15 +46,20 @@ static const char *const bsdf_cases[] = {
 };
 enum { BSDF_CASES = sizeof bsdf_cases / sizeof *bsdf_cases };
 
-static inline int bsdf_try(struct arena *a, const char *text, bool dialect_3, struct bsdf *b, struct error *e)
+static inline struct scene_node *bsdf_node(struct arena *a, const char *text)
 {
 	char copy[256], *rest = copy;
 	snprintf(copy, sizeof copy, "%s", text);
 	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(copy, "|", &rest));
 	for (char *child; (child = strtok_r(NULL, "|", &rest));)
 		node_add_child(a, n, node_make(a, PLUGIN_BSDF, child));
+	return n;
+}
+
+static inline int bsdf_try(struct arena *a, const char *text, bool dialect_3, struct bsdf *b, struct error *e)
+{
 	const struct bsdf_build build = {.arena = a, .dialect_3 = dialect_3};
-	return bsdf_create(b, n, &build, e);
+	return bsdf_create(b, bsdf_node(a, text), &build, e);
 }
 
 static inline void bsdf_make(struct arena *a, const char *text, struct bsdf *b)

@@ -323,6 +323,26 @@ static void test_refusals_say_why(void **state)
 	}
 }
 
+static void test_out_of_memory_is_an_answer(void **state)
+{
+	(void)state;
+	struct arena nodes = {0};
+	for (int k = 0; k < BSDF_CASES; k++) {
+		const struct scene_node *n = bsdf_node(&nodes, bsdf_cases[k]);
+		int code = -ENOMEM;
+		for (size_t limit = 1; code; limit += 64) {
+			struct arena a = {.limit = limit};
+			const struct bsdf_build build = {.arena = &a, .dialect_3 = true};
+			struct bsdf b;
+			struct error e;
+			code = bsdf_create(&b, n, &build, &e);
+			assert_true(code == 0 || code == -ENOMEM);
+			arena_fini(&a);
+		}
+	}
+	arena_fini(&nodes);
+}
+
 static void test_black_and_default(void **state)
 {
 	(void)state;
@@ -350,6 +370,7 @@ int main(void)
 		cmocka_unit_test(test_flags),
 		cmocka_unit_test(test_grey_is_the_same_without_wavelengths),
 		cmocka_unit_test(test_refusals_say_why),
+		cmocka_unit_test(test_out_of_memory_is_an_answer),
 		cmocka_unit_test(test_black_and_default),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

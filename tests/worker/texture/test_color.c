@@ -125,6 +125,10 @@ static void test_emitters_give_their_rgb(void **state)
 		for (int k = 0; k < 3; k++)
 			assert_true(fabs(rgb[k] - colours[i][k]) < 1e-3 * scale);
 	}
+	double y = 0;
+	for (int i = 0; i < CIE_COUNT; i++)
+		y += cie_observer[i][1] * color_d65(CIE_FIRST_NM + i) / CIE_Y_SUM;
+	assert_true(fabs(y - 1) < 1e-5);
 	/* Without an illuminant a constant spectrum is reddish: the contract's figures. */
 	struct color flat = color_constant(1);
 	double rgb[3];
