@@ -1,6 +1,5 @@
 /*
- * Primary sample space Metropolis light transport (Kelemen et al. 2002), over the bidirectional path tracer and, as a point
- * of comparison, over the path tracer.
+ * Primary sample space Metropolis light transport (Kelemen et al. 2002), over the bidirectional path tracer.
  */
 #include "worker/chain/pss.h"
 #include "worker/path/integrator.h"
@@ -9,10 +8,4 @@ const struct integrator integrator_pssmlt = {
 	.face = {"pssmlt", "primary sample space Metropolis over bdpt", PLAN_CHAINS, PSS_MAX_EDGES},
 	.stream = RNG_BOOTSTRAP,
 	.evaluate = path_trace_both_ways,
-};
-
-const struct integrator integrator_pssmlt_path = {
-	.face = {"pssmlt-path", "primary sample space Metropolis over path", PLAN_CHAINS, PSS_MAX_EDGES},
-	.stream = RNG_BOOTSTRAP,
-	.evaluate = path_trace,
 };

@@ -2,4 +2,3 @@
 INTEGRATOR(path)
 INTEGRATOR(bdpt)
 INTEGRATOR(pssmlt)
-INTEGRATOR(pssmlt_path)
