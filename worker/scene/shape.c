@@ -52,7 +52,7 @@ static void set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, dou
 	memcpy(m->uv[i], (double[2]){u, v}, sizeof m->uv[i]);
 }
 
-/* Vertices first .. first+3 in a circle, counter-clockwise. */
+/* Vertices first .. first+3 in a circle. */
 static void set_quad(struct mesh *m, uint32_t triangle, uint32_t first)
 {
 	memcpy(m->index[triangle], (uint32_t[3]){first, first + 1, first + 2}, sizeof m->index[0]);
@@ -73,7 +73,8 @@ static int make_rectangle(const struct scene_node *n, struct arena *arena, struc
 	return 0;
 }
 
-/* Each face with its normal and the directions in which u and v grow, as on Mitsuba's cube. */
+/* Each face with its normal and the directions in which u and v grow, as on Mitsuba's cube. Some are left-handed:
+ * mesh_finish winds the triangles by their normals. */
 static const struct face {
 	vec3 n, u, v;
 } faces[6] = {
@@ -87,9 +88,8 @@ static int make_cube(const struct scene_node *n, struct arena *arena, struct mes
 		return node_error(n, e, ENOMEM, "out of memory");
 	for (uint32_t f = 0; f < 6; f++) {
 		const struct face *face = &faces[f];
-		bool left_handed = vec3_dot(vec3_cross(face->u, face->v), face->n) < 0;
 		for (uint32_t i = 0; i < 4; i++) {
-			const double *c = corner[left_handed ? 3 - i : i];
+			const double *c = corner[i];
 			vec3 p = vec3_madd(vec3_madd(face->n, 2 * c[0] - 1, face->u), 2 * c[1] - 1, face->v);
 			set_vertex(m, 4 * f + i, p, face->n, c[0], c[1]);
 		}

@@ -109,10 +109,10 @@ static void test_files_elsewhere(void **state)
 	refuses("sub/..", "must lie below");
 	refuses("..", "must lie below");
 	refuses("/etc/passwd", "must lie below");
-	refuses("out", "leads out of the scene's folder");
-	refuses("up/secret", "leads out of the scene's folder");
-	refuses("absolute", "leads out of the scene's folder");
-	refuses("circle", "circle");
+	refuses("out", "out: ");
+	refuses("up/secret", "up/secret: ");
+	refuses("absolute", "absolute: ");
+	refuses("circle", "circle: ");
 	refuses("sub", "not a regular file");
 	refuses("fifo", "not a regular file");
 }
