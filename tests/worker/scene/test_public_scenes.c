@@ -1,6 +1,6 @@
-/* The public scenes in the folder that HSLT_SCENES names; skipped where it is not set. */
-#include "tests/support/scene_tables.h"
-
+/* The public scenes in the folder that HSLT_SCENES names, with the program's own tables; skipped where it is not set. */
+#include "worker/render/render.h"
+#include "worker/scene/mesh.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -63,7 +63,7 @@ static void check(const char *root, const struct expected *x)
 	struct asset_source assets = asset_folder(folder);
 	struct scene s;
 	struct error e;
-	if (scene_read(&s, &assets, x->file, scene_tables(), NULL, 0, &e))
+	if (scene_read(&s, &assets, x->file, render_plugins(), NULL, 0, &e))
 		fail_msg("%s", e.text);
 	for (uint32_t i = 0; i < s.note_count; i++)
 		print_message("%s\n", s.notes[i]);
