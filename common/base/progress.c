@@ -1,0 +1,89 @@
+#include "common/base/progress.h"
+
+#include "common/base/text.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/ioctl.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { BAR_MOST = 40, BAR_LEAST = 10, COLUMNS_ELSE = 80 };
+static const double line_seconds = 10, line_fraction = 0.1;
+
+void progress_start(struct progress *p)
+{
+	memset(p, 0, sizeof *p);
+	p->terminal = isatty(STDERR_FILENO);
+	p->shown = -1;
+}
+
+static double now(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void draw_bar(double fraction, const char *state, const char *detail)
+{
+	struct winsize w;
+	int columns = ioctl(STDERR_FILENO, TIOCGWINSZ, &w) == 0 && w.ws_col ? w.ws_col : COLUMNS_ELSE;
+	int room = columns - (int)strlen(state) - (int)strlen(detail) - 12;
+	int width = room > BAR_MOST ? BAR_MOST : room < BAR_LEAST ? BAR_LEAST : room;
+	char bar[BAR_MOST + 1] = "";
+	for (int i = 0; i < width; i++)
+		bar[i] = i < (int)(fraction * width) ? '#' : '.';
+	fprintf(stderr, "\r\033[K%s [%s] %5.1f %% %s", state, bar, 100 * fraction, detail);
+	fflush(stderr);
+}
+
+void progress_show(struct progress *p, double fraction, const char *state, const char *detail)
+{
+	fraction = fraction > 0 ? fraction < 1 ? fraction : 1 : 0;
+	if (p->terminal) {
+		draw_bar(fraction, state, detail);
+		p->drawn = true;
+		return;
+	}
+	double t = now();
+	bool due = p->shown < 0 || strcmp(state, p->state) != 0 || fraction >= p->shown + line_fraction ||
+		   (fraction > p->shown && (t >= p->shown_time + line_seconds || fraction >= 1));
+	if (!due)
+		return;
+	fprintf(stderr, "%s %.1f %% %s\n", state, 100 * fraction, detail);
+	p->shown = fraction;
+	p->shown_time = t;
+	text_copy(p->state, sizeof p->state, state);
+}
+
+void progress_end(struct progress *p)
+{
+	if (p->drawn)
+		fputc('\n', stderr);
+	p->drawn = false;
+}
+
+void progress_number(double x, char *text, size_t size)
+{
+	static const char *const units[] = {"", " k", " M", " G", " T"};
+	int unit = 0;
+	while (fabs(x) >= 999.5 && unit < 4) {
+		x /= 1000;
+		unit++;
+	}
+	snprintf(text, size, x < 9.995 && unit ? "%.2f%s" : x < 99.95 && unit ? "%.1f%s" : "%.0f%s", x, units[unit]);
+}
+
+void progress_time(double seconds, char *text, size_t size)
+{
+	double s = seconds > 0 ? ceil(seconds) : 0;
+	long n = s < 1e9 ? (long)s : 1000000000;
+	if (n < 60)
+		snprintf(text, size, "%ld s", n);
+	else if (n < 3600)
+		snprintf(text, size, "%ld:%02ld", n / 60, n % 60);
+	else
+		snprintf(text, size, "%ld:%02ld:%02ld", n / 3600, n / 60 % 60, n % 60);
+}

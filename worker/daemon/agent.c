@@ -1,0 +1,251 @@
+#include "worker/daemon/agent_private.h"
+
+#include "common/base/log.h"
+#include "common/base/mem.h"
+
+#include <assert.h>
+#include <signal.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { HEADER_LIMIT = 1 << 22, PAYLOAD_LIMIT = 1 << 28, SEND_LIMIT = 1 << 30 };
+static const double first_back_off = 0.2, longest_back_off = 10, stall_seconds = 30, linger_seconds = 5;
+
+static void connect_now(struct agent *a);
+
+void agent_send(struct agent *a, const Farm__Envelope *m)
+{
+	if (a->conn && a->welcome)
+		conn_send(a->conn, m, NULL, 0);
+}
+
+/* ---- connection ---- */
+
+static void on_retry(uv_timer_t *t)
+{
+	connect_now(t->data);
+}
+
+/* Twice as long each time, and never at the same moment as a hundred others. */
+static void try_later(struct agent *a)
+{
+	unsigned char random = 128;
+	uv_random(NULL, NULL, &random, 1, 0, NULL);
+	double wait = a->back_off * (0.5 + (double)random / 255);
+	a->back_off = a->back_off * 2 < longest_back_off ? a->back_off * 2 : longest_back_off;
+	uv_timer_start(&a->retry, on_retry, (uint64_t)(1000 * wait), 0);
+}
+
+static void on_opened(void *user)
+{
+	struct agent *a = user;
+	char name[128];
+	Farm__Hello hello;
+	Farm__Envelope m;
+	farm__hello__init(&hello);
+	farm__envelope__init(&m);
+	snprintf(name, sizeof name, "%s", a->config.name);
+	hello.version = FARM_VERSION;
+	hello.role = FARM__ROLE__ROLE_WORKER;
+	hello.name = name;
+	hello.fingerprint = a->fingerprint;
+	hello.threads = a->config.threads;
+	m.body_case = FARM__ENVELOPE__BODY_HELLO;
+	m.hello = &hello;
+	conn_send(a->conn, &m, NULL, 0);
+}
+
+static void on_heartbeat(uv_timer_t *t)
+{
+	Farm__Heartbeat beat;
+	Farm__Envelope m;
+	farm__heartbeat__init(&beat);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
+	m.heartbeat = &beat;
+	agent_send(t->data, &m);
+}
+
+static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
+{
+	if (!ack->accepted) {
+		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(ack->text).text);
+		conn_close(a->conn, ack->text);
+		return;
+	}
+	uint64_t ms = ack->heartbeat_ms >= 10 ? ack->heartbeat_ms : 10;
+	a->welcome = true;
+	a->back_off = first_back_off;
+	log_event(LOG_CONNECT, "coordinator=%s", a->config.coordinator);
+	uv_timer_start(&a->heartbeat, on_heartbeat, ms, ms);
+	conn_set_quiet(a->conn, 6e-3 * (double)ms + 1);
+	desk_welcome(a);
+}
+
+static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	struct agent *a = user;
+	const Farm__Envelope *m = env->message;
+	if (m->body_case == FARM__ENVELOPE__BODY_FAULT) {
+		log_event(LOG_PEER_FAULT, "text=%s", log_quote(m->fault->text).text);
+		conn_close(a->conn, m->fault->text);
+	} else if (a->welcome) {
+		desk_message(a, env, payload, size);
+	} else if (m->body_case == FARM__ENVELOPE__BODY_HELLO_ACK) {
+		take_hello_ack(a, m->hello_ack);
+	} else {
+		conn_close(a->conn, "the first answer must be to hello");
+	}
+}
+
+static void on_closed(void *user, const char *why)
+{
+	struct agent *a = user;
+	if (!a->gone)
+		log_event(a->welcome ? LOG_PEER_CLOSED : LOG_CONNECT_FAILED, "coordinator=%s text=%s",
+			  a->config.coordinator, log_quote(why).text);
+	a->conn = NULL;
+	a->welcome = false;
+	uv_timer_stop(&a->heartbeat);
+	if (!a->gone)
+		try_later(a);
+	agent_settle(a);
+}
+
+static const struct conn_events events = {on_opened, on_message, NULL, on_closed};
+
+static void connect_now(struct agent *a)
+{
+	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, stall_seconds, 10};
+	struct error e;
+	/* The name may mean another machine by now. */
+	int rc = net_addr_resolve(&a->address, a->config.coordinator, &e);
+	if (!rc)
+		rc = net_addr_allow(&a->address, a->config.coordinator, a->config.insecure, &e);
+	if (!rc)
+		rc = conn_connect(&a->conn, &a->loop, &a->address, &config, &events, a, &e);
+	if (rc) {
+		log_event(LOG_CONNECT_FAILED, "coordinator=%s text=%s", a->config.coordinator, log_quote(e.text).text);
+		try_later(a);
+	}
+}
+
+/* ---- leaving ---- */
+
+static void go(struct agent *a)
+{
+	Farm__Bye bye;
+	Farm__Envelope m;
+	if (a->gone)
+		return;
+	a->gone = true;
+	farm__bye__init(&bye);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_BYE;
+	m.bye = &bye;
+	agent_send(a, &m);
+	if (a->conn)
+		conn_close_when_sent(a->conn, "leaving");
+	uv_close((uv_handle_t *)&a->retry, NULL);
+	uv_close((uv_handle_t *)&a->heartbeat, NULL);
+	uv_close((uv_handle_t *)&a->grace, NULL);
+	uv_close((uv_handle_t *)&a->on_term, NULL);
+	uv_close((uv_handle_t *)&a->on_int, NULL);
+	crew_close(a->crew);
+}
+
+static void on_linger_over(uv_timer_t *t)
+{
+	go(t->data);
+}
+
+static void on_grace_over(uv_timer_t *t)
+{
+	struct agent *a = t->data;
+	log_event(LOG_STOP, "text=\"the grace period is over: unfinished leases are given up\"");
+	desk_stop_all(a);
+	uv_timer_start(&a->grace, on_linger_over, (uint64_t)(1000 * linger_seconds), 0);
+	agent_settle(a);
+}
+
+void agent_settle(struct agent *a)
+{
+	if (a->leaving && !a->gone && desk_is_idle(a))
+		go(a);
+}
+
+static void on_signal(uv_signal_t *h, int number)
+{
+	struct agent *a = h->data;
+	if (a->leaving) { /* the second time: at once */
+		log_event(LOG_STOP, "signal=%d text=\"at once\"", number);
+		_exit(0);
+	}
+	log_event(LOG_STOP, "signal=%d grace=%g", number, a->config.grace_seconds);
+	a->leaving = true;
+	desk_leave(a);
+	uv_timer_start(&a->grace, on_grace_over, (uint64_t)(1000 * a->config.grace_seconds), 0);
+	agent_settle(a);
+}
+
+/* ---- life ---- */
+
+static void init_handles(struct agent *a)
+{
+	uv_timer_init(&a->loop, &a->retry);
+	uv_timer_init(&a->loop, &a->heartbeat);
+	uv_timer_init(&a->loop, &a->grace);
+	uv_signal_init(&a->loop, &a->on_term);
+	uv_signal_init(&a->loop, &a->on_int);
+	a->retry.data = a->heartbeat.data = a->grace.data = a->on_term.data = a->on_int.data = a;
+	uv_signal_start(&a->on_term, on_signal, SIGTERM);
+	uv_signal_start(&a->on_int, on_signal, SIGINT);
+}
+
+static int start(struct agent *a, struct error *e)
+{
+	int rc = net_addr_resolve(&a->address, a->config.coordinator, e);
+	if (!rc)
+		rc = net_addr_allow(&a->address, a->config.coordinator, a->config.insecure, e);
+	if (!rc)
+		rc = cache_open(&a->cache, a->config.cache, a->config.cache_bytes, e);
+	if (rc)
+		return rc;
+	rc = uv_loop_init(&a->loop);
+	if (rc)
+		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
+	rc = crew_new(&a->crew, &a->loop, a->config.threads, e);
+	if (rc) {
+		uv_run(&a->loop, UV_RUN_DEFAULT);
+		uv_loop_close(&a->loop);
+	}
+	return rc;
+}
+
+int agent_run(const struct agent_config *c, struct error *e)
+{
+	struct agent *a = mem_alloc(1, sizeof *a);
+	if (!a)
+		return error_set(e, ENOMEM, "no memory for the worker");
+	signal(SIGPIPE, SIG_IGN);
+	a->config = *c;
+	a->cache.lock = -1;
+	a->back_off = first_back_off;
+	fingerprint_make(a->fingerprint);
+	int rc = start(a, e);
+	if (!rc) {
+		log_event(LOG_START, "program=hslt-worker name=%s threads=%u fingerprint=%s", log_quote(c->name).text,
+			  c->threads, log_quote(a->fingerprint).text);
+		init_handles(a);
+		connect_now(a);
+		uv_run(&a->loop, UV_RUN_DEFAULT);
+		int closed = uv_loop_close(&a->loop);
+		assert(closed == 0);
+		(void)closed;
+		desk_close(a);
+	}
+	cache_close(&a->cache);
+	mem_free(a);
+	return rc;
+}

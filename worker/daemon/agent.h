@@ -1,0 +1,27 @@
+/*
+ * The worker daemon: one loop thread that owns all state, a crew of render threads. Connects, asks for leases, fetches
+ * what it needs, sends results and keeps them until they are acknowledged; reconnects for ever. On SIGTERM it finishes
+ * what runs within the grace period, or gives it up, and leaves.
+ */
+#ifndef WORKER_DAEMON_AGENT_H
+#define WORKER_DAEMON_AGENT_H
+
+#include "common/base/error.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct agent_config {
+	const char *coordinator, *name;
+	const char *cache; /* NULL: the user's cache folder */
+	uint64_t cache_bytes;
+	unsigned threads;
+	double grace_seconds;
+	bool insecure;
+	bool repeat; /* tests: every result is sent twice */
+};
+
+/* Returns when the worker has left. -EINVAL, -EPERM, -EHOSTUNREACH at once when the address is of no use. */
+int agent_run(const struct agent_config *c, struct error *e);
+
+#endif

@@ -1,0 +1,44 @@
+/* The daemon's state, for its two halves: agent.c (connection, life) and desk.c (jobs and leases). */
+#ifndef WORKER_DAEMON_AGENT_PRIVATE_H
+#define WORKER_DAEMON_AGENT_PRIVATE_H
+
+#include "common/net/conn.h"
+#include "worker/daemon/agent.h"
+#include "worker/daemon/fingerprint.h"
+#include "worker/daemon/lease_task.h"
+
+enum { WORLDS_KEPT = 2 /* of jobs that have no lease here now */ };
+
+struct agent {
+	struct agent_config config;
+	uv_loop_t loop;
+	uv_timer_t retry, heartbeat, grace;
+	uv_signal_t on_term, on_int;
+	struct net_addr address;
+	struct conn *conn; /* NULL: not connected */
+	bool welcome;      /* hello was accepted */
+	double back_off;   /* s before the next attempt */
+	char fingerprint[FINGERPRINT_MAX];
+	struct cache cache;
+	struct crew *crew;
+	struct bundle *bundles;
+	struct lease_task *leases;
+	uint64_t clock; /* of uses of bundles */
+	bool leaving, gone;
+};
+
+/* agent.c */
+void agent_send(struct agent *a, const Farm__Envelope *m);
+/* Leaves when nothing is left to do. */
+void agent_settle(struct agent *a);
+
+/* desk.c */
+void desk_welcome(struct agent *a); /* (re)connected: asks for work, offers what is still unsent */
+void desk_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size);
+void desk_request(struct agent *a);
+void desk_leave(struct agent *a);      /* gives back what has not begun */
+void desk_stop_all(struct agent *a);   /* gives up what runs */
+bool desk_is_idle(const struct agent *a); /* nothing runs, nothing waits to be acknowledged */
+void desk_close(struct agent *a);      /* after the crew has been closed */
+
+#endif

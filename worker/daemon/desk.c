@@ -1,0 +1,431 @@
+/* Jobs and leases of the worker daemon. */
+#include "worker/daemon/agent_private.h"
+
+#include "common/base/log.h"
+#include "common/base/mem.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static unsigned long long number(uint64_t n)
+{
+	return n;
+}
+
+/* ---- what is said ---- */
+
+void desk_request(struct agent *a)
+{
+	Farm__LeaseRequest request;
+	Farm__Envelope m;
+	farm__lease_request__init(&request);
+	farm__envelope__init(&m);
+	request.want = a->leaving ? 0 : a->config.threads + 1;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_REQUEST;
+	m.lease_request = &request;
+	agent_send(a, &m);
+}
+
+static void ask_job(struct agent *a, uint64_t job)
+{
+	Farm__JobGet get;
+	Farm__Envelope m;
+	farm__job_get__init(&get);
+	farm__envelope__init(&m);
+	get.job = job;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_GET;
+	m.job_get = &get;
+	agent_send(a, &m);
+}
+
+/* An empty text gives the lease back without fault. */
+static void say_failed(struct agent *a, const struct lease_key *k, const char *text)
+{
+	char copy[1024];
+	Farm__LeaseKey key;
+	Farm__LeaseFailed failed;
+	Farm__Envelope m;
+	lease_key_to_wire(k, &key);
+	farm__lease_failed__init(&failed);
+	farm__envelope__init(&m);
+	snprintf(copy, sizeof copy, "%s", text);
+	for (char *c = copy; *c; c++) /* the coordinator takes no other text */
+		if ((unsigned char)*c < 32 || *c == 127)
+			*c = ' ';
+	failed.key = &key;
+	failed.text = copy;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
+	m.lease_failed = &failed;
+	agent_send(a, &m);
+	if (*text)
+		log_event(LOG_LEASE_FAILED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k->job), k->group,
+			  k->part, number(k->epoch), log_quote(text).text);
+}
+
+static void send_result(struct agent *a, struct lease_task *l)
+{
+	if (!a->conn || !a->welcome || l->sent)
+		return;
+	for (int i = 0; i < 1 + a->config.repeat; i++) {
+		unsigned char *copy = mem_alloc(l->frame_size, 1);
+		if (!copy) { /* offered again after the next connect */
+			conn_close(a->conn, "no memory to send a result");
+			return;
+		}
+		memcpy(copy, l->frame, l->frame_size);
+		conn_send_frame(a->conn, copy, l->frame_size);
+	}
+	l->sent = true;
+}
+
+/* ---- bundles ---- */
+
+static struct bundle *find_bundle(const struct agent *a, uint64_t job)
+{
+	for (struct bundle *b = a->bundles; b; b = b->next)
+		if (b->job == job)
+			return b;
+	return NULL;
+}
+
+static void drop_bundle(struct agent *a, struct bundle *b)
+{
+	struct bundle **at = &a->bundles;
+	while (*at != b)
+		at = &(*at)->next;
+	*at = b->next;
+	bundle_free(b);
+}
+
+/* Idle bundles go when their job has ended, and the least recently used ones beyond WORLDS_KEPT. */
+static void tidy(struct agent *a)
+{
+	for (;;) {
+		struct bundle *oldest = NULL, *ended = NULL;
+		unsigned idle = 0;
+		for (struct bundle *b = a->bundles; b; b = b->next) {
+			if (b->users || b->state == BUNDLE_BUILDING)
+				continue;
+			idle++;
+			if (b->ended || b->state == BUNDLE_FAILED)
+				ended = b;
+			if (!oldest || b->last_used < oldest->last_used)
+				oldest = b;
+		}
+		if (ended)
+			drop_bundle(a, ended);
+		else if (idle > WORLDS_KEPT)
+			drop_bundle(a, oldest);
+		else
+			return;
+	}
+}
+
+static void drop_lease(struct agent *a, struct lease_task *l)
+{
+	struct lease_task **at = &a->leases;
+	while (*at != l)
+		at = &(*at)->next;
+	*at = l->next;
+	lease_task_free(l);
+}
+
+static void fail_bundle(struct agent *a, struct bundle *b, const struct error *e)
+{
+	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", number(b->job), log_quote(e->text).text);
+	b->state = BUNDLE_FAILED;
+	for (struct lease_task *l = a->leases, *next; l; l = next) {
+		next = l->next;
+		if (l->bundle != b || l->state != LEASE_WAITING)
+			continue;
+		say_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built");
+		drop_lease(a, l);
+	}
+	tidy(a);
+}
+
+static void on_rendered(struct lease_task *l);
+
+static void start_lease(struct agent *a, struct lease_task *l)
+{
+	l->owner = a;
+	l->finished = on_rendered;
+	lease_task_start(l, a->crew);
+}
+
+static void on_built(struct bundle *b)
+{
+	struct agent *a = b->owner;
+	if (b->state == BUNDLE_FAILED) {
+		fail_bundle(a, b, &b->error);
+		agent_settle(a);
+		return;
+	}
+	log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", number(b->job), b->build_seconds,
+		  world_embree_bytes(b->world));
+	for (struct lease_task *l = a->leases; l; l = l->next)
+		if (l->bundle == b && l->state == LEASE_WAITING)
+			start_lease(a, l);
+	tidy(a);
+	agent_settle(a);
+}
+
+/* Asks for the next missing piece, or builds. */
+static void go_on(struct agent *a, struct bundle *b)
+{
+	struct error e;
+	uint64_t offset;
+	if (b->state != BUNDLE_FETCHING)
+		return;
+	if (bundle_next_missing(b, &offset)) {
+		Farm__BlobGet get;
+		Farm__Envelope m;
+		farm__blob_get__init(&get);
+		farm__envelope__init(&m);
+		get.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, b->wanted.bytes};
+		get.offset = offset;
+		m.body_case = FARM__ENVELOPE__BODY_BLOB_GET;
+		m.blob_get = &get;
+		agent_send(a, &m);
+		return;
+	}
+	b->owner = a;
+	b->built = on_built;
+	if (bundle_build(b, a->crew, &e))
+		fail_bundle(a, b, &e);
+}
+
+/* ---- leases ---- */
+
+static struct lease_task *find_lease(const struct agent *a, const struct lease_key *k)
+{
+	for (struct lease_task *l = a->leases; l; l = l->next)
+		if (!l->unwanted && lease_key_equal(&l->grant.key, k))
+			return l;
+	return NULL;
+}
+
+/* Nobody wants it any more. What a thread has is dropped when the thread lets go. */
+static void forget_lease(struct agent *a, struct lease_task *l)
+{
+	if (l->state == LEASE_QUEUED && !crew_take_back(a->crew, &l->task)) {
+		l->unwanted = true;
+		atomic_store(&l->stop, true);
+		return;
+	}
+	drop_lease(a, l);
+}
+
+static void on_rendered(struct lease_task *l)
+{
+	struct agent *a = l->owner;
+	l->state = LEASE_RENDERED;
+	if (l->unwanted) {
+		drop_lease(a, l);
+	} else if (l->rc || l->end == LEASE_STOPPED) {
+		say_failed(a, &l->grant.key, l->rc ? l->error.text : "");
+		drop_lease(a, l);
+	} else {
+		send_result(a, l);
+	}
+	tidy(a);
+	agent_settle(a);
+}
+
+static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigned char *payload, size_t size)
+{
+	struct grant g;
+	struct lease_task *l = NULL;
+	struct error e;
+	if (grant_unpack(&g, m, payload, size, &e)) {
+		conn_close(a->conn, e.text);
+		return;
+	}
+	struct bundle *b = find_bundle(a, g.key.job);
+	l = find_lease(a, &g.key);
+	if (l) { /* it is at work here already, from an earlier connection */
+		if (l->state == LEASE_RENDERED)
+			send_result(a, l);
+		grant_fini(&g);
+		return;
+	}
+	if (a->leaving) {
+		say_failed(a, &g.key, "");
+		grant_fini(&g);
+		return;
+	}
+	int rc = 0;
+	bool fresh = !b;
+	if (fresh)
+		rc = bundle_new(&b, g.key.job, a->cache.blobs, &e);
+	if (!rc && fresh) {
+		b->next = a->bundles;
+		a->bundles = b;
+		ask_job(a, b->job);
+	}
+	if (!rc)
+		rc = lease_task_new(&l, &g, b, &e);
+	if (rc) {
+		say_failed(a, &g.key, e.text);
+		grant_fini(&g);
+		return;
+	}
+	b->last_used = ++a->clock;
+	struct lease_task **end = &a->leases; /* the oldest first: rounds complete in order */
+	while (*end)
+		end = &(*end)->next;
+	*end = l;
+	if (b->state == BUNDLE_READY)
+		start_lease(a, l);
+	tidy(a);
+}
+
+static void take_ack(struct agent *a, const Farm__LeaseAck *m)
+{
+	struct lease_key k;
+	struct error e;
+	if (lease_key_from_wire(m->key, &k, &e)) {
+		conn_close(a->conn, e.text);
+		return;
+	}
+	struct lease_task *l = find_lease(a, &k);
+	if (m->verdict == FARM__VERDICT__VERDICT_REFUSED)
+		log_event(LOG_BATCH_REFUSED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k.job), k.group, k.part,
+			  number(k.epoch), log_quote(m->text).text);
+	if (l && l->state == LEASE_RENDERED) {
+		drop_lease(a, l);
+		tidy(a);
+	}
+}
+
+static void take_revoke(struct agent *a, const Farm__LeaseRevoke *m)
+{
+	struct lease_key k;
+	struct error e;
+	struct lease_task *l = lease_key_from_wire(m->key, &k, &e) ? NULL : find_lease(a, &k);
+	if (l && l->state != LEASE_RENDERED) /* a result that was sent is acknowledged all the same */
+		forget_lease(a, l);
+	tidy(a);
+}
+
+static void take_job_end(struct agent *a, uint64_t job)
+{
+	struct bundle *b = find_bundle(a, job);
+	if (!b)
+		return;
+	for (struct lease_task *l = a->leases, *next; l; l = next) {
+		next = l->next;
+		if (l->bundle == b && !l->unwanted)
+			forget_lease(a, l);
+	}
+	b->ended = true;
+	tidy(a);
+}
+
+static void take_job_info(struct agent *a, struct envelope *env)
+{
+	struct bundle *b = find_bundle(a, env->message->job_info->job);
+	struct error e;
+	if (!b)
+		return;
+	if (b->state == BUNDLE_ASKED && bundle_set_info(b, env, &e)) {
+		fail_bundle(a, b, &e);
+		return;
+	}
+	go_on(a, b);
+	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: results from before are welcome */
+		if (l->bundle == b && l->state == LEASE_RENDERED)
+			send_result(a, l);
+}
+
+static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
+{
+	struct error e;
+	for (struct bundle *b = a->bundles; b; b = b->next) {
+		if (b->state != BUNDLE_FETCHING || c->hash.len != BLOB_HASH_SIZE ||
+		    memcmp(c->hash.data, b->wanted.bytes, BLOB_HASH_SIZE) != 0)
+			continue;
+		if (bundle_add(b, c, payload, size, &e))
+			fail_bundle(a, b, &e);
+		else
+			go_on(a, b);
+		return;
+	}
+}
+
+void desk_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	const Farm__Envelope *m = env->message;
+	switch (m->body_case) {
+	case FARM__ENVELOPE__BODY_HEARTBEAT:
+		break;
+	case FARM__ENVELOPE__BODY_LEASE_GRANT:
+		take_grant(a, m->lease_grant, payload, size);
+		break;
+	case FARM__ENVELOPE__BODY_LEASE_ACK:
+		take_ack(a, m->lease_ack);
+		break;
+	case FARM__ENVELOPE__BODY_LEASE_REVOKE:
+		take_revoke(a, m->lease_revoke);
+		break;
+	case FARM__ENVELOPE__BODY_JOB_INFO:
+		take_job_info(a, env);
+		break;
+	case FARM__ENVELOPE__BODY_JOB_END:
+		take_job_end(a, m->job_end->job);
+		break;
+	case FARM__ENVELOPE__BODY_BLOB_CHUNK:
+		take_blob(a, m->blob_chunk, payload, size);
+		break;
+	default:
+		conn_close(a->conn, "not a message that a coordinator says to a worker");
+	}
+	agent_settle(a);
+}
+
+/* ---- connection and leaving ---- */
+
+void desk_welcome(struct agent *a)
+{
+	for (struct lease_task *l = a->leases; l; l = l->next)
+		l->sent = false;
+	/* Does the job live? The answer brings unfinished fetching and unsent results on their way. */
+	for (struct bundle *b = a->bundles; b; b = b->next)
+		if (!b->ended)
+			ask_job(a, b->job);
+	desk_request(a);
+}
+
+void desk_leave(struct agent *a)
+{
+	desk_request(a);
+	for (struct lease_task *l = a->leases, *next; l; l = next) {
+		next = l->next;
+		if (l->state == LEASE_RENDERED || (l->state == LEASE_QUEUED && !crew_take_back(a->crew, &l->task)))
+			continue;
+		say_failed(a, &l->grant.key, "");
+		drop_lease(a, l);
+	}
+}
+
+void desk_stop_all(struct agent *a)
+{
+	for (struct lease_task *l = a->leases; l; l = l->next)
+		atomic_store(&l->stop, true);
+}
+
+bool desk_is_idle(const struct agent *a)
+{
+	return !a->leases && crew_pending(a->crew) == 0;
+}
+
+void desk_close(struct agent *a)
+{
+	while (a->leases)
+		drop_lease(a, a->leases);
+	while (a->bundles) {
+		if (a->bundles->state == BUNDLE_BUILDING) /* its thread is gone */
+			a->bundles->state = a->bundles->world ? BUNDLE_READY : BUNDLE_FAILED;
+		drop_bundle(a, a->bundles);
+	}
+}

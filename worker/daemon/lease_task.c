@@ -1,0 +1,62 @@
+#include "worker/daemon/lease_task.h"
+
+#include "common/base/mem.h"
+
+#include <string.h>
+
+bool lease_key_equal(const struct lease_key *a, const struct lease_key *b)
+{
+	return a->job == b->job && a->kind == b->kind && a->group == b->group && a->part == b->part &&
+	       a->epoch == b->epoch;
+}
+
+int lease_task_new(struct lease_task **out, struct grant *g, struct bundle *b, struct error *e)
+{
+	struct lease_task *l = mem_alloc(1, sizeof *l);
+	if (!l)
+		return error_set(e, ENOMEM, "no memory for a lease");
+	l->grant = *g;
+	memset(g, 0, sizeof *g);
+	l->bundle = b;
+	b->users++;
+	atomic_init(&l->stop, false);
+	*out = l;
+	return 0;
+}
+
+void lease_task_free(struct lease_task *l)
+{
+	l->bundle->users--;
+	grant_fini(&l->grant);
+	mem_free(l->frame);
+	mem_free(l);
+}
+
+/* Packed here, so that the loop's thread never encodes a film. */
+static void run(struct task *t)
+{
+	struct lease_task *l = (struct lease_task *)t; /* its first member */
+	struct batch batch = {0};
+	struct lease_input in = {l->grant.chain_count, l->grant.seeds, l->grant.states};
+	const struct plan *p = &l->bundle->plan;
+	l->end = LEASE_STOPPED;
+	if (!atomic_load(&l->stop))
+		l->rc = render_lease(l->bundle->world, p, &l->grant.key, &in, &l->stop, &l->end, &batch, &l->error);
+	if (!l->rc && l->end == LEASE_DONE)
+		l->rc = batch_pack(&batch, p, &l->frame, &l->frame_size, &l->error);
+	batch_fini(&batch);
+}
+
+static void done(struct task *t)
+{
+	struct lease_task *l = (struct lease_task *)t;
+	l->finished(l);
+}
+
+void lease_task_start(struct lease_task *l, struct crew *c)
+{
+	l->state = LEASE_QUEUED;
+	l->task.run = run;
+	l->task.done = done;
+	crew_add(c, &l->task);
+}

@@ -1,0 +1,43 @@
+/*
+ * A lease in a worker's hands: from the grant through a thread of the crew to the frame that carries its result, which is
+ * kept until the coordinator has acknowledged it. Loop's thread, but for the run itself.
+ */
+#ifndef WORKER_DAEMON_LEASE_TASK_H
+#define WORKER_DAEMON_LEASE_TASK_H
+
+#include "common/wire/batch_wire.h"
+#include "worker/daemon/bundle.h"
+
+#include <stdatomic.h>
+
+enum lease_task_state {
+	LEASE_WAITING, /* for its bundle */
+	LEASE_QUEUED,  /* for a thread, or running */
+	LEASE_RENDERED /* frame holds the result */
+};
+
+struct lease_task {
+	struct task task;
+	struct lease_task *next;
+	struct grant grant;
+	struct bundle *bundle;
+	enum lease_task_state state;
+	atomic_bool stop;
+	bool unwanted; /* nobody waits for it: dropped when its thread lets go */
+	bool sent;     /* on this connection */
+	unsigned char *frame;
+	size_t frame_size;
+	/* set by the thread */
+	enum lease_end end;
+	int rc;
+	struct error error;
+	void *owner;
+	void (*finished)(struct lease_task *);
+};
+
+int lease_task_new(struct lease_task **l, struct grant *g, struct bundle *b, struct error *e); /* takes the grant */
+void lease_task_free(struct lease_task *l); /* not while a thread has it */
+void lease_task_start(struct lease_task *l, struct crew *c);
+bool lease_key_equal(const struct lease_key *a, const struct lease_key *b);
+
+#endif

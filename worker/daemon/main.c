@@ -1,0 +1,108 @@
+#include "common/base/log.h"
+#include "common/base/version.h"
+#include "worker/daemon/agent.h"
+
+#include <argp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+const char *argp_program_version = "hslt-worker " HSLT_VERSION;
+
+static const char doc[] =
+	"Renders leases for a coordinator until it is told to stop."
+	"\v"
+	"Examples:\n"
+	"  hslt-worker --coordinator 127.0.0.1:7700\n"
+	"  hslt-worker --coordinator farm.lan:7700 --insecure --threads 8 --name $(hostname)\n"
+	"\n"
+	"SIGTERM: finishes the running epochs within the grace period or gives them up, sends what is done and leaves; the "
+	"second one ends it at once. It reconnects for ever.\n"
+	"HSLT_COORDINATOR stands in for --coordinator. Exit codes: 0 stopped, 1 failed, 2 usage.";
+
+enum { OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT };
+
+static const struct argp_option options[] = {
+	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
+	{"threads", 't', "N", 0, "Render threads (all cores)", 0},
+	{"name", OPTION_NAME, "NAME", 0, "How the worker is shown (host and process)", 0},
+	{"cache", OPTION_CACHE, "DIR", 0, "Where files of scenes are kept (~/.cache/hslt)", 0},
+	{"cache-size", OPTION_CACHE_SIZE, "GB", 0, "The cache's limit (20)", 0},
+	{"grace", OPTION_GRACE, "SECONDS", 0, "After SIGTERM (20)", 0},
+	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
+	{"verbose", 'v', NULL, 0, "Log more", 0},
+	{"test-repeat", OPTION_REPEAT, NULL, OPTION_HIDDEN, "Send every result twice", 0},
+	{0},
+};
+
+static double number(struct argp_state *state, const char *option, const char *arg, double least, double most)
+{
+	char *end;
+	double x = strtod(arg, &end);
+	if (*end || end == arg || !(x >= least && x <= most))
+		argp_error(state, "%s takes a number from %g to %g, not '%s'", option, least, most, arg);
+	return x;
+}
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+	struct agent_config *c = state->input;
+	switch (key) {
+	case 'c':
+		c->coordinator = arg;
+		return 0;
+	case 't':
+		c->threads = (unsigned)number(state, "--threads", arg, 1, 1024);
+		return 0;
+	case OPTION_NAME:
+		if (!*arg || strlen(arg) > 127)
+			argp_error(state, "--name takes 1 to 127 bytes");
+		c->name = arg;
+		return 0;
+	case OPTION_CACHE:
+		c->cache = arg;
+		return 0;
+	case OPTION_CACHE_SIZE:
+		c->cache_bytes = (uint64_t)(1e9 * number(state, "--cache-size", arg, 0.001, 1e6));
+		return 0;
+	case OPTION_GRACE:
+		c->grace_seconds = number(state, "--grace", arg, 0, 86400);
+		return 0;
+	case OPTION_INSECURE:
+		c->insecure = true;
+		return 0;
+	case 'v':
+		log_set_level(LOG_LEVEL_DEBUG);
+		return 0;
+	case OPTION_REPEAT:
+		c->repeat = true;
+		return 0;
+	case ARGP_KEY_END:
+		if (!c->coordinator)
+			argp_error(state, "--coordinator HOST:PORT is needed (or $HSLT_COORDINATOR)");
+		return 0;
+	default:
+		return ARGP_ERR_UNKNOWN;
+	}
+}
+
+int main(int argc, char **argv)
+{
+	char host[64] = "worker", name[128];
+	struct error e;
+	long cores = sysconf(_SC_NPROCESSORS_ONLN);
+	gethostname(host, sizeof host - 1);
+	snprintf(name, sizeof name, "%s-%ld", host, (long)getpid());
+	struct agent_config c = {.coordinator = getenv("HSLT_COORDINATOR"),
+				 .name = name,
+				 .cache_bytes = 20000000000u,
+				 .threads = cores > 0 && cores <= 1024 ? (unsigned)cores : 1,
+				 .grace_seconds = 20};
+	argp_err_exit_status = 2;
+	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &c);
+	int rc = agent_run(&c, &e);
+	if (rc)
+		fprintf(stderr, "hslt-worker: %s\n", e.text);
+	return rc == 0 ? 0 : rc == -EPERM || rc == -EINVAL ? 2 : 1;
+}
