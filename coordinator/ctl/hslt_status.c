@@ -1,0 +1,274 @@
+#include "common/base/progress.h"
+#include "common/base/version.h"
+#include "common/base/error.h"
+
+#include <argp.h>
+#include <jansson.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+const char *argp_program_version = "hslt-status " HSLT_VERSION;
+
+static const char doc[] =
+	"Shows what a coordinator is doing, from its status socket."
+	"\v"
+	"Examples:\n"
+	"  hslt-status --socket ~/farm/status\n"
+	"  hslt-status --watch j12\n"
+	"  hslt-status --json | jq '.jobs[] | {id, state, progress}'\n"
+	"\n"
+	"--json prints the socket's objects, one a line; with JOB only that job's. HSLT_STATUS_SOCKET stands in for --socket. "
+	"Exit codes: 0 done, 1 no such job, 2 usage, 75 coordinator not reachable.";
+
+enum { OPTION_SOCKET = 256, OPTION_JSON, OPTION_WATCH, EXIT_UNREACHABLE = 75, LINE_MOST = 1 << 26 };
+
+static const struct argp_option options[] = {
+	{"socket", OPTION_SOCKET, "PATH", 0, "The coordinator's status socket", 0},
+	{"json", OPTION_JSON, NULL, 0, "Print JSON, one object a line", 0},
+	{"watch", OPTION_WATCH, NULL, 0, "Print again on every change, until the job has ended", 0},
+	{0},
+};
+
+struct arguments {
+	const char *socket, *job;
+	char job_text[32];
+	bool json, watch;
+};
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+	struct arguments *a = state->input;
+	switch (key) {
+	case OPTION_SOCKET:
+		a->socket = arg;
+		return 0;
+	case OPTION_JSON:
+		a->json = true;
+		return 0;
+	case OPTION_WATCH:
+		a->watch = true;
+		return 0;
+	case ARGP_KEY_ARG:
+		if (a->job)
+			argp_error(state, "'%s': one job at a time", arg);
+		snprintf(a->job_text, sizeof a->job_text, "%s%s", *arg == 'j' ? "" : "j", arg);
+		a->job = a->job_text;
+		return 0;
+	case ARGP_KEY_END:
+		if (!a->socket)
+			argp_error(state, "--socket PATH is needed (or $HSLT_STATUS_SOCKET)");
+		return 0;
+	default:
+		return ARGP_ERR_UNKNOWN;
+	}
+}
+
+static FILE *reach(const char *path, struct error *e)
+{
+	struct sockaddr_un a = {.sun_family = AF_UNIX};
+	if (strlen(path) >= sizeof a.sun_path) {
+		error_set(e, ENAMETOOLONG, "%s: too long for a socket's path", path);
+		return NULL;
+	}
+	memcpy(a.sun_path, path, strlen(path));
+	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
+	if (fd < 0 || connect(fd, (struct sockaddr *)&a, sizeof a)) {
+		error_set(e, ECONNREFUSED, "%s: no coordinator answers there: %s", path, strerror(errno));
+		if (fd >= 0)
+			close(fd);
+		return NULL;
+	}
+	FILE *f = fdopen(fd, "r+");
+	if (!f) {
+		error_set(e, errno, "%s: %s", path, strerror(errno));
+		close(fd);
+	}
+	return f;
+}
+
+/* ---- the table ---- */
+
+static const char *text_of(const json_t *o, const char *key)
+{
+	const char *s = json_string_value(json_object_get(o, key));
+	return s ? s : "";
+}
+
+static double number_of(const json_t *o, const char *key)
+{
+	return json_number_value(json_object_get(o, key));
+}
+
+static bool is_ended(const json_t *job)
+{
+	const char *state = text_of(job, "state");
+	return strcmp(state, "done") == 0 || strcmp(state, "failed") == 0 || strcmp(state, "cancelled") == 0;
+}
+
+static const char *color_of(const char *state, bool colors)
+{
+	if (!colors)
+		return "";
+	return strcmp(state, "done") == 0 ? "\033[32m" : strcmp(state, "failed") == 0 ? "\033[31m"
+	       : strcmp(state, "running") == 0 || strcmp(state, "bootstrap") == 0 ? "\033[36m" : "\033[33m";
+}
+
+static void print_job(const json_t *job, bool colors)
+{
+	char rate[32] = "-", eta[32] = "-", error[32] = "-";
+	const json_t *known_eta = json_object_get(job, "eta"), *known_error = json_object_get(job, "error");
+	if (!is_ended(job) && number_of(job, "rate") > 0)
+		progress_number(number_of(job, "rate"), rate, sizeof rate);
+	if (!is_ended(job) && json_is_number(known_eta))
+		progress_time(json_number_value(known_eta), eta, sizeof eta);
+	if (json_is_number(known_error))
+		snprintf(error, sizeof error, "%.2f %%", 100 * json_number_value(known_error));
+	const char *state = text_of(job, "state");
+	printf("%-6s %s%-10s%s %5.1f %% %9s %9s %8s %7.0f %6.0f  %s", text_of(job, "id"), color_of(state, colors), state,
+	       colors ? "\033[0m" : "", 100 * number_of(job, "progress"), rate, eta, error, number_of(job, "rounds"),
+	       number_of(job, "leases"), text_of(job, "name"));
+	printf("%s%s\n", *text_of(job, "why") ? "  # " : "", text_of(job, "why"));
+}
+
+static void print_effects(const json_t *job)
+{
+	size_t i;
+	const json_t *effect;
+	json_array_foreach(json_object_get(job, "effects"), i, effect)
+		printf("       %-3s %-14s %s\n", json_is_true(json_object_get(effect, "on")) ? "on" : "off",
+		       text_of(effect, "name"), text_of(effect, "why"));
+}
+
+static void print_workers(const json_t *snapshot)
+{
+	size_t i;
+	const json_t *worker;
+	json_array_foreach(json_object_get(snapshot, "workers"), i, worker) {
+		if (i == 0)
+			printf("\n%-24s %-8s %7s %6s %8s %s\n", "WORKER", "STATE", "THREADS", "LEASES", "MERGED", "LAST FAULT");
+		printf("%-24s %-8s %7.0f %6.0f %8.0f %s\n", text_of(worker, "name"), text_of(worker, "state"),
+		       number_of(worker, "threads"), number_of(worker, "leases"), number_of(worker, "merged"),
+		       text_of(worker, "text"));
+	}
+	if (i == 0)
+		printf("\nno workers are connected\n");
+}
+
+static void print_leases(const json_t *snapshot, const char *id)
+{
+	size_t i;
+	const json_t *lease;
+	json_array_foreach(json_object_get(snapshot, "leases"), i, lease)
+		if (strcmp(text_of(lease, "job"), id) == 0)
+			printf("       lease %-9s group %2.0f part %2.0f epoch %4.0f  %5.1f s at %s%s\n",
+			       text_of(lease, "kind"), number_of(lease, "group"), number_of(lease, "part"),
+			       number_of(lease, "epoch"), number_of(lease, "age"), text_of(lease, "worker"),
+			       json_is_true(json_object_get(lease, "overdue")) ? " (overdue)" : "");
+}
+
+static void print_snapshot(const json_t *snapshot, const char *only)
+{
+	bool colors = isatty(STDOUT_FILENO);
+	size_t i;
+	const json_t *job;
+	printf("%-6s %-10s %7s %9s %9s %8s %7s %6s  %s\n", "JOB", "STATE", "DONE", "RATE/s", "ETA", "ERROR", "ROUNDS",
+	       "LEASES", "NAME");
+	json_array_foreach(json_object_get(snapshot, "jobs"), i, job) {
+		if (only && strcmp(only, text_of(job, "id")) != 0)
+			continue;
+		print_job(job, colors);
+		if (only) {
+			print_effects(job);
+			print_leases(snapshot, only);
+		}
+	}
+	if (!only)
+		print_workers(snapshot);
+}
+
+/* ---- reading ---- */
+
+static const json_t *find_job(const json_t *snapshot, const char *id)
+{
+	size_t i;
+	const json_t *job;
+	json_array_foreach(json_object_get(snapshot, "jobs"), i, job)
+		if (strcmp(text_of(job, "id"), id) == 0)
+			return job;
+	return NULL;
+}
+
+/* One snapshot in the form that was asked for. false: nothing more is to come. */
+static bool show(const struct arguments *a, const json_t *snapshot, bool first, int *code)
+{
+	const json_t *job = a->job ? find_job(snapshot, a->job) : NULL;
+	if (a->job && !job) {
+		fprintf(stderr, "hslt-status: there is no job %s\n", a->job);
+		*code = 1;
+		return false;
+	}
+	if (a->json) {
+		json_dumpf(job ? job : snapshot, stdout, JSON_COMPACT);
+		putchar('\n');
+	} else {
+		if (isatty(STDOUT_FILENO) && a->watch)
+			fputs("\033[H\033[J", stdout);
+		else if (!first)
+			putchar('\n');
+		print_snapshot(snapshot, a->job);
+	}
+	fflush(stdout);
+	return a->watch && !(job && is_ended(job));
+}
+
+static int follow(const struct arguments *a, FILE *f)
+{
+	char *line = NULL;
+	size_t room = 0;
+	int code = 0;
+	bool first = true, more = true;
+	while (more) {
+		ssize_t n = getline(&line, &room, f);
+		json_error_t fault;
+		json_t *o = n > 0 && n < LINE_MOST ? json_loadb(line, (size_t)n, 0, &fault) : NULL;
+		if (!o) {
+			fprintf(stderr, "hslt-status: %s\n", n > 0 ? "what answers is no coordinator" : "the coordinator is gone");
+			code = EXIT_UNREACHABLE;
+			break;
+		}
+		if (strcmp(text_of(o, "type"), "snapshot") == 0) {
+			more = show(a, o, first, &code);
+			first = false;
+		}
+		json_decref(o);
+	}
+	free(line);
+	return code;
+}
+
+int main(int argc, char **argv)
+{
+	struct arguments a = {.socket = getenv("HSLT_STATUS_SOCKET")};
+	struct error e;
+	argp_err_exit_status = 2;
+	argp_parse(&(struct argp){options, parse, "[JOB]", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &a);
+	FILE *f = reach(a.socket, &e);
+	if (!f) {
+		fprintf(stderr, "hslt-status: %s\n", e.text);
+		return EXIT_UNREACHABLE;
+	}
+	static const char subscribe[] = "{\"subscribe\":[\"snapshot\"]}\n";
+	if (a.watch && write(fileno(f), subscribe, sizeof subscribe - 1) < 0) {
+		fprintf(stderr, "hslt-status: %s\n", strerror(errno));
+		fclose(f);
+		return EXIT_UNREACHABLE;
+	}
+	int code = follow(&a, f);
+	fclose(f);
+	return code;
+}

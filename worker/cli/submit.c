@@ -1,0 +1,343 @@
+#include "worker/cli/submit.h"
+
+#include "common/base/mem.h"
+#include "common/base/progress.h"
+#include "common/base/text.h"
+#include "common/wire/plan_wire.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { PATH_BYTES = 4096, CHUNK = 1 << 20 };
+
+/* ---- the bundle ---- */
+
+static int split_path(struct scene_bundle *b, const char *path, struct error *e)
+{
+	const char *slash = strrchr(path, '/');
+	b->scene = mem_strdup(slash ? slash + 1 : path);
+	b->folder = mem_strdup(slash ? path : ".");
+	if (!b->scene || !b->folder)
+		return error_set(e, ENOMEM, "no memory for the scene's name");
+	if (slash)
+		b->folder[slash == path ? 1 : slash - path] = 0;
+	return *b->scene ? 0 : error_set(e, EINVAL, "%s: is a folder, not a scene file", path);
+}
+
+static int add_file(struct scene_bundle *b, const char *name, struct error *e)
+{
+	char path[PATH_BYTES];
+	struct scene_bundle_file *f = &b->files[b->count];
+	int n = snprintf(path, sizeof path, "%s/%s", b->folder, name);
+	if (n < 0 || (size_t)n >= sizeof path)
+		return error_set(e, ENAMETOOLONG, "%s: the name is too long", name);
+	f->name = mem_strdup(name);
+	if (!f->name)
+		return error_set(e, ENOMEM, "no memory for the list of files");
+	b->count++;
+	return blob_hash_file(path, &f->hash, &f->size, e);
+}
+
+static int copy_notes(struct scene_bundle *b, const struct scene *s, struct error *e)
+{
+	b->notes = mem_alloc(s->note_count, sizeof *b->notes);
+	for (uint32_t i = 0; b->notes && i < s->note_count; i++) {
+		b->notes[i] = mem_strdup(s->notes[i]);
+		if (!b->notes[i])
+			break;
+		b->note_count++;
+	}
+	return b->note_count == s->note_count && b->notes ? 0 : error_set(e, ENOMEM, "no memory for the scene's notes");
+}
+
+static int add_files(struct scene_bundle *b, const struct scene *s, struct error *e)
+{
+	b->files = mem_alloc((size_t)s->asset_count + 1, sizeof *b->files);
+	if (!b->files)
+		return error_set(e, ENOMEM, "no memory for the list of files");
+	int rc = add_file(b, b->scene, e);
+	for (uint32_t i = 0; !rc && i < s->asset_count; i++)
+		rc = add_file(b, s->assets[i], e);
+	return rc;
+}
+
+int scene_bundle_read(struct scene_bundle *b, const char *path, const struct scene_define *defines, size_t define_count,
+		      const struct render_options *o, struct error *e)
+{
+	struct scene scene;
+	memset(b, 0, sizeof *b);
+	int rc = split_path(b, path, e);
+	if (rc) {
+		scene_bundle_fini(b);
+		return rc;
+	}
+	struct asset_source assets = asset_folder(b->folder);
+	rc = scene_read(&scene, &assets, b->scene, render_plugins(), defines, define_count, e);
+	if (!rc) {
+		rc = render_check(&scene, &assets, o, &b->summary, e);
+		if (!rc)
+			rc = copy_notes(b, &scene, e);
+		if (!rc)
+			rc = add_files(b, &scene, e);
+		scene_fini(&scene);
+	}
+	if (rc)
+		scene_bundle_fini(b);
+	return rc;
+}
+
+void scene_bundle_fini(struct scene_bundle *b)
+{
+	for (size_t i = 0; i < b->count; i++)
+		mem_free(b->files[i].name);
+	for (size_t i = 0; i < b->note_count; i++)
+		mem_free(b->notes[i]);
+	mem_free(b->files);
+	mem_free(b->notes);
+	mem_free(b->folder);
+	mem_free(b->scene);
+	memset(b, 0, sizeof *b);
+}
+
+/* ---- sending ---- */
+
+static char *borrow(const char *text)
+{
+	union {
+		const char *from;
+		char *to;
+	} u = {text}; /* generated structures have no const */
+	return u.to;
+}
+
+/* The message's lists; their texts are borrowed. */
+struct lists {
+	Farm__File *files, **file_at;
+	Farm__Define *defines, **define_at;
+	Farm__Effect *effects, **effect_at;
+};
+
+static void lists_fini(struct lists *l)
+{
+	mem_free(l->files);
+	mem_free(l->file_at);
+	mem_free(l->defines);
+	mem_free(l->define_at);
+	mem_free(l->effects);
+	mem_free(l->effect_at);
+}
+
+static int lists_init(struct lists *l, const struct submit_request *r, struct scene_bundle *b, struct error *e)
+{
+	size_t lines = b->summary.line_count;
+	*l = (struct lists){mem_alloc(b->count, sizeof *l->files),	  mem_alloc(b->count, sizeof *l->file_at),
+			    mem_alloc(r->define_count, sizeof *l->defines), mem_alloc(r->define_count, sizeof *l->define_at),
+			    mem_alloc(lines, sizeof *l->effects),	  mem_alloc(lines, sizeof *l->effect_at)};
+	if (!l->files || !l->file_at || !l->defines || !l->define_at || !l->effects || !l->effect_at) {
+		lists_fini(l);
+		return error_set(e, ENOMEM, "no memory for the submission");
+	}
+	for (size_t i = 0; i < b->count; i++) {
+		Farm__File *f = l->file_at[i] = &l->files[i];
+		farm__file__init(f);
+		f->name = b->files[i].name;
+		f->hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, b->files[i].hash.bytes};
+		f->size = b->files[i].size;
+	}
+	for (size_t i = 0; i < r->define_count; i++) {
+		Farm__Define *d = l->define_at[i] = &l->defines[i];
+		farm__define__init(d);
+		d->name = borrow(r->defines[i].name);
+		d->value = borrow(r->defines[i].value);
+	}
+	for (size_t i = 0; i < lines; i++) {
+		Farm__Effect *f = l->effect_at[i] = &l->effects[i];
+		farm__effect__init(f);
+		f->name = borrow(b->summary.lines[i].name);
+		f->on = b->summary.lines[i].on;
+		f->why = b->summary.lines[i].why;
+	}
+	return 0;
+}
+
+static int wait_answer(struct client *cl, struct client_message *answer, struct error *e)
+{
+	int rc = client_wait(cl, 300, answer, e);
+	if (!rc && answer->envelope.message->body_case != FARM__ENVELOPE__BODY_SUBMIT_ANSWER) {
+		client_message_fini(answer);
+		rc = error_set(e, EPROTO, "the coordinator's answer is not to the submission");
+	}
+	return rc;
+}
+
+static int send_submit(struct client *cl, const struct submit_request *r, struct scene_bundle *b, struct error *e)
+{
+	struct lists l;
+	Farm__Submit s;
+	Farm__PlanRequest plan;
+	Farm__Envelope m;
+	int rc = lists_init(&l, r, b, e);
+	if (rc)
+		return rc;
+	farm__submit__init(&s);
+	farm__envelope__init(&m);
+	plan_request_to_wire(&r->plan, &plan);
+	s.name = borrow(r->name);
+	s.scene = b->scene;
+	s.n_defines = r->define_count;
+	s.defines = l.define_at;
+	s.render_width = r->render.width;
+	s.render_height = r->render.height;
+	s.plan = &plan;
+	s.priority = r->priority;
+	s.n_files = b->count;
+	s.files = l.file_at;
+	s.n_effects = b->summary.line_count;
+	s.effects = l.effect_at;
+	s.n_notes = b->note_count;
+	s.notes = b->notes;
+	s.output = borrow(r->output);
+	s.mixed = r->mixed;
+	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
+	m.submit = &s;
+	rc = client_send(cl, &m, NULL, 0, e);
+	lists_fini(&l);
+	return rc;
+}
+
+static const struct scene_bundle_file *file_of_hash(const struct scene_bundle *b, const ProtobufCBinaryData *hash)
+{
+	for (size_t i = 0; i < b->count; i++)
+		if (hash->len == BLOB_HASH_SIZE && memcmp(hash->data, b->files[i].hash.bytes, BLOB_HASH_SIZE) == 0)
+			return &b->files[i];
+	return NULL;
+}
+
+static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint64_t offset, const void *bytes, size_t size,
+		      struct error *e)
+{
+	struct blob_hash hash = f->hash;
+	Farm__BlobChunk chunk;
+	Farm__Envelope m;
+	farm__blob_chunk__init(&chunk);
+	farm__envelope__init(&m);
+	chunk.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
+	chunk.offset = offset;
+	chunk.size = f->size;
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+	m.blob_chunk = &chunk;
+	return client_send(cl, &m, bytes, size, e);
+}
+
+static int send_file(struct client *cl, const struct scene_bundle *b, const struct scene_bundle_file *f, struct error *e)
+{
+	char path[PATH_BYTES];
+	snprintf(path, sizeof path, "%s/%s", b->folder, f->name);
+	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	if (fd < 0)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	unsigned char *bytes = mem_alloc(CHUNK, 1);
+	int rc = bytes ? 0 : error_set(e, ENOMEM, "no memory to send files");
+	uint64_t at = 0;
+	while (!rc) {
+		size_t want = f->size - at < CHUNK ? (size_t)(f->size - at) : CHUNK;
+		ssize_t n = want ? read(fd, bytes, want) : 0;
+		if (n < 0 || (n == 0 && want))
+			rc = error_set(e, EIO, "%s: %s", path, n < 0 ? strerror(errno) : "it became shorter meanwhile");
+		if (!rc)
+			rc = send_chunk(cl, f, at, bytes, (size_t)n, e);
+		at += n > 0 ? (uint64_t)n : 0;
+		if (at == f->size)
+			break;
+	}
+	mem_free(bytes);
+	close(fd);
+	return rc;
+}
+
+static int send_missing(struct client *cl, const struct scene_bundle *b, const Farm__SubmitAnswer *a, struct error *e)
+{
+	int rc = 0;
+	for (size_t i = 0; !rc && i < a->n_missing; i++) {
+		const struct scene_bundle_file *f = file_of_hash(b, &a->missing[i]);
+		rc = f ? send_file(cl, b, f, e) : error_set(e, EPROTO, "the coordinator asks for a file that is not ours");
+	}
+	return rc;
+}
+
+int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *bundle, uint64_t *job,
+		char *plan_text, size_t plan_size, struct error *e)
+{
+	struct scene_bundle b = *bundle; /* messages borrow texts that are not const */
+	struct client_message answer = {0};
+	int rc = send_submit(cl, r, &b, e);
+	if (!rc)
+		rc = wait_answer(cl, &answer, e);
+	if (!rc && answer.envelope.message->submit_answer->n_missing) {
+		rc = send_missing(cl, &b, answer.envelope.message->submit_answer, e);
+		client_message_fini(&answer);
+		if (!rc)
+			rc = wait_answer(cl, &answer, e);
+	}
+	if (rc)
+		return rc;
+	const Farm__SubmitAnswer *a = answer.envelope.message->submit_answer;
+	if (a->job == 0)
+		rc = error_set(e, EACCES, "the coordinator refuses the job: %s", a->refusal);
+	*job = a->job;
+	text_copy(plan_text, plan_size, a->plan);
+	client_message_fini(&answer);
+	return rc;
+}
+
+/* ---- waiting ---- */
+
+static void show(struct progress *p, const Farm__JobStatus *s)
+{
+	char rate[32], eta[32], detail[512];
+	progress_number(s->rate, rate, sizeof rate);
+	progress_time(s->eta, eta, sizeof eta);
+	if (*s->why)
+		snprintf(detail, sizeof detail, "%s", s->why);
+	else if (s->ended || s->eta < 0)
+		snprintf(detail, sizeof detail, "round %llu", (unsigned long long)s->rounds);
+	else
+		snprintf(detail, sizeof detail, "%s/s, %s left", rate, eta);
+	progress_show(p, s->progress, s->state, detail);
+}
+
+int submit_wait(struct client *cl, uint64_t job, uint32_t *exit_code, bool *has_result, char *why, size_t why_size,
+		struct error *e)
+{
+	struct progress p;
+	Farm__Watch watch;
+	Farm__Envelope m;
+	farm__watch__init(&watch);
+	farm__envelope__init(&m);
+	watch.job = job;
+	m.body_case = FARM__ENVELOPE__BODY_WATCH;
+	m.watch = &watch;
+	int rc = client_send(cl, &m, NULL, 0, e);
+	bool ended = false;
+	progress_start(&p);
+	while (!rc && !ended) {
+		struct client_message message;
+		rc = client_wait(cl, -1, &message, e);
+		if (rc)
+			break;
+		const Farm__Envelope *got = message.envelope.message;
+		if (got->body_case == FARM__ENVELOPE__BODY_JOB_STATUS) {
+			const Farm__JobStatus *s = got->job_status;
+			show(&p, s);
+			ended = s->ended;
+			*exit_code = s->exit_code;
+			*has_result = s->fetchable;
+			text_copy(why, why_size, s->why);
+		}
+		client_message_fini(&message);
+	}
+	progress_end(&p);
+	return rc;
+}

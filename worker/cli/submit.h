@@ -1,0 +1,51 @@
+/*
+ * What hslt-submit does: collects a scene's files by their hashes, sends the job and what the coordinator misses of it,
+ * waits for it and fetches its result. One thread.
+ */
+#ifndef WORKER_CLI_SUBMIT_H
+#define WORKER_CLI_SUBMIT_H
+
+#include "common/blob/blob.h"
+#include "common/net/client.h"
+#include "common/plan/plan.h"
+#include "worker/render/render.h"
+
+/* A scene and its files, as read here. */
+struct scene_bundle {
+	char *folder; /* of the scene file; asset names are relative to it */
+	char *scene;  /* the scene file's name in it */
+	size_t count;
+	struct scene_bundle_file {
+		char *name;
+		struct blob_hash hash;
+		uint64_t size;
+	} *files;
+	struct render_summary summary;
+	size_t note_count;
+	char **notes;
+};
+
+/* Reads and checks the scene with everything that it refers to. The error names file, line and element. */
+int scene_bundle_read(struct scene_bundle *b, const char *path, const struct scene_define *defines, size_t define_count,
+		      const struct render_options *o, struct error *e);
+void scene_bundle_fini(struct scene_bundle *b);
+
+struct submit_request {
+	const char *name, *output; /* output: absolute, or "" */
+	int priority;
+	bool mixed;
+	struct plan_request plan;
+	struct render_options render;
+	const struct scene_define *defines;
+	size_t define_count;
+};
+
+/* -EACCES: the coordinator refuses; the sentence is its own. plan_text: what was chosen and by which rule. */
+int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *b, uint64_t *job,
+		char *plan_text, size_t plan_size, struct error *e);
+
+/* Shows progress on stderr until the job has ended. *exit_code as the contract says. */
+int submit_wait(struct client *cl, uint64_t job, uint32_t *exit_code, bool *has_result, char *why, size_t why_size,
+		struct error *e);
+
+#endif
