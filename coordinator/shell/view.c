@@ -41,12 +41,12 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	v->rate = isfinite(s->rate) ? s->rate : 0;
 	v->eta = isfinite(s->eta) ? s->eta : -1;
 	v->leases = s->leases_out;
-	v->leases_merged = s->leases_merged;
-	v->repeats = s->repeats;
-	v->refused = s->refused;
-	v->failures = s->failures;
-	v->duplicates = s->duplicates;
-	v->timeouts = s->timeouts;
+	r->leases_merged = s->leases_merged;
+	r->repeats = s->repeats;
+	r->refused = s->refused;
+	r->failures = s->failures;
+	r->duplicates = s->duplicates;
+	r->timeouts = s->timeouts;
 	text_copy(v->waiting, sizeof v->waiting, shown(s->waiting, text));
 }
 
@@ -116,11 +116,7 @@ json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit)
 		return NULL;
 	json_object_set_new(o, "eta", number_or_null(v->eta, v->eta >= 0));
 	json_object_set_new(o, "error", number_or_null(r->rel_error, r->rel_error >= 0));
-	json_object_set_new(o, "counts",
-			    json_pack("{s:I s:I s:I s:I s:I s:I}", "merged", (json_int_t)v->leases_merged, "repeats",
-				      (json_int_t)v->repeats, "refused", (json_int_t)v->refused, "failures",
-				      (json_int_t)v->failures, "duplicates", (json_int_t)v->duplicates, "timeouts",
-				      (json_int_t)v->timeouts));
+	json_object_set_new(o, "counts", record_counts(r));
 	if (submit)
 		json_object_set_new(o, "effects", effects_to_json(submit));
 	return o;

@@ -16,7 +16,6 @@ struct job_view {
 	struct job_record record;
 	double rate, eta;  /* eta negative: not known */
 	uint32_t leases;   /* out at workers */
-	uint64_t leases_merged, repeats, refused, failures, duplicates, timeouts;
 	char waiting[256]; /* why nothing is being done for it */
 };
 

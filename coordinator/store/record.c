@@ -3,19 +3,46 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 
-#include <jansson.h>
 #include <stdlib.h>
 #include <string.h>
 
+static const struct {
+	const char *name;
+	size_t offset;
+} counts[] = {
+	{"rounds", offsetof(struct job_record, rounds)},	 {"mutations", offsetof(struct job_record, mutations)},
+	{"merged", offsetof(struct job_record, leases_merged)}, {"repeats", offsetof(struct job_record, repeats)},
+	{"refused", offsetof(struct job_record, refused)},	 {"failures", offsetof(struct job_record, failures)},
+	{"duplicates", offsetof(struct job_record, duplicates)}, {"timeouts", offsetof(struct job_record, timeouts)},
+};
+
+json_t *record_counts(const struct job_record *r)
+{
+	json_t *o = json_object();
+	for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+		uint64_t n;
+		memcpy(&n, (const char *)r + counts[i].offset, sizeof n);
+		json_object_set_new(o, counts[i].name, json_integer((json_int_t)n));
+	}
+	return o;
+}
+
+static void take_counts(const json_t *o, struct job_record *r)
+{
+	for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+		uint64_t n = (uint64_t)json_integer_value(json_object_get(o, counts[i].name));
+		memcpy((char *)r + counts[i].offset, &n, sizeof n);
+	}
+}
+
 char *record_to_json(const struct job_record *r)
 {
-	json_t *o = json_pack("{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:I s:I}", /* */
+	json_t *o = json_pack("{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:o}", /* */
 			      "schema", 1, "id", (json_int_t)r->id, "name", r->name, "integrator", r->integrator, /* */
 			      "state", r->state, "reason", r->reason, "why", r->why, "output", r->output, /* */
 			      "priority", r->priority, "exitCode", (int)r->exit_code, "result", (int)r->has_result, /* */
 			      "submitted", r->submitted, "ended", r->ended, "progress", r->progress, /* */
-			      "relError", r->rel_error, "rounds", (json_int_t)r->rounds, /* */
-			      "mutations", (json_int_t)r->mutations);
+			      "relError", r->rel_error, "counts", record_counts(r));
 	char *text = o ? json_dumps(o, JSON_INDENT(2)) : NULL;
 	json_decref(o);
 	char *copy = text ? mem_strdup(text) : NULL;
@@ -53,8 +80,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	r->ended = json_number_value(json_object_get(o, "ended"));
 	r->progress = json_number_value(json_object_get(o, "progress"));
 	r->rel_error = json_number_value(json_object_get(o, "relError"));
-	r->rounds = (uint64_t)json_integer_value(json_object_get(o, "rounds"));
-	r->mutations = (uint64_t)json_integer_value(json_object_get(o, "mutations"));
+	take_counts(json_object_get(o, "counts"), r);
 	json_decref(o);
 	return 0;
 }

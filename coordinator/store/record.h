@@ -7,6 +7,7 @@
 
 #include "common/base/error.h"
 
+#include <jansson.h>
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -25,9 +26,11 @@ struct job_record {
 	double submitted, ended; /* seconds since 1970; 0: not yet */
 	double progress;
 	double rel_error; /* negative: not known */
-	uint64_t rounds, mutations;
+	uint64_t rounds, mutations, leases_merged;
+	uint64_t repeats, refused, failures, duplicates, timeouts; /* what went wrong and cost nothing */
 };
 
+json_t *record_counts(const struct job_record *r); /* an object of its counts */
 char *record_to_json(const struct job_record *r); /* mem_alloc'd; NULL when memory is out */
 /* -EBADMSG when it is not a record. */
 int record_from_json(const char *text, size_t size, struct job_record *r, struct error *e);

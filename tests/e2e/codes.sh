@@ -1,0 +1,67 @@
+# Exit codes, what is refused, and what outlives the coordinator.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
+
+# code WANTED COMMAND...
+code() {
+	wanted=$1
+	shift
+	got=0
+	"$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
+	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/err.log")"
+}
+
+for p in coordinator worker submit status job; do
+	code 0 "$BIN/hslt-$p" --version
+	code 0 "$BIN/hslt-$p" --help
+	grep -qi example "$DIR/out" || fail "hslt-$p --help has no examples"
+	code 2 "$BIN/hslt-$p" --no-such-option
+done
+code 2 "$BIN/hslt-coordinator" --listen 0.0.0.0:0 --spool "$DIR/open"
+grep -q -- --insecure "$DIR/err.log" || fail "it does not say how"
+code 2 "$BIN/hslt-worker" --coordinator 192.0.2.1:7700 --cache "$DIR/cache"
+code 2 "$BIN/hslt-submit" --coordinator 192.0.2.1:7700 "$BOX" -o "$DIR/a.exr"
+code 75 "$BIN/hslt-submit" --coordinator 127.0.0.1:1 "$BOX" -o "$DIR/a.exr"
+code 75 "$BIN/hslt-job" --coordinator 127.0.0.1:1 list
+code 75 "$BIN/hslt-status" --socket "$DIR/none"
+
+start_coordinator
+code 1 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --spool "$DIR/spool" # one master a spool
+code 1 "$BIN/hslt-submit" "$DIR/none.xml" -o "$DIR/a.exr"
+code 2 "$BIN/hslt-submit" "$BOX" -o "$DIR/a.exr" --crop 0,0,0,0,0
+code 1 "$BIN/hslt-job" fetch j1
+code 1 "$BIN/hslt-job" cancel j1
+
+id=$(submit "$BOX" -o "$DIR/cancelled.exr" --integrator path --spp 1000000)
+[ "$id" = j1 ] || fail "the first job is $id"
+start_worker w1
+until_true 10 is_state "$id" running || fail "$id does not run"
+code 0 "$BIN/hslt-job" cancel "$id"
+until_true 5 is_state "$id" cancelled || fail "$id is not cancelled"
+code 1 "$BIN/hslt-job" fetch "$id"
+
+"$BIN/hslt-submit" "$BOX" -o "$DIR/waited.exr" --integrator path --spp 1000000 --wait >"$DIR/id" 2>"$DIR/wait.log" &
+waiter=$!
+PIDS="$PIDS $waiter"
+until_true 10 is_state j2 running || fail "j2 does not run"
+code 0 "$BIN/hslt-job" cancel j2
+got=0
+wait $waiter || got=$?
+[ $got -eq 3 ] || fail "waiting for a cancelled job ended with $got"
+[ "$(cat "$DIR/id")" = j2 ] || fail "stdout is not the id alone"
+
+code 4 "$BIN/hslt-submit" "$BOX" -o "$DIR/bound.exr" --integrator path --spp 16 --target-error 0.01% --wait
+code 0 "$BIN/hslt-submit" "$BOX" -o "$DIR/reached.exr" --integrator path --spp 64 --target-error 500% --wait --json
+grep -q '"id":"j4"' "$DIR/out" || fail "--json: $(cat "$DIR/out")"
+[ -s "$DIR/reached.exr" ] || fail "no image"
+
+stop $COORDINATOR_PID
+[ $CODE -eq 0 ] || fail "the coordinator stopped with $CODE"
+start_coordinator
+code 0 "$BIN/hslt-job" fetch j4 -o "$DIR/again.exr"
+cmp "$DIR/reached.exr" "$DIR/again.exr" || fail "another result after a restart"
+code 0 "$BIN/hslt-job" log j4
+grep -q event=job_done "$DIR/out" || fail "the log has no end"
+id=$(submit "$BOX" -o "$DIR/next.exr" --integrator path --spp 4 -D light=3)
+[ "$id" = j5 ] || fail "the next job is $id"
+echo "exit codes and restart"

@@ -1,0 +1,112 @@
+# For end-to-end tests with real processes on loopback: sourced by tests/e2e/*.sh, which are called with the build folder.
+# Each test has a folder of its own and ends what it started. Exit codes: 0 passed, 77 skipped, else failed.
+set -eu
+BUILD=${1:-build}
+BIN=$BUILD/bin
+HERE=$(dirname "$0")
+BOX=$HERE/../scenes/box/box.xml
+DIR=$(mktemp -d "${TMPDIR:-/tmp}/hslt-e2e.XXXXXX")
+PIDS=
+COORDINATOR=
+COORDINATOR_PID=
+export HSLT_STATUS_SOCKET="$DIR/status"
+
+finish() {
+	code=$?
+	trap - EXIT INT TERM
+	for p in $PIDS; do
+		kill -9 "$p" 2>/dev/null || :
+	done
+	wait 2>/dev/null || :
+	if [ $code -ne 0 ] && [ $code -ne 77 ]; then
+		for f in "$DIR"/*.log; do
+			[ -s "$f" ] && echo "---- $(basename "$f")" && tail -n 15 "$f"
+		done
+	fi
+	rm -rf "$DIR"
+	exit $code
+}
+trap finish EXIT
+trap 'exit 130' INT TERM
+
+fail() {
+	echo "FAILED: $*"
+	exit 1
+}
+
+skip() {
+	echo "skipped: $*"
+	exit 77
+}
+
+# need PROGRAM...: without them there is nothing to test
+need() {
+	for p in "$@"; do
+		[ -x "$BIN/$p" ] || skip "$p is not built"
+	done
+}
+
+# until_true SECONDS COMMAND...
+until_true() {
+	tries=$(($1 * 20))
+	shift
+	while ! "$@"; do
+		tries=$((tries - 1))
+		[ $tries -gt 0 ] || return 1
+		sleep 0.05
+	done
+}
+
+# start_coordinator [OPTION...]
+start_coordinator() {
+	rm -f "$DIR/port"
+	"$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port" --spool "$DIR/spool" \
+		--status-socket "$DIR/status" --heartbeat 0.5 "$@" 2>>"$DIR/coordinator.log" &
+	COORDINATOR_PID=$!
+	PIDS="$PIDS $COORDINATOR_PID"
+	until_true 10 test -s "$DIR/port" || fail "the coordinator does not listen"
+	COORDINATOR=127.0.0.1:$(cat "$DIR/port")
+	export HSLT_COORDINATOR="$COORDINATOR"
+}
+
+# start_worker NAME [OPTION...]: its process id is in WORKER
+start_worker() {
+	name=$1
+	shift
+	"$BIN/hslt-worker" --threads 1 --name "$name" --cache "$DIR/cache" "$@" 2>>"$DIR/$name.log" &
+	WORKER=$!
+	PIDS="$PIDS $WORKER"
+}
+
+# stop PID...: by SIGTERM, and waits; its exit code is in CODE
+stop() {
+	for p in "$@"; do
+		kill "$p"
+		CODE=0
+		wait "$p" || CODE=$?
+	done
+}
+
+# submit OPTION...: prints the job's id
+submit() {
+	"$BIN/hslt-submit" "$@" 2>>"$DIR/submit.log"
+}
+
+# value JOB KEY: a number or a word of the job's JSON
+value() {
+	"$BIN/hslt-status" --json "$1" 2>/dev/null | sed -n 's/.*"'"$2"'":"\{0,1\}\([^",}]*\).*/\1/p'
+}
+
+# is_beyond JOB PROGRESS
+is_beyond() {
+	awk -v a="$(value "$1" progress)" -v b="$2" 'BEGIN { exit !(a + 0 >= b + 0) }'
+}
+
+is_state() {
+	[ "$(value "$1" state)" = "$2" ]
+}
+
+# same A B: every bit of every pixel, and the header but for what may differ
+same() {
+	"$BIN/hslt-compare" --exact "$1" "$2" || fail "$1 and $2 differ"
+}

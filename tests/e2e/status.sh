@@ -1,0 +1,30 @@
+# The status socket during a job: valid JSON, progress that grows, lines for subscribers, nobody else may read it.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status
+
+start_coordinator
+[ "$(stat -c %a "$DIR/status")" = 600 ] || fail "the socket's mode is $(stat -c %a "$DIR/status")"
+id=$(submit "$BOX" -o "$DIR/a.exr" --integrator pssmlt --bootstrap 20000 --mutations 300000 --name "a \"name\" with ü")
+is_state "$id" queued || fail "without workers a job waits"
+[ -n "$(value "$id" waiting)" ] || fail "it does not say why it waits"
+timeout 40 "$BIN/hslt-status" --json --watch "$id" >"$DIR/lines" &
+watcher=$!
+PIDS="$PIDS $watcher"
+start_worker w1
+wait $watcher || fail "watching ended with $?"
+# hslt-status parses each line before it prints it; here the order of what it says is looked at
+sed -n 's/.*"progress":\([0-9.e-]*\).*/\1/p' "$DIR/lines" >"$DIR/progress"
+awk 'NR > 1 && $1 < last { exit 1 } { last = $1; if ($1 > 0 && $1 < 1) between++ } END { if (last != 1 || between < 3) exit 1 }' \
+	"$DIR/progress" || fail "progress: $(tr '\n' ' ' <"$DIR/progress")"
+tail -n 1 "$DIR/lines" | grep -q '"state":"done"' || fail "the last line is not the end"
+grep -q '"effects":\[{' "$DIR/lines" || fail "no effects are shown"
+if command -v jq >/dev/null; then
+	jq -e .id "$DIR/lines" >/dev/null || fail "jq does not take it"
+fi
+"$BIN/hslt-status" | grep -q "^$id  *done" || fail "the table does not show the job"
+"$BIN/hslt-status" j99 2>/dev/null && fail "j99 cannot be known"
+if command -v socat >/dev/null; then
+	echo '{"subscribe":["jobs"]}' | socat -t 1 - "UNIX-CONNECT:$DIR/status" | head -n 1 | grep -q '"type":"snapshot"' ||
+		fail "socat reads no snapshot"
+fi
+echo "status: $(wc -l <"$DIR/lines") lines, progress grows"
