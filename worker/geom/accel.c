@@ -20,15 +20,20 @@ struct accel {
 	RTCScene scene;
 	uint32_t sphere_count;
 	struct sphere_prim *spheres;
+	struct accel_shape *shapes;
 	atomic_size_t bytes;
 	vec3 low, high;
+	double reach; /* how far Embree's floats can be off, see below */
 };
 
 /* What a query carries into Embree's callbacks. */
 struct query {
 	embree_context context;
-	vec3 o, d; /* spheres are solved with these, in double */
+	vec3 o, d, end; /* in double: what Embree proposes is judged by these; end: o + d for a segment */
+	bool segment;
 	double t_min;
+	double reach; /* of the accel */
+	double back;  /* Embree's ray begins that much before o, in units of d */
 	struct prim_ref from, to;
 };
 
@@ -40,13 +45,56 @@ static bool memory_monitor(void *user, ssize_t bytes, bool post)
 	return true;
 }
 
-static void filter_self(const struct RTCFilterFunctionNArguments *args)
+static vec3 vertex(const struct accel_shape *s, uint32_t i)
+{
+	return (vec3){(double)s->position[i][0], (double)s->position[i][1], (double)s->position[i][2]};
+}
+
+static double norm1(vec3 v)
+{
+	return fabs(v.x) + fabs(v.y) + fabs(v.z);
+}
+
+/* Height of the plane through v0 over p, times |n|; 0 when p lies in the plane as far as double can tell: p and n carry the
+ * rounding of a few operations, of which `edges` bounds the terms. */
+static double height(vec3 p, vec3 v0, vec3 n, double edges)
+{
+	vec3 to = vec3_sub(v0, p);
+	double h = vec3_dot(n, to);
+	return fabs(h) <= 0x1p-49 * edges * (norm1(p) + norm1(to)) ? 0 : h;
+}
+
+/* The plane of the triangle is crossed after the start, and before the end of a segment. A ray that starts in the plane,
+ * on a coplanar neighbour, does not cross it again. */
+static bool crosses(const struct query *q, const struct accel_shape *s, uint32_t prim)
+{
+	const uint32_t *i = s->index[prim];
+	vec3 v0 = vertex(s, i[0]), e1 = vec3_sub(vertex(s, i[1]), v0), e2 = vec3_sub(vertex(s, i[2]), v0);
+	vec3 n = vec3_cross(e1, e2);
+	double edges = norm1(e1) * norm1(e2), start = height(q->o, v0, n, edges);
+	double beyond = q->segment ? -height(q->end, v0, n, edges) : vec3_dot(n, q->d);
+	return (start > 0 && beyond > 0) || (start < 0 && beyond < 0);
+}
+
+/* So high over the triangle's plane at both ends that not even the normal that Embree makes of tiny triangles far away can
+ * be wrong about the side: spares most hits the way to their vertices. */
+static bool clearly_crosses(const struct query *q, const struct RTCHit *hit, const struct RTCRay *ray)
+{
+	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
+	double t = (double)ray->tfar - q->back, nearer = q->segment ? fmin(t, 1 - t) : t;
+	return fabs(vec3_dot(n, q->d)) * nearer > 0x1p10 * q->reach * norm1(n);
+}
+
+static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
 {
 	const struct query *q = (const struct query *)(const void *)args->context;
 	/* Single rays only (N = 1): the accessors of packets exist in C++ alone. */
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
 	if ((hit->geomID == q->from.shape && hit->primID == q->from.prim) ||
 	    (hit->geomID == q->to.shape && hit->primID == q->to.prim))
+		args->valid[0] = 0;
+	else if (!clearly_crosses(q, hit, (const struct RTCRay *)(const void *)args->ray) &&
+		 !crosses(q, args->geometryUserPtr, hit->primID))
 		args->valid[0] = 0;
 }
 
@@ -77,7 +125,7 @@ static bool sphere_root(const struct sphere_prim *s, const struct query *q, doub
 		return false;
 	if (starts || ends) {
 		*t = starts ? -2 * b / a : c / a;
-		return *t > q->t_min && *t < (ends ? 1.0 : t_max);
+		return *t > q->t_min && *t < t_max;
 	}
 	vec3 nearest = vec3_madd(oc, -b / a, q->d);
 	double disc = s->radius * s->radius - vec3_dot(nearest, nearest);
@@ -98,9 +146,9 @@ static void sphere_intersect(const struct RTCIntersectFunctionNArguments *args)
 	const struct sphere_prim *s = args->geometryUserPtr;
 	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit;
 	double t;
-	if (!sphere_root(s, q, (double)rh->ray.tfar, &t))
+	if (!sphere_root(s, q, (double)rh->ray.tfar - q->back, &t))
 		return;
-	rh->ray.tfar = (float)t;
+	rh->ray.tfar = (float)(t + q->back);
 	rh->hit.geomID = s->shape;
 	rh->hit.primID = 0;
 	rh->hit.u = rh->hit.v = 0;
@@ -113,7 +161,7 @@ static void sphere_occluded(const struct RTCOccludedFunctionNArguments *args)
 	const struct query *q = (const struct query *)(const void *)args->context;
 	struct RTCRay *ray = (struct RTCRay *)(void *)args->ray;
 	double t;
-	if (sphere_root(args->geometryUserPtr, q, (double)ray->tfar, &t))
+	if (sphere_root(args->geometryUserPtr, q, q->segment ? 1 : INFINITY, &t))
 		ray->tfar = -INFINITY;
 }
 
@@ -125,7 +173,7 @@ static void attach(struct accel *a, RTCGeometry g, uint32_t id)
 	rtcReleaseGeometry(g);
 }
 
-static int attach_triangles(struct accel *a, const struct accel_shape *s, uint32_t id)
+static int attach_triangles(struct accel *a, struct accel_shape *s, uint32_t id)
 {
 	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_TRIANGLE);
 	if (!g)
@@ -134,8 +182,9 @@ static int attach_triangles(struct accel *a, const struct accel_shape *s, uint32
 				   s->vertex_count);
 	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, s->index, 0, sizeof s->index[0],
 				   s->triangle_count);
-	rtcSetGeometryIntersectFilterFunction(g, filter_self);
-	rtcSetGeometryOccludedFilterFunction(g, filter_self);
+	rtcSetGeometryUserData(g, s);
+	rtcSetGeometryIntersectFilterFunction(g, filter_triangle);
+	rtcSetGeometryOccludedFilterFunction(g, filter_triangle);
 	attach(a, g, id);
 	return 0;
 }
@@ -182,6 +231,14 @@ static int embree_failure(RTCDevice device, struct error *e)
 	return error_set(e, code == RTC_ERROR_OUT_OF_MEMORY ? ENOMEM : EIO, "Embree reports error %d while building", (int)code);
 }
 
+/* How far a point in float, and what Embree's robust test makes of it with vertices anywhere in the scene, can be off: half
+ * a unit in the last place of each coordinate for the point, as much again for the differences, times four. */
+static double rounding_reach(vec3 low, vec3 high)
+{
+	vec3 m = {fmax(fabs(low.x), fabs(high.x)), fmax(fabs(low.y), fabs(high.y)), fmax(fabs(low.z), fabs(high.z))};
+	return 0x1p-21 * fmax(m.x, fmax(m.y, m.z));
+}
+
 static int build(struct accel *a, const struct accel_shape *shapes, uint32_t count, struct error *e)
 {
 	a->device = rtcNewDevice(has_avx2() ? "threads=1,isa=avx2" : "threads=1");
@@ -194,7 +251,8 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 	rtcSetSceneFlags(a->scene, RTC_SCENE_FLAG_ROBUST);
 	rtcSetSceneBuildQuality(a->scene, RTC_BUILD_QUALITY_MEDIUM);
 	for (uint32_t i = 0; i < count; i++) {
-		int rc = shapes[i].is_sphere ? attach_sphere(a, &shapes[i], i) : attach_triangles(a, &shapes[i], i);
+		a->shapes[i] = shapes[i];
+		int rc = shapes[i].is_sphere ? attach_sphere(a, &shapes[i], i) : attach_triangles(a, &a->shapes[i], i);
 		if (rc)
 			return error_set(e, -rc, "Embree's geometry cannot be created");
 	}
@@ -206,6 +264,7 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 	rtcGetSceneBounds(a->scene, &b);
 	a->low = (vec3){(double)b.lower_x, (double)b.lower_y, (double)b.lower_z};
 	a->high = (vec3){(double)b.upper_x, (double)b.upper_y, (double)b.upper_z};
+	a->reach = rounding_reach(a->low, a->high);
 	return 0;
 }
 
@@ -216,8 +275,9 @@ int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t cou
 	if (!a)
 		return error_set(e, ENOMEM, "out of memory");
 	a->spheres = mem_alloc(count, sizeof *a->spheres);
+	a->shapes = mem_alloc(count, sizeof *a->shapes);
 	unsigned trap = fptrap_mask();
-	int rc = a->spheres ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
+	int rc = a->spheres && a->shapes ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
 	fptrap_restore(trap);
 	if (rc)
 		accel_free(a);
@@ -237,24 +297,13 @@ void accel_free(struct accel *a)
 		rtcReleaseDevice(a->device);
 	fptrap_restore(trap);
 	mem_free(a->spheres);
+	mem_free(a->shapes);
 	mem_free(a);
 }
 
 size_t accel_bytes(const struct accel *a)
 {
 	return atomic_load(&a->bytes);
-}
-
-/* How far float rounding of a point at p, and of the edges that Embree's robust test forms with it, can carry it: half a
- * unit in the last place of each coordinate for the point, as much again for the differences, times four. */
-static double rounding_reach(vec3 p)
-{
-	return 0x1p-21 * fmax(fabs(p.x), fmax(fabs(p.y), fabs(p.z)));
-}
-
-static vec3 lifted(vec3 p, vec3 ng, vec3 d)
-{
-	return vec3_madd(p, copysign(rounding_reach(p), vec3_dot(ng, d)), ng);
 }
 
 /* Rays from far outside enter the scene's box in double: Embree's floats never see the distance. In units of |d|. */
@@ -271,16 +320,26 @@ static double entry_distance(const struct accel *a, vec3 o, vec3 d)
 	return enter;
 }
 
-static void fill_ray(struct RTCRay *ray, vec3 o, vec3 d, double t_min, double t_max)
+/* To the side that d leaves for. */
+static vec3 lifted(const struct accel *a, vec3 p, vec3 ng, vec3 d)
 {
+	return vec3_madd(p, copysign(a->reach, vec3_dot(ng, d)), ng);
+}
+
+/* Embree's ray runs beside the true one and begins before it, by as much as floats may be off: beside, so that a low ray does
+ * not slip out along the edge of the triangle that it leaves and that is filtered; before, and beyond the end, so that
+ * nothing near them is lost. What it does not meet in double between the ends is turned down by the callbacks. */
+static void fill_ray(struct RTCRay *ray, const struct query *q, vec3 o, vec3 d, double t_max)
+{
+	o = vec3_madd(o, -q->back, d);
 	*ray = (struct RTCRay){.org_x = (float)o.x,
 			       .org_y = (float)o.y,
 			       .org_z = (float)o.z,
-			       .tnear = (float)t_min,
+			       .tnear = q->t_min > 0 ? (float)(q->t_min + q->back) : 0,
 			       .dir_x = (float)d.x,
 			       .dir_y = (float)d.y,
 			       .dir_z = (float)d.z,
-			       .tfar = (float)fmin(t_max, (double)FLT_MAX),
+			       .tfar = (float)fmin(t_max + 2 * q->back, (double)FLT_MAX),
 			       .mask = 0xFFFFFFFFu};
 }
 
@@ -289,10 +348,10 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	double enter = entry_distance(a, from->p, d);
 	if (enter >= t_max)
 		return false;
-	struct query q = {.o = vec3_madd(from->p, enter, d), .d = d, .t_min = fmax(t_min - enter, 0), .from = from->prim,
-			  .to = PRIM_NONE};
+	struct query q = {.o = vec3_madd(from->p, enter, d), .d = d, .t_min = fmax(t_min - enter, 0), .reach = a->reach,
+			  .back = a->reach, .from = from->prim, .to = PRIM_NONE};
 	struct RTCRayHit rh;
-	fill_ray(&rh.ray, lifted(q.o, from->ng, d), d, q.t_min, t_max - enter);
+	fill_ray(&rh.ray, &q, lifted(a, q.o, from->ng, d), d, t_max - enter);
 	rh.hit.geomID = rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
 	unsigned trap = fptrap_mask();
 	EMBREE_INIT_CONTEXT(&q.context);
@@ -300,14 +359,15 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	fptrap_restore(trap);
 	if (rh.hit.geomID == RTC_INVALID_GEOMETRY_ID)
 		return false;
-	*hit = (struct ray_hit){{rh.hit.geomID, rh.hit.primID}, enter + (double)rh.ray.tfar, (double)rh.hit.u, (double)rh.hit.v};
+	double t = enter + fmax((double)rh.ray.tfar - q.back, 0);
+	*hit = (struct ray_hit){{rh.hit.geomID, rh.hit.primID}, t, (double)rh.hit.u, (double)rh.hit.v};
 	return true;
 }
 
 static bool occluded(const struct accel *a, struct query *q, vec3 o, vec3 d, double t_max)
 {
 	struct RTCRay ray;
-	fill_ray(&ray, o, d, 0, t_max);
+	fill_ray(&ray, q, o, d, t_max);
 	unsigned trap = fptrap_mask();
 	EMBREE_INIT_CONTEXT(&q->context);
 	embree_occluded(a->scene, &q->context, &ray);
@@ -321,14 +381,18 @@ bool accel_occluded(const struct accel *a, const struct ray_end *from, const str
 	double enter = entry_distance(a, from->p, d);
 	if (enter >= 1)
 		return false;
-	vec3 start = vec3_madd(from->p, enter, d);
-	struct query q = {.o = start, .d = vec3_scale(1 - enter, d), .from = from->prim, .to = to->prim};
-	vec3 o = lifted(start, from->ng, d), end = lifted(to->p, to->ng, vec3_neg(d));
-	return occluded(a, &q, o, vec3_sub(end, o), 1 - 0x1p-20);
+	struct query q = {.o = vec3_madd(from->p, enter, d), .d = vec3_scale(1 - enter, d), .end = to->p, .segment = true,
+			  .reach = a->reach, .from = from->prim, .to = to->prim};
+	double length = vec3_length(q.d);
+	if (!(length > 0))
+		return false;
+	q.back = a->reach / length;
+	vec3 o = lifted(a, q.o, from->ng, d), end = lifted(a, to->p, to->ng, vec3_neg(d));
+	return occluded(a, &q, o, vec3_sub(end, o), 1);
 }
 
 bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d)
 {
-	struct query q = {.o = from->p, .d = d, .from = from->prim, .to = PRIM_NONE};
-	return occluded(a, &q, lifted(from->p, from->ng, d), d, (double)FLT_MAX);
+	struct query q = {.o = from->p, .d = d, .reach = a->reach, .back = a->reach, .from = from->prim, .to = PRIM_NONE};
+	return occluded(a, &q, lifted(a, from->p, from->ng, d), d, INFINITY);
 }

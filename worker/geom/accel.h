@@ -4,8 +4,9 @@
  *
  * Self-intersection: a ray names the primitive it starts on (and, for a segment, the one it ends on). A plane triangle
  * cannot be met again from itself, so it is filtered; on a sphere the root that is the start (or the end) is divided out
- * of the quadratic. Against neighbours the origin that Embree gets in float is moved off the surface by what rounding can
- * do at its place, never by an absolute length.
+ * of the quadratic. Every other triangle that Embree proposes is asked in double whether its plane is crossed between the
+ * ends: a coplanar neighbour is not, however low the ray. So the ray that Embree gets in float may run off the true one by
+ * what rounding can do in a scene of that extent, never by an absolute length.
  *
  * Embree runs in robust mode with one build thread. It raises INVALID on ordinary rays: traps are masked inside.
  * Immutable after creation: any thread. Lengths: the rescaled world, whose radius is about 1.

@@ -5,7 +5,27 @@ static vec3 at(const float (*a)[3], uint32_t i)
 	return (vec3){(double)a[i][0], (double)a[i][1], (double)a[i][2]};
 }
 
-/* Barycentrics of the ray's crossing with the triangle's plane, clamped to the triangle: Embree said that it was met.
+/* Moves a point of the triangle's plane that lies outside to the nearest one inside. Barycentrics clamped one by one would
+ * travel along a sliver by as many of its widths as they are off. */
+static void move_inside(vec3 e1, vec3 e2, double *b1, double *b2)
+{
+	const double start[3][2] = {{0, 0}, {0, 0}, {1, 0}}, step[3][2] = {{1, 0}, {0, 1}, {-1, 1}};
+	vec3 q = vec3_madd(vec3_scale(*b1, e1), *b2, e2);
+	double best = INFINITY;
+	for (int i = 0; i < 3; i++) {
+		vec3 a = vec3_scale(start[i][0], e1), g = vec3_madd(vec3_scale(step[i][0], e1), step[i][1], e2);
+		vec3 aq = vec3_sub(q, a);
+		double s = fmin(fmax(vec3_dot(aq, g) / vec3_dot(g, g), 0), 1);
+		vec3 miss = vec3_madd(aq, -s, g);
+		if (vec3_dot(miss, miss) >= best)
+			continue;
+		best = vec3_dot(miss, miss);
+		*b1 = start[i][0] + s * step[i][0];
+		*b2 = start[i][1] + s * step[i][1];
+	}
+}
+
+/* Barycentrics of the ray's crossing with the triangle's plane, kept inside the triangle: Embree said that it was met.
  * false: the ray lies in the plane. */
 static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1, double *b2)
 {
@@ -16,9 +36,10 @@ static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1
 	double u = vec3_dot(s, h) / det, v = vec3_dot(d, q) / det;
 	if (!isfinite(u) || !isfinite(v))
 		return false;
-	u = fmin(fmax(u, 0), 1);
 	*b1 = u;
-	*b2 = fmin(fmax(v, 0), 1 - u);
+	*b2 = v;
+	if (u < 0 || v < 0 || u + v > 1)
+		move_inside(e1, e2, b1, b2);
 	return true;
 }
 
