@@ -1,0 +1,46 @@
+#include "tests/support/dice.h"
+
+#include "tests/support/stats.h"
+#include "worker/math/rng.h"
+
+#include <stdlib.h>
+
+struct dice dice_of(const char *test)
+{
+	return (struct dice){.seed = stats_seed(test)};
+}
+
+double dice_throw(struct dice *d)
+{
+	if (d->left == 0) {
+		rng_uniform4(d->seed, RNG_TEST, d->index++, 0, 0, d->value);
+		d->left = 4;
+	}
+	return d->value[--d->left];
+}
+
+double dice_between(struct dice *d, double low, double high)
+{
+	return low + (high - low) * dice_throw(d);
+}
+
+uint32_t dice_below(struct dice *d, uint32_t n)
+{
+	return (uint32_t)(dice_throw(d) * n);
+}
+
+vec3 dice_direction(struct dice *d)
+{
+	double z = dice_between(d, -1, 1), phi = dice_between(d, 0, 2 * M_PI), r = sqrt(1 - z * z);
+	return (vec3){r * cos(phi), r * sin(phi), z};
+}
+
+size_t dice_count(size_t samples)
+{
+	const char *scale = getenv("HSLT_TEST_SCALE"), *full = getenv("FULL");
+	if (full && full[0] == '1')
+		samples *= 8;
+	if (scale && atoi(scale) > 1)
+		samples /= (size_t)atoi(scale);
+	return samples ? samples : 1;
+}

@@ -1,0 +1,142 @@
+/* The pinhole against what a pinhole is. Exact but for rounding. */
+#include "tests/support/dice.h"
+#include "worker/camera/camera.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static struct camera camera_of(uint32_t width, uint32_t height, double fov, const char *axis, vec3 origin, vec3 target)
+{
+	struct scene_settings s = {.width = width, .height = height, .fov = fov, .near_clip = 1e-3, .far_clip = 1e4};
+	strcpy(s.fov_axis, axis);
+	s.to_world = mat4_look_at(origin, target, (vec3){0, 1, 0});
+	struct camera c;
+	struct error e = {""};
+	if (camera_init(&c, &s, (vec3){0, 0, 0}, 1, &e))
+		fail_msg("%s", e.text);
+	return c;
+}
+
+static void test_project_direction(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("project direction");
+	const double fovs[] = {1e-3, 20, 90, 150, 179};
+	for (int i = 0; i < 20000; i++) {
+		vec3 o = vec3_scale(3, dice_direction(&d)), t = dice_direction(&d);
+		struct camera c = camera_of(320, 200, fovs[i % 5], "x", o, t);
+		double x = dice_between(&d, -20, 340), y = dice_between(&d, -20, 220), px, py;
+		vec3 w = camera_direction(&c, x, y);
+		assert_true(fabs(vec3_length(w) - 1) < 1e-15);
+		assert_true(camera_project(&c, w, 1, &px, &py));
+		/* A rounding of the direction is worth `scale` / cos^2 pixels. */
+		double slack = 8e-16 * (c.scale / pow(vec3_dot(c.axes.n, w), 2) + 400);
+		assert_true(fabs(px - x) < slack && fabs(py - y) < slack);
+		assert_false(camera_project(&c, vec3_neg(w), 1, &px, &py));
+	}
+}
+
+/* Solid angle of a small square of the film, by its two tangents. */
+static void test_jacobian(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("camera jacobian");
+	for (int i = 0; i < 5000; i++) {
+		struct camera c = camera_of(64, 48, dice_between(&d, 5, 150), "smaller", vec3_scale(3, dice_direction(&d)), (vec3){0, 0, 0});
+		double x = dice_between(&d, 0, 64), y = dice_between(&d, 0, 48), h = 1e-4;
+		vec3 dx = vec3_sub(camera_direction(&c, x + h, y), camera_direction(&c, x - h, y));
+		vec3 dy = vec3_sub(camera_direction(&c, x, y + h), camera_direction(&c, x, y - h));
+		double solid_from_film = vec3_length(vec3_cross(dx, dy)) / (4 * h * h);
+		/* Central differences of step h: h^2 and eps / h. */
+		assert_true(fabs(camera_jac_film_from_solid(&c, camera_direction(&c, x, y)) * solid_from_film - 1) < 1e-6);
+	}
+}
+
+/* The angle between the outermost film points of the side that fov_axis names. */
+static void test_fov_axes(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *axis;
+		uint32_t width, height;
+		double x0, y0, x1, y1;
+	} cases[] = {
+		{"x", 300, 100, 0, 50, 300, 50},       {"y", 300, 100, 150, 0, 150, 100},       {"diagonal", 300, 100, 0, 0, 300, 100},
+		{"smaller", 300, 100, 150, 0, 150, 100}, {"smaller", 100, 300, 0, 150, 100, 150}, {"larger", 300, 100, 0, 50, 300, 50},
+		{"larger", 100, 300, 50, 0, 50, 300},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
+		for (double fov = 10; fov < 180; fov += 30) {
+			struct camera c = camera_of(cases[i].width, cases[i].height, fov, cases[i].axis, (vec3){1, 2, 3}, (vec3){0, 0, 0});
+			vec3 a = camera_direction(&c, cases[i].x0, cases[i].y0), b = camera_direction(&c, cases[i].x1, cases[i].y1);
+			assert_true(fabs(acos(vec3_dot(a, b)) * 180 / M_PI - fov) < 1e-6);
+		}
+}
+
+/* Mitsuba's camera looks along +z with +x to the LEFT of the picture; pictures count rows from the top. */
+static void test_orientation(void **state)
+{
+	(void)state;
+	struct scene_settings s = {.width = 100, .height = 100, .fov = 90, .near_clip = 0.01, .far_clip = 100, .fov_axis = "x",
+				   .to_world = mat4_identity()};
+	struct camera c;
+	assert_int_equal(camera_init(&c, &s, (vec3){0, 0, 0}, 1, NULL), 0);
+	double x, y;
+	assert_true(camera_project(&c, vec3_normalize((vec3){0.5, 0, 1}), 1, &x, &y));
+	assert_true(fabs(x - 25) < 1e-12 && fabs(y - 50) < 1e-12);
+	assert_true(camera_project(&c, vec3_normalize((vec3){0, 0.5, 1}), 1, &x, &y));
+	assert_true(fabs(x - 50) < 1e-12 && fabs(y - 25) < 1e-12);
+	/* From +z towards the origin, y up: world +x is on the right. */
+	c = camera_of(100, 100, 90, "x", (vec3){0, 0, 5}, (vec3){0, 0, 0});
+	assert_true(camera_project(&c, vec3_normalize((vec3){1, 1, -5}), sqrt(27), &x, &y));
+	assert_true(fabs(x - 60) < 1e-12 && fabs(y - 40) < 1e-12);
+	/* A mirrored transform mirrors the picture. */
+	s.to_world = mat4_scale((vec3){-1, 1, 1});
+	assert_int_equal(camera_init(&c, &s, (vec3){0, 0, 0}, 1, NULL), 0);
+	assert_true(camera_project(&c, vec3_normalize((vec3){0.5, 0, 1}), 1, &x, &y));
+	assert_true(fabs(x - 75) < 1e-12);
+}
+
+/* Near and far are planes across the axis, in the scene's units whatever the world's scale. */
+static void test_clip(void **state)
+{
+	(void)state;
+	struct scene_settings s = {.width = 100, .height = 100, .fov = 90, .near_clip = 2, .far_clip = 8, .fov_axis = "x",
+				   .to_world = mat4_identity()};
+	struct camera c;
+	assert_int_equal(camera_init(&c, &s, (vec3){1, 1, 1}, 0.25, NULL), 0);
+	assert_true(c.position.x == -0.25 && c.position.y == -0.25 && c.position.z == -0.25);
+	vec3 w = camera_direction(&c, 0, 100);
+	double t0, t1, x, y;
+	camera_clip(&c, w, &t0, &t1);
+	assert_true(fabs(t0 * vec3_dot(w, c.axes.n) - 0.5) < 1e-15 && fabs(t1 * vec3_dot(w, c.axes.n) - 2) < 1e-15);
+	assert_true(camera_project(&c, w, t0 * (1 + 1e-12), &x, &y) && camera_project(&c, w, t1 * (1 - 1e-12), &x, &y));
+	assert_false(camera_project(&c, w, t0 * (1 - 1e-12), &x, &y) || camera_project(&c, w, t1 * (1 + 1e-12), &x, &y));
+}
+
+static void test_refused(void **state)
+{
+	(void)state;
+	struct scene_settings s = {.width = 8, .height = 8, .fov = 40, .fov_axis = "x", .to_world = mat4_scale((vec3){1, 0, 1})};
+	struct camera c;
+	struct error e;
+	assert_int_equal(camera_init(&c, &s, (vec3){0, 0, 0}, 1, &e), -EINVAL);
+	s.to_world = mat4_identity();
+	const double bad[] = {0, -1, 180, NAN, INFINITY};
+	for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+		s.fov = bad[i];
+		assert_int_equal(camera_init(&c, &s, (vec3){0, 0, 0}, 1, &e), -EINVAL);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_project_direction), cmocka_unit_test(test_jacobian), cmocka_unit_test(test_fov_axes),
+		cmocka_unit_test(test_orientation),	  cmocka_unit_test(test_clip),	   cmocka_unit_test(test_refused),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
