@@ -2,7 +2,7 @@
 # make test       unit and end-to-end tests (SAN=address,undefined for sanitizers, FULL=1 for the long forms)
 # make demo bench install clean
 
-CC       ?= cc
+CC       ?= gcc
 ifeq ($(origin CC),default)
 CC       := gcc
 endif

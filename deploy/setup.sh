@@ -1,0 +1,58 @@
+#!/bin/sh
+# Installs what building and testing need, through the system's package manager (Debian 12 or 13, and what is like them).
+# Says what it installs; does nothing where all is there.
+#
+#   sh deploy/setup.sh            what `make` and `make test` need
+#   sh deploy/setup.sh --full     also what the longer kinds of tests need (clang for fuzzers, valgrind for profiles)
+set -eu
+
+build="make gcc libc6-dev pkg-config libembree-dev libopenexr-dev libuv1-dev libprotobuf-c-dev protobuf-c-compiler
+libssl-dev libexpat1-dev zlib1g-dev libpng-dev libjpeg62-turbo-dev libjansson-dev librandom123-dev libcmocka-dev"
+full="clang libclang-rt-dev valgrind socat"
+
+case "${1:-}" in
+"") wanted=$build ;;
+--full) wanted="$build $full" ;;
+-h | --help)
+	sed -n '2,6s/^# \{0,1\}//p' "$0"
+	exit 0
+	;;
+*)
+	echo "setup.sh: unknown option '$1' (try --help)" >&2
+	exit 2
+	;;
+esac
+
+if ! command -v dpkg-query >/dev/null 2>&1 || ! command -v apt-get >/dev/null 2>&1; then
+	echo "setup.sh: this system has no apt; install the equivalents of:" $wanted >&2
+	exit 1
+fi
+
+missing=""
+for p in $wanted; do
+	[ "$(dpkg-query -W -f '${db:Status-Status}' "$p" 2>/dev/null)" = installed ] || missing="$missing $p"
+done
+[ -n "$missing" ] || exit 0
+
+root=""
+if [ "$(id -u)" != 0 ]; then
+	if ! command -v sudo >/dev/null 2>&1; then
+		echo "setup.sh: run as root, or install sudo; missing:$missing" >&2
+		exit 1
+	fi
+	root=sudo
+fi
+echo "setup.sh: installing$missing"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+install() {
+	$root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends $missing >"$log" 2>&1
+}
+# Lists of packages may be missing or old: fetch them once, and only when they are needed.
+if ! install; then
+	if ! $root apt-get update >"$log" 2>&1 || ! install; then
+		tail -n 20 "$log" >&2
+		echo "setup.sh: the packages could not be installed" >&2
+		exit 1
+	fi
+fi

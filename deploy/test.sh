@@ -1,0 +1,97 @@
+#!/bin/sh
+# Installs what is missing, builds, and runs the tests: one of the two commands of the README.
+#
+#   sh deploy/test.sh          all that the build packages allow; says what it skipped
+#   sh deploy/test.sh --full   also what needs big packages: a build with clang, fuzzers, longer statistical runs
+#   sh deploy/test.sh --ci     all kinds at short lengths
+#
+# HSLT_SCENES names a folder of public scenes; without it the tests that need them are skipped. The run ends with one line
+# `N passed, N failed, N skipped` and exit code 0 when nothing failed.
+set -eu
+cd "$(dirname "$0")/.."
+mode=plain
+case "${1:-}" in
+"") ;;
+--full) mode=full ;;
+--ci) mode=ci ;;
+-h | --help)
+	sed -n '2,9s/^# \{0,1\}//p' "$0"
+	exit 0
+	;;
+*)
+	echo "test.sh: unknown option '$1' (try --help)" >&2
+	exit 2
+	;;
+esac
+
+jobs=$(nproc 2>/dev/null || echo 2)
+results=$(mktemp)
+trap 'rm -f "$results"' EXIT
+passed=0 failed=0 skipped=0
+
+# Runs one kind, shows its output, and takes its closing line into the sum instead of printing it.
+kind() {
+	title=$1
+	shift
+	echo "== $title"
+	code=0
+	{ "$@" 2>&1 || echo "exit $?" >"$results.code"; } | tee "$results" | grep -v '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$' || true
+	[ ! -f "$results.code" ] || { code=1 && rm -f "$results.code"; }
+	line=$(grep '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$' "$results" | tail -n 1)
+	set -- $(echo "$line" | tr -dc '0-9 ')
+	passed=$((passed + ${1:-0})) skipped=$((skipped + ${3:-0}))
+	bad=${2:-0}
+	# A kind that failed without counting a failure (it did not build, it crashed) is one failure.
+	[ $code -eq 0 ] || [ "$bad" -gt 0 ] || bad=1
+	failed=$((failed + bad))
+	[ $code -eq 0 ] || echo "== FAILED: $title"
+}
+
+# A step that passes or fails as a whole.
+step() {
+	title=$1
+	shift
+	echo "== $title"
+	if "$@" >"$results" 2>&1; then
+		passed=$((passed + 1))
+	else
+		failed=$((failed + 1))
+		cat "$results"
+		echo "== FAILED: $title"
+	fi
+}
+
+skip() {
+	skipped=$((skipped + 1))
+	echo "== skipped: $1"
+}
+
+if [ $mode = plain ]; then
+	sh deploy/setup.sh
+else
+	sh deploy/setup.sh --full
+fi
+
+step "build" make -s -j"$jobs" programs tests
+kind "tests" make -s test
+[ -n "${HSLT_SCENES:-}" ] || echo "   (public scenes were not tested: HSLT_SCENES is not set)"
+
+if [ $mode = plain ]; then
+	skip "sanitizers: make test SAN=address,undefined, or --full"
+	skip "clang, fuzzers: --full"
+else
+	HSLT_TEST_SCALE=20 HSLT_TEST_KINDS=unit
+	export HSLT_TEST_SCALE HSLT_TEST_KINDS
+	step "build with address and undefined sanitizers" make -s -j"$jobs" SAN=address,undefined programs tests
+	kind "tests with sanitizers, 1/20 of the samples" make -s SAN=address,undefined test
+	unset HSLT_TEST_SCALE HSLT_TEST_KINDS
+	step "build with clang" make -s -j"$jobs" CC=clang BUILD=build/clang programs tests
+	if [ $mode = full ]; then
+		kind "long forms" make -s FULL=1 test
+		step "fuzzers, 10 minutes each" make -s fuzz FUZZ_SECONDS=600
+	else
+		step "fuzzers, 10 s each" make -s fuzz FUZZ_SECONDS=10
+	fi
+fi
+echo "$passed passed, $failed failed, $skipped skipped"
+[ $failed -eq 0 ]

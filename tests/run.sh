@@ -1,0 +1,83 @@
+#!/bin/sh
+# Runs all tests of a build folder and sums them up: tests/run.sh BUILD [PATTERN]
+#
+# Test programs are BUILD/tests/**/test_* (cmocka: each of their tests is counted); scripts are tests/lint/*.sh and
+# tests/e2e/*.sh (one test each; exit 77: skipped). The output of what fails is shown. The last line is
+# `N passed, N failed, N skipped`; the exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
+# HSLT_TEST_KINDS: "unit script" (default both); HSLT_TEST_TIMEOUT: seconds a program may take (default 900).
+set -u
+build=${1:?usage: tests/run.sh BUILD [PATTERN]}
+pattern=${2:-}
+kinds=${HSLT_TEST_KINDS:-unit script}
+limit=${HSLT_TEST_TIMEOUT:-900}
+cd "$(dirname "$0")/.." || exit 1
+case $build in /*) ;; *) build=$PWD/$build ;; esac
+export BUILD="$build"
+log=$(mktemp)
+trap 'rm -f "$log"' EXIT
+passed=0 failed=0 skipped=0
+
+count() { # of cmocka's closing lines: "[  PASSED  ] 3 test(s)."
+	sed -n "s/^\[ *$1 *\] \([0-9][0-9]*\) test(s).*/\1/p" "$log" | tail -n 1
+}
+
+run_program() {
+	name=${1#"$build"/tests/}
+	begin=$(date +%s)
+	timeout -k 10 "$limit" "$1" >"$log" 2>&1
+	code=$?
+	ok=$(count PASSED) bad=$(count FAILED) out=$(count SKIPPED)
+	passed=$((passed + ${ok:-0})) failed=$((failed + ${bad:-0})) skipped=$((skipped + ${out:-0}))
+	# A crash, a time-out or a leak report after the closing lines: one failure more than cmocka counted.
+	if [ $code -ne 0 ] && [ "${bad:-0}" = 0 ]; then
+		failed=$((failed + 1))
+	fi
+	if [ $code -ne 0 ]; then
+		echo "FAILED $name (exit $code)"
+		cat "$log"
+	else
+		echo "ok $name: ${ok:-0} passed, $(($(date +%s) - begin)) s"
+		# What tests print about themselves (figures, reasons for skipping) is part of the result.
+		grep -v '^\[' "$log" | grep -v '^$' | sed 's/^/   /'
+	fi
+}
+
+run_script() {
+	name=${1#tests/}
+	begin=$(date +%s)
+	timeout -k 10 "$limit" sh "$1" >"$log" 2>&1
+	code=$?
+	case $code in
+	0)
+		passed=$((passed + 1))
+		echo "ok $name, $(($(date +%s) - begin)) s"
+		;;
+	77)
+		skipped=$((skipped + 1))
+		echo "skipped $name: $(tail -n 1 "$log")"
+		;;
+	*)
+		failed=$((failed + 1))
+		echo "FAILED $name (exit $code)"
+		cat "$log"
+		;;
+	esac
+}
+
+for kind in $kinds; do
+	case $kind in
+	unit)
+		for t in $(find "$build/tests" -type f -name 'test_*' -perm -u+x 2>/dev/null | sort); do
+			case $t in *"$pattern"*) run_program "$t" ;; esac
+		done
+		;;
+	script)
+		for t in tests/lint/*.sh tests/e2e/test_*.sh; do
+			[ -f "$t" ] || continue
+			case $t in *"$pattern"*) run_script "$t" ;; esac
+		done
+		;;
+	esac
+done
+echo "$passed passed, $failed failed, $skipped skipped"
+[ $failed -eq 0 ] && [ $passed -gt 0 ]
