@@ -19,7 +19,8 @@ enum { BACKLOG = 128, TICK_MS = 200 };
 
 void server_config_init(struct server_config *c)
 {
-	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .max_connections = 1024};
+	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .max_connections = 1024,
+				    .hello_seconds = 10, .stall_seconds = 30};
 }
 
 double server_now(const struct server *s)

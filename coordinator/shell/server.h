@@ -19,6 +19,7 @@ struct server_config {
 	bool insecure;
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
 	unsigned max_connections;
+	double hello_seconds, stall_seconds; /* how long a peer may take to say hello, to finish a frame */
 };
 void server_config_init(struct server_config *c);
 

@@ -13,7 +13,6 @@ enum {
 	HEADER_LIMIT = 1 << 20,
 	SEND_LIMIT = 1 << 29, /* leases on their way to one worker */
 };
-static const double hello_seconds = 10, stall_seconds = 30;
 
 void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size)
 {
@@ -293,7 +292,7 @@ static const struct conn_events refused_events = {NULL, NULL, NULL, on_refused};
 
 void session_accept(struct server *s)
 {
-	struct conn_config config = {{HELLO_HEADER, 0}, SEND_LIMIT, stall_seconds, hello_seconds};
+	struct conn_config config = {{HELLO_HEADER, 0}, SEND_LIMIT, s->config.stall_seconds, s->config.hello_seconds};
 	struct error e;
 	struct session *p = s->session_count < s->config.max_connections ? mem_alloc(1, sizeof *p) : NULL;
 	struct conn *c;

@@ -1,0 +1,239 @@
+/* Batches, grants and plans come out of the wire as they went in; what does not fit its plan or its payload is refused. */
+#include "common/wire/batch_wire.h"
+#include "common/base/mem.h"
+#include "common/wire/frame.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <string.h>
+
+static struct plan chain_plan(void)
+{
+	struct plan_request r = {.integrator = "pssmlt",
+				 .kind = PLAN_CHAINS,
+				 .width = 200,
+				 .height = 100,
+				 .crop_x = 10,
+				 .crop_y = 20,
+				 .crop_width = 100,
+				 .crop_height = 70,
+				 .mutations = 100000,
+				 .max_depth = 10,
+				 .chains = 64,
+				 .groups = 8,
+				 .bootstrap = 1024,
+				 .epoch = 100};
+	struct plan p;
+	struct error e;
+	assert_int_equal(plan_make(&r, &p, &e), 0);
+	return p;
+}
+
+static void fill_tile(struct tile *t, uint32_t x, uint32_t y, uint32_t width, uint32_t height)
+{
+	*t = (struct tile){x, y, width, height, mem_alloc((size_t)width * height * 3, sizeof(float))};
+	for (uint32_t i = 0; i < width * height * 3; i++)
+		t->xyz[i] = (float)(i * 0.37 + x - 5);
+}
+
+/* The second and the last tile of the crop, states of several sizes, one of them dead. */
+static struct batch chain_batch(const struct plan *p)
+{
+	struct batch b = {.key = {7, LEASE_RENDER, 3, 0, 2}, .independent_sum = 1.0 / 3, .independent_square = 1e-300,
+			  .beyond_sum = 0, .cpu_seconds = 0.25};
+	uint32_t chains = p->chains / (p->groups * p->parts);
+	b.counters[COUNT_SAMPLES] = chains * p->epoch;
+	b.counters[COUNT_INDEPENDENT] = 3;
+	b.counters[COUNT_LONGEST_STUCK] = 77;
+	b.tile_count = 2;
+	b.tiles = mem_alloc(2, sizeof *b.tiles);
+	fill_tile(&b.tiles[0], 10 + 64, 20, 36, 64);
+	fill_tile(&b.tiles[1], 10 + 64, 20 + 64, 36, 6);
+	b.state_count = chains;
+	b.states = mem_alloc(chains, sizeof *b.states);
+	for (uint32_t i = 0; i < chains; i++) {
+		b.states[i].size = 10 + i;
+		b.states[i].bytes = mem_alloc(10 + i, 1);
+		memset(b.states[i].bytes, (int)i + 1, 10 + i);
+	}
+	return b;
+}
+
+/* Packs, takes the frame apart as a connection does. */
+static void travel(const struct batch *b, const struct plan *p, struct envelope *env, struct frame_reader *r)
+{
+	unsigned char *frame;
+	size_t size, used;
+	struct error e;
+	assert_int_equal(batch_pack(b, p, &frame, &size, &e), 0);
+	frame_reader_init(r, (struct frame_limits){1 << 20, batch_payload_max(p)});
+	assert_int_equal(frame_reader_take(r, frame, size, &used, &e), 1);
+	assert_int_equal(used, size);
+	assert_int_equal(envelope_unpack(env, r->header.bytes, r->header.size, &e), 0);
+	assert_int_equal(env->message->body_case, FARM__ENVELOPE__BODY_LEASE_RESULT);
+	mem_free(frame);
+}
+
+static void a_batch_travels(void **state)
+{
+	(void)state;
+	struct plan p = chain_plan();
+	struct batch b = chain_batch(&p), back;
+	struct envelope env;
+	struct frame_reader r;
+	struct error e = {""};
+	travel(&b, &p, &env, &r);
+	int rc = batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e);
+	if (rc)
+		print_message("%s\n", e.text);
+	assert_int_equal(rc, 0);
+	assert_memory_equal(&back.key, &b.key, sizeof b.key);
+	assert_memory_equal(back.counters, b.counters, sizeof b.counters);
+	assert_true(back.independent_sum == b.independent_sum && back.independent_square == b.independent_square);
+	assert_int_equal(back.tile_count, 2);
+	for (uint32_t i = 0; i < 2; i++) {
+		assert_int_equal(back.tiles[i].x, b.tiles[i].x);
+		assert_int_equal(back.tiles[i].height, b.tiles[i].height);
+		assert_memory_equal(back.tiles[i].xyz, b.tiles[i].xyz,
+				    b.tiles[i].width * b.tiles[i].height * 3 * sizeof(float));
+	}
+	assert_int_equal(back.state_count, b.state_count);
+	for (uint32_t i = 0; i < b.state_count; i++) {
+		assert_int_equal(back.states[i].size, b.states[i].size);
+		assert_memory_equal(back.states[i].bytes, b.states[i].bytes, b.states[i].size);
+	}
+	batch_fini(&back);
+	/* Every cut of the payload is noticed, and nothing leaks (seen by the sanitizer). */
+	for (size_t n = 0; n < r.payload.size; n += 97)
+		assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, n, &e), -EBADMSG);
+	env.message->lease_result->state_sizes[0] = UINT32_MAX;
+	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	envelope_fini(&env);
+	frame_reader_fini(&r);
+	batch_fini(&b);
+}
+
+static void memory_may_end_anywhere(void **state)
+{
+	(void)state;
+	struct plan p = chain_plan();
+	struct batch b = chain_batch(&p), back;
+	struct envelope env;
+	struct frame_reader r;
+	struct error e;
+	travel(&b, &p, &env, &r);
+	int rc = -ENOMEM;
+	for (long n = 0; rc; n++) {
+		mem_fail_after(n);
+		rc = batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e);
+		mem_fail_after(-1);
+		assert_true(rc == 0 || rc == -ENOMEM);
+	}
+	batch_fini(&back);
+	envelope_fini(&env);
+	frame_reader_fini(&r);
+	batch_fini(&b);
+}
+
+static void weights_travel(void **state)
+{
+	(void)state;
+	struct plan p = chain_plan();
+	struct plan_range range = plan_bootstrap_range(&p, 1, 0);
+	struct batch b = {.key = {7, LEASE_BOOTSTRAP, 1, 0, 0}, .independent_sum = 3}, back;
+	struct envelope env;
+	struct frame_reader r;
+	struct error e;
+	b.weight_count = range.end - range.begin;
+	b.counters[COUNT_INDEPENDENT] = b.counters[COUNT_SAMPLES] = b.weight_count;
+	b.weights = mem_alloc(b.weight_count, sizeof *b.weights);
+	for (uint64_t i = 0; i < b.weight_count; i++)
+		b.weights[i] = 1.0f / (float)(i + 1);
+	travel(&b, &p, &env, &r);
+	int rc = batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e);
+	if (rc)
+		print_message("%s\n", e.text);
+	assert_int_equal(rc, 0);
+	assert_int_equal(back.weight_count, b.weight_count);
+	assert_memory_equal(back.weights, b.weights, b.weight_count * sizeof *b.weights);
+	batch_fini(&back);
+	env.message->lease_result->weight_count = UINT64_MAX / 4 + 2; /* times 4 it is small again */
+	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	envelope_fini(&env);
+	frame_reader_fini(&r);
+	batch_fini(&b);
+}
+
+static struct grant grant_travels(const struct lease_key *k, const uint64_t *seeds, const struct chain_state *states,
+				  uint32_t count)
+{
+	struct frame_reader r;
+	struct envelope env;
+	struct grant g;
+	struct error e;
+	unsigned char *frame;
+	size_t size, used;
+	assert_int_equal(grant_pack(k, seeds, states, count, &frame, &size, &e), 0);
+	frame_reader_init(&r, (struct frame_limits){1 << 20, 1 << 20});
+	assert_int_equal(frame_reader_take(&r, frame, size, &used, &e), 1);
+	assert_int_equal(envelope_unpack(&env, r.header.bytes, r.header.size, &e), 0);
+	assert_int_equal(grant_unpack(&g, env.message->lease_grant, r.payload.bytes, r.payload.size, &e), 0);
+	assert_memory_equal(&g.key, k, sizeof *k);
+	envelope_fini(&env);
+	frame_reader_fini(&r);
+	mem_free(frame);
+	return g;
+}
+
+static void grants_travel(void **state)
+{
+	(void)state;
+	struct lease_key k = {1, LEASE_RENDER, 2, 3, UINT64_MAX};
+	uint64_t seeds[3] = {0, UINT64_MAX, 5};
+	uint8_t bytes[] = "abc";
+	struct chain_state states[2] = {{NULL, 0}, {bytes, 3}};
+	struct grant g = grant_travels(&k, seeds, NULL, 3);
+	assert_true(g.chain_count == 3 && g.states == NULL && g.seeds[1] == UINT64_MAX);
+	grant_fini(&g);
+	g = grant_travels(&k, NULL, states, 2);
+	assert_true(g.chain_count == 2 && g.seeds == NULL && g.states[0].size == 0 && g.states[1].size == 3);
+	assert_memory_equal(g.states[1].bytes, "abc", 3);
+	grant_fini(&g);
+	g = grant_travels(&k, NULL, NULL, 0);
+	assert_true(g.chain_count == 0);
+	grant_fini(&g);
+}
+
+static void plans_travel(void **state)
+{
+	(void)state;
+	struct plan p = chain_plan(), back;
+	struct error e;
+	Farm__Plan m;
+	plan_to_wire(&p, &m);
+	assert_int_equal(plan_from_wire(&m, &back, &e), 0);
+	assert_memory_equal(&p, &back, sizeof p);
+	m.groups = 0; /* plan_check has the last word */
+	assert_true(plan_from_wire(&m, &back, &e) < 0);
+	plan_to_wire(&p, &m);
+	m.kind = 17;
+	assert_int_equal(plan_from_wire(&m, &back, &e), -EBADMSG);
+	char name[] = "a name far too long";
+	plan_to_wire(&p, &m);
+	m.integrator = name;
+	assert_int_equal(plan_from_wire(&m, &back, &e), -EBADMSG);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_batch_travels), cmocka_unit_test(memory_may_end_anywhere),
+		cmocka_unit_test(weights_travel),  cmocka_unit_test(grants_travel),
+		cmocka_unit_test(plans_travel),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,470 @@
+/*
+ * The coordinator's shell against scripted peers over loopback: rubbish, liars, stragglers, and a whole job done by a worker
+ * of a few lines that answers every lease with black.
+ */
+#include "common/base/mem.h"
+#include "common/wire/batch_wire.h"
+#include "common/wire/frame.h"
+#include "coordinator/shell/server.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <arpa/inet.h>
+#include <math.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static char folder[64];
+static pid_t server;
+static uint16_t port;
+
+static int set_up(void **state)
+{
+	(void)state;
+	char spool[96], port_file[96];
+	strcpy(folder, "/tmp/hslt-peers.XXXXXX");
+	if (!mkdtemp(folder))
+		return -1;
+	snprintf(spool, sizeof spool, "%s/spool", folder);
+	snprintf(port_file, sizeof port_file, "%s/port", folder);
+	fflush(NULL);
+	server = fork();
+	if (server == 0) {
+		struct server_config c;
+		struct error e;
+		server_config_init(&c);
+		c.listen = "127.0.0.1:0";
+		c.spool = spool;
+		c.port_file = port_file;
+		c.max_connections = 8;
+		c.hello_seconds = 1;
+		c.stall_seconds = 1;
+		log_set_level(LOG_LEVEL_ERROR);
+		_exit(server_run(&c, &e) ? 1 : 0);
+	}
+	unsigned number = 0;
+	for (int i = 0; i < 500 && !number; i++) {
+		FILE *f = fopen(port_file, "r");
+		if (f && fscanf(f, "%u", &number) != 1)
+			number = 0;
+		if (f)
+			fclose(f);
+		usleep(10000);
+	}
+	port = (uint16_t)number;
+	return port ? 0 : -1;
+}
+
+static int tear_down(void **state)
+{
+	(void)state;
+	char command[96];
+	int status = -1;
+	kill(server, SIGTERM);
+	waitpid(server, &status, 0);
+	snprintf(command, sizeof command, "rm -rf '%s'", folder);
+	return system(command) || !WIFEXITED(status) || WEXITSTATUS(status);
+}
+
+/* ---- a peer of our own ---- */
+
+struct peer {
+	int fd;
+	struct frame_reader reader;
+	unsigned char bytes[4096];
+	size_t at, size;
+	struct envelope env;
+};
+
+static struct peer *call(void)
+{
+	struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = htons(port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
+	struct peer *p = calloc(1, sizeof *p);
+	assert_non_null(p);
+	p->fd = socket(AF_INET, SOCK_STREAM, 0);
+	assert_int_equal(connect(p->fd, (struct sockaddr *)&a, sizeof a), 0);
+	frame_reader_init(&p->reader, (struct frame_limits){1 << 22, 1 << 24});
+	return p;
+}
+
+static void hang_up(struct peer *p)
+{
+	close(p->fd);
+	frame_reader_fini(&p->reader);
+	envelope_fini(&p->env);
+	free(p);
+}
+
+static void say_bytes(const struct peer *p, const void *bytes, size_t size)
+{
+	assert_int_equal(send(p->fd, bytes, size, MSG_NOSIGNAL), size);
+}
+
+static void say(const struct peer *p, const Farm__Envelope *m, const void *payload, size_t payload_size)
+{
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	assert_int_equal(envelope_pack(m, payload, payload_size, &frame, &size, &e), 0);
+	say_bytes(p, frame, size);
+	mem_free(frame);
+}
+
+/* The next message but heartbeats; NULL when the coordinator hung up. Three seconds at most. */
+static const Farm__Envelope *hear(struct peer *p)
+{
+	for (;;) {
+		struct error e;
+		if (p->at == p->size) {
+			struct pollfd ready = {p->fd, POLLIN, 0};
+			assert_int_equal(poll(&ready, 1, 3000), 1);
+			ssize_t n = read(p->fd, p->bytes, sizeof p->bytes);
+			if (n <= 0)
+				return NULL;
+			p->at = 0;
+			p->size = (size_t)n;
+		}
+		size_t used;
+		int rc = frame_reader_take(&p->reader, p->bytes + p->at, p->size - p->at, &used, &e);
+		assert_true(rc >= 0);
+		p->at += used;
+		if (!rc)
+			continue;
+		envelope_fini(&p->env);
+		assert_int_equal(envelope_unpack(&p->env, p->reader.header.bytes, p->reader.header.size, &e), 0);
+		if (p->env.message->body_case != FARM__ENVELOPE__BODY_HEARTBEAT)
+			return p->env.message;
+	}
+}
+
+static const Farm__HelloAck *hello(struct peer *p, uint32_t version, Farm__Role role)
+{
+	Farm__Hello h;
+	Farm__Envelope m;
+	char name[] = "scripted", print[] = "p1";
+	farm__hello__init(&h);
+	farm__envelope__init(&m);
+	h.version = version;
+	h.role = role;
+	h.name = name;
+	h.fingerprint = print;
+	h.threads = 1;
+	m.body_case = FARM__ENVELOPE__BODY_HELLO;
+	m.hello = &h;
+	say(p, &m, NULL, 0);
+	const Farm__Envelope *answer = hear(p);
+	assert_non_null(answer);
+	assert_int_equal(answer->body_case, FARM__ENVELOPE__BODY_HELLO_ACK);
+	return answer->hello_ack;
+}
+
+static void say_empty(struct peer *p, Farm__Envelope__BodyCase what)
+{
+	Farm__Envelope m;
+	Farm__JobList list;
+	Farm__LeaseRequest request;
+	farm__envelope__init(&m);
+	farm__job_list__init(&list);
+	farm__lease_request__init(&request);
+	request.want = 2;
+	m.body_case = what;
+	if (what == FARM__ENVELOPE__BODY_JOB_LIST)
+		m.job_list = &list;
+	else
+		m.lease_request = &request;
+	say(p, &m, NULL, 0);
+}
+
+static void it_still_works(void)
+{
+	struct peer *p = call();
+	assert_true(hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	say_empty(p, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *answer = hear(p);
+	assert_non_null(answer);
+	assert_int_equal(answer->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	hang_up(p);
+}
+
+/* ---- rubbish ---- */
+
+static void rubbish_is_hung_up_on(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *bytes;
+		size_t size;
+	} rubbish[] = {
+		{"GET / HTTP/1.1\r\n\r\n", 18},
+		{"\xff\xff\xff\xff\xff\xff\xff\xff", 8},
+		{"\0\0\0\0\0\0\0\0", 8},                 /* no header */
+		{"\0\0\0\x04\0\0\0\x01", 8},             /* a payload before hello */
+		{"\0\0\x10\x01\0\0\0\0", 8},             /* 4,097 bytes of hello */
+		{"\0\0\0\x03\0\0\0\0\xff\xff\xff", 11},  /* does not parse */
+		{"\0\0\0\x02\0\0\0\0\x1a\x00", 10},      /* a heartbeat before hello */
+		{"\0\0\0\x05\0\0\0\0\x0a\x03\x78\x80\x01", 13}, /* hello with an unknown field */
+	};
+	for (size_t i = 0; i < sizeof rubbish / sizeof *rubbish; i++) {
+		struct peer *p = call();
+		say_bytes(p, rubbish[i].bytes, rubbish[i].size);
+		const Farm__Envelope *m = hear(p);
+		if (m) { /* who is understood is told what is wrong */
+			assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_FAULT);
+			assert_null(hear(p));
+		}
+		hang_up(p);
+	}
+	it_still_works();
+}
+
+static void stragglers_are_hung_up_on(void **state)
+{
+	(void)state;
+	struct peer *silent = call(), *half = call(), *client = call();
+	say_bytes(half, "\0\0\0\x20", 4);
+	assert_true(hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	say_bytes(client, "\0\0\0\x20\0\0\0\0abc", 11); /* begun and never finished */
+	assert_null(hear(silent));
+	assert_null(hear(half));
+	assert_null(hear(client));
+	hang_up(silent);
+	hang_up(half);
+	hang_up(client);
+	it_still_works();
+}
+
+static void crowds_are_turned_away(void **state)
+{
+	(void)state;
+	struct peer *crowd[8];
+	for (int i = 0; i < 8; i++) {
+		crowd[i] = call();
+		assert_true(hello(crowd[i], FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	}
+	struct peer *one_more = call();
+	assert_null(hear(one_more));
+	hang_up(one_more);
+	for (int i = 0; i < 8; i++)
+		hang_up(crowd[i]);
+	usleep(50000);
+	it_still_works();
+}
+
+static void hello_is_looked_at(void **state)
+{
+	(void)state;
+	struct peer *p = call();
+	const Farm__HelloAck *ack = hello(p, FARM_VERSION + 1, FARM__ROLE__ROLE_WORKER);
+	assert_false(ack->accepted);
+	assert_non_null(strstr(ack->text, "version"));
+	assert_null(hear(p));
+	hang_up(p);
+	p = call();
+	assert_false(hello(p, FARM_VERSION, FARM__ROLE__ROLE_NONE)->accepted);
+	hang_up(p);
+	p = call();
+	assert_true(hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	say_empty(p, FARM__ENVELOPE__BODY_LEASE_REQUEST); /* clients get no leases */
+	const Farm__Envelope *m = hear(p);
+	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_FAULT);
+	hang_up(p);
+}
+
+/* ---- a whole job ---- */
+
+static void submit(struct peer *p, const char *scene_text, const char *file_name)
+{
+	Farm__Submit s;
+	Farm__PlanRequest plan;
+	Farm__File file, *files[1] = {&file};
+	Farm__Envelope m;
+	struct blob_hash hash;
+	struct error e;
+	char name[] = "black", scene[] = "s.xml", integrator[] = "path", file_text[64];
+	struct plan_request r = {.integrator = "path", .kind = PLAN_SAMPLES, .width = 20, .height = 10, .spp = 4,
+				 .max_depth = 5, .groups = 2, .bootstrap = 256};
+	plan_request_to_wire(&r, &plan);
+	plan.integrator = integrator;
+	farm__submit__init(&s);
+	farm__file__init(&file);
+	farm__envelope__init(&m);
+	assert_int_equal(blob_hash_bytes(scene_text, strlen(scene_text), &hash, &e), 0);
+	snprintf(file_text, sizeof file_text, "%s", file_name);
+	file.name = file_text;
+	file.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
+	file.size = strlen(scene_text);
+	s.name = name;
+	s.scene = scene;
+	s.plan = &plan;
+	s.n_files = 1;
+	s.files = files;
+	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
+	m.submit = &s;
+	say(p, &m, NULL, 0);
+}
+
+static void send_blob(struct peer *p, const char *true_text, const char *sent_text)
+{
+	Farm__BlobChunk c;
+	Farm__Envelope m;
+	struct blob_hash hash;
+	struct error e;
+	assert_int_equal(blob_hash_bytes(true_text, strlen(true_text), &hash, &e), 0);
+	farm__blob_chunk__init(&c);
+	farm__envelope__init(&m);
+	c.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
+	c.size = strlen(true_text);
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+	m.blob_chunk = &c;
+	say(p, &m, sent_text, strlen(sent_text));
+}
+
+static const Farm__SubmitAnswer *submit_answer(struct peer *p)
+{
+	const Farm__Envelope *m = hear(p);
+	assert_non_null(m);
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_SUBMIT_ANSWER);
+	return m->submit_answer;
+}
+
+static void submissions_are_looked_at(void **state)
+{
+	(void)state;
+	struct peer *p = call();
+	assert_true(hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	static const char *const names[] = {"../s.xml", "/s.xml", "a//s.xml", "other.xml", "", "a/./s.xml", "s.xml/"};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+		submit(p, "<scene/>", names[i]);
+		const Farm__SubmitAnswer *a = submit_answer(p);
+		assert_true(a->job == 0 && a->n_missing == 0 && *a->refusal);
+	}
+	submit(p, "<scene/>", "s.xml");
+	assert_int_equal(submit_answer(p)->n_missing, 1);
+	send_blob(p, "<scene/>", "<SCENE/>"); /* other bytes than promised */
+	const Farm__SubmitAnswer *a = submit_answer(p);
+	assert_true(a->job == 0 && *a->refusal);
+	send_blob(p, "<scene/>", "<scene/>"); /* nobody asked */
+	hang_up(p);
+	it_still_works();
+}
+
+static void send_batch(struct peer *p, const struct batch *b, const struct plan *plan)
+{
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	assert_int_equal(batch_pack(b, plan, &frame, &size, &e), 0);
+	say_bytes(p, frame, size);
+	mem_free(frame);
+}
+
+/* Leases that came and were not answered yet. */
+struct desk {
+	struct lease_key keys[64];
+	size_t count;
+	bool job_ended;
+};
+
+/* Hears one message. Its verdict, or VERDICT_NONE when it was none. */
+static Farm__Verdict attend(struct peer *p, struct desk *d)
+{
+	struct error e;
+	const Farm__Envelope *m = hear(p);
+	assert_non_null(m);
+	if (m->body_case == FARM__ENVELOPE__BODY_LEASE_ACK)
+		return m->lease_ack->verdict;
+	if (m->body_case == FARM__ENVELOPE__BODY_LEASE_GRANT) {
+		assert_true(d->count < 64);
+		assert_int_equal(lease_key_from_wire(m->lease_grant->key, &d->keys[d->count++], &e), 0);
+	}
+	d->job_ended = d->job_ended || m->body_case == FARM__ENVELOPE__BODY_JOB_END;
+	return FARM__VERDICT__VERDICT_NONE;
+}
+
+static Farm__Verdict verdict(struct peer *p, struct desk *d)
+{
+	Farm__Verdict v;
+	while ((v = attend(p, d)) == FARM__VERDICT__VERDICT_NONE)
+		continue;
+	return v;
+}
+
+/* Black weights for a bootstrap lease. */
+static struct batch black_batch(const struct lease_key *k, const struct plan *plan)
+{
+	struct batch b = {.key = *k};
+	assert_int_equal(k->kind, LEASE_BOOTSTRAP); /* black ends before rounds */
+	struct plan_range range = plan_bootstrap_range(plan, k->group, k->part);
+	b.weight_count = b.counters[COUNT_INDEPENDENT] = b.counters[COUNT_SAMPLES] = range.end - range.begin;
+	b.weights = mem_alloc(b.weight_count, sizeof *b.weights);
+	return b;
+}
+
+static void a_black_job_ends(void **state)
+{
+	(void)state;
+	struct peer *client = call(), *worker = call();
+	struct plan plan;
+	struct error e;
+	struct plan_request r = {.integrator = "path", .kind = PLAN_SAMPLES, .width = 20, .height = 10, .spp = 4,
+				 .max_depth = 5, .groups = 2, .bootstrap = 256};
+	assert_int_equal(plan_make(&r, &plan, &e), 0);
+	assert_true(hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	submit(client, "<scene/>", "s.xml");
+	assert_int_equal(submit_answer(client)->n_missing, 1);
+	send_blob(client, "<scene/>", "<scene/>");
+	const Farm__SubmitAnswer *a = submit_answer(client);
+	assert_int_equal(a->job, 1);
+	assert_true(hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	struct desk d = {.count = 0};
+	bool first = true;
+	while (!d.job_ended) {
+		if (d.count == 0) {
+			attend(worker, &d);
+			continue;
+		}
+		struct batch b = black_batch(&d.keys[--d.count], &plan);
+		if (first) { /* wrong ones; then the right ones; then a repeat */
+			b.weights[0] = NAN;
+			send_batch(worker, &b, &plan);
+			assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
+			b.weights[0] = 0;
+			send_batch(worker, &b, &plan);
+			assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+			send_batch(worker, &b, &plan);
+			assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+			first = false;
+		} else {
+			send_batch(worker, &b, &plan);
+		}
+		batch_fini(&b);
+	}
+	say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = hear(client);
+	assert_non_null(m);
+	assert_int_equal(m->job_list_answer->n_jobs, 1);
+	assert_string_equal(m->job_list_answer->jobs[0]->state, "done");
+	assert_true(m->job_list_answer->jobs[0]->fetchable);
+	hang_up(client);
+	hang_up(worker);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(rubbish_is_hung_up_on),   cmocka_unit_test(stragglers_are_hung_up_on),
+		cmocka_unit_test(crowds_are_turned_away),  cmocka_unit_test(hello_is_looked_at),
+		cmocka_unit_test(submissions_are_looked_at), cmocka_unit_test(a_black_job_ends),
+	};
+	return cmocka_run_group_tests(tests, set_up, tear_down);
+}
