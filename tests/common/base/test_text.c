@@ -1,0 +1,105 @@
+/* Buffers keep their limit, texts are cut between characters, log values cannot forge a line, figures read well. */
+#include "common/base/buf.h"
+#include "common/base/log.h"
+#include "common/base/mem.h"
+#include "common/base/progress.h"
+#include "common/base/text.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <string.h>
+
+static void buffers_keep_their_limit(void **state)
+{
+	(void)state;
+	struct buf b = {.limit = 1000};
+	char chunk[300];
+	memset(chunk, 'x', sizeof chunk);
+	for (int i = 0; i < 3; i++)
+		assert_true(buf_append(&b, chunk, sizeof chunk));
+	assert_false(buf_append(&b, chunk, sizeof chunk));
+	assert_int_equal(b.size, 900);
+	assert_true(buf_append(&b, chunk, 100));
+	assert_false(buf_append(&b, chunk, 1));
+	assert_true(buf_append(&b, NULL, 0));
+	assert_true(b.capacity <= 1000);
+	buf_fini(&b);
+	assert_true(buf_print(&b, "%d %s", 12, "apples"));
+	assert_int_equal(b.size, 9);
+	assert_memory_equal(b.bytes, "12 apples", 9);
+	mem_fail_after(0);
+	assert_false(buf_reserve(&b, 800));
+	mem_fail_after(-1);
+	assert_memory_equal(b.bytes, "12 apples", 9);
+	buf_fini(&b);
+}
+
+static void texts_are_cut_between_characters(void **state)
+{
+	(void)state;
+	char out[8];
+	text_copy(out, sizeof out, "short");
+	assert_string_equal(out, "short");
+	text_copy(out, sizeof out, "1234567890");
+	assert_string_equal(out, "1234567");
+	text_copy(out, sizeof out, "12345\xe2\x82\xac"); /* a euro sign that does not fit */
+	assert_string_equal(out, "12345");
+	text_copy(out, sizeof out, "1234\xe2\x82\xac");
+	assert_string_equal(out, "1234\xe2\x82\xac");
+	text_copy(out, 1, "x");
+	assert_string_equal(out, "");
+}
+
+static void values_cannot_forge_a_line(void **state)
+{
+	(void)state;
+	assert_string_equal(log_quote("a \"b\"\nlevel=error \\ \x01").text, "\"a \\\"b\\\" level=error \\\\  \"");
+	char longer[2000];
+	memset(longer, '"', sizeof longer - 1);
+	longer[sizeof longer - 1] = 0;
+	struct log_value v = log_quote(longer);
+	assert_true(strlen(v.text) < LOG_VALUE_MAX);
+	assert_int_equal(v.text[strlen(v.text) - 1], '"');
+	char line[64];
+	size_t n = log_format(line, sizeof line, LOG_JOB_DONE, "job=j1");
+	assert_int_equal(n, strlen(line));
+	assert_true(n < sizeof line);
+	char whole[256];
+	log_format(whole, sizeof whole, LOG_JOB_DONE, "job=j1");
+	assert_non_null(strstr(whole, "Z level=info event=job_done job=j1"));
+}
+
+static void figures_read_well(void **state)
+{
+	(void)state;
+	static const struct {
+		double x;
+		const char *text;
+	} numbers[] = {{0, "0"},	 {12.4, "12"},	    {999.4, "999"},	{999.6, "1.00 k"}, {1234, "1.23 k"},
+		       {99900, "99.9 k"}, {123456, "123 k"}, {5e6, "5.00 M"}, {2e12, "2.00 T"}},
+	  times[] = {{0, "0 s"}, {0.2, "1 s"}, {59, "59 s"}, {61, "1:01"}, {3600, "1:00:00"}, {36061, "10:01:01"}};
+	char text[32];
+	for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
+		progress_number(numbers[i].x, text, sizeof text);
+		assert_string_equal(text, numbers[i].text);
+	}
+	for (size_t i = 0; i < sizeof times / sizeof *times; i++) {
+		progress_time(times[i].x, text, sizeof text);
+		assert_string_equal(text, times[i].text);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(buffers_keep_their_limit),
+		cmocka_unit_test(texts_are_cut_between_characters),
+		cmocka_unit_test(values_cannot_forge_a_line),
+		cmocka_unit_test(figures_read_well),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

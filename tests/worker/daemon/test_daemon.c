@@ -1,0 +1,275 @@
+/* The worker's parts: threads and their way back, the cache's slots, what is fetched, the fingerprint. */
+#include "common/base/mem.h"
+#include "worker/daemon/bundle.h"
+#include "worker/daemon/cache.h"
+#include "worker/daemon/crew.h"
+#include "worker/daemon/fingerprint.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+static char folder[64];
+
+static int set_up(void **state)
+{
+	(void)state;
+	strcpy(folder, "/tmp/hslt-daemon.XXXXXX");
+	return mkdtemp(folder) ? 0 : -1;
+}
+
+static int tear_down(void **state)
+{
+	(void)state;
+	char command[128];
+	snprintf(command, sizeof command, "rm -rf '%s'", folder);
+	return system(command);
+}
+
+/* ---- crew ---- */
+
+struct job {
+	struct task task;
+	atomic_int *running, *most, *gate;
+	pthread_t ran_on;
+	int done;
+};
+
+static pthread_t loop_thread;
+
+static void run(struct task *t)
+{
+	struct job *j = (struct job *)t;
+	int now = atomic_fetch_add(j->running, 1) + 1, most = atomic_load(j->most);
+	while (now > most && !atomic_compare_exchange_weak(j->most, &most, now))
+		continue;
+	while (j->gate && !atomic_load(j->gate))
+		usleep(100);
+	usleep(200);
+	j->ran_on = pthread_self();
+	atomic_fetch_sub(j->running, 1);
+}
+
+static void done(struct task *t)
+{
+	assert_true(pthread_equal(pthread_self(), loop_thread));
+	((struct job *)t)->done++;
+}
+
+static void the_crew_works(void **state)
+{
+	(void)state;
+	enum { JOBS = 100 };
+	static struct job jobs[JOBS];
+	atomic_int running = 0, most = 0, gate = 0;
+	uv_loop_t loop;
+	struct crew *c;
+	struct error e;
+	loop_thread = pthread_self();
+	assert_int_equal(uv_loop_init(&loop), 0);
+	assert_int_equal(crew_new(&c, &loop, 3, &e), 0);
+	for (int i = 0; i < JOBS; i++) {
+		jobs[i] = (struct job){.task = {NULL, run, done}, .running = &running, .most = &most, .gate = &gate};
+		crew_add(c, &jobs[i].task);
+	}
+	while (atomic_load(&running) < 3)
+		usleep(100);
+	assert_false(crew_take_back(c, &jobs[0].task)); /* it runs */
+	assert_true(crew_take_back(c, &jobs[50].task));
+	assert_true(crew_take_back(c, &jobs[JOBS - 1].task));
+	assert_false(crew_take_back(c, &jobs[50].task));
+	assert_int_equal(crew_pending(c), JOBS - 2);
+	crew_add(c, &jobs[50].task); /* behind the others */
+	atomic_store(&gate, 1);
+	while (crew_pending(c))
+		uv_run(&loop, UV_RUN_ONCE);
+	for (int i = 0; i < JOBS; i++)
+		assert_int_equal(jobs[i].done, i != JOBS - 1);
+	assert_false(pthread_equal(jobs[0].ran_on, loop_thread));
+	assert_int_equal(atomic_load(&most), 3);
+	crew_close(c);
+	uv_run(&loop, UV_RUN_DEFAULT);
+	assert_int_equal(uv_loop_close(&loop), 0);
+}
+
+/* ---- cache ---- */
+
+static void workers_share_a_cache_folder(void **state)
+{
+	(void)state;
+	struct cache a, b, c;
+	struct blob_hash h;
+	struct blob_writer *w;
+	struct error e;
+	char path[128];
+	snprintf(path, sizeof path, "%s/deep/er", folder);
+	assert_int_equal(cache_open(&a, path, 1000, &e), 0);
+	assert_int_equal(cache_open(&b, path, 1000, &e), 0);
+	assert_int_equal(blob_hash_bytes("abc", 3, &h, &e), 0);
+	assert_int_equal(blob_write_begin(&w, a.blobs, &h, 3, &e), 0);
+	assert_int_equal(blob_write_add(w, "abc", 3, &e), 0);
+	assert_int_equal(blob_write_commit(w, &e), 0);
+	assert_false(blob_has(b.blobs, &h, NULL)); /* each has a slot of its own */
+	cache_close(&a);
+	assert_int_equal(cache_open(&c, path, 1000, &e), 0); /* the free slot again, with what it held */
+	assert_true(blob_has(c.blobs, &h, NULL));
+	cache_close(&b);
+	cache_close(&c);
+}
+
+/* ---- bundle ---- */
+
+static void set_info(struct bundle *b, const char *texts[], size_t count)
+{
+	Farm__JobInfo info;
+	Farm__Plan plan;
+	Farm__Envelope m;
+	Farm__File files[4], *list[4];
+	struct blob_hash hashes[4];
+	struct envelope env;
+	struct error e;
+	unsigned char *frame;
+	size_t size;
+	char names[4][16];
+	struct plan p;
+	struct plan_request r = {.integrator = "path", .width = 8, .height = 8, .spp = 1, .max_depth = 3};
+	assert_int_equal(plan_make(&r, &p, &e), 0);
+	plan_to_wire(&p, &plan);
+	farm__job_info__init(&info);
+	farm__envelope__init(&m);
+	for (size_t i = 0; i < count; i++) {
+		farm__file__init(&files[i]);
+		snprintf(names[i], sizeof names[i], "f%zu", i);
+		assert_int_equal(blob_hash_bytes(texts[i], strlen(texts[i]), &hashes[i], &e), 0);
+		files[i].name = names[i];
+		files[i].hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hashes[i].bytes};
+		files[i].size = strlen(texts[i]);
+		list[i] = &files[i];
+	}
+	info.scene = names[0];
+	info.plan = &plan;
+	info.n_files = count;
+	info.files = list;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_INFO;
+	m.job_info = &info;
+	assert_int_equal(envelope_pack(&m, NULL, 0, &frame, &size, &e), 0);
+	assert_int_equal(envelope_unpack(&env, frame + 8, size - 8, &e), 0);
+	assert_int_equal(bundle_set_info(b, &env, &e), 0);
+	mem_free(frame);
+}
+
+static int give(struct bundle *b, const char *text, uint64_t offset, size_t count)
+{
+	Farm__BlobChunk c;
+	struct error e;
+	farm__blob_chunk__init(&c);
+	c.offset = offset;
+	c.size = strlen(text);
+	return bundle_add(b, &c, (const unsigned char *)text + offset, count, &e);
+}
+
+static void on_built(struct bundle *b)
+{
+	assert_true(b->state == BUNDLE_READY || b->state == BUNDLE_FAILED);
+}
+
+static void a_bundle_fetches_what_is_missing(void **state)
+{
+	(void)state;
+	struct cache cache;
+	struct bundle *b;
+	struct error e;
+	struct crew *crew;
+	uv_loop_t loop;
+	uint64_t offset;
+	const char *texts[] = {"<scene>", "second file", "<scene>", ""};
+	struct blob_hash first;
+	assert_int_equal(cache_open(&cache, folder, 1000, &e), 0);
+	assert_int_equal(bundle_new(&b, 5, cache.blobs, &e), 0);
+	set_info(b, texts, 4);
+	assert_int_equal(blob_hash_bytes(texts[0], 7, &first, &e), 0);
+	assert_true(bundle_next_missing(b, &offset));
+	assert_true(offset == 0 && blob_hash_equal(&b->wanted, &first));
+	assert_int_equal(give(b, texts[0], 0, 3), 0);
+	assert_true(bundle_next_missing(b, &offset)); /* a reconnect goes on where it stopped */
+	assert_int_equal(offset, 3);
+	assert_int_equal(give(b, texts[0], 3, 4), 0);
+	assert_true(bundle_next_missing(b, &offset));
+	assert_int_equal(offset, 0);
+	assert_int_equal(give(b, texts[1], 0, 11), 0);
+	assert_true(bundle_next_missing(b, &offset)); /* the third is the first again; the empty one is left */
+	assert_int_equal(give(b, texts[3], 0, 0), 0);
+	assert_false(bundle_next_missing(b, &offset));
+	/* The scene is none: that is found by the builder, and said. */
+	assert_int_equal(uv_loop_init(&loop), 0);
+	assert_int_equal(crew_new(&crew, &loop, 1, &e), 0);
+	b->built = on_built;
+	assert_int_equal(bundle_build(b, crew, &e), 0);
+	while (b->state == BUNDLE_BUILDING)
+		uv_run(&loop, UV_RUN_ONCE);
+	assert_int_equal(b->state, BUNDLE_FAILED);
+	assert_non_null(strstr(b->error.text, "f0"));
+	bundle_free(b);
+	crew_close(crew);
+	uv_run(&loop, UV_RUN_DEFAULT);
+	assert_int_equal(uv_loop_close(&loop), 0);
+	cache_close(&cache);
+}
+
+static void lies_are_noticed(void **state)
+{
+	(void)state;
+	struct cache cache;
+	struct bundle *b;
+	struct error e;
+	uint64_t offset;
+	const char *texts[] = {"true"};
+	assert_int_equal(cache_open(&cache, folder, 1000, &e), 0);
+	for (int i = 0; i < 3; i++) {
+		assert_int_equal(bundle_new(&b, 5, cache.blobs, &e), 0);
+		set_info(b, texts, 1);
+		assert_true(bundle_next_missing(b, &offset));
+		assert_true(give(b, i == 0 ? "lies" : "true", i == 1 ? 1 : 0, i == 2 ? 0 : 3) < (i == 0));
+		if (i == 0)
+			assert_int_equal(give(b, "lies", 3, 1), -EBADMSG);
+		bundle_free(b);
+	}
+	cache_close(&cache);
+}
+
+/* ---- fingerprint ---- */
+
+static void the_fingerprint_is_stable(void **state)
+{
+	(void)state;
+	char a[FINGERPRINT_MAX], b[FINGERPRINT_MAX];
+	fingerprint_make(a);
+	fingerprint_make(b);
+	assert_string_equal(a, b);
+	assert_non_null(strstr(a, "build="));
+	assert_non_null(strstr(a, "embree"));
+	assert_non_null(strstr(a, "libc="));
+	assert_true(strlen(a) < FINGERPRINT_MAX - 1); /* nothing was cut off */
+	assert_true(fingerprint_self_test() == fingerprint_self_test());
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(the_crew_works),
+		cmocka_unit_test_setup_teardown(workers_share_a_cache_folder, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(a_bundle_fetches_what_is_missing, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(lies_are_noticed, set_up, tear_down),
+		cmocka_unit_test(the_fingerprint_is_stable),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
