@@ -45,7 +45,7 @@ run_program() {
 run_script() {
 	name=${1#tests/}
 	begin=$(date +%s)
-	timeout -k 10 "$limit" sh "$1" >"$log" 2>&1
+	timeout -k 10 "$limit" sh "$1" "$build" >"$log" 2>&1
 	code=$?
 	case $code in
 	0)
@@ -72,8 +72,8 @@ for kind in $kinds; do
 		done
 		;;
 	script)
-		for t in tests/lint/*.sh tests/e2e/test_*.sh; do
-			[ -f "$t" ] || continue
+		for t in tests/lint/*.sh tests/e2e/*.sh; do
+			[ -f "$t" ] && [ "${t##*/}" != lib.sh ] || continue
 			case $t in *"$pattern"*) run_script "$t" ;; esac
 		done
 		;;
