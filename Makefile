@@ -1,6 +1,6 @@
 # make            programs into build/bin
 # make test       unit and end-to-end tests (SAN=address,undefined for sanitizers, FULL=1 for the long forms)
-# make demo bench install clean
+# make demo bench fuzz install clean
 
 CC       ?= gcc
 ifeq ($(origin CC),default)
@@ -48,7 +48,7 @@ CTL_CLI    := $(patsubst coordinator/ctl/hslt_%.c,hslt-%,$(wildcard coordinator/
 PROGRAMS   := $(if $(wildcard coordinator/main.c),hslt-coordinator) $(if $(wildcard worker/daemon/main.c),hslt-worker) \
               $(WORKER_CLI) $(CTL_CLI)
 
-.PHONY: all programs tests test demo bench install clean
+.PHONY: all programs tests test demo bench fuzz fuzzers install clean
 all: programs
 programs: $(addprefix $(BUILD)/bin/,$(PROGRAMS))
 
@@ -102,6 +102,15 @@ tests: $(TEST_BIN)
 test: programs tests
 	sh tests/run.sh $(BUILD)
 .SECONDARY:
+
+# Fuzzers: tests/fuzz/fuzz_*.c, one libFuzzer program each; run.sh calls `make fuzzers` with clang and its sanitizers.
+FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.c)
+FUZZ_BIN := $(patsubst tests/%.c,$(BUILD)/%,$(FUZZ_SRC))
+$(FUZZ_BIN): $(BUILD)/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
+	$(link) -fsanitize=fuzzer -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+fuzzers: $(FUZZ_BIN)
+fuzz:
+	MAKE="$(MAKE)" sh tests/fuzz/run.sh
 
 clean:
 	rm -rf build

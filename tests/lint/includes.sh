@@ -1,0 +1,130 @@
+# Who includes whom, against includes.txt; no unfinished marks; no overlong files. A line for each check, then what is wrong.
+cd "$(dirname "$0")/../.." || exit 1
+LIST=tests/lint/includes.txt
+MOST_LINES=600
+FOLDERS="common coordinator worker"
+SOURCES=$(find $FOLDERS -name '*.[ch]' | sort)
+failed=0
+
+# check NAME COMMAND...: the command prints what is wrong
+check() {
+	name=$1
+	shift
+	wrong=$("$@")
+	if [ -z "$wrong" ]; then
+		echo "ok: $name"
+	else
+		echo "WRONG: $name"
+		echo "$wrong" | sed 's/^/	/'
+		failed=1
+	fi
+}
+
+# A rule a line: the folder or library, then what is allowed, each between spaces.
+rules() {
+	sed 's/#.*//' $LIST | awk -F: 'NF > 1 { gsub(/[ \t]+/, " ", $2); print $1 " :" $2 " " }'
+}
+
+# FILE:LINE FOLDER HEADER, the header with the " or < before it
+includes() {
+	grep -Hn '^[[:space:]]*#[[:space:]]*include' $SOURCES |
+		sed 's/^\([^:]*\)\/\([^/:]*:[0-9]*\):[^"<]*\(["<][^">]*\).*/\1\/\2 \1 \3/'
+}
+
+{ rules; echo "--"; includes; } >"${TMPDIR:-/tmp}/includes.$$"
+trap 'rm -f "${TMPDIR:-/tmp}/includes.$$"' EXIT
+
+edges() {
+	awk '
+	$1 == "--" { reading = 1; next }
+	!reading && substr($1, 1, 1) != "<" { allowed[$1] = $0 " "; next }
+	!reading || substr($3, 1, 1) != "\"" { next }
+	{
+		header = substr($3, 2); folder = header
+		if (!sub("/[^/]*$", "", folder) || folder == $2)
+			next
+		if (!($2 in allowed))
+			print $1 ": the folder " $2 " is not in the list"
+		else if (!index(allowed[$2], " " folder " ") && !index(allowed[$2], " " header " "))
+			print $1 ": " $2 " must not include " header
+	}' "${TMPDIR:-/tmp}/includes.$$"
+}
+
+# What must not be allowed by the list either.
+borders() {
+	rules | awk '
+	substr($1, 1, 1) == "<" { next }
+	{
+		split($1, from, "/")
+		for (i = 3; i <= NF; i++) {
+			split($i, to, "/")
+			if (to[1] == "tests" || (to[1] != from[1] && to[1] != "common" && to[1] != "proto"))
+				print "the list lets " $1 " include " $i
+		}
+	}'
+}
+
+# Takes away folders that include nothing but what is gone; what stays goes round in circles.
+circles() {
+	rules | awk '
+	substr($1, 1, 1) == "<" { next }
+	{ n++; name[n] = $1; for (i = 3; i <= NF; i++) if ($i !~ /\.h$/) needs[n] = needs[n] " " $i }
+	END {
+		gone["proto"] = 1
+		do {
+			taken = 0
+			for (k = 1; k <= n; k++) {
+				if (name[k] in gone)
+					continue
+				count = split(needs[k], need, " "); free = 1
+				for (i = 1; i <= count; i++)
+					if (!(need[i] in gone))
+						free = 0
+				if (free) { gone[name[k]] = 1; taken = 1 }
+			}
+		} while (taken)
+		for (k = 1; k <= n; k++)
+			if (!(name[k] in gone))
+				print name[k] " includes itself by way of others"
+	}'
+}
+
+doors() {
+	awk '
+	$1 == "--" { reading = 1; next }
+	!reading && substr($1, 1, 1) == "<" { door[$1] = $0; next }
+	!reading || substr($3, 1, 1) != "<" { next }
+	{
+		file = $1; sub(/:.*/, "", file)
+		for (d in door) {
+			if (index($3, d) != 1)
+				continue
+			open = 0; count = split(door[d], place, " ")
+			for (i = 3; i <= count; i++)
+				if (file == place[i] || index(file, place[i] "/") == 1)
+					open = 1
+			if (!open)
+				print $1 ": " $3 "> is for " substr(door[d], index(door[d], ":") + 2)
+		}
+	}' "${TMPDIR:-/tmp}/includes.$$"
+}
+
+marks() {
+	words='TO''DO|FIX''ME'
+	grep -nIE "$words" $(git ls-files 2>/dev/null || find $FOLDERS tests deploy proto -type f)
+}
+
+overlong() {
+	for f in $SOURCES; do
+		lines=$(wc -l <"$f")
+		[ "$lines" -le $MOST_LINES ] || echo "$f: $lines lines"
+	done
+}
+
+check "every include between folders is in $LIST" edges
+check "coordinator and worker do not include each other, common includes neither, nobody tests" borders
+check "no folders in a circle" circles
+check "each library is included only at its door" doors
+check "no unfinished marks" marks
+check "no source of more than $MOST_LINES lines" overlong
+exit $failed
