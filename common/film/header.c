@@ -1,0 +1,197 @@
+#include "common/film/header.h"
+
+#include "common/base/version.h"
+
+#include <assert.h>
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+enum header_name {
+	H_VERSION, H_SCENE, H_INTEGRATOR, H_OPTIONS, H_SEED, H_MIN_DEPTH, H_MAX_DEPTH, H_GROUPS, H_CHAINS, H_BOOTSTRAP, H_EPOCH,
+	H_ROUNDS, H_MUTATIONS, H_SAMPLES, H_B, H_B_ERROR, H_BEYOND, H_REL_MSE, H_REL_MSE_UPPER, H_ACCEPTED, H_INDEPENDENT,
+	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_EFFECTS, H_MIXED, H_WALL,
+	H_CPU, H_WORKERS, H_DATE,
+};
+
+#define STRING EXR_ATTRIBUTE_STRING
+#define DOUBLE EXR_ATTRIBUTE_DOUBLE
+#define INT EXR_ATTRIBUTE_INT
+
+const struct header_row header_rows[] = {
+	[H_VERSION] = {"hslt:version", STRING, false, "version of the programs"},
+	[H_SCENE] = {"hslt:scene", STRING, false, "name of the scene file"},
+	[H_INTEGRATOR] = {"hslt:integrator", STRING, false, "path, bdpt, pssmlt, ..."},
+	[H_OPTIONS] = {"hslt:options", STRING, false, "options of hslt-render and hslt-submit that make the same bits again"},
+	[H_SEED] = {"hslt:seed", STRING, false, "seed of all random numbers"},
+	[H_MIN_DEPTH] = {"hslt:minDepth", INT, false, "shortest paths, in edges"},
+	[H_MAX_DEPTH] = {"hslt:maxDepth", INT, false, "longest paths, in edges"},
+	[H_GROUPS] = {"hslt:groups", INT, false, "independent replicates"},
+	[H_CHAINS] = {"hslt:chains", INT, false, "Markov chains of all groups (Metropolis only)"},
+	[H_BOOTSTRAP] = {"hslt:bootstrap", STRING, false, "bootstrap samples of all groups"},
+	[H_EPOCH] = {"hslt:epoch", STRING, false, "mutations a chain, or samples a pixel and group, in one round"},
+	[H_ROUNDS] = {"hslt:rounds", STRING, false, "complete rounds that the image holds"},
+	[H_MUTATIONS] = {"hslt:mutations", STRING, false, "mutations that the image holds (Metropolis only)"},
+	[H_SAMPLES] = {"hslt:samples", STRING, false, "samples a pixel that the image holds (others)"},
+	[H_B] = {"hslt:b", DOUBLE, false, "integral of X+Y+Z over the image, pooled over groups (Metropolis only)"},
+	[H_B_ERROR] = {"hslt:bError", DOUBLE, false, "its standard error, from the groups"},
+	[H_BEYOND] = {"hslt:beyondShare", DOUBLE, false, "share of the energy in paths too long for the chains"},
+	[H_REL_MSE] = {"hslt:relMSE", DOUBLE, false, "estimated relMSE, from the variance between groups"},
+	[H_REL_MSE_UPPER] = {"hslt:relMSEUpper", DOUBLE, false, "upper end of its 90 % interval"},
+	[H_ACCEPTED] = {"hslt:accepted", STRING, false, "accepted mutations"},
+	[H_INDEPENDENT] = {"hslt:independent", STRING, false, "independent proposals of the chains"},
+	[H_NAN] = {"hslt:nan", STRING, false, "path contributions refused: not a number"},
+	[H_INFINITE] = {"hslt:infinite", STRING, false, "path contributions refused: infinite"},
+	[H_NEGATIVE] = {"hslt:negative", STRING, false, "path contributions refused: negative"},
+	[H_RAYS_CLOSEST] = {"hslt:raysClosest", STRING, false, "rays traced to the closest hit"},
+	[H_RAYS_SHADOW] = {"hslt:raysShadow", STRING, false, "rays traced between two points"},
+	[H_STUCK] = {"hslt:stuck", STRING, false, "epochs in which a chain accepted nothing"},
+	[H_LONGEST_STUCK] = {"hslt:longestStuck", STRING, false, "most rejections in a row"},
+	[H_EFFECTS] = {"hslt:effects", STRING, false, "each effect, on or off, and why; one a line"},
+	[H_MIXED] = {"hslt:mixed", INT, false, "1: workers with different arithmetic took part, the bits cannot be made again"},
+	[H_WALL] = {"hslt:wallSeconds", DOUBLE, true, "from the first bootstrap sample to the last merge"},
+	[H_CPU] = {"hslt:cpuSeconds", DOUBLE, true, "of the leases, all threads"},
+	[H_WORKERS] = {"hslt:workers", INT, true, "workers that took part (hslt-render: threads)"},
+	[H_DATE] = {"hslt:date", STRING, true, "when the image was written, UTC"},
+	{NULL, 0, false, NULL},
+};
+
+bool header_excluded(const char *name)
+{
+	for (const struct header_row *r = header_rows; r->name; r++)
+		if (strcmp(r->name, name) == 0)
+			return r->excluded;
+	return false;
+}
+
+static struct exr_attribute *add(struct header *h, enum header_name name, int type)
+{
+	assert(h->count < HEADER_ATTRIBUTES && header_rows[name].type == type);
+	(void)type;
+	struct exr_attribute *a = &h->attributes[h->count++];
+	*a = (struct exr_attribute){.name = header_rows[name].name};
+	return a;
+}
+
+static void add_int(struct header *h, enum header_name name, uint32_t value)
+{
+	struct exr_attribute *a = add(h, name, INT);
+	a->type = EXR_ATTRIBUTE_INT;
+	a->integer = (int)value;
+}
+
+static void add_double(struct header *h, enum header_name name, double value)
+{
+	struct exr_attribute *a = add(h, name, DOUBLE);
+	a->type = EXR_ATTRIBUTE_DOUBLE;
+	a->number = value;
+}
+
+/* Appends to the text that is being written. */
+__attribute__((format(printf, 2, 3))) static void append(struct header *h, const char *format, ...)
+{
+	va_list ap;
+	va_start(ap, format);
+	int n = vsnprintf(h->text + h->used, HEADER_TEXT - h->used, format, ap);
+	va_end(ap);
+	size_t room = HEADER_TEXT - h->used - 1;
+	h->used += n < 0 ? 0 : (size_t)n < room ? (size_t)n : room;
+}
+
+static void begin_string(struct header *h, enum header_name name)
+{
+	struct exr_attribute *a = add(h, name, STRING);
+	a->type = EXR_ATTRIBUTE_STRING;
+	a->string = h->text + h->used;
+	h->text[h->used] = 0;
+}
+
+static void end_string(struct header *h)
+{
+	if (h->used < HEADER_TEXT - 1)
+		h->used++;
+	h->text[h->used] = 0;
+}
+
+static void add_string(struct header *h, enum header_name name, const char *value)
+{
+	begin_string(h, name);
+	append(h, "%s", value);
+	end_string(h);
+}
+
+static void add_count(struct header *h, enum header_name name, uint64_t value)
+{
+	begin_string(h, name);
+	append(h, "%" PRIu64, value);
+	end_string(h);
+}
+
+static void add_plan(struct header *h, const struct plan *p, uint64_t rounds)
+{
+	char options[512];
+	plan_options(p, rounds, options, sizeof options);
+	add_string(h, H_INTEGRATOR, p->integrator);
+	add_string(h, H_OPTIONS, options);
+	add_count(h, H_SEED, p->seed);
+	add_int(h, H_MIN_DEPTH, p->min_depth);
+	add_int(h, H_MAX_DEPTH, p->max_depth);
+	add_int(h, H_GROUPS, p->groups);
+	add_count(h, H_BOOTSTRAP, p->bootstrap);
+	add_count(h, H_EPOCH, p->epoch);
+	add_count(h, H_ROUNDS, rounds);
+}
+
+static void add_result(struct header *h, const struct canvas_image *img, const struct plan *p)
+{
+	if (p->kind == PLAN_CHAINS) {
+		add_int(h, H_CHAINS, p->chains);
+		add_count(h, H_MUTATIONS, img->samples);
+		add_double(h, H_B, img->b);
+		add_double(h, H_B_ERROR, img->b_error);
+		add_double(h, H_BEYOND, img->beyond_share);
+		add_count(h, H_ACCEPTED, img->counters[COUNT_ACCEPTED]);
+		add_count(h, H_INDEPENDENT, img->counters[COUNT_INDEPENDENT]);
+		add_count(h, H_STUCK, img->counters[COUNT_STUCK]);
+		add_count(h, H_LONGEST_STUCK, img->counters[COUNT_LONGEST_STUCK]);
+	} else {
+		add_count(h, H_SAMPLES, img->rounds * p->groups * p->epoch);
+	}
+	add_double(h, H_REL_MSE, img->rel_mse);
+	add_double(h, H_REL_MSE_UPPER, img->rel_mse_upper);
+	add_count(h, H_NAN, img->counters[COUNT_NAN]);
+	add_count(h, H_INFINITE, img->counters[COUNT_INFINITE]);
+	add_count(h, H_NEGATIVE, img->counters[COUNT_NEGATIVE]);
+	add_count(h, H_RAYS_CLOSEST, img->counters[COUNT_RAYS_CLOSEST]);
+	add_count(h, H_RAYS_SHADOW, img->counters[COUNT_RAYS_SHADOW]);
+}
+
+static void add_extra(struct header *h, const struct header_extra *x)
+{
+	add_string(h, H_SCENE, x->scene ? x->scene : "");
+	add_int(h, H_MIXED, x->mixed);
+	begin_string(h, H_EFFECTS);
+	for (size_t i = 0; i < x->effect_count; i++)
+		append(h, "%s%s: %s (%s)", i ? "\n" : "", x->effects[i].name, x->effects[i].on ? "on" : "off", x->effects[i].why);
+	end_string(h);
+	add_double(h, H_WALL, x->wall_seconds);
+	add_double(h, H_CPU, x->cpu_seconds);
+	add_int(h, H_WORKERS, x->workers);
+	char date[32] = "";
+	time_t now = time(NULL);
+	struct tm utc;
+	if (!x->date && gmtime_r(&now, &utc))
+		strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
+	add_string(h, H_DATE, x->date ? x->date : date);
+}
+
+void header_fill(struct header *h, const struct canvas_image *img, const struct plan *p, const struct header_extra *x)
+{
+	h->count = h->used = 0;
+	add_string(h, H_VERSION, HSLT_VERSION);
+	add_plan(h, p, img->rounds);
+	add_result(h, img, p);
+	add_extra(h, x);
+}

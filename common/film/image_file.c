@@ -1,0 +1,138 @@
+#include "common/film/image_file.h"
+
+#include "common/base/mem.h"
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { PATH_ROOM = 4096 };
+#define FILE_MOST (INT64_C(1) << 32)
+
+static int add_planes(struct exr_image *out, const float *rgb, const char *prefix)
+{
+	size_t pixels = (size_t)out->width * out->height;
+	for (size_t c = 0; c < 3; c++) {
+		float *plane = mem_alloc(pixels, sizeof *plane);
+		if (!plane)
+			return -ENOMEM;
+		for (size_t i = 0; i < pixels; i++)
+			plane[i] = rgb[i * 3 + c];
+		snprintf(out->names[out->channel_count], sizeof out->names[0], "%s%c", prefix, "RGB"[c]);
+		out->planes[out->channel_count++] = plane;
+	}
+	return 0;
+}
+
+int image_file_encode(const struct canvas_image *img, const struct plan *p, const struct header_extra *x,
+		      unsigned char **bytes, size_t *size, struct error *e)
+{
+	struct exr_image out = {.width = img->width, .height = img->height, .full_width = p->width, .full_height = p->height,
+				.x = p->crop_x, .y = p->crop_y};
+	struct header *h = mem_alloc(1, sizeof *h);
+	int rc = h ? add_planes(&out, img->rgb, "") : -ENOMEM;
+	if (rc == 0 && img->error)
+		rc = add_planes(&out, img->error, "error.");
+	if (rc) {
+		error_set(e, ENOMEM, "no memory for the image's file");
+	} else {
+		header_fill(h, img, p, x);
+		out.attributes = h->attributes;
+		out.attribute_count = h->count;
+		rc = exr_write(&out, bytes, size, e);
+	}
+	out.attributes = NULL; /* not mem_alloc'd one by one */
+	exr_image_fini(&out);
+	mem_free(h);
+	return rc;
+}
+
+static int failed(struct error *e, const char *path, const char *what)
+{
+	int code = errno;
+	return error_set(e, code, "%s: cannot %s: %s", path, what, strerror(code));
+}
+
+static int write_all(int fd, const unsigned char *bytes, size_t size)
+{
+	while (size) {
+		ssize_t n = write(fd, bytes, size);
+		if (n < 0 && errno != EINTR)
+			return -1;
+		bytes += n < 0 ? 0 : n;
+		size -= n < 0 ? 0 : (size_t)n;
+	}
+	return fsync(fd);
+}
+
+/* So that the new name survives a crash too; a folder that cannot be opened for it is not worth failing for. */
+static void sync_folder(const char *path)
+{
+	char folder[PATH_ROOM];
+	const char *slash = strrchr(path, '/');
+	int n = slash ? snprintf(folder, sizeof folder, "%.*s/", (int)(slash - path), path) : snprintf(folder, sizeof folder, ".");
+	int fd = n > 0 ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
+	if (fd < 0)
+		return;
+	fsync(fd);
+	close(fd);
+}
+
+int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e)
+{
+	char temporary[PATH_ROOM];
+	int n = snprintf(temporary, sizeof temporary, "%s.XXXXXX", path);
+	if (n < 0 || (size_t)n >= sizeof temporary)
+		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
+	int fd = mkostemp(temporary, O_CLOEXEC);
+	if (fd < 0)
+		return failed(e, path, "write there");
+	mode_t mask = umask(0);
+	umask(mask);
+	int rc = write_all(fd, bytes, size) != 0 || fchmod(fd, 0666 & ~mask) != 0 ? failed(e, path, "write") : 0;
+	if (close(fd) != 0 && rc == 0)
+		rc = failed(e, path, "write");
+	if (rc == 0 && rename(temporary, path) != 0)
+		rc = failed(e, path, "put the file in place");
+	if (rc)
+		unlink(temporary);
+	else
+		sync_folder(path);
+	return rc;
+}
+
+int image_file_read(const char *path, unsigned char **bytes, size_t *size, struct error *e)
+{
+	struct stat st;
+	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	if (fd < 0)
+		return failed(e, path, "open");
+	int rc = 0;
+	unsigned char *all = NULL;
+	size_t got = 0;
+	if (fstat(fd, &st) != 0)
+		rc = failed(e, path, "read");
+	else if (!S_ISREG(st.st_mode) || st.st_size > FILE_MOST)
+		rc = error_set(e, EINVAL, "%s: not a regular file of at most 4 GiB", path);
+	else if (!(all = mem_alloc((size_t)st.st_size, 1)))
+		rc = error_set(e, ENOMEM, "%s: no memory for it", path);
+	while (rc == 0 && got < (size_t)st.st_size) {
+		ssize_t n = read(fd, all + got, (size_t)st.st_size - got);
+		if (n < 0 && errno != EINTR)
+			rc = failed(e, path, "read");
+		if (n == 0)
+			break;
+		got += n < 0 ? 0 : (size_t)n;
+	}
+	close(fd);
+	if (rc) {
+		mem_free(all);
+		return rc;
+	}
+	*bytes = all;
+	*size = got;
+	return 0;
+}

@@ -1,0 +1,17 @@
+/* The image as a file: EXR with header, errors beside colours, and put in place as a whole or not at all. Any thread. */
+#ifndef COMMON_FILM_IMAGE_FILE_H
+#define COMMON_FILM_IMAGE_FILE_H
+
+#include "common/film/header.h"
+
+/* R G B and, with more than one group, error.R error.G error.B; bytes are mem_alloc'd. */
+int image_file_encode(const struct canvas_image *img, const struct plan *p, const struct header_extra *x,
+		      unsigned char **bytes, size_t *size, struct error *e);
+
+/* Temporary file beside it, fsync, rename, fsync of the folder. */
+int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e);
+
+/* The whole file, at most 2^32 bytes; bytes are mem_alloc'd. */
+int image_file_read(const char *path, unsigned char **bytes, size_t *size, struct error *e);
+
+#endif
