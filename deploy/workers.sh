@@ -1,0 +1,88 @@
+#!/bin/sh
+# Starts (or stops) hslt-worker on named hosts over ssh.
+set -eu
+
+usage() {
+	cat <<'TEXT'
+Usage: deploy/workers.sh [OPTION...] HOST...
+Starts hslt-worker on each HOST over ssh (user@host works), in the background, with its log on that host.
+
+  -c, --coordinator HOST:PORT  the coordinator, as the hosts reach it (or $HSLT_COORDINATOR)
+  -t, --threads N              render threads (all cores of the host)
+  -p, --path PROGRAM           hslt-worker on the hosts (hslt-worker)
+  -l, --log FILE               log on the hosts (~/hslt-worker.log)
+  -i, --insecure               the coordinator is not on the same host: there is no encryption yet
+  -s, --stop                   stop the workers that this script started there (SIGTERM: they finish their epochs)
+  -n, --dry-run                only print what would be done
+  -h, --help
+
+Examples:
+  deploy/workers.sh -c farm.lan:7700 --insecure node1 node2 node3
+  deploy/workers.sh --stop node1
+
+$SSH is the ssh command (ssh -o BatchMode=yes). Exit code: 0 when all hosts worked, 1 when one did not, 2 usage.
+TEXT
+}
+
+die() {
+	echo "workers.sh: $*" >&2
+	exit 2
+}
+
+# quote WORD: safe for the shell at the other end
+quote() {
+	printf "'%s'" "$(printf %s "$1" | sed "s/'/'\\\\''/g")"
+}
+
+coordinator=${HSLT_COORDINATOR:-}
+threads= program=hslt-worker log= insecure= stop= dry=
+while [ $# -gt 0 ]; do
+	case $1 in
+	-c | --coordinator | -t | --threads | -p | --path | -l | --log)
+		[ $# -ge 2 ] || die "$1 needs a value"
+		case $1 in
+		-c | --coordinator) coordinator=$2 ;;
+		-t | --threads) threads=$2 ;;
+		-p | --path) program=$2 ;;
+		-l | --log) log=$2 ;;
+		esac
+		shift 2
+		;;
+	-i | --insecure) insecure=1 && shift ;;
+	-s | --stop) stop=1 && shift ;;
+	-n | --dry-run) dry=1 && shift ;;
+	-h | --help) usage && exit 0 ;;
+	--) shift && break ;;
+	-*) die "unknown option $1 (see --help)" ;;
+	*) break ;;
+	esac
+done
+[ $# -gt 0 ] || die "which hosts? (see --help)"
+[ -n "$stop" ] || [ -n "$coordinator" ] || die "--coordinator HOST:PORT is needed (or \$HSLT_COORDINATOR)"
+case $threads in
+*[!0-9]*) die "--threads takes a number" ;;
+esac
+
+if [ -n "$stop" ]; then
+	remote='for f in ~/.hslt-worker.pid; do [ -s "$f" ] && kill "$(cat "$f")" && rm -f "$f" && echo stopped; done'
+else
+	command="$(quote "$program") --coordinator $(quote "$coordinator")"
+	[ -z "$threads" ] || command="$command --threads $threads"
+	[ -z "$insecure" ] || command="$command --insecure"
+	target='~/hslt-worker.log'
+	[ -z "$log" ] || target=$(quote "$log")
+	remote="nohup $command --name \"\$(hostname)\" >>$target 2>&1 </dev/null & echo \$! >~/.hslt-worker.pid;"
+	remote="$remote sleep 1; kill -0 \"\$(cat ~/.hslt-worker.pid)\" && echo started || { tail -n 3 $target; exit 1; }"
+fi
+
+failed=0
+for host in "$@"; do
+	echo "$host: $remote"
+	[ -z "$dry" ] || continue
+	# shellcheck disable=SC2086 # $SSH is a command with its options
+	${SSH:-ssh -o BatchMode=yes} "$host" "$remote" || {
+		echo "$host: failed" >&2
+		failed=1
+	}
+done
+exit $failed

@@ -1,0 +1,59 @@
+/*
+ * Bytes from a peer: frames, envelopes, and what is made of the messages that carry payloads.
+ *
+ * clang -std=c17 -g -O1 -D_GNU_SOURCE -I. -Ibuild/gen -fsanitize=fuzzer,address,undefined \
+ *   -fno-sanitize-recover=all tests/fuzz/fuzz_frame.c \
+ *   common/base/{arena,buf,error,mem,text}.c common/{wire,plan,film}/[a-z]*.c build/gen/proto/farm.pb-c.c \
+ *   -lOpenEXRCore -lprotobuf-c -lm -o build/fuzz_frame && build/fuzz_frame -max_total_time=60 -max_len=65536
+ */
+#include "common/wire/batch_wire.h"
+#include "common/wire/frame.h"
+
+#include <stdint.h>
+#include <string.h>
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
+
+static void take_message(const struct frame_reader *r)
+{
+	struct envelope env;
+	struct error e;
+	if (envelope_unpack(&env, r->header.bytes, r->header.size, &e))
+		return;
+	const Farm__Envelope *m = env.message;
+	struct plan plan;
+	struct plan_request request;
+	struct batch batch;
+	struct grant grant;
+	if (m->body_case == FARM__ENVELOPE__BODY_JOB_INFO)
+		plan_from_wire(m->job_info->plan, &plan, &e);
+	if (m->body_case == FARM__ENVELOPE__BODY_SUBMIT && !plan_request_from_wire(m->submit->plan, &request, &e))
+		plan_make(&request, &plan, &e);
+	if (m->body_case == FARM__ENVELOPE__BODY_LEASE_GRANT &&
+	    !grant_unpack(&grant, m->lease_grant, r->payload.bytes, r->payload.size, &e))
+		grant_fini(&grant);
+	if (m->body_case == FARM__ENVELOPE__BODY_LEASE_RESULT) {
+		struct plan_request small = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 70, .height = 70, .spp = 1,
+					     .max_depth = 4, .chains = 16, .groups = 4, .bootstrap = 64, .epoch = 4};
+		if (!plan_make(&small, &plan, &e) &&
+		    !batch_unpack(&batch, &plan, m->lease_result, r->payload.bytes, r->payload.size, &e))
+			batch_fini(&batch);
+	}
+	envelope_fini(&env);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
+{
+	struct frame_reader r;
+	struct error e;
+	frame_reader_init(&r, (struct frame_limits){1 << 20, 1 << 20});
+	for (size_t at = 0, used; at < size; at += used) {
+		int rc = frame_reader_take(&r, bytes + at, size - at, &used, &e);
+		if (rc < 0)
+			break;
+		if (rc)
+			take_message(&r);
+	}
+	frame_reader_fini(&r);
+	return 0;
+}
