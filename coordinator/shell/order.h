@@ -39,7 +39,7 @@ struct order {
 	uint32_t chains_per_lease;
 	FILE *log;
 	bool busy, ended;
-	double render_begun, cpu_seconds; /* s on the loop's clock; of all merged batches */
+	double cpu_seconds; /* of all merged leases */
 	uint32_t worker_count;            /* who had leases of it */
 	uint64_t last_workers[64];
 	struct waiting_batch *waiting, **waiting_last;

@@ -2,11 +2,13 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/film/exr.h"
+#include "common/film/image_file.h"
 
 #include <assert.h>
 #include <math.h>
 #include <string.h>
+
+enum { HEADER_EFFECTS_MAX = 64 };
 
 struct publishing {
 	uv_work_t work;
@@ -22,42 +24,28 @@ struct publishing {
 
 static const char *const files[] = {[PUBLISH_PREVIEW] = "preview.exr", [PUBLISH_RESULT] = "result.exr"};
 
-/* Planes for the EXR from interleaved pixels. */
-static int add_planes(struct exr_image *x, const float *rgb, const char *prefix, struct error *e)
-{
-	size_t pixels = (size_t)x->width * x->height;
-	for (int c = 0; c < 3; c++) {
-		float *plane = mem_alloc(pixels, sizeof *plane);
-		if (!plane)
-			return error_set(e, ENOMEM, "no memory for an image");
-		for (size_t i = 0; i < pixels; i++)
-			plane[i] = rgb[3 * i + (size_t)c];
-		snprintf(x->names[x->channel_count], sizeof x->names[0], "%s%c", prefix, "RGB"[c]);
-		x->planes[x->channel_count++] = plane;
-	}
-	return 0;
-}
-
 static int write_image(struct publishing *w)
 {
-	const struct plan *p = &w->order->plan;
-	struct exr_image x = {.width = w->image.width,
-			      .height = w->image.height,
-			      .full_width = p->width,
-			      .full_height = p->height,
-			      .x = p->crop_x,
-			      .y = p->crop_y};
+	const struct order *o = w->order;
+	const Farm__Submit *m = order_submit(o);
+	const char *slash = strrchr(m->scene, '/');
+	struct header_effect effects[HEADER_EFFECTS_MAX];
+	struct header_extra x = {.scene = slash ? slash + 1 : m->scene,
+				 .effects = effects,
+				 .mixed = m->mixed,
+				 .wall_seconds = w->wall_seconds,
+				 .cpu_seconds = o->cpu_seconds,
+				 .workers = o->worker_count};
+	for (; x.effect_count < m->n_effects && x.effect_count < HEADER_EFFECTS_MAX; x.effect_count++) {
+		const Farm__Effect *f = m->effects[x.effect_count];
+		effects[x.effect_count] = (struct header_effect){f->name, f->on, f->why};
+	}
 	unsigned char *bytes = NULL;
 	size_t size = 0;
-	int rc = add_planes(&x, w->image.rgb, "", &w->error);
-	if (!rc && w->image.error)
-		rc = add_planes(&x, w->image.error, "error.", &w->error);
+	int rc = image_file_encode(&w->image, &o->plan, &x, &bytes, &size, &w->error);
 	if (!rc)
-		rc = exr_write(&x, &bytes, &size, &w->error);
-	if (!rc)
-		rc = spool_write(w->server->spool, w->order->id, files[w->what], bytes, size, &w->error);
+		rc = spool_write(w->server->spool, o->id, files[w->what], bytes, size, &w->error);
 	mem_free(bytes);
-	exr_image_fini(&x);
 	return rc;
 }
 
@@ -131,6 +119,9 @@ void publish_start(struct server *s, struct order *o, enum publish_what what, ui
 	w->what = what;
 	w->rounds = rounds;
 	w->work.data = w;
+	struct job_status status; /* from the first lease to now */
+	if (farm_job(s->farm, o->id, server_now(s), &status))
+		w->wall_seconds = (isnan(status.ended) ? server_now(s) : status.ended) - status.started;
 	o->busy = true;
 	int rc = uv_queue_work(&s->loop, &w->work, run, done);
 	assert(rc == 0);
