@@ -78,6 +78,23 @@ static const float *plane_of(const struct exr_image *img, const char *name)
 	return NULL;
 }
 
+struct compressor {
+	exr_result_t (*run)(exr_encode_pipeline_t *encode); /* the library's own */
+};
+
+/*
+ * A chunk whose size in the file is that of its pixels is read as stored. OpenEXRCore 3.1.5 stores only what deflate makes
+ * larger, so that deflated bytes of exactly that size would be taken for pixels.
+ */
+static exr_result_t compress_or_store(exr_encode_pipeline_t *encode)
+{
+	const struct compressor *c = encode->encoding_user_data;
+	exr_result_t rc = c->run(encode);
+	if (rc == EXR_ERR_SUCCESS && encode->compressed_bytes == encode->packed_bytes)
+		memcpy(encode->compressed_buffer, encode->packed_buffer, encode->packed_bytes);
+	return rc;
+}
+
 static exr_result_t write_chunk(exr_context_t x, const struct exr_image *img, uint32_t first_row)
 {
 	exr_chunk_info_t chunk;
@@ -96,6 +113,11 @@ static exr_result_t write_chunk(exr_context_t x, const struct exr_image *img, ui
 		to->user_line_stride = (int32_t)(img->width * sizeof(float));
 	}
 	rc = exr_encoding_choose_default_routines(x, 0, &encode);
+	struct compressor library = {encode.compress_fn};
+	if (library.run) {
+		encode.encoding_user_data = &library;
+		encode.compress_fn = compress_or_store;
+	}
 	if (rc == EXR_ERR_SUCCESS)
 		rc = exr_encoding_run(x, 0, &encode);
 	exr_encoding_destroy(x, &encode);
