@@ -27,13 +27,13 @@ struct tile {
 /* The state of one chain after an epoch: opaque to all but the integrator; any worker can go on from it. */
 struct chain_state {
 	uint8_t *bytes;
-	uint32_t size; /* <= CHAIN_STATE_MAX; 0: the chain is dead (its group's bootstrap was black) */
+	uint32_t size; /* 1..CHAIN_STATE_MAX */
 };
 enum { CHAIN_STATE_MAX = 1 << 16 };
 
 enum { BATCH_COUNTERS = 16 };
 enum batch_counter {
-	COUNT_SAMPLES,        /* samples or mutations made; dead chains make none */
+	COUNT_SAMPLES,        /* samples or mutations made */
 	COUNT_ACCEPTED,       /* accepted mutations */
 	COUNT_INDEPENDENT,    /* independent proposals (bootstrap samples, large steps) */
 	COUNT_NAN,            /* contributions refused: not a number */

@@ -98,12 +98,15 @@ void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r)
 	r->black = !(inside > 0);
 }
 
-bool bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index)
+void bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index)
 {
 	assert(s->missing == 0 && s->plan.kind == PLAN_CHAINS);
 	uint64_t first = plan_bootstrap_range(&s->plan, group, 0).begin, count = s->plan.bootstrap / s->plan.groups;
-	return plan_resample(&s->plan, group, s->weights + first, count, plan_resample_u(&s->plan, group),
-			     s->plan.chains / s->plan.groups, index);
+	if (plan_resample(&s->plan, group, s->weights + first, count, plan_resample_u(&s->plan, group),
+			  s->plan.chains / s->plan.groups, index))
+		return;
+	for (uint32_t k = 0; k < s->plan.chains / s->plan.groups; k++)
+		index[k] = UINT64_MAX;
 }
 
 void bootstrap_to_canvas(const struct bootstrap *s, struct canvas *c)

@@ -19,8 +19,9 @@ uint32_t bootstrap_missing(const struct bootstrap *s); /* leases */
 /* When complete: b by group and pooled, from the weights in index order. */
 void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r);
 /* Seeds of all chains of a group, chains / groups of them: the k-th belongs to chain group + groups * k, and a lease's
- * are those of plan_chain_range(). false: the group's bootstrap is black and its chains are dead. */
-bool bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index);
+ * are those of plan_chain_range(). Where the group's bootstrap is black all are
+ * UINT64_MAX: such a chain looks for light by independent proposals. */
+void bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index);
 /* Adds the independent sums of all batches to a new canvas. */
 void bootstrap_to_canvas(const struct bootstrap *s, struct canvas *c);
 

@@ -42,13 +42,12 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 	o->waiting_last = &o->waiting;
 	begin_record(o);
 	o->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->states);
-	o->group_dead = mem_alloc(plan->groups, sizeof *o->group_dead);
 	if (plan->kind == PLAN_CHAINS) {
 		o->chains_per_lease = plan->chains / (plan->groups * plan->parts);
 		o->seeds = mem_alloc(plan->chains, sizeof *o->seeds);
 	}
 	int rc = 0;
-	if (!o->states || !o->group_dead || (plan->kind == PLAN_CHAINS && !o->seeds))
+	if (!o->states || (plan->kind == PLAN_CHAINS && !o->seeds))
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	if (!rc)
 		rc = bootstrap_new(&o->bootstrap, plan, e);
@@ -78,7 +77,6 @@ void order_free(struct order *o)
 	for (uint32_t i = 0; o->states && i < o->plan.groups * o->plan.parts; i++)
 		states_fini(o->states[i], o->chains_per_lease);
 	mem_free(o->states);
-	mem_free(o->group_dead);
 	mem_free(o->seeds);
 	bootstrap_free(o->bootstrap);
 	canvas_free(o->canvas);
@@ -134,7 +132,7 @@ int order_prepare(struct order *o, const char *canvas_folder, struct error *e)
 	bootstrap_to_canvas(o->bootstrap, o->canvas);
 	uint32_t per_group = o->plan.kind == PLAN_CHAINS ? o->plan.chains / o->plan.groups : 0;
 	for (uint32_t g = 0; o->seeds && g < o->plan.groups; g++)
-		o->group_dead[g] = !bootstrap_seeds(o->bootstrap, g, o->seeds + (size_t)g * per_group);
+		bootstrap_seeds(o->bootstrap, g, o->seeds + (size_t)g * per_group);
 	bootstrap_free(o->bootstrap);
 	o->bootstrap = NULL;
 	return 0;
@@ -148,17 +146,8 @@ int order_pack_lease(const struct order *o, const struct lease_key *k, unsigned 
 		return grant_pack(k, NULL, *states_at(o, k), o->chains_per_lease, frame, size, e);
 	struct plan_range r = plan_chain_range(&o->plan, k->part);
 	assert(r.end - r.begin == o->chains_per_lease);
-	if (!o->group_dead[k->group]) {
-		const uint64_t *seeds = o->seeds + (size_t)k->group * (o->plan.chains / o->plan.groups) + r.begin;
-		return grant_pack(k, seeds, NULL, o->chains_per_lease, frame, size, e);
-	}
-	/* Dead chains have empty states from the start. */
-	struct chain_state *dead = mem_alloc(o->chains_per_lease, sizeof *dead);
-	if (!dead)
-		return error_set(e, ENOMEM, "no memory to pack a lease");
-	int rc = grant_pack(k, NULL, dead, o->chains_per_lease, frame, size, e);
-	mem_free(dead);
-	return rc;
+	const uint64_t *seeds = o->seeds + (size_t)k->group * (o->plan.chains / o->plan.groups) + r.begin;
+	return grant_pack(k, seeds, NULL, o->chains_per_lease, frame, size, e);
 }
 
 void order_count_worker(struct order *o, uint64_t peer)

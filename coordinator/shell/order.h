@@ -34,7 +34,6 @@ struct order {
 	struct canvas *canvas;       /* from then on */
 	struct bootstrap_result lit;
 	uint64_t *seeds;             /* [groups][chains / groups]; NULL for samples */
-	bool *group_dead;            /* [groups]: its bootstrap was black */
 	struct chain_state **states; /* [groups x parts]; NULL entries: no epoch merged yet */
 	uint32_t chains_per_lease;
 	FILE *log;

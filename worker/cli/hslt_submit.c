@@ -24,30 +24,11 @@ static const char doc[] =
 	"Exit codes: 0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 6 refused, 75 "
 	"coordinator not reachable.";
 
-enum {
-	OPTION_SPP = 256, OPTION_MUTATIONS, OPTION_TIME, OPTION_TARGET, OPTION_SIZE, OPTION_CROP, OPTION_SEED, OPTION_MIN_DEPTH,
-	OPTION_MAX_DEPTH, OPTION_PRIORITY, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED,
-	OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH, DEFINES_MAX = 256
-};
+enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
 	{"output", 'o', "FILE", 0, "The image", 0},
-	{"integrator", 'i', "NAME", 0, "path, bdpt, pssmlt", 0},
-	{"spp", OPTION_SPP, "N", 0, "Samples a pixel", 0},
-	{"mutations", OPTION_MUTATIONS, "N", 0, "Mutations or samples in all", 0},
-	{"time", OPTION_TIME, "SECONDS", 0, "Wall clock", 0},
-	{"target-error", OPTION_TARGET, "E", 0, "Relative error: 0.02 or 2%", 0},
-	{"size", OPTION_SIZE, "WxH", 0, "Size of the film", 0},
-	{"crop", OPTION_CROP, "X,Y,W,H", 0, "Part of the film", 0},
-	{"seed", OPTION_SEED, "S", 0, "Of all random numbers (0)", 0},
-	{"min-depth", OPTION_MIN_DEPTH, "K", 0, "Shortest paths, in edges", 0},
-	{"max-depth", OPTION_MAX_DEPTH, "K", 0, "Longest paths, in edges", 0},
-	{"chains", OPTION_CHAINS, "N", 0, "Chains", 0},
-	{"groups", OPTION_GROUPS, "N", 0, "Groups", 0},
-	{"bootstrap", OPTION_BOOTSTRAP, "N", 0, "Bootstrap samples", 0},
-	{"epoch", OPTION_EPOCH, "N", 0, "Mutations of a chain between two merges", 0},
-	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 0},
 	{"priority", OPTION_PRIORITY, "P", 0, "-100 to 100, higher first (0)", 0},
 	{"name", OPTION_NAME, "NAME", 0, "How the job is shown (the scene's file name)", 0},
 	{"wait", OPTION_WAIT, NULL, 0, "Show progress and fetch the image", 0},
@@ -57,110 +38,28 @@ static const struct argp_option options[] = {
 	{0},
 };
 
+static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
+
 struct arguments {
 	const char *coordinator, *scene, *output, *name;
 	struct submit_request request;
-	struct scene_define defines[DEFINES_MAX];
-	bool wait, json, insecure, has_crop;
+	struct render_arguments render;
+	bool wait, json, insecure;
 };
-
-static uint64_t whole(struct argp_state *state, const char *option, const char *arg)
-{
-	char *end;
-	errno = 0;
-	unsigned long long n = strtoull(arg, &end, 10);
-	if (*arg < '0' || *arg > '9' || *end || errno)
-		argp_error(state, "%s takes a whole number, not '%s'", option, arg);
-	return n;
-}
-
-static double target_error(struct argp_state *state, const char *arg)
-{
-	char *end;
-	double x = strtod(arg, &end);
-	if (end != arg && strcmp(end, "%") == 0) {
-		x /= 100;
-		end++;
-	}
-	if (end == arg || *end || !(x > 0 && x < 1e3))
-		argp_error(state, "--target-error takes something like 0.02 or 2%%, not '%s'", arg);
-	return x;
-}
-
-static void take_define(struct arguments *a, char *arg, struct argp_state *state)
-{
-	char *equals = strchr(arg, '=');
-	if (!equals || equals == arg)
-		argp_error(state, "-D takes NAME=VALUE, not '%s'", arg);
-	if (a->request.define_count == DEFINES_MAX)
-		argp_error(state, "at most %d times -D", DEFINES_MAX);
-	*equals = 0;
-	a->defines[a->request.define_count++] = (struct scene_define){arg, equals + 1};
-}
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
 	struct arguments *a = state->input;
-	struct plan_request *p = &a->request.plan;
-	char rest;
 	char *end;
 	switch (key) {
+	case ARGP_KEY_INIT:
+		state->child_inputs[0] = &a->render;
+		return 0;
 	case 'c':
 		a->coordinator = arg;
 		return 0;
 	case 'o':
 		a->output = arg;
-		return 0;
-	case 'i':
-		if (!render_integrator_find(arg))
-			argp_error(state, "there is no integrator '%s'", arg);
-		text_copy(p->integrator, sizeof p->integrator, arg);
-		return 0;
-	case 'D':
-		take_define(a, arg, state);
-		return 0;
-	case OPTION_SPP:
-		p->spp = whole(state, "--spp", arg);
-		return 0;
-	case OPTION_MUTATIONS:
-		p->mutations = whole(state, "--mutations", arg);
-		return 0;
-	case OPTION_TIME:
-		p->seconds = strtod(arg, &end);
-		if (end == arg || *end || !(p->seconds > 0))
-			argp_error(state, "--time takes seconds, not '%s'", arg);
-		return 0;
-	case OPTION_TARGET:
-		p->target_error = target_error(state, arg);
-		return 0;
-	case OPTION_SIZE:
-		if (sscanf(arg, "%ux%u%c", &a->request.render.width, &a->request.render.height, &rest) != 2)
-			argp_error(state, "--size takes WxH, not '%s'", arg);
-		return 0;
-	case OPTION_CROP:
-		if (sscanf(arg, "%u,%u,%u,%u%c", &p->crop_x, &p->crop_y, &p->crop_width, &p->crop_height, &rest) != 4)
-			argp_error(state, "--crop takes X,Y,W,H, not '%s'", arg);
-		return 0;
-	case OPTION_SEED:
-		p->seed = whole(state, "--seed", arg);
-		return 0;
-	case OPTION_MIN_DEPTH:
-		p->min_depth = (uint32_t)whole(state, "--min-depth", arg);
-		return 0;
-	case OPTION_MAX_DEPTH:
-		p->max_depth = (uint32_t)whole(state, "--max-depth", arg);
-		return 0;
-	case OPTION_CHAINS:
-		p->chains = (uint32_t)whole(state, "--chains", arg);
-		return 0;
-	case OPTION_GROUPS:
-		p->groups = (uint32_t)whole(state, "--groups", arg);
-		return 0;
-	case OPTION_BOOTSTRAP:
-		p->bootstrap = whole(state, "--bootstrap", arg);
-		return 0;
-	case OPTION_EPOCH:
-		p->epoch = whole(state, "--epoch", arg);
 		return 0;
 	case OPTION_PRIORITY:
 		a->request.priority = (int)strtol(arg, &end, 10);
@@ -196,24 +95,6 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	default:
 		return ARGP_ERR_UNKNOWN;
 	}
-}
-
-static void plan_from_scene(struct arguments *a, const struct scene_settings *s)
-{
-	struct plan_request *p = &a->request.plan;
-	if (!*p->integrator)
-		text_copy(p->integrator, sizeof p->integrator, RENDER_INTEGRATOR_DEFAULT);
-	const struct render_integrator *i = render_integrator_find(p->integrator);
-	p->kind = i->kind;
-	p->width = s->width;
-	p->height = s->height;
-	p->border = s->border;
-	if (!p->max_depth)
-		p->max_depth = s->max_depth;
-	if (p->max_depth > i->max_depth)
-		p->max_depth = i->max_depth;
-	if (!p->spp && !p->mutations && !(p->seconds > 0) && !(p->target_error > 0))
-		p->spp = s->spp;
 }
 
 /* The name by which a later fetch finds the place, from wherever it is called. */
@@ -275,17 +156,17 @@ int main(int argc, char **argv)
 	char output[1024];
 	int code = 0;
 	a.coordinator = getenv("HSLT_COORDINATOR");
-	a.request.defines = a.defines;
+	a.request.args = &a.render;
 	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &a);
-	int rc = scene_bundle_read(&b, a.scene, a.defines, a.request.define_count, &a.request.render, &e);
+	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
+	int rc = scene_bundle_read(&b, a.scene, a.render.defines, a.render.define_count, &a.render.render, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		return 1;
 	}
 	for (size_t i = 0; i < b.note_count; i++)
 		fprintf(stderr, "%s\n", b.notes[i]);
-	plan_from_scene(&a, &b.summary.settings);
+	render_plan_from_scene(&a.render.plan, &b.summary.settings);
 	a.request.output = output;
 	a.request.name = a.name ? a.name : b.scene;
 	rc = absolute(a.output, output, sizeof output, &e);

@@ -4,6 +4,7 @@
 #include "common/base/progress.h"
 #include "common/base/text.h"
 #include "common/wire/plan_wire.h"
+#include "worker/cli/options.h"
 
 #include <fcntl.h>
 #include <stdio.h>
@@ -13,18 +14,6 @@
 enum { PATH_BYTES = 4096, CHUNK = 1 << 20 };
 
 /* ---- the bundle ---- */
-
-static int split_path(struct scene_bundle *b, const char *path, struct error *e)
-{
-	const char *slash = strrchr(path, '/');
-	b->scene = mem_strdup(slash ? slash + 1 : path);
-	b->folder = mem_strdup(slash ? path : ".");
-	if (!b->scene || !b->folder)
-		return error_set(e, ENOMEM, "no memory for the scene's name");
-	if (slash)
-		b->folder[slash == path ? 1 : slash - path] = 0;
-	return *b->scene ? 0 : error_set(e, EINVAL, "%s: is a folder, not a scene file", path);
-}
 
 static int add_file(struct scene_bundle *b, const char *name, struct error *e)
 {
@@ -68,11 +57,9 @@ int scene_bundle_read(struct scene_bundle *b, const char *path, const struct sce
 {
 	struct scene scene;
 	memset(b, 0, sizeof *b);
-	int rc = split_path(b, path, e);
-	if (rc) {
-		scene_bundle_fini(b);
+	int rc = scene_path_split(path, &b->folder, &b->scene, e);
+	if (rc)
 		return rc;
-	}
 	struct asset_source assets = asset_folder(b->folder);
 	rc = scene_read(&scene, &assets, b->scene, render_plugins(), defines, define_count, e);
 	if (!rc) {
@@ -133,7 +120,7 @@ static int lists_init(struct lists *l, const struct submit_request *r, struct sc
 {
 	size_t lines = b->summary.line_count;
 	*l = (struct lists){mem_alloc(b->count, sizeof *l->files),	  mem_alloc(b->count, sizeof *l->file_at),
-			    mem_alloc(r->define_count, sizeof *l->defines), mem_alloc(r->define_count, sizeof *l->define_at),
+			    mem_alloc(r->args->define_count, sizeof *l->defines), mem_alloc(r->args->define_count, sizeof *l->define_at),
 			    mem_alloc(lines, sizeof *l->effects),	  mem_alloc(lines, sizeof *l->effect_at)};
 	if (!l->files || !l->file_at || !l->defines || !l->define_at || !l->effects || !l->effect_at) {
 		lists_fini(l);
@@ -146,11 +133,11 @@ static int lists_init(struct lists *l, const struct submit_request *r, struct sc
 		f->hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, b->files[i].hash.bytes};
 		f->size = b->files[i].size;
 	}
-	for (size_t i = 0; i < r->define_count; i++) {
+	for (size_t i = 0; i < r->args->define_count; i++) {
 		Farm__Define *d = l->define_at[i] = &l->defines[i];
 		farm__define__init(d);
-		d->name = borrow(r->defines[i].name);
-		d->value = borrow(r->defines[i].value);
+		d->name = borrow(r->args->defines[i].name);
+		d->value = borrow(r->args->defines[i].value);
 	}
 	for (size_t i = 0; i < lines; i++) {
 		Farm__Effect *f = l->effect_at[i] = &l->effects[i];
@@ -183,13 +170,13 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 		return rc;
 	farm__submit__init(&s);
 	farm__envelope__init(&m);
-	plan_request_to_wire(&r->plan, &plan);
+	plan_request_to_wire(&r->args->plan, &plan);
 	s.name = borrow(r->name);
 	s.scene = b->scene;
-	s.n_defines = r->define_count;
+	s.n_defines = r->args->define_count;
 	s.defines = l.define_at;
-	s.render_width = r->render.width;
-	s.render_height = r->render.height;
+	s.render_width = r->args->render.width;
+	s.render_height = r->args->render.height;
 	s.plan = &plan;
 	s.priority = r->priority;
 	s.n_files = b->count;

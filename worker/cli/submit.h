@@ -8,7 +8,7 @@
 #include "common/blob/blob.h"
 #include "common/net/client.h"
 #include "common/plan/plan.h"
-#include "worker/render/render.h"
+#include "worker/cli/options.h"
 
 /* A scene and its files, as read here. */
 struct scene_bundle {
@@ -34,10 +34,7 @@ struct submit_request {
 	const char *name, *output; /* output: absolute, or "" */
 	int priority;
 	bool mixed;
-	struct plan_request plan;
-	struct render_options render;
-	const struct scene_define *defines;
-	size_t define_count;
+	const struct render_arguments *args;
 };
 
 /* -EACCES: the coordinator refuses; the sentence is its own. plan_text: what was chosen and by which rule. */

@@ -1,0 +1,306 @@
+#include "common/base/mem.h"
+#include "common/base/progress.h"
+#include "common/base/version.h"
+#include "common/film/image_file.h"
+#include "worker/cli/local.h"
+#include "worker/cli/options.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+const char *argp_program_version = "hslt-render " HSLT_VERSION;
+
+static const char doc[] =
+	"Renders a scene on this machine, without a farm: the same plan gives the same bits as the farm's."
+	"\v"
+	"Examples:\n"
+	"  hslt-render room.xml -o room.exr --spp 64\n"
+	"  hslt-render room.xml -o room.exr --integrator path --size 320x180 --threads 8 --stats room.json\n"
+	"  hslt-render room.xml -o room.exr --target-error 2% --time 3600\n"
+	"\n"
+	"The image holds linear Rec. 709 (R G B) and one standard error of each (error.R error.G error.B).\n"
+	"Exit codes: 0 done, 1 failed, 2 usage, 4 a bound came before the target error.";
+
+enum { OPTION_THREADS = 256, OPTION_STATS, OPTION_QUIET };
+
+static const struct argp_option options[] = {
+	{"output", 'o', "FILE", 0, "The image (OpenEXR)", 0},
+	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors); does not change the bits", 0},
+	{"stats", OPTION_STATS, "FILE", 0, "Write plan, times, counters and effects as JSON", 0},
+	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
+	{0},
+};
+static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
+
+struct arguments {
+	const char *scene, *output, *stats;
+	unsigned threads;
+	bool quiet;
+	struct render_arguments render;
+};
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+	struct arguments *a = state->input;
+	switch (key) {
+	case ARGP_KEY_INIT:
+		state->child_inputs[0] = &a->render;
+		return 0;
+	case 'o':
+		a->output = arg;
+		return 0;
+	case OPTION_THREADS:
+		a->threads = (unsigned)option_whole(state, "--threads", arg);
+		if (a->threads < 1 || a->threads > 1024)
+			argp_error(state, "--threads takes 1 to 1024, not '%s'", arg);
+		return 0;
+	case OPTION_STATS:
+		a->stats = arg;
+		return 0;
+	case OPTION_QUIET:
+		a->quiet = true;
+		return 0;
+	case ARGP_KEY_ARG:
+		if (a->scene)
+			argp_error(state, "one scene at a time");
+		a->scene = arg;
+		return 0;
+	case ARGP_KEY_END:
+		if (!a->scene || !a->output)
+			argp_error(state, "a scene and -o FILE are needed");
+		return 0;
+	default:
+		return ARGP_ERR_UNKNOWN;
+	}
+}
+
+static atomic_bool interrupted;
+
+static void interrupt(int signal_number)
+{
+	(void)signal_number;
+	atomic_store(&interrupted, true);
+}
+
+struct session {
+	struct arguments *a;
+	char *folder, *name;
+	struct world *world;
+	struct render_summary summary;
+	struct plan plan;
+	struct local_run run;
+	struct canvas_image image;
+	double build_seconds;
+	struct progress progress;
+};
+
+static double now(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static int load(struct session *s, struct error *e)
+{
+	struct scene scene;
+	double begin = now();
+	int rc = scene_path_split(s->a->scene, &s->folder, &s->name, e);
+	if (rc)
+		return rc;
+	struct asset_source assets = asset_folder(s->folder);
+	rc = scene_read(&scene, &assets, s->name, render_plugins(), s->a->render.defines, s->a->render.define_count, e);
+	if (rc)
+		return rc;
+	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)
+		fprintf(stderr, "%s\n", scene.notes[i]);
+	rc = world_new(&s->world, &scene, &assets, &s->a->render.render, e);
+	scene_fini(&scene);
+	if (rc)
+		return rc;
+	world_summary(s->world, &s->summary);
+	s->build_seconds = now() - begin;
+	return 0;
+}
+
+static int make_plan(struct session *s, struct error *e)
+{
+	struct plan_request *p = &s->a->render.plan;
+	char text[1024];
+	render_plan_from_scene(p, &s->summary.settings);
+	int rc = plan_make(p, &s->plan, e);
+	if (rc || s->a->quiet)
+		return rc;
+	plan_describe(&s->plan, text, sizeof text);
+	fprintf(stderr, "%s\n", text);
+	plan_describe_changes(p, &s->plan, text, sizeof text);
+	if (*text)
+		fprintf(stderr, "%s\n", text);
+	fprintf(stderr, "scene built in %.2f s: %llu triangles, %zu MB of Embree's\n", s->build_seconds,
+		(unsigned long long)s->summary.triangles, world_embree_bytes(s->world) >> 20);
+	return 0;
+}
+
+static void show(void *user, const struct local_progress *p)
+{
+	struct session *s = user;
+	char detail[64], eta[32];
+	double fraction = 0;
+	if (p->total != UINT64_MAX)
+		fraction = (double)p->done / (double)p->total;
+	if (s->plan.seconds > 0)
+		fraction = fmax(fraction, fmin(p->seconds / s->plan.seconds, 0.99));
+	progress_time(fraction > 0 ? p->seconds * (1 / fraction - 1) : 0, eta, sizeof eta);
+	snprintf(detail, sizeof detail, "%s left", eta);
+	progress_show(&s->progress, fraction, p->state, detail);
+}
+
+static int render(struct session *s, struct error *e)
+{
+	s->run = (struct local_run){.world = s->world, .plan = &s->plan, .threads = s->a->threads, .stop = &interrupted,
+				    .progress = s->a->quiet ? NULL : show, .user = s};
+	if (!s->a->quiet)
+		progress_start(&s->progress);
+	int rc = local_run(&s->run, e);
+	if (!s->a->quiet)
+		progress_end(&s->progress);
+	if (rc)
+		return rc;
+	if (!s->run.canvas)
+		return error_set(e, EINTR, "interrupted before the first round was complete: nothing to write");
+	return canvas_image(s->run.canvas, false, &s->image, e);
+}
+
+static int write_image(const struct session *s, struct error *e)
+{
+	struct header_effect effects[RENDER_EFFECTS_MAX];
+	for (size_t i = 0; i < s->summary.line_count; i++)
+		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].on, s->summary.lines[i].why};
+	struct header_extra x = {.scene = s->name, .effect_count = s->summary.line_count, .effects = effects,
+				 .wall_seconds = s->run.seconds, .cpu_seconds = s->run.cpu_seconds, .workers = s->a->threads};
+	unsigned char *bytes;
+	size_t size;
+	int rc = image_file_encode(&s->image, &s->plan, &x, &bytes, &size, e);
+	if (rc)
+		return rc;
+	rc = image_file_write(s->a->output, bytes, size, e);
+	mem_free(bytes);
+	return rc;
+}
+
+static const char *const counter_names[BATCH_COUNTERS] = {
+	[COUNT_SAMPLES] = "samples",	     [COUNT_ACCEPTED] = "accepted",
+	[COUNT_INDEPENDENT] = "independent", [COUNT_NAN] = "nan",
+	[COUNT_INFINITE] = "infinite",	     [COUNT_NEGATIVE] = "negative",
+	[COUNT_RAYS_CLOSEST] = "raysClosest", [COUNT_RAYS_SHADOW] = "raysShadow",
+	[COUNT_STUCK] = "stuck",	     [COUNT_LONGEST_STUCK] = "longestStuck",
+};
+static const char *const end_names[] = {[MERGE_GOES_ON] = "interrupted", [MERGE_ROUNDS] = "mutations", [MERGE_TIME] = "time",
+					[MERGE_ERROR] = "target-error"};
+
+static json_t *real_or_null(double x)
+{
+	return isfinite(x) ? json_real(x) : json_null();
+}
+
+static int write_stats(const struct session *s, struct error *e)
+{
+	char plan[1024], again[512];
+	plan_describe(&s->plan, plan, sizeof plan);
+	plan_options(&s->plan, s->image.rounds, again, sizeof again);
+	json_t *counters = json_object(), *effects = json_array();
+	for (int i = 0; i < BATCH_COUNTERS; i++)
+		if (counter_names[i])
+			json_object_set_new(counters, counter_names[i], json_integer((json_int_t)s->image.counters[i]));
+	for (size_t i = 0; i < s->summary.line_count; i++)
+		json_array_append_new(effects, json_pack("{s:s s:b s:s}", "name", s->summary.lines[i].name, "on",
+							 s->summary.lines[i].on, "why", s->summary.lines[i].why));
+	json_t *o = json_pack("{s:i s:s s:s s:s s:s s:I s:I s:f s:f s:f s:I s:I s:o s:o s:o s:o s:o s:o s:s}", "schema", 1, "scene",
+			      s->name, "integrator", s->plan.integrator, "plan", plan, "options", again, "rounds",
+			      (json_int_t)s->image.rounds, "threads", (json_int_t)s->a->threads, "buildSeconds", s->build_seconds,
+			      "wallSeconds", s->run.seconds, "cpuSeconds", s->run.cpu_seconds, "triangles",
+			      (json_int_t)s->summary.triangles, "embreeBytes", (json_int_t)world_embree_bytes(s->world), "b",
+			      real_or_null(s->image.b), "relMSE", real_or_null(s->image.rel_mse), "relMSEUpper", real_or_null(s->image.rel_mse_upper),
+			      "beyondShare", real_or_null(s->image.beyond_share), "counters", counters, "effects", effects, "end",
+			      end_names[s->run.end]);
+	char *text = o ? json_dumps(o, JSON_INDENT(2)) : NULL;
+	json_decref(o);
+	if (!text)
+		return error_set(e, ENOMEM, "no memory for the statistics");
+	int rc = image_file_write(s->a->stats, (const unsigned char *)text, strlen(text), e);
+	free(text);
+	return rc;
+}
+
+static void say(const struct session *s)
+{
+	const struct canvas_image *i = &s->image;
+	const struct plan *p = &s->plan;
+	fprintf(stderr, "%llu rounds in %.1f s (%.1f s of processors)", (unsigned long long)i->rounds, s->run.seconds,
+		s->run.cpu_seconds);
+	if (isfinite(i->rel_mse))
+		fprintf(stderr, ", relative error %.2f %% (at most %.2f %%)", 100 * sqrt(i->rel_mse), 100 * sqrt(i->rel_mse_upper));
+	fprintf(stderr, "\n");
+	if (i->black)
+		fprintf(stderr, "the image is black: none of %llu bootstrap samples found light\n", (unsigned long long)p->bootstrap);
+	if (i->beyond_share > 0.001)
+		fprintf(stderr, "%.2f %% of the energy lies in paths longer than %s can hold\n", 100 * i->beyond_share, p->integrator);
+	uint64_t bad = i->counters[COUNT_NAN] + i->counters[COUNT_INFINITE] + i->counters[COUNT_NEGATIVE];
+	if (bad)
+		fprintf(stderr, "%llu contributions were not numbers, infinite or negative, and left out\n", (unsigned long long)bad);
+	if (i->counters[COUNT_STUCK])
+		fprintf(stderr, "%llu times a chain accepted nothing during a whole epoch (longest run: %llu rejections)\n",
+			(unsigned long long)i->counters[COUNT_STUCK], (unsigned long long)i->counters[COUNT_LONGEST_STUCK]);
+}
+
+static int run(struct session *s, struct error *e)
+{
+	int rc = load(s, e);
+	if (!rc)
+		rc = make_plan(s, e);
+	if (!rc)
+		rc = render(s, e);
+	if (!rc)
+		rc = write_image(s, e);
+	if (!rc && s->a->stats)
+		rc = write_stats(s, e);
+	if (!rc && !s->a->quiet)
+		say(s);
+	if (!rc && s->run.end == MERGE_GOES_ON)
+		rc = error_set(e, EINTR, "interrupted: %s holds the %llu complete rounds", s->a->output,
+			       (unsigned long long)s->image.rounds);
+	return rc;
+}
+
+int main(int argc, char **argv)
+{
+	static struct arguments a;
+	static struct session s;
+	struct error e = {""};
+	long processors = sysconf(_SC_NPROCESSORS_ONLN);
+	a.threads = processors > 0 ? (unsigned)processors : 1;
+	argp_err_exit_status = 2;
+	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
+	struct sigaction act = {.sa_handler = interrupt, .sa_flags = (int)SA_RESETHAND};
+	sigaction(SIGINT, &act, NULL);
+	sigaction(SIGTERM, &act, NULL);
+	s.a = &a;
+	int rc = run(&s, &e);
+	canvas_image_fini(&s.image);
+	canvas_free(s.run.canvas);
+	world_free(s.world);
+	mem_free(s.folder);
+	mem_free(s.name);
+	if (rc) {
+		fprintf(stderr, "hslt-render: %s\n", e.text);
+		return 1;
+	}
+	bool missed = s.plan.target_error > 0 && s.run.end != MERGE_ERROR;
+	return missed ? 4 : 0;
+}

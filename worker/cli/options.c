@@ -1,0 +1,209 @@
+#include "worker/cli/options.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+	OPTION_SPP = 1000, OPTION_MUTATIONS, OPTION_TIME, OPTION_TARGET, OPTION_SIZE, OPTION_CROP, OPTION_SEED, OPTION_MIN_DEPTH,
+	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH,
+};
+
+static const struct argp_option options[] = {
+	{NULL, 0, NULL, 0, "What to render:", 1},
+	{"integrator", 'i', "NAME", 0, "path, bdpt or pssmlt (" RENDER_INTEGRATOR_DEFAULT "); the scene's own is ignored", 1},
+	{"size", OPTION_SIZE, "WxH", 0, "Size of the film; keeps the angle of view", 1},
+	{"crop", OPTION_CROP, "X,Y,W,H", 0, "Part of the film, in its pixels", 1},
+	{"seed", OPTION_SEED, "S", 0, "Of all random numbers (0)", 1},
+	{"min-depth", OPTION_MIN_DEPTH, "K", 0, "Shortest paths, in edges (1: emitters seen directly)", 1},
+	{"max-depth", OPTION_MAX_DEPTH, "K", 0, "Longest paths, in edges (the scene's)", 1},
+	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 1},
+	{NULL, 0, NULL, 0, "When to stop (the first bound met; without any, the scene's sampleCount):", 2},
+	{"spp", OPTION_SPP, "N", 0, "Samples a pixel, rounded up to whole rounds", 2},
+	{"mutations", OPTION_MUTATIONS, "N", 0, "Mutations or samples in all", 2},
+	{"time", OPTION_TIME, "SECONDS", 0, "Wall clock, looked at after complete rounds", 2},
+	{"target-error", OPTION_TARGET, "E", 0, "Estimated relative error: 0.02 or 2%", 2},
+	{NULL, 0, NULL, 0, "The plan (part of what decides the bits):", 3},
+	{"chains", OPTION_CHAINS, "N", 0, "Markov chains (1024, fewer for tiny jobs)", 3},
+	{"groups", OPTION_GROUPS, "N", 0, "Independent replicates, for the error (16)", 3},
+	{"bootstrap", OPTION_BOOTSTRAP, "N", 0, "Bootstrap samples (1000000, fewer for tiny jobs)", 3},
+	{"epoch", OPTION_EPOCH, "N", 0, "Mutations of a chain, or samples a pixel and group, in a round", 3},
+	{0},
+};
+
+uint64_t option_whole(const struct argp_state *state, const char *option, const char *arg)
+{
+	char *end;
+	errno = 0;
+	unsigned long long n = strtoull(arg, &end, 10);
+	if (*arg < '0' || *arg > '9' || *end || errno)
+		argp_error(state, "%s takes a whole number, not '%s'", option, arg);
+	return n;
+}
+
+static uint32_t whole32(const struct argp_state *state, const char *option, const char *arg)
+{
+	uint64_t n = option_whole(state, option, arg);
+	if (n > UINT32_MAX)
+		argp_error(state, "%s takes a number up to %u, not '%s'", option, UINT32_MAX, arg);
+	return (uint32_t)n;
+}
+
+double option_seconds(const struct argp_state *state, const char *option, const char *arg)
+{
+	char *end;
+	double x = strtod(arg, &end);
+	if (end == arg || *end || !(x > 0 && x < 1e9))
+		argp_error(state, "%s takes seconds, not '%s'", option, arg);
+	return x;
+}
+
+static double target_error(const struct argp_state *state, const char *arg)
+{
+	char *end;
+	double x = strtod(arg, &end);
+	if (end != arg && *end == '%') {
+		x /= 100;
+		end++;
+	}
+	if (end == arg || *end || !(x > 0 && x < 1e3))
+		argp_error(state, "--target-error takes something like 0.02 or 2%%, not '%s'", arg);
+	return x;
+}
+
+static void take_define(struct render_arguments *a, char *arg, const struct argp_state *state)
+{
+	char *equals = strchr(arg, '=');
+	if (!equals || equals == arg)
+		argp_error(state, "-D takes NAME=VALUE, not '%s'", arg);
+	if (a->define_count == OPTION_DEFINES_MAX)
+		argp_error(state, "at most %d times -D", OPTION_DEFINES_MAX);
+	*equals = 0;
+	a->defines[a->define_count++] = (struct scene_define){arg, equals + 1};
+}
+
+static void take_numbers(const struct argp_state *state, const char *option, const char *arg, const char *format, uint32_t *out,
+			 int count)
+{
+	const char *at = arg;
+	for (int i = 0; i < count; i++) {
+		char *end;
+		errno = 0;
+		unsigned long n = strtoul(at, &end, 10);
+		char wanted = i + 1 < count ? format[i] : 0;
+		if (*at < '0' || *at > '9' || errno || n > UINT32_MAX || *end != wanted)
+			argp_error(state, "%s does not understand '%s' (try --help)", option, arg);
+		out[i] = (uint32_t)n;
+		at = end + 1;
+	}
+}
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+	struct render_arguments *a = state->input;
+	struct plan_request *p = &a->plan;
+	uint32_t n[4] = {0};
+	switch (key) {
+	case 'i':
+		if (!render_integrator_find(arg))
+			argp_error(state, "there is no integrator '%s'", arg);
+		text_copy(p->integrator, sizeof p->integrator, arg);
+		return 0;
+	case 'D':
+		take_define(a, arg, state);
+		return 0;
+	case OPTION_SPP:
+		p->spp = option_whole(state, "--spp", arg);
+		if (p->spp == 0)
+			argp_error(state, "--spp takes 1 or more");
+		return 0;
+	case OPTION_MUTATIONS:
+		p->mutations = option_whole(state, "--mutations", arg);
+		if (p->mutations == 0)
+			argp_error(state, "--mutations takes 1 or more");
+		return 0;
+	case OPTION_TIME:
+		p->seconds = option_seconds(state, "--time", arg);
+		return 0;
+	case OPTION_TARGET:
+		p->target_error = target_error(state, arg);
+		return 0;
+	case OPTION_SIZE:
+		take_numbers(state, "--size", arg, "x", n, 2);
+		a->render = (struct render_options){n[0], n[1]};
+		if (n[0] == 0 || n[1] == 0)
+			argp_error(state, "--size takes a film of at least 1x1 pixels");
+		return 0;
+	case OPTION_CROP:
+		take_numbers(state, "--crop", arg, ",,,", n, 4);
+		p->crop_x = n[0];
+		p->crop_y = n[1];
+		p->crop_width = n[2];
+		p->crop_height = n[3];
+		if (n[2] == 0 || n[3] == 0)
+			argp_error(state, "--crop takes a part of at least 1x1 pixels");
+		return 0;
+	case OPTION_SEED:
+		p->seed = option_whole(state, "--seed", arg);
+		return 0;
+	case OPTION_MIN_DEPTH:
+		p->min_depth = whole32(state, "--min-depth", arg);
+		return 0;
+	case OPTION_MAX_DEPTH:
+		p->max_depth = whole32(state, "--max-depth", arg);
+		return 0;
+	case OPTION_CHAINS:
+		p->chains = whole32(state, "--chains", arg);
+		return 0;
+	case OPTION_GROUPS:
+		p->groups = whole32(state, "--groups", arg);
+		return 0;
+	case OPTION_BOOTSTRAP:
+		p->bootstrap = option_whole(state, "--bootstrap", arg);
+		return 0;
+	case OPTION_EPOCH:
+		p->epoch = option_whole(state, "--epoch", arg);
+		return 0;
+	default:
+		return ARGP_ERR_UNKNOWN;
+	}
+}
+
+const struct argp render_argp = {options, parse, NULL, NULL, NULL, NULL, NULL};
+
+void render_plan_from_scene(struct plan_request *p, const struct scene_settings *s)
+{
+	if (!*p->integrator)
+		text_copy(p->integrator, sizeof p->integrator, RENDER_INTEGRATOR_DEFAULT);
+	p->kind = render_integrator_find(p->integrator)->kind;
+	p->width = s->width;
+	p->height = s->height;
+	p->border = s->border;
+	if (!p->min_depth)
+		p->min_depth = 1;
+	if (!p->max_depth)
+		p->max_depth = s->max_depth;
+	if (!p->spp && !p->mutations && !(p->seconds > 0) && !(p->target_error > 0))
+		p->spp = s->spp;
+}
+
+int scene_path_split(const char *path, char **folder, char **name, struct error *e)
+{
+	const char *slash = strrchr(path, '/');
+	*name = mem_strdup(slash ? slash + 1 : path);
+	*folder = mem_strdup(slash ? path : ".");
+	int rc = !*name || !*folder ? error_set(e, ENOMEM, "no memory for the scene's name") : 0;
+	if (!rc && slash)
+		(*folder)[slash == path ? 1 : slash - path] = 0;
+	if (!rc && !**name)
+		rc = error_set(e, EINVAL, "%s: is a folder, not a scene file", path);
+	if (rc) {
+		mem_free(*folder);
+		mem_free(*name);
+		*folder = *name = NULL;
+	}
+	return rc;
+}

@@ -1,0 +1,34 @@
+/*
+ * The options that hslt-render and hslt-submit share: what to render of a scene, and how. Parsed by glibc's argp as a child
+ * of each program's own table. One thread.
+ */
+#ifndef WORKER_CLI_OPTIONS_H
+#define WORKER_CLI_OPTIONS_H
+
+#include "worker/render/render.h"
+
+#include <argp.h>
+
+enum { OPTION_DEFINES_MAX = 256 };
+
+struct render_arguments {
+	struct plan_request plan;
+	struct render_options render;
+	struct scene_define defines[OPTION_DEFINES_MAX];
+	size_t define_count;
+};
+
+/* Input of the child: a struct render_arguments. Keys from 1000 on are its own, and the short ones 'i' and 'D'. */
+extern const struct argp render_argp;
+
+/* Fills in what the options left to the scene: integrator, film, depth, samples. */
+void render_plan_from_scene(struct plan_request *p, const struct scene_settings *s);
+
+/* A whole number, or the usage error of `option`. */
+uint64_t option_whole(const struct argp_state *state, const char *option, const char *arg);
+double option_seconds(const struct argp_state *state, const char *option, const char *arg);
+
+/* "a/b/room.xml" -> "a/b" and "room.xml"; both to be mem_free'd. */
+int scene_path_split(const char *path, char **folder, char **name, struct error *e);
+
+#endif
