@@ -112,6 +112,14 @@ fuzzers: $(FUZZ_BIN)
 fuzz:
 	MAKE="$(MAKE)" sh tests/fuzz/run.sh
 
+# Benchmarks: one program from tests/bench/*.c; a table on stdout and $(BUILD)/bench.json. BENCH="path tiles" runs only these.
+BENCH_SRC := $(wildcard tests/bench/*.c)
+$(BUILD)/bench/bench: $(call obj,$(BENCH_SRC)) $(LIB_TEST) $(LIB_RENDER) $(LIB_COMMON)
+	$(link) $(BENCH_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occluded_to_infinity
+bench: programs $(BUILD)/bench/bench
+	$(BUILD)/bench/bench --bin $(BUILD)/bin --json $(BUILD)/bench.json $(BENCH)
+
 clean:
 	rm -rf build
 

@@ -1,0 +1,44 @@
+/*
+ * The benchmarks' table: each figure is the median of at least ten measurements with the order-statistic interval that
+ * holds the median with 97.8 % (the 2nd least to the 2nd largest of ten). Times are CPU seconds, by the thread's
+ * clock where getrusage would round to ticks; what is compared is measured in turns within the same minute. One thread.
+ */
+#ifndef TESTS_BENCH_BENCH_H
+#define TESTS_BENCH_BENCH_H
+
+#include "common/base/error.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+enum { BENCH_REPEATS = 11, BENCH_SERIES_MAX = 64 };
+
+struct series {
+	unsigned count;
+	double value[BENCH_SERIES_MAX];
+};
+
+enum bench_target { BENCH_INFORMS, BENCH_AT_LEAST, BENCH_AT_MOST };
+
+void series_add(struct series *s, double x);
+double series_median(const struct series *s);
+
+double bench_cpu_seconds(void); /* of this thread */
+
+/* The heading of the rows that follow; also their prefix in the JSON. */
+void bench_group(const char *name, const char *says);
+void bench_row(const char *name, const struct series *s, const char *unit, enum bench_target kind, double target);
+void bench_single(const char *name, double value, const char *unit, enum bench_target kind, double target);
+void bench_skip(const char *why);
+__attribute__((noreturn)) void bench_die(const struct error *e);
+
+/* Keeps the compiler from dropping what it computes. */
+extern volatile double bench_sink;
+
+/* One a file. bin: the folder of the programs. */
+void bench_rays(const char *bin);
+void bench_tiles(const char *bin);
+void bench_parts(const char *bin);
+
+#endif

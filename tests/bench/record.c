@@ -1,0 +1,54 @@
+#include "tests/bench/record.h"
+
+bool __real_accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max,
+			  struct ray_hit *hit);
+bool __real_accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to);
+bool __real_accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d);
+bool __wrap_accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max,
+			  struct ray_hit *hit);
+bool __wrap_accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to);
+bool __wrap_accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d);
+
+static struct recorded_ray *kept;
+static size_t room, count;
+
+void record_start(struct recorded_ray *rays, size_t size)
+{
+	kept = rays;
+	room = size;
+	count = 0;
+}
+
+size_t record_stop(void)
+{
+	kept = NULL;
+	return count;
+}
+
+static void keep(struct recorded_ray r)
+{
+	if (count < room)
+		kept[count++] = r;
+}
+
+bool __wrap_accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max,
+			  struct ray_hit *hit)
+{
+	if (kept)
+		keep((struct recorded_ray){.kind = RAY_CLOSEST, .from = *from, .d = d, .t_min = t_min, .t_max = t_max});
+	return __real_accel_closest(a, from, d, t_min, t_max, hit);
+}
+
+bool __wrap_accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to)
+{
+	if (kept)
+		keep((struct recorded_ray){.kind = RAY_SEGMENT, .from = *from, .to = *to});
+	return __real_accel_occluded(a, from, to);
+}
+
+bool __wrap_accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d)
+{
+	if (kept)
+		keep((struct recorded_ray){.kind = RAY_INFINITE, .from = *from, .d = d});
+	return __real_accel_occluded_to_infinity(a, from, d);
+}

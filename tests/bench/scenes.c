@@ -1,0 +1,142 @@
+#include "tests/bench/scenes.h"
+
+#include "common/base/mem.h"
+#include "tests/bench/bench.h"
+#include "tests/support/memory_assets.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { FLOOR_CELLS = 500, BALL_CELLS = 500, LINE = 96 };
+
+struct text {
+	char *bytes;
+	size_t size, room;
+};
+
+static void text_new(struct text *t, size_t lines)
+{
+	*t = (struct text){.bytes = mem_alloc(lines, LINE), .room = lines * LINE};
+	if (!t->bytes) {
+		struct error e;
+		error_set(&e, ENOMEM, "out of memory");
+		bench_die(&e);
+	}
+}
+
+__attribute__((format(printf, 2, 3))) static void text_line(struct text *t, const char *format, ...)
+{
+	va_list ap;
+	va_start(ap, format);
+	t->size += (size_t)vsnprintf(t->bytes + t->size, t->room - t->size, format, ap);
+	va_end(ap);
+}
+
+/* A grid of (cells + 1) x (cells + 1) vertices of a surface over the unit square, two triangles a cell. */
+static void grid(struct text *t, int cells, void (*surface)(double u, double v, double p[3]))
+{
+	int side = cells + 1;
+	text_new(t, (size_t)side * (size_t)side + 2 * (size_t)cells * (size_t)cells);
+	for (int j = 0; j < side; j++)
+		for (int i = 0; i < side; i++) {
+			double p[3];
+			surface((double)i / cells, (double)j / cells, p);
+			text_line(t, "v %.7g %.7g %.7g\n", p[0], p[1], p[2]);
+		}
+	for (int j = 0; j < cells; j++)
+		for (int i = 0; i < cells; i++) {
+			int a = j * side + i + 1, b = a + 1, c = a + side, d = c + 1;
+			text_line(t, "f %d %d %d\nf %d %d %d\n", a, b, d, a, d, c);
+		}
+}
+
+static void hills(double u, double v, double p[3])
+{
+	p[0] = 4 * u - 2;
+	p[2] = 2 - 4 * v;
+	p[1] = -1.9 + 0.08 * sin(31 * u) * cos(27 * v) + 0.01 * sin(411 * u + 3 * sin(97 * v)) * sin(377 * v);
+}
+
+static void ball(double u, double v, double p[3])
+{
+	double phi = 2 * M_PI * u, theta = M_PI * (0.002 + 0.996 * v);
+	double r = 0.8 + 0.03 * sin(14 * theta) * cos(12 * phi) + 0.004 * sin(90 * theta) * sin(80 * phi);
+	p[0] = r * sin(theta) * cos(phi) + 0.3;
+	p[1] = r * cos(theta) - 0.7;
+	p[2] = -r * sin(theta) * sin(phi) - 0.4;
+}
+
+#define LAMP(x)                                                                                                                 \
+	"<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' angle='90'/><translate x='" x    \
+	"' y='1.9'/></transform><emitter type='area'><rgb name='radiance' value='12,11,9'/></emitter></shape>"
+
+static const char million_xml[] =
+	"<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='8'/></integrator>"
+	"<sensor type='perspective'><float name='fov' value='60'/><transform name='to_world'><lookat origin='-0.4,0.3,1.9' "
+	"target='0,-0.6,-1' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' value='256'/><integer name='height' "
+	"value='192'/></film></sensor>"
+	"<shape type='cube'><transform name='to_world'><scale value='2'/></transform><bsdf type='diffuse'><rgb name='reflectance' "
+	"value='0.6,0.55,0.5'/></bsdf></shape>"
+	"<shape type='obj'><string name='filename' value='hills.obj'/><bsdf type='diffuse'><rgb name='reflectance' "
+	"value='0.3,0.5,0.2'/></bsdf></shape>"
+	"<shape type='obj'><string name='filename' value='ball.obj'/><bsdf type='roughconductor'><string name='material' value='Au'/>"
+	"<string name='distribution' value='ggx'/><float name='alpha' value='0.2'/></bsdf></shape>" LAMP("-1") LAMP("1") "</scene>";
+
+static struct world *build(const struct asset_source *assets, const char *file, const struct render_options *o)
+{
+	struct error e;
+	struct scene s;
+	struct world *w = NULL;
+	int rc = scene_read(&s, assets, file, render_plugins(), NULL, 0, &e);
+	if (!rc) {
+		rc = world_new(&w, &s, assets, o, &e);
+		scene_fini(&s);
+	}
+	if (rc)
+		bench_die(&e);
+	return w;
+}
+
+struct world *bench_world_million(void)
+{
+	struct text floor, round;
+	grid(&floor, FLOOR_CELLS, hills);
+	grid(&round, BALL_CELLS, ball);
+	const struct memory_file files[] = {{"million.xml", million_xml, sizeof million_xml - 1},
+					    {"hills.obj", floor.bytes, floor.size},
+					    {"ball.obj", round.bytes, round.size},
+					    {NULL, NULL, 0}};
+	struct asset_source assets = memory_assets(files);
+	struct world *w = build(&assets, "million.xml", NULL);
+	mem_free(floor.bytes);
+	mem_free(round.bytes);
+	return w;
+}
+
+const char *bench_box_file(void)
+{
+	static char path[4096];
+	const char *scenes = getenv("HSLT_SCENES");
+	if (scenes) {
+		snprintf(path, sizeof path, "%s/cornell-box/scene.xml", scenes);
+		if (access(path, R_OK) == 0)
+			return path;
+	}
+	return "tests/scenes/box/box.xml";
+}
+
+struct world *bench_world_box(const char **name)
+{
+	char folder[4096];
+	snprintf(folder, sizeof folder, "%s", bench_box_file());
+	char *slash = strrchr(folder, '/');
+	*slash = 0;
+	*name = strstr(folder, "cornell-box") ? "cornell-box" : "the box of tests/scenes (HSLT_SCENES names no cornell-box)";
+	struct asset_source assets = asset_folder(folder);
+	struct render_options small = {160, 160};
+	return build(&assets, slash + 1, &small);
+}

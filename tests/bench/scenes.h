@@ -1,0 +1,14 @@
+/* Scenes of the benchmarks. Any failure ends the bench with the reader's sentence. */
+#ifndef TESTS_BENCH_SCENES_H
+#define TESTS_BENCH_SCENES_H
+
+#include "worker/render/render.h"
+
+/* A room of walls, a hilly floor (diffuse) and a dented ball (rough gold) of half a million triangles each, two lamps. */
+struct world *bench_world_million(void);
+/* `cornell-box` from the folder that HSLT_SCENES names, else the box of tests/scenes. */
+struct world *bench_world_box(const char **name);
+/* Folder and file of that scene. */
+const char *bench_box_file(void);
+
+#endif
