@@ -17,8 +17,8 @@
  *  - Invalid content is its sender's fault; after three faults in a row the worker gets no more leases.
  *    A failed lease is tried elsewhere; its worker waits 10, 20, 40 ... s before it gets more of this job. The job fails
  *    when nothing was ever merged and three leases failed, or one lease failed on three workers, or six times in all.
- *  - Bounds are tested after complete rounds only. The target error is evaluated after rounds 1, 2, 3, 4, 5, 7, 9, 12 ...
- *    (each >= 1.25 x the last) and when another bound ends the job. From the end on nothing is merged: the image is exactly the
+ *  - Bounds are tested after complete rounds only. The target error is evaluated when merge_error_due() says so, as
+ *    hslt-render does, and when another bound ends the job. From the end on nothing is merged: the image is exactly the
  *    prefix that met the bound, and depends on workers and order only if the bound is a time.
  */
 #ifndef COORDINATOR_CORE_FARM_H

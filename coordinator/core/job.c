@@ -38,7 +38,6 @@ static void init(struct job *j, const struct event_submit *e, double now)
 	j->submitted = now;
 	j->started = j->ended = j->rel_error = NAN;
 	j->published = now;
-	j->next_evaluation = 1;
 	for (int i = 0; i < 2; i++) {
 		list_init(&j->ready[i]);
 		list_init(&j->out[i]);

@@ -43,7 +43,6 @@ struct job {
 
 	bool preparing, evaluating;
 	enum job_end ending; /* the bound that is met, while the error is evaluated once more */
-	uint64_t next_evaluation;
 	double published;
 
 	double durations[JOB_DURATIONS]; /* of merged leases of this kind */

@@ -2,6 +2,7 @@
 #include "coordinator/core/state.h"
 
 #include "common/base/mem.h"
+#include "common/film/merge.h"
 
 #include <assert.h>
 #include <math.h>
@@ -169,7 +170,7 @@ static void round_complete(struct farm *f, struct job *j)
 		revoke_all(f, j);
 		evaluate(f, j);
 	} else {
-		if (wants_error && j->rounds >= j->next_evaluation)
+		if (merge_error_due(&j->plan, j->rounds))
 			evaluate(f, j);
 		preview(f, j);
 	}
@@ -217,6 +218,4 @@ void rounds_error_known(struct farm *f, const struct event *ev)
 		rounds_end(f, j, END_ERROR, "");
 	else if (j->ending != END_NONE)
 		rounds_end(f, j, j->ending, "");
-	else
-		j->next_evaluation = j->rounds + (j->rounds + 3) / 4;
 }

@@ -416,7 +416,7 @@ static double error_after(const struct sim_job *j, uint64_t rounds)
 static uint64_t undisturbed_rounds(const struct sim_job *j)
 {
 	if (j->plan.target_error > 0)
-		for (uint64_t r = 1; r < j->plan.rounds; r += (r + 3) / 4)
+		for (uint64_t r = 1; r < j->plan.rounds; r += r < 4 ? 1 : r / 4) /* the ladder, written down once more */
 			if (error_after(j, r) <= j->plan.target_error)
 				return r;
 	return j->plan.rounds;
