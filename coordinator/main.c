@@ -20,7 +20,7 @@ static const char doc[] =
 	"stderr for every event.\n"
 	"Exit codes: 0 stopped by SIGTERM or SIGINT, 1 failed, 2 usage.";
 
-enum { OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT };
+enum { OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS };
 
 static const struct argp_option options[] = {
 	{"listen", 'l', "HOST:PORT", 0, "Where workers and clients connect (127.0.0.1:7700; port 0: any free one)", 0},
@@ -29,15 +29,24 @@ static const struct argp_option options[] = {
 	{"keep-partials", OPTION_PARTIALS, "DIR", 0, "Write every partial EXR tile that is merged into DIR", 0},
 	{"port-file", OPTION_PORT_FILE, "FILE", 0, "Write the port that was bound into FILE", 0},
 	{"heartbeat", OPTION_HEARTBEAT, "SECONDS", 0, "How often workers must be heard (5)", 0},
+	{"blobs", OPTION_BLOBS, "GB", 0, "Limit of scene files kept in the spool; the oldest that no job needs go (100)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Listen on other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log every lease, too", 0},
 	{0},
 };
 
+static double number(struct argp_state *state, const char *option, const char *arg, double least, double most)
+{
+	char *end;
+	double x = strtod(arg, &end);
+	if (*end || end == arg || !(x >= least && x <= most))
+		argp_error(state, "%s takes a number from %g to %g, not '%s'", option, least, most, arg);
+	return x;
+}
+
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
 	struct server_config *c = state->input;
-	char *end;
 	switch (key) {
 	case 'l':
 		c->listen = arg;
@@ -55,9 +64,10 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		c->port_file = arg;
 		return 0;
 	case OPTION_HEARTBEAT:
-		c->heartbeat_seconds = strtod(arg, &end);
-		if (*end || end == arg || !(c->heartbeat_seconds >= 0.05 && c->heartbeat_seconds <= 3600))
-			argp_error(state, "--heartbeat takes 0.05 to 3600 seconds, not '%s'", arg);
+		c->heartbeat_seconds = number(state, "--heartbeat", arg, 0.05, 3600);
+		return 0;
+	case OPTION_BLOBS:
+		c->blob_bytes = (uint64_t)(1e9 * number(state, "--blobs", arg, 0.001, 1e6));
 		return 0;
 	case OPTION_INSECURE:
 		c->insecure = true;
@@ -79,6 +89,7 @@ int main(int argc, char **argv)
 	struct server_config c;
 	struct error e;
 	server_config_init(&c);
+	c.blob_bytes = 100000000000u;
 	c.status_socket = getenv("HSLT_STATUS_SOCKET");
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &c);

@@ -329,7 +329,7 @@ static int open_stores(struct server *s, struct error *e)
 	struct farm_config config;
 	int rc = spool_open(&s->spool, s->config.spool, e);
 	if (!rc)
-		rc = blob_store_open(&s->blobs, spool_blobs(s->spool), 0, e);
+		rc = blob_store_open(&s->blobs, spool_blobs(s->spool), s->config.blob_bytes, e);
 	if (!rc)
 		rc = read_ended(s, e);
 	if (rc)

@@ -17,6 +17,7 @@ struct server_config {
 	const char *keep_partials; /* NULL: none */
 	const char *port_file;     /* NULL: none; the port that was bound is written there */
 	bool insecure;
+	uint64_t blob_bytes; /* the spool's limit of scene files; 0: none */
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
 	unsigned max_connections;
 	double hello_seconds, stall_seconds; /* how long a peer may take to say hello, to finish a frame */

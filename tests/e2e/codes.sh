@@ -57,6 +57,7 @@ grep -q '"id":"j4"' "$DIR/out" || fail "--json: $(cat "$DIR/out")"
 
 stop $COORDINATOR_PID
 [ $CODE -eq 0 ] || fail "the coordinator stopped with $CODE"
+LISTEN=$COORDINATOR
 start_coordinator
 code 0 "$BIN/hslt-job" fetch j4 -o "$DIR/again.exr"
 cmp "$DIR/reached.exr" "$DIR/again.exr" || fail "another result after a restart"
@@ -64,4 +65,15 @@ code 0 "$BIN/hslt-job" log j4
 grep -q event=job_done "$DIR/out" || fail "the log has no end"
 id=$(submit "$BOX" -o "$DIR/next.exr" --integrator path --spp 4 -D light=3)
 [ "$id" = j5 ] || fail "the next job is $id"
+until_true 20 is_state j5 done || fail "the worker did not come back: j5 is $(value j5 state)"
+
+id=$(submit "$BOX" -o "$DIR/lost.exr" --integrator path --spp 1000000)
+until_true 10 is_state "$id" running || fail "$id does not run"
+kill -9 $COORDINATOR_PID
+wait $COORDINATOR_PID 2>/dev/null || :
+start_coordinator
+is_state "$id" failed || fail "$id is $(value "$id" state)"
+value "$id" why | grep -q 'coordinator stopped' || fail "it does not say why $id failed"
+submit "$BOX" -o "$DIR/after.exr" --integrator path --spp 4 --wait >"$DIR/id" || fail "the worker did not come back"
+[ "$(cat "$DIR/id")" = j7 ] || fail "the job after the crash is $(cat "$DIR/id")"
 echo "exit codes and restart"

@@ -18,6 +18,9 @@ finish() {
 		kill -9 "$p" 2>/dev/null || :
 	done
 	wait 2>/dev/null || :
+	if grep -l 'runtime error:\|ERROR: .*Sanitizer' "$DIR"/*.log 2>/dev/null; then
+		code=1
+	fi
 	if [ $code -ne 0 ] && [ $code -ne 77 ]; then
 		for f in "$DIR"/*.log; do
 			[ -s "$f" ] && echo "---- $(basename "$f")" && tail -n 15 "$f"
@@ -57,10 +60,10 @@ until_true() {
 	done
 }
 
-# start_coordinator [OPTION...]
+# start_coordinator [OPTION...]: at $LISTEN, or at any free port
 start_coordinator() {
 	rm -f "$DIR/port"
-	"$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port" --spool "$DIR/spool" \
+	"$BIN/hslt-coordinator" --listen "${LISTEN:-127.0.0.1:0}" --port-file "$DIR/port" --spool "$DIR/spool" \
 		--status-socket "$DIR/status" --heartbeat 0.5 "$@" 2>>"$DIR/coordinator.log" &
 	COORDINATOR_PID=$!
 	PIDS="$PIDS $COORDINATOR_PID"
