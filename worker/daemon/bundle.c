@@ -193,9 +193,6 @@ static int check_plan(const struct bundle *b, const struct scene *s, const struc
 	const struct render_integrator *i = render_integrator_find(p->integrator);
 	if (!i || i->kind != p->kind)
 		return error_set(e, EINVAL, "this worker has no integrator '%s' of that kind", p->integrator);
-	if (p->max_depth > i->max_depth)
-		return error_set(e, EINVAL, "'%s' holds paths of %u edges, the plan says %u", p->integrator, i->max_depth,
-				 p->max_depth);
 	return 0;
 }
 
