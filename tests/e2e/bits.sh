@@ -1,10 +1,22 @@
-# The same bits for 1, 2 and 4 workers as from hslt-render, for samples and for chains.
+# The same bits for 1, 2 and 4 workers as from hslt-render: samples, chains, both directions, a crop that ends by its error.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-render hslt-compare
 
-CHAINS="--bootstrap 20000 --mutations 60000"
-"$BIN/hslt-render" "$BOX" -o "$DIR/path.exr" --integrator path --spp 16 2>"$DIR/render.log"
-"$BIN/hslt-render" "$BOX" -o "$DIR/pssmlt.exr" --integrator pssmlt $CHAINS 2>>"$DIR/render.log"
+options_of() {
+	case $1 in
+	path) echo "--integrator path --spp 16" ;;
+	bdpt) echo "--integrator bdpt --spp 4" ;;
+	pssmlt) echo "--integrator pssmlt --bootstrap 20000 --mutations 60000" ;;
+	error) echo "--integrator path --crop 8,8,24,16 --target-error 4% --spp 4096 --seed 7" ;;
+	esac
+}
+
+for kind in path bdpt pssmlt error; do
+	"$BIN/hslt-render" "$BOX" -o "$DIR/$kind.exr" $(options_of $kind) 2>>"$DIR/render.log" || fail "hslt-render: $kind"
+done
+if "$BIN/hslt-compare" --exact "$DIR/path.exr" "$DIR/bdpt.exr" >/dev/null 2>&1; then
+	fail "path and bdpt cannot be equal: what compares does not look"
+fi
 
 start_coordinator
 started=0
@@ -15,10 +27,11 @@ for workers in 1 2 4; do
 	done
 	until_true 10 sh -c "[ \$('$BIN/hslt-status' --json | grep -o '\"fingerprint\"' | wc -l) -eq $workers ]" ||
 		fail "$workers workers do not show"
-	submit "$BOX" -o "$DIR/path-$workers.exr" --integrator path --spp 16 --wait >"$DIR/id"
-	same "$DIR/path.exr" "$DIR/path-$workers.exr"
-	submit "$BOX" -o "$DIR/pssmlt-$workers.exr" --integrator pssmlt $CHAINS --wait >"$DIR/id"
-	same "$DIR/pssmlt.exr" "$DIR/pssmlt-$workers.exr"
+	for kind in path bdpt pssmlt error; do
+		submit "$BOX" -o "$DIR/$kind-$workers.exr" $(options_of $kind) --wait >"$DIR/id" || fail "$kind: $?"
+		same "$DIR/$kind.exr" "$DIR/$kind-$workers.exr"
+	done
 done
-"$BIN/hslt-compare" --exact "$DIR/path.exr" "$DIR/pssmlt.exr" >/dev/null 2>&1 && fail "path and pssmlt cannot be equal"
-echo "equal bits for 1, 2 and 4 workers and hslt-render"
+id=$(cat "$DIR/id")
+[ "$(value "$id" reason)" = error ] || fail "$id ended by its $(value "$id" reason)"
+echo "equal bits for 1, 2 and 4 workers and hslt-render; the error was reached after $(value "$id" rounds) rounds"
