@@ -71,9 +71,11 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 	}
 	double first = s == 1 ? point / toward : 1, r = first;
 	for (unsigned j = s; j < last && r > 0 && r < RATIO_LIMIT; j++) {
+		if (j == 0 && technique_exists(p, 1))
+			ratio[1] = r * toward / p->v[0]->pdf;
 		r *= (j == 0 ? point : light_pdf(c, p, j)) / p->v[j]->pdf;
-		if (technique_exists(p, j + 1))
-			ratio[j + 1] = j + 1 == 1 ? r * toward / point : r;
+		if (j > 0 && technique_exists(p, j + 1))
+			ratio[j + 1] = r;
 	}
 	bool beyond = r >= RATIO_LIMIT;
 	r = first;

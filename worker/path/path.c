@@ -137,17 +137,27 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 	return true;
 }
 
-/* Density per area of `to`, reached from `at` along omega; solid as chosen there. For a delta lobe `solid` is a
- * probability: the distribution is one in projected directions, so that the whole geometry term applies, and towards the
- * camera it carries the ratio of the two projected measures. */
-static double reach_pdf(const struct path_vertex *at, const struct path_vertex *to, double solid, bool delta, double ratio)
+/* Density per area of `to`, reached from `at`; solid as chosen there. For a delta lobe `solid` is a probability, and per_solid
+ * what makes it a density: see delta_per_solid. */
+static double reach_pdf(const struct path_vertex *at, const struct path_vertex *to, double solid, double per_solid)
 {
 	double distance2;
 	vec3 omega = path_direction(at, to, &distance2);
 	if (!(distance2 > 0))
 		return 0;
-	double lobe = delta ? solid * ratio * fabs(vec3_dot(at->x.ng, omega)) : solid;
+	double lobe = solid * per_solid;
 	return to->kind == VERTEX_INFINITE ? lobe : lobe * jac_solid_from_area(to->x.ng, omega, distance2);
+}
+
+/* Delta distributions are written in the direction towards the light, projected on the geometric normal: 1 in that measure is
+ * the cosine per solid angle. Towards the camera 1 per solid angle there is worth the ratio of the two solid angles, the
+ * squared indices and the cosines about which light is bent, those with the shading normal. eta_camera: the index on the
+ * camera's side over that on the light's. */
+static void delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera, double eta_camera, double *to_light,
+			    double *to_camera)
+{
+	*to_light = fabs(vec3_dot(x->ng, light));
+	*to_camera = *to_light * eta_camera * eta_camera * fabs(vec3_dot(x->sh.n, camera) / vec3_dot(x->sh.n, light));
 }
 
 static bool survives(const struct path_context *c, unsigned scatterings, double start, double u, spectrum *beta)
@@ -178,13 +188,15 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 			return n;
 		if (!extend(c, at, out.wi, 0, INFINITY, to) || (to->kind == VERTEX_INFINITE && side == SIDE_LIGHT))
 			return n;
-		/* Delta distributions are written in the direction towards the light; the one towards the camera is
-		 * the same but for the ratio of projected solid angles, (n_camera / n_light)^2. */
-		double to_camera = side == SIDE_CAMERA ? 1 / (out.eta * out.eta) : out.eta * out.eta;
+		double ahead = 1, back = 1;
+		if (out.delta && side == SIDE_CAMERA)
+			delta_per_solid(&at->x, out.wi, at->to_prev, 1 / out.eta, &ahead, &back);
+		else if (out.delta)
+			delta_per_solid(&at->x, at->to_prev, out.wi, out.eta, &back, &ahead);
 		at->delta = out.delta;
 		to->beta = out.beta;
-		to->pdf = reach_pdf(at, to, out.pdf, out.delta, side == SIDE_CAMERA ? 1 : to_camera);
-		v[n - 2].pdf_rev = reach_pdf(at, &v[n - 2], out.pdf_rev, out.delta, side == SIDE_CAMERA ? to_camera : 1);
+		to->pdf = reach_pdf(at, to, out.pdf, ahead);
+		v[n - 2].pdf_rev = reach_pdf(at, &v[n - 2], out.pdf_rev, back);
 		if (!(to->pdf > 0))
 			return n;
 		n++;

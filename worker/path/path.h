@@ -7,8 +7,9 @@
  * Directions on different sides of the shading and the geometric normal are refused (as Mitsuba's strictNormals).
  *
  * Densities of vertices: per area of the rescaled world; per solid angle for a vertex at infinity; times a delta
- * distribution in the projected direction towards the light where scattering is exactly specular (it cancels between all
- * techniques of one path). Roulette is not part of them. The film is sampled with density 1 / pixels (struct film_window).
+ * distribution in the direction towards the light, projected on the geometric normal, where scattering is exactly specular
+ * (it cancels between all techniques of one path). Roulette is not part of them. The film is sampled with density
+ * 1 / pixels (struct film_window).
  */
 #ifndef WORKER_PATH_PATH_H
 #define WORKER_PATH_PATH_H
