@@ -40,6 +40,12 @@ struct world *world_of_text(uint32_t width, uint32_t height, const char *format,
 	return build(&assets, "test.xml", width, height);
 }
 
+struct world *world_of_files(uint32_t width, uint32_t height, const struct memory_file *files)
+{
+	struct asset_source assets = memory_assets(files);
+	return build(&assets, files[0].name, width, height);
+}
+
 struct world *world_of_public_scene(const char *folder, const char *file, uint32_t width, uint32_t height)
 {
 	const char *scenes = getenv("HSLT_SCENES");

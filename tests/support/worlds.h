@@ -14,6 +14,10 @@ __attribute__((format(printf, 3, 4))) struct world *world_of_text(uint32_t width
 	"' target='" t "' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' value='32'/>"                      \
 	"<integer name='height' value='32'/><rfilter type='box'/></film></sensor>"
 
+/* From files in memory (tests/support/memory_assets.h): the first is the scene. */
+struct memory_file;
+struct world *world_of_files(uint32_t width, uint32_t height, const struct memory_file *files);
+
 /* From the folder that HSLT_SCENES names; NULL: the variable is not set. */
 struct world *world_of_public_scene(const char *folder, const char *file, uint32_t width, uint32_t height);
 
