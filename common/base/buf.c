@@ -2,8 +2,6 @@
 
 #include "common/base/mem.h"
 
-#include <stdarg.h>
-#include <stdio.h>
 #include <string.h>
 
 bool buf_reserve(struct buf *b, size_t count)
@@ -31,22 +29,6 @@ bool buf_append(struct buf *b, const void *bytes, size_t count)
 		memcpy(b->bytes + b->size, bytes, count);
 	b->size += count;
 	return true;
-}
-
-bool buf_print(struct buf *b, const char *format, ...)
-{
-	va_list ap, again;
-	va_start(ap, format);
-	va_copy(again, ap);
-	int n = vsnprintf(NULL, 0, format, ap);
-	va_end(ap);
-	bool ok = n >= 0 && buf_reserve(b, (size_t)n + 1);
-	if (ok) {
-		vsnprintf((char *)b->bytes + b->size, (size_t)n + 1, format, again);
-		b->size += (size_t)n;
-	}
-	va_end(again);
-	return ok;
 }
 
 void buf_fini(struct buf *b)

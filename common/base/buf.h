@@ -16,8 +16,6 @@ struct buf {
 /* Room for `count` bytes more. false: the limit or memory is out; the buffer is unchanged. */
 bool buf_reserve(struct buf *b, size_t count);
 bool buf_append(struct buf *b, const void *bytes, size_t count);
-/* Formatted text without its final zero. */
-__attribute__((format(printf, 2, 3))) bool buf_print(struct buf *b, const char *format, ...);
 void buf_fini(struct buf *b); /* the limit stays */
 
 #endif

@@ -25,13 +25,12 @@
 	X(JOB_DONE, "job_done", INFO) \
 	X(JOB_FAILED, "job_failed", ERROR) \
 	X(LEASE_GRANTED, "lease_granted", DEBUG) \
-	X(LEASE_TAKEN_BACK, "lease_taken_back", INFO) \
+	X(LEASE_TAKEN_BACK, "lease_taken_back", DEBUG) \
 	X(LEASE_FAILED, "lease_failed", WARN) \
 	X(BATCH_MERGED, "batch_merged", DEBUG) \
 	X(BATCH_REPEATED, "batch_repeated", INFO) \
 	X(BATCH_REFUSED, "batch_refused", WARN) \
 	X(BLOB_STORED, "blob_stored", DEBUG) \
-	X(BLOB_EVICTED, "blob_evicted", INFO) \
 	X(WORLD_BUILT, "world_built", INFO) \
 	X(WORLD_FAILED, "world_failed", ERROR) \
 	X(SPOOL_READ, "spool_read", INFO) \

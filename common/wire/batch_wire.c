@@ -321,27 +321,6 @@ void grant_fini(struct grant *g)
 	memset(g, 0, sizeof *g);
 }
 
-int states_copy(struct chain_state **out, const struct chain_state *states, uint32_t count, struct error *e)
-{
-	struct chain_state *s = mem_alloc(count, sizeof *s);
-	*out = s;
-	if (!s)
-		return error_set(e, ENOMEM, "no memory for %u chain states", count);
-	for (uint32_t i = 0; i < count; i++) {
-		if (states[i].size == 0)
-			continue;
-		s[i].bytes = mem_alloc(states[i].size, 1);
-		if (!s[i].bytes) {
-			states_fini(s, count);
-			*out = NULL;
-			return error_set(e, ENOMEM, "no memory for a chain state");
-		}
-		s[i].size = states[i].size;
-		memcpy(s[i].bytes, states[i].bytes, states[i].size);
-	}
-	return 0;
-}
-
 void states_fini(struct chain_state *states, uint32_t count)
 {
 	for (uint32_t i = 0; states && i < count; i++)

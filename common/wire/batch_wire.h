@@ -33,8 +33,6 @@ int grant_unpack(struct grant *g, const Farm__LeaseGrant *m, const unsigned char
 		 struct error *e);
 void grant_fini(struct grant *g);
 
-/* Chain states as one piece of bytes in one allocation each; states_fini frees them. */
-int states_copy(struct chain_state **out, const struct chain_state *states, uint32_t count, struct error *e);
 void states_fini(struct chain_state *states, uint32_t count);
 
 #endif

@@ -107,8 +107,10 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 	if (rc < 0) {
 		answer_submit(p, 0, e.text, NULL);
 		session_upload_abort(p);
-	} else if (rc && p->upload->missing_count == 0) {
-		submit(p);
+	} else if (rc) {
+		log_event(LOG_BLOB_STORED, "peer=%llu bytes=%llu", (unsigned long long)p->id, (unsigned long long)c->size);
+		if (p->upload->missing_count == 0)
+			submit(p);
 	}
 }
 

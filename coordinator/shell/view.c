@@ -50,7 +50,7 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	text_copy(v->waiting, sizeof v->waiting, shown(s->waiting, text));
 }
 
-const char *view_why(const struct job_view *v)
+static const char *why_of(const struct job_view *v)
 {
 	return *v->waiting ? v->waiting : v->record.why;
 }
@@ -76,7 +76,7 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 	out->eta = v->eta;
 	out->rounds = r->rounds;
 	out->error = r->rel_error;
-	out->why = borrow(view_why(v));
+	out->why = borrow(why_of(v));
 	out->reason = borrow(r->reason);
 	out->output = borrow(r->output);
 	out->priority = r->priority;
@@ -109,7 +109,7 @@ json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit)
 			      "id", id, "name", r->name, "state", r->state, "integrator", r->integrator, /* */
 			      "priority", r->priority, "progress", r->progress, "rate", v->rate, /* */
 			      "rounds", (json_int_t)r->rounds, "mutations", (json_int_t)r->mutations, /* */
-			      "why", view_why(v), "waiting", v->waiting, "reason", r->reason, "output", r->output, /* */
+			      "why", why_of(v), "waiting", v->waiting, "reason", r->reason, "output", r->output, /* */
 			      "result", (int)r->has_result, "leases", (int)v->leases, "submitted", r->submitted, /* */
 			      "ended", r->ended);
 	if (!o)

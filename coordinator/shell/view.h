@@ -22,7 +22,6 @@ struct job_view {
 void view_of_record(struct job_view *v, const struct job_record *r);
 /* Puts the core's view of a living job into v, whose record has the job's names and times already. */
 void view_add_status(struct job_view *v, const struct job_status *s);
-const char *view_why(const struct job_view *v);
 
 void view_to_wire(const struct job_view *v, Farm__JobStatus *out); /* borrows v's texts */
 json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit); /* submit: NULL for jobs of earlier lives */

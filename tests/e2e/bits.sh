@@ -7,7 +7,7 @@ options_of() {
 	path) echo "--integrator path --spp 16" ;;
 	bdpt) echo "--integrator bdpt --spp 4" ;;
 	pssmlt) echo "--integrator pssmlt --bootstrap 20000 --mutations 60000" ;;
-	error) echo "--integrator path --crop 8,8,24,16 --target-error 4% --spp 4096 --seed 7" ;;
+	error) echo "--integrator path --crop 8,8,24,16 --target-error 4% --epoch 1 --spp 4096 --seed 7" ;;
 	esac
 }
 

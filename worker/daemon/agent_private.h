@@ -35,7 +35,6 @@ void agent_settle(struct agent *a);
 /* desk.c */
 void desk_welcome(struct agent *a); /* (re)connected: asks for work, offers what is still unsent */
 void desk_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size);
-void desk_request(struct agent *a);
 void desk_leave(struct agent *a);      /* gives back what has not begun */
 void desk_stop_all(struct agent *a);   /* gives up what runs */
 bool desk_is_idle(const struct agent *a); /* nothing runs, nothing waits to be acknowledged */

@@ -14,7 +14,7 @@ static unsigned long long number(uint64_t n)
 
 /* ---- what is said ---- */
 
-void desk_request(struct agent *a)
+static void request_leases(struct agent *a)
 {
 	Farm__LeaseRequest request;
 	Farm__Envelope m;
@@ -393,12 +393,12 @@ void desk_welcome(struct agent *a)
 	for (struct bundle *b = a->bundles; b; b = b->next)
 		if (!b->ended)
 			ask_job(a, b->job);
-	desk_request(a);
+	request_leases(a);
 }
 
 void desk_leave(struct agent *a)
 {
-	desk_request(a);
+	request_leases(a);
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->state == LEASE_RENDERED || (l->state == LEASE_QUEUED && !crew_take_back(a->crew, &l->task)))

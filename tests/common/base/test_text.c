@@ -28,7 +28,7 @@ static void buffers_keep_their_limit(void **state)
 	assert_true(buf_append(&b, NULL, 0));
 	assert_true(b.capacity <= 1000);
 	buf_fini(&b);
-	assert_true(buf_print(&b, "%d %s", 12, "apples"));
+	assert_true(buf_append(&b, "12 apples", 9));
 	assert_int_equal(b.size, 9);
 	assert_memory_equal(b.bytes, "12 apples", 9);
 	mem_fail_after(0);
