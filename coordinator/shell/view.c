@@ -36,7 +36,6 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	r->progress = s->progress;
 	r->rounds = s->rounds;
 	r->mutations = s->mutations;
-	r->rel_error = isnan(s->rel_error) ? -1 : s->rel_error;
 	r->exit_code = job_state_is_end(s->state) ? (uint32_t)job_exit_code(s) : 0;
 	v->rate = isfinite(s->rate) ? s->rate : 0;
 	v->eta = isfinite(s->eta) ? s->eta : -1;
