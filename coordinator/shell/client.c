@@ -1,4 +1,5 @@
 /* A client's side of a session: submit, list, cancel, watch, fetch. */
+#include "coordinator/shell/publish.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/upload.h"
 
@@ -11,6 +12,7 @@
 #include <unistd.h>
 
 enum { CHUNK = 1 << 20, HEADER_LIMIT = 1 << 20 };
+static const double preview_seconds = 5; /* a younger one is good enough */
 
 /* ---- submit ---- */
 
@@ -220,7 +222,7 @@ static int fetch(struct session *p, const Farm__Fetch *f, Farm__FetchChunk *chun
 	return rc == -ENOENT ? error_set(e, ENOENT, "job j%llu has no %s yet", (unsigned long long)f->job, file) : rc;
 }
 
-static void take_fetch(struct session *p, const Farm__Fetch *f)
+static void answer_fetch(struct session *p, const Farm__Fetch *f)
 {
 	Farm__FetchChunk chunk;
 	Farm__Envelope m;
@@ -240,6 +242,41 @@ static void take_fetch(struct session *p, const Farm__Fetch *f)
 	m.fetch_chunk = &chunk;
 	session_send(p, &m, bytes, count);
 	mem_free(bytes);
+}
+
+/* Made when somebody asks: it holds up the job's results for as long as an image takes. */
+static bool is_preview_old(const struct server *s, const struct order *o)
+{
+	return o && o->canvas && !o->ended && (o->preview_made <= 0 || server_now(s) - o->preview_made > preview_seconds);
+}
+
+void session_previews(struct server *s, uint64_t job)
+{
+	for (struct session *p = s->sessions; p; p = p->next) {
+		struct order *o = server_order(s, job);
+		if (p->wants_preview != job || (o && o->busy))
+			continue;
+		if (is_preview_old(s, o)) {
+			publish_start(s, o, PUBLISH_PREVIEW, 0);
+			continue;
+		}
+		Farm__Fetch f;
+		farm__fetch__init(&f);
+		f.job = job;
+		f.what = FARM__WHAT__WHAT_PREVIEW;
+		p->wants_preview = 0;
+		answer_fetch(p, &f);
+	}
+}
+
+static void take_fetch(struct session *p, const Farm__Fetch *f)
+{
+	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset) {
+		answer_fetch(p, f);
+		return;
+	}
+	p->wants_preview = f->job;
+	session_previews(p->server, f->job);
 }
 
 void session_client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)

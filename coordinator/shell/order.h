@@ -38,6 +38,7 @@ struct order {
 	uint32_t chains_per_lease;
 	FILE *log;
 	bool busy, ended;
+	double preview_made; /* s on the loop's clock; 0: never */
 	double cpu_seconds; /* of all merged leases */
 	uint32_t worker_count;            /* who had leases of it */
 	uint64_t last_workers[64];

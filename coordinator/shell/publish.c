@@ -1,4 +1,5 @@
 #include "coordinator/shell/publish.h"
+#include "coordinator/shell/session.h"
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
@@ -90,6 +91,8 @@ static void done(uv_work_t *work, int status)
 		cannot_write(w);
 	else if (w->what == PUBLISH_RESULT)
 		o->record.has_result = true;
+	else if (w->what == PUBLISH_PREVIEW)
+		o->preview_made = server_now(s);
 	if (s->stopping) {
 		o->busy = false;
 	} else {
@@ -100,6 +103,7 @@ static void done(uv_work_t *work, int status)
 		o = server_order(s, id);
 		if (o && !o->busy)
 			server_order_free_again(s, o);
+		session_previews(s, id);
 		s->changes++;
 	}
 	canvas_image_fini(&w->image);
@@ -109,8 +113,6 @@ static void done(uv_work_t *work, int status)
 void publish_start(struct server *s, struct order *o, enum publish_what what, uint64_t rounds)
 {
 	assert(o && o->canvas);
-	if (o->busy && what == PUBLISH_PREVIEW)
-		return;
 	assert(!o->busy);
 	struct publishing *w = mem_alloc(1, sizeof *w);
 	if (!w) {

@@ -338,6 +338,7 @@ static int open_stores(struct server *s, struct error *e)
 		return error_set(e, errno, "%s: %s", s->config.keep_partials, strerror(errno));
 	farm_config_init(&config);
 	config.first_job = spool_next_job(s->spool);
+	config.preview_interval = 0; /* previews are made when somebody asks for one */
 	config.silent_after = 3 * s->config.heartbeat_seconds;
 	config.forget_after = 6 * s->config.heartbeat_seconds;
 	return farm_new(&s->farm, &config, e);

@@ -22,6 +22,7 @@ struct session {
 	uint32_t payload_limit;
 	struct upload *upload; /* a submission that waits for blobs */
 	uint64_t watched;      /* job; 0: none */
+	uint64_t wants_preview; /* job whose preview is being made for it; 0: none */
 	struct job_view *shown; /* what the watcher saw last */
 	char rejected[256];    /* why the core refused; "" it did not */
 	uint64_t answered_job; /* SUBMITTED or CANCELLED came for it */
@@ -45,5 +46,7 @@ void session_tick(struct session *p);
 /* client.c */
 void session_client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size);
 void session_upload_abort(struct session *p);
+/* The order's canvas is free, or the order has ended: who waits for its preview gets it, or it is made now. */
+void session_previews(struct server *s, uint64_t job);
 
 #endif

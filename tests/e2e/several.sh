@@ -11,6 +11,8 @@ low=$(submit "$BOX" -o "$DIR/low.exr" $LOW)
 until_true 10 is_state "$low" running || fail "$low does not run"
 high=$(submit "$BOX" -o "$DIR/high.exr" $HIGH)
 until_true 20 is_state "$high" done || fail "$high is $(value "$high" state)"
+"$BIN/hslt-job" fetch "$low" --preview -o "$DIR/preview.exr" || fail "no preview"
+head -c 4 "$DIR/preview.exr" | od -An -tx1 | grep -q '76 2f 31 01' || fail "the preview is no EXR"
 is_state "$low" running || fail "$low ended before $high, which has priority"
 until_true 30 is_state "$low" done || fail "$low is $(value "$low" state)"
 "$BIN/hslt-job" fetch "$low"
