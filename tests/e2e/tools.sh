@@ -1,0 +1,58 @@
+# hslt-compare and hslt-tonemap as programs: exit codes, what they print, the files they leave.
+. "$(dirname "$0")/lib.sh"
+need hslt-render hslt-compare hslt-tonemap
+
+# code WANTED COMMAND...
+code() {
+	wanted=$1
+	shift
+	got=0
+	"$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
+	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/out" "$DIR/err.log")"
+}
+
+render() { # FILE SEED SIZE
+	code 0 "$BIN/hslt-render" "$BOX" -o "$DIR/$1.exr" --integrator path --spp 4 --seed "$2" --size "$3" --threads 1 --quiet
+}
+
+for p in compare tonemap; do
+	code 0 "$BIN/hslt-$p" --version
+	code 0 "$BIN/hslt-$p" --help
+	grep -qi example "$DIR/out" || fail "hslt-$p --help has no examples"
+	code 2 "$BIN/hslt-$p" --no-such-option
+	code 2 "$BIN/hslt-$p" "$DIR/a.exr"
+	code 1 "$BIN/hslt-$p" "$DIR/none.exr" "$DIR/none.png"
+	grep -q "none.exr" "$DIR/err.log" || fail "hslt-$p does not name the file"
+done
+
+render a 1 32x32
+render again 1 32x32
+render other 2 32x32
+render large 1 64x64
+cd "$DIR"
+code 0 "$BIN/hslt-compare" --exact a.exr again.exr
+code 1 "$BIN/hslt-compare" --exact a.exr other.exr
+grep -q "^different: channel" out || fail "--exact says: $(cat out)"
+code 1 "$BIN/hslt-compare" --exact --json a.exr other.exr
+grep -q '"equal":false' out || fail "--exact --json says: $(cat out)"
+code 2 "$BIN/hslt-compare" --exact --trim 0.1 a.exr other.exr
+code 2 "$BIN/hslt-compare" --trim 1 a.exr other.exr
+code 2 "$BIN/hslt-compare" --max-relmse x a.exr other.exr
+code 0 "$BIN/hslt-compare" a.exr other.exr --max-relmse 1e6
+grep -q '^relMSE  *[0-9]' out || fail "no relMSE: $(cat out)"
+code 1 "$BIN/hslt-compare" a.exr other.exr --max-relmse 1e-6
+code 0 "$BIN/hslt-compare" a.exr again.exr --max-relmse 0 --json
+grep -q '"relMSE":0.0,.*"psnr":null' out || fail "--json says: $(cat out)"
+code 1 "$BIN/hslt-compare" a.exr large.exr
+grep -q -- --size err.log || fail "it does not say how: $(cat err.log)"
+code 1 "$BIN/hslt-compare" a.exr large.exr --size 24x24
+code 0 "$BIN/hslt-compare" a.exr large.exr --size 16x16 --heatmap heat.png --trim 0.01
+grep -q '^left out  *2 of 256' out || fail "--trim says: $(cat out)"
+code 0 "$BIN/hslt-tonemap" a.exr a.png --exposure -1
+code 2 "$BIN/hslt-tonemap" a.exr a.png --exposure bright
+code 1 "$BIN/hslt-tonemap" a.exr none/a.png
+[ "$(ls -1 ./*.png* | tr '\n' ' ')" = "./a.png ./heat.png " ] || fail "files: $(ls)"
+# 8 bytes of signature, then IHDR with the size
+[ "$(od -An -tx1 -j0 -N8 a.png | tr -d ' ')" = 89504e470d0a1a0a ] || fail "a.png is no PNG"
+[ "$(od -An -tx1 -j16 -N8 heat.png | tr -d ' ')" = 0000001000000010 ] || fail "heat.png is not 16x16"
+echo "compare and tonemap: exit codes and files"
