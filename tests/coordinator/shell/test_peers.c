@@ -281,7 +281,7 @@ static void hello_is_looked_at(void **state)
 
 /* ---- a whole job ---- */
 
-static void submit(struct peer *p, const char *scene_text, const char *file_name)
+static void submit(struct peer *p, const char *scene_text, const char *file_name, const char *scene_name)
 {
 	Farm__Submit s;
 	Farm__PlanRequest plan;
@@ -289,7 +289,7 @@ static void submit(struct peer *p, const char *scene_text, const char *file_name
 	Farm__Envelope m;
 	struct blob_hash hash;
 	struct error e;
-	char name[] = "black", scene[] = "s.xml", integrator[] = "path", file_text[64];
+	char name[] = "black", scene[64], integrator[] = "path", file_text[64];
 	struct plan_request r = {.integrator = "path", .kind = PLAN_SAMPLES, .width = 20, .height = 10, .spp = 4,
 				 .max_depth = 5, .groups = 2, .bootstrap = 256};
 	plan_request_to_wire(&r, &plan);
@@ -299,6 +299,7 @@ static void submit(struct peer *p, const char *scene_text, const char *file_name
 	farm__envelope__init(&m);
 	assert_int_equal(blob_hash_bytes(scene_text, strlen(scene_text), &hash, &e), 0);
 	snprintf(file_text, sizeof file_text, "%s", file_name);
+	snprintf(scene, sizeof scene, "%s", scene_name);
 	file.name = file_text;
 	file.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
 	file.size = strlen(scene_text);
@@ -341,13 +342,15 @@ static void submissions_are_looked_at(void **state)
 	(void)state;
 	struct peer *p = call();
 	assert_true(hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	static const char *const names[] = {"../s.xml", "/s.xml", "a//s.xml", "other.xml", "", "a/./s.xml", "s.xml/"};
+	static const char *const names[] = {"../s.xml", "/s.xml", "a//s.xml", "", "a/./s.xml", "s.xml/", "a/..", "a\nb"};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-		submit(p, "<scene/>", names[i]);
+		submit(p, "<scene/>", names[i], names[i]);
 		const Farm__SubmitAnswer *a = submit_answer(p);
 		assert_true(a->job == 0 && a->n_missing == 0 && *a->refusal);
 	}
-	submit(p, "<scene/>", "s.xml");
+	submit(p, "<scene/>", "other.xml", "s.xml");
+	assert_true(*submit_answer(p)->refusal);
+	submit(p, "<scene/>", "s.xml", "s.xml");
 	assert_int_equal(submit_answer(p)->n_missing, 1);
 	send_blob(p, "<scene/>", "<SCENE/>"); /* other bytes than promised */
 	const Farm__SubmitAnswer *a = submit_answer(p);
@@ -419,7 +422,7 @@ static void a_black_job_ends(void **state)
 				 .max_depth = 5, .groups = 2, .bootstrap = 256};
 	assert_int_equal(plan_make(&r, &plan, &e), 0);
 	assert_true(hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	submit(client, "<scene/>", "s.xml");
+	submit(client, "<scene/>", "s.xml", "s.xml");
 	assert_int_equal(submit_answer(client)->n_missing, 1);
 	send_blob(client, "<scene/>", "<scene/>");
 	const Farm__SubmitAnswer *a = submit_answer(client);
