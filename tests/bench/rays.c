@@ -177,7 +177,7 @@ static double replay_door(const struct subject *s)
 	struct ray_hit hit;
 	size_t hits = 0;
 	double begin = bench_cpu_seconds();
-	unsigned trap = fptrap_enable();
+	bool watched = fptrap_watch();
 	for (size_t i = 0; i < s->count; i++) {
 		const struct recorded_ray *r = &s->rays[i];
 		if (r->kind == RAY_CLOSEST)
@@ -187,7 +187,7 @@ static double replay_door(const struct subject *s)
 		else
 			hits += accel_occluded_to_infinity(a, &r->from, r->d);
 	}
-	fptrap_restore(trap);
+	fptrap_unwatch(watched);
 	double seconds = bench_cpu_seconds() - begin;
 	bench_sink += (double)hits;
 	return seconds;

@@ -276,9 +276,9 @@ int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t cou
 		return error_set(e, ENOMEM, "out of memory");
 	a->spheres = mem_alloc(count, sizeof *a->spheres);
 	a->shapes = mem_alloc(count, sizeof *a->shapes);
-	unsigned trap = fptrap_mask();
+	unsigned trap = fptrap_leave();
 	int rc = a->spheres && a->shapes ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
-	fptrap_restore(trap);
+	fptrap_return(trap);
 	if (rc)
 		accel_free(a);
 	else
@@ -290,12 +290,12 @@ void accel_free(struct accel *a)
 {
 	if (!a)
 		return;
-	unsigned trap = fptrap_mask();
+	unsigned trap = fptrap_leave();
 	if (a->scene)
 		rtcReleaseScene(a->scene);
 	if (a->device)
 		rtcReleaseDevice(a->device);
-	fptrap_restore(trap);
+	fptrap_return(trap);
 	mem_free(a->spheres);
 	mem_free(a->shapes);
 	mem_free(a);
@@ -353,10 +353,10 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	struct RTCRayHit rh;
 	fill_ray(&rh.ray, &q, lifted(a, q.o, from->ng, d), d, t_max - enter);
 	rh.hit.geomID = rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-	unsigned trap = fptrap_mask();
+	unsigned trap = fptrap_leave();
 	EMBREE_INIT_CONTEXT(&q.context);
 	embree_intersect(a->scene, &q.context, &rh);
-	fptrap_restore(trap);
+	fptrap_return(trap);
 	if (rh.hit.geomID == RTC_INVALID_GEOMETRY_ID)
 		return false;
 	double t = enter + fmax((double)rh.ray.tfar - q.back, 0);
@@ -368,10 +368,10 @@ static bool occluded(const struct accel *a, struct query *q, vec3 o, vec3 d, dou
 {
 	struct RTCRay ray;
 	fill_ray(&ray, q, o, d, t_max);
-	unsigned trap = fptrap_mask();
+	unsigned trap = fptrap_leave();
 	EMBREE_INIT_CONTEXT(&q->context);
 	embree_occluded(a->scene, &q->context, &ray);
-	fptrap_restore(trap);
+	fptrap_return(trap);
 	return ray.tfar < 0;
 }
 

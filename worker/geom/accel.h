@@ -8,7 +8,7 @@
  * ends: a coplanar neighbour is not, however low the ray. So the ray that Embree gets in float may run off the true one by
  * what rounding can do in a scene of that extent, never by an absolute length.
  *
- * Embree runs in robust mode with one build thread. It raises INVALID on ordinary rays: traps are masked inside.
+ * Embree runs in robust mode with one build thread. It raises INVALID on ordinary rays: what it raises is wiped away.
  * Immutable after creation: any thread. Lengths: the rescaled world, whose radius is about 1.
  */
 #ifndef WORKER_GEOM_ACCEL_H

@@ -263,9 +263,9 @@ int render_lease(const struct world *w, const struct plan *p, const struct lease
 	double start = thread_seconds();
 	rc = prepare(j, w, e);
 	if (!rc) {
-		unsigned trap = fptrap_enable();
+		bool watched = fptrap_watch();
 		rc = run(j, in, end);
-		fptrap_restore(trap);
+		fptrap_unwatch(watched);
 	}
 	film_sums_fini(&j->film);
 	mem_free(j);
