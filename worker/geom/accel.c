@@ -23,6 +23,7 @@ struct accel {
 	struct accel_shape *shapes;
 	atomic_size_t bytes;
 	vec3 low, high;
+	double size; /* sum of the sides */
 	double reach; /* how far Embree's floats can be off, see below */
 };
 
@@ -275,6 +276,7 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 	rtcGetSceneBounds(a->scene, &b);
 	a->low = (vec3){(double)b.lower_x, (double)b.lower_y, (double)b.lower_z};
 	a->high = (vec3){(double)b.upper_x, (double)b.upper_y, (double)b.upper_z};
+	a->size = a->high.x - a->low.x + a->high.y - a->low.y + a->high.z - a->low.z;
 	a->reach = rounding_reach(a->low, a->high);
 	return 0;
 }
@@ -320,9 +322,13 @@ size_t accel_bytes(const struct accel *a)
 /* Rays from far outside enter the scene's box in double: Embree's floats never see the distance. In units of |d|. */
 static double entry_distance(const struct accel *a, vec3 o, vec3 d)
 {
+	double size = a->size;
+	if (o.x >= a->low.x - size && o.y >= a->low.y - size && o.z >= a->low.z - size && o.x <= a->high.x + size &&
+	    o.y <= a->high.y + size && o.z <= a->high.z + size)
+		return 0;
 	const double lo[3] = {a->low.x, a->low.y, a->low.z}, hi[3] = {a->high.x, a->high.y, a->high.z};
 	const double p[3] = {o.x, o.y, o.z}, w[3] = {d.x, d.y, d.z};
-	double enter = 0, size = hi[0] - lo[0] + hi[1] - lo[1] + hi[2] - lo[2];
+	double enter = 0;
 	for (int i = 0; i < 3; i++) {
 		double outside = w[i] > 0 ? lo[i] - size - p[i] : p[i] - hi[i] - size;
 		if (outside > 0 && fabs(w[i]) * 0x1p60 > outside)

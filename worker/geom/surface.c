@@ -57,16 +57,24 @@ static vec3 tangent(const struct geom_shape *s, const uint32_t i[3], vec3 e1, ve
 	return vec3_is_finite(t) && vec3_dot(t, t) > 0 ? t : e1;
 }
 
-void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2, struct surface_point *x)
+/* A triangle's first vertex and the edges from there. */
+struct corner {
+	vec3 v0, e1, e2;
+};
+
+static struct corner corner_of(const struct geom_shape *s, const uint32_t i[3])
 {
-	const uint32_t *i = s->index[prim.prim];
 	vec3 v0 = at(s->position, i[0]);
-	vec3 e1 = vec3_sub(at(s->position, i[1]), v0), e2 = vec3_sub(at(s->position, i[2]), v0);
+	return (struct corner){v0, vec3_sub(at(s->position, i[1]), v0), vec3_sub(at(s->position, i[2]), v0)};
+}
+
+static void fill(const struct geom_shape *s, const uint32_t i[3], const struct corner *c, double b1, double b2,
+		 struct surface_point *x)
+{
 	double b0 = 1 - b1 - b2;
-	x->prim = prim;
-	x->p = vec3_madd(vec3_madd(v0, b1, e1), b2, e2);
-	x->ng = vec3_normalize(vec3_cross(e1, e2));
-	x->dpdu = tangent(s, i, e1, e2);
+	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
+	x->ng = vec3_normalize(vec3_cross(c->e1, c->e2));
+	x->dpdu = tangent(s, i, c->e1, c->e2);
 	vec3 n = x->ng;
 	if (s->normal) {
 		vec3 m = vec3_scale(b0, at(s->normal, i[0]));
@@ -82,6 +90,14 @@ void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, doubl
 		x->u = b0 * (double)s->uv[i[0]][0] + b1 * (double)s->uv[i[1]][0] + b2 * (double)s->uv[i[2]][0];
 		x->v = b0 * (double)s->uv[i[0]][1] + b1 * (double)s->uv[i[1]][1] + b2 * (double)s->uv[i[2]][1];
 	}
+}
+
+void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2, struct surface_point *x)
+{
+	const uint32_t *i = s->index[prim.prim];
+	struct corner c = corner_of(s, i);
+	x->prim = prim;
+	fill(s, i, &c, b1, b2, x);
 }
 
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
@@ -118,9 +134,9 @@ void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct r
 		return;
 	}
 	const uint32_t *i = s->index[hit->prim.prim];
-	vec3 v0 = at(s->position, i[0]);
-	vec3 e1 = vec3_sub(at(s->position, i[1]), v0), e2 = vec3_sub(at(s->position, i[2]), v0);
+	struct corner c = corner_of(s, i);
 	double b1 = fmin(fmax(hit->u, 0), 1), b2 = fmin(fmax(hit->v, 0), 1 - b1);
-	solve_triangle(o, d, v0, e1, e2, &b1, &b2);
-	surface_on_triangle(s, hit->prim, b1, b2, x);
+	solve_triangle(o, d, c.v0, c.e1, c.e2, &b1, &b2);
+	x->prim = hit->prim;
+	fill(s, i, &c, b1, b2, x);
 }

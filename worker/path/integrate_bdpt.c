@@ -10,6 +10,7 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 	double film[2];
 	out->count = 0;
 	out->intensity = 0;
+	c->one_way = false;
 	unsigned camera = path_walk_camera(c, s, c->max_depth + 1, film);
 	unsigned light = path_walk_light(c, s, c->max_depth);
 	spectrum sum = spectrum_of(0);

@@ -8,6 +8,7 @@
 void path_trace(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	double film[2];
+	c->one_way = true;
 	unsigned n = path_walk_camera(c, s, c->max_depth + 1, film);
 	spectrum sum = spectrum_of(0);
 	for (unsigned t = 2; t <= n; t++) {

@@ -132,6 +132,9 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 	out->beta = spectrum_scale(factor / s.pdf, spectrum_mul(v->beta, s.f));
 	out->pdf = s.pdf;
 	out->eta = s.eta;
+	out->pdf_rev = 0;
+	if (c->one_way)
+		return true;
 	struct bsdf_point back = bsdf_point_of(c, v, transport == TRANSPORT_RADIANCE ? TRANSPORT_IMPORTANCE : TRANSPORT_RADIANCE);
 	out->pdf_rev = out->delta ? s.pdf : v->bsdf->ops->pdf_solid(v->bsdf, &back, s.wi, wo);
 	return true;
@@ -196,7 +199,8 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 		at->delta = out.delta;
 		to->beta = out.beta;
 		to->pdf = reach_pdf(at, to, out.pdf, ahead);
-		v[n - 2].pdf_rev = reach_pdf(at, &v[n - 2], out.pdf_rev, back);
+		if (!c->one_way)
+			v[n - 2].pdf_rev = reach_pdf(at, &v[n - 2], out.pdf_rev, back);
 		if (!(to->pdf > 0))
 			return n;
 		n++;

@@ -47,6 +47,7 @@ struct path_context {
 	struct wavelengths wl;
 	uint32_t min_depth, max_depth; /* edges */
 	bool roulette;
+	bool one_way; /* nobody asks for pdf_rev: no technique has more than one light vertex */
 	uint64_t *counters; /* of enum batch_counter */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
 };

@@ -229,17 +229,18 @@ spectrum color_eval(const struct color *c, const struct wavelengths *w)
 		assert(c->shape != COLOR_SHAPE_OTHER);
 		return spectrum_of(c->scale);
 	}
-	spectrum s;
-	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double nm = w->nm[i], x = c->scale;
-		if (c->sigmoid)
-			x *= upsample_sigmoid((c->coefficient[0] * nm + c->coefficient[1]) * nm + c->coefficient[2]);
-		if (c->count)
-			x *= table_value(c, nm);
-		if (c->d65)
-			x *= color_d65(nm);
-		s.v[i] = x;
-	}
+	spectrum s = spectrum_of(c->scale);
+	if (c->sigmoid)
+		for (int i = 0; i < SPECTRUM_LANES; i++) {
+			double nm = w->nm[i];
+			s.v[i] *= upsample_sigmoid((c->coefficient[0] * nm + c->coefficient[1]) * nm + c->coefficient[2]);
+		}
+	if (c->count)
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			s.v[i] *= table_value(c, w->nm[i]);
+	if (c->d65)
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			s.v[i] *= color_d65(w->nm[i]);
 	return s;
 }
 
