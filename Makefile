@@ -120,6 +120,14 @@ BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occlud
 bench: programs $(BUILD)/bench/bench
 	$(BUILD)/bench/bench --bin $(BUILD)/bin --json $(BUILD)/bench.json $(BENCH)
 
+# The demo scene on a farm of two workers on this machine: build/demo/demo.exr and demo.png.
+demo: programs
+	sh deploy/demo-run.sh $(BUILD) build/demo
+
+install: programs
+	install -d $(DESTDIR)$(PREFIX)/bin
+	install -m 755 $(addprefix $(BUILD)/bin/,$(PROGRAMS)) $(DESTDIR)$(PREFIX)/bin
+
 clean:
 	rm -rf build
 

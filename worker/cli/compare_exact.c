@@ -1,7 +1,6 @@
 #include "common/film/header.h"
 #include "worker/cli/compare.h"
 
-#include <assert.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -62,17 +61,12 @@ static bool same_attribute(const struct exr_attribute *a, const struct exr_attri
 {
 	if (a->type != b->type)
 		return differ(to, "%s is of two types", a->name);
-	switch (a->type) {
-	case EXR_ATTRIBUTE_STRING:
+	if (a->type == EXR_ATTRIBUTE_STRING)
 		return strcmp(a->string, b->string) == 0 || differ(to, "%s is '%s' and '%s'", a->name, a->string, b->string);
-	case EXR_ATTRIBUTE_DOUBLE:
+	if (a->type == EXR_ATTRIBUTE_DOUBLE)
 		return memcmp(&a->number, &b->number, sizeof a->number) == 0 ||
 		       differ(to, "%s is %.17g and %.17g", a->name, a->number, b->number);
-	case EXR_ATTRIBUTE_INT:
-		return a->integer == b->integer || differ(to, "%s is %d and %d", a->name, a->integer, b->integer);
-	}
-	assert(!"a type that exr_read makes");
-	return false;
+	return a->integer == b->integer || differ(to, "%s is %d and %d", a->name, a->integer, b->integer);
 }
 
 static bool same_header(const struct exr_image *a, const struct exr_image *b, const struct answer *to)

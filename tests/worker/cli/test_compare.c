@@ -168,8 +168,9 @@ static struct picture through_file(struct exr_image *img)
 	int fd = mkstemp(path);
 	assert_true(fd >= 0);
 	close(fd);
-	if (exr_write(img, &bytes, &size, &e) != 0 || image_file_write(path, bytes, size, &e) != 0 || picture_read(&p, path, &e) != 0)
-		fail_msg("%s", e.text);
+	assert_int_equal(exr_write(img, &bytes, &size, &e), 0);
+	assert_int_equal(image_file_write(path, bytes, size, &e), 0);
+	assert_int_equal(picture_read(&p, path, &e), 0);
 	unlink(path);
 	mem_free(bytes);
 	return p;

@@ -1,0 +1,37 @@
+# The demo, small: it ends well, leaves its two pictures and nothing else; it stops what it started when it is interrupted.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-tonemap
+DEMO=$HERE/../../deploy/demo-run.sh
+case $BUILD in /*) ;; *) BUILD=$PWD/$BUILD ;; esac
+mkdir "$DIR/tmp"
+export TMPDIR="$DIR/tmp"
+
+# Nobody of the demo runs: their command lines hold its folders (grep's own does not).
+printf '%s\n' "$DIR/tmp/hslt-demo" "$DIR/out/demo.exr" >"$DIR/marks"
+nobody_left() {
+	! grep -alF -f "$DIR/marks" /proc/[0-9]*/cmdline 2>/dev/null | grep -q .
+}
+
+timeout 120 sh "$DEMO" "$BUILD" "$DIR/out" --size 96x54 -D spp=1 >"$DIR/demo.out" 2>"$DIR/demo.log" || fail "the demo ended with $?"
+[ "$(ls "$DIR/out" | tr '\n' ' ')" = "demo.exr demo.png " ] || fail "it left: $(ls "$DIR/out")"
+[ "$(od -An -tx1 -j16 -N8 "$DIR/out/demo.png" | tr -d ' ')" = 0000006000000036 ] || fail "the picture is not 96x54"
+grep -q '^worker2 ' "$DIR/demo.out" || fail "the farm's state is not shown: $(cat "$DIR/demo.out")"
+tail -n 1 "$DIR/demo.out" | grep -q 'out/demo.png' || fail "it does not say where the picture is"
+[ -z "$(ls "$TMPDIR")" ] || fail "it left $(ls "$TMPDIR")"
+nobody_left || fail "it left somebody running"
+
+sh "$DEMO" "$BUILD" "$DIR/out" --size 96x54 -D spp=1000000 >"$DIR/demo.out" 2>"$DIR/demo.log" &
+demo=$!
+PIDS="$PIDS $demo"
+until_true 20 grep -q 'running' "$DIR/demo.log" || fail "the long demo does not run"
+nobody_left && fail "nobody is there to be stopped"
+stop $demo
+[ $CODE -eq 130 ] || fail "interrupted, it ended with $CODE"
+[ -z "$(ls "$TMPDIR")" ] || fail "interrupted, it left $(ls "$TMPDIR")"
+nobody_left || fail "interrupted, it left somebody running"
+
+if timeout 60 sh "$DEMO" "$BUILD" "$DIR/out" --no-such-option >"$DIR/demo.out" 2>"$DIR/demo.log"; then
+	fail "a demo that cannot be submitted ended with 0"
+fi
+nobody_left || fail "failed, it left somebody running"
+echo "demo: pictures, and nobody left"
