@@ -20,6 +20,17 @@ double pss_small_step(double u, double r)
 	return w < 1 ? w : 0;
 }
 
+/* A small step from `from`, driven by the fresh numbers u and put in their place. The wavelength alone stays fresh: the target
+ * hardly depends on it, and a chain that moves through all of them at once shows no coloured noise. */
+static void move(enum sampler_side side, unsigned vertex, const double from[SAMPLER_BLOCK], double u[SAMPLER_BLOCK])
+{
+	double wavelength = u[DIM_WAVELENGTH];
+	for (int i = 0; i < SAMPLER_BLOCK; i++)
+		u[i] = pss_small_step(from[i], u[i]);
+	if (side == SIDE_CAMERA && vertex == 0)
+		u[DIM_WAVELENGTH] = wavelength;
+}
+
 static const double *block(struct sampler *base, enum sampler_side side, unsigned vertex)
 {
 	struct pss_sampler *s = (struct pss_sampler *)(void *)base;
@@ -28,8 +39,7 @@ static const double *block(struct sampler *base, enum sampler_side side, unsigne
 		double *u = s->point->u[side][v];
 		sampler_fill(s->seed, s->stream, s->index, s->step, side, v, u);
 		if (s->from && v < s->from->used[side])
-			for (int i = 0; i < SAMPLER_BLOCK; i++)
-				u[i] = pss_small_step(s->from->u[side][v][i], u[i]);
+			move(side, v, s->from->u[side][v], u);
 		s->point->used[side] = v + 1;
 	}
 	return s->point->u[side][vertex];
