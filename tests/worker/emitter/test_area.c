@@ -1,0 +1,330 @@
+/*
+ * Area emitters: what is sampled is distributed as the pdf functions say, and these integrate to one. Chi-square at level
+ * 1e-6 each, over cells of the (u,v) square of the emitter's surface; seeds are the hash of the test's name. A density wrong
+ * by 3 % in a tenth of the cells makes chi-square 0.1 x 0.03^2 x 200000 = 18 above its 96 degrees: found in a few cells,
+ * by its integral always.
+ */
+#include "tests/support/bodies.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/stats.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { CELLS = 16 }; /* squared */
+#define LEVEL 1e-6
+
+static struct world *sphere_light(const char *flip)
+{
+	return world_of_text(8, 8, SENSOR("0,0,9", "0,0,0") "<shape type='sphere'><point name='center' x='.25' y='-.5' z='.125'/>"
+			     "<float name='radius' value='.5'/><boolean name='flip_normals' value='%s'/>"
+			     "<emitter type='area'/></shape><shape type='sphere'><float name='radius' value='4'/></shape>",
+			     flip);
+}
+
+/* Three triangles of areas of about 1 : 18 : 1300, one of them on end. */
+static struct world *mesh_light(void)
+{
+	static const char scene[] = "<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0")
+		"<shape type='obj'><string name='filename' value='three.obj'/><emitter type='area'/></shape></scene>";
+	static const char three[] = "v 0 0 0\nv .02 0 0\nv 0 .1 0\nv 1 1 0\nv 1.1 1 .01\nv 1 1.2 .3\nv -1 -1 0\nv 1 -1 .5\nv 0 -1.1 -1\n"
+				    "f 1 2 3\nf 4 5 6\nf 7 8 9\n";
+	const struct memory_file files[] = {{"three.xml", scene, sizeof scene - 1}, {"three.obj", three, sizeof three - 1}, {NULL, NULL, 0}};
+	return world_of_files(8, 8, files);
+}
+
+static void check_counts(const char *what, const uint64_t *counts, const double *expected, size_t cells)
+{
+	double p = stats_counts_p(counts, expected, cells);
+	print_message("%s: p = %.3g\n", what, p);
+	if (p < LEVEL)
+		fail_msg("%s: p = %g", what, p);
+}
+
+/* A sphere's point as cell of (height, longitude): equal areas. */
+static size_t sphere_cell(vec3 w)
+{
+	double u = 0.5 * (1 - w.z), v = atan2(w.y, w.x) / (2 * M_PI) + 0.5;
+	size_t i = (size_t)fmin(u * CELLS, CELLS - 1), j = (size_t)fmin(v * CELLS, CELLS - 1);
+	return i * CELLS + j;
+}
+
+static vec3 cell_direction(double i, double j)
+{
+	double z = 1 - 2 * i / CELLS, phi = 2 * M_PI * (j / CELLS - 0.5), r = sqrt(fmax(1 - z * z, 0));
+	return (vec3){r * cos(phi), r * sin(phi), z};
+}
+
+/* Expected counts of a density over directions (per solid angle) by the midpoint rule, 16 x 16 points a cell; their sum. */
+static double expect(double (*density)(const void *, vec3), const void *arg, double n, double *expected)
+{
+	enum { SUB = 16 };
+	double sum = 0;
+	for (int i = 0; i < CELLS; i++)
+		for (int j = 0; j < CELLS; j++) {
+			double cell = 0;
+			for (int k = 0; k < SUB * SUB; k++)
+				cell += density(arg, cell_direction(i + (k / SUB + 0.5) / SUB, j + (k % SUB + 0.5) / SUB));
+			expected[i * CELLS + j] = n * cell * 4 * M_PI / (CELLS * CELLS * SUB * SUB);
+			sum += expected[i * CELLS + j] / n;
+		}
+	return sum;
+}
+
+struct seen {
+	const struct emitter *em;
+	const struct geom_shape *shape;
+	vec3 ref;
+};
+
+static struct emitter_point on_sphere(const struct seen *s, vec3 w)
+{
+	return (struct emitter_point){.p = vec3_madd(s->shape->center, s->shape->radius, w), .n = vec3_scale(s->shape->normal_sign, w)};
+}
+
+/* Per solid angle of directions from the centre. */
+static double toward_density(const void *arg, vec3 w)
+{
+	const struct seen *s = arg;
+	struct emitter_point x = on_sphere(s, w);
+	return s->em->ops->pdf_toward(s->em, s->ref, &x) * s->shape->radius * s->shape->radius;
+}
+
+static double point_density(const void *arg, vec3 w)
+{
+	const struct seen *s = arg;
+	struct emitter_point x = on_sphere(s, w);
+	return s->em->ops->pdf_point(s->em, &x) * s->shape->radius * s->shape->radius;
+}
+
+static void check_sphere(const char *what, const struct seen *s, bool toward, double tolerance)
+{
+	static uint64_t counts[CELLS * CELLS];
+	static double expected[CELLS * CELLS];
+	memset(counts, 0, sizeof counts);
+	struct dice d = dice_of(what);
+	size_t n = dice_count(200000), taken = 0;
+	for (size_t i = 0; i < n; i++) {
+		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+		struct emitter_point x = {0};
+		bool ok = toward ? s->em->ops->sample_toward(s->em, s->ref, u, &x, &pdf) : s->em->ops->sample_point(s->em, u, &x, &pdf);
+		if (!ok)
+			continue;
+		taken++;
+		vec3 w = vec3_scale(1 / s->shape->radius, vec3_sub(x.p, s->shape->center));
+		assert_true(fabs(vec3_length(w) - 1) < 1e-12);
+		assert_true(fabs(vec3_dot(w, x.n) - s->shape->normal_sign) < 1e-12);
+		double own = toward ? s->em->ops->pdf_toward(s->em, s->ref, &x) : s->em->ops->pdf_point(s->em, &x);
+		assert_true(fabs(own - pdf) <= 1e-9 * pdf);
+		counts[sphere_cell(w)]++;
+	}
+	/* Only the silhouette itself, a set of measure zero, may be refused. */
+	assert_true(n - taken <= n / 10000);
+	double sum = expect(toward ? toward_density : point_density, s, (double)taken, expected);
+	print_message("%s: integral %.6f\n", what, sum);
+	/* The midpoint rule cuts the cap's border. */
+	assert_true(fabs(sum - 1) < tolerance);
+	if (tolerance < 0.001)
+		check_counts(what, counts, expected, CELLS * CELLS);
+}
+
+static void test_sphere(void **state)
+{
+	(void)state;
+	for (int flip = 0; flip < 2; flip++) {
+		struct world *w = sphere_light(flip ? "true" : "false");
+		struct seen s = {&w->emitters[0], &w->shapes[0], {0, 0, 0}};
+		check_sphere(flip ? "point, inwards" : "point", &s, false, 1e-9);
+		s.ref = s.shape->center;
+		check_sphere(flip ? "toward, from the centre, inwards" : "toward, from the centre", &s, true, 1e-9);
+		if (flip) {
+			s.ref = vec3_add(s.shape->center, (vec3){0, 2 * s.shape->radius, 0});
+			check_sphere("toward, inwards, from outside", &s, true, 1e-9);
+		}
+		world_free(w);
+	}
+}
+
+/* Over the cap that is seen: cells of the sampled cone's own numbers must fill evenly. The cone's cosine is taken from the
+ * point found, so that a wrong angle, a wrong side or a wrong density shows. */
+static void check_cone(const char *what, const struct seen *s)
+{
+	enum { RINGS = 64 };
+	uint64_t counts[RINGS] = {0};
+	double expected[RINGS], integral = 0, r = s->shape->radius;
+	vec3 to = vec3_sub(s->shape->center, s->ref);
+	double distance = vec3_length(to);
+	vec3 axis = vec3_scale(1 / distance, to);
+	struct dice d = dice_of(what);
+	size_t n = dice_count(200000), refused = 0;
+	for (size_t i = 0; i < n; i++) {
+		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+		struct emitter_point x;
+		if (!s->em->ops->sample_toward(s->em, s->ref, u, &x, &pdf)) {
+			refused++;
+			continue;
+		}
+		double own = s->em->ops->pdf_toward(s->em, s->ref, &x);
+		assert_true(fabs(own - pdf) <= 1e-9 * pdf);
+		/* The point faces ref: r n = x - c, and ref sees it where (ref - x).n > 0. */
+		assert_true(vec3_dot(vec3_sub(s->ref, x.p), x.n) > 0);
+		/* Angle at the centre, as share of the cap that is seen, whose height is r - r^2 / d. */
+		double height = (1 + vec3_dot(x.n, axis)) / (1 - r / distance);
+		assert_true(height < 1 + 1e-6);
+		counts[(size_t)fmin(height * RINGS, RINGS - 1)]++;
+	}
+	/* Density over the height: pdf_toward is per area, areas are 2 pi r^2 per height. */
+	struct frame f = frame_around(vec3_neg(axis));
+	for (int i = 0; i < RINGS; i++) {
+		enum { SUB = 2000 };
+		double sum = 0;
+		for (int k = 0; k < SUB; k++) {
+			double h = (i + (k + 0.5) / SUB) / RINGS * (1 - r / distance), c = 1 - h, sine = sqrt(h * (2 - h));
+			vec3 w = frame_to_world(&f, (vec3){sine, 0, c});
+			struct emitter_point x = on_sphere(s, w);
+			sum += s->em->ops->pdf_toward(s->em, s->ref, &x) / SUB;
+		}
+		double share = sum * 2 * M_PI * r * r * (1 - r / distance) / RINGS;
+		integral += share;
+		expected[i] = (double)(n - refused) * share;
+	}
+	print_message("%s: integral %.9f, %zu of %zu refused\n", what, integral, refused, n);
+	/* Near the surface almost all of the density is in the first ring: the rule is coarser there. */
+	assert_true(fabs(integral - 1) < 1e-3);
+	assert_true(refused <= n / 1000);
+	for (int i = 0; i < RINGS; i++)
+		expected[i] /= integral;
+	check_counts(what, counts, expected, RINGS);
+}
+
+static void test_cone(void **state)
+{
+	(void)state;
+	struct world *w = sphere_light("false");
+	struct seen s = {&w->emitters[0], &w->shapes[0], {0, 0, 0}};
+	const double gaps[] = {1e-3, 0.1, 1, 10, 1e3, 1e6};
+	static const char *const names[] = {"cone, near the surface", "cone at 0.1 radii", "cone at 1 radius", "cone at 10 radii",
+					    "cone at 1e3 radii", "cone at 1e6 radii"};
+	for (size_t i = 0; i < sizeof gaps / sizeof gaps[0]; i++) {
+		vec3 away = vec3_normalize((vec3){1, -2, 3});
+		s.ref = vec3_madd(s.shape->center, s.shape->radius * (1 + gaps[i]), away);
+		check_cone(names[i], &s);
+	}
+	world_free(w);
+}
+
+static double cosine_density(const void *arg, vec3 w)
+{
+	const struct seen *s = arg;
+	struct emitter_point x = {.n = s->ref};
+	return s->em->ops->pdf_direction(s->em, &x, w);
+}
+
+static void test_direction(void **state)
+{
+	(void)state;
+	struct world *w = sphere_light("false");
+	static uint64_t counts[CELLS * CELLS];
+	static double expected[CELLS * CELLS];
+	memset(counts, 0, sizeof counts);
+	struct seen s = {&w->emitters[0], NULL, vec3_normalize((vec3){0.3, -0.8, 0.4})};
+	struct emitter_point x = {.n = s.ref};
+	struct dice d = dice_of("direction");
+	size_t n = dice_count(400000);
+	for (size_t i = 0; i < n; i++) {
+		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+		vec3 dir;
+		assert_true(s.em->ops->sample_direction(s.em, &x, u, &dir, &pdf));
+		assert_true(fabs(vec3_length(dir) - 1) < 1e-12);
+		assert_true(fabs(pdf - s.em->ops->pdf_direction(s.em, &x, dir)) < 1e-12);
+		struct wavelengths wl = {.grey = true};
+		assert_true(s.em->ops->radiance(s.em, &x, dir, &wl).v[0] > 0);
+		assert_true(s.em->ops->radiance(s.em, &x, vec3_neg(dir), &wl).v[0] == 0);
+		counts[sphere_cell(dir)]++;
+	}
+	double sum = expect(cosine_density, &s, (double)n, expected);
+	assert_true(fabs(sum - 1) < 1e-4);
+	check_counts("direction", counts, expected, CELLS * CELLS);
+	world_free(w);
+}
+
+/* Triangles by area, and evenly inside each: four equal parts of each triangle (by its midpoints) get the same. */
+static void test_mesh(void **state)
+{
+	(void)state;
+	struct world *w = mesh_light();
+	const struct emitter *em = &w->emitters[0];
+	const struct geom_shape *g = &w->shapes[0];
+	assert_int_equal(g->triangle_count, 3);
+	double area[3], total = 0, expected[12];
+	uint64_t counts[12] = {0};
+	vec3 corner[3][3];
+	for (int i = 0; i < 3; i++) {
+		for (int k = 0; k < 3; k++) {
+			const float *p = g->position[g->index[i][k]];
+			corner[i][k] = (vec3){(double)p[0], (double)p[1], (double)p[2]};
+		}
+		area[i] = 0.5 * vec3_length(vec3_cross(vec3_sub(corner[i][1], corner[i][0]), vec3_sub(corner[i][2], corner[i][0])));
+		total += area[i];
+	}
+	assert_true(area[2] > 50 * area[1] && area[1] > 5 * area[0]);
+	struct dice d = dice_of("mesh");
+	size_t n = dice_count(1000000);
+	for (size_t i = 0; i < n; i++) {
+		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
+		struct emitter_point x;
+		assert_true((i % 2 ? em->ops->sample_point(em, u, &x, &pdf) : em->ops->sample_toward(em, (vec3){0, 0, 1}, u, &x, &pdf)));
+		assert_true(x.prim < 3);
+		assert_true(fabs(pdf * total - 1) < 1e-12 && fabs(em->ops->pdf_point(em, &x) * total - 1) < 1e-12);
+		assert_true(em->ops->pdf_toward(em, (vec3){0, 0, 1}, &x) == pdf);
+		vec3 *c = corner[x.prim], normal = vec3_cross(vec3_sub(c[1], c[0]), vec3_sub(c[2], c[0]));
+		double l2 = vec3_dot(normal, normal), b[3];
+		assert_true(fabs(vec3_dot(vec3_sub(x.p, c[0]), normal)) < 1e-12 * sqrt(l2));
+		assert_true(vec3_length(vec3_sub(x.n, vec3_scale(1 / sqrt(l2), normal))) < 1e-12);
+		for (int k = 0; k < 3; k++) {
+			b[k] = vec3_dot(vec3_cross(vec3_sub(c[(k + 1) % 3], x.p), vec3_sub(c[(k + 2) % 3], x.p)), normal) / l2;
+			assert_true(b[k] > -1e-9);
+		}
+		counts[4 * x.prim + (b[0] > 0.5 ? 0 : b[1] > 0.5 ? 1 : b[2] > 0.5 ? 2 : 3)]++;
+	}
+	for (int i = 0; i < 12; i++)
+		expected[i] = (double)n * area[i / 4] / (4 * total);
+	check_counts("mesh", counts, expected, 12);
+	world_free(w);
+}
+
+/* The ends of the square of random numbers give points, too. */
+static void test_corners(void **state)
+{
+	(void)state;
+	struct world *w[2] = {sphere_light("false"), mesh_light()};
+	const double ends[] = {0, 0x1p-53, 0.5, 1 - 0x1p-53};
+	for (int k = 0; k < 2; k++) {
+		const struct emitter *em = &w[k]->emitters[0];
+		for (int i = 0; i < 16; i++) {
+			double u[2] = {ends[i / 4], ends[i % 4]}, pdf;
+			struct emitter_point x;
+			vec3 dir;
+			assert_true(em->ops->sample_point(em, u, &x, &pdf) && pdf > 0 && isfinite(pdf));
+			assert_true(vec3_is_finite(x.p) && fabs(vec3_length(x.n) - 1) < 1e-12);
+			if (em->ops->sample_direction(em, &x, u, &dir, &pdf))
+				assert_true(pdf > 0 && fabs(vec3_length(dir) - 1) < 1e-9 && vec3_dot(dir, x.n) > 0);
+			if (em->ops->sample_toward(em, (vec3){0.9, 0.9, 0.9}, u, &x, &pdf))
+				assert_true(pdf > 0 && isfinite(pdf) && vec3_is_finite(x.p));
+		}
+		world_free(w[k]);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_sphere), cmocka_unit_test(test_cone),    cmocka_unit_test(test_direction),
+		cmocka_unit_test(test_mesh),   cmocka_unit_test(test_corners),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
