@@ -67,7 +67,7 @@ static bool reach(double position, double radius, uint32_t size, uint32_t *first
 	return true;
 }
 
-enum { KERNEL_MAX = 64 }; /* pixels that a kernel may span: settings limit its radius to less than half of it */
+enum { KERNEL_MAX = 130 }; /* pixels that a kernel may span: settings limit its radius to 64 */
 
 void film_sums_splat(struct film_sums *f, const struct splat *s, double weight)
 {
