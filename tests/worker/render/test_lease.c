@@ -1,0 +1,457 @@
+/*
+ * Leases: results that depend on plan and key alone, in any order; stopping; what comes from outside refused; a crop's pixels;
+ * memory that runs out; and the film of one lease.
+ */
+#include "common/base/mem.h"
+#include "tests/support/dice.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/worlds.h"
+#include "worker/render/sums.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { PARTS = 2, GROUPS = 2, CHAINS = 8 };
+
+static struct world *small_world(const char *filter)
+{
+	return world_of_text(
+		80, 70,
+		"<sensor type='perspective'><float name='fov' value='50'/><transform name='to_world'>"
+		"<lookat origin='0,1,5' target='0,0.5,0' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='%s'/></film></sensor>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform></shape>"
+		"<shape type='sphere'><point name='center' x='0' y='.6' z='0'/><float name='radius' value='.6'/><bsdf type='dielectric'/></shape>"
+		"<shape type='sphere'><point name='center' x='1' y='2' z='1'/><float name='radius' value='.3'/>"
+		"<emitter type='area'><rgb name='radiance' value='4,3,2'/></emitter></shape>",
+		filter);
+}
+
+static struct plan plan_of(const struct world *w, const char *integrator)
+{
+	const struct render_integrator *i = render_integrator_find(integrator);
+	struct plan p = {.kind = i->kind, .width = w->settings.width, .height = w->settings.height, .crop_width = w->settings.width,
+			 .crop_height = w->settings.height, .border = w->settings.border, .seed = 3, .groups = GROUPS, .parts = PARTS,
+			 .chains = i->kind == PLAN_CHAINS ? CHAINS : 0, .bootstrap = 512, .epoch = i->kind == PLAN_CHAINS ? 300 : 1,
+			 .rounds = 3, .min_depth = 1, .max_depth = 6};
+	snprintf(p.integrator, sizeof p.integrator, "%s", integrator);
+	struct error e = {""};
+	if (plan_check(&p, &e))
+		fail_msg("%s", e.text);
+	return p;
+}
+
+static struct batch run(const struct world *w, const struct plan *p, struct lease_key k, const struct lease_input *in)
+{
+	struct batch b;
+	struct error e = {""};
+	enum lease_end end;
+	if (render_lease(w, p, &k, in, NULL, &end, &b, &e))
+		fail_msg("%s", e.text);
+	assert_int_equal(end, LEASE_DONE);
+	if (batch_check(&b, p, &e))
+		fail_msg("%s", e.text);
+	return b;
+}
+
+static void assert_same(const struct batch *a, const struct batch *b)
+{
+	assert_memory_equal(a->counters, b->counters, sizeof a->counters);
+	assert_true(a->independent_sum == b->independent_sum && a->independent_square == b->independent_square);
+	assert_true(a->beyond_sum == b->beyond_sum);
+	assert_int_equal(a->tile_count, b->tile_count);
+	for (uint32_t i = 0; i < a->tile_count; i++) {
+		const struct tile *s = &a->tiles[i], *t = &b->tiles[i];
+		assert_true(s->x == t->x && s->y == t->y && s->width == t->width && s->height == t->height);
+		assert_memory_equal(s->xyz, t->xyz, (size_t)s->width * s->height * 3 * sizeof *s->xyz);
+	}
+	assert_int_equal(a->state_count, b->state_count);
+	for (uint32_t i = 0; i < a->state_count; i++) {
+		assert_int_equal(a->states[i].size, b->states[i].size);
+		assert_memory_equal(a->states[i].bytes, b->states[i].bytes, a->states[i].size);
+	}
+	assert_int_equal(a->weight_count, b->weight_count);
+	if (a->weight_count)
+		assert_memory_equal(a->weights, b->weights, a->weight_count * sizeof *a->weights);
+}
+
+static struct lease_key key(enum lease_kind kind, uint32_t group, uint32_t part, uint64_t epoch)
+{
+	return (struct lease_key){1, kind, group, part, epoch};
+}
+
+/* Seeds that carry light, for one lease of chains. */
+static void find_seeds(const struct world *w, const struct plan *p, uint32_t group, uint64_t *seeds, uint32_t count)
+{
+	struct batch b = run(w, p, key(LEASE_BOOTSTRAP, group, 0, 0), NULL);
+	uint64_t first = plan_bootstrap_range(p, group, 0).begin;
+	uint32_t n = 0;
+	for (uint64_t i = 0; i < b.weight_count && n < count; i++)
+		if (b.weights[i] > 0)
+			seeds[n++] = first + i;
+	assert_int_equal(n, count);
+	batch_fini(&b);
+}
+
+/* All leases of a job of samples or bootstraps, forwards and backwards: the same bytes each. */
+static void test_any_order(void **state)
+{
+	(void)state;
+	struct world *w = small_world("gaussian");
+	const char *names[] = {"path", "bdpt", "pssmlt"};
+	for (int n = 0; n < 3; n++) {
+		struct plan p = plan_of(w, names[n]);
+		enum lease_kind kind = p.kind == PLAN_CHAINS ? LEASE_BOOTSTRAP : LEASE_RENDER;
+		struct batch b[GROUPS * PARTS];
+		for (uint32_t i = 0; i < GROUPS * PARTS; i++)
+			b[i] = run(w, &p, key(kind, i % GROUPS, i / GROUPS, 0), NULL);
+		for (uint32_t i = GROUPS * PARTS; i-- > 0;) {
+			struct batch again = run(w, &p, key(kind, i % GROUPS, i / GROUPS, 0), NULL);
+			assert_same(&b[i], &again);
+			batch_fini(&again);
+			batch_fini(&b[i]);
+		}
+	}
+	world_free(w);
+}
+
+/* Chains from seeds, and from states that went through another run. */
+static void test_chains(void **state)
+{
+	(void)state;
+	struct world *w = small_world("box");
+	for (size_t n = 0; render_integrator_at(n); n++) {
+		if (render_integrator_at(n)->kind != PLAN_CHAINS)
+			continue;
+		struct plan p = plan_of(w, render_integrator_at(n)->name);
+		uint64_t seeds[2];
+		find_seeds(w, &p, 1, seeds, 2);
+		struct lease_input in = {2, seeds, NULL};
+		struct batch a = run(w, &p, key(LEASE_RENDER, 1, 1, 0), &in), b = run(w, &p, key(LEASE_RENDER, 1, 1, 0), &in);
+		assert_same(&a, &b);
+		assert_true(a.counters[COUNT_SAMPLES] == 2 * p.epoch && a.tile_count > 0);
+		struct lease_input next = {2, NULL, a.states}, copy = {2, NULL, b.states};
+		struct batch c = run(w, &p, key(LEASE_RENDER, 1, 1, 1), &next), d = run(w, &p, key(LEASE_RENDER, 1, 1, 1), &copy);
+		assert_same(&c, &d);
+		batch_fini(&a);
+		batch_fini(&b);
+		batch_fini(&c);
+		batch_fini(&d);
+	}
+	world_free(w);
+}
+
+static int end_of(const struct world *w, const struct plan *p, struct lease_key k, const struct lease_input *in)
+{
+	struct batch b;
+	struct error e = {""};
+	enum lease_end end;
+	int rc = render_lease(w, p, &k, in, NULL, &end, &b, &e);
+	assert_true(rc == 0 || e.text[0]);
+	batch_fini(&b);
+	return rc;
+}
+
+static void test_refused(void **state)
+{
+	(void)state;
+	struct world *w = small_world("box");
+	struct plan p = plan_of(w, "pssmlt"), other;
+	uint64_t seeds[3];
+	find_seeds(w, &p, 0, seeds, 3);
+	struct lease_key k0 = key(LEASE_RENDER, 0, 0, 0), k1 = key(LEASE_RENDER, 0, 0, 1);
+	struct lease_input in = {2, seeds, NULL};
+	struct batch b = run(w, &p, k0, &in);
+	/* Counts, and nothing at all. */
+	assert_int_equal(end_of(w, &p, k0, NULL), -EINVAL);
+	for (uint32_t n = 0; n < 4; n++)
+		if (n != 2)
+			assert_int_equal(end_of(w, &p, k0, &(struct lease_input){n, seeds, NULL}), -EINVAL);
+	assert_int_equal(end_of(w, &p, k0, &(struct lease_input){2, NULL, NULL}), -EINVAL);
+	/* States: another chain's, cut, lengthened, noise. */
+	struct chain_state s[2] = {b.states[1], b.states[0]};
+	assert_int_equal(end_of(w, &p, k1, &(struct lease_input){2, NULL, s}), -EBADMSG);
+	struct dice d = dice_of("hostile states");
+	size_t good = 0;
+	for (size_t i = 0; i < dice_count(300); i++) {
+		uint8_t *bytes = malloc(b.states[0].size + 64);
+		uint32_t size = b.states[0].size;
+		memset(bytes, 0, size + 64);
+		memcpy(bytes, b.states[0].bytes, size);
+		if (i % 3 == 0)
+			size = dice_below(&d, size);
+		else if (i % 3 == 1)
+			size += 1 + dice_below(&d, 63);
+		else
+			for (int n = 0; n < 4; n++)
+				bytes[24 + dice_below(&d, size - 24)] ^= (uint8_t)(1 + dice_below(&d, 255));
+		uint8_t *exact = malloc(size ? size : 1);
+		memcpy(exact, bytes, size);
+		struct chain_state hostile[2] = {{exact, size}, b.states[1]};
+		int rc = end_of(w, &p, k1, &(struct lease_input){2, NULL, hostile});
+		/* Other numbers in [0,1) may make another path that carries light: a state like any. */
+		assert_true(rc == -EBADMSG || (rc == 0 && i % 3 == 2));
+		good += rc == 0;
+		free(exact);
+		free(bytes);
+	}
+	print_message("%zu of the noisy states are states\n", good);
+	/* Seeds outside the bootstrap, and dark ones. */
+	struct batch boot = run(w, &p, key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
+	for (uint64_t i = 0; i < boot.weight_count; i++)
+		if (!(boot.weights[i] > 0)) {
+			assert_int_equal(end_of(w, &p, k0, &(struct lease_input){2, (uint64_t[]){seeds[0], i}, NULL}), -EBADMSG);
+			break;
+		}
+	batch_fini(&boot);
+	/* Plans that are not this world's. */
+	other = p;
+	other.width++;
+	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	other = p;
+	other.border = 3;
+	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	other = p;
+	strcpy(other.integrator, "none");
+	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	other = p;
+	strcpy(other.integrator, "path");
+	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	other = p;
+	other.max_depth = 0;
+	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	other.max_depth = PATH_MAX_EDGES + 1;
+	assert_int_equal(end_of(w, &other, k0, &in), -EINVAL);
+	batch_fini(&b);
+	world_free(w);
+}
+
+static void test_stop(void **state)
+{
+	(void)state;
+	struct world *w = small_world("box");
+	const char *names[] = {"path", "bdpt", "pssmlt"};
+	for (int n = 0; n < 3; n++) {
+		struct plan p = plan_of(w, names[n]);
+		uint64_t seeds[2];
+		find_seeds(w, &p, 0, seeds, 2);
+		struct lease_input in = {2, seeds, NULL};
+		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
+			atomic_bool stop = true;
+			enum lease_end end = LEASE_DONE;
+			struct batch b;
+			struct lease_key k = key((enum lease_kind)kind, 0, 0, 0);
+			assert_int_equal(render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, &stop, &end, &b, NULL), 0);
+			assert_int_equal(end, LEASE_STOPPED);
+			assert_true(!b.tiles && !b.states && !b.weights && b.tile_count == 0 && b.state_count == 0 && b.weight_count == 0);
+			batch_fini(&b);
+			atomic_store(&stop, false);
+			assert_int_equal(render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, &stop, &end, &b, NULL), 0);
+			assert_int_equal(end, LEASE_DONE);
+			batch_fini(&b);
+		}
+	}
+	world_free(w);
+}
+
+static float *film_of(const struct world *w, const struct plan *p)
+{
+	float *film = calloc((size_t)p->width * p->height * 3, sizeof *film);
+	double *sum = calloc((size_t)p->width * p->height * 3, sizeof *sum);
+	for (uint32_t g = 0; g < p->groups; g++)
+		for (uint32_t part = 0; part < p->parts; part++) {
+			struct batch b = run(w, p, key(LEASE_RENDER, g, part, 0), NULL);
+			for (uint32_t t = 0; t < b.tile_count; t++)
+				for (uint32_t i = 0; i < b.tiles[t].width * b.tiles[t].height * 3; i++) {
+					uint32_t x = b.tiles[t].x + i / 3 % b.tiles[t].width, y = b.tiles[t].y + i / 3 / b.tiles[t].width;
+					sum[((size_t)y * p->width + x) * 3 + i % 3] += (double)b.tiles[t].xyz[i];
+				}
+			batch_fini(&b);
+		}
+	for (size_t i = 0; i < (size_t)p->width * p->height * 3; i++)
+		film[i] = (float)sum[i];
+	free(sum);
+	return film;
+}
+
+/* The crop draws the full render's samples. Film points are put together from the crop's own corner: they differ by roundings
+ * of double, which a path through glass can make larger, and sums are rounded to float in other strips. */
+static void test_crop(void **state)
+{
+	(void)state;
+	const char *filters[] = {"box", "tent", "gaussian"};
+	for (int f = 0; f < 3; f++) {
+		struct world *w = small_world(filters[f]);
+		struct plan p = plan_of(w, "path"), crop = p;
+		crop.crop_x = 13;
+		crop.crop_y = 9;
+		crop.crop_width = 50;
+		crop.crop_height = 31;
+		float *whole = film_of(w, &p), *part = film_of(w, &crop);
+		size_t differ = 0;
+		double light = 0;
+		for (uint32_t y = 0; y < p.height; y++)
+			for (uint32_t x = 0; x < p.width; x++)
+				for (int k = 0; k < 3; k++) {
+					bool inside = x - crop.crop_x < crop.crop_width && y - crop.crop_y < crop.crop_height;
+					double a = (double)whole[(y * p.width + x) * 3 + (uint32_t)k], b = (double)part[(y * p.width + x) * 3 + (uint32_t)k];
+					light += inside ? a : 0;
+					differ += inside ? !(fabs(a - b) <= 1e-6 * (a + b)) : b != 0;
+				}
+		print_message("%s: %zu of %u values differ\n", filters[f], differ, crop.crop_width * crop.crop_height * 3);
+		assert_true(light > 0);
+		assert_true(differ <= 12); /* an edge that a rounding crosses, once */
+		free(whole);
+		free(part);
+		world_free(w);
+	}
+}
+
+/* Constant light stays constant to the border, whatever the filter: sampling extends beyond the film. Each pixel's mean is
+ * within what so many samples allow: the kernel's weights vary, a border that lost energy would be darker by 10 % and more. */
+static void test_borders(void **state)
+{
+	(void)state;
+	const char *filters[] = {"box", "tent", "gaussian"};
+	for (int f = 0; f < 3; f++) {
+		struct world *w = world_of_text(24, 20, "<sensor type='perspective'><film type='hdrfilm'><rfilter type='%s'/></film></sensor>"
+						"<emitter type='constant'><float name='radiance' value='2'/></emitter>", filters[f]);
+		struct plan p = plan_of(w, "path");
+		p.epoch = 512;
+		float *film = film_of(w, &p);
+		double expected = 2 * w->grey_xyz[1] * (double)(p.epoch * p.groups), border = 0, inner = 0;
+		size_t borders = 0, inners = 0;
+		for (uint32_t y = 0; y < p.height; y++)
+			for (uint32_t x = 0; x < p.width; x++) {
+				double v = (double)film[(y * p.width + x) * 3 + 1] / expected;
+				bool edge = x == 0 || y == 0 || x + 1 == p.width || y + 1 == p.height;
+				*(edge ? &border : &inner) += v;
+				*(edge ? &borders : &inners) += 1;
+				/* Weights k / mean k of 1024 stratified samples: deviation below 3 %; seven of them. */
+				assert_true(fabs(v - 1) < 0.2);
+			}
+		print_message("%s: border %.5f, inside %.5f\n", filters[f], border / (double)borders, inner / (double)inners);
+		assert_true(fabs(border / (double)borders - 1) < 0.01);
+		assert_true(fabs(inner / (double)inners - 1) < 0.005);
+		free(film);
+		world_free(w);
+	}
+}
+
+/* Every kernel that the reader lets through has integral 1, and splats all of it. */
+static void test_kernels(void **state)
+{
+	(void)state;
+	static const struct scene_settings cases[] = {
+		{.filter = FILTER_BOX, .filter_radius = 0.5},  {.filter = FILTER_BOX, .filter_radius = 2},
+		{.filter = FILTER_BOX, .filter_radius = 64},   {.filter = FILTER_TENT, .filter_radius = 1},
+		{.filter = FILTER_TENT, .filter_radius = 0.25}, {.filter = FILTER_TENT, .filter_radius = 40},
+		{.filter = FILTER_GAUSSIAN, .filter_radius = 2, .filter_stddev = 0.5},
+		{.filter = FILTER_GAUSSIAN, .filter_radius = 1, .filter_stddev = 2},
+		{.filter = FILTER_GAUSSIAN, .filter_radius = 64, .filter_stddev = 16},
+	};
+	struct plan p = {.width = 300, .height = 300, .crop_x = 20, .crop_y = 10, .crop_width = 260, .crop_height = 270};
+	for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
+		struct film_sums f;
+		assert_int_equal(film_sums_init(&f, &p, &cases[k], NULL), 0);
+		enum { N = 200000 };
+		double sum = 0, r = cases[k].filter_radius;
+		for (int i = 0; i < N; i++)
+			sum += film_kernel(&f, 1.01 * r * (2 * (i + 0.5) / N - 1)) * 2.02 * r / N;
+		assert_true(fabs(sum - 1) < 1e-4);
+		assert_true(film_kernel(&f, 1.001 * r) == 0 && film_kernel(&f, -1.001 * r) == 0);
+		/* Splats at all places within a pixel bring their energy in the mean. */
+		double energy = 0, value[3] = {1, 2, 3};
+		enum { PLACES = 40 };
+		for (int i = 0; i < PLACES * PLACES; i++) {
+			struct splat s = {150 + (i % PLACES + 0.5) / PLACES, 145 + (i / PLACES + 0.5) / PLACES, {value[0], value[1], value[2]}};
+			film_sums_splat(&f, &s, 1.0 / (PLACES * PLACES));
+		}
+		for (size_t i = 0; i < (size_t)f.width * f.height; i++)
+			energy += f.xyz[3 * i + 1];
+		if (!(fabs(energy / 2 - 1) < 2e-3))
+			fail_msg("kernel %zu of radius %g splats %g of its energy", k, r, energy / 2);
+		film_sums_fini(&f);
+	}
+}
+
+/* The n-th allocation fails, for each n: an error or a result, nothing else; leaks are for the sanitizer to see. */
+static void test_no_memory(void **state)
+{
+	(void)state;
+	struct world *w = small_world("tent");
+	const char *names[] = {"path", "pssmlt"};
+	for (int n = 0; n < 2; n++) {
+		struct plan p = plan_of(w, names[n]);
+		p.epoch = 1;
+		uint64_t seeds[2];
+		find_seeds(w, &p, 0, seeds, 2);
+		struct lease_input in = {2, seeds, NULL};
+		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
+			int failed = 0;
+			for (long i = 0;; i++) {
+				struct error e = {""};
+				struct batch b;
+				enum lease_end end;
+				struct lease_key k = key((enum lease_kind)kind, 0, 0, 0);
+				mem_fail_after(i);
+				int rc = render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, NULL, &end, &b, &e);
+				mem_fail_after(-1);
+				assert_true(rc == 0 || (rc == -ENOMEM && e.text[0]));
+				if (rc)
+					assert_true(!b.tiles && !b.states && !b.weights);
+				batch_fini(&b);
+				if (rc == 0)
+					break;
+				failed++;
+			}
+			assert_true(failed >= 2 && failed < 50);
+		}
+	}
+	world_free(w);
+}
+
+static void test_no_memory_for_a_world(void **state)
+{
+	(void)state;
+	static const char text[] = "<scene version='3.0.0'>" SENSOR("0,0,5", "0,0,0")
+		"<shape type='cube'><bsdf type='twosided'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'/></bsdf></bsdf></shape>"
+		"<shape type='sphere'><bsdf type='roughdielectric'/></shape><shape type='rectangle'><emitter type='area'/></shape>"
+		"<emitter type='constant'/></scene>";
+	const struct memory_file files[] = {{"a.xml", text, sizeof text - 1}, {NULL, NULL, 0}};
+	struct asset_source assets = memory_assets(files);
+	struct error e = {""};
+	struct scene s;
+	if (scene_read(&s, &assets, "a.xml", render_plugins(), NULL, 0, &e))
+		fail_msg("%s", e.text);
+	int failed = 0;
+	for (long i = 0;; i++) {
+		struct world *w = NULL;
+		mem_fail_after(i);
+		int rc = world_new(&w, &s, &assets, NULL, &e);
+		mem_fail_after(-1);
+		assert_true(rc == 0 || (rc == -ENOMEM && !w));
+		world_free(w);
+		if (rc == 0)
+			break;
+		failed++;
+	}
+	print_message("%d allocations\n", failed);
+	assert_true(failed >= 4);
+	scene_fini(&s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_any_order), cmocka_unit_test(test_chains),  cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_stop),	  cmocka_unit_test(test_crop),	  cmocka_unit_test(test_borders),
+		cmocka_unit_test(test_kernels),	  cmocka_unit_test(test_no_memory),
+		cmocka_unit_test(test_no_memory_for_a_world),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
