@@ -66,7 +66,8 @@ static void test_outside_of_mesh(void **state)
 		uint32_t prim = 0;
 		double nearest = body_nearest(&s, x.p, w, 1e-9, &prim);
 		compared++;
-		wrong += met ? !(hit.prim.prim == prim || fabs(nearest - hit.t) < 1e-5) : isfinite(nearest);
+		bool same = met ? hit.prim.prim == prim || fabs(nearest - hit.t) < 1e-5 : isinf(nearest);
+		wrong += !same;
 	}
 	print_message("%zu rays, %zu met the body again, %zu of them falsely; %zu of %zu differ from the search in double\n", n,
 		      hits, false_hits, wrong, compared);
