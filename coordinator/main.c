@@ -1,4 +1,5 @@
 #include "common/base/log.h"
+#include "common/base/mem.h"
 #include "common/base/version.h"
 #include "coordinator/shell/server.h"
 
@@ -88,6 +89,7 @@ int main(int argc, char **argv)
 {
 	struct server_config c;
 	struct error e;
+	mem_keep(16 << 20);
 	server_config_init(&c);
 	c.blob_bytes = 100000000000u;
 	c.status_socket = getenv("HSLT_STATUS_SOCKET");

@@ -1,5 +1,7 @@
 #include "common/base/mem.h"
 
+#include <limits.h>
+#include <malloc.h>
 #include <stdatomic.h>
 #include <stdint.h>
 #include <stdlib.h>
@@ -48,4 +50,11 @@ void mem_free(void *p)
 void mem_fail_after(long n)
 {
 	atomic_store(&countdown, n);
+}
+
+void mem_keep(size_t bytes)
+{
+	int limit = bytes < INT_MAX ? (int)bytes : INT_MAX;
+	mallopt(M_TRIM_THRESHOLD, limit);
+	mallopt(M_MMAP_THRESHOLD, limit);
 }

@@ -12,6 +12,10 @@ void *mem_grow(void *p, size_t old_size, size_t new_size); /* as realloc; the ne
 char *mem_strdup(const char *s);
 void mem_free(void *p);
 
+/* Keep up to so many freed bytes for the next allocations: a daemon that takes and frees buffers of megabytes spends a fifth of
+ * its time on pages that the kernel takes back and zeroes again. At the start of a program. */
+void mem_keep(size_t bytes);
+
 /* Tests only: the allocation after `n` successful ones fails, once; n < 0 switches this off. */
 void mem_fail_after(long n);
 

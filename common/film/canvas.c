@@ -164,32 +164,62 @@ static int64_t round_to_grid(double x)
 	return (int64_t)x;
 }
 
-/* Adds (sign 1) or takes back (sign -1) a tile. False, with some values added: a value or sum is out of range; the number
- * of values done is then in *done, so that the same call with sign -1 restores them. */
-static bool add_tile(const struct canvas *c, int64_t *slot, const struct tile *t, int64_t sign, size_t *done, uint64_t *bound)
+static size_t tile_values(const struct tile *t)
 {
-	size_t row = (size_t)t->width * TILE_CHANNELS, limit = *done;
-	uint64_t highest = *bound;
-	const float *v = t->xyz;
-	for (size_t y = 0, made = 0; y < t->height && made < limit; y++, v += row) {
+	return (size_t)t->width * t->height * TILE_CHANNELS;
+}
+
+/* The largest magnitude: finite floats without their sign are ordered as their bits are. */
+static float largest(const struct tile *t)
+{
+	uint32_t most = 0;
+	size_t count = tile_values(t);
+	for (size_t i = 0; i < count; i++) {
+		uint32_t bits;
+		memcpy(&bits, &t->xyz[i], sizeof bits);
+		bits &= 0x7FFFFFFF;
+		most = bits > most ? bits : most;
+	}
+	float value;
+	memcpy(&value, &most, sizeof value);
+	return value;
+}
+
+/* Adds a row, with the scale's sign. Loops without exits, each doing one thing: the compiler makes vectors of them. */
+static void add_row(int64_t *s, const float *v, size_t count, double scale, bool small)
+{
+	if (small) {
+		for (size_t x = 0; x < count; x++) {
+			double shifted = (double)v[x] * scale + 0x1.8p52;
+			int64_t bits;
+			memcpy(&bits, &shifted, sizeof bits);
+			s[x] += bits - INT64_C(0x4338000000000000);
+		}
+	} else {
+		for (size_t x = 0; x < count; x++)
+			s[x] += round_to_grid((double)v[x] * scale);
+	}
+}
+
+/* Adds (sign 1) or takes back (sign -1) a tile. False: a value is off the grid, nothing was done. Each |sum| was at most
+ * SUM_MOST and a value is less than VALUE_MOST: their sum is a number, if one too large, and *bound tells. */
+static bool add_tile(const struct canvas *c, int64_t *slot, const struct tile *t, double sign, uint64_t *bound)
+{
+	double most = (double)largest(t) * c->scale;
+	if (!(most < VALUE_MOST))
+		return false;
+	size_t row = (size_t)t->width * TILE_CHANNELS;
+	int64_t low = 0, high = 0;
+	for (size_t y = 0; y < t->height; y++) {
 		int64_t *s = slot + y * SLOT_ROW;
-		for (size_t x = 0; x < row && made < limit; x++, made++) {
-			double d = (double)v[x] * c->scale;
-			if (!(fabs(d) < VALUE_MOST)) {
-				*done = made;
-				return false;
-			}
-			int64_t sum = s[x] + sign * round_to_grid(d);
-			s[x] = sum;
-			uint64_t magnitude = sum < 0 ? 0 - (uint64_t)sum : (uint64_t)sum;
-			highest = magnitude > highest ? magnitude : highest;
-			if (magnitude > SUM_MOST) {
-				*done = made + 1;
-				return false;
-			}
+		add_row(s, t->xyz + y * row, row, sign * c->scale, most < 0x1p51);
+		for (size_t x = 0; x < row; x++) {
+			low = s[x] < low ? s[x] : low;
+			high = s[x] > high ? s[x] : high;
 		}
 	}
-	*bound = highest;
+	uint64_t below = 0 - (uint64_t)low, above = (uint64_t)high, wider = below > above ? below : above;
+	*bound = wider > *bound ? wider : *bound;
 	return true;
 }
 
@@ -212,11 +242,6 @@ static size_t tile_index(const struct canvas *c, const struct tile *t)
 	return (size_t)((t->y - c->plan.crop_y) / TILE_SIZE) * c->tiles_across + (t->x - c->plan.crop_x) / TILE_SIZE;
 }
 
-static size_t tile_values(const struct tile *t)
-{
-	return (size_t)t->width * t->height * TILE_CHANNELS;
-}
-
 static int add_tiles(struct canvas *c, const struct batch *b, struct error *e)
 {
 	size_t prefix = canvas_film(b->key.group, FILM_PREFIX), open = prefix + FILM_OPEN + parity(b->key.epoch);
@@ -231,27 +256,20 @@ static int add_tiles(struct canvas *c, const struct batch *b, struct error *e)
 	if (rc)
 		return rc;
 	uint64_t bound = c->bound[open], old = bound, ignored = 0;
-	uint32_t i = 0;
-	size_t done = 0;
-	for (; i < b->tile_count; i++) {
-		size_t tile = tile_index(c, &b->tiles[i]);
-		done = tile_values(&b->tiles[i]);
-		if (!add_tile(c, canvas_slot(c, open, tile), &b->tiles[i], 1, &done, &bound))
+	uint32_t made = 0;
+	for (; made < b->tile_count && bound <= SUM_MOST; made++) {
+		size_t tile = tile_index(c, &b->tiles[made]);
+		if (!add_tile(c, canvas_slot(c, open, tile), &b->tiles[made], 1, &bound))
 			break;
 		*canvas_flags(c, open, tile) |= TILE_USED;
 	}
 	uint64_t others = c->bound[prefix] + c->bound[prefix + FILM_OPEN] + c->bound[prefix + FILM_OPEN + 1] - old;
-	c->bound[open] = bound;
-	if (i == b->tile_count && bound + others <= SUM_MOST)
+	if (made == b->tile_count && bound <= SUM_MOST && bound + others <= SUM_MOST) {
+		c->bound[open] = bound;
 		return 0;
-	/* Take all back: the tile that failed as far as it came, and those before it whole. */
-	if (i < b->tile_count)
-		add_tile(c, canvas_slot(c, open, tile_index(c, &b->tiles[i])), &b->tiles[i], -1, &done, &ignored);
-	while (i-- > 0) {
-		done = tile_values(&b->tiles[i]);
-		add_tile(c, canvas_slot(c, open, tile_index(c, &b->tiles[i])), &b->tiles[i], -1, &done, &ignored);
 	}
-	c->bound[open] = old;
+	while (made-- > 0)
+		add_tile(c, canvas_slot(c, open, tile_index(c, &b->tiles[made])), &b->tiles[made], -1, &ignored);
 	return error_set(e, ERANGE, "a pixel's sum left the film's range (quantum %g)", c->quantum);
 }
 

@@ -166,7 +166,7 @@ static void on_connected(uv_connect_t *r, int status)
 int conn_connect(struct conn **out, uv_loop_t *loop, const struct net_addr *a, const struct conn_config *config,
 		 const struct conn_events *events, void *user, struct error *e)
 {
-	struct conn *c;
+	struct conn *c = NULL;
 	int rc = conn_new(&c, loop, config, events, user, e);
 	if (rc)
 		return rc;
@@ -181,7 +181,7 @@ int conn_connect(struct conn **out, uv_loop_t *loop, const struct net_addr *a, c
 int conn_accept(struct conn **out, uv_stream_t *listener, const struct conn_config *config,
 		const struct conn_events *events, void *user, struct error *e)
 {
-	struct conn *c;
+	struct conn *c = NULL;
 	int rc = conn_new(&c, listener->loop, config, events, user, e);
 	if (rc)
 		return rc;

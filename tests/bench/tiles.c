@@ -69,6 +69,7 @@ void bench_tiles(const char *bin)
 			 .max_depth = 8};
 	struct canvas *c;
 	struct error e;
+	mem_keep(16 << 20); /* as the coordinator does */
 	write_tiles(wire);
 	if (canvas_new(&c, &p, -30, NULL, &e))
 		bench_die(&e);

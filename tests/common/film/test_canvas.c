@@ -180,10 +180,27 @@ static void a_sum_beyond_the_grid_adds_nothing(void **unused)
 	b = make_batch(&p, rounds, 0, 0, 4, one);
 	assert_int_equal(canvas_add(c, &b, NULL), 0);
 	batch_fini(&b);
-	b = make_batch(&p, rounds + 1, 0, 0, 1, one);
-	b.tiles[0].xyz[7] = 3e38f;
+	b = make_batch(&p, rounds + 1, 0, 0, 4, one);
+	b.tiles[3].xyz[7] = 3e38f;
 	assert_int_equal(canvas_add(c, &b, NULL), -ERANGE);
 	batch_fini(&b);
+	b = make_batch(&p, rounds + 1, 0, 0, 4, one);
+	assert_int_equal(canvas_add(c, &b, NULL), 0);
+	batch_fini(&b);
+	canvas_image_fini(&after);
+	assert_int_equal(canvas_image(c, false, &after, NULL), 0);
+	canvas_free(c);
+	assert_int_equal(canvas_new(&c, &p, -20, NULL, NULL), 0);
+	for (uint64_t r = 0; r < rounds + 2; r++) {
+		b = make_batch(&p, r, 0, 0, 4, one);
+		if (r > 0 && r < rounds)
+			b.tiles[2].xyz[100] = huge();
+		assert_int_equal(canvas_add(c, &b, NULL), 0);
+		batch_fini(&b);
+	}
+	canvas_image_fini(&before);
+	assert_int_equal(canvas_image(c, false, &before, NULL), 0);
+	assert_memory_equal(before.rgb, after.rgb, 100 * 70 * 3 * sizeof(float));
 	canvas_image_fini(&before);
 	canvas_image_fini(&after);
 	canvas_free(c);
