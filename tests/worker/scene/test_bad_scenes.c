@@ -19,7 +19,7 @@ static int read_files(const struct memory_file *files, struct error *e)
 	if (!r)
 		scene_fini(&s);
 	else if (s.arena.blocks || s.objects)
-		fail_msg("the scene is not empty after: %s", e->text);
+		fail_msg("the scene is not empty after: %s", e ? e->text : "");
 	return r;
 }
 
