@@ -1,0 +1,389 @@
+#include "worker/world/world.h"
+
+#include "common/base/mem.h"
+#include "worker/scene/mesh.h"
+
+#include <string.h>
+
+/* What building needs and the world does not. */
+struct builder {
+	struct world *w;
+	const struct scene *scene;
+	const struct asset_source *assets;
+	struct arena scratch;
+	struct shape_geometry *geometry;
+	const struct scene_node **shape_nodes, **bsdf_nodes;
+	struct emitter_surface *surfaces;
+	vec3 low, high;
+	struct error *e;
+};
+
+static int out_of_memory(struct error *e)
+{
+	return error_set(e, ENOMEM, "out of memory while building the scene");
+}
+
+static void grow_box(struct builder *b, vec3 p)
+{
+	b->low = (vec3){fmin(b->low.x, p.x), fmin(b->low.y, p.y), fmin(b->low.z, p.z)};
+	b->high = (vec3){fmax(b->high.x, p.x), fmax(b->high.y, p.y), fmax(b->high.z, p.z)};
+}
+
+static void grow_box_by_shape(struct builder *b, const struct shape_geometry *g)
+{
+	if (g->kind == SHAPE_SPHERE) {
+		vec3 r = {g->sphere.radius, g->sphere.radius, g->sphere.radius};
+		grow_box(b, vec3_add(g->sphere.center, r));
+		grow_box(b, vec3_sub(g->sphere.center, r));
+		return;
+	}
+	for (uint32_t i = 0; i < g->mesh.vertex_count; i++)
+		grow_box(b, (vec3){g->mesh.position[i][0], g->mesh.position[i][1], g->mesh.position[i][2]});
+}
+
+/* Shapes of the scene, their geometry in double, and the box around them. */
+static int read_shapes(struct builder *b)
+{
+	const struct scene *s = b->scene;
+	struct world *w = b->w;
+	for (uint32_t i = 0; i < s->object_count; i++)
+		w->shape_count += s->objects[i]->cls == PLUGIN_SHAPE;
+	b->geometry = arena_alloc(&b->scratch, w->shape_count, sizeof *b->geometry);
+	b->shape_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
+	if (!b->geometry || !b->shape_nodes)
+		return out_of_memory(b->e);
+	b->low = (vec3){INFINITY, INFINITY, INFINITY};
+	b->high = vec3_neg(b->low);
+	for (uint32_t i = 0, k = 0; i < s->object_count; i++) {
+		if (s->objects[i]->cls != PLUGIN_SHAPE)
+			continue;
+		uint64_t dropped = 0;
+		int rc = shape_build(s->objects[i], b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
+		if (rc)
+			return rc;
+		b->shape_nodes[k] = s->objects[i];
+		grow_box_by_shape(b, &b->geometry[k++]);
+	}
+	if (w->shape_count == 0)
+		b->low = b->high = (vec3){0, 0, 0};
+	return 0;
+}
+
+static int rescale(struct builder *b)
+{
+	struct world *w = b->w;
+	w->center = vec3_scale(0.5, vec3_add(b->low, b->high));
+	double r = 0.5 * vec3_length(vec3_sub(b->high, b->low));
+	if (!isfinite(r))
+		return error_set(b->e, EINVAL, "the scene's extent is not finite");
+	int exponent = 0;
+	if (r > 0)
+		frexp(r, &exponent);
+	w->scale = ldexp(1, -exponent);
+	/* Rounding to float moves vertices by parts in 2^24: the sphere is to hold them all the same. */
+	w->radius = (r > 0 ? r * w->scale : 1) * (1 + 0x1p-20);
+	return camera_init(&w->camera, &w->settings, w->center, w->scale, b->e);
+}
+
+static vec3 to_world_space(const struct world *w, const double p[3])
+{
+	return vec3_scale(w->scale, vec3_sub((vec3){p[0], p[1], p[2]}, w->center));
+}
+
+static vec3 float3(const float p[3])
+{
+	return (vec3){(double)p[0], (double)p[1], (double)p[2]};
+}
+
+static void put_float3(float out[3], vec3 v)
+{
+	out[0] = (float)v.x;
+	out[1] = (float)v.y;
+	out[2] = (float)v.z;
+}
+
+/* Keeps the triangles that still have an area in float, wound so that their normal agrees with the vertex normals. */
+static uint32_t take_triangles(struct geom_shape *g, const struct mesh *m)
+{
+	uint32_t kept = 0;
+	for (uint32_t i = 0; i < m->triangle_count; i++) {
+		const uint32_t *t = m->index[i];
+		vec3 v0 = float3(g->position[t[0]]);
+		vec3 n = vec3_cross(vec3_sub(float3(g->position[t[1]]), v0), vec3_sub(float3(g->position[t[2]]), v0));
+		if (!(vec3_dot(n, n) > 0))
+			continue;
+		bool turn = false;
+		if (g->normal) {
+			vec3 sum = vec3_add(float3(g->normal[t[0]]), vec3_add(float3(g->normal[t[1]]), float3(g->normal[t[2]])));
+			turn = vec3_dot(sum, n) < 0;
+		}
+		g->index[kept][0] = t[0];
+		g->index[kept][1] = t[turn ? 2 : 1];
+		g->index[kept++][2] = t[turn ? 1 : 2];
+	}
+	return kept;
+}
+
+static int place_mesh(struct builder *b, struct geom_shape *g, const struct mesh *m, const struct scene_node *n)
+{
+	struct arena *arena = &b->w->arena;
+	uint32_t vertices = m->vertex_count;
+	g->vertex_count = vertices;
+	/* One vertex more than there are: Embree reads 16 bytes from the start of each. */
+	g->position = arena_alloc(arena, (size_t)vertices + 1, sizeof *g->position);
+	g->index = arena_alloc(arena, m->triangle_count, sizeof *g->index);
+	g->normal = m->normal ? arena_alloc(arena, vertices, sizeof *g->normal) : NULL;
+	g->uv = m->uv ? arena_alloc(arena, vertices, sizeof *g->uv) : NULL;
+	if (!g->position || !g->index || (m->normal && !g->normal) || (m->uv && !g->uv))
+		return out_of_memory(b->e);
+	for (uint32_t i = 0; i < vertices; i++) {
+		put_float3(g->position[i], to_world_space(b->w, m->position[i]));
+		if (g->normal)
+			put_float3(g->normal[i], (vec3){m->normal[i][0], m->normal[i][1], m->normal[i][2]});
+		if (g->uv) {
+			g->uv[i][0] = (float)m->uv[i][0];
+			g->uv[i][1] = (float)m->uv[i][1];
+		}
+	}
+	g->triangle_count = take_triangles(g, m);
+	if (g->triangle_count == 0)
+		return node_error(n, b->e, EINVAL, "no triangle of this shape has an area at the scene's scale");
+	return 0;
+}
+
+static int place_shapes(struct builder *b)
+{
+	struct world *w = b->w;
+	w->shapes = arena_alloc(&w->arena, w->shape_count, sizeof *w->shapes);
+	w->parts = arena_alloc(&w->arena, w->shape_count, sizeof *w->parts);
+	if (!w->shapes || !w->parts)
+		return out_of_memory(b->e);
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		const struct shape_geometry *from = &b->geometry[i];
+		struct geom_shape *g = &w->shapes[i];
+		if (from->kind == SHAPE_SPHERE) {
+			const struct sphere *s = &from->sphere;
+			g->is_sphere = true;
+			g->center = vec3_scale(w->scale, vec3_sub(s->center, w->center));
+			g->radius = w->scale * s->radius;
+			g->normal_sign = s->flip_normals ? -1 : 1;
+			g->sphere_axes.s = vec3_normalize(mat4_vector(&s->to_world, (vec3){1, 0, 0}));
+			g->sphere_axes.t = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 1, 0}));
+			g->sphere_axes.n = vec3_normalize(mat4_vector(&s->to_world, (vec3){0, 0, 1}));
+			continue;
+		}
+		int rc = place_mesh(b, g, &from->mesh, b->shape_nodes[i]);
+		if (rc)
+			return rc;
+	}
+	return 0;
+}
+
+/* One BSDF a node, however many shapes refer to it. A shape that names none is grey, or black where it shines. */
+static int create_bsdfs(struct builder *b)
+{
+	struct world *w = b->w;
+	w->bsdfs = arena_alloc(&w->arena, w->shape_count, sizeof *w->bsdfs);
+	b->bsdf_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
+	if (!w->bsdfs || !b->bsdf_nodes)
+		return out_of_memory(b->e);
+	struct bsdf_build build = {b->assets, &w->arena, b->scene->dialect_3};
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_BSDF, 0);
+		const struct scene_node *light = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0), *key = n ? n : light;
+		uint32_t k = 0;
+		while (k < w->bsdf_count && b->bsdf_nodes[k] != key)
+			k++;
+		w->parts[i].bsdf = k;
+		if (k < w->bsdf_count)
+			continue;
+		b->bsdf_nodes[k] = key;
+		w->bsdf_count++;
+		int rc = 0;
+		if (n)
+			rc = bsdf_create(&w->bsdfs[k], n, &build, b->e);
+		else if (light)
+			bsdf_black(&w->bsdfs[k]);
+		else
+			bsdf_default(&w->bsdfs[k]);
+		if (!rc)
+			rc = bsdf_mirror_back(&w->bsdfs[k], &w->arena, b->e);
+		if (rc)
+			return rc;
+	}
+	return 0;
+}
+
+static struct emitter_surface emitter_surface_of(const struct geom_shape *g)
+{
+	return (struct emitter_surface){
+		.is_sphere = g->is_sphere,
+		.center = g->center,
+		.radius = g->radius,
+		.normal_sign = g->normal_sign,
+		.triangle_count = g->triangle_count,
+		.position = (const float(*)[3])g->position,
+		.index = (const uint32_t(*)[3])g->index,
+		.uv = (const float(*)[2])g->uv,
+	};
+}
+
+static int create_emitters(struct builder *b)
+{
+	struct world *w = b->w;
+	const struct scene *s = b->scene;
+	uint32_t limit = w->shape_count + s->object_count;
+	w->emitters = arena_alloc(&w->arena, limit, sizeof *w->emitters);
+	w->emitter_shape = arena_alloc(&w->arena, limit, sizeof *w->emitter_shape);
+	if (!w->emitters || !w->emitter_shape)
+		return out_of_memory(b->e);
+	struct emitter_build build = {b->assets, &w->arena, s->dialect_3, NULL};
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0);
+		w->parts[i].emitter = -1;
+		if (!n)
+			continue;
+		struct emitter_surface surface = emitter_surface_of(&w->shapes[i]);
+		build.surface = &surface;
+		int rc = emitter_create(&w->emitters[w->emitter_count], n, &build, b->e);
+		if (rc)
+			return rc;
+		w->emitter_shape[w->emitter_count] = i;
+		w->parts[i].emitter = (int32_t)w->emitter_count++;
+	}
+	w->environment = -1;
+	build.surface = NULL;
+	for (uint32_t i = 0; i < s->object_count; i++) {
+		const struct scene_node *n = s->objects[i];
+		if (n->cls != PLUGIN_EMITTER)
+			continue;
+		if (w->environment >= 0)
+			return node_error(n, b->e, EINVAL, "a second emitter at infinity: one is supported");
+		int rc = emitter_create(&w->emitters[w->emitter_count], n, &build, b->e);
+		if (rc)
+			return rc;
+		w->emitters[w->emitter_count].power *= M_PI * w->radius * w->radius;
+		w->emitter_shape[w->emitter_count] = UINT32_MAX;
+		w->environment = (int32_t)w->emitter_count++;
+	}
+	return 0;
+}
+
+static int choose_emitters(struct builder *b)
+{
+	struct world *w = b->w;
+	w->emitter_pdf = arena_alloc(&w->arena, (size_t)w->emitter_count + 1, sizeof(double));
+	w->emitter_cdf = arena_alloc(&w->arena, (size_t)w->emitter_count + 1, sizeof(double));
+	if (!w->emitter_pdf || !w->emitter_cdf)
+		return out_of_memory(b->e);
+	double total = 0;
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		total += w->emitters[i].power;
+	if (!isfinite(total))
+		return error_set(b->e, EINVAL, "the emitters' power is not finite");
+	for (uint32_t i = 0; i < w->emitter_count && total > 0; i++) {
+		w->emitter_pdf[i] = w->emitters[i].power / total;
+		w->emitter_cdf[i + 1] = w->emitter_cdf[i] + w->emitter_pdf[i];
+	}
+	return 0;
+}
+
+/* The colour that the grey value 1 stands for: the common illuminant's, as an emitter of rgb 1 or of a constant 1 has it. */
+static void set_grey(struct world *w)
+{
+	for (int i = 0; i < 3; i++)
+		w->grey_xyz[i] = 0;
+	int samples = 4700;
+	for (int i = 0; i < samples; i++) {
+		struct wavelengths wl;
+		double nm = WAVELENGTH_MIN + (i + 0.5) * (WAVELENGTH_MAX - WAVELENGTH_MIN) / samples;
+		for (int k = 0; k < SPECTRUM_LANES; k++)
+			wl.nm[k] = nm;
+		wl.grey = false;
+		double xyz[3];
+		spectrum_to_xyz(spectrum_of(w->effects.illuminant == COLOR_SHAPE_D65 ? color_d65(nm) : 1), &wl, xyz);
+		for (int k = 0; k < 3; k++)
+			w->grey_xyz[k] += xyz[k] / samples;
+	}
+}
+
+static int build_accel(struct builder *b)
+{
+	struct world *w = b->w;
+	struct accel_shape *s = arena_alloc(&b->scratch, w->shape_count, sizeof *s);
+	if (!s)
+		return out_of_memory(b->e);
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		const struct geom_shape *g = &w->shapes[i];
+		s[i] = (struct accel_shape){
+			.is_sphere = g->is_sphere,
+			.center = g->center,
+			.radius = g->radius,
+			.vertex_count = g->vertex_count,
+			.triangle_count = g->triangle_count,
+			.position = (const float(*)[3])g->position,
+			.index = (const uint32_t(*)[3])g->index,
+		};
+	}
+	return accel_new(&w->accel, s, w->shape_count, b->e);
+}
+
+/* All but Embree: every effect is known before that is built. */
+static int prepare(struct builder *b, const struct render_options *o)
+{
+	int rc = scene_settings_read(b->scene, o ? o->width : 0, o ? o->height : 0, &b->w->settings, b->e);
+	if (!rc)
+		rc = read_shapes(b);
+	if (!rc)
+		rc = rescale(b);
+	if (!rc)
+		rc = place_shapes(b);
+	if (!rc)
+		rc = create_bsdfs(b);
+	if (!rc)
+		rc = create_emitters(b);
+	if (!rc)
+		rc = choose_emitters(b);
+	if (rc)
+		return rc;
+	struct world *w = b->w;
+	effects_analyse(&w->effects, &w->settings, w->bsdfs, w->bsdf_count, w->emitters, w->emitter_count);
+	if (!w->effects.colour)
+		set_grey(w);
+	return 0;
+}
+
+static int new_world(struct world **out, bool with_accel, const struct scene *s, const struct asset_source *assets,
+		     const struct render_options *o, struct error *e)
+{
+	*out = NULL;
+	struct builder b = {.scene = s, .assets = assets, .e = e, .w = mem_alloc(1, sizeof *b.w)};
+	if (!b.w)
+		return out_of_memory(e);
+	int rc = prepare(&b, o);
+	if (!rc && with_accel)
+		rc = build_accel(&b);
+	arena_fini(&b.scratch);
+	if (rc)
+		world_free(b.w);
+	else
+		*out = b.w;
+	return rc;
+}
+
+int world_new(struct world **out, const struct scene *s, const struct asset_source *assets, const struct render_options *o,
+	      struct error *e)
+{
+	return new_world(out, true, s, assets, o, e);
+}
+
+int render_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
+		 struct render_summary *out, struct error *e)
+{
+	struct world *w;
+	int rc = new_world(&w, false, s, assets, o, e);
+	if (!rc)
+		world_summary(w, out);
+	world_free(w);
+	return rc;
+}
