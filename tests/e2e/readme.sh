@@ -14,10 +14,11 @@ mkdir -p "$DIR/home/build"
 ln -s "$(cd "$BIN" && pwd)" "$DIR/home/build/bin"
 {
 	echo 'set -eu'
-	echo "trap 'kill \$(jobs -p) 2>/dev/null; wait' EXIT"
+	echo 'RUNNING='
+	echo "trap 'code=\$?; kill \$RUNNING; wait; exit \$code' EXIT"
 	# make has nothing left to do here, but it must agree. By hand there is time between two lines; here it is waited for.
 	awk '/^```sh$/ { on = 1; next } /^```$/ { on = 0 } on' "$ROOT/README.md" |
-		sed -e "s/7700/$port/g" -e "s|^make -s\$|make -s -C '$ROOT' programs|" -e '/name two &$/a sleep 1'
+		sed -e "s/7700/$port/g" -e "s|^make -s\$|make -s -C '$ROOT' programs|" -e 's/ &$/ \& RUNNING="$RUNNING $!"/' -e '/name two &/a sleep 1'
 } >"$DIR/commands"
 [ "$(wc -l <"$DIR/commands")" -gt 12 ] || fail "the README has lost its commands"
 (cd "$DIR/home" && sh "$DIR/commands") >"$DIR/readme.log" 2>&1 || fail "a command of the README failed"
