@@ -17,7 +17,8 @@ struct bootstrap_result { /* of all groups, from the weights in index order: see
 	double b[PLAN_MAX_GROUPS];
 	double b_pooled;
 	double beyond_share; /* of the energy, in paths too long for the chains' state */
-	bool black;          /* no sample carried light */
+	bool black;          /* no sample carried light, so chains have nowhere to begin: the job ends with a black image.
+				Samples go on: the few of the bootstrap prove nothing about the many */
 };
 
 /* The grid: quantum 2^exponent. For chains fixed (values are of order 1 per mutation); for samples from b. */

@@ -95,7 +95,7 @@ void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r)
 	double inside = exact_sum_value(&all), outside = exact_sum_value(&beyond);
 	r->b_pooled = inside / (double)all_count;
 	r->beyond_share = outside > 0 ? outside / (inside + outside) : 0;
-	r->black = !(inside > 0);
+	r->black = s->plan.kind == PLAN_CHAINS && !(inside > 0);
 }
 
 void bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index)

@@ -125,8 +125,8 @@ int order_merge(struct order *o, struct batch *b, struct error *e)
 int order_prepare(struct order *o, const char *canvas_folder, struct error *e)
 {
 	bootstrap_merge(o->bootstrap, &o->lit);
-	/* A black job ends before anything is drawn: then the grid does not matter. */
-	int rc = canvas_new(&o->canvas, &o->plan, canvas_grid_exponent(&o->plan, o->lit.b_pooled, 0), canvas_folder, e);
+	int exponent = canvas_grid_exponent(&o->plan, o->lit.b_pooled, order_submit(o)->brightest);
+	int rc = canvas_new(&o->canvas, &o->plan, exponent, canvas_folder, e);
 	if (rc)
 		return rc;
 	bootstrap_to_canvas(o->bootstrap, o->canvas);

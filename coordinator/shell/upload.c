@@ -62,6 +62,8 @@ static int check(const Farm__Submit *m, struct plan *plan, struct error *e)
 		rc = check_files(m, e);
 	if (!rc && (m->render_width > PLAN_MAX_SIZE || m->render_height > PLAN_MAX_SIZE))
 		rc = error_set(e, EINVAL, "a film of %ux%u", m->render_width, m->render_height);
+	if (!rc && !(m->brightest >= 0 && isfinite(m->brightest)))
+		rc = error_set(e, EINVAL, "a brightness of %g", m->brightest);
 	if (!rc)
 		rc = plan_request_from_wire(m->plan, &request, e);
 	if (!rc)

@@ -248,7 +248,7 @@ static void say(const struct session *s)
 		fprintf(stderr, ", relative error %.2f %% (at most %.2f %%)", 100 * sqrt(i->rel_mse), 100 * sqrt(i->rel_mse_upper));
 	fprintf(stderr, "\n");
 	if (i->black)
-		fprintf(stderr, "the image is black: none of %llu bootstrap samples found light\n", (unsigned long long)p->bootstrap);
+		fprintf(stderr, "the image is black: no sample found light\n");
 	if (i->beyond_share > 0.001)
 		fprintf(stderr, "%.2f %% of the energy lies in paths longer than %s can hold\n", 100 * i->beyond_share, p->integrator);
 	uint64_t bad = i->counters[COUNT_NAN] + i->counters[COUNT_INFINITE] + i->counters[COUNT_NEGATIVE];

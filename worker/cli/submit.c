@@ -179,6 +179,7 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 	s.render_height = r->args->render.height;
 	s.plan = &plan;
 	s.priority = r->priority;
+	s.brightest = b->summary.brightest;
 	s.n_files = b->count;
 	s.files = l.file_at;
 	s.n_effects = b->summary.line_count;

@@ -63,7 +63,8 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	em->data = a;
 	em->textured = !texture_is_constant(&a->radiance);
 	em->shape = texture_shape(&a->radiance);
-	em->power = a->area * M_PI * texture_max(&a->radiance);
+	em->brightest = texture_max(&a->radiance);
+	em->power = a->area * M_PI * em->brightest;
 	return 0;
 }
 

@@ -56,6 +56,7 @@ static int constant_create(struct emitter *em, const struct scene_node *n, const
 	em->infinite = true;
 	em->shape = c->shape;
 	em->power = 4 * PI * color_mean(c);
+	em->brightest = color_max(c);
 	return 0;
 }
 

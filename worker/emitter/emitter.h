@@ -65,6 +65,7 @@ struct emitter {
 	enum color_shape shape; /* CONSTANT, D65: the same spectrum everywhere but for a factor */
 	double power;           /* for choosing among emitters: area x pi x mean radiance; infinite: mean radiance x 4 pi,
 				   multiplied by the scene's cross section pi R^2 by the caller */
+	double brightest;       /* upper bound of the radiance, over places, directions and wavelengths */
 	void *data;
 };
 

@@ -230,6 +230,7 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 	em->textured = true;
 	em->shape = raster_is_grey(&m->raster) ? COLOR_SHAPE_D65 : COLOR_SHAPE_OTHER;
 	em->power = build_density(m) * color_mean(&white);
+	em->brightest = raster_max(&m->raster) * color_max(&white);
 	return 0;
 }
 

@@ -46,6 +46,7 @@ struct render_summary {
 	struct effect_line lines[RENDER_EFFECTS_MAX];
 	size_t line_count;
 	uint64_t shapes, triangles;
+	double brightest; /* see world_brightest */
 };
 
 /* Reads every mesh, texture and material and says what the scene calls for; all but Embree's own building. What passes
@@ -58,7 +59,7 @@ int world_new(struct world **w, const struct scene *s, const struct asset_source
 	      struct error *e);
 void world_free(struct world *w);
 void world_summary(const struct world *w, struct render_summary *out);
-/* Upper bound of |value| of one sample, for canvas_grid_exponent when the bootstrap is black. */
+/* X+Y+Z of the brightest emitter, for canvas_grid_exponent when the bootstrap is black. */
 double world_brightest(const struct world *w);
 size_t world_embree_bytes(const struct world *w);
 

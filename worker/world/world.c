@@ -20,7 +20,8 @@ int32_t world_pick_emitter(const struct world *w, double u)
 
 void world_summary(const struct world *w, struct render_summary *out)
 {
-	*out = (struct render_summary){.settings = w->settings, .line_count = w->effects.line_count, .shapes = w->shape_count};
+	*out = (struct render_summary){.settings = w->settings, .line_count = w->effects.line_count, .shapes = w->shape_count,
+				       .brightest = world_brightest(w)};
 	memcpy(out->lines, w->effects.lines, sizeof out->lines);
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		out->triangles += w->shapes[i].triangle_count;
@@ -37,10 +38,10 @@ void world_free(struct world *w)
 
 double world_brightest(const struct world *w)
 {
-	double power = 0;
+	double most = 0;
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		power += w->emitters[i].power;
-	return power;
+		most = fmax(most, w->emitters[i].brightest);
+	return 3 * most; /* X + Y + Z */
 }
 
 size_t world_embree_bytes(const struct world *w)

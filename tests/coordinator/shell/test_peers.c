@@ -289,8 +289,8 @@ static void submit(struct peer *p, const char *scene_text, const char *file_name
 	Farm__Envelope m;
 	struct blob_hash hash;
 	struct error e;
-	char name[] = "black", scene[64], integrator[] = "path", file_text[64];
-	struct plan_request r = {.integrator = "path", .kind = PLAN_SAMPLES, .width = 20, .height = 10, .spp = 4,
+	char name[] = "black", scene[64], integrator[] = "pssmlt", file_text[64];
+	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .spp = 4,
 				 .max_depth = 5, .groups = 2, .bootstrap = 256};
 	plan_request_to_wire(&r, &plan);
 	plan.integrator = integrator;
@@ -418,7 +418,7 @@ static void a_black_job_ends(void **state)
 	struct peer *client = call(), *worker = call();
 	struct plan plan;
 	struct error e;
-	struct plan_request r = {.integrator = "path", .kind = PLAN_SAMPLES, .width = 20, .height = 10, .spp = 4,
+	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .spp = 4,
 				 .max_depth = 5, .groups = 2, .bootstrap = 256};
 	assert_int_equal(plan_make(&r, &plan, &e), 0);
 	assert_true(hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
