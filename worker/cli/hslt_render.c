@@ -261,11 +261,7 @@ static void say(const struct session *s)
 
 static int run(struct session *s, struct error *e)
 {
-	int rc = image_file_probe(s->a->output, e);
-	if (!rc && s->a->stats)
-		rc = image_file_probe(s->a->stats, e);
-	if (!rc)
-		rc = load(s, e);
+	int rc = load(s, e);
 	if (!rc)
 		rc = make_plan(s, e);
 	if (!rc)
@@ -287,6 +283,7 @@ int main(int argc, char **argv)
 	static struct arguments a;
 	static struct session s;
 	struct error e = {""};
+	mem_keep(1 << 20);
 	long processors = sysconf(_SC_NPROCESSORS_ONLN);
 	a.threads = processors > 0 ? (unsigned)processors : 1;
 	argp_err_exit_status = 2;

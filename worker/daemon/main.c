@@ -1,4 +1,5 @@
 #include "common/base/log.h"
+#include "common/base/mem.h"
 #include "common/base/version.h"
 #include "worker/daemon/agent.h"
 
@@ -91,6 +92,7 @@ int main(int argc, char **argv)
 {
 	char host[64] = "worker", name[128];
 	struct error e;
+	mem_keep(1 << 20);
 	long cores = sysconf(_SC_NPROCESSORS_ONLN);
 	gethostname(host, sizeof host - 1);
 	snprintf(name, sizeof name, "%s-%ld", host, (long)getpid());

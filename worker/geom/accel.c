@@ -21,7 +21,7 @@ struct accel {
 	uint32_t sphere_count;
 	struct sphere_prim *spheres;
 	struct accel_shape *shapes;
-	atomic_size_t bytes;
+	atomic_size_t bytes, peak;
 	vec3 low, high;
 	double size; /* sum of the sides */
 	double reach; /* how far Embree's floats can be off, see below */
@@ -42,7 +42,9 @@ static bool memory_monitor(void *user, ssize_t bytes, bool post)
 {
 	(void)post;
 	struct accel *a = user;
-	atomic_fetch_add(&a->bytes, (size_t)bytes);
+	size_t now = atomic_fetch_add(&a->bytes, (size_t)bytes) + (size_t)bytes;
+	if (now > atomic_load(&a->peak))
+		atomic_store(&a->peak, now); /* one thread builds */
 	return true;
 }
 
@@ -317,6 +319,11 @@ void accel_free(struct accel *a)
 size_t accel_bytes(const struct accel *a)
 {
 	return atomic_load(&a->bytes);
+}
+
+size_t accel_peak_bytes(const struct accel *a)
+{
+	return atomic_load(&a->peak);
 }
 
 /* Rays from far outside enter the scene's box in double: Embree's floats never see the distance. In units of |d|. */

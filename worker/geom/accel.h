@@ -53,6 +53,7 @@ struct ray_hit {
 int accel_new(struct accel **a, const struct accel_shape *shapes, uint32_t count, struct error *e);
 void accel_free(struct accel *a);
 size_t accel_bytes(const struct accel *a); /* what Embree allocated, without our vertices and indices */
+size_t accel_peak_bytes(const struct accel *a); /* the most of it, while it built */
 
 /* Closest hit along the unit direction d, in (t_min, t_max). */
 bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max, struct ray_hit *hit);

@@ -310,6 +310,8 @@ static void set_grey(struct world *w)
 static int build_accel(struct builder *b)
 {
 	struct world *w = b->w;
+	/* The meshes as they were read are half as large as what Embree is about to need. */
+	arena_fini(&b->scratch);
 	struct accel_shape *s = arena_alloc(&b->scratch, w->shape_count, sizeof *s);
 	if (!s)
 		return out_of_memory(b->e);
