@@ -40,5 +40,7 @@ extern volatile double bench_sink;
 void bench_rays(const char *bin);
 void bench_tiles(const char *bin);
 void bench_parts(const char *bin);
+void bench_farm(const char *bin);
+void bench_memory(const char *bin);
 
 #endif

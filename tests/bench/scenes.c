@@ -117,6 +117,29 @@ struct world *bench_world_million(void)
 	return w;
 }
 
+static void write_file(const char *folder, const char *name, const void *bytes, size_t size)
+{
+	char path[4096];
+	snprintf(path, sizeof path, "%s/%s", folder, name);
+	FILE *f = fopen(path, "wb");
+	if (!f || fwrite(bytes, 1, size, f) != size || fclose(f)) {
+		perror(path);
+		exit(1);
+	}
+}
+
+void bench_write_million(const char *folder)
+{
+	struct text t;
+	write_file(folder, "million.xml", million_xml, sizeof million_xml - 1);
+	grid(&t, FLOOR_CELLS, hills);
+	write_file(folder, "hills.obj", t.bytes, t.size);
+	mem_free(t.bytes);
+	grid(&t, BALL_CELLS, ball);
+	write_file(folder, "ball.obj", t.bytes, t.size);
+	mem_free(t.bytes);
+}
+
 const char *bench_box_file(void)
 {
 	static char path[4096];

@@ -6,6 +6,8 @@
 
 /* A room of walls, a hilly floor (diffuse) and a dented ball (rough gold) of half a million triangles each, two lamps. */
 struct world *bench_world_million(void);
+/* The same as files: FOLDER/million.xml and its meshes. */
+void bench_write_million(const char *folder);
 /* `cornell-box` from the folder that HSLT_SCENES names, else the box of tests/scenes. */
 struct world *bench_world_box(const char **name);
 /* Folder and file of that scene. */

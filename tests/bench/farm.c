@@ -1,0 +1,234 @@
+/* The farm's processes against hslt-render on the same plan, and their memory. */
+#include "common/plan/plan.h"
+#include "tests/bench/bench.h"
+#include "tests/bench/process.h"
+#include "tests/bench/scenes.h"
+#include "worker/world/world.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+struct farm {
+	const char *bin;
+	char folder[64], log[128], address[64];
+	struct process coordinator, worker[2];
+};
+
+static void start_coordinator(struct farm *f)
+{
+	char port_file[128], port[16] = "";
+	snprintf(port_file, sizeof port_file, "%s/port", f->folder);
+	unlink(port_file);
+	process_start(&f->coordinator, f->bin, f->log,
+		      "hslt-coordinator --listen 127.0.0.1:0 --port-file %s --spool %s/spool --status-socket %s/status", port_file,
+		      f->folder, f->folder);
+	for (int i = 0; i < 200 && !strchr(port, '\n'); i++) {
+		usleep(50000);
+		FILE *file = fopen(port_file, "r");
+		if (file && !fgets(port, sizeof port, file))
+			port[0] = 0;
+		if (file)
+			fclose(file);
+		if (port[0] && !strchr(port, '\n'))
+			strcat(port, "\n");
+	}
+	port[strcspn(port, "\n")] = 0;
+	snprintf(f->address, sizeof f->address, "127.0.0.1:%s", port);
+}
+
+static void farm_start(struct farm *f, const char *bin, int workers)
+{
+	*f = (struct farm){.bin = bin, .folder = "/tmp/hslt-bench.XXXXXX"};
+	if (!mkdtemp(f->folder)) {
+		perror("bench: mkdtemp");
+		exit(1);
+	}
+	snprintf(f->log, sizeof f->log, "%s/log", f->folder);
+	start_coordinator(f);
+	for (int i = 0; i < workers; i++)
+		process_start(&f->worker[i], bin, f->log, "hslt-worker --coordinator %s --threads 1 --name w%d --cache %s/cache",
+			      f->address, i, f->folder);
+}
+
+static void farm_stop(struct farm *f)
+{
+	for (int i = 0; i < 2; i++)
+		if (f->worker[i].pid)
+			process_stop(&f->worker[i]);
+	process_stop(&f->coordinator);
+	char command[128];
+	snprintf(command, sizeof command, "rm -rf %s", f->folder);
+	if (system(command) != 0)
+		fprintf(stderr, "bench: %s is left behind\n", f->folder);
+}
+
+static void start_submit(const struct farm *f, struct process *p, const char *scene, const char *options)
+{
+	process_start(p, f->bin, f->log, "hslt-submit --coordinator %s %s -o %s/farm.exr --wait %s", f->address, scene, f->folder,
+		      options);
+}
+
+static void submit(const struct farm *f, const char *scene, const char *options)
+{
+	struct process p;
+	start_submit(f, &p, scene, options);
+	process_wait(&p);
+}
+
+static void start_render(const struct farm *f, struct process *p, const char *options, int which)
+{
+	process_start(p, f->bin, f->log, "hslt-render %s -o %s/render%d.exr --threads 1 %s", bench_box_file(), f->folder, which,
+		      options);
+}
+
+/* 32 mutations a pixel, a fast preview: longer jobs send less for each mutation. */
+enum { MUTATIONS = 1 << 19 };
+#define JOB "--integrator pssmlt --size 128x128 --bootstrap 65536 --mutations 524288"
+#define TWICE "--integrator pssmlt --size 128x128 --bootstrap 131072 --mutations 1048576"
+
+static void cpu_per_mutation(const char *bin)
+{
+	struct farm f;
+	struct series worker = {0}, whole = {0}, alone = {0};
+	farm_start(&f, bin, 1);
+	submit(&f, bench_box_file(), JOB);
+	for (int i = 0; i < BENCH_REPEATS; i++) {
+		struct process render;
+		start_render(&f, &render, JOB, 0);
+		process_wait(&render);
+		double w = process_cpu_seconds(&f.worker[0]), c = process_cpu_seconds(&f.coordinator);
+		submit(&f, bench_box_file(), JOB);
+		w = process_cpu_seconds(&f.worker[0]) - w;
+		c = process_cpu_seconds(&f.coordinator) - c;
+		series_add(&alone, 1e6 * render.cpu_seconds / MUTATIONS);
+		series_add(&worker, w / render.cpu_seconds);
+		series_add(&whole, (w + c) / render.cpu_seconds);
+	}
+	bench_row("hslt-render, with its bootstrap", &alone, "us/mutation", BENCH_INFORMS, 0);
+	bench_row("CPU of one worker / hslt-render", &worker, "", BENCH_INFORMS, 0);
+	bench_row("CPU of worker and coordinator / hslt-render", &whole, "", BENCH_AT_MOST, 1.03);
+	farm_stop(&f);
+}
+
+static void two_workers(const char *bin)
+{
+	struct farm f;
+	struct series ratio = {0};
+	farm_start(&f, bin, 2);
+	submit(&f, bench_box_file(), JOB);
+	for (int i = 0; i < BENCH_REPEATS; i++) {
+		struct process render[2];
+		double begin = wall_seconds();
+		for (int k = 0; k < 2; k++)
+			start_render(&f, &render[k], JOB, k);
+		for (int k = 0; k < 2; k++)
+			process_wait(&render[k]);
+		double middle = wall_seconds();
+		submit(&f, bench_box_file(), TWICE);
+		series_add(&ratio, (middle - begin) / (wall_seconds() - middle));
+	}
+	bench_row("two workers / two hslt-render, throughput", &ratio, "", BENCH_AT_LEAST, 0.95);
+	farm_stop(&f);
+}
+
+/* Peak memory of a coordinator of its own that ran one job. */
+static double coordinator_peak(const char *bin, const char *options)
+{
+	struct farm f;
+	farm_start(&f, bin, 1);
+	submit(&f, bench_box_file(), options);
+	double peak = process_peak_bytes(&f.coordinator, NULL);
+	farm_stop(&f);
+	return peak;
+}
+
+static void coordinator_memory(const char *bin)
+{
+#define SMALL "--integrator path --size 128x128 --groups 16 --epoch 1 "
+	/* Three rounds touch all films: the prefix and the two open ones of each group. */
+	double films = 16 * 3 * 8.0 * 3 * 128 * 128, few = coordinator_peak(bin, SMALL "--spp 48"),
+	       many = coordinator_peak(bin, SMALL "--spp 1536");
+	bench_single("coordinator's peak, 3 rounds of leases", 1e-6 * few, "MB", BENCH_INFORMS, 0);
+	bench_single("coordinator's peak, 96 rounds of leases", 1e-6 * many, "MB", BENCH_AT_MOST, 1e-6 * (100e6 + films));
+	bench_single("growth from 3 to 96 rounds", 1e-6 * (many - few), "MB", BENCH_AT_MOST, 2);
+}
+
+static double mesh_bytes(const struct world *w)
+{
+	double sum = 0;
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		const struct geom_shape *g = &w->shapes[i];
+		size_t vertex = sizeof g->position[0] + (g->normal ? sizeof g->normal[0] : 0) + (g->uv ? sizeof g->uv[0] : 0);
+		sum += (double)g->vertex_count * (double)vertex + (double)g->triangle_count * sizeof g->index[0];
+	}
+	return sum;
+}
+
+static void worker_memory(const char *bin)
+{
+	struct farm f;
+	char scene[128];
+	struct world *w = bench_world_million();
+	double embree = (double)accel_bytes(w->accel), building = (double)accel_peak_bytes(w->accel), meshes = mesh_bytes(w);
+	double pixels = (double)w->settings.width * w->settings.height, films = pixels * (24 + 12);
+	world_free(w);
+	farm_start(&f, bin, 1);
+	usleep(500000);
+	double idle = process_peak_bytes(&f.worker[0], NULL);
+	bench_write_million(f.folder);
+	snprintf(scene, sizeof scene, "%s/million.xml", f.folder);
+	struct process job;
+	struct series size = {0};
+	double now, peak = 0, own = meshes + films;
+	start_submit(&f, &job, scene, "--integrator path --spp 192");
+	while (process_is_running(&job)) {
+		usleep(250000);
+		peak = process_peak_bytes(&f.worker[0], &now);
+		series_add(&size, 1e-6 * now);
+	}
+	process_wait(&job);
+	bench_single("worker without a job", 1e-6 * idle, "MB", BENCH_INFORMS, 0);
+	bench_row("worker on a million triangles, looked at 4/s", &size, "MB", BENCH_INFORMS, 0);
+	bench_single("its peak, while it built the world", 1e-6 * peak, "MB", BENCH_INFORMS, 0);
+	bench_single("of it: Embree's own", 1e-6 * embree, "MB", BENCH_INFORMS, 0);
+	bench_single("of it: Embree's own while it builds", 1e-6 * building, "MB", BENCH_INFORMS, 0);
+	bench_single("of it: meshes", 1e-6 * meshes, "MB", BENCH_INFORMS, 0);
+	bench_single("of it: a lease's film and tiles", 1e-6 * films, "MB", BENCH_INFORMS, 0);
+	bench_single("size / (Embree + meshes + films)", 1e6 * series_median(&size) / (embree + own), "", BENCH_AT_MOST, 1.2);
+	bench_single("peak / (Embree building + meshes + films)", peak / (building + own), "", BENCH_AT_MOST, 1.2);
+	farm_stop(&f);
+}
+
+/* All programs are there; says which is missing. */
+static bool ready(const char *bin)
+{
+	static const char *const needed[] = {"hslt-coordinator", "hslt-worker", "hslt-submit", "hslt-render"};
+	for (size_t i = 0; i < sizeof needed / sizeof *needed; i++)
+		if (!process_exists(bin, needed[i])) {
+			char why[128];
+			snprintf(why, sizeof why, "%s is not built", needed[i]);
+			bench_skip(why);
+			return false;
+		}
+	return true;
+}
+
+void bench_farm(const char *bin)
+{
+	bench_group("farm", "real processes on loopback, pssmlt");
+	if (!ready(bin))
+		return;
+	cpu_per_mutation(bin);
+	two_workers(bin);
+}
+
+void bench_memory(const char *bin)
+{
+	bench_group("memory", "resident sizes of real processes");
+	if (!ready(bin))
+		return;
+	coordinator_memory(bin);
+	worker_memory(bin);
+}

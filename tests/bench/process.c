@@ -1,0 +1,137 @@
+#include "tests/bench/process.h"
+
+#include <fcntl.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { RUNNING_MAX = 16 };
+static pid_t running[RUNNING_MAX];
+
+static void end_all(void)
+{
+	for (int i = 0; i < RUNNING_MAX; i++)
+		if (running[i])
+			kill(running[i], SIGKILL);
+}
+
+static void remember(pid_t before, pid_t after)
+{
+	static bool registered;
+	if (!registered)
+		atexit(end_all);
+	registered = true;
+	for (int i = 0; i < RUNNING_MAX; i++)
+		if (running[i] == before) {
+			running[i] = after;
+			return;
+		}
+}
+
+bool process_exists(const char *bin, const char *name)
+{
+	char path[4096];
+	snprintf(path, sizeof path, "%s/%s", bin, name);
+	return access(path, X_OK) == 0;
+}
+
+void process_start(struct process *p, const char *bin, const char *log, const char *format, ...)
+{
+	char line[8192], path[4096], *arg[PROCESS_ARGS + 1], *rest = line;
+	va_list ap;
+	va_start(ap, format);
+	vsnprintf(line, sizeof line, format, ap);
+	va_end(ap);
+	int n = 0;
+	for (char *word; n < PROCESS_ARGS && (word = strtok_r(n ? NULL : line, " ", &rest));)
+		arg[n++] = word;
+	arg[n] = NULL;
+	snprintf(path, sizeof path, "%s/%s", bin, arg[0]);
+	*p = (struct process){.pid = fork()};
+	if (p->pid == 0) {
+		int fd = open(log, O_WRONLY | O_CREAT | O_APPEND, 0600);
+		dup2(fd, 1);
+		dup2(fd, 2);
+		execv(path, arg);
+		_exit(127);
+	}
+	if (p->pid < 0) {
+		perror("bench: fork");
+		exit(1);
+	}
+	remember(0, p->pid);
+}
+
+static void reap(struct process *p)
+{
+	struct rusage r;
+	int status;
+	if (wait4(p->pid, &status, 0, &r) != p->pid) {
+		perror("bench: wait4");
+		exit(1);
+	}
+	remember(p->pid, 0);
+	p->pid = 0;
+	p->cpu_seconds = (double)(r.ru_utime.tv_sec + r.ru_stime.tv_sec) + 1e-6 * (double)(r.ru_utime.tv_usec + r.ru_stime.tv_usec);
+	p->peak_bytes = 1024 * (double)r.ru_maxrss;
+	p->code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+}
+
+void process_wait(struct process *p)
+{
+	reap(p);
+	if (p->code != 0) {
+		fprintf(stderr, "bench: a program ended with %d\n", p->code);
+		exit(1);
+	}
+}
+
+void process_stop(struct process *p)
+{
+	kill(p->pid, SIGTERM);
+	reap(p);
+}
+
+bool process_is_running(const struct process *p)
+{
+	siginfo_t info = {.si_pid = 0};
+	return waitid(P_PID, (id_t)p->pid, &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == 0;
+}
+
+double process_cpu_seconds(const struct process *p)
+{
+	clockid_t clock;
+	struct timespec t = {0, 0};
+	if (clock_getcpuclockid(p->pid, &clock) == 0)
+		clock_gettime(clock, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+double process_peak_bytes(const struct process *p, double *now)
+{
+	char path[64], line[256];
+	snprintf(path, sizeof path, "/proc/%d/status", (int)p->pid);
+	FILE *f = fopen(path, "r");
+	double peak = 0, resident = 0;
+	while (f && fgets(line, sizeof line, f))
+		if (sscanf(line, "VmHWM: %lf", &peak) != 1)
+			sscanf(line, "VmRSS: %lf", &resident);
+	if (f)
+		fclose(f);
+	if (now)
+		*now = 1024 * resident;
+	return 1024 * peak;
+}
+
+double wall_seconds(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
