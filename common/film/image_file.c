@@ -81,15 +81,36 @@ static void sync_folder(const char *path)
 	close(fd);
 }
 
+/* A temporary file beside `path`; its descriptor or a negative errno. */
+static int open_beside(const char *path, char temporary[PATH_ROOM], struct error *e)
+{
+	int n = snprintf(temporary, PATH_ROOM, "%s.XXXXXX", path);
+	if (n < 0 || n >= PATH_ROOM)
+		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
+	int fd = mkostemp(temporary, O_CLOEXEC);
+	return fd < 0 ? failed(e, path, "write there") : fd;
+}
+
+int image_file_probe(const char *path, struct error *e)
+{
+	char temporary[PATH_ROOM];
+	struct stat st;
+	if (stat(path, &st) == 0 && S_ISDIR(st.st_mode))
+		return error_set(e, EISDIR, "%s: is a folder", path);
+	int fd = open_beside(path, temporary, e);
+	if (fd < 0)
+		return fd;
+	close(fd);
+	unlink(temporary);
+	return 0;
+}
+
 int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e)
 {
 	char temporary[PATH_ROOM];
-	int n = snprintf(temporary, sizeof temporary, "%s.XXXXXX", path);
-	if (n < 0 || (size_t)n >= sizeof temporary)
-		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
-	int fd = mkostemp(temporary, O_CLOEXEC);
+	int fd = open_beside(path, temporary, e);
 	if (fd < 0)
-		return failed(e, path, "write there");
+		return fd;
 	mode_t mask = umask(0);
 	umask(mask);
 	int rc = write_all(fd, bytes, size) != 0 || fchmod(fd, 0666 & ~mask) != 0 ? failed(e, path, "write") : 0;

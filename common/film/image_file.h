@@ -11,6 +11,9 @@ int image_file_encode(const struct canvas_image *img, const struct plan *p, cons
 /* Temporary file beside it, fsync, rename, fsync of the folder. */
 int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e);
 
+/* Whether image_file_write could put a file there: asked before hours are spent. Leaves nothing behind. */
+int image_file_probe(const char *path, struct error *e);
+
 /* The whole file, at most 2^32 bytes; bytes are mem_alloc'd. */
 int image_file_read(const char *path, unsigned char **bytes, size_t *size, struct error *e);
 

@@ -27,6 +27,8 @@ code 75 "$BIN/hslt-status" --socket "$DIR/none"
 
 start_coordinator
 code 1 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --spool "$DIR/spool" # one master a spool
+code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/no/such/folder.exr" # before hours are spent, not after
+code 1 "$BIN/hslt-submit" "$BOX" -o "$DIR/no/such/folder.exr" --wait
 code 1 "$BIN/hslt-submit" "$DIR/none.xml" -o "$DIR/a.exr"
 code 2 "$BIN/hslt-submit" "$BOX" -o "$DIR/a.exr" --crop 0,0,0,0,0
 code 1 "$BIN/hslt-job" fetch j1

@@ -261,7 +261,11 @@ static void say(const struct session *s)
 
 static int run(struct session *s, struct error *e)
 {
-	int rc = load(s, e);
+	int rc = image_file_probe(s->a->output, e);
+	if (!rc && s->a->stats)
+		rc = image_file_probe(s->a->stats, e);
+	if (!rc)
+		rc = load(s, e);
 	if (!rc)
 		rc = make_plan(s, e);
 	if (!rc)

@@ -1,5 +1,6 @@
 #include "common/base/text.h"
 #include "common/base/version.h"
+#include "common/film/image_file.h"
 #include "worker/cli/submit.h"
 
 #include <argp.h>
@@ -159,7 +160,9 @@ int main(int argc, char **argv)
 	a.request.args = &a.render;
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
-	int rc = scene_bundle_read(&b, a.scene, a.render.defines, a.render.define_count, &a.render.render, &e);
+	int rc = a.wait ? image_file_probe(a.output, &e) : 0;
+	if (!rc)
+		rc = scene_bundle_read(&b, a.scene, a.render.defines, a.render.define_count, &a.render.render, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		return 1;
