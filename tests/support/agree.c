@@ -4,6 +4,7 @@
 #include "tests/support/stats.h"
 
 #include <pthread.h>
+#include <stdatomic.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -106,9 +107,8 @@ static bool run_part(struct group_run *g, uint32_t part, const uint64_t *seeds)
 	return ok;
 }
 
-static void *run_group(void *arg)
+static void run_group(struct group_run *g)
 {
-	struct group_run *g = arg;
 	const struct plan *p = g->p;
 	uint64_t *seeds = calloc((size_t)p->chains / p->groups + 1, sizeof *seeds);
 	bool ok = p->kind == PLAN_SAMPLES || bootstrap(g, seeds);
@@ -120,6 +120,19 @@ static void *run_group(void *arg)
 		scale = g->independent / g->count / (samples * p->chains / p->groups);
 	for (int c = 0; c <= AGREE_CELLS; c++)
 		g->mean[c] = g->sum[c] * scale / (c < AGREE_CELLS ? pixels / AGREE_CELLS : pixels);
+}
+
+struct queue {
+	struct group_run *runs;
+	uint32_t count;
+	atomic_uint next;
+};
+
+static void *work(void *arg)
+{
+	struct queue *q = arg;
+	for (uint32_t g; (g = atomic_fetch_add(&q->next, 1)) < q->count;)
+		run_group(&q->runs[g]);
 	return NULL;
 }
 
@@ -158,13 +171,12 @@ void agree_render(const struct world *w, const char *test, const char *side, con
 	*out = (struct agree_image){.groups = p.groups};
 	for (uint32_t g = 0; g < p.groups; g++)
 		runs[g] = (struct group_run){.w = w, .p = &p, .group = g, .mean = out->mean[g]};
-	for (uint32_t g = 0; g < p.groups; g += 2) {
-		pthread_t other;
-		bool two = g + 1 < p.groups && pthread_create(&other, NULL, run_group, &runs[g + 1]) == 0;
-		run_group(&runs[g]);
-		if (two)
-			pthread_join(other, NULL);
-	}
+	struct queue q = {runs, p.groups, 0};
+	pthread_t other;
+	bool two = pthread_create(&other, NULL, work, &q) == 0;
+	work(&q);
+	if (two)
+		pthread_join(other, NULL);
 	for (uint32_t g = 0; g < p.groups; g++) {
 		if (runs[g].failure[0])
 			fail_msg("%s: %s", how->integrator, runs[g].failure);
