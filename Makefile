@@ -31,6 +31,8 @@ CTL_SRC    := $(wildcard coordinator/ctl/*.c)
 DAEMON_SRC := $(filter-out worker/daemon/main.c,$(wildcard worker/daemon/*.c))
 CLI_SRC    := $(filter-out worker/cli/hslt_%.c,$(wildcard worker/cli/*.c))
 PROTO      := $(wildcard proto/*.proto)
+# protobuf-c 1.5 deprecates its own protoc-c: it is a plug-in of protoc.
+PROTOC     := $(if $(shell command -v protoc 2>/dev/null),protoc,protoc-c)
 
 obj = $(patsubst %.c,$(BUILD)/obj/%.o,$(1))
 PROTO_OBJ := $(patsubst proto/%.proto,$(BUILD)/obj/gen/proto/%.pb-c.o,$(PROTO))
@@ -62,7 +64,8 @@ $(BUILD)/obj/gen/%.o: $(BUILD)/gen/%.c
 
 $(BUILD)/gen/proto/%.pb-c.c $(BUILD)/gen/proto/%.pb-c.h: proto/%.proto
 	@mkdir -p $(@D)
-	protoc-c --c_out=$(BUILD)/gen $<
+	@command -v $(PROTOC) >/dev/null || { echo "make: no $(PROTOC); sh deploy/setup.sh installs what the build needs" >&2; exit 1; }
+	$(PROTOC) --c_out=$(BUILD)/gen $<
 
 .PHONY: generated
 generated: $(BUILD)/gen/.made
