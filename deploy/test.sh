@@ -35,7 +35,7 @@ kind() {
 	shift
 	echo "== $title"
 	code=0
-	{ "$@" 2>&1 || echo "exit $?" >"$results.code"; } | tee "$results" | grep -v '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$' || true
+	{ "$@" 2>&1 || echo "exit $?" >"$results.code"; } | tee "$results" | grep --line-buffered -v '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$' || true
 	[ ! -f "$results.code" ] || { code=1 && rm -f "$results.code"; }
 	line=$(grep '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$' "$results" | tail -n 1)
 	set -- $(echo "$line" | tr -dc '0-9 ')
