@@ -102,8 +102,9 @@ $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 tests: $(TEST_BIN)
+# Sanitized runs take 1/20 of the samples.
 test: programs tests
-	sh tests/run.sh $(BUILD)
+	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)
 .SECONDARY:
 
 # Fuzzers: tests/fuzz/fuzz_*.c, one libFuzzer program each; run.sh calls `make fuzzers` with clang and its sanitizers.

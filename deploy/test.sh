@@ -80,11 +80,11 @@ if [ $mode = plain ]; then
 	skip "sanitizers: make test SAN=address,undefined, or --full"
 	skip "clang, fuzzers: --full"
 else
-	HSLT_TEST_SCALE=20 HSLT_TEST_KINDS=unit
-	export HSLT_TEST_SCALE HSLT_TEST_KINDS
+	HSLT_TEST_KINDS=unit
+	export HSLT_TEST_KINDS
 	step "build with address and undefined sanitizers" make -s -j"$jobs" SAN=address,undefined programs tests
 	kind "tests with sanitizers, 1/20 of the samples" make -s SAN=address,undefined test
-	unset HSLT_TEST_SCALE HSLT_TEST_KINDS
+	unset HSLT_TEST_KINDS
 	step "build with clang" make -s -j"$jobs" CC=clang BUILD=build/clang programs tests
 	if [ $mode = full ]; then
 		kind "long forms" make -s FULL=1 test
