@@ -270,7 +270,7 @@ static void test_resume(void **state)
 	(void)state;
 	static struct chain whole, parts;
 	static struct path_context context;
-	uint64_t counters[BATCH_COUNTERS] = {0};
+	static uint64_t counters[BATCH_COUNTERS] = {0};
 	context.counters = counters;
 	const struct integrator integrator = {.stream = RNG_BOOTSTRAP, .evaluate = evaluate_lengths};
 	struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
