@@ -1,5 +1,6 @@
 /* The store keeps what it was given under its true name, refuses what is not it, and forgets the oldest first. */
 #include "common/blob/blob.h"
+#include "tests/support/folder.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -12,23 +13,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-static char folder[64];
-
-static int set_up(void **state)
-{
-	(void)state;
-	strcpy(folder, "/tmp/hslt-blob.XXXXXX");
-	return mkdtemp(folder) ? 0 : -1;
-}
-
-static int tear_down(void **state)
-{
-	(void)state;
-	char command[128];
-	snprintf(command, sizeof command, "rm -rf '%s'", folder);
-	return system(command);
-}
 
 static struct blob_hash put(struct blob_store *s, const char *text)
 {
@@ -131,9 +115,9 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(knows_sha_256),
-		cmocka_unit_test_setup_teardown(keeps_and_reads_back, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(refuses_false_bytes, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(forgets_the_oldest_that_nobody_holds, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(keeps_and_reads_back, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(refuses_false_bytes, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(forgets_the_oldest_that_nobody_holds, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,6 +1,7 @@
 /* A spool has one master, never gives an id twice, and remembers its jobs. */
 #include "coordinator/store/spool.h"
 #include "common/base/mem.h"
+#include "tests/support/folder.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -11,23 +12,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-
-static char folder[64];
-
-static int set_up(void **state)
-{
-	(void)state;
-	strcpy(folder, "/tmp/hslt-spool.XXXXXX");
-	return mkdtemp(folder) ? 0 : -1;
-}
-
-static int tear_down(void **state)
-{
-	(void)state;
-	char command[128];
-	snprintf(command, sizeof command, "rm -rf '%s'", folder);
-	return system(command);
-}
 
 static void one_master(void **state)
 {
@@ -102,9 +86,9 @@ static void records_come_back(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(one_master, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(ids_are_never_given_twice, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(records_come_back, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(one_master, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(ids_are_never_given_twice, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(records_come_back, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -4,6 +4,7 @@
 #include "worker/daemon/cache.h"
 #include "worker/daemon/crew.h"
 #include "worker/daemon/fingerprint.h"
+#include "tests/support/folder.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -17,23 +18,6 @@
 #include <stdlib.h>
 #include <string.h>
 #include <unistd.h>
-
-static char folder[64];
-
-static int set_up(void **state)
-{
-	(void)state;
-	strcpy(folder, "/tmp/hslt-daemon.XXXXXX");
-	return mkdtemp(folder) ? 0 : -1;
-}
-
-static int tear_down(void **state)
-{
-	(void)state;
-	char command[128];
-	snprintf(command, sizeof command, "rm -rf '%s'", folder);
-	return system(command);
-}
 
 /* ---- crew ---- */
 
@@ -266,9 +250,9 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(the_crew_works),
-		cmocka_unit_test_setup_teardown(workers_share_a_cache_folder, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(a_bundle_fetches_what_is_missing, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(lies_are_noticed, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(workers_share_a_cache_folder, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_bundle_fetches_what_is_missing, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(lies_are_noticed, folder_set_up, folder_tear_down),
 		cmocka_unit_test(the_fingerprint_is_stable),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
