@@ -25,7 +25,7 @@ LIBS_RENDER := $(EMBREE) -lexpat -lpng -ljpeg -lz
 
 COMMON_SRC := $(wildcard common/*/*.c)
 RENDER_SRC := $(filter-out %_gen.c,$(wildcard worker/math/*.c worker/scene/*.c worker/geom/*.c worker/texture/*.c worker/bsdf/*.c \
-              worker/emitter/*.c worker/camera/*.c worker/world/*.c worker/path/*.c worker/chain/*.c worker/render/*.c))
+              worker/emitter/*.c worker/camera/*.c worker/world/*.c worker/path/*.c worker/halfvec/*.c worker/mutation/*.c worker/chain/*.c worker/render/*.c))
 COORD_SRC  := $(wildcard coordinator/core/*.c coordinator/store/*.c coordinator/shell/*.c)
 CTL_SRC    := $(wildcard coordinator/ctl/*.c)
 DAEMON_SRC := $(filter-out worker/daemon/main.c,$(wildcard worker/daemon/*.c))

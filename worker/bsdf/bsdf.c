@@ -50,6 +50,37 @@ int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, 
 	return 0;
 }
 
+double bsdf_eta(const struct bsdf *b, const struct wavelengths *w)
+{
+	(void)w;
+	return b->eta;
+}
+
+/* What a plug-in that cancels nothing by hand is worth. */
+static spectrum halfvec_product(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	bool reflect = wo.z * wi.z > 0;
+	double eta = reflect ? 1 : wo.z > 0 ? bsdf_eta(b, p->w) : 1 / bsdf_eta(b, p->w);
+	vec3 un = vec3_madd(wo, eta, wi);
+	double length = vec3_length(un);
+	if (!(length > 0))
+		return spectrum_of(0);
+	vec3 h = vec3_scale(1 / length, un);
+	double oh = vec3_dot(wo, h), ih = vec3_dot(wi, h), root = oh + eta * ih;
+	double solid = reflect ? 4 * fabs(ih) : root * root / (eta * eta * fabs(ih));
+	return spectrum_scale(fabs(wi.z * h.z * h.z * h.z) * solid, b->ops->eval(b, p, wo, wi));
+}
+
+spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	return b->ops->eval_halfvec ? b->ops->eval_halfvec(b, p, wo, wi) : halfvec_product(b, p, wo, wi);
+}
+
+spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi, double *chance)
+{
+	return b->ops->eval_delta ? b->ops->eval_delta(b, p, wo, mode, wi, chance) : spectrum_of(0);
+}
+
 static spectrum black_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	(void)b, (void)p, (void)wo, (void)wi;

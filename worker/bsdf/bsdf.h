@@ -56,6 +56,11 @@ struct bsdf_ops {
 	int (*create)(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
 	spectrum (*eval)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 	double (*pdf_solid)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+	/* f |wi.z| |d wi / d h_par| with the factors that explode and vanish together cancelled by hand; see bsdf_eval_halfvec.
+	 * NULL: nothing cancels, the product of its factors will do. */
+	spectrum (*eval_halfvec)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+	/* See bsdf_eval_delta. NULL: has no exactly specular lobe. */
+	spectrum (*eval_delta)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi, double *chance);
 	/* u[0], u[1]: direction; u[2]: lobe. false: absorbed. */
 	bool (*sample)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out);
 };
@@ -66,12 +71,30 @@ struct bsdf {
 	bool has_smooth;   /* some lobe is not delta: eval is not identically 0 */
 	bool has_delta;
 	double alpha;      /* least roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
-	double eta;        /* index below the surface (against the normal) over the one above; 1: opaque or none */
+	double alpha_mean; /* albedo-weighted mean roughness of its non-delta lobes, diffuse counting 1; 0 for delta only */
+	double eta;        /* index below the surface (against the normal) over the one above, at the sodium line where it
+			      depends on the wavelength; 1: opaque or none */
+	bool dispersive;   /* the index depends on the wavelength: only bsdf_eta says it, and paths carry one wavelength */
 	bool two_sided;    /* scatters light that arrives from below the normal */
 	bool textured;
 	enum color_shape shape; /* CONSTANT: carries no colour */
 	void *data;
 };
+
+/* Index below the surface over the one above, at the hero wavelength nm[0] where dispersive. */
+double bsdf_eta(const struct bsdf *b, const struct wavelengths *w);
+
+/* For non-delta lobes, wo towards the camera, wi towards the light: f_radiance(wo, wi) |wi.z| times the solid angle of
+ * directions wi per area of plane-plane half vectors h_par = h_xy / h_z, h along wo + eta wi, eta = n_wi / n_wo (1 when
+ * reflected), with wo held: the way a chain is followed from the camera. For microfacets this is
+ * W G2 P22(h) |wo.h| / (|wo.z| |h.z|), W = F or (1-F) (n_wo/n_wi)^2, P22 the density of slopes; for others
+ * f |wi.z| |h.z|^3 4 |wi.h| where reflected and f |wi.z| |h.z|^3 (wo.h + eta wi.h)^2 / (eta^2 |wi.h|) where refracted. */
+spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+
+/* The exactly specular lobe `mode` (REFLECT or TRANSMIT, with or without the DELTA bit) seen from wo: its direction wi, the
+ * probability with which `sample` chooses it, and its weight f |wi.z| (f as in struct bsdf_sample). Zero: there is none, or
+ * light is totally reflected; wi and chance are then not to be read. */
+spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi, double *chance);
 
 int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
 void bsdf_black(struct bsdf *b); /* absorbs everything; for emitters without a BSDF */

@@ -72,6 +72,8 @@ static void fill(const struct geom_shape *s, const uint32_t i[3], const struct c
 		 struct surface_point *x)
 {
 	double b0 = 1 - b1 - b2;
+	x->b1 = b1;
+	x->b2 = b2;
 	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
 	x->ng = vec3_normalize(vec3_cross(c->e1, c->e2));
 	x->dpdu = tangent(s, i, c->e1, c->e2);
@@ -105,6 +107,7 @@ void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w,
 	vec3 l = frame_to_local(&s->sphere_axes, w);
 	x->prim = prim;
 	x->p = vec3_madd(s->center, s->radius, w);
+	x->b1 = x->b2 = 0;
 	x->ng = vec3_scale(s->normal_sign, w);
 	/* du of the longitude: axis x normal; undefined at the poles, where frame_along picks a frame of its own. */
 	x->dpdu = vec3_scale(2 * M_PI * s->radius, vec3_cross(s->sphere_axes.n, w));

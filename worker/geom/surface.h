@@ -27,6 +27,7 @@ struct surface_point {
 	vec3 p, ng;
 	struct frame sh; /* sh.n is the shading normal */
 	double u, v;
+	double b1, b2; /* barycentrics on a triangle; 0 on a sphere */
 	vec3 dpdu;
 	struct prim_ref prim;
 };

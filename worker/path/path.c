@@ -111,6 +111,7 @@ struct departure {
 	spectrum beta;
 	double pdf, pdf_rev; /* solid angle; the probability of the lobe where delta */
 	double eta;          /* index on wi's side over the one on the side the path came from */
+	unsigned mode;
 	bool delta;
 };
 
@@ -125,6 +126,7 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 	out->wi = frame_to_world(&v->x.sh, s.wi);
 	if (!same_side(&v->x, out->wi))
 		return false;
+	out->mode = s.mode;
 	out->delta = (s.mode & BSDF_DELTA) != 0;
 	double factor = fabs(s.wi.z);
 	if (transport == TRANSPORT_IMPORTANCE)
@@ -197,6 +199,7 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 		else if (out.delta)
 			delta_per_solid(&at->x, at->to_prev, out.wi, out.eta, &back, &ahead);
 		at->delta = out.delta;
+		at->mode = out.mode;
 		to->beta = out.beta;
 		to->pdf = reach_pdf(at, to, out.pdf, ahead);
 		if (!c->one_way)

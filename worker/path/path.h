@@ -25,6 +25,7 @@ enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINIT
 struct path_vertex {
 	enum vertex_kind kind;
 	bool delta;              /* its own sub-path left it by an exactly specular lobe */
+	unsigned mode;           /* of enum bsdf_mode: how its own sub-path left it */
 	int32_t emitter;         /* shines: index; -1 */
 	const struct bsdf *bsdf; /* VERTEX_SURFACE */
 	struct surface_point x;  /* VERTEX_INFINITE: p is the unit direction towards the emitter */
