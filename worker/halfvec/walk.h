@@ -1,0 +1,53 @@
+/*
+ * The predictor-corrector walk (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3 and 6; Jakob 2013): moves the inner vertices of a
+ * sub-path between two fixed ends until their half vectors are the ones asked for.
+ *
+ * A step of Newton moves every vertex in its tangent plane; from the camera's end each is put back onto the surface along the
+ * ray from the one before it: on the primitive where it was when it is still met, else by casting a ray. Only the path that
+ * the walk ends with must be visible: its edges are asked at the end, unless the caller knows (a walk back to a path that
+ * exists). One thread; nothing allocates.
+ */
+#ifndef WORKER_HALFVEC_WALK_H
+#define WORKER_HALFVEC_WALK_H
+
+#include "worker/halfvec/constraint.h"
+
+enum walk_end {
+	WALK_OK,
+	WALK_MISSED,     /* a ray met nothing */
+	WALK_BLOCKED,    /* another material, or an edge is occluded */
+	WALK_MODE,       /* a vertex would scatter in another mode, or the normals disagree about a side */
+	WALK_SINGULAR,   /* of the matrix */
+	WALK_DIVERGED,   /* step below the least */
+	WALK_ITERATIONS, /* ran out of them */
+};
+
+struct walk_limits {
+	unsigned iterations;  /* 15 */
+	double least_step;    /* 1e-5 of a Newton step */
+	double scale;         /* of all tolerances: 1, 0.5 to show that they change no image */
+};
+#define WALK_LIMITS_DEFAULT ((struct walk_limits){15, 1e-5, 1})
+
+struct walk_target {
+	vec2 h;           /* of the vertex where the walk ends, in its frame; (0,0) where specular */
+	double tolerance; /* of |h - target| */
+};
+
+/* Caller's storage for one walk. */
+struct walk_scratch {
+	struct constraint k[WHOLE_MAX_VERTICES];
+	struct constraint_system system;
+	vec2 residual[WHOLE_MAX_VERTICES], dx[WHOLE_MAX_VERTICES];
+	struct path_vertex kept[WHOLE_MAX_VERTICES];
+	unsigned iterations; /* out: of the last walk */
+};
+
+/* y: vertices b and c stay; b-1..c+1 are where the walk starts, and on WALK_OK where it ended, with edges c..b-1 joined.
+ * Wavelengths (indices of refraction) are y's. On WALK_OK s->k holds the constraints there. visible: do not ask for
+ * occlusion, the caller knows. On failure y's vertices c+1..b-1 are not to be read. */
+enum walk_end halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
+			   struct walk_scratch *s);
+
+#endif

@@ -1,0 +1,88 @@
+/*
+ * A whole path from an emitter to the camera: the state of chains in path space.
+ *
+ * v[0] is x_0 on the emitter (or the direction towards it, at infinity), v[edges] is x_k on the camera's aperture. Of struct
+ * path_vertex a whole path uses kind, mode (inner vertices: how they scatter), delta, emitter, bsdf, x, to_prev (the unit
+ * direction towards v[i + 1]: the camera's side) and as caches pdf and pdf_rev (density of the vertex as generated from the
+ * camera's side and from the light's side).
+ *
+ * i_j is the unit direction from v[j] to v[j - 1], o_j the one to v[j + 1]. The contribution is measured as in path.h: per
+ * area, per solid angle at infinity, delta distributions dropped (they are the same for all paths that share the modes).
+ * One thread; nothing allocates.
+ */
+#ifndef WORKER_PATH_WHOLE_H
+#define WORKER_PATH_WHOLE_H
+
+#include "worker/path/connect.h"
+
+enum {
+	WHOLE_MAX_EDGES = 32,
+	WHOLE_MAX_VERTICES = WHOLE_MAX_EDGES + 1,
+};
+
+struct whole_edge { /* v[e] - v[e + 1] */
+	vec3 w;           /* unit, from v[e] to v[e + 1] */
+	double distance2; /* 1 where v[0] lies at infinity */
+};
+
+struct whole_path {
+	unsigned edges; /* k; 0: no path */
+	struct wavelengths wl;
+	double wavelength; /* the number in [0,1) that wl was made of */
+	double film[2];
+	struct path_vertex v[WHOLE_MAX_VERTICES];
+	struct whole_edge edge[WHOLE_MAX_EDGES];
+	/* Caches, by vertex, filled by whole_scatter: */
+	spectrum f[WHOLE_MAX_VERTICES];  /* inner: f_radiance(o, i) without cosine, the lobe's weight where specular; v[0]: L_e */
+	spectrum fh[WHOLE_MAX_VERTICES]; /* inner: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), the lobe's weight where specular */
+};
+
+/* A product that neither over- nor underflows: v 2^exponent. */
+struct product {
+	spectrum v;
+	int exponent;
+};
+#define PRODUCT_ONE ((struct product){{{1, 1, 1, 1}}, 0})
+void product_mul(struct product *p, spectrum f);
+void product_scale(struct product *p, double s);
+/* log(X + Y + Z) of what the film gets; -INFINITY for black. dispersed: carries one wavelength (path_collapse). */
+double product_log_intensity(const struct path_context *c, const struct whole_path *x, const struct product *p);
+
+/* Edge e from the positions of its ends, and to_prev of v[e]. false: the ends coincide. */
+bool whole_join(struct whole_path *x, unsigned e);
+
+/* What kind of scattering the directions o_j, i_j mean: BSDF_REFLECT or BSDF_TRANSMIT by the sides of both normals; 0: the two
+ * normals disagree about a side, nothing scatters. */
+unsigned whole_mode(const struct whole_path *x, unsigned j);
+
+/* n_o / n_i at v[j]: index on the camera's side over that on the light's; 1 where it reflects. */
+double whole_eta(const struct whole_path *x, unsigned j);
+
+/* Fills f and fh of v[first..last] (0 <= first <= last <= k - 1) for the path's wavelengths. false: some of it is black. */
+bool whole_scatter(struct path_context *c, struct whole_path *x, unsigned first, unsigned last);
+
+/* Nothing lies between v[e] and v[e + 1]. Counts a ray. */
+bool whole_visible(struct path_context *c, const struct whole_path *x, unsigned e);
+
+/* Where v[edges - 1] lies on the film as seen from v[edges]; false: outside the window that is sampled. */
+bool whole_film(const struct path_context *c, struct whole_path *x);
+
+/* The path that technique s makes of the sub-paths in c (s vertices of c->light, the others of c->camera), with everything
+ * cached. Casts the connecting ray. false: there is none, or it is black. */
+bool whole_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct whole_path *x);
+
+/* log f of the path in the measure of path.h, from the products of its geometry terms; -INFINITY: black. */
+double whole_log_f(struct path_context *c, const struct whole_path *x);
+
+/* Fills pdf and pdf_rev of all vertices, then log of the density with which technique s makes this path, s = 0..edges;
+ * -INFINITY where it cannot. */
+void whole_log_techniques(struct path_context *c, struct whole_path *x, double *log_pdf);
+
+/* CIE XYZ of the path's colour, scaled so that X + Y + Z = 1. */
+void whole_colour(const struct path_context *c, const struct whole_path *x, double xyz[3]);
+
+/* Recomputes everything that is cached and asks every ray again; the first disagreement in words. For tests and for states
+ * that come from outside. */
+bool path_check(struct path_context *c, const struct whole_path *x, char *text, size_t size);
+
+#endif
