@@ -15,14 +15,25 @@ static double conductor_pdf(const struct bsdf *b, const struct bsdf_point *p, ve
 	return 0;
 }
 
+static spectrum conductor_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				     double *chance)
+{
+	if (!(mode & BSDF_REFLECT) || !(wo.z >= DBL_MIN)) /* 1 / wo.z must be finite */
+		return spectrum_of(0);
+	*wi = (vec3){-wo.x, -wo.y, wo.z};
+	*chance = 1;
+	return metal_fresnel(b->data, p, wo.z);
+}
+
 static bool conductor_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			     struct bsdf_sample *out)
 {
 	(void)u;
-	if (!(wo.z >= DBL_MIN)) /* 1 / wo.z must be finite */
+	*out = (struct bsdf_sample){.mode = BSDF_REFLECT | BSDF_DELTA, .eta = 1};
+	spectrum weight = conductor_eval_delta(b, p, wo, BSDF_REFLECT, &out->wi, &out->pdf);
+	if (!(out->pdf > 0))
 		return false;
-	*out = (struct bsdf_sample){.wi = {-wo.x, -wo.y, wo.z}, .mode = BSDF_REFLECT | BSDF_DELTA, .pdf = 1,
-				    .f = spectrum_scale(1 / wo.z, metal_fresnel(b->data, p, wo.z)), .eta = 1};
+	out->f = spectrum_scale(1 / wo.z, weight);
 	return true;
 }
 
@@ -45,5 +56,6 @@ const struct bsdf_ops bsdf_ops_conductor = {
 	.create = conductor_create,
 	.eval = conductor_eval,
 	.pdf_solid = conductor_pdf,
+	.eval_delta = conductor_eval_delta,
 	.sample = conductor_sample,
 };

@@ -35,6 +35,7 @@ static int diffuse_create(struct bsdf *b, const struct scene_node *n, const stru
 		return -ENOMEM;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
+	b->alpha_mean = 1;
 	return bsdf_texture(b, t, n, "reflectance", 0.5, build, e);
 }
 
@@ -56,5 +57,5 @@ void bsdf_default(struct bsdf *b)
 {
 	static struct texture half = {.color = {.shape = COLOR_SHAPE_CONSTANT, .scale = 0.5}};
 	*b = (struct bsdf){.ops = &bsdf_ops_diffuse, .modes = BSDF_REFLECT, .has_smooth = true, .alpha = INFINITY,
-			   .eta = 1, .shape = COLOR_SHAPE_CONSTANT, .data = &half};
+			   .alpha_mean = 1, .eta = 1, .shape = COLOR_SHAPE_CONSTANT, .data = &half};
 }

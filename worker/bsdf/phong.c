@@ -78,7 +78,9 @@ static int phong_create(struct bsdf *b, const struct scene_node *n, const struct
 	ph->specular_chance = d + s > 0 ? s / (d + s) : 0;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	b->alpha = s > 0 ? sqrt(2 / (ph->exponent + 2)) : INFINITY;
+	double alpha = sqrt(2 / (ph->exponent + 2));
+	b->alpha = s > 0 ? alpha : INFINITY;
+	b->alpha_mean = ph->specular_chance * alpha + (1 - ph->specular_chance);
 	return 0;
 }
 

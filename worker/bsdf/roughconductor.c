@@ -69,7 +69,7 @@ static int roughconductor_create(struct bsdf *b, const struct scene_node *n, con
 		return code;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	b->alpha = r->facets.alpha;
+	b->alpha = b->alpha_mean = r->facets.alpha;
 	return metal_read(&r->metal, b, n, build, e);
 }
 

@@ -129,7 +129,7 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 		return code;
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT;
 	b->has_smooth = true;
-	b->alpha = r->facets.alpha;
+	b->alpha = b->alpha_mean = r->facets.alpha;
 	if (b->eta == 1) {
 		/* No facet bends light: all of it goes straight on. */
 		extern const struct bsdf_ops bsdf_ops_dielectric;
@@ -137,7 +137,7 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 		b->modes |= BSDF_DELTA;
 		b->has_smooth = false;
 		b->has_delta = true;
-		b->alpha = 0;
+		b->alpha = b->alpha_mean = 0;
 	}
 	return 0;
 }

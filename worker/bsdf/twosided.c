@@ -28,6 +28,18 @@ static double twosided_pdf(const struct bsdf *b, const struct bsdf_point *p, vec
 	return t->side[1].ops->pdf_solid(&t->side[1], p, mirror(wo), mirror(wi));
 }
 
+static spectrum twosided_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				    double *chance)
+{
+	const struct twosided *t = b->data;
+	if (wo.z > 0)
+		return bsdf_eval_delta(&t->side[0], p, wo, mode, wi, chance);
+	spectrum weight = bsdf_eval_delta(&t->side[1], p, mirror(wo), mode, wi, chance);
+	if (!spectrum_is_zero(weight))
+		*wi = mirror(*wi);
+	return weight;
+}
+
 static bool twosided_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
 			    struct bsdf_sample *out)
 {
@@ -85,6 +97,9 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 	}
 	if (!b->has_smooth)
 		b->alpha = 0;
+	/* Nothing says from which side light comes: both count the same. */
+	int smooth = t->side[0].has_smooth + t->side[1].has_smooth;
+	b->alpha_mean = smooth ? (t->side[0].alpha_mean + t->side[1].alpha_mean) / smooth : 0;
 	return 0;
 }
 
@@ -97,5 +112,6 @@ const struct bsdf_ops bsdf_ops_twosided = {
 	.create = twosided_create,
 	.eval = twosided_eval,
 	.pdf_solid = twosided_pdf,
+	.eval_delta = twosided_eval_delta,
 	.sample = twosided_sample,
 };
