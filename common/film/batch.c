@@ -128,6 +128,27 @@ static int check_counts(const struct batch *b, const struct plan *p, uint64_t li
 	return 0;
 }
 
+static int check_strategies(const struct batch *b, const struct plan *p, struct error *e)
+{
+	uint64_t proposed = 0;
+	bool has = b->key.kind == LEASE_RENDER;
+	int expected = has ? plan_strategy_count(p->mutations) : 0;
+	if (b->strategy_count != 0 && (int64_t)b->strategy_count != expected)
+		return error_set(e, EBADMSG, "counters of %u strategies where the plan has %d", b->strategy_count, expected);
+	for (uint32_t i = 0; i < b->strategy_count; i++) {
+		const uint64_t *c = b->strategy[i];
+		for (int k = 0; k < STRATEGY_COUNTERS; k++)
+			if (c[k] >> 56 || ((k == STRATEGY_ACCEPTED || k >= STRATEGY_FAIL_FIRST) && c[k] > c[STRATEGY_PROPOSED]))
+				return error_set(e, EBADMSG, "counter %d of strategy %u is %llu of %llu proposals", k, i,
+						 (unsigned long long)c[k], (unsigned long long)c[STRATEGY_PROPOSED]);
+		proposed += c[STRATEGY_PROPOSED];
+	}
+	if (proposed > b->counters[COUNT_SAMPLES])
+		return error_set(e, EBADMSG, "%llu proposals in %llu mutations", (unsigned long long)proposed,
+				 (unsigned long long)b->counters[COUNT_SAMPLES]);
+	return 0;
+}
+
 int batch_check(const struct batch *b, const struct plan *p, struct error *e)
 {
 	uint64_t live;
@@ -138,5 +159,7 @@ int batch_check(const struct batch *b, const struct plan *p, struct error *e)
 		rc = check_states(b, p, &live, e);
 	if (rc == 0)
 		rc = check_weights(b, p, e);
-	return rc ? rc : check_counts(b, p, live, e);
+	if (rc == 0)
+		rc = check_counts(b, p, live, e);
+	return rc ? rc : check_strategies(b, p, e);
 }

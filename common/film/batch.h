@@ -45,9 +45,37 @@ enum batch_counter {
 	COUNT_LONGEST_STUCK,  /* most rejections in a row (merged by maximum) */
 };
 
+/* What the chains of a lease count of each strategy of the plan's mixture; names in common/film/strategy.h. From
+ * STRATEGY_FAIL_FIRST on: why a proposal could not be made or carried nothing, one reason a proposal. */
+enum { BATCH_STRATEGIES = PLAN_MAX_STRATEGIES };
+enum strategy_counter {
+	STRATEGY_PROPOSED,      /* mutations that the strategy was chosen for */
+	STRATEGY_ACCEPTED,
+	STRATEGY_RAYS,          /* of its proposals, the way back included */
+	STRATEGY_WALKS,         /* on the manifold */
+	STRATEGY_ITERATIONS,    /* of all walks */
+	STRATEGY_REVERSE_WALKS, /* walks from the proposal back to the state */
+	STRATEGY_FAIL_FIRST,
+	STRATEGY_FAIL_OUTSIDE = STRATEGY_FAIL_FIRST, /* left the frame or the aperture */
+	STRATEGY_FAIL_MISSED,       /* a ray met nothing */
+	STRATEGY_FAIL_BLOCKED,      /* ... or another surface than it should */
+	STRATEGY_FAIL_MODE,         /* reflection, transmission, side or material changed */
+	STRATEGY_FAIL_SINGULAR,     /* a matrix without inverse */
+	STRATEGY_FAIL_DIVERGED,     /* the step of a walk fell below the least */
+	STRATEGY_FAIL_ITERATIONS,   /* a walk ran out of them */
+	STRATEGY_FAIL_REVERSE,      /* the way back failed or came elsewhere */
+	STRATEGY_FAIL_SPECULAR,     /* would move a delta vertex that is fixed */
+	STRATEGY_FAIL_EMITTER,      /* did not end on an emitter that shines */
+	STRATEGY_FAIL_DARK,         /* contributes nothing */
+	STRATEGY_FAIL_INAPPLICABLE, /* the path has nothing that this strategy can move */
+	STRATEGY_COUNTERS,
+};
+
 struct batch {
 	struct lease_key key;
 	uint64_t counters[BATCH_COUNTERS];
+	uint32_t strategy_count; /* entries of the plan's mixture, or 0 */
+	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
 	/* Sums over independent proposals of I = X+Y+Z of the whole sample, zeros counted in COUNT_INDEPENDENT.
 	 * beyond_sum: the same from paths longer than the integrator's state holds, estimated by the bootstrap and not in
 	 * independent_sum (b is the integral of what the chains can reach). */
@@ -65,7 +93,7 @@ void batch_fini(struct batch *b);
 
 /* All that can be checked without the scene: key inside the plan, tiles inside the crop, aligned, once, in order, values
  * finite, counts as the plan says (COUNT_SAMPLES of a render lease and COUNT_INDEPENDENT of a bootstrap lease exactly),
- * states bounded, weights >= 0. -EBADMSG with a sentence. */
+ * states bounded, weights >= 0, strategies as many as the plan's and none with more proposals than samples. -EBADMSG with a sentence. */
 int batch_check(const struct batch *b, const struct plan *p, struct error *e);
 
 #endif

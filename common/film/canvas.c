@@ -288,19 +288,45 @@ static void close_tile(struct canvas *c, size_t prefix, size_t open, size_t tile
 
 /* ---- what goes with the pixels */
 
-static void merge_counters(uint64_t to[BATCH_COUNTERS], const uint64_t from[BATCH_COUNTERS])
+static uint64_t add_saturated(uint64_t a, uint64_t b)
+{
+	return a > UINT64_MAX - b ? UINT64_MAX : a + b;
+}
+
+static void add_counters(uint64_t to[BATCH_COUNTERS], const uint64_t from[BATCH_COUNTERS])
 {
 	for (int i = 0; i < BATCH_COUNTERS; i++) {
 		if (i == COUNT_LONGEST_STUCK)
 			to[i] = from[i] > to[i] ? from[i] : to[i];
 		else
-			to[i] = to[i] > UINT64_MAX - from[i] ? UINT64_MAX : to[i] + from[i];
+			to[i] = add_saturated(to[i], from[i]);
 	}
+}
+
+static void add_strategies(struct canvas_counts *to, const uint64_t (*from)[STRATEGY_COUNTERS], uint32_t count)
+{
+	for (uint32_t i = 0; i < count; i++)
+		for (int k = 0; k < STRATEGY_COUNTERS; k++)
+			to->strategy[i][k] = add_saturated(to->strategy[i][k], from[i][k]);
+}
+
+void canvas_add_counts(struct canvas_counts *to, const struct canvas_counts *from)
+{
+	add_counters(to->counters, from->counters);
+	add_strategies(to, from->strategy, BATCH_STRATEGIES);
+}
+
+void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out)
+{
+	*out = c->prefix.counts;
+	for (uint32_t i = 0; open_rounds && i < OPEN_ROUNDS; i++)
+		canvas_add_counts(out, &c->open[i].counts);
 }
 
 static void tally_batch(struct tally *t, const struct batch *b)
 {
-	merge_counters(t->counters, b->counters);
+	add_counters(t->counts.counters, b->counters);
+	add_strategies(&t->counts, b->strategy, b->strategy_count);
 	uint32_t g = b->key.group;
 	t->group[g].samples += b->counters[COUNT_SAMPLES];
 	t->group[g].independent += b->counters[COUNT_INDEPENDENT];
@@ -311,7 +337,7 @@ static void tally_batch(struct tally *t, const struct batch *b)
 
 static void tally_merge(struct tally *to, const struct tally *from, uint32_t groups)
 {
-	merge_counters(to->counters, from->counters);
+	canvas_add_counts(&to->counts, &from->counts);
 	for (uint32_t g = 0; g < groups; g++) {
 		to->group[g].samples += from->group[g].samples;
 		to->group[g].independent += from->group[g].independent;

@@ -34,6 +34,15 @@ bool canvas_has(const struct canvas *c, const struct lease_key *k); /* merged al
 uint64_t canvas_rounds(const struct canvas *c);                     /* complete rounds */
 uint64_t canvas_merged(const struct canvas *c); /* render leases merged, open rounds too */
 
+/* Sums over render batches, each merged once; COUNT_LONGEST_STUCK is their maximum. Cells of the strategies that the plan's
+ * mixture does not have are 0. */
+struct canvas_counts {
+	uint64_t counters[BATCH_COUNTERS];
+	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
+};
+/* Of the prefix of complete rounds, with open_rounds of all that has come. */
+void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out);
+
 struct canvas_image {
 	uint32_t width, height; /* crop */
 	float *rgb;   /* linear Rec. 709, [height][width][3]; from the prefix of complete rounds */
@@ -43,7 +52,7 @@ struct canvas_image {
 	double b, b_error;      /* pooled b and its standard error (chains) */
 	double beyond_share;
 	uint64_t samples, rounds;
-	uint64_t counters[BATCH_COUNTERS]; /* of the prefix */
+	struct canvas_counts counts; /* as the pixels; contributions refused in the bootstrap are added */
 	bool black;
 };
 /* Allocates img's arrays; canvas_image_fini frees them. open_rounds: a preview with all that has come. */

@@ -29,13 +29,10 @@ static void add_tally(struct tally *to, const struct tally *from, uint32_t group
 		exact_sum_merge(&to->group[g].sum, &from->group[g].sum);
 		exact_sum_merge(&to->group[g].beyond, &from->group[g].beyond);
 	}
-	for (int i = 0; i < BATCH_COUNTERS; i++) {
-		bool refused = i == COUNT_NAN || i == COUNT_INFINITE || i == COUNT_NEGATIVE;
-		if (i == COUNT_LONGEST_STUCK && all)
-			to->counters[i] = from->counters[i] > to->counters[i] ? from->counters[i] : to->counters[i];
-		else if (all || refused)
-			to->counters[i] += from->counters[i];
-	}
+	struct canvas_counts refused = {{0}, {{0}}};
+	for (int i = COUNT_NAN; i <= COUNT_NEGATIVE; i++)
+		refused.counters[i] = from->counts.counters[i];
+	canvas_add_counts(&to->counts, all ? &from->counts : &refused);
 }
 
 static double ratio(double a, double b)
@@ -235,8 +232,7 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 		add_tally(m.all, &c->open[i], p->groups, true);
 	find_b(&m);
 	find_factors(&m);
-	for (int i = 0; i < BATCH_COUNTERS; i++)
-		img->counters[i] = m.all->counters[i];
+	img->counts = m.all->counts;
 	for (uint32_t ty = 0; ty < c->tiles_down; ty++)
 		for (uint32_t tx = 0; tx < c->tiles_across; tx++)
 			pool_tile(&m, tx, ty);

@@ -13,7 +13,7 @@ enum tile_flag { TILE_BACKED = 1, TILE_USED = 2 };
 
 /* What a round (or the prefix, or the bootstrap) has besides pixels. */
 struct tally {
-	uint64_t counters[BATCH_COUNTERS];
+	struct canvas_counts counts;
 	struct {
 		uint64_t samples, independent;
 		struct exact_sum sum, beyond;
@@ -34,6 +34,8 @@ struct canvas {
 	uint8_t *has;         /* [bootstrap, open parity 0, 1][group][part] */
 	struct tally prefix, open[OPEN_ROUNDS], bootstrap;
 };
+
+void canvas_add_counts(struct canvas_counts *to, const struct canvas_counts *from);
 
 static inline size_t canvas_tiles(const struct canvas *c)
 {

@@ -10,7 +10,7 @@
 #include <time.h>
 
 enum header_name {
-	H_VERSION, H_SCENE, H_INTEGRATOR, H_OPTIONS, H_SEED, H_MIN_DEPTH, H_MAX_DEPTH, H_GROUPS, H_CHAINS, H_BOOTSTRAP, H_EPOCH,
+	H_VERSION, H_SCENE, H_INTEGRATOR, H_MIXTURE, H_OPTIONS, H_SEED, H_MIN_DEPTH, H_MAX_DEPTH, H_GROUPS, H_CHAINS, H_BOOTSTRAP, H_EPOCH,
 	H_ROUNDS, H_MUTATIONS, H_SAMPLES, H_B, H_B_ERROR, H_BEYOND, H_REL_MSE, H_REL_MSE_UPPER, H_ACCEPTED, H_INDEPENDENT,
 	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_EFFECTS, H_MIXED, H_WALL,
 	H_CPU, H_WORKERS, H_DATE,
@@ -23,7 +23,8 @@ enum header_name {
 const struct header_row header_rows[] = {
 	[H_VERSION] = {"hslt:version", STRING, false, "version of the programs"},
 	[H_SCENE] = {"hslt:scene", STRING, false, "name of the scene file"},
-	[H_INTEGRATOR] = {"hslt:integrator", STRING, false, "path, bdpt, pssmlt, ..."},
+	[H_INTEGRATOR] = {"hslt:integrator", STRING, false, "path, bdpt, pssmlt, hslt, ..."},
+	[H_MIXTURE] = {"hslt:mixture", STRING, false, "strategies that propose mutations, with their shares (Metropolis with several)"},
 	[H_OPTIONS] = {"hslt:options", STRING, false, "options of hslt-render and hslt-submit that make the same bits again"},
 	[H_SEED] = {"hslt:seed", STRING, false, "seed of all random numbers"},
 	[H_MIN_DEPTH] = {"hslt:minDepth", INT, false, "shortest paths, in edges"},
@@ -131,9 +132,11 @@ static void add_count(struct header *h, enum header_name name, uint64_t value)
 
 static void add_plan(struct header *h, const struct plan *p, uint64_t rounds)
 {
-	char options[512];
+	char options[768];
 	plan_options(p, rounds, options, sizeof options);
 	add_string(h, H_INTEGRATOR, p->integrator);
+	if (*p->mutations)
+		add_string(h, H_MIXTURE, p->mutations);
 	add_string(h, H_OPTIONS, options);
 	add_count(h, H_SEED, p->seed);
 	add_int(h, H_MIN_DEPTH, p->min_depth);
@@ -152,20 +155,20 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 		add_double(h, H_B, img->b);
 		add_double(h, H_B_ERROR, img->b_error);
 		add_double(h, H_BEYOND, img->beyond_share);
-		add_count(h, H_ACCEPTED, img->counters[COUNT_ACCEPTED]);
-		add_count(h, H_INDEPENDENT, img->counters[COUNT_INDEPENDENT]);
-		add_count(h, H_STUCK, img->counters[COUNT_STUCK]);
-		add_count(h, H_LONGEST_STUCK, img->counters[COUNT_LONGEST_STUCK]);
+		add_count(h, H_ACCEPTED, img->counts.counters[COUNT_ACCEPTED]);
+		add_count(h, H_INDEPENDENT, img->counts.counters[COUNT_INDEPENDENT]);
+		add_count(h, H_STUCK, img->counts.counters[COUNT_STUCK]);
+		add_count(h, H_LONGEST_STUCK, img->counts.counters[COUNT_LONGEST_STUCK]);
 	} else {
 		add_count(h, H_SAMPLES, img->rounds * p->groups * p->epoch);
 	}
 	add_double(h, H_REL_MSE, img->rel_mse);
 	add_double(h, H_REL_MSE_UPPER, img->rel_mse_upper);
-	add_count(h, H_NAN, img->counters[COUNT_NAN]);
-	add_count(h, H_INFINITE, img->counters[COUNT_INFINITE]);
-	add_count(h, H_NEGATIVE, img->counters[COUNT_NEGATIVE]);
-	add_count(h, H_RAYS_CLOSEST, img->counters[COUNT_RAYS_CLOSEST]);
-	add_count(h, H_RAYS_SHADOW, img->counters[COUNT_RAYS_SHADOW]);
+	add_count(h, H_NAN, img->counts.counters[COUNT_NAN]);
+	add_count(h, H_INFINITE, img->counts.counters[COUNT_INFINITE]);
+	add_count(h, H_NEGATIVE, img->counts.counters[COUNT_NEGATIVE]);
+	add_count(h, H_RAYS_CLOSEST, img->counts.counters[COUNT_RAYS_CLOSEST]);
+	add_count(h, H_RAYS_SHADOW, img->counts.counters[COUNT_RAYS_SHADOW]);
 }
 
 static void add_extra(struct header *h, const struct header_extra *x)

@@ -211,6 +211,7 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 		.max_depth = r->max_depth,
 	};
 	memcpy(p->integrator, r->integrator, sizeof p->integrator);
+	memcpy(p->mutations, r->mixture, strnlen(r->mixture, sizeof p->mutations));
 	if (r->crop_width == 0) {
 		p->crop_x = p->crop_y = 0;
 		p->crop_width = r->width;
@@ -240,6 +241,29 @@ static int check_integrator(const struct plan *p, struct error *e)
 		return error_set(e, EINVAL, "the integrator's name is empty or too long");
 	if (strspn(p->integrator, "abcdefghijklmnopqrstuvwxyz0123456789_-") != n)
 		return error_set(e, EINVAL, "the integrator's name has characters that no integrator's name has");
+	return 0;
+}
+
+/* Equal plans are equal bytes: what stands behind a text is 0. */
+static bool is_zero(const char *bytes, size_t n)
+{
+	while (n > 0 && bytes[n - 1] == 0)
+		n--;
+	return n == 0;
+}
+
+static int check_mutations(const struct plan *p, struct error *e)
+{
+	int n = plan_strategy_count(p->mutations);
+	if (n < 0)
+		return error_set(e, EINVAL,
+				 "the mixture of mutations is not a list of up to %d names with weights in %d characters",
+				 PLAN_MAX_STRATEGIES, PLAN_MUTATIONS_MAX - 1);
+	size_t length = strlen(p->mutations);
+	if (!is_zero(p->mutations + length, sizeof p->mutations - length))
+		return error_set(e, EINVAL, "the mixture of mutations does not end with its text");
+	if (n > 0 && p->kind != PLAN_CHAINS)
+		return error_set(e, EINVAL, "a plan without chains has a mixture of mutations");
 	return 0;
 }
 
@@ -291,6 +315,8 @@ static int check_end(const struct plan *p, struct error *e)
 int plan_check(const struct plan *p, struct error *e)
 {
 	int rc = check_integrator(p, e);
+	if (rc == 0)
+		rc = check_mutations(p, e);
 	if (rc == 0)
 		rc = check_film(p, e);
 	if (rc == 0)

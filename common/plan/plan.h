@@ -29,6 +29,8 @@ enum {
 	PLAN_MAX_CHAINS = 1 << 20,
 	PLAN_MAX_BOOTSTRAP = 1 << 26,
 	PLAN_MAX_DEPTH = 128,      /* edges */
+	PLAN_MUTATIONS_MAX = 160,  /* bytes of the mixture's text, the last a 0 */
+	PLAN_MAX_STRATEGIES = 8,   /* entries of the mixture */
 };
 
 struct plan_request {
@@ -45,6 +47,7 @@ struct plan_request {
 	uint32_t min_depth, max_depth; /* edges */
 	uint32_t chains, groups;       /* 0: by the rule */
 	uint64_t bootstrap, epoch;     /* 0: by the rule; epoch: mutations per chain or samples per pixel and group */
+	char mixture[PLAN_MUTATIONS_MAX]; /* see mutations below; the count of them has the word here */
 };
 
 struct plan {
@@ -59,6 +62,9 @@ struct plan {
 	uint64_t rounds;        /* after which the job ends; UINT64_MAX: only time or error end it */
 	double seconds, target_error;
 	uint32_t min_depth, max_depth;
+	/* The mixture of strategies that chains draw their proposals from, as the renderer spells it: one entry each, with
+	 * commas between, "independent=0.1,hslt=0.9". Empty: the integrator has none. Bytes behind the text are 0. */
+	char mutations[PLAN_MUTATIONS_MAX];
 };
 
 /* Checks the request (sizes, crop, counts) and fills in what it leaves open. -EINVAL with a sentence. */
@@ -83,6 +89,12 @@ struct plan_range plan_chain_range(const struct plan *p, uint32_t part);
 struct plan_range plan_row_range(const struct plan *p, uint32_t part);
 uint64_t plan_round_mutations(const struct plan *p); /* samples or mutations in one round, all groups */
 uint64_t plan_extended_pixels(const struct plan *p); /* (crop + 2 border) in each direction */
+
+/* Entries of a mixture's text; 0: it is empty, -1: it is none (an empty entry, too many, a character that none has, or no
+ * end within PLAN_MUTATIONS_MAX bytes). */
+int plan_strategy_count(const char *mixture);
+/* The i-th entry without its weight ("hslt", "hslt@b2c0"), cut to the size. */
+void plan_strategy_name(const char *mixture, uint32_t i, char *name, size_t size);
 
 /* Systematic resampling of a group's seeds over its bootstrap weights, in index order (contract section 2).
  * weight[i] >= 0 and finite, i in the group's range; writes `count` bootstrap indices. false: all weights are 0. */

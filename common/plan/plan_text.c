@@ -22,6 +22,34 @@ __attribute__((format(printf, 2, 3))) static void put(struct text *t, const char
 	t->left -= used;
 }
 
+int plan_strategy_count(const char *mixture)
+{
+	size_t length = strnlen(mixture, PLAN_MUTATIONS_MAX);
+	/* Nothing that a shell would take for its own: plan_options() prints it. */
+	if (length == PLAN_MUTATIONS_MAX ||
+	    strspn(mixture, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789@=,.:+-_") != length)
+		return -1;
+	int count = length > 0;
+	for (size_t i = 0; i < length; i++) {
+		bool begins = i == 0 || mixture[i - 1] == ',';
+		if (begins && strspn(mixture + i, "abcdefghijklmnopqrstuvwxyz") == 0)
+			return -1;
+		count += mixture[i] == ',';
+	}
+	if ((length > 0 && mixture[length - 1] == ',') || count > PLAN_MAX_STRATEGIES)
+		return -1;
+	return count;
+}
+
+void plan_strategy_name(const char *mixture, uint32_t i, char *name, size_t size)
+{
+	for (; i > 0 && *mixture; i--) {
+		mixture += strcspn(mixture, ",");
+		mixture += *mixture == ',';
+	}
+	snprintf(name, size, "%.*s", (int)strcspn(mixture, "=,"), mixture);
+}
+
 void plan_describe(const struct plan *p, char *text, size_t size)
 {
 	struct text t = {text, size};
@@ -32,6 +60,8 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 	else
 		put(&t, "%s: %u groups, %llu samples a pixel, group and round in %u leases, grid from %llu samples",
 		    p->integrator, p->groups, epoch, p->groups * p->parts, bootstrap);
+	if (*p->mutations)
+		put(&t, ", mutations %s", p->mutations);
 	put(&t, "; ");
 	const char *or = "";
 	if (p->rounds != UINT64_MAX) {
@@ -82,6 +112,8 @@ void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size
 	put(&t, "--integrator %s --size %ux%u --crop %u,%u,%u,%u --seed %llu --min-depth %u --max-depth %u --groups %u",
 	    p->integrator, p->width, p->height, p->crop_x, p->crop_y, p->crop_width, p->crop_height,
 	    (unsigned long long)p->seed, p->min_depth, p->max_depth, p->groups);
+	if (*p->mutations)
+		put(&t, " --mutations %s", p->mutations);
 	if (p->kind == PLAN_CHAINS)
 		put(&t, " --chains %u --bootstrap %llu --epoch %llu --mutations %llu", p->chains,
 		    (unsigned long long)p->bootstrap, (unsigned long long)p->epoch,

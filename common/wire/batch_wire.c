@@ -105,8 +105,9 @@ static void write_payload(unsigned char *at, const struct batch *b, const struct
 int batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size, struct error *e)
 {
 	struct packing k;
-	uint64_t counters[BATCH_COUNTERS];
+	uint64_t counters[BATCH_COUNTERS], strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
 	memcpy(counters, b->counters, sizeof counters);
+	memcpy(strategy, b->strategy, sizeof strategy);
 	int rc = packing_init(&k, b, p, e);
 	if (!rc) {
 		Farm__LeaseKey key;
@@ -118,6 +119,8 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 		m.key = &key;
 		m.n_counters = BATCH_COUNTERS;
 		m.counters = counters;
+		m.n_strategies = (size_t)b->strategy_count * STRATEGY_COUNTERS;
+		m.strategies = strategy[0];
 		m.independent_sum = b->independent_sum;
 		m.independent_square = b->independent_square;
 		m.beyond_sum = b->beyond_sum;
@@ -215,11 +218,16 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 	int rc = lease_key_from_wire(m->key, &b->key, e);
 	if (!rc && m->n_counters != BATCH_COUNTERS)
 		rc = error_set(e, EBADMSG, "a batch with %zu counters", m->n_counters);
+	if (!rc && (m->n_strategies % STRATEGY_COUNTERS || m->n_strategies > BATCH_STRATEGIES * STRATEGY_COUNTERS))
+		rc = error_set(e, EBADMSG, "a batch with %zu counters of strategies", m->n_strategies);
 	/* As many as the plan allows, before memory is asked for. */
 	if (!rc && m->n_state_sizes > chains_per_lease(p))
 		rc = error_set(e, EBADMSG, "a batch with %zu chain states", m->n_state_sizes);
 	if (!rc) {
 		memcpy(b->counters, m->counters, sizeof b->counters);
+		b->strategy_count = (uint32_t)(m->n_strategies / STRATEGY_COUNTERS);
+		if (m->n_strategies)
+			memcpy(b->strategy, m->strategies, m->n_strategies * sizeof *m->strategies);
 		b->independent_sum = m->independent_sum;
 		b->independent_square = m->independent_square;
 		b->beyond_sum = m->beyond_sum;

@@ -13,7 +13,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 1 };
+enum { FARM_VERSION = 2 };
 
 struct envelope_block;
 

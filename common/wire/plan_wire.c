@@ -34,6 +34,7 @@ void plan_to_wire(const struct plan *p, Farm__Plan *out)
 	out->target_error = p->target_error;
 	out->min_depth = p->min_depth;
 	out->max_depth = p->max_depth;
+	out->mutations = borrow(p->mutations);
 }
 
 static int kind_from_wire(uint32_t kind, const char *name, enum plan_kind *out, char integrator[16], struct error *e)
@@ -48,12 +49,23 @@ static int kind_from_wire(uint32_t kind, const char *name, enum plan_kind *out, 
 	return 0;
 }
 
+static int mixture_from_wire(const char *text, char mixture[PLAN_MUTATIONS_MAX], struct error *e)
+{
+	if (strlen(text) >= PLAN_MUTATIONS_MAX || plan_strategy_count(text) < 0)
+		return error_set(e, EBADMSG, "a plan whose mixture of mutations is none");
+	memset(mixture, 0, PLAN_MUTATIONS_MAX);
+	memcpy(mixture, text, strlen(text));
+	return 0;
+}
+
 int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e)
 {
 	memset(p, 0, sizeof *p);
 	int rc = m ? 0 : error_set(e, EBADMSG, "no plan");
 	if (!rc)
 		rc = kind_from_wire(m->kind, m->integrator, &p->kind, p->integrator, e);
+	if (!rc)
+		rc = mixture_from_wire(m->mutations, p->mutations, e);
 	if (rc)
 		return rc;
 	p->width = m->width;
@@ -100,6 +112,7 @@ void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out)
 	out->groups = r->groups;
 	out->bootstrap = r->bootstrap;
 	out->epoch = r->epoch;
+	out->mixture = borrow(r->mixture);
 }
 
 int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, struct error *e)
@@ -108,6 +121,8 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 	int rc = m ? 0 : error_set(e, EBADMSG, "no plan request");
 	if (!rc)
 		rc = kind_from_wire(m->kind, m->integrator, &r->kind, r->integrator, e);
+	if (!rc)
+		rc = mixture_from_wire(m->mixture, r->mixture, e);
 	if (rc)
 		return rc;
 	r->width = m->width;

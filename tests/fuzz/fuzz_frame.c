@@ -34,7 +34,8 @@ static void take_message(const struct frame_reader *r)
 		grant_fini(&grant);
 	if (m->body_case == FARM__ENVELOPE__BODY_LEASE_RESULT) {
 		struct plan_request small = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 70, .height = 70, .spp = 1,
-					     .max_depth = 4, .chains = 16, .groups = 4, .bootstrap = 64, .epoch = 4};
+					     .max_depth = 4, .chains = 16, .groups = 4, .bootstrap = 64, .epoch = 4,
+					     .mixture = "independent=0.1,hslt=0.9"};
 		if (!plan_make(&small, &plan, &e) &&
 		    !batch_unpack(&batch, &plan, m->lease_result, r->payload.bytes, r->payload.size, &e))
 			batch_fini(&batch);

@@ -217,7 +217,7 @@ static int write_stats(const struct session *s, struct error *e)
 	json_t *counters = json_object(), *effects = json_array();
 	for (int i = 0; i < BATCH_COUNTERS; i++)
 		if (counter_names[i])
-			json_object_set_new(counters, counter_names[i], json_integer((json_int_t)s->image.counters[i]));
+			json_object_set_new(counters, counter_names[i], json_integer((json_int_t)s->image.counts.counters[i]));
 	for (size_t i = 0; i < s->summary.line_count; i++)
 		json_array_append_new(effects, json_pack("{s:s s:b s:s}", "name", s->summary.lines[i].name, "on",
 							 s->summary.lines[i].on, "why", s->summary.lines[i].why));
@@ -251,12 +251,12 @@ static void say(const struct session *s)
 		fprintf(stderr, "the image is black: no sample found light\n");
 	if (i->beyond_share > 0.001)
 		fprintf(stderr, "%.2f %% of the energy lies in paths longer than %s can hold\n", 100 * i->beyond_share, p->integrator);
-	uint64_t bad = i->counters[COUNT_NAN] + i->counters[COUNT_INFINITE] + i->counters[COUNT_NEGATIVE];
+	uint64_t bad = i->counts.counters[COUNT_NAN] + i->counts.counters[COUNT_INFINITE] + i->counts.counters[COUNT_NEGATIVE];
 	if (bad)
 		fprintf(stderr, "%llu contributions were not numbers, infinite or negative, and left out\n", (unsigned long long)bad);
-	if (i->counters[COUNT_STUCK])
+	if (i->counts.counters[COUNT_STUCK])
 		fprintf(stderr, "%llu times a chain accepted nothing during a whole epoch (longest run: %llu rejections)\n",
-			(unsigned long long)i->counters[COUNT_STUCK], (unsigned long long)i->counters[COUNT_LONGEST_STUCK]);
+			(unsigned long long)i->counts.counters[COUNT_STUCK], (unsigned long long)i->counts.counters[COUNT_LONGEST_STUCK]);
 }
 
 static int run(struct session *s, struct error *e)

@@ -225,7 +225,7 @@ static void only_complete_rounds_are_published(void **unused)
 	assert_int_equal(canvas_rounds(c), 0);
 	assert_int_equal(canvas_merged(c), 7);
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
-	assert_true(img.black && img.counters[COUNT_NAN] == 0 && isnan(img.rel_mse));
+	assert_true(img.black && img.counts.counters[COUNT_NAN] == 0 && isnan(img.rel_mse));
 	canvas_image_fini(&img);
 	assert_int_equal(canvas_image(c, true, &img, NULL), 0);
 	assert_false(img.black);
@@ -241,7 +241,7 @@ static void only_complete_rounds_are_published(void **unused)
 	batch_fini(&b);
 	assert_int_equal(canvas_rounds(c), 2);
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
-	assert_int_equal(img.counters[COUNT_NAN], 7);
+	assert_int_equal(img.counts.counters[COUNT_NAN], 7);
 	/* Sums of 1 from two parts, 4 samples a pixel and round: XYZ = 0.5, whose Y is 0.5. */
 	double y = 0.2126729 * (double)img.rgb[0] + 0.7151522 * (double)img.rgb[1] + 0.0721750 * (double)img.rgb[2];
 	assert_true(fabs(y - 0.5) < 1e-6);

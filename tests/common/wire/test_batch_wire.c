@@ -26,7 +26,8 @@ static struct plan chain_plan(void)
 				 .chains = 64,
 				 .groups = 8,
 				 .bootstrap = 1024,
-				 .epoch = 100};
+				 .epoch = 100,
+				 .mixture = "independent=0.1,hslt=0.9"};
 	struct plan p;
 	struct error e;
 	assert_int_equal(plan_make(&r, &p, &e), 0);
@@ -49,6 +50,11 @@ static struct batch chain_batch(const struct plan *p)
 	b.counters[COUNT_SAMPLES] = chains * p->epoch;
 	b.counters[COUNT_INDEPENDENT] = 3;
 	b.counters[COUNT_LONGEST_STUCK] = 77;
+	b.strategy_count = 2;
+	for (uint64_t i = 0; i < STRATEGY_COUNTERS; i++) {
+		b.strategy[0][i] = 30 - i;
+		b.strategy[1][i] = i < STRATEGY_FAIL_FIRST && i > STRATEGY_ACCEPTED ? UINT64_C(1) << (50 + i) : 40 - i;
+	}
 	b.tile_count = 2;
 	b.tiles = mem_alloc(2, sizeof *b.tiles);
 	fill_tile(&b.tiles[0], 10 + 64, 20, 36, 64);
@@ -93,6 +99,8 @@ static void a_batch_travels(void **state)
 	assert_int_equal(rc, 0);
 	assert_memory_equal(&back.key, &b.key, sizeof b.key);
 	assert_memory_equal(back.counters, b.counters, sizeof b.counters);
+	assert_int_equal(back.strategy_count, 2);
+	assert_memory_equal(back.strategy, b.strategy, sizeof b.strategy);
 	assert_true(back.independent_sum == b.independent_sum && back.independent_square == b.independent_square);
 	assert_int_equal(back.tile_count, 2);
 	for (uint32_t i = 0; i < 2; i++) {
@@ -112,6 +120,41 @@ static void a_batch_travels(void **state)
 		assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, n, &e), -EBADMSG);
 	env.message->lease_result->state_sizes[0] = UINT32_MAX;
 	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	envelope_fini(&env);
+	frame_reader_fini(&r);
+	batch_fini(&b);
+}
+
+static void strategies_are_the_plans(void **state)
+{
+	(void)state;
+	struct plan p = chain_plan();
+	struct batch b = chain_batch(&p), back;
+	struct envelope env;
+	struct frame_reader r;
+	struct error e;
+	travel(&b, &p, &env, &r);
+	Farm__LeaseResult *m = env.message->lease_result;
+	assert_int_equal(m->n_strategies, 2 * STRATEGY_COUNTERS);
+	static const struct {
+		size_t count;
+		int rc;
+	} cases[] = {{0, 0}, {1, -EBADMSG}, {STRATEGY_COUNTERS, -EBADMSG}, {2 * STRATEGY_COUNTERS - 1, -EBADMSG}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		m->n_strategies = cases[i].count;
+		assert_int_equal(batch_unpack(&back, &p, m, r.payload.bytes, r.payload.size, &e), cases[i].rc);
+		if (!cases[i].rc)
+			assert_int_equal(back.strategy_count, 0);
+		batch_fini(&back);
+	}
+	uint64_t many[(BATCH_STRATEGIES + 1) * STRATEGY_COUNTERS] = {0}, *own = m->strategies;
+	for (size_t n = 3; n <= BATCH_STRATEGIES + 1; n++) {
+		m->strategies = many;
+		m->n_strategies = n * STRATEGY_COUNTERS;
+		assert_int_equal(batch_unpack(&back, &p, m, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	}
+	m->strategies = own;
+	m->n_strategies = 2 * STRATEGY_COUNTERS;
 	envelope_fini(&env);
 	frame_reader_fini(&r);
 	batch_fini(&b);
@@ -226,6 +269,25 @@ static void plans_travel(void **state)
 	plan_to_wire(&p, &m);
 	m.integrator = name;
 	assert_int_equal(plan_from_wire(&m, &back, &e), -EBADMSG);
+	char longest[PLAN_MUTATIONS_MAX + 1] = "", control[] = "a\n";
+	memset(longest, 'a', PLAN_MUTATIONS_MAX);
+	char *mixtures[] = {longest, control};
+	struct plan_request request = {.integrator = "hslt", .kind = PLAN_CHAINS, .mixture = "hslt=1"}, again;
+	Farm__PlanRequest rm;
+	plan_request_to_wire(&request, &rm);
+	assert_int_equal(plan_request_from_wire(&rm, &again, &e), 0);
+	assert_memory_equal(&request, &again, sizeof request);
+	for (int i = 0; i < 2; i++) {
+		plan_to_wire(&p, &m);
+		m.mutations = mixtures[i];
+		assert_int_equal(plan_from_wire(&m, &back, &e), -EBADMSG);
+		rm.mixture = mixtures[i];
+		assert_int_equal(plan_request_from_wire(&rm, &again, &e), -EBADMSG);
+	}
+	longest[PLAN_MUTATIONS_MAX - 1] = 0;
+	plan_to_wire(&p, &m);
+	m.mutations = longest;
+	assert_int_equal(plan_from_wire(&m, &back, &e), 0);
 }
 
 int main(void)
@@ -233,7 +295,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_batch_travels), cmocka_unit_test(memory_may_end_anywhere),
 		cmocka_unit_test(weights_travel),  cmocka_unit_test(grants_travel),
-		cmocka_unit_test(plans_travel),
+		cmocka_unit_test(plans_travel),    cmocka_unit_test(strategies_are_the_plans),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

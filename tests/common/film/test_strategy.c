@@ -1,0 +1,176 @@
+/* Counters of strategies: exact sums over rounds, what a batch may say, and the table that people see. */
+#include "common/film/strategy.h"
+
+#include "common/base/mem.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <cmocka.h>
+
+static struct plan make_plan(void)
+{
+	struct plan_request r = {.integrator = "hslt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .max_depth = 4, .chains = 4,
+				 .groups = 2, .bootstrap = 16, .epoch = 1000, .mutations = 8000,
+				 .mixture = "independent=0.1,hslt=0.9"};
+	struct plan p;
+	struct error e;
+	assert_int_equal(plan_make(&r, &p, &e), 0);
+	assert_true(p.parts == 2 && p.rounds == 2);
+	return p;
+}
+
+/* A lease of one chain without tiles. */
+static struct batch make_batch(uint64_t epoch, uint32_t group, uint32_t part)
+{
+	struct batch b = {.key = {1, LEASE_RENDER, group, part, epoch}, .strategy_count = 2, .state_count = 1};
+	b.states = mem_alloc(1, sizeof *b.states);
+	b.states[0] = (struct chain_state){mem_alloc(4, 1), 4};
+	b.counters[COUNT_SAMPLES] = 1000;
+	b.counters[COUNT_STUCK] = group == 1;
+	b.counters[COUNT_LONGEST_STUCK] = 5210 + group;
+	b.strategy[0][STRATEGY_PROPOSED] = 100;
+	b.strategy[0][STRATEGY_ACCEPTED] = 7;
+	b.strategy[0][STRATEGY_FAIL_DARK] = 91;
+	b.strategy[1][STRATEGY_PROPOSED] = 900;
+	b.strategy[1][STRATEGY_ACCEPTED] = 450 + 10 * group + part;
+	b.strategy[1][STRATEGY_RAYS] = UINT64_C(1) << 50;
+	b.strategy[1][STRATEGY_WALKS] = 800;
+	b.strategy[1][STRATEGY_ITERATIONS] = 2400;
+	b.strategy[1][STRATEGY_REVERSE_WALKS] = 500;
+	b.strategy[1][STRATEGY_FAIL_OUTSIDE] = 90;
+	b.strategy[1][STRATEGY_FAIL_INAPPLICABLE] = 9;
+	return b;
+}
+
+static void sums_are_of_each_batch_once(void **state)
+{
+	(void)state;
+	struct plan p = make_plan();
+	struct canvas *c;
+	struct canvas_counts n;
+	struct canvas_image img;
+	assert_int_equal(canvas_new(&c, &p, -30, NULL, NULL), 0);
+	for (uint64_t epoch = 0; epoch < 2; epoch++)
+		for (uint32_t i = 0; i < 4 - epoch; i++) { /* the second round stays open */
+			struct batch b = make_batch(epoch, i / 2, i % 2);
+			struct error e;
+			assert_int_equal(batch_check(&b, &p, &e), 0);
+			assert_int_equal(canvas_add(c, &b, NULL), 0);
+			assert_int_equal(canvas_add(c, &b, NULL), -EEXIST);
+			batch_fini(&b);
+		}
+	canvas_counts(c, false, &n);
+	assert_int_equal(n.strategy[0][STRATEGY_PROPOSED], 400);
+	assert_int_equal(n.strategy[1][STRATEGY_ACCEPTED], 4 * 450 + 22);
+	assert_true(n.strategy[1][STRATEGY_RAYS] == UINT64_C(1) << 52);
+	assert_int_equal(n.strategy[2][STRATEGY_PROPOSED], 0);
+	assert_int_equal(n.counters[COUNT_STUCK], 2);
+	assert_int_equal(n.counters[COUNT_LONGEST_STUCK], 5211);
+	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_memory_equal(&img.counts, &n, sizeof n);
+	canvas_image_fini(&img);
+	canvas_counts(c, true, &n);
+	assert_int_equal(n.strategy[0][STRATEGY_FAIL_DARK], 7 * 91);
+	assert_int_equal(n.strategy[1][STRATEGY_ACCEPTED], 7 * 450 + 22 + 11);
+	assert_int_equal(n.counters[COUNT_LONGEST_STUCK], 5211);
+	canvas_free(c);
+}
+
+static void expect(const struct plan *p, struct batch *b, int rc)
+{
+	struct error e = {""};
+	assert_int_equal(batch_check(b, p, &e), rc);
+	batch_fini(b);
+}
+
+static void a_batch_counts_within_bounds(void **state)
+{
+	(void)state;
+	struct plan p = make_plan(), without = p;
+	struct batch b = make_batch(0, 0, 0);
+	memset(without.mutations, 0, sizeof without.mutations);
+	expect(&without, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy_count = 0;
+	expect(&p, &b, 0);
+	b = make_batch(0, 0, 0);
+	b.strategy_count = 1;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy_count = UINT32_MAX;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy[1][STRATEGY_PROPOSED]++;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy[0][STRATEGY_ACCEPTED] = 101;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy[0][STRATEGY_FAIL_INAPPLICABLE] = 101;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy[1][STRATEGY_RAYS] = UINT64_C(1) << 56;
+	expect(&p, &b, -EBADMSG);
+}
+
+static void tables_are_readable(void **state)
+{
+	(void)state;
+	struct plan p = make_plan();
+	struct canvas_counts n = {{0}, {{0}}};
+	char text[STRATEGY_TABLE], small[40];
+	struct batch b = make_batch(0, 1, 0);
+	strategy_table(p.mutations, &n, text, sizeof text);
+	assert_string_equal(text, "");
+	strategy_stuck(&p, 2, &n, text, sizeof text);
+	assert_string_equal(text, "");
+	memcpy(n.strategy, b.strategy, sizeof n.strategy);
+	memcpy(n.counters, b.counters, sizeof n.counters);
+	n.strategy[1][STRATEGY_RAYS] = 1800;
+	n.strategy[0][STRATEGY_PROPOSED] = 1234567;
+	strategy_table(p.mutations, &n, text, sizeof text);
+	static const char expected[] =
+		"strategy                      proposals accepted% rays/prop          walks iter/walk  reverse walks  failed%"
+		"  failures in % of proposals\n"
+		"independent                   1,234,567      0.00      0.00              0         -              0     0.01"
+		"  dark 0.00737\n"
+		"hslt                                900     51.11      2.00            800      3.00            500    11.00"
+		"  outside 10 inapplicable 1\n";
+	assert_string_equal(text, expected);
+	strategy_stuck(&p, 2, &n, text, sizeof text);
+	assert_string_equal(text, "1 of 8 epochs of chains (4 chains, 2 rounds) passed without an accepted mutation; longest run: "
+				  "5,211 rejections");
+	strategy_table(p.mutations, &n, small, sizeof small); /* cut, and ended */
+	assert_int_equal(strlen(small), sizeof small - 1);
+	/* The widest that there can be. */
+	memset(n.strategy, 0xff, sizeof n.strategy);
+	strategy_table("aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa,b,c,d,e,f,g,h", &n, text, sizeof text);
+	assert_true(strlen(text) < sizeof text - 1 && text[strlen(text) - 1] == '\n');
+	batch_fini(&b);
+}
+
+static void counters_have_names(void **state)
+{
+	(void)state;
+	for (int i = 0; i < STRATEGY_COUNTERS; i++) {
+		assert_true(*strategy_counter_name((enum strategy_counter)i) != 0);
+		for (int k = 0; k < i; k++)
+			assert_string_not_equal(strategy_counter_name((enum strategy_counter)i),
+						strategy_counter_name((enum strategy_counter)k));
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(sums_are_of_each_batch_once),
+		cmocka_unit_test(a_batch_counts_within_bounds),
+		cmocka_unit_test(tables_are_readable),
+		cmocka_unit_test(counters_have_names),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
