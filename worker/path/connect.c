@@ -5,7 +5,7 @@
 /* Beyond this a weight is zero in double anyway; infinities would breed NaN. */
 #define RATIO_LIMIT 1e200
 
-static double emitter_pdf_point(const struct path_context *c, const struct path_vertex *v)
+double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v)
 {
 	const struct emitter *em = &c->w->emitters[v->emitter];
 	struct emitter_point p = world_emitter_point(&v->x);
@@ -13,12 +13,17 @@ static double emitter_pdf_point(const struct path_context *c, const struct path_
 	return c->w->emitter_pdf[v->emitter] * em->ops->pdf_point(em, &p);
 }
 
-static double emitter_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref)
+double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref)
 {
 	const struct emitter *em = &c->w->emitters[v->emitter];
 	struct emitter_point p = world_emitter_point(&v->x);
 	p.infinite = v->kind == VERTEX_INFINITE;
 	return c->w->emitter_pdf[v->emitter] * em->ops->pdf_toward(em, ref, &p);
+}
+
+bool path_can_be_hit(const struct path_context *c, const struct path_vertex *v)
+{
+	return v->kind != VERTEX_INFINITE || v->emitter == c->w->environment;
 }
 
 /* The ends that a technique joins scatter there by connection: their sub-path's delta flag says nothing. */
@@ -41,7 +46,7 @@ static double light_pdf(const struct path_context *c, const struct joined_path *
 {
 	unsigned s = p->s;
 	if (i == 0)
-		return emitter_pdf_point(c, p->v[0]);
+		return path_pdf_emitter(c, p->v[0]);
 	if (i >= s + 2)
 		return p->v[i]->pdf_rev;
 	const struct path_vertex *prev = i >= 2 ? p->v[i - 2] : NULL;
@@ -66,8 +71,8 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 	/* Technique 1 draws x_0 as seen from x_1, the longer ones as light sub-paths do. */
 	double toward = 1, point = 1;
 	if (k >= 2 && (s <= 1 || technique_exists(p, 1))) {
-		toward = emitter_pdf_toward(c, p->v[0], p->v[1]->x.p);
-		point = s >= 1 ? p->v[0]->pdf : emitter_pdf_point(c, p->v[0]);
+		toward = path_pdf_toward(c, p->v[0], p->v[1]->x.p);
+		point = s >= 1 ? p->v[0]->pdf : path_pdf_emitter(c, p->v[0]);
 	}
 	double first = s == 1 ? point / toward : 1, r = first;
 	for (unsigned j = s; j < last && r > 0 && r < RATIO_LIMIT; j++) {
@@ -108,20 +113,12 @@ static void join(const struct path_context *c, const struct path_vertex *light, 
 		p->v[p->edges - i] = &c->camera[i];
 }
 
-static spectrum emitted(const struct path_context *c, const struct path_vertex *v, vec3 w)
-{
-	const struct emitter *em = &c->w->emitters[v->emitter];
-	struct emitter_point p = world_emitter_point(&v->x);
-	p.infinite = v->kind == VERTEX_INFINITE;
-	return em->ops->radiance(em, &p, w, &c->wl);
-}
-
 static struct ray_end end_of(const struct path_vertex *v)
 {
 	return (struct ray_end){v->x.p, v->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : v->x.ng, v->x.prim};
 }
 
-static bool visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
+bool path_visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
 {
 	c->counters[COUNT_RAYS_SHADOW]++;
 	struct ray_end from = end_of(a);
@@ -144,12 +141,11 @@ static spectrum hit_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	const struct path_vertex *z = &c->camera[t - 1];
 	if (z->emitter < 0)
 		return spectrum_of(0);
-	spectrum l = spectrum_mul(z->beta, emitted(c, z, z->to_prev));
+	spectrum l = spectrum_mul(z->beta, path_emitted(c, z, z->to_prev, &c->wl));
 	return spectrum_is_zero(l) ? l : weighted(c, NULL, 0, t, max_s, l);
 }
 
-/* A fresh point on an emitter, drawn as seen from z with z's own numbers. */
-static bool next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf)
+bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf)
 {
 	const struct world *w = c->w;
 	int32_t chosen = world_pick_emitter(w, z->next_event[2]);
@@ -177,17 +173,17 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 	const struct path_vertex *z = &c->camera[t - 1];
 	struct path_vertex y;
 	double pdf, distance2;
-	if (!z->bsdf->has_smooth || !next_event(c, z, &y, &pdf))
+	if (!z->bsdf->has_smooth || !path_next_event(c, z, &y, &pdf))
 		return spectrum_of(0);
 	vec3 to_light = path_direction(z, &y, &distance2);
 	if (!(distance2 > 0))
 		return spectrum_of(0);
 	spectrum f = path_scatter(c, z, z->to_prev, to_light);
-	spectrum l = spectrum_mul(spectrum_mul(z->beta, f), emitted(c, &y, vec3_neg(to_light)));
+	spectrum l = spectrum_mul(spectrum_mul(z->beta, f), path_emitted(c, &y, vec3_neg(to_light), &c->wl));
 	double g = y.kind == VERTEX_INFINITE ? fabs(vec3_dot(z->x.ng, to_light)) :
 					       geometry_term(z->x.ng, y.x.ng, to_light, distance2);
 	l = spectrum_scale(g / pdf, l);
-	if (spectrum_is_zero(l) || !visible(c, z, &y))
+	if (spectrum_is_zero(l) || !path_visible(c, z, &y))
 		return spectrum_of(0);
 	return weighted(c, &y, 1, t, max_s, l);
 }
@@ -204,7 +200,7 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 		return spectrum_of(0);
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
 	l = spectrum_scale(camera_jac_film_from_solid(&c->w->camera, d) * jac_solid_from_area(y->x.ng, d, distance2), l);
-	if (spectrum_is_zero(l) || !visible(c, y, eye))
+	if (spectrum_is_zero(l) || !path_visible(c, y, eye))
 		return spectrum_of(0);
 	film[0] = x[0];
 	film[1] = x[1];
@@ -221,7 +217,7 @@ static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, un
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(to_light), y->to_prev));
 	l = spectrum_mul(l, spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, to_light)));
 	l = spectrum_scale(geometry_term(z->x.ng, y->x.ng, to_light, distance2), l);
-	if (spectrum_is_zero(l) || !visible(c, z, y))
+	if (spectrum_is_zero(l) || !path_visible(c, z, y))
 		return spectrum_of(0);
 	return weighted(c, c->light, s, t, max_s, l);
 }

@@ -21,6 +21,16 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 /* Weight of the balance heuristic: 1 / sum of the ratios. */
 double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s);
 
+/* Density of an emitter's point (and of the choice of the emitter): as light sub-paths draw it, and as drawn towards ref. */
+double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v);
+double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref);
+/* A ray can end at this point of an emitter. */
+bool path_can_be_hit(const struct path_context *c, const struct path_vertex *v);
+/* A fresh point on an emitter, drawn as seen from z with z's own numbers. */
+bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf);
+/* Nothing lies between a (not at infinity) and b. Counts a ray. */
+bool path_visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b);
+
 /* Contribution f / p of joining the first s vertices of c->light with the first t of c->camera, already weighted among the
  * techniques up to max_s. s <= 1 needs no light sub-path. film: where it lands when t = 1 (else unchanged). */
 spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned max_s, double film[2]);

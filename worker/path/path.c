@@ -23,6 +23,19 @@ vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, do
 	return *distance2 > 0 ? vec3_scale(1 / sqrt(*distance2), d) : (vec3){0, 0, 0};
 }
 
+double path_cosine(const struct path_vertex *v, vec3 w)
+{
+	return v->kind == VERTEX_CAMERA || v->kind == VERTEX_INFINITE ? 1 : fabs(vec3_dot(v->x.ng, w));
+}
+
+spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl)
+{
+	const struct emitter *em = &c->w->emitters[v->emitter];
+	struct emitter_point p = world_emitter_point(&v->x);
+	p.infinite = v->kind == VERTEX_INFINITE;
+	return em->ops->radiance(em, &p, w, wl);
+}
+
 /* Both normals see w from the same side. */
 static bool same_side(const struct surface_point *x, vec3 w)
 {
@@ -143,7 +156,7 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 }
 
 /* Density per area of `to`, reached from `at`; solid as chosen there. For a delta lobe `solid` is a probability, and per_solid
- * what makes it a density: see delta_per_solid. */
+ * what makes it a density: see path_delta_per_solid. */
 static double reach_pdf(const struct path_vertex *at, const struct path_vertex *to, double solid, double per_solid)
 {
 	double distance2;
@@ -154,12 +167,8 @@ static double reach_pdf(const struct path_vertex *at, const struct path_vertex *
 	return to->kind == VERTEX_INFINITE ? lobe : lobe * jac_solid_from_area(to->x.ng, omega, distance2);
 }
 
-/* Delta distributions are written in the direction towards the light, projected on the geometric normal: 1 in that measure is
- * the cosine per solid angle. Towards the camera 1 per solid angle there is worth the ratio of the two solid angles, the
- * squared indices and the cosines about which light is bent, those with the shading normal. eta_camera: the index on the
- * camera's side over that on the light's. */
-static void delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera, double eta_camera, double *to_light,
-			    double *to_camera)
+void path_delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera, double eta_camera, double *to_light,
+			  double *to_camera)
 {
 	*to_light = fabs(vec3_dot(x->ng, light));
 	*to_camera = *to_light * eta_camera * eta_camera * fabs(vec3_dot(x->sh.n, camera) / vec3_dot(x->sh.n, light));
@@ -195,9 +204,9 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 			return n;
 		double ahead = 1, back = 1;
 		if (out.delta && side == SIDE_CAMERA)
-			delta_per_solid(&at->x, out.wi, at->to_prev, 1 / out.eta, &ahead, &back);
+			path_delta_per_solid(&at->x, out.wi, at->to_prev, 1 / out.eta, &ahead, &back);
 		else if (out.delta)
-			delta_per_solid(&at->x, at->to_prev, out.wi, out.eta, &back, &ahead);
+			path_delta_per_solid(&at->x, at->to_prev, out.wi, out.eta, &back, &ahead);
 		at->delta = out.delta;
 		at->mode = out.mode;
 		to->beta = out.beta;

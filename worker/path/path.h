@@ -78,6 +78,19 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 /* F of the head comment at a surface vertex for unit directions towards camera and light. */
 spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light);
 
+/* |ng . w| of the geometry terms; 1 where a vertex has no surface: the camera, what lies at infinity. */
+double path_cosine(const struct path_vertex *v, vec3 w);
+
+/* Delta distributions are written in the direction towards the light, projected on the geometric normal: 1 in that measure is
+ * the cosine per solid angle. Towards the camera 1 per solid angle there is worth the ratio of the two solid angles, the
+ * squared indices and the cosines about which light is bent, those with the shading normal. eta_camera: the index on the
+ * camera's side over that on the light's. */
+void path_delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera, double eta_camera, double *to_light,
+			  double *to_camera);
+
+/* Radiance that leaves an emitter's point in direction w. */
+spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl);
+
 /* Unit direction and squared distance from a to b; b may lie at infinity (distance 1). */
 vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2);
 

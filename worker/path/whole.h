@@ -32,9 +32,9 @@ struct whole_path {
 	double film[2];
 	struct path_vertex v[WHOLE_MAX_VERTICES];
 	struct whole_edge edge[WHOLE_MAX_EDGES];
-	/* Caches, by vertex, filled by whole_scatter: */
-	spectrum f[WHOLE_MAX_VERTICES];  /* inner: f_radiance(o, i) without cosine, the lobe's weight where specular; v[0]: L_e */
-	spectrum fh[WHOLE_MAX_VERTICES]; /* inner: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), the lobe's weight where specular */
+	/* Caches, by vertex: read them through whole_f and whole_fh. */
+	uint64_t known_f, known_fh; /* bit j: that of v[j] */
+	spectrum f[WHOLE_MAX_VERTICES], fh[WHOLE_MAX_VERTICES];
 };
 
 /* A product that neither over- nor underflows: v 2^exponent. */
@@ -45,7 +45,7 @@ struct product {
 #define PRODUCT_ONE ((struct product){{{1, 1, 1, 1}}, 0})
 void product_mul(struct product *p, spectrum f);
 void product_scale(struct product *p, double s);
-/* log(X + Y + Z) of what the film gets; -INFINITY for black. dispersed: carries one wavelength (path_collapse). */
+/* log(X + Y + Z) of what the film gets of it; -INFINITY for black. */
 double product_log_intensity(const struct path_context *c, const struct whole_path *x, const struct product *p);
 
 /* Edge e from the positions of its ends, and to_prev of v[e]. false: the ends coincide. */
@@ -58,8 +58,19 @@ unsigned whole_mode(const struct whole_path *x, unsigned j);
 /* n_o / n_i at v[j]: index on the camera's side over that on the light's; 1 where it reflects. */
 double whole_eta(const struct whole_path *x, unsigned j);
 
-/* Fills f and fh of v[first..last] (0 <= first <= last <= k - 1) for the path's wavelengths. false: some of it is black. */
-bool whole_scatter(struct path_context *c, struct whole_path *x, unsigned first, unsigned last);
+/* v[0]: L_e towards v[1]. Inner vertices: f_radiance(o, i) without cosine, or the weight of the lobe where specular. Computed
+ * when asked for the first time. */
+spectrum whole_f(const struct path_context *c, struct whole_path *x, unsigned j);
+/* Inner vertices: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), or the weight of the lobe where specular. */
+spectrum whole_fh(const struct path_context *c, struct whole_path *x, unsigned j);
+/* The vertices first..last are about to change: what was known of them and of their neighbours no longer holds. */
+void whole_forget(struct whole_path *x, unsigned first, unsigned last);
+void whole_set_wavelength(const struct path_context *c, struct whole_path *x, double u);
+/* Some vertex disperses: the path carries its hero wavelength alone. */
+bool whole_is_dispersed(const struct path_context *c, const struct whole_path *x);
+
+/* Vertices first..last with their edges and caches, and what belongs to the path as a whole. */
+void whole_copy(struct whole_path *to, const struct whole_path *from, unsigned first, unsigned last);
 
 /* Nothing lies between v[e] and v[e + 1]. Counts a ray. */
 bool whole_visible(struct path_context *c, const struct whole_path *x, unsigned e);
@@ -72,14 +83,14 @@ bool whole_film(const struct path_context *c, struct whole_path *x);
 bool whole_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct whole_path *x);
 
 /* log f of the path in the measure of path.h, from the products of its geometry terms; -INFINITY: black. */
-double whole_log_f(struct path_context *c, const struct whole_path *x);
+double whole_log_f(const struct path_context *c, struct whole_path *x);
 
 /* Fills pdf and pdf_rev of all vertices, then log of the density with which technique s makes this path, s = 0..edges;
  * -INFINITY where it cannot. */
 void whole_log_techniques(struct path_context *c, struct whole_path *x, double *log_pdf);
 
 /* CIE XYZ of the path's colour, scaled so that X + Y + Z = 1. */
-void whole_colour(const struct path_context *c, const struct whole_path *x, double xyz[3]);
+void whole_colour(const struct path_context *c, struct whole_path *x, double xyz[3]);
 
 /* Recomputes everything that is cached and asks every ray again; the first disagreement in words. For tests and for states
  * that come from outside. */

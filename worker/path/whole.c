@@ -1,0 +1,265 @@
+#include "worker/path/whole.h"
+
+#include "worker/path/measure.h"
+
+#include <assert.h>
+#include <string.h>
+
+/* Products are brought back to a largest factor near 1 when they leave this range. */
+#define PRODUCT_HIGH 0x1p256
+#define PRODUCT_LOW 0x1p-256
+
+void product_mul(struct product *p, spectrum f)
+{
+	p->v = spectrum_mul(p->v, f);
+	double m = spectrum_max(p->v);
+	if (m < PRODUCT_HIGH && m > PRODUCT_LOW)
+		return;
+	if (!(m > 0) || !isfinite(m))
+		return;
+	int e;
+	frexp(m, &e);
+	p->v = spectrum_scale(ldexp(1, -e), p->v);
+	p->exponent += e;
+}
+
+void product_scale(struct product *p, double s)
+{
+	product_mul(p, spectrum_of(s));
+}
+
+static void to_xyz(const struct path_context *c, const struct whole_path *x, spectrum l, double xyz[3])
+{
+	if (c->w->effects.dispersion && whole_is_dispersed(c, x))
+		l = (spectrum){{SPECTRUM_LANES * l.v[0]}};
+	if (x->wl.grey)
+		for (int i = 0; i < 3; i++)
+			xyz[i] = l.v[0] * c->w->grey_xyz[i];
+	else
+		spectrum_to_xyz(l, &x->wl, xyz);
+}
+
+double product_log_intensity(const struct path_context *c, const struct whole_path *x, const struct product *p)
+{
+	double xyz[3];
+	to_xyz(c, x, p->v, xyz);
+	return log(xyz[0] + xyz[1] + xyz[2]) + M_LN2 * p->exponent;
+}
+
+bool whole_join(struct whole_path *x, unsigned e)
+{
+	struct path_vertex *light = &x->v[e];
+	x->edge[e].w = path_direction(light, &x->v[e + 1], &x->edge[e].distance2);
+	light->to_prev = x->edge[e].w;
+	return x->edge[e].distance2 > 0;
+}
+
+unsigned whole_mode(const struct whole_path *x, unsigned j)
+{
+	const struct surface_point *s = &x->v[j].x;
+	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w);
+	double no = vec3_dot(s->sh.n, o), ni = vec3_dot(s->sh.n, i);
+	if (!(no * vec3_dot(s->ng, o) > 0 && ni * vec3_dot(s->ng, i) > 0))
+		return 0;
+	return no * ni > 0 ? BSDF_REFLECT : BSDF_TRANSMIT;
+}
+
+double whole_eta(const struct whole_path *x, unsigned j)
+{
+	const struct path_vertex *v = &x->v[j];
+	if (!(v->mode & BSDF_TRANSMIT))
+		return 1;
+	double eta = bsdf_eta(v->bsdf, &x->wl);
+	return vec3_dot(v->x.sh.n, x->edge[j].w) > 0 ? 1 / eta : eta;
+}
+
+static spectrum scatter(const struct whole_path *x, unsigned j, bool halfvec)
+{
+	const struct path_vertex *v = &x->v[j];
+	if (!whole_mode(x, j))
+		return spectrum_of(0);
+	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
+	vec3 wo = frame_to_local(&v->x.sh, x->edge[j].w), wi;
+	if (v->delta) {
+		double chance;
+		return bsdf_eval_delta(v->bsdf, &p, wo, v->mode, &wi, &chance);
+	}
+	wi = frame_to_local(&v->x.sh, vec3_neg(x->edge[j - 1].w));
+	return halfvec ? bsdf_eval_halfvec(v->bsdf, &p, wo, wi) : v->bsdf->ops->eval(v->bsdf, &p, wo, wi);
+}
+
+spectrum whole_f(const struct path_context *c, struct whole_path *x, unsigned j)
+{
+	if (!(x->known_f >> j & 1)) {
+		x->f[j] = j > 0 ? scatter(x, j, false) : path_emitted(c, &x->v[0], x->edge[0].w, &x->wl);
+		x->known_f |= (uint64_t)1 << j;
+	}
+	return x->f[j];
+}
+
+spectrum whole_fh(const struct path_context *c, struct whole_path *x, unsigned j)
+{
+	(void)c;
+	if (!(x->known_fh >> j & 1)) {
+		x->fh[j] = scatter(x, j, true);
+		x->known_fh |= (uint64_t)1 << j;
+	}
+	return x->fh[j];
+}
+
+static uint64_t bits(unsigned first, unsigned last)
+{
+	return (~(uint64_t)0 >> (63 - last)) & (~(uint64_t)0 << first);
+}
+
+void whole_forget(struct whole_path *x, unsigned first, unsigned last)
+{
+	uint64_t keep = ~bits(first > 0 ? first - 1 : 0, last + 1);
+	x->known_f &= keep;
+	x->known_fh &= keep;
+}
+
+void whole_set_wavelength(const struct path_context *c, struct whole_path *x, double u)
+{
+	x->wavelength = u;
+	x->known_f = x->known_fh = 0;
+	if (c->w->effects.colour)
+		x->wl = wavelengths_sample(u);
+	else
+		x->wl.grey = true;
+}
+
+bool whole_is_dispersed(const struct path_context *c, const struct whole_path *x)
+{
+	if (!c->w->effects.dispersion)
+		return false;
+	for (unsigned j = 1; j < x->edges; j++)
+		if (x->v[j].bsdf->dispersive)
+			return true;
+	return false;
+}
+
+void whole_copy(struct whole_path *to, const struct whole_path *from, unsigned first, unsigned last)
+{
+	unsigned n = last - first + 1, edge = first > 0 ? first - 1 : 0, edge_end = last < from->edges ? last + 1 : from->edges;
+	to->edges = from->edges;
+	to->wl = from->wl;
+	to->wavelength = from->wavelength;
+	to->film[0] = from->film[0];
+	to->film[1] = from->film[1];
+	memcpy(&to->v[first], &from->v[first], n * sizeof to->v[0]);
+	if (edge < first)
+		to->v[edge].to_prev = from->v[edge].to_prev;
+	memcpy(&to->edge[edge], &from->edge[edge], (edge_end - edge) * sizeof to->edge[0]);
+	/* Neighbours scatter along the edges that came with the vertices. */
+	unsigned last_cached = last < from->edges ? last + 1 : last;
+	n = last_cached - edge + 1;
+	memcpy(&to->f[edge], &from->f[edge], n * sizeof to->f[0]);
+	memcpy(&to->fh[edge], &from->fh[edge], n * sizeof to->fh[0]);
+	uint64_t range = bits(edge, last_cached);
+	to->known_f = (to->known_f & ~range) | (from->known_f & range);
+	to->known_fh = (to->known_fh & ~range) | (from->known_fh & range);
+}
+
+bool whole_visible(struct path_context *c, const struct whole_path *x, unsigned e)
+{
+	return path_visible(c, &x->v[e + 1], &x->v[e]);
+}
+
+bool whole_film(const struct path_context *c, struct whole_path *x)
+{
+	const struct whole_edge *e = &x->edge[x->edges - 1];
+	const struct film_window *w = &c->window;
+	vec3 d = vec3_neg(e->w);
+	double distance = sqrt(e->distance2);
+	if (x->v[x->edges - 1].kind == VERTEX_INFINITE) {
+		/* What lies at infinity is seen between the clipping planes. */
+		double t_min, t_max;
+		camera_clip(&c->w->camera, d, &t_min, &t_max);
+		distance = 0.5 * (t_min + t_max);
+	}
+	if (!camera_project(&c->w->camera, d, distance, &x->film[0], &x->film[1]))
+		return false;
+	return x->film[0] >= w->x && x->film[0] < w->x + w->width && x->film[1] >= w->y && x->film[1] < w->y + w->height;
+}
+
+/* Vertex i of the path from vertex `from` of a sub-path; its scattering there still holds when `left` says so. */
+static void take_vertex(struct whole_path *x, unsigned i, const struct path_vertex *from, bool left)
+{
+	x->v[i] = *from;
+	if (!left) {
+		x->v[i].delta = false;
+		x->v[i].mode = 0;
+	}
+}
+
+/* The emitter's point, drawn or hit, as the path's first vertex. */
+static void take_emitter(struct whole_path *x, const struct path_vertex *from)
+{
+	take_vertex(x, 0, from, false);
+	if (x->v[0].kind == VERTEX_SURFACE)
+		x->v[0].kind = VERTEX_EMITTER;
+}
+
+static bool finish(struct path_context *c, struct whole_path *x)
+{
+	x->known_f = x->known_fh = 0;
+	for (unsigned e = 0; e < x->edges; e++)
+		if (!whole_join(x, e))
+			return false;
+	for (unsigned j = 1; j < x->edges; j++) {
+		if (!x->v[j].delta)
+			x->v[j].mode = whole_mode(x, j);
+		if (!x->v[j].mode)
+			return false;
+	}
+	if (!whole_film(c, x))
+		return false;
+	for (unsigned j = 0; j < x->edges; j++)
+		if (spectrum_is_zero(whole_f(c, x, j)))
+			return false;
+	return true;
+}
+
+bool whole_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct whole_path *x)
+{
+	unsigned t = edges + 1 - s;
+	assert(edges <= WHOLE_MAX_EDGES && t >= 1);
+	const struct path_vertex *z = &c->camera[t - 1];
+	struct path_vertex drawn;
+	double pdf;
+	x->edges = edges;
+	x->wl = c->wl;
+	x->wavelength = c->wl.grey ? 0 : (c->wl.nm[0] - WAVELENGTH_MIN) / (WAVELENGTH_MAX - WAVELENGTH_MIN);
+	if (s > 0 && t > 1 && (z->kind != VERTEX_SURFACE || !z->bsdf->has_smooth))
+		return false;
+	if (s == 0) {
+		if (z->emitter < 0)
+			return false;
+		take_emitter(x, z);
+	} else if (s == 1) {
+		if (!path_next_event(c, z, &drawn, &pdf))
+			return false;
+		take_emitter(x, &drawn);
+	} else {
+		if (!c->light[s - 1].bsdf->has_smooth)
+			return false;
+		take_emitter(x, &c->light[0]);
+		for (unsigned i = 1; i < s; i++)
+			take_vertex(x, i, &c->light[i], i + 1 < s);
+	}
+	for (unsigned i = s > 0 ? s : 1; i <= edges; i++)
+		take_vertex(x, i, &c->camera[edges - i], s == 0 || i > s);
+	return finish(c, x) && (s == 0 || whole_visible(c, x, s - 1));
+}
+
+void whole_colour(const struct path_context *c, struct whole_path *x, double xyz[3])
+{
+	struct product p = PRODUCT_ONE;
+	for (unsigned j = 0; j < x->edges; j++)
+		product_mul(&p, whole_f(c, x, j));
+	to_xyz(c, x, p.v, xyz);
+	double sum = xyz[0] + xyz[1] + xyz[2];
+	for (int i = 0; i < 3; i++)
+		xyz[i] /= sum;
+}

@@ -1,0 +1,104 @@
+#include "worker/path/whole.h"
+
+#include <stdio.h>
+
+/* Cached and fresh values may differ by rounding, amplified where a lobe is narrow. */
+#define CHECK_TOLERANCE 1e-6
+
+static bool close_to(double a, double b)
+{
+	return fabs(a - b) <= CHECK_TOLERANCE * fmax(fabs(a), fabs(b));
+}
+
+static bool same_spectrum(spectrum a, spectrum b)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		if (!close_to(a.v[i], b.v[i]))
+			return false;
+	return true;
+}
+
+static bool same_vector(vec3 a, vec3 b)
+{
+	vec3 d = vec3_sub(a, b);
+	return vec3_dot(d, d) <= CHECK_TOLERANCE * CHECK_TOLERANCE * fmax(vec3_dot(b, b), 1);
+}
+
+static bool check_edges(struct path_context *c, const struct whole_path *x, char *text, size_t size)
+{
+	for (unsigned e = 0; e < x->edges; e++) {
+		double distance2;
+		vec3 w = path_direction(&x->v[e], &x->v[e + 1], &distance2);
+		if (!(distance2 > 0) || !same_vector(w, x->edge[e].w) || !close_to(distance2, x->edge[e].distance2) ||
+		    !same_vector(w, x->v[e].to_prev)) {
+			snprintf(text, size, "edge %u of %u is not the one between its ends", e, x->edges);
+			return false;
+		}
+		if (!path_visible(c, &x->v[e + 1], &x->v[e])) {
+			snprintf(text, size, "edge %u of %u is occluded", e, x->edges);
+			return false;
+		}
+	}
+	return true;
+}
+
+/* The specular direction is met as exactly as walks do. */
+#define SPECULAR_TOLERANCE 1e-6
+
+static bool check_specular(const struct whole_path *x, unsigned j, char *text, size_t size)
+{
+	const struct path_vertex *v = &x->v[j];
+	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
+	vec3 wi;
+	double chance;
+	vec3 i = frame_to_local(&v->x.sh, vec3_neg(x->edge[j - 1].w)), o = frame_to_local(&v->x.sh, x->edge[j].w);
+	if (spectrum_is_zero(bsdf_eval_delta(v->bsdf, &p, o, v->mode, &wi, &chance))) {
+		snprintf(text, size, "vertex %u of %u has no specular lobe of its mode", j, x->edges);
+		return false;
+	}
+	vec3 off = vec3_sub(wi, i);
+	if (vec3_length(off) > SPECULAR_TOLERANCE) {
+		snprintf(text, size, "vertex %u of %u misses its specular direction by %g", j, x->edges, vec3_length(off));
+		return false;
+	}
+	return true;
+}
+
+static bool check_vertices(const struct path_context *c, const struct whole_path *x, char *text, size_t size)
+{
+	struct whole_path fresh = *x;
+	fresh.known_f = fresh.known_fh = 0;
+	for (unsigned j = 0; j < x->edges; j++) {
+		const struct path_vertex *v = &x->v[j];
+		if (j > 0 && (v->mode & (BSDF_REFLECT | BSDF_TRANSMIT)) != whole_mode(x, j)) {
+			snprintf(text, size, "vertex %u of %u does not scatter in its mode", j, x->edges);
+			return false;
+		}
+		if (j > 0 && v->delta && !check_specular(x, j, text, size))
+			return false;
+		spectrum f = whole_f(c, &fresh, j);
+		if (spectrum_is_zero(f) || !spectrum_is_valid(f) || ((x->known_f >> j & 1) && !same_spectrum(f, x->f[j]))) {
+			snprintf(text, size, "f at vertex %u of %u is %g, cached %g", j, x->edges, f.v[0], x->f[j].v[0]);
+			return false;
+		}
+		if (j > 0 && (x->known_fh >> j & 1) && !same_spectrum(whole_fh(c, &fresh, j), x->fh[j])) {
+			snprintf(text, size, "fh at vertex %u of %u is %g, cached %g", j, x->edges, fresh.fh[j].v[0], x->fh[j].v[0]);
+			return false;
+		}
+	}
+	return true;
+}
+
+bool path_check(struct path_context *c, const struct whole_path *x, char *text, size_t size)
+{
+	if (x->edges < 1 || x->edges > WHOLE_MAX_EDGES) {
+		snprintf(text, size, "%u edges", x->edges);
+		return false;
+	}
+	struct whole_path film = *x;
+	if (!whole_film(c, &film) || hypot(film.film[0] - x->film[0], film.film[1] - x->film[1]) > 1e-6) {
+		snprintf(text, size, "the film point (%g, %g) is (%g, %g)", x->film[0], x->film[1], film.film[0], film.film[1]);
+		return false;
+	}
+	return check_edges(c, x, text, size) && check_vertices(c, x, text, size);
+}
