@@ -31,6 +31,14 @@ code 1 "$BIN/hslt-render" "$BOX" -o "$DIR/no/such/folder.exr" # before hours are
 code 1 "$BIN/hslt-submit" "$BOX" -o "$DIR/no/such/folder.exr" --wait
 code 1 "$BIN/hslt-submit" "$DIR/none.xml" -o "$DIR/a.exr"
 code 2 "$BIN/hslt-submit" "$BOX" -o "$DIR/a.exr" --crop 0,0,0,0,0
+for p in render submit; do
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --mutations independent --integrator pssmlt --mutations 1000
+	grep -q "pssmlt has no strategies" "$DIR/err.log" || fail "hslt-$p says: $(cat "$DIR/err.log")"
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --integrator path --mutations hslt=0.9,independent=0.1
+	for list in 12x 0 a,,b 'a b' , -1; do
+		code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --mutations "$list"
+	done
+done
 code 1 "$BIN/hslt-job" fetch j1
 code 1 "$BIN/hslt-job" cancel j1
 

@@ -23,6 +23,7 @@ static const char doc[] =
 	"  hslt-render room.xml -o room.exr --spp 64\n"
 	"  hslt-render room.xml -o room.exr --integrator path --size 320x180 --threads 8 --stats room.json\n"
 	"  hslt-render room.xml -o room.exr --target-error 2% --time 3600\n"
+	"  hslt-render room.xml -o room.exr --integrator hslt --mutations hslt=0.9,independent=0.1 --mutations 10000000\n"
 	"\n"
 	"The image holds linear Rec. 709 (R G B) and one standard error of each (error.R error.G error.B).\n"
 	"Exit codes: 0 done, 1 failed, 2 usage, 4 a bound came before the target error.";
@@ -98,6 +99,7 @@ struct session {
 	struct canvas_image image;
 	double build_seconds;
 	struct progress progress;
+	bool usage; /* what went wrong was asked for */
 };
 
 static double now(void)
@@ -133,8 +135,10 @@ static int make_plan(struct session *s, struct error *e)
 {
 	struct plan_request *p = &s->a->render.plan;
 	char text[1024];
-	render_plan_from_scene(p, &s->summary.settings);
-	int rc = plan_make(p, &s->plan, e);
+	int rc = render_plan_from_scene(&s->a->render, &s->summary, e);
+	s->usage = rc == -EINVAL;
+	if (!rc)
+		rc = plan_make(p, &s->plan, e);
 	if (rc || s->a->quiet)
 		return rc;
 	plan_describe(&s->plan, text, sizeof text);
@@ -304,7 +308,7 @@ int main(int argc, char **argv)
 	mem_free(s.name);
 	if (rc) {
 		fprintf(stderr, "hslt-render: %s\n", e.text);
-		return 1;
+		return s.usage ? 2 : 1;
 	}
 	bool missed = s.plan.target_error > 0 && s.run.end != MERGE_ERROR;
 	return missed ? 4 : 0;

@@ -12,9 +12,18 @@ enum {
 	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH,
 };
 
+static char *borrow(const char *text)
+{
+	union {
+		const char *from;
+		char *to;
+	} u = {text}; /* argp's filters return what they were given or something new, so it has no const */
+	return u.to;
+}
+
 static const struct argp_option options[] = {
 	{NULL, 0, NULL, 0, "What to render:", 1},
-	{"integrator", 'i', "NAME", 0, "path, bdpt or pssmlt (" RENDER_INTEGRATOR_DEFAULT "); the scene's own is ignored", 1},
+	{"integrator", 'i', "NAME", 0, "(" RENDER_INTEGRATOR_DEFAULT "); the scene's own is ignored", 1}, /* see help */
 	{"size", OPTION_SIZE, "WxH", 0, "Size of the film; keeps the angle of view", 1},
 	{"crop", OPTION_CROP, "X,Y,W,H", 0, "Part of the film, in its pixels", 1},
 	{"seed", OPTION_SEED, "S", 0, "Of all random numbers (0)", 1},
@@ -23,7 +32,9 @@ static const struct argp_option options[] = {
 	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 1},
 	{NULL, 0, NULL, 0, "When to stop (the first bound met; without any, the scene's sampleCount):", 2},
 	{"spp", OPTION_SPP, "N", 0, "Samples a pixel, rounded up to whole rounds", 2},
-	{"mutations", OPTION_MUTATIONS, "N", 0, "Mutations or samples in all", 2},
+	{"mutations", OPTION_MUTATIONS, "N|LIST", 0,
+	 "N: mutations or samples in all. LIST: the strategies that propose mutations, with weights (1), such as "
+	 "hslt=0.9,independent=0.1; part of the plan. May be given twice, once for each", 2},
 	{"time", OPTION_TIME, "SECONDS", 0, "Wall clock, looked at after complete rounds", 2},
 	{"target-error", OPTION_TARGET, "E", 0, "Estimated relative error: 0.02 or 2%", 2},
 	{NULL, 0, NULL, 0, "The plan (part of what decides the bits):", 3},
@@ -101,6 +112,26 @@ static void take_numbers(const struct argp_state *state, const char *option, con
 	}
 }
 
+static void take_mutations(struct render_arguments *a, const char *arg, const struct argp_state *state)
+{
+	if (*arg >= '0' && *arg <= '9') {
+		a->plan.mutations = option_whole(state, "--mutations", arg);
+		if (a->plan.mutations == 0)
+			argp_error(state, "--mutations takes 1 or more");
+		return;
+	}
+	if (plan_strategy_count(arg) < 1)
+		argp_error(state, "--mutations takes a number or a list such as hslt=0.9,independent=0.1, not '%s'", arg);
+	a->mixture = arg;
+}
+
+static void check_mixture(const struct render_arguments *a, const struct argp_state *state)
+{
+	const char *name = *a->plan.integrator ? a->plan.integrator : RENDER_INTEGRATOR_DEFAULT;
+	if (a->mixture && !render_integrator_find(name)->has_mutations)
+		argp_error(state, "--mutations %s: the integrator %s has no strategies to choose from", a->mixture, name);
+}
+
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
 	struct render_arguments *a = state->input;
@@ -121,9 +152,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 			argp_error(state, "--spp takes 1 or more");
 		return 0;
 	case OPTION_MUTATIONS:
-		p->mutations = option_whole(state, "--mutations", arg);
-		if (p->mutations == 0)
-			argp_error(state, "--mutations takes 1 or more");
+		take_mutations(a, arg, state);
 		return 0;
 	case OPTION_TIME:
 		p->seconds = option_seconds(state, "--time", arg);
@@ -167,18 +196,42 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_EPOCH:
 		p->epoch = option_whole(state, "--epoch", arg);
 		return 0;
+	case ARGP_KEY_END:
+		check_mixture(a, state);
+		return 0;
 	default:
 		return ARGP_ERR_UNKNOWN;
 	}
 }
 
-const struct argp render_argp = {options, parse, NULL, NULL, NULL, NULL, NULL};
-
-void render_plan_from_scene(struct plan_request *p, const struct scene_settings *s)
+/* The integrators that there are before what the table says of --integrator. argp frees the text. */
+static char *help(int key, const char *text, void *input)
 {
+	(void)input;
+	char names[256] = "";
+	size_t used = 0;
+	const struct render_integrator *r;
+	if (key != 'i')
+		return borrow(text);
+	for (size_t i = 0; (r = render_integrator_at(i)) != NULL && used < sizeof names; i++) {
+		const char *separator = i == 0 ? "" : render_integrator_at(i + 1) ? ", " : " or ";
+		int n = snprintf(names + used, sizeof names - used, "%s%s", separator, r->name);
+		used += n < 0 ? 0 : (size_t)n;
+	}
+	char *all = NULL;
+	return asprintf(&all, "%s %s", names, text) < 0 ? borrow(text) : all;
+}
+
+const struct argp render_argp = {options, parse, NULL, NULL, NULL, help, NULL};
+
+int render_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e)
+{
+	struct plan_request *p = &a->plan;
+	const struct scene_settings *s = &summary->settings;
 	if (!*p->integrator)
 		text_copy(p->integrator, sizeof p->integrator, RENDER_INTEGRATOR_DEFAULT);
-	p->kind = render_integrator_find(p->integrator)->kind;
+	const struct render_integrator *integrator = render_integrator_find(p->integrator);
+	p->kind = integrator->kind;
 	p->width = s->width;
 	p->height = s->height;
 	p->border = s->border;
@@ -188,6 +241,7 @@ void render_plan_from_scene(struct plan_request *p, const struct scene_settings 
 		p->max_depth = s->max_depth;
 	if (!p->spp && !p->mutations && !(p->seconds > 0) && !(p->target_error > 0))
 		p->spp = s->spp;
+	return integrator->has_mutations ? render_mutations(a->mixture, summary, p->mixture, e) : 0;
 }
 
 int scene_path_split(const char *path, char **folder, char **name, struct error *e)

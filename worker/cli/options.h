@@ -16,13 +16,15 @@ struct render_arguments {
 	struct render_options render;
 	struct scene_define defines[OPTION_DEFINES_MAX];
 	size_t define_count;
+	const char *mixture; /* of --mutations LIST; NULL: not given */
 };
 
 /* Input of the child: a struct render_arguments. Keys from 1000 on are its own, and the short ones 'i' and 'D'. */
 extern const struct argp render_argp;
 
-/* Fills in what the options left to the scene: integrator, film, depth, samples. */
-void render_plan_from_scene(struct plan_request *p, const struct scene_settings *s);
+/* Fills in what the options left to the scene: integrator, film, depth, samples, mixture of mutations. -EINVAL: the mixture
+ * that was asked for is none, a usage error. */
+int render_plan_from_scene(struct render_arguments *a, const struct render_summary *s, struct error *e);
 
 /* A whole number, or the usage error of `option`. */
 uint64_t option_whole(const struct argp_state *state, const char *option, const char *arg);

@@ -196,6 +196,19 @@ static int check_plan(const struct bundle *b, const struct scene *s, const struc
 	return 0;
 }
 
+static int check_mutations(const struct bundle *b, struct error *e)
+{
+	const struct plan *p = &b->plan;
+	char own[PLAN_MUTATIONS_MAX] = "";
+	struct render_summary summary;
+	world_summary(b->world, &summary);
+	int rc = render_integrator_find(p->integrator)->has_mutations ? render_mutations(p->mutations, &summary, own, e) : 0;
+	if (!rc && strcmp(own, p->mutations) != 0)
+		rc = error_set(e, EINVAL, "this worker spells the mixture of mutations '%s', the plan '%s': other versions?", own,
+			       p->mutations);
+	return rc;
+}
+
 static int build(struct bundle *b, struct error *e)
 {
 	const Farm__JobInfo *m = info_of(b);
@@ -212,6 +225,13 @@ static int build(struct bundle *b, struct error *e)
 	if (!rc)
 		rc = world_new(&b->world, &scene, &assets, &options, e);
 	scene_fini(&scene);
+	if (rc)
+		return rc;
+	rc = check_mutations(b, e);
+	if (rc) {
+		world_free(b->world);
+		b->world = NULL;
+	}
 	return rc;
 }
 

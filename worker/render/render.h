@@ -26,7 +26,8 @@ enum { RENDER_EFFECTS_MAX = 24 };
 struct render_integrator {
 	const char *name, *summary;
 	enum plan_kind kind;
-	uint32_t max_depth; /* edges its state holds */
+	uint32_t max_depth;  /* edges its state holds */
+	bool has_mutations;  /* its chains draw proposals from a mixture of strategies */
 };
 /* NULL when there is none of that name; index from 0, NULL at the end. */
 const struct render_integrator *render_integrator_find(const char *name);
@@ -53,6 +54,11 @@ struct render_summary {
  * here is a scene that workers can render. */
 int render_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 		 struct render_summary *out, struct error *e);
+
+/* The mixture of strategies of an integrator that has_mutations, in the spelling that a plan holds: "independent=0.1,hslt=0.9".
+ * text: NAME or NAME=WEIGHT with commas between; NULL or "": what suits the scene. A canonical text comes back as it is.
+ * -EINVAL with a sentence. */
+int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX], struct error *e);
 
 /* Builds Embree's scene. The scene description may be freed afterwards. */
 int world_new(struct world **w, const struct scene *s, const struct asset_source *assets, const struct render_options *o,
