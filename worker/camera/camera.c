@@ -37,23 +37,91 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	c->scale = pixels_per_slope(s);
 	c->near_clip = s->near_clip * world_scale;
 	c->far_clip = s->far_clip * world_scale;
+	c->aperture = s->aperture_radius * world_scale;
+	c->focus = s->focus_distance * world_scale;
+	if (!(c->aperture >= 0) || (c->aperture > 0 && !(c->focus > 0)))
+		return error_set(e, EINVAL, "an aperture of radius %g, focused at a distance of %g", s->aperture_radius, s->focus_distance);
 	return 0;
 }
 
-vec3 camera_direction(const struct camera *c, double film_x, double film_y)
+bool camera_has_aperture(const struct camera *c)
+{
+	return c->aperture > 0;
+}
+
+/* The unit square onto the unit disk: concentric squares become circles, areas keep their ratios. */
+static void disk_from_square(const double u[2], double *x, double *y)
+{
+	double a = 2 * u[0] - 1, b = 2 * u[1] - 1;
+	bool wide = fabs(a) > fabs(b);
+	double r = wide ? a : b, angle = r == 0 ? 0 : M_PI / 4 * (wide ? b : a) / r;
+	*x = r * (wide ? cos(angle) : sin(angle));
+	*y = r * (wide ? sin(angle) : cos(angle));
+}
+
+static void square_from_disk(double x, double y, double u[2])
+{
+	bool wide = fabs(x) > fabs(y);
+	double r = copysign(hypot(x, y), wide ? x : y), other = r * (4 / M_PI) * (wide ? atan(y / x) : y == 0 ? 0 : atan(x / y));
+	double a[2] = {wide ? r : other, wide ? other : r};
+	for (int i = 0; i < 2; i++)
+		u[i] = fmin(fmax(0.5 * (a[i] + 1), 0), 1 - 0x1p-53);
+}
+
+/* On the aperture: x_k less the centre, along the image's axes. */
+static void aperture_offset(const struct camera *c, vec3 x_k, double *x, double *y)
+{
+	vec3 offset = vec3_sub(x_k, c->position);
+	*x = vec3_dot(c->axes.s, offset);
+	*y = vec3_dot(c->axes.t, offset);
+}
+
+vec3 camera_point(const struct camera *c, const double u[2])
+{
+	double x, y;
+	if (!camera_has_aperture(c))
+		return c->position;
+	disk_from_square(u, &x, &y);
+	return vec3_madd(vec3_madd(c->position, c->aperture * x, c->axes.s), c->aperture * y, c->axes.t);
+}
+
+void camera_point_inverse(const struct camera *c, vec3 p, double u[2])
+{
+	double x, y;
+	u[0] = u[1] = 0.5;
+	if (!camera_has_aperture(c))
+		return;
+	aperture_offset(c, p, &x, &y);
+	square_from_disk(x / c->aperture, y / c->aperture, u);
+}
+
+vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double film_y)
 {
 	vec3 l = {(film_x - c->width / 2) / c->scale, (film_y - c->height / 2) / c->scale, 1};
+	if (camera_has_aperture(c)) {
+		double x, y;
+		aperture_offset(c, x_k, &x, &y);
+		l.x -= x / c->focus;
+		l.y -= y / c->focus;
+	}
 	return vec3_normalize(frame_to_world(&c->axes, l));
 }
 
-bool camera_project(const struct camera *c, vec3 d, double distance, double *film_x, double *film_y)
+bool camera_project(const struct camera *c, vec3 x_k, vec3 d, double distance, double *film_x, double *film_y)
 {
 	vec3 l = frame_to_local(&c->axes, d);
 	double depth = l.z * distance;
 	if (!(l.z > 0) || depth < c->near_clip || depth > c->far_clip)
 		return false;
-	*film_x = c->width / 2 + c->scale * (l.x / l.z);
-	*film_y = c->height / 2 + c->scale * (l.y / l.z);
+	double slope_x = l.x / l.z, slope_y = l.y / l.z;
+	if (camera_has_aperture(c)) {
+		double x, y;
+		aperture_offset(c, x_k, &x, &y);
+		slope_x += x / c->focus;
+		slope_y += y / c->focus;
+	}
+	*film_x = c->width / 2 + c->scale * slope_x;
+	*film_y = c->height / 2 + c->scale * slope_y;
 	return isfinite(*film_x) && isfinite(*film_y);
 }
 

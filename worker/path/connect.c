@@ -193,7 +193,7 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 	const struct path_vertex *y = &c->light[s - 1], *eye = &c->camera[0];
 	double distance2, x[2];
 	vec3 d = path_direction(eye, y, &distance2); /* camera to y */
-	if (!(distance2 > 0) || !camera_project(&c->w->camera, d, sqrt(distance2), &x[0], &x[1]))
+	if (!(distance2 > 0) || !camera_project(&c->w->camera, eye->x.p, d, sqrt(distance2), &x[0], &x[1]))
 		return spectrum_of(0);
 	const struct film_window *win = &c->window;
 	if (!(x[0] >= win->x && x[0] < win->x + win->width && x[1] >= win->y && x[1] < win->y + win->height))

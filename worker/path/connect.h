@@ -1,8 +1,9 @@
 /*
  * Techniques: a path of k edges can be made from s vertices of a light sub-path and t = k + 1 - s of a camera sub-path.
- * x_0 lies on the emitter, x_k is the pinhole. Densities multiply (Veach 1997, sec. 10.2); the balance heuristic compares
- * them for one given path. s = 0: the camera sub-path found the emitter; s = 1: the emitter's point was drawn as seen from
- * x_1 (next event estimation); t = 1: the light sub-path is connected to the pinhole; t = 0 cannot happen.
+ * x_0 lies on the emitter, x_k is the pinhole or a point of the aperture, the same for all techniques of one evaluation.
+ * Densities multiply (Veach 1997, sec. 10.2); the balance heuristic compares them for one given path. s = 0: the camera
+ * sub-path found the emitter; s = 1: the emitter's point was drawn as seen from x_1 (next event estimation); t = 1: the light
+ * sub-path is connected to x_k; t = 0 cannot happen.
  */
 #ifndef WORKER_PATH_CONNECT_H
 #define WORKER_PATH_CONNECT_H

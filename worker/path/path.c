@@ -233,11 +233,11 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	else
 		c->wl.grey = true;
 	v[0] = (struct path_vertex){.kind = VERTEX_CAMERA, .emitter = -1, .pdf = 1, .beta = spectrum_of(1)};
-	v[0].x.p = w->camera.position;
+	v[0].x.p = camera_point(&w->camera, u + DIM_APERTURE_U);
 	v[0].x.prim = PRIM_NONE;
 	if (max_vertices < 2)
 		return 1;
-	vec3 d = camera_direction(&w->camera, film[0], film[1]);
+	vec3 d = camera_direction(&w->camera, v[0].x.p, film[0], film[1]);
 	double t_min, t_max, area = c->window.width * c->window.height;
 	camera_clip(&w->camera, d, &t_min, &t_max);
 	if (!extend(c, &v[0], d, t_min, t_max, &v[1]))

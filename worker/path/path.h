@@ -65,7 +65,7 @@ struct path_sample {
 
 struct film_window film_window_of(const struct plan *p);
 
-/* Camera sub-path: vertex 0 is the pinhole. Returns the number of vertices; an escaped path may end in VERTEX_INFINITE.
+/* Camera sub-path: vertex 0 is the pinhole or a point of the aperture, whose density is 1 in every technique. Returns the number of vertices; an escaped path may end in VERTEX_INFINITE.
  * film: the film point that was drawn. */
 unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned max_vertices, double film[2]);
 /* Light sub-path: vertex 0 lies on an emitter. 0: no emitter, or it could not be sampled. */

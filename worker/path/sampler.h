@@ -11,9 +11,9 @@
 enum sampler_side { SIDE_CAMERA, SIDE_LIGHT, SAMPLER_SIDES };
 enum { SAMPLER_BLOCK = 8 };
 
-/* What the numbers of a block are for. Block 0 of the camera: film x, y, wavelength. Block 0 of the light: point, direction
- * and choice of the emitter. All others: a vertex. */
-enum { DIM_FILM_X = 0, DIM_FILM_Y = 1, DIM_WAVELENGTH = 2 };
+/* What the numbers of a block are for. Block 0 of the camera: film x, y, wavelength, point of the aperture. Block 0 of the
+ * light: point, direction and choice of the emitter. All others: a vertex. */
+enum { DIM_FILM_X = 0, DIM_FILM_Y = 1, DIM_WAVELENGTH = 2, DIM_APERTURE_U = 3, DIM_APERTURE_V = 4 };
 enum { DIM_EMITTER_POINT = 0, DIM_EMITTER_DIRECTION = 2, DIM_EMITTER_CHOICE = 4 };
 enum { DIM_BSDF = 0, DIM_NEXT_EVENT = 3, DIM_ROULETTE = 6 };
 

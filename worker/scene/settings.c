@@ -16,20 +16,24 @@ enum { MAX_DEPTH = 128, FILM_PIXELS_MAX = 1 << 28, DEFAULT_WIDTH = 768, DEFAULT_
 #define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
 #define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
 
+/* Of both cameras. Shutters: nothing moves. */
+#define CAMERA_PARAMS                                                                                                          \
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},                                    \
+		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},                              \
+		{"focal_length", UNDERSTOOD(VALUE_STRING)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},                         \
+		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, {"shutter_open", IGNORED}, {"shutter_close", IGNORED},               \
+		{"principal_point_offset_x", REFUSED}, {"principal_point_offset_y", REFUSED}, {"srf", REFUSED}
+
 static const struct param perspective_params[] = {
-	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
-	{"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},
-	{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},
-	{"focal_length", UNDERSTOOD(VALUE_STRING)},
-	{"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},
-	{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)},
-	{"shutter_open", IGNORED},    /* nothing moves */
-	{"shutter_close", IGNORED},
+	CAMERA_PARAMS,
 	{"focus_distance", IGNORED},  /* a pinhole has none; exporters write it all the same */
-	{"aperture_radius", REFUSED},
-	{"principal_point_offset_x", REFUSED},
-	{"principal_point_offset_y", REFUSED},
-	{"srf", REFUSED},
+	{"aperture_radius", REFUSED}, /* thinlens has one */
+	{NULL, 0, 0, 0, 0, NULL},
+};
+static const struct param thinlens_params[] = {
+	CAMERA_PARAMS,
+	{"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
+	{"aperture_radius", RANGE(VALUE_FLOAT, 0, 1e30)},
 	{NULL, 0, 0, 0, 0, NULL},
 };
 
@@ -80,6 +84,7 @@ static const struct param integrator_params[] = {
 
 const struct plugin_decl setting_decls[] = {
 	{PLUGIN_SENSOR, "perspective", perspective_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER), PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "thinlens", thinlens_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "hdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "ldrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_RFILTER, "box", radius_params, 0, PARAM_UNDERSTOOD},
@@ -204,6 +209,12 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	out->far_clip = node_float(sensor, "far_clip", 1e4);
 	if (!(out->near_clip < out->far_clip))
 		return node_error(sensor, e, EINVAL, "near_clip=%g is not below far_clip=%g", out->near_clip, out->far_clip);
+	if (strcmp(sensor->type, "thinlens") != 0)
+		return 0;
+	if (!node_find(sensor, "aperture_radius"))
+		return node_error(sensor, e, EINVAL, "a thinlens needs an aperture_radius");
+	out->aperture_radius = node_float(sensor, "aperture_radius", 0);
+	out->focus_distance = node_float(sensor, "focus_distance", out->far_clip);
 	return 0;
 }
 

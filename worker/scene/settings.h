@@ -17,17 +17,18 @@ struct scene_settings {
 	uint64_t spp;                        /* sampleCount; 0: none given */
 	uint32_t max_depth;                  /* edges, 1..128 (-1 and more become 128); 128 when none is given */
 	char integrator[32];                 /* the scene's own ("" none): ignored but for its depth */
-	/* perspective */
+	/* perspective, thinlens */
 	mat4 to_world; /* camera: +z forward, +x LEFT on the image, +y up; any scale is removed */
 	double fov;    /* degrees, along fov_axis */
 	char fov_axis[16]; /* x, y, diagonal, smaller, larger: resolved against the film size by the camera */
 	double near_clip, far_clip;
+	double aperture_radius, focus_distance; /* thinlens; radius 0: a pinhole, whatever the distance */
 };
 
 /* width, height: override the film's (0: keep). Exactly one sensor must be there. */
 int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, struct scene_settings *out, struct error *e);
 
-/* Declarations of perspective, hdrfilm, ldrfilm, box, tent, gaussian, all samplers, all integrators; NULL type ends. */
+/* Declarations of perspective, thinlens, hdrfilm, ldrfilm, box, tent, gaussian, all samplers, all integrators; NULL type ends. */
 extern const struct plugin_decl setting_decls[];
 
 #endif

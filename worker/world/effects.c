@@ -58,7 +58,12 @@ void effects_analyse(struct effects *fx, const struct scene_settings *settings, 
 	struct census c = take(bsdfs, bsdf_count, emitters, emitter_count);
 	colour(fx, &c, emitter_count);
 	line(fx, "dispersion", false, "no index of refraction varies with wavelength: wavelengths travel together");
-	line(fx, "aperture", false, "the sensor is a pinhole");
+	fx->aperture = settings->aperture_radius > 0;
+	if (fx->aperture)
+		line(fx, "aperture", true, "a lens of radius %g, focused at a distance of %g", settings->aperture_radius,
+		     settings->focus_distance);
+	else
+		line(fx, "aperture", false, "the sensor is a pinhole");
 	fx->specular = c.specular > 0;
 	line(fx, "specular", fx->specular, "%zu materials have exactly specular lobes", c.specular);
 	fx->glossy = c.glossy > 0;

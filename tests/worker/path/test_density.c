@@ -310,7 +310,7 @@ static bool joins(struct path_context *c, unsigned s, unsigned t)
 		return false;
 	vec3 w = towards(z, y);
 	double film[2];
-	if (t == 1 && !camera_project(&c->w->camera, w, 1, &film[0], &film[1]))
+	if (t == 1 && !camera_project(&c->w->camera, z->x.p, w, 1, &film[0], &film[1]))
 		return false;
 	if (t > 1 && spectrum_is_zero(path_scatter(c, z, z->to_prev, w)))
 		return false;
@@ -341,6 +341,16 @@ static void check_route(const struct path_context *c, unsigned s, unsigned t, st
 	check_ratios(c, &r, tally);
 }
 
+/* What is joined to the camera lands where the film sees it from this x_k. */
+static void check_landing(struct path_context *c, unsigned s)
+{
+	double film[2];
+	if (spectrum_is_zero(path_connect(c, s, 1, PATH_MAX_EDGES, film)))
+		return;
+	vec3 w = camera_direction(&c->w->camera, c->camera[0].x.p, film[0], film[1]);
+	assert_true(vec3_length(vec3_sub(w, towards(&c->camera[0], &c->light[s - 1]))) < 1e-12);
+}
+
 static struct tally check_world(const char *name, struct world *w, size_t walks)
 {
 	static struct path_context c;
@@ -365,6 +375,8 @@ static struct tally check_world(const char *name, struct world *w, size_t walks)
 			if (well_conditioned(&whole))
 				check_beta(&c, c.light, light, &tally);
 		}
+		for (unsigned j = 2; j <= light; j++)
+			check_landing(&c, j);
 		for (unsigned t = 1; t <= camera; t++)
 			for (unsigned j = t == 1 ? 2 : 0; j <= light && t + j - 1 <= DEPTH; j++)
 				if (t + j >= 2 && joins(&c, j, t))
@@ -431,6 +443,21 @@ static void test_infinity(void **state)
 	assert_true(t.infinite > t.routes / 10);
 }
 
+/* A wide lens, focused before the balls: x_k differs from path to path. */
+static void test_lens(void **state)
+{
+	(void)state;
+	static const char lens[] =
+		"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='.7'/>"
+		"<float name='focus_distance' value='1.5'/><transform name='to_world'><lookat origin='0,0,2.9' target='0,0,0' up='0,1,0'/>"
+		"</transform></sensor>";
+	struct world *w = world_of_text(32, 24, "%s%s", lens,
+					BOX LAMPS BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
+					BALL("1.4", "-.5", "0", "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>"));
+	assert_true(w->effects.aperture);
+	check_world("lens", w, 8000);
+}
+
 /* Normals of vertices up to 40 degrees off the triangles'. */
 static void test_bent_normals(void **state)
 {
@@ -458,6 +485,7 @@ int main(void)
 		cmocka_unit_test(test_diffuse_and_rough),
 		cmocka_unit_test(test_specular),
 		cmocka_unit_test(test_infinity),
+		cmocka_unit_test(test_lens),
 		cmocka_unit_test(test_bent_normals),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -161,10 +161,30 @@ static void test_refused(void **state)
 	refuses(SENSOR("<transform name='to_world'><scale z='0'/></transform>"), "must only turn");
 }
 
+/* Both dialects; everything else as a pinhole has it. */
+static void test_thin_lens(void **state)
+{
+	(void)state;
+	struct scene_settings s;
+	struct error e;
+	if (read_scene("<scene version='0.5.0'><sensor type='thinlens'><float name='fov' value='30'/><float name='apertureRadius' value='.25'/>"
+		       "<float name='focusDistance' value='7'/></sensor></scene>", 0, 0, &s, &e))
+		fail_msg("%s", e.text);
+	assert_true(s.aperture_radius == 0.25 && s.focus_distance == 7 && s.fov == 30);
+	/* Focused at the far plane, where nothing is said. */
+	if (read_scene("<scene version='3.0.0'><sensor type='thinlens'><float name='fov' value='30'/><float name='aperture_radius' value='2'/>"
+		       "<float name='far_clip' value='50'/></sensor></scene>", 0, 0, &s, &e))
+		fail_msg("%s", e.text);
+	assert_true(s.aperture_radius == 2 && s.focus_distance == 50);
+	s = read_ok("", "<float name='focusDistance' value='7'/>");
+	assert_true(s.aperture_radius == 0 && s.focus_distance == 0);
+	refuses("<sensor type='thinlens'/>", "needs an aperture_radius");
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_defaults),
+		cmocka_unit_test(test_thin_lens), cmocka_unit_test(test_defaults),
 		cmocka_unit_test(test_filters),
 		cmocka_unit_test(test_sampler_and_integrator),
 		cmocka_unit_test(test_camera),

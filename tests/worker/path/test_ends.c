@@ -1,0 +1,120 @@
+/*
+ * The ends of paths: a camera with an aperture, emitters that cannot be hit. Integrators against each other and against
+ * closed forms. Statistics as in tests/support/agree.h: level 1e-4 over the suite; biases of 2 % on a quarter of the
+ * picture and 0.5 % of the mean are found with 95 %, what exactly is printed.
+ */
+#include "tests/support/agree.h"
+#include "tests/support/dice.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* Samples a pixel that the power asks for; 0: not run. */
+struct effort {
+	uint64_t path, bdpt, pssmlt;
+};
+
+/* The first that runs is what the others are to agree with. Takes the world. */
+static void check_agreement(const char *name, struct world *w, struct effort e)
+{
+	static struct agree_image image[2];
+	const struct agree_side sides[] = {{"path", e.path, 32, 0, 0}, {"bdpt", e.bdpt, 32, 0, 0}, {"pssmlt", e.pssmlt, 32, 0, 0}};
+	const struct agree_image *reference = NULL;
+	for (size_t i = 0; i < 3; i++) {
+		char test[64];
+		if (!sides[i].spp)
+			continue;
+		snprintf(test, sizeof test, "%s, %s", name, sides[i].integrator);
+		agree_render(w, test, sides[i].integrator, &sides[i], &image[reference != NULL]);
+		if (reference)
+			agree_check(test, &image[1], reference);
+		reference = &image[0];
+	}
+	world_free(w);
+}
+
+#define DEPTH(k) "<integrator type='path'><integer name='max_depth' value='" k "'/></integrator>"
+#define DIFFUSE(x) "<bsdf type='diffuse'><float name='reflectance' value='" x "'/></bsdf>"
+#define AT(inner) "<transform name='to_world'>" inner "</transform>"
+#define BALL(center, radius, bsdf)                                                                                             \
+	"<shape type='sphere'><point name='center' value='" center "'/><float name='radius' value='" radius "'/>" bsdf "</shape>"
+#define LENS(radius, focus, filter, o, t)                                                                                      \
+	"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='" radius                      \
+	"'/><float name='focus_distance' value='" focus "'/><transform name='to_world'><lookat origin='" o "' target='" t         \
+	"' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='" filter "'/></film></sensor>"
+
+/* Everything out of focus by up to a third of the picture's width; a border of two pixels. */
+static void test_defocus(void **state)
+{
+	(void)state;
+	check_agreement("defocus",
+			world_of_text(16, 16, "%s%s", DEPTH("3") LENS("0.3", "1.5", "gaussian", "0,0.6,1.9", "0,-0.2,-1"),
+				      "<shape type='rectangle'>" AT("<scale value='5'/><rotate x='1' angle='-90'/><translate y='-1'/>")
+				      DIFFUSE("0.5") "</shape><emitter type='constant'><float name='radiance' value='.5'/></emitter>"
+				      "<shape type='rectangle'>" AT("<scale value='.8'/><translate z='-2'/>")
+				      "<emitter type='area'><float name='radiance' value='1'/></emitter></shape>"
+				      BALL("0.5,-0.8,-0.2", "0.5", "<bsdf type='roughconductor'><float name='alpha' value='.2'/></bsdf>")
+				      BALL("-0.5,0.1,0.9", "0.3", DIFFUSE("0.9"))),
+			(struct effort){8192, 6144, 65536});
+}
+
+struct span {
+	double low, high;
+};
+
+static double overlap(struct span a, struct span b)
+{
+	return fmax(fmin(a.high, b.high) - fmax(a.low, b.low), 0);
+}
+
+/* A shining rectangle across the axis at depth z, seen through a lens. For one point a of the aperture the picture is the
+ * pinhole's, moved by a (1/z - 1/focus) in slope; the mean over the aperture by quadrature. */
+static void test_blurred_rectangle(void **state)
+{
+	(void)state;
+	enum { RADII = 64, TURNS = 64 };
+	const double focus = 2, z = 5, radius = 0.5, half = tan(20 * M_PI / 180);
+	const struct span x = {-0.3 / z, 3 / z}, y = {-1.5 / z, 1 / z};
+	static struct agree_image image;
+	struct world *w = world_of_text(16, 16, "%s%s", DEPTH("1") LENS("0.5", "2", "box", "0,0,5", "0,0,0"),
+					"<shape type='rectangle'>" AT("<scale x='1.65' y='1.25'/><translate x='1.35' y='-.25'/>")
+					"<emitter type='area'/></shape>");
+	const struct agree_side side = {"path", 32768, 32, 0, 0};
+	agree_render(w, __func__, "path", &side, &image);
+	double expected[AGREE_CELLS + 1] = {0};
+	for (int c = 0; c < AGREE_CELLS; c++) {
+		/* Film y runs down. */
+		struct span bx = {half * (c % 2 - 1), half * (c % 2)}, by = {half * (0 - c / 2), half * (1 - c / 2)};
+		for (int i = 0; i < RADII * TURNS; i++) {
+			double r = radius * sqrt((i / TURNS + 0.5) / RADII), phi = 2 * M_PI * (i % TURNS + 0.5) / TURNS;
+			double move = 1 / focus - 1 / z, mx = r * cos(phi) * move, my = r * sin(phi) * move;
+			expected[c] += overlap((struct span){x.low + mx, x.high + mx}, bx) * overlap((struct span){y.low + my, y.high + my}, by) /
+				       (half * half * RADII * TURNS);
+		}
+		expected[AGREE_CELLS] += expected[c] / AGREE_CELLS;
+	}
+	double sum = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2];
+	for (uint32_t g = 0; g < image.groups; g++)
+		for (int c = 0; c <= AGREE_CELLS; c++)
+			image.mean[g][c] /= expected[c] * sum;
+	agree_expect("blurred rectangle", &image, 1);
+	/* A pinhole's picture is another one by far. */
+	double sharp = overlap(x, (struct span){-half, 0}) * overlap(y, (struct span){0, half}) / (half * half);
+	assert_true(fabs(expected[0] / sharp - 1) > 0.1);
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_defocus),
+		cmocka_unit_test(test_blurred_rectangle),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
