@@ -2,10 +2,12 @@
  * Primary sample space Metropolis light transport (Kelemen et al. 2002), over the bidirectional path tracer.
  */
 #include "worker/chain/pss.h"
+#include "worker/chain/pss_chain.h"
 #include "worker/path/integrator.h"
 
 const struct integrator integrator_pssmlt = {
 	.face = {"pssmlt", "primary sample space Metropolis over bdpt", PLAN_CHAINS, PSS_MAX_EDGES},
 	.stream = RNG_BOOTSTRAP,
 	.evaluate = path_trace_both_ways,
+	.chain = &chain_pss,
 };

@@ -12,6 +12,7 @@ struct integrator {
 	struct render_integrator face; /* name, summary, kind, depth that its state holds */
 	enum rng_stream stream;        /* of its own samples */
 	void (*evaluate)(struct path_context *c, struct sampler *s, struct path_sample *out);
+	const struct chain_ops *chain; /* worker/chain/chain.h; NULL: averages independent points */
 };
 
 extern const struct integrator *const integrator_registry[]; /* ends with NULL */

@@ -18,7 +18,7 @@ struct job {
 	struct path_context context;
 	struct path_sample sample;
 	struct film_sums film;
-	struct chain chain;
+	struct chain *chain;
 	struct batch *out;
 	struct error *e;
 };
@@ -149,9 +149,11 @@ static enum lease_end run_bootstrap(struct job *j)
 
 static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, uint64_t id, enum lease_end *end)
 {
-	struct chain *c = &j->chain;
-	*c = (struct chain){.integrator = j->integrator, .context = &j->context, .film = &j->film, .seed = j->plan->seed, .id = id};
-	bool ok = in->states ? chain_resume(c, &in->states[k]) : chain_start(c, in->seeds[k]);
+	struct chain *c = j->chain;
+	const struct chain_ops *ops = j->integrator->chain;
+	*c = (struct chain){.integrator = j->integrator, .context = &j->context, .film = &j->film, .mixture = j->plan->mutations,
+			    .strategy = j->out->strategy, .seed = j->plan->seed, .id = id};
+	bool ok = in->states ? ops->resume(c, &in->states[k]) : ops->start(c, in->seeds[k]);
 	if (!ok)
 		return error_set(j->e, EBADMSG, "chain %llu of group %u does not resume: its state is not one of this plan",
 				 (unsigned long long)id, j->key->group);
@@ -162,13 +164,13 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 			*end = LEASE_STOPPED;
 			return 0;
 		}
-		chain_step(c, &sums);
+		ops->step(c, &sums);
 	}
-	chain_flush(c);
+	ops->flush(c);
 	j->out->counters[COUNT_STUCK] += j->out->counters[COUNT_ACCEPTED] == accepted;
 	j->out->independent_sum += sums.sum;
 	j->out->independent_square += sums.square;
-	return chain_save(c, &j->out->states[k]);
+	return ops->save(c, &j->out->states[k]);
 }
 
 static int run_chains(struct job *j, const struct lease_input *in, enum lease_end *end)
@@ -220,7 +222,8 @@ static int prepare(struct job *j, const struct world *w, struct error *e)
 		struct plan_range r = plan_chain_range(p, j->key->part);
 		j->out->state_count = (uint32_t)(r.end - r.begin);
 		j->out->states = mem_alloc(j->out->state_count, sizeof *j->out->states);
-		if (!j->out->states)
+		j->chain = mem_alloc(1, j->integrator->chain->size);
+		if (!j->out->states || !j->chain)
 			return error_set(e, ENOMEM, "out of memory for chain states");
 	}
 	return film_sums_init(&j->film, p, &w->settings, e);
@@ -268,6 +271,7 @@ int render_lease(const struct world *w, const struct plan *p, const struct lease
 		fptrap_unwatch(watched);
 	}
 	film_sums_fini(&j->film);
+	mem_free(j->chain);
 	mem_free(j);
 	out->cpu_seconds = thread_seconds() - start;
 	if (rc || *end == LEASE_STOPPED)

@@ -4,7 +4,8 @@
  */
 #include "tests/support/dice.h"
 #include "tests/support/stats.h"
-#include "worker/chain/chain.h"
+#include "worker/chain/pss.h"
+#include "worker/chain/pss_chain.h"
 
 #include "common/base/mem.h"
 
@@ -201,7 +202,7 @@ static void check_target(const char *name, void (*evaluate)(struct path_context 
 {
 	enum { GROUPS = 16, CELLS = 4 };
 	static double cell[CELLS * CELLS][GROUPS], exact[CELLS * CELLS], total[GROUPS];
-	static struct chain c;
+	struct chain *c = test_malloc(chain_pss.size);
 	static struct path_context context;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	context.counters = counters;
@@ -221,12 +222,12 @@ static void check_target(const char *name, void (*evaluate)(struct path_context 
 		struct chain_sums sums = {0, 0};
 		assert_int_equal(film_sums_init(&film, &plan, &settings, NULL), 0);
 		memset(counters, 0, sizeof counters);
-		c = (struct chain){.integrator = &integrator, .context = &context, .film = &film, .seed = stats_seed(name), .id = (uint64_t)g};
+		*c = (struct chain){.integrator = &integrator, .context = &context, .film = &film, .seed = stats_seed(name), .id = (uint64_t)g};
 		/* Any start will do: chains this long forget it. */
-		assert_true(chain_start(&c, UINT64_MAX));
+		assert_true(chain_pss.start(c, UINT64_MAX));
 		for (size_t i = 0; i < steps; i++)
-			chain_step(&c, &sums);
-		chain_flush(&c);
+			chain_pss.step(c, &sums);
+		chain_pss.flush(c);
 		assert_int_equal(counters[COUNT_SAMPLES], steps);
 		assert_true(counters[COUNT_ACCEPTED] > steps / 4 && counters[COUNT_ACCEPTED] < steps);
 		double b = sums.sum / (double)counters[COUNT_INDEPENDENT], sum = 0;
@@ -254,6 +255,7 @@ static void check_target(const char *name, void (*evaluate)(struct path_context 
 	/* t at 1e-6 and 15 degrees is 7.7: what is found with 95 %. */
 	if (steps >= 400000)
 		assert_true(9.4 * worst < 0.12 && 9.4 * m.error / whole < 0.02);
+	test_free(c);
 }
 
 static void test_targets(void **state)
@@ -268,7 +270,7 @@ static void test_targets(void **state)
 static void test_resume(void **state)
 {
 	(void)state;
-	static struct chain whole, parts;
+	struct chain *whole = test_malloc(chain_pss.size), *parts = test_malloc(chain_pss.size);
 	static struct path_context context;
 	static uint64_t counters[BATCH_COUNTERS] = {0};
 	context.counters = counters;
@@ -280,45 +282,47 @@ static void test_resume(void **state)
 		struct chain_sums sa = {0, 0}, sb = {0, 0};
 		assert_int_equal(film_sums_init(&a, &plan, &settings, NULL), 0);
 		assert_int_equal(film_sums_init(&b, &plan, &settings, NULL), 0);
-		whole = (struct chain){.integrator = &integrator, .context = &context, .film = &a, .seed = 5, .id = 11};
-		parts = (struct chain){.integrator = &integrator, .context = &context, .film = &b, .seed = 5, .id = 11};
+		*whole = (struct chain){.integrator = &integrator, .context = &context, .film = &a, .seed = 5, .id = 11};
+		*parts = (struct chain){.integrator = &integrator, .context = &context, .film = &b, .seed = 5, .id = 11};
 		uint64_t index = start ? start : UINT64_MAX;
-		assert_true(chain_start(&whole, index) && chain_start(&parts, index));
+		assert_true(chain_pss.start(whole, index) && chain_pss.start(parts, index));
 		for (int epoch = 0; epoch < 20; epoch++) {
 			struct chain_state s, t;
 			for (int i = 0; i < 37; i++) {
-				chain_step(&whole, &sa);
-				chain_step(&parts, &sb);
+				chain_pss.step(whole, &sa);
+				chain_pss.step(parts, &sb);
 			}
-			chain_flush(&whole);
-			chain_flush(&parts);
-			assert_int_equal(chain_save(&parts, &s), 0);
-			memset(&parts.place, 0xa5, sizeof parts.place);
-			parts.step = parts.rejected_run = 99;
-			assert_true(chain_resume(&parts, &s));
-			assert_int_equal(chain_save(&parts, &t), 0);
+			chain_pss.flush(whole);
+			chain_pss.flush(parts);
+			assert_int_equal(chain_pss.save(parts, &s), 0);
+			memset(parts + 1, 0xa5, chain_pss.size - sizeof *parts);
+			parts->step = parts->rejected_run = 99;
+			assert_true(chain_pss.resume(parts, &s));
+			assert_int_equal(chain_pss.save(parts, &t), 0);
 			assert_int_equal(s.size, t.size);
 			assert_memory_equal(s.bytes, t.bytes, s.size);
 			assert_true(s.size <= CHAIN_STATE_MAX);
 			/* Another chain's, or a piece of it, is refused. */
 			struct chain_state piece = {s.bytes, s.size - 1};
-			assert_false(chain_resume(&parts, &piece));
+			assert_false(chain_pss.resume(parts, &piece));
 			piece.size = 10;
-			assert_false(chain_resume(&parts, &piece));
-			parts.id++;
-			assert_false(chain_resume(&parts, &s));
-			parts.id--;
-			assert_true(chain_resume(&parts, &s));
+			assert_false(chain_pss.resume(parts, &piece));
+			parts->id++;
+			assert_false(chain_pss.resume(parts, &s));
+			parts->id--;
+			assert_true(chain_pss.resume(parts, &s));
 			mem_free(s.bytes);
 			mem_free(t.bytes);
 		}
 		assert_memory_equal(a.xyz, b.xyz, (size_t)SIDE * SIDE * 3 * sizeof *a.xyz);
 		assert_memory_equal(&sa, &sb, sizeof sa);
-		assert_int_equal(whole.step, parts.step);
-		assert_int_equal(whole.rejected_run, parts.rejected_run);
+		assert_int_equal(whole->step, parts->step);
+		assert_int_equal(whole->rejected_run, parts->rejected_run);
 		film_sums_fini(&a);
 		film_sums_fini(&b);
 	}
+	test_free(whole);
+	test_free(parts);
 }
 
 int main(void)
