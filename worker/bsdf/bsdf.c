@@ -1,6 +1,7 @@
 #include "worker/bsdf/bsdf.h"
 
 #include "worker/bsdf/create.h"
+#include "worker/bsdf/microfacet.h"
 
 #include <string.h>
 
@@ -59,16 +60,16 @@ double bsdf_eta(const struct bsdf *b, const struct wavelengths *w)
 /* What a plug-in that cancels nothing by hand is worth. */
 static spectrum halfvec_product(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
+	struct bsdf_point radiance = *p;
+	radiance.transport = TRANSPORT_RADIANCE;
+	spectrum f = b->ops->eval(b, &radiance, wo, wi);
 	bool reflect = wo.z * wi.z > 0;
-	double eta = reflect ? 1 : wo.z > 0 ? bsdf_eta(b, p->w) : 1 / bsdf_eta(b, p->w);
-	vec3 un = vec3_madd(wo, eta, wi);
-	double length = vec3_length(un);
-	if (!(length > 0))
+	double eta = reflect ? 1 : wo.z > 0 ? bsdf_eta(b, p->w) : 1 / bsdf_eta(b, p->w), length;
+	vec3 h;
+	if (spectrum_is_zero(f) || !microfacet_half(wo, eta, wi, &h, &length))
 		return spectrum_of(0);
-	vec3 h = vec3_scale(1 / length, un);
-	double oh = vec3_dot(wo, h), ih = vec3_dot(wi, h), root = oh + eta * ih;
-	double solid = reflect ? 4 * fabs(ih) : root * root / (eta * eta * fabs(ih));
-	return spectrum_scale(fabs(wi.z * h.z * h.z * h.z) * solid, b->ops->eval(b, p, wo, wi));
+	double ih = vec3_dot(wi, h), solid = reflect ? 2 * length : length * length / (eta * eta * fabs(ih));
+	return spectrum_scale(fabs(wi.z * h.z * h.z * h.z) * solid, f);
 }
 
 spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)

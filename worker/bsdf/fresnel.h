@@ -10,15 +10,23 @@ struct fresnel {
 	double cos_t; /* cosine beyond, 0 at total reflection */
 };
 
-/* eta: index beyond over index here. */
+/* Cosines on both sides, of directions that Snell's law joins; eta: index beyond over index here. The differences of the
+ * amplitudes are written as what is left of them, so that no digit goes where eta is next to 1. */
+static inline struct fresnel fresnel_between(double c, double t, double eta)
+{
+	double s = 1 / (c + eta * t), p = 1 / (eta * c + t), e = (eta - 1) * (eta + 1);
+	double rs = e * s * s, rp = e * p * ((c * c * (eta * eta + 1) - 1) * p) / (eta * eta);
+	double ts = 2 * c * s * (eta * t * s), tp = 2 * c * p * (eta * t * p);
+	return (struct fresnel){fmin(0.5 * (rs * rs + rp * rp), 1), fmin(ts + tp, 1), t};
+}
+
 static inline struct fresnel fresnel_dielectric(double c, double eta)
 {
-	double s2 = (1 - c) * (1 + c), t2 = 1 - s2 / (eta * eta);
+	/* (eta cos_t)^2; each form keeps its digits where it is used, next to eta = 1 and to the normal. */
+	double t2 = c * c < 0.5 ? (eta - 1) * (eta + 1) + c * c : eta * eta - (1 - c) * (1 + c);
 	if (!(t2 > 0))
 		return (struct fresnel){1, 0, 0};
-	double t = sqrt(t2), s = 1 / (c + eta * t), p = 1 / (eta * c + t);
-	double rs = (c - eta * t) * s, rp = (eta * c - t) * p;
-	return (struct fresnel){0.5 * (rs * rs + rp * rp), 2 * c * eta * t * (s * s + p * p), t};
+	return fresnel_between(c, sqrt(t2) / eta, eta);
 }
 
 /* Index eta - i k beyond, over the index here. eta = 0, k = 1 is a perfect mirror. */

@@ -28,13 +28,17 @@ double microfacet_g1_over_cos(const struct microfacet *m, vec3 v);
  * Beckmann: Heitz and d'Eon 2014, inverted to double precision. */
 vec3 microfacet_sample_visible(const struct microfacet *m, vec3 v, double u0, double u1);
 
-/* The direction of `sum`; false when it has none. */
-static inline bool microfacet_half(vec3 sum, vec3 *h)
+/* The half vector wo + eta wi: direction and length. false: too short to have one. */
+static inline bool microfacet_half(vec3 wo, double eta, vec3 wi, vec3 *h, double *length)
 {
+	vec3 sum = vec3_madd(wo, eta, wi);
 	double largest = fmax(fabs(sum.x), fmax(fabs(sum.y), fabs(sum.z)));
 	if (!(largest > 1e-300))
 		return false;
-	*h = vec3_normalize(vec3_scale(1 / largest, sum));
+	sum = vec3_scale(1 / largest, sum);
+	double l = vec3_length(sum);
+	*h = vec3_scale(1 / l, sum);
+	*length = l * largest;
 	return true;
 }
 

@@ -7,39 +7,48 @@ struct roughconductor {
 	struct microfacet facets;
 };
 
-/* The facet between the two: its cosine against them, and D G1(wo) / 4 wo.z, the density of wi. */
-static bool facet_of(const struct roughconductor *r, vec3 wo, vec3 wi, double *cosine, double *pdf)
-{
+/* The facet between two directions. */
+struct facet {
 	vec3 h;
-	if (!(wo.z > 0 && wi.z > 0) || !microfacet_half(vec3_add(wo, wi), &h))
+	double cosine; /* against both */
+	double pdf;    /* D G1(wo) / 4 wo.z, the density of wi */
+};
+
+static bool facet_of(const struct roughconductor *r, vec3 wo, vec3 wi, struct facet *f)
+{
+	double length;
+	if (!(wo.z > 0 && wi.z > 0) || !microfacet_half(wo, 1, wi, &f->h, &length))
 		return false;
-	*cosine = vec3_dot(wo, h);
-	double d = microfacet_d(&r->facets, h);
-	if (!(d > 0))
-		return false;
-	*pdf = 0.25 * d * microfacet_g1_over_cos(&r->facets, wo);
-	return *pdf > 0;
+	f->cosine = 0.5 * length;
+	f->pdf = 0.25 * microfacet_d(&r->facets, f->h) * microfacet_g1_over_cos(&r->facets, wo);
+	return f->pdf > 0;
 }
 
-static spectrum facet_f(const struct bsdf *b, const struct bsdf_point *p, vec3 wi, double cosine, double pdf)
+static spectrum facet_f(const struct bsdf *b, const struct bsdf_point *p, vec3 wi, const struct facet *f)
 {
 	const struct roughconductor *r = b->data;
-	return spectrum_scale(pdf * microfacet_g1_over_cos(&r->facets, wi), metal_fresnel(&r->metal, p, cosine));
+	return spectrum_scale(f->pdf * microfacet_g1_over_cos(&r->facets, wi), metal_fresnel(&r->metal, p, f->cosine));
 }
 
 static spectrum roughconductor_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	double cosine, pdf;
-	if (!facet_of(b->data, wo, wi, &cosine, &pdf))
+	struct facet f;
+	return facet_of(b->data, wo, wi, &f) ? facet_f(b, p, wi, &f) : spectrum_of(0);
+}
+
+static spectrum roughconductor_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	struct facet f;
+	if (!facet_of(b->data, wo, wi, &f))
 		return spectrum_of(0);
-	return facet_f(b, p, wi, cosine, pdf);
+	return spectrum_scale(4 * f.cosine * f.h.z * f.h.z * f.h.z * wi.z, facet_f(b, p, wi, &f));
 }
 
 static double roughconductor_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	(void)p;
-	double cosine, pdf;
-	return facet_of(b->data, wo, wi, &cosine, &pdf) ? pdf : 0;
+	struct facet f;
+	return facet_of(b->data, wo, wi, &f) ? f.pdf : 0;
 }
 
 static bool roughconductor_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -50,11 +59,10 @@ static bool roughconductor_sample(const struct bsdf *b, const struct bsdf_point 
 		return false;
 	vec3 h = microfacet_sample_visible(&r->facets, wo, u[0], u[1]);
 	vec3 wi = vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(wo, h), h), wo));
-	double cosine, pdf;
-	if (!facet_of(r, wo, wi, &cosine, &pdf))
+	struct facet f;
+	if (!facet_of(r, wo, wi, &f))
 		return false;
-	*out = (struct bsdf_sample){.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf,
-				    .f = facet_f(b, p, wi, cosine, pdf), .eta = 1};
+	*out = (struct bsdf_sample){.wi = wi, .mode = BSDF_REFLECT, .pdf = f.pdf, .f = facet_f(b, p, wi, &f), .eta = 1};
 	return true;
 }
 
@@ -81,5 +89,6 @@ const struct bsdf_ops bsdf_ops_roughconductor = {
 	.create = roughconductor_create,
 	.eval = roughconductor_eval,
 	.pdf_solid = roughconductor_pdf,
+	.eval_halfvec = roughconductor_eval_halfvec,
 	.sample = roughconductor_sample,
 };

@@ -18,29 +18,41 @@ struct facet {
 	double eta;  /* index beyond over index on wo's side */
 	struct fresnel fresnel;
 	double cos_o, cos_i; /* against h; cos_i < 0 when refracted */
-	double jacobian;     /* solid angle of h over that of wi */
+	double length;       /* of wo + wi or wo + eta wi */
 };
 
-/* wo.z > 0. false: no facet connects the two. */
+/* wo.z > 0. false: no facet connects the two. Fresnel's factors come from both cosines: next to the critical angle one alone
+ * says little about the other. */
 static bool facet_of(const struct roughdielectric *r, double eta, vec3 wo, vec3 wi, struct facet *f)
 {
 	bool reflect = wi.z > 0;
-	vec3 sum = reflect ? vec3_add(wo, wi) : vec3_madd(wo, eta, wi);
-	if (wi.z == 0 || !microfacet_half(sum, &f->h))
+	if (wi.z == 0 || (!reflect && eta == 1) || !microfacet_half(wo, reflect ? 1 : eta, wi, &f->h, &f->length))
 		return false;
 	if (f->h.z < 0)
 		f->h = vec3_neg(f->h);
 	f->eta = eta;
-	f->cos_o = vec3_dot(wo, f->h);
-	f->cos_i = vec3_dot(wi, f->h);
-	/* Facets are seen from the side that the surface is seen from. */
-	if (!(f->cos_o > 0) || (reflect ? !(f->cos_i > 0) : !(f->cos_i < 0)))
-		return false;
-	f->fresnel = fresnel_dielectric(fmin(f->cos_o, 1), eta);
+	if (reflect) {
+		f->cos_o = f->cos_i = 0.5 * f->length;
+		f->fresnel = fresnel_dielectric(fmin(f->cos_o, 1), eta);
+	} else {
+		f->cos_o = vec3_dot(wo, f->h);
+		f->cos_i = vec3_dot(wi, f->h);
+		/* Facets are seen from the side that the surface is seen from. */
+		if (!(f->cos_o > 0 && f->cos_i < 0))
+			return false;
+		f->fresnel = fresnel_between(fmin(f->cos_o, 1), fmin(-f->cos_i, 1), eta);
+	}
 	f->d = microfacet_d(&r->facets, f->h) * microfacet_g1_over_cos(&r->facets, wo);
-	double root = f->cos_o + eta * f->cos_i;
-	f->jacobian = reflect ? 0.25 / f->cos_o : eta * eta * -f->cos_i / (root * root);
-	return f->d > 0 && isfinite(f->jacobian);
+	return f->d > 0;
+}
+
+/* Cosine against h times the solid angle of h over that of wi. */
+static double facet_spread(const struct facet *f, bool reflect)
+{
+	if (reflect)
+		return 0.25;
+	double root = f->eta / f->length;
+	return f->cos_o * -f->cos_i * root * root;
 }
 
 static vec3 mirror(vec3 v, bool below)
@@ -48,41 +60,64 @@ static vec3 mirror(vec3 v, bool below)
 	return below ? (vec3){v.x, v.y, -v.z} : v;
 }
 
+/* What Fresnel and the transport leave of light. */
+static spectrum share(const struct roughdielectric *r, const struct bsdf_point *p, const struct facet *f, bool reflect,
+		      enum transport transport)
+{
+	if (reflect)
+		return spectrum_scale(f->fresnel.reflected, texture_eval(&r->glass.reflectance, p->u, p->v, p->w));
+	double scale = transport == TRANSPORT_RADIANCE ? 1 / (f->eta * f->eta) : 1;
+	return spectrum_scale(f->fresnel.transmitted * scale, texture_eval(&r->glass.transmittance, p->u, p->v, p->w));
+}
+
+/* G1(wi) / |wi.z| on whichever side. */
+static double g1_over_cos(const struct roughdielectric *r, vec3 wi)
+{
+	return microfacet_g1_over_cos(&r->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
+}
+
 static spectrum facet_f(const struct bsdf *b, const struct bsdf_point *p, const struct facet *f, vec3 wi)
 {
 	const struct roughdielectric *r = b->data;
-	double common = f->d * microfacet_g1_over_cos(&r->facets, (vec3){wi.x, wi.y, fabs(wi.z)}) * f->cos_o * f->jacobian;
-	if (wi.z > 0)
-		return spectrum_scale(common * f->fresnel.reflected, texture_eval(&r->glass.reflectance, p->u, p->v, p->w));
-	if (p->transport == TRANSPORT_RADIANCE)
-		common /= f->eta * f->eta;
-	return spectrum_scale(common * f->fresnel.transmitted, texture_eval(&r->glass.transmittance, p->u, p->v, p->w));
+	double common = f->d * g1_over_cos(r, wi) * facet_spread(f, wi.z > 0);
+	return spectrum_scale(common, share(r, p, f, wi.z > 0, p->transport));
 }
 
 static double facet_pdf(const struct facet *f, vec3 wi)
 {
-	return f->d * f->cos_o * f->jacobian * (wi.z > 0 ? f->fresnel.reflected : f->fresnel.transmitted);
+	return f->d * facet_spread(f, wi.z > 0) * (wi.z > 0 ? f->fresnel.reflected : f->fresnel.transmitted);
+}
+
+/* Seen with wo on the side of the normal. */
+static bool facet_between(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 *wi, struct facet *f)
+{
+	bool below = wo.z < 0;
+	double eta = bsdf_eta(b, p->w);
+	*wi = mirror(*wi, below);
+	return wo.z != 0 && facet_of(b->data, below ? 1 / eta : eta, mirror(wo, below), *wi, f);
 }
 
 static spectrum roughdielectric_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	bool below = wo.z < 0;
 	struct facet f;
-	wi = mirror(wi, below);
-	if (wo.z == 0 || !facet_of(b->data, below ? 1 / b->eta : b->eta, mirror(wo, below), wi, &f))
+	return facet_between(b, p, wo, &wi, &f) ? facet_f(b, p, &f, wi) : spectrum_of(0);
+}
+
+/* Neither the solid angle of h over that of wi nor its inverse: both go to extremes as eta goes to 1. */
+static spectrum roughdielectric_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct roughdielectric *r = b->data;
+	struct facet f;
+	if (!facet_between(b, p, wo, &wi, &f))
 		return spectrum_of(0);
-	return facet_f(b, p, &f, wi);
+	double common = f.d * f.h.z * f.h.z * f.h.z * f.cos_o * g1_over_cos(r, wi) * fabs(wi.z);
+	return spectrum_scale(common, share(r, p, &f, wi.z > 0, TRANSPORT_RADIANCE));
 }
 
 static double roughdielectric_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	(void)p;
-	bool below = wo.z < 0;
 	struct facet f;
-	wi = mirror(wi, below);
-	if (wo.z == 0 || !facet_of(b->data, below ? 1 / b->eta : b->eta, mirror(wo, below), wi, &f))
-		return 0;
-	return facet_pdf(&f, wi);
+	return facet_between(b, p, wo, &wi, &f) ? facet_pdf(&f, wi) : 0;
 }
 
 static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -93,7 +128,7 @@ static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point
 	if (wo.z == 0)
 		return false;
 	wo = mirror(wo, below);
-	double eta = below ? 1 / b->eta : b->eta;
+	double eta = below ? 1 / bsdf_eta(b, p->w) : bsdf_eta(b, p->w);
 	vec3 h = microfacet_sample_visible(&r->facets, wo, u[0], u[1]), wi;
 	double c = fmin(vec3_dot(wo, h), 1);
 	if (!(c > 0))
@@ -150,5 +185,6 @@ const struct bsdf_ops bsdf_ops_roughdielectric = {
 	.create = roughdielectric_create,
 	.eval = roughdielectric_eval,
 	.pdf_solid = roughdielectric_pdf,
+	.eval_halfvec = roughdielectric_eval_halfvec,
 	.sample = roughdielectric_sample,
 };

@@ -28,6 +28,14 @@ static double twosided_pdf(const struct bsdf *b, const struct bsdf_point *p, vec
 	return t->side[1].ops->pdf_solid(&t->side[1], p, mirror(wo), mirror(wi));
 }
 
+static spectrum twosided_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct twosided *t = b->data;
+	if (wo.z > 0)
+		return bsdf_eval_halfvec(&t->side[0], p, wo, wi);
+	return bsdf_eval_halfvec(&t->side[1], p, mirror(wo), mirror(wi));
+}
+
 static spectrum twosided_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
 				    double *chance)
 {
@@ -112,6 +120,7 @@ const struct bsdf_ops bsdf_ops_twosided = {
 	.create = twosided_create,
 	.eval = twosided_eval,
 	.pdf_solid = twosided_pdf,
+	.eval_halfvec = twosided_eval_halfvec,
 	.eval_delta = twosided_eval_delta,
 	.sample = twosided_sample,
 };

@@ -53,6 +53,8 @@ static void check(const char *text, const struct bsdf *b, const struct bsdf_poin
 	vec3 wo = corner(i, u), wi = i % 5 == 0 ? (vec3){-wo.x, -wo.y, wo.z} : corner(i / 2, v);
 	spectrum f = b->ops->eval(b, p, wo, wi);
 	double pdf = b->ops->pdf_solid(b, p, wo, wi);
+	if (!spectrum_is_valid(bsdf_eval_halfvec(b, p, wo, wi)))
+		fail_msg("%s: half vector form from z = %g to %g", text, wo.z, wi.z);
 	if (!spectrum_is_valid(f) || !(pdf >= 0) || !isfinite(pdf))
 		fail_msg("%s: f %g, pdf %g from z = %g to %g", text, f.v[0], pdf, wo.z, wi.z);
 	const double numbers[3] = {end_of_range(u[2], x[0]), end_of_range(u[3], x[1]), end_of_range(v[2], x[2])};
