@@ -178,7 +178,7 @@ bool whole_film(const struct path_context *c, struct whole_path *x)
 		camera_clip(&c->w->camera, d, &t_min, &t_max);
 		distance = 0.5 * (t_min + t_max);
 	}
-	if (!camera_project(&c->w->camera, d, distance, &x->film[0], &x->film[1]))
+	if (!camera_project(&c->w->camera, x->v[x->edges].x.p, d, distance, &x->film[0], &x->film[1]))
 		return false;
 	return x->film[0] >= w->x && x->film[0] < w->x + w->width && x->film[1] >= w->y && x->film[1] < w->y + w->height;
 }
