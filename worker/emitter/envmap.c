@@ -212,7 +212,7 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 		return node_error(n, e, ENOMEM, "out of memory");
 	int code = read_axes(m, n, e);
 	if (!code)
-		code = raster_read(&m->raster, n, build->assets, HUGE_VAL, build->arena, e);
+		code = raster_read(&m->raster, n, build->assets, &(struct raster_range){0, HUGE_VAL, false}, build->arena, e);
 	if (code)
 		return code;
 	m->raster.wrap_u = RASTER_REPEAT;

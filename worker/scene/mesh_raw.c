@@ -12,18 +12,6 @@ bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool norm
 	return m->position && m->index && (m->normal || !normals) && (m->uv || !uv);
 }
 
-static vec3 load(const double v[3])
-{
-	return (vec3){v[0], v[1], v[2]};
-}
-
-static void store(double out[3], vec3 v)
-{
-	out[0] = v.x;
-	out[1] = v.y;
-	out[2] = v.z;
-}
-
 static bool in_range(vec3 p)
 {
 	return fabs(p.x) <= MESH_COORDINATE_MAX && fabs(p.y) <= MESH_COORDINATE_MAX && fabs(p.z) <= MESH_COORDINATE_MAX;
@@ -31,7 +19,7 @@ static bool in_range(vec3 p)
 
 static vec3 area_normal(const struct mesh *m, const uint32_t t[3])
 {
-	vec3 a = load(m->position[t[0]]), b = load(m->position[t[1]]), c = load(m->position[t[2]]);
+	vec3 a = mesh_load(m->position[t[0]]), b = mesh_load(m->position[t[1]]), c = mesh_load(m->position[t[2]]);
 	return vec3_cross(vec3_sub(b, a), vec3_sub(c, a));
 }
 
@@ -48,17 +36,17 @@ static int place_vertices(struct mesh *m, const struct mesh_finish *f, const str
 	if (!mat4_invert(f->to_world, &inverse))
 		return node_error(n, e, EINVAL, "to_world flattens the shape (it has no inverse)");
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
-		vec3 p = mat4_point(&f->to_world, load(m->position[i]));
+		vec3 p = mat4_point(&f->to_world, mesh_load(m->position[i]));
 		if (!in_range(p))
 			return node_error(n, e, ERANGE, "a vertex lies beyond %g", MESH_COORDINATE_MAX);
-		store(m->position[i], p);
+		mesh_store(m->position[i], p);
 		if (!m->normal)
 			continue;
 		/* Normals come as unit vectors or as nothing; scaling first keeps tiny and huge transforms in range. */
-		vec3 normal = mat4_normal(&inverse, load(m->normal[i]));
+		vec3 normal = mat4_normal(&inverse, mesh_load(m->normal[i]));
 		double largest = fmax(fabs(normal.x), fmax(fabs(normal.y), fabs(normal.z)));
 		normal = largest > 0 && isfinite(largest) ? vec3_normalize(vec3_scale(1 / largest, normal)) : (vec3){0, 0, 0};
-		store(m->normal[i], vec3_is_finite(normal) ? normal : (vec3){0, 0, 0});
+		mesh_store(m->normal[i], vec3_is_finite(normal) ? normal : (vec3){0, 0, 0});
 	}
 	if (mat4_det3(f->to_world) < 0)
 		for (uint32_t i = 0; i < m->triangle_count; i++)
@@ -88,15 +76,10 @@ static void wind_by_normals(struct mesh *m)
 		vec3 g = area_normal(m, m->index[i]);
 		int against = 0;
 		for (int k = 0; k < 3; k++)
-			against += vec3_dot(g, load(m->normal[m->index[i][k]])) < 0;
+			against += vec3_dot(g, mesh_load(m->normal[m->index[i][k]])) < 0;
 		if (against == 3)
 			turn_round(m->index[i]);
 	}
-}
-
-static double angle_between(vec3 a, vec3 b)
-{
-	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
 }
 
 static void add_corner_normals(struct mesh *m, const uint32_t t[3], const double (*given)[3])
@@ -104,12 +87,12 @@ static void add_corner_normals(struct mesh *m, const uint32_t t[3], const double
 	vec3 g = vec3_normalize(area_normal(m, t));
 	for (int k = 0; k < 3; k++) {
 		uint32_t v = t[k];
-		if (given && vec3_length(load(given[v])) > 0)
+		if (given && vec3_length(mesh_load(given[v])) > 0)
 			continue;
-		vec3 p = load(m->position[v]);
-		double angle = angle_between(vec3_sub(load(m->position[t[(k + 1) % 3]]), p),
-					     vec3_sub(load(m->position[t[(k + 2) % 3]]), p));
-		store(m->normal[v], vec3_madd(load(m->normal[v]), angle, g));
+		vec3 p = mesh_load(m->position[v]);
+		double angle = mesh_angle(vec3_sub(mesh_load(m->position[t[(k + 1) % 3]]), p),
+					     vec3_sub(mesh_load(m->position[t[(k + 2) % 3]]), p));
+		mesh_store(m->normal[v], vec3_madd(mesh_load(m->normal[v]), angle, g));
 	}
 }
 
@@ -119,10 +102,10 @@ static void fill_cancelled(struct mesh *m)
 	for (uint32_t i = 0; i < m->triangle_count; i++)
 		for (int k = 0; k < 3; k++) {
 			double *normal = m->normal[m->index[i][k]];
-			vec3 v = load(normal);
+			vec3 v = mesh_load(normal);
 			if (!(vec3_length(v) > 1e-12))
 				v = vec3_normalize(area_normal(m, m->index[i]));
-			store(normal, vec3_normalize(v));
+			mesh_store(normal, vec3_normalize(v));
 		}
 }
 
@@ -144,7 +127,7 @@ static bool lacks_normals(const struct mesh *m)
 {
 	for (uint32_t i = 0; i < m->triangle_count && m->normal; i++)
 		for (int k = 0; k < 3; k++)
-			if (!(vec3_length(load(m->normal[m->index[i][k]])) > 0))
+			if (!(vec3_length(mesh_load(m->normal[m->index[i][k]])) > 0))
 				return true;
 	return !m->normal;
 }
@@ -167,7 +150,7 @@ int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena
 		for (uint32_t i = 0; i < m->triangle_count; i++)
 			turn_round(m->index[i]);
 		for (uint32_t i = 0; i < m->vertex_count && m->normal; i++)
-			store(m->normal[i], vec3_neg(load(m->normal[i])));
+			mesh_store(m->normal[i], vec3_neg(mesh_load(m->normal[i])));
 	}
 	return 0;
 }

@@ -10,6 +10,23 @@
 enum { MESH_TRIANGLES_MAX = 1 << 27 };
 #define MESH_COORDINATE_MAX 1e60 /* so that squares of areas stay finite */
 
+static inline vec3 mesh_load(const double v[3])
+{
+	return (vec3){v[0], v[1], v[2]};
+}
+
+static inline void mesh_store(double out[3], vec3 v)
+{
+	out[0] = v.x;
+	out[1] = v.y;
+	out[2] = v.z;
+}
+
+static inline double mesh_angle(vec3 a, vec3 b)
+{
+	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
+}
+
 /* Allocates the arrays; false: out of memory. */
 bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool normals, bool uv, struct arena *arena);
 

@@ -1,3 +1,4 @@
+#include "worker/scene/displace.h"
 #include "worker/scene/mesh_raw.h"
 
 #include <float.h>
@@ -18,12 +19,14 @@ static const struct param obj_params[] = {
 	{"load_materials", IGNORED}, /* .mtl files are never read */
 	{"max_smooth_angle", REFUSED},
 	{"shape_index", REFUSED},
+	DISPLACE_PARAMS,
 	PARAM_END,
 };
 
 static const struct param rectangle_params[] = {
 	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
 	{"flip_normals", UNDERSTOOD(VALUE_BOOL)},
+	DISPLACE_PARAMS,
 	PARAM_END,
 };
 
@@ -32,6 +35,7 @@ static const struct param sphere_params[] = {
 	{"radius", VALUE_FLOAT, PARAM_UNDERSTOOD, DBL_MIN, MESH_COORDINATE_MAX, NULL},
 	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
 	{"flip_normals", UNDERSTOOD(VALUE_BOOL)},
+	DISPLACE_PARAMS,
 	PARAM_END,
 };
 

@@ -54,7 +54,9 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 	t->data = b;
 	if (role == COLOR_UNBOUNDED)
 		return node_error(n, e, ENOTSUP, "a bitmap cannot stand for this quantity");
-	int code = raster_read(&b->raster, n, assets, role == COLOR_REFLECTANCE ? 1 : DBL_MAX, arena, e);
+	const struct raster_range range = {role == COLOR_HEIGHT ? -DBL_MAX : 0, role == COLOR_REFLECTANCE ? 1 : DBL_MAX,
+					   role == COLOR_HEIGHT};
+	int code = raster_read(&b->raster, n, assets, &range, arena, e);
 	if (code)
 		return code;
 	const char *both = node_string(n, "wrap_mode", "repeat");
@@ -63,6 +65,8 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 	b->raster.nearest = strcmp(node_string(n, "filter_type", "bilinear"), "nearest") == 0;
 	b->map = uv_map_read(n);
 	b->role = role;
+	if (role == COLOR_HEIGHT)
+		return 0;
 	b->shape = !raster_is_grey(&b->raster) ? COLOR_SHAPE_OTHER
 		   : role == COLOR_ILLUMINANT  ? COLOR_SHAPE_D65
 					       : COLOR_SHAPE_CONSTANT;
@@ -77,6 +81,16 @@ static spectrum bitmap_eval(const struct texture *t, double u, double v, const s
 	uv_map_apply(&b->map, &u, &v);
 	raster_eval(&b->raster, u, v, rgb);
 	return b->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);
+}
+
+/* Of a coloured picture the luminance. */
+static double bitmap_height(const struct texture *t, double u, double v)
+{
+	const struct bitmap *b = t->data;
+	double rgb[3];
+	uv_map_apply(&b->map, &u, &v);
+	raster_eval(&b->raster, u, v, rgb);
+	return b->raster.image.channels == 1 ? rgb[0] : 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
 }
 
 static double bitmap_max(const struct texture *t)
@@ -108,6 +122,7 @@ const struct texture_ops texture_ops_bitmap = {
 	.params = bitmap_params,
 	.create = bitmap_create,
 	.eval = bitmap_eval,
+	.height = bitmap_height,
 	.max = bitmap_max,
 	.shape = bitmap_shape,
 };

@@ -19,13 +19,21 @@ static int checkerboard_create(struct texture *t, const struct scene_node *n, en
 	return code ? code : texture_from_node(&c->color[1], n, "color1", 0.2, role, assets, dialect_3, arena, e);
 }
 
+static const struct texture *square_at(const struct checkerboard *c, double u, double v)
+{
+	uv_map_apply(&c->map, &u, &v);
+	bool right = u - floor(u) > 0.5, low = v - floor(v) > 0.5;
+	return &c->color[right != low];
+}
+
 static spectrum checkerboard_eval(const struct texture *t, double u, double v, const struct wavelengths *w)
 {
-	const struct checkerboard *c = t->data;
-	double x = u, y = v;
-	uv_map_apply(&c->map, &x, &y);
-	bool right = x - floor(x) > 0.5, low = y - floor(y) > 0.5;
-	return texture_eval(&c->color[right != low], u, v, w);
+	return texture_eval(square_at(t->data, u, v), u, v, w);
+}
+
+static double checkerboard_height(const struct texture *t, double u, double v)
+{
+	return texture_height(square_at(t->data, u, v), u, v);
 }
 
 static double checkerboard_max(const struct texture *t)
@@ -53,6 +61,7 @@ const struct texture_ops texture_ops_checkerboard = {
 	.params = checkerboard_params,
 	.create = checkerboard_create,
 	.eval = checkerboard_eval,
+	.height = checkerboard_height,
 	.max = checkerboard_max,
 	.shape = checkerboard_shape,
 };

@@ -10,7 +10,8 @@
 #include "worker/math/spectrum.h"
 #include "worker/scene/scene.h"
 
-enum color_role { COLOR_REFLECTANCE, COLOR_ILLUMINANT, COLOR_UNBOUNDED };
+/* COLOR_HEIGHT is of textures only: plain numbers of either sign, no spectrum. */
+enum color_role { COLOR_REFLECTANCE, COLOR_ILLUMINANT, COLOR_UNBOUNDED, COLOR_HEIGHT };
 
 /* How a colour varies with wavelength. Grey scenes need all reflectances CONSTANT and all emitters of one kind. */
 enum color_shape { COLOR_SHAPE_CONSTANT, COLOR_SHAPE_D65, COLOR_SHAPE_OTHER };

@@ -1,7 +1,7 @@
 #include "worker/texture/raster.h"
 
-int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets, double largest,
-		struct arena *arena, struct error *e)
+int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
+		const struct raster_range *range, struct arena *arena, struct error *e)
 {
 	const char *name = node_string(n, "filename", NULL);
 	double gamma = node_float(n, "gamma", 0);
@@ -10,13 +10,14 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 	if (gamma != 0 && gamma != 1 && gamma != -1)
 		return node_error(n, e, ENOTSUP, "gamma = %g is not supported; it can be 1 (linear) or -1 (sRGB)", gamma);
 	struct error reason;
-	int code = image_read(assets, name, gamma == 1 || node_bool(n, "raw", false), arena, &r->image, &reason);
+	bool raw = node_bool(n, "raw", range->raw && gamma != -1);
+	int code = image_read(assets, name, gamma == 1 || raw, arena, &r->image, &reason);
 	if (code)
 		return node_error(n, e, -code, "%s", reason.text);
 	size_t count = (size_t)r->image.width * r->image.height * r->image.channels;
 	for (size_t i = 0; i < count; i++) {
 		float x = r->image.pixels[i];
-		r->image.pixels[i] = x < 0 ? 0 : (double)x > largest ? (float)largest : x;
+		r->image.pixels[i] = (double)x < range->least ? (float)range->least : (double)x > range->largest ? (float)range->largest : x;
 	}
 	return 0;
 }

@@ -16,9 +16,14 @@ struct raster {
 	bool nearest; /* else bilinear */
 };
 
-/* Reads the property `filename` of n; pixels are clamped to [0, largest]. Parameters raw and gamma. */
-int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets, double largest,
-		struct arena *arena, struct error *e);
+struct raster_range {
+	double least, largest; /* pixels beyond are clamped */
+	bool raw;              /* integers are no sRGB, where the parameters raw and gamma do not say */
+};
+
+/* Reads the property `filename` of n, and the parameters raw and gamma. */
+int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
+		const struct raster_range *range, struct arena *arena, struct error *e);
 #define RASTER_PARAMS                                                                                                  \
 	{.name = "filename", .types = VALUE_STRING}, {.name = "raw", .types = VALUE_BOOL},                             \
 	{.name = "gamma", .types = VALUE_FLOAT | VALUE_INT}, {.name = "cache", .types = VALUE_BOOL, .status = PARAM_IGNORED}

@@ -24,6 +24,18 @@ static int create_nested(struct texture *t, const struct scene_node *n, enum col
 	return node_error(n, e, ENOTSUP, "\"%s\" is no texture that is supported", n->type);
 }
 
+static int height_from_value(struct texture *t, const struct scene_node *n, const char *name, const struct value *v,
+			     struct error *e)
+{
+	if (v->type != VALUE_FLOAT && v->type != VALUE_INT)
+		return node_error(n, e, EINVAL, "%s: a height is a number, not a colour", name);
+	double x = v->type == VALUE_INT ? (double)v->as.integer : v->as.number;
+	if (!isfinite(x))
+		return node_error(n, e, EINVAL, "%s: a height must be finite", name);
+	t->color = color_constant(x);
+	return 0;
+}
+
 int texture_from_node(struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		      enum color_role role, const struct asset_source *assets, bool dialect_3, struct arena *arena,
 		      struct error *e)
@@ -34,6 +46,8 @@ int texture_from_node(struct texture *t, const struct scene_node *n, const char 
 	*t = (struct texture){.ops = NULL};
 	if (v->type == VALUE_NODE)
 		return create_nested(t, v->as.node, role, assets, dialect_3, arena, e);
+	if (role == COLOR_HEIGHT)
+		return height_from_value(t, n, name, v, e);
 	struct error reason;
 	int code = color_from_value(v, role, arena, &t->color, &reason);
 	return code ? node_error(n, e, -code, "%s: %s", name, reason.text) : 0;

@@ -1,5 +1,5 @@
 /*
- * Textures: a colour that may depend on (u,v). One file per plug-in and one line in texture_list.h.
+ * Textures: a colour, or a height, that may depend on (u,v). One file per plug-in and one line in texture_list.h.
  * Immutable after creation; any thread.
  */
 #ifndef WORKER_TEXTURE_TEXTURE_H
@@ -16,6 +16,7 @@ struct texture_ops {
 	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role, const struct asset_source *assets,
 		      bool dialect_3, struct arena *arena, struct error *e);
 	spectrum (*eval)(const struct texture *t, double u, double v, const struct wavelengths *w);
+	double (*height)(const struct texture *t, double u, double v); /* one made as COLOR_HEIGHT has nothing else */
 	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
 	enum color_shape (*shape)(const struct texture *t);
 };
@@ -34,6 +35,11 @@ int texture_from_node(struct texture *t, const struct scene_node *n, const char 
 static inline spectrum texture_eval(const struct texture *t, double u, double v, const struct wavelengths *w)
 {
 	return t->ops ? t->ops->eval(t, u, v, w) : color_eval(&t->color, w);
+}
+
+static inline double texture_height(const struct texture *t, double u, double v)
+{
+	return t->ops ? t->ops->height(t, u, v) : t->color.scale;
 }
 
 double texture_max(const struct texture *t);

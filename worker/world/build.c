@@ -2,6 +2,7 @@
 
 #include "common/base/mem.h"
 #include "worker/scene/mesh.h"
+#include "worker/world/displacement.h"
 
 #include <string.h>
 
@@ -59,6 +60,8 @@ static int read_shapes(struct builder *b)
 			continue;
 		uint64_t dropped = 0;
 		int rc = shape_build(s->objects[i], b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
+		if (!rc)
+			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3, &b->scratch, b->e);
 		if (rc)
 			return rc;
 		b->shape_nodes[k] = s->objects[i];
@@ -102,8 +105,9 @@ static void put_float3(float out[3], vec3 v)
 	out[2] = (float)v.z;
 }
 
-/* Keeps the triangles that still have an area in float, wound so that their normal agrees with the vertex normals. */
-static uint32_t take_triangles(struct geom_shape *g, const struct mesh *m)
+/* Keeps the triangles that still have an area in float, wound so that their normal agrees with the vertex normals. Those of a
+ * displaced shape are left as they are: where one overhangs, its outside is still its neighbours'. */
+static uint32_t take_triangles(struct geom_shape *g, const struct mesh *m, bool displaced)
 {
 	uint32_t kept = 0;
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
@@ -113,7 +117,7 @@ static uint32_t take_triangles(struct geom_shape *g, const struct mesh *m)
 		if (!(vec3_dot(n, n) > 0))
 			continue;
 		bool turn = false;
-		if (g->normal) {
+		if (g->normal && !displaced) {
 			vec3 sum = vec3_add(float3(g->normal[t[0]]), vec3_add(float3(g->normal[t[1]]), float3(g->normal[t[2]])));
 			turn = vec3_dot(sum, n) < 0;
 		}
@@ -145,7 +149,7 @@ static int place_mesh(struct builder *b, struct geom_shape *g, const struct mesh
 			g->uv[i][1] = (float)m->uv[i][1];
 		}
 	}
-	g->triangle_count = take_triangles(g, m);
+	g->triangle_count = take_triangles(g, m, displacement_of(n) != NULL);
 	if (g->triangle_count == 0)
 		return node_error(n, b->e, EINVAL, "no triangle of this shape has an area at the scene's scale");
 	return 0;
@@ -330,6 +334,18 @@ static int build_accel(struct builder *b)
 	return accel_new(&w->accel, s, w->shape_count, b->e);
 }
 
+static void report_displacement(struct builder *b)
+{
+	size_t shapes = 0;
+	uint64_t triangles = 0;
+	for (uint32_t i = 0; i < b->w->shape_count; i++)
+		if (displacement_of(b->shape_nodes[i])) {
+			shapes++;
+			triangles += b->w->shapes[i].triangle_count;
+		}
+	effects_add_displacement(&b->w->effects, shapes, triangles);
+}
+
 /* All but Embree: every effect is known before that is built. */
 static int prepare(struct builder *b, const struct render_options *o)
 {
@@ -350,6 +366,7 @@ static int prepare(struct builder *b, const struct render_options *o)
 		return rc;
 	struct world *w = b->w;
 	effects_analyse(&w->effects, &w->settings, w->bsdfs, w->bsdf_count, w->emitters, w->emitter_count);
+	report_displacement(b);
 	if (!w->effects.colour)
 		set_grey(w);
 	return 0;

@@ -80,3 +80,26 @@ void effects_analyse(struct effects *fx, const struct scene_settings *settings, 
 	line(fx, "area-light", fx->area_light, "%zu surfaces emit", c.area);
 	line(fx, "depth", settings->max_depth > 1, "paths have at most %u edges", settings->max_depth);
 }
+
+/* In threes, from the right. */
+static const char *with_commas(uint64_t x, char text[32])
+{
+	char *p = text + 31;
+	*p = 0;
+	for (int digits = 0; x || !digits; digits++, x /= 10) {
+		if (digits && digits % 3 == 0)
+			*--p = ',';
+		*--p = (char)('0' + x % 10);
+	}
+	return p;
+}
+
+void effects_add_displacement(struct effects *fx, size_t shapes, uint64_t triangles)
+{
+	char text[32];
+	fx->displacement = shapes > 0;
+	if (shapes)
+		line(fx, "displacement", true, "%zu shapes are displaced: %s triangles", shapes, with_commas(triangles, text));
+	else
+		line(fx, "displacement", false, "no shape is displaced");
+}

@@ -10,6 +10,7 @@
 #include "worker/render/render.h"
 
 struct effects {
+	bool displacement;
 	bool colour;      /* off: no wavelengths are drawn, one grey value stands for the common illuminant's shape */
 	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light;
 	enum color_shape illuminant; /* of all emitters, when colour is off */
@@ -21,5 +22,8 @@ struct effects {
 /* Materials and emitters that shapes use (one that no shape uses calls for nothing). */
 void effects_analyse(struct effects *fx, const struct scene_settings *settings, const struct bsdf *bsdfs, size_t bsdf_count,
 		     const struct emitter *emitters, size_t emitter_count);
+
+/* How many shapes are displaced, and into how many triangles. */
+void effects_add_displacement(struct effects *fx, size_t shapes, uint64_t triangles);
 
 #endif
