@@ -1,6 +1,7 @@
 #include "common/film/header.h"
 
 #include "common/base/version.h"
+#include "common/film/strategy.h"
 
 #include <assert.h>
 #include <inttypes.h>
@@ -12,9 +13,11 @@
 enum header_name {
 	H_VERSION, H_SCENE, H_INTEGRATOR, H_MIXTURE, H_OPTIONS, H_SEED, H_MIN_DEPTH, H_MAX_DEPTH, H_GROUPS, H_CHAINS, H_BOOTSTRAP, H_EPOCH,
 	H_ROUNDS, H_MUTATIONS, H_SAMPLES, H_B, H_B_ERROR, H_BEYOND, H_REL_MSE, H_REL_MSE_UPPER, H_ACCEPTED, H_INDEPENDENT,
-	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_EFFECTS, H_MIXED, H_WALL,
+	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_STRATEGIES, H_NOTE, H_EFFECTS, H_MIXED, H_WALL,
 	H_CPU, H_WORKERS, H_DATE,
 };
+
+enum { HEADER_STRATEGIES = 5120 };
 
 #define STRING EXR_ATTRIBUTE_STRING
 #define DOUBLE EXR_ATTRIBUTE_DOUBLE
@@ -48,8 +51,10 @@ const struct header_row header_rows[] = {
 	[H_NEGATIVE] = {"hslt:negative", STRING, false, "path contributions refused: negative"},
 	[H_RAYS_CLOSEST] = {"hslt:raysClosest", STRING, false, "rays traced to the closest hit"},
 	[H_RAYS_SHADOW] = {"hslt:raysShadow", STRING, false, "rays traced between two points"},
-	[H_STUCK] = {"hslt:stuck", STRING, false, "epochs in which a chain accepted nothing"},
+	[H_STUCK] = {"hslt:stuck", STRING, false, "times that a chain accepted nothing during a whole epoch"},
 	[H_LONGEST_STUCK] = {"hslt:longestStuck", STRING, false, "most rejections in a row"},
+	[H_STRATEGIES] = {"hslt:strategies", STRING, false, "what each strategy of the mixture did; one a line"},
+	[H_NOTE] = {"hslt:note", STRING, false, "what whoever looks at the image should know"},
 	[H_EFFECTS] = {"hslt:effects", STRING, false, "each effect, on or off, and why; one a line"},
 	[H_MIXED] = {"hslt:mixed", INT, false, "1: workers with different arithmetic took part, the bits cannot be made again"},
 	[H_WALL] = {"hslt:wallSeconds", DOUBLE, true, "from the first bootstrap sample to the last merge"},
@@ -169,6 +174,13 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 	add_count(h, H_NEGATIVE, img->counts.counters[COUNT_NEGATIVE]);
 	add_count(h, H_RAYS_CLOSEST, img->counts.counters[COUNT_RAYS_CLOSEST]);
 	add_count(h, H_RAYS_SHADOW, img->counts.counters[COUNT_RAYS_SHADOW]);
+	char text[HEADER_STRATEGIES];
+	strategy_lines(p->mutations, &img->counts, text, sizeof text);
+	if (*text)
+		add_string(h, H_STRATEGIES, text);
+	strategy_note(p, &img->counts, img->black, text, sizeof text);
+	if (*text)
+		add_string(h, H_NOTE, text);
 }
 
 static void add_extra(struct header *h, const struct header_extra *x)

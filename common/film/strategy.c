@@ -123,16 +123,48 @@ void strategy_table(const char *mixture, const struct canvas_counts *n, char *te
 	}
 }
 
-void strategy_stuck(const struct plan *p, uint64_t rounds, const struct canvas_counts *n, char *text, size_t size)
+void strategy_lines(const char *mixture, const struct canvas_counts *n, char *text, size_t size)
 {
-	char number[5][NUMBER];
-	uint64_t stuck = n->counters[COUNT_STUCK];
+	struct text t = {text, size};
+	int count = plan_strategy_count(mixture);
 	if (size)
 		text[0] = 0;
-	if (!stuck)
-		return;
-	snprintf(text, size, "%s of %s epochs of chains (%s chains, %s %s) passed without an accepted mutation; longest run: %s rejections",
-		 thousands(stuck, number[0]), thousands(p->chains * rounds, number[1]), thousands(p->chains, number[2]),
-		 thousands(rounds, number[3]), rounds == 1 ? "round" : "rounds",
-		 thousands(n->counters[COUNT_LONGEST_STUCK], number[4]));
+	for (int i = 0; i < count; i++) {
+		char name[PLAN_MUTATIONS_MAX];
+		plan_strategy_name(mixture, (uint32_t)i, name, sizeof name);
+		put(&t, "%s%s:", i ? "\n" : "", name);
+		for (int k = 0; k < STRATEGY_COUNTERS; k++)
+			put(&t, " %s %llu", names[k], (unsigned long long)n->strategy[i][k]);
+	}
+}
+
+/* Epochs that chains went through: a chain without a state makes no mutations. */
+static uint64_t chain_epochs(const struct plan *p, const struct canvas_counts *n)
+{
+	return n->counters[COUNT_SAMPLES] / p->epoch;
+}
+
+void strategy_note(const struct plan *p, const struct canvas_counts *n, bool black, char *text, size_t size)
+{
+	struct text t = {text, size};
+	char number[4][NUMBER];
+	uint64_t stuck = p->kind == PLAN_CHAINS ? n->counters[COUNT_STUCK] : 0;
+	uint64_t bad = n->counters[COUNT_NAN] + n->counters[COUNT_INFINITE] + n->counters[COUNT_NEGATIVE];
+	const char *then = "";
+	if (size)
+		text[0] = 0;
+	if (black && p->kind == PLAN_CHAINS && n->counters[COUNT_SAMPLES] == 0)
+		put(&t, "the image is black: none of the %s bootstrap samples found light", thousands(p->bootstrap, number[0]));
+	else if (black)
+		put(&t, "the image is black: no sample found light");
+	if (black)
+		then = "; ";
+	if (bad) {
+		put(&t, "%s%s contributions were not numbers, infinite or negative, and left out", then, thousands(bad, number[0]));
+		then = "; ";
+	}
+	if (stuck)
+		put(&t, "%s%s of %s times a chain accepted nothing during a whole epoch (%s chains); longest run: %s rejections", then,
+		    thousands(stuck, number[0]), thousands(chain_epochs(p, n), number[1]), thousands(p->chains, number[2]),
+		    thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
 }

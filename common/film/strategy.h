@@ -1,6 +1,6 @@
 /*
- * What the strategies of a mixture did, for people and programs: names of the counters, a table, a sentence on chains that
- * did not move. Pure; any thread.
+ * What the strategies of a mixture did, for people and programs: names of the counters, a table; and the notes on an image
+ * that its counters give reason for. Pure; any thread.
  */
 #ifndef COMMON_FILM_STRATEGY_H
 #define COMMON_FILM_STRATEGY_H
@@ -16,8 +16,12 @@ const char *strategy_counter_name(enum strategy_counter c);
 enum { STRATEGY_TABLE = 4096 };
 void strategy_table(const char *mixture, const struct canvas_counts *n, char *text, size_t size);
 
-/* "3 of 8,192 epochs of chains (1,024 chains, 8 rounds) passed without an accepted mutation; longest run: 5,210 rejections";
- * empty: none did. */
-void strategy_stuck(const struct plan *p, uint64_t rounds, const struct canvas_counts *n, char *text, size_t size);
+/* Each strategy's counters one by one, a line each, for the image's header. Empty where the plan has no mixture. */
+void strategy_lines(const char *mixture, const struct canvas_counts *n, char *text, size_t size);
+
+/* What whoever looks at the image should know, in one line: that it is black, that contributions were left out, that "3 of
+ * 8,192 times a chain accepted nothing during a whole epoch (1,024 chains); longest run: 5,210 rejections". Empty: nothing. */
+enum { STRATEGY_NOTE = 512 };
+void strategy_note(const struct plan *p, const struct canvas_counts *n, bool black, char *text, size_t size);
 
 #endif

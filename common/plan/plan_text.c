@@ -109,6 +109,7 @@ void plan_describe_changes(const struct plan_request *r, const struct plan *p, c
 void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size)
 {
 	struct text t = {text, size};
+	rounds += rounds == 0; /* a black bootstrap ends a job before its first round, whatever the bound */
 	put(&t, "--integrator %s --size %ux%u --crop %u,%u,%u,%u --seed %llu --min-depth %u --max-depth %u --groups %u",
 	    p->integrator, p->width, p->height, p->crop_x, p->crop_y, p->crop_width, p->crop_height,
 	    (unsigned long long)p->seed, p->min_depth, p->max_depth, p->groups);

@@ -1,6 +1,8 @@
 #include "common/base/progress.h"
 #include "common/base/version.h"
 #include "common/base/error.h"
+#include "common/film/strategy.h"
+#include "common/film/strategy_json.h"
 
 #include <argp.h>
 #include <jansson.h>
@@ -144,6 +146,18 @@ static void print_effects(const json_t *job)
 		       text_of(effect, "name"), text_of(effect, "why"));
 }
 
+static void print_strategies(const json_t *job)
+{
+	struct canvas_counts n = {{0}, {{0}}};
+	char text[STRATEGY_TABLE];
+	const char *mixture = text_of(job, "mixture");
+	if (plan_strategy_count(mixture) < 1)
+		return;
+	strategy_from_json(json_object_get(job, "strategies"), &n);
+	strategy_table(mixture, &n, text, sizeof text);
+	fputs(text, stdout);
+}
+
 static void print_workers(const json_t *snapshot)
 {
 	size_t i;
@@ -183,7 +197,10 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 			continue;
 		print_job(job, colors);
 		if (only) {
+			if (*text_of(job, "note"))
+				printf("       note: %s\n", text_of(job, "note"));
 			print_effects(job);
+			print_strategies(job);
 			print_leases(snapshot, only);
 		}
 	}

@@ -22,6 +22,7 @@ static void begin_record(struct order *o)
 	r->id = o->id;
 	text_copy(r->name, sizeof r->name, m->name);
 	text_copy(r->integrator, sizeof r->integrator, o->plan.integrator);
+	text_copy(r->mixture, sizeof r->mixture, o->plan.mutations);
 	text_copy(r->state, sizeof r->state, "queued");
 	text_copy(r->output, sizeof r->output, m->output);
 	r->priority = m->priority;

@@ -1,7 +1,7 @@
 /*
  * An order: a live job with all its weight, beside the few numbers that the core (coordinator/core) keeps of it. Scene
  * bundle as submitted, bootstrap, canvas, seeds, the chain states of each (group, part)'s last merged epoch, its log.
- * The loop's thread, but while `busy` a thread of the pool has the canvas and nobody else touches it.
+ * The loop's thread, but while `busy` a thread of the pool reads the canvas and nobody adds to it.
  */
 #ifndef COORDINATOR_SHELL_ORDER_H
 #define COORDINATOR_SHELL_ORDER_H
@@ -38,6 +38,7 @@ struct order {
 	uint32_t chains_per_lease;
 	FILE *log;
 	bool busy, ended;
+	bool black; /* as the image that was published, or the bootstrap */
 	double preview_made; /* s on the loop's clock; 0: never */
 	double cpu_seconds; /* of all merged leases */
 	uint32_t worker_count;            /* who had leases of it */

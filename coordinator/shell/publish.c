@@ -87,6 +87,8 @@ static void done(uv_work_t *work, int status)
 	/* Every image says how good it is, asked for or not. */
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
 		o->record.rel_error = sqrt(w->image.rel_mse_upper);
+	if (w->what == PUBLISH_RESULT && !w->rc)
+		o->black = w->image.black;
 	if (w->what == PUBLISH_RESULT && w->rc)
 		cannot_write(w);
 	else if (w->what == PUBLISH_RESULT)

@@ -161,7 +161,12 @@ void server_order_free_again(struct server *s, struct order *o)
 static void view_order(struct server *s, const struct order *o, struct job_view *v)
 {
 	struct job_status status;
+	struct canvas_counts counted;
 	view_of_record(v, &o->record);
+	if (o->canvas) { /* in the end what the image holds, until then all that has come */
+		canvas_counts(o->canvas, !o->ended, &counted);
+		record_take_counted(&v->record, &o->plan, &counted, o->black);
+	}
 	if (!farm_job(s->farm, o->id, server_now(s), &status))
 		return;
 	view_add_status(v, &status);

@@ -83,6 +83,7 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 	out->fetchable = r->has_result;
 	out->ended = record_is_ended(r);
 	out->exit_code = r->exit_code;
+	out->note = borrow(r->note);
 }
 
 static json_t *effects_to_json(const Farm__Submit *m)
@@ -116,6 +117,9 @@ json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit)
 	json_object_set_new(o, "eta", number_or_null(v->eta, v->eta >= 0));
 	json_object_set_new(o, "error", number_or_null(r->rel_error, r->rel_error >= 0));
 	json_object_set_new(o, "counts", record_counts(r));
+	json_object_set_new(o, "mixture", json_string(r->mixture));
+	json_object_set_new(o, "strategies", record_strategies(r));
+	json_object_set_new(o, "note", json_string(r->note));
 	if (submit)
 		json_object_set_new(o, "effects", effects_to_json(submit));
 	return o;

@@ -2,6 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/film/strategy_json.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +15,33 @@ static const struct {
 	{"merged", offsetof(struct job_record, leases_merged)}, {"repeats", offsetof(struct job_record, repeats)},
 	{"refused", offsetof(struct job_record, refused)},	 {"failures", offsetof(struct job_record, failures)},
 	{"duplicates", offsetof(struct job_record, duplicates)}, {"timeouts", offsetof(struct job_record, timeouts)},
+	{"stuck", offsetof(struct job_record, stuck)},		 {"longestStuck", offsetof(struct job_record, longest_stuck)},
 };
+
+void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black)
+{
+	r->stuck = n->counters[COUNT_STUCK];
+	r->longest_stuck = n->counters[COUNT_LONGEST_STUCK];
+	memcpy(r->strategy, n->strategy, sizeof r->strategy);
+	strategy_note(p, n, black, r->note, sizeof r->note);
+}
+
+json_t *record_strategies(const struct job_record *r)
+{
+	struct canvas_counts n = {{0}, {{0}}};
+	memcpy(n.strategy, r->strategy, sizeof n.strategy);
+	return strategy_to_json(r->mixture, &n);
+}
+
+/* A record from elsewhere must not name more strategies than there are counters for. */
+static void take_strategies(const json_t *o, struct job_record *r)
+{
+	struct canvas_counts n;
+	if (plan_strategy_count(r->mixture) < 0)
+		memset(r->mixture, 0, sizeof r->mixture);
+	strategy_from_json(json_object_get(o, "strategies"), &n);
+	memcpy(r->strategy, n.strategy, sizeof r->strategy);
+}
 
 json_t *record_counts(const struct job_record *r)
 {
@@ -37,12 +64,13 @@ static void take_counts(const json_t *o, struct job_record *r)
 
 char *record_to_json(const struct job_record *r)
 {
-	json_t *o = json_pack("{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:o}", /* */
+	json_t *o = json_pack("{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:o s:s s:s s:o}", /* */
 			      "schema", 1, "id", (json_int_t)r->id, "name", r->name, "integrator", r->integrator, /* */
 			      "state", r->state, "reason", r->reason, "why", r->why, "output", r->output, /* */
 			      "priority", r->priority, "exitCode", (int)r->exit_code, "result", (int)r->has_result, /* */
 			      "submitted", r->submitted, "ended", r->ended, "progress", r->progress, /* */
-			      "relError", r->rel_error, "counts", record_counts(r));
+			      "relError", r->rel_error, "counts", record_counts(r), /* */
+			      "mixture", r->mixture, "note", r->note, "strategies", record_strategies(r));
 	char *text = o ? json_dumps(o, JSON_INDENT(2)) : NULL;
 	json_decref(o);
 	char *copy = text ? mem_strdup(text) : NULL;
@@ -80,7 +108,10 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	r->ended = json_number_value(json_object_get(o, "ended"));
 	r->progress = json_number_value(json_object_get(o, "progress"));
 	r->rel_error = json_number_value(json_object_get(o, "relError"));
+	take_text(o, "mixture", r->mixture, sizeof r->mixture);
+	take_text(o, "note", r->note, sizeof r->note);
 	take_counts(json_object_get(o, "counts"), r);
+	take_strategies(o, r);
 	json_decref(o);
 	return 0;
 }

@@ -6,6 +6,7 @@
 #define COORDINATOR_STORE_RECORD_H
 
 #include "common/base/error.h"
+#include "common/film/strategy.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -28,9 +29,16 @@ struct job_record {
 	double rel_error; /* negative: not known */
 	uint64_t rounds, mutations, leases_merged;
 	uint64_t repeats, refused, failures, duplicates, timeouts; /* what went wrong and cost nothing */
+	uint64_t stuck, longest_stuck; /* times that a chain accepted nothing during an epoch; most rejections in a row */
+	char mixture[PLAN_MUTATIONS_MAX];
+	char note[STRATEGY_NOTE];
+	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* of the mixture */
 };
 
-json_t *record_counts(const struct job_record *r); /* an object of its counts */
+/* What the merged batches counted, and what is to be said about it. */
+void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black);
+json_t *record_counts(const struct job_record *r);     /* an object of its counts */
+json_t *record_strategies(const struct job_record *r); /* an array: strategy_to_json */
 char *record_to_json(const struct job_record *r); /* mem_alloc'd; NULL when memory is out */
 /* -EBADMSG when it is not a record. */
 int record_from_json(const char *text, size_t size, struct job_record *r, struct error *e);

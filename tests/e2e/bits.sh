@@ -7,11 +7,17 @@ options_of() {
 	path) echo "--integrator path --spp 16" ;;
 	bdpt) echo "--integrator bdpt --spp 4" ;;
 	pssmlt) echo "--integrator pssmlt --bootstrap 20000 --mutations 60000" ;;
+	hslt) echo "--integrator hslt --mutations hslt=0.9,independent=0.1 --bootstrap 20000 --mutations 60000" ;;
 	error) echo "--integrator path --crop 8,8,24,16 --target-error 4% --epoch 1 --spp 4096 --seed 7" ;;
 	esac
 }
 
-for kind in path bdpt pssmlt error; do
+KINDS="path bdpt pssmlt"
+if "$BIN/hslt-render" --help | grep -q 'integrator=NAME.* hslt'; then
+	KINDS="$KINDS hslt"
+fi
+KINDS="$KINDS error"
+for kind in $KINDS; do
 	"$BIN/hslt-render" "$BOX" -o "$DIR/$kind.exr" $(options_of $kind) 2>>"$DIR/render.log" || fail "hslt-render: $kind"
 done
 if "$BIN/hslt-compare" --exact "$DIR/path.exr" "$DIR/bdpt.exr" >/dev/null 2>&1; then
@@ -27,7 +33,7 @@ for workers in 1 2 4; do
 	done
 	until_true 10 sh -c "[ \$('$BIN/hslt-status' --json | grep -o '\"fingerprint\"' | wc -l) -eq $workers ]" ||
 		fail "$workers workers do not show"
-	for kind in path bdpt pssmlt error; do
+	for kind in $KINDS; do
 		submit "$BOX" -o "$DIR/$kind-$workers.exr" $(options_of $kind) --wait >"$DIR/id" || fail "$kind: $?"
 		same "$DIR/$kind.exr" "$DIR/$kind-$workers.exr"
 	done

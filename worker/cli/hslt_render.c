@@ -2,6 +2,8 @@
 #include "common/base/progress.h"
 #include "common/base/version.h"
 #include "common/film/image_file.h"
+#include "common/film/strategy.h"
+#include "common/film/strategy_json.h"
 #include "worker/cli/local.h"
 #include "worker/cli/options.h"
 
@@ -33,7 +35,7 @@ enum { OPTION_THREADS = 256, OPTION_STATS, OPTION_QUIET };
 static const struct argp_option options[] = {
 	{"output", 'o', "FILE", 0, "The image (OpenEXR)", 0},
 	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors); does not change the bits", 0},
-	{"stats", OPTION_STATS, "FILE", 0, "Write plan, times, counters and effects as JSON", 0},
+	{"stats", OPTION_STATS, "FILE", 0, "Write plan, times, counters, strategies and effects as JSON, and show a table of the strategies", 0},
 	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
 	{0},
 };
@@ -215,9 +217,10 @@ static json_t *real_or_null(double x)
 
 static int write_stats(const struct session *s, struct error *e)
 {
-	char plan[1024], again[512];
+	char plan[1024], again[768], note[STRATEGY_NOTE];
 	plan_describe(&s->plan, plan, sizeof plan);
 	plan_options(&s->plan, s->image.rounds, again, sizeof again);
+	strategy_note(&s->plan, &s->image.counts, s->image.black, note, sizeof note);
 	json_t *counters = json_object(), *effects = json_array();
 	for (int i = 0; i < BATCH_COUNTERS; i++)
 		if (counter_names[i])
@@ -225,14 +228,15 @@ static int write_stats(const struct session *s, struct error *e)
 	for (size_t i = 0; i < s->summary.line_count; i++)
 		json_array_append_new(effects, json_pack("{s:s s:b s:s}", "name", s->summary.lines[i].name, "on",
 							 s->summary.lines[i].on, "why", s->summary.lines[i].why));
-	json_t *o = json_pack("{s:i s:s s:s s:s s:s s:I s:I s:f s:f s:f s:I s:I s:o s:o s:o s:o s:o s:o s:s}", "schema", 1, "scene",
+	json_t *o = json_pack("{s:i s:s s:s s:s s:s s:I s:I s:f s:f s:f s:I s:I s:o s:o s:o s:o s:o s:o s:s s:s s:o s:s}", "schema", 1, "scene",
 			      s->name, "integrator", s->plan.integrator, "plan", plan, "options", again, "rounds",
 			      (json_int_t)s->image.rounds, "threads", (json_int_t)s->a->threads, "buildSeconds", s->build_seconds,
 			      "wallSeconds", s->run.seconds, "cpuSeconds", s->run.cpu_seconds, "triangles",
 			      (json_int_t)s->summary.triangles, "embreeBytes", (json_int_t)world_embree_bytes(s->world), "b",
 			      real_or_null(s->image.b), "relMSE", real_or_null(s->image.rel_mse), "relMSEUpper", real_or_null(s->image.rel_mse_upper),
 			      "beyondShare", real_or_null(s->image.beyond_share), "counters", counters, "effects", effects, "end",
-			      end_names[s->run.end]);
+			      end_names[s->run.end], "mixture", s->plan.mutations, "strategies",
+			      strategy_to_json(s->plan.mutations, &s->image.counts), "note", note);
 	char *text = o ? json_dumps(o, JSON_INDENT(2)) : NULL;
 	json_decref(o);
 	if (!text)
@@ -251,16 +255,15 @@ static void say(const struct session *s)
 	if (isfinite(i->rel_mse))
 		fprintf(stderr, ", relative error %.2f %% (at most %.2f %%)", 100 * sqrt(i->rel_mse), 100 * sqrt(i->rel_mse_upper));
 	fprintf(stderr, "\n");
-	if (i->black)
-		fprintf(stderr, "the image is black: no sample found light\n");
 	if (i->beyond_share > 0.001)
 		fprintf(stderr, "%.2f %% of the energy lies in paths longer than %s can hold\n", 100 * i->beyond_share, p->integrator);
-	uint64_t bad = i->counts.counters[COUNT_NAN] + i->counts.counters[COUNT_INFINITE] + i->counts.counters[COUNT_NEGATIVE];
-	if (bad)
-		fprintf(stderr, "%llu contributions were not numbers, infinite or negative, and left out\n", (unsigned long long)bad);
-	if (i->counts.counters[COUNT_STUCK])
-		fprintf(stderr, "%llu times a chain accepted nothing during a whole epoch (longest run: %llu rejections)\n",
-			(unsigned long long)i->counts.counters[COUNT_STUCK], (unsigned long long)i->counts.counters[COUNT_LONGEST_STUCK]);
+	char text[STRATEGY_TABLE];
+	strategy_table(p->mutations, &i->counts, text, sizeof text);
+	if (s->a->stats)
+		fputs(text, stderr);
+	strategy_note(p, &i->counts, i->black, text, sizeof text);
+	if (*text)
+		fprintf(stderr, "hslt-render: note: %s\n", text);
 }
 
 static int run(struct session *s, struct error *e)
@@ -310,6 +313,6 @@ int main(int argc, char **argv)
 		fprintf(stderr, "hslt-render: %s\n", e.text);
 		return s.usage ? 2 : 1;
 	}
-	bool missed = s.plan.target_error > 0 && s.run.end != MERGE_ERROR;
+	bool missed = s.plan.target_error > 0 && s.run.end != MERGE_ERROR && !s.run.lit.black;
 	return missed ? 4 : 0;
 }

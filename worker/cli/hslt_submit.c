@@ -127,9 +127,8 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 static int run(struct arguments *a, struct client *cl, const struct scene_bundle *b, int *code, struct error *e)
 {
 	uint64_t job = 0;
-	uint32_t exit_code = 0;
-	bool has_result = false;
-	char plan[1024] = "", why[256] = "";
+	struct submit_end end = {0};
+	char plan[1024] = "";
 	int rc = submit_send(cl, &a->request, b, &job, plan, sizeof plan, e);
 	if (rc)
 		return rc;
@@ -138,14 +137,16 @@ static int run(struct arguments *a, struct client *cl, const struct scene_bundle
 		print_id(a, job, plan, "queued");
 	if (!a->wait)
 		return 0;
-	rc = submit_wait(cl, job, &exit_code, &has_result, why, sizeof why, e);
-	if (!rc && has_result)
+	rc = submit_wait(cl, job, &end, e);
+	if (!rc && end.has_result)
 		rc = client_fetch(cl, job, FARM__WHAT__WHAT_RESULT, a->output, NULL, 0, e);
-	if (!rc && !has_result)
-		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job, why);
+	if (!rc && !end.has_result)
+		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job, end.why);
+	if (!rc && *end.note)
+		fprintf(stderr, "hslt-submit: note: %s\n", end.note);
 	if (!rc && a->json)
-		print_id(a, job, plan, exit_code == 3 ? "failed" : "done");
-	*code = (int)exit_code;
+		print_id(a, job, plan, end.exit_code == 3 ? "failed" : "done");
+	*code = (int)end.exit_code;
 	return rc;
 }
 

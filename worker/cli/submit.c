@@ -296,8 +296,7 @@ static void show(struct progress *p, const Farm__JobStatus *s)
 	progress_show(p, s->progress, s->state, detail);
 }
 
-int submit_wait(struct client *cl, uint64_t job, uint32_t *exit_code, bool *has_result, char *why, size_t why_size,
-		struct error *e)
+int submit_wait(struct client *cl, uint64_t job, struct submit_end *end, struct error *e)
 {
 	struct progress p;
 	Farm__Watch watch;
@@ -320,9 +319,10 @@ int submit_wait(struct client *cl, uint64_t job, uint32_t *exit_code, bool *has_
 			const Farm__JobStatus *s = got->job_status;
 			show(&p, s);
 			ended = s->ended;
-			*exit_code = s->exit_code;
-			*has_result = s->fetchable;
-			text_copy(why, why_size, s->why);
+			end->exit_code = s->exit_code;
+			end->has_result = s->fetchable;
+			text_copy(end->why, sizeof end->why, s->why);
+			text_copy(end->note, sizeof end->note, s->note);
 		}
 		client_message_fini(&message);
 	}

@@ -41,8 +41,13 @@ struct submit_request {
 int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *b, uint64_t *job,
 		char *plan_text, size_t plan_size, struct error *e);
 
-/* Shows progress on stderr until the job has ended. *exit_code as the contract says. */
-int submit_wait(struct client *cl, uint64_t job, uint32_t *exit_code, bool *has_result, char *why, size_t why_size,
-		struct error *e);
+struct submit_end {
+	uint32_t exit_code; /* of a program that waited */
+	bool has_result;
+	char why[256], note[512]; /* why there is no result; what whoever looks at it should know */
+};
+
+/* Shows progress on stderr until the job has ended. */
+int submit_wait(struct client *cl, uint64_t job, struct submit_end *end, struct error *e);
 
 #endif

@@ -2,6 +2,7 @@
 #include "common/film/strategy.h"
 
 #include "common/base/mem.h"
+#include "common/film/strategy_json.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -126,8 +127,10 @@ static void tables_are_readable(void **state)
 	struct batch b = make_batch(0, 1, 0);
 	strategy_table(p.mutations, &n, text, sizeof text);
 	assert_string_equal(text, "");
-	strategy_stuck(&p, 2, &n, text, sizeof text);
+	strategy_note(&p, &n, false, text, sizeof text);
 	assert_string_equal(text, "");
+	strategy_note(&p, &n, true, text, sizeof text);
+	assert_string_equal(text, "the image is black: none of the 16 bootstrap samples found light");
 	memcpy(n.strategy, b.strategy, sizeof n.strategy);
 	memcpy(n.counters, b.counters, sizeof n.counters);
 	n.strategy[1][STRATEGY_RAYS] = 1800;
@@ -141,15 +144,53 @@ static void tables_are_readable(void **state)
 		"hslt                                900     51.11      2.00            800      3.00            500    11.00"
 		"  outside 10 inapplicable 1\n";
 	assert_string_equal(text, expected);
-	strategy_stuck(&p, 2, &n, text, sizeof text);
-	assert_string_equal(text, "1 of 8 epochs of chains (4 chains, 2 rounds) passed without an accepted mutation; longest run: "
+	n.counters[COUNT_NAN] = n.counters[COUNT_NEGATIVE] = 1000;
+	n.counters[COUNT_SAMPLES] = 8000;
+	strategy_note(&p, &n, true, text, sizeof text);
+	assert_string_equal(text, "the image is black: no sample found light; 2,000 contributions were not numbers, infinite or negative, "
+				  "and left out; 1 of 8 times a chain accepted nothing during a whole epoch (4 chains); longest run: "
 				  "5,211 rejections");
 	strategy_table(p.mutations, &n, small, sizeof small); /* cut, and ended */
 	assert_int_equal(strlen(small), sizeof small - 1);
+	strategy_lines(p.mutations, &n, text, sizeof text);
+	assert_non_null(strstr(text, "independent: proposed 1234567 accepted 7 "));
+	assert_non_null(strstr(text, "\nhslt: proposed 900 accepted 460 rays 1800 walks 800 iterations 2400 reverseWalks 500 outside 90 "));
 	/* The widest that there can be. */
 	memset(n.strategy, 0xff, sizeof n.strategy);
+	memset(n.counters, 0xff, sizeof n.counters);
+	p.chains = UINT32_MAX;
+	p.epoch = 1;
+	strategy_note(&p, &n, true, text, sizeof text);
+	assert_true(strlen(text) < STRATEGY_NOTE);
+	char lines[5120]; /* what the header keeps for them */
+	strategy_lines("aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa,b,c,d,e,f,g,h", &n, lines, sizeof lines);
+	assert_true(strlen(lines) < sizeof lines - 1);
 	strategy_table("aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa,b,c,d,e,f,g,h", &n, text, sizeof text);
 	assert_true(strlen(text) < sizeof text - 1 && text[strlen(text) - 1] == '\n');
+	batch_fini(&b);
+}
+
+static void json_comes_back(void **state)
+{
+	(void)state;
+	struct plan p = make_plan();
+	struct canvas_counts n = {{0}, {{0}}}, back = {{0}, {{0}}};
+	struct batch b = make_batch(0, 1, 0);
+	memcpy(n.strategy, b.strategy, sizeof n.strategy);
+	json_t *list = strategy_to_json(p.mutations, &n);
+	assert_int_equal(json_array_size(list), 2);
+	assert_string_equal(json_string_value(json_object_get(json_array_get(list, 1), "name")), "hslt");
+	strategy_from_json(list, &back);
+	assert_memory_equal(back.strategy, n.strategy, sizeof n.strategy);
+	json_object_set_new(json_array_get(list, 0), "proposed", json_integer(-1));
+	json_object_set_new(json_array_get(list, 0), "accepted", json_string("7"));
+	json_object_del(json_array_get(list, 1), "failures");
+	strategy_from_json(list, &back);
+	assert_true(back.strategy[0][STRATEGY_PROPOSED] == 0 && back.strategy[0][STRATEGY_ACCEPTED] == 0);
+	assert_true(back.strategy[1][STRATEGY_FAIL_OUTSIDE] == 0 && back.strategy[1][STRATEGY_PROPOSED] == 900);
+	json_decref(list);
+	strategy_from_json(NULL, &back);
+	assert_true(back.strategy[1][STRATEGY_PROPOSED] == 0);
 	batch_fini(&b);
 }
 
@@ -170,6 +211,7 @@ int main(void)
 		cmocka_unit_test(sums_are_of_each_batch_once),
 		cmocka_unit_test(a_batch_counts_within_bounds),
 		cmocka_unit_test(tables_are_readable),
+		cmocka_unit_test(json_comes_back),
 		cmocka_unit_test(counters_have_names),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -32,6 +32,8 @@ static void a_mixture_is_kept_and_told(void **state)
 	assert_int_equal(plan_make(&r, &p, &e), 0);
 	plan_options(&p, p.rounds, text, sizeof text);
 	assert_true(strstr(text, "--mutations") == strstr(text, "--mutations 32768"));
+	plan_options(&p, 0, text, sizeof text);
+	assert_null(strstr(text, "--mutations 0"));
 }
 
 static void other_texts_are_none(void **state)

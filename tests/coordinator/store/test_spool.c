@@ -66,6 +66,12 @@ static void records_come_back(void **state)
 	strcpy(r.state, "done");
 	strcpy(r.reason, "time");
 	strcpy(r.output, "a b.exr");
+	strcpy(r.mixture, "independent=0.1,hslt=0.9");
+	strcpy(r.note, "3 of 8 \"times\"");
+	r.stuck = 3;
+	r.longest_stuck = 5210;
+	for (uint64_t i = 0; i < 2 * STRATEGY_COUNTERS; i++)
+		r.strategy[i / STRATEGY_COUNTERS][i % STRATEGY_COUNTERS] = i * i;
 	assert_int_equal(spool_open(&s, folder, &e), 0);
 	assert_int_equal(spool_take_job(s, 7, &e), 0);
 	assert_int_equal(spool_write_record(s, &r, &e), 0);
@@ -75,6 +81,18 @@ static void records_come_back(void **state)
 	assert_true(back.rel_error == r.rel_error && back.progress == r.progress && back.ended == r.ended);
 	assert_true(back.rounds == 12 && back.mutations == 1u << 31 && back.priority == -3 && back.exit_code == 4);
 	assert_true(back.has_result && record_is_ended(&back));
+	assert_string_equal(back.mixture, r.mixture);
+	assert_string_equal(back.note, r.note);
+	assert_true(back.stuck == 3 && back.longest_stuck == 5210);
+	assert_memory_equal(back.strategy, r.strategy, sizeof r.strategy);
+	/* Of an earlier version, and of a hand that wrote too much. */
+	static const char old[] = "{\"schema\":1,\"id\":7,\"name\":\"a\"}", many[] = "{\"schema\":1,\"id\":7,\"mixture\":\"a,,b\",\"strategies\":7}";
+	assert_int_equal(spool_write(s, 7, "job.json", old, sizeof old - 1, &e), 0);
+	assert_int_equal(spool_read_record(s, 7, &back, &e), 0);
+	assert_true(*back.mixture == 0 && *back.note == 0 && back.stuck == 0);
+	assert_int_equal(spool_write(s, 7, "job.json", many, sizeof many - 1, &e), 0);
+	assert_int_equal(spool_read_record(s, 7, &back, &e), 0);
+	assert_true(*back.mixture == 0);
 	assert_int_equal(spool_read_record(s, 8, &back, &e), -ENOENT);
 	assert_int_equal(spool_write(s, 7, "job.json", "{}", 2, &e), 0);
 	assert_int_equal(spool_read_record(s, 7, &back, &e), -EBADMSG);

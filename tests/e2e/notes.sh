@@ -1,0 +1,38 @@
+# What an image's counters give reason to say: black scenes and chains that do not move, alone and on a farm.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare
+
+BLACK="-D light=0 --integrator pssmlt --spp 16 --target-error 2%"
+STUCK="--integrator pssmlt --bootstrap 16384 --epoch 2 --mutations 640"
+
+# noted FILE WORDS
+noted() {
+	grep -q "note: .*$2" "$1" || fail "it does not say '$2': $(cat "$1")"
+}
+
+start_coordinator
+start_worker w1
+for kind in black stuck; do
+	[ $kind = black ] && options=$BLACK words='image is black: none of the 16,384 bootstrap samples' ||
+		options=$STUCK words='of 320 times a chain accepted nothing .*16 chains.*longest run: [0-9,]* rejections'
+	"$BIN/hslt-render" "$BOX" -o "$DIR/$kind.exr" $options --stats "$DIR/$kind.json" 2>"$DIR/render-$kind.log" ||
+		fail "hslt-render: $kind ended with $?"
+	noted "$DIR/render-$kind.log" "$words"
+	grep -q "\"note\": \".*$words" "$DIR/$kind.json" || fail "--stats does not say it"
+	"$BIN/hslt-submit" "$BOX" -o "$DIR/farm-$kind.exr" $options --wait >"$DIR/id" 2>"$DIR/submit-$kind.log" ||
+		fail "hslt-submit: $kind ended with $?"
+	noted "$DIR/submit-$kind.log" "$words"
+	"$BIN/hslt-status" --json "$(cat "$DIR/id")" | grep -q "\"note\":\".*$words" || fail "the status does not say it"
+	"$BIN/hslt-status" "$(cat "$DIR/id")" >"$DIR/shown"
+	noted "$DIR/shown" "$words"
+	same "$DIR/$kind.exr" "$DIR/farm-$kind.exr"
+done
+[ "$(value "$(cat "$DIR/id")" stuck)" -gt 0 ] || fail "no count of them"
+"$BIN/hslt-status" --json "$(cat "$DIR/id")" | grep -q '"strategies":\[\]' || fail "pssmlt has no strategies"
+# The counts outlive the coordinator.
+stop $COORDINATOR_PID
+LISTEN=$COORDINATOR
+start_coordinator
+"$BIN/hslt-status" "$(cat "$DIR/id")" >"$DIR/shown"
+noted "$DIR/shown" 'accepted nothing'
+echo "black and stuck: said by both, with the same bits"
