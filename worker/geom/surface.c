@@ -68,6 +68,13 @@ static struct corner corner_of(const struct geom_shape *s, const uint32_t i[3])
 	return (struct corner){v0, vec3_sub(at(s->position, i[1]), v0), vec3_sub(at(s->position, i[2]), v0)};
 }
 
+/* Not normalised. */
+static vec3 interpolated_normal(const struct geom_shape *s, const uint32_t i[3], double b1, double b2)
+{
+	vec3 m = vec3_scale(1 - b1 - b2, at(s->normal, i[0]));
+	return vec3_madd(vec3_madd(m, b1, at(s->normal, i[1])), b2, at(s->normal, i[2]));
+}
+
 static void fill(const struct geom_shape *s, const uint32_t i[3], const struct corner *c, double b1, double b2,
 		 struct surface_point *x)
 {
@@ -79,8 +86,7 @@ static void fill(const struct geom_shape *s, const uint32_t i[3], const struct c
 	x->dpdu = tangent(s, i, c->e1, c->e2);
 	vec3 n = x->ng;
 	if (s->normal) {
-		vec3 m = vec3_scale(b0, at(s->normal, i[0]));
-		m = vec3_madd(vec3_madd(m, b1, at(s->normal, i[1])), b2, at(s->normal, i[2]));
+		vec3 m = interpolated_normal(s, i, b1, b2);
 		/* Normals that turn to the back somewhere inside the triangle say nothing about this side: shade flat. */
 		if (vec3_dot(m, x->ng) > 0)
 			n = vec3_normalize(m);
@@ -142,4 +148,58 @@ void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct r
 	solve_triangle(o, d, c.v0, c.e1, c.e2, &b1, &b2);
 	x->prim = hit->prim;
 	fill(s, i, &c, b1, b2, x);
+}
+
+void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv)
+{
+	struct frame f = frame_along(x->ng, x->dpdu);
+	*du = f.s;
+	*dv = f.t;
+}
+
+static void change_on_sphere(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+{
+	double bend = 1 / s->radius;
+	c->dn[0] = vec3_scale(s->normal_sign * bend, c->du);
+	c->dn[1] = vec3_scale(s->normal_sign * bend, c->dv);
+	/* du is axis x w over its length. Along the circle of latitude it turns by bend about the outward direction w's own circle
+	 * and by bend cot(theta) towards the pole; along the meridian it is carried in parallel. */
+	vec3 w = vec3_scale(s->normal_sign, x->ng);
+	double cosine = vec3_dot(s->sphere_axes.n, w), sine = vec3_length(vec3_cross(s->sphere_axes.n, w));
+	vec3 turn = vec3_scale(-bend, w);
+	if (sine > 0)
+		turn = vec3_madd(turn, bend * cosine / sine, vec3_cross(w, c->du));
+	c->ddu[0] = vec3_is_finite(turn) ? turn : vec3_scale(-bend, w);
+}
+
+static void change_on_triangle(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+{
+	const uint32_t *i = s->index[x->prim.prim];
+	vec3 m = interpolated_normal(s, i, x->b1, x->b2);
+	if (!(vec3_dot(m, x->ng) > 0))
+		return;
+	struct corner k = corner_of(s, i);
+	vec3 area = vec3_cross(k.e1, k.e2), n0 = at(s->normal, i[0]);
+	double inverse = 1 / vec3_dot(area, area);
+	/* Gradients of the barycentrics. */
+	vec3 g1 = vec3_scale(inverse, vec3_cross(k.e2, area)), g2 = vec3_scale(inverse, vec3_cross(area, k.e1));
+	vec3 m1 = vec3_sub(at(s->normal, i[1]), n0), m2 = vec3_sub(at(s->normal, i[2]), n0);
+	double length = vec3_length(m);
+	for (int d = 0; d < 2; d++) {
+		vec3 along = d ? c->dv : c->du;
+		vec3 dm = vec3_madd(vec3_scale(vec3_dot(along, g1), m1), vec3_dot(along, g2), m2);
+		vec3 dn = vec3_scale(1 / length, vec3_madd(dm, -vec3_dot(x->sh.n, dm), x->sh.n));
+		if (vec3_is_finite(dn))
+			c->dn[d] = dn;
+	}
+}
+
+void surface_change_of(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+{
+	*c = (struct surface_change){.dn = {{0, 0, 0}}};
+	surface_tangents(x, &c->du, &c->dv);
+	if (s->is_sphere)
+		change_on_sphere(s, x, c);
+	else if (s->normal)
+		change_on_triangle(s, x, c);
 }

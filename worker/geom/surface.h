@@ -32,10 +32,22 @@ struct surface_point {
 	struct prim_ref prim;
 };
 
+/* How a point's frame changes as it moves, per unit length, [0] along du and [1] along dv. */
+struct surface_change {
+	vec3 du, dv;  /* orthonormal, in the plane of ng, du along dpdu; what frame_along falls back to where there is no dpdu */
+	vec3 dn[2];   /* of the shading normal; 0 where a triangle shades flat */
+	vec3 ddu[2];  /* of the field of unit du: 0 on a triangle, turning with the meridians on a sphere (not at its poles) */
+};
+
 /* Where the ray o + t d meets the primitive named by the hit. */
 void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x);
 /* The point of barycentrics (b1, b2) on a triangle, or at unit normal direction w from a sphere's centre. */
 void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2, struct surface_point *x);
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x);
+
+/* du and dv of struct surface_change alone. */
+void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv);
+/* Finite whatever x is. */
+void surface_change_of(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c);
 
 #endif

@@ -10,6 +10,8 @@
  *
  * Tangent coordinates are lengths along the orthonormal (du, dv) of the vertex that moves, in the plane of its geometric
  * normal. An emitter at infinity moves as a direction (solid angle), a delta emitter across the direction to its neighbour.
+ * Derivatives are exact for shading normals that are not the geometric ones, too: the frame turns with both.
+ * h.n = 0: h is infinite and all derivatives are 0, so that the matrix is singular. All else is finite.
  * Pure; one thread a call; nothing allocates.
  */
 #ifndef WORKER_HALFVEC_CONSTRAINT_H
@@ -23,7 +25,7 @@ struct constraint {
 	mat2 a, b, c;
 };
 
-/* Constraints of the inner vertices c+1..b-1 of x, k[j] for vertex j. Needs edges c..b-1 joined. */
+/* Constraints of the inner vertices c+1..b-1 of x, k[j] for vertex j. Needs edges c..b-1 joined and the inner modes. */
 void constraints_of(const struct world *w, const struct whole_path *x, unsigned b, unsigned c, struct constraint *k);
 /* h alone. */
 vec2 halfvec_of(const struct whole_path *x, unsigned j);
@@ -42,7 +44,7 @@ struct constraint_system {
 	mat2 inverse[WHOLE_MAX_VERTICES]; /* of L_j, by vertex */
 	double log_det;                   /* log |det M| */
 	double log_transfer;              /* log |det d x_{b-1} / d x_c| with all h held: prod |det a_j| / |det M| */
-	/* banded factors, when pivoted: layout is constraint_system.c's */
+	/* banded factors, when pivoted: the layout is constraint_system.c's */
 	double band[2 * WHOLE_MAX_VERTICES][10];
 	unsigned char order[2 * WHOLE_MAX_VERTICES];
 };

@@ -48,6 +48,11 @@ static inline mat2 mat2_sub(mat2 a, mat2 b)
 	return (mat2){a.xx - b.xx, a.xy - b.xy, a.yx - b.yx, a.yy - b.yy};
 }
 
+static inline mat2 mat2_of_columns(vec2 a, vec2 b)
+{
+	return (mat2){a.x, b.x, a.y, b.y};
+}
+
 static inline mat2 mat2_scale(double s, mat2 a)
 {
 	return (mat2){s * a.xx, s * a.xy, s * a.yx, s * a.yy};
@@ -62,6 +67,12 @@ static inline double mat2_det(mat2 m)
 static inline double mat2_norm2(mat2 m)
 {
 	return m.xx * m.xx + m.xy * m.xy + m.yx * m.yx + m.yy * m.yy;
+}
+
+/* The largest magnitude among the entries. */
+static inline double mat2_largest(mat2 m)
+{
+	return fmax(fmax(fabs(m.xx), fabs(m.xy)), fmax(fabs(m.yx), fabs(m.yy)));
 }
 
 /* The adjugate: the inverse times the determinant. */
