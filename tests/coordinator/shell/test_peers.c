@@ -281,7 +281,17 @@ static void hello_is_looked_at(void **state)
 
 /* ---- a whole job ---- */
 
-static void submit(struct peer *p, const char *scene_text, const char *file_name, const char *scene_name)
+static struct plan_request request(const char *mixture)
+{
+	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .spp = 4,
+				 .max_depth = 5, .groups = 2, .bootstrap = 256};
+	if (mixture)
+		snprintf(r.mixture, sizeof r.mixture, "%s", mixture);
+	return r;
+}
+
+/* mixture: NULL, or of the mutations. */
+static void submit(struct peer *p, const char *mixture, const char *scene_text, const char *file_name, const char *scene_name)
 {
 	Farm__Submit s;
 	Farm__PlanRequest plan;
@@ -289,11 +299,9 @@ static void submit(struct peer *p, const char *scene_text, const char *file_name
 	Farm__Envelope m;
 	struct blob_hash hash;
 	struct error e;
-	char name[] = "black", scene[64], integrator[] = "pssmlt", file_text[64];
-	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .spp = 4,
-				 .max_depth = 5, .groups = 2, .bootstrap = 256};
+	char name[] = "black", scene[64], file_text[64];
+	struct plan_request r = request(mixture);
 	plan_request_to_wire(&r, &plan);
-	plan.integrator = integrator;
 	farm__submit__init(&s);
 	farm__file__init(&file);
 	farm__envelope__init(&m);
@@ -344,13 +352,13 @@ static void submissions_are_looked_at(void **state)
 	assert_true(hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	static const char *const names[] = {"../s.xml", "/s.xml", "a//s.xml", "", "a/./s.xml", "s.xml/", "a/..", "a\nb"};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
-		submit(p, "<scene/>", names[i], names[i]);
+		submit(p, NULL, "<scene/>", names[i], names[i]);
 		const Farm__SubmitAnswer *a = submit_answer(p);
 		assert_true(a->job == 0 && a->n_missing == 0 && *a->refusal);
 	}
-	submit(p, "<scene/>", "other.xml", "s.xml");
+	submit(p, NULL, "<scene/>", "other.xml", "s.xml");
 	assert_true(*submit_answer(p)->refusal);
-	submit(p, "<scene/>", "s.xml", "s.xml");
+	submit(p, NULL, "<scene/>", "s.xml", "s.xml");
 	assert_int_equal(submit_answer(p)->n_missing, 1);
 	send_blob(p, "<scene/>", "<SCENE/>"); /* other bytes than promised */
 	const Farm__SubmitAnswer *a = submit_answer(p);
@@ -418,11 +426,10 @@ static void a_black_job_ends(void **state)
 	struct peer *client = call(), *worker = call();
 	struct plan plan;
 	struct error e;
-	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .spp = 4,
-				 .max_depth = 5, .groups = 2, .bootstrap = 256};
+	struct plan_request r = request(NULL);
 	assert_int_equal(plan_make(&r, &plan, &e), 0);
 	assert_true(hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	submit(client, "<scene/>", "s.xml", "s.xml");
+	submit(client, NULL, "<scene/>", "s.xml", "s.xml");
 	assert_int_equal(submit_answer(client)->n_missing, 1);
 	send_blob(client, "<scene/>", "<scene/>");
 	const Farm__SubmitAnswer *a = submit_answer(client);
@@ -462,12 +469,108 @@ static void a_black_job_ends(void **state)
 	hang_up(worker);
 }
 
+/* A lease of chains in the dark; of a bootstrap in even light. */
+static struct batch counting_batch(const struct lease_key *k, const struct plan *plan)
+{
+	struct batch b = {.key = *k};
+	if (k->kind == LEASE_BOOTSTRAP) {
+		b = black_batch(k, plan);
+		for (uint64_t i = 0; i < b.weight_count; i++)
+			b.weights[i] = 1;
+		b.independent_sum = (double)b.weight_count;
+		return b;
+	}
+	struct plan_range chains = plan_chain_range(plan, k->part);
+	b.state_count = (uint32_t)(chains.end - chains.begin);
+	b.states = mem_alloc(b.state_count, sizeof *b.states);
+	for (uint32_t i = 0; i < b.state_count; i++)
+		b.states[i] = (struct chain_state){mem_alloc(4, 1), 4};
+	b.counters[COUNT_SAMPLES] = b.state_count * plan->epoch;
+	b.counters[COUNT_STUCK] = b.state_count;
+	b.counters[COUNT_LONGEST_STUCK] = 100 + k->group;
+	b.strategy_count = 2;
+	b.strategy[0][STRATEGY_PROPOSED] = 3;
+	b.strategy[1][STRATEGY_PROPOSED] = b.counters[COUNT_SAMPLES] - 3;
+	b.strategy[1][STRATEGY_RAYS] = UINT64_C(1) << 40;
+	b.strategy[1][STRATEGY_FAIL_MODE] = 7 + k->part;
+	return b;
+}
+
+static void expect_counts_in_spool(const struct plan *plan)
+{
+	struct job_record r;
+	struct error e;
+	char path[96], text[16384];
+	snprintf(path, sizeof path, "%s/spool/jobs/j2/job.json", folder);
+	FILE *f = fopen(path, "r");
+	assert_non_null(f);
+	size_t size = fread(text, 1, sizeof text, f);
+	fclose(f);
+	assert_int_equal(record_from_json(text, size, &r, &e), 0);
+	uint64_t leases = plan->rounds * plan->groups * plan->parts, chains = plan->chains * plan->rounds;
+	assert_int_equal(r.leases_merged, leases);
+	assert_int_equal(r.repeats, 1);
+	assert_int_equal(r.refused, 1);
+	assert_string_equal(r.mixture, "independent=0.1,hslt=0.9");
+	assert_int_equal(r.strategy[0][STRATEGY_PROPOSED], 3 * leases);
+	assert_int_equal(r.strategy[1][STRATEGY_PROPOSED], plan->rounds * plan_round_mutations(plan) - 3 * leases);
+	assert_true(r.strategy[1][STRATEGY_RAYS] == leases << 40);
+	assert_int_equal(r.strategy[1][STRATEGY_FAIL_MODE], plan->rounds * plan->groups * (7 * plan->parts + plan->parts * (plan->parts - 1) / 2));
+	assert_int_equal(r.stuck, chains);
+	assert_int_equal(r.longest_stuck, 101);
+	assert_non_null(strstr(r.note, "the image is black: no sample found light; "));
+	assert_non_null(strstr(r.note, "longest run: 101 rejections"));
+}
+
+static void strategies_are_counted_once(void **state)
+{
+	(void)state;
+	struct peer *client = call(), *worker = call();
+	struct plan plan;
+	struct error e;
+	struct plan_request r = request("independent=0.1,hslt=0.9");
+	assert_int_equal(plan_make(&r, &plan, &e), 0);
+	assert_true(hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	submit(client, r.mixture, "<scene/>", "s.xml", "s.xml");
+	assert_int_equal(submit_answer(client)->job, 2); /* the scene is still there */
+	assert_true(hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	struct desk d = {.count = 0};
+	bool first = true;
+	while (!d.job_ended) {
+		if (d.count == 0) {
+			attend(worker, &d);
+			continue;
+		}
+		struct batch b = counting_batch(&d.keys[--d.count], &plan);
+		bool wrong = first && b.key.kind == LEASE_RENDER;
+		if (wrong) {
+			b.strategy[0][STRATEGY_ACCEPTED] = 4; /* of 3 proposals */
+			send_batch(worker, &b, &plan);
+			assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
+			b.strategy[0][STRATEGY_ACCEPTED] = 0;
+		}
+		send_batch(worker, &b, &plan);
+		assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+		if (wrong) {
+			send_batch(worker, &b, &plan);
+			assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+			first = false;
+		}
+		batch_fini(&b);
+	}
+	expect_counts_in_spool(&plan);
+	hang_up(client);
+	hang_up(worker);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(rubbish_is_hung_up_on),   cmocka_unit_test(stragglers_are_hung_up_on),
 		cmocka_unit_test(crowds_are_turned_away),  cmocka_unit_test(hello_is_looked_at),
 		cmocka_unit_test(submissions_are_looked_at), cmocka_unit_test(a_black_job_ends),
+		cmocka_unit_test(strategies_are_counted_once),
 	};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }
