@@ -92,9 +92,8 @@ double path_pdf(const struct path_context *c, const struct path_vertex *prev, co
 	return next->kind == VERTEX_INFINITE ? solid : solid * jac_solid_from_area(next->x.ng, omega, distance2);
 }
 
-/* The vertex where the ray from `from` along d ends: a surface, the emitter at infinity, or nothing (false). */
-static bool extend(struct path_context *c, const struct path_vertex *from, vec3 d, double t_min, double t_max,
-		   struct path_vertex *to)
+bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d, double t_min, double t_max,
+		 struct path_vertex *to)
 {
 	struct ray_end start = {from->x.p, from->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : from->x.ng, from->x.prim};
 	struct ray_hit hit;
@@ -200,7 +199,7 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 			return n;
 		if (!survives(c, n - 1, start, u[DIM_ROULETTE], &out.beta) || spectrum_is_zero(out.beta))
 			return n;
-		if (!extend(c, at, out.wi, 0, INFINITY, to) || (to->kind == VERTEX_INFINITE && side == SIDE_LIGHT))
+		if (!path_extend(c, at, out.wi, 0, INFINITY, to) || (to->kind == VERTEX_INFINITE && side == SIDE_LIGHT))
 			return n;
 		double ahead = 1, back = 1;
 		if (out.delta && side == SIDE_CAMERA)
@@ -240,7 +239,7 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	vec3 d = camera_direction(&w->camera, v[0].x.p, film[0], film[1]);
 	double t_min, t_max, area = c->window.width * c->window.height;
 	camera_clip(&w->camera, d, &t_min, &t_max);
-	if (!extend(c, &v[0], d, t_min, t_max, &v[1]))
+	if (!path_extend(c, &v[0], d, t_min, t_max, &v[1]))
 		return 1;
 	v[1].beta = spectrum_of(area);
 	v[1].pdf = path_pdf(c, NULL, &v[0], &v[1], TRANSPORT_RADIANCE);
@@ -264,7 +263,7 @@ static bool leave_infinity(struct path_context *c, struct path_vertex *v, const 
 	const struct emitter *em = &w->emitters[v[0].emitter];
 	struct emitter_point p = {.p = v[0].x.p, .infinite = true};
 	spectrum l = em->ops->radiance(em, &p, d, &c->wl);
-	if (!extend(c, &start, d, 0, INFINITY, &v[1]) || v[1].kind != VERTEX_SURFACE)
+	if (!path_extend(c, &start, d, 0, INFINITY, &v[1]) || v[1].kind != VERTEX_SURFACE)
 		return false;
 	v[1].beta = spectrum_scale(1 / disk_pdf(w), spectrum_mul(v[0].beta, l));
 	return true;
@@ -279,7 +278,7 @@ static bool leave_surface(struct path_context *c, struct path_vertex *v, const d
 	if (!em->ops->sample_direction(em, &p, u, &d, &solid) || !(solid > 0))
 		return false;
 	spectrum l = em->ops->radiance(em, &p, d, &c->wl);
-	if (!extend(c, &v[0], d, 0, INFINITY, &v[1]) || v[1].kind != VERTEX_SURFACE)
+	if (!path_extend(c, &v[0], d, 0, INFINITY, &v[1]) || v[1].kind != VERTEX_SURFACE)
 		return false;
 	v[1].beta = spectrum_scale(fabs(vec3_dot(p.n, d)) / solid, spectrum_mul(v[0].beta, l));
 	return true;

@@ -91,6 +91,10 @@ void path_delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera
 /* Radiance that leaves an emitter's point in direction w. */
 spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl);
 
+/* The vertex where the ray from `from` along d ends: a surface, the emitter at infinity, or nothing (false). Counts a ray. */
+bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d, double t_min, double t_max,
+		 struct path_vertex *to);
+
 /* Unit direction and squared distance from a to b; b may lie at infinity (distance 1). */
 vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2);
 
