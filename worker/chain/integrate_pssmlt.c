@@ -6,7 +6,9 @@
 #include "worker/path/integrator.h"
 
 const struct integrator integrator_pssmlt = {
-	.face = {"pssmlt", "primary sample space Metropolis over bdpt", PLAN_CHAINS, PSS_MAX_EDGES},
+	.face = {.name = "pssmlt",
+		 .summary = "primary sample space Metropolis over bdpt",
+		 .kind = PLAN_CHAINS, .max_depth = PSS_MAX_EDGES},
 	.stream = RNG_BOOTSTRAP,
 	.evaluate = path_trace_both_ways,
 	.chain = &chain_pss,

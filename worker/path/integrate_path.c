@@ -27,7 +27,9 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 }
 
 const struct integrator integrator_path = {
-	.face = {"path", "path tracing with next event estimation and multiple importance sampling", PLAN_SAMPLES, PATH_MAX_EDGES},
+	.face = {.name = "path",
+		 .summary = "path tracing with next event estimation and multiple importance sampling",
+		 .kind = PLAN_SAMPLES, .max_depth = PATH_MAX_EDGES},
 	.stream = RNG_PATH,
 	.evaluate = path_trace,
 };
