@@ -1,0 +1,48 @@
+# Mixtures of strategies: what is one, the options that give the same bits again, and counters that a farm and hslt-render share.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare
+INTEGRATOR=${INTEGRATOR:-hslt}
+"$BIN/hslt-render" --help | grep -q "integrator=NAME.* $INTEGRATOR" || skip "there is no integrator $INTEGRATOR"
+LIST="--mutations hslt=0.75,independent=0.25"
+COUNT="--bootstrap 16384 --mutations 40000"
+
+# counters FILE: of all strategies, in order, one a line
+counters() {
+	sed 's/.*"strategies"/"strategies"/' "$1" | grep -o '"[a-zA-Z]*": *[0-9][0-9]*' | tr -d ' ' | grep -v '"rel\|"stuck\|"job'
+}
+
+for p in render submit; do
+	for list in nothing=1 hslt=0 hslt=0.9,independent=x; do
+		code=0
+		HSLT_COORDINATOR=127.0.0.1:1 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --integrator $INTEGRATOR --mutations $list \
+			2>"$DIR/wrong.log" || code=$?
+		[ $code -eq 2 ] || fail "hslt-$p --mutations $list ended with $code: $(cat "$DIR/wrong.log")"
+	done
+done
+
+"$BIN/hslt-render" "$BOX" -o "$DIR/a.exr" --integrator $INTEGRATOR $LIST $COUNT --stats "$DIR/a.json" 2>"$DIR/render.log" ||
+	fail "hslt-render ended with $?"
+grep -q '^strategy .*proposals' "$DIR/render.log" || fail "no table"
+grep -q '^hslt  *[0-9]' "$DIR/render.log" || fail "no row for hslt"
+proposed=$(counters "$DIR/a.json" | sed -n 's/"proposed"://p' | awk '{ n += $1 } END { print n + 0 }')
+samples=$(sed -n 's/.*"samples": *\([0-9]*\).*/\1/p' "$DIR/a.json")
+[ "$proposed" -gt 0 ] && [ "$proposed" -le "$samples" ] || fail "$proposed proposals in $samples mutations"
+options=$(sed -n 's/ *"options": "\(.*\)",/\1/p' "$DIR/a.json")
+"$BIN/hslt-render" "$BOX" -o "$DIR/again.exr" $options --quiet || fail "hslt-render $options ended with $?"
+same "$DIR/a.exr" "$DIR/again.exr"
+"$BIN/hslt-render" "$BOX" -o "$DIR/plain.exr" --integrator $INTEGRATOR $COUNT --quiet || fail "without a list it ended with $?"
+
+start_coordinator
+start_worker w1
+start_worker w2
+id=$(submit "$BOX" -o "$DIR/farm.exr" --integrator $INTEGRATOR $COUNT $LIST --wait) || fail "hslt-submit ended with $?"
+same "$DIR/a.exr" "$DIR/farm.exr"
+"$BIN/hslt-status" --json "$id" >"$DIR/status.json"
+tr -d '\n' <"$DIR/a.json" | sed 's/"note".*//' >"$DIR/render.json"
+sed 's/"note".*//' "$DIR/status.json" >"$DIR/farm.json"
+counters "$DIR/render.json" | sort >"$DIR/by-render"
+counters "$DIR/farm.json" | sort >"$DIR/by-farm"
+[ "$(wc -l <"$DIR/by-farm")" -ge 30 ] || fail "the status has few counters: $(cat "$DIR/by-farm")"
+cmp -s "$DIR/by-render" "$DIR/by-farm" || fail "other counters: $(diff "$DIR/by-render" "$DIR/by-farm")"
+"$BIN/hslt-status" "$id" | grep -q '^hslt  *[0-9]' || fail "hslt-status shows no table"
+echo "$(sed -n '/^hslt /p' "$DIR/render.log")"
