@@ -2,6 +2,7 @@
 #include "common/film/strategy.h"
 
 #include "common/base/mem.h"
+#include "common/film/header.h"
 #include "common/film/strategy_json.h"
 
 #include <setjmp.h>
@@ -194,6 +195,40 @@ static void json_comes_back(void **state)
 	batch_fini(&b);
 }
 
+static const char *attribute(const struct header *h, const char *name)
+{
+	for (size_t i = 0; i < h->count; i++)
+		if (strcmp(h->attributes[i].name, name) == 0)
+			return h->attributes[i].string;
+	return NULL;
+}
+
+static void headers_say_it(void **state)
+{
+	(void)state;
+	static struct header h;
+	struct plan p = make_plan();
+	struct canvas_image img = {.width = 20, .height = 10, .rounds = 2};
+	struct header_extra x = {.date = ""};
+	struct batch b = make_batch(0, 1, 0);
+	memcpy(img.counts.strategy, b.strategy, sizeof b.strategy);
+	memcpy(img.counts.counters, b.counters, sizeof b.counters);
+	header_fill(&h, &img, &p, &x);
+	assert_string_equal(attribute(&h, "hslt:mixture"), "independent=0.1,hslt=0.9");
+	assert_non_null(strstr(attribute(&h, "hslt:options"), "--mutations independent=0.1,hslt=0.9 "));
+	assert_non_null(strstr(attribute(&h, "hslt:strategies"), "hslt: proposed 900 accepted 460 "));
+	assert_string_equal(attribute(&h, "hslt:stuck"), "1");
+	assert_string_equal(attribute(&h, "hslt:longestStuck"), "5211");
+	assert_non_null(strstr(attribute(&h, "hslt:note"), "1 of 1 times a chain accepted nothing"));
+	img.counts.counters[COUNT_STUCK] = 0;
+	memset(p.mutations, 0, sizeof p.mutations);
+	header_fill(&h, &img, &p, &x);
+	assert_null(attribute(&h, "hslt:mixture"));
+	assert_null(attribute(&h, "hslt:strategies"));
+	assert_null(attribute(&h, "hslt:note"));
+	batch_fini(&b);
+}
+
 static void counters_have_names(void **state)
 {
 	(void)state;
@@ -212,6 +247,7 @@ int main(void)
 		cmocka_unit_test(a_batch_counts_within_bounds),
 		cmocka_unit_test(tables_are_readable),
 		cmocka_unit_test(json_comes_back),
+		cmocka_unit_test(headers_say_it),
 		cmocka_unit_test(counters_have_names),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
