@@ -43,18 +43,28 @@ static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1
 	return true;
 }
 
-/* dp/du from the texture coordinates; the first edge where there are none or they are degenerate. */
-static vec3 tangent(const struct geom_shape *s, const uint32_t i[3], vec3 e1, vec3 e2)
+/* A tangent that turns as little as it can from one triangle to the next: what the shortest rotation from r to n makes of a.
+ * Half vectors are numbers in frames, and frames along edges would turn at random. No such field is without a flaw; this one's
+ * is at n = -r, where few surfaces face. */
+static vec3 carried_axis(vec3 n)
+{
+	const vec3 r = {2.0 / 7, 3.0 / 7, 6.0 / 7}, a = {3.0 / 7, -6.0 / 7, 2.0 / 7};
+	double k = 1 + vec3_dot(r, n);
+	return k > 0x1p-20 ? vec3_madd(a, -vec3_dot(a, n) / k, vec3_add(r, n)) : a;
+}
+
+/* dp/du from the texture coordinates; an axis of our own where there are none or they are degenerate. */
+static vec3 tangent(const struct geom_shape *s, const uint32_t i[3], vec3 ng, vec3 e1, vec3 e2)
 {
 	if (!s->uv)
-		return e1;
+		return carried_axis(ng);
 	double du1 = (double)s->uv[i[1]][0] - (double)s->uv[i[0]][0], dv1 = (double)s->uv[i[1]][1] - (double)s->uv[i[0]][1];
 	double du2 = (double)s->uv[i[2]][0] - (double)s->uv[i[0]][0], dv2 = (double)s->uv[i[2]][1] - (double)s->uv[i[0]][1];
 	double det = du1 * dv2 - dv1 * du2;
 	if (det == 0)
-		return e1;
+		return carried_axis(ng);
 	vec3 t = vec3_scale(1 / det, vec3_sub(vec3_scale(dv2, e1), vec3_scale(dv1, e2)));
-	return vec3_is_finite(t) && vec3_dot(t, t) > 0 ? t : e1;
+	return vec3_is_finite(t) && vec3_dot(t, t) > 0 ? t : carried_axis(ng);
 }
 
 /* A triangle's first vertex and the edges from there. */
@@ -83,7 +93,7 @@ static void fill(const struct geom_shape *s, const uint32_t i[3], const struct c
 	x->b2 = b2;
 	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
 	x->ng = vec3_normalize(vec3_cross(c->e1, c->e2));
-	x->dpdu = tangent(s, i, c->e1, c->e2);
+	x->dpdu = tangent(s, i, x->ng, c->e1, c->e2);
 	vec3 n = x->ng;
 	if (s->normal) {
 		vec3 m = interpolated_normal(s, i, b1, b2);
@@ -202,4 +212,49 @@ void surface_change_of(const struct geom_shape *s, const struct surface_point *x
 		change_on_sphere(s, x, c);
 	else if (s->normal)
 		change_on_triangle(s, x, c);
+}
+
+static bool reproject_triangle(const struct geom_shape *s, struct prim_ref prim, vec3 o, vec3 d, struct surface_point *x)
+{
+	const uint32_t *i = s->index[prim.prim];
+	struct corner c = corner_of(s, i);
+	vec3 h = vec3_cross(d, c.e2), to = vec3_sub(o, c.v0), q = vec3_cross(to, c.e1);
+	double det = vec3_dot(c.e1, h), side = copysign(1, det);
+	double b1 = side * vec3_dot(to, h), b2 = side * vec3_dot(d, q), most = fabs(det);
+	if (!(b1 >= 0) || !(b2 >= 0) || !(b1 + b2 <= most) || !(side * vec3_dot(c.e2, q) > 0) || !(most > 0))
+		return false;
+	x->prim = prim;
+	fill(s, i, &c, b1 / most, b2 / most, x);
+	return true;
+}
+
+static bool reproject_sphere(const struct geom_shape *s, struct prim_ref prim, bool starts_on_it, vec3 o, vec3 d, double t_near,
+			     struct surface_point *x)
+{
+	vec3 oc = vec3_sub(o, s->center);
+	double b = vec3_dot(oc, d), root;
+	if (starts_on_it) {
+		root = -2 * b; /* the other root is the start */
+	} else {
+		double miss = vec3_length(vec3_madd(oc, -b, d)), l = vec3_length(oc);
+		double disc = (s->radius - miss) * (s->radius + miss), c = (l - s->radius) * (l + s->radius);
+		if (!(disc >= 0))
+			return false;
+		double k = -b - copysign(sqrt(disc), b), other = k != 0 ? c / k : k;
+		double near = fmin(k, other), far = fmax(k, other);
+		root = near > 0 && fabs(near - t_near) <= fabs(far - t_near) ? near : far;
+	}
+	if (!(root > 0))
+		return false;
+	surface_on_sphere(s, prim, vec3_normalize(vec3_madd(oc, root, d)), x);
+	return true;
+}
+
+bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d, double t_near,
+		       struct surface_point *x)
+{
+	bool same = prim.shape == from.shape && prim.prim == from.prim;
+	if (s->is_sphere)
+		return reproject_sphere(s, prim, same, o, d, t_near, x);
+	return !same && reproject_triangle(s, prim, o, d, x);
 }

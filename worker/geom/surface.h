@@ -44,6 +44,10 @@ void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct r
 /* The point of barycentrics (b1, b2) on a triangle, or at unit normal direction w from a sphere's centre. */
 void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2, struct surface_point *x);
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x);
+/* Where the ray from o (which lies on the primitive `from`) along the unit direction d meets this one primitive, whatever lies
+ * between; of a sphere's two crossings the one nearest to t_near. false: it passes by. */
+bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d, double t_near,
+		       struct surface_point *x);
 
 /* du and dv of struct surface_change alone. */
 void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv);
