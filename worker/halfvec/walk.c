@@ -1,0 +1,201 @@
+#include "worker/halfvec/walk.h"
+
+#include <assert.h>
+
+/* One walk while it goes on. Predictions start at the kept state alone, so that a refused trial leaves nothing to undo. */
+struct walk {
+	struct path_context *c;
+	struct whole_path *y; /* the trial */
+	unsigned b, end;
+	const struct walk_target *target;
+	double scale;
+	struct walk_scratch *s;
+	uint64_t above; /* by vertex: where light leaves on the side of the geometric normal */
+	uint64_t seen;  /* by edge: a ray of this trial has met the next vertex along it */
+	vec3 move[WHOLE_MAX_VERTICES]; /* a full step of Newton from the kept state */
+};
+
+static uint64_t bit(unsigned i)
+{
+	return (uint64_t)1 << i;
+}
+
+static bool light_above(const struct whole_path *y, unsigned j)
+{
+	return vec3_dot(y->v[j].x.ng, y->edge[j - 1].w) < 0;
+}
+
+static bool mode_holds(const struct whole_path *y, unsigned j)
+{
+	return whole_mode(y, j) == (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT));
+}
+
+/* By a ray: onto another primitive of the same material. */
+static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
+{
+	const struct world *w = m->c->w;
+	const struct path_vertex *from = &m->y->v[j + 1];
+	struct path_vertex *to = &m->y->v[j];
+	bool camera = from->kind == VERTEX_CAMERA;
+	struct ray_end start = {from->x.p, camera ? (vec3){0, 0, 0} : from->x.ng, from->x.prim};
+	double t_min = 0, t_max = INFINITY;
+	if (camera)
+		camera_clip(&w->camera, d, &t_min, &t_max);
+	struct ray_hit hit;
+	m->c->counters[COUNT_RAYS_CLOSEST]++;
+	if (!accel_closest(w->accel, &start, d, t_min, t_max, &hit))
+		return WALK_MISSED;
+	const struct world_shape *part = &w->parts[hit.prim.shape];
+	if (&w->bsdfs[part->bsdf] != to->bsdf)
+		return WALK_BLOCKED;
+	surface_from_hit(&w->shapes[hit.prim.shape], from->x.p, d, &hit, &to->x);
+	to->emitter = part->emitter;
+	m->seen |= bit(j);
+	return WALK_OK;
+}
+
+/* Vertex j of the trial: along the ray from the one before it towards the prediction. */
+static enum walk_end put_back(struct walk *m, unsigned j, double step)
+{
+	const struct path_vertex *from = &m->y->v[j + 1], *kept = &m->s->kept[j];
+	struct path_vertex *to = &m->y->v[j];
+	vec3 d = vec3_sub(vec3_madd(kept->x.p, step, m->move[j]), from->x.p);
+	double t = vec3_length(d);
+	if (!(t > 0) || !isfinite(t))
+		return WALK_MISSED;
+	d = vec3_scale(1 / t, d);
+	struct prim_ref prim = kept->x.prim;
+	if (!surface_reproject(&m->c->w->shapes[prim.shape], prim, from->x.prim, from->x.p, d, t, &to->x))
+		return cast(m, j, d);
+	to->emitter = kept->emitter;
+	return WALK_OK;
+}
+
+static enum walk_end trial(struct walk *m, double step)
+{
+	struct whole_path *y = m->y;
+	m->seen = 0;
+	for (unsigned j = m->b - 1;; j--) {
+		if (j > m->end) {
+			enum walk_end put = put_back(m, j, step);
+			if (put != WALK_OK)
+				return put;
+		}
+		if (!whole_join(y, j))
+			return WALK_SINGULAR;
+		if (j + 1 < m->b && (!mode_holds(y, j + 1) || light_above(y, j + 1) != ((m->above >> (j + 1)) & 1)))
+			return WALK_MODE;
+		if (j == m->end)
+			return WALK_OK;
+	}
+}
+
+/* How far the half vectors are from the targets, a measure for step control alone. within: all as near as asked. */
+static double residuals(struct walk *m, bool *within)
+{
+	double error = 0;
+	*within = true;
+	for (unsigned j = m->end + 1; j < m->b; j++) {
+		vec2 h = m->s->k[j].h, r = vec2_sub(m->target[j].h, h);
+		double tolerance = m->scale * m->target[j].tolerance, r2 = vec2_dot(r, r);
+		m->s->residual[j] = r;
+		*within = *within && r2 <= tolerance * tolerance;
+		error = fmax(error, r2 / (1 + vec2_dot(h, h)));
+		if (!isfinite(r2))
+			return INFINITY;
+	}
+	return error;
+}
+
+/* The trial becomes the kept state: Newton's step from there. */
+static enum walk_end keep(struct walk *m)
+{
+	struct walk_scratch *s = m->s;
+	if (constraint_factor(s->k, m->b, m->end, &s->system) != CONSTRAINT_OK)
+		return WALK_SINGULAR;
+	constraint_solve(s->k, &s->system, s->residual, s->dx);
+	for (unsigned j = m->end + 1; j < m->b; j++) {
+		s->kept[j].x = m->y->v[j].x;
+		s->kept[j].emitter = m->y->v[j].emitter;
+		vec3 du, dv;
+		surface_tangents(&s->kept[j].x, &du, &dv);
+		m->move[j] = vec3_madd(vec3_scale(s->dx[j].x, du), s->dx[j].y, dv);
+		if (!vec3_is_finite(m->move[j]))
+			return WALK_SINGULAR;
+	}
+	return WALK_OK;
+}
+
+static enum walk_end start(struct walk *m)
+{
+	struct whole_path *y = m->y;
+	for (unsigned e = m->end; e < m->b; e++)
+		if (!whole_join(y, e))
+			return WALK_SINGULAR;
+	for (unsigned j = m->end + 1; j < m->b; j++) {
+		if (!mode_holds(y, j))
+			return WALK_MODE;
+		if (light_above(y, j))
+			m->above |= bit(j);
+	}
+	return WALK_OK;
+}
+
+static bool all_visible(const struct walk *m)
+{
+	for (unsigned e = m->b; e-- > m->end;)
+		if (!(m->seen & bit(e)) && !whole_visible(m->c, m->y, e))
+			return false;
+	return true;
+}
+
+/* Until the residuals are as small as asked, or a reason why they cannot be. */
+static enum walk_end iterate(struct walk *m, const struct walk_limits *limits)
+{
+	struct walk_scratch *s = m->s;
+	bool within;
+	constraints_of(m->c->w, m->y, m->b, m->end, s->k);
+	double error = residuals(m, &within), step = 1;
+	enum walk_end last = isfinite(error) ? keep(m) : WALK_SINGULAR;
+	if (last != WALK_OK)
+		return last;
+	while (s->iterations < limits->iterations) {
+		s->iterations++;
+		last = trial(m, step);
+		if (last == WALK_OK) {
+			constraints_of(m->c->w, m->y, m->b, m->end, s->k);
+			double now = residuals(m, &within);
+			if (within)
+				return WALK_OK;
+			if (now < error) {
+				error = now;
+				last = keep(m);
+				if (last != WALK_OK)
+					return last;
+				step = fmin(1, 2 * step);
+				continue;
+			}
+			last = WALK_DIVERGED;
+		}
+		step /= 2;
+		if (step < limits->least_step)
+			return last;
+	}
+	return last == WALK_OK ? WALK_ITERATIONS : last;
+}
+
+enum walk_end halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
+			   struct walk_scratch *s)
+{
+	assert(c_end + 1 < b && b <= y->edges);
+	struct walk m = {.c = c, .y = y, .b = b, .end = c_end, .target = target, .scale = limits->scale, .s = s};
+	s->iterations = 0;
+	whole_forget(y, c_end + 1, b - 1);
+	enum walk_end end = start(&m);
+	if (end == WALK_OK)
+		end = iterate(&m, limits);
+	if (end == WALK_OK && !visible && !all_visible(&m))
+		end = WALK_BLOCKED;
+	return end;
+}
