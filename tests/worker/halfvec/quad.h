@@ -202,7 +202,10 @@ static inline struct quad_vertex quad_of_surface(const struct hand *h, unsigned 
 	v.smooth = s->normal != NULL;
 	for (int m = 0; m < 3 && v.smooth; m++)
 		v.normal[m] = q_of_float(s->normal[m]);
-	v.along = v.e1;
+	/* Without uv: (3, -6, 2) / 7 carried along by the shortest rotation from (2, 3, 6) / 7 to the normal. */
+	qvec from = {(quad)2 / 7, (quad)3 / 7, (quad)6 / 7}, axis = {(quad)3 / 7, (quad)-6 / 7, (quad)2 / 7};
+	qvec ng = q_unit(q_cross(v.e1, v.e2));
+	v.along = q_madd(axis, -q_dot(axis, ng) / (1 + q_dot(from, ng)), q_madd(from, 1, ng));
 	if (s->uv) {
 		quad u1 = (quad)s->uv[1][0] - (quad)s->uv[0][0], v1 = (quad)s->uv[1][1] - (quad)s->uv[0][1];
 		quad u2 = (quad)s->uv[2][0] - (quad)s->uv[0][0], v2 = (quad)s->uv[2][1] - (quad)s->uv[0][1];

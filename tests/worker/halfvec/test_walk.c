@@ -331,7 +331,7 @@ static void test_spheres(void **state)
 	(void)state;
 	struct tally t = walk_in("spheres", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.7", "-.5", "0", METAL(".1"))
 							BALL(".8", "-.5", "0", METAL(".02")) FLOOR(METAL(".2"))), 20000);
-	assert_true(t.arrived > 0.5 * (double)t.walks);
+	assert_true((double)t.arrived > 0.5 * (double)t.walks);
 }
 
 static void test_rough_glass(void **state)
@@ -339,7 +339,7 @@ static void test_rough_glass(void **state)
 	(void)state;
 	struct tally t = walk_in("rough glass", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", GLASS(".1"))
 							BALL(".9", "-.5", "0", GLASS(".01")) FLOOR("<bsdf type='diffuse'/>")), 20000);
-	assert_true(t.arrived > 0.5 * (double)t.walks);
+	assert_true((double)t.arrived > 0.5 * (double)t.walks);
 }
 
 static void test_smooth_glass(void **state)
@@ -349,7 +349,7 @@ static void test_smooth_glass(void **state)
 							BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
 							BALL(".9", "-.5", "0", "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")
 							FLOOR(METAL(".1"))), 20000);
-	assert_true(t.arrived > 0.5 * (double)t.walks);
+	assert_true((double)t.arrived > 0.5 * (double)t.walks);
 }
 
 static void test_sky(void **state)
@@ -357,7 +357,7 @@ static void test_sky(void **state)
 	(void)state;
 	struct tally t = walk_in("sky", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") SKY BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
 						BALL(".9", "-.5", "0", METAL(".05")) FLOOR(METAL(".1"))), 20000);
-	assert_true(t.arrived > 0.5 * (double)t.walks);
+	assert_true((double)t.arrived > 0.5 * (double)t.walks);
 }
 
 /* A pole of each sphere faces the camera, which sees little else. */
@@ -370,7 +370,7 @@ static void test_poles(void **state)
 						"<integer name='width' value='32'/><integer name='height' value='32'/>"
 						"<rfilter type='box'/></film></sensor>" SKY BALL("0", "0", "0", GLASS(".05"))
 						BALL("0", "0", "-2", METAL(".05"))), 20000);
-	assert_true(t.arrived > 0.4 * (double)t.walks);
+	assert_true((double)t.arrived > 0.4 * (double)t.walks);
 }
 
 /* Bumps with interpolated normals, n x n squares, over [-2,2]^2. */
@@ -402,11 +402,11 @@ static void test_meshes(void **state)
 {
 	(void)state;
 	struct tally t = walk_in("coarse bumps", bumpy_world(12, METAL(".1")), 20000);
-	assert_true(t.arrived > 0.4 * (double)t.walks);
+	assert_true((double)t.arrived > 0.4 * (double)t.walks);
 	t = walk_in("fine bumps", bumpy_world(60, METAL(".1")), 20000);
-	assert_true(t.arrived > 0.4 * (double)t.walks && t.seams > t.arrived / 10);
+	assert_true((double)t.arrived > 0.4 * (double)t.walks && t.seams > t.arrived / 10);
 	t = walk_in("bumpy water", bumpy_world(40, "<bsdf type='dielectric'/>"), 20000);
-	assert_true(t.arrived > 0.4 * (double)t.walks);
+	assert_true((double)t.arrived > 0.4 * (double)t.walks);
 }
 
 int main(void)
