@@ -3,6 +3,10 @@
  * A point on an emitter is a position with a normal, or for emitters at infinity the unit direction from the scene
  * towards it. Measures: `pdf_point` and `pdf_toward` are per area (world units of the rescaled scene), per solid angle at
  * infinity. Immutable after creation; any thread; nothing allocates after create.
+ *
+ * Delta emitters are one point (or one direction): nothing hits them by chance, the measure of x_0 counts and both densities
+ * are 1. What `radiance` gives is intensity per solid angle at a point (no cosine there, n is 0), irradiance across the
+ * direction at infinity.
  */
 #ifndef WORKER_EMITTER_EMITTER_H
 #define WORKER_EMITTER_EMITTER_H
@@ -12,7 +16,7 @@
 
 struct emitter_point {
 	vec3 p;        /* position, or direction towards the emitter when infinite */
-	vec3 n;        /* unit normal on the emitting side; unused when infinite */
+	vec3 n;        /* unit normal on the emitting side; 0 at a delta emitter; unused when infinite */
 	double u, v;   /* texture coordinates */
 	uint32_t prim; /* triangle of the surface; 0 on a sphere; unused when infinite */
 	bool infinite;
@@ -34,6 +38,8 @@ struct emitter_build {
 	struct arena *arena;
 	bool dialect_3;
 	const struct emitter_surface *surface; /* NULL where it hangs on no shape */
+	vec3 center; /* a point p of the scene lies at scale (p - center) in the rescaled world */
+	double scale;
 };
 
 struct emitter;
@@ -49,6 +55,8 @@ struct emitter_ops {
 	/* Where light sub-paths begin. */
 	bool (*sample_point)(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);
 	double (*pdf_point)(const struct emitter *em, const struct emitter_point *x);
+	/* The numbers in [0,1) for which sample_point gives x; NULL for delta emitters. */
+	void (*point_inverse)(const struct emitter *em, const struct emitter_point *x, double u[2]);
 	/* In which direction they leave; not called for infinite ones. */
 	bool (*sample_direction)(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
 				 double *pdf_solid);
@@ -61,11 +69,12 @@ struct emitter_ops {
 
 struct emitter {
 	const struct emitter_ops *ops;
-	bool infinite, textured;
+	bool infinite, textured, delta;
 	enum color_shape shape; /* CONSTANT, D65: the same spectrum everywhere but for a factor */
 	double power;           /* for choosing among emitters: area x pi x mean radiance; infinite: mean radiance x 4 pi,
-				   multiplied by the scene's cross section pi R^2 by the caller */
-	double brightest;       /* upper bound of the radiance, over places, directions and wavelengths */
+				   or irradiance, multiplied by the scene's cross section pi R^2 by the caller */
+	double brightest;       /* upper bound of the radiance, over places, directions and wavelengths; of delta emitters what
+				   pixels may be expected to stay below, see delta.h */
 	void *data;
 };
 

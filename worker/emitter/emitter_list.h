@@ -2,3 +2,6 @@
 EMITTER(area)
 EMITTER(constant)
 EMITTER(envmap)
+EMITTER(point)
+EMITTER(spot)
+EMITTER(directional)

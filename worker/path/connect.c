@@ -21,11 +21,6 @@ double path_pdf_toward(const struct path_context *c, const struct path_vertex *v
 	return c->w->emitter_pdf[v->emitter] * em->ops->pdf_toward(em, ref, &p);
 }
 
-bool path_can_be_hit(const struct path_context *c, const struct path_vertex *v)
-{
-	return v->kind != VERTEX_INFINITE || v->emitter == c->w->environment;
-}
-
 /* The ends that a technique joins scatter there by connection: their sub-path's delta flag says nothing. */
 static bool is_delta(const struct joined_path *p, unsigned i)
 {
@@ -156,14 +151,7 @@ bool path_next_event(const struct path_context *c, const struct path_vertex *z, 
 	if (!em->ops->sample_toward(em, z->x.p, z->next_event, &p, pdf) || !(*pdf > 0))
 		return false;
 	*pdf *= w->emitter_pdf[chosen];
-	y->kind = p.infinite ? VERTEX_INFINITE : VERTEX_EMITTER;
-	y->delta = false;
-	y->emitter = chosen;
-	y->x.p = p.p;
-	y->x.ng = y->x.sh.n = p.n;
-	y->x.u = p.u;
-	y->x.v = p.v;
-	y->x.prim = p.infinite ? PRIM_NONE : (struct prim_ref){w->emitter_shape[chosen], p.prim};
+	*y = path_emitter_vertex(w, chosen, &p);
 	y->pdf = w->emitter_pdf[chosen] * em->ops->pdf_point(em, &p);
 	return true;
 }
@@ -180,9 +168,7 @@ static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
 		return spectrum_of(0);
 	spectrum f = path_scatter(c, z, z->to_prev, to_light);
 	spectrum l = spectrum_mul(spectrum_mul(z->beta, f), path_emitted(c, &y, vec3_neg(to_light), &c->wl));
-	double g = y.kind == VERTEX_INFINITE ? fabs(vec3_dot(z->x.ng, to_light)) :
-					       geometry_term(z->x.ng, y.x.ng, to_light, distance2);
-	l = spectrum_scale(g / pdf, l);
+	l = spectrum_scale(path_cosine(z, to_light) * path_cosine(&y, to_light) / distance2 / pdf, l);
 	if (spectrum_is_zero(l) || !path_visible(c, z, &y))
 		return spectrum_of(0);
 	return weighted(c, &y, 1, t, max_s, l);

@@ -25,8 +25,6 @@ double path_balance_weight(const struct path_context *c, const struct joined_pat
 /* Density of an emitter's point (and of the choice of the emitter): as light sub-paths draw it, and as drawn towards ref. */
 double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v);
 double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref);
-/* A ray can end at this point of an emitter. */
-bool path_can_be_hit(const struct path_context *c, const struct path_vertex *v);
 /* A fresh point on an emitter, drawn as seen from z with z's own numbers. */
 bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf);
 /* Nothing lies between a (not at infinity) and b. Counts a ray. */

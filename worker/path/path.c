@@ -25,7 +25,10 @@ vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, do
 
 double path_cosine(const struct path_vertex *v, vec3 w)
 {
-	return v->kind == VERTEX_CAMERA || v->kind == VERTEX_INFINITE ? 1 : fabs(vec3_dot(v->x.ng, w));
+	vec3 n = v->x.ng;
+	if (v->kind == VERTEX_CAMERA || v->kind == VERTEX_INFINITE || (n.x == 0 && n.y == 0 && n.z == 0))
+		return 1;
+	return fabs(vec3_dot(n, w));
 }
 
 spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl)
@@ -70,12 +73,24 @@ static double disk_pdf(const struct world *w)
 	return 1 / (M_PI * w->radius * w->radius);
 }
 
+struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p)
+{
+	struct path_vertex v = {.kind = p->infinite ? VERTEX_INFINITE : VERTEX_EMITTER, .emitter = emitter};
+	uint32_t shape = w->emitter_shape[emitter];
+	v.x.p = p->p;
+	v.x.ng = v.x.sh.n = p->n;
+	v.x.u = p->u;
+	v.x.v = p->v;
+	v.x.prim = shape == UINT32_MAX ? PRIM_NONE : (struct prim_ref){shape, p->prim};
+	return v;
+}
+
 double path_pdf(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
 		const struct path_vertex *next, enum transport transport)
 {
 	double distance2, solid = 0;
 	vec3 omega = path_direction(at, next, &distance2);
-	if (!(distance2 > 0))
+	if (!(distance2 > 0) || !path_can_be_hit(c, next))
 		return 0;
 	if (at->kind == VERTEX_INFINITE)
 		return disk_pdf(c->w) * jac_disk_from_area(next->x.ng, omega);
@@ -156,11 +171,11 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 
 /* Density per area of `to`, reached from `at`; solid as chosen there. For a delta lobe `solid` is a probability, and per_solid
  * what makes it a density: see path_delta_per_solid. */
-static double reach_pdf(const struct path_vertex *at, const struct path_vertex *to, double solid, double per_solid)
+static double reach_pdf(const struct path_context *c, const struct path_vertex *at, const struct path_vertex *to, double solid, double per_solid)
 {
 	double distance2;
 	vec3 omega = path_direction(at, to, &distance2);
-	if (!(distance2 > 0))
+	if (!(distance2 > 0) || !path_can_be_hit(c, to))
 		return 0;
 	double lobe = solid * per_solid;
 	return to->kind == VERTEX_INFINITE ? lobe : lobe * jac_solid_from_area(to->x.ng, omega, distance2);
@@ -209,9 +224,9 @@ static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampl
 		at->delta = out.delta;
 		at->mode = out.mode;
 		to->beta = out.beta;
-		to->pdf = reach_pdf(at, to, out.pdf, ahead);
+		to->pdf = reach_pdf(c, at, to, out.pdf, ahead);
 		if (!c->one_way)
-			v[n - 2].pdf_rev = reach_pdf(at, &v[n - 2], out.pdf_rev, back);
+			v[n - 2].pdf_rev = reach_pdf(c, at, &v[n - 2], out.pdf_rev, back);
 		if (!(to->pdf > 0))
 			return n;
 		n++;
@@ -280,7 +295,7 @@ static bool leave_surface(struct path_context *c, struct path_vertex *v, const d
 	spectrum l = em->ops->radiance(em, &p, d, &c->wl);
 	if (!path_extend(c, &v[0], d, 0, INFINITY, &v[1]) || v[1].kind != VERTEX_SURFACE)
 		return false;
-	v[1].beta = spectrum_scale(fabs(vec3_dot(p.n, d)) / solid, spectrum_mul(v[0].beta, l));
+	v[1].beta = spectrum_scale(path_cosine(&v[0], d) / solid, spectrum_mul(v[0].beta, l));
 	return true;
 }
 
@@ -298,13 +313,9 @@ unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max
 	if (!em->ops->sample_point(em, u + DIM_EMITTER_POINT, &p, &pdf) || !(pdf > 0))
 		return 0;
 	pdf *= w->emitter_pdf[chosen];
-	v[0] = (struct path_vertex){.kind = p.infinite ? VERTEX_INFINITE : VERTEX_EMITTER, .emitter = chosen, .pdf = pdf,
-				    .beta = spectrum_of(1 / pdf)};
-	v[0].x.p = p.p;
-	v[0].x.ng = v[0].x.sh.n = p.n;
-	v[0].x.u = p.u;
-	v[0].x.v = p.v;
-	v[0].x.prim = p.infinite ? PRIM_NONE : (struct prim_ref){w->emitter_shape[chosen], p.prim};
+	v[0] = path_emitter_vertex(w, chosen, &p);
+	v[0].pdf = pdf;
+	v[0].beta = spectrum_of(1 / pdf);
 	if (max_vertices < 2)
 		return 1;
 	bool left = p.infinite ? leave_infinity(c, v, u + DIM_EMITTER_DIRECTION) : leave_surface(c, v, u + DIM_EMITTER_DIRECTION);

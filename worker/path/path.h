@@ -6,7 +6,8 @@
  * realises with shading normals, whichever way the path was sampled.
  * Directions on different sides of the shading and the geometric normal are refused (as Mitsuba's strictNormals).
  *
- * Densities of vertices: per area of the rescaled world; per solid angle for a vertex at infinity; times a delta
+ * Densities of vertices: per area of the rescaled world; per solid angle for a vertex at infinity; x_0 on a delta emitter
+ * counts: 1 times the choice of the emitter, and 0 as found by a path from the camera; times a delta
  * distribution in the direction towards the light, projected on the geometric normal, where scattering is exactly specular
  * (it cancels between all techniques of one path). Roulette is not part of them. The film is sampled with density
  * 1 / pixels (struct film_window).
@@ -28,7 +29,7 @@ struct path_vertex {
 	unsigned mode;           /* of enum bsdf_mode: how its own sub-path left it */
 	int32_t emitter;         /* shines: index; -1 */
 	const struct bsdf *bsdf; /* VERTEX_SURFACE */
-	struct surface_point x;  /* VERTEX_INFINITE: p is the unit direction towards the emitter */
+	struct surface_point x;  /* VERTEX_INFINITE: p is the unit direction towards the emitter. A point light's ng is 0 */
 	vec3 to_prev;            /* unit; towards the vertex before it on its own sub-path */
 	spectrum beta;           /* carried to this vertex over the density of getting here */
 	double pdf;              /* of this vertex from its own sub-path, see above */
@@ -65,8 +66,8 @@ struct path_sample {
 
 struct film_window film_window_of(const struct plan *p);
 
-/* Camera sub-path: vertex 0 is the pinhole or a point of the aperture, whose density is 1 in every technique. Returns the number of vertices; an escaped path may end in VERTEX_INFINITE.
- * film: the film point that was drawn. */
+/* Camera sub-path: vertex 0 is the pinhole or a point of the aperture, whose density is 1 in every technique. Returns the
+ * number of vertices; an escaped path may end in VERTEX_INFINITE. film: the film point that was drawn. */
 unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned max_vertices, double film[2]);
 /* Light sub-path: vertex 0 lies on an emitter. 0: no emitter, or it could not be sampled. */
 unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max_vertices);
@@ -75,10 +76,20 @@ unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max
 double path_pdf(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
 		const struct path_vertex *next, enum transport transport);
 
+/* false: x_0 on a delta emitter, which no path from the camera finds. */
+static inline bool path_can_be_hit(const struct path_context *c, const struct path_vertex *v)
+{
+	bool end = v->kind == VERTEX_EMITTER || v->kind == VERTEX_INFINITE;
+	return !end || v->emitter < 0 || !c->w->emitters[v->emitter].delta;
+}
+
+/* Kind, emitter and place of a point drawn on an emitter; the rest is 0. */
+struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p);
+
 /* F of the head comment at a surface vertex for unit directions towards camera and light. */
 spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light);
 
-/* |ng . w| of the geometry terms; 1 where a vertex has no surface: the camera, what lies at infinity. */
+/* |ng . w| of the geometry terms; 1 where a vertex has no surface: the camera, what lies at infinity, a point light. */
 double path_cosine(const struct path_vertex *v, vec3 w);
 
 /* Delta distributions are written in the direction towards the light, projected on the geometric normal: 1 in that measure is

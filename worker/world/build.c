@@ -241,7 +241,7 @@ static int create_emitters(struct builder *b)
 	w->emitter_shape = arena_alloc(&w->arena, limit, sizeof *w->emitter_shape);
 	if (!w->emitters || !w->emitter_shape)
 		return out_of_memory(b->e);
-	struct emitter_build build = {b->assets, &w->arena, s->dialect_3, NULL};
+	struct emitter_build build = {b->assets, &w->arena, s->dialect_3, NULL, w->center, w->scale};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0);
 		w->parts[i].emitter = -1;
@@ -261,14 +261,18 @@ static int create_emitters(struct builder *b)
 		const struct scene_node *n = s->objects[i];
 		if (n->cls != PLUGIN_EMITTER)
 			continue;
-		if (w->environment >= 0)
-			return node_error(n, b->e, EINVAL, "a second emitter at infinity: one is supported");
-		int rc = emitter_create(&w->emitters[w->emitter_count], n, &build, b->e);
+		struct emitter *em = &w->emitters[w->emitter_count];
+		int rc = emitter_create(em, n, &build, b->e);
 		if (rc)
 			return rc;
-		w->emitters[w->emitter_count].power *= M_PI * w->radius * w->radius;
-		w->emitter_shape[w->emitter_count] = UINT32_MAX;
-		w->environment = (int32_t)w->emitter_count++;
+		bool environment = em->infinite && !em->delta;
+		if (environment && w->environment >= 0)
+			return node_error(n, b->e, EINVAL, "a second environment: one is supported");
+		if (em->infinite)
+			em->power *= M_PI * w->radius * w->radius;
+		if (environment)
+			w->environment = (int32_t)w->emitter_count;
+		w->emitter_shape[w->emitter_count++] = UINT32_MAX;
 	}
 	return 0;
 }

@@ -15,7 +15,7 @@ __attribute__((format(printf, 4, 5))) static void line(struct effects *fx, const
 }
 
 struct census {
-	size_t specular, glossy, diffuse, transmission, textured, coloured, environment, area, textured_light, shape[3];
+	size_t specular, glossy, diffuse, transmission, textured, coloured, environment, area, delta, textured_light, shape[3];
 };
 
 static struct census take(const struct bsdf *b, size_t bn, const struct emitter *em, size_t en)
@@ -30,8 +30,9 @@ static struct census take(const struct bsdf *b, size_t bn, const struct emitter 
 		c.coloured += b[i].shape != COLOR_SHAPE_CONSTANT;
 	}
 	for (size_t i = 0; i < en; i++) {
-		c.environment += em[i].infinite;
-		c.area += !em[i].infinite;
+		c.delta += em[i].delta;
+		c.environment += em[i].infinite && !em[i].delta;
+		c.area += !em[i].infinite && !em[i].delta;
 		c.textured_light += em[i].textured;
 		c.shape[em[i].shape]++;
 	}
@@ -75,9 +76,11 @@ void effects_analyse(struct effects *fx, const struct scene_settings *settings, 
 	fx->textures = c.textured + c.textured_light > 0;
 	line(fx, "textures", fx->textures, "%zu materials and %zu emitters are textured", c.textured, c.textured_light);
 	fx->environment = c.environment > 0;
-	line(fx, "environment", fx->environment, c.environment ? "an emitter lies at infinity" : "no emitter lies at infinity");
+	line(fx, "environment", fx->environment, c.environment ? "rays that escape meet an emitter" : "rays that escape meet nothing");
 	fx->area_light = c.area > 0;
 	line(fx, "area-light", fx->area_light, "%zu surfaces emit", c.area);
+	fx->delta_light = c.delta > 0;
+	line(fx, "delta-light", fx->delta_light, "%zu emitters are points or parallel light, which no path hits by chance", c.delta);
 	line(fx, "depth", settings->max_depth > 1, "paths have at most %u edges", settings->max_depth);
 }
 

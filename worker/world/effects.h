@@ -12,7 +12,7 @@
 struct effects {
 	bool displacement;
 	bool colour;      /* off: no wavelengths are drawn, one grey value stands for the common illuminant's shape */
-	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light;
+	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light, delta_light;
 	enum color_shape illuminant; /* of all emitters, when colour is off */
 	uint32_t max_depth;
 	struct effect_line lines[RENDER_EFFECTS_MAX];

@@ -26,9 +26,9 @@ struct world {
 	struct world_shape *parts; /* one a shape */
 	struct bsdf *bsdfs;
 	struct emitter *emitters;
-	uint32_t *emitter_shape; /* on which it lies; UINT32_MAX at infinity */
+	uint32_t *emitter_shape; /* on which it lies; UINT32_MAX: on none */
 	double *emitter_pdf, *emitter_cdf; /* choice among emitters by power */
-	int32_t environment;               /* index of the emitter at infinity; -1: none */
+	int32_t environment;               /* index of the emitter that escaping rays meet; -1: none */
 	double grey_xyz[3];                /* CIE XYZ of grey value 1 */
 	struct accel *accel;
 };

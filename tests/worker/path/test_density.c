@@ -48,6 +48,11 @@ static vec3 towards(const struct path_vertex *a, const struct path_vertex *b)
 	return vec3_normalize(vec3_sub(b->x.p, a->x.p));
 }
 
+static bool on_delta(const struct path_context *c, const struct path_vertex *x0)
+{
+	return c->w->emitters[x0->emitter].delta;
+}
+
 static double per_area(const struct path_vertex *at, const struct path_vertex *to)
 {
 	if (to->kind == VERTEX_INFINITE)
@@ -120,6 +125,8 @@ static double density_from_camera(const struct path_context *c, const struct rou
 	const struct path_vertex *x = r->x;
 	if (i == r->k)
 		return 1;
+	if (i == 0 && on_delta(c, &x[0]))
+		return 0;
 	if (i + 2 <= r->k)
 		return scattered(c, &x[i + 2], &x[i + 1], r->delta[i + 1], &x[i], TRANSPORT_RADIANCE);
 	vec3 w = towards(&x[r->k], &x[i]);
@@ -133,8 +140,10 @@ static bool well_conditioned(const struct route *r)
 	for (unsigned i = 0; i < r->k; i++) {
 		const struct path_vertex *a = &r->x[i], *b = &r->x[i + 1];
 		vec3 w = towards(a, b);
-		if (a->kind != VERTEX_INFINITE &&
-		    (vec3_length(vec3_sub(a->x.p, b->x.p)) < 1e-3 || fabs(vec3_dot(w, a->x.ng)) < 1e-3))
+		bool has_normal = a->kind != VERTEX_INFINITE && vec3_length(a->x.ng) > 0;
+		if (a->kind != VERTEX_INFINITE && vec3_length(vec3_sub(a->x.p, b->x.p)) < 1e-3)
+			return false;
+		if (has_normal && fabs(vec3_dot(w, a->x.ng)) < 1e-3)
 			return false;
 		if (b->kind != VERTEX_CAMERA && fabs(vec3_dot(w, b->x.ng)) < 1e-3)
 			return false;
@@ -215,7 +224,8 @@ static void check_beta(const struct path_context *c, const struct path_vertex *v
 		const struct emitter *em = &c->w->emitters[v[0].emitter];
 		struct emitter_point p = emitter_point_of(&v[0]);
 		value = em->ops->radiance(em, &p, w, &c->wl).v[0];
-		value *= v[0].kind == VERTEX_INFINITE ? fabs(vec3_dot(v[1].x.ng, w)) : fabs(vec3_dot(v[0].x.ng, w)) * per_area(&v[0], &v[1]);
+		double leaving = on_delta(c, &v[0]) ? 1 : fabs(vec3_dot(v[0].x.ng, w));
+		value *= v[0].kind == VERTEX_INFINITE ? fabs(vec3_dot(v[1].x.ng, w)) : leaving * per_area(&v[0], &v[1]);
 	} else {
 		value = squared(c->w->camera.scale) / pow(vec3_dot(c->w->camera.axes.n, w), 3) * per_area(&v[0], &v[1]);
 	}
@@ -230,9 +240,11 @@ static void check_beta(const struct path_context *c, const struct path_vertex *v
 	}
 }
 
-static bool exists(const struct route *r, unsigned j)
+static bool exists(const struct path_context *c, const struct route *r, unsigned j)
 {
-	return j == 0 || (r->k >= 2 && !r->delta[j - 1] && !r->delta[j]);
+	if (j == 0)
+		return !on_delta(c, &r->x[0]);
+	return (r->k >= 2 && !r->delta[j - 1] && !r->delta[j]);
 }
 
 /* Logarithm of the density of the whole path by technique j. */
@@ -274,13 +286,13 @@ static void check_ratios(const struct path_context *c, struct route *r, struct t
 	for (unsigned j = 0; j <= r->k; j++) {
 		p[j] = technique(c, r, j);
 		most = fmax(most, p[j]);
-		if (!exists(r, j))
+		if (!exists(c, r, j))
 			p[j] = -INFINITY;
 	}
 	for (unsigned s = 0; s <= r->k; s++) {
 		struct joined_path joined;
 		/* No technique makes a path that is 1e100 times less likely than by another. */
-		if (!exists(r, s) || most - p[s] > 230)
+		if (!exists(c, r, s) || most - p[s] > 230)
 			continue;
 		relabel(r, s, &joined);
 		for (unsigned max_s = s > 1 ? PATH_MAX_EDGES : 1; max_s <= PATH_MAX_EDGES; max_s += PATH_MAX_EDGES - 1) {
@@ -443,6 +455,37 @@ static void test_infinity(void **state)
 	assert_true(t.infinite > t.routes / 10);
 }
 
+#define DELTA_LIGHTS                                                                                                                   \
+	"<emitter type='point'><point name='position' x='.5' y='2' z='1'/><float name='intensity' value='40'/></emitter>"         \
+	"<emitter type='directional'><vector name='direction' x='.3' y='-1' z='-.2'/><float name='irradiance' value='2'/></emitter>" \
+	"<emitter type='spot'><float name='cutoff_angle' value='50'/><float name='intensity' value='100'/>"                       \
+	"<transform name='to_world'><lookat origin='-1,2,1.5' target='0,0,0' up='1,0,0'/></transform></emitter>"
+
+/* Lights that no path hits by chance, beside some that can be hit. */
+static void test_delta_lights(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(
+		32, 24, SENSOR("0,1,4.9", "0,0,0") DELTA_LIGHTS "%s<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
+		"<shape type='sphere'><point name='center' x='-1' y='1.5' z='.5'/><float name='radius' value='.4'/>"
+		"<emitter type='area'><float name='radiance' value='5'/></emitter></shape>",
+		BALL("0", "0", "0", "<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.3'/></bsdf>")
+		BALL("1.2", "-.5", "0", "<bsdf type='dielectric'/>") BALL("-1.3", "-.7", "0", "<bsdf type='diffuse'/>")
+		"<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>"
+		"<translate y='-1.5'/></transform><bsdf type='phong'/></shape>");
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		assert_true(w->emitter_pdf[i] > 0.01);
+	struct tally t = check_world("delta lights", w, 30000);
+	assert_true(t.with_delta > t.routes / 100);
+	/* Nothing but such lights. */
+	t = check_world("delta lights in a box",
+			world_of_text(32, 24, SENSOR("0,0,2.9", "0,0,0") BOX DELTA_LIGHTS "%s",
+				      BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
+				      BALL("1.2", "-.5", "0", "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")),
+			6000);
+	assert_true(t.with_delta > t.routes / 20);
+}
+
 /* A wide lens, focused before the balls: x_k differs from path to path. */
 static void test_lens(void **state)
 {
@@ -486,6 +529,7 @@ int main(void)
 		cmocka_unit_test(test_specular),
 		cmocka_unit_test(test_infinity),
 		cmocka_unit_test(test_lens),
+		cmocka_unit_test(test_delta_lights),
 		cmocka_unit_test(test_bent_normals),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

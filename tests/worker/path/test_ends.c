@@ -110,11 +110,106 @@ static void test_blurred_rectangle(void **state)
 	world_free(w);
 }
 
+
+/* A floor at y = 0 seen straight from above, and what lights it. mirror: a mirror stands on it at x = -1.5. */
+struct lamps {
+	vec3 point, spot, aim, direction; /* the spot's 40 degrees, 25 of them full; direction in which the parallel light travels */
+	double intensity, spot_intensity, irradiance, sky;
+	bool mirror;
+};
+
+static double from_point(vec3 lamp, double intensity, vec3 at)
+{
+	vec3 d = vec3_sub(lamp, at);
+	return intensity * d.y / pow(vec3_dot(d, d), 1.5);
+}
+
+/* Over pi: what a white floor would send up. */
+static double irradiance(const struct lamps *l, double x, double z)
+{
+	vec3 at = {x, 0, z}, image = {-3 - l->point.x, l->point.y, l->point.z};
+	double sum = from_point(l->point, l->intensity, at) + l->irradiance * -vec3_normalize(l->direction).y;
+	if (l->mirror)
+		sum = 2 * sum - from_point(l->point, l->intensity, at) + from_point(image, l->intensity, at);
+	if (l->spot_intensity > 0) {
+		vec3 axis = vec3_normalize(vec3_sub(l->aim, l->spot));
+		double degrees = acos(vec3_dot(axis, vec3_normalize(vec3_sub(at, l->spot)))) * 180 / M_PI;
+		sum += from_point(l->spot, l->spot_intensity, at) * fmin(fmax((40 - degrees) / 15, 0), 1);
+	}
+	return sum / M_PI + l->sky;
+}
+
+static void check_floor(const char *name, const struct lamps *l, struct effort e)
+{
+	enum { N = 48 };
+	static struct agree_image image;
+	const struct agree_side sides[] = {{"path", e.path, 32, 0, 0}, {"bdpt", e.bdpt, 32, 0, 0}, {"pssmlt", e.pssmlt, 32, 0, 0}};
+	const char *mirror = l->mirror ? "<shape type='rectangle'>" AT("<scale value='1.6'/><rotate y='1' angle='90'/><translate x='-1.5'/>")
+					 "<bsdf type='conductor'><string name='material' value='none'/></bsdf></shape>" : "";
+	struct world *w = world_of_text(
+		16, 16, "<integrator type='path'><integer name='max_depth' value='%d'/></integrator><sensor type='perspective'><float name='fov' value='40'/>" AT("<lookat origin='0,4,0' target='0,0,0' up='0,0,-1'/>")
+		"<film type='hdrfilm'><rfilter type='box'/></film></sensor>%s<shape type='rectangle'>" AT(
+			"<scale value='1.5'/><rotate x='1' angle='-90'/>") DIFFUSE("0.5") "</shape>"
+		"<emitter type='point'><point name='position' x='%g' y='%g' z='%g'/><float name='intensity' value='%g'/></emitter>"
+		"<emitter type='directional'><vector name='direction' x='%g' y='%g' z='%g'/><float name='irradiance' value='%g'/></emitter>"
+		"<emitter type='spot'><float name='cutoff_angle' value='40'/><float name='beam_width' value='25'/>"
+		"<float name='intensity' value='%g'/>" AT("<lookat origin='%g,%g,%g' target='%g,%g,%g' up='0,0,1'/>") "</emitter>"
+		"<emitter type='constant'><float name='radiance' value='%g'/></emitter>",
+		l->mirror ? 3 : 2, mirror, l->point.x, l->point.y, l->point.z, l->intensity, l->direction.x, l->direction.y, l->direction.z, l->irradiance,
+		l->spot_intensity, l->spot.x, l->spot.y, l->spot.z, l->aim.x, l->aim.y, l->aim.z, l->sky);
+	assert_true(w->effects.delta_light && !w->effects.colour && w->environment >= 0);
+	double half = 4 * tan(20 * M_PI / 180), sum = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2], expected[AGREE_CELLS + 1] = {0};
+	for (int c = 0; c < AGREE_CELLS; c++) {
+		for (int i = 0; i < N * N; i++) {
+			double x = half * (c % 2 - 1 + (i % N + 0.5) / N), z = half * (c / 2 - 1 + (i / N + 0.5) / N);
+			expected[c] += 0.5 * sum * irradiance(l, x, z) / (N * N);
+		}
+		expected[AGREE_CELLS] += expected[c] / AGREE_CELLS;
+	}
+	for (size_t i = 0; i < 3; i++) {
+		char test[64];
+		if (!sides[i].spp)
+			continue;
+		snprintf(test, sizeof test, "%s, %s", name, sides[i].integrator);
+		agree_render(w, test, sides[i].integrator, &sides[i], &image);
+		for (uint32_t g = 0; g < image.groups; g++)
+			for (int c = 0; c <= AGREE_CELLS; c++)
+				image.mean[g][c] /= expected[c];
+		agree_expect(test, &image, 1);
+	}
+	world_free(w);
+}
+
+static void test_lit_floor(void **state)
+{
+	(void)state;
+	struct lamps l = {.point = {0.6, 1.2, -0.4}, .intensity = 2, .direction = {0, -1, 0}, .aim = {0, -1, 0}};
+	check_floor("point", &l, (struct effort){1024, 4096, 0});
+	l = (struct lamps){.spot = {-0.5, 2, 0}, .aim = {0.2, 0, 0.3}, .direction = {0, -1, 0}, .spot_intensity = 3};
+	check_floor("spot", &l, (struct effort){1024, 2048, 0});
+	/* Two of them, and the sky that escaping rays meet. */
+	l = (struct lamps){.point = {0.6, 2, -0.4}, .intensity = 1, .direction = {0.5, -1, 0.2}, .irradiance = 0.2, .aim = {0, -1, 0}, .sky = 0.02};
+	check_floor("point, parallel light and sky", &l, (struct effort){12288, 10240, 0});
+}
+
+/* Light by way of a mirror is a caustic: only paths from the light find it. */
+static void test_lit_by_a_mirror(void **state)
+{
+	(void)state;
+	struct lamps l = {.point = {-0.2, 2, -0.2}, .intensity = 2, .direction = {-1, -0.5, 0.03}, .aim = {0, -1, 0}, .mirror = true};
+	check_floor("mirrored point", &l, (struct effort){0, 18432, 77824});
+	l.intensity = 0;
+	l.irradiance = 1;
+	check_floor("mirrored parallel light", &l, (struct effort){0, 20480, 0});
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_defocus),
 		cmocka_unit_test(test_blurred_rectangle),
+		cmocka_unit_test(test_lit_floor),
+		cmocka_unit_test(test_lit_by_a_mirror),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
