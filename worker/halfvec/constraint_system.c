@@ -10,12 +10,14 @@
  */
 enum { LOWER = 3, UPPER = 3, WIDTH = LOWER + UPPER + 1 };
 
-/* A block that lost more than this to cancellation is not eliminated with: the digits it lost would be lost to all others. */
-#define BLOCK_LEAST 1e-3
-/* The last block is only solved with: this much less before the matrix is looked at as a whole. */
-#define LAST_LEAST 1e-10
+/* Rows and columns scaled to entries of at most 1, the inverse of a block that others are eliminated with is at most this:
+ * what it is multiplied with grows by no more. */
+#define BLOCK_MOST 30.0
+/* The last block is only solved with: this much before the matrix is looked at as a whole. */
+#define LAST_MOST 1e10
 /* Products of three of these, sums of them and determinants stay finite. */
 #define ENTRY_MOST 1e70
+#define ENTRY_LEAST 1e-140
 
 /* Products of many determinants, out of reach of overflow. */
 struct long_product {
@@ -40,25 +42,92 @@ static bool fits(mat2 m)
 	return fabs(m.xx) < ENTRY_MOST && fabs(m.xy) < ENTRY_MOST && fabs(m.yx) < ENTRY_MOST && fabs(m.yy) < ENTRY_MOST;
 }
 
-static mat2 magnitudes(mat2 m)
+/* By vertex, of its two rows and columns: the entries over both scales are at most 1, and 1 somewhere in each. */
+struct scales {
+	vec2 row[WHOLE_MAX_VERTICES], column[WHOLE_MAX_VERTICES];
+};
+
+static void grow_column(vec2 *column, mat2 m, vec2 row)
 {
-	return (mat2){fabs(m.xx), fabs(m.xy), fabs(m.yx), fabs(m.yy)};
+	column->x = fmax(column->x, fmax(fabs(m.xx) * row.x, fabs(m.yx) * row.y));
+	column->y = fmax(column->y, fmax(fabs(m.xy) * row.x, fabs(m.yy) * row.y));
 }
 
-/*
- * L = b - x inverse(L') y and its inverse. false: |det L| is below `least` of the products of the magnitudes that it was made
- * of, however rows and columns are scaled.
- */
-static bool eliminate(mat2 b, mat2 taken, mat2 taken_sizes, double least, mat2 *inverse, double *det)
+static void grow_row(vec2 *row, mat2 m, vec2 column)
 {
-	mat2 l = mat2_sub(b, taken), size = magnitudes(b);
-	size = (mat2){size.xx + taken_sizes.xx, size.xy + taken_sizes.xy, size.yx + taken_sizes.yx, size.yy + taken_sizes.yy};
-	if (!fits(l) || !fits(size))
+	row->x = fmax(row->x, fmax(fabs(m.xx) * column.x, fabs(m.xy) * column.y));
+	row->y = fmax(row->y, fmax(fabs(m.yx) * column.x, fabs(m.yy) * column.y));
+}
+
+/* 1 / of both; false: nothing, or nearly nothing, is there to be divided by. */
+static bool reciprocal(vec2 *v)
+{
+	if (!(v->x > ENTRY_LEAST) || !(v->y > ENTRY_LEAST))
+		return false;
+	*v = (vec2){1 / v->x, 1 / v->y};
+	return true;
+}
+
+static bool scale_columns(const struct constraint *k, unsigned b, unsigned c, struct scales *s)
+{
+	for (unsigned j = c + 1; j < b; j++)
+		s->column[j] = (vec2){0, 0};
+	for (unsigned j = c + 1; j < b; j++) {
+		grow_column(&s->column[j], k[j].b, s->row[j]);
+		if (j > c + 1)
+			grow_column(&s->column[j - 1], k[j].a, s->row[j]);
+		if (j + 1 < b)
+			grow_column(&s->column[j + 1], k[j].c, s->row[j]);
+	}
+	for (unsigned j = c + 1; j < b; j++)
+		if (!reciprocal(&s->column[j]))
+			return false;
+	return true;
+}
+
+/* Factors for columns, then rows, then the columns that are now all small; at last the scales are what was divided by.
+ * false: an entry is too large, or a row or column is nothing. */
+static bool find_scales(const struct constraint *k, unsigned b, unsigned c, struct scales *s)
+{
+	for (unsigned j = c + 1; j < b; j++) {
+		if (!fits(k[j].a) || !fits(k[j].b) || !fits(k[j].c))
+			return false;
+		s->row[j] = (vec2){1, 1};
+	}
+	if (!scale_columns(k, b, c, s))
+		return false;
+	for (unsigned j = c + 1; j < b; j++) {
+		vec2 r = {0, 0};
+		grow_row(&r, k[j].b, s->column[j]);
+		if (j > c + 1)
+			grow_row(&r, k[j].a, s->column[j - 1]);
+		if (j + 1 < b)
+			grow_row(&r, k[j].c, s->column[j + 1]);
+		if (!reciprocal(&r))
+			return false;
+		s->row[j] = r;
+	}
+	if (!scale_columns(k, b, c, s))
+		return false;
+	for (unsigned j = c + 1; j < b; j++) {
+		s->row[j] = (vec2){1 / s->row[j].x, 1 / s->row[j].y};
+		s->column[j] = (vec2){1 / s->column[j].x, 1 / s->column[j].y};
+	}
+	return true;
+}
+
+/* Inverse of l = the block of vertex j as it stands. false: too large by the scales, above. */
+static bool invert(mat2 l, const struct scales *s, unsigned j, double most, mat2 *inverse, double *det)
+{
+	if (!fits(l))
 		return false;
 	*det = mat2_det(l);
-	if (!(fabs(*det) > least * (size.xx * size.yy + size.xy * size.yx)))
-		return false;
 	mat2 adjugate = mat2_adjugate(l);
+	vec2 row = s->row[j], column = s->column[j];
+	double largest = fmax(fmax(fabs(adjugate.xx) * row.x * column.x, fabs(adjugate.xy) * row.y * column.x),
+			      fmax(fabs(adjugate.yx) * row.x * column.y, fabs(adjugate.yy) * row.y * column.y));
+	if (!(largest < most * fabs(*det)))
+		return false;
 	*inverse = (mat2){adjugate.xx / *det, adjugate.xy / *det, adjugate.yx / *det, adjugate.yy / *det};
 	return fits(*inverse);
 }
@@ -68,19 +137,18 @@ static mat2 triple(mat2 x, mat2 y, mat2 z)
 	return mat2_mul(mat2_mul(x, y), z);
 }
 
-static bool factor_blocks(const struct constraint *k, struct constraint_system *m)
+static bool factor_blocks(const struct constraint *k, const struct scales *s, struct constraint_system *m)
 {
 	struct long_product all = {1, 0};
-	mat2 taken = {0, 0, 0, 0}, sizes = taken;
+	mat2 taken = {0, 0, 0, 0};
 	for (unsigned j = m->b - 1; j > m->c; j--) {
+		bool last = j == m->c + 1;
 		double det;
-		if (!eliminate(k[j].b, taken, sizes, j == m->c + 1 ? LAST_LEAST : BLOCK_LEAST, &m->inverse[j], &det))
+		if (!invert(mat2_sub(k[j].b, taken), s, j, last ? LAST_MOST : BLOCK_MOST, &m->inverse[j], &det))
 			return false;
 		multiply(&all, det);
-		if (j == m->c + 1)
-			break;
-		taken = triple(k[j - 1].c, m->inverse[j], k[j].a);
-		sizes = triple(magnitudes(k[j - 1].c), magnitudes(m->inverse[j]), magnitudes(k[j].a));
+		if (!last)
+			taken = triple(k[j - 1].c, m->inverse[j], k[j].a);
 	}
 	all.v = fabs(all.v);
 	m->log_det = log_of(&all);
@@ -100,25 +168,6 @@ static void scalar_row(const struct constraint *k, const struct constraint_syste
 		row[first + 2 * i] = second ? block[i].yx : block[i].xx;
 		row[first + 2 * i + 1] = second ? block[i].yy : block[i].xy;
 	}
-}
-
-/* Largest magnitudes of the columns, and of the rows after dividing by those. false: one of them is nothing. */
-static bool scales(double row[][WIDTH], unsigned n, double *of_column, double *of_row)
-{
-	memset(of_column, 0, n * sizeof *of_column);
-	memset(of_row, 0, n * sizeof *of_row);
-	for (unsigned r = 0; r < n; r++)
-		for (unsigned i = 0; i < WIDTH; i++)
-			if (row[r][i] != 0)
-				of_column[r + i - LOWER] = fmax(of_column[r + i - LOWER], fabs(row[r][i]));
-	for (unsigned r = 0; r < n; r++)
-		for (unsigned i = 0; i < WIDTH; i++)
-			if (row[r][i] != 0)
-				of_row[r] = fmax(of_row[r], fabs(row[r][i]) / of_column[r + i - LOWER]);
-	for (unsigned r = 0; r < n; r++)
-		if (!(of_row[r] > 0) || !(of_column[r] > 0))
-			return false;
-	return true;
 }
 
 static void exchange(double *a, double *b)
@@ -141,7 +190,8 @@ static unsigned pick(double row[][WIDTH], const double *of_row, unsigned r, unsi
 	return best;
 }
 
-static bool eliminate_band(double row[][WIDTH], unsigned n, double *of_column, double *of_row, struct constraint_system *m)
+static bool eliminate_band(double row[][WIDTH], unsigned n, const double *of_column, double *of_row,
+			   struct constraint_system *m)
 {
 	struct long_product all = {1, 0};
 	double least = n * 0x1p-46;
@@ -176,31 +226,28 @@ static bool eliminate_band(double row[][WIDTH], unsigned n, double *of_column, d
 	return true;
 }
 
-static bool factor_pivoted(const struct constraint *k, struct constraint_system *m)
+static bool factor_pivoted(const struct constraint *k, const struct scales *s, struct constraint_system *m)
 {
 	double row[2 * WHOLE_MAX_VERTICES][WIDTH], of_column[2 * WHOLE_MAX_VERTICES], of_row[2 * WHOLE_MAX_VERTICES];
 	unsigned n = 2 * (m->b - m->c - 1);
 	m->pivoted = true;
-	for (unsigned r = 0; r < n; r++)
+	for (unsigned r = 0; r < n; r++) {
+		unsigned j = m->c + 1 + r / 2;
 		scalar_row(k, m, r, row[r]);
-	return scales(row, n, of_column, of_row) && eliminate_band(row, n, of_column, of_row, m);
-}
-
-static enum constraint_end factor(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *m)
-{
-	assert(c + 2 <= b && b < WHOLE_MAX_VERTICES);
-	m->b = b;
-	m->c = c;
-	m->pivoted = false;
-	for (unsigned j = c + 1; j < b; j++)
-		if (!fits(k[j].a) || !fits(k[j].b) || !fits(k[j].c))
-			return CONSTRAINT_SINGULAR;
-	return factor_blocks(k, m) || factor_pivoted(k, m) ? CONSTRAINT_OK : CONSTRAINT_SINGULAR;
+		of_column[r] = r & 1 ? s->column[j].y : s->column[j].x;
+		of_row[r] = r & 1 ? s->row[j].y : s->row[j].x;
+	}
+	return eliminate_band(row, n, of_column, of_row, m);
 }
 
 enum constraint_end constraint_factor(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *m)
 {
-	if (factor(k, b, c, m) != CONSTRAINT_OK)
+	assert(c + 2 <= b && b < WHOLE_MAX_VERTICES);
+	struct scales s;
+	m->b = b;
+	m->c = c;
+	m->pivoted = false;
+	if (!find_scales(k, b, c, &s) || !(factor_blocks(k, &s, m) || factor_pivoted(k, &s, m)))
 		return CONSTRAINT_SINGULAR;
 	struct long_product all = {1, 0};
 	for (unsigned j = c + 1; j < b; j++)
@@ -252,17 +299,16 @@ void constraint_solve(const struct constraint *k, const struct constraint_system
 
 /* By elimination from the light's end, whose last block is x_{b-1}'s:
  * D_{b-1} = L_{b-1}^-1, D_j = -D_{j+1} a_{j+1} L_j^-1. */
-static bool differentials_by_blocks(const struct constraint *k, unsigned b, unsigned c, mat2 *d)
+static bool differentials_by_blocks(const struct constraint *k, const struct scales *s, unsigned b, unsigned c, mat2 *d)
 {
-	mat2 inverse[WHOLE_MAX_VERTICES], taken = {0, 0, 0, 0}, sizes = taken;
+	mat2 inverse[WHOLE_MAX_VERTICES], taken = {0, 0, 0, 0};
 	for (unsigned j = c + 1; j < b; j++) {
+		bool last = j + 1 == b;
 		double det;
-		if (!eliminate(k[j].b, taken, sizes, j + 1 == b ? LAST_LEAST : BLOCK_LEAST, &inverse[j], &det))
+		if (!invert(mat2_sub(k[j].b, taken), s, j, last ? LAST_MOST : BLOCK_MOST, &inverse[j], &det))
 			return false;
-		if (j + 1 == b)
-			break;
-		taken = triple(k[j + 1].a, inverse[j], k[j].c);
-		sizes = triple(magnitudes(k[j + 1].a), magnitudes(inverse[j]), magnitudes(k[j].c));
+		if (!last)
+			taken = triple(k[j + 1].a, inverse[j], k[j].c);
 	}
 	d[b - 1] = inverse[b - 1];
 	for (unsigned j = b - 2; j > c; j--) {
@@ -275,15 +321,15 @@ static bool differentials_by_blocks(const struct constraint *k, unsigned b, unsi
 
 enum constraint_end constraint_differentials(const struct constraint *k, unsigned b, unsigned c, mat2 *d)
 {
-	for (unsigned j = c + 1; j < b; j++)
-		if (!fits(k[j].a) || !fits(k[j].b) || !fits(k[j].c))
-			return CONSTRAINT_SINGULAR;
-	if (differentials_by_blocks(k, b, c, d))
+	struct scales s;
+	if (!find_scales(k, b, c, &s))
+		return CONSTRAINT_SINGULAR;
+	if (differentials_by_blocks(k, &s, b, c, d))
 		return CONSTRAINT_OK;
 	struct constraint_system m;
 	m.b = b;
 	m.c = c;
-	if (!factor_pivoted(k, &m))
+	if (!factor_pivoted(k, &s, &m))
 		return CONSTRAINT_SINGULAR;
 	for (unsigned j = c + 1; j < b; j++) {
 		vec2 dh[WHOLE_MAX_VERTICES] = {{0, 0}}, x[WHOLE_MAX_VERTICES], y[WHOLE_MAX_VERTICES];

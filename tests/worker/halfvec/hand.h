@@ -132,4 +132,38 @@ static inline void hand_scatters(struct hand *h, unsigned j, double eta)
 	h->bsdf[j].eta = eta == 0 ? 1.5 : above ? 1 / eta : eta;
 }
 
+/* A random chain of `edges` edges on spheres, or on triangles with n != ng where `bent`. false: it came too close to grazing. */
+static inline bool hand_chain(struct hand *h, unsigned edges, double bent, struct dice *d)
+{
+	static const double etas[] = {1.5, 1 / 1.5, 1.33, 1.2};
+	vec3 p[WHOLE_MAX_VERTICES];
+	double eta[WHOLE_MAX_VERTICES] = {0};
+	hand_begin(h, edges);
+	for (unsigned j = 0; j <= edges; j++)
+		p[j] = (vec3){dice_between(d, -1, 1), dice_between(d, -1, 1), dice_between(d, -1, 1)};
+	for (unsigned j = 0; j <= edges; j++) {
+		vec3 ng = dice_direction(d), n = ng;
+		if (j > 0 && j < edges) {
+			eta[j] = dice_throw(d) < 0.5 ? 0 : etas[dice_below(d, 4)];
+			vec3 i = vec3_normalize(vec3_sub(p[j - 1], p[j])), o = vec3_normalize(vec3_sub(p[j + 1], p[j]));
+			vec3 sum = vec3_madd(i, eta[j] == 0 ? 1 : eta[j], o);
+			if (vec3_length(sum) < 0.2)
+				return false;
+			n = ng = vec3_normalize(vec3_madd(vec3_normalize(sum), 0.3 * dice_throw(d), dice_direction(d)));
+			ng = vec3_normalize(vec3_madd(n, bent, dice_direction(d)));
+			if (fmin(fabs(vec3_dot(ng, i)), fabs(vec3_dot(ng, o))) < 0.05)
+				return false;
+		}
+		const struct hand_triangle t = {.size = 0.3, .aspect = 1, .bend = 2, .uv = HAND_UV};
+		if (bent > 0)
+			hand_triangle(h, j, p[j], ng, n, &t, d);
+		else
+			hand_sphere(h, j, p[j], n, dice_between(d, 0.2, 2), dice_throw(d) < 0.3 ? -1 : 1, dice_between(d, 0.3, 2.8), d);
+	}
+	hand_join(h);
+	for (unsigned j = 1; j < edges; j++)
+		hand_scatters(h, j, eta[j]);
+	return true;
+}
+
 #endif
