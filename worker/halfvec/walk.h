@@ -12,22 +12,23 @@
 
 #include "worker/halfvec/constraint.h"
 
+/* Why a walk failed: the reason for which its last trial was refused. */
 enum walk_end {
 	WALK_OK,
 	WALK_MISSED,     /* a ray met nothing */
 	WALK_BLOCKED,    /* another material, or an edge is occluded */
 	WALK_MODE,       /* a vertex would scatter in another mode, or the normals disagree about a side */
-	WALK_SINGULAR,   /* of the matrix */
-	WALK_DIVERGED,   /* step below the least */
-	WALK_ITERATIONS, /* ran out of them */
+	WALK_SINGULAR,   /* of the matrix; or two vertices coincide */
+	WALK_DIVERGED,   /* the residuals grew, however short the step */
+	WALK_ITERATIONS, /* ran out of them, although the residuals still shrank */
 };
 
 struct walk_limits {
 	unsigned iterations;  /* 15 */
-	double least_step;    /* 1e-5 of a Newton step */
+	double least_step;    /* 0.03 of a Newton step: with 1e-5 at most 0.1 % more walks arrive, for 10 % more rays */
 	double scale;         /* of all tolerances: 1, 0.5 to show that they change no image */
 };
-#define WALK_LIMITS_DEFAULT ((struct walk_limits){15, 1e-5, 1})
+#define WALK_LIMITS_DEFAULT ((struct walk_limits){15, 0.03, 1})
 
 struct walk_target {
 	vec2 h;           /* of the vertex where the walk ends, in its frame; (0,0) where specular */
@@ -45,7 +46,9 @@ struct walk_scratch {
 
 /* y: vertices b and c stay; b-1..c+1 are where the walk starts, and on WALK_OK where it ended, with edges c..b-1 joined.
  * Wavelengths (indices of refraction) are y's. On WALK_OK s->k holds the constraints there. visible: do not ask for
- * occlusion, the caller knows. On failure y's vertices c+1..b-1 are not to be read. */
+ * occlusion, the caller knows. On failure y's vertices c+1..b-1 are not to be read. What y knew of f there is forgotten.
+ * A walk back tells for certain whether it finds the path again when its tolerances are tighter than those of the way there
+ * (scale 0.1: 0.2 iterations more, no rays). */
 enum walk_end halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
 			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
 			   struct walk_scratch *s);

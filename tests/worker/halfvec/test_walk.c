@@ -2,7 +2,8 @@
  * Walks to random half vectors in worlds that are hard in different ways. Where a walk says that it arrived, that is checked
  * from the outside: half vectors are worked out here in long double from the shapes' own vertices, positions must lie on the
  * primitives they name, no edge may be occluded, both ends must be as they were bit by bit. From there a second walk to the
- * old half vectors must find the old vertices.
+ * old half vectors must find the old vertices, a walk to where the path already is must stay there, and half the tolerance
+ * must lead to the same place.
  * Deterministic: seeds are the names of the cases. HSLT_TEST_ROWS=1 prints the rates.
  */
 #include "tests/support/dice.h"
@@ -128,8 +129,10 @@ static bool occluded(const struct world *w, const struct whole_path *y, unsigned
 /* What a run over one world found. */
 struct tally {
 	size_t walks, arrived, strict, returned, ends[WALK_ITERATIONS + 1], back_ends[WALK_ITERATIONS + 1];
+	size_t stays, left, again, elsewhere; /* walks to where the path is; walks repeated with half the tolerance */
 	uint64_t iterations, rays, occluded, seams;
-	double worst; /* residual over tolerance */
+	double worst;      /* residual over tolerance */
+	double worst_stay; /* how far a walk to where the path is went */
 };
 
 static struct path_context context_of(const struct world *w, uint64_t *counters)
@@ -191,14 +194,22 @@ static double step_of(const struct whole_path *x, const struct constraint *k, un
 	return fmin(alpha / sqrt(M_PI), reach * sqrt(mat2_norm2(k[j].b)));
 }
 
-static void check_arrival(struct path_context *c, const struct whole_path *x, const struct whole_path *y, unsigned b, unsigned end,
-			  const struct walk_target *target, double scale, struct tally *t)
+static void check_residuals(const struct world *w, const struct whole_path *y, unsigned b, unsigned end,
+			    const struct walk_target *target, double scale, struct tally *t)
 {
 	for (unsigned j = end + 1; j < b; j++) {
 		long double h[2];
-		measure(c->w, y, j, h);
+		measure(w, y, j, h);
 		double off = (double)hypotl(h[0] - (long double)target[j].h.x, h[1] - (long double)target[j].h.y);
 		t->worst = fmax(t->worst, off / (scale * target[j].tolerance));
+	}
+}
+
+static void check_arrival(struct path_context *c, const struct whole_path *x, const struct whole_path *y, unsigned b, unsigned end,
+			  const struct walk_target *target, double scale, struct tally *t)
+{
+	check_residuals(c->w, y, b, end, target, scale, t);
+	for (unsigned j = end + 1; j < b; j++) {
 		assert_ptr_equal(y->v[j].bsdf, x->v[j].bsdf);
 		assert_int_equal(y->v[j].emitter, c->w->parts[y->v[j].x.prim.shape].emitter);
 		t->seams += y->v[j].x.prim.prim != x->v[j].x.prim.prim || y->v[j].x.prim.shape != x->v[j].x.prim.shape;
@@ -213,17 +224,19 @@ static void check_arrival(struct path_context *c, const struct whole_path *x, co
 	}
 }
 
+static struct walk_scratch s;
+
 /* Back from y to x: x_b and the half vectors of x. */
 static void walk_back(struct path_context *c, const struct whole_path *x, struct whole_path *y, unsigned b, unsigned end,
 		      struct walk_target *target, const struct constraint *k, struct tally *t)
 {
-	static struct walk_scratch s;
 	static struct whole_path z;
 	z = *y;
 	z.v[b] = x->v[b];
 	for (unsigned j = end + 1; j < b; j++)
 		target[j].h = x->v[j].delta ? (vec2){0, 0} : k[j].h;
 	struct walk_limits limits = WALK_LIMITS_DEFAULT;
+	limits.scale = 0.1; /* tighter than the way there: where x lies is known, only its own residual is to tell */
 	enum walk_end back = halfvec_walk(c, &z, b, end, target, true, &limits, &s);
 	t->back_ends[back]++;
 	if (back != WALK_OK)
@@ -240,10 +253,49 @@ static void walk_back(struct path_context *c, const struct whole_path *x, struct
 	t->strict += each;
 }
 
+/* Largest distance between the inner vertices. */
+static double apart(const struct whole_path *x, const struct whole_path *y, unsigned b, unsigned end)
+{
+	double most = 0;
+	for (unsigned j = end + 1; j < b; j++)
+		most = fmax(most, vec3_length(vec3_sub(x->v[j].x.p, y->v[j].x.p)));
+	return most;
+}
+
+/* To where it is: one iteration, which moves it by rounding alone. */
+static void walk_nowhere(struct path_context *c, const struct whole_path *x, unsigned b, unsigned end, struct walk_target *target,
+			 const struct constraint *k, struct tally *t)
+{
+	static struct whole_path y;
+	y = *x;
+	for (unsigned j = end + 1; j < b; j++)
+		target[j].h = k[j].h;
+	struct walk_limits limits = WALK_LIMITS_DEFAULT;
+	t->stays++;
+	if (halfvec_walk(c, &y, b, end, target, false, &limits, &s) != WALK_OK || s.iterations != 1)
+		t->left++;
+	else
+		t->worst_stay = fmax(t->worst_stay, apart(x, &y, b, end));
+}
+
+/* From the same start with half the tolerance: to the same place y, as far as the whole tolerance says where that is. */
+static void walk_again(struct path_context *c, const struct whole_path *start, const struct whole_path *y, unsigned b, unsigned end,
+		       const struct walk_target *target, struct tally *t)
+{
+	static struct whole_path z;
+	z = *start;
+	struct walk_limits limits = WALK_LIMITS_DEFAULT;
+	limits.scale = 0.5;
+	t->again++;
+	if (halfvec_walk(c, &z, b, end, target, false, &limits, &s) != WALK_OK || apart(&z, y, b, end) > 0.01 * apart(start, y, b, end))
+		t->elsewhere++;
+	else
+		check_residuals(c->w, &z, b, end, target, limits.scale, t);
+}
+
 static void walk_once(struct path_context *c, struct dice *d, const struct whole_path *x, struct tally *t)
 {
-	static struct walk_scratch s;
-	static struct whole_path y;
+	static struct whole_path y, start;
 	static struct constraint k[WHOLE_MAX_VERTICES];
 	struct walk_target target[WHOLE_MAX_VERTICES];
 	unsigned b = 2 + dice_below(d, x->edges - 1), end = dice_below(d, b - 1);
@@ -260,6 +312,7 @@ static void walk_once(struct path_context *c, struct dice *d, const struct whole
 		move_end(c, d, &y, b);
 	if (all == 0 && b == x->edges)
 		return;
+	start = y;
 	struct path_vertex first = y.v[b], last = y.v[end];
 	struct walk_limits limits = WALK_LIMITS_DEFAULT;
 	uint64_t before = c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW];
@@ -274,7 +327,13 @@ static void walk_once(struct path_context *c, struct dice *d, const struct whole
 	assert_memory_equal(&first, &y.v[b], sizeof first);
 	assert_memory_equal(&last.x, &y.v[end].x, sizeof last.x);
 	check_arrival(c, x, &y, b, end, target, limits.scale, t);
+	for (unsigned j = end + 1; j < b; j++) { /* the caller gets the constraints of where it is now */
+		vec2 h = halfvec_of(&y, j);
+		assert_memory_equal(&h, &s.k[j].h, sizeof h);
+	}
+	walk_again(c, &start, &y, b, end, target, t);
 	walk_back(c, x, &y, b, end, target, k, t);
+	walk_nowhere(c, x, b, end, target, k, t);
 }
 
 static void print_row(const char *name, const struct tally *t)
@@ -287,6 +346,8 @@ static void print_row(const char *name, const struct tally *t)
 		      "%.3f\n",
 		      name, t->walks, 100 * ok / n, 100 * (double)t->returned / ok, 100 * (double)t->strict / ok, (double)t->iterations / n,
 		      (double)t->rays / n, t->worst);
+	print_message("    stays: %zu of %zu left, worst %.1e; half the tolerance: %zu of %zu elsewhere\n", t->left, t->stays, t->worst_stay,
+		      t->elsewhere, t->again);
 	print_message("    missed %zu, blocked %zu, mode %zu, singular %zu, diverged %zu, iterations %zu; back: %zu %zu %zu %zu %zu %zu; seams "
 		      "%llu, occluded %llu\n",
 		      t->ends[1], t->ends[2], t->ends[3], t->ends[4], t->ends[5], t->ends[6], t->back_ends[1], t->back_ends[2], t->back_ends[3],
@@ -307,6 +368,10 @@ static struct tally walk_in(const char *name, struct world *w, size_t paths)
 	print_row(name, &t);
 	world_free(w);
 	assert_true(t.worst <= 1.01);
+	assert_int_equal(t.occluded, 0);
+	assert_true(t.left <= t.stays / 1000 && t.worst_stay < 1e-9);
+	assert_true(t.elsewhere <= t.again / 200);
+	assert_true((double)t.returned > 0.9 * (double)t.arrived);
 	return t;
 }
 
