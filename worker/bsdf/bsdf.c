@@ -1,6 +1,7 @@
 #include "worker/bsdf/bsdf.h"
 
 #include "worker/bsdf/create.h"
+#include "worker/bsdf/glass.h"
 #include "worker/bsdf/microfacet.h"
 
 #include <string.h>
@@ -53,8 +54,7 @@ int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, 
 
 double bsdf_eta(const struct bsdf *b, const struct wavelengths *w)
 {
-	(void)w;
-	return b->eta;
+	return b->dispersive ? glass_eta(b->data, w->nm[0]) : b->eta;
 }
 
 /* What a plug-in that cancels nothing by hand is worth. */

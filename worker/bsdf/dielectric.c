@@ -1,7 +1,6 @@
 /* A smooth boundary between two transparent media: Fresnel's reflection and Snell's refraction. */
 #include "worker/bsdf/fresnel.h"
 #include "worker/bsdf/glass.h"
-#include "worker/bsdf/ior.h"
 
 #include <float.h>
 
@@ -63,24 +62,6 @@ static bool dielectric_sample(const struct bsdf *b, const struct bsdf_point *p, 
 		return false;
 	out->f = spectrum_scale(1 / fabs(out->wi.z), weight);
 	return true;
-}
-
-int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
-	       struct error *e)
-{
-	double inside, outside;
-	int code = ior_read(n, "int_ior", IOR_BK7_DEFAULT, &inside, e);
-	if (!code)
-		code = ior_read(n, "ext_ior", IOR_AIR_DEFAULT, &outside, e);
-	if (!code)
-		code = bsdf_texture(b, &g->reflectance, n, "specular_reflectance", 1, build, e);
-	if (!code)
-		code = bsdf_texture(b, &g->transmittance, n, "specular_transmittance", 1, build, e);
-	if (code)
-		return code;
-	b->eta = inside / outside;
-	b->two_sided = true;
-	return 0;
 }
 
 static int dielectric_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)

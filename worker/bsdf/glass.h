@@ -3,18 +3,22 @@
 #define WORKER_BSDF_GLASS_H
 
 #include "worker/bsdf/create.h"
+#include "worker/bsdf/ior.h"
 
 struct glass {
 	struct texture reflectance, transmittance; /* multiply */
+	struct ior side[2];                        /* of enum ior_side */
 };
 
-/* Parameters int_ior, ext_ior, specular_reflectance, specular_transmittance. Sets b->eta and enters the colours. */
+/* Parameters of the index, specular_reflectance, specular_transmittance. Sets b->eta and b->dispersive and enters the
+ * colours. Where dispersive, b->data begins with the struct glass. */
 int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 	       struct error *e);
 #define GLASS_PARAMS                                                                                                   \
-	{.name = "int_ior", .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING},                                          \
-	{.name = "ext_ior", .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING},                                          \
-	{.name = "specular_reflectance", .types = VALUE_TEXTURE},                                                      \
+	IOR_PARAMS, {.name = "specular_reflectance", .types = VALUE_TEXTURE},                                          \
 	{.name = "specular_transmittance", .types = VALUE_TEXTURE}
+
+/* Index below the surface over the one above. */
+double glass_eta(const struct glass *g, double nm);
 
 #endif

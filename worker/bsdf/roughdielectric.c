@@ -7,7 +7,7 @@
 #include "worker/bsdf/microfacet.h"
 
 struct roughdielectric {
-	struct glass glass; /* first: with equal indices the data is that of a smooth dielectric */
+	struct glass glass; /* first: so it is asked for its index, and with equal indices the data is a smooth dielectric's */
 	struct microfacet facets;
 };
 
@@ -165,7 +165,7 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT;
 	b->has_smooth = true;
 	b->alpha = b->alpha_mean = r->facets.alpha;
-	if (b->eta == 1) {
+	if (b->eta == 1 && !b->dispersive) {
 		/* No facet bends light: all of it goes straight on. */
 		extern const struct bsdf_ops bsdf_ops_dielectric;
 		b->ops = &bsdf_ops_dielectric;

@@ -123,12 +123,28 @@ bool path_visible(struct path_context *c, const struct path_vertex *a, const str
 	return !accel_occluded(c->w->accel, &from, &to);
 }
 
+spectrum path_collapse(spectrum l, bool dispersive)
+{
+	return dispersive ? (spectrum){{SPECTRUM_LANES * l.v[0]}} : l;
+}
+
+static bool disperses(const struct path_context *c, const struct joined_path *p)
+{
+	if (!c->w->effects.dispersion)
+		return false;
+	for (unsigned i = 1; i < p->edges; i++)
+		if (p->v[i]->bsdf->dispersive)
+			return true;
+	return false;
+}
+
+/* The end of every contribution. */
 static spectrum weighted(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t, unsigned max_s,
 			 spectrum l)
 {
 	struct joined_path p;
 	join(c, light, s, t, &p);
-	return spectrum_scale(path_balance_weight(c, &p, max_s), l);
+	return path_collapse(spectrum_scale(path_balance_weight(c, &p, max_s), l), disperses(c, &p));
 }
 
 static spectrum hit_emitter(struct path_context *c, unsigned t, unsigned max_s)

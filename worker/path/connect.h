@@ -30,6 +30,11 @@ bool path_next_event(const struct path_context *c, const struct path_vertex *z, 
 /* Nothing lies between a (not at infinity) and b. Counts a ray. */
 bool path_visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b);
 
+/* What a whole path brings, whose contribution is l. Where it scatters at a dispersive BSDF, however it does so there, its
+ * directions and densities are those of nm[0], and only that one travels on: four times its share, unbiased because nm[0] is
+ * uniform. A property of the path, so that all techniques that make it agree. */
+spectrum path_collapse(spectrum l, bool dispersive);
+
 /* Contribution f / p of joining the first s vertices of c->light with the first t of c->camera, already weighted among the
  * techniques up to max_s. s <= 1 needs no light sub-path. film: where it lands when t = 1 (else unchanged). */
 spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned max_s, double film[2]);

@@ -15,7 +15,8 @@ __attribute__((format(printf, 4, 5))) static void line(struct effects *fx, const
 }
 
 struct census {
-	size_t specular, glossy, diffuse, transmission, textured, coloured, environment, area, delta, textured_light, shape[3];
+	size_t specular, glossy, diffuse, transmission, textured, coloured, dispersive, environment, area, delta, textured_light;
+	size_t shape[3];
 };
 
 static struct census take(const struct bsdf *b, size_t bn, const struct emitter *em, size_t en)
@@ -28,6 +29,7 @@ static struct census take(const struct bsdf *b, size_t bn, const struct emitter 
 		c.transmission += (b[i].modes & BSDF_TRANSMIT) != 0;
 		c.textured += b[i].textured;
 		c.coloured += b[i].shape != COLOR_SHAPE_CONSTANT;
+		c.dispersive += b[i].dispersive;
 	}
 	for (size_t i = 0; i < en; i++) {
 		c.delta += em[i].delta;
@@ -58,7 +60,12 @@ void effects_analyse(struct effects *fx, const struct scene_settings *settings, 
 	*fx = (struct effects){.max_depth = settings->max_depth};
 	struct census c = take(bsdfs, bsdf_count, emitters, emitter_count);
 	colour(fx, &c, emitter_count);
-	line(fx, "dispersion", false, "no index of refraction varies with wavelength: wavelengths travel together");
+	fx->dispersion = c.dispersive > 0;
+	if (fx->dispersion)
+		line(fx, "dispersion", true, "%zu material%s by an index that varies with wavelength: paths that meet %s carry one",
+		     c.dispersive, c.dispersive == 1 ? " refracts" : "s refract", c.dispersive == 1 ? "it" : "them");
+	else
+		line(fx, "dispersion", false, "no index of refraction varies with wavelength: wavelengths travel together");
 	fx->aperture = settings->aperture_radius > 0;
 	if (fx->aperture)
 		line(fx, "aperture", true, "a lens of radius %g, focused at a distance of %g", settings->aperture_radius,

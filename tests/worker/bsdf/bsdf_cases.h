@@ -36,6 +36,11 @@ static const char *const bsdf_cases[] = {
 	"roughdielectric int_ior=2.4 ext_ior=1 alpha=1",
 	"roughdielectric int_ior=2.4 ext_ior=1 alpha=1 distribution=ggx specular_transmittance=rgb(0.9,0.8,0.7)",
 	"roughdielectric int_ior=1.1 ext_ior=1 alpha=0.5",
+	"dielectric int_ior=sf11 dispersion=true",
+	"dielectric int_cauchy_b=0.01 ext_cauchy_b=-0.002 ext_ior=1.2 specular_reflectance=0.9",
+	"roughdielectric int_ior=diamond ext_ior=water dispersion=true alpha=0.3",
+	"roughdielectric int_ior=1 ext_sellmeier=1.0396,0.2318,1.0105,0.006,0.02,103.56 alpha=0.2 distribution=ggx",
+	"roughdielectric int_ior=1.5 ext_ior=1.5 int_cauchy_b=0.02 alpha=0.4", /* eta is 1 at IOR_NM alone */
 	"phong",
 	"phong exponent=0 specular_reflectance=0.9 diffuse_reflectance=0.4",
 	"phong exponent=300 diffuse_reflectance=0 specular_reflectance=1",

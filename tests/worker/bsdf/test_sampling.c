@@ -37,7 +37,7 @@ struct chart {
 static struct chart chart_of(const struct bsdf *b, vec3 wo)
 {
 	struct chart c = {.side = wo.z > 0 ? 1 : -1};
-	double eta = wo.z > 0 ? b->eta : 1 / b->eta, s = sqrt(wo.x * wo.x + wo.y * wo.y);
+	double below = bsdf_eta(b, &wavelengths), eta = wo.z > 0 ? below : 1 / below, s = sqrt(wo.x * wo.x + wo.y * wo.y);
 	for (int other = 0; other < 2; other++) {
 		double sine = fmin(other ? s / eta : s, 1), radius = sqrt(1 - sqrt(1 - sine * sine));
 		c.center[other][0] = s > 0 ? -wo.x / s * radius : 0;
@@ -126,7 +126,7 @@ static void check_sample(const struct bsdf *b, vec3 wo, const struct bsdf_sample
 	assert_true(fabs(vec3_length(s->wi) - 1) < 1e-12);
 	assert_int_equal(s->mode & ~b->modes, 0);
 	assert_true(s->mode & (s->wi.z * wo.z > 0 ? BSDF_REFLECT : BSDF_TRANSMIT));
-	double eta = s->wi.z * wo.z > 0 ? 1 : wo.z > 0 ? b->eta : 1 / b->eta;
+	double below = bsdf_eta(b, &wavelengths), eta = s->wi.z * wo.z > 0 ? 1 : wo.z > 0 ? below : 1 / below;
 	assert_true(close_to(s->eta, eta));
 	assert_true(spectrum_is_valid(s->f));
 	if (s->mode & BSDF_DELTA) {

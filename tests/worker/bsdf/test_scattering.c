@@ -20,7 +20,7 @@ static vec3 uniform_direction(double u0, double u1)
 
 static double index_on(const struct bsdf *b, vec3 v)
 {
-	return v.z > 0 ? 1 : b->eta;
+	return v.z > 0 ? 1 : bsdf_eta(b, &wavelengths);
 }
 
 static void assert_near(double a, double b, double tolerance, const char *what)
@@ -308,6 +308,18 @@ static void test_refusals_say_why(void **state)
 		{"roughconductor alpha_u=0.1 alpha_v=0.2", "isotropic"},
 		{"dielectric int_ior=cheese", "cheese"},
 		{"dielectric int_ior=-1", "above 0"},
+		{"dielectric int_ior=amber dispersion=true", "amber"},
+		{"dielectric int_ior=1.5 dispersion=true", "wavelength"},
+		{"dielectric dispersion=true", "bk7"},
+		{"dielectric int_ior=1.5 int_sellmeier=1,0.01", "int_ior"},
+		{"dielectric int_cauchy_b=0.1 int_sellmeier=1,0.01", "int_cauchy_b"},
+		{"dielectric ext_sellmeier=1,0.01,2", "ext_sellmeier"},
+		{"dielectric int_sellmeier=1,1,1,1,1,0.01,0.01,0.01,0.01,0.01", "1 to 4"},
+		{"dielectric int_sellmeier=glass", "1 to 4"},
+		{"dielectric int_sellmeier=1,0.25", "500 nm"},
+		{"dielectric int_sellmeier=-1,0.01", "negative"},
+		{"dielectric int_sellmeier=100,0.7", "index"},
+		{"roughdielectric ext_ior=1 ext_cauchy_b=-0.9", "ext_cauchy_b"},
 		{"twosided", "one or two"},
 		{"twosided | diffuse | diffuse | diffuse", "one or two"},
 		{"twosided | dielectric", "two sides"},

@@ -101,7 +101,7 @@ static double scattered(const struct path_context *c, const struct path_vertex *
 		return density * fabs(vec3_dot(at->x.ng, towards(at, to)));
 	density *= fabs(wi.z / wo.z) * fabs(vec3_dot(at->x.ng, towards(at, from)));
 	if (wo.z * wi.z < 0)
-		density *= wi.z > 0 ? squared(1 / at->bsdf->eta) : squared(at->bsdf->eta);
+		density *= wi.z > 0 ? squared(1 / bsdf_eta(at->bsdf, &c->wl)) : squared(bsdf_eta(at->bsdf, &c->wl));
 	return density;
 }
 
@@ -436,7 +436,10 @@ static void test_specular(void **state)
 			      BALL("1.2", "-.5", "0", "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")
 			      BALL("-1.3", "-.7", "0", "<bsdf type='dielectric'><float name='int_ior' value='1'/>"
 						      "<float name='ext_ior' value='1.4'/></bsdf>")
-			      BALL("-.2", "-1.2", "1", "<bsdf type='roughdielectric'><float name='alpha' value='.1'/></bsdf>")),
+			      BALL("1.3", "-1.2", "1", "<bsdf type='dielectric'><string name='int_ior' value='sf11'/>"
+						       "<boolean name='dispersion' value='true'/></bsdf>")
+			      BALL("-.2", "-1.2", "1", "<bsdf type='roughdielectric'><float name='alpha' value='.1'/>"
+						       "<float name='int_cauchy_b' value='.02'/></bsdf>")),
 		20000);
 	assert_true(t.with_delta > t.routes / 20);
 }
