@@ -2,3 +2,4 @@
 INTEGRATOR(path)
 INTEGRATOR(bdpt)
 INTEGRATOR(pssmlt)
+INTEGRATOR(hslt)

@@ -142,6 +142,8 @@ bool whole_is_dispersed(const struct path_context *c, const struct whole_path *x
 void whole_copy(struct whole_path *to, const struct whole_path *from, unsigned first, unsigned last)
 {
 	unsigned n = last - first + 1, edge = first > 0 ? first - 1 : 0, edge_end = last < from->edges ? last + 1 : from->edges;
+	if (to->wavelength != from->wavelength)
+		to->known_f = to->known_fh = 0;
 	to->edges = from->edges;
 	to->wl = from->wl;
 	to->wavelength = from->wavelength;
@@ -201,7 +203,7 @@ static void take_emitter(struct whole_path *x, const struct path_vertex *from)
 		x->v[0].kind = VERTEX_EMITTER;
 }
 
-static bool finish(struct path_context *c, struct whole_path *x)
+bool whole_finish(const struct path_context *c, struct whole_path *x)
 {
 	x->known_f = x->known_fh = 0;
 	for (unsigned e = 0; e < x->edges; e++)
@@ -250,14 +252,14 @@ bool whole_from_subpaths(struct path_context *c, unsigned s, unsigned edges, str
 	}
 	for (unsigned i = s > 0 ? s : 1; i <= edges; i++)
 		take_vertex(x, i, &c->camera[edges - i], s == 0 || i > s);
-	return finish(c, x) && (s == 0 || whole_visible(c, x, s - 1));
+	return whole_finish(c, x) && (s == 0 || whole_visible(c, x, s - 1));
 }
 
 void whole_colour(const struct path_context *c, struct whole_path *x, double xyz[3])
 {
 	struct product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < x->edges; j++)
-		product_mul(&p, whole_f(c, x, j));
+		product_mul(&p, x->known_fh >> j & 1 ? x->fh[j] : whole_f(c, x, j));
 	to_xyz(c, x, p.v, xyz);
 	double sum = xyz[0] + xyz[1] + xyz[2];
 	for (int i = 0; i < 3; i++)

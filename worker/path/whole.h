@@ -78,6 +78,10 @@ bool whole_visible(struct path_context *c, const struct whole_path *x, unsigned 
 /* Where v[edges - 1] lies on the film as seen from v[edges]; false: outside the window that is sampled. */
 bool whole_film(const struct path_context *c, struct whole_path *x);
 
+/* Everything that follows from the vertices: edges, modes (those of specular vertices are kept), film point, scattering.
+ * false: ends coincide, it leaves the window, normals disagree about a side, or it is black. Casts no ray. */
+bool whole_finish(const struct path_context *c, struct whole_path *x);
+
 /* The path that technique s makes of the sub-paths in c (s vertices of c->light, the others of c->camera), with everything
  * cached. Casts the connecting ray. false: there is none, or it is black. */
 bool whole_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct whole_path *x);

@@ -1,0 +1,8 @@
+/* One line a strategy: MUTATION(name) stands for `const struct mutation_ops mutation_<name>`. */
+MUTATION(independent)
+MUTATION(hslt)
+MUTATION(halfvec)
+MUTATION(multichain)
+MUTATION(wavelength)
+MUTATION(lens)
+MUTATION(light)
