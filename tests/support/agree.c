@@ -26,6 +26,7 @@ struct group_run {
 	double sum[AGREE_CELLS + 1];
 	double independent, count;
 	uint64_t counters[BATCH_COUNTERS];
+	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
 	char failure[256];
 };
 
@@ -49,6 +50,9 @@ static void take(struct group_run *g, const struct batch *b)
 	g->count += (double)b->counters[COUNT_INDEPENDENT];
 	for (int i = 0; i < BATCH_COUNTERS; i++)
 		g->counters[i] += b->counters[i];
+	for (uint32_t i = 0; i < b->strategy_count; i++)
+		for (int k = 0; k < STRATEGY_COUNTERS; k++)
+			g->strategy[i][k] += b->strategy[i][k];
 }
 
 static bool lease(struct group_run *g, const struct lease_key *k, const struct lease_input *in, struct batch *b)
@@ -136,7 +140,8 @@ static void *work(void *arg)
 	return NULL;
 }
 
-static void make_plan(const struct world *w, const char *test, const char *side, const struct agree_side *how, struct plan *p)
+static void make_plan(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+		      const char *mutations, struct plan *p)
 {
 	const struct render_integrator *i = render_integrator_find(how->integrator);
 	assert_non_null(i);
@@ -152,11 +157,15 @@ static void make_plan(const struct world *w, const char *test, const char *side,
 			   .min_depth = how->min_depth ? how->min_depth : 1,
 			   .max_depth = how->max_depth ? how->max_depth : w->settings.max_depth};
 	strcpy(p->integrator, how->integrator);
+	struct error e = {""};
+	struct render_summary summary;
+	world_summary(w, &summary);
+	if (i->has_mutations && render_mutations(mutations, &summary, p->mutations, &e))
+		fail_msg("%s", e.text);
 	p->chains = i->kind == PLAN_CHAINS ? groups * 8 : 0;
 	p->bootstrap = (uint64_t)groups * 2048;
 	uint64_t per = i->kind == PLAN_CHAINS ? spp * pixels / p->chains : spp / groups;
 	p->epoch = per / 2 ? per / 2 : 1;
-	struct error e = {""};
 	if (plan_check(p, &e))
 		fail_msg("%s", e.text);
 }
@@ -164,9 +173,15 @@ static void make_plan(const struct world *w, const char *test, const char *side,
 void agree_render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
 		  struct agree_image *out)
 {
+	agree_render_mixture(w, test, side, how, NULL, out);
+}
+
+void agree_render_mixture(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+			  const char *mutations, struct agree_image *out)
+{
 	static struct group_run runs[AGREE_MAX_GROUPS];
 	struct plan p;
-	make_plan(w, test, side, how, &p);
+	make_plan(w, test, side, how, mutations, &p);
 	memset(runs, 0, sizeof runs);
 	*out = (struct agree_image){.groups = p.groups};
 	for (uint32_t g = 0; g < p.groups; g++)
@@ -182,6 +197,9 @@ void agree_render(const struct world *w, const char *test, const char *side, con
 			fail_msg("%s: %s", how->integrator, runs[g].failure);
 		for (int i = 0; i < BATCH_COUNTERS; i++)
 			out->counters[i] += runs[g].counters[i];
+		for (int i = 0; i < BATCH_STRATEGIES; i++)
+			for (int k = 0; k < STRATEGY_COUNTERS; k++)
+				out->strategy[i][k] += runs[g].strategy[i][k];
 	}
 	assert_int_equal(out->counters[COUNT_NAN] + out->counters[COUNT_INFINITE] + out->counters[COUNT_NEGATIVE], 0);
 }

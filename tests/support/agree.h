@@ -25,10 +25,15 @@ struct agree_image {
 	uint32_t groups;
 	double mean[AGREE_MAX_GROUPS][AGREE_CELLS + 1];
 	uint64_t counters[BATCH_COUNTERS];
+	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
 };
 
 void agree_render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
 		  struct agree_image *out);
+
+/* The same with a mixture of strategies of our own. */
+void agree_render_mixture(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+			  const char *mutations, struct agree_image *out);
 
 /* Fails the test when the images differ, or when the comparison is too weak to tell. */
 void agree_check(const char *test, const struct agree_image *a, const struct agree_image *b);

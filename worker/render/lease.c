@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 #include "worker/chain/chain.h"
 #include "worker/math/fptrap.h"
+#include "worker/mutation/mixture.h"
 #include "worker/render/sums.h"
 
 #include <float.h>
@@ -197,6 +198,9 @@ static int check(const struct world *w, const struct plan *p, const struct integ
 	if (p->width != w->settings.width || p->height != w->settings.height || p->border != w->settings.border)
 		return error_set(e, EINVAL, "the plan's film is %u x %u with a border of %u pixels, the scene's %u x %u with %u",
 				 p->width, p->height, p->border, w->settings.width, w->settings.height, w->settings.border);
+	struct mixture unused;
+	if (i->face.has_mutations && mixture_parse(p->mutations, &unused, e))
+		return -EINVAL;
 	if (p->max_depth < 1 || p->max_depth > PATH_MAX_EDGES)
 		return error_set(e, EINVAL, "a depth of %u edges is not within 1 and %d", p->max_depth, PATH_MAX_EDGES);
 	return 0;
@@ -212,6 +216,7 @@ static int prepare(struct job *j, const struct world *w, struct error *e)
 	j->context.max_depth = depth;
 	j->context.roulette = p->kind == PLAN_SAMPLES;
 	j->context.counters = j->out->counters;
+	j->out->strategy_count = j->key->kind == LEASE_RENDER ? (uint32_t)plan_strategy_count(p->mutations) : 0;
 	if (j->key->kind == LEASE_BOOTSTRAP) {
 		struct plan_range r = plan_bootstrap_range(p, j->key->group, j->key->part);
 		j->out->weight_count = r.end - r.begin;

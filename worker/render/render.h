@@ -60,6 +60,9 @@ int render_check(const struct scene *s, const struct asset_source *assets, const
  * -EINVAL with a sentence. */
 int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX], struct error *e);
 
+/* false also where there is no effect of that name. */
+bool render_effect_on(const struct render_summary *scene, const char *name);
+
 /* Builds Embree's scene. The scene description may be freed afterwards. */
 int world_new(struct world **w, const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 	      struct error *e);

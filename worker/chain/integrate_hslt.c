@@ -1,0 +1,13 @@
+/*
+ * Improved half vector space light transport (Hanika, Kaplanyan, Dachsbacher 2015): chains of whole paths. Their bootstrap is
+ * that of bdpt.
+ */
+#include "worker/chain/path_chain.h"
+#include "worker/path/integrator.h"
+
+const struct integrator integrator_hslt = {
+	.face = {"hslt", "improved half vector space light transport", PLAN_CHAINS, WHOLE_MAX_EDGES, .has_mutations = true},
+	.stream = RNG_BOOTSTRAP,
+	.evaluate = path_trace_both_ways,
+	.chain = &chain_path,
+};

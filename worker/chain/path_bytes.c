@@ -1,0 +1,150 @@
+#include "worker/chain/path_chain.h"
+
+#include <string.h>
+
+enum { PATH_HEAD = 16, VERTEX_BYTES = 40 };
+/* Where a position and the surface that it names differ more than that, in units of the world's radius, they do not belong
+ * together. */
+#define BELONGS 1e-9
+
+static void put32(uint8_t *p, uint32_t v)
+{
+	for (int i = 0; i < 4; i++)
+		p[i] = (uint8_t)(v >> (8 * i));
+}
+
+static uint32_t get32(const uint8_t *p)
+{
+	return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+}
+
+static void put_double(uint8_t *p, double v)
+{
+	uint64_t bits;
+	memcpy(&bits, &v, sizeof bits);
+	chain_put64(p, bits);
+}
+
+static double get_double(const uint8_t *p)
+{
+	uint64_t bits = chain_get64(p);
+	double v;
+	memcpy(&v, &bits, sizeof v);
+	return v;
+}
+
+size_t path_write(const struct whole_path *x, uint8_t *bytes)
+{
+	chain_put64(bytes, x->edges);
+	put_double(bytes + 8, x->wavelength);
+	if (x->edges == 0)
+		return PATH_HEAD;
+	uint8_t *at = bytes + PATH_HEAD;
+	for (unsigned i = 0; i <= x->edges; i++, at += VERTEX_BYTES) {
+		const struct path_vertex *v = &x->v[i];
+		at[0] = (uint8_t)v->kind;
+		at[1] = (uint8_t)v->mode;
+		at[2] = v->delta;
+		at[3] = 0;
+		put32(at + 4, (uint32_t)v->emitter);
+		put32(at + 8, v->x.prim.shape);
+		put32(at + 12, v->x.prim.prim);
+		put_double(at + 16, v->x.p.x);
+		put_double(at + 24, v->x.p.y);
+		put_double(at + 32, v->x.p.z);
+	}
+	return (size_t)(at - bytes);
+}
+
+static bool near(const struct world *w, vec3 a, vec3 b)
+{
+	vec3 d = vec3_sub(a, b);
+	return vec3_dot(d, d) <= BELONGS * BELONGS * w->radius * w->radius;
+}
+
+/* The surface at p. */
+static bool read_surface(const struct world *w, struct prim_ref prim, vec3 p, struct surface_point *x)
+{
+	if (prim.shape >= w->shape_count)
+		return false;
+	const struct geom_shape *s = &w->shapes[prim.shape];
+	if (s->is_sphere) {
+		vec3 d = vec3_sub(p, s->center);
+		if (!(vec3_dot(d, d) > 0))
+			return false;
+		surface_on_sphere(s, prim, vec3_normalize(d), x);
+	} else {
+		if (prim.prim >= s->triangle_count)
+			return false;
+		surface_on_triangle(s, prim, 1.0 / 3, 1.0 / 3, x);
+		const struct ray_hit hit = {prim, w->radius, 1.0 / 3, 1.0 / 3};
+		vec3 n = x->ng;
+		surface_from_hit(s, vec3_madd(p, -w->radius, n), n, &hit, x);
+	}
+	return near(w, x->p, p);
+}
+
+/* An emitter that has no surface. */
+static bool read_far_emitter(const struct world *w, int32_t emitter, vec3 p, struct path_vertex *v)
+{
+	const struct emitter *em = &w->emitters[emitter];
+	const double half[2] = {0.5, 0.5};
+	struct emitter_point point = {.infinite = em->infinite};
+	double pdf;
+	if (em->delta) {
+		if (!em->ops->sample_point(em, half, &point, &pdf) || !near(w, point.p, p))
+			return false;
+	} else {
+		if (!em->infinite || !(fabs(vec3_dot(p, p) - 1) <= BELONGS))
+			return false;
+		point.p = vec3_normalize(p);
+	}
+	*v = path_emitter_vertex(w, emitter, &point);
+	return true;
+}
+
+static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, unsigned edges, struct path_vertex *v)
+{
+	int32_t emitter = (int32_t)get32(at + 4);
+	struct prim_ref prim = {get32(at + 8), get32(at + 12)};
+	vec3 p = {get_double(at + 16), get_double(at + 24), get_double(at + 32)};
+	*v = (struct path_vertex){.kind = at[0], .mode = at[1], .delta = at[2] != 0, .emitter = emitter};
+	if (!vec3_is_finite(p) || at[0] > VERTEX_INFINITE || (v->kind == VERTEX_CAMERA) != (i == edges) ||
+	    (v->kind == VERTEX_SURFACE) != (i > 0 && i < edges))
+		return false;
+	if (v->kind == VERTEX_CAMERA) {
+		double u[2];
+		v->x.prim = PRIM_NONE;
+		camera_point_inverse(&w->camera, p, u);
+		v->x.p = camera_point(&w->camera, u);
+		return near(w, v->x.p, p);
+	}
+	if (i == 0 && (emitter < 0 || (uint32_t)emitter >= w->emitter_count))
+		return false;
+	if (i == 0 && w->emitter_shape[emitter] == UINT32_MAX)
+		return read_far_emitter(w, emitter, p, v) && v->kind == (enum vertex_kind)at[0];
+	if (!read_surface(w, prim, p, &v->x))
+		return false;
+	v->bsdf = &w->bsdfs[w->parts[prim.shape].bsdf];
+	v->emitter = w->parts[prim.shape].emitter;
+	return i > 0 || v->emitter == emitter;
+}
+
+bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct whole_path *x)
+{
+	if (size < PATH_HEAD)
+		return false;
+	uint64_t edges = chain_get64(bytes);
+	x->edges = 0;
+	if (edges == 0)
+		return size == PATH_HEAD;
+	double u = get_double(bytes + 8);
+	if (edges > c->max_depth || edges > WHOLE_MAX_EDGES || size != PATH_HEAD + (edges + 1) * VERTEX_BYTES || !(u >= 0 && u < 1))
+		return false;
+	x->edges = (unsigned)edges;
+	for (unsigned i = 0; i <= x->edges; i++)
+		if (!read_vertex(c->w, bytes + PATH_HEAD + i * VERTEX_BYTES, i, x->edges, &x->v[i]))
+			return false;
+	whole_set_wavelength(c, x, u);
+	return whole_finish(c, x);
+}
