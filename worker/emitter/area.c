@@ -4,6 +4,7 @@
  * sphere subtends (Shirley, Wang, Zimmerman 1996, sec. 4.1.1), with its angle from the sine so that far spheres keep digits.
  */
 #include "worker/emitter/emitter.h"
+#include "worker/emitter/uniform.h"
 #include "worker/math/frame.h"
 
 struct area {
@@ -122,8 +123,7 @@ static bool sample_point(const struct emitter *em, const double u[2], struct emi
 	x->infinite = false;
 	*pdf = 1 / a->area;
 	if (a->surface.is_sphere) {
-		double z = 1 - 2 * u[0], r = 2 * sqrt(u[0] * (1 - u[0])), phi = 2 * M_PI * u[1];
-		sphere_point(a, (vec3){r * cos(phi), r * sin(phi), z}, x);
+		sphere_point(a, direction_of_square(u), x);
 		return true;
 	}
 	double v;
@@ -131,6 +131,32 @@ static bool sample_point(const struct emitter *em, const double u[2], struct emi
 	double root = sqrt(v);
 	triangle_point(a, i, 1 - root, root * u[1], x);
 	return true;
+}
+
+static double below_1(double x)
+{
+	return fmin(fmax(x, 0), 1 - 0x1p-53);
+}
+
+static void triangle_inverse(const struct area *a, const struct emitter_point *x, double u[2])
+{
+	const struct emitter_surface *s = &a->surface;
+	vec3 v0 = corner(s, x->prim, 0), e1 = vec3_sub(corner(s, x->prim, 1), v0), e2 = vec3_sub(corner(s, x->prim, 2), v0);
+	vec3 r = vec3_sub(x->p, v0), n = vec3_cross(e1, e2);
+	double n2 = vec3_dot(n, n), b1 = vec3_dot(vec3_cross(r, e2), n) / n2, b2 = vec3_dot(vec3_cross(e1, r), n) / n2;
+	double root = fmin(fmax(1 - b1, 0), 1), low = a->cdf[x->prim], high = a->cdf[x->prim + 1];
+	/* It must stay the same triangle. */
+	u[0] = fmax(fmin(low + root * root * (high - low), nextafter(high, 0)), low);
+	u[1] = root > 0 ? below_1(b2 / root) : 0;
+}
+
+static void point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
+{
+	const struct area *a = em->data;
+	if (a->surface.is_sphere)
+		square_of_direction(vec3_scale(1 / a->surface.radius, vec3_sub(x->p, a->surface.center)), u);
+	else
+		triangle_inverse(a, x, u);
 }
 
 static double pdf_point(const struct emitter *em, const struct emitter_point *x)
@@ -221,6 +247,7 @@ const struct emitter_ops emitter_ops_area = {
 	.radiance = radiance,
 	.sample_point = sample_point,
 	.pdf_point = pdf_point,
+	.point_inverse = point_inverse,
 	.sample_direction = sample_direction,
 	.pdf_direction = pdf_direction,
 	.sample_toward = sample_toward,

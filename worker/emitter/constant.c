@@ -1,5 +1,6 @@
 /* The same radiance from everywhere. */
 #include "worker/emitter/emitter.h"
+#include "worker/emitter/uniform.h"
 
 #define PI 3.14159265358979323846
 #define UNIFORM (1 / (4 * PI))
@@ -15,8 +16,7 @@ static bool constant_sample_point(const struct emitter *em, const double u[2], s
 				  double *pdf_point)
 {
 	(void)em;
-	double z = 1 - 2 * u[0], r = 2 * sqrt(u[0] * (1 - u[0])), phi = 2 * PI * u[1];
-	*x = (struct emitter_point){.p = vec3_normalize((vec3){r * cos(phi), r * sin(phi), z}), .infinite = true};
+	*x = (struct emitter_point){.p = vec3_normalize(direction_of_square(u)), .infinite = true};
 	*pdf_point = UNIFORM;
 	return true;
 }
@@ -25,6 +25,12 @@ static double constant_pdf_point(const struct emitter *em, const struct emitter_
 {
 	(void)em, (void)x;
 	return UNIFORM;
+}
+
+static void constant_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
+{
+	(void)em;
+	square_of_direction(x->p, u);
 }
 
 static bool constant_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
@@ -73,6 +79,7 @@ const struct emitter_ops emitter_ops_constant = {
 	.radiance = constant_radiance,
 	.sample_point = constant_sample_point,
 	.pdf_point = constant_pdf_point,
+	.point_inverse = constant_point_inverse,
 	.sample_toward = constant_sample_toward,
 	.pdf_toward = constant_pdf_toward,
 };

@@ -66,20 +66,46 @@ static const uint32_t *row_cells(const struct envmap *m, uint32_t row)
 	return m->cell_cdf + (size_t)row * (m->columns + 1);
 }
 
+/* Where the density's cells are; across: how far into its cell the column is. */
+static void find_place(const struct envmap *m, vec3 d, uint32_t *row, uint32_t *column, double *across)
+{
+	double u, v;
+	coordinates(m, d, &u, &v);
+	/* Cell 0 of a row begins at the centre of pixel 0; the half pixel before belongs to the last one. */
+	double c = u * m->columns - 0.5, r = v * (m->rows - 1) + 0.5;
+	*column = c < 0 || c >= m->columns ? m->columns - 1 : (uint32_t)c;
+	*row = r >= m->rows ? m->rows - 1 : (uint32_t)r;
+	*across = (c < 0 ? c + m->columns : c) - *column;
+}
+
 static double envmap_pdf_point(const struct emitter *em, const struct emitter_point *x)
 {
 	const struct envmap *m = em->data;
-	double u, v;
-	coordinates(m, x->p, &u, &v);
-	/* Cell 0 of a row begins at the centre of pixel 0; the half pixel before belongs to the last one. */
-	double c = u * m->columns - 0.5, r = v * (m->rows - 1) + 0.5;
-	uint32_t column = c < 0 || c >= m->columns ? m->columns - 1 : (uint32_t)c;
-	uint32_t row = r >= m->rows ? m->rows - 1 : (uint32_t)r;
+	uint32_t row, column;
+	double across;
+	find_place(m, x->p, &row, &column, &across);
 	const uint32_t *cells = row_cells(m, row);
 	if (cells[m->columns] == 0)
 		return 0;
 	double chance = (m->row_cdf[row + 1] - m->row_cdf[row]) * (cells[column + 1] - cells[column]) / cells[m->columns];
 	return chance / (row_height(m, row) * 2 * PI / m->columns);
+}
+
+static void envmap_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
+{
+	const struct envmap *m = em->data;
+	uint32_t row, column;
+	double across;
+	find_place(m, x->p, &row, &column, &across);
+	const uint32_t *cells = row_cells(m, row);
+	vec3 d = to_local(m, x->p);
+	/* Heights in the cosine, as differences of angles. */
+	double angle = atan2(hypot(d.x, d.z), d.y), edge = row_edge(m, row);
+	double down = 2 * sin(0.5 * (angle + edge)) * sin(0.5 * (angle - edge)) / row_height(m, row);
+	u[0] = cells[m->columns] ? (cells[column] + across * (cells[column + 1] - cells[column])) / cells[m->columns] : 0;
+	u[1] = m->row_cdf[row] + down * (m->row_cdf[row + 1] - m->row_cdf[row]);
+	for (int i = 0; i < 2; i++)
+		u[i] = fmin(fmax(u[i], 0), 1 - 0x1p-53);
 }
 
 static double envmap_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
@@ -250,6 +276,7 @@ const struct emitter_ops emitter_ops_envmap = {
 	.radiance = envmap_radiance,
 	.sample_point = envmap_sample_point,
 	.pdf_point = envmap_pdf_point,
+	.point_inverse = envmap_point_inverse,
 	.sample_toward = envmap_sample_toward,
 	.pdf_toward = envmap_pdf_toward,
 };

@@ -1,5 +1,6 @@
 /* A point that shines alike in all directions: intensity, at a position or at the origin of to_world. */
 #include "worker/emitter/delta.h"
+#include "worker/emitter/uniform.h"
 
 static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
 {
@@ -12,8 +13,7 @@ static bool sample_direction(const struct emitter *em, const struct emitter_poin
 			     double *pdf_solid)
 {
 	(void)em, (void)x;
-	double z = 1 - 2 * u[0], r = 2 * sqrt(u[0] * (1 - u[0])), phi = 2 * M_PI * u[1];
-	*w = vec3_normalize((vec3){r * cos(phi), r * sin(phi), z});
+	*w = vec3_normalize(direction_of_square(u));
 	*pdf_solid = 1 / (4 * M_PI);
 	return true;
 }
