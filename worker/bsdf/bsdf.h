@@ -72,7 +72,7 @@ struct bsdf {
 	bool has_delta;
 	double alpha;      /* least roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
 	double alpha_mean; /* albedo-weighted mean roughness of its non-delta lobes, diffuse counting 1; 0 for delta only */
-	double eta;        /* index below the surface (against the normal) over the one above, at the sodium line where it
+	double eta;        /* index below the surface (against the normal) over the one above, at 587.6 nm where it
 			      depends on the wavelength; 1: opaque or none */
 	bool dispersive;   /* the index depends on the wavelength: only bsdf_eta says it, and paths carry one wavelength */
 	bool two_sided;    /* scatters light that arrives from below the normal */

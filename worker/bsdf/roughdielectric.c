@@ -128,7 +128,7 @@ static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point
 	if (wo.z == 0)
 		return false;
 	wo = mirror(wo, below);
-	double eta = below ? 1 / bsdf_eta(b, p->w) : bsdf_eta(b, p->w);
+	double ratio = bsdf_eta(b, p->w), eta = below ? 1 / ratio : ratio;
 	vec3 h = microfacet_sample_visible(&r->facets, wo, u[0], u[1]), wi;
 	double c = fmin(vec3_dot(wo, h), 1);
 	if (!(c > 0))

@@ -1,5 +1,6 @@
 #include "worker/path/whole.h"
 
+#include "worker/path/connect.h"
 #include "worker/path/measure.h"
 
 #include <assert.h>
@@ -30,8 +31,7 @@ void product_scale(struct product *p, double s)
 
 static void to_xyz(const struct path_context *c, const struct whole_path *x, spectrum l, double xyz[3])
 {
-	if (c->w->effects.dispersion && whole_is_dispersed(c, x))
-		l = (spectrum){{SPECTRUM_LANES * l.v[0]}};
+	l = path_collapse(l, whole_is_dispersed(c, x));
 	if (x->wl.grey)
 		for (int i = 0; i < 3; i++)
 			xyz[i] = l.v[0] * c->w->grey_xyz[i];
