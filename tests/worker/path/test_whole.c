@@ -115,11 +115,31 @@ static void test_environment(void **state)
 	      3000);
 }
 
+/* A lens, and lights that no path hits beside one environment. */
+static void test_ends(void **state)
+{
+	(void)state;
+	static const char lens[] =
+		"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='.4'/>"
+		"<float name='focus_distance' value='3'/>" AT("<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>") "</sensor>";
+	static const char lights[] =
+		"<emitter type='point'><point name='position' x='1.5' y='2' z='1'/><float name='intensity' value='3'/></emitter>"
+		"<emitter type='spot'><float name='cutoff_angle' value='40'/>" AT("<lookat origin='-1,3,1' target='0,0,0' up='1,0,0'/>") "</emitter>"
+		"<emitter type='directional'><vector name='direction' x='.3' y='-1' z='-.2'/></emitter>";
+	static const char floor[] = "<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/>") "</shape>"
+				    "<shape type='rectangle'>" AT("<scale value='3'/><translate z='-2'/>") "</shape>";
+	check("lens and lamps, rough", world_of_text(32, 32, "%s%s%s%s", lens, lights, floor,
+						     BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>")
+						     "<emitter type='constant'><float name='radiance' value='.2'/></emitter>"), 3000);
+	check("lens and lamps, glass", world_of_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_surfaces),
 		cmocka_unit_test(test_environment),
+		cmocka_unit_test(test_ends),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
