@@ -354,7 +354,15 @@ static void print_row(const char *name, const struct tally *t)
 		      t->back_ends[4], t->back_ends[5], t->back_ends[6], (unsigned long long)t->seams, (unsigned long long)t->occluded);
 }
 
-static struct tally walk_in(const char *name, struct world *w, size_t paths)
+/* Not below what was measured when this was written by more than five standard errors and 0.3 %. A walk that goes on from a
+ * refused trial's residual loses 0.4 to 2 % of its arrivals, and up to 3 % of its ways back. */
+static void check_rate(size_t hits, size_t of, double expected)
+{
+	double n = (double)of;
+	assert_true((double)hits > n * (expected - 0.003) - 5 * sqrt(n * expected * (1 - expected)));
+}
+
+static struct tally walk_in(const char *name, struct world *w, double arrive, double come_back)
 {
 	static struct path_context c;
 	static struct whole_path x;
@@ -362,7 +370,7 @@ static struct tally walk_in(const char *name, struct world *w, size_t paths)
 	struct tally t = {0};
 	struct dice d = dice_of(name);
 	c = context_of(w, counters);
-	for (uint64_t i = 0; i < dice_count(paths); i++)
+	for (uint64_t i = 0; i < dice_count(20000); i++)
 		if (draw_path(&c, d.seed, i, &x))
 			walk_once(&c, &d, &x, &t);
 	print_row(name, &t);
@@ -371,7 +379,8 @@ static struct tally walk_in(const char *name, struct world *w, size_t paths)
 	assert_int_equal(t.occluded, 0);
 	assert_true(t.left <= t.stays / 1000 && t.worst_stay < 1e-9);
 	assert_true(t.elsewhere <= t.again / 200);
-	assert_true((double)t.returned > 0.9 * (double)t.arrived);
+	check_rate(t.arrived, t.walks, arrive);
+	check_rate(t.returned, t.arrived, come_back);
 	return t;
 }
 
@@ -394,48 +403,43 @@ static struct tally walk_in(const char *name, struct world *w, size_t paths)
 static void test_spheres(void **state)
 {
 	(void)state;
-	struct tally t = walk_in("spheres", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.7", "-.5", "0", METAL(".1"))
-							BALL(".8", "-.5", "0", METAL(".02")) FLOOR(METAL(".2"))), 20000);
-	assert_true((double)t.arrived > 0.5 * (double)t.walks);
+	walk_in("spheres", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.7", "-.5", "0", METAL(".1"))
+							BALL(".8", "-.5", "0", METAL(".02")) FLOOR(METAL(".2"))), 0.908, 0.999);
 }
 
 static void test_rough_glass(void **state)
 {
 	(void)state;
-	struct tally t = walk_in("rough glass", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", GLASS(".1"))
-							BALL(".9", "-.5", "0", GLASS(".01")) FLOOR("<bsdf type='diffuse'/>")), 20000);
-	assert_true((double)t.arrived > 0.5 * (double)t.walks);
+	walk_in("rough glass", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", GLASS(".1"))
+							BALL(".9", "-.5", "0", GLASS(".01")) FLOOR("<bsdf type='diffuse'/>")), 0.891, 0.996);
 }
 
 static void test_smooth_glass(void **state)
 {
 	(void)state;
-	struct tally t = walk_in("smooth glass", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP
+	walk_in("smooth glass", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP
 							BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
 							BALL(".9", "-.5", "0", "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")
-							FLOOR(METAL(".1"))), 20000);
-	assert_true((double)t.arrived > 0.5 * (double)t.walks);
+							FLOOR(METAL(".1"))), 0.907, 0.998);
 }
 
 static void test_sky(void **state)
 {
 	(void)state;
-	struct tally t = walk_in("sky", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") SKY BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
-						BALL(".9", "-.5", "0", METAL(".05")) FLOOR(METAL(".1"))), 20000);
-	assert_true((double)t.arrived > 0.5 * (double)t.walks);
+	walk_in("sky", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") SKY BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
+						BALL(".9", "-.5", "0", METAL(".05")) FLOOR(METAL(".1"))), 0.909, 0.993);
 }
 
 /* A pole of each sphere faces the camera, which sees little else. */
 static void test_poles(void **state)
 {
 	(void)state;
-	struct tally t = walk_in("poles", world_of_text(32, 32,
+	walk_in("poles", world_of_text(32, 32,
 						"<sensor type='perspective'><float name='fov' value='3'/><transform name='to_world'>"
 						"<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
 						"<integer name='width' value='32'/><integer name='height' value='32'/>"
 						"<rfilter type='box'/></film></sensor>" SKY BALL("0", "0", "0", GLASS(".05"))
-						BALL("0", "0", "-2", METAL(".05"))), 20000);
-	assert_true((double)t.arrived > 0.4 * (double)t.walks);
+						BALL("0", "0", "-2", METAL(".05"))), 0.839, 0.989);
 }
 
 /* Bumps with interpolated normals, n x n squares, over [-2,2]^2. */
@@ -466,12 +470,10 @@ static struct world *bumpy_world(int n, const char *bsdf)
 static void test_meshes(void **state)
 {
 	(void)state;
-	struct tally t = walk_in("coarse bumps", bumpy_world(12, METAL(".1")), 20000);
-	assert_true((double)t.arrived > 0.4 * (double)t.walks);
-	t = walk_in("fine bumps", bumpy_world(60, METAL(".1")), 20000);
-	assert_true((double)t.arrived > 0.4 * (double)t.walks && t.seams > t.arrived / 10);
-	t = walk_in("bumpy water", bumpy_world(40, "<bsdf type='dielectric'/>"), 20000);
-	assert_true((double)t.arrived > 0.4 * (double)t.walks);
+	walk_in("coarse bumps", bumpy_world(12, METAL(".1")), 0.772, 0.951);
+	struct tally t = walk_in("fine bumps", bumpy_world(60, METAL(".1")), 0.771, 0.952);
+	assert_true(t.seams > t.arrived / 10);
+	walk_in("bumpy water", bumpy_world(40, "<bsdf type='dielectric'/>"), 0.975, 0.993);
 }
 
 int main(void)
