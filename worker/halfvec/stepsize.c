@@ -1,78 +1,109 @@
 #include "worker/halfvec/stepsize.h"
 
-/* Deviation of the film step that all vertices share, of the smaller side of the film. */
-#define FILM_STEP 0.02
-/* Steps are not shorter than that part of what the lobe allows: a focus would make them vanish. */
-#define LEAST_STEP 1e-6
+#include <assert.h>
 
-/* What the lobe allows: the mean |h_x| of a Beckmann lobe. */
-static double lobe_limit(const struct path_vertex *v)
+/* Standard deviation on the film, of its smaller side. */
+#define FILM_STEP 0.02
+/* Least sigma over the limit: a pixel that sees less than this of a lobe leaves no room for a walk in double. */
+#define SIGMA_LEAST 1e-6
+/* Cosines and determinants below this are none: what is divided by them would overflow. */
+#define RATIO_LEAST 0x1p-500
+
+static double bsdf_limit(const struct path_vertex *v)
 {
+	assert(v->bsdf->alpha > 0);
 	return fmin(v->bsdf->alpha, 1) / sqrt(M_PI);
 }
 
-mat2 halfvec_footprint(const struct world *w, const struct whole_path *x)
+/* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale a pixel, meet the plane of the geometric normal. */
+static bool pixel_footprint(const struct camera *camera, const struct whole_path *x, mat2 *j)
 {
-	const struct camera *camera = &w->camera;
-	const struct path_vertex *v = &x->v[x->edges - 1];
-	vec3 d = vec3_neg(x->edge[x->edges - 1].w), du, dv;
-	double along = vec3_dot(camera->axes.n, d), ng = vec3_dot(v->x.ng, d);
-	double shift = along * sqrt(x->edge[x->edges - 1].distance2) / camera->scale;
-	/* A pixel moves the ray's point by `shift` across the axis, and along the ray back into the plane. */
-	vec3 px = vec3_scale(shift, vec3_madd(camera->axes.s, -vec3_dot(v->x.ng, camera->axes.s) / ng, d));
-	vec3 py = vec3_scale(shift, vec3_madd(camera->axes.t, -vec3_dot(v->x.ng, camera->axes.t) / ng, d));
-	surface_tangents(&v->x, &du, &dv);
-	return (mat2){vec3_dot(px, du), vec3_dot(py, du), vec3_dot(px, dv), vec3_dot(py, dv)};
-}
-
-/* Axes and singular values of e times `pixels`; false: not finite. */
-static bool axes_of(mat2 e, double pixels, struct halfvec_step *out)
-{
-	double s00 = e.xx * e.xx + e.xy * e.xy, s11 = e.yx * e.yx + e.yy * e.yy, s01 = e.xx * e.yx + e.xy * e.yy;
-	double half = 0.5 * (s00 + s11), root = 0.5 * hypot(s00 - s11, 2 * s01), det = mat2_det(e);
-	if (!isfinite(half) || !isfinite(root) || !(half > 0))
+	const struct whole_edge *e = &x->edge[x->edges - 1];
+	const struct surface_point *at = &x->v[x->edges - 1].x;
+	vec3 w = vec3_neg(e->w), du, dv, d[2];
+	double depth = sqrt(e->distance2) * vec3_dot(camera->axes.n, w), cosine = vec3_dot(at->ng, w);
+	if (!(depth > 0) || !(fabs(cosine) > RATIO_LEAST))
 		return false;
-	double theta = 0.5 * atan2(2 * s01, s00 - s11), c = cos(theta), s = sin(theta), large = half + root;
-	out->u = (mat2){c, -s, s, c};
-	out->sigma[0] = pixels * sqrt(large);
-	/* The smaller value from the determinant: the difference would cancel. */
-	out->sigma[1] = pixels * fabs(det) / sqrt(large);
-	return isfinite(out->sigma[0]) && isfinite(out->sigma[1]);
+	for (int i = 0; i < 2; i++) {
+		vec3 axis = i ? camera->axes.t : camera->axes.s;
+		d[i] = vec3_scale(depth / camera->scale, vec3_madd(axis, -vec3_dot(at->ng, axis) / cosine, w));
+	}
+	surface_tangents(at, &du, &dv);
+	*j = (mat2){vec3_dot(du, d[0]), vec3_dot(du, d[1]), vec3_dot(dv, d[0]), vec3_dot(dv, d[1])};
+	return true;
 }
 
-static void clip(struct halfvec_step *s, double limit)
+/* d^-1 j, both brought to entries of at most 1 first. */
+static bool solve(mat2 d, mat2 j, mat2 *e)
 {
-	for (int i = 0; i < 2; i++)
-		s->sigma[i] = fmin(fmax(s->sigma[i], LEAST_STEP * limit), limit);
+	double size_d = mat2_largest(d), size_j = mat2_largest(j);
+	if (!(size_d > 0) || !(size_j > 0) || !isfinite(size_d) || !isfinite(size_j))
+		return false;
+	d = mat2_scale(1 / size_d, d);
+	j = mat2_scale(1 / size_j, j);
+	double det = mat2_det(d);
+	if (!(fabs(det) > RATIO_LEAST))
+		return false;
+	double factor = size_j / size_d / det;
+	if (!isfinite(factor))
+		return false;
+	*e = mat2_scale(factor, mat2_mul(mat2_adjugate(d), j));
+	return true;
+}
+
+static double clip(double sigma, double limit)
+{
+	return fmin(fmax(sigma, SIGMA_LEAST * limit), limit);
+}
+
+struct halfvec_step halfvec_step_of(mat2 e, double scale, double limit)
+{
+	struct halfvec_step s = {{1, 0, 0, 1}, {limit, limit}};
+	double size = mat2_largest(e);
+	if (!isfinite(size) || !(size > 0) || !isfinite(size * scale))
+		return s;
+	e = (mat2){e.xx / size, e.xy / size, e.yx / size, e.yy / size};
+	/* e e^T = U diag(s^2) U^T; the smaller one from the determinant, which keeps its digits. */
+	double s00 = e.xx * e.xx + e.xy * e.xy, s11 = e.yx * e.yx + e.yy * e.yy, s01 = e.xx * e.yx + e.xy * e.yy;
+	double difference = s00 - s11, root = sqrt(difference * difference + 4 * s01 * s01);
+	double larger = sqrt(0.5 * (s00 + s11 + root)), smaller = fabs(mat2_det(e)) / larger;
+	double angle = 0.5 * atan2(2 * s01, difference), cosine = cos(angle), sine = sin(angle);
+	s.u = (mat2){cosine, -sine, sine, cosine};
+	s.sigma[0] = clip(size * scale * larger, limit);
+	s.sigma[1] = clip(size * scale * smaller, limit);
+	return s;
 }
 
 void halfvec_steps(const struct path_context *c, const struct whole_path *x, const struct constraint *k, unsigned b,
 		   unsigned c_end, struct halfvec_step *step)
 {
+	const struct camera *camera = &c->w->camera;
+	double sum = 0, pixels = FILM_STEP * fmin(camera->width, camera->height);
 	mat2 d[WHOLE_MAX_VERTICES], footprint = {0, 0, 0, 0};
-	double sum = 0;
-	bool film = b == x->edges && constraint_differentials(k, b, c_end, d) == CONSTRAINT_OK;
 	for (unsigned j = c_end + 1; j < b; j++)
-		sum += x->v[j].delta ? 0 : lobe_limit(&x->v[j]);
-	if (film)
-		footprint = halfvec_footprint(c->w, x);
-	double pixels = FILM_STEP * fmin(c->w->camera.width, c->w->camera.height);
+		if (!x->v[j].delta)
+			sum += bsdf_limit(&x->v[j]);
+	bool differentials = b == x->edges && pixel_footprint(camera, x, &footprint) &&
+			     constraint_differentials(k, b, c_end, d) == CONSTRAINT_OK;
 	for (unsigned j = c_end + 1; j < b; j++) {
 		if (x->v[j].delta)
 			continue;
-		double limit = lobe_limit(&x->v[j]), det = film ? mat2_det(d[j]) : 0;
+		double limit = bsdf_limit(&x->v[j]);
+		mat2 e;
 		step[j] = (struct halfvec_step){{1, 0, 0, 1}, {limit, limit}};
-		struct halfvec_step by_film;
 		/* Each vertex takes its share of the pixels. */
-		if (det != 0 && axes_of(mat2_mul(mat2_scale(1 / det, mat2_adjugate(d[j])), footprint), pixels * limit / sum, &by_film)) {
-			clip(&by_film, limit);
-			step[j] = by_film;
-		}
+		if (differentials && solve(d[j], footprint, &e))
+			step[j] = halfvec_step_of(e, pixels * limit / sum, limit);
 	}
+}
+
+vec2 halfvec_step_take(const struct halfvec_step *s, double g0, double g1)
+{
+	return mat2_apply(s->u, (vec2){s->sigma[0] * g0, s->sigma[1] * g1});
 }
 
 double halfvec_step_log_pdf(const struct halfvec_step *s, vec2 dh)
 {
-	double a = (s->u.xx * dh.x + s->u.yx * dh.y) / s->sigma[0], b = (s->u.xy * dh.x + s->u.yy * dh.y) / s->sigma[1];
-	return -0.5 * (a * a + b * b) - log(2 * M_PI * s->sigma[0] * s->sigma[1]);
+	double x = (s->u.xx * dh.x + s->u.yx * dh.y) / s->sigma[0], y = (s->u.xy * dh.x + s->u.yy * dh.y) / s->sigma[1];
+	return -0.5 * (x * x + y * y) - log(2 * M_PI * s->sigma[0] * s->sigma[1]);
 }

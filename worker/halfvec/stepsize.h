@@ -1,8 +1,13 @@
 /*
- * Step sizes in half vector space by ray differentials (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3.3; Kaplanyan, Hanika,
- * Dachsbacher 2014, sec. 6): a half vector moves as far as takes the path across some pixels, but not farther than its lobe is
- * wide. Steps are Gaussian along the axes of the footprint: h' = h + u diag(sigma) g, g standard normal.
- * Pure; one thread a call; nothing allocates.
+ * Step sizes in half vector space (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3.3 and 7): how far a proposal moves the half
+ * vectors of the vertices between x_b and x_c. h' = h + U diag(sigma) g with two standard normals g; U and sigma are functions
+ * of the path, so the way back has those of the proposed path.
+ *
+ * Where the sub-path begins at the camera (b = k) ray differentials say what change of h_j moves the image by a pixel:
+ * E_j = D_j^-1 J, with J = d x_{k-1} / d pixel in the geometric tangent plane at a fixed x_k and D_j = d x_{k-1} / d h_j. From
+ * E_j = U diag(s) V^T, sigma is s times the vertex's share of the given number of pixels (shares as the roughnesses), at most
+ * alpha / sqrt(pi), the mean |slope| of a Beckmann lobe. Otherwise, and where E_j is not to be had, U = 1 and that limit.
+ * Pure; any thread; nothing allocates.
  */
 #ifndef WORKER_HALFVEC_STEPSIZE_H
 #define WORKER_HALFVEC_STEPSIZE_H
@@ -11,19 +16,20 @@
 
 struct halfvec_step {
 	mat2 u;          /* a rotation */
-	double sigma[2]; /* deviations along its columns, in slopes; above 0 and finite */
+	double sigma[2]; /* finite and above 0 */
 };
 
-/* The film offset per pixel as offsets of x_{k-1} in its tangent plane (du, dv): columns x, y of the film. Not finite where
- * the plane is seen edge on. */
-mat2 halfvec_footprint(const struct world *w, const struct whole_path *x);
-
-/* Steps of the vertices c_end+1 .. b-1 that are not exactly specular, from their constraints. Where x_k is not x_b the traced
- * part moves on the film already, and lobes alone set the steps. */
+/* Of those vertices among c_end+1..b-1 that are not specular (the others are not written), from their constraints. On the
+ * image all vertices together move by at most 2 % of the film's smaller side. */
 void halfvec_steps(const struct path_context *c, const struct whole_path *x, const struct constraint *k, unsigned b,
 		   unsigned c_end, struct halfvec_step *step);
 
-/* log density of a step per area of slopes. */
+/* The step for E = e (any entries that are numbers), `scale` pixels and at most `limit` (> 0). */
+struct halfvec_step halfvec_step_of(mat2 e, double scale, double limit);
+
+/* h' - h */
+vec2 halfvec_step_take(const struct halfvec_step *s, double g0, double g1);
+/* log density of that, per area of h; -INFINITY for what lies out of all reach. */
 double halfvec_step_log_pdf(const struct halfvec_step *s, vec2 dh);
 
 #endif

@@ -6,6 +6,7 @@
 #include "tests/worker/halfvec/dense.h"
 #include "tests/worker/halfvec/quad.h"
 
+#include <fenv.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -256,17 +257,41 @@ static void test_singular(void **state)
 		k[c + 1].b.xx *= 1 + 1e-6;
 		assert_int_equal(constraint_factor(k, b, c, &system_), CONSTRAINT_OK);
 	}
-	/* What cannot be computed with is refused before it is. */
-	const double bad[] = {INFINITY, -INFINITY, 1e300, 0};
-	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
-		for (unsigned inside = 1; inside < 5; inside++) {
-			random_system(&d, inside + 1, 0, 1);
-			k[1].b = (mat2){bad[i], bad[i], bad[i], bad[i]};
-			if (bad[i] == 0 && inside > 1)
-				k[1].c = k[1].b;
-			assert_int_equal(constraint_factor(k, inside + 1, 0, &system_), CONSTRAINT_SINGULAR);
-			assert_int_equal(constraint_differentials(k, inside + 1, 0, dj), CONSTRAINT_SINGULAR);
+}
+
+/* Entries of any size, some equal: nothing invalid is computed, and what is accepted is finite. */
+static void test_extremes(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("extreme systems");
+	const double values[] = {0, 1e-310, 1e-200, 1e-69, 1e-20, 1, 1, 1, 1e20, 1e69, 1e200, INFINITY};
+	vec2 dh[WHOLE_MAX_VERTICES], dx[WHOLE_MAX_VERTICES];
+	mat2 dj[WHOLE_MAX_VERTICES];
+	size_t refused = 0, count = dice_count(20000);
+	for (size_t s = 0; s < count; s++) {
+		unsigned inside = 1 + dice_below(&d, 6), b = inside + 1, few = s % 2 ? 12 : 9;
+		for (unsigned j = 1; j < b; j++) {
+			double *entry = &k[j].a.xx;
+			for (int q = 0; q < 12; q++)
+				entry[q] = values[dice_below(&d, few)] * (s % 3 ? dice_between(&d, 0.1, 1) : 1);
+			dh[j] = (vec2){1, -0.5};
 		}
+		feclearexcept(FE_INVALID);
+		bool ok = constraint_factor(k, b, 0, &system_) == CONSTRAINT_OK;
+		refused += !ok;
+		if (ok) {
+			constraint_solve(k, &system_, dh, dx);
+			assert_true(isfinite(system_.log_det) && !isnan(system_.log_transfer));
+			for (unsigned j = 1; j < b; j++)
+				assert_true(isfinite(dx[j].x) && isfinite(dx[j].y));
+		}
+		if (constraint_differentials(k, b, 0, dj) == CONSTRAINT_OK)
+			for (unsigned j = 1; j < b; j++)
+				assert_true(isfinite(mat2_largest(dj[j])));
+		assert_false(fetestexcept(FE_INVALID));
+	}
+	print_message("%zu of %zu refused\n", refused, count);
+	assert_true(refused > count / 10 && refused < count);
 }
 
 /* The decisions and the results do not depend on the units: powers of two change no digit. */
@@ -395,6 +420,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_dense),
 		cmocka_unit_test(test_singular),
+		cmocka_unit_test(test_extremes),
 		cmocka_unit_test(test_units),
 		cmocka_unit_test(test_solved_again),
 	};
