@@ -109,8 +109,7 @@ static void aim(struct mutation_ctx *m, const struct breakup *how, const struct 
 		double r[4], g[2];
 		mutation_random(m, BLOCK_VERTEX + j, r);
 		mutation_normals(r, g);
-		const struct halfvec_step *step = &s->step[X_TO_Y][j];
-		s->dh[j] = mat2_apply(step->u, (vec2){step->sigma[0] * g[0], step->sigma[1] * g[1]});
+		s->dh[j] = halfvec_step_take(&s->step[X_TO_Y][j], g[0], g[1]);
 		t->h = vec2_add(t->h, s->dh[j]);
 	}
 }
