@@ -12,7 +12,7 @@ enum { LOWER = 3, UPPER = 3, WIDTH = LOWER + UPPER + 1 };
 
 /* Rows and columns scaled to entries of at most 1, the inverse of a block that others are eliminated with is at most this:
  * what it is multiplied with grows by no more. */
-#define BLOCK_MOST 30.0
+#define BLOCK_MOST 10.0
 /* The last block is only solved with: this much before the matrix is looked at as a whole. */
 #define LAST_MOST 1e10
 /* Products of three of these, sums of them and determinants stay finite. */

@@ -80,8 +80,10 @@ struct quad_vertex {
 	enum quad_kind kind;
 	qvec p;
 	bool smooth;
-	qvec e1, e2, normal[3], along; /* triangle; along: dp/du */
+	qvec e1, e2, normal[3]; /* triangle */
 	quad b1, b2;
+	quad of_e1, of_e2; /* dp/du = of_e1 e1 + of_e2 e2, or carried by the normal */
+	bool carried;
 	qvec center, axis; /* sphere */
 	quad radius, sign;
 	qvec du, dv; /* of points and directions */
@@ -92,11 +94,21 @@ struct quad_place {
 	qvec p, s, t, n;
 };
 
+/* dp/du of a triangle. Without uv: (3, -6, 2) / 7 carried along by the shortest rotation from (2, 3, 6) / 7 to the normal. */
+static inline qvec quad_along(const struct quad_vertex *v)
+{
+	qvec from = {(quad)2 / 7, (quad)3 / 7, (quad)6 / 7}, axis = {(quad)3 / 7, (quad)-6 / 7, (quad)2 / 7};
+	qvec ng = q_unit(q_cross(v->e1, v->e2));
+	if (v->carried)
+		return q_madd(axis, -q_dot(axis, ng) / (1 + q_dot(from, ng)), q_madd(from, 1, ng));
+	return q_madd(q_scale(v->of_e1, v->e1), v->of_e2, v->e2);
+}
+
 static inline void quad_tangents(const struct quad_vertex *v, qvec *du, qvec *dv)
 {
 	if (v->kind == QUAD_TRIANGLE) {
 		qvec ng = q_unit(q_cross(v->e1, v->e2));
-		*du = q_across(v->along, ng);
+		*du = q_across(quad_along(v), ng);
 		*dv = q_cross(ng, *du);
 	} else if (v->kind == QUAD_SPHERE) {
 		qvec w = q_unit(q_sub(v->p, v->center));
@@ -111,12 +123,13 @@ static inline void quad_tangents(const struct quad_vertex *v, qvec *du, qvec *dv
 static inline struct quad_place quad_at(const struct quad_vertex *v, quad a, quad b)
 {
 	struct quad_place r = {.p = v->p};
-	qvec du, dv, along = v->along;
+	qvec du, dv, along = {0, 0, 0};
 	quad_tangents(v, &du, &dv);
 	r.p = q_madd(q_madd(v->p, a, du), b, dv);
 	if (v->kind == QUAD_DIRECTION)
 		r.p = q_unit(r.p);
 	if (v->kind == QUAD_TRIANGLE) {
+		along = quad_along(v);
 		/* move = c1 e1 + c2 e2 */
 		qvec move = q_sub(r.p, v->p), area = q_cross(v->e1, v->e2);
 		quad inverse = 1 / q_dot(area, area);
@@ -202,16 +215,14 @@ static inline struct quad_vertex quad_of_surface(const struct hand *h, unsigned 
 	v.smooth = s->normal != NULL;
 	for (int m = 0; m < 3 && v.smooth; m++)
 		v.normal[m] = q_of_float(s->normal[m]);
-	/* Without uv: (3, -6, 2) / 7 carried along by the shortest rotation from (2, 3, 6) / 7 to the normal. */
-	qvec from = {(quad)2 / 7, (quad)3 / 7, (quad)6 / 7}, axis = {(quad)3 / 7, (quad)-6 / 7, (quad)2 / 7};
-	qvec ng = q_unit(q_cross(v.e1, v.e2));
-	v.along = q_madd(axis, -q_dot(axis, ng) / (1 + q_dot(from, ng)), q_madd(from, 1, ng));
+	v.carried = true;
 	if (s->uv) {
 		quad u1 = (quad)s->uv[1][0] - (quad)s->uv[0][0], v1 = (quad)s->uv[1][1] - (quad)s->uv[0][1];
 		quad u2 = (quad)s->uv[2][0] - (quad)s->uv[0][0], v2 = (quad)s->uv[2][1] - (quad)s->uv[0][1];
 		quad det = u1 * v2 - v1 * u2;
-		if (det != 0)
-			v.along = q_scale(1 / det, q_sub(q_scale(v2, v.e1), q_scale(v1, v.e2)));
+		v.carried = det == 0;
+		v.of_e1 = v.carried ? 0 : v2 / det;
+		v.of_e2 = v.carried ? 0 : -v1 / det;
 	}
 	return v;
 }
@@ -262,7 +273,7 @@ static inline struct quad_problem quad_problem_shaken(const struct quad_problem 
 	struct quad_problem r = *q;
 	for (int k = 0; k < 3; k++) {
 		struct quad_vertex *v = &r.v[k];
-		qvec *vectors[] = {&v->p, &v->e1, &v->e2, &v->normal[0], &v->normal[1], &v->normal[2], &v->along, &v->center, &v->axis};
+		qvec *vectors[] = {&v->p, &v->e1, &v->e2, &v->normal[0], &v->normal[1], &v->normal[2], &v->center, &v->axis};
 		for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
 			*vectors[i] = q_shaken(*vectors[i], d);
 		v->b1 = quad_shaken(v->b1, d);

@@ -116,7 +116,7 @@ static void make_system(const struct kind *kind, struct dice *d, unsigned b, uns
 		random_system(d, b, c, 10);
 		break;
 	case WEAK_CENTRE:
-		random_system(d, b, c, 1e-4);
+		random_system(d, b, c, 1e-3);
 		break;
 	case FIRST_SINGULAR:
 		first_block_singular(d, b, c);
@@ -234,8 +234,8 @@ static void test_dense(void **state)
 		print_message("%s: %.2g of the bound, %zu of %zu with pivots\n", kinds[i].name, w.ratio, pivoted, count);
 		if (kinds[i].make == FIRST_SINGULAR || kinds[i].make == FOCUS || kinds[i].make == SCALED_FOCUS)
 			assert_int_equal(pivoted, count);
-		else if (kinds[i].make == RANDOM)
-			assert_true(pivoted < count / 2 + 1);
+		else if (kinds[i].make == RANDOM && kinds[i].most <= 6)
+			assert_true(pivoted < count / 3 + 1);
 	}
 	assert_true(good);
 }
@@ -254,7 +254,9 @@ static void test_singular(void **state)
 		assert_int_equal(constraint_factor(k, b, c, &system_), CONSTRAINT_SINGULAR);
 		assert_int_equal(constraint_differentials(k, b, c, dj), CONSTRAINT_SINGULAR);
 		/* A little off it is not. */
-		k[c + 1].b.xx *= 1 + 1e-6;
+		for (unsigned j = c + 1; j < b; j++)
+			k[j].b = (mat2){k[j].b.xx * (1 + 1e-6 * dice_throw(&d)), k[j].b.xy * (1 - 1e-6 * dice_throw(&d)), k[j].b.yx,
+					k[j].b.yy * (1 - 1e-6 * dice_throw(&d))};
 		assert_int_equal(constraint_factor(k, b, c, &system_), CONSTRAINT_OK);
 	}
 }
