@@ -97,7 +97,7 @@ void bench_die(const struct error *e)
 static const struct {
 	const char *name;
 	void (*run)(const char *bin);
-} benches[] = {{"rays", bench_rays}, {"tiles", bench_tiles}, {"parts", bench_parts}, {"farm", bench_farm}, {"memory", bench_memory}};
+} benches[] = {{"rays", bench_rays}, {"hslt", bench_hslt}, {"tiles", bench_tiles}, {"parts", bench_parts}, {"farm", bench_farm}, {"memory", bench_memory}};
 
 static bool chosen(const char *name, char **names, int count)
 {

@@ -52,3 +52,22 @@ bool __wrap_accel_occluded_to_infinity(const struct accel *a, const struct ray_e
 		keep((struct recorded_ray){.kind = RAY_INFINITE, .from = *from, .d = d});
 	return __real_accel_occluded_to_infinity(a, from, d);
 }
+
+struct recorded_walks record_walks;
+
+enum walk_end __real_halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+				  const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				  struct walk_scratch *s);
+enum walk_end __wrap_halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+				  const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				  struct walk_scratch *s);
+
+enum walk_end __wrap_halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+				  const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				  struct walk_scratch *s)
+{
+	enum walk_end end = __real_halfvec_walk(c, y, b, c_end, target, visible, limits, s);
+	/* Only a walk back knows that the path which it looks for can be seen. */
+	(visible ? record_walks.back : record_walks.there)[end]++;
+	return end;
+}

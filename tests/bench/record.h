@@ -1,11 +1,13 @@
 /*
- * The rays that the renderer sends through the door (worker/geom/accel.h), kept to be sent again. The bench is linked with
- * --wrap for the door's functions, so that the renderer itself knows nothing of it. One thread.
+ * The rays that the renderer sends through the door (worker/geom/accel.h), kept to be sent again, and how its walks in half
+ * vector space end. The bench is linked with --wrap for these functions, so that the renderer itself knows nothing of it.
+ * One thread.
  */
 #ifndef TESTS_BENCH_RECORD_H
 #define TESTS_BENCH_RECORD_H
 
 #include "worker/geom/accel.h"
+#include "worker/halfvec/walk.h"
 
 enum ray_kind { RAY_CLOSEST, RAY_SEGMENT, RAY_INFINITE };
 
@@ -18,5 +20,11 @@ struct recorded_ray {
 
 void record_start(struct recorded_ray *rays, size_t room);
 size_t record_stop(void); /* how many came; those beyond the room are not kept */
+
+enum { WALK_ENDS = WALK_ITERATIONS + 1 };
+struct recorded_walks { /* since the program began, by enum walk_end */
+	uint64_t there[WALK_ENDS], back[WALK_ENDS];
+};
+extern struct recorded_walks record_walks;
 
 #endif

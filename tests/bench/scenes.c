@@ -86,12 +86,13 @@ static const char million_xml[] =
 	"<shape type='obj'><string name='filename' value='ball.obj'/><bsdf type='roughconductor'><string name='material' value='Au'/>"
 	"<string name='distribution' value='ggx'/><float name='alpha' value='0.2'/></bsdf></shape>" LAMP("-1") LAMP("1") "</scene>";
 
-static struct world *build(const struct asset_source *assets, const char *file, const struct render_options *o)
+static struct world *build_with(const struct asset_source *assets, const char *file, const struct render_options *o,
+				const struct scene_define *defines, uint32_t define_count)
 {
 	struct error e;
 	struct scene s;
 	struct world *w = NULL;
-	int rc = scene_read(&s, assets, file, render_plugins(), NULL, 0, &e);
+	int rc = scene_read(&s, assets, file, render_plugins(), defines, define_count, &e);
 	if (!rc) {
 		rc = world_new(&w, &s, assets, o, &e);
 		scene_fini(&s);
@@ -99,6 +100,11 @@ static struct world *build(const struct asset_source *assets, const char *file, 
 	if (rc)
 		bench_die(&e);
 	return w;
+}
+
+static struct world *build(const struct asset_source *assets, const char *file, const struct render_options *o)
+{
+	return build_with(assets, file, o, NULL, 0);
 }
 
 struct world *bench_world_million(void)
@@ -162,4 +168,24 @@ struct world *bench_world_box(const char **name)
 	struct asset_source assets = asset_folder(folder);
 	struct render_options small = {160, 160};
 	return build(&assets, slash + 1, &small);
+}
+
+struct world *bench_world_public(const char *file)
+{
+	const char *folder = getenv("HSLT_SCENES");
+	char path[4096];
+	if (!folder)
+		return NULL;
+	snprintf(path, sizeof path, "%s/%s", folder, file);
+	if (access(path, R_OK))
+		return NULL;
+	struct asset_source assets = asset_folder(folder);
+	return build(&assets, file, NULL);
+}
+
+struct world *bench_world_displaced(void)
+{
+	static const struct scene_define levels[] = {{"ground", "9"}, {"ball", "8"}};
+	struct asset_source assets = asset_folder("tests/scenes/displaced");
+	return build_with(&assets, "scene.xml", NULL, levels, 2);
 }

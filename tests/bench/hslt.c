@@ -1,0 +1,166 @@
+/*
+ * What HSLT's mutations cost: how many are made in the CPU time in which Embree alone casts a million rays, rays, acceptance,
+ * walks that fail; the share of time inside Embree; the breakup against its two parts unbroken.
+ */
+#include "tests/bench/bench.h"
+#include "tests/bench/scenes.h"
+#include "tests/bench/subject.h"
+#include "worker/world/world.h"
+
+#include <stdio.h>
+
+/* What the reference renderer of the method does with these scenes, by the same measure. */
+struct reference {
+	const char *file;
+	double mutations, rays, failed; /* failed: % of walks */
+};
+static const struct reference references[] = {
+	{"three-spheres.xml", 25300, 5.2, 15.6},
+	{"half-sunk.xml", 19600, 6.3, 7.6},
+	{"half-sunk-rough.xml", 13700, 9.6, 19.3},
+};
+
+/* Proposals of half vectors but for so few that chains would not be chains without. */
+#define ALONE "hslt=1,independent=0.000001"
+#define BROKEN_UP "hslt=0.95,independent=0.05"
+#define UNBROKEN "halfvec=0.475,multichain=0.475,independent=0.05"
+
+struct figures {
+	double seconds, mutations, rays, accepted;
+	double there, failed, stuck, back, not_back; /* walks; stuck: those that failed because they did not converge */
+};
+
+static double sum(const uint64_t *n, unsigned first, unsigned last)
+{
+	double s = 0;
+	for (unsigned i = first; i <= last; i++)
+		s += (double)n[i];
+	return s;
+}
+
+static struct figures run(const struct subject *s)
+{
+	struct batch b;
+	record_walks = (struct recorded_walks){{0}, {0}};
+	double begin = bench_cpu_seconds();
+	subject_run(s, &b);
+	const uint64_t *there = record_walks.there, *back = record_walks.back;
+	struct figures f = {.seconds = bench_cpu_seconds() - begin,
+			    .mutations = (double)b.counters[COUNT_SAMPLES],
+			    .rays = (double)(b.counters[COUNT_RAYS_CLOSEST] + b.counters[COUNT_RAYS_SHADOW]),
+			    .accepted = (double)b.counters[COUNT_ACCEPTED],
+			    .there = sum(there, WALK_OK, WALK_ITERATIONS),
+			    .failed = sum(there, WALK_OK + 1, WALK_ITERATIONS),
+			    .stuck = sum(there, WALK_SINGULAR, WALK_ITERATIONS),
+			    .back = sum(back, WALK_OK, WALK_ITERATIONS),
+			    .not_back = sum(back, WALK_OK + 1, WALK_ITERATIONS)};
+	batch_fini(&b);
+	return f;
+}
+
+static void measure_rate(struct world *w, const struct reference *r)
+{
+	struct subject mixture, alone;
+	struct series rate = {0}, pure = {0}, embree = {0}, rays = {0}, accepted = {0}, failed = {0}, stuck = {0}, back = {0},
+		      micro = {0};
+	subject_make(&mixture, w, "hslt", NULL);
+	subject_make(&alone, w, "hslt", ALONE);
+	for (unsigned i = 0; i < BENCH_REPEATS; i++) {
+		subject_reseed(&mixture, i);
+		subject_reseed(&alone, i);
+		double million = subject_million_rays();
+		struct figures f = run(&mixture), p = run(&alone);
+		series_add(&embree, 1 / million);
+		series_add(&rate, f.mutations / f.seconds * million);
+		series_add(&pure, p.mutations / p.seconds * million);
+		series_add(&micro, 1e6 * f.seconds / f.mutations);
+		series_add(&rays, f.rays / f.mutations);
+		series_add(&accepted, 100 * f.accepted / f.mutations);
+		series_add(&failed, 100 * f.failed / f.there);
+		series_add(&stuck, 100 * f.stuck / f.there);
+		series_add(&back, 100 * f.not_back / f.back);
+	}
+	printf("  %s\n  reference renderer: %.0f mutations in the time of a million rays, %.1f rays each, %.1f %% of walks fail\n",
+	       mixture.plan.mutations, r->mutations, r->rays, r->failed);
+	bench_row("Embree alone", &embree, "million rays/s", BENCH_INFORMS, 0);
+	bench_row("mutations in the time of a million rays", &rate, "", BENCH_AT_LEAST, 2 * r->mutations);
+	bench_row("of hslt alone", &pure, "", BENCH_INFORMS, 0);
+	bench_row("a mutation", &micro, "us", BENCH_INFORMS, 0);
+	bench_row("rays", &rays, "/mutation", BENCH_INFORMS, 0);
+	bench_row("accepted", &accepted, "%", BENCH_INFORMS, 0);
+	bench_row("walks that fail", &failed, "%", BENCH_AT_MOST, r->failed);
+	bench_row("of all walks, because they do not converge", &stuck, "%", BENCH_INFORMS, 0);
+	bench_row("walks back that fail", &back, "%", BENCH_INFORMS, 0);
+	subject_release(&mixture);
+	subject_release(&alone);
+}
+
+/* Share of the time that the same rays take Embree alone, and the rest by mutation. */
+static void measure_share(struct world *w, double least_share)
+{
+	struct subject s;
+	struct series share = {0}, outside = {0}, rays = {0};
+	subject_make(&s, w, "hslt", NULL);
+	subject_record(&s);
+	for (unsigned i = 0; i < BENCH_REPEATS; i++) {
+		struct figures f = run(&s);
+		double alone = subject_replay_raw(&s) * f.rays / (double)s.count;
+		series_add(&share, alone / f.seconds);
+		series_add(&outside, 1e6 * (f.seconds - alone) / f.mutations);
+		series_add(&rays, f.rays / f.mutations);
+	}
+	bench_row("share of the time inside Embree", &share, "", least_share > 0 ? BENCH_AT_LEAST : BENCH_INFORMS, least_share);
+	bench_row("outside Embree", &outside, "us/mutation", BENCH_INFORMS, 0);
+	if (least_share > 0)
+		bench_row("rays", &rays, "/mutation", BENCH_INFORMS, 0);
+	subject_release(&s);
+}
+
+static void measure_breakup(struct world *w)
+{
+	struct subject broken, unbroken;
+	struct series rays = {0}, unbroken_rays = {0}, fewer = {0}, faster = {0};
+	subject_make(&broken, w, "hslt", BROKEN_UP);
+	subject_make(&unbroken, w, "hslt", UNBROKEN);
+	for (unsigned i = 0; i < BENCH_REPEATS; i++) {
+		subject_reseed(&broken, i);
+		subject_reseed(&unbroken, i);
+		struct figures b = run(&broken), u = run(&unbroken);
+		series_add(&rays, b.rays / b.mutations);
+		series_add(&unbroken_rays, u.rays / u.mutations);
+		series_add(&fewer, 100 * (1 - b.rays / b.mutations / (u.rays / u.mutations)));
+		series_add(&faster, b.mutations / b.seconds / (u.mutations / u.seconds));
+	}
+	bench_row("rays, breakup", &rays, "/mutation", BENCH_INFORMS, 0);
+	bench_row("rays, half of them halfvec, half multichain", &unbroken_rays, "/mutation", BENCH_INFORMS, 0);
+	bench_row("fewer rays by breaking up", &fewer, "%", BENCH_AT_LEAST, 40);
+	bench_row("more mutations in the same time", &faster, "x", BENCH_INFORMS, 0);
+	subject_release(&broken);
+	subject_release(&unbroken);
+}
+
+void bench_hslt(const char *bin)
+{
+	(void)bin;
+	for (size_t i = 0; i < sizeof references / sizeof *references; i++) {
+		bench_group("hslt", references[i].file);
+		struct world *w = bench_world_public(references[i].file);
+		if (!w) {
+			bench_skip("HSLT_SCENES does not name a folder with this scene");
+			continue;
+		}
+		measure_rate(w, &references[i]);
+		measure_share(w, 0);
+		measure_breakup(w);
+		world_free(w);
+	}
+	struct render_summary summary;
+	struct world *w = bench_world_displaced();
+	world_summary(w, &summary);
+	char says[96];
+	snprintf(says, sizeof says, "tests/scenes/displaced, %.2f million triangles", 1e-6 * (double)summary.triangles);
+	bench_group("hslt", says);
+	measure_share(w, 0.5);
+	measure_breakup(w);
+	world_free(w);
+}
