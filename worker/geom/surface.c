@@ -244,7 +244,7 @@ static bool reproject_sphere(const struct geom_shape *s, struct prim_ref prim, b
 		double near = fmin(k, other), far = fmax(k, other);
 		root = near > 0 && fabs(near - t_near) <= fabs(far - t_near) ? near : far;
 	}
-	if (!(root > 0))
+	if (!(root > 0) || !isfinite(root))
 		return false;
 	surface_on_sphere(s, prim, vec3_normalize(vec3_madd(oc, root, d)), x);
 	return true;

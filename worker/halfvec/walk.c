@@ -100,9 +100,9 @@ static double residuals(struct walk *m, bool *within)
 		double tolerance = m->scale * m->target[j].tolerance, r2 = vec2_dot(r, r);
 		m->s->residual[j] = r;
 		*within = *within && r2 <= tolerance * tolerance;
-		error = fmax(error, r2 / (1 + vec2_dot(h, h)));
 		if (!isfinite(r2))
 			return INFINITY;
+		error = fmax(error, r2 / (1 + vec2_dot(h, h)));
 	}
 	return error;
 }
@@ -117,11 +117,11 @@ static enum walk_end keep(struct walk *m)
 	for (unsigned j = m->end + 1; j < m->b; j++) {
 		s->kept[j].x = m->y->v[j].x;
 		s->kept[j].emitter = m->y->v[j].emitter;
+		if (!isfinite(s->dx[j].x) || !isfinite(s->dx[j].y))
+			return WALK_SINGULAR;
 		vec3 du, dv;
 		surface_tangents(&s->kept[j].x, &du, &dv);
 		m->move[j] = vec3_madd(vec3_scale(s->dx[j].x, du), s->dx[j].y, dv);
-		if (!vec3_is_finite(m->move[j]))
-			return WALK_SINGULAR;
 	}
 	return WALK_OK;
 }

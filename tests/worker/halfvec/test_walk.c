@@ -11,6 +11,7 @@
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 #include "worker/halfvec/walk.h"
+#include "worker/math/fptrap.h"
 #include "worker/render/render.h"
 
 #include <setjmp.h>
@@ -370,9 +371,11 @@ static struct tally walk_in(const char *name, struct world *w, double arrive, do
 	struct tally t = {0};
 	struct dice d = dice_of(name);
 	c = context_of(w, counters);
+	bool watched = fptrap_watch();
 	for (uint64_t i = 0; i < dice_count(20000); i++)
 		if (draw_path(&c, d.seed, i, &x))
 			walk_once(&c, &d, &x, &t);
+	fptrap_unwatch(watched);
 	print_row(name, &t);
 	world_free(w);
 	assert_true(t.worst <= 1.01);
