@@ -433,6 +433,20 @@ static void test_sky(void **state)
 						BALL(".9", "-.5", "0", METAL(".05")) FLOOR(METAL(".1"))), 0.909, 0.993);
 }
 
+/* Half vectors of smooth glass of nearly the index around it carry the rounding of directions a million times. */
+static void test_nearly_matched(void **state)
+{
+	(void)state;
+	walk_in("nearly matched", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP
+						BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'><float name='int_ior' value='1.000001'/>"
+									 "<float name='ext_ior' value='1'/></bsdf>")
+						BALL(".9", "-.5", "0", "<bsdf type='dielectric'><float name='int_ior' value='1.0001'/>"
+									"<float name='ext_ior' value='1'/></bsdf>")
+						BALL("0", "-.5", "-1", "<bsdf type='dielectric'><float name='int_ior' value='1.00000001'/>"
+									"<float name='ext_ior' value='1'/></bsdf>")
+						FLOOR(METAL(".1"))), 0.65, 0.983);
+}
+
 /* A pole of each sphere faces the camera, which sees little else. */
 static void test_poles(void **state)
 {
@@ -484,6 +498,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_spheres),	     cmocka_unit_test(test_rough_glass), cmocka_unit_test(test_smooth_glass),
 		cmocka_unit_test(test_sky),	     cmocka_unit_test(test_poles),	 cmocka_unit_test(test_meshes),
+		cmocka_unit_test(test_nearly_matched),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
