@@ -28,12 +28,13 @@ static inline struct frame frame_around(vec3 n)
 			      n};
 }
 
-/* The shading frame of hslt constraints: s is du made orthogonal to n (falls back where du is parallel to n). */
+/* The shading frame of hslt constraints: s is du made orthogonal to n (falls back where du is parallel to n, and where its
+ * square has no digits: within 1e-150 of a sphere's pole). */
 static inline struct frame frame_along(vec3 n, vec3 du)
 {
 	vec3 s = vec3_madd(du, -vec3_dot(n, du), n);
 	double l = vec3_length(s);
-	if (!(l > 1e-12 * vec3_length(du)) || !isfinite(l))
+	if (!(l > 1e-12 * vec3_length(du)) || !(l > 0x1p-500) || !isfinite(l))
 		return frame_around(n);
 	s = vec3_scale(1.0 / l, s);
 	return (struct frame){s, vec3_cross(n, s), n};
