@@ -1,0 +1,186 @@
+/*
+ * How points of a surface change as they move, against points a little further on: central differences of 1e-5 lengths,
+ * extrapolated once, leave less than 1e-7 of what is small beside nothing nearby.
+ */
+#include "tests/support/bodies.h"
+
+#include <fenv.h>
+#include <float.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static float position[3][3], normal[3][3], uv[3][2];
+static uint32_t index_[1][3] = {{0, 1, 2}};
+
+static struct geom_shape triangle(struct dice *d, bool smooth, bool with_uv)
+{
+	for (int m = 0; m < 3; m++)
+		for (int i = 0; i < 3; i++) {
+			position[m][i] = (float)dice_between(d, -1, 1);
+			normal[m][i] = (float)(dice_between(d, -0.5, 0.5));
+			if (i < 2)
+				uv[m][i] = (float)dice_throw(d);
+		}
+	vec3 v[3];
+	for (int m = 0; m < 3; m++)
+		v[m] = (vec3){(double)position[m][0], (double)position[m][1], (double)position[m][2]};
+	vec3 ng = vec3_normalize(vec3_cross(vec3_sub(v[1], v[0]), vec3_sub(v[2], v[0])));
+	for (int m = 0; m < 3; m++) {
+		normal[m][0] += (float)ng.x;
+		normal[m][1] += (float)ng.y;
+		normal[m][2] += (float)ng.z;
+	}
+	return (struct geom_shape){.vertex_count = 3, .triangle_count = 1, .position = position, .index = index_,
+				   .normal = smooth ? normal : NULL, .uv = with_uv ? uv : NULL};
+}
+
+static struct geom_shape sphere(struct dice *d)
+{
+	struct geom_shape s = {.is_sphere = true, .center = dice_direction(d), .radius = dice_between(d, 0.1, 2),
+			       .normal_sign = dice_throw(d) < 0.5 ? -1 : 1};
+	s.sphere_axes = frame_around(dice_direction(d));
+	return s;
+}
+
+/* The point that lies h further along t, as the surface itself makes it. */
+static struct surface_point moved(const struct geom_shape *s, const struct surface_point *x, vec3 t, double h)
+{
+	struct surface_point y;
+	vec3 p = vec3_madd(x->p, h, t);
+	if (s->is_sphere) {
+		surface_on_sphere(s, x->prim, vec3_normalize(vec3_sub(p, s->center)), &y);
+		return y;
+	}
+	vec3 o = vec3_add(p, x->ng);
+	struct ray_hit hit = {.prim = x->prim, .t = 1};
+	surface_from_hit(s, o, vec3_neg(x->ng), &hit, &y);
+	return y;
+}
+
+static vec3 unit_du(const struct surface_point *x)
+{
+	vec3 du, dv;
+	surface_tangents(x, &du, &dv);
+	return du;
+}
+
+static double off(vec3 a, vec3 b, double scale)
+{
+	return vec3_length(vec3_sub(a, b)) / fmax(scale, 1);
+}
+
+static double compare(const struct geom_shape *s, const struct surface_point *x)
+{
+	struct surface_change c;
+	surface_change_of(s, x, &c);
+	assert_true(fabs(vec3_length(c.du) - 1) < 4 * DBL_EPSILON && fabs(vec3_length(c.dv) - 1) < 4 * DBL_EPSILON);
+	assert_true(fabs(vec3_dot(c.du, c.dv)) < 4 * DBL_EPSILON && fabs(vec3_dot(c.du, x->ng)) < 4 * DBL_EPSILON);
+	assert_true(vec3_dot(c.du, x->dpdu) > 0.999999 * vec3_length(x->dpdu));
+	assert_true(vec3_dot(vec3_cross(c.du, c.dv), x->ng) > 0.999999);
+	double worst = 0, scale = fmax(fmax(vec3_length(c.dn[0]), vec3_length(c.dn[1])), vec3_length(c.ddu[0]));
+	for (int i = 0; i < 2; i++) {
+		vec3 t = i ? c.dv : c.du, dn[2], ddu[2];
+		/* The normal stays a unit vector. */
+		assert_true(fabs(vec3_dot(c.dn[i], x->sh.n)) < 1e-12 * fmax(scale, 1));
+		for (int half = 0; half < 2; half++) {
+			double h = (half ? 1e-5 : 2e-5) / fmax(scale, 1);
+			struct surface_point up = moved(s, x, t, h), down = moved(s, x, t, -h);
+			dn[half] = vec3_scale(0.5 / h, vec3_sub(up.sh.n, down.sh.n));
+			ddu[half] = vec3_scale(0.5 / h, vec3_sub(unit_du(&up), unit_du(&down)));
+		}
+		vec3 n = vec3_madd(vec3_scale(4.0 / 3, dn[1]), -1.0 / 3, dn[0]), u = vec3_madd(vec3_scale(4.0 / 3, ddu[1]), -1.0 / 3, ddu[0]);
+		worst = fmax(worst, fmax(off(n, c.dn[i], scale), off(u, c.ddu[i], scale)));
+	}
+	return worst;
+}
+
+static void test_differences(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("changes of surface points");
+	double worst[5] = {0};
+	for (size_t i = 0; i < dice_count(5000); i++) {
+		int kind = (int)(i % 5); /* flat, with and without uv; smooth, with and without uv; sphere */
+		struct geom_shape s = kind == 4 ? sphere(&d) : triangle(&d, kind >= 2, kind % 2);
+		struct surface_point x;
+		if (s.is_sphere)
+			surface_on_sphere(&s, (struct prim_ref){0, 0}, dice_direction(&d), &x);
+		else
+			surface_on_triangle(&s, (struct prim_ref){0, 0}, dice_between(&d, 0.2, 0.4), dice_between(&d, 0.2, 0.4), &x);
+		if (!s.is_sphere && vec3_dot(x.sh.n, x.ng) < 0.1)
+			continue;
+		/* Slivers: the points further on would lie outside. */
+		vec3 e1 = {(double)(position[1][0] - position[0][0]), (double)(position[1][1] - position[0][1]),
+			   (double)(position[1][2] - position[0][2])};
+		vec3 e2 = {(double)(position[2][0] - position[0][0]), (double)(position[2][1] - position[0][1]),
+			   (double)(position[2][2] - position[0][2])};
+		if (!s.is_sphere && vec3_length(vec3_cross(e1, e2)) < 0.05)
+			continue;
+		worst[kind] = fmax(worst[kind], compare(&s, &x));
+	}
+	print_message("flat %.1e %.1e, smooth %.1e %.1e, sphere %.1e\n", worst[0], worst[1], worst[2], worst[3], worst[4]);
+	for (int kind = 0; kind < 5; kind++)
+		assert_true(worst[kind] < 1e-7);
+}
+
+static void assert_finite(const struct geom_shape *s, const struct surface_point *x)
+{
+	struct surface_change c;
+	feclearexcept(FE_INVALID);
+	surface_change_of(s, x, &c);
+	assert_false(fetestexcept(FE_INVALID));
+	for (int i = 0; i < 2; i++)
+		assert_true(vec3_is_finite(c.dn[i]) && vec3_is_finite(c.ddu[i]));
+	assert_true(fabs(vec3_length(c.du) - 1) < 1e-12 && fabs(vec3_length(c.dv) - 1) < 1e-12);
+}
+
+static void test_degenerate(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("changes of degenerate surfaces");
+	struct surface_point x;
+	struct surface_change c;
+	/* At the poles, and as near as numbers get. */
+	for (int i = 0; i < 400; i++) {
+		struct geom_shape s = sphere(&d);
+		s.sphere_axes = frame_around((vec3){0, 0, i & 1 ? 1 : -1});
+		double off_axis = i < 4 ? 0 : exp(dice_between(&d, -740, 0));
+		surface_on_sphere(&s, (struct prim_ref){0, 0}, vec3_normalize((vec3){off_axis, 0, i & 2 ? 1 : -1}), &x);
+		assert_finite(&s, &x);
+	}
+	for (int i = 0; i < 400; i++) {
+		struct geom_shape s = triangle(&d, true, true);
+		/* Degenerate or huge uv, slivers down to floats' own limit, normals that turn away or vanish. */
+		for (int m = 0; m < 3; m++) {
+			uv[m][0] = i % 3 ? 1e30f * uv[m][0] : 0.25f;
+			position[m][1] = position[m][0] + (i % 5 ? 0 : position[m][1] * (float)exp(dice_between(&d, -70, 0)));
+			normal[m][2] = i % 7 ? normal[m][2] : 0;
+		}
+		if (i % 11 == 0)
+			memset(normal, 0, sizeof normal);
+		surface_on_triangle(&s, (struct prim_ref){0, 0}, 0.3, 0.3, &x);
+		if (!vec3_is_finite(x.ng))
+			continue; /* no area: no such triangle is kept */
+		assert_finite(&s, &x);
+	}
+	/* Shaded flat: nothing turns. */
+	struct geom_shape s = triangle(&d, true, true);
+	for (int m = 0; m < 3; m++)
+		for (int i = 0; i < 3; i++)
+			normal[m][i] = -normal[m][i];
+	surface_on_triangle(&s, (struct prim_ref){0, 0}, 0.3, 0.3, &x);
+	surface_change_of(&s, &x, &c);
+	assert_true(vec3_length(c.dn[0]) == 0 && vec3_length(c.dn[1]) == 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_differences),
+		cmocka_unit_test(test_degenerate),
+	};
+	return cmocka_run_group_tests_name("change", tests, NULL, NULL);
+}
