@@ -203,6 +203,20 @@ static void test_lit_by_a_mirror(void **state)
 	check_floor("mirrored parallel light", &l, (struct effort){0, 20480, 0});
 }
 
+/* Rough glass and metal in light that no path hits: caustics that the path tracer finds, too. */
+static void test_rough_in_delta_light(void **state)
+{
+	(void)state;
+	check_agreement("rough bodies in delta light",
+			world_of_text(16, 16, "%s%s", DEPTH("4") SENSOR("0,2.4,1.8", "0,-1,-0.1"),
+				      "<shape type='rectangle'>" AT("<scale value='2.4'/><rotate x='1' angle='-90'/><translate y='-1'/>") DIFFUSE("0.5") "</shape>"
+				      "<emitter type='point'><point name='position' x='1' y='2' z='1'/><float name='intensity' value='3'/></emitter>"
+				      "<emitter type='directional'><vector name='direction' x='.4' y='-1' z='-.3'/></emitter>"
+				      BALL("-0.5,-0.4,0", "0.6", "<bsdf type='roughdielectric'><float name='alpha' value='.5'/></bsdf>")
+				      BALL("0.7,-0.6,-0.3", "0.4", "<bsdf type='roughconductor'><float name='alpha' value='.4'/></bsdf>")),
+			(struct effort){14336, 12288, 0});
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -210,6 +224,7 @@ int main(void)
 		cmocka_unit_test(test_blurred_rectangle),
 		cmocka_unit_test(test_lit_floor),
 		cmocka_unit_test(test_lit_by_a_mirror),
+		cmocka_unit_test(test_rough_in_delta_light),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
