@@ -10,18 +10,24 @@
 #define PRODUCT_HIGH 0x1p256
 #define PRODUCT_LOW 0x1p-256
 
-void product_mul(struct product *p, spectrum f)
+/* Lobes go down to where doubles end: both factors have to be near 1 for their product to be one. */
+static int bring_near_one(spectrum *s)
 {
-	p->v = spectrum_mul(p->v, f);
-	double m = spectrum_max(p->v);
-	if (m < PRODUCT_HIGH && m > PRODUCT_LOW)
-		return;
-	if (!(m > 0) || !isfinite(m))
-		return;
+	double m = spectrum_max(*s);
+	if ((m < PRODUCT_HIGH && m > PRODUCT_LOW) || !(m > 0) || !isfinite(m))
+		return 0;
 	int e;
 	frexp(m, &e);
-	p->v = spectrum_scale(ldexp(1, -e), p->v);
-	p->exponent += e;
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		s->v[i] = ldexp(s->v[i], -e);
+	return e;
+}
+
+void product_mul(struct product *p, spectrum f)
+{
+	p->exponent += bring_near_one(&f);
+	p->v = spectrum_mul(p->v, f);
+	p->exponent += bring_near_one(&p->v);
 }
 
 void product_scale(struct product *p, double s)
