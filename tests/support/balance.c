@@ -1,0 +1,272 @@
+#include "tests/support/balance.h"
+
+#include "tests/support/stats.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* Comparisons in the whole suite, at most. */
+#define COMPARISONS 16384
+#define LEVEL (1e-4 / COMPARISONS)
+
+enum { FUNCTION_H_1 = 14, FUNCTION_H_K_1 };
+
+static const char *const functions[BALANCE_FUNCTIONS] = {
+	"film x", "film y", "distance from the film's centre", "even columns", "intensity", "wavelength", "x_k-1 x", "x_k-1 z",
+	"x_1 y", "x_1 z", "x_0 x", "x_0 z", "lengths", "last length", "h_1", "h_k-1", "roughness", "edges", "aperture", "cosine at x_1",
+};
+
+/* A ray that found a vertex and a ray that asks whether it is seen go to points that differ by rounding: at the edge of a
+ * triangle the answers may differ. One in some 100,000 accepted proposals is seen to. */
+#define MOST_DOUBTS 2
+
+/* Half vectors and what follows from them are as exact as walks are: differences below this mean nothing. */
+#define WALK_BLUR 0.003
+/* Rounding, of numbers that are equal otherwise. */
+#define ROUNDING 1e-9
+
+/* |h_j|, and how exactly; nothing where it is exactly specular. */
+static double slope(const struct whole_path *x, unsigned j, double *blur)
+{
+	if (j == 0 || j >= x->edges || x->v[j].delta)
+		return 0;
+	vec2 h = halfvec_of(x, j);
+	*blur = WALK_BLUR * fmin(x->v[j].bsdf->alpha, 1);
+	return hypot(h.x, h.y);
+}
+
+static void measure(struct path_context *c, struct whole_path *x, double *g, double *blur)
+{
+	unsigned k = x->edges;
+	double lengths = 0, roughness = 0;
+	for (unsigned e = 0; e < k; e++)
+		lengths += log(x->edge[e].distance2);
+	for (unsigned j = 1; j < k; j++)
+		roughness += x->v[j].delta ? 0 : fmin(x->v[j].bsdf->alpha_mean, 1);
+	double at_light = 0, at_camera = 0;
+	double first = slope(x, 1, &at_light), last = slope(x, k - 1, &at_camera);
+	vec3 near = x->v[k - 1].x.p, far = x->v[k > 1 ? 1 : 0].x.p, light = x->v[0].x.p;
+	const double all[BALANCE_FUNCTIONS] = {
+		x->film[0], x->film[1], hypot(x->film[0] - 16, x->film[1] - 16), fmod(floor(x->film[0]), 2), whole_log_f(c, x),
+		x->wavelength, near.x, near.z, far.y, far.z, light.x, light.z, lengths, x->edge[k - 1].distance2, first, last,
+		roughness, k, x->v[k].x.p.x, k > 1 ? fabs(vec3_dot(x->v[1].x.sh.n, x->edge[0].w)) : 0,
+	};
+	for (int i = 0; i < BALANCE_FUNCTIONS; i++) {
+		g[i] = all[i];
+		blur[i] = ROUNDING * fabs(all[i]);
+	}
+	blur[FUNCTION_H_1] += at_light;
+	blur[FUNCTION_H_K_1] += at_camera;
+}
+
+struct run {
+	const char *test;
+	struct path_context *c;
+	struct mutation_ctx *m;
+	struct whole_path *x, *y;
+	double weight, strict_weight; /* of strategies that keep the number of edges; of all */
+	double g[BALANCE_FUNCTIONS], blur[BALANCE_FUNCTIONS]; /* of x */
+	uint64_t checked, doubts;
+};
+
+static bool applies(const struct balance_trial *t, unsigned k)
+{
+	int b = t->how.b, c = t->how.c;
+	if (b > (int)k || (b > 0 && c >= b) || (t->side == BALANCE_CAMERA && b != (int)k))
+		return false;
+	return !(t->side == BALANCE_TRACED && b == (int)k);
+}
+
+static bool is_sound(const struct balance_trial *t, double log_weight)
+{
+	if (isnan(log_weight) || log_weight == INFINITY)
+		fail_msg("%s: a weight of %g", t->ops->name, log_weight);
+	return log_weight > -INFINITY;
+}
+
+/* As the chain does it. */
+static double acceptance(struct run *r, struct balance_trial *t, struct move *move)
+{
+	enum strategy_counter end = t->ops->propose(r->m, &t->how, r->x, r->y, move);
+	double to_y = end ? -INFINITY : t->ops->log_weight(r->m, r->y, move, X_TO_Y);
+	if (!end && !is_sound(t, to_y))
+		end = STRATEGY_FAIL_DARK;
+	t->count[end]++;
+	if (end)
+		return 0;
+	double to_x = t->ops->log_weight(r->m, r->x, move, Y_TO_X);
+	if (!is_sound(t, to_x))
+		fail_msg("%s: from y the path x is black", t->ops->name);
+	return exp(fmin(to_y - to_x, 0));
+}
+
+static void check_accepted(struct run *r, struct balance_trial *t)
+{
+	char text[200], name[48];
+	t->accepted++;
+	if (t->broken)
+		return;
+	r->checked++;
+	if (path_check(r->c, r->y, text, sizeof text))
+		return;
+	if (strstr(text, "occluded")) {
+		r->doubts++;
+		return;
+	}
+	balance_name(t, name);
+	fail_msg("%s, %s: %s", r->test, name, text);
+}
+
+/* y becomes x again by the vertices that the move names. */
+static void restore(struct run *r, const struct balance_trial *t, const struct move *move)
+{
+	const struct whole_path *x = r->x;
+	struct whole_path *y = r->y;
+	bool all = t->ops->independent || y->edges != x->edges;
+	whole_copy(y, x, all ? 0 : move->first, all ? x->edges : move->last);
+	for (unsigned i = 0; i <= x->edges; i++) {
+		const struct path_vertex *a = &x->v[i], *b = &y->v[i];
+		bool same = memcmp(&a->x.p, &b->x.p, sizeof a->x.p) == 0 && a->kind == b->kind && a->mode == b->mode &&
+			    a->delta == b->delta && a->bsdf == b->bsdf && a->emitter == b->emitter &&
+			    (i == x->edges || memcmp(&x->edge[i], &y->edge[i], sizeof x->edge[i]) == 0);
+		if (!same)
+			fail_msg("%s, %s: vertex %u of %u is not what it was", r->test, t->ops->name, i, x->edges);
+	}
+	assert_true(y->edges == x->edges && y->film[0] == x->film[0] && y->film[1] == x->film[1] && y->wavelength == x->wavelength);
+}
+
+static void propose(struct run *r, struct balance_trial *t, unsigned group)
+{
+	struct move move = {0};
+	double u[4], h[BALANCE_FUNCTIONS], blur[BALANCE_FUNCTIONS];
+	r->m->count = t->count;
+	r->m->step++;
+	t->pairs++;
+	double a = acceptance(r, t, &move), w = a * (t->ops->independent ? r->strict_weight : r->weight);
+	if (a > 0) {
+		t->expected += a;
+		measure(r->c, r->y, h, blur);
+		for (int i = 0; i < BALANCE_FUNCTIONS; i++) {
+			double d = h[i] - r->g[i];
+			if (!(fabs(d) > blur[i] + r->blur[i]))
+				continue;
+			t->sum[group][i] += copysign(w, d);
+			t->size[group][i] += w;
+		}
+		mutation_random(r->m, BLOCK_STRATEGY, u);
+		if (u[1] < a)
+			check_accepted(r, t);
+	}
+	restore(r, t, &move);
+}
+
+static void run_group(struct run *r, unsigned group, struct starts *s, struct balance_trial *trials, size_t count, size_t starts,
+		      const double *scale)
+{
+	for (unsigned k = 1; k <= BALANCE_EDGES; k++) {
+		double u[4], weight = starts_weight(s, k);
+		rng_uniform4(r->m->seed, RNG_TEST, group, k, 0, u);
+		for (size_t i = 0; i < starts && weight > 0; i++) {
+			if (!starts_path(s, k, ((double)i + u[0]) / (double)starts, r->x))
+				continue;
+			whole_copy(r->y, r->x, 0, k);
+			r->strict_weight = weight;
+			r->weight = weight / scale[k];
+			measure(r->c, r->x, r->g, r->blur);
+			for (size_t j = 0; j < count; j++)
+				for (unsigned n = 0; n < trials[j].repeat && applies(&trials[j], k); n++)
+					propose(r, &trials[j], group);
+		}
+	}
+}
+
+void balance_run(const struct world *w, const char *test, struct balance_trial *trials, size_t count, size_t starts, size_t pairs)
+{
+	static struct path_context c;
+	static struct mutation_ctx m;
+	static struct whole_path x, y;
+	static uint64_t counters[BATCH_COUNTERS];
+	starts_context(&c, w, 1, BALANCE_EDGES, counters);
+	m.path = &c;
+	m.seed = stats_seed(test);
+	m.limits = WALK_LIMITS_DEFAULT;
+	struct run r = {.test = test, .c = &c, .m = &m, .x = &x, .y = &y};
+	static struct starts s[BALANCE_GROUPS];
+	double scale[BALANCE_EDGES + 1] = {0}; /* all lengths are to count alike */
+	for (unsigned g = 0; g < BALANCE_GROUPS; g++) {
+		starts_init(&s[g], &c, m.seed, g, pairs);
+		for (unsigned k = 1; k <= BALANCE_EDGES; k++)
+			scale[k] += starts_weight(&s[g], k) / BALANCE_GROUPS;
+	}
+	for (unsigned g = 0; g < BALANCE_GROUPS; g++) {
+		m.chain = g;
+		m.step = 0;
+		run_group(&r, g, &s[g], trials, count, starts, scale);
+		starts_fini(&s[g]);
+	}
+	if (r.doubts > MOST_DOUBTS + r.checked / 10000)
+		fail_msg("%s: %llu of %llu accepted proposals have edges that are occluded", test, (unsigned long long)r.doubts,
+			 (unsigned long long)r.checked);
+}
+
+static double critical_t(void)
+{
+	double low = 0, high = 100;
+	for (int i = 0; i < 60; i++) {
+		double t = 0.5 * (low + high);
+		if (stats_student_t_p(t, BALANCE_GROUPS - 1) > LEVEL)
+			low = t;
+		else
+			high = t;
+	}
+	return high;
+}
+
+struct balance_verdict balance_judge(const struct balance_trial *t)
+{
+	struct balance_verdict v = {.p = 1, .power = INFINITY, .function = "", .balanced = true};
+	double critical = critical_t();
+	for (int i = 0; i < BALANCE_FUNCTIONS; i++) {
+		double column[BALANCE_GROUPS], size = 0;
+		for (int g = 0; g < BALANCE_GROUPS; g++) {
+			column[g] = t->sum[g][i];
+			size += t->size[g][i] / BALANCE_GROUPS;
+		}
+		struct stats_mean s = stats_mean_test(column, BALANCE_GROUPS, 0);
+		if (!(s.error > 0) || !(size > 0))
+			continue;
+		/* A ratio that is wrong by 1 + d one way shifts a phi by d / 2 of |a phi|. */
+		v.power = fmin(v.power, 2 * (critical + 1.645) * s.error / size);
+		if (s.p < v.p) {
+			v.t = s.mean / s.error;
+			v.p = s.p;
+			v.fault = 2 * s.mean / size;
+			v.function = functions[i];
+		}
+	}
+	v.balanced = !(v.p < LEVEL);
+	return v;
+}
+
+void balance_name(const struct balance_trial *t, char text[48])
+{
+	static const char *const sides[] = {"", " (b = k)", " (b < k)"};
+	char forced[16] = "";
+	if (t->how.b >= 0)
+		snprintf(forced, sizeof forced, t->how.b ? "@b%dc%d" : "@b%d", t->how.b % 100, t->how.c % 100);
+	snprintf(text, 48, "%.16s%s%s", t->ops->name, forced, sides[t->side]);
+}
+
+void balance_print(const char *test, const struct balance_trial *t, const struct balance_verdict *v)
+{
+	char name[48];
+	balance_name(t, name);
+	printf("%-14s %-22s %8llu pairs, accepted %.3f, reverse failed %.3f, worst t %+6.2f (%s), finds %5.1f %%%s\n", test, name,
+	       (unsigned long long)t->pairs, t->expected / (double)t->pairs, (double)t->count[STRATEGY_FAIL_REVERSE] / (double)t->pairs,
+	       v->t, v->function, 100 * v->power, v->balanced ? "" : " NOT BALANCED");
+}

@@ -1,0 +1,151 @@
+#include "tests/support/rooms.h"
+
+#include "tests/support/memory_assets.h"
+#include "tests/support/sample_images.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define AT(inner) "<transform name='to_world'>" inner "</transform>"
+#define PLAIN(rgb) "<bsdf type='diffuse'><rgb name='reflectance' value='" rgb "'/></bsdf>"
+#define BOX(rgb) "<shape type='cube'>" AT("<scale value='2'/>") PLAIN(rgb) "</shape>"
+#define VIEW SENSOR("0,0.2,1.9", "0,-0.3,-1")
+#define ROOM VIEW BOX("0.5,0.45,0.35")
+#define SHINES(rgb) "<emitter type='area'><rgb name='radiance' value='" rgb "'/></emitter>"
+#define LAMP                                                                                                                    \
+	"<shape type='rectangle'>" AT("<scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/>") SHINES("3,2.5,2")     \
+	"</shape>"
+#define BALL(bsdf)                                                                                                              \
+	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf "</shape>"
+#define METAL(alpha) "<bsdf type='roughconductor'><string name='material' value='Au'/><float name='alpha' value='" alpha "'/></bsdf>"
+#define CLOUDY(alpha) "<bsdf type='roughdielectric'><float name='alpha' value='" alpha "'/></bsdf>"
+#define GLASS "<bsdf type='dielectric'/>"
+#define MIRROR "<bsdf type='conductor'><string name='material' value='none'/></bsdf>"
+#define OBJ(inner) "<shape type='obj'><string name='filename' value='bent.obj'/>" inner "</shape>"
+
+static struct world *cloudy(void)
+{
+	return world_of_text(32, 32, ROOM LAMP BALL(CLOUDY("0.25")));
+}
+
+static struct world *glass(void)
+{
+	return world_of_text(32, 32, ROOM LAMP BALL(GLASS));
+}
+
+static struct world *gold(void)
+{
+	return world_of_text(32, 32, ROOM LAMP BALL(METAL("0.1")));
+}
+
+static struct world *mirror(void)
+{
+	return world_of_text(32, 32, VIEW BOX("0.5,0.5,0.5")
+			     "<shape type='rectangle'>" AT("<scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/>") SHINES("3,3,3")
+			     "</shape>" BALL(MIRROR)
+			     "<shape type='rectangle'>" AT("<rotate y='1' angle='60'/><translate x='-1.5' z='-0.6'/>")
+			     "<bsdf type='phong'><float name='exponent' value='60'/></bsdf></shape>");
+}
+
+/* Normals of vertices up to 40 degrees off the triangles'. */
+static const char bent_obj[] = "v -3 -1 -3\nv 3 -1.2 -3\nv 3 -1 3\nv -3 -1.1 3\nv 0 -.7 0\n"
+			       "vn -.5 1 .3\nvn .4 1 -.4\nvn .6 1 .2\nvn -.2 1 .7\nvn .3 1 -.5\n"
+			       "f 1//1 5//5 2//2\nf 2//2 5//5 3//3\nf 3//3 5//5 4//4\nf 4//4 5//5 1//1\n";
+
+static struct world *bent(void)
+{
+	static const char scene[] =
+		"<scene version='3.0.0'>" ROOM LAMP OBJ(AT("<scale value='.6'/><translate y='-.9'/>") METAL("0.3"))
+		OBJ(AT("<scale value='.3'/><rotate x='1' angle='80'/><translate x='-.5' y='-.6' z='-.9'/>") CLOUDY("0.4"))
+		OBJ(AT("<scale value='.3'/><rotate z='1' angle='15'/><translate x='.8' y='-.5' z='-.5'/>") GLASS)
+		OBJ(AT("<scale value='.4'/><rotate z='1' angle='-70'/><translate x='-1.2' y='-.4' z='-.8'/>") METAL("0.2")) "</scene>";
+	const struct memory_file files[] = {{"bent.xml", scene, sizeof scene - 1}, {"bent.obj", bent_obj, sizeof bent_obj - 1}, {NULL, NULL, 0}};
+	return world_of_files(32, 32, files);
+}
+
+static struct world *sky(void)
+{
+	return world_of_text(32, 32, SENSOR("0,1,5", "0,0,0")
+			     "<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1.4'/>")
+			     METAL("0.2") "</shape>" BALL(CLOUDY("0.3"))
+			     "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>");
+}
+
+/* A picture around, unlike on all sides. */
+static struct world *picture(void)
+{
+	static const char scene[] = "<scene version='3.0.0'>" SENSOR("0,1,5", "0,0,0")
+		"<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1.4'/>") "</shape>" BALL(METAL("0.2"))
+		"<emitter type='envmap'><string name='filename' value='sky.png'/></emitter></scene>";
+	size_t size;
+	unsigned char *png = sample_png(16, 8, SAMPLE_RGB, 8, 0, &size);
+	const struct memory_file files[] = {{"sky.xml", scene, sizeof scene - 1}, {"sky.png", png, size}, {NULL, NULL, 0}};
+	struct world *w = world_of_files(32, 32, files);
+	free(png);
+	return w;
+}
+
+static struct world *prism(void)
+{
+	return world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='dielectric'><float name='int_ior' value='1.6'/><float name='ext_ior' value='1'/>"
+						     "<float name='int_cauchy_b' value='0.05'/></bsdf>")
+			     "<shape type='sphere'><point name='center' value='1.1,-1.3,-0.2'/><float name='radius' value='0.6'/>"
+			     "<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/><float name='ext_ior' value='1'/>"
+			     "<float name='int_cauchy_b' value='0.03'/><float name='alpha' value='0.2'/></bsdf></shape>");
+}
+
+static struct world *lens(void)
+{
+	return world_of_text(32, 32,
+			     "<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='0.25'/>"
+			     "<float name='focus_distance' value='2.2'/>" AT("<lookat origin='0,0.2,1.6' target='0,-0.3,-1' up='0,1,0'/>")
+			     "<film type='hdrfilm'><integer name='width' value='32'/><integer name='height' value='32'/><rfilter type='box'/></film>"
+			     "</sensor>" BOX("0.5,0.45,0.35") LAMP BALL(METAL("0.2")));
+}
+
+static struct world *deltas(void)
+{
+	return world_of_text(32, 32, ROOM BALL(CLOUDY("0.3"))
+			     "<shape type='rectangle'>" AT("<scale value='0.9'/><rotate y='1' angle='70'/><translate x='-1.7' z='-0.6'/>") METAL("0.15") "</shape>"
+			     "<emitter type='point'><point name='position' value='0.5,1.5,0.6'/><rgb name='intensity' value='4,4,3'/></emitter>"
+			     "<emitter type='spot'><rgb name='intensity' value='9,8,8'/><float name='cutoff_angle' value='50'/>"
+			     AT("<lookat origin='-1,1.5,1' target='0,-1,-0.3' up='0,1,0'/>") "</emitter>");
+}
+
+static struct world *sun(void)
+{
+	return world_of_text(32, 32, SENSOR("0,1,5", "0,0,0")
+			     "<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1.4'/>")
+			     "</shape>" BALL(CLOUDY("0.3"))
+			     "<emitter type='directional'><vector name='direction' value='0.3,-1,-0.4'/><rgb name='irradiance' value='3,3,2'/></emitter>");
+}
+
+static struct world *dents(void)
+{
+	return world_of_text(32, 32, ROOM LAMP "<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>"
+			     CLOUDY("0.15") "<texture name='displacement' type='checkerboard'><float name='color0' value='0'/>"
+			     "<float name='color1' value='1'/>" "<transform name='to_uv'><scale x='6' y='4'/></transform></texture>"
+			     "<float name='displacement_scale' value='0.06'/><integer name='displacement_level' value='3'/></shape>");
+}
+
+const struct room rooms[] = {
+	{"rough glass", cloudy}, {"glass", glass}, {"gold", gold}, {"mirror", mirror}, {"bent normals", bent}, {"sky", sky},
+	{"picture", picture}, {"prism", prism}, {"lens", lens}, {"point and spot", deltas}, {"sun", sun}, {"dents", dents},
+	{NULL, NULL},
+};
+
+struct world *room_of(const char *name)
+{
+	for (const struct room *r = rooms; r->name; r++)
+		if (strcmp(r->name, name) == 0)
+			return r->build();
+	fail_msg("no room is called '%s'", name);
+	return NULL;
+}
