@@ -67,21 +67,7 @@ static bool read_surface(const struct world *w, struct prim_ref prim, vec3 p, st
 {
 	if (prim.shape >= w->shape_count)
 		return false;
-	const struct geom_shape *s = &w->shapes[prim.shape];
-	if (s->is_sphere) {
-		vec3 d = vec3_sub(p, s->center);
-		if (!(vec3_dot(d, d) > 0))
-			return false;
-		surface_on_sphere(s, prim, vec3_normalize(d), x);
-	} else {
-		if (prim.prim >= s->triangle_count)
-			return false;
-		surface_on_triangle(s, prim, 1.0 / 3, 1.0 / 3, x);
-		const struct ray_hit hit = {prim, w->radius, 1.0 / 3, 1.0 / 3};
-		vec3 n = x->ng;
-		surface_from_hit(s, vec3_madd(p, -w->radius, n), n, &hit, x);
-	}
-	return near(w, x->p, p);
+	return surface_near(&w->shapes[prim.shape], prim, p, w->radius, x) && near(w, x->p, p);
 }
 
 /* An emitter that has no surface. */

@@ -258,3 +258,21 @@ bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct 
 		return reproject_sphere(s, prim, same, o, d, t_near, x);
 	return !same && reproject_triangle(s, prim, o, d, x);
 }
+
+bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, double reach, struct surface_point *x)
+{
+	if (s->is_sphere) {
+		vec3 d = vec3_sub(p, s->center);
+		if (!(vec3_dot(d, d) > 0))
+			return false;
+		surface_on_sphere(s, prim, vec3_normalize(d), x);
+		return true;
+	}
+	if (prim.prim >= s->triangle_count)
+		return false;
+	surface_on_triangle(s, prim, 1.0 / 3, 1.0 / 3, x);
+	const struct ray_hit hit = {prim, reach, 1.0 / 3, 1.0 / 3};
+	vec3 n = x->ng;
+	surface_from_hit(s, vec3_madd(p, -reach, n), n, &hit, x);
+	return true;
+}

@@ -8,7 +8,7 @@
 
 #include <stdint.h>
 
-enum rng_stream { RNG_PATH = 1, RNG_BDPT, RNG_BOOTSTRAP, RNG_CHAIN, RNG_RESAMPLING, RNG_BEYOND, RNG_MUTATION, RNG_TEST };
+enum rng_stream { RNG_PATH = 1, RNG_BDPT, RNG_BOOTSTRAP, RNG_CHAIN, RNG_RESAMPLING, RNG_BEYOND, RNG_MUTATION, RNG_AROUND, RNG_TEST };
 
 /* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */
 void rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4]);

@@ -327,6 +327,12 @@ unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max
 	return scatter_on(c, s, SIDE_LIGHT, v, 2, max_vertices, spectrum_max(v[1].beta));
 }
 
+unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_side side, unsigned n, unsigned max_vertices)
+{
+	struct path_vertex *v = side == SIDE_CAMERA ? c->camera : c->light;
+	return scatter_on(c, s, side, v, n, max_vertices, spectrum_max(v[1].beta));
+}
+
 bool path_accept(const struct path_context *c, spectrum l)
 {
 	bool zero = true;

@@ -72,6 +72,9 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 /* Light sub-path: vertex 0 lies on an emitter. 0: no emitter, or it could not be sampled. */
 unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max_vertices);
 
+/* Goes on from a sub-path of n >= 2 vertices, the last of them a surface. Returns the number of vertices. */
+unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_side side, unsigned n, unsigned max_vertices);
+
 /* Density with which `next` is generated from `at` having come from `prev` (unused for camera and emitters). */
 double path_pdf(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
 		const struct path_vertex *next, enum transport transport);
