@@ -7,6 +7,8 @@
 #define SPECULAR_TOLERANCE 1e-9
 /* The way back ends so near to where the walk began, of the largest step that a vertex made. */
 #define BACK_TOLERANCE 1e-3
+/* The way back aims that much closer than the way there: at the same tolerance 2 to 11 % of the returns fail by it alone. */
+#define BACK_SCALE 0.1
 /* Positions are rounded in that many parts of the edges they hang on. */
 #define ROUNDING 0x1p-40
 /* Steps of x_0, in the numbers that make it. */
@@ -141,8 +143,10 @@ static bool leads_back(struct mutation_ctx *m, unsigned b, unsigned c, const str
 		s->target[j].h = x->v[j].delta ? (vec2){0, 0} : s->k[j].h;
 		s->target[j].tolerance = tolerance_of(&x->v[j], &s->step[X_TO_Y][j]);
 	}
+	struct walk_limits limits = m->limits;
+	limits.scale *= BACK_SCALE;
 	m->count[STRATEGY_REVERSE_WALKS]++;
-	enum walk_end end = halfvec_walk(m->path, back, b, c, s->target, true, &m->limits, &s->walk);
+	enum walk_end end = halfvec_walk(m->path, back, b, c, s->target, true, &limits, &s->walk);
 	m->count[STRATEGY_WALKS]++;
 	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
 	if (end != WALK_OK)

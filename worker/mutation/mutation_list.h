@@ -1,4 +1,5 @@
 /* One line a strategy: MUTATION(name) stands for `const struct mutation_ops mutation_<name>`. */
+MUTATION(bidirectional)
 MUTATION(independent)
 MUTATION(hslt)
 MUTATION(halfvec)
