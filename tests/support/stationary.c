@@ -1,0 +1,362 @@
+#include "tests/support/stationary.h"
+
+#include "tests/support/stats.h"
+#include "worker/chain/path_chain.h"
+#include "worker/math/fptrap.h"
+#include "worker/mutation/mixture.h"
+#include "worker/path/integrator.h"
+
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+#define LEVEL 1e-6
+/* One end state in so many is checked. */
+enum { CHECK_INTERVAL = 16, INNER = 3, FROM_LIGHT = 4, EDGES = 6 };
+
+struct group {
+	const struct world *w;
+	const struct stationary_how *how;
+	const struct mixture_entry *entry;
+	uint64_t seed;
+	uint32_t number, starts, bootstrap;
+	double weight;                     /* mean of the bootstrap */
+	double first[STATIONARY_FUNCTIONS], change[STATIONARY_FUNCTIONS]; /* means over the starts, times weight */
+	uint64_t proposals, accepted, checked;
+	uint64_t counters[BATCH_COUNTERS], strategy[STRATEGY_COUNTERS];
+	char failure[256];
+	struct path_context context;
+	struct mutation_ctx mutation;
+	struct whole_path place[2];
+};
+
+static const char *const inner_names[INNER] = {"first", "middle", "last"};
+static const char *const what_names[5] = {"x", "y", "z", "slope", "cosine"};
+
+const char *stationary_function(int i)
+{
+	static _Thread_local char text[32];
+	static const char *const film[] = {"upper left", "upper right", "lower left", "lower right", "share of X", "share of Z"};
+	static const char *const ends[] = {"x of x_0", "y of x_0", "z of x_0", "aperture x", "aperture y", "wavelength", "edge 0",
+					   "edge 1", "edge 2", "edge 3", "last edge but one", "last edge"};
+	if (i < 6)
+		return film[i];
+	if (i >= 6 + 5 * INNER)
+		return ends[i - 6 - 5 * INNER];
+	snprintf(text, sizeof text, "%s of the %s vertex", what_names[(i - 6) % 5], inner_names[(i - 6) / 5]);
+	return text;
+}
+
+static double unit(double a, double radius)
+{
+	return 0.5 * (1 + a / radius);
+}
+
+/* By their geometry terms: both ends move, and a join depends on nothing else. */
+static void look_at_edges(const struct path_context *c, const struct whole_path *x, double out[EDGES])
+{
+	unsigned k = x->edges;
+	for (unsigned i = 0; i < EDGES; i++) {
+		unsigned e = i < FROM_LIGHT ? i : k - (EDGES - i);
+		out[i] = 0;
+		if (e >= k || (i >= FROM_LIGHT && e < FROM_LIGHT))
+			continue;
+		const struct whole_edge *g = &x->edge[e];
+		double cosines = path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) * c->w->radius * c->w->radius;
+		out[i] = cosines / (cosines + g->distance2);
+	}
+}
+
+/* All between 0 and 1, or nearly so. */
+static void look_at(const struct path_context *c, struct whole_path *x, double out[STATIONARY_FUNCTIONS])
+{
+	const struct film_window *f = &c->window;
+	double u = (x->film[0] - f->x) / f->width, v = (x->film[1] - f->y) / f->height, xyz[3], *at = out, r = c->w->radius;
+	unsigned k = x->edges, inner[INNER] = {k - 1, (k + 1) / 2, 1};
+	whole_colour(c, x, xyz);
+	*at++ = (1 - u) * (1 - v);
+	*at++ = u * (1 - v);
+	*at++ = (1 - u) * v;
+	*at++ = u * v;
+	*at++ = xyz[0];
+	*at++ = xyz[2];
+	for (unsigned i = 0; i < INNER; i++, at += 5) {
+		const struct path_vertex *p = &x->v[inner[i]];
+		memset(at, 0, 5 * sizeof *at);
+		if (inner[i] == 0 || inner[i] >= k || (i > 0 && inner[i] == inner[i - 1]))
+			continue;
+		vec2 h = halfvec_of(x, inner[i]);
+		double h2 = vec2_dot(h, h);
+		at[0] = unit(p->x.p.x, r);
+		at[1] = unit(p->x.p.y, r);
+		at[2] = unit(p->x.p.z, r);
+		at[3] = isfinite(h2) ? h2 / (1 + h2) : 1;
+		at[4] = fabs(vec3_dot(p->x.ng, x->edge[inner[i] - 1].w));
+	}
+	double size = x->v[0].kind == VERTEX_INFINITE ? 1 : r;
+	*at++ = unit(x->v[0].x.p.x, size);
+	*at++ = unit(x->v[0].x.p.y, size);
+	*at++ = unit(x->v[0].x.p.z, size);
+	camera_point_inverse(&c->w->camera, x->v[k].x.p, at);
+	at[2] = x->wavelength;
+	look_at_edges(c, x, at + 3);
+}
+
+static double evaluate(struct group *g, uint64_t index)
+{
+	static _Thread_local struct path_sample sample;
+	struct sampler_random s;
+	sampler_random_init(&s, g->seed, RNG_BOOTSTRAP, index, 0);
+	path_trace_both_ways(&g->context, &s.base, &sample);
+	return sample.intensity;
+}
+
+/* Indices in proportion to their weights, systematically. */
+static bool resample(struct group *g, uint64_t *index)
+{
+	double *sum = calloc(g->bootstrap, sizeof *sum), total = 0, r[4];
+	uint64_t first = (uint64_t)g->number * g->bootstrap;
+	for (uint32_t i = 0; i < g->bootstrap; i++)
+		sum[i] = total += evaluate(g, first + i);
+	rng_uniform4(g->seed, RNG_RESAMPLING, g->number, 0, 0, r);
+	for (uint32_t i = 0, at = 0; total > 0 && i < g->starts; i++) {
+		while (at + 1 < g->bootstrap && sum[at] <= (i + r[0]) / g->starts * total)
+			at++;
+		index[i] = first + at;
+	}
+	free(sum);
+	g->weight = total / g->bootstrap;
+	return total > 0;
+}
+
+/* Of the edge at which x_b was joined. */
+static double log_geometry(const struct whole_path *x, unsigned b)
+{
+	return b > 0 ? log(path_cosine(&x->v[b - 1], x->edge[b - 1].w) / x->edge[b - 1].distance2) : 0;
+}
+
+static double planted(enum stationary_fault fault, const struct move *m, const struct whole_path *x, const struct whole_path *y)
+{
+	switch (fault) {
+	case STATIONARY_NO_TRANSFER:
+		return m->log_transfer[Y_TO_X] - m->log_transfer[X_TO_Y];
+	case STATIONARY_NO_DENSITY:
+		return m->log_density[X_TO_Y] - m->log_density[Y_TO_X];
+	case STATIONARY_NO_GEOMETRY:
+		return log_geometry(x, m->b) - log_geometry(y, m->b);
+	case STATIONARY_SOUND:
+		break;
+	}
+	return 0;
+}
+
+/* What may not come up; the state itself may not be black either. */
+static void count_unsound(struct group *g, double log_weight, bool state)
+{
+	if (isnan(log_weight))
+		g->counters[COUNT_NAN]++;
+	else if (log_weight == INFINITY || (state && isinf(log_weight)))
+		g->counters[COUNT_INFINITE]++;
+}
+
+/* The probability of acceptance of y. */
+static double propose(struct group *g, struct whole_path *x, struct whole_path *y, struct move *move)
+{
+	const struct mutation_ops *ops = g->entry->ops;
+	enum strategy_counter end = ops->propose(&g->mutation, &g->entry->how, x, y, move);
+	double to_y = end ? -INFINITY : ops->log_weight(&g->mutation, y, move, X_TO_Y);
+	if (!end && !(to_y > -INFINITY))
+		end = STRATEGY_FAIL_DARK;
+	count_unsound(g, to_y, false);
+	if (end) {
+		g->strategy[end]++;
+		return 0;
+	}
+	double to_x = ops->log_weight(&g->mutation, x, move, Y_TO_X);
+	count_unsound(g, to_x, true);
+	return exp(fmin(to_y - to_x + planted(g->how->fault, move, x, y), 0));
+}
+
+static void run_start(struct group *g, uint64_t chain, uint64_t index)
+{
+	struct whole_path *x = &g->place[0], *y = &g->place[1];
+	double now[STATIONARY_FUNCTIONS], next[STATIONARY_FUNCTIONS], first[STATIONARY_FUNCTIONS], r[4];
+	if (!path_start(&g->context, g->seed, index, x)) {
+		snprintf(g->failure, sizeof g->failure, "start %llu is black", (unsigned long long)index);
+		return;
+	}
+	whole_copy(y, x, 0, x->edges);
+	look_at(&g->context, x, first);
+	memcpy(now, first, sizeof now);
+	g->mutation.chain = chain;
+	for (unsigned n = 1; n <= STATIONARY_STEPS; n++) {
+		struct move move = {0};
+		g->mutation.step = n;
+		g->proposals++;
+		double a = propose(g, x, y, &move);
+		if (a > 0)
+			look_at(&g->context, y, next);
+		for (int f = 0; f < STATIONARY_FUNCTIONS; f++)
+			g->change[f] += (a > 0 ? a * next[f] + (1 - a) * now[f] : now[f]) - first[f];
+		mutation_random(&g->mutation, BLOCK_STRATEGY, r);
+		if (r[1] < a) {
+			struct whole_path *swap = x;
+			x = y;
+			y = swap;
+			memcpy(now, next, sizeof now);
+			g->accepted++;
+		}
+		if (y->edges != x->edges || g->entry->ops->independent)
+			whole_copy(y, x, 0, x->edges);
+		else
+			whole_copy(y, x, move.first, move.last);
+	}
+	for (int f = 0; f < STATIONARY_FUNCTIONS; f++)
+		g->first[f] += first[f];
+	if (chain % CHECK_INTERVAL == 0) {
+		g->checked++;
+		path_check(&g->context, x, g->failure, sizeof g->failure);
+	}
+}
+
+static void run_group(struct group *g)
+{
+	uint64_t *index = calloc(g->starts, sizeof *index);
+	const struct scene_settings *s = &g->w->settings;
+	g->context = (struct path_context){.w = g->w, .window = {0, 0, s->width, s->height}, .min_depth = g->how->min_edges,
+					   .max_depth = g->how->max_edges, .counters = g->counters};
+	g->mutation = (struct mutation_ctx){.path = &g->context, .seed = g->seed, .count = g->strategy, .limits = WALK_LIMITS_DEFAULT};
+	bool watched = fptrap_watch();
+	if (resample(g, index))
+		for (uint32_t i = 0; i < g->starts && !g->failure[0]; i++)
+			run_start(g, (uint64_t)g->number * g->starts + i, index[i]);
+	fptrap_unwatch(watched);
+	for (int f = 0; f < STATIONARY_FUNCTIONS; f++) {
+		g->first[f] *= g->weight / g->starts;
+		g->change[f] *= g->weight / g->starts / STATIONARY_STEPS;
+	}
+	free(index);
+}
+
+struct queue {
+	struct group *groups;
+	atomic_uint next;
+};
+
+static void *work(void *arg)
+{
+	struct queue *q = arg;
+	for (unsigned g; (g = atomic_fetch_add(&q->next, 1)) < STATIONARY_GROUPS;)
+		run_group(&q->groups[g]);
+	return NULL;
+}
+
+static double cpu_seconds(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static double critical_t(double level)
+{
+	double lo = 0, hi = 100;
+	for (int i = 0; i < 60; i++) {
+		double mid = 0.5 * (lo + hi);
+		*(stats_student_t_p(mid, STATIONARY_GROUPS - 1) > level ? &lo : &hi) = mid;
+	}
+	return hi;
+}
+
+static void judge(const struct group *groups, struct stationary_result *out)
+{
+	double weight = 0, t = critical_t(LEVEL / STATIONARY_FUNCTIONS) + 1.645;
+	for (int g = 0; g < STATIONARY_GROUPS; g++)
+		weight += groups[g].weight / STATIONARY_GROUPS;
+	out->p = 1;
+	for (int f = 0; f < STATIONARY_FUNCTIONS; f++) {
+		double change[STATIONARY_GROUPS], scale = 0;
+		for (int g = 0; g < STATIONARY_GROUPS; g++) {
+			change[g] = groups[g].change[f];
+			scale += groups[g].first[f] / STATIONARY_GROUPS;
+		}
+		struct stats_mean m = stats_mean_test(change, STATIONARY_GROUPS, 0);
+		/* What never changes is 0 up to rounding. */
+		if (!(scale > 0) || !(m.error > 1e-12 * weight))
+			continue;
+		out->bias[f] = m.mean / scale;
+		out->error[f] = m.error / scale;
+		double least = t * out->error[f], p = m.p * STATIONARY_FUNCTIONS;
+		double *kind = f < STATIONARY_BLOCKS ? &out->least_block
+			       : f < STATIONARY_BLOCKS + STATIONARY_COLOURS ? &out->least_colour : &out->least_other;
+		*kind = fmax(*kind, least);
+		if (p < out->p) {
+			out->p = p;
+			out->worst = f;
+		}
+	}
+}
+
+static void parse(const char *text, struct mixture_entry *out)
+{
+	struct mixture m;
+	struct error e = {""};
+	if (mixture_parse(text, &m, &e)) {
+		fprintf(stderr, "%s\n", e.text);
+		abort();
+	}
+	*out = m.entry[0];
+}
+
+void stationary_run(const struct world *w, const char *test, const struct stationary_how *how, struct stationary_result *out)
+{
+	struct group *groups = calloc(STATIONARY_GROUPS, sizeof *groups);
+	const char *text = getenv("HSLT_TEST_SCALE");
+	uint32_t scale = text && atoi(text) > 0 ? (uint32_t)atoi(text) : 1;
+	struct mixture_entry entry;
+	char name[160];
+	snprintf(name, sizeof name, "%s %s %u..%u", test, how->mutation, how->min_edges, how->max_edges);
+	parse(how->mutation, &entry);
+	*out = (struct stationary_result){.worst = -1};
+	for (uint32_t g = 0; g < STATIONARY_GROUPS; g++) {
+		groups[g].w = w;
+		groups[g].how = how;
+		groups[g].entry = &entry;
+		groups[g].seed = stats_seed(name);
+		groups[g].number = g;
+		groups[g].starts = how->starts / scale ? how->starts / scale : 1;
+		groups[g].bootstrap = how->bootstrap / scale > 16 ? how->bootstrap / scale : 16;
+	}
+	struct queue q = {groups, 0};
+	pthread_t other;
+	double begin = cpu_seconds();
+	bool two = pthread_create(&other, NULL, work, &q) == 0;
+	work(&q);
+	if (two)
+		pthread_join(other, NULL);
+	out->seconds = cpu_seconds() - begin;
+	for (int g = 0; g < STATIONARY_GROUPS; g++) {
+		const struct group *from = &groups[g];
+		out->starts += from->starts;
+		out->proposals += from->proposals;
+		out->accepted += from->accepted;
+		out->checked += from->checked;
+		for (int i = 0; i < BATCH_COUNTERS; i++)
+			out->counters[i] += from->counters[i];
+		for (int i = 0; i < STRATEGY_COUNTERS; i++)
+			out->strategy[i] += from->strategy[i];
+		if (from->failure[0])
+			memcpy(out->failure, from->failure, sizeof out->failure);
+	}
+	judge(groups, out);
+	out->share = (double)out->accepted / (double)(out->accepted + out->starts);
+	free(groups);
+}
+
+bool stationary_holds(const struct stationary_result *r)
+{
+	return r->p > LEVEL && !r->failure[0] && r->counters[COUNT_NAN] + r->counters[COUNT_INFINITE] + r->counters[COUNT_NEGATIVE] == 0;
+}
