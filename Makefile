@@ -118,7 +118,7 @@ fuzz:
 
 # Benchmarks: one program from tests/bench/*.c; a table on stdout and $(BUILD)/bench.json. BENCH="path tiles" runs only these.
 BENCH_SRC := $(wildcard tests/bench/*.c)
-$(BUILD)/bench/bench: $(call obj,$(BENCH_SRC)) $(LIB_TEST) $(LIB_RENDER) $(LIB_COMMON)
+$(BUILD)/bench/bench: $(call obj,$(BENCH_SRC)) $(LIB_TEST) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(BENCH_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occluded_to_infinity,--wrap=halfvec_walk
 bench: programs $(BUILD)/bench/bench

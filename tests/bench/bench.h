@@ -39,6 +39,7 @@ extern volatile double bench_sink;
 /* One a file. bin: the folder of the programs. */
 void bench_rays(const char *bin);
 void bench_hslt(const char *bin);
+void bench_equal_time(const char *bin); /* most of an hour: only when named */
 void bench_tiles(const char *bin);
 void bench_parts(const char *bin);
 void bench_farm(const char *bin);

@@ -144,7 +144,7 @@ void bench_hslt(const char *bin)
 	(void)bin;
 	for (size_t i = 0; i < sizeof references / sizeof *references; i++) {
 		bench_group("hslt", references[i].file);
-		struct world *w = bench_world_public(references[i].file);
+		struct world *w = bench_world(references[i].file, false, NULL);
 		if (!w) {
 			bench_skip("HSLT_SCENES does not name a folder with this scene");
 			continue;

@@ -97,14 +97,18 @@ void bench_die(const struct error *e)
 static const struct {
 	const char *name;
 	void (*run)(const char *bin);
-} benches[] = {{"rays", bench_rays}, {"hslt", bench_hslt}, {"tiles", bench_tiles}, {"parts", bench_parts}, {"farm", bench_farm}, {"memory", bench_memory}};
+	bool when_named; /* not with all */
+} benches[] = {
+	{"rays", bench_rays, false},   {"hslt", bench_hslt, false}, {"equal-time", bench_equal_time, true}, {"tiles", bench_tiles, false},
+	{"parts", bench_parts, false}, {"farm", bench_farm, false}, {"memory", bench_memory, false},
+};
 
-static bool chosen(const char *name, char **names, int count)
+static bool chosen(const char *name, bool when_named, char **names, int count)
 {
 	for (int i = 0; i < count; i++)
 		if (strcmp(names[i], name) == 0)
 			return true;
-	return count == 0;
+	return count == 0 && !when_named;
 }
 
 int main(int argc, char **argv)
@@ -120,7 +124,7 @@ int main(int argc, char **argv)
 	rows = json_array();
 	skipped = json_array();
 	for (size_t k = 0; k < sizeof benches / sizeof *benches; k++)
-		if (chosen(benches[k].name, argv + i, argc - i))
+		if (chosen(benches[k].name, benches[k].when_named, argv + i, argc - i))
 			benches[k].run(bin);
 	printf("\n%u target%s missed\n", missed, missed == 1 ? "" : "s");
 	json_t *all = json_pack("{s:i, s:o, s:o}", "schema", 1, "rows", rows, "skipped", skipped);

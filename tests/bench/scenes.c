@@ -170,17 +170,19 @@ struct world *bench_world_box(const char **name)
 	return build(&assets, slash + 1, &small);
 }
 
-struct world *bench_world_public(const char *file)
+struct world *bench_world(const char *path, bool shipped, const struct render_options *o)
 {
-	const char *folder = getenv("HSLT_SCENES");
-	char path[4096];
-	if (!folder)
+	const char *scenes = getenv("HSLT_SCENES");
+	char folder[4096];
+	if (!shipped && !scenes)
 		return NULL;
-	snprintf(path, sizeof path, "%s/%s", folder, file);
-	if (access(path, R_OK))
+	snprintf(folder, sizeof folder, "%s/%s", shipped ? "." : scenes, path);
+	if (access(folder, R_OK))
 		return NULL;
+	char *slash = strrchr(folder, '/');
+	*slash = 0;
 	struct asset_source assets = asset_folder(folder);
-	return build(&assets, file, NULL);
+	return build(&assets, slash + 1, o);
 }
 
 struct world *bench_world_displaced(void)

@@ -12,8 +12,9 @@ void bench_write_million(const char *folder);
 struct world *bench_world_box(const char **name);
 /* Folder and file of that scene. */
 const char *bench_box_file(void);
-/* A scene of the folder that HSLT_SCENES names; NULL: it is not set, or there is no such file. */
-struct world *bench_world_public(const char *file);
+/* shipped: a scene of the project. Else one of the folder that HSLT_SCENES names; NULL: it is not set, or there is no such
+ * file. o may be NULL. */
+struct world *bench_world(const char *path, bool shipped, const struct render_options *o);
 /* tests/scenes/displaced with a million triangles. */
 struct world *bench_world_displaced(void);
 
