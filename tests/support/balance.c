@@ -1,6 +1,7 @@
 #include "tests/support/balance.h"
 
 #include "tests/support/stats.h"
+#include "worker/mutation/heuristic.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -14,16 +15,24 @@
 #define COMPARISONS 16384
 #define LEVEL (1e-4 / COMPARISONS)
 
-enum { FUNCTION_H_1 = 14, FUNCTION_H_K_1 };
+enum {
+	FUNCTION_INTENSITY = 4, FUNCTION_H_1 = 14, FUNCTION_H_K_1, FUNCTION_TURN = 20,
+	/* Not of x and y alone, but of the move between them. */
+	FUNCTION_TRANSFER, FUNCTION_STEPS, FUNCTION_CHOICE, FUNCTION_F, FUNCTION_FIXED, FUNCTION_EMITTER, FUNCTION_BACK,
+};
 
 static const char *const functions[BALANCE_FUNCTIONS] = {
-	"film x", "film y", "distance from the film's centre", "even columns", "intensity", "wavelength", "x_k-1 x", "x_k-1 z",
-	"x_1 y", "x_1 z", "x_0 x", "x_0 z", "lengths", "last length", "h_1", "h_k-1", "roughness", "edges", "aperture", "cosine at x_1",
+	"film x", "film y", "film's centre", "even columns", "intensity", "wavelength", "x_k-1 x", "x_k-1 z",
+	"x_1 y", "x_1 z", "x_0 x", "x_0 z", "lengths", "last length", "h_1", "h_k-1", "roughness", "edges", "aperture", "cosine at x_1", "wavelength's turn",
+	"transfer", "steps", "choice", "f", "fixed part", "emitter", "way back",
 };
 
 /* A ray that found a vertex and a ray that asks whether it is seen go to points that differ by rounding: at the edge of a
  * triangle the answers may differ. One in some 100,000 accepted proposals is seen to. */
 #define MOST_DOUBTS 2
+
+/* Ways back are asked for that part of the proposals. */
+enum { WAYS_BACK = 4 };
 
 /* Half vectors and what follows from them are as exact as walks are: differences below this mean nothing. */
 #define WALK_BLUR 0.003
@@ -54,9 +63,9 @@ static void measure(struct path_context *c, struct whole_path *x, double *g, dou
 	const double all[BALANCE_FUNCTIONS] = {
 		x->film[0], x->film[1], hypot(x->film[0] - 16, x->film[1] - 16), fmod(floor(x->film[0]), 2), whole_log_f(c, x),
 		x->wavelength, near.x, near.z, far.y, far.z, light.x, light.z, lengths, x->edge[k - 1].distance2, first, last,
-		roughness, k, x->v[k].x.p.x, k > 1 ? fabs(vec3_dot(x->v[1].x.sh.n, x->edge[0].w)) : 0,
+		roughness, k, x->v[k].x.p.x, k > 1 ? fabs(vec3_dot(x->v[1].x.sh.n, x->edge[0].w)) : 0, x->wavelength,
 	};
-	for (int i = 0; i < BALANCE_FUNCTIONS; i++) {
+	for (int i = 0; i < FUNCTION_TRANSFER; i++) {
 		g[i] = all[i];
 		blur[i] = ROUNDING * fabs(all[i]);
 	}
@@ -140,6 +149,91 @@ static void restore(struct run *r, const struct balance_trial *t, const struct m
 	assert_true(y->edges == x->edges && y->film[0] == x->film[0] && y->film[1] == x->film[1] && y->wavelength == x->wavelength);
 }
 
+static double clamp(double d)
+{
+	return isnan(d) ? 0 : fmin(fmax(d, -1), 1);
+}
+
+static void compare(const struct run *r, const double *g, const double *blur, double *phi)
+{
+	for (int i = 0; i < FUNCTION_TRANSFER; i++) {
+		double d = g[i] - r->g[i];
+		/* Round the circle: nearly as many pairs of either sign from each x. */
+		if (i == FUNCTION_TURN)
+			d = sin(2 * M_PI * d);
+		phi[i] = fabs(d) > blur[i] + r->blur[i] ? copysign(1, d) : 0;
+	}
+}
+
+/* log P(b) P(c | b) by the heuristic. */
+static double log_choice(struct run *r, const struct whole_path *x, const struct move *move)
+{
+	double weight[WHOLE_MAX_VERTICES], p;
+	heuristic_roughness.weigh_b(r->c, x, weight);
+	p = heuristic_probability(weight, x->edges + 1, move->b);
+	if (move->b > 0) {
+		heuristic_roughness.weigh_c(r->c, x, move->b, weight);
+		p *= heuristic_probability(weight, move->b, move->c);
+	}
+	return log(p);
+}
+
+static double log_fixed(struct run *r, struct whole_path *x, const struct move *move)
+{
+	double sum = 0;
+	for (unsigned j = 0; j < move->c; j++)
+		sum += log(spectrum_max(whole_f(r->c, x, j)));
+	return sum;
+}
+
+/* Half vectors of x, asked of a walk that begins at y, do not lead to x: there is no way back. */
+static bool stays_away(struct run *r, const struct move *move)
+{
+	static struct whole_path back;
+	static struct walk_scratch scratch;
+	struct walk_target target[WHOLE_MAX_VERTICES];
+	const struct whole_path *x = r->x, *y = r->y;
+	unsigned b = move->b, c = move->c;
+	whole_copy(&back, y, 0, y->edges);
+	back.v[b] = x->v[b];
+	back.v[c] = x->v[c];
+	back.wl = x->wl;
+	back.wavelength = x->wavelength;
+	double farthest = 0;
+	for (unsigned j = c + 1; j < b; j++) {
+		farthest = fmax(farthest, vec3_length(vec3_sub(y->v[j].x.p, x->v[j].x.p)));
+		bool delta = x->v[j].delta;
+		target[j].h = delta ? (vec2){0, 0} : halfvec_of(x, j);
+		const double *sigma = r->m->scratch.step[X_TO_Y][j].sigma;
+		target[j].tolerance = delta ? 1e-9 : 1e-3 * fmin(fmin(x->v[j].bsdf->alpha, 1), fmin(sigma[0], sigma[1]));
+	}
+	if (halfvec_walk(r->c, &back, b, c, target, true, &r->m->limits, &scratch) != WALK_OK)
+		return true;
+	for (unsigned j = c + 1; j < b; j++)
+		if (vec3_length(vec3_sub(back.v[j].x.p, x->v[j].x.p)) > 0.01 * farthest + 1e-9)
+			return true;
+	return false;
+}
+
+/* Parts of the densities themselves, by as much as they differ: what is left out of the ratio shows there first. And whether
+ * there is a way back: where there is none phi is 1, and nobody ever proposes the pair for which it is -1. */
+static void compare_moves(struct run *r, const struct balance_trial *t, double log_f, const struct move *move, double *phi)
+{
+	for (int i = FUNCTION_TRANSFER; i < BALANCE_FUNCTIONS; i++)
+		phi[i] = 0;
+	phi[FUNCTION_F] = clamp(log_f - r->g[FUNCTION_INTENSITY]);
+	double emitter = log(path_pdf_emitter(r->c, &r->y->v[0]) / path_pdf_emitter(r->c, &r->x->v[0]));
+	phi[FUNCTION_EMITTER] = fabs(emitter) > ROUNDING ? clamp(emitter) : 0;
+	if (t->ops->independent)
+		return;
+	phi[FUNCTION_TRANSFER] = clamp(move->log_transfer[X_TO_Y] - move->log_transfer[Y_TO_X]);
+	phi[FUNCTION_STEPS] = clamp(move->log_density[X_TO_Y] - move->log_density[Y_TO_X]);
+	phi[FUNCTION_CHOICE] = clamp(log_choice(r, r->y, move) - log_choice(r, r->x, move));
+	phi[FUNCTION_FIXED] = clamp(log_fixed(r, r->y, move) - log_fixed(r, r->x, move));
+	if (move->b > move->c + 1 && r->m->step % WAYS_BACK == 0)
+		phi[FUNCTION_BACK] = stays_away(r, move);
+}
+
 static void propose(struct run *r, struct balance_trial *t, unsigned group)
 {
 	struct move move = {0};
@@ -149,14 +243,14 @@ static void propose(struct run *r, struct balance_trial *t, unsigned group)
 	t->pairs++;
 	double a = acceptance(r, t, &move), w = a * (t->ops->independent ? r->strict_weight : r->weight);
 	if (a > 0) {
+		double phi[BALANCE_FUNCTIONS];
 		t->expected += a;
 		measure(r->c, r->y, h, blur);
+		compare(r, h, blur, phi);
+		compare_moves(r, t, h[FUNCTION_INTENSITY], &move, phi);
 		for (int i = 0; i < BALANCE_FUNCTIONS; i++) {
-			double d = h[i] - r->g[i];
-			if (!(fabs(d) > blur[i] + r->blur[i]))
-				continue;
-			t->sum[group][i] += copysign(w, d);
-			t->size[group][i] += w;
+			t->sum[group][i] += w * phi[i];
+			t->size[group][i] += w * fabs(phi[i]);
 		}
 		mutation_random(r->m, BLOCK_STRATEGY, u);
 		if (u[1] < a)
