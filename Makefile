@@ -1,5 +1,6 @@
 # make            programs into build/bin
 # make test       unit and end-to-end tests (SAN=address,undefined for sanitizers, FULL=1 for the long forms)
+# make test-numerics   what is hard on the numbers, one row a case
 # make demo bench fuzz install clean
 
 CC       ?= gcc
@@ -106,6 +107,12 @@ tests: $(TEST_BIN)
 test: programs tests
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)
 .SECONDARY:
+
+# What is hard on the numbers, one row a case; the same programs are part of the tests.
+NUMERICS_BIN := $(filter $(BUILD)/tests/worker/halfvec/% $(BUILD)/tests/numerics/%,$(TEST_BIN))
+.PHONY: test-numerics
+test-numerics: programs $(NUMERICS_BIN)
+	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/numerics/run.sh $(BUILD)
 
 # Fuzzers: tests/fuzz/fuzz_*.c, one libFuzzer program each; run.sh calls `make fuzzers` with clang and its sanitizers.
 FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.c)

@@ -14,6 +14,7 @@
  */
 #include "tests/support/stationary.h"
 #include "tests/worker/mutation/scenes.h"
+#include "worker/mutation/mutation.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -88,7 +89,8 @@ static void check(const struct world *w, const char *scene, unsigned edges, cons
 {
 	static struct stationary_result r;
 	/* Fresh paths lie anywhere on the film: far less of the noise cancels. */
-	bool fresh = strcmp(mutation, "independent") == 0;
+	const struct mutation_ops *ops = mutation_find(mutation, strcspn(mutation, "@"));
+	bool fresh = ops && ops->independent;
 	uint32_t more = fresh && full() ? 16 : edges == 2 ? 2 : 1;
 	struct stationary_how how = {mutation, edges, edges, more * STARTS, more * BOOTSTRAP, STATIONARY_SOUND};
 	stationary_run(w, scene, &how, &r);
@@ -106,7 +108,6 @@ static void check(const struct world *w, const char *scene, unsigned edges, cons
 
 static void check_all(const struct world *w, const char *scene, unsigned k, struct tally *t)
 {
-	static const char *const alone[] = {"hslt", "halfvec", "multichain", "wavelength", "lens", "light", "independent"};
 	char text[32];
 	check(w, scene, k, "hslt@b0", false, t);
 	for (unsigned b = 1; b <= k; b++)
@@ -116,8 +117,8 @@ static void check_all(const struct world *w, const char *scene, unsigned k, stru
 			snprintf(text, sizeof text, "hslt@b%uc%u", b, c);
 			check(w, scene, k, text, false, t);
 		}
-	for (size_t i = 0; i < sizeof alone / sizeof *alone; i++)
-		check(w, scene, k, alone[i], false, t);
+	for (size_t i = 0; mutation_registry[i]; i++)
+		check(w, scene, k, mutation_registry[i]->name, false, t);
 }
 
 static void check_list(const struct world *w, const char *scene, const struct forced *f, struct tally *t)

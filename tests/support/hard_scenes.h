@@ -1,0 +1,21 @@
+/*
+ * Scenes that are hard on the numbers: each topic a function of one parameter. In a room of side 4 or on a plate under a lamp,
+ * 32 x 32 pixels. The caller frees the world.
+ */
+#ifndef TESTS_SUPPORT_HARD_SCENES_H
+#define TESTS_SUPPORT_HARD_SCENES_H
+
+#include "worker/world/world.h"
+
+struct hard_case {
+	const char *topic, *name;
+	struct world *(*make)(double parameter);
+	double parameter;
+	unsigned min_edges, max_edges;
+	const char *mutation; /* looked at alone */
+};
+
+/* Ends with a NULL topic. */
+extern const struct hard_case hard_cases[];
+
+#endif
