@@ -162,6 +162,12 @@ void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct r
 
 void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv)
 {
+	/* Where both normals are one the shading frame is this one already. */
+	if (x->sh.n.x == x->ng.x && x->sh.n.y == x->ng.y && x->sh.n.z == x->ng.z) {
+		*du = x->sh.s;
+		*dv = x->sh.t;
+		return;
+	}
 	struct frame f = frame_along(x->ng, x->dpdu);
 	*du = f.s;
 	*dv = f.t;

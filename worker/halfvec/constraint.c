@@ -44,13 +44,13 @@ vec2 halfvec_of(const struct whole_path *x, unsigned j)
 }
 
 /* Derivative of a unit direction that turns at `rate` as an end of it moves along d. */
-static vec3 turn(vec3 w, vec3 d, double rate)
+static inline vec3 turn(vec3 w, vec3 d, double rate)
 {
 	return vec3_scale(rate, vec3_madd(d, -vec3_dot(w, d), w));
 }
 
 /* Change of the slopes as the half vector changes by d, in a frame that stands still. */
-static vec2 slope_change(const struct frame *f, const struct half *r, vec3 d)
+static inline vec2 slope_change(const struct frame *f, const struct half *r, vec3 d)
 {
 	vec3 l = frame_to_local(f, d);
 	if (r->matched)
@@ -58,7 +58,7 @@ static vec2 slope_change(const struct frame *f, const struct half *r, vec3 d)
 	return (vec2){(l.x - r->h.x * l.z) / r->along, (l.y - r->h.y * l.z) / r->along};
 }
 
-static mat2 by_neighbour(const struct frame *f, const struct half *r, const struct neighbour *n, double weight)
+static inline mat2 by_neighbour(const struct frame *f, const struct half *r, const struct neighbour *n, double weight)
 {
 	return mat2_of_columns(slope_change(f, r, turn(n->w, n->du, weight * n->rate)),
 			       slope_change(f, r, turn(n->w, n->dv, weight * n->rate)));
@@ -66,7 +66,7 @@ static mat2 by_neighbour(const struct frame *f, const struct half *r, const stru
 
 /* The vertex itself moves along d: both directions turn, and the frame with the shading normal (by dn) and with the field of
  * du (by ddu). ds = -(s.dn) n + w t and dt = -(t.dn) n - w s, where w is how s = N(du - n (n.du)) turns about n. */
-static vec2 by_itself(const struct frame *f, const struct half *r, const struct neighbour *i, const struct neighbour *o,
+static inline vec2 by_itself(const struct frame *f, const struct half *r, const struct neighbour *i, const struct neighbour *o,
 		      double eta, vec3 d, vec3 du, vec3 dn, vec3 ddu)
 {
 	vec3 sum = vec3_add(turn(i->w, d, -i->own), turn(o->w, d, -eta * o->own));

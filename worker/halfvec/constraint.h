@@ -42,6 +42,7 @@ struct constraint_system {
 	unsigned b, c;
 	bool pivoted;
 	mat2 inverse[WHOLE_MAX_VERTICES]; /* of L_j, by vertex */
+	double det[WHOLE_MAX_VERTICES];   /* of L_j */
 	double log_det;                   /* log |det M| */
 	double log_transfer;              /* log |det d x_{b-1} / d x_c| with all h held: prod |det a_j| / |det M| */
 	/* banded factors, when pivoted: the layout is constraint_system.c's */
@@ -50,6 +51,8 @@ struct constraint_system {
 };
 
 enum constraint_end constraint_factor(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *out);
+/* The same but for the two logarithms, which only constraint_factor fills in. */
+enum constraint_end constraint_factor_to_solve(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *out);
 /* dx for given dh, both by vertex index c+1..b-1. */
 void constraint_solve(const struct constraint *k, const struct constraint_system *m, const vec2 *dh, vec2 *dx);
 

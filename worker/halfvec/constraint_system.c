@@ -34,7 +34,7 @@ static void multiply(struct long_product *p, double v)
 
 static double log_of(const struct long_product *p)
 {
-	return log(p->v) + p->exponent * M_LN2;
+	return log(fabs(p->v)) + p->exponent * M_LN2;
 }
 
 static bool fits(mat2 m)
@@ -47,16 +47,22 @@ struct scales {
 	vec2 row[WHOLE_MAX_VERTICES], column[WHOLE_MAX_VERTICES];
 };
 
-static void grow_column(vec2 *column, mat2 m, vec2 row)
+/* Of numbers that are none of them NaN: a call of fmax costs more than what is done here with the result. */
+static inline double larger(double a, double b)
 {
-	column->x = fmax(column->x, fmax(fabs(m.xx) * row.x, fabs(m.yx) * row.y));
-	column->y = fmax(column->y, fmax(fabs(m.xy) * row.x, fabs(m.yy) * row.y));
+	return a > b ? a : b;
 }
 
-static void grow_row(vec2 *row, mat2 m, vec2 column)
+static inline void grow_column(vec2 *column, mat2 m, vec2 row)
 {
-	row->x = fmax(row->x, fmax(fabs(m.xx) * column.x, fabs(m.xy) * column.y));
-	row->y = fmax(row->y, fmax(fabs(m.yx) * column.x, fabs(m.yy) * column.y));
+	column->x = larger(column->x, larger(fabs(m.xx) * row.x, fabs(m.yx) * row.y));
+	column->y = larger(column->y, larger(fabs(m.xy) * row.x, fabs(m.yy) * row.y));
+}
+
+static inline void grow_row(vec2 *row, mat2 m, vec2 column)
+{
+	row->x = larger(row->x, larger(fabs(m.xx) * column.x, fabs(m.xy) * column.y));
+	row->y = larger(row->y, larger(fabs(m.yx) * column.x, fabs(m.yy) * column.y));
 }
 
 /* 1 / of both; false: nothing, or nearly nothing, is there to be divided by. */
@@ -124,8 +130,8 @@ static bool invert(mat2 l, const struct scales *s, unsigned j, double most, mat2
 	*det = mat2_det(l);
 	mat2 adjugate = mat2_adjugate(l);
 	vec2 row = s->row[j], column = s->column[j];
-	double largest = fmax(fmax(fabs(adjugate.xx) * row.x * column.x, fabs(adjugate.xy) * row.y * column.x),
-			      fmax(fabs(adjugate.yx) * row.x * column.y, fabs(adjugate.yy) * row.y * column.y));
+	double largest = larger(larger(fabs(adjugate.xx) * row.x * column.x, fabs(adjugate.xy) * row.y * column.x),
+				larger(fabs(adjugate.yx) * row.x * column.y, fabs(adjugate.yy) * row.y * column.y));
 	if (!(largest < most * fabs(*det)))
 		return false;
 	*inverse = (mat2){adjugate.xx / *det, adjugate.xy / *det, adjugate.yx / *det, adjugate.yy / *det};
@@ -139,19 +145,14 @@ static mat2 triple(mat2 x, mat2 y, mat2 z)
 
 static bool factor_blocks(const struct constraint *k, const struct scales *s, struct constraint_system *m)
 {
-	struct long_product all = {1, 0};
 	mat2 taken = {0, 0, 0, 0};
 	for (unsigned j = m->b - 1; j > m->c; j--) {
 		bool last = j == m->c + 1;
-		double det;
-		if (!invert(mat2_sub(k[j].b, taken), s, j, last ? LAST_MOST : BLOCK_MOST, &m->inverse[j], &det))
+		if (!invert(mat2_sub(k[j].b, taken), s, j, last ? LAST_MOST : BLOCK_MOST, &m->inverse[j], &m->det[j]))
 			return false;
-		multiply(&all, det);
 		if (!last)
 			taken = triple(k[j - 1].c, m->inverse[j], k[j].a);
 	}
-	all.v = fabs(all.v);
-	m->log_det = log_of(&all);
 	return true;
 }
 
@@ -193,7 +194,6 @@ static unsigned pick(double row[][WIDTH], const double *of_row, unsigned r, unsi
 static bool eliminate_band(double row[][WIDTH], unsigned n, const double *of_column, double *of_row,
 			   struct constraint_system *m)
 {
-	struct long_product all = {1, 0};
 	double least = n * 0x1p-46;
 	/* Rows below the first start left of where they are first looked at: align those that reach column 0. */
 	for (unsigned r = 0; r < n && r < LOWER; r++) {
@@ -209,7 +209,6 @@ static bool eliminate_band(double row[][WIDTH], unsigned n, const double *of_col
 		of_row[p] = s;
 		if (!(fabs(row[r][0]) > least * of_row[r] * of_column[r]))
 			return false;
-		multiply(&all, row[r][0]);
 		memcpy(m->band[r], row[r], sizeof row[r]);
 		for (unsigned q = r + 1; q <= r + LOWER; q++) {
 			double f = q < n ? row[q][0] / row[r][0] : 0;
@@ -221,8 +220,6 @@ static bool eliminate_band(double row[][WIDTH], unsigned n, const double *of_col
 			row[q][WIDTH - 1] = 0;
 		}
 	}
-	all.v = fabs(all.v);
-	m->log_det = log_of(&all);
 	return true;
 }
 
@@ -240,7 +237,7 @@ static bool factor_pivoted(const struct constraint *k, const struct scales *s, s
 	return eliminate_band(row, n, of_column, of_row, m);
 }
 
-enum constraint_end constraint_factor(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *m)
+enum constraint_end constraint_factor_to_solve(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *m)
 {
 	assert(c + 2 <= b && b < WHOLE_MAX_VERTICES);
 	struct scales s;
@@ -249,11 +246,22 @@ enum constraint_end constraint_factor(const struct constraint *k, unsigned b, un
 	m->pivoted = false;
 	if (!find_scales(k, b, c, &s) || !(factor_blocks(k, &s, m) || factor_pivoted(k, &s, m)))
 		return CONSTRAINT_SINGULAR;
-	struct long_product all = {1, 0};
+	return CONSTRAINT_OK;
+}
+
+enum constraint_end constraint_factor(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *m)
+{
+	if (constraint_factor_to_solve(k, b, c, m) != CONSTRAINT_OK)
+		return CONSTRAINT_SINGULAR;
+	struct long_product all = {1, 0}, towards_light = {1, 0};
+	for (unsigned j = b - 1; !m->pivoted && j > c; j--)
+		multiply(&all, m->det[j]);
+	for (unsigned r = 0; m->pivoted && r < 2 * (b - c - 1); r++)
+		multiply(&all, m->band[r][0]);
 	for (unsigned j = c + 1; j < b; j++)
-		multiply(&all, mat2_det(k[j].a));
-	all.v = fabs(all.v);
-	m->log_transfer = log_of(&all) - m->log_det;
+		multiply(&towards_light, mat2_det(k[j].a));
+	m->log_det = log_of(&all);
+	m->log_transfer = log_of(&towards_light) - m->log_det;
 	return CONSTRAINT_OK;
 }
 

@@ -111,7 +111,7 @@ static double residuals(struct walk *m, bool *within)
 static enum walk_end keep(struct walk *m)
 {
 	struct walk_scratch *s = m->s;
-	if (constraint_factor(s->k, m->b, m->end, &s->system) != CONSTRAINT_OK)
+	if (constraint_factor_to_solve(s->k, m->b, m->end, &s->system) != CONSTRAINT_OK)
 		return WALK_SINGULAR;
 	constraint_solve(s->k, &s->system, s->residual, s->dx);
 	for (unsigned j = m->end + 1; j < m->b; j++) {
