@@ -55,18 +55,18 @@ bool __wrap_accel_occluded_to_infinity(const struct accel *a, const struct ray_e
 
 struct recorded_walks record_walks;
 
-enum walk_end __real_halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
-				  const struct walk_target *target, bool visible, const struct walk_limits *limits,
-				  struct walk_scratch *s);
-enum walk_end __wrap_halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
-				  const struct walk_target *target, bool visible, const struct walk_limits *limits,
-				  struct walk_scratch *s);
+enum walk_end __real_halfvec_walk_from(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+				       const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				       unsigned stale, struct walk_scratch *s);
+enum walk_end __wrap_halfvec_walk_from(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+				       const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				       unsigned stale, struct walk_scratch *s);
 
-enum walk_end __wrap_halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
-				  const struct walk_target *target, bool visible, const struct walk_limits *limits,
-				  struct walk_scratch *s)
+enum walk_end __wrap_halfvec_walk_from(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+				       const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				       unsigned stale, struct walk_scratch *s)
 {
-	enum walk_end end = __real_halfvec_walk(c, y, b, c_end, target, visible, limits, s);
+	enum walk_end end = __real_halfvec_walk_from(c, y, b, c_end, target, visible, limits, stale, s);
 	/* Only a walk back knows that the path which it looks for can be seen. */
 	(visible ? record_walks.back : record_walks.there)[end]++;
 	return end;

@@ -90,7 +90,7 @@ static enum walk_end trial(struct walk *m, double step)
 	}
 }
 
-/* How far the half vectors are from the targets, a measure for step control alone. within: all as near as asked. */
+/* How far the half vectors s->k[].h are from the targets, a measure for step control alone. within: all as near as asked. */
 static double residuals(struct walk *m, bool *within)
 {
 	double error = 0;
@@ -107,11 +107,11 @@ static double residuals(struct walk *m, bool *within)
 	return error;
 }
 
-/* The trial becomes the kept state: Newton's step from there. */
-static enum walk_end keep(struct walk *m)
+/* The trial becomes the kept state: Newton's step from there, by the system of s->k. */
+static enum walk_end keep(struct walk *m, bool factored)
 {
 	struct walk_scratch *s = m->s;
-	if (constraint_factor_to_solve(s->k, m->b, m->end, &s->system) != CONSTRAINT_OK)
+	if (!factored && constraint_factor_to_solve(s->k, m->b, m->end, &s->system) != CONSTRAINT_OK)
 		return WALK_SINGULAR;
 	constraint_solve(s->k, &s->system, s->residual, s->dx);
 	for (unsigned j = m->end + 1; j < m->b; j++) {
@@ -149,27 +149,53 @@ static bool all_visible(const struct walk *m)
 	return true;
 }
 
+static void constrain(struct walk *m, unsigned b, unsigned end)
+{
+	constraints_of(m->c->w, m->y, b, end, m->s->k);
+}
+
+static void refresh(struct walk *m, unsigned stale)
+{
+	if (stale & WALK_STALE) {
+		constrain(m, m->b, m->end);
+		return;
+	}
+	if (stale & WALK_STALE_B)
+		constrain(m, m->b, m->b - 2);
+	if (stale & WALK_STALE_C)
+		constrain(m, m->end + 2, m->end);
+}
+
+/* Of the trial: half vectors alone are cheap, derivatives only pay where the walk goes on or the caller asks for them. */
+static double look(struct walk *m, bool *within)
+{
+	for (unsigned j = m->end + 1; j < m->b; j++)
+		m->s->k[j].h = halfvec_of(m->y, j);
+	return residuals(m, within);
+}
+
 /* Until the residuals are as small as asked, or a reason why they cannot be. */
-static enum walk_end iterate(struct walk *m, const struct walk_limits *limits)
+static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, unsigned stale, bool back)
 {
 	struct walk_scratch *s = m->s;
 	bool within;
-	constraints_of(m->c->w, m->y, m->b, m->end, s->k);
+	refresh(m, stale);
 	double error = residuals(m, &within), step = 1;
-	enum walk_end last = isfinite(error) ? keep(m) : WALK_SINGULAR;
+	enum walk_end last = isfinite(error) ? keep(m, !stale) : WALK_SINGULAR;
 	if (last != WALK_OK)
 		return last;
 	while (s->iterations < limits->iterations) {
 		s->iterations++;
 		last = trial(m, step);
 		if (last == WALK_OK) {
-			constraints_of(m->c->w, m->y, m->b, m->end, s->k);
-			double now = residuals(m, &within);
+			double now = look(m, &within);
+			if (within ? !back : now < error)
+				constrain(m, m->b, m->end);
 			if (within)
 				return WALK_OK;
 			if (now < error) {
 				error = now;
-				last = keep(m);
+				last = keep(m, false);
 				if (last != WALK_OK)
 					return last;
 				step = fmin(1, 2 * step);
@@ -184,9 +210,9 @@ static enum walk_end iterate(struct walk *m, const struct walk_limits *limits)
 	return last == WALK_OK ? WALK_ITERATIONS : last;
 }
 
-enum walk_end halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
-			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
-			   struct walk_scratch *s)
+enum walk_end halfvec_walk_from(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+				const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				unsigned stale, struct walk_scratch *s)
 {
 	assert(c_end + 1 < b && b <= y->edges);
 	struct walk m = {.c = c, .y = y, .b = b, .end = c_end, .target = target, .scale = limits->scale, .s = s};
@@ -194,8 +220,15 @@ enum walk_end halfvec_walk(struct path_context *c, struct whole_path *y, unsigne
 	whole_forget(y, c_end + 1, b - 1);
 	enum walk_end end = start(&m);
 	if (end == WALK_OK)
-		end = iterate(&m, limits);
+		end = iterate(&m, limits, stale, visible);
 	if (end == WALK_OK && !visible && !all_visible(&m))
 		end = WALK_BLOCKED;
 	return end;
+}
+
+enum walk_end halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
+			   struct walk_scratch *s)
+{
+	return halfvec_walk_from(c, y, b, c_end, target, visible, limits, WALK_STALE, s);
 }

@@ -45,12 +45,19 @@ struct walk_scratch {
 };
 
 /* y: vertices b and c stay; b-1..c+1 are where the walk starts, and on WALK_OK where it ended, with edges c..b-1 joined.
- * Wavelengths (indices of refraction) are y's. On WALK_OK s->k holds the constraints there. visible: do not ask for
- * occlusion, the caller knows. On failure y's vertices c+1..b-1 are not to be read. What y knew of f there is forgotten.
+ * Wavelengths (indices of refraction) are y's. On WALK_OK s->k holds the constraints there, but for a walk back. visible: a
+ * walk back, do not ask for occlusion, the caller knows. On failure y's vertices c+1..b-1 are not to be read. What y knew of f there is forgotten.
  * A walk back tells for certain whether it finds the path again when its tolerances are tighter than those of the way there
  * (scale 0.1: 0.2 iterations more, no rays). */
 enum walk_end halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
 			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
 			   struct walk_scratch *s);
+
+/* What no longer holds of s->k and s->system, which are of the path where the walk starts: nothing; the constraint next to an
+ * end that has moved since, and the system; all. */
+enum walk_stale { WALK_STALE_B = 1, WALK_STALE_C = 2, WALK_STALE = 4 };
+enum walk_end halfvec_walk_from(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+				const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				unsigned stale, struct walk_scratch *s);
 
 #endif

@@ -2,6 +2,8 @@
 
 #include "worker/mutation/trace.h"
 
+#include <string.h>
+
 /* A vertex at the end of a walk: how near its target the half vector comes, of the smaller of lobe and step. */
 #define WALK_TOLERANCE 1e-3
 #define SPECULAR_TOLERANCE 1e-9
@@ -127,10 +129,21 @@ static void add_step_densities(struct mutation_ctx *m, const struct breakup *how
 	}
 }
 
+/* What of the constraints of one path does not hold when the walk to the other starts from it. */
+static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct whole_path *x, const struct whole_path *y)
+{
+	if (m->path->w->effects.dispersion && x->wavelength != y->wavelength)
+		return WALK_STALE;
+	bool aperture = how->aperture && camera_has_aperture(&m->path->w->camera);
+	bool b_moved = how->b < x->edges || aperture, c_moved = how->c == 0 && how->emitter;
+	return (b_moved ? WALK_STALE_B : 0) | (c_moved ? WALK_STALE_C : 0);
+}
+
 /* The walk from y leads back to x: else the proposal has no way back, and detailed balance wants it refused. */
-static bool leads_back(struct mutation_ctx *m, unsigned b, unsigned c, const struct whole_path *x, const struct whole_path *y)
+static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct whole_path *x, const struct whole_path *y)
 {
 	struct mutation_scratch *s = &m->scratch;
+	unsigned b = how->b, c = how->c;
 	struct whole_path *back = &s->back;
 	whole_copy(back, y, c, b);
 	back->v[b] = x->v[b];
@@ -146,7 +159,7 @@ static bool leads_back(struct mutation_ctx *m, unsigned b, unsigned c, const str
 	struct walk_limits limits = m->limits;
 	limits.scale *= BACK_SCALE;
 	m->count[STRATEGY_REVERSE_WALKS]++;
-	enum walk_end end = halfvec_walk(m->path, back, b, c, s->target, true, &limits, &s->walk);
+	enum walk_end end = halfvec_walk_from(m->path, back, b, c, s->target, true, &limits, stale_of(m, how, x, y), &s->walk);
 	m->count[STRATEGY_WALKS]++;
 	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
 	if (end != WALK_OK)
@@ -166,24 +179,24 @@ static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *
 {
 	struct mutation_scratch *s = &m->scratch;
 	struct path_context *c = m->path;
-	struct constraint_system system;
 	constraints_of(c->w, x, how->b, how->c, s->k);
-	if (constraint_factor(s->k, how->b, how->c, &system) != CONSTRAINT_OK)
+	if (constraint_factor(s->k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
 		return STRATEGY_FAIL_SINGULAR;
-	move->log_transfer[Y_TO_X] = system.log_transfer;
+	move->log_transfer[Y_TO_X] = s->walk.system.log_transfer;
 	halfvec_steps(c, x, s->k, how->b, how->c, s->step[X_TO_Y]);
 	aim(m, how, x);
-	enum walk_end end = halfvec_walk(c, y, how->b, how->c, s->target, false, &m->limits, &s->walk);
+	memcpy(&s->walk.k[how->c + 1], &s->k[how->c + 1], (how->b - how->c - 1) * sizeof s->k[0]);
+	enum walk_end end = halfvec_walk_from(c, y, how->b, how->c, s->target, false, &m->limits, stale_of(m, how, x, y), &s->walk);
 	m->count[STRATEGY_WALKS]++;
 	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
 	if (end != WALK_OK)
 		return reason_of(end);
-	if (constraint_factor(s->walk.k, how->b, how->c, &system) != CONSTRAINT_OK)
+	if (constraint_factor(s->walk.k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
 		return STRATEGY_FAIL_SINGULAR;
-	move->log_transfer[X_TO_Y] = system.log_transfer;
+	move->log_transfer[X_TO_Y] = s->walk.system.log_transfer;
 	halfvec_steps(c, y, s->walk.k, how->b, how->c, s->step[Y_TO_X]);
 	add_step_densities(m, how, x, move);
-	return leads_back(m, how->b, how->c, x, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_REVERSE;
+	return leads_back(m, how, x, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_REVERSE;
 }
 
 static enum strategy_counter join(struct mutation_ctx *m, unsigned e, struct whole_path *y)
