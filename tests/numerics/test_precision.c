@@ -1,0 +1,150 @@
+/*
+ * Acceptance ratios of walks from the camera to the light, from the positions of the vertices: the program's against an implementation of
+ * its own in long double (weight.inc), and what the same formulas would make of it in double and in float. Densities of the steps are
+ * left out (test_stepsize.c has them).
+ */
+#include "tests/numerics/rows.h"
+#include "tests/support/stats.h"
+#include "tests/support/worlds.h"
+#include "worker/chain/path_chain.h"
+#include "worker/math/fptrap.h"
+#include "worker/mutation/mutation.h"
+#include "worker/path/integrator.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+#include <tgmath.h>
+
+#include <cmocka.h>
+
+enum { WEIGHT_MOST = 8 };
+
+#define REAL float
+#define N(name) in_float_##name
+#include "tests/numerics/weight.inc"
+#undef REAL
+#undef N
+#define REAL double
+#define N(name) in_double_##name
+#include "tests/numerics/weight.inc"
+#undef REAL
+#undef N
+#define REAL long double
+#define N(name) in_long_##name
+#include "tests/numerics/weight.inc"
+#undef REAL
+#undef N
+
+#define AT(inner) "<transform name='to_world'>" inner "</transform>"
+#define SCENE                                                                                                                   \
+	SENSOR("0,0.2,1.9", "0,-0.3,-1")                                                                                        \
+	"<shape type='cube'>" AT("<scale value='2'/>") "<bsdf type='diffuse'><float name='reflectance' value='0.5'/></bsdf></shape>"  \
+	"<shape type='rectangle'>" AT("<scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/>")                         \
+	"<emitter type='area'><float name='radiance' value='3'/></emitter></shape>"                                               \
+	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>"                         \
+	"<bsdf type='roughdielectric'><float name='int_ior' value='%.17g'/><float name='ext_ior' value='1'/><float name='alpha' "   \
+	"value='%.17g'/></bsdf></shape>"
+
+struct precision_case {
+	const char *name;
+	double index, alpha;
+	unsigned edges;
+	double allowed; /* of the program's error, in log acceptance */
+};
+
+static const struct precision_case cases[] = {
+	{"roughness 0.3", 1.5, 0.3, 4, 2e-11},	       {"roughness 0.01", 1.5, 0.01, 4, 2e-11},
+	{"roughness 1e-4", 1.5, 1e-4, 4, 1e-9},	       {"roughness 1e-6", 1.5, 1e-6, 4, 1e-7},
+	{"index 1.01", 1.01, 0.1, 4, 2e-11},	       {"index 1 + 1e-4, roughness 0.3", 1.0001, 0.3, 4, 2e-9},
+	{"index 1 + 1e-6, roughness 0.5", 1.000001, 0.5, 4, 3e-7}, {"7 edges, roughness 0.1", 1.5, 0.1, 7, 2e-11},
+};
+
+struct errors {
+	unsigned count, wrong; /* wrong: float's acceptance is off by more than 1 % */
+	double program, in_double, in_float, *of_float;
+};
+
+static int by_size(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+	return (x > y) - (x < y);
+}
+
+static void note(struct errors *e, double program, const struct world *w, const struct whole_path *x, const struct whole_path *y)
+{
+	long double truth = in_long_log_weight(w, y) - in_long_log_weight(w, x);
+	double twice = in_double_log_weight(w, y) - in_double_log_weight(w, x);
+	double once = (double)(in_float_log_weight(w, y) - in_float_log_weight(w, x));
+	double accept = (double)exp(fmin(truth, 0.0L)), off = fabs((double)(once - truth));
+	/* A NaN counts as infinite. */
+	double wrong = (double)fabs(program - truth);
+	e->program = fmax(e->program, isfinite(wrong) ? wrong : INFINITY);
+	e->in_double = fmax(e->in_double, (double)fabs(twice - truth));
+	e->of_float[e->count++] = isfinite(off) ? off : INFINITY;
+	e->wrong += !(fabs(exp(fmin(once, 0.0)) - accept) <= 0.01);
+}
+
+static void run(const struct precision_case *p, unsigned most, struct errors *e)
+{
+	static struct path_context c;
+	static struct mutation_ctx m;
+	static struct whole_path x, y;
+	static uint64_t counters[BATCH_COUNTERS], strategy[STRATEGY_COUNTERS];
+	const struct mutation_ops *ops = mutation_find("hslt", 4);
+	const struct mutation_setting how = {(int)p->edges, 0};
+	struct world *w = world_of_text(32, 32, SCENE, p->index, p->alpha);
+	uint64_t seed = stats_seed(p->name);
+	c = (struct path_context){.w = w, .window = {0, 0, 32, 32}, .min_depth = p->edges, .max_depth = p->edges, .counters = counters};
+	m = (struct mutation_ctx){.path = &c, .seed = seed, .count = strategy, .limits = WALK_LIMITS_DEFAULT};
+	for (uint64_t i = 0; e->count < most && i < 400 * most; i++) {
+		struct move move = {0};
+		bool through = false;
+		if (!path_start(&c, seed, i, &x))
+			continue;
+		for (unsigned j = 1; j < p->edges; j++)
+			through |= x.v[j].bsdf->eta != 1;
+		if (!through)
+			continue;
+		whole_copy(&y, &x, 0, x.edges);
+		m.chain = i;
+		if (ops->propose(&m, &how, &x, &y, &move))
+			continue;
+		double to_y = ops->log_weight(&m, &y, &move, X_TO_Y), to_x = ops->log_weight(&m, &x, &move, Y_TO_X);
+		double program = to_y - to_x + move.log_density[X_TO_Y] - move.log_density[Y_TO_X];
+		if (isfinite(program))
+			note(e, program, w, &x, &y);
+	}
+	world_free(w);
+}
+
+static void test_precision(void **state)
+{
+	(void)state;
+	struct rows rows = {0, 0};
+	unsigned most = (rows_full() ? 20000 : 1000) / rows_scale();
+	double *of_float = calloc(most, sizeof *of_float);
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct errors e = {.of_float = of_float};
+		char measured[300], bound[64];
+		run(&cases[i], most, &e);
+		qsort(of_float, e.count, sizeof *of_float, by_size);
+		snprintf(measured, sizeof measured,
+			 "%u proposals: log acceptance is off by at most %.1e (these formulas in double %.1e); in float by %.1e in the median, at "
+			 "most %.1e, acceptance wrong by more than 1 %% in %.1f %%",
+			 e.count, e.program, e.in_double, e.count ? of_float[e.count / 2] : 0, e.count ? of_float[e.count - 1] : 0,
+			 100.0 * e.wrong / (e.count ? e.count : 1));
+		snprintf(bound, sizeof bound, "%.0e", cases[i].allowed);
+		row(&rows, "precision", cases[i].name, measured, bound, e.count > most / 4 && e.program <= cases[i].allowed);
+	}
+	free(of_float);
+	printf("precision: %u cases, %u failed\n", rows.cases, rows.failed);
+	assert_int_equal(rows.failed, 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_precision)};
+	return cmocka_run_group_tests_name("precision", tests, NULL, NULL);
+}

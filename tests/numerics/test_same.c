@@ -1,0 +1,98 @@
+/*
+ * The same scene in other units and at other places, by hslt: the image stays. Powers of two and moves that are exact give the same
+ * bits. Others differ by roundings of the coordinates, and a chain that once decides otherwise goes its own way until the next
+ * independent proposal that is accepted: that changes less of a film than 1 %, where another seed changes 19 %.
+ */
+#include "tests/numerics/rows.h"
+#include "tests/support/chains.h"
+#include "tests/support/stats.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 32 };
+
+/* Scaled by s, then moved by m along all axes. */
+static struct world *world_at(double s, double m)
+{
+#define P(x) (s * (x) + m)
+	return world_of_text(
+		SIDE, SIDE,
+		"<sensor type='perspective'><float name='fov' value='45'/><float name='near_clip' value='%.17g'/><float name='far_clip' value='%.17g'/>"
+		"<transform name='to_world'><lookat origin='%.17g,%.17g,%.17g' target='%.17g,%.17g,%.17g' up='0,1,0'/></transform>"
+		"<film type='hdrfilm'><rfilter type='box'/></film></sensor>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='%.17g'/><rotate x='1' angle='-90'/>"
+		"<translate x='%.17g' y='%.17g' z='%.17g'/></transform></shape>"
+		"<shape type='sphere'><point name='center' x='%.17g' y='%.17g' z='%.17g'/><float name='radius' value='%.17g'/>"
+		"<bsdf type='roughdielectric'><float name='alpha' value='0.1'/></bsdf></shape>"
+		"<shape type='cube'><transform name='to_world'><scale value='%.17g'/><translate x='%.17g' y='%.17g' z='%.17g'/></transform>"
+		"<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf></shape>"
+		"<shape type='sphere'><point name='center' x='%.17g' y='%.17g' z='%.17g'/><float name='radius' value='%.17g'/>"
+		"<emitter type='area'><float name='radiance' value='5'/></emitter></shape>",
+		s * 0x1p-7, s * 1000, P(0), P(2), P(5), P(0), P(0.5), P(0), 4 * s, P(0), P(0), P(0), P(-0.75), P(0.75), P(0.5), 0.75 * s, 0.5 * s,
+		P(1), P(0.5), P(-0.25), P(1), P(3), P(1), 0.5 * s);
+#undef P
+}
+
+static void render(struct world *w, uint64_t seed, struct chains_result *out)
+{
+	struct chains_how how = {.min_depth = 1, .max_depth = 6, .chains = 64, .bootstrap = 4096, .steps = 2000 / rows_scale(), .seed = seed};
+	chains_run(w, &how, out);
+	world_free(w);
+}
+
+/* Sum of the absolute differences over the sum; films in units of b. */
+static double difference(const struct chains_result *a, const struct chains_result *b)
+{
+	double off = 0, sum = 0;
+	for (int i = 0; i < 3 * SIDE * SIDE; i++) {
+		off += fabs((double)a->xyz[i] * a->b - (double)b->xyz[i] * b->b);
+		sum += (double)b->xyz[i] * b->b;
+	}
+	return off / sum;
+}
+
+static void test_same(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *name;
+		double scale, move;
+		bool exact;
+	} cases[] = {
+		{"in units 2^-13 as large", 0x1p-13, 0, true},	{"in units 2^13 as large", 0x1p13, 0, true},
+		{"moved by 1024", 1, 1024, true},		{"scaled by 1e-4", 1e-4, 0, false},
+		{"scaled by 1e4", 1e4, 0, false},		{"moved by 1e5", 1, 100000.1, false},
+		{"scaled by 1e-4, moved by 1", 1e-4, 1, false}, {"scaled by 1e4, moved by 1e9", 1e4, 1e9, false},
+	};
+	struct rows rows = {0, 0};
+	static struct chains_result here, other, there;
+	uint64_t seed = stats_seed("the same scene");
+	char measured[200];
+	render(world_at(1, 0), seed, &here);
+	render(world_at(1, 0), seed + 1, &other);
+	double noise = difference(&other, &here);
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		render(world_at(cases[i].scale, cases[i].move), seed, &there);
+		double off = difference(&there, &here), b = there.b / here.b - 1;
+		snprintf(measured, sizeof measured, "film differs by %.2g of itself, b by %.1g (another seed: %.2g, %.1g)", off, b, noise,
+			 other.b / here.b - 1);
+		bool ok = cases[i].exact ? off == 0 && b == 0 : off <= 0.01 && fabs(b) < 1e-3;
+		row(&rows, "same image", cases[i].name, measured, cases[i].exact ? "the same bits" : "film 0.01, b 1e-3", ok);
+		free(there.xyz);
+	}
+	free(here.xyz);
+	free(other.xyz);
+	printf("the same scene elsewhere: %u cases, %u failed\n", rows.cases, rows.failed);
+	assert_int_equal(rows.failed, 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_same)};
+	return cmocka_run_group_tests_name("same image", tests, NULL, NULL);
+}
