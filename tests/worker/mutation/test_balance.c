@@ -40,7 +40,7 @@ static void check_room(const struct room *room)
 	struct world *w = room->build();
 	size_t count = all_trials(trials);
 	unsigned faults = 0;
-	balance_run(w, room->name, trials, count, dice_count(64), 1000);
+	balance_run(w, room->name, trials, count, dice_count(48), 800);
 	for (size_t i = 0; i < count; i++) {
 		if (trials[i].expected == 0)
 			continue;
