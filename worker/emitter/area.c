@@ -5,7 +5,7 @@
  */
 #include "worker/emitter/emitter.h"
 #include "worker/emitter/uniform.h"
-#include "worker/math/frame.h"
+#include "worker/math/sphere.h"
 
 struct area {
 	struct texture radiance;
@@ -81,7 +81,7 @@ static void sphere_point(const struct area *a, vec3 w, struct emitter_point *x)
 {
 	x->p = vec3_madd(a->surface.center, a->surface.radius, w);
 	x->n = vec3_scale(a->surface.normal_sign, w);
-	x->u = x->v = 0;
+	sphere_uv(&a->surface.sphere_axes, w, &x->u, &x->v);
 	x->prim = 0;
 }
 

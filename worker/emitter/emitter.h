@@ -11,7 +11,7 @@
 #ifndef WORKER_EMITTER_EMITTER_H
 #define WORKER_EMITTER_EMITTER_H
 
-#include "worker/math/vec3.h"
+#include "worker/math/frame.h"
 #include "worker/texture/texture.h"
 
 struct emitter_point {
@@ -27,6 +27,7 @@ struct emitter_surface {
 	bool is_sphere;
 	vec3 center;
 	double radius, normal_sign; /* -1: normals point inwards */
+	struct frame sphere_axes;   /* of the (u,v) parametrisation */
 	uint32_t triangle_count;
 	const float (*position)[3];
 	const uint32_t (*index)[3];

@@ -1,5 +1,7 @@
 #include "worker/geom/surface.h"
 
+#include "worker/math/sphere.h"
+
 static vec3 at(const float (*a)[3], uint32_t i)
 {
 	return (vec3){(double)a[i][0], (double)a[i][1], (double)a[i][2]};
@@ -120,7 +122,6 @@ void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, doubl
 
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
-	vec3 l = frame_to_local(&s->sphere_axes, w);
 	x->prim = prim;
 	x->p = vec3_madd(s->center, s->radius, w);
 	x->b1 = x->b2 = 0;
@@ -128,9 +129,7 @@ void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w,
 	/* du of the longitude: axis x normal; undefined at the poles, where frame_along picks a frame of its own. */
 	x->dpdu = vec3_scale(2 * M_PI * s->radius, vec3_cross(s->sphere_axes.n, w));
 	x->sh = frame_along(x->ng, x->dpdu);
-	double phi = atan2(l.y, l.x);
-	x->u = (phi < 0 ? phi + 2 * M_PI : phi) / (2 * M_PI);
-	x->v = acos(fmin(fmax(l.z, -1), 1)) / M_PI;
+	sphere_uv(&s->sphere_axes, w, &x->u, &x->v);
 }
 
 /* The hit in double: the root nearest to the one that Embree's search settled on. */

@@ -225,6 +225,7 @@ static struct emitter_surface emitter_surface_of(const struct geom_shape *g)
 		.center = g->center,
 		.radius = g->radius,
 		.normal_sign = g->normal_sign,
+		.sphere_axes = g->sphere_axes,
 		.triangle_count = g->triangle_count,
 		.position = (const float(*)[3])g->position,
 		.index = (const uint32_t(*)[3])g->index,

@@ -320,11 +320,36 @@ static void test_corners(void **state)
 	}
 }
 
+/* A texture on the light is the same however its points are found: drawn from it, drawn towards a point, or hit by a ray. */
+static void test_texture_coordinates(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(8, 8, SENSOR("0,0,9", "0,0,0") "<shape type='sphere'><transform name='to_world'>"
+					"<rotate x='1' y='2' z='.5' angle='70'/><translate x='.25' y='-.5'/></transform>"
+					"<emitter type='area'/></shape><shape type='sphere'><float name='radius' value='4'/></shape>");
+	const struct emitter *em = &w->emitters[0];
+	const struct geom_shape *s = &w->shapes[w->emitter_shape[0]];
+	for (int i = 0; i < 64; i++) {
+		const double u[2] = {(i % 8 + 0.3) / 8, (i / 8 + 0.6) / 8};
+		struct emitter_point x[2];
+		struct surface_point there;
+		double pdf;
+		assert_true(em->ops->sample_point(em, u, &x[0], &pdf));
+		assert_true(em->ops->sample_toward(em, (vec3){0.9, 0.3, -0.2}, u, &x[1], &pdf));
+		for (int k = 0; k < 2; k++) {
+			surface_on_sphere(s, (struct prim_ref){0, 0}, vec3_normalize(vec3_sub(x[k].p, s->center)), &there);
+			assert_true(fabs(there.u - x[k].u) < 1e-9 && fabs(there.v - x[k].v) < 1e-9);
+		}
+	}
+	world_free(w);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_sphere), cmocka_unit_test(test_cone),    cmocka_unit_test(test_direction),
 		cmocka_unit_test(test_mesh),   cmocka_unit_test(test_corners),
+		cmocka_unit_test(test_texture_coordinates),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
