@@ -38,6 +38,10 @@ void agree_render_mixture(const struct world *w, const char *test, const char *s
 /* Fails the test when the images differ, or when the comparison is too weak to tell. */
 void agree_check(const char *test, const struct agree_image *a, const struct agree_image *b);
 
+/* The same level, but no demand on the power, which is printed: for whole scenes that cannot be rendered to half a percent in a
+ * test. Returns the relative difference of the means. */
+double agree_within_errors(const char *test, const struct agree_image *a, const struct agree_image *b);
+
 /* Fails unless every cell's mean is `expected` (same level and power, one-sample t). */
 void agree_expect(const char *test, const struct agree_image *a, double expected);
 

@@ -46,13 +46,23 @@ struct world *world_of_files(uint32_t width, uint32_t height, const struct memor
 	return build(&assets, files[0].name, width, height);
 }
 
+static struct world *build_in(const char *base, const char *folder, const char *file, uint32_t width, uint32_t height)
+{
+	char path[4096];
+	snprintf(path, sizeof path, "%s/%s", base, folder);
+	struct asset_source assets = asset_folder(path);
+	return build(&assets, file, width, height);
+}
+
 struct world *world_of_public_scene(const char *folder, const char *file, uint32_t width, uint32_t height)
 {
 	const char *scenes = getenv("HSLT_SCENES");
 	if (!scenes)
 		return NULL;
-	char path[4096];
-	snprintf(path, sizeof path, "%s/%s", scenes, folder);
-	struct asset_source assets = asset_folder(path);
-	return build(&assets, file, width, height);
+	return build_in(scenes, folder, file, width, height);
+}
+
+struct world *world_of_own_scene(const char *folder, const char *file, uint32_t width, uint32_t height)
+{
+	return build_in("tests/scenes", folder, file, width, height);
 }

@@ -21,4 +21,7 @@ struct world *world_of_files(uint32_t width, uint32_t height, const struct memor
 /* From the folder that HSLT_SCENES names; NULL: the variable is not set. */
 struct world *world_of_public_scene(const char *folder, const char *file, uint32_t width, uint32_t height);
 
+/* From tests/scenes; the working folder is the tree's root. */
+struct world *world_of_own_scene(const char *folder, const char *file, uint32_t width, uint32_t height);
+
 #endif

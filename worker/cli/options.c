@@ -34,7 +34,7 @@ static const struct argp_option options[] = {
 	{"spp", OPTION_SPP, "N", 0, "Samples a pixel, rounded up to whole rounds", 2},
 	{"mutations", OPTION_MUTATIONS, "N|LIST", 0,
 	 "N: mutations or samples in all. LIST: the strategies that propose mutations, with weights (1), such as "
-	 "hslt=0.9,independent=0.1; part of the plan. May be given twice, once for each", 2},
+	 "hslt=0.9,bidirectional=0.1; part of the plan. May be given twice, once for each", 2},
 	{"time", OPTION_TIME, "SECONDS", 0, "Wall clock, looked at after complete rounds", 2},
 	{"target-error", OPTION_TARGET, "E", 0, "Estimated relative error: 0.02 or 2%", 2},
 	{NULL, 0, NULL, 0, "The plan (part of what decides the bits):", 3},
@@ -121,7 +121,7 @@ static void take_mutations(struct render_arguments *a, const char *arg, const st
 		return;
 	}
 	if (plan_strategy_count(arg) < 1)
-		argp_error(state, "--mutations takes a number or a list such as hslt=0.9,independent=0.1, not '%s'", arg);
+		argp_error(state, "--mutations takes a number or a list such as hslt=0.9,bidirectional=0.1, not '%s'", arg);
 	a->mixture = arg;
 }
 

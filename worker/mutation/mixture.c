@@ -89,7 +89,7 @@ int mixture_parse(const char *text, struct mixture *out, struct error *e)
 		return 0;
 	if (out->count == BATCH_STRATEGIES)
 		return error_set(e, EINVAL, "'%s': no room for independent proposals among %d mutations", text, BATCH_STRATEGIES);
-	out->entry[out->count++] = (struct mixture_entry){mutation_find("independent", 11), {-1, -1}, INDEPENDENT_SHARE * out->total};
+	out->entry[out->count++] = (struct mixture_entry){mutation_find("bidirectional", 13), {-1, -1}, INDEPENDENT_SHARE * out->total};
 	finish(out);
 	return 0;
 }
