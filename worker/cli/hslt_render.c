@@ -25,7 +25,7 @@ static const char doc[] =
 	"  hslt-render room.xml -o room.exr --spp 64\n"
 	"  hslt-render room.xml -o room.exr --integrator path --size 320x180 --threads 8 --stats room.json\n"
 	"  hslt-render room.xml -o room.exr --target-error 2% --time 3600\n"
-	"  hslt-render room.xml -o room.exr --integrator hslt --mutations hslt=0.9,independent=0.1 --mutations 10000000\n"
+	"  hslt-render room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --mutations 10000000\n"
 	"\n"
 	"The image holds linear Rec. 709 (R G B) and one standard error of each (error.R error.G error.B).\n"
 	"Exit codes: 0 done, 1 failed, 2 usage, 4 a bound came before the target error.";

@@ -18,7 +18,7 @@ static const char doc[] =
 	"Examples:\n"
 	"  hslt-submit --coordinator 127.0.0.1:7700 room.xml -o room.exr --spp 64 --wait\n"
 	"  hslt-submit room.xml -o room.exr --target-error 2% --time 3600\n"
-	"  hslt-submit room.xml -o room.exr --integrator hslt --mutations hslt=0.9,independent=0.1 --spp 256\n"
+	"  hslt-submit room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --spp 256\n"
 	"  hslt-submit room.xml -o left.exr --crop 0,0,960,1080 --priority 10 -D light=sun\n"
 	"\n"
 	"The job's id goes to stdout, everything else to stderr. Without --wait, -o is the default name for hslt-job fetch. "
