@@ -33,7 +33,9 @@ static double survival(unsigned n)
 static double contribution(struct path_context *c, unsigned s, unsigned edges)
 {
 	double film[2];
-	struct path_sample one = {.count = 0, .intensity = 0};
+	struct path_sample one; /* its many splats are not read: nothing sets them */
+	one.count = 0;
+	one.intensity = 0;
 	spectrum l = path_connect(c, s, edges + 1 - s, PATH_MAX_EDGES, film);
 	if (!spectrum_is_zero(l))
 		path_splat(c, &one, 0, 0, l);
@@ -46,10 +48,11 @@ static void gather(struct path_context *c, unsigned camera, unsigned light, bool
 {
 	out->total = 0;
 	out->count = 0;
-	for (unsigned edges = c->min_depth; edges <= c->max_depth; edges++)
-		for (unsigned s = 0; s <= edges; s++) {
+	unsigned most_light = light > 1 ? light : 1, most = camera + most_light - 1;
+	for (unsigned edges = c->min_depth; edges <= c->max_depth && edges <= most; edges++)
+		for (unsigned s = edges + 1 > camera ? edges + 1 - camera : 0; s <= edges && s <= most_light; s++) {
 			unsigned t = edges + 1 - s;
-			if (t > camera || s > (light > 1 ? light : 1) || (t == 1 && s < 2))
+			if (t == 1 && s < 2)
 				continue;
 			bool is_known = known && known->s == s && known->edges == edges;
 			double i = is_known ? known->intensity : contribution(c, s, edges);
