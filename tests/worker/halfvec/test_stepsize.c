@@ -146,8 +146,8 @@ static void test_differentials(void **state)
 		}
 		mat2 e = mat2_of_columns(column[0], column[1]);
 		constraints_of(&h.w, &h.x, 2, 0, k);
-		/* So few pixels that no limit applies, from above or below: then sigma and U say what e e^T is. */
-		const double pixels = 0.1;
+		/* Pixels for which no limit applies, from above or below: then sigma and U say what e e^T is. */
+		const double pixels = 0.25 / mat2_largest(e);
 		steps(2, pixels);
 		double s0 = step[1].sigma[0] / pixels, s1 = step[1].sigma[1] / pixels;
 		mat2 u = step[1].u, us = {u.xx * s0, u.xy * s1, u.yx * s0, u.yy * s1};

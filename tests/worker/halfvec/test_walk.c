@@ -202,7 +202,10 @@ static void check_residuals(const struct world *w, const struct whole_path *y, u
 		long double h[2];
 		measure(w, y, j, h);
 		double off = (double)hypotl(h[0] - (long double)target[j].h.x, h[1] - (long double)target[j].h.y);
-		t->worst = fmax(t->worst, off / (scale * target[j].tolerance));
+		/* What double loses of directions that nearly cancel, next to an index of 1, no walk can see. */
+		vec3 half = vec3_sub(vec3_scale(whole_eta(y, j), y->edge[j].w), y->edge[j - 1].w);
+		double rounding = 0x1p-52 / fabs(vec3_dot(half, y->v[j].x.sh.n));
+		t->worst = fmax(t->worst, (off - rounding) / (scale * target[j].tolerance));
 	}
 }
 
