@@ -4,12 +4,14 @@
 # Test programs are BUILD/tests/**/test_* (cmocka: each of their tests is counted); scripts are tests/lint/*.sh and
 # tests/e2e/*.sh (one test each; exit 77: skipped). The output of what fails is shown. The last line is
 # `N passed, N failed, N skipped`; the exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
-# HSLT_TEST_KINDS: "unit script" (default both); HSLT_TEST_TIMEOUT: seconds a program may take (default 900).
+# HSLT_TEST_KINDS: "unit script" (default both); HSLT_TEST_TIMEOUT: seconds a program may take (default 900; with FULL=1 14400).
 set -u
 build=${1:?usage: tests/run.sh BUILD [PATTERN]}
 pattern=${2:-}
 kinds=${HSLT_TEST_KINDS:-unit script}
-limit=${HSLT_TEST_TIMEOUT:-900}
+# The long forms take hours.
+[ "${FULL:-0}" = 0 ] && limit=900 || limit=14400
+limit=${HSLT_TEST_TIMEOUT:-$limit}
 cd "$(dirname "$0")/.." || exit 1
 case $build in /*) ;; *) build=$PWD/$build ;; esac
 export BUILD="$build"

@@ -340,22 +340,22 @@ static void walk_once(struct path_context *c, struct dice *d, const struct whole
 	walk_nowhere(c, x, b, end, target, k, t);
 }
 
-static void print_row(const char *name, const struct tally *t)
+/* As rows of make test-numerics have it: topic, case, what was measured, what it must be, verdict. */
+static void print_row(const char *name, const struct tally *t, double arrive, double come_back)
 {
 	const char *rows = getenv("HSLT_TEST_ROWS");
 	if (!rows || rows[0] != '1')
 		return;
 	double n = (double)t->walks, ok = (double)t->arrived;
-	print_message("%-16s %6zu walks: arrived %5.1f %%, back %5.1f %% (each vertex %5.1f %%); %.2f iterations, %.2f rays, worst residual "
-		      "%.3f\n",
-		      name, t->walks, 100 * ok / n, 100 * (double)t->returned / ok, 100 * (double)t->strict / ok, (double)t->iterations / n,
-		      (double)t->rays / n, t->worst);
-	print_message("    stays: %zu of %zu left, worst %.1e; half the tolerance: %zu of %zu elsewhere\n", t->left, t->stays, t->worst_stay,
-		      t->elsewhere, t->again);
-	print_message("    missed %zu, blocked %zu, mode %zu, singular %zu, diverged %zu, iterations %zu; back: %zu %zu %zu %zu %zu %zu; seams "
-		      "%llu, occluded %llu\n",
-		      t->ends[1], t->ends[2], t->ends[3], t->ends[4], t->ends[5], t->ends[6], t->back_ends[1], t->back_ends[2], t->back_ends[3],
-		      t->back_ends[4], t->back_ends[5], t->back_ends[6], (unsigned long long)t->seams, (unsigned long long)t->occluded);
+	printf("walk\t%s\t%zu walks: %.1f %% arrive, %.1f %% of them come back (each vertex %.1f %%); %.2f iterations, %.2f rays; worst residual "
+	       "%.3f tolerances; from where it is %zu of %zu leave, by %.1e at most; by half the tolerance %zu of %zu come elsewhere; missed %zu, "
+	       "blocked %zu, mode %zu, singular %zu, diverged %zu, iterations %zu; back: %zu %zu %zu %zu %zu %zu; seams %llu\t"
+	       "%.1f %%, %.1f %%, 1.01\tok\n",
+	       name, t->walks, 100 * ok / n, 100 * (double)t->returned / ok, 100 * (double)t->strict / ok, (double)t->iterations / n,
+	       (double)t->rays / n, t->worst, t->left, t->stays, t->worst_stay, t->elsewhere, t->again, t->ends[1], t->ends[2], t->ends[3],
+	       t->ends[4], t->ends[5], t->ends[6], t->back_ends[1], t->back_ends[2], t->back_ends[3], t->back_ends[4], t->back_ends[5],
+	       t->back_ends[6], (unsigned long long)t->seams, 100 * arrive, 100 * come_back);
+	fflush(stdout);
 }
 
 /* Not below what was measured when this was written by more than five standard errors and 0.3 %. A walk that goes on from a
@@ -379,7 +379,6 @@ static struct tally walk_in(const char *name, struct world *w, double arrive, do
 		if (draw_path(&c, d.seed, i, &x))
 			walk_once(&c, &d, &x, &t);
 	fptrap_unwatch(watched);
-	print_row(name, &t);
 	world_free(w);
 	assert_true(t.worst <= 1.01);
 	assert_int_equal(t.occluded, 0);
@@ -387,6 +386,7 @@ static struct tally walk_in(const char *name, struct world *w, double arrive, do
 	assert_true(t.elsewhere <= t.again / 200);
 	check_rate(t.arrived, t.walks, arrive);
 	check_rate(t.returned, t.arrived, come_back);
+	print_row(name, &t, arrive, come_back);
 	return t;
 }
 

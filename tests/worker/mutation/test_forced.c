@@ -6,7 +6,7 @@
  * is 2 % at most; colours and what is looked at besides images have theirs printed. Of the whole image's mean there is nothing
  * to find: a mutation keeps the number of edges, and how much all paths of that length bring is b, which independent proposals
  * alone estimate (tests/worker/path/test_whole.c compares their densities path by path, test_integrators.c images of
- * mixtures). They go anywhere on the film, so that nothing cancels: 2 % by FULL=1 only, 8 % else.
+ * mixtures). They go anywhere on the film, so that nothing cancels: 2 % by FULL=1 only, with k = 3, 10 % else.
  * Of the accepted moves at least 10 % are the forced choice's, the starts counting as accepted independent proposals.
  *
  * About 100 s of CPU time; FULL=1: every (b, c) and every mutation, k = 2..4 and 6 on every scene, k = 8 on two.
@@ -90,11 +90,15 @@ static void check(const struct world *w, const char *scene, unsigned edges, cons
 	static struct stationary_result r;
 	/* Fresh paths lie anywhere on the film: far less of the noise cancels. */
 	const struct mutation_ops *ops = mutation_find(mutation, strcspn(mutation, "@"));
-	bool fresh = ops && ops->independent;
-	uint32_t more = fresh && full() ? 16 : edges == 2 ? 2 : 1;
+	bool fresh = ops && ops->independent, weak;
+	uint32_t more = fresh && full() && edges == 3 ? 16 : edges == 2 ? 2 : 1;
 	struct stationary_how how = {mutation, edges, edges, more * STARTS, more * BOOTSTRAP, STATIONARY_SOUND};
 	stationary_run(w, scene, &how, &r);
-	bool weak = !scaled() && r.least_block > 0.02 && !fresh;
+	for (; (weak = !scaled() && r.least_block > 0.02 && !fresh) && full() && more < 16; more *= 2) {
+		how.starts *= 2;
+		how.bootstrap *= 2;
+		stationary_run(w, scene, &how, &r);
+	}
 	/* What the scene has not got cannot be moved: only what was chosen for a scene must be. */
 	bool idle = chosen && !scaled() && r.share < 0.1;
 	const char *verdict = !stationary_holds(&r) ? "FAILED" : weak ? "TOO WEAK" : idle ? "HARDLY MOVES" : "ok";
