@@ -120,7 +120,8 @@ void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, doubl
 	fill(s, i, &c, b1, b2, x);
 }
 
-void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
+/* All but u and v. */
+static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
 	x->prim = prim;
 	x->p = vec3_madd(s->center, s->radius, w);
@@ -129,7 +130,18 @@ void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w,
 	/* du of the longitude: axis x normal; undefined at the poles, where frame_along picks a frame of its own. */
 	x->dpdu = vec3_scale(2 * M_PI * s->radius, vec3_cross(s->sphere_axes.n, w));
 	x->sh = frame_along(x->ng, x->dpdu);
-	sphere_uv(&s->sphere_axes, w, &x->u, &x->v);
+}
+
+void surface_uv(const struct geom_shape *s, struct surface_point *x)
+{
+	if (s->is_sphere)
+		sphere_uv(&s->sphere_axes, vec3_scale(s->normal_sign, x->ng), &x->u, &x->v);
+}
+
+void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
+{
+	on_sphere(s, prim, w, x);
+	surface_uv(s, x);
 }
 
 /* The hit in double: the root nearest to the one that Embree's search settled on. */
@@ -251,7 +263,7 @@ static bool reproject_sphere(const struct geom_shape *s, struct prim_ref prim, b
 	}
 	if (!(root > 0) || !isfinite(root))
 		return false;
-	surface_on_sphere(s, prim, vec3_normalize(vec3_madd(oc, root, d)), x);
+	on_sphere(s, prim, vec3_normalize(vec3_madd(oc, root, d)), x);
 	return true;
 }
 

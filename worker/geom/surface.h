@@ -47,9 +47,12 @@ void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct r
 void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2, struct surface_point *x);
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x);
 /* Where the ray from o (which lies on the primitive `from`) along the unit direction d meets this one primitive, whatever lies
- * between; of a sphere's two crossings the one nearest to t_near. false: it passes by. */
+ * between; of a sphere's two crossings the one nearest to t_near. false: it passes by. A sphere's u and v, which cost as much as
+ * all the rest, are left for surface_uv. */
 bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d, double t_near,
 		       struct surface_point *x);
+
+void surface_uv(const struct geom_shape *s, struct surface_point *x);
 
 /* du and dv of struct surface_change alone. */
 void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv);

@@ -221,9 +221,13 @@ enum walk_end halfvec_walk_from(struct path_context *c, struct whole_path *y, un
 	enum walk_end end = start(&m);
 	if (end == WALK_OK)
 		end = iterate(&m, limits, stale, visible);
-	if (end == WALK_OK && !visible && !all_visible(&m))
-		end = WALK_BLOCKED;
-	return end;
+	if (end != WALK_OK || visible)
+		return end;
+	if (!all_visible(&m))
+		return WALK_BLOCKED;
+	for (unsigned j = c_end + 1; j < b; j++)
+		surface_uv(&c->w->shapes[y->v[j].x.prim.shape], &y->v[j].x);
+	return WALK_OK;
 }
 
 enum walk_end halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
