@@ -204,22 +204,32 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	}
 }
 
-/* The integrators that there are before what the table says of --integrator. argp frees the text. */
+/* The integrators that there are before what the table says of --integrator, and the strategies after what it says of
+ * --mutations. argp frees the text. */
 static char *help(int key, const char *text, void *input)
 {
 	(void)input;
-	char names[256] = "";
+	char names[1024] = "";
+	const char *name, *summary;
 	size_t used = 0;
 	const struct render_integrator *r;
-	if (key != 'i')
+	if (key == 'i') {
+		for (size_t i = 0; (r = render_integrator_at(i)) != NULL && used < sizeof names; i++) {
+			const char *separator = i == 0 ? "" : render_integrator_at(i + 1) ? ", " : " or ";
+			int n = snprintf(names + used, sizeof names - used, "%s%s", separator, r->name);
+			used += n < 0 ? 0 : (size_t)n;
+		}
+	} else if (key == OPTION_MUTATIONS) {
+		for (size_t i = 0; (name = render_mutation_at(i, &summary)) != NULL && used < sizeof names; i++) {
+			int n = snprintf(names + used, sizeof names - used, "%s%s (%s)", i == 0 ? "" : ", ", name, summary);
+			used += n < 0 ? 0 : (size_t)n;
+		}
+	} else {
 		return borrow(text);
-	for (size_t i = 0; (r = render_integrator_at(i)) != NULL && used < sizeof names; i++) {
-		const char *separator = i == 0 ? "" : render_integrator_at(i + 1) ? ", " : " or ";
-		int n = snprintf(names + used, sizeof names - used, "%s%s", separator, r->name);
-		used += n < 0 ? 0 : (size_t)n;
 	}
 	char *all = NULL;
-	return asprintf(&all, "%s %s", names, text) < 0 ? borrow(text) : all;
+	int n = key == 'i' ? asprintf(&all, "%s %s", names, text) : asprintf(&all, "%s. There are %s", text, names);
+	return n < 0 ? borrow(text) : all;
 }
 
 const struct argp render_argp = {options, parse, NULL, NULL, NULL, help, NULL};

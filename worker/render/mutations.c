@@ -4,6 +4,15 @@
 
 #include <string.h>
 
+const char *render_mutation_at(size_t index, const char **summary)
+{
+	for (size_t i = 0; i <= index; i++)
+		if (!mutation_registry[i])
+			return NULL;
+	*summary = mutation_registry[index]->summary;
+	return mutation_registry[index]->name;
+}
+
 int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX], struct error *e)
 {
 	struct mixture m;

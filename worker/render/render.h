@@ -55,6 +55,9 @@ struct render_summary {
 int render_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 		 struct render_summary *out, struct error *e);
 
+/* The strategies that there are: a name and what it moves; NULL at the end. */
+const char *render_mutation_at(size_t index, const char **summary);
+
 /* The mixture of strategies of an integrator that has_mutations, in the spelling that a plan holds: "independent=0.1,hslt=0.9".
  * text: NAME or NAME=WEIGHT with commas between; NULL or "": what suits the scene. A canonical text comes back as it is.
  * -EINVAL with a sentence. */
