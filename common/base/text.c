@@ -1,5 +1,7 @@
 #include "common/base/text.h"
 
+#include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 void text_copy(char *out, size_t size, const char *from)
@@ -12,4 +14,17 @@ void text_copy(char *out, size_t size, const char *from)
 	}
 	memmove(out, from, n);
 	out[n] = 0;
+}
+
+void text_put(struct text *t, const char *format, ...)
+{
+	va_list ap;
+	va_start(ap, format);
+	int n = vsnprintf(t->at, t->left, format, ap);
+	va_end(ap);
+	size_t used = n < 0 ? 0 : (size_t)n;
+	if (t->left && used >= t->left)
+		used = t->left - 1;
+	t->at += used;
+	t->left -= used;
 }

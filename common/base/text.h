@@ -7,4 +7,11 @@
 /* Copies, cutting what does not fit, never in the middle of a UTF-8 sequence. */
 void text_copy(char *out, size_t size, const char *from);
 
+/* Appends to a fixed array: what does not fit is cut, the rest stays terminated. Begin with {array, size}. */
+struct text {
+	char *at;
+	size_t left;
+};
+__attribute__((format(printf, 2, 3))) void text_put(struct text *t, const char *format, ...);
+
 #endif

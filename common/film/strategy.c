@@ -1,7 +1,8 @@
 #include "common/film/strategy.h"
 
+#include "common/base/text.h"
+
 #include <assert.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
 
@@ -34,24 +35,6 @@ const char *strategy_counter_name(enum strategy_counter c)
 	return names[c];
 }
 
-struct text {
-	char *at;
-	size_t left;
-};
-
-__attribute__((format(printf, 2, 3))) static void put(struct text *t, const char *format, ...)
-{
-	va_list ap;
-	va_start(ap, format);
-	int n = vsnprintf(t->at, t->left, format, ap);
-	va_end(ap);
-	size_t used = n < 0 ? 0 : (size_t)n;
-	if (t->left && used >= t->left)
-		used = t->left - 1;
-	t->at += used;
-	t->left -= used;
-}
-
 /* 5210 -> "5,210". */
 static const char *thousands(uint64_t n, char out[NUMBER])
 {
@@ -70,9 +53,9 @@ static const char *thousands(uint64_t n, char out[NUMBER])
 static void put_ratio(struct text *t, int width, int decimals, double factor, uint64_t a, uint64_t b)
 {
 	if (b)
-		put(t, " %*.*f", width, decimals, factor * (double)a / (double)b);
+		text_put(t, " %*.*f", width, decimals, factor * (double)a / (double)b);
 	else
-		put(t, " %*s", width, "-");
+		text_put(t, " %*s", width, "-");
 }
 
 static uint64_t failures(const uint64_t c[STRATEGY_COUNTERS])
@@ -86,13 +69,13 @@ static uint64_t failures(const uint64_t c[STRATEGY_COUNTERS])
 /* Reasons that nobody met are left out, or the lines would be too long to read. */
 static void put_failures(struct text *t, const uint64_t c[STRATEGY_COUNTERS])
 {
-	put(t, " ");
+	text_put(t, " ");
 	if (failures(c) == 0)
-		put(t, " -");
+		text_put(t, " -");
 	for (int k = STRATEGY_FAIL_FIRST; k < STRATEGY_COUNTERS; k++)
 		if (c[k])
-			put(t, " %s %.3g", names[k], 100 * (double)c[k] / (double)c[STRATEGY_PROPOSED]);
-	put(t, "\n");
+			text_put(t, " %s %.3g", names[k], 100 * (double)c[k] / (double)c[STRATEGY_PROPOSED]);
+	text_put(t, "\n");
 }
 
 void strategy_table(const char *mixture, const struct canvas_counts *n, char *text, size_t size)
@@ -106,18 +89,18 @@ void strategy_table(const char *mixture, const struct canvas_counts *n, char *te
 		proposed += n->strategy[i][STRATEGY_PROPOSED];
 	if (!proposed)
 		return;
-	put(&t, "%-*s %14s %9s %9s %14s %9s %14s %8s  %s\n", NAME, "strategy", "proposals", "accepted%", "rays/prop", "walks",
+	text_put(&t, "%-*s %14s %9s %9s %14s %9s %14s %8s  %s\n", NAME, "strategy", "proposals", "accepted%", "rays/prop", "walks",
 	    "iter/walk", "reverse walks", "failed%", "failures in % of proposals");
 	for (int i = 0; i < count; i++) {
 		const uint64_t *c = n->strategy[i];
 		char name[NAME + 1], number[3][NUMBER];
 		plan_strategy_name(mixture, (uint32_t)i, name, sizeof name);
-		put(&t, "%-*s %14s", NAME, name, thousands(c[STRATEGY_PROPOSED], number[0]));
+		text_put(&t, "%-*s %14s", NAME, name, thousands(c[STRATEGY_PROPOSED], number[0]));
 		put_ratio(&t, 9, 2, 100, c[STRATEGY_ACCEPTED], c[STRATEGY_PROPOSED]);
 		put_ratio(&t, 9, 2, 1, c[STRATEGY_RAYS], c[STRATEGY_PROPOSED]);
-		put(&t, " %14s", thousands(c[STRATEGY_WALKS], number[1]));
+		text_put(&t, " %14s", thousands(c[STRATEGY_WALKS], number[1]));
 		put_ratio(&t, 9, 2, 1, c[STRATEGY_ITERATIONS], c[STRATEGY_WALKS]);
-		put(&t, " %14s", thousands(c[STRATEGY_REVERSE_WALKS], number[2]));
+		text_put(&t, " %14s", thousands(c[STRATEGY_REVERSE_WALKS], number[2]));
 		put_ratio(&t, 8, 2, 100, failures(c), c[STRATEGY_PROPOSED]);
 		put_failures(&t, c);
 	}
@@ -132,9 +115,9 @@ void strategy_lines(const char *mixture, const struct canvas_counts *n, char *te
 	for (int i = 0; i < count; i++) {
 		char name[PLAN_MUTATIONS_MAX];
 		plan_strategy_name(mixture, (uint32_t)i, name, sizeof name);
-		put(&t, "%s%s:", i ? "\n" : "", name);
+		text_put(&t, "%s%s:", i ? "\n" : "", name);
 		for (int k = 0; k < STRATEGY_COUNTERS; k++)
-			put(&t, " %s %llu", names[k], (unsigned long long)n->strategy[i][k]);
+			text_put(&t, " %s %llu", names[k], (unsigned long long)n->strategy[i][k]);
 	}
 }
 
@@ -154,17 +137,17 @@ void strategy_note(const struct plan *p, const struct canvas_counts *n, bool bla
 	if (size)
 		text[0] = 0;
 	if (black && p->kind == PLAN_CHAINS && n->counters[COUNT_SAMPLES] == 0)
-		put(&t, "the image is black: none of the %s bootstrap samples found light", thousands(p->bootstrap, number[0]));
+		text_put(&t, "the image is black: none of the %s bootstrap samples found light", thousands(p->bootstrap, number[0]));
 	else if (black)
-		put(&t, "the image is black: no sample found light");
+		text_put(&t, "the image is black: no sample found light");
 	if (black)
 		then = "; ";
 	if (bad) {
-		put(&t, "%s%s contributions were not numbers, infinite or negative, and left out", then, thousands(bad, number[0]));
+		text_put(&t, "%s%s contributions were not numbers, infinite or negative, and left out", then, thousands(bad, number[0]));
 		then = "; ";
 	}
 	if (stuck)
-		put(&t, "%s%s of %s times a chain accepted nothing during a whole epoch (%s chains); longest run: %s rejections", then,
+		text_put(&t, "%s%s of %s times a chain accepted nothing during a whole epoch (%s chains); longest run: %s rejections", then,
 		    thousands(stuck, number[0]), thousands(chain_epochs(p, n), number[1]), thousands(p->chains, number[2]),
 		    thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
 }

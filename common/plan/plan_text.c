@@ -1,26 +1,9 @@
 #include "common/plan/plan.h"
 
-#include <stdarg.h>
+#include "common/base/text.h"
+
 #include <stdio.h>
 #include <string.h>
-
-struct text {
-	char *at;
-	size_t left;
-};
-
-__attribute__((format(printf, 2, 3))) static void put(struct text *t, const char *format, ...)
-{
-	va_list ap;
-	va_start(ap, format);
-	int n = vsnprintf(t->at, t->left, format, ap);
-	va_end(ap);
-	size_t used = n < 0 ? 0 : (size_t)n;
-	if (t->left && used >= t->left)
-		used = t->left - 1;
-	t->at += used;
-	t->left -= used;
-}
 
 int plan_strategy_count(const char *mixture)
 {
@@ -55,33 +38,33 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 	struct text t = {text, size};
 	unsigned long long epoch = (unsigned long long)p->epoch, bootstrap = (unsigned long long)p->bootstrap;
 	if (p->kind == PLAN_CHAINS)
-		put(&t, "%s: %u chains in %u groups, %llu bootstrap samples, epochs of %llu mutations a chain in %u leases",
+		text_put(&t, "%s: %u chains in %u groups, %llu bootstrap samples, epochs of %llu mutations a chain in %u leases",
 		    p->integrator, p->chains, p->groups, bootstrap, epoch, p->groups * p->parts);
 	else
-		put(&t, "%s: %u groups, %llu samples a pixel, group and round in %u leases, grid from %llu samples",
+		text_put(&t, "%s: %u groups, %llu samples a pixel, group and round in %u leases, grid from %llu samples",
 		    p->integrator, p->groups, epoch, p->groups * p->parts, bootstrap);
 	if (*p->mutations)
-		put(&t, ", mutations %s", p->mutations);
-	put(&t, "; ");
+		text_put(&t, ", mutations %s", p->mutations);
+	text_put(&t, "; ");
 	const char *or = "";
 	if (p->rounds != UINT64_MAX) {
 		unsigned long long rounds = (unsigned long long)p->rounds;
 		if (p->kind == PLAN_CHAINS)
-			put(&t, "%llu rounds (%llu mutations)", rounds, rounds * plan_round_mutations(p));
+			text_put(&t, "%llu rounds (%llu mutations)", rounds, rounds * plan_round_mutations(p));
 		else
-			put(&t, "%llu rounds (%llu samples a pixel)", rounds, rounds * p->groups * p->epoch);
+			text_put(&t, "%llu rounds (%llu samples a pixel)", rounds, rounds * p->groups * p->epoch);
 		or = " or ";
 	}
 	if (p->seconds > 0) {
-		put(&t, "%s%g seconds", or, p->seconds);
+		text_put(&t, "%s%g seconds", or, p->seconds);
 		or = " or ";
 	}
 	if (p->target_error > 0)
-		put(&t, "%sa relative error of %g", or, p->target_error);
-	put(&t, "; %ux%u", p->crop_width, p->crop_height);
+		text_put(&t, "%sa relative error of %g", or, p->target_error);
+	text_put(&t, "; %ux%u", p->crop_width, p->crop_height);
 	if (p->crop_width != p->width || p->crop_height != p->height)
-		put(&t, " at %u,%u of %ux%u", p->crop_x, p->crop_y, p->width, p->height);
-	put(&t, ", paths of %u to %u edges, seed %llu", p->min_depth, p->max_depth, (unsigned long long)p->seed);
+		text_put(&t, " at %u,%u of %ux%u", p->crop_x, p->crop_y, p->width, p->height);
+	text_put(&t, ", paths of %u to %u edges, seed %llu", p->min_depth, p->max_depth, (unsigned long long)p->seed);
 }
 
 void plan_describe_changes(const struct plan_request *r, const struct plan *p, char *text, size_t size)
@@ -91,9 +74,9 @@ void plan_describe_changes(const struct plan_request *r, const struct plan *p, c
 		text[0] = 0;
 	unsigned leases = p->groups * p->parts;
 	if (p->kind == PLAN_CHAINS && r->chains && r->chains != p->chains)
-		put(&t, "chains %u -> %u: a multiple of the %u leases of a round. ", r->chains, p->chains, leases);
+		text_put(&t, "chains %u -> %u: a multiple of the %u leases of a round. ", r->chains, p->chains, leases);
 	if (r->bootstrap && r->bootstrap != p->bootstrap)
-		put(&t, "bootstrap %llu -> %llu: a multiple of the %u leases. ", (unsigned long long)r->bootstrap,
+		text_put(&t, "bootstrap %llu -> %llu: a multiple of the %u leases. ", (unsigned long long)r->bootstrap,
 		    (unsigned long long)p->bootstrap, leases);
 	if (p->rounds == UINT64_MAX)
 		return;
@@ -103,23 +86,23 @@ void plan_describe_changes(const struct plan_request *r, const struct plan *p, c
 	bool by_spp = r->spp && (!r->mutations || r->spp <= r->mutations / pixels);
 	unsigned long long asked = by_spp ? r->spp * pixels : r->mutations;
 	if (asked != made)
-		put(&t, "%s %llu -> %llu: whole rounds. ", p->kind == PLAN_CHAINS ? "mutations" : "samples", asked, made);
+		text_put(&t, "%s %llu -> %llu: whole rounds. ", p->kind == PLAN_CHAINS ? "mutations" : "samples", asked, made);
 }
 
 void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size)
 {
 	struct text t = {text, size};
 	rounds += rounds == 0; /* a black bootstrap ends a job before its first round, whatever the bound */
-	put(&t, "--integrator %s --size %ux%u --crop %u,%u,%u,%u --seed %llu --min-depth %u --max-depth %u --groups %u",
+	text_put(&t, "--integrator %s --size %ux%u --crop %u,%u,%u,%u --seed %llu --min-depth %u --max-depth %u --groups %u",
 	    p->integrator, p->width, p->height, p->crop_x, p->crop_y, p->crop_width, p->crop_height,
 	    (unsigned long long)p->seed, p->min_depth, p->max_depth, p->groups);
 	if (*p->mutations)
-		put(&t, " --mutations %s", p->mutations);
+		text_put(&t, " --mutations %s", p->mutations);
 	if (p->kind == PLAN_CHAINS)
-		put(&t, " --chains %u --bootstrap %llu --epoch %llu --mutations %llu", p->chains,
+		text_put(&t, " --chains %u --bootstrap %llu --epoch %llu --mutations %llu", p->chains,
 		    (unsigned long long)p->bootstrap, (unsigned long long)p->epoch,
 		    (unsigned long long)(rounds * plan_round_mutations(p)));
 	else
-		put(&t, " --bootstrap %llu --epoch %llu --spp %llu", (unsigned long long)p->bootstrap,
+		text_put(&t, " --bootstrap %llu --epoch %llu --spp %llu", (unsigned long long)p->bootstrap,
 		    (unsigned long long)p->epoch, (unsigned long long)(rounds * p->groups * p->epoch));
 }
