@@ -24,6 +24,7 @@ size_t record_stop(void); /* how many came; those beyond the room are not kept *
 enum { WALK_ENDS = WALK_ITERATIONS + 1 };
 struct recorded_walks { /* since the program began, by enum walk_end */
 	uint64_t there[WALK_ENDS], back[WALK_ENDS];
+	uint64_t occluded; /* of those there that are blocked: they arrived, but an edge is occluded */
 };
 extern struct recorded_walks record_walks;
 
