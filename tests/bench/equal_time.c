@@ -44,8 +44,8 @@ static const struct method {
 	{"pssmlt", "pssmlt", NULL},
 	{"bdpt", "bdpt", NULL},
 	{"path", "path", NULL},
-	{"breakup", "hslt", "hslt=0.95,independent=0.05"},
-	{"unbroken", "hslt", "halfvec=0.475,multichain=0.475,independent=0.05"},
+	{"breakup", "hslt", "hslt=0.95,bidirectional=0.05"},
+	{"unbroken", "hslt", "halfvec=0.475,multichain=0.475,bidirectional=0.05"},
 };
 enum { METHODS = sizeof methods / sizeof *methods, BREAKUP = 4, UNBROKEN = 5 };
 

@@ -21,9 +21,9 @@ static const struct reference references[] = {
 };
 
 /* Proposals of half vectors but for so few that chains would not be chains without. */
-#define ALONE "hslt=1,independent=0.000001"
-#define BROKEN_UP "hslt=0.95,independent=0.05"
-#define UNBROKEN "halfvec=0.475,multichain=0.475,independent=0.05"
+#define ALONE "hslt=1,bidirectional=0.000001"
+#define BROKEN_UP "hslt=0.95,bidirectional=0.05"
+#define UNBROKEN "halfvec=0.475,multichain=0.475,bidirectional=0.05"
 
 struct figures {
 	double seconds, mutations, rays, accepted;
