@@ -2,7 +2,7 @@
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-compare
 
-JOB="--integrator pssmlt --bootstrap 20000 --mutations 300000"
+JOB="--integrator hslt --bootstrap 20000 --mutations 1500000"
 start_coordinator
 start_worker stays
 submit "$BOX" -o "$DIR/calm.exr" $JOB --wait >/dev/null
