@@ -95,9 +95,10 @@ submit() {
 	"$BIN/hslt-submit" "$@" 2>>"$DIR/submit.log"
 }
 
-# value JOB KEY: a number or a word of the job's JSON
+# value JOB KEY: a number or a word of the job's JSON; the first of that name that is one
 value() {
-	"$BIN/hslt-status" --json "$1" 2>/dev/null | sed -n 's/.*"'"$2"'":"\{0,1\}\([^",}]*\).*/\1/p'
+	"$BIN/hslt-status" --json "$1" 2>/dev/null | grep -o '"'"$2"'":"\{0,1\}[^",{}]*' | sed -n 's/^[^:]*:"\{0,1\}\(..*\)/\1/p' |
+		head -n 1
 }
 
 # is_beyond JOB PROGRESS
