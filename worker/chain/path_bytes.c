@@ -6,6 +6,8 @@ enum { PATH_HEAD = 16, VERTEX_BYTES = 40 };
 /* Where a position and the surface that it names differ more than that, in units of the world's radius, they do not belong
  * together. */
 #define BELONGS 1e-9
+/* Walks meet specular directions far more exactly. */
+#define SPECULAR 1e-3
 
 static void put32(uint8_t *p, uint32_t v)
 {
@@ -132,5 +134,10 @@ bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct
 		if (!read_vertex(c->w, bytes + PATH_HEAD + i * VERTEX_BYTES, i, x->edges, &x->v[i]))
 			return false;
 	whole_set_wavelength(c, x, u);
-	return whole_finish(c, x);
+	if (!whole_finish(c, x))
+		return false;
+	for (unsigned j = 1; j < x->edges; j++)
+		if (x->v[j].delta && !(whole_specular_miss(x, j) <= SPECULAR))
+			return false;
+	return true;
 }

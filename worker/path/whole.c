@@ -113,6 +113,17 @@ spectrum whole_fh(const struct path_context *c, struct whole_path *x, unsigned j
 	return x->fh[j];
 }
 
+double whole_specular_miss(const struct whole_path *x, unsigned j)
+{
+	const struct path_vertex *v = &x->v[j];
+	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
+	vec3 i = frame_to_local(&v->x.sh, vec3_neg(x->edge[j - 1].w)), o = frame_to_local(&v->x.sh, x->edge[j].w), wi;
+	double chance;
+	if (spectrum_is_zero(bsdf_eval_delta(v->bsdf, &p, o, v->mode, &wi, &chance)))
+		return INFINITY;
+	return vec3_length(vec3_sub(wi, i));
+}
+
 static uint64_t bits(unsigned first, unsigned last)
 {
 	return (~(uint64_t)0 >> (63 - last)) & (~(uint64_t)0 << first);
@@ -216,9 +227,10 @@ bool whole_finish(const struct path_context *c, struct whole_path *x)
 		if (!whole_join(x, e))
 			return false;
 	for (unsigned j = 1; j < x->edges; j++) {
+		unsigned mode = whole_mode(x, j);
 		if (!x->v[j].delta)
-			x->v[j].mode = whole_mode(x, j);
-		if (!x->v[j].mode)
+			x->v[j].mode = mode;
+		if (!mode || mode != (x->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
 			return false;
 	}
 	if (!whole_film(c, x))

@@ -65,6 +65,8 @@ spectrum whole_f(const struct path_context *c, struct whole_path *x, unsigned j)
 spectrum whole_fh(const struct path_context *c, struct whole_path *x, unsigned j);
 /* The vertices first..last are about to change: what was known of them and of their neighbours no longer holds. */
 void whole_forget(struct whole_path *x, unsigned first, unsigned last);
+/* By how far i_j is from where the exactly specular lobe of v[j]'s mode sends o_j; INFINITY: there is no such lobe. */
+double whole_specular_miss(const struct whole_path *x, unsigned j);
 void whole_set_wavelength(const struct path_context *c, struct whole_path *x, double u);
 /* Some vertex disperses: the path carries its hero wavelength alone. */
 bool whole_is_dispersed(const struct path_context *c, const struct whole_path *x);
@@ -78,8 +80,8 @@ bool whole_visible(struct path_context *c, const struct whole_path *x, unsigned 
 /* Where v[edges - 1] lies on the film as seen from v[edges]; false: outside the window that is sampled. */
 bool whole_film(const struct path_context *c, struct whole_path *x);
 
-/* Everything that follows from the vertices: edges, modes (those of specular vertices are kept), film point, scattering.
- * false: ends coincide, it leaves the window, normals disagree about a side, or it is black. Casts no ray. */
+/* Everything that follows from the vertices: edges, modes (those of specular vertices are given), film point,
+ * scattering. false: ends coincide, it leaves the window, directions are not of a mode, or it is black. Casts no ray. */
 bool whole_finish(const struct path_context *c, struct whole_path *x);
 
 /* The path that technique s makes of the sub-paths in c (s vertices of c->light, the others of c->camera), with everything

@@ -47,21 +47,10 @@ static bool check_edges(struct path_context *c, const struct whole_path *x, char
 
 static bool check_specular(const struct whole_path *x, unsigned j, char *text, size_t size)
 {
-	const struct path_vertex *v = &x->v[j];
-	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
-	vec3 wi;
-	double chance;
-	vec3 i = frame_to_local(&v->x.sh, vec3_neg(x->edge[j - 1].w)), o = frame_to_local(&v->x.sh, x->edge[j].w);
-	if (spectrum_is_zero(bsdf_eval_delta(v->bsdf, &p, o, v->mode, &wi, &chance))) {
-		snprintf(text, size, "vertex %u of %u has no specular lobe of its mode", j, x->edges);
-		return false;
-	}
-	vec3 off = vec3_sub(wi, i);
-	if (vec3_length(off) > SPECULAR_TOLERANCE) {
-		snprintf(text, size, "vertex %u of %u misses its specular direction by %g", j, x->edges, vec3_length(off));
-		return false;
-	}
-	return true;
+	double miss = whole_specular_miss(x, j);
+	if (miss > SPECULAR_TOLERANCE)
+		snprintf(text, size, "vertex %u of %u misses its specular direction by %g", j, x->edges, miss);
+	return miss <= SPECULAR_TOLERANCE;
 }
 
 static bool check_vertices(const struct path_context *c, const struct whole_path *x, char *text, size_t size)

@@ -271,14 +271,18 @@ static void black(const char *text)
 		const struct render_integrator *r = render_integrator_at(i);
 		struct plan p = {.kind = r->kind, .width = 16, .height = 16, .crop_width = 16, .crop_height = 16, .groups = 2, .parts = 1,
 				 .chains = r->kind == PLAN_CHAINS ? 4 : 0, .bootstrap = 64, .epoch = 16, .rounds = 1, .min_depth = 1, .max_depth = 50};
+		struct render_summary summary;
+		struct error e = {""};
 		snprintf(p.integrator, sizeof p.integrator, "%s", r->name);
+		world_summary(w, &summary);
+		if (r->has_mutations && render_mutations(NULL, &summary, p.mutations, &e))
+			fail_msg("%s", e.text);
 		for (int boot = 0; boot < 2; boot++) {
 			const uint64_t seeds[] = {UINT64_MAX, UINT64_MAX};
 			struct lease_key k = {1, boot ? LEASE_BOOTSTRAP : LEASE_RENDER, 1, 0, 0};
 			struct lease_input in = {2, seeds, NULL};
 			enum lease_end end;
 			struct batch b;
-			struct error e = {""};
 			if (render_lease(w, &p, &k, boot || r->kind == PLAN_SAMPLES ? NULL : &in, NULL, &end, &b, &e))
 				fail_msg("%s", e.text);
 			assert_int_equal(end, LEASE_DONE);
