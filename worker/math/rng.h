@@ -8,7 +8,18 @@
 
 #include <stdint.h>
 
-enum rng_stream { RNG_PATH = 1, RNG_BDPT, RNG_BOOTSTRAP, RNG_CHAIN, RNG_RESAMPLING, RNG_BEYOND, RNG_MUTATION, RNG_AROUND, RNG_TEST };
+/* Numbers are never used again for something else, or jobs that go on would not: add new ones at the end. */
+enum rng_stream {
+	RNG_PATH = 1,
+	RNG_BDPT = 2,
+	RNG_BOOTSTRAP = 3,
+	RNG_CHAIN = 4,
+	RNG_RESAMPLING = 5,
+	RNG_BEYOND = 6,
+	RNG_MUTATION = 7,
+	RNG_AROUND = 8,
+	RNG_TEST = 9,
+};
 
 /* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */
 void rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4]);

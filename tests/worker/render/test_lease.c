@@ -39,7 +39,11 @@ static struct plan plan_of(const struct world *w, const char *integrator)
 			 .chains = i->kind == PLAN_CHAINS ? CHAINS : 0, .bootstrap = 512, .epoch = i->kind == PLAN_CHAINS ? 300 : 1,
 			 .rounds = 3, .min_depth = 1, .max_depth = 6};
 	snprintf(p.integrator, sizeof p.integrator, "%s", integrator);
+	struct render_summary summary;
 	struct error e = {""};
+	world_summary(w, &summary);
+	if (render_integrator_find(integrator)->has_mutations && render_mutations(NULL, &summary, p.mutations, &e))
+		fail_msg("%s", e.text);
 	if (plan_check(&p, &e))
 		fail_msg("%s", e.text);
 	return p;
