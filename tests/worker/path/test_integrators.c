@@ -13,21 +13,21 @@
 
 #include <cmocka.h>
 
-/* Samples a pixel are what the power asks for; chain_spp 0: the scene says nothing new about chains. */
-static void check_all(const char *name, struct world *w, uint64_t path_spp, uint64_t bdpt_spp, uint64_t chain_spp)
+/* Samples a pixel are what the power asks for; 0: the scene says nothing new about chains (single_spp: of single paths, whose
+ * states say less a mutation than those of all techniques). */
+static void check_all(const char *name, struct world *w, uint64_t path_spp, uint64_t bdpt_spp, uint64_t chain_spp, uint64_t single_spp)
 {
 	static struct agree_image reference, other;
 	struct agree_side path = {"path", path_spp, 32, 0, 0};
 	agree_render(w, name, "path", &path, &reference);
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		const struct render_integrator *r = render_integrator_at(i);
-		if (strcmp(r->name, "path") == 0 || (r->kind == PLAN_CHAINS && chain_spp == 0))
+		uint64_t spp = r->kind == PLAN_SAMPLES ? bdpt_spp : r->has_mutations ? single_spp : chain_spp;
+		if (strcmp(r->name, "path") == 0 || spp == 0)
 			continue;
 		char test[64];
 		snprintf(test, sizeof test, "%s %s", name, r->name);
-		/* A state of one path says less a mutation than one of all techniques. */
-		uint64_t times = r->has_mutations ? 4 : 1;
-		struct agree_side side = {r->name, r->kind == PLAN_CHAINS ? times * chain_spp : bdpt_spp, 32, 0, 0};
+		struct agree_side side = {r->name, spp, 32, 0, 0};
 		agree_render(w, test, r->name, &side, &other);
 		agree_check(test, &other, &reference);
 	}
@@ -56,7 +56,7 @@ static void test_diffuse(void **state)
 		  world_of_text(32, 32, DEPTH("3") ROOM LAMP "<shape type='cube'>" AT(
 						"<scale value='0.5'/><rotate y='1' angle='25'/><translate y='-1.5' z='-0.5'/>")
 						DIFFUSE("0.7,0.2,0.1") "</shape>"),
-		  4096, 4096, 6656);
+		  4096, 4096, 6656, 0);
 }
 
 static void test_glossy(void **state)
@@ -68,7 +68,7 @@ static void test_glossy(void **state)
 				"<bsdf type='roughconductor'><string name='material' value='Au'/><float name='alpha' value='0.15'/>"
 				"<string name='distribution' value='ggx'/></bsdf></shape>"
 				BALL("0.4,-0.5,-0.6", "0.6", "<bsdf type='phong'><float name='exponent' value='30'/></bsdf>")),
-		  6144, 6144, 0);
+		  6144, 6144, 0, 0);
 }
 
 static void test_glass(void **state)
@@ -78,7 +78,7 @@ static void test_glass(void **state)
 		  world_of_text(32, 32, DEPTH("6") ROOM LAMP
 				BALL("0,-0.6,-0.3", "0.8", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
 				     "<float name='ext_ior' value='1'/></bsdf>")),
-		  8192, 8192, 0);
+		  8192, 8192, 0, 0);
 }
 
 static void test_rough_glass(void **state)
@@ -88,7 +88,7 @@ static void test_rough_glass(void **state)
 		  world_of_text(32, 32, DEPTH("5") ROOM LAMP
 				BALL("0,-0.6,-0.3", "0.8", "<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/>"
 				     "<float name='ext_ior' value='1'/><float name='alpha' value='0.25'/></bsdf>")),
-		  6144, 6144, 8192);
+		  6144, 6144, 8192, 32768);
 }
 
 static void test_environment(void **state)
@@ -100,7 +100,7 @@ static void test_environment(void **state)
 				DIFFUSE("0.5,0.5,0.6") "</shape>"
 				BALL("0,0,0", "1", "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>")
 				"<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
-		  4096, 4096, 6144);
+		  4096, 4096, 6144, 0);
 }
 
 int main(void)
