@@ -101,7 +101,7 @@ static void run(const struct precision_case *p, unsigned most, struct errors *e)
 	for (uint64_t i = 0; e->count < most && i < 400 * most; i++) {
 		struct move move = {0};
 		bool through = false;
-		if (!path_start(&c, seed, i, &x))
+		if (!path_start(&c, seed, i, &x) || x.edges == 0)
 			continue;
 		for (unsigned j = 1; j < p->edges; j++)
 			through |= x.v[j].bsdf->eta != 1;

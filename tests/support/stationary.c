@@ -188,6 +188,8 @@ static void run_start(struct group *g, uint64_t chain, uint64_t index)
 		snprintf(g->failure, sizeof g->failure, "start %llu is black", (unsigned long long)index);
 		return;
 	}
+	if (x->edges == 0)
+		return;
 	whole_copy(y, x, 0, x->edges);
 	look_at(&g->context, x, first);
 	memcpy(now, first, sizeof now);

@@ -11,7 +11,8 @@
 extern const struct chain_ops chain_path;
 
 /* One of the paths that bdpt makes of a bootstrap sample, chosen in proportion to what it contributes there: drawing samples
- * in proportion to their sums and then paths like this gives paths in proportion to f. false: the sample is black. */
+ * in proportion to their sums and then paths like this gives paths in proportion to f. false: the sample is black. 0 edges: the
+ * path fell to rounding. */
 bool path_start(struct path_context *c, uint64_t seed, uint64_t bootstrap_index, struct whole_path *x);
 
 /* A path as bytes (little endian), and back: surfaces, modes and positions are taken from the world again. WHOLE_BYTES are
