@@ -35,7 +35,7 @@ static const struct trial_scene {
 	{"water", "tests/scenes/displaced/water.xml", true, 160, 90},
 	{"frosted", "tests/scenes/displaced/frosted.xml", true, 160, 90},
 	{"pane", "tests/bench/scenes/pane.xml", true, 160, 90},
-	{"bulbs", "tests/bench/scenes/bulbs.xml", true, 160, 90},
+	{"window", "tests/bench/scenes/window.xml", true, 160, 90},
 	{"rough-caustic", "tests/bench/scenes/rough-caustic.xml", true, 160, 90},
 	{"glossy-room", "tests/bench/scenes/glossy-room.xml", true, 160, 90},
 };
