@@ -1,6 +1,7 @@
 #include "worker/chain/chain.h"
 
 #include "common/base/mem.h"
+#include "worker/chain/bytes.h"
 
 #include <string.h>
 
@@ -17,33 +18,19 @@ void chain_count(struct chain *c, bool accepted)
 		counters[COUNT_LONGEST_STUCK] = c->rejected_run;
 }
 
-void chain_put64(uint8_t *p, uint64_t v)
-{
-	for (int i = 0; i < 8; i++)
-		p[i] = (uint8_t)(v >> (8 * i));
-}
-
-uint64_t chain_get64(const uint8_t *p)
-{
-	uint64_t v = 0;
-	for (int i = 0; i < 8; i++)
-		v |= (uint64_t)p[i] << (8 * i);
-	return v;
-}
-
 void chain_put_head(const struct chain *c, uint8_t *bytes)
 {
-	chain_put64(bytes, c->id);
-	chain_put64(bytes + 8, c->step);
-	chain_put64(bytes + 16, c->rejected_run);
+	put64(bytes, c->id);
+	put64(bytes + 8, c->step);
+	put64(bytes + 16, c->rejected_run);
 }
 
 bool chain_get_head(struct chain *c, const uint8_t *bytes, size_t size)
 {
-	if (size < CHAIN_STATE_HEAD || chain_get64(bytes) != c->id)
+	if (size < CHAIN_STATE_HEAD || get64(bytes) != c->id)
 		return false;
-	c->step = chain_get64(bytes + 8);
-	c->rejected_run = chain_get64(bytes + 16);
+	c->step = get64(bytes + 8);
+	c->rejected_run = get64(bytes + 16);
 	return true;
 }
 

@@ -45,8 +45,6 @@ void chain_count(struct chain *c, bool accepted);
 enum { CHAIN_STATE_HEAD = 24 };
 void chain_put_head(const struct chain *c, uint8_t *bytes);
 bool chain_get_head(struct chain *c, const uint8_t *bytes, size_t size); /* false: of another chain */
-void chain_put64(uint8_t *p, uint64_t v);
-uint64_t chain_get64(const uint8_t *p);
 /* Copies bytes into memory of the batch's. -ENOMEM */
 int chain_give(const uint8_t *bytes, size_t size, struct chain_state *out);
 

@@ -1,6 +1,6 @@
 #include "worker/chain/path_chain.h"
 
-#include <string.h>
+#include "worker/chain/bytes.h"
 
 enum { PATH_HEAD = 16, VERTEX_BYTES = 40 };
 /* Where a position and the surface that it names differ more than that, in units of the world's radius, they do not belong
@@ -9,35 +9,9 @@ enum { PATH_HEAD = 16, VERTEX_BYTES = 40 };
 /* Walks meet specular directions far more exactly. */
 #define SPECULAR 1e-3
 
-static void put32(uint8_t *p, uint32_t v)
-{
-	for (int i = 0; i < 4; i++)
-		p[i] = (uint8_t)(v >> (8 * i));
-}
-
-static uint32_t get32(const uint8_t *p)
-{
-	return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
-}
-
-static void put_double(uint8_t *p, double v)
-{
-	uint64_t bits;
-	memcpy(&bits, &v, sizeof bits);
-	chain_put64(p, bits);
-}
-
-static double get_double(const uint8_t *p)
-{
-	uint64_t bits = chain_get64(p);
-	double v;
-	memcpy(&v, &bits, sizeof v);
-	return v;
-}
-
 size_t path_write(const struct whole_path *x, uint8_t *bytes)
 {
-	chain_put64(bytes, x->edges);
+	put64(bytes, x->edges);
 	put_double(bytes + 8, x->wavelength);
 	if (x->edges == 0)
 		return PATH_HEAD;
@@ -122,7 +96,7 @@ bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct
 {
 	if (size < PATH_HEAD)
 		return false;
-	uint64_t edges = chain_get64(bytes);
+	uint64_t edges = get64(bytes);
 	x->edges = 0;
 	if (edges == 0)
 		return size == PATH_HEAD;

@@ -134,7 +134,6 @@ static void step(struct chain *base, struct chain_sums *sums)
 	uint64_t *counters = base->context->counters;
 	double r[4];
 	m->step = ++base->step;
-	m->count = base->strategy[0];
 	mutation_random(m, BLOCK_STRATEGY, r);
 	bool black = c->current->path.edges == 0;
 	unsigned chosen = black ? c->mixture.independent : mixture_choose(&c->mixture, r[0]);

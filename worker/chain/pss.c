@@ -1,5 +1,7 @@
 #include "worker/chain/pss.h"
 
+#include "worker/chain/bytes.h"
+
 #include <assert.h>
 #include <math.h>
 #include <string.h>
@@ -59,17 +61,6 @@ void pss_choices(uint64_t seed, uint64_t chain, uint64_t step, double out[SAMPLE
 }
 
 enum { HEADER = 8 };
-
-static void put32(uint8_t *p, uint32_t v)
-{
-	for (int i = 0; i < 4; i++)
-		p[i] = (uint8_t)(v >> (8 * i));
-}
-
-static uint32_t get32(const uint8_t *p)
-{
-	return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
-}
 
 size_t pss_write(const struct pss_point *p, uint8_t *bytes, size_t room)
 {

@@ -9,10 +9,20 @@
 /* Cosines and determinants below this are none: what is divided by them would overflow. */
 #define RATIO_LEAST 0x1p-500
 
-static double bsdf_limit(const struct path_vertex *v)
+double halfvec_film_step(const struct camera *camera)
+{
+	return FILM_STEP * fmin(camera->width, camera->height);
+}
+
+double halfvec_lobe_width(const struct path_vertex *v)
 {
 	assert(v->bsdf->alpha > 0);
-	return fmin(v->bsdf->alpha, 1) / sqrt(M_PI);
+	return fmin(v->bsdf->alpha, 1);
+}
+
+static double bsdf_limit(const struct path_vertex *v)
+{
+	return halfvec_lobe_width(v) / sqrt(M_PI);
 }
 
 /* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale a pixel, meet the plane of the geometric normal. */
@@ -78,7 +88,7 @@ void halfvec_steps(const struct path_context *c, const struct whole_path *x, con
 		   unsigned c_end, struct halfvec_step *step)
 {
 	const struct camera *camera = &c->w->camera;
-	double sum = 0, pixels = FILM_STEP * fmin(camera->width, camera->height);
+	double sum = 0, pixels = halfvec_film_step(camera);
 	mat2 d[WHOLE_MAX_VERTICES], footprint = {0, 0, 0, 0};
 	for (unsigned j = c_end + 1; j < b; j++)
 		if (!x->v[j].delta)

@@ -19,8 +19,13 @@ struct halfvec_step {
 	double sigma[2]; /* finite and above 0 */
 };
 
+/* Standard deviation of a step on the film, in pixels: 2 % of its smaller side. */
+double halfvec_film_step(const struct camera *camera);
+/* How wide the narrowest lobe of a vertex that is not specular is, in slopes; at most 1. */
+double halfvec_lobe_width(const struct path_vertex *v);
+
 /* Of those vertices among c_end+1..b-1 that are not specular (the others are not written), from their constraints. On the
- * image all vertices together move by at most 2 % of the film's smaller side. */
+ * image all vertices together move by at most halfvec_film_step. */
 void halfvec_steps(const struct path_context *c, const struct whole_path *x, const struct constraint *k, unsigned b,
 		   unsigned c_end, struct halfvec_step *step);
 

@@ -54,16 +54,12 @@ static bool move_emitter(struct mutation_ctx *m, const struct whole_path *x, str
 	const struct emitter *em = &c->w->emitters[v->emitter];
 	struct emitter_point p = world_emitter_point(&v->x);
 	double u[2], r[4], pdf;
-	mutation_random(m, BLOCK_ENDS, r);
 	p.infinite = v->kind == VERTEX_INFINITE;
 	move->log_density[Y_TO_X] += log(em->ops->pdf_point(em, &p));
 	em->ops->point_inverse(em, &p, u);
 	mutation_random(m, BLOCK_VERTEX, r);
-	for (int i = 0; i < 2; i++) {
-		u[i] += EMITTER_STEP * (2 * r[i] - 1);
-		if (!(u[i] >= 0 && u[i] < 1))
-			return false;
-	}
+	if (!mutation_step_square(u, r, EMITTER_STEP))
+		return false;
 	if (!em->ops->sample_point(em, u, &p, &pdf) || !(pdf > 0))
 		return false;
 	y->v[0] = path_emitter_vertex(c->w, v->emitter, &p);
@@ -96,7 +92,7 @@ static double tolerance_of(const struct path_vertex *v, const struct halfvec_ste
 {
 	if (v->delta)
 		return SPECULAR_TOLERANCE;
-	return WALK_TOLERANCE * fmin(fmin(v->bsdf->alpha, 1), fmin(s->sigma[0], s->sigma[1]));
+	return WALK_TOLERANCE * fmin(halfvec_lobe_width(v), fmin(s->sigma[0], s->sigma[1]));
 }
 
 /* Steps of the half vectors, and what they aim at. */

@@ -34,3 +34,13 @@ void mutation_normals(const double u[2], double out[2])
 	out[0] = r * cos(phi);
 	out[1] = r * sin(phi);
 }
+
+bool mutation_step_square(double u[2], const double r[2], double size)
+{
+	for (int i = 0; i < 2; i++) {
+		u[i] += size * (2 * r[i] - 1);
+		if (!(u[i] >= 0 && u[i] < 1))
+			return false;
+	}
+	return true;
+}

@@ -78,6 +78,8 @@ enum mutation_block {
 	BLOCK_VERTEX, /* + j: the step of vertex j */
 };
 void mutation_random(const struct mutation_ctx *m, unsigned block, double out[4]);
+/* A symmetric step of two numbers in [0,1), by r in [0,1). false: it leaves the square. */
+bool mutation_step_square(double u[2], const double r[2], double size);
 /* Two standard normals from two numbers in [0,1) (Box and Muller 1958). */
 void mutation_normals(const double u[2], double out[2]);
 

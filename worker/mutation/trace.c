@@ -1,7 +1,5 @@
 #include "worker/mutation/trace.h"
 
-/* Deviation of the film step, of the smaller side of the film. */
-#define FILM_STEP 0.02
 /* Half vectors take steps of so many lobe widths. */
 #define HALFVEC_STEP 0.01
 /* Steps of x_k, in the numbers that make it. */
@@ -15,30 +13,21 @@ bool trace_move_aperture(struct mutation_ctx *m, const struct whole_path *x, str
 	double u[2], r[4];
 	mutation_random(m, BLOCK_ENDS, r);
 	camera_point_inverse(camera, x->v[x->edges].x.p, u);
-	for (int i = 0; i < 2; i++) {
-		u[i] += APERTURE_STEP * (2 * r[1 + i] - 1);
-		if (!(u[i] >= 0 && u[i] < 1))
-			return false;
-	}
+	if (!mutation_step_square(u, r + 1, APERTURE_STEP))
+		return false;
 	y->v[y->edges].x.p = camera_point(camera, u);
 	return true;
 }
 
-static double film_step(const struct path_context *c)
-{
-	return FILM_STEP * fmin(c->w->camera.width, c->w->camera.height);
-}
-
 static bool move_film(struct mutation_ctx *m, const struct whole_path *x, struct whole_path *y, struct move *move)
 {
-	const struct film_window *w = &m->path->window;
-	double r[4], g[2], sigma = film_step(m->path);
+	double r[4], g[2], sigma = halfvec_film_step(&m->path->w->camera);
 	mutation_random(m, BLOCK_FILM, r);
 	mutation_normals(r, g);
 	for (int i = 0; i < 2; i++)
 		y->film[i] = x->film[i] + sigma * g[i];
 	move->log_symmetric -= 0.5 * (g[0] * g[0] + g[1] * g[1]) + log(2 * M_PI * sigma * sigma);
-	return y->film[0] >= w->x && y->film[0] < w->x + w->width && y->film[1] >= w->y && y->film[1] < w->y + w->height;
+	return film_window_holds(&m->path->window, y->film);
 }
 
 /* Rotation that takes half vectors of x_j's frame into y_j's, by the line between the two as both frames see it (sec. 4). It
@@ -52,11 +41,6 @@ static void turn(const struct path_vertex *from, const struct path_vertex *to, v
 		return;
 	double c = (a.x * b.x + a.y * b.y) / (la * lb), s = (a.x * b.y - a.y * b.x) / (la * lb);
 	*h = (vec2){c * h->x - s * h->y, s * h->x + c * h->y};
-}
-
-static double width(const struct path_vertex *v)
-{
-	return fmin(v->bsdf->alpha, 1);
 }
 
 /* Where light from o goes by the half vector h; eta = n_o / n_i. false: total reflection. */
@@ -89,14 +73,13 @@ static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct whole_pa
 	v->mode = from->mode;
 	v->delta = from->delta;
 	if (from->delta) {
-		struct bsdf_point p = {v->x.u, v->x.v, &y->wl, TRANSPORT_RADIANCE};
 		double chance;
-		if (!v->bsdf->has_delta || spectrum_is_zero(bsdf_eval_delta(v->bsdf, &p, o, v->mode, &i, &chance)))
+		if (!v->bsdf->has_delta || spectrum_is_zero(whole_specular(y, j, &i, &chance)))
 			return false;
 	} else {
 		if (!v->bsdf->has_smooth || !(v->bsdf->modes & v->mode))
 			return false;
-		double r[4], g[2], sigma = HALFVEC_STEP * 0.5 * (width(from) + width(v));
+		double r[4], g[2], sigma = HALFVEC_STEP * 0.5 * (halfvec_lobe_width(from) + halfvec_lobe_width(v));
 		mutation_random(m, BLOCK_VERTEX + j, r);
 		mutation_normals(r, g);
 		vec2 h = halfvec_of(x, j);

@@ -197,8 +197,7 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 	vec3 d = path_direction(eye, y, &distance2); /* camera to y */
 	if (!(distance2 > 0) || !camera_project(&c->w->camera, eye->x.p, d, sqrt(distance2), &x[0], &x[1]))
 		return spectrum_of(0);
-	const struct film_window *win = &c->window;
-	if (!(x[0] >= win->x && x[0] < win->x + win->width && x[1] >= win->y && x[1] < win->y + win->height))
+	if (!film_window_holds(&c->window, x))
 		return spectrum_of(0);
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
 	l = spectrum_scale(camera_jac_film_from_solid(&c->w->camera, d) * jac_solid_from_area(y->x.ng, d, distance2), l);

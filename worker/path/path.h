@@ -42,6 +42,11 @@ struct film_window {
 	double x, y, width, height;
 };
 
+static inline bool film_window_holds(const struct film_window *w, const double film[2])
+{
+	return film[0] >= w->x && film[0] < w->x + w->width && film[1] >= w->y && film[1] < w->y + w->height;
+}
+
 /* One evaluation's surroundings; one a thread. */
 struct path_context {
 	const struct world *w;

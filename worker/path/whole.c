@@ -30,11 +30,6 @@ void product_mul(struct product *p, spectrum f)
 	p->exponent += bring_near_one(&p->v);
 }
 
-void product_scale(struct product *p, double s)
-{
-	product_mul(p, spectrum_of(s));
-}
-
 static void to_xyz(const struct path_context *c, const struct whole_path *x, spectrum l, double xyz[3])
 {
 	l = path_collapse(l, whole_is_dispersed(c, x));
@@ -79,17 +74,25 @@ double whole_eta(const struct whole_path *x, unsigned j)
 	return vec3_dot(v->x.sh.n, x->edge[j].w) > 0 ? 1 / eta : eta;
 }
 
+spectrum whole_specular(const struct whole_path *x, unsigned j, vec3 *wi, double *chance)
+{
+	const struct path_vertex *v = &x->v[j];
+	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
+	return bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, x->edge[j].w), v->mode, wi, chance);
+}
+
 static spectrum scatter(const struct whole_path *x, unsigned j, bool halfvec)
 {
 	const struct path_vertex *v = &x->v[j];
 	if (!whole_mode(x, j))
 		return spectrum_of(0);
-	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
-	vec3 wo = frame_to_local(&v->x.sh, x->edge[j].w), wi;
+	vec3 wi;
 	if (v->delta) {
 		double chance;
-		return bsdf_eval_delta(v->bsdf, &p, wo, v->mode, &wi, &chance);
+		return whole_specular(x, j, &wi, &chance);
 	}
+	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
+	vec3 wo = frame_to_local(&v->x.sh, x->edge[j].w);
 	wi = frame_to_local(&v->x.sh, vec3_neg(x->edge[j - 1].w));
 	return halfvec ? bsdf_eval_halfvec(v->bsdf, &p, wo, wi) : v->bsdf->ops->eval(v->bsdf, &p, wo, wi);
 }
@@ -115,13 +118,11 @@ spectrum whole_fh(const struct path_context *c, struct whole_path *x, unsigned j
 
 double whole_specular_miss(const struct whole_path *x, unsigned j)
 {
-	const struct path_vertex *v = &x->v[j];
-	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
-	vec3 i = frame_to_local(&v->x.sh, vec3_neg(x->edge[j - 1].w)), o = frame_to_local(&v->x.sh, x->edge[j].w), wi;
+	vec3 wi;
 	double chance;
-	if (spectrum_is_zero(bsdf_eval_delta(v->bsdf, &p, o, v->mode, &wi, &chance)))
+	if (spectrum_is_zero(whole_specular(x, j, &wi, &chance)))
 		return INFINITY;
-	return vec3_length(vec3_sub(wi, i));
+	return vec3_length(vec3_sub(wi, frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w))));
 }
 
 static uint64_t bits(unsigned first, unsigned last)
@@ -188,7 +189,6 @@ bool whole_visible(struct path_context *c, const struct whole_path *x, unsigned 
 bool whole_film(const struct path_context *c, struct whole_path *x)
 {
 	const struct whole_edge *e = &x->edge[x->edges - 1];
-	const struct film_window *w = &c->window;
 	vec3 d = vec3_neg(e->w);
 	double distance = sqrt(e->distance2);
 	if (x->v[x->edges - 1].kind == VERTEX_INFINITE) {
@@ -199,7 +199,7 @@ bool whole_film(const struct path_context *c, struct whole_path *x)
 	}
 	if (!camera_project(&c->w->camera, x->v[x->edges].x.p, d, distance, &x->film[0], &x->film[1]))
 		return false;
-	return x->film[0] >= w->x && x->film[0] < w->x + w->width && x->film[1] >= w->y && x->film[1] < w->y + w->height;
+	return film_window_holds(&c->window, x->film);
 }
 
 /* Vertex i of the path from vertex `from` of a sub-path; its scattering there still holds when `left` says so. */

@@ -44,7 +44,6 @@ struct product {
 };
 #define PRODUCT_ONE ((struct product){{{1, 1, 1, 1}}, 0})
 void product_mul(struct product *p, spectrum f);
-void product_scale(struct product *p, double s);
 /* log(X + Y + Z) of what the film gets of it; -INFINITY for black. */
 double product_log_intensity(const struct path_context *c, const struct whole_path *x, const struct product *p);
 
@@ -65,6 +64,9 @@ spectrum whole_f(const struct path_context *c, struct whole_path *x, unsigned j)
 spectrum whole_fh(const struct path_context *c, struct whole_path *x, unsigned j);
 /* The vertices first..last are about to change: what was known of them and of their neighbours no longer holds. */
 void whole_forget(struct whole_path *x, unsigned first, unsigned last);
+/* The exactly specular lobe of v[j]'s mode seen along o_j, as bsdf_eval_delta has it: its weight, its direction in the shading
+ * frame, the probability with which it is chosen. */
+spectrum whole_specular(const struct whole_path *x, unsigned j, vec3 *wi, double *chance);
 /* By how far i_j is from where the exactly specular lobe of v[j]'s mode sends o_j; INFINITY: there is no such lobe. */
 double whole_specular_miss(const struct whole_path *x, unsigned j);
 void whole_set_wavelength(const struct path_context *c, struct whole_path *x, double u);

@@ -28,10 +28,9 @@ double whole_log_f(const struct path_context *c, struct whole_path *x)
 static void delta_densities(const struct whole_path *x, unsigned j, double *to_light, double *to_camera)
 {
 	const struct path_vertex *v = &x->v[j];
-	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
 	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w), wi;
 	double chance = 0, light, camera;
-	if (spectrum_is_zero(bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, o), v->mode, &wi, &chance)))
+	if (spectrum_is_zero(whole_specular(x, j, &wi, &chance)))
 		chance = 0;
 	path_delta_per_solid(&v->x, i, o, whole_eta(x, j), &light, &camera);
 	*to_light = chance * light * path_cosine(&x->v[j - 1], i) / x->edge[j - 1].distance2;
