@@ -10,6 +10,7 @@
 
 #include "common/film/batch.h"
 #include "common/film/exact_sum.h"
+#include "common/film/path_class.h"
 
 struct canvas;
 
@@ -43,12 +44,27 @@ struct canvas_counts {
 /* Of the prefix of complete rounds, with open_rounds of all that has come. */
 void canvas_counts(const struct canvas *c, bool open_rounds, struct canvas_counts *out);
 
+/* One class of paths: its X+Y+Z over the film window in units of b's, as independent samples (bootstrap and independent
+ * proposals of chains are kept apart: only the bootstrap's count here) and as the chains' share of time times b say; with
+ * standard errors from the groups. */
+struct path_class_energy {
+	double bootstrap, bootstrap_error, chains, chains_error;
+	double difference_t; /* of the groups' differences, Student's t with groups - 1 degrees; NAN: nothing to compare */
+};
+
 struct canvas_image {
 	uint32_t width, height; /* crop */
 	float *rgb;   /* linear Rec. 709, [height][width][3]; from the prefix of complete rounds */
 	float *error; /* one standard error, same shape and units; NULL when groups < 2 */
 	double rel_mse;         /* estimated relMSE of rgb at this resolution; NAN when groups < 2 */
 	double rel_mse_upper;   /* upper end of its 90 % interval */
+	double rel_mse_95[2];   /* interval that holds this image's own relMSE in 95 % of all cases */
+	/* Chains only, NULL else. Per tile of TILE_SIZE from the crop's corner: potential scale reduction (Gelman and Rubin 1992)
+	 * of the share of a chain's time that falls into the tile, NAN where no chain came; the relative standard error of the
+	 * tile's mean brightness from the spread between chains; the tile's share of the image's energy. */
+	uint32_t tiles_across, tiles_down;
+	float *r_hat, *tile_error, *tile_share;
+	struct path_class_energy classes[PATH_CLASSES];
 	double b, b_error;      /* pooled b and its standard error (chains) */
 	double beyond_share;
 	uint64_t samples, rounds;

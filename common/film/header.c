@@ -137,7 +137,7 @@ static void add_count(struct header *h, enum header_name name, uint64_t value)
 
 static void add_plan(struct header *h, const struct plan *p, uint64_t rounds)
 {
-	char options[768];
+	char options[PLAN_TEXT];
 	plan_options(p, rounds, options, sizeof options);
 	add_string(h, H_INTEGRATOR, p->integrator);
 	if (*p->mutations)

@@ -212,6 +212,8 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 	};
 	memcpy(p->integrator, r->integrator, sizeof p->integrator);
 	memcpy(p->mutations, r->mixture, strnlen(r->mixture, sizeof p->mutations));
+	memcpy(p->knobs, r->knobs, strnlen(r->knobs, sizeof p->knobs));
+	memcpy(p->effects, r->effects, strnlen(r->effects, sizeof p->effects));
 	if (r->crop_width == 0) {
 		p->crop_x = p->crop_y = 0;
 		p->crop_width = r->width;
@@ -244,14 +246,6 @@ static int check_integrator(const struct plan *p, struct error *e)
 	return 0;
 }
 
-/* Equal plans are equal bytes: what stands behind a text is 0. */
-static bool is_zero(const char *bytes, size_t n)
-{
-	while (n > 0 && bytes[n - 1] == 0)
-		n--;
-	return n == 0;
-}
-
 static int check_mutations(const struct plan *p, struct error *e)
 {
 	int n = plan_strategy_count(p->mutations);
@@ -259,9 +253,10 @@ static int check_mutations(const struct plan *p, struct error *e)
 		return error_set(e, EINVAL,
 				 "the mixture of mutations is not a list of up to %d names with weights in %d characters",
 				 PLAN_MAX_STRATEGIES, PLAN_MUTATIONS_MAX - 1);
-	size_t length = strlen(p->mutations);
-	if (!is_zero(p->mutations + length, sizeof p->mutations - length))
+	if (!plan_text_ok(p->mutations, sizeof p->mutations))
 		return error_set(e, EINVAL, "the mixture of mutations does not end with its text");
+	if (!plan_text_ok(p->knobs, sizeof p->knobs) || !plan_text_ok(p->effects, sizeof p->effects))
+		return error_set(e, EINVAL, "the settings or the effects are not a text of letters, digits and @=,.:+-_");
 	if (n > 0 && p->kind != PLAN_CHAINS)
 		return error_set(e, EINVAL, "a plan without chains has a mixture of mutations");
 	return 0;

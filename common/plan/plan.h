@@ -31,6 +31,8 @@ enum {
 	PLAN_MAX_DEPTH = 128,      /* edges */
 	PLAN_MUTATIONS_MAX = 160,  /* bytes of the mixture's text, the last a 0 */
 	PLAN_MAX_STRATEGIES = 8,   /* entries of the mixture */
+	PLAN_KNOBS_MAX = 256,      /* bytes of the text, the last a 0 */
+	PLAN_EFFECTS_MAX = 256,
 };
 
 struct plan_request {
@@ -48,6 +50,7 @@ struct plan_request {
 	uint32_t chains, groups;       /* 0: by the rule */
 	uint64_t bootstrap, epoch;     /* 0: by the rule; epoch: mutations per chain or samples per pixel and group */
 	char mixture[PLAN_MUTATIONS_MAX]; /* see mutations below; the count of them has the word here */
+	char knobs[PLAN_KNOBS_MAX], effects[PLAN_EFFECTS_MAX];
 };
 
 struct plan {
@@ -65,6 +68,10 @@ struct plan {
 	/* The mixture of strategies that chains draw their proposals from, as the renderer spells it: one entry each, with
 	 * commas between, "independent=0.1,hslt=0.9". Empty: the integrator has none. Bytes behind the text are 0. */
 	char mutations[PLAN_MUTATIONS_MAX];
+	/* As the renderer spells them, bytes behind the text are 0: settings that differ from the default, "tolerance=1e-05";
+	 * effects that the scene does not call for and that are simulated all the same, or the other way round:
+	 * "all", "-dispersion,+aperture". Empty: nothing differs. */
+	char knobs[PLAN_KNOBS_MAX], effects[PLAN_EFFECTS_MAX];
 };
 
 /* Checks the request (sizes, crop, counts) and fills in what it leaves open. -EINVAL with a sentence. */
@@ -75,6 +82,7 @@ int plan_check(const struct plan *p, struct error *e);
 void plan_describe(const struct plan *p, char *text, size_t size);
 /* What plan_make changed of the values asked for ("chains 100 -> 128: ..."); empty: nothing. */
 void plan_describe_changes(const struct plan_request *r, const struct plan *p, char *text, size_t size);
+enum { PLAN_TEXT = 1536 }; /* bytes that any of these texts needs at most */
 /* The options that make the same bits again when `rounds` rounds are done, whatever bound ended this job. */
 void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size);
 
@@ -95,6 +103,9 @@ uint64_t plan_extended_pixels(const struct plan *p); /* (crop + 2 border) in eac
 int plan_strategy_count(const char *mixture);
 /* The i-th entry without its weight ("hslt", "hslt@b2c0"), cut to the size. */
 void plan_strategy_name(const char *mixture, uint32_t i, char *name, size_t size);
+
+/* A text of a plan: ends within `size` bytes, nothing behind its end, and nothing in it that a shell would take for its own. */
+bool plan_text_ok(const char *text, size_t size);
 
 /* Systematic resampling of a group's seeds over its bootstrap weights, in index order (contract section 2).
  * weight[i] >= 0 and finite, i in the group's range; writes `count` bootstrap indices. false: all weights are 0. */

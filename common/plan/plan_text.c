@@ -5,12 +5,22 @@
 #include <stdio.h>
 #include <string.h>
 
+#define TEXT_CHARACTERS "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789@=,.:+-_"
+
+bool plan_text_ok(const char *text, size_t size)
+{
+	size_t length = strnlen(text, size);
+	if (length == size || strspn(text, TEXT_CHARACTERS) != length)
+		return false;
+	while (size > length && text[size - 1] == 0)
+		size--;
+	return size == length;
+}
+
 int plan_strategy_count(const char *mixture)
 {
 	size_t length = strnlen(mixture, PLAN_MUTATIONS_MAX);
-	/* Nothing that a shell would take for its own: plan_options() prints it. */
-	if (length == PLAN_MUTATIONS_MAX ||
-	    strspn(mixture, "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789@=,.:+-_") != length)
+	if (length == PLAN_MUTATIONS_MAX || strspn(mixture, TEXT_CHARACTERS) != length)
 		return -1;
 	int count = length > 0;
 	for (size_t i = 0; i < length; i++) {
@@ -45,6 +55,10 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 		    p->integrator, p->groups, epoch, p->groups * p->parts, bootstrap);
 	if (*p->mutations)
 		text_put(&t, ", mutations %s", p->mutations);
+	if (*p->knobs)
+		text_put(&t, ", %s", p->knobs);
+	if (*p->effects)
+		text_put(&t, ", effects %s", p->effects);
 	text_put(&t, "; ");
 	const char *or = "";
 	if (p->rounds != UINT64_MAX) {
@@ -98,6 +112,10 @@ void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size
 	    (unsigned long long)p->seed, p->min_depth, p->max_depth, p->groups);
 	if (*p->mutations)
 		text_put(&t, " --mutations %s", p->mutations);
+	if (*p->knobs)
+		text_put(&t, " --set %s", p->knobs);
+	if (*p->effects)
+		text_put(&t, " --effects=%s", p->effects);
 	if (p->kind == PLAN_CHAINS)
 		text_put(&t, " --chains %u --bootstrap %llu --epoch %llu --mutations %llu", p->chains,
 		    (unsigned long long)p->bootstrap, (unsigned long long)p->epoch,

@@ -35,6 +35,8 @@ void plan_to_wire(const struct plan *p, Farm__Plan *out)
 	out->min_depth = p->min_depth;
 	out->max_depth = p->max_depth;
 	out->mutations = borrow(p->mutations);
+	out->knobs = borrow(p->knobs);
+	out->effects = borrow(p->effects);
 }
 
 static int kind_from_wire(uint32_t kind, const char *name, enum plan_kind *out, char integrator[16], struct error *e)
@@ -58,6 +60,16 @@ static int mixture_from_wire(const char *text, char mixture[PLAN_MUTATIONS_MAX],
 	return 0;
 }
 
+static int text_from_wire(const char *text, char *out, size_t size, struct error *e)
+{
+	size_t n = strlen(text);
+	if (n >= size)
+		return error_set(e, EBADMSG, "a plan whose settings or effects are a text of %zu bytes", n);
+	memset(out, 0, size);
+	memcpy(out, text, n);
+	return plan_text_ok(out, size) ? 0 : error_set(e, EBADMSG, "a plan whose settings or effects are none");
+}
+
 int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e)
 {
 	memset(p, 0, sizeof *p);
@@ -66,6 +78,10 @@ int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e)
 		rc = kind_from_wire(m->kind, m->integrator, &p->kind, p->integrator, e);
 	if (!rc)
 		rc = mixture_from_wire(m->mutations, p->mutations, e);
+	if (!rc)
+		rc = text_from_wire(m->knobs, p->knobs, sizeof p->knobs, e);
+	if (!rc)
+		rc = text_from_wire(m->effects, p->effects, sizeof p->effects, e);
 	if (rc)
 		return rc;
 	p->width = m->width;
@@ -113,6 +129,8 @@ void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out)
 	out->bootstrap = r->bootstrap;
 	out->epoch = r->epoch;
 	out->mixture = borrow(r->mixture);
+	out->knobs = borrow(r->knobs);
+	out->effects = borrow(r->effects);
 }
 
 int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, struct error *e)
@@ -123,6 +141,10 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 		rc = kind_from_wire(m->kind, m->integrator, &r->kind, r->integrator, e);
 	if (!rc)
 		rc = mixture_from_wire(m->mixture, r->mixture, e);
+	if (!rc)
+		rc = text_from_wire(m->knobs, r->knobs, sizeof r->knobs, e);
+	if (!rc)
+		rc = text_from_wire(m->effects, r->effects, sizeof r->effects, e);
 	if (rc)
 		return rc;
 	r->width = m->width;

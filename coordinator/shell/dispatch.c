@@ -37,7 +37,7 @@ static void submitted(struct server *s, const struct action *a)
 	}
 	o->next = s->orders;
 	s->orders = o;
-	char plan[1024];
+	char plan[PLAN_TEXT];
 	plan_describe(&o->plan, plan, sizeof plan);
 	order_log(o, LOG_JOB_SUBMIT, "name=%s client=%s plan=%s", log_quote(o->record.name).text, p->address,
 		  log_quote(plan).text);

@@ -255,7 +255,7 @@ void bench_equal_time(const char *bin)
 	double seconds = asked ? atof(asked) : 10;
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
 		const struct trial_scene *s = &scenes[i];
-		const struct render_options size = {s->width, s->height};
+		const struct render_options size = {.width = s->width, .height = s->height};
 		char says[128];
 		if (only && strcmp(only, s->name) != 0)
 			continue;

@@ -166,7 +166,7 @@ struct world *bench_world_box(const char **name)
 	*slash = 0;
 	*name = strstr(folder, "cornell-box") ? "cornell-box" : "the box of tests/scenes (HSLT_SCENES names no cornell-box)";
 	struct asset_source assets = asset_folder(folder);
-	struct render_options small = {160, 160};
+	struct render_options small = {.width = 160, .height = 160};
 	return build(&assets, slash + 1, &small);
 }
 

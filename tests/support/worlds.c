@@ -15,7 +15,7 @@ static struct world *build(const struct asset_source *assets, const char *name, 
 	struct error e = {""};
 	struct scene s;
 	struct world *w = NULL;
-	struct render_options o = {width, height};
+	struct render_options o = {.width = width, .height = height};
 	int rc = scene_read(&s, assets, name, render_plugins(), NULL, 0, &e);
 	if (!rc) {
 		rc = world_new(&w, &s, assets, &o, &e);

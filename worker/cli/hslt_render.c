@@ -136,7 +136,7 @@ static int load(struct session *s, struct error *e)
 static int make_plan(struct session *s, struct error *e)
 {
 	struct plan_request *p = &s->a->render.plan;
-	char text[1024];
+	char text[PLAN_TEXT];
 	int rc = render_plan_from_scene(&s->a->render, &s->summary, e);
 	s->usage = rc == -EINVAL;
 	if (!rc)
@@ -217,7 +217,7 @@ static json_t *real_or_null(double x)
 
 static int write_stats(const struct session *s, struct error *e)
 {
-	char plan[1024], again[768], note[STRATEGY_NOTE];
+	char plan[PLAN_TEXT], again[PLAN_TEXT], note[STRATEGY_NOTE];
 	plan_describe(&s->plan, plan, sizeof plan);
 	plan_options(&s->plan, s->image.rounds, again, sizeof again);
 	strategy_note(&s->plan, &s->image.counts, s->image.black, note, sizeof note);

@@ -128,7 +128,7 @@ static int run(struct arguments *a, struct client *cl, const struct scene_bundle
 {
 	uint64_t job = 0;
 	struct submit_end end = {0};
-	char plan[1024] = "";
+	char plan[PLAN_TEXT] = "";
 	int rc = submit_send(cl, &a->request, b, &job, plan, sizeof plan, e);
 	if (rc)
 		return rc;

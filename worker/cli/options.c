@@ -162,7 +162,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_SIZE:
 		take_numbers(state, "--size", arg, "x", n, 2);
-		a->render = (struct render_options){n[0], n[1]};
+		a->render.width = n[0];
+		a->render.height = n[1];
 		if (n[0] == 0 || n[1] == 0)
 			argp_error(state, "--size takes a film of at least 1x1 pixels");
 		return 0;
@@ -245,6 +246,8 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 	p->width = s->width;
 	p->height = s->height;
 	p->border = s->border;
+	memcpy(p->knobs, a->render.knobs, sizeof p->knobs);
+	memcpy(p->effects, a->render.effects, sizeof p->effects);
 	if (!p->min_depth)
 		p->min_depth = 1;
 	if (!p->max_depth)

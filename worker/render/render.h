@@ -37,9 +37,10 @@ const struct render_integrator *render_integrator_at(size_t index);
 /* Of the libraries that decide bits, for the numeric fingerprint: "embree 3.13.5 avx2". */
 const char *render_numeric_version(void);
 
-/* What hslt-submit and hslt-render let the user override; all zero: as the scene says. */
+/* What hslt-submit and hslt-render let the user override; all zero: as the scene says. The texts are those of a plan. */
 struct render_options {
 	uint32_t width, height;
+	char knobs[PLAN_KNOBS_MAX], effects[PLAN_EFFECTS_MAX];
 };
 
 struct render_summary {

@@ -36,6 +36,27 @@ static void a_mixture_is_kept_and_told(void **state)
 	assert_null(strstr(text, "--mutations 0"));
 }
 
+static void settings_and_effects_are_kept_and_told(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_CHAINS, "hslt=1");
+	struct plan p;
+	struct error e;
+	char text[PLAN_TEXT];
+	strcpy(r.knobs, "tolerance=1e-05");
+	strcpy(r.effects, "-dispersion,+aperture");
+	assert_int_equal(plan_make(&r, &p, &e), 0);
+	plan_options(&p, 1, text, sizeof text);
+	assert_non_null(strstr(text, " --set tolerance=1e-05 --effects=-dispersion,+aperture --chains"));
+	p.knobs[40] = 'x'; /* something behind the end */
+	assert_int_equal(plan_check(&p, &e), -EINVAL);
+	p.knobs[40] = 0;
+	strcpy(p.effects, "a;b");
+	assert_int_equal(plan_check(&p, &e), -EINVAL);
+	memset(p.effects, 'a', sizeof p.effects);
+	assert_int_equal(plan_check(&p, &e), -EINVAL);
+}
+
 static void other_texts_are_none(void **state)
 {
 	(void)state;
@@ -82,7 +103,7 @@ static void entries_are_counted_and_named(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_mixture_is_kept_and_told),
+		cmocka_unit_test(a_mixture_is_kept_and_told), cmocka_unit_test(settings_and_effects_are_kept_and_told),
 		cmocka_unit_test(other_texts_are_none),
 		cmocka_unit_test(entries_are_counted_and_named),
 	};

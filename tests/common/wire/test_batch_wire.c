@@ -272,11 +272,20 @@ static void plans_travel(void **state)
 	char longest[PLAN_MUTATIONS_MAX + 1] = "", control[] = "a\n";
 	memset(longest, 'a', PLAN_MUTATIONS_MAX);
 	char *mixtures[] = {longest, control};
-	struct plan_request request = {.integrator = "hslt", .kind = PLAN_CHAINS, .mixture = "hslt=1"}, again;
+	struct plan_request request = {.integrator = "hslt", .kind = PLAN_CHAINS, .mixture = "hslt=1",
+				       .knobs = "tolerance=1e-05", .effects = "all"}, again;
 	Farm__PlanRequest rm;
 	plan_request_to_wire(&request, &rm);
 	assert_int_equal(plan_request_from_wire(&rm, &again, &e), 0);
 	assert_memory_equal(&request, &again, sizeof request);
+	char long_text[PLAN_KNOBS_MAX + 1] = "";
+	memset(long_text, 'a', PLAN_KNOBS_MAX);
+	plan_to_wire(&p, &m);
+	m.knobs = long_text;
+	assert_int_equal(plan_from_wire(&m, &back, &e), -EBADMSG);
+	plan_to_wire(&p, &m);
+	m.effects = control;
+	assert_int_equal(plan_from_wire(&m, &back, &e), -EBADMSG);
 	for (int i = 0; i < 2; i++) {
 		plan_to_wire(&p, &m);
 		m.mutations = mixtures[i];
