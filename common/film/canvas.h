@@ -58,6 +58,7 @@ struct canvas_image {
 	float *error; /* one standard error, same shape and units; NULL when groups < 2 */
 	double rel_mse;         /* estimated relMSE of rgb at this resolution; NAN when groups < 2 */
 	double rel_mse_upper;   /* upper end of its 90 % interval */
+	double rel_mse_degrees; /* of freedom: rel_mse is distributed as its expectation times chi-square over them; NAN: unknown */
 	double rel_mse_95[2];   /* interval that holds this image's own relMSE in 95 % of all cases */
 	/* Chains only, NULL else. Per tile of TILE_SIZE from the crop's corner: potential scale reduction (Gelman and Rubin 1992)
 	 * of the share of a chain's time that falls into the tile, NAN where no chain came; the relative standard error of the
