@@ -3,15 +3,12 @@
 #include "common/base/version.h"
 #include "common/film/image_file.h"
 #include "common/film/strategy.h"
-#include "common/film/strategy_json.h"
-#include "worker/cli/local.h"
 #include "worker/cli/options.h"
+#include "worker/cli/stats.h"
 
-#include <jansson.h>
 #include <math.h>
 #include <signal.h>
 #include <stdio.h>
-#include <stdlib.h>
 #include <string.h>
 #include <time.h>
 #include <unistd.h>
@@ -200,52 +197,6 @@ static int write_image(const struct session *s, struct error *e)
 	return rc;
 }
 
-static const char *const counter_names[BATCH_COUNTERS] = {
-	[COUNT_SAMPLES] = "samples",	     [COUNT_ACCEPTED] = "accepted",
-	[COUNT_INDEPENDENT] = "independent", [COUNT_NAN] = "nan",
-	[COUNT_INFINITE] = "infinite",	     [COUNT_NEGATIVE] = "negative",
-	[COUNT_RAYS_CLOSEST] = "raysClosest", [COUNT_RAYS_SHADOW] = "raysShadow",
-	[COUNT_STUCK] = "stuck",	     [COUNT_LONGEST_STUCK] = "longestStuck",
-};
-static const char *const end_names[] = {[MERGE_GOES_ON] = "interrupted", [MERGE_ROUNDS] = "mutations", [MERGE_TIME] = "time",
-					[MERGE_ERROR] = "target-error"};
-
-static json_t *real_or_null(double x)
-{
-	return isfinite(x) ? json_real(x) : json_null();
-}
-
-static int write_stats(const struct session *s, struct error *e)
-{
-	char plan[PLAN_TEXT], again[PLAN_TEXT], note[STRATEGY_NOTE];
-	plan_describe(&s->plan, plan, sizeof plan);
-	plan_options(&s->plan, s->image.rounds, again, sizeof again);
-	strategy_note(&s->plan, &s->image.counts, s->image.black, note, sizeof note);
-	json_t *counters = json_object(), *effects = json_array();
-	for (int i = 0; i < BATCH_COUNTERS; i++)
-		if (counter_names[i])
-			json_object_set_new(counters, counter_names[i], json_integer((json_int_t)s->image.counts.counters[i]));
-	for (size_t i = 0; i < s->summary.line_count; i++)
-		json_array_append_new(effects, json_pack("{s:s s:b s:s}", "name", s->summary.lines[i].name, "on",
-							 s->summary.lines[i].on, "why", s->summary.lines[i].why));
-	json_t *o = json_pack("{s:i s:s s:s s:s s:s s:I s:I s:f s:f s:f s:I s:I s:o s:o s:o s:o s:o s:o s:s s:s s:o s:s}", "schema", 1, "scene",
-			      s->name, "integrator", s->plan.integrator, "plan", plan, "options", again, "rounds",
-			      (json_int_t)s->image.rounds, "threads", (json_int_t)s->a->threads, "buildSeconds", s->build_seconds,
-			      "wallSeconds", s->run.seconds, "cpuSeconds", s->run.cpu_seconds, "triangles",
-			      (json_int_t)s->summary.triangles, "embreeBytes", (json_int_t)world_embree_bytes(s->world), "b",
-			      real_or_null(s->image.b), "relMSE", real_or_null(s->image.rel_mse), "relMSEUpper", real_or_null(s->image.rel_mse_upper),
-			      "beyondShare", real_or_null(s->image.beyond_share), "counters", counters, "effects", effects, "end",
-			      end_names[s->run.end], "mixture", s->plan.mutations, "strategies",
-			      strategy_to_json(s->plan.mutations, &s->image.counts), "note", note);
-	char *text = o ? json_dumps(o, JSON_INDENT(2)) : NULL;
-	json_decref(o);
-	if (!text)
-		return error_set(e, ENOMEM, "no memory for the statistics");
-	int rc = image_file_write(s->a->stats, (const unsigned char *)text, strlen(text), e);
-	free(text);
-	return rc;
-}
-
 static void say(const struct session *s)
 {
 	const struct canvas_image *i = &s->image;
@@ -280,7 +231,8 @@ static int run(struct session *s, struct error *e)
 	if (!rc)
 		rc = write_image(s, e);
 	if (!rc && s->a->stats)
-		rc = write_stats(s, e);
+		rc = stats_write(s->a->stats,
+				 &(struct stats){s->name, &s->summary, &s->run, &s->image, s->build_seconds}, e);
 	if (!rc && !s->a->quiet)
 		say(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)

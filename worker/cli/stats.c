@@ -1,0 +1,86 @@
+#include "worker/cli/stats.h"
+
+#include "common/film/image_file.h"
+#include "common/film/strategy.h"
+#include "common/film/strategy_json.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const counter_names[BATCH_COUNTERS] = {
+	[COUNT_SAMPLES] = "samples",	     [COUNT_ACCEPTED] = "accepted",
+	[COUNT_INDEPENDENT] = "independent", [COUNT_NAN] = "nan",
+	[COUNT_INFINITE] = "infinite",	     [COUNT_NEGATIVE] = "negative",
+	[COUNT_RAYS_CLOSEST] = "raysClosest", [COUNT_RAYS_SHADOW] = "raysShadow",
+	[COUNT_STUCK] = "stuck",	     [COUNT_LONGEST_STUCK] = "longestStuck",
+};
+
+const char *stats_end_name(enum merge_end end)
+{
+	static const char *const names[] = {[MERGE_GOES_ON] = "interrupted", [MERGE_ROUNDS] = "mutations", [MERGE_TIME] = "time",
+					    [MERGE_ERROR] = "target-error"};
+	return names[end];
+}
+
+static json_t *real_or_null(double x)
+{
+	return isfinite(x) ? json_real(x) : json_null();
+}
+
+static json_t *plan_json(const struct stats *s)
+{
+	const struct plan *p = s->run->plan;
+	char plan[PLAN_TEXT], again[PLAN_TEXT];
+	plan_describe(p, plan, sizeof plan);
+	plan_options(p, s->image->rounds, again, sizeof again);
+	return json_pack("{s:i s:s s:s s:s s:s s:I s:I s:f s:f s:f s:I s:I}", "schema", 1, "scene", s->scene, "integrator",
+			 p->integrator, "plan", plan, "options", again, "rounds", (json_int_t)s->image->rounds, "threads",
+			 (json_int_t)s->run->threads, "buildSeconds", s->build_seconds, "wallSeconds", s->run->seconds,
+			 "cpuSeconds", s->run->cpu_seconds, "triangles", (json_int_t)s->summary->triangles, "embreeBytes",
+			 (json_int_t)world_embree_bytes(s->run->world));
+}
+
+static json_t *image_json(const struct canvas_image *i)
+{
+	json_t *counters = json_object();
+	for (int k = 0; k < BATCH_COUNTERS; k++)
+		if (counter_names[k])
+			json_object_set_new(counters, counter_names[k], json_integer((json_int_t)i->counts.counters[k]));
+	return json_pack("{s:o s:o s:o s:o s:o}", "b", real_or_null(i->b), "relMSE", real_or_null(i->rel_mse), "relMSEUpper",
+			 real_or_null(i->rel_mse_upper), "beyondShare", real_or_null(i->beyond_share), "counters", counters);
+}
+
+static json_t *effects_json(const struct render_summary *m)
+{
+	json_t *effects = json_array();
+	for (size_t i = 0; i < m->line_count; i++)
+		json_array_append_new(effects, json_pack("{s:s s:b s:s}", "name", m->lines[i].name, "on", m->lines[i].on, "why",
+							 m->lines[i].why));
+	return effects;
+}
+
+static json_t *end_json(const struct stats *s)
+{
+	const struct plan *p = s->run->plan;
+	char note[STRATEGY_NOTE];
+	strategy_note(p, &s->image->counts, s->image->black, note, sizeof note);
+	return json_pack("{s:s s:s s:o s:s}", "end", stats_end_name(s->run->end), "mixture", p->mutations, "strategies",
+			 strategy_to_json(p->mutations, &s->image->counts), "note", note);
+}
+
+int stats_write(const char *path, const struct stats *s, struct error *e)
+{
+	json_t *o = plan_json(s);
+	bool whole = json_object_update_new(o, image_json(s->image)) == 0 &&
+		     json_object_set_new(o, "effects", effects_json(s->summary)) == 0 &&
+		     json_object_update_new(o, end_json(s)) == 0;
+	char *text = whole ? json_dumps(o, JSON_INDENT(2)) : NULL;
+	json_decref(o);
+	if (!text)
+		return error_set(e, ENOMEM, "no memory for the statistics");
+	int rc = image_file_write(path, (const unsigned char *)text, strlen(text), e);
+	free(text);
+	return rc;
+}

@@ -1,0 +1,20 @@
+/*
+ * What --stats FILE holds, as JSON: plan, times, counters, strategies, effects, which bound ended the render. One thread.
+ */
+#ifndef WORKER_CLI_STATS_H
+#define WORKER_CLI_STATS_H
+
+#include "worker/cli/local.h"
+
+struct stats {
+	const char *scene; /* file name */
+	const struct render_summary *summary;
+	const struct local_run *run; /* has ended */
+	const struct canvas_image *image;
+	double build_seconds; /* of the world */
+};
+
+const char *stats_end_name(enum merge_end end);
+int stats_write(const char *path, const struct stats *s, struct error *e);
+
+#endif
