@@ -168,7 +168,17 @@ static int look(struct crew *c, uint64_t rounds, enum merge_end *end)
 	bool due = merge_error_due(r->plan, rounds);
 	if (due && canvas_image(r->canvas, false, &img, &c->error))
 		return -ENOMEM;
-	*end = merge_end_of(r->plan, rounds, since(&c->begin), due ? &img : NULL);
+	double seconds = since(&c->begin);
+	*end = merge_end_of(r->plan, rounds, seconds, due ? &img : NULL);
+	if (r->round)
+		r->round(r->user, &(struct local_round){.rounds = rounds,
+							.mutations = rounds * plan_round_mutations(r->plan),
+							.cpu_seconds = r->cpu_seconds - r->bootstrap_cpu_seconds,
+							.seconds = seconds - r->bootstrap_seconds,
+							.bootstrap_cpu_seconds = r->bootstrap_cpu_seconds,
+							.bootstrap_seconds = r->bootstrap_seconds,
+							.canvas = r->canvas,
+							.image = due ? &img : NULL});
 	if (due)
 		canvas_image_fini(&img);
 	return 0;
@@ -180,12 +190,14 @@ static int run(struct crew *c)
 	int rc = phase(c, LEASE_BOOTSTRAP, 0);
 	if (rc || stopped(c))
 		return rc;
+	r->bootstrap_cpu_seconds = r->cpu_seconds;
+	r->bootstrap_seconds = since(&c->begin);
 	rc = begin_rounds(c);
 	if (rc || r->lit.black) {
 		r->end = MERGE_ROUNDS;
 		return rc;
 	}
-	for (uint64_t round = 0; r->end == MERGE_GOES_ON; round++) {
+	for (uint64_t round = 0; r->end == MERGE_GOES_ON && !stopped(c); round++) {
 		rc = phase(c, LEASE_RENDER, round);
 		if (rc || stopped(c))
 			return rc;
@@ -203,7 +215,7 @@ int local_run(struct local_run *r, struct error *e)
 	struct crew c = {.run = r, .lock = PTHREAD_MUTEX_INITIALIZER};
 	r->canvas = NULL;
 	r->end = MERGE_GOES_ON;
-	r->seconds = r->cpu_seconds = 0;
+	r->seconds = r->cpu_seconds = r->bootstrap_seconds = r->bootstrap_cpu_seconds = 0;
 	clock_gettime(CLOCK_MONOTONIC, &c.begin);
 	c.seeds = mem_alloc(p->chains, sizeof *c.seeds);
 	c.states = mem_alloc(leases, sizeof *c.states);

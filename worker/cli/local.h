@@ -14,6 +14,14 @@ struct local_progress { /* between leases, from the calling thread's point of vi
 	double seconds;
 };
 
+struct local_round { /* what is known after a complete round */
+	uint64_t rounds, mutations;  /* complete; mutations or samples, as plan_round_mutations counts */
+	double cpu_seconds, seconds; /* of the rounds, all leases and the wall clock; the bootstrap apart */
+	double bootstrap_cpu_seconds, bootstrap_seconds;
+	const struct canvas *canvas;      /* for a canvas_image of one's own */
+	const struct canvas_image *image; /* where the plan has the error looked at, else NULL */
+};
+
 struct local_run {
 	/* in */
 	const struct world *world;
@@ -21,6 +29,9 @@ struct local_run {
 	unsigned threads;
 	const atomic_bool *stop; /* may become true at any time: what is complete stays */
 	void (*progress)(void *user, const struct local_progress *p); /* under the lock, from any thread; may be NULL */
+	/* After each complete round, from the calling thread while no lease runs; may set *stop: the rounds end there and
+	 * `end` stays MERGE_GOES_ON. May be NULL. Its own time is in no sum but the wall clock. */
+	void (*round)(void *user, const struct local_round *r);
 	void *user;
 	/* out */
 	struct canvas *canvas; /* NULL: stopped before the bootstrap was complete. canvas_free is the caller's */
@@ -28,6 +39,7 @@ struct local_run {
 	enum merge_end end; /* MERGE_GOES_ON: stopped */
 	double seconds;     /* wall clock from the first bootstrap sample to the last merge */
 	double cpu_seconds; /* of all leases */
+	double bootstrap_cpu_seconds, bootstrap_seconds; /* the bootstrap's share of both */
 };
 
 int local_run(struct local_run *r, struct error *e);
