@@ -18,7 +18,8 @@ static const char doc[] =
 	"  hslt-coordinator --listen 0.0.0.0:7700 --insecure --spool /var/lib/hslt\n"
 	"\n"
 	"The spool keeps the jobs' results; one coordinator works with a spool at a time. A line of the log is written to "
-	"stderr for every event.\n"
+	"stderr for every event. Under systemd it says when it is ready and feeds the watchdog, and a socket unit's Unix socket "
+	"is taken as the status socket.\n"
 	"Exit codes: 0 stopped by SIGTERM or SIGINT, 1 failed, 2 usage.";
 
 enum { OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS };

@@ -2,6 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/net/notify.h"
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/status.h"
@@ -305,6 +306,10 @@ static void on_tick(uv_timer_t *t)
 	for (struct session *p = s->sessions; p; p = p->next)
 		session_tick(p);
 	status_tick(s->status);
+	if (s->watchdog > 0 && server_now(s) >= s->watchdog_next) {
+		s->watchdog_next = server_now(s) + s->watchdog / 3;
+		notify_send("WATCHDOG=1");
+	}
 }
 
 static void stop(struct server *s)
@@ -312,6 +317,7 @@ static void stop(struct server *s)
 	if (s->stopping)
 		return;
 	s->stopping = true;
+	notify_send("STOPPING=1");
 	uv_close((uv_handle_t *)&s->listener, NULL);
 	uv_close((uv_handle_t *)&s->wake, NULL);
 	uv_close((uv_handle_t *)&s->tick, NULL);
@@ -389,6 +395,7 @@ int server_run(const struct server_config *c, struct error *e)
 	signal(SIGPIPE, SIG_IGN);
 	s->config = *c;
 	s->deferred_last = &s->deferred;
+	s->watchdog = notify_watchdog();
 	int rc = uv_loop_init(&s->loop);
 	if (rc) {
 		mem_free(s);
@@ -396,12 +403,15 @@ int server_run(const struct server_config *c, struct error *e)
 	}
 	init_handles(s);
 	rc = open_stores(s, e);
-	if (!rc && c->status_socket)
-		rc = status_open(&s->status, s, c->status_socket, e);
+	int inherited = notify_inherited_unix();
+	if (!rc && (inherited >= 0 || c->status_socket))
+		rc = status_open(&s->status, s, inherited, c->status_socket, e);
 	if (!rc)
 		rc = start_listening(s, e);
 	if (rc)
 		stop(s);
+	else
+		notify_send("READY=1");
 	uv_run(&s->loop, UV_RUN_DEFAULT);
 	int closed = uv_loop_close(&s->loop);
 	assert(closed == 0);

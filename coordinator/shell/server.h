@@ -58,6 +58,7 @@ struct server {
 	uint64_t last_peer;
 	struct status_socket *status;
 	bool stepping, stopping;
+	double watchdog, watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */
 	uint64_t changes; /* grows with whatever the status shows */
 	/* What the current event brought; NULL when it did not. */
 	struct batch *batch;

@@ -34,7 +34,7 @@ struct status_socket {
 	struct job_view *shown; /* as the subscribers saw the jobs last */
 	size_t shown_count;
 	uint64_t shown_changes; /* of the server, at the last tick */
-	char *path;
+	char *path; /* NULL: inherited */
 };
 
 /* ---- lines ---- */
@@ -306,13 +306,21 @@ static int remove_stale(const char *path, struct error *e)
 	return unlink(path) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
 }
 
-int status_open(struct status_socket **out, struct server *s, const char *path, struct error *e)
+static int bind_private(uv_pipe_t *listener, const char *path)
 {
-	int rc = remove_stale(path, e);
+	mode_t mask = umask(0177); /* from its first moment on */
+	int rc = uv_pipe_bind(listener, path);
+	umask(mask);
+	return rc;
+}
+
+int status_open(struct status_socket **out, struct server *s, int inherited, const char *path, struct error *e)
+{
+	int rc = inherited < 0 ? remove_stale(path, e) : 0;
 	if (rc)
 		return rc;
 	struct status_socket *t = mem_alloc(1, sizeof *t);
-	if (!t || !(t->path = mem_strdup(path))) {
+	if (!t || (inherited < 0 && !(t->path = mem_strdup(path)))) {
 		mem_free(t);
 		return error_set(e, ENOMEM, "no memory for the status socket");
 	}
@@ -320,12 +328,10 @@ int status_open(struct status_socket **out, struct server *s, const char *path, 
 	uv_pipe_init(&s->loop, &t->listener, 0);
 	t->listener.data = t;
 	*out = t;
-	mode_t mask = umask(0177); /* from its first moment on */
-	rc = uv_pipe_bind(&t->listener, path);
-	umask(mask);
+	rc = t->path ? bind_private(&t->listener, path) : uv_pipe_open(&t->listener, inherited);
 	if (!rc)
 		rc = uv_listen((uv_stream_t *)&t->listener, BACKLOG, on_connection);
-	return rc ? error_set(e, -rc, "%s: %s", path, uv_strerror(rc)) : 0;
+	return rc ? error_set(e, -rc, "%s: %s", t->path ? path : "inherited status socket", uv_strerror(rc)) : 0;
 }
 
 static void on_closed(uv_handle_t *h)
@@ -342,6 +348,7 @@ void status_close(struct status_socket *t)
 		return;
 	while (t->readers)
 		drop(t->readers);
-	unlink(t->path);
+	if (t->path)
+		unlink(t->path);
 	uv_close((uv_handle_t *)&t->listener, on_closed);
 }

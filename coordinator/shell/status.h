@@ -8,8 +8,11 @@
 
 #include "coordinator/shell/server.h"
 
-/* -EADDRINUSE when somebody answers there already. */
-int status_open(struct status_socket **out, struct server *s, const char *path, struct error *e);
+/*
+ * inherited: a listening socket that the service manager made, whose file stays when we go; -1: one is made at path.
+ * -EADDRINUSE when somebody answers there already.
+ */
+int status_open(struct status_socket **out, struct server *s, int inherited, const char *path, struct error *e);
 void status_close(struct status_socket *t); /* NULL: nothing; asynchronous */
 void status_tick(struct status_socket *t);  /* NULL: nothing */
 
