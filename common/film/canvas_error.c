@@ -4,6 +4,7 @@
  */
 #include "common/film/canvas_private.h"
 #include "common/film/color.h"
+#include "common/film/quantile.h"
 
 #include <math.h>
 
@@ -40,13 +41,6 @@ static void error_tile(struct making *m, uint32_t tx, uint32_t ty, double floor_
 				    (size_t)y * p->crop_width + x, floor_square);
 }
 
-/* 5 % quantile of chi-square (Wilson and Hilferty 1931): the lower end of a two-sided 90 % interval. */
-static double chi_square_5(double degrees)
-{
-	double s = 2 / (9 * degrees), root = 1 - s - 1.6448536269514722 * sqrt(s);
-	return root > 0 ? degrees * root * root * root : 0;
-}
-
 /*
  * The estimate: mean over pixels and channels of the squared standard error over B^2 + (0.01 m)^2, with B the pooled image
  * itself. (B's own noise makes the weight a little too small where B is too bright and too large where it is too dark;
@@ -68,10 +62,11 @@ static void find_rel_mse(struct making *m)
 	for (uint32_t g = 0; g < m->c->plan.groups; g++)
 		square += (m->distance[g] / mean - 1) * (m->distance[g] / mean - 1);
 	double spread = square / (groups - 1) * (groups + 2) / groups;
-	if (m->c->plan.groups == 2)
-		m->img->rel_mse_upper /= 0.00393214;
-	else if (spread > 0)
-		m->img->rel_mse_upper *= 2 * (groups - 1) / spread / chi_square_5(2 * (groups - 1) / spread);
+	double own = groups > 2 && spread < 2 ? spread > 2e-6 ? 2 / spread : 1e6 : 1, degrees = own * (groups - 1);
+	m->img->rel_mse_degrees = degrees;
+	m->img->rel_mse_upper *= degrees / (m->c->plan.groups == 2 ? 0.00393214 : chi_square_5(degrees));
+	m->img->rel_mse_95[0] = m->img->rel_mse * f_quantile(0.025, own, degrees);
+	m->img->rel_mse_95[1] = m->img->rel_mse * f_quantile(0.975, own, degrees);
 }
 
 void canvas_error(struct making *m)

@@ -107,7 +107,7 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 {
 	const struct plan *p = &c->plan;
 	*img = (struct canvas_image){.width = p->crop_width, .height = p->crop_height, .rel_mse = NAN, .rel_mse_upper = NAN,
-				     .rounds = c->rounds};
+				     .rel_mse_degrees = NAN, .rel_mse_95 = {NAN, NAN}, .rounds = c->rounds};
 	struct making m = {.c = c, .img = img, .open_rounds = open_rounds, .all = mem_alloc(1, sizeof *m.all)};
 	bool errors = p->groups > 1 && !open_rounds;
 	img->rgb = mem_alloc((size_t)img->width * img->height * 3, sizeof *img->rgb);
