@@ -6,6 +6,8 @@
 #ifndef COMMON_FILM_PATH_CLASS_H
 #define COMMON_FILM_PATH_CLASS_H
 
+#include <stdbool.h>
+
 /* Inner vertices are smooth (delta, or a lobe narrower than PATH_CLASS_ALPHA) or rough. */
 enum path_class_kind {
 	PATH_ROUGH,     /* no smooth vertex */
@@ -14,13 +16,28 @@ enum path_class_kind {
 	PATH_BOTH,      /* smooth ones towards the camera and towards the light, a rough one between: caustics in mirrors */
 	PATH_SMOOTH,    /* smooth vertices only */
 	PATH_CLASS_KINDS,
+	PATH_NO_VERTEX = PATH_CLASS_KINDS, /* where path_class_kind_next begins; as a kind it is PATH_ROUGH */
 };
 enum path_class_length { PATH_EDGES_1_2, PATH_EDGES_3_4, PATH_EDGES_5_8, PATH_EDGES_9_UP, PATH_CLASS_LENGTHS };
 enum { PATH_CLASSES = PATH_CLASS_KINDS * PATH_CLASS_LENGTHS };
 
 #define PATH_CLASS_ALPHA 0.1
 
-/* 0..PATH_CLASSES - 1 */
+/* The kind of a path that has one more inner vertex on the light's side. */
+static inline enum path_class_kind path_class_kind_next(enum path_class_kind kind, bool smooth)
+{
+	static const unsigned char next[PATH_CLASS_KINDS + 1][2] = {
+		[PATH_NO_VERTEX] = {PATH_ROUGH, PATH_SMOOTH},
+		[PATH_ROUGH] = {PATH_ROUGH, PATH_CAUSTIC},
+		[PATH_SMOOTH] = {PATH_REFLECTED, PATH_SMOOTH},
+		[PATH_REFLECTED] = {PATH_REFLECTED, PATH_BOTH},
+		[PATH_CAUSTIC] = {PATH_CAUSTIC, PATH_CAUSTIC},
+		[PATH_BOTH] = {PATH_BOTH, PATH_BOTH},
+	};
+	return (enum path_class_kind)next[kind][smooth];
+}
+
+/* 0..PATH_CLASSES - 1, all lengths of a kind next to each other; edges >= 1 */
 unsigned path_class(unsigned edges, enum path_class_kind kind);
 /* "caustic, 3-4 edges" */
 const char *path_class_name(unsigned path_class);
