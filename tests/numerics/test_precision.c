@@ -97,7 +97,7 @@ static void run(const struct precision_case *p, unsigned most, struct errors *e)
 	struct world *w = world_of_text(32, 32, SCENE, p->index, p->alpha);
 	uint64_t seed = stats_seed(p->name);
 	c = (struct path_context){.w = w, .window = {0, 0, 32, 32}, .min_depth = p->edges, .max_depth = p->edges, .counters = counters};
-	m = (struct mutation_ctx){.path = &c, .seed = seed, .count = strategy, .limits = WALK_LIMITS_DEFAULT};
+	m = (struct mutation_ctx){.path = &c, .seed = seed, .count = strategy, .limits = walk_limits_of(&knobs_default)};
 	for (uint64_t i = 0; e->count < most && i < 400 * most; i++) {
 		struct move move = {0};
 		bool through = false;

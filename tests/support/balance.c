@@ -291,7 +291,7 @@ void balance_run(const struct world *w, const char *test, struct balance_trial *
 	starts_context(&c, w, 1, BALANCE_EDGES, counters);
 	m.path = &c;
 	m.seed = stats_seed(test);
-	m.limits = WALK_LIMITS_DEFAULT;
+	m.limits = walk_limits_of(&knobs_default);
 	struct run r = {.test = test, .c = &c, .m = &m, .x = &x, .y = &y};
 	static struct starts s[BALANCE_GROUPS];
 	double scale[BALANCE_EDGES + 1] = {0}; /* all lengths are to count alike */

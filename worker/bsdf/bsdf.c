@@ -35,6 +35,15 @@ void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_bu
 	return b->data;
 }
 
+void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops)
+{
+	b->ops = ops;
+	b->modes |= BSDF_DELTA;
+	b->has_smooth = false;
+	b->has_delta = true;
+	b->alpha = b->alpha_mean = 0;
+}
+
 void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
 {
 	if (shape != COLOR_SHAPE_CONSTANT)

@@ -46,7 +46,7 @@ struct bsdf_build {
 	const struct asset_source *assets;
 	struct arena *arena;
 	bool dialect_3;
-	/* Builds the nested BSDF of `n` (for twosided). */
+	double least_roughness; /* rough metal and glass below this is made smooth */
 };
 
 struct bsdf_ops {

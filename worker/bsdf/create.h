@@ -11,6 +11,9 @@ void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_bu
 int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		 const struct bsdf_build *build, struct error *e);
 
+/* b, whose data begins as that of `ops` does, has no lobes but exactly specular ones. */
+void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops);
+
 /* Enters that a part of b has this colour. */
 void bsdf_add_shape(struct bsdf *b, enum color_shape shape);
 

@@ -3,7 +3,7 @@
 #include "worker/bsdf/microfacet.h"
 
 struct roughconductor {
-	struct metal metal;
+	struct metal metal; /* first: taken for smooth, the data is a conductor's */
 	struct microfacet facets;
 };
 
@@ -78,6 +78,10 @@ static int roughconductor_create(struct bsdf *b, const struct scene_node *n, con
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
 	b->alpha = b->alpha_mean = r->facets.alpha;
+	if (r->facets.alpha < build->least_roughness) {
+		extern const struct bsdf_ops bsdf_ops_conductor;
+		bsdf_make_smooth(b, &bsdf_ops_conductor);
+	}
 	return metal_read(&r->metal, b, n, build, e);
 }
 

@@ -165,14 +165,10 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT;
 	b->has_smooth = true;
 	b->alpha = b->alpha_mean = r->facets.alpha;
-	if (b->eta == 1 && !b->dispersive) {
-		/* No facet bends light: all of it goes straight on. */
+	/* With equal indices no facet bends light: all of it goes straight on. */
+	if ((b->eta == 1 && !b->dispersive) || r->facets.alpha < build->least_roughness) {
 		extern const struct bsdf_ops bsdf_ops_dielectric;
-		b->ops = &bsdf_ops_dielectric;
-		b->modes |= BSDF_DELTA;
-		b->has_smooth = false;
-		b->has_delta = true;
-		b->alpha = b->alpha_mean = 0;
+		bsdf_make_smooth(b, &bsdf_ops_dielectric);
 	}
 	return 0;
 }

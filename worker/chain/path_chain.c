@@ -32,7 +32,7 @@ static void set_up(struct path_chain *c)
 	c->mutation.path = c->base.context;
 	c->mutation.seed = c->base.seed;
 	c->mutation.chain = c->base.id;
-	c->mutation.limits = WALK_LIMITS_DEFAULT;
+	c->mutation.limits = walk_limits_of(&c->base.context->w->knobs);
 }
 
 static void copy_whole(struct whole_path *to, const struct whole_path *from)

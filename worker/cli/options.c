@@ -2,6 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "worker/render/knobs.h"
 
 #include <stdio.h>
 #include <stdlib.h>
@@ -9,7 +10,7 @@
 
 enum {
 	OPTION_SPP = 1000, OPTION_MUTATIONS, OPTION_TIME, OPTION_TARGET, OPTION_SIZE, OPTION_CROP, OPTION_SEED, OPTION_MIN_DEPTH,
-	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH,
+	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH, OPTION_SET,
 };
 
 static char *borrow(const char *text)
@@ -29,6 +30,8 @@ static const struct argp_option options[] = {
 	{"seed", OPTION_SEED, "S", 0, "Of all random numbers (0)", 1},
 	{"min-depth", OPTION_MIN_DEPTH, "K", 0, "Shortest paths, in edges (1: emitters seen directly)", 1},
 	{"max-depth", OPTION_MAX_DEPTH, "K", 0, "Longest paths, in edges (the scene's)", 1},
+	{"set", OPTION_SET, "NAME=VALUE", 0,
+	 "Settings that trade accuracy for time, with commas between; may be given again. help: what each does", 1},
 	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 1},
 	{NULL, 0, NULL, 0, "When to stop (the first bound met; without any, the scene's sampleCount):", 2},
 	{"spp", OPTION_SPP, "N", 0, "Samples a pixel, rounded up to whole rounds", 2},
@@ -125,6 +128,32 @@ static void take_mutations(struct render_arguments *a, const char *arg, const st
 	a->mixture = arg;
 }
 
+/* Every knob, its default, its range and what it does. */
+static void list_knobs(void)
+{
+	const struct render_knob *k;
+	for (size_t i = 0; (k = render_knob_at(i)) != NULL; i++) {
+		char standard[32], range[80];
+		knobs_value(&knobs_default, i, standard, sizeof standard);
+		render_knob_range(k, range, sizeof range);
+		printf("%s=%s (%s)\n    %s\n", k->name, standard, range, k->summary);
+	}
+	exit(0);
+}
+
+static void take_set(struct render_arguments *a, const char *arg, const struct argp_state *state)
+{
+	char all[2 * PLAN_KNOBS_MAX];
+	struct error e;
+	if (strcmp(arg, "help") == 0)
+		list_knobs();
+	int n = snprintf(all, sizeof all, "%s%s%s", a->render.knobs, *a->render.knobs ? "," : "", arg);
+	if (n < 0 || (size_t)n >= sizeof all)
+		argp_error(state, "--set: the text is too long");
+	if (render_knobs_canonical(all, a->render.knobs, &e))
+		argp_error(state, "--set: %s", e.text);
+}
+
 static void check_mixture(const struct render_arguments *a, const struct argp_state *state)
 {
 	const char *name = *a->plan.integrator ? a->plan.integrator : RENDER_INTEGRATOR_DEFAULT;
@@ -194,6 +223,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_BOOTSTRAP:
 		p->bootstrap = option_whole(state, "--bootstrap", arg);
 		return 0;
+	case OPTION_SET:
+		take_set(a, arg, state);
+		return 0;
 	case OPTION_EPOCH:
 		p->epoch = option_whole(state, "--epoch", arg);
 		return 0;
@@ -205,8 +237,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	}
 }
 
-/* The integrators that there are before what the table says of --integrator, and the strategies after what it says of
- * --mutations. argp frees the text. */
+/* The integrators that there are before what the table says of --integrator, the strategies and the settings after what it
+ * says of --mutations and --set. argp frees the text. */
 static char *help(int key, const char *text, void *input)
 {
 	(void)input;
@@ -223,6 +255,14 @@ static char *help(int key, const char *text, void *input)
 	} else if (key == OPTION_MUTATIONS) {
 		for (size_t i = 0; (name = render_mutation_at(i, &summary)) != NULL && used < sizeof names; i++) {
 			int n = snprintf(names + used, sizeof names - used, "%s%s (%s)", i == 0 ? "" : ", ", name, summary);
+			used += n < 0 ? 0 : (size_t)n;
+		}
+	} else if (key == OPTION_SET) {
+		const struct render_knob *k;
+		for (size_t i = 0; (k = render_knob_at(i)) != NULL && used < sizeof names; i++) {
+			char standard[32];
+			knobs_value(&knobs_default, i, standard, sizeof standard);
+			int n = snprintf(names + used, sizeof names - used, "%s%s=%s", i == 0 ? "" : ", ", k->name, standard);
 			used += n < 0 ? 0 : (size_t)n;
 		}
 	} else {

@@ -1,6 +1,7 @@
 #include "worker/daemon/bundle.h"
 
 #include "common/base/mem.h"
+#include "worker/render/knobs.h"
 
 #include <assert.h>
 #include <fcntl.h>
@@ -193,7 +194,11 @@ static int check_plan(const struct bundle *b, const struct scene *s, const struc
 	const struct render_integrator *i = render_integrator_find(p->integrator);
 	if (!i || i->kind != p->kind)
 		return error_set(e, EINVAL, "this worker has no integrator '%s' of that kind", p->integrator);
-	return 0;
+	char own[PLAN_KNOBS_MAX];
+	rc = render_knobs_canonical(p->knobs, own, e);
+	if (!rc && strcmp(own, p->knobs) != 0)
+		rc = error_set(e, EINVAL, "this worker spells the settings '%s', the plan '%s': other versions?", own, p->knobs);
+	return rc;
 }
 
 static int check_mutations(const struct bundle *b, struct error *e)

@@ -20,9 +20,9 @@ double halfvec_lobe_width(const struct path_vertex *v)
 	return fmin(v->bsdf->alpha, 1);
 }
 
-static double bsdf_limit(const struct path_vertex *v)
+static double bsdf_limit(const struct path_context *c, const struct path_vertex *v)
 {
-	return halfvec_lobe_width(v) / sqrt(M_PI);
+	return c->w->knobs.step_scale * halfvec_lobe_width(v) / sqrt(M_PI);
 }
 
 /* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale a pixel, meet the plane of the geometric normal. */
@@ -92,13 +92,13 @@ void halfvec_steps(const struct path_context *c, const struct whole_path *x, con
 	mat2 d[WHOLE_MAX_VERTICES], footprint = {0, 0, 0, 0};
 	for (unsigned j = c_end + 1; j < b; j++)
 		if (!x->v[j].delta)
-			sum += bsdf_limit(&x->v[j]);
+			sum += bsdf_limit(c, &x->v[j]);
 	bool differentials = b == x->edges && pixel_footprint(camera, x, &footprint) &&
 			     constraint_differentials(k, b, c_end, d) == CONSTRAINT_OK;
 	for (unsigned j = c_end + 1; j < b; j++) {
 		if (x->v[j].delta)
 			continue;
-		double limit = bsdf_limit(&x->v[j]);
+		double limit = bsdf_limit(c, &x->v[j]);
 		mat2 e;
 		step[j] = (struct halfvec_step){{1, 0, 0, 1}, {limit, limit}};
 		/* Each vertex takes its share of the pixels. */

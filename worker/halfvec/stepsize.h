@@ -6,7 +6,7 @@
  * Where the sub-path begins at the camera (b = k) ray differentials say what change of h_j moves the image by a pixel:
  * E_j = D_j^-1 J, with J = d x_{k-1} / d pixel in the geometric tangent plane at a fixed x_k and D_j = d x_{k-1} / d h_j. From
  * E_j = U diag(s) V^T, sigma is s times the vertex's share of the given number of pixels (shares as the roughnesses), at most
- * alpha / sqrt(pi), the mean |slope| of a Beckmann lobe. Otherwise, and where E_j is not to be had, U = 1 and that limit.
+ * alpha / sqrt(pi), the mean |slope| of a Beckmann lobe (times the knob step-scale). Otherwise, and where E_j is not to be had, U = 1 and that limit.
  * Pure; any thread; nothing allocates.
  */
 #ifndef WORKER_HALFVEC_STEPSIZE_H

@@ -2,6 +2,11 @@
 
 #include <assert.h>
 
+struct walk_limits walk_limits_of(const struct knobs *k)
+{
+	return (struct walk_limits){(unsigned)k->iterations, k->least_step, 1, k->tolerance, k->reverse_tolerance};
+}
+
 /* One walk while it goes on. Predictions start at the kept state alone, so that a refused trial leaves nothing to undo. */
 struct walk {
 	struct path_context *c;

@@ -24,11 +24,14 @@ enum walk_end {
 };
 
 struct walk_limits {
-	unsigned iterations;  /* 15 */
-	double least_step;    /* 0.03 of a Newton step: with 1e-5 at most 0.1 % more walks arrive, for 10 % more rays */
+	unsigned iterations;
+	double least_step;    /* of a Newton step; with 1e-5 at most 0.1 % more walks arrive than with 0.03, for 10 % more rays */
 	double scale;         /* of all tolerances: 1, 0.5 to show that they change no image */
+	double tolerance;     /* of a vertex at the end of a walk: how near its target the half vector comes, of the smaller of lobe
+				 and step */
+	double back;          /* how near to where the walk began the way back ends, of the largest step that a vertex made */
 };
-#define WALK_LIMITS_DEFAULT ((struct walk_limits){15, 0.03, 1})
+struct walk_limits walk_limits_of(const struct knobs *k);
 
 struct walk_target {
 	vec2 h;           /* of the vertex where the walk ends, in its frame; (0,0) where specular */

@@ -4,11 +4,8 @@
 
 #include <string.h>
 
-/* A vertex at the end of a walk: how near its target the half vector comes, of the smaller of lobe and step. */
-#define WALK_TOLERANCE 1e-3
+/* At the end of a walk, of a half vector that is to be 0. */
 #define SPECULAR_TOLERANCE 1e-9
-/* The way back ends so near to where the walk began, of the largest step that a vertex made. */
-#define BACK_TOLERANCE 1e-3
 /* The way back aims that much closer than the way there: at the same tolerance 2 to 11 % of the returns fail by it alone. */
 #define BACK_SCALE 0.1
 /* Positions are rounded in that many parts of the edges they hang on. */
@@ -88,11 +85,11 @@ static enum strategy_counter reason_of(enum walk_end end)
 	return STRATEGY_FAIL_ITERATIONS;
 }
 
-static double tolerance_of(const struct path_vertex *v, const struct halfvec_step *s)
+static double tolerance_of(const struct mutation_ctx *m, const struct path_vertex *v, const struct halfvec_step *s)
 {
 	if (v->delta)
 		return SPECULAR_TOLERANCE;
-	return WALK_TOLERANCE * fmin(halfvec_lobe_width(v), fmin(s->sigma[0], s->sigma[1]));
+	return m->limits.tolerance * fmin(halfvec_lobe_width(v), fmin(s->sigma[0], s->sigma[1]));
 }
 
 /* Steps of the half vectors, and what they aim at. */
@@ -102,7 +99,7 @@ static void aim(struct mutation_ctx *m, const struct breakup *how, const struct 
 	for (unsigned j = how->c + 1; j < how->b; j++) {
 		struct walk_target *t = &s->target[j];
 		s->dh[j] = (vec2){0, 0};
-		t->tolerance = tolerance_of(&x->v[j], &s->step[X_TO_Y][j]);
+		t->tolerance = tolerance_of(m, &x->v[j], &s->step[X_TO_Y][j]);
 		t->h = x->v[j].delta ? (vec2){0, 0} : s->k[j].h;
 		if (x->v[j].delta || !how->halfvecs)
 			continue;
@@ -150,7 +147,7 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 		vec3 d = vec3_sub(y->v[j].x.p, x->v[j].x.p);
 		farthest = fmax(farthest, vec3_dot(d, d));
 		s->target[j].h = x->v[j].delta ? (vec2){0, 0} : s->k[j].h;
-		s->target[j].tolerance = tolerance_of(&x->v[j], &s->step[X_TO_Y][j]);
+		s->target[j].tolerance = tolerance_of(m, &x->v[j], &s->step[X_TO_Y][j]);
 	}
 	struct walk_limits limits = m->limits;
 	limits.scale *= BACK_SCALE;
@@ -160,10 +157,11 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
 	if (end != WALK_OK)
 		return false;
+	double near = m->limits.back * m->limits.scale;
 	for (unsigned j = c + 1; j < b; j++) {
 		vec3 d = vec3_sub(back->v[j].x.p, x->v[j].x.p);
 		double rounding = ROUNDING * ROUNDING * (x->edge[j].distance2 + x->edge[j - 1].distance2);
-		if (vec3_dot(d, d) > fmax(BACK_TOLERANCE * BACK_TOLERANCE * m->limits.scale * m->limits.scale * farthest, rounding))
+		if (vec3_dot(d, d) > fmax(near * near * farthest, rounding))
 			return false;
 	}
 	return true;

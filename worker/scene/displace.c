@@ -306,10 +306,15 @@ static int settle(struct work *w, const struct scene_node *n, struct error *e)
 	return 0;
 }
 
+static uint32_t parts_of(const struct displacement *d)
+{
+	return (uint32_t)fmin(fmax(round(ldexp(d->tessellation, (int)d->level)), 1), 1 << DISPLACE_LEVEL_MAX);
+}
+
 static int run(struct work *w, struct shape_geometry *g, struct arena *arena, struct arena *scratch, const struct scene_node *n,
 	       struct error *e)
 {
-	uint32_t parts = UINT32_C(1) << w->d->level;
+	uint32_t parts = parts_of(w->d);
 	uint64_t triangles = (g->kind == SHAPE_SPHERE ? 8 : (uint64_t)g->mesh.triangle_count) * parts * parts;
 	if (triangles > MESH_TRIANGLES_MAX)
 		return node_error(n, e, E2BIG, "displacement_level %u makes %llu triangles; at most %d are possible", w->d->level,

@@ -26,6 +26,7 @@ struct displacement {
 	bool is_constant; /* needs no texture coordinates */
 	double scale;     /* world units */
 	uint32_t level;
+	double tessellation; /* factor of the 2^level parts that an edge is cut into, from 1 part to the highest level's */
 };
 
 /* For the tables of shapes: the texture, and the two numbers that go with it. */

@@ -61,7 +61,8 @@ static int read_shapes(struct builder *b)
 		uint64_t dropped = 0;
 		int rc = shape_build(s->objects[i], b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
 		if (!rc)
-			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3, &b->scratch, b->e);
+			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3, w->knobs.tessellation,
+						&b->scratch, b->e);
 		if (rc)
 			return rc;
 		b->shape_nodes[k] = s->objects[i];
@@ -191,7 +192,7 @@ static int create_bsdfs(struct builder *b)
 	b->bsdf_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
 	if (!w->bsdfs || !b->bsdf_nodes)
 		return out_of_memory(b->e);
-	struct bsdf_build build = {b->assets, &w->arena, b->scene->dialect_3};
+	struct bsdf_build build = {b->assets, &w->arena, b->scene->dialect_3, w->knobs.roughness};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_BSDF, 0);
 		const struct scene_node *light = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0), *key = n ? n : light;
@@ -355,6 +356,8 @@ static void report_displacement(struct builder *b)
 static int prepare(struct builder *b, const struct render_options *o)
 {
 	int rc = scene_settings_read(b->scene, o ? o->width : 0, o ? o->height : 0, &b->w->settings, b->e);
+	if (!rc)
+		rc = knobs_read(o ? o->knobs : NULL, &b->w->knobs, b->e);
 	if (!rc)
 		rc = read_shapes(b);
 	if (!rc)

@@ -14,7 +14,7 @@ static double height(const void *user, double u, double v)
 }
 
 int displacement_apply(struct shape_geometry *g, const struct scene_node *shape, const struct asset_source *assets,
-		       bool dialect_3, struct arena *arena, struct error *e)
+		       bool dialect_3, double tessellation, struct arena *arena, struct error *e)
 {
 	if (!displacement_of(shape)) {
 		const char *lonely = node_find(shape, "displacement_scale") ? "displacement_scale" : "displacement_level";
@@ -27,7 +27,7 @@ int displacement_apply(struct shape_geometry *g, const struct scene_node *shape,
 	struct texture t;
 	int rc = texture_from_node(&t, shape, "displacement", 0, COLOR_HEIGHT, assets, dialect_3, &picture, e);
 	struct displacement d = {height, &t, texture_is_constant(&t), node_float(shape, "displacement_scale", 1),
-				 (uint32_t)node_int(shape, "displacement_level", 0)};
+				 (uint32_t)node_int(shape, "displacement_level", 0), tessellation};
 	if (!rc)
 		rc = displace(g, &d, arena, shape, e);
 	arena_fini(&picture);

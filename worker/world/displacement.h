@@ -10,8 +10,8 @@
 /* The property; NULL: this shape is not displaced. */
 const struct property *displacement_of(const struct scene_node *shape);
 
-/* Makes the finer mesh of a displaced shape in the arena; leaves others alone. */
+/* Makes the finer mesh of a displaced shape in the arena; leaves others alone. tessellation: factor of the parts of an edge. */
 int displacement_apply(struct shape_geometry *g, const struct scene_node *shape, const struct asset_source *assets,
-		       bool dialect_3, struct arena *arena, struct error *e);
+		       bool dialect_3, double tessellation, struct arena *arena, struct error *e);
 
 #endif

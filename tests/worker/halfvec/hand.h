@@ -26,6 +26,7 @@ static inline void hand_begin(struct hand *h, unsigned edges)
 {
 	memset(h, 0, sizeof *h);
 	h->x.edges = edges;
+	h->w.knobs = knobs_default;
 	h->w.shapes = h->shape;
 	h->w.shape_count = WHOLE_MAX_VERTICES;
 	h->w.camera = (struct camera){.axes = {{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}, .width = 640, .height = 480, .scale = 700,

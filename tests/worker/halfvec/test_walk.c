@@ -239,7 +239,7 @@ static void walk_back(struct path_context *c, const struct whole_path *x, struct
 	z.v[b] = x->v[b];
 	for (unsigned j = end + 1; j < b; j++)
 		target[j].h = x->v[j].delta ? (vec2){0, 0} : k[j].h;
-	struct walk_limits limits = WALK_LIMITS_DEFAULT;
+	struct walk_limits limits = walk_limits_of(&knobs_default);
 	limits.scale = 0.1; /* tighter than the way there: where x lies is known, only its own residual is to tell */
 	enum walk_end back = halfvec_walk(c, &z, b, end, target, true, &limits, &s);
 	t->back_ends[back]++;
@@ -274,7 +274,7 @@ static void walk_nowhere(struct path_context *c, const struct whole_path *x, uns
 	y = *x;
 	for (unsigned j = end + 1; j < b; j++)
 		target[j].h = k[j].h;
-	struct walk_limits limits = WALK_LIMITS_DEFAULT;
+	struct walk_limits limits = walk_limits_of(&knobs_default);
 	t->stays++;
 	if (halfvec_walk(c, &y, b, end, target, false, &limits, &s) != WALK_OK || s.iterations != 1)
 		t->left++;
@@ -288,7 +288,7 @@ static void walk_again(struct path_context *c, const struct whole_path *start, c
 {
 	static struct whole_path z;
 	z = *start;
-	struct walk_limits limits = WALK_LIMITS_DEFAULT;
+	struct walk_limits limits = walk_limits_of(&knobs_default);
 	limits.scale = 0.5;
 	t->again++;
 	if (halfvec_walk(c, &z, b, end, target, false, &limits, &s) != WALK_OK || apart(&z, y, b, end) > 0.01 * apart(start, y, b, end))
@@ -318,7 +318,7 @@ static void walk_once(struct path_context *c, struct dice *d, const struct whole
 		return;
 	start = y;
 	struct path_vertex first = y.v[b], last = y.v[end];
-	struct walk_limits limits = WALK_LIMITS_DEFAULT;
+	struct walk_limits limits = walk_limits_of(&knobs_default);
 	uint64_t before = c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW];
 	enum walk_end e = halfvec_walk(c, &y, b, end, target, false, &limits, &s);
 	t->rays += c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW] - before;

@@ -80,7 +80,7 @@ static void ask_move(const struct world *w, vec3 d, vec2 *h)
 	"<shape type='sphere'><point name='center' x='" x "' y='" y "' z='" z "'/><float name='radius' value='" r "'/>"           \
 	"<ref id='" material "'/></shape>"
 
-static const struct walk_limits normal = WALK_LIMITS_DEFAULT;
+static struct walk_limits normal;
 
 /* From the vertex where the walk ends the light is hidden by a ball: of the floor's own material or not. */
 static void test_occluder(void **state)
@@ -229,6 +229,7 @@ static void test_singular(void **state)
 
 int main(void)
 {
+	normal = walk_limits_of(&knobs_default);
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_occluder), cmocka_unit_test(test_names),	  cmocka_unit_test(test_other_material),
 		cmocka_unit_test(test_focus),	 cmocka_unit_test(test_singular),

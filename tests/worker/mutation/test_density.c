@@ -101,7 +101,7 @@ static void test_ratio(void **state)
 	struct starts s;
 	size_t count = all_trials(trials), n = dice_count(400), bad = 0;
 	starts_context(&c, w, 1, EDGES, counters);
-	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(room->name), .limits = WALK_LIMITS_DEFAULT};
+	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&knobs_default)};
 	starts_init(&s, &c, m.seed, 0, 2000);
 	for (unsigned k = 1; k <= EDGES; k++)
 		for (size_t i = 0; i < n; i++) {

@@ -76,7 +76,7 @@ static void test_integral(void **state)
 	size_t n = dice_count(1000);
 	unsigned faults = 0;
 	starts_context(&c, w, 1, EDGES, counters);
-	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(room->name), .limits = WALK_LIMITS_DEFAULT};
+	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&knobs_default)};
 	for (unsigned g = 0; g < GROUPS; g++) {
 		struct starts s;
 		starts_init(&s, &c, m.seed, g, n);

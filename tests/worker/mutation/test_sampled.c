@@ -259,7 +259,7 @@ static void test_example(void **state)
 	struct world *w = room_of(e->room);
 	struct starts starts;
 	starts_context(&c, w, 1, e->edges, counters);
-	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(name), .limits = WALK_LIMITS_DEFAULT};
+	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(name), .limits = walk_limits_of(&knobs_default)};
 	starts_init(&starts, &c, m.seed, 0, 3000);
 	s = (struct sampling){.example = e, .ops = mutation_find(e->strategy, strlen(e->strategy)), .x = &x, .y = &y};
 	list_vertices(&s);

@@ -43,7 +43,7 @@ static double propose(const struct mutation_ops *ops, double scale, struct whole
 	const struct mutation_setting how = {-1, -1};
 	struct move move = {0};
 	whole_copy(into, &x, 0, x.edges);
-	mutation.limits = WALK_LIMITS_DEFAULT;
+	mutation.limits = walk_limits_of(&knobs_default);
 	mutation.limits.scale = scale;
 	if (ops->propose(&mutation, &how, &x, into, &move))
 		return 0;

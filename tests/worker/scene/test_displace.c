@@ -156,7 +156,7 @@ static void test_no_cracks(void **state)
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
 		for (uint32_t level = 0; level < 5; level++) {
-			struct displacement d = {rough, NULL, false, 0.05, level};
+			struct displacement d = {rough, NULL, false, 0.05, level, 1};
 			struct built b = build_ok(cases[i].type, cases[i].content, cases[i].obj, &d);
 			const struct mesh *m = &b.g.mesh;
 			assert_int_equal(m->triangle_count, cases[i].base << 2 * level);
@@ -172,7 +172,7 @@ static void test_no_cracks(void **state)
 static void test_unused_vertices_stay(void **state)
 {
 	(void)state;
-	struct displacement d = {one, NULL, true, 3, 2};
+	struct displacement d = {one, NULL, true, 3, 2, 1};
 	struct built b = build_ok("obj", "", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 9 9 9\nv 9 9 9\nv 9 8 9\nf 1 2 3\nf 4 5 6\n", &d);
 	assert_int_equal(b.g.mesh.triangle_count, 16);
 	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
@@ -187,7 +187,7 @@ static void test_height_zero_is_the_base(void **state)
 	(void)state;
 	static const char *const types[] = {"cube", "rectangle", "sphere", "obj", "obj"};
 	for (size_t i = 0; i < 5; i++) {
-		struct displacement d = {rough, NULL, false, 0, 3};
+		struct displacement d = {rough, NULL, false, 0, 3, 1};
 		const char *content = i == 4 ? "<boolean name='face_normals' value='true'/>" : "";
 		struct built b = build_ok(types[i], content, i >= 3 ? TETRAHEDRON : NULL, &d);
 		const struct mesh *m = &b.g.mesh;
@@ -221,7 +221,7 @@ static void test_height_zero_is_the_base(void **state)
 static void test_constant_on_a_cube(void **state)
 {
 	(void)state;
-	struct displacement d = {one, NULL, true, 0.25, 3};
+	struct displacement d = {one, NULL, true, 0.25, 3, 1};
 	struct built b = build_ok("cube", "", NULL, &d);
 	const struct mesh *m = &b.g.mesh;
 	uint32_t corners = 0, edges = 0, faces = 0;
@@ -351,7 +351,7 @@ static void approaches(const char *type, double (*height)(const void *, double, 
 {
 	struct misses last = {0, 0, 0};
 	for (uint32_t level = 5; level <= 7; level++) {
-		struct displacement d = {height, NULL, false, scale, level};
+		struct displacement d = {height, NULL, false, scale, level, 1};
 		struct built b = build_ok(type, "", NULL, &d);
 		struct misses r = measure(&b.g.mesh, of, margin);
 		print_message("%s, level %u: positions off by %.1e, normals by %.2e, their derivatives by %.3f\n", type, level,
@@ -383,7 +383,7 @@ static void test_ball_approaches(void **state)
 static void test_poles(void **state)
 {
 	(void)state;
-	struct displacement d = {bumps, NULL, false, 0.1, 7};
+	struct displacement d = {bumps, NULL, false, 0.1, 7, 1};
 	struct built b = build_ok("sphere", "", NULL, &d);
 	uint32_t poles = 0;
 	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
@@ -404,7 +404,7 @@ static void test_poles(void **state)
 static void test_refused(void **state)
 {
 	(void)state;
-	struct displacement d = {waves, NULL, false, 1, 13};
+	struct displacement d = {waves, NULL, false, 1, 13, 1};
 	struct built b = build("cube", "", NULL, &d);
 	assert_int_equal(b.result, -E2BIG);
 	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"cube\">: displacement_level 13 makes 805306368 triangles; at most 134217728"));
@@ -424,7 +424,7 @@ static void test_refused(void **state)
 static void test_memory_runs_out(void **state)
 {
 	(void)state;
-	struct displacement d = {waves, NULL, false, 0.1, 2};
+	struct displacement d = {waves, NULL, false, 0.1, 2, 1};
 	int r = -1;
 	for (long n = 0; r && n < 100; n++) {
 		struct scene_node node = {.cls = PLUGIN_SHAPE, .type = "sphere", .file = "s.xml"};
@@ -444,7 +444,7 @@ static void test_memory_runs_out(void **state)
 static void test_a_million(void **state)
 {
 	(void)state;
-	struct displacement d = {waves, NULL, false, 0.1, 9};
+	struct displacement d = {waves, NULL, false, 0.1, 9, 1};
 	clock_t begin = clock();
 	struct built b = build_ok("cube", "", NULL, &d);
 	double seconds = (double)(clock() - begin) / CLOCKS_PER_SEC;

@@ -1,0 +1,23 @@
+/* One line a knob: field of struct knobs, name, kind, where it acts; the default, the least and the greatest value; choices, the
+ * first of them worth 0 unless they are numbers; what it does, in one sentence; values worth a sweep. */
+KNOB(tolerance, "tolerance", KNOB_REAL, KNOB_CHAINS, 1e-3, 1e-9, 1, NULL,
+     "How near its target a walk brings each half vector, of the smaller of lobe and step",
+     "0.1", "0.01", "0.001", "0.0001", "1e-05", "1e-06", "1e-08")
+KNOB(iterations, "iterations", KNOB_WHOLE, KNOB_CHAINS, 15, 1, 1000, NULL,
+     "Steps of Newton after which a walk is given up",
+     "2", "3", "4", "6", "10", "15", "30")
+KNOB(least_step, "least-step", KNOB_REAL, KNOB_CHAINS, 0.03, 1e-9, 1, NULL,
+     "Share of a step of Newton below which a walk that goes wrong is given up",
+     "1", "0.3", "0.1", "0.03", "0.001", "1e-05")
+KNOB(reverse_tolerance, "reverse-tolerance", KNOB_REAL, KNOB_CHAINS, 1e-3, 1e-9, 0.5, NULL,
+     "How near to where it began the way back of a walk must end, of the largest step that a vertex made",
+     "0.1", "0.01", "0.001", "0.0001", "1e-06")
+KNOB(step_scale, "step-scale", KNOB_REAL, KNOB_CHAINS, 1, 1e-3, 1000, NULL,
+     "Factor of the largest step of a half vector, which is a lobe's mean slope",
+     "0.1", "0.25", "0.5", "1", "2", "4")
+KNOB(roughness, "roughness", KNOB_REAL, KNOB_WORLD, 0, 0, 1, NULL,
+     "Rough metal and glass of less roughness is taken for smooth",
+     "0", "0.001", "0.003", "0.01", "0.03", "0.1")
+KNOB(tessellation, "tessellation", KNOB_REAL, KNOB_WORLD, 1, 1e-3, 64, NULL,
+     "Factor of the parts into which displacement cuts an edge",
+     "0.125", "0.25", "0.5", "1", "2")
