@@ -119,14 +119,17 @@ void bootstrap_to_canvas(const struct bootstrap *s, struct canvas *c)
 	}
 }
 
+uint64_t merge_error_next(uint64_t rounds)
+{
+	uint64_t due = 1;
+	while (due <= rounds && due < UINT64_MAX / 2)
+		due += due < 4 ? 1 : due / 4;
+	return due;
+}
+
 bool merge_error_due(const struct plan *p, uint64_t rounds)
 {
-	if (!(p->target_error > 0) || rounds == 0)
-		return false;
-	uint64_t due = 1;
-	while (due < rounds)
-		due += due < 4 ? 1 : due / 4;
-	return due == rounds;
+	return p->target_error > 0 && rounds > 0 && merge_error_next(rounds - 1) == rounds;
 }
 
 enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img)

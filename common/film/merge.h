@@ -31,6 +31,7 @@ enum merge_end { MERGE_GOES_ON, MERGE_ROUNDS, MERGE_TIME, MERGE_ERROR };
 /* Rounds at which the error is looked at: a geometric ladder (1 2 3 4 5 6 7 8 10 12 15 ...), a function of the count alone,
  * since each look costs an image and tests the target once more. */
 bool merge_error_due(const struct plan *p, uint64_t rounds);
+uint64_t merge_error_next(uint64_t rounds); /* the first step of the ladder after so many */
 /* img: of the complete rounds, or NULL when the error is not due. */
 enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img);
 

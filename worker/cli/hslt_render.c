@@ -96,6 +96,7 @@ struct session {
 	struct plan plan;
 	struct local_run run;
 	struct canvas_image image;
+	struct forecast_history looks;
 	double build_seconds;
 	struct progress progress;
 	bool usage; /* what went wrong was asked for */
@@ -164,10 +165,17 @@ static void show(void *user, const struct local_progress *p)
 	progress_show(&s->progress, fraction, p->state, detail);
 }
 
+static void look(void *user, const struct local_round *r)
+{
+	struct session *s = user;
+	if (r->image)
+		forecast_add(&s->looks, &s->plan, r->image, r->cpu_seconds, r->seconds);
+}
+
 static int render(struct session *s, struct error *e)
 {
 	s->run = (struct local_run){.world = s->world, .plan = &s->plan, .threads = s->a->threads, .stop = &interrupted,
-				    .progress = s->a->quiet ? NULL : show, .user = s};
+				    .progress = s->a->quiet ? NULL : show, .round = look, .user = s};
 	if (!s->a->quiet)
 		progress_start(&s->progress);
 	int rc = local_run(&s->run, e);
@@ -232,7 +240,7 @@ static int run(struct session *s, struct error *e)
 		rc = write_image(s, e);
 	if (!rc && s->a->stats)
 		rc = stats_write(s->a->stats,
-				 &(struct stats){s->name, &s->summary, &s->run, &s->image, s->build_seconds}, e);
+				 &(struct stats){s->name, &s->summary, &s->run, &s->image, s->build_seconds, &s->looks}, e);
 	if (!rc && !s->a->quiet)
 		say(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)

@@ -24,9 +24,22 @@ const char *stats_end_name(enum merge_end end)
 	return names[end];
 }
 
-static json_t *real_or_null(double x)
+json_t *stats_real(double x)
 {
 	return isfinite(x) ? json_real(x) : json_null();
+}
+
+json_t *stats_looks(const struct forecast_history *h)
+{
+	json_t *list = json_array();
+	for (uint32_t i = 0; i < h->count; i++) {
+		const struct forecast_look *l = &h->looks[i];
+		json_array_append_new(list, json_pack("{s:f s:f s:f s:o s:o s:o}", "mutations", l->work, "cpuSeconds",
+						      l->cpu_seconds, "wallSeconds", l->seconds, "relMSE", stats_real(l->rel_mse),
+						      "relMSEUpper", stats_real(l->rel_mse_upper), "degrees",
+						      stats_real(l->degrees)));
+	}
+	return list;
 }
 
 static json_t *plan_json(const struct stats *s)
@@ -35,10 +48,11 @@ static json_t *plan_json(const struct stats *s)
 	char plan[PLAN_TEXT], again[PLAN_TEXT];
 	plan_describe(p, plan, sizeof plan);
 	plan_options(p, s->image->rounds, again, sizeof again);
-	return json_pack("{s:i s:s s:s s:s s:s s:I s:I s:f s:f s:f s:I s:I}", "schema", 1, "scene", s->scene, "integrator",
+	return json_pack("{s:i s:s s:s s:s s:s s:I s:I s:f s:f s:f s:f s:I s:I}", "schema", 1, "scene", s->scene, "integrator",
 			 p->integrator, "plan", plan, "options", again, "rounds", (json_int_t)s->image->rounds, "threads",
 			 (json_int_t)s->run->threads, "buildSeconds", s->build_seconds, "wallSeconds", s->run->seconds,
-			 "cpuSeconds", s->run->cpu_seconds, "triangles", (json_int_t)s->summary->triangles, "embreeBytes",
+			 "cpuSeconds", s->run->cpu_seconds, "bootstrapCpuSeconds",
+			 s->run->bootstrap_cpu_seconds, "triangles", (json_int_t)s->summary->triangles, "embreeBytes",
 			 (json_int_t)world_embree_bytes(s->run->world));
 }
 
@@ -48,8 +62,8 @@ static json_t *image_json(const struct canvas_image *i)
 	for (int k = 0; k < BATCH_COUNTERS; k++)
 		if (counter_names[k])
 			json_object_set_new(counters, counter_names[k], json_integer((json_int_t)i->counts.counters[k]));
-	return json_pack("{s:o s:o s:o s:o s:o}", "b", real_or_null(i->b), "relMSE", real_or_null(i->rel_mse), "relMSEUpper",
-			 real_or_null(i->rel_mse_upper), "beyondShare", real_or_null(i->beyond_share), "counters", counters);
+	return json_pack("{s:o s:o s:o s:o s:o}", "b", stats_real(i->b), "relMSE", stats_real(i->rel_mse), "relMSEUpper",
+			 stats_real(i->rel_mse_upper), "beyondShare", stats_real(i->beyond_share), "counters", counters);
 }
 
 static json_t *effects_json(const struct render_summary *m)
@@ -75,6 +89,7 @@ int stats_write(const char *path, const struct stats *s, struct error *e)
 	json_t *o = plan_json(s);
 	bool whole = json_object_update_new(o, image_json(s->image)) == 0 &&
 		     json_object_set_new(o, "effects", effects_json(s->summary)) == 0 &&
+		     json_object_set_new(o, "looks", stats_looks(s->looks)) == 0 &&
 		     json_object_update_new(o, end_json(s)) == 0;
 	char *text = whole ? json_dumps(o, JSON_INDENT(2)) : NULL;
 	json_decref(o);

@@ -4,7 +4,10 @@
 #ifndef WORKER_CLI_STATS_H
 #define WORKER_CLI_STATS_H
 
+#include "common/film/forecast.h"
 #include "worker/cli/local.h"
+
+#include <jansson.h>
 
 struct stats {
 	const char *scene; /* file name */
@@ -12,8 +15,11 @@ struct stats {
 	const struct local_run *run; /* has ended */
 	const struct canvas_image *image;
 	double build_seconds; /* of the world */
+	const struct forecast_history *looks;
 };
 
+json_t *stats_looks(const struct forecast_history *h);
+json_t *stats_real(double x); /* null where it is no number */
 const char *stats_end_name(enum merge_end end);
 int stats_write(const char *path, const struct stats *s, struct error *e);
 
