@@ -12,7 +12,9 @@ enum {
 	STEPS_MOST = 256, /* of the ladder; more than 2^60 rounds have */
 };
 static const double used_share = 1.0 / 16; /* looks at less than this share of the work say little about what is to come */
-static const double trend_prior = 0.06;    /* standard deviation of the trend */
+static const double trend_prior = 0.2;     /* standard deviation of the trend: light that comes in rare bursts, chains that
+					    * have not forgotten their seeds yet */
+static const double drift = 0.08;          /* what the trend may change an e-fold of work that nobody has seen */
 static const double price_floor = 0.03;    /* relative spread of a sample's price from one stretch of time to another */
 static const double log_four = 1.3862943611198906;
 
@@ -205,7 +207,7 @@ static double normal(struct dice *d)
 }
 
 struct play { /* one way in which things may be */
-	double level, trend, margin, now, cpu, wall;
+	double level, trend, drift, margin, now, cpu, wall;
 };
 
 static struct play play_of(const struct fit *f, struct dice *d)
@@ -215,14 +217,14 @@ static struct play play_of(const struct fit *f, struct dice *d)
 	double level = f->level + f->level_sd * (f->correlation * a + sqrt(fmax(0, 1 - f->correlation * f->correlation)) * b);
 	double now = f->now + (f->level - level) / f->spread;
 	double margin = fmax(0, f->margin + f->margin_sd * normal(d));
-	return (struct play){level, trend, margin, now, f->cpu * exp(f->cpu_sd * normal(d)), f->wall * exp(f->wall_sd * normal(d))};
+	return (struct play){level, trend, drift * normal(d), margin, now, f->cpu * exp(f->cpu_sd * normal(d)), f->wall * exp(f->wall_sd * normal(d))};
 }
 
 /* log(relMSE) expected at a work. */
 static double expected(const struct fit *f, const struct play *y, double work)
 {
 	double t = log(work / f->work);
-	return y->level + y->trend * fmax(-f->seen, fmin(t, f->seen)) - log(work);
+	return y->level + y->trend * fmax(-f->seen, fmin(t, f->seen)) + y->drift * fmax(t, 0) - log(work);
 }
 
 /* Rounds at which it stops. */
@@ -255,6 +257,21 @@ static struct forecast_range range_of(double *x)
 {
 	qsort(x, PLAYS, sizeof *x, by_size);
 	return (struct forecast_range){x[PLAYS / 20], x[PLAYS / 2], x[PLAYS - 1 - PLAYS / 20]};
+}
+
+bool forecast_error_at(const struct forecast_history *h, double work, struct forecast_range *error)
+{
+	if (!h->count)
+		return false;
+	struct fit f = fit(h);
+	struct dice d = {3};
+	double x[PLAYS];
+	for (int i = 0; i < PLAYS; i++) {
+		struct play y = play_of(&f, &d);
+		x[i] = exp(0.5 * expected(&f, &y, work));
+	}
+	*error = range_of(x);
+	return true;
 }
 
 struct plays {
@@ -295,9 +312,10 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 /* e-folds of work that quarter relMSE: the trend holds as far as it was seen. */
 static double quartering(const struct fit *f, const struct play *y)
 {
-	if (y->trend < 1 && log_four / (1 - y->trend) <= f->seen)
-		return log_four / (1 - y->trend);
-	return log_four + y->trend * f->seen;
+	double fall = 1 - y->drift, whole = fall - y->trend;
+	if (whole > 0 && log_four / whole <= f->seen)
+		return log_four / whole;
+	return fall > 0 ? (log_four + y->trend * f->seen) / fall : INFINITY;
 }
 
 bool forecast_halving(const struct forecast_history *h, const struct plan *p, struct forecast_cost *c)

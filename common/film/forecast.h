@@ -50,6 +50,8 @@ void forecast_add(struct forecast_history *h, const struct plan *p, const struct
 const struct forecast_look *forecast_reached(const struct forecast_history *h, double target);
 /* Relative error at the last look. false: nothing is known, as below. */
 bool forecast_error(const struct forecast_history *h, struct forecast_range *error);
+/* Of a render that has done so much work. */
+bool forecast_error_at(const struct forecast_history *h, double work, struct forecast_range *error);
 /* When a render of plan p (its rounds; its bounds are not looked at) will stop by this target. */
 bool forecast_target(const struct forecast_history *h, const struct plan *p, double target, enum forecast_run run,
 		     struct forecast_cost *c);

@@ -3,7 +3,10 @@
 #include "common/base/version.h"
 #include "common/film/image_file.h"
 #include "common/film/strategy.h"
+#include "worker/cli/estimate.h"
+#include "worker/cli/local_pilot.h"
 #include "worker/cli/options.h"
+#include "worker/cli/pilot.h"
 #include "worker/cli/stats.h"
 
 #include <math.h>
@@ -22,26 +25,33 @@ static const char doc[] =
 	"  hslt-render room.xml -o room.exr --spp 64\n"
 	"  hslt-render room.xml -o room.exr --integrator path --size 320x180 --threads 8 --stats room.json\n"
 	"  hslt-render room.xml -o room.exr --target-error 2% --time 3600\n"
+	"  hslt-render --estimate room.xml --plot room.svg\n"
 	"  hslt-render room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --mutations 10000000\n"
 	"\n"
+	"--estimate makes no image: a pilot of a minute tells what errors of 10, 5, 2 and 1 % (and --target-error) will cost.\n"
 	"The image holds linear Rec. 709 (R G B) and one standard error of each (error.R error.G error.B).\n"
 	"Exit codes: 0 done, 1 failed, 2 usage, 4 a bound came before the target error.";
 
-enum { OPTION_THREADS = 256, OPTION_STATS, OPTION_QUIET };
+enum { OPTION_THREADS = 256, OPTION_STATS, OPTION_QUIET, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_JSON };
 
 static const struct argp_option options[] = {
 	{"output", 'o', "FILE", 0, "The image (OpenEXR)", 0},
 	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors); does not change the bits", 0},
 	{"stats", OPTION_STATS, "FILE", 0, "Write plan, times, counters, strategies and effects as JSON, and show a table of the strategies", 0},
 	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
+	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
+	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
+	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
+	{"json", OPTION_JSON, NULL, 0, "Print the estimate as one JSON object", 0},
 	{0},
 };
 static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
 
 struct arguments {
-	const char *scene, *output, *stats;
+	const char *scene, *output, *stats, *plot;
 	unsigned threads;
-	bool quiet;
+	double pilot; /* s; 0: not given */
+	bool quiet, estimate, json;
 	struct render_arguments render;
 };
 
@@ -66,14 +76,30 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_QUIET:
 		a->quiet = true;
 		return 0;
+	case OPTION_ESTIMATE:
+		a->estimate = true;
+		return 0;
+	case OPTION_PILOT:
+		a->pilot = option_seconds(state, "--pilot", arg);
+		return 0;
+	case OPTION_PLOT:
+		a->plot = arg;
+		return 0;
+	case OPTION_JSON:
+		a->json = true;
+		return 0;
 	case ARGP_KEY_ARG:
 		if (a->scene)
 			argp_error(state, "one scene at a time");
 		a->scene = arg;
 		return 0;
 	case ARGP_KEY_END:
-		if (!a->scene || !a->output)
+		if (!a->scene || (!a->output && !a->estimate))
 			argp_error(state, "a scene and -o FILE are needed");
+		if (a->estimate && (a->output || a->stats))
+			argp_error(state, "--estimate makes no image: no -o, no --stats");
+		if (!a->estimate && (a->pilot > 0 || a->plot || a->json))
+			argp_error(state, "--pilot, --plot and --json go with --estimate");
 		return 0;
 	default:
 		return ARGP_ERR_UNKNOWN;
@@ -225,8 +251,65 @@ static void say(const struct session *s)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 }
 
+static int report(const struct session *s, const struct local_pilot *p, struct error *e)
+{
+	char where[64];
+	snprintf(where, sizeof where, "this machine, %u threads", s->a->threads);
+	struct estimate m = {.scene = s->name,
+			     .where = where,
+			     .plan = &p->render,
+			     .pilot = &p->plan,
+			     .looks = &p->looks,
+			     .cpu_seconds = p->cpu_seconds,
+			     .seconds = p->wall_seconds,
+			     .bootstrap_cpu = p->bootstrap_cpu,
+			     .bootstrap_seconds = p->bootstrap_seconds,
+			     .target = s->a->render.plan.target_error};
+	int rc = estimate_check(&m, e);
+	if (rc)
+		return rc;
+	if (s->a->json)
+		rc = estimate_print_json(&m, stdout, e);
+	else
+		estimate_print(&m, stdout);
+	return !rc && s->a->plot ? estimate_plot(&m, s->a->plot, e) : rc;
+}
+
+static int estimate(struct session *s, struct error *e)
+{
+	struct plan_request *request = &s->a->render.plan;
+	double target = request->target_error;
+	request->target_error = target > 0 ? target : 1; /* else the scene's sampleCount would be taken for a wish */
+	int rc = s->a->plot ? image_file_probe(s->a->plot, e) : 0;
+	if (!rc)
+		rc = load(s, e);
+	if (!rc) {
+		rc = render_plan_from_scene(&s->a->render, &s->summary, e);
+		s->usage = rc == -EINVAL;
+	}
+	request->target_error = target;
+	if (rc)
+		return rc;
+	struct local_pilot p = {.world = s->world,
+				.request = request,
+				.seconds = s->a->pilot > 0 ? s->a->pilot : PILOT_SECONDS,
+				.threads = s->a->threads,
+				.stop = &interrupted,
+				.progress = s->a->quiet ? NULL : show,
+				.user = s};
+	s->plan.seconds = p.seconds;
+	if (!s->a->quiet)
+		progress_start(&s->progress);
+	rc = local_pilot(&p, e);
+	if (!s->a->quiet)
+		progress_end(&s->progress);
+	return rc ? rc : report(s, &p, e);
+}
+
 static int run(struct session *s, struct error *e)
 {
+	if (s->a->estimate)
+		return estimate(s, e);
 	int rc = image_file_probe(s->a->output, e);
 	if (!rc && s->a->stats)
 		rc = image_file_probe(s->a->stats, e);

@@ -1,0 +1,31 @@
+/*
+ * What an estimate says: a table of errors and what they cost, the same as JSON, and a plot of error against time. One
+ * thread.
+ */
+#ifndef WORKER_CLI_ESTIMATE_H
+#define WORKER_CLI_ESTIMATE_H
+
+#include "common/film/forecast.h"
+
+#include <stdio.h>
+
+struct estimate {
+	const char *scene, *where;  /* "this machine, 2 threads" */
+	const struct plan *plan;    /* of the render that is spoken of */
+	const struct plan *pilot;
+	const struct forecast_history *looks; /* of the pilot */
+	double cpu_seconds, seconds; /* of the pilot, bootstrap and all */
+	double bootstrap_cpu, bootstrap_seconds; /* of the pilot's bootstrap; the render's is longer by the ratio of samples */
+	double target;              /* asked for beside the usual ones; 0: none */
+};
+
+/* -EAGAIN: the pilot has not seen enough to say anything. */
+int estimate_check(const struct estimate *s, struct error *e);
+void estimate_print(const struct estimate *s, FILE *f);
+int estimate_print_json(const struct estimate *s, FILE *f, struct error *e);
+int estimate_plot(const struct estimate *s, const char *path, struct error *e);
+
+/* "45 s", "3.1 min", "2.4 h", "12 days"; "for ever". */
+void estimate_time(double seconds, char *text, size_t size);
+
+#endif

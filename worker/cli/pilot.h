@@ -1,0 +1,25 @@
+/*
+ * How a pilot is cut: a short render with the plan of the one to come, but for the length of an epoch, so that there are
+ * enough looks at its error. What an epoch costs is found by a probe, one short round. Pure; any thread.
+ */
+#ifndef WORKER_CLI_PILOT_H
+#define WORKER_CLI_PILOT_H
+
+#include "common/plan/plan.h"
+
+enum { PILOT_SECONDS = 60, PILOT_ROUNDS = 16 /* aimed at: a dozen looks */ };
+
+/* No bound but an error out of reach, so that all looks are made; request: of the render, complete. */
+int pilot_render_plan(const struct plan_request *request, struct plan *render, struct error *e);
+
+struct pilot_cost { /* wall seconds of a probe */
+	double bootstrap, rounds;
+};
+
+/* false: none is needed, an epoch cannot be shorter than one sample and that is as long as a pilot's. */
+bool pilot_probe(const struct plan_request *request, const struct plan *render, struct plan_request *probe);
+/* cost: of the probe, NULL: there was none. */
+void pilot_request(const struct plan_request *request, const struct plan *render, const struct plan_request *probe,
+		   const struct pilot_cost *cost, double seconds, struct plan_request *pilot);
+
+#endif
