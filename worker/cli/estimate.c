@@ -215,7 +215,7 @@ static void draw_goal(const struct row *r, struct drawing *d, size_t i)
 	for (int k = 0; k < 3; k++) {
 		d->goal_x[i][k] = x[k];
 		d->goal_y[i][k] = 100 * r->target;
-		d->label_at[i][k] = k == 2 ? d->labels[i] : "";
+		d->label_at[i][k] = k == 0 ? d->labels[i] : "";
 	}
 }
 
