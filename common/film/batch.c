@@ -14,7 +14,26 @@ void batch_fini(struct batch *b)
 	mem_free(b->tiles);
 	mem_free(b->states);
 	mem_free(b->weights);
+	mem_free(b->moments);
 	*b = (struct batch){0};
+}
+
+uint32_t batch_film_tiles(const struct plan *p)
+{
+	return ((p->crop_width + TILE_SIZE - 1) / TILE_SIZE) * ((p->crop_height + TILE_SIZE - 1) / TILE_SIZE);
+}
+
+uint32_t batch_sequences(const struct plan *p)
+{
+	if (p->kind != PLAN_CHAINS)
+		return 0;
+	return p->chains > SEQUENCES_MAX ? 1 : p->chains / (p->groups * p->parts);
+}
+
+uint64_t batch_moment_count(const struct plan *p, enum lease_kind kind)
+{
+	uint64_t sequences = kind == LEASE_RENDER ? batch_sequences(p) : 0;
+	return sequences ? (sequences + 1) * batch_film_tiles(p) : 0;
 }
 
 static int check_key(const struct lease_key *k, const struct plan *p, struct error *e)
@@ -149,6 +168,55 @@ static int check_strategies(const struct batch *b, const struct plan *p, struct 
 	return 0;
 }
 
+/* Sums of the same terms in another order, rounded to float here and there. */
+#define ROUNDING (1 + 1e-6)
+
+static int check_classes(const struct batch *b, const struct plan *p, struct error *e)
+{
+	double sum = 0, most = 0;
+	if (b->key.kind == LEASE_BOOTSTRAP)
+		most = b->independent_sum;
+	else if (p->kind == PLAN_CHAINS)
+		most = (double)b->counters[COUNT_SAMPLES];
+	for (int i = 0; i < PATH_CLASSES; i++) {
+		if (!(b->classes[i] >= 0) || !isfinite(b->classes[i]))
+			return error_set(e, EBADMSG, "the sum of a path class is negative or not finite");
+		sum += b->classes[i];
+	}
+	if (!(sum <= most * ROUNDING))
+		return error_set(e, EBADMSG, "the path classes add up to %g, more than %g", sum, most);
+	return 0;
+}
+
+static int check_moments(const struct batch *b, const struct plan *p, struct error *e)
+{
+	uint64_t expected = batch_moment_count(p, b->key.kind), tiles = batch_film_tiles(p), sequences = batch_sequences(p);
+	if (b->moment_count != expected || (expected && !b->moments))
+		return error_set(e, EBADMSG, "%llu moments where there should be %llu", (unsigned long long)b->moment_count,
+				 (unsigned long long)expected);
+	if (expected == 0)
+		return 0;
+	for (uint64_t i = 0; i < expected; i++)
+		if (!(b->moments[i] >= 0) || !isfinite(b->moments[i]))
+			return error_set(e, EBADMSG, "a moment is negative or not finite");
+	double most = (double)b->state_count / (double)sequences * (double)p->epoch * ROUNDING;
+	for (uint64_t s = 0; s < sequences; s++) {
+		double sum = 0;
+		for (uint64_t t = 0; t < tiles; t++)
+			sum += (double)b->moments[s * tiles + t];
+		if (!(sum <= most))
+			return error_set(e, EBADMSG, "a chain was in tiles %g times in %g mutations", sum, most);
+	}
+	for (uint64_t t = 0; t < tiles; t++) {
+		double first = 0;
+		for (uint64_t s = 0; s < sequences; s++)
+			first += (double)b->moments[s * tiles + t];
+		if (!((double)b->moments[sequences * tiles + t] <= first * ROUNDING))
+			return error_set(e, EBADMSG, "a second moment above the first");
+	}
+	return 0;
+}
+
 int batch_check(const struct batch *b, const struct plan *p, struct error *e)
 {
 	uint64_t live;
@@ -161,5 +229,9 @@ int batch_check(const struct batch *b, const struct plan *p, struct error *e)
 		rc = check_weights(b, p, e);
 	if (rc == 0)
 		rc = check_counts(b, p, live, e);
+	if (rc == 0)
+		rc = check_classes(b, p, e);
+	if (rc == 0)
+		rc = check_moments(b, p, e);
 	return rc ? rc : check_strategies(b, p, e);
 }

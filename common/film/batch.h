@@ -6,6 +6,7 @@
 #define COMMON_FILM_BATCH_H
 
 #include "common/base/error.h"
+#include "common/film/path_class.h"
 #include "common/plan/plan.h"
 
 struct lease_key {
@@ -71,6 +72,19 @@ enum strategy_counter {
 	STRATEGY_COUNTERS,
 };
 
+/*
+ * Within-chain moments, for chains only. A sequence is a chain; where the plan has more than SEQUENCES_MAX of them, all
+ * chains of one lease together (which bounds the coordinator's memory). A mutation gives weight w to a state (1 - a to the
+ * current one, a to the proposal) of which the share f of I = X+Y+Z has its film points in a tile of the crop; points outside
+ * the crop belong to no tile. First moments: by sequence and tile, the sum of w f. Second: by tile over the whole lease, the
+ * sum of w f^2.
+ */
+enum { SEQUENCES_MAX = 4096 };
+uint32_t batch_sequences(const struct plan *p); /* of one render lease; 0: not of chains */
+uint32_t batch_film_tiles(const struct plan *p);     /* of the crop */
+/* Floats of struct batch.moments of a lease of that kind. */
+uint64_t batch_moment_count(const struct plan *p, enum lease_kind kind);
+
 struct batch {
 	struct lease_key key;
 	uint64_t counters[BATCH_COUNTERS];
@@ -80,6 +94,9 @@ struct batch {
 	 * beyond_sum: the same from paths longer than the integrator's state holds, estimated by the bootstrap and not in
 	 * independent_sum (b is the integral of what the chains can reach). */
 	double independent_sum, independent_square, beyond_sum;
+	/* By path class. Bootstrap: what independent_sum is the sum of. Chains: their time, the sum of w times the class's
+	 * share of the state's I. Else 0. */
+	double classes[PATH_CLASSES];
 	double cpu_seconds; /* not part of the result's bits */
 	uint32_t tile_count;
 	struct tile *tiles;
@@ -87,13 +104,16 @@ struct batch {
 	struct chain_state *states;
 	uint64_t weight_count; /* bootstrap: I of each index of the range, in order */
 	float *weights;
+	uint64_t moment_count;
+	float *moments; /* [sequence][tile] first moments, then [tile] second ones; tiles row by row */
 };
 
 void batch_fini(struct batch *b);
 
 /* All that can be checked without the scene: key inside the plan, tiles inside the crop, aligned, once, in order, values
  * finite, counts as the plan says (COUNT_SAMPLES of a render lease and COUNT_INDEPENDENT of a bootstrap lease exactly),
- * states bounded, weights >= 0, strategies as many as the plan's and none with more proposals than samples. -EBADMSG with a sentence. */
+ * states bounded, weights >= 0, strategies as many as the plan's and none with more proposals than samples, no class and no
+ * sequence with more time than its mutations, no tile with a second moment above the first. -EBADMSG with a sentence. */
 int batch_check(const struct batch *b, const struct plan *p, struct error *e);
 
 #endif

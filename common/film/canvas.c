@@ -99,6 +99,8 @@ int canvas_new(struct canvas **out, const struct plan *p, int grid_exponent, con
 	c->bound = mem_alloc(films, sizeof *c->bound);
 	c->has = mem_alloc((size_t)(1 + OPEN_ROUNDS) * p->groups * p->parts, 1);
 	int rc = c->flags && c->bound && c->has ? map_sums(c, folder, e) : error_set(e, ENOMEM, "no memory for the films");
+	if (rc == 0)
+		rc = moments_new(&c->moments, p, e);
 	if (rc) {
 		canvas_free(c);
 		return rc;
@@ -118,6 +120,7 @@ void canvas_free(struct canvas *c)
 	mem_free(c->flags);
 	mem_free(c->bound);
 	mem_free(c->has);
+	moments_free(c->moments);
 	mem_free(c);
 }
 
@@ -357,6 +360,7 @@ static void close_round(struct canvas *c)
 		c->bound[from] = 0;
 	}
 	tally_merge(&c->prefix, &c->open[open], c->plan.groups);
+	moments_close_round(c->moments, c->rounds);
 	c->open[open] = (struct tally){0};
 	c->merged[open] = 0;
 	memset(c->has + (size_t)(1 + open) * leases, 0, leases);
@@ -372,16 +376,20 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e)
 	uint8_t *has = &c->has[((size_t)lease_set(k) * c->plan.groups + k->group) * c->plan.parts + k->part];
 	if (k->kind == LEASE_BOOTSTRAP) {
 		tally_batch(&c->bootstrap, b);
+		moments_add(c->moments, b);
 		*has = 1;
 		return 0;
 	}
 	if (k->epoch >= c->rounds + OPEN_ROUNDS || k->epoch >= c->plan.rounds)
 		return error_set(e, EAGAIN, "round %llu is not open yet: %llu are complete", (unsigned long long)k->epoch,
 				 (unsigned long long)c->rounds);
-	int rc = add_tiles(c, b, e);
+	int rc = moments_fit(c->moments, k, e);
+	if (rc == 0)
+		rc = add_tiles(c, b, e);
 	if (rc)
 		return rc;
 	tally_batch(&c->open[parity(k->epoch)], b);
+	moments_add(c->moments, b);
 	*has = 1;
 	c->merged[parity(k->epoch)]++;
 	while (c->merged[parity(c->rounds)] == c->plan.groups * c->plan.parts)

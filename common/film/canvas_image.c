@@ -103,6 +103,14 @@ static void pool_tile(struct making *m, uint32_t tx, uint32_t ty)
 	}
 }
 
+static int find_moments(const struct making *m, struct error *e)
+{
+	struct moments_group groups[PLAN_MAX_GROUPS];
+	for (uint32_t g = 0; g < m->c->plan.groups; g++)
+		groups[g] = (struct moments_group){m->c->bootstrap.group[g].independent, m->all->group[g].samples, m->b[g]};
+	return moments_image(m->c->moments, groups, m->c->rounds, m->open_rounds, m->img, e);
+}
+
 int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e)
 {
 	const struct plan *p = &c->plan;
@@ -132,13 +140,19 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 		img->black = img->rgb[i] == 0;
 	if (errors)
 		canvas_error(&m);
+	int rc = find_moments(&m, e);
+	if (rc)
+		canvas_image_fini(img);
 	mem_free(m.all);
-	return 0;
+	return rc;
 }
 
 void canvas_image_fini(struct canvas_image *img)
 {
 	mem_free(img->rgb);
 	mem_free(img->error);
-	img->rgb = img->error = NULL;
+	mem_free(img->r_hat);
+	mem_free(img->tile_error);
+	mem_free(img->tile_share);
+	img->rgb = img->error = img->r_hat = img->tile_error = img->tile_share = NULL;
 }

@@ -7,6 +7,7 @@
 #define COMMON_FILM_CANVAS_PRIVATE_H
 
 #include "common/film/canvas.h"
+#include "common/film/canvas_moments.h"
 
 enum { FILM_PREFIX, FILM_OPEN, FILMS = 3, SLOT_ROW = TILE_SIZE * TILE_CHANNELS, SLOT = TILE_SIZE * SLOT_ROW, OPEN_ROUNDS = 2 };
 enum tile_flag { TILE_BACKED = 1, TILE_USED = 2 };
@@ -33,6 +34,7 @@ struct canvas {
 	uint32_t merged[OPEN_ROUNDS]; /* leases of an open round, by its parity */
 	uint8_t *has;         /* [bootstrap, open parity 0, 1][group][part] */
 	struct tally prefix, open[OPEN_ROUNDS], bootstrap;
+	struct moments *moments;
 };
 
 /* An image on its way. */

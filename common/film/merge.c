@@ -69,6 +69,7 @@ int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
 	kept->independent_sum = b->independent_sum;
 	kept->independent_square = b->independent_square;
 	kept->beyond_sum = b->beyond_sum;
+	memcpy(kept->classes, b->classes, sizeof kept->classes);
 	s->missing--;
 	return 0;
 }

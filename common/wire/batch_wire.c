@@ -22,7 +22,8 @@ uint32_t batch_payload_max(const struct plan *p)
 {
 	uint64_t across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE, down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
 	uint64_t tiles = across * down * exr_tile_size_max(TILE_SIZE, TILE_SIZE);
-	uint64_t render = tiles + states_payload_max(p);
+	uint64_t moments = batch_moment_count(p, LEASE_RENDER) * sizeof(float);
+	uint64_t render = tiles + states_payload_max(p) + moments;
 	uint64_t weights = p->bootstrap / ((uint64_t)p->groups * p->parts) * sizeof(float);
 	uint64_t n = render > weights ? render : weights;
 	return n < PAYLOAD_MOST ? (uint32_t)n : PAYLOAD_MOST;
@@ -65,7 +66,7 @@ static int packing_init(struct packing *k, const struct batch *b, const struct p
 		k->state_sizes[i] = b->states[i].size;
 		k->payload += b->states[i].size;
 	}
-	k->payload += b->weight_count * sizeof(float);
+	k->payload += (b->weight_count + b->moment_count) * sizeof(float);
 	return 0;
 }
 
@@ -100,14 +101,17 @@ static void write_payload(unsigned char *at, const struct batch *b, const struct
 		at += b->states[i].size;
 	}
 	write_floats(at, b->weights, b->weight_count);
+	write_floats(at + b->weight_count * sizeof(float), b->moments, b->moment_count);
 }
 
 int batch_pack(const struct batch *b, const struct plan *p, unsigned char **frame, size_t *size, struct error *e)
 {
 	struct packing k;
 	uint64_t counters[BATCH_COUNTERS], strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
+	double classes[PATH_CLASSES];
 	memcpy(counters, b->counters, sizeof counters);
 	memcpy(strategy, b->strategy, sizeof strategy);
+	memcpy(classes, b->classes, sizeof classes);
 	int rc = packing_init(&k, b, p, e);
 	if (!rc) {
 		Farm__LeaseKey key;
@@ -130,6 +134,9 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 		m.n_state_sizes = b->state_count;
 		m.state_sizes = k.state_sizes;
 		m.weight_count = b->weight_count;
+		m.n_classes = PATH_CLASSES;
+		m.classes = classes;
+		m.moment_count = b->moment_count;
 		env.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
 		env.lease_result = &m;
 		rc = envelope_pack(&env, NULL, k.payload, frame, size, e);
@@ -196,17 +203,17 @@ static int cut_tiles(struct cutter *c, const Farm__LeaseResult *m, const struct 
 	return 0;
 }
 
-static int cut_weights(struct cutter *c, uint64_t count, struct batch *b, struct error *e)
+static int cut_floats(struct cutter *c, const char *what, uint64_t count, float **out, uint64_t *out_count, struct error *e)
 {
-	if (count > c->left / sizeof(float) || count * sizeof(float) != c->left)
-		return error_set(e, EBADMSG, "%llu weights do not fit the payload", (unsigned long long)count);
+	if (count > c->left / sizeof(float))
+		return error_set(e, EBADMSG, "%llu %s do not fit the payload", (unsigned long long)count, what);
 	if (count == 0)
 		return 0;
-	b->weights = mem_alloc(count, sizeof *b->weights);
-	if (!b->weights)
-		return error_set(e, ENOMEM, "no memory for %llu weights", (unsigned long long)count);
-	read_floats(c->at, b->weights, count);
-	b->weight_count = count;
+	*out = mem_alloc(count, sizeof **out);
+	if (!*out)
+		return error_set(e, ENOMEM, "no memory for %llu %s", (unsigned long long)count, what);
+	read_floats(cut(c, count * sizeof(float)), *out, count);
+	*out_count = count;
 	return 0;
 }
 
@@ -220,6 +227,8 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 		rc = error_set(e, EBADMSG, "a batch with %zu counters", m->n_counters);
 	if (!rc && (m->n_strategies % STRATEGY_COUNTERS || m->n_strategies > BATCH_STRATEGIES * STRATEGY_COUNTERS))
 		rc = error_set(e, EBADMSG, "a batch with %zu counters of strategies", m->n_strategies);
+	if (!rc && m->n_classes != PATH_CLASSES)
+		rc = error_set(e, EBADMSG, "a batch with %zu path classes", m->n_classes);
 	/* As many as the plan allows, before memory is asked for. */
 	if (!rc && m->n_state_sizes > chains_per_lease(p))
 		rc = error_set(e, EBADMSG, "a batch with %zu chain states", m->n_state_sizes);
@@ -232,6 +241,7 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 		b->independent_square = m->independent_square;
 		b->beyond_sum = m->beyond_sum;
 		b->cpu_seconds = m->cpu_seconds;
+		memcpy(b->classes, m->classes, sizeof b->classes);
 		rc = cut_tiles(&c, m, p, b, e);
 	}
 	if (!rc) {
@@ -239,7 +249,11 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 		rc = cut_states(&c, m->state_sizes, m->n_state_sizes, &b->states, e);
 	}
 	if (!rc)
-		rc = cut_weights(&c, m->weight_count, b, e);
+		rc = cut_floats(&c, "weights", m->weight_count, &b->weights, &b->weight_count, e);
+	if (!rc)
+		rc = cut_floats(&c, "moments", m->moment_count, &b->moments, &b->moment_count, e);
+	if (!rc && c.left)
+		rc = error_set(e, EBADMSG, "%zu bytes too many behind a batch", c.left);
 	if (!rc)
 		rc = batch_check(b, p, e);
 	if (rc)

@@ -13,7 +13,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 2 };
+enum { FARM_VERSION = 3 };
 
 struct envelope_block;
 

@@ -1,6 +1,7 @@
 #include "worker/chain/path_chain.h"
 
 #include "worker/mutation/mixture.h"
+#include "worker/path/classes.h"
 
 /* A state with what it has gathered and not splatted yet. */
 struct path_place {
@@ -78,6 +79,8 @@ static void splat(struct path_chain *c, struct path_place *at)
 	struct splat s = {.x = at->path.film[0], .y = at->path.film[1]};
 	whole_colour(c->base.context, &at->path, s.xyz);
 	film_sums_splat(c->base.film, &s, at->weight);
+	chain_moments_state(&c->base.film->moments, &s, 1, 1, at->weight);
+	chain_moments_class(&c->base.film->moments, path_class_whole(&at->path), at->weight);
 	at->weight = 0;
 }
 

@@ -39,6 +39,7 @@ static void set_places(struct pss_chain *c)
 static void set_black(struct pss_place *at)
 {
 	at->sample.count = 0;
+	at->sample.classes = 0;
 	at->sample.intensity = at->weight = 0;
 }
 
@@ -99,6 +100,11 @@ static void splat(struct pss_chain *c, struct pss_place *at)
 		return;
 	for (uint32_t i = 0; i < at->sample.count; i++)
 		film_sums_splat(c->base.film, &at->sample.splats[i], at->weight / at->sample.intensity);
+	struct chain_moments *m = &c->base.film->moments;
+	chain_moments_state(m, at->sample.splats, at->sample.count, at->sample.intensity, at->weight);
+	for (unsigned k = 0; at->sample.classes >> k; k++)
+		if (at->sample.classes >> k & 1)
+			chain_moments_class(m, k, at->weight * at->sample.of_class[k] / at->sample.intensity);
 	at->weight = 0;
 }
 

@@ -2,12 +2,15 @@
  * Bidirectional path tracing (Veach 1997, ch. 10): every way of joining a light with a camera sub-path, by the balance
  * heuristic. One light sub-path a camera sub-path; those that are joined to the pinhole land anywhere on the film.
  */
+#include "worker/path/classes.h"
 #include "worker/path/connect.h"
 #include "worker/path/integrator.h"
 
 void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	double film[2];
+	struct class_sums classes; /* its sums are set as they come */
+	classes.present = 0;
 	out->count = 0;
 	out->intensity = 0;
 	c->one_way = false;
@@ -19,19 +22,23 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 			if (t + j - 1 < c->min_depth)
 				continue;
 			spectrum l = path_connect(c, j, t, PATH_MAX_EDGES, film);
-			if (path_accept(c, l))
-				sum = spectrum_add(sum, l);
+			if (!path_accept(c, l))
+				continue;
+			sum = spectrum_add(sum, l);
+			class_sums_add(&classes, path_class_joined(c, j, t), l);
 		}
 	}
-	path_splat(c, out, film[0], film[1], sum);
+	if (!path_splat(c, out, film[0], film[1], sum))
+		classes.present = 0;
 	for (unsigned j = 2; j <= light && j <= c->max_depth; j++) {
 		double at[2];
 		if (j < c->min_depth)
 			continue;
 		spectrum l = path_connect(c, j, 1, PATH_MAX_EDGES, at);
-		if (!spectrum_is_zero(l))
-			path_splat(c, out, at[0], at[1], l);
+		if (!spectrum_is_zero(l) && path_splat(c, out, at[0], at[1], l))
+			class_sums_add(&classes, path_class_joined(c, j, 1), l);
 	}
+	class_sums_take(c, &classes, out);
 }
 
 const struct integrator integrator_bdpt = {

@@ -2,12 +2,15 @@
  * The path tracer: a camera sub-path, at each vertex next event estimation and the emitter met by chance, weighted against
  * each other by the balance heuristic (Veach 1997, sec. 9.2.4). The reference for all other integrators.
  */
+#include "worker/path/classes.h"
 #include "worker/path/connect.h"
 #include "worker/path/integrator.h"
 
 void path_trace(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	double film[2];
+	struct class_sums classes; /* its sums are set as they come */
+	classes.present = 0;
 	c->one_way = true;
 	unsigned n = path_walk_camera(c, s, c->max_depth + 1, film);
 	spectrum sum = spectrum_of(0);
@@ -17,13 +20,17 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 			if (edges < c->min_depth || edges > c->max_depth)
 				continue;
 			spectrum l = path_connect(c, j, t, 1, film);
-			if (path_accept(c, l))
-				sum = spectrum_add(sum, l);
+			if (!path_accept(c, l))
+				continue;
+			sum = spectrum_add(sum, l);
+			class_sums_add(&classes, path_class_joined(c, j, t), l);
 		}
 	}
 	out->count = 0;
 	out->intensity = 0;
-	path_splat(c, out, film[0], film[1], sum);
+	if (!path_splat(c, out, film[0], film[1], sum))
+		classes.present = 0;
+	class_sums_take(c, &classes, out);
 }
 
 const struct integrator integrator_path = {

@@ -354,17 +354,30 @@ bool path_accept(const struct path_context *c, spectrum l)
 	return !zero;
 }
 
-void path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l)
+static void to_film(const struct path_context *c, spectrum l, double xyz[3])
+{
+	if (c->wl.grey)
+		for (int i = 0; i < 3; i++)
+			xyz[i] = l.v[0] * c->w->grey_xyz[i];
+	else
+		spectrum_to_xyz(l, &c->wl, xyz);
+}
+
+double path_intensity(const struct path_context *c, spectrum l)
+{
+	double xyz[3];
+	to_film(c, l, xyz);
+	return xyz[0] + xyz[1] + xyz[2];
+}
+
+bool path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l)
 {
 	if (!path_accept(c, l) || out->count == PATH_MAX_SPLATS)
-		return;
+		return false;
 	struct splat *s = &out->splats[out->count++];
 	s->x = x;
 	s->y = y;
-	if (c->wl.grey)
-		for (int i = 0; i < 3; i++)
-			s->xyz[i] = l.v[0] * c->w->grey_xyz[i];
-	else
-		spectrum_to_xyz(l, &c->wl, s->xyz);
+	to_film(c, l, s->xyz);
 	out->intensity += s->xyz[0] + s->xyz[1] + s->xyz[2];
+	return true;
 }

@@ -66,6 +66,8 @@ struct splat {
 struct path_sample {
 	uint32_t count;
 	double intensity; /* I: sum of X + Y + Z */
+	uint32_t classes; /* bit a path class: it carries light, of_class is set */
+	double of_class[PATH_CLASSES]; /* its part of the intensity */
 	struct splat splats[PATH_MAX_SPLATS];
 };
 
@@ -117,8 +119,10 @@ bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d,
 /* Unit direction and squared distance from a to b; b may lie at infinity (distance 1). */
 vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2);
 
-/* Adds L (f / p) at a film point; NaN, infinite and negative ones are counted and left out. */
-void path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l);
+/* Adds L (f / p) at a film point; NaN, infinite and negative ones are counted and left out, as black ones are: false. */
+bool path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l);
+/* X + Y + Z of what the film gets of L. */
+double path_intensity(const struct path_context *c, spectrum l);
 /* false: L is zero, or was counted as invalid. */
 bool path_accept(const struct path_context *c, spectrum l);
 

@@ -136,7 +136,11 @@ static enum lease_end run_bootstrap(struct job *j)
 		if (intensity > (double)FLT_MAX) {
 			out->counters[COUNT_INFINITE]++;
 			intensity = 0;
+			j->sample.classes = 0;
 		}
+		for (unsigned k = 0; j->sample.classes >> k; k++)
+			if (j->sample.classes >> k & 1)
+				out->classes[k] += j->sample.of_class[k];
 		out->weights[i - r.begin] = (float)intensity;
 		out->independent_sum += intensity;
 		out->independent_square += intensity * intensity;
@@ -168,6 +172,8 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 		ops->step(c, &sums);
 	}
 	ops->flush(c);
+	if (batch_sequences(j->plan) > 1)
+		chain_moments_end_sequence(&j->film.moments, j->out->moments + (size_t)k * batch_film_tiles(j->plan));
 	j->out->counters[COUNT_STUCK] += j->out->counters[COUNT_ACCEPTED] == accepted;
 	j->out->independent_sum += sums.sum;
 	j->out->independent_square += sums.square;
@@ -186,6 +192,10 @@ static int run_chains(struct job *j, const struct lease_input *in, enum lease_en
 		if (rc)
 			return rc == -ENOMEM ? error_set(j->e, ENOMEM, "out of memory for chain states") : rc;
 	}
+	if (batch_sequences(j->plan) == 1)
+		chain_moments_end_sequence(&j->film.moments, j->out->moments);
+	size_t second = (size_t)batch_sequences(j->plan) * batch_film_tiles(j->plan);
+	chain_moments_end(&j->film.moments, j->out->moments + second, j->out->classes);
 	return 0;
 }
 
@@ -232,7 +242,9 @@ static int prepare(struct job *j, const struct world *w, struct error *e)
 		j->out->state_count = (uint32_t)(r.end - r.begin);
 		j->out->states = mem_alloc(j->out->state_count, sizeof *j->out->states);
 		j->chain = mem_alloc(1, j->integrator->chain->size);
-		if (!j->out->states || !j->chain)
+		j->out->moment_count = batch_moment_count(p, LEASE_RENDER);
+		j->out->moments = mem_alloc(j->out->moment_count, sizeof *j->out->moments);
+		if (!j->out->states || !j->chain || !j->out->moments)
 			return error_set(e, ENOMEM, "out of memory for chain states");
 	}
 	return film_sums_init(&j->film, p, &w->settings, e);

@@ -23,13 +23,17 @@ int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene
 		film_sums_fini(f);
 		return error_set(e, ENOMEM, "out of memory for a film of %u x %u pixels", f->width, f->height);
 	}
-	return 0;
+	int rc = chain_moments_init(&f->moments, p, e);
+	if (rc)
+		film_sums_fini(f);
+	return rc;
 }
 
 void film_sums_fini(struct film_sums *f)
 {
 	mem_free(f->xyz);
 	mem_free(f->touched);
+	chain_moments_fini(&f->moments);
 	f->xyz = NULL;
 	f->touched = NULL;
 }

@@ -8,6 +8,7 @@
 
 #include "common/film/batch.h"
 #include "worker/path/path.h"
+#include "worker/render/moments.h"
 
 struct film_sums {
 	uint32_t x, y, width, height; /* the crop */
@@ -17,6 +18,7 @@ struct film_sums {
 	double inverse, floor, scale; /* gaussian: scale (exp(-inverse d^2) - floor) */
 	double *xyz;
 	uint8_t *touched; /* one a tile */
+	struct chain_moments moments;
 };
 
 int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene_settings *s, struct error *e);

@@ -25,12 +25,15 @@ static struct plan make_plan(void)
 	return p;
 }
 
-/* A lease of one chain without tiles. */
+/* A lease of one chain without tiles; nothing of it lands in the crop. */
 static struct batch make_batch(uint64_t epoch, uint32_t group, uint32_t part)
 {
+	const struct plan p = make_plan();
 	struct batch b = {.key = {1, LEASE_RENDER, group, part, epoch}, .strategy_count = 2, .state_count = 1};
 	b.states = mem_alloc(1, sizeof *b.states);
 	b.states[0] = (struct chain_state){mem_alloc(4, 1), 4};
+	b.moment_count = batch_moment_count(&p, LEASE_RENDER);
+	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
 	b.counters[COUNT_SAMPLES] = 1000;
 	b.counters[COUNT_STUCK] = group == 1;
 	b.counters[COUNT_LONGEST_STUCK] = 5210 + group;

@@ -9,6 +9,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
+#include <math.h>
 #include <string.h>
 
 static struct plan chain_plan(void)
@@ -66,6 +67,12 @@ static struct batch chain_batch(const struct plan *p)
 		b.states[i].bytes = mem_alloc(10 + i, 1);
 		memset(b.states[i].bytes, (int)i + 1, 10 + i);
 	}
+	b.moment_count = batch_moment_count(p, LEASE_RENDER);
+	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
+	for (uint64_t i = 0; i < b.moment_count; i++)
+		b.moments[i] = 2 - (float)i / (float)b.moment_count;
+	for (int i = 0; i < PATH_CLASSES; i++)
+		b.classes[i] = i / 3.0;
 	return b;
 }
 
@@ -114,6 +121,9 @@ static void a_batch_travels(void **state)
 		assert_int_equal(back.states[i].size, b.states[i].size);
 		assert_memory_equal(back.states[i].bytes, b.states[i].bytes, b.states[i].size);
 	}
+	assert_memory_equal(back.classes, b.classes, sizeof b.classes);
+	assert_int_equal(back.moment_count, b.moment_count);
+	assert_memory_equal(back.moments, b.moments, b.moment_count * sizeof *b.moments);
 	batch_fini(&back);
 	/* Every cut of the payload is noticed, and nothing leaks (seen by the sanitizer). */
 	for (size_t n = 0; n < r.payload.size; n += 97)
@@ -182,12 +192,76 @@ static void memory_may_end_anywhere(void **state)
 	batch_fini(&b);
 }
 
+/* As many classes and moments as the plan has, and none that cannot be. */
+static void moments_are_the_plans(void **state)
+{
+	(void)state;
+	struct plan p = chain_plan();
+	struct batch b = chain_batch(&p), back;
+	struct envelope env;
+	struct frame_reader r;
+	struct error e;
+	uint64_t tiles = batch_film_tiles(&p), sequences = batch_sequences(&p), count = b.moment_count;
+	assert_int_equal(sequences, b.state_count);
+	assert_int_equal(count, (sequences + 1) * tiles);
+	travel(&b, &p, &env, &r);
+	Farm__LeaseResult *m = env.message->lease_result;
+	const uint64_t counts[] = {0, count - 1, count + 1, UINT64_MAX / 4 + 2};
+	for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+		m->moment_count = counts[i];
+		assert_int_equal(batch_unpack(&back, &p, m, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	}
+	m->moment_count = count;
+	const size_t classes[] = {0, PATH_CLASSES - 1};
+	for (size_t i = 0; i < 2; i++) {
+		m->n_classes = classes[i];
+		assert_int_equal(batch_unpack(&back, &p, m, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	}
+	m->n_classes = PATH_CLASSES;
+	assert_int_equal(batch_unpack(&back, &p, m, r.payload.bytes, r.payload.size, &e), 0);
+	batch_fini(&back);
+	envelope_fini(&env);
+	frame_reader_fini(&r);
+	const float epoch = (float)p.epoch, bad[] = {-1e-30f, NAN, INFINITY, epoch * 1.001f};
+	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+		for (uint64_t at = 0; at < count; at += count - 1) { /* a first moment, a second one */
+			float kept = b.moments[at];
+			b.moments[at] = bad[i];
+			assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
+			b.moments[at] = kept;
+		}
+	for (uint64_t t = 0; t < tiles; t++) /* a chain's whole time, and not more */
+		b.moments[t] = epoch / (float)tiles;
+	assert_int_equal(batch_check(&b, &p, &e), 0);
+	b.moments[0] *= 1.01f;
+	assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
+	b.moments[0] = 0;
+	const double time = (double)b.counters[COUNT_SAMPLES], classes_bad[] = {-1e-300, NAN, INFINITY, time};
+	for (size_t i = 0; i < sizeof classes_bad / sizeof *classes_bad; i++) {
+		b.classes[3] = classes_bad[i];
+		assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
+	}
+	memset(b.classes, 0, sizeof b.classes);
+	b.classes[PATH_CLASSES - 1] = time;
+	assert_int_equal(batch_check(&b, &p, &e), 0);
+	mem_free(b.moments);
+	b.moments = NULL;
+	b.moment_count = 0;
+	assert_int_equal(batch_check(&b, &p, &e), -EBADMSG);
+	batch_fini(&b);
+	p.chains = 8 * (SEQUENCES_MAX / 8 + 1);
+	assert_int_equal(batch_sequences(&p), 1);
+	p.kind = PLAN_SAMPLES;
+	assert_int_equal(batch_sequences(&p), 0);
+	assert_int_equal(batch_moment_count(&p, LEASE_RENDER), 0);
+}
+
 static void weights_travel(void **state)
 {
 	(void)state;
 	struct plan p = chain_plan();
 	struct plan_range range = plan_bootstrap_range(&p, 1, 0);
-	struct batch b = {.key = {7, LEASE_BOOTSTRAP, 1, 0, 0}, .independent_sum = 3}, back;
+	struct batch b = {.key = {7, LEASE_BOOTSTRAP, 1, 0, 0}, .independent_sum = 3, .classes = {1, 0, 2}}, back;
 	struct envelope env;
 	struct frame_reader r;
 	struct error e;
@@ -203,6 +277,7 @@ static void weights_travel(void **state)
 	assert_int_equal(rc, 0);
 	assert_int_equal(back.weight_count, b.weight_count);
 	assert_memory_equal(back.weights, b.weights, b.weight_count * sizeof *b.weights);
+	assert_memory_equal(back.classes, b.classes, sizeof b.classes);
 	batch_fini(&back);
 	env.message->lease_result->weight_count = UINT64_MAX / 4 + 2; /* times 4 it is small again */
 	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e), -EBADMSG);
@@ -303,7 +378,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_batch_travels), cmocka_unit_test(memory_may_end_anywhere),
-		cmocka_unit_test(weights_travel),  cmocka_unit_test(grants_travel),
+		cmocka_unit_test(moments_are_the_plans), cmocka_unit_test(weights_travel),  cmocka_unit_test(grants_travel),
 		cmocka_unit_test(plans_travel),    cmocka_unit_test(strategies_are_the_plans),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

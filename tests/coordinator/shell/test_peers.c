@@ -485,6 +485,8 @@ static struct batch counting_batch(const struct lease_key *k, const struct plan 
 	b.states = mem_alloc(b.state_count, sizeof *b.states);
 	for (uint32_t i = 0; i < b.state_count; i++)
 		b.states[i] = (struct chain_state){mem_alloc(4, 1), 4};
+	b.moment_count = batch_moment_count(plan, LEASE_RENDER);
+	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
 	b.counters[COUNT_SAMPLES] = b.state_count * plan->epoch;
 	b.counters[COUNT_STUCK] = b.state_count;
 	b.counters[COUNT_LONGEST_STUCK] = 100 + k->group;

@@ -161,6 +161,7 @@ static void evaluate_plain(struct path_context *c, struct sampler *s, struct pat
 	(void)c;
 	out->count = 0;
 	out->intensity = 0;
+	out->classes = 0;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
 	put(out, u[0], u[1], profile(u[0], u[1]));
 }
@@ -170,6 +171,7 @@ static void evaluate_lengths(struct path_context *c, struct sampler *s, struct p
 	(void)c;
 	out->count = 0;
 	out->intensity = 0;
+	out->classes = 0;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
 	double x = u[0], y = u[1], value = profile(x, y);
 	for (unsigned v = 1; v < 12; v++) {
@@ -187,6 +189,7 @@ static void evaluate_holes(struct path_context *c, struct sampler *s, struct pat
 	(void)c;
 	out->count = 0;
 	out->intensity = 0;
+	out->classes = 0;
 	const double *u = s->block(s, SIDE_CAMERA, 0);
 	double x = u[0], y = u[1], w = u[5];
 	if (w < 0.4)

@@ -1,0 +1,31 @@
+/*
+ * What a canvas keeps besides pixels to say whether chains agree: by sequence and tile the cumulated first moments, by lease
+ * and tile the second ones, by group and path class the chains' time and the bootstrap's energy (struct batch). As films are:
+ * integers on a grid or exact sums, open rounds apart from the prefix, so that the order of batches does not matter.
+ * Memory: 24 bytes a sequence and tile, 24 a lease and tile; pages that no batch touched cost nothing. One thread at a time.
+ */
+#ifndef COMMON_FILM_CANVAS_MOMENTS_H
+#define COMMON_FILM_CANVAS_MOMENTS_H
+
+#include "common/film/canvas.h"
+
+struct moments;
+
+int moments_new(struct moments **m, const struct plan *p, struct error *e);
+void moments_free(struct moments *m);
+
+/* -ERANGE: after so many rounds a sum could leave the grid. To be asked before moments_add, which cannot fail. */
+int moments_fit(const struct moments *m, const struct lease_key *k, struct error *e);
+void moments_add(struct moments *m, const struct batch *b);
+void moments_close_round(struct moments *m, uint64_t round);
+
+/* What moments_image needs of a group: independent samples of its bootstrap, mutations that are merged, b. */
+struct moments_group {
+	uint64_t bootstrap, mutations;
+	double b;
+};
+/* Fills img->classes and, where there are complete rounds of chains and this is no preview, the arrays by tile. */
+int moments_image(const struct moments *m, const struct moments_group *groups, uint64_t rounds, bool open_rounds,
+		  struct canvas_image *img, struct error *e);
+
+#endif
