@@ -1,7 +1,9 @@
 /*
  * Whether the chains of an image agree, from what its batches say besides pixels (contract sections 1 and 2): tiles whose
- * potential scale reduction says that chains have not mixed, classes of paths whose energy in the chains differs from the
- * bootstrap's, chains that stand still. Pure; any thread; allocates nothing. Samples (path, bdpt) always agree.
+ * potential scale reduction (Gelman and Rubin 1992) says that chains have not mixed, classes of paths whose energy in the
+ * chains differs from the bootstrap's, chains that stand still. Pure; any thread; allocates nothing. Samples (path, bdpt)
+ * always agree. Energies are in units of b. How often each criterion fires on scenes that are fine, and on one that is not:
+ * see tests/e2e/disagree.sh.
  */
 #ifndef COMMON_FILM_AGREEMENT_H
 #define COMMON_FILM_AGREEMENT_H
@@ -10,10 +12,14 @@
 
 enum agreement_verdict {
 	CHAINS_AGREE,
-	CHAINS_TOO_SHORT, /* too few mutations a chain to say */
+	CHAINS_TOO_SHORT, /* something is flagged, but chains made too few mutations to blame them for it */
 	CHAINS_DISAGREE,  /* exit code 5 */
 };
 
+/* Below so many mutations each, chains are not said to disagree: their beginnings weigh too much. */
+enum { AGREEMENT_MUTATIONS = 10000 };
+
+enum { AGREEMENT_TEXT = 512 };
 struct agreement {
 	enum agreement_verdict verdict;
 	uint32_t tiles, tiles_flagged; /* flagged: chains have not mixed there, and the tile's mean is uncertain by that */
@@ -22,10 +28,21 @@ struct agreement {
 	uint32_t worst_x, worst_y;     /* the tile of r_hat_worst, in pixels of the full film */
 	uint32_t classes_flagged;      /* bit a path class */
 	double stuck_share;            /* of chain epochs without an accepted mutation */
-	char text[512];                /* in words, one line: what disagrees, where, by how much. Empty: CHAINS_AGREE */
+	char text[AGREEMENT_TEXT];     /* in words, one line: what disagrees, where, by how much. Empty: CHAINS_AGREE */
 };
 
 void agreement_judge(const struct plan *p, const struct canvas_image *img, struct agreement *out);
 const char *agreement_name(enum agreement_verdict v); /* "agree", "too short", "disagree" */
+
+/* Appends its text to the note on the image (strategy_note). */
+void agreement_add_note(const struct agreement *a, char *note, size_t size);
+
+/* One row a class that has energy: bootstrap's and chains' share of b in %, the standard errors, t, and whether it is
+ * flagged. Lines end with '\n'; empty where no class has any. AGREEMENT_TABLE bytes are enough. */
+enum { AGREEMENT_TABLE = 4096 };
+void agreement_table(const struct path_class_energy classes[PATH_CLASSES], double b, uint32_t flagged, char *text, size_t size);
+
+/* P(|T| > |t|) of Student's t with so many degrees of freedom (at least 1). */
+double agreement_student_tail(double t, uint32_t degrees);
 
 #endif

@@ -1,10 +1,12 @@
 #include "common/film/header.h"
 
 #include "common/base/version.h"
+#include "common/film/agreement.h"
 #include "common/film/strategy.h"
 
 #include <assert.h>
 #include <inttypes.h>
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -13,7 +15,8 @@
 enum header_name {
 	H_VERSION, H_SCENE, H_INTEGRATOR, H_MIXTURE, H_OPTIONS, H_SEED, H_MIN_DEPTH, H_MAX_DEPTH, H_GROUPS, H_CHAINS, H_BOOTSTRAP, H_EPOCH,
 	H_ROUNDS, H_MUTATIONS, H_SAMPLES, H_B, H_B_ERROR, H_BEYOND, H_REL_MSE, H_REL_MSE_UPPER, H_ACCEPTED, H_INDEPENDENT,
-	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_STRATEGIES, H_NOTE, H_EFFECTS, H_MIXED, H_WALL,
+	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_STRATEGIES, H_NOTE, H_AGREEMENT, H_DISAGREEMENT,
+	H_R_HAT_MEDIAN, H_R_HAT_WORST, H_CLASSES, H_EFFECTS, H_MIXED, H_WALL,
 	H_CPU, H_WORKERS, H_DATE,
 };
 
@@ -55,6 +58,11 @@ const struct header_row header_rows[] = {
 	[H_LONGEST_STUCK] = {"hslt:longestStuck", STRING, false, "most rejections in a row"},
 	[H_STRATEGIES] = {"hslt:strategies", STRING, false, "what each strategy of the mixture did; one a line"},
 	[H_NOTE] = {"hslt:note", STRING, false, "what whoever looks at the image should know"},
+	[H_AGREEMENT] = {"hslt:agreement", STRING, false, "whether the chains agree: agree, too short, disagree (Metropolis only)"},
+	[H_DISAGREEMENT] = {"hslt:disagreement", STRING, false, "what disagrees, where, by how much"},
+	[H_R_HAT_MEDIAN] = {"hslt:rHatMedian", DOUBLE, false, "potential scale reduction of chains, median over tiles with light; the layer rhat has it by tile"},
+	[H_R_HAT_WORST] = {"hslt:rHatWorst", DOUBLE, false, "its largest"},
+	[H_CLASSES] = {"hslt:classes", STRING, false, "energy of each class of paths in % of b, in the bootstrap and in the chains"},
 	[H_EFFECTS] = {"hslt:effects", STRING, false, "each effect, on or off, and why; one a line"},
 	[H_MIXED] = {"hslt:mixed", INT, false, "1: workers with different arithmetic took part, the bits cannot be made again"},
 	[H_WALL] = {"hslt:wallSeconds", DOUBLE, true, "from the first bootstrap sample to the last merge"},
@@ -152,6 +160,23 @@ static void add_plan(struct header *h, const struct plan *p, uint64_t rounds)
 	add_count(h, H_ROUNDS, rounds);
 }
 
+static void add_agreement(struct header *h, const struct canvas_image *img, const struct plan *p, const struct agreement *a)
+{
+	if (p->kind != PLAN_CHAINS)
+		return;
+	char table[AGREEMENT_TABLE];
+	add_string(h, H_AGREEMENT, agreement_name(a->verdict));
+	if (*a->text)
+		add_string(h, H_DISAGREEMENT, a->text);
+	if (!isnan(a->r_hat_worst)) {
+		add_double(h, H_R_HAT_MEDIAN, a->r_hat_median);
+		add_double(h, H_R_HAT_WORST, a->r_hat_worst);
+	}
+	agreement_table(img->classes, img->b, a->classes_flagged, table, sizeof table);
+	if (*table)
+		add_string(h, H_CLASSES, table);
+}
+
 static void add_result(struct header *h, const struct canvas_image *img, const struct plan *p)
 {
 	if (p->kind == PLAN_CHAINS) {
@@ -178,9 +203,13 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 	strategy_lines(p->mutations, &img->counts, text, sizeof text);
 	if (*text)
 		add_string(h, H_STRATEGIES, text);
+	struct agreement a;
+	agreement_judge(p, img, &a);
 	strategy_note(p, &img->counts, img->black, text, sizeof text);
+	agreement_add_note(&a, text, sizeof text);
 	if (*text)
 		add_string(h, H_NOTE, text);
+	add_agreement(h, img, p, &a);
 }
 
 static void add_extra(struct header *h, const struct header_extra *x)

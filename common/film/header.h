@@ -35,7 +35,7 @@ struct header_extra {
 	const char *date;    /* NULL: now, UTC */
 };
 
-enum { HEADER_ATTRIBUTES = 48, HEADER_TEXT = 24576 };
+enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 32768 };
 struct header {
 	size_t count;
 	struct exr_attribute attributes[HEADER_ATTRIBUTES]; /* strings in `text` */

@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 
 #include <fcntl.h>
+#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -27,6 +28,21 @@ static int add_planes(struct exr_image *out, const float *rgb, const char *prefi
 	return 0;
 }
 
+static int add_r_hat(struct exr_image *out, const struct canvas_image *img)
+{
+	float *plane = mem_alloc((size_t)out->width * out->height, sizeof *plane);
+	if (!plane)
+		return -ENOMEM;
+	for (size_t y = 0; y < out->height; y++)
+		for (size_t x = 0; x < out->width; x++) {
+			float r_hat = img->r_hat[y / TILE_SIZE * img->tiles_across + x / TILE_SIZE];
+			plane[y * out->width + x] = isnan(r_hat) ? 0 : r_hat;
+		}
+	snprintf(out->names[out->channel_count], sizeof out->names[0], "rhat.Y");
+	out->planes[out->channel_count++] = plane;
+	return 0;
+}
+
 int image_file_encode(const struct canvas_image *img, const struct plan *p, const struct header_extra *x,
 		      unsigned char **bytes, size_t *size, struct error *e)
 {
@@ -36,6 +52,8 @@ int image_file_encode(const struct canvas_image *img, const struct plan *p, cons
 	int rc = h ? add_planes(&out, img->rgb, "") : -ENOMEM;
 	if (rc == 0 && img->error)
 		rc = add_planes(&out, img->error, "error.");
+	if (rc == 0 && img->r_hat)
+		rc = add_r_hat(&out, img);
 	if (rc) {
 		error_set(e, ENOMEM, "no memory for the image's file");
 	} else {

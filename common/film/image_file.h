@@ -4,7 +4,8 @@
 
 #include "common/film/header.h"
 
-/* R G B and, with more than one group, error.R error.G error.B; bytes are mem_alloc'd. */
+/* R G B; with more than one group error.R error.G error.B; with several chains rhat.Y, the potential scale reduction of the
+ * tile that the pixel lies in, 0 where no chain came. Bytes are mem_alloc'd. */
 int image_file_encode(const struct canvas_image *img, const struct plan *p, const struct header_extra *x,
 		      unsigned char **bytes, size_t *size, struct error *e);
 

@@ -21,7 +21,7 @@ void strategy_lines(const char *mixture, const struct canvas_counts *n, char *te
 
 /* What whoever looks at the image should know, in one line: that it is black, that contributions were left out, that "3 of
  * 8,192 times a chain accepted nothing during a whole epoch (1,024 chains); longest run: 5,210 rejections". Empty: nothing. */
-enum { STRATEGY_NOTE = 512 };
+enum { STRATEGY_NOTE = 1024 };
 void strategy_note(const struct plan *p, const struct canvas_counts *n, bool black, char *text, size_t size);
 
 #endif

@@ -21,6 +21,7 @@ enum event_kind {
 	EVENT_CANCEL,         /* tag, job */
 	EVENT_PREPARED,       /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
 	EVENT_ERROR_KNOWN,    /* error_known: the answer to ACTION_EVALUATE_ERROR */
+	EVENT_IMAGE_KNOWN,    /* image_known: what the final image of ACTION_PUBLISH says; the job has ended */
 	EVENT_JOB_BROKEN,     /* job, text: the shell cannot go on with it (a sum left the grid, the disk is full) */
 };
 
@@ -66,6 +67,10 @@ struct event {
 			uint64_t job, rounds;
 			double rel_error; /* sqrt of the upper end of the estimated relMSE; NAN: cannot be known */
 		} error_known;
+		struct {
+			uint64_t job;
+			bool disagrees; /* its chains do: common/film/agreement.h */
+		} image_known;
 	};
 };
 

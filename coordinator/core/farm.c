@@ -181,6 +181,7 @@ static void (*const on_event[])(struct farm *, const struct event *) = {
 	[EVENT_CANCEL] = rounds_cancel,
 	[EVENT_PREPARED] = rounds_prepared,
 	[EVENT_ERROR_KNOWN] = rounds_error_known,
+	[EVENT_IMAGE_KNOWN] = rounds_image_known,
 	[EVENT_JOB_BROKEN] = broken,
 };
 

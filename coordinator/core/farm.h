@@ -62,6 +62,7 @@ struct job_status {
 	double progress;                  /* [0,1], never falls */
 	double rate;                      /* merged mutations (bootstrap: samples) a second, over the last half minute */
 	double eta;                       /* s; NAN: unknown */
+	bool disagrees;                   /* the chains of its final image do */
 	double rel_error;                 /* last evaluated; NAN: none */
 	uint64_t rel_error_rounds;
 	uint64_t rounds;                  /* complete */
@@ -100,7 +101,8 @@ bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_st
 bool job_state_is_end(enum job_state s);
 const char *job_state_name(enum job_state s); /* as in the status: "queued" ... */
 const char *job_end_name(enum job_end e);     /* "mutations" ... */
-/* Of a program that waited for the job: 0 done, 3 failed or cancelled, 4 a bound came before the target error. */
+/* Of a program that waited for the job: 0 done, 3 failed or cancelled, 5 its chains disagree, 4 a bound came before the
+ * target error: the first of them that holds. */
 int job_exit_code(const struct job_status *s);
 
 #endif

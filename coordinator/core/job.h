@@ -42,6 +42,7 @@ struct job {
 	uint32_t leases_out;
 
 	bool preparing, evaluating;
+	bool disagrees; /* see EVENT_IMAGE_KNOWN */
 	enum job_end ending; /* the bound that is met, while the error is evaluated once more */
 	double published;
 

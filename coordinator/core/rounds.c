@@ -205,6 +205,13 @@ void rounds_prepared(struct farm *f, const struct event *ev)
 	job_changed(f, j);
 }
 
+void rounds_image_known(struct farm *f, const struct event *ev)
+{
+	struct job *j = farm_find_job(f, ev->image_known.job);
+	if (j && j->state == JOB_DONE)
+		j->disagrees = ev->image_known.disagrees;
+}
+
 void rounds_error_known(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->error_known.job);

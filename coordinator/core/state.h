@@ -43,6 +43,7 @@ void rounds_started(struct farm *f, struct job *j); /* a lease of it is about to
 void rounds_complete(struct farm *f, struct job *j);
 void rounds_prepared(struct farm *f, const struct event *ev);
 void rounds_error_known(struct farm *f, const struct event *ev);
+void rounds_image_known(struct farm *f, const struct event *ev);
 void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *text);
 
 /* answer.c: what workers send back. */

@@ -27,6 +27,8 @@ int job_exit_code(const struct job_status *s)
 {
 	if (s->state != JOB_DONE)
 		return 3;
+	if (s->disagrees)
+		return 5;
 	bool missed = s->plan->target_error > 0 && s->end != END_ERROR && s->end != END_BLACK;
 	return missed ? 4 : 0;
 }
@@ -123,6 +125,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		.progress = job_progress(j, now),
 		.rate = job_is_live(j) ? rate_value(&j->rate, now) : 0,
 		.eta = job_eta(j, now),
+		.disagrees = j->disagrees,
 		.rel_error = j->rel_error,
 		.rel_error_rounds = j->rel_error_rounds,
 	};

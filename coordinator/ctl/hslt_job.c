@@ -24,7 +24,7 @@ static const char doc[] =
 	"HSLT_COORDINATOR stands in for --coordinator. Exit codes: 0 done, 1 failed, 2 usage, 6 refused, 75 coordinator not "
 	"reachable.";
 
-enum { OPTION_INSECURE = 256, OPTION_JSON, OPTION_PREVIEW };
+enum { EXIT_DISAGREE = 5, OPTION_INSECURE = 256, OPTION_JSON, OPTION_PREVIEW };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
@@ -112,8 +112,9 @@ static void print_table(const Farm__JobListAnswer *a)
 		if (!s->ended && s->eta >= 0)
 			progress_time(s->eta, eta, sizeof eta);
 		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
+		const char *why = *s->why ? s->why : s->ended && s->exit_code == EXIT_DISAGREE ? "its chains disagree" : "";
 		printf("%-6s %-10s %4d %5.1f %% %-9s %s%s%s\n", id, s->state, s->priority, 100 * s->progress, eta, s->name,
-		       *s->why ? "  # " : "", s->why);
+		       *why ? "  # " : "", why);
 	}
 }
 
@@ -124,10 +125,11 @@ static void print_json(const Farm__JobListAnswer *a)
 		const Farm__JobStatus *s = a->jobs[i];
 		char id[32];
 		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
-		json_array_append_new(list, json_pack("{s:i s:s s:s s:s s:f s:i s:s s:s s:s s:b}", "schema", 1, "id", id,
+		json_array_append_new(list, json_pack("{s:i s:s s:s s:s s:f s:i s:s s:s s:s s:b s:i s:s}", "schema", 1, "id", id,
 						      "name", s->name, "state", s->state, "progress", s->progress, "priority",
 						      (int)s->priority, "why", s->why, "reason", s->reason, "output",
-						      s->output, "result", (int)s->fetchable));
+						      s->output, "result", (int)s->fetchable, "exitCode",
+						      (int)s->exit_code, "note", s->note));
 	}
 	json_dumpf(list, stdout, JSON_INDENT(2));
 	putchar('\n');

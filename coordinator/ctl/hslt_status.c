@@ -1,6 +1,7 @@
 #include "common/base/progress.h"
 #include "common/base/version.h"
 #include "common/base/error.h"
+#include "common/film/agreement_json.h"
 #include "common/film/strategy.h"
 #include "common/film/strategy_json.h"
 
@@ -158,6 +159,23 @@ static void print_strategies(const json_t *job)
 	fputs(text, stdout);
 }
 
+static void print_agreement(const json_t *job)
+{
+	struct agreement a;
+	struct path_class_energy classes[PATH_CLASSES];
+	char text[AGREEMENT_TABLE];
+	const json_t *o = json_object_get(job, "agreement");
+	if (!json_is_number(json_object_get(job, "b")))
+		return;
+	agreement_from_json(o, &a);
+	classes_from_json(json_object_get(job, "classes"), classes);
+	if (json_is_number(json_object_get(o, "rHatWorst")))
+		printf("       chains: %s; R-hat %.3g in the middle, %.3g in the worst of %u tiles\n", text_of(o, "verdict"), a.r_hat_median,
+		       a.r_hat_worst, a.tiles);
+	agreement_table(classes, number_of(job, "b"), a.classes_flagged, text, sizeof text);
+	fputs(text, stdout);
+}
+
 static void print_workers(const json_t *snapshot)
 {
 	size_t i;
@@ -201,6 +219,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 				printf("       note: %s\n", text_of(job, "note"));
 			print_effects(job);
 			print_strategies(job);
+			print_agreement(job);
 			print_leases(snapshot, only);
 		}
 	}

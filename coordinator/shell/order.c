@@ -27,6 +27,7 @@ static void begin_record(struct order *o)
 	text_copy(r->output, sizeof r->output, m->output);
 	r->priority = m->priority;
 	r->rel_error = -1;
+	record_begin_agreement(r);
 	r->submitted = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 

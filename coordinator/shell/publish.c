@@ -19,6 +19,7 @@ struct publishing {
 	uint64_t rounds;
 	double wall_seconds;
 	struct canvas_image image;
+	struct agreement agreement;
 	int rc;
 	struct error error;
 };
@@ -54,6 +55,8 @@ static void run(uv_work_t *work)
 {
 	struct publishing *w = work->data;
 	w->rc = canvas_image(w->order->canvas, w->what == PUBLISH_PREVIEW, &w->image, &w->error);
+	if (!w->rc)
+		agreement_judge(&w->order->plan, &w->image, &w->agreement);
 	if (!w->rc && w->what != PUBLISH_ERROR_ONLY)
 		w->rc = write_image(w);
 }
@@ -65,6 +68,15 @@ static void tell_error(const struct publishing *w)
 			   .error_known = {.job = w->order->id,
 					   .rounds = w->rounds,
 					   .rel_error = w->rc ? NAN : sqrt(w->image.rel_mse_upper)}};
+	server_step(w->server, &ev);
+}
+
+static void tell_image(const struct publishing *w)
+{
+	uint64_t job = w->order->id;
+	struct event ev = {.kind = EVENT_IMAGE_KNOWN,
+			   .job = job,
+			   .image_known = {.job = job, .disagrees = w->agreement.verdict == CHAINS_DISAGREE}};
 	server_step(w->server, &ev);
 }
 
@@ -87,6 +99,8 @@ static void done(uv_work_t *work, int status)
 	/* Every image says how good it is, asked for or not. */
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
 		o->record.rel_error = sqrt(w->image.rel_mse_upper);
+	if (!w->rc)
+		record_take_agreement(&o->record, &w->image, &w->agreement);
 	if (w->what == PUBLISH_RESULT && !w->rc)
 		o->black = w->image.black;
 	if (w->what == PUBLISH_RESULT && w->rc)
@@ -102,6 +116,8 @@ static void done(uv_work_t *work, int status)
 		o->busy = false; /* the core may want the final image at once */
 		if (w->what == PUBLISH_ERROR_ONLY)
 			tell_error(w);
+		else if (w->what == PUBLISH_RESULT && !w->rc)
+			tell_image(w);
 		o = server_order(s, id);
 		if (o && !o->busy)
 			server_order_free_again(s, o);

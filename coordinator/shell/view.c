@@ -1,6 +1,7 @@
 #include "coordinator/shell/view.h"
 
 #include "common/base/text.h"
+#include "common/film/agreement_json.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -120,6 +121,9 @@ json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit)
 	json_object_set_new(o, "mixture", json_string(r->mixture));
 	json_object_set_new(o, "strategies", record_strategies(r));
 	json_object_set_new(o, "note", json_string(r->note));
+	json_object_set_new(o, "agreement", agreement_to_json(&r->agreement));
+	json_object_set_new(o, "b", number_or_null(r->b, r->b > 0));
+	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	if (submit)
 		json_object_set_new(o, "effects", effects_to_json(submit));
 	return o;

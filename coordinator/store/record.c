@@ -2,6 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/film/agreement_json.h"
 #include "common/film/strategy_json.h"
 
 #include <stdlib.h>
@@ -24,6 +25,21 @@ void record_take_counted(struct job_record *r, const struct plan *p, const struc
 	r->longest_stuck = n->counters[COUNT_LONGEST_STUCK];
 	memcpy(r->strategy, n->strategy, sizeof r->strategy);
 	strategy_note(p, n, black, r->note, sizeof r->note);
+	agreement_add_note(&r->agreement, r->note, sizeof r->note);
+}
+
+void record_begin_agreement(struct job_record *r)
+{
+	agreement_from_json(NULL, &r->agreement);
+	classes_from_json(NULL, r->classes);
+	r->b = 0;
+}
+
+void record_take_agreement(struct job_record *r, const struct canvas_image *img, const struct agreement *a)
+{
+	r->agreement = *a;
+	r->b = img->b;
+	memcpy(r->classes, img->classes, sizeof r->classes);
 }
 
 json_t *record_strategies(const struct job_record *r)
@@ -71,6 +87,9 @@ char *record_to_json(const struct job_record *r)
 			      "submitted", r->submitted, "ended", r->ended, "progress", r->progress, /* */
 			      "relError", r->rel_error, "counts", record_counts(r), /* */
 			      "mixture", r->mixture, "note", r->note, "strategies", record_strategies(r));
+	json_object_set_new(o, "agreement", agreement_to_json(&r->agreement));
+	json_object_set_new(o, "b", json_real(r->b));
+	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	char *text = o ? json_dumps(o, JSON_INDENT(2)) : NULL;
 	json_decref(o);
 	char *copy = text ? mem_strdup(text) : NULL;
@@ -112,6 +131,9 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	take_text(o, "note", r->note, sizeof r->note);
 	take_counts(json_object_get(o, "counts"), r);
 	take_strategies(o, r);
+	agreement_from_json(json_object_get(o, "agreement"), &r->agreement);
+	r->b = json_number_value(json_object_get(o, "b"));
+	classes_from_json(json_object_get(o, "classes"), r->classes);
 	json_decref(o);
 	return 0;
 }

@@ -6,6 +6,7 @@
 #define COORDINATOR_STORE_RECORD_H
 
 #include "common/base/error.h"
+#include "common/film/agreement.h"
 #include "common/film/strategy.h"
 
 #include <jansson.h>
@@ -33,10 +34,15 @@ struct job_record {
 	char mixture[PLAN_MUTATIONS_MAX];
 	char note[STRATEGY_NOTE];
 	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* of the mixture */
+	struct agreement agreement; /* of the last image that was made */
+	double b;                   /* of it, as the classes; 0: none was made */
+	struct path_class_energy classes[PATH_CLASSES];
 };
 
 /* What the merged batches counted, and what is to be said about it. */
 void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black);
+void record_take_agreement(struct job_record *r, const struct canvas_image *img, const struct agreement *a);
+void record_begin_agreement(struct job_record *r); /* nothing is known */
 json_t *record_counts(const struct job_record *r);     /* an object of its counts */
 json_t *record_strategies(const struct job_record *r); /* an array: strategy_to_json */
 char *record_to_json(const struct job_record *r); /* mem_alloc'd; NULL when memory is out */

@@ -199,6 +199,10 @@ static void take_job(const char **at, struct event *ev)
 		ev->error_known.job = take_id(at, "j");
 		ev->error_known.rounds = take_count(at);
 		ev->error_known.rel_error = take_number(at);
+	} else if (take(at, "image")) {
+		ev->kind = EVENT_IMAGE_KNOWN;
+		ev->image_known.job = take_id(at, "j");
+		ev->image_known.disagrees = take(at, "disagrees");
 	} else if (take(at, "broken")) {
 		ev->kind = EVENT_JOB_BROKEN;
 		ev->job = take_id(at, "j");

@@ -29,15 +29,17 @@ static const char doc[] =
 	"  hslt-render room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --mutations 10000000\n"
 	"\n"
 	"--estimate makes no image: a pilot of a minute tells what errors of 10, 5, 2 and 1 % (and --target-error) will cost.\n"
-	"The image holds linear Rec. 709 (R G B) and one standard error of each (error.R error.G error.B).\n"
-	"Exit codes: 0 done, 1 failed, 2 usage, 4 a bound came before the target error.";
+	"The image holds linear Rec. 709 (R G B), one standard error of each (error.R error.G error.B), and for chains the potential "
+	"scale reduction of each pixel's tile (rhat.Y).\n"
+	"Exit codes: 0 done, 1 failed, 2 usage, 4 a bound came before the target error, 5 chains disagree (the image is there, and its "
+	"note says where).";
 
 enum { OPTION_THREADS = 256, OPTION_STATS, OPTION_QUIET, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_JSON };
 
 static const struct argp_option options[] = {
 	{"output", 'o', "FILE", 0, "The image (OpenEXR)", 0},
 	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors); does not change the bits", 0},
-	{"stats", OPTION_STATS, "FILE", 0, "Write plan, times, counters, strategies and effects as JSON, and show a table of the strategies", 0},
+	{"stats", OPTION_STATS, "FILE", 0, "Write plan, times, counters, strategies and effects as JSON, and show tables of the strategies and of the classes of paths", 0},
 	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
 	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
 	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
@@ -123,6 +125,7 @@ struct session {
 	struct local_run run;
 	struct canvas_image image;
 	struct forecast_history looks;
+	struct agreement agreement;
 	double build_seconds;
 	struct progress progress;
 	bool usage; /* what went wrong was asked for */
@@ -211,7 +214,10 @@ static int render(struct session *s, struct error *e)
 		return rc;
 	if (!s->run.canvas)
 		return error_set(e, EINTR, "interrupted before the first round was complete: nothing to write");
-	return canvas_image(s->run.canvas, false, &s->image, e);
+	rc = canvas_image(s->run.canvas, false, &s->image, e);
+	if (!rc)
+		agreement_judge(&s->plan, &s->image, &s->agreement);
+	return rc;
 }
 
 static int write_image(const struct session *s, struct error *e)
@@ -246,7 +252,11 @@ static void say(const struct session *s)
 	strategy_table(p->mutations, &i->counts, text, sizeof text);
 	if (s->a->stats)
 		fputs(text, stderr);
+	agreement_table(i->classes, i->b, s->agreement.classes_flagged, text, sizeof text);
+	if (s->a->stats)
+		fputs(text, stderr);
 	strategy_note(p, &i->counts, i->black, text, sizeof text);
+	agreement_add_note(&s->agreement, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 }
@@ -323,7 +333,7 @@ static int run(struct session *s, struct error *e)
 		rc = write_image(s, e);
 	if (!rc && s->a->stats)
 		rc = stats_write(s->a->stats,
-				 &(struct stats){s->name, &s->summary, &s->run, &s->image, s->build_seconds, &s->looks}, e);
+				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->agreement, s->build_seconds, &s->looks}, e);
 	if (!rc && !s->a->quiet)
 		say(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)
@@ -356,6 +366,8 @@ int main(int argc, char **argv)
 		fprintf(stderr, "hslt-render: %s\n", e.text);
 		return s.usage ? 2 : 1;
 	}
+	if (s.agreement.verdict == CHAINS_DISAGREE)
+		return 5;
 	bool missed = s.plan.target_error > 0 && s.run.end != MERGE_ERROR && !s.run.lit.black;
 	return missed ? 4 : 0;
 }

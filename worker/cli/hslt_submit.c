@@ -23,7 +23,8 @@ static const char doc[] =
 	"\n"
 	"The job's id goes to stdout, everything else to stderr. Without --wait, -o is the default name for hslt-job fetch. "
 	"HSLT_COORDINATOR stands in for --coordinator.\n"
-	"Exit codes: 0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 6 refused, 75 "
+	"Exit codes: 0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
+	"there, and its note says where), 6 refused, 75 "
 	"coordinator not reachable.";
 
 enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED };

@@ -1,5 +1,6 @@
 #include "worker/cli/stats.h"
 
+#include "common/film/agreement_json.h"
 #include "common/film/image_file.h"
 #include "common/film/strategy.h"
 #include "common/film/strategy_json.h"
@@ -80,8 +81,10 @@ static json_t *end_json(const struct stats *s)
 	const struct plan *p = s->run->plan;
 	char note[STRATEGY_NOTE];
 	strategy_note(p, &s->image->counts, s->image->black, note, sizeof note);
-	return json_pack("{s:s s:s s:o s:s}", "end", stats_end_name(s->run->end), "mixture", p->mutations, "strategies",
-			 strategy_to_json(p->mutations, &s->image->counts), "note", note);
+	agreement_add_note(s->agreement, note, sizeof note);
+	return json_pack("{s:s s:s s:o s:s s:o s:o}", "end", stats_end_name(s->run->end), "mixture", p->mutations, "strategies",
+			 strategy_to_json(p->mutations, &s->image->counts), "note", note, "agreement", agreement_to_json(s->agreement),
+			 "classes", classes_to_json(s->image->classes));
 }
 
 int stats_write(const char *path, const struct stats *s, struct error *e)

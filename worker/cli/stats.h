@@ -4,6 +4,7 @@
 #ifndef WORKER_CLI_STATS_H
 #define WORKER_CLI_STATS_H
 
+#include "common/film/agreement.h"
 #include "common/film/forecast.h"
 #include "worker/cli/local.h"
 
@@ -14,6 +15,7 @@ struct stats {
 	const struct render_summary *summary;
 	const struct local_run *run; /* has ended */
 	const struct canvas_image *image;
+	const struct agreement *agreement; /* of the image */
 	double build_seconds; /* of the world */
 	const struct forecast_history *looks;
 };

@@ -44,7 +44,7 @@ int submit_send(struct client *cl, const struct submit_request *r, const struct 
 struct submit_end {
 	uint32_t exit_code; /* of a program that waited */
 	bool has_result;
-	char why[256], note[512]; /* why there is no result; what whoever looks at it should know */
+	char why[256], note[1024]; /* why there is no result; what whoever looks at it should know */
 };
 
 /* Shows progress on stderr until the job has ended. */

@@ -91,6 +91,30 @@ static void bound_before_error(void **state)
 	expect_end(f, JOB_DONE, END_TIME, 4);
 }
 
+/* Whatever bound ended it. Before its end, after a failure and of other jobs the word means nothing. */
+static void chains_disagree(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=1 target=0.1"),
+		"[11] image j1 disagrees -> -",
+		"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1",
+		"[13] error j1 1 0.5 -> j1 publish 1, j1 is done (mutations)",
+		NULL });
+	struct job_status s;
+	assert_true(farm_job(f, 1, 1000, &s));
+	assert_int_equal(job_exit_code(&s), 4);
+	transcript_play(f, (const char *const[]){"[14] image j1 disagrees -> -", "[14] image j2 -> -", NULL});
+	expect_end(f, JOB_DONE, END_MUTATIONS, 5);
+	f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=1"), "[12] prepared j1 bad no space left -> j1 is failed (failed: no space left)",
+		"[13] image j1 disagrees -> -", NULL });
+	expect_end(f, JOB_FAILED, END_FAILED, 3);
+}
+
 static void error_with_the_last_round(void **state)
 {
 	(void)state;
@@ -225,7 +249,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(by_time),
 		cmocka_unit_test(by_error),
-		cmocka_unit_test(bound_before_error),
+		cmocka_unit_test(bound_before_error), cmocka_unit_test(chains_disagree),
 		cmocka_unit_test(error_with_the_last_round),
 		cmocka_unit_test(black),
 		cmocka_unit_test(cannot_be_prepared),

@@ -6,6 +6,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <math.h>
 #include <setjmp.h>
 #include <cmocka.h>
 
@@ -72,6 +73,11 @@ static void records_come_back(void **state)
 	r.longest_stuck = 5210;
 	for (uint64_t i = 0; i < 2 * STRATEGY_COUNTERS; i++)
 		r.strategy[i / STRATEGY_COUNTERS][i % STRATEGY_COUNTERS] = i * i;
+	record_begin_agreement(&r);
+	r.agreement = (struct agreement){CHAINS_DISAGREE, 12, 3, 0.125, 1.01, 2.5, 64, 128, 1U << 7 | 1, 0.25, "chains \"disagree\""};
+	r.b = 1.0 / 7;
+	r.classes[7] = (struct path_class_energy){0.1, 0.01, 0.2, 0.02, -12.5};
+	r.classes[0] = (struct path_class_energy){0.3, NAN, 0.4, NAN, NAN};
 	assert_int_equal(spool_open(&s, folder, &e), 0);
 	assert_int_equal(spool_take_job(s, 7, &e), 0);
 	assert_int_equal(spool_write_record(s, &r, &e), 0);
@@ -85,11 +91,20 @@ static void records_come_back(void **state)
 	assert_string_equal(back.note, r.note);
 	assert_true(back.stuck == 3 && back.longest_stuck == 5210);
 	assert_memory_equal(back.strategy, r.strategy, sizeof r.strategy);
+	const struct agreement *a = &back.agreement;
+	assert_true(a->verdict == CHAINS_DISAGREE && a->tiles == 12 && a->tiles_flagged == 3 && a->energy_flagged == 0.125);
+	assert_true(a->r_hat_median == 1.01 && a->r_hat_worst == 2.5 && a->worst_x == 64 && a->worst_y == 128);
+	assert_true(a->classes_flagged == r.agreement.classes_flagged && a->stuck_share == 0.25 && back.b == r.b);
+	assert_string_equal(a->text, r.agreement.text);
+	assert_memory_equal(&back.classes[7], &r.classes[7], sizeof *r.classes);
+	assert_true(back.classes[0].chains == 0.4 && isnan(back.classes[0].difference_t) && isnan(back.classes[0].chains_error));
+	assert_true(back.classes[1].chains == 0 && isnan(back.classes[1].difference_t));
 	/* Of an earlier version, and of a hand that wrote too much. */
 	static const char old[] = "{\"schema\":1,\"id\":7,\"name\":\"a\"}", many[] = "{\"schema\":1,\"id\":7,\"mixture\":\"a,,b\",\"strategies\":7}";
 	assert_int_equal(spool_write(s, 7, "job.json", old, sizeof old - 1, &e), 0);
 	assert_int_equal(spool_read_record(s, 7, &back, &e), 0);
 	assert_true(*back.mixture == 0 && *back.note == 0 && back.stuck == 0);
+	assert_true(back.agreement.verdict == CHAINS_AGREE && isnan(back.agreement.r_hat_worst) && back.b == 0);
 	assert_int_equal(spool_write(s, 7, "job.json", many, sizeof many - 1, &e), 0);
 	assert_int_equal(spool_read_record(s, 7, &back, &e), 0);
 	assert_true(*back.mixture == 0);
