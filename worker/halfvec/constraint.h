@@ -19,6 +19,7 @@
 
 #include "worker/math/mat2.h"
 #include "worker/path/whole.h"
+#include "worker/render/knobs.h"
 
 struct constraint {
 	vec2 h;
@@ -38,25 +39,51 @@ vec2 halfvec_of(const struct whole_path *x, unsigned j);
  */
 enum constraint_end { CONSTRAINT_OK, CONSTRAINT_SINGULAR };
 
+struct constraint_factors {
+	mat2 inverse[WHOLE_MAX_VERTICES]; /* of L_j, by vertex */
+	double det[WHOLE_MAX_VERTICES];   /* of L_j */
+	/* banded factors, when pivoted: the layout is constraint_system.inc's */
+	double band[2 * WHOLE_MAX_VERTICES][10];
+};
+
+struct constraint_single {
+	mat2_single a, b, c;
+};
+struct constraint_factors_single {
+	mat2_single inverse[WHOLE_MAX_VERTICES];
+	float det[WHOLE_MAX_VERTICES];
+	float band[2 * WHOLE_MAX_VERTICES][10];
+	struct constraint_single k[WHOLE_MAX_VERTICES]; /* what was factored */
+};
+
 struct constraint_system {
 	unsigned b, c;
 	bool pivoted;
-	mat2 inverse[WHOLE_MAX_VERTICES]; /* of L_j, by vertex */
-	double det[WHOLE_MAX_VERTICES];   /* of L_j */
-	double log_det;                   /* log |det M| */
-	double log_transfer;              /* log |det d x_{b-1} / d x_c| with all h held: prod |det a_j| / |det M| */
-	/* banded factors, when pivoted: the layout is constraint_system.c's */
-	double band[2 * WHOLE_MAX_VERTICES][10];
-	unsigned char order[2 * WHOLE_MAX_VERTICES];
+	unsigned char order[2 * WHOLE_MAX_VERTICES]; /* of the banded factors */
+	double log_det;      /* log |det M| */
+	double log_transfer; /* log |det d x_{b-1} / d x_c| with all h held: prod |det a_j| / |det M| */
+	union {
+		struct constraint_factors wide;
+		struct constraint_factors_single narrow;
+	};
 };
 
-enum constraint_end constraint_factor(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *out);
-/* The same but for the two logarithms, which only constraint_factor fills in. */
-enum constraint_end constraint_factor_to_solve(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *out);
-/* dx for given dh, both by vertex index c+1..b-1. */
-void constraint_solve(const struct constraint *k, const struct constraint_system *m, const vec2 *dh, vec2 *dx);
+/* One system in double, another with its matrices and vectors in float: derivatives, half vectors and what is solved for are
+ * double for both. */
+struct constraint_solver {
+	enum constraint_end (*factor)(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *out);
+	/* The same but for the two logarithms, which only `factor` fills in. */
+	enum constraint_end (*factor_to_solve)(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *out);
+	/* dx for given dh, both by vertex index c+1..b-1. Finite or infinite, in float also where the solution is out of reach. */
+	void (*solve)(const struct constraint *k, const struct constraint_system *m, const vec2 *dh, vec2 *dx);
+	/* Ray differentials (sec. 3.1): D_j = d x_{b-1} / d h_j, for j = c+1..b-1. CONSTRAINT_SINGULAR: not to be had. */
+	enum constraint_end (*differentials)(const struct constraint *k, unsigned b, unsigned c, mat2 *d);
+};
+extern const struct constraint_solver constraint_double, constraint_single;
 
-/* Ray differentials (sec. 3.1): D_j = d x_{b-1} / d h_j, for j = c+1..b-1. CONSTRAINT_SINGULAR: not to be had. */
-enum constraint_end constraint_differentials(const struct constraint *k, unsigned b, unsigned c, mat2 *d);
+static inline const struct constraint_solver *constraint_solver_of(const struct knobs *k)
+{
+	return k->precision == KNOB_SINGLE ? &constraint_single : &constraint_double;
+}
 
 #endif

@@ -94,7 +94,7 @@ void halfvec_steps(const struct path_context *c, const struct whole_path *x, con
 		if (!x->v[j].delta)
 			sum += bsdf_limit(c, &x->v[j]);
 	bool differentials = b == x->edges && pixel_footprint(camera, x, &footprint) &&
-			     constraint_differentials(k, b, c_end, d) == CONSTRAINT_OK;
+			     constraint_solver_of(&c->w->knobs)->differentials(k, b, c_end, d) == CONSTRAINT_OK;
 	for (unsigned j = c_end + 1; j < b; j++) {
 		if (x->v[j].delta)
 			continue;

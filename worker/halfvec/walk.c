@@ -4,7 +4,8 @@
 
 struct walk_limits walk_limits_of(const struct knobs *k)
 {
-	return (struct walk_limits){(unsigned)k->iterations, k->least_step, 1, k->tolerance, k->reverse_tolerance};
+	return (struct walk_limits){(unsigned)k->iterations, k->least_step, 1, k->tolerance, k->reverse_tolerance,
+				     constraint_solver_of(k)};
 }
 
 /* One walk while it goes on. Predictions start at the kept state alone, so that a refused trial leaves nothing to undo. */
@@ -13,6 +14,7 @@ struct walk {
 	struct whole_path *y; /* the trial */
 	unsigned b, end;
 	const struct walk_target *target;
+	const struct constraint_solver *solver;
 	double scale;
 	struct walk_scratch *s;
 	uint64_t above; /* by vertex: where light leaves on the side of the geometric normal */
@@ -116,9 +118,9 @@ static double residuals(struct walk *m, bool *within)
 static enum walk_end keep(struct walk *m, bool factored)
 {
 	struct walk_scratch *s = m->s;
-	if (!factored && constraint_factor_to_solve(s->k, m->b, m->end, &s->system) != CONSTRAINT_OK)
+	if (!factored && m->solver->factor_to_solve(s->k, m->b, m->end, &s->system) != CONSTRAINT_OK)
 		return WALK_SINGULAR;
-	constraint_solve(s->k, &s->system, s->residual, s->dx);
+	m->solver->solve(s->k, &s->system, s->residual, s->dx);
 	for (unsigned j = m->end + 1; j < m->b; j++) {
 		s->kept[j].x = m->y->v[j].x;
 		s->kept[j].emitter = m->y->v[j].emitter;
@@ -220,7 +222,8 @@ enum walk_end halfvec_walk_from(struct path_context *c, struct whole_path *y, un
 				unsigned stale, struct walk_scratch *s)
 {
 	assert(c_end + 1 < b && b <= y->edges);
-	struct walk m = {.c = c, .y = y, .b = b, .end = c_end, .target = target, .scale = limits->scale, .s = s};
+	struct walk m = {.c = c, .y = y, .b = b, .end = c_end, .target = target, .solver = limits->solver,
+		         .scale = limits->scale, .s = s};
 	s->iterations = 0;
 	whole_forget(y, c_end + 1, b - 1);
 	enum walk_end end = start(&m);

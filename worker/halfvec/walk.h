@@ -30,6 +30,7 @@ struct walk_limits {
 	double tolerance;     /* of a vertex at the end of a walk: how near its target the half vector comes, of the smaller of lobe
 				 and step */
 	double back;          /* how near to where the walk began the way back ends, of the largest step that a vertex made */
+	const struct constraint_solver *solver;
 };
 struct walk_limits walk_limits_of(const struct knobs *k);
 

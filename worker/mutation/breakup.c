@@ -174,7 +174,7 @@ static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *
 	struct mutation_scratch *s = &m->scratch;
 	struct path_context *c = m->path;
 	constraints_of(c->w, x, how->b, how->c, s->k);
-	if (constraint_factor(s->k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
+	if (m->limits.solver->factor(s->k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
 		return STRATEGY_FAIL_SINGULAR;
 	move->log_transfer[Y_TO_X] = s->walk.system.log_transfer;
 	halfvec_steps(c, x, s->k, how->b, how->c, s->step[X_TO_Y]);
@@ -185,7 +185,7 @@ static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *
 	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
 	if (end != WALK_OK)
 		return reason_of(end);
-	if (constraint_factor(s->walk.k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
+	if (m->limits.solver->factor(s->walk.k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
 		return STRATEGY_FAIL_SINGULAR;
 	move->log_transfer[X_TO_Y] = s->walk.system.log_transfer;
 	halfvec_steps(c, y, s->walk.k, how->b, how->c, s->step[Y_TO_X]);

@@ -12,6 +12,9 @@ KNOB(least_step, "least-step", KNOB_REAL, KNOB_CHAINS, 0.03, 1e-9, 1, NULL,
 KNOB(reverse_tolerance, "reverse-tolerance", KNOB_REAL, KNOB_CHAINS, 1e-3, 1e-9, 0.5, NULL,
      "How near to where it began the way back of a walk must end, of the largest step that a vertex made",
      "0.1", "0.01", "0.001", "0.0001", "1e-06")
+KNOB(precision, "precision", KNOB_CHOICE, KNOB_CHAINS, KNOB_DOUBLE, KNOB_DOUBLE, KNOB_SINGLE, "double single",
+     "Of the matrices that walks and densities of half vectors solve; positions are double",
+     "double", "single")
 KNOB(step_scale, "step-scale", KNOB_REAL, KNOB_CHAINS, 1, 1e-3, 1000, NULL,
      "Factor of the largest step of a half vector, which is a lobe's mean slope",
      "0.1", "0.25", "0.5", "1", "2", "4")

@@ -33,6 +33,8 @@ struct render_knob {
 /* NULL at the end. */
 const struct render_knob *render_knob_at(size_t index);
 
+enum { KNOB_DOUBLE, KNOB_SINGLE }; /* precision */
+
 struct knobs {
 #define KNOB(field, ...) double field;
 #include "worker/render/knob_list.h"

@@ -287,7 +287,7 @@ static void test_identity(void **state)
 				continue;
 			made++;
 			constraints_of(&h.w, &h.x, edges, 0, k);
-			if (constraint_factor(k, edges, 0, &m) != CONSTRAINT_OK)
+			if (constraint_double.factor(k, edges, 0, &m) != CONSTRAINT_OK)
 				continue;
 			double left = -m.log_det, right = log(geometry(&h, edges - 1)) + m.log_transfer;
 			for (unsigned e = 0; e < edges; e++)
@@ -321,9 +321,9 @@ static void test_degenerate(void **state)
 	constraints_of(&h.w, &h.x, 2, 0, k);
 	assert_true(isinf(k[1].h.x) && isinf(k[1].h.y));
 	assert_true(k[1].b.xx == 0 && k[1].b.xy == 0 && k[1].b.yx == 0 && k[1].b.yy == 0);
-	assert_int_equal(constraint_factor(k, 2, 0, &m), CONSTRAINT_SINGULAR);
+	assert_int_equal(constraint_double.factor(k, 2, 0, &m), CONSTRAINT_SINGULAR);
 	mat2 dj[3];
-	assert_int_equal(constraint_differentials(k, 2, 0, dj), CONSTRAINT_SINGULAR);
+	assert_int_equal(constraint_double.differentials(k, 2, 0, dj), CONSTRAINT_SINGULAR);
 	/* At the pole itself everything is finite. */
 	hand_sphere(&h, 1, (vec3){0, 0, 0}, (vec3){0, 0, 1}, 0.5, 1, 0, &d);
 	h.shape[1].sphere_axes = frame_around((vec3){0, 0, 1});

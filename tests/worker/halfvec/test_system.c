@@ -195,15 +195,15 @@ static unsigned compare_system(struct dice *d, unsigned b, unsigned c, struct wo
 	mat2 dj[WHOLE_MAX_VERTICES];
 	dense_fill(&dense, k, b, c);
 	assert_true(dense_invert(&dense));
-	assert_int_equal(constraint_factor(k, b, c, &system_), CONSTRAINT_OK);
+	assert_int_equal(constraint_double.factor(k, b, c, &system_), CONSTRAINT_OK);
 	for (unsigned j = c + 1; j < b; j++)
 		dh[j] = (vec2){dice_between(d, -1, 1), dice_between(d, -1, 1)};
-	constraint_solve(k, &system_, dh, dx);
+	constraint_double.solve(k, &system_, dh, dx);
 	compare_solution(dh, dx, c, w);
 	double condition, t = long_log_transfer(b, c, &condition);
 	note(w, fabs(system_.log_det - (double)dense.log_det), dense_det_condition(&dense) + fabs(system_.log_det));
 	note(w, fabs(system_.log_transfer - t), condition + fabs(system_.log_det) + fabs(t));
-	assert_int_equal(constraint_differentials(k, b, c, dj), CONSTRAINT_OK);
+	assert_int_equal(constraint_double.differentials(k, b, c, dj), CONSTRAINT_OK);
 	compare_differentials(dj, b, c, w);
 	return system_.pivoted;
 }
@@ -251,13 +251,13 @@ static void test_singular(void **state)
 		singular(&d, b, c);
 		if (s & 1)
 			rescale(&d, b, c, 8);
-		assert_int_equal(constraint_factor(k, b, c, &system_), CONSTRAINT_SINGULAR);
-		assert_int_equal(constraint_differentials(k, b, c, dj), CONSTRAINT_SINGULAR);
+		assert_int_equal(constraint_double.factor(k, b, c, &system_), CONSTRAINT_SINGULAR);
+		assert_int_equal(constraint_double.differentials(k, b, c, dj), CONSTRAINT_SINGULAR);
 		/* A little off it is not. */
 		for (unsigned j = c + 1; j < b; j++)
 			k[j].b = (mat2){k[j].b.xx * (1 + 1e-6 * dice_throw(&d)), k[j].b.xy * (1 - 1e-6 * dice_throw(&d)), k[j].b.yx,
 					k[j].b.yy * (1 - 1e-6 * dice_throw(&d))};
-		assert_int_equal(constraint_factor(k, b, c, &system_), CONSTRAINT_OK);
+		assert_int_equal(constraint_double.factor(k, b, c, &system_), CONSTRAINT_OK);
 	}
 }
 
@@ -279,15 +279,15 @@ static void test_extremes(void **state)
 			dh[j] = (vec2){1, -0.5};
 		}
 		feclearexcept(FE_INVALID);
-		bool ok = constraint_factor(k, b, 0, &system_) == CONSTRAINT_OK;
+		bool ok = constraint_double.factor(k, b, 0, &system_) == CONSTRAINT_OK;
 		refused += !ok;
 		if (ok) {
-			constraint_solve(k, &system_, dh, dx);
+			constraint_double.solve(k, &system_, dh, dx);
 			assert_true(isfinite(system_.log_det) && !isnan(system_.log_transfer));
 			for (unsigned j = 1; j < b; j++)
 				assert_true(isfinite(dx[j].x) && isfinite(dx[j].y));
 		}
-		if (constraint_differentials(k, b, 0, dj) == CONSTRAINT_OK)
+		if (constraint_double.differentials(k, b, 0, dj) == CONSTRAINT_OK)
 			for (unsigned j = 1; j < b; j++)
 				assert_true(isfinite(mat2_largest(dj[j])));
 		assert_false(fetestexcept(FE_INVALID));
@@ -305,7 +305,7 @@ static void test_units(void **state)
 		unsigned b = 2 + dice_below(&d, 6);
 		struct dice same = d;
 		random_system(&d, b, 0, 1);
-		assert_int_equal(constraint_factor(k, b, 0, &system_), CONSTRAINT_OK);
+		assert_int_equal(constraint_double.factor(k, b, 0, &system_), CONSTRAINT_OK);
 		bool pivoted = system_.pivoted;
 		double transfer = system_.log_transfer;
 		random_system(&same, b, 0, 1);
@@ -314,7 +314,7 @@ static void test_units(void **state)
 			k[j].b = mat2_scale(0x1p-60, k[j].b);
 			k[j].c = mat2_scale(0x1p-60, k[j].c);
 		}
-		assert_int_equal(constraint_factor(k, b, 0, &system_), CONSTRAINT_OK);
+		assert_int_equal(constraint_double.factor(k, b, 0, &system_), CONSTRAINT_OK);
 		assert_int_equal(system_.pivoted, pivoted);
 		assert_true(fabs(system_.log_transfer - transfer) < 1e-11 * (1 + b * 85));
 	}
@@ -347,7 +347,7 @@ static void solve_chain(const struct quad_vertex *v, const struct quad_problem *
 			return;
 		for (unsigned j = 1; j < edges; j++)
 			dh[j] = (vec2){(double)((target[j][0] - h[j][0]) / (quad)scale), (double)((target[j][1] - h[j][1]) / (quad)scale)};
-		constraint_solve(k, &system_, dh, dx);
+		constraint_double.solve(k, &system_, dh, dx);
 		for (unsigned j = 1; j < edges; j++) {
 			offset[j][0] += (quad)scale * (quad)dx[j].x;
 			offset[j][1] += (quad)scale * (quad)dx[j].y;
@@ -397,7 +397,7 @@ static void test_solved_again(void **state)
 		if (!hand_chain(&h, edges, 0.2, &d))
 			continue;
 		constraints_of(&h.w, &h.x, edges, 0, k);
-		if (constraint_factor(k, edges, 0, &system_) != CONSTRAINT_OK)
+		if (constraint_double.factor(k, edges, 0, &system_) != CONSTRAINT_OK)
 			continue;
 		dense_fill(&dense, k, edges, 0);
 		assert_true(dense_invert(&dense));
@@ -407,7 +407,7 @@ static void test_solved_again(void **state)
 		pivoted += system_.pivoted;
 		mat2 t = mat2_of_columns(resolved(&h, 0, 0), resolved(&h, 0, 1));
 		worst_transfer = fmax(worst_transfer, fabs(log(fabs(mat2_det(t))) - system_.log_transfer));
-		assert_int_equal(constraint_differentials(k, edges, 0, dj), CONSTRAINT_OK);
+		assert_int_equal(constraint_double.differentials(k, edges, 0, dj), CONSTRAINT_OK);
 		for (unsigned j = 1; j < edges; j++) {
 			mat2 e = mat2_of_columns(resolved(&h, j, 0), resolved(&h, j, 1));
 			worst_differential = fmax(worst_differential, mat2_largest(mat2_sub(e, dj[j])) / mat2_largest(e));

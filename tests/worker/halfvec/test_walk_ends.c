@@ -186,7 +186,7 @@ static void test_focus(void **state)
 	constraints_of(w, &x, 3, 0, k);
 	double det = fabs(mat2_det(k[2].b)) / mat2_norm2(k[2].b);
 	assert_true(det < 1e-6);
-	assert_int_equal(constraint_factor(k, 3, 0, &s.system), CONSTRAINT_OK);
+	assert_int_equal(constraint_double.factor(k, 3, 0, &s.system), CONSTRAINT_OK);
 	assert_true(s.system.pivoted);
 	struct dice d = dice_of("walks at a focus");
 	size_t ends[WALK_ITERATIONS + 1] = {0}, n = dice_count(2000);

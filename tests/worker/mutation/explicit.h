@@ -87,7 +87,7 @@ static inline double explicit_log_between(const struct path_context *c, const st
 	if (b < c_end + 2)
 		return 0;
 	constraints_of(c->w, y, b, c_end, at_y);
-	constraint_factor(at_y, b, c_end, &system);
+	constraint_double.factor(at_y, b, c_end, &system);
 	double sum = system.log_det;
 	if (dh) {
 		constraints_of(c->w, x, b, c_end, at_x);
