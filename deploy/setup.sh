@@ -3,19 +3,20 @@
 # Says what it installs; does nothing where all is there.
 #
 #   sh deploy/setup.sh            what `make` and `make test` need
-#   sh deploy/setup.sh --full     also what the longer kinds of tests need (clang for fuzzers, valgrind for profiles)
+#   sh deploy/setup.sh --full     also what the longer kinds of tests need (clang for fuzzers, valgrind for profiles, a
+#                                 Slurm and systemd's checker of units for deploy/'s own; Debian starts munge when it is installed)
 set -eu
 
 build="make gcc libc6-dev pkg-config libembree-dev libopenexr-dev libuv1-dev libprotobuf-c-dev protobuf-c-compiler
 protobuf-compiler libssl-dev libexpat1-dev zlib1g-dev libpng-dev libjpeg62-turbo-dev libjansson-dev librandom123-dev libcmocka-dev
 gnuplot-nox"
-full="clang libclang-rt-dev valgrind socat"
+full="clang libclang-rt-dev valgrind socat slurm-wlm munge systemd python3 python3-yaml debootstrap"
 
 case "${1:-}" in
 "") wanted=$build ;;
 --full) wanted="$build $full" ;;
 -h | --help)
-	sed -n '2,6s/^# \{0,1\}//p' "$0"
+	sed -n '2,7s/^# \{0,1\}//p' "$0"
 	exit 0
 	;;
 *)

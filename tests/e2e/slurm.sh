@@ -1,0 +1,219 @@
+# deploy/slurm on a cluster of three nodes with a slurmctld, slurmds and a munged of its own, on loopback, in a folder that goes:
+# workers come, are told to leave, are requeued off a node whose daemon is dead; a whole farm is requeued, one is cut short.
+# The images have the bits of hslt-render's.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare
+PATH=$PATH:/usr/sbin:/sbin
+for p in munged slurmctld slurmd sbatch; do
+	command -v $p >/dev/null || skip "no $p (deploy/setup.sh --full installs slurm-wlm and munge)"
+done
+[ "$(id -u)" = 0 ] || skip "slurmd wants root"
+command -v runuser >/dev/null && id munge >/dev/null 2>&1 || skip "no user munge"
+
+BIN=$(cd "$BIN" && pwd)
+DEPLOY=$(cd "$HERE/../../deploy" && pwd)
+BOX=$(cd "$HERE/../scenes/box" && pwd)/box.xml
+LONG="--integrator hslt --bootstrap 20000 --epoch 200 --mutations 6000000"
+SHORT="--integrator hslt --bootstrap 20000 --epoch 50 --mutations 1000000"
+
+# Whoever was started here, by us or by Slurm, knows the folder from the environment.
+ours() {
+	grep -lzF "SLURM_CONF=$DIR/" /proc/[0-9]*/environ 2>/dev/null | sed -n 's/^\/proc\/\([0-9]*\)\/.*/\1/p' | grep -vx $$ || :
+}
+
+end_cluster() {
+	for round in 1 2 3; do
+		left=$(ours)
+		[ -n "$left" ] || break
+		kill -9 $left 2>/dev/null || :
+		sleep 0.1
+	done
+	[ ! -s "$DIR/munge/pid" ] || kill -9 "$(cat "$DIR/munge/pid")" 2>/dev/null || :
+}
+end_all() {
+	code=$?
+	set +e
+	end_cluster
+	(exit $code)
+	finish
+}
+trap end_all EXIT
+
+# port: it and the next three are in nobody's use.
+free_ports() {
+	port=$((10000 + $$ % 5000 * 4))
+	while [ $port -lt 32000 ]; do
+		busy=0
+		for k in 0 1 2 3; do
+			hex=$(printf ':%04X ' $((port + k)))
+			! cat /proc/net/tcp /proc/net/tcp6 2>/dev/null | grep -q "$hex" || busy=1
+		done
+		[ $busy = 1 ] || break
+		port=$((port + 4))
+	done
+}
+
+start_cluster() {
+	free_ports
+	host=$(hostname -s)
+	mkdir -p "$DIR/munge" "$DIR/state" "$DIR/slurmd"
+	chmod 711 "$DIR"
+	head -c 128 /dev/urandom >"$DIR/munge/key"
+	chmod 400 "$DIR/munge/key"
+	chown -R munge "$DIR/munge"
+	runuser -u munge -- munged --force --key-file="$DIR/munge/key" --socket="$DIR/munge/socket" --pid-file="$DIR/munge/pid" \
+		--log-file="$DIR/munge/log" --seed-file="$DIR/munge/seed" >"$DIR/munged.log" 2>&1 || fail "munged does not start"
+	cat >"$DIR/slurm.conf" <<TEXT
+ClusterName=hslt
+SlurmctldHost=$host(127.0.0.1)
+SlurmUser=root
+SlurmdUser=root
+SlurmctldPort=$port
+AuthType=auth/munge
+AuthInfo=socket=$DIR/munge/socket
+CredType=cred/munge
+ProctrackType=proctrack/linuxproc
+TaskPlugin=task/none
+SwitchType=switch/none
+MpiDefault=none
+ReturnToService=2
+SelectType=select/cons_tres
+SelectTypeParameters=CR_Core
+SchedulerType=sched/backfill
+SchedulerParameters=bf_interval=1,sched_interval=1,batch_sched_delay=0,sched_min_interval=0
+StateSaveLocation=$DIR/state
+SlurmdSpoolDir=$DIR/slurmd/%n
+SlurmctldPidFile=$DIR/slurmctld.pid
+SlurmdPidFile=$DIR/slurmd-%n.pid
+SlurmctldLogFile=$DIR/slurmctld.log
+SlurmdLogFile=$DIR/slurmd-%n.log
+JobAcctGatherType=jobacct_gather/none
+AccountingStorageType=accounting_storage/none
+JobCompType=jobcomp/none
+KillWait=5
+MinJobAge=300
+SlurmdTimeout=60
+NodeName=n1 NodeHostname=$host NodeAddr=127.0.0.1 Port=$((port + 1)) CPUs=1 RealMemory=64 State=UNKNOWN
+NodeName=n2 NodeHostname=$host NodeAddr=127.0.0.1 Port=$((port + 2)) CPUs=1 RealMemory=64 State=UNKNOWN
+NodeName=n3 NodeHostname=$host NodeAddr=127.0.0.1 Port=$((port + 3)) CPUs=1 RealMemory=64 State=UNKNOWN
+PartitionName=render Nodes=n[1-3] Default=YES MaxTime=INFINITE State=UP
+TEXT
+	export SLURM_CONF="$DIR/slurm.conf"
+	slurmctld -c
+	for n in n1 n2 n3; do
+		slurmd -N $n
+	done
+	until_true 20 idle 3 || fail "the cluster does not come up: $(sinfo 2>&1)"
+}
+
+idle() {
+	[ "$(sinfo -h -o %D -t idle 2>/dev/null)" = "$1" ]
+}
+
+# batch OPTION...: the Slurm job's id in JOB
+batch() {
+	JOB=$(sbatch --parsable --output="$DIR/%j.log" "$@") || fail "sbatch $*"
+	JOB=${JOB%%;*}
+}
+
+job_state() {
+	scontrol show job "$1" 2>/dev/null | sed -n 's/.*JobState=\([A-Z]*\).*/\1/p' | head -n 1
+}
+
+is_job() {
+	[ "$(job_state "$1")" = "$2" ]
+}
+
+job_field() {
+	scontrol show job "$1" | sed -n "s/.* *$2=\([^ ]*\).*/\1/p" | head -n 1
+}
+
+# Names of the workers at the coordinator, one a line.
+workers() {
+	"$BIN/hslt-status" --json 2>/dev/null | sed 's/.*"workers":\[//; s/\],"leases":\[.*//' | grep -o '"name":"[^"]*"' | sed 's/.*:"//; s/"//'
+}
+
+has_workers() {
+	[ "$(workers | wc -l)" = "$1" ]
+}
+
+has_worker() {
+	workers | grep -q "$1"
+}
+
+# requeued JOB: is pending for its next life, which begins now instead of two minutes later
+requeued() {
+	until_true 10 is_job "$1" PENDING || return 1
+	scontrol update JobId="$1" StartTime=now
+	until_true 20 is_job "$1" RUNNING
+}
+
+# ---- elastic workers ----
+
+for kind in long short; do
+	[ $kind = long ] && options=$LONG || options=$SHORT
+	"$BIN/hslt-render" "$BOX" -o "$DIR/$kind.exr" $options --threads 2 2>>"$DIR/render.log" || fail "hslt-render"
+done
+start_cluster
+export HSLT_BIN="$BIN" HSLT_CACHE="$DIR/cache" TMPDIR="$DIR"
+start_coordinator
+batch --array=1 "$DEPLOY/slurm/workers.sbatch"
+first=$JOB
+until_true 20 has_workers 1 || fail "no worker came: $(squeue 2>&1)"
+id=$(submit "$BOX" -o "$DIR/elastic.exr" $LONG)
+until_true 30 is_beyond "$id" 0.1 || fail "$id does not get on with one worker"
+
+batch --array=2-3 "$DEPLOY/slurm/workers.sbatch"
+second=$JOB
+until_true 20 has_workers 3 || fail "three workers do not come: $(workers)"
+until_true 30 is_beyond "$id" 0.25 || fail "$id does not get on with three workers"
+
+scancel --batch --signal=TERM "${second}_2"
+until_true 20 is_job "${second}_2" COMPLETED || fail "the worker that was told to leave is $(job_state "${second}_2")"
+until_true 5 has_workers 2 || fail "it stays at the coordinator"
+
+# The daemon of a node dies, its worker does not; Slurm gives the node up and starts the worker elsewhere.
+node=$(job_field "${second}_3" BatchHost)
+kill -9 "$(cat "$DIR/slurmd-$node.pid")"
+scontrol update NodeName="$node" State=DOWN Reason=test
+requeued "${second}_3" || fail "the worker of the lost node is $(job_state "${second}_3")"
+until_true 10 has_worker "^${second}_3\.1@" || fail "the worker does not come back: $(workers)"
+has_worker "^${second}_3\.0@$node" || fail "the old worker on $node is gone, this tests nothing"
+is_beyond "$id" 0.95 && fail "$id was too fast, this tests nothing"
+until_true 60 is_state "$id" done || fail "$id is $(value "$id" state)"
+"$BIN/hslt-job" fetch "$id" || fail "no image of $id"
+same "$DIR/long.exr" "$DIR/elastic.exr"
+
+slurmd -N "$node"
+scontrol update NodeName="$node" State=RESUME 2>/dev/null || :
+scancel "$first" "$second"
+until_true 20 idle 3 || fail "the cluster does not come to rest: $(sinfo; squeue)"
+until_true 10 has_workers 0 || fail "workers are left: $(workers)"
+
+# ---- a whole farm in a job ----
+
+running() {
+	"$BIN/hslt-job" --coordinator "127.0.0.1:$(cat "$DIR"/hslt-farm-"$1"/port)" list 2>/dev/null | grep -q running
+}
+
+batch --nodes=3 "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/farm.exr" $SHORT
+until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; cat "$DIR/$JOB.log")"
+scontrol requeue "$JOB"
+requeued "$JOB" || fail "the farm is $(job_state "$JOB")"
+until_true 60 is_job "$JOB" COMPLETED || fail "the farm is $(job_state "$JOB"): $(cat "$DIR/$JOB.log")"
+[ "$(job_field "$JOB" Restarts)" = 1 ] || fail "the farm was not requeued"
+[ "$(grep -c 'event=peer_hello.*@n[123]' "$DIR/$JOB.log")" -ge 3 ] || fail "not all nodes worked"
+[ "$(grep -c "name=\"$JOB.1@.*said goodbye" "$DIR/$JOB.log")" = 3 ] || fail "workers were not left to leave"
+same "$DIR/short.exr" "$DIR/farm.exr"
+
+batch --nodes=2 "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/cut.exr" $LONG
+until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; cat "$DIR/$JOB.log")"
+until_true 20 sh -c "'$BIN/hslt-job' --coordinator 127.0.0.1:$(cat "$DIR/hslt-farm-$JOB.0/port") fetch j1 --preview -o '$DIR/look.exr' 2>'$DIR/look.err'" ||
+	fail "no preview"
+scancel --signal=TERM "$JOB"
+until_true 30 is_job "$JOB" FAILED || fail "the farm that was cut short is $(job_state "$JOB"): $(cat "$DIR/$JOB.log")"
+[ "$(job_field "$JOB" ExitCode)" = 143:0 ] || fail "it ended with $(job_field "$JOB" ExitCode)"
+[ -s "$DIR/cut.partial.exr" ] && [ ! -e "$DIR/cut.exr" ] || fail "it left $(ls "$DIR"/cut*)"
+until_true 10 idle 3 || fail "it left somebody: $(squeue)"
+ls -d "$DIR"/hslt-farm-* 2>/dev/null && fail "it left its folder"
+echo "Slurm: from 1 to 3 workers, one told to leave, one off a dead node; farms requeued and cut short; equal bits"
