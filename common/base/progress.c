@@ -87,3 +87,19 @@ void progress_time(double seconds, char *text, size_t size)
 	else
 		snprintf(text, size, "%ld:%02ld:%02ld", n / 3600, n / 60 % 60, n % 60);
 }
+
+void progress_duration(double seconds, char *text, size_t size)
+{
+	static const struct {
+		double unit;
+		const char *name;
+	} units[] = {{1, "s"}, {60, "min"}, {3600, "h"}, {86400, "days"}, {31557600, "years"}};
+	size_t i = 0;
+	while (i + 1 < sizeof units / sizeof *units && seconds >= 1.995 * units[i + 1].unit)
+		i++;
+	double x = seconds / units[i].unit;
+	if (!(x < 1e6))
+		snprintf(text, size, "for ever");
+	else
+		snprintf(text, size, "%.*f %s", x < 9.95 ? 1 : 0, x, units[i].name);
+}

@@ -22,5 +22,7 @@ void progress_end(struct progress *p); /* leaves the cursor on a line of its own
 /* "3.2 k", "12 M": a rate in few characters; "1:02:03", "45 s": a time. */
 void progress_number(double x, char *text, size_t size);
 void progress_time(double seconds, char *text, size_t size);
+/* In two figures: "4.5 s", "31 min", "2.4 h", "12 days"; "for ever". */
+void progress_duration(double seconds, char *text, size_t size);
 
 #endif

@@ -20,6 +20,16 @@ static const double log_four = 1.3862943611198906;
 
 /* ---- looks */
 
+void forecast_add_look(struct forecast_history *h, const struct forecast_look *l)
+{
+	bool sound = isfinite(l->rel_mse) && l->rel_mse > 0 && isfinite(l->rel_mse_upper) && l->rel_mse_upper >= l->rel_mse;
+	if (!sound || !(l->work > (h->count ? h->looks[h->count - 1].work : 0)))
+		return;
+	if (h->count == FORECAST_LOOKS)
+		memmove(h->looks, h->looks + 1, --h->count * sizeof *h->looks);
+	h->looks[h->count++] = *l;
+}
+
 void forecast_add(struct forecast_history *h, const struct plan *p, const struct canvas_image *img, double cpu_seconds,
 		  double seconds)
 {
@@ -29,12 +39,7 @@ void forecast_add(struct forecast_history *h, const struct plan *p, const struct
 				  .rel_mse = img->rel_mse,
 				  .rel_mse_upper = img->rel_mse_upper,
 				  .degrees = img->rel_mse_degrees > 0 ? img->rel_mse_degrees : p->groups - 1.0};
-	bool sound = isfinite(l.rel_mse) && l.rel_mse > 0 && isfinite(l.rel_mse_upper) && l.rel_mse_upper >= l.rel_mse;
-	if (!sound || (h->count && l.work <= h->looks[h->count - 1].work))
-		return;
-	if (h->count == FORECAST_LOOKS)
-		memmove(h->looks, h->looks + 1, --h->count * sizeof *h->looks);
-	h->looks[h->count++] = l;
+	forecast_add_look(h, &l);
 }
 
 static const struct forecast_look *last(const struct forecast_history *h)

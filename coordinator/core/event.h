@@ -66,6 +66,8 @@ struct event {
 		struct {
 			uint64_t job, rounds;
 			double rel_error; /* sqrt of the upper end of the estimated relMSE; NAN: cannot be known */
+			double rel_mse, degrees; /* the estimate, and its degrees of freedom; 0: not told */
+			double cpu_seconds;      /* of all merged render leases */
 		} error_known;
 		struct {
 			uint64_t job;

@@ -24,6 +24,7 @@
 #ifndef COORDINATOR_CORE_FARM_H
 #define COORDINATOR_CORE_FARM_H
 
+#include "common/film/forecast.h"
 #include "coordinator/core/event.h"
 #include "coordinator/core/update.h"
 
@@ -63,8 +64,13 @@ struct job_status {
 	double rate;                      /* merged mutations (bootstrap: samples) a second, over the last half minute */
 	double eta;                       /* s; NAN: unknown */
 	bool disagrees;                   /* the chains of its final image do */
+	double eta_low, eta_high;         /* its 90 % interval */
 	double rel_error;                 /* last evaluated; NAN: none */
 	uint64_t rel_error_rounds;
+	double bootstrap_seconds;         /* wall clock from the first lease to the first round; NAN: not yet */
+	const struct forecast_history *looks; /* at the error, oldest first */
+	struct forecast_range error_now;  /* these three only where there are looks */
+	struct forecast_range halving_cpu, halving_seconds; /* what it costs from now on to halve the error */
 	uint64_t rounds;                  /* complete */
 	uint64_t bootstrap_merged, leases_merged, mutations; /* leases_merged: render leases, open rounds too */
 	uint32_t leases_out;

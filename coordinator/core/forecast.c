@@ -25,18 +25,29 @@ static double work_of_rounds(const struct job *j, double rounds)
 	return bootstrap_total(j) + rounds * (double)plan_round_mutations(&j->plan);
 }
 
-/* All samples and mutations that the job will need: by the plan, or by the error so far, which falls as 1/sqrt(rounds);
- * more than the two open rounds hold. */
-static double work_total(const struct job *j)
+/* Where the error alone is known, without what it is made of: it falls as 1/sqrt(rounds). */
+static double rounds_by_rule(const struct job *j)
 {
-	double total = INFINITY;
+	double factor = j->rel_error / j->plan.target_error;
+	return (double)j->rel_error_rounds * factor * factor;
+}
+
+/* All samples and mutations that the job will need: by the plan, or by the error so far; more than the two open rounds
+ * hold. */
+static struct forecast_range work_total(const struct job *j)
+{
+	struct forecast_range total = {INFINITY, INFINITY, INFINITY};
 	if (j->plan.rounds != UINT64_MAX)
-		total = work_of_rounds(j, (double)j->plan.rounds);
-	if (j->plan.target_error > 0 && !isnan(j->rel_error)) {
-		double factor = j->rel_error / j->plan.target_error;
-		double rounds = fmax((double)j->rel_error_rounds * factor * factor, (double)j->rounds + 2);
-		total = fmin(total, work_of_rounds(j, rounds));
-	}
+		total.low = total.middle = total.high = work_of_rounds(j, (double)j->plan.rounds);
+	if (!(j->plan.target_error > 0) || isnan(j->rel_error))
+		return total;
+	double least = (double)j->rounds + 2, rule = rounds_by_rule(j);
+	struct forecast_range rounds = {rule, rule, rule};
+	if (j->looks.count)
+		rounds = j->stop.rounds;
+	total.low = fmin(total.low, work_of_rounds(j, fmax(rounds.low, least)));
+	total.middle = fmin(total.middle, work_of_rounds(j, fmax(rounds.middle, least)));
+	total.high = fmin(total.high, work_of_rounds(j, fmax(rounds.high, least)));
 	return total;
 }
 
@@ -44,20 +55,55 @@ double job_progress(const struct job *j, double now)
 {
 	if (j->state == JOB_DONE)
 		return 1;
-	double p = work_done(j) / work_total(j);
+	double p = work_done(j) / work_total(j).middle;
 	if (j->plan.seconds > 0 && !isnan(j->started) && job_is_live(j))
 		p = fmax(p, (now - j->started) / j->plan.seconds);
 	return fmin(1, fmax(j->progress_floor, p));
 }
 
-double job_eta(const struct job *j, double now)
+static double seconds_left(const struct job *j, double total, double now)
+{
+	double left = INFINITY, rate = rate_value(&j->rate, now);
+	if (rate > 0)
+		left = fmax(0, total - work_done(j)) / rate;
+	if (j->plan.seconds > 0 && !isnan(j->started))
+		left = fmin(left, fmax(0, j->started + j->plan.seconds - now));
+	return isfinite(left) ? left : NAN;
+}
+
+struct forecast_range job_eta(const struct job *j, double now)
 {
 	if (!job_is_live(j))
-		return NAN;
-	double eta = INFINITY, rate = rate_value(&j->rate, now);
-	if (rate > 0)
-		eta = fmax(0, work_total(j) - work_done(j)) / rate;
-	if (j->plan.seconds > 0 && !isnan(j->started))
-		eta = fmin(eta, fmax(0, j->started + j->plan.seconds - now));
-	return isfinite(eta) ? eta : NAN;
+		return (struct forecast_range){NAN, NAN, NAN};
+	struct forecast_range total = work_total(j);
+	return (struct forecast_range){seconds_left(j, total.low, now), seconds_left(j, total.middle, now),
+				       seconds_left(j, total.high, now)};
+}
+
+void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, double cpu_seconds)
+{
+	/* What workers have merged ahead of the prefix is paid for, but not in the picture yet. */
+	double in_prefix = (double)j->rounds * j->slot_count / (double)(j->leases_merged ? j->leases_merged : 1);
+	struct forecast_look l = {.work = (double)j->rounds * (double)plan_round_mutations(&j->plan),
+				  .cpu_seconds = cpu_seconds * in_prefix,
+				  .seconds = j->looked_at - j->opened,
+				  .rel_mse = rel_mse,
+				  .rel_mse_upper = rel_error * rel_error,
+				  .degrees = degrees > 0 ? degrees : j->plan.groups - 1.0};
+	uint32_t count = j->looks.count;
+	forecast_add_look(&j->looks, &l);
+	if (!j->looks.count || (count == j->looks.count && count < FORECAST_LOOKS))
+		return;
+	forecast_error(&j->looks, &j->error_now);
+	forecast_target(&j->looks, &j->plan, j->plan.target_error, FORECAST_SAME, &j->stop);
+	forecast_halving(&j->looks, &j->plan, &j->halving);
+}
+
+struct forecast_range job_halving_seconds(const struct job *j, double now)
+{
+	double rate = rate_value(&j->rate, now);
+	const struct forecast_range *work = &j->halving.work;
+	if (!job_is_live(j) || !(rate > 0))
+		return j->halving.seconds;
+	return (struct forecast_range){work->low / rate, work->middle / rate, work->high / rate};
 }

@@ -36,7 +36,7 @@ static void init(struct job *j, const struct event_submit *e, double now)
 	j->mixed = e->mixed;
 	j->plan = *e->plan;
 	j->submitted = now;
-	j->started = j->ended = j->rel_error = NAN;
+	j->started = j->ended = j->rel_error = j->opened = NAN;
 	j->published = now;
 	for (int i = 0; i < 2; i++) {
 		list_init(&j->ready[i]);
@@ -180,6 +180,7 @@ bool job_merge(struct job *j, struct slot *s, double now, double duration)
 
 void job_open_rounds(struct job *j, double now)
 {
+	j->opened = now;
 	begin(j, LEASE_RENDER, j->plan.rounds, now);
 }
 

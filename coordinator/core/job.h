@@ -2,6 +2,7 @@
 #ifndef COORDINATOR_CORE_JOB_H
 #define COORDINATOR_CORE_JOB_H
 
+#include "common/film/forecast.h"
 #include "coordinator/core/farm.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/list.h"
@@ -51,6 +52,11 @@ struct job {
 	double median; /* NAN: none yet */
 	struct rate rate;
 	double progress_floor, rel_error;
+	double opened;    /* the first round; NAN: not yet */
+	double looked_at; /* when the error was asked for last */
+	struct forecast_history looks;
+	struct forecast_range error_now;     /* these, when there are looks */
+	struct forecast_cost stop, halving;
 	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
 	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
 	char text[256];
@@ -79,6 +85,11 @@ void job_unpin_if_untouched(struct job *j);
 bool job_takes(const struct job *j, const struct peer *p);
 
 double job_progress(const struct job *j, double now);
-double job_eta(const struct job *j, double now);
+/* s; middle NAN: unknown. */
+struct forecast_range job_eta(const struct job *j, double now);
+/* The error of the prefix is known. */
+void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, double cpu_seconds);
+/* Seconds until the error is half of what it is, at the present rate. */
+struct forecast_range job_halving_seconds(const struct job *j, double now);
 
 #endif

@@ -143,6 +143,7 @@ void rounds_cancel(struct farm *f, const struct event *ev)
 static void evaluate(struct farm *f, struct job *j)
 {
 	j->evaluating = true;
+	j->looked_at = f->now;
 	about_job(f, ACTION_EVALUATE_ERROR, j);
 }
 
@@ -221,6 +222,7 @@ void rounds_error_known(struct farm *f, const struct event *ev)
 	j->progress_floor = job_progress(j, f->now);
 	j->rel_error = ev->error_known.rel_error;
 	j->rel_error_rounds = j->rounds;
+	job_note_look(j, ev->error_known.rel_error, ev->error_known.rel_mse, ev->error_known.degrees, ev->error_known.cpu_seconds);
 	if (j->rel_error <= j->plan.target_error)
 		rounds_end(f, j, END_ERROR, "");
 	else if (j->ending != END_NONE)

@@ -124,11 +124,19 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		.ended = j->ended,
 		.progress = job_progress(j, now),
 		.rate = job_is_live(j) ? rate_value(&j->rate, now) : 0,
-		.eta = job_eta(j, now),
 		.disagrees = j->disagrees,
 		.rel_error = j->rel_error,
 		.rel_error_rounds = j->rel_error_rounds,
+		.bootstrap_seconds = j->opened - j->started,
+		.looks = &j->looks,
+		.error_now = j->error_now,
+		.halving_cpu = j->halving.cpu_seconds,
+		.halving_seconds = job_halving_seconds(j, now),
 	};
+	struct forecast_range eta = job_eta(j, now);
+	s->eta = eta.middle;
+	s->eta_low = eta.low;
+	s->eta_high = eta.high;
 	fill_counts(j, s);
 	memcpy(s->text, j->text, sizeof s->text);
 	why_waiting(f, j, s->waiting, sizeof s->waiting);

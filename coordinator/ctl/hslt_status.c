@@ -7,6 +7,7 @@
 
 #include <argp.h>
 #include <jansson.h>
+#include <math.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -121,6 +122,23 @@ static const char *color_of(const char *state, bool colors)
 	       : strcmp(state, "running") == 0 || strcmp(state, "bootstrap") == 0 ? "\033[36m" : "\033[33m";
 }
 
+/* Which bound ended it, where there were several. */
+static const char *bound_of(const json_t *job)
+{
+	const char *reason = text_of(job, "reason");
+	if (!(number_of(job, "targetError") > 0) || strcmp(text_of(job, "state"), "done") != 0)
+		return "";
+	return strcmp(reason, "error") == 0 ? "target error reached" : strcmp(reason, "time") == 0 ? "time was up before the target error"
+	       : strcmp(reason, "mutations") == 0 ? "all mutations were made before the target error" : "";
+}
+
+/* null and negative: it has no end */
+static double span(const json_t *range, const char *key)
+{
+	const json_t *x = json_object_get(range, key);
+	return json_is_number(x) && json_number_value(x) >= 0 ? json_number_value(x) : HUGE_VAL;
+}
+
 static void print_job(const json_t *job, bool colors)
 {
 	char rate[32] = "-", eta[32] = "-", error[32] = "-";
@@ -135,7 +153,34 @@ static void print_job(const json_t *job, bool colors)
 	printf("%-6s %s%-10s%s %5.1f %% %9s %9s %8s %7.0f %6.0f  %s", text_of(job, "id"), color_of(state, colors), state,
 	       colors ? "\033[0m" : "", 100 * number_of(job, "progress"), rate, eta, error, number_of(job, "rounds"),
 	       number_of(job, "leases"), text_of(job, "name"));
-	printf("%s%s\n", *text_of(job, "why") ? "  # " : "", text_of(job, "why"));
+	const char *why = *text_of(job, "why") ? text_of(job, "why") : bound_of(job);
+	printf("%s%s\n", *why ? "  # " : "", why);
+}
+
+/* "3.2 % (3.0 - 3.5 %), half of it costs 12 min of processors, 6.0 min more; done in 31 min (25 min - 40 min)" */
+static void print_forecast(const json_t *job)
+{
+	const json_t *error = json_object_get(job, "errorNow"), *half = json_object_get(job, "nextHalving");
+	const json_t *eta = json_object_get(job, "etaRange");
+	char a[32], b[32], c[32];
+	if (!json_is_object(error))
+		return;
+	printf("       error %.3g %% (%.3g - %.3g %%)", 100 * number_of(error, "expected"), 100 * number_of(error, "low"),
+	       100 * number_of(error, "high"));
+	if (number_of(job, "targetError") > 0)
+		printf(", target %.3g %%", 100 * number_of(job, "targetError"));
+	if (json_is_object(half)) {
+		progress_duration(span(json_object_get(half, "cpuSeconds"), "expected"), a, sizeof a);
+		progress_duration(span(json_object_get(half, "wallSeconds"), "expected"), b, sizeof b);
+		printf("; to halve it costs %s of processors, %s", a, b);
+	}
+	if (json_is_object(eta)) {
+		progress_duration(span(eta, "expected"), a, sizeof a);
+		progress_duration(span(eta, "low"), b, sizeof b);
+		progress_duration(span(eta, "high"), c, sizeof c);
+		printf("; done in %s (%s - %s)", a, b, c);
+	}
+	printf("\n");
 }
 
 static void print_effects(const json_t *job)
@@ -217,6 +262,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 		if (only) {
 			if (*text_of(job, "note"))
 				printf("       note: %s\n", text_of(job, "note"));
+			print_forecast(job);
 			print_effects(job);
 			print_strategies(job);
 			print_agreement(job);

@@ -28,6 +28,7 @@ static void begin_record(struct order *o)
 	r->priority = m->priority;
 	r->rel_error = -1;
 	record_begin_agreement(r);
+	r->target_error = o->plan.target_error;
 	r->submitted = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 
@@ -111,6 +112,9 @@ static struct chain_state **states_at(const struct order *o, const struct lease_
 int order_merge(struct order *o, struct batch *b, struct error *e)
 {
 	o->cpu_seconds += b->cpu_seconds;
+	o->record.cpu_seconds = o->cpu_seconds;
+	if (b->key.kind == LEASE_BOOTSTRAP)
+		o->record.bootstrap_cpu_seconds = o->cpu_seconds;
 	if (b->key.kind == LEASE_BOOTSTRAP)
 		return bootstrap_add(o->bootstrap, b, e);
 	int rc = canvas_add(o->canvas, b, e);

@@ -67,7 +67,10 @@ static void tell_error(const struct publishing *w)
 			   .job = w->order->id,
 			   .error_known = {.job = w->order->id,
 					   .rounds = w->rounds,
-					   .rel_error = w->rc ? NAN : sqrt(w->image.rel_mse_upper)}};
+					   .rel_error = w->rc ? NAN : sqrt(w->image.rel_mse_upper),
+					   .rel_mse = w->rc ? NAN : w->image.rel_mse,
+					   .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
+					   .cpu_seconds = w->order->cpu_seconds - w->order->record.bootstrap_cpu_seconds}};
 	server_step(w->server, &ev);
 }
 

@@ -382,6 +382,7 @@ void session_send_job_end(struct session *p, uint64_t job)
 void session_tick(struct session *p)
 {
 	struct job_view v;
+	struct view_looks looks;
 	Farm__JobStatus status;
 	Farm__Envelope m;
 	if (!p->watched || p->state != SESSION_CLIENT || conn_unsent(p->conn))
@@ -397,6 +398,7 @@ void session_tick(struct session *p)
 	*p->shown = v;
 	farm__envelope__init(&m);
 	view_to_wire(&v, &status);
+	view_looks_to_wire(&v, &looks, &status);
 	m.body_case = FARM__ENVELOPE__BODY_JOB_STATUS;
 	m.job_status = &status;
 	session_send(p, &m, NULL, 0);

@@ -2,6 +2,7 @@
 
 #include "common/base/text.h"
 #include "common/film/agreement_json.h"
+#include "common/film/forecast_json.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -40,7 +41,13 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	r->exit_code = job_state_is_end(s->state) ? (uint32_t)job_exit_code(s) : 0;
 	v->rate = isfinite(s->rate) ? s->rate : 0;
 	v->eta = isfinite(s->eta) ? s->eta : -1;
+	v->eta_low = isfinite(s->eta_low) ? s->eta_low : -1;
+	v->eta_high = isfinite(s->eta_high) ? s->eta_high : -1;
 	v->leases = s->leases_out;
+	r->bootstrap_seconds = isfinite(s->bootstrap_seconds) ? s->bootstrap_seconds : 0;
+	r->looks = *s->looks;
+	v->halving_cpu = s->halving_cpu;
+	v->halving_seconds = s->halving_seconds;
 	r->leases_merged = s->leases_merged;
 	r->repeats = s->repeats;
 	r->refused = s->refused;
@@ -85,6 +92,31 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 	out->ended = record_is_ended(r);
 	out->exit_code = r->exit_code;
 	out->note = borrow(r->note);
+	out->eta_low = v->eta_low;
+	out->eta_high = v->eta_high;
+	out->target_error = r->target_error;
+	out->cpu_seconds = r->cpu_seconds;
+	out->bootstrap_cpu_seconds = r->bootstrap_cpu_seconds;
+	out->bootstrap_seconds = r->bootstrap_seconds;
+	out->halving_cpu_seconds = v->halving_cpu.middle;
+	out->halving_seconds = v->halving_seconds.middle;
+}
+
+void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm__JobStatus *out)
+{
+	const struct forecast_history *h = &v->record.looks;
+	for (uint32_t i = 0; i < h->count; i++) {
+		Farm__Look *l = looks->at[i] = &looks->look[i];
+		farm__look__init(l);
+		l->work = h->looks[i].work;
+		l->cpu_seconds = h->looks[i].cpu_seconds;
+		l->seconds = h->looks[i].seconds;
+		l->rel_mse = h->looks[i].rel_mse;
+		l->rel_mse_upper = h->looks[i].rel_mse_upper;
+		l->degrees = h->looks[i].degrees;
+	}
+	out->n_looks = h->count;
+	out->looks = looks->at;
 }
 
 static json_t *effects_to_json(const Farm__Submit *m)
@@ -98,7 +130,26 @@ static json_t *effects_to_json(const Farm__Submit *m)
 
 static json_t *number_or_null(double x, bool known)
 {
-	return known && isfinite(x) ? json_real(x) : json_null();
+	return known ? forecast_real(x) : json_null();
+}
+
+/* What is known of the error, and what less of it will cost. */
+static void add_forecast(json_t *o, const struct job_view *v)
+{
+	const struct job_record *r = &v->record;
+	struct forecast_range error, eta = {v->eta_low, v->eta, v->eta_high};
+	bool known = forecast_error(&r->looks, &error), live = !record_is_ended(r);
+	json_object_set_new(o, "targetError", number_or_null(r->target_error, r->target_error > 0));
+	json_object_set_new(o, "cpuSeconds", json_real(r->cpu_seconds));
+	json_object_set_new(o, "bootstrapCpuSeconds", json_real(r->bootstrap_cpu_seconds));
+	json_object_set_new(o, "bootstrapSeconds", json_real(r->bootstrap_seconds));
+	json_object_set_new(o, "errorNow", known ? forecast_range_to_json(&error) : json_null());
+	json_object_set_new(o, "etaRange", live && v->eta >= 0 ? forecast_range_to_json(&eta) : json_null());
+	json_object_set_new(o, "nextHalving", !known || !live ? json_null() :
+			    json_pack("{s:o s:o}", "cpuSeconds", forecast_range_to_json(&v->halving_cpu), "wallSeconds",
+				      forecast_range_to_json(&v->halving_seconds)));
+	if (live) /* there may be many that have ended */
+		json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 }
 
 json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit)
@@ -117,6 +168,7 @@ json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit)
 		return NULL;
 	json_object_set_new(o, "eta", number_or_null(v->eta, v->eta >= 0));
 	json_object_set_new(o, "error", number_or_null(r->rel_error, r->rel_error >= 0));
+	add_forecast(o, v);
 	json_object_set_new(o, "counts", record_counts(r));
 	json_object_set_new(o, "mixture", json_string(r->mixture));
 	json_object_set_new(o, "strategies", record_strategies(r));

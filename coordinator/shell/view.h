@@ -15,6 +15,8 @@
 struct job_view {
 	struct job_record record;
 	double rate, eta;  /* eta negative: not known */
+	double eta_low, eta_high; /* where eta is known */
+	struct forecast_range halving_cpu, halving_seconds; /* where there are looks */
 	uint32_t leases;   /* out at workers */
 	char waiting[256]; /* why nothing is being done for it */
 };
@@ -24,6 +26,10 @@ void view_of_record(struct job_view *v, const struct job_record *r);
 void view_add_status(struct job_view *v, const struct job_status *s);
 
 void view_to_wire(const struct job_view *v, Farm__JobStatus *out); /* borrows v's texts */
+struct view_looks {
+	Farm__Look look[FORECAST_LOOKS], *at[FORECAST_LOOKS];
+};
+void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm__JobStatus *out); /* borrows both */
 json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit); /* submit: NULL for jobs of earlier lives */
 json_t *view_peer_to_json(const struct peer_status *p, double now);
 json_t *view_lease_to_json(const struct lease_status *l, const char *worker, double now);

@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/film/agreement_json.h"
+#include "common/film/forecast_json.h"
 #include "common/film/strategy_json.h"
 
 #include <stdlib.h>
@@ -78,6 +79,24 @@ static void take_counts(const json_t *o, struct job_record *r)
 	}
 }
 
+static void put_looks(json_t *o, const struct job_record *r)
+{
+	json_object_set_new(o, "targetError", json_real(r->target_error));
+	json_object_set_new(o, "cpuSeconds", json_real(r->cpu_seconds));
+	json_object_set_new(o, "bootstrapCpuSeconds", json_real(r->bootstrap_cpu_seconds));
+	json_object_set_new(o, "bootstrapSeconds", json_real(r->bootstrap_seconds));
+	json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
+}
+
+static void take_looks(const json_t *o, struct job_record *r)
+{
+	r->target_error = json_number_value(json_object_get(o, "targetError"));
+	r->cpu_seconds = json_number_value(json_object_get(o, "cpuSeconds"));
+	r->bootstrap_cpu_seconds = json_number_value(json_object_get(o, "bootstrapCpuSeconds"));
+	r->bootstrap_seconds = json_number_value(json_object_get(o, "bootstrapSeconds"));
+	forecast_looks_from_json(json_object_get(o, "looks"), &r->looks);
+}
+
 char *record_to_json(const struct job_record *r)
 {
 	json_t *o = json_pack("{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:o s:s s:s s:o}", /* */
@@ -90,6 +109,8 @@ char *record_to_json(const struct job_record *r)
 	json_object_set_new(o, "agreement", agreement_to_json(&r->agreement));
 	json_object_set_new(o, "b", json_real(r->b));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
+	if (o)
+		put_looks(o, r);
 	char *text = o ? json_dumps(o, JSON_INDENT(2)) : NULL;
 	json_decref(o);
 	char *copy = text ? mem_strdup(text) : NULL;
@@ -134,6 +155,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	agreement_from_json(json_object_get(o, "agreement"), &r->agreement);
 	r->b = json_number_value(json_object_get(o, "b"));
 	classes_from_json(json_object_get(o, "classes"), r->classes);
+	take_looks(o, r);
 	json_decref(o);
 	return 0;
 }

@@ -7,6 +7,7 @@
 
 #include "common/base/error.h"
 #include "common/film/agreement.h"
+#include "common/film/forecast.h"
 #include "common/film/strategy.h"
 
 #include <jansson.h>
@@ -28,6 +29,10 @@ struct job_record {
 	double submitted, ended; /* seconds since 1970; 0: not yet */
 	double progress;
 	double rel_error; /* negative: not known */
+	double target_error; /* 0: none */
+	double cpu_seconds, bootstrap_cpu_seconds; /* of all merged leases, of those of the bootstrap */
+	double bootstrap_seconds; /* wall clock */
+	struct forecast_history looks;
 	uint64_t rounds, mutations, leases_merged;
 	uint64_t repeats, refused, failures, duplicates, timeouts; /* what went wrong and cost nothing */
 	uint64_t stuck, longest_stuck; /* times that a chain accepted nothing during an epoch; most rejections in a row */

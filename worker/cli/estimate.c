@@ -1,7 +1,8 @@
 #include "worker/cli/estimate.h"
 
+#include "common/base/progress.h"
+#include "common/film/forecast_json.h"
 #include "worker/cli/plot.h"
-#include "worker/cli/stats.h"
 
 #include <errno.h>
 #include <jansson.h>
@@ -60,30 +61,14 @@ int estimate_check(const struct estimate *s, struct error *e)
 			 s->looks->count, LOOKS_LEAST);
 }
 
-void estimate_time(double seconds, char *text, size_t size)
-{
-	static const struct {
-		double unit;
-		const char *name;
-	} units[] = {{1, "s"}, {60, "min"}, {3600, "h"}, {86400, "days"}, {31557600, "years"}};
-	size_t i = 0;
-	while (i + 1 < sizeof units / sizeof *units && seconds >= 1.995 * units[i + 1].unit)
-		i++;
-	double x = seconds / units[i].unit;
-	if (!(x < 1e6))
-		snprintf(text, size, "for ever");
-	else
-		snprintf(text, size, "%.*f %s", x < 9.95 ? 1 : 0, x, units[i].name);
-}
-
 /* ---- the table */
 
 static void print_range(FILE *f, const struct forecast_range *r)
 {
 	char low[32], middle[32], high[32], between[80];
-	estimate_time(r->low, low, sizeof low);
-	estimate_time(r->middle, middle, sizeof middle);
-	estimate_time(r->high, high, sizeof high);
+	progress_duration(r->low, low, sizeof low);
+	progress_duration(r->middle, middle, sizeof middle);
+	progress_duration(r->high, high, sizeof high);
 	snprintf(between, sizeof between, "%s - %s", low, high);
 	fprintf(f, "  %9s  %-20s", middle, between);
 }
@@ -95,8 +80,8 @@ void estimate_print(const struct estimate *s, FILE *f)
 	char text[64], cpu[64];
 	struct forecast_range now;
 	forecast_error(s->looks, &now);
-	estimate_time(s->seconds, text, sizeof text);
-	estimate_time(s->cpu_seconds, cpu, sizeof cpu);
+	progress_duration(s->seconds, text, sizeof text);
+	progress_duration(s->cpu_seconds, cpu, sizeof cpu);
 	fprintf(f, "%s: a pilot of %s (%s of processors) came to an error of %.3g %% (%.3g - %.3g %%)\n", s->scene, text, cpu,
 		100 * now.middle, 100 * now.low, 100 * now.high);
 	fprintf(f, "each with its 90 %% interval; wall clock on %s\n", s->where);
@@ -107,7 +92,7 @@ void estimate_print(const struct estimate *s, FILE *f)
 		print_range(f, &row[i].cost.cpu_seconds);
 		print_range(f, &row[i].cost.seconds);
 		if (row[i].reached) {
-			estimate_time(row[i].reached->seconds + s->bootstrap_seconds, text, sizeof text);
+			progress_duration(row[i].reached->seconds + s->bootstrap_seconds, text, sizeof text);
 			fprintf(f, "  reached after %s by the pilot", text);
 		}
 		fprintf(f, "\n");
@@ -115,12 +100,6 @@ void estimate_print(const struct estimate *s, FILE *f)
 }
 
 /* ---- JSON */
-
-static json_t *range_json(const struct forecast_range *r)
-{
-	return json_pack("{s:o s:o s:o}", "low", stats_real(r->low), "expected", stats_real(r->middle), "high",
-			 stats_real(r->high));
-}
 
 static json_t *reached_json(const struct estimate *s, const struct forecast_look *l)
 {
@@ -137,9 +116,9 @@ static json_t *targets_json(const struct estimate *s)
 	json_t *list = json_array();
 	for (size_t i = 0; i < count; i++)
 		json_array_append_new(list, json_pack("{s:f s:o s:o s:o s:o}", "error", row[i].target, "mutations",
-						      range_json(&row[i].cost.work), "cpuSeconds",
-						      range_json(&row[i].cost.cpu_seconds), "wallSeconds",
-						      range_json(&row[i].cost.seconds), "reached",
+						      forecast_range_to_json(&row[i].cost.work), "cpuSeconds",
+						      forecast_range_to_json(&row[i].cost.cpu_seconds), "wallSeconds",
+						      forecast_range_to_json(&row[i].cost.seconds), "reached",
 						      reached_json(s, row[i].reached)));
 	return list;
 }
@@ -151,9 +130,9 @@ int estimate_print_json(const struct estimate *s, FILE *f, struct error *e)
 	plan_describe(s->plan, plan, sizeof plan);
 	forecast_error(s->looks, &now);
 	json_t *o = json_pack("{s:i s:s s:s s:s s:s s:o s:{s:f s:f s:f s:f s:o} s:o}", "schema", 1, "type", "estimate", "scene",
-			      s->scene, "plan", plan, "where", s->where, "errorNow", range_json(&now), "pilot", "wallSeconds",
+			      s->scene, "plan", plan, "where", s->where, "errorNow", forecast_range_to_json(&now), "pilot", "wallSeconds",
 			      s->seconds, "cpuSeconds", s->cpu_seconds, "bootstrapCpuSeconds", s->bootstrap_cpu,
-			      "bootstrapWallSeconds", s->bootstrap_seconds, "looks", stats_looks(s->looks), "targets",
+			      "bootstrapWallSeconds", s->bootstrap_seconds, "looks", forecast_looks_to_json(s->looks), "targets",
 			      targets_json(s));
 	if (!o)
 		return error_set(e, ENOMEM, "no memory for the estimate");
@@ -209,7 +188,7 @@ static void draw_goal(const struct row *r, struct drawing *d, size_t i)
 {
 	char text[32];
 	const struct forecast_range *c = &r->cost.cpu_seconds;
-	estimate_time(c->middle, text, sizeof text);
+	progress_duration(c->middle, text, sizeof text);
 	snprintf(d->labels[i], sizeof d->labels[i], "%.3g %%: %s", 100 * r->target, text);
 	double x[3] = {c->low, c->middle, c->high};
 	for (int k = 0; k < 3; k++) {

@@ -25,7 +25,4 @@ void estimate_print(const struct estimate *s, FILE *f);
 int estimate_print_json(const struct estimate *s, FILE *f, struct error *e);
 int estimate_plot(const struct estimate *s, const char *path, struct error *e);
 
-/* "45 s", "3.1 min", "2.4 h", "12 days"; "for ever". */
-void estimate_time(double seconds, char *text, size_t size);
-
 #endif

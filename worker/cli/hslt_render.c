@@ -126,6 +126,8 @@ struct session {
 	struct canvas_image image;
 	struct forecast_history looks;
 	struct agreement agreement;
+	double forecast_seconds; /* from the first bootstrap sample to the target; 0: unknown */
+	char forecast[160];
 	double build_seconds;
 	struct progress progress;
 	bool usage; /* what went wrong was asked for */
@@ -183,22 +185,42 @@ static int make_plan(struct session *s, struct error *e)
 static void show(void *user, const struct local_progress *p)
 {
 	struct session *s = user;
-	char detail[64], eta[32];
+	char detail[224], eta[32];
 	double fraction = 0;
 	if (p->total != UINT64_MAX)
 		fraction = (double)p->done / (double)p->total;
+	if (s->forecast_seconds > 0)
+		fraction = fmax(fraction, fmin(p->seconds / s->forecast_seconds, 0.99));
 	if (s->plan.seconds > 0)
 		fraction = fmax(fraction, fmin(p->seconds / s->plan.seconds, 0.99));
 	progress_time(fraction > 0 ? p->seconds * (1 / fraction - 1) : 0, eta, sizeof eta);
-	snprintf(detail, sizeof detail, "%s left", eta);
+	snprintf(detail, sizeof detail, "%s left%s", eta, s->forecast);
 	progress_show(&s->progress, fraction, p->state, detail);
+}
+
+/* After a look: when it will stop by its target, and what the next halving would cost, for the progress line. */
+static void expect(struct session *s, const struct local_round *r)
+{
+	struct forecast_cost stop, half;
+	struct forecast_range error;
+	char low[32], high[32], more[32];
+	forecast_add(&s->looks, &s->plan, r->image, r->cpu_seconds, r->seconds);
+	if (!forecast_error(&s->looks, &error) || !forecast_halving(&s->looks, &s->plan, &half) ||
+	    !forecast_target(&s->looks, &s->plan, s->plan.target_error, FORECAST_SAME, &stop))
+		return;
+	s->forecast_seconds = stop.seconds.middle + r->bootstrap_seconds;
+	progress_duration(stop.seconds.low - r->seconds, low, sizeof low);
+	progress_duration(stop.seconds.high - r->seconds, high, sizeof high);
+	progress_duration(half.seconds.middle, more, sizeof more);
+	snprintf(s->forecast, sizeof s->forecast, " (%s - %s to the target), error %.3g %%, half of it in %s", low, high,
+		 100 * error.middle, more);
 }
 
 static void look(void *user, const struct local_round *r)
 {
 	struct session *s = user;
 	if (r->image)
-		forecast_add(&s->looks, &s->plan, r->image, r->cpu_seconds, r->seconds);
+		expect(s, r);
 }
 
 static int render(struct session *s, struct error *e)

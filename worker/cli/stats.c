@@ -1,6 +1,7 @@
 #include "worker/cli/stats.h"
 
 #include "common/film/agreement_json.h"
+#include "common/film/forecast_json.h"
 #include "common/film/image_file.h"
 #include "common/film/strategy.h"
 #include "common/film/strategy_json.h"
@@ -25,24 +26,6 @@ const char *stats_end_name(enum merge_end end)
 	return names[end];
 }
 
-json_t *stats_real(double x)
-{
-	return isfinite(x) ? json_real(x) : json_null();
-}
-
-json_t *stats_looks(const struct forecast_history *h)
-{
-	json_t *list = json_array();
-	for (uint32_t i = 0; i < h->count; i++) {
-		const struct forecast_look *l = &h->looks[i];
-		json_array_append_new(list, json_pack("{s:f s:f s:f s:o s:o s:o}", "mutations", l->work, "cpuSeconds",
-						      l->cpu_seconds, "wallSeconds", l->seconds, "relMSE", stats_real(l->rel_mse),
-						      "relMSEUpper", stats_real(l->rel_mse_upper), "degrees",
-						      stats_real(l->degrees)));
-	}
-	return list;
-}
-
 static json_t *plan_json(const struct stats *s)
 {
 	const struct plan *p = s->run->plan;
@@ -63,8 +46,8 @@ static json_t *image_json(const struct canvas_image *i)
 	for (int k = 0; k < BATCH_COUNTERS; k++)
 		if (counter_names[k])
 			json_object_set_new(counters, counter_names[k], json_integer((json_int_t)i->counts.counters[k]));
-	return json_pack("{s:o s:o s:o s:o s:o}", "b", stats_real(i->b), "relMSE", stats_real(i->rel_mse), "relMSEUpper",
-			 stats_real(i->rel_mse_upper), "beyondShare", stats_real(i->beyond_share), "counters", counters);
+	return json_pack("{s:o s:o s:o s:o s:o}", "b", forecast_real(i->b), "relMSE", forecast_real(i->rel_mse), "relMSEUpper",
+			 forecast_real(i->rel_mse_upper), "beyondShare", forecast_real(i->beyond_share), "counters", counters);
 }
 
 static json_t *effects_json(const struct render_summary *m)
@@ -92,7 +75,7 @@ int stats_write(const char *path, const struct stats *s, struct error *e)
 	json_t *o = plan_json(s);
 	bool whole = json_object_update_new(o, image_json(s->image)) == 0 &&
 		     json_object_set_new(o, "effects", effects_json(s->summary)) == 0 &&
-		     json_object_set_new(o, "looks", stats_looks(s->looks)) == 0 &&
+		     json_object_set_new(o, "looks", forecast_looks_to_json(s->looks)) == 0 &&
 		     json_object_update_new(o, end_json(s)) == 0;
 	char *text = whole ? json_dumps(o, JSON_INDENT(2)) : NULL;
 	json_decref(o);

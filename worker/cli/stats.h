@@ -8,8 +8,6 @@
 #include "common/film/forecast.h"
 #include "worker/cli/local.h"
 
-#include <jansson.h>
-
 struct stats {
 	const char *scene; /* file name */
 	const struct render_summary *summary;
@@ -20,8 +18,6 @@ struct stats {
 	const struct forecast_history *looks;
 };
 
-json_t *stats_looks(const struct forecast_history *h);
-json_t *stats_real(double x); /* null where it is no number */
 const char *stats_end_name(enum merge_end end);
 int stats_write(const char *path, const struct stats *s, struct error *e);
 

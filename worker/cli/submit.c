@@ -7,6 +7,7 @@
 #include "worker/cli/options.h"
 
 #include <fcntl.h>
+#include <math.h>
 #include <stdio.h>
 #include <string.h>
 #include <unistd.h>
@@ -282,17 +283,34 @@ int submit_send(struct client *cl, const struct submit_request *r, const struct 
 
 /* ---- waiting ---- */
 
+/* "120 k/s, 31 min left (25 min - 40 min), error 3.2 %, half costs 12 min" */
+static void describe(const Farm__JobStatus *s, const char *rate, char *text, size_t size)
+{
+	char eta[32], low[32], high[32] = "?", range[80] = "", error[80] = "";
+	progress_duration(s->eta, eta, sizeof eta);
+	if (s->eta_low >= 0 && (s->eta_low < s->eta || s->eta_high != s->eta)) {
+		progress_duration(s->eta_low, low, sizeof low);
+		if (s->eta_high >= 0)
+			progress_duration(s->eta_high, high, sizeof high);
+		snprintf(range, sizeof range, " (%s - %s)", low, high);
+	}
+	if (s->n_looks && s->halving_seconds > 0) {
+		progress_duration(s->halving_seconds, low, sizeof low);
+		snprintf(error, sizeof error, ", error %.3g %%, half of it in %s", 100 * sqrt(s->looks[s->n_looks - 1]->rel_mse), low);
+	}
+	snprintf(text, size, "%s/s, %s left%s%s", rate, eta, range, error);
+}
+
 static void show(struct progress *p, const Farm__JobStatus *s)
 {
-	char rate[32], eta[32], detail[512];
+	char rate[32], detail[512];
 	progress_number(s->rate, rate, sizeof rate);
-	progress_time(s->eta, eta, sizeof eta);
 	if (*s->why)
 		snprintf(detail, sizeof detail, "%s", s->why);
 	else if (s->ended || s->eta < 0)
 		snprintf(detail, sizeof detail, "round %llu", (unsigned long long)s->rounds);
 	else
-		snprintf(detail, sizeof detail, "%s/s, %s left", rate, eta);
+		describe(s, rate, detail, sizeof detail);
 	progress_show(p, s->progress, s->state, detail);
 }
 
