@@ -75,6 +75,14 @@ int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, cons
 	return 0;
 }
 
+static inline spectrum fresnel_lanes(double cosine, spectrum eta, spectrum k, int lanes)
+{
+	spectrum f = spectrum_of(0);
+	for (int i = 0; i < lanes; i++)
+		f.v[i] = fresnel_conductor(cosine, eta.v[i], k.v[i]);
+	return f;
+}
+
 spectrum metal_fresnel(const struct metal *m, const struct bsdf_point *p, double cosine)
 {
 	spectrum r = texture_eval(&m->reflectance, p->u, p->v, p->w);
@@ -82,7 +90,7 @@ spectrum metal_fresnel(const struct metal *m, const struct bsdf_point *p, double
 		return r;
 	spectrum eta = color_eval(&m->eta, p->w), k = color_eval(&m->k, p->w);
 	double c = fmin(fmax(cosine, 0), 1);
-	for (int i = 0; i < SPECTRUM_LANES; i++)
-		r.v[i] *= fresnel_conductor(c, eta.v[i], k.v[i]);
-	return r;
+	if (p->w->few)
+		return spectrum_mul(r, spectrum_repeat(fresnel_lanes(c, eta, k, (int)p->w->few), (int)p->w->few));
+	return spectrum_mul(r, fresnel_lanes(c, eta, k, SPECTRUM_LANES));
 }

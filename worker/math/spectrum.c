@@ -12,6 +12,18 @@ struct wavelengths wavelengths_sample(double u)
 	return w;
 }
 
+struct wavelengths wavelengths_sample_few(double u, unsigned count)
+{
+	if (count >= SPECTRUM_LANES)
+		return wavelengths_sample(u);
+	struct wavelengths w = {.grey = false, .few = count};
+	for (unsigned i = 0; i < SPECTRUM_LANES; i++) {
+		double x = u + (double)(i % count) / count;
+		w.nm[i] = WAVELENGTH_MIN + (WAVELENGTH_MAX - WAVELENGTH_MIN) * (x - floor(x));
+	}
+	return w;
+}
+
 void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3])
 {
 	const double factor = (WAVELENGTH_MAX - WAVELENGTH_MIN) / (CIE_Y_SUM * SPECTRUM_LANES);

@@ -20,6 +20,7 @@ typedef struct {
 struct wavelengths {
 	double nm[SPECTRUM_LANES];
 	bool grey; /* the scene carries no colour: nm is not to be read */
+	unsigned few; /* 0: all differ; 1 or 2: nm repeats after so many, for the same mean from fewer wavelengths */
 };
 
 static inline spectrum spectrum_of(double x)
@@ -82,6 +83,16 @@ static inline bool spectrum_is_valid(spectrum a) /* finite and nowhere negative 
 
 /* u in [0,1) -> the first wavelength uniform over the range, the others rotated by quarters of it. */
 struct wavelengths wavelengths_sample(double u);
+/* Of 1, 2 or 4 wavelengths, evenly rotated. */
+struct wavelengths wavelengths_sample_few(double u, unsigned count);
+
+/* The first `lanes` again and again. */
+static inline spectrum spectrum_repeat(spectrum s, int lanes)
+{
+	for (int i = lanes; i < SPECTRUM_LANES; i++)
+		s.v[i] = s.v[i - lanes];
+	return s;
+}
 
 /* The CIE 1931 colour of a spectrum estimated from its four lanes (one-sample estimate of the integral of
  * L x_bar / 106.857 nm, so that an emitter of rgb 1 has Y = 1). Not for grey: the film has its own factor. */

@@ -243,7 +243,7 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	film[0] = c->window.x + u[DIM_FILM_X] * c->window.width;
 	film[1] = c->window.y + u[DIM_FILM_Y] * c->window.height;
 	if (w->effects.colour)
-		c->wl = wavelengths_sample(u[DIM_WAVELENGTH]);
+		c->wl = wavelengths_sample_few(u[DIM_WAVELENGTH], (unsigned)w->knobs.wavelengths);
 	else
 		c->wl.grey = true;
 	v[0] = (struct path_vertex){.kind = VERTEX_CAMERA, .emitter = -1, .pdf = 1, .beta = spectrum_of(1)};

@@ -142,7 +142,7 @@ void whole_set_wavelength(const struct path_context *c, struct whole_path *x, do
 	x->wavelength = u;
 	x->known_f = x->known_fh = 0;
 	if (c->w->effects.colour)
-		x->wl = wavelengths_sample(u);
+		x->wl = wavelengths_sample_few(u, (unsigned)c->w->knobs.wavelengths);
 	else
 		x->wl.grey = true;
 }

@@ -18,6 +18,9 @@ KNOB(precision, "precision", KNOB_CHOICE, KNOB_CHAINS, KNOB_DOUBLE, KNOB_DOUBLE,
 KNOB(step_scale, "step-scale", KNOB_REAL, KNOB_CHAINS, 1, 1e-3, 1000, NULL,
      "Factor of the largest step of a half vector, which is a lobe's mean slope",
      "0.1", "0.25", "0.5", "1", "2", "4")
+KNOB(wavelengths, "wavelengths", KNOB_CHOICE, KNOB_PATHS, 4, 1, 4, "1 2 4",
+     "Wavelengths that travel together along a path where nothing disperses",
+     "1", "2", "4")
 KNOB(roughness, "roughness", KNOB_REAL, KNOB_WORLD, 0, 0, 1, NULL,
      "Rough metal and glass of less roughness is taken for smooth",
      "0", "0.001", "0.003", "0.01", "0.03", "0.1")

@@ -223,25 +223,32 @@ static double table_value(const struct color *c, double nm)
 	return (1 - b) * c->value[i] + b * c->value[i + 1];
 }
 
+static inline spectrum eval_lanes(const struct color *c, const struct wavelengths *w, int lanes)
+{
+	spectrum s = spectrum_of(c->scale);
+	if (c->sigmoid)
+		for (int i = 0; i < lanes; i++) {
+			double nm = w->nm[i];
+			s.v[i] *= upsample_sigmoid((c->coefficient[0] * nm + c->coefficient[1]) * nm + c->coefficient[2]);
+		}
+	if (c->count)
+		for (int i = 0; i < lanes; i++)
+			s.v[i] *= table_value(c, w->nm[i]);
+	if (c->d65)
+		for (int i = 0; i < lanes; i++)
+			s.v[i] *= color_d65(w->nm[i]);
+	return s;
+}
+
 spectrum color_eval(const struct color *c, const struct wavelengths *w)
 {
 	if (w->grey || c->shape == COLOR_SHAPE_CONSTANT) {
 		assert(c->shape != COLOR_SHAPE_OTHER);
 		return spectrum_of(c->scale);
 	}
-	spectrum s = spectrum_of(c->scale);
-	if (c->sigmoid)
-		for (int i = 0; i < SPECTRUM_LANES; i++) {
-			double nm = w->nm[i];
-			s.v[i] *= upsample_sigmoid((c->coefficient[0] * nm + c->coefficient[1]) * nm + c->coefficient[2]);
-		}
-	if (c->count)
-		for (int i = 0; i < SPECTRUM_LANES; i++)
-			s.v[i] *= table_value(c, w->nm[i]);
-	if (c->d65)
-		for (int i = 0; i < SPECTRUM_LANES; i++)
-			s.v[i] *= color_d65(w->nm[i]);
-	return s;
+	if (w->few)
+		return spectrum_repeat(eval_lanes(c, w, (int)w->few), (int)w->few);
+	return eval_lanes(c, w, SPECTRUM_LANES);
 }
 
 /* The polynomial's greatest value: at an end of the range, or at its vertex. */

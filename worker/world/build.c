@@ -305,7 +305,7 @@ static void set_grey(struct world *w)
 		w->grey_xyz[i] = 0;
 	int samples = 4700;
 	for (int i = 0; i < samples; i++) {
-		struct wavelengths wl;
+		struct wavelengths wl = {.grey = false};
 		double nm = WAVELENGTH_MIN + (i + 0.5) * (WAVELENGTH_MAX - WAVELENGTH_MIN) / samples;
 		for (int k = 0; k < SPECTRUM_LANES; k++)
 			wl.nm[k] = nm;

@@ -166,6 +166,24 @@ static void test_bounds_hold(void **state)
 		}
 }
 
+/* Where wavelengths repeat, the lanes are what each wavelength alone has. */
+static void test_few_wavelengths(void **state)
+{
+	(void)state;
+	const double rgb[3] = {0.9, 0.1, 0.3};
+	for (int role = COLOR_REFLECTANCE; role <= COLOR_UNBOUNDED; role++)
+		for (unsigned count = 1; count <= 2; count++)
+			for (double u = 0; u < 1; u += 0.01) {
+				struct color c;
+				assert_int_equal(color_from_rgb(rgb, (enum color_role)role, &c), 0);
+				struct wavelengths w = wavelengths_sample_few(u, count), each = w;
+				each.few = 0;
+				spectrum few = color_eval(&c, &w), all = color_eval(&c, &each);
+				assert_memory_equal(&few, &all, sizeof few);
+				assert_true(few.v[0] == few.v[2] && few.v[1] == few.v[3]);
+			}
+}
+
 static struct value table_of(const double *nm, const double *x, uint32_t n)
 {
 	return (struct value){.type = VALUE_SPECTRUM, .as.spectrum = {.count = n, .nm = nm, .value = x}};
@@ -227,6 +245,7 @@ int main(void)
 		cmocka_unit_test(test_emitters_give_their_rgb),
 		cmocka_unit_test(test_unbounded_keeps_its_rgb),
 		cmocka_unit_test(test_bounds_hold),
+		cmocka_unit_test(test_few_wavelengths),
 		cmocka_unit_test(test_tables),
 		cmocka_unit_test(test_bad_values_are_refused),
 	};
