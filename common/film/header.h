@@ -21,8 +21,8 @@ bool header_excluded(const char *name); /* one of the four that hslt-compare --e
 
 struct header_effect { /* see render_effects */
 	const char *name;
-	bool on;
-	const char *why;
+	bool on, forced;
+	const char *why, *saves;
 };
 
 struct header_extra {

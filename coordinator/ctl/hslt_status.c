@@ -188,8 +188,9 @@ static void print_effects(const json_t *job)
 	size_t i;
 	const json_t *effect;
 	json_array_foreach(json_object_get(job, "effects"), i, effect)
-		printf("       %-3s %-14s %s\n", json_is_true(json_object_get(effect, "on")) ? "on" : "off",
-		       text_of(effect, "name"), text_of(effect, "why"));
+		printf("       %-3s%-9s %-13s %s; %s: %s\n", json_is_true(json_object_get(effect, "on")) ? "on" : "off",
+		       json_is_true(json_object_get(effect, "forced")) ? " (forced)" : "", text_of(effect, "name"), text_of(effect, "why"),
+		       json_is_true(json_object_get(effect, "on")) ? "without it" : "saves", text_of(effect, "saves"));
 }
 
 static void print_strategies(const json_t *job)

@@ -40,7 +40,7 @@ static int write_image(struct publishing *w)
 				 .workers = o->worker_count};
 	for (; x.effect_count < m->n_effects && x.effect_count < HEADER_EFFECTS_MAX; x.effect_count++) {
 		const Farm__Effect *f = m->effects[x.effect_count];
-		effects[x.effect_count] = (struct header_effect){f->name, f->on, f->why};
+		effects[x.effect_count] = (struct header_effect){f->name, f->on, f->forced, f->why, f->saves};
 	}
 	unsigned char *bytes = NULL;
 	size_t size = 0;

@@ -48,7 +48,8 @@ static int check_texts(const Farm__Submit *m, struct error *e)
 	for (size_t i = 0; ok && i < m->n_defines; i++)
 		ok = envelope_text_ok(m->defines[i]->name, 256) && envelope_text_ok(m->defines[i]->value, 4096);
 	for (size_t i = 0; ok && i < m->n_effects; i++)
-		ok = envelope_text_ok(m->effects[i]->name, 64) && envelope_text_ok(m->effects[i]->why, 256);
+		ok = envelope_text_ok(m->effects[i]->name, 64) && envelope_text_ok(m->effects[i]->why, 256) &&
+		     envelope_text_ok(m->effects[i]->saves, 256);
 	for (size_t i = 0; ok && i < m->n_notes; i++)
 		ok = envelope_text_ok(m->notes[i], 2048);
 	return ok ? 0 : error_set(e, EINVAL, "a text or a count of the submission is out of bounds");

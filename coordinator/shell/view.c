@@ -123,8 +123,9 @@ static json_t *effects_to_json(const Farm__Submit *m)
 {
 	json_t *list = json_array();
 	for (size_t i = 0; i < m->n_effects; i++)
-		json_array_append_new(list, json_pack("{s:s s:b s:s}", "name", m->effects[i]->name, "on",
-						      (int)m->effects[i]->on, "why", m->effects[i]->why));
+		json_array_append_new(list, json_pack("{s:s s:b s:b s:s s:s}", "name", m->effects[i]->name, "on",
+						      (int)m->effects[i]->on, "forced", (int)m->effects[i]->forced, "why",
+						      m->effects[i]->why, "saves", m->effects[i]->saves));
 	return list;
 }
 

@@ -114,5 +114,5 @@ void bsdf_black(struct bsdf *b)
 {
 	static const struct bsdf_ops ops = {
 		.type = "black", .eval = black_eval, .pdf_solid = black_pdf, .sample = black_sample};
-	*b = (struct bsdf){.ops = &ops, .alpha = INFINITY, .eta = 1, .shape = COLOR_SHAPE_CONSTANT};
+	*b = (struct bsdf){.ops = &ops, .alpha = INFINITY, .eta = 1, .black = true, .shape = COLOR_SHAPE_CONSTANT};
 }

@@ -77,6 +77,7 @@ struct bsdf {
 	bool dispersive;   /* the index depends on the wavelength: only bsdf_eta says it, and paths carry one wavelength */
 	bool two_sided;    /* scatters light that arrives from below the normal */
 	bool textured;
+	bool black;        /* neither reflects nor lets through */
 	enum color_shape shape; /* CONSTANT: carries no colour */
 	void *data;
 };

@@ -36,7 +36,9 @@ static int diffuse_create(struct bsdf *b, const struct scene_node *n, const stru
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
 	b->alpha_mean = 1;
-	return bsdf_texture(b, t, n, "reflectance", 0.5, build, e);
+	int code = bsdf_texture(b, t, n, "reflectance", 0.5, build, e);
+	b->black = !code && texture_max(t) == 0;
+	return code;
 }
 
 static const struct param diffuse_params[] = {

@@ -51,5 +51,6 @@ int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, cons
 	if (!code)
 		code = bsdf_texture(b, &g->transmittance, n, "specular_transmittance", 1, build, e);
 	b->two_sided = true;
+	b->black = !code && texture_max(&g->reflectance) == 0 && texture_max(&g->transmittance) == 0;
 	return code;
 }

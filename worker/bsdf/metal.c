@@ -65,6 +65,7 @@ int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, cons
 		code = bsdf_texture(b, &m->reflectance, n, "specular_reflectance", 1, build, e);
 	if (code)
 		return code;
+	b->black = texture_max(&m->reflectance) == 0;
 	m->eta.scale /= outside;
 	m->k.scale /= outside;
 	m->perfect = color_max(&m->eta) == 0 && color_max(&m->k) > 0;

@@ -73,6 +73,7 @@ static int phong_create(struct bsdf *b, const struct scene_node *n, const struct
 	if (code)
 		return code;
 	double d = texture_max(&ph->diffuse), s = texture_max(&ph->specular);
+	b->black = d + s == 0;
 	ph->exponent = node_float(n, "exponent", 30);
 	ph->scale = d + s > 1 ? 0.99 / (d + s) : 1;
 	ph->specular_chance = d + s > 0 ? s / (d + s) : 0;

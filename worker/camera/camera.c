@@ -39,6 +39,7 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	c->far_clip = s->far_clip * world_scale;
 	c->aperture = s->aperture_radius * world_scale;
 	c->focus = s->focus_distance * world_scale;
+	c->lens = c->aperture > 0;
 	if (!(c->aperture >= 0) || (c->aperture > 0 && !(c->focus > 0)))
 		return error_set(e, EINVAL, "an aperture of radius %g, focused at a distance of %g", s->aperture_radius, s->focus_distance);
 	return 0;
@@ -46,7 +47,16 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 
 bool camera_has_aperture(const struct camera *c)
 {
-	return c->aperture > 0;
+	return c->lens;
+}
+
+void camera_force_aperture(struct camera *c, bool on)
+{
+	c->lens = on;
+	if (!on)
+		c->aperture = 0;
+	else if (!(c->focus > 0))
+		c->focus = 1; /* any: nothing lies off the centre */
 }
 
 /* The unit square onto the unit disk: concentric squares become circles, areas keep their ratios. */
@@ -89,7 +99,7 @@ void camera_point_inverse(const struct camera *c, vec3 p, double u[2])
 {
 	double x, y;
 	u[0] = u[1] = 0.5;
-	if (!camera_has_aperture(c))
+	if (!(c->aperture > 0))
 		return;
 	aperture_offset(c, p, &x, &y);
 	square_from_disk(x / c->aperture, y / c->aperture, u);

@@ -23,15 +23,17 @@ struct camera {
 	struct frame axes; /* s: right on the image, t: down, n: forward */
 	double width, height, scale; /* pixels; scale: pixels per unit of slope */
 	double near_clip, far_clip;  /* along the axis, in the rescaled world */
-	double aperture, focus;      /* radius, 0: a pinhole; distance of the plane of focus along the axis */
+	bool lens;                   /* x_k is drawn and moved: the radius is above 0, or that was forced */
+	double aperture, focus;      /* radius; distance of the plane of focus along the axis */
 };
 
 /* -EINVAL with a sentence when the field of view is not within (0,180) degrees, the transform is singular, or a lens is
  * focused on nothing in front of it. */
 int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_center, double world_scale, struct error *e);
 
-/* The radius is above 0. */
 bool camera_has_aperture(const struct camera *c);
+/* x_k is drawn and moved even where the radius is 0; or any camera becomes a pinhole. */
+void camera_force_aperture(struct camera *c, bool on);
 /* x_k from two numbers in [0,1), uniform on the aperture (Shirley and Chiu 1997); the pinhole's position without one. */
 vec3 camera_point(const struct camera *c, const double u[2]);
 /* The numbers in [0,1) that give p, a point of the aperture; 1/2, 1/2 without one. */

@@ -4,6 +4,7 @@
 #include "common/film/image_file.h"
 #include "common/film/strategy.h"
 #include "worker/cli/estimate.h"
+#include "worker/cli/explain.h"
 #include "worker/cli/local_pilot.h"
 #include "worker/cli/options.h"
 #include "worker/cli/pilot.h"
@@ -26,6 +27,7 @@ static const char doc[] =
 	"  hslt-render room.xml -o room.exr --integrator path --size 320x180 --threads 8 --stats room.json\n"
 	"  hslt-render room.xml -o room.exr --target-error 2% --time 3600\n"
 	"  hslt-render --estimate room.xml --plot room.svg\n"
+	"  hslt-render --explain room.xml\n"
 	"  hslt-render room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --mutations 10000000\n"
 	"\n"
 	"--estimate makes no image: a pilot of a minute tells what errors of 10, 5, 2 and 1 % (and --target-error) will cost.\n"
@@ -34,7 +36,7 @@ static const char doc[] =
 	"Exit codes: 0 done, 1 failed, 2 usage, 4 a bound came before the target error, 5 chains disagree (the image is there, and its "
 	"note says where).";
 
-enum { OPTION_THREADS = 256, OPTION_STATS, OPTION_QUIET, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_JSON };
+enum { OPTION_THREADS = 256, OPTION_STATS, OPTION_QUIET, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_JSON, OPTION_EXPLAIN };
 
 static const struct argp_option options[] = {
 	{"output", 'o', "FILE", 0, "The image (OpenEXR)", 0},
@@ -44,7 +46,8 @@ static const struct argp_option options[] = {
 	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
 	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
 	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
-	{"json", OPTION_JSON, NULL, 0, "Print the estimate as one JSON object", 0},
+	{"explain", OPTION_EXPLAIN, NULL, 0, "Only say what the scene calls for, why, and what leaving the rest out saves", 0},
+	{"json", OPTION_JSON, NULL, 0, "Print the estimate, or what --explain says, as one JSON object", 0},
 	{0},
 };
 static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
@@ -53,7 +56,7 @@ struct arguments {
 	const char *scene, *output, *stats, *plot;
 	unsigned threads;
 	double pilot; /* s; 0: not given */
-	bool quiet, estimate, json;
+	bool quiet, estimate, explain, json;
 	struct render_arguments render;
 };
 
@@ -90,17 +93,22 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_JSON:
 		a->json = true;
 		return 0;
+	case OPTION_EXPLAIN:
+		a->explain = true;
+		return 0;
 	case ARGP_KEY_ARG:
 		if (a->scene)
 			argp_error(state, "one scene at a time");
 		a->scene = arg;
 		return 0;
 	case ARGP_KEY_END:
-		if (!a->scene || (!a->output && !a->estimate))
+		if (!a->scene || (!a->output && !a->estimate && !a->explain))
 			argp_error(state, "a scene and -o FILE are needed");
 		if (a->estimate && (a->output || a->stats))
 			argp_error(state, "--estimate makes no image: no -o, no --stats");
-		if (!a->estimate && (a->pilot > 0 || a->plot || a->json))
+		if (a->explain && (a->output || a->stats || a->estimate))
+			argp_error(state, "--explain renders nothing: no -o, no --stats, no --estimate");
+		if (!a->estimate && (a->pilot > 0 || a->plot || (a->json && !a->explain)))
 			argp_error(state, "--pilot, --plot and --json go with --estimate");
 		return 0;
 	default:
@@ -177,6 +185,9 @@ static int make_plan(struct session *s, struct error *e)
 	plan_describe_changes(p, &s->plan, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "%s\n", text);
+	render_effects_note(&s->summary, text, sizeof text);
+	if (*text)
+		fprintf(stderr, "hslt-render: note: %s\n", text);
 	fprintf(stderr, "scene built in %.2f s: %llu triangles, %zu MB of Embree's\n", s->build_seconds,
 		(unsigned long long)s->summary.triangles, world_embree_bytes(s->world) >> 20);
 	return 0;
@@ -246,7 +257,8 @@ static int write_image(const struct session *s, struct error *e)
 {
 	struct header_effect effects[RENDER_EFFECTS_MAX];
 	for (size_t i = 0; i < s->summary.line_count; i++)
-		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].on, s->summary.lines[i].why};
+		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].on, s->summary.lines[i].forced,
+						      s->summary.lines[i].why, s->summary.lines[i].saves};
 	struct header_extra x = {.scene = s->name, .effect_count = s->summary.line_count, .effects = effects,
 				 .wall_seconds = s->run.seconds, .cpu_seconds = s->run.cpu_seconds, .workers = s->a->threads};
 	unsigned char *bytes;
@@ -342,6 +354,8 @@ static int run(struct session *s, struct error *e)
 {
 	if (s->a->estimate)
 		return estimate(s, e);
+	if (s->a->explain)
+		return explain(s->a->scene, &s->a->render, s->a->json, &s->usage, e);
 	int rc = image_file_probe(s->a->output, e);
 	if (!rc && s->a->stats)
 		rc = image_file_probe(s->a->stats, e);

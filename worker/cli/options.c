@@ -10,7 +10,7 @@
 
 enum {
 	OPTION_SPP = 1000, OPTION_MUTATIONS, OPTION_TIME, OPTION_TARGET, OPTION_SIZE, OPTION_CROP, OPTION_SEED, OPTION_MIN_DEPTH,
-	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH, OPTION_SET,
+	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH, OPTION_SET, OPTION_EFFECTS,
 };
 
 static char *borrow(const char *text)
@@ -32,6 +32,9 @@ static const struct argp_option options[] = {
 	{"max-depth", OPTION_MAX_DEPTH, "K", 0, "Longest paths, in edges (the scene's)", 1},
 	{"set", OPTION_SET, "NAME=VALUE", 0,
 	 "Settings that trade accuracy for time, with commas between; may be given again. help: what each does", 1},
+	{"effects", OPTION_EFFECTS, "LIST", 0,
+	 "What is simulated although the scene does not call for it, or not although it does: all, or such as -dispersion,+aperture "
+	 "(hslt-render --explain lists them)", 1},
 	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 1},
 	{NULL, 0, NULL, 0, "When to stop (the first bound met; without any, the scene's sampleCount):", 2},
 	{"spp", OPTION_SPP, "N", 0, "Samples a pixel, rounded up to whole rounds", 2},
@@ -154,6 +157,13 @@ static void take_set(struct render_arguments *a, const char *arg, const struct a
 		argp_error(state, "--set: %s", e.text);
 }
 
+static void take_effects(struct render_arguments *a, const char *arg, const struct argp_state *state)
+{
+	struct error e;
+	if (render_effects(arg, a->render.effects, &e))
+		argp_error(state, "--effects: %s", e.text);
+}
+
 static void check_mixture(const struct render_arguments *a, const struct argp_state *state)
 {
 	const char *name = *a->plan.integrator ? a->plan.integrator : RENDER_INTEGRATOR_DEFAULT;
@@ -212,7 +222,10 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		p->min_depth = whole32(state, "--min-depth", arg);
 		return 0;
 	case OPTION_MAX_DEPTH:
-		p->max_depth = whole32(state, "--max-depth", arg);
+		p->max_depth = a->render.max_depth = whole32(state, "--max-depth", arg);
+		return 0;
+	case OPTION_EFFECTS:
+		take_effects(a, arg, state);
 		return 0;
 	case OPTION_CHAINS:
 		p->chains = whole32(state, "--chains", arg);
@@ -292,6 +305,9 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 		p->min_depth = 1;
 	if (!p->max_depth)
 		p->max_depth = s->max_depth;
+	/* Longer paths carry no light; but what was asked for at least must be asked of something. */
+	if (p->max_depth > summary->useful_depth && summary->useful_depth >= p->min_depth)
+		p->max_depth = summary->useful_depth;
 	if (!p->spp && !p->mutations && !(p->seconds > 0) && !(p->target_error > 0))
 		p->spp = s->spp;
 	return integrator->has_mutations ? render_mutations(a->mixture, summary, p->mixture, e) : 0;

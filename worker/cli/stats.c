@@ -54,8 +54,9 @@ static json_t *effects_json(const struct render_summary *m)
 {
 	json_t *effects = json_array();
 	for (size_t i = 0; i < m->line_count; i++)
-		json_array_append_new(effects, json_pack("{s:s s:b s:s}", "name", m->lines[i].name, "on", m->lines[i].on, "why",
-							 m->lines[i].why));
+		json_array_append_new(effects, json_pack("{s:s s:b s:b s:s s:s}", "name", m->lines[i].name, "on",
+							 (int)m->lines[i].on, "forced", (int)m->lines[i].forced, "why",
+							 m->lines[i].why, "saves", m->lines[i].saves));
 	return effects;
 }
 

@@ -146,6 +146,8 @@ static int lists_init(struct lists *l, const struct submit_request *r, struct sc
 		f->name = borrow(b->summary.lines[i].name);
 		f->on = b->summary.lines[i].on;
 		f->why = b->summary.lines[i].why;
+		f->forced = b->summary.lines[i].forced;
+		f->saves = borrow(b->summary.lines[i].saves);
 	}
 	return 0;
 }

@@ -219,7 +219,7 @@ static int build(struct bundle *b, struct error *e)
 	const Farm__JobInfo *m = info_of(b);
 	struct scene_define defines[DEFINES_MAX];
 	struct asset_source assets = {b, open_asset, close_asset};
-	struct render_options options = {.width = m->render_width, .height = m->render_height};
+	struct render_options options = {.width = m->render_width, .height = m->render_height, .max_depth = b->plan.max_depth};
 	memcpy(options.knobs, b->plan.knobs, sizeof options.knobs);
 	memcpy(options.effects, b->plan.effects, sizeof options.effects);
 	struct scene scene;

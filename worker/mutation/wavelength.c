@@ -29,7 +29,7 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 
 static double useful(const struct render_summary *scene)
 {
-	return render_effect_on(scene, "colour") ? 0.05 : 0;
+	return render_effect_on(scene, "wavelength") ? 0.05 : 0;
 }
 
 const struct mutation_ops mutation_wavelength = {

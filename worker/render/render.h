@@ -19,7 +19,10 @@ const struct plugin_decl *render_plugins(void);
 struct effect_line {
 	const char *name;
 	bool on;
+	bool forced;      /* the user wants it other than the scene calls for */
+	bool other_scene; /* forced off: the image is another one */
 	char why[160];
+	const char *saves; /* what leaving it out saves */
 };
 enum { RENDER_EFFECTS_MAX = 24 };
 
@@ -41,10 +44,12 @@ const char *render_numeric_version(void);
 struct render_options {
 	uint32_t width, height;
 	char knobs[PLAN_KNOBS_MAX], effects[PLAN_EFFECTS_MAX];
+	uint32_t max_depth;
 };
 
 struct render_summary {
 	struct scene_settings settings; /* with the overrides of the options */
+	uint32_t useful_depth;          /* edges of the longest path that can carry light, at most what was asked for */
 	struct effect_line lines[RENDER_EFFECTS_MAX];
 	size_t line_count;
 	uint64_t shapes, triangles;
@@ -63,6 +68,12 @@ const char *render_mutation_at(size_t index, const char **summary);
  * text: NAME or NAME=WEIGHT with commas between; NULL or "": what suits the scene. A canonical text comes back as it is.
  * -EINVAL with a sentence. */
 int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX], struct error *e);
+
+/* The overrides of effects, in the spelling that a plan holds: "all", "-dispersion,+aperture". -EINVAL with a sentence: no such
+ * effect, or it cannot be forced. */
+int render_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct error *e);
+/* "the image is of another scene: without dispersion" where an effect that the scene calls for was switched off; else "". */
+void render_effects_note(const struct render_summary *scene, char *text, size_t size);
 
 /* false also where there is no effect of that name. */
 bool render_effect_on(const struct render_summary *scene, const char *name);

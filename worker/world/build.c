@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 #include "worker/scene/mesh.h"
 #include "worker/world/displacement.h"
+#include "worker/world/reach.h"
 
 #include <string.h>
 
@@ -13,7 +14,8 @@ struct builder {
 	const struct asset_source *assets;
 	struct arena scratch;
 	struct shape_geometry *geometry;
-	const struct scene_node **shape_nodes, **bsdf_nodes;
+	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
+	struct effects_choice forced;
 	struct emitter_surface *surfaces;
 	vec3 low, high;
 	struct error *e;
@@ -42,6 +44,11 @@ static void grow_box_by_shape(struct builder *b, const struct shape_geometry *g)
 		grow_box(b, (vec3){g->mesh.position[i][0], g->mesh.position[i][1], g->mesh.position[i][2]});
 }
 
+static bool is_displaced(const struct builder *b, const struct scene_node *shape)
+{
+	return b->forced.of[EFFECT_DISPLACEMENT] >= 0 && displacement_of(shape);
+}
+
 /* Shapes of the scene, their geometry in double, and the box around them. */
 static int read_shapes(struct builder *b)
 {
@@ -60,7 +67,7 @@ static int read_shapes(struct builder *b)
 			continue;
 		uint64_t dropped = 0;
 		int rc = shape_build(s->objects[i], b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
-		if (!rc)
+		if (!rc && b->forced.of[EFFECT_DISPLACEMENT] >= 0)
 			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3, w->knobs.tessellation,
 						&b->scratch, b->e);
 		if (rc)
@@ -150,7 +157,7 @@ static int place_mesh(struct builder *b, struct geom_shape *g, const struct mesh
 			g->uv[i][1] = (float)m->uv[i][1];
 		}
 	}
-	g->triangle_count = take_triangles(g, m, displacement_of(n) != NULL);
+	g->triangle_count = take_triangles(g, m, is_displaced(b, n));
 	if (g->triangle_count == 0)
 		return node_error(n, b->e, EINVAL, "no triangle of this shape has an area at the scene's scale");
 	return 0;
@@ -188,7 +195,8 @@ static int place_shapes(struct builder *b)
 static int create_bsdfs(struct builder *b)
 {
 	struct world *w = b->w;
-	w->bsdfs = arena_alloc(&w->arena, w->shape_count, sizeof *w->bsdfs);
+	/* One more for what no path meets. */
+	w->bsdfs = arena_alloc(&w->arena, (size_t)w->shape_count + 1, sizeof *w->bsdfs);
 	b->bsdf_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
 	if (!w->bsdfs || !b->bsdf_nodes)
 		return out_of_memory(b->e);
@@ -241,7 +249,8 @@ static int create_emitters(struct builder *b)
 	uint32_t limit = w->shape_count + s->object_count;
 	w->emitters = arena_alloc(&w->arena, limit, sizeof *w->emitters);
 	w->emitter_shape = arena_alloc(&w->arena, limit, sizeof *w->emitter_shape);
-	if (!w->emitters || !w->emitter_shape)
+	b->emitter_nodes = arena_alloc(&b->scratch, limit, sizeof(void *));
+	if (!w->emitters || !w->emitter_shape || !b->emitter_nodes)
 		return out_of_memory(b->e);
 	struct emitter_build build = {b->assets, &w->arena, s->dialect_3, NULL, w->center, w->scale};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
@@ -255,6 +264,7 @@ static int create_emitters(struct builder *b)
 		if (rc)
 			return rc;
 		w->emitter_shape[w->emitter_count] = i;
+		b->emitter_nodes[w->emitter_count] = n;
 		w->parts[i].emitter = (int32_t)w->emitter_count++;
 	}
 	w->environment = -1;
@@ -274,6 +284,7 @@ static int create_emitters(struct builder *b)
 			em->power *= M_PI * w->radius * w->radius;
 		if (environment)
 			w->environment = (int32_t)w->emitter_count;
+		b->emitter_nodes[w->emitter_count] = n;
 		w->emitter_shape[w->emitter_count++] = UINT32_MAX;
 	}
 	return 0;
@@ -340,22 +351,23 @@ static int build_accel(struct builder *b)
 	return accel_new(&w->accel, s, w->shape_count, b->e);
 }
 
-static void report_displacement(struct builder *b)
+static int find_effects(struct builder *b, uint32_t max_depth)
 {
-	size_t shapes = 0;
-	uint64_t triangles = 0;
-	for (uint32_t i = 0; i < b->w->shape_count; i++)
-		if (displacement_of(b->shape_nodes[i])) {
-			shapes++;
-			triangles += b->w->shapes[i].triangle_count;
-		}
-	effects_add_displacement(&b->w->effects, shapes, triangles);
+	struct world *w = b->w;
+	enum reach *reached = arena_alloc(&b->scratch, w->shape_count, sizeof *reached);
+	if (!reached)
+		return out_of_memory(b->e);
+	const struct effects_source src = {b->scene, b->shape_nodes, b->bsdf_nodes, b->emitter_nodes, max_depth};
+	effects_analyse(w, &src, &b->forced, reached);
+	return effects_apply(w, &b->forced, reached, b->e);
 }
 
 /* All but Embree: every effect is known before that is built. */
 static int prepare(struct builder *b, const struct render_options *o)
 {
-	int rc = scene_settings_read(b->scene, o ? o->width : 0, o ? o->height : 0, &b->w->settings, b->e);
+	int rc = effects_parse(o ? o->effects : "", &b->forced, b->e);
+	if (!rc)
+		rc = scene_settings_read(b->scene, o ? o->width : 0, o ? o->height : 0, &b->w->settings, b->e);
 	if (!rc)
 		rc = knobs_read(o ? o->knobs : NULL, &b->w->knobs, b->e);
 	if (!rc)
@@ -369,15 +381,12 @@ static int prepare(struct builder *b, const struct render_options *o)
 	if (!rc)
 		rc = create_emitters(b);
 	if (!rc)
+		rc = find_effects(b, o ? o->max_depth : 0);
+	if (!rc)
 		rc = choose_emitters(b);
-	if (rc)
-		return rc;
-	struct world *w = b->w;
-	effects_analyse(&w->effects, &w->settings, w->bsdfs, w->bsdf_count, w->emitters, w->emitter_count);
-	report_displacement(b);
-	if (!w->effects.colour)
-		set_grey(w);
-	return 0;
+	if (!rc && !b->w->effects.colour)
+		set_grey(b->w);
+	return rc;
 }
 
 static int new_world(struct world **out, bool with_accel, const struct scene *s, const struct asset_source *assets,

@@ -1,115 +1,352 @@
 #include "worker/world/effects.h"
 
+#include "worker/world/displacement.h"
+#include "worker/world/reach.h"
+
 #include <stdarg.h>
 #include <stdio.h>
+#include <string.h>
 
-__attribute__((format(printf, 4, 5))) static void line(struct effects *fx, const char *name, bool on, const char *why, ...)
+/* What is counted: how many, and the first by name. */
+struct tally {
+	size_t count;
+	char first[64];
+};
+
+static void count(struct tally *t, const struct scene_node *n, const char *nameless)
 {
-	struct effect_line *l = &fx->lines[fx->line_count++];
-	l->name = name;
-	l->on = on;
+	if (t->count++)
+		return;
+	if (!n)
+		snprintf(t->first, sizeof t->first, "%s", nameless);
+	else if (n->id)
+		snprintf(t->first, sizeof t->first, "`%.40s`", n->id);
+	else
+		snprintf(t->first, sizeof t->first, "the %.24s%s in line %d", n->type, n->cls == PLUGIN_EMITTER ? " emitter" : "", n->line);
+}
+
+/* "`glass1`", "`glass1` and 2 more" */
+static const char *who(const struct tally *t, char text[96])
+{
+	if (t->count > 1)
+		snprintf(text, 96, "%s and %zu more", t->first, t->count - 1);
+	else
+		snprintf(text, 96, "%s", t->first);
+	return text;
+}
+
+static const char *verb(const struct tally *t, const char *one, const char *many)
+{
+	return t->count == 1 ? one : many;
+}
+
+struct census {
+	struct tally specular, glossy, diffuse, transmission, textured, coloured, dispersive, constant_eta;
+	struct tally hidden_specular, hidden_dispersive, unused_dispersive; /* of those that no path meets; that no shape uses */
+	struct tally environment, area, delta, textured_light, coloured_light;
+	enum reach why_hidden;
+	size_t shape[3];
+};
+
+static void add_material(struct census *c, const struct bsdf *b, const struct scene_node *n)
+{
+	static const char nameless[] = "the default material";
+	bool smooth = b->has_smooth;
+	if (b->black)
+		return;
+	if (b->has_delta)
+		count(&c->specular, n, nameless);
+	if (smooth)
+		count(isfinite(b->alpha) ? &c->glossy : &c->diffuse, n, nameless);
+	if (b->modes & BSDF_TRANSMIT)
+		count(&c->transmission, n, nameless);
+	if (b->textured)
+		count(&c->textured, n, nameless);
+	if (b->shape != COLOR_SHAPE_CONSTANT)
+		count(&c->coloured, n, nameless);
+	if (b->dispersive)
+		count(&c->dispersive, n, nameless);
+	else if (b->eta != 1)
+		count(&c->constant_eta, n, nameless);
+}
+
+static void add_hidden(struct census *c, const struct bsdf *b, const struct scene_node *n, enum reach why)
+{
+	c->why_hidden = why;
+	if (b->has_delta)
+		count(&c->hidden_specular, n, "");
+	if (b->dispersive)
+		count(&c->hidden_dispersive, n, "");
+}
+
+static enum reach reach_of_bsdf(const struct world *w, const enum reach *shape, uint32_t bsdf)
+{
+	enum reach r = REACH_YES;
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (w->parts[i].bsdf == bsdf) {
+			if (shape[i] == REACH_YES)
+				return REACH_YES;
+			r = shape[i];
+		}
+	return r;
+}
+
+static bool asks_for_dispersion(const struct scene_node *n)
+{
+	static const char *const names[] = {"int_cauchy_b", "ext_cauchy_b", "int_sellmeier", "ext_sellmeier"};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (node_find(n, names[i]))
+			return true;
+	return node_bool(n, "dispersion", false);
+}
+
+static void add_unused(struct census *c, const struct world *w, const struct effects_source *src)
+{
+	for (uint32_t i = 0; i < src->scene->object_count; i++) {
+		const struct scene_node *n = src->scene->objects[i];
+		uint32_t k = 0;
+		while (k < w->bsdf_count && src->bsdf[k] != n)
+			k++;
+		if (n->cls == PLUGIN_BSDF && k == w->bsdf_count && asks_for_dispersion(n))
+			count(&c->unused_dispersive, n, "");
+	}
+}
+
+static void add_emitter(struct census *c, const struct emitter *em, const struct scene_node *n)
+{
+	count(em->delta ? &c->delta : em->infinite ? &c->environment : &c->area, n, "");
+	if (em->textured)
+		count(&c->textured_light, n, "");
+	if (em->shape == COLOR_SHAPE_OTHER)
+		count(&c->coloured_light, n, "");
+	c->shape[em->shape]++;
+}
+
+static struct census take(const struct world *w, const struct effects_source *src, const enum reach *shape)
+{
+	struct census c = {.why_hidden = REACH_YES};
+	for (uint32_t i = 0; i < w->bsdf_count; i++) {
+		enum reach r = reach_of_bsdf(w, shape, i);
+		if (r == REACH_YES)
+			add_material(&c, &w->bsdfs[i], src->bsdf[i]);
+		else
+			add_hidden(&c, &w->bsdfs[i], src->bsdf[i], r);
+	}
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		if (reach_emitter(w, shape, i))
+			add_emitter(&c, &w->emitters[i], src->emitter[i]);
+	add_unused(&c, w, src);
+	return c;
+}
+
+/* ---- lines ---- */
+
+struct report {
+	struct effects *fx;
+	const struct effects_choice *forced;
+};
+
+/* The line of an effect that the scene calls for or not; returns whether it is on after all. */
+__attribute__((format(printf, 4, 5))) static bool line(struct report *r, enum effect which, bool called, const char *why, ...)
+{
+	const struct effect_decl *d = &effect_table[which];
+	int force = r->forced->of[which];
+	struct effect_line *l = &r->fx->lines[r->fx->line_count++];
+	*l = (struct effect_line){.name = d->name, .on = force ? force > 0 : called, .saves = d->saves};
+	l->forced = force && l->on != called;
+	l->other_scene = l->forced && called && (d->may & EFFECT_OF_THE_SCENE);
 	va_list ap;
 	va_start(ap, why);
 	vsnprintf(l->why, sizeof l->why, why, ap);
 	va_end(ap);
+	return l->on;
 }
 
-struct census {
-	size_t specular, glossy, diffuse, transmission, textured, coloured, dispersive, environment, area, delta, textured_light;
-	size_t shape[3];
-};
-
-static struct census take(const struct bsdf *b, size_t bn, const struct emitter *em, size_t en)
+static const char *hidden_because(enum reach r)
 {
-	struct census c = {0};
-	for (size_t i = 0; i < bn; i++) {
-		c.specular += b[i].has_delta;
-		c.glossy += b[i].has_smooth && isfinite(b[i].alpha);
-		c.diffuse += b[i].has_smooth && !isfinite(b[i].alpha);
-		c.transmission += (b[i].modes & BSDF_TRANSMIT) != 0;
-		c.textured += b[i].textured;
-		c.coloured += b[i].shape != COLOR_SHAPE_CONSTANT;
-		c.dispersive += b[i].dispersive;
+	switch (r) {
+	case REACH_ENCLOSED:
+		return "a closed opaque shape is around it";
+	case REACH_DARK:
+		return "nothing shines";
+	case REACH_DEPTH:
+		return "paths of one edge do not scatter";
+	case REACH_YES:
+		break;
 	}
-	for (size_t i = 0; i < en; i++) {
-		c.delta += em[i].delta;
-		c.environment += em[i].infinite && !em[i].delta;
-		c.area += !em[i].infinite && !em[i].delta;
-		c.textured_light += em[i].textured;
-		c.shape[em[i].shape]++;
-	}
-	return c;
+	return "";
 }
 
-static void colour(struct effects *fx, const struct census *c, size_t emitters)
+static void colour(struct report *r, const struct census *c)
 {
+	struct effects *fx = r->fx;
+	char text[96];
 	bool one_shape = c->shape[COLOR_SHAPE_OTHER] == 0 && (!c->shape[COLOR_SHAPE_CONSTANT] || !c->shape[COLOR_SHAPE_D65]);
-	fx->colour = c->coloured > 0 || !one_shape;
+	bool called = c->coloured.count > 0 || !one_shape;
 	fx->illuminant = c->shape[COLOR_SHAPE_CONSTANT] ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_D65;
-	if (c->coloured)
-		line(fx, "colour", true, "%zu materials vary with wavelength", c->coloured);
+	if (c->coloured.count)
+		fx->colour = line(r, EFFECT_COLOUR, called, "%s var%s with wavelength", who(&c->coloured, text), verb(&c->coloured, "ies", "y"));
+	else if (c->coloured_light.count)
+		fx->colour = line(r, EFFECT_COLOUR, called, "the light of %s is coloured", who(&c->coloured_light, text));
 	else if (!one_shape)
-		line(fx, "colour", true, "the %zu emitters differ in spectrum or are coloured", emitters);
+		fx->colour = line(r, EFFECT_COLOUR, called, "the emitters differ in spectrum");
 	else
-		line(fx, "colour", false, "all materials are grey and all emitters have one spectrum: no wavelength is drawn");
+		fx->colour = line(r, EFFECT_COLOUR, called, "all materials are grey and all emitters have one spectrum");
 }
 
-void effects_analyse(struct effects *fx, const struct scene_settings *settings, const struct bsdf *bsdfs, size_t bsdf_count,
-		     const struct emitter *emitters, size_t emitter_count)
+/* Needed by another effect that is forced on. */
+static void force_colour(struct report *r, const char *by)
 {
-	*fx = (struct effects){.max_depth = settings->max_depth};
-	struct census c = take(bsdfs, bsdf_count, emitters, emitter_count);
-	colour(fx, &c, emitter_count);
-	fx->dispersion = c.dispersive > 0;
-	if (fx->dispersion)
-		line(fx, "dispersion", true, "%zu material%s by an index that varies with wavelength: paths that meet %s carry one",
-		     c.dispersive, c.dispersive == 1 ? " refracts" : "s refract", c.dispersive == 1 ? "it" : "them");
-	else
-		line(fx, "dispersion", false, "no index of refraction varies with wavelength: wavelengths travel together");
-	fx->aperture = settings->aperture_radius > 0;
-	if (fx->aperture)
-		line(fx, "aperture", true, "a lens of radius %g, focused at a distance of %g", settings->aperture_radius,
-		     settings->focus_distance);
-	else
-		line(fx, "aperture", false, "the sensor is a pinhole");
-	fx->specular = c.specular > 0;
-	line(fx, "specular", fx->specular, "%zu materials have exactly specular lobes", c.specular);
-	fx->glossy = c.glossy > 0;
-	line(fx, "glossy", fx->glossy, "%zu materials have rough lobes of finite width", c.glossy);
-	fx->diffuse = c.diffuse > 0;
-	line(fx, "diffuse", fx->diffuse, "%zu materials scatter diffusely only", c.diffuse);
-	fx->transmission = c.transmission > 0;
-	line(fx, "transmission", fx->transmission, "%zu materials let light through", c.transmission);
-	fx->textures = c.textured + c.textured_light > 0;
-	line(fx, "textures", fx->textures, "%zu materials and %zu emitters are textured", c.textured, c.textured_light);
-	fx->environment = c.environment > 0;
-	line(fx, "environment", fx->environment, c.environment ? "rays that escape meet an emitter" : "rays that escape meet nothing");
-	fx->area_light = c.area > 0;
-	line(fx, "area-light", fx->area_light, "%zu surfaces emit", c.area);
-	fx->delta_light = c.delta > 0;
-	line(fx, "delta-light", fx->delta_light, "%zu emitters are points or parallel light, which no path hits by chance", c.delta);
-	line(fx, "depth", settings->max_depth > 1, "paths have at most %u edges", settings->max_depth);
+	struct effect_line *l = &r->fx->lines[0];
+	if (r->fx->colour)
+		return;
+	r->fx->colour = l->on = l->forced = true;
+	snprintf(l->why + strlen(l->why), sizeof l->why - strlen(l->why), "; %s needs it", by);
 }
 
-/* In threes, from the right. */
-static const char *with_commas(uint64_t x, char text[32])
+static void dispersion(struct report *r, const struct census *c)
 {
-	char *p = text + 31;
-	*p = 0;
-	for (int digits = 0; x || !digits; digits++, x /= 10) {
-		if (digits && digits % 3 == 0)
-			*--p = ',';
-		*--p = (char)('0' + x % 10);
+	char text[96];
+	bool called = c->dispersive.count > 0, on;
+	const struct tally *t = called ? &c->dispersive : c->hidden_dispersive.count ? &c->hidden_dispersive
+			      : c->unused_dispersive.count ? &c->unused_dispersive : &c->constant_eta;
+	const char *name = t->count ? who(t, text) : "";
+	if (called)
+		on = line(r, EFFECT_DISPERSION, true, "the index of %s varies with wavelength: paths that meet %s carry one", name, verb(t, "it", "them"));
+	else if (t == &c->hidden_dispersive)
+		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but %s", name, verb(t, "s", ""), hidden_because(c->why_hidden));
+	else if (t == &c->unused_dispersive)
+		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but no shape uses %s", name, verb(t, "s", ""), verb(t, "it", "them"));
+	else if (t->count)
+		on = line(r, EFFECT_DISPERSION, false, "%s %s constant eta", name, verb(t, "has", "have"));
+	else
+		on = line(r, EFFECT_DISPERSION, false, "no material refracts");
+	r->fx->dispersion = on;
+}
+
+static void spectral(struct report *r, const struct census *c)
+{
+	colour(r, c);
+	bool wavelength = line(r, EFFECT_WAVELENGTH, r->fx->colour, r->fx->colour ? "paths carry wavelengths" : "paths carry no wavelength");
+	dispersion(r, c);
+	if (wavelength)
+		force_colour(r, "wavelength");
+	if (r->fx->dispersion)
+		force_colour(r, "dispersion");
+}
+
+/* The line of materials that have something, or "no material ...". */
+static bool materials(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many, const char *none)
+{
+	char text[96];
+	if (t->count)
+		return line(r, which, true, "%s %s", who(t, text), verb(t, one, many));
+	return line(r, which, false, "no material that light meets %s", none);
+}
+
+static void lobes(struct report *r, const struct census *c)
+{
+	struct effects *fx = r->fx;
+	struct effect_line *at = &fx->lines[fx->line_count++]; /* half vectors: known after the two */
+	if (!c->specular.count && c->hidden_specular.count) {
+		char text[96];
+		fx->specular = line(r, EFFECT_SPECULAR, false, "%s %s specular, but %s", who(&c->hidden_specular, text),
+				    verb(&c->hidden_specular, "is", "are"), hidden_because(c->why_hidden));
+	} else {
+		fx->specular = materials(r, EFFECT_SPECULAR, &c->specular, "has exactly specular lobes", "have exactly specular lobes",
+					 "has exactly specular lobes");
 	}
-	return p;
+	fx->glossy = materials(r, EFFECT_GLOSSY, &c->glossy, "has rough lobes of finite width", "have rough lobes of finite width",
+			       "has rough lobes of finite width");
+	size_t end = fx->line_count;
+	fx->line_count = (size_t)(at - fx->lines);
+	bool called = fx->specular || fx->glossy;
+	fx->half_vectors = line(r, EFFECT_HALF_VECTORS, called, called ? "lobes are narrow: %s" : "no lobe is narrow: %s",
+				fx->specular && fx->glossy ? "specular and glossy" : fx->specular ? "specular" : fx->glossy ? "glossy"
+				: "a path that is traced and joined is as likely to carry light");
+	fx->line_count = end;
+	fx->diffuse = materials(r, EFFECT_DIFFUSE, &c->diffuse, "scatters diffusely only", "scatter diffusely only", "is diffuse only");
+	fx->transmission = materials(r, EFFECT_TRANSMISSION, &c->transmission, "lets light through", "let light through", "lets it through");
 }
 
-void effects_add_displacement(struct effects *fx, size_t shapes, uint64_t triangles)
+static void surfaces(struct report *r, const struct census *c, const struct world *w, const struct effects_source *src)
 {
-	char text[32];
-	fx->displacement = shapes > 0;
-	if (shapes)
-		line(fx, "displacement", true, "%zu shapes are displaced: %s triangles", shapes, with_commas(triangles, text));
+	char text[96], more[96];
+	struct effects *fx = r->fx;
+	if (c->textured.count && c->textured_light.count)
+		fx->textures = line(r, EFFECT_TEXTURES, true, "%s and, of emitters, %s are textured", who(&c->textured, text),
+				    who(&c->textured_light, more));
+	else if (c->textured.count + c->textured_light.count)
+		fx->textures = line(r, EFFECT_TEXTURES, true, "textured: %s", who(c->textured.count ? &c->textured : &c->textured_light, text));
 	else
-		line(fx, "displacement", false, "no shape is displaced");
+		fx->textures = line(r, EFFECT_TEXTURES, false, "no material and no emitter has a texture");
+	struct tally t = {0};
+	uint64_t triangles = 0;
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (displacement_of(src->shape[i])) {
+			count(&t, src->shape[i], "");
+			triangles += w->shapes[i].triangle_count;
+		}
+	if (t.count)
+		fx->displacement = line(r, EFFECT_DISPLACEMENT, true, "%s %s displaced: %llu triangles", who(&t, text),
+					verb(&t, "is", "are"), (unsigned long long)triangles);
+	else
+		fx->displacement = line(r, EFFECT_DISPLACEMENT, false, "no shape is displaced");
+	static const enum effect absent[] = {EFFECT_BUMP, EFFECT_ALPHA, EFFECT_INSTANCING};
+	for (size_t i = 0; i < sizeof absent / sizeof *absent; i++)
+		line(r, absent[i], false, "%s", effect_table[absent[i]].refuse);
+}
+
+static bool lights(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many, const char *none)
+{
+	char text[96];
+	return t->count ? line(r, which, true, "%s %s", who(t, text), verb(t, one, many)) : line(r, which, false, "%s", none);
+}
+
+static void emitter_moves(struct report *r, const struct census *c)
+{
+	char text[96];
+	bool called = c->area.count + c->environment.count > 0;
+	if (called)
+		line(r, EFFECT_EMITTER_MOVE, true, "%s %s many points or directions",
+		     who(c->area.count ? &c->area : &c->environment, text), verb(c->area.count ? &c->area : &c->environment, "has", "have"));
+	else
+		line(r, EFFECT_EMITTER_MOVE, false, c->delta.count ? "all emitters are single points or directions" : "nothing shines");
+}
+
+static void depth(struct report *r, const struct world *w, const struct effects_source *src, const enum reach *shape)
+{
+	uint32_t asked = src->max_depth ? src->max_depth : w->settings.max_depth, bound = reach_depth(w, shape);
+	uint32_t useful = bound < asked ? bound : asked;
+	bool on;
+	if (useful < asked)
+		on = line(r, EFFECT_DEPTH, false, "of %u edges that paths may have %u can carry light: %s", asked, useful,
+			  useful == 1 ? "nothing scatters" : "all that scatters lies in one plane");
+	else
+		on = line(r, EFFECT_DEPTH, true, "paths of up to %u edges can carry light", asked);
+	r->fx->max_depth = on ? asked : useful;
+}
+
+void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced, enum reach *shape)
+{
+	struct effects *fx = &w->effects;
+	*fx = (struct effects){.line_count = 0};
+	reach_shapes(w, src->shape, src->max_depth ? src->max_depth : w->settings.max_depth, shape);
+	struct census c = take(w, src, shape);
+	struct report r = {fx, forced};
+	spectral(&r, &c);
+	if (w->settings.aperture_radius > 0)
+		fx->aperture = line(&r, EFFECT_APERTURE, true, "a lens of radius %g, focused at a distance of %g", w->settings.aperture_radius,
+				    w->settings.focus_distance);
+	else
+		fx->aperture = line(&r, EFFECT_APERTURE, false, "the sensor is a pinhole");
+	emitter_moves(&r, &c);
+	lobes(&r, &c);
+	surfaces(&r, &c, w, src);
+	fx->environment = lights(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on all that escapes", "", "rays that escape meet nothing");
+	fx->area_light = lights(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces", "no surface shines");
+	fx->delta_light = lights(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
+				 "are points or parallel light, which no path hits by chance",
+				 "no emitter is a point or parallel light");
+	depth(&r, w, src, shape);
 }
