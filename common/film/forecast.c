@@ -14,7 +14,8 @@ enum {
 static const double used_share = 1.0 / 16; /* looks at less than this share of the work say little about what is to come */
 static const double trend_prior = 0.2;     /* standard deviation of the trend: light that comes in rare bursts, chains that
 					    * have not forgotten their seeds yet */
-static const double drift = 0.08;          /* what the trend may change an e-fold of work that nobody has seen */
+static const double memory = 1.2, memory_sd = 0.6; /* e-folds of work over which a trend dies down; its logarithm's spread */
+static const double drift = 0.05;          /* what else may change in an e-fold of work that nobody has seen */
 static const double price_floor = 0.03;    /* relative spread of a sample's price from one stretch of time to another */
 static const double log_four = 1.3862943611198906;
 
@@ -212,7 +213,7 @@ static double normal(struct dice *d)
 }
 
 struct play { /* one way in which things may be */
-	double level, trend, drift, margin, now, cpu, wall;
+	double level, trend, memory, drift, margin, now, cpu, wall;
 };
 
 static struct play play_of(const struct fit *f, struct dice *d)
@@ -222,14 +223,21 @@ static struct play play_of(const struct fit *f, struct dice *d)
 	double level = f->level + f->level_sd * (f->correlation * a + sqrt(fmax(0, 1 - f->correlation * f->correlation)) * b);
 	double now = f->now + (f->level - level) / f->spread;
 	double margin = fmax(0, f->margin + f->margin_sd * normal(d));
-	return (struct play){level, trend, drift * normal(d), margin, now, f->cpu * exp(f->cpu_sd * normal(d)), f->wall * exp(f->wall_sd * normal(d))};
+	return (struct play){level, trend, memory * exp(memory_sd * normal(d)), drift * normal(d), margin, now, f->cpu * exp(f->cpu_sd * normal(d)), f->wall * exp(f->wall_sd * normal(d))};
+}
+
+/* How log(relMSE x work) will have changed after t e-folds of work. */
+static double change(const struct fit *f, const struct play *y, double t)
+{
+	if (t < 0)
+		return y->trend * fmax(-f->seen, t);
+	return y->trend * y->memory * (1 - exp(-t / y->memory)) + y->drift * t;
 }
 
 /* log(relMSE) expected at a work. */
 static double expected(const struct fit *f, const struct play *y, double work)
 {
-	double t = log(work / f->work);
-	return y->level + y->trend * fmax(-f->seen, fmin(t, f->seen)) + y->drift * fmax(t, 0) - log(work);
+	return y->level + change(f, y, log(work / f->work)) - log(work);
 }
 
 /* Rounds at which it stops. */
@@ -314,13 +322,15 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 	return true;
 }
 
-/* e-folds of work that quarter relMSE: the trend holds as far as it was seen. */
+/* e-folds of work that quarter relMSE. */
 static double quartering(const struct fit *f, const struct play *y)
 {
-	double fall = 1 - y->drift, whole = fall - y->trend;
-	if (whole > 0 && log_four / whole <= f->seen)
-		return log_four / whole;
-	return fall > 0 ? (log_four + y->trend * f->seen) / fall : INFINITY;
+	double low = 0, high = 16;
+	for (int i = 0; i < 40; i++) {
+		double t = 0.5 * (low + high);
+		*(t - change(f, y, t) < log_four ? &low : &high) = t;
+	}
+	return high < 15 ? high : INFINITY;
 }
 
 bool forecast_halving(const struct forecast_history *h, const struct plan *p, struct forecast_cost *c)
@@ -332,7 +342,7 @@ bool forecast_halving(const struct forecast_history *h, const struct plan *p, st
 	struct plays s;
 	for (int i = 0; i < PLAYS; i++) {
 		struct play y = play_of(&f, &d);
-		s.work[i] = f.work * (exp(fmax(0, quartering(&f, &y))) - 1);
+		s.work[i] = f.work * (exp(quartering(&f, &y)) - 1);
 		s.rounds[i] = s.work[i] / (double)plan_round_mutations(p);
 		s.cpu[i] = s.work[i] * y.cpu;
 		s.wall[i] = s.work[i] * y.wall;

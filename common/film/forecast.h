@@ -3,10 +3,11 @@
  * which a render will stop by its target (common/film/merge.h), with 90 % intervals. Pure, deterministic, no allocation; any
  * thread.
  *
- * Model. x = log(relMSE x work) is a level, plus a trend in log(work) that is 0 where the error falls as 1/sqrt(work). What
- * is seen of it is an estimate with the spread of chi-square over the degrees of freedom; since each look holds all samples
- * of those before it, the deviations of two looks correlate as the ratio of their works. Level and trend are fitted by
- * generalized least squares to the looks of the last decade or so; the trend has a prior around 0 and is not drawn further than it was seen.
+ * Model. x = log(relMSE x work) is a level, plus a trend in log(work): 0 where the error falls as 1/sqrt(work), above 0 where
+ * light comes in rare bursts that a short render has not met, or where chains have not forgotten their seeds. What is seen of
+ * it is an estimate with the spread of chi-square over the degrees of freedom; since each look holds all samples of those
+ * before it, the deviations of two looks correlate as the root of the ratio of their works. Level and trend are fitted by generalized
+ * least squares to the looks of the last decade or so, the trend with a prior around 0; from the last look on it dies down.
  * Renders are then played: a level, a trend, the price of a sample, and along the ladder of looks the deviations, until the
  * upper end of the estimate's interval meets the target. The quantiles of what they cost are the answer, so that margin,
  * ladder and luck of the rule are in it.
