@@ -4,13 +4,13 @@
 #
 #   sh deploy/setup.sh            what `make` and `make test` need
 #   sh deploy/setup.sh --full     also what the longer kinds of tests need (clang for fuzzers, valgrind for profiles, a
-#                                 Slurm and systemd's checker of units for deploy/'s own; Debian starts munge when it is installed)
+#                                 Slurm, and checkers of units and manifests, for deploy/; Debian starts munge when it is installed)
 set -eu
 
 build="make gcc libc6-dev pkg-config libembree-dev libopenexr-dev libuv1-dev libprotobuf-c-dev protobuf-c-compiler
 protobuf-compiler libssl-dev libexpat1-dev zlib1g-dev libpng-dev libjpeg62-turbo-dev libjansson-dev librandom123-dev libcmocka-dev
 gnuplot-nox"
-full="clang libclang-rt-dev valgrind socat strace slurm-wlm munge systemd python3 python3-yaml debootstrap"
+full="clang libclang-rt-dev valgrind socat strace slurm-wlm munge systemd python3-kubernetes debootstrap"
 
 case "${1:-}" in
 "") wanted=$build ;;
