@@ -7,6 +7,7 @@
 #include <errno.h>
 #include <jansson.h>
 #include <math.h>
+#include <stdio.h>
 
 enum { TARGETS_MOST = 5, LOOKS_LEAST = 3 };
 static const double usual[] = {0.1, 0.05, 0.02, 0.01};
@@ -51,7 +52,7 @@ static size_t rows_of(const struct estimate *s, struct row row[TARGETS_MOST])
 	return count;
 }
 
-int estimate_check(const struct estimate *s, struct error *e)
+static int check(const struct estimate *s, struct error *e)
 {
 	if (s->looks->count >= LOOKS_LEAST)
 		return 0;
@@ -73,7 +74,7 @@ static void print_range(FILE *f, const struct forecast_range *r)
 	fprintf(f, "  %9s  %-20s", middle, between);
 }
 
-void estimate_print(const struct estimate *s, FILE *f)
+static void print_table(const struct estimate *s, FILE *f)
 {
 	struct row row[TARGETS_MOST];
 	size_t count = rows_of(s, row);
@@ -123,7 +124,7 @@ static json_t *targets_json(const struct estimate *s)
 	return list;
 }
 
-int estimate_print_json(const struct estimate *s, FILE *f, struct error *e)
+static int print_json(const struct estimate *s, FILE *f, struct error *e)
 {
 	char plan[PLAN_TEXT];
 	struct forecast_range now;
@@ -198,7 +199,7 @@ static void draw_goal(const struct row *r, struct drawing *d, size_t i)
 	}
 }
 
-int estimate_plot(const struct estimate *s, const char *path, struct error *e)
+static int draw(const struct estimate *s, const char *path, struct error *e)
 {
 	static struct drawing d;
 	struct row row[TARGETS_MOST];
@@ -222,4 +223,14 @@ int estimate_plot(const struct estimate *s, const char *path, struct error *e)
 	struct plot p = {.title = s->scene, .x_label = "seconds of processors", .y_label = "relative error, %", .log_x = true,
 			 .log_y = true, .series_count = series, .series = list};
 	return plot_write(&p, path, e);
+}
+
+int estimate_report(const struct estimate *s, bool json, const char *plot, struct error *e)
+{
+	int rc = check(s, e);
+	if (!rc && json)
+		rc = print_json(s, stdout, e);
+	else if (!rc)
+		print_table(s, stdout);
+	return !rc && plot ? draw(s, plot, e) : rc;
 }

@@ -7,8 +7,6 @@
 
 #include "common/film/forecast.h"
 
-#include <stdio.h>
-
 struct estimate {
 	const char *scene, *where;  /* "this machine, 2 threads" */
 	const struct plan *plan;    /* of the render that is spoken of */
@@ -19,10 +17,7 @@ struct estimate {
 	double target;              /* asked for beside the usual ones; 0: none */
 };
 
-/* -EAGAIN: the pilot has not seen enough to say anything. */
-int estimate_check(const struct estimate *s, struct error *e);
-void estimate_print(const struct estimate *s, FILE *f);
-int estimate_print_json(const struct estimate *s, FILE *f, struct error *e);
-int estimate_plot(const struct estimate *s, const char *path, struct error *e);
+/* Table or JSON to stdout, and a plot where a path is given. -EAGAIN: the pilot has not seen enough to say anything. */
+int estimate_report(const struct estimate *s, bool json, const char *plot, struct error *e);
 
 #endif

@@ -309,33 +309,22 @@ static int report(const struct session *s, const struct local_pilot *p, struct e
 			     .bootstrap_cpu = p->bootstrap_cpu,
 			     .bootstrap_seconds = p->bootstrap_seconds,
 			     .target = s->a->render.plan.target_error};
-	int rc = estimate_check(&m, e);
-	if (rc)
-		return rc;
-	if (s->a->json)
-		rc = estimate_print_json(&m, stdout, e);
-	else
-		estimate_print(&m, stdout);
-	return !rc && s->a->plot ? estimate_plot(&m, s->a->plot, e) : rc;
+	return estimate_report(&m, s->a->json, s->a->plot, e);
 }
 
 static int estimate(struct session *s, struct error *e)
 {
-	struct plan_request *request = &s->a->render.plan;
-	double target = request->target_error;
-	request->target_error = target > 0 ? target : 1; /* else the scene's sampleCount would be taken for a wish */
 	int rc = s->a->plot ? image_file_probe(s->a->plot, e) : 0;
 	if (!rc)
 		rc = load(s, e);
 	if (!rc) {
-		rc = render_plan_from_scene(&s->a->render, &s->summary, e);
+		rc = pilot_plan_from_scene(&s->a->render, &s->summary, e);
 		s->usage = rc == -EINVAL;
 	}
-	request->target_error = target;
 	if (rc)
 		return rc;
 	struct local_pilot p = {.world = s->world,
-				.request = request,
+				.request = &s->a->render.plan,
 				.seconds = s->a->pilot > 0 ? s->a->pilot : PILOT_SECONDS,
 				.threads = s->a->threads,
 				.stop = &interrupted,

@@ -1,7 +1,10 @@
 #include "common/base/text.h"
 #include "common/base/version.h"
 #include "common/film/image_file.h"
-#include "worker/cli/submit.h"
+#include "worker/cli/estimate.h"
+#include "worker/cli/farm_pilot.h"
+#include "worker/cli/options.h"
+#include "worker/cli/pilot.h"
 
 #include <argp.h>
 #include <jansson.h>
@@ -19,15 +22,17 @@ static const char doc[] =
 	"  hslt-submit --coordinator 127.0.0.1:7700 room.xml -o room.exr --spp 64 --wait\n"
 	"  hslt-submit room.xml -o room.exr --target-error 2% --time 3600\n"
 	"  hslt-submit room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --spp 256\n"
+	"  hslt-submit --estimate room.xml --plot room.svg\n"
 	"  hslt-submit room.xml -o left.exr --crop 0,0,960,1080 --priority 10 -D light=sun\n"
 	"\n"
 	"The job's id goes to stdout, everything else to stderr. Without --wait, -o is the default name for hslt-job fetch. "
-	"HSLT_COORDINATOR stands in for --coordinator.\n"
+	"--estimate makes no image: a pilot of a minute on the farm tells what errors of 10, 5, 2 and 1 % (and --target-error) will "
+	"cost there. HSLT_COORDINATOR stands in for --coordinator.\n"
 	"Exit codes: 0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
 	"there, and its note says where), 6 refused, 75 "
 	"coordinator not reachable.";
 
-enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED };
+enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
@@ -35,7 +40,10 @@ static const struct argp_option options[] = {
 	{"priority", OPTION_PRIORITY, "P", 0, "-100 to 100, higher first (0)", 0},
 	{"name", OPTION_NAME, "NAME", 0, "How the job is shown (the scene's file name)", 0},
 	{"wait", OPTION_WAIT, NULL, 0, "Show progress and fetch the image", 0},
-	{"json", OPTION_JSON, NULL, 0, "Print one JSON object instead of the id", 0},
+	{"json", OPTION_JSON, NULL, 0, "Print one JSON object instead of the id, or of the estimate's table", 0},
+	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
+	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
+	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
 	{"mixed", OPTION_MIXED, NULL, 0, "Allow workers of any numeric fingerprint: gives up equal bits", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{0},
@@ -47,7 +55,9 @@ struct arguments {
 	const char *coordinator, *scene, *output, *name;
 	struct submit_request request;
 	struct render_arguments render;
-	bool wait, json, insecure;
+	const char *plot;
+	double pilot; /* s; 0: not given */
+	bool wait, json, insecure, estimate;
 };
 
 static error_t parse(int key, char *arg, struct argp_state *state)
@@ -84,14 +94,27 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_INSECURE:
 		a->insecure = true;
 		return 0;
+	case OPTION_ESTIMATE:
+		a->estimate = true;
+		return 0;
+	case OPTION_PILOT:
+		a->pilot = option_seconds(state, "--pilot", arg);
+		return 0;
+	case OPTION_PLOT:
+		a->plot = arg;
+		return 0;
 	case ARGP_KEY_ARG:
 		if (a->scene)
 			argp_error(state, "one scene at a time");
 		a->scene = arg;
 		return 0;
 	case ARGP_KEY_END:
-		if (!a->scene || !a->output)
+		if (!a->scene || (!a->output && !a->estimate))
 			argp_error(state, "a scene and -o FILE are needed");
+		if (a->estimate && (a->output || a->wait))
+			argp_error(state, "--estimate makes no image: no -o, no --wait");
+		if (!a->estimate && (a->pilot > 0 || a->plot))
+			argp_error(state, "--pilot and --plot go with --estimate");
 		if (!a->coordinator)
 			argp_error(state, "--coordinator HOST:PORT is needed (or $HSLT_COORDINATOR)");
 		return 0;
@@ -151,19 +174,39 @@ static int run(struct arguments *a, struct client *cl, const struct scene_bundle
 	return rc;
 }
 
+static int estimate(const struct arguments *a, struct client *cl, const struct scene_bundle *b, struct error *e)
+{
+	struct farm_pilot p = {.client = cl, .request = &a->request, .bundle = b, .seconds = a->pilot > 0 ? a->pilot : PILOT_SECONDS};
+	int rc = farm_pilot(&p, e);
+	if (rc)
+		return rc;
+	const struct forecast_history *looks = &p.end.looks;
+	struct estimate m = {.scene = a->request.name,
+			     .where = "the farm as it is",
+			     .plan = &p.render,
+			     .pilot = &p.plan,
+			     .looks = looks,
+			     .cpu_seconds = p.end.cpu_seconds,
+			     .seconds = p.end.bootstrap_seconds + (looks->count ? looks->looks[looks->count - 1].seconds : 0),
+			     .bootstrap_cpu = p.end.bootstrap_cpu_seconds,
+			     .bootstrap_seconds = p.end.bootstrap_seconds,
+			     .target = a->render.plan.target_error};
+	return estimate_report(&m, a->json, a->plot, e);
+}
+
 int main(int argc, char **argv)
 {
 	static struct arguments a; /* large */
 	struct scene_bundle b;
 	struct client *cl;
 	struct error e;
-	char output[1024];
+	char output[1024] = "";
 	int code = 0;
 	a.coordinator = getenv("HSLT_COORDINATOR");
 	a.request.args = &a.render;
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
-	int rc = a.wait ? image_file_probe(a.output, &e) : 0;
+	int rc = a.wait ? image_file_probe(a.output, &e) : a.plot ? image_file_probe(a.plot, &e) : 0;
 	if (!rc)
 		rc = scene_bundle_read(&b, a.scene, a.render.defines, a.render.define_count, &a.render.render, &e);
 	if (rc) {
@@ -172,7 +215,7 @@ int main(int argc, char **argv)
 	}
 	for (size_t i = 0; i < b.note_count; i++)
 		fprintf(stderr, "%s\n", b.notes[i]);
-	rc = render_plan_from_scene(&a.render, &b.summary, &e);
+	rc = a.estimate ? pilot_plan_from_scene(&a.render, &b.summary, &e) : render_plan_from_scene(&a.render, &b.summary, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		scene_bundle_fini(&b);
@@ -180,11 +223,11 @@ int main(int argc, char **argv)
 	}
 	a.request.output = output;
 	a.request.name = a.name ? a.name : b.scene;
-	rc = absolute(a.output, output, sizeof output, &e);
+	rc = a.estimate ? 0 : absolute(a.output, output, sizeof output, &e);
 	if (!rc)
 		rc = client_open(&cl, a.coordinator, a.insecure, "hslt-submit", &e);
 	if (!rc) {
-		rc = run(&a, cl, &b, &code, &e);
+		rc = a.estimate ? estimate(&a, cl, &b, &e) : run(&a, cl, &b, &code, &e);
 		client_close(cl);
 	}
 	scene_bundle_fini(&b);

@@ -1,5 +1,7 @@
 #include "worker/cli/pilot.h"
 
+#include "worker/cli/options.h"
+
 #include <math.h>
 
 enum {
@@ -9,6 +11,15 @@ enum {
 };
 static const double out_of_reach = 1e-9;
 static const double bootstrap_share = 0.25; /* of a pilot, at most */
+
+int pilot_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e)
+{
+	double target = a->plan.target_error;
+	a->plan.target_error = target > 0 ? target : 1; /* a wish, so that the scene's is not taken for one */
+	int rc = render_plan_from_scene(a, summary, e);
+	a->plan.target_error = target;
+	return rc;
+}
 
 static struct plan_request open_ended(const struct plan_request *request, const struct plan *render)
 {
@@ -26,7 +37,7 @@ int pilot_render_plan(const struct plan_request *request, struct plan *render, s
 {
 	struct plan_request r = *request;
 	if (!(r.target_error > 0))
-		r.target_error = out_of_reach;
+		r.target_error = 0.01; /* the least of those that are spoken of */
 	return plan_make(&r, render, e);
 }
 

@@ -9,7 +9,13 @@
 
 enum { PILOT_SECONDS = 60, PILOT_ROUNDS = 16 /* aimed at: a dozen looks */ };
 
-/* No bound but an error out of reach, so that all looks are made; request: of the render, complete. */
+struct render_arguments;
+struct render_summary;
+
+/* render_plan_from_scene, but without the scene's sampleCount: an estimate is about errors. */
+int pilot_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e);
+
+/* request: of the render, complete; where it has no target error the plan gets one, so that an end is in sight. */
 int pilot_render_plan(const struct plan_request *request, struct plan *render, struct error *e);
 
 struct pilot_cost { /* wall seconds of a probe */

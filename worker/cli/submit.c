@@ -316,6 +316,19 @@ static void show(struct progress *p, const Farm__JobStatus *s)
 	progress_show(p, s->progress, s->state, detail);
 }
 
+static void take_looks(const Farm__JobStatus *s, struct submit_end *end)
+{
+	end->cpu_seconds = s->cpu_seconds;
+	end->bootstrap_cpu_seconds = s->bootstrap_cpu_seconds;
+	end->bootstrap_seconds = s->bootstrap_seconds;
+	end->looks.count = 0;
+	for (size_t i = 0; i < s->n_looks; i++) {
+		const Farm__Look *l = s->looks[i];
+		forecast_add_look(&end->looks, &(struct forecast_look){l->work, l->cpu_seconds, l->seconds, l->rel_mse,
+								       l->rel_mse_upper, l->degrees});
+	}
+}
+
 int submit_wait(struct client *cl, uint64_t job, struct submit_end *end, struct error *e)
 {
 	struct progress p;
@@ -339,6 +352,7 @@ int submit_wait(struct client *cl, uint64_t job, struct submit_end *end, struct 
 			const Farm__JobStatus *s = got->job_status;
 			show(&p, s);
 			ended = s->ended;
+			take_looks(s, end);
 			end->exit_code = s->exit_code;
 			end->has_result = s->fetchable;
 			text_copy(end->why, sizeof end->why, s->why);

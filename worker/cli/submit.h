@@ -5,6 +5,7 @@
 #ifndef WORKER_CLI_SUBMIT_H
 #define WORKER_CLI_SUBMIT_H
 
+#include "common/film/forecast.h"
 #include "common/blob/blob.h"
 #include "common/net/client.h"
 #include "common/plan/plan.h"
@@ -44,6 +45,8 @@ int submit_send(struct client *cl, const struct submit_request *r, const struct 
 struct submit_end {
 	uint32_t exit_code; /* of a program that waited */
 	bool has_result;
+	struct forecast_history looks; /* at the error; seconds from the first round on */
+	double cpu_seconds, bootstrap_cpu_seconds, bootstrap_seconds;
 	char why[256], note[1024]; /* why there is no result; what whoever looks at it should know */
 };
 
