@@ -5,6 +5,7 @@
 #include "common/base/mem.h"
 
 #include <math.h>
+#include <string.h>
 
 static void add_tally(struct tally *to, const struct tally *from, uint32_t groups, bool all)
 {
@@ -79,26 +80,43 @@ static double preview_leases(const struct canvas *c, uint32_t row)
 	return (double)n;
 }
 
+/* The used slots of a tile, of all groups: the prefix's, and of a preview the open rounds'. */
+static uint32_t tile_slots(const struct making *m, size_t tile, const int64_t *slots[PLAN_MAX_GROUPS * FILMS])
+{
+	uint32_t n = 0;
+	for (uint32_t g = 0; g < m->c->plan.groups; g++)
+		for (uint32_t which = 0; which < (m->open_rounds ? FILMS : 1); which++)
+			if (*canvas_flags(m->c, canvas_film(g, which), tile) & TILE_USED)
+				slots[n++] = canvas_slot(m->c, canvas_film(g, which), tile);
+	return n;
+}
+
+/* Integers, so that their order is free; added as doubles, since together they may be more than 64 bits hold. */
+static void pool_row(const int64_t *const *slots, uint32_t count, size_t at, size_t values, double *sums)
+{
+	memset(sums, 0, values * sizeof *sums);
+	for (uint32_t i = 0; i < count; i++)
+		for (size_t k = 0; k < values; k++)
+			sums[k] += (double)slots[i][at + k];
+}
+
 static void pool_tile(struct making *m, uint32_t tx, uint32_t ty)
 {
 	const struct plan *p = &m->c->plan;
-	size_t tile = (size_t)ty * m->c->tiles_across + tx;
+	const int64_t *slots[PLAN_MAX_GROUPS * FILMS];
+	uint32_t count = tile_slots(m, (size_t)ty * m->c->tiles_across + tx, slots), x = tx * TILE_SIZE;
+	uint32_t width = p->crop_width - x < TILE_SIZE ? p->crop_width - x : TILE_SIZE;
 	for (uint32_t y = ty * TILE_SIZE; y < p->crop_height && y < (ty + 1) * TILE_SIZE; y++) {
-		double factor = m->pooled_factor;
+		double factor = m->pooled_factor, sums[SLOT_ROW], rgb[3];
 		if (m->open_rounds && p->kind == PLAN_SAMPLES)
 			factor = ratio(m->c->quantum, preview_leases(m->c, y) * (double)p->epoch);
-		for (uint32_t x = tx * TILE_SIZE; x < p->crop_width && x < (tx + 1) * TILE_SIZE; x++) {
-			size_t at = (size_t)(y % TILE_SIZE) * SLOT_ROW + (size_t)(x % TILE_SIZE) * TILE_CHANNELS;
-			double xyz[3] = {0}, rgb[3];
-			for (uint32_t g = 0; g < p->groups; g++)
-				for (size_t k = 0; k < 3; k++)
-					xyz[k] += canvas_sum(m, g, tile, at + k);
-			for (int k = 0; k < 3; k++)
-				xyz[k] *= factor;
+		pool_row(slots, count, (size_t)(y % TILE_SIZE) * SLOT_ROW, (size_t)width * TILE_CHANNELS, sums);
+		float *out = m->img->rgb + ((size_t)y * p->crop_width + x) * 3;
+		for (size_t i = 0; i < width; i++) {
+			const double *s = sums + i * TILE_CHANNELS, xyz[3] = {s[0] * factor, s[1] * factor, s[2] * factor};
 			rec709_from_xyz(xyz, rgb);
-			float *out = m->img->rgb + ((size_t)y * p->crop_width + x) * 3;
-			for (int k = 0; k < 3; k++)
-				out[k] = (float)rgb[k];
+			for (size_t k = 0; k < 3; k++)
+				out[i * 3 + k] = (float)rgb[k];
 		}
 	}
 }
@@ -138,9 +156,9 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 	img->black = true;
 	for (size_t i = 0; i < (size_t)img->width * img->height * 3 && img->black; i++)
 		img->black = img->rgb[i] == 0;
-	if (errors)
-		canvas_error(&m);
-	int rc = find_moments(&m, e);
+	int rc = errors ? canvas_error(&m, e) : 0;
+	if (rc == 0)
+		rc = find_moments(&m, e);
 	if (rc)
 		canvas_image_fini(img);
 	mem_free(m.all);

@@ -46,11 +46,10 @@ struct making {
 	double factor[PLAN_MAX_GROUPS];   /* grid units to the group's image; 0: the group has nothing */
 	double pooled_factor;
 	double b[PLAN_MAX_GROUPS];
-	double distance[PLAN_MAX_GROUPS]; /* mean over pixels of the weighted square distance of a group's image */
 };
 
-/* Fills error and the relMSE of an image whose rgb is there. */
-void canvas_error(struct making *m);
+/* Fills error and the relMSE of an image whose rgb is there; two or more groups, no open rounds. -ENOMEM */
+int canvas_error(struct making *m, struct error *e);
 
 void canvas_add_counts(struct canvas_counts *to, const struct canvas_counts *from);
 
@@ -77,18 +76,6 @@ static inline uint8_t *canvas_flags(const struct canvas *c, size_t film, size_t 
 static inline bool canvas_lease_merged(const struct canvas *c, uint32_t set, uint32_t group, uint32_t part)
 {
 	return c->has[((size_t)set * c->plan.groups + group) * c->plan.parts + part];
-}
-
-/* A group's sum at value i of a tile. */
-static inline double canvas_sum(const struct making *m, uint32_t group, size_t tile, size_t i)
-{
-	int64_t sum = 0;
-	for (uint32_t which = 0; which < (m->open_rounds ? FILMS : 1); which++) {
-		size_t film = canvas_film(group, which);
-		if (*canvas_flags(m->c, film, tile) & TILE_USED)
-			sum += canvas_slot(m->c, film, tile)[i];
-	}
-	return (double)sum;
 }
 
 #endif
