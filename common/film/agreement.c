@@ -18,6 +18,11 @@
 #define CLASS_OF_B 0.02
 #define CLASS_OF_ITSELF 0.2
 #define CLASS_LEAST 0.005
+/* Standard error from the groups of a class's energy in the chains: when half of the groups have found it and share it evenly it
+ * is a quarter of it (sqrt((16 / 8 - 1) / 15) of 16 groups); of fewer groups it is itself too uncertain. */
+#define APART_OF_ITSELF 0.25
+#define APART_OF_B 0.01
+enum { APART_GROUPS = 8 };
 /* Standard error of a class's energy in the bootstrap above which the bootstrap is no witness against more of it: see excess. */
 #define CLASS_KNOWN 0.1
 
@@ -132,6 +137,19 @@ static bool class_flagged(const struct path_class_energy *c, double b, uint32_t 
 	return agreement_student_tail(c->difference_t, groups - 1) < CLASS_LEVEL / PATH_CLASSES;
 }
 
+static bool class_apart(const struct path_class_energy *c, double b, uint32_t groups)
+{
+	return groups >= APART_GROUPS && c->chains_error > APART_OF_ITSELF * c->chains && c->chains_error > APART_OF_B * b;
+}
+
+static void judge_classes(const struct plan *p, const struct canvas_image *img, struct agreement *a)
+{
+	for (unsigned k = 0; k < PATH_CLASSES; k++) {
+		a->classes_flagged |= (uint32_t)class_flagged(&img->classes[k], img->b, p->groups) << k;
+		a->classes_apart |= (uint32_t)class_apart(&img->classes[k], img->b, p->groups) << k;
+	}
+}
+
 /* ---- words */
 
 static void put_tiles(struct text *t, const struct agreement *a)
@@ -140,20 +158,25 @@ static void put_tiles(struct text *t, const struct agreement *a)
 		 100 * a->energy_flagged, a->r_hat_worst, a->worst_x, a->worst_y);
 }
 
-static void put_classes(struct text *t, const struct canvas_image *img, uint32_t flagged, const char *then)
+static void put_classes(struct text *t, const struct canvas_image *img, uint32_t which, bool apart, const char *then)
 {
-	enum { SHOWN = 3 };
+	enum { SHOWN = 2 };
 	unsigned shown = 0, more = 0;
 	for (unsigned k = 0; k < PATH_CLASSES; k++) {
 		const struct path_class_energy *c = &img->classes[k];
-		if (!(flagged >> k & 1))
+		if (!(which >> k & 1))
 			continue;
 		if (shown == SHOWN) {
 			more++;
 			continue;
 		}
-		text_put(t, "%sto paths (%s) they give %.3g %% of b, the bootstrap %.3g %%", then, path_class_name(k),
-			 100 * c->chains / img->b, 100 * c->bootstrap / img->b);
+		double chains = 100 * c->chains / img->b;
+		if (apart)
+			text_put(t, "%sgroups of them differ in paths (%s): %.3g +- %.2g %% of b", then, path_class_name(k), chains,
+				 100 * c->chains_error / img->b);
+		else
+			text_put(t, "%sto paths (%s) they give %.3g %% of b, the bootstrap %.3g %%", then, path_class_name(k), chains,
+				 100 * c->bootstrap / img->b);
 		shown++;
 		then = ", ";
 	}
@@ -174,7 +197,11 @@ static void put_words(const struct plan *p, const struct canvas_image *img, stru
 		then = "; ";
 	}
 	if (a->classes_flagged) {
-		put_classes(&t, img, a->classes_flagged, then);
+		put_classes(&t, img, a->classes_flagged, false, then);
+		then = "; ";
+	}
+	if (a->classes_apart) {
+		put_classes(&t, img, a->classes_apart, true, then);
 		then = "; ";
 	}
 	if (stuck)
@@ -189,13 +216,11 @@ void agreement_judge(const struct plan *p, const struct canvas_image *img, struc
 		return;
 	uint64_t epochs = img->samples / p->epoch;
 	judge_tiles(p, img, a);
-	for (unsigned k = 0; k < PATH_CLASSES; k++)
-		if (class_flagged(&img->classes[k], img->b, p->groups))
-			a->classes_flagged |= UINT32_C(1) << k;
+	judge_classes(p, img, a);
 	if (epochs)
 		a->stuck_share = (double)img->counts.counters[COUNT_STUCK] / (double)epochs;
 	bool tiles = a->energy_flagged > FLAGGED_SHARE_MOST, stuck = p->epoch >= STUCK_EPOCH && a->stuck_share > STUCK_MOST;
-	if (!tiles && !a->classes_flagged && !stuck)
+	if (!tiles && !a->classes_flagged && !a->classes_apart && !stuck)
 		return;
 	/* The product of two counts of a plan that was checked fits 64 bits: COUNT_SAMPLES holds it. */
 	a->verdict = img->rounds * p->epoch < AGREEMENT_MUTATIONS ? CHAINS_TOO_SHORT : CHAINS_DISAGREE;
@@ -211,7 +236,7 @@ void agreement_add_note(const struct agreement *a, char *note, size_t size)
 	text_put(&t, "%s%s", used ? "; " : "", a->text);
 }
 
-void agreement_table(const struct path_class_energy classes[PATH_CLASSES], double b, uint32_t flagged, char *text, size_t size)
+void agreement_table(const struct path_class_energy classes[PATH_CLASSES], double b, const struct agreement *a, char *text, size_t size)
 {
 	struct text t = {text, size};
 	if (size)
@@ -230,6 +255,6 @@ void agreement_table(const struct path_class_energy classes[PATH_CLASSES], doubl
 			text_put(&t, " %9s", "-");
 		else
 			text_put(&t, " %9.2f", c->difference_t);
-		text_put(&t, "%s\n", flagged >> k & 1 ? "  differs" : "");
+		text_put(&t, "%s%s\n", a->classes_flagged >> k & 1 ? "  differs" : "", a->classes_apart >> k & 1 ? "  groups apart" : "");
 	}
 }

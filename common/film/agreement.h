@@ -1,7 +1,7 @@
 /*
  * Whether the chains of an image agree, from what its batches say besides pixels (contract sections 1 and 2): tiles whose
  * potential scale reduction (Gelman and Rubin 1992) says that chains have not mixed, classes of paths whose energy in the
- * chains differs from the bootstrap's, chains that stand still. Pure; any thread; allocates nothing. Samples (path, bdpt)
+ * chains differs from the bootstrap's or from group to group, chains that stand still. Pure; any thread; allocates nothing. Samples (path, bdpt)
  * always agree. Energies are in units of b. How often each criterion fires on scenes that are fine, and on one that is not:
  * see tests/e2e/disagree.sh.
  */
@@ -26,7 +26,8 @@ struct agreement {
 	double energy_flagged;         /* share of the image's energy in flagged tiles */
 	double r_hat_median, r_hat_worst; /* over tiles that have light; NAN: none */
 	uint32_t worst_x, worst_y;     /* the tile of r_hat_worst, in pixels of the full film */
-	uint32_t classes_flagged;      /* bit a path class */
+	uint32_t classes_flagged;      /* bit a path class: chains and bootstrap differ */
+	uint32_t classes_apart;        /* bit a path class: groups of chains differ, as if few of them had found it */
 	double stuck_share;            /* of chain epochs without an accepted mutation */
 	char text[AGREEMENT_TEXT];     /* in words, one line: what disagrees, where, by how much. Empty: CHAINS_AGREE */
 };
@@ -38,9 +39,9 @@ const char *agreement_name(enum agreement_verdict v); /* "agree", "too short", "
 void agreement_add_note(const struct agreement *a, char *note, size_t size);
 
 /* One row a class that has energy: bootstrap's and chains' share of b in %, the standard errors, t, and whether it is
- * flagged. Lines end with '\n'; empty where no class has any. AGREEMENT_TABLE bytes are enough. */
+ * flagged or its groups are apart. Lines end with '\n'; empty where no class has any. AGREEMENT_TABLE bytes are enough. */
 enum { AGREEMENT_TABLE = 4096 };
-void agreement_table(const struct path_class_energy classes[PATH_CLASSES], double b, uint32_t flagged, char *text, size_t size);
+void agreement_table(const struct path_class_energy classes[PATH_CLASSES], double b, const struct agreement *a, char *text, size_t size);
 
 /* P(|T| > |t|) of Student's t with so many degrees of freedom (at least 1). */
 double agreement_student_tail(double t, uint32_t degrees);

@@ -22,17 +22,23 @@ static uint32_t whole(const json_t *x)
 	return n < 0 ? 0 : n > UINT32_MAX ? UINT32_MAX : (uint32_t)n;
 }
 
+static json_t *names_of(uint32_t classes)
+{
+	json_t *list = json_array();
+	for (unsigned k = 0; k < PATH_CLASSES; k++)
+		if (classes >> k & 1)
+			json_array_append_new(list, json_string(path_class_name(k)));
+	return list;
+}
+
 json_t *agreement_to_json(const struct agreement *a)
 {
-	json_t *flagged = json_array();
-	for (unsigned k = 0; k < PATH_CLASSES; k++)
-		if (a->classes_flagged >> k & 1)
-			json_array_append_new(flagged, json_string(path_class_name(k)));
-	return json_pack("{s:s s:s s:o s:o s:[I,I] s:I s:I s:o s:o s:o}", "verdict", agreement_name(a->verdict), "text", a->text, /* */
+	return json_pack("{s:s s:s s:o s:o s:[I,I] s:I s:I s:o s:o s:o s:o}", "verdict", agreement_name(a->verdict), "text", a->text, /* */
 			 "rHatMedian", real_or_null(a->r_hat_median), "rHatWorst", real_or_null(a->r_hat_worst), /* */
 			 "worst", (json_int_t)a->worst_x, (json_int_t)a->worst_y, "tiles", (json_int_t)a->tiles, /* */
 			 "tilesFlagged", (json_int_t)a->tiles_flagged, "energyFlagged", real_or_null(a->energy_flagged), /* */
-			 "stuckShare", real_or_null(a->stuck_share), "classesFlagged", flagged);
+			 "stuckShare", real_or_null(a->stuck_share), "classesFlagged", names_of(a->classes_flagged), /* */
+			 "classesApart", names_of(a->classes_apart));
 }
 
 static unsigned class_named(const json_t *name)
@@ -43,10 +49,21 @@ static unsigned class_named(const json_t *name)
 	return k;
 }
 
+static uint32_t classes_named(const json_t *list)
+{
+	uint32_t classes = 0;
+	for (size_t i = 0; i < json_array_size(list); i++) {
+		unsigned k = class_named(json_array_get(list, i));
+		if (k < PATH_CLASSES)
+			classes |= UINT32_C(1) << k;
+	}
+	return classes;
+}
+
 void agreement_from_json(const json_t *o, struct agreement *a)
 {
 	const char *verdict = json_string_value(json_object_get(o, "verdict")), *text = json_string_value(json_object_get(o, "text"));
-	const json_t *worst = json_object_get(o, "worst"), *flagged = json_object_get(o, "classesFlagged");
+	const json_t *worst = json_object_get(o, "worst");
 	*a = (struct agreement){.r_hat_median = real_or_nan(o, "rHatMedian"), .r_hat_worst = real_or_nan(o, "rHatWorst")};
 	for (int v = CHAINS_AGREE; verdict && v <= CHAINS_DISAGREE; v++)
 		if (strcmp(verdict, agreement_name((enum agreement_verdict)v)) == 0)
@@ -58,11 +75,8 @@ void agreement_from_json(const json_t *o, struct agreement *a)
 	a->tiles_flagged = whole(json_object_get(o, "tilesFlagged"));
 	a->energy_flagged = json_number_value(json_object_get(o, "energyFlagged"));
 	a->stuck_share = json_number_value(json_object_get(o, "stuckShare"));
-	for (size_t i = 0; i < json_array_size(flagged); i++) {
-		unsigned k = class_named(json_array_get(flagged, i));
-		if (k < PATH_CLASSES)
-			a->classes_flagged |= UINT32_C(1) << k;
-	}
+	a->classes_flagged = classes_named(json_object_get(o, "classesFlagged"));
+	a->classes_apart = classes_named(json_object_get(o, "classesApart"));
 }
 
 json_t *classes_to_json(const struct path_class_energy classes[PATH_CLASSES])

@@ -7,7 +7,7 @@
 #include <jansson.h>
 
 /* {"verdict":"disagree","text":...,"rHatMedian":1.01,"rHatWorst":2.4,"worst":[64,0],"tiles":12,"tilesFlagged":3,
- * "energyFlagged":0.04,"stuckShare":0,"classesFlagged":["caustic, 3-4 edges"]}; what is not known is null. NULL: no memory. */
+ * "energyFlagged":0.04,"stuckShare":0,"classesFlagged":["caustic, 3-4 edges"],"classesApart":[]}; what is not known is null. NULL: no memory. */
 json_t *agreement_to_json(const struct agreement *a);
 /* What is missing or of another kind is 0, or not known. */
 void agreement_from_json(const json_t *o, struct agreement *a);

@@ -172,7 +172,7 @@ static void add_agreement(struct header *h, const struct canvas_image *img, cons
 		add_double(h, H_R_HAT_MEDIAN, a->r_hat_median);
 		add_double(h, H_R_HAT_WORST, a->r_hat_worst);
 	}
-	agreement_table(img->classes, img->b, a->classes_flagged, table, sizeof table);
+	agreement_table(img->classes, img->b, a, table, sizeof table);
 	if (*table)
 		add_string(h, H_CLASSES, table);
 }

@@ -218,7 +218,7 @@ static void print_agreement(const json_t *job)
 	if (json_is_number(json_object_get(o, "rHatWorst")))
 		printf("       chains: %s; R-hat %.3g in the middle, %.3g in the worst of %u tiles\n", text_of(o, "verdict"), a.r_hat_median,
 		       a.r_hat_worst, a.tiles);
-	agreement_table(classes, number_of(job, "b"), a.classes_flagged, text, sizeof text);
+	agreement_table(classes, number_of(job, "b"), &a, text, sizeof text);
 	fputs(text, stdout);
 }
 

@@ -286,7 +286,7 @@ static void say(const struct session *s)
 	strategy_table(p->mutations, &i->counts, text, sizeof text);
 	if (s->a->stats)
 		fputs(text, stderr);
-	agreement_table(i->classes, i->b, s->agreement.classes_flagged, text, sizeof text);
+	agreement_table(i->classes, i->b, &s->agreement, text, sizeof text);
 	if (s->a->stats)
 		fputs(text, stderr);
 	strategy_note(p, &i->counts, i->black, text, sizeof text);

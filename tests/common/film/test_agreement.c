@@ -173,6 +173,27 @@ static void classes_that_differ(void **state)
 	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
 }
 
+static void groups_that_are_apart(void **state)
+{
+	(void)state;
+	struct fixture f;
+	struct agreement a;
+	make(&f);
+	struct path_class_energy *both = &f.img.classes[path_class(4, PATH_BOTH)];
+	*both = (struct path_class_energy){0.1, 0.1, 0.2, 0.049, 1};
+	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	both->chains_error = 0.051;
+	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
+	assert_int_equal(a.classes_apart, 1U << path_class(4, PATH_BOTH));
+	assert_int_equal(a.classes_flagged, 0);
+	says(&a, "chains disagree: groups of them differ in paths (reflected caustic, 3-4 edges): 10 +- 2.5 % of b");
+	f.plan.groups = 7;
+	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+	f.plan.groups = 16;
+	*both = (struct path_class_energy){0.1, 0.1, 0.019, 0.019, 1}; /* too little to see */
+	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
+}
+
 static void chains_that_stand_still(void **state)
 {
 	(void)state;
@@ -208,23 +229,24 @@ static void words_fit(void **state)
 	struct fixture f;
 	struct agreement a;
 	char table[AGREEMENT_TABLE];
+	const struct agreement none = {.verdict = CHAINS_AGREE};
 	make(&f);
 	for (int i = 0; i < TILES; i++)
 		f.r_hat[i] = f.tile_error[i] = 123.456F;
 	for (int k = 0; k < PATH_CLASSES; k++)
-		f.img.classes[k] = (struct path_class_energy){1.23456789, 0.000123, 0.987654321e-3, 1e-9, -1234.5678};
+		f.img.classes[k] = (struct path_class_energy){1.23456789, 0.000123, 0.987654321e-1, 0.123456, -1234.5678};
 	f.img.counts.counters[COUNT_STUCK] = 1234;
 	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
 	says(&a, "in 20 of 20 tiles");
-	says(&a, "and 17 classes more");
+	says(&a, "and 18 classes more; groups of them differ in paths (rough, 1-2 edges): 4.94 +- 6.2 % of b");
 	says(&a, "they accepted nothing");
-	agreement_table(f.img.classes, f.img.b, a.classes_flagged, table, sizeof table);
+	agreement_table(f.img.classes, f.img.b, &a, table, sizeof table);
 	int lines = 0;
 	for (const char *c = table; *c; c++)
 		lines += *c == '\n';
 	assert_int_equal(lines, PATH_CLASSES + 1);
 	make(&f);
-	agreement_table(f.img.classes, f.img.b, 0, table, sizeof table);
+	agreement_table(f.img.classes, f.img.b, &none, table, sizeof table);
 	assert_non_null(strstr(table, "reflected caustic, 3-4 edges"));
 	assert_null(strstr(table, "differs"));
 	char note[AGREEMENT_TEXT] = "";
@@ -235,7 +257,7 @@ static void words_fit(void **state)
 	agreement_add_note(&a, note, 36);
 	assert_string_equal(note, "chains disagree; chains disagree; c");
 	char small[10];
-	agreement_table(f.img.classes, f.img.b, 0, small, sizeof small);
+	agreement_table(f.img.classes, f.img.b, &none, small, sizeof small);
 	assert_true(strlen(small) < sizeof small);
 }
 
@@ -244,7 +266,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(tails_of_student),  cmocka_unit_test(all_is_well),
 		cmocka_unit_test(medians),           cmocka_unit_test(tiles_that_have_not_mixed),
-		cmocka_unit_test(classes_that_differ), cmocka_unit_test(chains_that_stand_still),
+		cmocka_unit_test(classes_that_differ), cmocka_unit_test(groups_that_are_apart), cmocka_unit_test(chains_that_stand_still),
 		cmocka_unit_test(samples_agree),     cmocka_unit_test(words_fit),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -74,7 +74,7 @@ static void records_come_back(void **state)
 	for (uint64_t i = 0; i < 2 * STRATEGY_COUNTERS; i++)
 		r.strategy[i / STRATEGY_COUNTERS][i % STRATEGY_COUNTERS] = i * i;
 	record_begin_agreement(&r);
-	r.agreement = (struct agreement){CHAINS_DISAGREE, 12, 3, 0.125, 1.01, 2.5, 64, 128, 1U << 7 | 1, 0.25, "chains \"disagree\""};
+	r.agreement = (struct agreement){CHAINS_DISAGREE, 12, 3, 0.125, 1.01, 2.5, 64, 128, 1U << 7 | 1, 1U << 19 | 2, 0.25, "chains \"disagree\""};
 	r.b = 1.0 / 7;
 	r.classes[7] = (struct path_class_energy){0.1, 0.01, 0.2, 0.02, -12.5};
 	r.classes[0] = (struct path_class_energy){0.3, NAN, 0.4, NAN, NAN};
@@ -94,7 +94,7 @@ static void records_come_back(void **state)
 	const struct agreement *a = &back.agreement;
 	assert_true(a->verdict == CHAINS_DISAGREE && a->tiles == 12 && a->tiles_flagged == 3 && a->energy_flagged == 0.125);
 	assert_true(a->r_hat_median == 1.01 && a->r_hat_worst == 2.5 && a->worst_x == 64 && a->worst_y == 128);
-	assert_true(a->classes_flagged == r.agreement.classes_flagged && a->stuck_share == 0.25 && back.b == r.b);
+	assert_true(a->classes_flagged == r.agreement.classes_flagged && a->classes_apart == r.agreement.classes_apart && a->stuck_share == 0.25 && back.b == r.b);
 	assert_string_equal(a->text, r.agreement.text);
 	assert_memory_equal(&back.classes[7], &r.classes[7], sizeof *r.classes);
 	assert_true(back.classes[0].chains == 0.4 && isnan(back.classes[0].difference_t) && isnan(back.classes[0].chains_error));
