@@ -21,7 +21,7 @@
 /* Standard error from the groups of a class's energy in the chains: when half of the groups have found it and share it evenly it
  * is a quarter of it (sqrt((16 / 8 - 1) / 15) of 16 groups); of fewer groups it is itself too uncertain. */
 #define APART_OF_ITSELF 0.25
-#define APART_OF_B 0.01
+#define APART_OF_B 0.03
 enum { APART_GROUPS = 8 };
 /* Standard error of a class's energy in the bootstrap above which the bootstrap is no witness against more of it: see excess. */
 #define CLASS_KNOWN 0.1

@@ -180,17 +180,17 @@ static void groups_that_are_apart(void **state)
 	struct agreement a;
 	make(&f);
 	struct path_class_energy *both = &f.img.classes[path_class(4, PATH_BOTH)];
-	*both = (struct path_class_energy){0.1, 0.1, 0.2, 0.049, 1};
+	*both = (struct path_class_energy){0.1, 0.1, 0.4, 0.099, 1};
 	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
-	both->chains_error = 0.051;
+	both->chains_error = 0.102;
 	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
 	assert_int_equal(a.classes_apart, 1U << path_class(4, PATH_BOTH));
 	assert_int_equal(a.classes_flagged, 0);
-	says(&a, "chains disagree: groups of them differ in paths (reflected caustic, 3-4 edges): 10 +- 2.5 % of b");
+	says(&a, "chains disagree: groups of them differ in paths (reflected caustic, 3-4 edges): 20 +- 5.1 % of b");
 	f.plan.groups = 7;
 	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
 	f.plan.groups = 16;
-	*both = (struct path_class_energy){0.1, 0.1, 0.019, 0.019, 1}; /* too little to see */
+	*both = (struct path_class_energy){0.1, 0.1, 0.059, 0.059, 1}; /* too little to see */
 	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
 }
 
