@@ -21,6 +21,10 @@ struct crew {
 	struct error error;
 };
 
+struct local_job {
+	struct crew crew;
+};
+
 static double since(const struct timespec *begin)
 {
 	struct timespec now;
@@ -184,7 +188,8 @@ static int look(struct crew *c, uint64_t rounds, enum merge_end *end)
 	return 0;
 }
 
-static int run(struct crew *c)
+/* The bootstrap, and what the rounds begin with. */
+static int run_bootstrap(struct crew *c)
 {
 	struct local_run *r = c->run;
 	int rc = phase(c, LEASE_BOOTSTRAP, 0);
@@ -193,47 +198,87 @@ static int run(struct crew *c)
 	r->bootstrap_cpu_seconds = r->cpu_seconds;
 	r->bootstrap_seconds = since(&c->begin);
 	rc = begin_rounds(c);
-	if (rc || r->lit.black) {
+	if (r->lit.black)
 		r->end = MERGE_ROUNDS;
-		return rc;
+	return rc;
+}
+
+/* On errors the canvas goes: what it holds cannot be trusted. */
+static int fail(struct local_job *j, int rc, struct error *e)
+{
+	*e = j->crew.error;
+	canvas_free(j->crew.run->canvas);
+	j->crew.run->canvas = NULL;
+	return rc;
+}
+
+int local_start(struct local_run *r, struct local_job **out, struct error *e)
+{
+	const struct plan *p = r->plan;
+	struct local_job *j = *out = mem_alloc(1, sizeof *j);
+	if (!j)
+		return error_set(e, ENOMEM, "no memory for a job");
+	struct crew *c = &j->crew;
+	c->run = r;
+	pthread_mutex_init(&c->lock, NULL);
+	r->canvas = NULL;
+	r->end = MERGE_GOES_ON;
+	r->seconds = r->cpu_seconds = r->bootstrap_seconds = r->bootstrap_cpu_seconds = 0;
+	clock_gettime(CLOCK_MONOTONIC, &c->begin);
+	c->seeds = mem_alloc(p->chains, sizeof *c->seeds);
+	c->states = mem_alloc((size_t)p->groups * p->parts, sizeof *c->states);
+	int rc = !c->seeds || !c->states ? error_set(&c->error, ENOMEM, "no memory for the chains") :
+					   bootstrap_new(&c->bootstrap, p, &c->error);
+	if (!rc)
+		rc = run_bootstrap(c);
+	r->seconds = since(&c->begin);
+	if (rc) {
+		fail(j, rc, e);
+		local_end(j);
+		*out = NULL;
 	}
-	for (uint64_t round = 0; r->end == MERGE_GOES_ON && !stopped(c); round++) {
-		rc = phase(c, LEASE_RENDER, round);
-		if (rc || stopped(c))
-			return rc;
-		rc = look(c, round + 1, &r->end);
-		if (rc)
-			return rc;
-	}
-	return 0;
+	return rc;
+}
+
+int local_step(struct local_job *j, struct error *e)
+{
+	struct crew *c = &j->crew;
+	if (!c->run->canvas || c->run->lit.black || stopped(c))
+		return 0;
+	int rc = phase(c, LEASE_RENDER, canvas_rounds(c->run->canvas));
+	c->run->seconds = since(&c->begin);
+	return rc ? fail(j, rc, e) : 0;
+}
+
+void local_end(struct local_job *j)
+{
+	struct crew *c = &j->crew;
+	const struct plan *p = c->run->plan;
+	for (uint32_t i = 0; c->states && i < p->groups * p->parts; i++)
+		free_states(c->states[i], chains_of(p, i % p->parts));
+	mem_free(c->states);
+	mem_free(c->seeds);
+	bootstrap_free(c->bootstrap);
+	pthread_mutex_destroy(&c->lock);
+	mem_free(j);
 }
 
 int local_run(struct local_run *r, struct error *e)
 {
-	const struct plan *p = r->plan;
-	uint32_t leases = p->groups * p->parts;
-	struct crew c = {.run = r, .lock = PTHREAD_MUTEX_INITIALIZER};
-	r->canvas = NULL;
-	r->end = MERGE_GOES_ON;
-	r->seconds = r->cpu_seconds = r->bootstrap_seconds = r->bootstrap_cpu_seconds = 0;
-	clock_gettime(CLOCK_MONOTONIC, &c.begin);
-	c.seeds = mem_alloc(p->chains, sizeof *c.seeds);
-	c.states = mem_alloc(leases, sizeof *c.states);
-	int rc = !c.seeds || !c.states ? error_set(&c.error, ENOMEM, "no memory for the chains") :
-					 bootstrap_new(&c.bootstrap, p, &c.error);
-	if (!rc)
-		rc = run(&c);
-	r->seconds = since(&c.begin);
-	for (uint32_t i = 0; c.states && i < leases; i++)
-		free_states(c.states[i], chains_of(p, i % p->parts));
-	mem_free(c.states);
-	mem_free(c.seeds);
-	bootstrap_free(c.bootstrap);
-	pthread_mutex_destroy(&c.lock);
-	if (rc) {
-		*e = c.error;
-		canvas_free(r->canvas);
-		r->canvas = NULL;
+	struct local_job *j;
+	int rc = local_start(r, &j, e);
+	if (rc)
+		return rc;
+	while (!rc && r->canvas && r->end == MERGE_GOES_ON && !stopped(&j->crew)) {
+		uint64_t before = canvas_rounds(r->canvas);
+		rc = local_step(j, e);
+		if (rc || canvas_rounds(r->canvas) == before)
+			break;
+		rc = look(&j->crew, before + 1, &r->end);
+		if (rc)
+			fail(j, rc, e);
 	}
+	r->seconds = since(&j->crew.begin);
+	local_end(j);
 	return rc;
 }

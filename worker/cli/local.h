@@ -44,4 +44,13 @@ struct local_run {
 
 int local_run(struct local_run *r, struct error *e);
 
+/*
+ * The same in steps, for jobs that take turns: the bootstrap, then a round each time. The plan's bounds and the callback `round`
+ * are left to the caller. The run must outlive the job; canvas_rounds tells whether a round was stopped.
+ */
+struct local_job;
+int local_start(struct local_run *r, struct local_job **j, struct error *e);
+int local_step(struct local_job *j, struct error *e); /* nothing where the scene is black or stop is set */
+void local_end(struct local_job *j);                   /* run->canvas stays the caller's */
+
 #endif
