@@ -82,4 +82,9 @@ struct canvas_image {
 int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e);
 void canvas_image_fini(struct canvas_image *img);
 
+/* Mean X+Y+Z of each of across x down blocks of the crop in each group's own image, of the prefix of complete rounds, and that of
+ * the whole crop as the last: out[group][across * down + 1]. Groups are independent, so that their spread is these means' error.
+ * across and down: at most width and height. */
+void canvas_group_blocks(const struct canvas *c, uint32_t across, uint32_t down, double *out);
+
 #endif

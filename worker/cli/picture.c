@@ -85,19 +85,31 @@ int picture_shrink(struct picture *p, uint32_t width, uint32_t height, struct er
 	return 0;
 }
 
-int picture_write_png(const char *path, const unsigned char *rgb, uint32_t width, uint32_t height, struct error *e)
+int picture_encode_png(const unsigned char *rgb, uint32_t width, uint32_t height, unsigned char **bytes, size_t *size, struct error *e)
 {
 	png_image png = {.version = PNG_IMAGE_VERSION, .width = width, .height = height, .format = PNG_FORMAT_RGB};
-	size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
-	unsigned char *bytes = mem_alloc(size, 1);
-	if (!bytes)
-		return error_set(e, ENOMEM, "%s: no memory for a PNG of %ux%u", path, width, height);
-	int rc;
-	if (png_image_write_to_memory(&png, bytes, &size, 0, rgb, 0, NULL))
-		rc = image_file_write(path, bytes, size, e);
-	else
-		rc = error_set(e, EINVAL, "%s: PNG: %s", path, png.message);
+	*size = PNG_IMAGE_PNG_SIZE_MAX(png);
+	*bytes = mem_alloc(*size, 1);
+	if (!*bytes)
+		return error_set(e, ENOMEM, "no memory for a PNG of %ux%u", width, height);
+	int rc = 0;
+	if (!png_image_write_to_memory(&png, *bytes, size, 0, rgb, 0, NULL)) {
+		rc = error_set(e, EINVAL, "PNG: %s", png.message);
+		mem_free(*bytes);
+		*bytes = NULL;
+	}
 	png_image_free(&png);
+	return rc;
+}
+
+int picture_write_png(const char *path, const unsigned char *rgb, uint32_t width, uint32_t height, struct error *e)
+{
+	unsigned char *bytes;
+	size_t size;
+	int rc = picture_encode_png(rgb, width, height, &bytes, &size, e);
+	if (rc)
+		return error_prefix(e, rc, "%s", path);
+	rc = image_file_write(path, bytes, size, e);
 	mem_free(bytes);
 	return rc;
 }

@@ -20,7 +20,9 @@ void picture_fini(struct picture *p);
 /* Means of equal boxes, of R, G and B alone. -EINVAL: width and height do not divide the picture's. */
 int picture_shrink(struct picture *p, uint32_t width, uint32_t height, struct error *e);
 
-/* rgb: 3 bytes a pixel, sRGB. Temporary file and rename. */
+/* rgb: 3 bytes a pixel, sRGB. bytes are mem_alloc'd. */
+int picture_encode_png(const unsigned char *rgb, uint32_t width, uint32_t height, unsigned char **bytes, size_t *size, struct error *e);
+/* Temporary file and rename. */
 int picture_write_png(const char *path, const unsigned char *rgb, uint32_t width, uint32_t height, struct error *e);
 
 #endif

@@ -1,15 +1,14 @@
 #include "worker/cli/plot.h"
 
-#include "common/base/buf.h"
 #include "common/base/mem.h"
 #include "common/film/image_file.h"
+#include "worker/cli/page.h"
 #include "worker/cli/plot_axis.h"
 
 #include <fcntl.h>
 #include <math.h>
 #include <signal.h>
 #include <spawn.h>
-#include <stdarg.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <string.h>
@@ -18,99 +17,76 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { SCRIPT_MAX = 1 << 24, OUTPUT_MAX = 1 << 26 };
+enum { OUTPUT_MAX = 1 << 26 };
 
 extern char **environ;
 
-struct script {
-	struct buf text;
-	bool full;
-};
-
-static void append(struct script *s, const char *bytes, size_t count)
-{
-	s->full = s->full || !buf_append(&s->text, bytes, count);
-}
-
-__attribute__((format(printf, 2, 3))) static void put(struct script *s, const char *format, ...)
-{
-	char line[512];
-	va_list args;
-	va_start(args, format);
-	int n = vsnprintf(line, sizeof line, format, args);
-	va_end(args);
-	if (n < 0 || (size_t)n >= sizeof line)
-		s->full = true;
-	else
-		append(s, line, (size_t)n);
-}
-
-/* Bytes of the character at p when it is one of UTF-8 that XML may hold; 0: it is none. */
-static size_t character(const unsigned char *p)
-{
-	size_t n = *p < 0x80 ? 1 : *p >= 0xc2 && *p < 0xe0 ? 2 : *p >= 0xe0 && *p < 0xf0 ? 3 : *p >= 0xf0 && *p < 0xf5 ? 4 : 0;
-	for (size_t i = 1; i < n; i++)
-		if ((p[i] & 0xc0) != 0x80)
-			return 0;
-	bool surrogate = n == 3 && p[0] == 0xed && p[1] >= 0xa0, overlong = n == 3 && p[0] == 0xe0 && p[1] < 0xa0;
-	bool none = n == 3 && p[0] == 0xef && p[1] == 0xbf && p[2] >= 0xbe;
-	bool range = n == 4 && ((p[0] == 0xf0 && p[1] < 0x90) || (p[0] == 0xf4 && p[1] >= 0x90));
-	return surrogate || overlong || none || range ? 0 : n;
-}
-
 /* In single quotes gnuplot takes nothing for its own but the quote itself; a line cannot go on there, so controls are blanks. */
-static void put_quoted(struct script *s, const char *text)
+static void put_quoted(struct page *s, const char *text)
 {
 	enum { LONGEST = 400 };
 	const char *end = text + strlen(text);
-	append(s, "'", 1);
+	page_bytes(s, "'", 1);
 	for (size_t done = 0; text < end && done < LONGEST; done++) {
-		size_t n = character((const unsigned char *)text);
-		if (n == 0 || *text == 0x7f || (unsigned char)*text < 0x20)
-			append(s, n ? " " : "?", 1);
+		size_t n = page_character(text);
+		if (n == 0 || *text == '\t' || *text == '\n')
+			page_bytes(s, *text > 0 ? " " : "?", 1);
 		else if (*text == '\'')
-			append(s, "''", 2);
+			page_bytes(s, "''", 2);
 		else
-			append(s, text, n);
+			page_bytes(s, text, n);
 		text += n ? n : 1;
 	}
-	append(s, "'", 1);
+	page_bytes(s, "'", 1);
 }
 
 /* Blue, vermilion, green, purple, orange, sky (Okabe and Ito 2008): apart for every kind of eyes, on white and in print. */
 static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#aa4499", "#e69f00", "#56b4e9"};
 static const int shapes[] = {7, 5, 9, 13, 11, 4};
 
-static void put_axis(struct script *s, char which, const struct plot_axis *a, const char *label)
+static void put_axis(struct page *s, char which, const struct plot_axis *a, const char *label)
 {
-	put(s, "set %clabel ", which);
+	page_put(s, "set %clabel ", which);
 	put_quoted(s, label);
-	put(s, "\nset %crange [%.9g:%.9g]\n", which, a->low, a->high);
+	page_put(s, "\nset %crange [%.9g:%.9g]\n", which, a->low, a->high);
 	if (!a->log)
 		return;
-	put(s, "set logscale %c\nset %ctics (", which, which);
+	page_put(s, "set logscale %c\nset %ctics (", which, which);
 	for (size_t i = 0; i < a->tic_count; i++)
-		put(s, "%s'%.6g' %.9g", i ? "," : "", a->tic[i], a->tic[i]);
-	put(s, ")\n");
+		page_put(s, "%s'%.6g' %.9g", i ? "," : "", a->tic[i], a->tic[i]);
+	page_put(s, ")\n");
 }
 
-static void put_style(struct script *s, bool png, uint64_t name)
+static void put_names(struct page *s, const struct plot *p)
+{
+	if (!p->x_names)
+		return;
+	page_put(s, "set xrange [0.5:%zu.5]\nset xtics (", p->x_name_count);
+	for (size_t i = 0; i < p->x_name_count; i++) {
+		page_put(s, i ? "," : "");
+		put_quoted(s, p->x_names[i]);
+		page_put(s, " %zu", i + 1);
+	}
+	page_put(s, ")\n");
+}
+
+static void put_style(struct page *s, bool png, uint64_t name)
 {
 	if (png)
-		put(s, "set terminal pngcairo noenhanced size 1440,880 fontscale 1.7 linewidth 1.6 pointscale 1.7 font 'DejaVu Sans,11' "
+		page_put(s, "set terminal pngcairo noenhanced size 1440,880 fontscale 1.7 linewidth 1.6 pointscale 1.7 font 'DejaVu Sans,11' "
 		       "background '#ffffff'\n");
 	else
-		put(s, "set terminal svg noenhanced size 720,440 name 'p%016llx' font 'DejaVu Sans,Verdana,Helvetica,Arial,sans-serif,13' "
+		page_put(s, "set terminal svg noenhanced size 720,440 name 'p%016llx' font 'DejaVu Sans,Verdana,Helvetica,Arial,sans-serif,13' "
 		       "background '#ffffff'\n", (unsigned long long)name);
-	put(s, "set encoding utf8\nset border 3 lw 1 lc rgb '#555555'\nset tics out nomirror scale 0.6 textcolor rgb '#222222'\n"
-	       "set grid lc rgb '#dddddd' lt 1 lw 0.8\nset key tmargin center horizontal reverse Left noautotitle samplen 2 width 2 textcolor rgb '#222222'\n"
+	page_put(s, "set encoding utf8\nset border 3 lw 1 lc rgb '#555555'\nset tics out nomirror scale 0.6 textcolor rgb '#222222'\n"
+	       "set xzeroaxis lt 1 lw 1 lc rgb '#777777'\nset grid lc rgb '#dddddd' lt 1 lw 0.8\nset key tmargin center horizontal reverse Left noautotitle samplen 2 width 2 textcolor rgb '#222222'\n"
 	       "set style fill transparent solid 0.2 noborder\nset bars 0.6\nset format '%%.6g'\n");
 }
 
-static void put_data(struct script *s, const struct plot *p, const struct plot_axis *y_axis, size_t k)
+static void put_data(struct page *s, const struct plot *p, const struct plot_axis *y_axis, size_t k)
 {
 	const struct plot_series *r = &p->series[k];
-	put(s, "$d%zu << EOD\n", k);
+	page_put(s, "$d%zu << EOD\n", k);
 	for (size_t i = 0; i < r->count; i++) {
 		if (!plot_point_shown(p, r, i))
 			continue;
@@ -118,15 +94,15 @@ static void put_data(struct script *s, const struct plot *p, const struct plot_a
 		bool bars = r->low && r->high && isfinite(r->low[i]) && isfinite(r->high[i]) && (!p->log_y || r->high[i] > 0);
 		double low = bars ? r->low[i] : y, high = bars ? r->high[i] : y;
 		/* On a logarithmic axis a bar that reaches 0 goes to the edge. */
-		put(s, "%.9g %.9g %.9g %.9g\n", r->x[i], y, p->log_y && !(low > y_axis->low) ? y_axis->low : low, high);
+		page_put(s, "%.9g %.9g %.9g %.9g\n", r->x[i], y, p->log_y && !(low > y_axis->low) ? y_axis->low : low, high);
 	}
-	put(s, "EOD\n");
+	page_put(s, "EOD\n");
 	for (size_t i = 0; r->labels && i < r->count; i++) {
 		if (!r->labels[i] || !*r->labels[i] || !plot_point_shown(p, r, i))
 			continue;
-		put(s, "set label ");
+		page_put(s, "set label ");
 		put_quoted(s, r->labels[i]);
-		put(s, " at %.9g,%.9g left offset character 0.7,0.5 textcolor rgb '#444444' front\n", r->x[i], r->y ? r->y[i] : r->low[i]);
+		page_put(s, " at %.9g,%.9g left offset character 0.7,0.5 textcolor rgb '#444444' front\n", r->x[i], r->y ? r->y[i] : r->low[i]);
 	}
 }
 
@@ -138,22 +114,22 @@ static bool has_points(const struct plot *p, size_t k)
 	return false;
 }
 
-static void put_series(struct script *s, const struct plot *p, size_t k)
+static void put_series(struct page *s, const struct plot *p, size_t k)
 {
 	const struct plot_series *r = &p->series[k];
 	const char *colour = colours[k % (sizeof colours / sizeof *colours)];
 	int shape = shapes[k % (sizeof shapes / sizeof *shapes)];
 	if (r->style != PLOT_BAND && r->low && r->high)
-		put(s, "$d%zu using 1:2:3:4 with yerrorbars ps 0 lw 1.4 lc rgb '%s', ", k, colour);
-	put(s, "$d%zu using ", k);
+		page_put(s, "$d%zu using 1:2:3:4 with yerrorbars ps 0 lw 1.4 lc rgb '%s', ", k, colour);
+	page_put(s, "$d%zu using ", k);
 	if (r->style == PLOT_BAND)
-		put(s, "1:3:4 with filledcurves lc rgb '%s'", colour);
+		page_put(s, "1:3:4 with filledcurves lc rgb '%s'", colour);
 	else if (r->style == PLOT_LINE)
-		put(s, "1:2 with lines lw 2 lc rgb '%s'", colour);
+		page_put(s, "1:2 with lines lw 2 lc rgb '%s'", colour);
 	else
-		put(s, "1:2 with points pt %d ps 0.8 lc rgb '%s'", shape, colour);
+		page_put(s, "1:2 with points pt %d ps 0.8 lc rgb '%s'", shape, colour);
 	if (*r->name) {
-		put(s, " title ");
+		page_put(s, " title ");
 		put_quoted(s, r->name);
 	}
 }
@@ -166,31 +142,32 @@ static uint64_t hash(const struct buf *b)
 	return h;
 }
 
-static int write_script(struct script *s, const struct plot *p, bool png, struct error *e)
+static int write_script(struct page *s, const struct plot *p, bool png, struct error *e)
 {
 	struct plot_axis x, y;
-	struct script body = {.text.limit = SCRIPT_MAX};
+	struct page body = {.full = false};
 	if (!plot_axes(p, &x, &y))
 		return error_set(e, EINVAL, "the plot '%.80s' has no point that could be shown", p->title);
-	put(&body, "set title ");
+	page_put(&body, "set title ");
 	put_quoted(&body, p->title);
-	put(&body, "\n");
+	page_put(&body, "\n");
 	put_axis(&body, 'x', &x, p->x_label);
 	put_axis(&body, 'y', &y, p->y_label);
+	put_names(&body, p);
 	for (size_t k = 0; k < p->series_count; k++)
 		put_data(&body, p, &y, k);
 	for (size_t k = 0, shown = 0; k < p->series_count; k++) {
 		if (!has_points(p, k))
 			continue;
-		put(&body, shown++ ? ", " : "plot ");
+		page_put(&body, shown++ ? ", " : "plot ");
 		put_series(&body, p, k);
 	}
-	put(&body, "\n");
+	page_put(&body, "\n");
 	/* Plots in one page have names of their own for their parts: from what they show, so that they stay the same. */
 	put_style(s, png, hash(&body.text));
-	append(s, (const char *)body.text.bytes, body.text.size);
+	page_bytes(s, body.text.bytes, body.text.size);
 	s->full = s->full || body.full;
-	buf_fini(&body.text);
+	page_fini(&body);
 	return s->full ? error_set(e, ENOMEM, "the plot '%.80s' has too many points", p->title) : 0;
 }
 
@@ -280,7 +257,7 @@ static bool feed(int fd, const struct buf *b)
 static int draw(const struct plot *p, bool png, char **bytes, size_t *size, struct error *e)
 {
 	static const char *const names[3] = {"plot-script", "plot-output", "plot-errors"};
-	struct script s = {.text.limit = SCRIPT_MAX};
+	struct page s = {.full = false};
 	int fd[3] = {-1, -1, -1};
 	int rc = write_script(&s, p, png, e);
 	for (int i = 0; !rc && i < 3; i++) {
@@ -300,7 +277,7 @@ static int draw(const struct plot *p, bool png, char **bytes, size_t *size, stru
 	for (int i = 0; i < 3; i++)
 		if (fd[i] >= 0)
 			close(fd[i]);
-	buf_fini(&s.text);
+	page_fini(&s);
 	return rc;
 }
 

@@ -25,6 +25,8 @@ struct plot {
 	bool log_x, log_y;
 	size_t series_count;
 	const struct plot_series *series;
+	const char *const *x_names; /* [x_name_count], at x = 1, 2, ... in place of numbers; NULL: numbers */
+	size_t x_name_count;
 };
 
 /* An SVG document, 0-terminated; mem_free is the caller's. */

@@ -82,6 +82,9 @@ bool render_effect_on(const struct render_summary *scene, const char *name);
 int world_new(struct world **w, const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 	      struct error *e);
 void world_free(struct world *w);
+/* Other settings (render_options.knobs) for a world that is there, while no lease runs in it: whether those that differ can do
+ * without building again, and then they are set. *fits false: a new world is needed, this one is as it was. */
+int world_set_knobs(struct world *w, const char *knobs, bool *fits, struct error *e);
 void world_summary(const struct world *w, struct render_summary *out);
 /* X+Y+Z of the brightest emitter, for canvas_grid_exponent when the bootstrap is black. */
 double world_brightest(const struct world *w);

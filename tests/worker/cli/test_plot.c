@@ -75,7 +75,7 @@ static void points_are_where_their_values_say(void **unused)
 	(void)unused;
 	const double x[] = {1, 10, 100, 1000, NAN, 10}, y[] = {8, 4, 2, 1, 3, -1};
 	struct plot_series s = {.name = "measured", .style = PLOT_POINTS, .count = 6, .x = x, .y = y};
-	struct plot p = {"Title", "time", "error", true, true, 1, &s};
+	struct plot p = {"Title", "time", "error", true, true, 1, &s, NULL, 0};
 	struct content c;
 	read_svg(&p, &c);
 	/* Four can be shown; the fifth mark is the legend's. Equal ratios are equal distances. */
@@ -102,7 +102,7 @@ static void texts_stay_texts(void **unused)
 	const double x[] = {1, 2}, y[] = {1, 2};
 	const char *const labels[] = {nasty, ""};
 	struct plot_series s[] = {{nasty, PLOT_POINTS, 2, x, y, NULL, NULL, labels}, {nasty, PLOT_LINE, 2, x, y, x, y, NULL}};
-	struct plot p = {nasty, nasty, nasty, false, false, 2, s};
+	struct plot p = {nasty, nasty, nasty, false, false, 2, s, NULL, 0};
 	struct content c;
 	read_svg(&p, &c);
 	size_t seen = 0;
@@ -122,7 +122,7 @@ static void bars_and_bands_are_drawn(void **unused)
 	(void)unused;
 	const double x[] = {1, 2, 3}, y[] = {5, 4, 3}, low[] = {4, -1, 2.5}, high[] = {6, 5, INFINITY};
 	struct plot_series s[] = {{"band", PLOT_BAND, 3, x, NULL, low, high, NULL}, {"line", PLOT_LINE, 3, x, y, low, high, NULL}};
-	struct plot p = {"Bars", "x", "y", false, true, 2, s};
+	struct plot p = {"Bars", "x", "y", false, true, 2, s, NULL, 0};
 	struct plot_axis ax, ay;
 	struct content c;
 	read_svg(&p, &c);
@@ -135,7 +135,7 @@ static void nothing_to_show_is_said(void **unused)
 	(void)unused;
 	const double x[] = {-1, NAN}, y[] = {1, 1};
 	struct plot_series s = {"", PLOT_POINTS, 2, x, y, NULL, NULL, NULL};
-	struct plot p = {"None", "", "", true, false, 1, &s};
+	struct plot p = {"None", "", "", true, false, 1, &s, NULL, 0};
 	struct error e = {""};
 	char *svg;
 	size_t size;
@@ -153,7 +153,7 @@ static void axes_have_marks(void **unused)
 		for (double ratio = 1; ratio < 1e12; ratio *= 2.7) {
 			const double x[] = {from, from * ratio};
 			struct plot_series s = {"", PLOT_POINTS, 2, x, x, NULL, NULL, NULL};
-			struct plot p = {"", "", "", true, false, 1, &s};
+			struct plot p = {"", "", "", true, false, 1, &s, NULL, 0};
 			struct plot_axis ax, ay;
 			assert_true(plot_axes(&p, &ax, &ay));
 			assert_true(ax.low < from && ax.high > from * ratio && ay.low < ay.high);
@@ -167,7 +167,7 @@ static void files_are_written(void **unused)
 	(void)unused;
 	const double x[] = {1, 2, 3}, y[] = {3, 1, 2};
 	struct plot_series s = {"", PLOT_LINE, 3, x, y, NULL, NULL, NULL};
-	struct plot p = {"File", "x", "y", false, false, 1, &s};
+	struct plot p = {"File", "x", "y", false, false, 1, &s, NULL, 0};
 	struct error e = {""};
 	char path[128];
 	static const char *const ending[2] = {"png", "svg"}, *const begins[2] = {"\x89PNG", "<?xml"};
@@ -190,7 +190,7 @@ static void without_gnuplot_it_says_so(void **unused)
 	char *old = strdup(getenv("PATH"));
 	const double x[] = {1}, y[] = {1};
 	struct plot_series s = {"", PLOT_POINTS, 1, x, y, NULL, NULL, NULL};
-	struct plot p = {"Alone", "", "", false, false, 1, &s};
+	struct plot p = {"Alone", "", "", false, false, 1, &s, NULL, 0};
 	struct error e = {""};
 	char *svg;
 	size_t size;

@@ -1,0 +1,83 @@
+# hslt-accuracy: exit codes, a report that is XML and a CSV that is complete, a bias that is there and is seen, interruption.
+. "$(dirname "$0")/lib.sh"
+need hslt-accuracy
+PYTHON=${PYTHON:-python3}
+command -v "$PYTHON" >/dev/null || skip "no $PYTHON"
+
+code() { # WANTED COMMAND...
+	wanted=$1
+	shift
+	got=0
+	"$@" >"$DIR/out" 2>"$DIR/run.log" || got=$?
+	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/out" "$DIR/run.log")"
+}
+
+A="$BIN/hslt-accuracy"
+code 0 "$A" --version
+code 0 "$A" --help
+grep -qi example "$DIR/out" || fail "--help has no examples"
+code 2 "$A" "$BOX"
+code 2 "$A" "$BOX" -o "$DIR/a.html" --spp 4
+code 2 "$A" "$BOX" -o "$DIR/a.html" --budget soon
+code 2 "$A" "$BOX" -o "$DIR/a.html" --knobs depth --quiet
+grep -q "max-depth, independent" "$DIR/run.log" || fail "it does not say which knobs there are: $(cat "$DIR/run.log")"
+code 1 "$A" "$DIR/none.xml" -o "$DIR/a.html"
+code 1 "$A" "$BOX" -o "$DIR/none/a.html"
+[ ! -e "$DIR/a.html" ] || fail "a report of nothing"
+
+# A room without its indirect light, against the whole: two edges are emitters and what they shine on.
+code 0 "$A" "$BOX" -o "$DIR/a.html" --csv "$DIR/a.csv" --size 32x24 --chains 64 --seconds 0.6 --threads 1 \
+	--knobs max-depth,tolerance,roughness --quiet
+# No picture of it needs gnuplot: without it the report says so and is as valid.
+mkdir "$DIR/bin"
+code 0 env PATH="$DIR/bin" "$A" "$BOX" -o "$DIR/plain.html" --size 16x12 --chains 64 --seconds 0.02 --threads 1 \
+	--bootstrap 4096 --knobs preset --quiet
+grep -q gnuplot-nox "$DIR/plain.html" || fail "nothing is said of missing plots"
+
+cat >"$DIR/check.py" <<'END'
+import csv, sys, xml.dom.minidom
+folder = sys.argv[1]
+for name in "a", "plain":
+    page = xml.dom.minidom.parse(f"{folder}/{name}.html")
+    for element in page.getElementsByTagName("*"):
+        for key in "src", "href", "xlink:href":
+            value = element.getAttribute(key)
+            assert not value or value.startswith(("data:image/png;base64,", "#")), value
+    assert not page.getElementsByTagName("script")
+    plots = len(page.getElementsByTagName("svg"))
+    if name == "a":
+        assert plots == 5, plots  # the front, and two of each knob
+        text = " ".join(n.data for e in page.getElementsByTagName("td") for n in e.childNodes if n.nodeType == n.TEXT_NODE)
+        assert "roughness" in text and "no material has a rough lobe" in text
+rows = {r["setting"]: r for r in csv.DictReader(open(f"{folder}/a.csv"))}
+assert len(rows) == 15, list(rows)
+for name, r in rows.items():
+    assert None not in r and None not in r.values(), name
+    for key in "us", "error_time", "error_mutations":
+        low, value, high = (float(r[key + end]) for end in ("_low", "", "_high"))
+        assert 0 < low <= value <= high, (name, key, low, value, high)
+    assert 0 < float(r["acceptance"]) < 1 and float(r["rays"]) > 0 and int(r["mutations"]) > 1000, r
+    assert (r["front"] == "1") == (r["beaten_by"] == ""), r
+    assert r["beaten_by"] == "" or r["beaten_by"] in rows
+    # Equal shares of the time: a round more or less.
+    share = 4 if r["role"] == "reference" else 1
+    assert 0.6 < float(r["cpu_seconds"]) / (0.6 * share) < 1.6, (name, r["cpu_seconds"])
+assert rows["default"]["role"] == "default" and rows["careful"]["role"] == "reference"
+short = rows["max-depth 2"]
+print("max-depth 2: bias of the mean %s (%s to %s), seen: at least %s" %
+      (short["bias_mean"], short["bias_mean_low"], short["bias_mean_high"], short["bias_seen"]))
+assert float(short["bias_mean_high"]) < -0.1 and float(short["bias_seen"]) > 0.05
+assert float(rows["default"]["bias_seen"]) == 0 and float(rows["max-depth 20"]["bias_seen"]) == 0
+END
+"$PYTHON" "$DIR/check.py" "$DIR" || fail "the report or its figures"
+
+"$A" "$BOX" -o "$DIR/stopped.html" --size 32x24 --budget 0.4 --chains 64 --threads 1 --bootstrap 4096 --knobs preset 2>"$DIR/stopped.log" &
+job=$!
+PIDS="$PIDS $job"
+until_true 60 grep -q 'rendering [1-9]' "$DIR/stopped.log" || fail "it does not come to render"
+kill -INT $job
+got=0
+wait $job || got=$?
+[ $got -eq 1 ] || fail "interrupted it ended with $got"
+"$PYTHON" -c 'import sys, xml.dom.minidom; xml.dom.minidom.parse(sys.argv[1])' "$DIR/stopped.html" || fail "a broken report"
+grep -q interrupted "$DIR/stopped.html" || fail "the report does not say that it was interrupted"

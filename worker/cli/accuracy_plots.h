@@ -1,0 +1,13 @@
+/* The report's plots, as SVG inside the page. Where one cannot be drawn, the reason stands in its place. */
+#ifndef WORKER_CLI_ACCURACY_PLOTS_H
+#define WORKER_CLI_ACCURACY_PLOTS_H
+
+#include "worker/cli/accuracy.h"
+#include "worker/cli/page.h"
+
+/* Error at equal time and bias against the knob's values. */
+void accuracy_plot_sweep(struct page *p, const struct accuracy_context *x, const struct accuracy_sweep *s);
+/* All settings: bias against error at equal time. */
+void accuracy_plot_front(struct page *p, const struct accuracy_context *x);
+
+#endif

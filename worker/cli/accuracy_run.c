@@ -1,0 +1,214 @@
+#include "worker/cli/accuracy.h"
+
+#include "common/base/mem.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static double now(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static double shares(const struct accuracy_design *d)
+{
+	double sum = 0;
+	for (size_t i = 0; i < d->count; i++)
+		sum += d->settings[i].share;
+	return sum;
+}
+
+/* CPU seconds that a setting of share 1 will have, before it is known how much the bootstrap and the worlds take. */
+static double expected_seconds(const struct accuracy_run *r)
+{
+	if (r->setting_seconds > 0)
+		return r->setting_seconds;
+	long processors = sysconf(_SC_NPROCESSORS_ONLN);
+	double threads = processors > 0 ? fmin(r->threads, (double)processors) : r->threads;
+	return 0.85 * r->seconds * threads / shares(r->design);
+}
+
+/* All films stay in memory until the end, because the settings take turns. */
+static int check_memory(const struct accuracy_run *r, const struct plan *p, struct error *e)
+{
+	double tiles = ceil(p->crop_width / (double)TILE_SIZE) * ceil(p->crop_height / (double)TILE_SIZE);
+	double wanted = (double)r->design->count * p->groups * 3 * tiles * TILE_SIZE * TILE_SIZE * TILE_CHANNELS * sizeof(int64_t);
+	double there = (double)sysconf(_SC_AVPHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+	if (wanted < 0.75 * there)
+		return 0;
+	return error_set(e, ENOMEM, "%zu settings of %ux%u pixels take %.1f GB of memory, of which %.1f are there: choose a smaller --size, "
+				    "or fewer --knobs", r->design->count, p->crop_width, p->crop_height, wanted / 1e9, there / 1e9);
+}
+
+/* Rounds are short, so that the settings change often; the bootstrap takes a tenth of the time or so. */
+static int make_plan(struct accuracy_run *r, size_t i, struct error *e)
+{
+	enum { ROUNDS = 25 };
+	static const double guess = 6e-6; /* seconds a mutation; decides how long rounds are, nothing else */
+	const struct accuracy_setting *s = &r->design->settings[i];
+	struct plan_request q = r->request;
+	struct plan *p = &r->jobs[i].plan;
+	double each = expected_seconds(r);
+	q.max_depth = s->max_depth;
+	memcpy(q.knobs, s->knobs, sizeof q.knobs);
+	memcpy(q.mixture, s->mixture, sizeof q.mixture);
+	q.seed += i; /* what is compared shares no random numbers */
+	q.seconds = 1e8;
+	q.spp = q.mutations = 0;
+	q.target_error = 0;
+	if (!q.bootstrap && q.kind == PLAN_CHAINS)
+		q.bootstrap = (uint64_t)fmin(fmax(0.1 * each / (1.5 * guess), 16384), 1e6);
+	int rc = plan_make(&q, p, e);
+	if (!rc && !r->request.epoch && p->kind == PLAN_CHAINS) {
+		q.epoch = (uint64_t)fmin(fmax(each / ROUNDS / guess / p->chains, 16), 8192);
+		rc = plan_make(&q, p, e);
+	}
+	if (!rc && p->groups < 4)
+		rc = error_set(e, EINVAL, "%u groups are too few to tell errors from: at least 4 are needed", p->groups);
+	return rc;
+}
+
+/* A world that is there already and needs no building for these settings, or a new one. */
+static int find_world(struct accuracy_run *r, struct accuracy_job *j, struct error *e)
+{
+	struct render_options options = *r->render;
+	for (size_t k = 0; k < r->world_count; k++) {
+		bool fits;
+		int rc = world_set_knobs(r->worlds[k], j->plan.knobs, &fits, e);
+		if (rc)
+			return rc;
+		if (fits) {
+			j->world = r->worlds[k];
+			return 0;
+		}
+	}
+	memcpy(options.knobs, j->plan.knobs, sizeof options.knobs);
+	int rc = world_new(&j->world, r->scene, r->assets, &options, e);
+	if (!rc)
+		r->worlds[r->world_count++] = j->world;
+	return rc;
+}
+
+static bool stopped(const struct accuracy_run *r)
+{
+	return r->stop && atomic_load(r->stop);
+}
+
+static int start(struct accuracy_run *r, size_t i, struct error *e)
+{
+	struct accuracy_job *j = &r->jobs[i];
+	int rc = find_world(r, j, e);
+	if (rc)
+		return rc;
+	j->run = (struct local_run){.world = j->world, .plan = &j->plan, .threads = r->threads, .stop = r->stop};
+	rc = local_start(&j->run, &j->job, e);
+	if (!rc && j->run.lit.black && j->run.canvas)
+		rc = error_set(e, EINVAL, "no light arrives in the bootstrap: there is nothing to compare");
+	return rc;
+}
+
+/* A round of job i. Its cost is what its leases took of the processors. */
+static int step(struct accuracy_run *r, size_t i, struct error *e)
+{
+	struct accuracy_job *j = &r->jobs[i];
+	bool fits;
+	int rc = world_set_knobs(j->world, j->plan.knobs, &fits, e);
+	double before = j->run.cpu_seconds;
+	uint64_t rounds = canvas_rounds(j->run.canvas);
+	if (!rc)
+		rc = local_step(j->job, e);
+	if (rc || canvas_rounds(j->run.canvas) == rounds)
+		return rc;
+	double cpu = j->run.cpu_seconds - before;
+	j->cpu += cpu;
+	if (j->cost_count < ACCURACY_COSTS)
+		j->cost[j->cost_count++] = cpu / (double)plan_round_mutations(&j->plan);
+	return 0;
+}
+
+/* Who had least of its share. */
+static size_t next(const struct accuracy_run *r)
+{
+	const struct accuracy_design *d = r->design;
+	size_t best = 0;
+	for (size_t i = 1; i < d->count; i++)
+		if (r->jobs[i].cpu / d->settings[i].share < r->jobs[best].cpu / d->settings[best].share)
+			best = i;
+	return best;
+}
+
+static void show(const struct accuracy_run *r, double fraction, const char *state)
+{
+	if (r->progress)
+		r->progress(r->user, fraction, state);
+}
+
+static int rounds(struct accuracy_run *r, double begin, struct error *e)
+{
+	const struct accuracy_design *d = r->design;
+	double first = now();
+	for (;;) {
+		size_t i = next(r);
+		const struct accuracy_job *j = &r->jobs[i];
+		double had = j->cpu / d->settings[i].share, wall = now();
+		bool enough = r->setting_seconds > 0 ? had >= r->setting_seconds : wall >= begin + r->seconds;
+		/* Two rounds at least, however short the time. */
+		if ((enough && canvas_rounds(j->run.canvas) >= 2) || stopped(r))
+			return 0;
+		show(r, fmin(r->setting_seconds > 0 ? had / r->setting_seconds : (wall - first) / fmax(begin + r->seconds - first, 1), 1),
+		     "rendering");
+		int rc = step(r, i, e);
+		if (rc)
+			return rc;
+	}
+}
+
+int accuracy_render(struct accuracy_run *r, struct error *e)
+{
+	const struct accuracy_design *d = r->design;
+	double begin = now();
+	int rc = 0;
+	r->jobs = mem_alloc(d->count, sizeof *r->jobs);
+	if (!r->jobs)
+		return error_set(e, ENOMEM, "no memory for %zu settings", d->count);
+	for (size_t i = 0; !rc && i < d->count; i++)
+		rc = make_plan(r, i, e);
+	if (!rc)
+		rc = check_memory(r, &r->jobs[0].plan, e);
+	for (size_t i = 0; !rc && !stopped(r) && i < d->count; i++) {
+		show(r, (double)i / (double)d->count, "bootstrap");
+		rc = start(r, i, e);
+		if (rc) {
+			char name[96];
+			accuracy_name(&d->settings[i], name, sizeof name);
+			error_prefix(e, rc, "%s", name);
+		}
+	}
+	if (!rc && !stopped(r))
+		rc = rounds(r, begin, e);
+	r->wall_seconds = now() - begin;
+	r->interrupted = stopped(r);
+	for (size_t i = 0; !rc && i < d->count; i++)
+		if (!r->jobs[i].run.canvas || canvas_rounds(r->jobs[i].run.canvas) < 1)
+			rc = error_set(e, EINTR, "interrupted before each setting had a round: no report");
+	return rc;
+}
+
+void accuracy_run_fini(struct accuracy_run *r)
+{
+	for (size_t i = 0; r->jobs && i < r->design->count; i++) {
+		if (r->jobs[i].job)
+			local_end(r->jobs[i].job);
+		canvas_free(r->jobs[i].run.canvas);
+	}
+	mem_free(r->jobs);
+	for (size_t k = 0; k < r->world_count; k++)
+		world_free(r->worlds[k]);
+	r->jobs = NULL;
+	r->world_count = 0;
+}
