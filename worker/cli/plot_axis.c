@@ -34,7 +34,7 @@ static void add_tic(struct plot_axis *a, double value)
 static double round_step(double range)
 {
 	double step = pow(10, floor(log10(range / 5)));
-	return range / step > 25 ? 5 * step : range / step > 10 ? 2 * step : step;
+	return range / step > 20 ? 5 * step : range / step > 8 ? 2 * step : step;
 }
 
 static void mark(struct plot_axis *a)
