@@ -1,0 +1,364 @@
+/*
+ * What leases say besides pixels. Classes of paths: every technique that makes a path gives it the same class; path, bdpt, and the
+ * chains of pssmlt and hslt find the same energy in each class. Moments: what they say of a tile is what the film says of it.
+ *
+ * Level of the comparisons: 1e-6 a class, by Student's t between 16 groups. Power: the smallest difference of the classes that
+ * hold 10 % of the energy or more, found with 95 % probability, is printed; 15 % at most between path and bdpt, 25 % for
+ * chains. HSLT_TEST_SCALE: smaller samples, no demand on the power. About 30 s of CPU time.
+ */
+#include "common/film/merge.h"
+#include "tests/support/dice.h"
+#include "tests/support/rooms.h"
+#include "tests/support/starts.h"
+#include "tests/support/stats.h"
+#include "tests/support/worlds.h"
+#include "worker/path/classes.h"
+#include "worker/path/ensemble.h"
+#include "worker/path/integrator.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define LEVEL 1e-6
+enum { GROUPS = 16 };
+/* t at 1e-6 and 15 degrees, and the 95 % quantile: what is found with 95 %. */
+#define FOUND 9.4
+
+/* ---- one path, many techniques ---- */
+
+static bool same_place(const struct path_vertex *a, const struct path_vertex *b)
+{
+	return a->x.p.x == b->x.p.x && a->x.p.y == b->x.p.y && a->x.p.z == b->x.p.z;
+}
+
+/* Technique s of the sub-paths in c makes x. */
+static bool is_made(const struct path_context *c, const struct whole_path *x, unsigned s)
+{
+	unsigned k = x->edges;
+	for (unsigned i = 0; s >= 2 && i < s; i++)
+		if (!same_place(&c->light[i], &x->v[i]))
+			return false;
+	for (unsigned i = 0; i < k + 1 - s; i++)
+		if (!(s == 1 && i == k) && !same_place(&c->camera[i], &x->v[k - i]))
+			return false;
+	return true;
+}
+
+struct seen {
+	uint64_t paths, again;
+	uint32_t techniques, classes; /* bits */
+};
+
+/* x was made by technique `from`; a pair of sub-paths around it is drawn that another technique may have made. */
+static void check_around(struct path_context *c, struct whole_path *x, unsigned from, uint64_t index, struct dice *d, struct seen *seen)
+{
+	static struct ensemble around;
+	struct sampler_random s;
+	const double u[3] = {dice_throw(d), 0, 0};
+	unsigned class = path_class_whole(x);
+	sampler_random_init(&s, 17, RNG_CHAIN, index, 1);
+	for (unsigned i = 0; i <= x->edges; i++) { /* nothing of other paths is left */
+		memset(&c->camera[i].x.p, 0, sizeof c->camera[i].x.p);
+		memset(&c->light[i].x.p, 0, sizeof c->light[i].x.p);
+	}
+	ensemble_around(c, &s.base, x, u, &around);
+	for (uint32_t i = 0; i < around.count; i++) {
+		const struct candidate *a = &around.of[i];
+		if (a->edges != x->edges || a->s == from || !is_made(c, x, a->s))
+			continue;
+		assert_int_equal(path_class_joined(c, a->s, x->edges + 1 - a->s), class);
+		seen->again++;
+		seen->techniques |= 1u << (a->s < 31 ? a->s : 31);
+	}
+}
+
+static void check_techniques(const struct world *w, const char *name)
+{
+	static struct path_context c;
+	static struct ensemble e;
+	static struct path_sample sample;
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	struct dice d = dice_of(name);
+	struct seen seen = {0, 0, 0, 0};
+	starts_context(&c, w, 1, STARTS_MAX_EDGES, counters);
+	const struct ensemble_lengths all = ensemble_all_lengths(&c);
+	for (uint64_t index = 0; index < dice_count(3000); index++) {
+		struct sampler_random s;
+		struct whole_path x;
+		sampler_random_init(&s, stats_seed(name), RNG_BOOTSTRAP, index, 0);
+		path_trace_both_ways(&c, &s.base, &sample);
+		double by_class[PATH_CLASSES] = {0}, sum = 0;
+		for (unsigned k = 0; k < PATH_CLASSES; k++)
+			sum += sample.classes >> k & 1 ? sample.of_class[k] : 0;
+		assert_true(fabs(sum - sample.intensity) <= 1e-12 * sum);
+		sampler_random_init(&s, stats_seed(name), RNG_BOOTSTRAP, index, 0);
+		ensemble_draw(&c, &s.base, &all, &e);
+		for (uint32_t i = 0; i < e.count; i++) {
+			const struct candidate *a = &e.of[i];
+			unsigned class = path_class_joined(&c, a->s, a->edges + 1 - a->s);
+			by_class[class] += a->intensity;
+			if (!whole_from_subpaths(&c, a->s, a->edges, &x))
+				continue; /* on the film's very border */
+			assert_int_equal(path_class_whole(&x), class);
+			seen.paths++;
+			seen.classes |= 1u << class;
+		}
+		for (unsigned k = 0; k < PATH_CLASSES; k++)
+			assert_true(fabs(by_class[k] - (sample.classes >> k & 1 ? sample.of_class[k] : 0)) <= 1e-12 * sum);
+		if (e.count > 0) {
+			const struct candidate *a = &e.of[dice_below(&d, e.count)];
+			if (whole_from_subpaths(&c, a->s, a->edges, &x))
+				check_around(&c, &x, a->s, index, &d, &seen);
+		}
+	}
+	print_message("%s: %llu paths, %llu by another technique, techniques %#x, classes %#x\n", name, (unsigned long long)seen.paths,
+		      (unsigned long long)seen.again, seen.techniques, seen.classes);
+	assert_true(seen.again > dice_count(300));
+}
+
+static void techniques_agree(void **state)
+{
+	(void)state;
+	for (const struct room *r = rooms; r->name; r++) {
+		struct world *w = r->build();
+		check_techniques(w, r->name);
+		world_free(w);
+	}
+}
+
+/* ---- energies ---- */
+
+static struct plan make_plan(const struct world *w, const char *integrator, const char *test)
+{
+	const struct scene_settings *s = &w->settings;
+	struct render_summary summary;
+	struct plan p = {.width = s->width, .height = s->height, .crop_width = s->width, .crop_height = s->height, .border = s->border,
+			 .seed = stats_seed(test), .groups = GROUPS, .parts = 1, .bootstrap = GROUPS * dice_count(12288), .epoch = 1,
+			 .rounds = 1, .min_depth = 1, .max_depth = 10};
+	snprintf(p.integrator, sizeof p.integrator, "%s", integrator);
+	p.kind = render_integrator_find(integrator)->kind;
+	world_summary(w, &summary);
+	if (render_integrator_find(integrator)->has_mutations)
+		assert_int_equal(render_mutations(NULL, &summary, p.mutations, NULL), 0);
+	return p;
+}
+
+static void lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in, struct batch *b)
+{
+	struct error e = {""};
+	enum lease_end end;
+	if (render_lease(w, p, k, in, NULL, &end, b, &e) || batch_check(b, p, &e))
+		fail_msg("%s", e.text);
+}
+
+/* Each class's means by group, of independent samples. */
+static void sample_classes(const struct world *w, const char *integrator, const char *test, double mean[PATH_CLASSES][GROUPS])
+{
+	struct plan p = make_plan(w, integrator, test);
+	for (uint32_t g = 0; g < GROUPS; g++) {
+		struct batch b;
+		lease(w, &p, &(struct lease_key){1, LEASE_BOOTSTRAP, g, 0, 0}, NULL, &b);
+		double sum = 0;
+		for (int k = 0; k < PATH_CLASSES; k++) {
+			mean[k][g] = b.classes[k] / (double)b.weight_count;
+			sum += b.classes[k];
+		}
+		assert_true(fabs(sum - b.independent_sum) <= 1e-9 * sum);
+		batch_fini(&b);
+	}
+}
+
+static void judge(const char *test, unsigned class, double share, double difference_error, double p, double *least)
+{
+	if (p < LEVEL)
+		fail_msg("%s: the energies of class '%s', share %.3g, differ (p = %g)", test, path_class_name(class), share, p);
+	if (share >= 0.1)
+		*least = fmax(*least, FOUND * difference_error);
+}
+
+static void end_judging(const char *test, double least, double most)
+{
+	print_message("%s: finds a class that differs by %.1f %%\n", test, 100 * least);
+	assert_true(dice_count(1000) < 1000 || (least > 0 && least < most));
+}
+
+static void samples_agree(void **state)
+{
+	(void)state;
+	static const char *const of[] = {"glass", "mirror", "prism"};
+	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+		static double a[PATH_CLASSES][GROUPS], b[PATH_CLASSES][GROUPS];
+		char test[64];
+		struct world *w = room_of(of[i]);
+		double all = 0, least = 0;
+		snprintf(test, sizeof test, "%s, path and bdpt", of[i]);
+		sample_classes(w, "path", of[i], a);
+		sample_classes(w, "bdpt", test, b);
+		for (int k = 0; k < PATH_CLASSES; k++)
+			all += stats_mean_test(b[k], GROUPS, 0).mean;
+		for (unsigned k = 0; k < PATH_CLASSES; k++) {
+			double d[GROUPS], mean = stats_mean_test(b[k], GROUPS, 0).mean;
+			for (int g = 0; g < GROUPS; g++)
+				d[g] = a[k][g] - b[k][g];
+			struct stats_mean m = stats_mean_test(d, GROUPS, 0);
+			if (mean > 0)
+				judge(test, k, mean / all, m.error / mean, m.p, &least);
+		}
+		end_judging(test, least, 0.15);
+		world_free(w);
+	}
+}
+
+/* All leases of a plan of chains into a canvas. seen: called with each batch of chains. */
+static struct canvas *run_chains(const struct world *w, const struct plan *p, void (*seen)(const struct plan *, const struct batch *))
+{
+	struct bootstrap *s;
+	struct canvas *c;
+	struct error e = {""};
+	uint32_t chains = p->chains / p->groups;
+	uint64_t *seeds = calloc(chains, sizeof *seeds);
+	assert_int_equal(bootstrap_new(&s, p, &e), 0);
+	assert_int_equal(canvas_new(&c, p, -32, NULL, &e), 0);
+	for (uint32_t g = 0; g < p->groups; g++) {
+		struct batch b;
+		lease(w, p, &(struct lease_key){1, LEASE_BOOTSTRAP, g, 0, 0}, NULL, &b);
+		assert_int_equal(bootstrap_add(s, &b, &e), 0);
+		batch_fini(&b);
+	}
+	bootstrap_to_canvas(s, c);
+	for (uint32_t g = 0; g < p->groups; g++) {
+		struct lease_input in = {chains, seeds, NULL};
+		struct batch b;
+		bootstrap_seeds(s, g, seeds);
+		lease(w, p, &(struct lease_key){1, LEASE_RENDER, g, 0, 0}, &in, &b);
+		if (seen)
+			seen(p, &b);
+		assert_int_equal(canvas_add(c, &b, &e), 0);
+		batch_fini(&b);
+	}
+	bootstrap_free(s);
+	free(seeds);
+	return c;
+}
+
+static void check_chains(const char *room, const char *integrator, uint64_t steps)
+{
+	char test[64];
+	struct world *w = room_of(room);
+	double all = 0, least = 0;
+	snprintf(test, sizeof test, "%s, chains of %s", room, integrator);
+	struct plan p = make_plan(w, integrator, test);
+	p.chains = GROUPS * 32;
+	p.epoch = dice_count(steps);
+	struct canvas *c = run_chains(w, &p, NULL);
+	struct canvas_image img;
+	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	for (int k = 0; k < PATH_CLASSES; k++)
+		all += img.classes[k].bootstrap;
+	for (unsigned k = 0; k < PATH_CLASSES; k++) {
+		const struct path_class_energy *of = &img.classes[k];
+		double t = of->difference_t, p_value = isnan(t) ? 1 : stats_student_t_p(t, GROUPS - 1);
+		if (of->bootstrap > 0)
+			judge(test, k, of->bootstrap / all, hypot(of->bootstrap_error, of->chains_error) / of->bootstrap, p_value, &least);
+	}
+	end_judging(test, least, 0.25);
+	canvas_image_fini(&img);
+	canvas_free(c);
+	world_free(w);
+}
+
+static void chains_agree(void **state)
+{
+	(void)state;
+	static const char *const of[] = {"glass", "prism"};
+	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
+		check_chains(of[i], "pssmlt", 500);
+		check_chains(of[i], "hslt", 2500);
+	}
+}
+
+/* ---- moments against the film ---- */
+
+/* Films with a box filter of one pixel: a splat's light is all in its own pixel, so a tile's sum is its first moments'. */
+static void film_agrees(const struct plan *p, const struct batch *b)
+{
+	uint32_t tiles = batch_film_tiles(p), sequences = batch_sequences(p), across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE, next = 0;
+	double time = 0, classes = 0;
+	for (uint32_t t = 0; t < tiles; t++) {
+		double first = 0, film = 0, second = (double)b->moments[sequences * tiles + t];
+		uint32_t x = p->crop_x + t % across * TILE_SIZE, y = p->crop_y + t / across * TILE_SIZE;
+		for (uint32_t s = 0; s < sequences; s++)
+			first += (double)b->moments[s * tiles + t];
+		if (next < b->tile_count && b->tiles[next].x == x && b->tiles[next].y == y) {
+			const struct tile *tile = &b->tiles[next++];
+			for (uint32_t i = 0; i < tile->width * tile->height * 3; i++)
+				film += (double)tile->xyz[i];
+		}
+		assert_true(fabs(first - film) <= 1e-5 * first);
+		assert_true(second <= first * (1 + 1e-6) && (first == 0 || second > 0));
+		/* A path lands at one point. */
+		assert_true(*p->mutations == 0 || fabs(second - first) <= 1e-6 * first);
+		time += first;
+	}
+	assert_int_equal(next, b->tile_count);
+	for (int k = 0; k < PATH_CLASSES; k++)
+		classes += b->classes[k];
+	assert_true(fabs(classes / (double)b->counters[COUNT_SAMPLES] - 1) < 1e-9);
+	assert_true(time > 0.3 * classes && time < 0.9 * classes); /* the crop is a part of what is sampled */
+}
+
+static void moments_are_the_films(void **state)
+{
+	(void)state;
+	static const char *const integrators[] = {"pssmlt", "hslt"};
+	struct world *w = world_of_text(
+		200, 150, SENSOR("0,0.2,1.9", "0,-0.3,-1")
+		"<shape type='cube'><transform name='to_world'><scale value='2'/></transform></shape>"
+		"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/><bsdf type='dielectric'/></shape>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/></transform>"
+		"<emitter type='area'/></shape>");
+	for (size_t i = 0; i < 2; i++) {
+		struct canvas_image img;
+		struct plan p = make_plan(w, integrators[i], "moments and film");
+		p.crop_x = 21;
+		p.crop_y = 10;
+		p.crop_width = 130;
+		p.crop_height = 100;
+		p.border = 25;
+		p.chains = GROUPS * 4;
+		p.bootstrap = GROUPS * dice_count(4096);
+		p.epoch = dice_count(2000);
+		p.groups = GROUPS;
+		struct world moved = *w; /* a border wider than the filter asks for, so that chains leave the crop */
+		moved.settings.border = p.border;
+		struct canvas *c = run_chains(&moved, &p, film_agrees);
+		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		float sum = 0;
+		for (uint32_t t = 0; t < batch_film_tiles(&p); t++) {
+			print_message("%s: tile %u: R %.3f error %.3f share %.3f\n", integrators[i], t, (double)img.r_hat[t],
+				      (double)img.tile_error[t], (double)img.tile_share[t]);
+			assert_true(img.r_hat[t] > 0.99f && img.r_hat[t] < 1.2f);
+			sum += img.tile_share[t];
+		}
+		assert_true(fabsf(sum - 1) < 1e-5f);
+		canvas_image_fini(&img);
+		canvas_free(c);
+	}
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(techniques_agree),
+		cmocka_unit_test(samples_agree),
+		cmocka_unit_test(chains_agree),
+		cmocka_unit_test(moments_are_the_films),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
