@@ -123,6 +123,27 @@ static void known_sequences(void **state)
 	}
 }
 
+/* Four chains of four mutations, 1, 2, 2 and 3 of them in the tile: V = 1/24, W = 7/24. */
+static void four_by_hand(void **state)
+{
+	(void)state;
+	struct plan p = make_plan(4, 2, 1, 4);
+	struct canvas *c = canvas_of(&p);
+	struct canvas_image img;
+	for (uint32_t g = 0; g < 2; g++) {
+		struct batch b = make_batch(&p, 0, g);
+		b.moments[5] = g ? 2 : 1;
+		b.moments[TILES + 5] = g ? 3 : 2;
+		b.moments[2 * TILES + 5] = g ? 5 : 3;
+		give(c, &b);
+	}
+	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_true(fabs((double)img.r_hat[5] - sqrt(3.0 / 4 + 1.0 / 7)) < 1e-6);
+	assert_true(fabs((double)img.tile_error[5] - sqrt(1.0 / 24 / 4) / 0.5) < 1e-6);
+	canvas_image_fini(&img);
+	canvas_free(c);
+}
+
 /* Every chain sits in a tile of its own, or half of its time there. */
 static void chains_that_stand_still(void **state)
 {
@@ -354,6 +375,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(known_sequences),
+		cmocka_unit_test(four_by_hand),
 		cmocka_unit_test(chains_that_stand_still),
 		cmocka_unit_test(nothing_varies),
 		cmocka_unit_test(order_changes_no_bit),
