@@ -17,7 +17,7 @@ enum header_name {
 	H_ROUNDS, H_MUTATIONS, H_SAMPLES, H_B, H_B_ERROR, H_BEYOND, H_REL_MSE, H_REL_MSE_UPPER, H_ACCEPTED, H_INDEPENDENT,
 	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_STRATEGIES, H_NOTE, H_AGREEMENT, H_DISAGREEMENT,
 	H_R_HAT_MEDIAN, H_R_HAT_WORST, H_CLASSES, H_EFFECTS, H_MIXED, H_WALL,
-	H_CPU, H_WORKERS, H_DATE,
+	H_CPU, H_WORKERS, H_DATE, H_END,
 };
 
 enum { HEADER_STRATEGIES = 5120 };
@@ -69,6 +69,8 @@ const struct header_row header_rows[] = {
 	[H_CPU] = {"hslt:cpuSeconds", DOUBLE, true, "of the leases, all threads"},
 	[H_WORKERS] = {"hslt:workers", INT, true, "workers that took part (hslt-render: threads)"},
 	[H_DATE] = {"hslt:date", STRING, true, "when the image was written, UTC"},
+	/* Not compared: --mutations of as many rounds makes the same bits as the error or the time that ended them. */
+	[H_END] = {"hslt:end", STRING, true, "which bound ended the render: mutations, time, target-error, black, interrupted"},
 	{NULL, 0, false, NULL},
 };
 
@@ -231,6 +233,8 @@ static void add_extra(struct header *h, const struct header_extra *x)
 	if (!x->date && gmtime_r(&now, &utc))
 		strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
 	add_string(h, H_DATE, x->date ? x->date : date);
+	if (x->end)
+		add_string(h, H_END, x->end);
 }
 
 void header_fill(struct header *h, const struct canvas_image *img, const struct plan *p, const struct header_extra *x)

@@ -17,7 +17,7 @@ struct header_row {
 };
 extern const struct header_row header_rows[]; /* ends with a NULL name */
 
-bool header_excluded(const char *name); /* one of the four that hslt-compare --exact leaves out */
+bool header_excluded(const char *name); /* one of those that hslt-compare --exact leaves out */
 
 struct header_effect { /* see render_effects */
 	const char *name;
@@ -33,6 +33,7 @@ struct header_extra {
 	double wall_seconds, cpu_seconds;
 	uint32_t workers;
 	const char *date;    /* NULL: now, UTC */
+	const char *end;     /* merge_end_name; NULL: a preview */
 };
 
 enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 32768 };

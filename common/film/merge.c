@@ -143,3 +143,10 @@ enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double second
 		return MERGE_TIME;
 	return MERGE_GOES_ON;
 }
+
+const char *merge_end_name(enum merge_end end, bool black)
+{
+	static const char *const names[] = {[MERGE_GOES_ON] = "interrupted", [MERGE_ROUNDS] = "mutations", [MERGE_TIME] = "time",
+					    [MERGE_ERROR] = "target-error"};
+	return black ? "black" : names[end];
+}

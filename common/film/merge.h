@@ -27,6 +27,7 @@ void bootstrap_to_canvas(const struct bootstrap *s, struct canvas *c);
 
 /* Which bound ended the job. Time and error are looked at after complete rounds only. */
 enum merge_end { MERGE_GOES_ON, MERGE_ROUNDS, MERGE_TIME, MERGE_ERROR };
+const char *merge_end_name(enum merge_end end, bool black); /* as in the header: "target-error" */
 
 /* Rounds at which the error is looked at: a geometric ladder (1 2 3 4 5 6 7 8 10 12 15 ...), a function of the count alone,
  * since each look costs an image and tests the target once more. */

@@ -113,8 +113,12 @@ static void print_table(const Farm__JobListAnswer *a)
 			progress_time(s->eta, eta, sizeof eta);
 		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
 		const char *why = *s->why ? s->why : s->ended && s->exit_code == EXIT_DISAGREE ? "its chains disagree" : "";
-		printf("%-6s %-10s %4d %5.1f %% %-9s %s%s%s\n", id, s->state, s->priority, 100 * s->progress, eta, s->name,
-		       *why ? "  # " : "", why);
+		printf("%-6s %-10s %4d %5.1f %% %-9s %s", id, s->state, s->priority, 100 * s->progress, eta, s->name);
+		if (*why)
+			printf("  # %s", why);
+		else if (s->ended && s->target_error > 0)
+			printf("  # ended by %s", s->reason);
+		printf("\n");
 	}
 }
 

@@ -18,6 +18,7 @@ struct publishing {
 	enum publish_what what;
 	uint64_t rounds;
 	double wall_seconds;
+	enum job_end end;
 	struct canvas_image image;
 	struct agreement agreement;
 	int rc;
@@ -25,6 +26,13 @@ struct publishing {
 };
 
 static const char *const files[] = {[PUBLISH_PREVIEW] = "preview.exr", [PUBLISH_RESULT] = "result.exr"};
+
+static const char *end_name(enum job_end end)
+{
+	return end == END_BLACK	 ? merge_end_name(MERGE_ROUNDS, true)
+	       : end == END_TIME ? merge_end_name(MERGE_TIME, false)
+	       : end == END_ERROR ? merge_end_name(MERGE_ERROR, false) : merge_end_name(MERGE_ROUNDS, false);
+}
 
 static int write_image(struct publishing *w)
 {
@@ -37,7 +45,8 @@ static int write_image(struct publishing *w)
 				 .mixed = m->mixed,
 				 .wall_seconds = w->wall_seconds,
 				 .cpu_seconds = o->cpu_seconds,
-				 .workers = o->worker_count};
+				 .workers = o->worker_count,
+				 .end = w->what == PUBLISH_RESULT ? end_name(w->end) : NULL};
 	for (; x.effect_count < m->n_effects && x.effect_count < HEADER_EFFECTS_MAX; x.effect_count++) {
 		const Farm__Effect *f = m->effects[x.effect_count];
 		effects[x.effect_count] = (struct header_effect){f->name, f->on, f->forced, f->why, f->saves};
@@ -146,8 +155,10 @@ void publish_start(struct server *s, struct order *o, enum publish_what what, ui
 	w->rounds = rounds;
 	w->work.data = w;
 	struct job_status status; /* from the first lease to now */
-	if (farm_job(s->farm, o->id, server_now(s), &status))
+	if (farm_job(s->farm, o->id, server_now(s), &status)) {
+		w->end = status.end;
 		w->wall_seconds = (isnan(status.ended) ? server_now(s) : status.ended) - status.started;
+	}
 	o->busy = true;
 	int rc = uv_queue_work(&s->loop, &w->work, run, done);
 	assert(rc == 0);

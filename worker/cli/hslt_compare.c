@@ -22,7 +22,7 @@ static const char doc[] =
 	"relMSE is the mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B; the relative error is its "
 	"square root; PSNR takes the 99.5th percentile of B as peak. --trim leaves the worst pixels out of relMSE, RMSE and PSNR, "
 	"not out of the means.\n"
-	"--exact looks at every channel and at the header, but for hslt:wallSeconds, hslt:cpuSeconds, hslt:workers and "
+	"--exact looks at every channel and at the header, but for hslt:wallSeconds, hslt:cpuSeconds, hslt:workers, hslt:end and "
 	"hslt:date.\n"
 	"Exit codes: 0 done, 1 failed, different, or above --max-relmse, 2 usage.";
 

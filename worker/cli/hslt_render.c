@@ -260,7 +260,8 @@ static int write_image(const struct session *s, struct error *e)
 		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].on, s->summary.lines[i].forced,
 						      s->summary.lines[i].why, s->summary.lines[i].saves};
 	struct header_extra x = {.scene = s->name, .effect_count = s->summary.line_count, .effects = effects,
-				 .wall_seconds = s->run.seconds, .cpu_seconds = s->run.cpu_seconds, .workers = s->a->threads};
+				 .wall_seconds = s->run.seconds, .cpu_seconds = s->run.cpu_seconds, .workers = s->a->threads,
+				 .end = merge_end_name(s->run.end, s->run.lit.black)};
 	unsigned char *bytes;
 	size_t size;
 	int rc = image_file_encode(&s->image, &s->plan, &x, &bytes, &size, e);
@@ -279,7 +280,7 @@ static void say(const struct session *s)
 		s->run.cpu_seconds);
 	if (isfinite(i->rel_mse))
 		fprintf(stderr, ", relative error %.2f %% (at most %.2f %%)", 100 * sqrt(i->rel_mse), 100 * sqrt(i->rel_mse_upper));
-	fprintf(stderr, "\n");
+	fprintf(stderr, "; ended by %s\n", merge_end_name(s->run.end, s->run.lit.black));
 	if (i->beyond_share > 0.001)
 		fprintf(stderr, "%.2f %% of the energy lies in paths longer than %s can hold\n", 100 * i->beyond_share, p->integrator);
 	char text[STRATEGY_TABLE];

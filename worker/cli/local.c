@@ -169,10 +169,12 @@ static int look(struct crew *c, uint64_t rounds, enum merge_end *end)
 {
 	struct local_run *r = c->run;
 	struct canvas_image img;
-	bool due = merge_error_due(r->plan, rounds);
+	double seconds = since(&c->begin);
+	/* Where another bound ends it, the target may be met all the same. */
+	bool ends = merge_end_of(r->plan, rounds, seconds, NULL) != MERGE_GOES_ON && r->plan->target_error > 0;
+	bool due = ends || merge_error_due(r->plan, rounds);
 	if (due && canvas_image(r->canvas, false, &img, &c->error))
 		return -ENOMEM;
-	double seconds = since(&c->begin);
 	*end = merge_end_of(r->plan, rounds, seconds, due ? &img : NULL);
 	if (r->round)
 		r->round(r->user, &(struct local_round){.rounds = rounds,

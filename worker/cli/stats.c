@@ -19,13 +19,6 @@ static const char *const counter_names[BATCH_COUNTERS] = {
 	[COUNT_STUCK] = "stuck",	     [COUNT_LONGEST_STUCK] = "longestStuck",
 };
 
-const char *stats_end_name(enum merge_end end)
-{
-	static const char *const names[] = {[MERGE_GOES_ON] = "interrupted", [MERGE_ROUNDS] = "mutations", [MERGE_TIME] = "time",
-					    [MERGE_ERROR] = "target-error"};
-	return names[end];
-}
-
 static json_t *plan_json(const struct stats *s)
 {
 	const struct plan *p = s->run->plan;
@@ -66,7 +59,7 @@ static json_t *end_json(const struct stats *s)
 	char note[STRATEGY_NOTE];
 	strategy_note(p, &s->image->counts, s->image->black, note, sizeof note);
 	agreement_add_note(s->agreement, note, sizeof note);
-	return json_pack("{s:s s:s s:o s:s s:o s:o}", "end", stats_end_name(s->run->end), "mixture", p->mutations, "strategies",
+	return json_pack("{s:s s:s s:o s:s s:o s:o}", "end", merge_end_name(s->run->end, s->run->lit.black), "mixture", p->mutations, "strategies",
 			 strategy_to_json(p->mutations, &s->image->counts), "note", note, "agreement", agreement_to_json(s->agreement),
 			 "classes", classes_to_json(s->image->classes));
 }

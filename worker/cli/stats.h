@@ -18,7 +18,6 @@ struct stats {
 	const struct forecast_history *looks;
 };
 
-const char *stats_end_name(enum merge_end end);
 int stats_write(const char *path, const struct stats *s, struct error *e);
 
 #endif
