@@ -1,4 +1,4 @@
-# The same bits for 1, 2 and 4 workers as from hslt-render: samples, chains, both directions, a crop that ends by its error.
+# The same bits for 1, 2 and 4 workers as from hslt-render: samples, chains, both directions, other settings, a crop that ends by its error.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-render hslt-compare
 
@@ -8,13 +8,14 @@ options_of() {
 	bdpt) echo "--integrator bdpt --spp 4" ;;
 	pssmlt) echo "--integrator pssmlt --bootstrap 20000 --mutations 60000" ;;
 	hslt) echo "--integrator hslt --mutations hslt=0.9,independent=0.1 --bootstrap 20000 --mutations 60000" ;;
+	knobs) echo "--integrator hslt --bootstrap 5000 --mutations 20000 --set roughness=0.1,wavelengths=2 --set precision=single,tolerance=0.0001" ;;
 	error) echo "--integrator path --crop 8,8,24,16 --target-error 4% --epoch 1 --spp 4096 --seed 7" ;;
 	esac
 }
 
 KINDS="path bdpt pssmlt"
 if "$BIN/hslt-render" --help | grep -q 'integrator=NAME.* hslt'; then
-	KINDS="$KINDS hslt"
+	KINDS="$KINDS hslt knobs"
 fi
 KINDS="$KINDS error"
 for kind in $KINDS; do

@@ -38,6 +38,13 @@ for p in render submit; do
 	for list in 12x 0 a,,b 'a b' , -1; do
 		code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --mutations "$list"
 	done
+	for text in tolerance tolerance=2 tolerance=1e-3, =1 precision=half wavelengths=3; do
+		code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --set "$text"
+	done
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --set tolerence=1e-3
+	grep -q "did you mean .tolerance" "$DIR/err.log" || fail "hslt-$p says: $(cat "$DIR/err.log")"
+	code 0 "$BIN/hslt-$p" --set help
+	grep -q "^tolerance=0.001 " "$DIR/out" || fail "hslt-$p --set help says: $(cat "$DIR/out")"
 done
 code 1 "$BIN/hslt-job" fetch j1
 code 1 "$BIN/hslt-job" cancel j1

@@ -230,7 +230,7 @@ static void run_group(struct group *g)
 	const struct scene_settings *s = &g->w->settings;
 	g->context = (struct path_context){.w = g->w, .window = {0, 0, s->width, s->height}, .min_depth = g->how->min_edges,
 					   .max_depth = g->how->max_edges, .counters = g->counters};
-	g->mutation = (struct mutation_ctx){.path = &g->context, .seed = g->seed, .count = g->strategy, .limits = walk_limits_of(&knobs_default)};
+	g->mutation = (struct mutation_ctx){.path = &g->context, .seed = g->seed, .count = g->strategy, .limits = walk_limits_of(&g->w->knobs)};
 	bool watched = fptrap_watch();
 	if (resample(g, index))
 		for (uint32_t i = 0; i < g->starts && !g->failure[0]; i++)

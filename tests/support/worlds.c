@@ -10,12 +10,15 @@
 
 #include <cmocka.h>
 
+const char *worlds_knobs;
+
 static struct world *build(const struct asset_source *assets, const char *name, uint32_t width, uint32_t height)
 {
 	struct error e = {""};
 	struct scene s;
 	struct world *w = NULL;
 	struct render_options o = {.width = width, .height = height};
+	snprintf(o.knobs, sizeof o.knobs, "%s", worlds_knobs ? worlds_knobs : "");
 	int rc = scene_read(&s, assets, name, render_plugins(), NULL, 0, &e);
 	if (!rc) {
 		rc = world_new(&w, &s, assets, &o, &e);

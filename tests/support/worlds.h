@@ -14,6 +14,9 @@ __attribute__((format(printf, 3, 4))) struct world *world_of_text(uint32_t width
 	"' target='" t "' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' value='32'/>"                      \
 	"<integer name='height' value='32'/><rfilter type='box'/></film></sensor>"
 
+/* Of the worlds that are built from now on; NULL: all at their defaults. */
+extern const char *worlds_knobs;
+
 /* From files in memory (tests/support/memory_assets.h): the first is the scene. */
 struct memory_file;
 struct world *world_of_files(uint32_t width, uint32_t height, const struct memory_file *files);

@@ -122,11 +122,95 @@ static void test_walk_limits(void **state)
 	assert_true(l.tolerance == 1e-5 && l.least_step == 0.5 && l.back == 0.25 && l.scale == 1);
 }
 
+/* As a shape's first and only material is created. */
+static const struct bsdf *material(const char *knobs, const char *bsdf, struct world **w)
+{
+	worlds_knobs = knobs;
+	*w = world_of_text(8, 8, SENSOR("0,0,3", "0,0,0") "<emitter type='constant'/><shape type='sphere'>%s</shape>", bsdf);
+	worlds_knobs = NULL;
+	return &(*w)->bsdfs[(*w)->parts[0].bsdf];
+}
+
+static void test_roughness(void **state)
+{
+	(void)state;
+	static const char *const rough[] = {
+		"<bsdf type='roughconductor'><string name='material' value='Au'/><float name='alpha' value='0.05'/></bsdf>",
+		"<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/><float name='alpha' value='0.05'/></bsdf>",
+		"<bsdf type='twosided'><bsdf type='roughconductor'><float name='alpha' value='0.05'/></bsdf></bsdf>",
+	};
+	for (size_t i = 0; i < sizeof rough / sizeof *rough; i++) {
+		struct world *w;
+		const struct bsdf *b = material("roughness=0.05", rough[i], &w);
+		assert_true(b->has_smooth && !b->has_delta && b->alpha == 0.05);
+		assert_true(w->effects.glossy && !w->effects.specular);
+		world_free(w);
+		b = material("roughness=0.051", rough[i], &w);
+		assert_true(!b->has_smooth && b->has_delta && b->alpha == 0);
+		assert_true(!w->effects.glossy && w->effects.specular);
+		const struct wavelengths wl = wavelengths_sample(0.3);
+		const struct bsdf_point p = {0.5, 0.5, &wl, TRANSPORT_RADIANCE};
+		vec3 wo = {0, 0.6, 0.8}, wi;
+		double chance;
+		spectrum f = bsdf_eval_delta(b, &p, wo, BSDF_REFLECT, &wi, &chance);
+		assert_true(f.v[0] > 0.01 && f.v[0] <= 1 && wi.y == -wo.y && wi.z == wo.z);
+		world_free(w);
+	}
+}
+
+static void test_tessellation(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *knobs;
+		uint64_t triangles;
+	} cases[] = {{"", 8 * 64}, {"tessellation=0.5", 8 * 16}, {"tessellation=2", 8 * 256}, {"tessellation=0.375", 8 * 9}, {"tessellation=0.001", 8}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct render_summary summary;
+		worlds_knobs = cases[i].knobs;
+		struct world *w = world_of_text(8, 8, SENSOR("0,0,3", "0,0,0")
+						"<shape type='sphere'><texture type='checkerboard' name='displacement'/><integer name='displacement_level' "
+						"value='3'/><float name='displacement_scale' value='0.01'/></shape>");
+		worlds_knobs = NULL;
+		world_summary(w, &summary);
+		assert_int_equal(summary.triangles, cases[i].triangles);
+		world_free(w);
+	}
+}
+
+/* A lease refuses a world that was built by other settings than the plan's. */
+static void test_lease_and_world(void **state)
+{
+	(void)state;
+	worlds_knobs = "tolerance=1e-05";
+	struct world *w = world_of_text(8, 8, SENSOR("0,0,3", "0,0,0") "<shape type='sphere'/>");
+	worlds_knobs = NULL;
+	struct plan_request r = {.integrator = "path", .kind = PLAN_SAMPLES, .width = 8, .height = 8, .border = w->settings.border, .spp = 16,
+				 .min_depth = 1, .max_depth = 2, .groups = 16};
+	for (int same = 0; same < 2; same++) {
+		struct plan p;
+		struct error e = {""};
+		enum lease_end end;
+		struct batch b;
+		snprintf(r.knobs, sizeof r.knobs, "%s", same ? "tolerance=1e-05" : "");
+		assert_int_equal(plan_make(&r, &p, &e), 0);
+		const struct lease_key k = {1, LEASE_RENDER, 0, 0, 0};
+		int rc = render_lease(w, &p, &k, NULL, NULL, &end, &b, &e);
+		assert_int_equal(rc, same ? 0 : -EINVAL);
+		if (same)
+			batch_fini(&b);
+		else
+			assert_non_null(strstr(e.text, "tolerance=1e-05"));
+	}
+	world_free(w);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_canonical), cmocka_unit_test(test_all_at_once), cmocka_unit_test(test_list),
 		cmocka_unit_test(test_refusals),  cmocka_unit_test(test_walk_limits),
+		cmocka_unit_test(test_roughness), cmocka_unit_test(test_tessellation), cmocka_unit_test(test_lease_and_world),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,0 +1,114 @@
+/*
+ * Settings that must not bias, one at a time: mutations leave bdpt's distribution of paths as it is (tests/support/stationary.h),
+ * and images by fewer wavelengths are those by four (tests/support/agree.h).
+ *
+ * Level: 1e-6 a case; power: the smallest bias of a soft quarter of the image that is found with 95 % probability is printed and 2 %
+ * at most. A tolerance as wide as the lobes is found to bias. About 25 s of CPU time.
+ */
+#include "tests/support/agree.h"
+#include "tests/support/stationary.h"
+#include "tests/worker/mutation/scenes.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+enum { STARTS = 120, BOOTSTRAP = 1024 };
+
+struct knob_case {
+	const char *knobs, *scene;
+	unsigned edges;
+	const char *mutation;
+};
+
+static const struct knob_case cases[] = {
+	{"precision=single", "glossy", 3, "hslt@b3c0"},
+	{"precision=single", "rough glass", 4, "hslt@b4c0"},
+	{"precision=single", "bent normals", 4, "hslt"},
+	{"precision=single", "specular chain", 5, "hslt@b5c0"},
+	{"tolerance=0.01", "glossy", 3, "hslt@b3c0"},
+	{"tolerance=0.01", "rough glass", 4, "hslt@b4c0"},
+	{"tolerance=1e-06", "rough glass", 4, "hslt@b4c0"},
+	{"iterations=3", "rough glass", 4, "hslt@b4c0"},
+	{"least-step=1", "rough glass", 4, "hslt@b4c0"},
+	{"reverse-tolerance=0.1", "rough glass", 4, "hslt@b4c0"},
+	{"reverse-tolerance=1e-06", "rough glass", 4, "hslt@b4c0"},
+	{"step-scale=0.25", "rough glass", 4, "hslt@b3c0"},
+	{"step-scale=4", "glossy", 3, "hslt@b2c0"},
+	{"wavelengths=1", "glossy", 3, "hslt"},
+	{"wavelengths=2", "rough glass", 4, "hslt"},
+	{"wavelengths=1", "dispersion", 4, "wavelength"},
+};
+
+static bool scaled(void)
+{
+	const char *text = getenv("HSLT_TEST_SCALE");
+	return text && atoi(text) > 1;
+}
+
+static void run(const struct knob_case *c, struct stationary_result *r)
+{
+	struct stationary_how how = {c->mutation, c->edges, c->edges, STARTS, BOOTSTRAP, STATIONARY_SOUND};
+	char name[96];
+	snprintf(name, sizeof name, "%s %s", c->scene, c->knobs);
+	worlds_knobs = c->knobs;
+	struct world *w = test_world(c->scene);
+	worlds_knobs = NULL;
+	assert_non_null(w);
+	stationary_run(w, name, &how, r);
+	world_free(w);
+	print_message("%-24s %-15s k%u %-10s accepts %4.1f %%; finds %.2f %% on a quarter, %.1f %% of vertices; p %.1g %s; %.2f s %s\n", c->knobs,
+		      c->scene, c->edges, c->mutation, 100 * (double)r->accepted / (double)r->proposals, 100 * r->least_block,
+		      100 * r->least_other, r->p, r->worst >= 0 ? stationary_function(r->worst) : "", r->seconds, r->failure);
+}
+
+static void test_stationary(void **state)
+{
+	(void)state;
+	static struct stationary_result r;
+	unsigned wrong = 0;
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		run(&cases[i], &r);
+		wrong += !stationary_holds(&r) || !r.accepted || (!scaled() && r.least_block > 0.02);
+	}
+	assert_int_equal(wrong, 0);
+}
+
+static void test_bias_is_found(void **state)
+{
+	(void)state;
+	static struct stationary_result r;
+	run(&(struct knob_case){"tolerance=1", "rough glass", 4, "hslt@b4c0"}, &r);
+	assert_true(scaled() || !stationary_holds(&r));
+}
+
+/* Little noise but that of drawing wavelengths. */
+static void test_wavelengths(void **state)
+{
+	(void)state;
+	static struct agree_image image[3];
+	static const char *const knobs[] = {"", "wavelengths=1", "wavelengths=2"};
+	for (int i = 0; i < 3; i++) {
+		worlds_knobs = knobs[i];
+		struct world *w = world_of_text(8, 8,
+						"<integrator type='path'><integer name='max_depth' value='3'/></integrator>" SENSOR("0,1,5", "0,-0.2,0")
+						PLATE("-1", DIFFUSE("0.4,0.6,0.7")) BALL("0,-0.2,0", "0.8", METAL("0.4"))
+						"<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>");
+		worlds_knobs = NULL;
+		struct agree_side how = {"path", 5 << 14, 64, 0, 0};
+		agree_render(w, "wavelengths", *knobs[i] ? knobs[i] : "four", &how, &image[i]);
+		world_free(w);
+	}
+	agree_check("1 wavelength against 4", &image[1], &image[0]);
+	agree_check("2 wavelengths against 4", &image[2], &image[0]);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_stationary), cmocka_unit_test(test_bias_is_found), cmocka_unit_test(test_wavelengths),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
