@@ -154,7 +154,9 @@ static void print_job(const json_t *job, bool colors)
 	       colors ? "\033[0m" : "", 100 * number_of(job, "progress"), rate, eta, error, number_of(job, "rounds"),
 	       number_of(job, "leases"), text_of(job, "name"));
 	const char *why = *text_of(job, "why") ? text_of(job, "why") : bound_of(job);
-	printf("%s%s\n", *why ? "  # " : "", why);
+	const char *verdict = text_of(json_object_get(job, "agreement"), "verdict");
+	bool disagree = strcmp(verdict, agreement_name(CHAINS_DISAGREE)) == 0;
+	printf("%s%s%s%s\n", *why || disagree ? "  # " : "", why, *why && disagree ? "; " : "", disagree ? "its chains disagree" : "");
 }
 
 /* "3.2 % (3.0 - 3.5 %), half of it costs 12 min of processors, 6.0 min more; done in 31 min (25 min - 40 min)" */

@@ -86,6 +86,8 @@ static void tell_error(const struct publishing *w)
 static void tell_image(const struct publishing *w)
 {
 	uint64_t job = w->order->id;
+	if (*w->agreement.text)
+		order_log(w->order, LOG_JOB_NOTE, "text=%s", log_quote(w->agreement.text).text);
 	struct event ev = {.kind = EVENT_IMAGE_KNOWN,
 			   .job = job,
 			   .image_known = {.job = job, .disagrees = w->agreement.verdict == CHAINS_DISAGREE}};

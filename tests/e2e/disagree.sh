@@ -47,6 +47,10 @@ look() {
 	has "$DIR/shown" "$WORDS"
 	has "$DIR/shown" 'chains: disagree; R-hat'
 	has "$DIR/shown" 'groups apart'
+	"$BIN/hslt-status" >"$DIR/shown"
+	has "$DIR/shown" 'its chains disagree'
+	"$BIN/hslt-job" log "$id" >"$DIR/shown"
+	has "$DIR/shown" 'chains disagree: '
 	"$BIN/hslt-job" list >"$DIR/list"
 	has "$DIR/list" 'its chains disagree'
 	"$BIN/hslt-job" list --json >"$DIR/list"

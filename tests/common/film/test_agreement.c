@@ -1,6 +1,9 @@
 /* What makes chains disagree, from synthetic images: each criterion alone, on both sides of its limit, and its words. */
 #include "common/film/agreement.h"
 
+#include "common/base/mem.h"
+#include "common/film/image_file.h"
+
 #include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
@@ -261,13 +264,64 @@ static void words_fit(void **state)
 	assert_true(strlen(small) < sizeof small);
 }
 
+static const struct exr_attribute *attribute(const struct exr_image *x, const char *name)
+{
+	for (size_t i = 0; i < x->attribute_count; i++)
+		if (strcmp(x->attributes[i].name, name) == 0)
+			return &x->attributes[i];
+	return NULL;
+}
+
+/* What a reader of the file finds: the words, and in each pixel the R-hat of its tile, 0 where no chain came. */
+static void image_says_it(void **state)
+{
+	(void)state;
+	struct fixture f;
+	struct exr_image x;
+	struct error e = {""};
+	unsigned char *bytes;
+	size_t size, plane = 0;
+	make(&f);
+	f.r_hat[6] = 1.3F;
+	f.tile_error[6] = 0.2F;
+	f.r_hat[5] = NAN;
+	f.img.rgb = mem_alloc((size_t)f.img.width * f.img.height * 3, sizeof *f.img.rgb);
+	assert_non_null(f.img.rgb);
+	assert_int_equal(image_file_encode(&f.img, &f.plan, &(struct header_extra){.scene = "a.xml"}, &bytes, &size, &e), 0);
+	assert_int_equal(exr_read(bytes, size, &x, &e), 0);
+	assert_int_equal(x.channel_count, 4);
+	while (strcmp(x.names[plane], "rhat.Y") != 0)
+		assert_true(++plane < x.channel_count);
+	for (uint32_t y = 0; y < x.height; y++)
+		for (uint32_t c = 0; c < x.width; c++) {
+			uint32_t tile = y / 64 * ACROSS + c / 64;
+			close_to((double)x.planes[plane][y * x.width + c], tile == 5 ? 0 : (double)f.r_hat[tile], 0);
+		}
+	assert_string_equal(attribute(&x, "hslt:agreement")->string, "disagree");
+	assert_non_null(strstr(attribute(&x, "hslt:disagreement")->string, "in 1 of 20 tiles"));
+	assert_non_null(strstr(attribute(&x, "hslt:note")->string, "chains disagree"));
+	assert_non_null(strstr(attribute(&x, "hslt:classes")->string, "reflected caustic, 3-4 edges"));
+	close_to(attribute(&x, "hslt:rHatWorst")->number, 1.3, 1e-6);
+	exr_image_fini(&x);
+	mem_free(bytes);
+	f.plan.kind = PLAN_SAMPLES;
+	f.img.r_hat = NULL;
+	assert_int_equal(image_file_encode(&f.img, &f.plan, &(struct header_extra){.scene = "a.xml"}, &bytes, &size, &e), 0);
+	assert_int_equal(exr_read(bytes, size, &x, &e), 0);
+	assert_int_equal(x.channel_count, 3);
+	assert_null(attribute(&x, "hslt:agreement"));
+	exr_image_fini(&x);
+	mem_free(bytes);
+	mem_free(f.img.rgb);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(tails_of_student),  cmocka_unit_test(all_is_well),
 		cmocka_unit_test(medians),           cmocka_unit_test(tiles_that_have_not_mixed),
 		cmocka_unit_test(classes_that_differ), cmocka_unit_test(groups_that_are_apart), cmocka_unit_test(chains_that_stand_still),
-		cmocka_unit_test(samples_agree),     cmocka_unit_test(words_fit),
+		cmocka_unit_test(samples_agree),     cmocka_unit_test(words_fit),         cmocka_unit_test(image_says_it),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
