@@ -46,8 +46,8 @@ static double log_weight(struct mutation_ctx *m, struct whole_path *into, const 
 
 static double useful(const struct render_summary *scene)
 {
-	(void)scene;
-	return 0.1;
+	/* It costs ten times what `rejoin` does: cornell-box has 20 % less relMSE x time with half as many. */
+	return render_effect_on(scene, "half-vectors") ? 0.1 : 0.05;
 }
 
 const struct mutation_ops mutation_bidirectional = {

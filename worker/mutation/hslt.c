@@ -11,8 +11,7 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 
 static double useful(const struct render_summary *scene)
 {
-	(void)scene;
-	return 0.8;
+	return render_effect_on(scene, "half-vectors") ? 0.8 : 0;
 }
 
 const struct mutation_ops mutation_hslt = {

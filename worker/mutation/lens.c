@@ -22,7 +22,7 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 
 static double useful(const struct render_summary *scene)
 {
-	return render_effect_on(scene, "aperture") ? 0.1 : 0;
+	return render_effect_on(scene, "aperture") && render_effect_on(scene, "half-vectors") ? 0.1 : 0;
 }
 
 const struct mutation_ops mutation_lens = {

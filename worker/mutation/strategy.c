@@ -72,8 +72,8 @@ enum strategy_counter strategy_propose(const struct strategy *s, struct mutation
 	struct breakup br = {.halfvecs = s->halfvecs, .wavelength = s->wavelength, .aperture = s->aperture};
 	if (!choose(s, &forced, m, x, &br))
 		return STRATEGY_FAIL_INAPPLICABLE;
-	const struct emitter *em = &m->path->w->emitters[x->v[0].emitter];
-	br.emitter = s->emitter && br.b > 0 && br.c == 0 && em->ops->point_inverse;
+	const struct world *w = m->path->w;
+	br.emitter = s->emitter && w->effects.emitter_move && br.b > 0 && br.c == 0 && w->emitters[x->v[0].emitter].ops->point_inverse;
 	enum strategy_counter end = breakup_propose(m, &br, x, y, move);
 	if (end)
 		return end;

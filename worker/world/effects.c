@@ -308,10 +308,10 @@ static void emitter_moves(struct report *r, const struct census *c)
 	char text[96];
 	bool called = c->area.count + c->environment.count > 0;
 	if (called)
-		line(r, EFFECT_EMITTER_MOVE, true, "%s %s many points or directions",
+		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, true, "%s %s many points or directions",
 		     who(c->area.count ? &c->area : &c->environment, text), verb(c->area.count ? &c->area : &c->environment, "has", "have"));
 	else
-		line(r, EFFECT_EMITTER_MOVE, false, c->delta.count ? "all emitters are single points or directions" : "nothing shines");
+		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, false, c->delta.count ? "all emitters are single points or directions" : "nothing shines");
 }
 
 static void depth(struct report *r, const struct world *w, const struct effects_source *src, const enum reach *shape)

@@ -59,7 +59,7 @@ void effects_print(const struct effects_choice *c, char text[PLAN_EFFECTS_MAX]);
 struct effects {
 	bool colour;      /* off: no wavelengths are drawn, one grey value stands for the common illuminant's shape */
 	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light, delta_light;
-	bool displacement, half_vectors;
+	bool displacement, half_vectors, emitter_move;
 	enum color_shape illuminant; /* of all emitters, when colour is off */
 	uint32_t max_depth; /* edges of the longest path that can carry light, at most the scene's */
 	struct effect_line lines[RENDER_EFFECTS_MAX];

@@ -119,7 +119,20 @@ static inline double explicit_log_choice(const struct path_context *c, const cha
 		heuristic_roughness.weigh_c(c, x, b, weight);
 		p *= heuristic_probability(weight, b, c_end);
 	}
+	if (strcmp(strategy, "rejoin") == 0) {
+		/* 1 for each inner vertex that can be joined to the one before it, 0.1 for an emitter that can be hit. */
+		double found = c->w->emitters[x->v[0].emitter].delta ? 0 : 0.1, all = found;
+		for (unsigned i = 1; i < x->edges; i++)
+			all += !x->v[i].delta && (i == 1 || !x->v[i - 1].delta);
+		p = (b == 0 ? found : 1) / all;
+	}
 	return log(p);
+}
+
+/* The strategy also moves x_0 by the numbers that make it. */
+static inline bool explicit_moves_emitter(const char *strategy, unsigned b, unsigned c_end)
+{
+	return strcmp(strategy, "light") == 0 || (strcmp(strategy, "rejoin") == 0 && b > 0 && c_end == 0);
 }
 
 #endif

@@ -56,7 +56,7 @@ static double log_t(const struct trial *t, const struct move *move, const struct
 	sum += explicit_log_traced(&c, x, y, b, log_choices);
 	sum += explicit_log_between(&c, x, y, b, end, steps ? m.scratch.dh : NULL, sign);
 	const struct emitter *em = &c.w->emitters[y->v[0].emitter];
-	if (strcmp(t->ops->name, "light") == 0 && em->ops->point_inverse)
+	if (explicit_moves_emitter(t->ops->name, b, end) && em->ops->point_inverse)
 		sum += log(path_pdf_emitter(&c, &y->v[0]));
 	return sum;
 }

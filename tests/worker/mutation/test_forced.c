@@ -36,7 +36,7 @@ struct scene_cases {
 };
 
 static const struct scene_cases shorter[] = {
-	{"diffuse", {{3, "*"}, {2, "hslt@b2c0"}}},
+	{"diffuse", {{3, "*"}, {2, "hslt@b2c0 rejoin"}}},
 	{"glossy", {{2, "hslt@b2c0"}, {3, "*"}, {4, "hslt@b4c0 hslt@b4c1 hslt@b3c1"}}},
 	{"rough glass", {{4, "*"}, {6, "hslt@b0 hslt@b6c0 hslt@b6c2 hslt@b5c2 hslt@b2c1 hslt"}, {8, "hslt@b0 hslt@b8c4 hslt@b6c3 hslt"}}},
 	{"smooth glass", {{4, "hslt@b0 hslt@b4c0 hslt@b4c1 hslt halfvec light"}, {5, "hslt@b5c0 hslt@b5c1"}}},
@@ -47,7 +47,7 @@ static const struct scene_cases shorter[] = {
 	{"sun", {{2, "hslt@b2c0"}, {3, "hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt"}}},
 	{"dispersion", {{4, "hslt@b0 hslt@b4c0 hslt@b4c1 hslt@b3c1 wavelength hslt"}}},
 	{"dispersion, smooth", {{4, "hslt@b0 hslt@b4c0 hslt@b1c0 wavelength light hslt"}}},
-	{"aperture", {{3, "hslt@b0 hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt@b3c1 lens"}, {4, "hslt@b4c0 hslt@b4c1 lens hslt"}}},
+	{"aperture", {{3, "hslt@b0 hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt@b3c1 lens rejoin"}, {4, "hslt@b4c0 hslt@b4c1 lens hslt"}}},
 };
 enum { SCENES = sizeof shorter / sizeof *shorter };
 

@@ -48,6 +48,8 @@ static const struct example examples[] = {
 	{"gold", "hslt", {-1, -1}, 3, 2, 1},
 	{"gold", "hslt", {-1, -1}, 3, 2, 0},
 	{"gold", "light", {-1, -1}, 2, 1, 0},
+	{"rough glass", "rejoin", {-1, -1}, 2, 1, 0},
+	{"gold", "rejoin", {-1, -1}, 3, 2, 1},
 	{"lens", "halfvec", {-1, -1}, 2, 2, 0},
 	{"lens", "hslt", {1, 0}, 2, 1, 0},
 	{"lens", "multichain", {-1, -1}, 2, 0, 0},
@@ -79,7 +81,7 @@ static void list_vertices(struct sampling *s)
 			break;
 	}
 	s->ends = 0;
-	if (strcmp(e->strategy, "light") == 0)
+	if (explicit_moves_emitter(e->strategy, e->b, e->c))
 		s->vertex[s->count + s->ends++] = 0;
 	if (camera_has_aperture(&c.w->camera) && e->b < e->edges)
 		s->vertex[s->count + s->ends++] = e->edges;
@@ -135,7 +137,7 @@ static enum outcome propose(struct sampling *s, double *z, double *log_density)
 		*log_density = explicit_log_choice(&c, e->strategy, &e->how, s->x, e->b, e->c) +
 			       explicit_log_traced(&c, s->x, s->y, e->b, &unused) +
 			       explicit_log_between(&c, s->x, s->y, e->b, e->c, steps ? m.scratch.dh : NULL, 1) - log_plane;
-		if (strcmp(e->strategy, "light") == 0) {
+		if (explicit_moves_emitter(e->strategy, e->b, e->c)) {
 			const struct path_vertex *v = &s->y->v[0];
 			const struct emitter *em = &c.w->emitters[v->emitter];
 			struct emitter_point p = world_emitter_point(&v->x);
