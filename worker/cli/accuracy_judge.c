@@ -119,7 +119,7 @@ static void scale_errors(struct judge *j, struct stats_point *points)
 static double block_of(const struct picture *p, uint32_t x0, uint32_t x1, uint32_t y0, uint32_t y1)
 {
 	/* X+Y+Z of Rec. 709's red, green and blue */
-	static const double weight[3] = {0.6443632, 1.1919478, 1.2032103};
+	static const double weight[3] = {0.644463186, 1.191920259, 1.202916555};
 	double sum = 0;
 	for (uint32_t y = y0; y < y1; y++)
 		for (uint32_t x = x0; x < x1; x++)

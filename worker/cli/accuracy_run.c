@@ -15,6 +15,12 @@ static double now(void)
 	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
+enum { PILOT_BOOTSTRAP = 16384, PILOT_EPOCH = 16 };
+
+struct pilot { /* CPU seconds of the default's, for the sizes of rounds and nothing else */
+	double bootstrap_sample, mutation;
+};
+
 static double shares(const struct accuracy_design *d)
 {
 	double sum = 0;
@@ -46,10 +52,9 @@ static int check_memory(const struct accuracy_run *r, const struct plan *p, stru
 }
 
 /* Rounds are short, so that the settings change often; the bootstrap takes a tenth of the time or so. */
-static int make_plan(struct accuracy_run *r, size_t i, struct error *e)
+static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot, struct error *e)
 {
 	enum { ROUNDS = 25 };
-	static const double guess = 6e-6; /* seconds a mutation; decides how long rounds are, nothing else */
 	const struct accuracy_setting *s = &r->design->settings[i];
 	struct plan_request q = r->request;
 	struct plan *p = &r->jobs[i].plan;
@@ -61,11 +66,12 @@ static int make_plan(struct accuracy_run *r, size_t i, struct error *e)
 	q.seconds = 1e8;
 	q.spp = q.mutations = 0;
 	q.target_error = 0;
-	if (!q.bootstrap && q.kind == PLAN_CHAINS)
-		q.bootstrap = (uint64_t)fmin(fmax(0.1 * each / (1.5 * guess), 16384), 1e6);
+	bool chains = q.kind == PLAN_CHAINS;
+	if (chains && !q.bootstrap)
+		q.bootstrap = (uint64_t)fmin(fmax(0.1 * each / pilot->bootstrap_sample, PILOT_BOOTSTRAP), 1e6);
 	int rc = plan_make(&q, p, e);
-	if (!rc && !r->request.epoch && p->kind == PLAN_CHAINS) {
-		q.epoch = (uint64_t)fmin(fmax(each / ROUNDS / guess / p->chains, 16), 8192);
+	if (!rc && chains && !q.epoch) {
+		q.epoch = (uint64_t)fmin(fmax(each / ROUNDS / pilot->mutation / p->chains, PILOT_EPOCH), 8192);
 		rc = plan_make(&q, p, e);
 	}
 	if (!rc && p->groups < 4)
@@ -168,18 +174,47 @@ static int rounds(struct accuracy_run *r, double begin, struct error *e)
 	}
 }
 
+static void end(struct accuracy_job *j)
+{
+	if (j->job)
+		local_end(j->job);
+	canvas_free(j->run.canvas);
+	*j = (struct accuracy_job){.cost_count = 0};
+}
+
+/* The default for a moment, thrown away again. */
+static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
+{
+	struct accuracy_job *j = &r->jobs[ACCURACY_DEFAULT];
+	*pilot = (struct pilot){1, 1}; /* so slow that all sizes are the least */
+	int rc = make_plan(r, ACCURACY_DEFAULT, pilot, e);
+	if (!rc)
+		rc = check_memory(r, &j->plan, e);
+	if (!rc)
+		rc = start(r, ACCURACY_DEFAULT, e);
+	if (!rc && !stopped(r))
+		rc = step(r, ACCURACY_DEFAULT, e);
+	if (!rc && j->cost_count > 0) {
+		pilot->bootstrap_sample = fmax(j->run.bootstrap_cpu_seconds / (double)j->plan.bootstrap, 1e-9);
+		pilot->mutation = fmax(j->cost[0], 1e-9);
+	}
+	end(j);
+	return rc;
+}
+
 int accuracy_render(struct accuracy_run *r, struct error *e)
 {
 	const struct accuracy_design *d = r->design;
 	double begin = now();
-	int rc = 0;
+	int rc;
 	r->jobs = mem_alloc(d->count, sizeof *r->jobs);
 	if (!r->jobs)
 		return error_set(e, ENOMEM, "no memory for %zu settings", d->count);
+	struct pilot pilot;
+	show(r, 0, "pilot");
+	rc = fly(r, &pilot, e);
 	for (size_t i = 0; !rc && i < d->count; i++)
-		rc = make_plan(r, i, e);
-	if (!rc)
-		rc = check_memory(r, &r->jobs[0].plan, e);
+		rc = make_plan(r, i, &pilot, e);
 	for (size_t i = 0; !rc && !stopped(r) && i < d->count; i++) {
 		show(r, (double)i / (double)d->count, "bootstrap");
 		rc = start(r, i, e);
@@ -201,11 +236,8 @@ int accuracy_render(struct accuracy_run *r, struct error *e)
 
 void accuracy_run_fini(struct accuracy_run *r)
 {
-	for (size_t i = 0; r->jobs && i < r->design->count; i++) {
-		if (r->jobs[i].job)
-			local_end(r->jobs[i].job);
-		canvas_free(r->jobs[i].run.canvas);
-	}
+	for (size_t i = 0; r->jobs && i < r->design->count; i++)
+		end(&r->jobs[i]);
 	mem_free(r->jobs);
 	for (size_t k = 0; k < r->world_count; k++)
 		world_free(r->worlds[k]);

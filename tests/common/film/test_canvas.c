@@ -387,6 +387,56 @@ static void black_canvas_has_no_error(void **unused)
 	canvas_free(c);
 }
 
+static float some(void)
+{
+	return (float)uniform();
+}
+
+/* The mean over groups of the blocks is the image's, where the groups have as many samples; each group's b stands for its share. */
+static void blocks_of_groups_make_the_image(void **unused)
+{
+	(void)unused;
+	static const double weight[3] = {0.644463186, 1.191920259, 1.202916555}; /* X+Y+Z of Rec. 709's red, green, blue */
+	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++) {
+		struct plan p = make_plan((enum plan_kind)kind, 100, 70, 4, 1);
+		struct canvas *c;
+		struct canvas_image img;
+		double block[4][7], sum[7] = {0}, b_sum = 0;
+		state = 77;
+		assert_int_equal(canvas_new(&c, &p, -32, NULL, NULL), 0);
+		for (uint64_t round = 0; round < 2; round++)
+			for (uint32_t g = 0; g < 4; g++) {
+				struct batch b = make_batch(&p, round, g, 0, 4, some);
+				b.independent_sum = (g + 1) * (double)p.epoch;
+				assert_int_equal(canvas_add(c, &b, NULL), 0);
+				batch_fini(&b);
+			}
+		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		canvas_group_blocks(c, 3, 2, block[0]);
+		for (uint32_t g = 0; g < 4; g++) {
+			/* Undo the group's own b, so that the pooled one remains. */
+			double own = kind == PLAN_CHAINS ? (g + 1) / img.b : 1;
+			b_sum += own / 4;
+			for (int k = 0; k < 7; k++)
+				sum[k] += block[g][k] / own / 4;
+		}
+		assert_true(fabs(b_sum - 1) < 1e-12);
+		for (uint32_t k = 0; k < 7; k++) {
+			uint32_t x0 = k < 6 ? 100 * (k % 3) / 3 : 0, x1 = k < 6 ? 100 * (k % 3 + 1) / 3 : 100;
+			uint32_t y0 = k < 6 ? 35 * (k / 3) : 0, y1 = k < 6 ? y0 + 35 : 70;
+			double mean = 0;
+			for (uint32_t y = y0; y < y1; y++)
+				for (uint32_t x = x0; x < x1; x++)
+					for (uint32_t i = 0; i < 3; i++)
+						mean += weight[i] * (double)img.rgb[(y * 100 + x) * 3 + i] / ((x1 - x0) * (y1 - y0));
+			if (!(fabs(sum[k] / mean - 1) < 1e-6))
+				fail_msg("kind %d, block %u: %.9g is not %.9g", kind, k, sum[k], mean);
+		}
+		canvas_image_fini(&img);
+		canvas_free(c);
+	}
+}
+
 static void failing_allocations_leak_nothing(void **unused)
 {
 	(void)unused;
@@ -428,6 +478,7 @@ int main(void)
 		cmocka_unit_test(grids_fit_their_values),
 		cmocka_unit_test(estimated_error_covers_the_truth),
 		cmocka_unit_test(black_canvas_has_no_error),
+		cmocka_unit_test(blocks_of_groups_make_the_image),
 		cmocka_unit_test(failing_allocations_leak_nothing),
 		cmocka_unit_test(a_folder_that_is_not_there_is_an_error),
 	};
