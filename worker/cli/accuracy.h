@@ -100,6 +100,7 @@ struct accuracy_judgement {
 	uint64_t at_mutations;   /* of equal mutations */
 	double at_cpu_seconds;   /* of equal time */
 	bool file;               /* the reference is a file's image */
+	bool thin;               /* too little was rendered to trust the figures: errors of groups that missed the rare light look small */
 	struct accuracy_figures figures[ACCURACY_SETTINGS];
 	uint32_t width, height;
 	float *rgb;              /* planes of the picture for the report: R, G, B */

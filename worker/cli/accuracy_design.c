@@ -124,6 +124,8 @@ static const char *idle(const struct planner *p, const struct render_knob *k)
 		return "no shape is displaced";
 	if (strcmp(k->name, "roughness") == 0 && !render_effect_on(p->scene, "glossy"))
 		return "no material has a rough lobe of finite width";
+	if (strcmp(k->name, "wavelengths") == 0 && !render_effect_on(p->scene, "colour"))
+		return "nothing varies with wavelength";
 	return NULL;
 }
 

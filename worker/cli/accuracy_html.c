@@ -55,7 +55,12 @@ static void put_answer(struct page *p, const struct accuracy_context *x)
 {
 	const struct accuracy_figures *f = x->judgement->figures, *d = &f[ACCURACY_DEFAULT];
 	char name[96];
-	page_put(p, "<div class=\"answer\"><p>");
+	page_put(p, "<div class=\"answer\">");
+	if (x->judgement->thin)
+		page_put(p, "<p><b>Too little was rendered for this scene and size</b>: errors above 50 %%, or fewer than four rounds of a setting. "
+			    "Groups of chains that missed the rare light then look exact, and what follows may be chance. Give it more minutes "
+			    "(--budget), a smaller film (--size) or fewer knobs (--knobs).</p>");
+	page_put(p, "<p>");
 	if (d->beaten_by == ACCURACY_DEFAULT) {
 		page_put(p, "<b>The default lies on the front</b>: no other setting has surely less error at equal time without a sign of more bias, or "
 			    "surely less bias without surely more error.");

@@ -201,6 +201,9 @@ static int judge(struct judge *j, const struct picture *reference, struct error 
 	if (rc)
 		return rc;
 	scale_errors(j, points);
+	for (size_t i = 0; i < n; i++)
+		j->out->thin |= j->out->figures[i].rounds < 4;
+	j->out->thin |= j->out->figures[ACCURACY_DEFAULT].equal_time.value > 0.5;
 	take_biases(j, reference, points);
 	stats_front(points, n, LEVEL, by);
 	for (size_t i = 0; i < n; i++)

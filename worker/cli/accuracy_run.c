@@ -69,8 +69,14 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	bool chains = q.kind == PLAN_CHAINS;
 	if (chains && !q.bootstrap)
 		q.bootstrap = (uint64_t)fmin(fmax(0.1 * each / pilot->bootstrap_sample, PILOT_BOOTSTRAP), 1e6);
+	/* As many chains as a render of that length has: where they are short, many of them err in ways that groups do not show. */
+	q.mutations = chains && !q.chains ? (uint64_t)fmin(fmax(each / pilot->mutation, 1), 1e15) : 0;
 	int rc = plan_make(&q, p, e);
-	if (!rc && chains && !q.epoch) {
+	q.chains = p->chains;
+	q.mutations = 0;
+	if (!rc)
+		rc = plan_make(&q, p, e);
+	if (!rc && chains && !r->request.epoch) {
 		q.epoch = (uint64_t)fmin(fmax(each / ROUNDS / pilot->mutation / p->chains, PILOT_EPOCH), 8192);
 		rc = plan_make(&q, p, e);
 	}

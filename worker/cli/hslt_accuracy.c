@@ -206,6 +206,8 @@ static void say(const struct session *s)
 {
 	const struct accuracy_figures *f = s->judgement.figures, *d = &f[ACCURACY_DEFAULT];
 	char name[96];
+	if (s->judgement.thin)
+		fprintf(stderr, "too little was rendered: the figures may be chance (more --budget, smaller --size or fewer --knobs)\n");
 	fprintf(stderr, "default: relative error %.2f %% in %.3g s of CPU, bias at most %.2g %%", 100 * d->equal_time.value,
 		s->judgement.at_cpu_seconds, 100 * d->bias_bound);
 	if (d->beaten_by == ACCURACY_DEFAULT) {
