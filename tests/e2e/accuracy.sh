@@ -74,7 +74,7 @@ END
 "$A" "$BOX" -o "$DIR/stopped.html" --size 32x24 --budget 0.4 --chains 64 --threads 1 --bootstrap 4096 --knobs preset 2>"$DIR/stopped.log" &
 job=$!
 PIDS="$PIDS $job"
-until_true 60 grep -q 'rendering [1-9]' "$DIR/stopped.log" || fail "it does not come to render"
+until_true 60 grep -qs 'rendering [1-9]' "$DIR/stopped.log" || fail "it does not come to render"
 kill -INT $job
 got=0
 wait $job || got=$?

@@ -17,6 +17,7 @@ enum { ACCURACY_SETTINGS = 96, ACCURACY_SWEEPS = 24, ACCURACY_VALUES = 12, ACCUR
 struct accuracy_setting {
 	char knob[32], value[48]; /* "default" and "careful" are knobs without value */
 	double share;             /* of the time, in units of the others' */
+	bool other_image;         /* it is known to make another image, however small the difference */
 	uint32_t max_depth;
 	char knobs[PLAN_KNOBS_MAX], mixture[PLAN_MUTATIONS_MAX];
 };

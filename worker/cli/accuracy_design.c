@@ -148,8 +148,10 @@ static void sweep_knob(struct planner *p, const struct render_knob *k)
 			continue;
 		}
 		struct accuracy_setting *setting = swept(p, s, k->sweep[i]);
-		if (setting)
-			memcpy(setting->knobs, knobs, sizeof knobs);
+		if (!setting)
+			continue;
+		memcpy(setting->knobs, knobs, sizeof knobs);
+		setting->other_image = k->place == KNOB_WORLD;
 	}
 	if (s && !placed)
 		add_value(s, standard, ACCURACY_DEFAULT);
@@ -163,8 +165,10 @@ static void sweep_depth(struct planner *p)
 	for (size_t i = 0; s && i < sizeof depths / sizeof *depths && depths[i] < p->base->max_depth; i++) {
 		snprintf(value, sizeof value, "%u", depths[i]);
 		struct accuracy_setting *setting = swept(p, s, value);
-		if (setting)
-			setting->max_depth = depths[i];
+		if (!setting)
+			continue;
+		setting->max_depth = depths[i];
+		setting->other_image = true;
 	}
 	snprintf(value, sizeof value, "%u", p->base->max_depth);
 	if (s)

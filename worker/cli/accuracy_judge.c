@@ -6,6 +6,7 @@
 
 #include "common/base/mem.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -170,6 +171,9 @@ static void take_bias(struct judge *j, size_t i, const double *reference, size_t
 			f->block = (unsigned)c;
 		}
 	}
+	/* What is known to bias has not to be seen to be suspect. */
+	if (j->r->design->settings[i].other_image)
+		point->bias_suspect = fmax(point->bias_suspect, DBL_MIN);
 	point->bias_seen = f->bias_seen;
 	point->bias_bound = f->bias_bound;
 }

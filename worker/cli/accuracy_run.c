@@ -17,8 +17,9 @@ static double now(void)
 
 enum { PILOT_BOOTSTRAP = 16384, PILOT_EPOCH = 16 };
 
-struct pilot { /* CPU seconds of the default's, for the sizes of rounds and nothing else */
-	double bootstrap_sample, mutation;
+struct pilot { /* of the default, for the sizes of rounds and nothing else */
+	double bootstrap_sample, mutation; /* CPU seconds */
+	double rate;                       /* CPU seconds a second: what other programs leave of the processors */
 };
 
 static double shares(const struct accuracy_design *d)
@@ -30,13 +31,9 @@ static double shares(const struct accuracy_design *d)
 }
 
 /* CPU seconds that a setting of share 1 will have, before it is known how much the bootstrap and the worlds take. */
-static double expected_seconds(const struct accuracy_run *r)
+static double expected_seconds(const struct accuracy_run *r, const struct pilot *pilot)
 {
-	if (r->setting_seconds > 0)
-		return r->setting_seconds;
-	long processors = sysconf(_SC_NPROCESSORS_ONLN);
-	double threads = processors > 0 ? fmin(r->threads, (double)processors) : r->threads;
-	return 0.85 * r->seconds * threads / shares(r->design);
+	return r->setting_seconds > 0 ? r->setting_seconds : 0.85 * r->seconds * pilot->rate / shares(r->design);
 }
 
 /* All films stay in memory until the end, because the settings take turns. */
@@ -58,7 +55,7 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	const struct accuracy_setting *s = &r->design->settings[i];
 	struct plan_request q = r->request;
 	struct plan *p = &r->jobs[i].plan;
-	double each = expected_seconds(r);
+	double each = expected_seconds(r, pilot);
 	q.max_depth = s->max_depth;
 	memcpy(q.knobs, s->knobs, sizeof q.knobs);
 	memcpy(q.mixture, s->mixture, sizeof q.mixture);
@@ -192,10 +189,13 @@ static void end(struct accuracy_job *j)
 static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 {
 	struct accuracy_job *j = &r->jobs[ACCURACY_DEFAULT];
-	*pilot = (struct pilot){1, 1}; /* so slow that all sizes are the least */
+	*pilot = (struct pilot){1, 1, 1}; /* so slow that all sizes are the least */
 	int rc = make_plan(r, ACCURACY_DEFAULT, pilot, e);
 	if (!rc)
 		rc = check_memory(r, &j->plan, e);
+	if (!rc)
+		rc = find_world(r, j, e);
+	double begin = now();
 	if (!rc)
 		rc = start(r, ACCURACY_DEFAULT, e);
 	if (!rc && !stopped(r))
@@ -203,6 +203,7 @@ static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 	if (!rc && j->cost_count > 0) {
 		pilot->bootstrap_sample = fmax(j->run.bootstrap_cpu_seconds / (double)j->plan.bootstrap, 1e-9);
 		pilot->mutation = fmax(j->cost[0], 1e-9);
+		pilot->rate = fmax(j->run.cpu_seconds / fmax(now() - begin, 1e-9), 0.05);
 	}
 	end(j);
 	return rc;
