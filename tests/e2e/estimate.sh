@@ -1,0 +1,78 @@
+# What errors will cost: the estimate of hslt-render and of the farm, against a render that goes there; what the status says.
+. "$(dirname "$0")/lib.sh"
+need hslt-render hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
+
+# code WANTED COMMAND...
+code() {
+	wanted=$1
+	shift
+	got=0
+	"$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
+	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/err.log")"
+}
+
+for p in render submit; do
+	code 2 "$BIN/hslt-$p" --estimate "$BOX" -o "$DIR/a.exr"
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --pilot 3
+	code 2 "$BIN/hslt-$p" --estimate "$BOX" --pilot 0
+	code 2 "$BIN/hslt-$p" --estimate
+done
+code 1 "$BIN/hslt-render" --estimate "$BOX" --plot "$DIR/no/such/folder.svg"
+code 1 "$BIN/hslt-render" --estimate "$BOX" --groups 1 --size 16x16 --integrator path --pilot 0.2
+grep -q -- --groups "$DIR/err.log" || fail "one group: $(cat "$DIR/err.log")"
+
+target() { # FILE TARGET KEY: low, expected, high
+	awk -v target="$2" -v key="\"$3\":{" '{
+		n = split($0, row, "{\"error\":")
+		for (i = 2; i <= n; i++)
+			if ((row[i] + 0) / target > 0.999999 && (row[i] + 0) / target < 1.000001) {
+				s = substr(row[i], index(row[i], key) + length(key))
+				split(s, x, /[:,}]/)
+				print x[2], x[4], x[6]
+			}
+	}' "$1"
+}
+
+# The path tracer at 4 times the pilot's work: its error is as regular as any. A factor 2 beyond the interval is a broken model,
+# not bad luck (the interval alone fails 1 time in 10).
+how="$BOX --integrator path --size 40x40 --epoch 2 --threads 1 --target-error 6%"
+code 0 "$BIN/hslt-render" --estimate $how --pilot 3 --seed 11 --quiet --json
+cp "$DIR/out" "$DIR/estimate.json"
+if command -v jq >/dev/null; then
+	jq -e '.targets | length == 5' "$DIR/estimate.json" >/dev/null || fail "not five targets"
+	jq -e '.pilot.looks | length >= 5' "$DIR/estimate.json" >/dev/null || fail "too few looks"
+fi
+code 0 "$BIN/hslt-render" $how --seed 12 --quiet -o "$DIR/a.exr" --stats "$DIR/stats.json"
+samples=$(sed -n 's/.*"samples": *\([0-9]*\).*/\1/p' "$DIR/stats.json" | head -n 1)
+set -- $(target "$DIR/estimate.json" 0.06 mutations)
+awk -v n="$samples" -v low="$1" -v high="$3" 'BEGIN { exit !(low > 0 && high < 8 * low && n > low / 2 && n < 2 * high) }' ||
+	fail "6 % took $samples samples, predicted were $*"
+echo "6 %: $samples samples, predicted $2 ($1 - $3)"
+grep -q '"end": *"target-error"' "$DIR/stats.json" || fail "the statistics do not say what ended it"
+
+code 0 "$BIN/hslt-render" --estimate $how --pilot 2 --seed 11 --quiet
+[ "$(grep -cE '^[0-9.]+ %  +[0-9.]+ (s|min|h|days|years) ' "$DIR/out")" -eq 5 ] || fail "the table: $(cat "$DIR/out")"
+if command -v gnuplot >/dev/null; then
+	code 0 "$BIN/hslt-render" --estimate $how --pilot 2 --quiet --plot "$DIR/plot.svg"
+	grep -q '</svg>' "$DIR/plot.svg" || fail "the plot is no SVG"
+fi
+
+start_coordinator
+start_worker w1
+code 0 "$BIN/hslt-submit" --estimate $BOX --integrator path --size 40x40 --epoch 2 --pilot 3 --json --target-error 6%
+grep -q '"type":"estimate"' "$DIR/out" || fail "the farm's estimate: $(cat "$DIR/out")"
+set -- $(target "$DIR/out" 0.06 mutations)
+awk -v n="$samples" -v low="$1" -v high="$3" 'BEGIN { exit !(n > low / 2 && n < 2 * high) }' ||
+	fail "6 % took $samples samples, the farm predicted $*"
+
+id=$(submit "$BOX" -o "$DIR/b.exr" --integrator path --size 40x40 --epoch 2 --target-error 0.5%)
+knows() {
+	"$BIN/hslt-status" --json "$id" | grep -q '"nextHalving":{"cpuSeconds":{"low":[0-9]'
+}
+until_true 20 knows || fail "the status does not say what the next halving costs"
+"$BIN/hslt-status" --json "$id" | grep -q '"etaRange":{"low":[0-9]' || fail "nor when it will be done"
+"$BIN/hslt-status" "$id" | grep -q 'error .* %), target 0.5 %; to halve it costs .* done in' || fail "hslt-status: $("$BIN/hslt-status" "$id")"
+code 0 "$BIN/hslt-job" cancel "$id"
+code 4 "$BIN/hslt-submit" "$BOX" -o "$DIR/c.exr" --integrator path --size 40x40 --epoch 2 --spp 64 --target-error 0.5% --wait
+"$BIN/hslt-job" list | grep -q 'ended by mutations' || fail "hslt-job list does not say what ended it"
+grep -aq 'hslt:end' "$DIR/c.exr" || fail "the image does not say what ended it"
