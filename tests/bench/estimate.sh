@@ -34,7 +34,7 @@ range() {
 
 # number FILE KEY
 number() {
-	sed -n 's/.*"'"$2"'": *\([-0-9.e+]*\).*/\1/p' "$1" | head -n 1
+	grep -o '"'"$2"'": *[-0-9.e+]*' "$1" | head -n 1 | sed 's/.*: *//'
 }
 
 # row NAME SCENE TARGET SEED EPOCH [OPTION...]
@@ -81,7 +81,7 @@ row three-spheres "$public/three-spheres.xml" 0.17 2 128
 row three-spheres "$public/three-spheres.xml" 0.15 3 128
 
 # of the rows: how many hold, and the median of predicted over real
-sort -n -k1 "$DIR/rows" | awk '
+awk '
 	function median(x, n,   i, j, t) {
 		for (i = 2; i <= n; i++)
 			for (j = i; j > 1 && x[j] < x[j - 1]; j--) {
@@ -100,4 +100,4 @@ sort -n -k1 "$DIR/rows" | awk '
 		printf "%d rows; processor time: %d within, median of predicted over real %.2f; mutations: %d within, median %.2f\n",
 			n, cpu, median(a, n), work, median(b, n)
 		exit !(cpu >= 0.8 * n && median(a, n) < 1.25 && median(a, n) > 0.8)
-	}'
+	}' "$DIR/rows"

@@ -9,7 +9,7 @@
 #include <math.h>
 #include <stdio.h>
 
-enum { TARGETS_MOST = 5, LOOKS_LEAST = 3 };
+enum { TARGETS_MOST = 5, LOOKS_LEAST = 2 };
 static const double usual[] = {0.1, 0.05, 0.02, 0.01};
 
 struct row {
@@ -56,8 +56,6 @@ static int check(const struct estimate *s, struct error *e)
 {
 	if (s->looks->count >= LOOKS_LEAST)
 		return 0;
-	if (s->pilot->groups < 2)
-		return error_set(e, EINVAL, "one group has no error: give --groups 2 or more");
 	return error_set(e, EAGAIN, "the pilot has seen its error %u times only, %d are needed: give it more time (--pilot SECONDS)",
 			 s->looks->count, LOOKS_LEAST);
 }

@@ -7,6 +7,11 @@ static void look(void *user, const struct local_round *r)
 	struct local_pilot *p = user;
 	if (r->image)
 		forecast_add(&p->looks, &p->plan, r->image, r->cpu_seconds, r->seconds);
+	/* On a busy machine a little longer than asked for, rather than nothing to show. */
+	double seconds = r->bootstrap_seconds + r->seconds;
+	p->over = p->timed && seconds >= (p->looks.count < PILOT_LOOKS ? 4 : 1) * p->seconds;
+	if (p->over)
+		atomic_store(p->stop, true);
 }
 
 static void pass_on(void *user, const struct local_progress *r)
@@ -50,6 +55,8 @@ int local_pilot(struct local_pilot *p, struct error *e)
 	if (rc)
 		return rc;
 	pilot_request(p->request, &p->render, &probe, probed ? &cost : NULL, p->seconds, &pilot);
+	pilot.seconds = 0;
+	p->timed = true;
 	rc = run(p, &pilot, &r, e);
 	p->cpu_seconds = r.cpu_seconds;
 	p->wall_seconds = r.seconds;

@@ -11,12 +11,13 @@ struct local_pilot {
 	const struct plan_request *request; /* of the render, complete */
 	double seconds;
 	unsigned threads;
-	const atomic_bool *stop;
+	atomic_bool *stop; /* may become true at any time; the pilot sets it when it has seen enough */
 	void (*progress)(void *user, const struct local_progress *p); /* may be NULL */
 	void *user;
 	/* out */
 	struct plan render, plan; /* the one spoken of, the pilot's */
 	struct forecast_history looks;
+	bool timed, over; /* of the callbacks: the pilot proper has begun, has seen enough */
 	double cpu_seconds, wall_seconds, bootstrap_cpu, bootstrap_seconds;
 };
 

@@ -2,6 +2,7 @@
 
 #include "worker/cli/options.h"
 
+#include <errno.h>
 #include <math.h>
 
 enum {
@@ -38,7 +39,10 @@ int pilot_render_plan(const struct plan_request *request, struct plan *render, s
 	struct plan_request r = *request;
 	if (!(r.target_error > 0))
 		r.target_error = 0.01; /* the least of those that are spoken of */
-	return plan_make(&r, render, e);
+	int rc = plan_make(&r, render, e);
+	if (!rc && render->groups < 2)
+		rc = error_set(e, EINVAL, "one group has no error: give --groups 2 or more");
+	return rc;
 }
 
 bool pilot_probe(const struct plan_request *request, const struct plan *render, struct plan_request *probe)

@@ -7,7 +7,7 @@
 
 #include "common/plan/plan.h"
 
-enum { PILOT_SECONDS = 60, PILOT_ROUNDS = 16 /* aimed at: a dozen looks */ };
+enum { PILOT_SECONDS = 60, PILOT_ROUNDS = 16 /* aimed at: a dozen looks */, PILOT_LOOKS = 4 /* at least */ };
 
 struct render_arguments;
 struct render_summary;
