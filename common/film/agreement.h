@@ -1,9 +1,9 @@
 /*
  * Whether the chains of an image agree, from what its batches say besides pixels (contract sections 1 and 2): tiles whose
  * potential scale reduction (Gelman and Rubin 1992) says that chains have not mixed, classes of paths whose energy in the
- * chains differs from the bootstrap's or from group to group, chains that stand still. Pure; any thread; allocates nothing. Samples (path, bdpt)
- * always agree. Energies are in units of b. How often each criterion fires on scenes that are fine, and on one that is not:
- * see tests/e2e/disagree.sh.
+ * chains differs from the bootstrap's or from group to group, chains that stand still. Pure; any thread; allocates nothing.
+ * Samples (path, bdpt) always agree. Energies are in units of b's. How often each criterion fires on scenes that are fine, and
+ * on one that is not: tests/scenes/bulb/README.md.
  */
 #ifndef COMMON_FILM_AGREEMENT_H
 #define COMMON_FILM_AGREEMENT_H
