@@ -24,7 +24,8 @@ struct tile_error {
 	double floor_square;
 	float *apart;                         /* [height][width][3][groups]: a group's image less the groups' mean */
 	double brightness[TILE_SIZE * TILE_SIZE][3], square[TILE_SIZE * TILE_SIZE][3]; /* of the mean: value, variance */
-	double weight[TILE_SIZE * TILE_SIZE][3];                                       /* 0: not settled yet */
+	bool settled[TILE_SIZE * TILE_SIZE][3];
+	double share, doubt; /* sums over settled squares: their part of the relMSE; its square times its weight's variance */
 	double gram[FOLDED][FOLDED];
 	double distance[PLAN_MAX_GROUPS]; /* a group's weighted error, squared, summed over the image */
 };
@@ -93,22 +94,56 @@ struct block {
 	double all_apart[VALUES], open_apart[VALUES]; /* [3][groups] */
 };
 
-static bool settle(double brightness, double square, double floor_square, double *weight)
+/* What the errors of a pixel are divided by, squared; the third term makes up for the noise of B in the others. */
+static double divisor_square(double brightness, double square, double floor_square)
 {
-	double below = brightness * brightness + floor_square;
-	*weight = 1 / below;
-	return square <= believed * below;
+	return brightness * brightness + floor_square + 3 * square;
 }
 
-static uint32_t settle_pixels(struct tile_error *t)
+static bool believe(double brightness, double square, double floor_square)
+{
+	return square <= believed * (brightness * brightness + floor_square);
+}
+
+/* A part of the relMSE whose pixels share one brightness, and how sure that is. */
+static void add_share(struct tile_error *t, double part, double brightness, double square, double divisor)
+{
+	double slope = 2 * brightness * part / divisor;
+	t->share += part;
+	t->doubt += slope * slope * square;
+}
+
+/* A group's errors are divided by the brightness that the other groups found: its own fireflies are in both else. Here to
+ * second order, since the brightness is believed. */
+static void settle_pixel(struct tile_error *t, size_t pixel, size_t k)
+{
+	double brightness = t->brightness[pixel][k], square = t->square[pixel][k];
+	double divisor = divisor_square(brightness, square, t->floor_square), root = 1 / sqrt(divisor);
+	float r = (float)root, slope = (float)(brightness / divisor / (t->groups - 1));
+	float *apart = apart_at(t, pixel) + k * t->groups;
+	for (uint32_t g = 0; g < t->groups; g++) {
+		float x = slope * apart[g];
+		apart[g] *= r + r * (x + x * x);
+	}
+	add_share(t, square / divisor, brightness, square, divisor);
+}
+
+static void settle_pixels(struct tile_error *t, size_t first, size_t count)
+{
+	for (size_t pixel = first; pixel < first + count; pixel++)
+		for (size_t k = 0; k < 3; k++)
+			if (t->settled[pixel][k])
+				settle_pixel(t, pixel, k);
+}
+
+static uint32_t find_settled(struct tile_error *t)
 {
 	uint32_t waiting = 0;
 	for (size_t i = 0; i < (size_t)t->width * t->height; i++)
-		for (int k = 0; k < 3; k++)
-			if (!settle(t->brightness[i][k], t->square[i][k], t->floor_square, &t->weight[i][k])) {
-				t->weight[i][k] = 0;
-				waiting++;
-			}
+		for (int k = 0; k < 3; k++) {
+			t->settled[i][k] = believe(t->brightness[i][k], t->square[i][k], t->floor_square);
+			waiting += !t->settled[i][k];
+		}
 	return waiting;
 }
 
@@ -125,22 +160,35 @@ static double spread_square(const double *apart, uint32_t groups, double pixels)
  * those with one. But pixels that were believed and are more than twice as bright as what waits, a lamp beside a wall, are
  * something else and are left out.
  */
-static void settle_block(struct tile_error *t, struct block *b, int k, uint32_t x, uint32_t y, uint32_t size, bool last)
+static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32_t x, uint32_t y, uint32_t size)
 {
-	double n = b->pixels, waiting = b->waiting[k], weight;
+	double n = b->pixels, waiting = b->waiting[k], part = 0;
 	bool other = b->all[k] / n > 2 * b->open[k] / waiting;
-	double brightness = other ? b->open[k] / waiting : b->all[k] / n;
-	double square = spread_square((other ? b->open_apart : b->all_apart) + (size_t)k * t->groups, t->groups, other ? waiting : n);
-	if (!settle(brightness, square, t->floor_square, &weight) && !last)
+	n = other ? waiting : n;
+	double brightness = (other ? b->open[k] : b->all[k]) / n;
+	const double *apart = (other ? b->open_apart : b->all_apart) + k * t->groups;
+	double square = spread_square(apart, t->groups, n);
+	if (!believe(brightness, square, t->floor_square) && size < TILE_SIZE)
 		return;
+	float root[PLAN_MAX_GROUPS];
+	for (uint32_t g = 0; g < t->groups; g++)
+		root[g] = (float)(1 / sqrt(divisor_square(brightness - apart[g] / n / (t->groups - 1), square, t->floor_square)));
 	for (uint32_t j = y; j < y + size && j < t->height; j++)
 		for (uint32_t i = x; i < x + size && i < t->width; i++) {
-			double *w = &t->weight[(size_t)j * t->width + i][k];
-			*w = *w > 0 ? *w : weight;
+			size_t pixel = (size_t)j * t->width + i;
+			if (t->settled[pixel][k])
+				continue;
+			float *own = apart_at(t, pixel) + k * t->groups;
+			for (uint32_t g = 0; g < t->groups; g++)
+				own[g] *= root[g];
+			t->settled[pixel][k] = true;
+			part += t->square[pixel][k];
 		}
+	double divisor = divisor_square(brightness, square, t->floor_square);
+	add_share(t, part / divisor, brightness, square, divisor);
 	b->waiting[k] = 0;
 	b->open[k] = 0;
-	memset(b->open_apart + (size_t)k * t->groups, 0, t->groups * sizeof *b->open_apart);
+	memset(b->open_apart + k * t->groups, 0, t->groups * sizeof *b->open_apart);
 }
 
 static void add_pixel(const struct tile_error *t, struct block *b, size_t pixel)
@@ -152,7 +200,7 @@ static void add_pixel(const struct tile_error *t, struct block *b, size_t pixel)
 		b->all_apart[i] += (double)apart[i];
 	for (size_t k = 0; k < 3; k++) {
 		b->all[k] += t->brightness[pixel][k];
-		if (t->weight[pixel][k] > 0)
+		if (t->settled[pixel][k])
 			continue;
 		b->waiting[k]++;
 		b->open[k] += t->brightness[pixel][k];
@@ -187,25 +235,26 @@ static void settle_square(struct tile_error *t, uint32_t x, uint32_t y, uint32_t
 			continue;
 		if (half == 1) {
 			add_pixel(t, b, (size_t)py * t->width + px);
+			settle_pixels(t, (size_t)py * t->width + px, 1);
 			continue;
 		}
 		settle_square(t, px, py, half, &part);
 		add_block(b, &part, t->groups);
 	}
-	for (int k = 0; k < 3; k++)
+	for (size_t k = 0; k < 3; k++)
 		if (b->waiting[k])
-			settle_block(t, b, k, x, y, size, size == TILE_SIZE);
+			settle_block(t, b, k, x, y, size);
 }
 
 /* ---- sums over the image */
 
 /* FOLDED groups from `first` on, or as many as there are. */
-static void fold(struct tile_error *t, uint32_t first, float root, const float *apart, float *folded)
+static void fold(struct tile_error *t, uint32_t first, const float *apart, float *folded)
 {
 	uint32_t count = t->groups - first < FOLDED ? t->groups - first : FOLDED;
 	float v[FOLDED] = {0};
 	for (uint32_t g = 0; g < count; g++)
-		v[g] = root * apart[g];
+		v[g] = apart[g];
 	for (uint32_t g = 0; g < FOLDED; g++)
 		folded[g] += v[g];
 	for (uint32_t g = 0; g < FOLDED && t->groups > FOLDED; g++)
@@ -221,9 +270,8 @@ static void add_row(struct tile_error *t, size_t first)
 		const float *apart = apart_at(t, pixel);
 		float folded[3][FOLDED] = {{0}};
 		for (size_t k = 0; k < 3; k++) {
-			float root = (float)sqrt(t->weight[pixel][k]);
 			for (uint32_t g = 0; g < t->groups; g += FOLDED)
-				fold(t, g, root, apart + k * t->groups + g, folded[k]);
+				fold(t, g, apart + k * t->groups + g, folded[k]);
 		}
 		for (size_t i = 0; i < FOLDED; i++)
 			for (size_t j = i / 4 * 4; j < FOLDED; j++)
@@ -241,9 +289,11 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 	t->width = m->img->width - x < TILE_SIZE ? m->img->width - x : TILE_SIZE;
 	t->height = m->img->height - y < TILE_SIZE ? m->img->height - y : TILE_SIZE;
 	tile_errors(m, t);
-	if (settle_pixels(t)) {
+	if (find_settled(t)) {
 		struct block whole;
 		settle_square(t, 0, 0, TILE_SIZE, &whole);
+	} else {
+		settle_pixels(t, 0, (size_t)t->width * t->height);
 	}
 	for (uint32_t row = 0; row < t->height; row++)
 		add_row(t, (size_t)row * t->width);
@@ -309,7 +359,9 @@ static void find_rel_mse(struct making *m, struct tile_error *t)
 	img->rel_mse = img->rel_mse_upper = img->rel_mse_95[0] = img->rel_mse_95[1] = mean / (groups - 1) / (3.0 * img->width * img->height);
 	if (!(mean > 0))
 		return;
-	double own = own_degrees(t), degrees = (groups - 1) * fmin(own, 2 / distance_spread(t, mean));
+	double doubt = t->share > 0 ? t->doubt / (t->share * t->share) : 0, own = own_degrees(t);
+	double degrees = 1 / (0.5 * doubt + fmax(1 / own, 0.5 * distance_spread(t, mean)) / (groups - 1));
+	own = fmax(1, 1 / (1 / own + 0.5 * doubt * (groups - 1) / groups));
 	img->rel_mse_degrees = degrees;
 	img->rel_mse_upper *= degrees / (t->groups == 2 ? 0.00393214 : chi_square_5(degrees));
 	img->rel_mse_95[0] *= f_quantile(0.025, own, own * (groups - 1));
