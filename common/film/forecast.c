@@ -241,13 +241,14 @@ static double expected(const struct fit *f, const struct play *y, double work)
 }
 
 /* Rounds at which it stops. */
-static double play_target(const struct fit *f, const struct play *y, double target, double round, enum forecast_run run,
+static double play_target(const struct fit *f, const struct play *y, const struct plan *p, double target, enum forecast_run run,
 			  struct dice *d)
 {
+	double round = (double)plan_round_mutations(p);
 	double before = run == FORECAST_SAME ? f->work : 0, deviation = run == FORECAST_SAME ? y->now : 0;
 	uint64_t rounds = (uint64_t)fmin(before / round + 0.5, 0x1p62);
 	for (int i = 0; i < STEPS_MOST; i++) {
-		rounds = merge_error_next(rounds);
+		rounds = merge_error_next(p, rounds);
 		double work = (double)rounds * round, r = before / work;
 		deviation = r * deviation + sqrt(fmax(0, 1 - r * r)) * normal(d);
 		before = work;
@@ -312,7 +313,7 @@ bool forecast_target(const struct forecast_history *h, const struct plan *p, dou
 	bool same = run == FORECAST_SAME;
 	for (int i = 0; i < PLAYS; i++) {
 		struct play y = play_of(&f, &d);
-		s.rounds[i] = play_target(&f, &y, target, round, run, &d);
+		s.rounds[i] = play_target(&f, &y, p, target, run, &d);
 		s.work[i] = s.rounds[i] * round;
 		double more = s.work[i] - (same ? end->work : 0);
 		s.cpu[i] = (same ? end->cpu_seconds : 0) + more * y.cpu;

@@ -29,10 +29,15 @@ void bootstrap_to_canvas(const struct bootstrap *s, struct canvas *c);
 enum merge_end { MERGE_GOES_ON, MERGE_ROUNDS, MERGE_TIME, MERGE_ERROR };
 const char *merge_end_name(enum merge_end end, bool black); /* as in the header: "target-error" */
 
-/* Rounds at which the error is looked at: a geometric ladder (1 2 3 4 5 6 7 8 10 12 15 ...), a function of the count alone,
- * since each look costs an image and tests the target once more. */
+/*
+ * Rounds at which the error is looked at: a geometric ladder (1 2 3 4 5 6 7 8 10 12 15 ...) of as many rounds as it takes for a
+ * look to cost less than 1 % of the work since the last one. A function of the plan's counts alone, so that bits do not depend on
+ * the machine. One look below the target ends the job: it is the upper end of the interval that has to be below, and looks that
+ * share most of their samples are not many chances for luck (measured in tests/common/film/test_merge.c).
+ */
 bool merge_error_due(const struct plan *p, uint64_t rounds);
-uint64_t merge_error_next(uint64_t rounds); /* the first step of the ladder after so many */
+/* The first round after this one at which the error would be looked at. */
+uint64_t merge_error_next(const struct plan *p, uint64_t rounds);
 /* img: of the complete rounds, or NULL when the error is not due. */
 enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img);
 

@@ -56,7 +56,7 @@ static struct forecast_history pilot_of(double degrees, double scale, uint64_t r
 	struct plan p = plan_of(64);
 	struct forecast_history h = {0};
 	struct walk w = {.degrees = degrees, .scale = scale};
-	for (uint64_t r = 1; r <= rounds; r = merge_error_next(r)) {
+	for (uint64_t r = 1; r <= rounds; r = merge_error_next(&p, r)) {
 		struct forecast_look l = look_at(&w, (double)r * (double)plan_round_mutations(&p), d);
 		forecast_add_look(&h, &l);
 	}
@@ -66,7 +66,7 @@ static struct forecast_history pilot_of(double degrees, double scale, uint64_t r
 static double stop_of(double degrees, double scale, const struct plan *p, double target, struct dice *d)
 {
 	struct walk w = {.degrees = degrees, .scale = scale};
-	for (uint64_t r = 1;; r = merge_error_next(r)) {
+	for (uint64_t r = 1;; r = merge_error_next(p, r)) {
 		struct forecast_look l = look_at(&w, (double)r * (double)plan_round_mutations(p), d);
 		if (sqrt(l.rel_mse_upper) <= target)
 			return l.work;
@@ -116,7 +116,7 @@ static void own_looks_tell_more(void **state)
 		struct forecast_history h = {0};
 		struct forecast_cost c = {.work = {.low = 0}};
 		double target = sqrt(1000 / (400.0 * (double)plan_round_mutations(&p)));
-		for (uint64_t r = 1;; r = merge_error_next(r)) {
+		for (uint64_t r = 1;; r = merge_error_next(&p, r)) {
 			struct forecast_look l = look_at(&w, (double)r * (double)plan_round_mutations(&p), &d);
 			if (sqrt(l.rel_mse_upper) <= target) {
 				held += c.work.low <= l.work && l.work <= c.work.high;
