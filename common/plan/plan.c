@@ -17,7 +17,8 @@ enum {
 	MUTATIONS_PER_CHAIN = 2048, /* fewer chains before chains become shorter than this */
 	AIM_ROUNDS = 8,
 	LEASE_SAMPLES_MOST = 1 << 20, /* chains: mutations in one lease */
-	LEASE_SAMPLES_OPEN = 1 << 18, /* chains without a bound on mutations */
+	LEASE_SAMPLES_OPEN = 1 << 18, /* chains without a bound on mutations: most in one lease */
+	LEASE_SAMPLES_LEAST = 1 << 13,
 	STRIP_SAMPLES_MOST = 1 << 17, /* samples in one lease */
 	STREAM_RESAMPLING = 5,        /* RNG_RESAMPLING of the renderer's random numbers */
 };
@@ -124,6 +125,14 @@ static uint32_t power_of_two_below(uint64_t x)
 	return p;
 }
 
+/* Mutations in a lease of a plan that time or an error ends: 32 a pixel and round, as far as 64 leases go. A lease's tiles cost about
+ * 20 ns a pixel of the crop to sum, send and add, which is 2 % of half a mutation a pixel; fewer than 2^13 would not be worth sending. */
+static uint64_t open_lease(const struct plan *p)
+{
+	uint64_t leases = (uint64_t)p->groups * p->parts, per_pixel = crop_pixels(p) * 32 / leases, least = crop_pixels(p) / 2;
+	return clamp(per_pixel > least ? per_pixel : least, LEASE_SAMPLES_LEAST, LEASE_SAMPLES_OPEN);
+}
+
 static int make_chains(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
 {
 	p->groups = r->groups ? r->groups : DEFAULT_GROUPS;
@@ -142,7 +151,7 @@ static int make_chains(const struct plan_request *r, struct plan *p, uint64_t to
 		uint64_t longest = LEASE_SAMPLES_MOST / per_lease;
 		p->epoch = clamp(ceil_div(total, chains * AIM_ROUNDS), 1, longest ? longest : 1);
 	} else if (!p->epoch) {
-		p->epoch = clamp(LEASE_SAMPLES_OPEN / per_lease, 1, LEASE_SAMPLES_OPEN);
+		p->epoch = clamp(open_lease(p) / per_lease, 1, LEASE_SAMPLES_OPEN);
 	}
 	if (p->epoch > LEASE_MOST / per_lease)
 		return error_set(e, EINVAL, "an epoch of %llu mutations is too long", (unsigned long long)p->epoch);

@@ -100,12 +100,40 @@ static void entries_are_counted_and_named(void **state)
 	assert_string_equal(name, "");
 }
 
+/* A round is 32 mutations a pixel of the crop, but no lease above 2^18 nor below 2^13; a bound on mutations has its own rule. */
+static void rounds_without_a_bound_follow_the_film(void **state)
+{
+	(void)state;
+	static const struct {
+		uint32_t width, height;
+		uint64_t lease;
+	} cases[] = {{8, 8, 1 << 13}, {128, 128, 1 << 13}, {256, 256, 1 << 15}, {512, 512, 1 << 17}, {1024, 512, 1 << 18}, {4096, 4096, 1 << 18}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+		for (int by_time = 0; by_time < 2; by_time++) {
+			struct plan_request r = request(PLAN_CHAINS, "");
+			struct plan p;
+			struct error e;
+			r.width = cases[i].width;
+			r.height = cases[i].height;
+			r.spp = 0;
+			r.seconds = by_time ? 5 : 0;
+			r.target_error = by_time ? 0 : 0.02;
+			assert_int_equal(plan_make(&r, &p, &e), 0);
+			assert_int_equal(plan_round_mutations(&p), cases[i].lease * p.groups * p.parts);
+			assert_true(p.rounds == UINT64_MAX);
+			r.spp = 16;
+			assert_int_equal(plan_make(&r, &p, &e), 0);
+			assert_true(p.rounds <= 64 && p.rounds * plan_round_mutations(&p) >= 16 * (uint64_t)r.width * r.height);
+		}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_mixture_is_kept_and_told), cmocka_unit_test(settings_and_effects_are_kept_and_told),
 		cmocka_unit_test(other_texts_are_none),
 		cmocka_unit_test(entries_are_counted_and_named),
+		cmocka_unit_test(rounds_without_a_bound_follow_the_film),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
