@@ -229,6 +229,7 @@ static void check_arrival(struct path_context *c, const struct whole_path *x, co
 }
 
 static struct walk_scratch s;
+static struct knobs knobs;
 
 /* Back from y to x: x_b and the half vectors of x. */
 static void walk_back(struct path_context *c, const struct whole_path *x, struct whole_path *y, unsigned b, unsigned end,
@@ -239,7 +240,7 @@ static void walk_back(struct path_context *c, const struct whole_path *x, struct
 	z.v[b] = x->v[b];
 	for (unsigned j = end + 1; j < b; j++)
 		target[j].h = x->v[j].delta ? (vec2){0, 0} : k[j].h;
-	struct walk_limits limits = walk_limits_of(&knobs_default);
+	struct walk_limits limits = walk_limits_of(&knobs);
 	limits.scale = 0.1; /* tighter than the way there: where x lies is known, only its own residual is to tell */
 	enum walk_end back = halfvec_walk(c, &z, b, end, target, true, &limits, &s);
 	t->back_ends[back]++;
@@ -274,7 +275,7 @@ static void walk_nowhere(struct path_context *c, const struct whole_path *x, uns
 	y = *x;
 	for (unsigned j = end + 1; j < b; j++)
 		target[j].h = k[j].h;
-	struct walk_limits limits = walk_limits_of(&knobs_default);
+	struct walk_limits limits = walk_limits_of(&knobs);
 	t->stays++;
 	if (halfvec_walk(c, &y, b, end, target, false, &limits, &s) != WALK_OK || s.iterations != 1)
 		t->left++;
@@ -288,7 +289,7 @@ static void walk_again(struct path_context *c, const struct whole_path *start, c
 {
 	static struct whole_path z;
 	z = *start;
-	struct walk_limits limits = walk_limits_of(&knobs_default);
+	struct walk_limits limits = walk_limits_of(&knobs);
 	limits.scale = 0.5;
 	t->again++;
 	if (halfvec_walk(c, &z, b, end, target, false, &limits, &s) != WALK_OK || apart(&z, y, b, end) > 0.01 * apart(start, y, b, end))
@@ -318,7 +319,7 @@ static void walk_once(struct path_context *c, struct dice *d, const struct whole
 		return;
 	start = y;
 	struct path_vertex first = y.v[b], last = y.v[end];
-	struct walk_limits limits = walk_limits_of(&knobs_default);
+	struct walk_limits limits = walk_limits_of(&knobs);
 	uint64_t before = c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW];
 	enum walk_end e = halfvec_walk(c, &y, b, end, target, false, &limits, &s);
 	t->rays += c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW] - before;
@@ -496,12 +497,24 @@ static void test_meshes(void **state)
 	walk_in("bumpy water", bumpy_world(40, "<bsdf type='dielectric'/>"), 0.975, 0.993);
 }
 
+/* The same walks by matrices in float: as many arrive, as near their targets, and come back. */
+static void test_in_float(void **state)
+{
+	knobs.precision = KNOB_SINGLE;
+	test_spheres(state);
+	test_rough_glass(state);
+	test_smooth_glass(state);
+	test_nearly_matched(state);
+	knobs = knobs_default;
+}
+
 int main(void)
 {
+	knobs = knobs_default;
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_spheres),	     cmocka_unit_test(test_rough_glass), cmocka_unit_test(test_smooth_glass),
 		cmocka_unit_test(test_sky),	     cmocka_unit_test(test_poles),	 cmocka_unit_test(test_meshes),
-		cmocka_unit_test(test_nearly_matched),
+		cmocka_unit_test(test_nearly_matched), cmocka_unit_test(test_in_float),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
