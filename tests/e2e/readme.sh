@@ -7,6 +7,10 @@ ROOT=$(cd "$HERE/../.." && pwd)
 for command in deploy/demo.sh deploy/test.sh deploy/workers.sh; do
 	grep -q "sh $command" "$ROOT/README.md" && [ -f "$ROOT/$command" ] || fail "$command is not both in the README and there"
 done
+# What deploy/README.md names is there.
+for f in $(grep -o '`[a-z]*/`\|tests/e2e/[a-z]*\.sh\|deploy/[a-z]*/*[A-Za-z]*\.[a-z]*' "$ROOT/deploy/README.md" | tr -d '`' | sort -u); do
+	[ -e "$ROOT/$f" ] || [ -e "$ROOT/deploy/$f" ] || fail "deploy/README.md: there is no $f"
+done
 port=$((20000 + $$ % 20000))
 mkdir "$DIR/home"
 ln -s "$ROOT/tests" "$DIR/home/tests"

@@ -8,6 +8,7 @@ for p in munged slurmctld slurmd sbatch; do
 	command -v $p >/dev/null || skip "no $p (deploy/setup.sh --full installs slurm-wlm and munge)"
 done
 [ "$(id -u)" = 0 ] || skip "slurmd wants root"
+! grep -q __asan_init "$BIN/hslt-worker" || skip "programs with sanitizers take too long for it"
 command -v runuser >/dev/null && id munge >/dev/null 2>&1 || skip "no user munge"
 
 BIN=$(cd "$BIN" && pwd)
