@@ -8,6 +8,7 @@
 #include <stdarg.h>
 #include <stddef.h>
 #include <stdint.h>
+#include <math.h>
 #include <setjmp.h>
 #include <cmocka.h>
 
@@ -81,7 +82,9 @@ static void figures_read_well(void **state)
 		const char *text;
 	} numbers[] = {{0, "0"},	 {12.4, "12"},	    {999.4, "999"},	{999.6, "1.00 k"}, {1234, "1.23 k"},
 		       {99900, "99.9 k"}, {123456, "123 k"}, {5e6, "5.00 M"}, {2e12, "2.00 T"}},
-	  times[] = {{0, "0 s"}, {0.2, "1 s"}, {59, "59 s"}, {61, "1:01"}, {3600, "1:00:00"}, {36061, "10:01:01"}};
+	  times[] = {{0, "0 s"}, {0.2, "1 s"}, {59, "59 s"}, {61, "1:01"}, {3600, "1:00:00"}, {36061, "10:01:01"}},
+	  spans[] = {{0, "0.0 s"},     {4.46, "4.5 s"}, {31, "31 s"},	     {119, "119 s"}, {180, "3.0 min"},	{3600, "60 min"},
+		     {8000, "2.2 h"}, {2e6, "23 days"}, {1e8, "3.2 years"}, {1e15, "for ever"}, {HUGE_VAL, "for ever"}};
 	char text[32];
 	for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
 		progress_number(numbers[i].x, text, sizeof text);
@@ -90,6 +93,10 @@ static void figures_read_well(void **state)
 	for (size_t i = 0; i < sizeof times / sizeof *times; i++) {
 		progress_time(times[i].x, text, sizeof text);
 		assert_string_equal(text, times[i].text);
+	}
+	for (size_t i = 0; i < sizeof spans / sizeof *spans; i++) {
+		progress_duration(spans[i].x, text, sizeof text);
+		assert_string_equal(text, spans[i].text);
 	}
 }
 

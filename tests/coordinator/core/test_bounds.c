@@ -233,6 +233,35 @@ static void progress_of_errors(void **state)
 	farm_free(f);
 }
 
+/* With what the error is made of, the forecast of common/film takes over. */
+static void looks_give_a_forecast(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=inf target=0.1"),
+		"[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1", NULL });
+	struct event ev = {.kind = EVENT_ERROR_KNOWN, .time = 13.5,
+			   .error_known = {.job = 1, .rounds = 1, .rel_error = 0.2, .rel_mse = 0.038, .degrees = 2000, .cpu_seconds = 5}};
+	struct update u;
+	farm_step(f, &ev, &u);
+	struct job_status s = ask(f, 13.5);
+	assert_int_equal(s.looks->count, 1);
+	near(s.looks->looks[0].work, 400);
+	near(s.looks->looks[0].cpu_seconds, 5);
+	near(s.looks->looks[0].seconds, 2);
+	near(s.error_now.middle, sqrt(0.038));
+	near(s.error_now.high, 0.2);
+	/* Half of the error is four times the work: three times what was paid, at the present rate of 400 in 2.5 s. */
+	assert_true(fabs(s.halving_cpu.middle / 15 - 1) < 0.1);
+	assert_true(fabs(s.halving_seconds.middle / (1200 / s.rate) - 1) < 0.1);
+	/* Four rounds by the rule, three more to come; the interval says so. */
+	assert_true(s.eta_low <= s.eta && s.eta <= s.eta_high && s.eta_low >= 400 / s.rate && s.eta_high < 4000 / s.rate);
+	assert_true(s.eta >= 800 / s.rate - 1e-9 && s.eta <= 1600 / s.rate + 1e-9);
+	farm_free(f);
+}
+
 static void progress_of_time(void **state)
 {
 	(void)state;
@@ -257,6 +286,7 @@ int main(void)
 		cmocka_unit_test(previews),
 		cmocka_unit_test(progress_and_rate),
 		cmocka_unit_test(progress_of_errors),
+		cmocka_unit_test(looks_give_a_forecast),
 		cmocka_unit_test(progress_of_time),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

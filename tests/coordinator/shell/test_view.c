@@ -1,6 +1,7 @@
 /* A job as JSON: the counters of its strategies, and what is to be said about it. */
 #include "coordinator/shell/view.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -69,11 +70,64 @@ static void json_of_other_jobs_has_none(void **state)
 	json_decref(o);
 }
 
+static void json_shows_the_forecast(void **state)
+{
+	(void)state;
+	struct job_record r = record();
+	struct job_view v;
+	r.target_error = 0.02;
+	for (int i = 1; i < 9; i++)
+		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200});
+	view_of_record(&v, &r);
+	v.eta = 30;
+	v.eta_low = 20;
+	v.eta_high = -1;
+	v.halving_cpu = (struct forecast_range){1, 2, INFINITY};
+	v.halving_seconds = (struct forecast_range){1, 2, 3};
+	json_t *o = view_to_json(&v, NULL);
+	assert_non_null(o);
+	const json_t *half = json_object_get(o, "nextHalving"), *error = json_object_get(o, "errorNow");
+	assert_true(json_number_value(json_object_get(error, "high")) == sqrt(0.05 / 8));
+	assert_true(json_number_value(json_object_get(json_object_get(half, "cpuSeconds"), "expected")) == 2);
+	assert_true(json_is_null(json_object_get(json_object_get(half, "cpuSeconds"), "high")));
+	assert_true(json_number_value(json_object_get(json_object_get(o, "etaRange"), "low")) == 20);
+	assert_int_equal(json_array_size(json_object_get(o, "looks")), 8);
+	json_decref(o);
+	strcpy(v.record.state, "done"); /* what has ended has no future, and its looks stay in the spool */
+	o = view_to_json(&v, NULL);
+	assert_true(json_is_null(json_object_get(o, "nextHalving")) && json_is_null(json_object_get(o, "etaRange")));
+	assert_null(json_object_get(o, "looks"));
+	assert_true(json_is_object(json_object_get(o, "errorNow")));
+	json_decref(o);
+}
+
+/* As hslt-submit --estimate gets them. */
+static void looks_travel(void **state)
+{
+	(void)state;
+	struct job_record r = record();
+	struct job_view v;
+	static struct view_looks looks;
+	Farm__JobStatus wire;
+	for (int i = 1; i < 9; i++)
+		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200});
+	view_of_record(&v, &r);
+	view_to_wire(&v, &wire);
+	assert_int_equal(wire.n_looks, 0);
+	view_looks_to_wire(&v, &looks, &wire);
+	assert_int_equal(wire.n_looks, 8);
+	const Farm__Look *l = wire.looks[7];
+	assert_true(l->work == 1e5 * 8 && l->cpu_seconds == 0.1 * 8 && l->seconds == 0.05 * 8 && l->rel_mse == 0.04 / 8 &&
+		    l->rel_mse_upper == 0.05 / 8 && l->degrees == 200);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(json_shows_the_strategies),
 		cmocka_unit_test(json_of_other_jobs_has_none),
+		cmocka_unit_test(json_shows_the_forecast),
+		cmocka_unit_test(looks_travel),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -78,6 +78,12 @@ static void records_come_back(void **state)
 	r.b = 1.0 / 7;
 	r.classes[7] = (struct path_class_energy){0.1, 0.01, 0.2, 0.02, -12.5};
 	r.classes[0] = (struct path_class_energy){0.3, NAN, 0.4, NAN, NAN};
+	r.target_error = 0.02;
+	r.cpu_seconds = 100.0 / 3;
+	r.bootstrap_cpu_seconds = 1.0 / 3;
+	r.bootstrap_seconds = 0.25;
+	for (int i = 1; i < 200; i++)
+		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.3 / i, 0.4 / i, 20});
 	assert_int_equal(spool_open(&s, folder, &e), 0);
 	assert_int_equal(spool_take_job(s, 7, &e), 0);
 	assert_int_equal(spool_write_record(s, &r, &e), 0);
@@ -85,6 +91,9 @@ static void records_come_back(void **state)
 	assert_string_equal(back.name, r.name);
 	assert_string_equal(back.output, r.output);
 	assert_true(back.rel_error == r.rel_error && back.progress == r.progress && back.ended == r.ended);
+	assert_true(back.target_error == r.target_error && back.cpu_seconds == r.cpu_seconds);
+	assert_true(back.bootstrap_cpu_seconds == r.bootstrap_cpu_seconds && back.bootstrap_seconds == r.bootstrap_seconds);
+	assert_memory_equal(&back.looks, &r.looks, sizeof r.looks);
 	assert_true(back.rounds == 12 && back.mutations == 1u << 31 && back.priority == -3 && back.exit_code == 4);
 	assert_true(back.has_result && record_is_ended(&back));
 	assert_string_equal(back.mixture, r.mixture);
