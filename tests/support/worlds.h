@@ -16,6 +16,8 @@ __attribute__((format(printf, 3, 4))) struct world *world_of_text(uint32_t width
 
 /* Of the worlds that are built from now on; NULL: all at their defaults. */
 extern const char *worlds_knobs;
+/* Effects that the next worlds force, as a plan spells them; NULL: none. */
+extern const char *worlds_effects;
 
 /* From files in memory (tests/support/memory_assets.h): the first is the scene. */
 struct memory_file;
