@@ -12,6 +12,7 @@ enum {
 	STEPS_MOST = 256, /* of the ladder; more than 2^60 rounds have */
 };
 static const double used_share = 1.0 / 16; /* looks at less than this share of the work say little about what is to come */
+static const double burst = 0.15;           /* spread of a look beyond chi-square: light that comes in rare bursts */
 static const double trend_prior = 0.2;     /* standard deviation of the trend: light that comes in rare bursts, chains that
 					    * have not forgotten their seeds yet */
 static const double memory = 1.2, memory_sd = 0.6; /* e-folds of work over which a trend dies down; its logarithm's spread */
@@ -181,8 +182,8 @@ static struct fit fit(const struct forecast_history *h)
 	while (h->looks[first].work < used_share * end->work)
 		first++;
 	double d = fmax(end->degrees, 1);
-	/* Mean and variance of the logarithm of chi-square over its degrees. */
-	struct fit f = {.work = end->work, .spread = sqrt(2 / d + 2 / (d * d)), .shift = -1 / d - 1 / (3 * d * d)};
+	/* Mean and variance of the logarithm of chi-square over its degrees, and what bursts add. */
+	struct fit f = {.work = end->work, .spread = sqrt(2 / d + 2 / (d * d) + burst * burst), .shift = -1 / d - 1 / (3 * d * d)};
 	f.seen = log(end->work / h->looks[first].work);
 	fit_level(&f, h, first);
 	f.now = (log(end->rel_mse * end->work) - f.shift - f.level) / f.spread;

@@ -175,15 +175,20 @@ static void a_trend_is_seen(void **state)
 {
 	(void)state;
 	struct plan p = plan_of(64);
-	struct forecast_history h = {0};
-	struct forecast_cost c;
-	double work;
-	for (work = 1e5; work < 2e6; work *= 1.25)
-		forecast_add_look(&h, &(struct forecast_look){work, work, work, 10 * pow(work, -0.7), 10.5 * pow(work, -0.7), 3000});
-	const struct forecast_look *end = &h.looks[h.count - 1];
-	double target = sqrt(end->rel_mse_upper / 3), by_rule = 3 * end->work;
-	assert_true(forecast_target(&h, &p, target, FORECAST_NEW, &c));
-	assert_true(c.work.middle > 1.2 * by_rule && c.work.middle < 2 * by_rule);
+	double middle[2];
+	for (int i = 0; i < 2; i++) {
+		struct forecast_history h = {0};
+		struct forecast_cost c;
+		double power = i ? -0.6 : -1;
+		for (double work = 1e5; work < 2e6; work *= 1.25)
+			forecast_add_look(&h, &(struct forecast_look){work, work, work, pow(work, power), 1.05 * pow(work, power), 3000});
+		const struct forecast_look *end = &h.looks[h.count - 1];
+		assert_true(forecast_target(&h, &p, sqrt(end->rel_mse_upper / 6), FORECAST_NEW, &c));
+		middle[i] = c.work.middle / (6 * end->work);
+	}
+	printf("work over that of the rule: %.2f, with a trend of 0.4 %.2f\n", middle[0], middle[1]);
+	assert_true(middle[0] > 0.85 && middle[0] < 1.25);
+	assert_true(middle[1] > 1.2 * middle[0] && middle[1] < 2.5);
 }
 
 static void what_is_no_look_is_passed_over(void **state)
