@@ -2,14 +2,6 @@
 
 #include <assert.h>
 
-unsigned path_class(unsigned edges, enum path_class_kind kind)
-{
-	assert(edges >= 1 && kind <= PATH_NO_VERTEX);
-	unsigned row = kind == PATH_NO_VERTEX ? PATH_ROUGH : kind;
-	unsigned length = edges <= 2 ? PATH_EDGES_1_2 : edges <= 4 ? PATH_EDGES_3_4 : edges <= 8 ? PATH_EDGES_5_8 : PATH_EDGES_9_UP;
-	return row * PATH_CLASS_LENGTHS + length;
-}
-
 const char *path_class_name(unsigned path_class)
 {
 #define LENGTHS(kind) {kind ", 1-2 edges", kind ", 3-4 edges", kind ", 5-8 edges", kind ", 9 edges and more"}

@@ -37,8 +37,29 @@ static inline enum path_class_kind path_class_kind_next(enum path_class_kind kin
 	return (enum path_class_kind)next[kind][smooth];
 }
 
+/* The kind of a path whose inner vertices are those of `camera` and then those of `light`. */
+static inline enum path_class_kind path_class_kind_join(enum path_class_kind camera, enum path_class_kind light)
+{
+	/* Reading: after vertices of the row's kind those of the column's; columns in the order of the enum. */
+	static const unsigned char join[PATH_CLASS_KINDS + 1][PATH_CLASS_KINDS + 1] = {
+		[PATH_ROUGH] = {PATH_ROUGH, PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC, PATH_ROUGH},
+		[PATH_REFLECTED] = {PATH_REFLECTED, PATH_BOTH, PATH_BOTH, PATH_BOTH, PATH_BOTH, PATH_REFLECTED},
+		[PATH_CAUSTIC] = {PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC, PATH_CAUSTIC},
+		[PATH_BOTH] = {PATH_BOTH, PATH_BOTH, PATH_BOTH, PATH_BOTH, PATH_BOTH, PATH_BOTH},
+		[PATH_SMOOTH] = {PATH_REFLECTED, PATH_REFLECTED, PATH_BOTH, PATH_BOTH, PATH_SMOOTH, PATH_SMOOTH},
+		[PATH_NO_VERTEX] = {PATH_ROUGH, PATH_REFLECTED, PATH_CAUSTIC, PATH_BOTH, PATH_SMOOTH, PATH_NO_VERTEX},
+	};
+	return (enum path_class_kind)join[camera][light];
+}
+
 /* 0..PATH_CLASSES - 1, all lengths of a kind next to each other; edges >= 1 */
-unsigned path_class(unsigned edges, enum path_class_kind kind);
+static inline unsigned path_class(unsigned edges, enum path_class_kind kind)
+{
+	unsigned row = kind == PATH_NO_VERTEX ? PATH_ROUGH : kind;
+	static const unsigned char length[] = {PATH_EDGES_1_2, PATH_EDGES_1_2, PATH_EDGES_1_2, PATH_EDGES_3_4, PATH_EDGES_3_4,
+					       PATH_EDGES_5_8, PATH_EDGES_5_8, PATH_EDGES_5_8, PATH_EDGES_5_8};
+	return row * PATH_CLASS_LENGTHS + (edges <= 8 ? length[edges] : PATH_EDGES_9_UP);
+}
 /* "caustic, 3-4 edges" */
 const char *path_class_name(unsigned path_class);
 

@@ -101,10 +101,12 @@ static void splat(struct pss_chain *c, struct pss_place *at)
 	for (uint32_t i = 0; i < at->sample.count; i++)
 		film_sums_splat(c->base.film, &at->sample.splats[i], at->weight / at->sample.intensity);
 	struct chain_moments *m = &c->base.film->moments;
+	double scale = at->weight / at->sample.intensity;
 	chain_moments_state(m, at->sample.splats, at->sample.count, at->sample.intensity, at->weight);
-	for (unsigned k = 0; at->sample.classes >> k; k++)
-		if (at->sample.classes >> k & 1)
-			chain_moments_class(m, k, at->weight * at->sample.of_class[k] / at->sample.intensity);
+	for (uint32_t rest = at->sample.classes; rest; rest &= rest - 1) {
+		unsigned k = (unsigned)__builtin_ctz(rest);
+		chain_moments_class(m, k, scale * at->sample.of_class[k]);
+	}
 	at->weight = 0;
 }
 

@@ -42,3 +42,18 @@ void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3])
 	xyz[1] = factor * y;
 	xyz[2] = factor * z;
 }
+
+spectrum spectrum_intensity_weights(const struct wavelengths *w)
+{
+	const double factor = (WAVELENGTH_MAX - WAVELENGTH_MIN) / (CIE_Y_SUM * SPECTRUM_LANES);
+	spectrum sum;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double position = w->nm[i] - CIE_FIRST_NM;
+		int cell = (int)position;
+		cell = cell < 0 ? 0 : cell > CIE_COUNT - 2 ? CIE_COUNT - 2 : cell;
+		double b = position - cell, a = 1 - b;
+		const double *p = cie_observer[cell], *q = cie_observer[cell + 1];
+		sum.v[i] = factor * (a * (p[0] + p[1] + p[2]) + b * (q[0] + q[1] + q[2]));
+	}
+	return sum;
+}

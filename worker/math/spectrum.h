@@ -97,5 +97,7 @@ static inline spectrum spectrum_repeat(spectrum s, int lanes)
 /* The CIE 1931 colour of a spectrum estimated from its four lanes (one-sample estimate of the integral of
  * L x_bar / 106.857 nm, so that an emitter of rgb 1 has Y = 1). Not for grey: the film has its own factor. */
 void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3]);
+/* X + Y + Z of that is the sum of l times these, lane by lane. */
+spectrum spectrum_intensity_weights(const struct wavelengths *w);
 
 #endif

@@ -2,38 +2,45 @@
 
 _Static_assert(PATH_CLASSES <= 32, "a bit a class");
 
-static bool is_smooth(const struct path_vertex *v, bool delta)
+static bool is_smooth(const struct path_vertex *v)
 {
-	return delta || v->bsdf->alpha_mean < PATH_CLASS_ALPHA;
-}
-
-unsigned path_class_joined(const struct path_context *c, unsigned s, unsigned t)
-{
-	enum path_class_kind kind = PATH_NO_VERTEX;
-	/* The two ends that are joined scatter by what is not delta. An emitter that was hit does not scatter. */
-	for (unsigned i = 1; i + 1 < t; i++)
-		kind = path_class_kind_next(kind, is_smooth(&c->camera[i], c->camera[i].delta));
-	if (s > 0 && t > 1)
-		kind = path_class_kind_next(kind, is_smooth(&c->camera[t - 1], false));
-	if (s > 1)
-		kind = path_class_kind_next(kind, is_smooth(&c->light[s - 1], false));
-	for (unsigned i = s > 2 ? s - 2 : 0; i > 0; i--)
-		kind = path_class_kind_next(kind, is_smooth(&c->light[i], c->light[i].delta));
-	return path_class(s + t - 1, kind);
+	return v->bsdf->alpha_mean < PATH_CLASS_ALPHA;
 }
 
 unsigned path_class_whole(const struct whole_path *x)
 {
 	enum path_class_kind kind = PATH_NO_VERTEX;
 	for (unsigned j = x->edges - 1; j > 0; j--)
-		kind = path_class_kind_next(kind, is_smooth(&x->v[j], x->v[j].delta));
+		kind = path_class_kind_next(kind, x->v[j].delta || is_smooth(&x->v[j]));
 	return path_class(x->edges, kind);
 }
 
-void class_sums_take(const struct path_context *c, const struct class_sums *s, struct path_sample *out)
+void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light, struct path_sample *out)
 {
-	out->classes = s->present;
-	for (unsigned k = 0; s->present >> k; k++)
-		if (s->present >> k & 1)
-			out->of_class[k] = path_intensity(c, s->sum[k]);
+	k->out = out;
+	out->classes = 0;
+	if (c->wl.grey)
+		k->weights = (spectrum){{c->w->grey_xyz[0] + c->w->grey_xyz[1] + c->w->grey_xyz[2]}};
+	else
+		k->weights = spectrum_intensity_weights(&c->wl);
+	for (int i = 0; i < PATH_CLASSES; i++)
+		out->of_class[i] = 0;
+	enum path_class_kind kind = PATH_NO_VERTEX;
+	k->camera[1] = k->emitter[1] = k->light[0] = k->light[1] = PATH_NO_VERTEX;
+	for (unsigned i = 1; i < camera; i++) {
+		const struct path_vertex *v = &c->camera[i];
+		k->emitter[i + 1] = (unsigned char)kind;
+		if (v->kind != VERTEX_SURFACE) /* infinity */
+			break;
+		bool smooth = is_smooth(v);
+		k->camera[i + 1] = (unsigned char)path_class_kind_next(kind, smooth);
+		kind = path_class_kind_next(kind, v->delta || smooth);
+	}
+	kind = PATH_NO_VERTEX;
+	for (unsigned i = 1; i < light; i++) {
+		const struct path_vertex *v = &c->light[i];
+		bool smooth = is_smooth(v);
+		k->light[i + 1] = (unsigned char)path_class_kind_join(smooth ? PATH_SMOOTH : PATH_ROUGH, kind);
+		kind = path_class_kind_join(v->delta || smooth ? PATH_SMOOTH : PATH_ROUGH, kind);
+	}
 }

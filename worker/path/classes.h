@@ -7,24 +7,37 @@
 
 #include "worker/path/whole.h"
 
-/* Of what path_connect makes of s vertices of c->light and t of c->camera. */
-unsigned path_class_joined(const struct path_context *c, unsigned s, unsigned t);
 unsigned path_class_whole(const struct whole_path *x);
 
-/* What one sample carries, by class. */
-struct class_sums {
-	uint32_t present; /* bit: the class's sum is set */
-	spectrum sum[PATH_CLASSES];
+/* Classes of all paths that one pair of sub-paths makes, and what these carry. */
+struct classes {
+	/* Kinds of the parts that meet in a connection, the two that it joins included: the camera's first t vertices, the
+	 * light's first s. Joined ends scatter there by what is not delta. emitter: the camera's, where the last of the t is an
+	 * emitter that was hit and does not scatter. */
+	unsigned char camera[PATH_MAX_EDGES + 3], emitter[PATH_MAX_EDGES + 3], light[PATH_MAX_EDGES + 3];
+	spectrum weights; /* X + Y + Z of a contribution */
+	struct path_sample *out;
 };
 
-static inline void class_sums_add(struct class_sums *s, unsigned path_class, spectrum l)
+/* Of c's sub-paths of so many vertices. Empties out's classes. */
+void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light, struct path_sample *out);
+
+/* Of what path_connect makes of s vertices of c->light and t of c->camera. */
+static inline unsigned classes_joined(const struct classes *k, unsigned s, unsigned t)
 {
-	uint32_t bit = UINT32_C(1) << path_class;
-	s->sum[path_class] = s->present & bit ? spectrum_add(s->sum[path_class], l) : l;
-	s->present |= bit;
+	enum path_class_kind camera = (enum path_class_kind)(s > 0 ? k->camera[t] : k->emitter[t]);
+	return path_class(s + t - 1, path_class_kind_join(camera, (enum path_class_kind)k->light[s]));
 }
 
-/* To the sample's classes. */
-void class_sums_take(const struct path_context *c, const struct class_sums *s, struct path_sample *out);
+/* Technique s contributes l. */
+static inline void classes_add(struct classes *k, unsigned s, unsigned t, spectrum l)
+{
+	unsigned class = classes_joined(k, s, t);
+	double sum = 0;
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		sum += l.v[i] * k->weights.v[i];
+	k->out->classes |= UINT32_C(1) << class;
+	k->out->of_class[class] += sum;
+}
 
 #endif

@@ -9,14 +9,16 @@
 void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	double film[2];
-	struct class_sums classes; /* its sums are set as they come */
-	classes.present = 0;
+	struct classes classes;
 	out->count = 0;
+	out->classes = 0;
 	out->intensity = 0;
 	c->one_way = false;
 	unsigned camera = path_walk_camera(c, s, c->max_depth + 1, film);
 	unsigned light = path_walk_light(c, s, c->max_depth);
 	spectrum sum = spectrum_of(0);
+	if (!c->unclassed)
+		classes_begin(&classes, c, camera, light, out);
 	for (unsigned t = 2; t <= camera; t++) {
 		for (unsigned j = 0; j <= (light > 1 ? light : 1) && t + j - 1 <= c->max_depth; j++) {
 			if (t + j - 1 < c->min_depth)
@@ -25,20 +27,20 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 			if (!path_accept(c, l))
 				continue;
 			sum = spectrum_add(sum, l);
-			class_sums_add(&classes, path_class_joined(c, j, t), l);
+			if (!c->unclassed)
+				classes_add(&classes, j, t, l);
 		}
 	}
 	if (!path_splat(c, out, film[0], film[1], sum))
-		classes.present = 0;
+		out->classes = 0;
 	for (unsigned j = 2; j <= light && j <= c->max_depth; j++) {
 		double at[2];
 		if (j < c->min_depth)
 			continue;
 		spectrum l = path_connect(c, j, 1, PATH_MAX_EDGES, at);
-		if (!spectrum_is_zero(l) && path_splat(c, out, at[0], at[1], l))
-			class_sums_add(&classes, path_class_joined(c, j, 1), l);
+		if (!spectrum_is_zero(l) && path_splat(c, out, at[0], at[1], l) && !c->unclassed)
+			classes_add(&classes, j, 1, l);
 	}
-	class_sums_take(c, &classes, out);
 }
 
 const struct integrator integrator_bdpt = {

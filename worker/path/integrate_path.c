@@ -9,11 +9,15 @@
 void path_trace(struct path_context *c, struct sampler *s, struct path_sample *out)
 {
 	double film[2];
-	struct class_sums classes; /* its sums are set as they come */
-	classes.present = 0;
+	struct classes classes;
+	out->count = 0;
+	out->classes = 0;
+	out->intensity = 0;
 	c->one_way = true;
 	unsigned n = path_walk_camera(c, s, c->max_depth + 1, film);
 	spectrum sum = spectrum_of(0);
+	if (!c->unclassed)
+		classes_begin(&classes, c, n, 0, out);
 	for (unsigned t = 2; t <= n; t++) {
 		for (unsigned j = 0; j <= 1; j++) {
 			unsigned edges = t + j - 1;
@@ -23,14 +27,12 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 			if (!path_accept(c, l))
 				continue;
 			sum = spectrum_add(sum, l);
-			class_sums_add(&classes, path_class_joined(c, j, t), l);
+			if (!c->unclassed)
+				classes_add(&classes, j, t, l);
 		}
 	}
-	out->count = 0;
-	out->intensity = 0;
 	if (!path_splat(c, out, film[0], film[1], sum))
-		classes.present = 0;
-	class_sums_take(c, &classes, out);
+		out->classes = 0;
 }
 
 const struct integrator integrator_path = {

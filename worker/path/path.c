@@ -2,6 +2,8 @@
 
 #include "worker/path/measure.h"
 
+#include <string.h>
+
 /* Russian roulette begins after this many scattering events, where it is allowed. */
 enum { ROULETTE_FROM = 5 };
 
@@ -333,9 +335,27 @@ unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_si
 	return scatter_on(c, s, side, v, n, max_vertices, spectrum_max(v[1].beta));
 }
 
+/* All lanes are +0 or positive and finite, without a comparison that a NaN would trap. */
+static bool is_plain(const spectrum *l, bool *zero)
+{
+	const uint64_t exponent_one = UINT64_C(1) << 52;
+	uint64_t any = 0, sign = 0;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		uint64_t bits;
+		memcpy(&bits, &l->v[i], sizeof bits);
+		any |= bits;
+		sign |= bits | (bits + exponent_one);
+	}
+	*zero = any == 0;
+	return sign >> 63 == 0;
+}
+
 bool path_accept(const struct path_context *c, spectrum l)
 {
-	bool zero = true;
+	bool zero;
+	if (is_plain(&l, &zero))
+		return !zero;
+	zero = true;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		if (isnan(l.v[i])) {
 			c->counters[COUNT_NAN]++;
@@ -354,22 +374,6 @@ bool path_accept(const struct path_context *c, spectrum l)
 	return !zero;
 }
 
-static void to_film(const struct path_context *c, spectrum l, double xyz[3])
-{
-	if (c->wl.grey)
-		for (int i = 0; i < 3; i++)
-			xyz[i] = l.v[0] * c->w->grey_xyz[i];
-	else
-		spectrum_to_xyz(l, &c->wl, xyz);
-}
-
-double path_intensity(const struct path_context *c, spectrum l)
-{
-	double xyz[3];
-	to_film(c, l, xyz);
-	return xyz[0] + xyz[1] + xyz[2];
-}
-
 bool path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l)
 {
 	if (!path_accept(c, l) || out->count == PATH_MAX_SPLATS)
@@ -377,7 +381,11 @@ bool path_splat(struct path_context *c, struct path_sample *out, double x, doubl
 	struct splat *s = &out->splats[out->count++];
 	s->x = x;
 	s->y = y;
-	to_film(c, l, s->xyz);
+	if (c->wl.grey)
+		for (int i = 0; i < 3; i++)
+			s->xyz[i] = l.v[0] * c->w->grey_xyz[i];
+	else
+		spectrum_to_xyz(l, &c->wl, s->xyz);
 	out->intensity += s->xyz[0] + s->xyz[1] + s->xyz[2];
 	return true;
 }

@@ -54,6 +54,7 @@ struct path_context {
 	struct wavelengths wl;
 	uint32_t min_depth, max_depth; /* edges */
 	bool roulette;
+	bool unclassed; /* nobody asks for path_sample.classes */
 	bool one_way; /* nobody asks for pdf_rev: no technique has more than one light vertex */
 	uint64_t *counters; /* of enum batch_counter */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
@@ -66,7 +67,7 @@ struct splat {
 struct path_sample {
 	uint32_t count;
 	double intensity; /* I: sum of X + Y + Z */
-	uint32_t classes; /* bit a path class: it carries light, of_class is set */
+	uint32_t classes; /* bit a path class: it carries light, the others of of_class are 0; 0 where nobody asks */
 	double of_class[PATH_CLASSES]; /* its part of the intensity */
 	struct splat splats[PATH_MAX_SPLATS];
 };
@@ -121,8 +122,6 @@ vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, do
 
 /* Adds L (f / p) at a film point; NaN, infinite and negative ones are counted and left out, as black ones are: false. */
 bool path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l);
-/* X + Y + Z of what the film gets of L. */
-double path_intensity(const struct path_context *c, spectrum l);
 /* false: L is zero, or was counted as invalid. */
 bool path_accept(const struct path_context *c, spectrum l);
 

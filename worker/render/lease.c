@@ -138,9 +138,10 @@ static enum lease_end run_bootstrap(struct job *j)
 			intensity = 0;
 			j->sample.classes = 0;
 		}
-		for (unsigned k = 0; j->sample.classes >> k; k++)
-			if (j->sample.classes >> k & 1)
-				out->classes[k] += j->sample.of_class[k];
+		for (uint32_t rest = j->sample.classes; rest; rest &= rest - 1) {
+			int k = __builtin_ctz(rest);
+			out->classes[k] += j->sample.of_class[k];
+		}
 		out->weights[i - r.begin] = (float)intensity;
 		out->independent_sum += intensity;
 		out->independent_square += intensity * intensity;
@@ -229,6 +230,7 @@ static int prepare(struct job *j, const struct world *w, struct error *e)
 	j->context.min_depth = p->min_depth;
 	j->context.max_depth = depth;
 	j->context.roulette = p->kind == PLAN_SAMPLES;
+	j->context.unclassed = p->kind == PLAN_SAMPLES && j->key->kind == LEASE_RENDER;
 	j->context.counters = j->out->counters;
 	j->out->strategy_count = j->key->kind == LEASE_RENDER ? (uint32_t)plan_strategy_count(p->mutations) : 0;
 	if (j->key->kind == LEASE_BOOTSTRAP) {

@@ -44,6 +44,24 @@ static void test_words(void **state)
 	assert_int_equal(path_class(1, PATH_NO_VERTEX), path_class(1, PATH_ROUGH));
 }
 
+static enum path_class_kind kind_of(unsigned bits, unsigned n)
+{
+	enum path_class_kind kind = PATH_NO_VERTEX;
+	for (unsigned i = 0; i < n; i++)
+		kind = path_class_kind_next(kind, bits >> i & 1);
+	return kind;
+}
+
+/* A word in two parts, each of any length. */
+static void test_joins(void **state)
+{
+	(void)state;
+	for (unsigned n = 0; n <= 8; n++)
+		for (unsigned bits = 0; bits < 1u << n; bits++)
+			for (unsigned cut = 0; cut <= n; cut++)
+				assert_int_equal(path_class_kind_join(kind_of(bits, cut), kind_of(bits >> cut, n - cut)), kind_of(bits, n));
+}
+
 static void test_lengths_and_names(void **state)
 {
 	(void)state;
@@ -63,6 +81,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_words),
+		cmocka_unit_test(test_joins),
 		cmocka_unit_test(test_lengths_and_names),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -67,11 +67,14 @@ static void check_around(struct path_context *c, struct whole_path *x, unsigned 
 		memset(&c->light[i].x.p, 0, sizeof c->light[i].x.p);
 	}
 	ensemble_around(c, &s.base, x, u, &around);
+	static struct classes classes;
+	static struct path_sample unused;
 	for (uint32_t i = 0; i < around.count; i++) {
 		const struct candidate *a = &around.of[i];
 		if (a->edges != x->edges || a->s == from || !is_made(c, x, a->s))
 			continue;
-		assert_int_equal(path_class_joined(c, a->s, x->edges + 1 - a->s), class);
+		classes_begin(&classes, c, x->edges + 1 - a->s, a->s, &unused);
+		assert_int_equal(classes_joined(&classes, a->s, x->edges + 1 - a->s), class);
 		seen->again++;
 		seen->techniques |= 1u << (a->s < 31 ? a->s : 31);
 	}
@@ -81,7 +84,8 @@ static void check_techniques(const struct world *w, const char *name)
 {
 	static struct path_context c;
 	static struct ensemble e;
-	static struct path_sample sample;
+	static struct path_sample sample, unused;
+	static struct classes classes;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	struct dice d = dice_of(name);
 	struct seen seen = {0, 0, 0, 0};
@@ -98,9 +102,15 @@ static void check_techniques(const struct world *w, const char *name)
 		assert_true(fabs(sum - sample.intensity) <= 1e-12 * sum);
 		sampler_random_init(&s, stats_seed(name), RNG_BOOTSTRAP, index, 0);
 		ensemble_draw(&c, &s.base, &all, &e);
+		unsigned camera = 1, light = 0;
+		for (uint32_t i = 0; i < e.count; i++) {
+			camera = e.of[i].edges + 1 - e.of[i].s > camera ? e.of[i].edges + 1 - e.of[i].s : camera;
+			light = e.of[i].s > light ? e.of[i].s : light;
+		}
+		classes_begin(&classes, &c, camera, light > 1 ? light : 0, &unused);
 		for (uint32_t i = 0; i < e.count; i++) {
 			const struct candidate *a = &e.of[i];
-			unsigned class = path_class_joined(&c, a->s, a->edges + 1 - a->s);
+			unsigned class = classes_joined(&classes, a->s, a->edges + 1 - a->s);
 			by_class[class] += a->intensity;
 			if (!whole_from_subpaths(&c, a->s, a->edges, &x))
 				continue; /* on the film's very border */
