@@ -1,5 +1,5 @@
 # deploy/container without a container engine: its Containerfile carried out line by line in two fresh Debians, and a small farm
-# as the image's user. Minutes and downloads: only with FULL=1.
+# as the image's user; then deploy/systemd there, booted by systemd-nspawn. Minutes and downloads: only with FULL=1.
 . "$(dirname "$0")/lib.sh"
 [ "${FULL:-0}" != 0 ] || skip "downloads two Debians: FULL=1, or deploy/test.sh --full"
 command -v debootstrap >/dev/null || skip "no debootstrap (deploy/setup.sh --full installs it)"
@@ -68,3 +68,59 @@ inside "$ROOT" 'cd /tmp
 	wait $coordinator
 	hslt-compare --exact one.exr two.exr' "$user" || fail "the farm in the image"
 echo "image: $(du -sxm "$ROOT" | cut -f1) MB, $(wc -l <"$DIR/stage1/out/packages") packages of libraries"
+
+# ---- the units, under a systemd that runs ----
+
+command -v systemd-nspawn >/dev/null || { echo "the units were not booted: no systemd-nspawn"; exit 0; }
+inside "$ROOT" 'apt-get update -qq; DEBIAN_FRONTEND=noninteractive apt-get install -qq -y --no-install-recommends systemd systemd-sysv dbus' ||
+	fail "no systemd in the image"
+cp "$TREE"/deploy/systemd/*.service "$TREE"/deploy/systemd/*.socket "$ROOT/etc/systemd/system/"
+printf '%s\n' '[Unit]' 'After=multi-user.target' '[Service]' 'ExecStart=sh /try' '[Install]' 'WantedBy=multi-user.target' \
+	>"$ROOT/etc/systemd/system/try.service"
+cat >"$ROOT/try" <<'TEXT'
+set -eux
+exec >/tried 2>&1
+trap 'systemctl poweroff' EXIT
+until [ "$(systemctl is-active hslt-coordinator.socket hslt-coordinator.service hslt-worker@1.service | grep -cx active)" = 3 ]; do
+	sleep 0.2
+done
+pid() {
+	systemctl show -P MainPID "$1"
+}
+for s in hslt-coordinator hslt-worker@1; do
+	[ "$(sed -n 's/^Uid:[[:space:]]*\([0-9]*\).*/\1/p' /proc/$(pid $s)/status)" != 0 ]
+	grep -q '^NoNewPrivs:.1$' /proc/$(pid $s)/status
+	grep -q '^Seccomp:.2$' /proc/$(pid $s)/status
+	grep -q '^CapBnd:.0*$' /proc/$(pid $s)/status
+done
+export HSLT_COORDINATOR=127.0.0.1:7700 HSLT_STATUS_SOCKET=/run/hslt/status
+[ "$(stat -c %a /run/hslt/status)" = 600 ]
+hslt-status
+cd /root
+hslt-render /scenes/box/box.xml -o one.exr --integrator hslt --bootstrap 20000 --mutations 60000
+hslt-submit /scenes/box/box.xml -o two.exr --integrator hslt --bootstrap 20000 --mutations 60000 --wait
+hslt-compare --exact one.exr two.exr
+# A loop that stands still is noticed; what was finished is still there afterwards.
+mkdir -p /run/systemd/system/hslt-coordinator.service.d
+printf '[Service]\nWatchdogSec=3\n' >/run/systemd/system/hslt-coordinator.service.d/try.conf
+systemctl daemon-reload
+systemctl restart hslt-coordinator
+kill -STOP "$(pid hslt-coordinator)"
+for i in 1 2 3 4 5 6 7 8 9 10 11 12 13 14 15; do
+	[ "$(systemctl show -P NRestarts hslt-coordinator)" = 0 ] || break
+	sleep 1
+done
+[ "$(systemctl show -P NRestarts hslt-coordinator)" = 1 ]
+journalctl --no-pager -u hslt-coordinator | grep -q 'Watchdog timeout'
+hslt-status | grep -q '^j1 *done'
+systemctl stop hslt-worker@1
+[ "$(systemctl show -P Result hslt-worker@1)" = success ]
+echo all is well
+TEXT
+for u in try hslt-coordinator.service hslt-coordinator.socket hslt-worker@1; do
+	systemctl --root="$ROOT" enable "$u" >>"$DIR/inside.log" 2>&1 || fail "systemctl enable $u"
+done
+timeout -k 5 120 systemd-nspawn --register=no --keep-unit -D "$ROOT" --boot --private-network --console=pipe </dev/null >"$DIR/boot.log" 2>&1 ||
+	fail "systemd-nspawn ended with $?"
+tail -n 1 "$ROOT/tried" | grep -q 'systemctl poweroff' && grep -qx 'all is well' "$ROOT/tried" || fail "the units: $(cat "$ROOT/tried")"
+echo "units: started, confined, watched"
