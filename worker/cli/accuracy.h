@@ -67,6 +67,7 @@ struct accuracy_run {
 	unsigned threads;
 	double seconds;         /* wall clock in all */
 	double setting_seconds; /* CPU seconds of a setting; 0: by the clock */
+	uint64_t setting_rounds; /* rounds of a setting, so that all but times repeats; 0: by time */
 	const atomic_bool *stop;
 	void (*progress)(void *user, double fraction, const char *state);
 	void *user;
@@ -107,7 +108,7 @@ struct accuracy_judgement {
 	float *rgb;              /* planes of the picture for the report: R, G, B */
 };
 
-/* reference: an image to measure the bias against; NULL: the careful setting. */
+/* reference: an image of the settings' size to measure the bias against; NULL: the careful setting. */
 int accuracy_judge(const struct accuracy_run *r, const struct picture *reference, struct accuracy_judgement *out, struct error *e);
 void accuracy_judgement_fini(struct accuracy_judgement *j);
 

@@ -83,21 +83,20 @@ void accuracy_plot_front(struct page *p, const struct accuracy_context *x)
 		kinds[k].count = 0;
 	for (size_t i = 0; i < x->design->count; i++) {
 		const struct accuracy_figures *f = &j->figures[i];
-		if ((i == ACCURACY_CAREFUL && !j->file) || !(f->bias_bound > 0))
+		if (i == ACCURACY_CAREFUL && !j->file)
 			continue;
 		struct points *to = &kinds[i == ACCURACY_DEFAULT ? 2 : f->beaten_by == i ? 1 : 0];
-		size_t k = to->count++;
-		to->x[k] = 100 * f->equal_time.value;
-		to->y[k] = 100 * f->bias_bound;
+		size_t k = to->count;
+		add_point(to, 100 * f->equal_time.value, f->bias_mean);
 		accuracy_name(&x->design->settings[i], to->name[k], sizeof to->name[k]);
 		to->label[k] = i != ACCURACY_DEFAULT && f->bias_seen > 0 ? to->name[k] : "";
 	}
-	for (int k = 0; k < 3; k++)
-		s[k] = (struct plot_series){.name = names[k], .style = PLOT_POINTS, .count = kinds[k].count, .x = kinds[k].x, .y = kinds[k].y,
-					    .labels = kinds[k].label};
+	for (int k = 0; k < 3; k++) {
+		s[k] = series_of(&kinds[k], names[k]);
+		s[k].labels = kinds[k].label;
+	}
 	page_put(p, "<div class=\"wide\">\n");
 	put_plot(p, &(struct plot){.title = "Every setting (named where a bias was seen)", .x_label = "relative error at equal time, %",
-				   .y_label = "bias of the mean or of any block is at most, %", .log_x = true, .log_y = true, .series_count = 3,
-				   .series = s});
+				   .y_label = "bias of the mean, %", .log_x = true, .series_count = 3, .series = s});
 	page_put(p, "</div>\n");
 }

@@ -140,13 +140,19 @@ static int step(struct accuracy_run *r, size_t i, struct error *e)
 	return 0;
 }
 
-/* Who had least of its share. */
+/* What setting i had of its share: CPU seconds or rounds. */
+static double had(const struct accuracy_run *r, size_t i)
+{
+	const struct accuracy_job *j = &r->jobs[i];
+	return (r->setting_rounds ? (double)canvas_rounds(j->run.canvas) : j->cpu) / r->design->settings[i].share;
+}
+
+/* Who had least. */
 static size_t next(const struct accuracy_run *r)
 {
-	const struct accuracy_design *d = r->design;
 	size_t best = 0;
-	for (size_t i = 1; i < d->count; i++)
-		if (r->jobs[i].cpu / d->settings[i].share < r->jobs[best].cpu / d->settings[best].share)
+	for (size_t i = 1; i < r->design->count; i++)
+		if (had(r, i) < had(r, best))
 			best = i;
 	return best;
 }
@@ -159,18 +165,15 @@ static void show(const struct accuracy_run *r, double fraction, const char *stat
 
 static int rounds(struct accuracy_run *r, double begin, struct error *e)
 {
-	const struct accuracy_design *d = r->design;
-	double first = now();
+	double first = now(), wanted = r->setting_rounds ? (double)r->setting_rounds : r->setting_seconds;
 	for (;;) {
 		size_t i = next(r);
-		const struct accuracy_job *j = &r->jobs[i];
-		double had = j->cpu / d->settings[i].share, wall = now();
-		bool enough = r->setting_seconds > 0 ? had >= r->setting_seconds : wall >= begin + r->seconds;
+		double wall = now();
+		bool enough = wanted > 0 ? had(r, i) >= wanted : wall >= begin + r->seconds;
 		/* Two rounds at least, however short the time. */
-		if ((enough && canvas_rounds(j->run.canvas) >= 2) || stopped(r))
+		if ((enough && canvas_rounds(r->jobs[i].run.canvas) >= 2) || stopped(r))
 			return 0;
-		show(r, fmin(r->setting_seconds > 0 ? had / r->setting_seconds : (wall - first) / fmax(begin + r->seconds - first, 1), 1),
-		     "rendering");
+		show(r, fmin(wanted > 0 ? had(r, i) / wanted : (wall - first) / fmax(begin + r->seconds - first, 1), 1), "rendering");
 		int rc = step(r, i, e);
 		if (rc)
 			return rc;

@@ -27,13 +27,15 @@ static const char doc[] =
 	"Interrupted, it reports what there is once each setting had a round, and ends with 1.\n"
 	"Exit codes: 0 done, 1 failed, 2 usage.";
 
-enum { OPTION_THREADS = 256, OPTION_QUIET, OPTION_CSV, OPTION_BUDGET, OPTION_SECONDS, OPTION_KNOBS, OPTION_REFERENCE };
+enum { OPTION_THREADS = 256, OPTION_QUIET, OPTION_CSV, OPTION_BUDGET, OPTION_SECONDS, OPTION_ROUNDS, OPTION_KNOBS, OPTION_REFERENCE };
 
 static const struct argp_option options[] = {
 	{"output", 'o', "FILE", 0, "The report (HTML)", 0},
 	{"csv", OPTION_CSV, "FILE", 0, "The figures as comma-separated values too", 0},
 	{"budget", OPTION_BUDGET, "MINUTES", 0, "How long it may take in all (10), shared equally; more makes the intervals narrower", 0},
 	{"seconds", OPTION_SECONDS, "S", 0, "CPU seconds of each setting, in place of a budget", 0},
+	{"rounds", OPTION_ROUNDS, "N", 0,
+	 "Rounds of each setting, in place of a budget: with --epoch, --chains and --bootstrap all but the times repeats", 0},
 	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors)", 0},
 	{"knobs", OPTION_KNOBS, "LIST", 0,
 	 "Only these: settings of --set (its help names them), max-depth, independent, mixture, preset; with commas between", 0},
@@ -47,6 +49,7 @@ struct arguments {
 	const char *scene, *output, *csv, *knobs, *reference;
 	unsigned threads;
 	double budget, seconds;
+	uint64_t rounds;
 	bool quiet;
 	struct render_arguments render;
 };
@@ -87,6 +90,11 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_SECONDS:
 		a->seconds = option_seconds(state, "--seconds", arg);
+		return 0;
+	case OPTION_ROUNDS:
+		a->rounds = option_whole(state, "--rounds", arg);
+		if (a->rounds < 2 || a->rounds > ACCURACY_COSTS)
+			argp_error(state, "--rounds takes 2 to %d, not '%s'", ACCURACY_COSTS, arg);
 		return 0;
 	case OPTION_THREADS:
 		a->threads = (unsigned)option_whole(state, "--threads", arg);
@@ -161,12 +169,25 @@ static int load(struct session *s, struct error *e)
 	return render_check(&s->scene, &s->assets, &r->render, &s->summary, e);
 }
 
+/* Before hours are spent. */
+static int check_reference(const struct session *s, struct error *e)
+{
+	const struct plan_request *p = &s->a->render.plan;
+	uint32_t width = p->crop_width ? p->crop_width : p->width, height = p->crop_width ? p->crop_height : p->height;
+	if (!s->a->reference || (s->reference.image.width == width && s->reference.image.height == height))
+		return 0;
+	return error_set(e, EINVAL, "%s: %ux%u pixels, and the settings are rendered with %ux%u", s->a->reference,
+			 s->reference.image.width, s->reference.image.height, width, height);
+}
+
 static int design(struct session *s, struct error *e)
 {
 	struct render_arguments *r = &s->a->render;
 	int rc = render_plan_from_scene(r, &s->summary, e);
 	if (!rc)
 		rc = accuracy_design(&s->design, &r->plan, &s->summary, s->a->knobs, e);
+	if (!rc)
+		rc = check_reference(s, e);
 	s->usage = rc == -EINVAL;
 	if (rc || s->a->quiet)
 		return rc;
@@ -181,7 +202,7 @@ static int render(struct session *s, struct error *e)
 	const struct arguments *a = s->a;
 	s->run = (struct accuracy_run){.design = &s->design, .request = a->render.plan, .scene = &s->scene, .assets = &s->assets,
 				       .render = &a->render.render, .threads = a->threads, .seconds = 60 * a->budget,
-				       .setting_seconds = a->seconds, .stop = &interrupted, .progress = a->quiet ? NULL : show, .user = s};
+				       .setting_seconds = a->seconds, .setting_rounds = a->rounds, .stop = &interrupted, .progress = a->quiet ? NULL : show, .user = s};
 	if (!a->quiet)
 		progress_start(&s->progress);
 	int rc = accuracy_render(&s->run, e);
