@@ -87,4 +87,8 @@ void canvas_image_fini(struct canvas_image *img);
  * across and down: at most width and height. */
 void canvas_group_blocks(const struct canvas *c, uint32_t across, uint32_t down, double *out);
 
+/* Sum over pixels and R, G, B (weight[height][width][3], as canvas_image's rgb) of the weighted square of a group's image less the
+ * mean of the groups': out[groups]. Their mean over groups - 1 is the same sum of squared standard errors. */
+void canvas_group_distances(const struct canvas *c, const double *weight, double *out);
+
 #endif

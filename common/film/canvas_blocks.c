@@ -1,4 +1,5 @@
 #include "common/film/canvas_private.h"
+#include "common/film/color.h"
 
 static double ratio(double a, double b)
 {
@@ -17,13 +18,19 @@ static double factor_of(const struct canvas *c, uint32_t group)
 	return ratio(exact_sum_value(&sum), (double)independent) * ratio(c->quantum, (double)c->prefix.group[group].samples);
 }
 
-static double pixel_sum(const struct canvas *c, size_t film, uint32_t x, uint32_t y)
+/* X, Y, Z on the grid; NULL: nothing came there. */
+static const int64_t *pixel(const struct canvas *c, size_t film, uint32_t x, uint32_t y)
 {
 	size_t tile = (size_t)(y / TILE_SIZE) * c->tiles_across + x / TILE_SIZE;
 	if (!(*canvas_flags(c, film, tile) & TILE_USED))
-		return 0;
-	const int64_t *v = canvas_slot(c, film, tile) + (size_t)(y % TILE_SIZE) * SLOT_ROW + (size_t)(x % TILE_SIZE) * TILE_CHANNELS;
-	return (double)v[0] + (double)v[1] + (double)v[2];
+		return NULL;
+	return canvas_slot(c, film, tile) + (size_t)(y % TILE_SIZE) * SLOT_ROW + (size_t)(x % TILE_SIZE) * TILE_CHANNELS;
+}
+
+static double pixel_sum(const struct canvas *c, size_t film, uint32_t x, uint32_t y)
+{
+	const int64_t *v = pixel(c, film, x, y);
+	return v ? (double)v[0] + (double)v[1] + (double)v[2] : 0;
 }
 
 void canvas_group_blocks(const struct canvas *c, uint32_t across, uint32_t down, double *out)
@@ -42,5 +49,30 @@ void canvas_group_blocks(const struct canvas *c, uint32_t across, uint32_t down,
 			block[k] = factor * sum / (double)((x1 - x0) * (y1 - y0));
 		}
 		block[across * down] = factor * all / ((double)width * height);
+	}
+}
+
+void canvas_group_distances(const struct canvas *c, const double *weight, double *out)
+{
+	uint32_t groups = c->plan.groups, width = c->plan.crop_width, height = c->plan.crop_height;
+	double factor[PLAN_MAX_GROUPS], rgb[PLAN_MAX_GROUPS][3];
+	for (uint32_t g = 0; g < groups; g++) {
+		factor[g] = factor_of(c, g);
+		out[g] = 0;
+	}
+	for (size_t i = 0; i < (size_t)width * height; i++) {
+		double mean[3] = {0};
+		for (uint32_t g = 0; g < groups; g++) {
+			const int64_t *v = pixel(c, canvas_film(g, FILM_PREFIX), (uint32_t)(i % width), (uint32_t)(i / width));
+			double xyz[3] = {0};
+			for (int k = 0; v && k < 3; k++)
+				xyz[k] = factor[g] * (double)v[k];
+			rec709_from_xyz(xyz, rgb[g]);
+			for (int k = 0; k < 3; k++)
+				mean[k] += rgb[g][k] / groups;
+		}
+		for (uint32_t g = 0; g < groups; g++)
+			for (size_t k = 0; k < 3; k++)
+				out[g] += weight[3 * i + k] * (rgb[g][k] - mean[k]) * (rgb[g][k] - mean[k]);
 	}
 }

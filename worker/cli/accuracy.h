@@ -14,8 +14,11 @@ enum { ACCURACY_SETTINGS = 96, ACCURACY_SWEEPS = 24, ACCURACY_VALUES = 12, ACCUR
 /* How much longer the reference is rendered than each other setting. */
 #define ACCURACY_REFERENCE_SHARE 4.0
 
+/* Share of the pixels, those with the greatest errors, that errors leave out: a single one can be most of the whole. */
+#define ACCURACY_TRIM 0.005
+
 struct accuracy_setting {
-	char knob[32], value[48]; /* "default" and "careful" are knobs without value */
+	char knob[32], value[48]; /* "default" and "reference" are knobs without value */
 	double share;             /* of the time, in units of the others' */
 	bool other_image;         /* it is known to make another image, however small the difference */
 	uint32_t max_depth;
@@ -35,11 +38,11 @@ struct accuracy_left_out {
 
 struct accuracy_design {
 	size_t count, sweep_count, left_out_count;
-	struct accuracy_setting settings[ACCURACY_SETTINGS]; /* the first is the default, the second the careful one */
+	struct accuracy_setting settings[ACCURACY_SETTINGS]; /* the first is the default, the second the reference: careful, and longer */
 	struct accuracy_sweep sweeps[ACCURACY_SWEEPS];
 	struct accuracy_left_out left_out[ACCURACY_SWEEPS];
 };
-enum { ACCURACY_DEFAULT, ACCURACY_CAREFUL };
+enum { ACCURACY_DEFAULT, ACCURACY_REFERENCE };
 
 /* Around the request's settings, what the scene calls for. only: NAME,NAME: sweeps to make; NULL: all. -EINVAL: there is no such
  * knob, with a sentence. */
@@ -94,7 +97,7 @@ struct accuracy_figures {
 	struct interval bias_block;  /* of the worst block, at 95 % for all blocks together */
 	unsigned block;              /* which: across + down * blocks_across */
 	double bias_seen, bias_bound;
-	size_t beaten_by;            /* itself: on the front */
+	size_t beaten_by;            /* itself: on the front; the reference takes no part */
 };
 
 struct accuracy_judgement {

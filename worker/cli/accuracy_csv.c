@@ -35,7 +35,7 @@ const struct accuracy_column accuracy_columns[] = {
 	{"block_y", "and from the top"},
 	{"bias_seen", "the least that the bias is when all settings and blocks are asked at once; 0: none was seen"},
 	{"bias_bound", "the most that it may be, of the mean or of any block"},
-	{"front", "1: on the Pareto front"},
+	{"front", "1: on the Pareto front; empty: the reference, which takes no part"},
 	{"beaten_by", "the setting that beats it; empty: it is on the front"},
 	{0},
 };
@@ -61,7 +61,7 @@ static void put_row(struct page *p, const struct accuracy_context *x, size_t i)
 	const struct accuracy_setting *s = &x->design->settings[i];
 	const struct accuracy_figures *f = &j->figures[i];
 	char name[96];
-	bool reference = i == ACCURACY_CAREFUL && !j->file, front = f->beaten_by == i;
+	bool reference = i == ACCURACY_REFERENCE, front = f->beaten_by == i;
 	accuracy_name(s, name, sizeof name);
 	page_field(p, name);
 	page_put(p, ",");
@@ -85,7 +85,7 @@ static void put_row(struct page *p, const struct accuracy_context *x, size_t i)
 	page_put(p, ",%u,%u", f->block % j->across, f->block / j->across);
 	put_number(p, f->bias_seen);
 	put_number(p, f->bias_bound);
-	page_put(p, ",%d,", front);
+	page_put(p, reference ? ",," : ",%d,", front);
 	if (!front) {
 		accuracy_name(&x->design->settings[f->beaten_by], name, sizeof name);
 		page_field(p, name);

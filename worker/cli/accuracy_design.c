@@ -313,13 +313,15 @@ static void sweep_presets(struct planner *p)
 	}
 	if (s) {
 		add_value(s, "default", ACCURACY_DEFAULT);
-		add_value(s, "careful", ACCURACY_CAREFUL);
+		struct accuracy_setting *same = swept(p, s, "careful");
+		if (same)
+			memcpy(same->knobs, p->d->settings[ACCURACY_REFERENCE].knobs, sizeof same->knobs);
 	}
 }
 
-static void add_careful(struct planner *p)
+static void add_reference(struct planner *p)
 {
-	struct accuracy_setting *s = new_setting(p, "careful", "");
+	struct accuracy_setting *s = new_setting(p, "reference", "");
 	s->share = ACCURACY_REFERENCE_SHARE;
 	for (size_t i = 0; i < sizeof careful / sizeof *careful; i++) {
 		const struct render_knob *k = knob_find(careful[i].knob);
@@ -360,7 +362,7 @@ int accuracy_design(struct accuracy_design *d, const struct plan_request *base, 
 		return rc;
 	*d = (struct accuracy_design){.count = 0};
 	new_setting(&p, "default", "");
-	add_careful(&p);
+	add_reference(&p);
 	const struct render_knob *k;
 	for (size_t i = 0; (k = render_knob_at(i)) != NULL; i++) {
 		const char *why = idle(&p, k);

@@ -41,12 +41,12 @@ static void name_cell(struct page *p, const struct accuracy_context *x, size_t i
 	accuracy_name(&x->design->settings[i], name, sizeof name);
 	page_put(p, "<td class=\"t\">");
 	page_escaped(p, name);
-	page_put(p, i == ACCURACY_CAREFUL && !x->judgement->file ? " (reference)</td>" : "</td>");
+	page_put(p, "</td>");
 }
 
 static void row_begin(struct page *p, const struct accuracy_context *x, size_t i)
 {
-	bool front = x->judgement->figures[i].beaten_by == i;
+	bool front = x->judgement->figures[i].beaten_by == i && i != ACCURACY_REFERENCE;
 	page_put(p, "<tr class=\"%s%s\">", front ? "front " : "", i == ACCURACY_DEFAULT ? "default" : "");
 }
 
@@ -79,7 +79,7 @@ static void put_answer(struct page *p, const struct accuracy_context *x)
 	page_put(p, "</p>");
 	size_t biased = 0;
 	for (size_t i = 0; i < x->design->count; i++) {
-		if (!(f[i].bias_seen > 0))
+		if (!(f[i].bias_seen > 0) || i == ACCURACY_REFERENCE)
 			continue;
 		accuracy_name(&x->design->settings[i], name, sizeof name);
 		page_put(p, biased++ ? ", " : "<p>Settings whose bias was seen: ");
@@ -107,9 +107,9 @@ static int put_picture(struct page *p, const struct accuracy_context *x, struct 
 	mem_free(bytes);
 	if (rc)
 		return rc;
-	page_put(p, "<p><img alt=\"the scene, as the careful setting has it\" width=\"%u\" src=\"data:image/png;base64,", j->width < 480 ? j->width * (480 / j->width) : j->width);
+	page_put(p, "<p><img alt=\"the scene, as the reference has it\" width=\"%u\" src=\"data:image/png;base64,", j->width < 480 ? j->width * (480 / j->width) : j->width);
 	page_base64(p, png, size);
-	page_put(p, "\"/><br/><span class=\"note\">The scene, as the careful setting has it.</span></p>\n");
+	page_put(p, "\"/><br/><span class=\"note\">The scene, as the reference has it.</span></p>\n");
 	mem_free(png);
 	return 0;
 }
@@ -149,11 +149,11 @@ static void put_facts(struct page *p, const struct accuracy_context *x)
 	fact(p, "Settings changed", *plan->knobs ? plan->knobs : "none: the renderer's defaults");
 	plan_describe(plan, text, sizeof text);
 	fact(p, "Plan of the default", text);
-	snprintf(text, sizeof text, "%zu settings in turns, %.0f s in all%s; each %.3g s of CPU, the careful one %g times that", x->design->count,
+	snprintf(text, sizeof text, "%zu settings in turns, %.0f s in all%s; each %.3g s of CPU, the reference %g times that", x->design->count,
 		 r->wall_seconds, r->interrupted ? " (interrupted: what was there by then)" : "", x->judgement->figures[ACCURACY_DEFAULT].cpu_seconds,
 		 ACCURACY_REFERENCE_SHARE);
 	fact(p, "Run", text);
-	snprintf(text, sizeof text, "the setting \"careful\": %s", *x->design->settings[ACCURACY_CAREFUL].knobs ? x->design->settings[ACCURACY_CAREFUL].knobs :
+	snprintf(text, sizeof text, "rendered carefully: %s", *x->design->settings[ACCURACY_REFERENCE].knobs ? x->design->settings[ACCURACY_REFERENCE].knobs :
 		 "as the default, but longer");
 	fact(p, "Reference for the bias", x->reference ? x->reference : text);
 	machine(text, sizeof text, r->threads);
@@ -170,17 +170,19 @@ static void put_guide(struct page *p, const struct accuracy_context *x)
 		     "the other, so that whatever else the machine did meets all of them alike.");
 	page_put(p, "<p><b>Error at equal time</b> is the relative error that the setting reaches in the CPU time that the default had (%.3g s), and "
 		    "<b>error at equal mutations</b> that after as many mutations (%llu). Both are noise: the square root of the mean, over pixels and "
-		    "colours, of the squared standard error over the squared brightness, from the spread between independent groups of chains. "
-		    "Half the error takes four times the time.</p>\n", x->judgement->at_cpu_seconds, (unsigned long long)x->judgement->at_mutations);
+		    "colours, of the squared standard error over the squared brightness, from the spread between independent groups of chains; the "
+		    "%g %% of the pixels with the greatest errors are left out, because a single one can be most of the whole and say nothing about "
+		    "the setting. Half the error takes four times the time.</p>\n", x->judgement->at_cpu_seconds,
+		 (unsigned long long)x->judgement->at_mutations, 100 * ACCURACY_TRIM);
 	page_put(p, "<p><b>Bias</b> is what no amount of time removes: the mean of the image against that of the reference, and the block of the image "
 		    "(of %u x %u) that differs most surely. Figures in parentheses are 95 %% intervals. A bias is called seen when it is beyond "
 		    "chance even though all blocks of all settings were asked.</p>\n", x->judgement->across, x->judgement->down);
 	paragraph(p, "A setting lies on the front (shaded) when no other one beats it: none has surely less error at equal time without a sign of more "
-		     "bias, and none has surely less bias without surely more error. \"Surely\" is beyond the intervals, shared among all "
+		     "bias, and none is free of a bias that was seen in it without surely more error. \"Surely\" is beyond the intervals, shared among all "
 		     "settings; a setting whose bias is known much less well, or whose own interval of the bias leaves out 0, beats nobody by speed. Nor do max-depth, roughness and tessellation, which make "
 		     "another image by what they are: they may lie on the front, as trades.");
 	if (!x->judgement->file)
-		paragraph(p, "The reference is the careful setting itself, so that a bias which it has too cannot be seen here; --reference FILE takes an "
+		paragraph(p, "The reference is the careful preset, rendered longer, so that a bias which it has too cannot be seen here; --reference FILE takes an "
 			     "image of another integrator instead.");
 }
 
@@ -193,14 +195,15 @@ static void put_summary(struct page *p, const struct accuracy_context *x)
 	for (size_t i = 0; i < x->design->count; i++) {
 		const struct accuracy_figures *f = &j->figures[i];
 		double times = f->equal_time.value / j->figures[ACCURACY_DEFAULT].equal_time.value;
+		if (i == ACCURACY_REFERENCE)
+			continue;
 		row_begin(p, x, i);
 		name_cell(p, x, i);
 		cell(p, f->equal_time, false, false);
 		page_put(p, "<td>x %.2f</td>", times * times);
-		bool reference = i == ACCURACY_CAREFUL && !j->file;
 		struct interval none = {NAN, NAN, NAN};
-		cell(p, reference ? none : f->bias_mean, true, f->bias_seen > 0);
-		cell(p, reference || j->across * j->down == 1 ? none : f->bias_block, true, f->bias_seen > 0);
+		cell(p, f->bias_mean, true, f->bias_seen > 0);
+		cell(p, j->across * j->down == 1 ? none : f->bias_block, true, f->bias_seen > 0);
 		if (f->beaten_by == i) {
 			page_put(p, "<td class=\"t\">on the front%s</td></tr>\n", f->bias_seen > 0 ? ", biased" : "");
 			continue;
@@ -229,7 +232,8 @@ static void put_mutations(struct page *p, const struct accuracy_context *x)
 		else
 			page_put(p, "<td>&#8211;</td>");
 		page_put(p, "<td>%.3g</td>", f->rays);
-		cell(p, f->equal_mutations, false, false);
+		struct interval none = {NAN, NAN, NAN};
+		cell(p, i == ACCURACY_REFERENCE ? none : f->equal_mutations, false, false);
 		page_put(p, "</tr>\n");
 	}
 	page_put(p, "</table>\n<p class=\"note\">Failed walks: those that did not converge or whose way back did not lead to where they began, of all "
@@ -251,7 +255,6 @@ static void put_sweep(struct page *p, const struct accuracy_context *x, const st
 		size_t i = s->setting[k];
 		const struct accuracy_figures *f = &x->judgement->figures[i];
 		struct interval none = {NAN, NAN, NAN};
-		bool reference = i == ACCURACY_CAREFUL && !x->judgement->file;
 		row_begin(p, x, i);
 		page_put(p, "<td class=\"t\">");
 		page_escaped(p, s->value[k]);
@@ -262,8 +265,8 @@ static void put_sweep(struct page *p, const struct accuracy_context *x, const st
 		else
 			page_put(p, "<td>&#8211;</td>");
 		cell(p, f->equal_time, false, false);
-		cell(p, reference ? none : f->bias_mean, true, f->bias_seen > 0);
-		cell(p, reference || x->judgement->across == 1 ? none : f->bias_block, true, f->bias_seen > 0);
+		cell(p, f->bias_mean, true, f->bias_seen > 0);
+		cell(p, x->judgement->across == 1 ? none : f->bias_block, true, f->bias_seen > 0);
 		page_put(p, "</tr>\n");
 	}
 	page_put(p, "</table>\n");

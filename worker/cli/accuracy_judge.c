@@ -8,6 +8,7 @@
 
 #include <float.h>
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 #define LEVEL 0.05
@@ -16,6 +17,7 @@ struct judge {
 	const struct accuracy_run *r;
 	struct accuracy_judgement *out;
 	double *mean;                        /* [pixels * 3], over the settings */
+	double *weight, *worst;              /* [pixels * 3]; [2][pixels], the second sorted: of one setting at a time */
 	double *rel_mse, *degrees;           /* [settings] */
 	double *blocks;                      /* [settings][groups][cells] */
 	size_t cells, groups;
@@ -43,7 +45,7 @@ static int take_mean(struct judge *j, struct error *e)
 		for (size_t k = 0; k < values; k++)
 			j->mean[k] += (double)img.rgb[k] / (double)n;
 		/* The picture of the report is the one with the least noise. */
-		for (size_t k = 0; i == ACCURACY_CAREFUL && k < values; k++)
+		for (size_t k = 0; i == ACCURACY_REFERENCE && k < values; k++)
 			j->out->rgb[(k % 3) * (values / 3) + k / 3] = img.rgb[k];
 		canvas_image_fini(&img);
 	}
@@ -66,21 +68,58 @@ static void take_counts(struct accuracy_figures *f, const struct canvas_counts *
 	f->failed_walks = walks ? (double)failed / (double)walks : NAN;
 }
 
-/* Mean over pixels and channels of the squared standard error over B^2 + (0.01 m)^2, B the settings' common picture. */
+static int order(const void *pa, const void *pb)
+{
+	const double *a = pa, *b = pb;
+	return (*a > *b) - (*a < *b);
+}
+
+/* 1 over B^2 + (0.01 m)^2, B the settings' common picture; 0 for the pixels with the greatest errors. */
+static void weigh(struct judge *j, const float *error)
+{
+	size_t pixels = (size_t)j->out->width * j->out->height, left = (size_t)ceil(ACCURACY_TRIM * (double)pixels);
+	double m = 0;
+	for (size_t k = 0; k < 3 * pixels; k++)
+		m += j->mean[k] / (double)(3 * pixels);
+	for (size_t i = 0; i < pixels; i++) {
+		double sum = 0;
+		for (size_t k = 3 * i; k < 3 * i + 3; k++) {
+			j->weight[k] = 1 / (j->mean[k] * j->mean[k] + 1e-4 * m * m);
+			sum += j->weight[k] * (double)error[k] * (double)error[k];
+		}
+		j->worst[i] = sum;
+	}
+	double *sorted = j->worst + pixels;
+	memcpy(sorted, j->worst, pixels * sizeof *sorted);
+	qsort(sorted, pixels, sizeof *sorted, order);
+	double most = sorted[left < pixels ? pixels - 1 - left : 0];
+	for (size_t k = 0; k < 3 * pixels; k++)
+		j->weight[k] = j->worst[k / 3] > most ? 0 : j->weight[k] / (double)(3 * pixels);
+}
+
+/* Degrees of freedom of the chi-square with the spread that the groups' distances show (Satterthwaite 1946). */
+static double degrees_of(const double *distance, size_t groups, double mean)
+{
+	double n = (double)groups, square = 0;
+	for (size_t g = 0; g < groups; g++)
+		square += (distance[g] / mean - 1) * (distance[g] / mean - 1);
+	double spread = square / (n - 1) * (n + 2) / n;
+	return spread > 0 ? fmax(2 * (n - 1) / spread, 1) : 1e9;
+}
+
 static int take_error(struct judge *j, size_t i, struct error *e)
 {
-	size_t values = (size_t)j->out->width * j->out->height * 3;
 	struct accuracy_figures *f = &j->out->figures[i];
 	struct canvas_image img;
-	double m = 0, sum = 0;
+	double distance[PLAN_MAX_GROUPS], mean = 0;
 	if (canvas_image(job(j, i)->run.canvas, false, &img, e))
 		return -ENOMEM;
-	for (size_t k = 0; k < values; k++)
-		m += j->mean[k] / (double)values;
-	for (size_t k = 0; k < values; k++)
-		sum += (double)img.error[k] * (double)img.error[k] / (j->mean[k] * j->mean[k] + 1e-4 * m * m);
-	j->rel_mse[i] = sum / (double)values;
-	j->degrees[i] = img.rel_mse_degrees >= 1 ? img.rel_mse_degrees : (double)j->groups - 1;
+	weigh(j, img.error);
+	canvas_group_distances(job(j, i)->run.canvas, j->weight, distance);
+	for (size_t g = 0; g < j->groups; g++)
+		mean += distance[g] / (double)j->groups;
+	j->rel_mse[i] = mean / (double)(j->groups - 1);
+	j->degrees[i] = mean > 0 ? degrees_of(distance, j->groups, mean) : 1;
 	f->mutations = img.rounds * plan_round_mutations(&job(j, i)->plan);
 	f->rounds = img.rounds;
 	f->cpu_seconds = job(j, i)->cpu;
@@ -180,14 +219,14 @@ static void take_bias(struct judge *j, size_t i, const double *reference, size_t
 
 static void take_biases(struct judge *j, const struct picture *reference, struct stats_point *points)
 {
-	const double *from = j->blocks + ACCURACY_CAREFUL * j->groups * j->cells;
+	const double *from = j->blocks + ACCURACY_REFERENCE * j->groups * j->cells;
 	double file[ACCURACY_CELLS];
 	for (size_t i = 0; i < j->r->design->count; i++)
 		canvas_group_blocks(job(j, i)->run.canvas, j->out->across, j->out->down, j->blocks + i * j->groups * j->cells);
 	if (reference)
 		file_blocks(j, reference, file);
 	for (size_t i = 0; i < j->r->design->count; i++)
-		if (reference || i != ACCURACY_CAREFUL)
+		if (reference || i != ACCURACY_REFERENCE)
 			take_bias(j, i, reference ? file : from, reference ? 1 : j->groups, &points[i]);
 }
 
@@ -209,9 +248,12 @@ static int judge(struct judge *j, const struct picture *reference, struct error 
 		j->out->thin |= j->out->figures[i].rounds < 4;
 	j->out->thin |= j->out->figures[ACCURACY_DEFAULT].equal_time.value > 0.5;
 	take_biases(j, reference, points);
-	stats_front(points, n, LEVEL, by);
-	for (size_t i = 0; i < n; i++)
-		j->out->figures[i].beaten_by = by[i];
+	/* The reference is no setting that one would choose, and longer: it moves to the end and takes no part. */
+	points[ACCURACY_REFERENCE] = points[n - 1];
+	stats_front(points, n - 1, LEVEL, by);
+	for (size_t i = 0; i + 1 < n; i++)
+		j->out->figures[i == ACCURACY_REFERENCE ? n - 1 : i].beaten_by = by[i] == ACCURACY_REFERENCE ? n - 1 : by[i];
+	j->out->figures[ACCURACY_REFERENCE].beaten_by = ACCURACY_REFERENCE;
 	return 0;
 }
 
@@ -225,12 +267,16 @@ int accuracy_judge(const struct accuracy_run *r, const struct picture *reference
 	struct judge j = {.r = r, .out = out, .cells = (size_t)out->across * out->down + 1, .groups = p->groups};
 	out->rgb = mem_alloc(pixels * 3, sizeof *out->rgb);
 	j.mean = mem_alloc(pixels * 3, sizeof *j.mean);
+	j.weight = mem_alloc(pixels * 3, sizeof *j.weight);
+	j.worst = mem_alloc(pixels * 2, sizeof *j.worst);
 	j.rel_mse = mem_alloc(n, sizeof *j.rel_mse);
 	j.degrees = mem_alloc(n, sizeof *j.degrees);
 	j.blocks = mem_alloc(n * j.groups * j.cells, sizeof *j.blocks);
-	int rc = !out->rgb || !j.mean || !j.rel_mse || !j.degrees || !j.blocks ? error_set(e, ENOMEM, "no memory for the comparison") :
+	int rc = !out->rgb || !j.mean || !j.weight || !j.worst || !j.rel_mse || !j.degrees || !j.blocks ? error_set(e, ENOMEM, "no memory for the comparison") :
 										 judge(&j, reference, e);
 	mem_free(j.mean);
+	mem_free(j.weight);
+	mem_free(j.worst);
 	mem_free(j.rel_mse);
 	mem_free(j.degrees);
 	mem_free(j.blocks);

@@ -57,8 +57,6 @@ void accuracy_plot_sweep(struct page *p, const struct accuracy_context *x, const
 		double at = (double)k + 1;
 		names[k] = s->value[k];
 		add_point(i == ACCURACY_DEFAULT ? &standard : &error, at, f->equal_time);
-		if (i == ACCURACY_CAREFUL && !j->file)
-			continue;
 		add_point(&mean, at - 0.06, f->bias_mean);
 		if (j->across * j->down > 1)
 			add_point(&block, at + 0.06, f->bias_block);
@@ -83,7 +81,7 @@ void accuracy_plot_front(struct page *p, const struct accuracy_context *x)
 		kinds[k].count = 0;
 	for (size_t i = 0; i < x->design->count; i++) {
 		const struct accuracy_figures *f = &j->figures[i];
-		if (i == ACCURACY_CAREFUL && !j->file)
+		if (i == ACCURACY_REFERENCE)
 			continue;
 		struct points *to = &kinds[i == ACCURACY_DEFAULT ? 2 : f->beaten_by == i ? 1 : 0];
 		size_t k = to->count;

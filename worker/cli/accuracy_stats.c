@@ -65,8 +65,9 @@ struct interval stats_median(double *x, size_t count)
 static bool beats(const struct stats_point *j, const struct stats_point *i, double z)
 {
 	double apart = z * hypot(i->log_sd, j->log_sd), more = j->log_error - i->log_error;
-	bool less_error = more < -apart, less_bias = j->bias_bound < i->bias_seen;
-	bool more_bias = j->bias_suspect > i->bias_suspect || (i->bias_bound > 0 && j->bias_bound > 1.5 * i->bias_bound);
+	bool less_error = more < -apart, known = !(j->bias_bound > 1.5 * i->bias_bound);
+	bool more_bias = j->bias_suspect > i->bias_suspect || !known;
+	bool less_bias = j->bias_bound < i->bias_seen || (i->bias_seen > 0 && j->bias_suspect == 0 && known);
 	return (less_error && !more_bias) || (less_bias && !(more > apart));
 }
 

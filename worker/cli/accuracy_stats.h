@@ -26,12 +26,13 @@ struct stats_point {
 	double log_error, log_sd; /* of the error at equal time, and its standard deviation */
 	double bias_suspect;      /* the least that the bias is by this setting's own interval, 0: it holds 0 */
 	double bias_seen;         /* ... when all settings are asked at once: what chance alone does not do */
-	double bias_bound;        /* the most that it may be; 0: it is what the others are measured by */
+	double bias_bound;        /* the most that it may be */
 };
 
 /*
  * j beats i when its error at equal time is surely less and nothing speaks for more bias: it is not more suspect, nor may its bias
- * be half as large again as i's; or when its bias is surely less and its error not surely more. What nobody beats is on the
+ * be half as large again as i's; or when its bias is less (i's was seen, and none of j, or none that large) and its error not
+ * surely more. What nobody beats is on the
  * front. "Surely": at `level`, shared among the n - 1 others. by[i]: who beats i with the least error, or i itself when it is
  * on the front.
  */

@@ -39,7 +39,7 @@ static const struct argp_option options[] = {
 	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors)", 0},
 	{"knobs", OPTION_KNOBS, "LIST", 0,
 	 "Only these: settings of --set (its help names them), max-depth, independent, mixture, preset; with commas between", 0},
-	{"reference", OPTION_REFERENCE, "FILE", 0, "An image (OpenEXR) to measure the bias against, in place of the careful setting", 0},
+	{"reference", OPTION_REFERENCE, "FILE", 0, "An image (OpenEXR) to measure the bias against, in place of a careful render", 0},
 	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
 	{0},
 };
@@ -191,7 +191,7 @@ static int design(struct session *s, struct error *e)
 	s->usage = rc == -EINVAL;
 	if (rc || s->a->quiet)
 		return rc;
-	fprintf(stderr, "%zu settings: the default, a careful one and %zu knobs\n", s->design.count, s->design.sweep_count);
+	fprintf(stderr, "%zu settings: the default, a reference and %zu knobs\n", s->design.count, s->design.sweep_count);
 	for (size_t i = 0; i < s->design.left_out_count; i++)
 		fprintf(stderr, "left out: %s (%s)\n", s->design.left_out[i].knob, s->design.left_out[i].why);
 	return 0;

@@ -413,6 +413,14 @@ static void blocks_of_groups_make_the_image(void **unused)
 			}
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 		canvas_group_blocks(c, 3, 2, block[0]);
+		double distance[4], squares = 0, *weights = mem_alloc(21000, sizeof *weights);
+		for (size_t i = 0; i < 21000; i++) {
+			weights[i] = uniform();
+			squares += weights[i] * (double)img.error[i] * (double)img.error[i];
+		}
+		canvas_group_distances(c, weights, distance);
+		mem_free(weights);
+		assert_true(fabs((distance[0] + distance[1] + distance[2] + distance[3]) / (4 * 3 * squares) - 1) < 1e-6);
 		for (uint32_t g = 0; g < 4; g++) {
 			/* Undo the group's own b, so that the pooled one remains. */
 			double own = kind == PLAN_CHAINS ? (g + 1) / img.b : 1;
