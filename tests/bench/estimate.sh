@@ -62,23 +62,23 @@ public=${HSLT_SCENES:-/nowhere}
 row demo "$scenes/demo/scene.xml" 0.12 1 128
 row demo "$scenes/demo/scene.xml" 0.10 2 128
 row demo "$scenes/demo/scene.xml" 0.08 3 128
-row demo-path "$scenes/demo/scene.xml" 0.20 4 1 --integrator path
-row box "$scenes/box/box.xml" 0.10 1 128
-row box "$scenes/box/box.xml" 0.07 2 128
-row box "$scenes/box/box.xml" 0.05 3 128
-row box-pssmlt "$scenes/box/box.xml" 0.06 4 128 --integrator pssmlt
-row displaced "$scenes/displaced/scene.xml" 0.14 1 64
-row displaced "$scenes/displaced/scene.xml" 0.11 2 64
-row displaced "$scenes/displaced/scene.xml" 0.09 3 64
-row cornell-box "$public/cornell-box/scene.xml" 0.22 1 64
-row cornell-box "$public/cornell-box/scene.xml" 0.17 2 64
-row cornell-box "$public/cornell-box/scene.xml" 0.14 3 64
-row veach-door "$public/veach-door/scene.xml" 0.30 1 32
-row veach-door "$public/veach-door/scene.xml" 0.25 2 32
-row veach-door "$public/veach-door/scene.xml" 0.20 3 32
-row three-spheres "$public/three-spheres.xml" 0.20 1 128
-row three-spheres "$public/three-spheres.xml" 0.17 2 128
-row three-spheres "$public/three-spheres.xml" 0.15 3 128
+row demo-path "$scenes/demo/scene.xml" 0.12 4 1 --integrator path
+row box "$scenes/box/box.xml" 0.05 1 128
+row box "$scenes/box/box.xml" 0.035 2 128
+row box "$scenes/box/box.xml" 0.03 3 128
+row box-pssmlt "$scenes/box/box.xml" 0.08 4 128 --integrator pssmlt
+row displaced "$scenes/displaced/scene.xml" 0.12 1 64
+row displaced "$scenes/displaced/scene.xml" 0.09 2 64
+row displaced "$scenes/displaced/scene.xml" 0.07 3 64
+row cornell-box "$public/cornell-box/scene.xml" 0.07 1 64
+row cornell-box "$public/cornell-box/scene.xml" 0.055 2 64
+row cornell-box "$public/cornell-box/scene.xml" 0.045 3 64
+row veach-door "$public/veach-door/scene.xml" 0.25 1 32
+row veach-door "$public/veach-door/scene.xml" 0.20 2 32
+row veach-door "$public/veach-door/scene.xml" 0.15 3 32
+row three-spheres "$public/three-spheres.xml" 0.13 1 128
+row three-spheres "$public/three-spheres.xml" 0.10 2 128
+row three-spheres "$public/three-spheres.xml" 0.085 3 128
 
 # of the rows: how many hold, and the median of predicted over real
 awk '
