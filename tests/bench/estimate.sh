@@ -73,9 +73,9 @@ row displaced "$scenes/displaced/scene.xml" 0.07 3 64
 row cornell-box "$public/cornell-box/scene.xml" 0.07 1 64
 row cornell-box "$public/cornell-box/scene.xml" 0.055 2 64
 row cornell-box "$public/cornell-box/scene.xml" 0.045 3 64
-row veach-door "$public/veach-door/scene.xml" 0.25 1 32
-row veach-door "$public/veach-door/scene.xml" 0.20 2 32
-row veach-door "$public/veach-door/scene.xml" 0.15 3 32
+row veach-door "$public/veach-door/scene.xml" 0.40 1 32
+row veach-door "$public/veach-door/scene.xml" 0.32 2 32
+row veach-door "$public/veach-door/scene.xml" 0.27 3 32
 row three-spheres "$public/three-spheres.xml" 0.13 1 128
 row three-spheres "$public/three-spheres.xml" 0.10 2 128
 row three-spheres "$public/three-spheres.xml" 0.085 3 128
