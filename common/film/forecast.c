@@ -15,8 +15,8 @@ static const double used_share = 1.0 / 16; /* looks at less than this share of t
 static const double burst = 0.15;           /* spread of a look beyond chi-square: light that comes in rare bursts */
 static const double trend_prior = 0.2;     /* standard deviation of the trend: light that comes in rare bursts, chains that
 					    * have not forgotten their seeds yet */
-static const double memory = 1.2, memory_sd = 0.6; /* e-folds of work over which a trend dies down; its logarithm's spread */
-static const double drift = 0.05;          /* what else may change in an e-fold of work that nobody has seen */
+static const double memory = 2, memory_sd = 0.8; /* e-folds of work over which a trend dies down; its logarithm's spread */
+static const double drift = 0.08;          /* what else may change in an e-fold of work that nobody has seen */
 static const double price_floor = 0.03;    /* relative spread of a sample's price from one stretch of time to another */
 static const double log_four = 1.3862943611198906;
 
