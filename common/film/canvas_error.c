@@ -15,7 +15,7 @@
 enum { FOLDED = 16, VALUES = 3 * PLAN_MAX_GROUPS };
 
 /* Squared relative standard error below which a brightness is believed. */
-static const double believed = 0.04;
+static const double believed = 0.08;
 
 /* A tile at work. Rows of `apart` hold three channels of `groups` values. */
 struct tile_error {
@@ -94,10 +94,11 @@ struct block {
 	double all_apart[VALUES], open_apart[VALUES]; /* [3][groups] */
 };
 
-/* What the errors of a pixel are divided by, squared; the third term makes up for the noise of B in the others. */
-static double divisor_square(double brightness, double square, double floor_square)
+/* What the errors are divided by, squared. B's own noise makes 1 / B^2 too large by three of its variances, less two because
+ * errors are largest where B came out too bright, if brightness comes in hits: `variances` are 1, or 3 where they are apart. */
+static double divisor_square(const struct tile_error *t, double brightness, double square, double variances)
 {
-	return brightness * brightness + floor_square + 3 * square;
+	return brightness * brightness + t->floor_square + variances * square;
 }
 
 static bool believe(double brightness, double square, double floor_square)
@@ -113,17 +114,17 @@ static void add_share(struct tile_error *t, double part, double brightness, doub
 	t->doubt += slope * slope * square;
 }
 
-/* A group's errors are divided by the brightness that the other groups found: its own fireflies are in both else. Here to
- * second order, since the brightness is believed. */
-static void settle_pixel(struct tile_error *t, size_t pixel, size_t k)
+/* By the pixel's own brightness. Where it is believed, a group's errors are divided by the brightness that the other groups found,
+ * to second order: what errors and brightness have in common is taken out, however clumped they come. */
+static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool believed_in)
 {
 	double brightness = t->brightness[pixel][k], square = t->square[pixel][k];
-	double divisor = divisor_square(brightness, square, t->floor_square), root = 1 / sqrt(divisor);
-	float r = (float)root, slope = (float)(brightness / divisor / (t->groups - 1));
+	double divisor = divisor_square(t, brightness, square, believed_in ? 3 : 1);
+	float root = (float)(1 / sqrt(divisor)), slope = believed_in ? (float)(brightness / divisor / (t->groups - 1)) : 0;
 	float *apart = apart_at(t, pixel) + k * t->groups;
 	for (uint32_t g = 0; g < t->groups; g++) {
 		float x = slope * apart[g];
-		apart[g] *= r + r * (x + x * x);
+		apart[g] *= root * (1 + x + x * x);
 	}
 	add_share(t, square / divisor, brightness, square, divisor);
 }
@@ -133,17 +134,35 @@ static void settle_pixels(struct tile_error *t, size_t first, size_t count)
 	for (size_t pixel = first; pixel < first + count; pixel++)
 		for (size_t k = 0; k < 3; k++)
 			if (t->settled[pixel][k])
-				settle_pixel(t, pixel, k);
+				settle_pixel(t, pixel, k, true);
 }
 
+/* Squared relative standard error of the mean pixel of the 2 x 2 that this one lies in, each no more than 1. */
+static double noise_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
+{
+	double sum = 0, n = 0;
+	for (uint32_t j = y & ~1u; j < t->height && j <= (y | 1); j++)
+		for (uint32_t i = x & ~1u; i < t->width && i <= (x | 1); i++, n++) {
+			size_t p = (size_t)j * t->width + i;
+			double below = t->brightness[p][k] * t->brightness[p][k] + t->floor_square;
+			sum += t->square[p][k] < below ? t->square[p][k] / below : 1;
+		}
+	return sum / n;
+}
+
+/* A pixel keeps its own brightness where its neighbourhood is believed: by itself alone, those that came out bright would keep it
+ * and those that came out dark would not. Or where it is out of doubt, whatever is beside it. */
 static uint32_t find_settled(struct tile_error *t)
 {
 	uint32_t waiting = 0;
-	for (size_t i = 0; i < (size_t)t->width * t->height; i++)
-		for (int k = 0; k < 3; k++) {
-			t->settled[i][k] = believe(t->brightness[i][k], t->square[i][k], t->floor_square);
-			waiting += !t->settled[i][k];
-		}
+	for (uint32_t y = 0; y < t->height; y++)
+		for (uint32_t x = 0; x < t->width; x++)
+			for (size_t k = 0; k < 3; k++) {
+				size_t p = (size_t)y * t->width + x;
+				t->settled[p][k] = believe(t->brightness[p][k], 8 * t->square[p][k], t->floor_square) ||
+						   noise_around(t, x, y, k) <= believed;
+				waiting += !t->settled[p][k];
+			}
 	return waiting;
 }
 
@@ -158,7 +177,8 @@ static double spread_square(const double *apart, uint32_t groups, double pixels)
 /*
  * The block's weight for what waits in it. Its brightness is the mean of all its pixels: those without a firefly count as
  * those with one. But pixels that were believed and are more than twice as bright as what waits, a lamp beside a wall, are
- * something else and are left out.
+ * something else and are left out. And a pixel that is brighter than the block by 1.5 of its standard errors has met its light in
+ * three groups or more: that is no firefly (which is one standard error high) but a glint, and keeps its own brightness.
  */
 static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32_t x, uint32_t y, uint32_t size)
 {
@@ -170,21 +190,23 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 	double square = spread_square(apart, t->groups, n);
 	if (!believe(brightness, square, t->floor_square) && size < TILE_SIZE)
 		return;
-	float root[PLAN_MAX_GROUPS];
-	for (uint32_t g = 0; g < t->groups; g++)
-		root[g] = (float)(1 / sqrt(divisor_square(brightness - apart[g] / n / (t->groups - 1), square, t->floor_square)));
+	double divisor = divisor_square(t, brightness, square, 1);
+	float root = (float)(1 / sqrt(divisor));
 	for (uint32_t j = y; j < y + size && j < t->height; j++)
 		for (uint32_t i = x; i < x + size && i < t->width; i++) {
 			size_t pixel = (size_t)j * t->width + i;
 			if (t->settled[pixel][k])
 				continue;
+			t->settled[pixel][k] = true;
+			if (t->brightness[pixel][k] - brightness > 1.5 * sqrt(t->square[pixel][k])) {
+				settle_pixel(t, pixel, k, false);
+				continue;
+			}
 			float *own = apart_at(t, pixel) + k * t->groups;
 			for (uint32_t g = 0; g < t->groups; g++)
-				own[g] *= root[g];
-			t->settled[pixel][k] = true;
+				own[g] *= root;
 			part += t->square[pixel][k];
 		}
-	double divisor = divisor_square(brightness, square, t->floor_square);
 	add_share(t, part / divisor, brightness, square, divisor);
 	b->waiting[k] = 0;
 	b->open[k] = 0;
@@ -345,8 +367,10 @@ static double distance_spread(const struct tile_error *t, double mean)
  *
  * Of its expectation it is about chi-square over its degrees of freedom, those with the spread that the distances show
  * (Satterthwaite 1946), but no more than own_degrees allows: 16 distances may lie together by chance, the products of pairs
- * hardly. The error at hand over the estimate is F with own_degrees and (groups - 1) times as many: heavy tails are in both.
- * Where there are too few groups to tell, one degree of freedom is taken.
+ * hardly. The error at hand over the estimate is F with own_degrees and (groups - 1) times as many: heavy tails are in both. Own
+ * degrees are fewer by (groups - 1) / (groups + 2), since they come from so many groups themselves: intervals are wider by as much as
+ * Student's t is than the normal. The doubt of the weights adds to both. Where there are too few groups to tell, one degree of
+ * freedom is taken.
  */
 static void find_rel_mse(struct making *m, struct tile_error *t)
 {
@@ -361,7 +385,7 @@ static void find_rel_mse(struct making *m, struct tile_error *t)
 		return;
 	double doubt = t->share > 0 ? t->doubt / (t->share * t->share) : 0, own = own_degrees(t);
 	double degrees = 1 / (0.5 * doubt + fmax(1 / own, 0.5 * distance_spread(t, mean)) / (groups - 1));
-	own = fmax(1, 1 / (1 / own + 0.5 * doubt * (groups - 1) / groups));
+	own = fmax(1, (groups - 1) / (groups + 2) / (1 / own + 0.5 * doubt * (groups - 1) / groups));
 	img->rel_mse_degrees = degrees;
 	img->rel_mse_upper *= degrees / (t->groups == 2 ? 0.00393214 : chi_square_5(degrees));
 	img->rel_mse_95[0] *= f_quantile(0.025, own, own * (groups - 1));
