@@ -369,7 +369,8 @@ static double distance_spread(const struct tile_error *t, double mean)
  * (Satterthwaite 1946), but no more than own_degrees allows: 16 distances may lie together by chance, the products of pairs
  * hardly. The error at hand over the estimate is F with own_degrees and (groups - 1) times as many: heavy tails are in both. Own
  * degrees are fewer by (groups - 1) / (groups + 2), since they come from so many groups themselves: intervals are wider by as much as
- * Student's t is than the normal. The doubt of the weights adds to both. Where there are too few groups to tell, one degree of
+ * Student's t is than the normal. The doubt of the weights adds to both, to own degrees
+ * twice, since brightness that comes in hits is skewed. Where there are too few groups to tell, one degree of
  * freedom is taken.
  */
 static void find_rel_mse(struct making *m, struct tile_error *t)
@@ -385,7 +386,7 @@ static void find_rel_mse(struct making *m, struct tile_error *t)
 		return;
 	double doubt = t->share > 0 ? t->doubt / (t->share * t->share) : 0, own = own_degrees(t);
 	double degrees = 1 / (0.5 * doubt + fmax(1 / own, 0.5 * distance_spread(t, mean)) / (groups - 1));
-	own = fmax(1, (groups - 1) / (groups + 2) / (1 / own + 0.5 * doubt * (groups - 1) / groups));
+	own = fmax(1, (groups - 1) / (groups + 2) / (1 / own + doubt));
 	img->rel_mse_degrees = degrees;
 	img->rel_mse_upper *= degrees / (t->groups == 2 ? 0.00393214 : chi_square_5(degrees));
 	img->rel_mse_95[0] *= f_quantile(0.025, own, own * (groups - 1));
