@@ -179,8 +179,8 @@ static void put_guide(struct page *p, const struct accuracy_context *x)
 		    "chance even though all blocks of all settings were asked.</p>\n", x->judgement->across, x->judgement->down);
 	paragraph(p, "A setting lies on the front (shaded) when no other one beats it: none has surely less error at equal time without a sign of more "
 		     "bias, and none is free of a bias that was seen in it without surely more error. \"Surely\" is beyond the intervals, shared among all "
-		     "settings; a setting whose bias is known much less well, or whose own interval of the bias leaves out 0, beats nobody by speed. Nor do max-depth, roughness and tessellation, which make "
-		     "another image by what they are: they may lie on the front, as trades.");
+		     "settings; a setting whose bias is known much less well, or whose own interval of the bias leaves out 0, beats nobody by speed. max-depth, roughness and tessellation make "
+		     "another image by what they are: they beat nobody, and may lie on the front as trades.");
 	if (!x->judgement->file)
 		paragraph(p, "The reference is the careful preset, rendered longer, so that a bias which it has too cannot be seen here; --reference FILE takes an "
 			     "image of another integrator instead.");

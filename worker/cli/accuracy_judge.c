@@ -6,7 +6,6 @@
 
 #include "common/base/mem.h"
 
-#include <float.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -210,9 +209,7 @@ static void take_bias(struct judge *j, size_t i, const double *reference, size_t
 			f->block = (unsigned)c;
 		}
 	}
-	/* What is known to bias has not to be seen to be suspect. */
-	if (j->r->design->settings[i].other_image)
-		point->bias_suspect = fmax(point->bias_suspect, DBL_MIN);
+	point->other_image = j->r->design->settings[i].other_image;
 	point->bias_seen = f->bias_seen;
 	point->bias_bound = f->bias_bound;
 }

@@ -64,6 +64,8 @@ struct interval stats_median(double *x, size_t count)
 
 static bool beats(const struct stats_point *j, const struct stats_point *i, double z)
 {
+	if (j->other_image)
+		return false;
 	double apart = z * hypot(i->log_sd, j->log_sd), more = j->log_error - i->log_error;
 	bool less_error = more < -apart, known = !(j->bias_bound > 1.5 * i->bias_bound);
 	bool more_bias = j->bias_suspect > i->bias_suspect || !known;

@@ -27,6 +27,7 @@ struct stats_point {
 	double bias_suspect;      /* the least that the bias is by this setting's own interval, 0: it holds 0 */
 	double bias_seen;         /* ... when all settings are asked at once: what chance alone does not do */
 	double bias_bound;        /* the most that it may be */
+	bool other_image;         /* it is known to bias, seen or not: it beats nobody */
 };
 
 /*

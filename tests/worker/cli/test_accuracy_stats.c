@@ -77,13 +77,13 @@ static void the_front(void **unused)
 {
 	(void)unused;
 	const struct stats_point p[] = {
-		{log(10.0), 0.02, 0, 0, 0.01},     /* the default */
-		{log(10.2), 0.02, 0, 0, 0.01},     /* not surely slower */
-		{log(14.0), 0.02, 0, 0, 0.01},     /* surely slower, no better */
-		{log(5.0), 0.02, 0.05, 0.05, 0.07},   /* twice as fast, biased: a trade */
-		{log(5.1), 0.02, 0.20, 0.20, 0.25},   /* as fast, more biased */
-		{log(9.9), 0.02, 0.03, 0.03, 0.05},   /* as fast as the default, biased */
-		{log(7.0), 0.02, 0.06, 0.06, 0.08},   /* slower and no less biased than the fourth */
+		{log(10.0), 0.02, 0, 0, 0.01, false},     /* the default */
+		{log(10.2), 0.02, 0, 0, 0.01, false},     /* not surely slower */
+		{log(14.0), 0.02, 0, 0, 0.01, false},     /* surely slower, no better */
+		{log(5.0), 0.02, 0.05, 0.05, 0.07, false},   /* twice as fast, biased: a trade */
+		{log(5.1), 0.02, 0.20, 0.20, 0.25, false},   /* as fast, more biased */
+		{log(9.9), 0.02, 0.03, 0.03, 0.05, false},   /* as fast as the default, biased */
+		{log(7.0), 0.02, 0.06, 0.06, 0.08, false},   /* slower and no less biased than the fourth */
 	};
 	size_t by[7];
 	stats_front(p, 7, 0.05, by);
@@ -92,13 +92,21 @@ static void the_front(void **unused)
 	assert_int_equal(by[4], 3);
 	assert_int_equal(by[5], 0);
 	assert_int_equal(by[6], 3);
-	const struct stats_point wide[] = {{log(10.0), 0.3, 0, 0, 0.01}, {log(12.0), 0.3, 0, 0, 0.01}, {log(5.0), 0.3, 0, 0, 0.5}};
+	const struct stats_point wide[] = {{log(10.0), 0.3, 0, 0, 0.01, false}, {log(12.0), 0.3, 0, 0, 0.01, false}, {log(5.0), 0.3, 0, 0, 0.5, false}};
 	stats_front(wide, 3, 0.05, by);
 	assert_true(by[0] == 0 && by[1] == 1 && by[2] == 2);
 	/* Faster, but suspect, or known too little: neither beats. */
-	const struct stats_point weak[] = {{log(10.0), 0.02, 0, 0, 0.5}, {log(5.0), 0.02, 0.03, 0, 0.5}, {log(5.0), 0.02, 0, 0, 0.9}};
+	const struct stats_point weak[] = {{log(10.0), 0.02, 0, 0, 0.5, false}, {log(5.0), 0.02, 0.03, 0, 0.5, false}, {log(5.0), 0.02, 0, 0, 0.9, false}};
 	stats_front(weak, 3, 0.05, by);
 	assert_true(by[0] == 0 && by[1] == 1 && by[2] == 2);
+	/* Known to make another image: it may be beaten, and beats nobody. */
+	const struct stats_point other[] = {{log(10.0), 0.02, 0.01, 0, 0.05, false}, {log(5.0), 0.02, 0, 0, 0.05, true},
+					    {log(20.0), 0.02, 0, 0, 0.05, true}};
+	stats_front(other, 3, 0.05, by);
+	assert_true(by[0] == 0 && by[1] == 1 && by[2] == 2);
+	const struct stats_point same[] = {{log(10.0), 0.02, 0, 0, 0.05, false}, {log(20.0), 0.02, 0, 0, 0.05, true}};
+	stats_front(same, 2, 0.05, by);
+	assert_true(by[0] == 0 && by[1] == 0);
 	stats_front(p, 1, 0.05, by);
 	assert_int_equal(by[0], 0);
 }
