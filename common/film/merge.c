@@ -120,11 +120,11 @@ void bootstrap_to_canvas(const struct bootstrap *s, struct canvas *c)
 	}
 }
 
-/* Rounds between two looks at least. A look costs about 12 ns a pixel and group, a mutation or a sample 2 us or more: of the work
- * since the last one a look is 1 % after 0.6 of them a pixel for each group. */
+/* Rounds between two looks at least. A look costs 15 to 17 ns a pixel and group, a mutation or a sample 2 us or more: of the work
+ * since the last one a look is less than 1 % after 0.9 of them a pixel for each group. */
 static uint64_t look_rounds(const struct plan *p)
 {
-	uint64_t work = (uint64_t)p->crop_width * p->crop_height * p->groups / 5 * 3, round = plan_round_mutations(p);
+	uint64_t work = (uint64_t)p->crop_width * p->crop_height * p->groups / 10 * 9, round = plan_round_mutations(p);
 	return work / round + (work % round != 0);
 }
 
