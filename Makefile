@@ -128,8 +128,13 @@ BENCH_SRC := $(wildcard tests/bench/*.c)
 $(BUILD)/bench/bench: $(call obj,$(BENCH_SRC)) $(LIB_TEST) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(BENCH_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occluded_to_infinity,--wrap=halfvec_walk_from,--wrap=whole_visible
-bench: programs $(BUILD)/bench/bench
+bench: programs $(BUILD)/bench/bench $(if $(filter effects,$(BENCH)),plain)
 	$(BUILD)/bench/bench --bin $(BUILD)/bin --json $(BUILD)/bench.json $(BENCH)
+
+# A renderer that knows nothing of colour, dispersion and apertures, to measure what asking for them costs.
+.PHONY: plain
+plain:
+	$(MAKE) BUILD=$(BUILD)/plain EXTRA_CFLAGS="$(EXTRA_CFLAGS) -DHSLT_PLAIN" $(BUILD)/plain/bin/hslt-render
 
 # The demo scene on a farm of two workers on this machine: build/demo/demo.exr and demo.png.
 demo: programs

@@ -44,5 +44,6 @@ void bench_tiles(const char *bin);
 void bench_parts(const char *bin);
 void bench_farm(const char *bin);
 void bench_memory(const char *bin);
+void bench_effects(const char *bin); /* minutes of valgrind: only when named */
 
 #endif

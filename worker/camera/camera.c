@@ -47,7 +47,12 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 
 bool camera_has_aperture(const struct camera *c)
 {
+#ifdef HSLT_PLAIN
+	(void)c;
+	return false;
+#else
 	return c->lens;
+#endif
 }
 
 void camera_force_aperture(struct camera *c, bool on)

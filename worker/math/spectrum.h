@@ -23,6 +23,13 @@ struct wavelengths {
 	unsigned few; /* 0: all differ; 1 or 2: nm repeats after so many, for the same mean from fewer wavelengths */
 };
 
+/* See EFFECT_IS_ON in worker/world/world.h. */
+#ifdef HSLT_PLAIN
+#define WAVELENGTHS_GREY(w) ((void)(w), true)
+#else
+#define WAVELENGTHS_GREY(w) ((w)->grey)
+#endif
+
 static inline spectrum spectrum_of(double x)
 {
 	return (spectrum){{x, x, x, x}};

@@ -26,7 +26,7 @@ bool breakup_allows(const struct whole_path *x, unsigned b, unsigned c)
 /* A symmetric step, mirrored at the ends of the range. */
 static double move_wavelength(const struct path_context *c, double u, double r)
 {
-	if (!c->w->effects.dispersion)
+	if (!EFFECT_IS_ON(c->w, dispersion))
 		return r;
 	double v = u + (2 * r - 1) * WAVELENGTH_STEP / (WAVELENGTH_MAX - WAVELENGTH_MIN);
 	v = v < 0 ? -v : v >= 1 ? 2 - v : v;
@@ -36,7 +36,7 @@ static double move_wavelength(const struct path_context *c, double u, double r)
 /* Some vertex that stays where it is would have to move for another wavelength. */
 static bool holds_wavelength(const struct path_context *c, const struct whole_path *x, unsigned b, unsigned c_end)
 {
-	if (!c->w->effects.dispersion || b == 0)
+	if (!EFFECT_IS_ON(c->w, dispersion) || b == 0)
 		return false;
 	for (unsigned j = 1; j < c_end; j++)
 		if (x->v[j].delta && x->v[j].bsdf->dispersive)
@@ -125,9 +125,9 @@ static void add_step_densities(struct mutation_ctx *m, const struct breakup *how
 /* What of the constraints of one path does not hold when the walk to the other starts from it. */
 static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct whole_path *x, const struct whole_path *y)
 {
-	if (m->path->w->effects.dispersion && x->wavelength != y->wavelength)
+	if (EFFECT_IS_ON(m->path->w, dispersion) && x->wavelength != y->wavelength)
 		return WALK_STALE;
-	bool aperture = how->aperture && camera_has_aperture(&m->path->w->camera);
+	bool aperture = how->aperture && EFFECT_IS_ON(m->path->w, aperture);
 	bool b_moved = how->b < x->edges || aperture, c_moved = how->c == 0 && how->emitter;
 	return (b_moved ? WALK_STALE_B : 0) | (c_moved ? WALK_STALE_C : 0);
 }
@@ -213,12 +213,12 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 	struct path_context *c = m->path;
 	unsigned k = x->edges, b = how->b, c_end = b > 0 ? how->c : 0;
 	*move = (struct move){.first = c_end, .last = k, .b = b, .c = c_end, .log_density = {how->log_choice, 0}};
-	if (how->wavelength && c->w->effects.colour && !holds_wavelength(c, x, b, c_end)) {
+	if (how->wavelength && EFFECT_IS_ON(c->w, colour) && !holds_wavelength(c, x, b, c_end)) {
 		double r[4];
 		mutation_random(m, BLOCK_ENDS, r);
 		whole_set_wavelength(c, y, move_wavelength(c, x->wavelength, r[0]));
 	}
-	bool aperture = how->aperture && camera_has_aperture(&c->w->camera);
+	bool aperture = how->aperture && EFFECT_IS_ON(c->w, aperture);
 	enum strategy_counter end = STRATEGY_PROPOSED;
 	if (b == c_end && b > 0)
 		return STRATEGY_PROPOSED;

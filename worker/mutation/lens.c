@@ -15,7 +15,7 @@ static const struct strategy strategy = {&any_end, STRATEGY_CAMERA, STRATEGY_DRA
 static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct whole_path *x,
 				     struct whole_path *y, struct move *move)
 {
-	if (!camera_has_aperture(&m->path->w->camera))
+	if (!EFFECT_IS_ON(m->path->w, aperture))
 		return STRATEGY_FAIL_INAPPLICABLE;
 	return strategy_propose(&strategy, m, how, x, y, move);
 }

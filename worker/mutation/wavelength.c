@@ -17,7 +17,7 @@ static bool must_move(const struct whole_path *x)
 static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct whole_path *x,
 				     struct whole_path *y, struct move *move)
 {
-	if (!m->path->w->effects.colour)
+	if (!EFFECT_IS_ON(m->path->w, colour))
 		return STRATEGY_FAIL_INAPPLICABLE;
 	if (must_move(x)) {
 		const struct mutation_setting all = {(int)x->edges, 0};

@@ -130,7 +130,7 @@ spectrum path_collapse(spectrum l, bool dispersive)
 
 static bool disperses(const struct path_context *c, const struct joined_path *p)
 {
-	if (!c->w->effects.dispersion)
+	if (!EFFECT_IS_ON(c->w, dispersion))
 		return false;
 	for (unsigned i = 1; i < p->edges; i++)
 		if (p->v[i]->bsdf->dispersive)

@@ -244,7 +244,7 @@ unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned ma
 	const double *u = s->block(s, SIDE_CAMERA, 0);
 	film[0] = c->window.x + u[DIM_FILM_X] * c->window.width;
 	film[1] = c->window.y + u[DIM_FILM_Y] * c->window.height;
-	if (w->effects.colour)
+	if (EFFECT_IS_ON(w, colour))
 		c->wl = wavelengths_sample_few(u[DIM_WAVELENGTH], (unsigned)w->knobs.wavelengths);
 	else
 		c->wl.grey = true;
@@ -381,7 +381,7 @@ bool path_splat(struct path_context *c, struct path_sample *out, double x, doubl
 	struct splat *s = &out->splats[out->count++];
 	s->x = x;
 	s->y = y;
-	if (c->wl.grey)
+	if (!EFFECT_IS_ON(c->w, colour))
 		for (int i = 0; i < 3; i++)
 			s->xyz[i] = l.v[0] * c->w->grey_xyz[i];
 	else

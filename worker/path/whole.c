@@ -33,7 +33,7 @@ void product_mul(struct product *p, spectrum f)
 static void to_xyz(const struct path_context *c, const struct whole_path *x, spectrum l, double xyz[3])
 {
 	l = path_collapse(l, whole_is_dispersed(c, x));
-	if (x->wl.grey)
+	if (!EFFECT_IS_ON(c->w, colour))
 		for (int i = 0; i < 3; i++)
 			xyz[i] = l.v[0] * c->w->grey_xyz[i];
 	else
@@ -141,7 +141,7 @@ void whole_set_wavelength(const struct path_context *c, struct whole_path *x, do
 {
 	x->wavelength = u;
 	x->known_f = x->known_fh = 0;
-	if (c->w->effects.colour)
+	if (EFFECT_IS_ON(c->w, colour))
 		x->wl = wavelengths_sample_few(u, (unsigned)c->w->knobs.wavelengths);
 	else
 		x->wl.grey = true;
@@ -149,7 +149,7 @@ void whole_set_wavelength(const struct path_context *c, struct whole_path *x, do
 
 bool whole_is_dispersed(const struct path_context *c, const struct whole_path *x)
 {
-	if (!c->w->effects.dispersion)
+	if (!EFFECT_IS_ON(c->w, dispersion))
 		return false;
 	for (unsigned j = 1; j < x->edges; j++)
 		if (x->v[j].bsdf->dispersive)
@@ -250,7 +250,7 @@ bool whole_from_subpaths(struct path_context *c, unsigned s, unsigned edges, str
 	double pdf;
 	x->edges = edges;
 	x->wl = c->wl;
-	x->wavelength = c->wl.grey ? 0 : (c->wl.nm[0] - WAVELENGTH_MIN) / (WAVELENGTH_MAX - WAVELENGTH_MIN);
+	x->wavelength = !EFFECT_IS_ON(c->w, colour) ? 0 : (c->wl.nm[0] - WAVELENGTH_MIN) / (WAVELENGTH_MAX - WAVELENGTH_MIN);
 	if (s > 0 && t > 1 && (z->kind != VERTEX_SURFACE || !z->bsdf->has_smooth))
 		return false;
 	if (s == 0) {

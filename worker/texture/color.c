@@ -62,7 +62,7 @@ static void table_lookup(const double rgb[3], double c[3])
 
 spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelengths *w)
 {
-	if (w->grey || (rgb[0] == rgb[1] && rgb[1] == rgb[2]))
+	if (WAVELENGTHS_GREY(w) || (rgb[0] == rgb[1] && rgb[1] == rgb[2]))
 		return spectrum_of(rgb[0]);
 	double c[3];
 	table_lookup(rgb, c);
@@ -77,7 +77,7 @@ spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelength
 spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths *w)
 {
 	double largest = fmax(rgb[0], fmax(rgb[1], rgb[2]));
-	if (largest == 0 || w->grey)
+	if (largest == 0 || WAVELENGTHS_GREY(w))
 		return spectrum_of(largest);
 	const double unit[3] = {rgb[0] / largest, rgb[1] / largest, rgb[2] / largest};
 	spectrum s = color_eval_rgb_reflectance(unit, w);
@@ -242,7 +242,7 @@ static inline spectrum eval_lanes(const struct color *c, const struct wavelength
 
 spectrum color_eval(const struct color *c, const struct wavelengths *w)
 {
-	if (w->grey || c->shape == COLOR_SHAPE_CONSTANT) {
+	if (WAVELENGTHS_GREY(w) || c->shape == COLOR_SHAPE_CONSTANT) {
 		assert(c->shape != COLOR_SHAPE_OTHER);
 		return spectrum_of(c->scale);
 	}

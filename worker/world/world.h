@@ -35,6 +35,14 @@ struct world {
 	struct accel *accel;
 };
 
+/* Asked while rendering. -DHSLT_PLAIN makes a renderer that knows nothing of colour, dispersion and apertures: what asking costs
+ * where they are off is measured against it (tests/bench/effects.c). */
+#ifdef HSLT_PLAIN
+#define EFFECT_IS_ON(w, effect) ((void)(w), false)
+#else
+#define EFFECT_IS_ON(w, effect) ((w)->effects.effect)
+#endif
+
 /* Which emitter a number in [0,1) chooses; -1 when there is none. */
 int32_t world_pick_emitter(const struct world *w, double u);
 
