@@ -221,6 +221,10 @@ int main(int argc, char **argv)
 		scene_bundle_fini(&b);
 		return rc == -EINVAL ? 2 : 1;
 	}
+	char note[512];
+	render_effects_note(&b.summary, note, sizeof note);
+	if (*note)
+		fprintf(stderr, "hslt-submit: note: %s\n", note);
 	a.request.output = output;
 	a.request.name = a.name ? a.name : b.scene;
 	rc = a.estimate ? 0 : absolute(a.output, output, sizeof output, &e);
