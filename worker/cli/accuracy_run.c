@@ -73,8 +73,9 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	q.mutations = 0;
 	if (!rc)
 		rc = plan_make(&q, p, e);
-	if (!rc && chains && !r->request.epoch) {
-		q.epoch = (uint64_t)fmin(fmax(each / ROUNDS / pilot->mutation / p->chains, PILOT_EPOCH), 8192);
+	if (!rc && !r->request.epoch) {
+		double step = chains ? (double)p->chains : (double)p->groups * (double)plan_extended_pixels(p);
+		q.epoch = (uint64_t)fmin(fmax(each / ROUNDS / pilot->mutation / step, chains ? PILOT_EPOCH : 1), 8192);
 		rc = plan_make(&q, p, e);
 	}
 	if (!rc && p->groups < 4)
