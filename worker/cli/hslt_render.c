@@ -279,7 +279,8 @@ static void say(const struct session *s)
 	fprintf(stderr, "%llu rounds in %.1f s (%.1f s of processors)", (unsigned long long)i->rounds, s->run.seconds,
 		s->run.cpu_seconds);
 	if (isfinite(i->rel_mse))
-		fprintf(stderr, ", relative error %.2f %% (at most %.2f %%)", 100 * sqrt(i->rel_mse), 100 * sqrt(i->rel_mse_upper));
+		fprintf(stderr, ", relative error %.2f %% (95 %%: %.2f to %.2f %%)", 100 * sqrt(i->rel_mse), 100 * sqrt(i->rel_mse_95[0]),
+			100 * sqrt(i->rel_mse_95[1]));
 	fprintf(stderr, "; ended by %s\n", merge_end_name(s->run.end, s->run.lit.black));
 	if (i->beyond_share > 0.001)
 		fprintf(stderr, "%.2f %% of the energy lies in paths longer than %s can hold\n", 100 * i->beyond_share, p->integrator);

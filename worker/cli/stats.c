@@ -39,8 +39,10 @@ static json_t *image_json(const struct canvas_image *i)
 	for (int k = 0; k < BATCH_COUNTERS; k++)
 		if (counter_names[k])
 			json_object_set_new(counters, counter_names[k], json_integer((json_int_t)i->counts.counters[k]));
-	return json_pack("{s:o s:o s:o s:o s:o}", "b", forecast_real(i->b), "relMSE", forecast_real(i->rel_mse), "relMSEUpper",
-			 forecast_real(i->rel_mse_upper), "beyondShare", forecast_real(i->beyond_share), "counters", counters);
+	return json_pack("{s:o s:o s:o s:o s:[oo] s:o s:o}", "b", forecast_real(i->b), "bError", forecast_real(i->b_error), "relMSE",
+			 forecast_real(i->rel_mse), "relMSEUpper", forecast_real(i->rel_mse_upper), "relMSE95",
+			 forecast_real(i->rel_mse_95[0]), forecast_real(i->rel_mse_95[1]), "beyondShare",
+			 forecast_real(i->beyond_share), "counters", counters);
 }
 
 static json_t *effects_json(const struct render_summary *m)
