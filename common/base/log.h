@@ -28,6 +28,7 @@
 	X(LEASE_TAKEN_BACK, "lease_taken_back", DEBUG) \
 	X(LEASE_FAILED, "lease_failed", WARN) \
 	X(BATCH_MERGED, "batch_merged", DEBUG) \
+	X(BATCH_STORED, "batch_stored", DEBUG) \
 	X(BATCH_REPEATED, "batch_repeated", INFO) \
 	X(BATCH_REFUSED, "batch_refused", WARN) \
 	X(BLOB_STORED, "blob_stored", DEBUG) \

@@ -6,6 +6,7 @@
 #define COORDINATOR_CORE_EVENT_H
 
 #include "common/film/batch.h"
+#include "common/film/forecast.h"
 #include "common/plan/plan.h"
 
 enum event_kind {
@@ -22,6 +23,8 @@ enum event_kind {
 	EVENT_PREPARED,       /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
 	EVENT_ERROR_KNOWN,    /* error_known: the answer to ACTION_EVALUATE_ERROR */
 	EVENT_IMAGE_KNOWN,    /* image_known: what the final image of ACTION_PUBLISH says; the job has ended */
+	EVENT_RESTORE,        /* restore: a job of an earlier life goes on; before anything else has happened */
+	EVENT_HOLD,           /* job, text: no more of its leases go out; without a text: they do again */
 	EVENT_JOB_BROKEN,     /* job, text: the shell cannot go on with it (a sum left the grid, the disk is full) */
 };
 
@@ -38,6 +41,20 @@ struct event_submit {
 	int priority;   /* -100..100 */
 	uint64_t owner; /* the shell's handle for who submitted; the core only keeps it */
 	bool mixed;     /* workers of any numeric fingerprint */
+};
+
+/* Which leases are merged says where a job was. */
+struct event_restore {
+	uint64_t job; /* its id; those that come later are greater */
+	struct event_submit submit;
+	const char *fingerprint; /* "": it belongs to none */
+	enum lease_kind kind;    /* of its open leases; render: b and seeds are there */
+	const uint64_t *next;    /* [groups][parts]: the first epoch of that kind that is not merged */
+	bool black;              /* as EVENT_PREPARED said */
+	/* Seconds after its first lease: now, when the first round opened, when the last round was complete. NAN: was not yet.
+	 * The time in between lives does not count. */
+	double elapsed, opened, completed;
+	const struct forecast_history *looks;
 };
 
 struct event {
@@ -58,6 +75,7 @@ struct event {
 			bool valid; /* BATCH: batch_check and the frame's own checks passed; else text says what is wrong */
 		} lease;
 		struct event_submit submit;
+		struct event_restore restore;
 		struct {
 			uint64_t job;
 			bool ok; /* else text says why the job cannot go on */

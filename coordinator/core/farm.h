@@ -17,6 +17,9 @@
  *  - Invalid content is its sender's fault; after three faults in a row the worker gets no more leases.
  *    A failed lease is tried elsewhere; its worker waits 10, 20, 40 ... s before it gets more of this job. The job fails
  *    when nothing was ever merged and three leases failed, or one lease failed on three workers, or six times in all.
+ *  - A job of an earlier life goes on where its merged leases say that it was; leases that were out then count when their results
+ *    come, as any do. A bound that its last complete round had met, or a look at its error, is not forgotten.
+ *  - A job that is held gets no leases out; results that come are merged.
  *  - Bounds are tested after complete rounds only. The target error is evaluated when merge_error_due() says so, as
  *    hslt-render does, and when another bound ends the job. From the end on nothing is merged: the image is exactly the
  *    prefix that met the bound, and depends on workers and order only if the bound is a time.
@@ -101,6 +104,7 @@ struct lease_status {
 uint64_t farm_next_job(const struct farm *f, uint64_t after);
 uint64_t farm_next_peer(const struct farm *f, uint64_t after);
 bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s);   /* false: unknown */
+double farm_elapsed(const struct farm *f, uint64_t id, double now); /* s since the job's first lease; NAN: none yet, unknown */
 bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s);
 bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s); /* i-th lease of a worker */
 

@@ -94,6 +94,11 @@ void job_note_look(struct job *j, double rel_error, double rel_mse, double degre
 	forecast_add_look(&j->looks, &l);
 	if (!j->looks.count || (count == j->looks.count && count < FORECAST_LOOKS))
 		return;
+	job_forecast(j);
+}
+
+void job_forecast(struct job *j)
+{
 	forecast_error(&j->looks, &j->error_now);
 	forecast_target(&j->looks, &j->plan, j->plan.target_error, FORECAST_SAME, &j->stop);
 	forecast_halving(&j->looks, &j->plan, &j->halving);

@@ -88,7 +88,7 @@ bool job_is_live(const struct job *j)
 
 bool job_is_open(const struct job *j)
 {
-	return job_is_live(j) && !j->preparing && j->ending == END_NONE;
+	return job_is_live(j) && !j->preparing && j->ending == END_NONE && !*j->held;
 }
 
 struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part)
@@ -182,6 +182,30 @@ void job_open_rounds(struct job *j, double now)
 {
 	j->opened = now;
 	begin(j, LEASE_RENDER, j->plan.rounds, now);
+}
+
+void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, double now)
+{
+	uint64_t rounds = UINT64_MAX, merged = 0;
+	if (kind == LEASE_RENDER) {
+		j->bootstrap_merged = j->slot_count;
+		job_open_rounds(j, now);
+	}
+	for (uint32_t i = 0; i < j->slot_count; i++)
+		rounds = next[i] < rounds ? next[i] : rounds;
+	j->rounds = rounds;
+	for (uint32_t i = 0; i < j->slot_count; i++) {
+		assert(next[i] - rounds <= 2 && next[i] <= j->limit);
+		j->slots[i].next = next[i];
+		merged += next[i];
+		j->done += next[i] > rounds;
+		j->ahead += next[i] > rounds + 1;
+		job_place(j, &j->slots[i]);
+	}
+	if (kind == LEASE_RENDER)
+		j->leases_merged = merged;
+	else
+		j->bootstrap_merged = merged;
 }
 
 void job_pin(struct job *j, struct peer_class *c)

@@ -60,6 +60,7 @@ struct job {
 	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
 	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
 	char text[256];
+	char held[256]; /* why no lease of it goes out; "" when they do */
 };
 
 /* NULL with a sentence when it is refused. */
@@ -78,6 +79,8 @@ double job_lease_mutations(const struct job *j);
 
 /* The slot's next epoch is merged. true: its round is complete now. */
 bool job_merge(struct job *j, struct slot *s, double now, double duration);
+/* Of a job without merged leases: these are. next: see struct event_restore. */
+void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, double now);
 void job_open_rounds(struct job *j, double now); /* render leases after the bootstrap */
 /* Belongs to this class from now on; free again when nothing is merged and no lease is out. */
 void job_pin(struct job *j, struct peer_class *c);
@@ -89,6 +92,7 @@ double job_progress(const struct job *j, double now);
 struct forecast_range job_eta(const struct job *j, double now);
 /* The error of the prefix is known. */
 void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, double cpu_seconds);
+void job_forecast(struct job *j); /* anew, from its looks */
 /* Seconds until the error is half of what it is, at the present rate. */
 struct forecast_range job_halving_seconds(const struct job *j, double now);
 

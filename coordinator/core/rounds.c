@@ -35,8 +35,9 @@ static void reject(struct farm *f, const struct event *ev, const char *text)
 	a->text = text;
 }
 
-static void enlist(struct farm *f, struct job *j)
+void rounds_enlist(struct farm *f, struct job *j)
 {
+	assert(f->job_count == 0 || f->jobs[f->job_count - 1]->id < j->id);
 	f->jobs[f->job_count++] = j;
 	uint32_t i = f->live_count++;
 	for (; i > 0 && f->live[i - 1]->priority < j->priority; i--)
@@ -62,7 +63,7 @@ void rounds_submit(struct farm *f, const struct event *ev)
 		return;
 	}
 	j->id = f->next_job++;
-	enlist(f, j);
+	rounds_enlist(f, j);
 	struct action *a = about_job(f, ACTION_SUBMITTED, j);
 	a->tag = ev->tag;
 	job_changed(f, j);
@@ -155,13 +156,12 @@ static void preview(struct farm *f, struct job *j)
 	}
 }
 
-static void round_complete(struct farm *f, struct job *j)
+void rounds_settle(struct farm *f, struct job *j, double elapsed)
 {
-	about_job(f, ACTION_ROUND_DONE, j);
 	enum job_end end = END_NONE;
 	if (j->rounds >= j->plan.rounds)
 		end = END_MUTATIONS;
-	else if (j->plan.seconds > 0 && f->now - j->started >= j->plan.seconds)
+	else if (j->plan.seconds > 0 && elapsed >= j->plan.seconds)
 		end = END_TIME;
 	bool wants_error = j->plan.target_error > 0;
 	if (end != END_NONE && !wants_error) {
@@ -180,11 +180,22 @@ static void round_complete(struct farm *f, struct job *j)
 void rounds_complete(struct farm *f, struct job *j)
 {
 	if (j->kind == LEASE_RENDER) {
-		round_complete(f, j);
+		about_job(f, ACTION_ROUND_DONE, j);
+		rounds_settle(f, j, f->now - j->started);
 		return;
 	}
 	j->preparing = true;
 	about_job(f, ACTION_BOOTSTRAP_DONE, j);
+}
+
+void rounds_opened(struct farm *f, struct job *j, bool black)
+{
+	if (black) {
+		rounds_end(f, j, END_BLACK, "no bootstrap sample carried light");
+		return;
+	}
+	j->state = JOB_RUNNING;
+	job_changed(f, j);
 }
 
 void rounds_prepared(struct farm *f, const struct event *ev)
@@ -198,12 +209,7 @@ void rounds_prepared(struct farm *f, const struct event *ev)
 		return;
 	}
 	job_open_rounds(j, f->now);
-	if (ev->prepared.black) {
-		rounds_end(f, j, END_BLACK, "no bootstrap sample carried light");
-		return;
-	}
-	j->state = JOB_RUNNING;
-	job_changed(f, j);
+	rounds_opened(f, j, ev->prepared.black);
 }
 
 void rounds_image_known(struct farm *f, const struct event *ev)

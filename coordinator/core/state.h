@@ -40,11 +40,18 @@ struct peer *farm_find_peer(const struct farm *f, uint64_t id);
 void rounds_submit(struct farm *f, const struct event *ev);
 void rounds_cancel(struct farm *f, const struct event *ev);
 void rounds_started(struct farm *f, struct job *j); /* a lease of it is about to be sent */
+void rounds_enlist(struct farm *f, struct job *j); /* ids grow */
+void rounds_opened(struct farm *f, struct job *j, bool black); /* b and seeds are there */
+/* The bounds, when a round is complete: so many seconds after the first lease. */
+void rounds_settle(struct farm *f, struct job *j, double elapsed);
 void rounds_complete(struct farm *f, struct job *j);
 void rounds_prepared(struct farm *f, const struct event *ev);
 void rounds_error_known(struct farm *f, const struct event *ev);
 void rounds_image_known(struct farm *f, const struct event *ev);
 void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *text);
+
+/* restore.c */
+void restore_job(struct farm *f, const struct event *ev);
 
 /* answer.c: what workers send back. */
 void answer_batch(struct farm *f, const struct event *ev);

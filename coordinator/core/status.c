@@ -65,11 +65,13 @@ static bool someone_avoids(const struct farm *f, const struct job *j)
 static void why_waiting(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	text[0] = 0;
-	if (!job_is_live(j) || j->leases_out)
+	if (!job_is_live(j) || (j->leases_out && !*j->held))
 		return;
 	uint32_t active = active_workers(f);
 	const struct job *other = busy_with(f, j);
-	if (j->preparing)
+	if (*j->held)
+		snprintf(text, size, "%s", j->held);
+	else if (j->preparing)
 		snprintf(text, size, "the bootstrap is being evaluated");
 	else if (j->evaluating && (j->ending != END_NONE || !job_ready(j)))
 		snprintf(text, size, "its error is being estimated");
@@ -116,7 +118,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		.priority = j->priority,
 		.mixed = j->mixed,
 		.plan = &j->plan,
-		.state = j->state,
+		.state = *j->held && job_is_live(j) ? JOB_HELD : j->state,
 		.end = j->end,
 		.fingerprint = j->fingerprint,
 		.submitted = j->submitted,
@@ -141,6 +143,12 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 	memcpy(s->text, j->text, sizeof s->text);
 	why_waiting(f, j, s->waiting, sizeof s->waiting);
 	return true;
+}
+
+double farm_elapsed(const struct farm *f, uint64_t id, double now)
+{
+	const struct job *j = farm_find_job(f, id);
+	return j ? now - j->started : NAN;
 }
 
 bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)

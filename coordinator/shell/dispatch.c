@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/film/exr.h"
+#include "coordinator/shell/durable.h"
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/upload.h"
 
@@ -29,7 +30,12 @@ static void submitted(struct server *s, const struct action *a)
 	p->answered_job = a->job;
 	int rc = spool_take_job(s->spool, a->job, &e);
 	if (!rc)
-		rc = order_new(&o, a->job, &p->upload->submit, &p->upload->plan, s->spool, &e);
+		rc = order_new(&o, a->job, &p->upload->submit, &p->upload->plan, NULL, s->spool, &e);
+	if (!rc && (rc = durable_begin(s, o, &e))) {
+		p->upload->submit = o->submit;
+		memset(&o->submit, 0, sizeof o->submit);
+		order_free(o);
+	}
 	if (rc) {
 		text_copy(p->rejected, sizeof p->rejected, e.text);
 		server_job_broken(s, a->job, e.text);
@@ -106,7 +112,7 @@ static void merge(struct server *s, const struct action *a)
 	assert(o && s->batch && !o->busy);
 	if (s->config.keep_partials)
 		keep_partials(s, &a->key);
-	if (order_merge(o, s->batch, &e))
+	if (durable_merged(s, o, &e) || order_merge(o, s->batch, &e))
 		server_job_broken(s, a->job, e.text);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
 		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
@@ -115,7 +121,9 @@ static void merge(struct server *s, const struct action *a)
 static void acknowledge(struct server *s, const struct action *a)
 {
 	struct session *p = session_find(s, a->peer);
-	if (p)
+	if (a->ack == ACK_MERGED)
+		durable_ack(s, server_order(s, a->job), a->peer, &a->key);
+	else if (p)
 		session_send_ack(p, &a->key, a->ack, a->text);
 	if (a->ack != ACK_MERGED)
 		log_event(a->ack == ACK_REPEAT ? LOG_BATCH_REPEATED : LOG_BATCH_REFUSED,
@@ -206,7 +214,7 @@ void dispatch_update(struct server *s, const struct update *u)
 
 /* ---- the end of an order ---- */
 
-static void remember(struct server *s, const struct job_record *r)
+void dispatch_remember(struct server *s, const struct job_record *r)
 {
 	if (s->ended_count == ENDED_MAX)
 		memmove(s->ended, s->ended + 1, --s->ended_count * sizeof *s->ended);
@@ -223,7 +231,9 @@ static void finish(struct server *s, struct order *o)
 	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 	if (spool_write_record(s->spool, &v.record, &e))
 		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	remember(s, &v.record);
+	o->record = v.record;
+	durable_end(s, o);
+	dispatch_remember(s, &v.record);
 	for (struct session *p = s->sessions; p; p = p->next)
 		if (p->state == SESSION_WORKER)
 			session_send_job_end(p, o->id);

@@ -13,12 +13,17 @@ const Farm__Submit *order_submit(const struct order *o)
 	return o->submit.message->submit;
 }
 
-static void begin_record(struct order *o)
+static void begin_record(struct order *o, const struct job_record *earlier)
 {
 	const Farm__Submit *m = order_submit(o);
 	struct job_record *r = &o->record;
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
+	if (earlier) {
+		*r = *earlier;
+		r->cpu_seconds = r->bootstrap_cpu_seconds = 0; /* counted again with the batches */
+		return;
+	}
 	r->id = o->id;
 	text_copy(r->name, sizeof r->name, m->name);
 	text_copy(r->integrator, sizeof r->integrator, o->plan.integrator);
@@ -32,8 +37,8 @@ static void begin_record(struct order *o)
 	r->submitted = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 
-int order_new(struct order **out, uint64_t id, struct envelope *submit, const struct plan *plan, struct spool *s,
-	      struct error *e)
+int order_new(struct order **out, uint64_t id, struct envelope *submit, const struct plan *plan,
+	      const struct job_record *earlier, struct spool *s, struct error *e)
 {
 	struct order *o = mem_alloc(1, sizeof *o);
 	if (!o)
@@ -43,7 +48,7 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 	o->submit = *submit;
 	memset(submit, 0, sizeof *submit);
 	o->waiting_last = &o->waiting;
-	begin_record(o);
+	begin_record(o, earlier);
 	o->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->states);
 	if (plan->kind == PLAN_CHAINS) {
 		o->chains_per_lease = plan->chains / (plan->groups * plan->parts);
@@ -54,7 +59,7 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	if (!rc)
 		rc = bootstrap_new(&o->bootstrap, plan, e);
-	if (!rc)
+	if (!rc && !earlier)
 		rc = spool_write_record(s, &o->record, e);
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(s, id, "log", path);
@@ -85,6 +90,7 @@ void order_free(struct order *o)
 	canvas_free(o->canvas);
 	if (o->log)
 		fclose(o->log);
+	journal_release(o->journal);
 	envelope_fini(&o->submit);
 	mem_free(o);
 }

@@ -11,6 +11,7 @@
 #include "common/film/merge.h"
 #include "common/wire/batch_wire.h"
 #include "coordinator/shell/view.h"
+#include "coordinator/store/journal.h"
 #include "coordinator/store/spool.h"
 
 #include <stdio.h>
@@ -37,6 +38,12 @@ struct order {
 	struct chain_state **states; /* [groups x parts]; NULL entries: no epoch merged yet */
 	uint32_t chains_per_lease;
 	FILE *log;
+	struct journal *journal; /* NULL: it cannot be written any more */
+	bool pinned;             /* the journal knows whose it is */
+	double look_written;     /* work of the last look in the journal */
+	bool held;               /* the disk has no room for a result of so many bytes: */
+	size_t held_bytes;
+	double try_again;
 	bool busy, ended;
 	bool black; /* as the image that was published, or the bootstrap */
 	double preview_made; /* s on the loop's clock; 0: never */
@@ -46,8 +53,9 @@ struct order {
 	struct waiting_batch *waiting, **waiting_last;
 };
 
-/* Takes the submission, makes the job's folder and its record. */
-int order_new(struct order **o, uint64_t id, struct envelope *submit, const struct plan *plan, struct spool *s, struct error *e);
+/* Takes the submission. The job's folder is there; earlier: its record, of an earlier life, or NULL: it gets one. */
+int order_new(struct order **o, uint64_t id, struct envelope *submit, const struct plan *plan, const struct job_record *earlier,
+	      struct spool *s, struct error *e);
 /* Frees the memory; blobs and files stay. Not while busy. */
 void order_free(struct order *o);
 

@@ -1,4 +1,5 @@
 #include "coordinator/shell/publish.h"
+#include "coordinator/shell/durable.h"
 #include "coordinator/shell/session.h"
 
 #include "common/base/mem.h"
@@ -81,6 +82,7 @@ static void tell_error(const struct publishing *w)
 					   .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
 					   .cpu_seconds = w->order->cpu_seconds - w->order->record.bootstrap_cpu_seconds}};
 	server_step(w->server, &ev);
+	durable_look(w->server, ev.job);
 }
 
 static void tell_image(const struct publishing *w)

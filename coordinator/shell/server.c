@@ -4,6 +4,8 @@
 #include "common/base/text.h"
 #include "common/net/notify.h"
 #include "coordinator/shell/dispatch.h"
+#include "coordinator/shell/durable.h"
+#include "coordinator/shell/restore.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/status.h"
 
@@ -77,6 +79,7 @@ void server_step(struct server *s, struct event *ev)
 	one_step(s, ev);
 	s->batch = NULL;
 	s->result = NULL;
+	s->payload = NULL;
 	while (s->deferred) {
 		struct deferred *d = s->deferred;
 		s->deferred = d->next;
@@ -129,8 +132,17 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	s->batch = &batch;
 	s->result = m;
 	s->payload = payload;
+	s->payload_size = size;
+	if (o && ev.lease.valid && durable_reserve(s, o, &e)) {
+		struct session *p = session_find(s, peer);
+		if (p) /* it can be made again */
+			session_send_ack(p, &ev.lease.key, ACK_REFUSED, e.text);
+		ev.kind = EVENT_LEASE_RETURNED;
+	}
 	server_step(s, &ev);
 	batch_fini(&batch);
+	mem_free(s->frame);
+	s->frame = NULL;
 }
 
 void server_result(struct server *s, uint64_t peer, struct envelope *env, const unsigned char *payload, size_t size)
@@ -225,7 +237,7 @@ size_t server_views(struct server *s, struct job_view **views)
 
 /* ---- start ---- */
 
-/* Jobs of an earlier life. Those that had not ended cannot go on. */
+/* Jobs of an earlier life that have ended, and those that were never accepted: whoever submitted them has no answer. */
 static int read_ended(struct server *s, struct error *e)
 {
 	uint64_t ids[ENDED_MAX];
@@ -236,6 +248,8 @@ static int read_ended(struct server *s, struct error *e)
 	for (size_t i = 0; i < count; i++) {
 		struct job_record *r = &s->ended[s->ended_count];
 		struct error fault;
+		if (restore_lives(s, ids[i]))
+			continue;
 		if (spool_read_record(s->spool, ids[i], r, &fault)) {
 			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)ids[i],
 				  log_quote(fault.text).text);
@@ -244,7 +258,7 @@ static int read_ended(struct server *s, struct error *e)
 		if (!record_is_ended(r)) {
 			text_copy(r->state, sizeof r->state, "failed");
 			text_copy(r->reason, sizeof r->reason, job_end_name(END_FAILED));
-			text_copy(r->why, sizeof r->why, "the coordinator stopped before the job was done");
+			text_copy(r->why, sizeof r->why, "the coordinator stopped before the job was accepted");
 			r->exit_code = 3;
 			if (spool_write_record(s->spool, r, &fault))
 				log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(fault.text).text);
@@ -306,6 +320,7 @@ static void on_tick(uv_timer_t *t)
 	for (struct session *p = s->sessions; p; p = p->next)
 		session_tick(p);
 	status_tick(s->status);
+	durable_tick(s);
 	if (s->watchdog > 0 && server_now(s) >= s->watchdog_next) {
 		s->watchdog_next = server_now(s) + s->watchdog / 3;
 		notify_send("WATCHDOG=1");
@@ -342,6 +357,8 @@ static int open_stores(struct server *s, struct error *e)
 	if (!rc)
 		rc = blob_store_open(&s->blobs, spool_blobs(s->spool), s->config.blob_bytes, e);
 	if (!rc)
+		rc = restore_open(s, e);
+	if (!rc)
 		rc = read_ended(s, e);
 	if (rc)
 		return rc;
@@ -352,7 +369,8 @@ static int open_stores(struct server *s, struct error *e)
 	config.preview_interval = 0; /* previews are made when somebody asks for one */
 	config.silent_after = 3 * s->config.heartbeat_seconds;
 	config.forget_after = 6 * s->config.heartbeat_seconds;
-	return farm_new(&s->farm, &config, e);
+	rc = farm_new(&s->farm, &config, e);
+	return rc ? rc : restore_jobs(s, e);
 }
 
 static void init_handles(struct server *s)
@@ -380,11 +398,13 @@ static void close_stores(struct server *s)
 		mem_free(s->deferred);
 		s->deferred = next;
 	}
+	durable_close(s);
 	if (s->farm)
 		farm_free(s->farm);
 	blob_store_close(s->blobs);
 	spool_close(s->spool);
 	mem_free(s->ended);
+	mem_free(s->restored);
 }
 
 int server_run(const struct server_config *c, struct error *e)
@@ -395,6 +415,7 @@ int server_run(const struct server_config *c, struct error *e)
 	signal(SIGPIPE, SIG_IGN);
 	s->config = *c;
 	s->deferred_last = &s->deferred;
+	s->acks_last = &s->acks;
 	s->watchdog = notify_watchdog();
 	int rc = uv_loop_init(&s->loop);
 	if (rc) {

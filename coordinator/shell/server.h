@@ -9,6 +9,7 @@
 #include "common/net/conn.h"
 #include "coordinator/core/farm.h"
 #include "coordinator/shell/order.h"
+#include "coordinator/store/ledger.h"
 #include "coordinator/store/spool.h"
 
 struct server_config {
@@ -30,6 +31,7 @@ int server_run(const struct server_config *c, struct error *e);
 
 struct session;
 struct status_socket;
+struct durable_ack;
 
 /* An event for the core that came up while its last update was carried out. */
 struct deferred {
@@ -55,6 +57,11 @@ struct server {
 	struct job_record *ended; /* ENDED_MAX, oldest first */
 	size_t ended_count;
 	struct deferred *deferred, **deferred_last;
+	struct ledger *ledger;
+	uint64_t *restored; /* ids of the jobs that went on when this life began */
+	size_t restored_count;
+	struct durable_ack *acks, **acks_last; /* that wait for a flush */
+	bool flushing;
 	uint64_t last_peer;
 	struct status_socket *status;
 	bool stepping, stopping;
@@ -64,6 +71,9 @@ struct server {
 	struct batch *batch;
 	const Farm__LeaseResult *result;
 	const unsigned char *payload;
+	size_t payload_size;
+	unsigned char *frame; /* the result as the journal takes it, but for the payload */
+	size_t frame_size;
 	struct session *submitter;
 };
 

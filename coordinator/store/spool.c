@@ -255,7 +255,9 @@ int spool_take_job(struct spool *s, uint64_t id, struct error *e)
 		s->next = id + 1;
 	}
 	spool_job_path(s, id, NULL, path);
-	return make_folder(path, e);
+	int rc = make_folder(path, e);
+	spool_path(s, "jobs", path);
+	return rc ? rc : sync_folder(path, e);
 }
 
 const char *spool_blobs(const struct spool *s)
@@ -266,6 +268,11 @@ const char *spool_blobs(const struct spool *s)
 const char *spool_canvas(const struct spool *s)
 {
 	return s->canvas;
+}
+
+void spool_path(const struct spool *s, const char *name, char path[SPOOL_PATH_MAX])
+{
+	snprintf(path, SPOOL_PATH_MAX, "%s/%s", s->folder, name);
 }
 
 void spool_job_path(const struct spool *s, uint64_t id, const char *file, char path[SPOOL_PATH_MAX])

@@ -1,5 +1,5 @@
 /*
- * The coordinator's folder: lock, next-job, blobs/, canvas/, jobs/jN/{job.json, result.exr, log}. One coordinator a spool
+ * The coordinator's folder: lock, next-job, blobs/, canvas/, jobs/jN/{job.json, journal.G, checkpoint, result.exr, log}, jobs.db. One coordinator a spool
  * (a lock that the kernel drops when its holder dies). Files appear whole: temporary file, fsync, rename, fsync of the
  * folder. spool_write from any thread (of different files); the rest from one.
  */
@@ -23,6 +23,7 @@ int spool_take_job(struct spool *s, uint64_t id, struct error *e);
 const char *spool_blobs(const struct spool *s);
 const char *spool_canvas(const struct spool *s);
 enum { SPOOL_PATH_MAX = 4096 };
+void spool_path(const struct spool *s, const char *name, char path[SPOOL_PATH_MAX]); /* name in the spool's own folder */
 void spool_job_path(const struct spool *s, uint64_t id, const char *file, char path[SPOOL_PATH_MAX]);
 
 int spool_write(const struct spool *s, uint64_t id, const char *file, const void *bytes, size_t size, struct error *e);

@@ -84,13 +84,13 @@ id=$(submit "$BOX" -o "$DIR/next.exr" --integrator path --spp 4 -D light=3)
 [ "$id" = j5 ] || fail "the next job is $id"
 until_true 20 is_state j5 done || fail "the worker did not come back: j5 is $(value j5 state)"
 
-id=$(submit "$BOX" -o "$DIR/lost.exr" --integrator path --spp 1000000)
+id=$(submit "$BOX" -o "$DIR/long.exr" --integrator path --spp 1000000)
 until_true 10 is_state "$id" running || fail "$id does not run"
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 start_coordinator
-is_state "$id" failed || fail "$id is $(value "$id" state)"
-value "$id" why | grep -q 'coordinator stopped' || fail "it does not say why $id failed"
+is_state "$id" running || fail "$id is $(value "$id" state)"
+code 0 "$BIN/hslt-job" cancel "$id"
 submit "$BOX" -o "$DIR/after.exr" --integrator path --spp 4 --wait >"$DIR/id" || fail "the worker did not come back"
 [ "$(cat "$DIR/id")" = j7 ] || fail "the job after the crash is $(cat "$DIR/id")"
 echo "exit codes and restart"

@@ -1,0 +1,63 @@
+/* Jobs of an earlier life: put where their merged leases say that they were. */
+#include "coordinator/core/state.h"
+
+#include <math.h>
+
+/* As it was pinned by its first merged batch. Without memory for that the first worker that asks pins it again. */
+static void pin(struct farm *f, struct job *j, const char *fingerprint)
+{
+	struct peer_class *c = *fingerprint ? peer_class_use(f, fingerprint) : NULL;
+	if (!c)
+		return;
+	job_pin(j, c);
+	peer_class_drop(c);
+}
+
+static void take_times(struct farm *f, struct job *j, const struct event_restore *r)
+{
+	if (isnan(r->elapsed))
+		return;
+	j->started = f->now - r->elapsed;
+	j->state = JOB_BOOTSTRAP;
+	if (j->kind == LEASE_RENDER)
+		j->opened = j->started + (isnan(r->opened) ? r->elapsed : r->opened);
+}
+
+static void take_looks(struct job *j, const struct forecast_history *looks)
+{
+	j->looks = *looks;
+	if (looks->count == 0)
+		return;
+	const struct forecast_look *last = &looks->looks[looks->count - 1];
+	j->rel_error = sqrt(last->rel_mse_upper);
+	j->rel_error_rounds = (uint64_t)(last->work / (double)plan_round_mutations(&j->plan));
+	job_forecast(j);
+}
+
+void restore_job(struct farm *f, const struct event *ev)
+{
+	const struct event_restore *r = &ev->restore;
+	const char *refused = "the coordinator has as many jobs as it takes";
+	struct job *j = f->live_count < f->config.max_jobs ? job_new(f, &r->submit, &refused) : NULL;
+	if (!j) {
+		struct action *a = update_add(f, ACTION_REJECTED);
+		a->job = r->job;
+		a->text = refused;
+		return;
+	}
+	j->id = r->job;
+	if (f->next_job <= j->id)
+		f->next_job = j->id + 1;
+	rounds_enlist(f, j);
+	job_restore(j, r->kind, r->next, f->now);
+	take_times(f, j, r);
+	take_looks(j, r->looks);
+	pin(f, j, r->fingerprint);
+	j->progress_floor = job_progress(j, f->now);
+	if (j->kind != LEASE_RENDER)
+		return;
+	rounds_opened(f, j, r->black);
+	/* A bound that the last complete round met is met still; a look that is due is taken again, with the same answer. */
+	if (job_is_live(j) && j->rounds > 0)
+		rounds_settle(f, j, isnan(r->completed) ? r->elapsed : r->completed);
+}

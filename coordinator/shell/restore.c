@@ -1,0 +1,303 @@
+#include "coordinator/shell/restore.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "common/wire/frame.h"
+#include "coordinator/shell/dispatch.h"
+
+#include <math.h>
+#include <string.h>
+#include <time.h>
+
+/* What a journal says, besides what goes into its order. */
+struct replay {
+	struct order *order;
+	const char *canvas_folder;
+	double elapsed, opened, completed;
+	uint64_t batches, rounds;
+	struct forecast_history looks;
+	char fingerprint[256];
+};
+
+/* ---- frames */
+
+static uint32_t length_at(const unsigned char *p)
+{
+	return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
+}
+
+static int unpack(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
+		  const unsigned char **payload, size_t *payload_size, struct error *e)
+{
+	*payload = NULL;
+	*payload_size = 0;
+	if (size < FRAME_PREFIX || (uint64_t)length_at(frame) + length_at(frame + 4) != size - FRAME_PREFIX)
+		return error_set(e, EBADMSG, "a frame of another length");
+	uint32_t header = length_at(frame);
+	int rc = envelope_unpack(env, frame + FRAME_PREFIX, header, e);
+	if (!rc && env->message->body_case != want) {
+		envelope_fini(env);
+		rc = error_set(e, EBADMSG, "another message than was expected");
+	}
+	*payload = frame + FRAME_PREFIX + header;
+	*payload_size = size - FRAME_PREFIX - header;
+	return rc;
+}
+
+/* ---- the journal */
+
+static int merge(struct replay *r, struct batch *b, struct error *e)
+{
+	struct order *o = r->order;
+	if ((b->key.kind == LEASE_BOOTSTRAP) != (o->bootstrap != NULL))
+		return error_set(e, EBADMSG, "a batch that is not of its time");
+	int rc = order_merge(o, b, e);
+	if (!rc && o->bootstrap && bootstrap_missing(o->bootstrap) == 0) {
+		r->opened = r->elapsed;
+		rc = order_prepare(o, r->canvas_folder, e);
+	}
+	if (!rc && o->canvas && canvas_rounds(o->canvas) > r->rounds) {
+		r->rounds = canvas_rounds(o->canvas);
+		r->completed = r->elapsed;
+	}
+	r->batches++;
+	return rc;
+}
+
+static int take_batch(struct replay *r, const unsigned char *body, size_t size, struct error *e)
+{
+	struct envelope env;
+	struct batch batch = {0};
+	const unsigned char *payload;
+	size_t payload_size;
+	int rc = unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
+	if (rc)
+		return rc;
+	rc = batch_unpack(&batch, &r->order->plan, env.message->lease_result, payload, payload_size, e);
+	if (!rc)
+		rc = merge(r, &batch, e);
+	batch_fini(&batch);
+	envelope_fini(&env);
+	return rc;
+}
+
+static int take_record(void *user, enum journal_kind kind, double elapsed, const unsigned char *body, size_t size, struct error *e)
+{
+	struct replay *r = user;
+	struct forecast_look look;
+	if (isfinite(elapsed))
+		r->elapsed = elapsed;
+	switch (kind) {
+	case JOURNAL_BATCH:
+		return take_batch(r, body, size, e);
+	case JOURNAL_PINNED:
+		if (size >= sizeof r->fingerprint)
+			return error_set(e, EBADMSG, "a fingerprint of %zu bytes", size);
+		memcpy(r->fingerprint, body, size);
+		r->fingerprint[size] = 0;
+		return 0;
+	case JOURNAL_LOOK:
+		if (size != sizeof look)
+			return error_set(e, EBADMSG, "a look of %zu bytes", size);
+		memcpy(&look, body, size);
+		forecast_add_look(&r->looks, &look);
+		r->order->look_written = look.work;
+		return 0;
+	default:
+		return error_set(e, EBADMSG, "a record of kind %d", (int)kind);
+	}
+}
+
+static int read_journal(struct server *s, struct replay *r, struct error *e)
+{
+	struct order *o = r->order;
+	char folder[SPOOL_PATH_MAX];
+	uint64_t cut = 0;
+	spool_job_path(s->spool, o->id, NULL, folder);
+	int rc = journal_open(&o->journal, folder, o->id, 0, take_record, r, &cut, e);
+	if (rc == -ENOENT) /* its batches can be made again */
+		rc = journal_create(&o->journal, folder, o->id, 0, e);
+	if (rc)
+		return rc;
+	o->pinned = *r->fingerprint != 0;
+	order_log(o, LOG_JOB_STATE, "state=restored batches=%llu rounds=%llu elapsed=%.3f bytes=%llu cut=%llu",
+		  (unsigned long long)r->batches, (unsigned long long)r->rounds, r->elapsed,
+		  (unsigned long long)journal_bytes(o->journal), (unsigned long long)cut);
+	return 0;
+}
+
+/* ---- the core */
+
+static uint64_t next_epoch(const struct order *o, uint32_t group, uint32_t part)
+{
+	if (o->bootstrap)
+		return bootstrap_has(o->bootstrap, group, part);
+	struct lease_key k = {.job = o->id, .kind = LEASE_RENDER, .group = group, .part = part, .epoch = canvas_rounds(o->canvas)};
+	while (k.epoch < o->plan.rounds && canvas_has(o->canvas, &k))
+		k.epoch++;
+	return k.epoch;
+}
+
+static int tell_core(struct server *s, const struct replay *r, struct error *e)
+{
+	const struct order *o = r->order;
+	uint32_t slots = o->plan.groups * o->plan.parts;
+	uint64_t *next = mem_alloc(slots, sizeof *next);
+	if (!next)
+		return error_set(e, ENOMEM, "no memory for a job");
+	for (uint32_t i = 0; i < slots; i++)
+		next[i] = next_epoch(o, i / o->plan.parts, i % o->plan.parts);
+	struct event ev = {.kind = EVENT_RESTORE,
+			   .restore = {.job = o->id,
+				       .submit = {.plan = &o->plan, .name = o->record.name, .priority = o->record.priority,
+						  .mixed = order_submit(o)->mixed},
+				       .fingerprint = r->fingerprint,
+				       .kind = o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
+				       .next = next,
+				       .black = o->lit.black,
+				       .elapsed = r->elapsed,
+				       .opened = r->opened,
+				       .completed = r->completed,
+				       .looks = &r->looks}};
+	server_step(s, &ev);
+	mem_free(next);
+	return 0;
+}
+
+/* ---- one job */
+
+static int hold_blobs(struct server *s, const Farm__Submit *m, struct error *e)
+{
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = order_file_hash(m->files[i]);
+		if (!blob_hold(s->blobs, &h))
+			return error_set(e, EBADMSG, "the spool has lost %s", m->files[i]->name);
+	}
+	return 0;
+}
+
+static int make_order(struct server *s, const struct ledger_job *j, const struct job_record *record, struct order **o, struct error *e)
+{
+	struct envelope submit, info;
+	struct plan plan;
+	const unsigned char *payload;
+	size_t size;
+	int rc = unpack(&info, FARM__ENVELOPE__BODY_JOB_INFO, j->plan, j->plan_size, &payload, &size, e);
+	if (rc)
+		return rc;
+	rc = info.message->job_info->plan ? plan_from_wire(info.message->job_info->plan, &plan, e)
+					  : error_set(e, EBADMSG, "there is no plan");
+	envelope_fini(&info);
+	if (!rc)
+		rc = unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size, &payload, &size, e);
+	if (rc)
+		return rc;
+	rc = hold_blobs(s, submit.message->submit, e);
+	if (!rc)
+		rc = order_new(o, j->id, &submit, &plan, record, s->spool, e);
+	envelope_fini(&submit);
+	return rc;
+}
+
+static int restore_one(struct server *s, const struct ledger_job *j, const struct job_record *record, struct error *e)
+{
+	struct replay *r = mem_alloc(1, sizeof *r);
+	if (!r)
+		return error_set(e, ENOMEM, "no memory for a job");
+	r->elapsed = r->opened = r->completed = NAN;
+	r->canvas_folder = spool_canvas(s->spool);
+	int rc = make_order(s, j, record, &r->order, e);
+	if (!rc)
+		rc = read_journal(s, r, e);
+	if (!rc) {
+		r->order->next = s->orders;
+		s->orders = r->order;
+		rc = tell_core(s, r, e);
+	} else if (r->order) {
+		order_free(r->order);
+	}
+	mem_free(r);
+	return rc;
+}
+
+/* Not of the machine, but of what is stored: the same at every start. */
+static bool is_lasting(int rc)
+{
+	return rc == -EBADMSG || rc == -ERANGE || rc == -EINVAL || rc == -EEXIST || rc == -EAGAIN;
+}
+
+static void give_up(struct server *s, struct job_record *r, const char *why)
+{
+	struct timespec now;
+	struct error e;
+	clock_gettime(CLOCK_REALTIME, &now);
+	text_copy(r->state, sizeof r->state, "failed");
+	text_copy(r->reason, sizeof r->reason, job_end_name(END_FAILED));
+	text_copy(r->why, sizeof r->why, why);
+	r->exit_code = 3;
+	r->ended = (double)now.tv_sec;
+	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
+	if (spool_write_record(s->spool, r, &e) || ledger_end(s->ledger, r->id, r->state, &e))
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	dispatch_remember(s, r);
+}
+
+int restore_open(struct server *s, struct error *e)
+{
+	char path[SPOOL_PATH_MAX];
+	struct ledger_job j;
+	struct job_record *r = mem_alloc(1, sizeof *r);
+	spool_path(s->spool, "jobs.db", path);
+	int rc = r ? ledger_open(&s->ledger, path, e) : error_set(e, ENOMEM, "no memory for the jobs");
+	uint64_t id = 0;
+	while (!rc && (rc = ledger_next(s->ledger, id, &j, e)) > 0) {
+		id = j.id;
+		rc = 0;
+		/* Its record was written before its end came into the ledger. */
+		if (spool_read_record(s->spool, id, r, NULL) == 0 && record_is_ended(r)) {
+			rc = ledger_end(s->ledger, id, r->state, e);
+			continue;
+		}
+		uint64_t *more = mem_grow(s->restored, s->restored_count * sizeof *more, (s->restored_count + 1) * sizeof *more);
+		if (!more)
+			rc = error_set(e, ENOMEM, "no memory for the jobs");
+		else
+			(s->restored = more)[s->restored_count++] = id;
+	}
+	mem_free(r);
+	return rc;
+}
+
+bool restore_lives(const struct server *s, uint64_t job)
+{
+	for (size_t i = 0; i < s->restored_count; i++)
+		if (s->restored[i] == job)
+			return true;
+	return false;
+}
+
+int restore_jobs(struct server *s, struct error *e)
+{
+	struct ledger_job j;
+	uint64_t id = 0;
+	int rc;
+	struct job_record *r = mem_alloc(1, sizeof *r);
+	if (!r)
+		return error_set(e, ENOMEM, "no memory for the jobs");
+	while ((rc = ledger_next(s->ledger, id, &j, e)) > 0) {
+		id = j.id;
+		bool known = spool_read_record(s->spool, id, r, NULL) == 0;
+		rc = restore_one(s, &j, known ? r : NULL, e);
+		if (rc && !is_lasting(rc)) {
+			rc = error_prefix(e, rc, "j%llu", (unsigned long long)id);
+			break;
+		}
+		if (rc) {
+			if (!known)
+				*r = (struct job_record){.id = id, .rel_error = -1};
+			give_up(s, r, e->text);
+		}
+	}
+	mem_free(r);
+	return rc;
+}

@@ -1,0 +1,292 @@
+#include "coordinator/store/journal.h"
+
+#include "common/base/crc.h"
+#include "common/base/mem.h"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <stdatomic.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/uio.h>
+#include <unistd.h>
+
+enum { PATH_MOST = 4200 };
+
+struct head { /* of the file */
+	char magic[8];
+	uint64_t job, generation;
+	uint32_t check, nothing;
+};
+
+struct record { /* before its body */
+	uint32_t size, check; /* of the body; over all but itself */
+	uint32_t kind, nothing;
+	double elapsed;
+};
+
+struct journal {
+	int fd;
+	uint64_t generation;
+	atomic_uint holders;
+	_Atomic uint64_t bytes, synced;
+	char path[PATH_MOST];
+};
+
+static const char magic[8] = "hsltJ001";
+
+static uint32_t check_head(const struct head *h)
+{
+	return crc32c(0, h, offsetof(struct head, check));
+}
+
+static uint32_t check_record(const struct record *r, const void *a, size_t a_size, const void *b, size_t b_size)
+{
+	uint32_t c = crc32c(0, &r->size, sizeof r->size);
+	c = crc32c(c, &r->kind, sizeof *r - offsetof(struct record, kind));
+	c = crc32c(c, a, a_size);
+	return crc32c(c, b, b_size);
+}
+
+static int fault(const struct journal *j, int code, struct error *e)
+{
+	return error_set(e, code, "%s: %s", j->path, strerror(code));
+}
+
+static int sync_folder(const char *path, struct error *e)
+{
+	int fd = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+	int rc = fd < 0 || fsync(fd) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	if (fd >= 0)
+		close(fd);
+	return rc;
+}
+
+static struct journal *make(const char *folder, uint64_t generation, int flags, struct error *e)
+{
+	struct journal *j = mem_alloc(1, sizeof *j);
+	if (!j) {
+		error_set(e, ENOMEM, "no memory for a journal");
+		return NULL;
+	}
+	j->generation = generation;
+	atomic_init(&j->holders, 1);
+	snprintf(j->path, sizeof j->path, "%s/journal.%llu", folder, (unsigned long long)generation);
+	j->fd = open(j->path, flags | O_CLOEXEC, 0600);
+	return j;
+}
+
+void journal_hold(struct journal *j)
+{
+	atomic_fetch_add(&j->holders, 1);
+}
+
+void journal_release(struct journal *j)
+{
+	if (!j || atomic_fetch_sub(&j->holders, 1) > 1)
+		return;
+	if (j->fd >= 0)
+		close(j->fd);
+	mem_free(j);
+}
+
+int journal_create(struct journal **out, const char *folder, uint64_t job, uint64_t generation, struct error *e)
+{
+	struct journal *j = make(folder, generation, O_RDWR | O_CREAT | O_TRUNC, e);
+	if (!j)
+		return -ENOMEM;
+	struct head h = {.job = job, .generation = generation};
+	memcpy(h.magic, magic, sizeof h.magic);
+	h.check = check_head(&h);
+	int rc = 0;
+	if (j->fd < 0)
+		rc = fault(j, errno, e);
+	else if (pwrite(j->fd, &h, sizeof h, 0) != (ssize_t)sizeof h || fsync(j->fd))
+		rc = fault(j, errno ? errno : ENOSPC, e);
+	if (!rc)
+		rc = sync_folder(folder, e);
+	if (rc) {
+		journal_release(j);
+		return rc;
+	}
+	j->bytes = j->synced = sizeof h;
+	*out = j;
+	return 0;
+}
+
+/* ---- reading ---- */
+
+static bool read_at(int fd, void *bytes, size_t size, uint64_t at)
+{
+	unsigned char *p = bytes;
+	while (size) {
+		ssize_t n = pread(fd, p, size, (off_t)at);
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n <= 0)
+			return false;
+		p += n;
+		at += (uint64_t)n;
+		size -= (size_t)n;
+	}
+	return true;
+}
+
+/* The record at j->bytes, and beyond it. 0: it is not whole; else what the visitor says, or 1. */
+static int visit_next(struct journal *j, uint64_t end, journal_visit *visit, void *user, struct error *e)
+{
+	struct record r;
+	if (end - j->bytes < sizeof r || !read_at(j->fd, &r, sizeof r, j->bytes) || r.size > end - j->bytes - sizeof r)
+		return 0;
+	unsigned char *body = mem_alloc(r.size, 1);
+	if (!body)
+		return error_set(e, ENOMEM, "no memory for a record of %u bytes", r.size);
+	int rc = 0;
+	if (read_at(j->fd, body, r.size, j->bytes + sizeof r) && r.check == check_record(&r, body, r.size, NULL, 0)) {
+		rc = visit(user, (enum journal_kind)r.kind, r.elapsed, body, r.size, e);
+		rc = rc ? rc : 1;
+		j->bytes += sizeof r + r.size;
+	}
+	mem_free(body);
+	return rc;
+}
+
+static int read_all(struct journal *j, uint64_t job, journal_visit *visit, void *user, uint64_t *cut, struct error *e)
+{
+	struct stat st;
+	struct head h;
+	if (fstat(j->fd, &st))
+		return fault(j, errno, e);
+	uint64_t end = (uint64_t)st.st_size;
+	if (!read_at(j->fd, &h, sizeof h, 0) || memcmp(h.magic, magic, sizeof magic) != 0 || h.check != check_head(&h) || h.job != job ||
+	    h.generation != j->generation)
+		return error_set(e, EBADMSG, "%s: not the journal of j%llu", j->path, (unsigned long long)job);
+	j->bytes = sizeof h;
+	int rc;
+	do
+		rc = visit_next(j, end, visit, user, e);
+	while (rc > 0);
+	*cut = end - j->bytes;
+	if (rc < 0)
+		return rc;
+	if (*cut && ftruncate(j->fd, (off_t)j->bytes))
+		return fault(j, errno, e);
+	return fsync(j->fd) ? fault(j, errno, e) : 0;
+}
+
+int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_t generation, journal_visit *visit, void *user,
+		 uint64_t *cut, struct error *e)
+{
+	*cut = 0;
+	struct journal *j = make(folder, generation, O_RDWR, e);
+	if (!j)
+		return -ENOMEM;
+	int rc = j->fd < 0 ? fault(j, errno, e) : read_all(j, job, visit, user, cut, e);
+	if (rc) {
+		journal_release(j);
+		return rc;
+	}
+	atomic_store(&j->synced, atomic_load(&j->bytes));
+	*out = j;
+	return 0;
+}
+
+/* ---- writing ---- */
+
+int journal_reserve(struct journal *j, size_t body, struct error *e)
+{
+	off_t size = (off_t)(sizeof(struct record) + body);
+	if (fallocate(j->fd, FALLOC_FL_KEEP_SIZE, (off_t)j->bytes, size) == 0 || errno == EOPNOTSUPP || errno == ENOSYS)
+		return 0;
+	int code = errno;
+	int cut = ftruncate(j->fd, (off_t)j->bytes); /* gives back what there was */
+	(void)cut;
+	return fault(j, code, e);
+}
+
+static int write_parts(struct journal *j, struct iovec *part, int count)
+{
+	off_t at = (off_t)j->bytes;
+	while (count) {
+		ssize_t n = pwritev(j->fd, part, count, at);
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n <= 0)
+			return n < 0 ? -errno : -ENOSPC;
+		at += n;
+		for (; count && (size_t)n >= part->iov_len; part++, count--)
+			n -= (ssize_t)part->iov_len;
+		if (count) {
+			part->iov_base = (char *)part->iov_base + n;
+			part->iov_len -= (size_t)n;
+		}
+	}
+	return 0;
+}
+
+/* struct iovec is for reading too, so that its pointer is not to const. */
+static struct iovec part_of(const void *bytes, size_t size)
+{
+	struct iovec v = {.iov_len = size};
+	memcpy(&v.iov_base, &bytes, sizeof bytes);
+	return v;
+}
+
+int journal_append(struct journal *j, enum journal_kind kind, double elapsed, const void *a, size_t a_size, const void *b,
+		   size_t b_size, struct error *e)
+{
+	size_t size = a_size + b_size;
+	if (size > UINT32_MAX)
+		return error_set(e, EFBIG, "%s: a record of %zu bytes", j->path, size);
+	struct record r = {.size = (uint32_t)size, .kind = kind, .elapsed = elapsed};
+	r.check = check_record(&r, a, a_size, b, b_size);
+	struct iovec parts[3] = {part_of(&r, sizeof r), part_of(a, a_size), part_of(b, b_size)};
+	int rc = write_parts(j, parts, 3);
+	if (rc) {
+		/* A torn record that could not be cut off would be cut off by whoever reads it. */
+		int cut = ftruncate(j->fd, (off_t)j->bytes);
+		(void)cut;
+		return fault(j, -rc, e);
+	}
+	j->bytes += sizeof r + size;
+	return 0;
+}
+
+uint64_t journal_bytes(const struct journal *j)
+{
+	return j->bytes;
+}
+
+uint64_t journal_generation(const struct journal *j)
+{
+	return j->generation;
+}
+
+int journal_sync(struct journal *j, struct error *e)
+{
+	uint64_t bytes = j->bytes;
+	if (bytes == j->synced)
+		return 0;
+	if (fdatasync(j->fd))
+		return fault(j, errno, e);
+	j->synced = bytes;
+	return 0;
+}
+
+void journal_clear(const char *folder, uint64_t keep)
+{
+	DIR *d = opendir(folder);
+	for (struct dirent *f; d && (f = readdir(d));) {
+		unsigned long long generation;
+		char again[64];
+		if (sscanf(f->d_name, "journal.%llu", &generation) != 1 || generation == keep)
+			continue;
+		snprintf(again, sizeof again, "journal.%llu", generation);
+		if (strcmp(again, f->d_name) == 0)
+			unlinkat(dirfd(d), f->d_name, 0);
+	}
+	if (d)
+		closedir(d);
+}

@@ -1,0 +1,183 @@
+#include "coordinator/store/ledger.h"
+
+#include "common/base/mem.h"
+
+#include <sqlite3.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+struct ledger {
+	sqlite3 *db;
+	sqlite3_stmt *add, *end, *last, *next;
+};
+
+/* The n-th brings a database of version n to n + 1; never changed, only added to. */
+static const char *const migrations[] = {
+	"CREATE TABLE jobs (id INTEGER PRIMARY KEY, owner TEXT NOT NULL, name TEXT NOT NULL, version TEXT NOT NULL,"
+	" priority INTEGER NOT NULL, mixed INTEGER NOT NULL, state TEXT NOT NULL, submitted REAL NOT NULL, ended REAL,"
+	" submission BLOB, plan BLOB) STRICT;"
+	"CREATE INDEX living ON jobs (id) WHERE ended IS NULL;",
+};
+enum { VERSION = sizeof migrations / sizeof *migrations };
+
+static int fault(const struct ledger *l, struct error *e)
+{
+	int code = sqlite3_errcode(l->db);
+	int as = code == SQLITE_FULL ? ENOSPC : code == SQLITE_NOMEM ? ENOMEM : code == SQLITE_NOTADB || code == SQLITE_CORRUPT ? EBADMSG : EIO;
+	return error_set(e, as, "the database of jobs: %s", sqlite3_errmsg(l->db));
+}
+
+static int run(struct ledger *l, const char *sql, struct error *e)
+{
+	return sqlite3_exec(l->db, sql, NULL, NULL, NULL) == SQLITE_OK ? 0 : fault(l, e);
+}
+
+static int prepare(struct ledger *l, sqlite3_stmt **s, const char *sql, struct error *e)
+{
+	return sqlite3_prepare_v3(l->db, sql, -1, SQLITE_PREPARE_PERSISTENT, s, NULL) == SQLITE_OK ? 0 : fault(l, e);
+}
+
+static int version_of(struct ledger *l, int *version, struct error *e)
+{
+	sqlite3_stmt *s = NULL;
+	int rc = prepare(l, &s, "PRAGMA user_version", e);
+	if (!rc && sqlite3_step(s) != SQLITE_ROW)
+		rc = fault(l, e);
+	*version = rc ? 0 : sqlite3_column_int(s, 0);
+	sqlite3_finalize(s);
+	return rc;
+}
+
+static int migrate(struct ledger *l, struct error *e)
+{
+	int version;
+	int rc = version_of(l, &version, e);
+	if (!rc && version > VERSION)
+		return error_set(e, EPROTO, "the database of jobs is of version %d, and version %d is known here: a later coordinator wrote it",
+				 version, (int)VERSION);
+	for (; !rc && version < VERSION; version++) {
+		char done[64];
+		snprintf(done, sizeof done, "PRAGMA user_version = %d; COMMIT", version + 1);
+		rc = run(l, "BEGIN IMMEDIATE", e);
+		if (!rc)
+			rc = run(l, migrations[version], e);
+		if (!rc)
+			rc = run(l, done, e);
+	}
+	return rc;
+}
+
+int ledger_open(struct ledger **out, const char *path, struct error *e)
+{
+	struct ledger *l = mem_alloc(1, sizeof *l);
+	if (!l)
+		return error_set(e, ENOMEM, "no memory for the database of jobs");
+	int rc = 0;
+	if (sqlite3_open_v2(path, &l->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL) != SQLITE_OK)
+		rc = l->db ? fault(l, e) : error_set(e, ENOMEM, "no memory for the database of jobs");
+	/* The spool's lock makes us the only ones: without shared memory it works on any file system. */
+	if (!rc)
+		rc = run(l, "PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"
+			    "PRAGMA journal_size_limit = 1048576; PRAGMA trusted_schema = OFF",
+			 e);
+	if (!rc)
+		rc = migrate(l, e);
+	if (!rc)
+		rc = prepare(l, &l->add, "INSERT INTO jobs VALUES (?, ?, ?, ?, ?, ?, 'live', ?, NULL, ?, ?)", e);
+	if (!rc)
+		rc = prepare(l, &l->end, "UPDATE jobs SET state = ?2, ended = ?3, submission = NULL, plan = NULL WHERE id = ?1 AND ended IS NULL",
+			     e);
+	if (!rc)
+		rc = prepare(l, &l->last, "SELECT coalesce(max(id), 0) FROM jobs", e);
+	if (!rc)
+		rc = prepare(l, &l->next, "SELECT id, owner, name, version, priority, mixed, submitted, submission, plan FROM jobs"
+					  " WHERE ended IS NULL AND id > ? ORDER BY id LIMIT 1", e);
+	if (rc) {
+		ledger_close(l);
+		return rc == -EPROTO ? rc : error_prefix(e, rc, "%s", path);
+	}
+	*out = l;
+	return 0;
+}
+
+void ledger_close(struct ledger *l)
+{
+	if (!l)
+		return;
+	sqlite3_finalize(l->add);
+	sqlite3_finalize(l->end);
+	sqlite3_finalize(l->last);
+	sqlite3_finalize(l->next);
+	sqlite3_close(l->db);
+	mem_free(l);
+}
+
+/* Runs a statement that gives no rows. */
+static int finish(struct ledger *l, sqlite3_stmt *s, struct error *e)
+{
+	int rc = sqlite3_step(s) == SQLITE_DONE ? 0 : fault(l, e);
+	sqlite3_reset(s);
+	sqlite3_clear_bindings(s);
+	return rc;
+}
+
+int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e)
+{
+	sqlite3_stmt *s = l->add;
+	sqlite3_bind_int64(s, 1, (sqlite3_int64)j->id);
+	sqlite3_bind_text(s, 2, j->owner, -1, SQLITE_STATIC);
+	sqlite3_bind_text(s, 3, j->name, -1, SQLITE_STATIC);
+	sqlite3_bind_text(s, 4, j->version, -1, SQLITE_STATIC);
+	sqlite3_bind_int(s, 5, j->priority);
+	sqlite3_bind_int(s, 6, j->mixed);
+	sqlite3_bind_double(s, 7, j->submitted);
+	sqlite3_bind_blob64(s, 8, j->submission, j->submission_size, SQLITE_STATIC);
+	sqlite3_bind_blob64(s, 9, j->plan, j->plan_size, SQLITE_STATIC);
+	return finish(l, s, e);
+}
+
+int ledger_end(struct ledger *l, uint64_t id, const char *state, struct error *e)
+{
+	struct timespec now;
+	clock_gettime(CLOCK_REALTIME, &now);
+	sqlite3_bind_int64(l->end, 1, (sqlite3_int64)id);
+	sqlite3_bind_text(l->end, 2, state, -1, SQLITE_STATIC);
+	sqlite3_bind_double(l->end, 3, (double)now.tv_sec);
+	return finish(l, l->end, e);
+}
+
+int ledger_last(struct ledger *l, uint64_t *id, struct error *e)
+{
+	int rc = sqlite3_step(l->last) == SQLITE_ROW ? 0 : fault(l, e);
+	*id = rc ? 0 : (uint64_t)sqlite3_column_int64(l->last, 0);
+	sqlite3_reset(l->last);
+	return rc;
+}
+
+static const char *text_at(sqlite3_stmt *s, int column)
+{
+	const void *text = sqlite3_column_text(s, column);
+	return text ? text : "";
+}
+
+int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e)
+{
+	sqlite3_stmt *s = l->next;
+	sqlite3_reset(s); /* here, so that the last answer was valid until now */
+	sqlite3_bind_int64(s, 1, (sqlite3_int64)after);
+	int rc = sqlite3_step(s);
+	if (rc != SQLITE_ROW) {
+		rc = rc == SQLITE_DONE ? 0 : fault(l, e);
+		sqlite3_reset(s);
+		return rc;
+	}
+	*j = (struct ledger_job){.id = (uint64_t)sqlite3_column_int64(s, 0), .owner = text_at(s, 1), .name = text_at(s, 2),
+				 .version = text_at(s, 3), .priority = sqlite3_column_int(s, 4), .mixed = sqlite3_column_int(s, 5),
+				 .submitted = sqlite3_column_double(s, 6)};
+	j->submission = sqlite3_column_blob(s, 7);
+	j->submission_size = (size_t)sqlite3_column_bytes(s, 7);
+	j->plan = sqlite3_column_blob(s, 8);
+	j->plan_size = (size_t)sqlite3_column_bytes(s, 8);
+	return 1;
+}

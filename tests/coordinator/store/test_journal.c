@@ -1,0 +1,275 @@
+/* A journal gives back what was appended and whole, wherever the machine stopped and whatever bit fell over. */
+#include "coordinator/store/journal.h"
+#include "common/base/crc.h"
+#include "tests/support/folder.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <signal.h>
+#include <unistd.h>
+
+enum { RECORDS = 5, JOB = 12, GENERATION = 3 };
+
+static const size_t sizes[RECORDS] = {17, 0, 1, 64, 9};
+
+struct seen {
+	unsigned count;
+	double elapsed;
+	bool wrong;
+};
+
+static unsigned char byte_of(unsigned record, size_t i)
+{
+	return (unsigned char)(31 * record + 7 * i + 1);
+}
+
+static int see(void *user, enum journal_kind kind, double elapsed, const unsigned char *body, size_t size, struct error *e)
+{
+	struct seen *s = user;
+	(void)e;
+	s->wrong |= s->count >= RECORDS || kind != (enum journal_kind)(1 + s->count % 3) || size != sizes[s->count] || elapsed <= s->elapsed;
+	for (size_t i = 0; i < size && !s->wrong; i++)
+		s->wrong |= body[i] != byte_of(s->count, i);
+	s->elapsed = elapsed;
+	s->count++;
+	return 0;
+}
+
+static void append(struct journal *j, unsigned record)
+{
+	unsigned char body[64];
+	struct error e;
+	for (size_t i = 0; i < sizes[record]; i++)
+		body[i] = byte_of(record, i);
+	size_t first = sizes[record] / 3;
+	assert_int_equal(journal_append(j, (enum journal_kind)(1 + record % 3), 0.5 + record, body, first, body + first, sizes[record] - first, &e), 0);
+}
+
+/* bytes of the file after each record; [0]: without any */
+static void write_all(uint64_t ends[RECORDS + 1])
+{
+	struct journal *j;
+	struct error e;
+	assert_int_equal(journal_create(&j, folder, JOB, GENERATION, &e), 0);
+	ends[0] = journal_bytes(j);
+	for (unsigned i = 0; i < RECORDS; i++) {
+		append(j, i);
+		ends[i + 1] = journal_bytes(j);
+	}
+	assert_int_equal(journal_sync(j, &e), 0);
+	journal_release(j);
+}
+
+static int open_again(struct journal **j, struct seen *s, uint64_t *cut)
+{
+	struct error e;
+	*s = (struct seen){0};
+	return journal_open(j, folder, JOB, GENERATION, see, s, cut, &e);
+}
+
+static void path_of(char path[512])
+{
+	snprintf(path, 512, "%s/journal.%d", folder, GENERATION);
+}
+
+static void all_comes_back(void **state)
+{
+	(void)state;
+	uint64_t ends[RECORDS + 1], cut;
+	struct journal *j;
+	struct seen s;
+	write_all(ends);
+	assert_int_equal(open_again(&j, &s, &cut), 0);
+	assert_int_equal(s.count, RECORDS);
+	assert_false(s.wrong);
+	assert_int_equal(cut, 0);
+	assert_int_equal(journal_bytes(j), ends[RECORDS]);
+	journal_release(j);
+}
+
+/* Cut at every byte: the records before it are there, one more can be appended, and nothing of the torn one is seen again. */
+static void torn_at_every_byte(void **state)
+{
+	(void)state;
+	uint64_t ends[RECORDS + 1], cut;
+	char path[512];
+	path_of(path);
+	write_all(ends);
+	for (uint64_t length = ends[RECORDS]; length >= ends[0]; length--) {
+		struct journal *j;
+		struct seen s;
+		unsigned whole = 0;
+		write_all(ends);
+		assert_int_equal(truncate(path, (off_t)length), 0);
+		while (whole < RECORDS && ends[whole + 1] <= length)
+			whole++;
+		assert_int_equal(open_again(&j, &s, &cut), 0);
+		assert_int_equal(s.count, whole);
+		assert_false(s.wrong);
+		assert_int_equal(cut, length - ends[whole]);
+		for (unsigned i = whole; i < RECORDS; i++)
+			append(j, i);
+		journal_release(j);
+		assert_int_equal(open_again(&j, &s, &cut), 0);
+		assert_int_equal(s.count, RECORDS);
+		assert_false(s.wrong);
+		journal_release(j);
+	}
+}
+
+/* A file that grew before its bytes were written: the kernel shows zeros. */
+static void zeros_behind(void **state)
+{
+	(void)state;
+	uint64_t ends[RECORDS + 1], cut;
+	char path[512];
+	struct journal *j;
+	struct seen s;
+	path_of(path);
+	write_all(ends);
+	assert_int_equal(truncate(path, (off_t)ends[RECORDS] + 100), 0);
+	assert_int_equal(open_again(&j, &s, &cut), 0);
+	assert_int_equal(s.count, RECORDS);
+	assert_int_equal(cut, 100);
+	journal_release(j);
+}
+
+static void flip(const char *path, uint64_t at, unsigned bit)
+{
+	unsigned char c;
+	int fd = open(path, O_RDWR);
+	assert_true(fd >= 0);
+	assert_int_equal(pread(fd, &c, 1, (off_t)at), 1);
+	c = (unsigned char)(c ^ 1u << bit);
+	assert_int_equal(pwrite(fd, &c, 1, (off_t)at), 1);
+	close(fd);
+}
+
+/* Any bit of any byte: what was before it is seen, and nothing wrong ever; the head's bits make it nobody's journal. */
+static void one_bit_wrong(void **state)
+{
+	(void)state;
+	uint64_t ends[RECORDS + 1], cut;
+	char path[512];
+	path_of(path);
+	write_all(ends);
+	for (uint64_t at = 0; at < ends[RECORDS]; at++) {
+		struct journal *j;
+		struct seen s;
+		unsigned whole = 0;
+		write_all(ends);
+		flip(path, at, (unsigned)(at % 8));
+		while (whole < RECORDS && ends[whole + 1] <= at)
+			whole++;
+		int rc = open_again(&j, &s, &cut);
+		if (at < ends[0] - 4) { /* its last 4 bytes mean nothing */
+			assert_int_equal(rc, -EBADMSG);
+			continue;
+		}
+		assert_int_equal(rc, 0);
+		assert_int_equal(s.count, at < ends[0] ? RECORDS : whole);
+		assert_false(s.wrong);
+		journal_release(j);
+	}
+}
+
+static void of_another_job(void **state)
+{
+	(void)state;
+	uint64_t ends[RECORDS + 1], cut;
+	struct journal *j;
+	struct seen s = {0};
+	struct error e;
+	char path[512], other[512];
+	write_all(ends);
+	assert_int_equal(journal_open(&j, folder, JOB + 1, GENERATION, see, &s, &cut, &e), -EBADMSG);
+	assert_int_equal(journal_open(&j, folder, JOB, GENERATION + 1, see, &s, &cut, &e), -ENOENT);
+	path_of(path);
+	snprintf(other, sizeof other, "%s/journal.%d", folder, GENERATION + 1);
+	assert_int_equal(rename(path, other), 0);
+	assert_int_equal(journal_open(&j, folder, JOB, GENERATION + 1, see, &s, &cut, &e), -EBADMSG);
+	assert_int_equal(s.count, 0);
+}
+
+static void others_are_cleared(void **state)
+{
+	(void)state;
+	uint64_t ends[RECORDS + 1];
+	struct journal *j;
+	struct error e;
+	char path[512];
+	write_all(ends);
+	assert_int_equal(journal_create(&j, folder, JOB, 4, &e), 0);
+	journal_release(j);
+	journal_clear(folder, 4);
+	path_of(path);
+	assert_int_equal(access(path, F_OK), -1);
+	snprintf(path, sizeof path, "%s/journal.4", folder);
+	assert_int_equal(access(path, F_OK), 0);
+	journal_clear(folder, UINT64_MAX);
+	assert_int_equal(access(path, F_OK), -1);
+}
+
+/* A disk that takes no more: the record leaves nothing behind, and what was there stays. */
+static void no_room(void **state)
+{
+	(void)state;
+	uint64_t ends[RECORDS + 1], cut;
+	struct journal *j;
+	struct seen s;
+	struct error e;
+	struct rlimit old, small;
+	write_all(ends);
+	assert_int_equal(open_again(&j, &s, &cut), 0);
+	assert_int_equal(getrlimit(RLIMIT_FSIZE, &old), 0);
+	signal(SIGXFSZ, SIG_IGN);
+	small = (struct rlimit){ends[RECORDS] + 40, old.rlim_max};
+	assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
+	char body[100] = {0};
+	assert_int_equal(journal_append(j, JOURNAL_BATCH, 9, body, sizeof body, NULL, 0, &e), -EFBIG);
+	assert_int_equal(setrlimit(RLIMIT_FSIZE, &old), 0);
+	assert_int_equal(journal_bytes(j), ends[RECORDS]);
+	journal_release(j);
+	assert_int_equal(open_again(&j, &s, &cut), 0);
+	assert_int_equal(s.count, RECORDS);
+	assert_int_equal(cut, 0);
+	journal_release(j);
+}
+
+/* RFC 3720, B.4 */
+static void checksums(void **state)
+{
+	(void)state;
+	unsigned char zeros[32] = {0}, ones[32], up[32];
+	memset(ones, 255, sizeof ones);
+	for (int i = 0; i < 32; i++)
+		up[i] = (unsigned char)i;
+	assert_int_equal(crc32c(0, zeros, 32), 0x8A9136AAu);
+	assert_int_equal(crc32c(0, ones, 32), 0x62A8AB43u);
+	assert_int_equal(crc32c(0, up, 32), 0x46DD794Eu);
+	assert_int_equal(crc32c(crc32c(0, up, 13), up + 13, 19), 0x46DD794Eu);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(checksums),
+		cmocka_unit_test_setup_teardown(all_comes_back, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(torn_at_every_byte, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(zeros_behind, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(one_bit_wrong, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(of_another_job, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(others_are_cleared, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(no_room, folder_set_up, folder_tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

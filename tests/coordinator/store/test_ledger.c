@@ -1,0 +1,132 @@
+/* The database of jobs: what was added is there again, what has ended is not, another version is refused. */
+#include "coordinator/store/ledger.h"
+#include "tests/support/folder.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static struct ledger *open_ledger(char path[128])
+{
+	struct ledger *l;
+	struct error e;
+	snprintf(path, 128, "%s/jobs.db", folder);
+	assert_int_equal(ledger_open(&l, path, &e), 0);
+	return l;
+}
+
+static void add(struct ledger *l, uint64_t id)
+{
+	static const unsigned char submission[] = {0, 1, 0, 255}, plan[] = {9, 0};
+	struct error e;
+	struct ledger_job j = {.id = id, .owner = "7", .name = "a 'name'", .version = "0.1", .priority = -3, .mixed = true, .submitted = 12.5,
+			       .submission = submission, .submission_size = sizeof submission, .plan = plan, .plan_size = sizeof plan};
+	assert_int_equal(ledger_add(l, &j, &e), 0);
+}
+
+static void living_jobs(void **state)
+{
+	(void)state;
+	char path[128];
+	struct error e;
+	struct ledger_job j;
+	uint64_t last;
+	struct ledger *l = open_ledger(path);
+	assert_int_equal(ledger_next(l, 0, &j, &e), 0);
+	assert_int_equal(ledger_last(l, &last, &e), 0);
+	assert_int_equal(last, 0);
+	for (uint64_t id = 1; id <= 3; id++)
+		add(l, id);
+	assert_int_equal(ledger_end(l, 2, "done", &e), 0);
+	ledger_close(l);
+	l = open_ledger(path);
+	assert_int_equal(ledger_next(l, 0, &j, &e), 1);
+	assert_int_equal(j.id, 1);
+	assert_string_equal(j.owner, "7");
+	assert_string_equal(j.name, "a 'name'");
+	assert_string_equal(j.version, "0.1");
+	assert_int_equal(j.priority, -3);
+	assert_true(j.mixed && j.submitted == 12.5);
+	assert_int_equal(j.submission_size, 4);
+	assert_memory_equal(j.submission, "\0\1\0\377", 4);
+	assert_int_equal(j.plan_size, 2);
+	assert_memory_equal(j.plan, "\11\0", 2);
+	assert_int_equal(ledger_next(l, 1, &j, &e), 1);
+	assert_int_equal(j.id, 3);
+	assert_int_equal(ledger_next(l, 3, &j, &e), 0);
+	assert_int_equal(ledger_last(l, &last, &e), 0);
+	assert_int_equal(last, 3);
+	struct ledger_job again = j;
+	again.id = 3;
+	assert_true(ledger_add(l, &again, &e) < 0); /* an id is given once */
+	ledger_close(l);
+}
+
+static void set_version(const char *path, unsigned char version)
+{
+	int fd = open(path, O_RDWR); /* user_version: bytes 60 to 63, big endian */
+	assert_int_equal(pwrite(fd, &version, 1, 63), 1);
+	close(fd);
+}
+
+static void versions(void **state)
+{
+	(void)state;
+	char path[128];
+	struct error e;
+	struct ledger *l = open_ledger(path);
+	add(l, 1);
+	ledger_close(l);
+	set_version(path, 99);
+	assert_int_equal(ledger_open(&l, path, &e), -EPROTO);
+	assert_non_null(strstr(e.text, "later"));
+	set_version(path, 1);
+	l = open_ledger(path);
+	ledger_close(l);
+	int fd = open(path, O_RDWR | O_TRUNC);
+	assert_int_equal(write(fd, "this is no database, but a text that is long enough to be looked at as one, if anybody looked; and so on", 100), 100);
+	close(fd);
+	assert_int_equal(ledger_open(&l, path, &e), -EBADMSG);
+}
+
+/* Jobs come and go: neither the file nor its WAL grow with them. */
+static void stays_small(void **state)
+{
+	(void)state;
+	char path[128], wal[160];
+	struct error e;
+	struct stat st;
+	struct ledger *l = open_ledger(path);
+	unsigned char big[20000];
+	memset(big, 1, sizeof big);
+	for (uint64_t id = 1; id <= 300; id++) {
+		struct ledger_job j = {.id = id, .owner = "", .name = "", .version = "", .submission = big, .submission_size = sizeof big,
+				       .plan = big, .plan_size = 10};
+		assert_int_equal(ledger_add(l, &j, &e), 0);
+		assert_int_equal(ledger_end(l, id, "done", &e), 0);
+	}
+	snprintf(wal, sizeof wal, "%s-wal", path);
+	assert_int_equal(stat(wal, &st), 0);
+	assert_true(st.st_size < 8 << 20);
+	assert_int_equal(stat(path, &st), 0);
+	assert_true(st.st_size < 1 << 18);
+	ledger_close(l);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(living_jobs, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(versions, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(stays_small, folder_set_up, folder_tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,72 @@
+# The coordinator killed with -9 again and again, in the bootstrap, between rounds and just after an acknowledgement, with a job
+# of chains and one of samples under way: both go on where they were, nothing counts twice, the bits are those of quiet runs.
+# SEED=N repeats the moments of a run, KILLS=N changes how many there are.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
+
+SEED=${SEED:-7}
+KILLS=${KILLS:-7}
+CHAINS="--integrator hslt --bootstrap 200000 --mutations 6000000"
+SAMPLES="--integrator path --spp 600"
+echo "seed $SEED"
+
+moment() {
+	SEED=$(((SEED * 1103515245 + 12345) % 2147483648))
+	awk -v r=$SEED -v least="$1" -v most="$2" 'BEGIN { printf "%.3f\n", least + (most - least) * r / 2147483648 }'
+}
+
+again() {
+	kill -9 $COORDINATOR_PID
+	wait $COORDINATOR_PID 2>/dev/null || :
+	LISTEN=$COORDINATOR start_coordinator -v
+	killed=$((killed + 1))
+}
+
+is_merging() {
+	[ "$(tail -n +"$seen" "$DIR/coordinator.log" | grep -c event=batch_merged)" -ge "$1" ]
+}
+
+# leases that are merged, and those that were acknowledged in all lives
+merged() {
+	value "$1" merged
+}
+acknowledged() {
+	grep -c "event=batch_stored job=$1 .* kind=2 " "$DIR/coordinator.log" || :
+}
+
+start_coordinator -v
+start_worker w1
+start_worker w2
+submit "$BOX" -o "$DIR/chains-quiet.exr" $CHAINS --wait >/dev/null
+submit "$BOX" -o "$DIR/samples-quiet.exr" $SAMPLES --wait >/dev/null
+quiet=$(merged j1)
+[ "$(acknowledged j1)" -eq "$quiet" ] || fail "$(acknowledged j1) of $quiet were acknowledged"
+
+killed=0
+a=$(submit "$BOX" -o "$DIR/chains.exr" $CHAINS)
+b=$(submit "$BOX" -o "$DIR/samples.exr" $SAMPLES)
+again # before anything is merged, or in the bootstrap
+until_true 20 is_state "$a" bootstrap || is_state "$a" running || fail "$a is $(value "$a" state)"
+again
+while [ $killed -lt "$KILLS" ]; do
+	seen=$(wc -l <"$DIR/coordinator.log")
+	until_true 20 is_merging $((killed % 3 * 10 + 1)) || fail "nothing is merged after $killed kills"
+	[ $((killed % 2)) -eq 0 ] || sleep "$(moment 0.05 0.5)" # else: just after a merge
+	is_state "$a" done && is_state "$b" done && fail "both jobs were done after $killed kills"
+	again
+	for j in $a $b; do
+		[ "$(merged $j)" -ge "$(acknowledged $j)" ] || fail "$j knows $(merged $j) leases of $(acknowledged $j)"
+	done
+done
+until_true 60 is_state "$a" done || fail "$a is $(value "$a" state)"
+until_true 60 is_state "$b" done || fail "$b is $(value "$b" state)"
+"$BIN/hslt-job" fetch "$a"
+"$BIN/hslt-job" fetch "$b"
+same "$DIR/chains-quiet.exr" "$DIR/chains.exr"
+same "$DIR/samples-quiet.exr" "$DIR/samples.exr"
+[ "$(merged "$a")" = "$quiet" ] || fail "$(merged "$a") leases were merged, and $quiet without kills"
+"$BIN/hslt-job" log "$a" | grep -q state=restored || fail "$a never went on"
+[ "$(find "$DIR/spool/jobs" -name 'journal.*' -o -name checkpoint | wc -l)" -eq 0 ] || fail "journals of ended jobs are left"
+new=$(submit "$BOX" -o "$DIR/new.exr" --integrator path --spp 1)
+[ "$new" = j5 ] || fail "the next job is $new, not j5"
+echo "$killed kills, $quiet leases, none lost, none twice, bits equal"
