@@ -21,7 +21,7 @@ CFLAGS   := -std=c17 $(OPT) -g -ffp-contract=off -fno-fast-math -fno-strict-alia
 CPPFLAGS := -D_GNU_SOURCE -I. -I$(BUILD)/gen -MMD -MP
 LDFLAGS  := $(if $(SAN),-fsanitize=$(SAN)) $(EXTRA_LDFLAGS)
 
-LIBS_COMMON := -lOpenEXRCore -lprotobuf-c -luv -lcrypto -ljansson -lsqlite3 -lm -lpthread
+LIBS_COMMON := -lOpenEXRCore -lprotobuf-c -luv -lssl -lcrypto -ljansson -lsqlite3 -lm -lpthread
 LIBS_RENDER := $(EMBREE) -lexpat -lpng -ljpeg -lz
 
 COMMON_SRC := $(wildcard common/*/*.c)

@@ -15,14 +15,14 @@ static const char doc[] =
 	"\v"
 	"Examples:\n"
 	"  hslt-coordinator --listen 127.0.0.1:7700 --spool ~/farm --status-socket ~/farm/status\n"
-	"  hslt-coordinator --listen 0.0.0.0:7700 --insecure --spool /var/lib/hslt\n"
+	"  hslt-coordinator --listen 0.0.0.0:7700 --tls ~/.hslt-ca/coordinator --spool /var/lib/hslt\n"
 	"\n"
 	"The spool keeps the jobs' results; one coordinator works with a spool at a time. A line of the log is written to "
 	"stderr for every event. Under systemd it says when it is ready and feeds the watchdog, and a socket unit's Unix socket "
-	"is taken as the status socket.\n"
+	"is taken as the status socket. HSLT_TLS stands in for --tls.\n"
 	"Exit codes: 0 stopped by SIGTERM or SIGINT, 1 failed, 2 usage.";
 
-enum { OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS };
+enum { OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS, OPTION_TLS_CHECK };
 
 static const struct argp_option options[] = {
 	{"listen", 'l', "HOST:PORT", 0, "Where workers and clients connect (127.0.0.1:7700; port 0: any free one)", 0},
@@ -32,6 +32,8 @@ static const struct argp_option options[] = {
 	{"port-file", OPTION_PORT_FILE, "FILE", 0, "Write the port that was bound into FILE", 0},
 	{"heartbeat", OPTION_HEARTBEAT, "SECONDS", 0, "How often workers must be heard (5)", 0},
 	{"blobs", OPTION_BLOBS, "GB", 0, "Limit of scene files kept in the spool; the oldest that no job needs go (100)", 0},
+	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem, crl.pem: encrypt, and let in who has a certificate (hslt-ca)", 0},
+	{"tls-check", OPTION_TLS_CHECK, "SECONDS", 0, "How often certificates of live connections are checked again (60)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Listen on other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log every lease, too", 0},
 	{0},
@@ -71,6 +73,12 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_BLOBS:
 		c->blob_bytes = (uint64_t)(1e9 * number(state, "--blobs", arg, 0.001, 1e6));
 		return 0;
+	case OPTION_TLS:
+		c->tls = arg;
+		return 0;
+	case OPTION_TLS_CHECK:
+		c->tls_check_seconds = number(state, "--tls-check", arg, 0.1, 3600);
+		return 0;
 	case OPTION_INSECURE:
 		c->insecure = true;
 		return 0;
@@ -94,6 +102,7 @@ int main(int argc, char **argv)
 	server_config_init(&c);
 	c.blob_bytes = 100000000000u;
 	c.status_socket = getenv("HSLT_STATUS_SOCKET");
+	c.tls = getenv("HSLT_TLS");
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &c);
 	log_event(LOG_START, "program=hslt-coordinator version=%s", HSLT_VERSION);

@@ -17,6 +17,8 @@
 	X(PEER_REFUSED, "peer_refused", WARN) \
 	X(PEER_CLOSED, "peer_closed", INFO) \
 	X(PEER_FAULT, "peer_fault", WARN) \
+	X(TLS_READ, "tls_read", INFO) \
+	X(TLS_FAULT, "tls_fault", ERROR) \
 	X(CONNECT, "connect", INFO) \
 	X(CONNECT_FAILED, "connect_failed", WARN) \
 	X(JOB_SUBMIT, "job_submit", INFO) \

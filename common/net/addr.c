@@ -62,13 +62,14 @@ bool net_addr_is_loopback(const struct net_addr *a)
 	return false;
 }
 
-int net_addr_allow(const struct net_addr *a, const char *host_port, bool insecure, struct error *e)
+int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, struct error *e)
 {
-	if (insecure || net_addr_is_loopback(a))
+	if (safe || net_addr_is_loopback(a))
 		return 0;
 	return error_set(e, EPERM,
-			 "'%s' is not a loopback address, and what goes over the network is neither encrypted nor "
-			 "authenticated; say --insecure if every machine that can reach it is trusted",
+			 "'%s' is not a loopback address, and without certificates what goes over the network is neither "
+			 "encrypted nor authenticated: give --tls DIR (hslt-ca makes one), or say --insecure if every machine "
+			 "that can reach it is trusted",
 			 host_port);
 }
 

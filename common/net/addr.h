@@ -1,6 +1,6 @@
 /*
- * "HOST:PORT", "[::1]:PORT": where a daemon listens and whom a peer calls. Whatever is not loopback must be asked for
- * (--insecure), because nothing on the wire is encrypted.
+ * "HOST:PORT", "[::1]:PORT": where a daemon listens and whom a peer calls. Whatever is not loopback needs TLS or must be asked
+ * for (--insecure).
  */
 #ifndef COMMON_NET_ADDR_H
 #define COMMON_NET_ADDR_H
@@ -18,8 +18,8 @@ struct net_addr {
 /* Looks the name up (may block on DNS). -EINVAL: not HOST:PORT; -EHOSTUNREACH: unknown name. Port 0 is allowed. */
 int net_addr_resolve(struct net_addr *a, const char *host_port, struct error *e);
 bool net_addr_is_loopback(const struct net_addr *a);
-/* -EPERM with what to do, unless the address is loopback or insecure is set. */
-int net_addr_allow(const struct net_addr *a, const char *host_port, bool insecure, struct error *e);
+/* -EPERM with what to do, unless the address is loopback or `safe`: there is TLS, or none is wanted. */
+int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, struct error *e);
 unsigned net_addr_port(const struct net_addr *a);
 void net_addr_format(const struct net_addr *a, char *text, size_t size); /* numeric HOST:PORT */
 

@@ -31,7 +31,8 @@ struct client {
 	struct conn *conn; /* NULL: closed */
 	struct waiting *first, **last;
 	unsigned waiting_count;
-	bool opened, timed_out;
+	struct tls *tls; /* NULL: plaintext */
+	bool opened, timed_out, distrust;
 	char why[256];
 };
 
@@ -64,6 +65,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 static void on_closed(void *user, const char *why)
 {
 	struct client *cl = user;
+	cl->distrust = conn_distrust(cl->conn);
 	cl->conn = NULL;
 	text_copy(cl->why, sizeof cl->why, why);
 }
@@ -154,6 +156,11 @@ void client_message_fini(struct client_message *m)
 	buf_fini(&m->payload);
 }
 
+static int unwelcome(const struct client *cl, const char *host_port, struct error *e)
+{
+	return error_set(e, EACCES, "%s: %s", host_port, cl->why);
+}
+
 static int say_hello(struct client *cl, const char *host_port, const char *name, struct error *e)
 {
 	Farm__Hello hello;
@@ -171,6 +178,8 @@ static int say_hello(struct client *cl, const char *host_port, const char *name,
 	int rc = client_send(cl, &m, NULL, 0, e);
 	if (!rc)
 		rc = client_wait(cl, HELLO_SECONDS, &answer, e);
+	if (rc && cl->distrust)
+		return unwelcome(cl, host_port, e);
 	if (rc)
 		return rc == -EPROTO ? rc : error_set(e, ECONNREFUSED, "no coordinator answers at %s", host_port);
 	const Farm__Envelope *a = answer.envelope.message;
@@ -184,12 +193,12 @@ static int say_hello(struct client *cl, const char *host_port, const char *name,
 	return rc;
 }
 
-int client_open(struct client **out, const char *host_port, bool insecure, const char *name, struct error *e)
+int client_open(struct client **out, const char *host_port, const char *tls, bool insecure, const char *name, struct error *e)
 {
 	struct net_addr a;
 	int rc = net_addr_resolve(&a, host_port, e);
 	if (!rc)
-		rc = net_addr_allow(&a, host_port, insecure, e);
+		rc = net_addr_allow(&a, host_port, insecure || (tls && *tls), e);
 	if (rc)
 		return rc;
 	struct client *cl = mem_alloc(1, sizeof *cl);
@@ -197,20 +206,29 @@ int client_open(struct client **out, const char *host_port, bool insecure, const
 		return error_set(e, ENOMEM, "no memory for a connection");
 	signal(SIGPIPE, SIG_IGN);
 	cl->last = &cl->first;
+	if (tls && *tls)
+		rc = tls_open(&cl->tls, tls, e);
+	if (rc) {
+		mem_free(cl);
+		return rc;
+	}
 	rc = uv_loop_init(&cl->loop);
 	if (rc) {
+		tls_close(cl->tls);
 		mem_free(cl);
 		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
 	}
 	uv_timer_init(&cl->loop, &cl->timeout);
 	uv_timer_init(&cl->loop, &cl->heartbeat);
 	cl->timeout.data = cl->heartbeat.data = cl;
-	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, 1 << 23, 30, 0};
+	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, 1 << 23, 30, 0, cl->tls};
 	rc = conn_connect(&cl->conn, &cl->loop, &a, &config, &events, cl, e);
 	start_clock(cl, HELLO_SECONDS);
 	while (!rc && cl->conn && !cl->opened && !cl->timed_out)
 		uv_run(&cl->loop, UV_RUN_ONCE);
-	if (!rc && !cl->opened)
+	if (!rc && !cl->opened && cl->distrust)
+		rc = unwelcome(cl, host_port, e);
+	else if (!rc && !cl->opened)
 		rc = error_set(e, ECONNREFUSED, "no coordinator at %s: %s", host_port,
 			       cl->timed_out ? "no answer in time" : cl->why);
 	if (!rc)
@@ -234,6 +252,7 @@ void client_close(struct client *cl)
 	int rc = uv_loop_close(&cl->loop);
 	assert(rc == 0);
 	(void)rc;
+	tls_close(cl->tls);
 	while (cl->first) {
 		struct waiting *next = cl->first->next;
 		client_message_fini(&cl->first->message);

@@ -15,9 +15,10 @@ struct client_message { /* fini with client_message_fini */
 	struct buf payload;
 };
 
-/* Connects and exchanges hello. -ECONNREFUSED when nobody is there (also what is not one of ours: nothing else answers
- * in time), -EPROTO when hello is refused. */
-int client_open(struct client **cl, const char *host_port, bool insecure, const char *name, struct error *e);
+/* Connects and exchanges hello; tls: a folder (tls.h), NULL or "" for plaintext. -ECONNREFUSED when nobody is there (also
+ * what is not one of ours: nothing else answers in time), -EPROTO when hello is refused, -EACCES when one side does not accept
+ * the other's certificate or only one speaks TLS. */
+int client_open(struct client **cl, const char *host_port, const char *tls, bool insecure, const char *name, struct error *e);
 void client_close(struct client *cl);
 
 /* Sends and waits until it is with the kernel. */

@@ -7,7 +7,23 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { READ_BYTES = 1 << 16, TICK_MS = 250, LINGER_MS = 5000, BYTES_PER_SECOND = 1 << 16 };
+enum {
+	READ_BYTES = 1 << 16,
+	TICK_MS = 250,
+	LINGER_MS = 5000,
+	REFUSED_MS = 1000,    /* for a peer to read why */
+	HANDSHAKE_MS = 10000, /* of TLS */
+	BYTES_PER_SECOND = 1 << 16,
+	PIECE = 1 << 16,  /* encrypted at a time */
+	WINDOW = 1 << 20, /* encrypted and not yet with the kernel */
+};
+
+/* A frame that waits to be encrypted. */
+struct queued {
+	struct queued *next;
+	unsigned char *bytes;
+	size_t size, at;
+};
 
 struct conn {
 	uv_tcp_t tcp;
@@ -17,11 +33,17 @@ struct conn {
 	const struct conn_events *events;
 	void *user;
 	struct frame_reader reader;
-	size_t unsent;
+	struct tls_link *link; /* NULL: plaintext */
+	struct queued *queue, **queue_last;
+	size_t unsent;    /* bytes of frames that are not with the kernel */
+	size_t in_flight; /* what libuv has to write, of TLS with all its own */
 	uint64_t heard, frame_begun; /* ms of the loop's clock */
+	uint64_t begun, checked;     /* the connection; the peer's certificate */
 	uint64_t linger_until;       /* 0: not leaving */
 	int open_handles;
-	bool closing;
+	bool accepted, sniffed, closing;
+	bool waits_for_peer; /* it is told why before it is cut off */
+	bool distrust;
 	char why[256];
 	char chunk[READ_BYTES];
 };
@@ -29,8 +51,20 @@ struct conn {
 struct sending {
 	uv_write_t request;
 	unsigned char *bytes;
-	size_t size;
+	size_t size, plain; /* what it counts in in_flight, in unsent */
 };
+
+static void on_sent(uv_write_t *r, int status);
+
+static void free_queue(struct conn *c)
+{
+	while (c->queue) {
+		struct queued *next = c->queue->next;
+		mem_free(c->queue->bytes);
+		mem_free(c->queue);
+		c->queue = next;
+	}
+}
 
 static void on_handle_closed(uv_handle_t *h)
 {
@@ -39,6 +73,8 @@ static void on_handle_closed(uv_handle_t *h)
 		return;
 	c->events->closed(c->user, c->why);
 	frame_reader_fini(&c->reader);
+	tls_link_free(c->link);
+	free_queue(c);
 	mem_free(c);
 }
 
@@ -74,20 +110,16 @@ static void deliver(struct conn *c)
 	envelope_fini(&env);
 }
 
-static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b)
+/* Frames, as they are without encryption. */
+static void take(struct conn *c, const unsigned char *bytes, size_t size)
 {
-	struct conn *c = s->data;
-	if (count < 0) {
-		conn_close(c, count == UV_EOF ? "the peer hung up" : uv_strerror((int)count));
-		return;
-	}
-	size_t at = 0, size = (size_t)count;
-	c->heard = uv_now(s->loop);
+	size_t at = 0;
+	c->heard = uv_now(c->tcp.loop);
 	while (at < size && !c->closing && !c->linger_until) {
 		struct error e;
 		size_t used;
 		bool was_midway = frame_reader_is_midway(&c->reader);
-		int rc = frame_reader_take(&c->reader, (const unsigned char *)b->base + at, size - at, &used, &e);
+		int rc = frame_reader_take(&c->reader, bytes + at, size - at, &used, &e);
 		at += used;
 		if (!was_midway)
 			c->frame_begun = c->heard;
@@ -95,6 +127,141 @@ static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b)
 			conn_close(c, e.text);
 		else if (rc)
 			deliver(c);
+	}
+}
+
+/* Takes the mem_alloc'd bytes. */
+static void to_kernel(struct conn *c, unsigned char *bytes, size_t size, size_t plain)
+{
+	struct sending *s = mem_alloc(1, sizeof *s);
+	if (!s) {
+		mem_free(bytes);
+		conn_close(c, "no memory to send");
+		return;
+	}
+	*s = (struct sending){.bytes = bytes, .size = size, .plain = plain};
+	s->request.data = s;
+	uv_buf_t b = uv_buf_init((char *)bytes, (unsigned)size);
+	int rc = uv_write(&s->request, (uv_stream_t *)&c->tcp, &b, 1, on_sent);
+	if (rc) {
+		mem_free(bytes);
+		mem_free(s);
+		conn_close(c, uv_strerror(rc));
+		return;
+	}
+	c->in_flight += size;
+}
+
+static void copy_to_kernel(struct conn *c, const void *bytes, size_t size, size_t plain)
+{
+	unsigned char *copy = mem_alloc(size, 1);
+	if (copy)
+		to_kernel(c, memcpy(copy, bytes, size), size, plain);
+	else
+		conn_close(c, "no memory to send");
+}
+
+/* What TLS has to say, in which `plain` bytes of frames are. */
+static void flush(struct conn *c, size_t plain)
+{
+	const unsigned char *bytes;
+	size_t size = tls_link_output(c->link, &bytes);
+	if (!size || c->closing)
+		return;
+	if (c->in_flight > 2 * WINDOW) /* answers to what it asks for: it asks and does not read */
+		conn_close(c, "the peer does not take what is sent to it");
+	else
+		copy_to_kernel(c, bytes, size, plain);
+	tls_link_output_taken(c->link);
+}
+
+/* The peer is told, if there is something to tell, and is given a moment to read it: data that comes after the socket is
+ * closed would make the kernel throw that away. */
+static void refuse(struct conn *c, int rc, const char *why)
+{
+	c->distrust = rc == -EACCES;
+	text_copy(c->why, sizeof c->why, why);
+	c->linger_until = uv_now(c->tcp.loop) + REFUSED_MS;
+	c->waits_for_peer = true;
+	if (!c->in_flight)
+		conn_close(c, why);
+}
+
+static void pump(struct conn *c)
+{
+	while (c->queue && tls_link_is_open(c->link) && c->in_flight < WINDOW && !c->closing) {
+		struct queued *q = c->queue;
+		struct error e;
+		size_t size = q->size - q->at < PIECE ? q->size - q->at : PIECE;
+		if (tls_link_write(c->link, q->bytes + q->at, size, &e)) {
+			conn_close(c, e.text);
+			return;
+		}
+		q->at += size;
+		flush(c, size);
+		if (q->at < q->size)
+			continue;
+		c->queue = q->next;
+		if (!c->queue)
+			c->queue_last = &c->queue;
+		mem_free(q->bytes);
+		mem_free(q);
+	}
+}
+
+/* Encrypted bytes, or none: then the handshake begins. */
+static void take_encrypted(struct conn *c, const void *bytes, size_t size)
+{
+	struct error e;
+	ssize_t n = tls_link_take(c->link, bytes, size, &e);
+	while (n >= 0 && !c->closing && !c->linger_until) {
+		bool was_open = tls_link_is_open(c->link);
+		n = tls_link_read(c->link, c->chunk, sizeof c->chunk, &e);
+		flush(c, 0);
+		if (!was_open && tls_link_is_open(c->link) && !c->closing) {
+			c->heard = c->checked = uv_now(c->tcp.loop);
+			if (c->events->opened && !c->accepted)
+				c->events->opened(c->user);
+			pump(c);
+		}
+		if (n > 0)
+			take(c, (const unsigned char *)c->chunk, (size_t)n);
+		else if (n == 0)
+			return;
+	}
+	if (n < 0 && !c->closing) {
+		flush(c, 0);
+		refuse(c, (int)n, e.text);
+	}
+}
+
+/* No frame begins like TLS. */
+static bool is_tls(struct conn *c, const char *bytes, size_t size)
+{
+	bool first = !c->sniffed && size;
+	c->sniffed = true;
+	if (!first || !tls_is_first_byte((unsigned char)*bytes))
+		return false;
+	if (c->accepted)
+		copy_to_kernel(c, tls_none_here, sizeof tls_none_here, 0);
+	refuse(c, -EACCES, "the peer speaks TLS, and here nothing is encrypted: both need --tls DIR, or neither");
+	return true;
+}
+
+static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b)
+{
+	struct conn *c = s->data;
+	if (count < 0) {
+		bool midway = c->link && !tls_link_is_open(c->link);
+		conn_close(c, count != UV_EOF ? uv_strerror((int)count)
+			      : midway	      ? "the peer hung up during the TLS handshake"
+					      : "the peer hung up");
+	} else if (c->linger_until || c->closing) {
+		return;
+	} else if (c->link) {
+		take_encrypted(c, b->base, (size_t)count);
+	} else if (!is_tls(c, b->base, (size_t)count)) {
+		take(c, (const unsigned char *)b->base, (size_t)count);
 	}
 }
 
@@ -106,12 +273,29 @@ static bool has_stalled(const struct conn *c, uint64_t now)
 	return frame_reader_is_midway(&c->reader) && (double)(now - c->frame_begun) > 1000 * allowed;
 }
 
+/* Is the peer's certificate still good? By the clock it can expire, by the list it can be revoked. */
+static void check_again(struct conn *c, uint64_t now)
+{
+	struct error e;
+	if (!c->link || !tls_link_is_open(c->link) ||
+	    (double)(now - c->checked) < 1000 * tls_recheck_seconds(c->config.tls))
+		return;
+	c->checked = now;
+	if (tls_link_recheck(c->link, &e)) {
+		c->distrust = true;
+		conn_close(c, e.text);
+	}
+}
+
 static void on_tick(uv_timer_t *t)
 {
 	struct conn *c = t->data;
 	uint64_t now = uv_now(t->loop);
+	check_again(c, now);
 	if (c->linger_until && now >= c->linger_until)
 		conn_close(c, c->why);
+	else if (c->link && !tls_link_is_open(c->link) && now - c->begun > HANDSHAKE_MS)
+		conn_close(c, "the TLS handshake was not finished in time");
 	else if (has_stalled(c, now))
 		conn_close(c, "a frame was begun and not finished in time");
 	else if (c->config.quiet_seconds > 0 && (double)(now - c->heard) > 1000 * c->config.quiet_seconds)
@@ -120,18 +304,26 @@ static void on_tick(uv_timer_t *t)
 
 /* ---- life ---- */
 
-static int conn_new(struct conn **out, uv_loop_t *loop, const struct conn_config *config,
+static int conn_new(struct conn **out, uv_loop_t *loop, bool accepted, const struct conn_config *config,
 		    const struct conn_events *events, void *user, struct error *e)
 {
 	struct conn *c = mem_alloc(1, sizeof *c);
 	if (!c)
 		return error_set(e, ENOMEM, "no memory for a connection");
+	int rc = config->tls ? tls_link_new(&c->link, config->tls, accepted, e) : 0;
+	if (rc) {
+		mem_free(c);
+		return rc;
+	}
+	c->accepted = accepted;
+	c->queue_last = &c->queue;
 	c->config = *config;
 	c->events = events;
 	c->user = user;
 	frame_reader_init(&c->reader, config->limits);
-	int rc = uv_tcp_init(loop, &c->tcp);
+	rc = uv_tcp_init(loop, &c->tcp);
 	if (rc) {
+		tls_link_free(c->link);
 		mem_free(c);
 		return error_set(e, -rc, "no socket: %s", uv_strerror(rc));
 	}
@@ -147,8 +339,11 @@ static int start(struct conn *c)
 {
 	uv_tcp_nodelay(&c->tcp, 1);
 	uv_tcp_keepalive(&c->tcp, 1, 60);
-	c->heard = uv_now(c->tcp.loop);
-	return uv_read_start((uv_stream_t *)&c->tcp, on_alloc, on_read);
+	c->heard = c->begun = uv_now(c->tcp.loop);
+	int rc = uv_read_start((uv_stream_t *)&c->tcp, on_alloc, on_read);
+	if (!rc && c->link)
+		take_encrypted(c, NULL, 0);
+	return rc;
 }
 
 static void on_connected(uv_connect_t *r, int status)
@@ -159,7 +354,7 @@ static void on_connected(uv_connect_t *r, int status)
 	int rc = status ? status : start(c);
 	if (rc)
 		conn_close(c, uv_strerror(rc));
-	else if (c->events->opened)
+	else if (c->events->opened && !c->link)
 		c->events->opened(c->user);
 }
 
@@ -167,7 +362,7 @@ int conn_connect(struct conn **out, uv_loop_t *loop, const struct net_addr *a, c
 		 const struct conn_events *events, void *user, struct error *e)
 {
 	struct conn *c = NULL;
-	int rc = conn_new(&c, loop, config, events, user, e);
+	int rc = conn_new(&c, loop, false, config, events, user, e);
 	if (rc)
 		return rc;
 	uv_timer_start(&c->timer, on_tick, TICK_MS, TICK_MS);
@@ -182,7 +377,7 @@ int conn_accept(struct conn **out, uv_stream_t *listener, const struct conn_conf
 		const struct conn_events *events, void *user, struct error *e)
 {
 	struct conn *c = NULL;
-	int rc = conn_new(&c, listener->loop, config, events, user, e);
+	int rc = conn_new(&c, listener->loop, true, config, events, user, e);
 	if (rc)
 		return rc;
 	uv_timer_start(&c->timer, on_tick, TICK_MS, TICK_MS);
@@ -216,54 +411,72 @@ void conn_peer_name(const struct conn *c, char *text, size_t size)
 		net_addr_format(&a, text, size);
 }
 
+const struct tls_peer *conn_peer(const struct conn *c)
+{
+	return c->link && tls_link_is_open(c->link) ? tls_link_peer(c->link) : NULL;
+}
+
+bool conn_distrust(const struct conn *c)
+{
+	return c->distrust;
+}
+
 /* ---- writing ---- */
 
 static void on_sent(uv_write_t *r, int status)
 {
 	struct sending *s = r->data;
 	struct conn *c = r->handle->data;
-	c->unsent -= s->size;
+	c->in_flight -= s->size;
+	c->unsent -= s->plain;
 	mem_free(s->bytes);
 	mem_free(s);
 	if (c->closing)
 		return;
-	if (status)
+	if (status) {
 		conn_close(c, uv_strerror(status));
-	else if (c->unsent)
 		return;
-	else if (c->linger_until)
+	}
+	if (c->link && !c->waits_for_peer)
+		pump(c);
+	if (c->closing || c->in_flight || c->unsent || c->waits_for_peer)
+		return;
+	if (c->linger_until)
 		conn_close(c, c->why);
 	else if (c->events->drained)
 		c->events->drained(c->user);
 }
 
-void conn_send_frame(struct conn *c, unsigned char *frame, size_t size)
+/* Takes the frame, also when it fails. */
+static void enqueue(struct conn *c, unsigned char *frame, size_t size)
 {
-	struct sending *s = NULL;
-	const char *fault = NULL;
-	if (c->closing || c->linger_until)
-		goto drop;
-	if (c->unsent && size > c->config.send_limit - (c->unsent < c->config.send_limit ? c->unsent : c->config.send_limit))
-		fault = "the peer does not take what is sent to it";
-	else if (!(s = mem_alloc(1, sizeof *s)))
-		fault = "no memory to send";
-	if (fault) {
-		conn_close(c, fault);
-		goto drop;
-	}
-	s->bytes = frame;
-	s->size = size;
-	s->request.data = s;
-	uv_buf_t b = uv_buf_init((char *)frame, (unsigned)size);
-	int rc = uv_write(&s->request, (uv_stream_t *)&c->tcp, &b, 1, on_sent);
-	if (!rc) {
-		c->unsent += size;
+	struct queued *q = mem_alloc(1, sizeof *q);
+	if (!q) {
+		mem_free(frame);
+		conn_close(c, "no memory to send");
 		return;
 	}
-	conn_close(c, uv_strerror(rc));
-drop:
-	mem_free(s);
-	mem_free(frame);
+	*q = (struct queued){.bytes = frame, .size = size};
+	*c->queue_last = q;
+	c->queue_last = &q->next;
+	c->unsent += size;
+	pump(c);
+}
+
+void conn_send_frame(struct conn *c, unsigned char *frame, size_t size)
+{
+	size_t room = c->unsent < c->config.send_limit ? c->config.send_limit - c->unsent : 0;
+	if (c->closing || c->linger_until) {
+		mem_free(frame);
+	} else if (c->unsent && size > room) {
+		mem_free(frame);
+		conn_close(c, "the peer does not take what is sent to it");
+	} else if (c->link) {
+		enqueue(c, frame, size);
+	} else {
+		c->unsent += size;
+		to_kernel(c, frame, size, size);
+	}
 }
 
 void conn_send(struct conn *c, const Farm__Envelope *message, const void *payload, size_t payload_size)
@@ -288,6 +501,6 @@ void conn_close_when_sent(struct conn *c, const char *why)
 		return;
 	text_copy(c->why, sizeof c->why, why);
 	c->linger_until = uv_now(c->tcp.loop) + LINGER_MS;
-	if (!c->unsent)
+	if (!c->unsent && !c->in_flight)
 		conn_close(c, c->why);
 }

@@ -1,5 +1,5 @@
 /*
- * One connection: frames in and out over a TCP stream of libuv, with limits. All calls and callbacks on the loop's thread.
+ * One connection: frames in and out over a TCP stream of libuv, through TLS or not, with limits. All calls and callbacks on the loop's thread.
  * The connection owns its memory: after conn_close (or a fault) `closed` comes exactly once, from the loop and never from
  * inside another call, and the connection is gone when it returns; no other callback comes in between.
  */
@@ -7,6 +7,7 @@
 #define COMMON_NET_CONN_H
 
 #include "common/net/addr.h"
+#include "common/net/tls.h"
 #include "common/wire/envelope.h"
 #include "common/wire/frame.h"
 
@@ -15,7 +16,7 @@
 struct conn;
 
 struct conn_events {
-	void (*opened)(void *user); /* conn_connect only; may be NULL */
+	void (*opened)(void *user); /* conn_connect only, with TLS after the handshake; may be NULL */
 	/* The envelope may be taken (copied and zeroed); the payload is there during the call only. */
 	void (*message)(void *user, struct envelope *env, const unsigned char *payload, size_t payload_size);
 	void (*drained)(void *user); /* all that was sent is with the kernel; may be NULL */
@@ -27,6 +28,7 @@ struct conn_config {
 	size_t send_limit;    /* bytes waiting to be sent; a peer that lets more pile up is cut off */
 	double stall_seconds; /* a frame that has begun must be whole after this long + 1 s per 64 KB */
 	double quiet_seconds; /* nothing heard for so long: cut off; 0: never */
+	struct tls *tls;      /* NULL: plaintext. Outlives the connection; who does not speak it is cut off */
 };
 
 /* -errno when not even an attempt could be made; else opened or closed comes later. */
@@ -38,6 +40,10 @@ int conn_accept(struct conn **c, uv_stream_t *listener, const struct conn_config
 void conn_set_limits(struct conn *c, struct frame_limits limits);
 void conn_set_quiet(struct conn *c, double seconds);
 void conn_peer_name(const struct conn *c, char *text, size_t size); /* numeric HOST:PORT */
+const struct tls_peer *conn_peer(const struct conn *c); /* by its certificate; NULL in plaintext and before the handshake */
+/* In `closed`: it ended because one side does not accept the other's certificate, or only one of them speaks TLS. A client
+ * may be `opened` and refused after that: the coordinator judges last. */
+bool conn_distrust(const struct conn *c);
 
 /* Packs and sends; the payload is copied. A failure closes the connection, so callers need not look. */
 void conn_send(struct conn *c, const Farm__Envelope *message, const void *payload, size_t payload_size);

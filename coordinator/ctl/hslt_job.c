@@ -21,22 +21,23 @@ static const char doc[] =
 	"  hslt-job cancel j12\n"
 	"  hslt-job log j12\n"
 	"\n"
-	"HSLT_COORDINATOR stands in for --coordinator. Exit codes: 0 done, 1 failed, 2 usage, 6 refused, 75 coordinator not "
+	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 done, 1 failed, 2 usage, 6 refused, 75 coordinator not "
 	"reachable.";
 
-enum { EXIT_DISAGREE = 5, OPTION_INSECURE = 256, OPTION_JSON, OPTION_PREVIEW };
+enum { EXIT_DISAGREE = 5, OPTION_INSECURE = 256, OPTION_JSON, OPTION_PREVIEW, OPTION_TLS };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
 	{"output", 'o', "FILE", 0, "fetch: where to (the name that hslt-submit was given)", 0},
 	{"preview", OPTION_PREVIEW, NULL, 0, "fetch: what there is while the job runs", 0},
 	{"json", OPTION_JSON, NULL, 0, "list: one JSON array", 0},
+	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{0},
 };
 
 struct arguments {
-	const char *coordinator, *output, *verb;
+	const char *coordinator, *tls, *output, *verb;
 	uint64_t job;
 	bool insecure, json, preview;
 };
@@ -80,6 +81,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_JSON:
 		a->json = true;
+		return 0;
+	case OPTION_TLS:
+		a->tls = arg;
 		return 0;
 	case OPTION_INSECURE:
 		a->insecure = true;
@@ -191,13 +195,13 @@ static int fetch(struct client *cl, const struct arguments *a, struct error *e)
 
 int main(int argc, char **argv)
 {
-	struct arguments a = {.coordinator = getenv("HSLT_COORDINATOR")};
+	struct arguments a = {.coordinator = getenv("HSLT_COORDINATOR"), .tls = getenv("HSLT_TLS")};
 	struct client *cl;
 	struct error e;
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "list|cancel|fetch|log [JOB]", doc, NULL, NULL, NULL}, argc, argv, 0, NULL,
 		   &a);
-	int rc = client_open(&cl, a.coordinator, a.insecure, "hslt-job", &e);
+	int rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-job", &e);
 	if (!rc) {
 		if (strcmp(a.verb, "list") == 0)
 			rc = list(cl, &a, &e);

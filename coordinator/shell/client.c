@@ -118,6 +118,21 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 
 /* ---- the rest ---- */
 
+/* Whoever has a certificate sees the own jobs alone, an operator all. Jobs of others are not there: that they are would be an
+ * answer, too. */
+static bool may_see(const struct session *p, const struct job_record *r)
+{
+	if (p->who.role == TLS_NOBODY || p->who.role == TLS_OPERATOR)
+		return true;
+	return *p->who.name && strcmp(p->who.name, r->owner) == 0;
+}
+
+/* false: no such job for this client. */
+static bool find_job(const struct session *p, uint64_t job, struct job_view *v)
+{
+	return server_view(p->server, job, v) && may_see(p, &v->record);
+}
+
 static void take_list(struct session *p)
 {
 	struct job_view *views;
@@ -128,9 +143,10 @@ static void take_list(struct session *p)
 	farm__job_list_answer__init(&answer);
 	farm__envelope__init(&m);
 	for (size_t i = 0; status && list && i < count; i++) {
+		if (!may_see(p, &views[i].record))
+			continue;
 		view_to_wire(&views[i], &status[i]);
-		list[i] = &status[i];
-		answer.n_jobs++;
+		list[answer.n_jobs++] = &status[i];
 	}
 	answer.jobs = list;
 	m.body_case = FARM__ENVELOPE__BODY_JOB_LIST_ANSWER;
@@ -144,10 +160,14 @@ static void take_list(struct session *p)
 static void take_cancel(struct session *p, uint64_t job)
 {
 	struct event ev = {.kind = EVENT_CANCEL, .tag = p->id, .job = job};
+	struct job_view v;
 	Farm__Done done;
 	Farm__Envelope m;
 	p->rejected[0] = 0;
-	server_step(p->server, &ev);
+	if (p->who.role == TLS_NOBODY || find_job(p, job, &v))
+		server_step(p->server, &ev);
+	else
+		text_copy(p->rejected, sizeof p->rejected, "no such job");
 	farm__done__init(&done);
 	farm__envelope__init(&m);
 	done.ok = !*p->rejected;
@@ -160,7 +180,7 @@ static void take_cancel(struct session *p, uint64_t job)
 static void take_watch(struct session *p, uint64_t job)
 {
 	struct job_view v;
-	if (!server_view(p->server, job, &v)) {
+	if (!find_job(p, job, &v)) {
 		session_fault(p, "there is no job j%llu", (unsigned long long)job);
 		return;
 	}
@@ -211,7 +231,7 @@ static int fetch(struct session *p, const Farm__Fetch *f, Farm__FetchChunk *chun
 {
 	char path[SPOOL_PATH_MAX];
 	const char *file = file_of(f->what);
-	if (!server_view(p->server, f->job, v))
+	if (!find_job(p, f->job, v))
 		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)f->job);
 	if (!file)
 		return error_set(e, EINVAL, "there is nothing of that kind to fetch");
@@ -271,7 +291,8 @@ void session_previews(struct server *s, uint64_t job)
 
 static void take_fetch(struct session *p, const Farm__Fetch *f)
 {
-	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset) {
+	struct job_view v;
+	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset || !find_job(p, f->job, &v)) {
 		answer_fetch(p, f);
 		return;
 	}

@@ -30,7 +30,7 @@ static void submitted(struct server *s, const struct action *a)
 	p->answered_job = a->job;
 	int rc = spool_take_job(s->spool, a->job, &e);
 	if (!rc)
-		rc = order_new(&o, a->job, &p->upload->submit, &p->upload->plan, NULL, s->spool, &e);
+		rc = order_new(&o, a->job, &p->upload->submit, &p->upload->plan, p->who.name, NULL, s->spool, &e);
 	if (!rc && (rc = durable_begin(s, o, &e))) {
 		p->upload->submit = o->submit;
 		memset(&o->submit, 0, sizeof o->submit);
@@ -45,8 +45,8 @@ static void submitted(struct server *s, const struct action *a)
 	s->orders = o;
 	char plan[PLAN_TEXT];
 	plan_describe(&o->plan, plan, sizeof plan);
-	order_log(o, LOG_JOB_SUBMIT, "name=%s client=%s plan=%s", log_quote(o->record.name).text, p->address,
-		  log_quote(plan).text);
+	order_log(o, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s", log_quote(o->record.name).text, p->address,
+		  *p->who.name ? p->who.name : "-", log_quote(plan).text);
 	for (size_t i = 0; i < m->n_notes; i++)
 		order_log(o, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
 	for (size_t i = 0; i < m->n_effects; i++)

@@ -37,7 +37,7 @@ static void begin_record(struct order *o, const struct job_record *earlier)
 	r->submitted = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }
 
-int order_new(struct order **out, uint64_t id, struct envelope *submit, const struct plan *plan,
+int order_new(struct order **out, uint64_t id, struct envelope *submit, const struct plan *plan, const char *owner,
 	      const struct job_record *earlier, struct spool *s, struct error *e)
 {
 	struct order *o = mem_alloc(1, sizeof *o);
@@ -49,6 +49,7 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 	memset(submit, 0, sizeof *submit);
 	o->waiting_last = &o->waiting;
 	begin_record(o, earlier);
+	text_copy(o->record.owner, sizeof o->record.owner, owner);
 	o->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->states);
 	if (plan->kind == PLAN_CHAINS) {
 		o->chains_per_lease = plan->chains / (plan->groups * plan->parts);

@@ -53,9 +53,10 @@ struct order {
 	struct waiting_batch *waiting, **waiting_last;
 };
 
-/* Takes the submission. The job's folder is there; earlier: its record, of an earlier life, or NULL: it gets one. */
-int order_new(struct order **o, uint64_t id, struct envelope *submit, const struct plan *plan, const struct job_record *earlier,
-	      struct spool *s, struct error *e);
+/* Takes the submission. The job's folder is there; owner as in the record; earlier: its record, of an earlier life, or NULL: it
+ * gets one. */
+int order_new(struct order **o, uint64_t id, struct envelope *submit, const struct plan *plan, const char *owner,
+	      const struct job_record *earlier, struct spool *s, struct error *e);
 /* Frees the memory; blobs and files stay. Not while busy. */
 void order_free(struct order *o);
 

@@ -194,7 +194,7 @@ static int make_order(struct server *s, const struct ledger_job *j, const struct
 		return rc;
 	rc = hold_blobs(s, submit.message->submit, e);
 	if (!rc)
-		rc = order_new(o, j->id, &submit, &plan, record, s->spool, e);
+		rc = order_new(o, j->id, &submit, &plan, record->owner, record, s->spool, e);
 	envelope_fini(&submit);
 	return rc;
 }

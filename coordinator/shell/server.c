@@ -23,7 +23,7 @@ enum { BACKLOG = 128, TICK_MS = 200 };
 void server_config_init(struct server_config *c)
 {
 	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .max_connections = 1024,
-				    .hello_seconds = 10, .stall_seconds = 30};
+				    .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
 }
 
 double server_now(const struct server *s)
@@ -298,7 +298,7 @@ static int start_listening(struct server *s, struct error *e)
 	int length = sizeof bound.storage;
 	int rc = net_addr_resolve(&a, s->config.listen, e);
 	if (!rc)
-		rc = net_addr_allow(&a, s->config.listen, s->config.insecure, e);
+		rc = net_addr_allow(&a, s->config.listen, s->config.insecure || s->tls, e);
 	if (rc)
 		return rc;
 	memset(&bound, 0, sizeof bound);
@@ -310,13 +310,41 @@ static int start_listening(struct server *s, struct error *e)
 	if (rc)
 		return error_set(e, -rc, "cannot listen at %s: %s", s->config.listen, uv_strerror(rc));
 	net_addr_format(&bound, text, sizeof text);
-	log_event(LOG_LISTEN, "address=%s", text);
+	log_event(LOG_LISTEN, "address=%s tls=%s", text, s->tls ? "yes" : "no");
 	return s->config.port_file ? write_port(s->config.port_file, net_addr_port(&bound), e) : 0;
+}
+
+static int open_tls(struct server *s, struct error *e)
+{
+	int rc = tls_open(&s->tls, s->config.tls, e);
+	if (rc)
+		return rc;
+	tls_set_recheck(s->tls, s->config.tls_check_seconds);
+	const struct tls_peer *self = tls_self(s->tls);
+	if (self->role == TLS_COORDINATOR)
+		return 0;
+	return error_set(e, EINVAL, "%s: the certificate of %s is a %s's, and nobody would take it for a coordinator's", s->config.tls,
+			 self->name, tls_role_name(self->role));
+}
+
+/* A list of the revoked or a new certificate is taken up within a second. */
+static void refresh_tls(struct server *s)
+{
+	struct error e;
+	if (!s->tls || server_now(s) < s->tls_next)
+		return;
+	s->tls_next = server_now(s) + 1;
+	int rc = tls_refresh(s->tls, &e);
+	if (rc > 0)
+		log_event(LOG_TLS_READ, "path=%s", log_quote(s->config.tls).text);
+	else if (rc < 0)
+		log_event(LOG_TLS_FAULT, "text=%s", log_quote(e.text).text);
 }
 
 static void on_tick(uv_timer_t *t)
 {
 	struct server *s = t->data;
+	refresh_tls(s);
 	for (struct session *p = s->sessions; p; p = p->next)
 		session_tick(p);
 	status_tick(s->status);
@@ -423,7 +451,9 @@ int server_run(const struct server_config *c, struct error *e)
 		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
 	}
 	init_handles(s);
-	rc = open_stores(s, e);
+	rc = s->config.tls && *s->config.tls ? open_tls(s, e) : 0;
+	if (!rc)
+		rc = open_stores(s, e);
 	int inherited = notify_inherited_unix();
 	if (!rc && (inherited >= 0 || c->status_socket))
 		rc = status_open(&s->status, s, inherited, c->status_socket, e);
@@ -438,6 +468,7 @@ int server_run(const struct server_config *c, struct error *e)
 	assert(closed == 0);
 	(void)closed;
 	close_stores(s);
+	tls_close(s->tls);
 	mem_free(s);
 	return rc;
 }

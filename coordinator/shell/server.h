@@ -17,6 +17,8 @@ struct server_config {
 	const char *status_socket; /* NULL: none */
 	const char *keep_partials; /* NULL: none */
 	const char *port_file;     /* NULL: none; the port that was bound is written there */
+	const char *tls;           /* a folder (common/net/tls.h); NULL or "": plaintext */
+	double tls_check_seconds;  /* how often certificates of live connections are checked again */
 	bool insecure;
 	uint64_t blob_bytes; /* the spool's limit of scene files; 0: none */
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
@@ -45,6 +47,7 @@ enum { ENDED_MAX = 200 /* ended jobs in the lists; older ones can still be fetch
 struct server {
 	struct server_config config;
 	uv_loop_t loop;
+	struct tls *tls; /* NULL: plaintext */
 	uv_tcp_t listener;
 	uv_timer_t wake, tick;
 	uv_signal_t on_term, on_int;
@@ -65,6 +68,7 @@ struct server {
 	uint64_t last_peer;
 	struct status_socket *status;
 	bool stepping, stopping;
+	double tls_next; /* when its files are looked at again */
 	double watchdog, watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */
 	uint64_t changes; /* grows with whatever the status shows */
 	/* What the current event brought; NULL when it did not. */

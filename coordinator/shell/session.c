@@ -87,14 +87,31 @@ static void join(struct session *p, const Farm__Hello *h)
 		return;
 	}
 	p->state = SESSION_WORKER;
-	log_event(LOG_PEER_HELLO, "peer=%llu address=%s role=worker name=%s threads=%u fingerprint=%s",
-		  (unsigned long long)p->id, p->address, log_quote(p->name).text, h->threads, log_quote(h->fingerprint).text);
+	log_event(LOG_PEER_HELLO, "peer=%llu address=%s role=worker name=%s certificate=%s threads=%u fingerprint=%s",
+		  (unsigned long long)p->id, p->address, log_quote(p->name).text, *p->who.name ? p->who.name : "-", h->threads,
+		  log_quote(h->fingerprint).text);
 	send_hello_ack(p, NULL);
+}
+
+/* What the certificate does not allow; NULL: it does. */
+static const char *overreach(struct session *p, Farm__Role role, char *text, size_t size)
+{
+	const struct tls_peer *who = conn_peer(p->conn);
+	if (!who)
+		return NULL;
+	p->who = *who;
+	bool may = role == FARM__ROLE__ROLE_WORKER ? who->role == TLS_WORKER
+						   : who->role == TLS_CLIENT || who->role == TLS_OPERATOR;
+	if (may)
+		return NULL;
+	snprintf(text, size, "the certificate of %s is a %s's: it cannot %s", who->name, tls_role_name(who->role),
+		 role == FARM__ROLE__ROLE_WORKER ? "lease" : "submit or look after jobs");
+	return text;
 }
 
 static void take_hello(struct session *p, const Farm__Hello *h)
 {
-	char text[128];
+	char text[192];
 	if (h->version != FARM_VERSION) {
 		snprintf(text, sizeof text, "version %u of the protocol is spoken here, not %u", FARM_VERSION, h->version);
 		send_hello_ack(p, text);
@@ -106,6 +123,11 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		return;
 	}
 	text_copy(p->name, sizeof p->name, h->name);
+	const char *no = overreach(p, h->role, text, sizeof text);
+	if (no) {
+		send_hello_ack(p, no);
+		return;
+	}
 	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, 0});
 	conn_set_quiet(p->conn, 6 * p->server->config.heartbeat_seconds);
 	if (h->role == FARM__ROLE__ROLE_WORKER) {
@@ -271,7 +293,9 @@ static void on_closed(void *user, const char *why)
 	*at = p->next;
 	s->session_count--;
 	session_upload_abort(p);
-	log_event(p->state == SESSION_WORKER ? LOG_PEER_CLOSED : LOG_PEER_ACCEPT, "peer=%llu address=%s name=%s text=%s",
+	log_event(conn_distrust(p->conn)	? LOG_PEER_REFUSED
+		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED
+						: LOG_PEER_ACCEPT, "peer=%llu address=%s name=%s text=%s",
 		  (unsigned long long)p->id, p->address, log_quote(p->name).text, log_quote(why).text);
 	if (p->joined && !s->stopping) {
 		struct event ev = {.kind = EVENT_LEFT, .peer = p->id, .text = why};
@@ -292,7 +316,7 @@ static const struct conn_events refused_events = {NULL, NULL, NULL, on_refused};
 
 void session_accept(struct server *s)
 {
-	struct conn_config config = {{HELLO_HEADER, 0}, SEND_LIMIT, s->config.stall_seconds, s->config.hello_seconds};
+	struct conn_config config = {{HELLO_HEADER, 0}, SEND_LIMIT, s->config.stall_seconds, s->config.hello_seconds, s->tls};
 	struct error e;
 	struct session *p = s->session_count < s->config.max_connections ? mem_alloc(1, sizeof *p) : NULL;
 	struct conn *c;

@@ -19,6 +19,7 @@ struct session {
 	enum session_state state;
 	bool joined; /* the core knows it */
 	char name[128], address[64];
+	struct tls_peer who; /* by its certificate; TLS_NOBODY without TLS, and then everybody may do everything */
 	uint32_t payload_limit;
 	struct upload *upload; /* a submission that waits for blobs */
 	uint64_t watched;      /* job; 0: none */

@@ -23,6 +23,7 @@ struct job_record {
 	char reason[16];   /* which bound ended it */
 	char why[256];     /* why it failed */
 	char output[1024]; /* where the client wants it */
+	char owner[72];    /* the name in the certificate of who submitted it; "": there was none */
 	int priority;
 	uint32_t exit_code; /* of a program that waited */
 	bool has_result;

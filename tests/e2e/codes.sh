@@ -1,6 +1,6 @@
 # Exit codes, what is refused, and what outlives the coordinator.
 . "$(dirname "$0")/lib.sh"
-need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-ca
 
 # code WANTED COMMAND...
 code() {
@@ -11,7 +11,7 @@ code() {
 	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/err.log")"
 }
 
-for p in coordinator worker submit status job; do
+for p in coordinator worker submit status job ca; do
 	code 0 "$BIN/hslt-$p" --version
 	code 0 "$BIN/hslt-$p" --help
 	grep -qi example "$DIR/out" || fail "hslt-$p --help has no examples"

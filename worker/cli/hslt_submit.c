@@ -27,12 +27,12 @@ static const char doc[] =
 	"\n"
 	"The job's id goes to stdout, everything else to stderr. Without --wait, -o is the default name for hslt-job fetch. "
 	"--estimate makes no image: a pilot of a minute on the farm tells what errors of 10, 5, 2 and 1 % (and --target-error) will "
-	"cost there. HSLT_COORDINATOR stands in for --coordinator.\n"
+	"cost there. HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls.\n"
 	"Exit codes: 0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
 	"there, and its note says where), 6 refused, 75 "
 	"coordinator not reachable.";
 
-enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT };
+enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_TLS };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
@@ -45,6 +45,7 @@ static const struct argp_option options[] = {
 	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
 	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
 	{"mixed", OPTION_MIXED, NULL, 0, "Allow workers of any numeric fingerprint: gives up equal bits", 0},
+	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{0},
 };
@@ -52,7 +53,7 @@ static const struct argp_option options[] = {
 static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
 
 struct arguments {
-	const char *coordinator, *scene, *output, *name;
+	const char *coordinator, *tls, *scene, *output, *name;
 	struct submit_request request;
 	struct render_arguments render;
 	const char *plot;
@@ -90,6 +91,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_MIXED:
 		a->request.mixed = true;
+		return 0;
+	case OPTION_TLS:
+		a->tls = arg;
 		return 0;
 	case OPTION_INSECURE:
 		a->insecure = true;
@@ -203,6 +207,7 @@ int main(int argc, char **argv)
 	char output[1024] = "";
 	int code = 0;
 	a.coordinator = getenv("HSLT_COORDINATOR");
+	a.tls = getenv("HSLT_TLS");
 	a.request.args = &a.render;
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
@@ -229,7 +234,7 @@ int main(int argc, char **argv)
 	a.request.name = a.name ? a.name : b.scene;
 	rc = a.estimate ? 0 : absolute(a.output, output, sizeof output, &e);
 	if (!rc)
-		rc = client_open(&cl, a.coordinator, a.insecure, "hslt-submit", &e);
+		rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {
 		rc = a.estimate ? estimate(&a, cl, &b, &e) : run(&a, cl, &b, &code, &e);
 		client_close(cl);

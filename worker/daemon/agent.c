@@ -56,6 +56,17 @@ static void on_opened(void *user)
 	conn_send(a->conn, &m, NULL, 0);
 }
 
+/* New certificates and lists are taken up while the worker runs. */
+static void refresh_tls(struct agent *a)
+{
+	struct error e;
+	int rc = a->tls ? tls_refresh(a->tls, &e) : 0;
+	if (rc > 0)
+		log_event(LOG_TLS_READ, "path=%s", log_quote(a->config.tls).text);
+	else if (rc < 0)
+		log_event(LOG_TLS_FAULT, "text=%s", log_quote(e.text).text);
+}
+
 static void on_heartbeat(uv_timer_t *t)
 {
 	Farm__Heartbeat beat;
@@ -65,6 +76,7 @@ static void on_heartbeat(uv_timer_t *t)
 	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
 	m.heartbeat = &beat;
 	agent_send(t->data, &m);
+	refresh_tls(t->data);
 }
 
 static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
@@ -117,12 +129,13 @@ static const struct conn_events events = {on_opened, on_message, NULL, on_closed
 
 static void connect_now(struct agent *a)
 {
-	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, stall_seconds, 10};
+	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, stall_seconds, 10, a->tls};
 	struct error e;
+	refresh_tls(a);
 	/* The name may mean another machine by now. */
 	int rc = net_addr_resolve(&a->address, a->config.coordinator, &e);
 	if (!rc)
-		rc = net_addr_allow(&a->address, a->config.coordinator, a->config.insecure, &e);
+		rc = net_addr_allow(&a->address, a->config.coordinator, a->config.insecure || a->tls, &e);
 	if (!rc)
 		rc = conn_connect(&a->conn, &a->loop, &a->address, &config, &events, a, &e);
 	if (rc) {
@@ -205,9 +218,11 @@ static void init_handles(struct agent *a)
 
 static int start(struct agent *a, struct error *e)
 {
-	int rc = net_addr_resolve(&a->address, a->config.coordinator, e);
+	int rc = a->config.tls && *a->config.tls ? tls_open(&a->tls, a->config.tls, e) : 0;
 	if (!rc)
-		rc = net_addr_allow(&a->address, a->config.coordinator, a->config.insecure, e);
+		rc = net_addr_resolve(&a->address, a->config.coordinator, e);
+	if (!rc)
+		rc = net_addr_allow(&a->address, a->config.coordinator, a->config.insecure || a->tls, e);
 	if (!rc)
 		rc = cache_open(&a->cache, a->config.cache, a->config.cache_bytes, e);
 	if (rc)
@@ -246,6 +261,7 @@ int agent_run(const struct agent_config *c, struct error *e)
 		desk_close(a);
 	}
 	cache_close(&a->cache);
+	tls_close(a->tls);
 	mem_free(a);
 	return rc;
 }

@@ -13,6 +13,7 @@
 
 struct agent_config {
 	const char *coordinator, *name;
+	const char *tls;   /* a folder (common/net/tls.h); NULL or "": plaintext */
 	const char *cache; /* NULL: the user's cache folder */
 	uint64_t cache_bytes;
 	unsigned threads;

@@ -15,6 +15,7 @@ struct agent {
 	uv_timer_t retry, heartbeat, grace;
 	uv_signal_t on_term, on_int;
 	struct net_addr address;
+	struct tls *tls; /* NULL: plaintext */
 	struct conn *conn; /* NULL: not connected */
 	bool welcome;      /* hello was accepted */
 	double back_off;   /* s before the next attempt */

@@ -16,13 +16,13 @@ static const char doc[] =
 	"\v"
 	"Examples:\n"
 	"  hslt-worker --coordinator 127.0.0.1:7700\n"
-	"  hslt-worker --coordinator farm.lan:7700 --insecure --threads 8 --name $(hostname)\n"
+	"  hslt-worker --coordinator farm.lan:7700 --tls ~/node1 --threads 8 --name $(hostname)\n"
 	"\n"
 	"SIGTERM: finishes the running epochs within the grace period or gives them up, sends what is done and leaves; the "
 	"second one ends it at once. It reconnects for ever.\n"
-	"HSLT_COORDINATOR stands in for --coordinator. Exit codes: 0 stopped, 1 failed, 2 usage.";
+	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 stopped, 1 failed, 2 usage.";
 
-enum { OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT };
+enum { OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_TLS };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
@@ -31,6 +31,7 @@ static const struct argp_option options[] = {
 	{"cache", OPTION_CACHE, "DIR", 0, "Where files of scenes are kept (~/.cache/hslt)", 0},
 	{"cache-size", OPTION_CACHE_SIZE, "GB", 0, "The cache's limit (20)", 0},
 	{"grace", OPTION_GRACE, "SECONDS", 0, "After SIGTERM (20)", 0},
+	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log more", 0},
 	{"test-repeat", OPTION_REPEAT, NULL, OPTION_HIDDEN, "Send every result twice", 0},
@@ -70,6 +71,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_GRACE:
 		c->grace_seconds = number(state, "--grace", arg, 0, 86400);
 		return 0;
+	case OPTION_TLS:
+		c->tls = arg;
+		return 0;
 	case OPTION_INSECURE:
 		c->insecure = true;
 		return 0;
@@ -97,6 +101,7 @@ int main(int argc, char **argv)
 	gethostname(host, sizeof host - 1);
 	snprintf(name, sizeof name, "%s-%ld", host, (long)getpid());
 	struct agent_config c = {.coordinator = getenv("HSLT_COORDINATOR"),
+				 .tls = getenv("HSLT_TLS"),
 				 .name = name,
 				 .cache_bytes = 20000000000u,
 				 .threads = cores > 0 && cores <= 1024 ? (unsigned)cores : 1,

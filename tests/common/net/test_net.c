@@ -108,7 +108,7 @@ static void connect_ends(void)
 	memset(&here, 0, sizeof here);
 	memset(&there, 0, sizeof there);
 	memset(&bound, 0, sizeof bound);
-	config = (struct conn_config){{4096, 1 << 20}, 4 << 20, 0.5, 0};
+	config = (struct conn_config){{4096, 1 << 20}, 4 << 20, 0.5, 0, NULL};
 	assert_int_equal(uv_loop_init(&loop), 0);
 	uv_tcp_init(&loop, &listener);
 	assert_int_equal(net_addr_resolve(&a, "127.0.0.1:0", &e), 0);

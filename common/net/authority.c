@@ -1,0 +1,517 @@
+#include "common/net/authority.h"
+
+#include "common/base/mem.h"
+
+#include <dirent.h>
+#include <fcntl.h>
+#include <openssl/err.h>
+#include <openssl/pem.h>
+#include <openssl/rand.h>
+#include <openssl/x509v3.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { PATH_SIZE = 4096, SERIAL_BYTES = 16, EARLIER = 3600, ENTRIES_MAX = 1 << 20 };
+
+struct authority {
+	const char *folder;
+	int lock;
+	X509 *cert;
+	EVP_PKEY *key;
+	X509_CRL *list;
+};
+
+/* ---- files ---- */
+
+static int path_in(char *path, struct error *e, const char *folder, const char *middle, const char *name)
+{
+	int n = snprintf(path, PATH_SIZE, "%s/%s%s%s", folder, middle, *middle ? "/" : "", name);
+	return n < 0 || n >= PATH_SIZE ? error_set(e, ENAMETOOLONG, "%s: the name is too long", folder) : 0;
+}
+
+static int crypto_error(struct error *e, const char *what)
+{
+	unsigned long code = ERR_peek_last_error();
+	const char *text = code ? ERR_reason_error_string(code) : NULL;
+	error_set(e, EBADMSG, "%s: %s", what, text ? text : "OpenSSL fails");
+	ERR_clear_error();
+	return -EBADMSG;
+}
+
+/* The bytes of b, as a whole or not at all. Frees b. */
+static int write_pem(const char *path, BIO *b, mode_t mode, struct error *e)
+{
+	char temporary[PATH_SIZE + 8];
+	char *bytes = NULL;
+	long size = b ? BIO_get_mem_data(b, &bytes) : 0;
+	if (size <= 0) {
+		BIO_free(b);
+		return crypto_error(e, path);
+	}
+	snprintf(temporary, sizeof temporary, "%s.tmp", path);
+	unlink(temporary);
+	int fd = open(temporary, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, mode);
+	int rc = fd < 0 || fchmod(fd, mode) || write(fd, bytes, (size_t)size) != size || fsync(fd) ? -1 : 0;
+	if (fd >= 0 && close(fd))
+		rc = -1;
+	if (rc || rename(temporary, path)) {
+		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+		unlink(temporary);
+	}
+	BIO_free(b);
+	return rc;
+}
+
+static BIO *pem_cert(X509 *cert)
+{
+	BIO *b = BIO_new(BIO_s_mem());
+	if (b)
+		PEM_write_bio_X509(b, cert);
+	return b;
+}
+
+static BIO *pem_key(EVP_PKEY *key)
+{
+	BIO *b = BIO_new(BIO_s_secmem());
+	if (b)
+		PEM_write_bio_PKCS8PrivateKey(b, key, NULL, NULL, 0, NULL, NULL);
+	return b;
+}
+
+static BIO *pem_list(X509_CRL *list)
+{
+	BIO *b = BIO_new(BIO_s_mem());
+	if (b)
+		PEM_write_bio_X509_CRL(b, list);
+	return b;
+}
+
+static int read_cert(const char *path, X509 **cert, struct error *e)
+{
+	BIO *b = BIO_new_file(path, "r");
+	*cert = b ? PEM_read_bio_X509(b, NULL, NULL, NULL) : NULL;
+	BIO_free(b);
+	return *cert ? 0 : crypto_error(e, path);
+}
+
+/* ---- the authority ---- */
+
+static void authority_close(struct authority *a)
+{
+	X509_free(a->cert);
+	EVP_PKEY_free(a->key);
+	X509_CRL_free(a->list);
+	if (a->lock >= 0)
+		close(a->lock);
+}
+
+static int lock_folder(struct authority *a, const char *folder, struct error *e)
+{
+	*a = (struct authority){.folder = folder};
+	a->lock = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+	if (a->lock < 0 || flock(a->lock, LOCK_EX))
+		return error_set(e, errno, "%s: %s", folder, strerror(errno));
+	return 0;
+}
+
+static int read_list(struct authority *a, struct error *e)
+{
+	char path[PATH_SIZE];
+	int rc = path_in(path, e, a->folder, "", "crl.pem");
+	BIO *b = rc ? NULL : BIO_new_file(path, "r");
+	a->list = b ? PEM_read_bio_X509_CRL(b, NULL, NULL, NULL) : NULL;
+	BIO_free(b);
+	return rc || a->list ? rc : crypto_error(e, path);
+}
+
+static int authority_open(struct authority *a, const char *folder, bool with_key, struct error *e)
+{
+	char path[PATH_SIZE];
+	int rc = lock_folder(a, folder, e);
+	if (!rc)
+		rc = path_in(path, e, folder, "", "ca.pem");
+	if (!rc && access(path, R_OK))
+		rc = error_set(e, errno, "%s: there is no authority here (hslt-ca init makes one): %s", path, strerror(errno));
+	if (!rc)
+		rc = read_cert(path, &a->cert, e);
+	if (!rc)
+		rc = read_list(a, e);
+	if (!rc && with_key)
+		rc = path_in(path, e, folder, "", "ca.key");
+	if (!rc && with_key) {
+		BIO *b = BIO_new_file(path, "r");
+		a->key = b ? PEM_read_bio_PrivateKey(b, NULL, NULL, NULL) : NULL;
+		BIO_free(b);
+		if (!a->key)
+			rc = crypto_error(e, path);
+	}
+	if (rc)
+		authority_close(a);
+	return rc;
+}
+
+/* ---- certificates ---- */
+
+static bool add_extension(X509 *cert, X509 *issuer, int nid, const char *value)
+{
+	X509V3_CTX context;
+	X509V3_set_ctx_nodb(&context);
+	X509V3_set_ctx(&context, issuer, cert, NULL, NULL, 0);
+	X509_EXTENSION *x = X509V3_EXT_conf_nid(NULL, &context, nid, value);
+	bool ok = x && X509_add_ext(cert, x, -1) == 1;
+	X509_EXTENSION_free(x);
+	return ok;
+}
+
+static bool set_serial(X509 *cert)
+{
+	unsigned char bytes[SERIAL_BYTES];
+	if (RAND_bytes(bytes, sizeof bytes) != 1)
+		return false;
+	bytes[0] = (unsigned char)((bytes[0] & 0x7f) | 0x40); /* positive, and always as long */
+	BIGNUM *n = BN_bin2bn(bytes, sizeof bytes, NULL);
+	bool ok = n && BN_to_ASN1_INTEGER(n, X509_get_serialNumber(cert));
+	BN_free(n);
+	return ok;
+}
+
+static bool set_subject(X509 *cert, const char *name)
+{
+	X509_NAME *subject = X509_NAME_new();
+	bool ok = subject && X509_NAME_add_entry_by_txt(subject, "O", MBSTRING_UTF8, (const unsigned char *)"HSLT Farm", -1, -1, 0) &&
+		  X509_NAME_add_entry_by_txt(subject, "CN", MBSTRING_UTF8, (const unsigned char *)name, -1, -1, 0) &&
+		  X509_set_subject_name(cert, subject);
+	X509_NAME_free(subject);
+	return ok;
+}
+
+static bool set_times(X509 *cert, double days, const X509 *issuer)
+{
+	time_t now = time(NULL), until = now + (time_t)(86400 * days);
+	if (issuer && X509_cmp_time(X509_get0_notAfter(issuer), &until) < 0)
+		return ASN1_TIME_set(X509_getm_notBefore(cert), now - EARLIER) &&
+		       X509_set1_notAfter(cert, X509_get0_notAfter(issuer));
+	return ASN1_TIME_set(X509_getm_notBefore(cert), now - EARLIER) && ASN1_TIME_set(X509_getm_notAfter(cert), until);
+}
+
+/* A certificate without extensions and without a signature. */
+static X509 *begin_cert(const char *name, EVP_PKEY *key, const X509 *issuer, double days)
+{
+	X509 *cert = X509_new();
+	if (cert && X509_set_version(cert, X509_VERSION_3) && set_serial(cert) && set_subject(cert, name) &&
+	    set_times(cert, days, issuer) && X509_set_pubkey(cert, key))
+		return cert;
+	X509_free(cert);
+	return NULL;
+}
+
+static bool sign_own(X509 *cert, EVP_PKEY *key)
+{
+	return X509_set_issuer_name(cert, X509_get_subject_name(cert)) &&
+	       add_extension(cert, cert, NID_basic_constraints, "critical,CA:TRUE,pathlen:0") &&
+	       add_extension(cert, cert, NID_key_usage, "critical,keyCertSign,cRLSign") &&
+	       add_extension(cert, cert, NID_subject_key_identifier, "hash") && X509_sign(cert, key, EVP_sha256());
+}
+
+static bool sign_other(const struct authority *a, X509 *cert, enum tls_role role)
+{
+	char uri[64];
+	snprintf(uri, sizeof uri, "URI:hslt:role:%s", tls_role_name(role));
+	return X509_set_issuer_name(cert, X509_get_subject_name(a->cert)) &&
+	       add_extension(cert, a->cert, NID_basic_constraints, "critical,CA:FALSE") &&
+	       add_extension(cert, a->cert, NID_key_usage, "critical,digitalSignature") &&
+	       add_extension(cert, a->cert, NID_ext_key_usage, role == TLS_COORDINATOR ? "serverAuth" : "clientAuth") &&
+	       add_extension(cert, a->cert, NID_subject_alt_name, uri) &&
+	       add_extension(cert, a->cert, NID_subject_key_identifier, "hash") &&
+	       add_extension(cert, a->cert, NID_authority_key_identifier, "keyid") && X509_sign(cert, a->key, EVP_sha256());
+}
+
+/* ---- the list of the revoked ---- */
+
+/* Dates and signs it. It holds as long as the authority: a list that has run out would lock everybody out. */
+static int sign_list(struct authority *a, struct error *e)
+{
+	ASN1_TIME *now = ASN1_TIME_set(NULL, time(NULL));
+	bool ok = now && X509_CRL_set_version(a->list, X509_CRL_VERSION_2) &&
+		  X509_CRL_set_issuer_name(a->list, X509_get_subject_name(a->cert)) && X509_CRL_set1_lastUpdate(a->list, now) &&
+		  X509_CRL_set1_nextUpdate(a->list, X509_get0_notAfter(a->cert)) && X509_CRL_sort(a->list) &&
+		  X509_CRL_sign(a->list, a->key, EVP_sha256());
+	ASN1_TIME_free(now);
+	return ok ? 0 : crypto_error(e, "the list of the revoked");
+}
+
+static bool is_revoked(const struct authority *a, X509 *cert)
+{
+	X509_REVOKED *found = NULL;
+	return X509_CRL_get0_by_serial(a->list, &found, X509_get_serialNumber(cert)) == 1;
+}
+
+static bool add_revoked(struct authority *a, X509 *cert)
+{
+	X509_REVOKED *r = X509_REVOKED_new();
+	ASN1_TIME *now = ASN1_TIME_set(NULL, time(NULL));
+	bool ok = r && now && X509_REVOKED_set_serialNumber(r, X509_get_serialNumber(cert)) &&
+		  X509_REVOKED_set_revocationDate(r, now) && X509_CRL_add0_revoked(a->list, r);
+	ASN1_TIME_free(now);
+	if (!ok)
+		X509_REVOKED_free(r);
+	return ok;
+}
+
+static int write_list(struct authority *a, const char *middle, struct error *e)
+{
+	char path[PATH_SIZE];
+	int rc = path_in(path, e, a->folder, middle, "crl.pem");
+	return rc ? rc : write_pem(path, pem_list(a->list), 0644, e);
+}
+
+/* ---- commands ---- */
+
+static int make_folder(const char *path, bool may_be, struct error *e)
+{
+	if (mkdir(path, 0700) == 0 || (may_be && errno == EEXIST))
+		return 0;
+	return error_set(e, errno, "%s: %s", path, strerror(errno));
+}
+
+static int write_authority(struct authority *a, struct error *e)
+{
+	char path[PATH_SIZE];
+	a->list = X509_CRL_new();
+	int rc = a->list ? sign_list(a, e) : crypto_error(e, "the list of the revoked");
+	if (!rc)
+		rc = path_in(path, e, a->folder, "", "issued");
+	if (!rc)
+		rc = make_folder(path, true, e);
+	if (!rc)
+		rc = path_in(path, e, a->folder, "", "ca.key");
+	if (!rc)
+		rc = write_pem(path, pem_key(a->key), 0600, e);
+	if (!rc)
+		rc = write_list(a, "", e);
+	if (!rc) /* last: it says that there is an authority */
+		rc = path_in(path, e, a->folder, "", "ca.pem");
+	return rc ? rc : write_pem(path, pem_cert(a->cert), 0644, e);
+}
+
+int authority_init(const char *folder, const char *name, double days, struct error *e)
+{
+	char path[PATH_SIZE];
+	struct authority a = {.lock = -1};
+	int rc = make_folder(folder, true, e);
+	if (!rc)
+		rc = lock_folder(&a, folder, e);
+	if (!rc)
+		rc = path_in(path, e, folder, "", "ca.pem");
+	if (!rc && access(path, F_OK) == 0)
+		rc = error_set(e, EEXIST, "%s is there: a farm has one authority", path);
+	if (!rc) {
+		char unique[TLS_NAME_MAX + 16];
+		unsigned char random[4] = {0};
+		/* Two authorities of one name could not be told apart while one replaces the other. */
+		RAND_bytes(random, sizeof random);
+		snprintf(unique, sizeof unique, "%.*s-%02x%02x%02x%02x", TLS_NAME_MAX - 9, name, random[0], random[1], random[2], random[3]);
+		a.key = EVP_EC_gen("P-256");
+		a.cert = a.key ? begin_cert(unique, a.key, NULL, days) : NULL;
+		if (!a.cert || !sign_own(a.cert, a.key))
+			rc = crypto_error(e, "the authority's certificate");
+	}
+	if (!rc)
+		rc = write_authority(&a, e);
+	authority_close(&a);
+	return rc;
+}
+
+/* The key first: a program that reads in between finds that the two do not fit, and stays with what it has. */
+static int write_issued(const struct authority *a, const char *name, X509 *cert, EVP_PKEY *key, struct error *e)
+{
+	char path[PATH_SIZE], file[80];
+	struct tls_peer who;
+	int rc = tls_read_peer(cert, &who, e);
+	if (!rc) {
+		snprintf(file, sizeof file, "%s.pem", who.serial);
+		rc = path_in(path, e, a->folder, "issued", file);
+	}
+	if (!rc) /* before anybody can use it: what is not in the folder cannot be revoked by its name */
+		rc = write_pem(path, pem_cert(cert), 0644, e);
+	if (!rc)
+		rc = path_in(path, e, a->folder, name, "key.pem");
+	if (!rc)
+		rc = write_pem(path, pem_key(key), 0600, e);
+	if (!rc)
+		rc = path_in(path, e, a->folder, name, "ca.pem");
+	if (!rc)
+		rc = write_pem(path, pem_cert(a->cert), 0644, e);
+	if (!rc)
+		rc = path_in(path, e, a->folder, name, "cert.pem");
+	return rc ? rc : write_pem(path, pem_cert(cert), 0644, e);
+}
+
+int authority_issue(const char *folder, const char *name, enum tls_role role, double days, bool renew, struct error *e)
+{
+	char path[PATH_SIZE];
+	struct authority a;
+	if (!tls_name_ok(name) || strcmp(name, "issued") == 0)
+		return error_set(e, EINVAL, "'%s' is no name: up to %d letters, digits and ._@-, the first a letter or digit", name,
+				 TLS_NAME_MAX);
+	int rc = authority_open(&a, folder, true, e);
+	if (rc)
+		return rc;
+	rc = path_in(path, e, folder, "", name);
+	if (!rc && !renew && access(path, F_OK) == 0)
+		rc = error_set(e, EEXIST, "%s is there: --renew replaces its certificate and key", path);
+	if (!rc)
+		rc = make_folder(path, renew, e);
+	EVP_PKEY *key = rc ? NULL : EVP_EC_gen("P-256");
+	X509 *cert = key ? begin_cert(name, key, a.cert, days) : NULL;
+	if (!rc && (!cert || !sign_other(&a, cert, role)))
+		rc = crypto_error(e, "the certificate");
+	if (!rc)
+		rc = write_list(&a, name, e);
+	if (!rc)
+		rc = write_issued(&a, name, cert, key, e);
+	X509_free(cert);
+	EVP_PKEY_free(key);
+	authority_close(&a);
+	return rc;
+}
+
+/* Calls `each` for every certificate in issued/ until it fails. */
+static int walk(const char *folder, int (*each)(void *user, X509 *cert, const struct tls_peer *who, struct error *e), void *user,
+		struct error *e)
+{
+	char path[PATH_SIZE];
+	int rc = path_in(path, e, folder, "", "issued");
+	DIR *d = rc ? NULL : opendir(path);
+	if (!rc && !d)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	for (struct dirent *x; !rc && (x = readdir(d));) {
+		X509 *cert;
+		struct tls_peer who;
+		size_t length = strlen(x->d_name);
+		if (length < 5 || strcmp(x->d_name + length - 4, ".pem") != 0)
+			continue;
+		rc = path_in(path, e, folder, "issued", x->d_name);
+		if (!rc)
+			rc = read_cert(path, &cert, e);
+		if (rc)
+			break;
+		rc = tls_read_peer(cert, &who, e);
+		if (!rc)
+			rc = each(user, cert, &who, e);
+		X509_free(cert);
+	}
+	if (d)
+		closedir(d);
+	return rc;
+}
+
+struct revocation {
+	struct authority *a;
+	const char *what;
+	unsigned count;
+};
+
+static int revoke_one(void *user, X509 *cert, const struct tls_peer *who, struct error *e)
+{
+	struct revocation *r = user;
+	if ((strcmp(who->name, r->what) != 0 && strcasecmp(who->serial, r->what) != 0) || is_revoked(r->a, cert) ||
+	    X509_cmp_current_time(X509_get0_notAfter(cert)) < 0)
+		return 0;
+	r->count++;
+	return add_revoked(r->a, cert) ? 0 : crypto_error(e, "the list of the revoked");
+}
+
+static int tell_coordinator(void *user, X509 *cert, const struct tls_peer *who, struct error *e)
+{
+	struct authority *a = user;
+	char path[PATH_SIZE];
+	(void)cert;
+	int rc = path_in(path, e, a->folder, "", who->name);
+	return rc || who->role != TLS_COORDINATOR || access(path, F_OK) ? rc : write_list(a, who->name, e);
+}
+
+int authority_revoke(const char *folder, const char *what, unsigned *count, struct error *e)
+{
+	struct authority a;
+	int rc = authority_open(&a, folder, true, e);
+	if (rc)
+		return rc;
+	struct revocation r = {.a = &a, .what = what};
+	rc = walk(folder, revoke_one, &r, e);
+	if (!rc && !r.count)
+		rc = error_set(e, ENOENT, "no valid certificate has the name or serial number '%s'", what);
+	if (!rc)
+		rc = sign_list(&a, e);
+	if (!rc)
+		rc = write_list(&a, "", e);
+	if (!rc)
+		rc = walk(folder, tell_coordinator, &a, e);
+	*count = r.count;
+	authority_close(&a);
+	return rc;
+}
+
+struct listing {
+	const struct authority *a;
+	struct authority_entry *entries;
+	size_t count, room;
+};
+
+static time_t seconds_of(const ASN1_TIME *t)
+{
+	struct tm tm;
+	return ASN1_TIME_to_tm(t, &tm) ? timegm(&tm) : 0;
+}
+
+static int list_one(void *user, X509 *cert, const struct tls_peer *who, struct error *e)
+{
+	struct listing *l = user;
+	if (l->count == l->room) {
+		size_t room = l->room ? 2 * l->room : 16;
+		struct authority_entry *more =
+			room > ENTRIES_MAX ? NULL : mem_grow(l->entries, l->room * sizeof *more, room * sizeof *more);
+		if (!more)
+			return error_set(e, ENOMEM, "no memory for the list of certificates");
+		l->entries = more;
+		l->room = room;
+	}
+	l->entries[l->count++] = (struct authority_entry){.who = *who,
+							  .from = seconds_of(X509_get0_notBefore(cert)),
+							  .until = seconds_of(X509_get0_notAfter(cert)),
+							  .revoked = is_revoked(l->a, cert)};
+	return 0;
+}
+
+static int by_name(const void *x, const void *y)
+{
+	const struct authority_entry *a = x, *b = y;
+	int order = strcmp(a->who.name, b->who.name);
+	return order ? order : (a->from > b->from) - (a->from < b->from);
+}
+
+int authority_list(const char *folder, struct authority_entry **entries, size_t *count, struct error *e)
+{
+	struct authority a;
+	struct listing l = {.a = &a};
+	*entries = NULL;
+	*count = 0;
+	int rc = authority_open(&a, folder, false, e);
+	if (rc)
+		return rc;
+	rc = walk(folder, list_one, &l, e);
+	authority_close(&a);
+	if (rc) {
+		mem_free(l.entries);
+		return rc;
+	}
+	if (l.count)
+		qsort(l.entries, l.count, sizeof *l.entries, by_name);
+	*entries = l.entries;
+	*count = l.count;
+	return 0;
+}

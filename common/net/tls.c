@@ -1,0 +1,465 @@
+#include "common/net/tls.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+
+#include <openssl/err.h>
+#include <openssl/ssl.h>
+#include <openssl/x509v3.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+
+enum {
+	BEFORE_OPEN_MAX = 1 << 16, /* bytes from a peer whose certificate was not seen yet */
+	CERTIFICATES_MAX = 1 << 14,
+	DEPTH = 1,
+	ALERT_REASON = 1000, /* OpenSSL's number of the reason for an alert that came */
+	ALERT_RECORD = 21,
+	HANDSHAKE_RECORD = 22,
+	PROTOCOL_VERSION = 70,
+};
+
+const unsigned char tls_none_here[7] = {ALERT_RECORD, 3, 3, 0, 2, 2, PROTOCOL_VERSION};
+
+enum { FILES = 4 };
+static const char *const file_names[FILES] = {"ca.pem", "cert.pem", "key.pem", "crl.pem"};
+
+struct stamp { /* of a file; zeroes: not there */
+	ino_t inode;
+	off_t size;
+	struct timespec changed;
+};
+
+struct tls {
+	char folder[3072];
+	SSL_CTX *context;
+	struct stamp stamps[FILES];
+	struct tls_peer self;
+	double recheck;
+};
+
+struct tls_link {
+	struct tls *tls;
+	SSL *ssl;
+	BIO *in, *out; /* the SSL's */
+	struct tls_peer peer;
+	size_t taken; /* before the handshake was done */
+	bool listening, begun, open;
+	char distrust[128]; /* why the peer's certificate is not for us, though the authority made it */
+};
+
+bool tls_is_first_byte(unsigned char c)
+{
+	return c == HANDSHAKE_RECORD || c == ALERT_RECORD;
+}
+
+/* ---- who somebody is ---- */
+
+static const char role_prefix[] = "hslt:role:";
+static const char *const roles[TLS_ROLES] = {"nobody", "coordinator", "worker", "client", "operator"};
+
+const char *tls_role_name(enum tls_role r)
+{
+	return roles[r];
+}
+
+static bool is_alphanumeric(char c)
+{
+	return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9');
+}
+
+bool tls_name_ok(const char *name)
+{
+	size_t length = strlen(name);
+	if (length > TLS_NAME_MAX || !is_alphanumeric(*name))
+		return false;
+	for (size_t i = 0; i < length; i++)
+		if (!is_alphanumeric(name[i]) && !strchr("._@-", name[i]))
+			return false;
+	return true;
+}
+
+static enum tls_role role_of(const ASN1_IA5STRING *uri)
+{
+	const char *text = (const char *)ASN1_STRING_get0_data(uri);
+	size_t length = (size_t)ASN1_STRING_length(uri), prefix = sizeof role_prefix - 1;
+	if (length <= prefix || memcmp(text, role_prefix, prefix) != 0)
+		return TLS_NOBODY;
+	for (int r = TLS_COORDINATOR; r < TLS_ROLES; r++)
+		if (length - prefix == strlen(roles[r]) && memcmp(text + prefix, roles[r], length - prefix) == 0)
+			return (enum tls_role)r;
+	return TLS_NOBODY;
+}
+
+/* Exactly one role: of a certificate with two it would not be clear what it may do. */
+static enum tls_role read_role(X509 *cert)
+{
+	enum tls_role found = TLS_NOBODY;
+	int count = 0;
+	GENERAL_NAMES *names = X509_get_ext_d2i(cert, NID_subject_alt_name, NULL, NULL);
+	for (int i = 0; i < sk_GENERAL_NAME_num(names); i++) {
+		const GENERAL_NAME *n = sk_GENERAL_NAME_value(names, i);
+		enum tls_role r = n->type == GEN_URI ? role_of(n->d.uniformResourceIdentifier) : TLS_NOBODY;
+		if (r != TLS_NOBODY) {
+			found = r;
+			count++;
+		}
+	}
+	GENERAL_NAMES_free(names);
+	return count == 1 ? found : TLS_NOBODY;
+}
+
+int tls_read_peer(X509 *cert, struct tls_peer *p, struct error *e)
+{
+	memset(p, 0, sizeof *p);
+	X509_NAME *subject = X509_get_subject_name(cert);
+	int at = X509_NAME_get_index_by_NID(subject, NID_commonName, -1);
+	const ASN1_STRING *name = at < 0 ? NULL : X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at));
+	size_t length = name ? (size_t)ASN1_STRING_length(name) : 0;
+	if (length > 0 && length <= TLS_NAME_MAX && strnlen((const char *)ASN1_STRING_get0_data(name), length) == length)
+		memcpy(p->name, ASN1_STRING_get0_data(name), length);
+	if (!tls_name_ok(p->name))
+		return error_set(e, EACCES, "the certificate has no name that can be one of this farm");
+	BIGNUM *serial = ASN1_INTEGER_to_BN(X509_get0_serialNumber(cert), NULL);
+	char *hex = serial ? BN_bn2hex(serial) : NULL;
+	text_copy(p->serial, sizeof p->serial, hex ? hex : "");
+	OPENSSL_free(hex);
+	BN_free(serial);
+	p->role = read_role(cert);
+	if (p->role == TLS_NOBODY)
+		return error_set(e, EACCES, "the certificate of %s has no role in the farm", p->name);
+	return 0;
+}
+
+/* ---- the folder ---- */
+
+static int path_of(const struct tls *t, int file, char *path, size_t size)
+{
+	return snprintf(path, size, "%s/%s", t->folder, file_names[file]);
+}
+
+static void look(const struct tls *t, struct stamp *stamps)
+{
+	for (int i = 0; i < FILES; i++) {
+		char path[4096];
+		struct stat st;
+		path_of(t, i, path, sizeof path);
+		memset(&stamps[i], 0, sizeof stamps[i]);
+		if (stat(path, &st))
+			continue;
+		stamps[i].inode = st.st_ino;
+		stamps[i].size = st.st_size;
+		stamps[i].changed = st.st_mtim;
+	}
+}
+
+static int broken(struct error *e, int code, const char *path)
+{
+	unsigned long reason = ERR_peek_last_error();
+	const char *text = reason ? ERR_reason_error_string(reason) : NULL;
+	return error_set(e, code, "%s: %s", path, text ? text : "cannot be used");
+}
+
+/* At depth 0 the chain is good already: is the certificate for what the peer does with it? */
+static int judge(int good, X509_STORE_CTX *sc)
+{
+	if (!good || X509_STORE_CTX_get_error_depth(sc) != 0)
+		return good;
+	SSL *ssl = X509_STORE_CTX_get_ex_data(sc, SSL_get_ex_data_X509_STORE_CTX_idx());
+	struct tls_link *l = ssl ? SSL_get_app_data(ssl) : NULL;
+	struct error e;
+	if (!l)
+		return good;
+	if (tls_read_peer(X509_STORE_CTX_get_current_cert(sc), &l->peer, &e) == 0) {
+		if (l->listening || l->peer.role == TLS_COORDINATOR)
+			return 1;
+		error_set(&e, EACCES, "it is the certificate of a %s, not of a coordinator", roles[l->peer.role]);
+	}
+	text_copy(l->distrust, sizeof l->distrust, e.text);
+	X509_STORE_CTX_set_error(sc, X509_V_ERR_APPLICATION_VERIFICATION);
+	return 0;
+}
+
+static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, struct error *e)
+{
+	char path[4096];
+	X509_STORE *store = X509_STORE_new();
+	path_of(t, 0, path, sizeof path);
+	if (!store || X509_STORE_load_file(store, path) != 1) {
+		X509_STORE_free(store);
+		return broken(e, EBADMSG, path);
+	}
+	SSL_CTX_set_cert_store(context, store); /* which owns it now */
+	if (!revocations)
+		return 0;
+	path_of(t, 3, path, sizeof path);
+	if (X509_load_crl_file(X509_STORE_add_lookup(store, X509_LOOKUP_file()), path, X509_FILETYPE_PEM) < 1)
+		return broken(e, EBADMSG, path);
+	X509_STORE_set_flags(store, X509_V_FLAG_CRL_CHECK);
+	return 0;
+}
+
+static int load_own(const struct tls *t, SSL_CTX *context, struct tls_peer *self, struct error *e)
+{
+	char path[4096];
+	struct stat st;
+	path_of(t, 2, path, sizeof path);
+	if (stat(path, &st))
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	if (st.st_mode & 0007)
+		return error_set(e, EPERM, "%s: everybody on this machine can read the key: chmod 600", path);
+	if (SSL_CTX_use_PrivateKey_file(context, path, SSL_FILETYPE_PEM) != 1)
+		return broken(e, EBADMSG, path);
+	path_of(t, 1, path, sizeof path);
+	if (SSL_CTX_use_certificate_chain_file(context, path) != 1 || SSL_CTX_check_private_key(context) != 1)
+		return broken(e, EBADMSG, path);
+	int rc = tls_read_peer(SSL_CTX_get0_certificate(context), self, e);
+	return rc ? error_prefix(e, rc, "%s", path) : 0;
+}
+
+static void harden(SSL_CTX *context)
+{
+	SSL_CTX_set_min_proto_version(context, TLS1_3_VERSION);
+	SSL_CTX_set_max_proto_version(context, TLS1_3_VERSION);
+	SSL_CTX_set_options(context, SSL_OP_NO_TICKET | SSL_OP_NO_RENEGOTIATION | SSL_OP_NO_COMPRESSION |
+					     SSL_OP_CIPHER_SERVER_PREFERENCE);
+	SSL_CTX_set_session_cache_mode(context, SSL_SESS_CACHE_OFF);
+	SSL_CTX_set_num_tickets(context, 0);
+	SSL_CTX_set_mode(context, SSL_MODE_RELEASE_BUFFERS);
+	SSL_CTX_set_max_cert_list(context, CERTIFICATES_MAX);
+	SSL_CTX_set_verify(context, SSL_VERIFY_PEER | SSL_VERIFY_FAIL_IF_NO_PEER_CERT, judge);
+	SSL_CTX_set_verify_depth(context, DEPTH);
+}
+
+static int load(const struct tls *t, bool revocations, SSL_CTX **out, struct tls_peer *self, struct error *e)
+{
+	ERR_clear_error();
+	SSL_CTX *context = SSL_CTX_new(TLS_method());
+	if (!context)
+		return error_set(e, ENOMEM, "no memory for TLS");
+	harden(context);
+	int rc = load_own(t, context, self, e);
+	if (!rc)
+		rc = load_store(t, context, revocations, e);
+	ERR_clear_error();
+	if (rc)
+		SSL_CTX_free(context);
+	else
+		*out = context;
+	return rc;
+}
+
+static bool is_there(const struct stamp *s)
+{
+	return s->inode != 0;
+}
+
+int tls_open(struct tls **out, const char *folder, struct error *e)
+{
+	struct tls *t = mem_alloc(1, sizeof *t);
+	if (!t)
+		return error_set(e, ENOMEM, "no memory for TLS");
+	int n = snprintf(t->folder, sizeof t->folder, "%s", folder);
+	int rc = n < 0 || (size_t)n >= sizeof t->folder ? error_set(e, EINVAL, "%s: the name is too long", folder) : 0;
+	t->recheck = 60;
+	look(t, t->stamps);
+	if (!rc)
+		rc = load(t, is_there(&t->stamps[3]), &t->context, &t->self, e);
+	if (rc) {
+		mem_free(t);
+		return error_prefix(e, rc, "TLS");
+	}
+	*out = t;
+	return 0;
+}
+
+void tls_close(struct tls *t)
+{
+	if (!t)
+		return;
+	SSL_CTX_free(t->context);
+	mem_free(t);
+}
+
+int tls_refresh(struct tls *t, struct error *e)
+{
+	struct stamp now[FILES];
+	struct tls_peer self;
+	SSL_CTX *fresh;
+	look(t, now);
+	if (memcmp(now, t->stamps, sizeof now) == 0)
+		return 0;
+	bool had_list = is_there(&t->stamps[3]);
+	struct stamp list = t->stamps[3];
+	memcpy(t->stamps, now, sizeof now);
+	if (had_list && !is_there(&now[3])) { /* the revoked must not come back because a file is lost */
+		t->stamps[3] = list;
+		return error_set(e, ENOENT, "TLS: %s/crl.pem is gone; what it said still holds", t->folder);
+	}
+	int rc = load(t, is_there(&now[3]), &fresh, &self, e);
+	if (rc)
+		return error_prefix(e, rc, "TLS, the files before still hold");
+	SSL_CTX_free(t->context);
+	t->context = fresh;
+	t->self = self;
+	return 1;
+}
+
+const struct tls_peer *tls_self(const struct tls *t)
+{
+	return &t->self;
+}
+
+void tls_set_recheck(struct tls *t, double seconds)
+{
+	t->recheck = seconds;
+}
+
+double tls_recheck_seconds(const struct tls *t)
+{
+	return t->recheck;
+}
+
+/* ---- a link ---- */
+
+int tls_link_new(struct tls_link **out, struct tls *t, bool listening, struct error *e)
+{
+	struct tls_link *l = mem_alloc(1, sizeof *l);
+	SSL *ssl = l ? SSL_new(t->context) : NULL;
+	BIO *in = ssl ? BIO_new(BIO_s_mem()) : NULL, *to = in ? BIO_new(BIO_s_mem()) : NULL;
+	if (!to) {
+		BIO_free(in);
+		SSL_free(ssl);
+		mem_free(l);
+		return error_set(e, ENOMEM, "no memory for TLS");
+	}
+	BIO_set_mem_eof_return(in, -1);
+	SSL_set_bio(ssl, in, to);
+	SSL_set_app_data(ssl, l);
+	if (listening)
+		SSL_set_accept_state(ssl);
+	else
+		SSL_set_connect_state(ssl);
+	*l = (struct tls_link){.tls = t, .ssl = ssl, .in = in, .out = to, .listening = listening};
+	*out = l;
+	return 0;
+}
+
+void tls_link_free(struct tls_link *l)
+{
+	if (!l)
+		return;
+	SSL_free(l->ssl);
+	mem_free(l);
+}
+
+int tls_link_take(struct tls_link *l, const void *bytes, size_t size, struct error *e)
+{
+	if (!size)
+		return 0;
+	if (!l->begun && !tls_is_first_byte(*(const unsigned char *)bytes)) {
+		BIO_write(l->out, tls_none_here, sizeof tls_none_here);
+		return error_set(e, EACCES, "the peer speaks without TLS, and here it is needed");
+	}
+	l->begun = true;
+	l->taken += l->open ? 0 : size;
+	if (!l->open && l->taken > BEFORE_OPEN_MAX)
+		return error_set(e, EPROTO, "the TLS handshake is longer than %d bytes", BEFORE_OPEN_MAX);
+	if (BIO_write(l->in, bytes, (int)size) != (int)size)
+		return error_set(e, ENOMEM, "no memory for TLS");
+	return 0;
+}
+
+/* What OpenSSL stumbled over, in words for whoever must do something about it. */
+static int explain(struct tls_link *l, struct error *e)
+{
+	unsigned long code = ERR_peek_error();
+	int reason = ERR_GET_REASON(code), alert = reason - ALERT_REASON;
+	long verdict = SSL_get_verify_result(l->ssl);
+	const char *text = code ? ERR_reason_error_string(code) : NULL;
+	if (*l->distrust)
+		return error_set(e, EACCES, "the peer's certificate is not accepted: %s", l->distrust);
+	if (ERR_GET_LIB(code) == ERR_LIB_SSL && reason == SSL_R_PEER_DID_NOT_RETURN_A_CERTIFICATE)
+		return error_set(e, EACCES, "the peer has no certificate");
+	if (ERR_GET_LIB(code) == ERR_LIB_SSL && alert == PROTOCOL_VERSION)
+		return error_set(e, EACCES, "the peer speaks no TLS 1.3: is it started without --tls?");
+	if (ERR_GET_LIB(code) == ERR_LIB_SSL && alert >= 40 && alert < 256)
+		return error_set(e, EACCES, "the peer does not accept this certificate: %s", SSL_alert_desc_string_long(alert));
+	if (verdict != X509_V_OK)
+		return error_set(e, EACCES, "the peer's certificate is not accepted: %s", X509_verify_cert_error_string(verdict));
+	return error_set(e, EPROTO, "TLS: %s", text ? text : "nonsense on the wire");
+}
+
+ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *e)
+{
+	size_t got = 0;
+	ERR_clear_error();
+	int ok = SSL_read_ex(l->ssl, out, size, &got);
+	if (!l->open && SSL_is_init_finished(l->ssl))
+		l->open = true;
+	if (ok == 1)
+		return (ssize_t)got;
+	int rc;
+	switch (SSL_get_error(l->ssl, ok)) {
+	case SSL_ERROR_WANT_READ:
+		return 0;
+	case SSL_ERROR_ZERO_RETURN:
+		return error_set(e, ECONNRESET, "the peer hung up");
+	default:
+		rc = explain(l, e);
+		ERR_clear_error();
+		return rc;
+	}
+}
+
+int tls_link_write(struct tls_link *l, const void *bytes, size_t size, struct error *e)
+{
+	size_t done = 0;
+	ERR_clear_error();
+	if (SSL_write_ex(l->ssl, bytes, size, &done) == 1 && done == size)
+		return 0;
+	int rc = explain(l, e);
+	ERR_clear_error();
+	return rc;
+}
+
+size_t tls_link_output(struct tls_link *l, const unsigned char **bytes)
+{
+	char *at = NULL;
+	long size = BIO_get_mem_data(l->out, &at);
+	*bytes = (const unsigned char *)at;
+	return size > 0 ? (size_t)size : 0;
+}
+
+void tls_link_output_taken(struct tls_link *l)
+{
+	(void)BIO_reset(l->out);
+}
+
+bool tls_link_is_open(const struct tls_link *l)
+{
+	return l->open;
+}
+
+const struct tls_peer *tls_link_peer(const struct tls_link *l)
+{
+	return &l->peer;
+}
+
+int tls_link_recheck(struct tls_link *l, struct error *e)
+{
+	int rc = 0;
+	X509 *cert = SSL_get0_peer_certificate(l->ssl);
+	X509_STORE_CTX *sc = X509_STORE_CTX_new();
+	if (!sc || !cert ||
+	    X509_STORE_CTX_init(sc, SSL_CTX_get_cert_store(l->tls->context), cert, SSL_get_peer_cert_chain(l->ssl)) != 1 ||
+	    X509_STORE_CTX_set_default(sc, l->listening ? "ssl_client" : "ssl_server") != 1)
+		rc = error_set(e, ENOMEM, "the peer's certificate cannot be checked again");
+	else if (X509_verify_cert(sc) != 1)
+		rc = error_set(e, EACCES, "the peer's certificate is not accepted any more: %s",
+			       X509_verify_cert_error_string(X509_STORE_CTX_get_error(sc)));
+	X509_STORE_CTX_free(sc);
+	ERR_clear_error();
+	return rc;
+}

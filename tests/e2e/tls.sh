@@ -1,0 +1,130 @@
+# A farm over TLS: equal bits, and everybody who must not get in does not; the table of attempts is printed.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-ca hslt-render hslt-compare
+unset HSLT_TLS
+CA="$DIR/ca"
+export HSLT_CA="$CA"
+ROWS=0
+
+ca() {
+	"$BIN/hslt-ca" "$@" >>"$DIR/ca.log" 2>&1 || fail "hslt-ca $*: $(tail -n 1 "$DIR/ca.log")"
+}
+
+row() {
+	ROWS=$((ROWS + 1))
+	printf '%-48s %-8s %s\n' "$1" "$2" "$3"
+}
+
+# refused WHAT CODE SENTENCE COMMAND...: it ends with the code, within 5 s, and says so
+refused() {
+	what=$1 wanted=$2 sentence=$3
+	shift 3
+	got=0
+	timeout 5 "$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
+	[ $got -eq "$wanted" ] || fail "$what: ended with $got, not $wanted: $(cat "$DIR/err.log")"
+	grep -q -e "$sentence" "$DIR/err.log" || fail "$what: it says: $(cat "$DIR/err.log")"
+	row "$what" refused "$sentence"
+}
+
+# turned_away WHAT SENTENCE WORKER-LOG: a worker that is running is told so, and the status does not show it
+turned_away() {
+	until_true 5 grep -qs "$2" "$DIR/$3.log" || fail "$1: $(cat "$DIR/$3.log")"
+	"$BIN/hslt-status" --json | grep -q "\"name\":\"$3\"" && fail "$1: it has joined"
+	kill -9 "$WORKER"
+	row "$1" refused "$2"
+}
+
+# Three commands for a farm; the rest is for those who must not get in.
+ca init
+ca worker node
+ca client ann
+ca client bob
+ca operator chief
+ca worker lost
+ca client gone
+ca worker brief --days 0.0001
+ca client late --days 0.00001
+ca init --ca "$DIR/other"
+ca client eve --ca "$DIR/other"
+ca worker eve-node --ca "$DIR/other"
+[ "$(stat -c %a "$CA/ca.key" "$CA/node/key.pem" "$CA/node" | tr '\n' ' ')" = "600 600 700 " ] || fail "modes of keys"
+"$BIN/hslt-ca" list | grep -q '^lost *worker *valid' || fail "hslt-ca list: $("$BIN/hslt-ca" list)"
+ca revoke gone
+
+"$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" --integrator path --spp 16 2>>"$DIR/render.log"
+start_coordinator --tls "$CA/coordinator" --tls-check 0.5
+start_worker node1 --tls "$CA/node"
+start_worker node2 --tls "$CA/node"
+start_worker lost --tls "$CA/lost"
+start_worker brief --tls "$CA/brief"
+export HSLT_TLS="$CA/ann"
+submit "$BOX" -o "$DIR/farm.exr" --integrator path --spp 16 --wait >"$DIR/id" || fail "the job: $?"
+same "$DIR/alone.exr" "$DIR/farm.exr"
+
+row TRIED GOT BECAUSE
+ROWS=0
+list="$BIN/hslt-job list"
+refused "no certificate: plaintext to the TLS port" 6 "speaks TLS" $list --tls ""
+refused "a worker's certificate submits" 6 "cannot submit" "$BIN/hslt-submit" "$BOX" -o "$DIR/no.exr" --spp 1 --tls "$CA/node"
+refused "a worker's certificate lists jobs" 6 "cannot submit" $list --tls "$CA/node"
+refused "a coordinator's certificate lists jobs" 6 "does not accept this certificate" $list --tls "$CA/coordinator"
+refused "a certificate of another authority" 6 "is not accepted" $list --tls "$DIR/other/eve"
+cp -r "$DIR/other/eve" "$DIR/eve"
+cp "$CA/ca.pem" "$CA/crl.pem" "$DIR/eve"
+refused "the same, and it trusts this farm" 6 "unknown CA" $list --tls "$DIR/eve"
+refused "an expired certificate" 6 "certificate expired" $list --tls "$CA/late"
+refused "a revoked certificate" 6 "certificate revoked" $list --tls "$CA/gone"
+cp -r "$CA/ann" "$DIR/open"
+chmod 644 "$DIR/open/key.pem"
+refused "a key that everybody can read" 2 "everybody on this machine" $list --tls "$DIR/open"
+refused "cancelling a job of somebody else" 1 "no such job" "$BIN/hslt-job" cancel j1 --tls "$CA/bob"
+refused "fetching a job of somebody else" 1 "no job" "$BIN/hslt-job" fetch j1 -o "$DIR/no.exr" --tls "$CA/bob"
+refused "its preview" 1 "no job" "$BIN/hslt-job" fetch j1 --preview -o "$DIR/no.exr" --tls "$CA/bob"
+refused "its log" 1 "no job" "$BIN/hslt-job" log j1 --tls "$CA/bob"
+[ -z "$($list --tls "$CA/bob")" ] || fail "bob sees: $($list --tls "$CA/bob")"
+row "seeing a job of somebody else in the list" refused "not there"
+$list | grep -q '^j1 ' || fail "ann does not see her job"
+$list --tls "$CA/chief" | grep -q '^j1 ' || fail "an operator does not see it"
+"$BIN/hslt-job" fetch j1 -o "$DIR/again.exr" --tls "$CA/chief" || fail "an operator cannot fetch"
+same "$DIR/alone.exr" "$DIR/again.exr"
+
+start_worker as-client --tls "$CA/ann"
+turned_away "a client's certificate leases" "cannot lease" as-client
+start_worker foreign --tls "$DIR/other/eve-node"
+turned_away "a worker of another authority" "is not accepted" foreign
+start_worker plain --tls ""
+turned_away "a worker without TLS" "speaks TLS" plain
+
+# What is not TLS at all: an answer or a hang-up, never a wait.
+timeout 5 "${PYTHON:-python3}" -c '
+import socket, sys
+s = socket.create_connection(("127.0.0.1", int(sys.argv[1])))
+s.settimeout(4)
+s.sendall(b"GET / HTTP/1.0\r\n\r\n")
+sys.exit(0 if s.recv(64)[:1] == b"\x15" and s.recv(64) == b"" else 1)' "${COORDINATOR#*:}" || fail "HTTP is not hung up on"
+row "HTTP to the TLS port" refused "an alert, and hung up"
+
+# Live connections: revoked, expired.
+ca revoke lost
+until_true 10 grep -q 'peer_refused.*name=.\{0,1\}lost.*revoked' "$DIR/coordinator.log" || fail "the revoked worker stays"
+row "a worker that is revoked while it is connected" "cut off" "certificate revoked"
+until_true 10 grep -q 'peer_refused.*name=.\{0,1\}brief.*expired' "$DIR/coordinator.log" || fail "the expired worker stays"
+row "a worker whose certificate expires meanwhile" "cut off" "certificate has expired"
+
+# A renewed certificate is taken up without a restart, and the farm goes on with the same bits.
+ca coordinator coordinator --renew
+until_true 5 grep -q event=tls_read "$DIR/coordinator.log" || fail "new files are not noticed"
+submit "$BOX" -o "$DIR/farm2.exr" --integrator path --spp 16 --wait >"$DIR/id" || fail "the second job: $?"
+same "$DIR/alone.exr" "$DIR/farm2.exr"
+
+# The other way round: TLS to a port without; and only a coordinator can be one.
+"$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port2" --spool "$DIR/spool2" --status-socket "$DIR/status2" --tls "" \
+	2>>"$DIR/plain-coordinator.log" &
+PIDS="$PIDS $!"
+until_true 10 test -s "$DIR/port2" || fail "the plain coordinator does not listen"
+refused "TLS to a port without" 6 "no TLS" $list --coordinator "127.0.0.1:$(cat "$DIR/port2")"
+refused "a worker's certificate as coordinator" 2 "nobody would take it" "$BIN/hslt-coordinator" --listen 127.0.0.1:0 \
+	--spool "$DIR/spool3" --tls "$CA/node"
+refused "an open port without TLS" 2 "--insecure" "$BIN/hslt-coordinator" --listen 0.0.0.0:0 --spool "$DIR/spool3" \
+	--status-socket "$DIR/status3" --tls ""
+echo "TLS: equal bits; $ROWS attempts, all refused"
