@@ -13,6 +13,16 @@ const Farm__Submit *order_submit(const struct order *o)
 	return o->submit.message->submit;
 }
 
+static json_t *effects_to_json(const Farm__Submit *m)
+{
+	json_t *list = json_array();
+	for (size_t i = 0; i < m->n_effects; i++)
+		json_array_append_new(list, json_pack("{s:s s:b s:b s:s s:s}", "name", m->effects[i]->name, "on",
+						      (int)m->effects[i]->on, "forced", (int)m->effects[i]->forced, "why",
+						      m->effects[i]->why, "saves", m->effects[i]->saves));
+	return list;
+}
+
 static void begin_record(struct order *o, const struct job_record *earlier)
 {
 	const Farm__Submit *m = order_submit(o);
@@ -33,6 +43,7 @@ static void begin_record(struct order *o, const struct job_record *earlier)
 	r->priority = m->priority;
 	r->rel_error = -1;
 	record_begin_agreement(r);
+	record_take_effects(r, effects_to_json(m));
 	r->target_error = o->plan.target_error;
 	r->submitted = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 }

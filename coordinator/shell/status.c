@@ -47,17 +47,11 @@ static json_t *object(const char *type)
 			 (double)now.tv_sec + 1e-9 * (double)now.tv_nsec);
 }
 
-static json_t *job_json(struct server *s, const struct job_view *v)
-{
-	const struct order *o = server_order(s, v->record.id);
-	return view_to_json(v, o ? order_submit(o) : NULL);
-}
-
-static json_t *jobs_json(struct server *s, const struct job_view *views, size_t count)
+static json_t *jobs_json(const struct job_view *views, size_t count)
 {
 	json_t *list = json_array();
 	for (size_t i = 0; i < count; i++)
-		json_array_append_new(list, job_json(s, &views[i]));
+		json_array_append_new(list, view_to_json(&views[i]));
 	return list;
 }
 
@@ -83,7 +77,7 @@ static json_t *snapshot(struct server *s)
 	struct job_view *views;
 	size_t count = server_views(s, &views);
 	json_t *o = object("snapshot");
-	json_object_set_new(o, "jobs", jobs_json(s, views, count));
+	json_object_set_new(o, "jobs", jobs_json(views, count));
 	add_workers(s, o);
 	mem_free(views);
 	return o;
@@ -268,7 +262,7 @@ void status_tick(struct status_socket *t)
 		if (before && memcmp(before, &views[i], sizeof *before) == 0)
 			continue;
 		json_t *o = object("job");
-		json_object_set_new(o, "job", job_json(t->server, &views[i]));
+		json_object_set_new(o, "job", view_to_json(&views[i]));
 		tell(t, TOPIC_JOBS, o);
 	}
 	mem_free(t->shown);

@@ -119,16 +119,6 @@ void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm
 	out->looks = looks->at;
 }
 
-static json_t *effects_to_json(const Farm__Submit *m)
-{
-	json_t *list = json_array();
-	for (size_t i = 0; i < m->n_effects; i++)
-		json_array_append_new(list, json_pack("{s:s s:b s:b s:s s:s}", "name", m->effects[i]->name, "on",
-						      (int)m->effects[i]->on, "forced", (int)m->effects[i]->forced, "why",
-						      m->effects[i]->why, "saves", m->effects[i]->saves));
-	return list;
-}
-
 static json_t *number_or_null(double x, bool known)
 {
 	return known ? forecast_real(x) : json_null();
@@ -153,7 +143,7 @@ static void add_forecast(json_t *o, const struct job_view *v)
 		json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 }
 
-json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit)
+json_t *view_to_json(const struct job_view *v)
 {
 	const struct job_record *r = &v->record;
 	char id[32];
@@ -177,8 +167,7 @@ json_t *view_to_json(const struct job_view *v, const Farm__Submit *submit)
 	json_object_set_new(o, "agreement", agreement_to_json(&r->agreement));
 	json_object_set_new(o, "b", number_or_null(r->b, r->b > 0));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
-	if (submit)
-		json_object_set_new(o, "effects", effects_to_json(submit));
+	json_object_set_new(o, "effects", record_effects(r));
 	return o;
 }
 

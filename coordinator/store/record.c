@@ -43,6 +43,22 @@ void record_take_agreement(struct job_record *r, const struct canvas_image *img,
 	memcpy(r->classes, img->classes, sizeof r->classes);
 }
 
+void record_take_effects(struct job_record *r, json_t *list)
+{
+	size_t n = list ? json_dumpb(list, r->effects, sizeof r->effects - 1, JSON_COMPACT) : 0;
+	r->effects[n < sizeof r->effects ? n : 0] = 0;
+	json_decref(list);
+}
+
+json_t *record_effects(const struct job_record *r)
+{
+	json_t *list = *r->effects ? json_loads(r->effects, JSON_REJECT_DUPLICATES, NULL) : NULL;
+	if (json_is_array(list))
+		return list;
+	json_decref(list);
+	return json_array();
+}
+
 json_t *record_strategies(const struct job_record *r)
 {
 	struct canvas_counts n = {{0}, {{0}}};
@@ -110,6 +126,7 @@ char *record_to_json(const struct job_record *r)
 	json_object_set_new(o, "agreement", agreement_to_json(&r->agreement));
 	json_object_set_new(o, "b", json_real(r->b));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
+	json_object_set_new(o, "effects", record_effects(r));
 	if (o)
 		put_looks(o, r);
 	char *text = o ? json_dumps(o, JSON_INDENT(2)) : NULL;
@@ -158,6 +175,8 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	r->b = json_number_value(json_object_get(o, "b"));
 	classes_from_json(json_object_get(o, "classes"), r->classes);
 	take_looks(o, r);
+	json_t *effects = json_object_get(o, "effects");
+	record_take_effects(r, json_is_array(effects) ? json_incref(effects) : NULL);
 	json_decref(o);
 	return 0;
 }

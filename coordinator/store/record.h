@@ -15,6 +15,8 @@
 #include <stddef.h>
 #include <stdint.h>
 
+enum { RECORD_EFFECTS = 12288 };
+
 struct job_record {
 	uint64_t id;
 	char name[128];
@@ -39,6 +41,7 @@ struct job_record {
 	uint64_t stuck, longest_stuck; /* times that a chain accepted nothing during an epoch; most rejections in a row */
 	char mixture[PLAN_MUTATIONS_MAX];
 	char note[STRATEGY_NOTE];
+	char effects[RECORD_EFFECTS]; /* a JSON array: what the scene calls for, and why; "": not known, or too long */
 	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* of the mixture */
 	struct agreement agreement; /* of the last image that was made */
 	double b;                   /* of it, as the classes; 0: none was made */
@@ -49,6 +52,8 @@ struct job_record {
 void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black);
 void record_take_agreement(struct job_record *r, const struct canvas_image *img, const struct agreement *a);
 void record_begin_agreement(struct job_record *r); /* nothing is known */
+void record_take_effects(struct job_record *r, json_t *list); /* takes the reference; NULL: none */
+json_t *record_effects(const struct job_record *r);    /* an array */
 json_t *record_counts(const struct job_record *r);     /* an object of its counts */
 json_t *record_strategies(const struct job_record *r); /* an array: strategy_to_json */
 char *record_to_json(const struct job_record *r); /* mem_alloc'd; NULL when memory is out */

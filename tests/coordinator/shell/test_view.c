@@ -38,7 +38,7 @@ static void json_shows_the_strategies(void **state)
 	struct job_record r = record();
 	struct job_view v;
 	view_of_record(&v, &r);
-	json_t *o = view_to_json(&v, NULL);
+	json_t *o = view_to_json(&v);
 	const json_t *list = json_object_get(o, "strategies"), *counts = json_object_get(o, "counts");
 	assert_int_equal(json_array_size(list), 2);
 	const json_t *hslt = json_array_get(list, 1);
@@ -64,7 +64,7 @@ static void json_of_other_jobs_has_none(void **state)
 	struct job_record r = {.id = 1, .state = "done"};
 	struct job_view v;
 	view_of_record(&v, &r);
-	json_t *o = view_to_json(&v, NULL);
+	json_t *o = view_to_json(&v);
 	assert_true(json_is_array(json_object_get(o, "strategies")) && json_array_size(json_object_get(o, "strategies")) == 0);
 	assert_string_equal(json_string_value(json_object_get(o, "note")), "");
 	json_decref(o);
@@ -84,7 +84,7 @@ static void json_shows_the_forecast(void **state)
 	v.eta_high = -1;
 	v.halving_cpu = (struct forecast_range){1, 2, INFINITY};
 	v.halving_seconds = (struct forecast_range){1, 2, 3};
-	json_t *o = view_to_json(&v, NULL);
+	json_t *o = view_to_json(&v);
 	assert_non_null(o);
 	const json_t *half = json_object_get(o, "nextHalving"), *error = json_object_get(o, "errorNow");
 	assert_true(json_number_value(json_object_get(error, "high")) == sqrt(0.05 / 8));
@@ -94,7 +94,7 @@ static void json_shows_the_forecast(void **state)
 	assert_int_equal(json_array_size(json_object_get(o, "looks")), 8);
 	json_decref(o);
 	strcpy(v.record.state, "done"); /* what has ended has no future, and its looks stay in the spool */
-	o = view_to_json(&v, NULL);
+	o = view_to_json(&v);
 	assert_true(json_is_null(json_object_get(o, "nextHalving")) && json_is_null(json_object_get(o, "etaRange")));
 	assert_null(json_object_get(o, "looks"));
 	assert_true(json_is_object(json_object_get(o, "errorNow")));
