@@ -2,21 +2,34 @@
 
 #include "worker/chain/bytes.h"
 
-enum { PATH_HEAD = 16, VERTEX_BYTES = 40 };
+enum { PATH_HEAD = 8, VERTEX_BYTES = 40 };
+
+/* What a scene does not call for is not there: the wavelength's number without colour, the camera's vertex without aperture. */
+static size_t head_bytes(const struct world *w)
+{
+	return PATH_HEAD + (EFFECT_IS_ON(w, colour) ? 8 : 0);
+}
+
+static unsigned vertex_count(const struct world *w, unsigned edges)
+{
+	return EFFECT_IS_ON(w, aperture) ? edges + 1 : edges;
+}
+
 /* Where a position and the surface that it names differ more than that, in units of the world's radius, they do not belong
  * together. */
 #define BELONGS 1e-9
 /* Walks meet specular directions far more exactly. */
 #define SPECULAR 1e-3
 
-size_t path_write(const struct whole_path *x, uint8_t *bytes)
+size_t path_write(const struct world *w, const struct whole_path *x, uint8_t *bytes)
 {
 	put64(bytes, x->edges);
-	put_double(bytes + 8, x->wavelength);
 	if (x->edges == 0)
 		return PATH_HEAD;
-	uint8_t *at = bytes + PATH_HEAD;
-	for (unsigned i = 0; i <= x->edges; i++, at += VERTEX_BYTES) {
+	if (EFFECT_IS_ON(w, colour))
+		put_double(bytes + PATH_HEAD, x->wavelength);
+	uint8_t *at = bytes + head_bytes(w);
+	for (unsigned i = 0; i < vertex_count(w, x->edges); i++, at += VERTEX_BYTES) {
 		const struct path_vertex *v = &x->v[i];
 		at[0] = (uint8_t)v->kind;
 		at[1] = (uint8_t)v->mode;
@@ -65,6 +78,15 @@ static bool read_far_emitter(const struct world *w, int32_t emitter, vec3 p, str
 	return true;
 }
 
+static struct path_vertex pinhole(const struct world *w)
+{
+	const double middle[2] = {0.5, 0.5};
+	struct path_vertex v = {.kind = VERTEX_CAMERA, .emitter = -1};
+	v.x.prim = PRIM_NONE;
+	v.x.p = camera_point(&w->camera, middle);
+	return v;
+}
+
 static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, unsigned edges, struct path_vertex *v)
 {
 	int32_t emitter = (int32_t)get32(at + 4);
@@ -100,13 +122,21 @@ bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct
 	x->edges = 0;
 	if (edges == 0)
 		return size == PATH_HEAD;
-	double u = get_double(bytes + 8);
-	if (edges > c->max_depth || edges > WHOLE_MAX_EDGES || size != PATH_HEAD + (edges + 1) * VERTEX_BYTES || !(u >= 0 && u < 1))
+	size_t head = head_bytes(c->w);
+	if (edges > c->max_depth || edges > WHOLE_MAX_EDGES)
 		return false;
 	x->edges = (unsigned)edges;
-	for (unsigned i = 0; i <= x->edges; i++)
-		if (!read_vertex(c->w, bytes + PATH_HEAD + i * VERTEX_BYTES, i, x->edges, &x->v[i]))
+	unsigned vertices = vertex_count(c->w, x->edges);
+	if (size != head + (size_t)vertices * VERTEX_BYTES)
+		return false;
+	double u = EFFECT_IS_ON(c->w, colour) ? get_double(bytes + PATH_HEAD) : 0;
+	if (!(u >= 0 && u < 1))
+		return false;
+	for (unsigned i = 0; i < vertices; i++)
+		if (!read_vertex(c->w, bytes + head + i * VERTEX_BYTES, i, x->edges, &x->v[i]))
 			return false;
+	if (vertices == x->edges)
+		x->v[x->edges] = pinhole(c->w);
 	whole_set_wavelength(c, x, u);
 	if (!whole_finish(c, x))
 		return false;

@@ -69,7 +69,7 @@ static int save(const struct chain *base, struct chain_state *out)
 	const struct path_chain *c = (const struct path_chain *)(const void *)base;
 	uint8_t bytes[CHAIN_STATE_HEAD + WHOLE_BYTES];
 	chain_put_head(base, bytes);
-	return chain_give(bytes, CHAIN_STATE_HEAD + path_write(&c->current->path, bytes + CHAIN_STATE_HEAD), out);
+	return chain_give(bytes, CHAIN_STATE_HEAD + path_write(base->context->w, &c->current->path, bytes + CHAIN_STATE_HEAD), out);
 }
 
 static void splat(struct path_chain *c, struct path_place *at)

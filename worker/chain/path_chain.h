@@ -18,7 +18,7 @@ bool path_start(struct path_context *c, uint64_t seed, uint64_t bootstrap_index,
 /* A path as bytes (little endian), and back: surfaces, modes and positions are taken from the world again. WHOLE_BYTES are
  * always enough. */
 enum { WHOLE_BYTES = 16 + 56 * WHOLE_MAX_VERTICES };
-size_t path_write(const struct whole_path *x, uint8_t *bytes);
+size_t path_write(const struct world *w, const struct whole_path *x, uint8_t *bytes);
 /* false: not a path of this world, or a black one. */
 bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct whole_path *x);
 
