@@ -180,7 +180,8 @@ static void flush(struct conn *c, size_t plain)
 static void refuse(struct conn *c, int rc, const char *why)
 {
 	c->distrust = rc == -EACCES;
-	text_copy(c->why, sizeof c->why, why);
+	if (!c->linger_until)
+		text_copy(c->why, sizeof c->why, why);
 	c->linger_until = uv_now(c->tcp.loop) + REFUSED_MS;
 	c->waits_for_peer = true;
 	if (!c->in_flight)
@@ -214,7 +215,7 @@ static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 {
 	struct error e;
 	ssize_t n = tls_link_take(c->link, bytes, size, &e);
-	while (n >= 0 && !c->closing && !c->linger_until) {
+	while (n >= 0 && !c->closing) {
 		bool was_open = tls_link_is_open(c->link);
 		n = tls_link_read(c->link, c->chunk, sizeof c->chunk, &e);
 		flush(c, 0);
@@ -256,7 +257,7 @@ static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b)
 		conn_close(c, count != UV_EOF ? uv_strerror((int)count)
 			      : midway	      ? "the peer hung up during the TLS handshake"
 					      : "the peer hung up");
-	} else if (c->linger_until || c->closing) {
+	} else if (c->closing || c->waits_for_peer) {
 		return;
 	} else if (c->link) {
 		take_encrypted(c, b->base, (size_t)count);

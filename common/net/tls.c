@@ -364,8 +364,6 @@ int tls_link_take(struct tls_link *l, const void *bytes, size_t size, struct err
 	}
 	l->begun = true;
 	l->taken += l->open ? 0 : size;
-	if (!l->open && l->taken > BEFORE_OPEN_MAX)
-		return error_set(e, EPROTO, "the TLS handshake is longer than %d bytes", BEFORE_OPEN_MAX);
 	if (BIO_write(l->in, bytes, (int)size) != (int)size)
 		return error_set(e, ENOMEM, "no memory for TLS");
 	return 0;
@@ -402,7 +400,9 @@ ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *
 		return (ssize_t)got;
 	int rc;
 	switch (SSL_get_error(l->ssl, ok)) {
-	case SSL_ERROR_WANT_READ:
+	case SSL_ERROR_WANT_READ: /* all that was taken is used up: what came behind the handshake does not count for it */
+		if (!l->open && l->taken > BEFORE_OPEN_MAX)
+			return error_set(e, EPROTO, "the TLS handshake is longer than %d bytes", BEFORE_OPEN_MAX);
 		return 0;
 	case SSL_ERROR_ZERO_RETURN:
 		return error_set(e, ECONNRESET, "the peer hung up");

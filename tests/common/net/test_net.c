@@ -1,5 +1,9 @@
-/* Addresses are read strictly; connections carry frames both ways, tell once that they end, and never grow without bound. */
+/*
+ * Addresses are read strictly; connections carry frames both ways, tell once that they end, and never grow without bound: in
+ * plaintext and through TLS. Where only one end speaks it, both are told at once.
+ */
 #include "common/base/mem.h"
+#include "common/net/authority.h"
 #include "common/net/conn.h"
 
 #include <stdarg.h>
@@ -44,6 +48,8 @@ struct end {
 	struct conn *conn;
 	int messages, closed, drained;
 	size_t payload;
+	bool distrust;
+	struct tls_peer peer; /* who the other one was when a message came */
 	char why[128];
 };
 
@@ -51,6 +57,8 @@ static uv_loop_t loop;
 static uv_tcp_t listener;
 static struct end here, there;
 static struct conn_config config;
+static char folder[64];
+static struct tls *calling, *listening; /* NULL: plaintext */
 
 static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
 {
@@ -58,6 +66,8 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 	assert_int_equal(env->message->body_case, FARM__ENVELOPE__BODY_BYE);
 	for (size_t i = 0; i < size; i++)
 		assert_int_equal(payload[i], (unsigned char)(i * 7));
+	if (conn_peer(x->conn))
+		x->peer = *conn_peer(x->conn);
 	x->messages++;
 	x->payload += size;
 }
@@ -71,6 +81,7 @@ static void on_closed(void *user, const char *why)
 {
 	struct end *x = user;
 	x->closed++;
+	x->distrust = conn_distrust(x->conn);
 	x->conn = NULL;
 	snprintf(x->why, sizeof x->why, "%s", why);
 }
@@ -105,17 +116,20 @@ static void connect_ends(void)
 	struct net_addr a, bound;
 	struct error e;
 	int length = sizeof bound.storage;
+	struct conn_config caller;
 	memset(&here, 0, sizeof here);
 	memset(&there, 0, sizeof there);
 	memset(&bound, 0, sizeof bound);
-	config = (struct conn_config){{4096, 1 << 20}, 4 << 20, 0.5, 0, NULL};
+	config = (struct conn_config){{4096, 1 << 20}, 4 << 20, 0.5, 0, listening};
+	caller = config;
+	caller.tls = calling;
 	assert_int_equal(uv_loop_init(&loop), 0);
 	uv_tcp_init(&loop, &listener);
 	assert_int_equal(net_addr_resolve(&a, "127.0.0.1:0", &e), 0);
 	assert_int_equal(uv_tcp_bind(&listener, (struct sockaddr *)&a.storage, 0), 0);
 	assert_int_equal(uv_listen((uv_stream_t *)&listener, 8, on_connection), 0);
 	assert_int_equal(uv_tcp_getsockname(&listener, (struct sockaddr *)&bound.storage, &length), 0);
-	assert_int_equal(conn_connect(&here.conn, &loop, &bound, &config, &events, &here, &e), 0);
+	assert_int_equal(conn_connect(&here.conn, &loop, &bound, &caller, &events, &here, &e), 0);
 	while (!there.conn)
 		uv_run(&loop, UV_RUN_ONCE);
 }
@@ -143,6 +157,8 @@ static void frames_go_both_ways(void **state)
 	while (there.messages < 3 || here.messages < 3 || !here.drained)
 		uv_run(&loop, UV_RUN_ONCE);
 	assert_int_equal(there.payload, 900000);
+	assert_string_equal(there.peer.name, calling ? "node" : "");
+	assert_int_equal(here.peer.role, calling ? TLS_COORDINATOR : TLS_NOBODY);
 	conn_close_when_sent(here.conn, "said all");
 	while (!there.closed)
 		uv_run(&loop, UV_RUN_ONCE);
@@ -215,13 +231,116 @@ static void silence_is_not_waited_for(void **state)
 	close_ends();
 }
 
+/* ---- TLS ---- */
+
+static int without_tls(void **state)
+{
+	(void)state;
+	calling = listening = NULL;
+	return 0;
+}
+
+static int with_tls(void **state)
+{
+	(void)state;
+	char path[128];
+	struct error e;
+	snprintf(folder, sizeof folder, "/tmp/hslt-net.XXXXXX");
+	if (!mkdtemp(folder) || authority_init(folder, "net", 2, &e) || authority_issue(folder, "farm", TLS_COORDINATOR, 1, false, &e) ||
+	    authority_issue(folder, "node", TLS_WORKER, 1, false, &e))
+		return -1;
+	snprintf(path, sizeof path, "%s/node", folder);
+	if (tls_open(&calling, path, &e))
+		return -1;
+	snprintf(path, sizeof path, "%s/farm", folder);
+	return tls_open(&listening, path, &e);
+}
+
+static int end_tls(void **state)
+{
+	(void)state;
+	char command[128];
+	tls_close(calling);
+	tls_close(listening);
+	snprintf(command, sizeof command, "rm -rf '%s'", folder);
+	return system(command);
+}
+
+/* The last one alone speaks, or not, as told: both hear what is wrong within a second or two. */
+static void one_sided(bool caller_speaks)
+{
+	struct tls *t = caller_speaks ? listening : calling;
+	*(caller_speaks ? &listening : &calling) = NULL;
+	connect_ends();
+	send_bye(&here, 10);
+	uint64_t begun = uv_hrtime();
+	while (!here.closed || !there.closed)
+		uv_run(&loop, UV_RUN_ONCE);
+	assert_true((double)(uv_hrtime() - begun) < 3e9);
+	assert_true(here.distrust && there.distrust && !here.messages && !there.messages);
+	assert_non_null(strstr(here.why, "TLS"));
+	assert_non_null(strstr(there.why, "TLS"));
+	close_ends();
+	*(caller_speaks ? &listening : &calling) = t;
+}
+
+static void only_one_speaks_it(void **state)
+{
+	(void)state;
+	one_sided(true);
+	one_sided(false);
+}
+
+/* Whoever connects and says nothing, or a word now and then, has as long as the handshake may take; here the clock is the
+ * peer's silence. */
+static void silence_is_no_handshake(void **state)
+{
+	(void)state;
+	struct tls *t = calling;
+	calling = NULL;
+	connect_ends();
+	conn_set_quiet(there.conn, 0.3);
+	while (!there.closed)
+		uv_run(&loop, UV_RUN_ONCE);
+	assert_int_equal(there.messages, 0);
+	close_ends();
+	calling = t;
+}
+
+/* What is not valid any more is cut off while it lives. */
+static void a_live_connection_is_checked_again(void **state)
+{
+	(void)state;
+	char list[128];
+	unsigned count;
+	struct error e;
+	connect_ends();
+	tls_set_recheck(listening, 0.3);
+	send_bye(&here, 1);
+	while (!there.messages)
+		uv_run(&loop, UV_RUN_ONCE);
+	assert_int_equal(authority_revoke(folder, "node", &count, &e), 0);
+	assert_int_equal(tls_refresh(listening, &e), 1);
+	while (!there.closed)
+		uv_run(&loop, UV_RUN_ONCE);
+	assert_true(there.distrust);
+	assert_non_null(strstr(there.why, "revoked"));
+	close_ends();
+	snprintf(list, sizeof list, "%s/farm/crl.pem", folder);
+	assert_int_equal(remove(list), 0);
+}
+
+#define EITHER_WAY \
+	cmocka_unit_test(frames_go_both_ways), cmocka_unit_test(the_last_words_arrive), cmocka_unit_test(limits_close), \
+		cmocka_unit_test(who_does_not_read_is_cut_off), cmocka_unit_test(half_a_frame_is_not_waited_for), \
+		cmocka_unit_test(silence_is_not_waited_for)
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(addresses),		    cmocka_unit_test(frames_go_both_ways),
-		cmocka_unit_test(the_last_words_arrive),    cmocka_unit_test(limits_close),
-		cmocka_unit_test(who_does_not_read_is_cut_off), cmocka_unit_test(half_a_frame_is_not_waited_for),
-		cmocka_unit_test(silence_is_not_waited_for),
-	};
-	return cmocka_run_group_tests(tests, NULL, NULL);
+	const struct CMUnitTest plain[] = {cmocka_unit_test(addresses), EITHER_WAY};
+	const struct CMUnitTest encrypted[] = {EITHER_WAY, cmocka_unit_test(only_one_speaks_it),
+					       cmocka_unit_test(silence_is_no_handshake),
+					       cmocka_unit_test(a_live_connection_is_checked_again)};
+	int failed = cmocka_run_group_tests(plain, without_tls, NULL);
+	return failed + cmocka_run_group_tests(encrypted, with_tls, end_tls);
 }

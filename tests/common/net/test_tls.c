@@ -13,6 +13,9 @@
 #include <cmocka.h>
 
 #include <fcntl.h>
+#include <openssl/pem.h>
+#include <openssl/ssl.h>
+#include <openssl/x509v3.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -215,6 +218,121 @@ static void a_foreign_certificate_with_our_authority_beside_it(void **state)
 	chmod(path, 0604);
 	assert_int_equal(tls_open(&t, mixed, &e), -EPERM);
 	assert_int_equal(tls_open(&t, at(root, "nowhere"), &e), -ENOENT);
+}
+
+static void add(X509 *cert, int nid, const char *value)
+{
+	X509_EXTENSION *x = X509V3_EXT_conf_nid(NULL, NULL, nid, value);
+	assert_non_null(x);
+	assert_int_equal(X509_add_ext(cert, x, -1), 1);
+	X509_EXTENSION_free(x);
+}
+
+static FILE *file(const char *folder, const char *name, const char *mode)
+{
+	FILE *f = fopen(at(folder, name), mode);
+	assert_non_null(f);
+	return f;
+}
+
+/* What hslt-ca never makes, signed by our authority nevertheless: good for both purposes, with any words in it. */
+static const char *forge(const char *name, const char *shown, const char *other_names)
+{
+	static char folder[256];
+	snprintf(folder, sizeof folder, "%s/%s", root, name);
+	assert_int_equal(mkdir(folder, 0700), 0);
+	copy(at(ours, "ca.pem"), at(folder, "ca.pem"));
+	FILE *f = file(ours, "ca.key", "r");
+	EVP_PKEY *signer = PEM_read_PrivateKey(f, NULL, NULL, NULL), *key = EVP_EC_gen("P-256");
+	fclose(f);
+	f = file(ours, "ca.pem", "r");
+	X509 *ca = PEM_read_X509(f, NULL, NULL, NULL), *cert = X509_new();
+	fclose(f);
+	assert_true(signer && key && ca && cert);
+	X509_set_version(cert, 2);
+	ASN1_INTEGER_set(X509_get_serialNumber(cert), 77);
+	X509_set_issuer_name(cert, X509_get_subject_name(ca));
+	X509_NAME_add_entry_by_txt(X509_get_subject_name(cert), "CN", MBSTRING_UTF8, (const unsigned char *)shown, -1, -1, 0);
+	X509_gmtime_adj(X509_getm_notBefore(cert), -60);
+	X509_gmtime_adj(X509_getm_notAfter(cert), 3600);
+	X509_set_pubkey(cert, key);
+	add(cert, NID_ext_key_usage, "serverAuth,clientAuth");
+	if (other_names)
+		add(cert, NID_subject_alt_name, other_names);
+	assert_true(X509_sign(cert, signer, EVP_sha256()) > 0);
+	f = file(folder, "cert.pem", "w");
+	PEM_write_X509(f, cert);
+	fclose(f);
+	f = file(folder, "key.pem", "w");
+	PEM_write_PrivateKey(f, key, NULL, NULL, 0, NULL, NULL);
+	fclose(f);
+	chmod(at(folder, "key.pem"), 0600);
+	X509_free(ca);
+	X509_free(cert);
+	EVP_PKEY_free(key);
+	EVP_PKEY_free(signer);
+	return folder;
+}
+
+/* A caller that has the worst of intentions: any certificate or none, any version, and it accepts whoever answers. */
+static void raw_caller(const char *folder, int version, const char *listener_says)
+{
+	SSL_CTX *context = SSL_CTX_new(TLS_client_method());
+	SSL_CTX_set_max_proto_version(context, version);
+	if (folder) {
+		assert_int_equal(SSL_CTX_use_certificate_file(context, at(folder, "cert.pem"), SSL_FILETYPE_PEM), 1);
+		assert_int_equal(SSL_CTX_use_PrivateKey_file(context, at(folder, "key.pem"), SSL_FILETYPE_PEM), 1);
+	}
+	SSL *ssl = SSL_new(context);
+	BIO *in = BIO_new(BIO_s_mem()), *out = BIO_new(BIO_s_mem());
+	BIO_set_mem_eof_return(in, -1);
+	SSL_set_bio(ssl, in, out);
+	SSL_set_connect_state(ssl);
+	open_end(&listener, at(ours, "farm"), true);
+	for (int turn = 0; turn < 6; turn++) {
+		char *bytes;
+		const unsigned char *answer;
+		char word;
+		SSL_read(ssl, &word, 1);
+		long size = BIO_get_mem_data(out, &bytes);
+		if (size > 0 && !listener.rc) {
+			listener.rc = tls_link_take(listener.link, bytes, (size_t)size, &listener.e);
+			read_all(&listener);
+		}
+		(void)BIO_reset(out);
+		size_t said = tls_link_output(listener.link, &answer);
+		BIO_write(in, answer, (int)said);
+		tls_link_output_taken(listener.link);
+	}
+	if (*listener_says) {
+		assert_false(tls_link_is_open(listener.link));
+		if (listener.rc >= 0 || !strstr(listener.e.text, listener_says))
+			fail_msg("the listener says %d '%s', not '%s'", listener.rc, listener.e.text, listener_says);
+	} else {
+		assert_true(tls_link_is_open(listener.link));
+	}
+	close_end(&listener);
+	SSL_free(ssl);
+	SSL_CTX_free(context);
+}
+
+static void certificates_need_one_role_and_a_name(void **state)
+{
+	(void)state;
+	raw_caller(at(ours, "node"), TLS1_3_VERSION, ""); /* the caller of this test can be let in */
+	raw_caller(NULL, TLS1_3_VERSION, "the peer has no certificate");
+	raw_caller(at(ours, "node"), TLS1_2_VERSION, "unsupported protocol");
+	raw_caller(forge("good", "good", "URI:hslt:role:client"), TLS1_3_VERSION, "");
+	raw_caller(forge("none", "none", NULL), TLS1_3_VERSION, "no role");
+	raw_caller(forge("two", "two", "URI:hslt:role:client,URI:hslt:role:worker"), TLS1_3_VERSION, "no role");
+	raw_caller(forge("like", "like", "URI:hslt:role:workers"), TLS1_3_VERSION, "no role");
+	raw_caller(forge("part", "part", "URI:hslt:role:work"), TLS1_3_VERSION, "no role");
+	raw_caller(forge("dns", "dns", "DNS:hslt:role:worker"), TLS1_3_VERSION, "no role");
+	raw_caller(forge("name", "../name", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
+	raw_caller(forge("line", "a\nb", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
+	/* Whose purpose would do, but who is no coordinator, cannot play one. */
+	refuses(at(ours, "node"), forge("false", "farm", "URI:hslt:role:worker"), "certificate of a worker, not of a coordinator",
+		"does not accept this certificate");
 }
 
 static void who_has_expired_is_not(void **state)
@@ -437,6 +555,7 @@ int main(void)
 		cmocka_unit_test(those_of_the_farm_are_let_in),
 		cmocka_unit_test(others_are_not),
 		cmocka_unit_test(a_foreign_certificate_with_our_authority_beside_it),
+		cmocka_unit_test(certificates_need_one_role_and_a_name),
 		cmocka_unit_test(who_is_revoked_is_not),
 		cmocka_unit_test(names_are_strict),
 		cmocka_unit_test(what_is_said_arrives),
