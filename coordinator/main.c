@@ -22,7 +22,10 @@ static const char doc[] =
 	"is taken as the status socket. HSLT_TLS stands in for --tls.\n"
 	"Exit codes: 0 stopped by SIGTERM or SIGINT, 1 failed, 2 usage.";
 
-enum { OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS, OPTION_TLS_CHECK };
+enum {
+	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS,
+	OPTION_TLS_CHECK, OPTION_JOURNAL
+};
 
 static const struct argp_option options[] = {
 	{"listen", 'l', "HOST:PORT", 0, "Where workers and clients connect (127.0.0.1:7700; port 0: any free one)", 0},
@@ -34,6 +37,7 @@ static const struct argp_option options[] = {
 	{"blobs", OPTION_BLOBS, "GB", 0, "Limit of scene files kept in the spool; the oldest that no job needs go (100)", 0},
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem, crl.pem: encrypt, and let in who has a certificate (hslt-ca)", 0},
 	{"tls-check", OPTION_TLS_CHECK, "SECONDS", 0, "How often certificates of live connections are checked again (60)", 0},
+	{"journal", OPTION_JOURNAL, "MB", 0, "Results of a running job that are kept before its films are written in their place (64)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Listen on other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log every lease, too", 0},
 	{0},
@@ -78,6 +82,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_TLS_CHECK:
 		c->tls_check_seconds = number(state, "--tls-check", arg, 0.1, 3600);
+		return 0;
+	case OPTION_JOURNAL:
+		c->journal_bytes = (uint64_t)(1e6 * number(state, "--journal", arg, 0.001, 1e6));
 		return 0;
 	case OPTION_INSECURE:
 		c->insecure = true;

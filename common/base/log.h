@@ -36,6 +36,7 @@
 	X(BLOB_STORED, "blob_stored", DEBUG) \
 	X(WORLD_BUILT, "world_built", INFO) \
 	X(WORLD_FAILED, "world_failed", ERROR) \
+	X(CHECKPOINT, "checkpoint", INFO) \
 	X(SPOOL_READ, "spool_read", INFO) \
 	X(SPOOL_FAULT, "spool_fault", ERROR)
 

@@ -227,7 +227,7 @@ static bool add_tile(const struct canvas *c, int64_t *slot, const struct tile *t
 }
 
 /* A page of a sparse file that the disk has no room for would be a signal, not an error: reserve before touching. */
-static int back_tile(struct canvas *c, size_t film, size_t tile, struct error *e)
+int canvas_back_tile(struct canvas *c, size_t film, size_t tile, struct error *e)
 {
 	uint8_t *flags = canvas_flags(c, film, tile);
 	if (!(*flags & TILE_BACKED) && c->fd >= 0) {
@@ -252,9 +252,9 @@ static int add_tiles(struct canvas *c, const struct batch *b, struct error *e)
 	for (uint32_t i = 0; i < b->tile_count && rc == 0; i++) {
 		size_t tile = tile_index(c, &b->tiles[i]);
 		assert(tile < canvas_tiles(c));
-		rc = back_tile(c, open, tile, e);
+		rc = canvas_back_tile(c, open, tile, e);
 		if (rc == 0)
-			rc = back_tile(c, prefix, tile, e);
+			rc = canvas_back_tile(c, prefix, tile, e);
 	}
 	if (rc)
 		return rc;

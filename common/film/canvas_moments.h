@@ -7,6 +7,7 @@
 #ifndef COMMON_FILM_CANVAS_MOMENTS_H
 #define COMMON_FILM_CANVAS_MOMENTS_H
 
+#include "common/base/sealed.h"
 #include "common/film/canvas.h"
 
 struct moments;
@@ -18,6 +19,9 @@ void moments_free(struct moments *m);
 int moments_fit(const struct moments *m, const struct lease_key *k, struct error *e);
 void moments_add(struct moments *m, const struct batch *b);
 void moments_close_round(struct moments *m, uint64_t round);
+
+int moments_save(const struct moments *m, struct sealed *out, struct error *e);
+int moments_load(struct moments *m, struct sealed *in, struct error *e); /* into new ones of the same plan */
 
 /* What moments_image needs of a group: independent samples of its bootstrap, mutations that are merged, b. */
 struct moments_group {

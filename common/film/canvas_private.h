@@ -51,6 +51,9 @@ struct making {
 /* Fills error and the relMSE of an image whose rgb is there; two or more groups, no open rounds. -ENOMEM */
 int canvas_error(struct making *m, struct error *e);
 
+/* Reserves its place on the disk, before it is touched. */
+int canvas_back_tile(struct canvas *c, size_t film, size_t tile, struct error *e);
+
 void canvas_add_counts(struct canvas_counts *to, const struct canvas_counts *from);
 
 static inline size_t canvas_tiles(const struct canvas *c)

@@ -30,7 +30,7 @@ static void submitted(struct server *s, const struct action *a)
 	p->answered_job = a->job;
 	int rc = spool_take_job(s->spool, a->job, &e);
 	if (!rc)
-		rc = order_new(&o, a->job, &p->upload->submit, &p->upload->plan, p->who.name, NULL, s->spool, &e);
+		rc = order_new(&o, a->job, &p->upload->submit, &p->upload->plan, p->who.name, 0, s->spool, &e);
 	if (!rc && (rc = durable_begin(s, o, &e))) {
 		p->upload->submit = o->submit;
 		memset(&o->submit, 0, sizeof o->submit);
@@ -112,8 +112,10 @@ static void merge(struct server *s, const struct action *a)
 	assert(o && s->batch && !o->busy);
 	if (s->config.keep_partials)
 		keep_partials(s, &a->key);
+	uint64_t rounds = order_rounds(o);
 	if (durable_merged(s, o, &e) || order_merge(o, s->batch, &e))
 		server_job_broken(s, a->job, e.text);
+	order_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
 		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
 }

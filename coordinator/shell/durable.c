@@ -9,6 +9,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 static const double try_again_seconds = 2;
 
@@ -45,11 +46,10 @@ static int pack_plan(const struct order *o, unsigned char **frame, size_t *size,
 
 int durable_begin(struct server *s, struct order *o, struct error *e)
 {
-	char folder[SPOOL_PATH_MAX], owner[32];
+	char folder[SPOOL_PATH_MAX];
 	unsigned char *submission = NULL, *plan = NULL;
-	struct ledger_job j = {.id = o->id, .owner = owner, .name = o->record.name, .version = HSLT_VERSION,
+	struct ledger_job j = {.id = o->id, .owner = o->record.owner, .name = o->record.name, .version = HSLT_VERSION,
 			       .priority = o->record.priority, .mixed = order_submit(o)->mixed, .submitted = o->record.submitted};
-	snprintf(owner, sizeof owner, "%llu", (unsigned long long)s->submitter->id);
 	spool_job_path(s->spool, o->id, NULL, folder);
 	int rc = journal_create(&o->journal, folder, o->id, 0, e);
 	if (!rc)
@@ -74,6 +74,8 @@ void durable_end(struct server *s, const struct order *o)
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)o->id, log_quote(e.text).text);
 	spool_job_path(s->spool, o->id, NULL, folder);
 	journal_clear(folder, UINT64_MAX);
+	spool_job_path(s->spool, o->id, "checkpoint", folder);
+	unlink(folder);
 }
 
 /* ---- batches ---- */

@@ -4,6 +4,7 @@
 #include "common/base/text.h"
 
 #include <assert.h>
+#include <math.h>
 #include <stdarg.h>
 #include <string.h>
 #include <time.h>
@@ -23,17 +24,12 @@ static json_t *effects_to_json(const Farm__Submit *m)
 	return list;
 }
 
-static void begin_record(struct order *o, const struct job_record *earlier)
+static void begin_record(struct order *o, const char *owner, double submitted)
 {
 	const Farm__Submit *m = order_submit(o);
 	struct job_record *r = &o->record;
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
-	if (earlier) {
-		*r = *earlier;
-		r->cpu_seconds = r->bootstrap_cpu_seconds = 0; /* counted again with the batches */
-		return;
-	}
 	r->id = o->id;
 	text_copy(r->name, sizeof r->name, m->name);
 	text_copy(r->integrator, sizeof r->integrator, o->plan.integrator);
@@ -45,11 +41,12 @@ static void begin_record(struct order *o, const struct job_record *earlier)
 	record_begin_agreement(r);
 	record_take_effects(r, effects_to_json(m));
 	r->target_error = o->plan.target_error;
-	r->submitted = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+	r->submitted = submitted > 0 ? submitted : (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+	text_copy(r->owner, sizeof r->owner, owner);
 }
 
 int order_new(struct order **out, uint64_t id, struct envelope *submit, const struct plan *plan, const char *owner,
-	      const struct job_record *earlier, struct spool *s, struct error *e)
+	      double submitted, struct spool *s, struct error *e)
 {
 	struct order *o = mem_alloc(1, sizeof *o);
 	if (!o)
@@ -59,8 +56,8 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 	o->submit = *submit;
 	memset(submit, 0, sizeof *submit);
 	o->waiting_last = &o->waiting;
-	begin_record(o, earlier);
-	text_copy(o->record.owner, sizeof o->record.owner, owner);
+	o->times = (struct order_times){NAN, NAN, NAN};
+	begin_record(o, owner, submitted);
 	o->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->states);
 	if (plan->kind == PLAN_CHAINS) {
 		o->chains_per_lease = plan->chains / (plan->groups * plan->parts);
@@ -71,7 +68,7 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	if (!rc)
 		rc = bootstrap_new(&o->bootstrap, plan, e);
-	if (!rc && !earlier)
+	if (!rc && !(submitted > 0)) /* else it is there; a full disk must not keep the job from being known */
 		rc = spool_write_record(s, &o->record, e);
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(s, id, "log", path);
@@ -144,6 +141,22 @@ int order_merge(struct order *o, struct batch *b, struct error *e)
 		b->state_count = 0;
 	}
 	return rc;
+}
+
+uint64_t order_rounds(const struct order *o)
+{
+	return o->canvas ? canvas_rounds(o->canvas) : 0;
+}
+
+void order_note_times(struct order *o, double elapsed, uint64_t rounds)
+{
+	if (!isfinite(elapsed))
+		return;
+	o->times.elapsed = elapsed;
+	if (!o->canvas)
+		o->times.opened = elapsed; /* the last batch of the bootstrap stays */
+	if (order_rounds(o) > rounds)
+		o->times.completed = elapsed;
 }
 
 int order_prepare(struct order *o, const char *canvas_folder, struct error *e)

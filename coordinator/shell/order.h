@@ -25,6 +25,12 @@ struct waiting_batch {
 	size_t payload_size;
 };
 
+/* Seconds after the job's first lease, in this life and those before: at the last merged batch, when the first round opened, when the
+ * last round was complete. NAN: not yet. */
+struct order_times {
+	double elapsed, opened, completed;
+};
+
 struct order {
 	struct order *next;
 	uint64_t id;
@@ -40,6 +46,10 @@ struct order {
 	FILE *log;
 	struct journal *journal; /* NULL: it cannot be written any more */
 	bool pinned;             /* the journal knows whose it is */
+	struct order_times times;
+	char fingerprint[256];           /* of an earlier life */
+	uint64_t checkpoint_bytes;       /* of the last one */
+	double checkpoint_after;         /* s on the loop's clock: not before */
 	double look_written;     /* work of the last look in the journal */
 	bool held;               /* the disk has no room for a result of so many bytes: */
 	size_t held_bytes;
@@ -53,10 +63,10 @@ struct order {
 	struct waiting_batch *waiting, **waiting_last;
 };
 
-/* Takes the submission. The job's folder is there; owner as in the record; earlier: its record, of an earlier life, or NULL: it
- * gets one. */
+/* Takes the submission, writes a record if it is new. The job's folder is there; owner as in the record; submitted: s since 1970, of a job of an
+ * earlier life; 0: now. */
 int order_new(struct order **o, uint64_t id, struct envelope *submit, const struct plan *plan, const char *owner,
-	      const struct job_record *earlier, struct spool *s, struct error *e);
+	      double submitted, struct spool *s, struct error *e);
 /* Frees the memory; blobs and files stay. Not while busy. */
 void order_free(struct order *o);
 
@@ -65,6 +75,9 @@ __attribute__((format(printf, 3, 4))) void order_log(struct order *o, enum log_e
 
 /* A batch that the core has accepted. Takes its states out of it. */
 int order_merge(struct order *o, struct batch *b, struct error *e);
+/* So many seconds after the first lease the batch was merged, and what comes of it done. rounds: complete before. */
+void order_note_times(struct order *o, double elapsed, uint64_t rounds);
+uint64_t order_rounds(const struct order *o); /* complete */
 /* All bootstrap batches are in: b, seeds, canvas. */
 int order_prepare(struct order *o, const char *canvas_folder, struct error *e);
 /* The lease as a frame for a worker. */

@@ -3,20 +3,18 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/wire/frame.h"
+#include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/dispatch.h"
 
-#include <math.h>
 #include <string.h>
 #include <time.h>
 
-/* What a journal says, besides what goes into its order. */
+/* A journal on its way into an order. */
 struct replay {
 	struct order *order;
 	const char *canvas_folder;
-	double elapsed, opened, completed;
-	uint64_t batches, rounds;
-	struct forecast_history looks;
-	char fingerprint[256];
+	double elapsed;
+	uint64_t batches;
 };
 
 /* ---- frames */
@@ -51,15 +49,11 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 	struct order *o = r->order;
 	if ((b->key.kind == LEASE_BOOTSTRAP) != (o->bootstrap != NULL))
 		return error_set(e, EBADMSG, "a batch that is not of its time");
+	uint64_t rounds = order_rounds(o);
 	int rc = order_merge(o, b, e);
-	if (!rc && o->bootstrap && bootstrap_missing(o->bootstrap) == 0) {
-		r->opened = r->elapsed;
+	order_note_times(o, r->elapsed, rounds);
+	if (!rc && o->bootstrap && bootstrap_missing(o->bootstrap) == 0)
 		rc = order_prepare(o, r->canvas_folder, e);
-	}
-	if (!rc && o->canvas && canvas_rounds(o->canvas) > r->rounds) {
-		r->rounds = canvas_rounds(o->canvas);
-		r->completed = r->elapsed;
-	}
 	r->batches++;
 	return rc;
 }
@@ -84,24 +78,24 @@ static int take_batch(struct replay *r, const unsigned char *body, size_t size, 
 static int take_record(void *user, enum journal_kind kind, double elapsed, const unsigned char *body, size_t size, struct error *e)
 {
 	struct replay *r = user;
+	struct order *o = r->order;
 	struct forecast_look look;
-	if (isfinite(elapsed))
-		r->elapsed = elapsed;
+	r->elapsed = elapsed;
 	switch (kind) {
 	case JOURNAL_BATCH:
 		return take_batch(r, body, size, e);
 	case JOURNAL_PINNED:
-		if (size >= sizeof r->fingerprint)
+		if (size >= sizeof o->fingerprint)
 			return error_set(e, EBADMSG, "a fingerprint of %zu bytes", size);
-		memcpy(r->fingerprint, body, size);
-		r->fingerprint[size] = 0;
+		memcpy(o->fingerprint, body, size);
+		o->fingerprint[size] = 0;
 		return 0;
 	case JOURNAL_LOOK:
 		if (size != sizeof look)
 			return error_set(e, EBADMSG, "a look of %zu bytes", size);
 		memcpy(&look, body, size);
-		forecast_add_look(&r->looks, &look);
-		r->order->look_written = look.work;
+		forecast_add_look(&o->record.looks, &look);
+		o->look_written = look.work;
 		return 0;
 	default:
 		return error_set(e, EBADMSG, "a record of kind %d", (int)kind);
@@ -112,17 +106,21 @@ static int read_journal(struct server *s, struct replay *r, struct error *e)
 {
 	struct order *o = r->order;
 	char folder[SPOOL_PATH_MAX];
-	uint64_t cut = 0;
+	uint64_t cut = 0, generation = 0;
 	spool_job_path(s->spool, o->id, NULL, folder);
-	int rc = journal_open(&o->journal, folder, o->id, 0, take_record, r, &cut, e);
+	int rc = checkpoint_load(s, o, &generation, e);
+	if (rc && rc != -ENOENT)
+		return rc;
+	journal_clear(folder, generation);
+	rc = journal_open(&o->journal, folder, o->id, generation, take_record, r, &cut, e);
 	if (rc == -ENOENT) /* its batches can be made again */
-		rc = journal_create(&o->journal, folder, o->id, 0, e);
+		rc = journal_create(&o->journal, folder, o->id, generation, e);
 	if (rc)
 		return rc;
-	o->pinned = *r->fingerprint != 0;
-	order_log(o, LOG_JOB_STATE, "state=restored batches=%llu rounds=%llu elapsed=%.3f bytes=%llu cut=%llu",
-		  (unsigned long long)r->batches, (unsigned long long)r->rounds, r->elapsed,
-		  (unsigned long long)journal_bytes(o->journal), (unsigned long long)cut);
+	o->pinned = *o->fingerprint != 0;
+	order_log(o, LOG_JOB_STATE, "state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu",
+		  (unsigned long long)r->batches, (unsigned long long)order_rounds(o), o->times.elapsed,
+		  (unsigned long long)o->checkpoint_bytes, (unsigned long long)journal_bytes(o->journal), (unsigned long long)cut);
 	return 0;
 }
 
@@ -151,14 +149,14 @@ static int tell_core(struct server *s, const struct replay *r, struct error *e)
 			   .restore = {.job = o->id,
 				       .submit = {.plan = &o->plan, .name = o->record.name, .priority = o->record.priority,
 						  .mixed = order_submit(o)->mixed},
-				       .fingerprint = r->fingerprint,
+				       .fingerprint = o->fingerprint,
 				       .kind = o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
 				       .next = next,
 				       .black = o->lit.black,
-				       .elapsed = r->elapsed,
-				       .opened = r->opened,
-				       .completed = r->completed,
-				       .looks = &r->looks}};
+				       .elapsed = o->times.elapsed,
+				       .opened = o->times.opened,
+				       .completed = o->times.completed,
+				       .looks = &o->record.looks}};
 	server_step(s, &ev);
 	mem_free(next);
 	return 0;
@@ -176,7 +174,7 @@ static int hold_blobs(struct server *s, const Farm__Submit *m, struct error *e)
 	return 0;
 }
 
-static int make_order(struct server *s, const struct ledger_job *j, const struct job_record *record, struct order **o, struct error *e)
+static int make_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e)
 {
 	struct envelope submit, info;
 	struct plan plan;
@@ -194,19 +192,18 @@ static int make_order(struct server *s, const struct ledger_job *j, const struct
 		return rc;
 	rc = hold_blobs(s, submit.message->submit, e);
 	if (!rc)
-		rc = order_new(o, j->id, &submit, &plan, record->owner, record, s->spool, e);
+		rc = order_new(o, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e);
 	envelope_fini(&submit);
 	return rc;
 }
 
-static int restore_one(struct server *s, const struct ledger_job *j, const struct job_record *record, struct error *e)
+static int restore_one(struct server *s, const struct ledger_job *j, struct error *e)
 {
 	struct replay *r = mem_alloc(1, sizeof *r);
 	if (!r)
 		return error_set(e, ENOMEM, "no memory for a job");
-	r->elapsed = r->opened = r->completed = NAN;
 	r->canvas_folder = spool_canvas(s->spool);
-	int rc = make_order(s, j, record, &r->order, e);
+	int rc = make_order(s, j, &r->order, e);
 	if (!rc)
 		rc = read_journal(s, r, e);
 	if (!rc) {
@@ -286,14 +283,13 @@ int restore_jobs(struct server *s, struct error *e)
 		return error_set(e, ENOMEM, "no memory for the jobs");
 	while ((rc = ledger_next(s->ledger, id, &j, e)) > 0) {
 		id = j.id;
-		bool known = spool_read_record(s->spool, id, r, NULL) == 0;
-		rc = restore_one(s, &j, known ? r : NULL, e);
+		rc = restore_one(s, &j, e);
 		if (rc && !is_lasting(rc)) {
 			rc = error_prefix(e, rc, "j%llu", (unsigned long long)id);
 			break;
 		}
 		if (rc) {
-			if (!known)
+			if (spool_read_record(s->spool, id, r, NULL))
 				*r = (struct job_record){.id = id, .rel_error = -1};
 			give_up(s, r, e->text);
 		}

@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/net/notify.h"
+#include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/restore.h"
@@ -23,7 +24,7 @@ enum { BACKLOG = 128, TICK_MS = 200 };
 void server_config_init(struct server_config *c)
 {
 	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .max_connections = 1024,
-				    .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
+				    .journal_bytes = 64 << 20, .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
 }
 
 double server_now(const struct server *s)
@@ -90,6 +91,7 @@ void server_step(struct server *s, struct event *ev)
 	}
 	s->stepping = false;
 	dispatch_finish_orders(s);
+	checkpoint_where_due(s);
 }
 
 static void on_wake(uv_timer_t *t)

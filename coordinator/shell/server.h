@@ -21,6 +21,7 @@ struct server_config {
 	double tls_check_seconds;  /* how often certificates of live connections are checked again */
 	bool insecure;
 	uint64_t blob_bytes; /* the spool's limit of scene files; 0: none */
+	uint64_t journal_bytes; /* a job's journal that is longer is cut by a checkpoint */
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
 	unsigned max_connections;
 	double hello_seconds, stall_seconds; /* how long a peer may take to say hello, to finish a frame */

@@ -288,6 +288,11 @@ int spool_write(const struct spool *s, uint64_t id, const char *file, const void
 	return write_file(path, file, bytes, size, e);
 }
 
+int spool_rename(const char *from, const char *to, const char *folder, struct error *e)
+{
+	return rename(from, to) ? error_set(e, errno, "%s: %s", to, strerror(errno)) : sync_folder(folder, e);
+}
+
 int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e)
 {
 	char *text = record_to_json(r);

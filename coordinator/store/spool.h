@@ -27,6 +27,8 @@ void spool_path(const struct spool *s, const char *name, char path[SPOOL_PATH_MA
 void spool_job_path(const struct spool *s, uint64_t id, const char *file, char path[SPOOL_PATH_MAX]);
 
 int spool_write(const struct spool *s, uint64_t id, const char *file, const void *bytes, size_t size, struct error *e);
+/* path gets the name, in this folder, for good. Any thread. */
+int spool_rename(const char *from, const char *to, const char *folder, struct error *e);
 int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e);
 /* -ENOENT: there is no such job. */
 int spool_read_record(const struct spool *s, uint64_t id, struct job_record *r, struct error *e);

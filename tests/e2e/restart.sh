@@ -5,9 +5,10 @@
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
 
 SEED=${SEED:-7}
-KILLS=${KILLS:-7}
-CHAINS="--integrator hslt --bootstrap 200000 --mutations 6000000"
+KILLS=${KILLS:-9}
+CHAINS="--integrator hslt --bootstrap 100000 --mutations 6000000"
 SAMPLES="--integrator path --spp 600"
+JOURNAL=0.5 # MB: some kills meet a checkpoint, some a journal without one
 echo "seed $SEED"
 
 moment() {
@@ -18,8 +19,17 @@ moment() {
 again() {
 	kill -9 $COORDINATOR_PID
 	wait $COORDINATOR_PID 2>/dev/null || :
-	LISTEN=$COORDINATOR start_coordinator -v
+	LISTEN=$COORDINATOR start_coordinator -v --journal $JOURNAL
 	killed=$((killed + 1))
+}
+
+# until a checkpoint is being written, or no more than a moment
+writing() {
+	tries=20000
+	while [ $tries -gt 0 ] && ! [ -e "$DIR/spool/jobs/$a/checkpoint.tmp" ] && ! [ -e "$DIR/spool/jobs/$b/checkpoint.tmp" ]; do
+		tries=$((tries - 1))
+	done
+	[ $tries -eq 0 ] || caught=$((caught + 1))
 }
 
 is_merging() {
@@ -43,6 +53,7 @@ quiet=$(merged j1)
 [ "$(acknowledged j1)" -eq "$quiet" ] || fail "$(acknowledged j1) of $quiet were acknowledged"
 
 killed=0
+caught=0
 a=$(submit "$BOX" -o "$DIR/chains.exr" $CHAINS)
 b=$(submit "$BOX" -o "$DIR/samples.exr" $SAMPLES)
 again # before anything is merged, or in the bootstrap
@@ -51,7 +62,10 @@ again
 while [ $killed -lt "$KILLS" ]; do
 	seen=$(wc -l <"$DIR/coordinator.log")
 	until_true 20 is_merging $((killed % 3 * 10 + 1)) || fail "nothing is merged after $killed kills"
-	[ $((killed % 2)) -eq 0 ] || sleep "$(moment 0.05 0.5)" # else: just after a merge
+	case $((killed % 3)) in # 1: just after a merge
+	0) sleep "$(moment 0.05 1.2)" ;;
+	2) [ $killed -lt 4 ] || writing ;;
+	esac
 	is_state "$a" done && is_state "$b" done && fail "both jobs were done after $killed kills"
 	again
 	for j in $a $b; do
@@ -65,8 +79,8 @@ until_true 60 is_state "$b" done || fail "$b is $(value "$b" state)"
 same "$DIR/chains-quiet.exr" "$DIR/chains.exr"
 same "$DIR/samples-quiet.exr" "$DIR/samples.exr"
 [ "$(merged "$a")" = "$quiet" ] || fail "$(merged "$a") leases were merged, and $quiet without kills"
-"$BIN/hslt-job" log "$a" | grep -q state=restored || fail "$a never went on"
+"$BIN/hslt-job" log "$a" | grep -q 'state=restored .*checkpoint=[1-9]' || fail "$a never went on from a checkpoint"
 [ "$(find "$DIR/spool/jobs" -name 'journal.*' -o -name checkpoint | wc -l)" -eq 0 ] || fail "journals of ended jobs are left"
 new=$(submit "$BOX" -o "$DIR/new.exr" --integrator path --spp 1)
 [ "$new" = j5 ] || fail "the next job is $new, not j5"
-echo "$killed kills, $quiet leases, none lost, none twice, bits equal"
+echo "$killed kills ($caught while a checkpoint was written), $quiet leases, none lost, none twice, bits equal"

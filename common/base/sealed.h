@@ -1,0 +1,32 @@
+/*
+ * A file that is believed as a whole or not at all: bytes, and the CRC-32C of them behind. Written to its end and flushed before
+ * it gets its name; read through once and checked before anything in it is used. Any thread, one at a time for a file. Numbers are
+ * in the byte order of the machine.
+ */
+#ifndef COMMON_BASE_SEALED_H
+#define COMMON_BASE_SEALED_H
+
+#include "common/base/error.h"
+
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+
+struct sealed {
+	FILE *file;
+	uint32_t crc;
+	uint64_t left, bytes; /* reading: until the CRC; writing: so far */
+	const char *path;     /* the caller's */
+};
+
+int sealed_create(struct sealed *s, const char *path, struct error *e);
+int sealed_write(struct sealed *s, const void *bytes, size_t size, struct error *e);
+/* Writes the CRC, flushes the file to the disk, closes it. */
+int sealed_finish(struct sealed *s, struct error *e);
+
+/* -EBADMSG: the CRC does not fit; -ENOENT. */
+int sealed_open(struct sealed *s, const char *path, struct error *e);
+int sealed_read(struct sealed *s, void *bytes, size_t size, struct error *e); /* -EBADMSG: there is not so much */
+void sealed_close(struct sealed *s); /* at any time; what was being written has no seal then */
+
+#endif

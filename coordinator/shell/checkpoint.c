@@ -1,0 +1,253 @@
+#include "coordinator/shell/checkpoint.h"
+
+#include "common/base/mem.h"
+#include "common/film/canvas_save.h"
+#include "coordinator/shell/session.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static const double pause_seconds = 30; /* after one that could not be written */
+
+/* Versioned by its own size, too: what it holds is as it lies in memory. */
+struct head {
+	char magic[8];
+	uint32_t bytes, worker_count;
+	uint64_t job, generation;
+	double cpu_seconds, bootstrap_cpu_seconds, look_written;
+	struct order_times times;
+	struct bootstrap_result lit;
+	struct forecast_history looks;
+	char fingerprint[256];
+};
+
+static const char magic[8] = "hsltC001";
+
+struct writing {
+	uv_work_t work;
+	struct server *server;
+	struct order *order;
+	struct journal *journal; /* the one that follows */
+	struct head head;
+	uint64_t bytes;
+	char folder[SPOOL_PATH_MAX];
+	int rc;
+	struct error error;
+};
+
+static uint32_t slots_of(const struct order *o)
+{
+	return o->plan.groups * o->plan.parts;
+}
+
+/* ---- writing */
+
+static int write_states(const struct order *o, struct sealed *out, struct error *e)
+{
+	int rc = 0;
+	for (uint32_t i = 0; i < slots_of(o) && !rc; i++) {
+		uint32_t there = o->states[i] != NULL;
+		rc = sealed_write(out, &there, sizeof there, e);
+		for (uint32_t k = 0; there && k < o->chains_per_lease && !rc; k++) {
+			rc = sealed_write(out, &o->states[i][k].size, sizeof o->states[i][k].size, e);
+			if (!rc)
+				rc = sealed_write(out, o->states[i][k].bytes, o->states[i][k].size, e);
+		}
+	}
+	return rc;
+}
+
+static int write_all(struct writing *w, struct sealed *out, struct error *e)
+{
+	const struct order *o = w->order;
+	int rc = sealed_write(out, &w->head, sizeof w->head, e);
+	if (!rc && o->seeds)
+		rc = sealed_write(out, o->seeds, o->plan.chains * sizeof *o->seeds, e);
+	if (!rc)
+		rc = write_states(o, out, e);
+	return rc ? rc : canvas_save(o->canvas, out, e);
+}
+
+static void run(uv_work_t *work)
+{
+	struct writing *w = work->data;
+	struct sealed out = {0};
+	char name[SPOOL_PATH_MAX + 16], temporary[SPOOL_PATH_MAX + 16];
+	snprintf(name, sizeof name, "%s/checkpoint", w->folder);
+	snprintf(temporary, sizeof temporary, "%s/checkpoint.tmp", w->folder);
+	w->rc = journal_create(&w->journal, w->folder, w->head.job, w->head.generation, &w->error);
+	if (!w->rc)
+		w->rc = sealed_create(&out, temporary, &w->error);
+	if (!w->rc)
+		w->rc = write_all(w, &out, &w->error);
+	if (!w->rc)
+		w->rc = sealed_finish(&out, &w->error);
+	sealed_close(&out);
+	w->bytes = out.bytes;
+	if (!w->rc)
+		w->rc = spool_rename(temporary, name, w->folder, &w->error);
+	if (w->rc) {
+		unlink(temporary);
+		journal_release(w->journal);
+		w->journal = NULL;
+	}
+}
+
+static void done(uv_work_t *work, int status)
+{
+	struct writing *w = work->data;
+	struct server *s = w->server;
+	struct order *o = w->order;
+	uint64_t id = o->id;
+	assert(status == 0);
+	(void)status;
+	if (w->rc) { /* the old ones go on */
+		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+		o->checkpoint_after = server_now(s) + pause_seconds;
+		journal_clear(w->folder, journal_generation(o->journal));
+	} else {
+		log_event(LOG_CHECKPOINT, "job=j%llu rounds=%llu bytes=%llu journal=%llu", (unsigned long long)id,
+			  (unsigned long long)canvas_rounds(o->canvas), (unsigned long long)w->bytes,
+			  (unsigned long long)journal_bytes(o->journal));
+		journal_release(o->journal); /* what waits for its flush holds it, too */
+		o->journal = w->journal;
+		o->checkpoint_bytes = w->bytes;
+		journal_clear(w->folder, w->head.generation);
+	}
+	o->busy = false;
+	if (!s->stopping) {
+		server_order_free_again(s, o);
+		session_previews(s, id);
+	}
+	mem_free(w);
+}
+
+static void start(struct server *s, struct order *o)
+{
+	struct job_status status;
+	struct writing *w = mem_alloc(1, sizeof *w);
+	if (!w || !farm_job(s->farm, o->id, server_now(s), &status)) {
+		mem_free(w);
+		o->checkpoint_after = server_now(s) + pause_seconds;
+		return;
+	}
+	w->server = s;
+	w->order = o;
+	w->work.data = w;
+	spool_job_path(s->spool, o->id, NULL, w->folder);
+	w->head = (struct head){.bytes = sizeof w->head,
+				.worker_count = o->worker_count,
+				.job = o->id,
+				.generation = journal_generation(o->journal) + 1,
+				.cpu_seconds = o->cpu_seconds,
+				.bootstrap_cpu_seconds = o->record.bootstrap_cpu_seconds,
+				.look_written = o->look_written,
+				.times = o->times,
+				.lit = o->lit,
+				.looks = *status.looks};
+	memcpy(w->head.magic, magic, sizeof magic);
+	snprintf(w->head.fingerprint, sizeof w->head.fingerprint, "%s", status.fingerprint);
+	o->busy = true;
+	int rc = uv_queue_work(&s->loop, &w->work, run, done);
+	assert(rc == 0);
+	(void)rc;
+}
+
+void checkpoint_where_due(struct server *s)
+{
+	if (s->stepping || s->stopping)
+		return;
+	for (struct order *o = s->orders; o; o = o->next) {
+		if (!o->journal || !o->canvas || o->busy || o->ended)
+			continue;
+		uint64_t limit = o->checkpoint_bytes > s->config.journal_bytes ? o->checkpoint_bytes : s->config.journal_bytes;
+		if (journal_bytes(o->journal) > limit && server_now(s) >= o->checkpoint_after)
+			start(s, o);
+	}
+}
+
+/* ---- reading */
+
+static int read_states(struct order *o, struct sealed *in, struct error *e)
+{
+	int rc = 0;
+	for (uint32_t i = 0; i < slots_of(o) && !rc; i++) {
+		uint32_t there;
+		rc = sealed_read(in, &there, sizeof there, e);
+		if (rc || !there)
+			continue;
+		o->states[i] = mem_alloc(o->chains_per_lease, sizeof *o->states[i]);
+		if (!o->states[i])
+			return error_set(e, ENOMEM, "no memory for chains");
+		for (uint32_t k = 0; k < o->chains_per_lease && !rc; k++) {
+			struct chain_state *c = &o->states[i][k];
+			uint32_t size;
+			rc = sealed_read(in, &size, sizeof size, e);
+			if (!rc && (size == 0 || size > CHAIN_STATE_MAX))
+				rc = error_set(e, EBADMSG, "the state of a chain has %u bytes", size);
+			if (!rc && !(c->bytes = mem_alloc(size, 1)))
+				rc = error_set(e, ENOMEM, "no memory for chains");
+			if (!rc) {
+				c->size = size;
+				rc = sealed_read(in, c->bytes, size, e);
+			}
+		}
+	}
+	return rc;
+}
+
+static void take_head(struct order *o, const struct head *h)
+{
+	o->worker_count = h->worker_count;
+	o->cpu_seconds = o->record.cpu_seconds = h->cpu_seconds;
+	o->record.bootstrap_cpu_seconds = h->bootstrap_cpu_seconds;
+	o->look_written = h->look_written;
+	o->times = h->times;
+	o->lit = h->lit;
+	o->record.looks = h->looks;
+	snprintf(o->fingerprint, sizeof o->fingerprint, "%s", h->fingerprint);
+}
+
+static int read_all(struct server *s, struct order *o, struct sealed *in, uint64_t *generation, struct error *e)
+{
+	struct head h;
+	int rc = sealed_read(in, &h, sizeof h, e);
+	if (!rc && (memcmp(h.magic, magic, sizeof magic) != 0 || h.bytes != sizeof h || h.job != o->id))
+		rc = error_set(e, EBADMSG, "%s: of another job, or of another version", in->path);
+	if (rc)
+		return rc;
+	h.fingerprint[sizeof h.fingerprint - 1] = 0;
+	take_head(o, &h);
+	*generation = h.generation;
+	int exponent = canvas_grid_exponent(&o->plan, o->lit.b_pooled, order_submit(o)->brightest);
+	rc = canvas_new(&o->canvas, &o->plan, exponent, spool_canvas(s->spool), e);
+	if (!rc && o->seeds)
+		rc = sealed_read(in, o->seeds, o->plan.chains * sizeof *o->seeds, e);
+	if (!rc)
+		rc = read_states(o, in, e);
+	if (!rc)
+		rc = canvas_load(o->canvas, in, e);
+	bootstrap_free(o->bootstrap);
+	o->bootstrap = NULL;
+	o->checkpoint_bytes = in->bytes;
+	return rc;
+}
+
+int checkpoint_load(struct server *s, struct order *o, uint64_t *generation, struct error *e)
+{
+	char name[SPOOL_PATH_MAX];
+	struct sealed in;
+	spool_job_path(s->spool, o->id, "checkpoint.tmp", name);
+	unlink(name); /* of a life that ended before it was whole */
+	spool_job_path(s->spool, o->id, "checkpoint", name);
+	int rc = sealed_open(&in, name, e);
+	if (rc)
+		return rc;
+	in.bytes = in.left;
+	rc = read_all(s, o, &in, generation, e);
+	sealed_close(&in);
+	return rc;
+}

@@ -1,0 +1,20 @@
+/*
+ * A job's checkpoint (jobs/jN/checkpoint): films, seeds, chain states and the rest of an order, so that its journal can begin anew.
+ * Written when the journal is longer than the limit and than the last checkpoint, so that disk and bytes written stay within a small
+ * multiple of the films. Order of steps: an empty journal G + 1; the checkpoint under a temporary name, which says that G + 1 follows
+ * it; its rename; only then does journal G go. Wherever the machine stops, one checkpoint and its journal are whole.
+ * Writing runs in the pool while the order is busy; the rest on the loop's thread.
+ */
+#ifndef COORDINATOR_SHELL_CHECKPOINT_H
+#define COORDINATOR_SHELL_CHECKPOINT_H
+
+#include "coordinator/shell/server.h"
+
+/* Starts one for each order whose journal is long enough. Not while an update is carried out. */
+void checkpoint_where_due(struct server *s);
+
+/* Into a new order without merged batches. -ENOENT: there is none; -EBADMSG: it is damaged or of another version, and the order is of
+ * no use. generation: of the journal that follows. */
+int checkpoint_load(struct server *s, struct order *o, uint64_t *generation, struct error *e);
+
+#endif

@@ -1,0 +1,262 @@
+/* A canvas that was saved and loaded goes on with the same bits, wherever between two batches it was saved. */
+#include "common/film/canvas_save.h"
+
+#include "common/base/mem.h"
+#include "tests/support/folder.h"
+
+#include <math.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { WIDTH = 150, HEIGHT = 70, GROUPS = 4, PARTS = 3, ROUNDS = 5, EXPONENT = -20 };
+
+static uint64_t state;
+
+static uint64_t next(void)
+{
+	state ^= state << 13;
+	state ^= state >> 7;
+	return state ^= state << 17;
+}
+
+static double uniform(void)
+{
+	return (double)(next() >> 11) * 0x1p-53;
+}
+
+static struct plan make_plan(enum plan_kind kind)
+{
+	struct plan p = {.integrator = "path", .kind = kind, .width = WIDTH, .height = HEIGHT, .crop_width = WIDTH, .crop_height = HEIGHT,
+			 .groups = GROUPS, .parts = PARTS, .epoch = 4, .rounds = UINT64_MAX, .seconds = 1, .max_depth = 8};
+	p.bootstrap = GROUPS * PARTS * 8;
+	if (kind == PLAN_CHAINS)
+		p.chains = GROUPS * PARTS * 2;
+	return p;
+}
+
+/* Every field that a canvas looks at; some tiles, and no more than the film has. */
+static struct batch make_batch(const struct plan *p, enum lease_kind kind, uint64_t epoch, uint32_t group, uint32_t part)
+{
+	struct batch b = {.key = {1, kind, group, part, epoch}};
+	uint32_t across = (WIDTH + TILE_SIZE - 1) / TILE_SIZE, down = (HEIGHT + TILE_SIZE - 1) / TILE_SIZE;
+	state = 1000003u * (uint64_t)(1 + part + PARTS * (group + GROUPS * (epoch + 100 * (uint64_t)kind)));
+	b.tiles = mem_alloc((size_t)across * down, sizeof *b.tiles);
+	for (uint32_t i = 0; kind == LEASE_RENDER && i < across * down; i++) {
+		uint32_t x = i % across * TILE_SIZE, y = i / across * TILE_SIZE;
+		uint32_t w = WIDTH - x < TILE_SIZE ? WIDTH - x : TILE_SIZE, h = HEIGHT - y < TILE_SIZE ? HEIGHT - y : TILE_SIZE;
+		if (next() % 3 == 0 || i == 4) /* the fifth tile is never touched */
+			continue;
+		struct tile *t = &b.tiles[b.tile_count++];
+		*t = (struct tile){x, y, w, h, mem_alloc((size_t)w * h * 3, sizeof(float))};
+		for (size_t k = 0; k < (size_t)w * h * 3; k++)
+			t->xyz[k] = (float)(uniform() * pow(10, -6 * uniform()));
+	}
+	b.counters[COUNT_SAMPLES] = 2 * p->epoch;
+	b.counters[COUNT_INDEPENDENT] = p->epoch + next() % 4;
+	b.counters[COUNT_LONGEST_STUCK] = next() % 100;
+	b.independent_sum = uniform() * (double)p->epoch;
+	b.beyond_sum = uniform();
+	for (int k = 0; k < PATH_CLASSES; k++)
+		b.classes[k] = uniform();
+	b.moment_count = batch_moment_count(p, kind);
+	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
+	for (uint64_t k = 0; k < b.moment_count; k++)
+		b.moments[k] = (float)uniform();
+	return b;
+}
+
+static void add(struct canvas *c, const struct plan *p, enum lease_kind kind, uint64_t epoch, uint32_t group, uint32_t part)
+{
+	struct batch b = make_batch(p, kind, epoch, group, part);
+	struct error e;
+	if (canvas_add(c, &b, &e))
+		fail_msg("%s", e.text);
+	batch_fini(&b);
+}
+
+/* The n-th batch of a run in which the next round begins before the last one is complete. */
+static void add_nth(struct canvas *c, const struct plan *p, unsigned n)
+{
+	enum { LEASES = GROUPS * PARTS };
+	if (n < LEASES) {
+		add(c, p, LEASE_BOOTSTRAP, 0, n / PARTS, n % PARTS);
+		return;
+	}
+	n -= LEASES;
+	unsigned pair = n / (2 * LEASES), lease = n % (2 * LEASES) / 2;
+	add(c, p, LEASE_RENDER, 2 * pair + n % 2, lease / PARTS, lease % PARTS);
+}
+
+static struct canvas *make(const struct plan *p, const char *films)
+{
+	struct canvas *c;
+	assert_int_equal(canvas_new(&c, p, EXPONENT, films, NULL), 0);
+	return c;
+}
+
+static void path_of(char path[128])
+{
+	snprintf(path, 128, "%s/canvas", folder);
+}
+
+/* Saves, forgets, loads. */
+static struct canvas *through_file(struct canvas *c, const struct plan *p, const char *films)
+{
+	char path[128];
+	struct sealed s;
+	struct error e;
+	path_of(path);
+	assert_int_equal(sealed_create(&s, path, &e), 0);
+	assert_int_equal(canvas_save(c, &s, &e), 0);
+	assert_int_equal(sealed_finish(&s, &e), 0);
+	canvas_free(c);
+	c = make(p, films);
+	assert_int_equal(sealed_open(&s, path, &e), 0);
+	if (canvas_load(c, &s, &e))
+		fail_msg("%s", e.text);
+	assert_int_equal(s.left, 0);
+	sealed_close(&s);
+	return c;
+}
+
+static void assert_same(const struct canvas *a, const struct canvas *b, const struct plan *p)
+{
+	for (int open = 0; open < 2; open++) {
+		struct canvas_image x, y;
+		assert_int_equal(canvas_rounds(a), canvas_rounds(b));
+		assert_int_equal(canvas_merged(a), canvas_merged(b));
+		assert_int_equal(canvas_image(a, open, &x, NULL), 0);
+		assert_int_equal(canvas_image(b, open, &y, NULL), 0);
+		assert_memory_equal(x.rgb, y.rgb, WIDTH * HEIGHT * 3 * sizeof(float));
+		assert_int_equal(x.error != NULL, y.error != NULL);
+		if (x.error)
+			assert_memory_equal(x.error, y.error, WIDTH * HEIGHT * 3 * sizeof(float));
+		assert_memory_equal(&x.rel_mse, &y.rel_mse, sizeof x.rel_mse);
+		assert_memory_equal(&x.b, &y.b, 2 * sizeof x.b);
+		assert_memory_equal(x.classes, y.classes, sizeof x.classes);
+		assert_memory_equal(&x.counts, &y.counts, sizeof x.counts);
+		assert_int_equal(x.samples, y.samples);
+		assert_int_equal(x.r_hat != NULL, y.r_hat != NULL);
+		if (x.r_hat) {
+			size_t tiles = (size_t)x.tiles_across * x.tiles_down * sizeof *x.r_hat;
+			assert_memory_equal(x.r_hat, y.r_hat, tiles);
+			assert_memory_equal(x.tile_error, y.tile_error, tiles);
+		}
+		canvas_image_fini(&x);
+		canvas_image_fini(&y);
+	}
+	for (uint32_t i = 0; i < GROUPS * PARTS * 3; i++) {
+		struct lease_key k = {1, i % 3 ? LEASE_RENDER : LEASE_BOOTSTRAP, i / 3 / PARTS, i / 3 % PARTS, 0};
+		k.epoch = i % 3 ? canvas_rounds(a) + i % 3 - 1 : 0;
+		assert_int_equal(canvas_has(a, &k), canvas_has(b, &k));
+	}
+	(void)p;
+}
+
+static void goes_on_with_the_same_bits(void **unused)
+{
+	(void)unused;
+	for (int kind = 0; kind < 2; kind++) {
+		enum { BATCHES = GROUPS * PARTS * (1 + 4) };
+		struct plan p = make_plan(kind ? PLAN_CHAINS : PLAN_SAMPLES);
+		for (unsigned stop = 0; stop <= BATCHES; stop += 7) {
+			struct canvas *plain = make(&p, NULL), *broken = make(&p, stop % 2 ? folder : NULL);
+			for (unsigned n = 0; n < BATCHES; n++) {
+				if (n == stop)
+					broken = through_file(broken, &p, stop % 2 ? NULL : folder);
+				add_nth(plain, &p, n);
+				add_nth(broken, &p, n);
+			}
+			assert_int_equal(canvas_rounds(plain), 4);
+			assert_same(plain, broken, &p);
+			canvas_free(plain);
+			canvas_free(broken);
+		}
+	}
+}
+
+static void what_is_loaded_is_what_was_saved(void **unused)
+{
+	(void)unused;
+	struct plan p = make_plan(PLAN_CHAINS);
+	struct canvas *plain = make(&p, NULL), *again = make(&p, NULL);
+	for (unsigned n = 0; n < 50; n++) {
+		add_nth(plain, &p, n);
+		add_nth(again, &p, n);
+	}
+	again = through_file(again, &p, NULL);
+	assert_same(plain, again, &p);
+	again = through_file(again, &p, NULL);
+	assert_same(plain, again, &p);
+	canvas_free(plain);
+	canvas_free(again);
+}
+
+/* Of another plan or grid, torn, or with a bit wrong: refused, and nothing of it is used. */
+static void others_are_refused(void **unused)
+{
+	(void)unused;
+	char path[128];
+	struct sealed s;
+	struct error e;
+	struct stat st;
+	struct plan p = make_plan(PLAN_CHAINS), q = p;
+	path_of(path);
+	struct canvas *c = make(&p, NULL);
+	for (unsigned n = 0; n < 30; n++)
+		add_nth(c, &p, n);
+	c = through_file(c, &p, NULL);
+	canvas_free(c);
+	q.groups = 2;
+	q.chains /= 2;
+	assert_int_equal(canvas_new(&c, &q, EXPONENT, NULL, NULL), 0);
+	assert_int_equal(sealed_open(&s, path, &e), 0);
+	assert_int_equal(canvas_load(c, &s, &e), -EBADMSG);
+	sealed_close(&s);
+	canvas_free(c);
+	assert_int_equal(canvas_new(&c, &p, EXPONENT + 1, NULL, NULL), 0);
+	assert_int_equal(sealed_open(&s, path, &e), 0);
+	assert_int_equal(canvas_load(c, &s, &e), -EBADMSG);
+	sealed_close(&s);
+	canvas_free(c);
+	assert_int_equal(stat(path, &st), 0);
+	for (int i = 0; i < 40; i++) {
+		off_t at = st.st_size * i / 40;
+		unsigned char byte;
+		int fd = open(path, O_RDWR);
+		assert_int_equal(pread(fd, &byte, 1, at), 1);
+		byte ^= 16;
+		assert_int_equal(pwrite(fd, &byte, 1, at), 1);
+		assert_int_equal(sealed_open(&s, path, &e), -EBADMSG);
+		byte ^= 16;
+		assert_int_equal(pwrite(fd, &byte, 1, at), 1);
+		close(fd);
+	}
+	assert_int_equal(sealed_open(&s, path, &e), 0);
+	sealed_close(&s);
+	for (off_t cut = 1; cut < st.st_size; cut *= 3) {
+		assert_int_equal(truncate(path, st.st_size - cut), 0);
+		assert_int_equal(sealed_open(&s, path, &e), -EBADMSG);
+	}
+	unlink(path);
+	assert_int_equal(sealed_open(&s, path, &e), -ENOENT);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(goes_on_with_the_same_bits, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_is_loaded_is_what_was_saved, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(others_are_refused, folder_set_up, folder_tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
