@@ -226,13 +226,10 @@ void dispatch_remember(struct server *s, const struct job_record *r)
 static void finish(struct server *s, struct order *o)
 {
 	struct job_view v;
-	struct error e;
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
 	server_view(s, o->id, &v);
 	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-	if (spool_write_record(s->spool, &v.record, &e))
-		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	o->record = v.record;
 	durable_end(s, o);
 	dispatch_remember(s, &v.record);

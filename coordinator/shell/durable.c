@@ -65,17 +65,30 @@ int durable_begin(struct server *s, struct order *o, struct error *e)
 	return rc;
 }
 
-void durable_end(struct server *s, const struct order *o)
+/* With its last holder the journal gives up its room, too. */
+static void drop_files(struct server *s, struct order *o)
 {
-	char folder[SPOOL_PATH_MAX];
+	char path[SPOOL_PATH_MAX];
+	journal_release(o->journal);
+	o->journal = NULL;
+	spool_job_path(s->spool, o->id, NULL, path);
+	journal_clear(path, UINT64_MAX);
+	spool_job_path(s->spool, o->id, "checkpoint", path);
+	unlink(path);
+}
+
+void durable_end(struct server *s, struct order *o)
+{
 	struct error e;
+	int rc = spool_write_record(s->spool, &o->record, &e);
+	drop_files(s, o);
+	if (rc == -ENOSPC)
+		rc = spool_write_record(s->spool, &o->record, &e);
+	if (rc)
+		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	/* The record says it already: without this row the next start reads it there. */
 	if (ledger_end(s->ledger, o->id, o->record.state, &e))
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)o->id, log_quote(e.text).text);
-	spool_job_path(s->spool, o->id, NULL, folder);
-	journal_clear(folder, UINT64_MAX);
-	spool_job_path(s->spool, o->id, "checkpoint", folder);
-	unlink(folder);
 }
 
 /* ---- batches ---- */

@@ -10,8 +10,8 @@
 
 /* The job is in the ledger when this returns, with an empty journal: it may be told to whoever submitted it. */
 int durable_begin(struct server *s, struct order *o, struct error *e);
-/* It has ended and its record says so. */
-void durable_end(struct server *s, const struct order *o);
+/* It has ended: its record is written, its journal goes. */
+void durable_end(struct server *s, struct order *o);
 
 /* Before the core sees the batch of this event: the frame for the journal, and room on the disk for it. -ENOSPC, -EFBIG: the disk
  * is full: the job is held until there is room. */

@@ -26,6 +26,7 @@ finish() {
 			[ -s "$f" ] && echo "---- $(basename "$f")" && tail -n 15 "$f"
 		done
 	fi
+	[ -z "${HSLT_OWN_MOUNTS:-}" ] || umount "$DIR/spool" 2>/dev/null || :
 	rm -rf "$DIR"
 	exit $code
 }

@@ -66,7 +66,8 @@ within() {
 	sed -n 's/^SystemCallFilter=~\(.*\)/\1/p' "$UNITS/$1" >"$DIR/filter"
 	syscalls $(cat "$DIR/filter") | sort -u >"$DIR/without"
 	comm -23 "$DIR/with" "$DIR/without" >"$DIR/allowed"
-	refused=$(comm -23 "$DIR/called" "$DIR/allowed" | tr '\n' ' ')
+	# SQLite calls fchown when it runs as root, as a test may and the service does not, and lives with a refusal.
+	refused=$(comm -23 "$DIR/called" "$DIR/allowed" | grep -vx fchown | tr '\n' ' ')
 	[ -z "$refused" ] || fail "$1 refuses what the program calls: $refused"
 	echo "$1: $(wc -l <"$DIR/called") system calls, all let through"
 }

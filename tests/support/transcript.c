@@ -2,6 +2,7 @@
 
 #include <inttypes.h>
 #include <math.h>
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -184,6 +185,36 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 	}
 }
 
+/* restore J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [options of submit] */
+static void take_restore(const char **at, struct event *ev, struct plan *p, char *fingerprint, uint64_t *next,
+			 const struct forecast_history *looks)
+{
+	struct event_restore r = { .job = take_id(at, "j"), .next = next, .fingerprint = fingerprint,
+				   .elapsed = NAN, .opened = NAN, .completed = NAN, .looks = looks };
+	r.kind = take(at, "boot") ? LEASE_BOOTSTRAP : LEASE_RENDER;
+	if (r.kind == LEASE_RENDER && !take(at, "render"))
+		fail_msg("boot or render is missing: %s", *at);
+	fingerprint[0] = 0;
+	do
+		*next++ = take_count(at);
+	while (take(at, ","));
+	if (take(at, "fingerprint=")) {
+		int n = 0;
+		sscanf(*at, "%31s%n", fingerprint, &n);
+		*at += n;
+		take(at, " ");
+	}
+	if (take(at, "elapsed="))
+		r.elapsed = r.opened = take_number(at);
+	if (take(at, "completed="))
+		r.completed = take_number(at);
+	r.black = take(at, "black");
+	take_submit(at, ev, p);
+	r.submit = ev->submit;
+	ev->kind = EVENT_RESTORE;
+	ev->restore = r;
+}
+
 static void take_job(const char **at, struct event *ev)
 {
 	if (take(at, "cancel")) {
@@ -203,6 +234,9 @@ static void take_job(const char **at, struct event *ev)
 		ev->kind = EVENT_IMAGE_KNOWN;
 		ev->image_known.job = take_id(at, "j");
 		ev->image_known.disagrees = take(at, "disagrees");
+	} else if (take(at, "hold") || take(at, "release")) {
+		ev->kind = EVENT_HOLD;
+		ev->job = take_id(at, "j");
 	} else if (take(at, "broken")) {
 		ev->kind = EVENT_JOB_BROKEN;
 		ev->job = take_id(at, "j");
@@ -228,6 +262,8 @@ static bool play_line(struct farm *f, const char *line)
 	const char *at = line, *arrow = strstr(line, "-> ");
 	char name[32], fingerprint[32], text[256];
 	struct plan plan;
+	uint64_t next[64];
+	struct forecast_history looks = { .count = 0 };
 	struct event ev = { .kind = EVENT_TICK };
 	if (!arrow || !take(&at, "["))
 		fail_msg("not a line of a transcript: %s", line);
@@ -239,6 +275,8 @@ static bool play_line(struct farm *f, const char *line)
 		take_worker(&at, &ev, name, fingerprint);
 	else if (take(&at, "submit"))
 		take_submit(&at, &ev, &plan);
+	else if (take(&at, "restore"))
+		take_restore(&at, &ev, &plan, fingerprint, next, &looks);
 	else
 		take_job(&at, &ev);
 	snprintf(text, sizeof text, "%.*s", at < arrow ? (int)(arrow - at) - 1 : 0, at);

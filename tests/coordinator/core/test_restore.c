@@ -1,0 +1,117 @@
+/* Jobs of an earlier life, and jobs that are held, as transcripts. */
+#include "tests/support/transcript.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+static void in_the_bootstrap(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] restore j4 boot 1,0 fingerprint=A elapsed=3 -> -",
+		"[0] w1 joins B threads=1 -> -", "[0] w1 wants 1 -> -", /* it belongs to A */
+		"[0] w2 joins A threads=1 -> -", "[0] w2 wants 1 -> w2 gets j4 g1 p0 boot",
+		"[1] w2 batch j4 g0 p0 boot -> repeat: merged already",
+		"[1] w2 batch j4 g1 p0 boot -> merge, merged, j4 prepare",
+		"[1] prepared j4 -> j4 is running, w2 gets j4 g0 p0 e0",
+		NULL });
+}
+
+/* Two rounds are open, as they were: what is merged is a repeat, what was out counts when it comes, asked for or not. */
+static void in_a_round(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] restore j7 render 4,3,5 fingerprint=A elapsed=10 groups=3 rounds=9 -> j7 is running",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 batch j7 g0 p0 e3 -> repeat: merged already",
+		"[0] w1 batch j7 g2 p0 e5 -> refused: the epoch is not open",
+		"[0] w1 wants 1 -> w1 gets j7 g1 p0 e3",
+		"[1] w1 batch j7 g0 p0 e4 -> merge, merged",
+		"[1] w1 batch j7 g0 p0 e5 -> refused: the epoch is not open",
+		"[2] w1 batch j7 g1 p0 e3 -> merge, merged, j7 round 4, w1 gets j7 g1 p0 e4",
+		"[3] w1 batch j7 g1 p0 e4 -> merge, merged, j7 round 5, w1 gets j7 g2 p0 e5",
+		/* ids go on */
+		"[3] submit -> j8 submitted, j8 is queued",
+		NULL });
+	struct job_status s;
+	assert_true(farm_job(f, 7, 3, &s));
+	assert_int_equal(s.leases_merged, 4 + 3 + 5 + 3);
+	assert_int_equal(s.bootstrap_merged, 3);
+	assert_true(s.rounds == 5 && s.started == -10);
+	assert_true(farm_elapsed(f, 7, 3) == 13);
+	farm_free(f);
+}
+
+static void before_anything(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] restore j1 boot 0,0 -> -", "[0] restore j3 boot 0,0 priority=5 -> -",
+		"[0] w1 joins B threads=1 -> -", "[0] w1 wants 1 -> j3 is bootstrap, w1 gets j3 g0 p0 boot",
+		NULL });
+	struct job_status s;
+	assert_true(farm_job(f, 1, 3, &s));
+	assert_int_equal(s.state, JOB_QUEUED);
+	farm_free(f);
+}
+
+/* What the last complete round had met is met: the end, a look at the error, the time that it took, not that in between. */
+static void bounds(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){ "[0] restore j1 render 2,2 elapsed=3 completed=3 rounds=2 -> "
+					  "j1 is running, j1 publish 2, j1 is done (mutations)", NULL });
+	transcript((const char *const[]){ "[0] restore j1 render 2,3 elapsed=3 completed=3 rounds=9 target=0.1 -> j1 is running, j1 evaluate 2",
+					  "[1] w1 joins A threads=1 -> -",
+					  "[1] w1 wants 1 -> w1 gets j1 g0 p0 e2",
+					  "[2] w1 batch j1 g0 p0 e2 -> refused: the job's error is being estimated, w1 gets j1 g0 p0 e2",
+					  "[2] error j1 2 0.05 -> w1 loses j1 g0 p0 e2, j1 publish 2, j1 is done (error)", NULL });
+	transcript((const char *const[]){ "[100] restore j1 render 2,3 elapsed=9 completed=7 rounds=inf seconds=8 -> j1 is running",
+					  "[100] w1 joins A threads=1 -> -",
+					  "[100] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 publish 3, j1 is done (time)", NULL });
+	transcript((const char *const[]){ "[100] restore j1 render 2,3 elapsed=9 completed=8 rounds=inf seconds=8 -> "
+					  "j1 is running, j1 publish 2, j1 is done (time)", NULL });
+	transcript((const char *const[]){ "[0] restore j1 render 0,0 elapsed=3 black -> j1 publish 0, j1 is done (black: no bootstrap sample carried light)",
+					  NULL });
+}
+
+static void held(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=2 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[1] hold j1 no room -> -",
+		"[1] w1 wants 2 -> -",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged",
+		NULL });
+	struct job_status s;
+	assert_true(farm_job(f, 1, 1, &s));
+	assert_int_equal(s.state, JOB_HELD);
+	assert_string_equal(s.waiting, "no room");
+	transcript_play(f, (const char *const[]){ "[2] release j1 -> w1 gets j1 g1 p0 boot", "[3] hold j1 no room -> -",
+						  "[4] cancel j1 -> j1 cancelled, w1 loses j1 g1 p0 boot, j1 is cancelled (cancelled: cancelled)", NULL });
+	assert_true(farm_job(f, 1, 5, &s));
+	assert_int_equal(s.state, JOB_CANCELLED);
+	farm_free(f);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(in_the_bootstrap),
+		cmocka_unit_test(in_a_round),
+		cmocka_unit_test(before_anything),
+		cmocka_unit_test(bounds),
+		cmocka_unit_test(held),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

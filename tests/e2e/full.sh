@@ -1,0 +1,50 @@
+# A spool without room: nothing is acknowledged that is not stored, the job is held and says why, no new one is taken, the
+# coordinator answers. With room again the job goes on by itself, to the same bits. Cancelling a job needs no room.
+if [ -z "${HSLT_OWN_MOUNTS:-}" ]; then
+	if ! unshare -rm true 2>/dev/null; then
+		echo "skipped: no name spaces for mounts here"
+		exit 77
+	fi
+	HSLT_OWN_MOUNTS=1 exec unshare -rm sh "$0" "$@"
+fi
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
+
+JOB="--integrator hslt --bootstrap 20000 --mutations 2000000"
+mkdir "$DIR/spool"
+mount -t tmpfs -o size=32m none "$DIR/spool" || skip "no tmpfs"
+start_coordinator -v
+start_worker w1
+submit "$BOX" -o "$DIR/quiet.exr" $JOB --wait >/dev/null
+quiet=$(value j1 merged)
+
+used=$(df --output=used -k "$DIR/spool" | tail -n 1)
+mount -o remount,size=$((used + 6400))k "$DIR/spool" # the films take 4,700, all batches 5,000
+id=$(submit "$BOX" -o "$DIR/full.exr" $JOB)
+until_true 20 is_state "$id" held || fail "$id is $(value "$id" state), and $(df -k "$DIR/spool" | tail -n 1)"
+value "$id" waiting | grep -q 'No space left' || fail "it does not say why: $(value "$id" waiting)"
+before=$(value "$id" merged)
+[ "$before" -lt "$quiet" ] || fail "there was room for all"
+head -c 20000000 /dev/zero >"$DIR/spool/filler" 2>/dev/null && fail "there is room"
+if submit "$BOX" -o "$DIR/none.exr" $JOB >/dev/null; then
+	fail "another job was taken"
+fi
+tail -n 1 "$DIR/submit.log" | grep -q 'No space left\|full' || fail "the refusal does not say why: $(tail -n 1 "$DIR/submit.log")"
+rm "$DIR/spool/filler"
+is_state "$id" held || fail "$id is $(value "$id" state)"
+mount -o remount,size=64m "$DIR/spool"
+until_true 30 is_state "$id" done || fail "$id is $(value "$id" state)"
+"$BIN/hslt-job" fetch "$id"
+same "$DIR/quiet.exr" "$DIR/full.exr"
+[ "$(value "$id" merged)" = "$quiet" ] || fail "$(value "$id" merged) leases, not $quiet"
+
+used=$(df --output=used -k "$DIR/spool" | tail -n 1)
+mount -o remount,size=$((used + 6400))k "$DIR/spool"
+id=$(submit "$BOX" -o "$DIR/gone.exr" $JOB)
+until_true 20 is_state "$id" held || fail "$id is $(value "$id" state)"
+"$BIN/hslt-job" cancel "$id"
+kill -9 $COORDINATOR_PID
+wait $COORDINATOR_PID 2>/dev/null || :
+LISTEN=$COORDINATOR start_coordinator -v
+is_state "$id" cancelled || fail "$id is $(value "$id" state) after it was cancelled"
+echo "held at $before of $quiet leases, went on, bits equal"
