@@ -1,13 +1,15 @@
 # The coordinator killed with -9 again and again, in the bootstrap, between rounds and just after an acknowledgement, with a job
-# of chains and one of samples under way: both go on where they were, nothing counts twice, the bits are those of quiet runs.
+# of chains, one of samples and one with a target error under way: all go on where they were, nothing counts twice, the bits
+# are those of quiet runs.
 # SEED=N repeats the moments of a run, KILLS=N changes how many there are.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
 
 SEED=${SEED:-7}
 KILLS=${KILLS:-9}
-CHAINS="--integrator hslt --bootstrap 100000 --mutations 6000000"
-SAMPLES="--integrator path --spp 600"
+CHAINS="--integrator hslt --bootstrap 100000 --mutations 5000000"
+SAMPLES="--integrator path --spp 500"
+TARGET="--integrator path --spp 1200 --target-error 6%" # looks at the error on the way
 JOURNAL=0.5 # MB: some kills meet a checkpoint, some a journal without one
 echo "seed $SEED"
 
@@ -25,7 +27,7 @@ again() {
 
 # until a checkpoint is being written, or no more than a moment
 writing() {
-	tries=20000
+	tries=400000
 	while [ $tries -gt 0 ] && ! [ -e "$DIR/spool/jobs/$a/checkpoint.tmp" ] && ! [ -e "$DIR/spool/jobs/$b/checkpoint.tmp" ]; do
 		tries=$((tries - 1))
 	done
@@ -49,6 +51,8 @@ start_worker w1
 start_worker w2
 submit "$BOX" -o "$DIR/chains-quiet.exr" $CHAINS --wait >/dev/null
 submit "$BOX" -o "$DIR/samples-quiet.exr" $SAMPLES --wait >/dev/null
+submit "$BOX" -o "$DIR/target-quiet.exr" $TARGET --wait >/dev/null
+[ "$(value j3 reason)" = error ] || fail "j3 ended by $(value j3 reason)"
 quiet=$(merged j1)
 [ "$(acknowledged j1)" -eq "$quiet" ] || fail "$(acknowledged j1) of $quiet were acknowledged"
 
@@ -56,6 +60,7 @@ killed=0
 caught=0
 a=$(submit "$BOX" -o "$DIR/chains.exr" $CHAINS)
 b=$(submit "$BOX" -o "$DIR/samples.exr" $SAMPLES)
+c=$(submit "$BOX" -o "$DIR/target.exr" $TARGET)
 again # before anything is merged, or in the bootstrap
 until_true 20 is_state "$a" bootstrap || is_state "$a" running || fail "$a is $(value "$a" state)"
 again
@@ -63,24 +68,27 @@ while [ $killed -lt "$KILLS" ]; do
 	seen=$(wc -l <"$DIR/coordinator.log")
 	until_true 20 is_merging $((killed % 3 * 10 + 1)) || fail "nothing is merged after $killed kills"
 	case $((killed % 3)) in # 1: just after a merge
-	0) sleep "$(moment 0.05 1.2)" ;;
+	0) sleep "$(moment 0.05 $((killed / 3)))" ;;
 	2) [ $killed -lt 4 ] || writing ;;
 	esac
 	is_state "$a" done && is_state "$b" done && fail "both jobs were done after $killed kills"
 	again
-	for j in $a $b; do
+	for j in $a $b $c; do
 		[ "$(merged $j)" -ge "$(acknowledged $j)" ] || fail "$j knows $(merged $j) leases of $(acknowledged $j)"
 	done
 done
 until_true 60 is_state "$a" done || fail "$a is $(value "$a" state)"
 until_true 60 is_state "$b" done || fail "$b is $(value "$b" state)"
+until_true 60 is_state "$c" done || fail "$c is $(value "$c" state)"
 "$BIN/hslt-job" fetch "$a"
 "$BIN/hslt-job" fetch "$b"
+"$BIN/hslt-job" fetch "$c"
 same "$DIR/chains-quiet.exr" "$DIR/chains.exr"
 same "$DIR/samples-quiet.exr" "$DIR/samples.exr"
+same "$DIR/target-quiet.exr" "$DIR/target.exr"
 [ "$(merged "$a")" = "$quiet" ] || fail "$(merged "$a") leases were merged, and $quiet without kills"
 "$BIN/hslt-job" log "$a" | grep -q 'state=restored .*checkpoint=[1-9]' || fail "$a never went on from a checkpoint"
 [ "$(find "$DIR/spool/jobs" -name 'journal.*' -o -name checkpoint | wc -l)" -eq 0 ] || fail "journals of ended jobs are left"
 new=$(submit "$BOX" -o "$DIR/new.exr" --integrator path --spp 1)
-[ "$new" = j5 ] || fail "the next job is $new, not j5"
+[ "$new" = j7 ] || fail "the next job is $new, not j7"
 echo "$killed kills ($caught while a checkpoint was written), $quiet leases, none lost, none twice, bits equal"
