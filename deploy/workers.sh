@@ -11,13 +11,14 @@ Starts hslt-worker on each HOST over ssh (user@host works), in the background, w
   -t, --threads N              render threads (all cores of the host)
   -p, --path PROGRAM           hslt-worker on the hosts (hslt-worker)
   -l, --log FILE               log on the hosts (~/hslt-worker.log)
-  -i, --insecure               the coordinator is not on the same host: there is no encryption yet
+  -k, --tls DIR                the certificate's folder on the hosts (hslt-ca worker NAME makes one; deploy/SECURITY.md)
+  -i, --insecure               without TLS, though the coordinator is not on the same host
   -s, --stop                   stop the workers that this script started there (SIGTERM: they finish their epochs)
   -n, --dry-run                only print what would be done
   -h, --help
 
 Examples:
-  deploy/workers.sh -c farm.lan:7700 --insecure node1 node2 node3
+  deploy/workers.sh -c farm.lan:7700 --tls .hslt-node node1 node2 node3
   deploy/workers.sh --stop node1
 
 $SSH is the ssh command (ssh -o BatchMode=yes). Exit code: 0 when all hosts worked, 1 when one did not, 2 usage.
@@ -35,16 +36,17 @@ quote() {
 }
 
 coordinator=${HSLT_COORDINATOR:-}
-threads= program=hslt-worker log= insecure= stop= dry=
+threads= program=hslt-worker log= tls= insecure= stop= dry=
 while [ $# -gt 0 ]; do
 	case $1 in
-	-c | --coordinator | -t | --threads | -p | --path | -l | --log)
+	-c | --coordinator | -t | --threads | -p | --path | -l | --log | -k | --tls)
 		[ $# -ge 2 ] || die "$1 needs a value"
 		case $1 in
 		-c | --coordinator) coordinator=$2 ;;
 		-t | --threads) threads=$2 ;;
 		-p | --path) program=$2 ;;
 		-l | --log) log=$2 ;;
+		-k | --tls) tls=$2 ;;
 		esac
 		shift 2
 		;;
@@ -68,6 +70,7 @@ if [ -n "$stop" ]; then
 else
 	command="$(quote "$program") --coordinator $(quote "$coordinator")"
 	[ -z "$threads" ] || command="$command --threads $threads"
+	[ -z "$tls" ] || command="$command --tls $(quote "$tls")"
 	[ -z "$insecure" ] || command="$command --insecure"
 	target='~/hslt-worker.log'
 	[ -z "$log" ] || target=$(quote "$log")

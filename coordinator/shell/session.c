@@ -314,11 +314,27 @@ static void on_refused(void *user, const char *why)
 }
 static const struct conn_events refused_events = {NULL, NULL, NULL, on_refused};
 
+/* Whoever has not said who they are gives way, the one who has had longest first: strangers who hold connections and say
+ * nothing must not keep out those who can. */
+static bool make_room(struct server *s)
+{
+	struct session *oldest = NULL;
+	for (struct session *p = s->sessions; p; p = p->next)
+		if (p->state == SESSION_NEW)
+			oldest = p;
+	if (!oldest)
+		return false;
+	oldest->state = SESSION_LEAVING;
+	conn_close(oldest->conn, "as many connections as are allowed, and this one has not said hello");
+	return true;
+}
+
 void session_accept(struct server *s)
 {
 	struct conn_config config = {{HELLO_HEADER, 0}, SEND_LIMIT, s->config.stall_seconds, s->config.hello_seconds, s->tls};
 	struct error e;
-	struct session *p = s->session_count < s->config.max_connections ? mem_alloc(1, sizeof *p) : NULL;
+	bool room = s->session_count < s->config.max_connections || make_room(s);
+	struct session *p = room ? mem_alloc(1, sizeof *p) : NULL;
 	struct conn *c;
 	if (!p) {
 		log_event(LOG_PEER_REFUSED, "text=\"as many connections as are allowed\"");

@@ -2,7 +2,7 @@
 # Every command of the README's ```sh blocks, in order, as a reader would type them; in a folder of its own and at a port of
 # its own. The two commands above them are tests of their own: demo.sh here, and the run that this is part of.
 . "$(dirname "$0")/lib.sh"
-need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare hslt-tonemap
+need hslt-ca hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare hslt-tonemap
 ROOT=$(cd "$HERE/../.." && pwd)
 for command in deploy/demo.sh deploy/test.sh deploy/workers.sh; do
 	grep -q "sh $command" "$ROOT/README.md" && [ -f "$ROOT/$command" ] || fail "$command is not both in the README and there"
@@ -22,11 +22,11 @@ ln -s "$(cd "$BIN" && pwd)" "$DIR/home/build/bin"
 	echo "trap 'code=\$?; kill \$RUNNING; wait; exit \$code' EXIT"
 	# make has nothing left to do here, but it must agree. By hand there is time between two lines; here it is waited for.
 	awk '/^```sh$/ { on = 1; next } /^```$/ { on = 0 } on' "$ROOT/README.md" |
-		sed -e "s/7700/$port/g" -e "s|^make -s\$|make -s -C '$ROOT' programs|" -e 's/ &$/ \& RUNNING="$RUNNING $!"/' -e '/name two &/a sleep 1'
+		sed -e "s/7700/$port/g" -e "s|^make -s\$|make -s -C '$ROOT' programs|" -e 's/ &$/ \& RUNNING="$RUNNING $!"/' -e '/name two &/a sleep 1' -e '/node1 --threads 1 &/a sleep 1' -e "s/7701/$((port + 20000))/g"
 } >"$DIR/commands"
 [ "$(wc -l <"$DIR/commands")" -gt 12 ] || fail "the README has lost its commands"
 (cd "$DIR/home" && sh "$DIR/commands") >"$DIR/readme.log" 2>&1 || fail "a command of the README failed"
-for f in demo.exr demo.png farm.exr; do
+for f in demo.exr demo.png farm.exr safe.exr; do
 	[ -s "$DIR/home/$f" ] || fail "the README's commands left no $f"
 done
 echo "$(grep -c . "$DIR/commands") lines run"

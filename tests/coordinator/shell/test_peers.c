@@ -259,6 +259,31 @@ static void crowds_are_turned_away(void **state)
 	it_still_works();
 }
 
+/* Who says nothing gives way to who comes after, the first of them first; who has said hello stays. */
+static void the_silent_give_way(void **state)
+{
+	(void)state;
+	struct peer *first = call(), *crowd[7], *guests[7];
+	assert_true(hello(first, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	for (int i = 0; i < 7; i++)
+		crowd[i] = call();
+	for (int i = 0; i < 7; i++) {
+		guests[i] = call();
+		assert_true(hello(guests[i], FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+		assert_null(hear(crowd[i]));
+	}
+	struct peer *one_more = call();
+	assert_null(hear(one_more));
+	hang_up(one_more);
+	hang_up(first);
+	for (int i = 0; i < 7; i++) {
+		hang_up(crowd[i]);
+		hang_up(guests[i]);
+	}
+	usleep(50000);
+	it_still_works();
+}
+
 static void hello_is_looked_at(void **state)
 {
 	(void)state;
@@ -570,7 +595,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(rubbish_is_hung_up_on),   cmocka_unit_test(stragglers_are_hung_up_on),
-		cmocka_unit_test(crowds_are_turned_away),  cmocka_unit_test(hello_is_looked_at),
+		cmocka_unit_test(crowds_are_turned_away), cmocka_unit_test(the_silent_give_way),  cmocka_unit_test(hello_is_looked_at),
 		cmocka_unit_test(submissions_are_looked_at), cmocka_unit_test(a_black_job_ends),
 		cmocka_unit_test(strategies_are_counted_once),
 	};
