@@ -197,6 +197,10 @@ running() {
 	"$BIN/hslt-job" --coordinator "127.0.0.1:$(cat "$DIR"/hslt-farm-"$1"/port)" list 2>/dev/null | grep -q running
 }
 
+# The first of them over TLS, each program in its role.
+export HSLT_CA="$DIR/ca"
+{ "$BIN/hslt-ca" init && "$BIN/hslt-ca" worker worker && "$BIN/hslt-ca" client client; } >>"$DIR/ca.log" 2>&1 || fail "hslt-ca"
+export HSLT_TLS="$HSLT_CA/client"
 batch --nodes=3 "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/farm.exr" $SHORT
 until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; cat "$DIR/$JOB.log")"
 scontrol requeue "$JOB"
@@ -205,7 +209,10 @@ until_true 60 is_job "$JOB" COMPLETED || fail "the farm is $(job_state "$JOB"): 
 [ "$(job_field "$JOB" Restarts)" = 1 ] || fail "the farm was not requeued"
 [ "$(grep -c 'event=peer_hello.*@n[123]' "$DIR/$JOB.log")" -ge 3 ] || fail "not all nodes worked"
 [ "$(grep -c "name=\"$JOB.1@.*said goodbye" "$DIR/$JOB.log")" = 3 ] || fail "workers were not left to leave"
+grep -q 'event=listen.*tls=yes' "$DIR/$JOB.log" || fail "it was not over TLS"
+grep -q 'event=peer_hello.*certificate=worker' "$DIR/$JOB.log" || fail "the workers had another certificate"
 same "$DIR/short.exr" "$DIR/farm.exr"
+unset HSLT_CA HSLT_TLS
 
 batch --nodes=2 "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/cut.exr" $LONG
 until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; cat "$DIR/$JOB.log")"
