@@ -114,8 +114,10 @@ row "a worker whose certificate expires meanwhile" "cut off" "certificate has ex
 # A renewed certificate is taken up without a restart, and the farm goes on with the same bits.
 ca coordinator coordinator --renew
 until_true 5 grep -q event=tls_read "$DIR/coordinator.log" || fail "new files are not noticed"
-submit "$BOX" -o "$DIR/farm2.exr" --integrator path --spp 16 --wait >"$DIR/id" || fail "the second job: $?"
-same "$DIR/alone.exr" "$DIR/farm2.exr"
+chains="--integrator pssmlt --bootstrap 20000 --mutations 60000"
+"$BIN/hslt-render" "$BOX" -o "$DIR/alone2.exr" $chains 2>>"$DIR/render.log"
+submit "$BOX" -o "$DIR/farm2.exr" $chains --wait >"$DIR/id" || fail "the second job: $?"
+same "$DIR/alone2.exr" "$DIR/farm2.exr"
 
 # The other way round: TLS to a port without; and only a coordinator can be one.
 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port2" --spool "$DIR/spool2" --status-socket "$DIR/status2" --tls "" \

@@ -394,6 +394,67 @@ static void who_is_revoked_is_not(void **state)
 	accepts("twice", "twice", TLS_WORKER);
 }
 
+static void append(const char *from, const char *to)
+{
+	static char bytes[1 << 16];
+	int in = open(from, O_RDONLY | O_CLOEXEC), out = open(to, O_WRONLY | O_APPEND | O_CLOEXEC);
+	ssize_t n = read(in, bytes, sizeof bytes);
+	assert_true(n > 0 && write(out, bytes, (size_t)n) == n);
+	close(in);
+	close(out);
+}
+
+/* How a farm changes its authority without a day on which nobody gets in: first both are trusted everywhere, then new
+ * certificates are given out, then the old authority goes. */
+static void one_authority_replaces_another(void **state)
+{
+	(void)state;
+	struct error e;
+	unsigned count;
+	char farm[256], node[256];
+	issue(ours, "old-farm", TLS_COORDINATOR, 5);
+	issue(ours, "old-node", TLS_WORKER, 5);
+	issue(theirs, "lost", TLS_WORKER, 5);
+	snprintf(farm, sizeof farm, "%s/old-farm", ours);
+	snprintf(node, sizeof node, "%s/old-node", ours);
+	static const char *const files[] = {"ca.pem", "crl.pem"};
+	for (size_t i = 0; i < 2; i++) {
+		append(at(theirs, files[i]), at(farm, files[i]));
+		append(at(theirs, files[i]), at(node, files[i]));
+	}
+	char new_node[256], new_lost[256];
+	snprintf(new_node, sizeof new_node, "%s/node", theirs);
+	snprintf(new_lost, sizeof new_lost, "%s/lost", theirs);
+	append(at(ours, "ca.pem"), at(new_node, "ca.pem"));
+	append(at(ours, "crl.pem"), at(new_node, "crl.pem"));
+	append(at(ours, "ca.pem"), at(new_lost, "ca.pem"));
+	append(at(ours, "crl.pem"), at(new_lost, "crl.pem"));
+	const char *const callers[] = {node, new_node, new_lost};
+	for (size_t i = 0; i < 3; i++) {
+		shake_by(callers[i], farm, 100000);
+		if (caller.rc || listener.rc)
+			fail_msg("%s: %s / %s", callers[i], caller.e.text, listener.e.text);
+		assert_true(tls_link_is_open(listener.link));
+		hang_up();
+	}
+	/* Both lists hold. */
+	assert_int_equal(authority_revoke(theirs, "lost", &count, &e), 0);
+	assert_int_equal(authority_revoke(ours, "old-node", &count, &e), 0);
+	copy(at(ours, "crl.pem"), at(farm, "crl.pem"));
+	append(at(theirs, "crl.pem"), at(farm, "crl.pem"));
+	refuses(new_lost, farm, "revoked", "revoked");
+	refuses(node, farm, "revoked", "revoked");
+	shake_by(new_node, farm, 100000);
+	assert_true(tls_link_is_open(listener.link));
+	hang_up();
+	/* The old one goes: nobody of it gets in any more. */
+	copy(at(theirs, "ca.pem"), at(farm, "ca.pem"));
+	copy(at(theirs, "crl.pem"), at(farm, "crl.pem"));
+	shake_by(at(ours, "node"), farm, 100000);
+	assert_false(tls_link_is_open(listener.link));
+	hang_up();
+}
+
 static void names_are_strict(void **state)
 {
 	(void)state;
@@ -557,6 +618,7 @@ int main(void)
 		cmocka_unit_test(a_foreign_certificate_with_our_authority_beside_it),
 		cmocka_unit_test(certificates_need_one_role_and_a_name),
 		cmocka_unit_test(who_is_revoked_is_not),
+		cmocka_unit_test(one_authority_replaces_another),
 		cmocka_unit_test(names_are_strict),
 		cmocka_unit_test(what_is_said_arrives),
 		cmocka_unit_test(half_a_record_says_nothing),
