@@ -300,7 +300,7 @@ static void say(const struct session *s)
 static int report(const struct session *s, const struct local_pilot *p, struct error *e)
 {
 	char where[64];
-	snprintf(where, sizeof where, "this machine, %u threads", s->a->threads);
+	snprintf(where, sizeof where, "this machine, %u thread%s", s->a->threads, s->a->threads == 1 ? "" : "s");
 	struct estimate m = {.scene = s->name,
 			     .where = where,
 			     .plan = &p->render,
