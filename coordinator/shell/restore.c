@@ -8,6 +8,7 @@
 
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 /* A journal on its way into an order. */
 struct replay {
@@ -197,6 +198,21 @@ static int make_order(struct server *s, const struct ledger_job *j, struct order
 	return rc;
 }
 
+/* What is stored is damaged, or of another version: the job's batches can be made again, with the same bits. */
+static void begin_anew(struct server *s, struct replay *r, const struct error *why)
+{
+	char path[SPOOL_PATH_MAX];
+	struct order *o = r->order;
+	order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"the job begins anew\"", log_quote(why->text).text);
+	spool_job_path(s->spool, o->id, "checkpoint", path);
+	unlink(path);
+	spool_job_path(s->spool, o->id, NULL, path);
+	journal_clear(path, UINT64_MAX);
+	order_release_blobs(order_submit(o), s->blobs);
+	order_free(o);
+	r->order = NULL;
+}
+
 static int restore_one(struct server *s, const struct ledger_job *j, struct error *e)
 {
 	struct replay *r = mem_alloc(1, sizeof *r);
@@ -206,6 +222,12 @@ static int restore_one(struct server *s, const struct ledger_job *j, struct erro
 	int rc = make_order(s, j, &r->order, e);
 	if (!rc)
 		rc = read_journal(s, r, e);
+	if (rc == -EBADMSG && r->order) {
+		begin_anew(s, r, e);
+		rc = make_order(s, j, &r->order, e);
+		if (!rc)
+			rc = read_journal(s, r, e);
+	}
 	if (!rc) {
 		r->order->next = s->orders;
 		s->orders = r->order;

@@ -10,7 +10,7 @@
 
 int restore_open(struct server *s, struct error *e);           /* the ledger */
 bool restore_lives(const struct server *s, uint64_t job);      /* it had not ended */
-/* Jobs that cannot go on fail with a sentence; an error is one of the machine, and another start may go better. */
+/* Jobs whose checkpoint or journal is damaged begin anew, those without a plan or a scene fail with a sentence; an error is one of the machine, and another start may go better. */
 int restore_jobs(struct server *s, struct error *e);
 
 #endif
