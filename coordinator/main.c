@@ -24,7 +24,7 @@ static const char doc[] =
 
 enum {
 	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS,
-	OPTION_TLS_CHECK, OPTION_JOURNAL
+	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL
 };
 
 static const struct argp_option options[] = {
@@ -38,6 +38,10 @@ static const struct argp_option options[] = {
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem, crl.pem: encrypt, and let in who has a certificate (hslt-ca)", 0},
 	{"tls-check", OPTION_TLS_CHECK, "SECONDS", 0, "How often certificates of live connections are checked again (60)", 0},
 	{"journal", OPTION_JOURNAL, "MB", 0, "Results of a running job that are kept before its films are written in their place (64)", 0},
+	{"quota-jobs", OPTION_JOBS, "N", 0, "Jobs of a client that have not ended", 0},
+	{"quota-assets", OPTION_ASSETS, "MB", 0, "Their files together", 0},
+	{"quota-film", OPTION_FILM, "PIXELS", 0, "Of a job's film", 0},
+	{"quota-mutations", OPTION_MUTATIONS, "N", 0, "Of a job, or samples; then each must say how many", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Listen on other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log every lease, too", 0},
 	{0},
@@ -85,6 +89,18 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_JOURNAL:
 		c->journal_bytes = (uint64_t)(1e6 * number(state, "--journal", arg, 0.001, 1e6));
+		return 0;
+	case OPTION_JOBS:
+		c->quota.jobs = (uint64_t)number(state, "--quota-jobs", arg, 1, 1e9);
+		return 0;
+	case OPTION_ASSETS:
+		c->quota.asset_bytes = (uint64_t)(1e6 * number(state, "--quota-assets", arg, 1e-6, 1e12));
+		return 0;
+	case OPTION_FILM:
+		c->quota.pixels = (uint64_t)number(state, "--quota-film", arg, 1, 1e15);
+		return 0;
+	case OPTION_MUTATIONS:
+		c->quota.mutations = (uint64_t)number(state, "--quota-mutations", arg, 1, 1e18);
 		return 0;
 	case OPTION_INSECURE:
 		c->insecure = true;

@@ -56,11 +56,40 @@ void session_upload_abort(struct session *p)
 	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, 0});
 }
 
+static uint64_t bytes_of(const Farm__Submit *m)
+{
+	uint64_t sum = 0;
+	for (size_t i = 0; i < m->n_files; i++)
+		if (__builtin_add_overflow(sum, m->files[i]->size, &sum))
+			return UINT64_MAX;
+	return sum;
+}
+
+static int within_quota(const struct session *p, struct error *e)
+{
+	struct quota_use has = {0};
+	if (p->who.role == TLS_OPERATOR)
+		return 0;
+	for (const struct order *o = p->server->orders; o; o = o->next) {
+		if (o->ended || strcmp(o->record.owner, p->who.name) != 0)
+			continue;
+		has.jobs++;
+		has.asset_bytes += bytes_of(order_submit(o));
+	}
+	return quota_check(&p->server->config.quota, &has, &p->upload->plan, bytes_of(p->upload->submit.message->submit), e);
+}
+
 /* Every blob is there: the core decides. */
 static void submit(struct session *p)
 {
 	const Farm__Submit *m = p->upload->submit.message->submit;
 	char name[128];
+	struct error e;
+	if (within_quota(p, &e)) { /* again: other jobs may have come while its files did */
+		answer_submit(p, 0, e.text, NULL);
+		session_upload_abort(p);
+		return;
+	}
 	text_copy(name, sizeof name, m->name);
 	struct event ev = {.kind = EVENT_SUBMIT,
 			   .tag = p->id,
@@ -92,6 +121,11 @@ static void take_submit(struct session *p, struct envelope *env)
 	}
 	if (p->upload->missing_count == 0) {
 		submit(p);
+		return;
+	}
+	if (within_quota(p, &e)) {
+		answer_submit(p, 0, e.text, NULL);
+		session_upload_abort(p);
 		return;
 	}
 	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, CHUNK});

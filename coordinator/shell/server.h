@@ -9,6 +9,7 @@
 #include "common/net/conn.h"
 #include "coordinator/core/farm.h"
 #include "coordinator/shell/order.h"
+#include "coordinator/shell/quota.h"
 #include "coordinator/store/ledger.h"
 #include "coordinator/store/spool.h"
 
@@ -20,6 +21,7 @@ struct server_config {
 	const char *tls;           /* a folder (common/net/tls.h); NULL or "": plaintext */
 	double tls_check_seconds;  /* how often certificates of live connections are checked again */
 	bool insecure;
+	struct quota quota; /* of each client */
 	uint64_t blob_bytes; /* the spool's limit of scene files; 0: none */
 	uint64_t journal_bytes; /* a job's journal that is longer is cut by a checkpoint */
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */

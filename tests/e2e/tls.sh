@@ -121,10 +121,24 @@ same "$DIR/alone2.exr" "$DIR/farm2.exr"
 
 # The other way round: TLS to a port without; and only a coordinator can be one.
 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port2" --spool "$DIR/spool2" --status-socket "$DIR/status2" --tls "" \
+	--quota-jobs 2 --quota-film 5000 --quota-mutations 100000 --quota-assets 0.02 \
 	2>>"$DIR/plain-coordinator.log" &
 PIDS="$PIDS $!"
 until_true 10 test -s "$DIR/port2" || fail "the plain coordinator does not listen"
 refused "TLS to a port without" 6 "no TLS" $list --coordinator "127.0.0.1:$(cat "$DIR/port2")"
+# Its quotas; the box has 1,920 pixels and 2 KB. There is no worker, so that jobs stay.
+plain="$BIN/hslt-submit --coordinator 127.0.0.1:$(cat "$DIR/port2") --tls"
+refused "a film beyond the quota" 6 "quota: a film" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 1 --size 100x80
+refused "samples beyond the quota" 6 "quota: .* samples" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 1000
+refused "samples without a bound" 6 "quota: at most" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --target-error 1%
+cp -r "$(dirname "$BOX")" "$DIR/large"
+{ echo '<?xml version="1.0"?>' && printf '<!--%30000s-->\n' '' && grep -v '^<?xml' "$BOX"; } >"$DIR/large/box.xml"
+refused "files beyond the quota" 6 "quota: its files" $plain "" "$DIR/large/box.xml" -o "$DIR/no.exr" --integrator path --spp 1
+for k in 1 2; do
+	$plain "" "$BOX" -o "$DIR/yes.exr" --integrator path --spp 16 >>"$DIR/id" 2>>"$DIR/submit.log" || fail "job $k of 2 is refused"
+done
+refused "jobs beyond the quota" 6 "quota: 2 jobs" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 1
+
 refused "a worker's certificate as coordinator" 2 "nobody would take it" "$BIN/hslt-coordinator" --listen 127.0.0.1:0 \
 	--spool "$DIR/spool3" --tls "$CA/node"
 refused "an open port without TLS" 2 "--insecure" "$BIN/hslt-coordinator" --listen 0.0.0.0:0 --spool "$DIR/spool3" \
