@@ -104,6 +104,12 @@ s.sendall(b"GET / HTTP/1.0\r\n\r\n")
 sys.exit(0 if s.recv(64)[:1] == b"\x15" and s.recv(64) == b"" else 1)' "${COORDINATOR#*:}" || fail "HTTP is not hung up on"
 row "HTTP to the TLS port" refused "an alert, and hung up"
 
+# A good certificate and bad manners.
+"${PYTHON:-python3}" "$HERE/intruder.py" "${COORDINATOR#*:}" "$CA/ann" >"$DIR/tricks" 2>"$DIR/err.log" || fail "$(cat "$DIR/err.log")"
+while IFS='|' read -r what answer; do
+	row "$what" refused "$answer"
+done <"$DIR/tricks"
+
 # Live connections: revoked, expired.
 ca revoke lost
 until_true 10 grep -q 'peer_refused.*name=.\{0,1\}lost.*revoked' "$DIR/coordinator.log" || fail "the revoked worker stays"
