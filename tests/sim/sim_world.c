@@ -12,7 +12,7 @@
 
 enum { WORKERS = 8, JOBS = 5, SLOTS = 12, ROUNDS = 512, QUEUE = 64, MESSAGES = 1 << 14, STEPS_MOST = 400000 };
 
-enum message_kind { TO_CORE, TICK, SUBMIT, LEASE, REVOKE, FINISH, BEAT, CRASH, START, CALM };
+enum message_kind { TO_CORE, TICK, SUBMIT, LEASE, REVOKE, FINISH, BEAT, CRASH, START, CALM, RESTART };
 
 struct message {
 	double time;
@@ -48,6 +48,7 @@ struct sim_job {
 	uint64_t next[SLOTS], state[SLOTS], boot;
 	uint64_t round_sum[ROUNDS];
 	uint64_t rounds; /* complete, counted here */
+	double completed; /* s after its first lease: the last complete round */
 	char fingerprint[2]; /* of those whose work is merged */
 	double progress;
 };
@@ -58,6 +59,7 @@ struct world {
 	double now, calm, tick_at;
 	double drop, repeat, delay, failure;
 	struct farm *farm;
+	struct farm_config config;
 	struct message *heap;
 	size_t heap_count;
 	uint32_t worker_count, job_count;
@@ -219,7 +221,7 @@ static void finish(struct world *w, const struct message *m)
 	work_on(w, m->worker);
 }
 
-/* An answer that nobody asked for: right if its epoch is the next one, else of an epoch that is not open. */
+/* An answer that nobody asked for, perhaps of an epoch that is not open, and right should it come when it is. */
 static void volunteer(struct world *w, const struct worker *k)
 {
 	const struct sim_job *j = &w->jobs[below(w, w->job_count)];
@@ -228,9 +230,14 @@ static void volunteer(struct world *w, const struct worker *k)
 	struct lease_key key = { .job = j->id, .kind = LEASE_RENDER, .group = below(w, j->plan.groups),
 				 .part = below(w, j->plan.parts) };
 	uint32_t slot = key.group * j->plan.parts + key.part;
-	key.epoch = j->next[slot] + below(w, 3);
+	key.epoch = j->next[slot];
+	uint64_t value = result_of(key, j->state[slot]);
+	for (uint32_t later = below(w, 3); later > 0; later--) {
+		key.epoch++;
+		value = result_of(key, value);
+	}
 	struct event ev = { .kind = EVENT_BATCH, .lease = { .key = key, .valid = true } };
-	tell_core(w, k, ev, result_of(key, j->state[slot]));
+	tell_core(w, k, ev, value);
 }
 
 static void beat(struct world *w, const struct message *m)
@@ -508,6 +515,7 @@ static void act(struct world *w, const struct action *a, uint64_t value)
 	case ACTION_BOOTSTRAP_DONE: prepare(w, a, j); break;
 	case ACTION_EVALUATE_ERROR: evaluate(w, a, j); break;
 	case ACTION_ROUND_DONE:
+		j->completed = farm_elapsed(w->farm, a->job, w->now);
 		if (a->rounds != j->rounds)
 			wrong(w, "round %" PRIu64 " said to be complete, %" PRIu64 " are", a->rounds, j->rounds);
 		break;
@@ -560,6 +568,60 @@ static void step(struct world *w, struct event *ev, uint64_t value)
 	}
 }
 
+/* ---- the coordinator dies and comes back */
+
+static void restore(struct world *w, struct sim_job *j, double elapsed)
+{
+	static const struct forecast_history no_looks;
+	uint32_t slots = j->plan.groups * j->plan.parts;
+	uint64_t next[SLOTS];
+	bool render = j->boot == (1u << slots) - 1;
+	for (uint32_t i = 0; i < slots; i++)
+		next[i] = render ? j->next[i] : j->boot >> i & 1;
+	j->prepared = render;
+	j->progress = 0; /* looks at the error are not remembered here */
+	struct event ev = { .kind = EVENT_RESTORE,
+			    .restore = { .job = j->id,
+					 .submit = { .plan = &j->plan, .name = "sim", .priority = j->priority, .mixed = j->mixed },
+					 .fingerprint = j->mixed ? "" : j->fingerprint,
+					 .kind = render ? LEASE_RENDER : LEASE_BOOTSTRAP,
+					 .next = next,
+					 .elapsed = elapsed,
+					 .opened = elapsed,
+					 .completed = j->completed,
+					 .looks = &no_looks } };
+	step(w, &ev, 0);
+}
+
+/* Only what is merged is remembered. What was under way to the old one comes to the new one, from peers that it does not know. */
+static void restart(struct world *w)
+{
+	double elapsed[JOBS];
+	struct farm *old = w->farm;
+	struct error e;
+	w->result.restarts++;
+	for (uint32_t i = 0; i < w->job_count; i++)
+		elapsed[i] = w->jobs[i].submitted ? farm_elapsed(old, w->jobs[i].id, w->now) : NAN;
+	for (uint32_t i = 0; i < w->job_count; i++)
+		if (w->jobs[i].submitted && w->jobs[i].id >= w->config.first_job)
+			w->config.first_job = w->jobs[i].id + 1;
+	if (farm_new(&w->farm, &w->config, &e) < 0) {
+		wrong(w, "no memory for another farm");
+		return;
+	}
+	farm_free(old);
+	w->tick_at = INFINITY;
+	for (uint64_t id = 1; id < w->config.first_job; id++)
+		for (uint32_t i = 0; i < w->job_count; i++)
+			if (w->jobs[i].submitted && !w->jobs[i].over && w->jobs[i].id == id)
+				restore(w, &w->jobs[i], elapsed[i]);
+	for (uint32_t i = 0; i < w->worker_count; i++) {
+		if (w->workers[i].peer)
+			push(w, (struct message){ .kind = START, .time = w->now + 20 * uniform(w), .worker = i });
+		w->workers[i].peer = 0;
+	}
+}
+
 /* ---- the seed's world */
 
 static void plan_job(struct world *w, struct sim_job *j)
@@ -608,6 +670,8 @@ static void make_world(struct world *w)
 		push(w, (struct message){ .kind = SUBMIT, .time = i ? 300 * uniform(w) : 0, .worker = i });
 	}
 	push(w, (struct message){ .kind = CALM, .time = w->calm });
+	for (uint32_t i = chance(w, 0.5) ? 1 + below(w, 4) : 0; i > 0; i--)
+		push(w, (struct message){ .kind = RESTART, .time = 600 * uniform(w) * uniform(w) });
 }
 
 static void submit(struct world *w, uint32_t index)
@@ -640,6 +704,7 @@ static void happen(struct world *w, struct message *m)
 	case CRASH: crash(w, m); break;
 	case START: start(w, m->worker); break;
 	case CALM: calm_down(w); break;
+	case RESTART: restart(w); break;
 	}
 }
 
@@ -656,13 +721,12 @@ const char *sim_run(uint64_t seed, int trace, struct sim_result *r)
 	static struct world world;
 	struct world *w = &world;
 	*w = (struct world){ .seed = seed, .trace = trace };
-	struct farm_config c;
 	struct error e;
-	farm_config_init(&c);
-	c.max_peers = 4 * WORKERS;
-	c.max_jobs = JOBS;
+	farm_config_init(&w->config);
+	w->config.max_peers = 4 * WORKERS;
+	w->config.max_jobs = JOBS;
 	w->heap = mem_alloc(MESSAGES, sizeof *w->heap);
-	if (!w->heap || farm_new(&w->farm, &c, &e) < 0) {
+	if (!w->heap || farm_new(&w->farm, &w->config, &e) < 0) {
 		mem_free(w->heap);
 		return "no memory for the world";
 	}

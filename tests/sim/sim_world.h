@@ -1,6 +1,6 @@
 /*
  * A farm in virtual time around the real core: workers that compute, crash, freeze, come back, fail, lie and volunteer; a network that
- * drops, repeats, delays and reorders; jobs with priorities and bounds, some cancelled. Everything follows from one seed.
+ * drops, repeats, delays and reorders; a coordinator that dies and remembers what is merged; jobs with priorities and bounds, some cancelled. Everything follows from one seed.
  * After `calm` seconds the trouble ends and every job must end too.
  *
  * A lease's result is a number made from its key and from the result of the epoch before, as a chain state is, so an epoch
@@ -16,7 +16,7 @@
 #include <stdint.h>
 
 struct sim_result {
-	uint64_t steps, merged, repeats, refused, crashes, done, failed, cancelled, copies, timeouts;
+	uint64_t steps, merged, repeats, refused, crashes, done, failed, cancelled, copies, timeouts, restarts;
 	double time; /* virtual seconds */
 };
 
