@@ -148,7 +148,7 @@ static void test_other_material(void **state)
 	(void)state;
 	struct world *w = world_of_text(32, 32, SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other") BLOCK("0", "0", "0", ".5", "metal")
 						"<shape type='rectangle'><transform name='to_world'><scale value='9'/><translate z='-2'/></transform>"
-						"<ref id='other'/></shape>");
+						"<ref id='other'/></shape><emitter type='constant'/>"); /* in the dark all are black */
 	lay_path(w, (vec3[]){{0.2, 0, 3}, {0.2, 0, 0}, {2, 0, 3}}, 3);
 	vec2 h[3];
 	struct walk_limits once = normal;
