@@ -30,6 +30,56 @@ static int add_file(struct scene_bundle *b, const char *name, struct error *e)
 	return blob_hash_file(path, &f->hash, &f->size, e);
 }
 
+/* A folder that remembers what was opened: the world is built here as workers will build it, so what was not opened they do
+ * not need. One thread. */
+struct opened {
+	struct asset_source folder;
+	char **names;
+	size_t count, room;
+};
+
+static int open_remembered(void *user, const char *name, struct asset *out, struct error *e)
+{
+	struct opened *o = user;
+	if (o->count == o->room) {
+		size_t room = o->room ? 2 * o->room : 16;
+		char **names = mem_alloc(room, sizeof *names);
+		if (!names)
+			return error_set(e, ENOMEM, "no memory for the list of files");
+		if (o->count)
+			memcpy(names, o->names, o->count * sizeof *names);
+		mem_free(o->names);
+		o->names = names;
+		o->room = room;
+	}
+	o->names[o->count] = mem_strdup(name);
+	if (!o->names[o->count])
+		return error_set(e, ENOMEM, "no memory for the list of files");
+	o->count++;
+	return o->folder.open(o->folder.user, name, out, e);
+}
+
+static void close_remembered(void *user, struct asset *a)
+{
+	struct opened *o = user;
+	o->folder.close(o->folder.user, a);
+}
+
+static bool was_opened(const struct opened *o, const char *name)
+{
+	for (size_t i = 0; i < o->count; i++)
+		if (strcmp(o->names[i], name) == 0)
+			return true;
+	return false;
+}
+
+static void opened_fini(struct opened *o)
+{
+	for (size_t i = 0; i < o->count; i++)
+		mem_free(o->names[i]);
+	mem_free(o->names);
+}
+
 static int copy_notes(struct scene_bundle *b, const struct scene *s, struct error *e)
 {
 	b->notes = mem_alloc(s->note_count, sizeof *b->notes);
@@ -42,14 +92,15 @@ static int copy_notes(struct scene_bundle *b, const struct scene *s, struct erro
 	return b->note_count == s->note_count && b->notes ? 0 : error_set(e, ENOMEM, "no memory for the scene's notes");
 }
 
-static int add_files(struct scene_bundle *b, const struct scene *s, struct error *e)
+static int add_files(struct scene_bundle *b, const struct scene *s, const struct opened *o, struct error *e)
 {
 	b->files = mem_alloc((size_t)s->asset_count + 1, sizeof *b->files);
 	if (!b->files)
 		return error_set(e, ENOMEM, "no memory for the list of files");
 	int rc = add_file(b, b->scene, e);
 	for (uint32_t i = 0; !rc && i < s->asset_count; i++)
-		rc = add_file(b, s->assets[i], e);
+		if (was_opened(o, s->assets[i]))
+			rc = add_file(b, s->assets[i], e);
 	return rc;
 }
 
@@ -61,16 +112,18 @@ int scene_bundle_read(struct scene_bundle *b, const char *path, const struct sce
 	int rc = scene_path_split(path, &b->folder, &b->scene, e);
 	if (rc)
 		return rc;
-	struct asset_source assets = asset_folder(b->folder);
+	struct opened opened = {.folder = asset_folder(b->folder)};
+	struct asset_source assets = {&opened, open_remembered, close_remembered};
 	rc = scene_read(&scene, &assets, b->scene, render_plugins(), defines, define_count, e);
 	if (!rc) {
 		rc = render_check(&scene, &assets, o, &b->summary, e);
 		if (!rc)
 			rc = copy_notes(b, &scene, e);
 		if (!rc)
-			rc = add_files(b, &scene, e);
+			rc = add_files(b, &scene, &opened, e);
 		scene_fini(&scene);
 	}
+	opened_fini(&opened);
 	if (rc)
 		scene_bundle_fini(b);
 	return rc;

@@ -26,7 +26,8 @@ struct scene_bundle {
 	char **notes;
 };
 
-/* Reads and checks the scene with everything that it refers to. The error names file, line and element. */
+/* Reads and checks the scene with everything that it calls for; files that its world was built without are not of the bundle. The
+ * error names file, line and element. */
 int scene_bundle_read(struct scene_bundle *b, const char *path, const struct scene_define *defines, size_t define_count,
 		      const struct render_options *o, struct error *e);
 void scene_bundle_fini(struct scene_bundle *b);

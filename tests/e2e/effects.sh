@@ -1,0 +1,31 @@
+# What a scene calls for: listed, overridden, in the bits of farm and hslt-render alike; and what it does not is not sent.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare
+HERE=$(cd "$(dirname "$0")/.." && pwd)
+
+# The box, with a textured material that no shape uses.
+cp -r "$HERE/scenes/box/." "$DIR/scene"
+head -c 4000 /dev/urandom >"$DIR/scene/unused.png"
+sed "s|</scene>|<bsdf type='diffuse' id='nobody'><texture name='reflectance' type='bitmap'><string name='filename' value='unused.png'/></texture></bsdf></scene>|" \
+	"$HERE/scenes/box/box.xml" >"$DIR/scene/box.xml"
+SCENE=$DIR/scene/box.xml
+
+"$BIN/hslt-render" --explain "$SCENE" >"$DIR/list" 2>"$DIR/log" || fail "--explain ended with $?: $(cat "$DIR/log")"
+grep -q '^textures  *off' "$DIR/list" || fail "textures of a material that nobody uses: $(cat "$DIR/list")"
+grep -q '^aperture  *off' "$DIR/list" || fail "no word on the aperture"
+"$BIN/hslt-render" --explain --effects=+aperture "$SCENE" 2>/dev/null | grep -q '^aperture  *on (forced)' || fail "not forced"
+for p in render submit; do
+	code=0
+	HSLT_COORDINATOR=127.0.0.1:1 "$BIN/hslt-$p" "$SCENE" -o "$DIR/a.exr" --effects=+apertur 2>"$DIR/wrong.log" || code=$?
+	[ $code -eq 2 ] && grep -q aperture "$DIR/wrong.log" || fail "hslt-$p --effects=+apertur: $code, $(cat "$DIR/wrong.log")"
+done
+
+OPTIONS="--size 64x36 --spp 32 --effects=+aperture"
+"$BIN/hslt-render" "$SCENE" -o "$DIR/a.exr" $OPTIONS --quiet || fail "hslt-render ended with $?"
+start_coordinator
+start_worker w1
+id=$(submit "$SCENE" -o "$DIR/farm.exr" $OPTIONS --wait) || fail "hslt-submit ended with $?"
+same "$DIR/a.exr" "$DIR/farm.exr"
+"$BIN/hslt-status" "$id" >"$DIR/said"
+grep -q 'on *(forced) *aperture' "$DIR/said" || fail "an ended job does not list its effects: $(cat "$DIR/said")"
+[ -z "$(find "$DIR" -path '*blobs*' -type f -size 4000c)" ] || fail "a texture of a material that nobody uses was sent"
