@@ -3,14 +3,13 @@
 #include "common/base/version.h"
 #include "common/film/image_file.h"
 #include "worker/cli/accuracy.h"
+#include "worker/cli/interrupt.h"
 #include "worker/cli/options.h"
 
 #include <math.h>
-#include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 const char *argp_program_version = "hslt-accuracy " HSLT_VERSION;
 
@@ -97,9 +96,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 			argp_error(state, "--rounds takes 2 to %d, not '%s'", ACCURACY_COSTS, arg);
 		return 0;
 	case OPTION_THREADS:
-		a->threads = (unsigned)option_whole(state, "--threads", arg);
-		if (a->threads < 1 || a->threads > 1024)
-			argp_error(state, "--threads takes 1 to 1024, not '%s'", arg);
+		a->threads = option_threads(state, arg);
 		return 0;
 	case OPTION_KNOBS:
 		a->knobs = arg;
@@ -121,14 +118,6 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	default:
 		return ARGP_ERR_UNKNOWN;
 	}
-}
-
-static atomic_bool interrupted;
-
-static void interrupt(int signal_number)
-{
-	(void)signal_number;
-	atomic_store(&interrupted, true);
 }
 
 struct session {
@@ -267,13 +256,10 @@ int main(int argc, char **argv)
 	static struct session s;
 	struct error e = {""};
 	mem_keep(1 << 20);
-	long processors = sysconf(_SC_NPROCESSORS_ONLN);
-	a.threads = processors > 0 ? (unsigned)processors : 1;
+	a.threads = option_threads_default();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
-	struct sigaction act = {.sa_handler = interrupt, .sa_flags = (int)SA_RESETHAND};
-	sigaction(SIGINT, &act, NULL);
-	sigaction(SIGTERM, &act, NULL);
+	interrupt_watch();
 	s.a = &a;
 	int rc = run(&s, &e);
 	accuracy_run_fini(&s.run);

@@ -6,16 +6,15 @@
 #include "worker/cli/estimate.h"
 #include "worker/cli/explain.h"
 #include "worker/cli/local_pilot.h"
+#include "worker/cli/interrupt.h"
 #include "worker/cli/options.h"
 #include "worker/cli/pilot.h"
 #include "worker/cli/stats.h"
 
 #include <math.h>
-#include <signal.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 
 const char *argp_program_version = "hslt-render " HSLT_VERSION;
 
@@ -71,9 +70,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		a->output = arg;
 		return 0;
 	case OPTION_THREADS:
-		a->threads = (unsigned)option_whole(state, "--threads", arg);
-		if (a->threads < 1 || a->threads > 1024)
-			argp_error(state, "--threads takes 1 to 1024, not '%s'", arg);
+		a->threads = option_threads(state, arg);
 		return 0;
 	case OPTION_STATS:
 		a->stats = arg;
@@ -114,14 +111,6 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	default:
 		return ARGP_ERR_UNKNOWN;
 	}
-}
-
-static atomic_bool interrupted;
-
-static void interrupt(int signal_number)
-{
-	(void)signal_number;
-	atomic_store(&interrupted, true);
 }
 
 struct session {
@@ -375,13 +364,10 @@ int main(int argc, char **argv)
 	static struct session s;
 	struct error e = {""};
 	mem_keep(1 << 20);
-	long processors = sysconf(_SC_NPROCESSORS_ONLN);
-	a.threads = processors > 0 ? (unsigned)processors : 1;
+	a.threads = option_threads_default();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
-	struct sigaction act = {.sa_handler = interrupt, .sa_flags = (int)SA_RESETHAND};
-	sigaction(SIGINT, &act, NULL);
-	sigaction(SIGTERM, &act, NULL);
+	interrupt_watch();
 	s.a = &a;
 	int rc = run(&s, &e);
 	canvas_image_fini(&s.image);

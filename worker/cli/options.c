@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 enum {
 	OPTION_SPP = 1000, OPTION_MUTATIONS, OPTION_TIME, OPTION_TARGET, OPTION_SIZE, OPTION_CROP, OPTION_SEED, OPTION_MIN_DEPTH,
@@ -59,6 +60,20 @@ uint64_t option_whole(const struct argp_state *state, const char *option, const 
 	if (*arg < '0' || *arg > '9' || *end || errno)
 		argp_error(state, "%s takes a whole number, not '%s'", option, arg);
 	return n;
+}
+
+unsigned option_threads(const struct argp_state *state, const char *arg)
+{
+	uint64_t n = option_whole(state, "--threads", arg);
+	if (n < 1 || n > 1024)
+		argp_error(state, "--threads takes 1 to 1024, not '%s'", arg);
+	return (unsigned)n;
+}
+
+unsigned option_threads_default(void)
+{
+	long processors = sysconf(_SC_NPROCESSORS_ONLN);
+	return processors > 0 ? (unsigned)processors : 1;
 }
 
 static uint32_t whole32(const struct argp_state *state, const char *option, const char *arg)

@@ -28,6 +28,8 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 
 /* A whole number, or the usage error of `option`. */
 uint64_t option_whole(const struct argp_state *state, const char *option, const char *arg);
+unsigned option_threads(const struct argp_state *state, const char *arg);
+unsigned option_threads_default(void); /* as many as processors */
 double option_seconds(const struct argp_state *state, const char *option, const char *arg);
 
 /* "a/b/room.xml" -> "a/b" and "room.xml"; both to be mem_free'd. */

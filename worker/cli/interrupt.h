@@ -1,0 +1,13 @@
+/*
+ * SIGINT and SIGTERM as a flag that renders look at: the first asks for an end that leaves what is complete, the second one
+ * kills. One a process.
+ */
+#ifndef WORKER_CLI_INTERRUPT_H
+#define WORKER_CLI_INTERRUPT_H
+
+#include <stdatomic.h>
+
+extern atomic_bool interrupted;
+void interrupt_watch(void);
+
+#endif
