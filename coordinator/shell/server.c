@@ -437,7 +437,19 @@ static void close_stores(struct server *s)
 	mem_free(s->restored);
 }
 
-int server_run(const struct server_config *c, struct error *e)
+void server_close(struct server *s)
+{
+	stop(s);
+	uv_run(&s->loop, UV_RUN_DEFAULT);
+	int closed = uv_loop_close(&s->loop);
+	assert(closed == 0);
+	(void)closed;
+	close_stores(s);
+	tls_close(s->tls);
+	mem_free(s);
+}
+
+int server_open(struct server **out, const struct server_config *c, struct error *e)
 {
 	struct server *s = mem_alloc(1, sizeof *s);
 	if (!s)
@@ -462,15 +474,20 @@ int server_run(const struct server_config *c, struct error *e)
 	if (!rc)
 		rc = start_listening(s, e);
 	if (rc)
-		stop(s);
+		server_close(s);
 	else
-		notify_send("READY=1");
-	uv_run(&s->loop, UV_RUN_DEFAULT);
-	int closed = uv_loop_close(&s->loop);
-	assert(closed == 0);
-	(void)closed;
-	close_stores(s);
-	tls_close(s->tls);
-	mem_free(s);
+		*out = s;
 	return rc;
+}
+
+int server_run(const struct server_config *c, struct error *e)
+{
+	struct server *s;
+	int rc = server_open(&s, c, e);
+	if (rc)
+		return rc;
+	notify_send("READY=1");
+	uv_run(&s->loop, UV_RUN_DEFAULT);
+	server_close(s);
+	return 0;
 }

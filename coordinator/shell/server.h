@@ -32,7 +32,12 @@ void server_config_init(struct server_config *c);
 
 int server_run(const struct server_config *c, struct error *e);
 
-/* ---- for the parts of the shell ---- */
+/* ---- for the parts of the shell, and whoever turns its loop ---- */
+
+struct server;
+
+int server_open(struct server **s, const struct server_config *c, struct error *e);
+void server_close(struct server *s); /* stops it, if no signal has */
 
 struct session;
 struct status_socket;

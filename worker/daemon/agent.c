@@ -238,7 +238,7 @@ static int start(struct agent *a, struct error *e)
 	return rc;
 }
 
-int agent_run(const struct agent_config *c, struct error *e)
+int agent_open(struct agent **out, const struct agent_config *c, struct error *e)
 {
 	struct agent *a = mem_alloc(1, sizeof *a);
 	if (!a)
@@ -249,19 +249,40 @@ int agent_run(const struct agent_config *c, struct error *e)
 	a->back_off = first_back_off;
 	fingerprint_make(a->fingerprint);
 	int rc = start(a, e);
-	if (!rc) {
-		log_event(LOG_START, "program=hslt-worker name=%s threads=%u fingerprint=%s", log_quote(c->name).text,
-			  c->threads, log_quote(a->fingerprint).text);
-		init_handles(a);
-		connect_now(a);
-		uv_run(&a->loop, UV_RUN_DEFAULT);
-		int closed = uv_loop_close(&a->loop);
-		assert(closed == 0);
-		(void)closed;
-		desk_close(a);
+	if (rc) {
+		cache_close(&a->cache);
+		tls_close(a->tls);
+		mem_free(a);
+		return rc;
 	}
+	log_event(LOG_START, "program=hslt-worker name=%s threads=%u fingerprint=%s", log_quote(c->name).text, c->threads,
+		  log_quote(a->fingerprint).text);
+	init_handles(a);
+	connect_now(a);
+	*out = a;
+	return 0;
+}
+
+void agent_close(struct agent *a)
+{
+	go(a);
+	uv_run(&a->loop, UV_RUN_DEFAULT);
+	int closed = uv_loop_close(&a->loop);
+	assert(closed == 0);
+	(void)closed;
+	desk_close(a);
 	cache_close(&a->cache);
 	tls_close(a->tls);
 	mem_free(a);
-	return rc;
+}
+
+int agent_run(const struct agent_config *c, struct error *e)
+{
+	struct agent *a;
+	int rc = agent_open(&a, c, e);
+	if (rc)
+		return rc;
+	uv_run(&a->loop, UV_RUN_DEFAULT);
+	agent_close(a);
+	return 0;
 }

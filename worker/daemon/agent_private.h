@@ -29,6 +29,8 @@ struct agent {
 };
 
 /* agent.c */
+int agent_open(struct agent **a, const struct agent_config *c, struct error *e);
+void agent_close(struct agent *a); /* leaves at once, if it has not left */
 void agent_send(struct agent *a, const Farm__Envelope *m);
 /* Leaves when nothing is left to do. */
 void agent_settle(struct agent *a);
