@@ -1,78 +1,134 @@
 #include "common/base/sealed.h"
 
 #include "common/base/crc.h"
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 
+#include <fcntl.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 enum { BUFFER = 1 << 16 };
 
-static int fault(const struct sealed *s, struct error *e)
+static int fault(const struct sealed *s, int code, struct error *e)
 {
-	int code = errno ? errno : EIO;
 	return error_set(e, code, "%s: %s", s->path, strerror(code));
+}
+
+static int open_file(struct sealed *s, const char *path, int flags, struct error *e)
+{
+	*s = (struct sealed){.path = path, .fd = disk_open(path, flags | O_CLOEXEC, 0666)};
+	if (s->fd < 0)
+		return fault(s, errno, e);
+	s->buffer = mem_alloc(BUFFER, 1);
+	if (s->buffer)
+		return 0;
+	disk_close(s->fd);
+	return error_set(e, ENOMEM, "no memory to open %s", path);
 }
 
 int sealed_create(struct sealed *s, const char *path, struct error *e)
 {
-	*s = (struct sealed){.path = path, .file = fopen(path, "wbe")};
-	return s->file ? 0 : fault(s, e);
+	return open_file(s, path, O_WRONLY | O_CREAT | O_TRUNC, e);
+}
+
+static int flush(struct sealed *s, struct error *e)
+{
+	int rc = disk_write_all(s->fd, s->buffer, s->filled);
+	s->filled = 0;
+	return rc ? fault(s, -rc, e) : 0;
 }
 
 int sealed_write(struct sealed *s, const void *bytes, size_t size, struct error *e)
 {
 	s->crc = crc32c(s->crc, bytes, size);
 	s->bytes += size;
-	errno = 0;
-	return fwrite(bytes, 1, size, s->file) == size ? 0 : fault(s, e);
+	for (const unsigned char *p = bytes; size;) {
+		size_t n = size < BUFFER - s->filled ? size : BUFFER - s->filled;
+		memcpy(s->buffer + s->filled, p, n);
+		s->filled += n;
+		p += n;
+		size -= n;
+		int rc = s->filled == BUFFER ? flush(s, e) : 0;
+		if (rc)
+			return rc;
+	}
+	return 0;
 }
 
 int sealed_finish(struct sealed *s, struct error *e)
 {
 	uint32_t crc = s->crc;
 	int rc = sealed_write(s, &crc, sizeof crc, e);
-	if (!rc && (fflush(s->file) || fsync(fileno(s->file))))
-		rc = fault(s, e);
-	if (fclose(s->file) && !rc)
-		rc = fault(s, e);
-	s->file = NULL;
+	if (!rc)
+		rc = flush(s, e);
+	if (!rc && disk_fsync(s->fd))
+		rc = fault(s, errno, e);
+	if (disk_close(s->fd) && !rc)
+		rc = fault(s, errno, e);
+	mem_free(s->buffer);
+	s->buffer = NULL;
 	return rc;
+}
+
+/* Fills the buffer anew; at the end of the file it stays empty. */
+static int fill(struct sealed *s, struct error *e)
+{
+	ssize_t n;
+	do
+		n = disk_pread(s->fd, s->buffer, BUFFER, (off_t)s->from);
+	while (n < 0 && errno == EINTR);
+	s->at = 0;
+	s->filled = n > 0 ? (size_t)n : 0;
+	s->from += s->filled;
+	return n < 0 ? fault(s, errno, e) : 0;
+}
+
+static int take(struct sealed *s, void *bytes, size_t size, struct error *e)
+{
+	for (unsigned char *p = bytes; size;) {
+		int rc = s->at == s->filled ? fill(s, e) : 0;
+		if (rc)
+			return rc;
+		size_t n = s->filled - s->at < size ? s->filled - s->at : size;
+		if (n == 0)
+			return error_set(e, EBADMSG, "%s: ends too early", s->path);
+		memcpy(p, s->buffer + s->at, n);
+		s->at += n;
+		p += n;
+		size -= n;
+	}
+	return 0;
 }
 
 static int check(struct sealed *s, struct error *e)
 {
 	struct stat st;
 	uint32_t crc = 0, want;
-	if (fstat(fileno(s->file), &st))
-		return fault(s, e);
+	if (disk_fstat(s->fd, &st))
+		return fault(s, errno, e);
 	if ((uint64_t)st.st_size < sizeof want)
 		return error_set(e, EBADMSG, "%s: too short", s->path);
 	s->left = (uint64_t)st.st_size - sizeof want;
-	unsigned char *buffer = mem_alloc(BUFFER, 1);
-	if (!buffer)
-		return error_set(e, ENOMEM, "no memory to read %s", s->path);
-	size_t n = 1;
-	for (uint64_t left = s->left; left && n; left -= n) {
-		n = fread(buffer, 1, left < BUFFER ? left : BUFFER, s->file);
-		crc = crc32c(crc, buffer, n);
+	for (uint64_t left = s->left; left;) {
+		int rc = s->at == s->filled ? fill(s, e) : 0;
+		size_t n = s->filled - s->at < left ? s->filled - s->at : (size_t)left;
+		if (rc || n == 0)
+			return rc ? rc : error_set(e, EBADMSG, "%s: ends too early", s->path);
+		crc = crc32c(crc, s->buffer + s->at, n);
+		s->at += n;
+		left -= n;
 	}
-	mem_free(buffer);
-	if (ferror(s->file))
-		return fault(s, e);
-	if (fread(&want, sizeof want, 1, s->file) != 1 || want != crc)
-		return error_set(e, EBADMSG, "%s: damaged", s->path);
-	rewind(s->file);
-	return 0;
+	int rc = take(s, &want, sizeof want, e);
+	return rc ? rc : want == crc ? 0 : error_set(e, EBADMSG, "%s: damaged", s->path);
 }
 
 int sealed_open(struct sealed *s, const char *path, struct error *e)
 {
-	*s = (struct sealed){.path = path, .file = fopen(path, "rbe")};
-	if (!s->file)
-		return fault(s, e);
-	int rc = check(s, e);
+	int rc = open_file(s, path, O_RDONLY, e);
+	if (rc)
+		return rc;
+	rc = check(s, e);
+	s->at = s->filled = s->from = 0;
 	if (rc)
 		sealed_close(s);
 	return rc;
@@ -83,13 +139,13 @@ int sealed_read(struct sealed *s, void *bytes, size_t size, struct error *e)
 	if (size > s->left)
 		return error_set(e, EBADMSG, "%s: ends too early", s->path);
 	s->left -= size;
-	errno = 0;
-	return fread(bytes, 1, size, s->file) == size ? 0 : fault(s, e);
+	return take(s, bytes, size, e);
 }
 
 void sealed_close(struct sealed *s)
 {
-	if (s->file)
-		fclose(s->file);
-	s->file = NULL;
+	if (s->buffer)
+		disk_close(s->fd);
+	mem_free(s->buffer);
+	s->buffer = NULL;
 }

@@ -10,11 +10,13 @@
 
 #include <stddef.h>
 #include <stdint.h>
-#include <stdio.h>
 
 struct sealed {
-	FILE *file;
+	int fd;
 	uint32_t crc;
+	unsigned char *buffer; /* NULL: the file is closed */
+	size_t at, filled;     /* in the buffer: reading; bytes of the file that are in it */
+	uint64_t from;         /* reading: the buffer's end in the file */
 	uint64_t left, bytes; /* reading: until the CRC; writing: so far */
 	const char *path;     /* the caller's */
 };

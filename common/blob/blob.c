@@ -1,16 +1,17 @@
 #include "common/blob/blob.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 
-#include <dirent.h>
 #include <fcntl.h>
 #include <openssl/evp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
 #include <time.h>
 #include <unistd.h>
+
+enum { PATH_MOST = 4096 };
 
 struct entry {
 	struct blob_hash hash;
@@ -20,7 +21,6 @@ struct entry {
 
 struct blob_store {
 	char *folder;
-	int fd;
 	uint64_t limit, bytes, clock;
 	uint64_t temporary; /* number of the last temporary file */
 	struct entry *entries;
@@ -32,7 +32,7 @@ struct blob_writer {
 	struct blob_hash hash;
 	uint64_t size, at;
 	int fd;
-	char name[48];
+	char path[PATH_MOST]; /* of the temporary file */
 	EVP_MD_CTX *md;
 };
 
@@ -48,7 +48,7 @@ int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struc
 
 int blob_hash_file(const char *path, struct blob_hash *out, uint64_t *size, struct error *e)
 {
-	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
 	if (fd < 0)
 		return error_set(e, errno, "%s: %s", path, strerror(errno));
 	EVP_MD_CTX *md = EVP_MD_CTX_new();
@@ -58,7 +58,7 @@ int blob_hash_file(const char *path, struct blob_hash *out, uint64_t *size, stru
 			 : error_set(e, ENOMEM, "%s: SHA-256 cannot start", path);
 	ssize_t n = 1;
 	*size = 0;
-	while (!rc && (n = read(fd, chunk, 1 << 16)) > 0) {
+	while (!rc && (n = disk_read(fd, chunk, 1 << 16)) > 0) {
 		*size += (uint64_t)n;
 		if (EVP_DigestUpdate(md, chunk, (size_t)n) != 1)
 			rc = error_set(e, EIO, "%s: SHA-256 failed", path);
@@ -69,7 +69,7 @@ int blob_hash_file(const char *path, struct blob_hash *out, uint64_t *size, stru
 		rc = error_set(e, EIO, "%s: SHA-256 failed", path);
 	mem_free(chunk);
 	EVP_MD_CTX_free(md);
-	close(fd);
+	disk_close(fd);
 	return rc;
 }
 
@@ -103,6 +103,11 @@ bool blob_hash_equal(const struct blob_hash *a, const struct blob_hash *b)
 }
 
 /* ---- the store ---- */
+
+static void path_of(const struct blob_store *s, const char *name, char path[PATH_MOST])
+{
+	snprintf(path, PATH_MOST, "%s/%s", s->folder, name);
+}
 
 static struct entry *find(struct blob_store *s, const struct blob_hash *h)
 {
@@ -146,16 +151,18 @@ static int read_folder(struct blob_store *s, struct error *e)
 {
 	struct found *all = NULL;
 	size_t count = 0, capacity = 0;
-	int rc = 0, copy = dup(s->fd);
-	DIR *d = copy < 0 ? NULL : fdopendir(copy);
+	int rc = 0;
+	DIR *d = disk_opendir(s->folder);
 	if (!d)
 		return error_set(e, errno, "%s: %s", s->folder, strerror(errno));
 	for (struct dirent *f; !rc && (f = readdir(d));) {
 		struct stat st;
 		struct blob_hash h;
+		char path[PATH_MOST];
+		path_of(s, f->d_name, path);
 		if (strncmp(f->d_name, "tmp.", 4) == 0)
-			unlinkat(s->fd, f->d_name, 0);
-		if (!from_hex(f->d_name, &h) || fstatat(s->fd, f->d_name, &st, AT_SYMLINK_NOFOLLOW) || !S_ISREG(st.st_mode))
+			disk_unlink(path);
+		if (!from_hex(f->d_name, &h) || disk_stat(path, &st) || !S_ISREG(st.st_mode))
 			continue;
 		if (count == capacity) {
 			size_t want = capacity ? 2 * capacity : 64;
@@ -190,9 +197,9 @@ static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 			return error_set(e, EFBIG,
 					 "%s: %llu bytes more do not fit below its limit of %llu beside what is in use",
 					 s->folder, (unsigned long long)need, (unsigned long long)s->limit);
-		char hex[BLOB_HEX_SIZE];
-		blob_hex(&oldest->hash, hex);
-		unlinkat(s->fd, hex, 0);
+		char path[PATH_MOST];
+		blob_path(s, &oldest->hash, path, sizeof path);
+		disk_unlink(path);
 		s->bytes -= oldest->size;
 		*oldest = s->entries[--s->count];
 	}
@@ -207,12 +214,8 @@ int blob_store_open(struct blob_store **out, const char *folder, uint64_t limit,
 		return error_set(e, ENOMEM, "no memory for a blob store");
 	}
 	s->limit = limit;
-	int rc = 0;
-	if (mkdir(folder, 0700) && errno != EEXIST)
-		rc = error_set(e, errno, "%s: %s", folder, strerror(errno));
-	s->fd = rc ? -1 : open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-	if (!rc && s->fd < 0)
-		rc = error_set(e, errno, "%s: %s", folder, strerror(errno));
+	int rc = strlen(folder) < PATH_MOST - 2 * BLOB_HEX_SIZE ? disk_make_folder(folder, e)
+								: error_set(e, ENAMETOOLONG, "%s: the name is too long", folder);
 	if (!rc)
 		rc = read_folder(s, e);
 	if (!rc)
@@ -228,8 +231,6 @@ void blob_store_close(struct blob_store *s)
 {
 	if (!s)
 		return;
-	if (s->fd >= 0)
-		close(s->fd);
 	mem_free(s->entries);
 	mem_free(s->folder);
 	mem_free(s);
@@ -245,11 +246,11 @@ static struct entry *touch(struct blob_store *s, const struct blob_hash *h)
 	struct entry *n = find(s, h);
 	if (!n)
 		return NULL;
-	char hex[BLOB_HEX_SIZE];
-	blob_hex(h, hex);
+	char path[PATH_MOST];
+	blob_path(s, h, path, sizeof path);
 	n->used = ++s->clock;
 	if (s->limit)
-		utimensat(s->fd, hex, NULL, 0);
+		disk_touch(path);
 	return n;
 }
 
@@ -278,10 +279,11 @@ void blob_release(struct blob_store *s, const struct blob_hash *h)
 
 int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, struct error *e)
 {
-	char hex[BLOB_HEX_SIZE];
+	char path[PATH_MOST], hex[BLOB_HEX_SIZE];
+	blob_path(s, h, path, sizeof path);
 	blob_hex(h, hex);
 	struct entry *n = touch(s, h);
-	int fd = n ? openat(s->fd, hex, O_RDONLY | O_CLOEXEC | O_NOFOLLOW) : -1;
+	int fd = n ? disk_open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW, 0) : -1;
 	if (fd < 0)
 		return error_set(e, ENOENT, "there is no blob %s", hex);
 	*size = n->size;
@@ -306,12 +308,14 @@ int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struc
 	struct blob_writer *w = mem_alloc(1, sizeof *w);
 	if (!w)
 		return error_set(e, ENOMEM, "no memory for a blob");
+	char name[48];
 	w->store = s;
 	w->hash = *h;
 	w->size = size;
 	w->md = EVP_MD_CTX_new();
-	snprintf(w->name, sizeof w->name, "tmp.%ld.%llu", (long)getpid(), (unsigned long long)++s->temporary);
-	w->fd = openat(s->fd, w->name, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
+	snprintf(name, sizeof name, "tmp.%ld.%llu", (long)getpid(), (unsigned long long)++s->temporary);
+	path_of(s, name, w->path);
+	w->fd = disk_open(w->path, O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
 	if (w->fd < 0)
 		rc = error_set(e, errno, "%s: %s", s->folder, strerror(errno));
 	else if (!w->md || EVP_DigestInit_ex(w->md, EVP_sha256(), NULL) != 1)
@@ -334,16 +338,10 @@ int blob_write_add(struct blob_writer *w, const void *bytes, size_t size, struct
 		return error_set(e, EFBIG, "more bytes than were announced");
 	if (EVP_DigestUpdate(w->md, bytes, size) != 1)
 		return error_set(e, EIO, "SHA-256 failed");
-	for (const char *p = bytes; size;) {
-		ssize_t n = write(w->fd, p, size);
-		if (n < 0 && errno == EINTR)
-			continue;
-		if (n < 0)
-			return error_set(e, errno, "%s: %s", w->store->folder, strerror(errno));
-		p += n;
-		size -= (size_t)n;
-		w->at += (uint64_t)n;
-	}
+	int rc = disk_write_all(w->fd, bytes, size);
+	if (rc)
+		return error_set(e, -rc, "%s: %s", w->store->folder, strerror(-rc));
+	w->at += size;
 	return 0;
 }
 
@@ -351,7 +349,7 @@ static int finish(struct blob_writer *w, struct error *e)
 {
 	struct blob_store *s = w->store;
 	struct blob_hash got;
-	char hex[BLOB_HEX_SIZE];
+	char hex[BLOB_HEX_SIZE], path[PATH_MOST];
 	if (w->at != w->size)
 		return error_set(e, EBADMSG, "a blob of %llu bytes instead of %llu", (unsigned long long)w->at,
 				 (unsigned long long)w->size);
@@ -361,10 +359,11 @@ static int finish(struct blob_writer *w, struct error *e)
 	if (!blob_hash_equal(&got, &w->hash))
 		return error_set(e, EBADMSG, "the bytes are not those of the blob %s", hex);
 	if (blob_hold(s, &w->hash)) { /* somebody else brought it in the meantime */
-		unlinkat(s->fd, w->name, 0);
+		disk_unlink(w->path);
 		return 0;
 	}
-	if (fsync(w->fd) || renameat(s->fd, w->name, s->fd, hex))
+	blob_path(s, &w->hash, path, sizeof path);
+	if (disk_fsync(w->fd) || disk_rename(w->path, path))
 		return error_set(e, errno, "%s: %s", s->folder, strerror(errno));
 	return add_entry(s, &w->hash, w->size, 1, e);
 }
@@ -372,7 +371,7 @@ static int finish(struct blob_writer *w, struct error *e)
 static void writer_free(struct blob_writer *w)
 {
 	if (w->fd >= 0)
-		close(w->fd);
+		disk_close(w->fd);
 	EVP_MD_CTX_free(w->md);
 	mem_free(w);
 }
@@ -381,7 +380,7 @@ int blob_write_commit(struct blob_writer *w, struct error *e)
 {
 	int rc = finish(w, e);
 	if (rc)
-		unlinkat(w->store->fd, w->name, 0);
+		disk_unlink(w->path);
 	writer_free(w);
 	return rc;
 }
@@ -389,6 +388,6 @@ int blob_write_commit(struct blob_writer *w, struct error *e)
 void blob_write_abort(struct blob_writer *w)
 {
 	if (w->fd >= 0)
-		unlinkat(w->store->fd, w->name, 0);
+		disk_unlink(w->path);
 	writer_free(w);
 }

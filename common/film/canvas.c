@@ -1,10 +1,12 @@
 #include "common/film/canvas_private.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 
 #include <assert.h>
 #include <fcntl.h>
 #include <math.h>
+#include <stdatomic.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -42,19 +44,20 @@ int canvas_grid_exponent(const struct plan *p, double b_pooled, double brightest
 
 static int open_unlinked(const char *folder, struct error *e)
 {
-	int fd = open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+	int fd = disk_open(folder, O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
 	if (fd >= 0)
 		return fd;
+	static atomic_uint count;
 	char path[4096];
-	int n = snprintf(path, sizeof path, "%s/canvas-XXXXXX", folder);
+	int n = snprintf(path, sizeof path, "%s/canvas-%ld-%u", folder, (long)getpid(), atomic_fetch_add(&count, 1));
 	if (n < 0 || (size_t)n >= sizeof path)
 		return error_set(e, ENAMETOOLONG, "%s: the folder's name is too long", folder);
-	fd = mkostemp(path, O_CLOEXEC);
+	fd = disk_open(path, O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0600);
 	if (fd < 0) {
 		int code = errno;
 		return error_set(e, code, "%s: cannot make a file for the films: %s", folder, strerror(code));
 	}
-	unlink(path);
+	disk_unlink(path);
 	return fd;
 }
 
@@ -65,7 +68,7 @@ static int map_sums(struct canvas *c, const char *folder, struct error *e)
 		c->fd = open_unlinked(folder, e);
 		if (c->fd < 0)
 			return c->fd;
-		if (ftruncate(c->fd, (off_t)c->bytes) != 0) {
+		if (disk_ftruncate(c->fd, (off_t)c->bytes) != 0) {
 			int code = errno;
 			return error_set(e, code, "%s: a file of %zu bytes for the films: %s", folder, c->bytes, strerror(code));
 		}
@@ -116,7 +119,7 @@ void canvas_free(struct canvas *c)
 	if (c->sums)
 		munmap(c->sums, c->bytes);
 	if (c->fd >= 0)
-		close(c->fd);
+		disk_close(c->fd);
 	mem_free(c->flags);
 	mem_free(c->bound);
 	mem_free(c->has);
@@ -232,7 +235,7 @@ int canvas_back_tile(struct canvas *c, size_t film, size_t tile, struct error *e
 	uint8_t *flags = canvas_flags(c, film, tile);
 	if (!(*flags & TILE_BACKED) && c->fd >= 0) {
 		off_t at = (off_t)((film * canvas_tiles(c) + tile) * SLOT * sizeof *c->sums);
-		int code = posix_fallocate(c->fd, at, SLOT * sizeof *c->sums);
+		int code = disk_posix_fallocate(c->fd, at, SLOT * sizeof *c->sums);
 		if (code)
 			return error_set(e, code, "no room on the disk for the films: %s", strerror(code));
 	}

@@ -1,5 +1,6 @@
 #include "coordinator/shell/checkpoint.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/film/canvas_save.h"
 #include "coordinator/shell/session.h"
@@ -7,8 +8,6 @@
 #include <assert.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 static const double pause_seconds = 30; /* after one that could not be written */
 
@@ -90,7 +89,7 @@ static void run(uv_work_t *work)
 	if (!w->rc)
 		w->rc = spool_rename(temporary, name, w->folder, &w->error);
 	if (w->rc) {
-		unlink(temporary);
+		disk_unlink(temporary);
 		journal_release(w->journal);
 		w->journal = NULL;
 	}
@@ -241,7 +240,7 @@ int checkpoint_load(struct server *s, struct order *o, uint64_t *generation, str
 	char name[SPOOL_PATH_MAX];
 	struct sealed in;
 	spool_job_path(s->spool, o->id, "checkpoint.tmp", name);
-	unlink(name); /* of a life that ended before it was whole */
+	disk_unlink(name); /* of a life that ended before it was whole */
 	spool_job_path(s->spool, o->id, "checkpoint", name);
 	int rc = sealed_open(&in, name, e);
 	if (rc)

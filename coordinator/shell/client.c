@@ -3,13 +3,12 @@
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/upload.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 
 #include <fcntl.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 enum { CHUNK = 1 << 20, HEADER_LIMIT = 1 << 20 };
 static const double preview_seconds = 5; /* a younger one is good enough */
@@ -228,11 +227,11 @@ static int read_chunk(const char *path, uint64_t offset, unsigned char *bytes, s
 		      struct error *e)
 {
 	struct stat st;
-	int fd = open(path, O_RDONLY | O_CLOEXEC);
-	int rc = fd < 0 || fstat(fd, &st) ? error_set(e, errno, "%s", strerror(errno)) : 0;
+	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
+	int rc = fd < 0 || disk_fstat(fd, &st) ? error_set(e, errno, "%s", strerror(errno)) : 0;
 	if (!rc && offset > (uint64_t)st.st_size)
 		rc = error_set(e, EINVAL, "the file is shorter than that");
-	ssize_t n = rc ? 0 : pread(fd, bytes, CHUNK, (off_t)offset);
+	ssize_t n = rc ? 0 : disk_pread(fd, bytes, CHUNK, (off_t)offset);
 	if (n < 0)
 		rc = error_set(e, errno, "%s", strerror(errno));
 	if (!rc) {
@@ -242,7 +241,7 @@ static int read_chunk(const char *path, uint64_t offset, unsigned char *bytes, s
 			*size = offset + *count;
 	}
 	if (fd >= 0)
-		close(fd);
+		disk_close(fd);
 	return rc;
 }
 

@@ -1,5 +1,6 @@
 #include "coordinator/shell/dispatch.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/film/exr.h"
@@ -11,7 +12,6 @@
 #include <fcntl.h>
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 
 static unsigned long long number(uint64_t n)
 {
@@ -97,11 +97,11 @@ static void keep_partials(const struct server *s, const struct lease_key *k)
 		const unsigned char *bytes = batch_tile_bytes(s->result, s->payload, i, &size);
 		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", s->config.keep_partials, number(k->job),
 			 number(k->epoch), k->group, k->part, s->batch->tiles[i].x, s->batch->tiles[i].y);
-		int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-		if (fd < 0 || write(fd, bytes, size) != (ssize_t)size)
+		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+		if (fd < 0 || disk_write_all(fd, bytes, size))
 			log_event(LOG_SPOOL_FAULT, "path=%s text=%s", log_quote(path).text, log_quote(strerror(errno)).text);
 		if (fd >= 0)
-			close(fd);
+			disk_close(fd);
 	}
 }
 

@@ -1,5 +1,6 @@
 #include "coordinator/shell/durable.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/version.h"
 #include "common/wire/frame.h"
@@ -9,7 +10,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 static const double try_again_seconds = 2;
 
@@ -74,7 +74,7 @@ static void drop_files(struct server *s, struct order *o)
 	spool_job_path(s->spool, o->id, NULL, path);
 	journal_clear(path, UINT64_MAX);
 	spool_job_path(s->spool, o->id, "checkpoint", path);
-	unlink(path);
+	disk_unlink(path);
 }
 
 void durable_end(struct server *s, struct order *o)

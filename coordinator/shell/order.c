@@ -1,9 +1,11 @@
 #include "coordinator/shell/order.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 
 #include <assert.h>
+#include <fcntl.h>
 #include <math.h>
 #include <stdarg.h>
 #include <string.h>
@@ -52,6 +54,7 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 	if (!o)
 		return error_set(e, ENOMEM, "no memory for a job");
 	o->id = id;
+	o->log = -1;
 	o->plan = *plan;
 	o->submit = *submit;
 	memset(submit, 0, sizeof *submit);
@@ -72,8 +75,8 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 		rc = spool_write_record(s, &o->record, e);
 	char path[SPOOL_PATH_MAX];
 	spool_job_path(s, id, "log", path);
-	o->log = rc ? NULL : fopen(path, "ae");
-	if (!rc && !o->log)
+	o->log = rc ? -1 : disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
+	if (!rc && o->log < 0)
 		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
 	if (rc) {
 		*submit = o->submit;
@@ -81,7 +84,6 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 		order_free(o);
 		return rc;
 	}
-	setvbuf(o->log, NULL, _IOLBF, 0);
 	*out = o;
 	return 0;
 }
@@ -97,8 +99,8 @@ void order_free(struct order *o)
 	mem_free(o->seeds);
 	bootstrap_free(o->bootstrap);
 	canvas_free(o->canvas);
-	if (o->log)
-		fclose(o->log);
+	if (o->log >= 0)
+		disk_close(o->log);
 	journal_release(o->journal);
 	envelope_fini(&o->submit);
 	mem_free(o);
@@ -113,8 +115,11 @@ void order_log(struct order *o, enum log_event event, const char *fields, ...)
 	vsnprintf(text, sizeof text, fields, ap);
 	va_end(ap);
 	log_event(event, "job=j%llu %s", (unsigned long long)o->id, text);
-	log_format(line, sizeof line, event, text);
-	fprintf(o->log, "%s\n", line);
+	log_format(line, sizeof line - 1, event, text);
+	size_t size = strlen(line);
+	line[size++] = '\n';
+	int rc = disk_write_all(o->log, line, size); /* the log of all jobs has the line, too */
+	(void)rc;
 }
 
 /* ---- merging ---- */

@@ -14,8 +14,6 @@
 #include "coordinator/store/journal.h"
 #include "coordinator/store/spool.h"
 
-#include <stdio.h>
-
 /* A result that came while the canvas was busy. */
 struct waiting_batch {
 	struct waiting_batch *next;
@@ -43,7 +41,7 @@ struct order {
 	uint64_t *seeds;             /* [groups][chains / groups]; NULL for samples */
 	struct chain_state **states; /* [groups x parts]; NULL entries: no epoch merged yet */
 	uint32_t chains_per_lease;
-	FILE *log;
+	int log; /* a file descriptor */
 	struct journal *journal; /* NULL: it cannot be written any more */
 	bool pinned;             /* the journal knows whose it is */
 	struct order_times times;

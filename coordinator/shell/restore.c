@@ -1,5 +1,6 @@
 #include "coordinator/shell/restore.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/wire/frame.h"
@@ -8,7 +9,6 @@
 
 #include <string.h>
 #include <time.h>
-#include <unistd.h>
 
 /* A journal on its way into an order. */
 struct replay {
@@ -205,7 +205,7 @@ static void begin_anew(struct server *s, struct replay *r, const struct error *w
 	struct order *o = r->order;
 	order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"the job begins anew\"", log_quote(why->text).text);
 	spool_job_path(s->spool, o->id, "checkpoint", path);
-	unlink(path);
+	disk_unlink(path);
 	spool_job_path(s->spool, o->id, NULL, path);
 	journal_clear(path, UINT64_MAX);
 	order_release_blobs(order_submit(o), s->blobs);

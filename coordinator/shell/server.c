@@ -1,5 +1,6 @@
 #include "coordinator/shell/server.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/net/notify.h"
@@ -16,8 +17,6 @@
 #include <signal.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 enum { BACKLOG = 128, TICK_MS = 200 };
 
@@ -284,11 +283,11 @@ static int write_port(const char *path, unsigned port, struct error *e)
 	char text[16], temporary[4096];
 	int n = snprintf(text, sizeof text, "%u\n", port);
 	snprintf(temporary, sizeof temporary, "%s.tmp", path);
-	int fd = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-	int rc = fd < 0 || write(fd, text, (size_t)n) != n ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	int fd = disk_open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+	int rc = fd < 0 || disk_write_all(fd, text, (size_t)n) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
 	if (fd >= 0)
-		close(fd);
-	if (!rc && rename(temporary, path))
+		disk_close(fd);
+	if (!rc && disk_rename(temporary, path))
 		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
 	return rc;
 }
@@ -392,7 +391,7 @@ static int open_stores(struct server *s, struct error *e)
 		rc = read_ended(s, e);
 	if (rc)
 		return rc;
-	if (s->config.keep_partials && mkdir(s->config.keep_partials, 0777) && errno != EEXIST)
+	if (s->config.keep_partials && disk_mkdir(s->config.keep_partials, 0777) && errno != EEXIST)
 		return error_set(e, errno, "%s: %s", s->config.keep_partials, strerror(errno));
 	farm_config_init(&config);
 	config.first_job = spool_next_job(s->spool);

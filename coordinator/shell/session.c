@@ -1,12 +1,12 @@
 #include "coordinator/shell/session.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
 enum {
 	HELLO_HEADER = 4096,
@@ -217,7 +217,7 @@ static void take_blob_get(struct session *p, const Farm__BlobGet *g)
 	ssize_t n = 0;
 	int fd = blob_open(p->server->blobs, &h, &size, &e);
 	if (fd >= 0 && bytes)
-		n = pread(fd, bytes, BLOB_CHUNK, g->offset <= size ? (off_t)g->offset : 0);
+		n = disk_pread(fd, bytes, BLOB_CHUNK, g->offset <= size ? (off_t)g->offset : 0);
 	if (fd >= 0 && (!bytes || n < 0 || g->offset > size))
 		error_set(&e, EIO, "the blob cannot be read there");
 	chunk.hash = g->hash;
@@ -228,7 +228,7 @@ static void take_blob_get(struct session *p, const Farm__BlobGet *g)
 	m.blob_chunk = &chunk;
 	session_send(p, &m, bytes, *e.text ? 0 : (size_t)n);
 	if (fd >= 0)
-		close(fd);
+		disk_close(fd);
 	mem_free(bytes);
 }
 

@@ -1,17 +1,14 @@
 #include "coordinator/store/journal.h"
 
 #include "common/base/crc.h"
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 
-#include <dirent.h>
 #include <fcntl.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
-#include <sys/stat.h>
-#include <sys/uio.h>
-#include <unistd.h>
 
 enum { PATH_MOST = 4200 };
 
@@ -55,15 +52,6 @@ static int fault(const struct journal *j, int code, struct error *e)
 	return error_set(e, code, "%s: %s", j->path, strerror(code));
 }
 
-static int sync_folder(const char *path, struct error *e)
-{
-	int fd = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-	int rc = fd < 0 || fsync(fd) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
-	if (fd >= 0)
-		close(fd);
-	return rc;
-}
-
 static struct journal *make(const char *folder, uint64_t generation, int flags, struct error *e)
 {
 	struct journal *j = mem_alloc(1, sizeof *j);
@@ -74,7 +62,7 @@ static struct journal *make(const char *folder, uint64_t generation, int flags, 
 	j->generation = generation;
 	atomic_init(&j->holders, 1);
 	snprintf(j->path, sizeof j->path, "%s/journal.%llu", folder, (unsigned long long)generation);
-	j->fd = open(j->path, flags | O_CLOEXEC, 0600);
+	j->fd = disk_open(j->path, flags | O_CLOEXEC, 0600);
 	return j;
 }
 
@@ -88,7 +76,7 @@ void journal_release(struct journal *j)
 	if (!j || atomic_fetch_sub(&j->holders, 1) > 1)
 		return;
 	if (j->fd >= 0)
-		close(j->fd);
+		disk_close(j->fd);
 	mem_free(j);
 }
 
@@ -103,10 +91,10 @@ int journal_create(struct journal **out, const char *folder, uint64_t job, uint6
 	int rc = 0;
 	if (j->fd < 0)
 		rc = fault(j, errno, e);
-	else if (pwrite(j->fd, &h, sizeof h, 0) != (ssize_t)sizeof h || fsync(j->fd))
+	else if (disk_write_all(j->fd, &h, sizeof h) || disk_fsync(j->fd))
 		rc = fault(j, errno ? errno : ENOSPC, e);
 	if (!rc)
-		rc = sync_folder(folder, e);
+		rc = disk_sync_folder(folder, e);
 	if (rc) {
 		journal_release(j);
 		return rc;
@@ -122,7 +110,7 @@ static bool read_at(int fd, void *bytes, size_t size, uint64_t at)
 {
 	unsigned char *p = bytes;
 	while (size) {
-		ssize_t n = pread(fd, p, size, (off_t)at);
+		ssize_t n = disk_pread(fd, p, size, (off_t)at);
 		if (n < 0 && errno == EINTR)
 			continue;
 		if (n <= 0)
@@ -157,7 +145,7 @@ static int read_all(struct journal *j, uint64_t job, journal_visit *visit, void 
 {
 	struct stat st;
 	struct head h;
-	if (fstat(j->fd, &st))
+	if (disk_fstat(j->fd, &st))
 		return fault(j, errno, e);
 	uint64_t end = (uint64_t)st.st_size;
 	if (!read_at(j->fd, &h, sizeof h, 0) || memcmp(h.magic, magic, sizeof magic) != 0 || h.check != check_head(&h) || h.job != job ||
@@ -171,9 +159,9 @@ static int read_all(struct journal *j, uint64_t job, journal_visit *visit, void 
 	*cut = end - j->bytes;
 	if (rc < 0)
 		return rc;
-	if (*cut && ftruncate(j->fd, (off_t)j->bytes))
+	if (*cut && disk_ftruncate(j->fd, (off_t)j->bytes))
 		return fault(j, errno, e);
-	return fsync(j->fd) ? fault(j, errno, e) : 0;
+	return disk_fsync(j->fd) ? fault(j, errno, e) : 0;
 }
 
 int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_t generation, journal_visit *visit, void *user,
@@ -198,10 +186,10 @@ int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_
 int journal_reserve(struct journal *j, size_t body, struct error *e)
 {
 	off_t size = (off_t)(sizeof(struct record) + body);
-	if (fallocate(j->fd, FALLOC_FL_KEEP_SIZE, (off_t)j->bytes, size) == 0 || errno == EOPNOTSUPP || errno == ENOSYS)
+	if (disk_fallocate(j->fd, FALLOC_FL_KEEP_SIZE, (off_t)j->bytes, size) == 0 || errno == EOPNOTSUPP || errno == ENOSYS)
 		return 0;
 	int code = errno;
-	int cut = ftruncate(j->fd, (off_t)j->bytes); /* gives back what there was */
+	int cut = disk_ftruncate(j->fd, (off_t)j->bytes); /* gives back what there was */
 	(void)cut;
 	return fault(j, code, e);
 }
@@ -210,7 +198,7 @@ static int write_parts(struct journal *j, struct iovec *part, int count)
 {
 	off_t at = (off_t)j->bytes;
 	while (count) {
-		ssize_t n = pwritev(j->fd, part, count, at);
+		ssize_t n = disk_pwritev(j->fd, part, count, at);
 		if (n < 0 && errno == EINTR)
 			continue;
 		if (n <= 0)
@@ -246,7 +234,7 @@ int journal_append(struct journal *j, enum journal_kind kind, double elapsed, co
 	int rc = write_parts(j, parts, 3);
 	if (rc) {
 		/* A torn record that could not be cut off would be cut off by whoever reads it. */
-		int cut = ftruncate(j->fd, (off_t)j->bytes);
+		int cut = disk_ftruncate(j->fd, (off_t)j->bytes);
 		(void)cut;
 		return fault(j, -rc, e);
 	}
@@ -269,7 +257,7 @@ int journal_sync(struct journal *j, struct error *e)
 	uint64_t bytes = j->bytes;
 	if (bytes == j->synced)
 		return 0;
-	if (fdatasync(j->fd))
+	if (disk_fdatasync(j->fd))
 		return fault(j, errno, e);
 	j->synced = bytes;
 	return 0;
@@ -277,15 +265,18 @@ int journal_sync(struct journal *j, struct error *e)
 
 void journal_clear(const char *folder, uint64_t keep)
 {
-	DIR *d = opendir(folder);
+	char path[PATH_MOST];
+	DIR *d = disk_opendir(folder);
 	for (struct dirent *f; d && (f = readdir(d));) {
 		unsigned long long generation;
 		char again[64];
 		if (sscanf(f->d_name, "journal.%llu", &generation) != 1 || generation == keep)
 			continue;
 		snprintf(again, sizeof again, "journal.%llu", generation);
-		if (strcmp(again, f->d_name) == 0)
-			unlinkat(dirfd(d), f->d_name, 0);
+		if (strcmp(again, f->d_name) != 0)
+			continue;
+		snprintf(path, sizeof path, "%s/%s", folder, again);
+		disk_unlink(path);
 	}
 	if (d)
 		closedir(d);

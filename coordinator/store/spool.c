@@ -1,15 +1,13 @@
 #include "coordinator/store/spool.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 
-#include <dirent.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 enum { RECORD_MAX = 1 << 16, FOLDER_MAX = SPOOL_PATH_MAX - 128 };
 
@@ -28,51 +26,21 @@ static char *join(const char *folder, const char *name)
 	return path;
 }
 
-static int make_folder(const char *path, struct error *e)
-{
-	if (mkdir(path, 0700) && errno != EEXIST)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
-	return 0;
-}
-
 static int take_lock(struct spool *s, struct error *e)
 {
 	char *path = join(s->folder, "lock");
 	if (!path)
 		return error_set(e, ENOMEM, "no memory for the spool");
-	s->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+	s->lock = disk_open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
 	int rc = 0;
 	if (s->lock < 0)
 		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
-	else if (flock(s->lock, LOCK_EX | LOCK_NB))
+	else if (disk_flock(s->lock, LOCK_EX | LOCK_NB))
 		rc = errno == EWOULDBLOCK
 			     ? error_set(e, EBUSY, "%s: another coordinator works with this spool", s->folder)
 			     : error_set(e, errno, "%s: %s", path, strerror(errno));
 	mem_free(path);
 	return rc;
-}
-
-static int sync_folder(const char *path, struct error *e)
-{
-	int fd = open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-	int rc = fd < 0 || fsync(fd) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
-	if (fd >= 0)
-		close(fd);
-	return rc;
-}
-
-static int write_all(int fd, const char *bytes, size_t size)
-{
-	while (size) {
-		ssize_t n = write(fd, bytes, size);
-		if (n < 0 && errno != EINTR)
-			return -errno;
-		if (n > 0) {
-			bytes += n;
-			size -= (size_t)n;
-		}
-	}
-	return 0;
 }
 
 /* folder/name appears with these bytes, or not at all. */
@@ -81,37 +49,37 @@ static int write_file(const char *folder, const char *name, const void *bytes, s
 	char path[SPOOL_PATH_MAX], temporary[SPOOL_PATH_MAX + 8];
 	snprintf(path, sizeof path, "%s/%s", folder, name);
 	snprintf(temporary, sizeof temporary, "%s.tmp", path);
-	int fd = open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-	int rc = fd < 0 ? -errno : write_all(fd, bytes, size);
-	if (!rc && fsync(fd))
+	int fd = disk_open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+	int rc = fd < 0 ? -errno : disk_write_all(fd, bytes, size);
+	if (!rc && disk_fsync(fd))
 		rc = -errno;
-	if (fd >= 0 && close(fd) && !rc)
+	if (fd >= 0 && disk_close(fd) && !rc)
 		rc = -errno;
-	if (!rc && rename(temporary, path))
+	if (!rc && disk_rename(temporary, path))
 		rc = -errno;
 	if (rc) {
 		if (fd >= 0)
-			unlink(temporary);
+			disk_unlink(temporary);
 		return error_set(e, -rc, "%s: %s", path, strerror(-rc));
 	}
-	return sync_folder(folder, e);
+	return disk_sync_folder(folder, e);
 }
 
 static int read_file(const char *path, char **text, size_t *size, struct error *e)
 {
-	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
 	if (fd < 0)
 		return error_set(e, errno, "%s: %s", path, strerror(errno));
 	char *bytes = mem_alloc(RECORD_MAX, 1);
 	ssize_t n = 0;
 	*size = 0;
-	while (bytes && *size < RECORD_MAX && (n = read(fd, bytes + *size, RECORD_MAX - *size)) > 0)
+	while (bytes && *size < RECORD_MAX && (n = disk_read(fd, bytes + *size, RECORD_MAX - *size)) > 0)
 		*size += (size_t)n;
 	int rc = !bytes ? error_set(e, ENOMEM, "no memory to read %s", path)
 		 : n < 0 ? error_set(e, errno, "%s: %s", path, strerror(errno))
 		 : *size == RECORD_MAX ? error_set(e, EFBIG, "%s: too long", path)
 				       : 0;
-	close(fd);
+	disk_close(fd);
 	if (rc)
 		mem_free(bytes);
 	else
@@ -144,7 +112,7 @@ static int by_id(const void *a, const void *b)
 size_t spool_jobs(const struct spool *s, uint64_t *ids, size_t max)
 {
 	char *path = join(s->folder, "jobs");
-	DIR *d = path ? opendir(path) : NULL;
+	DIR *d = path ? disk_opendir(path) : NULL;
 	size_t count = 0;
 	mem_free(path);
 	for (struct dirent *f; d && (f = readdir(d));) {
@@ -210,13 +178,13 @@ int spool_open(struct spool **out, const char *folder, struct error *e)
 	s->canvas = join(folder, "canvas");
 	char *jobs = join(folder, "jobs");
 	int rc = !s->folder || !s->blobs || !s->canvas || !jobs ? error_set(e, ENOMEM, "no memory for the spool")
-								: make_folder(folder, e);
+								: disk_make_folder(folder, e);
 	if (!rc)
 		rc = take_lock(s, e);
 	if (!rc)
-		rc = make_folder(jobs, e);
+		rc = disk_make_folder(jobs, e);
 	if (!rc)
-		rc = make_folder(s->canvas, e);
+		rc = disk_make_folder(s->canvas, e);
 	if (!rc)
 		rc = read_counter(s, e);
 	mem_free(jobs);
@@ -232,7 +200,7 @@ void spool_close(struct spool *s)
 	if (!s)
 		return;
 	if (s->lock >= 0)
-		close(s->lock);
+		disk_close(s->lock);
 	mem_free(s->folder);
 	mem_free(s->blobs);
 	mem_free(s->canvas);
@@ -255,9 +223,7 @@ int spool_take_job(struct spool *s, uint64_t id, struct error *e)
 		s->next = id + 1;
 	}
 	spool_job_path(s, id, NULL, path);
-	int rc = make_folder(path, e);
-	spool_path(s, "jobs", path);
-	return rc ? rc : sync_folder(path, e);
+	return disk_make_folder(path, e);
 }
 
 const char *spool_blobs(const struct spool *s)
@@ -290,7 +256,7 @@ int spool_write(const struct spool *s, uint64_t id, const char *file, const void
 
 int spool_rename(const char *from, const char *to, const char *folder, struct error *e)
 {
-	return rename(from, to) ? error_set(e, errno, "%s: %s", to, strerror(errno)) : sync_folder(folder, e);
+	return disk_rename(from, to) ? error_set(e, errno, "%s: %s", to, strerror(errno)) : disk_sync_folder(folder, e);
 }
 
 int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e)

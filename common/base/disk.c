@@ -1,0 +1,103 @@
+#include "common/base/disk.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+static int system_open(const char *path, int flags, mode_t mode)
+{
+	return open(path, flags, mode);
+}
+
+static int system_stat(const char *path, struct stat *st)
+{
+	return lstat(path, st);
+}
+
+static int system_fstat(int fd, struct stat *st)
+{
+	return fstat(fd, st);
+}
+
+static int system_touch(const char *path)
+{
+	return utimensat(AT_FDCWD, path, NULL, 0);
+}
+
+const struct disk disk_system = {
+	.open = system_open,
+	.close = close,
+	.read = read,
+	.pread = pread,
+	.write = write,
+	.pwritev = pwritev,
+	.ftruncate = ftruncate,
+	.fallocate = fallocate,
+	.posix_fallocate = posix_fallocate,
+	.fsync = fsync,
+	.fdatasync = fdatasync,
+	.rename = rename,
+	.unlink = unlink,
+	.mkdir = mkdir,
+	.stat = system_stat,
+	.fstat = system_fstat,
+	.touch = system_touch,
+	.flock = flock,
+	.opendir = opendir,
+};
+const struct disk *disk_calls = &disk_system;
+
+void disk_use(const struct disk *calls)
+{
+	disk_calls = calls ? calls : &disk_system;
+}
+
+int disk_write_all(int fd, const void *bytes, size_t size)
+{
+	const char *p = bytes;
+	while (size) {
+		ssize_t n = disk_write(fd, p, size);
+		if (n < 0 && errno != EINTR)
+			return -errno;
+		if (n == 0)
+			return -ENOSPC;
+		if (n > 0) {
+			p += n;
+			size -= (size_t)n;
+		}
+	}
+	return 0;
+}
+
+int disk_sync_folder(const char *path, struct error *e)
+{
+	int fd = disk_open(path, O_RDONLY | O_DIRECTORY | O_CLOEXEC, 0);
+	int rc = fd < 0 || disk_fsync(fd) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	if (fd >= 0)
+		disk_close(fd);
+	return rc;
+}
+
+int disk_make_folder(const char *path, struct error *e)
+{
+	char parent[4096];
+	bool there = disk_mkdir(path, 0700) != 0; /* perhaps by a start that was cut short: its name is flushed again */
+	if (there && errno != EEXIST)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	int n = snprintf(parent, sizeof parent, "%s", path);
+	if (n < 0 || (size_t)n >= sizeof parent)
+		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
+	while (n > 1 && parent[n - 1] == '/')
+		parent[--n] = 0;
+	char *slash = strrchr(parent, '/');
+	if (slash == parent)
+		slash[1] = 0;
+	else if (slash)
+		*slash = 0;
+	int rc = disk_sync_folder(slash ? parent : ".", e);
+	return there && rc == -EACCES ? 0 : rc; /* somebody else made it, where we may not look */
+}
