@@ -24,7 +24,7 @@ static const char doc[] =
 
 enum {
 	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS,
-	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL
+	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_BANDWIDTH
 };
 
 static const struct argp_option options[] = {
@@ -38,6 +38,8 @@ static const struct argp_option options[] = {
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem, crl.pem: encrypt, and let in who has a certificate (hslt-ca)", 0},
 	{"tls-check", OPTION_TLS_CHECK, "SECONDS", 0, "How often certificates of live connections are checked again (60)", 0},
 	{"journal", OPTION_JOURNAL, "MB", 0, "Results of a running job that are kept before its films are written in their place (64)", 0},
+	{"worker-bandwidth", OPTION_BANDWIDTH, "MB/S", 0,
+	 "Tiles that one thread of a worker may send on average: epochs of new jobs are at least that long (any)", 0},
 	{"quota-jobs", OPTION_JOBS, "N", 0, "Jobs of a client that have not ended", 0},
 	{"quota-assets", OPTION_ASSETS, "MB", 0, "Their files together", 0},
 	{"quota-film", OPTION_FILM, "PIXELS", 0, "Of a job's film", 0},
@@ -89,6 +91,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_JOURNAL:
 		c->journal_bytes = (uint64_t)(1e6 * number(state, "--journal", arg, 0.001, 1e6));
+		return 0;
+	case OPTION_BANDWIDTH:
+		c->worker_bandwidth = 1e6 * number(state, "--worker-bandwidth", arg, 1e-6, 1e6);
 		return 0;
 	case OPTION_JOBS:
 		c->quota.jobs = (uint64_t)number(state, "--quota-jobs", arg, 1, 1e9);

@@ -19,6 +19,10 @@ enum {
 	LEASE_SAMPLES_MOST = 1 << 20, /* chains: mutations in one lease */
 	LEASE_SAMPLES_OPEN = 1 << 18, /* chains without a bound on mutations: most in one lease */
 	LEASE_SAMPLES_LEAST = 1 << 13,
+	LEASE_SECONDS = 20,        /* of one thread */
+	LEASE_SAMPLES_SLOW = 1 << 15, /* fewer take no longer than that in any scene that was seen */
+	SPEED_UNKNOWN = 50000,     /* mutations or samples a second, where no pilot said it */
+	PIXEL_BYTES = 12,          /* of a tile on the wire */
 	STRIP_SAMPLES_MOST = 1 << 17, /* samples in one lease */
 	STREAM_RESAMPLING = 5,        /* RNG_RESAMPLING of the renderer's random numbers */
 };
@@ -79,6 +83,13 @@ struct plan_range plan_row_range(const struct plan *p, uint32_t part)
 	return split((uint64_t)p->crop_height + 2 * (uint64_t)p->border, part, p->parts);
 }
 
+uint32_t plan_parts_usual(const struct plan *p)
+{
+	if (p->kind == PLAN_CHAINS)
+		return (uint32_t)clamp(ceil_div(p->chains, p->groups), 1, DEFAULT_PARTS);
+	return (uint32_t)clamp((uint64_t)p->crop_height + 2 * (uint64_t)p->border, 1, DEFAULT_PARTS);
+}
+
 /* ---- making a plan */
 
 static int check_film(const struct plan *p, struct error *e)
@@ -133,6 +144,88 @@ static uint64_t open_lease(const struct plan *p)
 	return clamp(per_pixel > least ? per_pixel : least, LEASE_SAMPLES_LEAST, LEASE_SAMPLES_OPEN);
 }
 
+enum epoch_rule { RULE_ASKED, RULE_ROUNDS, RULE_FILM, RULE_MOST, RULE_SECONDS, RULE_BANDWIDTH };
+
+/* The power of two nearest to x by ratio, at least 1. */
+static double power_of_two_near(double x)
+{
+	return x > 1 ? exp2(fmin(round(log2(x)), 40)) : 1;
+}
+
+/* Mutations, or samples, of a lease whose epoch is 1. */
+static uint64_t lease_unit(const struct plan *p)
+{
+	if (p->kind == PLAN_CHAINS)
+		return p->chains / ((uint64_t)p->groups * p->parts);
+	return ceil_div(plan_extended_pixels(p), p->parts);
+}
+
+static uint64_t lease_bytes(const struct plan *p)
+{
+	return crop_pixels(p) * PIXEL_BYTES / (p->kind == PLAN_CHAINS ? 1 : p->parts);
+}
+
+/* By the rule above plan_wants_speed. parts, groups and chains stand already. */
+static enum epoch_rule choose_epoch(const struct plan_request *r, const struct plan *p, uint64_t total, uint64_t *epoch)
+{
+	bool chains = p->kind == PLAN_CHAINS;
+	uint64_t unit = lease_unit(p), round = chains ? p->chains : p->groups * crop_pixels(p);
+	uint64_t usual = chains ? LEASE_SAMPLES_MOST / unit : (uint64_t)STRIP_SAMPLES_MOST * p->parts / plan_extended_pixels(p);
+	uint64_t most = clamp(usual, 1, LEASE_SAMPLES_MOST);
+	enum epoch_rule rule = RULE_MOST;
+	if (r->epoch) {
+		*epoch = r->epoch;
+		return RULE_ASKED;
+	}
+	if (r->speed > 0) {
+		most = (uint64_t)power_of_two_near(LEASE_SECONDS * r->speed / (double)unit);
+		rule = RULE_SECONDS;
+	}
+	uint64_t want = total ? (uint64_t)wide_ceil_div(total, (wide)round * AIM_ROUNDS)
+			      : chains ? open_lease(p) / unit : usual;
+	*epoch = clamp(want, 1, most);
+	if (want <= most)
+		rule = total ? RULE_ROUNDS : RULE_FILM;
+	double seconds = r->bandwidth > 0 ? (double)lease_bytes(p) / r->bandwidth : 0;
+	double least = ceil(seconds * (r->speed > 0 ? r->speed : SPEED_UNKNOWN) / (double)unit);
+	uint64_t all = total ? (uint64_t)wide_ceil_div(total, round) : LEASE_MOST / unit;
+	least = fmin(exp2(ceil(log2(fmax(least, 1)))), (double)all);
+	if (least > (double)*epoch) {
+		*epoch = (uint64_t)least;
+		rule = RULE_BANDWIDTH;
+	}
+	return rule;
+}
+
+void plan_describe_epoch(const struct plan_request *r, const struct plan *p, char *text, size_t size)
+{
+	struct plan q = *p;
+	struct error e;
+	uint64_t total, epoch;
+	if (p->kind == PLAN_SAMPLES)
+		q.groups = r->groups ? r->groups : DEFAULT_GROUPS;
+	enum epoch_rule rule = asked_total(r, p, &total, &e) ? RULE_ASKED : choose_epoch(r, &q, total, &epoch);
+	const char *thing = p->kind == PLAN_CHAINS ? "mutations" : "samples";
+	if (rule == RULE_ROUNDS)
+		snprintf(text, size, "epochs: for %d rounds", AIM_ROUNDS);
+	else if (rule == RULE_FILM)
+		snprintf(text, size, "epochs: by the size of the film");
+	else if (rule == RULE_MOST)
+		snprintf(text, size, "epochs: the most %s in a lease without a pilot", thing);
+	else if (rule == RULE_SECONDS)
+		snprintf(text, size, "epochs: leases of about %d s of a thread that makes %.3g %s a second", LEASE_SECONDS, r->speed, thing);
+	else if (rule == RULE_BANDWIDTH)
+		snprintf(text, size, "epochs: %.3g MB of tiles a lease at %.3g MB/s a thread that makes %.3g %s a second",
+			 1e-6 * (double)lease_bytes(p), 1e-6 * r->bandwidth, r->speed > 0 ? r->speed : SPEED_UNKNOWN, thing);
+	else if (size)
+		*text = 0;
+}
+
+bool plan_wants_speed(const struct plan_request *r, const struct plan *p)
+{
+	return !r->epoch && !(r->speed > 0) && p->epoch > LEASE_SAMPLES_SLOW / lease_unit(p);
+}
+
 static int make_chains(const struct plan_request *r, struct plan *p, uint64_t total, struct error *e)
 {
 	p->groups = r->groups ? r->groups : DEFAULT_GROUPS;
@@ -140,19 +233,16 @@ static int make_chains(const struct plan_request *r, struct plan *p, uint64_t to
 	if (!chains)
 		chains = total ? power_of_two_below(clamp(total / MUTATIONS_PER_CHAIN, 16, DEFAULT_CHAINS)) : DEFAULT_CHAINS;
 	uint64_t per_group = ceil_div(chains, p->groups);
-	p->parts = (uint32_t)clamp(per_group, 1, DEFAULT_PARTS);
+	p->parts = r->parts ? r->parts : (uint32_t)clamp(per_group, 1, DEFAULT_PARTS);
+	if (r->parts && r->chains && (chains % p->groups || per_group % p->parts))
+		return error_set(e, EINVAL, "%llu chains in %u groups cannot be cut into %u parts of equal size",
+				 (unsigned long long)chains, p->groups, p->parts);
 	chains = ceil_div(chains, (uint64_t)p->groups * p->parts) * p->groups * p->parts;
 	if (chains > PLAN_MAX_CHAINS)
 		return error_set(e, EINVAL, "%llu chains; at most %d", (unsigned long long)chains, PLAN_MAX_CHAINS);
 	p->chains = (uint32_t)chains;
-	uint64_t per_lease = chains / ((uint64_t)p->groups * p->parts);
-	p->epoch = r->epoch;
-	if (!p->epoch && total) {
-		uint64_t longest = LEASE_SAMPLES_MOST / per_lease;
-		p->epoch = clamp(ceil_div(total, chains * AIM_ROUNDS), 1, longest ? longest : 1);
-	} else if (!p->epoch) {
-		p->epoch = clamp(open_lease(p) / per_lease, 1, LEASE_SAMPLES_OPEN);
-	}
+	uint64_t per_lease = lease_unit(p);
+	choose_epoch(r, p, total, &p->epoch);
 	if (p->epoch > LEASE_MOST / per_lease)
 		return error_set(e, EINVAL, "an epoch of %llu mutations is too long", (unsigned long long)p->epoch);
 	p->rounds = total ? ceil_div(total, chains * p->epoch) : UINT64_MAX;
@@ -163,14 +253,13 @@ static int make_samples(const struct plan_request *r, struct plan *p, uint64_t t
 {
 	uint64_t rows = (uint64_t)p->crop_height + 2 * (uint64_t)p->border;
 	uint64_t groups = r->groups ? r->groups : DEFAULT_GROUPS;
-	p->parts = (uint32_t)clamp(rows, 1, DEFAULT_PARTS);
+	if (r->parts > rows)
+		return error_set(e, EINVAL, "%llu rows cannot be cut into %u parts", (unsigned long long)rows, r->parts);
+	p->parts = r->parts ? r->parts : (uint32_t)clamp(rows, 1, DEFAULT_PARTS);
 	uint64_t spp = ceil_div(total, crop_pixels(p)); /* 0: no bound */
-	uint64_t k = r->epoch;
-	if (!k) {
-		k = clamp((uint64_t)STRIP_SAMPLES_MOST * p->parts / plan_extended_pixels(p), 1, STRIP_SAMPLES_MOST);
-		if (spp)
-			k = clamp(ceil_div(spp, groups * AIM_ROUNDS), 1, k);
-	}
+	p->groups = (uint32_t)groups;
+	choose_epoch(r, p, total, &p->epoch);
+	uint64_t k = p->epoch;
 	if (k > LEASE_MOST / plan_extended_pixels(p))
 		return error_set(e, EINVAL, "an epoch of %llu samples per pixel is too long", (unsigned long long)k);
 	p->rounds = UINT64_MAX;
@@ -230,8 +319,8 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 	}
 	uint64_t total = 0;
 	int rc = check_film(p, e);
-	if (rc == 0 && r->groups > PLAN_MAX_GROUPS)
-		rc = error_set(e, EINVAL, "%u groups; at most %d", r->groups, PLAN_MAX_GROUPS);
+	if (rc == 0 && (r->groups > PLAN_MAX_GROUPS || r->parts > PLAN_MAX_PARTS))
+		rc = error_set(e, EINVAL, "%u groups of %u parts; at most %d of %d", r->groups, r->parts, PLAN_MAX_GROUPS, PLAN_MAX_PARTS);
 	if (rc == 0)
 		rc = asked_total(r, p, &total, e);
 	if (rc == 0 && !total && !(r->seconds > 0) && !(r->target_error > 0))

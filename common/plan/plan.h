@@ -48,7 +48,10 @@ struct plan_request {
 	double target_error; /* 0: none */
 	uint32_t min_depth, max_depth; /* edges */
 	uint32_t chains, groups;       /* 0: by the rule */
+	uint32_t parts;                /* leases of a group in a round; 0: by the rule */
 	uint64_t bootstrap, epoch;     /* 0: by the rule; epoch: mutations per chain or samples per pixel and group */
+	double speed;     /* mutations or samples a second of one thread, by a pilot: bounds a lease's time; 0: not known */
+	double bandwidth; /* bytes of tiles a second that one thread may send, a setting of the coordinator; 0: any */
 	char mixture[PLAN_MUTATIONS_MAX]; /* see mutations below; the count of them has the word here */
 	char knobs[PLAN_KNOBS_MAX], effects[PLAN_EFFECTS_MAX];
 };
@@ -76,12 +79,22 @@ struct plan {
 
 /* Checks the request (sizes, crop, counts) and fills in what it leaves open. -EINVAL with a sentence. */
 int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
+/*
+ * The length of an epoch that nobody asked for. A job with a bound on its mutations has 8 rounds, one without has 32 mutations a
+ * pixel in each; no lease has more than a million mutations, or, where the pilot's speed is known, takes about 20 s of one thread at
+ * most (rounded to a power of two, so that the pilot's noise seldom shows). Where a bandwidth is set an epoch is at least so long
+ * that the tiles of a lease do not exceed it, but no longer than the job.
+ */
+/* A pilot would tell something: a lease might take longer than that. */
+bool plan_wants_speed(const struct plan_request *r, const struct plan *p);
 /* Every plan from the wire passes here before it is believed. */
 int plan_check(const struct plan *p, struct error *e);
 /* "1024 chains in 16 groups ..., 8 rounds ...": what was chosen and by which rule; for logs. */
 void plan_describe(const struct plan *p, char *text, size_t size);
 /* What plan_make changed of the values asked for ("chains 100 -> 128: ..."); empty: nothing. */
 void plan_describe_changes(const struct plan_request *r, const struct plan *p, char *text, size_t size);
+/* By which rule plan_make chose the length of an epoch; empty: it was asked for. */
+void plan_describe_epoch(const struct plan_request *r, const struct plan *p, char *text, size_t size);
 enum { PLAN_TEXT = 1536 }; /* bytes that any of these texts needs at most */
 /* The options that make the same bits again when `rounds` rounds are done, whatever bound ended this job. */
 void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size);
@@ -95,6 +108,7 @@ struct plan_range plan_bootstrap_range(const struct plan *p, uint32_t group, uin
 struct plan_range plan_chain_range(const struct plan *p, uint32_t part);
 /* Rows of the crop extended by the border, counted from the top of the extended crop: a part's strip. */
 struct plan_range plan_row_range(const struct plan *p, uint32_t part);
+uint32_t plan_parts_usual(const struct plan *p); /* by the rule, for its chains and groups or its film */
 uint64_t plan_round_mutations(const struct plan *p); /* samples or mutations in one round, all groups */
 uint64_t plan_extended_pixels(const struct plan *p); /* (crop + 2 border) in each direction */
 

@@ -110,6 +110,8 @@ void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size
 	text_put(&t, "--integrator %s --size %ux%u --crop %u,%u,%u,%u --seed %llu --min-depth %u --max-depth %u --groups %u",
 	    p->integrator, p->width, p->height, p->crop_x, p->crop_y, p->crop_width, p->crop_height,
 	    (unsigned long long)p->seed, p->min_depth, p->max_depth, p->groups);
+	if (p->parts != plan_parts_usual(p))
+		text_put(&t, " --parts %u", p->parts);
 	if (*p->mutations)
 		text_put(&t, " --mutations %s", p->mutations);
 	if (*p->knobs)

@@ -126,6 +126,8 @@ void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out)
 	out->max_depth = r->max_depth;
 	out->chains = r->chains;
 	out->groups = r->groups;
+	out->parts = r->parts;
+	out->speed = r->speed;
 	out->bootstrap = r->bootstrap;
 	out->epoch = r->epoch;
 	out->mixture = borrow(r->mixture);
@@ -145,6 +147,8 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 		rc = text_from_wire(m->knobs, r->knobs, sizeof r->knobs, e);
 	if (!rc)
 		rc = text_from_wire(m->effects, r->effects, sizeof r->effects, e);
+	if (!rc && !(m->speed >= 0 && m->speed < 1e15))
+		rc = error_set(e, EBADMSG, "a pilot of %g a second", m->speed);
 	if (rc)
 		return rc;
 	r->width = m->width;
@@ -163,6 +167,8 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 	r->max_depth = m->max_depth;
 	r->chains = m->chains;
 	r->groups = m->groups;
+	r->parts = m->parts;
+	r->speed = m->speed;
 	r->bootstrap = m->bootstrap;
 	r->epoch = m->epoch;
 	return 0;

@@ -8,6 +8,7 @@
 #include "common/base/text.h"
 
 #include <fcntl.h>
+#include <stdio.h>
 #include <string.h>
 
 enum { CHUNK = 1 << 20, HEADER_LIMIT = 1 << 20 };
@@ -19,14 +20,17 @@ static void answer_submit(struct session *p, uint64_t job, const char *refusal, 
 {
 	Farm__SubmitAnswer answer;
 	Farm__Envelope m;
-	char text[1024] = "", plan[1024] = "";
+	char text[1024] = "", plan[PLAN_TEXT + 200] = "";
 	struct blob_hash *hashes = NULL;
 	ProtobufCBinaryData *list = NULL;
 	farm__submit_answer__init(&answer);
 	farm__envelope__init(&m);
 	text_copy(text, sizeof text, refusal);
-	if (u)
-		plan_describe(&u->plan, plan, sizeof plan);
+	if (u) {
+		plan_describe(&u->plan, plan, PLAN_TEXT);
+		size_t n = strlen(plan);
+		snprintf(plan + n, sizeof plan - n, "%s%s", *u->rule ? "; " : "", u->rule);
+	}
 	if (u && !job) {
 		hashes = mem_alloc(u->missing_count, sizeof *hashes);
 		list = mem_alloc(u->missing_count, sizeof *list);
@@ -113,7 +117,7 @@ static void take_submit(struct session *p, struct envelope *env)
 		session_fault(p, "one submission at a time");
 		return;
 	}
-	if (upload_new(&p->upload, env, p->server->blobs, &e)) {
+	if (upload_new(&p->upload, env, p->server->blobs, p->server->config.worker_bandwidth, &e)) {
 		p->upload = NULL;
 		answer_submit(p, 0, e.text, NULL);
 		return;

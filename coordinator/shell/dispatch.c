@@ -45,8 +45,8 @@ static void submitted(struct server *s, const struct action *a)
 	s->orders = o;
 	char plan[PLAN_TEXT];
 	plan_describe(&o->plan, plan, sizeof plan);
-	order_log(o, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s", log_quote(o->record.name).text, p->address,
-		  *p->who.name ? p->who.name : "-", log_quote(plan).text);
+	order_log(o, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s", log_quote(o->record.name).text, p->address,
+		  *p->who.name ? p->who.name : "-", log_quote(plan).text, log_quote(p->upload->rule).text);
 	for (size_t i = 0; i < m->n_notes; i++)
 		order_log(o, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
 	for (size_t i = 0; i < m->n_effects; i++)

@@ -55,7 +55,7 @@ static int check_texts(const Farm__Submit *m, struct error *e)
 	return ok ? 0 : error_set(e, EINVAL, "a text or a count of the submission is out of bounds");
 }
 
-static int check(const Farm__Submit *m, struct plan *plan, struct error *e)
+static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, char *rule, size_t rule_size, struct error *e)
 {
 	struct plan_request request;
 	int rc = check_texts(m, e);
@@ -67,8 +67,12 @@ static int check(const Farm__Submit *m, struct plan *plan, struct error *e)
 		rc = error_set(e, EINVAL, "a brightness of %g", m->brightest);
 	if (!rc)
 		rc = plan_request_from_wire(m->plan, &request, e);
+	if (rc)
+		return rc;
+	request.bandwidth = bandwidth;
+	rc = plan_make(&request, plan, e);
 	if (!rc)
-		rc = plan_make(&request, plan, e);
+		plan_describe_epoch(&request, plan, rule, rule_size);
 	return rc;
 }
 
@@ -97,11 +101,12 @@ static int check_sizes(const struct upload *u, struct error *e)
 	return 0;
 }
 
-int upload_new(struct upload **out, struct envelope *submit, struct blob_store *blobs, struct error *e)
+int upload_new(struct upload **out, struct envelope *submit, struct blob_store *blobs, double bandwidth, struct error *e)
 {
 	const Farm__Submit *m = submit->message->submit;
 	struct plan plan;
-	int rc = check(m, &plan, e);
+	char rule[sizeof (*out)->rule];
+	int rc = check(m, bandwidth, &plan, rule, sizeof rule, e);
 	if (rc)
 		return rc;
 	struct upload *u = mem_alloc(1, sizeof *u);
@@ -112,6 +117,7 @@ int upload_new(struct upload **out, struct envelope *submit, struct blob_store *
 		return error_set(e, ENOMEM, "no memory for a submission");
 	}
 	u->plan = plan;
+	memcpy(u->rule, rule, sizeof rule);
 	u->held = held;
 	u->blobs = blobs;
 	u->submit = *submit;

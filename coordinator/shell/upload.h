@@ -10,6 +10,7 @@
 struct upload {
 	struct envelope submit; /* owned */
 	struct plan plan;
+	char rule[160]; /* by which its epochs are so long; "": they were asked for */
 	struct blob_store *blobs;
 	bool *held;           /* a file's blob is there and held */
 	size_t missing_count; /* files not held */
@@ -17,8 +18,8 @@ struct upload {
 	struct blob_hash writing;
 };
 
-/* Takes the envelope of a Submit. -EINVAL with a sentence for the client. */
-int upload_new(struct upload **u, struct envelope *submit, struct blob_store *blobs, struct error *e);
+/* Takes the envelope of a Submit. bandwidth: as in struct plan_request. -EINVAL with a sentence for the client. */
+int upload_new(struct upload **u, struct envelope *submit, struct blob_store *blobs, double bandwidth, struct error *e);
 void upload_free(struct upload *u); /* lets go of the blobs that it holds */
 
 /* One chunk from the client. 1: a blob is complete. */

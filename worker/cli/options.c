@@ -11,7 +11,7 @@
 
 enum {
 	OPTION_SPP = 1000, OPTION_MUTATIONS, OPTION_TIME, OPTION_TARGET, OPTION_SIZE, OPTION_CROP, OPTION_SEED, OPTION_MIN_DEPTH,
-	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH, OPTION_SET, OPTION_EFFECTS,
+	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH, OPTION_SET, OPTION_EFFECTS, OPTION_PARTS,
 };
 
 static char *borrow(const char *text)
@@ -47,6 +47,7 @@ static const struct argp_option options[] = {
 	{NULL, 0, NULL, 0, "The plan (part of what decides the bits):", 3},
 	{"chains", OPTION_CHAINS, "N", 0, "Markov chains (1024, fewer for tiny jobs)", 3},
 	{"groups", OPTION_GROUPS, "N", 0, "Independent replicates, for the error (16)", 3},
+	{"parts", OPTION_PARTS, "N", 0, "Leases of a group in a round: groups times parts threads at most work on the job (4)", 3},
 	{"bootstrap", OPTION_BOOTSTRAP, "N", 0, "Bootstrap samples (1000000, fewer for tiny jobs)", 3},
 	{"epoch", OPTION_EPOCH, "N", 0, "Mutations of a chain, or samples a pixel and group, in a round", 3},
 	{0},
@@ -247,6 +248,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_GROUPS:
 		p->groups = whole32(state, "--groups", arg);
+		return 0;
+	case OPTION_PARTS:
+		p->parts = whole32(state, "--parts", arg);
 		return 0;
 	case OPTION_BOOTSTRAP:
 		p->bootstrap = option_whole(state, "--bootstrap", arg);

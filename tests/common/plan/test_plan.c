@@ -1,6 +1,7 @@
 /* The mixture of mutations in a plan: what is one and what is not, and the texts that it appears in. */
 #include "common/plan/plan.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -127,13 +128,162 @@ static void rounds_without_a_bound_follow_the_film(void **state)
 		}
 }
 
+static struct plan made(const struct plan_request *r)
+{
+	struct plan p;
+	struct error e = {""};
+	if (plan_make(r, &p, &e))
+		fail_msg("%s", e.text);
+	return p;
+}
+
+static bool ends_with_rule(const struct plan_request *r, const char *words)
+{
+	struct plan p = made(r);
+	char text[PLAN_TEXT];
+	plan_describe_epoch(r, &p, text, sizeof text);
+	return *words ? strstr(text, words) != NULL : !*text;
+}
+
+static uint64_t lease_work(const struct plan *p)
+{
+	return plan_round_mutations(p) / (p->groups * p->parts);
+}
+
+/* More leases for more threads: the same chains, cut finer; what cannot be cut is refused, what is usual is not told. */
+static void parts_are_asked_for(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_CHAINS, "");
+	struct plan p;
+	struct error e;
+	char text[PLAN_TEXT];
+	r.width = r.height = 1024;
+	p = made(&r);
+	assert_int_equal(p.parts, 4);
+	plan_options(&p, 1, text, sizeof text);
+	assert_null(strstr(text, "--parts"));
+	r.parts = 64;
+	p = made(&r);
+	assert_int_equal(p.groups * p.parts, 1024);
+	assert_int_equal(p.chains, 1024);
+	plan_options(&p, 1, text, sizeof text);
+	assert_non_null(strstr(text, " --groups 16 --parts 64 "));
+	r.chains = 1024;
+	r.parts = 48;
+	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
+	r.chains = 0; /* the rule's can be more */
+	p = made(&r);
+	assert_int_equal(p.chains % (16 * 48), 0);
+	r.parts = 65;
+	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
+	r = request(PLAN_SAMPLES, "");
+	r.parts = 33;
+	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
+	r.parts = 32;
+	assert_int_equal(made(&r).parts, 32);
+}
+
+/* A pilot's speed bounds a lease to about 20 s of a thread, and noise of a tenth does not show. */
+static void leases_take_twenty_seconds(void **state)
+{
+	(void)state;
+	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++)
+		for (double speed = 1000; speed < 2e7; speed *= 3.1) {
+			struct plan_request r = request((enum plan_kind)kind, "");
+			r.width = 1280;
+			r.height = 720;
+			r.spp = 1 << 24;
+			struct plan p = made(&r);
+			assert_true(plan_wants_speed(&r, &p));
+			r.speed = speed;
+			p = made(&r);
+			double seconds = (double)lease_work(&p) / speed;
+			bool least = p.epoch == 1; /* a strip cannot be cut further */
+			assert_true(seconds < 20 * 1.4143 || least);
+			assert_true(seconds > 20 / 1.4143 - 1e-9);
+			assert_true((p.epoch & (p.epoch - 1)) == 0);
+			assert_true(ends_with_rule(&r, "20 s of a thread"));
+			assert_false(plan_wants_speed(&r, &p));
+		}
+	struct plan_request r = request(PLAN_CHAINS, "");
+	r.width = r.height = 1024;
+	r.spp = 1 << 20;
+	uint32_t differ = 0;
+	for (int i = 0; i < 100; i++) {
+		r.speed = 20000 * exp(0.07 * i);
+		uint64_t epoch = made(&r).epoch;
+		r.speed *= 1.1;
+		differ += made(&r).epoch != epoch;
+	}
+	assert_true(differ > 0 && differ < 25); /* log2 1.1 = 0.14 of all */
+}
+
+/* What is short stays as it was: so hslt-render and the farm agree without a pilot. An epoch that was asked for stays, too. */
+static void short_jobs_ask_for_no_pilot(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_CHAINS, "");
+	r.width = 320;
+	r.height = 180;
+	struct plan p = made(&r), q;
+	assert_false(plan_wants_speed(&r, &p));
+	assert_true(ends_with_rule(&r, "for 8 rounds"));
+	r.speed = 5000;
+	q = made(&r);
+	assert_memory_equal(&p, &q, sizeof p);
+	r.spp = 0;
+	r.target_error = 0.02;
+	p = made(&r);
+	r.speed = 100; /* so slow that the film's rule gives way */
+	assert_true(made(&r).epoch < p.epoch);
+	r.speed = 1e6;
+	assert_int_equal(made(&r).epoch, p.epoch);
+	assert_true(ends_with_rule(&r, "size of the film"));
+	r.epoch = 77;
+	p = made(&r);
+	assert_int_equal(p.epoch, 77);
+	assert_false(plan_wants_speed(&r, &p));
+	assert_true(ends_with_rule(&r, ""));
+}
+
+/* 11 MB of tiles a lease: at 0.1 MB/s of a thread an epoch lasts 110 s or more, at 10 MB/s the 20 s stand. */
+static void a_bandwidth_makes_epochs_longer(void **state)
+{
+	(void)state;
+	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++) {
+		struct plan_request r = request((enum plan_kind)kind, "");
+		r.width = 1280;
+		r.height = 720;
+		r.spp = 1 << 20;
+		r.speed = kind == PLAN_CHAINS ? 30000 : 300000;
+		uint64_t free = made(&r).epoch;
+		r.bandwidth = 10e6;
+		assert_int_equal(made(&r).epoch, free);
+		r.bandwidth = 1e5 / (kind == PLAN_CHAINS ? 1 : 4);
+		struct plan p = made(&r);
+		double seconds = (double)lease_work(&p) / r.speed;
+		assert_true(seconds >= 12 * 1280 * 720 / 1e5 && seconds < 2.2 * 12 * 1280 * 720 / 1e5);
+		assert_true(ends_with_rule(&r, "MB of tiles a lease"));
+		r.spp = 32; /* not longer than the job */
+		assert_true(made(&r).rounds == 1);
+		r.speed = 0; /* nobody knows: something is assumed */
+		r.spp = 1 << 20;
+		uint64_t assumed = made(&r).epoch;
+		r.bandwidth = 0;
+		assert_true(made(&r).epoch < assumed);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_mixture_is_kept_and_told), cmocka_unit_test(settings_and_effects_are_kept_and_told),
 		cmocka_unit_test(other_texts_are_none),
 		cmocka_unit_test(entries_are_counted_and_named),
-		cmocka_unit_test(rounds_without_a_bound_follow_the_film),
+		cmocka_unit_test(rounds_without_a_bound_follow_the_film), cmocka_unit_test(parts_are_asked_for),
+		cmocka_unit_test(leases_take_twenty_seconds), cmocka_unit_test(short_jobs_ask_for_no_pilot),
+		cmocka_unit_test(a_bandwidth_makes_epochs_longer),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
