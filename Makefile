@@ -27,8 +27,9 @@ LIBS_RENDER := $(EMBREE) -lexpat -lpng -ljpeg -lz
 COMMON_SRC := $(wildcard common/*/*.c)
 RENDER_SRC := $(filter-out %_gen.c,$(wildcard worker/math/*.c worker/scene/*.c worker/geom/*.c worker/texture/*.c worker/bsdf/*.c \
               worker/emitter/*.c worker/camera/*.c worker/world/*.c worker/path/*.c worker/halfvec/*.c worker/mutation/*.c worker/chain/*.c worker/render/*.c))
+CTL_SRC    := $(filter-out coordinator/ctl/hslt_%.c,$(wildcard coordinator/ctl/*.c))
 COORD_SRC  := $(wildcard coordinator/core/*.c coordinator/store/*.c coordinator/shell/*.c)
-CTL_SRC    := $(wildcard coordinator/ctl/*.c)
+LIB_CTL    := $(BUILD)/lib/libhslt-ctl.a
 DAEMON_SRC := $(filter-out worker/daemon/main.c,$(wildcard worker/daemon/*.c))
 CLI_SRC    := $(filter-out worker/cli/hslt_%.c,$(wildcard worker/cli/*.c))
 PROTO      := $(wildcard proto/*.proto)
@@ -78,6 +79,7 @@ $(BUILD)/gen/.made:
 $(LIB_COMMON): $(call obj,$(COMMON_SRC)) $(PROTO_OBJ)
 $(LIB_RENDER): $(call obj,$(RENDER_SRC))
 $(LIB_COORD): $(call obj,$(COORD_SRC))
+$(LIB_CTL): $(call obj,$(CTL_SRC))
 $(LIB_DAEMON): $(call obj,$(DAEMON_SRC))
 $(LIB_CLI): $(call obj,$(CLI_SRC))
 $(BUILD)/lib/%.a:
@@ -91,7 +93,7 @@ $(BUILD)/bin/hslt-worker: $(BUILD)/obj/worker/daemon/main.o $(LIB_DAEMON) $(LIB_
 	$(link) $(LIBS_RENDER) $(LIBS_COMMON)
 $(addprefix $(BUILD)/bin/,$(WORKER_CLI)): $(BUILD)/bin/hslt-%: $(BUILD)/obj/worker/cli/hslt_%.o $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(LIBS_RENDER) $(LIBS_COMMON)
-$(addprefix $(BUILD)/bin/,$(CTL_CLI)): $(BUILD)/bin/hslt-%: $(BUILD)/obj/coordinator/ctl/hslt_%.o $(LIB_COORD) $(LIB_COMMON)
+$(addprefix $(BUILD)/bin/,$(CTL_CLI)): $(BUILD)/bin/hslt-%: $(BUILD)/obj/coordinator/ctl/hslt_%.o $(LIB_CTL) $(LIB_COORD) $(LIB_COMMON)
 	$(link) $(LIBS_COMMON)
 
 # Tests mirror the tree: tests/<folder>/.../test_*.c, one program each, found here.

@@ -24,8 +24,16 @@ enum event_kind {
 	EVENT_ERROR_KNOWN,    /* error_known: the answer to ACTION_EVALUATE_ERROR */
 	EVENT_IMAGE_KNOWN,    /* image_known: what the final image of ACTION_PUBLISH says; the job has ended */
 	EVENT_RESTORE,        /* restore: a job of an earlier life goes on; before anything else has happened */
-	EVENT_HOLD,           /* job, text: no more of its leases go out; without a text: they do again */
+	EVENT_HOLD,           /* tag, job, hold, text: no more of its leases go out; without a text this hold is over */
+	EVENT_PRIORITY,       /* tag, job, priority: from the next lease on */
 	EVENT_JOB_BROKEN,     /* job, text: the shell cannot go on with it (a sum left the grid, the disk is full) */
+};
+
+/* A job may be held for each of these at once; its leases go out when it is held for none. */
+enum job_hold {
+	HOLD_STORAGE, /* its results cannot be stored */
+	HOLD_ORDERED, /* somebody wants it so */
+	JOB_HOLDS,
 };
 
 struct event_join {
@@ -62,7 +70,7 @@ struct event {
 	double time;
 	uint64_t peer;
 	uint64_t job;
-	uint64_t tag; /* of SUBMIT and CANCEL: comes back in their answer */
+	uint64_t tag; /* of SUBMIT, CANCEL, HOLD, PRIORITY: comes back in their answer; of the last two there is one only when they are refused */
 	const char *text;
 	union {
 		struct event_join join;
@@ -74,6 +82,8 @@ struct event {
 			struct lease_key key;
 			bool valid; /* BATCH: batch_check and the frame's own checks passed; else text says what is wrong */
 		} lease;
+		enum job_hold hold;
+		int priority;
 		struct event_submit submit;
 		struct event_restore restore;
 		struct {

@@ -5,7 +5,6 @@
 
 #include <assert.h>
 #include <math.h>
-#include <stdio.h>
 
 void farm_config_init(struct farm_config *c)
 {
@@ -163,13 +162,6 @@ static void broken(struct farm *f, const struct event *ev)
 		rounds_end(f, j, END_FAILED, ev->text ? ev->text : "");
 }
 
-static void held(struct farm *f, const struct event *ev)
-{
-	struct job *j = farm_find_job(f, ev->job);
-	if (j)
-		snprintf(j->held, sizeof j->held, "%s", ev->text ? ev->text : "");
-}
-
 static void ticked(struct farm *f, const struct event *ev)
 {
 	(void)f;
@@ -191,7 +183,8 @@ static void (*const on_event[])(struct farm *, const struct event *) = {
 	[EVENT_ERROR_KNOWN] = rounds_error_known,
 	[EVENT_IMAGE_KNOWN] = rounds_image_known,
 	[EVENT_RESTORE] = restore_job,
-	[EVENT_HOLD] = held,
+	[EVENT_HOLD] = orders_hold,
+	[EVENT_PRIORITY] = orders_priority,
 	[EVENT_JOB_BROKEN] = broken,
 };
 

@@ -19,7 +19,7 @@
  *    when nothing was ever merged and three leases failed, or one lease failed on three workers, or six times in all.
  *  - A job of an earlier life goes on where its merged leases say that it was; leases that were out then count when their results
  *    come, as any do. A bound that its last complete round had met, or a look at its error, is not forgotten.
- *  - A job that is held gets no leases out; results that come are merged.
+ *  - A job that is held gets no leases out; results that come are merged, and its clock stands still.
  *  - Bounds are tested after complete rounds only. The target error is evaluated when merge_error_due() says so, as
  *    hslt-render does, and when another bound ends the job. From the end on nothing is merged: the image is exactly the
  *    prefix that met the bound, and depends on workers and order only if the bound is a time.
@@ -104,7 +104,8 @@ struct lease_status {
 uint64_t farm_next_job(const struct farm *f, uint64_t after);
 uint64_t farm_next_peer(const struct farm *f, uint64_t after);
 bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s);   /* false: unknown */
-double farm_elapsed(const struct farm *f, uint64_t id, double now); /* s since the job's first lease; NAN: none yet, unknown */
+/* s since the job's first lease, less those that it was held; NAN: none yet, unknown */
+double farm_elapsed(const struct farm *f, uint64_t id, double now);
 bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s);
 bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s); /* i-th lease of a worker */
 

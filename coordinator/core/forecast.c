@@ -57,7 +57,7 @@ double job_progress(const struct job *j, double now)
 		return 1;
 	double p = work_done(j) / work_total(j).middle;
 	if (j->plan.seconds > 0 && !isnan(j->started) && job_is_live(j))
-		p = fmax(p, (now - j->started) / j->plan.seconds);
+		p = fmax(p, job_elapsed(j, now) / j->plan.seconds);
 	return fmin(1, fmax(j->progress_floor, p));
 }
 
@@ -67,7 +67,7 @@ static double seconds_left(const struct job *j, double total, double now)
 	if (rate > 0)
 		left = fmax(0, total - work_done(j)) / rate;
 	if (j->plan.seconds > 0 && !isnan(j->started))
-		left = fmin(left, fmax(0, j->started + j->plan.seconds - now));
+		left = fmin(left, fmax(0, j->plan.seconds - job_elapsed(j, now)));
 	return isfinite(left) ? left : NAN;
 }
 

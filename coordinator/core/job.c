@@ -36,7 +36,7 @@ static void init(struct job *j, const struct event_submit *e, double now)
 	j->mixed = e->mixed;
 	j->plan = *e->plan;
 	j->submitted = now;
-	j->started = j->ended = j->rel_error = j->opened = NAN;
+	j->started = j->ended = j->rel_error = j->opened = j->held_since = NAN;
 	j->published = now;
 	for (int i = 0; i < 2; i++) {
 		list_init(&j->ready[i]);
@@ -88,7 +88,35 @@ bool job_is_live(const struct job *j)
 
 bool job_is_open(const struct job *j)
 {
-	return job_is_live(j) && !j->preparing && j->ending == END_NONE && !*j->held;
+	return job_is_live(j) && !j->preparing && j->ending == END_NONE && !job_is_held(j);
+}
+
+bool job_is_held(const struct job *j)
+{
+	for (int i = 0; i < JOB_HOLDS; i++)
+		if (*j->held[i])
+			return true;
+	return false;
+}
+
+void job_hold(struct job *j, enum job_hold which, const char *why, double now)
+{
+	bool was = job_is_held(j);
+	snprintf(j->held[which], sizeof j->held[which], "%s", why);
+	if (!was && job_is_held(j))
+		j->held_since = now;
+	if (!was || job_is_held(j))
+		return;
+	double pause = now - j->held_since; /* its times are as if that had not been; NAN stays */
+	j->started += pause;
+	j->opened += pause;
+	j->looked_at += pause;
+	j->held_since = NAN;
+}
+
+double job_elapsed(const struct job *j, double now)
+{
+	return (isnan(j->held_since) ? now : j->held_since) - j->started;
 }
 
 struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part)

@@ -60,7 +60,8 @@ struct job {
 	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
 	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
 	char text[256];
-	char held[256]; /* why no lease of it goes out; "" when they do */
+	char held[JOB_HOLDS][256]; /* why no lease of it goes out; "" each when they do */
+	double held_since;         /* NAN: it is not */
 };
 
 /* NULL with a sentence when it is refused. */
@@ -69,6 +70,9 @@ void job_free(struct job *j);
 
 bool job_is_live(const struct job *j);
 bool job_is_open(const struct job *j); /* leases may be handed out and merged */
+bool job_is_held(const struct job *j);
+void job_hold(struct job *j, enum job_hold which, const char *why, double now); /* why "": no longer */
+double job_elapsed(const struct job *j, double now); /* s since its first lease, the time that it was held left out; NAN: none yet */
 struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part);
 struct slot *job_ready(const struct job *j); /* NULL: none */
 /* Puts the slot into the list where it belongs after its holders or its next epoch changed. */

@@ -9,8 +9,6 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { PRIORITY_MAX = 100 };
-
 static struct action *about_job(struct farm *f, enum action_kind kind, const struct job *j)
 {
 	struct action *a = update_add(f, kind);
@@ -27,7 +25,7 @@ static void job_changed(struct farm *f, const struct job *j)
 	a->text = j->text;
 }
 
-static void reject(struct farm *f, const struct event *ev, const char *text)
+void rounds_reject(struct farm *f, const struct event *ev, const char *text)
 {
 	struct action *a = update_add(f, ACTION_REJECTED);
 	a->tag = ev->tag;
@@ -39,27 +37,24 @@ void rounds_enlist(struct farm *f, struct job *j)
 {
 	assert(f->job_count == 0 || f->jobs[f->job_count - 1]->id < j->id);
 	f->jobs[f->job_count++] = j;
-	uint32_t i = f->live_count++;
-	for (; i > 0 && f->live[i - 1]->priority < j->priority; i--)
-		f->live[i] = f->live[i - 1];
-	f->live[i] = j;
+	orders_enlist(f, j);
 }
 
 void rounds_submit(struct farm *f, const struct event *ev)
 {
 	const struct event_submit *e = &ev->submit;
 	if (e->priority < -PRIORITY_MAX || e->priority > PRIORITY_MAX) {
-		reject(f, ev, "a priority is from -100 to 100");
+		rounds_reject(f, ev, "a priority is from -100 to 100");
 		return;
 	}
 	if (f->live_count == f->config.max_jobs) {
-		reject(f, ev, "the coordinator has as many jobs as it takes");
+		rounds_reject(f, ev, "the coordinator has as many jobs as it takes");
 		return;
 	}
 	const char *refused = "";
 	struct job *j = job_new(f, e, &refused);
 	if (!j) {
-		reject(f, ev, refused);
+		rounds_reject(f, ev, refused);
 		return;
 	}
 	j->id = f->next_job++;
@@ -118,11 +113,7 @@ void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *tex
 	mem_free(j->slots);
 	j->slots = NULL;
 	j->slot_count = 0;
-	uint32_t i = 0;
-	while (f->live[i] != j)
-		i++;
-	f->live_count--;
-	memmove(&f->live[i], &f->live[i + 1], (f->live_count - i) * sizeof *f->live);
+	orders_delist(f, j);
 	if (j->state == JOB_DONE)
 		about_job(f, ACTION_PUBLISH, j)->final = true;
 	job_changed(f, j);
@@ -133,7 +124,7 @@ void rounds_cancel(struct farm *f, const struct event *ev)
 {
 	struct job *j = farm_find_job(f, ev->job);
 	if (!j || !job_is_live(j)) {
-		reject(f, ev, j ? "the job is over" : "no such job");
+		rounds_reject(f, ev, j ? "the job is over" : "no such job");
 		return;
 	}
 	struct action *a = about_job(f, ACTION_CANCELLED, j);
@@ -181,7 +172,7 @@ void rounds_complete(struct farm *f, struct job *j)
 {
 	if (j->kind == LEASE_RENDER) {
 		about_job(f, ACTION_ROUND_DONE, j);
-		rounds_settle(f, j, f->now - j->started);
+		rounds_settle(f, j, job_elapsed(j, f->now));
 		return;
 	}
 	j->preparing = true;

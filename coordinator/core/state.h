@@ -41,6 +41,7 @@ void rounds_submit(struct farm *f, const struct event *ev);
 void rounds_cancel(struct farm *f, const struct event *ev);
 void rounds_started(struct farm *f, struct job *j); /* a lease of it is about to be sent */
 void rounds_enlist(struct farm *f, struct job *j); /* ids grow */
+void rounds_reject(struct farm *f, const struct event *ev, const char *text);
 void rounds_opened(struct farm *f, struct job *j, bool black); /* b and seeds are there */
 /* The bounds, when a round is complete: so many seconds after the first lease. */
 void rounds_settle(struct farm *f, struct job *j, double elapsed);
@@ -49,6 +50,13 @@ void rounds_prepared(struct farm *f, const struct event *ev);
 void rounds_error_known(struct farm *f, const struct event *ev);
 void rounds_image_known(struct farm *f, const struct event *ev);
 void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *text);
+
+/* orders.c: what people want of jobs that are there. */
+enum { PRIORITY_MAX = 100 };
+void orders_hold(struct farm *f, const struct event *ev);
+void orders_priority(struct farm *f, const struct event *ev);
+void orders_enlist(struct farm *f, struct job *j); /* among the live ones: by priority, then id */
+void orders_delist(struct farm *f, const struct job *j);
 
 /* restore.c */
 void restore_job(struct farm *f, const struct event *ev);

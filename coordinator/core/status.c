@@ -65,12 +65,14 @@ static bool someone_avoids(const struct farm *f, const struct job *j)
 static void why_waiting(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	text[0] = 0;
-	if (!job_is_live(j) || (j->leases_out && !*j->held))
+	if (!job_is_live(j) || (j->leases_out && !job_is_held(j)))
 		return;
 	uint32_t active = active_workers(f);
 	const struct job *other = busy_with(f, j);
-	if (*j->held)
-		snprintf(text, size, "%s", j->held);
+	if (*j->held[HOLD_STORAGE] && *j->held[HOLD_ORDERED])
+		snprintf(text, size, "%.100s; %.140s", j->held[HOLD_ORDERED], j->held[HOLD_STORAGE]);
+	else if (job_is_held(j))
+		snprintf(text, size, "%s", *j->held[HOLD_ORDERED] ? j->held[HOLD_ORDERED] : j->held[HOLD_STORAGE]);
 	else if (j->preparing)
 		snprintf(text, size, "the bootstrap is being evaluated");
 	else if (j->evaluating && (j->ending != END_NONE || !job_ready(j)))
@@ -118,7 +120,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		.priority = j->priority,
 		.mixed = j->mixed,
 		.plan = &j->plan,
-		.state = *j->held && job_is_live(j) ? JOB_HELD : j->state,
+		.state = job_is_held(j) && job_is_live(j) ? JOB_HELD : j->state,
 		.end = j->end,
 		.fingerprint = j->fingerprint,
 		.submitted = j->submitted,
@@ -148,7 +150,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 double farm_elapsed(const struct farm *f, uint64_t id, double now)
 {
 	const struct job *j = farm_find_job(f, id);
-	return j ? now - j->started : NAN;
+	return j ? job_elapsed(j, now) : NAN;
 }
 
 bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)

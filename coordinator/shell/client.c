@@ -1,4 +1,4 @@
-/* A client's side of a session: submit, list, cancel, watch, fetch. */
+/* A client's side of a session: submit, list, cancel, watch, fetch; control.c has the rest. */
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/upload.h"
@@ -164,8 +164,7 @@ static bool may_see(const struct session *p, const struct job_record *r)
 	return *p->who.name && strcmp(p->who.name, r->owner) == 0;
 }
 
-/* false: no such job for this client. */
-static bool find_job(const struct session *p, uint64_t job, struct job_view *v)
+bool session_finds_job(const struct session *p, uint64_t job, struct job_view *v)
 {
 	return server_view(p->server, job, v) && may_see(p, &v->record);
 }
@@ -194,17 +193,10 @@ static void take_list(struct session *p)
 	mem_free(views);
 }
 
-static void take_cancel(struct session *p, uint64_t job)
+void session_send_done(struct session *p)
 {
-	struct event ev = {.kind = EVENT_CANCEL, .tag = p->id, .job = job};
-	struct job_view v;
 	Farm__Done done;
 	Farm__Envelope m;
-	p->rejected[0] = 0;
-	if (p->who.role == TLS_NOBODY || find_job(p, job, &v))
-		server_step(p->server, &ev);
-	else
-		text_copy(p->rejected, sizeof p->rejected, "no such job");
 	farm__done__init(&done);
 	farm__envelope__init(&m);
 	done.ok = !*p->rejected;
@@ -214,10 +206,22 @@ static void take_cancel(struct session *p, uint64_t job)
 	session_send(p, &m, NULL, 0);
 }
 
+static void take_cancel(struct session *p, uint64_t job)
+{
+	struct event ev = {.kind = EVENT_CANCEL, .tag = p->id, .job = job};
+	struct job_view v;
+	p->rejected[0] = 0;
+	if (p->who.role == TLS_NOBODY || session_finds_job(p, job, &v))
+		server_step(p->server, &ev);
+	else
+		text_copy(p->rejected, sizeof p->rejected, "no such job");
+	session_send_done(p);
+}
+
 static void take_watch(struct session *p, uint64_t job)
 {
 	struct job_view v;
-	if (!find_job(p, job, &v)) {
+	if (!session_finds_job(p, job, &v)) {
 		session_fault(p, "there is no job j%llu", (unsigned long long)job);
 		return;
 	}
@@ -268,7 +272,7 @@ static int fetch(struct session *p, const Farm__Fetch *f, Farm__FetchChunk *chun
 {
 	char path[SPOOL_PATH_MAX];
 	const char *file = file_of(f->what);
-	if (!find_job(p, f->job, v))
+	if (!session_finds_job(p, f->job, v))
 		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)f->job);
 	if (!file)
 		return error_set(e, EINVAL, "there is nothing of that kind to fetch");
@@ -329,7 +333,7 @@ void session_previews(struct server *s, uint64_t job)
 static void take_fetch(struct session *p, const Farm__Fetch *f)
 {
 	struct job_view v;
-	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset || !find_job(p, f->job, &v)) {
+	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset || !session_finds_job(p, f->job, &v)) {
 		answer_fetch(p, f);
 		return;
 	}
@@ -354,6 +358,9 @@ void session_client_message(struct session *p, struct envelope *env, const unsig
 		break;
 	case FARM__ENVELOPE__BODY_CANCEL:
 		take_cancel(p, m->cancel->job);
+		break;
+	case FARM__ENVELOPE__BODY_CONTROL:
+		session_control(p, m->control);
 		break;
 	case FARM__ENVELOPE__BODY_WATCH:
 		take_watch(p, m->watch->job);

@@ -5,6 +5,7 @@
 #include "common/base/text.h"
 #include "common/wire/frame.h"
 #include "coordinator/shell/checkpoint.h"
+#include "coordinator/shell/control.h"
 #include "coordinator/shell/dispatch.h"
 
 #include <string.h>
@@ -137,7 +138,7 @@ static uint64_t next_epoch(const struct order *o, uint32_t group, uint32_t part)
 	return k.epoch;
 }
 
-static int tell_core(struct server *s, const struct replay *r, struct error *e)
+static int tell_core(struct server *s, const struct replay *r, const char *held, struct error *e)
 {
 	const struct order *o = r->order;
 	uint32_t slots = o->plan.groups * o->plan.parts;
@@ -146,6 +147,7 @@ static int tell_core(struct server *s, const struct replay *r, struct error *e)
 		return error_set(e, ENOMEM, "no memory for a job");
 	for (uint32_t i = 0; i < slots; i++)
 		next[i] = next_epoch(o, i / o->plan.parts, i % o->plan.parts);
+	char text[256];
 	struct event ev = {.kind = EVENT_RESTORE,
 			   .restore = {.job = o->id,
 				       .submit = {.plan = &o->plan, .name = o->record.name, .priority = o->record.priority,
@@ -160,6 +162,10 @@ static int tell_core(struct server *s, const struct replay *r, struct error *e)
 				       .looks = &o->record.looks}};
 	server_step(s, &ev);
 	mem_free(next);
+	if (*held) {
+		ev = (struct event){.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_ORDERED, .text = control_held_by(held, text)};
+		server_step(s, &ev);
+	}
 	return 0;
 }
 
@@ -194,6 +200,8 @@ static int make_order(struct server *s, const struct ledger_job *j, struct order
 	rc = hold_blobs(s, submit.message->submit, e);
 	if (!rc)
 		rc = order_new(o, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e);
+	if (!rc)
+		(*o)->record.priority = j->priority;
 	envelope_fini(&submit);
 	return rc;
 }
@@ -231,7 +239,7 @@ static int restore_one(struct server *s, const struct ledger_job *j, struct erro
 	if (!rc) {
 		r->order->next = s->orders;
 		s->orders = r->order;
-		rc = tell_core(s, r, e);
+		rc = tell_core(s, r, j->held, e);
 	} else if (r->order) {
 		order_free(r->order);
 	}

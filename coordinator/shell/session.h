@@ -45,6 +45,13 @@ void session_send_job_end(struct session *p, uint64_t job);
 void session_tick(struct session *p);
 
 /* client.c */
+/* false: no such job for this client, who sees the own jobs alone. */
+bool session_finds_job(const struct session *p, uint64_t job, struct job_view *v);
+void session_send_done(struct session *p); /* p->rejected says why not */
+/* control.c */
+void session_control(struct session *p, const Farm__Control *c);
+
+/* client.c again */
 void session_client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size);
 void session_upload_abort(struct session *p);
 /* The order's canvas is free, or the order has ended: who waits for its preview gets it, or it is made now. */

@@ -9,7 +9,7 @@
 
 struct ledger {
 	sqlite3 *db;
-	sqlite3_stmt *add, *end, *last, *next;
+	sqlite3_stmt *add, *end, *hold, *priority, *last, *next;
 };
 
 /* The n-th brings a database of version n to n + 1; never changed, only added to. */
@@ -18,6 +18,7 @@ static const char *const migrations[] = {
 	" priority INTEGER NOT NULL, mixed INTEGER NOT NULL, state TEXT NOT NULL, submitted REAL NOT NULL, ended REAL,"
 	" submission BLOB, plan BLOB) STRICT;"
 	"CREATE INDEX living ON jobs (id) WHERE ended IS NULL;",
+	"ALTER TABLE jobs ADD COLUMN held TEXT NOT NULL DEFAULT '';",
 };
 enum { VERSION = sizeof migrations / sizeof *migrations };
 
@@ -84,14 +85,19 @@ int ledger_open(struct ledger **out, const char *path, struct error *e)
 	if (!rc)
 		rc = migrate(l, e);
 	if (!rc)
-		rc = prepare(l, &l->add, "INSERT INTO jobs VALUES (?, ?, ?, ?, ?, ?, 'live', ?, NULL, ?, ?)", e);
+		rc = prepare(l, &l->add, "INSERT INTO jobs (id, owner, name, version, priority, mixed, state, submitted, submission, plan)"
+					 " VALUES (?, ?, ?, ?, ?, ?, 'live', ?, ?, ?)", e);
 	if (!rc)
 		rc = prepare(l, &l->end, "UPDATE jobs SET state = ?2, ended = ?3, submission = NULL, plan = NULL WHERE id = ?1 AND ended IS NULL",
 			     e);
 	if (!rc)
+		rc = prepare(l, &l->hold, "UPDATE jobs SET held = ?2 WHERE id = ?1", e);
+	if (!rc)
+		rc = prepare(l, &l->priority, "UPDATE jobs SET priority = ?2 WHERE id = ?1", e);
+	if (!rc)
 		rc = prepare(l, &l->last, "SELECT coalesce(max(id), 0) FROM jobs", e);
 	if (!rc)
-		rc = prepare(l, &l->next, "SELECT id, owner, name, version, priority, mixed, submitted, submission, plan FROM jobs"
+		rc = prepare(l, &l->next, "SELECT id, owner, name, version, priority, mixed, submitted, submission, plan, held FROM jobs"
 					  " WHERE ended IS NULL AND id > ? ORDER BY id LIMIT 1", e);
 	if (rc) {
 		ledger_close(l);
@@ -107,6 +113,8 @@ void ledger_close(struct ledger *l)
 		return;
 	sqlite3_finalize(l->add);
 	sqlite3_finalize(l->end);
+	sqlite3_finalize(l->hold);
+	sqlite3_finalize(l->priority);
 	sqlite3_finalize(l->last);
 	sqlite3_finalize(l->next);
 	sqlite3_close(l->db);
@@ -147,6 +155,20 @@ int ledger_end(struct ledger *l, uint64_t id, const char *state, struct error *e
 	return finish(l, l->end, e);
 }
 
+int ledger_hold(struct ledger *l, uint64_t id, const char *who, struct error *e)
+{
+	sqlite3_bind_int64(l->hold, 1, (sqlite3_int64)id);
+	sqlite3_bind_text(l->hold, 2, who, -1, SQLITE_STATIC);
+	return finish(l, l->hold, e);
+}
+
+int ledger_priority(struct ledger *l, uint64_t id, int priority, struct error *e)
+{
+	sqlite3_bind_int64(l->priority, 1, (sqlite3_int64)id);
+	sqlite3_bind_int(l->priority, 2, priority);
+	return finish(l, l->priority, e);
+}
+
 int ledger_last(struct ledger *l, uint64_t *id, struct error *e)
 {
 	int rc = sqlite3_step(l->last) == SQLITE_ROW ? 0 : fault(l, e);
@@ -179,5 +201,6 @@ int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct e
 	j->submission_size = (size_t)sqlite3_column_bytes(s, 7);
 	j->plan = sqlite3_column_blob(s, 8);
 	j->plan_size = (size_t)sqlite3_column_bytes(s, 8);
+	j->held = text_at(s, 9);
 	return 1;
 }

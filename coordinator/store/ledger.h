@@ -18,6 +18,7 @@ struct ledger;
 struct ledger_job {
 	uint64_t id;
 	const char *owner, *name, *version; /* version: of the program that took it */
+	const char *held;                   /* by whom; "": it is not. ledger_add does not look at it */
 	int priority;
 	bool mixed;
 	double submitted;                       /* seconds since 1970 */
@@ -30,6 +31,8 @@ int ledger_open(struct ledger **l, const char *path, struct error *e);
 void ledger_close(struct ledger *l); /* NULL: nothing */
 int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e);
 int ledger_end(struct ledger *l, uint64_t id, const char *state, struct error *e);
+int ledger_hold(struct ledger *l, uint64_t id, const char *who, struct error *e); /* "": no longer */
+int ledger_priority(struct ledger *l, uint64_t id, int priority, struct error *e);
 /* The greatest id that was ever added; 0: none. */
 int ledger_last(struct ledger *l, uint64_t *id, struct error *e);
 /* The living job with the smallest id above `after`, whose texts and bytes are valid until the next call. 1: it is there;

@@ -236,7 +236,14 @@ static void take_job(const char **at, struct event *ev)
 		ev->image_known.disagrees = take(at, "disagrees");
 	} else if (take(at, "hold") || take(at, "release")) {
 		ev->kind = EVENT_HOLD;
+		ev->tag = 7;
+		ev->hold = take(at, "order") ? HOLD_ORDERED : HOLD_STORAGE;
 		ev->job = take_id(at, "j");
+	} else if (take(at, "priority")) {
+		ev->kind = EVENT_PRIORITY;
+		ev->tag = 7;
+		ev->job = take_id(at, "j");
+		ev->priority = (int)take_number(at);
 	} else if (take(at, "broken")) {
 		ev->kind = EVENT_JOB_BROKEN;
 		ev->job = take_id(at, "j");

@@ -9,6 +9,7 @@
 #include <cmocka.h>
 
 #include <fcntl.h>
+#include <sqlite3.h>
 #include <stdio.h>
 #include <string.h>
 #include <sys/stat.h>
@@ -69,6 +70,64 @@ static void living_jobs(void **state)
 	ledger_close(l);
 }
 
+/* As the first version made it, with a job in it. */
+static void earlier_versions(void **state)
+{
+	(void)state;
+	char path[128];
+	sqlite3 *db;
+	struct error e;
+	struct ledger_job j;
+	snprintf(path, sizeof path, "%s/jobs.db", folder);
+	assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+	assert_int_equal(sqlite3_exec(db, "CREATE TABLE jobs (id INTEGER PRIMARY KEY, owner TEXT NOT NULL, name TEXT NOT NULL, version TEXT NOT NULL,"
+					  " priority INTEGER NOT NULL, mixed INTEGER NOT NULL, state TEXT NOT NULL, submitted REAL NOT NULL,"
+					  " ended REAL, submission BLOB, plan BLOB) STRICT;"
+					  "CREATE INDEX living ON jobs (id) WHERE ended IS NULL;"
+					  "INSERT INTO jobs VALUES (7, 'ann', 'old', '0.1', 2, 0, 'live', 5.5, NULL, x'0001', x'02');"
+					  "PRAGMA user_version = 1", NULL, NULL, NULL), SQLITE_OK);
+	assert_int_equal(sqlite3_close(db), SQLITE_OK);
+	struct ledger *l = open_ledger(path);
+	for (int again = 0; again < 2; again++) {
+		assert_int_equal(ledger_next(l, 0, &j, &e), 1);
+		assert_true(j.id == 7 && j.priority == 2 && j.submitted == 5.5 && j.submission_size == 2 && j.plan_size == 1);
+		assert_string_equal(j.owner, "ann");
+		assert_string_equal(j.held, again ? "bob" : "");
+		assert_int_equal(ledger_hold(l, 7, "bob", &e), 0);
+		ledger_close(l);
+		l = open_ledger(path);
+	}
+	add(l, 8);
+	ledger_close(l);
+}
+
+static void orders(void **state)
+{
+	(void)state;
+	char path[128];
+	struct error e;
+	struct ledger_job j;
+	struct ledger *l = open_ledger(path);
+	add(l, 1);
+	add(l, 2);
+	assert_int_equal(ledger_next(l, 0, &j, &e), 1);
+	assert_string_equal(j.held, "");
+	assert_int_equal(ledger_hold(l, 1, "ann", &e), 0);
+	assert_int_equal(ledger_priority(l, 2, 77, &e), 0);
+	ledger_close(l);
+	l = open_ledger(path);
+	assert_int_equal(ledger_next(l, 0, &j, &e), 1);
+	assert_string_equal(j.held, "ann");
+	assert_int_equal(j.priority, -3);
+	assert_int_equal(ledger_next(l, 1, &j, &e), 1);
+	assert_string_equal(j.held, "");
+	assert_int_equal(j.priority, 77);
+	assert_int_equal(ledger_hold(l, 1, "", &e), 0);
+	assert_int_equal(ledger_next(l, 0, &j, &e), 1);
+	assert_string_equal(j.held, "");
+	ledger_close(l);
+}
+
 static void set_version(const char *path, unsigned char version)
 {
 	int fd = open(path, O_RDWR); /* user_version: bytes 60 to 63, big endian */
@@ -87,7 +146,7 @@ static void versions(void **state)
 	set_version(path, 99);
 	assert_int_equal(ledger_open(&l, path, &e), -EPROTO);
 	assert_non_null(strstr(e.text, "later"));
-	set_version(path, 1);
+	set_version(path, 2);
 	l = open_ledger(path);
 	ledger_close(l);
 	int fd = open(path, O_RDWR | O_TRUNC);
@@ -124,6 +183,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(living_jobs, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(earlier_versions, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(orders, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(versions, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(stays_small, folder_set_up, folder_tear_down),
 	};

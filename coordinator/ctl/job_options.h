@@ -1,0 +1,20 @@
+/* hslt-job's command line. Texts are borrowed from argv; a command that makes no sense ends the program with 2. */
+#ifndef COORDINATOR_CTL_JOB_OPTIONS_H
+#define COORDINATOR_CTL_JOB_OPTIONS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum job_verb { JOB_LIST, JOB_CANCEL, JOB_FETCH, JOB_LOG, JOB_HOLD, JOB_RELEASE, JOB_PRIORITY, JOB_VERBS };
+
+struct job_options {
+	const char *coordinator, *tls, *output;
+	enum job_verb verb; /* JOB_VERBS: none */
+	uint64_t job;
+	int priority;
+	bool has_priority, insecure, json, preview;
+};
+
+void job_options_parse(struct job_options *o, int argc, char **argv);
+
+#endif

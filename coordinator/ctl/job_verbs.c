@@ -1,0 +1,136 @@
+#include "coordinator/ctl/job_verbs.h"
+
+#include "common/base/progress.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { EXIT_DISAGREE = 5 };
+
+/* ---- list ---- */
+
+static void print_table(const Farm__JobListAnswer *a)
+{
+	if (a->n_jobs)
+		printf("%-6s %-10s %4s %7s %-9s %s\n", "JOB", "STATE", "PRI", "DONE", "ETA", "NAME");
+	for (size_t i = 0; i < a->n_jobs; i++) {
+		const Farm__JobStatus *s = a->jobs[i];
+		char eta[32] = "-", id[32];
+		if (!s->ended && s->eta >= 0)
+			progress_time(s->eta, eta, sizeof eta);
+		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
+		const char *why = *s->why ? s->why : s->ended && s->exit_code == EXIT_DISAGREE ? "its chains disagree" : "";
+		printf("%-6s %-10s %4d %5.1f %% %-9s %s", id, s->state, s->priority, 100 * s->progress, eta, s->name);
+		if (*why)
+			printf("  # %s", why);
+		else if (s->ended && s->target_error > 0)
+			printf("  # ended by %s", s->reason);
+		printf("\n");
+	}
+}
+
+static void print_json(const Farm__JobListAnswer *a)
+{
+	json_t *list = json_array();
+	for (size_t i = 0; i < a->n_jobs; i++) {
+		const Farm__JobStatus *s = a->jobs[i];
+		char id[32];
+		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
+		json_array_append_new(list, json_pack("{s:i s:s s:s s:s s:f s:i s:s s:s s:s s:b s:i s:s}", "schema", 1, "id", id,
+						      "name", s->name, "state", s->state, "progress", s->progress, "priority",
+						      (int)s->priority, "why", s->why, "reason", s->reason, "output",
+						      s->output, "result", (int)s->fetchable, "exitCode",
+						      (int)s->exit_code, "note", s->note));
+	}
+	json_dumpf(list, stdout, JSON_INDENT(2));
+	putchar('\n');
+	json_decref(list);
+}
+
+static int list(struct client *cl, const struct job_options *o, struct error *e)
+{
+	Farm__JobList question;
+	Farm__Envelope m;
+	struct client_message answer;
+	farm__job_list__init(&question);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_JOB_LIST;
+	m.job_list = &question;
+	int rc = client_call(cl, &m, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER, &answer, e);
+	if (rc)
+		return rc;
+	(o->json ? print_json : print_table)(answer.envelope.message->job_list_answer);
+	client_message_fini(&answer);
+	return 0;
+}
+
+/* ---- the others ---- */
+
+static int take_done(struct client *cl, const Farm__Envelope *m, const struct job_options *o, struct error *e)
+{
+	struct client_message answer;
+	int rc = client_call(cl, m, FARM__ENVELOPE__BODY_DONE, &answer, e);
+	if (rc)
+		return rc;
+	const Farm__Done *done = answer.envelope.message->done;
+	if (!done->ok)
+		rc = error_set(e, ENOENT, "j%llu: %s", (unsigned long long)o->job, done->text);
+	else if (*done->text)
+		printf("%s\n", done->text);
+	client_message_fini(&answer);
+	return rc;
+}
+
+static int cancel(struct client *cl, const struct job_options *o, struct error *e)
+{
+	Farm__Cancel question;
+	Farm__Envelope m;
+	farm__cancel__init(&question);
+	farm__envelope__init(&m);
+	question.job = o->job;
+	m.body_case = FARM__ENVELOPE__BODY_CANCEL;
+	m.cancel = &question;
+	return take_done(cl, &m, o, e);
+}
+
+static int control(struct client *cl, const struct job_options *o, struct error *e)
+{
+	static const Farm__Verb verbs[] = {[JOB_HOLD] = FARM__VERB__VERB_HOLD, [JOB_RELEASE] = FARM__VERB__VERB_RELEASE,
+					   [JOB_PRIORITY] = FARM__VERB__VERB_PRIORITY};
+	Farm__Control question;
+	Farm__Envelope m;
+	farm__control__init(&question);
+	farm__envelope__init(&m);
+	question.job = o->job;
+	question.verb = verbs[o->verb];
+	question.priority = o->priority;
+	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
+	m.control = &question;
+	return take_done(cl, &m, o, e);
+}
+
+static int fetch(struct client *cl, const struct job_options *o, struct error *e)
+{
+	char output[1024];
+	int rc = client_fetch(cl, o->job, o->preview ? FARM__WHAT__WHAT_PREVIEW : FARM__WHAT__WHAT_RESULT, o->output, output,
+			      sizeof output, e);
+	if (!rc && isatty(STDERR_FILENO))
+		fprintf(stderr, "%s\n", output);
+	return rc;
+}
+
+static int print_log(struct client *cl, const struct job_options *o, struct error *e)
+{
+	return client_fetch_stream(cl, o->job, FARM__WHAT__WHAT_LOG, STDOUT_FILENO, e);
+}
+
+int job_verb(struct client *cl, const struct job_options *o, struct error *e)
+{
+	static int (*const verbs[])(struct client *, const struct job_options *, struct error *) = {
+		[JOB_LIST] = list,	[JOB_CANCEL] = cancel,	 [JOB_FETCH] = fetch,	   [JOB_LOG] = print_log,
+		[JOB_HOLD] = control,	[JOB_RELEASE] = control, [JOB_PRIORITY] = control,
+	};
+	return verbs[o->verb](cl, o, e);
+}

@@ -1,0 +1,90 @@
+#include "coordinator/shell/control.h"
+
+#include "common/base/text.h"
+#include "coordinator/shell/session.h"
+
+#include <stdio.h>
+
+const char *control_held_by(const char *who, char text[256])
+{
+	snprintf(text, 256, "held by %.200s", who);
+	return text;
+}
+
+/* Without a certificate anybody may call himself anything. */
+static const char *name_of(const struct session *p)
+{
+	return *p->who.name ? p->who.name : "a client";
+}
+
+static int tell(struct session *p, struct event *ev)
+{
+	ev->tag = p->id;
+	server_step(p->server, ev);
+	return *p->rejected ? -1 : 0;
+}
+
+/* The core knows whether it can be, and is told first. */
+static void not_for_long(struct session *p, const struct error *e)
+{
+	snprintf(p->rejected, sizeof p->rejected, "so it is until the coordinator stops, but it cannot be stored: %.180s", e->text);
+}
+
+static void hold(struct session *p, uint64_t job, const char *who)
+{
+	struct server *s = p->server;
+	struct error e;
+	char text[256];
+	struct event ev = {.kind = EVENT_HOLD, .job = job, .hold = HOLD_ORDERED, .text = *who ? control_held_by(who, text) : ""};
+	if (tell(p, &ev))
+		return;
+	if (ledger_hold(s->ledger, job, who, &e)) {
+		not_for_long(p, &e);
+		return;
+	}
+	struct order *o = server_order(s, job);
+	if (o)
+		order_log(o, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released", log_quote(name_of(p)).text);
+}
+
+static void set_priority(struct session *p, uint64_t job, int priority)
+{
+	struct server *s = p->server;
+	struct error e;
+	struct event ev = {.kind = EVENT_PRIORITY, .job = job, .priority = priority};
+	if (tell(p, &ev))
+		return;
+	if (ledger_priority(s->ledger, job, priority, &e)) {
+		not_for_long(p, &e);
+		return;
+	}
+	struct order *o = server_order(s, job);
+	if (o)
+		order_log(o, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);
+}
+
+void session_control(struct session *p, const Farm__Control *c)
+{
+	struct job_view v;
+	p->rejected[0] = 0;
+	if (!session_finds_job(p, c->job, &v)) {
+		text_copy(p->rejected, sizeof p->rejected, "no such job");
+	} else if (!server_order(p->server, c->job)) { /* the core need not know it any more */
+		text_copy(p->rejected, sizeof p->rejected, "the job is over");
+	} else {
+		switch (c->verb) {
+		case FARM__VERB__VERB_HOLD:
+			hold(p, c->job, name_of(p));
+			break;
+		case FARM__VERB__VERB_RELEASE:
+			hold(p, c->job, "");
+			break;
+		case FARM__VERB__VERB_PRIORITY:
+			set_priority(p, c->job, c->priority);
+			break;
+		default: /* a number from outside */
+			text_copy(p->rejected, sizeof p->rejected, "nothing that can be done with a job");
+		}
+	}
+	session_send_done(p);
+}

@@ -1,0 +1,124 @@
+/* What people want of jobs that are there, as transcripts: hold, release, priority. */
+#include "tests/support/transcript.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+
+#include <cmocka.h>
+
+static struct job_status status(const struct farm *f, uint64_t job, double now)
+{
+	struct job_status s;
+	assert_true(farm_job(f, job, now, &s));
+	return s;
+}
+
+/* No more leases go out, those that are out count; the other job has the workers. */
+static void hold_and_release(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=3 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=2 -> -",
+		"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+		"[1] hold order j1 held by ann -> -",
+		"[1] hold order j1 held by bob -> -", /* whoever came last */
+		"[2] w1 batch j1 g0 p0 boot -> merge, merged",
+		NULL });
+	assert_int_equal(status(f, 1, 2).state, JOB_HELD);
+	assert_string_equal(status(f, 1, 2).waiting, "held by bob");
+	transcript_play(f, (const char *const[]){
+		"[2] submit groups=1 priority=-9 -> j2 submitted, j2 is queued, j2 is bootstrap, w1 gets j2 g0 p0 boot",
+		"[3] w1 batch j2 g0 p0 boot -> merge, merged, j2 prepare",
+		"[3] w1 batch j1 g1 p0 boot -> merge, merged",
+		"[4] release order j1 -> w1 gets j1 g2 p0 boot",
+		"[4] release order j1 -> -",
+		"[5] hold order j9 held by ann -> rejected: no such job",
+		"[5] cancel j1 -> j1 cancelled, w1 loses j1 g2 p0 boot, j1 is cancelled (cancelled: cancelled)",
+		"[5] hold order j1 held by ann -> rejected: the job is over",
+		NULL });
+	assert_int_equal(status(f, 1, 5).state, JOB_CANCELLED);
+	farm_free(f);
+}
+
+static void two_reasons(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit -> j1 submitted, j1 is queued",
+		"[0] hold order j1 held by ann -> -", "[0] hold j1 no room -> -",
+		"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> -", NULL });
+	assert_string_equal(status(f, 1, 0).waiting, "held by ann; no room");
+	transcript_play(f, (const char *const[]){ "[1] release order j1 -> -", NULL });
+	assert_string_equal(status(f, 1, 1).waiting, "no room");
+	transcript_play(f, (const char *const[]){ "[1] hold order j1 held by ann -> -", "[2] release j1 -> -", NULL });
+	assert_string_equal(status(f, 1, 2).waiting, "held by ann");
+	assert_int_equal(status(f, 1, 2).state, JOB_HELD);
+	transcript_play(f, (const char *const[]){ "[3] release order j1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot", NULL });
+	farm_free(f);
+}
+
+/* A bound in seconds does not run out while nobody may work: 3 s of 8 before the hold, 90 of it, and then five more. */
+static void the_clock_stands_still(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[100] restore j1 render 2,3 elapsed=3 completed=2 rounds=inf seconds=8 -> j1 is running",
+		"[100] w1 joins A threads=1 -> -",
+		"[100] hold order j1 held by ann -> -",
+		"[150] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3",
+		"[150] w1 batch j1 g0 p0 e3 -> merge, merged", NULL });
+	assert_true(farm_elapsed(f, 1, 180) == 3);
+	transcript_play(f, (const char *const[]){
+		"[190] release order j1 -> -", NULL });
+	assert_true(farm_elapsed(f, 1, 194) == 7);
+	transcript_play(f, (const char *const[]){
+		"[194] w1 batch j1 g1 p0 e3 -> merge, merged, j1 round 4",
+		"[194] w1 batch j1 g0 p0 e4 -> merge, merged",
+		"[195] w1 batch j1 g1 p0 e4 -> merge, merged, j1 round 5, j1 publish 5, j1 is done (time)", NULL });
+	farm_free(f);
+}
+
+static void priority(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=4 -> j1 submitted, j1 is queued",
+		"[0] submit groups=4 -> j2 submitted, j2 is queued",
+		"[0] submit groups=4 -> j3 submitted, j3 is queued",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[1] priority j3 1 -> -", /* the lease that is out stays */
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged, j3 is bootstrap, w1 gets j3 g0 p0 boot",
+		"[2] priority j2 1 -> -",
+		"[2] w1 batch j3 g0 p0 boot -> merge, merged, j2 is bootstrap, w1 gets j2 g0 p0 boot", /* the older one */
+		"[3] priority j2 -100 -> -",
+		"[3] priority j3 0 -> -",
+		"[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot", /* as if it had never been */
+		"[4] priority j3 100 -> -",
+		"[4] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j3 g1 p0 boot",
+		"[5] priority j3 101 -> rejected: a priority is from -100 to 100",
+		"[5] priority j4 1 -> rejected: no such job",
+		"[5] cancel j1 -> j1 cancelled, j1 is cancelled (cancelled: cancelled)",
+		"[5] priority j1 1 -> rejected: the job is over",
+		"[6] cancel j3 -> j3 cancelled, w1 loses j3 g1 p0 boot, j3 is cancelled (cancelled: cancelled), w1 gets j2 g1 p0 boot",
+		NULL });
+	assert_int_equal(status(f, 3, 5).priority, 100);
+	farm_free(f);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(hold_and_release),
+		cmocka_unit_test(two_reasons),
+		cmocka_unit_test(the_clock_stands_still),
+		cmocka_unit_test(priority),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

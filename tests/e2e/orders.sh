@@ -1,0 +1,77 @@
+# What is ordered of jobs that are there: hold, release, priority; and all of it after kill -9 of the coordinator.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
+
+job() {
+	"$BIN/hslt-job" "$@"
+}
+
+# refused CODE TEXT COMMAND...
+refused() {
+	want=$1
+	text=$2
+	shift 2
+	code=0
+	"$@" >"$DIR/said" 2>&1 || code=$?
+	[ $code -eq "$want" ] || fail "$*: code $code, not $want"
+	grep -q -e "$text" "$DIR/said" || fail "$*: $(cat "$DIR/said")"
+}
+
+again() {
+	kill -9 $COORDINATOR_PID
+	wait $COORDINATOR_PID 2>/dev/null || :
+	LISTEN=$COORDINATOR start_coordinator -v --journal 0.2
+}
+
+done_in() {
+	until_true "$1" is_state "$2" done || fail "$2 is $(value "$2" state): $(value "$2" why)"
+}
+
+merged_more() {
+	[ "$(value "$1" merged)" -gt "$2" ]
+}
+
+has_no_leases() {
+	[ "$(value "$1" leases)" -eq 0 ]
+}
+
+start_coordinator -v --journal 0.2
+start_worker w1
+
+# ---- hold, release, priority
+a=$(submit "$BOX" -o "$DIR/a.exr" --integrator path --spp 1000)
+until_true 20 merged_more "$a" 3 || fail "nothing of $a is merged"
+job hold "$a"
+[ "$(value "$a" state)" = held ] || fail "$a is $(value "$a" state)"
+[ "$(value "$a" waiting)" = "held by a client" ] || fail "$a waits: $(value "$a" waiting)"
+until_true 20 has_no_leases "$a" || fail "leases of $a are out"
+b=$(submit "$BOX" -o "$DIR/b.exr" --integrator path --spp 4)
+done_in 30 "$b"
+again
+[ "$(value "$a" state)" = held ] || fail "$a is $(value "$a" state) after a restart"
+c=$(submit "$BOX" -o "$DIR/c.exr" --integrator path --spp 1000)
+d=$(submit "$BOX" -o "$DIR/d.exr" --integrator path --spp 1000)
+job priority "$d" -5
+job priority "$c" 7
+again
+[ "$(value "$c" priority)" = 7 ] && [ "$(value "$d" priority)" = -5 ] || fail "priorities are lost"
+until_true 30 merged_more "$c" 5 || fail "nothing of $c is merged"
+[ "$(value "$d" merged)" -eq 0 ] || fail "$d came before $c"
+job priority "$d" 50
+job release "$a"
+[ "$(value "$a" state)" != held ] || fail "$a is held still"
+until_true 30 merged_more "$d" 5 || fail "nothing of $d is merged"
+job log "$d" | grep -q 'event=job_note .*priority=50 by=' || fail "the log of $d does not know its priority"
+job log "$a" | grep -q 'state=held by=' || fail "the log of $a does not know that it was held"
+job log "$a" | grep -q 'state=released by=' || fail "the log of $a does not know that it was released"
+refused 2 'from -100 to 100' job priority "$d" 101
+refused 2 'which priority' job priority "$d"
+refused 1 'no such job' job hold j99
+refused 1 'the job is over' job hold "$b"
+job cancel "$c"
+job cancel "$d"
+done_in 60 "$a"
+submit "$BOX" -o "$DIR/quiet.exr" --integrator path --spp 1000 --wait >/dev/null
+job fetch "$a"
+same "$DIR/a.exr" "$DIR/quiet.exr"
+echo "held, released, put first and last; the bits of a quiet run"
