@@ -24,13 +24,15 @@ static const char doc[] =
 
 enum {
 	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS,
-	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_BANDWIDTH
+	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_BANDWIDTH,
+	OPTION_GROUP
 };
 
 static const struct argp_option options[] = {
 	{"listen", 'l', "HOST:PORT", 0, "Where workers and clients connect (127.0.0.1:7700; port 0: any free one)", 0},
 	{"spool", OPTION_SPOOL, "DIR", 0, "The folder of blobs, jobs and results", 0},
 	{"status-socket", OPTION_STATUS, "PATH", 0, "Unix socket for hslt-status (or $HSLT_STATUS_SOCKET)", 0},
+	{"status-group", OPTION_GROUP, "GROUP", 0, "Who may connect to it besides this user (nobody)", 0},
 	{"keep-partials", OPTION_PARTIALS, "DIR", 0, "Write every partial EXR tile that is merged into DIR", 0},
 	{"port-file", OPTION_PORT_FILE, "FILE", 0, "Write the port that was bound into FILE", 0},
 	{"heartbeat", OPTION_HEARTBEAT, "SECONDS", 0, "How often workers must be heard (5)", 0},
@@ -70,6 +72,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_STATUS:
 		c->status_socket = arg;
+		return 0;
+	case OPTION_GROUP:
+		c->status_group = arg;
 		return 0;
 	case OPTION_PARTIALS:
 		c->keep_partials = arg;
@@ -116,6 +121,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case ARGP_KEY_END:
 		if (!c->spool)
 			argp_error(state, "--spool DIR is needed");
+		if (c->status_group && !c->status_socket && !getenv("LISTEN_FDS"))
+			argp_error(state, "--status-group is for a --status-socket");
 		return 0;
 	default:
 		return ARGP_ERR_UNKNOWN;

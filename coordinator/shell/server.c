@@ -469,7 +469,7 @@ int server_open(struct server **out, const struct server_config *c, struct error
 		rc = open_stores(s, e);
 	int inherited = notify_inherited_unix();
 	if (!rc && (inherited >= 0 || c->status_socket))
-		rc = status_open(&s->status, s, inherited, c->status_socket, e);
+		rc = status_open(&s->status, s, inherited, c->status_socket, c->status_group, e);
 	if (!rc)
 		rc = start_listening(s, e);
 	if (rc)

@@ -16,6 +16,7 @@
 struct server_config {
 	const char *listen, *spool;
 	const char *status_socket; /* NULL: none */
+	const char *status_group;  /* who may connect to it besides us; NULL: nobody */
 	const char *keep_partials; /* NULL: none */
 	const char *port_file;     /* NULL: none; the port that was bound is written there */
 	const char *tls;           /* a folder (common/net/tls.h); NULL or "": plaintext */

@@ -2,6 +2,9 @@
 
 #include "common/base/mem.h"
 
+#include <errno.h>
+#include <fcntl.h>
+#include <grp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,6 +38,8 @@ struct status_socket {
 	size_t shown_count;
 	uint64_t shown_changes; /* of the server, at the last tick */
 	char *path; /* NULL: inherited */
+	dev_t device; /* the file that was made there; inode 0: none */
+	ino_t inode;
 };
 
 /* ---- lines ---- */
@@ -279,40 +284,94 @@ void status_tick(struct status_socket *t)
 
 /* ---- life ---- */
 
-/* A socket that nobody answers is left from an earlier life. */
-static int remove_stale(const char *path, struct error *e)
+/* A socket that nobody listens to is left from an earlier life; whatever else is there is somebody's. */
+static int remove_stale(const char *path, const struct sockaddr_un *a, struct error *e)
 {
-	struct sockaddr_un a = {.sun_family = AF_UNIX};
 	struct stat st;
-	if (strlen(path) >= sizeof a.sun_path)
-		return error_set(e, ENAMETOOLONG, "%s: at most %zu bytes for a socket's path", path, sizeof a.sun_path - 1);
 	if (lstat(path, &st))
 		return 0;
 	if (!S_ISSOCK(st.st_mode))
 		return error_set(e, EEXIST, "%s: is there already and is no socket", path);
-	memcpy(a.sun_path, path, strlen(path));
-	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0);
-	bool alive = fd >= 0 && connect(fd, (struct sockaddr *)&a, sizeof a) == 0;
-	if (fd >= 0)
-		close(fd);
-	if (alive)
+	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+	if (fd < 0)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	int fault = connect(fd, (const struct sockaddr *)a, sizeof *a) ? errno : 0;
+	close(fd);
+	if (fault == ENOENT)
+		return 0;
+	if (fault == EACCES || fault == EPROTOTYPE)
+		return error_set(e, fault, "%s: somebody else's socket: %s", path, strerror(fault));
+	if (fault != ECONNREFUSED) /* EAGAIN: so many wait there that nobody more can */
 		return error_set(e, EADDRINUSE, "%s: somebody else answers there", path);
 	return unlink(path) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
 }
 
-static int bind_private(uv_pipe_t *listener, const char *path)
+/* Through a descriptor of the file that we made: the name may mean another by now. */
+static int share(const char *path, gid_t group, struct error *e)
 {
-	mode_t mask = umask(0177); /* from its first moment on */
-	int rc = uv_pipe_bind(listener, path);
-	umask(mask);
+	char itself[64];
+	struct stat st;
+	int fd = open(path, O_PATH | O_NOFOLLOW | O_CLOEXEC);
+	snprintf(itself, sizeof itself, "/proc/self/fd/%d", fd);
+	bool ours = fd >= 0 && fstat(fd, &st) == 0 && S_ISSOCK(st.st_mode) && st.st_uid == geteuid();
+	int rc = 0;
+	if (!ours)
+		rc = error_set(e, fd < 0 ? errno : EEXIST, "%s: is not the socket that was made there", path);
+	else if (fchownat(fd, "", (uid_t)-1, group, AT_EMPTY_PATH) || chmod(itself, 0660))
+		rc = error_set(e, errno, "%s: cannot be given to the group: %s", path, strerror(errno));
+	if (fd >= 0)
+		close(fd);
 	return rc;
 }
 
-int status_open(struct status_socket **out, struct server *s, int inherited, const char *path, struct error *e)
+static int find_group(const char *name, gid_t *group, struct error *e)
 {
-	int rc = inherited < 0 ? remove_stale(path, e) : 0;
+	errno = 0;
+	const struct group *g = getgrnam(name);
+	if (!g)
+		return error_set(e, EINVAL, "--status-group: there is no group '%s'%s%s", name, errno ? ": " : "", errno ? strerror(errno) : "");
+	*group = g->gr_gid;
+	return 0;
+}
+
+/* A socket of our own at the path, mode 0600 from its first moment on. libuv's own would remove the file when it closes, and
+ * by then it may be another's. */
+static int make(struct status_socket *t, const char *group, struct error *e)
+{
+	struct sockaddr_un a = {.sun_family = AF_UNIX};
+	struct stat st = {0};
+	gid_t gid = 0;
+	if (strlen(t->path) >= sizeof a.sun_path)
+		return error_set(e, ENAMETOOLONG, "%s: at most %zu bytes for a socket's path", t->path, sizeof a.sun_path - 1);
+	memcpy(a.sun_path, t->path, strlen(t->path));
+	int rc = group ? find_group(group, &gid, e) : 0;
+	if (!rc)
+		rc = remove_stale(t->path, &a, e);
 	if (rc)
 		return rc;
+	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+	mode_t mask = umask(0177);
+	if (fd < 0 || bind(fd, (struct sockaddr *)&a, sizeof a))
+		rc = error_set(e, errno, "%s: %s", t->path, strerror(errno));
+	umask(mask);
+	if (!rc && lstat(t->path, &st) == 0) {
+		t->device = st.st_dev;
+		t->inode = st.st_ino;
+	}
+	if (!rc && group)
+		rc = share(t->path, gid, e);
+	int fault = rc ? 0 : uv_pipe_open(&t->listener, fd);
+	if (fault)
+		rc = error_set(e, -fault, "%s: %s", t->path, uv_strerror(fault));
+	if (rc && fd >= 0)
+		close(fd);
+	return rc;
+}
+
+int status_open(struct status_socket **out, struct server *s, int inherited, const char *path, const char *group, struct error *e)
+{
+	if (inherited >= 0 && group)
+		return error_set(e, EINVAL, "--status-group: the socket is the service manager's: SocketGroup= in its unit");
 	struct status_socket *t = mem_alloc(1, sizeof *t);
 	if (!t || (inherited < 0 && !(t->path = mem_strdup(path)))) {
 		mem_free(t);
@@ -322,10 +381,14 @@ int status_open(struct status_socket **out, struct server *s, int inherited, con
 	uv_pipe_init(&s->loop, &t->listener, 0);
 	t->listener.data = t;
 	*out = t;
-	rc = t->path ? bind_private(&t->listener, path) : uv_pipe_open(&t->listener, inherited);
-	if (!rc)
-		rc = uv_listen((uv_stream_t *)&t->listener, BACKLOG, on_connection);
-	return rc ? error_set(e, -rc, "%s: %s", t->path ? path : "inherited status socket", uv_strerror(rc)) : 0;
+	int fault = 0, rc = 0;
+	if (t->path)
+		rc = make(t, group, e);
+	else
+		fault = uv_pipe_open(&t->listener, inherited);
+	if (!rc && !fault)
+		fault = uv_listen((uv_stream_t *)&t->listener, BACKLOG, on_connection);
+	return fault ? error_set(e, -fault, "%s: %s", t->path ? path : "inherited status socket", uv_strerror(fault)) : rc;
 }
 
 static void on_closed(uv_handle_t *h)
@@ -342,7 +405,8 @@ void status_close(struct status_socket *t)
 		return;
 	while (t->readers)
 		drop(t->readers);
-	if (t->path)
+	struct stat st;
+	if (t->path && t->inode && lstat(t->path, &st) == 0 && st.st_dev == t->device && st.st_ino == t->inode)
 		unlink(t->path);
 	uv_close((uv_handle_t *)&t->listener, on_closed);
 }

@@ -1,0 +1,133 @@
+# The status socket's file: who may connect, and that what lies at its path is never followed, taken over or removed when it is
+# somebody else's.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-status
+AT=$DIR/at
+
+# refused SENTENCE OPTION...: a second coordinator does not start with a status socket at $AT
+refused() {
+	sentence=$1
+	shift
+	code=0
+	timeout 10 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --spool "$DIR/other" --status-socket "$AT" "$@" 2>"$DIR/err.log" || code=$?
+	[ $code -ne 0 ] && [ $code -ne 124 ] || fail "it starts, or hangs ($code), though: $sentence"
+	grep -q -e "$sentence" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
+}
+
+# begin OPTION...: one that starts
+begin() {
+	rm -f "$DIR/port"
+	"$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port" --spool "$DIR/spool" --status-socket "$AT" "$@" \
+		2>>"$DIR/coordinator.log" &
+	COORDINATOR_PID=$!
+	PIDS="$PIDS $COORDINATOR_PID"
+	until_true 10 test -s "$DIR/port" || fail "it does not start"
+}
+
+answers() {
+	"$BIN/hslt-status" --socket "$AT" --json >/dev/null
+}
+
+# What is not a socket stays what it is, and what a link leads to as well.
+echo precious >"$AT"
+refused "no socket"
+[ "$(cat "$AT")" = precious ] || fail "a file was changed"
+mv "$AT" "$DIR/target"
+ln -s "$DIR/target" "$AT"
+refused "no socket"
+ln -sfn "$DIR/nowhere" "$AT"
+refused "no socket"
+[ -L "$AT" ] && [ ! -e "$DIR/nowhere" ] || fail "a link was followed or removed"
+rm "$AT"
+mkfifo "$AT"
+refused "no socket"
+rm "$AT"
+mkdir "$AT"
+refused "no socket"
+rmdir "$AT"
+AT=$DIR/$(printf '%0120d' 0)
+refused "at most"
+AT=$DIR/none/at
+refused "No such file"
+AT=$DIR/at
+refused "no group 'nobody-of-that-name'" --status-group nobody-of-that-name
+[ ! -e "$AT" ] || fail "a socket was left"
+timeout 5 env -u HSLT_STATUS_SOCKET "$BIN/hslt-coordinator" --spool "$DIR/other" --status-group daemon 2>"$DIR/err.log" && fail "a group for no socket"
+
+# Another's live socket, by a link too; one that answers so slowly that nobody more can wait there; one of another kind.
+begin
+[ "$(stat -c %a "$AT")" = 600 ] || fail "the mode is $(stat -c %a "$AT")"
+answers || fail "no answer"
+refused "somebody else answers"
+mv "$AT" "$DIR/moved"
+ln -s "$DIR/moved" "$AT"
+refused "no socket"
+rm "$AT"
+mv "$DIR/moved" "$AT"
+answers || fail "it was disturbed"
+if "${PYTHON:-python3}" -c '' 2>/dev/null; then
+	AT=$DIR/busy
+	"${PYTHON:-python3}" -c '
+import os, socket, sys, time
+d, busy, kind = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM), socket.socket(socket.AF_UNIX), sys.argv[1]
+busy.bind(kind + "/busy")
+busy.listen(0)
+socket.socket(socket.AF_UNIX).connect(kind + "/busy")
+wait = [socket.socket(socket.AF_UNIX) for _ in range(3)]
+for w in wait:
+    w.setblocking(False)
+    try:
+        w.connect(kind + "/busy")
+    except BlockingIOError:
+        pass
+d.bind(kind + "/kind")
+time.sleep(60)' "$DIR" &
+	PIDS="$PIDS $!"
+	until_true 10 test -S "$DIR/kind" || fail "no sockets"
+	refused "somebody else answers"
+	AT=$DIR/kind
+	refused "somebody else's socket"
+	AT=$DIR/at
+fi
+
+# One that was left by a life that ended badly is taken away; one that another has put there since is not.
+kill -9 $COORDINATOR_PID
+wait $COORDINATOR_PID 2>/dev/null || :
+[ -S "$AT" ] || fail "it should be there still"
+begin
+answers || fail "a stale socket is in the way"
+rm "$AT"
+first=$COORDINATOR_PID
+rm -f "$DIR/port"
+"$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port" --spool "$DIR/other" --status-socket "$AT" 2>>"$DIR/coordinator.log" &
+second=$!
+PIDS="$PIDS $second"
+until_true 10 test -s "$DIR/port" || fail "the second does not start"
+stop $first
+answers || fail "the first removed the second's socket"
+stop $second
+[ ! -e "$AT" ] || fail "the socket stays"
+
+# A group.
+if [ "$(id -u)" = 0 ] && command -v setpriv >/dev/null && id daemon >/dev/null 2>&1; then
+	begin --status-group daemon
+	[ "$(stat -c '%a %G' "$AT")" = "660 daemon" ] || fail "it is $(stat -c '%a %G' "$AT")"
+	cat >"$DIR/knock" <<'TEXT'
+import socket, sys
+socket.socket(socket.AF_UNIX).connect(sys.argv[1])
+TEXT
+	chmod 711 "$DIR"
+	chmod 644 "$DIR/knock"
+	knock() {
+		setpriv --reuid 65534 --clear-groups "$@" /usr/bin/python3 "$DIR/knock" "$AT" 2>/dev/null
+	}
+	if [ -x /usr/bin/python3 ]; then
+		knock --regid daemon || fail "the group cannot connect"
+		knock --regid 65534 && fail "everybody can connect"
+	fi
+	stop $COORDINATOR_PID
+	[ $CODE -eq 0 ] || fail "it ended with $CODE"
+else
+	echo "the group was not tried: not root"
+fi
+echo "status socket: nobody's file was touched, stale ones go, a group gets in"
