@@ -133,6 +133,14 @@ BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occlud
 bench: programs $(BUILD)/bench/bench $(if $(filter effects,$(BENCH)),plain)
 	$(BUILD)/bench/bench --bin $(BUILD)/bin --json $(BUILD)/bench.json $(BENCH)
 
+# Fake workers against the real coordinator: make load LOAD="--workers 1000 --minutes 10"
+LOAD_SRC := $(wildcard tests/load/*.c) tests/bench/process.c
+$(BUILD)/load/load: $(call obj,$(LOAD_SRC)) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
+	$(link) $(LIBS_RENDER) $(LIBS_COMMON)
+.PHONY: load
+load: programs $(BUILD)/load/load
+	$(BUILD)/load/load --bin $(BUILD)/bin $(LOAD)
+
 # A renderer that knows nothing of colour, dispersion and apertures, to measure what asking for them costs.
 .PHONY: plain
 plain:
