@@ -117,9 +117,12 @@ test-numerics: programs $(NUMERICS_BIN)
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/numerics/run.sh $(BUILD)
 
 # Fuzzers: tests/fuzz/fuzz_*.c, one libFuzzer program each; run.sh calls `make fuzzers` with clang and its sanitizers.
-FUZZ_SRC := $(wildcard tests/fuzz/fuzz_*.c)
-FUZZ_BIN := $(patsubst tests/%.c,$(BUILD)/%,$(FUZZ_SRC))
-$(FUZZ_BIN): $(BUILD)/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
+FUZZ_SRC     := $(wildcard tests/fuzz/fuzz_*.c)
+FUZZ_BIN     := $(patsubst tests/%.c,$(BUILD)/%,$(FUZZ_SRC))
+FUZZ_SUPPORT := $(filter-out $(FUZZ_SRC),$(wildcard tests/fuzz/*.c))
+LIB_FUZZ     := $(BUILD)/lib/libhslt-fuzz.a
+$(LIB_FUZZ): $(call obj,$(FUZZ_SUPPORT))
+$(FUZZ_BIN): $(BUILD)/%: $(BUILD)/obj/tests/%.o $(LIB_FUZZ) $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) -fsanitize=fuzzer -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 fuzzers: $(FUZZ_BIN)
 fuzz:

@@ -90,7 +90,7 @@ else
 		kind "long forms" make -s FULL=1 test
 		step "fuzzers, 10 minutes each" make -s fuzz FUZZ_SECONDS=600
 	else
-		step "fuzzers, 10 s each" make -s fuzz FUZZ_SECONDS=10
+		step "fuzzers, 5 s each" make -s fuzz FUZZ_SECONDS=5
 	fi
 fi
 echo "$passed passed, $failed failed, $skipped skipped"

@@ -1,18 +1,12 @@
 /*
- * Bytes from a peer: frames, envelopes, and what is made of the messages that carry payloads.
- *
- * clang -std=c17 -g -O1 -D_GNU_SOURCE -I. -Ibuild/gen -fsanitize=fuzzer,address,undefined \
- *   -fno-sanitize-recover=all tests/fuzz/fuzz_frame.c \
- *   common/base/{arena,buf,error,mem,text}.c common/{wire,plan,film}/[a-z]*.c build/gen/proto/farm.pb-c.c \
- *   -lOpenEXRCore -lprotobuf-c -lm -o build/fuzz_frame && build/fuzz_frame -max_total_time=60 -max_len=65536
+ * Bytes from a peer, cut into frames whose bounds are the fuzzer's; what is made of messages that carry payloads. The bytes come in
+ * pieces, as from a network.
  */
 #include "common/wire/batch_wire.h"
 #include "common/wire/frame.h"
+#include "tests/fuzz/messages.h"
 
-#include <stdint.h>
 #include <string.h>
-
-int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
 
 static void take_message(const struct frame_reader *r)
 {
@@ -49,7 +43,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	struct error e;
 	frame_reader_init(&r, (struct frame_limits){1 << 20, 1 << 20});
 	for (size_t at = 0, used; at < size; at += used) {
-		int rc = frame_reader_take(&r, bytes + at, size - at, &used, &e);
+		size_t piece = 1 + (at * 2654435761u >> 7) % 4096;
+		int rc = frame_reader_take(&r, bytes + at, piece < size - at ? piece : size - at, &used, &e);
 		if (rc < 0)
 			break;
 		if (rc)

@@ -1,17 +1,11 @@
 /*
  * libFuzzer: a scene file and a mesh, in one input with a zero byte between them.
- *
- *   clang -std=c17 -D_GNU_SOURCE -I. -g -O1 -fsanitize=fuzzer,address,undefined -fno-sanitize-recover=all \
- *       tests/fuzz/fuzz_scene.c tests/support/scene_tables.c tests/support/memory_assets.c common/base/mem.c \
- *       common/base/arena.c common/base/error.c worker/math/mat4.c worker/scene/[a-hj-z]*.c -lexpat -lm -o build/fuzz_scene
- *   build/fuzz_scene -max_total_time=60 -rss_limit_mb=2500 CORPUS_FOLDER
  */
+#include "tests/fuzz/messages.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"
 
 #include <string.h>
-
-int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size);
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {

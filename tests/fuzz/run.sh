@@ -1,5 +1,7 @@
-# Builds every tests/fuzz/fuzz_*.c with clang and runs each for FUZZ_SECONDS (60). Seeds: tests/fuzz/corpus/NAME and the small
-# files of tests/scenes. What is found stays in BUILD/findings and ends the run with 1; a corpus that grows is BUILD/corpus.
+# Builds every tests/fuzz/fuzz_*.c with clang and runs each for FUZZ_SECONDS (60), one after the other; FUZZ_TARGETS="frame tile": only
+# these. Seeds: what a target makes of today's messages, tests/fuzz/corpus/NAME, the small files of tests/scenes. Nothing is written
+# into the tree: what is found stays in BUILD/findings and ends the run with 1; a corpus that grows is BUILD/corpus.
+# A finding is a crash, an input that takes 10 s, an allocation of 512 MB, or 2 GB in all.
 set -u
 cd "$(dirname "$0")/../.." || exit 1
 BUILD=${BUILD:-build/fuzz}
@@ -18,19 +20,28 @@ fi
 	exit 1
 }
 
+# figure NAME LOG: the last value of libFuzzer's progress lines
+figure() {
+	sed -n "s/.* $1: \([0-9]*\).*/\1/p" "$2" | tail -n 1
+}
+
 failed=0
 for source in tests/fuzz/fuzz_*.c; do
 	name=$(basename "$source" .c)
-	mkdir -p "$BUILD/corpus/$name" "$BUILD/findings"
-	find tests/scenes -type f -size -64k -exec cp {} "$BUILD/corpus/$name" \;
-	[ -d "tests/fuzz/corpus/$name" ] && cp tests/fuzz/corpus/"$name"/* "$BUILD/corpus/$name"
-	if "$BUILD/fuzz/$name" -max_total_time="$SECONDS_EACH" -rss_limit_mb=2500 -timeout=10 -print_final_stats=1 \
-		-artifact_prefix="$BUILD/findings/$name-" "$BUILD/corpus/$name" >"$BUILD/$name.log" 2>&1; then
-		echo "fuzz: $name: $(sed -n 's/^stat::number_of_executed_units: *//p' "$BUILD/$name.log") inputs in $SECONDS_EACH s, nothing found"
+	case " ${FUZZ_TARGETS:-${name#fuzz_}} " in *" ${name#fuzz_} "*) ;; *) continue ;; esac
+	corpus=$BUILD/corpus/$name log=$BUILD/$name.log
+	mkdir -p "$corpus" "$BUILD/findings"
+	case $name in fuzz_image | fuzz_scene) find tests/scenes -type f -size -64k -exec cp {} "$corpus" \; ;; esac
+	[ -d "tests/fuzz/corpus/$name" ] && cp tests/fuzz/corpus/"$name"/* "$corpus"
+	! grep -q seeds_wanted "$source" || HSLT_FUZZ_SEEDS=$corpus "$BUILD/fuzz/$name" || failed=1
+	if "$BUILD/fuzz/$name" -max_total_time="$SECONDS_EACH" -rss_limit_mb=2048 -malloc_limit_mb=512 -timeout=10 -max_len=16384 -close_fd_mask=2 \
+		-print_final_stats=1 -artifact_prefix="$BUILD/findings/$name-" "$corpus" >"$log" 2>&1; then
+		echo "fuzz: $name: $(sed -n 's/^stat::number_of_executed_units: *//p' "$log") inputs in $SECONDS_EACH s," \
+			"$(figure cov "$log") edges, nothing found"
 	else
 		failed=1
-		grep -E 'ERROR|SUMMARY|runtime error|Test unit written' "$BUILD/$name.log"
-		echo "fuzz: $name: FOUND something; all of it is in $BUILD/$name.log"
+		grep -E 'ERROR|SUMMARY|runtime error|Test unit written' "$log"
+		echo "fuzz: $name: FOUND something; all of it is in $log"
 	fi
 done
 exit $failed

@@ -1,0 +1,500 @@
+#include "tests/fuzz/farm.h"
+
+#include "common/base/log.h"
+#include "common/base/mem.h"
+#include "common/wire/batch_wire.h"
+#include "coordinator/shell/session.h"
+
+#include <arpa/inet.h>
+#include <dirent.h>
+#include <fcntl.h>
+#include <netinet/tcp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+const char farm_scene[] = "<scene version=\"3.0.0\"/>";
+
+static char base[64]; /* folder of all worlds */
+
+static void need(bool ok, const char *what)
+{
+	if (!ok) {
+		fprintf(stderr, "the world of the fuzzer cannot be made: %s\n", what);
+		abort();
+	}
+}
+
+/* ---- folders ---- */
+
+static void remove_tree(const char *path)
+{
+	struct dirent *d;
+	DIR *dir = opendir(path);
+	while (dir && (d = readdir(dir))) {
+		char below[1024];
+		if (strcmp(d->d_name, ".") == 0 || strcmp(d->d_name, "..") == 0)
+			continue;
+		snprintf(below, sizeof below, "%s/%s", path, d->d_name);
+		if (unlink(below))
+			remove_tree(below);
+	}
+	if (dir)
+		closedir(dir);
+	rmdir(path);
+}
+
+static void copy_file(const char *from, const char *to)
+{
+	char bytes[1 << 15];
+	ssize_t n;
+	int in = open(from, O_RDONLY | O_CLOEXEC), out = open(to, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+	need(in >= 0 && out >= 0, to);
+	while ((n = read(in, bytes, sizeof bytes)) > 0)
+		need(write(out, bytes, (size_t)n) == n, to);
+	close(in);
+	close(out);
+}
+
+static void copy_tree(const char *from, const char *to)
+{
+	struct dirent *d;
+	DIR *dir = opendir(from);
+	mkdir(to, 0700);
+	while (dir && (d = readdir(dir))) {
+		char source[1024], target[1024];
+		struct stat st;
+		if (strcmp(d->d_name, ".") == 0 || strcmp(d->d_name, "..") == 0)
+			continue;
+		snprintf(source, sizeof source, "%s/%s", from, d->d_name);
+		snprintf(target, sizeof target, "%s/%s", to, d->d_name);
+		if (lstat(source, &st) == 0 && S_ISDIR(st.st_mode))
+			copy_tree(source, target);
+		else if (S_ISREG(st.st_mode))
+			copy_file(source, target);
+	}
+	if (dir)
+		closedir(dir);
+}
+
+static void remove_base(void)
+{
+	remove_tree(base);
+}
+
+static void make_base(void)
+{
+	strcpy(base, access("/dev/shm", W_OK) ? "/tmp/hslt-fuzz.XXXXXX" : "/dev/shm/hslt-fuzz.XXXXXX");
+	need(mkdtemp(base) != NULL, base);
+	atexit(remove_base);
+}
+
+/* ---- turning ---- */
+
+void farm_turn(struct farm_world *w)
+{
+	uv_run(&w->server->loop, UV_RUN_NOWAIT);
+}
+
+static bool is_at_work(const struct server *s)
+{
+	for (const struct order *o = s->orders; o; o = o->next)
+		if (o->busy)
+			return true;
+	return s->flushing || s->session_count;
+}
+
+void farm_settle(struct farm_world *w)
+{
+	for (unsigned i = 0; i < FARM_PEERS; i++)
+		farm_hang_up(w, i);
+	farm_turn(w);
+	while (is_at_work(w->server))
+		uv_run(&w->server->loop, UV_RUN_ONCE);
+	farm_turn(w);
+}
+
+/* ---- life ---- */
+
+int farm_world_open(struct farm_world *w, struct error *e)
+{
+	char socket_path[160];
+	struct server_config c;
+	server_config_init(&c);
+	snprintf(socket_path, sizeof socket_path, "%s.sock", w->spool);
+	c.listen = "127.0.0.1:0";
+	c.spool = w->spool;
+	c.status_socket = socket_path;
+	c.journal_bytes = 1 << 14;
+	c.max_connections = 16;
+	for (unsigned i = 0; i < FARM_PEERS; i++)
+		w->peers[i].fd = -1;
+	return server_open(&w->server, &c, e);
+}
+
+void farm_world_close(struct farm_world *w)
+{
+	for (unsigned i = 0; i < FARM_PEERS; i++)
+		farm_hang_up(w, i);
+	server_close(w->server);
+	w->server = NULL;
+}
+
+static void fill(void);
+
+static void template_path(char path[128])
+{
+	snprintf(path, 128, "%s/template", base);
+}
+
+static void make_once(void)
+{
+	if (*base)
+		return;
+	make_base();
+	log_set_level(getenv("HSLT_FUZZ_LOG") ? LOG_LEVEL_DEBUG : LOG_LEVEL_ERROR);
+	fill();
+}
+
+void farm_spool_copy(const char *to)
+{
+	char from[128];
+	make_once();
+	template_path(from);
+	copy_tree(from, to);
+}
+
+struct farm_world *farm_world_new(void)
+{
+	static unsigned count;
+	struct farm_world *w = calloc(1, sizeof *w);
+	struct error e;
+	make_once();
+	snprintf(w->spool, sizeof w->spool, "%s/%u", base, count++);
+	farm_spool_copy(w->spool);
+	int rc = farm_world_open(w, &e);
+	need(rc == 0, e.text);
+	return w;
+}
+
+void farm_world_free(struct farm_world *w)
+{
+	if (w->server)
+		farm_world_close(w);
+	remove_tree(w->spool);
+	free(w);
+}
+
+/* ---- peers ---- */
+
+static uint16_t port_of(const struct server *s)
+{
+	struct sockaddr_in a;
+	int size = sizeof a;
+	uv_tcp_getsockname(&s->listener, (struct sockaddr *)&a, &size);
+	return a.sin_port;
+}
+
+void farm_call(struct farm_world *w, unsigned peer, bool status_socket)
+{
+	struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = port_of(w->server), .sin_addr = {htonl(INADDR_LOOPBACK)}};
+	struct sockaddr_un u = {.sun_family = AF_UNIX};
+	struct farm_peer *p = &w->peers[peer];
+	snprintf(u.sun_path, sizeof u.sun_path, "%.100s.sock", w->spool);
+	farm_hang_up(w, peer);
+	p->fd = socket(status_socket ? AF_UNIX : AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+	const struct sockaddr *to = status_socket ? (const struct sockaddr *)&u : (const struct sockaddr *)&a;
+	if (p->fd >= 0 && connect(p->fd, to, status_socket ? sizeof u : sizeof a)) {
+		close(p->fd);
+		p->fd = -1;
+		return;
+	}
+	struct linger reset = {1, 0}; /* thousands of calls leave nothing behind in the kernel */
+	setsockopt(p->fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
+	setsockopt(p->fd, IPPROTO_TCP, TCP_NODELAY, &(int){1}, sizeof(int)); /* said is heard at the next turn */
+	frame_reader_init(&p->reader, (struct frame_limits){1 << 22, 1 << 24});
+	farm_turn(w);
+}
+
+void farm_hang_up(struct farm_world *w, unsigned peer)
+{
+	struct farm_peer *p = &w->peers[peer];
+	if (p->fd < 0)
+		return;
+	close(p->fd);
+	frame_reader_fini(&p->reader);
+	envelope_fini(&p->heard);
+	*p = (struct farm_peer){.fd = -1};
+}
+
+void farm_drain(struct farm_world *w, unsigned peer)
+{
+	char bytes[1 << 15];
+	ssize_t n = 1;
+	while (w->peers[peer].fd >= 0 && n > 0)
+		n = recv(w->peers[peer].fd, bytes, sizeof bytes, MSG_DONTWAIT);
+	if (w->peers[peer].fd >= 0 && (n == 0 || (errno != EAGAIN && errno != EINTR)))
+		farm_hang_up(w, peer);
+}
+
+void farm_say(struct farm_world *w, unsigned peer, const void *bytes, size_t size)
+{
+	const char *at = bytes;
+	while (size && w->peers[peer].fd >= 0) {
+		ssize_t n = send(w->peers[peer].fd, at, size, MSG_NOSIGNAL | MSG_DONTWAIT);
+		if (n < 0 && errno != EAGAIN) {
+			farm_hang_up(w, peer);
+			return;
+		}
+		at += n > 0 ? n : 0;
+		size -= n > 0 ? (size_t)n : 0;
+		farm_turn(w);
+	}
+}
+
+void farm_say_message(struct farm_world *w, unsigned peer, const Farm__Envelope *m, const void *payload, size_t size)
+{
+	unsigned char *frame;
+	size_t n;
+	struct error e;
+	need(envelope_pack(m, payload, size, &frame, &n, &e) == 0, e.text);
+	farm_say(w, peer, frame, n);
+	mem_free(frame);
+}
+
+void farm_hello(struct farm_world *w, unsigned peer, Farm__Role role)
+{
+	Farm__Hello h;
+	Farm__Envelope m;
+	char name[] = "somebody", print[] = "p1", none[] = "";
+	farm__hello__init(&h);
+	farm__envelope__init(&m);
+	h.version = FARM_VERSION;
+	h.role = role;
+	h.name = name;
+	h.fingerprint = role == FARM__ROLE__ROLE_WORKER ? print : none;
+	h.threads = 1;
+	m.body_case = FARM__ENVELOPE__BODY_HELLO;
+	m.hello = &h;
+	farm_say_message(w, peer, &m, NULL, 0);
+}
+
+/* ---- the jobs ---- */
+
+struct plan farm_plan(uint64_t job)
+{
+	struct plan p;
+	struct error e;
+	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .spp = 4, .max_depth = 5,
+				 .groups = 2, .bootstrap = 64, .chains = 4, .epoch = 100};
+	if (job == FARM_CHAINS)
+		snprintf(r.mixture, sizeof r.mixture, "independent=0.1,hslt=0.9");
+	if (job == FARM_SAMPLES) {
+		r.kind = PLAN_SAMPLES;
+		r.chains = 0;
+		r.epoch = 1;
+		snprintf(r.integrator, sizeof r.integrator, "path");
+	}
+	need(plan_make(&r, &p, &e) == 0, e.text);
+	return p;
+}
+
+const Farm__Envelope *farm_submission(uint64_t job)
+{
+	static Farm__Submit s;
+	static Farm__PlanRequest request;
+	static Farm__File file, *files[1] = {&file};
+	static Farm__Envelope m;
+	static struct blob_hash hash;
+	static char name[] = "job", scene[] = "s.xml", integrator[16], mixture[PLAN_MUTATIONS_MAX];
+	struct error e;
+	struct plan p = farm_plan(job);
+	need(blob_hash_bytes(farm_scene, strlen(farm_scene), &hash, &e) == 0, "a hash");
+	farm__submit__init(&s);
+	farm__plan_request__init(&request);
+	farm__file__init(&file);
+	farm__envelope__init(&m);
+	snprintf(integrator, sizeof integrator, "%s", p.integrator);
+	snprintf(mixture, sizeof mixture, "%s", p.mutations);
+	request.integrator = integrator;
+	request.mixture = mixture;
+	request.kind = p.kind;
+	request.width = p.width;
+	request.height = p.height;
+	request.spp = 4;
+	request.max_depth = p.max_depth;
+	request.groups = p.groups;
+	request.bootstrap = p.bootstrap;
+	request.chains = p.chains;
+	request.epoch = p.epoch;
+	request.border = p.border;
+	file.name = scene;
+	file.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
+	file.size = strlen(farm_scene);
+	s.name = name;
+	s.scene = scene;
+	s.plan = &request;
+	s.n_files = 1;
+	s.files = files;
+	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
+	m.submit = &s;
+	return &m;
+}
+
+static void light(struct batch *b, const struct plan *plan)
+{
+	b->tile_count = 1;
+	b->tiles = mem_alloc(1, sizeof *b->tiles);
+	b->tiles[0] = (struct tile){0, 0, plan->width, plan->height, mem_alloc((size_t)plan->width * plan->height, TILE_CHANNELS * sizeof(float))};
+	for (size_t i = 0; i < (size_t)plan->width * plan->height * TILE_CHANNELS; i++)
+		b->tiles[0].xyz[i] = 0.01f;
+}
+
+struct batch farm_batch(const struct lease_key *k, const struct plan *plan)
+{
+	struct batch b = {.key = *k};
+	if (k->kind == LEASE_BOOTSTRAP) {
+		struct plan_range range = plan_bootstrap_range(plan, k->group, k->part);
+		b.weight_count = b.counters[COUNT_INDEPENDENT] = b.counters[COUNT_SAMPLES] = range.end - range.begin;
+		b.weights = mem_alloc(b.weight_count, sizeof *b.weights);
+		for (uint64_t i = 0; i < b.weight_count && k->job != FARM_DONE; i++)
+			b.weights[i] = 1;
+		b.independent_sum = k->job == FARM_DONE ? 0 : (double)b.weight_count;
+		return b;
+	}
+	light(&b, plan);
+	if (plan->kind == PLAN_SAMPLES) {
+		struct plan_range rows = plan_row_range(plan, k->part);
+		b.counters[COUNT_SAMPLES] = (rows.end - rows.begin) * (plan->crop_width + 2 * (uint64_t)plan->border) * plan->epoch;
+		return b;
+	}
+	struct plan_range chains = plan_chain_range(plan, k->part);
+	b.state_count = (uint32_t)(chains.end - chains.begin);
+	b.states = mem_alloc(b.state_count, sizeof *b.states);
+	for (uint32_t i = 0; i < b.state_count; i++)
+		b.states[i] = (struct chain_state){mem_alloc(4, 1), 4};
+	b.moment_count = batch_moment_count(plan, LEASE_RENDER);
+	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
+	b.counters[COUNT_SAMPLES] = b.state_count * plan->epoch;
+	return b;
+}
+
+/* ---- the first spool ---- */
+
+static const Farm__Envelope *hear(struct farm_world *w, unsigned peer)
+{
+	struct farm_peer *p = &w->peers[peer];
+	for (int i = 0; i < 100000; i++) {
+		struct error e;
+		unsigned char byte;
+		size_t used;
+		if (recv(p->fd, &byte, 1, MSG_DONTWAIT) != 1) {
+			uv_run(&w->server->loop, UV_RUN_ONCE);
+			continue;
+		}
+		int rc = frame_reader_take(&p->reader, &byte, 1, &used, &e);
+		need(rc >= 0, e.text);
+		if (!rc)
+			continue;
+		envelope_fini(&p->heard);
+		need(envelope_unpack(&p->heard, p->reader.header.bytes, p->reader.header.size, &e) == 0, e.text);
+		return p->heard.message;
+	}
+	need(false, "the coordinator says nothing");
+	return NULL;
+}
+
+static const Farm__Envelope *hear_kind(struct farm_world *w, unsigned peer, Farm__Envelope__BodyCase kind)
+{
+	const Farm__Envelope *m;
+	while ((m = hear(w, peer))->body_case != kind)
+		need(m->body_case != FARM__ENVELOPE__BODY_FAULT, "a fault");
+	return m;
+}
+
+static void submit(struct farm_world *w, unsigned client, uint64_t job)
+{
+	const Farm__Envelope *m = farm_submission(job);
+	farm_say_message(w, client, m, NULL, 0);
+	const Farm__SubmitAnswer *a = hear_kind(w, client, FARM__ENVELOPE__BODY_SUBMIT_ANSWER)->submit_answer;
+	need(!*a->refusal, a->refusal);
+	if (a->n_missing) {
+		Farm__BlobChunk c;
+		Farm__Envelope chunk;
+		farm__blob_chunk__init(&c);
+		farm__envelope__init(&chunk);
+		c.hash = m->submit->files[0]->hash;
+		c.size = m->submit->files[0]->size;
+		chunk.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+		chunk.blob_chunk = &c;
+		farm_say_message(w, client, &chunk, farm_scene, strlen(farm_scene));
+		a = hear_kind(w, client, FARM__ENVELOPE__BODY_SUBMIT_ANSWER)->submit_answer;
+	}
+	need(a->job == job, "another number of a job");
+}
+
+static void ask_for_job(struct farm_world *w, unsigned worker, uint64_t job)
+{
+	Farm__JobGet get;
+	Farm__Envelope m;
+	farm__job_get__init(&get);
+	farm__envelope__init(&m);
+	get.job = job;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_GET;
+	m.job_get = &get;
+	farm_say_message(w, worker, &m, NULL, 0);
+	hear_kind(w, worker, FARM__ENVELOPE__BODY_JOB_INFO);
+}
+
+static void answer(struct farm_world *w, unsigned worker, struct lease_key k)
+{
+	struct plan plan = farm_plan(k.job);
+	struct batch b = farm_batch(&k, &plan);
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	need(batch_pack(&b, &plan, &frame, &size, &e) == 0, e.text);
+	farm_say(w, worker, frame, size);
+	const Farm__LeaseAck *a = hear_kind(w, worker, FARM__ENVELOPE__BODY_LEASE_ACK)->lease_ack;
+	need(a->verdict == FARM__VERDICT__VERDICT_MERGED, a->text);
+	mem_free(frame);
+	batch_fini(&b);
+}
+
+static void do_bootstrap(struct farm_world *w, unsigned worker, uint64_t job)
+{
+	struct plan p = farm_plan(job);
+	for (uint32_t g = 0; g < p.groups; g++)
+		for (uint32_t part = 0; part < p.parts; part++)
+			answer(w, worker, (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP, .group = g, .part = part});
+}
+
+static void fill(void)
+{
+	enum { CLIENT, WORKER };
+	struct farm_world w = {0};
+	struct error e;
+	template_path(w.spool);
+	int rc = farm_world_open(&w, &e);
+	need(rc == 0, e.text);
+	farm_call(&w, CLIENT, false);
+	farm_hello(&w, CLIENT, FARM__ROLE__ROLE_CLIENT);
+	farm_call(&w, WORKER, false);
+	farm_hello(&w, WORKER, FARM__ROLE__ROLE_WORKER);
+	for (uint64_t job = FARM_DONE; job <= FARM_SAMPLES; job++) {
+		submit(&w, CLIENT, job);
+		ask_for_job(&w, WORKER, job);
+		if (job == FARM_DONE || job == FARM_CHAINS)
+			do_bootstrap(&w, WORKER, job);
+		if (job == FARM_CHAINS)
+			answer(&w, WORKER, (struct lease_key){.job = job, .kind = LEASE_RENDER});
+		if (job == FARM_BOOTSTRAP)
+			answer(&w, WORKER, (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP});
+	}
+	farm_settle(&w);
+	farm_world_close(&w);
+}

@@ -1,0 +1,52 @@
+/*
+ * A coordinator to speak to, in this process: its loop turns when it is told to. It begins with the state of a spool that is made
+ * once: job 1 is done, 2 renders chains (all but one of its leases are open), 3 is in its bootstrap, 4 waits for its first samples.
+ * One thread. What goes wrong ends the program.
+ */
+#ifndef TESTS_FUZZ_FARM_H
+#define TESTS_FUZZ_FARM_H
+
+#include "common/film/batch.h"
+#include "common/wire/frame.h"
+#include "coordinator/shell/server.h"
+
+enum { FARM_DONE = 1, FARM_CHAINS = 2, FARM_BOOTSTRAP = 3, FARM_SAMPLES = 4 };
+enum { FARM_PEERS = 6 };
+
+struct farm_peer {
+	int fd; /* negative: not there */
+	struct frame_reader reader;
+	struct envelope heard;
+	bool has_frame;
+};
+
+struct farm_world {
+	struct server *server;
+	char spool[128]; /* of this one; as it was in the beginning */
+	struct farm_peer peers[FARM_PEERS];
+};
+
+struct farm_world *farm_world_new(void);        /* on a copy of that spool */
+void farm_world_free(struct farm_world *w);     /* its folder goes */
+void farm_spool_copy(const char *to);           /* the spool alone, for those who damage it first */
+int farm_world_open(struct farm_world *w, struct error *e); /* server_open on w->spool as it is */
+void farm_world_close(struct farm_world *w);
+
+void farm_turn(struct farm_world *w);           /* what can be done at once */
+void farm_settle(struct farm_world *w);         /* all hang up; until nothing is under way */
+
+void farm_call(struct farm_world *w, unsigned peer, bool status_socket);
+void farm_hello(struct farm_world *w, unsigned peer, Farm__Role role);
+void farm_say(struct farm_world *w, unsigned peer, const void *bytes, size_t size);
+void farm_say_message(struct farm_world *w, unsigned peer, const Farm__Envelope *m, const void *payload, size_t size);
+void farm_drain(struct farm_world *w, unsigned peer); /* throws away what it was told */
+void farm_hang_up(struct farm_world *w, unsigned peer);
+
+/* What an honest worker answers to a lease of one of these jobs, in even light; batch_fini frees it. */
+struct batch farm_batch(const struct lease_key *k, const struct plan *plan);
+/* The submissions of jobs 2, 3 and 4, with a scene of one file; text and message are static. */
+const Farm__Envelope *farm_submission(uint64_t job);
+extern const char farm_scene[];
+struct plan farm_plan(uint64_t job);
+
+#endif

@@ -1,0 +1,248 @@
+/*
+ * Whole conversations with a live coordinator: workers, clients and strangers who say what they like, and readers of the status. In
+ * the script the speaker says hello by itself where it has a role. The world begins anew when something was stored.
+ */
+#include "common/base/mem.h"
+#include "common/wire/batch_wire.h"
+#include "tests/fuzz/farm.h"
+#include "tests/fuzz/messages.h"
+#include "tests/fuzz/seeds.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum speaker { WORKER_ONE, WORKER_TWO, CLIENT_ONE, CLIENT_TWO, STRANGER, READER, ONE_HANGS_UP, SPEAKERS };
+
+enum { WORLD_MOST = 200 /* inputs; their blobs stay in the spool */ };
+
+static struct {
+	struct farm_world *world;
+	unsigned inputs;
+	uint64_t stored;
+} now;
+
+static uint64_t stored(const struct server *s)
+{
+	uint64_t sum = s->ended_count;
+	for (const struct order *o = s->orders; o; o = o->next)
+		sum += 1000003 + (o->journal ? journal_bytes(o->journal) : 0);
+	return sum;
+}
+
+static void speak(struct farm_world *w, const struct step *s)
+{
+	unsigned who = s->who % SPEAKERS;
+	if (who == ONE_HANGS_UP) {
+		farm_hang_up(w, s->header_size ? *s->header % FARM_PEERS : 0);
+		farm_turn(w);
+		return;
+	}
+	if (w->peers[who].fd < 0) {
+		farm_call(w, who, who == READER);
+		if (who <= CLIENT_TWO)
+			farm_hello(w, who, who <= WORKER_TWO ? FARM__ROLE__ROLE_WORKER : FARM__ROLE__ROLE_CLIENT);
+	}
+	if (who != READER) {
+		unsigned char prefix[FRAME_PREFIX];
+		frame_prefix_write(prefix, (uint32_t)s->header_size, (uint32_t)s->payload_size);
+		farm_say(w, who, prefix, sizeof prefix);
+	}
+	farm_say(w, who, s->header, s->header_size);
+	farm_say(w, who, s->payload, s->payload_size);
+	farm_turn(w);
+	for (unsigned i = 0; i < FARM_PEERS; i++)
+		farm_drain(w, i);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
+{
+	struct step steps[SCRIPT_STEPS];
+	if (!now.world) {
+		now.world = farm_world_new();
+		now.inputs = 0;
+		now.stored = stored(now.world->server);
+	}
+	size_t count = script_read(bytes, size, steps);
+	for (size_t i = 0; i < count; i++)
+		speak(now.world, &steps[i]);
+	farm_settle(now.world);
+	if (++now.inputs == WORLD_MOST || stored(now.world->server) != now.stored) {
+		farm_world_free(now.world);
+		now.world = NULL;
+	}
+	return 0;
+}
+
+size_t LLVMFuzzerCustomMutator(uint8_t *bytes, size_t size, size_t room, unsigned seed)
+{
+	return script_mutate(bytes, size, room, seed, SPEAKERS);
+}
+
+/* ---- seeds ---- */
+
+static void say_result(struct seed *s, uint8_t who, struct lease_key k)
+{
+	struct plan plan = farm_plan(k.job);
+	struct batch b = farm_batch(&k, &plan);
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	struct envelope env;
+	if (batch_pack(&b, &plan, &frame, &size, &e) == 0) {
+		size_t header = (size_t)frame[2] << 8 | frame[3];
+		if (envelope_unpack(&env, frame + FRAME_PREFIX, header, &e) == 0) {
+			seed_say(s, who, env.message, frame + FRAME_PREFIX + header, size - FRAME_PREFIX - header);
+			envelope_fini(&env);
+		}
+		mem_free(frame);
+	}
+	batch_fini(&b);
+}
+
+static void write_results(void)
+{
+	static const struct lease_key keys[] = {
+		{.job = FARM_CHAINS, .kind = LEASE_RENDER, .group = 1},
+		{.job = FARM_CHAINS, .kind = LEASE_RENDER, .epoch = 1},
+		{.job = FARM_BOOTSTRAP, .kind = LEASE_BOOTSTRAP, .group = 1},
+		{.job = FARM_SAMPLES, .kind = LEASE_RENDER},
+		{.job = FARM_CHAINS, .kind = LEASE_RENDER}, /* a repeat */
+	};
+	for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
+		struct seed s = {0};
+		Farm__LeaseRequest r;
+		farm__lease_request__init(&r);
+		Farm__JobGet g;
+		farm__job_get__init(&g);
+		r.want = 4;
+		g.job = keys[i].job;
+		SEED_SAY(&s, WORKER_ONE, LEASE_REQUEST, lease_request, &r);
+		SEED_SAY(&s, WORKER_ONE, JOB_GET, job_get, &g);
+		say_result(&s, WORKER_ONE, keys[i]);
+		seed_end(&s, "result", i);
+	}
+}
+
+static void write_words(void)
+{
+	for (uint64_t job = 1; job <= FARM_SAMPLES; job++) {
+		struct seed s = {0};
+		Farm__JobList list;
+		farm__job_list__init(&list);
+		Farm__Watch watch;
+		farm__watch__init(&watch);
+		Farm__Fetch fetch;
+		farm__fetch__init(&fetch);
+		Farm__Control control;
+		farm__control__init(&control);
+		Farm__Cancel cancel;
+		farm__cancel__init(&cancel);
+		Farm__Heartbeat beat;
+		farm__heartbeat__init(&beat);
+		fetch.job = watch.job = control.job = cancel.job = job;
+		fetch.what = (Farm__What)(job % 3);
+		control.verb = (Farm__Verb)job;
+		control.priority = 3;
+		control.more_spp = 4;
+		SEED_SAY(&s, CLIENT_ONE, HEARTBEAT, heartbeat, &beat);
+		SEED_SAY(&s, CLIENT_ONE, JOB_LIST, job_list, &list);
+		SEED_SAY(&s, CLIENT_TWO, WATCH, watch, &watch);
+		SEED_SAY(&s, CLIENT_ONE, FETCH, fetch, &fetch);
+		seed_end(&s, "look", job);
+		SEED_SAY(&s, CLIENT_ONE, CONTROL, control, &control);
+		SEED_SAY(&s, CLIENT_ONE, WATCH, watch, &watch);
+		SEED_SAY(&s, CLIENT_TWO, CANCEL, cancel, &cancel);
+		seed_end(&s, "control", job);
+	}
+}
+
+static void write_worker(void)
+{
+	struct seed s = {0};
+	Farm__LeaseRequest request;
+	farm__lease_request__init(&request);
+	Farm__LeaseFailed failed;
+	farm__lease_failed__init(&failed);
+	Farm__BlobGet blob;
+	farm__blob_get__init(&blob);
+	Farm__Bye bye;
+	farm__bye__init(&bye);
+	Farm__Heartbeat beat;
+	farm__heartbeat__init(&beat);
+	Farm__LeaseKey key;
+	char text[] = "no memory";
+	struct lease_key k = {.job = FARM_CHAINS, .kind = LEASE_RENDER, .group = 1};
+	lease_key_to_wire(&k, &key);
+	request.want = 8;
+	failed.key = &key;
+	failed.text = text;
+	blob.hash = farm_submission(FARM_CHAINS)->submit->files[0]->hash;
+	SEED_SAY(&s, WORKER_ONE, HEARTBEAT, heartbeat, &beat);
+	SEED_SAY(&s, WORKER_ONE, LEASE_REQUEST, lease_request, &request);
+	SEED_SAY(&s, WORKER_TWO, LEASE_REQUEST, lease_request, &request);
+	SEED_SAY(&s, WORKER_ONE, LEASE_FAILED, lease_failed, &failed);
+	SEED_SAY(&s, WORKER_TWO, LEASE_FAILED, lease_failed, &failed);
+	SEED_SAY(&s, WORKER_ONE, BLOB_GET, blob_get, &blob);
+	SEED_SAY(&s, WORKER_ONE, BYE, bye, &bye);
+	seed_end(&s, "worker", 0);
+}
+
+static void write_submission(void)
+{
+	for (uint64_t job = FARM_CHAINS; job <= FARM_SAMPLES; job++) {
+		struct seed s = {0};
+		struct blob_hash hash;
+		struct error e;
+		char other[] = "<scene version=\"0.6.0\"/>", name[] = "b.xml";
+		const Farm__Envelope *m = farm_submission(job);
+		Farm__File file = *m->submit->files[0], *files[2] = {m->submit->files[0], &file};
+		Farm__BlobChunk chunk;
+		farm__blob_chunk__init(&chunk);
+		blob_hash_bytes(other, strlen(other), &hash, &e);
+		file.name = name;
+		file.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
+		file.size = chunk.size = strlen(other);
+		chunk.hash = file.hash;
+		m->submit->n_files = 2;
+		m->submit->files = files;
+		seed_say(&s, CLIENT_ONE, m, NULL, 0);
+		Farm__Envelope c;
+		farm__envelope__init(&c);
+		c.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+		c.blob_chunk = &chunk;
+		seed_say(&s, CLIENT_ONE, &c, other, strlen(other));
+		seed_end(&s, "submit", job);
+	}
+}
+
+static void write_strangers(void)
+{
+	for (unsigned role = 0; role < 3; role++) {
+		struct seed s = {0};
+		Farm__Hello h;
+		farm__hello__init(&h);
+		char name[] = "n", print[] = "p2";
+		h.version = FARM_VERSION;
+		h.role = (Farm__Role)role;
+		h.name = name;
+		h.fingerprint = print;
+		h.threads = 2;
+		SEED_SAY(&s, STRANGER, HELLO, hello, &h);
+		seed_raw(&s, READER, "{\"subscribe\":[\"jobs\",\"workers\",\"snapshot\"]}\n");
+		seed_end(&s, "hello", role);
+	}
+}
+
+int LLVMFuzzerInitialize(int *argc, char ***argv)
+{
+	(void)argc;
+	(void)argv;
+	if (!seeds_wanted())
+		return 0;
+	write_results();
+	write_words();
+	write_worker();
+	write_submission();
+	write_strangers();
+	exit(0);
+}

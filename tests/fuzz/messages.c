@@ -1,0 +1,388 @@
+#include "tests/fuzz/messages.h"
+
+#include <stdbool.h>
+#include <string.h>
+
+/* ---- memory of one mutation ---- */
+
+enum { SPACE = 1 << 22, STRING_ROOM = 256, STEP_PREFIX = 5, PART_MOST = 0xffff };
+
+static struct {
+	_Alignas(16) uint8_t bytes[SPACE];
+	size_t used;
+	uint64_t random;
+} now;
+
+static void *take(void *user, size_t size)
+{
+	(void)user;
+	size_t need = (size + 15) & ~(size_t)15;
+	if (need < size || need > SPACE - now.used)
+		return NULL;
+	void *p = now.bytes + now.used;
+	now.used += need;
+	return memset(p, 0, need);
+}
+
+static void give_back(void *user, void *p)
+{
+	(void)user;
+	(void)p;
+}
+
+static ProtobufCAllocator allocator = {take, give_back, NULL};
+
+static void begin(unsigned seed)
+{
+	now.used = 0;
+	now.random = seed * UINT64_C(0x9E3779B97F4A7C15) + 1;
+}
+
+static uint64_t dice(uint64_t below)
+{
+	now.random ^= now.random << 13;
+	now.random ^= now.random >> 7;
+	now.random ^= now.random << 17;
+	return (now.random >> 8) % below;
+}
+
+/* ---- fields ---- */
+
+static uint64_t some_integer(uint64_t before)
+{
+	switch (dice(8)) {
+	case 0:
+		return dice(5);
+	case 1:
+		return before + 1;
+	case 2:
+		return before - 1;
+	case 3:
+		return before ^ UINT64_C(1) << dice(64);
+	case 4:
+		return UINT64_MAX >> dice(64);
+	case 5:
+		return UINT64_C(1) << dice(64);
+	case 6:
+		return before * 2;
+	default:
+		return dice(300);
+	}
+}
+
+static double some_double(double before)
+{
+	static const double values[] = {0, -0.0, 1, -1, 0.5, 1e-320, 1e-9, 1e9, 1e18, 1e308, -1e308, (double)__builtin_inf(), -(double)__builtin_inf(), (double)__builtin_nan("")};
+	return dice(4) ? values[dice(sizeof values / sizeof *values)] : dice(2) ? before * 2 : before + 1;
+}
+
+static char *some_text(const char *before)
+{
+	static const char *const texts[] = {"", "s.xml", "../s.xml", "/etc/passwd", "a/b", "a//b", ".", "path", "bdpt", "pssmlt", "hslt", "p1", "p2",
+					    "independent=0.1,hslt=0.9", "hslt@b2c0", "tolerance=0.1", "-dispersion,+aperture", "all", "\xc3\xa9", "\xff",
+					    "a\nb", "%s%n"};
+	char *p = take(NULL, STRING_ROOM);
+	if (!p)
+		return NULL;
+	if (dice(2)) {
+		strcpy(p, texts[dice(sizeof texts / sizeof *texts)]);
+		return p;
+	}
+	size_t length = before ? strlen(before) : 0;
+	length = length < STRING_ROOM - 1 ? length : STRING_ROOM - 1;
+	if (before)
+		memcpy(p, before, length);
+	length = LLVMFuzzerMutate((uint8_t *)p, length, STRING_ROOM - 1);
+	p[length] = 0;
+	return p;
+}
+
+static ProtobufCBinaryData some_bytes(ProtobufCBinaryData before)
+{
+	ProtobufCBinaryData b = {0, take(NULL, STRING_ROOM)};
+	if (!b.data)
+		return b;
+	b.len = before.len < STRING_ROOM ? before.len : STRING_ROOM;
+	if (b.len)
+		memcpy(b.data, before.data, b.len);
+	b.len = LLVMFuzzerMutate(b.data, b.len, STRING_ROOM);
+	return b;
+}
+
+static size_t size_of(ProtobufCType t)
+{
+	switch (t) {
+	case PROTOBUF_C_TYPE_INT32:
+	case PROTOBUF_C_TYPE_SINT32:
+	case PROTOBUF_C_TYPE_SFIXED32:
+	case PROTOBUF_C_TYPE_UINT32:
+	case PROTOBUF_C_TYPE_FIXED32:
+	case PROTOBUF_C_TYPE_ENUM:
+	case PROTOBUF_C_TYPE_FLOAT:
+		return 4;
+	case PROTOBUF_C_TYPE_BOOL:
+		return sizeof(protobuf_c_boolean);
+	case PROTOBUF_C_TYPE_BYTES:
+		return sizeof(ProtobufCBinaryData);
+	default:
+		return 8;
+	}
+}
+
+static void change(ProtobufCMessage *m);
+
+static ProtobufCMessage *fresh(const ProtobufCMessageDescriptor *d)
+{
+	ProtobufCMessage *m = take(NULL, d->sizeof_message);
+	if (m)
+		d->message_init(m);
+	return m;
+}
+
+/* One value of a field, where it lies. */
+static void change_value(const ProtobufCFieldDescriptor *f, void *at)
+{
+	uint64_t n = 0;
+	double d;
+	switch (f->type) {
+	case PROTOBUF_C_TYPE_STRING:
+		*(char **)at = some_text(*(char **)at);
+		return;
+	case PROTOBUF_C_TYPE_BYTES:
+		*(ProtobufCBinaryData *)at = some_bytes(*(ProtobufCBinaryData *)at);
+		return;
+	case PROTOBUF_C_TYPE_MESSAGE:
+		if (!*(ProtobufCMessage **)at)
+			*(ProtobufCMessage **)at = fresh(f->descriptor);
+		if (*(ProtobufCMessage **)at)
+			change(*(ProtobufCMessage **)at);
+		return;
+	case PROTOBUF_C_TYPE_DOUBLE:
+		memcpy(&d, at, sizeof d);
+		d = some_double(d);
+		memcpy(at, &d, sizeof d);
+		return;
+	default:
+		memcpy(&n, at, size_of(f->type));
+		n = f->type == PROTOBUF_C_TYPE_BOOL ? !n : some_integer(n);
+		memcpy(at, &n, size_of(f->type));
+	}
+}
+
+static void change_list(const ProtobufCFieldDescriptor *f, void *at, size_t *count)
+{
+	size_t each = size_of(f->type);
+	uint8_t *list = *(uint8_t **)at;
+	if (*count && dice(2)) {
+		change_value(f, list + dice(*count) * each);
+	} else if (*count && dice(2)) {
+		size_t gone = dice(*count);
+		memmove(list + gone * each, list + (gone + 1) * each, (*count - gone - 1) * each);
+		--*count;
+	} else {
+		uint8_t *more = take(NULL, (*count + 1) * each);
+		if (!more)
+			return;
+		if (*count)
+			memcpy(more, list, *count * each);
+		if (*count && dice(2))
+			memcpy(more + *count * each, list + dice(*count) * each, each);
+		else
+			change_value(f, more + *count * each);
+		if (f->type >= PROTOBUF_C_TYPE_STRING && f->type != PROTOBUF_C_TYPE_BYTES && !*(void **)(void *)(more + *count * each))
+			return;
+		*(uint8_t **)at = more;
+		++*count;
+	}
+}
+
+/* Of the alternatives of a message, the one that is there, or now and then another. */
+static const ProtobufCFieldDescriptor *choose_field(ProtobufCMessage *m)
+{
+	const ProtobufCMessageDescriptor *d = m->descriptor;
+	const ProtobufCFieldDescriptor *f = &d->fields[dice(d->n_fields)];
+	if (!(f->flags & PROTOBUF_C_FIELD_FLAG_ONEOF))
+		return f;
+	uint32_t *chosen = (uint32_t *)(void *)((uint8_t *)m + f->quantifier_offset);
+	const ProtobufCFieldDescriptor *there = protobuf_c_message_descriptor_get_field(d, *chosen);
+	if (there && dice(16))
+		return there;
+	*chosen = f->id;
+	*(void **)(void *)((uint8_t *)m + f->offset) = NULL;
+	return f;
+}
+
+static void change(ProtobufCMessage *m)
+{
+	if (!m->descriptor->n_fields)
+		return;
+	const ProtobufCFieldDescriptor *f = choose_field(m);
+	uint8_t *base = (uint8_t *)m, *at = base + f->offset;
+	if (f->label == PROTOBUF_C_LABEL_REPEATED)
+		change_list(f, at, (size_t *)(void *)(base + f->quantifier_offset));
+	else if (f->type == PROTOBUF_C_TYPE_MESSAGE && !(f->flags & PROTOBUF_C_FIELD_FLAG_ONEOF) && dice(16) == 0)
+		*(void **)(void *)at = NULL;
+	else
+		change_value(f, at);
+}
+
+/* NULL: it has become too much. */
+static const uint8_t *change_packed(const uint8_t *bytes, size_t *size)
+{
+	ProtobufCMessage *m = protobuf_c_message_unpack(&farm__envelope__descriptor, &allocator, *size, bytes);
+	if (!m)
+		m = fresh(&farm__envelope__descriptor);
+	for (uint64_t i = 0, n = 1 + dice(4); i < n && m; i++)
+		change(m);
+	size_t packed = m ? protobuf_c_message_get_packed_size(m) : 0;
+	uint8_t *out = packed ? take(NULL, packed) : NULL;
+	if (out)
+		*size = protobuf_c_message_pack(m, out);
+	return out;
+}
+
+size_t message_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed)
+{
+	begin(seed);
+	size_t changed = size;
+	const uint8_t *out = dice(8) ? change_packed(bytes, &changed) : NULL;
+	if (!out || changed > room)
+		return LLVMFuzzerMutate(bytes, size, room);
+	memcpy(bytes, out, changed);
+	return changed;
+}
+
+/* ---- scripts ---- */
+
+size_t script_read(const uint8_t *bytes, size_t size, struct step steps[SCRIPT_STEPS])
+{
+	size_t count = 0;
+	const uint8_t *p = bytes, *end = bytes + size;
+	for (; count < SCRIPT_STEPS && end - p > STEP_PREFIX; count++) {
+		size_t header = (size_t)p[1] << 8 | p[2], payload = (size_t)p[3] << 8 | p[4];
+		struct step *s = &steps[count];
+		s->who = p[0];
+		p += STEP_PREFIX;
+		s->header = p;
+		s->header_size = header < (size_t)(end - p) ? header : (size_t)(end - p);
+		p += s->header_size;
+		s->payload = p;
+		s->payload_size = payload < (size_t)(end - p) ? payload : (size_t)(end - p);
+		p += s->payload_size;
+	}
+	return count;
+}
+
+size_t script_write(const struct step *steps, size_t count, uint8_t *bytes, size_t room)
+{
+	uint8_t *p = bytes;
+	for (size_t i = 0; i < count; i++) {
+		const struct step *s = &steps[i];
+		if (s->header_size > PART_MOST || s->payload_size > PART_MOST ||
+		    STEP_PREFIX + s->header_size + s->payload_size > room - (size_t)(p - bytes))
+			return 0;
+		*p++ = s->who;
+		*p++ = (uint8_t)(s->header_size >> 8);
+		*p++ = (uint8_t)s->header_size;
+		*p++ = (uint8_t)(s->payload_size >> 8);
+		*p++ = (uint8_t)s->payload_size;
+		if (s->header_size)
+			memmove(p, s->header, s->header_size);
+		p += s->header_size;
+		if (s->payload_size)
+			memmove(p, s->payload, s->payload_size);
+		p += s->payload_size;
+	}
+	return (size_t)(p - bytes);
+}
+
+size_t script_add(uint8_t *bytes, size_t size, size_t room, uint8_t who, const Farm__Envelope *m, const void *payload, size_t payload_size)
+{
+	static uint8_t header[PART_MOST];
+	struct step s = {.who = who, .header = header, .payload = payload, .payload_size = payload_size};
+	s.header_size = farm__envelope__get_packed_size(m);
+	if (s.header_size > sizeof header)
+		return size;
+	farm__envelope__pack(m, header);
+	return size + script_write(&s, 1, bytes + size, room - size);
+}
+
+static void change_payload(struct step *s)
+{
+	size_t room = s->payload_size + 64 < PART_MOST ? s->payload_size + 64 : PART_MOST;
+	uint8_t *p = take(NULL, room);
+	if (!p)
+		return;
+	if (s->payload_size)
+		memcpy(p, s->payload, s->payload_size);
+	s->payload_size = LLVMFuzzerMutate(p, s->payload_size, room);
+	s->payload = p;
+}
+
+static void change_step(struct step *s, unsigned speakers)
+{
+	size_t size = s->header_size;
+	const uint8_t *changed;
+	switch (dice(10)) {
+	case 0:
+		s->who = (uint8_t)dice(speakers);
+		break;
+	case 1:
+	case 2:
+		change_payload(s);
+		break;
+	default:
+		changed = change_packed(s->header, &size);
+		if (changed) {
+			s->header = changed;
+			s->header_size = size;
+		}
+	}
+}
+
+static size_t change_script(struct step *steps, size_t count, unsigned speakers)
+{
+	size_t at = count ? dice(count) : 0;
+	switch (count ? dice(12) : 0) {
+	case 0: /* something new */
+		if (count == SCRIPT_STEPS)
+			return count;
+		memmove(steps + at + 1, steps + at, (count - at) * sizeof *steps);
+		steps[at] = (struct step){.who = (uint8_t)dice(speakers), .header = now.bytes};
+		change_step(&steps[at], speakers);
+		return count + 1;
+	case 1: /* again */
+		if (count < SCRIPT_STEPS)
+			steps[count++] = steps[at];
+		return count;
+	case 2: /* not at all */
+		memmove(steps + at, steps + at + 1, (count - at - 1) * sizeof *steps);
+		return count - 1;
+	case 3: { /* in another order */
+		size_t other = dice(count);
+		struct step s = steps[at];
+		steps[at] = steps[other];
+		steps[other] = s;
+		return count;
+	}
+	default:
+		change_step(&steps[at], speakers);
+		return count;
+	}
+}
+
+size_t script_mutate(uint8_t *bytes, size_t size, size_t room, unsigned seed, unsigned speakers)
+{
+	struct step steps[SCRIPT_STEPS];
+	begin(seed);
+	uint8_t *copy = take(NULL, size + 1); /* the input may grow over what the steps point at */
+	if (!copy || dice(32) == 0)
+		return LLVMFuzzerMutate(bytes, size, room);
+	if (size)
+		memcpy(copy, bytes, size);
+	size_t count = script_read(copy, size, steps);
+	for (uint64_t i = 0, n = 1 + dice(3); i < n; i++)
+		count = change_script(steps, count, speakers);
+	size_t changed = script_write(steps, count, bytes, room);
+	return changed ? changed : LLVMFuzzerMutate(bytes, size, room);
+}

@@ -1,0 +1,34 @@
+/*
+ * Seeds of the fuzzers of conversations, made from the messages of now: a target that is started with HSLT_FUZZ_SEEDS=FOLDER writes
+ * its own there and ends.
+ */
+#ifndef TESTS_FUZZ_SEEDS_H
+#define TESTS_FUZZ_SEEDS_H
+
+#include "tests/fuzz/messages.h"
+
+#include <stdbool.h>
+#include <stdlib.h>
+
+struct seed {
+	uint8_t bytes[1 << 16];
+	size_t size;
+};
+
+bool seeds_wanted(void);
+void seed_say(struct seed *s, uint8_t who, const Farm__Envelope *m, const void *payload, size_t size);
+void seed_raw(struct seed *s, uint8_t who, const char *text);
+void seed_end(struct seed *s, const char *name, uint64_t number); /* writes it; it is empty then */
+void seed_file(const char *name, uint64_t number, const void *bytes, size_t size);
+
+/* A message without payload: the kind as the envelope's case and as its member. */
+#define SEED_SAY(seed, who, KIND, kind, message)                               \
+	do {                                                                   \
+		Farm__Envelope seed_m;                                         \
+		farm__envelope__init(&seed_m);                                 \
+		seed_m.body_case = FARM__ENVELOPE__BODY_##KIND;                \
+		seed_m.kind = (message);                                       \
+		seed_say((seed), (who), &seed_m, NULL, 0);                     \
+	} while (0)
+
+#endif
