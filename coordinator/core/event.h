@@ -47,7 +47,7 @@ struct event_submit {
 	const struct plan *plan; /* checked by plan_check */
 	const char *name;
 	int priority;   /* -100..100 */
-	uint64_t owner; /* the shell's handle for who submitted; the core only keeps it */
+	const char *owner; /* the name that its certificate says; "": there is none, and all such jobs are one owner's */
 	bool mixed;     /* workers of any numeric fingerprint */
 };
 

@@ -47,6 +47,7 @@ int farm_new(struct farm **out, const struct farm_config *c, struct error *e)
 	f->check_at = f->schedule_at = INFINITY;
 	f->now = -INFINITY;
 	list_init(&f->classes);
+	list_init(&f->owners);
 	f->jobs = mem_alloc((size_t)c->max_jobs + c->max_ended + 1, sizeof(struct job *));
 	f->live = mem_alloc(c->max_jobs, sizeof(struct job *));
 	f->peers = mem_alloc(c->max_peers, sizeof(struct peer *));

@@ -8,7 +8,9 @@
  *    sender has the job's fingerprint, whoever holds the lease by now. A repeat is counted and dropped.
  *  - Epoch e + 1 of a (group, part) opens when its epoch e is merged and round e + 1 is at most one ahead of the first
  *    incomplete round: two rounds are open.
- *  - Higher priority first; among equals the job with the fewest leases out, then the older one.
+ *  - Higher priority first; among equals the owner with the fewest leases out in all, of its jobs that with the fewest, then the
+ *    older one. An owner is a name of a certificate; jobs without one are all one owner's, for a name that anybody can call
+ *    himself would be worth as many shares as he likes.
  *  - A job belongs to the fingerprint of its first worker (again free while nothing is merged and no lease is out).
  *  - A lease goes back to the pool when its holder leaves, is silent, fails or returns it. After 10 x the job's median
  *    lease time (at least 60 s; doubled each time for the same lease) it is handed out again, the first answer wins.
@@ -54,8 +56,8 @@ void farm_step(struct farm *f, const struct event *ev, struct update *u);
 
 /* Questions, for status. Pointers inside are valid until the next step. */
 struct job_status {
-	uint64_t id, owner;
-	const char *name;
+	uint64_t id;
+	const char *name, *owner;
 	int priority;
 	bool mixed;
 	const struct plan *plan;

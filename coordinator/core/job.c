@@ -31,7 +31,6 @@ static void begin(struct job *j, enum lease_kind kind, uint64_t limit, double no
 static void init(struct job *j, const struct event_submit *e, double now)
 {
 	snprintf(j->name, sizeof j->name, "%s", e->name);
-	j->owner = e->owner;
 	j->priority = e->priority;
 	j->mixed = e->mixed;
 	j->plan = *e->plan;
@@ -58,7 +57,9 @@ struct job *job_new(struct farm *f, const struct event_submit *e, const char **r
 	struct job *j = mem_alloc(1, sizeof *j);
 	if (j)
 		j->slots = mem_alloc(slots, sizeof *j->slots);
-	if (!j || !j->slots) {
+	if (j && j->slots)
+		j->owner = owner_use(&f->owners, e->owner ? e->owner : "");
+	if (!j || !j->owner) {
 		job_free(j);
 		*refused = "the coordinator has no memory for another job";
 		return NULL;
@@ -72,6 +73,7 @@ void job_free(struct job *j)
 {
 	if (!j)
 		return;
+	owner_drop(j->owner);
 	mem_free(j->slots);
 	mem_free(j);
 }

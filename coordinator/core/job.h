@@ -6,6 +6,7 @@
 #include "coordinator/core/farm.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/list.h"
+#include "coordinator/core/owner.h"
 #include "coordinator/core/peer.h"
 #include "coordinator/core/rate.h"
 
@@ -21,7 +22,8 @@ struct slot {
 };
 
 struct job {
-	uint64_t id, owner;
+	uint64_t id;
+	struct owner *owner;
 	char name[JOB_NAME];
 	int priority;
 	bool mixed;

@@ -58,6 +58,7 @@ void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 		j->duplicates++;
 	s->holders++;
 	j->leases_out++;
+	j->owner->leases_out++;
 	p->held++;
 	job_place(j, s);
 	peer_requeue(f, p);
@@ -71,6 +72,7 @@ static void let_go(struct farm *f, struct lease *l)
 	struct slot *s = l->slot;
 	s->holders--;
 	l->job->leases_out--;
+	l->job->owner->leases_out--;
 	l->peer->held--;
 	for (const struct lease *k = s->leases; k; k = k->next)
 		if (k != l && !k->overdue)

@@ -49,7 +49,15 @@ static void hand_out(struct farm *f, struct peer *p, struct job *j, struct slot 
 	lease_send(f, p, j, s);
 }
 
-/* Among jobs of the highest priority that can use a waiting worker the one with the fewest leases out. */
+/* Of two jobs of the same priority, a the older one. */
+static bool comes_first(const struct job *a, const struct job *b)
+{
+	if (a->owner != b->owner && a->owner->leases_out != b->owner->leases_out)
+		return a->owner->leases_out < b->owner->leases_out;
+	return a->owner == b->owner ? a->leases_out <= b->leases_out : true;
+}
+
+/* Among jobs of the highest priority that can use a waiting worker the one whose turn it is. */
 static bool hand_out_ready(struct farm *f)
 {
 	struct job *best = NULL;
@@ -59,7 +67,7 @@ static bool hand_out_ready(struct farm *f)
 		struct job *j = f->live[i];
 		if (best && j->priority < best->priority)
 			break;
-		if (!job_is_open(j) || (best && j->leases_out >= best->leases_out))
+		if (!job_is_open(j) || (best && comes_first(best, j)))
 			continue;
 		struct slot *s = job_ready(j);
 		struct peer *p = s ? waiting_for(f, j, s, true) : NULL;

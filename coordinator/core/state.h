@@ -17,7 +17,7 @@ struct farm {
 	uint32_t live_count;
 	struct peer **peers; /* by id */
 	uint32_t peer_count;
-	struct link classes;
+	struct link classes, owners;
 	uint32_t waiting; /* workers with a wish */
 	uint64_t queued;  /* counts who began to wait */
 	double check_at;  /* something may be silent or overdue then, not before */

@@ -115,7 +115,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		return false;
 	*s = (struct job_status){
 		.id = j->id,
-		.owner = j->owner,
+		.owner = j->owner->name,
 		.name = j->name,
 		.priority = j->priority,
 		.mixed = j->mixed,

@@ -99,7 +99,7 @@ static void submit(struct session *p)
 			   .submit = {.plan = &p->upload->plan,
 				      .name = name,
 				      .priority = m->priority,
-				      .owner = p->id,
+				      .owner = p->who.name,
 				      .mixed = m->mixed}};
 	p->rejected[0] = 0;
 	p->answered_job = 0;

@@ -122,18 +122,31 @@ static struct lease_key take_key(const char **at)
 	return k;
 }
 
-static void take_submit(const char **at, struct event *ev, struct plan *p)
+enum { WORD = 32 };
+
+static const char *take_word(const char **at, char word[WORD])
+{
+	size_t n = strcspn(*at, " ");
+	snprintf(word, WORD, "%.*s", (int)n, *at);
+	*at += n;
+	take(at, " ");
+	return word;
+}
+
+static void take_submit(const char **at, struct event *ev, struct plan *p, char owner[WORD])
 {
 	*p = (struct plan){ .kind = PLAN_CHAINS, .width = 8, .height = 8, .crop_width = 8, .crop_height = 8,
 			    .groups = 2, .parts = 1, .rounds = 2, .epoch = 100, .bootstrap = 1000 };
 	ev->kind = EVENT_SUBMIT;
 	ev->tag = 7;
-	ev->submit = (struct event_submit){ .plan = p, .name = "job" };
+	ev->submit = (struct event_submit){ .plan = p, .name = "job", .owner = "" };
 	while (**at && **at != '-') {
 		if (take(at, "priority="))
 			ev->submit.priority = (int)take_number(at);
 		else if (take(at, "mixed"))
 			ev->submit.mixed = true;
+		else if (take(at, "owner="))
+			ev->submit.owner = take_word(at, owner);
 		else if (take(at, "groups="))
 			p->groups = (uint32_t)take_count(at);
 		else if (take(at, "parts="))
@@ -187,7 +200,7 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 
 /* restore J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [options of submit] */
 static void take_restore(const char **at, struct event *ev, struct plan *p, char *fingerprint, uint64_t *next,
-			 const struct forecast_history *looks)
+			 const struct forecast_history *looks, char owner[WORD])
 {
 	struct event_restore r = { .job = take_id(at, "j"), .next = next, .fingerprint = fingerprint,
 				   .elapsed = NAN, .opened = NAN, .completed = NAN, .looks = looks };
@@ -209,7 +222,7 @@ static void take_restore(const char **at, struct event *ev, struct plan *p, char
 	if (take(at, "completed="))
 		r.completed = take_number(at);
 	r.black = take(at, "black");
-	take_submit(at, ev, p);
+	take_submit(at, ev, p, owner);
 	r.submit = ev->submit;
 	ev->kind = EVENT_RESTORE;
 	ev->restore = r;
@@ -267,7 +280,7 @@ static bool play_wake(const char *line, const char *expected)
 static bool play_line(struct farm *f, const char *line)
 {
 	const char *at = line, *arrow = strstr(line, "-> ");
-	char name[32], fingerprint[32], text[256];
+	char name[32], fingerprint[32], owner[WORD], text[256];
 	struct plan plan;
 	uint64_t next[64];
 	struct forecast_history looks = { .count = 0 };
@@ -281,9 +294,9 @@ static bool play_line(struct farm *f, const char *line)
 	if (*at == 'w')
 		take_worker(&at, &ev, name, fingerprint);
 	else if (take(&at, "submit"))
-		take_submit(&at, &ev, &plan);
+		take_submit(&at, &ev, &plan, owner);
 	else if (take(&at, "restore"))
-		take_restore(&at, &ev, &plan, fingerprint, next, &looks);
+		take_restore(&at, &ev, &plan, fingerprint, next, &looks, owner);
 	else
 		take_job(&at, &ev);
 	snprintf(text, sizeof text, "%.*s", at < arrow ? (int)(arrow - at) - 1 : 0, at);

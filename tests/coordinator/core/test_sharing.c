@@ -54,6 +54,50 @@ static void fair_sharing(void **state)
 		NULL });
 }
 
+/* By owner first: of nine leases bob's one job has half, ann's two share the other. */
+static void owners_share_first(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=9 owner=ann -> j1 submitted, j1 is queued",
+		"[0] submit groups=9 owner=ann -> j2 submitted, j2 is queued",
+		"[0] submit groups=9 owner=bob -> j3 submitted, j3 is queued",
+		"[0] w1 joins A threads=9 -> -",
+		"[0] w1 wants 9 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, j3 is bootstrap, w1 gets j3 g0 p0 boot, "
+		"j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j3 g1 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j3 g2 p0 boot, "
+		"w1 gets j2 g1 p0 boot, w1 gets j3 g3 p0 boot, w1 gets j1 g2 p0 boot",
+		/* whoever has fewest, not whose was done */
+		"[1] w1 batch j3 g0 p0 boot -> merge, merged, w1 gets j3 g4 p0 boot",
+		"[1] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j2 g2 p0 boot",
+		/* what an owner has of another priority counts, too: one lease is bob's j4 */
+		"[2] submit groups=1 priority=1 owner=bob -> j4 submitted, j4 is queued",
+		"[2] w1 batch j1 g0 p0 boot -> merge, merged, j4 is bootstrap, w1 gets j4 g0 p0 boot",
+		"[3] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j1 g3 p0 boot",
+		"[3] w1 batch j3 g1 p0 boot -> merge, merged, w1 gets j1 g4 p0 boot",
+		NULL });
+	struct job_status s;
+	assert_true(farm_job(f, 3, 3, &s));
+	assert_string_equal(s.owner, "bob");
+	farm_free(f);
+}
+
+/* An owner without a name is one as any other, however many they are; a job of an earlier life has its owner still. */
+static void the_nameless_and_the_restored(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] restore j5 boot 0,0,0,0 groups=4 owner=bob -> -",
+		"[0] submit groups=4 -> j6 submitted, j6 is queued",
+		"[0] submit groups=4 -> j7 submitted, j7 is queued",
+		"[0] submit groups=4 owner=bob -> j8 submitted, j8 is queued",
+		"[0] w1 joins A threads=6 -> -",
+		"[0] w1 wants 6 -> j5 is bootstrap, w1 gets j5 g0 p0 boot, j6 is bootstrap, w1 gets j6 g0 p0 boot, "
+		"j8 is bootstrap, w1 gets j8 g0 p0 boot, j7 is bootstrap, w1 gets j7 g0 p0 boot, "
+		"w1 gets j5 g1 p0 boot, w1 gets j6 g1 p0 boot",
+		NULL });
+}
+
 static void workers_take_turns(void **state)
 {
 	(void)state;
@@ -192,6 +236,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(priority),
 		cmocka_unit_test(fair_sharing),
+		cmocka_unit_test(owners_share_first),
+		cmocka_unit_test(the_nameless_and_the_restored),
 		cmocka_unit_test(workers_take_turns),
 		cmocka_unit_test(fingerprints),
 		cmocka_unit_test(free_again_while_untouched),

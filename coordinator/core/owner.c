@@ -1,0 +1,35 @@
+#include "coordinator/core/owner.h"
+
+#include "common/base/mem.h"
+
+#include <stdio.h>
+#include <string.h>
+
+struct owner *owner_use(struct link *owners, const char *name)
+{
+	char cut[OWNER_NAME];
+	snprintf(cut, sizeof cut, "%s", name);
+	for (struct link *k = owners->next; k != owners; k = k->next) {
+		struct owner *o = list_entry(k, struct owner, link);
+		if (strcmp(o->name, cut) == 0) {
+			o->uses++;
+			return o;
+		}
+	}
+	struct owner *o = mem_alloc(1, sizeof *o);
+	if (!o)
+		return NULL;
+	memcpy(o->name, cut, sizeof o->name);
+	o->uses = 1;
+	list_init(&o->link);
+	list_append(owners, &o->link);
+	return o;
+}
+
+void owner_drop(struct owner *o)
+{
+	if (!o || --o->uses > 0)
+		return;
+	list_remove(&o->link);
+	mem_free(o);
+}
