@@ -123,8 +123,9 @@ static void merge(struct server *s, const struct action *a)
 static void acknowledge(struct server *s, const struct action *a)
 {
 	struct session *p = session_find(s, a->peer);
-	if (a->ack == ACK_MERGED)
-		durable_ack(s, server_order(s, a->job), a->peer, &a->key);
+	const struct order *o = server_order(s, a->job);
+	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && o && o->journal)) /* what it repeats may not be on the disk yet */
+		durable_ack(s, o, a->peer, &a->key, a->ack);
 	else if (p)
 		session_send_ack(p, &a->key, a->ack, a->text);
 	if (a->ack != ACK_MERGED)

@@ -17,6 +17,7 @@ struct durable_ack {
 	struct durable_ack *next;
 	uint64_t peer;
 	struct lease_key key;
+	enum ack ack;
 	struct journal *journal; /* held */
 };
 
@@ -177,11 +178,11 @@ static void answer(struct server *s, struct durable_ack *a)
 		struct event ev = {.kind = EVENT_JOB_BROKEN, .job = a->key.job, .text = "its journal cannot be written to the disk"};
 		server_step(s, &ev);
 	}
-	if (a->peer)
+	if (a->peer && a->ack == ACK_MERGED)
 		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", (unsigned long long)a->key.job,
 			  (unsigned long long)a->peer, (int)a->key.kind, a->key.group, a->key.part, (unsigned long long)a->key.epoch);
 	if (p)
-		session_send_ack(p, &a->key, ACK_MERGED, "");
+		session_send_ack(p, &a->key, a->ack, "");
 	journal_release(a->journal);
 	mem_free(a);
 }
@@ -220,14 +221,14 @@ static void flush_next(struct server *s)
 	(void)rc;
 }
 
-void durable_ack(struct server *s, const struct order *o, uint64_t peer, const struct lease_key *k)
+void durable_ack(struct server *s, const struct order *o, uint64_t peer, const struct lease_key *k, enum ack ack)
 {
 	struct durable_ack *a = mem_alloc(1, sizeof *a);
 	if (!a || !o->journal) { /* not answered: the worker offers it again, and it is a repeat */
 		mem_free(a);
 		return;
 	}
-	*a = (struct durable_ack){.peer = peer, .key = *k, .journal = o->journal};
+	*a = (struct durable_ack){.peer = peer, .key = *k, .ack = ack, .journal = o->journal};
 	journal_hold(a->journal);
 	*s->acks_last = a;
 	s->acks_last = &a->next;

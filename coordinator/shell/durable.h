@@ -18,8 +18,8 @@ void durable_end(struct server *s, struct order *o);
 int durable_reserve(struct server *s, struct order *o, struct error *e);
 /* The core merges the batch of this event. */
 int durable_merged(struct server *s, struct order *o, struct error *e);
-/* The answer to a merged batch, when what the order's journal holds is safe. */
-void durable_ack(struct server *s, const struct order *o, uint64_t peer, const struct lease_key *k);
+/* The answer to a batch that is merged, by now or before, when what the order's journal holds is safe. */
+void durable_ack(struct server *s, const struct order *o, uint64_t peer, const struct lease_key *k, enum ack ack);
 /* The last look at the job's error, if it is new. */
 void durable_look(struct server *s, uint64_t job);
 
