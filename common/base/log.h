@@ -31,6 +31,8 @@
 	X(LEASE_FAILED, "lease_failed", WARN) \
 	X(BATCH_MERGED, "batch_merged", DEBUG) \
 	X(BATCH_STORED, "batch_stored", DEBUG) \
+	X(BATCH_ACKNOWLEDGED, "batch_acknowledged", DEBUG) \
+	X(BATCH_RESTORED, "batch_restored", DEBUG) \
 	X(BATCH_REPEATED, "batch_repeated", INFO) \
 	X(BATCH_REFUSED, "batch_refused", WARN) \
 	X(BLOB_STORED, "blob_stored", DEBUG) \

@@ -145,8 +145,12 @@ static int tell_core(struct server *s, const struct replay *r, const char *held,
 	uint64_t *next = mem_alloc(slots, sizeof *next);
 	if (!next)
 		return error_set(e, ENOMEM, "no memory for a job");
-	for (uint32_t i = 0; i < slots; i++)
+	for (uint32_t i = 0; i < slots; i++) {
 		next[i] = next_epoch(o, i / o->plan.parts, i % o->plan.parts);
+		log_event(LOG_BATCH_RESTORED, "job=j%llu kind=%d group=%u part=%u epochs=%llu", (unsigned long long)o->id,
+			  (int)(o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER), i / o->plan.parts, i % o->plan.parts,
+			  (unsigned long long)next[i]);
+	}
 	char text[256];
 	struct event ev = {.kind = EVENT_RESTORE,
 			   .restore = {.job = o->id,
