@@ -1,6 +1,7 @@
 # make            programs into build/bin
 # make test       unit and end-to-end tests (SAN=address,undefined for sanitizers, FULL=1 for the long forms)
 # make test-numerics   what is hard on the numbers, one row a case
+# make test-faults   what happens to machines, one fault after the other; writes the tables of tests/e2e/README.md
 # make demo bench fuzz install clean
 
 CC       ?= gcc
@@ -115,6 +116,11 @@ NUMERICS_BIN := $(filter $(BUILD)/tests/worker/halfvec/% $(BUILD)/tests/numerics
 .PHONY: test-numerics
 test-numerics: programs $(NUMERICS_BIN)
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/numerics/run.sh $(BUILD)
+
+# What happens to machines while a job runs, each fault as often as the tables of tests/e2e/README.md say, which it writes.
+.PHONY: test-faults
+test-faults: programs
+	sh tests/e2e/faults.sh $(BUILD) --write
 
 # Fuzzers: tests/fuzz/fuzz_*.c, one libFuzzer program each; run.sh calls `make fuzzers` with clang and its sanitizers.
 FUZZ_SRC     := $(wildcard tests/fuzz/fuzz_*.c)

@@ -1,11 +1,12 @@
 # For end-to-end tests with real processes on loopback: sourced by tests/e2e/*.sh, which are called with the build folder.
-# Each test has a folder of its own and ends what it started. Exit codes: 0 passed, 77 skipped, else failed.
+# Each test has a folder of its own and ends what it started; HSLT_KEEP=FOLDER copies it there. Exit codes: 0 passed, 77 skipped, else failed.
 set -eu
 BUILD=${1:-build}
 BIN=$BUILD/bin
 HERE=$(dirname "$0")
 BOX=$HERE/../scenes/box/box.xml
 DIR=$(mktemp -d "${TMPDIR:-/tmp}/hslt-e2e.XXXXXX")
+TOP=$DIR # DIR may become a folder in it
 PIDS=
 COORDINATOR=
 COORDINATOR_PID=
@@ -18,7 +19,7 @@ finish() {
 		kill -9 "$p" 2>/dev/null || :
 	done
 	wait 2>/dev/null || :
-	if grep -l 'runtime error:\|ERROR: .*Sanitizer' "$DIR"/*.log 2>/dev/null; then
+	if grep -l 'runtime error:\|ERROR: .*Sanitizer' "$TOP"/*.log "$DIR"/*.log 2>/dev/null; then
 		code=1
 	fi
 	if [ $code -ne 0 ] && [ $code -ne 77 ]; then
@@ -27,7 +28,8 @@ finish() {
 		done
 	fi
 	[ -z "${HSLT_OWN_MOUNTS:-}" ] || umount "$DIR/spool" 2>/dev/null || :
-	rm -rf "$DIR"
+	[ -z "${HSLT_KEEP:-}" ] || cp -r "$TOP" "$HSLT_KEEP"
+	rm -rf "$TOP"
 	exit $code
 }
 trap finish EXIT

@@ -1,0 +1,57 @@
+# What came of a job's results. Reads the coordinator's log of all its lives (-v), then the workers' logs (-v), and prints
+# "LOST DOUBLED RESULTS".
+#   awk -v job=j1 -f count.awk coordinator.log w1.log ...
+# The film of a life is what the coordinator found on the disk when it started, and what it merged from then on. LOST are
+# results that were acknowledged and that it had to merge again in a later life, or that the last film does not hold; and
+# those of which a worker was told that they count and that never were on the disk. What a life merged and lost before it was
+# acknowledged is computed again and is no loss. DOUBLED: how often a film held a result beyond the first time. RESULTS: how
+# many the last film holds.
+
+function get(name) {
+	return match($0, " " name "=[^ ]*") ? substr($0, RSTART + length(name) + 2, RLENGTH - length(name) - 2) : ""
+}
+
+function key(kind, epoch) {
+	return kind " " get("group") " " get("part") " " epoch
+}
+
+function add(k, fresh) {
+	if (!fresh)
+		stored[k] = 1
+	else if (!(k in film) && (k in stored))
+		lost++
+	if (k in film)
+		doubled++
+	film[k] = 1
+}
+
+/ event=start / && /program=hslt-coordinator/ { started = 1 }
+
+/ event=batch_/ && get("job") == job {
+	event = get("event")
+	if (event == "batch_acknowledged")
+		told[key(get("kind"), get("epoch"))] = 1
+	else if (event == "batch_stored")
+		stored[key(get("kind"), get("epoch"))] = 1
+	else if (event == "batch_restored" || event == "batch_merged") {
+		if (started)
+			split("", film)
+		started = 0
+		if (event == "batch_merged")
+			add(key(get("kind"), get("epoch")), 1)
+		for (e = 0; event == "batch_restored" && e < get("epochs"); e++)
+			add(key(get("kind"), e))
+		if (event == "batch_restored" && get("kind") == 2) # after the bootstrap
+			add(key(1, 0))
+	}
+}
+
+END {
+	for (k in stored)
+		lost += !(k in film)
+	for (k in told)
+		lost += !(k in stored)
+	for (k in film)
+		results++
+	print lost + 0, doubled + 0, results + 0
+}
