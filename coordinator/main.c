@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 const char *argp_program_version = "hslt-coordinator " HSLT_VERSION;
 
@@ -141,6 +142,8 @@ int main(int argc, char **argv)
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &c);
 	log_event(LOG_START, "program=hslt-coordinator version=%s", HSLT_VERSION);
+	if (geteuid() == 0)
+		log_event(LOG_ROOT, "text=\"a coordinator needs no privileges: what comes over the network is read as root\"");
 	int rc = server_run(&c, &e);
 	if (rc)
 		fprintf(stderr, "hslt-coordinator: %s\n", e.text);

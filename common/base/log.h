@@ -12,6 +12,7 @@
 	X(START, "start", INFO) \
 	X(LISTEN, "listen", INFO) \
 	X(STOP, "stop", INFO) \
+	X(ROOT, "runs_as_root", WARN) \
 	X(PEER_ACCEPT, "peer_accept", DEBUG) \
 	X(PEER_HELLO, "peer_hello", INFO) \
 	X(PEER_REFUSED, "peer_refused", WARN) \

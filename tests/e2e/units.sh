@@ -21,7 +21,7 @@ cd "$DIR/units"
 systemd-analyze verify ./hslt-coordinator.service ./hslt-coordinator.socket ./hslt-worker@.service >"$DIR/verify" 2>&1 ||
 	fail "systemd-analyze verify ended with $?: $(cat "$DIR/verify")"
 [ ! -s "$DIR/verify" ] || fail "systemd-analyze verify: $(cat "$DIR/verify")"
-for u in hslt-coordinator.service hslt-worker@.service; do
+for u in *.service; do
 	level=$(systemd-analyze security --offline=true "./$u" | sed -n 's/.*Overall exposure level for .*: \([0-9.]*\) .*/\1/p')
 	echo "$u: exposure $level"
 	awk -v a="$level" -v b=$MOST 'BEGIN { exit !(a != "" && a + 0 <= b) }' || fail "$u is exposed: '$level', at most $MOST"
@@ -87,12 +87,25 @@ until_true 5 test -S "$DIR/status" || fail "no socket"
 grep -q READY=1 "$DIR/heard" || fail "it did not say that it is ready"
 HSLT_COORDINATOR=127.0.0.1:$(cat "$DIR/port")
 export HSLT_COORDINATOR
-${TRACE:+$TRACE "$DIR/worker.trace"} "$BIN/hslt-worker" --threads 2 --name one --cache "$DIR/cache" 2>>"$DIR/worker.log" &
+socat -u "UNIX-RECV:$DIR/notify2" "OPEN:$DIR/heard2,creat,append" 2>>"$DIR/socat.log" &
+PIDS="$PIDS $!"
+until_true 5 test -S "$DIR/notify2" || fail "nobody to notify"
+NOTIFY_SOCKET=$DIR/notify2 WATCHDOG_USEC=900000 ${TRACE:+$TRACE "$DIR/worker.trace"} "$BIN/hslt-worker" --threads 2 --name one --cache "$DIR/cache" 2>>"$DIR/worker.log" &
 WORKER=$!
 PIDS="$PIDS $WORKER"
 submit "$BOX" -o "$DIR/unit.exr" --integrator hslt --bootstrap 20000 --mutations 60000 --wait >/dev/null || fail "the job: $?"
 until_true 5 grep -q 'WATCHDOG=1.*WATCHDOG=1' "$DIR/heard" || fail "the watchdog hears nothing: $(cat "$DIR/heard")"
-stop $WORKER $COORDINATOR_PID
+until_true 5 grep -q 'WATCHDOG=1.*WATCHDOG=1' "$DIR/heard2" || fail "the worker's watchdog hears nothing: $(cat "$DIR/heard2")"
+grep -q '^READY=1' "$DIR/heard2" || fail "the worker said $(cat "$DIR/heard2")"
+if [ "$(id -u)" = 0 ]; then
+	for f in coordinator worker; do
+		grep -q 'level=warn event=runs_as_root' "$DIR/$f.log" || fail "no warning that the $f runs as root"
+	done
+fi
+stop $WORKER
+[ $CODE -eq 0 ] || fail "the worker ended with $CODE"
+until_true 5 grep -q 'STOPPING=1$' "$DIR/heard2" || fail "the worker said $(cat "$DIR/heard2")"
+stop $COORDINATOR_PID
 [ $CODE -eq 0 ] || fail "the coordinator ended with $CODE"
 until_true 5 grep -q '^READY=1.*STOPPING=1$' "$DIR/heard" || fail "it said $(cat "$DIR/heard")"
 [ -S "$DIR/status" ] || fail "the socket that it was given is gone"

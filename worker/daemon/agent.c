@@ -2,6 +2,7 @@
 
 #include "common/base/log.h"
 #include "common/base/mem.h"
+#include "common/net/notify.h"
 
 #include <assert.h>
 #include <signal.h>
@@ -163,6 +164,7 @@ static void go(struct agent *a)
 	uv_close((uv_handle_t *)&a->retry, NULL);
 	uv_close((uv_handle_t *)&a->heartbeat, NULL);
 	uv_close((uv_handle_t *)&a->grace, NULL);
+	uv_close((uv_handle_t *)&a->pulse, NULL);
 	uv_close((uv_handle_t *)&a->on_term, NULL);
 	uv_close((uv_handle_t *)&a->on_int, NULL);
 	crew_close(a->crew);
@@ -188,6 +190,15 @@ void agent_settle(struct agent *a)
 		go(a);
 }
 
+static void leave(struct agent *a)
+{
+	notify_send("STOPPING=1");
+	a->leaving = true;
+	desk_leave(a);
+	uv_timer_start(&a->grace, on_grace_over, (uint64_t)(1000 * a->config.grace_seconds), 0);
+	agent_settle(a);
+}
+
 static void on_signal(uv_signal_t *h, int number)
 {
 	struct agent *a = h->data;
@@ -196,22 +207,49 @@ static void on_signal(uv_signal_t *h, int number)
 		_exit(0);
 	}
 	log_event(LOG_STOP, "signal=%d grace=%g", number, a->config.grace_seconds);
-	a->leaving = true;
-	desk_leave(a);
-	uv_timer_start(&a->grace, on_grace_over, (uint64_t)(1000 * a->config.grace_seconds), 0);
-	agent_settle(a);
+	leave(a);
 }
 
 /* ---- life ---- */
+
+static void on_pulse(uv_timer_t *t)
+{
+	struct agent *a = t->data;
+	uint64_t now = uv_now(&a->loop);
+	if (a->watched)
+		notify_send("WATCHDOG=1");
+	if (a->leases)
+		a->busy_at = now;
+	if (a->leaving || !(a->config.idle_seconds > 0) || (double)(now - a->busy_at) < 1000 * a->config.idle_seconds)
+		return;
+	log_event(LOG_STOP, "text=\"no lease for %g s\"", a->config.idle_seconds);
+	leave(a);
+}
+
+/* Often enough for whoever waits; not at all when nobody does. */
+static void start_pulse(struct agent *a)
+{
+	double watchdog = notify_watchdog(), idle = a->config.idle_seconds, wait = 1;
+	a->watched = watchdog > 0;
+	a->busy_at = uv_now(&a->loop);
+	if (a->watched && watchdog / 3 < wait)
+		wait = watchdog / 3;
+	if (idle > 0 && idle / 4 < wait)
+		wait = idle / 4;
+	uint64_t ms = wait > 0.01 ? (uint64_t)(1000 * wait) : 10;
+	if (a->watched || idle > 0)
+		uv_timer_start(&a->pulse, on_pulse, ms, ms);
+}
 
 static void init_handles(struct agent *a)
 {
 	uv_timer_init(&a->loop, &a->retry);
 	uv_timer_init(&a->loop, &a->heartbeat);
 	uv_timer_init(&a->loop, &a->grace);
+	uv_timer_init(&a->loop, &a->pulse);
 	uv_signal_init(&a->loop, &a->on_term);
 	uv_signal_init(&a->loop, &a->on_int);
-	a->retry.data = a->heartbeat.data = a->grace.data = a->on_term.data = a->on_int.data = a;
+	a->retry.data = a->heartbeat.data = a->grace.data = a->pulse.data = a->on_term.data = a->on_int.data = a;
 	uv_signal_start(&a->on_term, on_signal, SIGTERM);
 	uv_signal_start(&a->on_int, on_signal, SIGINT);
 }
@@ -258,6 +296,7 @@ int agent_open(struct agent **out, const struct agent_config *c, struct error *e
 	log_event(LOG_START, "program=hslt-worker name=%s threads=%u fingerprint=%s", log_quote(c->name).text, c->threads,
 		  log_quote(a->fingerprint).text);
 	init_handles(a);
+	start_pulse(a);
 	connect_now(a);
 	*out = a;
 	return 0;
@@ -282,6 +321,7 @@ int agent_run(const struct agent_config *c, struct error *e)
 	int rc = agent_open(&a, c, e);
 	if (rc)
 		return rc;
+	notify_send("READY=1"); /* it may wait for its coordinator for long */
 	uv_run(&a->loop, UV_RUN_DEFAULT);
 	agent_close(a);
 	return 0;

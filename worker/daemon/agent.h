@@ -1,7 +1,8 @@
 /*
  * The worker daemon: one loop thread that owns all state, a crew of render threads. Connects, asks for leases, fetches
  * what it needs, sends results and keeps them until they are acknowledged; reconnects for ever. On SIGTERM it finishes
- * what runs within the grace period, or gives it up, and leaves.
+ * what runs within the grace period, or gives it up, and leaves. Tells the service manager what it waits to hear
+ * (common/net/notify.h).
  */
 #ifndef WORKER_DAEMON_AGENT_H
 #define WORKER_DAEMON_AGENT_H
@@ -18,6 +19,7 @@ struct agent_config {
 	uint64_t cache_bytes;
 	unsigned threads;
 	double grace_seconds;
+	double idle_seconds; /* without a lease for so long: it leaves; 0: never */
 	bool insecure;
 	bool repeat; /* tests: every result is sent twice */
 };

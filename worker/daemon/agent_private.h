@@ -12,7 +12,7 @@ enum { WORLDS_KEPT = 2 /* of jobs that have no lease here now */ };
 struct agent {
 	struct agent_config config;
 	uv_loop_t loop;
-	uv_timer_t retry, heartbeat, grace;
+	uv_timer_t retry, heartbeat, grace, pulse;
 	uv_signal_t on_term, on_int;
 	struct net_addr address;
 	struct tls *tls; /* NULL: plaintext */
@@ -25,6 +25,8 @@ struct agent {
 	struct bundle *bundles;
 	struct lease_task *leases;
 	uint64_t clock; /* of uses of bundles */
+	uint64_t busy_at;   /* ms of the loop: when it had a lease last */
+	bool watched;       /* the service manager waits to hear of us */
 	bool leaving, gone;
 };
 

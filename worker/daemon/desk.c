@@ -127,6 +127,7 @@ static void drop_lease(struct agent *a, struct lease_task *l)
 	while (*at != l)
 		at = &(*at)->next;
 	*at = l->next;
+	a->busy_at = uv_now(&a->loop);
 	lease_task_free(l);
 }
 

@@ -19,10 +19,11 @@ static const char doc[] =
 	"  hslt-worker --coordinator farm.lan:7700 --tls ~/node1 --threads 8 --name $(hostname)\n"
 	"\n"
 	"SIGTERM: finishes the running epochs within the grace period or gives them up, sends what is done and leaves; the "
-	"second one ends it at once. It reconnects for ever.\n"
+	"second one ends it at once. It reconnects for ever; with --idle-exit it leaves when nobody has work for it. Under "
+	"systemd it says when it is ready and feeds the watchdog.\n"
 	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 stopped, 1 failed, 2 usage.";
 
-enum { OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_TLS };
+enum { OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_TLS, OPTION_IDLE };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
@@ -31,6 +32,7 @@ static const struct argp_option options[] = {
 	{"cache", OPTION_CACHE, "DIR", 0, "Where files of scenes are kept (~/.cache/hslt)", 0},
 	{"cache-size", OPTION_CACHE_SIZE, "GB", 0, "The cache's limit (20)", 0},
 	{"grace", OPTION_GRACE, "SECONDS", 0, "After SIGTERM (20)", 0},
+	{"idle-exit", OPTION_IDLE, "SECONDS", 0, "Leave when there was no lease for so long (0: never)", 0},
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log more", 0},
@@ -71,6 +73,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_GRACE:
 		c->grace_seconds = number(state, "--grace", arg, 0, 86400);
 		return 0;
+	case OPTION_IDLE:
+		c->idle_seconds = number(state, "--idle-exit", arg, 0, 1e7);
+		return 0;
 	case OPTION_TLS:
 		c->tls = arg;
 		return 0;
@@ -108,6 +113,8 @@ int main(int argc, char **argv)
 				 .grace_seconds = 20};
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &c);
+	if (geteuid() == 0)
+		log_event(LOG_ROOT, "text=\"a worker needs no privileges: scenes from others are read as root\"");
 	int rc = agent_run(&c, &e);
 	if (rc)
 		fprintf(stderr, "hslt-worker: %s\n", e.text);
