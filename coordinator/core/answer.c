@@ -6,7 +6,7 @@
 
 enum { FAILURES_FATAL = 3, SLOT_FAILURES_FATAL = 6 };
 
-enum verdict { MERGE, REPEAT, REFUSE, FAULT };
+enum verdict { MERGE, NOTE, REPEAT, REFUSE, FAULT };
 
 static struct slot *slot_of(const struct job *j, const struct lease_key *k)
 {
@@ -34,6 +34,10 @@ static enum verdict judge(const struct peer *p, const struct job *j, const struc
 	*why = !p ? "unknown worker" : !j ? "no such job" : !job_is_live(j) ? "the job is over" : "";
 	if (**why)
 		return REFUSE;
+	if (p->who->aside) {
+		*why = "the worker is set aside: its results do not count";
+		return REFUSE;
+	}
 	const struct slot *s = slot_of(j, k);
 	if (!s) {
 		*why = "not a lease of this job";
@@ -75,18 +79,23 @@ static void acknowledge(struct farm *f, const struct event *ev, enum ack ack, co
 	a->text = f->text;
 }
 
-static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s, const struct event *ev)
+static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s, const struct event *ev, bool verified)
 {
 	struct action *a = update_add(f, ACTION_MERGE);
 	a->peer = p->id;
 	a->key = ev->lease.key;
 	a->job = j->id;
+	a->who = p->who->id;
+	a->verified = verified;
 	acknowledge(f, ev, ACK_MERGED, "");
 	struct lease *l = lease_of(s, p);
 	double duration = l ? f->now - l->sent : NAN;
 	if (l)
 		lease_drop(f, l);
 	lease_revoke_slot(f, s);
+	j->verified += verified;
+	if (verified)
+		verify_settle(f, j, s, &ev->lease.digest);
 	peer_succeeded(p, j->id);
 	if (!j->mixed)
 		job_pin(j, p->class);
@@ -108,6 +117,40 @@ static void count(struct peer *p, struct job *j, enum verdict v)
 	}
 }
 
+/* Two workers must say the same before it counts. */
+static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct peer *p, const struct event *ev, const char **why)
+{
+	switch (verify_take(f, j, s, p->who, &ev->lease.digest)) {
+	case VERIFY_AGREES:
+		return MERGE;
+	case VERIFY_NOTED:
+		return NOTE;
+	case VERIFY_DIFFERS:
+	case VERIFY_HOPELESS:
+		*why = "it differs from another worker's";
+		return NOTE;
+	case VERIFY_REPEATED:
+		*why = "it waits for another worker's";
+		return REPEAT;
+	case VERIFY_CONTRADICTS:
+		*why = "it differs from what the same worker sent before";
+		return FAULT;
+	}
+	return FAULT;
+}
+
+/* The job's workers cannot compute it, or one of them is wrong each time in the same way: no third opinion will help. */
+static void give_up_where_hopeless(struct farm *f, struct job *j, struct slot *s, const struct lease_key *k)
+{
+	char names[160], text[256];
+	if (j->proofs[s - j->slots].count < VERIFY_MOST)
+		return;
+	verify_names(j, s, names, sizeof names);
+	snprintf(text, sizeof text, "no two of %d workers agree on group %u part %u epoch %llu: %s", VERIFY_MOST, k->group, k->part,
+		 (unsigned long long)k->epoch, names);
+	rounds_end(f, j, END_FAILED, text);
+}
+
 void answer_batch(struct farm *f, const struct event *ev)
 {
 	struct peer *p = farm_find_peer(f, ev->peer);
@@ -115,17 +158,24 @@ void answer_batch(struct farm *f, const struct event *ev)
 	const char *why;
 	enum verdict v = judge(p, j, ev, &why);
 	struct slot *s = j && job_is_live(j) ? slot_of(j, &ev->lease.key) : NULL;
+	bool verified = v == MERGE && verify_chosen(j, &ev->lease.key);
+	if (verified)
+		v = verify(f, j, s, p, ev, &why);
 	if (v == MERGE) {
-		merge(f, p, j, s, ev);
+		merge(f, p, j, s, ev, verified);
 		return;
 	}
 	count(p, j, v);
-	acknowledge(f, ev, v == REPEAT ? ACK_REPEAT : ACK_REFUSED, why);
+	acknowledge(f, ev, v == NOTE ? ACK_NOTED : v == REPEAT ? ACK_REPEAT : ACK_REFUSED, why);
 	struct lease *l = p && is_next(j, s, &ev->lease.key) ? lease_of(s, p) : NULL;
 	if (l)
 		lease_drop(f, l);
+	else if (v == NOTE)
+		job_place(j, s);
 	if (v == FAULT)
 		peer_fault(f, p, f->text);
+	if (v == NOTE)
+		give_up_where_hopeless(f, j, s, &ev->lease.key);
 }
 
 static uint32_t failers(struct slot *s, uint64_t peer)
@@ -165,7 +215,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 	snprintf(j->text, sizeof j->text, "%s", f->text);
 	j->failures++;
 	s->failures++;
-	bool never = j->bootstrap_merged + j->leases_merged == 0;
+	bool never = j->bootstrap_merged + j->leases_merged + j->noted == 0;
 	if (failers(s, p->id) >= FAILURES_FATAL || s->failures >= SLOT_FAILURES_FATAL ||
 	    (never && j->failures >= FAILURES_FATAL))
 		rounds_end(f, j, END_FAILED, f->text);

@@ -26,6 +26,8 @@ enum event_kind {
 	EVENT_RESTORE,        /* restore: a job of an earlier life goes on; before anything else has happened */
 	EVENT_HOLD,           /* tag, job, hold, text: no more of its leases go out; without a text this hold is over */
 	EVENT_PRIORITY,       /* tag, job, priority: from the next lease on */
+	EVENT_ASIDE,          /* join (but for peer, fingerprint, threads), text: a worker that was set aside in an earlier life */
+	EVENT_FORGIVE,        /* text: the name of workers that are set aside no more */
 	EVENT_JOB_BROKEN,     /* job, text: the shell cannot go on with it (a sum left the grid, the disk is full) */
 };
 
@@ -36,11 +38,21 @@ enum job_hold {
 	JOB_HOLDS,
 };
 
+/* SHA-256 over what of a batch decides bits. */
+struct batch_digest {
+	uint8_t bytes[32];
+};
+
+enum { JOIN_HOME = 40 /* bytes of a home's name, its end included */ };
+
 struct event_join {
 	uint64_t peer; /* chosen by the shell, not 0, never used twice while the farm lives */
 	const char *name;
 	const char *fingerprint; /* compared as a whole */
 	uint32_t threads;
+	const char *certificate; /* the name in it; NULL: none */
+	const char *home;        /* the folder that counts its starts; NULL: nobody does */
+	uint64_t restarts;       /* so many there have been */
 };
 
 struct event_submit {
@@ -49,6 +61,7 @@ struct event_submit {
 	int priority;   /* -100..100 */
 	const char *owner; /* the name that its certificate says; "": there is none, and all such jobs are one owner's */
 	bool mixed;     /* workers of any numeric fingerprint */
+	double verify;  /* share of its leases that two workers compute; not where it is mixed: only equals can be compared */
 };
 
 /* Which leases are merged says where a job was. */
@@ -81,6 +94,7 @@ struct event {
 		struct {
 			struct lease_key key;
 			bool valid; /* BATCH: batch_check and the frame's own checks passed; else text says what is wrong */
+			struct batch_digest digest; /* BATCH: of a lease that farm_verifies */
 		} lease;
 		enum job_hold hold;
 		int priority;

@@ -6,6 +6,8 @@
 #include <assert.h>
 #include <math.h>
 
+enum { KNOWN_PER_PEER = 4 };
+
 void farm_config_init(struct farm_config *c)
 {
 	*c = (struct farm_config){
@@ -51,7 +53,9 @@ int farm_new(struct farm **out, const struct farm_config *c, struct error *e)
 	f->jobs = mem_alloc((size_t)c->max_jobs + c->max_ended + 1, sizeof(struct job *));
 	f->live = mem_alloc(c->max_jobs, sizeof(struct job *));
 	f->peers = mem_alloc(c->max_peers, sizeof(struct peer *));
-	if (!f->jobs || !f->live || !f->peers || update_reserve(f, 0) < 0) {
+	f->known_limit = KNOWN_PER_PEER * c->max_peers;
+	f->known = mem_alloc(f->known_limit, sizeof(struct identity *));
+	if (!f->jobs || !f->live || !f->peers || !f->known || update_reserve(f, 0) < 0) {
 		farm_free(f);
 		return error_set(e, ENOMEM, "no memory for the farm");
 	}
@@ -70,6 +74,7 @@ void farm_free(struct farm *f)
 			peer_class_drop(f->jobs[i]->class);
 		job_free(f->jobs[i]);
 	}
+	roster_free(f);
 	mem_free(f->jobs);
 	mem_free(f->live);
 	mem_free(f->peers);
@@ -128,15 +133,35 @@ uint64_t farm_next_peer(const struct farm *f, uint64_t after)
 	return i < f->peer_count ? f->peers[i]->id : 0;
 }
 
+static struct event_join complete(const struct event_join *e)
+{
+	struct event_join j = *e;
+	j.certificate = e->certificate ? e->certificate : "";
+	j.home = e->home ? e->home : "";
+	return j;
+}
+
 static void joined(struct farm *f, const struct event *ev)
 {
-	assert(ev->join.peer && !farm_find_peer(f, ev->join.peer));
+	const struct event_join join = complete(&ev->join);
 	const char *refused = "";
-	if (peer_join(f, &ev->join, &refused))
+	assert(join.peer && !farm_find_peer(f, join.peer));
+	if (roster_replace(f, &join, &refused) && peer_join(f, &join, &refused))
 		return;
 	struct action *a = update_add(f, ACTION_REJECTED);
 	a->peer = ev->join.peer;
 	a->text = refused;
+}
+
+static void aside(struct farm *f, const struct event *ev)
+{
+	const struct event_join join = complete(&ev->join);
+	roster_aside(f, &join, ev->text);
+}
+
+static void forgiven(struct farm *f, const struct event *ev)
+{
+	roster_forgive(f, ev->text);
 }
 
 static void left(struct farm *f, const struct event *ev)
@@ -186,6 +211,8 @@ static void (*const on_event[])(struct farm *, const struct event *) = {
 	[EVENT_RESTORE] = restore_job,
 	[EVENT_HOLD] = orders_hold,
 	[EVENT_PRIORITY] = orders_priority,
+	[EVENT_ASIDE] = aside,
+	[EVENT_FORGIVE] = forgiven,
 	[EVENT_JOB_BROKEN] = broken,
 };
 

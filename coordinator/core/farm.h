@@ -19,6 +19,12 @@
  *  - Invalid content is its sender's fault; after three faults in a row the worker gets no more leases.
  *    A failed lease is tried elsewhere; its worker waits 10, 20, 40 ... s before it gets more of this job. The job fails
  *    when nothing was ever merged and three leases failed, or one lease failed on three workers, or six times in all.
+ *  - Of a job that is verified a share of the leases is computed by two workers, of two identities (roster.h) and one
+ *    fingerprint. The first answer is noted; one that equals another worker's is merged; where two differ a third
+ *    decides, and a fourth; then the job fails. Who said otherwise than two that agree has given a wrong result.
+ *  - A worker is set aside for good, by identity, after three faults in a row or three wrong results. Nothing that it sends
+ *    counts any more, and no failure of a job is laid to its wrong results.
+ *  - A worker that calls again, in the same life or a later one of the same home, takes the place of its old connection.
  *  - A job of an earlier life goes on where its merged leases say that it was; leases that were out then count when their results
  *    come, as any do. A bound that its last complete round had met, or a look at its error, is not forgotten.
  *  - A job that is held gets no leases out; results that come are merged, and its clock stands still.
@@ -40,7 +46,8 @@ struct farm_config {
 	uint32_t max_peers;
 	uint32_t max_peer_leases; /* held by one worker */
 	uint32_t max_slots;       /* groups x parts of one job */
-	uint32_t max_faults;      /* of a worker in a row */
+	uint32_t max_faults;      /* of a worker in a row; wrong results in all */
+	uint64_t verify_seed;     /* of the choice of leases that are verified: what no worker knows */
 	double silent_after;      /* s without a word: leases taken back */
 	double forget_after;      /* s without a word: hung up */
 	double first_timeout;     /* of a lease before the job has a median */
@@ -60,6 +67,8 @@ struct job_status {
 	const char *name, *owner;
 	int priority;
 	bool mixed;
+	double verify;
+	uint64_t verified, mismatched;    /* leases on which two workers agreed; on which the first two did not */
 	const struct plan *plan;
 	enum job_state state;
 	enum job_end end;
@@ -87,6 +96,8 @@ struct job_status {
 enum peer_state { PEER_ACTIVE, PEER_SILENT, PEER_ASIDE };
 struct peer_status {
 	uint64_t id;
+	uint64_t who; /* the same for each of its connections */
+	uint64_t restarts;
 	const char *name, *fingerprint;
 	uint32_t threads, want, leases;
 	enum peer_state state;
@@ -105,6 +116,18 @@ struct lease_status {
 /* The smallest id above `after` (start with 0); 0: no more. */
 uint64_t farm_next_job(const struct farm *f, uint64_t after);
 uint64_t farm_next_peer(const struct farm *f, uint64_t after);
+/* A result of this lease must come with its digest. */
+bool farm_verifies(const struct farm *f, const struct lease_key *k);
+/* What is known of a worker, here or not. */
+struct worker_status {
+	uint64_t who, restarts;
+	const char *certificate, *name, *home, *text;
+	uint32_t wrong; /* results */
+	bool aside;
+};
+/* The smallest id above `after` (start with 0) of those that are set aside; 0: no more. */
+uint64_t farm_next_aside(const struct farm *f, uint64_t after);
+bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s); /* false: unknown */
 bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s);   /* false: unknown */
 /* s since the job's first lease, less those that it was held; NAN: none yet, unknown */
 double farm_elapsed(const struct farm *f, uint64_t id, double now);

@@ -33,6 +33,7 @@ static void init(struct job *j, const struct event_submit *e, double now)
 	snprintf(j->name, sizeof j->name, "%s", e->name);
 	j->priority = e->priority;
 	j->mixed = e->mixed;
+	j->verify = e->verify;
 	j->plan = *e->plan;
 	j->submitted = now;
 	j->started = j->ended = j->rel_error = j->opened = j->held_since = NAN;
@@ -40,6 +41,7 @@ static void init(struct job *j, const struct event_submit *e, double now)
 	for (int i = 0; i < 2; i++) {
 		list_init(&j->ready[i]);
 		list_init(&j->out[i]);
+		list_init(&j->second[i]);
 	}
 	list_init(&j->blocked);
 	for (uint32_t i = 0; i < j->slot_count; i++)
@@ -57,7 +59,10 @@ struct job *job_new(struct farm *f, const struct event_submit *e, const char **r
 	struct job *j = mem_alloc(1, sizeof *j);
 	if (j)
 		j->slots = mem_alloc(slots, sizeof *j->slots);
-	if (j && j->slots)
+	bool verified = e->verify > 0 && !e->mixed;
+	if (j && j->slots && verified)
+		j->proofs = mem_alloc(slots, sizeof *j->proofs);
+	if (j && j->slots && (j->proofs || !verified))
 		j->owner = owner_use(&f->owners, e->owner ? e->owner : "");
 	if (!j || !j->owner) {
 		job_free(j);
@@ -65,6 +70,7 @@ struct job *job_new(struct farm *f, const struct event_submit *e, const char **r
 		return NULL;
 	}
 	j->slot_count = (uint32_t)slots;
+	j->verify_seed = f->config.verify_seed;
 	init(j, e, f->now);
 	return j;
 }
@@ -75,6 +81,7 @@ void job_free(struct job *j)
 		return;
 	owner_drop(j->owner);
 	mem_free(j->slots);
+	mem_free(j->proofs);
 	mem_free(j);
 }
 
@@ -142,8 +149,10 @@ void job_place(struct job *j, struct slot *s)
 	uint64_t ahead = s->next - j->rounds;
 	if (ahead > 1)
 		list_append(&j->blocked, &s->link);
+	else if (s->holders >= verify_copies(j, s))
+		list_append(&j->out[ahead], &s->link);
 	else
-		list_append(s->holders ? &j->out[ahead] : &j->ready[ahead], &s->link);
+		list_append(verify_waits(j, s) ? &j->second[ahead] : &j->ready[ahead], &s->link);
 }
 
 double job_lease_timeout(const struct farm_config *c, const struct job *j, const struct slot *s)
@@ -199,9 +208,10 @@ bool job_merge(struct job *j, struct slot *s, double now, double duration)
 		j->done = j->ahead;
 		j->ahead = 0;
 		list_remove(&s->link);
-		assert(list_is_empty(&j->ready[0]) && list_is_empty(&j->out[0]));
+		assert(list_is_empty(&j->ready[0]) && list_is_empty(&j->out[0]) && list_is_empty(&j->second[0]));
 		list_join(&j->ready[0], &j->ready[1]);
 		list_join(&j->out[0], &j->out[1]);
+		list_join(&j->second[0], &j->second[1]);
 		list_join(&j->ready[1], &j->blocked);
 	}
 	job_place(j, s);
@@ -249,7 +259,7 @@ void job_pin(struct job *j, struct peer_class *c)
 
 void job_unpin_if_untouched(struct job *j)
 {
-	if (!j->class || j->leases_out || j->bootstrap_merged || j->leases_merged)
+	if (!j->class || j->leases_out || j->noted || j->bootstrap_merged || j->leases_merged)
 		return;
 	peer_class_drop(j->class);
 	j->class = NULL;

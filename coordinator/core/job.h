@@ -27,6 +27,8 @@ struct job {
 	char name[JOB_NAME];
 	int priority;
 	bool mixed;
+	double verify;
+	uint64_t verify_seed;
 	struct plan plan;
 	enum job_state state;
 	enum job_end end;
@@ -36,11 +38,15 @@ struct job {
 
 	uint32_t slot_count;
 	struct slot *slots;       /* [groups][parts]; NULL when ended */
+	struct proof *proofs;     /* as many; NULL: nothing is verified, or ended */
+	uint32_t noted;           /* slots that have an answer which waits for another */
+	uint64_t verified, mismatched;
 	enum lease_kind kind;     /* of the leases that are open */
 	uint64_t rounds;          /* complete, of this kind */
 	uint64_t limit;           /* rounds of this kind */
 	uint32_t done, ahead;     /* slots that have merged round `rounds`; the one after it too */
 	struct link ready[2], out[2]; /* by round: the first incomplete one and the next; `out` has one holder */
+	struct link second[2];    /* the same: verified, and waits for a worker that has not had it */
 	struct link blocked;      /* the round after those */
 	uint32_t leases_out;
 

@@ -55,7 +55,7 @@ void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 	if (s->holders == 0)
 		s->since = f->now;
 	else
-		j->duplicates++;
+		j->duplicates += s->holders >= verify_copies(j, s);
 	s->holders++;
 	j->leases_out++;
 	j->owner->leases_out++;

@@ -66,16 +66,26 @@ struct peer *peer_join(struct farm *f, const struct event_join *e, const char **
 	uint32_t limit = f->config.max_peer_leases;
 	if (e->threads < limit / 2)
 		limit = 2 * e->threads < 4 ? (limit < 4 ? limit : 4) : 2 * e->threads;
+	struct identity *who = roster_use(f, e, refused);
+	if (!who)
+		return NULL;
 	struct peer *p = make(f, e, limit);
 	if (!p) {
+		roster_drop(f, who);
 		*refused = "the coordinator has no memory for another worker";
 		return NULL;
 	}
 	p->id = e->peer;
+	p->who = who;
+	snprintf(p->home, sizeof p->home, "%s", e->home);
+	p->restarts = e->restarts;
 	snprintf(p->name, sizeof p->name, "%s", e->name);
 	p->threads = e->threads;
 	p->joined = p->heard = f->now;
-	p->class->active++;
+	p->state = who->aside ? PEER_ASIDE : PEER_ACTIVE;
+	if (who->aside)
+		memcpy(p->text, who->text, sizeof p->text);
+	p->class->active += p->state == PEER_ACTIVE;
 	list_init(&p->waiting);
 	f->lease_limit += limit;
 	if (f->now + f->config.silent_after < f->check_at)
@@ -95,6 +105,7 @@ void peer_leave(struct farm *f, struct peer *p)
 	if (p->state == PEER_ACTIVE)
 		p->class->active--;
 	peer_class_drop(p->class);
+	roster_drop(f, p->who);
 	f->lease_limit -= p->lease_limit;
 	uint32_t i = 0;
 	while (f->peers[i] != p)
@@ -118,7 +129,7 @@ void peer_heard(struct farm *f, struct peer *p)
 {
 	p->heard = f->now;
 	if (p->state == PEER_SILENT)
-		peer_set_state(f, p, p->aside ? PEER_ASIDE : PEER_ACTIVE);
+		peer_set_state(f, p, p->who->aside ? PEER_ASIDE : PEER_ACTIVE);
 }
 
 void peer_drop_leases(struct farm *f, struct peer *p, bool revoke)
@@ -155,13 +166,11 @@ void peer_requeue(struct farm *f, struct peer *p)
 void peer_fault(struct farm *f, struct peer *p, const char *text)
 {
 	p->faults++;
-	p->faults_in_row++;
+	p->who->faults_in_row++;
 	snprintf(p->text, sizeof p->text, "%s", text);
-	if (p->faults_in_row >= f->config.max_faults && !p->aside) {
-		p->aside = true;
-		peer_set_state(f, p, PEER_ASIDE);
-		peer_drop_leases(f, p, true);
-	}
+	memcpy(p->who->text, p->text, sizeof p->text);
+	if (p->who->faults_in_row >= f->config.max_faults)
+		roster_set_aside(f, p->who);
 }
 
 void peer_failed(struct peer *p, uint64_t job, double now)
@@ -186,7 +195,7 @@ void peer_failed(struct peer *p, uint64_t job, double now)
 void peer_succeeded(struct peer *p, uint64_t job)
 {
 	p->merged++;
-	p->faults_in_row = 0;
+	p->who->faults_in_row = 0;
 	for (int i = 0; i < PEER_AVOIDED; i++)
 		if (p->avoid[i].job == job)
 			p->avoid[i] = (struct peer_avoid){ 0 };

@@ -5,8 +5,9 @@
 #include "coordinator/core/farm.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/list.h"
+#include "coordinator/core/roster.h"
 
-enum { PEER_AVOIDED = 4, PEER_NAME = 64, FINGERPRINT_SIZE = 128 };
+enum { PEER_AVOIDED = 4, PEER_NAME = IDENTITY_NAME, FINGERPRINT_SIZE = 128 };
 
 /* Workers with the same numeric fingerprint. */
 struct peer_class {
@@ -27,15 +28,16 @@ struct peer_avoid {
 struct peer {
 	uint64_t id;
 	char name[PEER_NAME];
+	struct identity *who;
+	char home[IDENTITY_HOME];
+	uint64_t restarts;
 	struct peer_class *class;
 	uint32_t threads, want;
 	uint32_t held; /* leases that are not overdue */
 	enum peer_state state;
-	bool aside; /* too many faults: for good, silent or not */
 	struct link waiting;
 	uint64_t queued; /* when it began to wait, as a number */
 	double joined, heard;
-	uint32_t faults_in_row;
 	uint64_t merged, repeats, refused, faults, failures, timeouts;
 	struct peer_avoid avoid[PEER_AVOIDED];
 	char text[256];

@@ -107,11 +107,14 @@ void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *tex
 	j->end = end;
 	j->ended = f->now;
 	snprintf(j->text, sizeof j->text, "%s", text);
+	verify_forget_job(f, j);
 	if (j->class)
 		peer_class_drop(j->class);
 	j->class = NULL;
 	mem_free(j->slots);
+	mem_free(j->proofs);
 	j->slots = NULL;
+	j->proofs = NULL;
 	j->slot_count = 0;
 	orders_delist(f, j);
 	if (j->state == JOB_DONE)

@@ -16,6 +16,8 @@ static struct peer *waiting_in(struct farm *f, const struct peer_class *c, const
 	struct peer *second = NULL;
 	for (struct link *k = c->waiting.next; k != &c->waiting; k = k->next) {
 		struct peer *p = list_entry(k, struct peer, waiting);
+		if (verify_bars(j, s, p))
+			continue;
 		double until = peer_avoids_until(p, j->id);
 		if (until > f->now) {
 			call_again(f, until);
@@ -36,11 +38,32 @@ static struct peer *waiting_for(struct farm *f, const struct job *j, const struc
 		return waiting_in(f, j->class, j, s, again);
 	struct peer *first = NULL;
 	for (struct link *k = f->classes.next; k != &f->classes; k = k->next) {
-		struct peer *p = waiting_in(f, list_entry(k, struct peer_class, link), j, s, again);
+		const struct peer_class *c = list_entry(k, struct peer_class, link);
+		struct peer *p = verify_may_begin(f, j, c) ? waiting_in(f, c, j, s, again) : NULL;
 		if (p && (!first || p->queued < first->queued))
 			first = p;
 	}
 	return first;
+}
+
+/* What waits for a second worker goes first: its chain and its round stand still. */
+static struct peer *taker(struct farm *f, const struct job *j, struct slot **slot)
+{
+	for (int i = 0; i < 2; i++) {
+		for (struct link *k = j->second[i].next; k != &j->second[i]; k = k->next) {
+			*slot = list_entry(k, struct slot, link);
+			struct peer *p = waiting_for(f, j, *slot, true);
+			if (p)
+				return p;
+		}
+		if (list_is_empty(&j->ready[i]))
+			continue;
+		*slot = list_entry(j->ready[i].next, struct slot, link);
+		struct peer *p = waiting_for(f, j, *slot, true);
+		if (p)
+			return p;
+	}
+	return NULL;
 }
 
 static void hand_out(struct farm *f, struct peer *p, struct job *j, struct slot *s)
@@ -69,8 +92,8 @@ static bool hand_out_ready(struct farm *f)
 			break;
 		if (!job_is_open(j) || (best && comes_first(best, j)))
 			continue;
-		struct slot *s = job_ready(j);
-		struct peer *p = s ? waiting_for(f, j, s, true) : NULL;
+		struct slot *s;
+		struct peer *p = taker(f, j, &s);
 		if (p) {
 			best = j;
 			slot = s;
@@ -109,6 +132,7 @@ static bool hand_out_copy(struct farm *f)
 void schedule(struct farm *f)
 {
 	f->schedule_at = INFINITY;
+	verify_change_class(f);
 	while (f->waiting && hand_out_ready(f))
 		;
 	while (f->waiting && hand_out_copy(f))

@@ -6,6 +6,8 @@
 #include "coordinator/core/job.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/peer.h"
+#include "coordinator/core/roster.h"
+#include "coordinator/core/verify.h"
 
 struct farm {
 	struct farm_config config;
@@ -17,6 +19,9 @@ struct farm {
 	uint32_t live_count;
 	struct peer **peers; /* by id */
 	uint32_t peer_count;
+	struct identity **known; /* workers that are or were here */
+	uint32_t known_count, known_limit;
+	uint64_t identities; /* ids so far */
 	struct link classes, owners;
 	uint32_t waiting; /* workers with a wish */
 	uint64_t queued;  /* counts who began to wait */

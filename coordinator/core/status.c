@@ -83,6 +83,8 @@ static void why_waiting(const struct farm *f, const struct job *j, char *text, s
 		snprintf(text, size, "no worker that answers and is trusted (%u are known)", f->peer_count);
 	else if (j->class && !j->mixed && j->class->active == 0)
 		snprintf(text, size, "no worker with fingerprint %s (%u with others)", j->fingerprint, active);
+	else if (verify_why(f, j, text, size))
+		return;
 	else if (someone_avoids(f, j))
 		snprintf(text, size, "its workers failed and pause before they try again");
 	else if (other)
@@ -119,6 +121,9 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		.name = j->name,
 		.priority = j->priority,
 		.mixed = j->mixed,
+		.verify = j->verify,
+		.verified = j->verified,
+		.mismatched = j->mismatched,
 		.plan = &j->plan,
 		.state = job_is_held(j) && job_is_live(j) ? JOB_HELD : j->state,
 		.end = j->end,
@@ -160,6 +165,8 @@ bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)
 		return false;
 	*s = (struct peer_status){
 		.id = p->id,
+		.who = p->who->id,
+		.restarts = p->restarts,
 		.name = p->name,
 		.fingerprint = p->class->fingerprint,
 		.threads = p->threads,
@@ -177,6 +184,36 @@ bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)
 	};
 	memcpy(s->text, p->text, sizeof s->text);
 	return true;
+}
+
+bool farm_verifies(const struct farm *f, const struct lease_key *k)
+{
+	const struct job *j = farm_find_job(f, k->job);
+	return j && verify_chosen(j, k);
+}
+
+uint64_t farm_next_aside(const struct farm *f, uint64_t after)
+{
+	uint64_t next = 0;
+	for (uint32_t i = 0; i < f->known_count; i++) {
+		const struct identity *k = f->known[i];
+		if (k->aside && k->id > after && (next == 0 || k->id < next))
+			next = k->id;
+	}
+	return next;
+}
+
+bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s)
+{
+	for (uint32_t i = 0; i < f->known_count; i++) {
+		const struct identity *k = f->known[i];
+		if (k->id != who)
+			continue;
+		*s = (struct worker_status){ .who = k->id, .restarts = k->restarts, .certificate = k->certificate, .name = k->name,
+					     .home = k->home, .text = k->text, .wrong = k->wrong, .aside = k->aside };
+		return true;
+	}
+	return false;
 }
 
 bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_status *s)

@@ -42,10 +42,12 @@ enum action_kind {
 	ACTION_PUBLISH,     /* job, rounds, final: write the image of the prefix; not final: a preview */
 	ACTION_JOB_CHANGED, /* job, state, end, text */
 	ACTION_JOB_FORGOTTEN, /* job: too many ended jobs; the core answers no more questions about it */
+	ACTION_WRONG, /* who, job, key, text: a worker's answer, noted before, is not what two others say */
+	ACTION_ASIDE, /* who, text: a worker is set aside for good */
 	ACTION_CLOSE_PEER,    /* peer, text: hang up; the core has forgotten it already */
 };
 
-enum ack { ACK_MERGED, ACK_REPEAT, ACK_REFUSED };
+enum ack { ACK_MERGED, ACK_REPEAT, ACK_REFUSED, ACK_NOTED };
 
 struct action {
 	enum action_kind kind;
@@ -53,7 +55,9 @@ struct action {
 	enum job_state state;
 	enum job_end end;
 	bool final;
+	bool verified;     /* MERGE: two workers agree */
 	uint64_t tag, peer;
+	uint64_t who;      /* of MERGE, WRONG, ASIDE: the worker, whatever its connection (struct peer_status) */
 	uint64_t job; /* also of actions with a key */
 	uint64_t rounds;
 	struct lease_key key;

@@ -1,6 +1,7 @@
 /* A client's side of a session: submit, list, cancel, watch, fetch; control.c has the rest. */
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/session.h"
+#include "coordinator/shell/trust.h"
 #include "coordinator/shell/upload.h"
 
 #include "common/base/disk.h"
@@ -100,7 +101,8 @@ static void submit(struct session *p)
 				      .name = name,
 				      .priority = m->priority,
 				      .owner = p->who.name,
-				      .mixed = m->mixed}};
+				      .mixed = m->mixed,
+				      .verify = trust_share(p->server, m)}};
 	p->rejected[0] = 0;
 	p->answered_job = 0;
 	p->server->submitter = p;

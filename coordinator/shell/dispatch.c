@@ -6,6 +6,7 @@
 #include "common/film/exr.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/publish.h"
+#include "coordinator/shell/trust.h"
 #include "coordinator/shell/upload.h"
 
 #include <assert.h>
@@ -115,6 +116,7 @@ static void merge(struct server *s, const struct action *a)
 	uint64_t rounds = order_rounds(o);
 	if (durable_merged(s, o, &e) || order_merge(o, s->batch, &e))
 		server_job_broken(s, a->job, e.text);
+	trust_merged(o, a);
 	order_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
 		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
@@ -129,7 +131,9 @@ static void acknowledge(struct server *s, const struct action *a)
 	else if (p)
 		session_send_ack(p, &a->key, a->ack, a->text);
 	if (a->ack != ACK_MERGED)
-		log_event(a->ack == ACK_REPEAT ? LOG_BATCH_REPEATED : LOG_BATCH_REFUSED,
+		log_event(a->ack == ACK_REPEAT	 ? LOG_BATCH_REPEATED
+			  : a->ack == ACK_NOTED ? LOG_BATCH_NOTED
+						: LOG_BATCH_REFUSED,
 			  "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu text=%s", number(a->job),
 			  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch),
 			  log_quote(a->text).text);
@@ -207,6 +211,12 @@ void dispatch_update(struct server *s, const struct update *u)
 			job_changed(s, a);
 			break;
 		case ACTION_JOB_FORGOTTEN:
+			break;
+		case ACTION_WRONG:
+			trust_wrong(s, a);
+			break;
+		case ACTION_ASIDE:
+			trust_aside(s, a);
 			break;
 		case ACTION_CLOSE_PEER:
 			close_peer(s, a);

@@ -97,6 +97,7 @@ void order_free(struct order *o)
 		states_fini(o->states[i], o->chains_per_lease);
 	mem_free(o->states);
 	mem_free(o->seeds);
+	mem_free(o->credits);
 	bootstrap_free(o->bootstrap);
 	canvas_free(o->canvas);
 	if (o->log >= 0)

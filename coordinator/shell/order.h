@@ -29,6 +29,12 @@ struct order_times {
 	double elapsed, opened, completed;
 };
 
+/* Results of a worker that count though nobody else made them, too. */
+struct order_credit {
+	uint64_t who; /* as the core knows it */
+	uint64_t leases;
+};
+
 struct order {
 	struct order *next;
 	uint64_t id;
@@ -58,6 +64,9 @@ struct order {
 	double cpu_seconds; /* of all merged leases */
 	uint32_t worker_count;            /* who had leases of it */
 	uint64_t last_workers[64];
+	struct order_credit *credits;
+	size_t credit_count;
+	char doubts[512]; /* about those of workers that are set aside by now; "": none */
 	struct waiting_batch *waiting, **waiting_last;
 };
 

@@ -7,6 +7,7 @@
 #include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/control.h"
 #include "coordinator/shell/dispatch.h"
+#include "coordinator/shell/trust.h"
 
 #include <string.h>
 #include <time.h>
@@ -155,7 +156,7 @@ static int tell_core(struct server *s, const struct replay *r, const char *held,
 	struct event ev = {.kind = EVENT_RESTORE,
 			   .restore = {.job = o->id,
 				       .submit = {.plan = &o->plan, .name = o->record.name, .priority = o->record.priority,
-						  .mixed = order_submit(o)->mixed, .owner = o->record.owner},
+						  .mixed = order_submit(o)->mixed, .owner = o->record.owner, .verify = trust_share(s, order_submit(o))},
 				       .fingerprint = o->fingerprint,
 				       .kind = o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
 				       .next = next,

@@ -5,11 +5,13 @@
 #include "common/base/text.h"
 #include "common/net/notify.h"
 #include "coordinator/shell/checkpoint.h"
+#include "coordinator/shell/digest.h"
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/restore.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/status.h"
+#include "coordinator/shell/trust.h"
 
 #include <assert.h>
 #include <fcntl.h>
@@ -22,7 +24,7 @@ enum { BACKLOG = 128, TICK_MS = 200 };
 
 void server_config_init(struct server_config *c)
 {
-	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .max_connections = 1024,
+	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .max_connections = 1024, .max_faults = 3,
 				    .journal_bytes = 64 << 20, .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
 }
 
@@ -124,6 +126,8 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	ev.job = ev.lease.key.job;
 	struct order *o = server_order(s, ev.job);
 	int rc = o ? batch_unpack(&batch, &o->plan, m, payload, size, &e) : 0;
+	if (o && !rc && farm_verifies(s->farm, &ev.lease.key))
+		rc = digest_batch(&batch, &ev.lease.digest, &e);
 	if (rc == -ENOMEM) {
 		server_job_broken(s, ev.job, e.text);
 		ev.kind = EVENT_HEARD;
@@ -180,6 +184,7 @@ static void view_order(struct server *s, const struct order *o, struct job_view 
 	if (o->canvas) { /* in the end what the image holds, until then all that has come */
 		canvas_counts(o->canvas, !o->ended, &counted);
 		record_take_counted(&v->record, &o->plan, &counted, o->black);
+		record_add_note(&v->record, o->doubts);
 	}
 	if (!farm_job(s->farm, o->id, server_now(s), &status))
 		return;
@@ -397,8 +402,12 @@ static int open_stores(struct server *s, struct error *e)
 	config.first_job = spool_next_job(s->spool);
 	config.preview_interval = 0; /* previews are made when somebody asks for one */
 	config.silent_after = 3 * s->config.heartbeat_seconds;
+	config.max_faults = s->config.max_faults;
+	uv_random(NULL, NULL, &config.verify_seed, sizeof config.verify_seed, 0, NULL);
 	config.forget_after = 6 * s->config.heartbeat_seconds;
 	rc = farm_new(&s->farm, &config, e);
+	if (!rc)
+		rc = trust_open(s, e);
 	return rc ? rc : restore_jobs(s, e);
 }
 

@@ -27,6 +27,9 @@ struct server_config {
 	uint64_t journal_bytes; /* a job's journal that is longer is cut by a checkpoint */
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
 	unsigned max_connections;
+	double verify;        /* least share of the leases of each job that two workers compute */
+	unsigned max_faults;  /* of a worker, before it is set aside */
+	const char *forgive;  /* the name of a worker that was set aside and may come back; NULL: none */
 	double worker_bandwidth; /* bytes of tiles a second that one thread may send on average, for new jobs' epochs; 0: any */
 	double hello_seconds, stall_seconds; /* how long a peer may take to say hello, to finish a frame */
 };

@@ -77,7 +77,8 @@ static void join(struct session *p, const Farm__Hello *h)
 {
 	struct event ev = {.kind = EVENT_JOINED,
 			   .peer = p->id,
-			   .join = {.peer = p->id, .name = p->name, .fingerprint = h->fingerprint, .threads = h->threads}};
+			   .join = {.peer = p->id, .name = p->name, .fingerprint = h->fingerprint, .threads = h->threads,
+				    .certificate = p->who.name, .home = h->home, .restarts = h->restarts}};
 	p->rejected[0] = 0;
 	p->joined = true;
 	server_step(p->server, &ev);
@@ -87,8 +88,9 @@ static void join(struct session *p, const Farm__Hello *h)
 		return;
 	}
 	p->state = SESSION_WORKER;
-	log_event(LOG_PEER_HELLO, "peer=%llu address=%s role=worker name=%s certificate=%s threads=%u fingerprint=%s",
-		  (unsigned long long)p->id, p->address, log_quote(p->name).text, *p->who.name ? p->who.name : "-", h->threads,
+	log_event(LOG_PEER_HELLO, "peer=%llu address=%s role=worker name=%s certificate=%s home=%s start=%llu threads=%u fingerprint=%s",
+		  (unsigned long long)p->id, p->address, log_quote(p->name).text, *p->who.name ? p->who.name : "-", *h->home ? h->home : "-",
+		  (unsigned long long)h->restarts, h->threads,
 		  log_quote(h->fingerprint).text);
 	send_hello_ack(p, NULL);
 }
@@ -109,6 +111,13 @@ static const char *overreach(struct session *p, Farm__Role role, char *text, siz
 	return text;
 }
 
+/* Hexadecimal digits, as many as the core remembers. */
+static bool home_ok(const char *home)
+{
+	size_t n = strspn(home, "0123456789abcdef");
+	return !home[n] && n < JOIN_HOME;
+}
+
 static void take_hello(struct session *p, const Farm__Hello *h)
 {
 	char text[192];
@@ -118,7 +127,7 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		return;
 	}
 	if (!envelope_text_ok(h->name, sizeof p->name - 1) || !envelope_text_ok(h->fingerprint, 255) ||
-	    h->threads > 4096) {
+	    !home_ok(h->home) || h->threads > 4096) {
 		send_hello_ack(p, "a name or a number in hello is out of bounds");
 		return;
 	}
@@ -388,7 +397,8 @@ void session_send_ack(struct session *p, const struct lease_key *k, enum ack ack
 {
 	static const Farm__Verdict verdicts[] = {[ACK_MERGED] = FARM__VERDICT__VERDICT_MERGED,
 						 [ACK_REPEAT] = FARM__VERDICT__VERDICT_REPEATED,
-						 [ACK_REFUSED] = FARM__VERDICT__VERDICT_REFUSED};
+						 [ACK_REFUSED] = FARM__VERDICT__VERDICT_REFUSED,
+						 [ACK_NOTED] = FARM__VERDICT__VERDICT_NOTED};
 	char copy[512];
 	Farm__LeaseKey key;
 	Farm__LeaseAck answer;

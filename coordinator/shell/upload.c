@@ -65,6 +65,10 @@ static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, cha
 		rc = error_set(e, EINVAL, "a film of %ux%u", m->render_width, m->render_height);
 	if (!rc && !(m->brightest >= 0 && isfinite(m->brightest)))
 		rc = error_set(e, EINVAL, "a brightness of %g", m->brightest);
+	if (!rc && !(m->verify >= 0 && m->verify <= 1))
+		rc = error_set(e, EINVAL, "a share of %g of the epochs to be verified", m->verify);
+	if (!rc && m->verify > 0 && m->mixed)
+		rc = error_set(e, EINVAL, "workers of several fingerprints cannot be held against each other: verify or mixed, not both");
 	if (!rc)
 		rc = plan_request_from_wire(m->plan, &request, e);
 	if (rc)

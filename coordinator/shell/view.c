@@ -50,6 +50,9 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	v->halving_seconds = s->halving_seconds;
 	r->leases_merged = s->leases_merged;
 	r->repeats = s->repeats;
+	r->verify = s->verify;
+	r->verified = s->verified;
+	r->mismatched = s->mismatched;
 	r->refused = s->refused;
 	r->failures = s->failures;
 	r->duplicates = s->duplicates;
@@ -92,6 +95,9 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 	out->ended = record_is_ended(r);
 	out->exit_code = r->exit_code;
 	out->note = borrow(r->note);
+	out->verify = r->verify;
+	out->verified = r->verified;
+	out->mismatched = r->mismatched;
 	out->eta_low = v->eta_low;
 	out->eta_high = v->eta_high;
 	out->target_error = r->target_error;
@@ -161,6 +167,7 @@ json_t *view_to_json(const struct job_view *v)
 	json_object_set_new(o, "error", number_or_null(r->rel_error, r->rel_error >= 0));
 	add_forecast(o, v);
 	json_object_set_new(o, "counts", record_counts(r));
+	json_object_set_new(o, "verify", json_real(r->verify));
 	json_object_set_new(o, "mixture", json_string(r->mixture));
 	json_object_set_new(o, "strategies", record_strategies(r));
 	json_object_set_new(o, "note", json_string(r->note));
@@ -175,12 +182,13 @@ json_t *view_peer_to_json(const struct peer_status *p, double now)
 {
 	char text[256];
 	static const char *const states[] = {"active", "silent", "aside"};
-	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:s}", /* */
+	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:I s:I s:s}", /* */
 			 "id", (json_int_t)p->id, "name", p->name, "state", states[p->state], /* */
 			 "fingerprint", p->fingerprint, "threads", (int)p->threads, "want", (int)p->want, /* */
 			 "leases", (int)p->leases, "connected", now - p->joined, "heard", now - p->heard, /* */
 			 "merged", (json_int_t)p->merged, "repeats", (json_int_t)p->repeats, /* */
-			 "refused", (json_int_t)p->refused, "failures", (json_int_t)p->failures, "text", shown(p->text, text));
+			 "refused", (json_int_t)p->refused, "failures", (json_int_t)p->failures, "faults", (json_int_t)p->faults, /* */
+			 "restarts", (json_int_t)p->restarts, "text", shown(p->text, text));
 }
 
 json_t *view_lease_to_json(const struct lease_status *l, const char *worker, double now)

@@ -6,6 +6,7 @@
 #include "common/film/forecast_json.h"
 #include "common/film/strategy_json.h"
 
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -17,6 +18,7 @@ static const struct {
 	{"merged", offsetof(struct job_record, leases_merged)}, {"repeats", offsetof(struct job_record, repeats)},
 	{"refused", offsetof(struct job_record, refused)},	 {"failures", offsetof(struct job_record, failures)},
 	{"duplicates", offsetof(struct job_record, duplicates)}, {"timeouts", offsetof(struct job_record, timeouts)},
+	{"verified", offsetof(struct job_record, verified)},	 {"mismatched", offsetof(struct job_record, mismatched)},
 	{"stuck", offsetof(struct job_record, stuck)},		 {"longestStuck", offsetof(struct job_record, longest_stuck)},
 };
 
@@ -27,6 +29,13 @@ void record_take_counted(struct job_record *r, const struct plan *p, const struc
 	memcpy(r->strategy, n->strategy, sizeof r->strategy);
 	strategy_note(p, n, black, r->note, sizeof r->note);
 	agreement_add_note(&r->agreement, r->note, sizeof r->note);
+}
+
+void record_add_note(struct job_record *r, const char *text)
+{
+	size_t used = strlen(r->note);
+	if (*text)
+		snprintf(r->note + used, sizeof r->note - used, "%s%s", used ? "; " : "", text);
 }
 
 void record_begin_agreement(struct job_record *r)
@@ -123,6 +132,7 @@ char *record_to_json(const struct job_record *r)
 			      "relError", r->rel_error, "counts", record_counts(r), /* */
 			      "mixture", r->mixture, "note", r->note, "strategies", record_strategies(r));
 	json_object_set_new(o, "owner", json_string(r->owner));
+	json_object_set_new(o, "verify", json_real(r->verify));
 	json_object_set_new(o, "agreement", agreement_to_json(&r->agreement));
 	json_object_set_new(o, "b", json_real(r->b));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
@@ -163,6 +173,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	r->priority = (int)json_integer_value(json_object_get(o, "priority"));
 	r->exit_code = (uint32_t)json_integer_value(json_object_get(o, "exitCode"));
 	r->has_result = json_is_true(json_object_get(o, "result"));
+	r->verify = json_number_value(json_object_get(o, "verify"));
 	r->submitted = json_number_value(json_object_get(o, "submitted"));
 	r->ended = json_number_value(json_object_get(o, "ended"));
 	r->progress = json_number_value(json_object_get(o, "progress"));

@@ -38,6 +38,8 @@ struct job_record {
 	struct forecast_history looks;
 	uint64_t rounds, mutations, leases_merged;
 	uint64_t repeats, refused, failures, duplicates, timeouts; /* what went wrong and cost nothing */
+	double verify;                 /* share of its leases that two workers compute */
+	uint64_t verified, mismatched; /* on which two workers agreed; on which the first two did not */
 	uint64_t stuck, longest_stuck; /* times that a chain accepted nothing during an epoch; most rejections in a row */
 	char mixture[PLAN_MUTATIONS_MAX];
 	char note[STRATEGY_NOTE];
@@ -50,6 +52,7 @@ struct job_record {
 
 /* What the merged batches counted, and what is to be said about it. */
 void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black);
+void record_add_note(struct job_record *r, const char *text); /* "": nothing to say */
 void record_take_agreement(struct job_record *r, const struct canvas_image *img, const struct agreement *a);
 void record_begin_agreement(struct job_record *r); /* nothing is known */
 void record_take_effects(struct job_record *r, json_t *list); /* takes the reference; NULL: none */

@@ -254,6 +254,18 @@ int spool_write(const struct spool *s, uint64_t id, const char *file, const void
 	return write_file(path, file, bytes, size, e);
 }
 
+int spool_write_own(const struct spool *s, const char *file, const void *bytes, size_t size, struct error *e)
+{
+	return write_file(s->folder, file, bytes, size, e);
+}
+
+int spool_read_own(const struct spool *s, const char *file, char **text, size_t *size, struct error *e)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_path(s, file, path);
+	return read_file(path, text, size, e);
+}
+
 int spool_rename(const char *from, const char *to, const char *folder, struct error *e)
 {
 	return disk_rename(from, to) ? error_set(e, errno, "%s: %s", to, strerror(errno)) : disk_sync_folder(folder, e);

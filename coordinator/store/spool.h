@@ -27,6 +27,9 @@ void spool_path(const struct spool *s, const char *name, char path[SPOOL_PATH_MA
 void spool_job_path(const struct spool *s, uint64_t id, const char *file, char path[SPOOL_PATH_MAX]);
 
 int spool_write(const struct spool *s, uint64_t id, const char *file, const void *bytes, size_t size, struct error *e);
+/* In the spool's own folder. Reading: mem_alloc'd; -ENOENT. */
+int spool_write_own(const struct spool *s, const char *file, const void *bytes, size_t size, struct error *e);
+int spool_read_own(const struct spool *s, const char *file, char **text, size_t *size, struct error *e);
 /* path gets the name, in this folder, for good. Any thread. */
 int spool_rename(const char *from, const char *to, const char *folder, struct error *e);
 int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e);

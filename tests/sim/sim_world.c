@@ -299,6 +299,10 @@ static void calm_down(struct world *w)
 {
 	for (uint32_t i = 0; i < w->worker_count; i++) {
 		struct worker *k = &w->workers[i];
+		char name[16];
+		snprintf(name, sizeof name, "w%u", i);
+		struct event forgive = { .kind = EVENT_FORGIVE, .text = name };
+		step(w, &forgive, 0);
 		if (k->peer) {
 			struct event ev = { .kind = EVENT_LEFT, .peer = k->peer };
 			k->peer = 0;

@@ -37,7 +37,7 @@ static void say_key(struct said *s, const struct lease_key *k)
 
 static void say_ack(struct said *s, const struct action *a)
 {
-	static const char *const names[] = { "merged", "repeat", "refused" };
+	static const char *const names[] = { "merged", "repeat", "refused", "noted" };
 	say(s, "%s%s%s", names[a->ack], *a->text ? ": " : "", a->text);
 }
 
@@ -69,6 +69,8 @@ static void say_action(struct said *s, const struct action *a)
 		break;
 	case ACTION_JOB_CHANGED: say_changed(s, a); break;
 	case ACTION_JOB_FORGOTTEN: say(s, "j%" PRIu64 " forgotten", a->job); break;
+	case ACTION_WRONG: say(s, "#%" PRIu64 " %s", a->who, a->text); break;
+	case ACTION_ASIDE: say(s, "#%" PRIu64 " aside", a->who); break;
 	case ACTION_CLOSE_PEER: say(s, "close w%" PRIu64, a->peer); break;
 	}
 }
@@ -147,6 +149,8 @@ static void take_submit(const char **at, struct event *ev, struct plan *p, char 
 			ev->submit.mixed = true;
 		else if (take(at, "owner="))
 			ev->submit.owner = take_word(at, owner);
+		else if (take(at, "verify="))
+			ev->submit.verify = take_number(at);
 		else if (take(at, "groups="))
 			p->groups = (uint32_t)take_count(at);
 		else if (take(at, "parts="))
@@ -167,6 +171,23 @@ static void take_submit(const char **at, struct event *ev, struct plan *p, char 
 	p->chains = p->groups * p->parts * 4;
 }
 
+/* [certificate=C] [name=N] [home=H] [start=K], texts of a letter. */
+static void take_identity(const char **at, struct event_join *j)
+{
+	static const char *const letters[] = { "a", "b", "c", "d" };
+	const char **where[] = { &j->certificate, &j->name, &j->home };
+	static const char *const words[] = { "certificate=", "name=", "home=" };
+	for (int i = 0; i < 3; i++)
+		for (int k = 0; take(at, words[i]); k = 0) {
+			while (k < 3 && **at != *letters[k])
+				k++;
+			*where[i] = letters[k];
+			take(at, letters[k]);
+		}
+	if (take(at, "start="))
+		j->restarts = take_count(at);
+}
+
 static void take_worker(const char **at, struct event *ev, char *name, char *fingerprint)
 {
 	ev->peer = take_id(at, "w");
@@ -181,6 +202,7 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		ev->join.peer = ev->peer;
 		ev->join.name = name;
 		ev->join.fingerprint = fingerprint;
+		take_identity(at, &ev->join);
 		ev->peer = 0;
 	} else if (take(at, "leaves")) {
 		ev->kind = EVENT_LEFT;
@@ -195,6 +217,9 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 			fail_msg("no such event: %s", *at);
 		ev->lease.key = take_key(at);
 		ev->lease.valid = !take(at, "bad");
+		if (take(at, "says "))
+			memset(&ev->lease.digest, *(*at)++, sizeof ev->lease.digest);
+		take(at, " ");
 	}
 }
 
@@ -257,6 +282,11 @@ static void take_job(const char **at, struct event *ev)
 		ev->tag = 7;
 		ev->job = take_id(at, "j");
 		ev->priority = (int)take_number(at);
+	} else if (take(at, "aside")) { /* NAME's letter, as when it joins */
+		ev->kind = EVENT_ASIDE;
+		take_identity(at, &ev->join);
+	} else if (take(at, "forgive")) {
+		ev->kind = EVENT_FORGIVE;
 	} else if (take(at, "broken")) {
 		ev->kind = EVENT_JOB_BROKEN;
 		ev->job = take_id(at, "j");

@@ -86,7 +86,7 @@ static void set_aside_after_faults(void **state)
 		START_TWO,
 		"[2] w1 batch j1 g0 p0 e0 bad tile 3 holds a NaN -> refused: tile 3 holds a NaN, w1 gets j1 g0 p0 e0",
 		"[3] w1 batch j1 g7 p0 e0 -> refused: not a lease of this job",
-		"[4] w1 batch j1 g0 p0 e0 bad torn -> refused: torn",
+		"[4] w1 batch j1 g0 p0 e0 bad torn -> refused: torn, #1 aside",
 		"[5] w1 wants 1 -> -",
 		/* its last lease is somebody else's now */
 		"[5] w2 batch j1 g1 p0 e0 -> merge, merged, w2 gets j1 g0 p0 e0",

@@ -1,0 +1,173 @@
+#include "coordinator/core/roster.h"
+
+#include "common/base/mem.h"
+#include "coordinator/core/state.h"
+
+#include <stdio.h>
+#include <string.h>
+
+/* By its home, else by its name. */
+static struct identity *find(const struct farm *f, const struct event_join *e)
+{
+	struct identity *named = NULL;
+	for (uint32_t i = 0; i < f->known_count; i++) {
+		struct identity *k = f->known[i];
+		if (strcmp(k->certificate, e->certificate) != 0)
+			continue;
+		if (*e->home && strcmp(k->home, e->home) == 0)
+			return k;
+		if (strncmp(k->name, e->name, sizeof k->name - 1) == 0)
+			named = k;
+	}
+	return named;
+}
+
+static bool goes_before(const struct identity *a, const struct identity *b)
+{
+	return a->aside != b->aside ? b->aside : a->seen < b->seen;
+}
+
+/* NULL: all of them are needed. */
+static struct identity *room_for_one(struct farm *f)
+{
+	struct identity *oldest = NULL;
+	if (f->known_count < f->known_limit) {
+		struct identity *k = mem_alloc(1, sizeof *k);
+		if (k)
+			f->known[f->known_count++] = k;
+		return k;
+	}
+	for (uint32_t i = 0; i < f->known_count; i++)
+		if (f->known[i]->uses == 0 && (!oldest || goes_before(f->known[i], oldest)))
+			oldest = f->known[i];
+	return oldest;
+}
+
+struct identity *roster_use(struct farm *f, const struct event_join *e, const char **refused)
+{
+	struct identity *k = find(f, e);
+	if (!k) {
+		k = room_for_one(f);
+		if (!k) {
+			*refused = "the coordinator has no room to remember another worker";
+			return NULL;
+		}
+		*k = (struct identity){ .id = ++f->identities };
+		snprintf(k->certificate, sizeof k->certificate, "%s", e->certificate);
+	}
+	snprintf(k->name, sizeof k->name, "%s", e->name);
+	snprintf(k->home, sizeof k->home, "%s", e->home);
+	k->restarts = e->restarts;
+	k->seen = f->now;
+	k->uses++;
+	return k;
+}
+
+void roster_drop(struct farm *f, struct identity *who)
+{
+	who->uses--;
+	who->seen = f->now;
+}
+
+void roster_free(struct farm *f)
+{
+	for (uint32_t i = 0; i < f->known_count; i++)
+		mem_free(f->known[i]);
+	mem_free(f->known);
+}
+
+static bool is_at(const struct peer *p, const struct event_join *e)
+{
+	return strcmp(p->home, e->home) == 0 && strcmp(p->who->certificate, e->certificate) == 0;
+}
+
+bool roster_replace(struct farm *f, const struct event_join *e, const char **refused)
+{
+	if (!*e->home)
+		return true;
+	const struct identity *k = find(f, e);
+	uint64_t last = k && strcmp(k->home, e->home) == 0 ? k->restarts : 0;
+	for (uint32_t i = 0; i < f->peer_count; i++)
+		if (is_at(f->peers[i], e) && f->peers[i]->restarts > last)
+			last = f->peers[i]->restarts;
+	if (last > e->restarts) {
+		snprintf(f->text, sizeof f->text, "this is start %llu of %.60s, and start %llu of it has been here before",
+			 (unsigned long long)e->restarts, e->name, (unsigned long long)last);
+		*refused = f->text;
+		return false;
+	}
+	for (uint32_t i = f->peer_count; i-- > 0;) {
+		struct peer *p = f->peers[i];
+		if (!is_at(p, e))
+			continue;
+		struct action *a = update_add(f, ACTION_CLOSE_PEER);
+		a->peer = p->id;
+		a->text = "the same worker has called again";
+		peer_leave(f, p);
+	}
+	return true;
+}
+
+void roster_set_aside(struct farm *f, struct identity *who)
+{
+	if (who->aside)
+		return;
+	who->aside = true;
+	struct action *a = update_add(f, ACTION_ASIDE);
+	a->who = who->id;
+	a->text = who->text;
+	for (uint32_t i = 0; i < f->peer_count; i++) {
+		struct peer *p = f->peers[i];
+		if (p->who != who)
+			continue;
+		peer_set_state(f, p, PEER_ASIDE);
+		peer_drop_leases(f, p, true);
+	}
+	verify_forget_worker(f, who);
+}
+
+void roster_wrong(struct farm *f, struct identity *who, const struct lease_key *k)
+{
+	snprintf(who->text, sizeof who->text, "wrong result: j%llu %s group %u part %u epoch %llu", (unsigned long long)k->job,
+		 k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group, k->part, (unsigned long long)k->epoch);
+	who->wrong++;
+	struct action *a = update_add(f, ACTION_WRONG);
+	a->who = who->id;
+	a->job = k->job;
+	a->key = *k;
+	a->text = who->text;
+	for (uint32_t i = 0; i < f->peer_count; i++) {
+		struct peer *p = f->peers[i];
+		if (p->who != who)
+			continue;
+		p->faults++;
+		memcpy(p->text, who->text, sizeof p->text);
+	}
+	if (who->wrong >= f->config.max_faults)
+		roster_set_aside(f, who);
+}
+
+void roster_aside(struct farm *f, const struct event_join *e, const char *text)
+{
+	const char *refused;
+	struct identity *k = roster_use(f, e, &refused);
+	if (!k)
+		return;
+	snprintf(k->text, sizeof k->text, "%s", text);
+	k->aside = true;
+	roster_drop(f, k);
+}
+
+void roster_forgive(struct farm *f, const char *name)
+{
+	for (uint32_t i = 0; i < f->known_count; i++) {
+		struct identity *k = f->known[i];
+		if (strcmp(k->name, name) != 0)
+			continue;
+		k->aside = false;
+		k->wrong = k->faults_in_row = 0;
+		for (uint32_t n = 0; n < f->peer_count; n++)
+			if (f->peers[n]->who == k && f->peers[n]->state == PEER_ASIDE)
+				peer_set_state(f, f->peers[n], PEER_ACTIVE);
+	}
+}

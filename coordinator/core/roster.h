@@ -1,0 +1,42 @@
+/*
+ * Who workers are, for longer than their connections last: what a worker did wrong is not forgotten when it calls again. A
+ * worker is known by the name in its certificate ("" without TLS) together with the name that it gives itself or its home,
+ * the folder that counts its starts: who has one of the two in common with somebody is that somebody. Bounded: those who
+ * have been away longest are forgotten first, and those that are set aside last. Allocates when a worker joins.
+ */
+#ifndef COORDINATOR_CORE_ROSTER_H
+#define COORDINATOR_CORE_ROSTER_H
+
+#include "coordinator/core/farm.h"
+
+enum { IDENTITY_CERTIFICATE = 72, IDENTITY_NAME = 64, IDENTITY_HOME = JOIN_HOME };
+
+struct identity {
+	uint64_t id; /* never used twice */
+	char certificate[IDENTITY_CERTIFICATE], name[IDENTITY_NAME], home[IDENTITY_HOME];
+	uint64_t restarts; /* of the home, as they were last told */
+	uint32_t uses;     /* connections, and answers that wait for a second one */
+	uint32_t faults_in_row, wrong;
+	bool aside;
+	double seen;
+	char text[256]; /* its last fault */
+};
+
+/* As they were last told when there is one like that, else a new one; used by the caller. NULL with a sentence: refused. */
+struct identity *roster_use(struct farm *f, const struct event_join *e, const char **refused);
+void roster_drop(struct farm *f, struct identity *who);
+void roster_free(struct farm *f);
+
+/* The connections of an earlier life of the same home are closed. false with a sentence: this one is of an earlier life. */
+bool roster_replace(struct farm *f, const struct event_join *e, const char **refused);
+
+/* It gave a wrong result. */
+void roster_wrong(struct farm *f, struct identity *who, const struct lease_key *k);
+/* For good: no leases, nothing that it sends counts. */
+void roster_set_aside(struct farm *f, struct identity *who);
+
+/* As it was in an earlier life of the coordinator. */
+void roster_aside(struct farm *f, const struct event_join *e, const char *text);
+void roster_forgive(struct farm *f, const char *name); /* all workers of that name */
+
+#endif

@@ -1,0 +1,137 @@
+#include "coordinator/shell/trust.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char file[] = "aside";
+
+/* ---- the file */
+
+static void write_aside(struct server *s)
+{
+	struct worker_status w;
+	struct error e;
+	json_t *list = json_array(), *o = json_pack("{s:i s:o}", "schema", 1, "workers", list);
+	for (uint64_t who = 0; (who = farm_next_aside(s->farm, who)) && farm_worker(s->farm, who, &w);)
+		json_array_append_new(list, json_pack("{s:s s:s s:s s:I s:s}", "certificate", w.certificate, "name", w.name, "home",
+						      w.home, "restarts", (json_int_t)w.restarts, "why", w.text));
+	char *text = json_dumps(o, JSON_INDENT(1));
+	json_decref(o);
+	if (!text)
+		error_set(&e, ENOMEM, "no memory for the list of those that are set aside");
+	if (!text || spool_write_own(s->spool, file, text, strlen(text), &e))
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	free(text);
+}
+
+static const char *text_of(const json_t *o, const char *key)
+{
+	const char *text = json_string_value(json_object_get(o, key));
+	return text ? text : "";
+}
+
+static void tell_core(struct server *s, const json_t *w)
+{
+	struct event ev = {.kind = EVENT_ASIDE,
+			   .text = text_of(w, "why"),
+			   .join = {.certificate = text_of(w, "certificate"),
+				    .name = text_of(w, "name"),
+				    .home = text_of(w, "home"),
+				    .restarts = (uint64_t)json_integer_value(json_object_get(w, "restarts"))}};
+	const char *forgiven = s->config.forgive;
+	if (forgiven && strcmp(forgiven, ev.join.name) == 0) {
+		log_event(LOG_WORKER_FORGIVEN, "name=%s why=%s", log_quote(ev.join.name).text, log_quote(ev.text).text);
+		return;
+	}
+	log_event(LOG_WORKER_ASIDE, "name=%s why=%s", log_quote(ev.join.name).text, log_quote(ev.text).text);
+	server_step(s, &ev);
+}
+
+int trust_open(struct server *s, struct error *e)
+{
+	char *text;
+	size_t size;
+	json_error_t fault;
+	int rc = spool_read_own(s->spool, file, &text, &size, e);
+	if (rc == -ENOENT)
+		return 0;
+	if (rc)
+		return rc;
+	json_t *o = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
+	const json_t *list = json_object_get(o, "workers");
+	if (!json_is_array(list))
+		rc = error_set(e, EBADMSG, "the spool's file %s is no list of workers", file);
+	for (size_t i = 0; i < json_array_size(list); i++)
+		tell_core(s, json_array_get(list, i));
+	json_decref(o);
+	mem_free(text);
+	if (!rc && s->config.forgive)
+		write_aside(s);
+	return rc;
+}
+
+/* ---- what they did */
+
+double trust_share(const struct server *s, const Farm__Submit *m)
+{
+	return m->mixed ? 0 : m->verify > s->config.verify ? m->verify : s->config.verify;
+}
+
+void trust_merged(struct order *o, const struct action *a)
+{
+	if (a->verified)
+		return;
+	for (size_t i = 0; i < o->credit_count; i++)
+		if (o->credits[i].who == a->who) {
+			o->credits[i].leases++;
+			return;
+		}
+	struct order_credit *more = mem_grow(o->credits, o->credit_count * sizeof *more, (o->credit_count + 1) * sizeof *more);
+	if (!more) {
+		log_event(LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
+		return;
+	}
+	o->credits = more;
+	o->credits[o->credit_count++] = (struct order_credit){a->who, 1};
+}
+
+static const char *name_of(const struct server *s, uint64_t who, char name[64])
+{
+	struct worker_status w;
+	text_copy(name, 64, farm_worker(s->farm, who, &w) ? w.name : "?");
+	return name;
+}
+
+void trust_wrong(struct server *s, const struct action *a)
+{
+	char name[64];
+	struct order *o = server_order(s, a->job);
+	if (o)
+		order_log(o, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text, log_quote(a->text).text);
+}
+
+static void note(struct order *o, const char *name, uint64_t leases)
+{
+	char text[256];
+	snprintf(text, sizeof text, "worker %s gave wrong results; %llu of its leases were merged unverified", name,
+		 (unsigned long long)leases);
+	order_log(o, LOG_JOB_NOTE, "text=%s", log_quote(text).text);
+	size_t used = strlen(o->doubts);
+	snprintf(o->doubts + used, sizeof o->doubts - used, "%s%s", used ? "; " : "", text);
+}
+
+void trust_aside(struct server *s, const struct action *a)
+{
+	char name[64];
+	name_of(s, a->who, name);
+	log_event(LOG_WORKER_ASIDE, "name=%s why=%s", log_quote(name).text, log_quote(a->text).text);
+	write_aside(s);
+	for (struct order *o = s->orders; o; o = o->next)
+		for (size_t i = 0; i < o->credit_count; i++)
+			if (o->credits[i].who == a->who)
+				note(o, name, o->credits[i].leases);
+}

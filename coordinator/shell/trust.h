@@ -1,0 +1,22 @@
+/*
+ * Workers that gave wrong results: what is written down about them. Those that are set aside stand in the spool's file
+ * `aside`, so that they are after a restart, too; an operator lets one back by --forgive. A job's log and note say how many
+ * results of such a worker are in its image that nobody had verified: they cannot be taken out again. Who gave which is known
+ * as long as the coordinator lives. The loop's thread.
+ */
+#ifndef COORDINATOR_SHELL_TRUST_H
+#define COORDINATOR_SHELL_TRUST_H
+
+#include "coordinator/shell/server.h"
+
+/* Tells the core who is set aside, but for those that the configuration forgives. -EBADMSG: the file is damaged. */
+int trust_open(struct server *s, struct error *e);
+
+/* Of the job's leases that two workers compute: as it asks for, and no less than is asked of all; none of a mixed one. */
+double trust_share(const struct server *s, const Farm__Submit *m);
+
+void trust_merged(struct order *o, const struct action *a);
+void trust_wrong(struct server *s, const struct action *a);
+void trust_aside(struct server *s, const struct action *a);
+
+#endif

@@ -1,0 +1,323 @@
+/* Leases that two workers compute, and workers that are set aside, as transcripts. */
+#include "tests/support/transcript.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* One chain, every lease verified, three workers. */
+#define START                                                                          \
+	"[0] submit groups=1 verify=1 -> j1 submitted, j1 is queued",                  \
+	"[0] w1 joins A threads=1 name=a -> -", "[0] w2 joins A threads=1 name=b -> -", \
+	"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",                    \
+	"[0] w2 wants 1 -> w2 gets j1 g0 p0 boot"
+
+#define START_ROUNDS                                                                   \
+	START, "[1] w1 batch j1 g0 p0 boot says x -> noted",                           \
+	"[1] w2 batch j1 g0 p0 boot says x -> merge, merged, j1 prepare",              \
+	"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w2 gets j1 g0 p0 e0"
+
+static void agree(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START_ROUNDS,
+		"[2] w2 batch j1 g0 p0 e0 says x -> noted",
+		"[3] w1 batch j1 g0 p0 e0 says x -> merge, merged, j1 round 1, w2 gets j1 g0 p0 e1, w1 gets j1 g0 p0 e1",
+		"[4] w1 batch j1 g0 p0 e1 says y -> noted",
+		"[4] w2 batch j1 g0 p0 e1 says y -> merge, merged, j1 round 2, j1 publish 2, j1 is done (mutations)",
+		NULL });
+	struct job_status j;
+	assert_true(farm_job(f, 1, 4, &j));
+	assert_int_equal(j.verified, 3);
+	assert_int_equal(j.mismatched, 0);
+	assert_int_equal(j.duplicates, 0);
+	assert_int_equal(farm_next_aside(f, 0), 0);
+	farm_free(f);
+}
+
+static void third_decides(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START_ROUNDS,
+		"[2] w1 batch j1 g0 p0 e0 says x -> noted",
+		"[2] w2 batch j1 g0 p0 e0 says y -> noted: it differs from another worker's",
+		"[2] w3 joins A threads=1 name=c -> -",
+		"[2] w3 wants 1 -> w3 gets j1 g0 p0 e0",
+		"[3] w3 batch j1 g0 p0 e0 says y -> merge, merged, #1 wrong result: j1 render group 0 part 0 epoch 0, j1 round 1, "
+		"w1 gets j1 g0 p0 e1, w2 gets j1 g0 p0 e1",
+		NULL });
+	struct job_status j;
+	struct peer_status p;
+	assert_true(farm_job(f, 1, 4, &j));
+	assert_int_equal(j.verified, 2);
+	assert_int_equal(j.mismatched, 1);
+	assert_int_equal(j.failures, 0);
+	assert_true(farm_peer(f, 1, &p));
+	assert_int_equal(p.faults, 1);
+	assert_string_equal(p.text, "wrong result: j1 render group 0 part 0 epoch 0");
+	assert_true(farm_peer(f, 2, &p) && p.faults == 0);
+	farm_free(f);
+}
+
+static void all_differ(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START,
+		"[1] w1 batch j1 g0 p0 boot says 1 -> noted",
+		"[1] w2 batch j1 g0 p0 boot says 2 -> noted: it differs from another worker's",
+		"[1] w3 joins A threads=1 name=c -> -", "[1] w3 wants 1 -> w3 gets j1 g0 p0 boot",
+		"[1] w3 batch j1 g0 p0 boot says 3 -> noted: it differs from another worker's",
+		"[1] w4 joins A threads=1 name=d -> -", "[1] w4 wants 1 -> w4 gets j1 g0 p0 boot",
+		"[1] w4 batch j1 g0 p0 boot says 4 -> noted: it differs from another worker's, "
+		"j1 is failed (failed: no two of 4 workers agree on group 0 part 0 epoch 0: a, b, c, d)",
+		NULL });
+}
+
+static void one_worker_twice(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=2 verify=1 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 name=a -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		/* other work goes on, and it does not get the same again */
+		"[1] w1 batch j1 g0 p0 boot says x -> noted, w1 gets j1 g1 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot says x -> repeat: it waits for another worker's",
+		"[1] w1 batch j1 g1 p0 boot says x -> noted",
+		NULL });
+	struct job_status j;
+	assert_true(farm_job(f, 1, 1, &j));
+	assert_string_equal(j.waiting, "verification waits for a second worker (2 leases have one answer)");
+	transcript_play(f, (const char *const[]){
+		/* another connection of the same name is the same worker; and so is another name of the same home */
+		"[1] w2 joins A threads=1 name=a home=c start=1 -> -", "[1] w2 wants 1 -> -",
+		"[1] w3 joins A threads=1 name=b home=c start=1 -> close w2", "[1] w3 wants 1 -> -",
+		"[1] w3 batch j1 g0 p0 boot says x -> repeat: it waits for another worker's",
+		"[1] w3 batch j1 g0 p0 boot says y -> refused: it differs from what the same worker sent before",
+		/* of another certificate it is another one */
+		"[1] w4 joins A threads=1 certificate=d name=a -> -",
+		"[1] w4 wants 1 -> w4 gets j1 g0 p0 boot",
+		"[2] w4 batch j1 g0 p0 boot says x -> merge, merged, w4 gets j1 g1 p0 boot",
+		"[2] w4 batch j1 g1 p0 boot says x -> merge, merged, j1 prepare",
+		NULL });
+	farm_free(f);
+}
+
+static void leaves_between(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START_ROUNDS,
+		"[2] w1 batch j1 g0 p0 e0 says x -> noted",
+		"[2] w1 leaves -> -",
+		"[2] w2 leaves -> -",
+		"[3] w3 joins A threads=1 name=a -> -",
+		"[3] w3 wants 1 -> -", /* it is back, and has answered */
+		"[4] w4 joins A threads=1 name=c -> -",
+		"[4] w4 wants 1 -> w4 gets j1 g0 p0 e0",
+		"[5] w4 batch j1 g0 p0 e0 says x -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1, w4 gets j1 g0 p0 e1",
+		NULL });
+}
+
+static void restart(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		/* notes are gone: the lease is computed anew, by two */
+		"[0] restore j1 render 1 fingerprint=A elapsed=5 groups=1 rounds=9 verify=1 -> j1 is running",
+		"[0] w1 joins A threads=1 name=a -> -", "[0] w2 joins A threads=1 name=b -> -",
+		"[0] w1 batch j1 g0 p0 e1 says x -> noted",
+		"[0] w1 wants 1 -> -",
+		"[0] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+		"[1] w2 batch j1 g0 p0 e1 says x -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2, w2 gets j1 g0 p0 e2",
+		NULL });
+}
+
+/* A share: the same leases whoever computes them, about as many as were asked for. */
+static void share(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=2 verify=0.3 -> j1 submitted, j1 is queued",
+		"[0] submit groups=2 -> j2 submitted, j2 is queued",
+		"[0] submit groups=2 mixed verify=1 -> j3 submitted, j3 is queued",
+		NULL });
+	int chosen = 0;
+	for (uint64_t e = 0; e < 10000; e++) {
+		struct lease_key k = { 1, LEASE_RENDER, (uint32_t)(e & 1), 0, e / 2 };
+		chosen += farm_verifies(f, &k);
+		k.job = 2;
+		assert_false(farm_verifies(f, &k));
+		k.job = 3;
+		assert_false(farm_verifies(f, &k));
+	}
+	assert_in_range(chosen, 2760, 3240); /* 5.2 sigma of a fair draw each side; the draw is fixed */
+	farm_free(f);
+}
+
+static void set_aside(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=1 rounds=9 verify=1 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 name=a -> -", "[0] w2 joins A threads=1 name=b -> -",
+		"[0] w3 joins A threads=1 name=c home=c start=4 -> -",
+		"[0] w3 wants 1 -> j1 is bootstrap, w3 gets j1 g0 p0 boot",
+		"[0] w1 wants 1 -> w1 gets j1 g0 p0 boot", "[0] w2 wants 1 -> -",
+		"[1] w3 batch j1 g0 p0 boot says 1 -> noted",
+		"[1] w1 batch j1 g0 p0 boot says x -> noted: it differs from another worker's, w2 gets j1 g0 p0 boot",
+		"[1] w2 batch j1 g0 p0 boot says x -> merge, merged, #3 wrong result: j1 bootstrap group 0 part 0 epoch 0, j1 prepare",
+		"[1] prepared j1 -> j1 is running, w3 gets j1 g0 p0 e0, w1 gets j1 g0 p0 e0",
+		"[2] w3 batch j1 g0 p0 e0 says 1 -> noted",
+		"[2] w1 batch j1 g0 p0 e0 says x -> noted: it differs from another worker's, w2 gets j1 g0 p0 e0",
+		"[2] w2 batch j1 g0 p0 e0 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 0, j1 round 1, "
+		"w3 gets j1 g0 p0 e1, w1 gets j1 g0 p0 e1",
+		"[3] w3 batch j1 g0 p0 e1 says 1 -> noted, w2 gets j1 g0 p0 e1", /* it straggles at w1 */
+		"[3] w1 batch j1 g0 p0 e1 says x -> noted: it differs from another worker's",
+		"[3] w2 batch j1 g0 p0 e1 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 1, #3 aside, j1 round 2, "
+		"w1 gets j1 g0 p0 e2, w2 gets j1 g0 p0 e2",
+		/* nothing of it counts, here or when it calls again, under whatever name */
+		"[4] w3 batch j1 g0 p0 e2 says x -> refused: the worker is set aside: its results do not count",
+		"[4] w3 leaves -> -",
+		"[4] w5 joins A threads=1 name=d home=c start=5 -> -",
+		"[4] w5 wants 1 -> -",
+		"[4] w5 batch j1 g0 p0 e2 says x -> refused: the worker is set aside: its results do not count",
+		"[5] w6 joins A threads=1 name=d home=b start=1 -> -",
+		"[5] w6 wants 1 -> -",
+		NULL });
+	struct peer_status p;
+	struct worker_status w;
+	struct job_status j;
+	assert_true(farm_peer(f, 6, &p));
+	assert_int_equal(p.state, PEER_ASIDE);
+	assert_int_equal(farm_next_aside(f, 0), 3);
+	assert_int_equal(farm_next_aside(f, 3), 0);
+	assert_true(farm_worker(f, 3, &w));
+	assert_int_equal(w.wrong, 3);
+	assert_string_equal(w.name, "d");
+	assert_string_equal(w.text, "wrong result: j1 render group 0 part 0 epoch 1");
+	assert_true(farm_job(f, 1, 5, &j));
+	assert_int_equal(j.failures, 0);
+	assert_int_equal(j.mismatched, 3);
+	transcript_play(f, (const char *const[]){
+		"[6] w1 batch j1 g0 p0 e2 says x -> noted",
+		"[6] forgive d -> w5 gets j1 g0 p0 e2",
+		NULL });
+	farm_free(f);
+}
+
+/* What it noted elsewhere is worth nothing either. */
+static void notes_of_a_liar(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=1 rounds=9 verify=1 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 name=a -> -", "[0] w2 joins A threads=1 name=b -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[0] w1 batch j1 g0 p0 boot says x -> noted",
+		"[1] w1 batch j1 g7 p0 boot -> refused: not a lease of this job",
+		"[1] w1 batch j1 g7 p0 boot -> refused: not a lease of this job",
+		"[1] w1 batch j1 g7 p0 boot -> refused: not a lease of this job, #1 aside",
+		"[2] w2 wants 1 -> w2 gets j1 g0 p0 boot",
+		"[2] w2 batch j1 g0 p0 boot says x -> noted",
+		NULL });
+}
+
+static void remembered(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] aside certificate=a name=b home=c -> -",
+		"[0] submit groups=1 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 certificate=a name=b -> -", "[0] w1 wants 1 -> -",
+		"[0] w2 joins A threads=1 name=b -> -", "[0] w2 wants 1 -> j1 is bootstrap, w2 gets j1 g0 p0 boot",
+		NULL });
+}
+
+static void lives(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=1 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 name=a home=a start=7 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		/* the later life: what the earlier one held is free at once */
+		"[1] w2 joins A threads=1 name=b home=a start=8 -> close w1",
+		"[1] w2 wants 1 -> w2 gets j1 g0 p0 boot",
+		"[2] w3 joins A threads=1 name=a home=a start=7 -> rejected: this is start 7 of a, and start 8 of it has been here before",
+		/* the same life on a new connection */
+		"[3] w4 joins A threads=1 name=b home=a start=8 -> close w2",
+		"[3] w4 wants 1 -> w4 gets j1 g0 p0 boot",
+		"[4] w4 leaves -> -",
+		"[4] w5 joins A threads=1 name=a home=a start=7 -> rejected: this is start 7 of a, and start 8 of it has been here before",
+		/* one name on two machines, one home of two certificates: nobody is replaced */
+		"[5] w6 joins A threads=1 name=a home=b start=1 -> -",
+		"[5] w7 joins A threads=1 name=a home=c start=1 -> -",
+		"[5] w8 joins A threads=1 certificate=d name=a home=c start=1 -> -",
+		"[5] w9 joins A threads=1 name=a -> -",
+		NULL });
+}
+
+/* A job of which nothing is merged is not lost to the only worker of its kind. */
+static void odd_one_out(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=1 verify=1 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 name=a -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot says x -> noted",
+		"[2] w2 joins B threads=1 name=b -> -", "[2] w2 wants 1 -> -",
+		"[2] w3 joins B threads=1 name=c -> w2 gets j1 g0 p0 boot", "[2] w3 wants 1 -> w3 gets j1 g0 p0 boot",
+		"[3] w2 batch j1 g0 p0 boot says y -> noted",
+		"[3] w3 leaves -> -",
+		"[3] w2 leaves -> w1 gets j1 g0 p0 boot",
+		NULL });
+	farm_free(f);
+}
+
+/* Where one answer is there and the other takes long, a third worker is asked. */
+static void straggler(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START_ROUNDS,
+		"[2] w1 batch j1 g0 p0 e0 says x -> noted",
+		"[2] w2 batch j1 g0 p0 e0 says x -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1, w2 gets j1 g0 p0 e1",
+		"[2] w3 joins A threads=1 name=c -> -", "[2] w3 wants 1 -> -",
+		"[3] w1 batch j1 g0 p0 e1 says x -> noted",
+		"[3.4] tick -> -", "[3.5] tick -> w3 gets j1 g0 p0 e1",
+		"[4] w3 batch j1 g0 p0 e1 says x -> merge, merged, w2 loses j1 g0 p0 e1, j1 round 2, j1 publish 2, j1 is done (mutations)",
+		NULL });
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(agree),
+		cmocka_unit_test(third_decides),
+		cmocka_unit_test(all_differ),
+		cmocka_unit_test(one_worker_twice),
+		cmocka_unit_test(leaves_between),
+		cmocka_unit_test(restart),
+		cmocka_unit_test(share),
+		cmocka_unit_test(set_aside),
+		cmocka_unit_test(notes_of_a_liar),
+		cmocka_unit_test(remembered),
+		cmocka_unit_test(lives),
+		cmocka_unit_test(odd_one_out),
+		cmocka_unit_test(straggler),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
