@@ -88,6 +88,9 @@ struct job_status {
 	uint64_t rounds;                  /* complete */
 	uint64_t bootstrap_merged, leases_merged, mutations; /* leases_merged: render leases, open rounds too */
 	uint32_t leases_out;
+	uint32_t workers, machines; /* that hold its leases, that might */
+	double share;               /* machines that it would have by its priority: coordinator/core/share.h */
+	char place[160];            /* both, and who comes first */
 	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
 	char text[256];    /* why it failed, or the last failure of a lease */
 	char waiting[256]; /* why nothing is being done for it; "" when something is */

@@ -12,6 +12,7 @@ struct owner {
 	struct link link; /* farm.owners */
 	uint32_t uses;
 	uint32_t leases_out; /* of all its jobs */
+	double wants; /* share.c's */
 	char name[OWNER_NAME];
 };
 

@@ -1,4 +1,5 @@
 /* Answers to questions about the farm. */
+#include "coordinator/core/share.h"
 #include "coordinator/core/state.h"
 
 #include <math.h>
@@ -33,14 +34,17 @@ int job_exit_code(const struct job_status *s)
 	return missed ? 4 : 0;
 }
 
-/* The job that keeps workers of this class busy: the one with the most leases. */
+/* The job that keeps workers of this class busy: the first of higher priority, else the one with the most leases. */
 static const struct job *busy_with(const struct farm *f, const struct job *j)
 {
 	const struct job *most = NULL;
 	for (uint32_t i = 0; i < f->live_count; i++) {
 		const struct job *o = f->live[i];
-		if (o != j && o->leases_out && (!j->class || o->mixed || j->mixed || o->class == j->class) &&
-		    (!most || o->leases_out > most->leases_out))
+		if (o == j || !o->leases_out || !share_competes(o, j))
+			continue;
+		if (o->priority > j->priority)
+			return o;
+		if (!most || o->leases_out > most->leases_out)
 			most = o;
 	}
 	return most;
@@ -87,6 +91,8 @@ static void why_waiting(const struct farm *f, const struct job *j, char *text, s
 		return;
 	else if (someone_avoids(f, j))
 		snprintf(text, size, "its workers failed and pause before they try again");
+	else if (other && other->priority > j->priority)
+		snprintf(text, size, "waits for j%llu of higher priority (%d)", (unsigned long long)other->id, other->priority);
 	else if (other)
 		snprintf(text, size, "workers busy with j%llu (priority %d)", (unsigned long long)other->id,
 			 other->priority);
@@ -108,6 +114,16 @@ static void fill_counts(const struct job *j, struct job_status *s)
 	s->failures = j->failures;
 	s->timeouts = j->timeouts;
 	s->duplicates = j->duplicates;
+}
+
+static void fill_share(const struct farm *f, const struct job *j, struct job_status *s)
+{
+	struct share share;
+	share_of(f, j, &share);
+	s->workers = share.workers;
+	s->machines = share.machines;
+	s->share = share.machines_due;
+	memcpy(s->place, share.place, sizeof s->place);
 }
 
 bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s)
@@ -147,6 +163,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 	s->eta_low = eta.low;
 	s->eta_high = eta.high;
 	fill_counts(j, s);
+	fill_share(f, j, s);
 	memcpy(s->text, j->text, sizeof s->text);
 	why_waiting(f, j, s->waiting, sizeof s->waiting);
 	return true;

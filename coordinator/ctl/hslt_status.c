@@ -156,6 +156,8 @@ static void print_job(const json_t *job, bool colors)
 	const char *why = *text_of(job, "why") ? text_of(job, "why") : bound_of(job);
 	const char *verdict = text_of(json_object_get(job, "agreement"), "verdict");
 	bool disagree = strcmp(verdict, agreement_name(CHAINS_DISAGREE)) == 0;
+	if (!*why && !is_ended(job))
+		why = text_of(job, "place");
 	printf("%s%s%s%s\n", *why || disagree ? "  # " : "", why, *why && disagree ? "; " : "", disagree ? "its chains disagree" : "");
 }
 
@@ -183,6 +185,15 @@ static void print_forecast(const json_t *job)
 		printf("; done in %s (%s - %s)", a, b, c);
 	}
 	printf("\n");
+}
+
+/* What its priority means: "priority 5, of ann; 3 of 8 machines; j4 comes first; by its priority 2.7" */
+static void print_share(const json_t *job)
+{
+	if (is_ended(job) || !json_is_number(json_object_get(job, "share")))
+		return;
+	printf("       priority %.0f%s%s; %s; by its priority %.3g\n", number_of(job, "priority"), *text_of(job, "owner") ? ", of " : "",
+	       text_of(job, "owner"), text_of(job, "place"), number_of(job, "share"));
 }
 
 static void print_effects(const json_t *job)
@@ -265,6 +276,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 		if (only) {
 			if (*text_of(job, "note"))
 				printf("       note: %s\n", text_of(job, "note"));
+			print_share(job);
 			print_forecast(job);
 			print_effects(job);
 			print_strategies(job);

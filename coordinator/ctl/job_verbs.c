@@ -14,19 +14,23 @@ enum { EXIT_DISAGREE = 5 };
 static void print_table(const Farm__JobListAnswer *a)
 {
 	if (a->n_jobs)
-		printf("%-6s %-10s %4s %7s %-9s %s\n", "JOB", "STATE", "PRI", "DONE", "ETA", "NAME");
+		printf("%-6s %-10s %4s %7s %-9s %-8s %s\n", "JOB", "STATE", "PRI", "DONE", "ETA", "MACHINES", "NAME");
 	for (size_t i = 0; i < a->n_jobs; i++) {
 		const Farm__JobStatus *s = a->jobs[i];
-		char eta[32] = "-", id[32];
+		char eta[32] = "-", machines[48] = "-", id[32];
 		if (!s->ended && s->eta >= 0)
 			progress_time(s->eta, eta, sizeof eta);
 		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
+		if (!s->ended && s->share >= 0)
+			snprintf(machines, sizeof machines, "%u (%.1f)", s->workers, s->share);
 		const char *why = *s->why ? s->why : s->ended && s->exit_code == EXIT_DISAGREE ? "its chains disagree" : "";
-		printf("%-6s %-10s %4d %5.1f %% %-9s %s", id, s->state, s->priority, 100 * s->progress, eta, s->name);
+		printf("%-6s %-10s %4d %5.1f %% %-9s %-8s %s", id, s->state, s->priority, 100 * s->progress, eta, machines, s->name);
 		if (*why)
 			printf("  # %s", why);
 		else if (s->ended && s->target_error > 0)
 			printf("  # ended by %s", s->reason);
+		else if (!s->ended && *s->place)
+			printf("  # %s", s->place);
 		printf("\n");
 	}
 }
@@ -38,11 +42,12 @@ static void print_json(const Farm__JobListAnswer *a)
 		const Farm__JobStatus *s = a->jobs[i];
 		char id[32];
 		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
-		json_array_append_new(list, json_pack("{s:i s:s s:s s:s s:f s:i s:s s:s s:s s:b s:i s:s}", "schema", 1, "id", id,
+		json_array_append_new(list, json_pack("{s:i s:s s:s s:s s:f s:i s:s s:s s:s s:b s:i s:s s:s s:i s:f s:s}", "schema", 1, "id", id,
 						      "name", s->name, "state", s->state, "progress", s->progress, "priority",
 						      (int)s->priority, "why", s->why, "reason", s->reason, "output",
 						      s->output, "result", (int)s->fetchable, "exitCode",
-						      (int)s->exit_code, "note", s->note));
+						      (int)s->exit_code, "note", s->note, "owner", s->owner, "workers", (int)s->workers,
+						      "share", s->share, "place", s->place));
 	}
 	json_dumpf(list, stdout, JSON_INDENT(2));
 	putchar('\n');

@@ -13,6 +13,7 @@ void view_of_record(struct job_view *v, const struct job_record *r)
 	memset(v, 0, sizeof *v);
 	v->record = *r;
 	v->eta = record_is_ended(r) ? 0 : -1;
+	v->share = -1;
 }
 
 /* A text that was cut in the middle of a character would make the whole object fail. */
@@ -44,6 +45,10 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	v->eta_low = isfinite(s->eta_low) ? s->eta_low : -1;
 	v->eta_high = isfinite(s->eta_high) ? s->eta_high : -1;
 	v->leases = s->leases_out;
+	v->workers = s->workers;
+	v->machines = s->machines;
+	v->share = s->share;
+	text_copy(v->place, sizeof v->place, s->place);
 	r->bootstrap_seconds = isfinite(s->bootstrap_seconds) ? s->bootstrap_seconds : 0;
 	r->looks = *s->looks;
 	v->halving_cpu = s->halving_cpu;
@@ -91,6 +96,10 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 	out->output = borrow(r->output);
 	out->priority = r->priority;
 	out->leases = v->leases;
+	out->owner = borrow(r->owner);
+	out->workers = v->workers;
+	out->share = v->share;
+	out->place = borrow(v->place);
 	out->fetchable = r->has_result;
 	out->ended = record_is_ended(r);
 	out->exit_code = r->exit_code;
@@ -149,6 +158,16 @@ static void add_forecast(json_t *o, const struct job_view *v)
 		json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 }
 
+/* What its priority means. */
+static void add_share(json_t *o, const struct job_view *v)
+{
+	json_object_set_new(o, "owner", json_string(v->record.owner));
+	json_object_set_new(o, "workers", json_integer(v->workers));
+	json_object_set_new(o, "machines", json_integer(v->machines));
+	json_object_set_new(o, "share", number_or_null(v->share, v->share >= 0 && !record_is_ended(&v->record)));
+	json_object_set_new(o, "place", json_string(v->place));
+}
+
 json_t *view_to_json(const struct job_view *v)
 {
 	const struct job_record *r = &v->record;
@@ -166,6 +185,7 @@ json_t *view_to_json(const struct job_view *v)
 	json_object_set_new(o, "eta", number_or_null(v->eta, v->eta >= 0));
 	json_object_set_new(o, "error", number_or_null(r->rel_error, r->rel_error >= 0));
 	add_forecast(o, v);
+	add_share(o, v);
 	json_object_set_new(o, "counts", record_counts(r));
 	json_object_set_new(o, "verify", json_real(r->verify));
 	json_object_set_new(o, "mixture", json_string(r->mixture));

@@ -18,6 +18,9 @@ struct job_view {
 	double eta_low, eta_high; /* where eta is known */
 	struct forecast_range halving_cpu, halving_seconds; /* where there are looks */
 	uint32_t leases;   /* out at workers */
+	uint32_t workers, machines; /* that hold them, that might */
+	double share;      /* machines that it would have by its priority; negative: not known */
+	char place[160];   /* in words */
 	char waiting[256]; /* why nothing is being done for it */
 };
 

@@ -101,6 +101,32 @@ static void json_shows_the_forecast(void **state)
 	json_decref(o);
 }
 
+static void shows_the_share(void **state)
+{
+	(void)state;
+	struct job_record r = {.id = 1, .state = "running", .owner = "ann"};
+	struct job_status s = {.workers = 3, .machines = 8, .share = 2.5, .place = "3 of 8 machines; j4 comes first", .looks = &r.looks,
+			       .state = JOB_RUNNING};
+	struct job_view v;
+	Farm__JobStatus wire;
+	view_of_record(&v, &r);
+	view_add_status(&v, &s);
+	json_t *o = view_to_json(&v);
+	assert_true(whole(o, "workers") == 3 && whole(o, "machines") == 8);
+	assert_true(json_number_value(json_object_get(o, "share")) == 2.5);
+	assert_string_equal(json_string_value(json_object_get(o, "owner")), "ann");
+	assert_string_equal(json_string_value(json_object_get(o, "place")), s.place);
+	json_decref(o);
+	view_to_wire(&v, &wire);
+	assert_true(wire.workers == 3 && wire.share == 2.5);
+	assert_string_equal(wire.owner, "ann");
+	assert_string_equal(wire.place, s.place);
+	view_of_record(&v, &r);
+	o = view_to_json(&v);
+	assert_true(json_is_null(json_object_get(o, "share")));
+	json_decref(o);
+}
+
 /* As hslt-submit --estimate gets them. */
 static void looks_travel(void **state)
 {
@@ -127,6 +153,7 @@ int main(void)
 		cmocka_unit_test(json_shows_the_strategies),
 		cmocka_unit_test(json_of_other_jobs_has_none),
 		cmocka_unit_test(json_shows_the_forecast),
+		cmocka_unit_test(shows_the_share),
 		cmocka_unit_test(looks_travel),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

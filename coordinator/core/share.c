@@ -1,0 +1,148 @@
+#include "coordinator/core/share.h"
+
+#include "common/base/text.h"
+#include "coordinator/core/state.h"
+
+#include <math.h>
+
+bool share_competes(const struct job *a, const struct job *b)
+{
+	return !a->class || !b->class || a->mixed || b->mixed || a->class == b->class;
+}
+
+/* Machines that would be busy with all of its leases, when one takes so many. */
+static double wants(const struct job *j, double leases_each)
+{
+	if (job_is_held(j))
+		return 0;
+	uint32_t open = j->rounds + 1 >= j->limit ? j->slot_count - j->done : j->slot_count;
+	return open / leases_each;
+}
+
+static uint32_t machines_of(const struct farm *f, const struct job *j, double *leases_each)
+{
+	uint32_t machines = 0;
+	double leases = 0;
+	for (uint32_t i = 0; i < f->peer_count; i++) {
+		const struct peer *p = f->peers[i];
+		if (p->state != PEER_ACTIVE || !job_takes(j, p))
+			continue;
+		machines++;
+		leases += p->want;
+	}
+	*leases_each = leases > 0 ? leases / machines : 1;
+	return machines;
+}
+
+static bool is_first_lease(const struct lease *l)
+{
+	for (const struct lease *k = l->peer->leases; k < l; k++)
+		if (k->used && !k->overdue && k->job == l->job)
+			return false;
+	return true;
+}
+
+static uint32_t workers_of(const struct job *j)
+{
+	uint32_t n = 0;
+	for (uint32_t i = 0; i < j->slot_count; i++)
+		for (const struct lease *l = j->slots[i].leases; l; l = l->next)
+			n += !l->overdue && is_first_lease(l);
+	return n;
+}
+
+/* One that takes part: the i-th live job where it competes at this priority and for this owner (NULL: anybody's). */
+static const struct job *rival(const struct farm *f, uint32_t i, const struct job *j, const struct owner *o)
+{
+	const struct job *r = f->live[i];
+	return r->priority == j->priority && share_competes(r, j) && (!o || r->owner == o) ? r : NULL;
+}
+
+/* The level up to which all are filled from what there is, given how much those below a level take and how many are above. */
+struct level {
+	double there, taken, level;
+	uint32_t above;
+};
+
+static void pour(struct level *v, double want)
+{
+	if (want > v->level)
+		v->above++;
+	else
+		v->taken += want;
+}
+
+/* true: the level is found. It only rises. */
+static bool is_level(struct level *v)
+{
+	if (v->above == 0)
+		return true;
+	double next = (v->there - v->taken) / v->above;
+	if (!(next > v->level))
+		return true;
+	*v = (struct level){.there = v->there, .level = next};
+	return false;
+}
+
+static double due(const struct farm *f, const struct job *j, uint32_t machines, double leases_each)
+{
+	struct level v = {.there = machines};
+	for (struct link *k = f->owners.next; k != &f->owners; k = k->next)
+		list_entry(k, struct owner, link)->wants = 0;
+	for (uint32_t i = 0; i < f->live_count; i++) {
+		const struct job *r = f->live[i];
+		if (r->priority > j->priority && share_competes(r, j))
+			v.there = fmax(0, v.there - wants(r, leases_each));
+		else if (rival(f, i, j, NULL))
+			r->owner->wants += wants(r, leases_each);
+	}
+	do
+		for (struct link *k = f->owners.next; k != &f->owners; k = k->next)
+			pour(&v, list_entry(k, struct owner, link)->wants);
+	while (!is_level(&v));
+	v = (struct level){.there = fmin(j->owner->wants, v.above ? v.level : INFINITY)};
+	do
+		for (uint32_t i = 0; i < f->live_count; i++)
+			if (rival(f, i, j, j->owner))
+				pour(&v, wants(f->live[i], leases_each));
+	while (!is_level(&v));
+	return fmin(wants(j, leases_each), v.above ? v.level : INFINITY);
+}
+
+/* "; j4, j7 and 2 more come first" */
+static void put_others(struct text *t, const struct farm *f, const struct job *j, bool higher, double leases_each)
+{
+	enum { NAMED = 3 };
+	uint32_t count = 0, named = 0;
+	for (int pass = 0; pass < 2; pass++)
+		for (uint32_t i = 0; i < f->live_count; i++) {
+			const struct job *r = f->live[i];
+			if (r == j || !share_competes(r, j) || !(wants(r, leases_each) > 0) ||
+			    !(higher ? r->priority > j->priority : r->priority == j->priority))
+				continue;
+			if (pass == 0)
+				count++;
+			else if (named < NAMED)
+				text_put(t, "%sj%llu", named++ == 0 ? (higher ? "; " : "; by turns with ") :
+						       named == count ? " and " : ", ", (unsigned long long)r->id);
+		}
+	if (count > NAMED)
+		text_put(t, " and %u more", count - NAMED);
+	if (count && higher)
+		text_put(t, count == 1 ? " comes first" : " come first");
+}
+
+void share_of(const struct farm *f, const struct job *j, struct share *out)
+{
+	double leases_each;
+	*out = (struct share){.machines_due = 0};
+	if (!job_is_live(j))
+		return;
+	out->workers = workers_of(j);
+	out->machines = machines_of(f, j, &leases_each);
+	out->machines_due = due(f, j, out->machines, leases_each);
+	struct text t = {out->place, sizeof out->place};
+	text_put(&t, "%u of %u machine%s", out->workers, out->machines, out->machines == 1 ? "" : "s");
+	put_others(&t, f, j, true, leases_each);
+	put_others(&t, f, j, false, leases_each);
+}
