@@ -20,6 +20,7 @@
 	X(PEER_FAULT, "peer_fault", WARN) \
 	X(TLS_READ, "tls_read", INFO) \
 	X(TLS_FAULT, "tls_fault", ERROR) \
+	X(TLS_EXPIRY, "tls_expiry", WARN) \
 	X(CONNECT, "connect", INFO) \
 	X(CONNECT_FAILED, "connect_failed", WARN) \
 	X(JOB_SUBMIT, "job_submit", INFO) \

@@ -33,7 +33,7 @@ struct client {
 	unsigned waiting_count;
 	struct tls *tls; /* NULL: plaintext */
 	bool opened, timed_out, distrust;
-	char why[256];
+	char why[256], warning[384];
 };
 
 static void on_opened(void *user)
@@ -212,6 +212,8 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 		mem_free(cl);
 		return rc;
 	}
+	if (cl->tls)
+		tls_warning(cl->tls, time(NULL), cl->warning, sizeof cl->warning);
 	rc = uv_loop_init(&cl->loop);
 	if (rc) {
 		tls_close(cl->tls);
@@ -238,6 +240,11 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 	else
 		*out = cl;
 	return rc;
+}
+
+const char *client_warning(const struct client *cl)
+{
+	return cl->warning;
 }
 
 void client_close(struct client *cl)

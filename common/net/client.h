@@ -20,6 +20,8 @@ struct client_message { /* fini with client_message_fini */
  * the other's certificate or only one speaks TLS. */
 int client_open(struct client **cl, const char *host_port, const char *tls, bool insecure, const char *name, struct error *e);
 void client_close(struct client *cl);
+/* What its user should know about the certificates (they expire soon); "": nothing. */
+const char *client_warning(const struct client *cl);
 
 /* Sends and waits until it is with the kernel. */
 int client_send(struct client *cl, const Farm__Envelope *m, const void *payload, size_t size, struct error *e);

@@ -36,6 +36,8 @@ struct tls {
 	SSL_CTX *context;
 	struct stamp stamps[FILES];
 	struct tls_peer self;
+	time_t authority_until;
+	time_t warned; /* 0: not since the files were read */
 	double recheck;
 };
 
@@ -110,9 +112,16 @@ static enum tls_role read_role(X509 *cert)
 	return count == 1 ? found : TLS_NOBODY;
 }
 
+static time_t end_of(const X509 *cert)
+{
+	struct tm tm;
+	return ASN1_TIME_to_tm(X509_get0_notAfter(cert), &tm) ? timegm(&tm) : 0;
+}
+
 int tls_read_peer(X509 *cert, struct tls_peer *p, struct error *e)
 {
 	memset(p, 0, sizeof *p);
+	p->until = end_of(cert);
 	X509_NAME *subject = X509_get_subject_name(cert);
 	int at = X509_NAME_get_index_by_NID(subject, NID_commonName, -1);
 	const ASN1_STRING *name = at < 0 ? NULL : X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at));
@@ -130,6 +139,54 @@ int tls_read_peer(X509 *cert, struct tls_peer *p, struct error *e)
 	if (p->role == TLS_NOBODY)
 		return error_set(e, EACCES, "the certificate of %s has no role in the farm", p->name);
 	return 0;
+}
+
+/* ---- what is about to expire ---- */
+
+static bool expiry(const char *what, time_t until, time_t now, char *text, size_t size)
+{
+	char when[32];
+	struct tm tm;
+	double days = difftime(until, now) / 86400;
+	if (size)
+		*text = 0;
+	if (!until || days > TLS_WARN_DAYS)
+		return false;
+	strftime(when, sizeof when, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&until, &tm));
+	if (days > 0)
+		snprintf(text, size, "%s expires in %.3g days, at %s", what, days, when);
+	else
+		snprintf(text, size, "%s has expired, at %s", what, when);
+	return true;
+}
+
+bool tls_expiry(const struct tls_peer *p, time_t now, char *text, size_t size)
+{
+	char what[TLS_NAME_MAX + 32];
+	snprintf(what, sizeof what, "the certificate of %s", p->name);
+	return expiry(what, p->until, now, text, size);
+}
+
+bool tls_warning(const struct tls *t, time_t now, char *text, size_t size)
+{
+	char own[192], authority[160];
+	bool first = tls_expiry(&t->self, now, own, sizeof own);
+	bool second = expiry("the authority's certificate", t->authority_until, now, authority, sizeof authority);
+	snprintf(text, size, "%s%s%s", own, first && second ? "; " : "", authority);
+	return first || second;
+}
+
+bool tls_warning_due(struct tls *t, time_t now, char *text, size_t size)
+{
+	if ((t->warned && difftime(now, t->warned) < 86400) || !tls_warning(t, now, text, size))
+		return false;
+	t->warned = now;
+	return true;
+}
+
+time_t tls_authority_until(const struct tls *t)
+{
+	return t->authority_until;
 }
 
 /* ---- the folder ---- */
@@ -218,6 +275,21 @@ static int load_own(const struct tls *t, SSL_CTX *context, struct tls_peer *self
 	return rc ? error_prefix(e, rc, "%s", path) : 0;
 }
 
+/* While one authority replaces another there are several. */
+static time_t find_authority(SSL_CTX *context)
+{
+	time_t last = 0;
+	STACK_OF(X509_OBJECT) *all = X509_STORE_get0_objects(SSL_CTX_get_cert_store(context));
+	for (int i = 0; i < sk_X509_OBJECT_num(all); i++) {
+		X509 *cert = X509_OBJECT_get0_X509(sk_X509_OBJECT_value(all, i));
+		if (!cert || X509_check_issued(cert, SSL_CTX_get0_certificate(context)) != X509_V_OK)
+			continue;
+		time_t until = end_of(cert);
+		last = until > last ? until : last;
+	}
+	return last;
+}
+
 static void harden(SSL_CTX *context)
 {
 	SSL_CTX_set_min_proto_version(context, TLS1_3_VERSION);
@@ -270,6 +342,7 @@ int tls_open(struct tls **out, const char *folder, struct error *e)
 		mem_free(t);
 		return error_prefix(e, rc, "TLS");
 	}
+	t->authority_until = find_authority(t->context);
 	*out = t;
 	return 0;
 }
@@ -303,6 +376,8 @@ int tls_refresh(struct tls *t, struct error *e)
 	SSL_CTX_free(t->context);
 	t->context = fresh;
 	t->self = self;
+	t->authority_until = find_authority(fresh);
+	t->warned = 0;
 	return 1;
 }
 

@@ -16,6 +16,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 #include <sys/types.h>
+#include <time.h>
 
 enum tls_role { TLS_NOBODY, TLS_COORDINATOR, TLS_WORKER, TLS_CLIENT, TLS_OPERATOR, TLS_ROLES };
 const char *tls_role_name(enum tls_role r);
@@ -28,7 +29,12 @@ struct tls_peer {
 	char name[TLS_NAME_MAX + 1];
 	char serial[48]; /* hexadecimal */
 	enum tls_role role;
+	time_t until; /* the certificate's end */
 };
+
+/* "the certificate of NAME expires in 3.2 days, at 2031-05-01T12:00:00Z"; false: not within TLS_WARN_DAYS. */
+enum { TLS_WARN_DAYS = 14 };
+bool tls_expiry(const struct tls_peer *p, time_t now, char *text, size_t size);
 
 /* ---- a folder ---- */
 
@@ -41,6 +47,12 @@ void tls_close(struct tls *t); /* links that live keep what they need */
  * are checked again; negative: they had and are of no use, the old ones stay (said once, then 0). */
 int tls_refresh(struct tls *t, struct error *e);
 const struct tls_peer *tls_self(const struct tls *t);
+/* The end of the authority's certificate that signed ours; 0: there is none. */
+time_t tls_authority_until(const struct tls *t);
+/* What expires within TLS_WARN_DAYS, our own certificate or the authority's; false: neither, text is "". */
+bool tls_warning(const struct tls *t, time_t now, char *text, size_t size);
+/* The same, and true only when it was not said for a day, or files have been read since. */
+bool tls_warning_due(struct tls *t, time_t now, char *text, size_t size);
 /* How often live connections are checked again: 60 s at first. */
 void tls_set_recheck(struct tls *t, double seconds);
 double tls_recheck_seconds(const struct tls *t);

@@ -10,6 +10,8 @@ int main(int argc, char **argv)
 	job_options_parse(&o, argc, argv);
 	int rc = client_open(&cl, o.coordinator, o.tls, o.insecure, "hslt-job", &e);
 	if (!rc) {
+		if (*client_warning(cl))
+			fprintf(stderr, "hslt-job: warning: %s\n", client_warning(cl));
 		rc = job_verb(cl, &o, &e);
 		client_close(cl);
 	}

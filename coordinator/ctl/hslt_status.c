@@ -250,6 +250,17 @@ static void print_workers(const json_t *snapshot)
 		printf("\nno workers are connected\n");
 }
 
+static void print_warnings(const json_t *snapshot)
+{
+	size_t i;
+	const json_t *worker, *tls = json_object_get(snapshot, "tls");
+	if (*text_of(tls, "warning"))
+		printf("\nwarning: %s\n", text_of(tls, "warning"));
+	json_array_foreach(json_object_get(snapshot, "workers"), i, worker)
+		if (*text_of(worker, "warning"))
+			printf("warning: %s: %s\n", text_of(worker, "name"), text_of(worker, "warning"));
+}
+
 static void print_leases(const json_t *snapshot, const char *id)
 {
 	size_t i;
@@ -284,8 +295,10 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 			print_leases(snapshot, only);
 		}
 	}
-	if (!only)
+	if (!only) {
 		print_workers(snapshot);
+		print_warnings(snapshot);
+	}
 }
 
 /* ---- reading ---- */

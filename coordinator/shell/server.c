@@ -337,6 +337,7 @@ static int open_tls(struct server *s, struct error *e)
 static void refresh_tls(struct server *s)
 {
 	struct error e;
+	char text[384];
 	if (!s->tls || server_now(s) < s->tls_next)
 		return;
 	s->tls_next = server_now(s) + 1;
@@ -345,6 +346,8 @@ static void refresh_tls(struct server *s)
 		log_event(LOG_TLS_READ, "path=%s", log_quote(s->config.tls).text);
 	else if (rc < 0)
 		log_event(LOG_TLS_FAULT, "text=%s", log_quote(e.text).text);
+	if (tls_warning_due(s->tls, time(NULL), text, sizeof text))
+		log_event(LOG_TLS_EXPIRY, "text=%s", log_quote(text).text);
 }
 
 static void on_tick(uv_timer_t *t)

@@ -1,6 +1,7 @@
 #include "coordinator/shell/status.h"
 
 #include "common/base/mem.h"
+#include "coordinator/shell/session.h"
 
 #include <errno.h>
 #include <fcntl.h>
@@ -60,6 +61,31 @@ static json_t *jobs_json(const struct job_view *views, size_t count)
 	return list;
 }
 
+/* What a worker's certificate is, and whether it must be renewed. */
+static void add_certificate(const struct server *s, uint64_t peer, json_t *worker)
+{
+	char text[192];
+	const struct session *p = s->tls ? session_find(s, peer) : NULL;
+	if (!p || !*p->who.name)
+		return;
+	json_object_set_new(worker, "certificate", json_string(p->who.name));
+	json_object_set_new(worker, "certificateUntil", json_integer(p->who.until));
+	if (tls_expiry(&p->who, time(NULL), text, sizeof text))
+		json_object_set_new(worker, "warning", json_string(text));
+}
+
+static void add_tls(const struct server *s, json_t *o)
+{
+	char text[384];
+	if (!s->tls)
+		return;
+	json_t *tls = json_pack("{s:s s:I s:I}", "certificate", tls_self(s->tls)->name, "certificateUntil",
+				(json_int_t)tls_self(s->tls)->until, "authorityUntil", (json_int_t)tls_authority_until(s->tls));
+	if (tls_warning(s->tls, time(NULL), text, sizeof text))
+		json_object_set_new(tls, "warning", json_string(text));
+	json_object_set_new(o, "tls", tls);
+}
+
 static void add_workers(struct server *s, json_t *o)
 {
 	json_t *workers = json_array(), *leases = json_array();
@@ -69,7 +95,9 @@ static void add_workers(struct server *s, json_t *o)
 	for (uint64_t id = 0; (id = farm_next_peer(s->farm, id));) {
 		if (!farm_peer(s->farm, id, &p))
 			continue;
-		json_array_append_new(workers, view_peer_to_json(&p, now));
+		json_t *worker = view_peer_to_json(&p, now);
+		add_certificate(s, id, worker);
+		json_array_append_new(workers, worker);
 		for (uint32_t i = 0; farm_lease(s->farm, id, i, &l); i++)
 			json_array_append_new(leases, view_lease_to_json(&l, p.name, now));
 	}
@@ -84,6 +112,7 @@ static json_t *snapshot(struct server *s)
 	json_t *o = object("snapshot");
 	json_object_set_new(o, "jobs", jobs_json(views, count));
 	add_workers(s, o);
+	add_tls(s, o);
 	mem_free(views);
 	return o;
 }

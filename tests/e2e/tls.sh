@@ -118,13 +118,65 @@ row "a worker that is revoked while it is connected" "cut off" "certificate revo
 until_true 10 grep -q 'peer_refused.*name=.\{0,1\}brief.*expired' "$DIR/coordinator.log" || fail "the expired worker stays"
 row "a worker whose certificate expires meanwhile" "cut off" "certificate has expired"
 
+# Whose certificate ends soon is told so, in the log, in the status, and at the terminal; nobody else is.
+grep -q 'event=tls_expiry' "$DIR/coordinator.log" "$DIR/node1.log" && fail "a warning without a reason"
+grep -q 'level=warn event=tls_expiry text="the certificate of brief expires in' "$DIR/brief.log" || fail "no warning in the worker's log"
+ca client soon --days 5
+$list --tls "$CA/soon" 2>&1 >/dev/null | grep -q 'warning: the certificate of soon expires in 5 days' || fail "no warning for a client"
+$list 2>&1 >/dev/null | grep -q warning && fail "a warning for ann without a reason"
+
 # A renewed certificate is taken up without a restart, and the farm goes on with the same bits.
 ca coordinator coordinator --renew
 until_true 5 grep -q event=tls_read "$DIR/coordinator.log" || fail "new files are not noticed"
-chains="--integrator pssmlt --bootstrap 20000 --mutations 60000"
+chains="--integrator pssmlt --bootstrap 20000 --mutations 200000 --epoch 50"
 "$BIN/hslt-render" "$BOX" -o "$DIR/alone2.exr" $chains 2>>"$DIR/render.log"
 submit "$BOX" -o "$DIR/farm2.exr" $chains --wait >"$DIR/id" || fail "the second job: $?"
 same "$DIR/alone2.exr" "$DIR/farm2.exr"
+
+# Rotation: the authority's certificate lasts a week, the coordinator's a day, the worker's seconds. New ones are there before the
+# old ones end, and a job that was begun over the old ones is finished over the new.
+export HSLT_CA="$DIR/week"
+ca init --days 7
+ca coordinator coordinator --renew --days 1
+ca worker swift --days 0.00007
+ca client ann
+"$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port3" --spool "$DIR/spool4" --status-socket "$DIR/status4" --heartbeat 0.5 \
+	--tls "$HSLT_CA/coordinator" --tls-check 0.5 2>>"$DIR/week.log" &
+PIDS="$PIDS $!"
+until_true 10 test -s "$DIR/port3" || fail "the coordinator does not listen"
+week="--coordinator 127.0.0.1:$(cat "$DIR/port3") --tls $HSLT_CA/ann"
+week_value() {
+	"$BIN/hslt-status" --socket "$DIR/status4" --json | grep -o "\"$1\":[0-9.]*" | head -n 1 | cut -d: -f2
+}
+week_greets() {
+	[ "$(grep -c 'event=peer_hello.*name="swift"' "$DIR/week.log")" -ge "$1" ]
+}
+week_merges() {
+	[ "$(week_value merged)" -ge 10 ]
+}
+start_worker swift --tls "$HSLT_CA/swift" --coordinator "127.0.0.1:$(cat "$DIR/port3")"
+until_true 5 week_greets 1 || fail "the worker does not come"
+"$BIN/hslt-submit" $week "$BOX" -o "$DIR/rotated.exr" $chains >>"$DIR/id" 2>>"$DIR/submit.log" || fail "the job: $?"
+until_true 10 week_merges || fail "the job does not begin"
+"$BIN/hslt-job" $week hold j1 2>>"$DIR/submit.log" || fail "hold: $?"
+grep -q 'certificate of coordinator expires in 1 days.*; the authority.s certificate expires in 7 days' "$DIR/week.log" ||
+	fail "the coordinator does not warn"
+"$BIN/hslt-status" --socket "$DIR/status4" >"$DIR/shown"
+grep -q '^warning: the certificate of coordinator .*authority' "$DIR/shown" &&
+	grep -q '^warning: swift: the certificate of swift expires' "$DIR/shown" || fail "the status does not warn: $(cat "$DIR/shown")"
+[ "$(week_value certificateUntil)" -lt $(($(date +%s) + 90000)) ] || fail "the status has another end: $(week_value certificateUntil)"
+ca coordinator coordinator --renew
+ca worker swift --renew
+until_true 15 grep -q 'peer_refused.*name="swift".*expired' "$DIR/week.log" || fail "the old certificate does not end"
+until_true 5 week_greets 2 || fail "the worker does not come back with the new one"
+[ "$(week_value certificateUntil)" -gt $(($(date +%s) + 500000)) ] || fail "the coordinator has the old one: $(week_value certificateUntil)"
+"$BIN/hslt-job" $week release j1 2>>"$DIR/submit.log" || fail "release: $?"
+until_true 20 "$BIN/hslt-job" $week fetch j1 -o "$DIR/rotated.exr" 2>>"$DIR/submit.log" || fail "the job does not end"
+same "$DIR/alone2.exr" "$DIR/rotated.exr"
+kill -9 "$WORKER"
+export HSLT_CA="$CA"
+row "a certificate that was renewed in time" "let in" "no restart, equal bits"
+ROWS=$((ROWS - 1))
 
 # The other way round: TLS to a port without; and only a coordinator can be one.
 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port2" --spool "$DIR/spool2" --status-socket "$DIR/status2" --tls "" \

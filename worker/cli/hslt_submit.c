@@ -236,6 +236,8 @@ int main(int argc, char **argv)
 	if (!rc)
 		rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {
+		if (*client_warning(cl))
+			fprintf(stderr, "hslt-submit: warning: %s\n", client_warning(cl));
 		rc = a.estimate ? estimate(&a, cl, &b, &e) : run(&a, cl, &b, &code, &e);
 		client_close(cl);
 	}

@@ -61,11 +61,14 @@ static void on_opened(void *user)
 static void refresh_tls(struct agent *a)
 {
 	struct error e;
+	char text[384];
 	int rc = a->tls ? tls_refresh(a->tls, &e) : 0;
 	if (rc > 0)
 		log_event(LOG_TLS_READ, "path=%s", log_quote(a->config.tls).text);
 	else if (rc < 0)
 		log_event(LOG_TLS_FAULT, "text=%s", log_quote(e.text).text);
+	if (a->tls && tls_warning_due(a->tls, time(NULL), text, sizeof text))
+		log_event(LOG_TLS_EXPIRY, "text=%s", log_quote(text).text);
 }
 
 static void on_heartbeat(uv_timer_t *t)

@@ -1,0 +1,119 @@
+/*
+ * Certificates that end soon are spoken of in time, again every day, and not when there is no need; clocks are arguments here.
+ */
+#include "common/net/authority.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { DAY = 86400 };
+
+static char root[64];
+
+static int make_folder(void **state)
+{
+	(void)state;
+	snprintf(root, sizeof root, "/tmp/hslt-expiry.XXXXXX");
+	return mkdtemp(root) ? 0 : -1;
+}
+
+static int remove_folder(void **state)
+{
+	(void)state;
+	char command[128];
+	snprintf(command, sizeof command, "rm -rf '%s'", root);
+	return system(command);
+}
+
+/* An authority of `whole` days, and a worker's certificate of `own` days by it. */
+static struct tls *party(const char *name, double whole, double own)
+{
+	char ca[128], folder[160];
+	struct error e = {""};
+	struct tls *t;
+	snprintf(ca, sizeof ca, "%s/%s", root, name);
+	snprintf(folder, sizeof folder, "%s/node", ca);
+	if (authority_init(ca, "test", whole, &e) || authority_issue(ca, "node", TLS_WORKER, own, false, &e) || tls_open(&t, folder, &e))
+		fail_msg("%s", e.text);
+	return t;
+}
+
+static void a_long_one_is_no_matter(void **state)
+{
+	(void)state;
+	char text[384];
+	struct tls *t = party("long", 100, 50);
+	time_t now = time(NULL);
+	assert_in_range(tls_self(t)->until, now + 50 * DAY - 60, now + 50 * DAY + 60);
+	assert_in_range(tls_authority_until(t), now + 100 * DAY - 60, now + 100 * DAY + 60);
+	assert_false(tls_warning_due(t, now, text, sizeof text));
+	assert_false(tls_warning(t, now + 35 * DAY, text, sizeof text));
+	assert_string_equal(text, "");
+	assert_true(tls_warning(t, now + 37 * DAY, text, sizeof text));
+	assert_non_null(strstr(text, "the certificate of node expires in 13 days, at 20"));
+	assert_null(strstr(text, "authority"));
+	assert_true(tls_warning(t, now + 51 * DAY, text, sizeof text));
+	assert_non_null(strstr(text, "the certificate of node has expired, at 20"));
+	tls_close(t);
+}
+
+static void it_is_said_once_a_day_and_after_files_were_read(void **state)
+{
+	(void)state;
+	char text[384], ca[128];
+	struct error e;
+	struct tls *t = party("daily", 400, 10);
+	time_t now = time(NULL);
+	assert_true(tls_warning_due(t, now, text, sizeof text));
+	assert_false(tls_warning_due(t, now + 1, text, sizeof text));
+	assert_false(tls_warning_due(t, now + DAY - 1, text, sizeof text));
+	assert_true(tls_warning_due(t, now + DAY, text, sizeof text));
+	assert_non_null(strstr(text, "expires in 9 days"));
+	assert_false(tls_warning_due(t, now + 2 * DAY - 1, text, sizeof text));
+	snprintf(ca, sizeof ca, "%s/daily", root);
+	assert_int_equal(authority_issue(ca, "node", TLS_WORKER, 5, true, &e), 0);
+	assert_int_equal(tls_refresh(t, &e), 1);
+	assert_true(tls_warning_due(t, now + DAY + 2, text, sizeof text));
+	assert_int_equal(authority_issue(ca, "node", TLS_WORKER, 300, true, &e), 0);
+	assert_int_equal(tls_refresh(t, &e), 1);
+	assert_false(tls_warning_due(t, now + DAY + 3, text, sizeof text));
+	tls_close(t);
+}
+
+/* A certificate does not outlive its authority: both are named. Another authority in ca.pem does not matter. */
+static void the_authoritys_end_is_named(void **state)
+{
+	(void)state;
+	char text[384], command[512];
+	struct error e;
+	struct tls *t = party("old", 7, 825);
+	time_t now = time(NULL);
+	assert_true(tls_warning(t, now, text, sizeof text));
+	assert_non_null(strstr(text, "the certificate of node expires in 7 days"));
+	assert_non_null(strstr(text, "; the authority's certificate expires in 7 days"));
+	tls_close(t);
+	t = party("new", 3650, 825);
+	snprintf(command, sizeof command, "cat %s/old/ca.pem >>%s/new/node/ca.pem", root, root);
+	assert_int_equal(system(command), 0);
+	assert_int_equal(tls_refresh(t, &e), 1);
+	assert_in_range(tls_authority_until(t), now + 3600 * DAY, now + 3651 * DAY);
+	assert_false(tls_warning(t, now, text, sizeof text));
+	tls_close(t);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_long_one_is_no_matter),
+		cmocka_unit_test(it_is_said_once_a_day_and_after_files_were_read),
+		cmocka_unit_test(the_authoritys_end_is_named),
+	};
+	return cmocka_run_group_tests(tests, make_folder, remove_folder);
+}
