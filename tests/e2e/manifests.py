@@ -11,6 +11,7 @@ import yaml
 from kubernetes import client
 
 NAME = re.compile(r"[a-z0-9]([a-z0-9-]{0,61}[a-z0-9])?")
+SECRETS = set()  # that the commands in the files' comments make
 QUANTITY = re.compile(r"[0-9]+(\.[0-9]+)?(m|k|M|G|T|Ki|Mi|Gi|Ti)?")
 
 
@@ -99,6 +100,28 @@ def matches(selector, labels):
     return bool(selector) and all(labels.get(k) == v for k, v in selector.items())
 
 
+def check_tls(where, pod, c, docs, wrong):
+    """What HSLT_TLS names is a Secret that must be there, for the pod's group and nobody else."""
+    if "--insecure" in c["args"]:
+        wrong.append("%s: is insecure" % where)
+    settings = {}
+    for r in c.get("envFrom", []):
+        for m in find(docs, "ConfigMap", r["configMapRef"]["name"]):
+            settings.update(m["data"])
+    at = [m for m in c.get("volumeMounts", []) if m["mountPath"] == settings.get("HSLT_TLS")]
+    secrets = [v["secret"] for v in pod.get("volumes", []) if at and v["name"] == at[0]["name"] and "secret" in v]
+    if len(secrets) != 1 or at[0].get("readOnly") is not True:
+        wrong.append("%s: HSLT_TLS is no Secret" % where)
+        return
+    mode = secrets[0].get("defaultMode", 0o644)
+    if mode & 0o337 or not mode & 0o040 or not pod["securityContext"].get("fsGroup"):
+        wrong.append("%s: the key has the mode %o" % (where, mode))
+    if secrets[0].get("optional"):
+        wrong.append("%s: starts without TLS" % where)
+    if secrets[0]["secretName"] not in SECRETS:
+        wrong.append("%s: nobody says how to make the Secret %s" % (where, secrets[0]["secretName"]))
+
+
 def check_pod(d, docs, options, wrong):
     name = dig(d, "metadata", "name")
     pod = dig(d, "spec", "template", "spec")
@@ -118,6 +141,7 @@ def check_pod(d, docs, options, wrong):
         safe = c.get("securityContext", {})
         if safe.get("allowPrivilegeEscalation") is not False or dig(safe, "capabilities", "drop") != ["ALL"]:
             wrong.append("%s: is not restricted" % where)
+        check_tls(where, pod, c, docs, wrong)
         for r in c.get("envFrom", []):
             if not find(docs, "ConfigMap", r["configMapRef"]["name"]):
                 wrong.append("%s: no ConfigMap %s" % (where, r["configMapRef"]["name"]))
@@ -246,6 +270,14 @@ def faults(docs):
         ("another namespace", lambda ds: service(ds)["metadata"].update(namespace="other")),
         ("no such service", lambda ds: coordinator(ds)["spec"].update(serviceName="x")),
         ("no hook", lambda ds: box(worker(ds)).pop("lifecycle")),
+        ("no encryption", lambda ds: box(coordinator(ds))["args"].append("--insecure")),
+        ("certificates elsewhere", lambda ds: find(ds, "ConfigMap", "hslt-farm")[0]["data"].update(HSLT_TLS="/etc/tls")),
+        ("no certificates", lambda ds: find(ds, "ConfigMap", "hslt-farm")[0]["data"].pop("HSLT_TLS")),
+        ("a key for everybody", lambda ds: pod(worker(ds))["volumes"][0]["secret"].update(defaultMode=0o444)),
+        ("a key for root alone", lambda ds: pod(worker(ds))["volumes"][0]["secret"].update(defaultMode=0o400)),
+        ("a key by default", lambda ds: pod(worker(ds))["volumes"][0]["secret"].pop("defaultMode")),
+        ("a Secret that may be missing", lambda ds: pod(coordinator(ds))["volumes"][0]["secret"].update(optional=True)),
+        ("a Secret that nobody makes", lambda ds: pod(coordinator(ds))["volumes"][0]["secret"].update(secretName="x")),
         ("no budget", lambda ds: ds.remove(budget(ds))),
     ]
 
@@ -257,6 +289,9 @@ def main(argv):
                 print("\n".join(d["spec"]["template"]["spec"]["containers"][0]["lifecycle"]["preStop"]["exec"]["command"]))
         return 0
     known = {}
+    for f in argv[2:]:
+        with open(f) as text:
+            SECRETS.update(re.findall(r"create secret generic ([a-z-]+) --from-file=", text.read()))
 
     def options(program):
         if program not in known:
@@ -264,7 +299,7 @@ def main(argv):
             known[program] = set(re.findall(r"--[a-z-]+", text))
         return known[program]
 
-    docs = load(argv[2:])
+    docs = load([f for f in argv[2:] if f.endswith(".yaml")])
     wrong = verdict(docs, options)
     for name, change in faults(docs):
         copies = copy.deepcopy(docs)
