@@ -23,9 +23,10 @@ enum event_kind {
 	EVENT_PREPARED,       /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
 	EVENT_ERROR_KNOWN,    /* error_known: the answer to ACTION_EVALUATE_ERROR */
 	EVENT_IMAGE_KNOWN,    /* image_known: what the final image of ACTION_PUBLISH says; the job has ended */
-	EVENT_RESTORE,        /* restore: a job of an earlier life goes on; before anything else has happened */
+	EVENT_RESTORE,        /* tag, restore: a job of an earlier life goes on, or one that has ended */
 	EVENT_HOLD,           /* tag, job, hold, text: no more of its leases go out; without a text this hold is over */
 	EVENT_PRIORITY,       /* tag, job, priority: from the next lease on */
+	EVENT_EXTEND,         /* tag, job, plan: its own, but for the bounds; not fewer rounds */
 	EVENT_ASIDE,          /* join (but for peer, fingerprint, threads), text: a worker that was set aside in an earlier life */
 	EVENT_FORGIVE,        /* text: the name of workers that are set aside no more */
 	EVENT_JOB_BROKEN,     /* job, text: the shell cannot go on with it (a sum left the grid, the disk is full) */
@@ -64,9 +65,14 @@ struct event_submit {
 	double verify;  /* share of its leases that two workers compute; not where it is mixed: only equals can be compared */
 };
 
+/* What went wrong and cost nothing; what was verified. */
+struct job_counts {
+	uint64_t repeats, refused, faults, failures, timeouts, duplicates, verified, mismatched;
+};
+
 /* Which leases are merged says where a job was. */
 struct event_restore {
-	uint64_t job; /* its id; those that come later are greater */
+	uint64_t job; /* its id */
 	struct event_submit submit;
 	const char *fingerprint; /* "": it belongs to none */
 	enum lease_kind kind;    /* of its open leases; render: b and seeds are there */
@@ -76,6 +82,7 @@ struct event_restore {
 	 * The time in between lives does not count. */
 	double elapsed, opened, completed;
 	const struct forecast_history *looks;
+	struct job_counts counts; /* so far */
 };
 
 struct event {
@@ -83,7 +90,7 @@ struct event {
 	double time;
 	uint64_t peer;
 	uint64_t job;
-	uint64_t tag; /* of SUBMIT, CANCEL, HOLD, PRIORITY: comes back in their answer; of the last two there is one only when they are refused */
+	uint64_t tag; /* comes back in the answer; but to SUBMIT and CANCEL there is one only when it is refused */
 	const char *text;
 	union {
 		struct event_join join;
@@ -98,6 +105,7 @@ struct event {
 		} lease;
 		enum job_hold hold;
 		int priority;
+		const struct plan *plan;
 		struct event_submit submit;
 		struct event_restore restore;
 		struct {

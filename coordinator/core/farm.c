@@ -211,6 +211,7 @@ static void (*const on_event[])(struct farm *, const struct event *) = {
 	[EVENT_RESTORE] = restore_job,
 	[EVENT_HOLD] = orders_hold,
 	[EVENT_PRIORITY] = orders_priority,
+	[EVENT_EXTEND] = orders_extend,
 	[EVENT_ASIDE] = aside,
 	[EVENT_FORGIVE] = forgiven,
 	[EVENT_JOB_BROKEN] = broken,

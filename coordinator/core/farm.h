@@ -27,6 +27,8 @@
  *  - A worker that calls again, in the same life or a later one of the same home, takes the place of its old connection.
  *  - A job of an earlier life goes on where its merged leases say that it was; leases that were out then count when their results
  *    come, as any do. A bound that its last complete round had met, or a look at its error, is not forgotten.
+ *  - A job may get other bounds while it lives; one that has ended goes on as one of an earlier life does, under its id. Neither
+ *    changes what its leases compute.
  *  - A job that is held gets no leases out; results that come are merged, and its clock stands still.
  *  - Bounds are tested after complete rounds only. The target error is evaluated when merge_error_due() says so, as
  *    hslt-render does, and when another bound ends the job. From the end on nothing is merged: the image is exactly the
@@ -132,6 +134,7 @@ struct worker_status {
 uint64_t farm_next_aside(const struct farm *f, uint64_t after);
 bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s); /* false: unknown */
 bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s);   /* false: unknown */
+bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c); /* false: unknown */
 /* s since the job's first lease, less those that it was held; NAN: none yet, unknown */
 double farm_elapsed(const struct farm *f, uint64_t id, double now);
 bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s);

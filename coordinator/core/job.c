@@ -218,6 +218,15 @@ bool job_merge(struct job *j, struct slot *s, double now, double duration)
 	return complete;
 }
 
+void job_raise_limit(struct job *j)
+{
+	uint64_t before = j->limit;
+	j->limit = j->plan.rounds;
+	for (uint32_t i = 0; i < j->slot_count; i++)
+		if (j->slots[i].next >= before)
+			job_place(j, &j->slots[i]);
+}
+
 void job_open_rounds(struct job *j, double now)
 {
 	j->opened = now;

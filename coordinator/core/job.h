@@ -93,6 +93,7 @@ double job_lease_mutations(const struct job *j);
 bool job_merge(struct job *j, struct slot *s, double now, double duration);
 /* Of a job without merged leases: these are. next: see struct event_restore. */
 void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, double now);
+void job_raise_limit(struct job *j); /* to the plan's rounds */
 void job_open_rounds(struct job *j, double now); /* render leases after the bootstrap */
 /* Belongs to this class from now on; free again when nothing is merged and no lease is out. */
 void job_pin(struct job *j, struct peer_class *c);

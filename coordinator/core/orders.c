@@ -1,6 +1,7 @@
-/* What people want of jobs that are there: that they wait, go on, come earlier or later. */
+/* What people want of jobs that are there: that they wait, go on, come earlier or later, last longer. */
 #include "coordinator/core/state.h"
 
+#include <assert.h>
 #include <string.h>
 
 /* The live job that somebody means; NULL: the answer is given. */
@@ -33,6 +34,25 @@ void orders_priority(struct farm *f, const struct event *ev)
 	orders_delist(f, j);
 	j->priority = ev->priority;
 	orders_enlist(f, j);
+}
+
+void orders_extend(struct farm *f, const struct event *ev)
+{
+	struct job *j = meant(f, ev);
+	if (!j)
+		return;
+	assert(ev->plan->rounds >= j->plan.rounds && ev->plan->groups == j->plan.groups && ev->plan->parts == j->plan.parts);
+	j->plan.rounds = ev->plan->rounds;
+	j->plan.seconds = ev->plan->seconds;
+	j->plan.target_error = ev->plan->target_error;
+	j->progress_floor = 0;
+	if (j->looks.count)
+		job_forecast(j);
+	if (j->kind == LEASE_RENDER)
+		job_raise_limit(j);
+	/* While its error was estimated once more for a bound that is none any longer, it goes on. */
+	if (j->ending != END_NONE)
+		j->ending = rounds_bound(j, job_elapsed(j, f->now));
 }
 
 static bool comes_before(const struct job *a, const struct job *b)

@@ -1,6 +1,7 @@
-/* Jobs of an earlier life: put where their merged leases say that they were. */
+/* Jobs of an earlier life, and ended ones that go on: put where their merged leases say that they were. */
 #include "coordinator/core/state.h"
 
+#include <assert.h>
 #include <math.h>
 
 /* As it was pinned by its first merged batch. Without memory for that the first worker that asks pins it again. */
@@ -34,13 +35,28 @@ static void take_looks(struct job *j, const struct forecast_history *looks)
 	job_forecast(j);
 }
 
+static void take_counts(struct job *j, const struct job_counts *c)
+{
+	j->repeats = c->repeats;
+	j->refused = c->refused;
+	j->faults = c->faults;
+	j->failures = c->failures;
+	j->timeouts = c->timeouts;
+	j->duplicates = c->duplicates;
+	j->verified = c->verified;
+	j->mismatched = c->mismatched;
+}
+
 void restore_job(struct farm *f, const struct event *ev)
 {
 	const struct event_restore *r = &ev->restore;
+	struct job *ended = farm_find_job(f, r->job);
+	assert(!ended || !job_is_live(ended));
 	const char *refused = "the coordinator has as many jobs as it takes";
 	struct job *j = f->live_count < f->config.max_jobs ? job_new(f, &r->submit, &refused) : NULL;
 	if (!j) {
 		struct action *a = update_add(f, ACTION_REJECTED);
+		a->tag = ev->tag;
 		a->job = r->job;
 		a->text = refused;
 		return;
@@ -48,7 +64,10 @@ void restore_job(struct farm *f, const struct event *ev)
 	j->id = r->job;
 	if (f->next_job <= j->id)
 		f->next_job = j->id + 1;
+	if (ended)
+		rounds_forget(f, ended);
 	rounds_enlist(f, j);
+	take_counts(j, &r->counts);
 	job_restore(j, r->kind, r->next, f->now);
 	take_times(f, j, r);
 	take_looks(j, r->looks);

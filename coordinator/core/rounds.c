@@ -35,9 +35,22 @@ void rounds_reject(struct farm *f, const struct event *ev, const char *text)
 
 void rounds_enlist(struct farm *f, struct job *j)
 {
-	assert(f->job_count == 0 || f->jobs[f->job_count - 1]->id < j->id);
-	f->jobs[f->job_count++] = j;
+	uint32_t i = f->job_count++;
+	for (; i > 0 && f->jobs[i - 1]->id > j->id; i--)
+		f->jobs[i] = f->jobs[i - 1];
+	f->jobs[i] = j;
 	orders_enlist(f, j);
+}
+
+void rounds_forget(struct farm *f, struct job *j)
+{
+	assert(!job_is_live(j));
+	uint32_t i = 0;
+	while (f->jobs[i] != j)
+		i++;
+	f->job_count--;
+	memmove(&f->jobs[i], &f->jobs[i + 1], (f->job_count - i) * sizeof *f->jobs);
+	job_free(j);
 }
 
 void rounds_submit(struct farm *f, const struct event *ev)
@@ -88,9 +101,7 @@ static void forget_oldest(struct farm *f, const struct job *latest)
 	assert(oldest != UINT32_MAX);
 	struct job *j = f->jobs[oldest];
 	about_job(f, ACTION_JOB_FORGOTTEN, j);
-	f->job_count--;
-	memmove(&f->jobs[oldest], &f->jobs[oldest + 1], (f->job_count - oldest) * sizeof *f->jobs);
-	job_free(j);
+	rounds_forget(f, j);
 }
 
 static void revoke_all(struct farm *f, struct job *j)
@@ -150,13 +161,16 @@ static void preview(struct farm *f, struct job *j)
 	}
 }
 
+enum job_end rounds_bound(const struct job *j, double elapsed)
+{
+	if (j->rounds >= j->plan.rounds)
+		return END_MUTATIONS;
+	return j->plan.seconds > 0 && elapsed >= j->plan.seconds ? END_TIME : END_NONE;
+}
+
 void rounds_settle(struct farm *f, struct job *j, double elapsed)
 {
-	enum job_end end = END_NONE;
-	if (j->rounds >= j->plan.rounds)
-		end = END_MUTATIONS;
-	else if (j->plan.seconds > 0 && elapsed >= j->plan.seconds)
-		end = END_TIME;
+	enum job_end end = rounds_bound(j, elapsed);
 	bool wants_error = j->plan.target_error > 0;
 	if (end != END_NONE && !wants_error) {
 		rounds_end(f, j, end, "");

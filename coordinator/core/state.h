@@ -45,7 +45,9 @@ struct peer *farm_find_peer(const struct farm *f, uint64_t id);
 void rounds_submit(struct farm *f, const struct event *ev);
 void rounds_cancel(struct farm *f, const struct event *ev);
 void rounds_started(struct farm *f, struct job *j); /* a lease of it is about to be sent */
-void rounds_enlist(struct farm *f, struct job *j); /* ids grow */
+void rounds_enlist(struct farm *f, struct job *j); /* its id is new */
+void rounds_forget(struct farm *f, struct job *j); /* it has ended */
+enum job_end rounds_bound(const struct job *j, double elapsed); /* that is met, the error apart */
 void rounds_reject(struct farm *f, const struct event *ev, const char *text);
 void rounds_opened(struct farm *f, struct job *j, bool black); /* b and seeds are there */
 /* The bounds, when a round is complete: so many seconds after the first lease. */
@@ -60,6 +62,7 @@ void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *tex
 enum { PRIORITY_MAX = 100 };
 void orders_hold(struct farm *f, const struct event *ev);
 void orders_priority(struct farm *f, const struct event *ev);
+void orders_extend(struct farm *f, const struct event *ev);
 void orders_enlist(struct farm *f, struct job *j); /* among the live ones: by priority, then id */
 void orders_delist(struct farm *f, const struct job *j);
 

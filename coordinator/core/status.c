@@ -169,6 +169,17 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 	return true;
 }
 
+bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c)
+{
+	const struct job *j = farm_find_job(f, id);
+	if (!j)
+		return false;
+	*c = (struct job_counts){.repeats = j->repeats, .refused = j->refused, .faults = j->faults, .failures = j->failures,
+				 .timeouts = j->timeouts, .duplicates = j->duplicates, .verified = j->verified,
+				 .mismatched = j->mismatched};
+	return true;
+}
+
 double farm_elapsed(const struct farm *f, uint64_t id, double now)
 {
 	const struct job *j = farm_find_job(f, id);

@@ -253,6 +253,14 @@ static void take_restore(const char **at, struct event *ev, struct plan *p, char
 	ev->restore = r;
 }
 
+static void take_extend(const char **at, struct event *ev, struct plan *p, char owner[WORD])
+{
+	ev->job = take_id(at, "j");
+	take_submit(at, ev, p, owner);
+	ev->kind = EVENT_EXTEND;
+	ev->plan = p;
+}
+
 static void take_job(const char **at, struct event *ev)
 {
 	if (take(at, "cancel")) {
@@ -325,6 +333,8 @@ static bool play_line(struct farm *f, const char *line)
 		take_worker(&at, &ev, name, fingerprint);
 	else if (take(&at, "submit"))
 		take_submit(&at, &ev, &plan, owner);
+	else if (take(&at, "extend"))
+		take_extend(&at, &ev, &plan, owner);
 	else if (take(&at, "restore"))
 		take_restore(&at, &ev, &plan, fingerprint, next, &looks, owner);
 	else

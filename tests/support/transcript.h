@@ -8,7 +8,7 @@
  *   wN batch KEY [bad TEXT] | wN fails KEY TEXT | wN returns KEY        KEY: j1 g0 p0 e0, or j1 g0 p0 boot
  *   submit [NAME=VALUE ...]: priority mixed groups parts rounds seconds target boot owner
  *   restore J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [as submit]: the slots' next epochs
- *   hold [order] J TEXT | release [order] J | priority J N        (order: by somebody, not for want of room)
+ *   hold [order] J TEXT | release [order] J | priority J N | extend J [as submit: the new plan]        (order: by somebody, not for want of room)
  *   cancel J | prepared J [black | bad TEXT] | error J R E | broken J TEXT | tick
  * "[0] wake -> T": when the core wants to be called again, as it said last.
  * "-> -" is silence. A line that does not fit is printed beside what was said, and the test fails at the end.

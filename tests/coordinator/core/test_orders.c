@@ -112,6 +112,82 @@ static void priority(void **state)
 	farm_free(f);
 }
 
+/* While it runs: rounds that were the last ones no longer are, and who waited for them has work. */
+static void extend_while_it_runs(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] restore j1 render 1,2 rounds=2 -> j1 is running",
+		"[0] w1 joins A threads=2 -> -", "[0] w1 wants 2 -> w1 gets j1 g0 p0 e1",
+		"[1] extend j1 rounds=4 -> w1 gets j1 g1 p0 e2",
+		"[1] extend j9 rounds=4 -> rejected: no such job",
+		"[2] w1 batch j1 g1 p0 e2 -> merge, merged",
+		"[3] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2, w1 gets j1 g1 p0 e3",
+		"[4] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, w1 gets j1 g0 p0 e3",
+		"[5] w1 batch j1 g0 p0 e3 -> merge, merged",
+		"[6] w1 batch j1 g1 p0 e3 -> merge, merged, j1 round 4, j1 publish 4, j1 is done (mutations)",
+		"[6] extend j1 rounds=5 -> rejected: the job is over", NULL });
+	farm_free(f);
+	/* in the bootstrap, too */
+	transcript((const char *const[]){
+		"[0] restore j1 boot 1,0 rounds=1 -> -",
+		"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g1 p0 boot",
+		"[1] extend j1 rounds=2 -> -",
+		"[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
+		"[1] extend j1 rounds=3 -> -",
+		"[1] w1 batch j1 g1 p0 e2 -> refused: the bootstrap is not complete",
+		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0", NULL });
+}
+
+/* The error is estimated once more because a bound is met, and then it is not. */
+static void extend_while_it_ends(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] restore j1 render 2,2 elapsed=1 completed=1 rounds=2 target=0.1 -> j1 is running, j1 evaluate 2",
+		"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> -",
+		"[1] extend j1 rounds=3 target=0.05 -> w1 gets j1 g0 p0 e2",
+		"[2] error j1 2 0.07 -> -",
+		"[3] w1 batch j1 g0 p0 e2 -> merge, merged, w1 gets j1 g1 p0 e2",
+		"[4] w1 batch j1 g1 p0 e2 -> merge, merged, j1 round 3, j1 evaluate 3",
+		/* another target alone: the rounds are over all the same */
+		"[5] extend j1 rounds=3 target=0.01 -> -",
+		"[6] error j1 3 0.05 -> j1 publish 3, j1 is done (mutations)", NULL });
+	transcript((const char *const[]){
+		"[10] restore j1 render 2,2 elapsed=9 completed=9 rounds=inf seconds=8 target=0.1 -> j1 is running, j1 evaluate 2",
+		"[10] extend j1 rounds=inf seconds=20 target=0.1 -> -",
+		"[11] w1 joins A threads=1 -> -", "[11] w1 wants 1 -> w1 gets j1 g0 p0 e2", NULL });
+}
+
+/* A job that has ended comes to life again under its id; what it had counted is told by whoever remembers. */
+static void extend_when_it_has_ended(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit rounds=1 -> j1 submitted, j1 is queued",
+		"[0] submit rounds=1 priority=1 -> j2 submitted, j2 is queued",
+		"[0] cancel j2 -> j2 cancelled, j2 is cancelled (cancelled: cancelled)",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot",
+		"[2] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
+		"[2] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[3] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g1 p0 e0",
+		"[4] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, j1 publish 1, j1 is done (mutations)",
+		"[9] restore j1 render 1,1 fingerprint=A elapsed=4 completed=4 rounds=2 -> j1 is running, w1 gets j1 g0 p0 e1",
+		"[9] submit -> j3 submitted, j3 is queued", /* ids go on */
+		"[9] w1 batch j1 g1 p0 e0 -> repeat: merged already", NULL });
+	assert_true(farm_elapsed(f, 1, 10) == 5);
+	assert_int_equal(farm_next_job(f, 0), 1);
+	assert_int_equal(farm_next_job(f, 1), 2);
+	transcript_play(f, (const char *const[]){
+		"[10] w1 batch j1 g0 p0 e1 -> merge, merged, w1 gets j1 g1 p0 e1", /* the older one */
+		"[11] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (mutations), j3 is bootstrap, w1 gets j3 g0 p0 boot", NULL });
+	farm_free(f);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -119,6 +195,9 @@ int main(void)
 		cmocka_unit_test(two_reasons),
 		cmocka_unit_test(the_clock_stands_still),
 		cmocka_unit_test(priority),
+		cmocka_unit_test(extend_while_it_runs),
+		cmocka_unit_test(extend_while_it_ends),
+		cmocka_unit_test(extend_when_it_has_ended),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
