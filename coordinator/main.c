@@ -1,5 +1,6 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
+#include "common/base/text.h"
 #include "common/base/version.h"
 #include "coordinator/shell/server.h"
 
@@ -25,7 +26,7 @@ static const char doc[] =
 
 enum {
 	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS,
-	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_BANDWIDTH,
+	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE, OPTION_BANDWIDTH,
 	OPTION_GROUP
 };
 
@@ -47,6 +48,9 @@ static const struct argp_option options[] = {
 	{"quota-assets", OPTION_ASSETS, "MB", 0, "Their files together", 0},
 	{"quota-film", OPTION_FILM, "PIXELS", 0, "Of a job's film", 0},
 	{"quota-mutations", OPTION_MUTATIONS, "N", 0, "Of a job, or samples; then each must say how many", 0},
+	{"verify", OPTION_VERIFY, "P", 0, "Least share of the epochs of each job, or percent, that two workers must compute alike (0)", 0},
+	{"max-faults", OPTION_FAULTS, "N", 0, "Wrong results, or invalid ones in a row, after which a worker is set aside for good (3)", 0},
+	{"forgive", OPTION_FORGIVE, "NAME", 0, "A worker that was set aside in an earlier life comes back", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Listen on other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log every lease, too", 0},
 	{0},
@@ -112,6 +116,16 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_MUTATIONS:
 		c->quota.mutations = (uint64_t)number(state, "--quota-mutations", arg, 1, 1e18);
+		return 0;
+	case OPTION_VERIFY:
+		if (!text_share(arg, &c->verify))
+			argp_error(state, "--verify takes a share from 0 to 1 or percent, not '%s'", arg);
+		return 0;
+	case OPTION_FAULTS:
+		c->max_faults = (unsigned)number(state, "--max-faults", arg, 1, 1e6);
+		return 0;
+	case OPTION_FORGIVE:
+		c->forgive = arg;
 		return 0;
 	case OPTION_INSECURE:
 		c->insecure = true;

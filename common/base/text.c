@@ -2,6 +2,7 @@
 
 #include <stdarg.h>
 #include <stdio.h>
+#include <stdlib.h>
 #include <string.h>
 
 void text_copy(char *out, size_t size, const char *from)
@@ -27,4 +28,18 @@ void text_put(struct text *t, const char *format, ...)
 		used = t->left - 1;
 	t->at += used;
 	t->left -= used;
+}
+
+bool text_share(const char *text, double *share)
+{
+	char *end;
+	double x = strtod(text, &end);
+	if (end != text && *end == '%') {
+		x /= 100;
+		end++;
+	}
+	if (end == text || *end || !(x >= 0 && x <= 1))
+		return false;
+	*share = x;
+	return true;
 }

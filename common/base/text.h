@@ -2,10 +2,14 @@
 #ifndef COMMON_BASE_TEXT_H
 #define COMMON_BASE_TEXT_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 /* Copies, cutting what does not fit, never in the middle of a UTF-8 sequence. */
 void text_copy(char *out, size_t size, const char *from);
+
+/* A share: "0.05" or "5%". false: not from 0 to 1. */
+bool text_share(const char *text, double *share);
 
 /* Appends to a fixed array: what does not fit is cut, the rest stays terminated. Begin with {array, size}. */
 struct text {

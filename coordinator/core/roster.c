@@ -55,9 +55,13 @@ struct identity *roster_use(struct farm *f, const struct event_join *e, const ch
 		*k = (struct identity){ .id = ++f->identities };
 		snprintf(k->certificate, sizeof k->certificate, "%s", e->certificate);
 	}
-	snprintf(k->name, sizeof k->name, "%s", e->name);
-	snprintf(k->home, sizeof k->home, "%s", e->home);
-	k->restarts = e->restarts;
+	/* One that is set aside stays known by what it was. */
+	if (!k->aside || strcmp(k->home, e->home) == 0)
+		k->restarts = e->restarts;
+	if (!k->aside) {
+		snprintf(k->name, sizeof k->name, "%s", e->name);
+		snprintf(k->home, sizeof k->home, "%s", e->home);
+	}
 	k->seen = f->now;
 	k->uses++;
 	return k;

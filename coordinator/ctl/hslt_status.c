@@ -261,6 +261,23 @@ static void print_warnings(const json_t *snapshot)
 			printf("warning: %s: %s\n", text_of(worker, "name"), text_of(worker, "warning"));
 }
 
+static void print_aside(const json_t *snapshot)
+{
+	size_t i;
+	const json_t *worker;
+	json_array_foreach(json_object_get(snapshot, "aside"), i, worker)
+		printf("set aside: %s%s%s: %s\n", text_of(worker, "name"), *text_of(worker, "certificate") ? " of " : "",
+		       text_of(worker, "certificate"), text_of(worker, "why"));
+}
+
+static void print_verified(const json_t *job)
+{
+	const json_t *counts = json_object_get(job, "counts");
+	if (number_of(job, "verify") > 0)
+		printf("       verified: %.3g %% of the epochs; %.0f agreed, %.0f of them not at first\n", 100 * number_of(job, "verify"),
+		       number_of(counts, "verified"), number_of(counts, "mismatched"));
+}
+
 static void print_leases(const json_t *snapshot, const char *id)
 {
 	size_t i;
@@ -289,6 +306,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 				printf("       note: %s\n", text_of(job, "note"));
 			print_share(job);
 			print_forecast(job);
+			print_verified(job);
 			print_effects(job);
 			print_strategies(job);
 			print_agreement(job);
@@ -298,6 +316,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 	if (!only) {
 		print_workers(snapshot);
 		print_warnings(snapshot);
+		print_aside(snapshot);
 	}
 }
 

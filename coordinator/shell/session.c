@@ -50,31 +50,42 @@ struct session *session_find(const struct server *s, uint64_t id)
 
 /* ---- hello ---- */
 
-static void send_hello_ack(struct session *p, const char *refusal)
+/* said: why it is refused, or what a peer that is not should know. */
+static void send_hello_ack(struct session *p, bool accepted, const char *said)
 {
 	char text[256];
 	Farm__HelloAck ack;
 	Farm__Envelope m;
 	farm__hello_ack__init(&ack);
 	farm__envelope__init(&m);
-	text_copy(text, sizeof text, refusal ? refusal : "");
-	ack.accepted = !refusal;
+	text_copy(text, sizeof text, said);
+	ack.accepted = accepted;
 	ack.text = text;
 	ack.version = FARM_VERSION;
 	ack.heartbeat_ms = (uint32_t)(1000 * p->server->config.heartbeat_seconds);
 	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
 	m.hello_ack = &ack;
 	session_send(p, &m, NULL, 0);
-	if (refusal) {
+	if (!accepted) {
 		log_event(LOG_PEER_REFUSED, "peer=%llu address=%s text=%s", (unsigned long long)p->id, p->address,
-			  log_quote(refusal).text);
+			  log_quote(text).text);
 		p->state = SESSION_LEAVING;
-		conn_close_when_sent(p->conn, refusal);
+		conn_close_when_sent(p->conn, text);
 	}
+}
+
+static const char *set_aside(const struct session *p, char *text, size_t size)
+{
+	struct peer_status s;
+	*text = 0;
+	if (farm_peer(p->server->farm, p->id, &s) && s.state == PEER_ASIDE)
+		snprintf(text, size, "this worker is set aside and gets no work: %.180s", s.text);
+	return text;
 }
 
 static void join(struct session *p, const Farm__Hello *h)
 {
+	char aside[256];
 	struct event ev = {.kind = EVENT_JOINED,
 			   .peer = p->id,
 			   .join = {.peer = p->id, .name = p->name, .fingerprint = h->fingerprint, .threads = h->threads,
@@ -84,7 +95,7 @@ static void join(struct session *p, const Farm__Hello *h)
 	server_step(p->server, &ev);
 	if (*p->rejected) {
 		p->joined = false;
-		send_hello_ack(p, p->rejected);
+		send_hello_ack(p, false, p->rejected);
 		return;
 	}
 	p->state = SESSION_WORKER;
@@ -92,7 +103,7 @@ static void join(struct session *p, const Farm__Hello *h)
 		  (unsigned long long)p->id, p->address, log_quote(p->name).text, *p->who.name ? p->who.name : "-", *h->home ? h->home : "-",
 		  (unsigned long long)h->restarts, h->threads,
 		  log_quote(h->fingerprint).text);
-	send_hello_ack(p, NULL);
+	send_hello_ack(p, true, set_aside(p, aside, sizeof aside));
 }
 
 /* What the certificate does not allow; NULL: it does. */
@@ -123,18 +134,18 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 	char text[192];
 	if (h->version != FARM_VERSION) {
 		snprintf(text, sizeof text, "version %u of the protocol is spoken here, not %u", FARM_VERSION, h->version);
-		send_hello_ack(p, text);
+		send_hello_ack(p, false, text);
 		return;
 	}
 	if (!envelope_text_ok(h->name, sizeof p->name - 1) || !envelope_text_ok(h->fingerprint, 255) ||
 	    !home_ok(h->home) || h->threads > 4096) {
-		send_hello_ack(p, "a name or a number in hello is out of bounds");
+		send_hello_ack(p, false, "a name or a number in hello is out of bounds");
 		return;
 	}
 	text_copy(p->name, sizeof p->name, h->name);
 	const char *no = overreach(p, h->role, text, sizeof text);
 	if (no) {
-		send_hello_ack(p, no);
+		send_hello_ack(p, false, no);
 		return;
 	}
 	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, 0});
@@ -143,9 +154,9 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		join(p, h);
 	} else if (h->role == FARM__ROLE__ROLE_CLIENT) {
 		p->state = SESSION_CLIENT;
-		send_hello_ack(p, NULL);
+		send_hello_ack(p, true, "");
 	} else {
-		send_hello_ack(p, "hello must say whether it is a worker or a client");
+		send_hello_ack(p, false, "hello must say whether it is a worker or a client");
 	}
 }
 

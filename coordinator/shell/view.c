@@ -211,6 +211,13 @@ json_t *view_peer_to_json(const struct peer_status *p, double now)
 			 "restarts", (json_int_t)p->restarts, "text", shown(p->text, text));
 }
 
+json_t *view_aside_to_json(const struct worker_status *w)
+{
+	char text[256], name[256];
+	return json_pack("{s:s s:s s:s s:I s:I s:s}", "name", shown(w->name, name), "certificate", w->certificate, "home", w->home, /* */
+			 "restarts", (json_int_t)w->restarts, "wrong", (json_int_t)w->wrong, "why", shown(w->text, text));
+}
+
 json_t *view_lease_to_json(const struct lease_status *l, const char *worker, double now)
 {
 	char id[32];

@@ -32,7 +32,7 @@ static const char doc[] =
 	"there, and its note says where), 6 refused, 75 "
 	"coordinator not reachable.";
 
-enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_TLS };
+enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED, OPTION_VERIFY, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_TLS };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
@@ -45,6 +45,7 @@ static const struct argp_option options[] = {
 	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
 	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
 	{"mixed", OPTION_MIXED, NULL, 0, "Allow workers of any numeric fingerprint: gives up equal bits", 0},
+	{"verify", OPTION_VERIFY, "P", 0, "Share of the epochs, or percent, that two workers must compute alike before they count (0)", 0},
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{0},
@@ -92,6 +93,10 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_MIXED:
 		a->request.mixed = true;
 		return 0;
+	case OPTION_VERIFY:
+		if (!text_share(arg, &a->request.verify))
+			argp_error(state, "--verify takes a share from 0 to 1 or percent, not '%s'", arg);
+		return 0;
 	case OPTION_TLS:
 		a->tls = arg;
 		return 0;
@@ -115,6 +120,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case ARGP_KEY_END:
 		if (!a->scene || (!a->output && !a->estimate))
 			argp_error(state, "a scene and -o FILE are needed");
+		if (a->request.verify > 0 && a->request.mixed)
+			argp_error(state, "--mixed workers cannot be held against each other: no --verify");
 		if (a->estimate && (a->output || a->wait))
 			argp_error(state, "--estimate makes no image: no -o, no --wait");
 		if (!a->estimate && (a->pilot > 0 || a->plot))

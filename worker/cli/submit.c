@@ -244,6 +244,7 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 	s.notes = b->notes;
 	s.output = borrow(r->output);
 	s.mixed = r->mixed;
+	s.verify = r->verify;
 	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
 	m.submit = &s;
 	rc = client_send(cl, &m, NULL, 0, e);

@@ -36,6 +36,7 @@ struct submit_request {
 	const char *name, *output; /* output: absolute, or "" */
 	int priority;
 	bool mixed;
+	double verify; /* share of the epochs that two workers compute */
 	const struct render_arguments *args;
 };
 

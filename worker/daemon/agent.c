@@ -52,6 +52,8 @@ static void on_opened(void *user)
 	hello.name = name;
 	hello.fingerprint = a->fingerprint;
 	hello.threads = a->config.threads;
+	hello.home = a->cache.life.home;
+	hello.restarts = a->cache.life.restarts;
 	m.body_case = FARM__ENVELOPE__BODY_HELLO;
 	m.hello = &hello;
 	conn_send(a->conn, &m, NULL, 0);
@@ -93,7 +95,9 @@ static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
 	uint64_t ms = ack->heartbeat_ms >= 10 ? ack->heartbeat_ms : 10;
 	a->welcome = true;
 	a->back_off = first_back_off;
-	log_event(LOG_CONNECT, "coordinator=%s", a->config.coordinator);
+	log_event(LOG_CONNECT, "coordinator=%s start=%llu", a->config.coordinator, (unsigned long long)a->cache.life.restarts);
+	if (*ack->text)
+		log_event(LOG_PEER_FAULT, "text=%s", log_quote(ack->text).text);
 	uv_timer_start(&a->heartbeat, on_heartbeat, ms, ms);
 	conn_set_quiet(a->conn, 6e-3 * (double)ms + 1);
 	desk_welcome(a);

@@ -21,6 +21,7 @@ struct agent_config {
 	double grace_seconds;
 	double idle_seconds; /* without a lease for so long: it leaves; 0: never */
 	bool insecure;
+	unsigned lie; /* tests: one of so many results has a wrong bit; 0: none */
 	bool repeat; /* tests: every result is sent twice */
 };
 

@@ -1,5 +1,7 @@
 #include "worker/daemon/cache.h"
 
+#include "common/base/log.h"
+
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -42,6 +44,16 @@ static int base_folder(const char *folder, char path[PATH_BYTES], struct error *
 	return make_folders(path, e);
 }
 
+/* A worker that nobody can count is a worker all the same. */
+static void begin_life(struct cache *c, const char *base, int slot)
+{
+	char name[32];
+	struct error e;
+	snprintf(name, sizeof name, "slot-%d.life", slot);
+	if (life_begin(&c->life, base, name, &e))
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+}
+
 int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error *e)
 {
 	char base[PATH_BYTES], path[PATH_BYTES + 32];
@@ -55,6 +67,7 @@ int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error
 			return error_set(e, errno, "%s: %s", path, strerror(errno));
 		if (flock(c->lock, LOCK_EX | LOCK_NB) == 0) {
 			snprintf(path, sizeof path, "%s/slot-%d", base, slot);
+			begin_life(c, base, slot);
 			rc = blob_store_open(&c->blobs, path, limit, e);
 			if (rc)
 				cache_close(c);

@@ -151,6 +151,7 @@ static void start_lease(struct agent *a, struct lease_task *l)
 {
 	l->owner = a;
 	l->finished = on_rendered;
+	l->lie = a->config.lie && a->rendered++ % a->config.lie == 0;
 	lease_task_start(l, a->crew);
 }
 

@@ -24,6 +24,7 @@ struct lease_task {
 	enum lease_task_state state;
 	atomic_bool stop;
 	bool unwanted; /* nobody waits for it: dropped when its thread lets go */
+	bool lie;      /* tests */
 	bool sent;     /* on this connection */
 	unsigned char *frame;
 	size_t frame_size;

@@ -23,7 +23,7 @@ static const char doc[] =
 	"systemd it says when it is ready and feeds the watchdog.\n"
 	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 stopped, 1 failed, 2 usage.";
 
-enum { OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_TLS, OPTION_IDLE };
+enum { OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_LIE, OPTION_TLS, OPTION_IDLE };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
@@ -36,6 +36,7 @@ static const struct argp_option options[] = {
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log more", 0},
+	{"test-lie", OPTION_LIE, "N", OPTION_HIDDEN, "Flip a bit in one of N results", 0},
 	{"test-repeat", OPTION_REPEAT, NULL, OPTION_HIDDEN, "Send every result twice", 0},
 	{0},
 };
@@ -84,6 +85,11 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case 'v':
 		log_set_level(LOG_LEVEL_DEBUG);
+		return 0;
+	case OPTION_LIE:
+		if (!getenv("HSLT_TEST"))
+			argp_error(state, "--test-lie is for tests alone: it makes wrong images");
+		c->lie = (unsigned)number(state, "--test-lie", arg, 1, 1e6);
 		return 0;
 	case OPTION_REPEAT:
 		c->repeat = true;

@@ -192,7 +192,7 @@ static void set_aside(void **state)
 		"[4] w5 joins A threads=1 name=d home=c start=5 -> -",
 		"[4] w5 wants 1 -> -",
 		"[4] w5 batch j1 g0 p0 e2 says x -> refused: the worker is set aside: its results do not count",
-		"[5] w6 joins A threads=1 name=d home=b start=1 -> -",
+		"[5] w6 joins A threads=1 name=c home=b start=1 -> -",
 		"[5] w6 wants 1 -> -",
 		NULL });
 	struct peer_status p;
@@ -204,14 +204,15 @@ static void set_aside(void **state)
 	assert_int_equal(farm_next_aside(f, 3), 0);
 	assert_true(farm_worker(f, 3, &w));
 	assert_int_equal(w.wrong, 3);
-	assert_string_equal(w.name, "d");
+	assert_string_equal(w.name, "c");
+	assert_int_equal(w.restarts, 5);
 	assert_string_equal(w.text, "wrong result: j1 render group 0 part 0 epoch 1");
 	assert_true(farm_job(f, 1, 5, &j));
 	assert_int_equal(j.failures, 0);
 	assert_int_equal(j.mismatched, 3);
 	transcript_play(f, (const char *const[]){
 		"[6] w1 batch j1 g0 p0 e2 says x -> noted",
-		"[6] forgive d -> w5 gets j1 g0 p0 e2",
+		"[6] forgive d -> -", "[6] forgive c -> w5 gets j1 g0 p0 e2",
 		NULL });
 	farm_free(f);
 }

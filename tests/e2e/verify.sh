@@ -1,0 +1,80 @@
+# A worker whose results have one wrong bit, among honest ones: with --verify 1 the image is that of hslt-render, the liar is set
+# aside for good, and nothing of it counts as the job's failures. A share finds one that lies now and then. What was merged
+# unverified is said.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-job hslt-compare
+export HSLT_TEST=1
+
+# says FILE WORDS
+says() {
+	grep -q -F -- "$2" "$1" || fail "$1 does not say '$2': $(tail -n 5 "$1" | cut -c 1-600)"
+}
+
+aside() {
+	"$BIN/hslt-status" >"$DIR/shown"
+	grep -q "set aside: $1" "$DIR/shown"
+}
+
+JOB="--integrator hslt --size 96x96 --bootstrap 20000 --mutations 640000 --chains 64 --epoch 2500"
+"$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" $JOB 2>"$DIR/render.log"
+if (unset HSLT_TEST; "$BIN/hslt-worker" --coordinator 127.0.0.1:1 --test-lie 1) 2>/dev/null; then
+	fail "a worker lies outside of tests"
+fi
+
+start_coordinator
+start_worker honest1
+a=$WORKER
+id=$(submit "$BOX" -o "$DIR/all.exr" $JOB --verify 100%)
+waits() {
+	[ "$(value "$id" waiting | cut -c 1-38)" = "verification waits for a second worker" ]
+}
+until_true 20 waits || fail "it waits for '$(value "$id" waiting)'"
+start_worker liar --test-lie 2
+liar=$WORKER
+start_worker honest2
+b=$WORKER
+until_true 60 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" why)"
+"$BIN/hslt-job" fetch "$id"
+same "$DIR/alone.exr" "$DIR/all.exr"
+[ "$(value "$id" failures)" = 0 ] || fail "$(value "$id" failures) failures of the job"
+[ "$(value "$id" verified)" -ge 64 ] || fail "$(value "$id" verified) leases were verified"
+[ "$(value "$id" mismatched)" -ge 3 ] || fail "$(value "$id" mismatched) were mismatched"
+aside liar || fail "the liar is trusted: $(cat "$DIR/shown")"
+says "$DIR/shown" "wrong result: j1"
+says "$DIR/coordinator.log" "event=worker_aside"
+"$BIN/hslt-job" log "$id" >"$DIR/log"
+says "$DIR/log" "worker=\"liar\""
+
+# It comes back in another life, under another name, and to a coordinator in its next life: it is who it was.
+stop $liar
+start_worker saint
+saint=$WORKER
+until_true 10 grep -q 'is set aside and gets no work' "$DIR/saint.log" || fail "the liar's home is trusted under another name"
+kill -9 $COORDINATOR_PID
+wait $COORDINATOR_PID 2>/dev/null || :
+LISTEN=$COORDINATOR
+start_coordinator --verify 0.5
+aside liar || fail "a restart made an honest worker of it"
+until_true 10 sh -c "[ \$(grep -c 'is set aside and gets no work' '$DIR/saint.log') -ge 2 ]" || fail "it is trusted after a restart"
+id=$(submit "$BOX" -o "$DIR/half.exr" $JOB --wait)
+same "$DIR/alone.exr" "$DIR/half.exr"
+[ "$(value "$id" verify)" = 0.5 ] || fail "the least share is $(value "$id" verify)"
+
+# Its unverified results cannot be taken out: the note says how many there are. Some are merged unverified before it is found out.
+stop $saint $a $b
+kill -9 $COORDINATOR_PID
+wait $COORDINATOR_PID 2>/dev/null || :
+start_coordinator --forgive liar
+says "$DIR/coordinator.log" "event=worker_forgiven"
+start_worker liar --test-lie 1
+id=$(submit "$BOX" -o "$DIR/some.exr" $JOB --verify 0.3)
+until_true 20 waits || fail "it waits for '$(value "$id" waiting)'"
+start_worker honest3
+start_worker honest4
+until_true 60 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" why)"
+"$BIN/hslt-status" "$id" >"$DIR/shown"
+says "$DIR/shown" "worker liar gave wrong results; "
+says "$DIR/shown" "of its leases were merged unverified"
+"$BIN/hslt-job" log "$id" >"$DIR/log"
+says "$DIR/log" "merged unverified"
+echo "a wrong bit is found"
