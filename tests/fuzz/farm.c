@@ -4,22 +4,18 @@
 #include "common/base/mem.h"
 #include "common/wire/batch_wire.h"
 #include "coordinator/shell/session.h"
+#include "tests/fuzz/folders.h"
 
 #include <arpa/inet.h>
-#include <dirent.h>
-#include <fcntl.h>
 #include <netinet/tcp.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 #include <sys/socket.h>
-#include <sys/stat.h>
 #include <sys/un.h>
 #include <unistd.h>
 
 const char farm_scene[] = "<scene version=\"3.0.0\"/>";
-
-static char base[64]; /* folder of all worlds */
 
 static void need(bool ok, const char *what)
 {
@@ -27,70 +23,6 @@ static void need(bool ok, const char *what)
 		fprintf(stderr, "the world of the fuzzer cannot be made: %s\n", what);
 		abort();
 	}
-}
-
-/* ---- folders ---- */
-
-static void remove_tree(const char *path)
-{
-	struct dirent *d;
-	DIR *dir = opendir(path);
-	while (dir && (d = readdir(dir))) {
-		char below[1024];
-		if (strcmp(d->d_name, ".") == 0 || strcmp(d->d_name, "..") == 0)
-			continue;
-		snprintf(below, sizeof below, "%s/%s", path, d->d_name);
-		if (unlink(below))
-			remove_tree(below);
-	}
-	if (dir)
-		closedir(dir);
-	rmdir(path);
-}
-
-static void copy_file(const char *from, const char *to)
-{
-	char bytes[1 << 15];
-	ssize_t n;
-	int in = open(from, O_RDONLY | O_CLOEXEC), out = open(to, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-	need(in >= 0 && out >= 0, to);
-	while ((n = read(in, bytes, sizeof bytes)) > 0)
-		need(write(out, bytes, (size_t)n) == n, to);
-	close(in);
-	close(out);
-}
-
-static void copy_tree(const char *from, const char *to)
-{
-	struct dirent *d;
-	DIR *dir = opendir(from);
-	mkdir(to, 0700);
-	while (dir && (d = readdir(dir))) {
-		char source[1024], target[1024];
-		struct stat st;
-		if (strcmp(d->d_name, ".") == 0 || strcmp(d->d_name, "..") == 0)
-			continue;
-		snprintf(source, sizeof source, "%s/%s", from, d->d_name);
-		snprintf(target, sizeof target, "%s/%s", to, d->d_name);
-		if (lstat(source, &st) == 0 && S_ISDIR(st.st_mode))
-			copy_tree(source, target);
-		else if (S_ISREG(st.st_mode))
-			copy_file(source, target);
-	}
-	if (dir)
-		closedir(dir);
-}
-
-static void remove_base(void)
-{
-	remove_tree(base);
-}
-
-static void make_base(void)
-{
-	strcpy(base, access("/dev/shm", W_OK) ? "/tmp/hslt-fuzz.XXXXXX" : "/dev/shm/hslt-fuzz.XXXXXX");
-	need(mkdtemp(base) != NULL, base);
-	atexit(remove_base);
 }
 
 /* ---- turning ---- */
@@ -148,14 +80,15 @@ static void fill(void);
 
 static void template_path(char path[128])
 {
-	snprintf(path, 128, "%s/template", base);
+	snprintf(path, 128, "%s/template", folders_base());
 }
 
 static void make_once(void)
 {
-	if (*base)
+	static bool made;
+	if (made)
 		return;
-	make_base();
+	made = true;
 	log_set_level(getenv("HSLT_FUZZ_LOG") ? LOG_LEVEL_DEBUG : LOG_LEVEL_ERROR);
 	fill();
 }
@@ -165,7 +98,7 @@ void farm_spool_copy(const char *to)
 	char from[128];
 	make_once();
 	template_path(from);
-	copy_tree(from, to);
+	folders_copy(from, to);
 }
 
 struct farm_world *farm_world_new(void)
@@ -174,7 +107,7 @@ struct farm_world *farm_world_new(void)
 	struct farm_world *w = calloc(1, sizeof *w);
 	struct error e;
 	make_once();
-	snprintf(w->spool, sizeof w->spool, "%s/%u", base, count++);
+	snprintf(w->spool, sizeof w->spool, "%s/%u", folders_base(), count++);
 	farm_spool_copy(w->spool);
 	int rc = farm_world_open(w, &e);
 	need(rc == 0, e.text);
@@ -185,7 +118,7 @@ void farm_world_free(struct farm_world *w)
 {
 	if (w->server)
 		farm_world_close(w);
-	remove_tree(w->spool);
+	folders_remove(w->spool);
 	free(w);
 }
 
@@ -289,10 +222,10 @@ struct plan farm_plan(uint64_t job)
 {
 	struct plan p;
 	struct error e;
-	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .spp = 4, .max_depth = 5,
+	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .border = 2, .spp = 4, .max_depth = 5,
 				 .groups = 2, .bootstrap = 64, .chains = 4, .epoch = 100};
 	if (job == FARM_CHAINS)
-		snprintf(r.mixture, sizeof r.mixture, "independent=0.1,hslt=0.9");
+		snprintf(r.integrator, sizeof r.integrator, "hslt"), snprintf(r.mixture, sizeof r.mixture, "independent=0.1,hslt=0.9");
 	if (job == FARM_SAMPLES) {
 		r.kind = PLAN_SAMPLES;
 		r.chains = 0;

@@ -1,0 +1,295 @@
+/*
+ * TLS in memory. The first byte says what the others are: what a stranger says to a listener or to a caller; places where one
+ * direction of a handshake and what follows is changed; records to an established link; a certificate. Whatever is changed, no link
+ * may open to somebody else, and what is heard is a beginning of what was said.
+ */
+#include "common/net/authority.h"
+#include "tests/fuzz/folders.h"
+#include "tests/fuzz/seeds.h"
+
+#include <openssl/err.h>
+#include <openssl/pem.h>
+#include <openssl/ssl.h>
+#include <openssl/x509.h>
+#include <stdio.h>
+#include <string.h>
+
+enum what { TO_LISTENER, TO_CALLER, CHANGE_CALLER, CHANGE_LISTENER, RECORDS, CERTIFICATE, WHATS };
+enum { SAID = 3000, EDITS_MOST = 16, PIECE = 700 };
+
+static struct tls *farm, *node, *stranger;
+
+static void need(int rc, const struct error *e)
+{
+	if (rc) {
+		fprintf(stderr, "%s\n", e->text);
+		abort();
+	}
+}
+
+static struct tls *folder_of(const char *authority, const char *name, enum tls_role role)
+{
+	char path[256], home[128];
+	struct tls *t;
+	struct error e = {""};
+	snprintf(home, sizeof home, "%s/%s", folders_base(), authority);
+	snprintf(path, sizeof path, "%s/%s", home, name);
+	need(authority_issue(home, name, role, 1, false, &e), &e);
+	need(tls_open(&t, path, &e), &e);
+	return t;
+}
+
+static void make_folders(void)
+{
+	static const char *const homes[] = {"ours", "theirs"};
+	struct error e = {""};
+	if (farm)
+		return;
+	for (int i = 0; i < 2; i++) {
+		char home[128];
+		snprintf(home, sizeof home, "%s/%s", folders_base(), homes[i]);
+		need(authority_init(home, homes[i], 2, &e), &e);
+	}
+	farm = folder_of("ours", "farm", TLS_COORDINATOR);
+	node = folder_of("ours", "node", TLS_WORKER);
+	stranger = folder_of("theirs", "node", TLS_WORKER);
+}
+
+/* ---- an end ---- */
+
+struct end {
+	struct tls_link *link;
+	bool broken;
+	uint8_t got[2 * SAID];
+	size_t got_size;
+};
+
+static struct end caller, listener;
+
+static void open_end(struct end *x, struct tls *t, bool listening)
+{
+	struct error e;
+	*x = (struct end){0};
+	need(tls_link_new(&x->link, t, listening, &e), &e);
+}
+
+static void read_all(struct end *x)
+{
+	struct error e;
+	ssize_t n = 1;
+	while (!x->broken && n > 0) {
+		uint8_t bytes[512];
+		n = tls_link_read(x->link, bytes, sizeof bytes, &e);
+		x->broken = n < 0;
+		for (ssize_t i = 0; i < n && x->got_size < sizeof x->got; i++)
+			x->got[x->got_size++] = bytes[i];
+	}
+}
+
+static void give(struct end *x, const void *bytes, size_t size)
+{
+	struct error e;
+	for (size_t i = 0; i < size && !x->broken; i += PIECE) {
+		x->broken = tls_link_take(x->link, (const uint8_t *)bytes + i, size - i < PIECE ? size - i : PIECE, &e) != 0;
+		read_all(x);
+	}
+}
+
+/* ---- two ends, and somebody between them ---- */
+
+struct edits { /* of one direction: u16 BE place, xor */
+	const uint8_t *bytes;
+	size_t size, passed;
+	const struct end *from;
+};
+
+static void change(struct edits *d, uint8_t *bytes, size_t size)
+{
+	for (size_t i = 0; i + 3 <= d->size && i < 3 * EDITS_MOST; i += 3) {
+		size_t place = (size_t)d->bytes[i] << 8 | d->bytes[i + 1];
+		if (place >= d->passed && place < d->passed + size)
+			bytes[place - d->passed] ^= d->bytes[i + 2];
+	}
+	d->passed += size;
+}
+
+static bool carry(struct end *from, struct end *to, struct edits *d)
+{
+	const unsigned char *bytes;
+	static uint8_t copy[1 << 17];
+	size_t size = tls_link_output(from->link, &bytes);
+	if (!size)
+		return false;
+	if (size > sizeof copy)
+		abort();
+	memcpy(copy, bytes, size);
+	tls_link_output_taken(from->link);
+	if (d && d->from == from)
+		change(d, copy, size);
+	give(to, copy, size);
+	return true;
+}
+
+static void carry_all(struct edits *d)
+{
+	bool more = true;
+	while (more) {
+		more = carry(&caller, &listener, d);
+		more |= carry(&listener, &caller, d);
+	}
+}
+
+static uint8_t said(size_t i)
+{
+	return (uint8_t)(i * 7 + i / 251);
+}
+
+static void say(struct end *x)
+{
+	uint8_t bytes[SAID];
+	struct error e;
+	for (size_t i = 0; i < SAID; i++)
+		bytes[i] = said(i);
+	if (!x->broken && tls_link_is_open(x->link))
+		x->broken = tls_link_write(x->link, bytes, SAID, &e) != 0;
+}
+
+static void judge(const struct end *x, const char *name)
+{
+	if (x->got_size > SAID)
+		abort();
+	for (size_t i = 0; i < x->got_size; i++)
+		if (x->got[i] != said(i))
+			abort();
+	if (tls_link_is_open(x->link) && strcmp(tls_link_peer(x->link)->name, name) != 0)
+		abort();
+}
+
+static void converse(const uint8_t *bytes, size_t size, const struct end *changed, struct tls *who)
+{
+	struct edits d = {bytes, size, 0, changed};
+	open_end(&caller, who, false);
+	open_end(&listener, farm, true);
+	read_all(&caller);
+	carry_all(&d);
+	say(&caller);
+	say(&listener);
+	carry_all(&d);
+	judge(&caller, "farm");
+	judge(&listener, "node");
+	if (who == stranger && tls_link_is_open(listener.link))
+		abort();
+	tls_link_free(caller.link);
+	tls_link_free(listener.link);
+}
+
+static void send_records(const uint8_t *bytes, size_t size)
+{
+	struct error e;
+	open_end(&caller, node, false);
+	open_end(&listener, farm, true);
+	read_all(&caller);
+	carry_all(NULL);
+	if (!tls_link_is_open(listener.link) || !tls_link_is_open(caller.link))
+		abort();
+	give(&listener, bytes, size);
+	if (listener.got_size)
+		abort(); /* nobody without the keys is heard */
+	if (tls_link_recheck(listener.link, &e))
+		abort();
+	tls_link_free(caller.link);
+	tls_link_free(listener.link);
+}
+
+static void send_alone(const uint8_t *bytes, size_t size, bool listening)
+{
+	struct end *x = listening ? &listener : &caller;
+	open_end(x, listening ? farm : node, listening);
+	read_all(x);
+	give(x, bytes, size);
+	if (tls_link_is_open(x->link))
+		abort();
+	tls_link_free(x->link);
+}
+
+static void read_certificate(const uint8_t *bytes, size_t size)
+{
+	struct tls_peer p;
+	struct error e;
+	X509 *cert = d2i_X509(NULL, &bytes, (long)size);
+	if (cert && tls_read_peer(cert, &p, &e) == 0 && (!tls_name_ok(p.name) || p.role == TLS_NOBODY))
+		abort();
+	X509_free(cert);
+	ERR_clear_error();
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
+{
+	make_folders();
+	if (!size)
+		return 0;
+	unsigned what = *bytes++;
+	size--;
+	switch ((enum what)(what % WHATS)) {
+	case TO_LISTENER:
+	case TO_CALLER:
+		send_alone(bytes, size, what % WHATS == TO_LISTENER);
+		break;
+	case CHANGE_CALLER:
+	case CHANGE_LISTENER:
+		converse(bytes, size, what % WHATS == CHANGE_CALLER ? &caller : &listener, what / WHATS % 8 == 1 ? stranger : node);
+		break;
+	case RECORDS:
+		send_records(bytes, size);
+		break;
+	default:
+		read_certificate(bytes, size);
+	}
+	return 0;
+}
+
+/* ---- seeds ---- */
+
+static void write_seed(enum what what, const void *bytes, size_t size)
+{
+	static uint8_t all[1 << 16];
+	all[0] = (uint8_t)what;
+	memcpy(all + 1, bytes, size);
+	seed_file("tls", what, all, size + 1);
+}
+
+int LLVMFuzzerInitialize(int *argc, char ***argv)
+{
+	(void)argc;
+	(void)argv;
+	if (!seeds_wanted())
+		return 0;
+	const unsigned char *bytes;
+	char path[256];
+	make_folders();
+	open_end(&caller, node, false);
+	open_end(&listener, farm, true);
+	read_all(&caller);
+	size_t size = tls_link_output(caller.link, &bytes);
+	write_seed(TO_LISTENER, bytes, size);
+	write_seed(RECORDS, bytes, size);
+	carry(&caller, &listener, NULL);
+	size = tls_link_output(listener.link, &bytes);
+	write_seed(TO_CALLER, bytes, size);
+	write_seed(CHANGE_CALLER, "\0\60\1", 3);
+	write_seed(CHANGE_LISTENER, "\1\0\1", 3);
+	tls_link_free(caller.link);
+	tls_link_free(listener.link);
+	snprintf(path, sizeof path, "%s/ours/node/cert.pem", folders_base());
+	FILE *f = fopen(path, "r");
+	X509 *cert = f ? PEM_read_X509(f, NULL, NULL, NULL) : NULL;
+	unsigned char *der = NULL;
+	int n = cert ? i2d_X509(cert, &der) : 0;
+	if (n > 0)
+		write_seed(CERTIFICATE, der, (size_t)n);
+	OPENSSL_free(der);
+	X509_free(cert);
+	if (f)
+		fclose(f);
+	exit(0);
+}

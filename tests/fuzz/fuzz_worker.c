@@ -1,0 +1,359 @@
+/*
+ * A live worker and a coordinator that says what it likes. Its crew is one here that works when it is told to, on small leases only:
+ * long work is what a coordinator may ask for. Everything it fetched is forgotten after each input but the cache.
+ */
+#include "common/base/log.h"
+#include "common/base/mem.h"
+#include "tests/fuzz/farm.h"
+#include "tests/fuzz/folders.h"
+#include "tests/fuzz/messages.h"
+#include "tests/fuzz/seeds.h"
+#include "worker/daemon/agent_private.h"
+
+#include <arpa/inet.h>
+#include <netinet/tcp.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum speaker { COORDINATOR, CREW, NETWORK, SIGNAL, SPEAKERS };
+enum { WORK_MOST = 3000, PIXELS_MOST = 10000 };
+
+/* ---- the crew ---- */
+
+struct crew {
+	struct task *first;
+	unsigned pending;
+};
+
+int crew_new(struct crew **c, uv_loop_t *loop, unsigned threads, struct error *e)
+{
+	(void)loop;
+	(void)threads;
+	*c = mem_alloc(1, sizeof **c);
+	return *c ? 0 : error_set(e, ENOMEM, "no memory for a crew");
+}
+
+void crew_add(struct crew *c, struct task *t)
+{
+	struct task **at = &c->first;
+	while (*at)
+		at = &(*at)->next;
+	*at = t;
+	t->next = NULL;
+	c->pending++;
+}
+
+bool crew_take_back(struct crew *c, struct task *t)
+{
+	for (struct task **at = &c->first; *at; at = &(*at)->next)
+		if (*at == t) {
+			*at = t->next;
+			c->pending--;
+			return true;
+		}
+	return false;
+}
+
+unsigned crew_pending(const struct crew *c)
+{
+	return c->pending;
+}
+
+void crew_close(struct crew *c)
+{
+	mem_free(c);
+}
+
+/* ---- the worker ---- */
+
+static struct {
+	struct agent *agent;
+	int listener, fd;
+	char address[32], cache[96];
+} now = {.fd = -1};
+
+static void start_listening(void)
+{
+	struct sockaddr_in a = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
+	socklen_t size = sizeof a;
+	now.listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+	if (bind(now.listener, (struct sockaddr *)&a, size) || listen(now.listener, 8) ||
+	    getsockname(now.listener, (struct sockaddr *)&a, &size))
+		abort();
+	snprintf(now.address, sizeof now.address, "127.0.0.1:%u", ntohs(a.sin_port));
+	snprintf(now.cache, sizeof now.cache, "%s/cache", folders_base());
+	log_set_level(getenv("HSLT_FUZZ_LOG") ? LOG_LEVEL_DEBUG : LOG_LEVEL_ERROR);
+}
+
+static void start_worker(void)
+{
+	struct agent_config c = {.coordinator = now.address, .name = "w", .cache = now.cache, .cache_bytes = 1 << 22, .threads = 1};
+	struct error e;
+	if (!now.listener)
+		start_listening();
+	if (agent_open(&now.agent, &c, &e)) {
+		fprintf(stderr, "%s\n", e.text);
+		abort();
+	}
+}
+
+static void turn(void)
+{
+	uv_run(&now.agent->loop, UV_RUN_NOWAIT);
+}
+
+static void drain(void)
+{
+	char bytes[1 << 15];
+	ssize_t n = 1;
+	while (now.fd >= 0 && n > 0)
+		n = recv(now.fd, bytes, sizeof bytes, MSG_DONTWAIT);
+}
+
+static void say(const void *bytes, size_t size)
+{
+	const char *at = bytes;
+	while (now.fd >= 0 && size && now.agent->conn) {
+		ssize_t n = send(now.fd, at, size, MSG_NOSIGNAL | MSG_DONTWAIT);
+		if (n < 0 && errno != EAGAIN)
+			return;
+		at += n > 0 ? n : 0;
+		size -= n > 0 ? (size_t)n : 0;
+		turn();
+	}
+}
+
+static void say_hello_ack(void)
+{
+	Farm__HelloAck ack;
+	Farm__Envelope m;
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	farm__hello_ack__init(&ack);
+	farm__envelope__init(&m);
+	ack.accepted = true;
+	ack.version = FARM_VERSION;
+	ack.heartbeat_ms = 100000;
+	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
+	m.hello_ack = &ack;
+	if (envelope_pack(&m, NULL, 0, &frame, &size, &e) == 0) {
+		say(frame, size);
+		mem_free(frame);
+	}
+}
+
+static void hang_up(void)
+{
+	struct linger reset = {1, 0};
+	if (now.fd >= 0) {
+		setsockopt(now.fd, SOL_SOCKET, SO_LINGER, &reset, sizeof reset);
+		close(now.fd);
+	}
+	now.fd = -1;
+	for (int i = 0; now.agent->conn && i < 1000; i++)
+		turn();
+}
+
+/* The worker waits a while before it calls again; here it does not. */
+static void answer(void)
+{
+	struct agent *a = now.agent;
+	for (int i = 0; i < 1000 && now.fd < 0 && !a->gone; i++) {
+		if (!a->conn)
+			uv_timer_start(&a->retry, a->retry.timer_cb, 0, 0);
+		turn();
+		now.fd = accept4(now.listener, NULL, NULL, SOCK_CLOEXEC | SOCK_NONBLOCK);
+	}
+	setsockopt(now.fd, IPPROTO_TCP, TCP_NODELAY, &(int){1}, sizeof(int));
+	turn();
+	say_hello_ack();
+}
+
+/* ---- steps ---- */
+
+static bool is_small(const struct plan *p)
+{
+	uint64_t pixels = (uint64_t)p->width * p->height;
+	return pixels <= PIXELS_MOST && p->border < 16 && p->bootstrap / (p->groups * p->parts) <= WORK_MOST && p->epoch <= WORK_MOST &&
+	       (p->kind == PLAN_CHAINS ? p->chains / (p->groups * p->parts) * p->epoch : pixels * p->epoch) <= WORK_MOST && p->max_depth <= 16;
+}
+
+static bool is_building(const struct task *t)
+{
+	for (const struct bundle *b = now.agent->bundles; b; b = b->next)
+		if (&b->task == t)
+			return true;
+	return false;
+}
+
+/* What has begun is let go of on the way back, as by a thread. */
+static void work(void)
+{
+	struct crew *c = now.agent->crew;
+	struct task *t = c->first;
+	if (!t)
+		return;
+	c->first = t->next;
+	if (is_building(t)) {
+		if (is_small(&((struct bundle *)t)->plan))
+			t->run(t);
+		else
+			((struct bundle *)t)->state = BUNDLE_FAILED;
+	} else {
+		struct lease_task *l = (struct lease_task *)t;
+		atomic_store(&l->stop, !is_small(&l->bundle->plan));
+		t->run(t);
+	}
+	c->pending--;
+	t->done(t);
+}
+
+static void step(const struct step *s)
+{
+	unsigned char prefix[FRAME_PREFIX];
+	switch (s->who % SPEAKERS) {
+	case COORDINATOR:
+		if (now.fd < 0)
+			answer();
+		frame_prefix_write(prefix, (uint32_t)s->header_size, (uint32_t)s->payload_size);
+		say(prefix, sizeof prefix);
+		say(s->header, s->header_size);
+		say(s->payload, s->payload_size);
+		break;
+	case CREW:
+		work();
+		break;
+	case NETWORK:
+		hang_up();
+		break;
+	case SIGNAL:
+		if (!now.agent->leaving) {
+			now.agent->leaving = true;
+			desk_leave(now.agent);
+			agent_settle(now.agent);
+		}
+	}
+	turn();
+	drain();
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
+{
+	struct step steps[SCRIPT_STEPS];
+	if (!now.agent)
+		start_worker();
+	size_t count = script_read(bytes, size, steps);
+	for (size_t i = 0; i < count && !now.agent->gone; i++)
+		step(&steps[i]);
+	hang_up();
+	if (!now.agent->gone)
+		*now.agent->crew = (struct crew){0};
+	desk_close(now.agent);
+	if (now.agent->leaving) {
+		agent_close(now.agent);
+		now.agent = NULL;
+	}
+	return 0;
+}
+
+size_t LLVMFuzzerCustomMutator(uint8_t *bytes, size_t size, size_t room, unsigned seed)
+{
+	return script_mutate(bytes, size, room, seed, SPEAKERS);
+}
+
+/* ---- seeds ---- */
+
+static char room[] = "<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><film type=\"hdrfilm\">"
+		     "<integer name=\"width\" value=\"20\"/><integer name=\"height\" value=\"10\"/></film></sensor>"
+		     "<shape type=\"sphere\"><point name=\"center\" x=\"0\" y=\"0\" z=\"4\"/><bsdf type=\"diffuse\"/></shape>"
+		     "<shape type=\"rectangle\"><transform name=\"to_world\"><rotate x=\"1\" angle=\"90\"/><translate y=\"3\" z=\"4\"/></transform>"
+		     "<emitter type=\"area\"><rgb name=\"radiance\" value=\"9\"/></emitter></shape></scene>";
+
+static void describe_job(struct seed *s, uint64_t job)
+{
+	struct plan plan = farm_plan(job);
+	struct blob_hash hash;
+	struct error e;
+	Farm__JobInfo info;
+	Farm__Plan wire;
+	Farm__File file, *files[1] = {&file};
+	Farm__BlobChunk chunk;
+	Farm__Envelope m;
+	char name[] = "s.xml";
+	farm__job_info__init(&info);
+	farm__file__init(&file);
+	farm__blob_chunk__init(&chunk);
+	blob_hash_bytes(room, strlen(room), &hash, &e);
+	plan_to_wire(&plan, &wire);
+	file.name = info.name = info.scene = name;
+	file.hash = chunk.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
+	file.size = chunk.size = strlen(room);
+	info.job = job;
+	info.plan = &wire;
+	info.n_files = 1;
+	info.files = files;
+	SEED_SAY(s, COORDINATOR, JOB_INFO, job_info, &info);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+	m.blob_chunk = &chunk;
+	seed_say(s, COORDINATOR, &m, room, strlen(room));
+}
+
+static void grant(struct seed *s, const struct lease_key *k)
+{
+	Farm__LeaseKey key;
+	Farm__LeaseGrant g;
+	uint64_t seeds[2] = {UINT64_MAX, UINT64_MAX}; /* of a black bootstrap */
+	struct plan plan = farm_plan(k->job);
+	farm__lease_grant__init(&g);
+	lease_key_to_wire(k, &key);
+	g.key = &key;
+	if (k->kind == LEASE_RENDER && plan.kind == PLAN_CHAINS) {
+		struct plan_range chains = plan_chain_range(&plan, k->part);
+		g.n_seeds = (size_t)(chains.end - chains.begin);
+		g.seeds = seeds;
+	}
+	SEED_SAY(s, COORDINATOR, LEASE_GRANT, lease_grant, &g);
+}
+
+int LLVMFuzzerInitialize(int *argc, char ***argv)
+{
+	(void)argc;
+	(void)argv;
+	static const struct lease_key keys[] = {{.job = FARM_BOOTSTRAP, .kind = LEASE_BOOTSTRAP}, {.job = FARM_CHAINS, .kind = LEASE_RENDER},
+						{.job = FARM_SAMPLES, .kind = LEASE_RENDER}};
+	if (!seeds_wanted())
+		return 0;
+	for (size_t i = 0; i < sizeof keys / sizeof *keys; i++)
+		for (int end = 0; end < 3; end++) {
+			struct seed s = {0};
+			Farm__LeaseKey key;
+			Farm__LeaseAck ack;
+			Farm__LeaseRevoke revoke;
+			Farm__JobEnd job_end;
+			farm__lease_ack__init(&ack);
+			farm__lease_revoke__init(&revoke);
+			farm__job_end__init(&job_end);
+			lease_key_to_wire(&keys[i], &key);
+			ack.key = revoke.key = &key;
+			ack.verdict = FARM__VERDICT__VERDICT_MERGED;
+			job_end.job = keys[i].job;
+			grant(&s, &keys[i]);
+			describe_job(&s, keys[i].job);
+			seed_raw(&s, CREW, "-");
+			if (end == 1)
+				SEED_SAY(&s, COORDINATOR, LEASE_REVOKE, lease_revoke, &revoke);
+			seed_raw(&s, end == 2 ? SIGNAL : CREW, "-");
+			if (end == 0) {
+				seed_raw(&s, NETWORK, "-");
+				describe_job(&s, keys[i].job);
+				SEED_SAY(&s, COORDINATOR, LEASE_ACK, lease_ack, &ack);
+			}
+			SEED_SAY(&s, COORDINATOR, JOB_END, job_end, &job_end);
+			seed_end(&s, "lease", 3 * i + (size_t)end);
+		}
+	exit(0);
+}
