@@ -155,6 +155,13 @@ struct cutter {
 	size_t left;
 };
 
+/* No bytes at all are a place, too: that of states without bytes. */
+static struct cutter cutter_of(const unsigned char *payload, size_t size)
+{
+	static const unsigned char nothing[1];
+	return (struct cutter){payload ? payload : nothing, size};
+}
+
 static const unsigned char *cut(struct cutter *c, size_t size)
 {
 	if (size > c->left)
@@ -220,7 +227,7 @@ static int cut_floats(struct cutter *c, const char *what, uint64_t count, float 
 int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult *m, const unsigned char *payload,
 		 size_t payload_size, struct error *e)
 {
-	struct cutter c = {payload, payload_size};
+	struct cutter c = cutter_of(payload, payload_size);
 	memset(b, 0, sizeof *b);
 	int rc = lease_key_from_wire(m->key, &b->key, e);
 	if (!rc && m->n_counters != BATCH_COUNTERS)
@@ -312,7 +319,7 @@ int grant_pack(const struct lease_key *k, const uint64_t *seeds, const struct ch
 int grant_unpack(struct grant *g, const Farm__LeaseGrant *m, const unsigned char *payload, size_t payload_size,
 		 struct error *e)
 {
-	struct cutter c = {payload, payload_size};
+	struct cutter c = cutter_of(payload, payload_size);
 	memset(g, 0, sizeof *g);
 	int rc = lease_key_from_wire(m->key, &g->key, e);
 	if (!rc && m->n_seeds && m->n_state_sizes)

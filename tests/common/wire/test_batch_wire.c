@@ -321,6 +321,9 @@ static void grants_travel(void **state)
 	assert_true(g.chain_count == 2 && g.seeds == NULL && g.states[0].size == 0 && g.states[1].size == 3);
 	assert_memory_equal(g.states[1].bytes, "abc", 3);
 	grant_fini(&g);
+	g = grant_travels(&k, NULL, (struct chain_state[2]){{NULL, 0}, {NULL, 0}}, 2); /* the first payload of a connection, and none */
+	assert_true(g.chain_count == 2 && g.states[0].size == 0 && g.states[1].size == 0);
+	grant_fini(&g);
 	g = grant_travels(&k, NULL, NULL, 0);
 	assert_true(g.chain_count == 0);
 	grant_fini(&g);
