@@ -61,7 +61,7 @@ int farm_world_open(struct farm_world *w, struct error *e)
 	c.listen = "127.0.0.1:0";
 	c.spool = w->spool;
 	c.status_socket = socket_path;
-	c.journal_bytes = 1 << 14;
+	c.journal_bytes = 1 << 12; /* so that there are checkpoints */
 	c.max_connections = 16;
 	for (unsigned i = 0; i < FARM_PEERS; i++)
 		w->peers[i].fd = -1;

@@ -1,0 +1,286 @@
+/*
+ * A coordinator that starts on a spool which came back damaged. The first byte says which file, and what the others are: its bytes,
+ * places of it that are changed, or what is in it behind checksums that fit. It may refuse to start, begin a job anew or fail it; if
+ * it starts, it answers.
+ */
+#include "common/base/mem.h"
+#include "common/base/sealed.h"
+#include "common/wire/batch_wire.h"
+#include "coordinator/store/journal.h"
+#include "coordinator/store/ledger.h"
+#include "tests/fuzz/farm.h"
+#include "tests/fuzz/folders.h"
+#include "tests/fuzz/seeds.h"
+
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+enum what { RECORD, JOURNAL, JOURNAL_CHANGED, JOURNAL_BODIES, CHECKPOINT_CHANGED, CHECKPOINT_BODY, DATABASE_CHANGED, SUBMISSION, WHATS };
+enum { EDIT = 4, EDITS_MOST = 32, SEED_MOST = 16000, FILE_MOST = 1 << 20 };
+
+static uint8_t file[FILE_MOST];
+
+static size_t load(const char *path)
+{
+	FILE *f = fopen(path, "rb");
+	size_t n = f ? fread(file, 1, sizeof file, f) : 0;
+	if (f)
+		fclose(f);
+	return n;
+}
+
+static void store(const char *path, const void *bytes, size_t size)
+{
+	FILE *f = fopen(path, "wb");
+	if (!f || fwrite(bytes, 1, size, f) != size || fclose(f))
+		abort();
+}
+
+static void path_in(const char *spool, const char *name, char path[512])
+{
+	snprintf(path, 512, "%s/%s", spool, name);
+}
+
+/* Of the job in its bootstrap, which has no checkpoint yet. */
+static void journal_path(const char *spool, char path[512])
+{
+	snprintf(path, 512, "%s/jobs/j%d/journal.0", spool, FARM_BOOTSTRAP);
+}
+
+/* u24 BE place, xor */
+static void change(const uint8_t *edits, size_t size, uint8_t *bytes, size_t count)
+{
+	for (size_t i = 0; i + EDIT <= size && i < EDIT * EDITS_MOST && count; i += EDIT) {
+		size_t at = (size_t)edits[i] << 16 | (size_t)edits[i + 1] << 8 | edits[i + 2];
+		bytes[at % count] ^= edits[i + 3];
+	}
+}
+
+static void change_file(const char *path, const uint8_t *edits, size_t size)
+{
+	size_t n = load(path);
+	change(edits, size, file, n);
+	store(path, file, n);
+}
+
+static void seal(const char *path, const void *bytes, size_t size)
+{
+	struct sealed s;
+	struct error e;
+	unlink(path);
+	if (sealed_create(&s, path, &e) || sealed_write(&s, bytes, size, &e) || sealed_finish(&s, &e))
+		abort();
+	sealed_close(&s);
+}
+
+/* Each: kind, u16 BE size, body. */
+static void write_journal(const char *spool, const uint8_t *bytes, size_t size)
+{
+	char path[512], folder[512];
+	struct journal *j;
+	struct error e;
+	journal_path(spool, path);
+	unlink(path);
+	snprintf(folder, sizeof folder, "%s/jobs/j%d", spool, FARM_BOOTSTRAP);
+	if (journal_create(&j, folder, FARM_BOOTSTRAP, 0, &e))
+		abort();
+	while (size > 3) {
+		size_t n = (size_t)bytes[1] << 8 | bytes[2];
+		n = n < size - 3 ? n : size - 3;
+		journal_append(j, (enum journal_kind)(*bytes % 5), *bytes, bytes + 3, n, NULL, 0, &e);
+		bytes += 3 + n;
+		size -= 3 + n;
+	}
+	journal_release(j);
+}
+
+/* A new job's submission and plan: what the database would hold; the first two bytes say where one ends. */
+static void write_submission(const char *spool, const uint8_t *bytes, size_t size)
+{
+	char path[512];
+	struct ledger *l;
+	struct error e;
+	size_t first = size < 2 ? 0 : (size_t)bytes[0] << 8 | bytes[1];
+	if (size < 2)
+		return;
+	bytes += 2;
+	size -= 2;
+	first = first < size ? first : size;
+	struct ledger_job job = {.id = 9, .owner = "", .name = "n", .version = "1", .submitted = 1, .submission = bytes,
+				 .submission_size = first, .plan = bytes + first, .plan_size = size - first};
+	path_in(spool, "jobs.db", path);
+	if (ledger_open(&l, path, &e))
+		abort();
+	ledger_add(l, &job, &e);
+	ledger_close(l);
+}
+
+static void damage(const char *spool, enum what what, const uint8_t *bytes, size_t size)
+{
+	char path[512];
+	size_t n;
+	switch (what) {
+	case RECORD:
+		path_in(spool, "jobs/j1/job.json", path);
+		store(path, bytes, size);
+		break;
+	case JOURNAL:
+		journal_path(spool, path);
+		store(path, bytes, size);
+		break;
+	case JOURNAL_CHANGED:
+		journal_path(spool, path);
+		change_file(path, bytes, size);
+		break;
+	case JOURNAL_BODIES:
+		write_journal(spool, bytes, size);
+		break;
+	case CHECKPOINT_CHANGED:
+		path_in(spool, "jobs/j2/checkpoint", path);
+		n = load(path);
+		if (n < 4)
+			abort();
+		change(bytes, size, file, n - 4);
+		seal(path, file, n - 4);
+		break;
+	case CHECKPOINT_BODY:
+		path_in(spool, "jobs/j2/checkpoint", path);
+		seal(path, bytes, size);
+		break;
+	case DATABASE_CHANGED:
+		path_in(spool, "jobs.db", path);
+		change_file(path, bytes, size);
+		break;
+	default:
+		write_submission(spool, bytes, size);
+	}
+}
+
+static void ask(struct farm_world *w)
+{
+	Farm__JobList list;
+	Farm__LeaseRequest request;
+	Farm__Envelope m;
+	farm__job_list__init(&list);
+	farm__lease_request__init(&request);
+	farm__envelope__init(&m);
+	farm_call(w, 0, false);
+	farm_hello(w, 0, FARM__ROLE__ROLE_CLIENT);
+	m.body_case = FARM__ENVELOPE__BODY_JOB_LIST;
+	m.job_list = &list;
+	farm_say_message(w, 0, &m, NULL, 0);
+	farm_call(w, 1, false);
+	farm_hello(w, 1, FARM__ROLE__ROLE_WORKER);
+	request.want = 20;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_REQUEST;
+	m.lease_request = &request;
+	farm_say_message(w, 1, &m, NULL, 0);
+	farm_turn(w);
+	if (w->peers[0].fd < 0)
+		abort();
+	farm_settle(w);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
+{
+	struct farm_world w = {0};
+	struct error e;
+	if (!size)
+		return 0;
+	snprintf(w.spool, sizeof w.spool, "%s/damaged", folders_base());
+	farm_spool_copy(w.spool);
+	damage(w.spool, (enum what)(*bytes % WHATS), bytes + 1, size - 1);
+	if (farm_world_open(&w, &e) == 0) {
+		ask(&w);
+		farm_world_close(&w);
+	}
+	folders_remove(w.spool);
+	return 0;
+}
+
+/* ---- seeds ---- */
+
+static uint8_t seed[FILE_MOST];
+
+static void write_seed(enum what what, size_t size)
+{
+	seed[0] = (uint8_t)what;
+	seed_file("spool", what, seed, size + 1);
+}
+
+static size_t seeded;
+
+static int add_record(void *user, enum journal_kind kind, double elapsed, const unsigned char *body, size_t size, struct error *e)
+{
+	(void)user;
+	(void)elapsed;
+	(void)e;
+	if (size > 0xffff || seeded + 3 + size > sizeof seed - 1)
+		return 0;
+	uint8_t *at = seed + 1 + seeded;
+	at[0] = (uint8_t)kind;
+	at[1] = (uint8_t)(size >> 8);
+	at[2] = (uint8_t)size;
+	memcpy(at + 3, body, size);
+	seeded += 3 + size;
+	return 0;
+}
+
+static size_t take_file(const char *path)
+{
+	size_t n = load(path);
+	memcpy(seed + 1, file, n);
+	return n;
+}
+
+static void write_seeds(const char *spool)
+{
+	char path[512], folder[512];
+	struct journal *j;
+	struct ledger *l;
+	struct ledger_job job;
+	struct error e;
+	uint64_t cut;
+	path_in(spool, "jobs/j1/job.json", path);
+	write_seed(RECORD, take_file(path));
+	path_in(spool, "jobs/j2/checkpoint", path);
+	size_t n = take_file(path);
+	if (n < 4)
+		abort(); /* the world has no checkpoint */
+	write_seed(CHECKPOINT_BODY, n - 4 < SEED_MOST ? n - 4 : SEED_MOST);
+	journal_path(spool, path);
+	write_seed(JOURNAL, take_file(path));
+	for (int i = 0; i < 3; i++) {
+		static const enum what changed[] = {JOURNAL_CHANGED, CHECKPOINT_CHANGED, DATABASE_CHANGED};
+		memcpy(seed + 1, "\0\0\60\1", EDIT);
+		write_seed(changed[i], EDIT);
+	}
+	snprintf(folder, sizeof folder, "%s/jobs/j%d", spool, FARM_BOOTSTRAP);
+	if (journal_open(&j, folder, FARM_BOOTSTRAP, 0, add_record, NULL, &cut, &e))
+		abort();
+	journal_release(j);
+	write_seed(JOURNAL_BODIES, seeded);
+	path_in(spool, "jobs.db", path);
+	if (ledger_open(&l, path, &e) || ledger_next(l, 0, &job, &e) <= 0)
+		abort();
+	seed[1] = (uint8_t)(job.submission_size >> 8);
+	seed[2] = (uint8_t)job.submission_size;
+	memcpy(seed + 3, job.submission, job.submission_size);
+	memcpy(seed + 3 + job.submission_size, job.plan, job.plan_size);
+	write_seed(SUBMISSION, 2 + job.submission_size + job.plan_size);
+	ledger_close(l);
+}
+
+int LLVMFuzzerInitialize(int *argc, char ***argv)
+{
+	char spool[128];
+	(void)argc;
+	(void)argv;
+	if (!seeds_wanted())
+		return 0;
+	snprintf(spool, sizeof spool, "%s/seeds", folders_base());
+	farm_spool_copy(spool);
+	write_seeds(spool);
+	exit(0);
+}
