@@ -365,7 +365,8 @@ static int finish(struct blob_writer *w, struct error *e)
 	blob_path(s, &w->hash, path, sizeof path);
 	if (disk_fsync(w->fd) || disk_rename(w->path, path))
 		return error_set(e, errno, "%s: %s", s->folder, strerror(errno));
-	return add_entry(s, &w->hash, w->size, 1, e);
+	int rc = disk_sync_folder(s->folder, e);
+	return rc ? rc : add_entry(s, &w->hash, w->size, 1, e);
 }
 
 static void writer_free(struct blob_writer *w)

@@ -1,5 +1,6 @@
 /*
- * Bytes named by their SHA-256: a folder of files, put there whole or not at all (temporary file, check, fsync, rename).
+ * Bytes named by their SHA-256: a folder of files, put there whole or not at all (temporary file, check, fsync,
+ * rename, fsync of the folder).
  * A store with a limit forgets what was used least recently, but nothing that is held. One thread at a time for a store;
  * hashing functions from any thread. SHA-256 through OpenSSL's EVP.
  */

@@ -1,0 +1,477 @@
+/*
+ * The power goes at a random call of the disk, again and again, while a coordinator takes jobs, merges, writes checkpoints and
+ * results; each life goes on with what the disk kept (tests/support/lossy.h). Whatever was acknowledged is there: jobs, batches (a
+ * lease whose result was acknowledged is not handed out again), results that were said to be there; and the image has the bits of
+ * an undisturbed run, which it has not if a batch is missing or counted twice.
+ *
+ * HSLT_POWER_SEEDS: so many runs (default 150; FULL=1: 4000). HSLT_POWER_SEED: this one alone, with the coordinator's log.
+ */
+#include "common/base/log.h"
+#include "common/base/mem.h"
+#include "common/film/exr.h"
+#include "coordinator/shell/server.h"
+#include "tests/support/folder.h"
+#include "tests/support/lossy.h"
+#include "tests/support/scripted.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <fcntl.h>
+#include <math.h>
+#include <signal.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+enum { JOBS = 2, IDS_MAX = 64, LEASES_MAX = 256, LIVES_MAX = 12, SHARES = 4, STATE_BYTES = 3000 };
+static const char scene[] = "<scene/>";
+
+struct job {
+	bool submitted, announced; /* acknowledged; its result was said to be there */
+	bool acked[LEASES_MAX];
+};
+
+struct farm_run {
+	struct lossy disk;
+	struct plan plan;
+	struct plan_request request;
+	pid_t pid;
+	int code; /* of its end */
+	uint16_t port;
+	struct job jobs[IDS_MAX];
+	uint64_t accepted;
+	struct scripted *client, *worker;
+	uint64_t losses, acks;
+};
+
+static _Atomic uint64_t *counts, *totals; /* of this share; of all: losses, batches acknowledged, sectors and names lost */
+static unsigned share;
+static pid_t others[SHARES];
+static struct exr_image reference;
+static bool has_reference, loud;
+static uint64_t quiet_calls; /* of an undisturbed run, that change something */
+static char port_file[80], root[80], after[80];
+
+/* ---- a life ---- */
+
+static void serve(const struct farm_run *f)
+{
+	struct server_config c;
+	struct error e = {""};
+	prctl(PR_SET_PDEATHSIG, SIGKILL); /* a test that fails leaves nobody behind */
+	server_config_init(&c);
+	c.listen = "127.0.0.1:0";
+	c.spool = root;
+	c.port_file = port_file;
+	c.journal_bytes = 2000;
+	c.blob_bytes = 1 << 20;
+	log_set_level(LOG_LEVEL_DEBUG);
+	if (!loud && !freopen("/dev/null", "w", stderr))
+		_exit(1);
+	lossy_begin(&f->disk);
+	int rc = server_run(&c, &e);
+	if (rc)
+		fprintf(stderr, "%s\n", e.text);
+	_exit(rc ? 1 : 0);
+}
+
+/* 0: it runs; else its exit code, -1 for 0: it is gone. */
+static int gone(struct farm_run *f, bool wait)
+{
+	int status;
+	if (!f->code && waitpid(f->pid, &status, wait ? 0 : WNOHANG) == f->pid) {
+		assert_true(WIFEXITED(status));
+		f->code = WEXITSTATUS(status) ? WEXITSTATUS(status) : -1;
+	}
+	return f->code;
+}
+
+/* false: the power went before it listened. */
+static bool start(struct farm_run *f)
+{
+	unlink(port_file);
+	fflush(NULL);
+	f->code = 0;
+	f->pid = fork();
+	if (f->pid == 0)
+		serve(f);
+	for (unsigned number = 0, i = 0; i < 20000; i++) {
+		FILE *file = fopen(port_file, "r");
+		bool has = file && fscanf(file, "%u", &number) == 1;
+		if (file)
+			fclose(file);
+		if (has) {
+			f->port = (uint16_t)number;
+			return true;
+		}
+		int code = gone(f, false);
+		if (code) {
+			assert_int_equal(code, LOSSY_EXIT);
+			return false;
+		}
+		usleep(500);
+	}
+	fail_msg("the coordinator does not start");
+	return false;
+}
+
+/* What the disk kept becomes the spool. */
+static void swap_folders(struct farm_run *f)
+{
+	char command[512];
+	snprintf(command, sizeof command, "rm -rf '%s' && mv '%s' '%s'", root, after, root);
+	assert_int_equal(system(command), 0);
+	f->losses++;
+}
+
+static void hang_up(struct farm_run *f)
+{
+	scripted_hang_up(f->client);
+	scripted_hang_up(f->worker);
+	f->client = f->worker = NULL;
+}
+
+/* ---- what it must say ---- */
+
+static size_t lease_index(const struct plan *p, const struct lease_key *k)
+{
+	size_t i = k->kind == LEASE_BOOTSTRAP ? 0 : 1 + (size_t)k->epoch;
+	i = (i * p->groups + k->group) * p->parts + k->part;
+	assert_true(i < LEASES_MAX);
+	return i;
+}
+
+static const Farm__Envelope *ask(struct scripted *p, bool said)
+{
+	return said ? scripted_hear(p) : NULL;
+}
+
+static void check_image(const unsigned char *bytes, size_t size)
+{
+	struct exr_image img;
+	struct error e;
+	assert_int_equal(exr_read(bytes, size, &img, &e), 0);
+	if (!has_reference) {
+		reference = img;
+		has_reference = true;
+		return;
+	}
+	assert_int_equal(img.channel_count, reference.channel_count);
+	for (uint32_t i = 0; i < img.channel_count; i++)
+		assert_memory_equal(img.planes[i], reference.planes[i], sizeof(float) * img.width * img.height);
+	exr_image_fini(&img);
+}
+
+/* false: it hung up. */
+static bool fetch(struct farm_run *f, uint64_t id)
+{
+	const Farm__Envelope *m = ask(f->client, scripted_fetch(f->client, id, FARM__WHAT__WHAT_RESULT));
+	if (!m)
+		return false;
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_FETCH_CHUNK);
+	assert_string_equal(m->fetch_chunk->error, "");
+	check_image(f->client->reader.payload.bytes, f->client->reader.payload.size);
+	return true;
+}
+
+/* All that were acknowledged are there, none failed, and those that were said to be done are. false: it hung up. */
+static bool look(struct farm_run *f)
+{
+	bool seen[IDS_MAX] = {false}, done[IDS_MAX] = {false};
+	const Farm__Envelope *m = ask(f->client, scripted_list(f->client));
+	if (!m)
+		return false;
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	for (size_t i = 0; i < m->job_list_answer->n_jobs; i++) {
+		const Farm__JobStatus *j = m->job_list_answer->jobs[i];
+		assert_true(j->job < IDS_MAX);
+		if (f->jobs[j->job].submitted && (strcmp(j->state, "failed") == 0 || strcmp(j->state, "cancelled") == 0))
+			fail_msg("j%llu is %s: %s", (unsigned long long)j->job, j->state, j->why);
+		seen[j->job] = true;
+		done[j->job] = strcmp(j->state, "done") == 0 && j->fetchable;
+	}
+	for (uint64_t id = 0; id < IDS_MAX; id++) {
+		struct job *j = &f->jobs[id];
+		if (j->submitted && !seen[id])
+			fail_msg("j%llu is lost", (unsigned long long)id);
+		if (j->announced && !done[id])
+			fail_msg("j%llu was done", (unsigned long long)id);
+		if (done[id] && !fetch(f, id))
+			return false;
+		j->announced = done[id] && j->submitted;
+	}
+	return true;
+}
+
+/* ---- the work of a life; false: the power went ---- */
+
+static bool submit(struct farm_run *f)
+{
+	const Farm__Envelope *m = ask(f->client, scripted_submit(f->client, &f->request, scene));
+	if (m && m->body_case == FARM__ENVELOPE__BODY_SUBMIT_ANSWER && m->submit_answer->n_missing)
+		m = ask(f->client, scripted_send_scene(f->client, scene));
+	if (!m)
+		return false;
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_SUBMIT_ANSWER);
+	if (*m->submit_answer->refusal)
+		fail_msg("%s", m->submit_answer->refusal);
+	assert_in_range(m->submit_answer->job, 1, IDS_MAX - 1);
+	struct job *j = &f->jobs[m->submit_answer->job];
+	assert_false(j->submitted); /* an id is given out once */
+	j->submitted = true;
+	f->accepted++;
+	return true;
+}
+
+static bool answer_lease(struct farm_run *f, const Farm__LeaseGrant *g)
+{
+	struct grant grant;
+	struct error e;
+	assert_int_equal(grant_unpack(&grant, g, f->worker->reader.payload.bytes, f->worker->reader.payload.size, &e), 0);
+	struct lease_key before = grant.key;
+	assert_true(before.job < IDS_MAX);
+	if (f->jobs[before.job].acked[lease_index(&f->plan, &before)])
+		fail_msg("j%llu kind %d group %u part %u epoch %llu was acknowledged, and is handed out again", (unsigned long long)before.job,
+			 (int)before.kind, before.group, before.part, (unsigned long long)before.epoch);
+	before.epoch--;
+	for (uint32_t i = 0; grant.states && i < grant.chain_count; i++) {
+		uint64_t tag;
+		memcpy(&tag, grant.states[i].bytes, sizeof tag);
+		assert_true(tag == scripted_tag(&before));
+	}
+	struct batch b = scripted_batch(&grant.key, &f->plan, STATE_BYTES);
+	bool said = scripted_send(f->worker, &b, &f->plan);
+	batch_fini(&b);
+	grant_fini(&grant);
+	return said;
+}
+
+static void take_ack(struct farm_run *f, const Farm__LeaseAck *a)
+{
+	struct lease_key k;
+	struct error e;
+	assert_int_equal(lease_key_from_wire(a->key, &k, &e), 0);
+	if (a->verdict == FARM__VERDICT__VERDICT_REFUSED)
+		fail_msg("refused: %s", a->text);
+	f->jobs[k.job].acked[lease_index(&f->plan, &k)] = true;
+	f->acks++;
+}
+
+static bool all_announced(const struct farm_run *f)
+{
+	for (int i = 0; i < IDS_MAX; i++)
+		if (f->jobs[i].submitted && !f->jobs[i].announced)
+			return false;
+	return true;
+}
+
+static bool work(struct farm_run *f)
+{
+	f->client = scripted_call(f->port, FARM__ROLE__ROLE_CLIENT);
+	f->worker = f->client ? scripted_call(f->port, FARM__ROLE__ROLE_WORKER) : NULL;
+	if (!f->worker || !look(f))
+		return false;
+	while (f->accepted < JOBS)
+		if (!submit(f))
+			return false;
+	if (!scripted_want(f->worker, 3))
+		return false;
+	while (!all_announced(f)) {
+		if (!scripted_has(f->worker, 5)) {
+			if (!look(f))
+				return false;
+			continue;
+		}
+		const Farm__Envelope *m = scripted_hear(f->worker);
+		if (!m)
+			return false;
+		if (m->body_case == FARM__ENVELOPE__BODY_LEASE_ACK)
+			take_ack(f, m->lease_ack);
+		if (m->body_case == FARM__ENVELOPE__BODY_LEASE_GRANT && !answer_lease(f, m->lease_grant))
+			return false;
+		if (m->body_case == FARM__ENVELOPE__BODY_JOB_END && !look(f))
+			return false;
+	}
+	return true;
+}
+
+/* ---- runs ---- */
+
+static void begin(struct farm_run *f, uint64_t seed)
+{
+	struct error e;
+	memset(f, 0, sizeof *f);
+	f->request = (struct plan_request){.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .mutations = 3200,
+					   .max_depth = 5, .groups = 2, .chains = 8, .epoch = 100, .bootstrap = 64};
+	assert_int_equal(plan_make(&f->request, &f->plan, &e), 0);
+	f->disk = (struct lossy){.root = root, .after = after, .seed = seed, .counts = counts};
+	if (getenv("HSLT_POWER_FORGET"))
+		f->disk.forget = (enum lossy_forget)atoi(getenv("HSLT_POWER_FORGET"));
+	f->disk.forget_name = getenv("HSLT_POWER_FORGET_NAME");
+	snprintf(root, sizeof root, "%s/spool", folder);
+	snprintf(after, sizeof after, "%s/after", folder);
+	snprintf(port_file, sizeof port_file, "%s/port", folder);
+	char command[512];
+	snprintf(command, sizeof command, "rm -rf '%s' '%s' && mkdir '%s'", root, after, root);
+	assert_int_equal(system(command), 0);
+}
+
+static void stop(struct farm_run *f)
+{
+	hang_up(f);
+	kill(f->pid, SIGTERM);
+	assert_int_equal(gone(f, true), -1);
+}
+
+/* All is done and the coordinator idle: another job, and at its first call the power goes. */
+static void stop_in_the_dark(struct farm_run *f)
+{
+	atomic_store(&counts[4], 1);
+	scripted_submit(f->client, &f->request, "<scene version='2'/>");
+	const Farm__Envelope *m = scripted_hear(f->client);
+	if (m)
+		scripted_send_scene(f->client, "<scene version='2'/>");
+	hang_up(f);
+	assert_int_equal(gone(f, true), LOSSY_EXIT);
+	swap_folders(f);
+}
+
+static void run_seed(uint64_t seed, uint64_t *losses, uint64_t *acks)
+{
+	static struct farm_run f;
+	uint64_t draw = seed;
+	begin(&f, seed);
+	bool dark = false;
+	for (int life = 0;; life++) {
+		struct lease_key k = {.kind = LEASE_RENDER, .epoch = draw++};
+		atomic_store(&counts[0], 0);
+		atomic_store(&counts[4], 0);
+		f.disk.seed = seed * 100 + (uint64_t)life;
+		f.disk.lose_at = life < LIVES_MAX && !dark ? 1 + scripted_tag(&k) % (quiet_calls + quiet_calls / 4) : 0;
+		bool done = start(&f) && work(&f);
+		if (done && dark)
+			break;
+		if (done) {
+			stop_in_the_dark(&f);
+			dark = true;
+			continue;
+		}
+		hang_up(&f);
+		assert_int_equal(gone(&f, true), LOSSY_EXIT);
+		swap_folders(&f);
+	}
+	stop(&f);
+	*losses += f.losses;
+	*acks += f.acks;
+}
+
+static void quiet_run(void)
+{
+	static struct farm_run f;
+	begin(&f, 1);
+	atomic_store(&counts[0], 0);
+	assert_true(start(&f) && work(&f));
+	stop(&f);
+	quiet_calls = atomic_load(&counts[0]);
+	assert_true(has_reference && f.acks > 0);
+}
+
+static uint64_t number(const char *name, uint64_t otherwise)
+{
+	const char *text = getenv(name);
+	return text && *text ? strtoull(text, NULL, 10) : otherwise;
+}
+
+/* ---- shares of the runs, side by side: most of the time somebody waits ---- */
+
+static void share_log(int i, char path[64])
+{
+	snprintf(path, 64, "/tmp/hslt-power.%ld.%d", (long)getpid(), i);
+}
+
+static void begin_shares(void)
+{
+	char path[64];
+	fflush(NULL);
+	for (int i = 1; i < SHARES; i++) {
+		share_log(i, path);
+		others[i] = fork();
+		if (others[i])
+			continue;
+		share = (unsigned)i;
+		prctl(PR_SET_PDEATHSIG, SIGKILL);
+		counts += i * LOSSY_COUNTS;
+		int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+		if (fd < 0 || dup2(fd, 1) < 0 || dup2(fd, 2) < 0)
+			_exit(1);
+		close(fd);
+		return;
+	}
+}
+
+static void others_pass(void)
+{
+	bool all = true;
+	for (int i = 1; i < SHARES; i++) {
+		char path[64], line[512];
+		int status;
+		assert_true(waitpid(others[i], &status, 0) == others[i]);
+		share_log(i, path);
+		FILE *f = fopen(path, "r");
+		bool bad = !WIFEXITED(status) || WEXITSTATUS(status);
+		while (bad && f && fgets(line, sizeof line, f))
+			print_error("%s", line);
+		if (f)
+			fclose(f);
+		unlink(path);
+		all = all && !bad;
+	}
+	assert_true(all);
+}
+
+static void power_goes_at_any_time(void **state)
+{
+	(void)state;
+	uint64_t seeds = number("HSLT_POWER_SEEDS", number("FULL", 0) ? 4000 : 150), one = number("HSLT_POWER_SEED", 0);
+	uint64_t losses = 0, acks = 0;
+	quiet_run();
+	loud = one != 0;
+	atomic_store(&counts[3], 0);
+	for (uint64_t seed = one ? one : 1 + share; seed <= (one ? one : seeds); seed += one ? 1 : SHARES) {
+		print_message("seed %llu\n", (unsigned long long)seed);
+		run_seed(seed, &losses, &acks);
+	}
+	totals[0] += losses;
+	totals[1] += acks;
+	totals[2] += atomic_load(&counts[3]);
+	if (share == 0 && !one)
+		others_pass();
+	if (share == 0)
+		printf("   %llu runs of %llu calls: the power went %llu times and took %llu sectors and names; %llu batches acknowledged, none lost\n",
+		       (unsigned long long)(one ? 1 : seeds), (unsigned long long)quiet_calls, (unsigned long long)totals[0],
+		       (unsigned long long)totals[2], (unsigned long long)totals[1]);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(power_goes_at_any_time, folder_set_up, folder_tear_down),
+	};
+	size_t size = (SHARES + 1) * LOSSY_COUNTS * sizeof *counts;
+	counts = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	if (counts == MAP_FAILED)
+		return 1;
+	totals = counts + SHARES * LOSSY_COUNTS;
+	if (!number("HSLT_POWER_SEED", 0))
+		begin_shares();
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,280 @@
+#include "tests/support/scripted.h"
+
+#include "common/base/mem.h"
+#include "common/blob/blob.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <arpa/inet.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+enum { PATIENCE_MS = 10000 };
+
+bool scripted_say(const struct scripted *p, const Farm__Envelope *m, const void *payload, size_t payload_size)
+{
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	assert_int_equal(envelope_pack(m, payload, payload_size, &frame, &size, &e), 0);
+	size_t done = 0;
+	while (done < size) {
+		ssize_t n = send(p->fd, frame + done, size - done, MSG_NOSIGNAL);
+		if (n <= 0)
+			break;
+		done += (size_t)n;
+	}
+	mem_free(frame);
+	return done == size;
+}
+
+bool scripted_has(struct scripted *p, int milliseconds)
+{
+	struct pollfd ready = {p->fd, POLLIN, 0};
+	return p->at < p->size || poll(&ready, 1, milliseconds) == 1;
+}
+
+const Farm__Envelope *scripted_hear(struct scripted *p)
+{
+	for (;;) {
+		struct error e;
+		if (p->at == p->size) {
+			assert_true(scripted_has(p, PATIENCE_MS));
+			ssize_t n = read(p->fd, p->bytes, sizeof p->bytes);
+			if (n <= 0)
+				return NULL;
+			p->at = 0;
+			p->size = (size_t)n;
+		}
+		size_t used;
+		int rc = frame_reader_take(&p->reader, p->bytes + p->at, p->size - p->at, &used, &e);
+		assert_true(rc >= 0);
+		p->at += used;
+		if (!rc)
+			continue;
+		envelope_fini(&p->env);
+		assert_int_equal(envelope_unpack(&p->env, p->reader.header.bytes, p->reader.header.size, &e), 0);
+		if (p->env.message->body_case != FARM__ENVELOPE__BODY_HEARTBEAT)
+			return p->env.message;
+	}
+}
+
+static bool hello(struct scripted *p, Farm__Role role)
+{
+	Farm__Hello h;
+	Farm__Envelope m;
+	char name[] = "scripted", print[] = "p1";
+	farm__hello__init(&h);
+	farm__envelope__init(&m);
+	h.version = FARM_VERSION;
+	h.role = role;
+	h.name = name;
+	h.fingerprint = print;
+	h.threads = 1;
+	m.body_case = FARM__ENVELOPE__BODY_HELLO;
+	m.hello = &h;
+	const Farm__Envelope *answer = scripted_say(p, &m, NULL, 0) ? scripted_hear(p) : NULL;
+	return answer && answer->body_case == FARM__ENVELOPE__BODY_HELLO_ACK && answer->hello_ack->accepted;
+}
+
+struct scripted *scripted_call(uint16_t port, Farm__Role role)
+{
+	struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = htons(port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
+	struct scripted *p = calloc(1, sizeof *p);
+	assert_non_null(p);
+	p->fd = socket(AF_INET, SOCK_STREAM, 0);
+	setsockopt(p->fd, IPPROTO_TCP, TCP_NODELAY, &(int){1}, sizeof(int));
+	frame_reader_init(&p->reader, (struct frame_limits){1 << 22, 1 << 24});
+	if (connect(p->fd, (struct sockaddr *)&a, sizeof a) == 0 && hello(p, role))
+		return p;
+	scripted_hang_up(p);
+	return NULL;
+}
+
+void scripted_hang_up(struct scripted *p)
+{
+	if (!p)
+		return;
+	close(p->fd);
+	frame_reader_fini(&p->reader);
+	envelope_fini(&p->env);
+	free(p);
+}
+
+/* ---- what a client says ---- */
+
+static ProtobufCBinaryData hash_of(const char *text, struct blob_hash *h)
+{
+	struct error e;
+	assert_int_equal(blob_hash_bytes(text, strlen(text), h, &e), 0);
+	return (ProtobufCBinaryData){BLOB_HASH_SIZE, h->bytes};
+}
+
+bool scripted_submit(const struct scripted *p, const struct plan_request *r, const char *scene)
+{
+	Farm__Submit s;
+	Farm__PlanRequest plan;
+	Farm__File file, *files[1] = {&file};
+	Farm__Envelope m;
+	struct blob_hash hash;
+	char name[] = "scripted", path[] = "s.xml";
+	plan_request_to_wire(r, &plan);
+	farm__submit__init(&s);
+	farm__file__init(&file);
+	farm__envelope__init(&m);
+	file.name = s.scene = path;
+	file.hash = hash_of(scene, &hash);
+	file.size = strlen(scene);
+	s.name = name;
+	s.plan = &plan;
+	s.n_files = 1;
+	s.files = files;
+	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
+	m.submit = &s;
+	return scripted_say(p, &m, NULL, 0);
+}
+
+bool scripted_send_scene(const struct scripted *p, const char *scene)
+{
+	Farm__BlobChunk c;
+	Farm__Envelope m;
+	struct blob_hash hash;
+	farm__blob_chunk__init(&c);
+	farm__envelope__init(&m);
+	c.hash = hash_of(scene, &hash);
+	c.size = strlen(scene);
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+	m.blob_chunk = &c;
+	return scripted_say(p, &m, scene, strlen(scene));
+}
+
+bool scripted_want(const struct scripted *p, uint32_t leases)
+{
+	Farm__LeaseRequest request;
+	Farm__Envelope m;
+	farm__lease_request__init(&request);
+	farm__envelope__init(&m);
+	request.want = leases;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_REQUEST;
+	m.lease_request = &request;
+	return scripted_say(p, &m, NULL, 0);
+}
+
+bool scripted_list(const struct scripted *p)
+{
+	Farm__JobList list;
+	Farm__Envelope m;
+	farm__job_list__init(&list);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_JOB_LIST;
+	m.job_list = &list;
+	return scripted_say(p, &m, NULL, 0);
+}
+
+bool scripted_fetch(const struct scripted *p, uint64_t job, Farm__What what)
+{
+	Farm__Fetch f;
+	Farm__Envelope m;
+	farm__fetch__init(&f);
+	farm__envelope__init(&m);
+	f.job = job;
+	f.what = what;
+	m.body_case = FARM__ENVELOPE__BODY_FETCH;
+	m.fetch = &f;
+	return scripted_say(p, &m, NULL, 0);
+}
+
+/* ---- what a worker makes ---- */
+
+uint64_t scripted_tag(const struct lease_key *k)
+{
+	uint64_t z = ((uint64_t)k->kind << 60 ^ (uint64_t)k->group << 48 ^ (uint64_t)k->part << 36 ^ k->epoch) + UINT64_C(0x9e3779b97f4a7c15);
+	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
+	return z ^ z >> 31;
+}
+
+static float light(uint64_t *tag)
+{
+	*tag = *tag * UINT64_C(6364136223846793005) + UINT64_C(1442695040888963407);
+	return 0.5f + (float)(*tag >> 40) * 0x1p-24f;
+}
+
+static void add_weights(struct batch *b, const struct plan *plan, uint64_t tag)
+{
+	struct plan_range range = plan_bootstrap_range(plan, b->key.group, b->key.part);
+	b->weight_count = b->counters[COUNT_INDEPENDENT] = b->counters[COUNT_SAMPLES] = range.end - range.begin;
+	b->weights = mem_alloc(b->weight_count, sizeof *b->weights);
+	for (uint64_t i = 0; i < b->weight_count; i++) {
+		b->weights[i] = light(&tag);
+		b->independent_sum += b->weights[i];
+		b->independent_square += (double)b->weights[i] * b->weights[i];
+	}
+}
+
+static void add_tiles(struct batch *b, const struct plan *plan, uint64_t tag)
+{
+	uint32_t across = (plan->crop_width + TILE_SIZE - 1) / TILE_SIZE, down = (plan->crop_height + TILE_SIZE - 1) / TILE_SIZE;
+	b->tiles = mem_alloc((size_t)across * down, sizeof *b->tiles);
+	for (uint32_t y = 0; y < plan->crop_height; y += TILE_SIZE)
+		for (uint32_t x = 0; x < plan->crop_width; x += TILE_SIZE) {
+			struct tile *t = &b->tiles[b->tile_count++];
+			t->x = plan->crop_x + x;
+			t->y = plan->crop_y + y;
+			t->width = plan->crop_width - x < TILE_SIZE ? plan->crop_width - x : TILE_SIZE;
+			t->height = plan->crop_height - y < TILE_SIZE ? plan->crop_height - y : TILE_SIZE;
+			size_t count = (size_t)t->width * t->height * TILE_CHANNELS;
+			t->xyz = mem_alloc(count, sizeof *t->xyz);
+			for (size_t i = 0; i < count; i++)
+				t->xyz[i] = light(&tag);
+		}
+}
+
+struct batch scripted_batch(const struct lease_key *k, const struct plan *plan, uint32_t state_bytes)
+{
+	struct batch b = {.key = *k, .cpu_seconds = 1};
+	uint64_t tag = scripted_tag(k);
+	if (k->kind == LEASE_BOOTSTRAP) {
+		add_weights(&b, plan, tag);
+		return b;
+	}
+	struct plan_range chains = plan_chain_range(plan, k->part);
+	b.state_count = (uint32_t)(chains.end - chains.begin);
+	b.states = mem_alloc(b.state_count, sizeof *b.states);
+	for (uint32_t i = 0; i < b.state_count; i++) {
+		b.states[i] = (struct chain_state){mem_alloc(state_bytes, 1), state_bytes};
+		memcpy(b.states[i].bytes, &tag, sizeof tag);
+	}
+	b.moment_count = batch_moment_count(plan, LEASE_RENDER);
+	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
+	b.counters[COUNT_SAMPLES] = b.state_count * plan->epoch;
+	b.counters[COUNT_ACCEPTED] = b.counters[COUNT_SAMPLES] / 2;
+	add_tiles(&b, plan, tag);
+	return b;
+}
+
+bool scripted_send(const struct scripted *p, const struct batch *b, const struct plan *plan)
+{
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	assert_int_equal(batch_pack(b, plan, &frame, &size, &e), 0);
+	size_t done = 0;
+	while (done < size) {
+		ssize_t n = send(p->fd, frame + done, size - done, MSG_NOSIGNAL);
+		if (n <= 0)
+			break;
+		done += (size_t)n;
+	}
+	mem_free(frame);
+	return done == size;
+}
