@@ -148,7 +148,7 @@ int main(int argc, char **argv)
 {
 	struct server_config c;
 	struct error e;
-	mem_keep(16 << 20);
+	mem_keep(128 << 20);
 	server_config_init(&c);
 	c.blob_bytes = 100000000000u;
 	c.status_socket = getenv("HSLT_STATUS_SOCKET");

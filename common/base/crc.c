@@ -1,6 +1,7 @@
 #include "common/base/crc.h"
 
 #include <pthread.h>
+#include <string.h>
 
 enum { SLICES = 8 };
 
@@ -20,12 +21,33 @@ static void fill(void)
 			table[s][i] = table[s - 1][i] >> 8 ^ table[0][table[s - 1][i] & 255];
 }
 
+#ifdef __x86_64__
+/* The processor's own, three times as fast and more. */
+__attribute__((target("sse4.2"))) static uint32_t by_instruction(uint32_t crc, const uint8_t *p, size_t size)
+{
+	uint64_t c = crc;
+	for (; size >= sizeof c; size -= sizeof c, p += sizeof c) {
+		uint64_t word;
+		memcpy(&word, p, sizeof word);
+		c = __builtin_ia32_crc32di(c, word);
+	}
+	crc = (uint32_t)c;
+	while (size--)
+		crc = __builtin_ia32_crc32qi(crc, *p++);
+	return crc;
+}
+#endif
+
 /* Eight bytes a step, each through a table of its own (slicing by 8); byte order does not matter to what comes out. */
 uint32_t crc32c(uint32_t crc, const void *bytes, size_t size)
 {
 	const uint8_t *p = bytes;
-	pthread_once(&once, fill);
 	crc = ~crc;
+#ifdef __x86_64__
+	if (__builtin_cpu_supports("sse4.2"))
+		return ~by_instruction(crc, p, size);
+#endif
+	pthread_once(&once, fill);
 	for (; size >= SLICES; size -= SLICES, p += SLICES) {
 		uint32_t low = crc ^ ((uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24);
 		crc = table[7][low & 255] ^ table[6][low >> 8 & 255] ^ table[5][low >> 16 & 255] ^ table[4][low >> 24] ^

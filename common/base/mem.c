@@ -54,7 +54,8 @@ void mem_fail_after(long n)
 
 void mem_keep(size_t bytes)
 {
+	enum { MAPPED_MOST = 32 << 20 }; /* glibc takes no more */
 	int limit = bytes < INT_MAX ? (int)bytes : INT_MAX;
 	mallopt(M_TRIM_THRESHOLD, limit);
-	mallopt(M_MMAP_THRESHOLD, limit);
+	mallopt(M_MMAP_THRESHOLD, limit < MAPPED_MOST ? limit : MAPPED_MOST);
 }

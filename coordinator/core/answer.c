@@ -221,6 +221,13 @@ void answer_failed(struct farm *f, const struct event *ev)
 		rounds_end(f, j, END_FAILED, f->text);
 }
 
+void answer_delivered(struct farm *f, const struct event *ev)
+{
+	struct lease *l = held(f, ev);
+	if (l)
+		lease_deliver(f, l);
+}
+
 void answer_returned(struct farm *f, const struct event *ev)
 {
 	struct lease *l = held(f, ev);

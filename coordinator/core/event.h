@@ -16,6 +16,7 @@ enum event_kind {
 	EVENT_HEARD,          /* peer: a heartbeat (every other event of a peer counts as one) */
 	EVENT_REQUEST,        /* peer, want */
 	EVENT_BATCH,          /* peer, key, valid, text: the result of a lease */
+	EVENT_DELIVERED,      /* peer, key: its result is here and will be looked at later (EVENT_BATCH): it may have another lease */
 	EVENT_LEASE_FAILED,   /* peer, key, text: the worker tried and could not */
 	EVENT_LEASE_RETURNED, /* peer, key: given up unfinished (the worker is stopping); nobody's fault */
 	EVENT_SUBMIT,         /* tag, submit */

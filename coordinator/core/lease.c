@@ -47,7 +47,7 @@ void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 		*l = (struct lease){ .used = true, .peer = p, .job = j, .slot = s, .next = s->leases };
 		s->leases = l;
 	}
-	l->overdue = false;
+	l->overdue = l->delivered = false;
 	l->sent = f->now;
 	l->deadline = f->now + job_lease_timeout(&f->config, j, s);
 	if (l->deadline < f->check_at)
@@ -73,7 +73,10 @@ static void let_go(struct farm *f, struct lease *l)
 	s->holders--;
 	l->job->leases_out--;
 	l->job->owner->leases_out--;
-	l->peer->held--;
+	if (l->delivered)
+		l->peer->delivered--;
+	else
+		l->peer->held--;
 	for (const struct lease *k = s->leases; k; k = k->next)
 		if (k != l && !k->overdue)
 			s->since = k->sent;
@@ -81,6 +84,18 @@ static void let_go(struct farm *f, struct lease *l)
 	job_unpin_if_untouched(l->job);
 	if (!peer_has_wish(l->peer) || list_is_empty(&l->peer->waiting))
 		peer_requeue(f, l->peer);
+}
+
+void lease_deliver(struct farm *f, struct lease *l)
+{
+	struct peer *p = l->peer;
+	if (l->overdue || l->delivered)
+		return;
+	l->delivered = true;
+	p->held--;
+	p->delivered++;
+	if (list_is_empty(&p->waiting))
+		peer_requeue(f, p);
 }
 
 void lease_drop(struct farm *f, struct lease *l)

@@ -14,6 +14,7 @@ struct slot;
 struct lease {
 	bool used;
 	bool overdue; /* counts no longer as held: handed out again */
+	bool delivered; /* its result waits to be looked at: counts no longer among what its worker has to do */
 	struct peer *peer;
 	struct job *job;
 	struct slot *slot; /* the key is that of the slot's next epoch: a merge ends all leases of the slot */
@@ -29,6 +30,8 @@ void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s);
 /* Takes it out of all lists; the slot goes back to where it belongs. */
 void lease_drop(struct farm *f, struct lease *l);
 void lease_revoke(struct farm *f, struct lease *l); /* the same, and tells the worker */
+/* The worker has done its part. */
+void lease_deliver(struct farm *f, struct lease *l);
 /* Its time is over: the slot is free for others, an answer still counts. */
 void lease_expire(struct farm *f, struct lease *l);
 void lease_revoke_slot(struct farm *f, struct slot *s); /* all holders */

@@ -147,7 +147,7 @@ void peer_drop_leases(struct farm *f, struct peer *p, bool revoke)
 
 bool peer_has_wish(const struct peer *p)
 {
-	return p->state == PEER_ACTIVE && p->held < p->want;
+	return p->state == PEER_ACTIVE && p->held < p->want && p->held + p->delivered < p->lease_limit;
 }
 
 void peer_requeue(struct farm *f, struct peer *p)

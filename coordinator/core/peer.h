@@ -33,7 +33,8 @@ struct peer {
 	uint64_t restarts;
 	struct peer_class *class;
 	uint32_t threads, want;
-	uint32_t held; /* leases that are not overdue */
+	uint32_t held; /* leases that are neither overdue nor delivered */
+	uint32_t delivered;
 	enum peer_state state;
 	struct link waiting;
 	uint64_t queued; /* when it began to wait, as a number */

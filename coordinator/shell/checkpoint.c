@@ -116,7 +116,7 @@ static void done(uv_work_t *work, int status)
 		o->checkpoint_bytes = w->bytes;
 		journal_clear(w->folder, w->head.generation);
 	}
-	o->busy = false;
+	o->busy = s->checkpointing = false;
 	if (!s->stopping) {
 		server_order_free_again(s, o);
 		session_previews(s, id);
@@ -149,7 +149,7 @@ static void start(struct server *s, struct order *o)
 				.looks = *status.looks};
 	memcpy(w->head.magic, magic, sizeof magic);
 	snprintf(w->head.fingerprint, sizeof w->head.fingerprint, "%s", status.fingerprint);
-	o->busy = true;
+	o->busy = s->checkpointing = true;
 	int rc = uv_queue_work(&s->loop, &w->work, run, done);
 	assert(rc == 0);
 	(void)rc;
@@ -157,7 +157,7 @@ static void start(struct server *s, struct order *o)
 
 void checkpoint_where_due(struct server *s)
 {
-	if (s->stepping || s->stopping)
+	if (s->stepping || s->stopping || s->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
 		return;
 	for (struct order *o = s->orders; o; o = o->next) {
 		if (!o->journal || !o->canvas || o->busy || o->ended)
@@ -165,6 +165,8 @@ void checkpoint_where_due(struct server *s)
 		uint64_t limit = o->checkpoint_bytes > s->config.journal_bytes ? o->checkpoint_bytes : s->config.journal_bytes;
 		if (journal_bytes(o->journal) > limit && server_now(s) >= o->checkpoint_after)
 			start(s, o);
+		if (s->checkpointing)
+			return;
 	}
 }
 

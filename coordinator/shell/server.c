@@ -154,23 +154,44 @@ void server_result(struct server *s, uint64_t peer, struct envelope *env, const 
 {
 	const Farm__LeaseResult *m = env->message->lease_result;
 	struct order *o = m->key ? server_order(s, m->key->job) : NULL;
+	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer};
+	struct error e;
 	if (!o || !o->busy) {
 		take_result(s, peer, m, payload, size);
-	} else if (!order_put_off(o, peer, env, payload, size)) {
+		return;
+	}
+	bool named = lease_key_from_wire(m->key, &ev.lease.key, &e) == 0;
+	if (!order_put_off(o, peer, env, payload, size)) {
 		struct session *p = session_find(s, peer);
 		if (p)
 			session_fault(p, "no memory for a result");
+	} else if (named) {
+		ev.job = ev.lease.key.job;
+		server_step(s, &ev);
 	}
+}
+
+/* One at a time, so that nobody else waits for all of them. */
+static void on_drain(uv_timer_t *t)
+{
+	struct server *s = t->data;
+	struct order *o = s->orders;
+	while (o && (o->busy || !o->waiting))
+		o = o->next;
+	if (!o)
+		return;
+	struct waiting_batch *w = order_take_waiting(o);
+	server_result(s, w->peer, &w->envelope, w->payload, w->payload_size);
+	waiting_batch_free(w);
+	if (!s->stopping)
+		uv_timer_start(&s->drain, on_drain, 0, 0);
 }
 
 void server_order_free_again(struct server *s, struct order *o)
 {
 	o->busy = false;
-	uint64_t id = o->id;
-	for (struct waiting_batch *w; (o = server_order(s, id)) && !o->busy && (w = order_take_waiting(o));) {
-		server_result(s, w->peer, &w->envelope, w->payload, w->payload_size);
-		waiting_batch_free(w);
-	}
+	if (!s->stopping)
+		uv_timer_start(&s->drain, on_drain, 0, 0);
 	dispatch_finish_orders(s);
 }
 
@@ -373,6 +394,7 @@ static void stop(struct server *s)
 	uv_close((uv_handle_t *)&s->listener, NULL);
 	uv_close((uv_handle_t *)&s->wake, NULL);
 	uv_close((uv_handle_t *)&s->tick, NULL);
+	uv_close((uv_handle_t *)&s->drain, NULL);
 	uv_close((uv_handle_t *)&s->on_term, NULL);
 	uv_close((uv_handle_t *)&s->on_int, NULL);
 	for (struct session *p = s->sessions; p; p = p->next)
@@ -419,9 +441,10 @@ static void init_handles(struct server *s)
 	uv_tcp_init(&s->loop, &s->listener);
 	uv_timer_init(&s->loop, &s->wake);
 	uv_timer_init(&s->loop, &s->tick);
+	uv_timer_init(&s->loop, &s->drain);
 	uv_signal_init(&s->loop, &s->on_term);
 	uv_signal_init(&s->loop, &s->on_int);
-	s->listener.data = s->wake.data = s->tick.data = s->on_term.data = s->on_int.data = s;
+	s->listener.data = s->wake.data = s->tick.data = s->drain.data = s->on_term.data = s->on_int.data = s;
 	uv_signal_start(&s->on_term, on_signal, SIGTERM);
 	uv_signal_start(&s->on_int, on_signal, SIGINT);
 	uv_timer_start(&s->tick, on_tick, TICK_MS, TICK_MS);

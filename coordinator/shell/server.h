@@ -62,7 +62,7 @@ struct server {
 	uv_loop_t loop;
 	struct tls *tls; /* NULL: plaintext */
 	uv_tcp_t listener;
-	uv_timer_t wake, tick;
+	uv_timer_t wake, tick, drain; /* drain: results that waited for a canvas */
 	uv_signal_t on_term, on_int;
 	struct farm *farm;
 	struct spool *spool;
@@ -81,6 +81,7 @@ struct server {
 	uint64_t last_peer;
 	struct status_socket *status;
 	bool stepping, stopping;
+	bool checkpointing; /* of some job, by the pool */
 	double tls_next; /* when its files are looked at again */
 	double watchdog, watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */
 	uint64_t changes; /* grows with whatever the status shows */

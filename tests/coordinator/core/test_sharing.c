@@ -54,6 +54,30 @@ static void fair_sharing(void **state)
 		NULL });
 }
 
+/* A result that waits to be looked at keeps no worker waiting, as far as its table goes; the lease stays its own. */
+static void delivered_is_not_held(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=9 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[1] w1 delivers j1 g1 p0 boot -> -",
+		"[1] w1 delivers j1 g0 p0 boot -> w1 gets j1 g1 p0 boot",
+		"[1] w1 delivers j1 g0 p0 boot -> -",
+		"[2] w2 joins A threads=1 -> -",
+		"[2] w2 wants 1 -> w2 gets j1 g2 p0 boot",
+		"[3] w1 batch j1 g0 p0 boot -> merge, merged",
+		"[4] w1 delivers j1 g1 p0 boot -> w1 gets j1 g3 p0 boot",
+		"[4] w1 delivers j1 g3 p0 boot -> w1 gets j1 g4 p0 boot",
+		"[4] w1 delivers j1 g4 p0 boot -> w1 gets j1 g5 p0 boot",
+		"[4] w1 delivers j1 g5 p0 boot -> -", /* four places, all taken */
+		"[5] w1 batch j1 g3 p0 boot -> merge, merged, w1 gets j1 g6 p0 boot",
+		"[6] w1 leaves -> -",
+		"[7] w2 batch j1 g2 p0 boot -> merge, merged, w2 gets j1 g7 p0 boot",
+		NULL });
+}
+
 /* By owner first: of nine leases bob's one job has half, ann's two share the other. */
 static void owners_share_first(void **state)
 {
@@ -235,7 +259,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(priority),
-		cmocka_unit_test(fair_sharing),
+		cmocka_unit_test(delivered_is_not_held), cmocka_unit_test(fair_sharing),
 		cmocka_unit_test(owners_share_first),
 		cmocka_unit_test(the_nameless_and_the_restored),
 		cmocka_unit_test(workers_take_turns),

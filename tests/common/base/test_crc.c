@@ -1,0 +1,39 @@
+/* CRC-32C by whatever way this processor has, against one bit after the other, at every length and alignment of a word. */
+#include "common/base/crc.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+static uint32_t by_bits(uint32_t crc, const uint8_t *p, size_t size)
+{
+	crc = ~crc;
+	for (size_t i = 0; i < size; i++) {
+		crc ^= p[i];
+		for (int k = 0; k < 8; k++)
+			crc = crc & 1 ? crc >> 1 ^ 0x82F63B78u : crc >> 1;
+	}
+	return ~crc;
+}
+
+static void every_length(void **state)
+{
+	(void)state;
+	uint8_t bytes[80];
+	for (size_t i = 0; i < sizeof bytes; i++)
+		bytes[i] = (uint8_t)(i * 151 + 7);
+	for (size_t at = 0; at < 8; at++)
+		for (size_t n = 0; n + at <= sizeof bytes; n++) {
+			assert_int_equal(crc32c(0, bytes + at, n), by_bits(0, bytes + at, n));
+			assert_int_equal(crc32c(crc32c(0, bytes, at), bytes + at, n), by_bits(0, bytes, at + n));
+		}
+	assert_int_equal(crc32c(0, "123456789", 9), 0xE3069283u);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(every_length)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
