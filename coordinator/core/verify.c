@@ -152,11 +152,12 @@ void verify_forget_worker(struct farm *f, const struct identity *who)
 			forget_answers(f, f->live[i], who);
 }
 
-static bool pair_elsewhere(const struct farm *f, const struct peer_class *than)
+/* Another class has more than so many. */
+static bool more_elsewhere(const struct farm *f, const struct peer_class *than, uint32_t workers)
 {
 	for (struct link *k = f->classes.next; k != &f->classes; k = k->next) {
 		const struct peer_class *c = list_entry(k, struct peer_class, link);
-		if (c != than && c->active > 1)
+		if (c != than && c->active > workers)
 			return true;
 	}
 	return false;
@@ -168,7 +169,7 @@ void verify_change_class(struct farm *f)
 		struct job *j = f->live[i];
 		if (!j->noted || j->leases_out || j->bootstrap_merged || j->leases_merged || !j->class)
 			continue;
-		if (j->class->active > 1 || (j->class->active == 1 && !pair_elsewhere(f, j->class)))
+		if (j->class->active > 1 || !more_elsewhere(f, j->class, j->class->active))
 			continue;
 		verify_forget_job(f, j);
 		for (uint32_t s = 0; s < j->slot_count; s++)
@@ -179,7 +180,7 @@ void verify_change_class(struct farm *f)
 
 bool verify_may_begin(const struct farm *f, const struct job *j, const struct peer_class *c)
 {
-	return !j->proofs || c->active > 1 || !pair_elsewhere(f, c);
+	return !j->proofs || c->active > 1 || !more_elsewhere(f, c, 1);
 }
 
 /* The first lease that no worker here may have. */

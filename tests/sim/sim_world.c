@@ -34,7 +34,7 @@ struct worker {
 	uint64_t peer; /* 0: down */
 	uint32_t threads, busy, queued, want;
 	double speed, frozen_until;
-	double fault_rate, failure_rate;
+	double fault_rate, failure_rate, lie_rate;
 	const char *fingerprint;
 	struct work queue[QUEUE];
 };
@@ -44,6 +44,8 @@ struct sim_job {
 	uint64_t id;
 	int priority;
 	bool mixed, submitted, over, prepared;
+	double verify;
+	uint32_t answered[SLOTS]; /* whose answers are noted, by worker */
 	double cancel_at, lease_time, error_scale;
 	uint64_t next[SLOTS], state[SLOTS], boot;
 	uint64_t round_sum[ROUNDS];
@@ -58,6 +60,8 @@ struct world {
 	int trace;
 	double now, calm, tick_at;
 	double drop, repeat, delay, failure;
+	double verify; /* of every job */
+	bool liars; /* then every result is verified, and all are of one fingerprint */
 	struct farm *farm;
 	struct farm_config config;
 	struct message *heap;
@@ -217,7 +221,10 @@ static void finish(struct world *w, const struct message *m)
 		ev.lease.valid = false;
 	else if (!is_calm(w) && chance(w, 0.01))
 		ev.kind = EVENT_LEASE_RETURNED;
-	tell_core(w, k, ev, result_of(m->key, m->value));
+	uint64_t value = result_of(m->key, m->value);
+	if (!is_calm(w) && k->lie_rate > 0 && chance(w, k->lie_rate))
+		value ^= 1 + mix(w->draws); /* no two lies are alike */
+	tell_core(w, k, ev, value);
 	work_on(w, m->worker);
 }
 
@@ -295,8 +302,16 @@ static void crash(struct world *w, const struct message *m)
 	push(w, (struct message){ .kind = START, .time = w->now + 60 * uniform(w), .worker = m->worker });
 }
 
+static void forget_answers(struct world *w)
+{
+	for (uint32_t i = 0; i < w->job_count; i++)
+		memset(w->jobs[i].answered, 0, sizeof w->jobs[i].answered);
+}
+
 static void calm_down(struct world *w)
 {
+	if (w->liars) /* who is forgiven may answer again */
+		forget_answers(w);
 	for (uint32_t i = 0; i < w->worker_count; i++) {
 		struct worker *k = &w->workers[i];
 		char name[16];
@@ -380,6 +395,8 @@ static void send_lease(struct world *w, const struct action *a)
 	if (a->key.kind == LEASE_RENDER && (!j->prepared || a->key.epoch != j->next[slot] || a->key.epoch > j->rounds + 1))
 		wrong(w, "epoch %" PRIu64 " was handed out too early or too late", a->key.epoch);
 	check_holders(w, a->key);
+	if (worker_of(w, a->peer, &index) && w->liars && j->answered[slot] >> index & 1)
+		wrong(w, "w%u gets a lease of which its answer is noted", index);
 	if (worker_of(w, a->peer, &index))
 		post(w, (struct message){ .kind = LEASE, .worker = index, .peer = a->peer, .key = a->key, .value = j->state[slot] });
 }
@@ -397,6 +414,11 @@ static void merge(struct world *w, const struct action *a, uint64_t value)
 		wrong(w, "batches of two fingerprints are merged");
 	snprintf(j->fingerprint, sizeof j->fingerprint, "%s", p.fingerprint);
 	uint32_t slot = slot_of(j, a->key);
+	if (value != result_of(a->key, j->state[slot]))
+		wrong(w, "a wrong result is merged, verified: %d", (int)a->verified);
+	if (a->verified != (j->verify >= 1) && (j->verify >= 1 || j->verify <= 0))
+		wrong(w, "verified with a share of %g: %d", j->verify, (int)a->verified);
+	j->answered[slot] = 0;
 	if (a->key.kind == LEASE_BOOTSTRAP) {
 		if (j->boot & 1u << slot)
 			wrong(w, "a bootstrap batch is merged twice");
@@ -465,6 +487,8 @@ static void ended(struct world *w, const struct action *a, struct sim_job *j)
 	w->result.timeouts += s.timeouts;
 	w->result.repeats += s.repeats;
 	w->result.refused += s.refused;
+	w->result.verified += s.verified;
+	w->result.mismatched += s.mismatched;
 	if (a->state != JOB_DONE)
 		return;
 	if (s.rounds != j->rounds)
@@ -516,6 +540,12 @@ static void act(struct world *w, const struct action *a, uint64_t value)
 			post(w, (struct message){ .kind = REVOKE, .worker = index, .peer = a->peer, .key = a->key });
 		break;
 	case ACTION_MERGE: merge(w, a, value); break;
+	case ACTION_ACK:
+		if (a->ack == ACK_NOTED && worker_of(w, a->peer, &index))
+			j->answered[slot_of(j, a->key)] |= 1u << index;
+		break;
+	case ACTION_WRONG: w->result.lies++; break;
+	case ACTION_ASIDE: w->result.aside++; break;
 	case ACTION_BOOTSTRAP_DONE: prepare(w, a, j); break;
 	case ACTION_EVALUATE_ERROR: evaluate(w, a, j); break;
 	case ACTION_ROUND_DONE:
@@ -554,6 +584,8 @@ static void step(struct world *w, struct event *ev, uint64_t value)
 {
 	struct update u;
 	ev->time = w->now;
+	if (ev->kind == EVENT_BATCH)
+		memcpy(&ev->lease.digest, &value, sizeof value);
 	if (w->trace)
 		printf("[%.3f] event %d peer %" PRIu64 "\n", w->now, (int)ev->kind, ev->peer);
 	farm_step(w->farm, ev, &u);
@@ -586,7 +618,7 @@ static void restore(struct world *w, struct sim_job *j, double elapsed)
 	j->progress = 0; /* looks at the error are not remembered here */
 	struct event ev = { .kind = EVENT_RESTORE,
 			    .restore = { .job = j->id,
-					 .submit = { .plan = &j->plan, .name = "sim", .priority = j->priority, .mixed = j->mixed },
+					 .submit = { .plan = &j->plan, .name = "sim", .priority = j->priority, .mixed = j->mixed, .verify = j->verify },
 					 .fingerprint = j->mixed ? "" : j->fingerprint,
 					 .kind = render ? LEASE_RENDER : LEASE_BOOTSTRAP,
 					 .next = next,
@@ -604,6 +636,7 @@ static void restart(struct world *w)
 	struct farm *old = w->farm;
 	struct error e;
 	w->result.restarts++;
+	forget_answers(w);
 	for (uint32_t i = 0; i < w->job_count; i++)
 		elapsed[i] = w->jobs[i].submitted ? farm_elapsed(old, w->jobs[i].id, w->now) : NAN;
 	for (uint32_t i = 0; i < w->job_count; i++)
@@ -649,6 +682,17 @@ static void plan_job(struct world *w, struct sim_job *j)
 		p->seconds = j->lease_time * 20 * uniform(w);
 }
 
+/* Two honest workers of one fingerprint at least, or a job could not end; one or two that are not. */
+static void distrust(struct world *w)
+{
+	for (uint32_t i = 0; i < w->worker_count; i++) {
+		if (w->liars || w->verify < 1 || i < 2)
+			w->workers[i].fingerprint = "A";
+		if (w->liars && i < 2 && (i == 0 || chance(w, 0.5)))
+			w->workers[i].lie_rate = chance(w, 0.5) ? 1 : uniform(w);
+	}
+}
+
 static void make_world(struct world *w)
 {
 	w->calm = 2000;
@@ -660,6 +704,11 @@ static void make_world(struct world *w)
 	w->failure = chance(w, 0.3) ? 0.3 * uniform(w) : 0;
 	w->worker_count = 1 + below(w, WORKERS);
 	w->job_count = 1 + below(w, JOBS);
+	w->verify = chance(w, 0.4) ? chance(w, 0.5) ? 1 : uniform(w) : 0;
+	w->liars = w->verify >= 1 && chance(w, 0.6);
+	uint32_t least = w->liars ? 4 : w->verify > 0 ? 2 : 1;
+	if (w->worker_count < least)
+		w->worker_count = least;
 	for (uint32_t i = 0; i < w->worker_count; i++) {
 		struct worker *k = &w->workers[i];
 		k->threads = 1 + below(w, 4);
@@ -671,8 +720,12 @@ static void make_world(struct world *w)
 	}
 	for (uint32_t i = 0; i < w->job_count; i++) {
 		plan_job(w, &w->jobs[i]);
+		w->jobs[i].verify = w->verify;
+		w->jobs[i].mixed = w->jobs[i].mixed && w->verify == 0;
 		push(w, (struct message){ .kind = SUBMIT, .time = i ? 300 * uniform(w) : 0, .worker = i });
 	}
+	if (w->verify > 0)
+		distrust(w);
 	push(w, (struct message){ .kind = CALM, .time = w->calm });
 	for (uint32_t i = chance(w, 0.5) ? 1 + below(w, 4) : 0; i > 0; i--)
 		push(w, (struct message){ .kind = RESTART, .time = 600 * uniform(w) * uniform(w) });
@@ -682,7 +735,7 @@ static void submit(struct world *w, uint32_t index)
 {
 	struct sim_job *j = &w->jobs[index];
 	struct event ev = { .kind = EVENT_SUBMIT, .tag = index,
-			    .submit = { .plan = &j->plan, .name = "sim", .priority = j->priority, .mixed = j->mixed } };
+			    .submit = { .plan = &j->plan, .name = "sim", .priority = j->priority, .mixed = j->mixed, .verify = j->verify } };
 	step(w, &ev, 0);
 	if (!j->submitted)
 		wrong(w, "a job is refused");

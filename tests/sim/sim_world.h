@@ -1,5 +1,5 @@
 /*
- * A farm in virtual time around the real core: workers that compute, crash, freeze, come back, fail, lie and volunteer; a network that
+ * A farm in virtual time around the real core: workers that compute, crash, freeze, come back, fail, send what is torn or wrong and volunteer; a network that
  * drops, repeats, delays and reorders; a coordinator that dies and remembers what is merged; jobs with priorities and bounds, some cancelled. Everything follows from one seed.
  * After `calm` seconds the trouble ends and every job must end too.
  *
@@ -7,6 +7,7 @@
  * merged out of order or from a wrong state shows in the sums. Checked all the time:
  *   each lease is merged once and in the order of its epochs; two rounds are open at most; an ended job's sum is that of the
  *   undisturbed run after as many rounds, and the rounds are those of the undisturbed run unless a time ended it;
+ *   of jobs of which everything is verified no wrong result is merged while some workers lie, and nobody is asked twice;
  *   no lease goes to a worker of another fingerprint, nor to more than two at once; progress never falls; every job ends.
  */
 #ifndef TESTS_SIM_SIM_WORLD_H
@@ -17,6 +18,7 @@
 
 struct sim_result {
 	uint64_t steps, merged, repeats, refused, crashes, done, failed, cancelled, copies, timeouts, restarts;
+	uint64_t verified, mismatched, lies, aside; /* lies: wrong results that were found out */
 	double time; /* virtual seconds */
 };
 
