@@ -1,6 +1,7 @@
 # make            programs into build/bin
 # make test       unit and end-to-end tests (SAN=address,undefined for sanitizers, FULL=1 for the long forms)
 # make test-numerics   what is hard on the numbers, one row a case
+# make test-sim        10,000 schedules of faults in virtual time
 # make test-faults   what happens to machines, one fault after the other; writes the tables of tests/e2e/README.md
 # make demo bench fuzz install clean
 
@@ -110,6 +111,11 @@ tests: $(TEST_BIN)
 test: programs tests
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)
 .SECONDARY:
+
+# The farm in virtual time: 10,000 schedules of faults; 200 are part of the tests. HSLT_SIM_SEED=N: that one, with all that is said.
+.PHONY: test-sim
+test-sim: $(BUILD)/tests/sim/test_farm
+	FULL=1 $(BUILD)/tests/sim/test_farm
 
 # What is hard on the numbers, one row a case; the same programs are part of the tests.
 NUMERICS_BIN := $(filter $(BUILD)/tests/worker/halfvec/% $(BUILD)/tests/numerics/%,$(TEST_BIN))

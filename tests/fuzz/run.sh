@@ -34,7 +34,9 @@ for source in tests/fuzz/fuzz_*.c; do
 	case $name in fuzz_image | fuzz_scene) find tests/scenes -type f -size -64k -exec cp {} "$corpus" \; ;; esac
 	[ -d "tests/fuzz/corpus/$name" ] && cp tests/fuzz/corpus/"$name"/* "$corpus"
 	! grep -q seeds_wanted "$source" || HSLT_FUZZ_SEEDS=$corpus "$BUILD/fuzz/$name" || failed=1
-	if "$BUILD/fuzz/$name" -max_total_time="$SECONDS_EACH" -rss_limit_mb=2048 -malloc_limit_mb=512 -timeout=10 -max_len=16384 -close_fd_mask=2 \
+	words=
+	[ ! -f "tests/fuzz/$name.dict" ] || words=-dict=tests/fuzz/$name.dict
+	if "$BUILD/fuzz/$name" $words -max_total_time="$SECONDS_EACH" -rss_limit_mb=2048 -malloc_limit_mb=512 -timeout=10 -max_len=16384 -close_fd_mask=2 \
 		-print_final_stats=1 -artifact_prefix="$BUILD/findings/$name-" "$corpus" >"$log" 2>&1; then
 		echo "fuzz: $name: $(sed -n 's/^stat::number_of_executed_units: *//p' "$log") inputs in $SECONDS_EACH s," \
 			"$(figure cov "$log") edges, nothing found"

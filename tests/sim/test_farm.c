@@ -44,9 +44,9 @@ static void simulate(void **state)
 			fail_msg("HSLT_SIM_SEED=%" PRIu64 ": %s", seed, wrong);
 		add(&sum, &r);
 	}
-	print_message("%" PRIu64 " steps, %" PRIu64 " merged, %" PRIu64 " repeats, %" PRIu64 " refused, %" PRIu64 " crashes, "
+	print_message("seeds %" PRIu64 " to %" PRIu64 ": %" PRIu64 " steps, %" PRIu64 " merged, %" PRIu64 " repeats, %" PRIu64 " refused, %" PRIu64 " crashes, "
 		      "%" PRIu64 " copies, %" PRIu64 " timeouts, %" PRIu64 " restarts, %" PRIu64 " verified, %" PRIu64 " mismatched, %" PRIu64 " lies, %" PRIu64 " set aside; jobs: %" PRIu64 " done, %" PRIu64 " failed, %" PRIu64 " cancelled\n",
-		      sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.copies, sum.timeouts, sum.restarts, sum.verified, sum.mismatched, sum.lies, sum.aside, sum.done,
+		      first, first + count - 1, sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.copies, sum.timeouts, sum.restarts, sum.verified, sum.mismatched, sum.lies, sum.aside, sum.done,
 		      sum.failed, sum.cancelled);
 	/* The worlds must be wild enough to mean something. */
 	if (!one) {
