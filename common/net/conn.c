@@ -16,6 +16,7 @@ enum {
 	BYTES_PER_SECOND = 1 << 16,
 	PIECE = 1 << 16,  /* encrypted at a time */
 	WINDOW = 1 << 20, /* encrypted and not yet with the kernel */
+	FRAME_COST = 256, /* memory of a frame that waits, beside its bytes */
 };
 
 /* A frame that waits to be encrypted. */
@@ -35,7 +36,7 @@ struct conn {
 	struct frame_reader reader;
 	struct tls_link *link; /* NULL: plaintext */
 	struct queued *queue, **queue_last;
-	size_t unsent;    /* bytes of frames that are not with the kernel */
+	size_t unsent;    /* bytes of frames that are not with the kernel, and what they cost beside */
 	size_t in_flight; /* what libuv has to write, of TLS with all its own */
 	uint64_t heard, frame_begun; /* ms of the loop's clock */
 	uint64_t begun, checked;     /* the connection; the peer's certificate */
@@ -199,7 +200,7 @@ static void pump(struct conn *c)
 			return;
 		}
 		q->at += size;
-		flush(c, size);
+		flush(c, size + (q->at == q->size ? FRAME_COST : 0));
 		if (q->at < q->size)
 			continue;
 		c->queue = q->next;
@@ -396,6 +397,11 @@ void conn_set_limits(struct conn *c, struct frame_limits limits)
 	c->reader.limits = limits;
 }
 
+void conn_set_send_limit(struct conn *c, size_t bytes)
+{
+	c->config.send_limit = bytes;
+}
+
 void conn_set_quiet(struct conn *c, double seconds)
 {
 	c->config.quiet_seconds = seconds;
@@ -460,7 +466,7 @@ static void enqueue(struct conn *c, unsigned char *frame, size_t size)
 	*q = (struct queued){.bytes = frame, .size = size};
 	*c->queue_last = q;
 	c->queue_last = &q->next;
-	c->unsent += size;
+	c->unsent += size + FRAME_COST;
 	pump(c);
 }
 
@@ -475,8 +481,8 @@ void conn_send_frame(struct conn *c, unsigned char *frame, size_t size)
 	} else if (c->link) {
 		enqueue(c, frame, size);
 	} else {
-		c->unsent += size;
-		to_kernel(c, frame, size, size);
+		c->unsent += size + FRAME_COST;
+		to_kernel(c, frame, size, size + FRAME_COST);
 	}
 }
 

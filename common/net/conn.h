@@ -38,6 +38,7 @@ int conn_accept(struct conn **c, uv_stream_t *listener, const struct conn_config
 		const struct conn_events *events, void *user, struct error *e);
 
 void conn_set_limits(struct conn *c, struct frame_limits limits);
+void conn_set_send_limit(struct conn *c, size_t bytes);
 void conn_set_quiet(struct conn *c, double seconds);
 void conn_peer_name(const struct conn *c, char *text, size_t size); /* numeric HOST:PORT */
 const struct tls_peer *conn_peer(const struct conn *c); /* by its certificate; NULL in plaintext and before the handshake */

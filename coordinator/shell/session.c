@@ -11,7 +11,10 @@
 enum {
 	HELLO_HEADER = 4096,
 	HEADER_LIMIT = 1 << 20,
-	SEND_LIMIT = 1 << 29, /* leases on their way to one worker */
+	/* What may wait for a peer to read it: a word to a stranger, answers to a client, leases for one worker. */
+	HELLO_SEND = 1 << 16,
+	CLIENT_SEND = 1 << 23,
+	WORKER_SEND = 1 << 29,
 };
 
 void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size)
@@ -149,6 +152,7 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		return;
 	}
 	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, 0});
+	conn_set_send_limit(p->conn, h->role == FARM__ROLE__ROLE_WORKER ? WORKER_SEND : CLIENT_SEND);
 	conn_set_quiet(p->conn, 6 * p->server->config.heartbeat_seconds);
 	if (h->role == FARM__ROLE__ROLE_WORKER) {
 		join(p, h);
@@ -351,7 +355,7 @@ static bool make_room(struct server *s)
 
 void session_accept(struct server *s)
 {
-	struct conn_config config = {{HELLO_HEADER, 0}, SEND_LIMIT, s->config.stall_seconds, s->config.hello_seconds, s->tls};
+	struct conn_config config = {{HELLO_HEADER, 0}, HELLO_SEND, s->config.stall_seconds, s->config.hello_seconds, s->tls};
 	struct error e;
 	bool room = s->session_count < s->config.max_connections || make_room(s);
 	struct session *p = room ? mem_alloc(1, sizeof *p) : NULL;
