@@ -128,6 +128,8 @@ static void on_closed(void *user, const char *why)
 	a->conn = NULL;
 	a->welcome = false;
 	uv_timer_stop(&a->heartbeat);
+	if (a->gone && a->hung)
+		_exit(AGENT_HUNG);
 	if (!a->gone)
 		try_later(a);
 	agent_settle(a);
@@ -168,10 +170,15 @@ static void go(struct agent *a)
 	agent_send(a, &m);
 	if (a->conn)
 		conn_close_when_sent(a->conn, "leaving");
+	else if (a->hung)
+		_exit(AGENT_HUNG);
+	if (a->hung) /* nobody can wait for its threads; what is to be said is sent first */
+		return;
 	uv_close((uv_handle_t *)&a->retry, NULL);
 	uv_close((uv_handle_t *)&a->heartbeat, NULL);
 	uv_close((uv_handle_t *)&a->grace, NULL);
 	uv_close((uv_handle_t *)&a->pulse, NULL);
+	uv_close((uv_handle_t *)&a->watch, NULL);
 	uv_close((uv_handle_t *)&a->on_term, NULL);
 	uv_close((uv_handle_t *)&a->on_int, NULL);
 	crew_close(a->crew);
@@ -204,6 +211,17 @@ static void leave(struct agent *a)
 	desk_leave(a);
 	uv_timer_start(&a->grace, on_grace_over, (uint64_t)(1000 * a->config.grace_seconds), 0);
 	agent_settle(a);
+}
+
+static void on_watch(uv_timer_t *t)
+{
+	struct agent *a = t->data;
+	if (!desk_watch(a))
+		return;
+	log_event(LOG_STOP, "text=\"a thread hangs: the others finish, and the worker ends to be started again\"");
+	a->hung = true;
+	if (!a->leaving)
+		leave(a);
 }
 
 static void on_signal(uv_signal_t *h, int number)
@@ -254,11 +272,15 @@ static void init_handles(struct agent *a)
 	uv_timer_init(&a->loop, &a->heartbeat);
 	uv_timer_init(&a->loop, &a->grace);
 	uv_timer_init(&a->loop, &a->pulse);
+	uv_timer_init(&a->loop, &a->watch);
 	uv_signal_init(&a->loop, &a->on_term);
 	uv_signal_init(&a->loop, &a->on_int);
-	a->retry.data = a->heartbeat.data = a->grace.data = a->pulse.data = a->on_term.data = a->on_int.data = a;
+	a->retry.data = a->heartbeat.data = a->grace.data = a->pulse.data = a->watch.data = a->on_term.data = a->on_int.data = a;
 	uv_signal_start(&a->on_term, on_signal, SIGTERM);
 	uv_signal_start(&a->on_int, on_signal, SIGINT);
+	uint64_t look = (uint64_t)(1000 * a->config.stall_seconds / STALL_LOOKS);
+	if (a->config.stall_seconds > 0)
+		uv_timer_start(&a->watch, on_watch, look + !look, look + !look);
 }
 
 static int start(struct agent *a, struct error *e)

@@ -2,7 +2,8 @@
  * The worker daemon: one loop thread that owns all state, a crew of render threads. Connects, asks for leases, fetches
  * what it needs, sends results and keeps them until they are acknowledged; reconnects for ever. On SIGTERM it finishes
  * what runs within the grace period, or gives it up, and leaves. Tells the service manager what it waits to hear
- * (common/net/notify.h).
+ * (common/net/notify.h). A lease that gets nowhere is given back as failed; its thread cannot be ended, so the worker leaves
+ * as on SIGTERM, and the program ends then and there, with AGENT_HUNG.
  */
 #ifndef WORKER_DAEMON_AGENT_H
 #define WORKER_DAEMON_AGENT_H
@@ -20,10 +21,14 @@ struct agent_config {
 	unsigned threads;
 	double grace_seconds;
 	double idle_seconds; /* without a lease for so long: it leaves; 0: never */
+	double stall_seconds; /* a lease that makes no progress for so long hangs; 0: nobody looks */
 	bool insecure;
 	unsigned lie; /* tests: one of so many results has a wrong bit; 0: none */
 	bool repeat; /* tests: every result is sent twice */
+	unsigned hang; /* tests: this lease, counted from 1, never ends; 0: none */
 };
+
+enum { AGENT_HUNG = 75 }; /* exit code: to be started again */
 
 /* Returns when the worker has left. -EINVAL, -EPERM, -EHOSTUNREACH at once when the address is of no use. */
 int agent_run(const struct agent_config *c, struct error *e);

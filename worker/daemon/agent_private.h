@@ -12,7 +12,7 @@ enum { WORLDS_KEPT = 2 /* of jobs that have no lease here now */ };
 struct agent {
 	struct agent_config config;
 	uv_loop_t loop;
-	uv_timer_t retry, heartbeat, grace, pulse;
+	uv_timer_t retry, heartbeat, grace, pulse, watch;
 	uv_signal_t on_term, on_int;
 	struct net_addr address;
 	struct tls *tls; /* NULL: plaintext */
@@ -29,6 +29,7 @@ struct agent {
 	uint64_t busy_at;   /* ms of the loop: when it had a lease last */
 	bool watched;       /* the service manager waits to hear of us */
 	bool leaving, gone;
+	bool hung; /* a thread of the crew is */
 };
 
 /* agent.c */
@@ -43,6 +44,8 @@ void desk_welcome(struct agent *a); /* (re)connected: asks for work, offers what
 void desk_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size);
 void desk_leave(struct agent *a);      /* gives back what has not begun */
 void desk_stop_all(struct agent *a);   /* gives up what runs */
+enum { STALL_LOOKS = 8 }; /* without progress, until a lease hangs */
+bool desk_watch(struct agent *a);      /* true: a lease hangs that did not at the last look */
 bool desk_is_idle(const struct agent *a); /* nothing runs, nothing waits to be acknowledged */
 void desk_close(struct agent *a);      /* after the crew has been closed */
 

@@ -151,7 +151,8 @@ static void start_lease(struct agent *a, struct lease_task *l)
 {
 	l->owner = a;
 	l->finished = on_rendered;
-	l->lie = a->config.lie && a->rendered++ % a->config.lie == 0;
+	l->lie = a->config.lie && a->rendered % a->config.lie == 0;
+	l->hangs = ++a->rendered == a->config.hang;
 	lease_task_start(l, a->crew);
 }
 
@@ -419,9 +420,36 @@ void desk_stop_all(struct agent *a)
 		atomic_store(&l->stop, true);
 }
 
+/* Looks are counted, not seconds: a worker that was stopped as a whole has not hung. */
+bool desk_watch(struct agent *a)
+{
+	char text[128];
+	bool found = false;
+	snprintf(text, sizeof text, "no progress for %g s: its thread hangs", a->config.stall_seconds);
+	for (struct lease_task *l = a->leases; l; l = l->next) {
+		unsigned long long now = atomic_load(&l->progress);
+		if (l->state != LEASE_QUEUED || l->hung)
+			continue;
+		l->still = now && now == l->seen ? l->still + 1 : 0;
+		l->seen = now;
+		if (l->still < STALL_LOOKS)
+			continue;
+		if (!l->unwanted)
+			say_failed(a, &l->grant.key, text);
+		l->unwanted = l->hung = found = true;
+		atomic_store(&l->stop, true);
+	}
+	return found;
+}
+
+/* But for threads that hang. */
 bool desk_is_idle(const struct agent *a)
 {
-	return !a->leases && crew_pending(a->crew) == 0;
+	unsigned hung = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next, hung++)
+		if (!l->hung)
+			return false;
+	return crew_pending(a->crew) == hung;
 }
 
 void desk_close(struct agent *a)

@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 
 #include <string.h>
+#include <unistd.h>
 
 bool lease_key_equal(const struct lease_key *a, const struct lease_key *b)
 {
@@ -20,6 +21,7 @@ int lease_task_new(struct lease_task **out, struct grant *g, struct bundle *b, s
 	l->bundle = b;
 	b->users++;
 	atomic_init(&l->stop, false);
+	atomic_init(&l->progress, 0);
 	*out = l;
 	return 0;
 }
@@ -52,12 +54,17 @@ static void run(struct task *t)
 	struct lease_input in = {l->grant.chain_count, l->grant.seeds, l->grant.states};
 	const struct plan *p = &l->bundle->plan;
 	l->end = LEASE_STOPPED;
+	atomic_fetch_add(&l->progress, 1);
+	while (l->hangs)
+		pause();
+	render_count_progress(&l->progress);
 	if (!atomic_load(&l->stop))
 		l->rc = render_lease(l->bundle->world, p, &l->grant.key, &in, &l->stop, &l->end, &batch, &l->error);
 	if (!l->rc && l->end == LEASE_DONE && l->lie)
 		lie(&batch);
 	if (!l->rc && l->end == LEASE_DONE)
 		l->rc = batch_pack(&batch, p, &l->frame, &l->frame_size, &l->error);
+	render_count_progress(NULL);
 	batch_fini(&batch);
 }
 

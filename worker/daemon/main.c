@@ -19,11 +19,16 @@ static const char doc[] =
 	"  hslt-worker --coordinator farm.lan:7700 --tls ~/node1 --threads 8 --name $(hostname)\n"
 	"\n"
 	"SIGTERM: finishes the running epochs within the grace period or gives them up, sends what is done and leaves; the "
-	"second one ends it at once. It reconnects for ever; with --idle-exit it leaves when nobody has work for it. Under "
-	"systemd it says when it is ready and feeds the watchdog.\n"
-	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 stopped, 1 failed, 2 usage.";
+	"second one ends it at once. It reconnects for ever; with --idle-exit it leaves when nobody has work for it. A lease that "
+	"makes no progress for --stall is given back as failed, and the worker leaves, to be started again. Under systemd it says "
+	"when it is ready and feeds the watchdog.\n"
+	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 stopped, 1 failed, 2 usage, 75 a thread "
+	"hung.";
 
-enum { OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_LIE, OPTION_TLS, OPTION_IDLE };
+enum {
+	OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_LIE, OPTION_TLS,
+	OPTION_IDLE, OPTION_STALL, OPTION_HANG
+};
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
@@ -33,11 +38,13 @@ static const struct argp_option options[] = {
 	{"cache-size", OPTION_CACHE_SIZE, "GB", 0, "The cache's limit (20)", 0},
 	{"grace", OPTION_GRACE, "SECONDS", 0, "After SIGTERM (20)", 0},
 	{"idle-exit", OPTION_IDLE, "SECONDS", 0, "Leave when there was no lease for so long (0: never)", 0},
+	{"stall", OPTION_STALL, "SECONDS", 0, "How long a lease may make no progress (120; 0: for ever)", 0},
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log more", 0},
 	{"test-lie", OPTION_LIE, "N", OPTION_HIDDEN, "Flip a bit in one of N results", 0},
 	{"test-repeat", OPTION_REPEAT, NULL, OPTION_HIDDEN, "Send every result twice", 0},
+	{"test-hang", OPTION_HANG, "N", OPTION_HIDDEN, "The N-th lease never ends", 0},
 	{0},
 };
 
@@ -91,6 +98,12 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 			argp_error(state, "--test-lie is for tests alone: it makes wrong images");
 		c->lie = (unsigned)number(state, "--test-lie", arg, 1, 1e6);
 		return 0;
+	case OPTION_STALL:
+		c->stall_seconds = number(state, "--stall", arg, 0, 86400);
+		return 0;
+	case OPTION_HANG:
+		c->hang = (unsigned)number(state, "--test-hang", arg, 1, 1e9);
+		return 0;
 	case OPTION_REPEAT:
 		c->repeat = true;
 		return 0;
@@ -116,7 +129,8 @@ int main(int argc, char **argv)
 				 .name = name,
 				 .cache_bytes = 20000000000u,
 				 .threads = cores > 0 && cores <= 1024 ? (unsigned)cores : 1,
-				 .grace_seconds = 20};
+				 .grace_seconds = 20,
+				 .stall_seconds = 120};
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &c);
 	if (geteuid() == 0)

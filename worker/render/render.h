@@ -104,5 +104,7 @@ enum lease_end { LEASE_DONE, LEASE_STOPPED };
  * the program. */
 int render_lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
 		 const atomic_bool *stop, enum lease_end *end, struct batch *out, struct error *e);
+/* From now on leases that this thread runs count up *counter at least every 256 samples or mutations; NULL: no more. */
+void render_count_progress(atomic_ullong *counter);
 
 #endif
