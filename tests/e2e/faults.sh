@@ -15,7 +15,8 @@ esac
 README=$HERE/README.md
 GRACE=
 . "$HERE/faults/lib.sh"
-for f in worker coordinator; do
+PYTHON=${PYTHON:-python3}
+for f in worker coordinator network; do
 	. "$HERE/faults/$f.sh"
 done
 
@@ -85,7 +86,9 @@ bad=$(awk -F'|' '$3 != 0 || $4 != 0 || $5 != "yes"' "$ROWS")
 	sed '/<!-- faults -->/q' "$README"
 	echo '| fault | times injected | results lost | results doubled | bits equal |'
 	echo '|---|---|---|---|---|'
-	sed 's/|/ | /g; s/^/| /; s/$/ |/' "$ROWS"
+	for f in $FAULTS; do # what did not run stays
+		eval "grep -F \"\$text_$f|\" \"$ROWS\" | sed 's/|/ | /g; s/^/| /; s/$/ |/' | grep . || grep -F \"| \$text_$f |\" \"$README\"" || :
+	done
 	sed -n '/<!-- faults -->/,$p' "$README" | sed -n '/<!-- end -->/,$p'
 } >"$TOP/new"
 cat "$TOP/new" >"$README"

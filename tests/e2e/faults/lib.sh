@@ -87,7 +87,7 @@ finish_job() {
 	equal=yes
 	"$BIN/hslt-compare" --exact "$QUIET" "$DIR/image.exr" >"$DIR/compare.log" 2>&1 || equal=no
 	# shellcheck disable=SC2046
-	set -- $(cat "$DIR/coordinator.log" "$DIR"/w*.log | awk -v job="$ID" -f "$HERE/faults/count.awk")
+	set -- $(cat "$DIR/coordinator.log" "$DIR"/[wh]*.log | awk -v job="$ID" -f "$HERE/faults/count.awk")
 	[ "$3" -eq "$RESULTS" ] || fail "$NAME: the film holds $3 results, not $RESULTS"
 	row "$1" "$2" $equal
 }

@@ -89,3 +89,22 @@ repeat_worker() {
 	finish_job
 	grep -q 'event=batch_repeated' "$DIR/coordinator.log" || fail "$NAME: nothing was repeated"
 }
+
+fault hang_worker 2 1 "a thread of a worker hangs in a lease, and heartbeats go on"
+hang_worker() {
+	farm
+	worker w0
+	worker w1
+	job
+	each_time one_thread_hangs
+	finish_job
+}
+one_thread_hangs() {
+	worker "h$i" --threads 2 --stall 0.5 --test-hang 1
+	CODE=0
+	wait "$WORKER" || CODE=$?
+	[ "$CODE" -eq 75 ] || fail "$NAME: it ended with $CODE"
+	# if others have computed it meanwhile, or the job has ended, there is nothing to give back
+	[ "$TIMES" -eq 1 ] || grep -q "event=lease_failed job=$ID .*no progress for 0.5 s" "$DIR/h$i.log" ||
+		grep -q "event=lease_taken_back job=$ID" "$DIR/coordinator.log" || fail "$NAME: h$i keeps its lease"
+}

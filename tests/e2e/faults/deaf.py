@@ -1,0 +1,55 @@
+"""deaf.py PORT JOB STATUS-SOCKET: a client that asks for a job's log again and again, and a reader of the status socket that
+subscribes again and again; neither reads. Fails unless each is cut off within ten seconds."""
+import os, re, socket, struct, sys, time
+
+here = os.path.dirname(os.path.abspath(__file__))
+VERSION = int(re.search(r"FARM_VERSION = (\d+)", open(here + "/../../../common/wire/envelope.h").read()).group(1))
+
+
+def varint(n):
+    out = b""
+    while n > 127:
+        out += bytes([n & 127 | 128])
+        n >>= 7
+    return out + bytes([n])
+
+
+def field(number, value):
+    if isinstance(value, int):
+        return varint(number << 3) + varint(value)
+    return varint(number << 3 | 2) + varint(len(value)) + value
+
+
+def frame(message):
+    return struct.pack(">II", len(message), 0) + message
+
+
+def is_cut_off(s, words, most):
+    """Says words until the other side hangs up; most: bytes that we may be allowed to say before."""
+    s.settimeout(0.2)
+    said, end = 0, time.monotonic() + 10
+    while time.monotonic() < end:
+        try:
+            said += s.send(words)
+        except socket.timeout:
+            continue
+        except OSError:
+            return True
+        if said > most:
+            return False
+    return False
+
+
+client = socket.socket()
+client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+client.connect(("127.0.0.1", int(sys.argv[1])))
+client.sendall(frame(field(1, field(1, VERSION) + field(2, 2) + field(3, b"deaf"))))
+client.recv(4)
+asks = frame(field(46, field(1, int(sys.argv[2])))) + 100 * frame(field(48, field(1, int(sys.argv[2])) + field(2, 1)))
+if not is_cut_off(client, asks, 1 << 26):
+    sys.exit("the client is not cut off")
+
+reader = socket.socket(socket.AF_UNIX)
+reader.connect(sys.argv[3])
+if not is_cut_off(reader, 100 * b'{"subscribe":["jobs","workers","snapshot"]}\n' + 100 * b'rubbish\n', 1 << 26):
+    sys.exit("the reader of the status is not cut off")

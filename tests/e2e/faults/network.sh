@@ -1,0 +1,71 @@
+# Faults of the network, by a proxy between one of two workers and the coordinator (proxy.py).
+
+through_proxy() {
+	farm
+	rm -f "$DIR/proxy-port"
+	"$PYTHON" "$HERE/faults/proxy.py" "$DIR/proxy-port" "${COORDINATOR#*:}" "$DIR/order" 2>>"$DIR/proxy.log" &
+	PIDS="$PIDS $!"
+	until_true 10 test -s "$DIR/proxy-port" || fail "$NAME: no proxy"
+	worker w0
+	worker w1 --coordinator "127.0.0.1:$(cat "$DIR/proxy-port")"
+	says w1 event=connect
+	job
+	each_time "$@"
+	finish_job
+	blameless
+}
+
+# happens ACTION FIELD: to the next message of that kind
+happens() {
+	echo "$1 $2" >"$DIR/order.tmp"
+	mv "$DIR/order.tmp" "$DIR/order"
+	until_true 10 test ! -e "$DIR/order" || fail "$NAME: there was nothing to do it to"
+}
+
+# and the worker comes back
+is_cut() {
+	happens "$@"
+	until_true 10 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: the worker does not come back"
+}
+
+fault cut_result 10 1 "a connection is cut in the middle of a result"
+cut_result() {
+	through_proxy is_cut cut 22
+}
+
+fault cut_grant 10 1 "a connection is cut in the middle of a grant"
+cut_grant() {
+	through_proxy is_cut cut 21
+}
+
+fault stall_result 3 1 "half a result comes, and then nothing"
+stall_result() {
+	through_proxy is_cut stall 22
+}
+
+fault late_result 3 0 "results come when their worker has been missed"
+late_result() {
+	through_proxy happens late 22
+}
+
+fault twice_result 10 1 "results are sent twice by the network"
+twice_result() {
+	through_proxy happens twice 22
+	grep -q 'event=batch_repeated' "$DIR/coordinator.log" || fail "$NAME: nothing was repeated"
+}
+
+fault deaf_client 3 1 "clients and readers of the status ask for all there is and do not read"
+deaf_client() {
+	farm
+	worker w0
+	worker w1
+	job
+	each_time nobody_reads
+	finish_job
+}
+nobody_reads() {
+	before=$(awk '/^VmRSS/ { print $2 }' "/proc/$COORDINATOR_PID/status")
+	"$PYTHON" "$HERE/faults/deaf.py" "${COORDINATOR#*:}" "${ID#j}" "$DIR/status" >"$DIR/deaf.log" 2>&1 || fail "$NAME: $(cat "$DIR/deaf.log")"
+	after=$(awk '/^VmRSS/ { print $2 }' "/proc/$COORDINATOR_PID/status")
+	[ $((after - before)) -lt 65536 ] || fail "$NAME: the coordinator grew from $before to $after KB"
+}

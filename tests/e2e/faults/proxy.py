@@ -1,0 +1,90 @@
+"""A network of our own: proxy.py PORT-FILE TARGET-PORT ORDER-FILE passes frames on between who connects and the target.
+
+When ORDER-FILE holds "ACTION FIELD", that is done to the next message of this field of the envelope (proto/farm.proto), either
+way, and the file goes:
+  cut    half of it, then the connection is closed on both sides
+  stall  half of it, then nothing more, either way, until one side hangs up
+  twice  it is sent twice
+  late   it, and what is behind it, a second and a half later"""
+import asyncio, os, sys
+
+port_file, target, order_file = sys.argv[1], int(sys.argv[2]), sys.argv[3]
+
+
+def field_of(header):
+    number, shift = 0, 0
+    for byte in header[:5]:
+        number |= (byte & 127) << shift
+        shift += 7
+        if byte < 128:
+            break
+    return number >> 3
+
+
+def order_for(field):
+    try:
+        with open(order_file) as f:
+            action, wanted = f.read().split()
+    except (FileNotFoundError, ValueError):
+        return ""
+    if int(wanted) != field:
+        return ""
+    os.unlink(order_file)
+    return action
+
+
+class Pair:
+    """Two ends of a connection."""
+    def __init__(self):
+        self.stalled = False
+
+
+async def one_way(pair, source, sink):
+    try:
+        while True:
+            prefix = await source.readexactly(8)
+            header = int.from_bytes(prefix[:4], "big")
+            frame = prefix + await source.readexactly(header + int.from_bytes(prefix[4:], "big"))
+            action = "" if pair.stalled else order_for(field_of(frame[8:]))
+            if pair.stalled:
+                continue
+            if action in ("cut", "stall"):
+                sink.write(frame[:len(frame) // 2])
+                await sink.drain()
+                if action == "cut":
+                    break
+                pair.stalled = True
+                continue
+            if action == "late":
+                await asyncio.sleep(1.5)
+            sink.write(frame * (2 if action == "twice" else 1))
+            await sink.drain()
+    except (asyncio.IncompleteReadError, OSError):
+        pass
+    sink.close()
+
+
+async def pair_up(near_reader, near_writer):
+    try:
+        far_reader, far_writer = await asyncio.open_connection("127.0.0.1", target)
+    except OSError:
+        near_writer.close()
+        return
+    pair = Pair()
+    ways = [asyncio.ensure_future(one_way(pair, near_reader, far_writer)),
+            asyncio.ensure_future(one_way(pair, far_reader, near_writer))]
+    await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+    near_writer.close()
+    far_writer.close()
+    for way in ways:
+        way.cancel()
+
+
+async def main():
+    server = await asyncio.start_server(pair_up, "127.0.0.1", 0)
+    with open(port_file + ".tmp", "w") as f:
+        print(server.sockets[0].getsockname()[1], file=f)
+    os.rename(port_file + ".tmp", port_file)
+    await server.serve_forever()
+
+asyncio.run(main())
