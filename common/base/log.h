@@ -11,6 +11,7 @@
 #define LOG_EVENTS(X) \
 	X(START, "start", INFO) \
 	X(LISTEN, "listen", INFO) \
+	X(LIMITS, "limits", INFO) \
 	X(STOP, "stop", INFO) \
 	X(ROOT, "runs_as_root", WARN) \
 	X(PEER_ACCEPT, "peer_accept", DEBUG) \

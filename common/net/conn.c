@@ -10,6 +10,7 @@
 enum {
 	READ_BYTES = 1 << 16,
 	TICK_MS = 250,
+	TICK_MS_MOST = 1000, /* where nothing can come sooner */
 	LINGER_MS = 5000,
 	REFUSED_MS = 1000,    /* for a peer to read why */
 	HANDSHAKE_MS = 10000, /* of TLS */
@@ -46,8 +47,10 @@ struct conn {
 	bool waits_for_peer; /* it is told why before it is cut off */
 	bool distrust;
 	char why[256];
-	char chunk[READ_BYTES];
 };
+
+/* What was just read, or decrypted: libuv calls back with it before it reads anything else, and nobody reads from inside a callback. */
+static _Thread_local char chunk[READ_BYTES];
 
 struct sending {
 	uv_write_t request;
@@ -95,8 +98,8 @@ void conn_close(struct conn *c, const char *why)
 static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
 {
 	(void)suggested;
-	struct conn *c = h->data;
-	*out = uv_buf_init(c->chunk, sizeof c->chunk);
+	(void)h;
+	*out = uv_buf_init(chunk, sizeof chunk);
 }
 
 static void deliver(struct conn *c)
@@ -184,6 +187,8 @@ static void refuse(struct conn *c, int rc, const char *why)
 	if (!c->linger_until)
 		text_copy(c->why, sizeof c->why, why);
 	c->linger_until = uv_now(c->tcp.loop) + REFUSED_MS;
+	uv_timer_set_repeat(&c->timer, TICK_MS);
+	uv_timer_again(&c->timer);
 	c->waits_for_peer = true;
 	if (!c->in_flight)
 		conn_close(c, why);
@@ -218,7 +223,7 @@ static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 	ssize_t n = tls_link_take(c->link, bytes, size, &e);
 	while (n >= 0 && !c->closing) {
 		bool was_open = tls_link_is_open(c->link);
-		n = tls_link_read(c->link, c->chunk, sizeof c->chunk, &e);
+		n = tls_link_read(c->link, chunk, sizeof chunk, &e);
 		flush(c, 0);
 		if (!was_open && tls_link_is_open(c->link) && !c->closing) {
 			c->heard = c->checked = uv_now(c->tcp.loop);
@@ -227,7 +232,7 @@ static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 			pump(c);
 		}
 		if (n > 0)
-			take(c, (const unsigned char *)c->chunk, (size_t)n);
+			take(c, (const unsigned char *)chunk, (size_t)n);
 		else if (n == 0)
 			return;
 	}
@@ -302,6 +307,12 @@ static void on_tick(uv_timer_t *t)
 		conn_close(c, "a frame was begun and not finished in time");
 	else if (c->config.quiet_seconds > 0 && (double)(now - c->heard) > 1000 * c->config.quiet_seconds)
 		conn_close(c, "nothing was heard for too long");
+}
+
+static void tick_every(struct conn *c, uint64_t ms)
+{
+	if (!c->closing)
+		uv_timer_start(&c->timer, on_tick, ms, ms);
 }
 
 /* ---- life ---- */
@@ -405,6 +416,8 @@ void conn_set_send_limit(struct conn *c, size_t bytes)
 void conn_set_quiet(struct conn *c, double seconds)
 {
 	c->config.quiet_seconds = seconds;
+	double ms = 1000 * seconds / 16;
+	tick_every(c, ms > TICK_MS_MOST ? TICK_MS_MOST : ms < TICK_MS ? TICK_MS : (uint64_t)ms);
 }
 
 void conn_peer_name(const struct conn *c, char *text, size_t size)
@@ -508,6 +521,8 @@ void conn_close_when_sent(struct conn *c, const char *why)
 		return;
 	text_copy(c->why, sizeof c->why, why);
 	c->linger_until = uv_now(c->tcp.loop) + LINGER_MS;
+	uv_timer_set_repeat(&c->timer, TICK_MS);
+	uv_timer_again(&c->timer);
 	if (!c->unsent && !c->in_flight)
 		conn_close(c, c->why);
 }

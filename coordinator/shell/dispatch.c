@@ -266,14 +266,16 @@ static void finish(struct server *s, struct order *o)
 
 void dispatch_finish_orders(struct server *s)
 {
+	bool finished = false;
 	for (struct order *o = s->orders, *next; o; o = next) {
 		next = o->next;
 		if (o->ended && !o->busy) {
 			finish(s, o);
+			finished = true;
 			next = s->orders; /* late batches may have ended others */
 		}
 	}
-	for (struct session *p = s->sessions; p; p = p->next)
+	for (struct session *p = finished ? s->sessions : NULL; p; p = p->next)
 		if (p->watched && p->shown && !server_order(s, p->watched))
 			session_tick(p);
 }

@@ -8,6 +8,7 @@
 #include "coordinator/shell/digest.h"
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
+#include "coordinator/shell/limits.h"
 #include "coordinator/shell/restore.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/status.h"
@@ -20,11 +21,11 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { BACKLOG = 128, TICK_MS = 200 };
+enum { BACKLOG = 4096, TICK_MS = 200 };
 
 void server_config_init(struct server_config *c)
 {
-	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .max_connections = 1024, .max_faults = 3,
+	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5,  .max_faults = 3,
 				    .journal_bytes = 64 << 20, .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
 }
 
@@ -424,6 +425,7 @@ static int open_stores(struct server *s, struct error *e)
 	if (s->config.keep_partials && disk_mkdir(s->config.keep_partials, 0777) && errno != EEXIST)
 		return error_set(e, errno, "%s: %s", s->config.keep_partials, strerror(errno));
 	farm_config_init(&config);
+	config.max_peers = s->config.max_connections;
 	config.first_job = spool_next_job(s->spool);
 	config.preview_interval = 0; /* previews are made when somebody asks for one */
 	config.silent_after = 3 * s->config.heartbeat_seconds;
@@ -500,6 +502,8 @@ int server_open(struct server **out, const struct server_config *c, struct error
 	}
 	init_handles(s);
 	rc = s->config.tls && *s->config.tls ? open_tls(s, e) : 0;
+	if (!rc)
+		rc = limits_connections(c->max_connections, &s->config.max_connections, e);
 	if (!rc)
 		rc = open_stores(s, e);
 	int inherited = notify_inherited_unix();

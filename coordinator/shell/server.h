@@ -26,7 +26,7 @@ struct server_config {
 	uint64_t blob_bytes; /* the spool's limit of scene files; 0: none */
 	uint64_t journal_bytes; /* a job's journal that is longer is cut by a checkpoint */
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
-	unsigned max_connections;
+	unsigned max_connections; /* 0: by the file descriptors that there are */
 	double verify;        /* least share of the leases of each job that two workers compute */
 	unsigned max_faults;  /* of a worker, before it is set aside */
 	const char *forgive;  /* the name of a worker that was set aside and may come back; NULL: none */
@@ -55,6 +55,7 @@ struct deferred {
 	char text[256];
 };
 
+enum { SESSION_BUCKETS = 4096 };
 enum { ENDED_MAX = 200 /* ended jobs in the lists; older ones can still be fetched */ };
 
 struct server {
@@ -67,7 +68,7 @@ struct server {
 	struct farm *farm;
 	struct spool *spool;
 	struct blob_store *blobs;
-	struct session *sessions;
+	struct session *sessions, *by_id[SESSION_BUCKETS];
 	unsigned session_count;
 	struct order *orders;
 	struct job_record *ended; /* ENDED_MAX, oldest first */

@@ -45,10 +45,35 @@ void session_fault(struct session *p, const char *format, ...)
 
 struct session *session_find(const struct server *s, uint64_t id)
 {
-	for (struct session *p = s->sessions; p; p = p->next)
+	for (struct session *p = s->by_id[id % SESSION_BUCKETS]; p; p = p->alike)
 		if (p->id == id)
 			return p;
 	return NULL;
+}
+
+static void enlist(struct server *s, struct session *p)
+{
+	struct session **bucket = &s->by_id[p->id % SESSION_BUCKETS];
+	p->alike = *bucket;
+	*bucket = p;
+	p->next = s->sessions;
+	p->place = &s->sessions;
+	if (p->next)
+		p->next->place = &p->next;
+	s->sessions = p;
+	s->session_count++;
+}
+
+static void delist(struct server *s, struct session *p)
+{
+	struct session **at = &s->by_id[p->id % SESSION_BUCKETS];
+	while (*at != p)
+		at = &(*at)->alike;
+	*at = p->alike;
+	*p->place = p->next;
+	if (p->next)
+		p->next->place = p->place;
+	s->session_count--;
 }
 
 /* ---- hello ---- */
@@ -311,11 +336,7 @@ static void on_closed(void *user, const char *why)
 {
 	struct session *p = user;
 	struct server *s = p->server;
-	struct session **at = &s->sessions;
-	while (*at != p)
-		at = &(*at)->next;
-	*at = p->next;
-	s->session_count--;
+	delist(s, p);
 	session_upload_abort(p);
 	log_event(conn_distrust(p->conn)	? LOG_PEER_REFUSED
 		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED
@@ -374,9 +395,7 @@ void session_accept(struct server *s)
 		return;
 	}
 	conn_peer_name(p->conn, p->address, sizeof p->address);
-	p->next = s->sessions;
-	s->sessions = p;
-	s->session_count++;
+	enlist(s, p);
 	log_event(LOG_PEER_ACCEPT, "peer=%llu address=%s", (unsigned long long)p->id, p->address);
 }
 

@@ -12,7 +12,8 @@ enum session_state { SESSION_NEW, SESSION_WORKER, SESSION_CLIENT, SESSION_LEAVIN
 struct upload;
 
 struct session {
-	struct session *next;
+	struct session *next, **place; /* all; where they point to this one */
+	struct session *alike;         /* of the same bucket */
 	struct server *server;
 	struct conn *conn;
 	uint64_t id; /* the core's peer id, and the tag of its requests */

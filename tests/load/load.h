@@ -64,7 +64,7 @@ struct load {
 	bool measuring, leaving;
 	uint64_t random;
 	/* counted from the first to the last moment */
-	uint64_t grants, merged, bootstrap_merged, repeated, refused, revoked, given_back, disordered, faults;
+	uint64_t grants, again, merged, bootstrap_merged, repeated, refused, revoked, given_back, disordered, faults;
 	/* counted while measuring */
 	uint64_t batches, bytes;
 	struct load_times grant, first_grant, ack, send, beat, late;

@@ -349,9 +349,9 @@ static int report(double wrong, double peak)
 	row_times("heartbeat -> answer", &load.beat);
 	row_times("result to the kernel", &load.send);
 	row_times("generator's timer late", &load.late);
-	printf("leases: %llu granted, %llu merged, %llu of bootstraps, %llu given back at the end, %llu copies taken back, %llu repeats\n",
+	printf("leases: %llu granted, %llu merged, %llu of bootstraps, %llu given back at the end, %llu copies taken back, %llu again to the same, %llu repeats\n",
 	       (unsigned long long)load.grants, (unsigned long long)load.merged, (unsigned long long)load.bootstrap_merged,
-	       (unsigned long long)load.given_back, (unsigned long long)load.revoked, (unsigned long long)load.repeated);
+	       (unsigned long long)load.given_back, (unsigned long long)load.revoked, (unsigned long long)load.again, (unsigned long long)load.repeated);
 	if (load.faults)
 		printf("faults: %llu, the first: %s\n", (unsigned long long)load.faults, load.fault);
 	bool met = bound("leases lost", lost, "", 0, false);

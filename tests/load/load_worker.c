@@ -187,12 +187,12 @@ static void work_on(struct load_worker *w)
 	if (!h || !job_of(l, h->key.job, &i) || !(w->jobs_ready >> i & 1))
 		return;
 	h->state = WORKING;
-	/* The crowd is spread over the interval by the first lease of each; those of the bootstrap are short. */
+	/* Leases of the bootstrap are short; the crowd is spread over the interval by when each begins with its first other one. */
 	double seconds = l->s.interval * (0.9 + 0.2 * load_uniform(l));
 	if (h->key.kind == LEASE_BOOTSTRAP)
-		seconds = fmin(1, seconds) * load_uniform(l);
+		seconds = fmin(1, seconds) * (0.5 + 0.5 * load_uniform(l));
 	else if (w->first)
-		seconds = l->s.interval * load_uniform(l);
+		seconds += l->s.interval * load_uniform(l);
 	w->first = w->first && h->key.kind == LEASE_BOOTSTRAP;
 	uv_timer_start(&w->work, on_worked, (uint64_t)(1000 * seconds) + 1, 0);
 }
@@ -204,8 +204,12 @@ static void take_grant(struct load_worker *w, const Farm__LeaseGrant *m)
 	unsigned i;
 	struct held *h = in_state(w, FREE);
 	struct lease_key k;
-	if (!h || lease_key_from_wire(m->key, &k, &e) || !job_of(l, k.job, &i) || find(w, &k)) {
+	if (!h || lease_key_from_wire(m->key, &k, &e) || !job_of(l, k.job, &i)) {
 		fault(w, "a lease that cannot be");
+		return;
+	}
+	if (find(w, &k)) { /* it took too long, and nobody else is there */
+		l->again++;
 		return;
 	}
 	l->grants++;

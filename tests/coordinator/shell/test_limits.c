@@ -1,0 +1,45 @@
+/* As many connections as there are file descriptors for; more than that is refused with a sentence. */
+#include "coordinator/shell/limits.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#include <sys/resource.h>
+#include <cmocka.h>
+
+static void set(rlim_t now, rlim_t most)
+{
+	struct rlimit r = {now, most};
+	assert_int_equal(setrlimit(RLIMIT_NOFILE, &r), 0);
+}
+
+static rlim_t now(void)
+{
+	struct rlimit r;
+	assert_int_equal(getrlimit(RLIMIT_NOFILE, &r), 0);
+	return r.rlim_cur;
+}
+
+static void descriptors_bound_connections(void **state)
+{
+	(void)state;
+	struct error e;
+	unsigned n = 0;
+	set(64, 1024);
+	assert_int_equal(limits_connections(100, &n, &e), 0);
+	assert_int_equal(n, 100);
+	assert_true(now() >= 356 && now() < 1024); /* no more than it takes */
+	assert_int_equal(limits_connections(1000, &n, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "1000 connections need 1256 file descriptors, and this process may have 1024"));
+	assert_int_equal(limits_connections(0, &n, &e), 0);
+	assert_int_equal(n, 768);
+	assert_int_equal(now(), 1024);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(descriptors_bound_connections)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
