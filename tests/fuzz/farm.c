@@ -203,7 +203,7 @@ void farm_hello(struct farm_world *w, unsigned peer, Farm__Role role)
 {
 	Farm__Hello h;
 	Farm__Envelope m;
-	char name[] = "somebody", print[] = "p1", none[] = "";
+	char name[] = {'w', (char)('0' + peer), 0}, print[] = "p1", none[] = "";
 	farm__hello__init(&h);
 	farm__envelope__init(&m);
 	h.version = FARM_VERSION;
@@ -273,6 +273,7 @@ const Farm__Envelope *farm_submission(uint64_t job)
 	s.plan = &request;
 	s.n_files = 1;
 	s.files = files;
+	s.verify = job == FARM_SAMPLES;
 	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
 	m.submit = &s;
 	return &m;
@@ -393,9 +394,12 @@ static void answer(struct farm_world *w, unsigned worker, struct lease_key k)
 	need(batch_pack(&b, &plan, &frame, &size, &e) == 0, e.text);
 	farm_say(w, worker, frame, size);
 	const Farm__LeaseAck *a = hear_kind(w, worker, FARM__ENVELOPE__BODY_LEASE_ACK)->lease_ack;
-	need(a->verdict == FARM__VERDICT__VERDICT_MERGED, a->text);
+	bool noted = a->verdict == FARM__VERDICT__VERDICT_NOTED;
+	need(noted || a->verdict == FARM__VERDICT__VERDICT_MERGED, a->text);
 	mem_free(frame);
 	batch_fini(&b);
+	if (noted) /* now the other one's */
+		answer(w, worker + 1, k);
 }
 
 static void do_bootstrap(struct farm_world *w, unsigned worker, uint64_t job)
@@ -406,9 +410,19 @@ static void do_bootstrap(struct farm_world *w, unsigned worker, uint64_t job)
 			answer(w, worker, (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP, .group = g, .part = part});
 }
 
+/* All but those of the last part of the last group: two more, and the job is done. */
+static void do_rounds(struct farm_world *w, unsigned worker, uint64_t job)
+{
+	struct plan p = farm_plan(job);
+	uint32_t slots = p.groups * p.parts;
+	for (uint64_t epoch = 0; epoch < p.rounds; epoch++)
+		for (uint32_t i = 0; i + 1 < slots; i++)
+			answer(w, worker, (struct lease_key){.job = job, .kind = LEASE_RENDER, .group = i / p.parts, .part = i % p.parts, .epoch = epoch});
+}
+
 static void fill(void)
 {
-	enum { CLIENT, WORKER };
+	enum { CLIENT, WORKER, SECOND };
 	struct farm_world w = {0};
 	struct error e;
 	template_path(w.spool);
@@ -418,13 +432,16 @@ static void fill(void)
 	farm_hello(&w, CLIENT, FARM__ROLE__ROLE_CLIENT);
 	farm_call(&w, WORKER, false);
 	farm_hello(&w, WORKER, FARM__ROLE__ROLE_WORKER);
+	farm_call(&w, SECOND, false);
+	farm_hello(&w, SECOND, FARM__ROLE__ROLE_WORKER);
 	for (uint64_t job = FARM_DONE; job <= FARM_SAMPLES; job++) {
 		submit(&w, CLIENT, job);
 		ask_for_job(&w, WORKER, job);
-		if (job == FARM_DONE || job == FARM_CHAINS)
+		ask_for_job(&w, SECOND, job);
+		if (job != FARM_BOOTSTRAP)
 			do_bootstrap(&w, WORKER, job);
 		if (job == FARM_CHAINS)
-			answer(&w, WORKER, (struct lease_key){.job = job, .kind = LEASE_RENDER});
+			do_rounds(&w, WORKER, job);
 		if (job == FARM_BOOTSTRAP)
 			answer(&w, WORKER, (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP});
 	}

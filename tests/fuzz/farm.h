@@ -1,6 +1,7 @@
 /*
  * A coordinator to speak to, in this process: its loop turns when it is told to. It begins with the state of a spool that is made
- * once: job 1 is done, 2 renders chains (all but one of its leases are open), 3 is in its bootstrap, 4 waits for its first samples.
+ * once: job 1 is done, 2 lacks the chains of one lease in each of its rounds, 3 is in its bootstrap, 4 waits for its first samples and
+ * wants each from two workers.
  * One thread. What goes wrong ends the program.
  */
 #ifndef TESTS_FUZZ_FARM_H

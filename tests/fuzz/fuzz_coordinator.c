@@ -99,28 +99,51 @@ static void say_result(struct seed *s, uint8_t who, struct lease_key k)
 	batch_fini(&b);
 }
 
+static void ask(struct seed *s, uint8_t who, uint64_t job)
+{
+	Farm__LeaseRequest r;
+	farm__lease_request__init(&r);
+	Farm__JobGet g;
+	farm__job_get__init(&g);
+	r.want = 4;
+	g.job = job;
+	SEED_SAY(s, who, LEASE_REQUEST, lease_request, &r);
+	SEED_SAY(s, who, JOB_GET, job_get, &g);
+}
+
 static void write_results(void)
 {
-	static const struct lease_key keys[] = {
-		{.job = FARM_CHAINS, .kind = LEASE_RENDER, .group = 1},
-		{.job = FARM_CHAINS, .kind = LEASE_RENDER, .epoch = 1},
+	struct plan p = farm_plan(FARM_CHAINS);
+	const struct lease_key last = {.job = FARM_CHAINS, .kind = LEASE_RENDER, .group = p.groups - 1, .part = p.parts - 1};
+	const struct lease_key keys[] = {
+		last,
 		{.job = FARM_BOOTSTRAP, .kind = LEASE_BOOTSTRAP, .group = 1},
 		{.job = FARM_SAMPLES, .kind = LEASE_RENDER},
 		{.job = FARM_CHAINS, .kind = LEASE_RENDER}, /* a repeat */
 	};
+	struct seed s = {0};
 	for (size_t i = 0; i < sizeof keys / sizeof *keys; i++) {
-		struct seed s = {0};
-		Farm__LeaseRequest r;
-		farm__lease_request__init(&r);
-		Farm__JobGet g;
-		farm__job_get__init(&g);
-		r.want = 4;
-		g.job = keys[i].job;
-		SEED_SAY(&s, WORKER_ONE, LEASE_REQUEST, lease_request, &r);
-		SEED_SAY(&s, WORKER_ONE, JOB_GET, job_get, &g);
+		ask(&s, WORKER_ONE, keys[i].job);
 		say_result(&s, WORKER_ONE, keys[i]);
 		seed_end(&s, "result", i);
+		ask(&s, WORKER_ONE, keys[i].job);
+		ask(&s, WORKER_TWO, keys[i].job);
+		say_result(&s, WORKER_ONE, keys[i]);
+		say_result(&s, WORKER_TWO, keys[i]);
+		seed_end(&s, "both", i);
 	}
+	ask(&s, WORKER_ONE, last.job); /* to its end */
+	for (uint64_t epoch = 0; epoch < p.rounds; epoch++) {
+		struct lease_key k = last;
+		k.epoch = epoch;
+		say_result(&s, WORKER_ONE, k);
+	}
+	seed_end(&s, "end", 0);
+	p = farm_plan(FARM_BOOTSTRAP);
+	ask(&s, WORKER_ONE, FARM_BOOTSTRAP);
+	for (uint32_t i = 1; i < p.groups * p.parts; i++)
+		say_result(&s, WORKER_ONE, (struct lease_key){.job = FARM_BOOTSTRAP, .kind = LEASE_BOOTSTRAP, .group = i / p.parts, .part = i % p.parts});
+	seed_end(&s, "bootstrap", 0);
 }
 
 static void write_words(void)
