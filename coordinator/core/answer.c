@@ -178,16 +178,38 @@ void answer_batch(struct farm *f, const struct event *ev)
 		give_up_where_hopeless(f, j, s, &ev->lease.key);
 }
 
-static uint32_t failers(struct slot *s, uint64_t peer)
+/* How many workers there are in the list with this one. */
+static uint32_t failers(uint64_t list[SLOT_FAILERS], uint64_t who)
 {
 	uint32_t n = 0;
-	while (n < SLOT_FAILERS && s->failed_on[n] && s->failed_on[n] != peer)
+	while (n < SLOT_FAILERS && list[n] && list[n] != who)
 		n++;
 	if (n < SLOT_FAILERS)
-		s->failed_on[n] = peer;
-	while (n < SLOT_FAILERS && s->failed_on[n])
+		list[n] = who;
+	while (n < SLOT_FAILERS && list[n])
 		n++;
 	return n;
+}
+
+static bool all_failed(const struct farm *f, const struct job *j)
+{
+	for (uint32_t i = 0; i < f->peer_count; i++) {
+		const struct peer *p = f->peers[i];
+		if (p->state == PEER_ACTIVE && job_takes(j, p) && isinf(peer_avoids_until(p, j->id)))
+			return false;
+	}
+	return true;
+}
+
+/* Nothing of the job was ever made: the fault is the job's when three workers say so, or all that there are, after three tries. One
+ * worker that is out of order cannot fail what others would make. */
+static bool never_works(const struct farm *f, struct job *j, const struct peer *p, bool again)
+{
+	j->tries += !again;
+	uint32_t workers = failers(j->failed_on, p->who->id);
+	if (j->bootstrap_merged + j->leases_merged + j->noted > 0)
+		return false;
+	return workers >= FAILURES_FATAL || (j->tries >= FAILURES_FATAL && all_failed(f, j));
 }
 
 static struct lease *held(const struct farm *f, const struct event *ev)
@@ -209,15 +231,15 @@ void answer_failed(struct farm *f, const struct event *ev)
 	struct job *j = l->job;
 	struct slot *s = l->slot;
 	lease_drop(f, l);
+	bool again = peer_avoids_until(p, j->id) > f->now; /* several at once: one reason */
 	peer_failed(p, j->id, f->now);
 	snprintf(p->text, sizeof p->text, "%s", ev->text ? ev->text : "");
 	snprintf(f->text, sizeof f->text, "%s: %.180s", p->name, p->text);
 	snprintf(j->text, sizeof j->text, "%s", f->text);
 	j->failures++;
 	s->failures++;
-	bool never = j->bootstrap_merged + j->leases_merged + j->noted == 0;
-	if (failers(s, p->id) >= FAILURES_FATAL || s->failures >= SLOT_FAILURES_FATAL ||
-	    (never && j->failures >= FAILURES_FATAL))
+	bool never = never_works(f, j, p, again);
+	if (never || failers(s->failed_on, p->who->id) >= FAILURES_FATAL || s->failures >= SLOT_FAILURES_FATAL)
 		rounds_end(f, j, END_FAILED, f->text);
 }
 

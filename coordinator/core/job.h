@@ -67,6 +67,8 @@ struct job {
 	struct forecast_cost stop, halving;
 	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
 	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
+	uint64_t failed_on[SLOT_FAILERS]; /* workers that failed with it */
+	uint32_t tries; /* that failed; several leases of one worker at once are one */
 	char text[256];
 	char held[JOB_HOLDS][256]; /* why no lease of it goes out; "" each when they do */
 	double held_since;         /* NAN: it is not */

@@ -184,12 +184,14 @@ void peer_failed(struct peer *p, uint64_t job, double now)
 		if (p->avoid[i].until < a->until)
 			a = &p->avoid[i];
 	}
+	p->failures++;
+	if (a->job == job && a->until > now)
+		return;
 	if (a->job != job)
 		*a = (struct peer_avoid){ .job = job };
 	uint32_t doublings = a->failures < PAUSE_DOUBLINGS ? a->failures : PAUSE_DOUBLINGS;
 	a->failures++;
 	a->until = now + ldexp(FIRST_PAUSE, (int)doublings);
-	p->failures++;
 }
 
 void peer_succeeded(struct peer *p, uint64_t job)

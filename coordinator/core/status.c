@@ -90,7 +90,7 @@ static void why_waiting(const struct farm *f, const struct job *j, char *text, s
 	else if (verify_why(f, j, text, size))
 		return;
 	else if (someone_avoids(f, j))
-		snprintf(text, size, "its workers failed and pause before they try again");
+		snprintf(text, size, "its workers failed and pause before they try again; the last one: %.180s", j->text);
 	else if (other && other->priority > j->priority)
 		snprintf(text, size, "waits for j%llu of higher priority (%d)", (unsigned long long)other->id, other->priority);
 	else if (other)

@@ -227,6 +227,49 @@ static void never_a_success(void **state)
 		NULL });
 }
 
+/* One worker that is out of order, however many leases it has, fails no job that others could make. */
+static void out_of_order(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=5 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=3 -> -", "[0] w2 joins A threads=1 -> -",
+		"[0] w1 wants 4 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w1 gets j1 g3 p0 boot",
+		"[0] w2 wants 1 -> w2 gets j1 g4 p0 boot",
+		"[1] w1 fails j1 g0 p0 boot no disk -> -", "[1] w1 fails j1 g1 p0 boot no disk -> -",
+		"[1] w1 fails j1 g2 p0 boot no disk -> -", "[1] w1 fails j1 g3 p0 boot no disk -> -",
+		"[1] wake -> 11",
+		"[11] w1 wants 1 -> w1 gets j1 g0 p0 boot",
+		"[11] w1 fails j1 g0 p0 boot no disk -> -",
+		"[31] w2 heard -> w1 gets j1 g1 p0 boot", "[31] w1 fails j1 g1 p0 boot no disk -> -",
+		"[32] w2 batch j1 g4 p0 boot -> merge, merged, w2 gets j1 g2 p0 boot",
+		NULL });
+}
+
+/* On all that there are, and three times; on three at once. */
+static void out_of_order_all(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=5 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=2 -> -", "[0] w2 joins A threads=1 -> -",
+		"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+		"[0] w2 wants 1 -> w2 gets j1 g2 p0 boot",
+		"[1] w1 fails j1 g0 p0 boot no mesh -> -", "[1] w1 fails j1 g1 p0 boot no mesh -> -",
+		"[1] w2 fails j1 g2 p0 boot no mesh -> -",
+		"[1] w3 joins A threads=1 -> -",
+		"[1] w3 wants 1 -> w3 gets j1 g3 p0 boot",
+		"[1] w3 fails j1 g3 p0 boot no mesh -> j1 is failed (failed: w3: no mesh)",
+		"[2] submit groups=5 -> j2 submitted, j2 is queued, j2 is bootstrap, w1 gets j2 g0 p0 boot, w2 gets j2 g1 p0 boot, "
+		"w3 gets j2 g2 p0 boot, w1 gets j2 g3 p0 boot",
+		"[2] w3 leaves -> -",
+		"[2] w1 fails j2 g0 p0 boot no mesh -> -", "[2] w1 fails j2 g3 p0 boot no mesh -> -",
+		"[2] w2 fails j2 g1 p0 boot no mesh -> -",
+		"[12] w1 wants 1 -> w1 gets j2 g4 p0 boot, w2 gets j2 g2 p0 boot",
+		"[12] w1 fails j2 g4 p0 boot no mesh -> w2 loses j2 g2 p0 boot, j2 is failed (failed: w1: no mesh)",
+		NULL });
+}
+
 static void returned_lease(void **state)
 {
 	(void)state;
@@ -266,6 +309,8 @@ int main(void)
 		cmocka_unit_test(straggler),
 		cmocka_unit_test(failed_lease),
 		cmocka_unit_test(never_a_success),
+		cmocka_unit_test(out_of_order),
+		cmocka_unit_test(out_of_order_all),
 		cmocka_unit_test(returned_lease),
 		cmocka_unit_test(bounded_wish),
 	};
