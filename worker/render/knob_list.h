@@ -6,7 +6,7 @@ KNOB(tolerance, "tolerance", KNOB_REAL, KNOB_CHAINS, 1e-3, 1e-9, 1, NULL,
 KNOB(iterations, "iterations", KNOB_WHOLE, KNOB_CHAINS, 15, 1, 1000, NULL,
      "Steps of Newton after which a walk is given up",
      "2", "3", "4", "6", "10", "15", "30")
-KNOB(least_step, "least-step", KNOB_REAL, KNOB_CHAINS, 0.03, 1e-9, 1, NULL,
+KNOB(least_step, "least-step", KNOB_REAL, KNOB_CHAINS, 0.3, 1e-9, 1, NULL,
      "Share of a step of Newton below which a walk that goes wrong is given up",
      "1", "0.3", "0.1", "0.03", "0.001", "1e-05")
 KNOB(reverse_tolerance, "reverse-tolerance", KNOB_REAL, KNOB_CHAINS, 1e-3, 1e-9, 0.5, NULL,
