@@ -232,7 +232,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 	struct slot *s = l->slot;
 	lease_drop(f, l);
 	bool again = peer_avoids_until(p, j->id) > f->now; /* several at once: one reason */
-	peer_failed(p, j->id, f->now);
+	peer_failed(f, p, j->id);
 	snprintf(p->text, sizeof p->text, "%s", ev->text ? ev->text : "");
 	snprintf(f->text, sizeof f->text, "%s: %.180s", p->name, p->text);
 	snprintf(j->text, sizeof j->text, "%s", f->text);

@@ -55,6 +55,7 @@ struct farm_config {
 	double forget_after;      /* s without a word: hung up */
 	double first_timeout;     /* of a lease before the job has a median */
 	double min_timeout;
+	double first_pause;       /* of a worker that failed with a job, doubled each time */
 	double preview_interval;  /* between previews of one job; 0: none */
 };
 void farm_config_init(struct farm_config *c); /* first_job 1 and sane limits */

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { FIRST_PAUSE = 10, PAUSE_DOUBLINGS = 10 }; /* seconds away from a job after a failed lease */
+enum { PAUSE_DOUBLINGS = 10 };
 
 struct peer_class *peer_class_use(struct farm *f, const char *fingerprint)
 {
@@ -173,7 +173,7 @@ void peer_fault(struct farm *f, struct peer *p, const char *text)
 		roster_set_aside(f, p->who);
 }
 
-void peer_failed(struct peer *p, uint64_t job, double now)
+void peer_failed(const struct farm *f, struct peer *p, uint64_t job)
 {
 	struct peer_avoid *a = &p->avoid[0];
 	for (int i = 0; i < PEER_AVOIDED; i++) {
@@ -185,13 +185,13 @@ void peer_failed(struct peer *p, uint64_t job, double now)
 			a = &p->avoid[i];
 	}
 	p->failures++;
-	if (a->job == job && a->until > now)
+	if (a->job == job && a->until > f->now)
 		return;
 	if (a->job != job)
 		*a = (struct peer_avoid){ .job = job };
 	uint32_t doublings = a->failures < PAUSE_DOUBLINGS ? a->failures : PAUSE_DOUBLINGS;
 	a->failures++;
-	a->until = now + ldexp(FIRST_PAUSE, (int)doublings);
+	a->until = f->now + ldexp(f->config.first_pause, (int)doublings);
 }
 
 void peer_succeeded(struct peer *p, uint64_t job)

@@ -430,6 +430,7 @@ static int open_stores(struct server *s, struct error *e)
 	config.preview_interval = 0; /* previews are made when somebody asks for one */
 	config.silent_after = 3 * s->config.heartbeat_seconds;
 	config.max_faults = s->config.max_faults;
+	config.first_pause = 2 * s->config.heartbeat_seconds;
 	uv_random(NULL, NULL, &config.verify_seed, sizeof config.verify_seed, 0, NULL);
 	config.forget_after = 6 * s->config.heartbeat_seconds;
 	rc = farm_new(&s->farm, &config, e);
