@@ -5,6 +5,7 @@
 #include "worker/cli/farm_pilot.h"
 #include "worker/cli/options.h"
 #include "worker/cli/pilot.h"
+#include "worker/cli/speed.h"
 
 #include <argp.h>
 #include <jansson.h>
@@ -27,7 +28,8 @@ static const char doc[] =
 	"\n"
 	"The job's id goes to stdout, everything else to stderr. Without --wait, -o is the default name for hslt-job fetch. "
 	"--estimate makes no image: a pilot of a minute on the farm tells what errors of 10, 5, 2 and 1 % (and --target-error) will "
-	"cost there. HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls.\n"
+	"cost there. For long jobs without --epoch a pilot of a second here says how many mutations a thread makes in the 20 s that a "
+	"lease should take; --epoch pins it. HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls.\n"
 	"Exit codes: 0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
 	"there, and its note says where), 6 refused, 75 "
 	"coordinator not reachable.";
@@ -205,6 +207,22 @@ static int estimate(const struct arguments *a, struct client *cl, const struct s
 	return estimate_report(&m, a->json, a->plot, e);
 }
 
+/* How long leases take is asked only where it matters; who gives --epoch knows it. */
+static void measure(struct arguments *a, const struct scene_bundle *b)
+{
+	struct plan plan;
+	struct error e;
+	double speed;
+	if (a->estimate || plan_make(&a->render.plan, &plan, &e) || !plan_wants_speed(&a->render.plan, &plan))
+		return;
+	if (speed_measure(&a->render, b->folder, b->scene, &speed, &e)) {
+		fprintf(stderr, "hslt-submit: note: no pilot for the length of epochs: %s\n", e.text);
+		return;
+	}
+	a->render.plan.speed = speed;
+	fprintf(stderr, "pilot: %.3g %s a second of one thread here\n", speed, plan.kind == PLAN_CHAINS ? "mutations" : "samples");
+}
+
 int main(int argc, char **argv)
 {
 	static struct arguments a; /* large */
@@ -240,6 +258,8 @@ int main(int argc, char **argv)
 	a.request.output = output;
 	a.request.name = a.name ? a.name : b.scene;
 	rc = a.estimate ? 0 : absolute(a.output, output, sizeof output, &e);
+	if (!rc)
+		measure(&a, &b);
 	if (!rc)
 		rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {

@@ -49,7 +49,7 @@ static const struct argp_option options[] = {
 	{"groups", OPTION_GROUPS, "N", 0, "Independent replicates, for the error (16)", 3},
 	{"parts", OPTION_PARTS, "N", 0, "Leases of a group in a round: groups times parts threads at most work on the job (4)", 3},
 	{"bootstrap", OPTION_BOOTSTRAP, "N", 0, "Bootstrap samples (1000000, fewer for tiny jobs)", 3},
-	{"epoch", OPTION_EPOCH, "N", 0, "Mutations of a chain, or samples a pixel and group, in a round", 3},
+	{"epoch", OPTION_EPOCH, "N", 0, "Mutations of a chain, or samples a pixel and group, in a round (leases of 20 s at most, where a farm is asked)", 3},
 	{0},
 };
 

@@ -1,0 +1,45 @@
+# The length of an epoch: by a pilot where a job is long, longer where the coordinator bounds the bandwidth, as asked with --epoch;
+# and where a job is short, as hslt-render makes it. Nothing is rendered.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-submit hslt-job
+
+# epoch FILE: of the plan that hslt-submit printed; rule FILE WORDS
+epoch() {
+	sed -n 's/.*epochs of \([0-9]*\) mutations.*/\1/p' "$1"
+}
+
+rule() {
+	grep -q -e "$2" "$1" || fail "no \"$2\" in: $(cat "$1")"
+}
+
+# told NAME OPTION...: the job's id in JOB, what was said in NAME
+told() {
+	name=$DIR/$1
+	shift
+	JOB=$("$BIN/hslt-submit" "$BOX" -o "$DIR/x.exr" --integrator pssmlt --size 640x360 "$@" 2>"$name") || fail "$(cat "$name")"
+	"$BIN/hslt-job" cancel "$JOB" >/dev/null || fail "$JOB is not cancelled"
+}
+
+start_coordinator
+told long --spp 100000
+rule "$DIR/long" "pilot: "
+rule "$DIR/long" "leases of about 20 s of a thread"
+long=$(epoch "$DIR/long")
+told short --spp 16
+grep -q pilot "$DIR/short" && fail "a pilot for a short job"
+rule "$DIR/short" "for 8 rounds"
+told pinned --spp 100000 --epoch 12345
+[ "$(epoch "$DIR/pinned")" = 12345 ] || fail "an epoch of $(epoch "$DIR/pinned")"
+grep -q "pilot\|epochs:" "$DIR/pinned" && fail "a pilot for an epoch that was asked for"
+told parts --spp 16 --parts 64
+rule "$DIR/parts" "1024 leases"
+"$BIN/hslt-submit" "$BOX" -o "$DIR/x.exr" --integrator pssmlt --parts 3 --chains 1024 --epoch 9 2>"$DIR/odd" && fail "3 parts of 64 chains"
+rule "$DIR/odd" "cannot be cut into 3 parts"
+stop "$COORDINATOR_PID"
+
+start_coordinator --worker-bandwidth 0.01
+told slow --spp 100000
+rule "$DIR/slow" "2.76 MB of tiles a lease at 0.01 MB/s"
+slow=$(epoch "$DIR/slow")
+[ "$slow" -gt "$long" ] || fail "epochs of $slow at a slow bandwidth, $long without"
+echo "epochs of $long mutations, $slow with 0.01 MB/s a thread"
