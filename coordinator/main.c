@@ -27,7 +27,7 @@ static const char doc[] =
 
 enum {
 	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS,
-	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE, OPTION_BANDWIDTH, OPTION_CONNECTIONS,
+	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_KEEP, OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE, OPTION_BANDWIDTH, OPTION_CONNECTIONS,
 	OPTION_GROUP
 };
 
@@ -44,6 +44,7 @@ static const struct argp_option options[] = {
 	{"tls-check", OPTION_TLS_CHECK, "SECONDS", 0, "How often certificates of live connections are checked again (60)", 0},
 	{"journal", OPTION_JOURNAL, "MB", 0, "Results of a running job that are kept before its films are written in their place (64)", 0},
 	{"connections", OPTION_CONNECTIONS, "N", 0, "At once, at most (10000, or as many as there are file descriptors)", 0},
+	{"keep-films", OPTION_KEEP, "MB", 0, "Films of jobs that are done, for hslt-job extend; the oldest go (2000)", 0},
 	{"worker-bandwidth", OPTION_BANDWIDTH, "MB/S", 0,
 	 "Tiles that one thread of a worker may send on average: epochs of new jobs are at least that long (any)", 0},
 	{"quota-jobs", OPTION_JOBS, "N", 0, "Jobs of a client that have not ended", 0},
@@ -106,6 +107,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_CONNECTIONS:
 		c->max_connections = (unsigned)number(state, "--connections", arg, 1, CONNECTIONS_MOST);
+		return 0;
+	case OPTION_KEEP:
+		c->keep_bytes = (uint64_t)(1e6 * number(state, "--keep-films", arg, 0, 1e9));
 		return 0;
 	case OPTION_BANDWIDTH:
 		c->worker_bandwidth = 1e6 * number(state, "--worker-bandwidth", arg, 1e-6, 1e6);

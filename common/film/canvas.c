@@ -146,6 +146,12 @@ bool canvas_has(const struct canvas *c, const struct lease_key *k)
 	return canvas_lease_merged(c, lease_set(k), k->group, k->part);
 }
 
+void canvas_set_rounds(struct canvas *c, uint64_t rounds)
+{
+	assert(rounds >= c->rounds);
+	c->plan.rounds = rounds;
+}
+
 uint64_t canvas_rounds(const struct canvas *c)
 {
 	return c->rounds;

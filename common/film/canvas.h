@@ -32,6 +32,8 @@ void canvas_free(struct canvas *c);
 /* Bootstrap batches add only their independent sums. Counters and sums of render batches are those of their round.
  * -EEXIST: merged already; -EAGAIN: round not open; -ERANGE: a sum left the grid (an error of the job). */
 int canvas_add(struct canvas *c, const struct batch *b, struct error *e);
+/* The plan ends after so many rounds now, not fewer than are open. */
+void canvas_set_rounds(struct canvas *c, uint64_t rounds);
 bool canvas_has(const struct canvas *c, const struct lease_key *k); /* merged already */
 uint64_t canvas_rounds(const struct canvas *c);                     /* complete rounds */
 uint64_t canvas_merged(const struct canvas *c); /* render leases merged, open rounds too */

@@ -19,28 +19,34 @@ static const char doc[] =
 	"  hslt-job hold j12             no more of its leases go out; those that are out count\n"
 	"  hslt-job release j12\n"
 	"  hslt-job priority j12 -5      -100 to 100; from the next lease on\n"
+	"  hslt-job extend j12 --spp +8  goes on with it, as if that many more had been asked for; done or not\n"
+	"  hslt-job extend j12 --target-error 2%\n"
 	"  hslt-job cancel j12\n"
 	"  hslt-job log j12\n"
 	"\n"
 	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 done, 1 failed, 2 usage, 6 refused, 75 coordinator not "
 	"reachable.";
 
-#define VERBS "list, hold, release, priority, cancel, fetch, log"
+#define VERBS "list, hold, release, priority, extend, cancel, fetch, log"
 
-enum { OPTION_INSECURE = 256, OPTION_JSON, OPTION_PREVIEW, OPTION_TLS, PRIORITY_MOST = 100 };
+enum { OPTION_INSECURE = 256, OPTION_JSON, OPTION_PREVIEW, OPTION_TLS, OPTION_SPP, OPTION_MUTATIONS, OPTION_TIME, OPTION_TARGET, PRIORITY_MOST = 100 };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
 	{"output", 'o', "FILE", 0, "fetch: where to (the name that hslt-submit was given)", 0},
 	{"preview", OPTION_PREVIEW, NULL, 0, "fetch: what there is while the job runs", 0},
 	{"json", OPTION_JSON, NULL, 0, "list: one JSON array", 0},
+	{"spp", OPTION_SPP, "+N", 0, "extend: so many more samples a pixel", 0},
+	{"mutations", OPTION_MUTATIONS, "+N", 0, "extend: so many more", 0},
+	{"time", OPTION_TIME, "+SECONDS", 0, "extend: so much longer", 0},
+	{"target-error", OPTION_TARGET, "E", 0, "extend: until the estimated relative error is 0.02 or 2%; bounds that are met and not named end it no more", 0},
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{0},
 };
 
 static const char *const verbs[JOB_VERBS] = {[JOB_LIST] = "list",	[JOB_CANCEL] = "cancel",   [JOB_FETCH] = "fetch",	 [JOB_LOG] = "log",
-					     [JOB_HOLD] = "hold", [JOB_RELEASE] = "release", [JOB_PRIORITY] = "priority"};
+					     [JOB_HOLD] = "hold", [JOB_RELEASE] = "release", [JOB_PRIORITY] = "priority", [JOB_EXTEND] = "extend"};
 
 static void take_verb(struct job_options *o, const char *arg, struct argp_state *state)
 {
@@ -69,6 +75,29 @@ static void take_priority(struct job_options *o, const char *arg, struct argp_st
 	o->has_priority = true;
 }
 
+/* Above 0; with a plus sign or without, for it is more in any case. */
+static double take_more(const char *option, const char *arg, double most, struct argp_state *state)
+{
+	char *end;
+	double x = strtod(arg, &end);
+	if (*end || end == arg || !(x > 0 && x <= most))
+		argp_error(state, "%s takes something like +8, not '%s'", option, arg);
+	return x;
+}
+
+static double take_error(const char *arg, struct argp_state *state)
+{
+	char *end;
+	double x = strtod(arg, &end);
+	if (*end == '%') {
+		x /= 100;
+		end++;
+	}
+	if (*end || end == arg || !(x > 0 && x < 1e6))
+		argp_error(state, "--target-error takes something like 0.02 or 2%%, not '%s'", arg);
+	return x;
+}
+
 static void take_word(struct job_options *o, const char *arg, struct argp_state *state)
 {
 	if (state->arg_num == 0)
@@ -89,6 +118,11 @@ static void check(const struct job_options *o, struct argp_state *state)
 		argp_error(state, "%s needs a job", verbs[o->verb]);
 	if (o->verb == JOB_PRIORITY && !o->has_priority)
 		argp_error(state, "which priority? From -100 to 100");
+	bool more = o->more_spp || o->more_mutations || o->more_seconds > 0 || o->target_error > 0;
+	if (o->verb == JOB_EXTEND && !more)
+		argp_error(state, "by what? --spp, --mutations, --time or --target-error");
+	if (o->verb != JOB_EXTEND && more)
+		argp_error(state, "bounds are for extend");
 	if (!o->coordinator)
 		argp_error(state, "--coordinator HOST:PORT is needed (or $HSLT_COORDINATOR)");
 }
@@ -102,6 +136,18 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case 'o':
 		o->output = arg;
+		return 0;
+	case OPTION_SPP:
+		o->more_spp = (uint64_t)take_more("--spp", arg, 1e15, state);
+		return 0;
+	case OPTION_MUTATIONS:
+		o->more_mutations = (uint64_t)take_more("--mutations", arg, 1e18, state);
+		return 0;
+	case OPTION_TIME:
+		o->more_seconds = take_more("--time", arg, 1e9, state);
+		return 0;
+	case OPTION_TARGET:
+		o->target_error = take_error(arg, state);
 		return 0;
 	case OPTION_PREVIEW:
 		o->preview = true;

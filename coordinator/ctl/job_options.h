@@ -5,13 +5,15 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-enum job_verb { JOB_LIST, JOB_CANCEL, JOB_FETCH, JOB_LOG, JOB_HOLD, JOB_RELEASE, JOB_PRIORITY, JOB_VERBS };
+enum job_verb { JOB_LIST, JOB_CANCEL, JOB_FETCH, JOB_LOG, JOB_HOLD, JOB_RELEASE, JOB_PRIORITY, JOB_EXTEND, JOB_VERBS };
 
 struct job_options {
 	const char *coordinator, *tls, *output;
 	enum job_verb verb; /* JOB_VERBS: none */
 	uint64_t job;
 	int priority;
+	uint64_t more_spp, more_mutations; /* extend: these four */
+	double more_seconds, target_error;
 	bool has_priority, insecure, json, preview;
 };
 

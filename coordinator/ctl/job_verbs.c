@@ -103,7 +103,7 @@ static int cancel(struct client *cl, const struct job_options *o, struct error *
 static int control(struct client *cl, const struct job_options *o, struct error *e)
 {
 	static const Farm__Verb verbs[] = {[JOB_HOLD] = FARM__VERB__VERB_HOLD, [JOB_RELEASE] = FARM__VERB__VERB_RELEASE,
-					   [JOB_PRIORITY] = FARM__VERB__VERB_PRIORITY};
+					   [JOB_PRIORITY] = FARM__VERB__VERB_PRIORITY, [JOB_EXTEND] = FARM__VERB__VERB_EXTEND};
 	Farm__Control question;
 	Farm__Envelope m;
 	farm__control__init(&question);
@@ -111,6 +111,10 @@ static int control(struct client *cl, const struct job_options *o, struct error 
 	question.job = o->job;
 	question.verb = verbs[o->verb];
 	question.priority = o->priority;
+	question.more_spp = o->more_spp;
+	question.more_mutations = o->more_mutations;
+	question.more_seconds = o->more_seconds;
+	question.target_error = o->target_error;
 	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
 	m.control = &question;
 	return take_done(cl, &m, o, e);
@@ -136,6 +140,7 @@ int job_verb(struct client *cl, const struct job_options *o, struct error *e)
 	static int (*const verbs[])(struct client *, const struct job_options *, struct error *) = {
 		[JOB_LIST] = list,	[JOB_CANCEL] = cancel,	 [JOB_FETCH] = fetch,	   [JOB_LOG] = print_log,
 		[JOB_HOLD] = control,	[JOB_RELEASE] = control, [JOB_PRIORITY] = control,
+		[JOB_EXTEND] = control,
 	};
 	return verbs[o->verb](cl, o, e);
 }

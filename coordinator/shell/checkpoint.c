@@ -20,10 +20,11 @@ struct head {
 	struct order_times times;
 	struct bootstrap_result lit;
 	struct forecast_history looks;
+	struct job_counts counts;
 	char fingerprint[256];
 };
 
-static const char magic[8] = "hsltC001";
+static const char magic[8] = "hsltC002";
 
 struct writing {
 	uv_work_t work;
@@ -146,6 +147,7 @@ static void start(struct server *s, struct order *o)
 				.look_written = o->look_written,
 				.times = o->times,
 				.lit = o->lit,
+				.counts = o->counts,
 				.looks = *status.looks};
 	memcpy(w->head.magic, magic, sizeof magic);
 	snprintf(w->head.fingerprint, sizeof w->head.fingerprint, "%s", status.fingerprint);
@@ -209,6 +211,7 @@ static void take_head(struct order *o, const struct head *h)
 	o->times = h->times;
 	o->lit = h->lit;
 	o->record.looks = h->looks;
+	o->counts = h->counts;
 	snprintf(o->fingerprint, sizeof o->fingerprint, "%s", h->fingerprint);
 }
 

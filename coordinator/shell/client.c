@@ -69,18 +69,23 @@ static uint64_t bytes_of(const Farm__Submit *m)
 	return sum;
 }
 
-static int within_quota(const struct session *p, struct error *e)
+int session_within_quota(const struct session *p, uint64_t job, const struct plan *plan, const Farm__Submit *m, struct error *e)
 {
 	struct quota_use has = {0};
 	if (p->who.role == TLS_OPERATOR)
 		return 0;
 	for (const struct order *o = p->server->orders; o; o = o->next) {
-		if (o->ended || strcmp(o->record.owner, p->who.name) != 0)
+		if (o->ended || o->id == job || strcmp(o->record.owner, p->who.name) != 0)
 			continue;
 		has.jobs++;
 		has.asset_bytes += bytes_of(order_submit(o));
 	}
-	return quota_check(&p->server->config.quota, &has, &p->upload->plan, bytes_of(p->upload->submit.message->submit), e);
+	return quota_check(&p->server->config.quota, &has, plan, bytes_of(m), e);
+}
+
+static int within_quota(const struct session *p, struct error *e)
+{
+	return session_within_quota(p, 0, &p->upload->plan, p->upload->submit.message->submit, e);
 }
 
 /* Every blob is there: the core decides. */
@@ -195,14 +200,16 @@ static void take_list(struct session *p)
 	mem_free(views);
 }
 
-void session_send_done(struct session *p)
+void session_send_done(struct session *p, const char *text)
 {
+	char said[256];
 	Farm__Done done;
 	Farm__Envelope m;
 	farm__done__init(&done);
 	farm__envelope__init(&m);
 	done.ok = !*p->rejected;
-	done.text = p->rejected;
+	text_copy(said, sizeof said, *p->rejected ? p->rejected : text);
+	done.text = said;
 	m.body_case = FARM__ENVELOPE__BODY_DONE;
 	m.done = &done;
 	session_send(p, &m, NULL, 0);
@@ -217,7 +224,7 @@ static void take_cancel(struct session *p, uint64_t job)
 		server_step(p->server, &ev);
 	else
 		text_copy(p->rejected, sizeof p->rejected, "no such job");
-	session_send_done(p);
+	session_send_done(p, "");
 }
 
 static void take_watch(struct session *p, uint64_t job)

@@ -69,7 +69,7 @@ void session_control(struct session *p, const Farm__Control *c)
 	p->rejected[0] = 0;
 	if (!session_finds_job(p, c->job, &v)) {
 		text_copy(p->rejected, sizeof p->rejected, "no such job");
-	} else if (!server_order(p->server, c->job)) { /* the core need not know it any more */
+	} else if (!server_order(p->server, c->job) && c->verb != FARM__VERB__VERB_EXTEND) { /* the core need not know it any more */
 		text_copy(p->rejected, sizeof p->rejected, "the job is over");
 	} else {
 		switch (c->verb) {
@@ -82,9 +82,13 @@ void session_control(struct session *p, const Farm__Control *c)
 		case FARM__VERB__VERB_PRIORITY:
 			set_priority(p, c->job, c->priority);
 			break;
+		case FARM__VERB__VERB_EXTEND:
+			extend_job(p, &(struct extension){.job = c->job, .spp = c->more_spp, .mutations = c->more_mutations,
+							  .seconds = c->more_seconds, .target_error = c->target_error});
+			return; /* with an answer, or there will be one */
 		default: /* a number from outside */
 			text_copy(p->rejected, sizeof p->rejected, "nothing that can be done with a job");
 		}
 	}
-	session_send_done(p);
+	session_send_done(p, "");
 }

@@ -5,6 +5,7 @@
 #include "common/base/text.h"
 #include "common/film/exr.h"
 #include "coordinator/shell/durable.h"
+#include "coordinator/shell/keep.h"
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/trust.h"
 #include "coordinator/shell/upload.h"
@@ -229,8 +230,10 @@ void dispatch_update(struct server *s, const struct update *u)
 
 void dispatch_remember(struct server *s, const struct job_record *r)
 {
-	if (s->ended_count == ENDED_MAX)
+	if (s->ended_count == ENDED_MAX) {
+		keep_drop(s, s->ended[0].id); /* nobody would count its films any more */
 		memmove(s->ended, s->ended + 1, --s->ended_count * sizeof *s->ended);
+	}
 	s->ended[s->ended_count++] = *r;
 }
 
@@ -247,6 +250,7 @@ static void finish(struct server *s, struct order *o)
 	for (struct session *p = s->sessions; p; p = p->next)
 		if (p->state == SESSION_WORKER)
 			session_send_job_end(p, o->id);
+	keep_trim(s);
 	order_release_blobs(order_submit(o), s->blobs);
 	struct order **at = &s->orders;
 	while (*at != o)
@@ -278,4 +282,5 @@ void dispatch_finish_orders(struct server *s)
 	for (struct session *p = finished ? s->sessions : NULL; p; p = p->next)
 		if (p->watched && p->shown && !server_order(s, p->watched))
 			session_tick(p);
+	extend_waiting(s);
 }

@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/version.h"
 #include "common/wire/frame.h"
+#include "coordinator/shell/keep.h"
 #include "coordinator/shell/session.h"
 
 #include <assert.h>
@@ -45,20 +46,27 @@ static int pack_plan(const struct order *o, unsigned char **frame, size_t *size,
 	return envelope_pack(&m, NULL, 0, frame, size, e);
 }
 
+int durable_pack(const struct order *o, struct ledger_job *j, unsigned char **submission, unsigned char **plan, struct error *e)
+{
+	*submission = *plan = NULL;
+	int rc = envelope_pack(o->submit.message, NULL, 0, submission, &j->submission_size, e);
+	if (!rc)
+		rc = pack_plan(o, plan, &j->plan_size, e);
+	j->submission = *submission;
+	j->plan = *plan;
+	return rc;
+}
+
 int durable_begin(struct server *s, struct order *o, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX];
-	unsigned char *submission = NULL, *plan = NULL;
+	unsigned char *submission, *plan;
 	struct ledger_job j = {.id = o->id, .owner = o->record.owner, .name = o->record.name, .version = HSLT_VERSION,
 			       .priority = o->record.priority, .mixed = order_submit(o)->mixed, .submitted = o->record.submitted};
 	spool_job_path(s->spool, o->id, NULL, folder);
-	int rc = journal_create(&o->journal, folder, o->id, 0, e);
+	int rc = durable_pack(o, &j, &submission, &plan, e);
 	if (!rc)
-		rc = envelope_pack(o->submit.message, NULL, 0, &submission, &j.submission_size, e);
-	if (!rc)
-		rc = pack_plan(o, &plan, &j.plan_size, e);
-	j.submission = submission;
-	j.plan = plan;
+		rc = journal_create(&o->journal, folder, o->id, 0, e);
 	if (!rc)
 		rc = ledger_add(s->ledger, &j, e);
 	mem_free(submission);
@@ -66,23 +74,17 @@ int durable_begin(struct server *s, struct order *o, struct error *e)
 	return rc;
 }
 
-/* With its last holder the journal gives up its room, too. */
-static void drop_files(struct server *s, struct order *o)
-{
-	char path[SPOOL_PATH_MAX];
-	journal_release(o->journal);
-	o->journal = NULL;
-	spool_job_path(s->spool, o->id, NULL, path);
-	journal_clear(path, UINT64_MAX);
-	spool_job_path(s->spool, o->id, "checkpoint", path);
-	disk_unlink(path);
-}
-
 void durable_end(struct server *s, struct order *o)
 {
 	struct error e;
+	bool kept = keep_order(s, o);
 	int rc = spool_write_record(s->spool, &o->record, &e);
-	drop_files(s, o);
+	if (rc == -ENOSPC)
+		kept = false;
+	journal_release(o->journal); /* with its last holder it gives up its room, too */
+	o->journal = NULL;
+	if (!kept)
+		keep_drop(s, o->id);
 	if (rc == -ENOSPC)
 		rc = spool_write_record(s->spool, &o->record, &e);
 	if (rc)
@@ -122,6 +124,8 @@ int durable_reserve(struct server *s, struct order *o, struct error *e)
 		return rc;
 	frame_prefix_write(s->frame, (uint32_t)(s->frame_size - FRAME_PREFIX), (uint32_t)s->payload_size);
 	rc = journal_reserve(o->journal, s->frame_size + s->payload_size, e);
+	if (rc == -ENOSPC && keep_drop_all(s))
+		rc = journal_reserve(o->journal, s->frame_size + s->payload_size, e);
 	if (!rc)
 		return 0;
 	char text[256];
@@ -253,8 +257,21 @@ void durable_look(struct server *s, uint64_t job)
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
+/* Not before each answer: it is for the record alone. */
+static void write_counts(struct server *s, struct order *o)
+{
+	struct job_counts now;
+	struct error e;
+	if (o->ended || !o->journal || !farm_counts(s->farm, o->id, &now) || memcmp(&now, &o->counts, sizeof now) == 0)
+		return;
+	if (journal_append(o->journal, JOURNAL_COUNTS, o->times.elapsed, &now, sizeof now, NULL, 0, &e) == 0)
+		o->counts = now;
+}
+
 void durable_tick(struct server *s)
 {
+	for (struct order *o = s->orders; o; o = o->next)
+		write_counts(s, o);
 	for (struct order *o = s->orders, *next; o; o = next) {
 		struct error e;
 		next = o->next;

@@ -50,6 +50,7 @@ struct order {
 	int log; /* a file descriptor */
 	struct journal *journal; /* NULL: it cannot be written any more */
 	bool pinned;             /* the journal knows whose it is */
+	struct job_counts counts; /* as they were written down last */
 	struct order_times times;
 	char fingerprint[256];           /* of an earlier life */
 	uint64_t checkpoint_bytes;       /* of the last one */

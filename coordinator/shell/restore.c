@@ -100,6 +100,11 @@ static int take_record(void *user, enum journal_kind kind, double elapsed, const
 		forecast_add_look(&o->record.looks, &look);
 		o->look_written = look.work;
 		return 0;
+	case JOURNAL_COUNTS:
+		if (size != sizeof o->counts)
+			return error_set(e, EBADMSG, "counts of %zu bytes", size);
+		memcpy(&o->counts, body, size);
+		return 0;
 	default:
 		return error_set(e, EBADMSG, "a record of kind %d", (int)kind);
 	}
@@ -139,9 +144,8 @@ static uint64_t next_epoch(const struct order *o, uint32_t group, uint32_t part)
 	return k.epoch;
 }
 
-static int tell_core(struct server *s, const struct replay *r, const char *held, struct error *e)
+int restore_tell(struct server *s, const struct order *o, const char *held, uint64_t tag, struct error *e)
 {
-	const struct order *o = r->order;
 	uint32_t slots = o->plan.groups * o->plan.parts;
 	uint64_t *next = mem_alloc(slots, sizeof *next);
 	if (!next)
@@ -154,6 +158,7 @@ static int tell_core(struct server *s, const struct replay *r, const char *held,
 	}
 	char text[256];
 	struct event ev = {.kind = EVENT_RESTORE,
+			   .tag = tag,
 			   .restore = {.job = o->id,
 				       .submit = {.plan = &o->plan, .name = o->record.name, .priority = o->record.priority,
 						  .mixed = order_submit(o)->mixed, .owner = o->record.owner, .verify = trust_share(s, order_submit(o))},
@@ -164,7 +169,8 @@ static int tell_core(struct server *s, const struct replay *r, const char *held,
 				       .elapsed = o->times.elapsed,
 				       .opened = o->times.opened,
 				       .completed = o->times.completed,
-				       .looks = &o->record.looks}};
+				       .looks = &o->record.looks,
+				       .counts = o->counts}};
 	server_step(s, &ev);
 	mem_free(next);
 	if (*held) {
@@ -180,10 +186,27 @@ static int hold_blobs(struct server *s, const Farm__Submit *m, struct error *e)
 {
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = order_file_hash(m->files[i]);
-		if (!blob_hold(s->blobs, &h))
-			return error_set(e, EBADMSG, "the spool has lost %s", m->files[i]->name);
+		if (blob_hold(s->blobs, &h))
+			continue;
+		int rc = error_set(e, EBADMSG, "the spool has lost %s", m->files[i]->name);
+		while (i-- > 0) {
+			h = order_file_hash(m->files[i]);
+			blob_release(s->blobs, &h);
+		}
+		return rc;
 	}
 	return 0;
+}
+
+/* What the submission does not say, but its earlier end: its image is there until the next one is. */
+static void take_record_of(const struct server *s, const struct ledger_job *j, struct order *o)
+{
+	struct job_record *r = mem_alloc(1, sizeof *r);
+	o->record.priority = j->priority;
+	o->record.extended = j->extended;
+	if (r && j->extended && spool_read_record(s->spool, o->id, r, NULL) == 0)
+		o->record.has_result = r->has_result;
+	mem_free(r);
 }
 
 static int make_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e)
@@ -203,10 +226,10 @@ static int make_order(struct server *s, const struct ledger_job *j, struct order
 	if (rc)
 		return rc;
 	rc = hold_blobs(s, submit.message->submit, e);
+	if (!rc && (rc = order_new(o, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e)))
+		order_release_blobs(submit.message->submit, s->blobs);
 	if (!rc)
-		rc = order_new(o, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e);
-	if (!rc)
-		(*o)->record.priority = j->priority;
+		take_record_of(s, j, *o);
 	envelope_fini(&submit);
 	return rc;
 }
@@ -224,6 +247,25 @@ static void begin_anew(struct server *s, struct replay *r, const struct error *w
 	order_release_blobs(order_submit(o), s->blobs);
 	order_free(o);
 	r->order = NULL;
+}
+
+int restore_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e)
+{
+	struct replay *r = mem_alloc(1, sizeof *r);
+	if (!r)
+		return error_set(e, ENOMEM, "no memory for a job");
+	r->canvas_folder = spool_canvas(s->spool);
+	int rc = make_order(s, j, &r->order, e);
+	if (!rc)
+		rc = read_journal(s, r, e);
+	if (rc && r->order) {
+		order_release_blobs(order_submit(r->order), s->blobs);
+		order_free(r->order);
+		r->order = NULL;
+	}
+	*o = r->order;
+	mem_free(r);
+	return rc;
 }
 
 static int restore_one(struct server *s, const struct ledger_job *j, struct error *e)
@@ -244,7 +286,7 @@ static int restore_one(struct server *s, const struct ledger_job *j, struct erro
 	if (!rc) {
 		r->order->next = s->orders;
 		s->orders = r->order;
-		rc = tell_core(s, r, j->held, e);
+		rc = restore_tell(s, r->order, j->held, 0, e);
 	} else if (r->order) {
 		order_free(r->order);
 	}
@@ -286,7 +328,7 @@ int restore_open(struct server *s, struct error *e)
 		id = j.id;
 		rc = 0;
 		/* Its record was written before its end came into the ledger. */
-		if (spool_read_record(s->spool, id, r, NULL) == 0 && record_is_ended(r)) {
+		if (spool_read_record(s->spool, id, r, NULL) == 0 && record_is_ended(r) && r->extended == j.extended) {
 			rc = ledger_end(s->ledger, id, r->state, e);
 			continue;
 		}

@@ -8,6 +8,7 @@
 #include "coordinator/shell/digest.h"
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
+#include "coordinator/shell/keep.h"
 #include "coordinator/shell/limits.h"
 #include "coordinator/shell/restore.h"
 #include "coordinator/shell/session.h"
@@ -26,7 +27,7 @@ enum { BACKLOG = 4096, TICK_MS = 200 };
 void server_config_init(struct server_config *c)
 {
 	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5,  .max_faults = 3,
-				    .journal_bytes = 64 << 20, .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
+				    .journal_bytes = 64 << 20, .keep_bytes = 2000000000, .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
 }
 
 double server_now(const struct server *s)
@@ -436,7 +437,11 @@ static int open_stores(struct server *s, struct error *e)
 	rc = farm_new(&s->farm, &config, e);
 	if (!rc)
 		rc = trust_open(s, e);
-	return rc ? rc : restore_jobs(s, e);
+	if (!rc)
+		rc = restore_jobs(s, e);
+	if (!rc)
+		keep_trim(s);
+	return rc;
 }
 
 static void init_handles(struct server *s)

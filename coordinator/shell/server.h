@@ -24,6 +24,7 @@ struct server_config {
 	bool insecure;
 	struct quota quota; /* of each client */
 	uint64_t blob_bytes; /* the spool's limit of scene files; 0: none */
+	uint64_t keep_bytes; /* of films of jobs that are done, so that they can be extended; 0: none are kept */
 	uint64_t journal_bytes; /* a job's journal that is longer is cut by a checkpoint */
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
 	unsigned max_connections; /* 0: by the file descriptors that there are */

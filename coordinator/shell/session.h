@@ -5,6 +5,7 @@
 #ifndef COORDINATOR_SHELL_SESSION_H
 #define COORDINATOR_SHELL_SESSION_H
 
+#include "coordinator/shell/extend.h"
 #include "coordinator/shell/server.h"
 
 enum session_state { SESSION_NEW, SESSION_WORKER, SESSION_CLIENT, SESSION_LEAVING };
@@ -26,6 +27,7 @@ struct session {
 	uint64_t watched;      /* job; 0: none */
 	uint64_t wants_preview; /* job whose preview is being made for it; 0: none */
 	struct job_view *shown; /* what the watcher saw last */
+	struct extension wants; /* it waits until nobody reads the job's films; job 0: none */
 	char rejected[256];    /* why the core refused; "" it did not */
 	uint64_t answered_job; /* SUBMITTED or CANCELLED came for it */
 };
@@ -48,7 +50,9 @@ void session_tick(struct session *p);
 /* client.c */
 /* false: no such job for this client, who sees the own jobs alone. */
 bool session_finds_job(const struct session *p, uint64_t job, struct job_view *v);
-void session_send_done(struct session *p); /* p->rejected says why not */
+void session_send_done(struct session *p, const char *text); /* p->rejected says why not; text: what was done, or "" */
+/* -EDQUOT. job: 0, or one that is there already. */
+int session_within_quota(const struct session *p, uint64_t job, const struct plan *plan, const Farm__Submit *m, struct error *e);
 /* control.c */
 void session_control(struct session *p, const Farm__Control *c);
 

@@ -17,6 +17,7 @@ enum journal_kind {
 	JOURNAL_BATCH = 1,  /* a frame as it came: prefix, header, payload */
 	JOURNAL_PINNED = 2, /* the fingerprint that the job belongs to */
 	JOURNAL_LOOK = 3,   /* struct forecast_look */
+	JOURNAL_COUNTS = 4, /* struct job_counts: in all, not since the last */
 };
 
 struct journal;

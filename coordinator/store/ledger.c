@@ -9,7 +9,7 @@
 
 struct ledger {
 	sqlite3 *db;
-	sqlite3_stmt *add, *end, *hold, *priority, *last, *next;
+	sqlite3_stmt *add, *end, *hold, *priority, *extend, *last, *next, *get;
 };
 
 /* The n-th brings a database of version n to n + 1; never changed, only added to. */
@@ -19,8 +19,11 @@ static const char *const migrations[] = {
 	" submission BLOB, plan BLOB) STRICT;"
 	"CREATE INDEX living ON jobs (id) WHERE ended IS NULL;",
 	"ALTER TABLE jobs ADD COLUMN held TEXT NOT NULL DEFAULT '';",
+	"ALTER TABLE jobs ADD COLUMN extended INTEGER NOT NULL DEFAULT 0;",
 };
 enum { VERSION = sizeof migrations / sizeof *migrations };
+
+#define COLUMNS "id, owner, name, version, priority, mixed, submitted, submission, plan, held, extended"
 
 static int fault(const struct ledger *l, struct error *e)
 {
@@ -88,7 +91,7 @@ int ledger_open(struct ledger **out, const char *path, struct error *e)
 		rc = prepare(l, &l->add, "INSERT INTO jobs (id, owner, name, version, priority, mixed, state, submitted, submission, plan)"
 					 " VALUES (?, ?, ?, ?, ?, ?, 'live', ?, ?, ?)", e);
 	if (!rc)
-		rc = prepare(l, &l->end, "UPDATE jobs SET state = ?2, ended = ?3, submission = NULL, plan = NULL WHERE id = ?1 AND ended IS NULL",
+		rc = prepare(l, &l->end, "UPDATE jobs SET state = ?2, ended = ?3, submission = NULL, plan = NULL, held = '' WHERE id = ?1 AND ended IS NULL",
 			     e);
 	if (!rc)
 		rc = prepare(l, &l->hold, "UPDATE jobs SET held = ?2 WHERE id = ?1", e);
@@ -97,8 +100,12 @@ int ledger_open(struct ledger **out, const char *path, struct error *e)
 	if (!rc)
 		rc = prepare(l, &l->last, "SELECT coalesce(max(id), 0) FROM jobs", e);
 	if (!rc)
-		rc = prepare(l, &l->next, "SELECT id, owner, name, version, priority, mixed, submitted, submission, plan, held FROM jobs"
-					  " WHERE ended IS NULL AND id > ? ORDER BY id LIMIT 1", e);
+		rc = prepare(l, &l->extend, "UPDATE jobs SET submission = ?2, plan = ?3, extended = extended + (ended IS NOT NULL), ended = NULL,"
+					    " state = 'live' WHERE id = ?1", e);
+	if (!rc)
+		rc = prepare(l, &l->next, "SELECT " COLUMNS " FROM jobs WHERE ended IS NULL AND id > ? ORDER BY id LIMIT 1", e);
+	if (!rc)
+		rc = prepare(l, &l->get, "SELECT " COLUMNS " FROM jobs WHERE id = ?", e);
 	if (rc) {
 		ledger_close(l);
 		return rc == -EPROTO ? rc : error_prefix(e, rc, "%s", path);
@@ -115,6 +122,8 @@ void ledger_close(struct ledger *l)
 	sqlite3_finalize(l->end);
 	sqlite3_finalize(l->hold);
 	sqlite3_finalize(l->priority);
+	sqlite3_finalize(l->extend);
+	sqlite3_finalize(l->get);
 	sqlite3_finalize(l->last);
 	sqlite3_finalize(l->next);
 	sqlite3_close(l->db);
@@ -169,6 +178,14 @@ int ledger_priority(struct ledger *l, uint64_t id, int priority, struct error *e
 	return finish(l, l->priority, e);
 }
 
+int ledger_extend(struct ledger *l, const struct ledger_job *j, struct error *e)
+{
+	sqlite3_bind_int64(l->extend, 1, (sqlite3_int64)j->id);
+	sqlite3_bind_blob64(l->extend, 2, j->submission, j->submission_size, SQLITE_STATIC);
+	sqlite3_bind_blob64(l->extend, 3, j->plan, j->plan_size, SQLITE_STATIC);
+	return finish(l, l->extend, e);
+}
+
 int ledger_last(struct ledger *l, uint64_t *id, struct error *e)
 {
 	int rc = sqlite3_step(l->last) == SQLITE_ROW ? 0 : fault(l, e);
@@ -183,11 +200,10 @@ static const char *text_at(sqlite3_stmt *s, int column)
 	return text ? text : "";
 }
 
-int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e)
+static int row(struct ledger *l, sqlite3_stmt *s, uint64_t id, struct ledger_job *j, struct error *e)
 {
-	sqlite3_stmt *s = l->next;
 	sqlite3_reset(s); /* here, so that the last answer was valid until now */
-	sqlite3_bind_int64(s, 1, (sqlite3_int64)after);
+	sqlite3_bind_int64(s, 1, (sqlite3_int64)id);
 	int rc = sqlite3_step(s);
 	if (rc != SQLITE_ROW) {
 		rc = rc == SQLITE_DONE ? 0 : fault(l, e);
@@ -196,11 +212,21 @@ int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct e
 	}
 	*j = (struct ledger_job){.id = (uint64_t)sqlite3_column_int64(s, 0), .owner = text_at(s, 1), .name = text_at(s, 2),
 				 .version = text_at(s, 3), .priority = sqlite3_column_int(s, 4), .mixed = sqlite3_column_int(s, 5),
-				 .submitted = sqlite3_column_double(s, 6)};
+				 .submitted = sqlite3_column_double(s, 6), .held = text_at(s, 9),
+				 .extended = (uint64_t)sqlite3_column_int64(s, 10)};
 	j->submission = sqlite3_column_blob(s, 7);
 	j->submission_size = (size_t)sqlite3_column_bytes(s, 7);
 	j->plan = sqlite3_column_blob(s, 8);
 	j->plan_size = (size_t)sqlite3_column_bytes(s, 8);
-	j->held = text_at(s, 9);
 	return 1;
+}
+
+int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e)
+{
+	return row(l, l->next, after, j, e);
+}
+
+int ledger_get(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e)
+{
+	return row(l, l->get, id, j, e);
 }

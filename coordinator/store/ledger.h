@@ -19,6 +19,7 @@ struct ledger_job {
 	uint64_t id;
 	const char *owner, *name, *version; /* version: of the program that took it */
 	const char *held;                   /* by whom; "": it is not. ledger_add does not look at it */
+	uint64_t extended;                  /* how often it went on after its end; as held */
 	int priority;
 	bool mixed;
 	double submitted;                       /* seconds since 1970 */
@@ -33,10 +34,14 @@ int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e);
 int ledger_end(struct ledger *l, uint64_t id, const char *state, struct error *e);
 int ledger_hold(struct ledger *l, uint64_t id, const char *who, struct error *e); /* "": no longer */
 int ledger_priority(struct ledger *l, uint64_t id, int priority, struct error *e);
+/* Another submission and plan; a job that has ended lives again. */
+int ledger_extend(struct ledger *l, const struct ledger_job *j, struct error *e);
 /* The greatest id that was ever added; 0: none. */
 int ledger_last(struct ledger *l, uint64_t *id, struct error *e);
 /* The living job with the smallest id above `after`, whose texts and bytes are valid until the next call. 1: it is there;
  * 0: no more. */
 int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e);
+/* That one, ended or not; until the next call of this. 0: it is not there. */
+int ledger_get(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e);
 
 #endif

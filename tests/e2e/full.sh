@@ -13,7 +13,7 @@ need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare
 JOB="--integrator hslt --bootstrap 20000 --mutations 2000000"
 mkdir "$DIR/spool"
 mount -t tmpfs -o size=32m none "$DIR/spool" || skip "no tmpfs"
-start_coordinator -v
+start_coordinator -v --keep-films 0
 start_worker w1
 submit "$BOX" -o "$DIR/quiet.exr" $JOB --wait >/dev/null
 quiet=$(value j1 merged)
@@ -45,6 +45,6 @@ until_true 20 is_state "$id" held || fail "$id is $(value "$id" state)"
 "$BIN/hslt-job" cancel "$id"
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
-LISTEN=$COORDINATOR start_coordinator -v
+LISTEN=$COORDINATOR start_coordinator -v --keep-films 0
 is_state "$id" cancelled || fail "$id is $(value "$id" state) after it was cancelled"
 echo "held at $before of $quiet leases, went on, bits equal"

@@ -35,11 +35,15 @@ has_no_leases() {
 	[ "$(value "$1" leases)" -eq 0 ]
 }
 
+more_rounds() {
+	[ "$(value "$1" rounds)" -gt "$2" ]
+}
+
 start_coordinator -v --journal 0.2
 start_worker w1
 
 # ---- hold, release, priority
-a=$(submit "$BOX" -o "$DIR/a.exr" --integrator path --spp 1000)
+a=$(submit "$BOX" -o "$DIR/a.exr" --integrator path --spp 500)
 until_true 20 merged_more "$a" 3 || fail "nothing of $a is merged"
 job hold "$a"
 [ "$(value "$a" state)" = held ] || fail "$a is $(value "$a" state)"
@@ -49,8 +53,8 @@ b=$(submit "$BOX" -o "$DIR/b.exr" --integrator path --spp 4)
 done_in 30 "$b"
 again
 [ "$(value "$a" state)" = held ] || fail "$a is $(value "$a" state) after a restart"
-c=$(submit "$BOX" -o "$DIR/c.exr" --integrator path --spp 1000)
-d=$(submit "$BOX" -o "$DIR/d.exr" --integrator path --spp 1000)
+c=$(submit "$BOX" -o "$DIR/c.exr" --integrator path --spp 500)
+d=$(submit "$BOX" -o "$DIR/d.exr" --integrator path --spp 500)
 job priority "$d" -5
 job priority "$c" 7
 again
@@ -75,7 +79,28 @@ refused 1 'the job is over' job hold "$b"
 job cancel "$c"
 job cancel "$d"
 done_in 60 "$a"
-submit "$BOX" -o "$DIR/quiet.exr" --integrator path --spp 1000 --wait >/dev/null
+submit "$BOX" -o "$DIR/quiet.exr" --integrator path --spp 500 --wait >/dev/null
 job fetch "$a"
 same "$DIR/a.exr" "$DIR/quiet.exr"
 echo "held, released, put first and last; the bits of a quiet run"
+
+# ---- extend: after the end, after a restart, by an error; the bits of one long job
+CHAINS="--integrator hslt --chains 64 --epoch 500 --bootstrap 20000"
+submit "$BOX" -o "$DIR/long.exr" $CHAINS --spp 600 --wait >/dev/null
+e=$(submit "$BOX" -o "$DIR/extended.exr" $CHAINS --spp 100)
+done_in 60 "$e"
+job fetch "$e" -o "$DIR/short.exr"
+"$BIN/hslt-compare" --exact "$DIR/short.exr" "$DIR/long.exr" >/dev/null 2>&1 && fail "100 and 600 samples a pixel are the same"
+refused 2 'by what' job extend "$e"
+job extend "$e" --spp +100
+job fetch "$e" -o "$DIR/between.exr" || fail "the image of before is gone while it goes on"
+again # in the midst of it
+done_in 60 "$e"
+again # and after its end
+first=$(value "$e" rounds)
+job extend "$e" --spp 300
+job extend "$e" --spp +100 # while it runs, or just after
+until_true 60 more_rounds "$e" "$first" || fail "$e does not go on after $first rounds"
+done_in 60 "$e"
+job fetch "$e"
+same "$DIR/extended.exr" "$DIR/long.exr"

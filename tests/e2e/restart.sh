@@ -21,7 +21,7 @@ moment() {
 again() {
 	kill -9 $COORDINATOR_PID
 	wait $COORDINATOR_PID 2>/dev/null || :
-	LISTEN=$COORDINATOR start_coordinator -v --journal $JOURNAL
+	LISTEN=$COORDINATOR start_coordinator -v --keep-films 0 --journal $JOURNAL
 	killed=$((killed + 1))
 }
 
@@ -46,7 +46,7 @@ acknowledged() {
 	grep -c "event=batch_stored job=$1 .* kind=2 " "$DIR/coordinator.log" || :
 }
 
-start_coordinator -v
+start_coordinator -v --keep-films 0
 start_worker w1
 start_worker w2
 submit "$BOX" -o "$DIR/chains-quiet.exr" $CHAINS --wait >/dev/null
@@ -103,7 +103,7 @@ until_true 20 test -e "$DIR/spool/jobs/$d/checkpoint" || fail "no checkpoint of 
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 printf x | dd of="$DIR/spool/jobs/$d/checkpoint" bs=1 seek=5000 conv=notrunc 2>/dev/null
-LISTEN=$COORDINATOR start_coordinator -v --journal $JOURNAL
+LISTEN=$COORDINATOR start_coordinator -v --keep-films 0 --journal $JOURNAL
 "$BIN/hslt-job" log "$d" | grep -q 'event=spool_fault .*damaged' || fail "$d does not say that it is damaged"
 until_true 60 is_state "$d" done || fail "$d is $(value "$d" state)"
 "$BIN/hslt-job" fetch "$d"

@@ -128,6 +128,35 @@ static void orders(void **state)
 	ledger_close(l);
 }
 
+/* A job that ended lives again with another plan, and it is counted; one that lives gets the plan alone. */
+static void extended(void **state)
+{
+	(void)state;
+	static const unsigned char longer[] = {7, 7, 7};
+	char path[128];
+	struct error e;
+	struct ledger_job j, more = {.id = 1, .submission = longer, .submission_size = 3, .plan = longer, .plan_size = 2};
+	struct ledger *l = open_ledger(path);
+	add(l, 1);
+	assert_int_equal(ledger_hold(l, 1, "ann", &e), 0);
+	assert_int_equal(ledger_extend(l, &more, &e), 0);
+	assert_int_equal(ledger_next(l, 0, &j, &e), 1);
+	assert_true(j.extended == 0 && j.submission_size == 3 && j.plan_size == 2);
+	assert_int_equal(ledger_end(l, 1, "done", &e), 0);
+	assert_int_equal(ledger_next(l, 0, &j, &e), 0);
+	assert_int_equal(ledger_get(l, 1, &j, &e), 1);
+	assert_true(j.submission_size == 0 && j.priority == -3 && j.mixed);
+	assert_int_equal(ledger_extend(l, &more, &e), 0);
+	ledger_close(l);
+	l = open_ledger(path);
+	assert_int_equal(ledger_next(l, 0, &j, &e), 1);
+	assert_true(j.id == 1 && j.extended == 1 && j.submission_size == 3 && j.plan_size == 2);
+	assert_string_equal(j.owner, "7");
+	assert_string_equal(j.held, ""); /* with the end of the job that is over, too */
+	assert_int_equal(ledger_get(l, 2, &j, &e), 0);
+	ledger_close(l);
+}
+
 static void set_version(const char *path, unsigned char version)
 {
 	int fd = open(path, O_RDWR); /* user_version: bytes 60 to 63, big endian */
@@ -146,7 +175,7 @@ static void versions(void **state)
 	set_version(path, 99);
 	assert_int_equal(ledger_open(&l, path, &e), -EPROTO);
 	assert_non_null(strstr(e.text, "later"));
-	set_version(path, 2);
+	set_version(path, 3);
 	l = open_ledger(path);
 	ledger_close(l);
 	int fd = open(path, O_RDWR | O_TRUNC);
@@ -184,6 +213,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(living_jobs, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(earlier_versions, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(extended, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(orders, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(versions, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(stays_small, folder_set_up, folder_tear_down),

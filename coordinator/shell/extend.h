@@ -1,0 +1,41 @@
+/*
+ * A job goes on beyond its bounds, while it runs or after it is done: the same bits as if it had been submitted with the later
+ * ones. What is named is added to what was asked for (to what is done, where nothing was); a bound that is not named and is met
+ * already is lifted. The loop's thread.
+ */
+#ifndef COORDINATOR_SHELL_EXTEND_H
+#define COORDINATOR_SHELL_EXTEND_H
+
+#include "common/plan/plan.h"
+
+struct server;
+struct session;
+
+struct extension { /* 0: not named, all but job */
+	uint64_t job;
+	uint64_t spp, mutations; /* more */
+	double seconds;          /* more */
+	double target_error;
+};
+
+/* Where a job is. */
+struct extension_from {
+	uint64_t rounds; /* complete */
+	double seconds;  /* that it took */
+	double error;    /* at the last look; NAN: none */
+	bool ended;
+};
+
+/*
+ * Pure. asked: what the plan was made of; becomes what the new one is made of. -EINVAL with a sentence: nothing is named, the
+ * job would end at once, or a bound would have to be where there is none.
+ */
+int extend_plan(const struct plan *p, const struct extension *x, const struct extension_from *from, struct plan_request *asked,
+		struct plan *out, struct error *e);
+
+/* Does it, or puts it off until the job's films are free; the session gets its Done. */
+void extend_job(struct session *p, const struct extension *x);
+/* Films are free, or a job has ended: those that were put off. */
+void extend_waiting(struct server *s);
+
+#endif
