@@ -1,8 +1,9 @@
 # deploy/slurm on a cluster of three nodes with a slurmctld, slurmds and a munged of its own, on loopback, in a folder that goes:
-# workers come, are told to leave, are requeued off a node whose daemon is dead; a whole farm is requeued, one is cut short.
-# The images have the bits of hslt-render's.
+# workers come, are told to leave, are preempted, are requeued off a node whose daemon is dead, leave when there is nothing to do;
+# a whole farm is requeued, one is cut short. All over TLS. The images have the bits of hslt-render's, and each loss repeats at most
+# one epoch of a chain.
 . "$(dirname "$0")/lib.sh"
-need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare
+need hslt-ca hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare
 PATH=$PATH:/usr/sbin:/sbin
 for p in munged slurmctld slurmd sbatch; do
 	command -v $p >/dev/null || skip "no $p (deploy/setup.sh --full installs slurm-wlm and munge)"
@@ -97,7 +98,10 @@ SlurmdTimeout=60
 NodeName=n1 NodeHostname=$host NodeAddr=127.0.0.1 Port=$((port + 1)) CPUs=1 RealMemory=64 State=UNKNOWN
 NodeName=n2 NodeHostname=$host NodeAddr=127.0.0.1 Port=$((port + 2)) CPUs=1 RealMemory=64 State=UNKNOWN
 NodeName=n3 NodeHostname=$host NodeAddr=127.0.0.1 Port=$((port + 3)) CPUs=1 RealMemory=64 State=UNKNOWN
-PartitionName=render Nodes=n[1-3] Default=YES MaxTime=INFINITE State=UP
+PreemptType=preempt/partition_prio
+PreemptMode=REQUEUE
+PartitionName=render Nodes=n[1-3] Default=YES MaxTime=INFINITE State=UP PriorityTier=1
+PartitionName=urgent Nodes=n[1-3] MaxTime=INFINITE State=UP PriorityTier=2
 TEXT
 	export SLURM_CONF="$DIR/slurm.conf"
 	slurmctld -c
@@ -142,6 +146,10 @@ has_worker() {
 	workers | grep -q "$1"
 }
 
+pause() {
+	"$BIN/hslt-job" "$1" "$id" 2>>"$DIR/submit.log" || fail "hslt-job $1 $id"
+}
+
 # requeued JOB: is pending for its next life, which begins now instead of two minutes later
 requeued() {
 	until_true 10 is_job "$1" PENDING || return 1
@@ -156,40 +164,70 @@ for kind in long short; do
 	"$BIN/hslt-render" "$BOX" -o "$DIR/$kind.exr" $options --threads 2 2>>"$DIR/render.log" || fail "hslt-render"
 done
 start_cluster
-export HSLT_BIN="$BIN" HSLT_CACHE="$DIR/cache" TMPDIR="$DIR"
-start_coordinator
-batch --array=1 "$DEPLOY/slurm/workers.sbatch"
+export HSLT_BIN="$BIN" HSLT_CACHE="$DIR/cache" TMPDIR="$DIR" HSLT_IDLE=4
+# Each program in its role.
+export HSLT_CA="$DIR/ca"
+{ "$BIN/hslt-ca" init && "$BIN/hslt-ca" worker worker && "$BIN/hslt-ca" client client; } >>"$DIR/ca.log" 2>&1 || fail "hslt-ca"
+export HSLT_TLS="$HSLT_CA/client"
+start_coordinator --verbose --tls "$HSLT_CA/coordinator"
+batch --array=1 --export="ALL,HSLT_TLS=$HSLT_CA/worker,HSLT_GRACE=0" "$DEPLOY/slurm/workers.sbatch"
 first=$JOB
 until_true 20 has_workers 1 || fail "no worker came: $(squeue 2>&1)"
 id=$(submit "$BOX" -o "$DIR/elastic.exr" $LONG)
 until_true 30 is_beyond "$id" 0.1 || fail "$id does not get on with one worker"
 
-batch --array=2-3 "$DEPLOY/slurm/workers.sbatch"
+batch --array=2-3 --export="ALL,HSLT_TLS=$HSLT_CA/worker" "$DEPLOY/slurm/workers.sbatch"
 second=$JOB
 until_true 20 has_workers 3 || fail "three workers do not come: $(workers)"
-until_true 30 is_beyond "$id" 0.25 || fail "$id does not get on with three workers"
+until_true 30 is_beyond "$id" 0.2 || fail "$id does not get on with three workers"
 
 scancel --batch --signal=TERM "${second}_2"
 until_true 20 is_job "${second}_2" COMPLETED || fail "the worker that was told to leave is $(job_state "${second}_2")"
 until_true 5 has_workers 2 || fail "it stays at the coordinator"
 
+# Somebody more important wants the first worker's node; it leaves in a hurry and comes back when the node is free.
+batch --partition=urgent --nodelist="$(job_field "${first}_1" BatchHost)" --wrap "sleep 1"
+urgent=$JOB
+until_true 10 is_job "$urgent" RUNNING || fail "the urgent job is $(job_state "$urgent"): $(squeue)"
+pause hold # Slurm takes its time, and the job shall last
+requeued "${first}_1" || fail "the worker that was preempted is $(job_state "${first}_1")"
+until_true 10 has_worker "^${first}_1\.1@" || fail "the preempted worker does not come back: $(workers)"
+pause release
+
 # The daemon of a node dies, its worker does not; Slurm gives the node up and starts the worker elsewhere.
 node=$(job_field "${second}_3" BatchHost)
 kill -9 "$(cat "$DIR/slurmd-$node.pid")"
 scontrol update NodeName="$node" State=DOWN Reason=test
+pause hold
 requeued "${second}_3" || fail "the worker of the lost node is $(job_state "${second}_3")"
 until_true 10 has_worker "^${second}_3\.1@" || fail "the worker does not come back: $(workers)"
 has_worker "^${second}_3\.0@$node" || fail "the old worker on $node is gone, this tests nothing"
+pause release
 is_beyond "$id" 0.95 && fail "$id was too fast, this tests nothing"
 until_true 60 is_state "$id" done || fail "$id is $(value "$id" state)"
 "$BIN/hslt-job" fetch "$id" || fail "no image of $id"
 same "$DIR/long.exr" "$DIR/elastic.exr"
 
+# Three were lost: told to leave, preempted, and the worker that Slurm gave up but that went on.
+grep 'event=lease_granted job=j1 ' "$DIR/coordinator.log" | sed 's/.*peer=[0-9]* //' |
+	awk '{ chain = $1 $2 $3; if (seen[chain, $4]++) { sum++; if (++again[chain] > most) most = again[chain] } }
+		END { print NR, sum + 0, most + 0 }' >"$DIR/repeats"
+read -r leases repeats most <"$DIR/repeats"
+[ "$leases" -gt 1000 ] && [ "$repeats" -ge 1 ] || fail "$leases leases, $repeats repeated: this tests nothing"
+[ "$most" -le 2 ] || fail "$most epochs of a chain were repeated: $(cat "$DIR/repeats")"
+grep -c 'event=batch_merged job=j1 ' "$DIR/coordinator.log" >"$DIR/merged"
+[ "$(grep 'event=batch_merged job=j1 ' "$DIR/coordinator.log" | sed 's/.*peer=[0-9]* //' | sort -u | wc -l)" = "$(cat "$DIR/merged")" ] ||
+	fail "an epoch was counted twice"
+grep -q 'event=peer_hello.*certificate=worker' "$DIR/coordinator.log" || fail "it was not over TLS"
+
 slurmd -N "$node"
 scontrol update NodeName="$node" State=RESUME 2>/dev/null || :
-scancel "$first" "$second"
+# Nobody ends the workers: there is no work for them.
 until_true 20 idle 3 || fail "the cluster does not come to rest: $(sinfo; squeue)"
 until_true 10 has_workers 0 || fail "workers are left: $(workers)"
+for id in "${first}_1" "${second}_3"; do
+	is_job "$id" COMPLETED || fail "the idle worker is $(job_state "$id")"
+done
 
 # ---- a whole farm in a job ----
 
@@ -197,10 +235,6 @@ running() {
 	"$BIN/hslt-job" --coordinator "127.0.0.1:$(cat "$DIR"/hslt-farm-"$1"/port)" list 2>/dev/null | grep -q running
 }
 
-# The first of them over TLS, each program in its role.
-export HSLT_CA="$DIR/ca"
-{ "$BIN/hslt-ca" init && "$BIN/hslt-ca" worker worker && "$BIN/hslt-ca" client client; } >>"$DIR/ca.log" 2>&1 || fail "hslt-ca"
-export HSLT_TLS="$HSLT_CA/client"
 batch --nodes=3 "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/farm.exr" $SHORT
 until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; cat "$DIR/$JOB.log")"
 scontrol requeue "$JOB"
@@ -212,7 +246,6 @@ until_true 60 is_job "$JOB" COMPLETED || fail "the farm is $(job_state "$JOB"): 
 grep -q 'event=listen.*tls=yes' "$DIR/$JOB.log" || fail "it was not over TLS"
 grep -q 'event=peer_hello.*certificate=worker' "$DIR/$JOB.log" || fail "the workers had another certificate"
 same "$DIR/short.exr" "$DIR/farm.exr"
-unset HSLT_CA HSLT_TLS
 
 batch --nodes=2 "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/cut.exr" $LONG
 until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; cat "$DIR/$JOB.log")"
@@ -224,4 +257,5 @@ until_true 30 is_job "$JOB" FAILED || fail "the farm that was cut short is $(job
 [ -s "$DIR/cut.partial.exr" ] && [ ! -e "$DIR/cut.exr" ] || fail "it left $(ls "$DIR"/cut*)"
 until_true 10 idle 3 || fail "it left somebody: $(squeue)"
 ls -d "$DIR"/hslt-farm-* 2>/dev/null && fail "it left its folder"
-echo "Slurm: from 1 to 3 workers, one told to leave, one off a dead node; farms requeued and cut short; equal bits"
+echo "Slurm: from 1 to 3 workers, one told to leave, one preempted, one off a dead node: $repeats of $leases leases were given twice, at most" \
+	"$most of a chain; farms requeued and cut short; equal bits"
