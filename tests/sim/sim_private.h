@@ -1,0 +1,106 @@
+/* The simulated farm's insides, for sim_*.c: what there is, what happens when, who does what. One thread. */
+#ifndef TESTS_SIM_SIM_PRIVATE_H
+#define TESTS_SIM_SIM_PRIVATE_H
+
+#include "coordinator/core/farm.h"
+#include "tests/sim/sim_world.h"
+
+#include <stdbool.h>
+
+enum { WORKERS = 8, JOBS = 5, SLOTS = 12, ROUNDS = 512, QUEUE = 64, MESSAGES = 1 << 14, STEPS_MOST = 400000 };
+
+enum message_kind { TO_CORE, TICK, SUBMIT, LEASE, REVOKE, FINISH, BEAT, CRASH, START, CALM, RESTART };
+
+struct message {
+	double time;
+	uint64_t order;
+	enum message_kind kind;
+	uint32_t worker;
+	uint64_t peer;
+	struct event ev;    /* TO_CORE */
+	struct lease_key key;
+	uint64_t value;     /* chain state: in for LEASE, out for a batch */
+};
+
+struct work {
+	struct lease_key key;
+	uint64_t state;
+};
+
+struct worker {
+	uint64_t peer; /* 0: down */
+	uint32_t threads, busy, queued, want;
+	double speed, frozen_until;
+	double fault_rate, failure_rate, lie_rate;
+	const char *fingerprint;
+	struct work queue[QUEUE];
+};
+
+struct sim_job {
+	struct plan plan;
+	uint64_t id;
+	int priority;
+	bool mixed, submitted, over, prepared;
+	double verify;
+	uint32_t answered[SLOTS]; /* whose answers are noted, by worker */
+	double cancel_at, lease_time, error_scale;
+	uint64_t next[SLOTS], state[SLOTS], boot;
+	uint64_t round_sum[ROUNDS];
+	uint64_t rounds; /* complete, counted here */
+	double completed; /* s after its first lease: the last complete round */
+	char fingerprint[2]; /* of those whose work is merged */
+	double progress;
+};
+
+struct world {
+	uint64_t seed, draws, order, next_peer;
+	int trace;
+	double now, calm, tick_at;
+	double drop, repeat, delay, failure;
+	double verify; /* of every job */
+	bool liars; /* then every result is verified, and all are of one fingerprint */
+	struct farm *farm;
+	struct farm_config config;
+	struct message *heap;
+	size_t heap_count;
+	uint32_t worker_count, job_count;
+	struct worker workers[WORKERS];
+	struct sim_job jobs[JOBS];
+	struct sim_result result;
+	char wrong[256];
+};
+
+/* sim_chance.c: everything that is random, and the messages under way, in the order of their times. */
+uint64_t sim_mix(uint64_t x);
+double sim_uniform(struct world *w);
+uint32_t sim_below(struct world *w, uint32_t n);
+bool sim_chance(struct world *w, double p);
+__attribute__((format(printf, 2, 3))) void sim_wrong(struct world *w, const char *format, ...);
+void sim_push(struct world *w, struct message m);
+struct message sim_pop(struct world *w);
+bool sim_is_calm(const struct world *w);
+void sim_post(struct world *w, struct message m);
+
+/* sim_worker.c */
+uint64_t sim_result_of(struct lease_key k, uint64_t state);
+struct sim_job *sim_job_by_id(struct world *w, uint64_t id);
+void sim_finish(struct world *w, const struct message *m);
+void sim_beat(struct world *w, const struct message *m);
+void sim_start(struct world *w, uint32_t index);
+void sim_crash(struct world *w, const struct message *m);
+void sim_forget_answers(struct world *w);
+void sim_calm_down(struct world *w);
+void sim_receive_lease(struct world *w, const struct message *m);
+bool sim_same_key(struct lease_key a, struct lease_key b);
+void sim_receive_revoke(struct world *w, const struct message *m);
+
+/* sim_shell.c: the shell around the core, which checks what it says. */
+double sim_error_after(const struct sim_job *j, uint64_t rounds);
+uint64_t sim_undisturbed_rounds(const struct sim_job *j);
+void sim_step(struct world *w, struct event *ev, uint64_t value);
+
+/* sim_orders.c */
+void sim_restore(struct world *w, struct sim_job *j, double elapsed);
+void sim_restart(struct world *w);
+
+#endif

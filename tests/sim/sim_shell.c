@@ -1,0 +1,255 @@
+#include "tests/sim/sim_private.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+static struct worker *worker_of(struct world *w, uint64_t peer, uint32_t *index)
+{
+	for (*index = 0; *index < w->worker_count; ++*index)
+		if (w->workers[*index].peer == peer)
+			return &w->workers[*index];
+	return NULL;
+}
+
+static uint32_t slot_of(const struct sim_job *j, struct lease_key k)
+{
+	return k.group * j->plan.parts + k.part;
+}
+
+static void check_holders(struct world *w, struct lease_key key)
+{
+	int holders = 0;
+	struct lease_status s;
+	for (uint64_t p = farm_next_peer(w->farm, 0); p; p = farm_next_peer(w->farm, p))
+		for (uint32_t i = 0; farm_lease(w->farm, p, i, &s); i++)
+			holders += !s.overdue && sim_same_key(s.key, key);
+	if (holders > 2)
+		sim_wrong(w, "%d workers hold one lease", holders);
+}
+
+static void send_lease(struct world *w, const struct action *a)
+{
+	struct sim_job *j = sim_job_by_id(w, a->job);
+	struct peer_status p;
+	uint32_t slot = j ? slot_of(j, a->key) : 0, index;
+	if (!j || j->over || !farm_peer(w->farm, a->peer, &p)) {
+		sim_wrong(w, "a lease of an ended job or to an unknown worker");
+		return;
+	}
+	if (p.state != PEER_ACTIVE)
+		sim_wrong(w, "a lease for a worker that is silent or set aside");
+	if (!j->mixed && *j->fingerprint && strcmp(j->fingerprint, p.fingerprint) != 0)
+		sim_wrong(w, "a lease of j%" PRIu64 " for a worker of fingerprint %s", a->job, p.fingerprint);
+	if (a->key.kind == LEASE_RENDER && (!j->prepared || a->key.epoch != j->next[slot] || a->key.epoch > j->rounds + 1))
+		sim_wrong(w, "epoch %" PRIu64 " was handed out too early or too late", a->key.epoch);
+	check_holders(w, a->key);
+	if (worker_of(w, a->peer, &index) && w->liars && j->answered[slot] >> index & 1)
+		sim_wrong(w, "w%u gets a lease of which its answer is noted", index);
+	if (worker_of(w, a->peer, &index))
+		sim_post(w, (struct message){ .kind = LEASE, .worker = index, .peer = a->peer, .key = a->key, .value = j->state[slot] });
+}
+
+static void merge(struct world *w, const struct action *a, uint64_t value)
+{
+	struct sim_job *j = sim_job_by_id(w, a->job);
+	struct peer_status p;
+	w->result.merged++;
+	if (!j || j->over || !farm_peer(w->farm, a->peer, &p)) {
+		sim_wrong(w, "a batch of an ended job or of an unknown worker is merged");
+		return;
+	}
+	if (!j->mixed && *j->fingerprint && strcmp(j->fingerprint, p.fingerprint) != 0)
+		sim_wrong(w, "batches of two fingerprints are merged");
+	snprintf(j->fingerprint, sizeof j->fingerprint, "%s", p.fingerprint);
+	uint32_t slot = slot_of(j, a->key);
+	if (value != sim_result_of(a->key, j->state[slot]))
+		sim_wrong(w, "a wrong result is merged, verified: %d", (int)a->verified);
+	if (a->verified != (j->verify >= 1) && (j->verify >= 1 || j->verify <= 0))
+		sim_wrong(w, "verified with a share of %g: %d", j->verify, (int)a->verified);
+	j->answered[slot] = 0;
+	if (a->key.kind == LEASE_BOOTSTRAP) {
+		if (j->boot & 1u << slot)
+			sim_wrong(w, "a bootstrap batch is merged twice");
+		j->boot |= 1u << slot;
+		j->state[slot] = value;
+		return;
+	}
+	if (a->key.epoch != j->next[slot] || !j->prepared)
+		sim_wrong(w, "epoch %" PRIu64 " is merged where %" PRIu64 " is next", a->key.epoch, j->next[slot]);
+	if (a->key.epoch > j->rounds + 1 || a->key.epoch >= ROUNDS) {
+		sim_wrong(w, "more than two rounds are open");
+		return;
+	}
+	j->next[slot]++;
+	j->state[slot] = value;
+	j->round_sum[a->key.epoch] += value;
+	uint64_t least = UINT64_MAX;
+	for (uint32_t i = 0; i < j->plan.groups * j->plan.parts; i++)
+		least = j->next[i] < least ? j->next[i] : least;
+	j->rounds = least;
+}
+
+double sim_error_after(const struct sim_job *j, uint64_t rounds)
+{
+	return j->error_scale / sqrt((double)rounds);
+}
+
+uint64_t sim_undisturbed_rounds(const struct sim_job *j)
+{
+	if (j->plan.target_error > 0)
+		for (uint64_t r = 1; r < j->plan.rounds; r += r < 4 ? 1 : r / 4) /* the ladder, written down once more */
+			if (sim_error_after(j, r) <= j->plan.target_error)
+				return r;
+	return j->plan.rounds;
+}
+
+static uint64_t undisturbed_sum(const struct sim_job *j, uint64_t rounds)
+{
+	uint64_t sum = 0;
+	for (uint32_t i = 0; i < j->plan.groups * j->plan.parts; i++) {
+		struct lease_key k = { j->id, LEASE_BOOTSTRAP, i / j->plan.parts, i % j->plan.parts, 0 };
+		uint64_t state = sim_result_of(k, 0);
+		k.kind = LEASE_RENDER;
+		for (k.epoch = 0; k.epoch < rounds; k.epoch++) {
+			state = sim_result_of(k, state);
+			sum += state;
+		}
+	}
+	return sum;
+}
+
+static void ended(struct world *w, const struct action *a, struct sim_job *j)
+{
+	if (j->over)
+		sim_wrong(w, "j%" PRIu64 " ended twice", a->job);
+	j->over = true;
+	w->result.done += a->state == JOB_DONE;
+	w->result.failed += a->state == JOB_FAILED;
+	w->result.cancelled += a->state == JOB_CANCELLED;
+	struct job_status s;
+	if (!farm_job(w->farm, a->job, w->now, &s)) {
+		sim_wrong(w, "an ended job is forgotten");
+		return;
+	}
+	w->result.copies += s.duplicates;
+	w->result.timeouts += s.timeouts;
+	w->result.repeats += s.repeats;
+	w->result.refused += s.refused;
+	w->result.verified += s.verified;
+	w->result.mismatched += s.mismatched;
+	if (a->state != JOB_DONE)
+		return;
+	if (s.rounds != j->rounds)
+		sim_wrong(w, "the core counts %" PRIu64 " rounds, the canvas %" PRIu64, s.rounds, j->rounds);
+	if (a->end != END_TIME && j->rounds != sim_undisturbed_rounds(j))
+		sim_wrong(w, "ended after %" PRIu64 " rounds, undisturbed %" PRIu64, j->rounds, sim_undisturbed_rounds(j));
+	uint64_t sum = 0;
+	for (uint64_t r = 0; r < j->rounds; r++)
+		sum += j->round_sum[r];
+	if (sum != undisturbed_sum(j, j->rounds))
+		sim_wrong(w, "j%" PRIu64 " has another sum than undisturbed", a->job);
+}
+
+static void evaluate(struct world *w, const struct action *a, const struct sim_job *j)
+{
+	if (a->rounds != j->rounds)
+		sim_wrong(w, "asked for the error after %" PRIu64 " rounds of %" PRIu64, a->rounds, j->rounds);
+	struct event ev = { .kind = EVENT_ERROR_KNOWN,
+			    .error_known = { .job = a->job, .rounds = a->rounds, .rel_error = sim_error_after(j, a->rounds) } };
+	sim_push(w, (struct message){ .kind = TO_CORE, .time = w->now + 3 * sim_uniform(w), .ev = ev });
+}
+
+static void prepare(struct world *w, const struct action *a, struct sim_job *j)
+{
+	if (j->boot != (1u << (j->plan.groups * j->plan.parts)) - 1)
+		sim_wrong(w, "the bootstrap is not complete");
+	j->prepared = true;
+	struct event ev = { .kind = EVENT_PREPARED, .prepared = { .job = a->job, .ok = true } };
+	sim_push(w, (struct message){ .kind = TO_CORE, .time = w->now + 3 * sim_uniform(w), .ev = ev });
+}
+
+static void trace_action(const struct world *w, const struct action *a)
+{
+	printf("[%.3f]   action %d peer %" PRIu64 " j%" PRIu64 " kind %d g%u p%u e%" PRIu64 " rounds %" PRIu64 " ack %d state %d %s\n",
+	       w->now, (int)a->kind, a->peer, a->job, (int)a->key.kind, a->key.group, a->key.part, a->key.epoch, a->rounds,
+	       (int)a->ack, (int)a->state, a->text);
+}
+
+static void act(struct world *w, const struct action *a, uint64_t value)
+{
+	struct sim_job *j = sim_job_by_id(w, a->job);
+	uint32_t index;
+	if (w->trace)
+		trace_action(w, a);
+	switch (a->kind) {
+	case ACTION_SEND_LEASE: send_lease(w, a); break;
+	case ACTION_REVOKE:
+		if (worker_of(w, a->peer, &index))
+			sim_post(w, (struct message){ .kind = REVOKE, .worker = index, .peer = a->peer, .key = a->key });
+		break;
+	case ACTION_MERGE: merge(w, a, value); break;
+	case ACTION_ACK:
+		if (a->ack == ACK_NOTED && worker_of(w, a->peer, &index))
+			j->answered[slot_of(j, a->key)] |= 1u << index;
+		break;
+	case ACTION_WRONG: w->result.lies++; break;
+	case ACTION_ASIDE: w->result.aside++; break;
+	case ACTION_BOOTSTRAP_DONE: prepare(w, a, j); break;
+	case ACTION_EVALUATE_ERROR: evaluate(w, a, j); break;
+	case ACTION_ROUND_DONE:
+		j->completed = farm_elapsed(w->farm, a->job, w->now);
+		if (a->rounds != j->rounds)
+			sim_wrong(w, "round %" PRIu64 " said to be complete, %" PRIu64 " are", a->rounds, j->rounds);
+		break;
+	case ACTION_JOB_CHANGED:
+		if (job_state_is_end(a->state))
+			ended(w, a, j);
+		break;
+	case ACTION_CLOSE_PEER:
+		if (worker_of(w, a->peer, &index)) {
+			w->workers[index].peer = 0;
+			sim_push(w, (struct message){ .kind = START, .time = w->now + 1, .worker = index });
+		}
+		break;
+	default: break;
+	}
+}
+
+static void check_progress(struct world *w)
+{
+	for (uint32_t i = 0; i < w->job_count; i++) {
+		struct sim_job *j = &w->jobs[i];
+		struct job_status s;
+		if (!j->submitted || !farm_job(w->farm, j->id, w->now, &s))
+			continue;
+		if (!(s.progress >= j->progress && s.progress <= 1))
+			sim_wrong(w, "progress of j%" PRIu64 " goes from %g to %g", j->id, j->progress, s.progress);
+		j->progress = s.progress;
+	}
+}
+
+void sim_step(struct world *w, struct event *ev, uint64_t value)
+{
+	struct update u;
+	ev->time = w->now;
+	if (ev->kind == EVENT_BATCH)
+		memcpy(&ev->lease.digest, &value, sizeof value);
+	if (w->trace)
+		printf("[%.3f] event %d peer %" PRIu64 "\n", w->now, (int)ev->kind, ev->peer);
+	farm_step(w->farm, ev, &u);
+	w->result.steps++;
+	if (ev->kind == EVENT_SUBMIT && u.count && u.actions[0].kind == ACTION_SUBMITTED) {
+		w->jobs[ev->tag].id = u.actions[0].job;
+		w->jobs[ev->tag].submitted = true;
+	}
+	for (size_t i = 0; i < u.count && !*w->wrong; i++)
+		act(w, &u.actions[i], value);
+	check_progress(w);
+	if (u.wake < w->tick_at || w->tick_at <= w->now) {
+		w->tick_at = u.wake;
+		if (isfinite(u.wake))
+			sim_push(w, (struct message){ .kind = TICK, .time = fmax(u.wake, w->now) });
+	}
+}

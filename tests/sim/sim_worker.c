@@ -1,0 +1,190 @@
+/* Workers that compute, crash, freeze, come back, fail, lie and volunteer. */
+#include "tests/sim/sim_private.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+uint64_t sim_result_of(struct lease_key k, uint64_t state)
+{
+	return sim_mix(sim_mix(state ^ (k.job << 32)) ^ ((uint64_t)k.kind << 60) ^ ((uint64_t)k.group << 40) ^
+		   ((uint64_t)k.part << 20) ^ k.epoch);
+}
+
+struct sim_job *sim_job_by_id(struct world *w, uint64_t id)
+{
+	for (uint32_t i = 0; i < w->job_count; i++)
+		if (w->jobs[i].submitted && w->jobs[i].id == id)
+			return &w->jobs[i];
+	return NULL;
+}
+
+static void tell_core(struct world *w, const struct worker *k, struct event ev, uint64_t value)
+{
+	ev.peer = k->peer;
+	sim_post(w, (struct message){ .kind = TO_CORE, .peer = k->peer, .ev = ev, .value = value });
+}
+
+static void work_on(struct world *w, uint32_t index)
+{
+	struct worker *k = &w->workers[index];
+	while (k->busy < k->threads && k->queued > 0) {
+		struct work work = k->queue[0];
+		k->queued--;
+		memmove(&k->queue[0], &k->queue[1], k->queued * sizeof k->queue[0]);
+		k->busy++;
+		const struct sim_job *j = sim_job_by_id(w, work.key.job);
+		double seconds = j->lease_time * k->speed * (0.8 + 0.4 * sim_uniform(w));
+		sim_push(w, (struct message){ .kind = FINISH, .time = fmax(w->now, k->frozen_until) + seconds, .worker = index,
+					  .peer = k->peer, .key = work.key, .value = work.state });
+	}
+}
+
+void sim_finish(struct world *w, const struct message *m)
+{
+	struct worker *k = &w->workers[m->worker];
+	if (k->peer != m->peer)
+		return;
+	if (k->frozen_until > w->now) {
+		struct message later = *m;
+		later.time = k->frozen_until;
+		sim_push(w, later);
+		return;
+	}
+	k->busy--;
+	struct event ev = { .kind = EVENT_BATCH, .lease = { .key = m->key, .valid = true }, .text = "trouble" };
+	if (!sim_is_calm(w) && sim_chance(w, k->failure_rate))
+		ev.kind = EVENT_LEASE_FAILED;
+	else if (!sim_is_calm(w) && sim_chance(w, k->fault_rate))
+		ev.lease.valid = false;
+	else if (!sim_is_calm(w) && sim_chance(w, 0.01))
+		ev.kind = EVENT_LEASE_RETURNED;
+	uint64_t value = sim_result_of(m->key, m->value);
+	if (!sim_is_calm(w) && k->lie_rate > 0 && sim_chance(w, k->lie_rate))
+		value ^= 1 + sim_mix(w->draws); /* no two lies are alike */
+	tell_core(w, k, ev, value);
+	work_on(w, m->worker);
+}
+
+/* An answer that nobody asked for, perhaps of an epoch that is not open, and right should it come when it is. */
+static void volunteer(struct world *w, const struct worker *k)
+{
+	const struct sim_job *j = &w->jobs[sim_below(w, w->job_count)];
+	if (!j->prepared)
+		return;
+	struct lease_key key = { .job = j->id, .kind = LEASE_RENDER, .group = sim_below(w, j->plan.groups),
+				 .part = sim_below(w, j->plan.parts) };
+	uint32_t slot = key.group * j->plan.parts + key.part;
+	key.epoch = j->next[slot];
+	uint64_t value = sim_result_of(key, j->state[slot]);
+	for (uint32_t later = sim_below(w, 3); later > 0; later--) {
+		key.epoch++;
+		value = sim_result_of(key, value);
+	}
+	struct event ev = { .kind = EVENT_BATCH, .lease = { .key = key, .valid = true } };
+	tell_core(w, k, ev, value);
+}
+
+void sim_beat(struct world *w, const struct message *m)
+{
+	struct worker *k = &w->workers[m->worker];
+	if (k->peer != m->peer)
+		return;
+	if (k->frozen_until <= w->now) {
+		k->want = sim_is_calm(w) || !sim_chance(w, 0.02) ? k->threads + (k->threads > 1) : 0;
+		tell_core(w, k, (struct event){ .kind = EVENT_REQUEST, .want = k->want }, 0);
+		if (!sim_is_calm(w) && sim_chance(w, 0.05))
+			volunteer(w, k);
+	}
+	struct message next = *m;
+	next.time = w->now + 7;
+	sim_push(w, next);
+}
+
+void sim_start(struct world *w, uint32_t index)
+{
+	struct worker *k = &w->workers[index];
+	if (k->peer)
+		return;
+	k->peer = w->next_peer++;
+	k->busy = k->queued = 0;
+	k->frozen_until = 0;
+	char name[16];
+	snprintf(name, sizeof name, "w%u", index);
+	struct event ev = { .kind = EVENT_JOINED,
+			    .join = { .peer = k->peer, .name = name, .fingerprint = k->fingerprint, .threads = k->threads } };
+	sim_step(w, &ev, 0);
+	sim_push(w, (struct message){ .kind = BEAT, .time = w->now + sim_uniform(w), .worker = index, .peer = k->peer });
+	if (!sim_is_calm(w))
+		sim_push(w, (struct message){ .kind = CRASH, .time = w->now - 150 * log(1 - sim_uniform(w)), .worker = index,
+					  .peer = k->peer });
+}
+
+/* Dies with or without a word, or stands still for a while. */
+void sim_crash(struct world *w, const struct message *m)
+{
+	struct worker *k = &w->workers[m->worker];
+	if (k->peer != m->peer || sim_is_calm(w))
+		return;
+	w->result.crashes++;
+	if (sim_chance(w, 0.3)) {
+		k->frozen_until = w->now + 200 * sim_uniform(w);
+		sim_push(w, (struct message){ .kind = CRASH, .time = w->now + 300 * sim_uniform(w), .worker = m->worker, .peer = k->peer });
+		return;
+	}
+	if (sim_chance(w, 0.7))
+		tell_core(w, k, (struct event){ .kind = EVENT_LEFT }, 0);
+	k->peer = 0;
+	sim_push(w, (struct message){ .kind = START, .time = w->now + 60 * sim_uniform(w), .worker = m->worker });
+}
+
+void sim_forget_answers(struct world *w)
+{
+	for (uint32_t i = 0; i < w->job_count; i++)
+		memset(w->jobs[i].answered, 0, sizeof w->jobs[i].answered);
+}
+
+void sim_calm_down(struct world *w)
+{
+	if (w->liars) /* who is forgiven may answer again */
+		sim_forget_answers(w);
+	for (uint32_t i = 0; i < w->worker_count; i++) {
+		struct worker *k = &w->workers[i];
+		char name[16];
+		snprintf(name, sizeof name, "w%u", i);
+		struct event forgive = { .kind = EVENT_FORGIVE, .text = name };
+		sim_step(w, &forgive, 0);
+		if (k->peer) {
+			struct event ev = { .kind = EVENT_LEFT, .peer = k->peer };
+			k->peer = 0;
+			sim_step(w, &ev, 0);
+		}
+		sim_start(w, i);
+	}
+}
+
+void sim_receive_lease(struct world *w, const struct message *m)
+{
+	struct worker *k = &w->workers[m->worker];
+	if (k->peer != m->peer || k->queued == QUEUE)
+		return;
+	k->queue[k->queued++] = (struct work){ m->key, m->value };
+	work_on(w, m->worker);
+}
+
+bool sim_same_key(struct lease_key a, struct lease_key b)
+{
+	return a.job == b.job && a.kind == b.kind && a.group == b.group && a.part == b.part && a.epoch == b.epoch;
+}
+
+void sim_receive_revoke(struct world *w, const struct message *m)
+{
+	struct worker *k = &w->workers[m->worker];
+	for (uint32_t i = 0; k->peer == m->peer && i < k->queued; i++) {
+		if (!sim_same_key(k->queue[i].key, m->key))
+			continue;
+		k->queued--;
+		memmove(&k->queue[i], &k->queue[i + 1], (k->queued - i) * sizeof k->queue[0]);
+		return;
+	}
+}
