@@ -96,6 +96,48 @@ static void run(uv_work_t *work)
 	}
 }
 
+/* Closing and unlinking a journal of hundreds of megabytes takes as many milliseconds: the pool does it, too. */
+struct tidying {
+	uv_work_t work;
+	struct server *server;
+	struct journal *old;
+	uint64_t keep;
+	char folder[SPOOL_PATH_MAX];
+};
+
+static void run_tidy(uv_work_t *work)
+{
+	struct tidying *t = work->data;
+	journal_release(t->old); /* what waits for its flush holds it, too */
+	journal_clear(t->folder, t->keep);
+}
+
+static void tidied(uv_work_t *work, int status)
+{
+	struct tidying *t = work->data;
+	(void)status;
+	t->server->checkpointing = false; /* until now, so that no younger journal is in the way */
+	mem_free(t);
+}
+
+/* The journals before `keep` go. */
+static void tidy(struct server *s, struct journal *old, const char *folder, uint64_t keep)
+{
+	struct tidying *t = mem_alloc(1, sizeof *t);
+	if (!t) {
+		journal_release(old);
+		journal_clear(folder, keep);
+		s->checkpointing = false;
+		return;
+	}
+	*t = (struct tidying){.server = s, .old = old, .keep = keep};
+	snprintf(t->folder, sizeof t->folder, "%s", folder);
+	t->work.data = t;
+	int rc = uv_queue_work(&s->loop, &t->work, run_tidy, tidied);
+	assert(rc == 0);
+	(void)rc;
+}
+
 static void done(uv_work_t *work, int status)
 {
 	struct writing *w = work->data;
@@ -112,12 +154,12 @@ static void done(uv_work_t *work, int status)
 		log_event(LOG_CHECKPOINT, "job=j%llu rounds=%llu bytes=%llu journal=%llu", (unsigned long long)id,
 			  (unsigned long long)canvas_rounds(o->canvas), (unsigned long long)w->bytes,
 			  (unsigned long long)journal_bytes(o->journal));
-		journal_release(o->journal); /* what waits for its flush holds it, too */
+		tidy(s, o->journal, w->folder, w->head.generation);
 		o->journal = w->journal;
 		o->checkpoint_bytes = w->bytes;
-		journal_clear(w->folder, w->head.generation);
 	}
-	o->busy = s->checkpointing = false;
+	o->busy = false;
+	s->checkpointing = s->checkpointing && !w->rc;
 	if (!s->stopping) {
 		server_order_free_again(s, o);
 		session_previews(s, id);
