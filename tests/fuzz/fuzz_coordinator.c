@@ -164,7 +164,6 @@ static void write_words(void)
 		farm__heartbeat__init(&beat);
 		fetch.job = watch.job = control.job = cancel.job = job;
 		fetch.what = (Farm__What)(job % 3);
-		control.verb = (Farm__Verb)job;
 		control.priority = 3;
 		control.more_spp = 4;
 		SEED_SAY(&s, CLIENT_ONE, HEARTBEAT, heartbeat, &beat);
@@ -172,7 +171,10 @@ static void write_words(void)
 		SEED_SAY(&s, CLIENT_TWO, WATCH, watch, &watch);
 		SEED_SAY(&s, CLIENT_ONE, FETCH, fetch, &fetch);
 		seed_end(&s, "look", job);
-		SEED_SAY(&s, CLIENT_ONE, CONTROL, control, &control);
+		for (int verb = FARM__VERB__VERB_HOLD; verb <= FARM__VERB__VERB_EXTEND; verb++) {
+			control.verb = (Farm__Verb)verb;
+			SEED_SAY(&s, CLIENT_ONE, CONTROL, control, &control);
+		}
 		SEED_SAY(&s, CLIENT_ONE, WATCH, watch, &watch);
 		SEED_SAY(&s, CLIENT_TWO, CANCEL, cancel, &cancel);
 		seed_end(&s, "control", job);
