@@ -108,7 +108,7 @@ $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(
 	$(link) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
 tests: $(TEST_BIN)
 # Sanitized runs take 1/20 of the samples.
-test: programs tests
+test: programs tests $(BUILD)/load/load
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)
 .SECONDARY:
 

@@ -16,7 +16,7 @@ struct load_settings {
 	double minutes, interval, ramp; /* s between a worker's batches; connections a second */
 	double heartbeat;
 	unsigned want;          /* leases that a worker holds: one in work, the others at hand */
-	bool insecure, profile; /* profile: the coordinator runs under perf */
+	bool insecure, losses; /* losses: nothing else is judged */
 	const char *bin, *spool, *options;
 };
 

@@ -20,7 +20,7 @@ static const char doc[] =
 	"within 100 ms.";
 
 enum { OPTION_BIN = 256, OPTION_MINUTES, OPTION_SIZE, OPTION_INTERVAL, OPTION_INSECURE, OPTION_JOBS, OPTION_GROUPS, OPTION_PARTS,
-       OPTION_RAMP, OPTION_SPOOL, OPTION_WANT, OPTION_HEARTBEAT, OPTION_COORDINATOR };
+       OPTION_RAMP, OPTION_SPOOL, OPTION_WANT, OPTION_HEARTBEAT, OPTION_COORDINATOR, OPTION_LOSSES };
 
 static const struct argp_option options[] = {
 	{"workers", 'w', "N", 0, "Connected workers (1000)", 0},
@@ -36,6 +36,7 @@ static const struct argp_option options[] = {
 	{"spool", OPTION_SPOOL, "DIR", 0, "Where a folder for spool, certificates and logs is made and removed (/tmp)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Without TLS", 0},
 	{"coordinator", OPTION_COORDINATOR, "OPTIONS", 0, "More options for the coordinator", 0},
+	{"losses", OPTION_LOSSES, NULL, 0, "Only what is lost or wrong counts, not how fast it is", 0},
 	{"bin", OPTION_BIN, "DIR", 0, "The programs (build/bin)", 0},
 	{0},
 };
@@ -119,6 +120,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_INSECURE:
 		s->insecure = true;
+		return 0;
+	case OPTION_LOSSES:
+		s->losses = true;
 		return 0;
 	case OPTION_COORDINATOR:
 		s->options = arg;
@@ -358,6 +362,8 @@ static int report(double wrong, double peak)
 	met &= bound("acknowledged out of order", (double)load.disordered, "", 0, false);
 	met &= bound("merged more or less than once", wrong, "", 0, false);
 	met &= bound("connections lost, faults", (double)(load.closed + load.faults), "", 0, false);
+	if (load.s.losses)
+		return met ? 0 : 1;
 	met &= bound("coordinator", cores, "cores", 1, true);
 	met &= bound("memory beyond the films", 1e-9 * (peak - films), "GB", 1, true);
 	met &= bound("p99 of a lease", load_times_at(&load.grant, 0.99), "ms", 100, true);
