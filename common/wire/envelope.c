@@ -69,10 +69,16 @@ static bool field_is_known(const ProtobufCMessage *m, const ProtobufCFieldDescri
 	return !one || is_known(one);
 }
 
+/* Whoever speaks another version says so in hello, with fields that are new there, and must be told. */
+static bool may_be_newer(const ProtobufCMessage *m)
+{
+	return m->descriptor == &farm__hello__descriptor || m->descriptor == &farm__hello_ack__descriptor;
+}
+
 /* The schema is not recursive, so this is at most as deep as the schema. */
 static bool is_known(const ProtobufCMessage *m)
 {
-	if (m->n_unknown_fields)
+	if (m->n_unknown_fields && !may_be_newer(m))
 		return false;
 	for (unsigned i = 0; i < m->descriptor->n_fields; i++) {
 		const ProtobufCFieldDescriptor *f = &m->descriptor->fields[i];
@@ -92,7 +98,7 @@ int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t siz
 	if (!m)
 		fault = "a message that does not parse";
 	else if (!is_known(&m->base))
-		fault = "a message with fields that version 1 of the protocol does not know";
+		fault = "a message with fields that this version of the protocol does not know";
 	else if (m->body_case == FARM__ENVELOPE__BODY__NOT_SET)
 		fault = "an envelope without a message";
 	if (fault) {

@@ -1,7 +1,7 @@
 /*
  * The one door to protobuf-c: a frame's header is one Farm__Envelope (proto/farm.proto). Messages are unpacked into
  * memory that is bounded by a multiple of their length, and one with fields that this version does not know is
- * refused: what is new must have been agreed upon in Hello. Any thread, one message at a time.
+ * refused: what is new must have been agreed upon in Hello, where alone unknown fields are passed over. Any thread, one message at a time.
  */
 #ifndef COMMON_WIRE_ENVELOPE_H
 #define COMMON_WIRE_ENVELOPE_H

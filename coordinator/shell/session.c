@@ -161,7 +161,9 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 {
 	char text[192];
 	if (h->version != FARM_VERSION) {
-		snprintf(text, sizeof text, "version %u of the protocol is spoken here, not %u", FARM_VERSION, h->version);
+		const char *who = h->role == FARM__ROLE__ROLE_WORKER ? "worker" : "client";
+		snprintf(text, sizeof text, "the %s speaks version %u of the protocol, the coordinator version %u: the %s is older and must be renewed",
+			 who, h->version, FARM_VERSION, h->version < FARM_VERSION ? who : "coordinator");
 		send_hello_ack(p, false, text);
 		return;
 	}
