@@ -4,6 +4,7 @@
 #include "worker/cli/estimate.h"
 #include "worker/cli/farm_pilot.h"
 #include "worker/cli/options.h"
+#include "worker/cli/outlast.h"
 #include "worker/cli/pilot.h"
 #include "worker/cli/speed.h"
 
@@ -29,12 +30,12 @@ static const char doc[] =
 	"The job's id goes to stdout, everything else to stderr. Without --wait, -o is the default name for hslt-job fetch. "
 	"--estimate makes no image: a pilot of a minute on the farm tells what errors of 10, 5, 2 and 1 % (and --target-error) will "
 	"cost there. For long jobs without --epoch a pilot of a second here says how many mutations a thread makes in the 20 s that a "
-	"lease should take; --epoch pins it. HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls.\n"
+	"lease should take; --epoch pins it. --wait outlasts restarts of the coordinator. HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls.\n"
 	"Exit codes: 0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
 	"there, and its note says where), 6 refused, 75 "
 	"coordinator not reachable.";
 
-enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED, OPTION_VERIFY, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_TLS };
+enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED, OPTION_VERIFY, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_TLS, OPTION_PATIENCE };
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
@@ -42,6 +43,7 @@ static const struct argp_option options[] = {
 	{"priority", OPTION_PRIORITY, "P", 0, "-100 to 100, higher first (0)", 0},
 	{"name", OPTION_NAME, "NAME", 0, "How the job is shown (the scene's file name)", 0},
 	{"wait", OPTION_WAIT, NULL, 0, "Show progress and fetch the image", 0},
+	{"patience", OPTION_PATIENCE, "SECONDS", 0, "With --wait: how long to call a coordinator that is gone (600)", 0},
 	{"json", OPTION_JSON, NULL, 0, "Print one JSON object instead of the id, or of the estimate's table", 0},
 	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
 	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
@@ -61,6 +63,7 @@ struct arguments {
 	struct render_arguments render;
 	const char *plot;
 	double pilot; /* s; 0: not given */
+	double patience; /* s */
 	bool wait, json, insecure, estimate;
 };
 
@@ -110,6 +113,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_PILOT:
 		a->pilot = option_seconds(state, "--pilot", arg);
+		return 0;
+	case OPTION_PATIENCE:
+		a->patience = option_seconds(state, "--patience", arg);
 		return 0;
 	case OPTION_PLOT:
 		a->plot = arg;
@@ -161,12 +167,13 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	fflush(stdout);
 }
 
-static int run(struct arguments *a, struct client *cl, const struct scene_bundle *b, int *code, struct error *e)
+static int run(struct arguments *a, struct client **cl, const struct scene_bundle *b, int *code, struct error *e)
 {
 	uint64_t job = 0;
 	struct submit_end end = {0};
 	char plan[PLAN_TEXT] = "";
-	int rc = submit_send(cl, &a->request, b, &job, plan, sizeof plan, e);
+	struct outlast o = {a->coordinator, a->tls, a->insecure, a->patience};
+	int rc = submit_send(*cl, &a->request, b, &job, plan, sizeof plan, e);
 	if (rc)
 		return rc;
 	fprintf(stderr, "%s\n", plan);
@@ -174,9 +181,7 @@ static int run(struct arguments *a, struct client *cl, const struct scene_bundle
 		print_id(a, job, plan, "queued");
 	if (!a->wait)
 		return 0;
-	rc = submit_wait(cl, job, &end, e);
-	if (!rc && end.has_result)
-		rc = client_fetch(cl, job, FARM__WHAT__WHAT_RESULT, a->output, NULL, 0, e);
+	rc = outlast_job(cl, &o, job, a->output, &end, e);
 	if (!rc && !end.has_result)
 		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job, end.why);
 	if (!rc && *end.note)
@@ -234,6 +239,7 @@ int main(int argc, char **argv)
 	a.coordinator = getenv("HSLT_COORDINATOR");
 	a.tls = getenv("HSLT_TLS");
 	a.request.args = &a.render;
+	a.patience = 600;
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
 	int rc = a.wait ? image_file_probe(a.output, &e) : a.plot ? image_file_probe(a.plot, &e) : 0;
@@ -265,7 +271,7 @@ int main(int argc, char **argv)
 	if (!rc) {
 		if (*client_warning(cl))
 			fprintf(stderr, "hslt-submit: warning: %s\n", client_warning(cl));
-		rc = a.estimate ? estimate(&a, cl, &b, &e) : run(&a, cl, &b, &code, &e);
+		rc = a.estimate ? estimate(&a, cl, &b, &e) : run(&a, &cl, &b, &code, &e);
 		client_close(cl);
 	}
 	scene_bundle_fini(&b);
