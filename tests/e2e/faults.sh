@@ -16,7 +16,7 @@ README=$HERE/README.md
 GRACE=
 . "$HERE/faults/lib.sh"
 PYTHON=${PYTHON:-python3}
-for f in worker coordinator network; do
+for f in worker coordinator network versions; do
 	. "$HERE/faults/$f.sh"
 done
 

@@ -1,27 +1,7 @@
 """deaf.py PORT JOB STATUS-SOCKET: a client that asks for a job's log again and again, and a reader of the status socket that
 subscribes again and again; neither reads. Fails unless each is cut off within ten seconds."""
-import os, re, socket, struct, sys, time
-
-here = os.path.dirname(os.path.abspath(__file__))
-VERSION = int(re.search(r"FARM_VERSION = (\d+)", open(here + "/../../../common/wire/envelope.h").read()).group(1))
-
-
-def varint(n):
-    out = b""
-    while n > 127:
-        out += bytes([n & 127 | 128])
-        n >>= 7
-    return out + bytes([n])
-
-
-def field(number, value):
-    if isinstance(value, int):
-        return varint(number << 3) + varint(value)
-    return varint(number << 3 | 2) + varint(len(value)) + value
-
-
-def frame(message):
-    return struct.pack(">II", len(message), 0) + message
+import socket, sys, time
+from wire import VERSION, field, frame
 
 
 def is_cut_off(s, words, most):
