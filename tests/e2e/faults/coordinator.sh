@@ -65,7 +65,7 @@ patient_client() {
 	"$BIN/hslt-submit" "$BOX" -o "$DIR/late.exr" $JOB --wait --patience 0.5 >"$DIR/id2" 2>>"$DIR/give-up.log" &
 	waiting=$!
 	PIDS="$PIDS $waiting"
-	until_true 10 test -s "$DIR/id2" || fail "$NAME: no second job"
+	until_true 30 test -s "$DIR/id2" || fail "$NAME: no second job"
 	kill -9 "$COORDINATOR_PID"
 	CODE=0
 	wait $waiting || CODE=$?

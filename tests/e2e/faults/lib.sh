@@ -71,7 +71,7 @@ each_time() {
 
 # says LOG TEXT [SECONDS]: until it does
 says() {
-	until_true "${3:-10}" grep -qs -e "$2" "$DIR/$1.log" || fail "$NAME: $1 never says: $2"
+	until_true "${3:-30}" grep -qs -e "$2" "$DIR/$1.log" || fail "$NAME: $1 never says: $2"
 }
 
 # has_said LOG TEXT TIMES

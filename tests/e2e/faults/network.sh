@@ -5,7 +5,7 @@ through_proxy() {
 	rm -f "$DIR/proxy-port"
 	"$PYTHON" "$HERE/faults/proxy.py" "$DIR/proxy-port" "${COORDINATOR#*:}" "$DIR/order" 2>>"$DIR/proxy.log" &
 	PIDS="$PIDS $!"
-	until_true 10 test -s "$DIR/proxy-port" || fail "$NAME: no proxy"
+	until_true 30 test -s "$DIR/proxy-port" || fail "$NAME: no proxy"
 	worker w0
 	worker w1 --coordinator "127.0.0.1:$(cat "$DIR/proxy-port")"
 	says w1 event=connect
@@ -19,13 +19,13 @@ through_proxy() {
 happens() {
 	echo "$1 $2" >"$DIR/order.tmp"
 	mv "$DIR/order.tmp" "$DIR/order"
-	until_true 10 test ! -e "$DIR/order" || fail "$NAME: there was nothing to do it to"
+	until_true 30 test ! -e "$DIR/order" || fail "$NAME: there was nothing to do it to"
 }
 
 # and the worker comes back
 is_cut() {
 	happens "$@"
-	until_true 10 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: the worker does not come back"
+	until_true 30 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: the worker does not come back"
 }
 
 fault cut_result 10 1 "a connection is cut in the middle of a result"

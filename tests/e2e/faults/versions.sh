@@ -39,7 +39,7 @@ another_comes() {
 	"$other" --threads 1 --name o1 --cache "$DIR/cache" -v 2>>"$DIR/o1.log" &
 	odd=$!
 	PIDS="$PIDS $odd"
-	until_true 10 waits_for_build || fail "$NAME: the status says: $(value "$ID" waiting)"
+	until_true 30 waits_for_build || fail "$NAME: the status says: $(value "$ID" waiting)"
 	stop $odd
 	worker "w$i"
 }

@@ -56,9 +56,9 @@ stop_worker() {
 }
 one_worker_sleeps() {
 	kill -STOP "$WORKER"
-	until_true 10 has_said coordinator 'event=peer_closed .*name="w1"' $i || fail "$NAME: the silent worker is not missed"
+	until_true 30 has_said coordinator 'event=peer_closed .*name="w1"' $i || fail "$NAME: the silent worker is not missed"
 	kill -CONT "$WORKER"
-	until_true 10 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: it does not come back"
+	until_true 30 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: it does not come back"
 }
 
 fault slow_worker 1 1 "a worker is slowed down to a tenth: others compute its leases, too"
