@@ -42,6 +42,7 @@ static bool is_at_work(const struct server *s)
 
 void farm_settle(struct farm_world *w)
 {
+	w->settled++;
 	for (unsigned i = 0; i < FARM_PEERS; i++)
 		farm_hang_up(w, i);
 	farm_turn(w);
@@ -203,9 +204,10 @@ void farm_hello(struct farm_world *w, unsigned peer, Farm__Role role)
 {
 	Farm__Hello h;
 	Farm__Envelope m;
-	char name[] = {'w', (char)('0' + peer), 0}, print[] = "p1", none[] = "";
+	char name[32], print[] = "p1", none[] = "";
 	farm__hello__init(&h);
 	farm__envelope__init(&m);
+	snprintf(name, sizeof name, "w%u-%u", peer, w->settled);
 	h.version = FARM_VERSION;
 	h.role = role;
 	h.name = name;

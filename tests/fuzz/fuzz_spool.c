@@ -16,7 +16,7 @@
 #include <string.h>
 #include <unistd.h>
 
-enum what { RECORD, JOURNAL, JOURNAL_CHANGED, JOURNAL_BODIES, CHECKPOINT_CHANGED, CHECKPOINT_BODY, DATABASE_CHANGED, SUBMISSION, WHATS };
+enum what { RECORD, JOURNAL, JOURNAL_CHANGED, JOURNAL_BODIES, CHECKPOINT_CHANGED, CHECKPOINT_BODY, DATABASE_CHANGED, SUBMISSION, ASIDE, WHATS };
 enum { EDIT = 4, EDITS_MOST = 32, SEED_MOST = 16000, FILE_MOST = 1 << 20 };
 
 static uint8_t file[FILE_MOST];
@@ -152,6 +152,10 @@ static void damage(const char *spool, enum what what, const uint8_t *bytes, size
 		path_in(spool, "jobs.db", path);
 		change_file(path, bytes, size);
 		break;
+	case ASIDE:
+		path_in(spool, "aside", path);
+		store(path, bytes, size);
+		break;
 	default:
 		write_submission(spool, bytes, size);
 	}
@@ -236,6 +240,9 @@ static size_t take_file(const char *path)
 
 static void write_seeds(const char *spool)
 {
+	static const char aside[] = "{\"schema\":1,\"workers\":[{\"certificate\":\"\",\"name\":\"w1-0\",\"home\":\"h\",\"restarts\":2,\"why\":\"x\"}]}";
+	memcpy(seed + 1, aside, sizeof aside - 1);
+	write_seed(ASIDE, sizeof aside - 1);
 	char path[512], folder[512];
 	struct journal *j;
 	struct ledger *l;
