@@ -16,6 +16,7 @@ enum {
 	HEADER_LIMIT = 1 << 22,
 	PAYLOAD_LIMIT = 1 << 21,
 	WAITING_MAX = 4096, /* messages not yet asked for */
+	WAITING_BYTES = 1 << 26, /* of them */
 	ANSWER_SECONDS = 60,
 	HELLO_SECONDS = 10,
 };
@@ -31,6 +32,7 @@ struct client {
 	struct conn *conn; /* NULL: closed */
 	struct waiting *first, **last;
 	unsigned waiting_count;
+	size_t waiting_bytes;
 	struct tls *tls; /* NULL: plaintext */
 	bool opened, timed_out, distrust;
 	char why[256], warning[384];
@@ -51,9 +53,10 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 		return;
 	}
 	w->message.payload.limit = size;
-	if (++cl->waiting_count > WAITING_MAX || !buf_append(&w->message.payload, payload, size)) {
+	cl->waiting_bytes += env->used + size;
+	if (++cl->waiting_count > WAITING_MAX || cl->waiting_bytes > WAITING_BYTES || !buf_append(&w->message.payload, payload, size)) {
 		mem_free(w);
-		conn_close(cl->conn, "no memory for what the coordinator sends");
+		conn_close(cl->conn, "the coordinator sends more than it is asked for");
 		return;
 	}
 	w->message.envelope = *env;
@@ -128,6 +131,7 @@ int client_wait(struct client *cl, double seconds, struct client_message *m, str
 	if (!cl->first)
 		cl->last = &cl->first;
 	cl->waiting_count--;
+	cl->waiting_bytes -= m->envelope.used + m->payload.size;
 	mem_free(w);
 	if (m->envelope.message->body_case != FARM__ENVELOPE__BODY_FAULT)
 		return 0;

@@ -235,6 +235,15 @@ static void on_rendered(struct lease_task *l)
 	agent_settle(a);
 }
 
+/* Far more than were asked for, those included whose results nobody has acknowledged: no coordinator of ours does that. */
+static bool is_flood(const struct agent *a)
+{
+	unsigned count = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		count++;
+	return count >= 4 * (a->config.threads + 1) + 16;
+}
+
 static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigned char *payload, size_t size)
 {
 	struct grant g;
@@ -242,6 +251,11 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	struct error e;
 	if (grant_unpack(&g, m, payload, size, &e)) {
 		conn_close(a->conn, e.text);
+		return;
+	}
+	if (is_flood(a)) {
+		grant_fini(&g);
+		conn_close(a->conn, "the coordinator grants more leases than it is asked for");
 		return;
 	}
 	struct bundle *b = find_bundle(a, g.key.job);
