@@ -116,6 +116,7 @@ void job_hold(struct job *j, enum job_hold which, const char *why, double now)
 		j->held_since = now;
 	if (!was || job_is_held(j))
 		return;
+	j->progress_floor = job_progress(j, now); /* moving its clock rounds */
 	double pause = now - j->held_since; /* its times are as if that had not been; NAN stays */
 	j->started += pause;
 	j->opened += pause;

@@ -237,7 +237,9 @@ void rounds_error_known(struct farm *f, const struct event *ev)
 	j->rel_error = ev->error_known.rel_error;
 	j->rel_error_rounds = j->rounds;
 	job_note_look(j, ev->error_known.rel_error, ev->error_known.rel_mse, ev->error_known.degrees, ev->error_known.cpu_seconds);
-	if (j->rel_error <= j->plan.target_error)
+	/* A look that was taken because another bound was met does not count when that bound was lifted meanwhile. */
+	bool counts = j->ending != END_NONE || merge_error_due(&j->plan, j->rounds);
+	if (counts && j->rel_error <= j->plan.target_error)
 		rounds_end(f, j, END_ERROR, "");
 	else if (j->ending != END_NONE)
 		rounds_end(f, j, j->ending, "");

@@ -1,6 +1,17 @@
+/* The coordinator dies and comes back; jobs are held, released, given another priority, and extended while they run or are done. */
 #include "tests/sim/sim_private.h"
 
 #include <math.h>
+#include <string.h>
+
+static void hold(struct world *w, struct sim_job *j, enum job_hold which, bool on)
+{
+	struct event ev = { .kind = EVENT_HOLD, .job = j->id, .hold = which, .text = on ? "held" : "" };
+	if (j->over)
+		return;
+	j->held[which] = on; /* first: leases may go out at once */
+	sim_step(w, &ev, 0);
+}
 
 void sim_restore(struct world *w, struct sim_job *j, double elapsed)
 {
@@ -22,7 +33,11 @@ void sim_restore(struct world *w, struct sim_job *j, double elapsed)
 					 .opened = elapsed,
 					 .completed = j->completed,
 					 .looks = &no_looks } };
+	bool held = j->held[HOLD_ORDERED]; /* the other is not remembered: there may be room by now */
+	memset(j->held, 0, sizeof j->held);
 	sim_step(w, &ev, 0);
+	if (held)
+		hold(w, j, HOLD_ORDERED, true);
 }
 
 /* Only what is merged is remembered. What was under way to the old one comes to the new one, from peers that it does not know. */
@@ -52,5 +67,68 @@ void sim_restart(struct world *w)
 		if (w->workers[i].peer)
 			sim_push(w, (struct message){ .kind = START, .time = w->now + 20 * sim_uniform(w), .worker = i });
 		w->workers[i].peer = 0;
+	}
+}
+
+/* ---- orders */
+
+void sim_release_all(struct world *w)
+{
+	for (uint32_t i = 0; i < w->job_count; i++)
+		for (int which = 0; which < JOB_HOLDS; which++)
+			if (w->jobs[i].submitted)
+				hold(w, &w->jobs[i], (enum job_hold)which, false);
+}
+
+static void set_priority(struct world *w, struct sim_job *j)
+{
+	struct event ev = { .kind = EVENT_PRIORITY, .job = j->id, .priority = (int)sim_below(w, 5) - 2 };
+	if (j->over)
+		return;
+	j->priority = ev.priority;
+	sim_step(w, &ev, 0);
+}
+
+/* Later bounds: each that the job has, so that none of them is met. */
+static void later(struct world *w, struct sim_job *j)
+{
+	struct plan *p = &j->plan;
+	if (p->rounds != UINT64_MAX)
+		p->rounds += 1 + sim_below(w, 6);
+	if (p->seconds > 0)
+		p->seconds = fmax(p->seconds, j->over ? j->elapsed : 0) + j->lease_time * 10 * sim_uniform(w) + 1e-3;
+	if (p->target_error > 0 && j->rounds > 0)
+		p->target_error = 0.9 * fmin(p->target_error, sim_error_after(j, j->rounds));
+	j->progress = 0;
+}
+
+static void extend(struct world *w, struct sim_job *j)
+{
+	if ((j->over && !j->done) || j->plan.rounds > 40)
+		return;
+	w->result.extended++;
+	later(w, j);
+	if (j->over) {
+		j->over = j->done = false;
+		memset(j->held, 0, sizeof j->held);
+		memset(j->answered, 0, sizeof j->answered);
+		sim_restore(w, j, j->elapsed);
+	} else {
+		struct event ev = { .kind = EVENT_EXTEND, .job = j->id, .plan = &j->plan };
+		sim_step(w, &ev, 0);
+	}
+}
+
+void sim_order(struct world *w)
+{
+	struct sim_job *j = &w->jobs[sim_below(w, w->job_count)];
+	w->orders_left--;
+	if (!j->submitted)
+		return;
+	switch (sim_below(w, 4)) {
+	case 0: hold(w, j, sim_chance(w, 0.5) ? HOLD_ORDERED : HOLD_STORAGE, true); break;
+	case 1: hold(w, j, sim_chance(w, 0.5) ? HOLD_ORDERED : HOLD_STORAGE, false); break;
+	case 2: set_priority(w, j); break;
+	default: extend(w, j); break;
 	}
 }

@@ -9,7 +9,7 @@
 
 enum { WORKERS = 8, JOBS = 5, SLOTS = 12, ROUNDS = 512, QUEUE = 64, MESSAGES = 1 << 14, STEPS_MOST = 400000 };
 
-enum message_kind { TO_CORE, TICK, SUBMIT, LEASE, REVOKE, FINISH, BEAT, CRASH, START, CALM, RESTART };
+enum message_kind { TO_CORE, TICK, SUBMIT, LEASE, REVOKE, FINISH, BEAT, CRASH, START, CALM, RESTART, ORDER };
 
 struct message {
 	double time;
@@ -43,6 +43,8 @@ struct sim_job {
 	bool mixed, submitted, over, prepared;
 	double verify;
 	uint32_t answered[SLOTS]; /* whose answers are noted, by worker */
+	bool held[JOB_HOLDS], done; /* done: it has ended, and may go on */
+	double elapsed;             /* then */
 	double cancel_at, lease_time, error_scale;
 	uint64_t next[SLOTS], state[SLOTS], boot;
 	uint64_t round_sum[ROUNDS];
@@ -63,7 +65,7 @@ struct world {
 	struct farm_config config;
 	struct message *heap;
 	size_t heap_count;
-	uint32_t worker_count, job_count;
+	uint32_t worker_count, job_count, orders_left;
 	struct worker workers[WORKERS];
 	struct sim_job jobs[JOBS];
 	struct sim_result result;
@@ -102,5 +104,7 @@ void sim_step(struct world *w, struct event *ev, uint64_t value);
 /* sim_orders.c */
 void sim_restore(struct world *w, struct sim_job *j, double elapsed);
 void sim_restart(struct world *w);
+void sim_order(struct world *w); /* hold, release, priority, extend: something, of some job */
+void sim_release_all(struct world *w);
 
 #endif

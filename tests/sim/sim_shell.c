@@ -38,6 +38,8 @@ static void send_lease(struct world *w, const struct action *a)
 		sim_wrong(w, "a lease of an ended job or to an unknown worker");
 		return;
 	}
+	if (j->held[HOLD_STORAGE] || j->held[HOLD_ORDERED])
+		sim_wrong(w, "a lease of a job that is held");
 	if (p.state != PEER_ACTIVE)
 		sim_wrong(w, "a lease for a worker that is silent or set aside");
 	if (!j->mixed && *j->fingerprint && strcmp(j->fingerprint, p.fingerprint) != 0)
@@ -125,6 +127,8 @@ static void ended(struct world *w, const struct action *a, struct sim_job *j)
 	if (j->over)
 		sim_wrong(w, "j%" PRIu64 " ended twice", a->job);
 	j->over = true;
+	j->done = a->state == JOB_DONE;
+	j->elapsed = farm_elapsed(w->farm, a->job, w->now);
 	w->result.done += a->state == JOB_DONE;
 	w->result.failed += a->state == JOB_FAILED;
 	w->result.cancelled += a->state == JOB_CANCELLED;
@@ -224,6 +228,10 @@ static void check_progress(struct world *w)
 		struct job_status s;
 		if (!j->submitted || !farm_job(w->farm, j->id, w->now, &s))
 			continue;
+		if (s.priority != j->priority || (s.state == JOB_HELD) != (!j->over && (j->held[0] || j->held[1])))
+			sim_wrong(w, "j%" PRIu64 " has priority %d, or is %s", j->id, s.priority, job_state_name(s.state));
+		if (s.workers > s.leases_out || !(s.share >= 0 && s.share <= s.machines))
+			sim_wrong(w, "%u leases at %u workers, %g machines of %u due", s.leases_out, s.workers, s.share, s.machines);
 		if (!(s.progress >= j->progress && s.progress <= 1))
 			sim_wrong(w, "progress of j%" PRIu64 " goes from %g to %g", j->id, j->progress, s.progress);
 		j->progress = s.progress;

@@ -72,6 +72,9 @@ static void make_world(struct world *w)
 	sim_push(w, (struct message){ .kind = CALM, .time = w->calm });
 	for (uint32_t i = sim_chance(w, 0.5) ? 1 + sim_below(w, 4) : 0; i > 0; i--)
 		sim_push(w, (struct message){ .kind = RESTART, .time = 600 * sim_uniform(w) * sim_uniform(w) });
+	w->orders_left = sim_chance(w, 0.5) ? 1 + sim_below(w, 16) : 0;
+	for (uint32_t i = 0; i < w->orders_left; i++)
+		sim_push(w, (struct message){ .kind = ORDER, .time = 900 * sim_uniform(w) * sim_uniform(w) });
 }
 
 static void submit(struct world *w, uint32_t index)
@@ -103,8 +106,12 @@ static void happen(struct world *w, struct message *m)
 	case BEAT: sim_beat(w, m); break;
 	case CRASH: sim_crash(w, m); break;
 	case START: sim_start(w, m->worker); break;
-	case CALM: sim_calm_down(w); break;
+	case CALM:
+		sim_calm_down(w);
+		sim_release_all(w);
+		break;
 	case RESTART: sim_restart(w); break;
+	case ORDER: sim_order(w); break;
 	}
 }
 
@@ -113,7 +120,7 @@ static bool all_over(const struct world *w)
 	for (uint32_t i = 0; i < w->job_count; i++)
 		if (!w->jobs[i].over)
 			return false;
-	return true;
+	return w->orders_left == 0;
 }
 
 const char *sim_run(uint64_t seed, int trace, struct sim_result *r)

@@ -1,6 +1,7 @@
 /*
  * A farm in virtual time around the real core: workers that compute, crash, freeze, come back, fail, send what is torn or wrong and volunteer; a network that
- * drops, repeats, delays and reorders; a coordinator that dies and remembers what is merged; jobs with priorities and bounds, some cancelled. Everything follows from one seed.
+ * drops, repeats, delays and reorders; a coordinator that dies and remembers what is merged; jobs with priorities and bounds, some cancelled, held,
+ * extended while they run or when they are done. Everything follows from one seed.
  * After `calm` seconds the trouble ends and every job must end too.
  *
  * A lease's result is a number made from its key and from the result of the epoch before, as a chain state is, so an epoch
@@ -17,7 +18,7 @@
 #include <stdint.h>
 
 struct sim_result {
-	uint64_t steps, merged, repeats, refused, crashes, done, failed, cancelled, copies, timeouts, restarts;
+	uint64_t steps, merged, repeats, refused, crashes, done, failed, cancelled, copies, timeouts, restarts, extended;
 	uint64_t verified, mismatched, lies, aside; /* lies: wrong results that were found out */
 	double time; /* virtual seconds */
 };

@@ -154,6 +154,12 @@ static void extend_while_it_ends(void **state)
 		/* another target alone: the rounds are over all the same */
 		"[5] extend j1 rounds=3 target=0.01 -> -",
 		"[6] error j1 3 0.05 -> j1 publish 3, j1 is done (mutations)", NULL });
+	/* after nine rounds one long job would not have looked at all */
+	transcript((const char *const[]){
+		"[0] restore j1 render 9,9 elapsed=1 completed=1 rounds=9 target=0.1 -> j1 is running, j1 evaluate 9",
+		"[1] extend j1 rounds=12 target=0.1 -> -",
+		"[2] error j1 9 0.05 -> -",
+		"[3] w1 joins A threads=1 -> -", "[3] w1 wants 1 -> w1 gets j1 g0 p0 e9", NULL });
 	transcript((const char *const[]){
 		"[10] restore j1 render 2,2 elapsed=9 completed=9 rounds=inf seconds=8 target=0.1 -> j1 is running, j1 evaluate 2",
 		"[10] extend j1 rounds=inf seconds=20 target=0.1 -> -",
