@@ -120,6 +120,12 @@ static void count(struct peer *p, struct job *j, enum verdict v)
 /* Two workers must say the same before it counts. */
 static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct peer *p, const struct event *ev, const char **why)
 {
+	/* A late answer of a class that the job has left is not to be held against those of another. */
+	if (!j->class && !verify_may_begin(f, j, p->class)) {
+		*why = "the job belongs to nobody, and not to a lone worker";
+		return REFUSE;
+	}
+	job_pin(j, p->class);
 	switch (verify_take(f, j, s, p->who, &ev->lease.digest)) {
 	case VERIFY_AGREES:
 		return MERGE;
