@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 
 #include <math.h>
+#include <stdlib.h>
 #include <string.h>
 
 enum { FILES_MAX = 10000, DEFINES_MAX = 256, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_MAX_BYTES = 1024 };
@@ -40,6 +41,28 @@ static int check_files(const Farm__Submit *m, struct error *e)
 	return scene ? 0 : error_set(e, EINVAL, "the scene file is not in the bundle");
 }
 
+static int compare_names(const void *x, const void *y)
+{
+	const Farm__File *const *a = x, *const *b = y;
+	return strcmp((*a)->name, (*b)->name);
+}
+
+/* Of two files of a name nobody could say which one the scene means. */
+static int check_names(const Farm__Submit *m, struct error *e)
+{
+	Farm__File **sorted = mem_alloc(m->n_files, sizeof *sorted);
+	int rc = 0;
+	if (!sorted)
+		return error_set(e, ENOMEM, "no memory for a submission");
+	memcpy(sorted, m->files, m->n_files * sizeof *sorted);
+	qsort(sorted, m->n_files, sizeof *sorted, compare_names);
+	for (size_t i = 1; !rc && i < m->n_files; i++)
+		if (compare_names(&sorted[i - 1], &sorted[i]) == 0)
+			rc = error_set(e, EINVAL, "%.256s: the bundle has two files of that name", sorted[i]->name);
+	mem_free(sorted);
+	return rc;
+}
+
 static int check_texts(const Farm__Submit *m, struct error *e)
 {
 	bool ok = envelope_text_ok(m->name, 127) && envelope_text_ok(m->scene, NAME_MAX_BYTES) &&
@@ -61,6 +84,8 @@ static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, cha
 	int rc = check_texts(m, e);
 	if (!rc)
 		rc = check_files(m, e);
+	if (!rc)
+		rc = check_names(m, e);
 	if (!rc && (m->render_width > PLAN_MAX_SIZE || m->render_height > PLAN_MAX_SIZE))
 		rc = error_set(e, EINVAL, "a film of %ux%u", m->render_width, m->render_height);
 	if (!rc && !(m->brightest >= 0 && isfinite(m->brightest)))
@@ -80,14 +105,62 @@ static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, cha
 	return rc;
 }
 
+static int compare_hashes(const void *x, const void *y, void *files)
+{
+	Farm__File *const *f = files;
+	return memcmp(f[*(const uint32_t *)x]->hash.data, f[*(const uint32_t *)y]->hash.data, BLOB_HASH_SIZE);
+}
+
+/* Some thousand files, of which each is looked for when it comes: they are put in order once. */
+static int sort_hashes(struct upload *u, struct error *e)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	for (uint32_t i = 0; i < m->n_files; i++)
+		u->by_hash[i] = i;
+	qsort_r(u->by_hash, m->n_files, sizeof *u->by_hash, compare_hashes, m->files);
+	for (size_t i = 1; i < m->n_files; i++) {
+		const Farm__File *a = m->files[u->by_hash[i - 1]], *b = m->files[u->by_hash[i]];
+		if (memcmp(a->hash.data, b->hash.data, BLOB_HASH_SIZE) == 0 && a->size != b->size)
+			return error_set(e, EINVAL, "%.256s: the same content as %.256s, and another size", a->name, b->name);
+	}
+	return 0;
+}
+
+/* The first place in by_hash that is not before h. */
+static size_t place_of(const struct upload *u, const struct blob_hash *h)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	size_t low = 0, high = m->n_files;
+	while (low < high) {
+		size_t middle = low + (high - low) / 2;
+		if (memcmp(m->files[u->by_hash[middle]]->hash.data, h->bytes, BLOB_HASH_SIZE) < 0)
+			low = middle + 1;
+		else
+			high = middle;
+	}
+	return low;
+}
+
+/* A blob has come: all files that have its content hold it. */
+static void hold_blob(struct upload *u, const struct blob_hash *h)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	for (size_t at = place_of(u, h); at < m->n_files; at++) {
+		uint32_t i = u->by_hash[at];
+		if (memcmp(m->files[i]->hash.data, h->bytes, BLOB_HASH_SIZE) != 0)
+			break;
+		if (!u->held[i])
+			u->missing_count -= u->held[i] = blob_hold(u->blobs, h);
+	}
+}
+
 static void look_for_blobs(struct upload *u)
 {
 	const Farm__Submit *m = u->submit.message->submit;
 	u->missing_count = 0;
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = order_file_hash(m->files[i]);
-		if (!u->held[i])
-			u->held[i] = blob_hold(u->blobs, &h);
+		u->held[i] = blob_hold(u->blobs, &h);
 		u->missing_count += !u->held[i];
 	}
 }
@@ -115,19 +188,25 @@ int upload_new(struct upload **out, struct envelope *submit, struct blob_store *
 		return rc;
 	struct upload *u = mem_alloc(1, sizeof *u);
 	bool *held = mem_alloc(m->n_files, sizeof *held);
-	if (!u || !held) {
+	uint32_t *by_hash = mem_alloc(m->n_files, sizeof *by_hash);
+	if (!u || !held || !by_hash) {
 		mem_free(u);
 		mem_free(held);
+		mem_free(by_hash);
 		return error_set(e, ENOMEM, "no memory for a submission");
 	}
 	u->plan = plan;
 	memcpy(u->rule, rule, sizeof rule);
 	u->held = held;
+	u->by_hash = by_hash;
 	u->blobs = blobs;
 	u->submit = *submit;
 	memset(submit, 0, sizeof *submit);
-	look_for_blobs(u);
-	rc = check_sizes(u, e);
+	rc = sort_hashes(u, e);
+	if (!rc)
+		look_for_blobs(u);
+	if (!rc)
+		rc = check_sizes(u, e);
 	if (rc)
 		upload_free(u);
 	else
@@ -147,18 +226,16 @@ void upload_free(struct upload *u)
 	}
 	envelope_fini(&u->submit);
 	mem_free(u->held);
+	mem_free(u->by_hash);
 	mem_free(u);
 }
 
 static const Farm__File *missing_file(const struct upload *u, const struct blob_hash *h)
 {
 	const Farm__Submit *m = u->submit.message->submit;
-	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash have = order_file_hash(m->files[i]);
-		if (!u->held[i] && blob_hash_equal(&have, h))
-			return m->files[i];
-	}
-	return NULL;
+	size_t at = place_of(u, h);
+	const Farm__File *f = at < m->n_files ? m->files[u->by_hash[at]] : NULL;
+	return f && !u->held[u->by_hash[at]] && memcmp(f->hash.data, h->bytes, BLOB_HASH_SIZE) == 0 ? f : NULL;
 }
 
 int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e)
@@ -185,7 +262,7 @@ int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *
 	u->writer = NULL;
 	if (rc)
 		return rc;
-	look_for_blobs(u);
+	hold_blob(u, &h);
 	blob_release(u->blobs, &h); /* the writer's hold; each file has its own now */
 	return 1;
 }
@@ -194,12 +271,9 @@ size_t upload_missing(const struct upload *u, struct blob_hash *hashes)
 {
 	const Farm__Submit *m = u->submit.message->submit;
 	size_t count = 0;
-	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = order_file_hash(m->files[i]);
-		bool known = u->held[i];
-		for (size_t k = 0; k < count && !known; k++)
-			known = blob_hash_equal(&hashes[k], &h);
-		if (!known)
+	for (size_t at = 0; at < m->n_files; at++) {
+		struct blob_hash h = order_file_hash(m->files[u->by_hash[at]]);
+		if (!u->held[u->by_hash[at]] && (count == 0 || !blob_hash_equal(&hashes[count - 1], &h)))
 			hashes[count++] = h;
 	}
 	return count;

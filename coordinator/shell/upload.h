@@ -13,6 +13,7 @@ struct upload {
 	char rule[160]; /* by which its epochs are so long; "": they were asked for */
 	struct blob_store *blobs;
 	bool *held;           /* a file's blob is there and held */
+	uint32_t *by_hash;    /* the files in the order of their hashes */
 	size_t missing_count; /* files not held */
 	struct blob_writer *writer;
 	struct blob_hash writing;
@@ -24,7 +25,7 @@ void upload_free(struct upload *u); /* lets go of the blobs that it holds */
 
 /* One chunk from the client. 1: a blob is complete. */
 int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e);
-/* Each missing hash once. Returns how many; hashes has room for missing_count. */
+/* Each missing hash once, ascending. Returns how many; hashes has room for missing_count. */
 size_t upload_missing(const struct upload *u, struct blob_hash *hashes);
 
 #endif

@@ -1,6 +1,7 @@
 """A client with a good certificate and bad manners: intruder.py PORT FOLDER prints one line an attempt, "WHAT|ANSWER", and
-fails when one of them is not hung up on or refused within four seconds."""
-import os, re, socket, ssl, struct, sys
+fails when one of them is not hung up on or refused within four seconds. With a worker at the coordinator: also scenes that reach
+for what is not in their bundle, submitted by hand so that no program of ours looks at them before."""
+import hashlib, os, re, socket, ssl, struct, sys, time
 
 here = os.path.dirname(os.path.abspath(__file__))
 VERSION = int(re.search(r"FARM_VERSION = (\d+)", open(here + "/../../common/wire/envelope.h").read()).group(1))
@@ -34,8 +35,8 @@ def ask(words):
     with socket.create_connection(("127.0.0.1", port)) as plain:
         plain.settimeout(4)
         with context.wrap_socket(plain) as s:
-            s.sendall(words)
             try:
+                s.sendall(words)
                 while b"bundle" not in heard:
                     got = s.recv(4096)
                     if not got:
@@ -46,9 +47,58 @@ def ask(words):
     return heard
 
 
-def submit(name):
-    file = field(1, name) + field(2, bytes(32)) + field(3, 1)
-    return frame(field(40, field(2, name) + field(8, file)))
+def submit(*names, scene=None):
+    files = b"".join(field(8, field(1, name) + field(2, bytes(32)) + field(3, 1)) for name in names)
+    return frame(field(40, field(2, scene or names[0]) + files))
+
+
+# A box, and in it what a scene may not have.
+here_box = open(here + "/../scenes/box/box.xml", "rb").read()
+wedge = open(here + "/../scenes/box/meshes/wedge.obj", "rb").read()
+known = {hashlib.sha256(c).digest() for c in (here_box, wedge)}  # what the spool has, from the job before
+
+
+def box(inside, before=b""):
+    return here_box.replace(b"<scene ", before + b"<scene ", 1).replace(b"</scene>", inside + b"</scene>")
+
+
+def mesh(name):
+    return box(b'<shape type="obj"><string name="filename" value="%s"/><bsdf type="diffuse"/></shape>' % name)
+
+
+def smuggle(scene, files=(), sentence=b""):
+    """Submits scene and files (name, content) by hand; all that is said until the job has failed."""
+    bundle = [(b"box.xml", scene), (b"meshes/wedge.obj", wedge), *files]
+    plan = field(1, b"path") + field(2, 0) + field(3, 48) + field(4, 40) + field(9, 1) + field(11, 4) + field(15, 1) + field(16, 8)
+    hashed = {hashlib.sha256(c).digest(): c for _, c in bundle}
+    named = b"".join(field(8, field(1, n) + field(2, hashlib.sha256(c).digest()) + field(3, len(c))) for n, c in bundle)
+    words = hello + frame(field(40, field(1, b"smuggled") + field(2, b"box.xml") + field(6, plan) + named))
+    for h, c in hashed.items():
+        if h in known:
+            continue
+        known.add(h)
+        words += frame(field(11, field(1, h) + field(3, len(c))), c)
+    job = 0
+    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
+    context.check_hostname = False
+    context.load_verify_locations(folder + "/ca.pem")
+    context.load_cert_chain(folder + "/cert.pem", folder + "/key.pem")
+    heard, end = b"", time.monotonic() + 20
+    with socket.create_connection(("127.0.0.1", port)) as plain:
+        plain.settimeout(20)
+        with context.wrap_socket(plain) as s:
+            s.sendall(words)
+            while sentence not in heard and time.monotonic() < end:
+                got = s.recv(65536)
+                if not got:
+                    break
+                heard += got
+                # Envelope.submit_answer = 41 with its number of the job; the other answers of that kind have none.
+                found = re.search(rb"\xca\x02.{1,2}?\x08([\x01-\x7f])\x22", heard, re.S)
+                if found and not job:
+                    job = found.group(1)[0]
+                    s.sendall(frame(field(46, field(1, job))))
+    return heard
 
 
 hello = frame(field(1, field(1, VERSION) + field(2, 2) + field(3, b"intruder")))
@@ -64,9 +114,56 @@ attempts = [
     ("path tricks: ../../etc/passwd", hello + submit(b"../../etc/passwd"), b"no proper name"),
     ("path tricks: /etc/passwd", hello + submit(b"/etc/passwd"), b"no proper name"),
     ("path tricks: a//b", hello + submit(b"a//b"), b"no proper name"),
+    ("path tricks: a/./b", hello + submit(b"a/./b"), b"no proper name"),
+    ("path tricks: a/..", hello + submit(b"a/.."), b"no proper name"),
+    ("path tricks: a/", hello + submit(b"a/"), b"no proper name"),
+    ("path tricks: a name of nothing", hello + submit(b"a", b"", scene=b"a"), b"no proper name"),
+    ("path tricks: a zero in a name, .. behind it", hello + submit(b"a\0/../../b", scene=b"a\0/../../b"), b"no plan"),
+    ("path tricks: control characters", hello + submit(b"a\nb", scene=b"a"), b"no proper name"),
+    ("path tricks: no UTF-8", hello + submit(b"a", b"\xc0\xae\xc0\xae/b"), b""),
+    ("path tricks: a name of 2,000 bytes", hello + submit(b"a", b"x" * 2000), b"no proper name"),
+    ("two files of one name", hello + submit(b"a", b"b", b"a"), b"two files of that name"),
+    ("a scene of another case than its file", hello + submit(b"A.xml", scene=b"a.xml"), b"not in the bundle"),
+    ("10,001 files", hello + submit(*[b"%d" % i for i in range(10001)]), b"files, not 10001"),
+    ("10^6 files", hello + submit(*[b"%d" % i for i in range(10 ** 6)]), b""),
+]
+# Files that a worker could open, if names led anywhere: by their whole name, and from where it was started.
+at = os.getcwd().encode()
+open("beside.obj", "w").write("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+os.mkfifo("pipe.obj")
+
+
+def unsent(what, name):
+    return what, mesh(name), (), name + b": the file was not sent with the job"
+
+
+entity = b'<!DOCTYPE scene [<!ENTITY e SYSTEM "file:///proc/self/environ">]>'
+laughs = b"<!DOCTYPE scene [<!ENTITY a0 'ha'>" + b"".join(
+    b"<!ENTITY a%d '%s'>" % (i, b"&a%d;" % (i - 1) * 10) for i in range(1, 12)) + b"]>"
+scenes = [
+    unsent("a scene that names /dev/zero", b"/dev/zero"),
+    unsent("a scene that names /proc/self/environ", b"/proc/self/environ"),
+    unsent("a scene that names ../../../../etc/passwd", b"../../../../etc/passwd"),
+    unsent("a scene that names a file by its whole name", at + b"/beside.obj"),
+    unsent("a scene that names a file where the worker was started", b"LICENSE"),
+    unsent("a scene that names a pipe", at + b"/pipe.obj"),
+    ("a scene that names a file of its bundle in another case", mesh(b"A.obj"), ((b"a.obj", b"v 0 0 0\n"),),
+     b"A.obj: the file was not sent with the job"),
+    unsent("a scene that names another job's file by its hash", hashlib.sha256(here_box).hexdigest().encode()),
+    ("a scene that includes /etc/passwd", box(b'<include filename="/etc/passwd"/>'), (), b"/etc/passwd: the file was not sent"),
+    ("a scene whose define names /etc/passwd", box(b'<default name="p" value="/etc/passwd"/><include filename="$p"/>'), (), b"/etc/passwd: the file was not sent"),
+    ("a scene with an entity of a file", box(b'<default name="q" value="x"/>&e;', entity), (), b"must not declare"),
+    ("a scene of nested entities", box(b'<default name="q" value="&a11;"/>', laughs), (), b"must not declare"),
 ]
 for what, words, sentence in attempts:
     heard = ask(words)
     if sentence not in heard:
         sys.exit(f"{what}: it says {heard!r}")
     print(f"{what}|{sentence.decode() or 'hung up'}")
+if b"done" not in smuggle(box(b""), (), b"done"):
+    sys.exit("a box that is as it should be is refused, too")
+for what, scene, files, sentence in scenes:
+    heard = smuggle(scene, files, sentence)
+    if sentence not in heard or b"PATH=" in heard:
+        sys.exit(f"{what}: it says {heard[-600:]!r}")
+    print(f"{what}|{sentence.decode()}")

@@ -106,7 +106,8 @@ sys.exit(0 if s.recv(64)[:1] == b"\x15" and s.recv(64) == b"" else 1)' "${COORDI
 row "HTTP to the TLS port" refused "an alert, and hung up"
 
 # A good certificate and bad manners.
-"${PYTHON:-python3}" "$HERE/intruder.py" "${COORDINATOR#*:}" "$CA/ann" >"$DIR/tricks" 2>"$DIR/err.log" || fail "$(cat "$DIR/err.log")"
+tricks=$(cd "$HERE" && pwd)/intruder.py
+(cd "$DIR" && exec "${PYTHON:-python3}" -B "$tricks" "${COORDINATOR#*:}" "$CA/ann") >"$DIR/tricks" 2>"$DIR/err.log" || fail "$(cat "$DIR/err.log")"
 while IFS='|' read -r what answer; do
 	row "$what" refused "$answer"
 done <"$DIR/tricks"

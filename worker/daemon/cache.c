@@ -27,6 +27,28 @@ static int make_folders(char *path, struct error *e)
 	}
 }
 
+/* In a folder that somebody else made, or can write to, somebody else chooses what we render: names are all that is looked at
+ * when a worker starts. Root may have made the one around ours. */
+static int check_owner(const char *path, bool or_root, struct error *e)
+{
+	struct stat st;
+	if (stat(path, &st))
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	bool ours = st.st_uid == geteuid();
+	if (!ours && !(or_root && st.st_uid == 0))
+		return error_set(e, EPERM, "%s: belongs to another user: what it holds cannot be trusted (--cache DIR)", path);
+	if (ours && (st.st_mode & S_IWOTH) && !(or_root && (st.st_mode & S_ISVTX)))
+		return error_set(e, EPERM, "%s: everybody can write there: what it holds cannot be trusted (--cache DIR)", path);
+	return 0;
+}
+
+static int make_slot(const char *path, struct error *e)
+{
+	if (mkdir(path, 0700) && errno != EEXIST)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	return check_owner(path, false, e);
+}
+
 static int base_folder(const char *folder, char path[PATH_BYTES], struct error *e)
 {
 	const char *xdg = getenv("XDG_CACHE_HOME"), *home = getenv("HOME");
@@ -41,7 +63,8 @@ static int base_folder(const char *folder, char path[PATH_BYTES], struct error *
 		return error_set(e, EINVAL, "no folder for the cache: there is no $HOME; say --cache DIR");
 	if (n <= 0 || n >= PATH_BYTES - 32)
 		return error_set(e, EINVAL, "the name of the cache's folder is empty or too long");
-	return make_folders(path, e);
+	int rc = make_folders(path, e);
+	return rc ? rc : check_owner(path, true, e);
 }
 
 /* A worker that nobody can count is a worker all the same. */
@@ -62,13 +85,15 @@ int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error
 	int rc = base_folder(folder, base, e);
 	for (int slot = 0; !rc && slot < SLOTS; slot++) {
 		snprintf(path, sizeof path, "%s/slot-%d.lock", base, slot);
-		c->lock = open(path, O_RDWR | O_CREAT | O_CLOEXEC, 0600);
+		c->lock = open(path, O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0600);
 		if (c->lock < 0)
 			return error_set(e, errno, "%s: %s", path, strerror(errno));
 		if (flock(c->lock, LOCK_EX | LOCK_NB) == 0) {
 			snprintf(path, sizeof path, "%s/slot-%d", base, slot);
 			begin_life(c, base, slot);
-			rc = blob_store_open(&c->blobs, path, limit, e);
+			rc = make_slot(path, e);
+			if (!rc)
+				rc = blob_store_open(&c->blobs, path, limit, e);
 			if (rc)
 				cache_close(c);
 			return rc;

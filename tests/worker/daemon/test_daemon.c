@@ -17,6 +17,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 /* ---- crew ---- */
@@ -108,6 +109,41 @@ static void workers_share_a_cache_folder(void **state)
 	assert_true(blob_has(c.blobs, &h, NULL));
 	cache_close(&b);
 	cache_close(&c);
+}
+
+/* In /tmp anybody can be there first, with files of the right names and wrong contents. */
+static void a_cache_of_others_is_not_used(void **state)
+{
+	(void)state;
+	struct cache c;
+	struct error e;
+	char base[128], slot[160], lock[160];
+	snprintf(base, sizeof base, "%s/base", folder);
+	snprintf(slot, sizeof slot, "%s/slot-0", base);
+	snprintf(lock, sizeof lock, "%s/slot-0.lock", base);
+	assert_int_equal(mkdir(base, 0700), 0);
+	assert_int_equal(mkdir(slot, 0700), 0);
+	assert_int_equal(chmod(base, 0777), 0);
+	assert_int_equal(cache_open(&c, base, 1000, &e), -EPERM);
+	assert_non_null(strstr(e.text, "everybody can write"));
+	assert_int_equal(chmod(base, 01777), 0);
+	assert_int_equal(chmod(slot, 0777), 0);
+	assert_int_equal(cache_open(&c, base, 1000, &e), -EPERM);
+	assert_int_equal(chmod(slot, 0700), 0);
+	assert_int_equal(cache_open(&c, base, 1000, &e), 0);
+	cache_close(&c);
+	unlink(lock);
+	assert_int_equal(symlink("elsewhere", lock), 0);
+	assert_true(cache_open(&c, base, 1000, &e) < 0);
+	unlink(lock);
+	if (geteuid() != 0)
+		return;
+	assert_int_equal(chown(slot, 65534, 65534), 0);
+	assert_int_equal(cache_open(&c, base, 1000, &e), -EPERM);
+	assert_non_null(strstr(e.text, "another user"));
+	assert_int_equal(chown(slot, 0, 0), 0);
+	assert_int_equal(chown(base, 65534, 65534), 0);
+	assert_int_equal(cache_open(&c, base, 1000, &e), -EPERM);
 }
 
 /* ---- bundle ---- */
@@ -251,6 +287,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(the_crew_works),
 		cmocka_unit_test_setup_teardown(workers_share_a_cache_folder, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_cache_of_others_is_not_used, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_bundle_fetches_what_is_missing, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(lies_are_noticed, folder_set_up, folder_tear_down),
 		cmocka_unit_test(the_fingerprint_is_stable),
