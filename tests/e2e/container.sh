@@ -77,6 +77,23 @@ inside "$ROOT" 'apt-get update -qq; DEBIAN_FRONTEND=noninteractive apt-get insta
 cp "$TREE"/deploy/systemd/*.service "$TREE"/deploy/systemd/*.socket "$ROOT/etc/systemd/system/"
 printf '%s\n' '[Unit]' 'After=multi-user.target' '[Service]' 'ExecStart=sh /try' '[Install]' 'WantedBy=multi-user.target' \
 	>"$ROOT/etc/systemd/system/try.service"
+# Over TLS: each service reads the folder that its settings name, by a group of its unit's.
+inside "$ROOT" 'export HSLT_CA=/root/ca
+	hslt-ca init
+	hslt-ca worker node
+	hslt-ca client root
+	mkdir -p /etc/hslt
+	cp -r /root/ca/coordinator /etc/hslt/tls
+	cp -r /root/ca/node /etc/hslt/tls-node
+	chgrp -R hslt /etc/hslt/tls /etc/hslt/tls-node
+	chmod 750 /etc/hslt/tls /etc/hslt/tls-node
+	chmod 640 /etc/hslt/tls/key.pem /etc/hslt/tls-node/key.pem
+	echo HSLT_TLS=/etc/hslt/tls >/etc/hslt/coordinator.conf
+	echo HSLT_TLS=/etc/hslt/tls-node >/etc/hslt/worker.conf
+	for u in hslt-coordinator hslt-worker@; do
+		mkdir -p /etc/systemd/system/$u.service.d
+		printf "[Service]\nSupplementaryGroups=hslt\n" >/etc/systemd/system/$u.service.d/tls.conf
+	done' || fail "no certificates"
 cat >"$ROOT/try" <<'TEXT'
 set -eux
 exec >/tried 2>&1
@@ -93,13 +110,16 @@ for s in hslt-coordinator hslt-worker@1; do
 	grep -q '^Seccomp:.2$' /proc/$(pid $s)/status
 	grep -q '^CapBnd:.0*$' /proc/$(pid $s)/status
 done
-export HSLT_COORDINATOR=127.0.0.1:7700 HSLT_STATUS_SOCKET=/run/hslt/status
+export HSLT_COORDINATOR=127.0.0.1:7700 HSLT_TLS=/root/ca/root HSLT_STATUS_SOCKET=/run/hslt/status
 [ "$(stat -c %a /run/hslt/status)" = 600 ]
 hslt-status
 cd /root
 hslt-render /scenes/box/box.xml -o one.exr --integrator hslt --bootstrap 20000 --mutations 60000
 hslt-submit /scenes/box/box.xml -o two.exr --integrator hslt --bootstrap 20000 --mutations 60000 --wait
 hslt-compare --exact one.exr two.exr
+journalctl --no-pager -u hslt-coordinator | grep -q 'event=listen .*tls=yes'
+journalctl --no-pager -u hslt-coordinator | grep -q 'event=peer_hello .*certificate=node'
+HSLT_TLS= hslt-job list && exit 1 # nobody without a certificate
 # A loop that stands still is noticed; what was finished is still there afterwards.
 mkdir -p /run/systemd/system/hslt-coordinator.service.d
 printf '[Service]\nWatchdogSec=3\n' >/run/systemd/system/hslt-coordinator.service.d/try.conf
@@ -123,4 +143,4 @@ done
 timeout -k 5 120 systemd-nspawn --register=no --keep-unit -D "$ROOT" --boot --private-network --console=pipe </dev/null >"$DIR/boot.log" 2>&1 ||
 	fail "systemd-nspawn ended with $?"
 tail -n 1 "$ROOT/tried" | grep -q 'systemctl poweroff' && grep -qx 'all is well' "$ROOT/tried" || fail "the units: $(cat "$ROOT/tried")"
-echo "units: started, confined, watched"
+echo "units: started, confined, watched, over TLS"
