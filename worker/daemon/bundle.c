@@ -87,6 +87,34 @@ int bundle_set_info(struct bundle *b, struct envelope *info, struct error *e)
 	return 0;
 }
 
+static unsigned char *pack_unbounded(const Farm__JobInfo *m, size_t *size)
+{
+	Farm__JobInfo job = *m;
+	Farm__Plan plan = *m->plan;
+	plan.rounds = 0;
+	plan.seconds = plan.target_error = 0;
+	job.plan = &plan;
+	*size = farm__job_info__get_packed_size(&job);
+	unsigned char *bytes = mem_alloc(*size, 1);
+	if (bytes)
+		farm__job_info__pack(&job, bytes);
+	return bytes;
+}
+
+bool bundle_is_of(const struct bundle *b, const Farm__JobInfo *info)
+{
+	size_t known_size, size;
+	if (!b->info.message)
+		return true;
+	if (!info->plan)
+		return false;
+	unsigned char *known = pack_unbounded(info_of(b), &known_size), *told = pack_unbounded(info, &size);
+	bool same = known && told && size == known_size && memcmp(known, told, size) == 0;
+	mem_free(known);
+	mem_free(told);
+	return same;
+}
+
 bool bundle_next_missing(struct bundle *b, uint64_t *offset)
 {
 	*offset = b->writer ? blob_write_at(b->writer) : 0;

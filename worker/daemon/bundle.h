@@ -46,6 +46,8 @@ void bundle_free(struct bundle *b);
 
 /* Takes the answer to JobGet; then bundle_next_missing. -EBADMSG. */
 int bundle_set_info(struct bundle *b, struct envelope *info, struct error *e);
+/* Whether it is the same job: number and all, but for the bounds, which may have been moved. Where it cannot be known: not. */
+bool bundle_is_of(const struct bundle *b, const Farm__JobInfo *info);
 /* The next hash to fetch, into b->wanted, and from which byte on. false: all files are there. */
 bool bundle_next_missing(struct bundle *b, uint64_t *offset);
 /* A chunk of b->wanted. */

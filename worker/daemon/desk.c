@@ -342,12 +342,30 @@ static void take_job_end(struct agent *a, uint64_t job)
 	tidy(a);
 }
 
+/* The coordinator has begun anew, and the job's number is another job's now: what was made of the old one is nobody's. */
+static void disown(struct agent *a, struct bundle *b)
+{
+	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job of this number\"", number(b->job));
+	for (struct lease_task *l = a->leases, *next; l; l = next) {
+		next = l->next;
+		if (l->bundle == b && !l->unwanted)
+			forget_lease(a, l);
+	}
+	b->ended = true;
+	b->job = 0;
+	tidy(a);
+}
+
 static void take_job_info(struct agent *a, struct envelope *env)
 {
 	struct bundle *b = find_bundle(a, env->message->job_info->job);
 	struct error e;
 	if (!b)
 		return;
+	if (!bundle_is_of(b, env->message->job_info)) {
+		disown(a, b);
+		return;
+	}
 	if (b->state == BUNDLE_ASKED && bundle_set_info(b, env, &e)) {
 		fail_bundle(a, b, &e);
 		return;
