@@ -1,4 +1,5 @@
 # A farm over TLS: equal bits, and everybody who must not get in does not; the table of attempts is printed.
+# HSLT_ATTEMPTS=FILE: they are written there, too, for the table in README.md.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-ca hslt-render hslt-compare
 unset HSLT_TLS
@@ -13,14 +14,21 @@ ca() {
 row() {
 	ROWS=$((ROWS + 1))
 	printf '%-48s %-8s %s\n' "$1" "$2" "$3"
+	[ -z "${HSLT_ATTEMPTS:-}" ] || printf '%s|%s\n' "$2" "$1" >>"$HSLT_ATTEMPTS"
 }
 
-# refused WHAT CODE SENTENCE COMMAND...: it ends with the code, within 5 s, and says so
+# tries WHAT: about to
+tries() {
+	[ -z "${HSLT_ATTEMPTS:-}" ] || printf 'tried|%s\n' "$1" >>"$HSLT_ATTEMPTS"
+}
+
+# refused WHAT CODE SENTENCE COMMAND...: it ends with the code, within 20 s, and says so
 refused() {
 	what=$1 wanted=$2 sentence=$3
 	shift 3
 	got=0
-	timeout 5 "$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
+	tries "$what"
+	timeout 20 "$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
 	[ $got -eq "$wanted" ] || fail "$what: ended with $got, not $wanted: $(cat "$DIR/err.log")"
 	grep -q -e "$sentence" "$DIR/err.log" || fail "$what: it says: $(cat "$DIR/err.log")"
 	row "$what" refused "$sentence"
@@ -28,7 +36,8 @@ refused() {
 
 # turned_away WHAT SENTENCE WORKER-LOG: a worker that is running is told so, and the status does not show it
 turned_away() {
-	until_true 5 grep -qs "$2" "$DIR/$3.log" || fail "$1: $(cat "$DIR/$3.log")"
+	tries "$1"
+	until_true 20 grep -qs "$2" "$DIR/$3.log" || fail "$1: $(cat "$DIR/$3.log")"
 	"$BIN/hslt-status" --json | grep -q "\"name\":\"$3\"" && fail "$1: it has joined"
 	kill -9 "$WORKER"
 	row "$1" refused "$2"
@@ -61,7 +70,7 @@ export HSLT_TLS="$CA/ann"
 submit "$BOX" -o "$DIR/farm.exr" --integrator path --spp 16 --wait >"$DIR/id" || fail "the job: $?"
 same "$DIR/alone.exr" "$DIR/farm.exr"
 
-row TRIED GOT BECAUSE
+printf '%-48s %-8s %s\n' TRIED GOT BECAUSE
 ROWS=0
 list="$BIN/hslt-job list"
 refused "no certificate: plaintext to the TLS port" 6 "speaks TLS" $list --tls ""
@@ -82,6 +91,7 @@ refused "cancelling a job of somebody else" 1 "no such job" "$BIN/hslt-job" canc
 refused "fetching a job of somebody else" 1 "no job" "$BIN/hslt-job" fetch j1 -o "$DIR/no.exr" --tls "$CA/bob"
 refused "its preview" 1 "no job" "$BIN/hslt-job" fetch j1 --preview -o "$DIR/no.exr" --tls "$CA/bob"
 refused "its log" 1 "no job" "$BIN/hslt-job" log j1 --tls "$CA/bob"
+tries "seeing a job of somebody else in the list"
 [ -z "$($list --tls "$CA/bob")" ] || fail "bob sees: $($list --tls "$CA/bob")"
 row "seeing a job of somebody else in the list" refused "not there"
 $list | grep -q '^j1 ' || fail "ann does not see her job"
@@ -97,6 +107,7 @@ start_worker plain --tls ""
 turned_away "a worker without TLS" "speaks TLS" plain
 
 # What is not TLS at all: an answer or a hang-up, never a wait.
+tries "HTTP to the TLS port"
 timeout 5 "${PYTHON:-python3}" -c '
 import socket, sys
 s = socket.create_connection(("127.0.0.1", int(sys.argv[1])))
@@ -109,10 +120,29 @@ row "HTTP to the TLS port" refused "an alert, and hung up"
 tricks=$(cd "$HERE" && pwd)/intruder.py
 (cd "$DIR" && exec "${PYTHON:-python3}" -B "$tricks" "${COORDINATOR#*:}" "$CA/ann") >"$DIR/tricks" 2>"$DIR/err.log" || fail "$(cat "$DIR/err.log")"
 while IFS='|' read -r what answer; do
+	tries "$what"
 	row "$what" refused "$answer"
 done <"$DIR/tricks"
 
+# Scenes that reach outside their folder.
+mkdir "$DIR/scene"
+echo "v 0 0 0" >"$DIR/secret.obj"
+ln -s ../secret.obj "$DIR/scene/link.obj"
+ln -s /dev/zero "$DIR/scene/device.obj"
+mkfifo "$DIR/scene/pipe.obj"
+asks_for() {
+	sed "s|meshes/wedge.obj|$1|" "$BOX" >"$DIR/scene/box.xml"
+	refused "path tricks: a scene asks for $2" 1 "$3" "$BIN/hslt-submit" "$DIR/scene/box.xml" -o "$DIR/no.exr" --integrator path --spp 1
+}
+asks_for "$DIR/secret.obj" "an absolute path" "must lie below"
+asks_for ../secret.obj "../secret.obj" "must lie below"
+asks_for link.obj "a link that leads out" "must lie below\|outside\|link"
+asks_for device.obj "a device" "."
+asks_for pipe.obj "a named pipe" "."
+
 # Live connections: revoked, expired.
+tries "a worker that is revoked while it is connected"
+tries "a worker whose certificate expires meanwhile"
 ca revoke lost
 until_true 10 grep -q 'peer_refused.*name=.\{0,1\}lost.*revoked' "$DIR/coordinator.log" || fail "the revoked worker stays"
 row "a worker that is revoked while it is connected" "cut off" "certificate revoked"
@@ -172,7 +202,7 @@ until_true 15 grep -q 'peer_refused.*name="swift".*expired' "$DIR/week.log" || f
 until_true 5 week_greets 2 || fail "the worker does not come back with the new one"
 [ "$(week_value certificateUntil)" -gt $(($(date +%s) + 500000)) ] || fail "the coordinator has the old one: $(week_value certificateUntil)"
 "$BIN/hslt-job" $week release j1 2>>"$DIR/submit.log" || fail "release: $?"
-until_true 20 "$BIN/hslt-job" $week fetch j1 -o "$DIR/rotated.exr" 2>>"$DIR/submit.log" || fail "the job does not end"
+until_true 60 "$BIN/hslt-job" $week fetch j1 -o "$DIR/rotated.exr" 2>>"$DIR/submit.log" || fail "the job does not end"
 same "$DIR/alone2.exr" "$DIR/rotated.exr"
 kill -9 "$WORKER"
 export HSLT_CA="$CA"
