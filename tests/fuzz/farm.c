@@ -227,6 +227,8 @@ struct plan farm_plan(uint64_t job)
 	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .border = 2, .spp = 4, .max_depth = 5,
 				 .groups = 2, .bootstrap = 64, .chains = 4, .epoch = 100};
 	if (job == FARM_CHAINS)
+		r.target_error = 1e-4; /* so that its error is looked at */
+	if (job == FARM_CHAINS || job == FARM_ENDED)
 		snprintf(r.integrator, sizeof r.integrator, "hslt"), snprintf(r.mixture, sizeof r.mixture, "independent=0.1,hslt=0.9");
 	if (job == FARM_SAMPLES) {
 		r.kind = PLAN_SAMPLES;
@@ -266,6 +268,7 @@ const Farm__Envelope *farm_submission(uint64_t job)
 	request.bootstrap = p.bootstrap;
 	request.chains = p.chains;
 	request.epoch = p.epoch;
+	request.target_error = p.target_error;
 	request.border = p.border;
 	file.name = scene;
 	file.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
@@ -412,13 +415,11 @@ static void do_bootstrap(struct farm_world *w, unsigned worker, uint64_t job)
 			answer(w, worker, (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP, .group = g, .part = part});
 }
 
-/* All but those of the last part of the last group: two more, and the job is done. */
-static void do_rounds(struct farm_world *w, unsigned worker, uint64_t job)
+static void do_rounds(struct farm_world *w, unsigned worker, uint64_t job, uint32_t slots)
 {
 	struct plan p = farm_plan(job);
-	uint32_t slots = p.groups * p.parts;
 	for (uint64_t epoch = 0; epoch < p.rounds; epoch++)
-		for (uint32_t i = 0; i + 1 < slots; i++)
+		for (uint32_t i = 0; i < slots; i++)
 			answer(w, worker, (struct lease_key){.job = job, .kind = LEASE_RENDER, .group = i / p.parts, .part = i % p.parts, .epoch = epoch});
 }
 
@@ -436,14 +437,15 @@ static void fill(void)
 	farm_hello(&w, WORKER, FARM__ROLE__ROLE_WORKER);
 	farm_call(&w, SECOND, false);
 	farm_hello(&w, SECOND, FARM__ROLE__ROLE_WORKER);
-	for (uint64_t job = FARM_DONE; job <= FARM_SAMPLES; job++) {
+	for (uint64_t job = FARM_DONE; job <= FARM_ENDED; job++) {
+		struct plan p = farm_plan(job);
 		submit(&w, CLIENT, job);
 		ask_for_job(&w, WORKER, job);
 		ask_for_job(&w, SECOND, job);
 		if (job != FARM_BOOTSTRAP)
 			do_bootstrap(&w, WORKER, job);
-		if (job == FARM_CHAINS)
-			do_rounds(&w, WORKER, job);
+		if (job == FARM_CHAINS || job == FARM_ENDED)
+			do_rounds(&w, WORKER, job, p.groups * p.parts - (job == FARM_CHAINS));
 		if (job == FARM_BOOTSTRAP)
 			answer(&w, WORKER, (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP});
 	}

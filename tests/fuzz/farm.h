@@ -1,7 +1,7 @@
 /*
  * A coordinator to speak to, in this process: its loop turns when it is told to. It begins with the state of a spool that is made
  * once: job 1 is done, 2 lacks the chains of one lease in each of its rounds, 3 is in its bootstrap, 4 waits for its first samples and
- * wants each from two workers.
+ * wants each from two workers, 5 is done and can be extended.
  * One thread. What goes wrong ends the program.
  */
 #ifndef TESTS_FUZZ_FARM_H
@@ -11,8 +11,8 @@
 #include "common/wire/frame.h"
 #include "coordinator/shell/server.h"
 
-enum { FARM_DONE = 1, FARM_CHAINS = 2, FARM_BOOTSTRAP = 3, FARM_SAMPLES = 4 };
-enum { FARM_PEERS = 6 };
+enum { FARM_DONE = 1, FARM_CHAINS = 2, FARM_BOOTSTRAP = 3, FARM_SAMPLES = 4, FARM_ENDED = 5 };
+enum { FARM_PEERS = 7 };
 
 struct farm_peer {
 	int fd; /* negative: not there */
@@ -46,7 +46,7 @@ void farm_hang_up(struct farm_world *w, unsigned peer);
 
 /* What an honest worker answers to a lease of one of these jobs, in even light; batch_fini frees it. */
 struct batch farm_batch(const struct lease_key *k, const struct plan *plan);
-/* The submissions of jobs 2, 3 and 4, with a scene of one file; text and message are static. */
+/* The submissions of the jobs, with a scene of one file; text and message are static. */
 const Farm__Envelope *farm_submission(uint64_t job);
 extern const char farm_scene[];
 struct plan farm_plan(uint64_t job);

@@ -11,7 +11,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum speaker { WORKER_ONE, WORKER_TWO, CLIENT_ONE, CLIENT_TWO, STRANGER, READER, ONE_HANGS_UP, SPEAKERS };
+enum speaker { WORKER_ONE, WORKER_TWO, CLIENT_ONE, CLIENT_TWO, STRANGER, READER, WORKER_THREE, ONE_HANGS_UP, SPEAKERS };
 
 enum { WORLD_MOST = 200 /* inputs; their blobs stay in the spool */ };
 
@@ -39,8 +39,8 @@ static void speak(struct farm_world *w, const struct step *s)
 	}
 	if (w->peers[who].fd < 0) {
 		farm_call(w, who, who == READER);
-		if (who <= CLIENT_TWO)
-			farm_hello(w, who, who <= WORKER_TWO ? FARM__ROLE__ROLE_WORKER : FARM__ROLE__ROLE_CLIENT);
+		if (who <= CLIENT_TWO || who == WORKER_THREE)
+			farm_hello(w, who, who <= WORKER_TWO || who == WORKER_THREE ? FARM__ROLE__ROLE_WORKER : FARM__ROLE__ROLE_CLIENT);
 	}
 	if (who != READER) {
 		unsigned char prefix[FRAME_PREFIX];
@@ -80,10 +80,12 @@ size_t LLVMFuzzerCustomMutator(uint8_t *bytes, size_t size, size_t room, unsigne
 
 /* ---- seeds ---- */
 
-static void say_result(struct seed *s, uint8_t who, struct lease_key k)
+static void say_some(struct seed *s, uint8_t who, struct lease_key k, float light)
 {
 	struct plan plan = farm_plan(k.job);
 	struct batch b = farm_batch(&k, &plan);
+	if (b.tile_count)
+		b.tiles[0].xyz[0] = light;
 	unsigned char *frame;
 	size_t size;
 	struct error e;
@@ -99,6 +101,11 @@ static void say_result(struct seed *s, uint8_t who, struct lease_key k)
 	batch_fini(&b);
 }
 
+static void say_result(struct seed *s, uint8_t who, struct lease_key k)
+{
+	say_some(s, who, k, 0.01f);
+}
+
 static void ask(struct seed *s, uint8_t who, uint64_t job)
 {
 	Farm__LeaseRequest r;
@@ -109,6 +116,20 @@ static void ask(struct seed *s, uint8_t who, uint64_t job)
 	g.job = job;
 	SEED_SAY(s, who, LEASE_REQUEST, lease_request, &r);
 	SEED_SAY(s, who, JOB_GET, job_get, &g);
+}
+
+/* Two workers differ, and a third one decides. */
+static void write_dispute(void)
+{
+	struct seed s = {0};
+	const struct lease_key k = {.job = FARM_SAMPLES, .kind = LEASE_RENDER};
+	ask(&s, WORKER_ONE, k.job);
+	ask(&s, WORKER_TWO, k.job);
+	say_some(&s, WORKER_ONE, k, 0.01f);
+	say_some(&s, WORKER_TWO, k, 7);
+	ask(&s, WORKER_THREE, k.job);
+	say_some(&s, WORKER_THREE, k, 0.01f);
+	seed_end(&s, "dispute", 0);
 }
 
 static void write_results(void)
@@ -148,7 +169,7 @@ static void write_results(void)
 
 static void write_words(void)
 {
-	for (uint64_t job = 1; job <= FARM_SAMPLES; job++) {
+	for (uint64_t job = 1; job <= FARM_ENDED; job++) {
 		struct seed s = {0};
 		Farm__JobList list;
 		farm__job_list__init(&list);
@@ -265,6 +286,7 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 	if (!seeds_wanted())
 		return 0;
 	write_results();
+	write_dispute();
 	write_words();
 	write_worker();
 	write_submission();
