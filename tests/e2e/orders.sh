@@ -104,3 +104,36 @@ until_true 60 more_rounds "$e" "$first" || fail "$e does not go on after $first 
 done_in 60 "$e"
 job fetch "$e"
 same "$DIR/extended.exr" "$DIR/long.exr"
+job log "$e" | grep -q 'state=extended by=- text="after 6 rounds it goes on until 12 are done"' || fail "the log of $e does not say that it went on"
+
+# samples, and until an error is reached
+SAMPLES="--integrator path --epoch 4 --bootstrap 16384"
+submit "$BOX" -o "$DIR/target.exr" $SAMPLES --target-error 5% --wait >/dev/null
+f=$(submit "$BOX" -o "$DIR/tighter.exr" $SAMPLES --target-error 20%)
+done_in 60 "$f"
+first=$(value "$f" rounds)
+refused 1 'already' job extend "$f" --target-error 30%
+job extend "$f" --target-error 5%
+until_true 60 more_rounds "$f" "$first" || fail "$f does not go on after $first rounds"
+again
+done_in 60 "$f"
+[ "$(value "$f" reason)" = error ] || fail "$f ended by $(value "$f" reason)"
+job fetch "$f"
+same "$DIR/tighter.exr" "$DIR/target.exr"
+
+# what cannot be said yes to
+g=$(submit "$BOX" -o "$DIR/g.exr" --integrator path --spp 20000)
+job cancel "$g"
+refused 1 'has been cancelled, and nothing of it was kept: submit it again' job extend "$g" --spp +8
+refused 1 'no such job' job extend j99 --spp +8
+rm "$DIR/spool/jobs/$f/checkpoint" "$DIR/spool/jobs/$f"/journal.* 2>/dev/null || :
+refused 1 'its films have been cleared: submit it again' job extend "$f" --time +1
+is_state "$f" done || fail "$f is $(value "$f" state)"
+kill -9 $COORDINATOR_PID
+wait $COORDINATOR_PID 2>/dev/null || :
+LISTEN=$COORDINATOR start_coordinator -v --keep-films 0.001
+refused 1 'its films have been cleared' job extend "$e" --spp +8
+[ "$(find "$DIR/spool/jobs" -name 'journal.*' -o -name checkpoint -o -name order | wc -l)" -eq 0 ] || fail "films beyond the limit are kept"
+job fetch "$e" -o "$DIR/still.exr"
+same "$DIR/still.exr" "$DIR/long.exr"
+echo "extended while it ran, when it was done, after restarts, until an error: the bits of one long job"
