@@ -235,13 +235,17 @@ static void on_rendered(struct lease_task *l)
 	agent_settle(a);
 }
 
-/* Far more than were asked for, those included whose results nobody has acknowledged: no coordinator of ours does that. */
+/* Far more than were asked for: no coordinator of ours does that. Those whose results are not acknowledged are many where leases
+ * are short and the coordinator's disk is slow. */
 static bool is_flood(const struct agent *a)
 {
-	unsigned count = 0;
-	for (const struct lease_task *l = a->leases; l; l = l->next)
-		count++;
-	return count >= 4 * (a->config.threads + 1) + 16;
+	enum { ANSWERS_MOST = 1024 };
+	unsigned open = 0, answered = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next) {
+		answered += l->state == LEASE_RENDERED;
+		open += l->state != LEASE_RENDERED;
+	}
+	return open >= 4 * (a->config.threads + 1) + 16 || answered >= ANSWERS_MOST;
 }
 
 static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigned char *payload, size_t size)
