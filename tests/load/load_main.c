@@ -24,7 +24,7 @@ enum { OPTION_BIN = 256, OPTION_MINUTES, OPTION_SIZE, OPTION_INTERVAL, OPTION_IN
 
 static const struct argp_option options[] = {
 	{"workers", 'w', "N", 0, "Connected workers (1000)", 0},
-	{"minutes", OPTION_MINUTES, "M", 0, "How long is measured, once all are connected (10)", 0},
+	{"minutes", OPTION_MINUTES, "M", 0, "How long is measured, once all are connected and each has sent a batch (10)", 0},
 	{"size", OPTION_SIZE, "WxH", 0, "Film of each job (1280x720)", 0},
 	{"interval", OPTION_INTERVAL, "SECONDS", 0, "Between a worker's batches (60)", 0},
 	{"jobs", OPTION_JOBS, "N", 0, "Jobs at once (as many as keep all of them busy, and one)", 0},
@@ -265,10 +265,10 @@ static void on_phase(uv_timer_t *t)
 	clockwork.anonymous = fmax(clockwork.anonymous, anonymous);
 	if (!process_is_running(&coordinator))
 		load_die("the coordinator has ended");
-	if (!load.measuring && !load.leaving && load.connected == load.s.workers && load.merged > 0) {
+	if (!load.measuring && !load.leaving && load.connected == load.s.workers && load.merged >= load.s.workers) {
 		load.measuring = true;
 		mark(0);
-		fprintf(stderr, "load: %u workers are connected; measuring\n", load.connected);
+		fprintf(stderr, "load: %u workers are connected and have sent a batch; measuring\n", load.connected);
 	} else if (load.measuring && now - clockwork.begun >= 60 * load.s.minutes) {
 		double average[3];
 		clockwork.loaded = getloadavg(average, 3) > 0 ? average[0] : NAN;
