@@ -129,8 +129,10 @@ static void take(struct conn *c, const unsigned char *bytes, size_t size)
 			c->frame_begun = c->heard;
 		if (rc < 0)
 			conn_close(c, e.text);
-		else if (rc)
+		else if (rc) {
 			deliver(c);
+			frame_reader_drop(&c->reader); /* not only when the next one comes: that may be seconds */
+		}
 	}
 }
 

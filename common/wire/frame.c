@@ -44,7 +44,7 @@ bool frame_reader_is_midway(const struct frame_reader *r)
 }
 
 /* Big buffers are given back: a connection at rest holds little. */
-static void start_frame(struct frame_reader *r)
+void frame_reader_drop(struct frame_reader *r)
 {
 	enum { KEEP = 1 << 16 };
 	if (r->header.capacity > KEEP)
@@ -85,7 +85,7 @@ int frame_reader_take(struct frame_reader *r, const unsigned char *bytes, size_t
 {
 	*used = 0;
 	if (is_whole(r))
-		start_frame(r);
+		frame_reader_drop(r);
 	if (r->prefix_size < FRAME_PREFIX) {
 		while (r->prefix_size < FRAME_PREFIX && *used < count)
 			r->prefix[r->prefix_size++] = bytes[(*used)++];

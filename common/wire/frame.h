@@ -30,6 +30,8 @@ void frame_reader_fini(struct frame_reader *r);
 /* Takes bytes up to the end of a frame; *used says how many. 1: a frame is whole (header, payload hold it until the next
  * call), 0: more bytes are needed, -EMSGSIZE: a length is over its limit, -EBADMSG: no header, -ENOMEM. */
 int frame_reader_take(struct frame_reader *r, const unsigned char *bytes, size_t count, size_t *used, struct error *e);
+/* The frame that is whole is no longer needed; else the next call of frame_reader_take drops it. */
+void frame_reader_drop(struct frame_reader *r);
 bool frame_reader_is_midway(const struct frame_reader *r); /* part of a frame has come */
 
 void frame_prefix_write(unsigned char out[FRAME_PREFIX], uint32_t header_size, uint32_t payload_size);
