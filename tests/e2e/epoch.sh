@@ -1,7 +1,7 @@
 # The length of an epoch: by a pilot where a job is long, longer where the coordinator bounds the bandwidth, as asked with --epoch;
-# and where a job is short, as hslt-render makes it. Nothing is rendered.
+# and where a job is short, as hslt-render makes it. Parts: the farm's bits are hslt-render's.
 . "$(dirname "$0")/lib.sh"
-need hslt-coordinator hslt-submit hslt-job
+need hslt-coordinator hslt-submit hslt-job hslt-worker hslt-render hslt-compare
 
 # epoch FILE: of the plan that hslt-submit printed; rule FILE WORDS
 epoch() {
@@ -35,7 +35,13 @@ told parts --spp 16 --parts 64
 rule "$DIR/parts" "1024 leases"
 "$BIN/hslt-submit" "$BOX" -o "$DIR/x.exr" --integrator pssmlt --parts 3 --chains 1024 --epoch 9 2>"$DIR/odd" && fail "3 parts of 64 chains"
 rule "$DIR/odd" "cannot be cut into 3 parts"
-stop "$COORDINATOR_PID"
+start_worker one
+FINE="--integrator pssmlt --size 64x36 --spp 16 --groups 4 --chains 64 --parts 16"
+submit "$BOX" -o "$DIR/farm.exr" $FINE --wait >/dev/null || fail "a job of 16 parts"
+"$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" $FINE --quiet 2>>"$DIR/render.log" || fail "hslt-render"
+same "$DIR/farm.exr" "$DIR/alone.exr"
+grep -aq -e "--parts 16" "$DIR/farm.exr" || fail "the header does not name the parts"
+stop "$WORKER" "$COORDINATOR_PID"
 
 start_coordinator --worker-bandwidth 0.01
 told slow --spp 100000
