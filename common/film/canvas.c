@@ -254,7 +254,7 @@ static size_t tile_index(const struct canvas *c, const struct tile *t)
 	return (size_t)((t->y - c->plan.crop_y) / TILE_SIZE) * c->tiles_across + (t->x - c->plan.crop_x) / TILE_SIZE;
 }
 
-static int add_tiles(struct canvas *c, const struct batch *b, struct error *e)
+int canvas_reserve(struct canvas *c, const struct batch *b, struct error *e)
 {
 	size_t prefix = canvas_film(b->key.group, FILM_PREFIX), open = prefix + FILM_OPEN + parity(b->key.epoch);
 	int rc = 0;
@@ -265,6 +265,13 @@ static int add_tiles(struct canvas *c, const struct batch *b, struct error *e)
 		if (rc == 0)
 			rc = canvas_back_tile(c, prefix, tile, e);
 	}
+	return rc;
+}
+
+static int add_tiles(struct canvas *c, const struct batch *b, struct error *e)
+{
+	size_t prefix = canvas_film(b->key.group, FILM_PREFIX), open = prefix + FILM_OPEN + parity(b->key.epoch);
+	int rc = canvas_reserve(c, b, e);
 	if (rc)
 		return rc;
 	uint64_t bound = c->bound[open], old = bound, ignored = 0;

@@ -34,6 +34,9 @@ void canvas_free(struct canvas *c);
 int canvas_add(struct canvas *c, const struct batch *b, struct error *e);
 /* The plan ends after so many rounds now, not fewer than are open. */
 void canvas_set_rounds(struct canvas *c, uint64_t rounds);
+/* Room on the disk for the tiles of a render batch, so that adding it does not fail for want of it. -ENOSPC and what else a disk
+ * says. */
+int canvas_reserve(struct canvas *c, const struct batch *b, struct error *e);
 bool canvas_has(const struct canvas *c, const struct lease_key *k); /* merged already */
 uint64_t canvas_rounds(const struct canvas *c);                     /* complete rounds */
 uint64_t canvas_merged(const struct canvas *c); /* render leases merged, open rounds too */

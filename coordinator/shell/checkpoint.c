@@ -3,6 +3,7 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/film/canvas_save.h"
+#include "coordinator/shell/durable.h"
 #include "coordinator/shell/session.h"
 
 #include <assert.h>
@@ -35,6 +36,7 @@ struct writing {
 	uint64_t bytes;
 	char folder[SPOOL_PATH_MAX];
 	int rc;
+	bool unsure; /* it has its name, but perhaps not for good */
 	struct error error;
 };
 
@@ -88,9 +90,14 @@ static void run(uv_work_t *work)
 	sealed_close(&out);
 	w->bytes = out.bytes;
 	if (!w->rc)
-		w->rc = spool_rename(temporary, name, w->folder, &w->error);
+		w->rc = disk_rename(temporary, name) ? error_set(&w->error, errno, "%s: %s", name, strerror(errno)) : 0;
+	if (!w->rc) {
+		w->rc = disk_sync_folder(w->folder, &w->error);
+		w->unsure = w->rc != 0;
+	}
 	if (w->rc) {
-		disk_unlink(temporary);
+		if (!w->unsure)
+			disk_unlink(temporary);
 		journal_release(w->journal);
 		w->journal = NULL;
 	}
@@ -146,11 +153,17 @@ static void done(uv_work_t *work, int status)
 	uint64_t id = o->id;
 	assert(status == 0);
 	(void)status;
-	if (w->rc) { /* the old ones go on */
+	if (w->rc && (w->unsure || o->unsure)) { /* this one and its journal, or the old ones: both hold all that was acknowledged */
+		o->unsure = true;
+		o->generation_least = w->head.generation + 1;
+		o->checkpoint_after = server_now(s) + s->config.retry_seconds;
+	} else if (w->rc) { /* the old ones go on */
 		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 		o->checkpoint_after = server_now(s) + pause_seconds;
 		journal_clear(w->folder, journal_generation(o->journal));
 	} else {
+		o->unsure = false;
+		journal_settle(o->journal);
 		log_event(LOG_CHECKPOINT, "job=j%llu rounds=%llu bytes=%llu journal=%llu", (unsigned long long)id,
 			  (unsigned long long)canvas_rounds(o->canvas), (unsigned long long)w->bytes,
 			  (unsigned long long)journal_bytes(o->journal));
@@ -160,6 +173,8 @@ static void done(uv_work_t *work, int status)
 	}
 	o->busy = false;
 	s->checkpointing = s->checkpointing && !w->rc;
+	if (!s->stopping && o->unsure)
+		durable_hold(s, o, "its results cannot be stored", w->error.text);
 	if (!s->stopping) {
 		server_order_free_again(s, o);
 		session_previews(s, id);
@@ -183,7 +198,8 @@ static void start(struct server *s, struct order *o)
 	w->head = (struct head){.bytes = sizeof w->head,
 				.worker_count = o->worker_count,
 				.job = o->id,
-				.generation = journal_generation(o->journal) + 1,
+				.generation = journal_generation(o->journal) < o->generation_least ? o->generation_least
+												  : journal_generation(o->journal) + 1,
 				.cpu_seconds = o->cpu_seconds,
 				.bootstrap_cpu_seconds = o->record.bootstrap_cpu_seconds,
 				.look_written = o->look_written,
@@ -207,7 +223,7 @@ void checkpoint_where_due(struct server *s)
 		if (!o->journal || !o->canvas || o->busy || o->ended)
 			continue;
 		uint64_t limit = o->checkpoint_bytes > s->config.journal_bytes ? o->checkpoint_bytes : s->config.journal_bytes;
-		if (journal_bytes(o->journal) > limit && server_now(s) >= o->checkpoint_after)
+		if ((journal_bytes(o->journal) > limit || o->unsure) && server_now(s) >= o->checkpoint_after)
 			start(s, o);
 		if (s->checkpointing)
 			return;

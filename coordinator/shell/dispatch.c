@@ -74,18 +74,25 @@ static void job_changed(struct server *s, const struct action *a)
 	o->ended = job_state_is_end(a->state);
 }
 
-static void bootstrap_done(struct server *s, const struct action *a)
+void dispatch_prepare(struct server *s, struct order *o)
 {
-	struct order *o = server_order(s, a->job);
 	struct error e = {""};
 	int rc = order_prepare(o, spool_canvas(s->spool), &e);
+	if (rc && rc != -ENOMEM) {
+		if (!o->unprepared)
+			order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+		o->unprepared = true;
+		o->try_again = server_now(s) + s->config.retry_seconds;
+		return;
+	}
+	o->unprepared = false;
 	if (!rc)
 		order_log(o, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d", o->lit.b_pooled,
 			  o->lit.beyond_share, (int)o->lit.black);
 	struct event ev = {.kind = EVENT_PREPARED,
-			   .job = a->job,
+			   .job = o->id,
 			   .text = e.text,
-			   .prepared = {.job = a->job, .ok = rc == 0, .black = o->lit.black}};
+			   .prepared = {.job = o->id, .ok = rc == 0, .black = o->lit.black}};
 	server_defer(s, &ev);
 }
 
@@ -198,7 +205,7 @@ void dispatch_update(struct server *s, const struct update *u)
 			acknowledge(s, a);
 			break;
 		case ACTION_BOOTSTRAP_DONE:
-			bootstrap_done(s, a);
+			dispatch_prepare(s, server_order(s, a->job));
 			break;
 		case ACTION_ROUND_DONE:
 			break;
@@ -245,7 +252,12 @@ static void finish(struct server *s, struct order *o)
 	server_view(s, o->id, &v);
 	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 	o->record = v.record;
-	durable_end(s, o);
+	if (durable_end(s, o)) { /* the image and its record again, later */
+		o->unpublished = true;
+		o->unpublished_rounds = order_rounds(o);
+		o->try_again = server_now(s) + s->config.retry_seconds;
+		return;
+	}
 	dispatch_remember(s, &v.record);
 	for (struct session *p = s->sessions; p; p = p->next)
 		if (p->state == SESSION_WORKER)
@@ -273,7 +285,7 @@ void dispatch_finish_orders(struct server *s)
 	bool finished = false;
 	for (struct order *o = s->orders, *next; o; o = next) {
 		next = o->next;
-		if (o->ended && !o->busy) {
+		if (o->ended && !o->busy && !o->unpublished) {
 			finish(s, o);
 			finished = true;
 			next = s->orders; /* late batches may have ended others */

@@ -9,4 +9,7 @@ void dispatch_remember(struct server *s, const struct job_record *r); /* it has 
 /* Orders that the core has ended and whose canvas is free: written down, told to the workers, let go. */
 void dispatch_finish_orders(struct server *s);
 
+/* All of its bootstrap is merged: its films, or another try later, when the disk has no room for them. */
+void dispatch_prepare(struct server *s, struct order *o);
+
 #endif

@@ -2,9 +2,12 @@
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
+#include "common/base/text.h"
 #include "common/base/version.h"
 #include "common/wire/frame.h"
+#include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/keep.h"
+#include "coordinator/shell/publish.h"
 #include "coordinator/shell/session.h"
 
 #include <assert.h>
@@ -12,13 +15,20 @@
 #include <stdlib.h>
 #include <string.h>
 
-static const double try_again_seconds = 2;
+enum { PINNED_ROOM = 512 /* for the record of the fingerprint before the first batch */ };
+
+/* A job that has ended, of which the disk does not know it yet. */
+struct ending {
+	struct ending *next;
+	struct job_record record;
+};
 
 struct durable_ack {
 	struct durable_ack *next;
 	uint64_t peer;
 	struct lease_key key;
 	enum ack ack;
+	bool failed;
 	struct journal *journal; /* held */
 };
 
@@ -69,29 +79,69 @@ int durable_begin(struct server *s, struct order *o, struct error *e)
 		rc = journal_create(&o->journal, folder, o->id, 0, e);
 	if (!rc)
 		rc = ledger_add(s->ledger, &j, e);
+	if (rc) { /* should the row be there all the same: nobody waits for the job */
+		text_copy(o->record.state, sizeof o->record.state, "failed");
+		text_copy(o->record.why, sizeof o->record.why, e ? e->text : "");
+		o->record.exit_code = 3;
+		spool_write_record(s->spool, &o->record, NULL);
+	}
 	mem_free(submission);
 	mem_free(plan);
 	return rc;
 }
 
-void durable_end(struct server *s, struct order *o)
+/* Its journal goes only when the record says for good that it has ended. kept: the films stay (keep.h). */
+static int end(struct server *s, const struct job_record *r, bool kept, struct error *e)
+{
+	struct error late;
+	int rc = spool_write_record(s->spool, r, e);
+	if (rc && !r->has_result) /* what it has merged is for nobody, and may be what fills the disk */
+		keep_drop(s, r->id);
+	if (rc == -ENOSPC)
+		keep_drop_all(s);
+	if (rc)
+		rc = spool_write_record(s->spool, r, e);
+	if (rc)
+		return rc;
+	if (!kept)
+		keep_drop(s, r->id);
+	/* The record says it already: without this row the next start reads it there. */
+	if (ledger_end(s->ledger, r->id, r->state, &late))
+		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(late.text).text);
+	return 0;
+}
+
+int durable_end(struct server *s, struct order *o)
 {
 	struct error e;
-	bool kept = keep_order(s, o);
-	int rc = spool_write_record(s->spool, &o->record, &e);
-	if (rc == -ENOSPC)
-		kept = false;
+	int rc = end(s, &o->record, keep_order(s, o), &e);
+	if (rc)
+		order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+	if (rc && o->record.has_result) {
+		text_copy(o->record.why, sizeof o->record.why, e.text);
+		return rc;
+	}
+	struct ending *n = rc ? mem_alloc(1, sizeof *n) : NULL;
+	if (n) {
+		*n = (struct ending){s->endings, o->record};
+		s->endings = n;
+		s->endings_again = server_now(s) + s->config.retry_seconds;
+	}
 	journal_release(o->journal); /* with its last holder it gives up its room, too */
 	o->journal = NULL;
-	if (!kept)
-		keep_drop(s, o->id);
-	if (rc == -ENOSPC)
-		rc = spool_write_record(s->spool, &o->record, &e);
-	if (rc)
-		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	/* The record says it already: without this row the next start reads it there. */
-	if (ledger_end(s->ledger, o->id, o->record.state, &e))
-		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)o->id, log_quote(e.text).text);
+	return 0;
+}
+
+static void end_again(struct server *s)
+{
+	struct error e;
+	if (!s->endings || server_now(s) < s->endings_again)
+		return;
+	s->endings_again = server_now(s) + s->config.retry_seconds;
+	for (struct ending *n; (n = s->endings) && end(s, &n->record, false, &e) == 0;) {
+		s->endings = n->next;
+		mem_free(n);
+	}
 }
 
 /* ---- batches ---- */
@@ -103,8 +153,15 @@ static void hold(struct server *s, struct order *o, const char *text)
 		order_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
 		o->held = *text != 0;
 	}
-	o->try_again = server_now(s) + try_again_seconds;
+	o->try_again = server_now(s) + s->config.retry_seconds;
 	server_step(s, &ev);
+}
+
+void durable_hold(struct server *s, struct order *o, const char *what, const char *why)
+{
+	char text[256];
+	snprintf(text, sizeof text, "%s: %.200s", what, why);
+	hold(s, o, text);
 }
 
 int durable_reserve(struct server *s, struct order *o, struct error *e)
@@ -117,21 +174,21 @@ int durable_reserve(struct server *s, struct order *o, struct error *e)
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
 	m.lease_result = result.to;
-	if (!o->journal)
-		return error_set(e, EIO, "the job's journal cannot be written");
+	if (!o->journal || o->unsure)
+		return error_set(e, EIO, "the job's files cannot be written");
 	int rc = envelope_pack(&m, NULL, 0, &s->frame, &s->frame_size, e);
 	if (rc)
 		return rc;
 	frame_prefix_write(s->frame, (uint32_t)(s->frame_size - FRAME_PREFIX), (uint32_t)s->payload_size);
-	rc = journal_reserve(o->journal, s->frame_size + s->payload_size, e);
+	rc = journal_reserve(o->journal, s->frame_size + s->payload_size + PINNED_ROOM, e);
 	if (rc == -ENOSPC && keep_drop_all(s))
-		rc = journal_reserve(o->journal, s->frame_size + s->payload_size, e);
+		rc = journal_reserve(o->journal, s->frame_size + s->payload_size + PINNED_ROOM, e);
+	if (!rc && o->canvas && s->batch->key.kind == LEASE_RENDER)
+		rc = canvas_reserve(o->canvas, s->batch, e);
 	if (!rc)
 		return 0;
-	char text[256];
 	o->held_bytes = s->frame_size + s->payload_size;
-	snprintf(text, sizeof text, "its results cannot be stored: %.200s", e->text);
-	hold(s, o, text);
+	durable_hold(s, o, "its results cannot be stored", e->text);
 	return rc;
 }
 
@@ -168,27 +225,45 @@ static void run(uv_work_t *work)
 	struct flush *w = work->data;
 	for (struct durable_ack *a = w->acks; a; a = a->next) {
 		struct error e;
-		if (journal_sync(a->journal, &e)) {
-			a->peer = 0; /* no answer; `done` says why */
+		a->failed = journal_sync(a->journal, &e) != 0;
+		if (a->failed)
 			log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-		}
 	}
+}
+
+static void drop_ack(struct durable_ack *a)
+{
+	journal_release(a->journal);
+	mem_free(a);
+}
+
+/* It waits until the journal is a good one again. */
+static void park(struct server *s, struct durable_ack *a)
+{
+	struct order *o = s->stopping ? NULL : server_order(s, a->key.job);
+	if (!o) {
+		drop_ack(a);
+		return;
+	}
+	a->next = s->parked;
+	s->parked = a;
+	if (!o->held)
+		durable_hold(s, o, "its results cannot be stored", "its journal failed to be written");
 }
 
 static void answer(struct server *s, struct durable_ack *a)
 {
 	struct session *p = s->stopping ? NULL : session_find(s, a->peer);
-	if (a->peer == 0 && !s->stopping) {
-		struct event ev = {.kind = EVENT_JOB_BROKEN, .job = a->key.job, .text = "its journal cannot be written to the disk"};
-		server_step(s, &ev);
+	if (a->failed) {
+		park(s, a);
+		return;
 	}
-	if (a->peer && a->ack == ACK_MERGED)
+	if (a->ack == ACK_MERGED)
 		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", (unsigned long long)a->key.job,
 			  (unsigned long long)a->peer, (int)a->key.kind, a->key.group, a->key.part, (unsigned long long)a->key.epoch);
 	if (p)
 		session_send_ack(p, &a->key, a->ack, "");
-	journal_release(a->journal);
-	mem_free(a);
+	drop_ack(a);
 }
 
 static void done(uv_work_t *work, int status)
@@ -268,17 +343,64 @@ static void write_counts(struct server *s, struct order *o)
 		o->counts = now;
 }
 
+/* The answers that waited for the journals of jobs that are no longer bad. */
+static void unpark(struct server *s)
+{
+	struct durable_ack *list = s->parked;
+	s->parked = NULL;
+	for (struct durable_ack *a, *next = list; (a = next);) {
+		struct order *o = server_order(s, a->key.job);
+		next = a->next;
+		a->next = NULL;
+		if (!o) {
+			drop_ack(a);
+		} else if (a->journal == o->journal && journal_is_bad(a->journal)) {
+			a->next = s->parked;
+			s->parked = a;
+		} else {
+			*s->acks_last = a;
+			s->acks_last = &a->next;
+		}
+	}
+	flush_next(s);
+}
+
+/* 0: nothing stands in the way of its results any more. */
+static int mend(struct order *o, struct error *e)
+{
+	if (!o->journal || o->unsure)
+		return -EAGAIN;
+	int rc = journal_is_bad(o->journal) ? journal_renew(o->journal, e) : 0;
+	if (rc && rc != -EAGAIN)
+		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
+	return rc ? rc : journal_reserve(o->journal, 2 * o->held_bytes, e);
+}
+
 void durable_tick(struct server *s)
 {
 	for (struct order *o = s->orders; o; o = o->next)
 		write_counts(s, o);
-	for (struct order *o = s->orders, *next; o; o = next) {
+	if (s->parked)
+		unpark(s);
+	end_again(s);
+	for (struct order *o = s->orders; o; o = o->next) {
 		struct error e;
-		next = o->next;
-		if (!o->held || o->ended || server_now(s) < o->try_again)
+		if (server_now(s) < o->try_again || o->busy)
 			continue;
-		o->try_again = server_now(s) + try_again_seconds;
-		if (o->journal && journal_reserve(o->journal, 2 * o->held_bytes, &e) == 0) {
+		if (o->unpublished) {
+			o->unpublished = false;
+			publish_start(s, o, PUBLISH_RESULT, o->unpublished_rounds);
+		}
+		if (o->unprepared && !o->ended) {
+			struct event ev = {.kind = EVENT_TICK};
+			dispatch_prepare(s, o);
+			server_step(s, &ev);
+			return;
+		}
+		if (!o->held || o->ended)
+			continue;
+		o->try_again = server_now(s) + s->config.retry_seconds;
+		if (mend(o, &e) == 0) {
 			hold(s, o, "");
 			return; /* the list may have changed; the others next time */
 		}
@@ -288,5 +410,13 @@ void durable_tick(struct server *s)
 void durable_close(struct server *s)
 {
 	assert(!s->flushing && !s->acks);
+	for (struct durable_ack *a; (a = s->parked);) {
+		s->parked = a->next;
+		drop_ack(a);
+	}
+	for (struct ending *n; (n = s->endings);) {
+		s->endings = n->next;
+		mem_free(n);
+	}
 	ledger_close(s->ledger);
 }

@@ -1,7 +1,8 @@
 /*
  * What survives the coordinator: its jobs in the ledger, their merged batches in journals, each flushed before it is
  * acknowledged. Batches that come while a flush is under way share the next one (group commit), which runs in the pool.
- * The loop's thread.
+ * A job that the disk fails is held, says why, and goes on by itself: what it appended meanwhile and what was not flushed is
+ * brought into a new file (store/journal.h), an image that could not be written is made again. The loop's thread.
  */
 #ifndef COORDINATOR_SHELL_DURABLE_H
 #define COORDINATOR_SHELL_DURABLE_H
@@ -12,8 +13,9 @@
 int durable_begin(struct server *s, struct order *o, struct error *e);
 /* Submission and plan as the ledger takes them; the two are mem_alloc'd, and NULL if they could not be made. */
 int durable_pack(const struct order *o, struct ledger_job *j, unsigned char **submission, unsigned char **plan, struct error *e);
-/* It has ended: its record is written, its films are kept (keep.h) or go. */
-void durable_end(struct server *s, struct order *o);
+/* It has ended: its record is written, its films are kept (keep.h) or go. Not 0: its record cannot be written, and it has a
+ * result, which nobody must be told of yet. Records of others are tried again. */
+int durable_end(struct server *s, struct order *o);
 
 /* Before the core sees the batch of this event: the frame for the journal, and room on the disk for it. -ENOSPC, -EFBIG: the disk
  * is full: the job is held until there is room. */
@@ -25,7 +27,9 @@ void durable_ack(struct server *s, const struct order *o, uint64_t peer, const s
 /* The last look at the job's error, if it is new. */
 void durable_look(struct server *s, uint64_t job);
 
-/* Now and then: jobs that are held for want of room, if there is some; what went wrong with a job since it was written down last. */
+/* What the disk did not take is tried again from time to time, and the text says what that is. */
+void durable_hold(struct server *s, struct order *o, const char *what, const char *why);
+/* Now and then; writes down, too, what went wrong with a job since. */
 void durable_tick(struct server *s);
 void durable_close(struct server *s); /* after the loop */
 

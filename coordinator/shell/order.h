@@ -59,6 +59,11 @@ struct order {
 	bool held;               /* the disk has no room for a result of so many bytes: */
 	size_t held_bytes;
 	double try_again;
+	bool unsure;             /* whether the last checkpoint has its name: nothing is stored before the next has */
+	uint64_t generation_least; /* of that one */
+	bool unprepared;         /* the disk has no room for its films yet */
+	bool unpublished;        /* it has ended, but its image could not be written yet */
+	uint64_t unpublished_rounds;
 	bool busy, ended;
 	bool black; /* as the image that was published, or the bootstrap */
 	double preview_made; /* s on the loop's clock; 0: never */

@@ -96,13 +96,22 @@ static void tell_image(const struct publishing *w)
 	server_step(w->server, &ev);
 }
 
-/* The core's job is done; only the record knows that there is nothing to fetch. */
+/* The core's job is done; all that it is made of stays until the disk takes the image. */
 static void cannot_write(struct publishing *w)
 {
-	struct job_record *r = &w->order->record;
-	r->exit_code = 3;
-	text_copy(r->why, sizeof r->why, w->error.text);
-	order_log(w->order, LOG_JOB_FAILED, "text=%s", log_quote(w->error.text).text);
+	struct order *o = w->order;
+	o->unpublished = true;
+	o->unpublished_rounds = w->rounds;
+	o->try_again = server_now(w->server) + w->server->config.retry_seconds;
+	if (strcmp(o->record.why, w->error.text) != 0)
+		order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(w->error.text).text);
+	text_copy(o->record.why, sizeof o->record.why, w->error.text);
+}
+
+static void has_written(struct order *o)
+{
+	o->record.has_result = true;
+	o->record.why[0] = 0;
 }
 
 static void done(uv_work_t *work, int status)
@@ -122,7 +131,7 @@ static void done(uv_work_t *work, int status)
 	if (w->what == PUBLISH_RESULT && w->rc)
 		cannot_write(w);
 	else if (w->what == PUBLISH_RESULT)
-		o->record.has_result = true;
+		has_written(o);
 	else if (w->what == PUBLISH_PREVIEW)
 		o->preview_made = server_now(s);
 	if (s->stopping) {

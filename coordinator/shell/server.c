@@ -26,7 +26,7 @@ enum { BACKLOG = 4096, TICK_MS = 200 };
 
 void server_config_init(struct server_config *c)
 {
-	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5,  .max_faults = 3,
+	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .retry_seconds = 2,  .max_faults = 3,
 				    .journal_bytes = 64 << 20, .keep_bytes = 2000000000, .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
 }
 
@@ -212,12 +212,10 @@ static void view_order(struct server *s, const struct order *o, struct job_view 
 	if (!farm_job(s->farm, o->id, server_now(s), &status))
 		return;
 	view_add_status(v, &status);
-	if (o->record.exit_code) { /* the core's job is done, but its image could not be written */
-		text_copy(v->record.state, sizeof v->record.state, "failed");
-		text_copy(v->record.why, sizeof v->record.why, o->record.why);
-		v->record.exit_code = o->record.exit_code;
-	} else if (o->ended && o->busy) { /* not before its image is there */
+	if (o->ended && (o->busy || o->unpublished)) { /* not before its image is there */
 		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
+		if (*o->record.why)
+			snprintf(v->waiting, sizeof v->waiting, "its image cannot be written: %.200s", o->record.why);
 		v->record.reason[0] = 0;
 		v->record.exit_code = 0;
 	}
@@ -279,7 +277,10 @@ static int read_ended(struct server *s, struct error *e)
 		struct error fault;
 		if (restore_lives(s, ids[i]))
 			continue;
-		if (spool_read_record(s->spool, ids[i], r, &fault)) {
+		int rc = spool_read_record(s->spool, ids[i], r, &fault);
+		if (rc == -ENOENT) /* the number of a job that did not get as far as a record */
+			continue;
+		if (rc) {
 			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)ids[i],
 				  log_quote(fault.text).text);
 			continue;
@@ -381,6 +382,7 @@ static void on_tick(uv_timer_t *t)
 		session_tick(p);
 	status_tick(s->status);
 	durable_tick(s);
+	checkpoint_where_due(s);
 	if (s->watchdog > 0 && server_now(s) >= s->watchdog_next) {
 		s->watchdog_next = server_now(s) + s->watchdog / 3;
 		notify_send("WATCHDOG=1");

@@ -25,6 +25,7 @@ struct server_config {
 	struct quota quota; /* of each client */
 	uint64_t blob_bytes; /* the spool's limit of scene files; 0: none */
 	uint64_t keep_bytes; /* of films of jobs that are done, so that they can be extended; 0: none are kept */
+	double retry_seconds; /* between tries of what the disk did not take */
 	uint64_t journal_bytes; /* a job's journal that is longer is cut by a checkpoint */
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
 	unsigned max_connections; /* 0: by the file descriptors that there are */
@@ -48,6 +49,7 @@ void server_close(struct server *s); /* stops it, if no signal has */
 struct session;
 struct status_socket;
 struct durable_ack;
+struct ending;
 
 /* An event for the core that came up while its last update was carried out. */
 struct deferred {
@@ -79,6 +81,9 @@ struct server {
 	uint64_t *restored; /* ids of the jobs that went on when this life began */
 	size_t restored_count;
 	struct durable_ack *acks, **acks_last; /* that wait for a flush */
+	struct durable_ack *parked;            /* ... for a journal that failed to be a good one again */
+	struct ending *endings;                /* jobs that ended and whose records could not be written yet */
+	double endings_again;
 	bool flushing;
 	uint64_t last_peer;
 	struct status_socket *status;

@@ -1,5 +1,6 @@
 #include "coordinator/store/journal.h"
 
+#include "common/base/buf.h"
 #include "common/base/crc.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
@@ -28,7 +29,11 @@ struct journal {
 	int fd;
 	uint64_t generation;
 	atomic_uint holders;
-	_Atomic uint64_t bytes, synced;
+	_Atomic uint64_t bytes, synced; /* in the file */
+	atomic_bool bad;                /* a call on the file failed: it is not written any more, nor believed */
+	atomic_bool settled;            /* all of it is stored elsewhere */
+	atomic_uint flushes;            /* under way */
+	struct buf tail;                /* what was appended since it is bad */
 	char path[PATH_MOST];
 };
 
@@ -60,6 +65,7 @@ static struct journal *make(const char *folder, uint64_t generation, int flags, 
 		return NULL;
 	}
 	j->generation = generation;
+	j->tail.limit = SIZE_MAX;
 	atomic_init(&j->holders, 1);
 	snprintf(j->path, sizeof j->path, "%s/journal.%llu", folder, (unsigned long long)generation);
 	j->fd = disk_open(j->path, flags | O_CLOEXEC, 0600);
@@ -77,6 +83,7 @@ void journal_release(struct journal *j)
 		return;
 	if (j->fd >= 0)
 		disk_close(j->fd);
+	buf_fini(&j->tail);
 	mem_free(j);
 }
 
@@ -122,6 +129,11 @@ static bool read_at(int fd, void *bytes, size_t size, uint64_t at)
 	return true;
 }
 
+static bool head_fits(const struct head *h, uint64_t job, uint64_t generation)
+{
+	return memcmp(h->magic, magic, sizeof magic) == 0 && h->check == check_head(h) && h->job == job && h->generation == generation;
+}
+
 /* The record at j->bytes, and beyond it. 0: it is not whole; else what the visitor says, or 1. */
 static int visit_next(struct journal *j, uint64_t end, journal_visit *visit, void *user, struct error *e)
 {
@@ -148,8 +160,7 @@ static int read_all(struct journal *j, uint64_t job, journal_visit *visit, void 
 	if (disk_fstat(j->fd, &st))
 		return fault(j, errno, e);
 	uint64_t end = (uint64_t)st.st_size;
-	if (!read_at(j->fd, &h, sizeof h, 0) || memcmp(h.magic, magic, sizeof magic) != 0 || h.check != check_head(&h) || h.job != job ||
-	    h.generation != j->generation)
+	if (!read_at(j->fd, &h, sizeof h, 0) || !head_fits(&h, job, j->generation))
 		return error_set(e, EBADMSG, "%s: not the journal of j%llu", j->path, (unsigned long long)job);
 	j->bytes = sizeof h;
 	int rc;
@@ -186,6 +197,8 @@ int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_
 int journal_reserve(struct journal *j, size_t body, struct error *e)
 {
 	off_t size = (off_t)(sizeof(struct record) + body);
+	if (j->bad)
+		return fault(j, EIO, e);
 	if (disk_fallocate(j->fd, FALLOC_FL_KEEP_SIZE, (off_t)j->bytes, size) == 0 || errno == EOPNOTSUPP || errno == ENOSYS)
 		return 0;
 	int code = errno;
@@ -231,20 +244,92 @@ int journal_append(struct journal *j, enum journal_kind kind, double elapsed, co
 	struct record r = {.size = (uint32_t)size, .kind = kind, .elapsed = elapsed};
 	r.check = check_record(&r, a, a_size, b, b_size);
 	struct iovec parts[3] = {part_of(&r, sizeof r), part_of(a, a_size), part_of(b, b_size)};
-	int rc = write_parts(j, parts, 3);
-	if (rc) {
-		/* A torn record that could not be cut off would be cut off by whoever reads it. */
-		int cut = disk_ftruncate(j->fd, (off_t)j->bytes);
-		(void)cut;
-		return fault(j, -rc, e);
+	size_t before = j->tail.size;
+	int rc = j->bad ? -EIO : write_parts(j, parts, 3);
+	if (!rc) {
+		j->bytes += sizeof r + size;
+		return 0;
 	}
-	j->bytes += sizeof r + size;
+	if (!j->bad) { /* a torn record that could not be cut off would be cut off by whoever reads it */
+		int cut = disk_ftruncate(j->fd, (off_t)j->bytes);
+		if (!cut && rc == -ENOSPC && kind != JOURNAL_BATCH && kind != JOURNAL_PINNED)
+			return fault(j, -rc, e);
+		j->bad = true;
+	}
+	if (buf_append(&j->tail, &r, sizeof r) && buf_append(&j->tail, a, a_size) && buf_append(&j->tail, b, b_size))
+		return 0;
+	j->tail.size = before;
+	return error_set(e, ENOMEM, "no memory for a record of %zu bytes", size);
+}
+
+bool journal_is_bad(const struct journal *j)
+{
+	return j->bad;
+}
+
+void journal_settle(struct journal *j)
+{
+	j->settled = true;
+}
+
+/* All whole records as they are read, each checked again, into another file. */
+static int copy_records(struct journal *j, int to, struct error *e)
+{
+	struct record r;
+	uint64_t at = sizeof(struct head);
+	int rc = 0;
+	for (; !rc && at < j->bytes; at += sizeof r + r.size) {
+		if (!read_at(j->fd, &r, sizeof r, at) || r.size > j->bytes - at - sizeof r)
+			return fault(j, EIO, e);
+		unsigned char *body = mem_alloc(r.size, 1);
+		if (!body)
+			return error_set(e, ENOMEM, "no memory for a record of %u bytes", r.size);
+		if (!read_at(j->fd, body, r.size, at + sizeof r) || r.check != check_record(&r, body, r.size, NULL, 0))
+			rc = fault(j, EIO, e);
+		if (!rc && ((rc = disk_write_all(to, &r, sizeof r)) || (rc = disk_write_all(to, body, r.size))))
+			rc = fault(j, -rc, e);
+		mem_free(body);
+	}
+	return rc;
+}
+
+int journal_renew(struct journal *j, struct error *e)
+{
+	char path[PATH_MOST + 8], folder[PATH_MOST];
+	struct head h;
+	snprintf(path, sizeof path, "%s.new", j->path);
+	snprintf(folder, sizeof folder, "%s", j->path);
+	*strrchr(folder, '/') = 0;
+	if (j->flushes)
+		return error_set(e, EAGAIN, "%s: is being flushed", j->path);
+	if (!read_at(j->fd, &h, sizeof h, 0) || !head_fits(&h, h.job, j->generation))
+		return fault(j, EIO, e);
+	int fd = disk_open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
+	int rc = fd < 0 ? fault(j, errno, e) : disk_write_all(fd, &h, sizeof h) ? fault(j, errno ? errno : ENOSPC, e) : copy_records(j, fd, e);
+	if (!rc && disk_write_all(fd, j->tail.bytes, j->tail.size))
+		rc = fault(j, errno ? errno : ENOSPC, e);
+	if (!rc && (disk_fsync(fd) || disk_rename(path, j->path)))
+		rc = fault(j, errno, e);
+	if (!rc)
+		rc = disk_sync_folder(folder, e);
+	if (rc) { /* with its name or without it: it holds all that was acknowledged */
+		if (fd >= 0)
+			disk_close(fd);
+		disk_unlink(path);
+		return rc;
+	}
+	disk_close(j->fd);
+	j->fd = fd;
+	j->bytes += j->tail.size;
+	j->synced = j->bytes;
+	j->tail.size = 0;
+	j->bad = false;
 	return 0;
 }
 
 uint64_t journal_bytes(const struct journal *j)
 {
-	return j->bytes;
+	return j->bytes + j->tail.size;
 }
 
 uint64_t journal_generation(const struct journal *j)
@@ -254,13 +339,21 @@ uint64_t journal_generation(const struct journal *j)
 
 int journal_sync(struct journal *j, struct error *e)
 {
-	uint64_t bytes = j->bytes;
-	if (bytes == j->synced)
+	int rc = 0;
+	if (j->settled)
 		return 0;
-	if (disk_fdatasync(j->fd))
-		return fault(j, errno, e);
-	j->synced = bytes;
-	return 0;
+	atomic_fetch_add(&j->flushes, 1); /* before it is asked whether it is bad: a bad one may be renewed at any time */
+	uint64_t bytes = j->bytes;
+	if (j->bad) {
+		rc = fault(j, EIO, e);
+	} else if (bytes != j->synced && disk_fdatasync(j->fd)) {
+		rc = fault(j, errno, e);
+		j->bad = true;
+	} else {
+		j->synced = bytes;
+	}
+	atomic_fetch_sub(&j->flushes, 1);
+	return rc;
 }
 
 void journal_clear(const char *folder, uint64_t keep)
@@ -273,9 +366,10 @@ void journal_clear(const char *folder, uint64_t keep)
 		if (sscanf(f->d_name, "journal.%llu", &generation) != 1 || generation == keep)
 			continue;
 		snprintf(again, sizeof again, "journal.%llu", generation);
-		if (strcmp(again, f->d_name) != 0)
+		size_t n = strlen(again);
+		if (strncmp(again, f->d_name, n) != 0 || (f->d_name[n] && strcmp(f->d_name + n, ".new") != 0))
 			continue;
-		snprintf(path, sizeof path, "%s/%s", folder, again);
+		snprintf(path, sizeof path, "%s/%s", folder, f->d_name);
 		disk_unlink(path);
 	}
 	if (d)

@@ -4,7 +4,11 @@
  * lease whose result was acknowledged is not handed out again), results that were said to be there; and the image has the bits of
  * an undisturbed run, which it has not if a batch is missing or counted twice.
  *
+ * Then single calls fail, the n-th one of a run, in several ways: nothing crashes, what is refused is refused with a sentence and taken
+ * later, what was acknowledged stays, and the images have the same bits.
+ *
  * HSLT_POWER_SEEDS: so many runs (default 150; FULL=1: 4000). HSLT_POWER_SEED: this one alone, with the coordinator's log.
+ * HSLT_FAULT, HSLT_FAULT_AT: this kind, at this call alone. HSLT_FAULT_STEP: every so many calls (default 72; FULL=1: each).
  */
 #include "common/base/log.h"
 #include "common/base/mem.h"
@@ -50,7 +54,8 @@ struct farm_run {
 	struct job jobs[IDS_MAX];
 	uint64_t accepted;
 	struct scripted *client, *worker;
-	uint64_t losses, acks;
+	uint64_t losses, acks, refused, failed;
+	bool faulty; /* calls fail: what is refused with a sentence is tried again */
 };
 
 static _Atomic uint64_t *counts, *totals; /* of this share; of all: losses, batches acknowledged, sectors and names lost */
@@ -59,6 +64,7 @@ static pid_t others[SHARES];
 static struct exr_image reference;
 static bool has_reference, loud;
 static uint64_t quiet_calls; /* of an undisturbed run, that change something */
+static char running[64]; /* the run that is under way; "": none */
 static char port_file[80], root[80], after[80];
 
 /* ---- a life ---- */
@@ -74,6 +80,7 @@ static void serve(const struct farm_run *f)
 	c.port_file = port_file;
 	c.journal_bytes = 2000;
 	c.blob_bytes = 1 << 20;
+	c.retry_seconds = 0.01;
 	log_set_level(LOG_LEVEL_DEBUG);
 	if (!loud && !freopen("/dev/null", "w", stderr))
 		_exit(1);
@@ -115,7 +122,7 @@ static bool start(struct farm_run *f)
 		}
 		int code = gone(f, false);
 		if (code) {
-			assert_int_equal(code, LOSSY_EXIT);
+			assert_int_equal(code, f->faulty ? 1 : LOSSY_EXIT);
 			return false;
 		}
 		usleep(500);
@@ -172,12 +179,17 @@ static void check_image(const unsigned char *bytes, size_t size)
 }
 
 /* false: it hung up. */
-static bool fetch(struct farm_run *f, uint64_t id)
+static bool fetch(struct farm_run *f, uint64_t id, bool *there)
 {
 	const Farm__Envelope *m = ask(f->client, scripted_fetch(f->client, id, FARM__WHAT__WHAT_RESULT));
 	if (!m)
 		return false;
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_FETCH_CHUNK);
+	if (f->faulty && *m->fetch_chunk->error) {
+		*there = false;
+		f->refused++;
+		return true;
+	}
 	assert_string_equal(m->fetch_chunk->error, "");
 	check_image(f->client->reader.payload.bytes, f->client->reader.payload.size);
 	return true;
@@ -194,6 +206,13 @@ static bool look(struct farm_run *f)
 	for (size_t i = 0; i < m->job_list_answer->n_jobs; i++) {
 		const Farm__JobStatus *j = m->job_list_answer->jobs[i];
 		assert_true(j->job < IDS_MAX);
+		if (f->faulty && f->jobs[j->job].submitted && strcmp(j->state, "failed") == 0) {
+			print_message("j%llu failed: %s\n", (unsigned long long)j->job, j->why);
+			assert_true(*j->why != 0);
+			f->jobs[j->job].submitted = false;
+			f->accepted--;
+			f->failed++;
+		}
 		if (f->jobs[j->job].submitted && (strcmp(j->state, "failed") == 0 || strcmp(j->state, "cancelled") == 0))
 			fail_msg("j%llu is %s: %s", (unsigned long long)j->job, j->state, j->why);
 		seen[j->job] = true;
@@ -205,7 +224,7 @@ static bool look(struct farm_run *f)
 			fail_msg("j%llu is lost", (unsigned long long)id);
 		if (j->announced && !done[id])
 			fail_msg("j%llu was done", (unsigned long long)id);
-		if (done[id] && !fetch(f, id))
+		if (done[id] && !fetch(f, id, &done[id]))
 			return false;
 		j->announced = done[id] && j->submitted;
 	}
@@ -222,6 +241,10 @@ static bool submit(struct farm_run *f)
 	if (!m)
 		return false;
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_SUBMIT_ANSWER);
+	if (*m->submit_answer->refusal && f->faulty) {
+		f->refused++;
+		return true;
+	}
 	if (*m->submit_answer->refusal)
 		fail_msg("%s", m->submit_answer->refusal);
 	assert_in_range(m->submit_answer->job, 1, IDS_MAX - 1);
@@ -260,6 +283,10 @@ static void take_ack(struct farm_run *f, const Farm__LeaseAck *a)
 	struct lease_key k;
 	struct error e;
 	assert_int_equal(lease_key_from_wire(a->key, &k, &e), 0);
+	if (a->verdict == FARM__VERDICT__VERDICT_REFUSED && f->faulty) {
+		f->refused++;
+		return;
+	}
 	if (a->verdict == FARM__VERDICT__VERDICT_REFUSED)
 		fail_msg("refused: %s", a->text);
 	f->jobs[k.job].acked[lease_index(&f->plan, &k)] = true;
@@ -285,7 +312,11 @@ static bool work(struct farm_run *f)
 			return false;
 	if (!scripted_want(f->worker, 3))
 		return false;
-	while (!all_announced(f)) {
+	for (int turns = 0; !all_announced(f) || f->accepted < JOBS; turns++) {
+		assert_true(turns < 4000);
+		while (f->accepted < JOBS)
+			if (!submit(f))
+				return false;
 		if (!scripted_has(f->worker, 5)) {
 			if (!look(f))
 				return false;
@@ -385,6 +416,36 @@ static void quiet_run(void)
 	assert_true(has_reference && f.acks > 0);
 }
 
+/* Calls fail, from the n-th on; then all is well again, the power goes, and all that was acknowledged is there. */
+static void run_faults(uint64_t from, uint64_t count, int with, bool writes_only, uint64_t *refused, uint64_t *failed)
+{
+	static struct farm_run f;
+	begin(&f, from);
+	f.disk.fail_from = from;
+	f.disk.fail_count = count;
+	f.disk.fail_with = with;
+	f.disk.fail_writes_only = writes_only;
+	f.faulty = true;
+	for (int life = 0;; life++) {
+		assert_true(life < 3);
+		atomic_store(&counts[4], 0);
+		if (start(&f)) {
+			assert_true(work(&f));
+			break;
+		}
+		f.disk.fail_from = 0; /* it did not start, and said why */
+		f.refused++;
+	}
+	stop_in_the_dark(&f);
+	f.disk.fail_from = 0;
+	f.faulty = false;
+	atomic_store(&counts[4], 0);
+	assert_true(start(&f) && work(&f));
+	stop(&f);
+	*refused += f.refused;
+	*failed += f.failed;
+}
+
 static uint64_t number(const char *name, uint64_t otherwise)
 {
 	const char *text = getenv(name);
@@ -447,9 +508,10 @@ static void power_goes_at_any_time(void **state)
 	loud = one != 0;
 	atomic_store(&counts[3], 0);
 	for (uint64_t seed = one ? one : 1 + share; seed <= (one ? one : seeds); seed += one ? 1 : SHARES) {
-		print_message("seed %llu\n", (unsigned long long)seed);
+		snprintf(running, sizeof running, "HSLT_POWER_SEED=%llu", (unsigned long long)seed);
 		run_seed(seed, &losses, &acks);
 	}
+	running[0] = 0;
 	totals[0] += losses;
 	totals[1] += acks;
 	totals[2] += atomic_load(&counts[3]);
@@ -461,10 +523,48 @@ static void power_goes_at_any_time(void **state)
 		       (unsigned long long)totals[2], (unsigned long long)totals[1]);
 }
 
+static void calls_fail_at_any_time(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *name;
+		int with;
+		uint64_t count;
+		bool writes_only;
+	} kinds[] = {{"EIO", EIO, 1, false}, {"ENOSPC", ENOSPC, 40, true}, {"EMFILE", EMFILE, 1, false}, {"EROFS", EROFS, 10, false}};
+	uint64_t one = number("HSLT_FAULT_AT", 0), step = number("FULL", 0) ? SHARES : number("HSLT_FAULT_STEP", 18 * SHARES);
+	if (number("HSLT_POWER_SEED", 0))
+		skip();
+	quiet_run();
+	loud = one != 0;
+	uint64_t calls = atomic_load(&counts[1]);
+	for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
+		uint64_t refused = 0, failed = 0, runs = 0;
+		if (getenv("HSLT_FAULT") && strcmp(getenv("HSLT_FAULT"), kinds[k].name) != 0)
+			continue;
+		for (uint64_t from = one ? one : 1 + share + SHARES * k; from < (one ? one + 1 : calls); from += step, runs++) {
+			snprintf(running, sizeof running, "HSLT_FAULT=%s HSLT_FAULT_AT=%llu", kinds[k].name, (unsigned long long)from);
+			run_faults(from, kinds[k].count, kinds[k].with, kinds[k].writes_only, &refused, &failed);
+		}
+		running[0] = 0;
+		print_message("   %s at %llu of %llu calls: %llu refusals, %llu jobs failed and said so\n", kinds[k].name, (unsigned long long)runs,
+			      (unsigned long long)calls, (unsigned long long)refused, (unsigned long long)failed);
+	}
+}
+
+static int tear_down(void **state)
+{
+	if (*running)
+		print_error("failed: %s\n", running);
+	running[0] = 0;
+	return folder_tear_down(state);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test_setup_teardown(power_goes_at_any_time, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(power_goes_at_any_time, folder_set_up, tear_down),
+		cmocka_unit_test_setup_teardown(calls_fail_at_any_time, folder_set_up, tear_down),
 	};
 	size_t size = (SHARES + 1) * LOSSY_COUNTS * sizeof *counts;
 	counts = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);

@@ -219,7 +219,8 @@ static void others_are_cleared(void **state)
 	assert_int_equal(access(path, F_OK), -1);
 }
 
-/* A disk that takes no more: the record leaves nothing behind, and what was there stays. */
+/* A disk that takes no more: what was there stays, and what was appended comes when there is room, in a new file: the old one is
+ * not believed again. */
 static void no_room(void **state)
 {
 	(void)state;
@@ -235,13 +236,26 @@ static void no_room(void **state)
 	small = (struct rlimit){ends[RECORDS] + 40, old.rlim_max};
 	assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
 	char body[100] = {0};
-	assert_int_equal(journal_append(j, JOURNAL_BATCH, 9, body, sizeof body, NULL, 0, &e), -EFBIG);
+	assert_int_equal(journal_append(j, JOURNAL_BATCH, 9, body, sizeof body, NULL, 0, &e), 0);
+	assert_true(journal_is_bad(j));
+	assert_int_equal(journal_renew(j, &e), -EFBIG);
 	assert_int_equal(setrlimit(RLIMIT_FSIZE, &old), 0);
-	assert_int_equal(journal_bytes(j), ends[RECORDS]);
-	journal_release(j);
-	assert_int_equal(open_again(&j, &s, &cut), 0);
+	assert_true(journal_sync(j, &e) != 0 && journal_reserve(j, 1, &e) != 0);
+	struct journal *other;
+	assert_int_equal(open_again(&other, &s, &cut), 0);
 	assert_int_equal(s.count, RECORDS);
 	assert_int_equal(cut, 0);
+	journal_release(other);
+	assert_int_equal(journal_append(j, JOURNAL_BATCH, 10, body, 3, NULL, 0, &e), 0);
+	assert_int_equal(journal_renew(j, &e), 0);
+	assert_false(journal_is_bad(j));
+	assert_int_equal(journal_sync(j, &e), 0);
+	uint64_t bytes = journal_bytes(j);
+	assert_true(bytes > ends[RECORDS] + sizeof body);
+	journal_release(j);
+	assert_int_equal(open_again(&j, &s, &cut), 0);
+	assert_int_equal(s.count, RECORDS + 2);
+	assert_int_equal(journal_bytes(j), bytes);
 	journal_release(j);
 }
 
