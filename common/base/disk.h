@@ -13,6 +13,7 @@
 #include "common/base/error.h"
 
 #include <dirent.h>
+#include <fcntl.h>
 #include <stddef.h>
 #include <sys/stat.h>
 #include <sys/types.h>
@@ -99,6 +100,11 @@ static inline int disk_fdatasync(int fd)
 	return disk_calls->fdatasync(fd);
 }
 
+/* What is on the disk need not stay in memory: it is read again after a crash only. */
+static inline void disk_forget(int fd)
+{
+	posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
+}
 static inline int disk_rename(const char *from, const char *to)
 {
 	return disk_calls->rename(from, to);

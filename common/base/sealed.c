@@ -63,6 +63,8 @@ int sealed_finish(struct sealed *s, struct error *e)
 		rc = flush(s, e);
 	if (!rc && disk_fsync(s->fd))
 		rc = fault(s, errno, e);
+	if (!rc)
+		disk_forget(s->fd);
 	if (disk_close(s->fd) && !rc)
 		rc = fault(s, errno, e);
 	mem_free(s->buffer);

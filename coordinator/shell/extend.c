@@ -214,6 +214,7 @@ void extend_job(struct session *p, const struct extension *x)
 	char text[256] = "";
 	if (must_wait(o)) {
 		p->wants = *x;
+		p->server->extend_waits = true;
 		return;
 	}
 	p->rejected[0] = 0;
@@ -231,11 +232,14 @@ void extend_job(struct session *p, const struct extension *x)
 
 void extend_waiting(struct server *s)
 {
+	if (!s->extend_waits)
+		return;
+	s->extend_waits = false;
 	for (struct session *p = s->sessions; p; p = p->next) {
 		struct extension x = p->wants;
-		if (!x.job || must_wait(server_order(s, x.job)))
+		if (!x.job)
 			continue;
 		p->wants.job = 0;
-		extend_job(p, &x);
+		extend_job(p, &x); /* which may let it wait on */
 	}
 }

@@ -89,6 +89,7 @@ struct server {
 	struct status_socket *status;
 	bool stepping, stopping;
 	bool checkpointing; /* of some job, by the pool */
+	bool extend_waits;  /* some session's extension does */
 	double tls_next; /* when its files are looked at again */
 	double watchdog, watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */
 	uint64_t changes; /* grows with whatever the status shows */

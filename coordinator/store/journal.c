@@ -351,6 +351,7 @@ int journal_sync(struct journal *j, struct error *e)
 		j->bad = true;
 	} else {
 		j->synced = bytes;
+		disk_forget(j->fd);
 	}
 	atomic_fetch_sub(&j->flushes, 1);
 	return rc;
