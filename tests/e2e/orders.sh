@@ -121,6 +121,23 @@ done_in 60 "$f"
 job fetch "$f"
 same "$DIR/tighter.exr" "$DIR/target.exr"
 
+# what went wrong is counted over restarts and ends
+start_worker twice --test-repeat
+h=$(submit "$BOX" -o "$DIR/h.exr" --integrator path --spp 500)
+repeated() {
+	[ "$(value "$1" repeats)" -ge "$2" ]
+}
+until_true 60 repeated "$h" 5 || fail "nothing of $h is repeated"
+sleep 0.5 # they are written down now and then
+again
+repeated "$h" 5 || fail "$h had 5 repeats, and after a restart $(value "$h" repeats)"
+stop $WORKER
+done_in 60 "$h"
+count=$(value "$h" repeats)
+job extend "$h" --spp +100
+repeated "$h" "$count" || fail "$h had $count repeats, and when it goes on $(value "$h" repeats)"
+done_in 60 "$h"
+
 # what cannot be said yes to
 g=$(submit "$BOX" -o "$DIR/g.exr" --integrator path --spp 20000)
 job cancel "$g"
