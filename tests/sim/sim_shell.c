@@ -122,6 +122,13 @@ static uint64_t undisturbed_sum(const struct sim_job *j, uint64_t rounds)
 	return sum;
 }
 
+/* A job whose time is over is looked at once more, and may then end by its error after any number of rounds. */
+static bool ended_by_time(enum job_end end, const struct sim_job *j)
+{
+	bool over = j->plan.seconds > 0 && j->elapsed >= j->plan.seconds;
+	return end == END_TIME || (end == END_ERROR && over && sim_error_after(j, j->rounds) <= j->plan.target_error);
+}
+
 static void ended(struct world *w, const struct action *a, struct sim_job *j)
 {
 	if (j->over)
@@ -147,7 +154,7 @@ static void ended(struct world *w, const struct action *a, struct sim_job *j)
 		return;
 	if (s.rounds != j->rounds)
 		sim_wrong(w, "the core counts %" PRIu64 " rounds, the canvas %" PRIu64, s.rounds, j->rounds);
-	if (a->end != END_TIME && j->rounds != sim_undisturbed_rounds(j))
+	if (!ended_by_time(a->end, j) && j->rounds != sim_undisturbed_rounds(j))
 		sim_wrong(w, "ended after %" PRIu64 " rounds, undisturbed %" PRIu64, j->rounds, sim_undisturbed_rounds(j));
 	uint64_t sum = 0;
 	for (uint64_t r = 0; r < j->rounds; r++)
