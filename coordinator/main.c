@@ -27,7 +27,7 @@ static const char doc[] =
 
 enum {
 	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS,
-	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_KEEP, OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE, OPTION_BANDWIDTH, OPTION_CONNECTIONS,
+	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_KEEP, OPTION_DAYS, OPTION_GB, OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE, OPTION_BANDWIDTH, OPTION_CONNECTIONS,
 	OPTION_GROUP
 };
 
@@ -45,6 +45,8 @@ static const struct argp_option options[] = {
 	{"journal", OPTION_JOURNAL, "MB", 0, "Results of a running job that are kept before its films are written in their place (64)", 0},
 	{"connections", OPTION_CONNECTIONS, "N", 0, "At once, at most (10000, or as many as there are file descriptors)", 0},
 	{"keep-films", OPTION_KEEP, "MB", 0, "Films of jobs that are done, for hslt-job extend; the oldest go (2000)", 0},
+	{"keep-days", OPTION_DAYS, "N", 0, "Results of finished jobs; their records ten times as long; 0: for ever (30)", 0},
+	{"keep-gb", OPTION_GB, "N", 0, "Of all finished jobs together: films go first, then results, the oldest first; 0: any (0)", 0},
 	{"worker-bandwidth", OPTION_BANDWIDTH, "MB/S", 0,
 	 "Tiles that one thread of a worker may send on average: epochs of new jobs are at least that long (any)", 0},
 	{"quota-jobs", OPTION_JOBS, "N", 0, "Jobs of a client that have not ended", 0},
@@ -110,6 +112,12 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_KEEP:
 		c->keep_bytes = (uint64_t)(1e6 * number(state, "--keep-films", arg, 0, 1e9));
+		return 0;
+	case OPTION_DAYS:
+		c->clear_seconds = 86400 * number(state, "--keep-days", arg, 0, 1e6);
+		return 0;
+	case OPTION_GB:
+		c->clear_bytes = (uint64_t)(1e9 * number(state, "--keep-gb", arg, 0, 1e9));
 		return 0;
 	case OPTION_BANDWIDTH:
 		c->worker_bandwidth = 1e6 * number(state, "--worker-bandwidth", arg, 1e-6, 1e6);

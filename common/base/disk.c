@@ -43,6 +43,7 @@ const struct disk disk_system = {
 	.rename = rename,
 	.unlink = unlink,
 	.mkdir = mkdir,
+	.rmdir = rmdir,
 	.stat = system_stat,
 	.fstat = system_fstat,
 	.touch = system_touch,

@@ -34,6 +34,7 @@ struct disk {
 	int (*rename)(const char *from, const char *to);
 	int (*unlink)(const char *path);
 	int (*mkdir)(const char *path, mode_t mode);
+	int (*rmdir)(const char *path);
 	int (*stat)(const char *path, struct stat *st); /* of a link: the link's */
 	int (*fstat)(int fd, struct stat *st);
 	int (*touch)(const char *path);
@@ -118,6 +119,11 @@ static inline int disk_unlink(const char *path)
 static inline int disk_mkdir(const char *path, mode_t mode)
 {
 	return disk_calls->mkdir(path, mode);
+}
+
+static inline int disk_rmdir(const char *path)
+{
+	return disk_calls->rmdir(path);
 }
 
 static inline int disk_stat(const char *path, struct stat *st)

@@ -46,6 +46,7 @@
 	X(WORLD_BUILT, "world_built", INFO) \
 	X(WORLD_FAILED, "world_failed", ERROR) \
 	X(CHECKPOINT, "checkpoint", INFO) \
+	X(JOB_CLEARED, "job_cleared", INFO) \
 	X(SPOOL_READ, "spool_read", INFO) \
 	X(SPOOL_FAULT, "spool_fault", ERROR)
 

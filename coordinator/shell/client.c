@@ -11,6 +11,7 @@
 #include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
+#include <time.h>
 
 enum { CHUNK = 1 << 20, HEADER_LIMIT = 1 << 20 };
 static const double preview_seconds = 5; /* a younger one is good enough */
@@ -276,6 +277,16 @@ static const char *file_of(Farm__What what)
 	}
 }
 
+static int cleared(const struct job_record *r, struct error *e)
+{
+	char day[32];
+	struct tm t;
+	time_t at = (time_t)r->cleared;
+	strftime(day, sizeof day, "%Y-%m-%d", gmtime_r(&at, &t));
+	return error_set(e, ENOENT, "job j%llu: its result was cleared on %s, by --keep-days or --keep-gb of the coordinator",
+			 (unsigned long long)r->id, day);
+}
+
 static int fetch(struct session *p, const Farm__Fetch *f, Farm__FetchChunk *chunk, struct job_view *v, unsigned char *bytes,
 		 size_t *count, struct error *e)
 {
@@ -285,6 +296,8 @@ static int fetch(struct session *p, const Farm__Fetch *f, Farm__FetchChunk *chun
 		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)f->job);
 	if (!file)
 		return error_set(e, EINVAL, "there is nothing of that kind to fetch");
+	if (f->what == FARM__WHAT__WHAT_RESULT && v->record.cleared > 0)
+		return cleared(&v->record, e);
 	if (f->what == FARM__WHAT__WHAT_RESULT && !v->record.has_result)
 		return error_set(e, ENOENT, "job j%llu is %s: it has no result", (unsigned long long)f->job, v->record.state);
 	spool_job_path(p->server->spool, f->job, file, path);
@@ -308,6 +321,8 @@ static void answer_fetch(struct session *p, const Farm__Fetch *f)
 	chunk.error = e.text;
 	if (fetch(p, f, &chunk, &v, bytes, &count, &e) == 0)
 		chunk.output = v.record.output;
+	p->fetching = !*e.text && chunk.offset + count < chunk.size ? f->job : 0;
+	p->fetched = server_now(p->server);
 	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
 	m.fetch_chunk = &chunk;
 	session_send(p, &m, bytes, count);

@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/film/exr.h"
+#include "coordinator/shell/clear.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/keep.h"
 #include "coordinator/shell/publish.h"
@@ -263,6 +264,7 @@ static void finish(struct server *s, struct order *o)
 		if (p->state == SESSION_WORKER)
 			session_send_job_end(p, o->id);
 	keep_trim(s);
+	clear_soon(s);
 	order_release_blobs(order_submit(o), s->blobs);
 	struct order **at = &s->orders;
 	while (*at != o)

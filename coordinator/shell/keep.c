@@ -68,7 +68,7 @@ void keep_drop(const struct server *s, uint64_t job)
 	disk_unlink(path);
 }
 
-static uint64_t bytes_of(const struct server *s, uint64_t job)
+uint64_t keep_bytes(const struct server *s, uint64_t job)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
 	uint64_t sum = 0;
@@ -90,7 +90,7 @@ bool keep_drop_all(const struct server *s)
 {
 	bool any = false;
 	for (size_t i = 0; i < s->ended_count; i++)
-		if (bytes_of(s, s->ended[i].id)) {
+		if (keep_bytes(s, s->ended[i].id)) {
 			keep_drop(s, s->ended[i].id);
 			any = true;
 		}
@@ -101,7 +101,7 @@ void keep_trim(const struct server *s)
 {
 	uint64_t left = s->config.keep_bytes;
 	for (size_t i = s->ended_count; i-- > 0;) { /* the latest ones first */
-		uint64_t bytes = bytes_of(s, s->ended[i].id);
+		uint64_t bytes = keep_bytes(s, s->ended[i].id);
 		if (bytes > left)
 			keep_drop(s, s->ended[i].id);
 		else

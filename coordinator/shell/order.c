@@ -11,6 +11,8 @@
 #include <string.h>
 #include <time.h>
 
+static const uint64_t log_most = 16 << 20;
+
 const Farm__Submit *order_submit(const struct order *o)
 {
 	return o->submit.message->submit;
@@ -78,6 +80,9 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 	o->log = rc ? -1 : disk_open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
 	if (!rc && o->log < 0)
 		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	struct stat st;
+	if (!rc && disk_fstat(o->log, &st) == 0)
+		o->log_bytes = (uint64_t)st.st_size;
 	if (rc) {
 		*submit = o->submit;
 		memset(&o->submit, 0, sizeof o->submit);
@@ -119,6 +124,11 @@ void order_log(struct order *o, enum log_event event, const char *fields, ...)
 	log_format(line, sizeof line - 1, event, text);
 	size_t size = strlen(line);
 	line[size++] = '\n';
+	if (o->log_bytes >= log_most)
+		return;
+	o->log_bytes += size;
+	if (o->log_bytes >= log_most)
+		size = (size_t)snprintf(line, sizeof line, "the log of this job is full: the coordinator's has the rest\n");
 	int rc = disk_write_all(o->log, line, size); /* the log of all jobs has the line, too */
 	(void)rc;
 }

@@ -48,6 +48,7 @@ struct order {
 	struct chain_state **states; /* [groups x parts]; NULL entries: no epoch merged yet */
 	uint32_t chains_per_lease;
 	int log; /* a file descriptor */
+	uint64_t log_bytes;
 	struct journal *journal; /* NULL: it cannot be written any more */
 	bool pinned;             /* the journal knows whose it is */
 	struct job_counts counts; /* as they were written down last */

@@ -5,6 +5,7 @@
 #include "common/base/text.h"
 #include "common/net/notify.h"
 #include "coordinator/shell/checkpoint.h"
+#include "coordinator/shell/clear.h"
 #include "coordinator/shell/digest.h"
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
@@ -26,7 +27,7 @@ enum { BACKLOG = 4096, TICK_MS = 200 };
 
 void server_config_init(struct server_config *c)
 {
-	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .retry_seconds = 2,  .max_faults = 3,
+	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .retry_seconds = 2, .clear_seconds = 30 * 86400.0,  .max_faults = 3,
 				    .journal_bytes = 64 << 20, .keep_bytes = 2000000000, .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
 }
 
@@ -382,6 +383,7 @@ static void on_tick(uv_timer_t *t)
 		session_tick(p);
 	status_tick(s->status);
 	durable_tick(s);
+	clear_tick(s);
 	checkpoint_where_due(s);
 	if (s->watchdog > 0 && server_now(s) >= s->watchdog_next) {
 		s->watchdog_next = server_now(s) + s->watchdog / 3;

@@ -24,6 +24,8 @@ struct server_config {
 	bool insecure;
 	struct quota quota; /* of each client */
 	uint64_t blob_bytes; /* the spool's limit of scene files; 0: none */
+	double clear_seconds; /* results of finished jobs are kept so long; 0: for ever */
+	uint64_t clear_bytes; /* of all finished jobs, their films included; 0: any */
 	uint64_t keep_bytes; /* of films of jobs that are done, so that they can be extended; 0: none are kept */
 	double retry_seconds; /* between tries of what the disk did not take */
 	uint64_t journal_bytes; /* a job's journal that is longer is cut by a checkpoint */
@@ -84,6 +86,7 @@ struct server {
 	struct durable_ack *parked;            /* ... for a journal that failed to be a good one again */
 	struct ending *endings;                /* jobs that ended and whose records could not be written yet */
 	double endings_again;
+	double clear_next; /* when finished jobs are looked at again */
 	bool flushing;
 	uint64_t last_peer;
 	struct status_socket *status;

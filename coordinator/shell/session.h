@@ -25,6 +25,8 @@ struct session {
 	uint32_t payload_limit;
 	struct upload *upload; /* a submission that waits for blobs */
 	uint64_t watched;      /* job; 0: none */
+	uint64_t fetching;     /* job of which it has not got all of a file yet; 0: none */
+	double fetched;        /* s on the loop's clock: its last piece */
 	uint64_t wants_preview; /* job whose preview is being made for it; 0: none */
 	struct job_view *shown; /* what the watcher saw last */
 	struct extension wants; /* it waits until nobody reads the job's films; job 0: none */

@@ -132,6 +132,7 @@ char *record_to_json(const struct job_record *r)
 			      "relError", r->rel_error, "counts", record_counts(r), /* */
 			      "mixture", r->mixture, "note", r->note, "strategies", record_strategies(r));
 	json_object_set_new(o, "owner", json_string(r->owner));
+	json_object_set_new(o, "cleared", json_real(r->cleared));
 	json_object_set_new(o, "extended", json_integer((json_int_t)r->extended));
 	json_object_set_new(o, "verify", json_real(r->verify));
 	json_object_set_new(o, "agreement", agreement_to_json(&r->agreement));
@@ -175,6 +176,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	r->priority = (int)json_integer_value(json_object_get(o, "priority"));
 	r->exit_code = (uint32_t)json_integer_value(json_object_get(o, "exitCode"));
 	r->has_result = json_is_true(json_object_get(o, "result"));
+	r->cleared = json_number_value(json_object_get(o, "cleared"));
 	r->verify = json_number_value(json_object_get(o, "verify"));
 	r->submitted = json_number_value(json_object_get(o, "submitted"));
 	r->ended = json_number_value(json_object_get(o, "ended"));

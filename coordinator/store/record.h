@@ -29,6 +29,7 @@ struct job_record {
 	int priority;
 	uint32_t exit_code; /* of a program that waited */
 	bool has_result;
+	double cleared; /* its result was, s since 1970; 0: it was not */
 	uint64_t extended;  /* how often it went on after its end, as the ledger counts */
 	double submitted, ended; /* seconds since 1970; 0: not yet */
 	double progress;

@@ -508,6 +508,16 @@ static int do_mkdir(const char *path, mode_t mode)
 	return (int)out(rc);
 }
 
+static int do_rmdir(const char *path)
+{
+	if (is_refused(LOSSY_REMOVES))
+		return -1;
+	int rc = rmdir(path);
+	if (!rc)
+		lossy_removed(path);
+	return (int)out(rc);
+}
+
 static int do_stat(const char *path, struct stat *st)
 {
 	return is_refused(LOSSY_READS) ? -1 : (int)out(lstat(path, st));
@@ -539,7 +549,7 @@ static DIR *do_opendir(const char *path)
 
 static const struct disk door = {
 	do_open,  do_close,  do_read,   do_pread,  do_write, do_pwritev, do_ftruncate, do_fallocate, do_posix_fallocate, do_fsync,
-	do_fsync, do_rename, do_unlink, do_mkdir,  do_stat,  do_fstat,   do_touch,     do_flock,     do_opendir,
+	do_fsync, do_rename, do_unlink, do_mkdir,  do_rmdir, do_stat,  do_fstat,   do_touch,     do_flock,     do_opendir,
 };
 
 /* ---- the start: all that is there is safe ---- */

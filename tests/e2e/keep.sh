@@ -1,0 +1,33 @@
+# Results of finished jobs go by age and by space, and who asks for one hears when it went; a living job keeps all.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
+
+JOB="--integrator path --size 64x48 --spp 4"
+start_coordinator --keep-gb 0.00000001
+start_worker w1
+first=$(submit "$BOX" -o "$DIR/first.exr" $JOB --wait)
+[ -s "$DIR/first.exr" ] || fail "what somebody waits for is gone before it is fetched"
+until_true 20 test ! -e "$DIR/spool/jobs/j1/result.exr" || fail "ten bytes are kept, and its result is still there"
+stop $COORDINATOR_PID
+
+LISTEN=$COORDINATOR start_coordinator
+second=$(submit "$BOX" -o "$DIR/second.exr" $JOB)
+until_true 30 is_state j2 done || fail "j2 is $(value j2 state)"
+stop $COORDINATOR_PID
+LISTEN=$COORDINATOR start_coordinator
+sleep 1
+[ -s "$DIR/spool/jobs/j2/result.exr" ] || fail "thirty days are less than a second"
+"$BIN/hslt-job" fetch j2
+stop $COORDINATOR_PID
+
+LISTEN=$COORDINATOR start_coordinator --keep-days 0.00001
+until_true 20 test ! -e "$DIR/spool/jobs/j2/result.exr" || fail "its result is still there"
+for j in j1 j2; do
+	if "$BIN/hslt-job" fetch $j -o "$DIR/none.exr" 2>"$DIR/fetch.log"; then
+		fail "$j was fetched"
+	fi
+	grep -q "$j: its result was cleared on 20[0-9][0-9]-" "$DIR/fetch.log" || fail "it says: $(cat "$DIR/fetch.log")"
+	is_state $j done || fail "$j is $(value $j state)"
+	grep -q "event=job_cleared job=$j what=result" "$DIR/coordinator.log" || fail "the log does not say that $j went"
+done
+echo "two results went, by space and by age, and who asks is told"
