@@ -241,8 +241,8 @@ static void print_workers(const json_t *snapshot)
 	const json_t *worker;
 	json_array_foreach(json_object_get(snapshot, "workers"), i, worker) {
 		if (i == 0)
-			printf("\n%-24s %-8s %7s %6s %8s %s\n", "WORKER", "STATE", "THREADS", "LEASES", "MERGED", "LAST FAULT");
-		printf("%-24s %-8s %7.0f %6.0f %8.0f %s\n", text_of(worker, "name"), text_of(worker, "state"),
+			printf("\n%-24s %-8s %5s %7s %6s %8s %s\n", "WORKER", "STATE", "START", "THREADS", "LEASES", "MERGED", "LAST FAULT");
+		printf("%-24s %-8s %5.0f %7.0f %6.0f %8.0f %s\n", text_of(worker, "name"), text_of(worker, "state"), number_of(worker, "restarts"),
 		       number_of(worker, "threads"), number_of(worker, "leases"), number_of(worker, "merged"),
 		       text_of(worker, "text"));
 	}

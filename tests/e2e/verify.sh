@@ -1,6 +1,6 @@
 # A worker whose results have one wrong bit, among honest ones: with --verify 1 the image is that of hslt-render, the liar is set
 # aside for good, and nothing of it counts as the job's failures. A share finds one that lies now and then. What was merged
-# unverified is said.
+# unverified is said. Before: what becomes of connections when a worker starts again.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-job hslt-compare
 export HSLT_TEST=1
@@ -21,6 +21,9 @@ if (unset HSLT_TEST; "$BIN/hslt-worker" --coordinator 127.0.0.1:1 --test-lie 1) 
 	fail "a worker lies outside of tests"
 fi
 
+start_coordinator --heartbeat 5
+python3 "$HERE/lives.py" "${COORDINATOR#*:}" || fail "lives of workers"
+stop $COORDINATOR_PID
 start_coordinator
 start_worker honest1
 a=$WORKER

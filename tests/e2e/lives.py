@@ -1,0 +1,59 @@
+"""Lives of workers by hand: lives.py PORT fails when a later start does not take the place of the earlier one's open connection, when
+an earlier one is let in, or when strangers replace each other."""
+import os, re, socket, struct, sys
+
+here = os.path.dirname(os.path.abspath(__file__))
+VERSION = int(re.search(r"FARM_VERSION = (\d+)", open(here + "/../../common/wire/envelope.h").read()).group(1))
+
+
+def varint(n):
+    out = b""
+    while n > 127:
+        out += bytes([n & 127 | 128])
+        n >>= 7
+    return out + bytes([n])
+
+
+def field(number, value):
+    if isinstance(value, int):
+        return varint(number << 3) + varint(value)
+    return varint(number << 3 | 2) + varint(len(value)) + value
+
+
+def hello(name, home, start):
+    """The connection, and what it heard first."""
+    body = field(1, VERSION) + field(2, 1) + field(3, name) + field(4, b"by hand") + field(5, 1) + field(6, start) + field(7, home)
+    words = field(1, body)
+    s = socket.create_connection(("127.0.0.1", int(sys.argv[1])))
+    s.settimeout(5)
+    s.sendall(struct.pack(">II", len(words), 0) + words)
+    return s, s.recv(4096)
+
+
+def expect(what, heard, sentence):
+    if sentence not in heard:
+        sys.exit(f"{what}: it says {heard!r}")
+
+
+def is_open(s):
+    s.settimeout(0.3)
+    try:
+        return s.recv(4096) != b""
+    except socket.timeout:
+        return True
+
+
+first, heard = hello(b"w", b"ab12", 5)
+later, heard = hello(b"other", b"ab12", 6)
+expect("the earlier life", first.recv(4096), b"the same worker has called again")
+stale, heard = hello(b"w", b"ab12", 5)
+expect("a start before", heard, b"start 6 of it has been here before")
+again, heard = hello(b"other", b"ab12", 6)
+expect("the same life on its old connection", later.recv(4096), b"the same worker has called again")
+elsewhere, heard = hello(b"other", b"cd34", 1)
+nowhere, heard = hello(b"other", b"", 0)
+for what, s in (("the same life", again), ("one name, another home", elsewhere), ("one name, no home", nowhere)):
+    if not is_open(s):
+        sys.exit(f"{what} is hung up on")
+expect("a home of words", hello(b"w", b"../home", 1)[1], b"out of bounds")
+expect("a home that is too long", hello(b"w", b"0" * 40, 1)[1], b"out of bounds")
