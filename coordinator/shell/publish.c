@@ -111,6 +111,7 @@ static void cannot_write(struct publishing *w)
 static void has_written(struct order *o)
 {
 	o->record.has_result = true;
+	o->record.cleared = 0;
 	o->record.why[0] = 0;
 }
 

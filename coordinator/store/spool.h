@@ -1,5 +1,6 @@
 /*
- * The coordinator's folder: lock, next-job, blobs/, canvas/, jobs/jN/{job.json, journal.G, checkpoint, result.exr, log}, jobs.db. One coordinator a spool
+ * The coordinator's folder: lock, next-job, blobs/, canvas/, jobs.db, jobs/jN/{job.json, journal.G, checkpoint, order, result.exr,
+ * preview.exr, log}. Names are flushed with their folders (common/base/disk.h). One coordinator a spool
  * (a lock that the kernel drops when its holder dies). Files appear whole: temporary file, fsync, rename, fsync of the
  * folder. spool_write from any thread (of different files); the rest from one.
  */

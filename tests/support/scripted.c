@@ -18,7 +18,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { PATIENCE_MS = 10000 };
+enum { PATIENCE_MS = 60000 };
 
 bool scripted_say(const struct scripted *p, const Farm__Envelope *m, const void *payload, size_t payload_size)
 {

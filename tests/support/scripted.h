@@ -1,6 +1,6 @@
 /*
  * Peers of a coordinator, of a few lines each: a client, and a worker whose results depend on the lease alone and take no time.
- * Blocking, one thread. A coordinator that hangs up is an answer (NULL), one that says nothing for ten seconds fails the test.
+ * Blocking, one thread. A coordinator that hangs up is an answer (NULL), one that says nothing for a minute fails the test.
  */
 #ifndef TESTS_SUPPORT_SCRIPTED_H
 #define TESTS_SUPPORT_SCRIPTED_H

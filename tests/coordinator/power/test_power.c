@@ -111,7 +111,7 @@ static bool start(struct farm_run *f)
 	f->pid = fork();
 	if (f->pid == 0)
 		serve(f);
-	for (unsigned number = 0, i = 0; i < 20000; i++) {
+	for (unsigned number = 0, i = 0; i < 120000; i++) {
 		FILE *file = fopen(port_file, "r");
 		bool has = file && fscanf(file, "%u", &number) == 1;
 		if (file)
@@ -313,7 +313,7 @@ static bool work(struct farm_run *f)
 	if (!scripted_want(f->worker, 3))
 		return false;
 	for (int turns = 0; !all_announced(f) || f->accepted < JOBS; turns++) {
-		assert_true(turns < 4000);
+		assert_true(turns < 40000);
 		while (f->accepted < JOBS)
 			if (!submit(f))
 				return false;
@@ -503,6 +503,7 @@ static void power_goes_at_any_time(void **state)
 {
 	(void)state;
 	uint64_t seeds = number("HSLT_POWER_SEEDS", number("FULL", 0) ? 4000 : 150), one = number("HSLT_POWER_SEED", 0);
+	seeds = seeds / number("HSLT_TEST_SCALE", 1) + 1;
 	uint64_t losses = 0, acks = 0;
 	quiet_run();
 	loud = one != 0;
@@ -532,7 +533,7 @@ static void calls_fail_at_any_time(void **state)
 		uint64_t count;
 		bool writes_only;
 	} kinds[] = {{"EIO", EIO, 1, false}, {"ENOSPC", ENOSPC, 40, true}, {"EMFILE", EMFILE, 1, false}, {"EROFS", EROFS, 10, false}};
-	uint64_t one = number("HSLT_FAULT_AT", 0), step = number("FULL", 0) ? SHARES : number("HSLT_FAULT_STEP", 18 * SHARES);
+	uint64_t one = number("HSLT_FAULT_AT", 0), step = number("FULL", 0) ? SHARES : number("HSLT_FAULT_STEP", 18 * SHARES * number("HSLT_TEST_SCALE", 1));
 	if (number("HSLT_POWER_SEED", 0))
 		skip();
 	quiet_run();
