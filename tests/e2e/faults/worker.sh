@@ -56,7 +56,7 @@ stop_worker() {
 }
 one_worker_sleeps() {
 	kill -STOP "$WORKER"
-	until_true 30 has_said coordinator 'event=peer_closed .*name="w1"' $i || fail "$NAME: the silent worker is not missed"
+	until_true 30 has_said coordinator 'event=peer_closed .*name="w1"\|event=peer_fault .*nothing heard' $i || fail "$NAME: the silent worker is not missed"
 	kill -CONT "$WORKER"
 	until_true 30 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: it does not come back"
 }
