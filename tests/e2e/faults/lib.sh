@@ -113,6 +113,7 @@ end() {
 	if grep -l 'runtime error:\|ERROR: .*Sanitizer\|Assertion' "$DIR"/*.log; then
 		fail "$NAME: a program failed"
 	fi
+	[ ! -d "$DIR/spool" ] || umount "$DIR/spool" 2>/dev/null || :
 	PIDS=
 	unset LISTEN
 }
