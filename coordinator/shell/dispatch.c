@@ -15,6 +15,7 @@
 #include <fcntl.h>
 #include <string.h>
 #include <time.h>
+#include <unistd.h>
 
 static unsigned long long number(uint64_t n)
 {
@@ -123,7 +124,12 @@ static void merge(struct server *s, const struct action *a)
 	if (s->config.keep_partials)
 		keep_partials(s, &a->key);
 	uint64_t rounds = order_rounds(o);
-	if (durable_merged(s, o, &e) || order_merge(o, s->batch, &e))
+	int rc = durable_merged(s, o, &e);
+	if (!rc && (rc = order_merge(o, s->batch, &e)) == -ENOMEM) { /* half merged; the journal has it whole */
+		log_event(LOG_STOP, "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
+		_exit(1);
+	}
+	if (rc)
 		server_job_broken(s, a->job, e.text);
 	trust_merged(o, a);
 	order_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);

@@ -131,17 +131,13 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	int rc = o ? batch_unpack(&batch, &o->plan, m, payload, size, &e) : 0;
 	if (o && !rc && farm_verifies(s->farm, &ev.lease.key))
 		rc = digest_batch(&batch, &ev.lease.digest, &e);
-	if (rc == -ENOMEM) {
-		server_job_broken(s, ev.job, e.text);
-		ev.kind = EVENT_HEARD;
-	}
 	ev.lease.valid = rc == 0;
 	ev.text = e.text;
 	s->batch = &batch;
 	s->result = m;
 	s->payload = payload;
 	s->payload_size = size;
-	if (o && ev.lease.valid && durable_reserve(s, o, &e)) {
+	if (rc == -ENOMEM || (o && ev.lease.valid && durable_reserve(s, o, &e))) { /* no room for it, here or on the disk */
 		struct session *p = session_find(s, peer);
 		if (p) /* it can be made again */
 			session_send_ack(p, &ev.lease.key, ACK_REFUSED, e.text);
