@@ -235,17 +235,24 @@ static void on_rendered(struct lease_task *l)
 	agent_settle(a);
 }
 
-/* Far more than were asked for: no coordinator of ours does that. Those whose results are not acknowledged are many where leases
- * are short and the coordinator's disk is slow. */
+/* Far more than were asked for: no coordinator of ours does that. */
 static bool is_flood(const struct agent *a)
 {
-	enum { ANSWERS_MOST = 1024 };
-	unsigned open = 0, answered = 0;
-	for (const struct lease_task *l = a->leases; l; l = l->next) {
-		answered += l->state == LEASE_RENDERED;
+	unsigned open = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
 		open += l->state != LEASE_RENDERED;
-	}
-	return open >= 4 * (a->config.threads + 1) + 16 || answered >= ANSWERS_MOST;
+	return open >= 4 * (a->config.threads + 1) + 16;
+}
+
+/* Results that are not acknowledged are many where leases are short and the coordinator's disk is slow. Whoever hung up then
+ * would send them all again, and have no fewer. */
+static bool is_stuffed(const struct agent *a)
+{
+	enum { ANSWERS_MOST = 1024 };
+	unsigned answered = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		answered += l->state == LEASE_RENDERED;
+	return answered >= ANSWERS_MOST;
 }
 
 static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigned char *payload, size_t size)
@@ -257,11 +264,6 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		conn_close(a->conn, e.text);
 		return;
 	}
-	if (is_flood(a)) {
-		grant_fini(&g);
-		conn_close(a->conn, "the coordinator grants more leases than it is asked for");
-		return;
-	}
 	struct bundle *b = find_bundle(a, g.key.job);
 	l = find_lease(a, &g.key);
 	if (l) { /* it is at work here already, from an earlier connection */
@@ -270,7 +272,12 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		grant_fini(&g);
 		return;
 	}
-	if (a->leaving) {
+	if (is_flood(a)) {
+		grant_fini(&g);
+		conn_close(a->conn, "the coordinator grants more leases than it is asked for");
+		return;
+	}
+	if (a->leaving || is_stuffed(a)) {
 		say_failed(a, &g.key, "");
 		grant_fini(&g);
 		return;
