@@ -20,10 +20,24 @@ static void request_leases(struct agent *a)
 	Farm__Envelope m;
 	farm__lease_request__init(&request);
 	farm__envelope__init(&m);
-	request.want = a->leaving ? 0 : a->config.threads + 1;
+	request.want = a->leaving || a->backlog ? 0 : a->config.threads + 1;
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_REQUEST;
 	m.lease_request = &request;
 	agent_send(a, &m);
+}
+
+/* Where leases are short and the coordinator's disk is slow results pile up: it asks for no more until they have gone. */
+static void pace(struct agent *a)
+{
+	enum { RESULTS_MANY = 256, RESULTS_FEW = 128 };
+	unsigned results = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		results += l->state == LEASE_RENDERED;
+	bool backlog = a->backlog ? results > RESULTS_FEW : results >= RESULTS_MANY;
+	if (backlog == a->backlog)
+		return;
+	a->backlog = backlog;
+	request_leases(a);
 }
 
 static void ask_job(struct agent *a, uint64_t job)
@@ -231,6 +245,7 @@ static void on_rendered(struct lease_task *l)
 	} else {
 		send_result(a, l);
 	}
+	pace(a);
 	tidy(a);
 	agent_settle(a);
 }
@@ -325,6 +340,7 @@ static void take_ack(struct agent *a, const Farm__LeaseAck *m)
 			  (int)k.kind, k.group, k.part, number(k.epoch), m->verdict == FARM__VERDICT__VERDICT_REPEATED);
 	if (l && l->state == LEASE_RENDERED) {
 		drop_lease(a, l);
+		pace(a);
 		tidy(a);
 	}
 }
@@ -350,6 +366,7 @@ static void take_job_end(struct agent *a, uint64_t job)
 			forget_lease(a, l);
 	}
 	b->ended = true;
+	pace(a);
 	tidy(a);
 }
 
@@ -362,6 +379,7 @@ static void disown(struct agent *a, struct bundle *b)
 		if (l->bundle == b && !l->unwanted)
 			forget_lease(a, l);
 	}
+	pace(a);
 	b->ended = true;
 	b->job = 0;
 	tidy(a);
