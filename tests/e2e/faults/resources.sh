@@ -118,6 +118,35 @@ is_refused() {
 	is_state "$1" failed || is_state "$1" cancelled || is_state "$1" done
 }
 
+fault small_worker 1 0 "a scene is larger than the memory of one of two workers"
+small_worker() {
+	mkdir -p "$DIR/box/meshes"
+	awk 'BEGIN { n = 300
+		for (y = 0; y <= n; y++) for (x = 0; x <= n; x++) printf "v %g %g %g\n", x / n - 0.5, y / n - 0.5, 0.1 * sin(x) * sin(y)
+		for (y = 0; y < n; y++) for (x = 1; x <= n; x++) { a = y * (n + 1) + x; b = a + n + 1; printf "f %d %d %d\nf %d %d %d\n", a, a + 1, b, b, a + 1, b + 1 } }' \
+		>"$DIR/box/meshes/wedge.obj"
+	cp "$BOX" "$DIR/box/"
+	small=$BOX
+	quiet=$QUIET
+	BOX=$DIR/box/box.xml
+	QUIET=$DIR/alone.exr
+	# shellcheck disable=SC2086
+	"$BIN/hslt-render" "$BOX" -o "$QUIET" $JOB 2>>"$DIR/render.log"
+	farm
+	worker w1
+	says w1 event=connect
+	size=$(awk '/^VmSize/ { print $2 }' "/proc/$WORKER/status")
+	prlimit --pid "$WORKER" --as=$((size * 1024 + 20000000))
+	job
+	says w1 event=world_failed
+	worker w0
+	finish_job
+	kill -0 "$WORKER" || fail "$NAME: the small worker is gone"
+	"$BIN/hslt-job" log "$ID" | grep -q 'event=lease_failed worker="w1" .*memory' || fail "$NAME: the log does not say why"
+	BOX=$small
+	QUIET=$quiet
+}
+
 fault clock_jumps 6 2 "the wall clock jumps by a year, back and forth, everywhere"
 clock_jumps() {
 	${CC:-cc} -shared -fPIC -O1 -o "$DIR/clock.so" "$HERE/faults/clock.c" 2>"$DIR/cc.log" || { cannot "no compiler" && return; }
