@@ -24,7 +24,6 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
-#include <fcntl.h>
 #include <math.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -61,6 +60,7 @@ struct farm_run {
 static _Atomic uint64_t *counts, *totals; /* of this share; of all: losses, batches acknowledged, sectors and names lost */
 static unsigned share;
 static pid_t others[SHARES];
+static FILE *logs[SHARES];
 static struct exr_image reference;
 static bool has_reference, loud;
 static uint64_t quiet_calls; /* of an undisturbed run, that change something */
@@ -454,27 +454,19 @@ static uint64_t number(const char *name, uint64_t otherwise)
 
 /* ---- shares of the runs, side by side: most of the time somebody waits ---- */
 
-static void share_log(int i, char path[64])
-{
-	snprintf(path, 64, "/tmp/hslt-power.%ld.%d", (long)getpid(), i);
-}
-
 static void begin_shares(void)
 {
-	char path[64];
 	fflush(NULL);
 	for (int i = 1; i < SHARES; i++) {
-		share_log(i, path);
-		others[i] = fork();
+		logs[i] = tmpfile();
+		others[i] = logs[i] ? fork() : -1;
 		if (others[i])
 			continue;
 		share = (unsigned)i;
 		prctl(PR_SET_PDEATHSIG, SIGKILL);
 		counts += i * LOSSY_COUNTS;
-		int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
-		if (fd < 0 || dup2(fd, 1) < 0 || dup2(fd, 2) < 0)
+		if (dup2(fileno(logs[i]), 1) < 0 || dup2(fileno(logs[i]), 2) < 0)
 			_exit(1);
-		close(fd);
 		return;
 	}
 }
@@ -483,17 +475,14 @@ static void others_pass(void)
 {
 	bool all = true;
 	for (int i = 1; i < SHARES; i++) {
-		char path[64], line[512];
+		char line[512];
 		int status;
 		assert_true(waitpid(others[i], &status, 0) == others[i]);
-		share_log(i, path);
-		FILE *f = fopen(path, "r");
 		bool bad = !WIFEXITED(status) || WEXITSTATUS(status);
-		while (bad && f && fgets(line, sizeof line, f))
+		rewind(logs[i]);
+		while (bad && fgets(line, sizeof line, logs[i]))
 			print_error("%s", line);
-		if (f)
-			fclose(f);
-		unlink(path);
+		fclose(logs[i]);
 		all = all && !bad;
 	}
 	assert_true(all);
