@@ -220,6 +220,18 @@ void lossy_flushed(struct lossy_node *n, bool database)
 	n->renamings_last = &n->renamings;
 }
 
+void lossy_failed(struct lossy_node *n)
+{
+	while (n && !n->folder && n->changes) {
+		struct change *c = n->changes;
+		n->changes = c->next;
+		free(c->bytes);
+		free(c);
+	}
+	if (n && !n->folder)
+		n->changes_last = &n->changes;
+}
+
 void lossy_flushed_folder_of(const char *path)
 {
 	const char *last;
@@ -466,10 +478,14 @@ static int do_posix_fallocate(int fd, off_t at, off_t size)
 
 static int do_fsync(int fd)
 {
-	if (is_refused(LOSSY_FLUSHES))
-		return -1;
-	lossy_flushed(file_of(fd), false);
-	return (int)out(0);
+	int code = lossy_enter(LOSSY_FLUSHES);
+	if (code)
+		lossy_failed(file_of(fd));
+	else
+		lossy_flushed(file_of(fd), false);
+	lossy_leave();
+	errno = code;
+	return code ? -1 : 0;
 }
 
 static int do_rename(const char *from, const char *to)

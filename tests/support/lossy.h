@@ -2,7 +2,8 @@
  * A disk of tests behind common/base/disk.h and behind SQLite: below one folder it does what is asked of it and keeps beside, in
  * memory, what a loss of power would leave. A file's bytes and length are safe after a flush of the file, its name after a flush of
  * the folder; of what was done since, a loss of power keeps a random part: of bytes by the sector, of lengths, of names one by one
- * (made, renamed, gone). What is left is written to another folder, and the process ends. Or calls fail, from the n-th on.
+ * (made, renamed, gone). A flush of a file that fails forgets what it did not write, and the next one says that all is well, as
+ * systems do. What is left is written to another folder, and the process ends. Or calls fail, from the n-th on.
  *
  * For a process of its own (fork): lossy_begin replaces the door and SQLite's default VFS for good. Any thread; nothing is
  * flushed for real. Films mapped into memory (O_TMPFILE) are not looked at: nobody finds them again.
@@ -50,6 +51,7 @@ void lossy_leave(void);
 void lossy_wrote(struct lossy_node *n, const void *bytes, size_t size, uint64_t at);
 void lossy_cut(struct lossy_node *n, uint64_t size);
 void lossy_flushed(struct lossy_node *n, bool database);
+void lossy_failed(struct lossy_node *n);
 void lossy_flushed_folder_of(const char *path);
 void lossy_removed(const char *path);
 void lossy_vfs_begin(void);

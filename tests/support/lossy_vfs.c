@@ -62,8 +62,10 @@ static int x_truncate(sqlite3_file *f, sqlite3_int64 size)
 static int x_sync(sqlite3_file *f, int flags)
 {
 	(void)flags;
-	if (lossy_enter(LOSSY_FLUSHES))
+	if (lossy_enter(LOSSY_FLUSHES)) {
+		lossy_failed(of(f)->node);
 		return leave(SQLITE_IOERR_FSYNC);
+	}
 	lossy_flushed(of(f)->node, true);
 	if (of(f)->tell_folder)
 		lossy_flushed_folder_of(of(f)->name);
