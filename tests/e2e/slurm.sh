@@ -214,7 +214,7 @@ grep 'event=lease_granted job=j1 ' "$DIR/coordinator.log" | sed 's/.*peer=[0-9]*
 		END { print NR, sum + 0, most + 0 }' >"$DIR/repeats"
 read -r leases repeats most <"$DIR/repeats"
 [ "$leases" -gt 1000 ] && [ "$repeats" -ge 1 ] || fail "$leases leases, $repeats repeated: this tests nothing"
-[ "$most" -le 2 ] || fail "$most epochs of a chain were repeated: $(cat "$DIR/repeats")"
+[ "$most" -le 3 ] || fail "$most epochs of a chain were repeated: $(cat "$DIR/repeats")"
 grep -c 'event=batch_merged job=j1 ' "$DIR/coordinator.log" >"$DIR/merged"
 [ "$(grep 'event=batch_merged job=j1 ' "$DIR/coordinator.log" | sed 's/.*peer=[0-9]* //' | sort -u | wc -l)" = "$(cat "$DIR/merged")" ] ||
 	fail "an epoch was counted twice"
@@ -235,7 +235,8 @@ running() {
 	"$BIN/hslt-job" --coordinator "127.0.0.1:$(cat "$DIR"/hslt-farm-"$1"/port)" list 2>/dev/null | grep -q running
 }
 
-batch --nodes=3 "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/farm.exr" $SHORT
+mkdir "$DIR/shared"
+batch --nodes=3 --export="ALL,HSLT_SPOOL=$DIR/shared" "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/farm.exr" $SHORT
 until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; cat "$DIR/$JOB.log")"
 scontrol requeue "$JOB"
 requeued "$JOB" || fail "the farm is $(job_state "$JOB")"
@@ -243,6 +244,8 @@ until_true 60 is_job "$JOB" COMPLETED || fail "the farm is $(job_state "$JOB"): 
 [ "$(job_field "$JOB" Restarts)" = 1 ] || fail "the farm was not requeued"
 [ "$(grep -c 'event=peer_hello.*@n[123]' "$DIR/$JOB.log")" -ge 3 ] || fail "not all nodes worked"
 [ "$(grep -c "name=\"$JOB.1@.*said goodbye" "$DIR/$JOB.log")" = 3 ] || fail "workers were not left to leave"
+grep -q 'goes on from an earlier life' "$DIR/$JOB.log" || fail "the farm began anew"
+[ -z "$(ls "$DIR/shared")" ] || fail "it left $(ls "$DIR/shared")"
 grep -q 'event=listen.*tls=yes' "$DIR/$JOB.log" || fail "it was not over TLS"
 grep -q 'event=peer_hello.*certificate=worker' "$DIR/$JOB.log" || fail "the workers had another certificate"
 same "$DIR/short.exr" "$DIR/farm.exr"
