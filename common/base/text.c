@@ -1,5 +1,6 @@
 #include "common/base/text.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -30,7 +31,7 @@ void text_put(struct text *t, const char *format, ...)
 	t->left -= used;
 }
 
-bool text_share(const char *text, double *share)
+bool text_ratio(const char *text, double *ratio)
 {
 	char *end;
 	double x = strtod(text, &end);
@@ -38,8 +39,26 @@ bool text_share(const char *text, double *share)
 		x /= 100;
 		end++;
 	}
-	if (end == text || *end || !(x >= 0 && x <= 1))
+	if (end == text || *end || !isfinite(x))
+		return false;
+	*ratio = x;
+	return true;
+}
+
+bool text_share(const char *text, double *share)
+{
+	double x;
+	if (!text_ratio(text, &x) || !(x >= 0 && x <= 1))
 		return false;
 	*share = x;
 	return true;
+}
+
+char *text_borrow(const char *text)
+{
+	union {
+		const char *from;
+		char *to;
+	} u = {text};
+	return u.to;
 }

@@ -8,7 +8,11 @@
 /* Copies, cutting what does not fit, never in the middle of a UTF-8 sequence. */
 void text_copy(char *out, size_t size, const char *from);
 
-/* A share: "0.05" or "5%". false: not from 0 to 1. */
+/* The same text, for interfaces that have no const and change nothing: generated messages, argp's filters. */
+char *text_borrow(const char *text);
+
+/* "0.05" or "5%". false: no number. A share is from 0 to 1. */
+bool text_ratio(const char *text, double *ratio);
 bool text_share(const char *text, double *share);
 
 /* Appends to a fixed array: what does not fit is cut, the rest stays terminated. Begin with {array, size}. */

@@ -1,20 +1,13 @@
 #include "common/wire/plan_wire.h"
 
-#include <string.h>
+#include "common/base/text.h"
 
-static char *borrow(const char *text)
-{
-	union {
-		const char *from;
-		char *to;
-	} u = {text}; /* generated structures have no const */
-	return u.to;
-}
+#include <string.h>
 
 void plan_to_wire(const struct plan *p, Farm__Plan *out)
 {
 	farm__plan__init(out);
-	out->integrator = borrow(p->integrator);
+	out->integrator = text_borrow(p->integrator);
 	out->kind = (uint32_t)p->kind;
 	out->width = p->width;
 	out->height = p->height;
@@ -34,9 +27,9 @@ void plan_to_wire(const struct plan *p, Farm__Plan *out)
 	out->target_error = p->target_error;
 	out->min_depth = p->min_depth;
 	out->max_depth = p->max_depth;
-	out->mutations = borrow(p->mutations);
-	out->knobs = borrow(p->knobs);
-	out->effects = borrow(p->effects);
+	out->mutations = text_borrow(p->mutations);
+	out->knobs = text_borrow(p->knobs);
+	out->effects = text_borrow(p->effects);
 }
 
 static int kind_from_wire(uint32_t kind, const char *name, enum plan_kind *out, char integrator[16], struct error *e)
@@ -108,7 +101,7 @@ int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e)
 void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out)
 {
 	farm__plan_request__init(out);
-	out->integrator = borrow(r->integrator);
+	out->integrator = text_borrow(r->integrator);
 	out->kind = (uint32_t)r->kind;
 	out->width = r->width;
 	out->height = r->height;
@@ -130,9 +123,9 @@ void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out)
 	out->speed = r->speed;
 	out->bootstrap = r->bootstrap;
 	out->epoch = r->epoch;
-	out->mixture = borrow(r->mixture);
-	out->knobs = borrow(r->knobs);
-	out->effects = borrow(r->effects);
+	out->mixture = text_borrow(r->mixture);
+	out->knobs = text_borrow(r->knobs);
+	out->effects = text_borrow(r->effects);
 }
 
 int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, struct error *e)

@@ -1,5 +1,6 @@
 #include "coordinator/ctl/job_options.h"
 
+#include "common/base/text.h"
 #include "common/base/version.h"
 
 #include <argp.h>
@@ -87,13 +88,8 @@ static double take_more(const char *option, const char *arg, double most, struct
 
 static double take_error(const char *arg, struct argp_state *state)
 {
-	char *end;
-	double x = strtod(arg, &end);
-	if (*end == '%') {
-		x /= 100;
-		end++;
-	}
-	if (*end || end == arg || !(x > 0 && x < 1e6))
+	double x;
+	if (!text_ratio(arg, &x) || !(x > 0 && x < 1e3))
 		argp_error(state, "--target-error takes something like 0.02 or 2%%, not '%s'", arg);
 	return x;
 }

@@ -70,40 +70,31 @@ static const char *why_of(const struct job_view *v)
 	return *v->waiting ? v->waiting : v->record.why;
 }
 
-static char *borrow(const char *text)
-{
-	union {
-		const char *from;
-		char *to;
-	} u = {text}; /* generated structures have no const */
-	return u.to;
-}
-
 void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 {
 	const struct job_record *r = &v->record;
 	farm__job_status__init(out);
 	out->job = r->id;
-	out->name = borrow(r->name);
-	out->state = borrow(r->state);
+	out->name = text_borrow(r->name);
+	out->state = text_borrow(r->state);
 	out->progress = r->progress;
 	out->rate = v->rate;
 	out->eta = v->eta;
 	out->rounds = r->rounds;
 	out->error = r->rel_error;
-	out->why = borrow(why_of(v));
-	out->reason = borrow(r->reason);
-	out->output = borrow(r->output);
+	out->why = text_borrow(why_of(v));
+	out->reason = text_borrow(r->reason);
+	out->output = text_borrow(r->output);
 	out->priority = r->priority;
 	out->leases = v->leases;
-	out->owner = borrow(r->owner);
+	out->owner = text_borrow(r->owner);
 	out->workers = v->workers;
 	out->share = v->share;
-	out->place = borrow(v->place);
+	out->place = text_borrow(v->place);
 	out->fetchable = r->has_result;
 	out->ended = record_is_ended(r);
 	out->exit_code = r->exit_code;
-	out->note = borrow(r->note);
+	out->note = text_borrow(r->note);
 	out->verify = r->verify;
 	out->verified = r->verified;
 	out->mismatched = r->mismatched;

@@ -14,15 +14,6 @@ enum {
 	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH, OPTION_SET, OPTION_EFFECTS, OPTION_PARTS,
 };
 
-static char *borrow(const char *text)
-{
-	union {
-		const char *from;
-		char *to;
-	} u = {text}; /* argp's filters return what they were given or something new, so it has no const */
-	return u.to;
-}
-
 static const struct argp_option options[] = {
 	{NULL, 0, NULL, 0, "What to render:", 1},
 	{"integrator", 'i', "NAME", 0, "(" RENDER_INTEGRATOR_DEFAULT "); the scene's own is ignored", 1}, /* see help */
@@ -96,13 +87,8 @@ double option_seconds(const struct argp_state *state, const char *option, const 
 
 static double target_error(const struct argp_state *state, const char *arg)
 {
-	char *end;
-	double x = strtod(arg, &end);
-	if (end != arg && *end == '%') {
-		x /= 100;
-		end++;
-	}
-	if (end == arg || *end || !(x > 0 && x < 1e3))
+	double x;
+	if (!text_ratio(arg, &x) || !(x > 0 && x < 1e3))
 		argp_error(state, "--target-error takes something like 0.02 or 2%%, not '%s'", arg);
 	return x;
 }
@@ -298,11 +284,11 @@ static char *help(int key, const char *text, void *input)
 			used += n < 0 ? 0 : (size_t)n;
 		}
 	} else {
-		return borrow(text);
+		return text_borrow(text);
 	}
 	char *all = NULL;
 	int n = key == 'i' ? asprintf(&all, "%s %s", names, text) : asprintf(&all, "%s. There are %s", text, names);
-	return n < 0 ? borrow(text) : all;
+	return n < 0 ? text_borrow(text) : all;
 }
 
 const struct argp render_argp = {options, parse, NULL, NULL, NULL, help, NULL};

@@ -144,15 +144,6 @@ void scene_bundle_fini(struct scene_bundle *b)
 
 /* ---- sending ---- */
 
-static char *borrow(const char *text)
-{
-	union {
-		const char *from;
-		char *to;
-	} u = {text}; /* generated structures have no const */
-	return u.to;
-}
-
 /* The message's lists; their texts are borrowed. */
 struct lists {
 	Farm__File *files, **file_at;
@@ -190,17 +181,17 @@ static int lists_init(struct lists *l, const struct submit_request *r, struct sc
 	for (size_t i = 0; i < r->args->define_count; i++) {
 		Farm__Define *d = l->define_at[i] = &l->defines[i];
 		farm__define__init(d);
-		d->name = borrow(r->args->defines[i].name);
-		d->value = borrow(r->args->defines[i].value);
+		d->name = text_borrow(r->args->defines[i].name);
+		d->value = text_borrow(r->args->defines[i].value);
 	}
 	for (size_t i = 0; i < lines; i++) {
 		Farm__Effect *f = l->effect_at[i] = &l->effects[i];
 		farm__effect__init(f);
-		f->name = borrow(b->summary.lines[i].name);
+		f->name = text_borrow(b->summary.lines[i].name);
 		f->on = b->summary.lines[i].on;
 		f->why = b->summary.lines[i].why;
 		f->forced = b->summary.lines[i].forced;
-		f->saves = borrow(b->summary.lines[i].saves);
+		f->saves = text_borrow(b->summary.lines[i].saves);
 	}
 	return 0;
 }
@@ -227,7 +218,7 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 	farm__submit__init(&s);
 	farm__envelope__init(&m);
 	plan_request_to_wire(&r->args->plan, &plan);
-	s.name = borrow(r->name);
+	s.name = text_borrow(r->name);
 	s.scene = b->scene;
 	s.n_defines = r->args->define_count;
 	s.defines = l.define_at;
@@ -242,7 +233,7 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 	s.effects = l.effect_at;
 	s.n_notes = b->note_count;
 	s.notes = b->notes;
-	s.output = borrow(r->output);
+	s.output = text_borrow(r->output);
 	s.mixed = r->mixed;
 	s.verify = r->verify;
 	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
