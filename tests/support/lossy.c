@@ -47,7 +47,8 @@ static struct lossy setup;
 static struct lossy_node *root;
 static struct lossy_node *open_files[FDS];
 static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
-static uint64_t calls, changing_calls, dice;
+static uint64_t calls, changing_calls, since_failure, dice;
+static atomic_bool failed;
 static _Atomic uint64_t unasked[LOSSY_COUNTS];
 
 static void *must(void *p)
@@ -357,7 +358,8 @@ int lossy_enter(enum lossy_call what)
 	atomic_store(&setup.counts[1], ++calls);
 	if (what != LOSSY_READS) {
 		atomic_store(&setup.counts[0], ++changing_calls);
-		if (changing_calls == setup.lose_at || atomic_load(&setup.counts[4]))
+		since_failure += setup.lose_after && atomic_load(&failed);
+		if (changing_calls == setup.lose_at || (setup.lose_after && since_failure == setup.lose_after) || atomic_load(&setup.counts[4]))
 			go_dark();
 	}
 	if (!setup.fail_from || calls < setup.fail_from || calls - setup.fail_from >= setup.fail_count)
@@ -365,6 +367,7 @@ int lossy_enter(enum lossy_call what)
 	if (setup.fail_writes_only && what != LOSSY_WRITES && what != LOSSY_FLUSHES)
 		return 0;
 	atomic_fetch_add(&setup.counts[2], 1);
+	atomic_store(&failed, true);
 	return setup.fail_with;
 }
 

@@ -29,6 +29,7 @@ struct lossy {
 	uint64_t fail_from;    /* calls fail, from this one of all on; 0: none */
 	uint64_t fail_count;   /* so many */
 	int fail_with;         /* errno */
+	uint64_t lose_after;   /* the power goes so many calls that change something after the first that failed; 0: not */
 	bool fail_writes_only; /* as on a disk that is full, or read-only: reading and making room go on */
 	enum lossy_forget forget;
 	const char *forget_name; /* only of files or folders with this last part of their name; NULL: all */
