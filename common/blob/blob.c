@@ -23,7 +23,7 @@ struct blob_store {
 	char *folder;
 	uint64_t limit, bytes, clock;
 	uint64_t temporary; /* number of the last temporary file */
-	struct entry *entries;
+	struct entry *entries; /* by hash */
 	size_t count, capacity;
 };
 
@@ -109,27 +109,61 @@ static void path_of(const struct blob_store *s, const char *name, char path[PATH
 	snprintf(path, PATH_MOST, "%s/%s", s->folder, name);
 }
 
+/* The place of the first entry that is not below it. */
+static size_t place_of(const struct blob_store *s, const struct blob_hash *h)
+{
+	size_t low = 0, high = s->count;
+	while (low < high) {
+		size_t mid = low + (high - low) / 2;
+		if (memcmp(s->entries[mid].hash.bytes, h->bytes, BLOB_HASH_SIZE) < 0)
+			low = mid + 1;
+		else
+			high = mid;
+	}
+	return low;
+}
+
 static struct entry *find(struct blob_store *s, const struct blob_hash *h)
 {
-	for (size_t i = 0; i < s->count; i++)
-		if (blob_hash_equal(&s->entries[i].hash, h))
-			return &s->entries[i];
-	return NULL;
+	size_t i = place_of(s, h);
+	return i < s->count && blob_hash_equal(&s->entries[i].hash, h) ? &s->entries[i] : NULL;
+}
+
+static int reserve(struct blob_store *s, size_t count, struct error *e)
+{
+	if (count <= s->capacity)
+		return 0;
+	size_t want = count > 2 * s->capacity ? count : 2 * s->capacity;
+	struct entry *grown = mem_grow(s->entries, s->capacity * sizeof *grown, want * sizeof *grown);
+	if (!grown)
+		return error_set(e, ENOMEM, "no memory for the list of blobs");
+	s->entries = grown;
+	s->capacity = want;
+	return 0;
 }
 
 static int add_entry(struct blob_store *s, const struct blob_hash *h, uint64_t size, unsigned holds, struct error *e)
 {
-	if (s->count == s->capacity) {
-		size_t want = s->capacity ? 2 * s->capacity : 64;
-		struct entry *grown = mem_grow(s->entries, s->capacity * sizeof *grown, want * sizeof *grown);
-		if (!grown)
-			return error_set(e, ENOMEM, "no memory for the list of blobs");
-		s->entries = grown;
-		s->capacity = want;
-	}
-	s->entries[s->count++] = (struct entry){*h, size, ++s->clock, holds};
+	int rc = reserve(s, s->count + 1, e);
+	if (rc)
+		return rc;
+	size_t i = place_of(s, h);
+	memmove(&s->entries[i + 1], &s->entries[i], (s->count++ - i) * sizeof *s->entries);
+	s->entries[i] = (struct entry){*h, size, ++s->clock, holds};
 	s->bytes += size;
 	return 0;
+}
+
+static void remove_entry(struct blob_store *s, struct entry *n)
+{
+	s->bytes -= n->size;
+	memmove(n, n + 1, (size_t)(&s->entries[--s->count] - n) * sizeof *n);
+}
+
+static int by_hash(const void *a, const void *b)
+{
+	const struct entry *x = a, *y = b;
+	return memcmp(x->hash.bytes, y->hash.bytes, BLOB_HASH_SIZE);
 }
 
 struct found {
@@ -179,8 +213,14 @@ static int read_folder(struct blob_store *s, struct error *e)
 	closedir(d);
 	if (count)
 		qsort(all, count, sizeof *all, by_age);
-	for (size_t i = 0; !rc && i < count; i++)
-		rc = add_entry(s, &all[i].hash, all[i].size, 0, e);
+	if (!rc)
+		rc = reserve(s, count, e);
+	for (size_t i = 0; !rc && i < count; i++) {
+		s->entries[s->count++] = (struct entry){all[i].hash, all[i].size, ++s->clock, 0};
+		s->bytes += all[i].size;
+	}
+	if (s->count)
+		qsort(s->entries, s->count, sizeof *s->entries, by_hash);
 	mem_free(all);
 	return rc;
 }
@@ -200,8 +240,7 @@ static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 		char path[PATH_MOST];
 		blob_path(s, &oldest->hash, path, sizeof path);
 		disk_unlink(path);
-		s->bytes -= oldest->size;
-		*oldest = s->entries[--s->count];
+		remove_entry(s, oldest);
 	}
 	return 0;
 }

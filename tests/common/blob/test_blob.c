@@ -111,6 +111,31 @@ static void forgets_the_oldest_that_nobody_holds(void **state)
 	blob_store_close(s);
 }
 
+/* The last twenty of a hundred fit; in each life it is they and nobody else who are there. */
+static void knows_many(void **state)
+{
+	(void)state;
+	enum { MANY = 100, FIT = 20 };
+	struct blob_hash h[MANY];
+	struct blob_store *s;
+	struct error e;
+	assert_int_equal(blob_store_open(&s, folder, 4 * FIT, &e), 0);
+	for (int i = 0; i < MANY; i++) {
+		char text[8];
+		snprintf(text, sizeof text, "%04d", i);
+		h[i] = put(s, text);
+		blob_release(s, &h[i]);
+	}
+	for (int life = 0; life < 2; life++) {
+		for (int i = 0; i < MANY; i++)
+			assert_true(blob_has(s, &h[i], NULL) == (i >= MANY - FIT));
+		assert_int_equal(blob_store_bytes(s), 4 * FIT);
+		blob_store_close(s);
+		assert_int_equal(blob_store_open(&s, folder, 4 * FIT, &e), 0);
+	}
+	blob_store_close(s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -118,6 +143,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(keeps_and_reads_back, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(refuses_false_bytes, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(forgets_the_oldest_that_nobody_holds, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(knows_many, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
