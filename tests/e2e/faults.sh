@@ -19,7 +19,7 @@ README=$HERE/README.md
 GRACE=
 . "$HERE/faults/lib.sh"
 PYTHON=${PYTHON:-python3}
-for f in worker coordinator network versions resources people; do
+for f in worker coordinator network versions resources people disk; do
 	. "$HERE/faults/$f.sh"
 done
 
