@@ -355,5 +355,9 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 			SEED_SAY(&s, COORDINATOR, JOB_END, job_end, &job_end);
 			seed_end(&s, "lease", 3 * i + (size_t)end);
 		}
+	struct seed flood = {0};
+	for (uint64_t epoch = 0; epoch < SCRIPT_STEPS; epoch++)
+		grant(&flood, &(struct lease_key){.job = FARM_SAMPLES, .kind = LEASE_RENDER, .epoch = epoch});
+	seed_end(&flood, "flood", 0);
 	exit(0);
 }
