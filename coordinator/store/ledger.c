@@ -223,7 +223,10 @@ static int row(struct ledger *l, sqlite3_stmt *s, uint64_t id, struct ledger_job
 
 int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e)
 {
-	return row(l, l->next, after, j, e);
+	int rc = row(l, l->next, after, j, e);
+	if (rc > 0 && j->id <= after) /* or whoever asks for the next one after it would ask for ever */
+		return error_set(e, EBADMSG, "jobs.db is damaged: its jobs are not in order");
+	return rc;
 }
 
 int ledger_get(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e)
