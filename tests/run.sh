@@ -16,7 +16,7 @@ cd "$(dirname "$0")/.." || exit 1
 case $build in /*) ;; *) build=$PWD/$build ;; esac
 export BUILD="$build"
 log=$(mktemp)
-trap 'rm -f "$log"' EXIT
+trap 'rm -f "$log" "$log.counts"' EXIT
 passed=0 failed=0 skipped=0
 
 count() { # of cmocka's closing lines: "[  PASSED  ] 3 test(s)."
@@ -66,8 +66,9 @@ run_script() {
 	esac
 }
 
-for kind in $kinds; do
-	case $kind in
+# Runs all of a kind; the last line has the counts.
+lane() {
+	case $1 in
 	unit)
 		for t in $(find "$build/tests" -type f -name 'test_*' -perm -u+x 2>/dev/null | sort); do
 			case $t in *"$pattern"*) run_program "$t" ;; esac
@@ -80,6 +81,28 @@ for kind in $kinds; do
 		done
 		;;
 	esac
-done
+	echo "$passed $failed $skipped" >"$log.counts"
+}
+
+# Scripts mostly wait: they do so beside the programs, and are shown behind them.
+beside=
+case " $kinds " in
+*" unit "*" script "*)
+	beside=$(mktemp)
+	(
+		log=$beside
+		lane script
+	) >"$beside.out" 2>&1 &
+	trap 'kill $! 2>/dev/null; rm -f "$log" "$log.counts" "$beside" "$beside.out" "$beside.counts"' EXIT
+	lane unit
+	wait $!
+	cat "$beside.out"
+	;;
+*) for kind in $kinds; do lane "$kind"; done ;;
+esac
+if [ -n "$beside" ]; then
+	read -r p f s <"$beside.counts" || { echo "FAILED: the scripts did not end as they should" && f=1 p=0 s=0; }
+	passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
+fi
 echo "$passed passed, $failed failed, $skipped skipped"
 [ $failed -eq 0 ] && [ $passed -gt 0 ]
