@@ -189,7 +189,8 @@ static void put(unsigned char **bytes, uint64_t *size, const void *from, uint64_
 {
 	if (at + n > *size)
 		resize(bytes, size, at + n);
-	memcpy(*bytes + at, from, n);
+	if (n)
+		memcpy(*bytes + at, from, n);
 }
 
 static bool is_forgotten(const struct lossy_node *n, enum lossy_forget kind)

@@ -37,7 +37,7 @@ static struct tls *party(const char *name, double whole, double own)
 {
 	char ca[128], folder[160];
 	struct error e = {""};
-	struct tls *t;
+	struct tls *t = NULL;
 	snprintf(ca, sizeof ca, "%s/%s", root, name);
 	snprintf(folder, sizeof folder, "%s/node", ca);
 	if (authority_init(ca, "test", whole, &e) || authority_issue(ca, "node", TLS_WORKER, own, false, &e) || tls_open(&t, folder, &e))
