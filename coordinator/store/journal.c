@@ -12,6 +12,8 @@
 #include <string.h>
 
 enum { PATH_MOST = 4200 };
+/* Room is taken for several records at once: a file system that is writing back makes whoever asks for it wait. */
+enum { AHEAD = 8, AHEAD_MOST = 1 << 28 };
 
 struct head { /* of the file */
 	char magic[8];
@@ -30,6 +32,7 @@ struct journal {
 	uint64_t generation;
 	atomic_uint holders;
 	_Atomic uint64_t bytes, synced; /* in the file */
+	uint64_t room;                  /* the disk has it, up to this byte of the file */
 	atomic_bool bad;                /* a call on the file failed: it is not written any more, nor believed */
 	atomic_bool settled;            /* all of it is stored elsewhere */
 	atomic_uint flushes;            /* under way */
@@ -77,10 +80,21 @@ void journal_hold(struct journal *j)
 	atomic_fetch_add(&j->holders, 1);
 }
 
+/* Gives back what nothing was written to. */
+static int cut_off(struct journal *j)
+{
+	j->room = 0;
+	return disk_ftruncate(j->fd, (off_t)j->bytes);
+}
+
 void journal_release(struct journal *j)
 {
 	if (!j || atomic_fetch_sub(&j->holders, 1) > 1)
 		return;
+	if (j->fd >= 0 && j->room > j->bytes && !j->bad && !j->settled) {
+		int cut = cut_off(j); /* else it goes with the file */
+		(void)cut;
+	}
 	if (j->fd >= 0)
 		disk_close(j->fd);
 	buf_fini(&j->tail);
@@ -194,15 +208,23 @@ int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_
 
 /* ---- writing ---- */
 
+static bool reserve(struct journal *j, uint64_t size)
+{
+	if (disk_fallocate(j->fd, FALLOC_FL_KEEP_SIZE, (off_t)j->bytes, (off_t)size))
+		return false;
+	j->room = j->bytes + size;
+	return true;
+}
+
 int journal_reserve(struct journal *j, size_t body, struct error *e)
 {
-	off_t size = (off_t)(sizeof(struct record) + body);
+	uint64_t size = sizeof(struct record) + body;
 	if (j->bad)
 		return fault(j, EIO, e);
-	if (disk_fallocate(j->fd, FALLOC_FL_KEEP_SIZE, (off_t)j->bytes, size) == 0 || errno == EOPNOTSUPP || errno == ENOSYS)
+	if (j->bytes + size <= j->room || (AHEAD * size <= AHEAD_MOST && reserve(j, AHEAD * size)) || reserve(j, size) || errno == EOPNOTSUPP || errno == ENOSYS)
 		return 0;
 	int code = errno;
-	int cut = disk_ftruncate(j->fd, (off_t)j->bytes); /* gives back what there was */
+	int cut = cut_off(j);
 	(void)cut;
 	return fault(j, code, e);
 }
@@ -251,7 +273,7 @@ int journal_append(struct journal *j, enum journal_kind kind, double elapsed, co
 		return 0;
 	}
 	if (!j->bad) { /* a torn record that could not be cut off would be cut off by whoever reads it */
-		int cut = disk_ftruncate(j->fd, (off_t)j->bytes);
+		int cut = cut_off(j);
 		if (!cut && rc == -ENOSPC && kind != JOURNAL_BATCH && kind != JOURNAL_PINNED)
 			return fault(j, -rc, e);
 		j->bad = true;
