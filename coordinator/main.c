@@ -27,7 +27,7 @@ static const char doc[] =
 
 enum {
 	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS,
-	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_KEEP, OPTION_DAYS, OPTION_GB, OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE, OPTION_BANDWIDTH, OPTION_CONNECTIONS,
+	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_KEEP, OPTION_FILM_MEMORY, OPTION_DAYS, OPTION_GB, OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE, OPTION_BANDWIDTH, OPTION_CONNECTIONS,
 	OPTION_GROUP
 };
 
@@ -44,6 +44,7 @@ static const struct argp_option options[] = {
 	{"tls-check", OPTION_TLS_CHECK, "SECONDS", 0, "How often certificates of live connections are checked again (60)", 0},
 	{"journal", OPTION_JOURNAL, "MB", 0, "Results of a running job that are kept before its films are written in their place (64)", 0},
 	{"connections", OPTION_CONNECTIONS, "N", 0, "At once, at most (10000, or as many as there are file descriptors)", 0},
+	{"film-memory", OPTION_FILM_MEMORY, "MB", 0, "Films of running jobs in memory; beyond, they are files of the spool (a quarter of the memory)", 0},
 	{"keep-films", OPTION_KEEP, "MB", 0, "Films of jobs that are done, for hslt-job extend; the oldest go (2000)", 0},
 	{"keep-days", OPTION_DAYS, "N", 0, "Results of finished jobs; their records ten times as long; 0: for ever (30)", 0},
 	{"keep-gb", OPTION_GB, "N", 0, "Of all finished jobs together: films go first, then results, the oldest first; 0: any (0)", 0},
@@ -109,6 +110,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_CONNECTIONS:
 		c->max_connections = (unsigned)number(state, "--connections", arg, 1, CONNECTIONS_MOST);
+		return 0;
+	case OPTION_FILM_MEMORY:
+		c->film_bytes = (uint64_t)(1e6 * number(state, "--film-memory", arg, 0, 1e9));
 		return 0;
 	case OPTION_KEEP:
 		c->keep_bytes = (uint64_t)(1e6 * number(state, "--keep-films", arg, 0, 1e9));

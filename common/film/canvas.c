@@ -83,6 +83,22 @@ static int map_sums(struct canvas *c, const char *folder, struct error *e)
 	return 0;
 }
 
+static uint32_t tiles_along(uint32_t pixels)
+{
+	return (pixels + TILE_SIZE - 1) / TILE_SIZE;
+}
+
+size_t canvas_bytes(const struct plan *p)
+{
+	size_t tiles = (size_t)tiles_along(p->crop_width) * tiles_along(p->crop_height);
+	return p->groups * FILMS * tiles * SLOT * sizeof(int64_t);
+}
+
+bool canvas_is_mapped(const struct canvas *c)
+{
+	return c->fd >= 0;
+}
+
 int canvas_new(struct canvas **out, const struct plan *p, int grid_exponent, const char *folder, struct error *e)
 {
 	assert(grid_exponent >= -EXPONENT_MOST && grid_exponent <= EXPONENT_MOST);
@@ -94,10 +110,10 @@ int canvas_new(struct canvas **out, const struct plan *p, int grid_exponent, con
 	c->fd = -1;
 	c->scale = ldexp(1, -grid_exponent);
 	c->quantum = ldexp(1, grid_exponent);
-	c->tiles_across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE;
-	c->tiles_down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
+	c->tiles_across = tiles_along(p->crop_width);
+	c->tiles_down = tiles_along(p->crop_height);
 	size_t films = (size_t)p->groups * FILMS;
-	c->bytes = films * canvas_tiles(c) * SLOT * sizeof *c->sums;
+	c->bytes = canvas_bytes(p);
 	c->flags = mem_alloc(films * canvas_tiles(c), 1);
 	c->bound = mem_alloc(films, sizeof *c->bound);
 	c->has = mem_alloc((size_t)(1 + OPEN_ROUNDS) * p->groups * p->parts, 1);

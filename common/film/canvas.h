@@ -28,6 +28,8 @@ int canvas_grid_exponent(const struct plan *p, double b_pooled, double brightest
 
 int canvas_new(struct canvas **c, const struct plan *p, int grid_exponent, const char *folder, struct error *e);
 void canvas_free(struct canvas *c);
+size_t canvas_bytes(const struct plan *p); /* of its films */
+bool canvas_is_mapped(const struct canvas *c); /* to a file */
 
 /* Bootstrap batches add only their independent sums. Counters and sums of render batches are those of their round.
  * -EEXIST: merged already; -EAGAIN: round not open; -ERANGE: a sum left the grid (an error of the job). */

@@ -285,7 +285,7 @@ static int read_all(struct server *s, struct order *o, struct sealed *in, uint64
 	take_head(o, &h);
 	*generation = h.generation;
 	int exponent = canvas_grid_exponent(&o->plan, o->lit.b_pooled, order_submit(o)->brightest);
-	rc = canvas_new(&o->canvas, &o->plan, exponent, spool_canvas(s->spool), e);
+	rc = canvas_new(&o->canvas, &o->plan, exponent, server_film_folder(s, &o->plan), e);
 	if (!rc && o->seeds)
 		rc = sealed_read(in, o->seeds, o->plan.chains * sizeof *o->seeds, e);
 	if (!rc)

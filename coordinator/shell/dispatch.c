@@ -79,7 +79,7 @@ static void job_changed(struct server *s, const struct action *a)
 void dispatch_prepare(struct server *s, struct order *o)
 {
 	struct error e = {""};
-	int rc = order_prepare(o, spool_canvas(s->spool), &e);
+	int rc = order_prepare(o, server_film_folder(s, &o->plan), &e);
 	if (rc && rc != -ENOMEM) {
 		if (!o->unprepared)
 			order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);

@@ -15,7 +15,7 @@
 /* A journal on its way into an order. */
 struct replay {
 	struct order *order;
-	const char *canvas_folder;
+	const struct server *server;
 	double elapsed;
 	uint64_t batches;
 };
@@ -56,7 +56,7 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 	int rc = order_merge(o, b, e);
 	order_note_times(o, r->elapsed, rounds);
 	if (!rc && o->bootstrap && bootstrap_missing(o->bootstrap) == 0)
-		rc = order_prepare(o, r->canvas_folder, e);
+		rc = order_prepare(o, server_film_folder(r->server, &o->plan), e);
 	r->batches++;
 	return rc;
 }
@@ -254,7 +254,7 @@ int restore_order(struct server *s, const struct ledger_job *j, struct order **o
 	struct replay *r = mem_alloc(1, sizeof *r);
 	if (!r)
 		return error_set(e, ENOMEM, "no memory for a job");
-	r->canvas_folder = spool_canvas(s->spool);
+	r->server = s;
 	int rc = make_order(s, j, &r->order, e);
 	if (!rc)
 		rc = read_journal(s, r, e);
@@ -273,7 +273,7 @@ static int restore_one(struct server *s, const struct ledger_job *j, struct erro
 	struct replay *r = mem_alloc(1, sizeof *r);
 	if (!r)
 		return error_set(e, ENOMEM, "no memory for a job");
-	r->canvas_folder = spool_canvas(s->spool);
+	r->server = s;
 	int rc = make_order(s, j, &r->order, e);
 	if (!rc)
 		rc = read_journal(s, r, e);

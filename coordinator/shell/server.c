@@ -25,10 +25,17 @@
 
 enum { BACKLOG = 4096, TICK_MS = 200 };
 
+/* A quarter of what this process may have. */
+static uint64_t film_memory(void)
+{
+	uint64_t all = uv_get_total_memory(), ours = uv_get_constrained_memory();
+	return (ours && ours < all ? ours : all) / 4;
+}
+
 void server_config_init(struct server_config *c)
 {
-	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .retry_seconds = 2, .clear_seconds = 30 * 86400.0,  .max_faults = 3,
-				    .journal_bytes = 64 << 20, .keep_bytes = 2000000000, .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
+	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .retry_seconds = 2, .clear_seconds = 30 * 86400.0, .max_faults = 3,
+				    .journal_bytes = 64 << 20, .keep_bytes = 2000000000, .film_bytes = film_memory(), .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
 }
 
 double server_now(const struct server *s)
@@ -105,6 +112,15 @@ static void on_wake(uv_timer_t *t)
 }
 
 /* ---- orders ---- */
+
+const char *server_film_folder(const struct server *s, const struct plan *p)
+{
+	uint64_t bytes = canvas_bytes(p);
+	for (const struct order *o = s->orders; o; o = o->next)
+		if (o->canvas && !canvas_is_mapped(o->canvas))
+			bytes += canvas_bytes(&o->plan);
+	return bytes <= s->config.film_bytes ? NULL : spool_canvas(s->spool);
+}
 
 struct order *server_order(const struct server *s, uint64_t job)
 {

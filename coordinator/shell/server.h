@@ -34,6 +34,7 @@ struct server_config {
 	double verify;        /* least share of the leases of each job that two workers compute */
 	unsigned max_faults;  /* of a worker, before it is set aside */
 	const char *forgive;  /* the name of a worker that was set aside and may come back; NULL: none */
+	uint64_t film_bytes; /* of running jobs' films in memory; those of further jobs are mapped files of the spool */
 	double worker_bandwidth; /* bytes of tiles a second that one thread may send on average, for new jobs' epochs; 0: any */
 	double hello_seconds, stall_seconds; /* how long a peer may take to say hello, to finish a frame */
 };
@@ -114,6 +115,8 @@ void server_defer(struct server *s, const struct event *ev);
 void server_job_broken(struct server *s, uint64_t job, const char *text);
 
 struct order *server_order(const struct server *s, uint64_t job);
+/* Where the films of a job of this plan go: NULL: into memory, which is never kept waiting by the disk. */
+const char *server_film_folder(const struct server *s, const struct plan *p);
 /* The order's canvas is free again: what waited goes on. */
 void server_order_free_again(struct server *s, struct order *o);
 /* A result from a worker: now, or when the canvas is free. */

@@ -81,6 +81,7 @@ static void serve(const struct farm_run *f)
 	c.journal_bytes = 2000;
 	c.blob_bytes = 1 << 20;
 	c.retry_seconds = 0.01;
+	c.film_bytes = 0; /* more files that can fail */
 	log_set_level(LOG_LEVEL_DEBUG);
 	if (!loud && !freopen("/dev/null", "w", stderr))
 		_exit(1);
