@@ -114,6 +114,13 @@ static void deliver(struct conn *c)
 	envelope_fini(&env);
 }
 
+struct buf conn_take_payload(struct conn *c)
+{
+	struct buf payload = c->reader.payload;
+	c->reader.payload = (struct buf){.limit = payload.limit};
+	return payload;
+}
+
 /* Frames, as they are without encryption. */
 static void take(struct conn *c, const unsigned char *bytes, size_t size)
 {

@@ -17,7 +17,7 @@ struct conn;
 
 struct conn_events {
 	void (*opened)(void *user); /* conn_connect only, with TLS after the handshake; may be NULL */
-	/* The envelope may be taken (copied and zeroed); the payload is there during the call only. */
+	/* The envelope may be taken (copied and zeroed); the payload is there during the call only, but for conn_take_payload. */
 	void (*message)(void *user, struct envelope *env, const unsigned char *payload, size_t payload_size);
 	void (*drained)(void *user); /* all that was sent is with the kernel; may be NULL */
 	void (*closed)(void *user, const char *why);
@@ -49,6 +49,8 @@ bool conn_distrust(const struct conn *c);
 /* Packs and sends; the payload is copied. A failure closes the connection, so callers need not look. */
 void conn_send(struct conn *c, const Farm__Envelope *message, const void *payload, size_t payload_size);
 void conn_send_frame(struct conn *c, unsigned char *frame, size_t size); /* takes the mem_alloc'd frame */
+/* Within `message`, once: its payload is the caller's from now on. */
+struct buf conn_take_payload(struct conn *c);
 size_t conn_unsent(const struct conn *c);
 
 void conn_close(struct conn *c, const char *why);

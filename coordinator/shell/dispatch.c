@@ -105,7 +105,7 @@ static void keep_partials(const struct server *s, const struct lease_key *k)
 	for (size_t i = 0; i < s->result->n_tile_sizes; i++) {
 		char path[SPOOL_PATH_MAX];
 		size_t size;
-		const unsigned char *bytes = batch_tile_bytes(s->result, s->payload, i, &size);
+		const unsigned char *bytes = batch_tile_bytes(s->result, s->payload->bytes, i, &size);
 		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", s->config.keep_partials, number(k->job),
 			 number(k->epoch), k->group, k->part, s->batch->tiles[i].x, s->batch->tiles[i].y);
 		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
@@ -125,7 +125,7 @@ static void merge(struct server *s, const struct action *a)
 		keep_partials(s, &a->key);
 	uint64_t rounds = order_rounds(o);
 	int rc = durable_merged(s, o, &e);
-	if (!rc && (rc = order_merge(o, s->batch, &e)) == -ENOMEM) { /* half merged; the journal has it whole */
+	if (!rc && (rc = order_merge(o, s->batch, &e)) == -ENOMEM) { /* half merged; nobody was told that it is stored */
 		log_event(LOG_STOP, "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
 		_exit(1);
 	}
@@ -282,7 +282,7 @@ static void finish(struct server *s, struct order *o)
 	order_free(o);
 	while (late) { /* the core says that the job is over */
 		struct waiting_batch *next = late->next;
-		server_result(s, late->peer, &late->envelope, late->payload, late->payload_size);
+		server_result(s, late->peer, &late->envelope, &late->payload);
 		waiting_batch_free(late);
 		late = next;
 	}

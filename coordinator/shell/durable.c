@@ -16,6 +16,7 @@
 #include <string.h>
 
 enum { PINNED_ROOM = 512 /* for the record of the fingerprint before the first batch */ };
+enum { NOBODY = 0 /* peers are counted from 1 */ };
 
 /* A job that has ended, of which the disk does not know it yet. */
 struct ending {
@@ -25,7 +26,7 @@ struct ending {
 
 struct durable_ack {
 	struct durable_ack *next;
-	uint64_t peer;
+	uint64_t peer; /* NOBODY: no answer is waited for */
 	struct lease_key key;
 	enum ack ack;
 	bool failed;
@@ -114,6 +115,8 @@ static int end(struct server *s, const struct job_record *r, bool kept, struct e
 int durable_end(struct server *s, struct order *o)
 {
 	struct error e;
+	if (o->journal && journal_write(o->journal, &e)) /* for whoever extends it; what is not stored is computed again */
+		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	int rc = end(s, &o->record, keep_order(s, o), &e);
 	if (rc)
 		order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
@@ -179,15 +182,16 @@ int durable_reserve(struct server *s, struct order *o, struct error *e)
 	int rc = envelope_pack(&m, NULL, 0, &s->frame, &s->frame_size, e);
 	if (rc)
 		return rc;
-	frame_prefix_write(s->frame, (uint32_t)(s->frame_size - FRAME_PREFIX), (uint32_t)s->payload_size);
-	rc = journal_reserve(o->journal, s->frame_size + s->payload_size + PINNED_ROOM, e);
+	size_t size = s->frame_size + s->payload->size;
+	frame_prefix_write(s->frame, (uint32_t)(s->frame_size - FRAME_PREFIX), (uint32_t)s->payload->size);
+	rc = journal_reserve(o->journal, size + PINNED_ROOM, e);
 	if (rc == -ENOSPC && keep_drop_all(s))
-		rc = journal_reserve(o->journal, s->frame_size + s->payload_size + PINNED_ROOM, e);
+		rc = journal_reserve(o->journal, size + PINNED_ROOM, e);
 	if (!rc && o->canvas && s->batch->key.kind == LEASE_RENDER)
 		rc = canvas_reserve(o->canvas, s->batch, e);
 	if (!rc)
 		return 0;
-	o->held_bytes = s->frame_size + s->payload_size;
+	o->held_bytes = size;
 	durable_hold(s, o, "its results cannot be stored", e->text);
 	return rc;
 }
@@ -199,7 +203,7 @@ static int write_pinned(struct server *s, struct order *o, double elapsed, struc
 	if (o->pinned || !farm_job(s->farm, o->id, server_now(s), &status) || !*status.fingerprint)
 		return 0;
 	o->pinned = true;
-	return journal_append(o->journal, JOURNAL_PINNED, elapsed, status.fingerprint, strlen(status.fingerprint), NULL, 0, e);
+	return journal_append(o->journal, JOURNAL_PINNED, elapsed, status.fingerprint, strlen(status.fingerprint), NULL, e);
 }
 
 int durable_merged(struct server *s, struct order *o, struct error *e)
@@ -208,7 +212,7 @@ int durable_merged(struct server *s, struct order *o, struct error *e)
 	assert(s->frame && o->journal);
 	int rc = write_pinned(s, o, elapsed, e);
 	if (!rc)
-		rc = journal_append(o->journal, JOURNAL_BATCH, elapsed, s->frame, s->frame_size, s->payload, s->payload_size, e);
+		rc = journal_append(o->journal, JOURNAL_BATCH, elapsed, s->frame, s->frame_size, s->payload, e);
 	if (rc) { /* what is merged but not written must not be acknowledged */
 		journal_release(o->journal);
 		o->journal = NULL;
@@ -316,6 +320,15 @@ void durable_ack(struct server *s, const struct order *o, uint64_t peer, const s
 
 /* ---- the rest ---- */
 
+/* What nobody waits for: it need not be safe at once, but soon. */
+static int append_note(struct server *s, const struct order *o, enum journal_kind kind, double elapsed, const void *bytes, size_t size, struct error *e)
+{
+	int rc = journal_append(o->journal, kind, elapsed, bytes, size, NULL, e);
+	if (!rc)
+		durable_ack(s, o, NOBODY, &(struct lease_key){.job = o->id}, ACK_REPEAT);
+	return rc;
+}
+
 void durable_look(struct server *s, uint64_t job)
 {
 	struct order *o = server_order(s, job);
@@ -328,7 +341,7 @@ void durable_look(struct server *s, uint64_t job)
 		return;
 	o->look_written = l->work;
 	/* Only forecasts are made of it: the look itself is taken again. */
-	if (journal_append(o->journal, JOURNAL_LOOK, farm_elapsed(s->farm, job, server_now(s)), l, sizeof *l, NULL, 0, &e))
+	if (append_note(s, o, JOURNAL_LOOK, farm_elapsed(s->farm, job, server_now(s)), l, sizeof *l, &e))
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
@@ -339,7 +352,7 @@ static void write_counts(struct server *s, struct order *o)
 	struct error e;
 	if (o->ended || !o->journal || !farm_counts(s->farm, o->id, &now) || memcmp(&now, &o->counts, sizeof now) == 0)
 		return;
-	if (journal_append(o->journal, JOURNAL_COUNTS, o->times.elapsed, &now, sizeof now, NULL, 0, &e) == 0)
+	if (append_note(s, o, JOURNAL_COUNTS, o->times.elapsed, &now, sizeof now, &e) == 0)
 		o->counts = now;
 }
 

@@ -214,19 +214,14 @@ void order_count_worker(struct order *o, uint64_t peer)
 
 /* ---- results that wait ---- */
 
-bool order_put_off(struct order *o, uint64_t peer, struct envelope *env, const unsigned char *payload, size_t size)
+bool order_put_off(struct order *o, uint64_t peer, struct envelope *env, struct buf *payload)
 {
 	struct waiting_batch *w = mem_alloc(1, sizeof *w);
-	unsigned char *copy = mem_alloc(size, 1);
-	if (!w || !copy) {
-		mem_free(w);
-		mem_free(copy);
+	if (!w)
 		return false;
-	}
-	if (size)
-		memcpy(copy, payload, size);
-	*w = (struct waiting_batch){NULL, peer, *env, copy, size};
+	*w = (struct waiting_batch){NULL, peer, *env, *payload};
 	memset(env, 0, sizeof *env);
+	memset(payload, 0, sizeof *payload);
 	*o->waiting_last = w;
 	o->waiting_last = &w->next;
 	return true;
@@ -246,7 +241,7 @@ struct waiting_batch *order_take_waiting(struct order *o)
 void waiting_batch_free(struct waiting_batch *w)
 {
 	envelope_fini(&w->envelope);
-	mem_free(w->payload);
+	buf_fini(&w->payload);
 	mem_free(w);
 }
 

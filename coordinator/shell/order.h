@@ -19,8 +19,7 @@ struct waiting_batch {
 	struct waiting_batch *next;
 	uint64_t peer;
 	struct envelope envelope;
-	unsigned char *payload;
-	size_t payload_size;
+	struct buf payload;
 };
 
 /* Seconds after the job's first lease, in this life and those before: at the last merged batch, when the first round opened, when the
@@ -98,8 +97,8 @@ int order_prepare(struct order *o, const char *canvas_folder, struct error *e);
 int order_pack_lease(const struct order *o, const struct lease_key *k, unsigned char **frame, size_t *size, struct error *e);
 void order_count_worker(struct order *o, uint64_t peer);
 
-/* false: memory is out. */
-bool order_put_off(struct order *o, uint64_t peer, struct envelope *env, const unsigned char *payload, size_t size);
+/* Takes both. false: memory is out. */
+bool order_put_off(struct order *o, uint64_t peer, struct envelope *env, struct buf *payload);
 struct waiting_batch *order_take_waiting(struct order *o); /* NULL: none */
 void waiting_batch_free(struct waiting_batch *w);
 

@@ -130,8 +130,7 @@ struct order *server_order(const struct server *s, uint64_t job)
 	return NULL;
 }
 
-static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult *m, const unsigned char *payload,
-			size_t size)
+static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_BATCH, .peer = peer, .lease = {.valid = true}};
 	struct error e = {""};
@@ -144,7 +143,7 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	}
 	ev.job = ev.lease.key.job;
 	struct order *o = server_order(s, ev.job);
-	int rc = o ? batch_unpack(&batch, &o->plan, m, payload, size, &e) : 0;
+	int rc = o ? batch_unpack(&batch, &o->plan, m, payload->bytes, payload->size, &e) : 0;
 	if (o && !rc && farm_verifies(s->farm, &ev.lease.key))
 		rc = digest_batch(&batch, &ev.lease.digest, &e);
 	ev.lease.valid = rc == 0;
@@ -152,7 +151,6 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	s->batch = &batch;
 	s->result = m;
 	s->payload = payload;
-	s->payload_size = size;
 	if (rc == -ENOMEM || (o && ev.lease.valid && durable_reserve(s, o, &e))) { /* no room for it, here or on the disk */
 		struct session *p = session_find(s, peer);
 		if (p) /* it can be made again */
@@ -165,18 +163,18 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	s->frame = NULL;
 }
 
-void server_result(struct server *s, uint64_t peer, struct envelope *env, const unsigned char *payload, size_t size)
+void server_result(struct server *s, uint64_t peer, struct envelope *env, struct buf *payload)
 {
 	const Farm__LeaseResult *m = env->message->lease_result;
 	struct order *o = m->key ? server_order(s, m->key->job) : NULL;
 	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer};
 	struct error e;
 	if (!o || !o->busy) {
-		take_result(s, peer, m, payload, size);
+		take_result(s, peer, m, payload);
 		return;
 	}
 	bool named = lease_key_from_wire(m->key, &ev.lease.key, &e) == 0;
-	if (!order_put_off(o, peer, env, payload, size)) {
+	if (!order_put_off(o, peer, env, payload)) {
 		struct session *p = session_find(s, peer);
 		if (p)
 			session_fault(p, "no memory for a result");
@@ -196,7 +194,7 @@ static void on_drain(uv_timer_t *t)
 	if (!o)
 		return;
 	struct waiting_batch *w = order_take_waiting(o);
-	server_result(s, w->peer, &w->envelope, w->payload, w->payload_size);
+	server_result(s, w->peer, &w->envelope, &w->payload);
 	waiting_batch_free(w);
 	if (!s->stopping)
 		uv_timer_start(&s->drain, on_drain, 0, 0);

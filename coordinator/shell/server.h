@@ -100,8 +100,7 @@ struct server {
 	/* What the current event brought; NULL when it did not. */
 	struct batch *batch;
 	const Farm__LeaseResult *result;
-	const unsigned char *payload;
-	size_t payload_size;
+	struct buf *payload;
 	unsigned char *frame; /* the result as the journal takes it, but for the payload */
 	size_t frame_size;
 	struct session *submitter;
@@ -119,8 +118,8 @@ struct order *server_order(const struct server *s, uint64_t job);
 const char *server_film_folder(const struct server *s, const struct plan *p);
 /* The order's canvas is free again: what waited goes on. */
 void server_order_free_again(struct server *s, struct order *o);
-/* A result from a worker: now, or when the canvas is free. */
-void server_result(struct server *s, uint64_t peer, struct envelope *env, const unsigned char *payload, size_t size);
+/* A result from a worker: now, or when the canvas is free. May take either. */
+void server_result(struct server *s, uint64_t peer, struct envelope *env, struct buf *payload);
 
 /* false: no such job. Looks at living jobs, then at ended ones, then into the spool. */
 bool server_view(struct server *s, uint64_t job, struct job_view *v);

@@ -283,7 +283,14 @@ static void take_blob_get(struct session *p, const Farm__BlobGet *g)
 	mem_free(bytes);
 }
 
-static void worker_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
+static void take_lease_result(struct session *p, struct envelope *env)
+{
+	struct buf payload = conn_take_payload(p->conn);
+	server_result(p->server, p->id, env, &payload);
+	buf_fini(&payload);
+}
+
+static void worker_message(struct session *p, struct envelope *env)
 {
 	struct event ev = {.kind = EVENT_HEARD, .peer = p->id};
 	const Farm__Envelope *m = env->message;
@@ -300,7 +307,7 @@ static void worker_message(struct session *p, struct envelope *env, const unsign
 	case FARM__ENVELOPE__BODY_LEASE_RESULT:
 		server_step(p->server, &ev);
 		if (p->joined)
-			server_result(p->server, p->id, env, payload, size);
+			take_lease_result(p, env);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_FAILED:
 		take_lease_failed(p, m->lease_failed);
@@ -329,7 +336,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 	else if (p->state == SESSION_NEW)
 		session_fault(p, "the first word must be hello");
 	else if (p->state == SESSION_WORKER)
-		worker_message(p, env, payload, size);
+		worker_message(p, env);
 	else if (p->state == SESSION_CLIENT)
 		session_client_message(p, env, payload, size);
 }

@@ -6,6 +6,7 @@
 #include "common/base/mem.h"
 
 #include <fcntl.h>
+#include <pthread.h>
 #include <stdatomic.h>
 #include <stdbool.h>
 #include <stdio.h>
@@ -14,6 +15,8 @@
 enum { PATH_MOST = 4200 };
 /* Room is taken for several records at once: a file system that is writing back makes whoever asks for it wait. */
 enum { AHEAD = 8, AHEAD_MOST = 1 << 28 };
+/* More than that does not wait in memory: whoever appends writes, too, as fast as the disk takes it. */
+enum { UNWRITTEN_MOST = 1 << 28 };
 
 struct head { /* of the file */
 	char magic[8];
@@ -27,16 +30,26 @@ struct record { /* before its body */
 	double elapsed;
 };
 
+struct unwritten {
+	struct unwritten *next;
+	struct record record;
+	struct buf a, b; /* its body */
+};
+
 struct journal {
 	int fd;
 	uint64_t generation;
 	atomic_uint holders;
-	_Atomic uint64_t bytes, synced; /* in the file */
-	uint64_t room;                  /* the disk has it, up to this byte of the file */
-	atomic_bool bad;                /* a call on the file failed: it is not written any more, nor believed */
-	atomic_bool settled;            /* all of it is stored elsewhere */
-	atomic_uint flushes;            /* under way */
-	struct buf tail;                /* what was appended since it is bad */
+	pthread_mutex_t writer; /* held while the file is written or cut; taken before `list` */
+	pthread_mutex_t list;   /* held for a moment only: of the next three */
+	struct unwritten *first, **last;
+	uint64_t waiting;                /* their bytes; what the file will have is written + waiting */
+	_Atomic uint64_t written, synced; /* in the file */
+	_Atomic uint64_t room;            /* the disk has it, up to this byte of the file */
+	_Atomic uint64_t record;          /* the size of one, as room was asked for last */
+	atomic_bool bad;                  /* a call on the file failed: it is not written any more, nor believed */
+	atomic_bool settled;              /* all of it is stored elsewhere */
+	atomic_uint flushes;              /* under way */
 	char path[PATH_MOST];
 };
 
@@ -68,7 +81,9 @@ static struct journal *make(const char *folder, uint64_t generation, int flags, 
 		return NULL;
 	}
 	j->generation = generation;
-	j->tail.limit = SIZE_MAX;
+	j->last = &j->first;
+	pthread_mutex_init(&j->writer, NULL);
+	pthread_mutex_init(&j->list, NULL);
 	atomic_init(&j->holders, 1);
 	snprintf(j->path, sizeof j->path, "%s/journal.%llu", folder, (unsigned long long)generation);
 	j->fd = disk_open(j->path, flags | O_CLOEXEC, 0600);
@@ -80,24 +95,110 @@ void journal_hold(struct journal *j)
 	atomic_fetch_add(&j->holders, 1);
 }
 
-/* Gives back what nothing was written to. */
+/* ---- what waits to be written ---- */
+
+static struct unwritten *front(struct journal *j)
+{
+	pthread_mutex_lock(&j->list);
+	struct unwritten *n = j->first;
+	pthread_mutex_unlock(&j->list);
+	return n;
+}
+
+static uint64_t size_of(const struct record *r)
+{
+	return sizeof *r + r->size;
+}
+
+static void pop(struct journal *j)
+{
+	pthread_mutex_lock(&j->list);
+	struct unwritten *n = j->first;
+	j->first = n->next;
+	if (!j->first)
+		j->last = &j->first;
+	j->waiting -= size_of(&n->record);
+	j->written += size_of(&n->record);
+	pthread_mutex_unlock(&j->list);
+	buf_fini(&n->a);
+	buf_fini(&n->b);
+	mem_free(n);
+}
+
+static void drop_all(struct journal *j)
+{
+	while (j->first)
+		pop(j);
+}
+
+static int write_parts(int fd, off_t at, struct iovec *part, int count)
+{
+	while (count) {
+		ssize_t n = disk_pwritev(fd, part, count, at);
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n <= 0)
+			return n < 0 ? -errno : -ENOSPC;
+		at += n;
+		for (; count && (size_t)n >= part->iov_len; part++, count--)
+			n -= (ssize_t)part->iov_len;
+		if (count) {
+			part->iov_base = (char *)part->iov_base + n;
+			part->iov_len -= (size_t)n;
+		}
+	}
+	return 0;
+}
+
+static int write_one(int fd, uint64_t at, struct unwritten *n)
+{
+	struct record *r = &n->record;
+	r->check = check_record(r, n->a.bytes, n->a.size, n->b.bytes, n->b.size);
+	struct iovec parts[3] = {{r, sizeof *r}, {n->a.bytes, n->a.size}, {n->b.bytes, n->b.size}};
+	return write_parts(fd, (off_t)at, parts, 3);
+}
+
+/* Gives back what nothing was written to; the writer's lock is held. */
 static int cut_off(struct journal *j)
 {
 	j->room = 0;
-	return disk_ftruncate(j->fd, (off_t)j->bytes);
+	return disk_ftruncate(j->fd, (off_t)j->written);
+}
+
+/* All that waited when this began. */
+static int write_waiting(struct journal *j)
+{
+	int rc = 0;
+	pthread_mutex_lock(&j->writer);
+	for (struct unwritten *n; !rc && !j->bad && (n = front(j));) {
+		rc = write_one(j->fd, j->written, n);
+		if (!rc) {
+			pop(j);
+			continue;
+		}
+		int cut = cut_off(j); /* a torn record that could not be cut off would be cut off by whoever reads it */
+		(void)cut;
+		j->bad = true;
+	}
+	pthread_mutex_unlock(&j->writer);
+	return rc;
 }
 
 void journal_release(struct journal *j)
 {
 	if (!j || atomic_fetch_sub(&j->holders, 1) > 1)
 		return;
-	if (j->fd >= 0 && j->room > j->bytes && !j->bad && !j->settled) {
-		int cut = cut_off(j); /* else it goes with the file */
-		(void)cut;
+	if (j->fd >= 0 && !j->bad && !j->settled) { /* nobody was told that it is stored */
+		int rc = write_waiting(j);
+		if (!rc && j->room > j->written)
+			rc = cut_off(j); /* else it goes with the file */
+		(void)rc;
 	}
+	drop_all(j);
 	if (j->fd >= 0)
 		disk_close(j->fd);
-	buf_fini(&j->tail);
+	pthread_mutex_destroy(&j->list);
+	pthread_mutex_destroy(&j->writer);
 	mem_free(j);
 }
 
@@ -120,7 +221,7 @@ int journal_create(struct journal **out, const char *folder, uint64_t job, uint6
 		journal_release(j);
 		return rc;
 	}
-	j->bytes = j->synced = sizeof h;
+	j->written = j->synced = sizeof h;
 	*out = j;
 	return 0;
 }
@@ -148,20 +249,20 @@ static bool head_fits(const struct head *h, uint64_t job, uint64_t generation)
 	return memcmp(h->magic, magic, sizeof magic) == 0 && h->check == check_head(h) && h->job == job && h->generation == generation;
 }
 
-/* The record at j->bytes, and beyond it. 0: it is not whole; else what the visitor says, or 1. */
+/* The record at j->written, and beyond it. 0: it is not whole; else what the visitor says, or 1. */
 static int visit_next(struct journal *j, uint64_t end, journal_visit *visit, void *user, struct error *e)
 {
 	struct record r;
-	if (end - j->bytes < sizeof r || !read_at(j->fd, &r, sizeof r, j->bytes) || r.size > end - j->bytes - sizeof r)
+	if (end - j->written < sizeof r || !read_at(j->fd, &r, sizeof r, j->written) || r.size > end - j->written - sizeof r)
 		return 0;
 	unsigned char *body = mem_alloc(r.size, 1);
 	if (!body)
 		return error_set(e, ENOMEM, "no memory for a record of %u bytes", r.size);
 	int rc = 0;
-	if (read_at(j->fd, body, r.size, j->bytes + sizeof r) && r.check == check_record(&r, body, r.size, NULL, 0)) {
+	if (read_at(j->fd, body, r.size, j->written + sizeof r) && r.check == check_record(&r, body, r.size, NULL, 0)) {
 		rc = visit(user, (enum journal_kind)r.kind, r.elapsed, body, r.size, e);
 		rc = rc ? rc : 1;
-		j->bytes += sizeof r + r.size;
+		j->written += sizeof r + r.size;
 	}
 	mem_free(body);
 	return rc;
@@ -176,15 +277,15 @@ static int read_all(struct journal *j, uint64_t job, journal_visit *visit, void 
 	uint64_t end = (uint64_t)st.st_size;
 	if (!read_at(j->fd, &h, sizeof h, 0) || !head_fits(&h, job, j->generation))
 		return error_set(e, EBADMSG, "%s: not the journal of j%llu", j->path, (unsigned long long)job);
-	j->bytes = sizeof h;
+	j->written = sizeof h;
 	int rc;
 	do
 		rc = visit_next(j, end, visit, user, e);
 	while (rc > 0);
-	*cut = end - j->bytes;
+	*cut = end - j->written;
 	if (rc < 0)
 		return rc;
-	if (*cut && disk_ftruncate(j->fd, (off_t)j->bytes))
+	if (*cut && disk_ftruncate(j->fd, (off_t)j->written))
 		return fault(j, errno, e);
 	return disk_fsync(j->fd) ? fault(j, errno, e) : 0;
 }
@@ -201,87 +302,89 @@ int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_
 		journal_release(j);
 		return rc;
 	}
-	atomic_store(&j->synced, atomic_load(&j->bytes));
+	atomic_store(&j->synced, atomic_load(&j->written));
 	*out = j;
 	return 0;
 }
 
-/* ---- writing ---- */
+/* ---- appending ---- */
 
-static bool reserve(struct journal *j, uint64_t size)
+uint64_t journal_bytes(struct journal *j)
 {
-	if (disk_fallocate(j->fd, FALLOC_FL_KEEP_SIZE, (off_t)j->bytes, (off_t)size))
+	pthread_mutex_lock(&j->list);
+	uint64_t bytes = j->written + j->waiting;
+	pthread_mutex_unlock(&j->list);
+	return bytes;
+}
+
+static bool reserve(struct journal *j, uint64_t from, uint64_t size)
+{
+	if (disk_fallocate(j->fd, FALLOC_FL_KEEP_SIZE, (off_t)from, (off_t)size))
 		return false;
-	j->room = j->bytes + size;
+	j->room = from + size;
 	return true;
 }
 
-int journal_reserve(struct journal *j, size_t body, struct error *e)
+static int room_for(struct journal *j, uint64_t size, struct error *e)
 {
-	uint64_t size = sizeof(struct record) + body;
+	uint64_t end = journal_bytes(j);
 	if (j->bad)
 		return fault(j, EIO, e);
-	if (j->bytes + size <= j->room || (AHEAD * size <= AHEAD_MOST && reserve(j, AHEAD * size)) || reserve(j, size) || errno == EOPNOTSUPP || errno == ENOSYS)
+	if (end + size <= j->room || (AHEAD * size <= AHEAD_MOST && reserve(j, end, AHEAD * size)) || reserve(j, end, size) || errno == EOPNOTSUPP || errno == ENOSYS)
 		return 0;
 	int code = errno;
+	pthread_mutex_lock(&j->writer);
 	int cut = cut_off(j);
+	pthread_mutex_unlock(&j->writer);
 	(void)cut;
 	return fault(j, code, e);
 }
 
-static int write_parts(struct journal *j, struct iovec *part, int count)
+int journal_reserve(struct journal *j, size_t body, struct error *e)
 {
-	off_t at = (off_t)j->bytes;
-	while (count) {
-		ssize_t n = disk_pwritev(j->fd, part, count, at);
-		if (n < 0 && errno == EINTR)
-			continue;
-		if (n <= 0)
-			return n < 0 ? -errno : -ENOSPC;
-		at += n;
-		for (; count && (size_t)n >= part->iov_len; part++, count--)
-			n -= (ssize_t)part->iov_len;
-		if (count) {
-			part->iov_base = (char *)part->iov_base + n;
-			part->iov_len -= (size_t)n;
-		}
+	j->record = sizeof(struct record) + body;
+	return room_for(j, j->record, e);
+}
+
+/* Before it runs out, by whoever flushes. */
+static void reserve_ahead(struct journal *j)
+{
+	uint64_t size = j->record, end = journal_bytes(j);
+	if (size && AHEAD * size <= AHEAD_MOST && end + AHEAD / 2 * size > j->room)
+		reserve(j, end, AHEAD * size);
+}
+
+int journal_append(struct journal *j, enum journal_kind kind, double elapsed, const void *a, size_t a_size, struct buf *b,
+		   struct error *e)
+{
+	size_t b_size = b ? b->size : 0;
+	if (a_size > UINT32_MAX || b_size > UINT32_MAX - a_size)
+		return error_set(e, EFBIG, "%s: a record of %zu bytes", j->path, a_size + b_size);
+	if (kind != JOURNAL_BATCH && kind != JOURNAL_PINNED && !j->bad) { /* it may stay away, but must not make the journal bad */
+		int rc = room_for(j, sizeof(struct record) + a_size + b_size, e);
+		if (rc)
+			return rc;
 	}
+	struct unwritten *n = mem_alloc(1, sizeof *n);
+	if (n)
+		*n = (struct unwritten){.record = {.size = (uint32_t)(a_size + b_size), .kind = kind, .elapsed = elapsed}, .a.limit = a_size};
+	if (!n || !buf_append(&n->a, a, a_size)) {
+		mem_free(n);
+		return error_set(e, ENOMEM, "no memory for a record of %zu bytes", a_size + b_size);
+	}
+	if (b) {
+		n->b = *b;
+		memset(b, 0, sizeof *b);
+	}
+	pthread_mutex_lock(&j->list);
+	*j->last = n;
+	j->last = &n->next;
+	j->waiting += size_of(&n->record);
+	bool many = j->waiting > UNWRITTEN_MOST;
+	pthread_mutex_unlock(&j->list);
+	if (many && !j->bad)
+		write_waiting(j); /* a journal that has become bad says so */
 	return 0;
-}
-
-/* struct iovec is for reading too, so that its pointer is not to const. */
-static struct iovec part_of(const void *bytes, size_t size)
-{
-	struct iovec v = {.iov_len = size};
-	memcpy(&v.iov_base, &bytes, sizeof bytes);
-	return v;
-}
-
-int journal_append(struct journal *j, enum journal_kind kind, double elapsed, const void *a, size_t a_size, const void *b,
-		   size_t b_size, struct error *e)
-{
-	size_t size = a_size + b_size;
-	if (size > UINT32_MAX)
-		return error_set(e, EFBIG, "%s: a record of %zu bytes", j->path, size);
-	struct record r = {.size = (uint32_t)size, .kind = kind, .elapsed = elapsed};
-	r.check = check_record(&r, a, a_size, b, b_size);
-	struct iovec parts[3] = {part_of(&r, sizeof r), part_of(a, a_size), part_of(b, b_size)};
-	size_t before = j->tail.size;
-	int rc = j->bad ? -EIO : write_parts(j, parts, 3);
-	if (!rc) {
-		j->bytes += sizeof r + size;
-		return 0;
-	}
-	if (!j->bad) { /* a torn record that could not be cut off would be cut off by whoever reads it */
-		int cut = cut_off(j);
-		if (!cut && rc == -ENOSPC && kind != JOURNAL_BATCH && kind != JOURNAL_PINNED)
-			return fault(j, -rc, e);
-		j->bad = true;
-	}
-	if (buf_append(&j->tail, &r, sizeof r) && buf_append(&j->tail, a, a_size) && buf_append(&j->tail, b, b_size))
-		return 0;
-	j->tail.size = before;
-	return error_set(e, ENOMEM, "no memory for a record of %zu bytes", size);
 }
 
 bool journal_is_bad(const struct journal *j)
@@ -294,14 +397,14 @@ void journal_settle(struct journal *j)
 	j->settled = true;
 }
 
-/* All whole records as they are read, each checked again, into another file. */
+/* All records of the file as they are read, each checked again, and those that wait, into another file. */
 static int copy_records(struct journal *j, int to, struct error *e)
 {
 	struct record r;
 	uint64_t at = sizeof(struct head);
 	int rc = 0;
-	for (; !rc && at < j->bytes; at += sizeof r + r.size) {
-		if (!read_at(j->fd, &r, sizeof r, at) || r.size > j->bytes - at - sizeof r)
+	for (; !rc && at < j->written; at += size_of(&r)) {
+		if (!read_at(j->fd, &r, sizeof r, at) || r.size > j->written - at - sizeof r)
 			return fault(j, EIO, e);
 		unsigned char *body = mem_alloc(r.size, 1);
 		if (!body)
@@ -312,6 +415,9 @@ static int copy_records(struct journal *j, int to, struct error *e)
 			rc = fault(j, -rc, e);
 		mem_free(body);
 	}
+	for (struct unwritten *n = j->first; !rc && n; at += size_of(&n->record), n = n->next)
+		if ((rc = write_one(to, at, n)))
+			rc = fault(j, -rc, e);
 	return rc;
 }
 
@@ -328,8 +434,6 @@ int journal_renew(struct journal *j, struct error *e)
 		return fault(j, EIO, e);
 	int fd = disk_open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
 	int rc = fd < 0 ? fault(j, errno, e) : disk_write_all(fd, &h, sizeof h) ? fault(j, errno ? errno : ENOSPC, e) : copy_records(j, fd, e);
-	if (!rc && disk_write_all(fd, j->tail.bytes, j->tail.size))
-		rc = fault(j, errno ? errno : ENOSPC, e);
 	if (!rc && (disk_fsync(fd) || disk_rename(path, j->path)))
 		rc = fault(j, errno, e);
 	if (!rc)
@@ -342,16 +446,11 @@ int journal_renew(struct journal *j, struct error *e)
 	}
 	disk_close(j->fd);
 	j->fd = fd;
-	j->bytes += j->tail.size;
-	j->synced = j->bytes;
-	j->tail.size = 0;
+	drop_all(j);
+	j->synced = j->written;
+	j->room = 0;
 	j->bad = false;
 	return 0;
-}
-
-uint64_t journal_bytes(const struct journal *j)
-{
-	return j->bytes + j->tail.size;
 }
 
 uint64_t journal_generation(const struct journal *j)
@@ -359,24 +458,33 @@ uint64_t journal_generation(const struct journal *j)
 	return j->generation;
 }
 
+int journal_write(struct journal *j, struct error *e)
+{
+	int rc = j->settled ? 0 : j->bad ? -EIO : write_waiting(j);
+	return rc ? fault(j, -rc, e) : 0;
+}
+
 int journal_sync(struct journal *j, struct error *e)
 {
-	int rc = 0;
 	if (j->settled)
 		return 0;
 	atomic_fetch_add(&j->flushes, 1); /* before it is asked whether it is bad: a bad one may be renewed at any time */
-	uint64_t bytes = j->bytes;
-	if (j->bad) {
-		rc = fault(j, EIO, e);
-	} else if (bytes != j->synced && disk_fdatasync(j->fd)) {
-		rc = fault(j, errno, e);
-		j->bad = true;
-	} else {
-		j->synced = bytes;
-		disk_forget(j->fd);
+	int rc = j->bad ? -EIO : write_waiting(j);
+	uint64_t written = j->written;
+	if (!rc && j->bad) {
+		rc = -EIO;
+	} else if (!rc && written != j->synced) {
+		if (disk_fdatasync(j->fd)) {
+			rc = -errno;
+			j->bad = true;
+		} else {
+			j->synced = written;
+			disk_forget(j->fd);
+			reserve_ahead(j);
+		}
 	}
 	atomic_fetch_sub(&j->flushes, 1);
-	return rc;
+	return rc ? fault(j, -rc, e) : 0;
 }
 
 void journal_clear(const char *folder, uint64_t keep)

@@ -1,9 +1,10 @@
 /*
  * A job's journal: what was merged since its last checkpoint, one record after the other in jobs/jN/journal.G (G counts the
  * checkpoints). A record is believed when its checksum fits; the first that does not, and all behind it, were not whole when
- * the machine stopped, and are cut off. What is appended is durable after journal_sync.
+ * the machine stopped, and are cut off. What is appended waits in memory, up to 256 MB, until journal_sync writes it and flushes it:
+ * after that it is durable. So whoever appends does not wait for a disk that is busy.
  * A file of which a call failed is bad: it is neither written nor flushed again, because a flush that failed may have forgotten
- * what it did not write and would say next time that all is well. What is appended from then on is kept in memory until
+ * what it did not write and would say next time that all is well. What is appended from then on stays in memory until
  * journal_renew has brought all into a new file. (Who reads a journal believes what is read: the machine that failed to write it
  * has forgotten that with its process.)
  * One thread at a time, but journal_sync may run beside the others: the handle is counted, so that a flush outlives a close.
@@ -12,6 +13,7 @@
 #ifndef COORDINATOR_STORE_JOURNAL_H
 #define COORDINATOR_STORE_JOURNAL_H
 
+#include "common/base/buf.h"
 #include "common/base/error.h"
 
 #include <stdbool.h>
@@ -42,12 +44,13 @@ void journal_release(struct journal *j); /* NULL: nothing */
 
 /* Room on the disk for a record with a body of so many bytes, so that appending it does not fail for want of it. -ENOSPC */
 int journal_reserve(struct journal *j, size_t body, struct error *e);
-/* The body is a and b, one behind the other. A record that cannot be written makes the journal bad, and stays in memory: -ENOMEM,
- * -EFBIG; but what is not of the result (looks, counts) is just not written when the disk is full: -ENOSPC. */
-int journal_append(struct journal *j, enum journal_kind kind, double elapsed, const void *a, size_t a_size, const void *b,
-		   size_t b_size, struct error *e);
-uint64_t journal_bytes(const struct journal *j); /* all that was appended, or read */
+/* The body is a, copied, and b (NULL: nothing), taken if this succeeds. -ENOMEM, -EFBIG; and what is not of the result (looks,
+ * counts) is not taken when the disk has no room for it: -ENOSPC. A journal that is bad takes all. */
+int journal_append(struct journal *j, enum journal_kind kind, double elapsed, const void *a, size_t a_size, struct buf *b, struct error *e);
+uint64_t journal_bytes(struct journal *j); /* all that was appended, or read */
 uint64_t journal_generation(const struct journal *j);
+/* All that was appended before the call is in the file when it returns; for whoever opens it. The machine may still lose it. */
+int journal_write(struct journal *j, struct error *e);
 /* All that was appended before the call is durable when it returns; costs nothing when it was already. Any thread, one at a
  * time. */
 int journal_sync(struct journal *j, struct error *e);

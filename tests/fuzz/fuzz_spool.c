@@ -88,7 +88,7 @@ static void write_journal(const char *spool, const uint8_t *bytes, size_t size)
 	while (size > 3) {
 		size_t n = (size_t)bytes[1] << 8 | bytes[2];
 		n = n < size - 3 ? n : size - 3;
-		journal_append(j, (enum journal_kind)(*bytes % 5), *bytes, bytes + 3, n, NULL, 0, &e);
+		journal_append(j, (enum journal_kind)(*bytes % 5), *bytes, bytes + 3, n, NULL, &e);
 		bytes += 3 + n;
 		size -= 3 + n;
 	}

@@ -14,6 +14,7 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/resource.h>
+#include <sys/stat.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -51,7 +52,10 @@ static void append(struct journal *j, unsigned record)
 	for (size_t i = 0; i < sizes[record]; i++)
 		body[i] = byte_of(record, i);
 	size_t first = sizes[record] / 3;
-	assert_int_equal(journal_append(j, (enum journal_kind)(1 + record % 3), 0.5 + record, body, first, body + first, sizes[record] - first, &e), 0);
+	struct buf rest = {.limit = sizes[record]};
+	assert_true(buf_append(&rest, body + first, sizes[record] - first));
+	assert_int_equal(journal_append(j, (enum journal_kind)(1 + record % 3), 0.5 + record, body, first, &rest, &e), 0);
+	assert_null(rest.bytes);
 }
 
 /* bytes of the file after each record; [0]: without any */
@@ -236,7 +240,9 @@ static void no_room(void **state)
 	small = (struct rlimit){ends[RECORDS] + 40, old.rlim_max};
 	assert_int_equal(setrlimit(RLIMIT_FSIZE, &small), 0);
 	char body[100] = {0};
-	assert_int_equal(journal_append(j, JOURNAL_BATCH, 9, body, sizeof body, NULL, 0, &e), 0);
+	assert_int_equal(journal_append(j, JOURNAL_BATCH, 9, body, sizeof body, NULL, &e), 0);
+	assert_false(journal_is_bad(j));
+	assert_int_equal(journal_sync(j, &e), -EFBIG);
 	assert_true(journal_is_bad(j));
 	assert_int_equal(journal_renew(j, &e), -EFBIG);
 	assert_int_equal(setrlimit(RLIMIT_FSIZE, &old), 0);
@@ -246,7 +252,7 @@ static void no_room(void **state)
 	assert_int_equal(s.count, RECORDS);
 	assert_int_equal(cut, 0);
 	journal_release(other);
-	assert_int_equal(journal_append(j, JOURNAL_BATCH, 10, body, 3, NULL, 0, &e), 0);
+	assert_int_equal(journal_append(j, JOURNAL_BATCH, 10, body, 3, NULL, &e), 0);
 	assert_int_equal(journal_renew(j, &e), 0);
 	assert_false(journal_is_bad(j));
 	assert_int_equal(journal_sync(j, &e), 0);
@@ -256,6 +262,41 @@ static void no_room(void **state)
 	assert_int_equal(open_again(&j, &s, &cut), 0);
 	assert_int_equal(s.count, RECORDS + 2);
 	assert_int_equal(journal_bytes(j), bytes);
+	journal_release(j);
+}
+
+static off_t length_of_file(void)
+{
+	char path[512];
+	struct stat st;
+	path_of(path);
+	assert_int_equal(stat(path, &st), 0);
+	return st.st_size;
+}
+
+/* What is appended goes to the disk with the flush, or when it is too much to be kept in memory. */
+static void memory_is_bounded(void **state)
+{
+	(void)state;
+	enum { PIECE = 1 << 24, MOST = 1 << 28 };
+	struct journal *j;
+	struct error e;
+	assert_int_equal(journal_create(&j, folder, JOB, GENERATION, &e), 0);
+	off_t empty = length_of_file();
+	for (unsigned n = 0; n <= MOST / PIECE; n++) {
+		struct buf piece = {.limit = PIECE};
+		assert_int_equal(length_of_file(), empty);
+		assert_true(buf_reserve(&piece, PIECE));
+		piece.size = PIECE;
+		assert_int_equal(journal_append(j, JOURNAL_BATCH, 1, "", 0, &piece, &e), 0);
+	}
+	off_t written = length_of_file();
+	assert_true(written > empty + MOST);
+	assert_int_equal(journal_bytes(j), written);
+	assert_int_equal(journal_append(j, JOURNAL_BATCH, 1, "more", 4, NULL, &e), 0);
+	assert_int_equal(length_of_file(), written);
+	assert_int_equal(journal_write(j, &e), 0);
+	assert_int_equal(length_of_file(), journal_bytes(j));
 	journal_release(j);
 }
 
@@ -331,6 +372,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(of_another_job, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(others_are_cleared, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(power_lost, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(memory_is_bounded, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(no_room, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
