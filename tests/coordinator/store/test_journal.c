@@ -283,7 +283,7 @@ static void memory_is_bounded(void **state)
 	struct error e;
 	assert_int_equal(journal_create(&j, folder, JOB, GENERATION, &e), 0);
 	off_t empty = length_of_file();
-	for (unsigned n = 0; n <= MOST / PIECE; n++) {
+	for (unsigned n = 0; n < MOST / PIECE; n++) { /* with their heads it is a little more */
 		struct buf piece = {.limit = PIECE};
 		assert_int_equal(length_of_file(), empty);
 		assert_true(buf_reserve(&piece, PIECE));
