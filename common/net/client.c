@@ -355,7 +355,17 @@ int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd
 	return rc;
 }
 
-static int fetch_file(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, const char *path,
+/* replace: what is there already under that name. */
+static int give_name(const char *temporary, const char *path, bool replace, struct error *e)
+{
+	if ((replace ? rename(temporary, path) : link(temporary, path)) != 0)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	if (!replace)
+		unlink(temporary);
+	return 0;
+}
+
+static int fetch_file(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, const char *path, bool replace,
 		      struct error *e)
 {
 	char temporary[4096];
@@ -372,28 +382,44 @@ static int fetch_file(struct client *cl, struct client_message *first, uint64_t 
 		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
 	if (close(fd) && !rc)
 		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
-	if (!rc && rename(temporary, path))
-		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	if (!rc)
+		rc = give_name(temporary, path, replace, e);
 	if (rc)
 		unlink(temporary);
 	return rc;
 }
 
-int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, char *output, size_t output_size,
-		 struct error *e)
+int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, struct error *e)
 {
 	struct client_message first;
 	int rc = fetch_chunk(cl, job, what, 0, &first, e);
 	if (rc)
 		return rc;
-	if (!path || !*path)
-		path = first.envelope.message->fetch_chunk->output;
-	if (!*path)
-		rc = error_set(e, EINVAL, "the job has no default name for its result: give one with -o FILE");
-	if (!rc && output)
-		text_copy(output, output_size, path);
+	rc = fetch_file(cl, &first, job, what, path, true, e);
+	client_message_fini(&first);
+	return rc;
+}
+
+/* What somebody else called it, as the name of a file here: nothing hidden, nothing that looks like an option. */
+static int take_name(const char *output, char name[CLIENT_NAME_BYTES], struct error *e)
+{
+	struct stat st;
+	const char *slash = strrchr(output, '/'), *last = slash ? slash + 1 : output;
+	if (!envelope_text_ok(last, CLIENT_NAME_BYTES - 1) || !*last || *last == '.' || *last == '-')
+		return error_set(e, EEXIST, "the job has no name for its image that would do here: give one with -o FILE");
+	text_copy(name, CLIENT_NAME_BYTES, last);
+	return lstat(name, &st) == 0 ? error_set(e, EEXIST, "%s is there already: -o FILE replaces what is there", name) : 0;
+}
+
+int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e)
+{
+	struct client_message first;
+	int rc = fetch_chunk(cl, job, what, 0, &first, e);
+	if (rc)
+		return rc;
+	rc = take_name(first.envelope.message->fetch_chunk->output, name, e);
 	if (!rc)
-		rc = fetch_file(cl, &first, job, what, path, e);
+		rc = fetch_file(cl, &first, job, what, name, false, e);
 	client_message_fini(&first);
 	return rc;
 }

@@ -10,6 +10,8 @@
 
 struct client;
 
+enum { CLIENT_NAME_BYTES = 240 };
+
 struct client_message { /* fini with client_message_fini */
 	struct envelope envelope;
 	struct buf payload;
@@ -33,10 +35,11 @@ int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__Body
 		struct error *e);
 void client_message_fini(struct client_message *m);
 
-/* Fetches a job's result or log piece by piece into the file: temporary file beside it, then rename. `output`
- * (may be NULL): the name that hslt-submit gave, when path is NULL or "". */
-int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, char *output, size_t output_size,
-		 struct error *e);
+/* Fetches a job's result or log piece by piece into the file: temporary file beside it, then rename. */
+int client_fetch(struct client *cl, uint64_t job, Farm__What what, const char *path, struct error *e);
+/* The same into the current folder, under the last part of the name that hslt-submit was given. That came over the wire: -EEXIST when
+ * something has that name already, or when it is none that a file of somebody else's choice may have (hidden, like an option). */
+int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e);
 /* The same, to a stream. */
 int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd, struct error *e);
 

@@ -34,7 +34,7 @@ enum { OPTION_INSECURE = 256, OPTION_JSON, OPTION_PREVIEW, OPTION_TLS, OPTION_SP
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
-	{"output", 'o', "FILE", 0, "fetch: where to (the name that hslt-submit was given)", 0},
+	{"output", 'o', "FILE", 0, "fetch: where to, over what is there (without it: into the current folder, under the last part of the name that hslt-submit was given, never over anything)", 0},
 	{"preview", OPTION_PREVIEW, NULL, 0, "fetch: what there is while the job runs", 0},
 	{"json", OPTION_JSON, NULL, 0, "list: one JSON array", 0},
 	{"spp", OPTION_SPP, "+N", 0, "extend: so many more samples a pixel", 0},

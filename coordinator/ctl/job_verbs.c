@@ -122,11 +122,11 @@ static int control(struct client *cl, const struct job_options *o, struct error 
 
 static int fetch(struct client *cl, const struct job_options *o, struct error *e)
 {
-	char output[1024];
-	int rc = client_fetch(cl, o->job, o->preview ? FARM__WHAT__WHAT_PREVIEW : FARM__WHAT__WHAT_RESULT, o->output, output,
-			      sizeof output, e);
+	Farm__What what = o->preview ? FARM__WHAT__WHAT_PREVIEW : FARM__WHAT__WHAT_RESULT;
+	char name[CLIENT_NAME_BYTES];
+	int rc = o->output ? client_fetch(cl, o->job, what, o->output, e) : client_fetch_here(cl, o->job, what, name, e);
 	if (!rc && isatty(STDERR_FILENO))
-		fprintf(stderr, "%s\n", output);
+		fprintf(stderr, "%s\n", o->output ? o->output : name);
 	return rc;
 }
 

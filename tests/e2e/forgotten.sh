@@ -20,7 +20,7 @@ again=$(submit "$BOX" -o "$DIR/new.exr" $JOB -D light=3)
 [ "$again" = "$id" ] || fail "the new job is $again, the old one was $id"
 kill -CONT $worker
 until_true 60 is_state "$again" done || fail "$again is $(value "$again" state): $(value "$again" why)"
-"$BIN/hslt-job" fetch "$again"
+"$BIN/hslt-job" fetch "$again" -o "$DIR/new.exr"
 same "$DIR/alone.exr" "$DIR/new.exr"
 grep -q 'the coordinator has another job of this number' "$DIR/w1.log" || fail "the worker did not notice"
 [ "$("$BIN/hslt-status" | grep -c aside)" -eq 0 ] || fail "the worker is blamed"

@@ -34,7 +34,7 @@ rm "$DIR/spool/filler"
 is_state "$id" held || fail "$id is $(value "$id" state)"
 mount -o remount,size=64m "$DIR/spool"
 until_true 30 is_state "$id" done || fail "$id is $(value "$id" state)"
-"$BIN/hslt-job" fetch "$id"
+"$BIN/hslt-job" fetch "$id" -o "$DIR/full.exr"
 same "$DIR/quiet.exr" "$DIR/full.exr"
 [ "$(value "$id" merged)" = "$quiet" ] || fail "$(value "$id" merged) leases, not $quiet"
 

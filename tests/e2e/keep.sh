@@ -17,7 +17,7 @@ stop $COORDINATOR_PID
 LISTEN=$COORDINATOR start_coordinator
 sleep 1
 [ -s "$DIR/spool/jobs/j2/result.exr" ] || fail "thirty days are less than a second"
-"$BIN/hslt-job" fetch j2
+"$BIN/hslt-job" fetch j2 -o "$DIR/second.exr"
 stop $COORDINATOR_PID
 
 LISTEN=$COORDINATOR start_coordinator --keep-days 0.00001

@@ -14,7 +14,7 @@ until_true 20 is_beyond "$id" 0.4 || fail "$id does not get on"
 kill -9 $victim
 start_worker late
 until_true 30 is_state "$id" done || fail "$id is $(value "$id" state)"
-"$BIN/hslt-job" fetch "$id"
+"$BIN/hslt-job" fetch "$id" -o "$DIR/disturbed.exr"
 same "$DIR/calm.exr" "$DIR/disturbed.exr"
 grep -q 'name="victim".*the peer hung up\|name="victim".*reset' "$DIR/coordinator.log" || fail "nobody was killed"
 [ "$(value "$id" failures)" = 0 ] || fail "a killed worker is nobody's fault"

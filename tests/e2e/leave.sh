@@ -18,6 +18,6 @@ stop $hurries
 [ $CODE -eq 0 ] || fail "leaving in a hurry ended with $CODE"
 until_true 30 is_state "$id" done || fail "$id is $(value "$id" state)"
 [ "$(value "$id" failures)" = 0 ] || fail "leaving was counted as a failure"
-"$BIN/hslt-job" fetch "$id"
+"$BIN/hslt-job" fetch "$id" -o "$DIR/left.exr"
 same "$DIR/calm.exr" "$DIR/left.exr"
 echo "workers leave in peace"

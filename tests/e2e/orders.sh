@@ -80,7 +80,7 @@ job cancel "$c"
 job cancel "$d"
 done_in 60 "$a"
 submit "$BOX" -o "$DIR/quiet.exr" --integrator path --spp 500 --wait >/dev/null
-job fetch "$a"
+job fetch "$a" -o "$DIR/a.exr"
 same "$DIR/a.exr" "$DIR/quiet.exr"
 echo "held, released, put first and last; the bits of a quiet run"
 
@@ -102,7 +102,7 @@ job extend "$e" --spp 300
 job extend "$e" --spp +100 # while it runs, or just after
 until_true 60 more_rounds "$e" "$first" || fail "$e does not go on after $first rounds"
 done_in 60 "$e"
-job fetch "$e"
+job fetch "$e" -o "$DIR/extended.exr"
 same "$DIR/extended.exr" "$DIR/long.exr"
 job log "$e" | grep -q 'state=extended by=- text="after 6 rounds it goes on until 12 are done"' || fail "the log of $e does not say that it went on"
 
@@ -118,7 +118,7 @@ until_true 60 more_rounds "$f" "$first" || fail "$f does not go on after $first 
 again
 done_in 60 "$f"
 [ "$(value "$f" reason)" = error ] || fail "$f ended by $(value "$f" reason)"
-job fetch "$f"
+job fetch "$f" -o "$DIR/tighter.exr"
 same "$DIR/tighter.exr" "$DIR/target.exr"
 
 # what went wrong is counted over restarts and ends

@@ -15,8 +15,8 @@ until_true 20 is_state "$high" done || fail "$high is $(value "$high" state)"
 head -c 4 "$DIR/preview.exr" | od -An -tx1 | grep -q '76 2f 31 01' || fail "the preview is no EXR"
 is_state "$low" running || fail "$low ended before $high, which has priority"
 until_true 30 is_state "$low" done || fail "$low is $(value "$low" state)"
-"$BIN/hslt-job" fetch "$low"
-"$BIN/hslt-job" fetch "$high"
+"$BIN/hslt-job" fetch "$low" -o "$DIR/low.exr"
+"$BIN/hslt-job" fetch "$high" -o "$DIR/high.exr"
 submit "$BOX" -o "$DIR/low-alone.exr" $LOW --wait >/dev/null
 submit "$BOX" -o "$DIR/high-alone.exr" $HIGH --wait >/dev/null
 same "$DIR/low.exr" "$DIR/low-alone.exr"

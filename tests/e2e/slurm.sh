@@ -205,7 +205,7 @@ has_worker "^${second}_3\.0@$node" || fail "the old worker on $node is gone, thi
 pause release
 is_beyond "$id" 0.95 && fail "$id was too fast, this tests nothing"
 until_true 60 is_state "$id" done || fail "$id is $(value "$id" state)"
-"$BIN/hslt-job" fetch "$id" || fail "no image of $id"
+"$BIN/hslt-job" fetch "$id" -o "$DIR/elastic.exr" || fail "no image of $id"
 same "$DIR/long.exr" "$DIR/elastic.exr"
 
 # Three were lost: told to leave, preempted, and the worker that Slurm gave up but that went on.

@@ -140,6 +140,22 @@ asks_for link.obj "a link that leads out" "must lie below\|outside\|link"
 asks_for device.obj "a device" "."
 asks_for pipe.obj "a named pipe" "."
 
+# Names of images: who fetches a job of somebody else's keeps the own files.
+programs=$(cd "$BIN" && pwd)
+mkdir "$DIR/home"
+echo precious >"$DIR/home/room.exr"
+is_listed_done() {
+	$list --tls "$CA/chief" | grep -q "^$1 *done"
+}
+calls_it() {
+	id=$("$BIN/hslt-submit" "$BOX" -o "$1" --integrator path --spp 1 --tls "$CA/bob" 2>>"$DIR/submit.log")
+	until_true 20 is_listed_done "$id" || fail "$id does not end"
+	refused "path tricks: an image that is called $2" 1 "$3" env -C "$DIR/home" "$programs/hslt-job" fetch "$id" --tls "$CA/chief"
+}
+calls_it "$DIR/home/.profile" "/home/ann/.profile" "no name for its image"
+calls_it ../home/room.exr "like one that is there" "is there already"
+[ "$(ls -A "$DIR/home")" = room.exr ] && [ "$(cat "$DIR/home/room.exr")" = precious ] || fail "it was written over: $(ls -lA "$DIR/home")"
+
 # Live connections: revoked, expired.
 tries "a worker that is revoked while it is connected"
 tries "a worker whose certificate expires meanwhile"

@@ -37,7 +37,7 @@ liar=$WORKER
 start_worker honest2
 b=$WORKER
 until_true 60 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" why)"
-"$BIN/hslt-job" fetch "$id"
+"$BIN/hslt-job" fetch "$id" -o "$DIR/all.exr"
 same "$DIR/alone.exr" "$DIR/all.exr"
 [ "$(value "$id" failures)" = 0 ] || fail "$(value "$id" failures) failures of the job"
 [ "$(value "$id" verified)" -ge 64 ] || fail "$(value "$id" verified) leases were verified"

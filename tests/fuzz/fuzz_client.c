@@ -124,7 +124,6 @@ static void submit(struct client *cl)
 static void want(struct client *cl, enum want w)
 {
 	struct error e;
-	char output[1024];
 	struct submit_end end;
 	int fd;
 	switch (w) {
@@ -143,7 +142,7 @@ static void want(struct client *cl, enum want w)
 		close(fd);
 		break;
 	default:
-		client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, now.file, output, sizeof output, &e);
+		client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, now.file, &e);
 	}
 }
 

@@ -13,7 +13,6 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <unistd.h>
 
 const char *argp_program_version = "hslt-submit " HSLT_VERSION;
 
@@ -27,7 +26,7 @@ static const char doc[] =
 	"  hslt-submit --estimate room.xml --plot room.svg\n"
 	"  hslt-submit room.xml -o left.exr --crop 0,0,960,1080 --priority 10 -D light=sun\n"
 	"\n"
-	"The job's id goes to stdout, everything else to stderr. Without --wait, -o is the default name for hslt-job fetch. "
+	"The job's id goes to stdout, everything else to stderr. Without --wait, the last part of -o is what hslt-job fetch calls the image. "
 	"--estimate makes no image: a pilot of a minute on the farm tells what errors of 10, 5, 2 and 1 % (and --target-error) will "
 	"cost there. For long jobs without --epoch a pilot of a second here says how many mutations a thread makes in the 20 s that a "
 	"lease should take; --epoch pins it. --wait outlasts restarts of the coordinator. HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls.\n"
@@ -142,13 +141,11 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	}
 }
 
-/* The name by which a later fetch finds the place, from wherever it is called. */
-static int absolute(const char *path, char *out, size_t size, struct error *e)
+/* What a later fetch calls it. The folder is no business of the farm's. */
+static const char *last_part(const char *path)
 {
-	char here[2048];
-	int n = *path == '/' || !getcwd(here, sizeof here) ? snprintf(out, size, "%s", path)
-							   : snprintf(out, size, "%s/%s", here, path);
-	return n < 0 || (size_t)n >= size ? error_set(e, EINVAL, "%s: the name is too long", path) : 0;
+	const char *slash = strrchr(path, '/');
+	return slash ? slash + 1 : path;
 }
 
 static void print_id(const struct arguments *a, uint64_t job, const char *plan, const char *state)
@@ -156,8 +153,8 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	char id[32];
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)job);
 	if (a->json) {
-		json_t *o = json_pack("{s:i s:s s:s s:s s:s s:s}", "schema", 1, "id", id, "name", a->request.name, "output",
-				      a->request.output, "plan", plan, "state", state);
+		json_t *o = json_pack("{s:i s:s s:s s:s s:s s:s}", "schema", 1, "id", id, "name", a->request.name, "output", a->output,
+				      "plan", plan, "state", state);
 		json_dumpf(o, stdout, JSON_COMPACT);
 		putchar('\n');
 		json_decref(o);
@@ -234,7 +231,6 @@ int main(int argc, char **argv)
 	struct scene_bundle b;
 	struct client *cl;
 	struct error e;
-	char output[1024] = "";
 	int code = 0;
 	a.coordinator = getenv("HSLT_COORDINATOR");
 	a.tls = getenv("HSLT_TLS");
@@ -261,13 +257,10 @@ int main(int argc, char **argv)
 	render_effects_note(&b.summary, note, sizeof note);
 	if (*note)
 		fprintf(stderr, "hslt-submit: note: %s\n", note);
-	a.request.output = output;
+	a.request.output = a.estimate ? "" : last_part(a.output);
 	a.request.name = a.name ? a.name : b.scene;
-	rc = a.estimate ? 0 : absolute(a.output, output, sizeof output, &e);
-	if (!rc)
-		measure(&a, &b);
-	if (!rc)
-		rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
+	measure(&a, &b);
+	rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {
 		if (*client_warning(cl))
 			fprintf(stderr, "hslt-submit: warning: %s\n", client_warning(cl));

@@ -27,7 +27,7 @@ static int try_once(struct client *cl, uint64_t job, const char *output, struct 
 {
 	int rc = submit_wait(cl, job, end, e);
 	if (!rc && end->has_result)
-		rc = client_fetch(cl, job, FARM__WHAT__WHAT_RESULT, output, NULL, 0, e);
+		rc = client_fetch(cl, job, FARM__WHAT__WHAT_RESULT, output, e);
 	return rc;
 }
 

@@ -33,7 +33,7 @@ int scene_bundle_read(struct scene_bundle *b, const char *path, const struct sce
 void scene_bundle_fini(struct scene_bundle *b);
 
 struct submit_request {
-	const char *name, *output; /* output: absolute, or "" */
+	const char *name, *output; /* output: a file's name for a later fetch, or "" */
 	int priority;
 	bool mixed;
 	double verify; /* share of the epochs that two workers compute */

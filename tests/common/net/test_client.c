@@ -1,0 +1,288 @@
+/*
+ * The client against a coordinator of a few lines that means it no good: names of files that lead elsewhere, and more than was asked
+ * for.
+ */
+#include "common/base/mem.h"
+#include "common/net/client.h"
+#include "common/wire/frame.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <arpa/inet.h>
+#include <pthread.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+static char folder[64];
+static const unsigned char image[] = "the image";
+
+/* ---- a coordinator: takes one connection, says hello, then what it is told to say ---- */
+
+struct coordinator {
+	pthread_t thread;
+	int listener;
+	char address[32];
+	const char *name;      /* answers one Fetch, and calls the result so */
+	size_t flood, payload; /* or says so many unasked things of so many bytes before it reads on */
+};
+
+static void say(int fd, const Farm__Envelope *m, const void *payload, size_t payload_size)
+{
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	if (envelope_pack(m, payload, payload_size, &frame, &size, &e))
+		abort();
+	for (size_t at = 0; at < size;) {
+		ssize_t n = send(fd, frame + at, size - at, MSG_NOSIGNAL);
+		if (n <= 0)
+			break;
+		at += (size_t)n;
+	}
+	mem_free(frame);
+}
+
+static void say_hello(int fd)
+{
+	Farm__HelloAck ack;
+	Farm__Envelope m;
+	farm__hello_ack__init(&ack);
+	farm__envelope__init(&m);
+	ack.accepted = true;
+	ack.version = FARM_VERSION;
+	ack.heartbeat_ms = 5000;
+	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
+	m.hello_ack = &ack;
+	say(fd, &m, NULL, 0);
+}
+
+static void say_chunk(int fd, const char *name)
+{
+	Farm__FetchChunk chunk;
+	Farm__Envelope m;
+	char output[2048];
+	farm__fetch_chunk__init(&chunk);
+	farm__envelope__init(&m);
+	snprintf(output, sizeof output, "%s", name);
+	chunk.size = sizeof image;
+	chunk.output = output;
+	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
+	m.fetch_chunk = &chunk;
+	say(fd, &m, image, sizeof image);
+}
+
+static void *coordinate(void *user)
+{
+	const struct coordinator *c = user;
+	char bytes[4096];
+	unsigned char *rubbish = calloc(1, c->payload + 1);
+	Farm__Done done;
+	Farm__Envelope m;
+	int fd = accept(c->listener, NULL, NULL);
+	farm__done__init(&done);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_DONE;
+	m.done = &done;
+	if (recv(fd, bytes, sizeof bytes, 0) > 0)
+		say_hello(fd);
+	for (size_t i = 0; i < c->flood; i++)
+		say(fd, &m, rubbish, c->payload);
+	if (c->name && recv(fd, bytes, sizeof bytes, 0) > 0)
+		say_chunk(fd, c->name);
+	while (recv(fd, bytes, sizeof bytes, 0) > 0)
+		continue;
+	close(fd);
+	free(rubbish);
+	return NULL;
+}
+
+static struct client *meet(struct coordinator *c)
+{
+	struct sockaddr_in a = {.sin_family = AF_INET, .sin_addr = {htonl(INADDR_LOOPBACK)}};
+	socklen_t size = sizeof a;
+	struct client *cl;
+	struct error e;
+	c->listener = socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+	assert_int_equal(bind(c->listener, (struct sockaddr *)&a, size), 0);
+	assert_int_equal(listen(c->listener, 1), 0);
+	assert_int_equal(getsockname(c->listener, (struct sockaddr *)&a, &size), 0);
+	snprintf(c->address, sizeof c->address, "127.0.0.1:%u", ntohs(a.sin_port));
+	assert_int_equal(pthread_create(&c->thread, NULL, coordinate, c), 0);
+	assert_int_equal(client_open(&cl, c->address, NULL, false, "test", &e), 0);
+	return cl;
+}
+
+static void part(struct coordinator *c, struct client *cl)
+{
+	client_close(cl);
+	pthread_join(c->thread, NULL);
+	close(c->listener);
+}
+
+/* ---- names ---- */
+
+static int fetch_as(const char *name, char taken[CLIENT_NAME_BYTES])
+{
+	struct coordinator c = {.name = name};
+	struct client *cl = meet(&c);
+	struct error e;
+	int rc = client_fetch_here(cl, 1, FARM__WHAT__WHAT_RESULT, taken, &e);
+	part(&c, cl);
+	return rc;
+}
+
+static bool holds(const char *path, const void *bytes, size_t size)
+{
+	char there[64];
+	FILE *f = fopen(path, "r");
+	bool same = f && fread(there, 1, sizeof there, f) == size && memcmp(there, bytes, size) == 0;
+	if (f)
+		fclose(f);
+	return same;
+}
+
+static void write_text(const char *path)
+{
+	FILE *f = fopen(path, "w");
+	assert_non_null(f);
+	assert_int_equal(fputs("precious", f) >= 0, 1);
+	assert_int_equal(fclose(f), 0);
+}
+
+static unsigned files_here(void)
+{
+	unsigned count = 0;
+	FILE *f = popen("ls -A | wc -l", "r");
+	assert_non_null(f);
+	assert_int_equal(fscanf(f, "%u", &count), 1);
+	pclose(f);
+	return count;
+}
+
+static void names_lead_nowhere(void **state)
+{
+	(void)state;
+	char taken[CLIENT_NAME_BYTES], path[128], longest[1024];
+	struct stat st;
+	write_text("above.exr");
+	assert_int_equal(mkdir("here", 0700), 0);
+	assert_int_equal(chdir("here"), 0);
+	/* folders are not looked at */
+	snprintf(path, sizeof path, "%s/above.exr", folder);
+	assert_int_equal(fetch_as(path, taken), 0);
+	assert_string_equal(taken, "above.exr");
+	assert_true(holds("above.exr", image, sizeof image) && holds(path, "precious", 8));
+	assert_int_equal(fetch_as("../room.exr", taken), 0);
+	assert_true(holds("room.exr", image, sizeof image));
+	assert_int_not_equal(stat("../room.exr", &st), 0);
+	assert_int_equal(fetch_as("\xc3\xa4 b.exr", taken), 0);
+	/* what would be no file's name, or a file that others look for */
+	memset(longest, 'x', sizeof longest - 1);
+	longest[sizeof longest - 1] = 0;
+	const char *const bad[] = {"", ".", "..", "/", "a/", "../..", "/home/.profile", ".bashrc", "-rf", "a/-o", "a\nb", "a\x1b[2Jb",
+				   "\xff\xfe", longest};
+	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+		assert_int_equal(fetch_as(bad[i], taken), -EEXIST);
+	/* what is there stays: files, links that lead nowhere, links that lead to files */
+	write_text("mine.exr");
+	assert_int_equal(symlink("../nobody.exr", "link.exr"), 0);
+	assert_int_equal(symlink("../above.exr", "other.exr"), 0);
+	assert_int_equal(fetch_as("/tmp/mine.exr", taken), -EEXIST);
+	assert_int_equal(fetch_as("link.exr", taken), -EEXIST);
+	assert_int_equal(fetch_as("other.exr", taken), -EEXIST);
+	assert_true(holds("mine.exr", "precious", 8) && holds("../above.exr", "precious", 8));
+	assert_int_not_equal(stat("../nobody.exr", &st), 0);
+	assert_int_equal(files_here(), 6); /* and nothing half done */
+	assert_int_equal(chdir(".."), 0);
+}
+
+static void who_names_a_file_gets_it(void **state)
+{
+	(void)state;
+	struct coordinator c = {.name = "/etc/passwd"};
+	struct error e;
+	write_text("old.exr");
+	struct client *cl = meet(&c);
+	assert_int_equal(client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, "old.exr", &e), 0);
+	part(&c, cl);
+	assert_true(holds("old.exr", image, sizeof image));
+}
+
+/* ---- more than was asked for ---- */
+
+/* Takes what has come in until there is no more: how much that was. */
+static size_t take_all(struct client *cl)
+{
+	struct client_message m;
+	struct error e;
+	size_t sum = 0, count = 0;
+	int rc;
+	while ((rc = client_wait(cl, 5, &m, &e)) == 0) {
+		sum += m.payload.size;
+		count++;
+		client_message_fini(&m);
+	}
+	assert_int_equal(rc, -ECONNRESET);
+	if (!strstr(e.text, "sends more than it is asked for"))
+		fail_msg("%s", e.text);
+	return sum ? sum : count;
+}
+
+static void floods_are_dammed(void **state)
+{
+	(void)state;
+	static const struct {
+		size_t count, payload, most;
+	} floods[] = {{5000, 0, 4096}, {80, 1 << 20, 1 << 26}};
+	for (int i = 0; i < 2; i++) {
+		struct coordinator c = {.flood = floods[i].count, .payload = floods[i].payload};
+		struct client *cl = meet(&c);
+		struct error e;
+		unsigned char *question = calloc(1, 1 << 22); /* which is not read before the flood is over */
+		Farm__Bye bye;
+		Farm__Envelope m;
+		farm__bye__init(&bye);
+		farm__envelope__init(&m);
+		m.body_case = FARM__ENVELOPE__BODY_BYE;
+		m.bye = &bye;
+		client_send(cl, &m, question, 1 << 22, &e);
+		client_send(cl, &m, question, 1 << 22, &e);
+		free(question);
+		size_t taken = take_all(cl);
+		assert_true(taken <= floods[i].most && taken > floods[i].most / 2);
+		part(&c, cl);
+	}
+}
+
+static int set_up(void **state)
+{
+	(void)state;
+	strcpy(folder, "/tmp/hslt-client.XXXXXX");
+	return mkdtemp(folder) ? chdir(folder) : -1;
+}
+
+static int tear_down(void **state)
+{
+	(void)state;
+	char command[96];
+	snprintf(command, sizeof command, "rm -rf '%s'", folder);
+	return chdir("/") || system(command);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(names_lead_nowhere),
+		cmocka_unit_test(who_names_a_file_gets_it),
+		cmocka_unit_test(floods_are_dammed),
+	};
+	return cmocka_run_group_tests(tests, set_up, tear_down);
+}
