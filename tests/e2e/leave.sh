@@ -1,10 +1,13 @@
-# SIGTERM: a worker finishes or gives back its leases and leaves with 0; the job loses nothing and nobody is blamed.
+# SIGTERM: a worker finishes or gives back its leases and leaves with 0; the job loses nothing and nobody is blamed. It does so
+# also while its thread builds a scene and does not come back; where nobody tells it to leave it notices that, and ends with 75,
+# but not where the building only takes long.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-compare
 
 JOB="--integrator hslt --bootstrap 20000 --mutations 1500000"
-start_coordinator
+start_coordinator -v
 start_worker stays
+STAYS=$WORKER
 submit "$BOX" -o "$DIR/calm.exr" $JOB --wait >/dev/null
 start_worker leaves
 leaves=$WORKER
@@ -21,3 +24,37 @@ until_true 30 is_state "$id" done || fail "$id is $(value "$id" state)"
 "$BIN/hslt-job" fetch "$id" -o "$DIR/left.exr"
 same "$DIR/calm.exr" "$DIR/left.exr"
 echo "workers leave in peace"
+
+# ---- scenes that are being built ----
+
+${CC:-cc} -shared -fPIC -O1 -o "$DIR/build.so" "$HERE/build.c" -ldl 2>"$DIR/cc.log" || fail "no compiler: $(cat "$DIR/cc.log")"
+stop $STAYS
+start_builder() {
+	LD_PRELOAD=$DIR/build.so HSLT_BUILD=$1 start_worker "$2" --stall 0.8 --grace 1
+}
+is_building() {
+	grep -q "event=lease_granted job=$id " "$DIR/coordinator.log"
+}
+id=$(submit "$BOX" -o "$DIR/built.exr" --integrator path --spp 8)
+start_builder 600 never
+until_true 10 is_building || fail "nobody builds $id"
+sleep 0.1
+begun=$(date +%s%N)
+stop $WORKER
+[ $CODE -eq 0 ] || fail "leaving while a scene is built ended with $CODE"
+[ $(($(date +%s%N) - begun)) -lt 1000000000 ] || fail "it took $((($(date +%s%N) - begun) / 1000000)) ms, the grace is 1 s"
+until_true 5 grep -q 'event=peer_closed .*name="never" .*said goodbye' "$DIR/coordinator.log" || fail "it said nothing"
+[ "$(value "$id" failures)" = 0 ] || fail "leaving while a scene is built was counted as a failure"
+
+start_builder 600 stands
+CODE=0
+wait $WORKER || CODE=$?
+[ $CODE -eq 75 ] || fail "a building that stands still ended with $CODE"
+"$BIN/hslt-job" log "$id" | grep -q 'event=lease_failed .*worker="stands" .*no progress for 0.8 s in building' || fail "nobody says that the building hangs"
+
+HSLT_BUILD_TICKS=1 start_builder 2 slow
+until_true 20 is_state "$id" done || fail "$id is $(value "$id" state)"
+grep -q 'event=world_built .*seconds=[2-9]' "$DIR/slow.log" || fail "it was not slow: $(cat "$DIR/slow.log")"
+stop $WORKER
+[ $CODE -eq 0 ] || fail "the slow one ended with $CODE"
+echo "nobody waits for a building that never ends"

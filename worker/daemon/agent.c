@@ -128,8 +128,6 @@ static void on_closed(void *user, const char *why)
 	a->conn = NULL;
 	a->welcome = false;
 	uv_timer_stop(&a->heartbeat);
-	if (a->gone && a->hung)
-		_exit(AGENT_HUNG);
 	if (!a->gone)
 		try_later(a);
 	agent_settle(a);
@@ -170,10 +168,6 @@ static void go(struct agent *a)
 	agent_send(a, &m);
 	if (a->conn)
 		conn_close_when_sent(a->conn, "leaving");
-	else if (a->hung)
-		_exit(AGENT_HUNG);
-	if (a->hung) /* nobody can wait for its threads; what is to be said is sent first */
-		return;
 	uv_close((uv_handle_t *)&a->retry, NULL);
 	uv_close((uv_handle_t *)&a->heartbeat, NULL);
 	uv_close((uv_handle_t *)&a->grace, NULL);
@@ -181,7 +175,6 @@ static void go(struct agent *a)
 	uv_close((uv_handle_t *)&a->watch, NULL);
 	uv_close((uv_handle_t *)&a->on_term, NULL);
 	uv_close((uv_handle_t *)&a->on_int, NULL);
-	crew_close(a->crew);
 }
 
 static void on_linger_over(uv_timer_t *t)
@@ -334,6 +327,7 @@ int agent_open(struct agent **out, const struct agent_config *c, struct error *e
 void agent_close(struct agent *a)
 {
 	go(a);
+	crew_close(a->crew);
 	uv_run(&a->loop, UV_RUN_DEFAULT);
 	int closed = uv_loop_close(&a->loop);
 	assert(closed == 0);
@@ -351,7 +345,10 @@ int agent_run(const struct agent_config *c, struct error *e)
 	if (rc)
 		return rc;
 	notify_send("READY=1"); /* it may wait for its coordinator for long */
-	uv_run(&a->loop, UV_RUN_DEFAULT);
+	while (!a->gone || a->conn)
+		uv_run(&a->loop, UV_RUN_ONCE);
+	if (a->hung || crew_pending(a->crew)) /* nobody can wait for its threads; what was to be said has been sent */
+		_exit(a->hung ? AGENT_HUNG : 0);
 	agent_close(a);
 	return 0;
 }

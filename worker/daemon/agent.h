@@ -2,8 +2,9 @@
  * The worker daemon: one loop thread that owns all state, a crew of render threads. Connects, asks for leases, fetches
  * what it needs, sends results and keeps them until they are acknowledged; reconnects for ever. On SIGTERM it finishes
  * what runs within the grace period, or gives it up, and leaves. Tells the service manager what it waits to hear
- * (common/net/notify.h). A lease that gets nowhere is given back as failed; its thread cannot be ended, so the worker leaves
- * as on SIGTERM, and the program ends then and there, with AGENT_HUNG.
+ * (common/net/notify.h). A lease that gets nowhere is given back as failed, and so are those that wait for a scene whose building
+ * gets nowhere; a thread cannot be ended, so the worker leaves as on SIGTERM, and the program ends then and there, with AGENT_HUNG.
+ * Nobody waits for a scene that is being built when the worker is to leave.
  */
 #ifndef WORKER_DAEMON_AGENT_H
 #define WORKER_DAEMON_AGENT_H
@@ -21,7 +22,7 @@ struct agent_config {
 	unsigned threads;
 	double grace_seconds;
 	double idle_seconds; /* without a lease for so long: it leaves; 0: never */
-	double stall_seconds; /* a lease that makes no progress for so long hangs; 0: nobody looks */
+	double stall_seconds; /* a lease or a building that makes no progress for so long hangs; 0: nobody looks */
 	bool insecure;
 	unsigned lie; /* tests: one of so many results has a wrong bit; 0: none */
 	bool repeat; /* tests: every result is sent twice */
@@ -30,7 +31,7 @@ struct agent_config {
 
 enum { AGENT_HUNG = 75 }; /* exit code: to be started again */
 
-/* Returns when the worker has left. -EINVAL, -EPERM, -EHOSTUNREACH at once when the address is of no use. */
+/* Returns when the worker has left; where a thread is still at work the program ends instead. -EINVAL, -EPERM, -EHOSTUNREACH at once when the address is of no use. */
 int agent_run(const struct agent_config *c, struct error *e);
 
 #endif

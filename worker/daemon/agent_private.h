@@ -35,7 +35,7 @@ struct agent {
 
 /* agent.c */
 int agent_open(struct agent **a, const struct agent_config *c, struct error *e);
-void agent_close(struct agent *a); /* leaves at once, if it has not left */
+void agent_close(struct agent *a); /* leaves, if it has not left; waits for its threads */
 void agent_send(struct agent *a, const Farm__Envelope *m);
 /* Leaves when nothing is left to do. */
 void agent_settle(struct agent *a);
@@ -45,9 +45,9 @@ void desk_welcome(struct agent *a); /* (re)connected: asks for work, offers what
 void desk_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size);
 void desk_leave(struct agent *a);      /* gives back what has not begun */
 void desk_stop_all(struct agent *a);   /* gives up what runs */
-enum { STALL_LOOKS = 8 }; /* without progress, until a lease hangs */
-bool desk_watch(struct agent *a);      /* true: a lease hangs that did not at the last look */
-bool desk_is_idle(const struct agent *a); /* nothing runs, nothing waits to be acknowledged */
+enum { STALL_LOOKS = 8 }; /* without progress, until a thread hangs */
+bool desk_watch(struct agent *a);      /* true: a thread hangs that did not at the last look */
+bool desk_is_idle(const struct agent *a); /* no lease is at work, none waits to be acknowledged */
 void desk_close(struct agent *a);      /* after the crew has been closed */
 
 #endif

@@ -1,6 +1,7 @@
 #include "worker/daemon/bundle.h"
 
 #include "common/base/mem.h"
+#include "common/base/tick.h"
 #include "worker/render/knobs.h"
 
 #include <assert.h>
@@ -168,6 +169,7 @@ static int open_asset(void *user, const char *name, struct asset *out, struct er
 	const struct bundle *b = user;
 	const Farm__JobInfo *m = info_of(b);
 	size_t i = 0;
+	tick();
 	while (i < m->n_files && strcmp(m->files[i]->name, name) != 0)
 		i++;
 	if (i == m->n_files)

@@ -1,6 +1,7 @@
 #include "worker/daemon/crew.h"
 
 #include "common/base/mem.h"
+#include "common/base/tick.h"
 
 #include <pthread.h>
 #include <signal.h>
@@ -49,7 +50,10 @@ static void *thread_main(void *user)
 		if (!t)
 			break;
 		pthread_mutex_unlock(&c->lock);
+		tick_counter = &t->ticks;
+		tick();
 		t->run(t);
+		tick_counter = NULL;
 		pthread_mutex_lock(&c->lock);
 		put(&c->finished, t);
 		uv_async_send(&c->back);
@@ -121,6 +125,7 @@ int crew_new(struct crew **out, uv_loop_t *loop, unsigned threads, struct error 
 
 void crew_add(struct crew *c, struct task *t)
 {
+	atomic_store(&t->ticks, 0);
 	pthread_mutex_lock(&c->lock);
 	put(&c->waiting, t);
 	pthread_cond_signal(&c->work);

@@ -7,6 +7,7 @@
 
 #include "common/base/error.h"
 
+#include <stdatomic.h>
 #include <stdbool.h>
 #include <uv.h>
 
@@ -14,6 +15,10 @@ struct task {
 	struct task *next;
 	void (*run)(struct task *);
 	void (*done)(struct task *); /* on the loop's thread */
+	atomic_ullong ticks;         /* of the thread that has it (common/base/tick.h); 0: none has begun */
+	unsigned long long seen;     /* of them, when the watchdog looked last */
+	unsigned still;              /* looks in a row that saw nothing new */
+	bool hung;                   /* given up by the watchdog; a thread has it still */
 };
 
 struct crew;
@@ -23,7 +28,7 @@ void crew_add(struct crew *c, struct task *t);
 /* true: it had not begun and is the caller's again. */
 bool crew_take_back(struct crew *c, struct task *t);
 unsigned crew_pending(const struct crew *c); /* tasks that are not done yet */
-/* Waits for what runs; `done` is not called any more. The memory goes when the loop has closed its handle. */
+/* Waits for what runs, for ever where that never ends; `done` is not called any more. The memory goes when the loop has closed its handle. */
 void crew_close(struct crew *c);
 
 #endif

@@ -145,10 +145,9 @@ static void drop_lease(struct agent *a, struct lease_task *l)
 	lease_task_free(l);
 }
 
-static void fail_bundle(struct agent *a, struct bundle *b, const struct error *e)
+static void fail_leases_of(struct agent *a, struct bundle *b, const struct error *e)
 {
 	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", number(b->job), log_quote(e->text).text);
-	b->state = BUNDLE_FAILED;
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->bundle != b || l->state != LEASE_WAITING)
@@ -156,6 +155,12 @@ static void fail_bundle(struct agent *a, struct bundle *b, const struct error *e
 		say_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built");
 		drop_lease(a, l);
 	}
+}
+
+static void fail_bundle(struct agent *a, struct bundle *b, const struct error *e)
+{
+	b->state = BUNDLE_FAILED;
+	fail_leases_of(a, b, e);
 	tidy(a);
 }
 
@@ -482,35 +487,60 @@ void desk_stop_all(struct agent *a)
 }
 
 /* Looks are counted, not seconds: a worker that was stopped as a whole has not hung. */
-bool desk_watch(struct agent *a)
+static bool has_hung(struct task *t)
+{
+	unsigned long long now = atomic_load(&t->ticks);
+	t->still = now && now == t->seen ? t->still + 1 : 0;
+	t->seen = now;
+	return t->still >= STALL_LOOKS;
+}
+
+static bool watch_leases(struct agent *a)
 {
 	char text[128];
 	bool found = false;
 	snprintf(text, sizeof text, "no progress for %g s: its thread hangs", a->config.stall_seconds);
 	for (struct lease_task *l = a->leases; l; l = l->next) {
-		unsigned long long now = atomic_load(&l->progress);
-		if (l->state != LEASE_QUEUED || l->hung)
-			continue;
-		l->still = now && now == l->seen ? l->still + 1 : 0;
-		l->seen = now;
-		if (l->still < STALL_LOOKS)
+		if (l->state != LEASE_QUEUED || l->task.hung || !has_hung(&l->task))
 			continue;
 		if (!l->unwanted)
 			say_failed(a, &l->grant.key, text);
-		l->unwanted = l->hung = found = true;
+		l->unwanted = l->task.hung = found = true;
 		atomic_store(&l->stop, true);
 	}
 	return found;
 }
 
-/* But for threads that hang. */
+static bool watch_builds(struct agent *a)
+{
+	bool found = false;
+	for (struct bundle *b = a->bundles; b; b = b->next) {
+		struct error e;
+		if (b->state != BUNDLE_BUILDING || b->task.hung || !has_hung(&b->task))
+			continue;
+		error_set(&e, ETIMEDOUT, "no progress for %g s in building the scene: its thread hangs", a->config.stall_seconds);
+		fail_leases_of(a, b, &e);
+		b->task.hung = found = true;
+	}
+	return found;
+}
+
+bool desk_watch(struct agent *a)
+{
+	bool lease = watch_leases(a);
+	return watch_builds(a) || lease;
+}
+
+/* But for threads that hang, and scenes that are being built for nobody. */
 bool desk_is_idle(const struct agent *a)
 {
-	unsigned hung = 0;
-	for (const struct lease_task *l = a->leases; l; l = l->next, hung++)
-		if (!l->hung)
+	unsigned left = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next, left++)
+		if (!l->task.hung)
 			return false;
-	return crew_pending(a->crew) == hung;
+	for (const struct bundle *b = a->bundles; b; b = b->next)
+		left += b->state == BUNDLE_BUILDING;
+	return crew_pending(a->crew) == left;
 }
 
 void desk_close(struct agent *a)

@@ -21,7 +21,6 @@ int lease_task_new(struct lease_task **out, struct grant *g, struct bundle *b, s
 	l->bundle = b;
 	b->users++;
 	atomic_init(&l->stop, false);
-	atomic_init(&l->progress, 0);
 	*out = l;
 	return 0;
 }
@@ -54,17 +53,14 @@ static void run(struct task *t)
 	struct lease_input in = {l->grant.chain_count, l->grant.seeds, l->grant.states};
 	const struct plan *p = &l->bundle->plan;
 	l->end = LEASE_STOPPED;
-	atomic_fetch_add(&l->progress, 1);
 	while (l->hangs)
 		pause();
-	render_count_progress(&l->progress);
 	if (!atomic_load(&l->stop))
 		l->rc = render_lease(l->bundle->world, p, &l->grant.key, &in, &l->stop, &l->end, &batch, &l->error);
 	if (!l->rc && l->end == LEASE_DONE && l->lie)
 		lie(&batch);
 	if (!l->rc && l->end == LEASE_DONE)
 		l->rc = batch_pack(&batch, p, &l->frame, &l->frame_size, &l->error);
-	render_count_progress(NULL);
 	batch_fini(&batch);
 }
 

@@ -23,11 +23,7 @@ struct lease_task {
 	struct bundle *bundle;
 	enum lease_task_state state;
 	atomic_bool stop;
-	atomic_ullong progress; /* counts up while a thread gets on with it; 0: none has begun */
-	unsigned long long seen; /* of it, when the watchdog looked last */
-	unsigned still;          /* looks in a row that saw nothing new */
-	bool hung;               /* given up by the watchdog; a thread has it still */
-	bool hangs;              /* tests: it never ends */
+	bool hangs;    /* tests: it never ends */
 	bool unwanted; /* nobody waits for it: dropped when its thread lets go */
 	bool lie;      /* tests */
 	bool sent;     /* on this connection */

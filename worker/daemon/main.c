@@ -20,8 +20,8 @@ static const char doc[] =
 	"\n"
 	"SIGTERM: finishes the running epochs within the grace period or gives them up, sends what is done and leaves; the "
 	"second one ends it at once. It reconnects for ever; with --idle-exit it leaves when nobody has work for it. A lease that "
-	"makes no progress for --stall is given back as failed, and the worker leaves, to be started again. Under systemd it says "
-	"when it is ready and feeds the watchdog.\n"
+	"makes no progress for --stall is given back as failed, as are those that wait for a scene whose building makes none, and "
+	"the worker leaves, to be started again. Under systemd it says when it is ready and feeds the watchdog.\n"
 	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 stopped, 1 failed, 2 usage, 75 a thread "
 	"hung.";
 
@@ -38,7 +38,7 @@ static const struct argp_option options[] = {
 	{"cache-size", OPTION_CACHE_SIZE, "GB", 0, "The cache's limit (20)", 0},
 	{"grace", OPTION_GRACE, "SECONDS", 0, "After SIGTERM (20)", 0},
 	{"idle-exit", OPTION_IDLE, "SECONDS", 0, "Leave when there was no lease for so long (0: never)", 0},
-	{"stall", OPTION_STALL, "SECONDS", 0, "How long a lease may make no progress (120; 0: for ever)", 0},
+	{"stall", OPTION_STALL, "SECONDS", 0, "How long a lease or the building of a scene may make no progress (120; 0: for ever)", 0},
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log more", 0},

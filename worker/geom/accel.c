@@ -1,6 +1,7 @@
 #include "worker/geom/accel.h"
 
 #include "common/base/mem.h"
+#include "common/base/tick.h"
 #include "worker/geom/embree.h"
 #include "worker/math/fptrap.h"
 
@@ -45,6 +46,14 @@ static bool memory_monitor(void *user, ssize_t bytes, bool post)
 	size_t now = atomic_fetch_add(&a->bytes, (size_t)bytes) + (size_t)bytes;
 	if (now > atomic_load(&a->peak))
 		atomic_store(&a->peak, now); /* one thread builds */
+	return true;
+}
+
+/* Once in about a thousand primitives, on whatever thread Embree likes. */
+static bool progress_monitor(void *counter, double done)
+{
+	(void)done;
+	tick_on(counter);
 	return true;
 }
 
@@ -270,6 +279,7 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 		if (rc)
 			return error_set(e, -rc, "Embree's geometry cannot be created");
 	}
+	rtcSetSceneProgressMonitorFunction(a->scene, progress_monitor, tick_counter);
 	rtcCommitScene(a->scene);
 	int rc = embree_failure(a->device, e);
 	if (rc || count == 0)

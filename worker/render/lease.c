@@ -1,6 +1,7 @@
 #include "worker/render/render.h"
 
 #include "common/base/mem.h"
+#include "common/base/tick.h"
 #include "worker/chain/chain.h"
 #include "worker/math/fptrap.h"
 #include "worker/mutation/mixture.h"
@@ -32,17 +33,9 @@ const char *render_numeric_version(void)
 	return accel_version();
 }
 
-static _Thread_local atomic_ullong *progress;
-
-void render_count_progress(atomic_ullong *counter)
-{
-	progress = counter;
-}
-
 static bool stopped(const struct job *j)
 {
-	if (progress)
-		atomic_fetch_add_explicit(progress, 1, memory_order_relaxed);
+	tick();
 	return j->stop && atomic_load_explicit(j->stop, memory_order_relaxed);
 }
 

@@ -78,7 +78,7 @@ void render_effects_note(const struct render_summary *scene, char *text, size_t 
 /* false also where there is no effect of that name. */
 bool render_effect_on(const struct render_summary *scene, const char *name);
 
-/* Builds Embree's scene. The scene description may be freed afterwards. */
+/* Builds Embree's scene, and ticks meanwhile (common/base/tick.h). The scene description may be freed afterwards. */
 int world_new(struct world **w, const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 	      struct error *e);
 void world_free(struct world *w);
@@ -101,10 +101,8 @@ enum lease_end { LEASE_DONE, LEASE_STOPPED };
 
 /* Runs one lease and fills the batch (batch_fini frees it). `stop` may become true at any time: the lease is given up.
  * -ENOMEM, -EBADMSG (states that do not parse), -EINVAL (plan and world do not fit). An invalid operation inside stops
- * the program. */
+ * the program. Ticks (common/base/tick.h) at least every 256 samples or mutations. */
 int render_lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
 		 const atomic_bool *stop, enum lease_end *end, struct batch *out, struct error *e);
-/* From now on leases that this thread runs count up *counter at least every 256 samples or mutations; NULL: no more. */
-void render_count_progress(atomic_ullong *counter);
 
 #endif

@@ -1,5 +1,6 @@
 #include "worker/scene/displace.h"
 
+#include "common/base/tick.h"
 #include "worker/scene/displace_grid.h"
 #include "worker/scene/mesh_raw.h"
 
@@ -182,12 +183,14 @@ static void each_point(struct work *w, bool all, void (*what)(struct work *, uin
 {
 	uint32_t n = w->grid.parts;
 	for (uint32_t t = 0; t < w->base.triangle_count; t++)
-		for (uint32_t i = 0; i <= n; i++)
+		for (uint32_t i = 0; i <= n; i++) {
+			tick();
 			for (uint32_t j = 0; j <= n - i; j++) {
 				if (!all && i > 0 && j > 0 && j < n - i)
 					j = n - i;
 				what(w, t, i, j);
 			}
+		}
 }
 
 static vec3 unit_area(const vec3 p[3])
@@ -232,13 +235,15 @@ static void put_triangles(struct work *w)
 {
 	uint32_t n = w->grid.parts, count = 0;
 	for (uint32_t t = 0; t < w->base.triangle_count; t++)
-		for (uint32_t i = 0; i < n; i++)
+		for (uint32_t i = 0; i < n; i++) {
+			tick();
 			for (uint32_t j = 0; j < n - i; j++) {
 				put_triangle(w, t, (const uint32_t[3][2]){{i, j}, {i + 1, j}, {i, j + 1}}, w->out->index[count++]);
 				if (i + j + 1 < n)
 					put_triangle(w, t, (const uint32_t[3][2]){{i + 1, j}, {i + 1, j + 1}, {i, j + 1}},
 						     w->out->index[count++]);
 			}
+		}
 	for (uint64_t i = 0; i < w->grid.border; i++) {
 		vec3 n0 = mesh_load(w->out->normal[i]);
 		if (w->turns[i].weight > 0)

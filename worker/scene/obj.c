@@ -3,6 +3,7 @@
  * where it stands, so that an error has a line.
  */
 #include "common/base/mem.h"
+#include "common/base/tick.h"
 #include "worker/scene/mesh_raw.h"
 #include "worker/scene/number.h"
 
@@ -204,6 +205,7 @@ static int read_lines(struct obj *o)
 {
 	while (o->p < o->end) {
 		o->line++;
+		tick();
 		int r = read_line(o);
 		if (r)
 			return r;
@@ -218,6 +220,7 @@ static int read_lines(struct obj *o)
 static int compare_corners(const void *a, const void *b)
 {
 	const struct corner *x = a, *y = b;
+	tick();
 	if (x->v != y->v)
 		return x->v < y->v ? -1 : 1;
 	if (x->vt != y->vt)

@@ -1,6 +1,7 @@
 #include "worker/world/world.h"
 
 #include "common/base/mem.h"
+#include "common/base/tick.h"
 #include "worker/scene/mesh.h"
 #include "worker/world/displacement.h"
 #include "worker/world/reach.h"
@@ -66,6 +67,7 @@ static int read_shapes(struct builder *b)
 		if (s->objects[i]->cls != PLUGIN_SHAPE)
 			continue;
 		uint64_t dropped = 0;
+		tick();
 		int rc = shape_build(s->objects[i], b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
 		if (!rc && b->forced.of[EFFECT_DISPLACEMENT] >= 0)
 			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3, w->knobs.tessellation,
@@ -173,6 +175,7 @@ static int place_shapes(struct builder *b)
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct shape_geometry *from = &b->geometry[i];
 		struct geom_shape *g = &w->shapes[i];
+		tick();
 		if (from->kind == SHAPE_SPHERE) {
 			const struct sphere *s = &from->sphere;
 			g->is_sphere = true;

@@ -3,6 +3,7 @@
  * lies between and nothing else, but for those that pass an edge by less than floats can tell. Deterministic: every count below
  * is exact, no rate is estimated.
  */
+#include "common/base/tick.h"
 #include "tests/support/bodies.h"
 #include "worker/geom/accel.h"
 
@@ -327,12 +328,28 @@ static void test_slivers(void **state)
 	body_free(&s);
 }
 
+/* Whoever watches a long building sees it get on. */
+static void test_building_ticks(void **state)
+{
+	(void)state;
+	atomic_ullong ticks = 0;
+	struct geom_shape s;
+	body_ball(&s, 200, 0.7, 0.15);
+	tick_counter = &ticks;
+	struct accel *a = body_accel(&s, 1);
+	tick_counter = NULL;
+	print_message("%llu ticks for %u triangles\n", atomic_load(&ticks), s.triangle_count);
+	assert_true(atomic_load(&ticks) >= s.triangle_count / 4096);
+	accel_free(a);
+	body_free(&s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_outside_of_mesh), cmocka_unit_test(test_closed),	 cmocka_unit_test(test_plane),
 		cmocka_unit_test(test_segments),	cmocka_unit_test(test_far_away), cmocka_unit_test(test_slivers),
-		cmocka_unit_test(test_silhouettes),
+		cmocka_unit_test(test_silhouettes),	cmocka_unit_test(test_building_ticks),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
