@@ -17,7 +17,7 @@ enum header_name {
 	H_ROUNDS, H_MUTATIONS, H_SAMPLES, H_B, H_B_ERROR, H_BEYOND, H_REL_MSE, H_REL_MSE_UPPER, H_REL_MSE_LOW_95, H_REL_MSE_HIGH_95, H_ACCEPTED, H_INDEPENDENT,
 	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_STRATEGIES, H_NOTE, H_AGREEMENT, H_DISAGREEMENT,
 	H_R_HAT_MEDIAN, H_R_HAT_WORST, H_CLASSES, H_EFFECTS, H_MIXED, H_WALL,
-	H_CPU, H_WORKERS, H_DATE, H_END,
+	H_CPU, H_WORKERS, H_DATE, H_END, H_CROPS,
 };
 
 enum { HEADER_STRATEGIES = 5120 };
@@ -73,6 +73,7 @@ const struct header_row header_rows[] = {
 	[H_DATE] = {"hslt:date", STRING, true, "when the image was written, UTC"},
 	/* Not compared: --mutations of as many rounds makes the same bits as the error or the time that ended them. */
 	[H_END] = {"hslt:end", STRING, true, "which bound ended the render: mutations, time, target-error, black, interrupted"},
+	[H_CROPS] = {"hslt:crops", INT, false, "number of crops that hslt-assemble made the image of"},
 	{NULL, 0, false, NULL},
 };
 

@@ -1,0 +1,67 @@
+# A film in crops on two coordinators, each with a worker of its own: put together it is the film that one render makes.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-assemble hslt-compare hslt-render
+CROPS=$HERE/../../deploy/crops.sh
+
+# code WANTED COMMAND...
+code() {
+	wanted=$1
+	shift
+	got=0
+	"$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
+	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/out" "$DIR/err.log")"
+}
+
+says() {
+	grep -q -- "$1" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
+}
+
+for c in one two; do
+	mkdir "$DIR/$c"
+	"$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/$c/port" --spool "$DIR/$c/spool" \
+		--status-socket "$DIR/$c/status" 2>>"$DIR/$c-coordinator.log" &
+	PIDS="$PIDS $!"
+	until_true 10 test -s "$DIR/$c/port" || fail "the coordinator does not listen"
+	start_worker $c --coordinator "127.0.0.1:$(cat "$DIR/$c/port")"
+done
+FARMS=127.0.0.1:$(cat "$DIR/one/port"),127.0.0.1:$(cat "$DIR/two/port")
+
+# Samples do not depend on the crop: the same image but for roundings of the grids that sums lie on.
+"$BIN/hslt-render" "$BOX" -o "$DIR/whole.exr" -i path --size 81x45 --spp 16 --threads 1 --quiet
+code 0 sh "$CROPS" -p "$BIN" -g 3x2 -s 81x45 -c "$FARMS" -o "$DIR/path.exr" "$BOX" -i path --spp 16
+says "6 crops, 6 of them to render"
+code 0 "$BIN/hslt-compare" "$DIR/path.exr" "$DIR/whole.exr" --max-relmse 1e-12
+[ ! -d "$DIR/path.exr.crops" ] || fail "the crops are still there"
+for c in one two; do
+	grep -q event=job_state "$DIR/$c-coordinator.log" || fail "coordinator $c had no job"
+done
+
+# It goes on with what is there, and not with what is of another call.
+"$BIN/hslt-render" "$BOX" -o "$DIR/hslt.exr" -i hslt --size 80x40 --crop 0,0,40,40 --mutations 40000 --threads 1 --quiet
+mkdir "$DIR/chains.exr.crops"
+cp "$DIR/hslt.exr" "$DIR/chains.exr.crops/0-0.exr"
+printf '%s\n' 2x1 80x40 "$BOX" --mutations 40000 >"$DIR/chains.exr.crops/call"
+code 2 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" --mutations 40001
+says "another"
+code 0 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" --mutations 40000
+says "2 crops, 1 of them to render"
+code 2 sh "$CROPS" -g 2y1 -s 80x40 -c "$FARMS" -o "$DIR/x.exr" "$BOX"
+code 1 sh "$CROPS" -p "$BIN" -g 1x1 -s 80x40 -c "$FARMS" -o "$DIR/x.exr" "$DIR/none.xml"
+says "0-0 failed"
+
+# What does not fit together
+"$BIN/hslt-render" "$BOX" -o "$DIR/right.exr" -i hslt --size 80x40 --crop 40,0,40,40 --mutations 40000 --threads 1 --quiet
+code 0 "$BIN/hslt-assemble" "$DIR/right.exr" "$DIR/hslt.exr" -o "$DIR/both.exr"
+code 0 "$BIN/hslt-compare" "$DIR/both.exr" "$DIR/chains.exr" --max-relmse 0
+code 1 "$BIN/hslt-assemble" "$DIR/right.exr" "$DIR/right.exr" -o "$DIR/x.exr"
+says "another crop has its pixel 40,0"
+"$BIN/hslt-render" "$BOX" -o "$DIR/low.exr" -i hslt --size 80x40 --crop 0,1,40,39 --mutations 40000 --threads 1 --quiet
+code 1 "$BIN/hslt-assemble" "$DIR/right.exr" "$DIR/low.exr" -o "$DIR/x.exr"
+says "no crop has pixel 0,0"
+"$BIN/hslt-render" "$BOX" -o "$DIR/other.exr" -i hslt --size 80x40 --crop 0,0,40,40 --mutations 40000 --set wavelengths=1 --threads 1 --quiet
+code 1 "$BIN/hslt-assemble" "$DIR/right.exr" "$DIR/other.exr" -o "$DIR/x.exr"
+says "other.exr: .*--set"
+"$BIN/hslt-render" "$BOX" -o "$DIR/path-crop.exr" -i path --size 80x40 --crop 0,0,40,40 --spp 16 --threads 1 --quiet
+code 1 "$BIN/hslt-assemble" "$DIR/right.exr" "$DIR/path-crop.exr" -o "$DIR/x.exr"
+[ ! -e "$DIR/x.exr" ] || fail "an image of nothing"
+echo "crops: two coordinators, put together, and what does not fit"
