@@ -4,7 +4,7 @@
 #include <math.h>
 #include <stdio.h>
 
-enum { FAILURES_FATAL = 3, SLOT_FAILURES_FATAL = 6 };
+enum { TRIES_FATAL = 3 };
 
 enum verdict { MERGE, NOTE, REPEAT, REFUSE, FAULT };
 
@@ -184,38 +184,24 @@ void answer_batch(struct farm *f, const struct event *ev)
 		give_up_where_hopeless(f, j, s, &ev->lease.key);
 }
 
-/* How many workers there are in the list with this one. */
-static uint32_t failers(uint64_t list[SLOT_FAILERS], uint64_t who)
+bool answer_all_failed(const struct farm *f, const struct job *j)
 {
-	uint32_t n = 0;
-	while (n < SLOT_FAILERS && list[n] && list[n] != who)
-		n++;
-	if (n < SLOT_FAILERS)
-		list[n] = who;
-	while (n < SLOT_FAILERS && list[n])
-		n++;
-	return n;
-}
-
-static bool all_failed(const struct farm *f, const struct job *j)
-{
+	uint32_t here = 0;
 	for (uint32_t i = 0; i < f->peer_count; i++) {
 		const struct peer *p = f->peers[i];
-		if (p->state == PEER_ACTIVE && job_takes(j, p) && isinf(peer_avoids_until(p, j->id)))
+		if (p->state != PEER_ACTIVE || !job_takes(j, p))
+			continue;
+		if (isinf(peer_avoids_until(p, j->id)))
 			return false;
+		here++;
 	}
-	return true;
+	return here > 0;
 }
 
-/* Nothing of the job was ever made: the fault is the job's when three workers say so, or all that there are, after three tries. One
- * worker that is out of order cannot fail what others would make. */
-static bool never_works(const struct farm *f, struct job *j, const struct peer *p, bool again)
+/* Nothing of the job was ever made, and nobody is left who might: there is nothing to lose or to wait for. */
+static bool never_works(const struct farm *f, const struct job *j)
 {
-	j->tries += !again;
-	uint32_t workers = failers(j->failed_on, p->who->id);
-	if (j->bootstrap_merged + j->leases_merged + j->noted > 0)
-		return false;
-	return workers >= FAILURES_FATAL || (j->tries >= FAILURES_FATAL && all_failed(f, j));
+	return j->tries >= TRIES_FATAL && answer_all_failed(f, j);
 }
 
 static struct lease *held(const struct farm *f, const struct event *ev)
@@ -243,9 +229,10 @@ void answer_failed(struct farm *f, const struct event *ev)
 	snprintf(f->text, sizeof f->text, "%s: %.180s", p->name, p->text);
 	snprintf(j->text, sizeof j->text, "%s", f->text);
 	j->failures++;
-	s->failures++;
-	bool never = never_works(f, j, p, again);
-	if (never || failers(s->failed_on, p->who->id) >= FAILURES_FATAL || s->failures >= SLOT_FAILURES_FATAL)
+	j->tries += !again;
+	bool fatal = failers_add(&s->failers, f, p->who), in_all = failers_add(&j->failers, f, p->who);
+	bool made = j->bootstrap_merged + j->leases_merged + j->noted > 0;
+	if (fatal || (!made && (in_all || never_works(f, j))))
 		rounds_end(f, j, END_FAILED, f->text);
 }
 

@@ -17,9 +17,12 @@
  *    A worker without other work gets a second copy of a lease of the first incomplete round that takes longer
  *    than 1.5 medians; never more than two workers are on one lease otherwise.
  *  - Invalid content is its sender's fault; after three faults in a row the worker gets no more leases.
- *    A failed lease is tried elsewhere; its worker waits 10, 20, 40 ... s before it gets more of this job; what it fails with
- *    meanwhile is the same failure. The job fails when one lease failed on three workers, or six times in all; or when nothing
- *    was ever merged or noted and leases of it failed on three workers, or on all that there are and three times.
+ *    A failed lease is tried elsewhere; its worker, whatever its connection, waits 10, 20, 40 ... 640 s before it gets more of
+ *    this job; what it fails with meanwhile is the same failure.
+ *  - The job fails when one lease failed on three workers, of three certificates where the farm knows as many (failers.h):
+ *    one worker never ends a job of which something is made, it waits for others, or for that one to mend. While nothing was
+ *    merged or noted the job fails, too, when any leases of it failed on three such workers, or on all that are here and three
+ *    times.
  *  - Of a job that is verified a share of the leases is computed by two workers, of two identities (roster.h) and one
  *    fingerprint. The first answer is noted; one that equals another worker's is merged; where two differ a third
  *    decides, and a fourth; then the job fails. Who said otherwise than two that agree has given a wrong result.

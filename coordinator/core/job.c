@@ -194,8 +194,8 @@ bool job_merge(struct job *j, struct slot *s, double now, double duration)
 		j->done++;
 	else
 		j->ahead++;
-	s->failures = s->timeouts = 0;
-	memset(s->failed_on, 0, sizeof s->failed_on);
+	s->timeouts = 0;
+	s->failers.count = 0;
 	if (j->kind == LEASE_BOOTSTRAP)
 		j->bootstrap_merged++;
 	else

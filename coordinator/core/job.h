@@ -3,6 +3,7 @@
 #define COORDINATOR_CORE_JOB_H
 
 #include "common/film/forecast.h"
+#include "coordinator/core/failers.h"
 #include "coordinator/core/farm.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/list.h"
@@ -10,15 +11,15 @@
 #include "coordinator/core/peer.h"
 #include "coordinator/core/rate.h"
 
-enum { JOB_NAME = 128, JOB_DURATIONS = 31, SLOT_FAILERS = 3 };
+enum { JOB_NAME = 128, JOB_DURATIONS = 31 };
 
 struct slot {
 	struct link link;     /* one of the job's lists, or alone: two holders, or nothing left to do */
 	struct lease *leases; /* overdue ones too */
 	uint64_t next;        /* the first epoch that is not merged */
 	double since;         /* when the lease that is out was sent */
-	uint64_t failed_on[SLOT_FAILERS]; /* workers that failed with the next epoch */
-	uint32_t holders, failures, timeouts;
+	struct failers failers; /* with the next epoch */
+	uint32_t holders, timeouts;
 };
 
 struct job {
@@ -67,7 +68,7 @@ struct job {
 	struct forecast_cost stop, halving;
 	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
 	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
-	uint64_t failed_on[SLOT_FAILERS]; /* workers that failed with it */
+	struct failers failers; /* with any of its leases */
 	uint32_t tries; /* that failed; several leases of one worker at once are one */
 	char text[256];
 	char held[JOB_HOLDS][256]; /* why no lease of it goes out; "" each when they do */

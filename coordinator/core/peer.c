@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { PAUSE_DOUBLINGS = 10 };
+enum { PAUSE_DOUBLINGS = 6 };
 
 struct peer_class *peer_class_use(struct farm *f, const char *fingerprint)
 {
@@ -173,22 +173,39 @@ void peer_fault(struct farm *f, struct peer *p, const char *text)
 		roster_set_aside(f, p->who);
 }
 
+static struct avoid *avoid_of(const struct peer *p, uint64_t job)
+{
+	for (int i = 0; i < IDENTITY_AVOIDED; i++)
+		if (p->who->avoid[i].job == job)
+			return &p->who->avoid[i];
+	return NULL;
+}
+
+/* Where there is room, where a job is over, or instead of the one that ends first. */
+static struct avoid *room_to_avoid(const struct farm *f, struct identity *who)
+{
+	struct avoid *first = &who->avoid[0];
+	for (int i = 0; i < IDENTITY_AVOIDED; i++) {
+		struct avoid *a = &who->avoid[i];
+		const struct job *j = a->job ? farm_find_job(f, a->job) : NULL;
+		if (!j || !job_is_live(j))
+			return a;
+		if (a->until < first->until)
+			first = a;
+	}
+	return first;
+}
+
 void peer_failed(const struct farm *f, struct peer *p, uint64_t job)
 {
-	struct peer_avoid *a = &p->avoid[0];
-	for (int i = 0; i < PEER_AVOIDED; i++) {
-		if (p->avoid[i].job == job) {
-			a = &p->avoid[i];
-			break;
-		}
-		if (p->avoid[i].until < a->until)
-			a = &p->avoid[i];
-	}
+	struct avoid *a = avoid_of(p, job);
 	p->failures++;
-	if (a->job == job && a->until > f->now)
+	if (a && a->until > f->now)
 		return;
-	if (a->job != job)
-		*a = (struct peer_avoid){ .job = job };
+	if (!a) {
+		a = room_to_avoid(f, p->who);
+		*a = (struct avoid){ .job = job };
+	}
 	uint32_t doublings = a->failures < PAUSE_DOUBLINGS ? a->failures : PAUSE_DOUBLINGS;
 	a->failures++;
 	a->until = f->now + ldexp(f->config.first_pause, (int)doublings);
@@ -196,17 +213,15 @@ void peer_failed(const struct farm *f, struct peer *p, uint64_t job)
 
 void peer_succeeded(struct peer *p, uint64_t job)
 {
+	struct avoid *a = avoid_of(p, job);
 	p->merged++;
 	p->who->faults_in_row = 0;
-	for (int i = 0; i < PEER_AVOIDED; i++)
-		if (p->avoid[i].job == job)
-			p->avoid[i] = (struct peer_avoid){ 0 };
+	if (a)
+		*a = (struct avoid){ 0 };
 }
 
 double peer_avoids_until(const struct peer *p, uint64_t job)
 {
-	for (int i = 0; i < PEER_AVOIDED; i++)
-		if (p->avoid[i].job == job)
-			return p->avoid[i].until;
-	return -INFINITY;
+	const struct avoid *a = avoid_of(p, job);
+	return a ? a->until : -INFINITY;
 }

@@ -7,7 +7,7 @@
 #include "coordinator/core/list.h"
 #include "coordinator/core/roster.h"
 
-enum { PEER_AVOIDED = 4, PEER_NAME = IDENTITY_NAME, FINGERPRINT_SIZE = 128 };
+enum { PEER_NAME = IDENTITY_NAME, FINGERPRINT_SIZE = 128 };
 
 /* Workers with the same numeric fingerprint. */
 struct peer_class {
@@ -16,13 +16,6 @@ struct peer_class {
 	uint32_t uses;       /* workers and live jobs */
 	uint32_t active;     /* workers that may get leases */
 	char fingerprint[FINGERPRINT_SIZE];
-};
-
-/* After a failed lease the worker stays away from that job for a while. */
-struct peer_avoid {
-	uint64_t job; /* 0: free */
-	uint32_t failures;
-	double until;
 };
 
 struct peer {
@@ -40,7 +33,6 @@ struct peer {
 	uint64_t queued; /* when it began to wait, as a number */
 	double joined, heard;
 	uint64_t merged, repeats, refused, faults, failures, timeouts;
-	struct peer_avoid avoid[PEER_AVOIDED];
 	char text[256];
 	uint32_t lease_limit;
 	struct lease leases[];

@@ -43,6 +43,15 @@ static struct identity *room_for_one(struct farm *f)
 	return oldest;
 }
 
+/* That of those who have the same, else a new one. */
+static uint64_t certificate_id(const struct farm *f, const char *certificate, uint64_t otherwise)
+{
+	for (uint32_t i = 0; i < f->known_count; i++)
+		if (f->known[i]->certificate_id && strcmp(f->known[i]->certificate, certificate) == 0)
+			return f->known[i]->certificate_id;
+	return otherwise;
+}
+
 struct identity *roster_use(struct farm *f, const struct event_join *e, const char **refused)
 {
 	struct identity *k = find(f, e);
@@ -53,6 +62,7 @@ struct identity *roster_use(struct farm *f, const struct event_join *e, const ch
 			return NULL;
 		}
 		*k = (struct identity){ .id = ++f->identities };
+		k->certificate_id = certificate_id(f, e->certificate, k->id);
 		snprintf(k->certificate, sizeof k->certificate, "%s", e->certificate);
 	}
 	/* One that is set aside stays known by what it was. */

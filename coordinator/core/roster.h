@@ -9,16 +9,25 @@
 
 #include "coordinator/core/farm.h"
 
-enum { IDENTITY_CERTIFICATE = 72, IDENTITY_NAME = 64, IDENTITY_HOME = JOIN_HOME };
+enum { IDENTITY_AVOIDED = 8, IDENTITY_CERTIFICATE = 72, IDENTITY_NAME = 64, IDENTITY_HOME = JOIN_HOME };
+
+/* After a failed lease the worker stays away from that job for a while. */
+struct avoid {
+	uint64_t job; /* 0: free */
+	uint32_t failures;
+	double until;
+};
 
 struct identity {
 	uint64_t id; /* never used twice */
+	uint64_t certificate_id; /* the same for all of one certificate */
 	char certificate[IDENTITY_CERTIFICATE], name[IDENTITY_NAME], home[IDENTITY_HOME];
 	uint64_t restarts; /* of the home, as they were last told */
 	uint32_t uses;     /* connections, and answers that wait for a second one */
 	uint32_t faults_in_row, wrong;
 	bool aside;
 	double seen;
+	struct avoid avoid[IDENTITY_AVOIDED];
 	char text[256]; /* its last fault */
 };
 

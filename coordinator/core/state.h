@@ -74,6 +74,7 @@ void answer_batch(struct farm *f, const struct event *ev);
 void answer_failed(struct farm *f, const struct event *ev);
 void answer_delivered(struct farm *f, const struct event *ev);
 void answer_returned(struct farm *f, const struct event *ev);
+bool answer_all_failed(const struct farm *f, const struct job *j); /* each worker here, since it last gave something */
 
 /* schedule.c */
 void schedule(struct farm *f);

@@ -89,6 +89,8 @@ static void why_waiting(const struct farm *f, const struct job *j, char *text, s
 		snprintf(text, size, "no worker with fingerprint %s (%u with others)", j->fingerprint, active);
 	else if (verify_why(f, j, text, size))
 		return;
+	else if (answer_all_failed(f, j))
+		snprintf(text, size, "no worker can compute it: %.220s", j->text);
 	else if (someone_avoids(f, j))
 		snprintf(text, size, "its workers failed and pause before they try again; the last one: %.180s", j->text);
 	else if (other && other->priority > j->priority)

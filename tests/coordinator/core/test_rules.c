@@ -270,6 +270,65 @@ static void out_of_order_all(void **state)
 		NULL });
 }
 
+/* What is made is not lost to one worker, however often it fails and calls again: the job waits, and says for what. */
+static void one_bad_worker(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START_TWO,
+		"[2] w2 batch j1 g1 p0 e0 -> merge, merged, w2 gets j1 g1 p0 e1",
+		"[2] w2 leaves -> -",
+		"[2] w1 fails j1 g0 p0 e0 sorry -> -",
+		"[3] w1 wants 1 -> -",
+		"[3] w1 leaves -> -",
+		/* its pause is its own, not its connection's */
+		"[3] w3 joins A threads=1 name=a home=a start=1 -> -", "[3] w3 wants 1 -> w3 gets j1 g0 p0 e0",
+		"[4] w3 fails j1 g0 p0 e0 sorry -> -",
+		"[4] w4 joins A threads=1 name=b home=a start=2 -> close w3", "[4] w4 wants 1 -> -",
+		"[13] tick -> -", "[14] tick -> w4 gets j1 g0 p0 e0", "[14] w4 fails j1 g0 p0 e0 sorry -> -",
+		"[34] w4 heard -> w4 gets j1 g0 p0 e0", "[34] w4 fails j1 g0 p0 e0 sorry -> -",
+		"[60] w4 heard -> -", "[74] w4 heard -> w4 gets j1 g0 p0 e0", "[74] w4 fails j1 g0 p0 e0 sorry -> -",
+		"[100] w4 heard -> -", "[125] w4 heard -> -", "[150] w4 heard -> -",
+		"[154] w4 heard -> w4 gets j1 g0 p0 e0", "[154] w4 fails j1 g0 p0 e0 sorry -> -",
+		NULL });
+	struct job_status s;
+	assert_true(farm_job(f, 1, 160, &s));
+	assert_int_equal(s.state, JOB_RUNNING);
+	assert_string_equal(s.waiting, "no worker can compute it: b: sorry");
+	transcript_play(f, (const char *const[]){
+		"[160] w5 joins A threads=1 name=c -> -",
+		"[160] w5 wants 1 -> w5 gets j1 g0 p0 e0",
+		"[161] w5 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w5 gets j1 g1 p0 e1",
+		NULL });
+	farm_free(f);
+}
+
+/* Names cost nothing, certificates do: where the farm knows three, three names of one are not three workers. */
+static void made_up_names(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=1 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 certificate=a name=a -> -", "[0] w2 joins A threads=1 certificate=b name=a -> -",
+		"[0] w3 joins A threads=1 certificate=c name=a -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged, j1 prepare", "[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[1] w1 leaves -> -", "[1] w2 leaves -> -",
+		"[2] w3 wants 1 -> w3 gets j1 g0 p0 e0", "[2] w3 fails j1 g0 p0 e0 sorry -> -",
+		"[2] w4 joins A threads=1 certificate=c name=b -> -", "[2] w4 wants 1 -> w4 gets j1 g0 p0 e0",
+		"[2] w4 fails j1 g0 p0 e0 sorry -> -",
+		"[2] w5 joins A threads=1 certificate=c name=c -> -", "[2] w5 wants 1 -> w5 gets j1 g0 p0 e0",
+		"[2] w5 fails j1 g0 p0 e0 sorry -> -",
+		"[2] w6 joins A threads=1 certificate=c name=d -> -", "[2] w6 wants 1 -> w6 gets j1 g0 p0 e0",
+		"[2] w6 fails j1 g0 p0 e0 sorry -> -",
+		"[3] w7 joins A threads=1 certificate=a name=b -> -", "[3] w7 wants 1 -> w7 gets j1 g0 p0 e0",
+		"[3] w7 fails j1 g0 p0 e0 sorry -> -",
+		"[4] w8 joins A threads=1 certificate=b name=b -> -", "[4] w8 wants 1 -> w8 gets j1 g0 p0 e0",
+		"[4] w8 fails j1 g0 p0 e0 sorry -> j1 is failed (failed: b: sorry)",
+		NULL });
+}
+
 static void returned_lease(void **state)
 {
 	(void)state;
@@ -311,6 +370,8 @@ int main(void)
 		cmocka_unit_test(never_a_success),
 		cmocka_unit_test(out_of_order),
 		cmocka_unit_test(out_of_order_all),
+		cmocka_unit_test(one_bad_worker),
+		cmocka_unit_test(made_up_names),
 		cmocka_unit_test(returned_lease),
 		cmocka_unit_test(bounded_wish),
 	};

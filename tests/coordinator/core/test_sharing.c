@@ -184,7 +184,7 @@ static void nobody_is_trusted(void **state)
 	transcript_play(f, (const char *const[]){
 		"[30] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 		"[31] w1 fails j1 g0 p0 boot no such file -> -", NULL });
-	assert_string_equal(waiting(f, 1), "its workers failed and pause before they try again; the last one: w1: no such file");
+	assert_string_equal(waiting(f, 1), "no worker can compute it: w1: no such file");
 	farm_free(f);
 }
 

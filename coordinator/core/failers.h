@@ -1,0 +1,27 @@
+/*
+ * Workers that failed with the same thing. Three of them say that it is the thing's fault, each counted once however often it
+ * failed and called again; of as many certificates, up to three, as the farm knows workers of, for whoever has one can give
+ * himself any number of names. Pure but for the list.
+ */
+#ifndef COORDINATOR_CORE_FAILERS_H
+#define COORDINATOR_CORE_FAILERS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum { FAILERS_FATAL = 3 };
+
+struct farm;
+struct identity;
+
+struct failers {
+	uint32_t count;
+	struct {
+		uint64_t who, certificate; /* ids of struct identity */
+	} of[FAILERS_FATAL];
+};
+
+/* true: it is the thing's fault. */
+bool failers_add(struct failers *l, const struct farm *f, const struct identity *who);
+
+#endif
