@@ -64,6 +64,7 @@ int farm_world_open(struct farm_world *w, struct error *e)
 	c.status_socket = socket_path;
 	c.journal_bytes = 1 << 12; /* so that there are checkpoints */
 	c.max_connections = 16;
+	c.heartbeat_seconds = c.hello_seconds = c.stall_seconds = 3600; /* what is found must not depend on the machine's load */
 	for (unsigned i = 0; i < FARM_PEERS; i++)
 		w->peers[i].fd = -1;
 	return server_open(&w->server, &c, e);
