@@ -86,15 +86,6 @@ bad=$(awk -F'|' '$3 != 0 || $4 != 0 || $5 != "yes"' "$ROWS")
 [ $MODE = write ] || { echo "$(wc -l <"$ROWS") faults, $RESULTS results a job, nothing lost, nothing doubled, bits equal" && exit 0; }
 [ ! -s "$SKIPPED" ] || fail "the table is not written: $(cat "$SKIPPED")"
 
-# table NAME FILE: its rows, between the marks of that name
-table() {
-	{
-		sed "/<!-- $1 -->/q" "$README"
-		cat "$2"
-		sed -n "/<!-- $1 -->/,\$p" "$README" | sed -n '/<!-- end -->/,$p'
-	} >"$TOP/new"
-	cat "$TOP/new" >"$README"
-}
 {
 	echo '| fault | times injected | results lost | results doubled | bits equal |'
 	echo '|---|---|---|---|---|'
@@ -102,14 +93,5 @@ table() {
 		eval "grep -F \"\$text_$f|\" \"$ROWS\" | sed 's/|/ | /g; s/^/| /; s/$/ |/' | grep . || grep -F \"| \$text_$f |\" \"$README\"" || :
 	done
 } >"$TOP/table"
-table faults "$TOP/table"
-[ $# -eq 0 ] || exit 0
-
-HSLT_ATTEMPTS=$TOP/attempts sh "$HERE/tls.sh" "$BUILD" || fail "an attempt that must fail did not"
-{
-	echo '| attempts | what | tried | refused |'
-	echo '|---|---|---|---|'
-	awk -f "$HERE/faults/kinds.awk" "$TOP/attempts" | sed 's/|/ | /g; s/^/| /; s/$/ |/'
-} >"$TOP/table"
-table attempts "$TOP/table"
-awk -F' [|] ' '/^[|] [^a]/ && $3 + 0 != $4 + 0 { bad = 1 } END { exit bad }' "$TOP/table" || fail "an attempt was not refused"
+write_table faults "$TOP/table"
+[ $# -gt 0 ] || sh "$HERE/tls.sh" "$BUILD" --write || fail "an attempt that must fail did not"

@@ -122,10 +122,10 @@ attempts = [
     ("path tricks: control characters", hello + submit(b"a\nb", scene=b"a"), b"no proper name"),
     ("path tricks: no UTF-8", hello + submit(b"a", b"\xc0\xae\xc0\xae/b"), b""),
     ("path tricks: a name of 2,000 bytes", hello + submit(b"a", b"x" * 2000), b"no proper name"),
-    ("two files of one name", hello + submit(b"a", b"b", b"a"), b"two files of that name"),
-    ("a scene of another case than its file", hello + submit(b"A.xml", scene=b"a.xml"), b"not in the bundle"),
-    ("10,001 files", hello + submit(*[b"%d" % i for i in range(10001)]), b"files, not 10001"),
-    ("10^6 files", hello + submit(*[b"%d" % i for i in range(10 ** 6)]), b""),
+    ("no proper bundle: two files of one name", hello + submit(b"a", b"b", b"a"), b"two files of that name"),
+    ("no proper bundle: a scene of another case than its file", hello + submit(b"A.xml", scene=b"a.xml"), b"not in the bundle"),
+    ("no proper bundle: 10,001 files", hello + submit(*[b"%d" % i for i in range(10001)]), b"files, not 10001"),
+    ("no proper bundle: 10^6 files", hello + submit(*[b"%d" % i for i in range(10 ** 6)]), b""),
 ]
 # Files that a worker could open, if names led anywhere: by their whole name, and from where it was started.
 at = os.getcwd().encode()
@@ -141,19 +141,19 @@ entity = b'<!DOCTYPE scene [<!ENTITY e SYSTEM "file:///proc/self/environ">]>'
 laughs = b"<!DOCTYPE scene [<!ENTITY a0 'ha'>" + b"".join(
     b"<!ENTITY a%d '%s'>" % (i, b"&a%d;" % (i - 1) * 10) for i in range(1, 12)) + b"]>"
 scenes = [
-    unsent("a scene that names /dev/zero", b"/dev/zero"),
-    unsent("a scene that names /proc/self/environ", b"/proc/self/environ"),
-    unsent("a scene that names ../../../../etc/passwd", b"../../../../etc/passwd"),
-    unsent("a scene that names a file by its whole name", at + b"/beside.obj"),
-    unsent("a scene that names a file where the worker was started", b"LICENSE"),
-    unsent("a scene that names a pipe", at + b"/pipe.obj"),
-    ("a scene that names a file of its bundle in another case", mesh(b"A.obj"), ((b"a.obj", b"v 0 0 0\n"),),
+    unsent("a scene sent past the client: names /dev/zero", b"/dev/zero"),
+    unsent("a scene sent past the client: names /proc/self/environ", b"/proc/self/environ"),
+    unsent("a scene sent past the client: names ../../../../etc/passwd", b"../../../../etc/passwd"),
+    unsent("a scene sent past the client: names a file by its whole name", at + b"/beside.obj"),
+    unsent("a scene sent past the client: names a file where the worker was started", b"LICENSE"),
+    unsent("a scene sent past the client: names a pipe", at + b"/pipe.obj"),
+    ("a scene sent past the client: names a file of its bundle in another case", mesh(b"A.obj"), ((b"a.obj", b"v 0 0 0\n"),),
      b"A.obj: the file was not sent with the job"),
-    unsent("a scene that names another job's file by its hash", hashlib.sha256(here_box).hexdigest().encode()),
-    ("a scene that includes /etc/passwd", box(b'<include filename="/etc/passwd"/>'), (), b"/etc/passwd: the file was not sent"),
-    ("a scene whose define names /etc/passwd", box(b'<default name="p" value="/etc/passwd"/><include filename="$p"/>'), (), b"/etc/passwd: the file was not sent"),
-    ("a scene with an entity of a file", box(b'<default name="q" value="x"/>&e;', entity), (), b"must not declare"),
-    ("a scene of nested entities", box(b'<default name="q" value="&a11;"/>', laughs), (), b"must not declare"),
+    unsent("a scene sent past the client: names another job's file by its hash", hashlib.sha256(here_box).hexdigest().encode()),
+    ("a scene sent past the client: includes /etc/passwd", box(b'<include filename="/etc/passwd"/>'), (), b"/etc/passwd: the file was not sent"),
+    ("a scene sent past the client: a define that names /etc/passwd", box(b'<default name="p" value="/etc/passwd"/><include filename="$p"/>'), (), b"/etc/passwd: the file was not sent"),
+    ("a scene sent past the client: an entity of a file", box(b'<default name="q" value="x"/>&e;', entity), (), b"must not declare"),
+    ("a scene sent past the client: nested entities", box(b'<default name="q" value="&a11;"/>', laughs), (), b"must not declare"),
 ]
 for what, words, sentence in attempts:
     heard = ask(words)

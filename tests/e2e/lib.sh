@@ -113,6 +113,16 @@ is_state() {
 	[ "$(value "$1" state)" = "$2" ]
 }
 
+# write_table NAME FILE: its rows into README.md, between the marks of that name
+write_table() {
+	{
+		sed "/<!-- $1 -->/q" "$HERE/README.md"
+		cat "$2"
+		sed -n "/<!-- $1 -->/,\$p" "$HERE/README.md" | sed -n '/<!-- end -->/,$p'
+	} >"$TOP/readme.new"
+	cat "$TOP/readme.new" >"$HERE/README.md"
+}
+
 # same A B: every bit of every pixel, and the header but for what may differ
 same() {
 	"$BIN/hslt-compare" --exact "$1" "$2" || fail "$1 and $2 differ"

@@ -1,5 +1,6 @@
-# A farm over TLS: equal bits, and everybody who must not get in does not; the table of attempts is printed.
-# HSLT_ATTEMPTS=FILE: they are written there, too, for the table in README.md.
+# A farm over TLS: equal bits, and everybody who must not get in does not. README.md has the table of the attempts, and must have it
+# as it is today.
+#   sh tests/e2e/tls.sh BUILD [--write]     --write: writes the table
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-ca hslt-render hslt-compare
 unset HSLT_TLS
@@ -14,12 +15,12 @@ ca() {
 row() {
 	ROWS=$((ROWS + 1))
 	printf '%-48s %-8s %s\n' "$1" "$2" "$3"
-	[ -z "${HSLT_ATTEMPTS:-}" ] || printf '%s|%s\n' "$2" "$1" >>"$HSLT_ATTEMPTS"
+	printf '%s|%s\n' "$2" "$1" >>"$DIR/attempts"
 }
 
 # tries WHAT: about to
 tries() {
-	[ -z "${HSLT_ATTEMPTS:-}" ] || printf 'tried|%s\n' "$1" >>"$HSLT_ATTEMPTS"
+	printf 'tried|%s\n' "$1" >>"$DIR/attempts"
 }
 
 # refused WHAT CODE SENTENCE COMMAND...: it ends with the code, within 20 s, and says so
@@ -249,4 +250,14 @@ refused "a worker's certificate as coordinator" 2 "nobody would take it" "$BIN/h
 	--spool "$DIR/spool3" --tls "$CA/node"
 refused "an open port without TLS" 2 "--insecure" "$BIN/hslt-coordinator" --listen 0.0.0.0:0 --spool "$DIR/spool3" \
 	--status-socket "$DIR/status3" --tls ""
+
+awk -f "$HERE/faults/kinds.awk" "$DIR/attempts" >"$DIR/kinds" || fail "of no kind, never tried, or not refused: $(cat "$DIR/kinds")"
+{
+	echo '| attempts | what | tried | refused |'
+	echo '|---|---|---|---|'
+	sed 's/|/ | /g; s/^/| /; s/$/ |/' "$DIR/kinds"
+} >"$DIR/table"
+[ "${2:-}" != --write ] || write_table attempts "$DIR/table"
+sed -n '/<!-- attempts -->/,/<!-- end -->/p' "$HERE/README.md" | grep '^|' | diff - "$DIR/table" >"$DIR/diff" ||
+	fail "the table of README.md has other attempts than there were (sh tests/e2e/tls.sh $BUILD --write writes it): $(cat "$DIR/diff")"
 echo "TLS: equal bits; $ROWS attempts, all refused"

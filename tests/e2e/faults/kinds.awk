@@ -1,5 +1,5 @@
 # The attempts that tls.sh writes ("tried|WHAT" before, "refused|WHAT" or "cut off|WHAT" after), by kind: a row "KIND|HOW|TRIED|REFUSED"
-# each, in this order. What belongs to no kind makes a row of its own.
+# each, in this order. Ends with 1 when an attempt belongs to no kind, or was not refused.
 function kind_of(what) {
 	if (what ~ /without TLS|no certificate|HTTP|port without/) return "no certificate, or no TLS"
 	if (what ~ /another authority|trusts this farm/) return "a certificate of another authority"
@@ -8,22 +8,23 @@ function kind_of(what) {
 	if (what ~ /revoked/) return "revoked"
 	if (what ~ /key that everybody/) return "a key in the open"
 	if (what ~ /somebody else|^its /) return "jobs of somebody else"
-	if (what ~ /^(oversized|replayed|out of order|path tricks): /) return substr(what, 1, index(what, ":") - 1)
 	if (what ~ /quota|without a bound/) return "beyond a quota"
-	return what
+	return substr(what, 1, index(what, ":") - 1)
 }
 
 BEGIN {
 	FS = "|"
-	count = split("no certificate, or no TLS;a certificate of another authority;wrong role;expired;revoked;a key in the open;jobs of somebody else;oversized;replayed;out of order;path tricks;beyond a quota", order, ";")
+	count = split("no certificate, or no TLS;a certificate of another authority;wrong role;expired;revoked;a key in the open;jobs of somebody else;oversized;replayed;out of order;no proper bundle;path tricks;a scene sent past the client;beyond a quota", order, ";")
 	for (i = 1; i <= count; i++)
 		place[order[i]] = i
 }
 
 $1 == "tried" {
 	k = kind_of($2)
-	if (!(k in place))
-		place[order[++count] = k] = count
+	if (!(k in place)) {
+		print "of no kind: " $2
+		bad = 1
+	}
 	what = $2
 	sub(/^[a-z ]*: /, "", what)
 	tried[k]++
@@ -33,6 +34,10 @@ $1 == "tried" {
 $1 == "refused" || $1 == "cut off" { refused[kind_of($2)]++ }
 
 END {
-	for (i = 1; i <= count; i++)
-		printf "%s|%s|%d|%d\n", order[i], how[order[i]], tried[order[i]], refused[order[i]]
+	for (i = 1; i <= count; i++) {
+		k = order[i]
+		printf "%s|%s|%d|%d\n", k, how[k], tried[k], refused[k]
+		bad = bad || !tried[k] || tried[k] != refused[k]
+	}
+	exit bad
 }
