@@ -73,7 +73,7 @@ static void on_closed(void *user, const char *why)
 	text_copy(cl->why, sizeof cl->why, why);
 }
 
-static const struct conn_events events = {on_opened, on_message, NULL, on_closed};
+static const struct conn_events events = {.opened = on_opened, .message = on_message, .closed = on_closed};
 
 static void on_timeout(uv_timer_t *t)
 {

@@ -39,8 +39,9 @@ struct conn {
 	struct queued *queue, **queue_last;
 	size_t unsent;    /* bytes of frames that are not with the kernel, and what they cost beside */
 	size_t in_flight; /* what libuv has to write, of TLS with all its own */
-	uint64_t heard, frame_begun; /* ms of the loop's clock */
-	uint64_t begun, checked;     /* the connection; the peer's certificate */
+	uint64_t clock, ticked;      /* ms of its own clock, and of the loop's, at the last tick */
+	uint64_t begun, heard, frame_begun; /* ms of its own clock, as it was then */
+	uint64_t checked;            /* ms of the loop's clock: the peer's certificate */
 	uint64_t linger_until;       /* 0: not leaving */
 	int open_handles;
 	bool accepted, sniffed, closing;
@@ -93,6 +94,25 @@ void conn_close(struct conn *c, const char *why)
 	uv_close((uv_handle_t *)&c->tcp, on_handle_closed);
 }
 
+/* ---- its own clock ---- */
+
+/* Stands still while the loop does: what came meanwhile is not read yet, and nobody is to be blamed for it. */
+static uint64_t clock_of(const struct conn *c)
+{
+	uint64_t since = uv_now(c->tcp.loop) - c->ticked, most = uv_timer_get_repeat(&c->timer);
+	return c->clock + (since < most ? since : most);
+}
+
+static void tick_every(struct conn *c, uint64_t ms)
+{
+	if (c->closing)
+		return;
+	c->clock = clock_of(c);
+	c->ticked = uv_now(c->tcp.loop);
+	uv_timer_set_repeat(&c->timer, ms);
+	uv_timer_again(&c->timer);
+}
+
 /* ---- reading ---- */
 
 static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
@@ -125,7 +145,7 @@ struct buf conn_take_payload(struct conn *c)
 static void take(struct conn *c, const unsigned char *bytes, size_t size)
 {
 	size_t at = 0;
-	c->heard = uv_now(c->tcp.loop);
+	c->heard = clock_of(c);
 	while (at < size && !c->closing && !c->linger_until) {
 		struct error e;
 		size_t used;
@@ -141,6 +161,8 @@ static void take(struct conn *c, const unsigned char *bytes, size_t size)
 			frame_reader_drop(&c->reader); /* not only when the next one comes: that may be seconds */
 		}
 	}
+	if (c->events->heard && frame_reader_is_midway(&c->reader) && !c->closing && !c->linger_until)
+		c->events->heard(c->user);
 }
 
 /* Takes the mem_alloc'd bytes. */
@@ -196,8 +218,7 @@ static void refuse(struct conn *c, int rc, const char *why)
 	if (!c->linger_until)
 		text_copy(c->why, sizeof c->why, why);
 	c->linger_until = uv_now(c->tcp.loop) + REFUSED_MS;
-	uv_timer_set_repeat(&c->timer, TICK_MS);
-	uv_timer_again(&c->timer);
+	tick_every(c, TICK_MS);
 	c->waits_for_peer = true;
 	if (!c->in_flight)
 		conn_close(c, why);
@@ -235,7 +256,8 @@ static void take_encrypted(struct conn *c, const void *bytes, size_t size)
 		n = tls_link_read(c->link, chunk, sizeof chunk, &e);
 		flush(c, 0);
 		if (!was_open && tls_link_is_open(c->link) && !c->closing) {
-			c->heard = c->checked = uv_now(c->tcp.loop);
+			c->heard = clock_of(c);
+			c->checked = uv_now(c->tcp.loop);
 			if (c->events->opened && !c->accepted)
 				c->events->opened(c->user);
 			pump(c);
@@ -283,10 +305,10 @@ static void on_read(uv_stream_t *s, ssize_t count, const uv_buf_t *b)
 
 /* ---- time ---- */
 
-static bool has_stalled(const struct conn *c, uint64_t now)
+static bool has_stalled(const struct conn *c)
 {
 	double allowed = c->config.stall_seconds + (double)c->reader.payload_size / BYTES_PER_SECOND;
-	return frame_reader_is_midway(&c->reader) && (double)(now - c->frame_begun) > 1000 * allowed;
+	return frame_reader_is_midway(&c->reader) && (double)(c->clock - c->frame_begun) > 1000 * allowed;
 }
 
 /* Is the peer's certificate still good? By the clock it can expire, by the list it can be revoked. */
@@ -307,21 +329,17 @@ static void on_tick(uv_timer_t *t)
 {
 	struct conn *c = t->data;
 	uint64_t now = uv_now(t->loop);
+	c->clock = clock_of(c);
+	c->ticked = now;
 	check_again(c, now);
 	if (c->linger_until && now >= c->linger_until)
 		conn_close(c, c->why);
-	else if (c->link && !tls_link_is_open(c->link) && now - c->begun > HANDSHAKE_MS)
+	else if (c->link && !tls_link_is_open(c->link) && c->clock - c->begun > HANDSHAKE_MS)
 		conn_close(c, "the TLS handshake was not finished in time");
-	else if (has_stalled(c, now))
+	else if (has_stalled(c))
 		conn_close(c, "a frame was begun and not finished in time");
-	else if (c->config.quiet_seconds > 0 && (double)(now - c->heard) > 1000 * c->config.quiet_seconds)
+	else if (c->config.quiet_seconds > 0 && (double)(c->clock - c->heard) > 1000 * c->config.quiet_seconds)
 		conn_close(c, "nothing was heard for too long");
-}
-
-static void tick_every(struct conn *c, uint64_t ms)
-{
-	if (!c->closing)
-		uv_timer_start(&c->timer, on_tick, ms, ms);
 }
 
 /* ---- life ---- */
@@ -352,7 +370,8 @@ static int conn_new(struct conn **out, uv_loop_t *loop, bool accepted, const str
 	uv_timer_init(loop, &c->timer);
 	c->tcp.data = c->timer.data = c->connecting.data = c;
 	c->open_handles = 2;
-	c->heard = uv_now(loop);
+	c->ticked = uv_now(loop);
+	uv_timer_start(&c->timer, on_tick, TICK_MS, TICK_MS);
 	*out = c;
 	return 0;
 }
@@ -361,7 +380,7 @@ static int start(struct conn *c)
 {
 	uv_tcp_nodelay(&c->tcp, 1);
 	uv_tcp_keepalive(&c->tcp, 1, 60);
-	c->heard = c->begun = uv_now(c->tcp.loop);
+	c->begun = c->heard = clock_of(c);
 	int rc = uv_read_start((uv_stream_t *)&c->tcp, on_alloc, on_read);
 	if (!rc && c->link)
 		take_encrypted(c, NULL, 0);
@@ -387,7 +406,6 @@ int conn_connect(struct conn **out, uv_loop_t *loop, const struct net_addr *a, c
 	int rc = conn_new(&c, loop, false, config, events, user, e);
 	if (rc)
 		return rc;
-	uv_timer_start(&c->timer, on_tick, TICK_MS, TICK_MS);
 	*out = c;
 	rc = uv_tcp_connect(&c->connecting, &c->tcp, (const struct sockaddr *)&a->storage, on_connected);
 	if (rc)
@@ -402,7 +420,6 @@ int conn_accept(struct conn **out, uv_stream_t *listener, const struct conn_conf
 	int rc = conn_new(&c, listener->loop, true, config, events, user, e);
 	if (rc)
 		return rc;
-	uv_timer_start(&c->timer, on_tick, TICK_MS, TICK_MS);
 	*out = c;
 	rc = uv_accept(listener, (uv_stream_t *)&c->tcp);
 	if (!rc)
@@ -530,8 +547,7 @@ void conn_close_when_sent(struct conn *c, const char *why)
 		return;
 	text_copy(c->why, sizeof c->why, why);
 	c->linger_until = uv_now(c->tcp.loop) + LINGER_MS;
-	uv_timer_set_repeat(&c->timer, TICK_MS);
-	uv_timer_again(&c->timer);
+	tick_every(c, TICK_MS);
 	if (!c->unsent && !c->in_flight)
 		conn_close(c, c->why);
 }

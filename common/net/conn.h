@@ -19,6 +19,7 @@ struct conn_events {
 	void (*opened)(void *user); /* conn_connect only, with TLS after the handshake; may be NULL */
 	/* The envelope may be taken (copied and zeroed); the payload is there during the call only, but for conn_take_payload. */
 	void (*message)(void *user, struct envelope *env, const unsigned char *payload, size_t payload_size);
+	void (*heard)(void *user); /* bytes of a message that is not whole yet; may be NULL */
 	void (*drained)(void *user); /* all that was sent is with the kernel; may be NULL */
 	void (*closed)(void *user, const char *why);
 };
@@ -27,7 +28,7 @@ struct conn_config {
 	struct frame_limits limits;
 	size_t send_limit;    /* bytes waiting to be sent; a peer that lets more pile up is cut off */
 	double stall_seconds; /* a frame that has begun must be whole after this long + 1 s per 64 KB */
-	double quiet_seconds; /* nothing heard for so long: cut off; 0: never */
+	double quiet_seconds; /* not a byte heard for so long: cut off; 0: never. No time in which the loop stood still counts */
 	struct tls *tls;      /* NULL: plaintext. Outlives the connection; who does not speak it is cut off */
 };
 

@@ -89,6 +89,7 @@ struct event_restore {
 struct event {
 	enum event_kind kind;
 	double time;
+	double unread; /* s: what has come in the last so many may not have been read: nobody is missed for being silent in them */
 	uint64_t peer;
 	uint64_t job;
 	uint64_t tag; /* comes back in the answer; but to SUBMIT and CANCEL there is one only when it is refused */

@@ -227,7 +227,7 @@ void farm_step(struct farm *f, const struct event *ev, struct update *u)
 	struct peer *p = ev->peer ? farm_find_peer(f, ev->peer) : NULL;
 	if (p)
 		peer_heard(f, p);
-	schedule_expire(f);
+	schedule_expire(f, f->now - ev->unread);
 	on_event[ev->kind](f, ev);
 	schedule(f);
 	u->actions = f->actions;

@@ -139,40 +139,40 @@ void schedule(struct farm *f)
 		;
 }
 
-static void expire_leases(struct farm *f, struct peer *p)
+static void expire_leases(struct farm *f, struct peer *p, double read)
 {
 	for (uint32_t i = 0; i < p->lease_limit; i++) {
 		struct lease *l = &p->leases[i];
 		if (!l->used || l->overdue)
 			continue;
-		if (l->deadline <= f->now)
+		if (l->deadline <= read)
 			lease_expire(f, l);
 		else
 			f->check_at = fmin(f->check_at, l->deadline);
 	}
 }
 
-void schedule_expire(struct farm *f)
+void schedule_expire(struct farm *f, double read)
 {
 	if (f->now < f->check_at)
 		return;
 	f->check_at = INFINITY;
 	for (uint32_t i = f->peer_count; i-- > 0;) {
 		struct peer *p = f->peers[i];
-		if (p->heard + f->config.forget_after <= f->now) {
+		if (p->heard + f->config.forget_after <= read) {
 			struct action *a = update_add(f, ACTION_CLOSE_PEER);
 			a->peer = p->id;
 			a->text = "nothing heard for too long";
 			peer_leave(f, p);
 			continue;
 		}
-		if (p->state != PEER_SILENT && p->heard + f->config.silent_after <= f->now) {
+		if (p->state != PEER_SILENT && p->heard + f->config.silent_after <= read) {
 			peer_set_state(f, p, PEER_SILENT);
 			peer_drop_leases(f, p, false);
 		}
 		double patience = p->state == PEER_SILENT ? f->config.forget_after : f->config.silent_after;
 		f->check_at = fmin(f->check_at, p->heard + patience);
-		expire_leases(f, p);
+		expire_leases(f, p, read);
 	}
 	/* All of this is a scan; once a second is enough for it. */
 	f->check_at = fmax(f->check_at, f->now + 1);

@@ -78,6 +78,6 @@ bool answer_all_failed(const struct farm *f, const struct job *j); /* each worke
 
 /* schedule.c */
 void schedule(struct farm *f);
-void schedule_expire(struct farm *f); /* silence and overdue leases */
+void schedule_expire(struct farm *f, double read); /* silence and overdue leases, by what had come then */
 
 #endif

@@ -70,6 +70,9 @@ static void one_step(struct server *s, struct event *ev)
 {
 	struct update u;
 	ev->time = server_now(s);
+	ev->unread = ev->time - s->read;
+	if (ev->unread < s->config.heartbeat_seconds + 1e-3 * TICK_MS) /* nobody is missed for so little */
+		ev->unread = 0;
 	farm_step(s->farm, ev, &u);
 	s->changes++;
 	dispatch_update(s, &u);
@@ -385,6 +388,19 @@ static void refresh_tls(struct server *s)
 		log_event(LOG_TLS_EXPIRY, "text=%s", log_quote(text).text);
 }
 
+/* What came before the loop looked at its sockets has been read when it has. */
+static void on_look(uv_prepare_t *h)
+{
+	struct server *s = h->data;
+	s->looked = server_now(s);
+}
+
+static void on_read(uv_check_t *h)
+{
+	struct server *s = h->data;
+	s->read = s->looked;
+}
+
 static void on_tick(uv_timer_t *t)
 {
 	struct server *s = t->data;
@@ -411,6 +427,8 @@ static void stop(struct server *s)
 	uv_close((uv_handle_t *)&s->wake, NULL);
 	uv_close((uv_handle_t *)&s->tick, NULL);
 	uv_close((uv_handle_t *)&s->drain, NULL);
+	uv_close((uv_handle_t *)&s->look, NULL);
+	uv_close((uv_handle_t *)&s->check, NULL);
 	uv_close((uv_handle_t *)&s->on_term, NULL);
 	uv_close((uv_handle_t *)&s->on_int, NULL);
 	for (struct session *p = s->sessions; p; p = p->next)
@@ -464,12 +482,17 @@ static void init_handles(struct server *s)
 	uv_timer_init(&s->loop, &s->wake);
 	uv_timer_init(&s->loop, &s->tick);
 	uv_timer_init(&s->loop, &s->drain);
+	uv_prepare_init(&s->loop, &s->look);
+	uv_check_init(&s->loop, &s->check);
 	uv_signal_init(&s->loop, &s->on_term);
 	uv_signal_init(&s->loop, &s->on_int);
-	s->listener.data = s->wake.data = s->tick.data = s->drain.data = s->on_term.data = s->on_int.data = s;
+	s->listener.data = s->wake.data = s->tick.data = s->drain.data = s->look.data = s->check.data = s->on_term.data = s->on_int.data = s;
 	uv_signal_start(&s->on_term, on_signal, SIGTERM);
 	uv_signal_start(&s->on_int, on_signal, SIGINT);
 	uv_timer_start(&s->tick, on_tick, TICK_MS, TICK_MS);
+	uv_prepare_start(&s->look, on_look);
+	uv_check_start(&s->check, on_read);
+	s->read = server_now(s);
 }
 
 static void close_stores(struct server *s)

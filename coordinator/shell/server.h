@@ -70,6 +70,9 @@ struct server {
 	struct tls *tls; /* NULL: plaintext */
 	uv_tcp_t listener;
 	uv_timer_t wake, tick, drain; /* drain: results that waited for a canvas */
+	uv_prepare_t look;
+	uv_check_t check;
+	double looked, read; /* s: when the loop looked at its sockets last; what came before this has been read */
 	uv_signal_t on_term, on_int;
 	struct farm *farm;
 	struct spool *spool;

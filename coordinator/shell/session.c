@@ -290,6 +290,25 @@ static void take_lease_result(struct session *p, struct envelope *env)
 	buf_fini(&payload);
 }
 
+/* Also a message that takes long is a word from its worker, who must know for as long that we are here: its heartbeats, and with
+ * them our answers, are behind that message. */
+static void on_heard(void *user)
+{
+	struct session *p = user;
+	struct event ev = {.kind = EVENT_HEARD, .peer = p->id};
+	Farm__Heartbeat beat;
+	Farm__Envelope m;
+	if (!p->joined || p->state != SESSION_WORKER || server_now(p->server) < p->heard + p->server->config.heartbeat_seconds)
+		return;
+	p->heard = server_now(p->server);
+	farm__heartbeat__init(&beat);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
+	m.heartbeat = &beat;
+	session_send(p, &m, NULL, 0);
+	server_step(p->server, &ev);
+}
+
 static void worker_message(struct session *p, struct envelope *env)
 {
 	struct event ev = {.kind = EVENT_HEARD, .peer = p->id};
@@ -359,14 +378,14 @@ static void on_closed(void *user, const char *why)
 	mem_free(p);
 }
 
-static const struct conn_events events = {NULL, on_message, NULL, on_closed};
+static const struct conn_events events = {.message = on_message, .heard = on_heard, .closed = on_closed};
 
 static void on_refused(void *user, const char *why)
 {
 	(void)user;
 	(void)why;
 }
-static const struct conn_events refused_events = {NULL, NULL, NULL, on_refused};
+static const struct conn_events refused_events = {.closed = on_refused};
 
 /* Whoever has not said who they are gives way, the one who has had longest first: strangers who hold connections and say
  * nothing must not keep out those who can. */

@@ -23,6 +23,7 @@ struct session {
 	char name[128], address[64];
 	struct tls_peer who; /* by its certificate; TLS_NOBODY without TLS, and then everybody may do everything */
 	uint32_t payload_limit;
+	double heard; /* s on the loop's clock: when it was last told so amid a message */
 	struct upload *upload; /* a submission that waits for blobs */
 	uint64_t watched;      /* job; 0: none */
 	uint64_t fetching;     /* job of which it has not got all of a file yet; 0: none */

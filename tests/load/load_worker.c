@@ -413,7 +413,7 @@ struct load_worker *load_workers_new(unsigned count)
 
 void load_connect(struct load *l, unsigned index)
 {
-	static const struct conn_events events = {on_opened, on_message, on_drained, on_closed};
+	static const struct conn_events events = {.opened = on_opened, .message = on_message, .drained = on_drained, .closed = on_closed};
 	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, 600, 0, l->tls};
 	struct load_worker *w = &l->workers[index];
 	struct error e;

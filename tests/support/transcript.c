@@ -330,6 +330,8 @@ static bool play_line(struct farm *f, const char *line)
 		fail_msg("not a line of a transcript: %s", line);
 	ev.time = take_number(&at);
 	take(&at, "]");
+	if (take(&at, "unread="))
+		ev.unread = take_number(&at);
 	if (take(&at, "wake"))
 		return play_wake(line, arrow + 3);
 	if (*at == 'w')

@@ -10,6 +10,7 @@
  *   restore J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [as submit]: the slots' next epochs
  *   hold [order] J TEXT | release [order] J | priority J N | extend J [as submit: the new plan]        (order: by somebody, not for want of room)
  *   cancel J | prepared J [black | bad TEXT] | error J R E | broken J TEXT | tick
+ * "[60] unread=40 ...": with any of them: what came in the last so many seconds may not have been read.
  * "[0] wake -> T": when the core wants to be called again, as it said last.
  * "-> -" is silence. A line that does not fit is printed beside what was said, and the test fails at the end.
  */

@@ -133,7 +133,7 @@ static void on_closed(void *user, const char *why)
 	agent_settle(a);
 }
 
-static const struct conn_events events = {on_opened, on_message, NULL, on_closed};
+static const struct conn_events events = {.opened = on_opened, .message = on_message, .closed = on_closed};
 
 static void connect_now(struct agent *a)
 {

@@ -15,6 +15,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <time.h>
 
 static void addresses(void **state)
 {
@@ -46,7 +47,7 @@ static void addresses(void **state)
 
 struct end {
 	struct conn *conn;
-	int messages, closed, drained;
+	int messages, closed, drained, heard;
 	size_t payload;
 	bool distrust;
 	struct tls_peer peer; /* who the other one was when a message came */
@@ -77,6 +78,11 @@ static void on_drained(void *user)
 	((struct end *)user)->drained++;
 }
 
+static void on_heard(void *user)
+{
+	((struct end *)user)->heard++;
+}
+
 static void on_closed(void *user, const char *why)
 {
 	struct end *x = user;
@@ -86,7 +92,7 @@ static void on_closed(void *user, const char *why)
 	snprintf(x->why, sizeof x->why, "%s", why);
 }
 
-static const struct conn_events events = {NULL, on_message, on_drained, on_closed};
+static const struct conn_events events = {.message = on_message, .heard = on_heard, .drained = on_drained, .closed = on_closed};
 
 static void on_connection(uv_stream_t *l, int status)
 {
@@ -231,6 +237,78 @@ static void silence_is_not_waited_for(void **state)
 	close_ends();
 }
 
+/* A frame of a payload, piece by piece. */
+struct drip {
+	uv_timer_t timer;
+	unsigned char *bytes;
+	size_t size, at;
+};
+
+static void on_drip(uv_timer_t *t)
+{
+	struct drip *d = t->data;
+	size_t n = d->size - d->at < 4096 ? d->size - d->at : 4096;
+	unsigned char *piece = mem_alloc(n, 1);
+	memcpy(piece, d->bytes + d->at, n);
+	conn_send_frame(here.conn, piece, n);
+	d->at += n;
+	if (d->at == d->size)
+		uv_timer_stop(t);
+}
+
+/* Its bytes are words, and it is whole before its time is over: half a second and one for each 64 KB. */
+static void a_slow_frame_is_heard(void **state)
+{
+	(void)state;
+	Farm__Bye bye;
+	Farm__Envelope m;
+	struct error e;
+	struct drip d = {.at = 0};
+	enum { PAYLOAD = 1 << 16 };
+	unsigned char *payload = mem_alloc(PAYLOAD, 1);
+	for (size_t i = 0; i < PAYLOAD; i++)
+		payload[i] = (unsigned char)(i * 7);
+	farm__bye__init(&bye);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_BYE;
+	m.bye = &bye;
+	assert_int_equal(envelope_pack(&m, payload, PAYLOAD, &d.bytes, &d.size, &e), 0);
+	connect_ends();
+	send_bye(&here, 0);
+	while (!there.messages)
+		uv_run(&loop, UV_RUN_ONCE);
+	assert_int_equal(there.heard, 0); /* none was under way */
+	conn_set_quiet(there.conn, 0.3);
+	d.timer.data = &d;
+	uv_timer_init(&loop, &d.timer);
+	uv_timer_start(&d.timer, on_drip, 50, 50);
+	while (there.messages < 2 && !there.closed)
+		uv_run(&loop, UV_RUN_ONCE);
+	assert_int_equal(there.messages, 2);
+	assert_true(there.heard >= 15);
+	uv_close((uv_handle_t *)&d.timer, NULL);
+	close_ends();
+	mem_free(d.bytes);
+	mem_free(payload);
+}
+
+/* Nobody is to blame for what was not read: the clocks of silence and of half a frame stand still with the loop. */
+static void a_late_reader_waits(void **state)
+{
+	(void)state;
+	connect_ends();
+	conn_set_quiet(there.conn, 0.5);
+	send_bye(&here, 1000);
+	struct timespec stall = {0, 800000000};
+	nanosleep(&stall, NULL);
+	uv_run(&loop, UV_RUN_ONCE);
+	send_bye(&here, 1000);
+	while (there.messages < 2 && !there.closed)
+		uv_run(&loop, UV_RUN_ONCE);
+	assert_int_equal(there.messages, 2);
+	close_ends();
+}
+
 /* ---- TLS ---- */
 
 static int without_tls(void **state)
@@ -333,7 +411,8 @@ static void a_live_connection_is_checked_again(void **state)
 #define EITHER_WAY \
 	cmocka_unit_test(frames_go_both_ways), cmocka_unit_test(the_last_words_arrive), cmocka_unit_test(limits_close), \
 		cmocka_unit_test(who_does_not_read_is_cut_off), cmocka_unit_test(half_a_frame_is_not_waited_for), \
-		cmocka_unit_test(silence_is_not_waited_for)
+		cmocka_unit_test(silence_is_not_waited_for), cmocka_unit_test(a_slow_frame_is_heard), \
+		cmocka_unit_test(a_late_reader_waits)
 
 int main(void)
 {

@@ -121,6 +121,21 @@ static void worker_gone(void **state)
 		NULL });
 }
 
+/* Who reads late what was said in time misses nobody for it: not for being silent, not for a lease that is overdue. */
+static void read_late(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		START_TWO,
+		"[2] w3 joins A threads=1 -> -",
+		"[700] unread=690 tick -> -",
+		"[700] unread=690 w2 heard -> -",
+		"[702] unread=692 w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
+		/* now all has been read: the third has said nothing, and the second's lease is overdue */
+		"[703] tick -> close w3, w2 gets j1 g1 p0 e0",
+		NULL });
+}
+
 static void hung_up(void **state)
 {
 	(void)state;
@@ -362,7 +377,7 @@ int main(void)
 		cmocka_unit_test(refused),
 		cmocka_unit_test(set_aside_after_faults),
 		cmocka_unit_test(worker_gone),
-		cmocka_unit_test(hung_up),
+		cmocka_unit_test(read_late), cmocka_unit_test(hung_up),
 		cmocka_unit_test(timeout),
 		cmocka_unit_test(timeout_after_median),
 		cmocka_unit_test(straggler),

@@ -27,9 +27,8 @@ static char folder[64];
 static pid_t server;
 static uint16_t port;
 
-static int set_up(void **state)
+static int start_server(double heartbeat_seconds, double stall_seconds)
 {
-	(void)state;
 	char spool[96], port_file[96];
 	strcpy(folder, "/tmp/hslt-peers.XXXXXX");
 	if (!mkdtemp(folder))
@@ -47,7 +46,8 @@ static int set_up(void **state)
 		c.port_file = port_file;
 		c.max_connections = 8;
 		c.hello_seconds = 1;
-		c.stall_seconds = 1;
+		c.heartbeat_seconds = heartbeat_seconds;
+		c.stall_seconds = stall_seconds;
 		log_set_level(LOG_LEVEL_ERROR);
 		_exit(server_run(&c, &e) ? 1 : 0);
 	}
@@ -62,6 +62,19 @@ static int set_up(void **state)
 	}
 	port = (uint16_t)number;
 	return port ? 0 : -1;
+}
+
+static int set_up(void **state)
+{
+	(void)state;
+	return start_server(5, 1);
+}
+
+/* Who is silent for 1.2 s is hung up on. */
+static int set_up_quick(void **state)
+{
+	(void)state;
+	return start_server(0.2, 10);
 }
 
 static int tear_down(void **state)
@@ -83,6 +96,7 @@ struct peer {
 	unsigned char bytes[4096];
 	size_t at, size;
 	struct envelope env;
+	unsigned heartbeats; /* heard */
 };
 
 static struct peer *call(void)
@@ -143,6 +157,7 @@ static const Farm__Envelope *hear(struct peer *p)
 		assert_int_equal(envelope_unpack(&p->env, p->reader.header.bytes, p->reader.header.size, &e), 0);
 		if (p->env.message->body_case != FARM__ENVELOPE__BODY_HEARTBEAT)
 			return p->env.message;
+		p->heartbeats++;
 	}
 }
 
@@ -591,6 +606,69 @@ static void strategies_are_counted_once(void **state)
 	hang_up(worker);
 }
 
+/* ---- slow links ---- */
+
+/* A worker with a lease of a new job, and its result. The keys of what came stay in the desk. */
+static struct peer *worker_with_result(struct peer *client, struct desk *d, unsigned char **frame, size_t *size)
+{
+	struct peer *worker = call();
+	struct plan plan;
+	struct error e;
+	struct plan_request r = request(NULL);
+	assert_int_equal(plan_make(&r, &plan, &e), 0);
+	assert_true(hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	if (submit_answer(client)->n_missing) {
+		send_blob(client, "<scene/>", "<scene/>");
+		submit_answer(client);
+	}
+	assert_true(hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	while (d->count == 0)
+		attend(worker, d);
+	struct batch b = black_batch(&d->keys[0], &plan);
+	assert_int_equal(batch_pack(&b, &plan, frame, size, &e), 0);
+	batch_fini(&b);
+	return worker;
+}
+
+/* It takes longer than anybody may be silent, and the worker can say nothing else meanwhile; it is told that it is heard. */
+static void a_slow_result_counts(void **state)
+{
+	(void)state;
+	enum { PIECES = 24 };
+	unsigned char *frame;
+	size_t size, at = 0;
+	struct desk d = {.count = 0};
+	struct peer *client = call(), *worker = worker_with_result(client, &d, &frame, &size);
+	for (size_t i = 1; i <= PIECES; i++) {
+		usleep(100000);
+		say_bytes(worker, frame + at, size * i / PIECES - at);
+		at = size * i / PIECES;
+	}
+	assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+	assert_true(worker->heartbeats >= 8 && worker->heartbeats <= 13);
+	mem_free(frame);
+	hang_up(client);
+	hang_up(worker);
+}
+
+static void half_a_result_is_no_word(void **state)
+{
+	(void)state;
+	unsigned char *frame;
+	size_t size;
+	struct desk d = {.count = 0};
+	struct peer *client = call(), *worker = worker_with_result(client, &d, &frame, &size);
+	say_bytes(worker, frame, size / 2);
+	const Farm__Envelope *m;
+	while ((m = hear(worker)) && m->body_case != FARM__ENVELOPE__BODY_FAULT)
+		continue;
+	mem_free(frame);
+	hang_up(client);
+	hang_up(worker);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -599,5 +677,7 @@ int main(void)
 		cmocka_unit_test(submissions_are_looked_at), cmocka_unit_test(a_black_job_ends),
 		cmocka_unit_test(strategies_are_counted_once),
 	};
-	return cmocka_run_group_tests(tests, set_up, tear_down);
+	const struct CMUnitTest slow[] = {cmocka_unit_test(a_slow_result_counts), cmocka_unit_test(half_a_result_is_no_word)};
+	int failed = cmocka_run_group_tests(tests, set_up, tear_down);
+	return failed + cmocka_run_group_tests(slow, set_up_quick, tear_down);
 }
