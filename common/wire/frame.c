@@ -21,6 +21,12 @@ void frame_prefix_write(unsigned char out[FRAME_PREFIX], uint32_t header_size, u
 	write_u32(out + 4, payload_size);
 }
 
+void frame_prefix_read(const unsigned char in[FRAME_PREFIX], uint32_t *header_size, uint32_t *payload_size)
+{
+	*header_size = read_u32(in);
+	*payload_size = read_u32(in + 4);
+}
+
 void frame_reader_init(struct frame_reader *r, struct frame_limits limits)
 {
 	memset(r, 0, sizeof *r);
@@ -57,8 +63,7 @@ void frame_reader_drop(struct frame_reader *r)
 
 static int take_prefix(struct frame_reader *r, struct error *e)
 {
-	r->header_size = read_u32(r->prefix);
-	r->payload_size = read_u32(r->prefix + 4);
+	frame_prefix_read(r->prefix, &r->header_size, &r->payload_size);
 	if (r->header_size == 0)
 		return error_set(e, EBADMSG, "a frame without a header");
 	if (r->header_size > r->limits.header)

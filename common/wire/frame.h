@@ -34,6 +34,7 @@ int frame_reader_take(struct frame_reader *r, const unsigned char *bytes, size_t
 void frame_reader_drop(struct frame_reader *r);
 bool frame_reader_is_midway(const struct frame_reader *r); /* part of a frame has come */
 
+void frame_prefix_read(const unsigned char in[FRAME_PREFIX], uint32_t *header_size, uint32_t *payload_size);
 void frame_prefix_write(unsigned char out[FRAME_PREFIX], uint32_t header_size, uint32_t payload_size);
 
 #endif
