@@ -22,6 +22,7 @@ struct entry {
 struct blob_store {
 	char *folder;
 	uint64_t limit, bytes, clock;
+	uint64_t promised; /* to writers that are open */
 	uint64_t temporary; /* number of the last temporary file */
 	struct entry *entries; /* by hash */
 	size_t count, capacity;
@@ -196,7 +197,13 @@ static int read_folder(struct blob_store *s, struct error *e)
 		path_of(s, f->d_name, path);
 		if (strncmp(f->d_name, "tmp.", 4) == 0)
 			disk_unlink(path);
-		if (!from_hex(f->d_name, &h) || disk_stat(path, &st) || !S_ISREG(st.st_mode))
+		if (!from_hex(f->d_name, &h))
+			continue;
+		if (disk_stat(path, &st)) { /* what cannot be looked at is not lost */
+			rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+			break;
+		}
+		if (!S_ISREG(st.st_mode))
 			continue;
 		if (count == capacity) {
 			size_t want = capacity ? 2 * capacity : 64;
@@ -228,7 +235,7 @@ static int read_folder(struct blob_store *s, struct error *e)
 /* Forgets blobs that nobody holds until `need` bytes more fit. */
 static int make_room(struct blob_store *s, uint64_t need, struct error *e)
 {
-	while (s->limit && (need > s->limit || s->bytes > s->limit - need)) {
+	while (s->limit && (need > s->limit || s->bytes + s->promised > s->limit - need)) {
 		struct entry *oldest = NULL;
 		for (size_t i = 0; i < s->count; i++)
 			if (!s->entries[i].holds && (!oldest || s->entries[i].used < oldest->used))
@@ -257,8 +264,6 @@ int blob_store_open(struct blob_store **out, const char *folder, uint64_t limit,
 								: error_set(e, ENAMETOOLONG, "%s: the name is too long", folder);
 	if (!rc)
 		rc = read_folder(s, e);
-	if (!rc)
-		rc = make_room(s, 0, e);
 	if (rc)
 		blob_store_close(s);
 	else
@@ -275,9 +280,9 @@ void blob_store_close(struct blob_store *s)
 	mem_free(s);
 }
 
-uint64_t blob_store_bytes(const struct blob_store *s)
+void blob_store_trim(struct blob_store *s)
 {
-	return s->bytes;
+	make_room(s, 0, NULL);
 }
 
 static struct entry *touch(struct blob_store *s, const struct blob_hash *h)
@@ -351,6 +356,7 @@ int blob_write_begin(struct blob_writer **out, struct blob_store *s, const struc
 	w->store = s;
 	w->hash = *h;
 	w->size = size;
+	s->promised += size;
 	w->md = EVP_MD_CTX_new();
 	snprintf(name, sizeof name, "tmp.%ld.%llu", (long)getpid(), (unsigned long long)++s->temporary);
 	path_of(s, name, w->path);
@@ -410,6 +416,7 @@ static int finish(struct blob_writer *w, struct error *e)
 
 static void writer_free(struct blob_writer *w)
 {
+	w->store->promised -= w->size;
 	if (w->fd >= 0)
 		disk_close(w->fd);
 	EVP_MD_CTX_free(w->md);

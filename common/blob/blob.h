@@ -26,10 +26,11 @@ bool blob_hash_equal(const struct blob_hash *a, const struct blob_hash *b);
 
 struct blob_store;
 
-/* Makes the folder if need be and clears temporary files of earlier lives. limit: bytes; 0: none. */
+/* Makes the folder if need be and clears temporary files of earlier lives. limit: bytes; 0: none. What is there stays for now. */
 int blob_store_open(struct blob_store **s, const char *folder, uint64_t limit, struct error *e);
 void blob_store_close(struct blob_store *s);
-uint64_t blob_store_bytes(const struct blob_store *s);
+/* When what is needed is held: what is beyond the limit goes. */
+void blob_store_trim(struct blob_store *s);
 
 bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size); /* size may be NULL */
 /* Held blobs are not evicted; holds are counted. false: it is not there. */
@@ -42,7 +43,8 @@ int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, s
 /* The file of a blob that is held, for those who map it. */
 void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path, size_t size);
 
-/* Writing: begin, add in order, commit. -EFBIG: more than was announced or than the limit; -EBADMSG: the bytes are not
+/* Writing: begin, add in order, commit. What is announced has its room from the beginning on. -EFBIG: more than was announced or than
+ * the limit; -EBADMSG: the bytes are not
  * those of that name. A writer ends with commit or abort. What is committed is held once. */
 struct blob_writer;
 int blob_write_begin(struct blob_writer **w, struct blob_store *s, const struct blob_hash *h, uint64_t size, struct error *e);

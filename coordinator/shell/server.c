@@ -471,9 +471,11 @@ static int open_stores(struct server *s, struct error *e)
 		rc = trust_open(s, e);
 	if (!rc)
 		rc = restore_jobs(s, e);
-	if (!rc)
-		keep_trim(s);
-	return rc;
+	if (rc)
+		return rc;
+	blob_store_trim(s->blobs); /* the files of living jobs are held by now */
+	keep_trim(s);
+	return 0;
 }
 
 static void init_handles(struct server *s)

@@ -96,6 +96,8 @@ int cache_open(struct cache *c, const char *folder, uint64_t limit, struct error
 				rc = blob_store_open(&c->blobs, path, limit, e);
 			if (rc)
 				cache_close(c);
+			else
+				blob_store_trim(c->blobs);
 			return rc;
 		}
 		close(c->lock);

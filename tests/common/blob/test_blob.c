@@ -1,4 +1,5 @@
 /* The store keeps what it was given under its true name, refuses what is not it, and forgets the oldest first. */
+#include "common/base/disk.h"
 #include "common/blob/blob.h"
 #include "tests/support/folder.h"
 
@@ -8,10 +9,13 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
+#include <dirent.h>
+#include <errno.h>
 #include <fcntl.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 static struct blob_hash put(struct blob_store *s, const char *text)
@@ -40,6 +44,20 @@ static void knows_sha_256(void **state)
 	assert_string_equal(hex, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
 }
 
+static uint64_t bytes_of_folder(void)
+{
+	uint64_t sum = 0;
+	DIR *d = opendir(folder);
+	assert_non_null(d);
+	for (struct dirent *f; (f = readdir(d));) {
+		struct stat st;
+		if (fstatat(dirfd(d), f->d_name, &st, 0) == 0 && S_ISREG(st.st_mode))
+			sum += (uint64_t)st.st_size;
+	}
+	closedir(d);
+	return sum;
+}
+
 static void keeps_and_reads_back(void **state)
 {
 	(void)state;
@@ -62,7 +80,7 @@ static void keeps_and_reads_back(void **state)
 	other.bytes[0] ^= 1;
 	assert_int_equal(blob_open(s, &other, &size, &e), -ENOENT);
 	put(s, "hello, farm"); /* twice is as once */
-	assert_int_equal(blob_store_bytes(s), 11);
+	assert_int_equal(bytes_of_folder(), 11);
 	blob_store_close(s);
 }
 
@@ -104,7 +122,7 @@ static void forgets_the_oldest_that_nobody_holds(void **state)
 	struct blob_hash d = put(s, "!@#$%^&*()");
 	assert_false(blob_has(s, &b, NULL));
 	assert_true(blob_has(s, &a, NULL) && blob_has(s, &c, NULL) && blob_has(s, &d, NULL));
-	assert_int_equal(blob_store_bytes(s), 30);
+	assert_int_equal(bytes_of_folder(), 30);
 	assert_true(blob_hold(s, &a));
 	assert_int_equal(blob_write_begin(&w, s, &b, 10, &e), -EFBIG); /* all in use */
 	assert_int_equal(blob_write_begin(&w, s, &b, 31, &e), -EFBIG);
@@ -129,11 +147,88 @@ static void knows_many(void **state)
 	for (int life = 0; life < 2; life++) {
 		for (int i = 0; i < MANY; i++)
 			assert_true(blob_has(s, &h[i], NULL) == (i >= MANY - FIT));
-		assert_int_equal(blob_store_bytes(s), 4 * FIT);
+		assert_int_equal(bytes_of_folder(), 4 * FIT);
 		blob_store_close(s);
 		assert_int_equal(blob_store_open(&s, folder, 4 * FIT, &e), 0);
 	}
 	blob_store_close(s);
+}
+
+static struct blob_hash hash_of(const char *text)
+{
+	struct blob_hash h;
+	struct error e;
+	assert_int_equal(blob_hash_bytes(text, strlen(text), &h, &e), 0);
+	return h;
+}
+
+/* What two writers bring at the same time has room below the limit together. */
+static void room_is_promised_once(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct blob_writer *w[3];
+	struct blob_hash a = hash_of("0123456789"), b = hash_of("abcdefghij");
+	struct error e;
+	assert_int_equal(blob_store_open(&s, folder, 25, &e), 0);
+	assert_int_equal(blob_write_begin(&w[0], s, &a, 10, &e), 0);
+	assert_int_equal(blob_write_begin(&w[1], s, &b, 10, &e), 0);
+	assert_int_equal(blob_write_begin(&w[2], s, &a, 10, &e), -EFBIG);
+	blob_write_abort(w[1]);
+	assert_int_equal(blob_write_begin(&w[2], s, &a, 10, &e), 0);
+	for (int i = 0; i < 3; i += 2) { /* the second finds it there */
+		assert_int_equal(blob_write_add(w[i], "0123456789", 10, &e), 0);
+		assert_int_equal(blob_write_commit(w[i], &e), 0);
+	}
+	assert_int_equal(bytes_of_folder(), 10);
+	assert_int_equal(blob_write_begin(&w[1], s, &b, 15, &e), 0); /* all that was promised is given back */
+	blob_write_abort(w[1]);
+	blob_store_close(s);
+}
+
+/* A smaller limit in the next life: what is held by then stays, though it is the oldest. */
+static void held_before_it_is_trimmed(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct error e;
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	struct blob_hash a = put(s, "0123456789"), b = put(s, "abcdefghij");
+	blob_store_close(s);
+	assert_int_equal(blob_store_open(&s, folder, 5, &e), 0);
+	assert_true(blob_hold(s, &a));
+	blob_store_trim(s);
+	assert_true(blob_has(s, &a, NULL));
+	assert_false(blob_has(s, &b, NULL));
+	blob_release(s, &a);
+	blob_store_trim(s);
+	assert_int_equal(bytes_of_folder(), 0);
+	blob_store_close(s);
+}
+
+static int failing_stat(const char *path, struct stat *st)
+{
+	(void)path;
+	(void)st;
+	errno = EIO;
+	return -1;
+}
+
+/* A file that cannot be looked at is not one that is lost. */
+static void a_disk_that_fails(void **state)
+{
+	(void)state;
+	struct blob_store *s;
+	struct error e;
+	struct disk failing = disk_system;
+	failing.stat = failing_stat;
+	assert_int_equal(blob_store_open(&s, folder, 0, &e), 0);
+	put(s, "hello, farm");
+	blob_store_close(s);
+	disk_use(&failing);
+	int rc = blob_store_open(&s, folder, 0, &e);
+	disk_use(NULL);
+	assert_int_equal(rc, -EIO);
 }
 
 int main(void)
@@ -143,6 +238,9 @@ int main(void)
 		cmocka_unit_test_setup_teardown(keeps_and_reads_back, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(refuses_false_bytes, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(forgets_the_oldest_that_nobody_holds, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(room_is_promised_once, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(held_before_it_is_trimmed, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_disk_that_fails, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(knows_many, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
