@@ -119,8 +119,11 @@ int canvas_load(struct canvas *c, struct sealed *in, struct error *e)
 	int rc = sealed_read(in, &h, sizeof h, e);
 	if (rc)
 		return rc;
+	if (h.version != want.version || h.tally_bytes != want.tally_bytes || h.slot != want.slot)
+		return error_set(e, EPROTO, "%s: films of version %u, and version %u is known here: another coordinator wrote them", in->path,
+				 h.version, want.version);
 	if (memcmp(&h, &want, sizeof h) != 0)
-		return error_set(e, EBADMSG, "the films of another plan, or of another version");
+		return error_set(e, EBADMSG, "%s: the films of another plan", in->path);
 	pieces_of(c, p);
 	for (int i = 0; i < PIECES && !rc; i++)
 		rc = sealed_read(in, p[i].bytes, p[i].size, e);

@@ -9,7 +9,7 @@
 #include "common/film/canvas.h"
 
 int canvas_save(const struct canvas *c, struct sealed *out, struct error *e);
-/* Into a new canvas of the same plan and grid. -EBADMSG: of another one, or of another version; the canvas is of no use then. */
+/* Into a new canvas of the same plan and grid. -EBADMSG: of another one; -EPROTO: of another version; the canvas is of no use then. */
 int canvas_load(struct canvas *c, struct sealed *in, struct error *e);
 
 #endif

@@ -12,7 +12,7 @@
 
 static const double pause_seconds = 30; /* after one that could not be written */
 
-/* Versioned by its own size, too: what it holds is as it lies in memory. */
+/* As it lies in memory. Whoever changes it, or what follows it, counts the version up. */
 struct head {
 	char magic[8];
 	uint32_t bytes, worker_count;
@@ -26,6 +26,7 @@ struct head {
 };
 
 static const char magic[8] = "hsltC002";
+_Static_assert(sizeof(struct head) == 4016, "another layout is another version");
 
 struct writing {
 	uv_work_t work;
@@ -276,9 +277,16 @@ static void take_head(struct order *o, const struct head *h)
 static int read_all(struct server *s, struct order *o, struct sealed *in, uint64_t *generation, struct error *e)
 {
 	struct head h;
-	int rc = sealed_read(in, &h, sizeof h, e);
-	if (!rc && (memcmp(h.magic, magic, sizeof magic) != 0 || h.bytes != sizeof h || h.job != o->id))
-		rc = error_set(e, EBADMSG, "%s: of another job, or of another version", in->path);
+	int rc = sealed_read(in, &h, offsetof(struct head, worker_count), e); /* another version's may be shorter */
+	if (!rc)
+		rc = spool_check_version(h.magic, magic, in->path, e);
+	if (!rc && h.bytes != sizeof h)
+		rc = error_set(e, EPROTO, "%s: its head has %u bytes instead of %zu: a coordinator for another machine wrote it", in->path, h.bytes,
+			       sizeof h);
+	if (!rc)
+		rc = sealed_read(in, &h.worker_count, sizeof h - offsetof(struct head, worker_count), e);
+	if (!rc && h.job != o->id)
+		rc = error_set(e, EBADMSG, "%s: of j%llu", in->path, (unsigned long long)h.job);
 	if (rc)
 		return rc;
 	h.fingerprint[sizeof h.fingerprint - 1] = 0;

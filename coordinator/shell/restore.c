@@ -22,26 +22,23 @@ struct replay {
 
 /* ---- frames */
 
-static uint32_t length_at(const unsigned char *p)
-{
-	return (uint32_t)p[0] << 24 | (uint32_t)p[1] << 16 | (uint32_t)p[2] << 8 | p[3];
-}
-
 static int unpack(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
 		  const unsigned char **payload, size_t *payload_size, struct error *e)
 {
+	uint32_t header = 0, rest = 0;
 	*payload = NULL;
 	*payload_size = 0;
-	if (size < FRAME_PREFIX || (uint64_t)length_at(frame) + length_at(frame + 4) != size - FRAME_PREFIX)
+	if (size >= FRAME_PREFIX)
+		frame_prefix_read(frame, &header, &rest);
+	if (size < FRAME_PREFIX || (uint64_t)header + rest != size - FRAME_PREFIX)
 		return error_set(e, EBADMSG, "a frame of another length");
-	uint32_t header = length_at(frame);
 	int rc = envelope_unpack(env, frame + FRAME_PREFIX, header, e);
 	if (!rc && env->message->body_case != want) {
 		envelope_fini(env);
 		rc = error_set(e, EBADMSG, "another message than was expected");
 	}
 	*payload = frame + FRAME_PREFIX + header;
-	*payload_size = size - FRAME_PREFIX - header;
+	*payload_size = rest;
 	return rc;
 }
 
@@ -54,11 +51,20 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 		return error_set(e, EBADMSG, "a batch that is not of its time");
 	uint64_t rounds = order_rounds(o);
 	int rc = order_merge(o, b, e);
+	if (rc == -EEXIST || rc == -EAGAIN) /* of the films, not of the machine */
+		rc = error_prefix(e, -EBADMSG, "a batch out of its order");
 	order_note_times(o, r->elapsed, rounds);
 	if (!rc && o->bootstrap && bootstrap_missing(o->bootstrap) == 0)
 		rc = order_prepare(o, server_film_folder(r->server, &o->plan), e);
 	r->batches++;
 	return rc;
+}
+
+/* It was written whole: by a coordinator with other records. They are not thrown away. */
+static int strange(const struct replay *r, const char *what, size_t size, struct error *e)
+{
+	return error_set(e, EPROTO, "the journal of j%llu has %s of %zu bytes that mean nothing here: another coordinator wrote it",
+			 (unsigned long long)r->order->id, what, size);
 }
 
 static int take_batch(struct replay *r, const unsigned char *body, size_t size, struct error *e)
@@ -69,10 +75,9 @@ static int take_batch(struct replay *r, const unsigned char *body, size_t size, 
 	size_t payload_size;
 	int rc = unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
 	if (rc)
-		return rc;
+		return rc == -EBADMSG ? strange(r, "a result", size, e) : rc;
 	rc = batch_unpack(&batch, &r->order->plan, env.message->lease_result, payload, payload_size, e);
-	if (!rc)
-		rc = merge(r, &batch, e);
+	rc = !rc ? merge(r, &batch, e) : rc == -EBADMSG ? strange(r, "a result", size, e) : rc;
 	batch_fini(&batch);
 	envelope_fini(&env);
 	return rc;
@@ -89,45 +94,45 @@ static int take_record(void *user, enum journal_kind kind, double elapsed, const
 		return take_batch(r, body, size, e);
 	case JOURNAL_PINNED:
 		if (size >= sizeof o->fingerprint)
-			return error_set(e, EBADMSG, "a fingerprint of %zu bytes", size);
+			return strange(r, "a fingerprint", size, e);
 		memcpy(o->fingerprint, body, size);
 		o->fingerprint[size] = 0;
 		return 0;
 	case JOURNAL_LOOK:
 		if (size != sizeof look)
-			return error_set(e, EBADMSG, "a look of %zu bytes", size);
+			return strange(r, "a look", size, e);
 		memcpy(&look, body, size);
 		forecast_add_look(&o->record.looks, &look);
 		o->look_written = look.work;
 		return 0;
 	case JOURNAL_COUNTS:
 		if (size != sizeof o->counts)
-			return error_set(e, EBADMSG, "counts of %zu bytes", size);
+			return strange(r, "counts", size, e);
 		memcpy(&o->counts, body, size);
 		return 0;
 	default:
-		return error_set(e, EBADMSG, "a record of kind %d", (int)kind);
+		return strange(r, "a record", size, e);
 	}
 }
 
-static int read_journal(struct server *s, struct replay *r, struct error *e)
+static int read_journal(struct server *s, struct order *o, struct error *e)
 {
-	struct order *o = r->order;
+	struct replay r = {.order = o, .server = s};
 	char folder[SPOOL_PATH_MAX];
 	uint64_t cut = 0, generation = 0;
 	spool_job_path(s->spool, o->id, NULL, folder);
 	int rc = checkpoint_load(s, o, &generation, e);
 	if (rc && rc != -ENOENT)
 		return rc;
-	journal_clear(folder, generation);
-	rc = journal_open(&o->journal, folder, o->id, generation, take_record, r, &cut, e);
+	rc = journal_open(&o->journal, folder, o->id, generation, take_record, &r, &cut, e);
 	if (rc == -ENOENT) /* its batches can be made again */
 		rc = journal_create(&o->journal, folder, o->id, generation, e);
 	if (rc)
 		return rc;
+	journal_clear(folder, generation);
 	o->pinned = *o->fingerprint != 0;
 	order_log(o, LOG_JOB_STATE, "state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu",
-		  (unsigned long long)r->batches, (unsigned long long)order_rounds(o), o->times.elapsed,
+		  (unsigned long long)r.batches, (unsigned long long)order_rounds(o), o->times.elapsed,
 		  (unsigned long long)o->checkpoint_bytes, (unsigned long long)journal_bytes(o->journal), (unsigned long long)cut);
 	return 0;
 }
@@ -198,15 +203,26 @@ static int hold_blobs(struct server *s, const Farm__Submit *m, struct error *e)
 	return 0;
 }
 
-/* What the submission does not say, but its earlier end: its image is there until the next one is. */
-static void take_record_of(const struct server *s, const struct ledger_job *j, struct order *o)
+/* 0: it is there, and whole. What cannot be read just now is an error. */
+static int read_record(const struct server *s, uint64_t id, struct job_record *r, bool *there, struct error *e)
 {
-	struct job_record *r = mem_alloc(1, sizeof *r);
+	int rc = spool_read_record(s->spool, id, r, e);
+	*there = rc == 0;
+	return rc == -ENOENT || rc == -EBADMSG ? 0 : rc;
+}
+
+/* What the submission does not say, but its earlier end: its image is there until the next one is. */
+static int take_record_of(const struct server *s, const struct ledger_job *j, struct order *o, struct error *e)
+{
 	o->record.priority = j->priority;
 	o->record.extended = j->extended;
-	if (r && j->extended && spool_read_record(s->spool, o->id, r, NULL) == 0)
+	struct job_record *r = mem_alloc(1, sizeof *r);
+	bool there;
+	int rc = r ? 0 : error_set(e, ENOMEM, "no memory for a job");
+	if (!rc && j->extended && (rc = read_record(s, o->id, r, &there, e)) == 0 && there)
 		o->record.has_result = r->has_result;
 	mem_free(r);
+	return rc;
 }
 
 static int make_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e)
@@ -224,80 +240,70 @@ static int make_order(struct server *s, const struct ledger_job *j, struct order
 	if (!rc)
 		rc = unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size, &payload, &size, e);
 	if (rc)
-		return rc;
+		return rc == -EINVAL ? error_prefix(e, -EBADMSG, "its plan") : rc;
 	rc = hold_blobs(s, submit.message->submit, e);
 	if (!rc && (rc = order_new(o, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e)))
 		order_release_blobs(submit.message->submit, s->blobs);
-	if (!rc)
-		take_record_of(s, j, *o);
 	envelope_fini(&submit);
 	return rc;
 }
 
-/* What is stored is damaged, or of another version: the job's batches can be made again, with the same bits. */
-static void begin_anew(struct server *s, struct replay *r, const struct error *why)
+static void drop(struct server *s, struct order *o)
+{
+	order_release_blobs(order_submit(o), s->blobs);
+	order_free(o);
+}
+
+/* What is stored is damaged: the job's batches can be made again, with the same bits. */
+static void begin_anew(struct server *s, struct order *o)
 {
 	char path[SPOOL_PATH_MAX];
-	struct order *o = r->order;
-	order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"the job begins anew\"", log_quote(why->text).text);
+	order_log(o, LOG_JOB_STATE, "state=anew");
 	spool_job_path(s->spool, o->id, "checkpoint", path);
 	disk_unlink(path);
 	spool_job_path(s->spool, o->id, NULL, path);
 	journal_clear(path, UINT64_MAX);
-	order_release_blobs(order_submit(o), s->blobs);
-	order_free(o);
-	r->order = NULL;
+}
+
+static int restore(struct server *s, const struct ledger_job *j, bool anew, struct order **o, struct error *e)
+{
+	int rc = make_order(s, j, o, e);
+	if (rc)
+		return rc;
+	rc = take_record_of(s, j, *o, e);
+	if (!rc)
+		rc = read_journal(s, *o, e);
+	if (!rc)
+		return 0;
+	order_log(*o, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
+	anew = anew && rc == -EBADMSG;
+	if (anew)
+		begin_anew(s, *o);
+	drop(s, *o);
+	*o = NULL;
+	return anew ? restore(s, j, false, o, e) : rc;
 }
 
 int restore_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e)
 {
-	struct replay *r = mem_alloc(1, sizeof *r);
-	if (!r)
-		return error_set(e, ENOMEM, "no memory for a job");
-	r->server = s;
-	int rc = make_order(s, j, &r->order, e);
-	if (!rc)
-		rc = read_journal(s, r, e);
-	if (rc && r->order) {
-		order_release_blobs(order_submit(r->order), s->blobs);
-		order_free(r->order);
-		r->order = NULL;
-	}
-	*o = r->order;
-	mem_free(r);
-	return rc;
+	return restore(s, j, false, o, e);
 }
 
 static int restore_one(struct server *s, const struct ledger_job *j, struct error *e)
 {
-	struct replay *r = mem_alloc(1, sizeof *r);
-	if (!r)
-		return error_set(e, ENOMEM, "no memory for a job");
-	r->server = s;
-	int rc = make_order(s, j, &r->order, e);
-	if (!rc)
-		rc = read_journal(s, r, e);
-	if (rc == -EBADMSG && r->order) {
-		begin_anew(s, r, e);
-		rc = make_order(s, j, &r->order, e);
-		if (!rc)
-			rc = read_journal(s, r, e);
-	}
-	if (!rc) {
-		r->order->next = s->orders;
-		s->orders = r->order;
-		rc = restore_tell(s, r->order, j->held, 0, e);
-	} else if (r->order) {
-		order_free(r->order);
-	}
-	mem_free(r);
-	return rc;
+	struct order *o;
+	int rc = restore(s, j, true, &o, e);
+	if (rc)
+		return rc;
+	o->next = s->orders;
+	s->orders = o;
+	return restore_tell(s, o, j->held, 0, e);
 }
 
-/* Not of the machine, but of what is stored: the same at every start. */
+/* Not of the machine, but of what is stored: the same at every start. ENOENT: its folder is gone. */
 static bool is_lasting(int rc)
 {
-	return rc == -EBADMSG || rc == -ERANGE || rc == -EINVAL || rc == -EEXIST || rc == -EAGAIN;
+	return rc == -EBADMSG || rc == -ERANGE || rc == -ENOENT;
 }
 
 static void give_up(struct server *s, struct job_record *r, const char *why)
@@ -311,7 +317,7 @@ static void give_up(struct server *s, struct job_record *r, const char *why)
 	r->exit_code = 3;
 	r->ended = (double)now.tv_sec;
 	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
-	if (spool_write_record(s->spool, r, &e) || ledger_end(s->ledger, r->id, r->state, &e))
+	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) || ledger_end(s->ledger, r->id, r->state, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	dispatch_remember(s, r);
 }
@@ -326,9 +332,12 @@ int restore_open(struct server *s, struct error *e)
 	uint64_t id = 0;
 	while (!rc && (rc = ledger_next(s->ledger, id, &j, e)) > 0) {
 		id = j.id;
-		rc = 0;
+		bool there;
+		rc = read_record(s, id, r, &there, e);
+		if (rc)
+			break;
 		/* Its record was written before its end came into the ledger. */
-		if (spool_read_record(s->spool, id, r, NULL) == 0 && record_is_ended(r) && r->extended == j.extended) {
+		if (there && record_is_ended(r) && r->extended == j.extended) {
 			rc = ledger_end(s->ledger, id, r->state, e);
 			continue;
 		}
@@ -366,9 +375,14 @@ int restore_jobs(struct server *s, struct error *e)
 			break;
 		}
 		if (rc) {
-			if (spool_read_record(s->spool, id, r, NULL))
+			struct error why = *e;
+			bool there;
+			rc = read_record(s, id, r, &there, e);
+			if (rc)
+				break;
+			if (!there)
 				*r = (struct job_record){.id = id, .rel_error = -1};
-			give_up(s, r, e->text);
+			give_up(s, r, why.text);
 		}
 	}
 	mem_free(r);

@@ -10,10 +10,13 @@
 
 int restore_open(struct server *s, struct error *e);           /* the ledger */
 bool restore_lives(const struct server *s, uint64_t job);      /* it had not ended */
-/* Jobs whose checkpoint or journal is damaged begin anew, those without a plan or a scene fail with a sentence; an error is one of the machine, and another start may go better. */
+/* Jobs whose checkpoint or journal is damaged begin anew, those without a folder, a plan or a scene fail with a sentence. An error is
+ * one of the machine, and another start may go better, or -EPROTO: another version of the coordinator wrote it. Then all is as it
+ * was: nothing stored is given up because it could not be read. */
 int restore_jobs(struct server *s, struct error *e);
 
-/* One job from its row, its checkpoint and its journal, for nobody yet. -EBADMSG: something of it is damaged or gone. */
+/* One job from its row, its checkpoint and its journal, for nobody yet. -EBADMSG: something of it is damaged or gone;
+ * -EPROTO: it is of another version. */
 int restore_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e);
 /* The core hears of an order that is in the server's list. held: by whom, or "". Refusals carry the tag. */
 int restore_tell(struct server *s, const struct order *o, const char *held, uint64_t tag, struct error *e);

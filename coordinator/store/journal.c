@@ -4,6 +4,7 @@
 #include "common/base/crc.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
+#include "coordinator/store/spool.h"
 
 #include <fcntl.h>
 #include <pthread.h>
@@ -53,6 +54,7 @@ struct journal {
 	char path[PATH_MOST];
 };
 
+/* Its digits grow with every change of what a record is, the bodies included (the next ones, and batches as common/wire packs them). */
 static const char magic[8] = "hsltJ001";
 
 static uint32_t check_head(const struct head *h)
@@ -228,7 +230,8 @@ int journal_create(struct journal **out, const char *folder, uint64_t job, uint6
 
 /* ---- reading ---- */
 
-static bool read_at(int fd, void *bytes, size_t size, uint64_t at)
+/* -ENODATA: the file ends before that. What cannot be read is not what is not there. */
+static int read_at(int fd, void *bytes, size_t size, uint64_t at)
 {
 	unsigned char *p = bytes;
 	while (size) {
@@ -236,12 +239,12 @@ static bool read_at(int fd, void *bytes, size_t size, uint64_t at)
 		if (n < 0 && errno == EINTR)
 			continue;
 		if (n <= 0)
-			return false;
+			return n < 0 ? -errno : -ENODATA;
 		p += n;
 		at += (uint64_t)n;
 		size -= (size_t)n;
 	}
-	return true;
+	return 0;
 }
 
 static bool head_fits(const struct head *h, uint64_t job, uint64_t generation)
@@ -249,23 +252,36 @@ static bool head_fits(const struct head *h, uint64_t job, uint64_t generation)
 	return memcmp(h->magic, magic, sizeof magic) == 0 && h->check == check_head(h) && h->job == job && h->generation == generation;
 }
 
-/* The record at j->written, and beyond it. 0: it is not whole; else what the visitor says, or 1. */
+/* The record at `at` of a file with so many bytes; its body is mem_alloc'd. -ENODATA: it is not whole. */
+static int read_record(const struct journal *j, uint64_t at, uint64_t end, struct record *r, unsigned char **body, struct error *e)
+{
+	int rc = end - at < sizeof *r ? -ENODATA : read_at(j->fd, r, sizeof *r, at);
+	if (!rc && r->size > end - at - sizeof *r)
+		rc = -ENODATA;
+	if (!rc && !(*body = mem_alloc(r->size, 1)))
+		return error_set(e, ENOMEM, "no memory for a record of %u bytes", r->size);
+	if (!rc) {
+		rc = read_at(j->fd, *body, r->size, at + sizeof *r);
+		if (!rc && r->check != check_record(r, *body, r->size, NULL, 0))
+			rc = -ENODATA;
+		if (rc)
+			mem_free(*body);
+	}
+	return rc && rc != -ENODATA ? fault(j, -rc, e) : rc;
+}
+
+/* The record at j->written, and beyond it. 1, -ENODATA, or what the visitor says. */
 static int visit_next(struct journal *j, uint64_t end, journal_visit *visit, void *user, struct error *e)
 {
 	struct record r;
-	if (end - j->written < sizeof r || !read_at(j->fd, &r, sizeof r, j->written) || r.size > end - j->written - sizeof r)
-		return 0;
-	unsigned char *body = mem_alloc(r.size, 1);
-	if (!body)
-		return error_set(e, ENOMEM, "no memory for a record of %u bytes", r.size);
-	int rc = 0;
-	if (read_at(j->fd, body, r.size, j->written + sizeof r) && r.check == check_record(&r, body, r.size, NULL, 0)) {
-		rc = visit(user, (enum journal_kind)r.kind, r.elapsed, body, r.size, e);
-		rc = rc ? rc : 1;
-		j->written += sizeof r + r.size;
-	}
+	unsigned char *body;
+	int rc = read_record(j, j->written, end, &r, &body, e);
+	if (rc)
+		return rc;
+	rc = visit(user, (enum journal_kind)r.kind, r.elapsed, body, r.size, e);
+	j->written += sizeof r + r.size;
 	mem_free(body);
-	return rc;
+	return rc ? rc : 1;
 }
 
 static int read_all(struct journal *j, uint64_t job, journal_visit *visit, void *user, uint64_t *cut, struct error *e)
@@ -275,16 +291,20 @@ static int read_all(struct journal *j, uint64_t job, journal_visit *visit, void 
 	if (disk_fstat(j->fd, &st))
 		return fault(j, errno, e);
 	uint64_t end = (uint64_t)st.st_size;
-	if (!read_at(j->fd, &h, sizeof h, 0) || !head_fits(&h, job, j->generation))
+	int rc = read_at(j->fd, &h, sizeof h, 0);
+	if (rc && rc != -ENODATA)
+		return fault(j, -rc, e);
+	if (!rc && (rc = spool_check_version(h.magic, magic, j->path, e)) == -EPROTO)
+		return rc;
+	if (rc || !head_fits(&h, job, j->generation))
 		return error_set(e, EBADMSG, "%s: not the journal of j%llu", j->path, (unsigned long long)job);
 	j->written = sizeof h;
-	int rc;
 	do
 		rc = visit_next(j, end, visit, user, e);
 	while (rc > 0);
-	*cut = end - j->written;
-	if (rc < 0)
+	if (rc != -ENODATA)
 		return rc;
+	*cut = end - j->written;
 	if (*cut && disk_ftruncate(j->fd, (off_t)j->written))
 		return fault(j, errno, e);
 	return disk_fsync(j->fd) ? fault(j, errno, e) : 0;
@@ -401,17 +421,14 @@ void journal_settle(struct journal *j)
 static int copy_records(struct journal *j, int to, struct error *e)
 {
 	struct record r;
+	unsigned char *body;
 	uint64_t at = sizeof(struct head);
 	int rc = 0;
 	for (; !rc && at < j->written; at += size_of(&r)) {
-		if (!read_at(j->fd, &r, sizeof r, at) || r.size > j->written - at - sizeof r)
-			return fault(j, EIO, e);
-		unsigned char *body = mem_alloc(r.size, 1);
-		if (!body)
-			return error_set(e, ENOMEM, "no memory for a record of %u bytes", r.size);
-		if (!read_at(j->fd, body, r.size, at + sizeof r) || r.check != check_record(&r, body, r.size, NULL, 0))
-			rc = fault(j, EIO, e);
-		if (!rc && ((rc = disk_write_all(to, &r, sizeof r)) || (rc = disk_write_all(to, body, r.size))))
+		rc = read_record(j, at, j->written, &r, &body, e);
+		if (rc)
+			return rc == -ENODATA ? fault(j, EIO, e) : rc;
+		if ((rc = disk_write_all(to, &r, sizeof r)) || (rc = disk_write_all(to, body, r.size)))
 			rc = fault(j, -rc, e);
 		mem_free(body);
 	}
@@ -430,7 +447,7 @@ int journal_renew(struct journal *j, struct error *e)
 	*strrchr(folder, '/') = 0;
 	if (j->flushes)
 		return error_set(e, EAGAIN, "%s: is being flushed", j->path);
-	if (!read_at(j->fd, &h, sizeof h, 0) || !head_fits(&h, h.job, j->generation))
+	if (read_at(j->fd, &h, sizeof h, 0) || !head_fits(&h, h.job, j->generation))
 		return fault(j, EIO, e);
 	int fd = disk_open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
 	int rc = fd < 0 ? fault(j, errno, e) : disk_write_all(fd, &h, sizeof h) ? fault(j, errno ? errno : ENOSPC, e) : copy_records(j, fd, e);

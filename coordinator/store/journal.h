@@ -36,7 +36,7 @@ int journal_create(struct journal **j, const char *folder, uint64_t job, uint64_
 typedef int journal_visit(void *user, enum journal_kind kind, double elapsed, const unsigned char *body, size_t size, struct error *e);
 
 /* Visits what is whole, cuts off the rest (*cut: so many bytes), goes on behind it. -ENOENT: there is none; -EBADMSG: that of
- * another job or generation. */
+ * another job or generation; -EPROTO: of another version. Whatever the error, also one of reading: the file is as it was. */
 int journal_open(struct journal **j, const char *folder, uint64_t job, uint64_t generation, journal_visit *visit, void *user,
 		 uint64_t *cut, struct error *e);
 void journal_hold(struct journal *j);

@@ -271,6 +271,20 @@ int spool_rename(const char *from, const char *to, const char *folder, struct er
 	return disk_rename(from, to) ? error_set(e, errno, "%s: %s", to, strerror(errno)) : disk_sync_folder(folder, e);
 }
 
+int spool_check_version(const char got[8], const char known[8], const char *path, struct error *e)
+{
+	enum { NAME = 5, DIGITS = 3 };
+	bool same = memcmp(got, known, NAME) == 0;
+	for (int i = NAME; i < NAME + DIGITS; i++)
+		same = same && got[i] >= '0' && got[i] <= '9';
+	if (!same)
+		return error_set(e, EBADMSG, "%s: damaged", path);
+	if (memcmp(got + NAME, known + NAME, DIGITS) == 0)
+		return 0;
+	return error_set(e, EPROTO, "%s is of version %.3s, and version %.3s is known here: another coordinator wrote it", path, got + NAME,
+			 known + NAME);
+}
+
 int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e)
 {
 	char *text = record_to_json(r);

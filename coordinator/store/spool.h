@@ -36,6 +36,9 @@ int spool_rename(const char *from, const char *to, const char *folder, struct er
 int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e);
 /* -ENOENT: there is no such job. */
 int spool_read_record(const struct spool *s, uint64_t id, struct job_record *r, struct error *e);
+/* The first bytes of a file: a name and three digits, its version, in all versions. -EBADMSG: another name; -EPROTO, with a sentence:
+ * another version. Any thread. */
+int spool_check_version(const char got[8], const char known[8], const char *path, struct error *e);
 /* Ids that have a folder, ascending; the greatest `max` of them. Returns how many. */
 size_t spool_jobs(const struct spool *s, uint64_t *ids, size_t max);
 

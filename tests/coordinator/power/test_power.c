@@ -5,13 +5,14 @@
  * an undisturbed run, which it has not if a batch is missing or counted twice.
  *
  * Then single calls fail, the n-th one of a run, in several ways: nothing crashes, what is refused is refused with a sentence and taken
- * later, what was acknowledged stays, and the images have the same bits.
+ * later, what was acknowledged stays, and the images have the same bits. So do calls of a start that finds jobs half done.
  *
  * HSLT_POWER_SEEDS: so many runs (default 150; FULL=1: 4000). HSLT_POWER_SEED: this one alone, with the coordinator's log.
  * HSLT_FAULT, HSLT_FAULT_AT: this kind, at this call alone. HSLT_FAULT_STEP: every so many calls (default 72; FULL=1: each).
  */
 #include "common/base/log.h"
 #include "common/base/mem.h"
+#include "common/base/sealed.h"
 #include "common/film/exr.h"
 #include "coordinator/shell/server.h"
 #include "tests/support/folder.h"
@@ -24,6 +25,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
+#include <glob.h>
 #include <math.h>
 #include <signal.h>
 #include <stdatomic.h>
@@ -450,6 +452,51 @@ static void run_faults(uint64_t from, uint64_t count, int with, bool writes_only
 	*failed += f.failed;
 }
 
+/* The power goes in the middle of the work; calls of the next start fail, from the n-th on. It starts or says why not; no job fails of
+ * it, and all that was acknowledged is there, then or after another start. */
+static bool begin_restart(struct farm_run *f, uint64_t from)
+{
+	begin(f, from);
+	f->disk.lose_at = quiet_calls * 3 / 5;
+	atomic_store(&counts[4], 0);
+	assert_false(start(f) && work(f));
+	hang_up(f);
+	assert_int_equal(gone(f, true), LOSSY_EXIT);
+	swap_folders(f);
+	f->disk.lose_at = 0;
+	return f->acks > 0;
+}
+
+static uint64_t restart_calls(void)
+{
+	static struct farm_run f;
+	assert_true(begin_restart(&f, 1) && start(&f));
+	uint64_t calls = atomic_load(&counts[1]);
+	stop(&f);
+	return calls;
+}
+
+static void run_restart(uint64_t from, uint64_t count, int with, uint64_t *refused)
+{
+	static struct farm_run f;
+	assert_true(begin_restart(&f, from));
+	f.disk.fail_from = from;
+	f.disk.fail_count = count;
+	f.disk.fail_with = with;
+	f.faulty = true;
+	bool done = start(&f) && work(&f);
+	assert_int_equal(f.failed, 0);
+	if (!done) {
+		hang_up(&f);
+		assert_int_equal(gone(&f, true), 1);
+		++*refused;
+		f.disk.fail_from = 0;
+		f.faulty = false;
+		assert_true(start(&f) && work(&f));
+	}
+	stop(&f);
+}
+
 static uint64_t number(const char *name, uint64_t otherwise)
 {
 	const char *text = getenv(name);
@@ -546,6 +593,120 @@ static void calls_fail_at_any_time(void **state)
 	}
 }
 
+static void starts_fail_at_any_time(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *name;
+		int with;
+		uint64_t count;
+	} kinds[] = {{"EIO", EIO, 1}, {"EMFILE", EMFILE, 3}};
+	uint64_t one = number("HSLT_FAULT_AT", 0), step = number("FULL", 0) ? SHARES : number("HSLT_FAULT_STEP", 5 * SHARES * number("HSLT_TEST_SCALE", 1));
+	if (number("HSLT_POWER_SEED", 0))
+		skip();
+	quiet_run();
+	uint64_t calls = restart_calls();
+	loud = one != 0;
+	for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
+		uint64_t refused = 0, runs = 0;
+		if (getenv("HSLT_FAULT") && strcmp(getenv("HSLT_FAULT"), kinds[k].name) != 0)
+			continue;
+		for (uint64_t from = one ? one : 1 + share + SHARES * k; from < (one ? one + 1 : calls); from += step, runs++) {
+			snprintf(running, sizeof running, "of a restart: HSLT_FAULT=%s HSLT_FAULT_AT=%llu", kinds[k].name, (unsigned long long)from);
+			run_restart(from, kinds[k].count, kinds[k].with, &refused);
+		}
+		running[0] = 0;
+		print_message("   %s at %llu of %llu calls of a restart: %llu did not start, none failed\n", kinds[k].name, (unsigned long long)runs,
+			      (unsigned long long)calls, (unsigned long long)refused);
+	}
+}
+
+/* ---- what another coordinator wrote, and what somebody removed ---- */
+
+enum { FILE_MOST = 1 << 20 };
+
+static size_t load(const char *path, unsigned char bytes[FILE_MOST])
+{
+	FILE *f = fopen(path, "rb");
+	size_t n = f ? fread(bytes, 1, FILE_MOST, f) : 0;
+	assert_true(f && n && n < FILE_MOST);
+	fclose(f);
+	return n;
+}
+
+static void store(const char *path, const unsigned char *bytes, size_t size, bool seal)
+{
+	struct sealed out;
+	struct error e;
+	FILE *f = fopen(path, "wb");
+	assert_true(f && fwrite(bytes, 1, size, f) == size && fclose(f) == 0);
+	if (!seal)
+		return;
+	assert_int_equal(sealed_create(&out, path, &e), 0);
+	assert_int_equal(sealed_write(&out, bytes, size - sizeof(uint32_t), &e), 0);
+	assert_int_equal(sealed_finish(&out, &e), 0);
+	sealed_close(&out);
+}
+
+static void of_another_version(void **state)
+{
+	(void)state;
+	static const char *const names[] = {"checkpoint", "journal.*"};
+	static struct farm_run f;
+	static unsigned char before[FILE_MOST], bytes[FILE_MOST];
+	if (share || number("HSLT_POWER_SEED", 0) || number("HSLT_FAULT_AT", 0))
+		skip();
+	quiet_run();
+	assert_true(begin_restart(&f, 7));
+	f.faulty = true;
+	for (int i = 0; i < 2; i++) {
+		glob_t g;
+		char pattern[256];
+		snprintf(pattern, sizeof pattern, "%s/jobs/*/%s", root, names[i]);
+		assert_int_equal(glob(pattern, 0, NULL, &g), 0);
+		size_t size = load(g.gl_pathv[0], before);
+		memcpy(bytes, before, size);
+		memcpy(bytes + 5, "999", 3);
+		store(g.gl_pathv[0], bytes, size, i == 0);
+		load(g.gl_pathv[0], bytes);
+		assert_false(start(&f));
+		assert_int_equal(f.code, 1);
+		static unsigned char after_it[FILE_MOST];
+		assert_int_equal(load(g.gl_pathv[0], after_it), size);
+		assert_memory_equal(bytes, after_it, size);
+		store(g.gl_pathv[0], before, size, false);
+		globfree(&g);
+	}
+	f.faulty = false;
+	assert_true(start(&f) && work(&f));
+	stop(&f);
+}
+
+/* Its folder was removed: it fails, once and for all; the others go on. */
+static void without_its_folder(void **state)
+{
+	(void)state;
+	static struct farm_run f;
+	if (share || number("HSLT_POWER_SEED", 0) || number("HSLT_FAULT_AT", 0))
+		skip();
+	quiet_run();
+	assert_true(begin_restart(&f, 7));
+	uint64_t id = 1;
+	while (!f.jobs[id].submitted)
+		id++;
+	char command[300];
+	snprintf(command, sizeof command, "rm -r '%s/jobs/j%llu'", root, (unsigned long long)id);
+	assert_int_equal(system(command), 0);
+	f.faulty = true;
+	assert_true(start(&f) && work(&f)); /* which submits another in its place */
+	assert_int_equal(f.failed, 1);
+	assert_false(f.jobs[id].submitted);
+	stop(&f);
+	assert_true(start(&f) && work(&f));
+	assert_int_equal(f.failed, 1);
+	stop(&f);
+}
+
 static int tear_down(void **state)
 {
 	if (*running)
@@ -559,6 +720,9 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(power_goes_at_any_time, folder_set_up, tear_down),
 		cmocka_unit_test_setup_teardown(calls_fail_at_any_time, folder_set_up, tear_down),
+		cmocka_unit_test_setup_teardown(starts_fail_at_any_time, folder_set_up, tear_down),
+		cmocka_unit_test_setup_teardown(of_another_version, folder_set_up, tear_down),
+		cmocka_unit_test_setup_teardown(without_its_folder, folder_set_up, tear_down),
 	};
 	size_t size = (SHARES + 1) * LOSSY_COUNTS * sizeof *counts;
 	counts = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
