@@ -274,7 +274,7 @@ static void take_head(struct order *o, const struct head *h)
 	snprintf(o->fingerprint, sizeof o->fingerprint, "%s", h->fingerprint);
 }
 
-static int read_all(struct server *s, struct order *o, struct sealed *in, uint64_t *generation, struct error *e)
+static int read_all(struct order *o, struct sealed *in, uint64_t *generation, struct error *e)
 {
 	struct head h;
 	int rc = sealed_read(in, &h, offsetof(struct head, worker_count), e); /* another version's may be shorter */
@@ -293,7 +293,7 @@ static int read_all(struct server *s, struct order *o, struct sealed *in, uint64
 	take_head(o, &h);
 	*generation = h.generation;
 	int exponent = canvas_grid_exponent(&o->plan, o->lit.b_pooled, order_submit(o)->brightest);
-	rc = canvas_new(&o->canvas, &o->plan, exponent, server_film_folder(s, &o->plan), e);
+	rc = canvas_new(&o->canvas, &o->plan, exponent, o->film_folder, e);
 	if (!rc && o->seeds)
 		rc = sealed_read(in, o->seeds, o->plan.chains * sizeof *o->seeds, e);
 	if (!rc)
@@ -306,18 +306,18 @@ static int read_all(struct server *s, struct order *o, struct sealed *in, uint64
 	return rc;
 }
 
-int checkpoint_load(struct server *s, struct order *o, uint64_t *generation, struct error *e)
+int checkpoint_load(const struct spool *spool, struct order *o, uint64_t *generation, struct error *e)
 {
 	char name[SPOOL_PATH_MAX];
 	struct sealed in;
-	spool_job_path(s->spool, o->id, "checkpoint.tmp", name);
+	spool_job_path(spool, o->id, "checkpoint.tmp", name);
 	disk_unlink(name); /* of a life that ended before it was whole */
-	spool_job_path(s->spool, o->id, "checkpoint", name);
+	spool_job_path(spool, o->id, "checkpoint", name);
 	int rc = sealed_open(&in, name, e);
 	if (rc)
 		return rc;
 	in.bytes = in.left;
-	rc = read_all(s, o, &in, generation, e);
+	rc = read_all(o, &in, generation, e);
 	sealed_close(&in);
 	return rc;
 }

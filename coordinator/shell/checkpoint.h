@@ -13,8 +13,8 @@
 /* Starts one for each order whose journal is long enough. Not while an update is carried out. */
 void checkpoint_where_due(struct server *s);
 
-/* Into a new order without merged batches. -ENOENT: there is none; -EBADMSG: it is damaged; -EPROTO: of another version; the order is of
+/* Into a new order without merged batches, by any thread. -ENOENT: there is none; -EBADMSG: it is damaged; -EPROTO: of another version; the order is of
  * no use then. generation: of the journal that follows. */
-int checkpoint_load(struct server *s, struct order *o, uint64_t *generation, struct error *e);
+int checkpoint_load(const struct spool *spool, struct order *o, uint64_t *generation, struct error *e);
 
 #endif

@@ -8,6 +8,7 @@
 #include "coordinator/shell/restore.h"
 #include "coordinator/shell/session.h"
 
+#include <assert.h>
 #include <math.h>
 #include <string.h>
 
@@ -156,19 +157,77 @@ static int begin_again(struct session *p, struct order *o, const struct job_reco
 	return rc;
 }
 
-static int extend_ended(struct session *p, const struct extension *x, const struct job_record *r, char *text, size_t size,
-			struct error *e)
+static int extend_read(struct session *p, struct order *o, const struct extension *x, const struct job_record *r, char *text, size_t size,
+		       struct error *e)
+{
+	struct plan_request asked;
+	struct plan plan;
+	if (order_rounds(o) == 0)
+		return error_set(e, ENOENT, "its films have been cleared: %s", again);
+	struct extension_from from = where(o, isnan(o->times.completed) ? 0 : o->times.completed, true);
+	int rc = plan_of(p, o, x, &from, &asked, &plan, e);
+	if (rc)
+		return rc;
+	set_bounds(o, &asked, &plan);
+	note(p, o, text, size);
+	return begin_again(p, o, r, e);
+}
+
+/* Films of hundreds of megabytes, which the pool reads, those of one job at a time. */
+struct reading {
+	uv_work_t work;
+	struct server *server;
+	uint64_t peer; /* who asked for it, and may have gone meanwhile */
+	struct extension what;
+	struct job_record record; /* of its end */
+	struct order *order;
+	int rc;
+	struct error error;
+};
+
+static void run(uv_work_t *work)
+{
+	struct reading *w = work->data;
+	w->rc = restore_films(w->server->spool, w->order, &w->error);
+}
+
+static void answer(struct session *p, int rc, const struct error *e, const char *text)
+{
+	text_copy(p->rejected, sizeof p->rejected, rc ? e->text : "");
+	session_send_done(p, text);
+}
+
+static void done(uv_work_t *work, int status)
+{
+	struct reading *w = work->data;
+	struct server *s = w->server;
+	struct session *p = s->stopping ? NULL : session_find(s, w->peer);
+	char text[256] = "";
+	assert(status == 0);
+	(void)status;
+	s->reading = NULL;
+	if (w->rc)
+		order_log(w->order, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+	int rc = w->rc ? error_prefix(&w->error, w->rc, "it cannot go on, %s", again) : p ? 0 : -ECANCELED;
+	if (p) {
+		p->wants.job = 0;
+		p->rejected[0] = 0;
+	}
+	if (!rc)
+		rc = extend_read(p, w->order, &w->what, &w->record, text, sizeof text, &w->error);
+	if (rc)
+		restore_drop(s, w->order);
+	if (p)
+		answer(p, rc, &w->error, text);
+	mem_free(w);
+	if (!s->stopping)
+		extend_waiting(s);
+}
+
+static int start_reading(struct session *p, const struct extension *x, const struct job_record *r, struct error *e)
 {
 	struct server *s = p->server;
 	struct ledger_job j;
-	struct order *o = NULL;
-	struct plan_request asked;
-	struct plan plan;
-	if (strcmp(r->state, job_state_name(JOB_DONE)) != 0)
-		return error_set(e, EINVAL, "it has %s, and nothing of it was kept: %s", strcmp(r->state, "failed") == 0 ? "failed" : "been cancelled",
-				 again);
-	if (strcmp(r->reason, job_end_name(END_BLACK)) == 0)
-		return error_set(e, EINVAL, "it is black: chains have nowhere to begin");
 	int rc = read_job(s, r->id, &j, e);
 	if (rc)
 		return rc;
@@ -176,58 +235,81 @@ static int extend_ended(struct session *p, const struct extension *x, const stru
 		const unsigned char *from;
 		unsigned char *to;
 	} submission = {j.submission}, frame = {j.plan}; /* ours */
-	rc = restore_order(s, &j, &o, e);
+	struct reading *w = mem_alloc(1, sizeof *w);
+	rc = w ? restore_order(s, &j, &w->order, e) : error_set(e, ENOMEM, "no memory for a job");
 	mem_free(submission.to);
 	mem_free(frame.to);
-	if (rc)
-		return error_prefix(e, rc, "it cannot go on, %s", again);
-	if (order_rounds(o) == 0)
-		rc = error_set(e, ENOENT, "its films have been cleared: %s", again);
-	struct extension_from from = where(o, isnan(o->times.completed) ? 0 : o->times.completed, true);
-	if (!rc)
-		rc = plan_of(p, o, x, &from, &asked, &plan, e);
-	if (!rc) {
-		set_bounds(o, &asked, &plan);
-		note(p, o, text, size);
-		rc = begin_again(p, o, r, e);
-	}
 	if (rc) {
-		order_release_blobs(order_submit(o), s->blobs);
-		order_free(o);
+		mem_free(w);
+		return error_prefix(e, rc, "it cannot go on, %s", again);
 	}
+	w->work.data = w;
+	w->server = s;
+	w->peer = p->id;
+	w->what = *x;
+	w->record = *r;
+	s->reading = w->order;
+	rc = uv_queue_work(&s->loop, &w->work, run, done);
+	assert(rc == 0);
 	return rc;
+}
+
+/* All that can be said without its films. */
+static int extend_ended(struct session *p, const struct extension *x, const struct job_record *r, struct error *e)
+{
+	if (strcmp(r->state, job_state_name(JOB_DONE)) != 0)
+		return error_set(e, EINVAL, "it has %s, and nothing of it was kept: %s", strcmp(r->state, "failed") == 0 ? "failed" : "been cancelled",
+				 again);
+	if (strcmp(r->reason, job_end_name(END_BLACK)) == 0)
+		return error_set(e, EINVAL, "it is black: chains have nowhere to begin");
+	return start_reading(p, x, r, e);
 }
 
 /* ---- both ---- */
 
-static bool must_wait(const struct order *o)
+/* Its films are in use, or those of another job are being read. */
+static bool must_wait(const struct server *s, const struct order *o)
 {
-	return o && (o->busy || o->ended);
+	return o ? o->busy || o->ended : s->reading != NULL;
+}
+
+static void go_on(struct session *p)
+{
+	struct server *s = p->server;
+	const struct extension x = p->wants;
+	struct order *o = server_order(s, x.job);
+	struct job_view v;
+	struct error e = {""};
+	char text[256] = "";
+	int rc;
+	if (must_wait(s, o)) {
+		s->extend_waits = true;
+		return;
+	}
+	p->wants.job = 0;
+	p->rejected[0] = 0;
+	if (o)
+		rc = extend_live(p, o, &x, text, sizeof text, &e);
+	else if (!server_view(s, x.job, &v))
+		rc = error_set(&e, ENOENT, "no such job");
+	else
+		rc = extend_ended(p, &x, &v.record, &e);
+	if (!rc && !o)
+		p->wants = x; /* until it is read */
+	else
+		answer(p, rc, &e, text);
 }
 
 void extend_job(struct session *p, const struct extension *x)
 {
-	struct server *s = p->server;
-	struct order *o = server_order(s, x->job);
-	struct job_view v;
-	struct error e = {""};
-	char text[256] = "";
-	if (must_wait(o)) {
-		p->wants = *x;
-		p->server->extend_waits = true;
+	struct error e;
+	int rc = p->wants.job ? error_set(&e, EBUSY, "one extension at a time: the one before is not answered yet") : extend_check(x, &e);
+	if (rc) {
+		answer(p, rc, &e, "");
 		return;
 	}
-	p->rejected[0] = 0;
-	int rc = 0;
-	if (o)
-		rc = extend_live(p, o, x, text, sizeof text, &e);
-	else if (!server_view(s, x->job, &v))
-		rc = error_set(&e, ENOENT, "no such job");
-	else
-		rc = extend_ended(p, x, &v.record, text, sizeof text, &e);
-	if (rc)
-		text_copy(p->rejected, sizeof p->rejected, e.text);
-	session_send_done(p, text);
+	p->wants = *x;
+	go_on(p);
 }
 
 void extend_waiting(struct server *s)
@@ -235,11 +317,7 @@ void extend_waiting(struct server *s)
 	if (!s->extend_waits)
 		return;
 	s->extend_waits = false;
-	for (struct session *p = s->sessions; p; p = p->next) {
-		struct extension x = p->wants;
-		if (!x.job)
-			continue;
-		p->wants.job = 0;
-		extend_job(p, &x); /* which may let it wait on */
-	}
+	for (struct session *p = s->sessions; p; p = p->next)
+		if (p->wants.job)
+			go_on(p); /* which may let it wait on */
 }

@@ -26,16 +26,19 @@ struct extension_from {
 	bool ended;
 };
 
+/* -EINVAL with a sentence: nothing is named, or what is no number of them. */
+int extend_check(const struct extension *x, struct error *e);
 /*
- * Pure. asked: what the plan was made of; becomes what the new one is made of. -EINVAL with a sentence: nothing is named, the
+ * Pure. asked: what the plan was made of; becomes what the new one is made of. -EINVAL with a sentence: as above, the
  * job would end at once, or a bound would have to be where there is none.
  */
 int extend_plan(const struct plan *p, const struct extension *x, const struct extension_from *from, struct plan_request *asked,
 		struct plan *out, struct error *e);
 
-/* Does it, or puts it off until the job's films are free; the session gets its Done. */
+/* Does it, or puts it off until the job's films are free or read; the session gets its Done. One at a time of a session: another one
+ * meanwhile is refused. */
 void extend_job(struct session *p, const struct extension *x);
-/* Films are free, or a job has ended: those that were put off. */
+/* Films are free or read, or a job has ended: those that were put off. */
 void extend_waiting(struct server *s);
 
 #endif

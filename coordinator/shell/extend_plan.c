@@ -51,21 +51,29 @@ static bool same_bits(const struct plan *a, const struct plan *b)
 	       memcmp(a->knobs, c.knobs, sizeof a->knobs) == 0 && memcmp(a->effects, c.effects, sizeof a->effects) == 0;
 }
 
+int extend_check(const struct extension *x, struct error *e)
+{
+	if (!isfinite(x->seconds) || !isfinite(x->target_error) || x->seconds < 0 || x->target_error < 0)
+		return error_set(e, EINVAL, "a time or an error that is none");
+	if (!x->spp && !x->mutations && !(x->seconds > 0) && !(x->target_error > 0))
+		return error_set(e, EINVAL, "by what? --spp, --mutations, --time or --target-error");
+	return 0;
+}
+
 int extend_plan(const struct plan *p, const struct extension *x, const struct extension_from *from, struct plan_request *asked,
 		struct plan *out, struct error *e)
 {
 	bool samples = x->spp || x->mutations, time = x->seconds > 0, error = x->target_error > 0;
-	if (!samples && !time && !error)
-		return error_set(e, EINVAL, "by what? --spp, --mutations, --time or --target-error");
-	if (!isfinite(x->seconds) || !isfinite(x->target_error) || x->seconds < 0 || x->target_error < 0)
-		return error_set(e, EINVAL, "a time or an error that is none");
+	int rc = extend_check(x, e);
+	if (rc)
+		return rc;
 	if (error && from->ended && from->error <= x->target_error)
 		return error_set(e, EINVAL, "its error is %.3g %% already", 100 * from->error);
 	uint64_t total = total_of(p, asked, from->rounds);
 	bool bounded = p->rounds != UINT64_MAX;
 	asked->spp = 0;
 	asked->mutations = bounded ? total : 0;
-	int rc = samples ? more_rounds(p, x, from, asked, e) : 0;
+	rc = samples ? more_rounds(p, x, from, asked, e) : 0;
 	if (rc)
 		return rc;
 	if (!samples && from->ended && bounded && from->rounds >= p->rounds)

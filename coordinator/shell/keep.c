@@ -60,6 +60,8 @@ bool keep_order(struct server *s, const struct order *o)
 void keep_drop(const struct server *s, uint64_t job)
 {
 	char path[SPOOL_PATH_MAX];
+	if (s->reading && s->reading->id == job)
+		return;
 	spool_job_path(s->spool, job, NULL, path);
 	journal_clear(path, UINT64_MAX);
 	spool_job_path(s->spool, job, "checkpoint", path);

@@ -42,6 +42,7 @@ struct order {
 	struct job_record record;
 	struct bootstrap *bootstrap; /* until the canvas is there */
 	struct canvas *canvas;       /* from then on */
+	const char *film_folder;     /* where it goes when it is read from the spool; NULL: into memory */
 	struct bootstrap_result lit;
 	uint64_t *seeds;             /* [groups][chains / groups]; NULL for samples */
 	struct chain_state **states; /* [groups x parts]; NULL entries: no epoch merged yet */

@@ -15,7 +15,6 @@
 /* A journal on its way into an order. */
 struct replay {
 	struct order *order;
-	const struct server *server;
 	double elapsed;
 	uint64_t batches;
 };
@@ -55,7 +54,7 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 		rc = error_prefix(e, -EBADMSG, "a batch out of its order");
 	order_note_times(o, r->elapsed, rounds);
 	if (!rc && o->bootstrap && bootstrap_missing(o->bootstrap) == 0)
-		rc = order_prepare(o, server_film_folder(r->server, &o->plan), e);
+		rc = order_prepare(o, o->film_folder, e);
 	r->batches++;
 	return rc;
 }
@@ -115,13 +114,13 @@ static int take_record(void *user, enum journal_kind kind, double elapsed, const
 	}
 }
 
-static int read_journal(struct server *s, struct order *o, struct error *e)
+int restore_films(const struct spool *spool, struct order *o, struct error *e)
 {
-	struct replay r = {.order = o, .server = s};
+	struct replay r = {.order = o};
 	char folder[SPOOL_PATH_MAX];
 	uint64_t cut = 0, generation = 0;
-	spool_job_path(s->spool, o->id, NULL, folder);
-	int rc = checkpoint_load(s, o, &generation, e);
+	spool_job_path(spool, o->id, NULL, folder);
+	int rc = checkpoint_load(spool, o, &generation, e);
 	if (rc && rc != -ENOENT)
 		return rc;
 	rc = journal_open(&o->journal, folder, o->id, generation, take_record, &r, &cut, e);
@@ -248,10 +247,23 @@ static int make_order(struct server *s, const struct ledger_job *j, struct order
 	return rc;
 }
 
-static void drop(struct server *s, struct order *o)
+void restore_drop(struct server *s, struct order *o)
 {
 	order_release_blobs(order_submit(o), s->blobs);
 	order_free(o);
+}
+
+int restore_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e)
+{
+	int rc = make_order(s, j, o, e);
+	if (rc)
+		return rc;
+	rc = take_record_of(s, j, *o, e);
+	if (rc)
+		restore_drop(s, *o);
+	else
+		(*o)->film_folder = server_film_folder(s, &(*o)->plan);
+	return rc;
 }
 
 /* What is stored is damaged: the job's batches can be made again, with the same bits. */
@@ -267,26 +279,18 @@ static void begin_anew(struct server *s, struct order *o)
 
 static int restore(struct server *s, const struct ledger_job *j, bool anew, struct order **o, struct error *e)
 {
-	int rc = make_order(s, j, o, e);
+	int rc = restore_order(s, j, o, e);
 	if (rc)
 		return rc;
-	rc = take_record_of(s, j, *o, e);
-	if (!rc)
-		rc = read_journal(s, *o, e);
+	rc = restore_films(s->spool, *o, e);
 	if (!rc)
 		return 0;
 	order_log(*o, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
 	anew = anew && rc == -EBADMSG;
 	if (anew)
 		begin_anew(s, *o);
-	drop(s, *o);
-	*o = NULL;
+	restore_drop(s, *o);
 	return anew ? restore(s, j, false, o, e) : rc;
-}
-
-int restore_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e)
-{
-	return restore(s, j, false, o, e);
 }
 
 static int restore_one(struct server *s, const struct ledger_job *j, struct error *e)

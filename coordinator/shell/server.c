@@ -118,7 +118,7 @@ static void on_wake(uv_timer_t *t)
 
 const char *server_film_folder(const struct server *s, const struct plan *p)
 {
-	uint64_t bytes = canvas_bytes(p);
+	uint64_t bytes = canvas_bytes(p) + (s->reading ? canvas_bytes(&s->reading->plan) : 0);
 	for (const struct order *o = s->orders; o; o = o->next)
 		if (o->canvas && !canvas_is_mapped(o->canvas))
 			bytes += canvas_bytes(&o->plan);

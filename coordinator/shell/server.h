@@ -97,6 +97,7 @@ struct server {
 	bool stepping, stopping;
 	bool checkpointing; /* of some job, by the pool */
 	bool extend_waits;  /* some session's extension does */
+	const struct order *reading; /* of an ended job: the pool reads its films, and all else of it but id and plan is the pool's */
 	double tls_next; /* when its files are looked at again */
 	double watchdog, watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */
 	uint64_t changes; /* grows with whatever the status shows */

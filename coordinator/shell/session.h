@@ -30,7 +30,7 @@ struct session {
 	double fetched;        /* s on the loop's clock: its last piece */
 	uint64_t wants_preview; /* job whose preview is being made for it; 0: none */
 	struct job_view *shown; /* what the watcher saw last */
-	struct extension wants; /* it waits until nobody reads the job's films; job 0: none */
+	struct extension wants; /* not answered yet: it waits until the job's films are free, or read; job 0: none */
 	char rejected[256];    /* why the core refused; "" it did not */
 	uint64_t answered_job; /* SUBMITTED or CANCELLED came for it */
 };

@@ -669,13 +669,76 @@ static void half_a_result_is_no_word(void **state)
 	hang_up(worker);
 }
 
+static void say_extend(const struct peer *p, uint64_t job, uint64_t spp, int times)
+{
+	unsigned char all[512];
+	size_t at = 0;
+	Farm__Control c;
+	Farm__Envelope m;
+	farm__control__init(&c);
+	farm__envelope__init(&m);
+	c.job = job;
+	c.verb = FARM__VERB__VERB_EXTEND;
+	c.more_spp = spp;
+	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
+	m.control = &c;
+	for (int i = 0; i < times; i++) {
+		unsigned char *frame;
+		size_t size;
+		struct error e;
+		assert_int_equal(envelope_pack(&m, NULL, 0, &frame, &size, &e), 0);
+		memcpy(all + at, frame, size);
+		at += size;
+		mem_free(frame);
+	}
+	say_bytes(p, all, at);
+}
+
+static void hear_done(struct peer *p, bool ok, const char *text)
+{
+	const Farm__Envelope *m = hear(p);
+	assert_non_null(m);
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_DONE);
+	assert_int_equal(m->done->ok, ok);
+	if (!strstr(m->done->text, text))
+		fail_msg("'%s' is not in '%s'", text, m->done->text);
+}
+
+/* The job that was done before: its films are read beside the loop, and each Extend gets one answer. */
+static void extensions_wait_for_films(void **state)
+{
+	(void)state;
+	struct peer *a = call(), *b = call();
+	assert_true(hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	assert_true(hello(b, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	say_extend(a, 2, 0, 1); /* not for that */
+	hear_done(a, false, "by what");
+	say_extend(a, 2, 8, 3);
+	say_extend(b, 2, 8, 1);
+	hear_done(a, false, "one extension at a time");
+	hear_done(a, false, "one extension at a time");
+	hear_done(a, true, "it goes on until");
+	hear_done(b, true, "it goes on until"); /* the job lives by then */
+	say_extend(a, 1, 8, 1);
+	hear_done(a, false, "it is black");
+	hang_up(a);
+	hang_up(b);
+	a = call();
+	assert_true(hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	say_empty(a, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = hear(a);
+	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	assert_false(m->job_list_answer->jobs[1]->ended);
+	hang_up(a);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(rubbish_is_hung_up_on),   cmocka_unit_test(stragglers_are_hung_up_on),
 		cmocka_unit_test(crowds_are_turned_away), cmocka_unit_test(the_silent_give_way),  cmocka_unit_test(hello_is_looked_at),
 		cmocka_unit_test(submissions_are_looked_at), cmocka_unit_test(a_black_job_ends),
-		cmocka_unit_test(strategies_are_counted_once),
+		cmocka_unit_test(strategies_are_counted_once), cmocka_unit_test(extensions_wait_for_films),
 	};
 	const struct CMUnitTest slow[] = {cmocka_unit_test(a_slow_result_counts), cmocka_unit_test(half_a_result_is_no_word)};
 	int failed = cmocka_run_group_tests(tests, set_up, tear_down);
