@@ -7,6 +7,9 @@
  * Then single calls fail, the n-th one of a run, in several ways: nothing crashes, what is refused is refused with a sentence and taken
  * later, what was acknowledged stays, and the images have the same bits. So do calls of a start that finds jobs half done.
  *
+ * What must not be is counted, and each of the two tests ends with a line of what it did and counted: tests/e2e/faults/disk.sh makes
+ * rows of a table of them.
+ *
  * HSLT_POWER_SEEDS: so many runs (default 150; FULL=1: 4000). HSLT_POWER_SEED: this one alone, with the coordinator's log.
  * HSLT_FAULT, HSLT_FAULT_AT: this kind, at this call alone. HSLT_FAULT_STEP: every so many calls (default 72; FULL=1: each).
  */
@@ -18,6 +21,7 @@
 #include "tests/support/folder.h"
 #include "tests/support/lossy.h"
 #include "tests/support/scripted.h"
+#include "tests/support/shares.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -37,7 +41,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-enum { JOBS = 2, IDS_MAX = 64, LEASES_MAX = 256, LIVES_MAX = 12, SHARES = 4, STATE_BYTES = 3000 };
+enum { JOBS = 2, IDS_MAX = 64, LEASES_MAX = 256, LIVES_MAX = 12, STATE_BYTES = 3000 };
 static const char scene[] = "<scene/>";
 
 struct job {
@@ -59,11 +63,18 @@ struct farm_run {
 	bool faulty; /* calls fail: what is refused with a sentence is tried again */
 };
 
-static _Atomic uint64_t *counts, *totals; /* of this share; of all: losses, batches acknowledged, sectors and names lost */
+enum harm { LOST, DOUBLED, UNEQUAL, HARMS };
+enum { KINDS = 4 }; /* of calls that fail */
+
+struct sums { /* of all shares */
+	_Atomic uint64_t losses, acks, taken, images, harm[HARMS], runs[KINDS], refused[KINDS], failed[KINDS];
+};
+
+static _Atomic uint64_t *counts; /* of this share */
+static struct sums *sums, *now;  /* of the two tests; of the one that runs */
 static unsigned share;
-static pid_t others[SHARES];
-static FILE *logs[SHARES];
 static struct exr_image reference;
+static uint64_t reference_results; /* that its film holds */
 static bool has_reference, loud;
 static uint64_t quiet_calls; /* of an undisturbed run, that change something */
 static char running[64]; /* the run that is under way; "": none */
@@ -152,6 +163,12 @@ static void hang_up(struct farm_run *f)
 
 /* ---- what it must say ---- */
 
+static void count_harm(enum harm what, uint64_t times, const char *text)
+{
+	print_error("%s: %s\n", running, text);
+	now->harm[what] += times;
+}
+
 static size_t lease_index(const struct plan *p, const struct lease_key *k)
 {
 	size_t i = k->kind == LEASE_BOOTSTRAP ? 0 : 1 + (size_t)k->epoch;
@@ -165,20 +182,43 @@ static const Farm__Envelope *ask(struct scripted *p, bool said)
 	return said ? scripted_hear(p) : NULL;
 }
 
-static void check_image(const unsigned char *bytes, size_t size)
+/* Every result of these plans brings as many accepted mutations as any other. */
+static uint64_t results_in(const struct exr_image *img, const struct plan *p)
+{
+	struct lease_key k = {.kind = LEASE_RENDER};
+	struct batch b = scripted_batch(&k, p, STATE_BYTES);
+	uint64_t one = b.counters[COUNT_ACCEPTED], all = 0;
+	batch_fini(&b);
+	for (size_t i = 0; i < img->attribute_count; i++)
+		if (strcmp(img->attributes[i].name, "hslt:accepted") == 0)
+			all = strtoull(img->attributes[i].string, NULL, 10);
+	assert_true(one && all % one == 0);
+	return all / one;
+}
+
+static void check_image(const unsigned char *bytes, size_t size, const struct plan *p)
 {
 	struct exr_image img;
 	struct error e;
+	bool equal = true;
 	assert_int_equal(exr_read(bytes, size, &img, &e), 0);
+	uint64_t results = results_in(&img, p);
 	if (!has_reference) {
 		reference = img;
+		reference_results = results;
 		has_reference = true;
+		assert_int_equal(results, p->rounds * p->groups * p->parts);
 		return;
 	}
 	assert_int_equal(img.channel_count, reference.channel_count);
 	for (uint32_t i = 0; i < img.channel_count; i++)
-		assert_memory_equal(img.planes[i], reference.planes[i], sizeof(float) * img.width * img.height);
+		equal = equal && memcmp(img.planes[i], reference.planes[i], sizeof(float) * img.width * img.height) == 0;
 	exr_image_fini(&img);
+	now->images++;
+	if (results != reference_results)
+		count_harm(results < reference_results ? LOST : DOUBLED, (uint64_t)llabs((long long)(results - reference_results)), "a film holds too few or too many");
+	if (!equal)
+		count_harm(UNEQUAL, 1, "an image has other bits");
 }
 
 /* false: it hung up. */
@@ -194,7 +234,7 @@ static bool fetch(struct farm_run *f, uint64_t id, bool *there)
 		return true;
 	}
 	assert_string_equal(m->fetch_chunk->error, "");
-	check_image(f->client->reader.payload.bytes, f->client->reader.payload.size);
+	check_image(f->client->reader.payload.bytes, f->client->reader.payload.size, &f->plan);
 	return true;
 }
 
@@ -223,10 +263,13 @@ static bool look(struct farm_run *f)
 	}
 	for (uint64_t id = 0; id < IDS_MAX; id++) {
 		struct job *j = &f->jobs[id];
-		if (j->submitted && !seen[id])
-			fail_msg("j%llu is lost", (unsigned long long)id);
-		if (j->announced && !done[id])
-			fail_msg("j%llu was done", (unsigned long long)id);
+		if (j->submitted && !seen[id]) {
+			count_harm(LOST, 1, "a job is lost");
+			j->submitted = false;
+			f->accepted--;
+		} else if (j->announced && !done[id]) {
+			count_harm(LOST, 1, "a job was done and is not");
+		}
 		if (done[id] && !fetch(f, id, &done[id]))
 			return false;
 		j->announced = done[id] && j->submitted;
@@ -265,9 +308,10 @@ static bool answer_lease(struct farm_run *f, const Farm__LeaseGrant *g)
 	assert_int_equal(grant_unpack(&grant, g, f->worker->reader.payload.bytes, f->worker->reader.payload.size, &e), 0);
 	struct lease_key before = grant.key;
 	assert_true(before.job < IDS_MAX);
-	if (f->jobs[before.job].acked[lease_index(&f->plan, &before)])
-		fail_msg("j%llu kind %d group %u part %u epoch %llu was acknowledged, and is handed out again", (unsigned long long)before.job,
-			 (int)before.kind, before.group, before.part, (unsigned long long)before.epoch);
+	bool *acked = &f->jobs[before.job].acked[lease_index(&f->plan, &before)];
+	if (*acked)
+		count_harm(LOST, 1, "a result was acknowledged, and its lease is handed out again");
+	*acked = false;
 	before.epoch--;
 	for (uint32_t i = 0; grant.states && i < grant.chain_count; i++) {
 		uint64_t tag;
@@ -503,45 +547,22 @@ static uint64_t number(const char *name, uint64_t otherwise)
 	return text && *text ? strtoull(text, NULL, 10) : otherwise;
 }
 
-/* ---- shares of the runs, side by side: most of the time somebody waits ---- */
+/* ---- tests ---- */
 
-static void begin_shares(void)
+static void say_harm(const char *what, uint64_t times)
 {
-	fflush(NULL);
-	for (int i = 1; i < SHARES; i++) {
-		logs[i] = tmpfile();
-		others[i] = logs[i] ? fork() : -1;
-		if (others[i])
-			continue;
-		share = (unsigned)i;
-		prctl(PR_SET_PDEATHSIG, SIGKILL);
-		counts += i * LOSSY_COUNTS;
-		if (dup2(fileno(logs[i]), 1) < 0 || dup2(fileno(logs[i]), 2) < 0)
-			_exit(1);
-		return;
-	}
-}
-
-static void others_pass(void)
-{
-	bool all = true;
-	for (int i = 1; i < SHARES; i++) {
-		char line[512];
-		int status;
-		assert_true(waitpid(others[i], &status, 0) == others[i]);
-		bool bad = !WIFEXITED(status) || WEXITSTATUS(status);
-		rewind(logs[i]);
-		while (bad && fgets(line, sizeof line, logs[i]))
-			print_error("%s", line);
-		fclose(logs[i]);
-		all = all && !bad;
-	}
-	assert_true(all);
+	if (share == 0) /* the last to come here */
+		printf("   %s: times=%llu lost=%llu doubled=%llu images=%llu unequal=%llu\n", what, (unsigned long long)times,
+		       (unsigned long long)now->harm[LOST], (unsigned long long)now->harm[DOUBLED], (unsigned long long)now->images,
+		       (unsigned long long)now->harm[UNEQUAL]);
+	assert_true(share || (times && now->images));
+	assert_true(!now->harm[LOST] && !now->harm[DOUBLED] && !now->harm[UNEQUAL]);
 }
 
 static void power_goes_at_any_time(void **state)
 {
 	(void)state;
+	now = &sums[0];
 	uint64_t seeds = number("HSLT_POWER_SEEDS", number("FULL", 0) ? 4000 : 150), one = number("HSLT_POWER_SEED", 0);
 	seeds = seeds / number("HSLT_TEST_SCALE", 1) + 1;
 	uint64_t losses = 0, acks = 0;
@@ -553,15 +574,15 @@ static void power_goes_at_any_time(void **state)
 		run_seed(seed, &losses, &acks);
 	}
 	running[0] = 0;
-	totals[0] += losses;
-	totals[1] += acks;
-	totals[2] += atomic_load(&counts[3]);
-	if (share == 0 && !one)
-		others_pass();
+	now->losses += losses;
+	now->acks += acks;
+	now->taken += atomic_load(&counts[3]);
+	bool pass = share || one || shares_pass();
 	if (share == 0)
-		printf("   %llu runs of %llu calls: the power went %llu times and took %llu sectors and names; %llu batches acknowledged, none lost\n",
-		       (unsigned long long)(one ? 1 : seeds), (unsigned long long)quiet_calls, (unsigned long long)totals[0],
-		       (unsigned long long)totals[2], (unsigned long long)totals[1]);
+		printf("   %llu runs of %llu calls: the power took %llu sectors and names; %llu batches were acknowledged\n",
+		       (unsigned long long)(one ? 1 : seeds), (unsigned long long)quiet_calls, (unsigned long long)now->taken, (unsigned long long)now->acks);
+	say_harm("power", now->losses);
+	assert_true(pass);
 }
 
 static void calls_fail_at_any_time(void **state)
@@ -572,13 +593,14 @@ static void calls_fail_at_any_time(void **state)
 		int with;
 		uint64_t count;
 		bool writes_only;
-	} kinds[] = {{"EIO", EIO, 1, false}, {"ENOSPC", ENOSPC, 40, true}, {"EMFILE", EMFILE, 1, false}, {"EROFS", EROFS, 10, false}};
+	} kinds[KINDS] = {{"EIO", EIO, 1, false}, {"ENOSPC", ENOSPC, 40, true}, {"EMFILE", EMFILE, 1, false}, {"EROFS", EROFS, 10, false}};
 	uint64_t one = number("HSLT_FAULT_AT", 0), step = number("FULL", 0) ? SHARES : number("HSLT_FAULT_STEP", 18 * SHARES * number("HSLT_TEST_SCALE", 1));
 	if (number("HSLT_POWER_SEED", 0))
 		skip();
+	now = &sums[1];
 	quiet_run();
 	loud = one != 0;
-	uint64_t calls = atomic_load(&counts[1]);
+	uint64_t calls = atomic_load(&counts[1]), times = 0;
 	for (size_t k = 0; k < sizeof kinds / sizeof *kinds; k++) {
 		uint64_t refused = 0, failed = 0, runs = 0;
 		if (getenv("HSLT_FAULT") && strcmp(getenv("HSLT_FAULT"), kinds[k].name) != 0)
@@ -588,9 +610,14 @@ static void calls_fail_at_any_time(void **state)
 			run_faults(from, kinds[k].count, kinds[k].with, kinds[k].writes_only, &refused, &failed);
 		}
 		running[0] = 0;
-		print_message("   %s at %llu of %llu calls: %llu refusals, %llu jobs failed and said so\n", kinds[k].name, (unsigned long long)runs,
-			      (unsigned long long)calls, (unsigned long long)refused, (unsigned long long)failed);
+		now->refused[k] += refused;
+		now->failed[k] += failed;
+		times += now->runs[k] += runs;
+		if (share == 0)
+			printf("   %s at %llu of %llu calls: %llu refusals, %llu jobs failed and said so\n", kinds[k].name, (unsigned long long)now->runs[k],
+			       (unsigned long long)calls, (unsigned long long)now->refused[k], (unsigned long long)now->failed[k]);
 	}
+	say_harm("failing calls", times);
 }
 
 static void starts_fail_at_any_time(void **state)
@@ -724,12 +751,13 @@ int main(void)
 		cmocka_unit_test_setup_teardown(of_another_version, folder_set_up, tear_down),
 		cmocka_unit_test_setup_teardown(without_its_folder, folder_set_up, tear_down),
 	};
-	size_t size = (SHARES + 1) * LOSSY_COUNTS * sizeof *counts;
-	counts = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
-	if (counts == MAP_FAILED)
+	size_t size = 2 * sizeof *sums + SHARES * LOSSY_COUNTS * sizeof *counts;
+	sums = mmap(NULL, size, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	if (sums == MAP_FAILED)
 		return 1;
-	totals = counts + SHARES * LOSSY_COUNTS;
+	counts = (_Atomic uint64_t *)(sums + 2);
 	if (!number("HSLT_POWER_SEED", 0))
-		begin_shares();
+		share = shares_begin();
+	counts += share * LOSSY_COUNTS;
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
