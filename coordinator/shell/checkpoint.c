@@ -175,9 +175,9 @@ static void done(uv_work_t *work, int status)
 	o->busy = false;
 	s->checkpointing = s->checkpointing && !w->rc;
 	if (!s->stopping && o->unsure)
-		durable_hold(s, o, "its results cannot be stored", w->error.text);
+		durable_hold(s, o, "its results cannot be stored", w->error.text); /* which is the end of it, if it was cancelled */
 	if (!s->stopping) {
-		server_order_free_again(s, o);
+		server_order_free_again(s);
 		session_previews(s, id);
 	}
 	mem_free(w);

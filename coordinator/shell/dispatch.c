@@ -259,9 +259,8 @@ static void finish(struct server *s, struct order *o)
 	server_view(s, o->id, &v);
 	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 	o->record = v.record;
-	if (durable_end(s, o)) { /* the image and its record again, later */
-		o->unpublished = true;
-		o->unpublished_rounds = order_rounds(o);
+	if (durable_end(s, o)) { /* again, later */
+		o->unrecorded = true;
 		o->try_again = server_now(s) + s->config.retry_seconds;
 		return;
 	}
@@ -293,7 +292,7 @@ void dispatch_finish_orders(struct server *s)
 	bool finished = false;
 	for (struct order *o = s->orders, *next; o; o = next) {
 		next = o->next;
-		if (o->ended && !o->busy && !o->unpublished) {
+		if (o->ended && !o->busy && !o->unpublished && !o->unrecorded) {
 			finish(s, o);
 			finished = true;
 			next = s->orders; /* late batches may have ended others */

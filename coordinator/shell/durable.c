@@ -345,12 +345,13 @@ void durable_look(struct server *s, uint64_t job)
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
-/* Not before each answer: it is for the record alone. */
+/* Not before each answer: it is for the record alone. Nor while a checkpoint is written, which has the last ones and takes the
+ * journal's place. */
 static void write_counts(struct server *s, struct order *o)
 {
 	struct job_counts now;
 	struct error e;
-	if (o->ended || !o->journal || !farm_counts(s->farm, o->id, &now) || memcmp(&now, &o->counts, sizeof now) == 0)
+	if (o->ended || o->busy || !o->journal || !farm_counts(s->farm, o->id, &now) || memcmp(&now, &o->counts, sizeof now) == 0)
 		return;
 	if (append_note(s, o, JOURNAL_COUNTS, o->times.elapsed, &now, sizeof now, &e) == 0)
 		o->counts = now;
@@ -403,6 +404,11 @@ void durable_tick(struct server *s)
 		if (o->unpublished) {
 			o->unpublished = false;
 			publish_start(s, o, PUBLISH_RESULT, o->unpublished_rounds);
+		}
+		if (o->unrecorded) {
+			o->unrecorded = false;
+			dispatch_finish_orders(s);
+			return; /* as below */
 		}
 		if (o->unprepared && !o->ended) {
 			struct event ev = {.kind = EVENT_TICK};

@@ -65,6 +65,7 @@ struct order {
 	bool unprepared;         /* the disk has no room for its films yet */
 	bool unpublished;        /* it has ended, but its image could not be written yet */
 	uint64_t unpublished_rounds;
+	bool unrecorded;         /* ... but its record could not */
 	bool busy, ended;
 	bool black; /* as the image that was published, or the bootstrap */
 	double preview_made; /* s on the loop's clock; 0: never */

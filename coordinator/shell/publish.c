@@ -144,9 +144,7 @@ static void done(uv_work_t *work, int status)
 			tell_error(w);
 		else if (w->what == PUBLISH_RESULT && !w->rc)
 			tell_image(w);
-		o = server_order(s, id);
-		if (o && !o->busy)
-			server_order_free_again(s, o);
+		server_order_free_again(s);
 		session_previews(s, id);
 		s->changes++;
 	}

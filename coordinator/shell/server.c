@@ -203,9 +203,8 @@ static void on_drain(uv_timer_t *t)
 		uv_timer_start(&s->drain, on_drain, 0, 0);
 }
 
-void server_order_free_again(struct server *s, struct order *o)
+void server_order_free_again(struct server *s)
 {
-	o->busy = false;
 	if (!s->stopping)
 		uv_timer_start(&s->drain, on_drain, 0, 0);
 	dispatch_finish_orders(s);
@@ -226,10 +225,10 @@ static void view_order(struct server *s, const struct order *o, struct job_view 
 	if (!farm_job(s->farm, o->id, server_now(s), &status))
 		return;
 	view_add_status(v, &status);
-	if (o->ended && (o->busy || o->unpublished)) { /* not before its image is there */
+	if (o->ended && (o->busy || o->unpublished || o->unrecorded)) { /* not before its image is there */
 		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
 		if (*o->record.why)
-			snprintf(v->waiting, sizeof v->waiting, "its image cannot be written: %.200s", o->record.why);
+			snprintf(v->waiting, sizeof v->waiting, "its %s cannot be written: %.200s", o->unrecorded ? "record" : "image", o->record.why);
 		v->record.reason[0] = 0;
 		v->record.exit_code = 0;
 	}

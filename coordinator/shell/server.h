@@ -120,8 +120,8 @@ void server_job_broken(struct server *s, uint64_t job, const char *text);
 struct order *server_order(const struct server *s, uint64_t job);
 /* Where the films of a job of this plan go: NULL: into memory, which is never kept waiting by the disk. */
 const char *server_film_folder(const struct server *s, const struct plan *p);
-/* The order's canvas is free again: what waited goes on. */
-void server_order_free_again(struct server *s, struct order *o);
+/* Some order is not busy any more: what waited for its canvas goes on. Orders that have ended are gone then. */
+void server_order_free_again(struct server *s);
 /* A result from a worker: now, or when the canvas is free. May take either. */
 void server_result(struct server *s, uint64_t peer, struct envelope *env, struct buf *payload);
 
