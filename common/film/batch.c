@@ -5,6 +5,12 @@
 #include <math.h>
 #include <string.h>
 
+bool lease_key_equal(const struct lease_key *a, const struct lease_key *b)
+{
+	return a->job == b->job && a->kind == b->kind && a->group == b->group && a->part == b->part &&
+	       a->epoch == b->epoch;
+}
+
 void batch_fini(struct batch *b)
 {
 	for (uint32_t i = 0; b->tiles && i < b->tile_count; i++)

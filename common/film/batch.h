@@ -15,6 +15,7 @@ struct lease_key {
 	uint32_t group, part;
 	uint64_t epoch;
 };
+bool lease_key_equal(const struct lease_key *a, const struct lease_key *b);
 
 enum { TILE_SIZE = 64, TILE_CHANNELS = 3 }; /* X Y Z */
 

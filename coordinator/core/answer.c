@@ -236,6 +236,18 @@ void answer_failed(struct farm *f, const struct event *ev)
 		rounds_end(f, j, END_FAILED, f->text);
 }
 
+enum farm_delivery farm_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k)
+{
+	const struct event ev = {.peer = peer, .lease = {.key = *k}};
+	const struct peer *p = farm_find_peer(f, peer);
+	const struct job *j = farm_find_job(f, k->job);
+	const struct lease *l = held(f, &ev);
+	if (l && !l->delivered)
+		return DELIVERY_AWAITED;
+	bool open = p && !p->who->aside && j && job_is_live(j) && j->ending == END_NONE && job_takes(j, p);
+	return open && is_next(j, slot_of(j, k), k) ? DELIVERY_OPEN : DELIVERY_USELESS;
+}
+
 void answer_delivered(struct farm *f, const struct event *ev)
 {
 	struct lease *l = held(f, ev);

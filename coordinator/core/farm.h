@@ -128,6 +128,11 @@ uint64_t farm_next_job(const struct farm *f, uint64_t after);
 uint64_t farm_next_peer(const struct farm *f, uint64_t after);
 /* A result of this lease must come with its digest. */
 bool farm_verifies(const struct farm *f, const struct lease_key *k);
+/* Is a result of this lease that cannot be looked at yet worth keeping? Awaited: the worker holds the lease and has not delivered one
+ * (EVENT_DELIVERED). Open: it might be merged, and the worker may have held the lease before it called again. Useless: EVENT_BATCH
+ * says why, whatever is in it. */
+enum farm_delivery { DELIVERY_AWAITED, DELIVERY_OPEN, DELIVERY_USELESS };
+enum farm_delivery farm_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k);
 /* What is known of a worker, here or not. */
 struct worker_status {
 	uint64_t who, restarts;

@@ -89,9 +89,11 @@ static void let_go(struct farm *f, struct lease *l)
 void lease_deliver(struct farm *f, struct lease *l)
 {
 	struct peer *p = l->peer;
-	if (l->overdue || l->delivered)
+	if (l->delivered)
 		return;
 	l->delivered = true;
+	if (l->overdue)
+		return;
 	p->held--;
 	p->delivered++;
 	if (list_is_empty(&p->waiting))

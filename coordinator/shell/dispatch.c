@@ -180,6 +180,7 @@ static void revoke_lease(struct server *s, const struct action *a)
 static void close_peer(struct server *s, const struct action *a)
 {
 	struct session *p = session_find(s, a->peer);
+	orders_drop_waiting(s->orders, a->peer); /* it may come back, with the same */
 	if (!p)
 		return;
 	p->joined = false;

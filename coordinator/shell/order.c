@@ -214,17 +214,53 @@ void order_count_worker(struct order *o, uint64_t peer)
 
 /* ---- results that wait ---- */
 
-bool order_put_off(struct order *o, uint64_t peer, struct envelope *env, struct buf *payload)
+static size_t waiting_size(const struct waiting_batch *w)
+{
+	return sizeof *w + w->envelope.used + w->payload.capacity;
+}
+
+bool order_put_off(struct order *o, uint64_t peer, const struct lease_key *k, struct envelope *env, struct buf *payload)
 {
 	struct waiting_batch *w = mem_alloc(1, sizeof *w);
 	if (!w)
 		return false;
-	*w = (struct waiting_batch){NULL, peer, *env, *payload};
+	*w = (struct waiting_batch){NULL, peer, *k, *env, *payload};
 	memset(env, 0, sizeof *env);
 	memset(payload, 0, sizeof *payload);
 	*o->waiting_last = w;
 	o->waiting_last = &w->next;
+	o->waiting_bytes += waiting_size(w);
 	return true;
+}
+
+const struct waiting_batch *order_waits_for(const struct order *o, const struct lease_key *k)
+{
+	const struct waiting_batch *w = o->waiting;
+	while (w && !lease_key_equal(&w->key, k))
+		w = w->next;
+	return w;
+}
+
+static void drop_waiting(struct order *o, uint64_t peer)
+{
+	struct waiting_batch **at = &o->waiting;
+	while (*at) {
+		struct waiting_batch *w = *at;
+		if (w->peer != peer) {
+			at = &w->next;
+			continue;
+		}
+		*at = w->next;
+		o->waiting_bytes -= waiting_size(w);
+		waiting_batch_free(w);
+	}
+	o->waiting_last = at;
+}
+
+void orders_drop_waiting(struct order *first, uint64_t peer)
+{
+	for (struct order *o = first; o; o = o->next)
+		drop_waiting(o, peer);
 }
 
 struct waiting_batch *order_take_waiting(struct order *o)
@@ -235,6 +271,7 @@ struct waiting_batch *order_take_waiting(struct order *o)
 	o->waiting = w->next;
 	if (!o->waiting)
 		o->waiting_last = &o->waiting;
+	o->waiting_bytes -= waiting_size(w);
 	return w;
 }
 

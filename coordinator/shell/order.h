@@ -18,6 +18,7 @@
 struct waiting_batch {
 	struct waiting_batch *next;
 	uint64_t peer;
+	struct lease_key key;
 	struct envelope envelope;
 	struct buf payload;
 };
@@ -76,6 +77,7 @@ struct order {
 	size_t credit_count;
 	char doubts[512]; /* about those of workers that are set aside by now; "": none */
 	struct waiting_batch *waiting, **waiting_last;
+	size_t waiting_bytes;
 };
 
 /* Takes the submission, writes a record if it is new. The job's folder is there; owner as in the record; submitted: s since 1970, of a job of an
@@ -100,8 +102,11 @@ int order_pack_lease(const struct order *o, const struct lease_key *k, unsigned 
 void order_count_worker(struct order *o, uint64_t peer);
 
 /* Takes both. false: memory is out. */
-bool order_put_off(struct order *o, uint64_t peer, struct envelope *env, struct buf *payload);
+bool order_put_off(struct order *o, uint64_t peer, const struct lease_key *k, struct envelope *env, struct buf *payload);
+const struct waiting_batch *order_waits_for(const struct order *o, const struct lease_key *k); /* NULL: no result of that lease */
 struct waiting_batch *order_take_waiting(struct order *o); /* NULL: none */
+/* The results of a worker that has gone, of these orders. */
+void orders_drop_waiting(struct order *first, uint64_t peer);
 void waiting_batch_free(struct waiting_batch *w);
 
 /* Lets go of the bundle's blobs. */

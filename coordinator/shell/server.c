@@ -6,7 +6,6 @@
 #include "common/net/notify.h"
 #include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/clear.h"
-#include "coordinator/shell/digest.h"
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/keep.h"
@@ -25,8 +24,8 @@
 
 enum { BACKLOG = 4096, TICK_MS = 200 };
 
-/* A quarter of what this process may have. */
-static uint64_t film_memory(void)
+/* Of what this process may have. */
+static uint64_t quarter_of_memory(void)
 {
 	uint64_t all = uv_get_total_memory(), ours = uv_get_constrained_memory();
 	return (ours && ours < all ? ours : all) / 4;
@@ -35,7 +34,7 @@ static uint64_t film_memory(void)
 void server_config_init(struct server_config *c)
 {
 	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .retry_seconds = 2, .clear_seconds = 30 * 86400.0, .max_faults = 3,
-				    .journal_bytes = 64 << 20, .keep_bytes = 2000000000, .film_bytes = film_memory(), .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
+				    .journal_bytes = 64 << 20, .keep_bytes = 2000000000, .film_bytes = quarter_of_memory(), .waiting_bytes = quarter_of_memory(), .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
 }
 
 double server_now(const struct server *s)
@@ -131,60 +130,6 @@ struct order *server_order(const struct server *s, uint64_t job)
 		if (o->id == job)
 			return o;
 	return NULL;
-}
-
-static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
-{
-	struct event ev = {.kind = EVENT_BATCH, .peer = peer, .lease = {.valid = true}};
-	struct error e = {""};
-	struct batch batch = {0};
-	if (lease_key_from_wire(m->key, &ev.lease.key, &e)) {
-		struct session *p = session_find(s, peer);
-		if (p)
-			session_fault(p, "%s", e.text);
-		return;
-	}
-	ev.job = ev.lease.key.job;
-	struct order *o = server_order(s, ev.job);
-	int rc = o ? batch_unpack(&batch, &o->plan, m, payload->bytes, payload->size, &e) : 0;
-	if (o && !rc && farm_verifies(s->farm, &ev.lease.key))
-		rc = digest_batch(&batch, &ev.lease.digest, &e);
-	ev.lease.valid = rc == 0;
-	ev.text = e.text;
-	s->batch = &batch;
-	s->result = m;
-	s->payload = payload;
-	if (rc == -ENOMEM || (o && ev.lease.valid && durable_reserve(s, o, &e))) { /* no room for it, here or on the disk */
-		struct session *p = session_find(s, peer);
-		if (p) /* it can be made again */
-			session_send_ack(p, &ev.lease.key, ACK_REFUSED, e.text);
-		ev.kind = EVENT_LEASE_RETURNED;
-	}
-	server_step(s, &ev);
-	batch_fini(&batch);
-	mem_free(s->frame);
-	s->frame = NULL;
-}
-
-void server_result(struct server *s, uint64_t peer, struct envelope *env, struct buf *payload)
-{
-	const Farm__LeaseResult *m = env->message->lease_result;
-	struct order *o = m->key ? server_order(s, m->key->job) : NULL;
-	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer};
-	struct error e;
-	if (!o || !o->busy) {
-		take_result(s, peer, m, payload);
-		return;
-	}
-	bool named = lease_key_from_wire(m->key, &ev.lease.key, &e) == 0;
-	if (!order_put_off(o, peer, env, payload)) {
-		struct session *p = session_find(s, peer);
-		if (p)
-			session_fault(p, "no memory for a result");
-	} else if (named) {
-		ev.job = ev.lease.key.job;
-		server_step(s, &ev);
-	}
 }
 
 /* One at a time, so that nobody else waits for all of them. */

@@ -35,6 +35,7 @@ struct server_config {
 	unsigned max_faults;  /* of a worker, before it is set aside */
 	const char *forgive;  /* the name of a worker that was set aside and may come back; NULL: none */
 	uint64_t film_bytes; /* of running jobs' films in memory; those of further jobs are mapped files of the spool */
+	uint64_t waiting_bytes; /* of results that wait for films that are being read */
 	double worker_bandwidth; /* bytes of tiles a second that one thread may send on average, for new jobs' epochs; 0: any */
 	double hello_seconds, stall_seconds; /* how long a peer may take to say hello, to finish a frame */
 };

@@ -370,6 +370,7 @@ static void on_closed(void *user, const char *why)
 		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED
 						: LOG_PEER_ACCEPT, "peer=%llu address=%s name=%s text=%s",
 		  (unsigned long long)p->id, p->address, log_quote(p->name).text, log_quote(why).text);
+	orders_drop_waiting(s->orders, p->id);
 	if (p->joined && !s->stopping) {
 		struct event ev = {.kind = EVENT_LEFT, .peer = p->id, .text = why};
 		server_step(s, &ev);

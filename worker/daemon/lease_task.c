@@ -5,12 +5,6 @@
 #include <string.h>
 #include <unistd.h>
 
-bool lease_key_equal(const struct lease_key *a, const struct lease_key *b)
-{
-	return a->job == b->job && a->kind == b->kind && a->group == b->group && a->part == b->part &&
-	       a->epoch == b->epoch;
-}
-
 int lease_task_new(struct lease_task **out, struct grant *g, struct bundle *b, struct error *e)
 {
 	struct lease_task *l = mem_alloc(1, sizeof *l);

@@ -40,6 +40,5 @@ struct lease_task {
 int lease_task_new(struct lease_task **l, struct grant *g, struct bundle *b, struct error *e); /* takes the grant */
 void lease_task_free(struct lease_task *l); /* not while a thread has it */
 void lease_task_start(struct lease_task *l, struct crew *c);
-bool lease_key_equal(const struct lease_key *a, const struct lease_key *b);
 
 #endif

@@ -27,6 +27,58 @@ static char folder[64];
 static pid_t server;
 static uint16_t port;
 
+/* While the folder has a file `busy` nobody may look at the films of jobs. */
+static void on_look(uv_timer_t *t)
+{
+	static bool held;
+	struct server *s = t->data;
+	char path[96];
+	snprintf(path, sizeof path, "%s/busy", folder);
+	bool wanted = access(path, F_OK) == 0;
+	if (held == wanted)
+		return;
+	held = wanted;
+	snprintf(path, sizeof path, "%s/held", folder);
+	for (struct order *o = s->orders; o; o = o->next) {
+		if (wanted)
+			o->busy = true;
+		else
+			server_order_free_again(s, o);
+	}
+	if (wanted && fclose(fopen(path, "w")))
+		abort();
+	if (!wanted && remove(path))
+		abort();
+}
+
+static int serve(const struct server_config *c)
+{
+	struct server *s;
+	struct error e;
+	uv_timer_t look;
+	if (server_open(&s, c, &e))
+		return 1;
+	look.data = s;
+	uv_timer_init(&s->loop, &look);
+	uv_timer_start(&look, on_look, 5, 5);
+	uv_unref((uv_handle_t *)&look);
+	uv_run(&s->loop, UV_RUN_DEFAULT);
+	uv_close((uv_handle_t *)&look, NULL);
+	server_close(s);
+	return 0;
+}
+
+static void set_busy(bool busy)
+{
+	char path[96], held[96];
+	snprintf(path, sizeof path, "%s/busy", folder);
+	snprintf(held, sizeof held, "%s/held", folder);
+	assert_int_equal(busy ? fclose(fopen(path, "w")) : remove(path), 0);
+	for (int i = 0; i < 500 && (access(held, F_OK) == 0) != busy; i++)
+		usleep(10000);
+	assert_true((access(held, F_OK) == 0) == busy);
+}
+
 static int start_server(double heartbeat_seconds, double stall_seconds)
 {
 	char spool[96], port_file[96];
@@ -39,7 +91,6 @@ static int start_server(double heartbeat_seconds, double stall_seconds)
 	server = fork();
 	if (server == 0) {
 		struct server_config c;
-		struct error e;
 		server_config_init(&c);
 		c.listen = "127.0.0.1:0";
 		c.spool = spool;
@@ -49,7 +100,7 @@ static int start_server(double heartbeat_seconds, double stall_seconds)
 		c.heartbeat_seconds = heartbeat_seconds;
 		c.stall_seconds = stall_seconds;
 		log_set_level(LOG_LEVEL_ERROR);
-		_exit(server_run(&c, &e) ? 1 : 0);
+		_exit(serve(&c));
 	}
 	unsigned number = 0;
 	for (int i = 0; i < 500 && !number; i++) {
@@ -196,6 +247,18 @@ static void say_empty(struct peer *p, Farm__Envelope__BodyCase what)
 		m.job_list = &list;
 	else
 		m.lease_request = &request;
+	say(p, &m, NULL, 0);
+}
+
+static void say_job_get(const struct peer *p, uint64_t job)
+{
+	Farm__Envelope m;
+	Farm__JobGet get;
+	farm__envelope__init(&m);
+	farm__job_get__init(&get);
+	get.job = job;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_GET;
+	m.job_get = &get;
 	say(p, &m, NULL, 0);
 }
 
@@ -606,6 +669,71 @@ static void strategies_are_counted_once(void **state)
 	hang_up(worker);
 }
 
+/* ---- results that wait ---- */
+
+static void send_bootstrap(struct peer *p, const struct lease_key *k)
+{
+	struct plan plan;
+	struct error e;
+	struct plan_request r = request(NULL);
+	assert_int_equal(plan_make(&r, &plan, &e), 0);
+	struct batch b = black_batch(k, &plan);
+	send_batch(p, &b, &plan);
+	batch_fini(&b);
+}
+
+/* While nobody may look at the film only what would be merged waits, each once; all else is answered at once. */
+static void what_is_useless_does_not_wait(void **state)
+{
+	(void)state;
+	struct peer *client = call(), *worker = call(), *other = call();
+	struct desk d = {.count = 0}, none = {.count = 0};
+	assert_true(hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	uint64_t job = submit_answer(client)->job;
+	assert_true(job > 0);
+	assert_true(hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	while (d.count < 2)
+		attend(worker, &d);
+	send_bootstrap(worker, &d.keys[0]);
+	assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+	while (d.count < 3)
+		attend(worker, &d);
+	assert_true(hello(other, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	say_job_get(other, job);
+	assert_int_equal(hear(other)->body_case, FARM__ENVELOPE__BODY_JOB_INFO);
+	set_busy(true);
+	for (int i = 0; i < 3; i++)
+		send_bootstrap(worker, &d.keys[1]);
+	send_bootstrap(worker, &d.keys[0]);
+	assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+	send_bootstrap(other, &d.keys[0]);
+	assert_int_equal(verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
+	send_bootstrap(other, &d.keys[1]); /* it waits already */
+	assert_int_equal(verdict(other, &none), FARM__VERDICT__VERDICT_REFUSED);
+	send_bootstrap(other, &d.keys[2]); /* open: perhaps it held it before it called again */
+	send_bootstrap(other, &d.keys[2]);
+	send_bootstrap(other, &d.keys[0]);
+	assert_int_equal(verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
+	set_busy(false);
+	assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+	assert_int_equal(verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
+	send_bootstrap(worker, &d.keys[0]); /* nothing else was kept */
+	assert_int_equal(verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+	/* Who goes takes along what waits for it. */
+	assert_true(d.count >= 4);
+	set_busy(true);
+	send_bootstrap(worker, &d.keys[3]);
+	hang_up(worker);
+	usleep(50000);
+	send_bootstrap(other, &d.keys[3]);
+	set_busy(false);
+	assert_int_equal(verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
+	hang_up(client);
+	hang_up(other);
+}
+
 /* ---- slow links ---- */
 
 /* A worker with a lease of a new job, and its result. The keys of what came stay in the desk. */
@@ -739,6 +867,7 @@ int main(void)
 		cmocka_unit_test(crowds_are_turned_away), cmocka_unit_test(the_silent_give_way),  cmocka_unit_test(hello_is_looked_at),
 		cmocka_unit_test(submissions_are_looked_at), cmocka_unit_test(a_black_job_ends),
 		cmocka_unit_test(strategies_are_counted_once), cmocka_unit_test(extensions_wait_for_films),
+		cmocka_unit_test(what_is_useless_does_not_wait),
 	};
 	const struct CMUnitTest slow[] = {cmocka_unit_test(a_slow_result_counts), cmocka_unit_test(half_a_result_is_no_word)};
 	int failed = cmocka_run_group_tests(tests, set_up, tear_down);

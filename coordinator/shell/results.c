@@ -1,0 +1,84 @@
+/* Results of leases on their way to the core: now, or when nobody reads their film any more. */
+#include "coordinator/shell/digest.h"
+#include "coordinator/shell/durable.h"
+#include "coordinator/shell/session.h"
+
+#include "common/base/mem.h"
+
+/* It can be made again. */
+static void refuse(struct server *s, uint64_t peer, const struct lease_key *k, const char *why)
+{
+	struct session *p = session_find(s, peer);
+	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = peer, .job = k->job, .lease = {.key = *k}};
+	if (p)
+		session_send_ack(p, k, ACK_REFUSED, why);
+	server_step(s, &ev);
+}
+
+static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
+{
+	struct event ev = {.kind = EVENT_BATCH, .peer = peer, .lease = {.valid = true}};
+	struct error e = {""};
+	struct batch batch = {0};
+	if (lease_key_from_wire(m->key, &ev.lease.key, &e)) {
+		struct session *p = session_find(s, peer);
+		if (p)
+			session_fault(p, "%s", e.text);
+		return;
+	}
+	ev.job = ev.lease.key.job;
+	struct order *o = server_order(s, ev.job);
+	int rc = o ? batch_unpack(&batch, &o->plan, m, payload->bytes, payload->size, &e) : 0;
+	if (o && !rc && farm_verifies(s->farm, &ev.lease.key))
+		rc = digest_batch(&batch, &ev.lease.digest, &e);
+	ev.lease.valid = rc == 0;
+	ev.text = e.text;
+	s->batch = &batch;
+	s->result = m;
+	s->payload = payload;
+	if (rc == -ENOMEM || (o && ev.lease.valid && durable_reserve(s, o, &e))) /* no room for it, here or on the disk */
+		refuse(s, peer, &ev.lease.key, e.text);
+	else
+		server_step(s, &ev);
+	batch_fini(&batch);
+	mem_free(s->frame);
+	s->frame = NULL;
+}
+
+static bool has_room(const struct server *s, const struct buf *payload)
+{
+	uint64_t bytes = payload->capacity;
+	for (const struct order *o = s->orders; o; o = o->next)
+		bytes += o->waiting_bytes;
+	return bytes <= s->config.waiting_bytes;
+}
+
+/* Nobody may look at the film now. What the core would merge waits, one result of each lease that its worker holds, and one of
+ * those that nobody's waits for. */
+static void put_off(struct server *s, struct order *o, uint64_t peer, const struct lease_key *k, struct envelope *env, struct buf *payload)
+{
+	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
+	enum farm_delivery awaited = farm_awaits(s->farm, peer, k);
+	const struct waiting_batch *w = awaited == DELIVERY_OPEN ? order_waits_for(o, k) : NULL;
+	if (w && w->peer == peer) /* the answer to that one is the answer to this one */
+		return;
+	if (awaited == DELIVERY_USELESS)
+		ev.kind = EVENT_BATCH;
+	else if (w || !has_room(s, payload) || !order_put_off(o, peer, k, env, payload)) {
+		refuse(s, peer, k, w ? "another worker's result of this lease waits" : "no room for results that wait");
+		return;
+	}
+	server_step(s, &ev);
+}
+
+void server_result(struct server *s, uint64_t peer, struct envelope *env, struct buf *payload)
+{
+	const Farm__LeaseResult *m = env->message->lease_result;
+	struct order *o = m->key ? server_order(s, m->key->job) : NULL;
+	struct lease_key k;
+	struct error e;
+	if (o && o->busy && lease_key_from_wire(m->key, &k, &e) == 0)
+		put_off(s, o, peer, &k, env, payload);
+	else
+		take_result(s, peer, m, payload);
+}
