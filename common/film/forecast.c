@@ -22,10 +22,13 @@ static const double log_four = 1.3862943611198906;
 
 /* ---- looks */
 
+#define WORK_MOST 0x1p63 /* plans count it in 64 bits */
+
 void forecast_add_look(struct forecast_history *h, const struct forecast_look *l)
 {
 	bool sound = isfinite(l->rel_mse) && l->rel_mse > 0 && isfinite(l->rel_mse_upper) && l->rel_mse_upper >= l->rel_mse;
-	if (!sound || !(l->work > (h->count ? h->looks[h->count - 1].work : 0)))
+	bool counted = l->work < WORK_MOST && isfinite(l->cpu_seconds) && isfinite(l->seconds) && isfinite(l->degrees);
+	if (!sound || !counted || !(l->work > (h->count ? h->looks[h->count - 1].work : 0)))
 		return;
 	if (h->count == FORECAST_LOOKS)
 		memmove(h->looks, h->looks + 1, --h->count * sizeof *h->looks);

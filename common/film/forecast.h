@@ -44,7 +44,7 @@ enum forecast_run {
 	FORECAST_NEW,  /* a pilot's: the render starts anew, with other random numbers */
 };
 
-/* A look that is none (no finite error above 0), or of no more work than the last, is passed over. */
+/* A look that is none (no finite error above 0, numbers that no render has), or of no more work than the last, is passed over. */
 void forecast_add_look(struct forecast_history *h, const struct forecast_look *l);
 /* What an image says after these seconds. */
 void forecast_add(struct forecast_history *h, const struct plan *p, const struct canvas_image *img, double cpu_seconds,

@@ -269,7 +269,9 @@ static void take_head(struct order *o, const struct head *h)
 	o->look_written = h->look_written;
 	o->times = h->times;
 	o->lit = h->lit;
-	o->record.looks = h->looks;
+	o->record.looks.count = 0;
+	for (uint32_t i = 0; i < h->looks.count && i < FORECAST_LOOKS; i++)
+		forecast_add_look(&o->record.looks, &h->looks.looks[i]);
 	o->counts = h->counts;
 	snprintf(o->fingerprint, sizeof o->fingerprint, "%s", h->fingerprint);
 }

@@ -200,7 +200,8 @@ static void what_is_no_look_is_passed_over(void **state)
 	struct plan p = plan_of(64);
 	assert_false(forecast_error(&h, &r) || forecast_target(&h, &p, 0.1, FORECAST_NEW, &c) || forecast_halving(&h, &p, &c));
 	const struct forecast_look none[] = {{1, 1, 1, NAN, NAN, 15}, {1, 1, 1, 0, 0, 15}, {1, 1, 1, INFINITY, INFINITY, 15},
-					     {1, 1, 1, 2, 1, 15}, {0, 1, 1, 1, 2, 15}};
+					     {1, 1, 1, 2, 1, 15}, {0, 1, 1, 1, 2, 15}, {9.9e228, 1, 1, 1, 2, 15}, {NAN, 1, 1, 1, 2, 15},
+					     {1, INFINITY, 1, 1, 2, 15}, {1, 1, NAN, 1, 2, 15}, {1, 1, 1, 1, 2, NAN}};
 	for (size_t i = 0; i < sizeof none / sizeof *none; i++)
 		forecast_add_look(&h, &none[i]);
 	assert_int_equal(h.count, 0);
