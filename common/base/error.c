@@ -1,5 +1,7 @@
 #include "common/base/error.h"
 
+#include "common/base/text.h"
+
 #include <stdarg.h>
 #include <stdio.h>
 #include <string.h>
@@ -11,6 +13,7 @@ int error_set(struct error *e, int errno_value, const char *format, ...)
 		va_start(ap, format);
 		vsnprintf(e->text, sizeof e->text, format, ap);
 		va_end(ap);
+		text_clean(e->text);
 	}
 	return -errno_value;
 }
@@ -26,6 +29,7 @@ int error_prefix(struct error *e, int code, const char *format, ...)
 		va_end(ap);
 		if (n >= 0 && (size_t)n < sizeof e->text)
 			snprintf(e->text + n, sizeof e->text - (size_t)n, ": %s", tail);
+		text_clean(e->text);
 	}
 	return code;
 }

@@ -1,5 +1,7 @@
 #include "common/base/log.h"
 
+#include "common/base/text.h"
+
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -34,10 +36,11 @@ struct log_value log_quote(const char *text)
 	for (; *text && n + 3 < sizeof v.text; text++) {
 		if (*text == '"' || *text == '\\')
 			v.text[n++] = '\\';
-		v.text[n++] = (unsigned char)*text < 32 || *text == 127 ? ' ' : *text;
+		v.text[n++] = *text;
 	}
 	v.text[n++] = '"';
 	v.text[n] = 0;
+	text_clean(v.text);
 	return v;
 }
 

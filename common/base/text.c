@@ -6,6 +6,63 @@
 #include <stdlib.h>
 #include <string.h>
 
+/* Length of the UTF-8 sequence at p (1..4), 0 when it is none: RFC 3629, no surrogates, shortest form. */
+static size_t utf8_length(const unsigned char *p)
+{
+	if (p[0] < 0x80)
+		return 1;
+	size_t n = p[0] >= 0xF0 ? 4 : p[0] >= 0xE0 ? 3 : 2;
+	if (p[0] < 0xC2 || p[0] > 0xF4)
+		return 0;
+	for (size_t i = 1; i < n; i++)
+		if ((p[i] & 0xC0) != 0x80)
+			return 0;
+	if ((p[0] == 0xE0 && p[1] < 0xA0) || (p[0] == 0xED && p[1] > 0x9F) || (p[0] == 0xF0 && p[1] < 0x90) ||
+	    (p[0] == 0xF4 && p[1] > 0x8F))
+		return 0;
+	return n;
+}
+
+static bool is_control(unsigned char c)
+{
+	return c < 32 || c == 127;
+}
+
+bool text_is_clean(const char *text)
+{
+	size_t n;
+	for (const unsigned char *p = (const unsigned char *)text; *p; p += n) {
+		n = utf8_length(p);
+		if (n == 0 || is_control(*p))
+			return false;
+	}
+	return true;
+}
+
+void text_clean(char *text)
+{
+	size_t n;
+	for (unsigned char *p = (unsigned char *)text; *p; p += n ? n : 1) {
+		n = utf8_length(p);
+		if (n == 0)
+			*p = '?';
+		else if (is_control(*p))
+			*p = ' ';
+	}
+}
+
+/* The length of a text of n bytes without the beginning of a sequence at its end. */
+static size_t whole(const char *text, size_t n)
+{
+	size_t start = n;
+	while (start && n - start < 4 && ((unsigned char)text[start - 1] & 0xC0) == 0x80)
+		start--;
+	if (start == 0 || (unsigned char)text[start - 1] < 0xC0)
+		return n;
+	start--;
+	return utf8_length((const unsigned char *)text + start) ? n : start;
+}
+
 void text_copy(char *out, size_t size, const char *from)
 {
 	size_t n = strlen(from);
@@ -18,17 +75,39 @@ void text_copy(char *out, size_t size, const char *from)
 	out[n] = 0;
 }
 
-void text_put(struct text *t, const char *format, ...)
+/* The length of what is there; cut: not all of it. */
+static size_t print(char *out, size_t size, bool *cut, const char *format, va_list ap)
 {
+	int n = vsnprintf(out, size, format, ap);
+	size_t used = n < 0 ? 0 : (size_t)n;
+	*cut = used >= size;
+	if (*cut && size) {
+		used = whole(out, size - 1);
+		out[used] = 0;
+	}
+	return used;
+}
+
+void text_print(char *out, size_t size, const char *format, ...)
+{
+	bool cut;
 	va_list ap;
 	va_start(ap, format);
-	int n = vsnprintf(t->at, t->left, format, ap);
+	print(out, size, &cut, format, ap);
 	va_end(ap);
-	size_t used = n < 0 ? 0 : (size_t)n;
-	if (t->left && used >= t->left)
-		used = t->left - 1;
+}
+
+void text_put(struct text *t, const char *format, ...)
+{
+	bool cut;
+	va_list ap;
+	if (t->left == 0)
+		return;
+	va_start(ap, format);
+	size_t used = print(t->at, t->left, &cut, format, ap);
+	va_end(ap);
 	t->at += used;
-	t->left -= used;
+	t->left = cut ? 1 : t->left - used;
 }
 
 bool text_ratio(const char *text, double *ratio)

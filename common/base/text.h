@@ -7,6 +7,13 @@
 
 /* Copies, cutting what does not fit, never in the middle of a UTF-8 sequence. */
 void text_copy(char *out, size_t size, const char *from);
+/* The same of something formatted. */
+__attribute__((format(printf, 3, 4))) void text_print(char *out, size_t size, const char *format, ...);
+
+/* UTF-8 without control characters: what may be shown, sent, and written as JSON. */
+bool text_is_clean(const char *text);
+/* Makes it that, in place: what is no UTF-8 becomes '?', a control character a blank. */
+void text_clean(char *text);
 
 /* The same text, for interfaces that have no const and change nothing: generated messages, argp's filters. */
 char *text_borrow(const char *text);
@@ -15,7 +22,7 @@ char *text_borrow(const char *text);
 bool text_ratio(const char *text, double *ratio);
 bool text_share(const char *text, double *share);
 
-/* Appends to a fixed array: what does not fit is cut, the rest stays terminated. Begin with {array, size}. */
+/* Appends to a fixed array: what does not fit is cut as above, and nothing comes after it. Begin with {array, size}. */
 struct text {
 	char *at;
 	size_t left;

@@ -1,6 +1,7 @@
 #include "common/wire/envelope.h"
 
 #include "common/base/mem.h"
+#include "common/base/text.h"
 #include "common/wire/frame.h"
 
 #include <stdalign.h>
@@ -139,32 +140,7 @@ int envelope_pack(const Farm__Envelope *message, const void *payload, size_t pay
 	return 0;
 }
 
-/* Length of the UTF-8 sequence at p (1..4), 0 when it is none: RFC 3629, no surrogates, shortest form. */
-static size_t utf8_length(const unsigned char *p)
-{
-	if (p[0] < 0x80)
-		return 1;
-	size_t n = p[0] >= 0xF0 ? 4 : p[0] >= 0xE0 ? 3 : 2;
-	if (p[0] < 0xC2 || p[0] > 0xF4)
-		return 0;
-	for (size_t i = 1; i < n; i++)
-		if ((p[i] & 0xC0) != 0x80)
-			return 0;
-	if ((p[0] == 0xE0 && p[1] < 0xA0) || (p[0] == 0xED && p[1] > 0x9F) || (p[0] == 0xF0 && p[1] < 0x90) ||
-	    (p[0] == 0xF4 && p[1] > 0x8F))
-		return 0;
-	return n;
-}
-
 bool envelope_text_ok(const char *text, size_t max)
 {
-	if (!text || strnlen(text, max + 1) > max)
-		return false;
-	for (const unsigned char *p = (const unsigned char *)text; *p;) {
-		size_t n = utf8_length(p);
-		if (n == 0 || (n == 1 && (*p < 32 || *p == 127)))
-			return false;
-		p += n;
-	}
-	return true;
+	return text && strnlen(text, max + 1) <= max && text_is_clean(text);
 }

@@ -1,8 +1,8 @@
 /* What workers send back: merged, repeated, refused, failed. */
+#include "common/base/text.h"
 #include "coordinator/core/state.h"
 
 #include <math.h>
-#include <stdio.h>
 
 enum { TRIES_FATAL = 3 };
 
@@ -70,7 +70,7 @@ static enum verdict judge(const struct peer *p, const struct job *j, const struc
 
 static void acknowledge(struct farm *f, const struct event *ev, enum ack ack, const char *text)
 {
-	snprintf(f->text, sizeof f->text, "%s", text);
+	text_copy(f->text, sizeof f->text, text);
 	struct action *a = update_add(f, ACTION_ACK);
 	a->peer = ev->peer;
 	a->key = ev->lease.key;
@@ -152,7 +152,7 @@ static void give_up_where_hopeless(struct farm *f, struct job *j, struct slot *s
 	if (j->proofs[s - j->slots].count < VERIFY_MOST)
 		return;
 	verify_names(j, s, names, sizeof names);
-	snprintf(text, sizeof text, "no two of %d workers agree on group %u part %u epoch %llu: %s", VERIFY_MOST, k->group, k->part,
+	text_print(text, sizeof text, "no two of %d workers agree on group %u part %u epoch %llu: %s", VERIFY_MOST, k->group, k->part,
 		 (unsigned long long)k->epoch, names);
 	rounds_end(f, j, END_FAILED, text);
 }
@@ -225,9 +225,9 @@ void answer_failed(struct farm *f, const struct event *ev)
 	lease_drop(f, l);
 	bool again = peer_avoids_until(p, j->id) > f->now; /* several at once: one reason */
 	peer_failed(f, p, j->id);
-	snprintf(p->text, sizeof p->text, "%s", ev->text ? ev->text : "");
-	snprintf(f->text, sizeof f->text, "%s: %.180s", p->name, p->text);
-	snprintf(j->text, sizeof j->text, "%s", f->text);
+	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
+	text_print(f->text, sizeof f->text, "%s: %s", p->name, p->text);
+	text_copy(j->text, sizeof j->text, f->text);
 	j->failures++;
 	j->tries += !again;
 	bool fatal = failers_add(&s->failers, f, p->who), in_all = failers_add(&j->failers, f, p->who);

@@ -45,11 +45,11 @@ struct batch_digest {
 	uint8_t bytes[32];
 };
 
-enum { JOIN_HOME = 40 /* bytes of a home's name, its end included */ };
+enum { JOIN_HOME = 40, JOIN_NAME = 128 /* bytes of a home's name and of a worker's, their ends included */ };
 
 struct event_join {
 	uint64_t peer; /* chosen by the shell, not 0, never used twice while the farm lives */
-	const char *name;
+	const char *name;        /* not empty */
 	const char *fingerprint; /* compared as a whole */
 	uint32_t threads;
 	const char *certificate; /* the name in it; NULL: none */

@@ -1,11 +1,11 @@
 #include "coordinator/core/job.h"
 
 #include "common/base/mem.h"
+#include "common/base/text.h"
 #include "coordinator/core/state.h"
 
 #include <assert.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 enum { TIMEOUT_MEDIANS = 10, TIMEOUT_DOUBLINGS = 16 };
@@ -30,7 +30,7 @@ static void begin(struct job *j, enum lease_kind kind, uint64_t limit, double no
 
 static void init(struct job *j, const struct event_submit *e, double now)
 {
-	snprintf(j->name, sizeof j->name, "%s", e->name);
+	text_copy(j->name, sizeof j->name, e->name);
 	j->priority = e->priority;
 	j->mixed = e->mixed;
 	j->verify = e->verify;
@@ -111,7 +111,7 @@ bool job_is_held(const struct job *j)
 void job_hold(struct job *j, enum job_hold which, const char *why, double now)
 {
 	bool was = job_is_held(j);
-	snprintf(j->held[which], sizeof j->held[which], "%s", why);
+	text_copy(j->held[which], sizeof j->held[which], why);
 	if (!was && job_is_held(j))
 		j->held_since = now;
 	if (!was || job_is_held(j))

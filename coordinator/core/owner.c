@@ -1,14 +1,14 @@
 #include "coordinator/core/owner.h"
 
 #include "common/base/mem.h"
+#include "common/base/text.h"
 
-#include <stdio.h>
 #include <string.h>
 
 struct owner *owner_use(struct link *owners, const char *name)
 {
 	char cut[OWNER_NAME];
-	snprintf(cut, sizeof cut, "%s", name);
+	text_copy(cut, sizeof cut, name);
 	for (struct link *k = owners->next; k != owners; k = k->next) {
 		struct owner *o = list_entry(k, struct owner, link);
 		if (strcmp(o->name, cut) == 0) {

@@ -1,10 +1,10 @@
 #include "coordinator/core/peer.h"
 
 #include "common/base/mem.h"
+#include "common/base/text.h"
 #include "coordinator/core/state.h"
 
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 enum { PAUSE_DOUBLINGS = 6 };
@@ -21,7 +21,7 @@ struct peer_class *peer_class_use(struct farm *f, const char *fingerprint)
 	struct peer_class *c = mem_alloc(1, sizeof *c);
 	if (!c)
 		return NULL;
-	snprintf(c->fingerprint, sizeof c->fingerprint, "%s", fingerprint);
+	text_copy(c->fingerprint, sizeof c->fingerprint, fingerprint);
 	c->uses = 1;
 	list_init(&c->waiting);
 	list_append(&f->classes, &c->link);
@@ -58,6 +58,10 @@ struct peer *peer_join(struct farm *f, const struct event_join *e, const char **
 		*refused = "the farm has as many workers as it takes";
 		return NULL;
 	}
+	if (!*e->name || strlen(e->name) >= PEER_NAME) {
+		*refused = "a worker must have a name, and a short one";
+		return NULL;
+	}
 	if (e->threads == 0 || strlen(e->fingerprint) >= FINGERPRINT_SIZE) {
 		*refused = e->threads ? "the fingerprint is too long" : "a worker without threads";
 		return NULL;
@@ -77,9 +81,9 @@ struct peer *peer_join(struct farm *f, const struct event_join *e, const char **
 	}
 	p->id = e->peer;
 	p->who = who;
-	snprintf(p->home, sizeof p->home, "%s", e->home);
+	text_copy(p->home, sizeof p->home, e->home);
 	p->restarts = e->restarts;
-	snprintf(p->name, sizeof p->name, "%s", e->name);
+	text_copy(p->name, sizeof p->name, e->name);
 	p->threads = e->threads;
 	p->joined = p->heard = f->now;
 	p->state = who->aside ? PEER_ASIDE : PEER_ACTIVE;
@@ -167,7 +171,7 @@ void peer_fault(struct farm *f, struct peer *p, const char *text)
 {
 	p->faults++;
 	p->who->faults_in_row++;
-	snprintf(p->text, sizeof p->text, "%s", text);
+	text_copy(p->text, sizeof p->text, text);
 	memcpy(p->who->text, p->text, sizeof p->text);
 	if (p->who->faults_in_row >= f->config.max_faults)
 		roster_set_aside(f, p->who);

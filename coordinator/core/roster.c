@@ -1,6 +1,7 @@
 #include "coordinator/core/roster.h"
 
 #include "common/base/mem.h"
+#include "common/base/text.h"
 #include "coordinator/core/state.h"
 
 #include <stdio.h>
@@ -16,7 +17,7 @@ static struct identity *find(const struct farm *f, const struct event_join *e)
 			continue;
 		if (*e->home && strcmp(k->home, e->home) == 0)
 			return k;
-		if (strncmp(k->name, e->name, sizeof k->name - 1) == 0)
+		if (strcmp(k->name, e->name) == 0)
 			named = k;
 	}
 	return named;
@@ -63,14 +64,14 @@ struct identity *roster_use(struct farm *f, const struct event_join *e, const ch
 		}
 		*k = (struct identity){ .id = ++f->identities };
 		k->certificate_id = certificate_id(f, e->certificate, k->id);
-		snprintf(k->certificate, sizeof k->certificate, "%s", e->certificate);
+		text_copy(k->certificate, sizeof k->certificate, e->certificate);
 	}
 	/* One that is set aside stays known by what it was. */
 	if (!k->aside || strcmp(k->home, e->home) == 0)
 		k->restarts = e->restarts;
 	if (!k->aside) {
-		snprintf(k->name, sizeof k->name, "%s", e->name);
-		snprintf(k->home, sizeof k->home, "%s", e->home);
+		text_copy(k->name, sizeof k->name, e->name);
+		text_copy(k->home, sizeof k->home, e->home);
 	}
 	k->seen = f->now;
 	k->uses++;
@@ -105,7 +106,7 @@ bool roster_replace(struct farm *f, const struct event_join *e, const char **ref
 		if (is_at(f->peers[i], e) && f->peers[i]->restarts > last)
 			last = f->peers[i]->restarts;
 	if (last > e->restarts) {
-		snprintf(f->text, sizeof f->text, "this is start %llu of %.60s, and start %llu of it has been here before",
+		text_print(f->text, sizeof f->text, "this is start %llu of %s, and start %llu of it has been here before",
 			 (unsigned long long)e->restarts, e->name, (unsigned long long)last);
 		*refused = f->text;
 		return false;
@@ -167,7 +168,7 @@ void roster_aside(struct farm *f, const struct event_join *e, const char *text)
 	struct identity *k = roster_use(f, e, &refused);
 	if (!k)
 		return;
-	snprintf(k->text, sizeof k->text, "%s", text);
+	text_copy(k->text, sizeof k->text, text);
 	k->aside = true;
 	roster_drop(f, k);
 }

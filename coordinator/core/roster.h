@@ -9,7 +9,7 @@
 
 #include "coordinator/core/farm.h"
 
-enum { IDENTITY_AVOIDED = 8, IDENTITY_CERTIFICATE = 72, IDENTITY_NAME = 64, IDENTITY_HOME = JOIN_HOME };
+enum { IDENTITY_AVOIDED = 8, IDENTITY_CERTIFICATE = 72, IDENTITY_NAME = JOIN_NAME, IDENTITY_HOME = JOIN_HOME };
 
 /* After a failed lease the worker stays away from that job for a while. */
 struct avoid {

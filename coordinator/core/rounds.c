@@ -2,11 +2,11 @@
 #include "coordinator/core/state.h"
 
 #include "common/base/mem.h"
+#include "common/base/text.h"
 #include "common/film/merge.h"
 
 #include <assert.h>
 #include <math.h>
-#include <stdio.h>
 #include <string.h>
 
 static struct action *about_job(struct farm *f, enum action_kind kind, const struct job *j)
@@ -117,7 +117,7 @@ void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *tex
 	j->state = end == END_CANCELLED ? JOB_CANCELLED : end == END_FAILED ? JOB_FAILED : JOB_DONE;
 	j->end = end;
 	j->ended = f->now;
-	snprintf(j->text, sizeof j->text, "%s", text);
+	text_copy(j->text, sizeof j->text, text);
 	verify_forget_job(f, j);
 	if (j->class)
 		peer_class_drop(j->class);

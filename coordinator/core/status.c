@@ -1,4 +1,5 @@
 /* Answers to questions about the farm. */
+#include "common/base/text.h"
 #include "coordinator/core/share.h"
 #include "coordinator/core/state.h"
 
@@ -74,9 +75,9 @@ static void why_waiting(const struct farm *f, const struct job *j, char *text, s
 	uint32_t active = active_workers(f);
 	const struct job *other = busy_with(f, j);
 	if (*j->held[HOLD_STORAGE] && *j->held[HOLD_ORDERED])
-		snprintf(text, size, "%.100s; %.140s", j->held[HOLD_ORDERED], j->held[HOLD_STORAGE]);
+		text_print(text, size, "%s; %s", j->held[HOLD_ORDERED], j->held[HOLD_STORAGE]);
 	else if (job_is_held(j))
-		snprintf(text, size, "%s", *j->held[HOLD_ORDERED] ? j->held[HOLD_ORDERED] : j->held[HOLD_STORAGE]);
+		text_copy(text, size, *j->held[HOLD_ORDERED] ? j->held[HOLD_ORDERED] : j->held[HOLD_STORAGE]);
 	else if (j->preparing)
 		snprintf(text, size, "the bootstrap is being evaluated");
 	else if (j->evaluating && (j->ending != END_NONE || !job_ready(j)))
@@ -90,9 +91,9 @@ static void why_waiting(const struct farm *f, const struct job *j, char *text, s
 	else if (verify_why(f, j, text, size))
 		return;
 	else if (answer_all_failed(f, j))
-		snprintf(text, size, "no worker can compute it: %.220s", j->text);
+		text_print(text, size, "no worker can compute it: %s", j->text);
 	else if (someone_avoids(f, j))
-		snprintf(text, size, "its workers failed and pause before they try again; the last one: %.180s", j->text);
+		text_print(text, size, "its workers failed and pause before they try again; the last one: %s", j->text);
 	else if (other && other->priority > j->priority)
 		snprintf(text, size, "waits for j%llu of higher priority (%d)", (unsigned long long)other->id, other->priority);
 	else if (other)

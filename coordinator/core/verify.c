@@ -1,5 +1,6 @@
 #include "coordinator/core/verify.h"
 
+#include "common/base/text.h"
 #include "coordinator/core/state.h"
 
 #include <stdio.h>
@@ -113,11 +114,12 @@ void verify_settle(struct farm *f, struct job *j, struct slot *s, const struct b
 void verify_names(const struct job *j, const struct slot *s, char *text, size_t size)
 {
 	const struct proof *p = proof_of(j, s);
-	size_t used = 0;
+	struct text t = {text, size};
 	text[0] = 0;
-	for (uint32_t i = 0; i < p->count && used < size; i++) {
-		int n = snprintf(text + used, size - used, "%s%.40s", i ? ", " : "", p->who[i]->name);
-		used += n > 0 ? (size_t)n : 0;
+	for (uint32_t i = 0; i < p->count; i++) {
+		char name[40];
+		text_copy(name, sizeof name, p->who[i]->name);
+		text_put(&t, "%s%s", i ? ", " : "", name);
 	}
 }
 
@@ -212,7 +214,7 @@ bool verify_why(const struct farm *f, const struct job *j, char *text, size_t si
 	if (proof_of(j, s)->count < 2)
 		snprintf(text, size, "verification waits for a second worker (%u leases have one answer)", j->noted);
 	else
-		snprintf(text, size, "verification waits for another worker: %s differ on group %u part %u epoch %llu", names, k.group,
+		text_print(text, size, "verification waits for another worker: %s differ on group %u part %u epoch %llu", names, k.group,
 			 k.part, (unsigned long long)k.epoch);
 	return true;
 }

@@ -3,11 +3,10 @@
 #include "common/base/text.h"
 #include "coordinator/shell/session.h"
 
-#include <stdio.h>
 
 const char *control_held_by(const char *who, char text[256])
 {
-	snprintf(text, 256, "held by %.200s", who);
+	text_print(text, 256, "held by %s", who);
 	return text;
 }
 
@@ -27,7 +26,7 @@ static int tell(struct session *p, struct event *ev)
 /* The core knows whether it can be, and is told first. */
 static void not_for_long(struct session *p, const struct error *e)
 {
-	snprintf(p->rejected, sizeof p->rejected, "so it is until the coordinator stops, but it cannot be stored: %.180s", e->text);
+	text_print(p->rejected, sizeof p->rejected, "so it is until the coordinator stops, but it cannot be stored: %s", e->text);
 }
 
 static void hold(struct session *p, uint64_t job, const char *who)

@@ -11,7 +11,6 @@
 #include "coordinator/shell/session.h"
 
 #include <assert.h>
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -163,7 +162,7 @@ static void hold(struct server *s, struct order *o, const char *text)
 void durable_hold(struct server *s, struct order *o, const char *what, const char *why)
 {
 	char text[256];
-	snprintf(text, sizeof text, "%s: %.200s", what, why);
+	text_print(text, sizeof text, "%s: %s", what, why);
 	hold(s, o, text);
 }
 

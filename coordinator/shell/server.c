@@ -173,7 +173,7 @@ static void view_order(struct server *s, const struct order *o, struct job_view 
 	if (o->ended && (o->busy || o->unpublished || o->unrecorded)) { /* not before its image is there */
 		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
 		if (*o->record.why)
-			snprintf(v->waiting, sizeof v->waiting, "its %s cannot be written: %.200s", o->unrecorded ? "record" : "image", o->record.why);
+			text_print(v->waiting, sizeof v->waiting, "its %s cannot be written: %s", o->unrecorded ? "record" : "image", o->record.why);
 		v->record.reason[0] = 0;
 		v->record.exit_code = 0;
 	}

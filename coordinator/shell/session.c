@@ -31,6 +31,7 @@ void session_fault(struct session *p, const char *format, ...)
 	va_start(ap, format);
 	vsnprintf(text, sizeof text, format, ap);
 	va_end(ap);
+	text_clean(text);
 	farm__fault__init(&fault);
 	farm__envelope__init(&m);
 	fault.text = text;
@@ -107,7 +108,7 @@ static const char *set_aside(const struct session *p, char *text, size_t size)
 	struct peer_status s;
 	*text = 0;
 	if (farm_peer(p->server->farm, p->id, &s) && s.state == PEER_ASIDE)
-		snprintf(text, size, "this worker is set aside and gets no work: %.180s", s.text);
+		text_print(text, size, "this worker is set aside and gets no work: %s", s.text);
 	return text;
 }
 
@@ -236,15 +237,19 @@ static void send_job_info(struct session *p, uint64_t job)
 static void take_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 {
 	struct error e;
-	struct event ev = {.kind = *f->text ? EVENT_LEASE_FAILED : EVENT_LEASE_RETURNED, .peer = p->id, .text = f->text};
-	if (lease_key_from_wire(f->key, &ev.lease.key, &e) || !envelope_text_ok(f->text, 2048)) {
+	char text[1024];
+	struct event ev = {.kind = *f->text ? EVENT_LEASE_FAILED : EVENT_LEASE_RETURNED, .peer = p->id, .text = text};
+	/* Whatever it says, it failed: many texts of a scene's author are in it. */
+	text_copy(text, sizeof text, f->text);
+	text_clean(text);
+	if (lease_key_from_wire(f->key, &ev.lease.key, &e)) {
 		session_fault(p, "a lease cannot fail like this");
 		return;
 	}
 	ev.job = ev.lease.key.job;
 	struct order *o = server_order(p->server, ev.job);
 	if (o && *f->text)
-		order_log(o, LOG_LEASE_FAILED, "worker=%s text=%s", log_quote(p->name).text, log_quote(f->text).text);
+		order_log(o, LOG_LEASE_FAILED, "worker=%s text=%s", log_quote(p->name).text, log_quote(text).text);
 	server_step(p->server, &ev);
 }
 

@@ -3,7 +3,6 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -99,16 +98,16 @@ void trust_merged(struct order *o, const struct action *a)
 	o->credits[o->credit_count++] = (struct order_credit){a->who, 1};
 }
 
-static const char *name_of(const struct server *s, uint64_t who, char name[64])
+static const char *name_of(const struct server *s, uint64_t who, char name[JOIN_NAME])
 {
 	struct worker_status w;
-	text_copy(name, 64, farm_worker(s->farm, who, &w) ? w.name : "?");
+	text_copy(name, JOIN_NAME, farm_worker(s->farm, who, &w) ? w.name : "?");
 	return name;
 }
 
 void trust_wrong(struct server *s, const struct action *a)
 {
-	char name[64];
+	char name[JOIN_NAME];
 	struct order *o = server_order(s, a->job);
 	if (o)
 		order_log(o, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text, log_quote(a->text).text);
@@ -117,16 +116,16 @@ void trust_wrong(struct server *s, const struct action *a)
 static void note(struct order *o, const char *name, uint64_t leases)
 {
 	char text[256];
-	snprintf(text, sizeof text, "worker %s gave wrong results; %llu of its leases were merged unverified", name,
+	text_print(text, sizeof text, "worker %s gave wrong results; %llu of its leases were merged unverified", name,
 		 (unsigned long long)leases);
 	order_log(o, LOG_JOB_NOTE, "text=%s", log_quote(text).text);
 	size_t used = strlen(o->doubts);
-	snprintf(o->doubts + used, sizeof o->doubts - used, "%s%s", used ? "; " : "", text);
+	text_print(o->doubts + used, sizeof o->doubts - used, "%s%s", used ? "; " : "", text);
 }
 
 void trust_aside(struct server *s, const struct action *a)
 {
-	char name[64];
+	char name[JOIN_NAME];
 	name_of(s, a->who, name);
 	log_event(LOG_WORKER_ASIDE, "name=%s why=%s", log_quote(name).text, log_quote(a->text).text);
 	write_aside(s);

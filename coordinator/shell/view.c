@@ -16,25 +16,12 @@ void view_of_record(struct job_view *v, const struct job_record *r)
 	v->share = -1;
 }
 
-/* A text that was cut in the middle of a character would make the whole object fail. */
-static const char *shown(const char *text, char out[256])
-{
-	if (envelope_text_ok(text, 4096))
-		return text;
-	text_copy(out, 256, text);
-	for (char *c = out; *c; c++)
-		if ((unsigned char)*c < 32 || (unsigned char)*c >= 127)
-			*c = '?';
-	return out;
-}
-
 void view_add_status(struct job_view *v, const struct job_status *s)
 {
 	struct job_record *r = &v->record;
-	char text[256];
 	text_copy(r->state, sizeof r->state, job_state_name(s->state));
 	text_copy(r->reason, sizeof r->reason, s->end == END_NONE ? "" : job_end_name(s->end));
-	text_copy(r->why, sizeof r->why, shown(s->text, text));
+	text_copy(r->why, sizeof r->why, s->text);
 	r->priority = s->priority;
 	r->progress = s->progress;
 	r->rounds = s->rounds;
@@ -62,7 +49,7 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	r->failures = s->failures;
 	r->duplicates = s->duplicates;
 	r->timeouts = s->timeouts;
-	text_copy(v->waiting, sizeof v->waiting, shown(s->waiting, text));
+	text_copy(v->waiting, sizeof v->waiting, s->waiting);
 }
 
 static const char *why_of(const struct job_view *v)
@@ -192,7 +179,6 @@ json_t *view_to_json(const struct job_view *v)
 
 json_t *view_peer_to_json(const struct peer_status *p, double now)
 {
-	char text[256];
 	static const char *const states[] = {"active", "silent", "aside"};
 	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:I s:I s:s}", /* */
 			 "id", (json_int_t)p->id, "name", p->name, "state", states[p->state], /* */
@@ -200,14 +186,13 @@ json_t *view_peer_to_json(const struct peer_status *p, double now)
 			 "leases", (int)p->leases, "connected", now - p->joined, "heard", now - p->heard, /* */
 			 "merged", (json_int_t)p->merged, "repeats", (json_int_t)p->repeats, /* */
 			 "refused", (json_int_t)p->refused, "failures", (json_int_t)p->failures, "faults", (json_int_t)p->faults, /* */
-			 "restarts", (json_int_t)p->restarts, "text", shown(p->text, text));
+			 "restarts", (json_int_t)p->restarts, "text", p->text);
 }
 
 json_t *view_aside_to_json(const struct worker_status *w)
 {
-	char text[256], name[256];
-	return json_pack("{s:s s:s s:s s:I s:I s:s}", "name", shown(w->name, name), "certificate", w->certificate, "home", w->home, /* */
-			 "restarts", (json_int_t)w->restarts, "wrong", (json_int_t)w->wrong, "why", shown(w->text, text));
+	return json_pack("{s:s s:s s:s s:I s:I s:s}", "name", w->name, "certificate", w->certificate, "home", w->home, /* */
+			 "restarts", (json_int_t)w->restarts, "wrong", (json_int_t)w->wrong, "why", w->text);
 }
 
 json_t *view_lease_to_json(const struct lease_status *l, const char *worker, double now)

@@ -6,7 +6,6 @@
 #include "common/film/forecast_json.h"
 #include "common/film/strategy_json.h"
 
-#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -35,7 +34,7 @@ void record_add_note(struct job_record *r, const char *text)
 {
 	size_t used = strlen(r->note);
 	if (*text)
-		snprintf(r->note + used, sizeof r->note - used, "%s%s", used ? "; " : "", text);
+		text_print(r->note + used, sizeof r->note - used, "%s%s", used ? "; " : "", text);
 }
 
 void record_begin_agreement(struct job_record *r)
@@ -122,15 +121,19 @@ static void take_looks(const json_t *o, struct job_record *r)
 	forecast_looks_from_json(json_object_get(o, "looks"), &r->looks);
 }
 
-char *record_to_json(const struct job_record *r)
+int record_to_json(const struct job_record *r, char **out, struct error *e)
 {
-	json_t *o = json_pack("{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:o s:s s:s s:o}", /* */
+	json_error_t fault;
+	json_t *o = json_pack_ex(&fault, 0, "{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:o s:s s:s s:o}", /* */
 			      "schema", 1, "id", (json_int_t)r->id, "name", r->name, "integrator", r->integrator, /* */
 			      "state", r->state, "reason", r->reason, "why", r->why, "output", r->output, /* */
 			      "priority", r->priority, "exitCode", (int)r->exit_code, "result", (int)r->has_result, /* */
 			      "submitted", r->submitted, "ended", r->ended, "progress", r->progress, /* */
 			      "relError", r->rel_error, "counts", record_counts(r), /* */
 			      "mixture", r->mixture, "note", r->note, "strategies", record_strategies(r));
+	if (!o)
+		return error_set(e, json_error_code(&fault) == json_error_invalid_utf8 ? EINVAL : ENOMEM,
+				 "the record of job j%llu cannot be written: %s", (unsigned long long)r->id, fault.text);
 	json_object_set_new(o, "owner", json_string(r->owner));
 	json_object_set_new(o, "cleared", json_real(r->cleared));
 	json_object_set_new(o, "extended", json_integer((json_int_t)r->extended));
@@ -139,13 +142,12 @@ char *record_to_json(const struct job_record *r)
 	json_object_set_new(o, "b", json_real(r->b));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	json_object_set_new(o, "effects", record_effects(r));
-	if (o)
-		put_looks(o, r);
-	char *text = o ? json_dumps(o, JSON_INDENT(2)) : NULL;
+	put_looks(o, r);
+	char *text = json_dumps(o, JSON_INDENT(2));
 	json_decref(o);
-	char *copy = text ? mem_strdup(text) : NULL;
+	*out = text ? mem_strdup(text) : NULL;
 	free(text);
-	return copy;
+	return *out ? 0 : error_set(e, ENOMEM, "no memory for the record of a job");
 }
 
 static void take_text(const json_t *o, const char *key, char *out, size_t size)

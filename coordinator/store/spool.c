@@ -287,10 +287,11 @@ int spool_check_version(const char got[8], const char known[8], const char *path
 
 int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e)
 {
-	char *text = record_to_json(r);
-	if (!text)
-		return error_set(e, ENOMEM, "no memory for the record of a job");
-	int rc = spool_write(s, r->id, "job.json", text, strlen(text), e);
+	char *text;
+	int rc = record_to_json(r, &text, e);
+	if (rc)
+		return rc;
+	rc = spool_write(s, r->id, "job.json", text, strlen(text), e);
 	mem_free(text);
 	return rc;
 }

@@ -3,6 +3,7 @@
 
 #include "common/base/log.h"
 #include "common/base/mem.h"
+#include "common/base/text.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -62,10 +63,8 @@ static void say_failed(struct agent *a, const struct lease_key *k, const char *t
 	lease_key_to_wire(k, &key);
 	farm__lease_failed__init(&failed);
 	farm__envelope__init(&m);
-	snprintf(copy, sizeof copy, "%s", text);
-	for (char *c = copy; *c; c++) /* the coordinator takes no other text */
-		if ((unsigned char)*c < 32 || *c == 127)
-			*c = ' ';
+	text_copy(copy, sizeof copy, text);
+	text_clean(copy);
 	failed.key = &key;
 	failed.text = copy;
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;

@@ -1,5 +1,6 @@
 /* Buffers keep their limit, texts are cut between characters, log values cannot forge a line, figures read well. */
 #include "common/base/buf.h"
+#include "common/base/error.h"
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "common/base/progress.h"
@@ -53,6 +54,33 @@ static void texts_are_cut_between_characters(void **state)
 	assert_string_equal(out, "1234\xe2\x82\xac");
 	text_copy(out, 1, "x");
 	assert_string_equal(out, "");
+	text_print(out, sizeof out, "%d%s", 1, "2345\xe2\x82\xac");
+	assert_string_equal(out, "12345");
+	text_print(out, sizeof out, "%d%s", 1, "234\xe2\x82\xac");
+	assert_string_equal(out, "1234\xe2\x82\xac");
+	struct text t = {out, sizeof out};
+	text_put(&t, "123%s", "\xc3\xa4\xc3\xa4\xc3\xa4");
+	assert_string_equal(out, "123\xc3\xa4\xc3\xa4");
+	t = (struct text){out, sizeof out};
+	text_put(&t, "1234%s", "\xc3\xa4\xc3\xa4");
+	text_put(&t, "x"); /* nothing comes after what was cut */
+	assert_string_equal(out, "1234\xc3\xa4");
+}
+
+static void texts_are_made_clean(void **state)
+{
+	(void)state;
+	char text[] = "a\xc3\xa4\xe2\x82\"\n\x7f\xed\xa0\x80\xf0\x9f\x98\x80\xff";
+	assert_false(text_is_clean(text));
+	text_clean(text);
+	assert_string_equal(text, "a\xc3\xa4??\"  ???\xf0\x9f\x98\x80?");
+	assert_true(text_is_clean(text));
+	/* a sentence is clean whatever it quotes */
+	struct error e;
+	error_set(&e, EINVAL, "<%.4s>: %s", "abc\xc3\xa4", "caf\xe9");
+	assert_string_equal(e.text, "<abc?>: caf?");
+	assert_int_equal(error_prefix(&e, -1, "%.2s", "x\xc3\xa4"), -1);
+	assert_string_equal(e.text, "x?: <abc?>: caf?");
 }
 
 static void values_cannot_forge_a_line(void **state)
@@ -105,6 +133,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(buffers_keep_their_limit),
 		cmocka_unit_test(texts_are_cut_between_characters),
+		cmocka_unit_test(texts_are_made_clean),
 		cmocka_unit_test(values_cannot_forge_a_line),
 		cmocka_unit_test(figures_read_well),
 	};

@@ -3,6 +3,7 @@
 
 #include <setjmp.h>
 #include <stdarg.h>
+#include <string.h>
 
 #include <cmocka.h>
 
@@ -368,6 +369,35 @@ static void bounded_wish(void **state)
 		NULL });
 }
 
+static bool joins(struct farm *f, uint64_t id, const char *name)
+{
+	struct event ev = { .kind = EVENT_JOINED, .join = { .peer = id, .name = name, .fingerprint = "A", .threads = 1 } };
+	struct update u;
+	farm_step(f, &ev, &u);
+	return u.count == 0;
+}
+
+/* A name is kept as it is, whatever letters end where; who has none or a longer one than hello allows is no worker. */
+static void long_names(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	struct peer_status p, q;
+	char name[JOIN_NAME + 1];
+	for (size_t i = 0; i + 1 < sizeof name; i += 2)
+		memcpy(name + i, "\xc3\xa4", 3);
+	assert_false(joins(f, 1, name));
+	assert_false(joins(f, 1, ""));
+	name[JOIN_NAME - 2] = 0;
+	assert_true(joins(f, 1, name));
+	name[JOIN_NAME - 4] = 0;
+	assert_true(joins(f, 2, name));
+	assert_true(farm_peer(f, 2, &p) && farm_peer(f, 1, &q));
+	assert_string_equal(p.name, name);
+	assert_true(p.who != q.who);
+	farm_free(f);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -389,6 +419,7 @@ int main(void)
 		cmocka_unit_test(made_up_names),
 		cmocka_unit_test(returned_lease),
 		cmocka_unit_test(bounded_wish),
+		cmocka_unit_test(long_names),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -860,6 +860,52 @@ static void extensions_wait_for_films(void **state)
 	hang_up(a);
 }
 
+static void say_failed(struct peer *p, const struct lease_key *k, const char *text)
+{
+	Farm__LeaseKey key;
+	Farm__LeaseFailed failed;
+	Farm__Envelope m;
+	char copy[64];
+	lease_key_to_wire(k, &key);
+	farm__lease_failed__init(&failed);
+	farm__envelope__init(&m);
+	strcpy(copy, text);
+	failed.key = &key;
+	failed.text = copy;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
+	m.lease_failed = &failed;
+	say(p, &m, NULL, 0);
+}
+
+/* A failure is the scene's, or the worker's; never the connection's, because of letters that a scene's author chose. */
+static void a_failure_counts_whatever_its_text(void **state)
+{
+	(void)state;
+	struct peer *client = call(), *worker = call();
+	assert_true(hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	assert_true(submit_answer(client)->job);
+	assert_true(hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	struct desk d = {.count = 0};
+	while (d.count == 0)
+		attend(worker, &d);
+	say_failed(worker, &d.keys[0], "half a letter \xc3\nof a file");
+	say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	usleep(100000);
+	say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = hear(client);
+	assert_non_null(m);
+	for (size_t i = 0; i < m->job_list_answer->n_jobs; i++)
+		if (m->job_list_answer->jobs[i]->job == d.keys[0].job)
+			assert_non_null(strstr(m->job_list_answer->jobs[i]->why, "scripted: half a letter ? of a file"));
+	struct pollfd ready = {worker->fd, POLLIN, 0};
+	while (poll(&ready, 1, 200) == 1) /* neither a fault nor the end */
+		assert_true(attend(worker, &d) == FARM__VERDICT__VERDICT_NONE && worker->env.message->body_case != FARM__ENVELOPE__BODY_FAULT);
+	hang_up(client);
+	hang_up(worker);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -867,7 +913,8 @@ int main(void)
 		cmocka_unit_test(crowds_are_turned_away), cmocka_unit_test(the_silent_give_way),  cmocka_unit_test(hello_is_looked_at),
 		cmocka_unit_test(submissions_are_looked_at), cmocka_unit_test(a_black_job_ends),
 		cmocka_unit_test(strategies_are_counted_once), cmocka_unit_test(what_is_useless_does_not_wait),
-		cmocka_unit_test(extensions_wait_for_films), /* the last: its job lives again */
+		cmocka_unit_test(extensions_wait_for_films), /* its job lives again */
+		cmocka_unit_test(a_failure_counts_whatever_its_text),
 	};
 	const struct CMUnitTest slow[] = {cmocka_unit_test(a_slow_result_counts), cmocka_unit_test(half_a_result_is_no_word)};
 	int failed = cmocka_run_group_tests(tests, set_up, tear_down);

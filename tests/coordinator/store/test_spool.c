@@ -111,6 +111,9 @@ static void records_come_back(void **state)
 	assert_memory_equal(&back.classes[7], &r.classes[7], sizeof *r.classes);
 	assert_true(back.classes[0].chains == 0.4 && isnan(back.classes[0].difference_t) && isnan(back.classes[0].chains_error));
 	assert_true(back.classes[1].chains == 0 && isnan(back.classes[1].difference_t));
+	strcpy(r.output, "caf\xe9"); /* no memory is missing */
+	assert_int_equal(spool_write_record(s, &r, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "the record of job j7 cannot be written: Invalid UTF-8"));
 	/* Of an earlier version, and of a hand that wrote too much. */
 	static const char old[] = "{\"schema\":1,\"id\":7,\"name\":\"a\"}", many[] = "{\"schema\":1,\"id\":7,\"mixture\":\"a,,b\",\"strategies\":7}";
 	assert_int_equal(spool_write(s, 7, "job.json", old, sizeof old - 1, &e), 0);

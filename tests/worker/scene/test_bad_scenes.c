@@ -37,6 +37,7 @@ static void refuses(const char *xml, const char *text)
 		fail_msg("%.200s\n  gave %d: %s\n  not: %s", xml, r, e.text, text);
 }
 
+#define SIXTY "xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx"
 #define S "<scene version='3.0.0'>"
 #define END "</scene>"
 #define BSDF(x) S "<bsdf type='roughconductor'>" x "</bsdf>" END
@@ -135,6 +136,8 @@ static void test_unknown_names(void **state)
 	refuses(BSDF("<boolean name='nonlinear' value='true'/>"), "would change the image and is not supported; supported: alpha");
 	refuses(BSDF("<string name='distribution' value='beckman'/>"), "did you mean `beckmann`? (supported: beckmann, ggx)");
 	refuses(BSDF("<flaot name='alpha' value='1'/>"), "did you mean `float`?");
+	/* what is quoted and cut stays UTF-8: 63 letters and half of one */
+	refuses(S "<bsdf type='" SIXTY "xxx\xc3\xa4'/>" END, "<bsdf type=\"" SIXTY "xxx?\">: there is no bsdf");
 }
 
 static void test_bad_values(void **state)
