@@ -39,12 +39,10 @@ static void on_look(uv_timer_t *t)
 		return;
 	held = wanted;
 	snprintf(path, sizeof path, "%s/held", folder);
-	for (struct order *o = s->orders; o; o = o->next) {
-		if (wanted)
-			o->busy = true;
-		else
-			server_order_free_again(s, o);
-	}
+	for (struct order *o = s->orders; o; o = o->next)
+		o->busy = wanted;
+	if (!wanted)
+		server_order_free_again(s);
 	if (wanted && fclose(fopen(path, "w")))
 		abort();
 	if (!wanted && remove(path))
