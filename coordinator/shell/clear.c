@@ -10,10 +10,19 @@
 #include <string.h>
 #include <time.h>
 
-enum { JOBS_MOST = 1 << 17 };
-static const double every_seconds = 3600, soon_seconds = 2, fetching_seconds = 60;
+static const double every_seconds = 3600, soon_seconds = 2, fetching_seconds = 60, tick_seconds = 0.005;
 static const char *const results[] = {"result.exr", "preview.exr", "log"};
 enum { RESULTS = sizeof results / sizeof *results };
+
+/* First all are looked at, then it is chosen among them, then what is chosen goes. */
+struct clearing {
+	uint64_t *ids;
+	size_t id_count, looked;
+	struct age_job *jobs; /* those that have ended */
+	size_t job_count, cleared, records;
+	double now; /* s since 1970, when it was chosen; 0: not yet */
+	struct job_record record; /* the one at hand */
+};
 
 static bool is_fetched(const struct server *s, uint64_t job)
 {
@@ -35,21 +44,20 @@ static uint64_t result_bytes(const struct server *s, uint64_t job)
 	return sum;
 }
 
-/* All that have ended, so far as their records can be read. */
-static size_t list(const struct server *s, struct job_record *r, struct age_job **out)
+static void look(const struct server *s, struct clearing *c, uint64_t id)
 {
-	uint64_t *ids = mem_alloc(JOBS_MOST, sizeof *ids);
-	size_t count = ids ? spool_jobs(s->spool, ids, JOBS_MOST) : 0, n = 0;
-	struct age_job *jobs = count ? mem_alloc(count, sizeof *jobs) : NULL;
-	for (size_t i = 0; jobs && i < count; i++) {
-		if (server_order(s, ids[i]) || spool_read_record(s->spool, ids[i], r, NULL) || !record_is_ended(r))
-			continue;
-		jobs[n++] = (struct age_job){.id = ids[i], .ended = r->ended, .films = keep_bytes(s, ids[i]),
-					     .result = result_bytes(s, ids[i]), .busy = is_fetched(s, ids[i])};
+	if (server_order(s, id))
+		return;
+	int rc = spool_read_record(s->spool, id, &c->record, NULL);
+	if (rc == -ENOENT) { /* if nothing is in it */
+		char path[SPOOL_PATH_MAX];
+		spool_job_path(s->spool, id, NULL, path);
+		disk_rmdir(path);
 	}
-	mem_free(ids);
-	*out = jobs;
-	return n;
+	if (rc || !record_is_ended(&c->record))
+		return;
+	c->jobs[c->job_count++] = (struct age_job){.id = id, .ended = c->record.ended, .films = keep_bytes(s, id),
+						   .result = result_bytes(s, id), .busy = is_fetched(s, id)};
 }
 
 static struct job_record *listed(struct server *s, uint64_t job)
@@ -64,8 +72,6 @@ static void drop_result(struct server *s, const struct age_job *j, struct job_re
 {
 	struct error e;
 	struct job_record *known = listed(s, j->id);
-	if (spool_read_record(s->spool, j->id, r, &e))
-		return;
 	if (r->has_result) {
 		r->has_result = false;
 		r->cleared = now;
@@ -87,12 +93,8 @@ static void drop_result(struct server *s, const struct age_job *j, struct job_re
 
 static void drop_record(struct server *s, const struct age_job *j)
 {
-	char path[SPOOL_PATH_MAX];
 	struct job_record *known = listed(s, j->id);
-	spool_job_path(s->spool, j->id, "job.json", path);
-	disk_unlink(path);
-	spool_job_path(s->spool, j->id, NULL, path);
-	disk_rmdir(path);
+	spool_drop_job(s->spool, j->id);
 	if (known) {
 		size_t behind = s->ended_count - (size_t)(known - s->ended) - 1;
 		memmove(known, known + 1, behind * sizeof *known);
@@ -101,27 +103,80 @@ static void drop_record(struct server *s, const struct age_job *j)
 	log_event(LOG_JOB_CLEARED, "job=j%llu what=record", (unsigned long long)j->id);
 }
 
-void clear_run(struct server *s, double now)
+/* What was chosen, unless something has come of the job since. */
+static void clear_job(struct server *s, struct clearing *c, const struct age_job *j)
 {
-	struct age_limits limits = {s->config.clear_seconds, s->config.clear_bytes};
-	struct job_record *r = mem_alloc(1, sizeof *r);
-	struct age_job *jobs = NULL;
-	size_t count = r ? list(s, r, &jobs) : 0;
-	age_choose(jobs, count, &limits, now);
-	for (size_t i = 0; i < count; i++) {
-		if (jobs[i].no_films && jobs[i].films) {
-			keep_drop(s, jobs[i].id);
-			log_event(LOG_JOB_CLEARED, "job=j%llu what=films bytes=%llu", (unsigned long long)jobs[i].id,
-				  (unsigned long long)jobs[i].films);
-		}
-		if (jobs[i].no_result && jobs[i].result)
-			drop_result(s, &jobs[i], r, now);
-		if (jobs[i].no_record)
-			drop_record(s, &jobs[i]);
+	if ((!j->no_films || !j->films) && (!j->no_result || !j->result) && !j->no_record)
+		return;
+	if (server_order(s, j->id) || is_fetched(s, j->id) || spool_read_record(s->spool, j->id, &c->record, NULL) || c->record.ended != j->ended)
+		return;
+	if (j->no_films && j->films) {
+		keep_drop(s, j->id);
+		log_event(LOG_JOB_CLEARED, "job=j%llu what=films bytes=%llu", (unsigned long long)j->id, (unsigned long long)j->films);
+	}
+	if (j->no_result && j->result)
+		drop_result(s, j, &c->record, c->now);
+	if (j->no_record) {
+		drop_record(s, j);
+		c->records++;
 	}
 	s->changes++;
-	mem_free(jobs);
-	mem_free(r);
+}
+
+static void choose(const struct server *s, struct clearing *c)
+{
+	struct age_limits limits = {s->config.clear_seconds, s->config.clear_bytes};
+	struct timespec now;
+	clock_gettime(CLOCK_REALTIME, &now);
+	c->now = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+	age_choose(c->jobs, c->job_count, &limits, c->now);
+}
+
+/* false: that was all. */
+static bool step(struct server *s, struct clearing *c)
+{
+	if (c->looked < c->id_count)
+		look(s, c, c->ids[c->looked++]);
+	else if (!(c->now > 0))
+		choose(s, c);
+	else if (c->cleared < c->job_count)
+		clear_job(s, c, &c->jobs[c->cleared++]);
+	else
+		return false;
+	return true;
+}
+
+/* At once, for each change of the database is flushed. */
+static void drop_rows(struct server *s, const struct clearing *c)
+{
+	struct error e;
+	if (c->records && ledger_drop(s->ledger, c->now - AGE_RECORD * s->config.clear_seconds, &e))
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+}
+
+void clear_close(struct server *s)
+{
+	struct clearing *c = s->clearing;
+	if (!c)
+		return;
+	mem_free(c->ids);
+	mem_free(c->jobs);
+	mem_free(c);
+	s->clearing = NULL;
+}
+
+static bool begin(struct server *s)
+{
+	struct error e;
+	struct clearing *c = s->clearing = mem_alloc(1, sizeof *c);
+	if (!c)
+		return false;
+	if (spool_jobs(s->spool, &c->ids, &c->id_count, &e))
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	c->jobs = c->id_count ? mem_alloc(c->id_count, sizeof *c->jobs) : NULL;
+	if (!c->jobs)
+		clear_close(s);
+	return s->clearing != NULL;
 }
 
 void clear_soon(struct server *s)
@@ -131,12 +186,17 @@ void clear_soon(struct server *s)
 
 void clear_tick(struct server *s)
 {
-	struct timespec now;
-	if (server_now(s) < s->clear_next)
-		return;
-	s->clear_next = server_now(s) + every_seconds;
-	if (!(s->config.clear_seconds > 0) && !s->config.clear_bytes)
-		return;
-	clock_gettime(CLOCK_REALTIME, &now);
-	clear_run(s, (double)now.tv_sec + (double)now.tv_nsec * 1e-9);
+	double now = server_now(s);
+	if (!s->clearing) {
+		if (now < s->clear_next)
+			return;
+		s->clear_next = now + every_seconds;
+		if ((!(s->config.clear_seconds > 0) && !s->config.clear_bytes) || !begin(s))
+			return;
+	}
+	while (step(s, s->clearing))
+		if (server_now(s) - now > tick_seconds)
+			return;
+	drop_rows(s, s->clearing);
+	clear_close(s);
 }

@@ -1,8 +1,8 @@
 /*
  * Finished jobs go by age and by space (store/age.h): at the start, every hour, and soon after a job has ended. Never a living
- * job's files, never a result that a client is fetching or
- * waits for. The record says first that the result is gone, and when; then the files
- * go. The loop's thread.
+ * job's files, never a result that a client is fetching or waits for. The record says first that the result is gone, and when; then
+ * the files go. With its record a job's row goes, too, and all that is left in its folder. All finished jobs are looked at, a few
+ * milliseconds in each tick: nobody waits for it. The loop's thread.
  */
 #ifndef COORDINATOR_SHELL_CLEAR_H
 #define COORDINATOR_SHELL_CLEAR_H
@@ -11,7 +11,6 @@
 
 void clear_tick(struct server *s);
 void clear_soon(struct server *s); /* a job has ended */
-/* With another clock, s since 1970. */
-void clear_run(struct server *s, double now);
+void clear_close(struct server *s); /* after the loop */
 
 #endif

@@ -225,17 +225,22 @@ size_t server_views(struct server *s, struct job_view **views)
 /* Jobs of an earlier life that have ended, and those that were never accepted: whoever submitted them has no answer. */
 static int read_ended(struct server *s, struct error *e)
 {
-	uint64_t ids[ENDED_MAX];
-	size_t count = spool_jobs(s->spool, ids, ENDED_MAX);
+	uint64_t *ids;
+	size_t count;
+	int rc = spool_jobs(s->spool, &ids, &count, e);
+	if (rc)
+		return rc;
 	s->ended = mem_alloc(ENDED_MAX, sizeof *s->ended);
-	if (!s->ended)
+	if (!s->ended) {
+		mem_free(ids);
 		return error_set(e, ENOMEM, "no memory for the list of jobs");
-	for (size_t i = 0; i < count; i++) {
+	}
+	for (size_t i = count > ENDED_MAX ? count - ENDED_MAX : 0; i < count; i++) {
 		struct job_record *r = &s->ended[s->ended_count];
 		struct error fault;
 		if (restore_lives(s, ids[i]))
 			continue;
-		int rc = spool_read_record(s->spool, ids[i], r, &fault);
+		rc = spool_read_record(s->spool, ids[i], r, &fault);
 		if (rc == -ENOENT) /* the number of a job that did not get as far as a record */
 			continue;
 		if (rc) {
@@ -253,6 +258,7 @@ static int read_ended(struct server *s, struct error *e)
 		}
 		s->ended_count++;
 	}
+	mem_free(ids);
 	log_event(LOG_SPOOL_READ, "path=%s jobs=%zu next=j%llu", log_quote(s->config.spool).text, s->ended_count,
 		  (unsigned long long)spool_next_job(s->spool));
 	return 0;
@@ -454,6 +460,7 @@ static void close_stores(struct server *s)
 		s->deferred = next;
 	}
 	durable_close(s);
+	clear_close(s);
 	if (s->farm)
 		farm_free(s->farm);
 	blob_store_close(s->blobs);

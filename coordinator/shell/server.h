@@ -52,6 +52,7 @@ void server_close(struct server *s); /* stops it, if no signal has */
 
 struct session;
 struct status_socket;
+struct clearing;
 struct durable_ack;
 struct ending;
 
@@ -92,6 +93,7 @@ struct server {
 	struct ending *endings;                /* jobs that ended and whose records could not be written yet */
 	double endings_again;
 	double clear_next; /* when finished jobs are looked at again */
+	struct clearing *clearing; /* they are being looked at */
 	bool flushing;
 	uint64_t last_peer;
 	struct status_socket *status;

@@ -9,7 +9,7 @@
 
 struct ledger {
 	sqlite3 *db;
-	sqlite3_stmt *add, *end, *hold, *priority, *extend, *last, *next, *get;
+	sqlite3_stmt *add, *end, *hold, *priority, *extend, *drop, *next, *get;
 };
 
 /* The n-th brings a database of version n to n + 1; never changed, only added to. */
@@ -98,7 +98,7 @@ int ledger_open(struct ledger **out, const char *path, struct error *e)
 	if (!rc)
 		rc = prepare(l, &l->priority, "UPDATE jobs SET priority = ?2 WHERE id = ?1", e);
 	if (!rc)
-		rc = prepare(l, &l->last, "SELECT coalesce(max(id), 0) FROM jobs", e);
+		rc = prepare(l, &l->drop, "DELETE FROM jobs WHERE ended < ?1", e);
 	if (!rc)
 		rc = prepare(l, &l->extend, "UPDATE jobs SET submission = ?2, plan = ?3, extended = extended + (ended IS NOT NULL), ended = NULL,"
 					    " state = 'live' WHERE id = ?1", e);
@@ -124,7 +124,7 @@ void ledger_close(struct ledger *l)
 	sqlite3_finalize(l->priority);
 	sqlite3_finalize(l->extend);
 	sqlite3_finalize(l->get);
-	sqlite3_finalize(l->last);
+	sqlite3_finalize(l->drop);
 	sqlite3_finalize(l->next);
 	sqlite3_close(l->db);
 	mem_free(l);
@@ -164,6 +164,12 @@ int ledger_end(struct ledger *l, uint64_t id, const char *state, struct error *e
 	return finish(l, l->end, e);
 }
 
+int ledger_drop(struct ledger *l, double ended, struct error *e)
+{
+	sqlite3_bind_double(l->drop, 1, ended);
+	return finish(l, l->drop, e);
+}
+
 int ledger_hold(struct ledger *l, uint64_t id, const char *who, struct error *e)
 {
 	sqlite3_bind_int64(l->hold, 1, (sqlite3_int64)id);
@@ -184,14 +190,6 @@ int ledger_extend(struct ledger *l, const struct ledger_job *j, struct error *e)
 	sqlite3_bind_blob64(l->extend, 2, j->submission, j->submission_size, SQLITE_STATIC);
 	sqlite3_bind_blob64(l->extend, 3, j->plan, j->plan_size, SQLITE_STATIC);
 	return finish(l, l->extend, e);
-}
-
-int ledger_last(struct ledger *l, uint64_t *id, struct error *e)
-{
-	int rc = sqlite3_step(l->last) == SQLITE_ROW ? 0 : fault(l, e);
-	*id = rc ? 0 : (uint64_t)sqlite3_column_int64(l->last, 0);
-	sqlite3_reset(l->last);
-	return rc;
 }
 
 static const char *text_at(sqlite3_stmt *s, int column)

@@ -1,7 +1,7 @@
 /*
  * The farm's jobs in an SQLite database (spool/jobs.db; the one door to SQLite): who wants what, and whether it has ended. WAL,
  * synchronous FULL: what a call has written is durable when it returns. A job that has ended keeps its row without the
- * submission. One thread. The scheme's version is the database's user_version; older ones are brought up to date when the
+ * submission until it is dropped. One thread. The scheme's version is the database's user_version; older ones are brought up to date when the
  * database is opened, newer ones refused.
  */
 #ifndef COORDINATOR_STORE_LEDGER_H
@@ -32,12 +32,11 @@ int ledger_open(struct ledger **l, const char *path, struct error *e);
 void ledger_close(struct ledger *l); /* NULL: nothing */
 int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e);
 int ledger_end(struct ledger *l, uint64_t id, const char *state, struct error *e);
+int ledger_drop(struct ledger *l, double ended, struct error *e); /* the rows of all jobs that ended before, s since 1970 */
 int ledger_hold(struct ledger *l, uint64_t id, const char *who, struct error *e); /* "": no longer */
 int ledger_priority(struct ledger *l, uint64_t id, int priority, struct error *e);
 /* Another submission and plan; a job that has ended lives again. */
 int ledger_extend(struct ledger *l, const struct ledger_job *j, struct error *e);
-/* The greatest id that was ever added; 0: none. */
-int ledger_last(struct ledger *l, uint64_t *id, struct error *e);
 /* The living job with the smallest id above `after`, whose texts and bytes are valid until the next call. 1: it is there;
  * 0: no more. */
 int ledger_next(struct ledger *l, uint64_t after, struct ledger_job *j, struct error *e);

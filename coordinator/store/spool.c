@@ -108,40 +108,48 @@ static int by_id(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-/* A full array gives up its smallest id. */
-size_t spool_jobs(const struct spool *s, uint64_t *ids, size_t max)
+static bool add_id(uint64_t **ids, size_t count, uint64_t id)
 {
-	char *path = join(s->folder, "jobs");
-	DIR *d = path ? disk_opendir(path) : NULL;
-	size_t count = 0;
-	mem_free(path);
-	for (struct dirent *f; d && (f = readdir(d));) {
-		uint64_t id;
-		if (!is_job_folder(f->d_name, &id) || max == 0)
-			continue;
-		if (count < max) {
-			ids[count++] = id;
-			continue;
-		}
-		size_t least = 0;
-		for (size_t i = 1; i < count; i++)
-			if (ids[i] < ids[least])
-				least = i;
-		if (id > ids[least])
-			ids[least] = id;
+	if ((count & (count - 1)) == 0) { /* it grows at powers of two */
+		uint64_t *more = mem_grow(*ids, count * sizeof *more, (count ? 2 * count : 1) * sizeof *more);
+		if (!more)
+			return false;
+		*ids = more;
 	}
-	if (d)
-		closedir(d);
-	if (count)
-		qsort(ids, count, sizeof *ids, by_id);
-	return count;
+	(*ids)[count] = id;
+	return true;
+}
+
+int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct error *e)
+{
+	char path[SPOOL_PATH_MAX];
+	uint64_t id;
+	*ids = NULL;
+	*count = 0;
+	spool_path(s, "jobs", path);
+	DIR *d = disk_opendir(path);
+	if (!d)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	int rc = 0;
+	for (struct dirent *f; !rc && (f = readdir(d));)
+		if (is_job_folder(f->d_name, &id))
+			rc = add_id(ids, *count, id) ? ++*count, 0 : error_set(e, ENOMEM, "%s: no memory for its list", path);
+	closedir(d);
+	if (rc) {
+		mem_free(*ids);
+		*ids = NULL;
+		*count = 0;
+	}
+	if (*count)
+		qsort(*ids, *count, sizeof **ids, by_id);
+	return rc;
 }
 
 static int read_counter(struct spool *s, struct error *e)
 {
 	char *path = join(s->folder, "next-job"), *text;
-	size_t size;
-	uint64_t greatest = 0;
+	size_t size, count;
+	uint64_t *ids;
 	s->next = 1;
 	if (!path)
 		return error_set(e, ENOMEM, "no memory for the spool");
@@ -158,9 +166,12 @@ static int read_counter(struct spool *s, struct error *e)
 		rc = 0;
 	}
 	mem_free(path);
-	if (!rc && spool_jobs(s, &greatest, 1) && greatest >= s->next)
-		s->next = greatest + 1;
-	return rc;
+	if (rc || (rc = spool_jobs(s, &ids, &count, e)))
+		return rc;
+	if (count && ids[count - 1] >= s->next)
+		s->next = ids[count - 1] + 1;
+	mem_free(ids);
+	return 0;
 }
 
 /* ---- life ---- */
@@ -309,4 +320,23 @@ int spool_read_record(const struct spool *s, uint64_t id, struct job_record *r, 
 	if (!rc && r->id != id)
 		rc = error_set(e, EBADMSG, "the record of another job");
 	return rc ? error_prefix(e, rc, "%s", path) : 0;
+}
+
+void spool_drop_job(const struct spool *s, uint64_t id)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(s, id, NULL, path);
+	DIR *d = disk_opendir(path);
+	for (struct dirent *f; d && (f = readdir(d));) {
+		if (strcmp(f->d_name, ".") == 0 || strcmp(f->d_name, "..") == 0 || strcmp(f->d_name, "job.json") == 0)
+			continue;
+		spool_job_path(s, id, f->d_name, path);
+		disk_unlink(path);
+	}
+	if (d)
+		closedir(d);
+	spool_job_path(s, id, "job.json", path);
+	disk_unlink(path);
+	spool_job_path(s, id, NULL, path);
+	disk_rmdir(path);
 }

@@ -39,7 +39,9 @@ int spool_read_record(const struct spool *s, uint64_t id, struct job_record *r, 
 /* The first bytes of a file: a name and three digits, its version, in all versions. -EBADMSG: another name; -EPROTO, with a sentence:
  * another version. Any thread. */
 int spool_check_version(const char got[8], const char known[8], const char *path, struct error *e);
-/* Ids that have a folder, ascending; the greatest `max` of them. Returns how many. */
-size_t spool_jobs(const struct spool *s, uint64_t *ids, size_t max);
+/* All ids that have a folder, ascending; mem_alloc'd, NULL: none. */
+int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct error *e);
+/* The job's folder with all that is in it goes, the record last. */
+void spool_drop_job(const struct spool *s, uint64_t id);
 
 #endif

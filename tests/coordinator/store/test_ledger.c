@@ -12,6 +12,7 @@
 #include <sqlite3.h>
 #include <stdio.h>
 #include <string.h>
+#include <time.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -39,11 +40,8 @@ static void living_jobs(void **state)
 	char path[128];
 	struct error e;
 	struct ledger_job j;
-	uint64_t last;
 	struct ledger *l = open_ledger(path);
 	assert_int_equal(ledger_next(l, 0, &j, &e), 0);
-	assert_int_equal(ledger_last(l, &last, &e), 0);
-	assert_int_equal(last, 0);
 	for (uint64_t id = 1; id <= 3; id++)
 		add(l, id);
 	assert_int_equal(ledger_end(l, 2, "done", &e), 0);
@@ -63,8 +61,11 @@ static void living_jobs(void **state)
 	assert_int_equal(ledger_next(l, 1, &j, &e), 1);
 	assert_int_equal(j.id, 3);
 	assert_int_equal(ledger_next(l, 3, &j, &e), 0);
-	assert_int_equal(ledger_last(l, &last, &e), 0);
-	assert_int_equal(last, 3);
+	assert_int_equal(ledger_drop(l, (double)time(NULL) - 1000, &e), 0);
+	assert_int_equal(ledger_get(l, 2, &j, &e), 1);
+	assert_int_equal(ledger_drop(l, (double)time(NULL) + 1000, &e), 0);
+	assert_int_equal(ledger_get(l, 2, &j, &e), 0);
+	assert_int_equal(ledger_get(l, 3, &j, &e), 1); /* it lives */
 	struct ledger_job again = {.id = 3, .owner = "", .name = "", .version = ""};
 	assert_true(ledger_add(l, &again, &e) < 0); /* an id is given once */
 	ledger_close(l);

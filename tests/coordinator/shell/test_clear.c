@@ -1,0 +1,169 @@
+/* Finished jobs that are old go, with all that is in their folders and their rows, and nobody waits for it. */
+#include "common/base/disk.h"
+#include "common/base/log.h"
+#include "coordinator/shell/clear.h"
+#include "tests/support/folder.h"
+
+#include <fcntl.h>
+#include <setjmp.h>
+#include <sqlite3.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { JOBS = 120, LIVING = 7, YOUNG = 9, DAY = 86400 };
+
+static struct server server;
+
+/* Each look at a file takes 0.2 ms: 120 jobs are more than 20 ms. */
+static int slow_open(const char *path, int flags, mode_t mode)
+{
+	usleep(200);
+	return disk_system.open(path, flags, mode);
+}
+
+static int no_flush(int fd)
+{
+	(void)fd;
+	return 0;
+}
+
+static bool has(uint64_t job, const char *file)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(server.spool, job, file, path);
+	return access(path, F_OK) == 0;
+}
+
+static void put(uint64_t job, const char *file)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(server.spool, job, file, path);
+	int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+	assert_true(fd >= 0);
+	assert_int_equal(write(fd, "bytes", 5), 5);
+	close(fd);
+}
+
+static void add(uint64_t id, double ended)
+{
+	struct error e;
+	struct job_record *r = calloc(1, sizeof *r);
+	*r = (struct job_record){.id = id, .state = "done", .ended = ended, .has_result = true, .rel_error = -1};
+	if (id == LIVING)
+		strcpy(r->state, "running");
+	assert_int_equal(spool_take_job(server.spool, id, &e), 0);
+	assert_int_equal(spool_write_record(server.spool, r, &e), 0);
+	put(id, "result.exr");
+	put(id, "checkpoint.tmp"); /* of a life that was cut short */
+	free(r);
+}
+
+/* All rows at once: each alone would be flushed. */
+static void add_rows(const char *path, double now)
+{
+	char sql[600];
+	sqlite3 *db;
+	snprintf(sql, sizeof sql, "WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < %d)"
+				  " INSERT INTO jobs (id, owner, name, version, priority, mixed, state, submitted, ended)"
+				  " SELECT i, '', 'n', '1', 0, 0, 'done', 1, CASE i WHEN %d THEN NULL WHEN %d THEN %.0f ELSE %.0f END FROM n",
+		 JOBS, LIVING, YOUNG, now - 2 * DAY, now - 20 * DAY);
+	assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+	assert_int_equal(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
+	assert_int_equal(sqlite3_close(db), SQLITE_OK);
+}
+
+static void open_server(void)
+{
+	struct error e;
+	char path[SPOOL_PATH_MAX];
+	memset(&server, 0, sizeof server);
+	snprintf(path, sizeof path, "%s/spool", folder);
+	assert_int_equal(spool_open(&server.spool, path, &e), 0);
+	spool_path(server.spool, "jobs.db", path);
+	assert_int_equal(ledger_open(&server.ledger, path, &e), 0);
+	ledger_close(server.ledger);
+	add_rows(path, (double)time(NULL));
+	assert_int_equal(ledger_open(&server.ledger, path, &e), 0);
+	server.config.clear_seconds = DAY;
+}
+
+static void old_jobs_go_bit_by_bit(void **state)
+{
+	(void)state;
+	struct disk slow = disk_system;
+	struct ledger_job j;
+	struct error e;
+	double now = (double)time(NULL), longest = 0;
+	unsigned ticks = 0;
+	slow.fsync = no_flush;
+	disk_use(&slow);
+	open_server();
+	for (uint64_t id = 1; id <= JOBS; id++)
+		add(id, now - (id == YOUNG ? 2 : 20) * DAY);
+	assert_int_equal(spool_take_job(server.spool, JOBS + 1, &e), 0); /* it never came to a record */
+	slow.open = slow_open;
+	do {
+		double begin = server_now(&server);
+		clear_tick(&server);
+		double took = server_now(&server) - begin;
+		longest = took > longest ? took : longest;
+		ticks++;
+	} while (server.clearing);
+	disk_use(NULL);
+	print_message("   %d jobs in %u ticks, the longest %.1f ms\n", JOBS, ticks, 1e3 * longest);
+	assert_true(ticks >= 5);
+	for (uint64_t id = 1; id <= JOBS + 1; id++) {
+		bool stays = id == LIVING || id == YOUNG;
+		assert_true(has(id, NULL) == stays);
+		assert_int_equal(ledger_get(server.ledger, id, &j, &e), stays);
+	}
+	assert_true(has(YOUNG, "job.json") && !has(YOUNG, "result.exr") && has(LIVING, "result.exr"));
+	ledger_close(server.ledger);
+	spool_close(server.spool);
+}
+
+/* What ended once more between the look and the end of it. */
+static void what_has_changed_stays(void **state)
+{
+	(void)state;
+	struct disk slow = disk_system;
+	double now = (double)time(NULL);
+	slow.fsync = no_flush;
+	slow.open = slow_open;
+	disk_use(&slow);
+	open_server();
+	for (uint64_t id = 1; id <= JOBS; id++)
+		add(id, now - 20 * DAY);
+	clear_tick(&server);
+	assert_non_null(server.clearing);
+	struct error e;
+	struct job_record *r = calloc(1, sizeof *r);
+	assert_int_equal(spool_read_record(server.spool, 1, r, &e), 0);
+	r->ended = now;
+	assert_int_equal(spool_write_record(server.spool, r, &e), 0);
+	free(r);
+	while (server.clearing)
+		clear_tick(&server);
+	disk_use(NULL);
+	assert_true(has(1, "result.exr") && !has(2, NULL));
+	clear_close(&server);
+	ledger_close(server.ledger);
+	spool_close(server.spool);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(old_jobs_go_bit_by_bit, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_has_changed_stays, folder_set_up, folder_tear_down),
+	};
+	log_set_level(LOG_LEVEL_ERROR);
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
