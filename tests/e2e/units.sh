@@ -28,6 +28,8 @@ for u in *.service; do
 done
 sed -i '/^ExecStart/s|=.*|=/none/such|' hslt-worker@.service
 systemd-analyze verify ./hslt-worker@.service >/dev/null 2>&1 && fail "verify does not look"
+# How long it reads its jobs depends on them alone: who stopped it meanwhile would do so for ever.
+grep -qx 'TimeoutStartSec=infinity' hslt-coordinator.service || fail "the coordinator's start has a limit"
 cd "$HOME_FOLDER"
 
 # Options in the units and the examples are options of the programs.
