@@ -1,8 +1,8 @@
 #include "coordinator/shell/session.h"
 
-#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "coordinator/shell/asks.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -11,10 +11,9 @@
 enum {
 	HELLO_HEADER = 4096,
 	HEADER_LIMIT = 1 << 20,
-	/* What may wait for a peer to read it: a word to a stranger, answers to a client, leases for one worker. */
+	/* What may wait for a peer to read it: a word to a stranger, answers; for a worker the leases beside that it may hold. */
 	HELLO_SEND = 1 << 16,
-	CLIENT_SEND = 1 << 23,
-	WORKER_SEND = 1 << 29,
+	PEER_SEND = 1 << 23,
 };
 
 void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size)
@@ -180,7 +179,7 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		return;
 	}
 	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, 0});
-	conn_set_send_limit(p->conn, h->role == FARM__ROLE__ROLE_WORKER ? WORKER_SEND : CLIENT_SEND);
+	conn_set_send_limit(p->conn, PEER_SEND);
 	conn_set_quiet(p->conn, 6 * p->server->config.heartbeat_seconds);
 	if (h->role == FARM__ROLE__ROLE_WORKER) {
 		join(p, h);
@@ -194,44 +193,13 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 
 /* ---- a worker speaks ---- */
 
-/* Results of this job may come from now on, and they may be so long. */
-static void allow_results(struct session *p, const struct order *o)
+void session_allow_results(struct session *p, const struct order *o)
 {
 	uint32_t need = batch_payload_max(&o->plan);
 	if (need > p->payload_limit) {
 		p->payload_limit = need;
 		conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, need});
 	}
-}
-
-static void send_job_info(struct session *p, uint64_t job)
-{
-	const struct order *o = server_order(p->server, job);
-	if (!o) {
-		session_send_job_end(p, job);
-		return;
-	}
-	allow_results(p, o);
-	const Farm__Submit *from = order_submit(o);
-	Farm__JobInfo info;
-	Farm__Plan plan;
-	Farm__Envelope m;
-	farm__job_info__init(&info);
-	farm__envelope__init(&m);
-	plan_to_wire(&o->plan, &plan);
-	info.job = job;
-	info.name = from->name;
-	info.scene = from->scene;
-	info.n_defines = from->n_defines;
-	info.defines = from->defines;
-	info.render_width = from->render_width;
-	info.render_height = from->render_height;
-	info.plan = &plan;
-	info.n_files = from->n_files;
-	info.files = from->files;
-	m.body_case = FARM__ENVELOPE__BODY_JOB_INFO;
-	m.job_info = &info;
-	session_send(p, &m, NULL, 0);
 }
 
 static void take_lease_failed(struct session *p, const Farm__LeaseFailed *f)
@@ -253,39 +221,15 @@ static void take_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 	server_step(p->server, &ev);
 }
 
-enum { BLOB_CHUNK = 1 << 20 };
-
 static void take_blob_get(struct session *p, const Farm__BlobGet *g)
 {
-	Farm__BlobChunk chunk;
-	Farm__Envelope m;
-	struct error e = {""};
-	struct blob_hash h;
-	uint64_t size = 0;
+	struct ask a = {.blob = true, .number = g->offset};
 	if (g->hash.len != BLOB_HASH_SIZE) {
 		session_fault(p, "a blob's name has %zu bytes", g->hash.len);
 		return;
 	}
-	memcpy(h.bytes, g->hash.data, sizeof h.bytes);
-	farm__blob_chunk__init(&chunk);
-	farm__envelope__init(&m);
-	unsigned char *bytes = mem_alloc(BLOB_CHUNK, 1);
-	ssize_t n = 0;
-	int fd = blob_open(p->server->blobs, &h, &size, &e);
-	if (fd >= 0 && bytes)
-		n = disk_pread(fd, bytes, BLOB_CHUNK, g->offset <= size ? (off_t)g->offset : 0);
-	if (fd >= 0 && (!bytes || n < 0 || g->offset > size))
-		error_set(&e, EIO, "the blob cannot be read there");
-	chunk.hash = g->hash;
-	chunk.offset = g->offset;
-	chunk.size = size;
-	chunk.error = e.text;
-	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
-	m.blob_chunk = &chunk;
-	session_send(p, &m, bytes, *e.text ? 0 : (size_t)n);
-	if (fd >= 0)
-		disk_close(fd);
-	mem_free(bytes);
+	memcpy(a.hash.bytes, g->hash.data, sizeof a.hash.bytes);
+	asks_take(p, &a);
 }
 
 static void take_lease_result(struct session *p, struct envelope *env)
@@ -337,7 +281,7 @@ static void worker_message(struct session *p, struct envelope *env)
 		take_lease_failed(p, m->lease_failed);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_GET:
-		send_job_info(p, m->job_get->job);
+		asks_take(p, &(struct ask){.number = m->job_get->job});
 		break;
 	case FARM__ENVELOPE__BODY_BLOB_GET:
 		take_blob_get(p, m->blob_get);
@@ -371,6 +315,7 @@ static void on_closed(void *user, const char *why)
 	struct server *s = p->server;
 	delist(s, p);
 	session_upload_abort(p);
+	asks_drop(p);
 	log_event(conn_distrust(p->conn)	? LOG_PEER_REFUSED
 		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED
 						: LOG_PEER_ACCEPT, "peer=%llu address=%s name=%s text=%s",
@@ -384,7 +329,12 @@ static void on_closed(void *user, const char *why)
 	mem_free(p);
 }
 
-static const struct conn_events events = {.message = on_message, .heard = on_heard, .closed = on_closed};
+static void on_drained(void *user)
+{
+	asks_go_on(user);
+}
+
+static const struct conn_events events = {.message = on_message, .heard = on_heard, .drained = on_drained, .closed = on_closed};
 
 static void on_refused(void *user, const char *why)
 {
@@ -435,16 +385,28 @@ void session_accept(struct server *s)
 
 /* ---- the core speaks to a worker ---- */
 
+/* As many leases as it wants, of the size of the largest, may wait for it to read them. */
+static void allow_lease(struct session *p, size_t size)
+{
+	struct peer_status s;
+	if (!farm_peer(p->server->farm, p->id, &s) || s.want * size <= p->leases_most)
+		return;
+	p->leases_most = s.want * size;
+	conn_set_send_limit(p->conn, PEER_SEND + p->leases_most);
+}
+
 void session_send_lease(struct session *p, const struct order *o, const struct lease_key *k)
 {
 	unsigned char *frame;
 	size_t size;
 	struct error e;
-	allow_results(p, o);
-	if (order_pack_lease(o, k, &frame, &size, &e))
+	session_allow_results(p, o);
+	if (order_pack_lease(o, k, &frame, &size, &e)) {
 		conn_close(p->conn, e.text);
-	else
-		conn_send_frame(p->conn, frame, size);
+		return;
+	}
+	allow_lease(p, size);
+	conn_send_frame(p->conn, frame, size);
 }
 
 void session_send_revoke(struct session *p, const struct lease_key *k)

@@ -11,6 +11,7 @@
 enum session_state { SESSION_NEW, SESSION_WORKER, SESSION_CLIENT, SESSION_LEAVING };
 
 struct upload;
+struct ask;
 
 struct session {
 	struct session *next, **place; /* all; where they point to this one */
@@ -23,6 +24,9 @@ struct session {
 	char name[128], address[64];
 	struct tls_peer who; /* by its certificate; TLS_NOBODY without TLS, and then everybody may do everything */
 	uint32_t payload_limit;
+	size_t leases_most; /* bytes of as many leases as it wanted */
+	struct ask *asks;  /* that wait for it to read */
+	unsigned ask_count;
 	double heard; /* s on the loop's clock: when it was last told so amid a message */
 	struct upload *upload; /* a submission that waits for blobs */
 	uint64_t watched;      /* job; 0: none */
@@ -40,6 +44,9 @@ struct session *session_find(const struct server *s, uint64_t id);
 void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size);
 /* Says why and hangs up. */
 __attribute__((format(printf, 2, 3))) void session_fault(struct session *p, const char *format, ...);
+
+/* Results of this job may come from now on, and they may be so long. */
+void session_allow_results(struct session *p, const struct order *o);
 
 /* What the core wants said to workers. */
 void session_send_lease(struct session *p, const struct order *o, const struct lease_key *k);

@@ -732,6 +732,84 @@ static void what_is_useless_does_not_wait(void **state)
 	hang_up(other);
 }
 
+/* ---- who asks and does not read ---- */
+
+enum { PIECE = 1 << 20 };
+
+static void say_piece_gets(const struct peer *p, const struct blob_hash *h, int count)
+{
+	Farm__Envelope m;
+	Farm__BlobGet get;
+	struct blob_hash copy = *h;
+	farm__envelope__init(&m);
+	farm__blob_get__init(&get);
+	get.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, copy.bytes};
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_GET;
+	m.blob_get = &get;
+	for (int i = 0; i < count; i++)
+		say(p, &m, NULL, 0);
+}
+
+static long server_kilobytes(void)
+{
+	char path[64], line[256];
+	long kilobytes = -1;
+	snprintf(path, sizeof path, "/proc/%d/status", (int)server);
+	FILE *f = fopen(path, "r");
+	assert_non_null(f);
+	while (fgets(line, sizeof line, f))
+		if (sscanf(line, "VmRSS: %ld", &kilobytes) == 1)
+			break;
+	fclose(f);
+	return kilobytes;
+}
+
+/* A worker may ask for what all its jobs need at once, and gets it; what it does not read does not fill our memory, and when it goes
+ * on asking it is hung up on. */
+static void the_deaf_cost_little(void **state)
+{
+	(void)state;
+	struct peer *client = call(), *honest = call(), *deaf[4];
+	struct blob_hash h;
+	struct error e;
+	char *scene = malloc(PIECE);
+	assert_non_null(scene);
+	memset(scene, 'x', PIECE - 1);
+	scene[PIECE - 1] = 0;
+	assert_int_equal(blob_hash_bytes(scene, PIECE - 1, &h, &e), 0);
+	assert_true(hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	submit(client, NULL, scene, "s.xml", "s.xml");
+	assert_int_equal(submit_answer(client)->n_missing, 1);
+	send_blob(client, scene, scene);
+	assert_true(submit_answer(client)->job);
+	assert_true(hello(honest, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	say_piece_gets(honest, &h, 64);
+	for (int i = 0; i < 64; i++) {
+		const Farm__Envelope *m = hear(honest);
+		assert_true(m && m->body_case == FARM__ENVELOPE__BODY_BLOB_CHUNK);
+		assert_int_equal(honest->reader.payload.size, PIECE - 1);
+	}
+	long before = server_kilobytes();
+	for (int i = 0; i < 4; i++) {
+		deaf[i] = call();
+		assert_true(hello(deaf[i], FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+		say_piece_gets(deaf[i], &h, 500);
+	}
+	it_still_works();
+	assert_true(server_kilobytes() - before < 4 * 10 * 1024);
+	for (int i = 0; i < 4; i++) {
+		const Farm__Envelope *m;
+		say_piece_gets(deaf[i], &h, 50);
+		while ((m = hear(deaf[i])) && m->body_case == FARM__ENVELOPE__BODY_BLOB_CHUNK)
+			continue;
+		assert_true(!m || strstr(m->fault->text, "no worker needs so many"));
+		hang_up(deaf[i]);
+	}
+	free(scene);
+	hang_up(client);
+	hang_up(honest);
+}
+
 /* ---- slow links ---- */
 
 /* A worker with a lease of a new job, and its result. The keys of what came stay in the desk. */
@@ -911,6 +989,7 @@ int main(void)
 		cmocka_unit_test(crowds_are_turned_away), cmocka_unit_test(the_silent_give_way),  cmocka_unit_test(hello_is_looked_at),
 		cmocka_unit_test(submissions_are_looked_at), cmocka_unit_test(a_black_job_ends),
 		cmocka_unit_test(strategies_are_counted_once), cmocka_unit_test(what_is_useless_does_not_wait),
+		cmocka_unit_test(the_deaf_cost_little),
 		cmocka_unit_test(extensions_wait_for_films), /* its job lives again */
 		cmocka_unit_test(a_failure_counts_whatever_its_text),
 	};
