@@ -11,6 +11,11 @@ failing_calls() {
 	disk_test "failing calls" 1 72
 }
 
+fault failing_starts 1 0 "a call of the disk fails while the coordinator starts with jobs half done"
+failing_starts() {
+	disk_test "failing starts" 1 20
+}
+
 # disk_test WHAT SEEDS STEP: TIMES is how often it says that it did that
 disk_test() {
 	[ -x "$BUILD/tests/coordinator/power/test_power" ] || fail "$NAME: tests/coordinator/power/test_power is not built"

@@ -118,7 +118,7 @@ is_refused() {
 	is_state "$1" failed || is_state "$1" cancelled || is_state "$1" done
 }
 
-fault small_worker 1 0 "a scene is larger than the memory of one of two workers"
+fault small_worker 1 1 "a scene is larger than the memory of one of two workers"
 small_worker() {
 	mkdir -p "$DIR/box/meshes"
 	awk 'BEGIN { n = 300
