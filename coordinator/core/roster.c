@@ -23,13 +23,15 @@ static struct identity *find(const struct farm *f, const struct event_join *e)
 	return named;
 }
 
-static bool goes_before(const struct identity *a, const struct identity *b)
+/* Whom to forget for one with this certificate: its own names first, whoever was set aside last. */
+static bool goes_before(const struct identity *a, const struct identity *b, const char *certificate)
 {
-	return a->aside != b->aside ? b->aside : a->seen < b->seen;
+	bool a_own = strcmp(a->certificate, certificate) == 0, b_own = strcmp(b->certificate, certificate) == 0;
+	return a->aside != b->aside ? b->aside : a_own != b_own ? a_own : a->seen < b->seen;
 }
 
 /* NULL: all of them are needed. */
-static struct identity *room_for_one(struct farm *f)
+static struct identity *room_for_one(struct farm *f, const char *certificate)
 {
 	struct identity *oldest = NULL;
 	if (f->known_count < f->known_limit) {
@@ -39,7 +41,7 @@ static struct identity *room_for_one(struct farm *f)
 		return k;
 	}
 	for (uint32_t i = 0; i < f->known_count; i++)
-		if (f->known[i]->uses == 0 && (!oldest || goes_before(f->known[i], oldest)))
+		if (f->known[i]->uses == 0 && (!oldest || goes_before(f->known[i], oldest, certificate)))
 			oldest = f->known[i];
 	return oldest;
 }
@@ -57,7 +59,7 @@ struct identity *roster_use(struct farm *f, const struct event_join *e, const ch
 {
 	struct identity *k = find(f, e);
 	if (!k) {
-		k = room_for_one(f);
+		k = room_for_one(f, e->certificate);
 		if (!k) {
 			*refused = "the coordinator has no room to remember another worker";
 			return NULL;
@@ -123,11 +125,29 @@ bool roster_replace(struct farm *f, const struct event_join *e, const char **ref
 	return true;
 }
 
+/* Names cost nothing: of one certificate so many are remembered as set aside, and the one that has been away longest makes room. */
+static void set_aside(struct farm *f, struct identity *who)
+{
+	struct identity *oldest = NULL;
+	uint32_t count = 0;
+	for (uint32_t i = 0; i < f->known_count; i++) {
+		struct identity *k = f->known[i];
+		if (!k->aside || k == who || k->certificate_id != who->certificate_id)
+			continue;
+		count++;
+		if (k->uses == 0 && (!oldest || k->seen < oldest->seen))
+			oldest = k;
+	}
+	if (count >= IDENTITY_ASIDE && oldest)
+		oldest->aside = false;
+	who->aside = true;
+}
+
 void roster_set_aside(struct farm *f, struct identity *who)
 {
 	if (who->aside)
 		return;
-	who->aside = true;
+	set_aside(f, who);
 	struct action *a = update_add(f, ACTION_ASIDE);
 	a->who = who->id;
 	a->text = who->text;
@@ -169,7 +189,7 @@ void roster_aside(struct farm *f, const struct event_join *e, const char *text)
 	if (!k)
 		return;
 	text_copy(k->text, sizeof k->text, text);
-	k->aside = true;
+	set_aside(f, k);
 	roster_drop(f, k);
 }
 

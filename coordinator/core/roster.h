@@ -2,14 +2,16 @@
  * Who workers are, for longer than their connections last: what a worker did wrong is not forgotten when it calls again. A
  * worker is known by the name in its certificate ("" without TLS) together with the name that it gives itself or its home,
  * the folder that counts its starts: who has one of the two in common with somebody is that somebody. Bounded: those who
- * have been away longest are forgotten first, and those that are set aside last. Allocates when a worker joins.
+ * have been away longest are forgotten first, of the newcomer's own certificate before others, and those that are set aside
+ * last; of these IDENTITY_ASIDE a certificate, so that one that makes up names pushes out none but its own. Allocates when a
+ * worker joins.
  */
 #ifndef COORDINATOR_CORE_ROSTER_H
 #define COORDINATOR_CORE_ROSTER_H
 
 #include "coordinator/core/farm.h"
 
-enum { IDENTITY_AVOIDED = 8, IDENTITY_CERTIFICATE = 72, IDENTITY_NAME = JOIN_NAME, IDENTITY_HOME = JOIN_HOME };
+enum { IDENTITY_AVOIDED = 8, IDENTITY_ASIDE = 64, IDENTITY_CERTIFICATE = 72, IDENTITY_NAME = JOIN_NAME, IDENTITY_HOME = JOIN_HOME };
 
 /* After a failed lease the worker stays away from that job for a while. */
 struct avoid {

@@ -10,19 +10,31 @@ static const char file[] = "aside";
 
 /* ---- the file */
 
+static int add_worker(json_t *list, const struct worker_status *w, struct error *e)
+{
+	json_error_t fault;
+	json_t *o = json_pack_ex(&fault, 0, "{s:s s:s s:s s:I s:s}", "certificate", w->certificate, "name", w->name, "home", w->home,
+				 "restarts", (json_int_t)w->restarts, "why", w->text);
+	if (!o)
+		return error_set(e, EINVAL, "%s, who is set aside, cannot be written down: %s", w->name, fault.text);
+	return json_array_append_new(list, o) ? error_set(e, ENOMEM, "no memory for the list of those that are set aside") : 0;
+}
+
 static void write_aside(struct server *s)
 {
 	struct worker_status w;
 	struct error e;
+	int rc = 0;
 	json_t *list = json_array(), *o = json_pack("{s:i s:o}", "schema", 1, "workers", list);
-	for (uint64_t who = 0; (who = farm_next_aside(s->farm, who)) && farm_worker(s->farm, who, &w);)
-		json_array_append_new(list, json_pack("{s:s s:s s:s s:I s:s}", "certificate", w.certificate, "name", w.name, "home",
-						      w.home, "restarts", (json_int_t)w.restarts, "why", w.text));
+	for (uint64_t who = 0; !rc && (who = farm_next_aside(s->farm, who)) && farm_worker(s->farm, who, &w);)
+		rc = add_worker(list, &w, &e);
 	char *text = json_dumps(o, JSON_INDENT(1));
 	json_decref(o);
-	if (!text)
-		error_set(&e, ENOMEM, "no memory for the list of those that are set aside");
-	if (!text || spool_write_own(s->spool, file, text, strlen(text), &e))
+	if (!rc && !text)
+		rc = error_set(&e, ENOMEM, "no memory for the list of those that are set aside");
+	if (!rc)
+		rc = spool_write_own(s->spool, file, text, strlen(text), &e);
+	if (rc)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	free(text);
 }
@@ -50,20 +62,31 @@ static void tell_core(struct server *s, const json_t *w)
 	server_step(s, &ev);
 }
 
+/* The farm does not stand still for it: whoever gives wrong results will do so again, and is found again. */
+static int put_by(struct server *s, struct error *e)
+{
+	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
+	spool_path(s->spool, file, from);
+	spool_path(s->spool, "aside.damaged", to);
+	spool_path(s->spool, "", folder);
+	log_event(LOG_SPOOL_FAULT, "text=\"the file %s is no list of workers: it is kept as %s.damaged, and nobody in it is set aside\"", file, file);
+	return spool_rename(from, to, folder, e);
+}
+
 int trust_open(struct server *s, struct error *e)
 {
 	char *text;
 	size_t size;
 	json_error_t fault;
 	int rc = spool_read_own(s->spool, file, &text, &size, e);
-	if (rc == -ENOENT)
-		return 0;
+	if (rc == -EFBIG)
+		return put_by(s, e);
 	if (rc)
-		return rc;
+		return rc == -ENOENT ? 0 : rc;
 	json_t *o = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
 	const json_t *list = json_object_get(o, "workers");
 	if (!json_is_array(list))
-		rc = error_set(e, EBADMSG, "the spool's file %s is no list of workers", file);
+		rc = put_by(s, e);
 	for (size_t i = 0; i < json_array_size(list); i++)
 		tell_core(s, json_array_get(list, i));
 	json_decref(o);

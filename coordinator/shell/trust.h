@@ -9,7 +9,8 @@
 
 #include "coordinator/shell/server.h"
 
-/* Tells the core who is set aside, but for those that the configuration forgives. -EBADMSG: the file is damaged. */
+/* Tells the core who is set aside, but for those that the configuration forgives. A file that
+ * is damaged is put by as aside.damaged, and the log says so. */
 int trust_open(struct server *s, struct error *e);
 
 /* Of the job's leases that two workers compute: as it asks for, and no less than is asked of all; none of a mixed one. */

@@ -8,8 +8,10 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/file.h>
+#include <sys/stat.h>
 
-enum { RECORD_MAX = 1 << 16, FOLDER_MAX = SPOOL_PATH_MAX - 128 };
+/* Of a file of a job; of one in the spool's own folder: who is set aside, 64 workers a certificate, a kilobyte each. */
+enum { RECORD_MAX = 1 << 16, OWN_MAX = 1 << 28, FOLDER_MAX = SPOOL_PATH_MAX - 128 };
 
 struct spool {
 	char *folder, *blobs, *canvas;
@@ -65,20 +67,26 @@ static int write_file(const char *folder, const char *name, const void *bytes, s
 	return disk_sync_folder(folder, e);
 }
 
-static int read_file(const char *path, char **text, size_t *size, struct error *e)
+static int read_file(const char *path, size_t most, char **text, size_t *size, struct error *e)
 {
+	struct stat st;
 	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
-	if (fd < 0)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
-	char *bytes = mem_alloc(RECORD_MAX, 1);
+	if (fd < 0 || disk_fstat(fd, &st)) {
+		int rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+		if (fd >= 0)
+			disk_close(fd);
+		return rc;
+	}
+	size_t there = (size_t)st.st_size;
+	char *bytes = there < most ? mem_alloc(there + 1, 1) : NULL;
 	ssize_t n = 0;
 	*size = 0;
-	while (bytes && *size < RECORD_MAX && (n = disk_read(fd, bytes + *size, RECORD_MAX - *size)) > 0)
+	while (bytes && *size < there && (n = disk_read(fd, bytes + *size, there - *size)) > 0)
 		*size += (size_t)n;
-	int rc = !bytes ? error_set(e, ENOMEM, "no memory to read %s", path)
+	int rc = there >= most ? error_set(e, EFBIG, "%s: too long", path)
+		 : !bytes ? error_set(e, ENOMEM, "no memory to read %s", path)
 		 : n < 0 ? error_set(e, errno, "%s: %s", path, strerror(errno))
-		 : *size == RECORD_MAX ? error_set(e, EFBIG, "%s: too long", path)
-				       : 0;
+			 : 0;
 	disk_close(fd);
 	if (rc)
 		mem_free(bytes);
@@ -153,7 +161,7 @@ static int read_counter(struct spool *s, struct error *e)
 	s->next = 1;
 	if (!path)
 		return error_set(e, ENOMEM, "no memory for the spool");
-	int rc = read_file(path, &text, &size, e);
+	int rc = read_file(path, RECORD_MAX, &text, &size, e);
 	if (!rc) {
 		unsigned long long n = 0;
 		char digits[24] = "";
@@ -274,7 +282,7 @@ int spool_read_own(const struct spool *s, const char *file, char **text, size_t 
 {
 	char path[SPOOL_PATH_MAX];
 	spool_path(s, file, path);
-	return read_file(path, text, size, e);
+	return read_file(path, OWN_MAX, text, size, e);
 }
 
 int spool_rename(const char *from, const char *to, const char *folder, struct error *e)
@@ -312,7 +320,7 @@ int spool_read_record(const struct spool *s, uint64_t id, struct job_record *r, 
 	char path[SPOOL_PATH_MAX], *text;
 	size_t size;
 	spool_job_path(s, id, "job.json", path);
-	int rc = read_file(path, &text, &size, e);
+	int rc = read_file(path, RECORD_MAX, &text, &size, e);
 	if (rc)
 		return rc == -ENOENT ? error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)id) : rc;
 	rc = record_from_json(text, size, r, e);

@@ -1,8 +1,10 @@
 /* Leases that two workers compute, and workers that are set aside, as transcripts. */
+#include "coordinator/core/roster.h"
 #include "tests/support/transcript.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
+#include <stdio.h>
 #include <string.h>
 
 #include <cmocka.h>
@@ -303,6 +305,44 @@ static void straggler(void **state)
 		NULL });
 }
 
+static void give_faults(struct farm *f, uint64_t peer, const char *certificate, const char *name)
+{
+	struct update u;
+	struct event ev = { .kind = EVENT_JOINED, .time = 10.0 + (double)peer,
+			    .join = { .peer = peer, .name = name, .certificate = certificate, .fingerprint = "A", .threads = 1 } };
+	farm_step(f, &ev, &u);
+	ev = (struct event){ .kind = EVENT_BATCH, .time = ev.time, .peer = peer, .lease = { .key = { .job = 1, .kind = LEASE_RENDER } } };
+	for (int i = 0; i < 3; i++)
+		farm_step(f, &ev, &u);
+	ev = (struct event){ .kind = EVENT_LEFT, .time = ev.time, .peer = peer };
+	farm_step(f, &ev, &u);
+}
+
+/* Who gives himself name after name is remembered by the last of them, and pushes out nobody of another certificate. */
+static void names_without_end(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	struct worker_status w;
+	char name[16];
+	transcript_play(f, (const char *const[]){ "[0] submit groups=1 -> j1 submitted, j1 is queued", NULL });
+	give_faults(f, 1, "b", "honest once");
+	for (uint64_t i = 2; i < 500; i++) {
+		snprintf(name, sizeof name, "n%u", (unsigned)i);
+		give_faults(f, i, "a", name);
+	}
+	uint64_t who = farm_next_aside(f, 0);
+	assert_true(farm_worker(f, who, &w) && strcmp(w.certificate, "b") == 0);
+	int count = 0;
+	while ((who = farm_next_aside(f, who))) {
+		assert_true(farm_worker(f, who, &w));
+		count++;
+	}
+	assert_int_equal(count, IDENTITY_ASIDE);
+	assert_string_equal(w.name, "n499");
+	farm_free(f);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -319,6 +359,7 @@ int main(void)
 		cmocka_unit_test(lives),
 		cmocka_unit_test(odd_one_out),
 		cmocka_unit_test(straggler),
+		cmocka_unit_test(names_without_end),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
