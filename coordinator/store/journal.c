@@ -16,8 +16,9 @@
 enum { PATH_MOST = 4200 };
 /* Room is taken for several records at once: a file system that is writing back makes whoever asks for it wait. */
 enum { AHEAD = 8, AHEAD_MOST = 1 << 28 };
-/* More than that does not wait in memory: whoever appends writes, too, as fast as the disk takes it. */
+/* More than that does not wait in memory, of all journals together: whoever appends writes, too, as fast as the disk takes it. */
 enum { UNWRITTEN_MOST = 1 << 28 };
+static _Atomic uint64_t unwritten_bytes;
 
 struct head { /* of the file */
 	char magic[8];
@@ -122,6 +123,7 @@ static void pop(struct journal *j)
 	j->waiting -= size_of(&n->record);
 	j->written += size_of(&n->record);
 	pthread_mutex_unlock(&j->list);
+	unwritten_bytes -= size_of(&n->record);
 	buf_fini(&n->a);
 	buf_fini(&n->b);
 	mem_free(n);
@@ -167,12 +169,22 @@ static int cut_off(struct journal *j)
 	return disk_ftruncate(j->fd, (off_t)j->written);
 }
 
-/* All that waited when this began. */
+uint64_t journal_bytes(struct journal *j)
+{
+	pthread_mutex_lock(&j->list);
+	uint64_t bytes = j->written + j->waiting;
+	pthread_mutex_unlock(&j->list);
+	return bytes;
+}
+
+/* All that waited when this began, and no more: on a slow disk more would come for ever, and nobody hear that the first is stored. */
 static int write_waiting(struct journal *j)
 {
 	int rc = 0;
 	pthread_mutex_lock(&j->writer);
-	for (struct unwritten *n; !rc && !j->bad && (n = front(j));) {
+	uint64_t end = journal_bytes(j);
+	while (!rc && !j->bad && j->written < end) {
+		struct unwritten *n = front(j);
 		rc = write_one(j->fd, j->written, n);
 		if (!rc) {
 			pop(j);
@@ -329,14 +341,6 @@ int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_
 
 /* ---- appending ---- */
 
-uint64_t journal_bytes(struct journal *j)
-{
-	pthread_mutex_lock(&j->list);
-	uint64_t bytes = j->written + j->waiting;
-	pthread_mutex_unlock(&j->list);
-	return bytes;
-}
-
 static bool reserve(struct journal *j, uint64_t from, uint64_t size)
 {
 	if (disk_fallocate(j->fd, FALLOC_FL_KEEP_SIZE, (off_t)from, (off_t)size))
@@ -355,8 +359,10 @@ static int room_for(struct journal *j, uint64_t size, struct error *e)
 	int code = errno;
 	pthread_mutex_lock(&j->writer);
 	int cut = cut_off(j);
+	bool kept = j->written == end || reserve(j, j->written, end - j->written); /* what waits was promised its room */
 	pthread_mutex_unlock(&j->writer);
 	(void)cut;
+	(void)kept;
 	return fault(j, code, e);
 }
 
@@ -396,13 +402,13 @@ int journal_append(struct journal *j, enum journal_kind kind, double elapsed, co
 		n->b = *b;
 		memset(b, 0, sizeof *b);
 	}
+	uint64_t size = size_of(&n->record), bytes = unwritten_bytes += size;
 	pthread_mutex_lock(&j->list);
 	*j->last = n;
 	j->last = &n->next;
-	j->waiting += size_of(&n->record);
-	bool many = j->waiting > UNWRITTEN_MOST;
+	j->waiting += size;
 	pthread_mutex_unlock(&j->list);
-	if (many && !j->bad)
+	if (bytes > UNWRITTEN_MOST && !j->bad)
 		write_waiting(j); /* a journal that has become bad says so */
 	return 0;
 }

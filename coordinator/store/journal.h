@@ -1,7 +1,7 @@
 /*
  * A job's journal: what was merged since its last checkpoint, one record after the other in jobs/jN/journal.G (G counts the
  * checkpoints). A record is believed when its checksum fits; the first that does not, and all behind it, were not whole when
- * the machine stopped, and are cut off. What is appended waits in memory, up to 256 MB, until journal_sync writes it and flushes it:
+ * the machine stopped, and are cut off. What is appended waits in memory, up to 256 MB of all journals, until journal_sync writes it and flushes it:
  * after that it is durable. So whoever appends does not wait for a disk that is busy.
  * A file of which a call failed is bad: it is neither written nor flushed again, because a flush that failed may have forgotten
  * what it did not write and would say next time that all is well. What is appended from then on stays in memory until
