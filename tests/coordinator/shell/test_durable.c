@@ -1,0 +1,315 @@
+/*
+ * What happens while the disk is asked: a checkpoint is held up in its last step, and meanwhile its job is cancelled or counts go on; a
+ * record that cannot be written is written later.
+ */
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "coordinator/shell/server.h"
+#include "tests/support/folder.h"
+#include "tests/support/scripted.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdatomic.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { STATE_BYTES = 3000, PATIENCE = 20000, TICKS_US = 500000 /* two of the coordinator's */ };
+static const char scene[] = "<scene/>";
+
+/* Shared with the coordinator, which is another process. */
+static struct {
+	_Atomic bool hold_up, held_up, go_on; /* a checkpoint on its way to its name */
+	_Atomic bool fail_folder;             /* then the flush of that name fails */
+	_Atomic bool fail_records;
+} *disk;
+static _Thread_local bool fail_next_folder;
+
+static struct plan plan;
+static struct plan_request request = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .mutations = 3200,
+				      .max_depth = 5, .groups = 2, .chains = 8, .epoch = 100, .bootstrap = 64};
+static pid_t pid;
+static char spool[100], port_file[100];
+static struct scripted *client, *worker;
+
+/* ---- the coordinator ---- */
+
+static bool ends_with(const char *path, const char *end)
+{
+	size_t n = strlen(path), m = strlen(end);
+	return n >= m && strcmp(path + n - m, end) == 0;
+}
+
+static int own_rename(const char *from, const char *to)
+{
+	if (ends_with(to, "/job.json") && disk->fail_records) {
+		errno = EIO;
+		return -1;
+	}
+	if (ends_with(to, "/checkpoint") && disk->hold_up) {
+		disk->held_up = true;
+		while (!disk->go_on)
+			usleep(1000);
+		fail_next_folder = disk->fail_folder;
+		disk->hold_up = false;
+	}
+	return disk_system.rename(from, to);
+}
+
+static int own_open(const char *path, int flags, mode_t mode)
+{
+	if ((flags & O_DIRECTORY) && fail_next_folder) {
+		fail_next_folder = false;
+		errno = EIO;
+		return -1;
+	}
+	return disk_system.open(path, flags, mode);
+}
+
+static void serve(void)
+{
+	struct disk own = disk_system;
+	struct server_config c;
+	struct error e;
+	prctl(PR_SET_PDEATHSIG, SIGKILL);
+	own.rename = own_rename;
+	own.open = own_open;
+	disk_use(&own);
+	server_config_init(&c);
+	c.listen = "127.0.0.1:0";
+	c.spool = spool;
+	c.port_file = port_file;
+	c.journal_bytes = 2000;
+	c.keep_bytes = 0;
+	c.retry_seconds = 0.05;
+	log_set_level(LOG_LEVEL_ERROR);
+	_exit(server_run(&c, &e) ? 1 : 0);
+}
+
+static void start(void)
+{
+	unsigned port = 0;
+	unlink(port_file);
+	fflush(NULL);
+	pid = fork();
+	if (pid == 0)
+		serve();
+	for (int i = 0; i < PATIENCE && !port; i++) {
+		FILE *f = fopen(port_file, "r");
+		if (f && fscanf(f, "%u", &port) != 1)
+			port = 0;
+		if (f)
+			fclose(f);
+		usleep(1000);
+	}
+	client = scripted_call((uint16_t)port, FARM__ROLE__ROLE_CLIENT);
+	worker = scripted_call((uint16_t)port, FARM__ROLE__ROLE_WORKER);
+	assert_true(client && worker && scripted_want(worker, 3));
+}
+
+static void end(int signal, bool well)
+{
+	int status;
+	scripted_hang_up(client);
+	scripted_hang_up(worker);
+	kill(pid, signal);
+	assert_true(waitpid(pid, &status, 0) == pid);
+	assert_true(!well || (WIFEXITED(status) && WEXITSTATUS(status) == 0));
+}
+
+/* ---- its peers ---- */
+
+static uint64_t submit(void)
+{
+	assert_true(scripted_submit(client, &request, scene));
+	const Farm__Envelope *m = scripted_hear(client);
+	if (m && m->body_case == FARM__ENVELOPE__BODY_SUBMIT_ANSWER && m->submit_answer->n_missing)
+		m = scripted_send_scene(client, scene) ? scripted_hear(client) : NULL;
+	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_SUBMIT_ANSWER && m->submit_answer->job);
+	return m->submit_answer->job;
+}
+
+static void cancel(uint64_t job)
+{
+	Farm__Cancel c;
+	Farm__Envelope m;
+	farm__cancel__init(&c);
+	farm__envelope__init(&m);
+	c.job = job;
+	m.body_case = FARM__ENVELOPE__BODY_CANCEL;
+	m.cancel = &c;
+	assert_true(scripted_say(client, &m, NULL, 0));
+	const Farm__Envelope *answer = scripted_hear(client);
+	assert_true(answer && answer->body_case == FARM__ENVELOPE__BODY_DONE && answer->done->ok);
+}
+
+static void fail_lease(const struct lease_key *k)
+{
+	Farm__LeaseFailed f;
+	Farm__LeaseKey key;
+	Farm__Envelope m;
+	char text[] = "it does not work";
+	farm__lease_failed__init(&f);
+	farm__envelope__init(&m);
+	lease_key_to_wire(k, &key);
+	f.key = &key;
+	f.text = text;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
+	m.lease_failed = &f;
+	assert_true(scripted_say(worker, &m, NULL, 0));
+}
+
+/* Answers leases until this is so, but the first one of the image, if it is to be kept. */
+static void work(const _Atomic bool *until, struct lease_key *keep)
+{
+	while (!*until) {
+		struct grant grant;
+		struct error e;
+		if (!scripted_has(worker, 5))
+			continue;
+		const Farm__Envelope *m = scripted_hear(worker);
+		assert_non_null(m);
+		if (m->body_case == FARM__ENVELOPE__BODY_JOB_END)
+			return;
+		if (m->body_case != FARM__ENVELOPE__BODY_LEASE_GRANT)
+			continue;
+		assert_int_equal(grant_unpack(&grant, m->lease_grant, worker->reader.payload.bytes, worker->reader.payload.size, &e), 0);
+		if (keep && grant.key.kind == LEASE_RENDER && !keep->job) {
+			*keep = grant.key;
+		} else {
+			struct batch b = scripted_batch(&grant.key, &plan, STATE_BYTES);
+			assert_true(scripted_send(worker, &b, &plan));
+			batch_fini(&b);
+		}
+		grant_fini(&grant);
+	}
+}
+
+static void await_state(const char *state)
+{
+	for (int i = 0; i < PATIENCE / 10; i++) {
+		assert_true(scripted_list(client));
+		const Farm__Envelope *m = scripted_hear(client);
+		assert_true(m && m->job_list_answer->n_jobs == 1);
+		if (strcmp(m->job_list_answer->jobs[0]->state, state) == 0)
+			return;
+		usleep(10000);
+	}
+	fail_msg("it is never %s", state);
+}
+
+/* ---- tests ---- */
+
+static int set_up(void **state)
+{
+	struct error e;
+	int rc = folder_set_up(state);
+	snprintf(spool, sizeof spool, "%s/spool", folder);
+	snprintf(port_file, sizeof port_file, "%s/port", folder);
+	memset(disk, 0, sizeof *disk);
+	return rc ? rc : plan_make(&request, &plan, &e);
+}
+
+/* The end of the job comes while it is held because of the checkpoint. */
+static void cancelled_while_its_checkpoint_fails(void **state)
+{
+	(void)state;
+	disk->hold_up = disk->fail_folder = true;
+	start();
+	uint64_t job = submit();
+	work(&disk->held_up, NULL);
+	cancel(job);
+	disk->go_on = true;
+	await_state("cancelled");
+	end(SIGTERM, true);
+}
+
+static void counted_while_a_checkpoint_is_written(void **state)
+{
+	(void)state;
+	struct lease_key kept = {.job = 0};
+	struct job_record r;
+	struct spool *s;
+	struct error e;
+	disk->hold_up = true;
+	start();
+	uint64_t job = submit();
+	work(&disk->held_up, &kept);
+	assert_true(kept.job == job);
+	fail_lease(&kept);
+	usleep(TICKS_US);
+	disk->go_on = true;
+	usleep(TICKS_US);
+	end(SIGKILL, false);
+	start();
+	cancel(job);
+	await_state("cancelled");
+	end(SIGTERM, true);
+	assert_int_equal(spool_open(&s, spool, &e), 0);
+	assert_int_equal(spool_read_record(s, job, &r, &e), 0);
+	spool_close(s);
+	assert_int_equal(r.failures, 1);
+}
+
+static void *copy_of(const void *bytes, size_t size)
+{
+	void *copy = malloc(size);
+	assert_non_null(copy);
+	return memcpy(copy, bytes, size);
+}
+
+/* It went on after its end, without films, and is cancelled: its earlier result is there, and nothing to make another one of. */
+static void a_record_is_written_later(void **state)
+{
+	(void)state;
+	static _Atomic bool never;
+	struct ledger *l;
+	struct ledger_job j;
+	struct error e;
+	char path[150];
+	snprintf(path, sizeof path, "%s/jobs.db", spool);
+	start();
+	uint64_t job = submit();
+	end(SIGKILL, false);
+	assert_int_equal(ledger_open(&l, path, &e), 0);
+	assert_int_equal(ledger_get(l, job, &j, &e), 1);
+	void *submission = copy_of(j.submission, j.submission_size), *frame = copy_of(j.plan, j.plan_size);
+	ledger_close(l);
+	start();
+	work(&never, NULL);
+	await_state("done");
+	end(SIGTERM, true);
+	assert_int_equal(ledger_open(&l, path, &e), 0);
+	j = (struct ledger_job){.id = job, .submission = submission, .submission_size = j.submission_size, .plan = frame, .plan_size = j.plan_size};
+	assert_int_equal(ledger_extend(l, &j, &e), 0);
+	ledger_close(l);
+	free(submission);
+	free(frame);
+	start();
+	disk->fail_records = true;
+	cancel(job);
+	usleep(TICKS_US);
+	await_state("running");
+	disk->fail_records = false;
+	await_state("cancelled");
+	end(SIGTERM, true);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(cancelled_while_its_checkpoint_fails, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(counted_while_a_checkpoint_is_written, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_record_is_written_later, set_up, folder_tear_down),
+	};
+	disk = mmap(NULL, sizeof *disk, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	return disk == MAP_FAILED ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
+}
