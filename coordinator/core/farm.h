@@ -101,6 +101,7 @@ struct job_status {
 	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
 	char text[256];    /* why it failed, or the last failure of a lease */
 	char waiting[256]; /* why nothing is being done for it; "" when something is */
+	char owners_place[160], owners_waiting[256]; /* for its owner: without the ids of other owners' jobs */
 };
 
 enum peer_state { PEER_ACTIVE, PEER_SILENT, PEER_ASIDE };

@@ -109,27 +109,39 @@ static double due(const struct farm *f, const struct job *j, uint32_t machines, 
 	return fmin(wants(j, leases_each), v.above ? v.level : INFINITY);
 }
 
-/* "; j4, j7 and 2 more come first" */
-static void put_others(struct text *t, const struct farm *f, const struct job *j, bool higher, double leases_each)
+/* "; j4, j7 and 2 more come first"; only: whose jobs may be named, NULL: anybody's. "; 2 jobs of other owners come first" */
+static void put_others(struct text *t, const struct farm *f, const struct job *j, const struct owner *only, bool higher, double leases_each)
 {
 	enum { NAMED = 3 };
+	const char *intro = higher ? "; " : "; by turns with ";
+	uint64_t name[NAMED];
 	uint32_t count = 0, named = 0;
-	for (int pass = 0; pass < 2; pass++)
-		for (uint32_t i = 0; i < f->live_count; i++) {
-			const struct job *r = f->live[i];
-			if (r == j || !share_competes(r, j) || !(wants(r, leases_each) > 0) ||
-			    !(higher ? r->priority > j->priority : r->priority == j->priority))
-				continue;
-			if (pass == 0)
-				count++;
-			else if (named < NAMED)
-				text_put(t, "%sj%llu", named++ == 0 ? (higher ? "; " : "; by turns with ") :
-						       named == count ? " and " : ", ", (unsigned long long)r->id);
-		}
-	if (count > NAMED)
-		text_put(t, " and %u more", count - NAMED);
+	for (uint32_t i = 0; i < f->live_count; i++) {
+		const struct job *r = f->live[i];
+		if (r == j || !share_competes(r, j) || !(wants(r, leases_each) > 0) ||
+		    !(higher ? r->priority > j->priority : r->priority == j->priority))
+			continue;
+		count++;
+		if (named < NAMED && (!only || r->owner == only))
+			name[named++] = r->id;
+	}
+	for (uint32_t i = 0; i < named; i++)
+		text_put(t, "%sj%llu", i == 0 ? intro : i + 1 == count ? " and " : ", ", (unsigned long long)name[i]);
+	if (count > named && named)
+		text_put(t, " and %u more", count - named);
+	else if (count && !named)
+		text_put(t, "%s%u job%s of %s", intro, count, count == 1 ? "" : "s", count == 1 ? "another owner" : "other owners");
 	if (count && higher)
 		text_put(t, count == 1 ? " comes first" : " come first");
+}
+
+static void put_place(const struct farm *f, const struct job *j, const struct owner *only, const struct share *s, double leases_each,
+		      char *place, size_t size)
+{
+	struct text t = {place, size};
+	text_put(&t, "%u of %u machine%s", s->workers, s->machines, s->machines == 1 ? "" : "s");
+	put_others(&t, f, j, only, true, leases_each);
+	put_others(&t, f, j, only, false, leases_each);
 }
 
 void share_of(const struct farm *f, const struct job *j, struct share *out)
@@ -141,8 +153,6 @@ void share_of(const struct farm *f, const struct job *j, struct share *out)
 	out->workers = workers_of(j);
 	out->machines = machines_of(f, j, &leases_each);
 	out->machines_due = due(f, j, out->machines, leases_each);
-	struct text t = {out->place, sizeof out->place};
-	text_put(&t, "%u of %u machine%s", out->workers, out->machines, out->machines == 1 ? "" : "s");
-	put_others(&t, f, j, true, leases_each);
-	put_others(&t, f, j, false, leases_each);
+	put_place(f, j, NULL, out, leases_each, out->place, sizeof out->place);
+	put_place(f, j, j->owner, out, leases_each, out->owners_place, sizeof out->owners_place);
 }

@@ -16,6 +16,7 @@ struct share {
 	uint32_t machines; /* that might */
 	double machines_due; /* what it would have of them */
 	char place[160];   /* "3 of 8 machines; j4 and j7 come first"; "" when it has ended */
+	char owners_place[160]; /* the same without the ids of other owners' jobs */
 };
 
 void share_of(const struct farm *f, const struct job *j, struct share *out);

@@ -67,11 +67,23 @@ static bool someone_avoids(const struct farm *f, const struct job *j)
 	return false;
 }
 
-static void why_waiting(const struct farm *f, const struct job *j, char *text, size_t size)
+/* all: other owners' jobs are named. */
+static void put_busy(char *text, size_t size, const struct job *j, const struct job *other, bool all)
+{
+	bool higher = other->priority > j->priority;
+	if (!all && other->owner != j->owner)
+		text_copy(text, size, higher ? "waits for a job of higher priority of another owner" : "workers busy with a job of another owner");
+	else
+		text_print(text, size, higher ? "waits for j%llu of higher priority (%d)" : "workers busy with j%llu (priority %d)",
+			   (unsigned long long)other->id, other->priority);
+}
+
+/* The job that it waits for; NULL: it does not, or for something else. */
+static const struct job *why_waiting(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	text[0] = 0;
 	if (!job_is_live(j) || (j->leases_out && !job_is_held(j)))
-		return;
+		return NULL;
 	uint32_t active = active_workers(f);
 	const struct job *other = busy_with(f, j);
 	if (*j->held[HOLD_STORAGE] && *j->held[HOLD_ORDERED])
@@ -89,18 +101,26 @@ static void why_waiting(const struct farm *f, const struct job *j, char *text, s
 	else if (j->class && !j->mixed && j->class->active == 0)
 		snprintf(text, size, "no worker with fingerprint %s (%u with others)", j->fingerprint, active);
 	else if (verify_why(f, j, text, size))
-		return;
+		return NULL;
 	else if (answer_all_failed(f, j))
 		text_print(text, size, "no worker can compute it: %s", j->text);
 	else if (someone_avoids(f, j))
 		text_print(text, size, "its workers failed and pause before they try again; the last one: %s", j->text);
-	else if (other && other->priority > j->priority)
-		snprintf(text, size, "waits for j%llu of higher priority (%d)", (unsigned long long)other->id, other->priority);
-	else if (other)
-		snprintf(text, size, "workers busy with j%llu (priority %d)", (unsigned long long)other->id,
-			 other->priority);
-	else
+	else if (!other)
 		snprintf(text, size, "no worker asks for work");
+	else {
+		put_busy(text, size, j, other, true);
+		return other;
+	}
+	return NULL;
+}
+
+static void fill_waiting(const struct farm *f, const struct job *j, struct job_status *s)
+{
+	const struct job *other = why_waiting(f, j, s->waiting, sizeof s->waiting);
+	memcpy(s->owners_waiting, s->waiting, sizeof s->waiting);
+	if (other)
+		put_busy(s->owners_waiting, sizeof s->owners_waiting, j, other, false);
 }
 
 static void fill_counts(const struct job *j, struct job_status *s)
@@ -127,6 +147,7 @@ static void fill_share(const struct farm *f, const struct job *j, struct job_sta
 	s->machines = share.machines;
 	s->share = share.machines_due;
 	memcpy(s->place, share.place, sizeof s->place);
+	memcpy(s->owners_place, share.owners_place, sizeof s->owners_place);
 }
 
 bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s)
@@ -168,7 +189,7 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 	fill_counts(j, s);
 	fill_share(f, j, s);
 	memcpy(s->text, j->text, sizeof s->text);
-	why_waiting(f, j, s->waiting, sizeof s->waiting);
+	fill_waiting(f, j, s);
 	return true;
 }
 

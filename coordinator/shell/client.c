@@ -165,16 +165,17 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 
 /* Whoever has a certificate sees the own jobs alone, an operator all. Jobs of others are not there: that they are would be an
  * answer, too. */
-static bool may_see(const struct session *p, const struct job_record *r)
+static bool may_see(const struct session *p, struct job_view *v)
 {
 	if (p->who.role == TLS_NOBODY || p->who.role == TLS_OPERATOR)
 		return true;
-	return *p->who.name && strcmp(p->who.name, r->owner) == 0;
+	view_hide_others(v);
+	return *p->who.name && strcmp(p->who.name, v->record.owner) == 0;
 }
 
 bool session_finds_job(const struct session *p, uint64_t job, struct job_view *v)
 {
-	return server_view(p->server, job, v) && may_see(p, &v->record);
+	return server_view(p->server, job, v) && may_see(p, v);
 }
 
 static void take_list(struct session *p)
@@ -187,7 +188,7 @@ static void take_list(struct session *p)
 	farm__job_list_answer__init(&answer);
 	farm__envelope__init(&m);
 	for (size_t i = 0; status && list && i < count; i++) {
-		if (!may_see(p, &views[i].record))
+		if (!may_see(p, &views[i]))
 			continue;
 		view_to_wire(&views[i], &status[i]);
 		list[answer.n_jobs++] = &status[i];

@@ -467,7 +467,7 @@ void session_tick(struct session *p)
 	Farm__Envelope m;
 	if (!p->watched || p->state != SESSION_CLIENT || conn_unsent(p->conn))
 		return;
-	if (!server_view(p->server, p->watched, &v)) {
+	if (!session_finds_job(p, p->watched, &v)) {
 		session_fault(p, "the job is no longer known");
 		return;
 	}

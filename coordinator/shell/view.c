@@ -50,6 +50,14 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	r->duplicates = s->duplicates;
 	r->timeouts = s->timeouts;
 	text_copy(v->waiting, sizeof v->waiting, s->waiting);
+	text_copy(v->owners_place, sizeof v->owners_place, s->owners_place);
+	text_copy(v->owners_waiting, sizeof v->owners_waiting, s->owners_waiting);
+}
+
+void view_hide_others(struct job_view *v)
+{
+	memcpy(v->place, v->owners_place, sizeof v->place);
+	memcpy(v->waiting, v->owners_waiting, sizeof v->waiting);
 }
 
 static const char *why_of(const struct job_view *v)

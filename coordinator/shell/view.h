@@ -22,11 +22,15 @@ struct job_view {
 	double share;      /* machines that it would have by its priority; negative: not known */
 	char place[160];   /* in words */
 	char waiting[256]; /* why nothing is being done for it */
+	char owners_place[160], owners_waiting[256]; /* the same for its owner */
 };
 
 void view_of_record(struct job_view *v, const struct job_record *r);
 /* Puts the core's view of a living job into v, whose record has the job's names and times already. */
 void view_add_status(struct job_view *v, const struct job_status *s);
+
+/* For its owner, who is to know nothing of other owners' jobs. */
+void view_hide_others(struct job_view *v);
 
 void view_to_wire(const struct job_view *v, Farm__JobStatus *out); /* borrows v's texts */
 struct view_looks {

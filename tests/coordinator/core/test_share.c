@@ -78,9 +78,11 @@ static void by_priority_and_owner(void **state)
 	has_share(f, 3, 1.5);
 	has_share(f, 4, 1);
 	assert_string_equal(status(f, 3).place, "0 of 8 machines; j2 comes first; by turns with j1 and j4");
+	assert_string_equal(status(f, 3).owners_place, "0 of 8 machines; 1 job of another owner comes first; by turns with j4 and 1 more");
 	play(f, "[0] submit groups=16 priority=-1 owner=eve -> j5 submitted, j5 is queued");
 	has_share(f, 5, 0);
 	assert_string_equal(status(f, 5).place, "0 of 8 machines; j2, j1, j3 and 1 more come first");
+	assert_string_equal(status(f, 5).owners_place, "0 of 8 machines; 4 jobs of other owners come first");
 	play(f, "[0] hold order j2 held by ann -> -");
 	has_share(f, 2, 0);
 	has_share(f, 1, 4);
@@ -121,8 +123,15 @@ static void who_comes_first(void **state)
 		"[0] w1 joins A threads=1 -> -",
 		"[0] w1 wants 2 -> j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j2 g1 p0 boot", NULL });
 	assert_string_equal(status(f, 1).waiting, "waits for j2 of higher priority (7)");
+	assert_string_equal(status(f, 1).owners_waiting, status(f, 1).waiting); /* both are his own */
 	assert_int_equal(status(f, 2).workers, 1); /* one machine, two leases */
 	assert_string_equal(status(f, 2).place, "1 of 1 machine");
+	play(f, "[0] submit groups=4 owner=ann -> j3 submitted, j3 is queued");
+	assert_string_equal(status(f, 3).waiting, "waits for j2 of higher priority (7)");
+	assert_string_equal(status(f, 3).owners_waiting, "waits for a job of higher priority of another owner");
+	play(f, "[0] priority j2 0 -> -");
+	assert_string_equal(status(f, 3).waiting, "workers busy with j2 (priority 0)");
+	assert_string_equal(status(f, 3).owners_waiting, "workers busy with a job of another owner");
 	farm_free(f);
 }
 

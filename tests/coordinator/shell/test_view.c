@@ -105,7 +105,9 @@ static void shows_the_share(void **state)
 {
 	(void)state;
 	struct job_record r = {.id = 1, .state = "running", .owner = "ann"};
-	struct job_status s = {.workers = 3, .machines = 8, .share = 2.5, .place = "3 of 8 machines; j4 comes first", .looks = &r.looks,
+	struct job_status s = {.workers = 3, .machines = 8, .share = 2.5, .place = "3 of 8 machines; j4 comes first",
+			       .owners_place = "3 of 8 machines; 1 job of another owner comes first", .waiting = "waits for j4",
+			       .owners_waiting = "waits for a job of another owner", .looks = &r.looks,
 			       .state = JOB_RUNNING};
 	struct job_view v;
 	Farm__JobStatus wire;
@@ -121,6 +123,10 @@ static void shows_the_share(void **state)
 	assert_true(wire.workers == 3 && wire.share == 2.5);
 	assert_string_equal(wire.owner, "ann");
 	assert_string_equal(wire.place, s.place);
+	view_hide_others(&v);
+	view_to_wire(&v, &wire);
+	assert_string_equal(wire.place, "3 of 8 machines; 1 job of another owner comes first");
+	assert_string_equal(wire.why, "waits for a job of another owner");
 	view_of_record(&v, &r);
 	o = view_to_json(&v);
 	assert_true(json_is_null(json_object_get(o, "share")));
