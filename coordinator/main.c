@@ -26,9 +26,10 @@ static const char doc[] =
 	"Exit codes: 0 stopped by SIGTERM or SIGINT, 1 failed, 2 usage.";
 
 enum {
-	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_INSECURE, OPTION_HEARTBEAT, OPTION_BLOBS, OPTION_TLS,
-	OPTION_TLS_CHECK, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS, OPTION_JOURNAL, OPTION_KEEP, OPTION_FILM_MEMORY, OPTION_DAYS, OPTION_GB, OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE, OPTION_BANDWIDTH, OPTION_CONNECTIONS,
-	OPTION_GROUP
+	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_GROUP, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_HEARTBEAT, OPTION_BLOBS,
+	OPTION_TLS, OPTION_TLS_CHECK, OPTION_INSECURE, OPTION_JOURNAL, OPTION_CONNECTIONS, OPTION_FILM_MEMORY,
+	OPTION_KEEP, OPTION_DAYS, OPTION_GB, OPTION_BANDWIDTH, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS,
+	OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE,
 };
 
 static const struct argp_option options[] = {
@@ -51,8 +52,8 @@ static const struct argp_option options[] = {
 	{"worker-bandwidth", OPTION_BANDWIDTH, "MB/S", 0,
 	 "Tiles that one thread of a worker may send on average: epochs of new jobs are at least that long (any)", 0},
 	{"quota-jobs", OPTION_JOBS, "N", 0, "Jobs of a client that have not ended", 0},
-	{"quota-assets", OPTION_ASSETS, "MB", 0, "Their files together", 0},
-	{"quota-film", OPTION_FILM, "PIXELS", 0, "Of a job's film", 0},
+	{"quota-assets", OPTION_ASSETS, "MB", 0, "Their files together, and those on their way", 0},
+	{"quota-film", OPTION_FILM, "MB", 0, "Films of a job: 72 bytes a pixel of its crop and group (--groups, up to 16 by itself)", 0},
 	{"quota-mutations", OPTION_MUTATIONS, "N", 0, "Of a job, or samples; then each must say how many", 0},
 	{"verify", OPTION_VERIFY, "P", 0, "Least share of the epochs of each job, or percent, that two workers must compute alike (0)", 0},
 	{"max-faults", OPTION_FAULTS, "N", 0, "Wrong results, or invalid ones in a row, after which a worker is set aside for good (3)", 0},
@@ -133,7 +134,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		c->quota.asset_bytes = (uint64_t)(1e6 * number(state, "--quota-assets", arg, 1e-6, 1e12));
 		return 0;
 	case OPTION_FILM:
-		c->quota.pixels = (uint64_t)number(state, "--quota-film", arg, 1, 1e15);
+		c->quota.film_bytes = (uint64_t)(1e6 * number(state, "--quota-film", arg, 1e-6, 1e12));
 		return 0;
 	case OPTION_MUTATIONS:
 		c->quota.mutations = (uint64_t)number(state, "--quota-mutations", arg, 1, 1e18);

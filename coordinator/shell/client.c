@@ -81,6 +81,9 @@ int session_within_quota(const struct session *p, uint64_t job, const struct pla
 		has.jobs++;
 		has.asset_bytes += bytes_of(order_submit(o));
 	}
+	for (const struct session *other = p->server->sessions; other; other = other->next)
+		if (other != p && other->upload && strcmp(other->who.name, p->who.name) == 0)
+			has.asset_bytes += bytes_of(other->upload->submit.message->submit);
 	return quota_check(&p->server->config.quota, &has, plan, bytes_of(m), e);
 }
 

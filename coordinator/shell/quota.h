@@ -12,8 +12,8 @@
 
 struct quota { /* 0: no limit */
 	uint64_t jobs;        /* that have not ended, of one owner */
-	uint64_t asset_bytes; /* of their files, each job's counted */
-	uint64_t pixels;      /* of a job's film */
+	uint64_t asset_bytes; /* of their files, each job's counted, and of those that are on their way */
+	uint64_t film_bytes;  /* of a job's films, as canvas_bytes */
 	uint64_t mutations;   /* or samples, of a job; then every job must have such a bound */
 };
 

@@ -1,11 +1,11 @@
-"""A client with a good certificate and bad manners: intruder.py PORT FOLDER prints one line an attempt, "WHAT|ANSWER", and
+"""A client with a good certificate and bad manners: intruder.py PORT FOLDER ANOTHER'S prints one line an attempt, "WHAT|ANSWER", and
 fails when one of them is not hung up on or refused within four seconds. With a worker at the coordinator: also scenes that reach
 for what is not in their bundle, submitted by hand so that no program of ours looks at them before."""
 import hashlib, os, re, socket, ssl, struct, sys, time
 
 here = os.path.dirname(os.path.abspath(__file__))
 VERSION = int(re.search(r"FARM_VERSION = (\d+)", open(here + "/../../common/wire/envelope.h").read()).group(1))
-port, folder = int(sys.argv[1]), sys.argv[2]
+port, folder, another = int(sys.argv[1]), sys.argv[2], sys.argv[3]
 
 
 def field(number, value):
@@ -25,31 +25,48 @@ def frame(message, payload=b""):
     return struct.pack(">II", len(message), len(payload)) + message + payload
 
 
-def ask(words):
-    """All that comes back until it hangs up, or until an answer to a submission is in it."""
+def call(seconds, who=None):
+    who = who or folder
     context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
     context.check_hostname = False
-    context.load_verify_locations(folder + "/ca.pem")
-    context.load_cert_chain(folder + "/cert.pem", folder + "/key.pem")
+    context.load_verify_locations(who + "/ca.pem")
+    context.load_cert_chain(who + "/cert.pem", who + "/key.pem")
+    s = context.wrap_socket(socket.create_connection(("127.0.0.1", port)))
+    s.settimeout(seconds)
+    return s
+
+
+def say(s, words, until):
+    """All that comes back until it hangs up, or until that is in it."""
     heard = b""
-    with socket.create_connection(("127.0.0.1", port)) as plain:
-        plain.settimeout(4)
-        with context.wrap_socket(plain) as s:
-            try:
-                s.sendall(words)
-                while b"bundle" not in heard:
-                    got = s.recv(4096)
-                    if not got:
-                        break
-                    heard += got
-            except (ssl.SSLEOFError, ConnectionResetError, BrokenPipeError):
-                pass
+    try:
+        s.sendall(words)
+        while until not in heard:
+            got = s.recv(4096)
+            if not got:
+                break
+            heard += got
+    except (ssl.SSLEOFError, ConnectionResetError, BrokenPipeError, TimeoutError):
+        pass
     return heard
+
+
+def ask(words):
+    with call(4) as s:
+        return say(s, words, b"bundle")
 
 
 def submit(*names, scene=None):
     files = b"".join(field(8, field(1, name) + field(2, bytes(32)) + field(3, 1)) for name in names)
     return frame(field(40, field(2, scene or names[0]) + files))
+
+
+plan = field(1, b"path") + field(2, 0) + field(3, 48) + field(4, 40) + field(9, 1) + field(11, 4) + field(15, 1) + field(16, 8)
+
+
+def announce(size):
+    """The submission of a file that nobody has."""
+    return frame(field(40, field(2, b"a") + field(6, plan) + field(8, field(1, b"a") + field(2, os.urandom(32)) + field(3, size))))
 
 
 # A box, and in it what a scene may not have.
@@ -69,7 +86,6 @@ def mesh(name):
 def smuggle(scene, files=(), sentence=b""):
     """Submits scene and files (name, content) by hand; all that is said until the job has failed."""
     bundle = [(b"box.xml", scene), (b"meshes/wedge.obj", wedge), *files]
-    plan = field(1, b"path") + field(2, 0) + field(3, 48) + field(4, 40) + field(9, 1) + field(11, 4) + field(15, 1) + field(16, 8)
     hashed = {hashlib.sha256(c).digest(): c for _, c in bundle}
     named = b"".join(field(8, field(1, n) + field(2, hashlib.sha256(c).digest()) + field(3, len(c))) for n, c in bundle)
     words = hello + frame(field(40, field(1, b"smuggled") + field(2, b"box.xml") + field(6, plan) + named))
@@ -79,25 +95,19 @@ def smuggle(scene, files=(), sentence=b""):
         known.add(h)
         words += frame(field(11, field(1, h) + field(3, len(c))), c)
     job = 0
-    context = ssl.SSLContext(ssl.PROTOCOL_TLS_CLIENT)
-    context.check_hostname = False
-    context.load_verify_locations(folder + "/ca.pem")
-    context.load_cert_chain(folder + "/cert.pem", folder + "/key.pem")
     heard, end = b"", time.monotonic() + 20
-    with socket.create_connection(("127.0.0.1", port)) as plain:
-        plain.settimeout(20)
-        with context.wrap_socket(plain) as s:
-            s.sendall(words)
-            while sentence not in heard and time.monotonic() < end:
-                got = s.recv(65536)
-                if not got:
-                    break
-                heard += got
-                # Envelope.submit_answer = 41 with its number of the job; the other answers of that kind have none.
-                found = re.search(rb"\xca\x02.{1,2}?\x08([\x01-\x7f])\x22", heard, re.S)
-                if found and not job:
-                    job = found.group(1)[0]
-                    s.sendall(frame(field(46, field(1, job))))
+    with call(20) as s:
+        s.sendall(words)
+        while sentence not in heard and time.monotonic() < end:
+            got = s.recv(65536)
+            if not got:
+                break
+            heard += got
+            # Envelope.submit_answer = 41 with its number of the job; the other answers of that kind have none.
+            found = re.search(rb"\xca\x02.{1,2}?\x08([\x01-\x7f])\x22", heard, re.S)
+            if found and not job:
+                job = found.group(1)[0]
+                s.sendall(frame(field(46, field(1, job))))
     return heard
 
 
@@ -160,6 +170,14 @@ for what, words, sentence in attempts:
     if sentence not in heard:
         sys.exit(f"{what}: it says {heard!r}")
     print(f"{what}|{sentence.decode() or 'hung up'}")
+# What one owner has on its way counts on all connections, what others have does not.
+what, goes_on = "files beyond the quota, on two connections", b"samples a pixel"
+with call(4) as first, call(4) as second, call(4, another) as other:
+    for s, sentence in (first, goes_on), (second, b"quota: its files"), (other, goes_on):
+        heard = say(s, hello + announce(60000), sentence)
+        if sentence not in heard:
+            sys.exit(f"{what}: it says {heard!r}")
+print(f"{what}|quota: its files")
 if b"done" not in smuggle(box(b""), (), b"done"):
     sys.exit("a box that is as it should be is refused, too")
 for what, scene, files, sentence in scenes:

@@ -62,7 +62,7 @@ ca worker eve-node --ca "$DIR/other"
 ca revoke gone
 
 "$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" --integrator path --spp 16 2>>"$DIR/render.log"
-start_coordinator --tls "$CA/coordinator" --tls-check 0.5
+start_coordinator --tls "$CA/coordinator" --tls-check 0.5 --quota-assets 0.1
 start_worker node1 --tls "$CA/node"
 start_worker node2 --tls "$CA/node"
 start_worker lost --tls "$CA/lost"
@@ -119,7 +119,7 @@ row "HTTP to the TLS port" refused "an alert, and hung up"
 
 # A good certificate and bad manners.
 tricks=$(cd "$HERE" && pwd)/intruder.py
-(cd "$DIR" && exec "${PYTHON:-python3}" -B "$tricks" "${COORDINATOR#*:}" "$CA/ann") >"$DIR/tricks" 2>"$DIR/err.log" || fail "$(cat "$DIR/err.log")"
+(cd "$DIR" && exec "${PYTHON:-python3}" -B "$tricks" "${COORDINATOR#*:}" "$CA/ann" "$CA/bob") >"$DIR/tricks" 2>"$DIR/err.log" || fail "$(cat "$DIR/err.log")"
 while IFS='|' read -r what answer; do
 	tries "$what"
 	row "$what" refused "$answer"
@@ -228,14 +228,15 @@ ROWS=$((ROWS - 1))
 
 # The other way round: TLS to a port without; and only a coordinator can be one.
 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --port-file "$DIR/port2" --spool "$DIR/spool2" --status-socket "$DIR/status2" --tls "" \
-	--quota-jobs 2 --quota-film 5000 --quota-mutations 100000 --quota-assets 0.02 \
+	--quota-jobs 2 --quota-film 5 --quota-mutations 100000 --quota-assets 0.02 \
 	2>>"$DIR/plain-coordinator.log" &
 PIDS="$PIDS $!"
 until_true 10 test -s "$DIR/port2" || fail "the plain coordinator does not listen"
 refused "TLS to a port without" 6 "no TLS" $list --coordinator "127.0.0.1:$(cat "$DIR/port2")"
-# Its quotas; the box has 1,920 pixels and 2 KB. There is no worker, so that jobs stay.
+# Its quotas; the box has 1,920 pixels, which are one tile of 4.7 MB in 16 groups, and 2 KB. There is no worker, so that jobs stay.
 plain="$BIN/hslt-submit --coordinator 127.0.0.1:$(cat "$DIR/port2") --tls"
-refused "a film beyond the quota" 6 "quota: a film" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 1 --size 100x80
+refused "a film beyond the quota" 6 "quota: films" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 16 --size 100x80
+refused "groups beyond the quota" 6 "quota: films" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 64 --groups 64
 refused "samples beyond the quota" 6 "quota: .* samples" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --spp 1000
 refused "samples without a bound" 6 "quota: at most" $plain "" "$BOX" -o "$DIR/no.exr" --integrator path --target-error 1%
 cp -r "$(dirname "$BOX")" "$DIR/large"

@@ -1,4 +1,5 @@
 /* Quotas at their edges: what is exactly allowed passes, one more does not, and what overflows is more than anything. */
+#include "common/film/canvas.h"
 #include "coordinator/shell/quota.h"
 
 #include <stdarg.h>
@@ -46,8 +47,16 @@ static void edges(void **state)
 	assert_int_equal(check(&(struct quota){.asset_bytes = 10}, 0, 4, 7), -EDQUOT);
 	assert_int_equal(check(&(struct quota){.asset_bytes = 10}, 0, 11, 0), -EDQUOT);
 	assert_int_equal(check(&(struct quota){.asset_bytes = 10}, 0, 4, UINT64_MAX), -EDQUOT);
-	assert_int_equal(check(&(struct quota){.pixels = 5000}, 0, 0, 0), 0);
-	assert_int_equal(check(&(struct quota){.pixels = 4999}, 0, 0, 0), -EDQUOT);
+	uint64_t films = canvas_bytes(&plan);
+	assert_true(films >= UINT64_C(72) * 16 * 100 * 50);
+	assert_int_equal(check(&(struct quota){.film_bytes = films}, 0, 0, 0), 0);
+	assert_int_equal(check(&(struct quota){.film_bytes = films - 1}, 0, 0, 0), -EDQUOT);
+	plan.groups = 17;
+	assert_int_equal(check(&(struct quota){.film_bytes = films}, 0, 0, 0), -EDQUOT);
+	plan.crop_width = 50; /* of a film as large */
+	assert_int_equal(check(&(struct quota){.film_bytes = films}, 0, 0, 0), 0);
+	plan.groups = 16;
+	plan.crop_width = 100;
 	assert_int_equal(check(&(struct quota){.mutations = all}, 0, 0, 0), 0);
 	assert_int_equal(check(&(struct quota){.mutations = all - 1}, 0, 0, 0), -EDQUOT);
 	plan.rounds = UINT64_MAX / 2; /* the product overflows */
