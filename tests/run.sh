@@ -2,8 +2,9 @@
 # Runs all tests of a build folder and sums them up: tests/run.sh BUILD [PATTERN]
 #
 # Test programs are BUILD/tests/**/test_* (cmocka: each of their tests is counted); scripts are tests/lint/*.sh and
-# tests/e2e/*.sh (one test each; exit 77: skipped). The output of what fails is shown. The last line is
-# `N passed, N failed, N skipped`; the exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
+# tests/e2e/*.sh (one test each; exit 77: skipped; a line `skipped in part: WHY`: one skipped beside the one that passed). The output
+# of what fails is shown. The last lines name what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`; the
+# exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
 # HSLT_TEST_KINDS: "unit script" (default both); HSLT_TEST_TIMEOUT: seconds a program may take (default 900; with FULL=1 14400).
 set -u
 build=${1:?usage: tests/run.sh BUILD [PATTERN]}
@@ -16,7 +17,7 @@ cd "$(dirname "$0")/.." || exit 1
 case $build in /*) ;; *) build=$PWD/$build ;; esac
 export BUILD="$build"
 log=$(mktemp)
-trap 'rm -f "$log" "$log.counts"' EXIT
+trap 'rm -f "$log" "$log.counts" "$log.skips"' EXIT
 passed=0 failed=0 skipped=0
 
 count() { # of cmocka's closing lines: "[  PASSED  ] 3 test(s)."
@@ -42,6 +43,10 @@ run_program() {
 		# What tests print about themselves (figures, reasons for skipping) is part of the result.
 		grep -v '^\[' "$log" | grep -v '^$' | sed 's/^/   /'
 	fi
+	# By name, with what the test said before.
+	awk -v of="$name" '/^\[ *RUN/ { why = "" }
+		/^[^[]/ { why = $0; sub(/^skipped: /, "", why) }
+		/^\[ *SKIPPED *\] [^ ]*$/ && !seen[$NF]++ { print "skipped: " of ": " $NF (why ? ": " why : "") }' "$log" >>"$log.skips"
 }
 
 run_script() {
@@ -53,10 +58,12 @@ run_script() {
 	0)
 		passed=$((passed + 1))
 		echo "ok $name, $(($(date +%s) - begin)) s"
+		skipped=$((skipped + $(grep -c '^skipped in part: ' "$log")))
+		sed -n "s|^skipped in part: |skipped: $name: |p" "$log" | tee -a "$log.skips"
 		;;
 	77)
 		skipped=$((skipped + 1))
-		echo "skipped $name: $(tail -n 1 "$log")"
+		tail -n 1 "$log" | sed "s|^skipped: ||; s|^|skipped: $name: |" | tee -a "$log.skips"
 		;;
 	*)
 		failed=$((failed + 1))
@@ -82,6 +89,7 @@ lane() {
 		;;
 	esac
 	echo "$passed $failed $skipped" >"$log.counts"
+	touch "$log.skips"
 }
 
 # Scripts mostly wait: they do so beside the programs, and are shown behind them.
@@ -93,7 +101,7 @@ case " $kinds " in
 		log=$beside
 		lane script
 	) >"$beside.out" 2>&1 &
-	trap 'kill $! 2>/dev/null; rm -f "$log" "$log.counts" "$beside" "$beside.out" "$beside.counts"' EXIT
+	trap 'kill $! 2>/dev/null; rm -f "$log" "$log.counts" "$log.skips" "$beside" "$beside.out" "$beside.counts" "$beside.skips"' EXIT
 	lane unit
 	wait $!
 	cat "$beside.out"
@@ -103,6 +111,8 @@ esac
 if [ -n "$beside" ]; then
 	read -r p f s <"$beside.counts" || { echo "FAILED: the scripts did not end as they should" && f=1 p=0 s=0; }
 	passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
+	cat "$beside.skips" >>"$log.skips"
 fi
+cat "$log.skips" 2>/dev/null
 echo "$passed passed, $failed failed, $skipped skipped"
 [ $failed -eq 0 ] && [ $passed -gt 0 ]

@@ -2,7 +2,7 @@
 . "$(dirname "$0")/lib.sh"
 need hslt-accuracy
 PYTHON=${PYTHON:-python3}
-command -v "$PYTHON" >/dev/null || skip "no $PYTHON"
+command -v "$PYTHON" >/dev/null || lacks "no $PYTHON"
 
 code() { # WANTED COMMAND...
 	wanted=$1

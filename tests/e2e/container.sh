@@ -1,8 +1,9 @@
 # deploy/container without a container engine: its Containerfile carried out line by line in two fresh Debians, and a small farm
-# as the image's user; then deploy/systemd there, booted by systemd-nspawn. Minutes and downloads: only with FULL=1.
+# as the image's user; then deploy/systemd there, booted by systemd-nspawn. Minutes and downloads: only with FULL=1, as by
+# deploy/test.sh --full; the tests of every day and CI name it among what they skip.
 . "$(dirname "$0")/lib.sh"
 [ "${FULL:-0}" != 0 ] || skip "downloads two Debians: FULL=1, or deploy/test.sh --full"
-command -v debootstrap >/dev/null || skip "no debootstrap (deploy/setup.sh --full installs it)"
+command -v debootstrap >/dev/null || lacks "no debootstrap (deploy/setup.sh --full installs it)"
 [ "$(id -u)" = 0 ] || skip "debootstrap wants root"
 unshare --mount --pid --fork true 2>/dev/null || skip "no namespaces for mounts and processes here"
 TREE=$(cd "$HERE/../.." && pwd)

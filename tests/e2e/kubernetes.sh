@@ -4,7 +4,7 @@
 . "$(dirname "$0")/lib.sh"
 need hslt-ca hslt-coordinator hslt-worker hslt-submit hslt-status hslt-compare
 PYTHON=/usr/bin/python3
-"$PYTHON" -c 'import yaml, kubernetes' 2>/dev/null || skip "no python3-kubernetes (deploy/setup.sh --full installs it)"
+"$PYTHON" -c 'import yaml, kubernetes' 2>/dev/null || lacks "no python3-kubernetes (deploy/setup.sh --full installs it)"
 FILES=$(ls "$HERE"/../../deploy/kubernetes/*.yaml)
 "$PYTHON" -B "$HERE/manifests.py" "$BIN" $FILES || fail "the manifests are not right"
 

@@ -6,11 +6,11 @@
 need hslt-ca hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare
 PATH=$PATH:/usr/sbin:/sbin
 for p in munged slurmctld slurmd sbatch; do
-	command -v $p >/dev/null || skip "no $p (deploy/setup.sh --full installs slurm-wlm and munge)"
+	command -v $p >/dev/null || lacks "no $p (deploy/setup.sh --full installs slurm-wlm and munge)"
 done
 [ "$(id -u)" = 0 ] || skip "slurmd wants root"
 ! grep -q __asan_init "$BIN/hslt-worker" || skip "programs with sanitizers take too long for it"
-command -v runuser >/dev/null && id munge >/dev/null 2>&1 || skip "no user munge"
+command -v runuser >/dev/null && id munge >/dev/null 2>&1 || lacks "no runuser, or no user munge (of the package munge)"
 
 BIN=$(cd "$BIN" && pwd)
 DEPLOY=$(cd "$HERE/../../deploy" && pwd)

@@ -2,7 +2,7 @@
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare
 INTEGRATOR=${INTEGRATOR:-hslt}
-"$BIN/hslt-render" --help | grep -q "integrator=NAME.* $INTEGRATOR" || skip "there is no integrator $INTEGRATOR"
+"$BIN/hslt-render" --help | grep -q "integrator=NAME.* $INTEGRATOR" || fail "there is no integrator $INTEGRATOR"
 LIST="--mutations hslt=0.75,independent=0.25"
 COUNT="--bootstrap 16384 --mutations 40000"
 

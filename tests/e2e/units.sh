@@ -4,7 +4,7 @@
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status
 for p in systemd-analyze systemd-socket-activate socat; do
-	command -v $p >/dev/null || skip "no $p (deploy/setup.sh --full installs systemd and socat)"
+	command -v $p >/dev/null || lacks "no $p (deploy/setup.sh --full installs systemd and socat)"
 done
 BIN=$(cd "$BIN" && pwd)
 UNITS=$HERE/../../deploy/systemd
@@ -52,10 +52,15 @@ syscalls() {
 	done
 }
 
+command -v strace >/dev/null || lacks "no strace (deploy/setup.sh --full installs it)"
 TRACE=
 # Sanitizers make calls of their own, and look for leaks only where nobody traces.
-if ! grep -q __asan_init "$BIN/hslt-worker" && command -v strace >/dev/null && strace -f -c -U name -o "$DIR/try" true 2>/dev/null && grep -q "^total" "$DIR/try"; then
+if grep -q __asan_init "$BIN/hslt-worker"; then
+	skip_part "system calls: those of programs with sanitizers are others"
+elif strace -f -c -U name -o "$DIR/try" true 2>/dev/null && grep -q "^total" "$DIR/try"; then
 	TRACE="strace -D -f -c -U name -o"
+else
+	skip_part "system calls: strace may not trace here"
 fi
 
 # within UNIT TRACE-FILE
@@ -114,6 +119,4 @@ until_true 5 grep -q '^READY=1.*STOPPING=1$' "$DIR/heard" || fail "it said $(cat
 if [ -n "$TRACE" ]; then
 	within hslt-coordinator.service "$DIR/coordinator.trace"
 	within hslt-worker@.service "$DIR/worker.trace"
-else
-	echo "system calls were not looked at: no strace, or it may not trace"
 fi

@@ -12,7 +12,7 @@ mkdir -p "$BUILD"
 
 if ! command -v "$CLANG" >/dev/null 2>&1; then
 	echo "fuzz: skipped: $CLANG is not installed (apt install clang)"
-	exit 0
+	exit 77
 fi
 "${MAKE:-make}" --no-print-directory CC="$CLANG" BUILD="$BUILD" SAN=fuzzer-no-link,address,undefined OPT=-O1 fuzzers >"$BUILD.log" 2>&1 || {
 	tail -20 "$BUILD.log"

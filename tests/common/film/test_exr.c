@@ -233,8 +233,10 @@ static void foreign_images_are_read(void **unused)
 	char path[4096];
 	snprintf(path, sizeof path, "%s/cornell-box/TungstenRender.exr", scenes ? scenes : "");
 	FILE *f = scenes ? fopen(path, "rb") : NULL;
-	if (!f)
+	if (!f) {
+		print_message("skipped: HSLT_SCENES is not set, or has no cornell-box/TungstenRender.exr\n");
 		skip();
+	}
 	unsigned char *bytes = mem_alloc(1 << 26, 1);
 	size_t size = fread(bytes, 1, 1 << 26, f);
 	fclose(f);

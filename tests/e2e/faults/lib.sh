@@ -100,9 +100,8 @@ row() {
 
 # The fault cannot be injected here: no row.
 cannot() {
-	eval "text=\$text_$NAME"
 	echo "$NAME: $*" >>"$SKIPPED"
-	printf '%-74s skipped: %s\n' "$text" "$*"
+	skip_part "$NAME: $*"
 }
 
 end() {

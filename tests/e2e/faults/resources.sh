@@ -149,7 +149,7 @@ small_worker() {
 
 fault clock_jumps 6 2 "the wall clock jumps by a year, back and forth, everywhere"
 clock_jumps() {
-	${CC:-cc} -shared -fPIC -O1 -o "$DIR/clock.so" "$HERE/faults/clock.c" 2>"$DIR/cc.log" || { cannot "no compiler" && return; }
+	${CC:-cc} -shared -fPIC -O1 -o "$DIR/clock.so" "$HERE/faults/clock.c" 2>"$DIR/cc.log" || fail "$NAME: no compiler: $(cat "$DIR/cc.log")"
 	export HSLT_CLOCK="$DIR/clock" LD_PRELOAD="$DIR/clock.so"
 	farm
 	worker w0

@@ -87,8 +87,10 @@ static void test_public_scenes(void **state)
 {
 	(void)state;
 	const char *root = getenv("HSLT_SCENES");
-	if (!root || !*root)
+	if (!root || !*root) {
+		print_message("skipped: HSLT_SCENES is not set\n");
 		skip();
+	}
 	for (size_t i = 0; i < sizeof all / sizeof *all; i++)
 		check(root, &all[i]);
 }
