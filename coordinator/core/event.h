@@ -29,7 +29,6 @@ enum event_kind {
 	EVENT_PRIORITY,       /* tag, job, priority: from the next lease on */
 	EVENT_EXTEND,         /* tag, job, plan: its own, but for the bounds; not fewer rounds */
 	EVENT_ASIDE,          /* join (but for peer, fingerprint, threads), text: a worker that was set aside in an earlier life */
-	EVENT_FORGIVE,        /* text: the name of workers that are set aside no more */
 	EVENT_JOB_BROKEN,     /* job, text: the shell cannot go on with it (a sum left the grid, the disk is full) */
 };
 

@@ -23,7 +23,6 @@ void farm_config_init(struct farm_config *c)
 		.first_timeout = 600,
 		.min_timeout = 60,
 		.first_pause = 10,
-		.preview_interval = 10,
 	};
 }
 
@@ -31,8 +30,7 @@ static int check(const struct farm_config *c, struct error *e)
 {
 	if (c->first_job == 0 || c->max_jobs == 0 || c->max_ended == 0 || c->max_peers == 0 || c->max_peer_leases == 0 || c->max_faults == 0)
 		return error_set(e, EINVAL, "a farm without jobs, workers or leases");
-	if (!(c->silent_after > 0 && c->forget_after >= c->silent_after && c->first_timeout > 0 && c->min_timeout > 0 && c->first_pause > 0 &&
-	      c->preview_interval >= 0))
+	if (!(c->silent_after > 0 && c->forget_after >= c->silent_after && c->first_timeout > 0 && c->min_timeout > 0 && c->first_pause > 0))
 		return error_set(e, EINVAL, "the farm's times are not in order");
 	return 0;
 }
@@ -122,12 +120,6 @@ struct peer *farm_find_peer(const struct farm *f, uint64_t id)
 	return i < f->peer_count && f->peers[i]->id == id ? f->peers[i] : NULL;
 }
 
-uint64_t farm_next_job(const struct farm *f, uint64_t after)
-{
-	uint32_t i = after == UINT64_MAX ? f->job_count : job_place_of(f, after + 1);
-	return i < f->job_count ? f->jobs[i]->id : 0;
-}
-
 uint64_t farm_next_peer(const struct farm *f, uint64_t after)
 {
 	uint32_t i = after == UINT64_MAX ? f->peer_count : peer_place_of(f, after + 1);
@@ -158,11 +150,6 @@ static void aside(struct farm *f, const struct event *ev)
 {
 	const struct event_join join = complete(&ev->join);
 	roster_aside(f, &join, ev->text);
-}
-
-static void forgiven(struct farm *f, const struct event *ev)
-{
-	roster_forgive(f, ev->text);
 }
 
 static void left(struct farm *f, const struct event *ev)
@@ -215,7 +202,6 @@ static void (*const on_event[])(struct farm *, const struct event *) = {
 	[EVENT_PRIORITY] = orders_priority,
 	[EVENT_EXTEND] = orders_extend,
 	[EVENT_ASIDE] = aside,
-	[EVENT_FORGIVE] = forgiven,
 	[EVENT_JOB_BROKEN] = broken,
 };
 

@@ -59,7 +59,6 @@ struct farm_config {
 	double first_timeout;     /* of a lease before the job has a median */
 	double min_timeout;
 	double first_pause;       /* of a worker that failed with a job, doubled each time */
-	double preview_interval;  /* between previews of one job; 0: none */
 };
 void farm_config_init(struct farm_config *c); /* first_job 1 and sane limits */
 
@@ -125,7 +124,6 @@ struct lease_status {
 };
 
 /* The smallest id above `after` (start with 0); 0: no more. */
-uint64_t farm_next_job(const struct farm *f, uint64_t after);
 uint64_t farm_next_peer(const struct farm *f, uint64_t after);
 /* A result of this lease must come with its digest. */
 bool farm_verifies(const struct farm *f, const struct lease_key *k);

@@ -37,7 +37,6 @@ static void init(struct job *j, const struct event_submit *e, double now)
 	j->plan = *e->plan;
 	j->submitted = now;
 	j->started = j->ended = j->rel_error = j->opened = j->held_since = NAN;
-	j->published = now;
 	for (int i = 0; i < 2; i++) {
 		list_init(&j->ready[i]);
 		list_init(&j->out[i]);

@@ -54,7 +54,6 @@ struct job {
 	bool preparing, evaluating;
 	bool disagrees; /* see EVENT_IMAGE_KNOWN */
 	enum job_end ending; /* the bound that is met, while the error is evaluated once more */
-	double published;
 
 	double durations[JOB_DURATIONS]; /* of merged leases of this kind */
 	uint32_t duration_count;

@@ -192,17 +192,3 @@ void roster_aside(struct farm *f, const struct event_join *e, const char *text)
 	set_aside(f, k);
 	roster_drop(f, k);
 }
-
-void roster_forgive(struct farm *f, const char *name)
-{
-	for (uint32_t i = 0; i < f->known_count; i++) {
-		struct identity *k = f->known[i];
-		if (strcmp(k->name, name) != 0)
-			continue;
-		k->aside = false;
-		k->wrong = k->faults_in_row = 0;
-		for (uint32_t n = 0; n < f->peer_count; n++)
-			if (f->peers[n]->who == k && f->peers[n]->state == PEER_ASIDE)
-				peer_set_state(f, f->peers[n], PEER_ACTIVE);
-	}
-}

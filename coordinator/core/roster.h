@@ -48,6 +48,5 @@ void roster_set_aside(struct farm *f, struct identity *who);
 
 /* As it was in an earlier life of the coordinator. */
 void roster_aside(struct farm *f, const struct event_join *e, const char *text);
-void roster_forgive(struct farm *f, const char *name); /* all workers of that name */
 
 #endif

@@ -129,7 +129,7 @@ void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *tex
 	j->slot_count = 0;
 	orders_delist(f, j);
 	if (j->state == JOB_DONE)
-		about_job(f, ACTION_PUBLISH, j)->final = true;
+		about_job(f, ACTION_PUBLISH, j);
 	job_changed(f, j);
 	forget_oldest(f, j);
 }
@@ -153,14 +153,6 @@ static void evaluate(struct farm *f, struct job *j)
 	about_job(f, ACTION_EVALUATE_ERROR, j);
 }
 
-static void preview(struct farm *f, struct job *j)
-{
-	if (f->config.preview_interval > 0 && f->now - j->published >= f->config.preview_interval) {
-		j->published = f->now;
-		about_job(f, ACTION_PUBLISH, j);
-	}
-}
-
 enum job_end rounds_bound(const struct job *j, double elapsed)
 {
 	if (j->rounds >= j->plan.rounds)
@@ -178,10 +170,8 @@ void rounds_settle(struct farm *f, struct job *j, double elapsed)
 		j->ending = end;
 		revoke_all(f, j);
 		evaluate(f, j);
-	} else {
-		if (merge_error_due(&j->plan, j->rounds))
-			evaluate(f, j);
-		preview(f, j);
+	} else if (merge_error_due(&j->plan, j->rounds)) {
+		evaluate(f, j);
 	}
 }
 

@@ -39,7 +39,7 @@ enum action_kind {
 	/* job, rounds: answer with EVENT_ERROR_KNOWN for exactly this prefix. Later batches of the job should wait for the
 	 * answer; one that would complete the next round before it is refused, so the prefix stays what was asked for. */
 	ACTION_EVALUATE_ERROR,
-	ACTION_PUBLISH,     /* job, rounds, final: write the image of the prefix; not final: a preview */
+	ACTION_PUBLISH,     /* job, rounds: write the image of the prefix; the job is done */
 	ACTION_JOB_CHANGED, /* job, state, end, text */
 	ACTION_JOB_FORGOTTEN, /* job: too many ended jobs; the core answers no more questions about it */
 	ACTION_WRONG, /* who, job, key, text: a worker's answer, noted before, is not what two others say */
@@ -54,7 +54,6 @@ struct action {
 	enum ack ack;
 	enum job_state state;
 	enum job_end end;
-	bool final;
 	bool verified;     /* MERGE: two workers agree */
 	uint64_t tag, peer;
 	uint64_t who;      /* of MERGE, WRONG, ASIDE: the worker, whatever its connection (struct peer_status) */

@@ -221,7 +221,7 @@ void dispatch_update(struct server *s, const struct update *u)
 			publish_start(s, server_order(s, a->job), PUBLISH_ERROR_ONLY, a->rounds);
 			break;
 		case ACTION_PUBLISH:
-			publish_start(s, server_order(s, a->job), PUBLISH_RESULT, a->rounds); /* previews: not by the core */
+			publish_start(s, server_order(s, a->job), PUBLISH_RESULT, a->rounds);
 			break;
 		case ACTION_JOB_CHANGED:
 			job_changed(s, a);

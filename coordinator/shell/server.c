@@ -411,7 +411,6 @@ static int open_stores(struct server *s, struct error *e)
 	farm_config_init(&config);
 	config.max_peers = s->config.max_connections;
 	config.first_job = spool_next_job(s->spool);
-	config.preview_interval = 0; /* previews are made when somebody asks for one */
 	config.silent_after = 3 * s->config.heartbeat_seconds;
 	config.max_faults = s->config.max_faults;
 	config.first_pause = 2 * s->config.heartbeat_seconds;

@@ -65,7 +65,7 @@ static void say_action(struct said *s, const struct action *a)
 	case ACTION_ROUND_DONE: say(s, "j%" PRIu64 " round %" PRIu64, a->job, a->rounds); break;
 	case ACTION_EVALUATE_ERROR: say(s, "j%" PRIu64 " evaluate %" PRIu64, a->job, a->rounds); break;
 	case ACTION_PUBLISH:
-		say(s, "j%" PRIu64 " %s %" PRIu64, a->job, a->final ? "publish" : "preview", a->rounds);
+		say(s, "j%" PRIu64 " publish %" PRIu64, a->job, a->rounds);
 		break;
 	case ACTION_JOB_CHANGED: say_changed(s, a); break;
 	case ACTION_JOB_FORGOTTEN: say(s, "j%" PRIu64 " forgotten", a->job); break;
@@ -296,8 +296,6 @@ static void take_job(const char **at, struct event *ev)
 	} else if (take(at, "aside")) { /* NAME's letter, as when it joins */
 		ev->kind = EVENT_ASIDE;
 		take_identity(at, &ev->join);
-	} else if (take(at, "forgive")) {
-		ev->kind = EVENT_FORGIVE;
 	} else if (take(at, "broken")) {
 		ev->kind = EVENT_JOB_BROKEN;
 		ev->job = take_id(at, "j");
@@ -370,7 +368,6 @@ struct farm *transcript_farm(void)
 	struct farm *f = NULL;
 	struct error e;
 	farm_config_init(&c);
-	c.preview_interval = 0;
 	assert_int_equal(farm_new(&f, &c, &e), 0);
 	return f;
 }

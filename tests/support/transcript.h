@@ -19,7 +19,7 @@
 
 #include "coordinator/core/farm.h"
 
-struct farm *transcript_farm(void); /* default configuration, no previews */
+struct farm *transcript_farm(void); /* default configuration */
 void transcript_play(struct farm *f, const char *const *lines); /* up to NULL */
 /* Both, and frees the farm. */
 void transcript(const char *const *lines);

@@ -160,25 +160,6 @@ static void broken(void **state)
 	expect_end(f, JOB_FAILED, END_FAILED, 3);
 }
 
-static void previews(void **state)
-{
-	(void)state;
-	struct farm_config c;
-	struct farm *f;
-	farm_config_init(&c);
-	c.preview_interval = 10;
-	assert_int_equal(farm_new(&f, &c, NULL), 0);
-	transcript_play(f, (const char *const[]){
-		START("rounds=4"),
-		"[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
-		"[12] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 preview 1, w1 gets j1 g0 p0 e1",
-		"[13] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
-		"[22] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 preview 3, w1 gets j1 g0 p0 e3",
-		"[32] w1 batch j1 g0 p0 e3 -> merge, merged, j1 round 4, j1 publish 4, j1 is done (mutations)",
-		NULL });
-	farm_free(f);
-}
-
 static struct job_status ask(const struct farm *f, double now)
 {
 	struct job_status s;
@@ -283,7 +264,6 @@ int main(void)
 		cmocka_unit_test(black),
 		cmocka_unit_test(cannot_be_prepared),
 		cmocka_unit_test(broken),
-		cmocka_unit_test(previews),
 		cmocka_unit_test(progress_and_rate),
 		cmocka_unit_test(progress_of_errors),
 		cmocka_unit_test(looks_give_a_forecast),

@@ -214,7 +214,6 @@ static void set_aside(void **state)
 	assert_int_equal(j.mismatched, 3);
 	transcript_play(f, (const char *const[]){
 		"[6] w1 batch j1 g0 p0 e2 says x -> noted",
-		"[6] forgive d -> -", "[6] forgive c -> w5 gets j1 g0 p0 e2",
 		NULL });
 	farm_free(f);
 }
