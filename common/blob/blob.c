@@ -47,33 +47,6 @@ int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struc
 	return 0;
 }
 
-int blob_hash_file(const char *path, struct blob_hash *out, uint64_t *size, struct error *e)
-{
-	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
-	if (fd < 0)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
-	EVP_MD_CTX *md = EVP_MD_CTX_new();
-	unsigned char *chunk = mem_alloc(1, 1 << 16);
-	int rc = md && chunk && EVP_DigestInit_ex(md, EVP_sha256(), NULL) == 1
-			 ? 0
-			 : error_set(e, ENOMEM, "%s: SHA-256 cannot start", path);
-	ssize_t n = 1;
-	*size = 0;
-	while (!rc && (n = disk_read(fd, chunk, 1 << 16)) > 0) {
-		*size += (uint64_t)n;
-		if (EVP_DigestUpdate(md, chunk, (size_t)n) != 1)
-			rc = error_set(e, EIO, "%s: SHA-256 failed", path);
-	}
-	if (!rc && n < 0)
-		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
-	if (!rc && EVP_DigestFinal_ex(md, out->bytes, NULL) != 1)
-		rc = error_set(e, EIO, "%s: SHA-256 failed", path);
-	mem_free(chunk);
-	EVP_MD_CTX_free(md);
-	disk_close(fd);
-	return rc;
-}
-
 void blob_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE])
 {
 	for (int i = 0; i < BLOB_HASH_SIZE; i++)

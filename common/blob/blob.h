@@ -20,7 +20,6 @@ struct blob_hash {
 };
 
 int blob_hash_bytes(const void *bytes, size_t size, struct blob_hash *out, struct error *e);
-int blob_hash_file(const char *path, struct blob_hash *out, uint64_t *size, struct error *e);
 void blob_hex(const struct blob_hash *h, char hex[BLOB_HEX_SIZE]);
 bool blob_hash_equal(const struct blob_hash *a, const struct blob_hash *b);
 

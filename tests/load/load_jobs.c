@@ -39,6 +39,8 @@ void load_submit(struct load *l, const char *host_port, const char *tls, unsigne
 	struct scene_bundle bundle = {.folder = folder, .scene = scene, .count = 1, .files = &file};
 	struct submit_request request = {.name = name, .output = "", .args = &args};
 	struct load_job *j = &l->jobs[index];
+	struct asset_source assets = asset_folder(folder);
+	struct asset a;
 	struct client *cl;
 	struct error e;
 	snprintf(name, sizeof name, "load %u", index);
@@ -46,7 +48,12 @@ void load_submit(struct load *l, const char *host_port, const char *tls, unsigne
 	bundle.summary.brightest = 1;
 	int rc = plan_make(&args.plan, &j->plan, &e);
 	if (!rc)
-		rc = blob_hash_file("tests/load/load.xml", &file.hash, &file.size, &e);
+		rc = assets.open(assets.user, scene, &a, &e);
+	if (!rc) {
+		file.size = a.size;
+		rc = blob_hash_bytes(a.bytes, a.size, &file.hash, &e);
+		assets.close(assets.user, &a);
+	}
 	if (!rc)
 		rc = client_open(&cl, host_port, tls, l->s.insecure, "load", &e);
 	if (rc)

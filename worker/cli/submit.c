@@ -6,78 +6,52 @@
 #include "common/wire/plan_wire.h"
 #include "worker/cli/options.h"
 
-#include <fcntl.h>
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <unistd.h>
 
-enum { PATH_BYTES = 4096, CHUNK = 1 << 20 };
+enum { CHUNK = 1 << 20 };
 
 /* ---- the bundle ---- */
 
-static int add_file(struct scene_bundle *b, const char *name, struct error *e)
-{
-	char path[PATH_BYTES];
-	struct scene_bundle_file *f = &b->files[b->count];
-	int n = snprintf(path, sizeof path, "%s/%s", b->folder, name);
-	if (n < 0 || (size_t)n >= sizeof path)
-		return error_set(e, ENAMETOOLONG, "%s: the name is too long", name);
-	f->name = mem_strdup(name);
-	if (!f->name)
-		return error_set(e, ENOMEM, "no memory for the list of files");
-	b->count++;
-	return blob_hash_file(path, &f->hash, &f->size, e);
-}
-
-/* A folder that remembers what was opened: the world is built here as workers will build it, so what was not opened they do
- * not need. One thread. */
+/* A folder that remembers what was opened, and the hash of what was read: the world is built here as workers will build it, so they
+ * need just that. One thread. */
 struct opened {
 	struct asset_source folder;
-	char **names;
-	size_t count, room;
+	struct scene_bundle *bundle;
 };
+
+static int remember(struct scene_bundle *b, const char *name, const struct asset *a, struct error *e)
+{
+	for (size_t i = 0; i < b->count; i++)
+		if (strcmp(b->files[i].name, name) == 0)
+			return 0;
+	struct scene_bundle_file *more = mem_grow(b->files, b->count * sizeof *more, (b->count + 1) * sizeof *more);
+	char *copy = mem_strdup(name);
+	b->files = more ? more : b->files;
+	if (!more || !copy) {
+		mem_free(copy);
+		return error_set(e, ENOMEM, "no memory for the list of files");
+	}
+	struct scene_bundle_file *f = &b->files[b->count++];
+	f->name = copy;
+	f->size = a->size;
+	return blob_hash_bytes(a->bytes, a->size, &f->hash, e);
+}
 
 static int open_remembered(void *user, const char *name, struct asset *out, struct error *e)
 {
 	struct opened *o = user;
-	if (o->count == o->room) {
-		size_t room = o->room ? 2 * o->room : 16;
-		char **names = mem_alloc(room, sizeof *names);
-		if (!names)
-			return error_set(e, ENOMEM, "no memory for the list of files");
-		if (o->count)
-			memcpy(names, o->names, o->count * sizeof *names);
-		mem_free(o->names);
-		o->names = names;
-		o->room = room;
-	}
-	o->names[o->count] = mem_strdup(name);
-	if (!o->names[o->count])
-		return error_set(e, ENOMEM, "no memory for the list of files");
-	o->count++;
-	return o->folder.open(o->folder.user, name, out, e);
+	int rc = o->folder.open(o->folder.user, name, out, e);
+	if (!rc && (rc = remember(o->bundle, name, out, e)))
+		o->folder.close(o->folder.user, out);
+	return rc;
 }
 
 static void close_remembered(void *user, struct asset *a)
 {
 	struct opened *o = user;
 	o->folder.close(o->folder.user, a);
-}
-
-static bool was_opened(const struct opened *o, const char *name)
-{
-	for (size_t i = 0; i < o->count; i++)
-		if (strcmp(o->names[i], name) == 0)
-			return true;
-	return false;
-}
-
-static void opened_fini(struct opened *o)
-{
-	for (size_t i = 0; i < o->count; i++)
-		mem_free(o->names[i]);
-	mem_free(o->names);
 }
 
 static int copy_notes(struct scene_bundle *b, const struct scene *s, struct error *e)
@@ -92,18 +66,6 @@ static int copy_notes(struct scene_bundle *b, const struct scene *s, struct erro
 	return b->note_count == s->note_count && b->notes ? 0 : error_set(e, ENOMEM, "no memory for the scene's notes");
 }
 
-static int add_files(struct scene_bundle *b, const struct scene *s, const struct opened *o, struct error *e)
-{
-	b->files = mem_alloc((size_t)s->asset_count + 1, sizeof *b->files);
-	if (!b->files)
-		return error_set(e, ENOMEM, "no memory for the list of files");
-	int rc = add_file(b, b->scene, e);
-	for (uint32_t i = 0; !rc && i < s->asset_count; i++)
-		if (was_opened(o, s->assets[i]))
-			rc = add_file(b, s->assets[i], e);
-	return rc;
-}
-
 int scene_bundle_read(struct scene_bundle *b, const char *path, const struct scene_define *defines, size_t define_count,
 		      const struct render_options *o, struct error *e)
 {
@@ -112,18 +74,15 @@ int scene_bundle_read(struct scene_bundle *b, const char *path, const struct sce
 	int rc = scene_path_split(path, &b->folder, &b->scene, e);
 	if (rc)
 		return rc;
-	struct opened opened = {.folder = asset_folder(b->folder)};
+	struct opened opened = {asset_folder(b->folder), b};
 	struct asset_source assets = {&opened, open_remembered, close_remembered};
 	rc = scene_read(&scene, &assets, b->scene, render_plugins(), defines, define_count, e);
 	if (!rc) {
 		rc = render_check(&scene, &assets, o, &b->summary, e);
 		if (!rc)
 			rc = copy_notes(b, &scene, e);
-		if (!rc)
-			rc = add_files(b, &scene, &opened, e);
 		scene_fini(&scene);
 	}
-	opened_fini(&opened);
 	if (rc)
 		scene_bundle_fini(b);
 	return rc;
@@ -267,29 +226,26 @@ static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint
 	return client_send(cl, &m, bytes, size, e);
 }
 
+/* Opened as it was before, below the scene's folder, and no other bytes than those that were read then leave this machine. */
 static int send_file(struct client *cl, const struct scene_bundle *b, const struct scene_bundle_file *f, struct error *e)
 {
-	char path[PATH_BYTES];
-	snprintf(path, sizeof path, "%s/%s", b->folder, f->name);
-	int fd = open(path, O_RDONLY | O_CLOEXEC);
-	if (fd < 0)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
-	unsigned char *bytes = mem_alloc(CHUNK, 1);
-	int rc = bytes ? 0 : error_set(e, ENOMEM, "no memory to send files");
-	uint64_t at = 0;
-	while (!rc) {
-		size_t want = f->size - at < CHUNK ? (size_t)(f->size - at) : CHUNK;
-		ssize_t n = want ? read(fd, bytes, want) : 0;
-		if (n < 0 || (n == 0 && want))
-			rc = error_set(e, EIO, "%s: %s", path, n < 0 ? strerror(errno) : "it became shorter meanwhile");
+	struct asset_source folder = asset_folder(b->folder);
+	struct asset a;
+	struct blob_hash hash;
+	int rc = folder.open(folder.user, f->name, &a, e);
+	if (rc)
+		return rc;
+	rc = blob_hash_bytes(a.bytes, a.size, &hash, e);
+	if (!rc && !blob_hash_equal(&hash, &f->hash))
+		rc = error_set(e, EIO, "%s: it has changed meanwhile", f->name);
+	size_t at = 0;
+	do {
+		size_t n = a.size - at < CHUNK ? a.size - at : CHUNK;
 		if (!rc)
-			rc = send_chunk(cl, f, at, bytes, (size_t)n, e);
-		at += n > 0 ? (uint64_t)n : 0;
-		if (at == f->size)
-			break;
-	}
-	mem_free(bytes);
-	close(fd);
+			rc = send_chunk(cl, f, at, a.bytes + at, n, e);
+		at += n;
+	} while (!rc && at < a.size);
+	folder.close(folder.user, &a);
 	return rc;
 }
 
