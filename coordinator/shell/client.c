@@ -1,4 +1,4 @@
-/* A client's side of a session: submit, list, cancel, watch, fetch; control.c has the rest. */
+/* A client's side of a session: submit, list, watch, fetch; control.c has the rest. */
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/trust.h"
@@ -220,18 +220,6 @@ void session_send_done(struct session *p, const char *text)
 	session_send(p, &m, NULL, 0);
 }
 
-static void take_cancel(struct session *p, uint64_t job)
-{
-	struct event ev = {.kind = EVENT_CANCEL, .tag = p->id, .job = job};
-	struct job_view v;
-	p->rejected[0] = 0;
-	if (p->who.role == TLS_NOBODY || session_finds_job(p, job, &v))
-		server_step(p->server, &ev);
-	else
-		text_copy(p->rejected, sizeof p->rejected, "no such job");
-	session_send_done(p, "");
-}
-
 static void take_watch(struct session *p, uint64_t job)
 {
 	struct job_view v;
@@ -385,7 +373,7 @@ void session_client_message(struct session *p, struct envelope *env, const unsig
 		take_list(p);
 		break;
 	case FARM__ENVELOPE__BODY_CANCEL:
-		take_cancel(p, m->cancel->job);
+		session_cancel(p, m->cancel->job);
 		break;
 	case FARM__ENVELOPE__BODY_CONTROL:
 		session_control(p, m->control);

@@ -62,15 +62,27 @@ static void set_priority(struct session *p, uint64_t job, int priority)
 		order_log(o, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);
 }
 
-void session_control(struct session *p, const Farm__Control *c)
+/* The core need not know a job that is over any more. false: p->rejected says why. */
+static bool finds(struct session *p, uint64_t job, bool over_too)
 {
 	struct job_view v;
-	p->rejected[0] = 0;
-	if (!session_finds_job(p, c->job, &v)) {
-		text_copy(p->rejected, sizeof p->rejected, "no such job");
-	} else if (!server_order(p->server, c->job) && c->verb != FARM__VERB__VERB_EXTEND) { /* the core need not know it any more */
-		text_copy(p->rejected, sizeof p->rejected, "the job is over");
-	} else {
+	bool there = session_finds_job(p, job, &v);
+	text_copy(p->rejected, sizeof p->rejected, !there ? "no such job" : over_too || server_order(p->server, job) ? "" : "the job is over");
+	return !*p->rejected;
+}
+
+void session_cancel(struct session *p, uint64_t job)
+{
+	struct event ev = {.kind = EVENT_CANCEL, .job = job};
+	if (finds(p, job, false))
+		tell(p, &ev);
+	session_send_done(p, "");
+}
+
+void session_control(struct session *p, const Farm__Control *c)
+{
+	bool extends = c->verb == FARM__VERB__VERB_EXTEND;
+	if (finds(p, c->job, extends)) {
 		switch (c->verb) {
 		case FARM__VERB__VERB_HOLD:
 			hold(p, c->job, name_of(p));

@@ -1,4 +1,4 @@
-/* What clients want of jobs that are there: hold, release, priority. The loop's thread. */
+/* What clients want of jobs that are there: cancel, hold, release, priority. The loop's thread. */
 #ifndef COORDINATOR_SHELL_CONTROL_H
 #define COORDINATOR_SHELL_CONTROL_H
 

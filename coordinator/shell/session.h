@@ -64,6 +64,7 @@ void session_send_done(struct session *p, const char *text); /* p->rejected says
 /* -EDQUOT. job: 0, or one that is there already. */
 int session_within_quota(const struct session *p, uint64_t job, const struct plan *plan, const Farm__Submit *m, struct error *e);
 /* control.c */
+void session_cancel(struct session *p, uint64_t job);
 void session_control(struct session *p, const Farm__Control *c);
 
 /* client.c again */

@@ -76,6 +76,7 @@ refused 2 'from -100 to 100' job priority "$d" 101
 refused 2 'which priority' job priority "$d"
 refused 1 'no such job' job hold j99
 refused 1 'the job is over' job hold "$b"
+refused 1 'the job is over' job cancel "$b"
 job cancel "$c"
 job cancel "$d"
 done_in 60 "$a"
