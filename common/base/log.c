@@ -68,6 +68,7 @@ void log_event(enum log_event event, const char *fields, ...)
 	va_start(ap, fields);
 	vsnprintf(text, sizeof text, fields, ap);
 	va_end(ap);
+	text_clean(text);
 	size_t n = log_format(line, sizeof line - 1, event, text);
 	line[n++] = '\n';
 	/* A log that cannot be written must not stop the farm. */

@@ -120,6 +120,7 @@ void order_log(struct order *o, enum log_event event, const char *fields, ...)
 	va_start(ap, fields);
 	vsnprintf(text, sizeof text, fields, ap);
 	va_end(ap);
+	text_clean(text);
 	log_event(event, "job=j%llu %s", (unsigned long long)o->id, text);
 	log_format(line, sizeof line - 1, event, text);
 	size_t size = strlen(line);

@@ -1,5 +1,6 @@
 #include "worker/scene/scene.h"
 
+#include "common/base/text.h"
 #include "worker/scene/plugin.h"
 #include "worker/scene/value.h"
 #include "worker/scene/xml.h"
@@ -65,6 +66,7 @@ __attribute__((format(printf, 5, 6))) static int note(struct maker *m, const str
 	va_start(ap, format);
 	vsnprintf(text, sizeof text, format, ap);
 	va_end(ap);
+	text_clean(text);
 	if (s->note_count == NOTES_MAX - 1)
 		snprintf(text, sizeof text, "%s: more is ignored than is listed here", el->file);
 	m->notes[s->note_count] = arena_strdup(&s->arena, text);

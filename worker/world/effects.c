@@ -1,5 +1,6 @@
 #include "worker/world/effects.h"
 
+#include "common/base/text.h"
 #include "worker/world/displacement.h"
 #include "worker/world/reach.h"
 
@@ -159,6 +160,7 @@ __attribute__((format(printf, 4, 5))) static bool line(struct report *r, enum ef
 	va_start(ap, why);
 	vsnprintf(l->why, sizeof l->why, why, ap);
 	va_end(ap);
+	text_clean(l->why);
 	return l->on;
 }
 
