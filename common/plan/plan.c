@@ -377,6 +377,9 @@ static int check_cut(const struct plan *p, struct error *e)
 			return error_set(e, EINVAL, "%u chains are not a multiple of %llu up to %d", p->chains,
 					 (unsigned long long)leases, PLAN_MAX_CHAINS);
 		lease_unit = p->chains / leases;
+		if (lease_unit > PLAN_MAX_LEASE_CHAINS)
+			return error_set(e, EINVAL, "%u chains in %u groups of %u parts are %llu to a lease; at most %d: take more groups or parts",
+					 p->chains, p->groups, p->parts, (unsigned long long)lease_unit, PLAN_MAX_LEASE_CHAINS);
 	} else {
 		if (p->chains)
 			return error_set(e, EINVAL, "a plan without chains names %u of them", p->chains);

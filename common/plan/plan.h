@@ -27,6 +27,7 @@ enum {
 	PLAN_MAX_BORDER = 256,
 	PLAN_MAX_PARTS = 64,
 	PLAN_MAX_CHAINS = 1 << 20,
+	PLAN_MAX_LEASE_CHAINS = 1 << 14, /* their seeds, and the sizes of their states, fit into a header; the states into a payload */
 	PLAN_MAX_BOOTSTRAP = 1 << 26,
 	PLAN_MAX_DEPTH = 128,      /* edges */
 	PLAN_MUTATIONS_MAX = 160,  /* bytes of the mixture's text, the last a 0 */

@@ -177,6 +177,14 @@ static void parts_are_asked_for(void **state)
 	assert_int_equal(p.chains % (16 * 48), 0);
 	r.parts = 65;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
+	/* A lease of more chains than a message can carry is refused, and it is said what to do. */
+	r.chains = PLAN_MAX_CHAINS;
+	r.parts = 64;
+	r.groups = 1;
+	assert_int_equal(made(&r).chains, PLAN_MAX_CHAINS);
+	r.parts = 32;
+	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "32768 to a lease; at most 16384: take more groups or parts"));
 	r = request(PLAN_SAMPLES, "");
 	r.parts = 33;
 	assert_int_equal(plan_make(&r, &p, &e), -EINVAL);

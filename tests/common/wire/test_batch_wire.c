@@ -385,11 +385,42 @@ static void plans_travel(void **state)
 	assert_int_equal(plan_from_wire(&m, &back, &e), 0);
 }
 
+/* The most chains that a plan lets into a lease: the longest seeds, and the sizes of states, fit into a header of 1 MB, which is what a
+ * coordinator takes. A worker takes four times as much, and 256 MB of states: 16 KB each, more than any has. */
+static void the_largest_lease_travels(void **state)
+{
+	(void)state;
+	enum { COUNT = PLAN_MAX_LEASE_CHAINS, STATE = 1 << 9 };
+	struct lease_key k = {.job = UINT64_MAX, .kind = LEASE_RENDER, .group = 63, .part = 63, .epoch = UINT64_MAX};
+	uint64_t *seeds = mem_alloc(COUNT, sizeof *seeds);
+	for (int i = 0; i < COUNT; i++)
+		seeds[i] = UINT64_MAX;
+	struct grant g = grant_travels(&k, seeds, NULL, COUNT);
+	assert_int_equal(g.chain_count, COUNT);
+	grant_fini(&g);
+	mem_free(seeds);
+	struct plan p = chain_plan();
+	struct batch b = chain_batch(&p);
+	struct envelope env;
+	struct frame_reader r;
+	states_fini(b.states, b.state_count);
+	b.state_count = COUNT;
+	b.states = mem_alloc(COUNT, sizeof *b.states);
+	for (int i = 0; i < COUNT; i++)
+		b.states[i] = (struct chain_state){mem_alloc(STATE, 1), STATE};
+	p.chains = COUNT * p.groups * p.parts;
+	travel(&b, &p, &env, &r);
+	envelope_fini(&env);
+	frame_reader_fini(&r);
+	batch_fini(&b);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_batch_travels), cmocka_unit_test(memory_may_end_anywhere),
 		cmocka_unit_test(moments_are_the_plans), cmocka_unit_test(weights_travel),  cmocka_unit_test(grants_travel),
+		cmocka_unit_test(the_largest_lease_travels),
 		cmocka_unit_test(plans_travel),    cmocka_unit_test(strategies_are_the_plans),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
