@@ -1,11 +1,12 @@
 # What came of a job's results. Reads the coordinator's log of all its lives (-v), then the workers' logs (-v), and prints
-# "LOST DOUBLED RESULTS".
+# "LOST DOUBLED RESULTS AGAIN".
 #   awk -v job=j1 -f count.awk coordinator.log w1.log ...
 # The film of a life is what the coordinator found on the disk when it started, and what it merged from then on. LOST are
 # results that were acknowledged and that it had to merge again in a later life, or that the last film does not hold; and
 # those of which a worker was told that they count and that never were on the disk. What a life merged and lost before it was
 # acknowledged is computed again and is no loss. DOUBLED: how often a film held a result beyond the first time. RESULTS: how
-# many the last film holds.
+# many the last film holds. AGAIN: the most epochs of one chain that were given out again between one injected fault (event=fault)
+# and the next because who had them was gone; one that is given to two at once, as at the end of a round, is no loss.
 
 function get(name) {
 	return match($0, " " name "=[^ ]*") ? substr($0, RSTART + length(name) + 2, RLENGTH - length(name) - 2) : ""
@@ -25,7 +26,23 @@ function add(k, fresh) {
 	film[k] = 1
 }
 
-/ event=start / && /program=hslt-coordinator/ { started = 1 }
+/ event=start / && /program=hslt-coordinator/ {
+	started = 1
+	life++
+}
+
+/ event=fault / { fault++ }
+
+/ event=(peer_closed|peer_accept) .*text=/ { gone[life, get("peer")] = 1 }
+
+/ event=lease_granted / && get("job") == job {
+	k = key(get("kind"), get("epoch"))
+	if (k in holder && (split(holder[k], had, SUBSEP) && had[1] != life || holder[k] in gone)) {
+		n = ++repeats[fault, get("group"), get("part")]
+		again = n > again ? n : again
+	}
+	holder[k] = life SUBSEP get("peer")
+}
 
 / event=batch_/ && get("job") == job {
 	event = get("event")
@@ -53,5 +70,5 @@ END {
 		lost += !(k in stored)
 	for (k in film)
 		results++
-	print lost + 0, doubled + 0, results + 0
+	print lost + 0, doubled + 0, results + 0, again + 0
 }

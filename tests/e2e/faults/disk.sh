@@ -26,5 +26,5 @@ disk_test() {
 	TIMES=$1
 	[ "$5" -eq 0 ] && equal=yes || equal=no
 	[ $CODE -eq 0 ] || [ "$2 $3 $5" != "0 0 0" ] || fail "$NAME: test_power ended with $CODE: $(tail -n 9 "$DIR/power.log")"
-	row "$2" "$3" $equal
+	row "$2" "$3" $equal -
 }

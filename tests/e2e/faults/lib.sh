@@ -65,6 +65,7 @@ each_time() {
 	while [ $i -lt "$TIMES" ]; do
 		i=$((i + 1))
 		moment $i
+		echo "x event=fault " >>"$DIR/coordinator.log"
 		"$@"
 	done
 }
@@ -89,13 +90,14 @@ finish_job() {
 	# shellcheck disable=SC2046
 	set -- $(cat "$DIR/coordinator.log" "$DIR"/[wh]*.log | awk -v job="$ID" -f "$HERE/faults/count.awk")
 	[ "$3" -eq "$RESULTS" ] || fail "$NAME: the film holds $3 results, not $RESULTS"
-	row "$1" "$2" $equal
+	row "$1" "$2" $equal "$4"
 }
 
+# row LOST DOUBLED EQUAL AGAIN
 row() {
 	eval "text=\$text_$NAME"
-	printf '%s|%s|%s|%s|%s\n' "$text" "$TIMES" "$1" "$2" "$3" >>"$ROWS"
-	printf '%-74s %5s %5s %8s  %s\n' "$text" "$TIMES" "$1" "$2" "$3"
+	printf '%s|%s|%s|%s|%s|%s\n' "$text" "$TIMES" "$1" "$2" "$3" "$4" >>"$ROWS"
+	printf '%-74s %5s %5s %8s  %-10s  %s\n' "$text" "$TIMES" "$1" "$2" "$3" "$4"
 }
 
 # The fault cannot be injected here: no row.
