@@ -35,6 +35,7 @@ struct conn_config {
 /* -errno when not even an attempt could be made; else opened or closed comes later. */
 int conn_connect(struct conn **c, uv_loop_t *loop, const struct net_addr *a, const struct conn_config *config,
 		 const struct conn_events *events, void *user, struct error *e);
+/* -errno: nobody was let in. The caller waits, and with it all others: the listener goes on when this is called again. */
 int conn_accept(struct conn **c, uv_stream_t *listener, const struct conn_config *config,
 		const struct conn_events *events, void *user, struct error *e);
 

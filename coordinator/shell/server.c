@@ -356,6 +356,8 @@ static void on_tick(uv_timer_t *t)
 {
 	struct server *s = t->data;
 	refresh_tls(s);
+	if (s->caller_waits)
+		session_accept(s);
 	for (struct session *p = s->sessions; p; p = p->next)
 		session_tick(p);
 	status_tick(s->status);

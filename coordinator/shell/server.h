@@ -98,6 +98,7 @@ struct server {
 	uint64_t last_peer;
 	struct status_socket *status;
 	bool stepping, stopping;
+	bool caller_waits; /* nobody could be let in: to be tried again */
 	bool checkpointing; /* of some job, by the pool */
 	bool extend_waits;  /* some session's extension does */
 	const struct order *reading; /* of an ended job: the pool reads its films, and all else of it but id and plan is the pool's */

@@ -365,16 +365,20 @@ void session_accept(struct server *s)
 	bool room = s->session_count < s->config.max_connections || make_room(s);
 	struct session *p = room ? mem_alloc(1, sizeof *p) : NULL;
 	struct conn *c;
+	s->caller_waits = false;
 	if (!p) {
 		log_event(LOG_PEER_REFUSED, "text=\"as many connections as are allowed\"");
 		if (conn_accept(&c, (uv_stream_t *)&s->listener, &config, &refused_events, NULL, &e) == 0)
 			conn_close(c, "as many connections as are allowed");
+		else
+			s->caller_waits = true;
 		return;
 	}
 	p->server = s;
 	p->id = ++s->last_peer;
 	if (conn_accept(&p->conn, (uv_stream_t *)&s->listener, &config, &events, p, &e)) {
 		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(e.text).text);
+		s->caller_waits = true;
 		mem_free(p);
 		return;
 	}

@@ -35,6 +35,7 @@ struct status_socket {
 	uv_pipe_t listener;
 	struct reader *readers;
 	unsigned reader_count;
+	bool caller_waits;
 	struct job_view *shown; /* as the subscribers saw the jobs last */
 	size_t shown_count;
 	uint64_t shown_changes; /* of the server, at the last tick */
@@ -254,6 +255,7 @@ static void on_connection(uv_stream_t *listener, int status)
 {
 	struct status_socket *t = listener->data;
 	struct reader *r = status ? NULL : mem_alloc(1, sizeof *r);
+	t->caller_waits = !r && !status; /* and with it all others, until it is let in */
 	if (!r)
 		return;
 	uv_pipe_init(listener->loop, &r->pipe, 0);
@@ -295,6 +297,8 @@ void status_tick(struct status_socket *t)
 	unsigned topics = 0;
 	if (!t)
 		return;
+	if (t->caller_waits)
+		on_connection((uv_stream_t *)&t->listener, 0);
 	for (struct reader *r = t->readers; r; r = r->next)
 		topics |= r->topics;
 	if (!topics || t->shown_changes == t->server->changes)

@@ -35,6 +35,9 @@ static void on_look(uv_timer_t *t)
 	char path[96];
 	snprintf(path, sizeof path, "%s/busy", folder);
 	bool wanted = access(path, F_OK) == 0;
+	snprintf(path, sizeof path, "%s/nomem", folder);
+	if (remove(path) == 0)
+		mem_fail_after(1); /* a caller's session is made, and its connection is not */
 	if (held == wanted)
 		return;
 	held = wanted;
@@ -332,6 +335,19 @@ static void crowds_are_turned_away(void **state)
 	for (int i = 0; i < 8; i++)
 		hang_up(crowd[i]);
 	usleep(50000);
+	it_still_works();
+}
+
+/* There is no memory for a connection: nobody is let in before there is, and then all are. */
+static void a_caller_waits_for_memory(void **state)
+{
+	(void)state;
+	char path[96];
+	snprintf(path, sizeof path, "%s/nomem", folder);
+	assert_int_equal(fclose(fopen(path, "w")), 0);
+	while (access(path, F_OK) == 0)
+		usleep(1000);
+	it_still_works();
 	it_still_works();
 }
 
@@ -986,7 +1002,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(rubbish_is_hung_up_on),   cmocka_unit_test(stragglers_are_hung_up_on),
-		cmocka_unit_test(crowds_are_turned_away), cmocka_unit_test(the_silent_give_way),  cmocka_unit_test(hello_is_looked_at),
+		cmocka_unit_test(crowds_are_turned_away), cmocka_unit_test(a_caller_waits_for_memory),
+		cmocka_unit_test(the_silent_give_way),  cmocka_unit_test(hello_is_looked_at),
 		cmocka_unit_test(submissions_are_looked_at), cmocka_unit_test(a_black_job_ends),
 		cmocka_unit_test(strategies_are_counted_once), cmocka_unit_test(what_is_useless_does_not_wait),
 		cmocka_unit_test(the_deaf_cost_little),
