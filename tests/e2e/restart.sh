@@ -106,6 +106,6 @@ printf x | dd of="$DIR/spool/jobs/$d/checkpoint" bs=1 seek=5000 conv=notrunc 2>/
 LISTEN=$COORDINATOR start_coordinator -v --keep-films 0 --journal $JOURNAL
 "$BIN/hslt-job" log "$d" | grep -q 'event=spool_fault .*damaged' || fail "$d does not say that it is damaged"
 until_true 60 is_state "$d" done || fail "$d is $(value "$d" state)"
-"$BIN/hslt-job" fetch "$d"
+"$BIN/hslt-job" fetch "$d" -o "$DIR/damaged.exr"
 same "$DIR/samples-quiet.exr" "$DIR/damaged.exr"
 echo "$killed kills ($caught while a checkpoint was written), $quiet leases, none lost, none twice, bits equal"
