@@ -30,6 +30,7 @@ static void *take(void *user, size_t size)
 	if (!b || b->size - b->used < need) {
 		size_t room = need > BLOCK_BYTES ? need : BLOCK_BYTES;
 		b = mem_alloc(1, sizeof *b + room);
+		env->memory_out = !b;
 		if (!b)
 			return NULL;
 		b->size = room;
@@ -103,8 +104,9 @@ int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t siz
 	else if (m->body_case == FARM__ENVELOPE__BODY__NOT_SET)
 		fault = "an envelope without a message";
 	if (fault) {
+		bool memory_out = env->memory_out;
 		envelope_fini(env);
-		return error_set(e, EBADMSG, "%s", fault);
+		return memory_out ? error_set(e, ENOMEM, "no memory for a message") : error_set(e, EBADMSG, "%s", fault);
 	}
 	env->message = m;
 	return 0;

@@ -22,9 +22,10 @@ struct envelope {
 	Farm__Envelope *message;
 	struct envelope_block *blocks;
 	size_t used, limit;
+	bool memory_out;
 };
 
-/* -EBADMSG: does not parse, unknown fields, no body, or needs more memory than its length may ask for. */
+/* -EBADMSG: does not parse, unknown fields, no body, or needs more memory than its length may ask for; -ENOMEM. */
 int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t size, struct error *e);
 void envelope_fini(struct envelope *env);
 

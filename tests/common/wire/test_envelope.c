@@ -62,6 +62,19 @@ static int answer(const char *bytes, size_t size)
 	return rc;
 }
 
+/* That is no fault of whoever sent it. */
+static void memory_is_out(void **state)
+{
+	(void)state;
+	struct envelope env;
+	struct error e;
+	mem_fail_after(0);
+	int rc = envelope_unpack(&env, (const unsigned char *)"\x1a\x00", 2, &e);
+	mem_fail_after(-1);
+	assert_int_equal(rc, -ENOMEM);
+	assert_null(env.blocks);
+}
+
 static void what_is_not_known_is_refused(void **state)
 {
 	(void)state;
@@ -106,6 +119,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(goes_out_and_comes_in),
+		cmocka_unit_test(memory_is_out),
 		cmocka_unit_test(what_is_not_known_is_refused),
 		cmocka_unit_test(a_bomb_is_defused),
 		cmocka_unit_test(text_is_checked),
