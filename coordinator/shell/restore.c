@@ -3,6 +3,7 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "common/base/version.h"
 #include "common/wire/frame.h"
 #include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/control.h"
@@ -224,6 +225,16 @@ static int take_record_of(const struct server *s, const struct ledger_job *j, st
 	return rc;
 }
 
+/* Plan or submission cannot be read: they are of another version, or damaged. */
+static int not_known(const struct ledger_job *j, int rc, struct error *e)
+{
+	if (rc != -EBADMSG && rc != -EINVAL)
+		return rc;
+	if (strcmp(j->version, HSLT_VERSION) == 0)
+		return error_prefix(e, -EBADMSG, "what it was submitted with");
+	return error_prefix(e, -EPROTO, "version %.40s of the coordinator took it, and this is %s", j->version, HSLT_VERSION);
+}
+
 static int make_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e)
 {
 	struct envelope submit, info;
@@ -232,14 +243,14 @@ static int make_order(struct server *s, const struct ledger_job *j, struct order
 	size_t size;
 	int rc = unpack(&info, FARM__ENVELOPE__BODY_JOB_INFO, j->plan, j->plan_size, &payload, &size, e);
 	if (rc)
-		return rc;
+		return not_known(j, rc, e);
 	rc = info.message->job_info->plan ? plan_from_wire(info.message->job_info->plan, &plan, e)
 					  : error_set(e, EBADMSG, "there is no plan");
 	envelope_fini(&info);
 	if (!rc)
 		rc = unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size, &payload, &size, e);
 	if (rc)
-		return rc == -EINVAL ? error_prefix(e, -EBADMSG, "its plan") : rc;
+		return not_known(j, rc, e);
 	rc = hold_blobs(s, submit.message->submit, e);
 	if (!rc && (rc = order_new(o, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e)))
 		order_release_blobs(submit.message->submit, s->blobs);

@@ -9,6 +9,8 @@
 #include <stdlib.h>
 #include <string.h>
 
+enum { SCHEMA = 1 };
+
 static const struct {
 	const char *name;
 	size_t offset;
@@ -125,7 +127,7 @@ int record_to_json(const struct job_record *r, char **out, struct error *e)
 {
 	json_error_t fault;
 	json_t *o = json_pack_ex(&fault, 0, "{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:o s:s s:s s:o}", /* */
-			      "schema", 1, "id", (json_int_t)r->id, "name", r->name, "integrator", r->integrator, /* */
+			      "schema", SCHEMA, "id", (json_int_t)r->id, "name", r->name, "integrator", r->integrator, /* */
 			      "state", r->state, "reason", r->reason, "why", r->why, "output", r->output, /* */
 			      "priority", r->priority, "exitCode", (int)r->exit_code, "result", (int)r->has_result, /* */
 			      "submitted", r->submitted, "ended", r->ended, "progress", r->progress, /* */
@@ -160,9 +162,14 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 {
 	json_error_t fault;
 	json_t *o = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
+	const json_t *schema = json_object_get(o, "schema"); /* NULL of whatever is no object */
 	memset(r, 0, sizeof *r);
-	if (!json_is_object(o) || json_integer_value(json_object_get(o, "schema")) != 1) {
-		int rc = error_set(e, EBADMSG, "not the record of a job: %s", o ? "another schema" : fault.text);
+	if (json_integer_value(schema) != SCHEMA) {
+		int rc = json_is_integer(schema) ? error_set(e, EPROTO, "a record of version %lld, and version %d is known here: another coordinator wrote it",
+							      (long long)json_integer_value(schema), SCHEMA)
+			 : !o && json_error_code(&fault) == json_error_out_of_memory
+				 ? error_set(e, ENOMEM, "no memory for a record")
+				 : error_set(e, EBADMSG, "not the record of a job: %s", o ? "no schema" : fault.text);
 		json_decref(o);
 		return rc;
 	}

@@ -62,7 +62,7 @@ json_t *record_effects(const struct job_record *r);    /* an array */
 json_t *record_counts(const struct job_record *r);     /* an object of its counts */
 json_t *record_strategies(const struct job_record *r); /* an array: strategy_to_json */
 int record_to_json(const struct job_record *r, char **text, struct error *e); /* mem_alloc'd; -ENOMEM, -EINVAL: a text of it is not UTF-8 */
-/* -EBADMSG when it is not a record. */
+/* -EBADMSG when it is not a record, -EPROTO when it is one of another version. */
 int record_from_json(const char *text, size_t size, struct job_record *r, struct error *e);
 bool record_is_ended(const struct job_record *r);
 

@@ -297,6 +297,17 @@ static void store(const char *path, const unsigned char *bytes, size_t size, boo
 	sealed_close(&out);
 }
 
+static void change_rows(const char *sql)
+{
+	char path[256];
+	sqlite3 *db;
+	snprintf(path, sizeof path, "%s/jobs.db", outage.root);
+	assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+	assert_int_equal(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
+	assert_true(sqlite3_changes(db) > 0);
+	assert_int_equal(sqlite3_close(db), SQLITE_OK);
+}
+
 static void of_another_version(void **state)
 {
 	(void)state;
@@ -327,6 +338,10 @@ static void of_another_version(void **state)
 		store(g.gl_pathv[0], before, size, false);
 		globfree(&g);
 	}
+	change_rows("UPDATE jobs SET version = '99', submission = CAST(submission || x'00' AS BLOB) WHERE ended IS NULL");
+	assert_false(outage_start(&f));
+	assert_int_equal(f.code, 1);
+	change_rows("UPDATE jobs SET submission = substr(submission, 1, length(submission) - 1) WHERE ended IS NULL");
 	f.faulty = false;
 	assert_true(outage_start(&f) && outage_work(&f));
 	outage_stop(&f);

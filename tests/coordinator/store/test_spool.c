@@ -128,6 +128,9 @@ static void records_come_back(void **state)
 	assert_int_equal(spool_read_record(s, 8, &back, &e), -ENOENT);
 	assert_int_equal(spool_write(s, 7, "job.json", "{}", 2, &e), 0);
 	assert_int_equal(spool_read_record(s, 7, &back, &e), -EBADMSG);
+	assert_int_equal(spool_write(s, 7, "job.json", "{\"schema\":2}", 12, &e), 0);
+	assert_int_equal(spool_read_record(s, 7, &back, &e), -EPROTO);
+	assert_non_null(strstr(e.text, "version 2"));
 	assert_int_equal(spool_write(s, 7, "job.json", "[", 1, &e), 0);
 	assert_int_equal(spool_read_record(s, 7, &back, &e), -EBADMSG);
 	spool_close(s);
