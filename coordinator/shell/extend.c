@@ -16,12 +16,14 @@ static const char *const again = "submit it again (hslt-submit)";
 
 /* ---- the new plan ---- */
 
+static double error_of(const struct forecast_history *h)
+{
+	return h->count ? sqrt(h->looks[h->count - 1].rel_mse_upper) : NAN;
+}
+
 static struct extension_from where(const struct order *o, double seconds, bool ended)
 {
-	const struct forecast_history *h = &o->record.looks;
-	const struct forecast_look *last = h->count ? &h->looks[h->count - 1] : NULL;
-	return (struct extension_from){.rounds = order_rounds(o), .seconds = seconds, .error = last ? sqrt(last->rel_mse_upper) : NAN,
-				       .ended = ended};
+	return (struct extension_from){.rounds = order_rounds(o), .seconds = seconds, .error = error_of(&o->record.looks), .ended = ended};
 }
 
 static int plan_of(const struct session *p, const struct order *o, const struct extension *x, const struct extension_from *from,
@@ -224,6 +226,15 @@ static void done(uv_work_t *work, int status)
 		extend_waiting(s);
 }
 
+/* All that can be said without its films: of less than was done, so that nothing is refused which they would allow. */
+static int ask_beforehand(const struct session *p, const struct order *o, const struct extension *x, const struct job_record *r,
+			  struct error *e)
+{
+	struct plan_request asked;
+	struct plan plan;
+	return plan_of(p, o, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked, &plan, e);
+}
+
 static int start_reading(struct session *p, const struct extension *x, const struct job_record *r, struct error *e)
 {
 	struct server *s = p->server;
@@ -243,6 +254,12 @@ static int start_reading(struct session *p, const struct extension *x, const str
 		mem_free(w);
 		return error_prefix(e, rc, "it cannot go on, %s", again);
 	}
+	rc = ask_beforehand(p, w->order, x, r, e);
+	if (rc) {
+		restore_drop(s, w->order);
+		mem_free(w);
+		return rc;
+	}
 	w->work.data = w;
 	w->server = s;
 	w->peer = p->id;
@@ -254,7 +271,6 @@ static int start_reading(struct session *p, const struct extension *x, const str
 	return rc;
 }
 
-/* All that can be said without its films. */
 static int extend_ended(struct session *p, const struct extension *x, const struct job_record *r, struct error *e)
 {
 	if (strcmp(r->state, job_state_name(JOB_DONE)) != 0)

@@ -114,6 +114,7 @@ f=$(submit "$BOX" -o "$DIR/tighter.exr" $SAMPLES --target-error 20%)
 done_in 60 "$f"
 first=$(value "$f" rounds)
 refused 1 'already' job extend "$f" --target-error 30%
+job log "$f" | grep -q state=restored && fail "its films are read for nothing"
 job extend "$f" --target-error 5%
 until_true 60 more_rounds "$f" "$first" || fail "$f does not go on after $first rounds"
 again
