@@ -238,6 +238,20 @@ static int judge(int good, X509_STORE_CTX *sc)
 	return 0;
 }
 
+/* The revoked must not come back because a file is lost. How many lists there were; -1: no memory. */
+static int keep_lists(SSL_CTX *from, X509_STORE *to)
+{
+	int count = 0;
+	STACK_OF(X509_OBJECT) *all = X509_STORE_get0_objects(SSL_CTX_get_cert_store(from));
+	for (int i = 0; i < sk_X509_OBJECT_num(all); i++) {
+		X509_CRL *list = X509_OBJECT_get0_X509_CRL(sk_X509_OBJECT_value(all, i));
+		if (list && X509_STORE_add_crl(to, list) != 1)
+			return -1;
+		count += list != NULL;
+	}
+	return count;
+}
+
 static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, struct error *e)
 {
 	char path[4096];
@@ -248,10 +262,13 @@ static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, s
 		return broken(e, EBADMSG, path);
 	}
 	SSL_CTX_set_cert_store(context, store); /* which owns it now */
-	if (!revocations)
+	int kept = revocations || !t->context ? 0 : keep_lists(t->context, store);
+	if (kept < 0)
+		return error_set(e, ENOMEM, "no memory for TLS");
+	if (!revocations && !kept)
 		return 0;
 	path_of(t, 3, path, sizeof path);
-	if (X509_load_crl_file(X509_STORE_add_lookup(store, X509_LOOKUP_file()), path, X509_FILETYPE_PEM) < 1)
+	if (revocations && X509_load_crl_file(X509_STORE_add_lookup(store, X509_LOOKUP_file()), path, X509_FILETYPE_PEM) < 1)
 		return broken(e, EBADMSG, path);
 	X509_STORE_set_flags(store, X509_V_FLAG_CRL_CHECK);
 	return 0;
@@ -363,22 +380,17 @@ int tls_refresh(struct tls *t, struct error *e)
 	look(t, now);
 	if (memcmp(now, t->stamps, sizeof now) == 0)
 		return 0;
-	bool had_list = is_there(&t->stamps[3]);
-	struct stamp list = t->stamps[3];
+	bool lost = is_there(&t->stamps[3]) && !is_there(&now[3]);
 	memcpy(t->stamps, now, sizeof now);
-	if (had_list && !is_there(&now[3])) { /* the revoked must not come back because a file is lost */
-		t->stamps[3] = list;
-		return error_set(e, ENOENT, "TLS: %s/crl.pem is gone; what it said still holds", t->folder);
-	}
 	int rc = load(t, is_there(&now[3]), &fresh, &self, e);
 	if (rc)
-		return error_prefix(e, rc, "TLS, the files before still hold");
+		return error_prefix(e, rc, "TLS, the files before still hold%s", lost ? ", crl.pem too, which is gone" : "");
 	SSL_CTX_free(t->context);
 	t->context = fresh;
 	t->self = self;
 	t->authority_until = find_authority(fresh);
 	t->warned = 0;
-	return 1;
+	return lost ? error_set(e, ENOENT, "TLS: %s/crl.pem is gone; what it said still holds", t->folder) : 1;
 }
 
 const struct tls_peer *tls_self(const struct tls *t)

@@ -369,7 +369,15 @@ static void who_is_revoked_is_not(void **state)
 	/* The list does not lose its power with its file. */
 	assert_int_equal(unlink(at(ours, "farm/crl.pem")), 0);
 	assert_int_equal(tls_refresh(listener.tls, &e), -ENOENT);
+	assert_int_equal(tls_refresh(listener.tls, &e), 0); /* it is said once */
 	assert_int_equal(tls_link_recheck(listener.link, &e), -EACCES);
+	time_t until = tls_self(listener.tls)->until;
+	assert_int_equal(authority_issue(ours, "farm", TLS_COORDINATOR, 50, true, &e), 0);
+	unlink(at(ours, "farm/crl.pem")); /* whoever renews need not bring a list */
+	assert_int_equal(tls_refresh(listener.tls, &e), 1);
+	assert_true(tls_self(listener.tls)->until != until);
+	assert_int_equal(tls_link_recheck(listener.link, &e), -EACCES);
+	assert_non_null(strstr(e.text, "revoked"));
 	copy(at(ours, "crl.pem"), at(ours, "farm/crl.pem"));
 	assert_int_equal(tls_refresh(listener.tls, &e), 1);
 	hang_up();
