@@ -12,7 +12,7 @@ void farm_config_init(struct farm_config *c)
 {
 	*c = (struct farm_config){
 		.first_job = 1,
-		.max_jobs = 256,
+		.max_jobs = FARM_JOBS,
 		.max_ended = 1000,
 		.max_peers = 4096,
 		.max_peer_leases = 256,

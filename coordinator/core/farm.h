@@ -45,6 +45,8 @@
 #include "coordinator/core/event.h"
 #include "coordinator/core/update.h"
 
+enum { FARM_JOBS = 256 /* that live at once, unless told otherwise */ };
+
 struct farm_config {
 	uint64_t first_job;       /* ids from here on, counted up, never reused */
 	uint32_t max_jobs;        /* not ended */

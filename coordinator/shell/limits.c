@@ -1,11 +1,17 @@
 #include "coordinator/shell/limits.h"
 
 #include "common/base/log.h"
+#include "coordinator/core/farm.h"
 
 #include <string.h>
 #include <sys/resource.h>
 
-enum { OTHERS = 256 /* descriptors: journals, logs and films of jobs, the spool's, whoever looks at the status */ };
+enum {
+	OF_JOB = 3,  /* descriptors: its log, its journal, the next one while a checkpoint is written */
+	SPARE = 128, /* the spool's and the database's, files on their way in and out, whoever looks at the status */
+	OTHERS = FARM_JOBS * OF_JOB + SPARE,
+	FEWEST = 16, /* connections without which a coordinator is none */
+};
 
 int limits_connections(unsigned asked, unsigned *connections, struct error *e)
 {
@@ -18,10 +24,11 @@ int limits_connections(unsigned asked, unsigned *connections, struct error *e)
 		if (setrlimit(RLIMIT_NOFILE, &r))
 			return error_set(e, errno, "the limit of file descriptors: %s", strerror(errno));
 	}
-	rlim_t room = r.rlim_cur > OTHERS ? r.rlim_cur - OTHERS : 1;
-	if (asked > room)
-		return error_set(e, EINVAL, "%u connections need %u file descriptors, and this process may have %llu (ulimit -Hn, LimitNOFILE)",
-				 asked, asked + OTHERS, (unsigned long long)r.rlim_cur);
+	rlim_t room = r.rlim_cur > OTHERS ? r.rlim_cur - OTHERS : 0;
+	unsigned least = asked ? asked : FEWEST;
+	if (least > room)
+		return error_set(e, EINVAL, "%u connections, and %d jobs, need %u file descriptors, and this process may have %llu (ulimit -Hn, LimitNOFILE)",
+				 least, FARM_JOBS, least + OTHERS, (unsigned long long)r.rlim_cur);
 	*connections = want - OTHERS < room ? (unsigned)(want - OTHERS) : (unsigned)room;
 	log_event(LOG_LIMITS, "connections=%u descriptors=%llu before=%llu", *connections, (unsigned long long)r.rlim_cur,
 		  (unsigned long long)before);

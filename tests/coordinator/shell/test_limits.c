@@ -27,15 +27,18 @@ static void descriptors_bound_connections(void **state)
 	(void)state;
 	struct error e;
 	unsigned n = 0;
-	set(64, 1024);
+	set(64, 2048);
 	assert_int_equal(limits_connections(100, &n, &e), 0);
 	assert_int_equal(n, 100);
-	assert_true(now() >= 356 && now() < 1024); /* no more than it takes */
-	assert_int_equal(limits_connections(1000, &n, &e), -EINVAL);
-	assert_non_null(strstr(e.text, "1000 connections need 1256 file descriptors, and this process may have 1024"));
+	assert_true(now() >= 100 + 3 * 256 && now() < 2048); /* no more than it takes: a job has three */
+	assert_int_equal(limits_connections(2000, &n, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "2000 connections, and 256 jobs, need 2896 file descriptors, and this process may have 2048"));
 	assert_int_equal(limits_connections(0, &n, &e), 0);
-	assert_int_equal(n, 768);
-	assert_int_equal(now(), 1024);
+	assert_int_equal(n, 2048 - 896);
+	assert_int_equal(now(), 2048);
+	set(64, 900); /* all of which the jobs could have */
+	assert_int_equal(limits_connections(0, &n, &e), -EINVAL);
+	assert_non_null(strstr(e.text, "16 connections, and 256 jobs, need 912 file descriptors"));
 }
 
 int main(void)
