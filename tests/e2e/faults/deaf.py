@@ -1,5 +1,5 @@
-"""deaf.py PORT JOB STATUS-SOCKET: a client that asks for a job's log again and again, and a reader of the status socket that
-subscribes again and again; neither reads. Fails unless each is cut off within half a minute."""
+"""deaf.py PORT JOB STATUS-SOCKET: a client that asks for a job's log again and again, a worker that asks for the job, and a reader
+of the status socket that subscribes; none of them reads. Fails unless each is cut off within half a minute."""
 import socket, sys, time
 from wire import VERSION, field, frame
 
@@ -9,6 +9,7 @@ def is_cut_off(s, words, most):
     s.settimeout(0.2)
     said, end = 0, time.monotonic() + 30
     while time.monotonic() < end:
+        time.sleep(0.005)
         try:
             said += s.send(words)
         except socket.timeout:
@@ -20,14 +21,22 @@ def is_cut_off(s, words, most):
     return False
 
 
-client = socket.socket()
-client.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-client.connect(("127.0.0.1", int(sys.argv[1])))
-client.sendall(frame(field(1, field(1, VERSION) + field(2, 2) + field(3, b"deaf"))))
-client.recv(4)
+def call(role):
+    s = socket.socket()
+    s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    s.connect(("127.0.0.1", int(sys.argv[1])))
+    s.sendall(frame(field(1, field(1, VERSION) + field(2, role) + field(3, b"deaf") + field(4, b"none") + field(5, 1))))
+    s.recv(4)
+    return s
+
+
+client = call(2)
 asks = frame(field(46, field(1, int(sys.argv[2])))) + 100 * frame(field(48, field(1, int(sys.argv[2])) + field(2, 1)))
 if not is_cut_off(client, asks, 1 << 26):
     sys.exit("the client is not cut off")
+
+if not is_cut_off(call(1), 1000 * frame(field(25, field(1, int(sys.argv[2])))), 1 << 26):
+    sys.exit("the worker is not cut off")
 
 reader = socket.socket(socket.AF_UNIX)
 reader.connect(sys.argv[3])

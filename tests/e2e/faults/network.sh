@@ -7,6 +7,7 @@ through_proxy() {
 	PIDS="$PIDS $!"
 	until_true 30 test -s "$DIR/proxy-port" || fail "$NAME: no proxy"
 	worker w0
+	OTHER=$WORKER
 	worker w1 --coordinator "127.0.0.1:$(cat "$DIR/proxy-port")"
 	says w1 event=connect
 	job
@@ -45,7 +46,13 @@ stall_result() {
 
 fault late_result 3 0 "results come when their worker has been missed"
 late_result() {
-	through_proxy happens late 22
+	through_proxy is_late
+}
+# The other worker stands still until the last is late, lest it does the job alone.
+is_late() {
+	kill -STOP "$OTHER"
+	happens late 22
+	[ "$i" -lt "$TIMES" ] || kill -CONT "$OTHER"
 }
 
 fault twice_result 10 1 "results are sent twice by the network"
@@ -54,7 +61,7 @@ twice_result() {
 	grep -q 'event=batch_repeated' "$DIR/coordinator.log" || fail "$NAME: nothing was repeated"
 }
 
-fault deaf_client 3 1 "clients and readers of the status ask for all there is and do not read"
+fault deaf_client 3 1 "clients, workers and readers of the status ask for all there is and do not read"
 deaf_client() {
 	farm
 	worker w0
