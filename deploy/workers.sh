@@ -11,7 +11,7 @@ Starts hslt-worker on each HOST over ssh (user@host works), in the background, w
   -t, --threads N              render threads (all cores of the host)
   -p, --path PROGRAM           hslt-worker on the hosts (hslt-worker)
   -l, --log FILE               log on the hosts (~/hslt-worker.log)
-  -k, --tls DIR                the certificate's folder on the hosts (hslt-ca worker NAME makes one; deploy/SECURITY.md)
+  -k, --tls DIR                the certificate's folder on the hosts (hslt-ca worker NAME makes one; deploy/README.md)
   -i, --insecure               without TLS, though the coordinator is not on the same host
   -s, --stop                   stop the workers that this script started there (SIGTERM: they finish their epochs)
   -n, --dry-run                only print what would be done
