@@ -44,15 +44,20 @@ stall_result() {
 	through_proxy is_cut stall 22
 }
 
-fault late_result 3 0 "results come when their worker has been missed"
+fault late_result 3 1 "results come when their worker has been missed"
 late_result() {
 	through_proxy is_late
 }
-# The other worker stands still until the last is late, lest it does the job alone.
+# The other worker stands still until the last is late and was missed, lest it does the job alone.
 is_late() {
 	kill -STOP "$OTHER"
 	happens late 22
-	[ "$i" -lt "$TIMES" ] || kill -CONT "$OTHER"
+	[ "$i" -eq "$TIMES" ] || return 0
+	until_true 10 is_missed || fail "$NAME: the late worker is not missed"
+	kill -CONT "$OTHER"
+}
+is_missed() {
+	grep -q 'name="w1" text="nothing.* heard' "$DIR/coordinator.log"
 }
 
 fault twice_result 10 1 "results are sent twice by the network"

@@ -5,7 +5,7 @@ way, and the file goes:
   cut    half of it, then the connection is closed on both sides
   stall  half of it, then nothing more, either way, until one side hangs up
   twice  it is sent twice
-  late   it, and what is behind it, a second and a half later"""
+  late   it, and what is behind it, two and a half seconds later"""
 import asyncio, os, sys
 
 port_file, target, order_file = sys.argv[1], int(sys.argv[2]), sys.argv[3]
@@ -56,7 +56,7 @@ async def one_way(pair, source, sink):
                 pair.stalled = True
                 continue
             if action == "late":
-                await asyncio.sleep(1.5)
+                await asyncio.sleep(2.5)
             sink.write(frame * (2 if action == "twice" else 1))
             await sink.drain()
     except (asyncio.IncompleteReadError, OSError):
