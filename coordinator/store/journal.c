@@ -402,7 +402,7 @@ int journal_append(struct journal *j, enum journal_kind kind, double elapsed, co
 		n->b = *b;
 		memset(b, 0, sizeof *b);
 	}
-	uint64_t size = size_of(&n->record), bytes = unwritten_bytes += size;
+	uint64_t size = size_of(&n->record), bytes = atomic_fetch_add(&unwritten_bytes, size) + size;
 	pthread_mutex_lock(&j->list);
 	*j->last = n;
 	j->last = &n->next;
