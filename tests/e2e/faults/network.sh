@@ -44,6 +44,20 @@ stall_result() {
 	through_proxy is_cut stall 22
 }
 
+fault slow_result 3 1 "results take longer than a worker may be silent"
+slow_result() {
+	through_proxy is_slow
+	[ "$(grep -c event=connect\  "$DIR/w1.log")" -eq 1 ] || fail "$NAME: the worker is cut off"
+}
+# The other worker stands still until the result is there, lest the job is done by it alone meanwhile.
+is_slow() {
+	kill -STOP "$OTHER"
+	before=$(merged)
+	happens slow 22
+	until_true 30 is_merged $((before + 2)) || fail "$NAME: the result does not come"
+	kill -CONT "$OTHER"
+}
+
 fault late_result 3 1 "results come when their worker has been missed"
 late_result() {
 	through_proxy is_late

@@ -5,6 +5,7 @@ way, and the file goes:
   cut    half of it, then the connection is closed on both sides
   stall  half of it, then nothing more, either way, until one side hangs up
   twice  it is sent twice
+  slow   it takes two seconds, piece by piece
   late   it, and what is behind it, two and a half seconds later"""
 import asyncio, os, sys
 
@@ -55,6 +56,12 @@ async def one_way(pair, source, sink):
                     break
                 pair.stalled = True
                 continue
+            if action == "slow":
+                piece = len(frame) // 20 + 1
+                for at in range(0, len(frame) - piece, piece):
+                    sink.write(frame[at:at + piece])
+                    await asyncio.sleep(0.1)
+                frame = frame[(len(frame) - 1) // piece * piece:]
             if action == "late":
                 await asyncio.sleep(2.5)
             sink.write(frame * (2 if action == "twice" else 1))
