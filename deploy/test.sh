@@ -38,7 +38,7 @@ kind() {
 	echo "== $title"
 	code=0
 	{ "$@" 2>&1 || echo "exit $?" >"$results.code"; } | tee "$results" | grep --line-buffered -v '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$\|^skipped: ' || true
-	grep '^skipped: ' "$results" | sort -u | sed "s/^skipped: /skipped: $title: /" >>"$skips" || true
+	grep '^skipped: ' "$results" | sort -u | sed "s|^skipped: |skipped: $title: |" >>"$skips" || true
 	[ ! -f "$results.code" ] || { code=1 && rm -f "$results.code"; }
 	line=$(grep '^[0-9]* passed, [0-9]* failed, [0-9]* skipped$' "$results" | tail -n 1)
 	set -- $(echo "$line" | tr -dc '0-9 ')
@@ -58,7 +58,7 @@ step() {
 	if "$@" >"$results" 2>&1; then
 		passed=$((passed + 1))
 		skipped=$((skipped + $(grep -c '^skipped in part: ' "$results" || true)))
-		sed -n "s/^skipped in part: /skipped: $title: /p" "$results" >>"$skips"
+		sed -n "s|^skipped in part: |skipped: $title: |p" "$results" >>"$skips"
 	else
 		failed=$((failed + 1))
 		cat "$results"
