@@ -5,8 +5,8 @@
 # results that were acknowledged and that it had to merge again in a later life, or that the last film does not hold; and
 # those of which a worker was told that they count and that never were on the disk. What a life merged and lost before it was
 # acknowledged is computed again and is no loss. DOUBLED: how often a film held a result beyond the first time. RESULTS: how
-# many the last film holds. AGAIN: the most epochs of one chain that were given out again between one injected fault (event=fault)
-# and the next because who had them was gone; one that is given to two at once, as at the end of a round, is no loss.
+# many the last film holds. AGAIN: the most epochs of one chain that were given out again because one worker was gone that had them, or
+# one life of the coordinator; one that is given to two at once, as at the end of a round, is no loss.
 
 function get(name) {
 	return match($0, " " name "=[^ ]*") ? substr($0, RSTART + length(name) + 2, RLENGTH - length(name) - 2) : ""
@@ -31,14 +31,12 @@ function add(k, fresh) {
 	life++
 }
 
-/ event=fault / { fault++ }
-
 / event=(peer_closed|peer_accept) .*text=/ { gone[life, get("peer")] = 1 }
 
 / event=lease_granted / && get("job") == job {
 	k = key(get("kind"), get("epoch"))
 	if (k in holder && (split(holder[k], had, SUBSEP) && had[1] != life || holder[k] in gone)) {
-		n = ++repeats[fault, get("group"), get("part")]
+		n = ++repeats[had[1] != life ? had[1] : holder[k], get("group"), get("part")]
 		again = n > again ? n : again
 	}
 	holder[k] = life SUBSEP get("peer")

@@ -65,7 +65,6 @@ each_time() {
 	while [ $i -lt "$TIMES" ]; do
 		i=$((i + 1))
 		moment $i
-		echo "x event=fault " >>"$DIR/coordinator.log"
 		"$@"
 	done
 }

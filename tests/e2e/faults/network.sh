@@ -41,7 +41,13 @@ cut_grant() {
 
 fault stall_result 3 1 "half a result comes, and then nothing"
 stall_result() {
-	through_proxy is_cut stall 22
+	through_proxy is_stalled
+}
+# The other worker stands still meanwhile, lest it does the job alone.
+is_stalled() {
+	kill -STOP "$OTHER"
+	is_cut stall 22
+	kill -CONT "$OTHER"
 }
 
 fault slow_result 3 1 "results take longer than a worker may be silent"
