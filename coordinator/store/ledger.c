@@ -60,6 +60,8 @@ static int migrate(struct ledger *l, struct error *e)
 	if (!rc && version > VERSION)
 		return error_set(e, EPROTO, "the database of jobs is of version %d, and version %d is known here: a later coordinator wrote it",
 				 version, (int)VERSION);
+	if (!rc && version < 0)
+		return error_set(e, EBADMSG, "the database of jobs is damaged: no coordinator writes a version %d", version);
 	for (; !rc && version < VERSION; version++) {
 		char done[64];
 		snprintf(done, sizeof done, "PRAGMA user_version = %d; COMMIT", version + 1);

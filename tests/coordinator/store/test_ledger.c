@@ -8,6 +8,7 @@
 #include <setjmp.h>
 #include <cmocka.h>
 
+#include <arpa/inet.h>
 #include <fcntl.h>
 #include <sqlite3.h>
 #include <stdio.h>
@@ -158,10 +159,11 @@ static void extended(void **state)
 	ledger_close(l);
 }
 
-static void set_version(const char *path, unsigned char version)
+static void set_version(const char *path, int32_t version)
 {
 	int fd = open(path, O_RDWR); /* user_version: bytes 60 to 63, big endian */
-	assert_int_equal(pwrite(fd, &version, 1, 63), 1);
+	uint32_t bytes = htonl((uint32_t)version);
+	assert_int_equal(pwrite(fd, &bytes, sizeof bytes, 60), sizeof bytes);
 	close(fd);
 }
 
@@ -176,6 +178,9 @@ static void versions(void **state)
 	set_version(path, 99);
 	assert_int_equal(ledger_open(&l, path, &e), -EPROTO);
 	assert_non_null(strstr(e.text, "later"));
+	set_version(path, -1140850685);
+	assert_int_equal(ledger_open(&l, path, &e), -EBADMSG);
+	assert_non_null(strstr(e.text, "damaged"));
 	set_version(path, 3);
 	l = open_ledger(path);
 	ledger_close(l);
