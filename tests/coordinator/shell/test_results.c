@@ -1,0 +1,429 @@
+/*
+ * The coordinator's shell and workers that answer every lease at once with what the test wants: results counted once, late, slow, useless,
+ * failed; extensions of what is done.
+ */
+#include "tests/support/served.h"
+
+#include "common/base/mem.h"
+#include "coordinator/store/record.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <math.h>
+#include <poll.h>
+#include <stdio.h>
+#include <string.h>
+#include <unistd.h>
+
+static int set_up(void **state)
+{
+	(void)state;
+	return served_start(5, 1);
+}
+
+/* Who is silent for 1.2 s is hung up on. */
+static int set_up_quick(void **state)
+{
+	(void)state;
+	return served_start(0.2, 10);
+}
+
+static void a_black_job_ends(void **state)
+{
+	(void)state;
+	struct peer *client = peer_call(), *worker = peer_call();
+	struct plan plan;
+	struct error e;
+	struct plan_request r = peer_plan_request(NULL);
+	assert_int_equal(plan_make(&r, &plan, &e), 0);
+	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	assert_int_equal(peer_submit_answer(client)->n_missing, 1);
+	peer_send_blob(client, "<scene/>", "<scene/>");
+	const Farm__SubmitAnswer *a = peer_submit_answer(client);
+	assert_int_equal(a->job, 1);
+	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	struct desk d = {.count = 0};
+	bool first = true;
+	while (!d.job_ended) {
+		if (d.count == 0) {
+			peer_attend(worker, &d);
+			continue;
+		}
+		struct batch b = peer_black_batch(&d.keys[--d.count], &plan);
+		if (first) { /* wrong ones; then the right ones; then a repeat */
+			b.weights[0] = NAN;
+			peer_send_batch(worker, &b, &plan);
+			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
+			b.weights[0] = 0;
+			peer_send_batch(worker, &b, &plan);
+			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+			peer_send_batch(worker, &b, &plan);
+			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+			first = false;
+		} else {
+			peer_send_batch(worker, &b, &plan);
+		}
+		batch_fini(&b);
+	}
+	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = peer_hear(client);
+	assert_non_null(m);
+	assert_int_equal(m->job_list_answer->n_jobs, 1);
+	assert_string_equal(m->job_list_answer->jobs[0]->state, "done");
+	assert_true(m->job_list_answer->jobs[0]->fetchable);
+	peer_hang_up(client);
+	peer_hang_up(worker);
+}
+
+/* A lease of chains in the dark; of a bootstrap in even light. */
+static struct batch counting_batch(const struct lease_key *k, const struct plan *plan)
+{
+	struct batch b = {.key = *k};
+	if (k->kind == LEASE_BOOTSTRAP) {
+		b = peer_black_batch(k, plan);
+		for (uint64_t i = 0; i < b.weight_count; i++)
+			b.weights[i] = 1;
+		b.independent_sum = (double)b.weight_count;
+		return b;
+	}
+	struct plan_range chains = plan_chain_range(plan, k->part);
+	b.state_count = (uint32_t)(chains.end - chains.begin);
+	b.states = mem_alloc(b.state_count, sizeof *b.states);
+	for (uint32_t i = 0; i < b.state_count; i++)
+		b.states[i] = (struct chain_state){mem_alloc(4, 1), 4};
+	b.moment_count = batch_moment_count(plan, LEASE_RENDER);
+	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
+	b.counters[COUNT_SAMPLES] = b.state_count * plan->epoch;
+	b.counters[COUNT_STUCK] = b.state_count;
+	b.counters[COUNT_LONGEST_STUCK] = 100 + k->group;
+	b.strategy_count = 2;
+	b.strategy[0][STRATEGY_PROPOSED] = 3;
+	b.strategy[1][STRATEGY_PROPOSED] = b.counters[COUNT_SAMPLES] - 3;
+	b.strategy[1][STRATEGY_RAYS] = UINT64_C(1) << 40;
+	b.strategy[1][STRATEGY_FAIL_MODE] = 7 + k->part;
+	return b;
+}
+
+static void expect_counts_in_spool(const struct plan *plan)
+{
+	struct job_record r;
+	struct error e;
+	char path[96], text[16384];
+	snprintf(path, sizeof path, "%s/spool/jobs/j2/job.json", served_folder());
+	FILE *f = fopen(path, "r");
+	assert_non_null(f);
+	size_t size = fread(text, 1, sizeof text, f);
+	fclose(f);
+	assert_int_equal(record_from_json(text, size, &r, &e), 0);
+	uint64_t leases = plan->rounds * plan->groups * plan->parts, chains = plan->chains * plan->rounds;
+	assert_int_equal(r.leases_merged, leases);
+	assert_int_equal(r.repeats, 1);
+	assert_int_equal(r.refused, 1);
+	assert_string_equal(r.mixture, "independent=0.1,hslt=0.9");
+	assert_int_equal(r.strategy[0][STRATEGY_PROPOSED], 3 * leases);
+	assert_int_equal(r.strategy[1][STRATEGY_PROPOSED], plan->rounds * plan_round_mutations(plan) - 3 * leases);
+	assert_true(r.strategy[1][STRATEGY_RAYS] == leases << 40);
+	assert_int_equal(r.strategy[1][STRATEGY_FAIL_MODE], plan->rounds * plan->groups * (7 * plan->parts + plan->parts * (plan->parts - 1) / 2));
+	assert_int_equal(r.stuck, chains);
+	assert_int_equal(r.longest_stuck, 101);
+	assert_non_null(strstr(r.note, "the image is black: no sample found light; "));
+	assert_non_null(strstr(r.note, "longest run: 101 rejections"));
+}
+
+static void strategies_are_counted_once(void **state)
+{
+	(void)state;
+	struct peer *client = peer_call(), *worker = peer_call();
+	struct plan plan;
+	struct error e;
+	struct plan_request r = peer_plan_request("independent=0.1,hslt=0.9");
+	assert_int_equal(plan_make(&r, &plan, &e), 0);
+	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	peer_submit(client, r.mixture, "<scene/>", "s.xml", "s.xml");
+	assert_int_equal(peer_submit_answer(client)->job, 2); /* the scene is still there */
+	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	struct desk d = {.count = 0};
+	bool first = true;
+	while (!d.job_ended) {
+		if (d.count == 0) {
+			peer_attend(worker, &d);
+			continue;
+		}
+		struct batch b = counting_batch(&d.keys[--d.count], &plan);
+		bool wrong = first && b.key.kind == LEASE_RENDER;
+		if (wrong) {
+			b.strategy[0][STRATEGY_ACCEPTED] = 4; /* of 3 proposals */
+			peer_send_batch(worker, &b, &plan);
+			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
+			b.strategy[0][STRATEGY_ACCEPTED] = 0;
+		}
+		peer_send_batch(worker, &b, &plan);
+		assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+		if (wrong) {
+			peer_send_batch(worker, &b, &plan);
+			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+			first = false;
+		}
+		batch_fini(&b);
+	}
+	expect_counts_in_spool(&plan);
+	peer_hang_up(client);
+	peer_hang_up(worker);
+}
+
+/* ---- results that wait ---- */
+
+static void send_bootstrap(struct peer *p, const struct lease_key *k)
+{
+	struct plan plan;
+	struct error e;
+	struct plan_request r = peer_plan_request(NULL);
+	assert_int_equal(plan_make(&r, &plan, &e), 0);
+	struct batch b = peer_black_batch(k, &plan);
+	peer_send_batch(p, &b, &plan);
+	batch_fini(&b);
+}
+
+/* While nobody may look at the film only what would be merged waits, each once; all else is answered at once. */
+static void what_is_useless_does_not_wait(void **state)
+{
+	(void)state;
+	struct peer *client = peer_call(), *worker = peer_call(), *other = peer_call();
+	struct desk d = {.count = 0}, none = {.count = 0};
+	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	uint64_t job = peer_submit_answer(client)->job;
+	assert_true(job > 0);
+	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	while (d.count < 2)
+		peer_attend(worker, &d);
+	send_bootstrap(worker, &d.keys[0]);
+	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+	while (d.count < 3)
+		peer_attend(worker, &d);
+	assert_true(peer_hello(other, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	peer_say_job_get(other, job);
+	assert_int_equal(peer_hear(other)->body_case, FARM__ENVELOPE__BODY_JOB_INFO);
+	served_set_busy(true);
+	for (int i = 0; i < 3; i++)
+		send_bootstrap(worker, &d.keys[1]);
+	send_bootstrap(worker, &d.keys[0]);
+	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+	send_bootstrap(other, &d.keys[0]);
+	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
+	send_bootstrap(other, &d.keys[1]); /* it waits already */
+	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_REFUSED);
+	send_bootstrap(other, &d.keys[2]); /* open: perhaps it held it before it called again */
+	send_bootstrap(other, &d.keys[2]);
+	send_bootstrap(other, &d.keys[0]);
+	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_REPEATED);
+	served_set_busy(false);
+	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
+	send_bootstrap(worker, &d.keys[0]); /* nothing else was kept */
+	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REPEATED);
+	/* Who goes takes along what waits for it. */
+	assert_true(d.count >= 4);
+	served_set_busy(true);
+	send_bootstrap(worker, &d.keys[3]);
+	peer_hang_up(worker);
+	usleep(50000);
+	send_bootstrap(other, &d.keys[3]);
+	served_set_busy(false);
+	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
+	peer_hang_up(client);
+	peer_hang_up(other);
+}
+
+/* ---- slow links ---- */
+
+/* A worker with a lease of a new job, and its result. The keys of what came stay in the desk. */
+static struct peer *worker_with_result(struct peer *client, struct desk *d, unsigned char **frame, size_t *size)
+{
+	struct peer *worker = peer_call();
+	struct plan plan;
+	struct error e;
+	struct plan_request r = peer_plan_request(NULL);
+	assert_int_equal(plan_make(&r, &plan, &e), 0);
+	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	if (peer_submit_answer(client)->n_missing) {
+		peer_send_blob(client, "<scene/>", "<scene/>");
+		peer_submit_answer(client);
+	}
+	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	while (d->count == 0)
+		peer_attend(worker, d);
+	struct batch b = peer_black_batch(&d->keys[0], &plan);
+	assert_int_equal(batch_pack(&b, &plan, frame, size, &e), 0);
+	batch_fini(&b);
+	return worker;
+}
+
+/* It takes longer than anybody may be silent, and the worker can say nothing else meanwhile; it is told that it is heard. */
+static void a_slow_result_counts(void **state)
+{
+	(void)state;
+	enum { PIECES = 24 };
+	unsigned char *frame;
+	size_t size, at = 0;
+	struct desk d = {.count = 0};
+	struct peer *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
+	for (size_t i = 1; i <= PIECES; i++) {
+		usleep(100000);
+		peer_say_bytes(worker, frame + at, size * i / PIECES - at);
+		at = size * i / PIECES;
+	}
+	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
+	assert_true(worker->heartbeats >= 8 && worker->heartbeats <= 13);
+	mem_free(frame);
+	peer_hang_up(client);
+	peer_hang_up(worker);
+}
+
+static void half_a_result_is_no_word(void **state)
+{
+	(void)state;
+	unsigned char *frame;
+	size_t size;
+	struct desk d = {.count = 0};
+	struct peer *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
+	peer_say_bytes(worker, frame, size / 2);
+	const Farm__Envelope *m;
+	while ((m = peer_hear(worker)) && m->body_case != FARM__ENVELOPE__BODY_FAULT)
+		continue;
+	mem_free(frame);
+	peer_hang_up(client);
+	peer_hang_up(worker);
+}
+
+static void say_extend(const struct peer *p, uint64_t job, uint64_t spp, int times)
+{
+	unsigned char all[512];
+	size_t at = 0;
+	Farm__Control c;
+	Farm__Envelope m;
+	farm__control__init(&c);
+	farm__envelope__init(&m);
+	c.job = job;
+	c.verb = FARM__VERB__VERB_EXTEND;
+	c.more_spp = spp;
+	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
+	m.control = &c;
+	for (int i = 0; i < times; i++) {
+		unsigned char *frame;
+		size_t size;
+		struct error e;
+		assert_int_equal(envelope_pack(&m, NULL, 0, &frame, &size, &e), 0);
+		memcpy(all + at, frame, size);
+		at += size;
+		mem_free(frame);
+	}
+	peer_say_bytes(p, all, at);
+}
+
+static void hear_done(struct peer *p, bool ok, const char *text)
+{
+	const Farm__Envelope *m = peer_hear(p);
+	assert_non_null(m);
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_DONE);
+	assert_int_equal(m->done->ok, ok);
+	if (!strstr(m->done->text, text))
+		fail_msg("'%s' is not in '%s'", text, m->done->text);
+}
+
+/* The job that was done before: its films are read beside the loop, and each Extend gets one answer. */
+static void extensions_wait_for_films(void **state)
+{
+	(void)state;
+	struct peer *a = peer_call(), *b = peer_call();
+	assert_true(peer_hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	assert_true(peer_hello(b, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	say_extend(a, 2, 0, 1); /* not for that */
+	hear_done(a, false, "by what");
+	say_extend(a, 2, 8, 3);
+	say_extend(b, 2, 8, 1);
+	hear_done(a, false, "one extension at a time");
+	hear_done(a, false, "one extension at a time");
+	hear_done(a, true, "it goes on until");
+	hear_done(b, true, "it goes on until"); /* the job lives by then */
+	say_extend(a, 1, 8, 1);
+	hear_done(a, false, "it is black");
+	peer_hang_up(a);
+	peer_hang_up(b);
+	a = peer_call();
+	assert_true(peer_hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	peer_say_empty(a, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = peer_hear(a);
+	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	assert_false(m->job_list_answer->jobs[1]->ended);
+	peer_hang_up(a);
+}
+
+static void say_failed(struct peer *p, const struct lease_key *k, const char *text)
+{
+	Farm__LeaseKey key;
+	Farm__LeaseFailed failed;
+	Farm__Envelope m;
+	char copy[64];
+	lease_key_to_wire(k, &key);
+	farm__lease_failed__init(&failed);
+	farm__envelope__init(&m);
+	strcpy(copy, text);
+	failed.key = &key;
+	failed.text = copy;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
+	m.lease_failed = &failed;
+	peer_say(p, &m, NULL, 0);
+}
+
+/* A failure is the scene's, or the worker's; never the connection's, because of letters that a scene's author chose. */
+static void a_failure_counts_whatever_its_text(void **state)
+{
+	(void)state;
+	struct peer *client = peer_call(), *worker = peer_call();
+	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
+	assert_true(peer_submit_answer(client)->job);
+	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	struct desk d = {.count = 0};
+	while (d.count == 0)
+		peer_attend(worker, &d);
+	say_failed(worker, &d.keys[0], "half a letter \xc3\nof a file");
+	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
+	usleep(100000);
+	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = peer_hear(client);
+	assert_non_null(m);
+	for (size_t i = 0; i < m->job_list_answer->n_jobs; i++)
+		if (m->job_list_answer->jobs[i]->job == d.keys[0].job)
+			assert_non_null(strstr(m->job_list_answer->jobs[i]->why, "scripted: half a letter ? of a file"));
+	struct pollfd ready = {worker->fd, POLLIN, 0};
+	while (poll(&ready, 1, 200) == 1) /* neither a fault nor the end */
+		assert_true(peer_attend(worker, &d) == FARM__VERDICT__VERDICT_NONE && worker->env.message->body_case != FARM__ENVELOPE__BODY_FAULT);
+	peer_hang_up(client);
+	peer_hang_up(worker);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_black_job_ends), cmocka_unit_test(strategies_are_counted_once),
+		cmocka_unit_test(what_is_useless_does_not_wait),
+		cmocka_unit_test(extensions_wait_for_films), /* the job of strategies_are_counted_once lives again */
+		cmocka_unit_test(a_failure_counts_whatever_its_text),
+	};
+	const struct CMUnitTest slow[] = {cmocka_unit_test(a_slow_result_counts), cmocka_unit_test(half_a_result_is_no_word)};
+	int failed = cmocka_run_group_tests(tests, set_up, served_stop);
+	return failed + cmocka_run_group_tests(slow, set_up_quick, served_stop);
+}

@@ -1,0 +1,375 @@
+#include "tests/support/served.h"
+
+#include "common/base/mem.h"
+#include "coordinator/shell/server.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <arpa/inet.h>
+#include <poll.h>
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static char folder[64];
+static pid_t server;
+static uint16_t port;
+
+/* While the folder has a file `busy` nobody may look at the films of jobs. */
+static void on_look(uv_timer_t *t)
+{
+	static bool held;
+	struct server *s = t->data;
+	char path[96];
+	snprintf(path, sizeof path, "%s/busy", folder);
+	bool wanted = access(path, F_OK) == 0;
+	snprintf(path, sizeof path, "%s/nomem", folder);
+	if (remove(path) == 0)
+		mem_fail_after(1); /* a caller's session is made, and its connection is not */
+	if (held == wanted)
+		return;
+	held = wanted;
+	snprintf(path, sizeof path, "%s/held", folder);
+	for (struct order *o = s->orders; o; o = o->next)
+		o->busy = wanted;
+	if (!wanted)
+		server_order_free_again(s);
+	if (wanted && fclose(fopen(path, "w")))
+		abort();
+	if (!wanted && remove(path))
+		abort();
+}
+
+static int serve(const struct server_config *c)
+{
+	struct server *s;
+	struct error e;
+	uv_timer_t look;
+	if (server_open(&s, c, &e))
+		return 1;
+	look.data = s;
+	uv_timer_init(&s->loop, &look);
+	uv_timer_start(&look, on_look, 5, 5);
+	uv_unref((uv_handle_t *)&look);
+	uv_run(&s->loop, UV_RUN_DEFAULT);
+	uv_close((uv_handle_t *)&look, NULL);
+	server_close(s);
+	return 0;
+}
+
+const char *served_folder(void)
+{
+	return folder;
+}
+
+void served_set_busy(bool busy)
+{
+	char path[96], held[96];
+	snprintf(path, sizeof path, "%s/busy", folder);
+	snprintf(held, sizeof held, "%s/held", folder);
+	assert_int_equal(busy ? fclose(fopen(path, "w")) : remove(path), 0);
+	for (int i = 0; i < 500 && (access(held, F_OK) == 0) != busy; i++)
+		usleep(10000);
+	assert_true((access(held, F_OK) == 0) == busy);
+}
+
+int served_start(double heartbeat_seconds, double stall_seconds)
+{
+	char spool[96], port_file[96];
+	strcpy(folder, "/tmp/hslt-peers.XXXXXX");
+	if (!mkdtemp(folder))
+		return -1;
+	snprintf(spool, sizeof spool, "%s/spool", folder);
+	snprintf(port_file, sizeof port_file, "%s/port", folder);
+	fflush(NULL);
+	server = fork();
+	if (server == 0) {
+		struct server_config c;
+		server_config_init(&c);
+		c.listen = "127.0.0.1:0";
+		c.spool = spool;
+		c.port_file = port_file;
+		c.max_connections = 8;
+		c.hello_seconds = 1;
+		c.heartbeat_seconds = heartbeat_seconds;
+		c.stall_seconds = stall_seconds;
+		log_set_level(LOG_LEVEL_ERROR);
+		_exit(serve(&c));
+	}
+	unsigned number = 0;
+	for (int i = 0; i < 500 && !number; i++) {
+		FILE *f = fopen(port_file, "r");
+		if (f && fscanf(f, "%u", &number) != 1)
+			number = 0;
+		if (f)
+			fclose(f);
+		usleep(10000);
+	}
+	port = (uint16_t)number;
+	return port ? 0 : -1;
+}
+
+int served_stop(void **state)
+{
+	(void)state;
+	char command[96];
+	int status = -1;
+	kill(server, SIGTERM);
+	waitpid(server, &status, 0);
+	snprintf(command, sizeof command, "rm -rf '%s'", folder);
+	return system(command) || !WIFEXITED(status) || WEXITSTATUS(status);
+}
+
+long served_kilobytes(void)
+{
+	char path[64], line[256];
+	long kilobytes = -1;
+	snprintf(path, sizeof path, "/proc/%d/status", (int)server);
+	FILE *f = fopen(path, "r");
+	assert_non_null(f);
+	while (fgets(line, sizeof line, f))
+		if (sscanf(line, "VmRSS: %ld", &kilobytes) == 1)
+			break;
+	fclose(f);
+	return kilobytes;
+}
+
+/* ---- a peer of our own ---- */
+
+struct peer *peer_call(void)
+{
+	struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = htons(port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
+	struct peer *p = calloc(1, sizeof *p);
+	assert_non_null(p);
+	p->fd = socket(AF_INET, SOCK_STREAM, 0);
+	assert_int_equal(connect(p->fd, (struct sockaddr *)&a, sizeof a), 0);
+	frame_reader_init(&p->reader, (struct frame_limits){1 << 22, 1 << 24});
+	return p;
+}
+
+void peer_hang_up(struct peer *p)
+{
+	close(p->fd);
+	frame_reader_fini(&p->reader);
+	envelope_fini(&p->env);
+	free(p);
+}
+
+void peer_say_bytes(const struct peer *p, const void *bytes, size_t size)
+{
+	assert_int_equal(send(p->fd, bytes, size, MSG_NOSIGNAL), size);
+}
+
+void peer_say(const struct peer *p, const Farm__Envelope *m, const void *payload, size_t payload_size)
+{
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	assert_int_equal(envelope_pack(m, payload, payload_size, &frame, &size, &e), 0);
+	peer_say_bytes(p, frame, size);
+	mem_free(frame);
+}
+
+/* The next message but heartbeats; NULL when the coordinator hung up. Three seconds at most. */
+const Farm__Envelope *peer_hear(struct peer *p)
+{
+	for (;;) {
+		struct error e;
+		if (p->at == p->size) {
+			struct pollfd ready = {p->fd, POLLIN, 0};
+			assert_int_equal(poll(&ready, 1, 3000), 1);
+			ssize_t n = read(p->fd, p->bytes, sizeof p->bytes);
+			if (n <= 0)
+				return NULL;
+			p->at = 0;
+			p->size = (size_t)n;
+		}
+		size_t used;
+		int rc = frame_reader_take(&p->reader, p->bytes + p->at, p->size - p->at, &used, &e);
+		assert_true(rc >= 0);
+		p->at += used;
+		if (!rc)
+			continue;
+		envelope_fini(&p->env);
+		assert_int_equal(envelope_unpack(&p->env, p->reader.header.bytes, p->reader.header.size, &e), 0);
+		if (p->env.message->body_case != FARM__ENVELOPE__BODY_HEARTBEAT)
+			return p->env.message;
+		p->heartbeats++;
+	}
+}
+
+const Farm__HelloAck *peer_hello(struct peer *p, uint32_t version, Farm__Role role)
+{
+	Farm__Hello h;
+	Farm__Envelope m;
+	char name[] = "scripted", print[] = "p1";
+	farm__hello__init(&h);
+	farm__envelope__init(&m);
+	h.version = version;
+	h.role = role;
+	h.name = name;
+	h.fingerprint = print;
+	h.threads = 1;
+	m.body_case = FARM__ENVELOPE__BODY_HELLO;
+	m.hello = &h;
+	peer_say(p, &m, NULL, 0);
+	const Farm__Envelope *answer = peer_hear(p);
+	assert_non_null(answer);
+	assert_int_equal(answer->body_case, FARM__ENVELOPE__BODY_HELLO_ACK);
+	return answer->hello_ack;
+}
+
+void peer_say_empty(struct peer *p, Farm__Envelope__BodyCase what)
+{
+	Farm__Envelope m;
+	Farm__JobList list;
+	Farm__LeaseRequest request;
+	farm__envelope__init(&m);
+	farm__job_list__init(&list);
+	farm__lease_request__init(&request);
+	request.want = 2;
+	m.body_case = what;
+	if (what == FARM__ENVELOPE__BODY_JOB_LIST)
+		m.job_list = &list;
+	else
+		m.lease_request = &request;
+	peer_say(p, &m, NULL, 0);
+}
+
+void peer_say_job_get(const struct peer *p, uint64_t job)
+{
+	Farm__Envelope m;
+	Farm__JobGet get;
+	farm__envelope__init(&m);
+	farm__job_get__init(&get);
+	get.job = job;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_GET;
+	m.job_get = &get;
+	peer_say(p, &m, NULL, 0);
+}
+
+void served_still_works(void)
+{
+	struct peer *p = peer_call();
+	assert_true(peer_hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	peer_say_empty(p, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *answer = peer_hear(p);
+	assert_non_null(answer);
+	assert_int_equal(answer->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+	peer_hang_up(p);
+}
+
+/* ---- jobs ---- */
+
+struct plan_request peer_plan_request(const char *mixture)
+{
+	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .spp = 4,
+				 .max_depth = 5, .groups = 2, .bootstrap = 256};
+	if (mixture)
+		snprintf(r.mixture, sizeof r.mixture, "%s", mixture);
+	return r;
+}
+
+void peer_submit(struct peer *p, const char *mixture, const char *scene_text, const char *file_name, const char *scene_name)
+{
+	Farm__Submit s;
+	Farm__PlanRequest plan;
+	Farm__File file, *files[1] = {&file};
+	Farm__Envelope m;
+	struct blob_hash hash;
+	struct error e;
+	char name[] = "black", scene[64], file_text[64];
+	struct plan_request r = peer_plan_request(mixture);
+	plan_request_to_wire(&r, &plan);
+	farm__submit__init(&s);
+	farm__file__init(&file);
+	farm__envelope__init(&m);
+	assert_int_equal(blob_hash_bytes(scene_text, strlen(scene_text), &hash, &e), 0);
+	snprintf(file_text, sizeof file_text, "%s", file_name);
+	snprintf(scene, sizeof scene, "%s", scene_name);
+	file.name = file_text;
+	file.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
+	file.size = strlen(scene_text);
+	s.name = name;
+	s.scene = scene;
+	s.plan = &plan;
+	s.n_files = 1;
+	s.files = files;
+	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
+	m.submit = &s;
+	peer_say(p, &m, NULL, 0);
+}
+
+void peer_send_blob(struct peer *p, const char *true_text, const char *sent_text)
+{
+	Farm__BlobChunk c;
+	Farm__Envelope m;
+	struct blob_hash hash;
+	struct error e;
+	assert_int_equal(blob_hash_bytes(true_text, strlen(true_text), &hash, &e), 0);
+	farm__blob_chunk__init(&c);
+	farm__envelope__init(&m);
+	c.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
+	c.size = strlen(true_text);
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+	m.blob_chunk = &c;
+	peer_say(p, &m, sent_text, strlen(sent_text));
+}
+
+const Farm__SubmitAnswer *peer_submit_answer(struct peer *p)
+{
+	const Farm__Envelope *m = peer_hear(p);
+	assert_non_null(m);
+	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_SUBMIT_ANSWER);
+	return m->submit_answer;
+}
+
+void peer_send_batch(struct peer *p, const struct batch *b, const struct plan *plan)
+{
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	assert_int_equal(batch_pack(b, plan, &frame, &size, &e), 0);
+	peer_say_bytes(p, frame, size);
+	mem_free(frame);
+}
+
+Farm__Verdict peer_attend(struct peer *p, struct desk *d)
+{
+	struct error e;
+	const Farm__Envelope *m = peer_hear(p);
+	assert_non_null(m);
+	if (m->body_case == FARM__ENVELOPE__BODY_LEASE_ACK)
+		return m->lease_ack->verdict;
+	if (m->body_case == FARM__ENVELOPE__BODY_LEASE_GRANT) {
+		assert_true(d->count < 64);
+		assert_int_equal(lease_key_from_wire(m->lease_grant->key, &d->keys[d->count++], &e), 0);
+	}
+	d->job_ended = d->job_ended || m->body_case == FARM__ENVELOPE__BODY_JOB_END;
+	return FARM__VERDICT__VERDICT_NONE;
+}
+
+Farm__Verdict peer_verdict(struct peer *p, struct desk *d)
+{
+	Farm__Verdict v;
+	while ((v = peer_attend(p, d)) == FARM__VERDICT__VERDICT_NONE)
+		continue;
+	return v;
+}
+
+struct batch peer_black_batch(const struct lease_key *k, const struct plan *plan)
+{
+	struct batch b = {.key = *k};
+	assert_int_equal(k->kind, LEASE_BOOTSTRAP); /* black ends before rounds */
+	struct plan_range range = plan_bootstrap_range(plan, k->group, k->part);
+	b.weight_count = b.counters[COUNT_INDEPENDENT] = b.counters[COUNT_SAMPLES] = range.end - range.begin;
+	b.weights = mem_alloc(b.weight_count, sizeof *b.weights);
+	return b;
+}
