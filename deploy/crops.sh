@@ -30,7 +30,7 @@ die() {
 	exit 2
 }
 
-# pair NAME TEXT: two positive numbers with an x between, into $1 and $2 of the caller's `set`
+# pair NAME TEXT: prints the two positive numbers that an x stands between
 pair() {
 	case $2 in
 	*[!0-9x]* | x* | *x | *x*x* | 0* | *x0*) die "$1 takes two positive numbers, as in 5x5, not '$2'" ;;

@@ -2,15 +2,6 @@
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-ca
 
-# code WANTED COMMAND...
-code() {
-	wanted=$1
-	shift
-	got=0
-	"$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
-	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/err.log")"
-}
-
 for p in coordinator worker submit status job ca; do
 	code 0 "$BIN/hslt-$p" --version
 	code 0 "$BIN/hslt-$p" --help

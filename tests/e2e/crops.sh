@@ -3,15 +3,6 @@
 need hslt-coordinator hslt-worker hslt-submit hslt-assemble hslt-compare hslt-render
 CROPS=$HERE/../../deploy/crops.sh
 
-# code WANTED COMMAND...
-code() {
-	wanted=$1
-	shift
-	got=0
-	"$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
-	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/out" "$DIR/err.log")"
-}
-
 says() {
 	grep -q -- "$1" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
 }

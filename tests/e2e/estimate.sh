@@ -2,15 +2,6 @@
 . "$(dirname "$0")/lib.sh"
 need hslt-render hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job
 
-# code WANTED COMMAND...
-code() {
-	wanted=$1
-	shift
-	got=0
-	"$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
-	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/err.log")"
-}
-
 for p in render submit; do
 	code 2 "$BIN/hslt-$p" --estimate "$BOX" -o "$DIR/a.exr"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --pilot 3

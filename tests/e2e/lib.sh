@@ -64,6 +64,15 @@ need() {
 	done
 }
 
+# code WANTED COMMAND...: its exit code; what it says is in out and err.log
+code() {
+	wanted=$1
+	shift
+	got=0
+	"$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
+	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/out" "$DIR/err.log")"
+}
+
 # until_true SECONDS COMMAND...
 until_true() {
 	tries=$(($1 * 20))

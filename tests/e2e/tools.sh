@@ -2,15 +2,6 @@
 . "$(dirname "$0")/lib.sh"
 need hslt-render hslt-compare hslt-tonemap
 
-# code WANTED COMMAND...
-code() {
-	wanted=$1
-	shift
-	got=0
-	"$@" >"$DIR/out" 2>"$DIR/err.log" || got=$?
-	[ $got -eq "$wanted" ] || fail "$* ended with $got, not $wanted: $(cat "$DIR/out" "$DIR/err.log")"
-}
-
 render() { # FILE SEED SIZE
 	code 0 "$BIN/hslt-render" "$BOX" -o "$DIR/$1.exr" --integrator path --spp 4 --seed "$2" --size "$3" --threads 1 --quiet
 }

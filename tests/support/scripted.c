@@ -48,7 +48,7 @@ const Farm__Envelope *scripted_hear(struct scripted *p)
 	for (;;) {
 		struct error e;
 		if (p->at == p->size) {
-			assert_true(scripted_has(p, PATIENCE_MS));
+			assert_true(scripted_has(p, p->patience_ms));
 			ssize_t n = read(p->fd, p->bytes, sizeof p->bytes);
 			if (n <= 0)
 				return NULL;
@@ -65,17 +65,18 @@ const Farm__Envelope *scripted_hear(struct scripted *p)
 		assert_int_equal(envelope_unpack(&p->env, p->reader.header.bytes, p->reader.header.size, &e), 0);
 		if (p->env.message->body_case != FARM__ENVELOPE__BODY_HEARTBEAT)
 			return p->env.message;
+		p->heartbeats++;
 	}
 }
 
-static bool hello(struct scripted *p, Farm__Role role)
+const Farm__HelloAck *scripted_hello(struct scripted *p, uint32_t version, Farm__Role role)
 {
 	Farm__Hello h;
 	Farm__Envelope m;
 	char name[] = "scripted", print[] = "p1";
 	farm__hello__init(&h);
 	farm__envelope__init(&m);
-	h.version = FARM_VERSION;
+	h.version = version;
 	h.role = role;
 	h.name = name;
 	h.fingerprint = print;
@@ -83,18 +84,29 @@ static bool hello(struct scripted *p, Farm__Role role)
 	m.body_case = FARM__ENVELOPE__BODY_HELLO;
 	m.hello = &h;
 	const Farm__Envelope *answer = scripted_say(p, &m, NULL, 0) ? scripted_hear(p) : NULL;
-	return answer && answer->body_case == FARM__ENVELOPE__BODY_HELLO_ACK && answer->hello_ack->accepted;
+	return answer && answer->body_case == FARM__ENVELOPE__BODY_HELLO_ACK ? answer->hello_ack : NULL;
 }
 
-struct scripted *scripted_call(uint16_t port, Farm__Role role)
+struct scripted *scripted_connect(uint16_t port)
 {
 	struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = htons(port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
 	struct scripted *p = calloc(1, sizeof *p);
 	assert_non_null(p);
+	p->patience_ms = PATIENCE_MS;
 	p->fd = socket(AF_INET, SOCK_STREAM, 0);
 	setsockopt(p->fd, IPPROTO_TCP, TCP_NODELAY, &(int){1}, sizeof(int));
 	frame_reader_init(&p->reader, (struct frame_limits){1 << 22, 1 << 24});
-	if (connect(p->fd, (struct sockaddr *)&a, sizeof a) == 0 && hello(p, role))
+	if (connect(p->fd, (struct sockaddr *)&a, sizeof a) == 0)
+		return p;
+	scripted_hang_up(p);
+	return NULL;
+}
+
+struct scripted *scripted_call(uint16_t port, Farm__Role role)
+{
+	struct scripted *p = scripted_connect(port);
+	const Farm__HelloAck *ack = p ? scripted_hello(p, FARM_VERSION, role) : NULL;
+	if (ack && ack->accepted)
 		return p;
 	scripted_hang_up(p);
 	return NULL;

@@ -14,8 +14,12 @@ struct scripted {
 	unsigned char bytes[1 << 16];
 	size_t at, size;
 	struct envelope env;
+	int patience_ms;     /* of scripted_hear: a minute, unless changed */
+	unsigned heartbeats; /* heard */
 };
 
+struct scripted *scripted_connect(uint16_t port); /* without a word; NULL: nobody answers */
+const Farm__HelloAck *scripted_hello(struct scripted *p, uint32_t version, Farm__Role role); /* NULL: no such answer */
 struct scripted *scripted_call(uint16_t port, Farm__Role role); /* NULL: nobody answers */
 void scripted_hang_up(struct scripted *p); /* NULL: nothing */
 bool scripted_say(const struct scripted *p, const Farm__Envelope *m, const void *payload, size_t size); /* false: it hung up */

@@ -143,90 +143,32 @@ long served_kilobytes(void)
 
 /* ---- a peer of our own ---- */
 
-struct peer *peer_call(void)
+struct scripted *peer_call(void)
 {
-	struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = htons(port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
-	struct peer *p = calloc(1, sizeof *p);
+	struct scripted *p = scripted_connect(port);
 	assert_non_null(p);
-	p->fd = socket(AF_INET, SOCK_STREAM, 0);
-	assert_int_equal(connect(p->fd, (struct sockaddr *)&a, sizeof a), 0);
-	frame_reader_init(&p->reader, (struct frame_limits){1 << 22, 1 << 24});
+	p->patience_ms = 3000;
 	return p;
 }
 
-void peer_hang_up(struct peer *p)
-{
-	close(p->fd);
-	frame_reader_fini(&p->reader);
-	envelope_fini(&p->env);
-	free(p);
-}
-
-void peer_say_bytes(const struct peer *p, const void *bytes, size_t size)
+void peer_say_bytes(const struct scripted *p, const void *bytes, size_t size)
 {
 	assert_int_equal(send(p->fd, bytes, size, MSG_NOSIGNAL), size);
 }
 
-void peer_say(const struct peer *p, const Farm__Envelope *m, const void *payload, size_t payload_size)
+void peer_say(const struct scripted *p, const Farm__Envelope *m, const void *payload, size_t payload_size)
 {
-	unsigned char *frame;
-	size_t size;
-	struct error e;
-	assert_int_equal(envelope_pack(m, payload, payload_size, &frame, &size, &e), 0);
-	peer_say_bytes(p, frame, size);
-	mem_free(frame);
+	assert_true(scripted_say(p, m, payload, payload_size));
 }
 
-/* The next message but heartbeats; NULL when the coordinator hung up. Three seconds at most. */
-const Farm__Envelope *peer_hear(struct peer *p)
+const Farm__HelloAck *peer_hello(struct scripted *p, uint32_t version, Farm__Role role)
 {
-	for (;;) {
-		struct error e;
-		if (p->at == p->size) {
-			struct pollfd ready = {p->fd, POLLIN, 0};
-			assert_int_equal(poll(&ready, 1, 3000), 1);
-			ssize_t n = read(p->fd, p->bytes, sizeof p->bytes);
-			if (n <= 0)
-				return NULL;
-			p->at = 0;
-			p->size = (size_t)n;
-		}
-		size_t used;
-		int rc = frame_reader_take(&p->reader, p->bytes + p->at, p->size - p->at, &used, &e);
-		assert_true(rc >= 0);
-		p->at += used;
-		if (!rc)
-			continue;
-		envelope_fini(&p->env);
-		assert_int_equal(envelope_unpack(&p->env, p->reader.header.bytes, p->reader.header.size, &e), 0);
-		if (p->env.message->body_case != FARM__ENVELOPE__BODY_HEARTBEAT)
-			return p->env.message;
-		p->heartbeats++;
-	}
+	const Farm__HelloAck *ack = scripted_hello(p, version, role);
+	assert_non_null(ack);
+	return ack;
 }
 
-const Farm__HelloAck *peer_hello(struct peer *p, uint32_t version, Farm__Role role)
-{
-	Farm__Hello h;
-	Farm__Envelope m;
-	char name[] = "scripted", print[] = "p1";
-	farm__hello__init(&h);
-	farm__envelope__init(&m);
-	h.version = version;
-	h.role = role;
-	h.name = name;
-	h.fingerprint = print;
-	h.threads = 1;
-	m.body_case = FARM__ENVELOPE__BODY_HELLO;
-	m.hello = &h;
-	peer_say(p, &m, NULL, 0);
-	const Farm__Envelope *answer = peer_hear(p);
-	assert_non_null(answer);
-	assert_int_equal(answer->body_case, FARM__ENVELOPE__BODY_HELLO_ACK);
-	return answer->hello_ack;
-}
-
-void peer_say_empty(struct peer *p, Farm__Envelope__BodyCase what)
+void peer_say_empty(struct scripted *p, Farm__Envelope__BodyCase what)
 {
 	Farm__Envelope m;
 	Farm__JobList list;
@@ -243,7 +185,7 @@ void peer_say_empty(struct peer *p, Farm__Envelope__BodyCase what)
 	peer_say(p, &m, NULL, 0);
 }
 
-void peer_say_job_get(const struct peer *p, uint64_t job)
+void peer_say_job_get(const struct scripted *p, uint64_t job)
 {
 	Farm__Envelope m;
 	Farm__JobGet get;
@@ -257,13 +199,13 @@ void peer_say_job_get(const struct peer *p, uint64_t job)
 
 void served_still_works(void)
 {
-	struct peer *p = peer_call();
+	struct scripted *p = peer_call();
 	assert_true(peer_hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	peer_say_empty(p, FARM__ENVELOPE__BODY_JOB_LIST);
-	const Farm__Envelope *answer = peer_hear(p);
+	const Farm__Envelope *answer = scripted_hear(p);
 	assert_non_null(answer);
 	assert_int_equal(answer->body_case, FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
-	peer_hang_up(p);
+	scripted_hang_up(p);
 }
 
 /* ---- jobs ---- */
@@ -277,7 +219,7 @@ struct plan_request peer_plan_request(const char *mixture)
 	return r;
 }
 
-void peer_submit(struct peer *p, const char *mixture, const char *scene_text, const char *file_name, const char *scene_name)
+void peer_submit(struct scripted *p, const char *mixture, const char *scene_text, const char *file_name, const char *scene_name)
 {
 	Farm__Submit s;
 	Farm__PlanRequest plan;
@@ -307,7 +249,7 @@ void peer_submit(struct peer *p, const char *mixture, const char *scene_text, co
 	peer_say(p, &m, NULL, 0);
 }
 
-void peer_send_blob(struct peer *p, const char *true_text, const char *sent_text)
+void peer_send_blob(struct scripted *p, const char *true_text, const char *sent_text)
 {
 	Farm__BlobChunk c;
 	Farm__Envelope m;
@@ -323,15 +265,15 @@ void peer_send_blob(struct peer *p, const char *true_text, const char *sent_text
 	peer_say(p, &m, sent_text, strlen(sent_text));
 }
 
-const Farm__SubmitAnswer *peer_submit_answer(struct peer *p)
+const Farm__SubmitAnswer *peer_submit_answer(struct scripted *p)
 {
-	const Farm__Envelope *m = peer_hear(p);
+	const Farm__Envelope *m = scripted_hear(p);
 	assert_non_null(m);
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_SUBMIT_ANSWER);
 	return m->submit_answer;
 }
 
-void peer_send_batch(struct peer *p, const struct batch *b, const struct plan *plan)
+void peer_send_batch(struct scripted *p, const struct batch *b, const struct plan *plan)
 {
 	unsigned char *frame;
 	size_t size;
@@ -341,10 +283,10 @@ void peer_send_batch(struct peer *p, const struct batch *b, const struct plan *p
 	mem_free(frame);
 }
 
-Farm__Verdict peer_attend(struct peer *p, struct desk *d)
+Farm__Verdict peer_attend(struct scripted *p, struct desk *d)
 {
 	struct error e;
-	const Farm__Envelope *m = peer_hear(p);
+	const Farm__Envelope *m = scripted_hear(p);
 	assert_non_null(m);
 	if (m->body_case == FARM__ENVELOPE__BODY_LEASE_ACK)
 		return m->lease_ack->verdict;
@@ -356,7 +298,7 @@ Farm__Verdict peer_attend(struct peer *p, struct desk *d)
 	return FARM__VERDICT__VERDICT_NONE;
 }
 
-Farm__Verdict peer_verdict(struct peer *p, struct desk *d)
+Farm__Verdict peer_verdict(struct scripted *p, struct desk *d)
 {
 	Farm__Verdict v;
 	while ((v = peer_attend(p, d)) == FARM__VERDICT__VERDICT_NONE)

@@ -1,13 +1,12 @@
 /*
  * A coordinator's shell in a process of its own, and peers of it that say what a test wants them to say, well or badly. Blocking, one
- * thread, one server at a time; what does not answer within three seconds fails the test. (scripted.h: peers that take part in whole jobs.)
+ * thread, one server at a time; what does not answer within three seconds fails the test. They hear and hang up as scripted.h has it.
  */
 #ifndef TESTS_SUPPORT_SERVED_H
 #define TESTS_SUPPORT_SERVED_H
 
 #include "common/plan/plan.h"
-#include "common/wire/batch_wire.h"
-#include "common/wire/frame.h"
+#include "tests/support/scripted.h"
 
 /* ---- the server ---- */
 
@@ -21,32 +20,20 @@ void served_still_works(void);
 
 /* ---- a peer ---- */
 
-struct peer {
-	int fd;
-	struct frame_reader reader;
-	unsigned char bytes[4096];
-	size_t at, size;
-	struct envelope env;
-	unsigned heartbeats; /* heard */
-};
-
-struct peer *peer_call(void);
-void peer_hang_up(struct peer *p);
-void peer_say_bytes(const struct peer *p, const void *bytes, size_t size);
-void peer_say(const struct peer *p, const Farm__Envelope *m, const void *payload, size_t payload_size);
-/* The next message but heartbeats, until the next call; NULL when the coordinator hung up. */
-const Farm__Envelope *peer_hear(struct peer *p);
-const Farm__HelloAck *peer_hello(struct peer *p, uint32_t version, Farm__Role role);
-void peer_say_empty(struct peer *p, Farm__Envelope__BodyCase what); /* JOB_LIST or LEASE_REQUEST */
-void peer_say_job_get(const struct peer *p, uint64_t job);
+struct scripted *peer_call(void);
+void peer_say_bytes(const struct scripted *p, const void *bytes, size_t size);
+void peer_say(const struct scripted *p, const Farm__Envelope *m, const void *payload, size_t payload_size);
+const Farm__HelloAck *peer_hello(struct scripted *p, uint32_t version, Farm__Role role);
+void peer_say_empty(struct scripted *p, Farm__Envelope__BodyCase what); /* JOB_LIST or LEASE_REQUEST */
+void peer_say_job_get(const struct scripted *p, uint64_t job);
 
 /* ---- jobs ---- */
 
 /* mixture: NULL, or of the mutations. */
 struct plan_request peer_plan_request(const char *mixture);
-void peer_submit(struct peer *p, const char *mixture, const char *scene_text, const char *file_name, const char *scene_name);
-const Farm__SubmitAnswer *peer_submit_answer(struct peer *p);
-void peer_send_blob(struct peer *p, const char *true_text, const char *sent_text);
+void peer_submit(struct scripted *p, const char *mixture, const char *scene_text, const char *file_name, const char *scene_name);
+const Farm__SubmitAnswer *peer_submit_answer(struct scripted *p);
+void peer_send_blob(struct scripted *p, const char *true_text, const char *sent_text);
 
 /* Leases that came and were not answered yet. */
 struct desk {
@@ -56,9 +43,9 @@ struct desk {
 };
 
 /* Hears one message. Its verdict, or VERDICT_NONE when it was none. */
-Farm__Verdict peer_attend(struct peer *p, struct desk *d);
-Farm__Verdict peer_verdict(struct peer *p, struct desk *d); /* the next one */
+Farm__Verdict peer_attend(struct scripted *p, struct desk *d);
+Farm__Verdict peer_verdict(struct scripted *p, struct desk *d); /* the next one */
 struct batch peer_black_batch(const struct lease_key *k, const struct plan *plan); /* of a bootstrap lease */
-void peer_send_batch(struct peer *p, const struct batch *b, const struct plan *plan);
+void peer_send_batch(struct scripted *p, const struct batch *b, const struct plan *plan);
 
 #endif

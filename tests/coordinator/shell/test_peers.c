@@ -37,14 +37,14 @@ static void rubbish_is_hung_up_on(void **state)
 		{"\0\0\0\x05\0\0\0\0\x0a\0\x98\x06\x01", 13}, /* an unknown field beside hello */
 	};
 	for (size_t i = 0; i < sizeof rubbish / sizeof *rubbish; i++) {
-		struct peer *p = peer_call();
+		struct scripted *p = peer_call();
 		peer_say_bytes(p, rubbish[i].bytes, rubbish[i].size);
-		const Farm__Envelope *m = peer_hear(p);
+		const Farm__Envelope *m = scripted_hear(p);
 		if (m) { /* who is understood is told what is wrong */
 			assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_FAULT);
-			assert_null(peer_hear(p));
+			assert_null(scripted_hear(p));
 		}
-		peer_hang_up(p);
+		scripted_hang_up(p);
 	}
 	served_still_works();
 }
@@ -52,32 +52,32 @@ static void rubbish_is_hung_up_on(void **state)
 static void stragglers_are_hung_up_on(void **state)
 {
 	(void)state;
-	struct peer *silent = peer_call(), *half = peer_call(), *client = peer_call();
+	struct scripted *silent = peer_call(), *half = peer_call(), *client = peer_call();
 	peer_say_bytes(half, "\0\0\0\x20", 4);
 	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	peer_say_bytes(client, "\0\0\0\x20\0\0\0\0abc", 11); /* begun and never finished */
-	assert_null(peer_hear(silent));
-	assert_null(peer_hear(half));
-	assert_null(peer_hear(client));
-	peer_hang_up(silent);
-	peer_hang_up(half);
-	peer_hang_up(client);
+	assert_null(scripted_hear(silent));
+	assert_null(scripted_hear(half));
+	assert_null(scripted_hear(client));
+	scripted_hang_up(silent);
+	scripted_hang_up(half);
+	scripted_hang_up(client);
 	served_still_works();
 }
 
 static void crowds_are_turned_away(void **state)
 {
 	(void)state;
-	struct peer *crowd[8];
+	struct scripted *crowd[8];
 	for (int i = 0; i < 8; i++) {
 		crowd[i] = peer_call();
 		assert_true(peer_hello(crowd[i], FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	}
-	struct peer *one_more = peer_call();
-	assert_null(peer_hear(one_more));
-	peer_hang_up(one_more);
+	struct scripted *one_more = peer_call();
+	assert_null(scripted_hear(one_more));
+	scripted_hang_up(one_more);
 	for (int i = 0; i < 8; i++)
-		peer_hang_up(crowd[i]);
+		scripted_hang_up(crowd[i]);
 	usleep(50000);
 	served_still_works();
 }
@@ -99,22 +99,22 @@ static void a_caller_waits_for_memory(void **state)
 static void the_silent_give_way(void **state)
 {
 	(void)state;
-	struct peer *first = peer_call(), *crowd[7], *guests[7];
+	struct scripted *first = peer_call(), *crowd[7], *guests[7];
 	assert_true(peer_hello(first, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	for (int i = 0; i < 7; i++)
 		crowd[i] = peer_call();
 	for (int i = 0; i < 7; i++) {
 		guests[i] = peer_call();
 		assert_true(peer_hello(guests[i], FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-		assert_null(peer_hear(crowd[i]));
+		assert_null(scripted_hear(crowd[i]));
 	}
-	struct peer *one_more = peer_call();
-	assert_null(peer_hear(one_more));
-	peer_hang_up(one_more);
-	peer_hang_up(first);
+	struct scripted *one_more = peer_call();
+	assert_null(scripted_hear(one_more));
+	scripted_hang_up(one_more);
+	scripted_hang_up(first);
 	for (int i = 0; i < 7; i++) {
-		peer_hang_up(crowd[i]);
-		peer_hang_up(guests[i]);
+		scripted_hang_up(crowd[i]);
+		scripted_hang_up(guests[i]);
 	}
 	usleep(50000);
 	served_still_works();
@@ -123,27 +123,27 @@ static void the_silent_give_way(void **state)
 static void hello_is_looked_at(void **state)
 {
 	(void)state;
-	struct peer *p = peer_call();
+	struct scripted *p = peer_call();
 	const Farm__HelloAck *ack = peer_hello(p, FARM_VERSION + 1, FARM__ROLE__ROLE_WORKER);
 	assert_false(ack->accepted);
 	assert_non_null(strstr(ack->text, "the coordinator is older"));
-	assert_null(peer_hear(p));
-	peer_hang_up(p);
+	assert_null(scripted_hear(p));
+	scripted_hang_up(p);
 	p = peer_call();
 	assert_false(peer_hello(p, FARM_VERSION, FARM__ROLE__ROLE_NONE)->accepted);
-	peer_hang_up(p);
+	scripted_hang_up(p);
 	p = peer_call();
 	assert_true(peer_hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	peer_say_empty(p, FARM__ENVELOPE__BODY_LEASE_REQUEST); /* clients get no leases */
-	const Farm__Envelope *m = peer_hear(p);
+	const Farm__Envelope *m = scripted_hear(p);
 	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_FAULT);
-	peer_hang_up(p);
+	scripted_hang_up(p);
 }
 
 static void submissions_are_looked_at(void **state)
 {
 	(void)state;
-	struct peer *p = peer_call();
+	struct scripted *p = peer_call();
 	assert_true(peer_hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	static const char *const names[] = {"../s.xml", "/s.xml", "a//s.xml", "", "a/./s.xml", "s.xml/", "a/..", "a\nb"};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
@@ -159,7 +159,7 @@ static void submissions_are_looked_at(void **state)
 	const Farm__SubmitAnswer *a = peer_submit_answer(p);
 	assert_true(a->job == 0 && *a->refusal);
 	peer_send_blob(p, "<scene/>", "<scene/>"); /* nobody asked */
-	peer_hang_up(p);
+	scripted_hang_up(p);
 	served_still_works();
 }
 
@@ -167,7 +167,7 @@ static void submissions_are_looked_at(void **state)
 
 enum { PIECE = 1 << 20 };
 
-static void say_piece_gets(const struct peer *p, const struct blob_hash *h, int count)
+static void say_piece_gets(const struct scripted *p, const struct blob_hash *h, int count)
 {
 	Farm__Envelope m;
 	Farm__BlobGet get;
@@ -186,7 +186,7 @@ static void say_piece_gets(const struct peer *p, const struct blob_hash *h, int 
 static void the_deaf_cost_little(void **state)
 {
 	(void)state;
-	struct peer *client = peer_call(), *honest = peer_call(), *deaf[4];
+	struct scripted *client = peer_call(), *honest = peer_call(), *deaf[4];
 	struct blob_hash h;
 	struct error e;
 	char *scene = malloc(PIECE);
@@ -202,7 +202,7 @@ static void the_deaf_cost_little(void **state)
 	assert_true(peer_hello(honest, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
 	say_piece_gets(honest, &h, 64);
 	for (int i = 0; i < 64; i++) {
-		const Farm__Envelope *m = peer_hear(honest);
+		const Farm__Envelope *m = scripted_hear(honest);
 		assert_true(m && m->body_case == FARM__ENVELOPE__BODY_BLOB_CHUNK);
 		assert_int_equal(honest->reader.payload.size, PIECE - 1);
 	}
@@ -217,14 +217,14 @@ static void the_deaf_cost_little(void **state)
 	for (int i = 0; i < 4; i++) {
 		const Farm__Envelope *m;
 		say_piece_gets(deaf[i], &h, 50);
-		while ((m = peer_hear(deaf[i])) && m->body_case == FARM__ENVELOPE__BODY_BLOB_CHUNK)
+		while ((m = scripted_hear(deaf[i])) && m->body_case == FARM__ENVELOPE__BODY_BLOB_CHUNK)
 			continue;
 		assert_true(!m || strstr(m->fault->text, "no worker needs so many"));
-		peer_hang_up(deaf[i]);
+		scripted_hang_up(deaf[i]);
 	}
 	free(scene);
-	peer_hang_up(client);
-	peer_hang_up(honest);
+	scripted_hang_up(client);
+	scripted_hang_up(honest);
 }
 
 int main(void)

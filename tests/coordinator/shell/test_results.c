@@ -35,7 +35,7 @@ static int set_up_quick(void **state)
 static void a_black_job_ends(void **state)
 {
 	(void)state;
-	struct peer *client = peer_call(), *worker = peer_call();
+	struct scripted *client = peer_call(), *worker = peer_call();
 	struct plan plan;
 	struct error e;
 	struct plan_request r = peer_plan_request(NULL);
@@ -72,13 +72,13 @@ static void a_black_job_ends(void **state)
 		batch_fini(&b);
 	}
 	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
-	const Farm__Envelope *m = peer_hear(client);
+	const Farm__Envelope *m = scripted_hear(client);
 	assert_non_null(m);
 	assert_int_equal(m->job_list_answer->n_jobs, 1);
 	assert_string_equal(m->job_list_answer->jobs[0]->state, "done");
 	assert_true(m->job_list_answer->jobs[0]->fetchable);
-	peer_hang_up(client);
-	peer_hang_up(worker);
+	scripted_hang_up(client);
+	scripted_hang_up(worker);
 }
 
 /* A lease of chains in the dark; of a bootstrap in even light. */
@@ -139,7 +139,7 @@ static void expect_counts_in_spool(const struct plan *plan)
 static void strategies_are_counted_once(void **state)
 {
 	(void)state;
-	struct peer *client = peer_call(), *worker = peer_call();
+	struct scripted *client = peer_call(), *worker = peer_call();
 	struct plan plan;
 	struct error e;
 	struct plan_request r = peer_plan_request("independent=0.1,hslt=0.9");
@@ -174,13 +174,13 @@ static void strategies_are_counted_once(void **state)
 		batch_fini(&b);
 	}
 	expect_counts_in_spool(&plan);
-	peer_hang_up(client);
-	peer_hang_up(worker);
+	scripted_hang_up(client);
+	scripted_hang_up(worker);
 }
 
 /* ---- results that wait ---- */
 
-static void send_bootstrap(struct peer *p, const struct lease_key *k)
+static void send_bootstrap(struct scripted *p, const struct lease_key *k)
 {
 	struct plan plan;
 	struct error e;
@@ -195,7 +195,7 @@ static void send_bootstrap(struct peer *p, const struct lease_key *k)
 static void what_is_useless_does_not_wait(void **state)
 {
 	(void)state;
-	struct peer *client = peer_call(), *worker = peer_call(), *other = peer_call();
+	struct scripted *client = peer_call(), *worker = peer_call(), *other = peer_call();
 	struct desk d = {.count = 0}, none = {.count = 0};
 	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
@@ -211,7 +211,7 @@ static void what_is_useless_does_not_wait(void **state)
 		peer_attend(worker, &d);
 	assert_true(peer_hello(other, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
 	peer_say_job_get(other, job);
-	assert_int_equal(peer_hear(other)->body_case, FARM__ENVELOPE__BODY_JOB_INFO);
+	assert_int_equal(scripted_hear(other)->body_case, FARM__ENVELOPE__BODY_JOB_INFO);
 	served_set_busy(true);
 	for (int i = 0; i < 3; i++)
 		send_bootstrap(worker, &d.keys[1]);
@@ -234,21 +234,21 @@ static void what_is_useless_does_not_wait(void **state)
 	assert_true(d.count >= 4);
 	served_set_busy(true);
 	send_bootstrap(worker, &d.keys[3]);
-	peer_hang_up(worker);
+	scripted_hang_up(worker);
 	usleep(50000);
 	send_bootstrap(other, &d.keys[3]);
 	served_set_busy(false);
 	assert_int_equal(peer_verdict(other, &none), FARM__VERDICT__VERDICT_MERGED);
-	peer_hang_up(client);
-	peer_hang_up(other);
+	scripted_hang_up(client);
+	scripted_hang_up(other);
 }
 
 /* ---- slow links ---- */
 
 /* A worker with a lease of a new job, and its result. The keys of what came stay in the desk. */
-static struct peer *worker_with_result(struct peer *client, struct desk *d, unsigned char **frame, size_t *size)
+static struct scripted *worker_with_result(struct scripted *client, struct desk *d, unsigned char **frame, size_t *size)
 {
-	struct peer *worker = peer_call();
+	struct scripted *worker = peer_call();
 	struct plan plan;
 	struct error e;
 	struct plan_request r = peer_plan_request(NULL);
@@ -277,7 +277,7 @@ static void a_slow_result_counts(void **state)
 	unsigned char *frame;
 	size_t size, at = 0;
 	struct desk d = {.count = 0};
-	struct peer *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
+	struct scripted *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
 	for (size_t i = 1; i <= PIECES; i++) {
 		usleep(100000);
 		peer_say_bytes(worker, frame + at, size * i / PIECES - at);
@@ -286,8 +286,8 @@ static void a_slow_result_counts(void **state)
 	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
 	assert_true(worker->heartbeats >= 8 && worker->heartbeats <= 13);
 	mem_free(frame);
-	peer_hang_up(client);
-	peer_hang_up(worker);
+	scripted_hang_up(client);
+	scripted_hang_up(worker);
 }
 
 static void half_a_result_is_no_word(void **state)
@@ -296,17 +296,17 @@ static void half_a_result_is_no_word(void **state)
 	unsigned char *frame;
 	size_t size;
 	struct desk d = {.count = 0};
-	struct peer *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
+	struct scripted *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
 	peer_say_bytes(worker, frame, size / 2);
 	const Farm__Envelope *m;
-	while ((m = peer_hear(worker)) && m->body_case != FARM__ENVELOPE__BODY_FAULT)
+	while ((m = scripted_hear(worker)) && m->body_case != FARM__ENVELOPE__BODY_FAULT)
 		continue;
 	mem_free(frame);
-	peer_hang_up(client);
-	peer_hang_up(worker);
+	scripted_hang_up(client);
+	scripted_hang_up(worker);
 }
 
-static void say_extend(const struct peer *p, uint64_t job, uint64_t spp, int times)
+static void say_extend(const struct scripted *p, uint64_t job, uint64_t spp, int times)
 {
 	unsigned char all[512];
 	size_t at = 0;
@@ -331,9 +331,9 @@ static void say_extend(const struct peer *p, uint64_t job, uint64_t spp, int tim
 	peer_say_bytes(p, all, at);
 }
 
-static void hear_done(struct peer *p, bool ok, const char *text)
+static void hear_done(struct scripted *p, bool ok, const char *text)
 {
-	const Farm__Envelope *m = peer_hear(p);
+	const Farm__Envelope *m = scripted_hear(p);
 	assert_non_null(m);
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_DONE);
 	assert_int_equal(m->done->ok, ok);
@@ -345,7 +345,7 @@ static void hear_done(struct peer *p, bool ok, const char *text)
 static void extensions_wait_for_films(void **state)
 {
 	(void)state;
-	struct peer *a = peer_call(), *b = peer_call();
+	struct scripted *a = peer_call(), *b = peer_call();
 	assert_true(peer_hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	assert_true(peer_hello(b, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	say_extend(a, 2, 0, 1); /* not for that */
@@ -358,18 +358,18 @@ static void extensions_wait_for_films(void **state)
 	hear_done(b, true, "it goes on until"); /* the job lives by then */
 	say_extend(a, 1, 8, 1);
 	hear_done(a, false, "it is black");
-	peer_hang_up(a);
-	peer_hang_up(b);
+	scripted_hang_up(a);
+	scripted_hang_up(b);
 	a = peer_call();
 	assert_true(peer_hello(a, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	peer_say_empty(a, FARM__ENVELOPE__BODY_JOB_LIST);
-	const Farm__Envelope *m = peer_hear(a);
+	const Farm__Envelope *m = scripted_hear(a);
 	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
 	assert_false(m->job_list_answer->jobs[1]->ended);
-	peer_hang_up(a);
+	scripted_hang_up(a);
 }
 
-static void say_failed(struct peer *p, const struct lease_key *k, const char *text)
+static void say_failed(struct scripted *p, const struct lease_key *k, const char *text)
 {
 	Farm__LeaseKey key;
 	Farm__LeaseFailed failed;
@@ -390,7 +390,7 @@ static void say_failed(struct peer *p, const struct lease_key *k, const char *te
 static void a_failure_counts_whatever_its_text(void **state)
 {
 	(void)state;
-	struct peer *client = peer_call(), *worker = peer_call();
+	struct scripted *client = peer_call(), *worker = peer_call();
 	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
 	assert_true(peer_submit_answer(client)->job);
@@ -403,7 +403,7 @@ static void a_failure_counts_whatever_its_text(void **state)
 	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
 	usleep(100000);
 	peer_say_empty(client, FARM__ENVELOPE__BODY_JOB_LIST);
-	const Farm__Envelope *m = peer_hear(client);
+	const Farm__Envelope *m = scripted_hear(client);
 	assert_non_null(m);
 	for (size_t i = 0; i < m->job_list_answer->n_jobs; i++)
 		if (m->job_list_answer->jobs[i]->job == d.keys[0].job)
@@ -411,8 +411,8 @@ static void a_failure_counts_whatever_its_text(void **state)
 	struct pollfd ready = {worker->fd, POLLIN, 0};
 	while (poll(&ready, 1, 200) == 1) /* neither a fault nor the end */
 		assert_true(peer_attend(worker, &d) == FARM__VERDICT__VERDICT_NONE && worker->env.message->body_case != FARM__ENVELOPE__BODY_FAULT);
-	peer_hang_up(client);
-	peer_hang_up(worker);
+	scripted_hang_up(client);
+	scripted_hang_up(worker);
 }
 
 int main(void)
