@@ -152,9 +152,9 @@ pause() {
 
 # requeued JOB: is pending for its next life, which begins now instead of two minutes later
 requeued() {
-	until_true 10 is_job "$1" PENDING || return 1
+	until_true 60 is_job "$1" PENDING || return 1
 	scontrol update JobId="$1" StartTime=now
-	until_true 20 is_job "$1" RUNNING
+	until_true 60 is_job "$1" RUNNING
 }
 
 # ---- elastic workers ----
@@ -226,21 +226,33 @@ scontrol update NodeName="$node" State=RESUME 2>/dev/null || :
 until_true 20 idle 3 || fail "the cluster does not come to rest: $(sinfo; squeue)"
 until_true 10 has_workers 0 || fail "workers are left: $(workers)"
 for id in "${first}_1" "${second}_3"; do
-	is_job "$id" COMPLETED || fail "the idle worker is $(job_state "$id")"
+	until_true 20 is_job "$id" COMPLETED || fail "the idle worker is $(job_state "$id")"
 done
 
 # ---- a whole farm in a job ----
 
 running() {
-	"$BIN/hslt-job" --coordinator "127.0.0.1:$(cat "$DIR"/hslt-farm-"$1"/port)" list 2>/dev/null | grep -q running
+	[ -s "$DIR/hslt-farm-$1/port" ] &&
+		"$BIN/hslt-job" --coordinator "127.0.0.1:$(cat "$DIR/hslt-farm-$1/port")" list 2>/dev/null | grep -q running
+}
+
+# The batch job's state, and what it said.
+told() {
+	echo "$(job_state "$JOB")"
+	cat "$DIR/$JOB.log"
 }
 
 mkdir "$DIR/shared"
 batch --nodes=3 --export="ALL,HSLT_SPOOL=$DIR/shared" "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/farm.exr" $SHORT
-until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; cat "$DIR/$JOB.log")"
+until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; told)"
+# Between the lives somebody has the spool, until the next has been there for a second.
+flock "$DIR/shared/hslt-farm-$JOB/lock" sh -c "while [ ! -e '$DIR/spool-free' ]; do sleep 0.1; done" &
+PIDS="$PIDS $!"
 scontrol requeue "$JOB"
-requeued "$JOB" || fail "the farm is $(job_state "$JOB")"
-until_true 60 is_job "$JOB" COMPLETED || fail "the farm is $(job_state "$JOB"): $(cat "$DIR/$JOB.log")"
+requeued "$JOB" || fail "the farm that was requeued is $(told)"
+sleep 1
+touch "$DIR/spool-free"
+until_true 60 is_job "$JOB" COMPLETED || fail "the farm is $(told)"
 [ "$(job_field "$JOB" Restarts)" = 1 ] || fail "the farm was not requeued"
 [ "$(grep -c 'event=peer_hello.*@n[123]' "$DIR/$JOB.log")" -ge 3 ] || fail "not all nodes worked"
 [ "$(grep -c "name=\"$JOB.1@.*said goodbye" "$DIR/$JOB.log")" = 3 ] || fail "workers were not left to leave"
@@ -251,14 +263,24 @@ grep -q 'event=peer_hello.*certificate=worker' "$DIR/$JOB.log" || fail "the work
 same "$DIR/short.exr" "$DIR/farm.exr"
 
 batch --nodes=2 "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/cut.exr" $LONG
-until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; cat "$DIR/$JOB.log")"
+until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; told)"
 until_true 20 sh -c "'$BIN/hslt-job' --coordinator 127.0.0.1:$(cat "$DIR/hslt-farm-$JOB.0/port") fetch j1 --preview -o '$DIR/look.exr' 2>'$DIR/look.err'" ||
 	fail "no preview"
 scancel --signal=TERM "$JOB"
-until_true 30 is_job "$JOB" FAILED || fail "the farm that was cut short is $(job_state "$JOB"): $(cat "$DIR/$JOB.log")"
+until_true 30 is_job "$JOB" FAILED || fail "the farm that was cut short is $(told)"
 [ "$(job_field "$JOB" ExitCode)" = 143:0 ] || fail "it ended with $(job_field "$JOB" ExitCode)"
 [ -s "$DIR/cut.partial.exr" ] && [ ! -e "$DIR/cut.exr" ] || fail "it left $(ls "$DIR"/cut*)"
 until_true 10 idle 3 || fail "it left somebody: $(squeue)"
 ls -d "$DIR"/hslt-farm-* 2>/dev/null && fail "it left its folder"
+
+# Whoever is preempted is told to leave program by program; that hslt-submit hears it before the script is not the image's end.
+batch --nodes=1 --export="ALL,HSLT_SPOOL=$DIR/shared" "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/cut.exr" $LONG
+until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; told)"
+for p in $(ours); do
+	[ "$(cat "/proc/$p/comm" 2>/dev/null)" != hslt-submit ] || kill -TERM "$p"
+done
+until_true 30 is_job "$JOB" FAILED || fail "the farm without its hslt-submit is $(told)"
+[ "$(job_field "$JOB" ExitCode)" = 143:0 ] || fail "it ended with $(job_field "$JOB" ExitCode)"
+[ -s "$DIR/shared/hslt-farm-$JOB/jobs.db" ] || fail "the image's next life has nothing to go on with: $(told)"
 echo "Slurm: from 1 to 3 workers, one told to leave, one preempted, one off a dead node: $repeats of $leases leases were given twice, at most" \
 	"$most of a chain; farms requeued and cut short; equal bits"
