@@ -48,7 +48,7 @@ const Farm__Envelope *scripted_hear(struct scripted *p)
 	for (;;) {
 		struct error e;
 		if (p->at == p->size) {
-			assert_true(scripted_has(p, p->patience_ms));
+			assert_true(scripted_has(p, PATIENCE_MS));
 			ssize_t n = read(p->fd, p->bytes, sizeof p->bytes);
 			if (n <= 0)
 				return NULL;
@@ -92,7 +92,6 @@ struct scripted *scripted_connect(uint16_t port)
 	struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = htons(port), .sin_addr = {htonl(INADDR_LOOPBACK)}};
 	struct scripted *p = calloc(1, sizeof *p);
 	assert_non_null(p);
-	p->patience_ms = PATIENCE_MS;
 	p->fd = socket(AF_INET, SOCK_STREAM, 0);
 	setsockopt(p->fd, IPPROTO_TCP, TCP_NODELAY, &(int){1}, sizeof(int));
 	frame_reader_init(&p->reader, (struct frame_limits){1 << 22, 1 << 24});

@@ -14,7 +14,6 @@ struct scripted {
 	unsigned char bytes[1 << 16];
 	size_t at, size;
 	struct envelope env;
-	int patience_ms;     /* of scripted_hear: a minute, unless changed */
 	unsigned heartbeats; /* heard */
 };
 

@@ -1,6 +1,6 @@
 /*
  * A coordinator's shell in a process of its own, and peers of it that say what a test wants them to say, well or badly. Blocking, one
- * thread, one server at a time; what does not answer within three seconds fails the test. They hear and hang up as scripted.h has it.
+ * thread, one server at a time; what does not answer within a minute fails the test. They hear and hang up as scripted.h has it.
  */
 #ifndef TESTS_SUPPORT_SERVED_H
 #define TESTS_SUPPORT_SERVED_H
@@ -10,13 +10,14 @@
 
 /* ---- the server ---- */
 
-/* Eight connections at most; 0: it listens. */
-int served_start(double heartbeat_seconds, double stall_seconds);
+/* Eight connections at most; 0: it listens. What a test does not wait for is to last longer than a busy machine stands still. */
+int served_start(double hello_seconds, double heartbeat_seconds, double stall_seconds);
 int served_stop(void **state); /* a teardown: fails when it did not end well */
 const char *served_folder(void); /* holds its spool; a file `nomem` there: its next connection gets no memory */
 void served_set_busy(bool busy); /* nobody may look at the films of its jobs */
 long served_kilobytes(void); /* of memory */
 void served_still_works(void);
+void served_works_again(void); /* when it has noticed that others hung up */
 
 /* ---- a peer ---- */
 

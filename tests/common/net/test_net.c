@@ -221,7 +221,7 @@ static void half_a_frame_is_not_waited_for(void **state)
 	while (!there.closed)
 		uv_run(&loop, UV_RUN_ONCE);
 	double seconds = (double)(uv_hrtime() - begun) * 1e-9;
-	assert_true(seconds > 0.4 && seconds < 5);
+	assert_true(seconds > 0.4 && seconds < 60);
 	assert_non_null(strstr(there.why, "not finished"));
 	close_ends();
 }
@@ -238,6 +238,8 @@ static void silence_is_not_waited_for(void **state)
 }
 
 /* A frame of a payload, piece by piece. */
+enum { PAYLOAD = 1 << 20, PIECE = PAYLOAD / 16 };
+
 struct drip {
 	uv_timer_t timer;
 	unsigned char *bytes;
@@ -247,7 +249,7 @@ struct drip {
 static void on_drip(uv_timer_t *t)
 {
 	struct drip *d = t->data;
-	size_t n = d->size - d->at < 4096 ? d->size - d->at : 4096;
+	size_t n = d->size - d->at < PIECE ? d->size - d->at : PIECE;
 	unsigned char *piece = mem_alloc(n, 1);
 	memcpy(piece, d->bytes + d->at, n);
 	conn_send_frame(here.conn, piece, n);
@@ -256,7 +258,7 @@ static void on_drip(uv_timer_t *t)
 		uv_timer_stop(t);
 }
 
-/* Its bytes are words, and it is whole before its time is over: half a second and one for each 64 KB. */
+/* Its bytes are words, and after 0.8 s it is whole; its time is over after 16.5 s: half a second and one for each 64 KB. */
 static void a_slow_frame_is_heard(void **state)
 {
 	(void)state;
@@ -264,7 +266,6 @@ static void a_slow_frame_is_heard(void **state)
 	Farm__Envelope m;
 	struct error e;
 	struct drip d = {.at = 0};
-	enum { PAYLOAD = 1 << 16 };
 	unsigned char *payload = mem_alloc(PAYLOAD, 1);
 	for (size_t i = 0; i < PAYLOAD; i++)
 		payload[i] = (unsigned char)(i * 7);
@@ -344,17 +345,16 @@ static int end_tls(void **state)
 	return system(command);
 }
 
-/* The last one alone speaks, or not, as told: both hear what is wrong within a second or two. */
+/* The last one alone speaks, or not, as told: both hear what is wrong before the time of a handshake is over. */
 static void one_sided(bool caller_speaks)
 {
 	struct tls *t = caller_speaks ? listening : calling;
 	*(caller_speaks ? &listening : &calling) = NULL;
 	connect_ends();
 	send_bye(&here, 10);
-	uint64_t begun = uv_hrtime();
 	while (!here.closed || !there.closed)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_true((double)(uv_hrtime() - begun) < 3e9);
+	assert_true(!strstr(here.why, "in time") && !strstr(there.why, "in time"));
 	assert_true(here.distrust && there.distrust && !here.messages && !there.messages);
 	assert_non_null(strstr(here.why, "TLS"));
 	assert_non_null(strstr(there.why, "TLS"));

@@ -340,7 +340,14 @@ static void who_has_expired_is_not(void **state)
 	(void)state;
 	issue(ours, "brief", TLS_WORKER, 3.0 / 86400);
 	shake_by(at(ours, "brief"), at(ours, "farm"), 100000);
-	assert_true(tls_link_is_open(listener.link));
+	while (!tls_link_is_open(listener.link)) { /* the machine stood still meanwhile: once more */
+		struct error e;
+		if (listener.rc != -EACCES || !strstr(listener.e.text, "expired"))
+			fail_msg("the listener says %d '%s'", listener.rc, listener.e.text);
+		hang_up();
+		assert_int_equal(authority_issue(ours, "brief", TLS_WORKER, 3.0 / 86400, true, &e), 0);
+		shake_by(at(ours, "brief"), at(ours, "farm"), 100000);
+	}
 	while (tls_link_recheck(listener.link, &listener.e) == 0)
 		usleep(50000);
 	assert_non_null(strstr(listener.e.text, "expired"));
