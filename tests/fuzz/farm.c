@@ -5,6 +5,7 @@
 #include "common/wire/batch_wire.h"
 #include "coordinator/shell/session.h"
 #include "tests/fuzz/folders.h"
+#include "tests/support/dark.h"
 
 #include <arpa/inet.h>
 #include <netinet/tcp.h>
@@ -296,30 +297,14 @@ static void light(struct batch *b, const struct plan *plan)
 
 struct batch farm_batch(const struct lease_key *k, const struct plan *plan)
 {
-	struct batch b = {.key = *k};
-	if (k->kind == LEASE_BOOTSTRAP) {
-		struct plan_range range = plan_bootstrap_range(plan, k->group, k->part);
-		b.weight_count = b.counters[COUNT_INDEPENDENT] = b.counters[COUNT_SAMPLES] = range.end - range.begin;
-		b.weights = mem_alloc(b.weight_count, sizeof *b.weights);
-		for (uint64_t i = 0; i < b.weight_count && k->job != FARM_DONE; i++)
+	struct batch b = dark_batch(k, plan, 4);
+	if (k->kind == LEASE_RENDER) {
+		light(&b, plan);
+	} else if (k->job != FARM_DONE) {
+		for (uint64_t i = 0; i < b.weight_count; i++)
 			b.weights[i] = 1;
-		b.independent_sum = k->job == FARM_DONE ? 0 : (double)b.weight_count;
-		return b;
+		b.independent_sum = (double)b.weight_count;
 	}
-	light(&b, plan);
-	if (plan->kind == PLAN_SAMPLES) {
-		struct plan_range rows = plan_row_range(plan, k->part);
-		b.counters[COUNT_SAMPLES] = (rows.end - rows.begin) * (plan->crop_width + 2 * (uint64_t)plan->border) * plan->epoch;
-		return b;
-	}
-	struct plan_range chains = plan_chain_range(plan, k->part);
-	b.state_count = (uint32_t)(chains.end - chains.begin);
-	b.states = mem_alloc(b.state_count, sizeof *b.states);
-	for (uint32_t i = 0; i < b.state_count; i++)
-		b.states[i] = (struct chain_state){mem_alloc(4, 1), 4};
-	b.moment_count = batch_moment_count(plan, LEASE_RENDER);
-	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
-	b.counters[COUNT_SAMPLES] = b.state_count * plan->epoch;
 	return b;
 }
 

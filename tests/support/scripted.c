@@ -2,6 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/blob/blob.h"
+#include "tests/support/dark.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -220,11 +221,8 @@ static float light(uint64_t *tag)
 	return 0.5f + (float)(*tag >> 40) * 0x1p-24f;
 }
 
-static void add_weights(struct batch *b, const struct plan *plan, uint64_t tag)
+static void light_weights(struct batch *b, uint64_t tag)
 {
-	struct plan_range range = plan_bootstrap_range(plan, b->key.group, b->key.part);
-	b->weight_count = b->counters[COUNT_INDEPENDENT] = b->counters[COUNT_SAMPLES] = range.end - range.begin;
-	b->weights = mem_alloc(b->weight_count, sizeof *b->weights);
 	for (uint64_t i = 0; i < b->weight_count; i++) {
 		b->weights[i] = light(&tag);
 		b->independent_sum += b->weights[i];
@@ -252,22 +250,15 @@ static void add_tiles(struct batch *b, const struct plan *plan, uint64_t tag)
 
 struct batch scripted_batch(const struct lease_key *k, const struct plan *plan, uint32_t state_bytes)
 {
-	struct batch b = {.key = *k, .cpu_seconds = 1};
+	struct batch b = dark_batch(k, plan, state_bytes);
 	uint64_t tag = scripted_tag(k);
+	b.cpu_seconds = 1;
 	if (k->kind == LEASE_BOOTSTRAP) {
-		add_weights(&b, plan, tag);
+		light_weights(&b, tag);
 		return b;
 	}
-	struct plan_range chains = plan_chain_range(plan, k->part);
-	b.state_count = (uint32_t)(chains.end - chains.begin);
-	b.states = mem_alloc(b.state_count, sizeof *b.states);
-	for (uint32_t i = 0; i < b.state_count; i++) {
-		b.states[i] = (struct chain_state){mem_alloc(state_bytes, 1), state_bytes};
+	for (uint32_t i = 0; i < b.state_count; i++)
 		memcpy(b.states[i].bytes, &tag, sizeof tag);
-	}
-	b.moment_count = batch_moment_count(plan, LEASE_RENDER);
-	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
-	b.counters[COUNT_SAMPLES] = b.state_count * plan->epoch;
 	b.counters[COUNT_ACCEPTED] = b.counters[COUNT_SAMPLES] / 2;
 	add_tiles(&b, plan, tag);
 	return b;

@@ -324,13 +324,3 @@ Farm__Verdict peer_verdict(struct scripted *p, struct desk *d)
 		continue;
 	return v;
 }
-
-struct batch peer_black_batch(const struct lease_key *k, const struct plan *plan)
-{
-	struct batch b = {.key = *k};
-	assert_int_equal(k->kind, LEASE_BOOTSTRAP); /* black ends before rounds */
-	struct plan_range range = plan_bootstrap_range(plan, k->group, k->part);
-	b.weight_count = b.counters[COUNT_INDEPENDENT] = b.counters[COUNT_SAMPLES] = range.end - range.begin;
-	b.weights = mem_alloc(b.weight_count, sizeof *b.weights);
-	return b;
-}

@@ -46,7 +46,6 @@ struct desk {
 /* Hears one message. Its verdict, or VERDICT_NONE when it was none. */
 Farm__Verdict peer_attend(struct scripted *p, struct desk *d);
 Farm__Verdict peer_verdict(struct scripted *p, struct desk *d); /* the next one */
-struct batch peer_black_batch(const struct lease_key *k, const struct plan *plan); /* of a bootstrap lease */
 void peer_send_batch(struct scripted *p, const struct batch *b, const struct plan *plan);
 
 #endif

@@ -6,6 +6,7 @@
 
 #include "common/base/mem.h"
 #include "coordinator/store/record.h"
+#include "tests/support/dark.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -59,7 +60,7 @@ static void a_black_job_ends(void **state)
 			peer_attend(worker, &d);
 			continue;
 		}
-		struct batch b = peer_black_batch(&d.keys[--d.count], &plan);
+		struct batch b = dark_batch(&d.keys[--d.count], &plan, 0);
 		if (first) { /* wrong ones; then the right ones; then a repeat */
 			b.weights[0] = NAN;
 			peer_send_batch(worker, &b, &plan);
@@ -88,22 +89,13 @@ static void a_black_job_ends(void **state)
 /* A lease of chains in the dark; of a bootstrap in even light. */
 static struct batch counting_batch(const struct lease_key *k, const struct plan *plan)
 {
-	struct batch b = {.key = *k};
+	struct batch b = dark_batch(k, plan, 4);
 	if (k->kind == LEASE_BOOTSTRAP) {
-		b = peer_black_batch(k, plan);
 		for (uint64_t i = 0; i < b.weight_count; i++)
 			b.weights[i] = 1;
 		b.independent_sum = (double)b.weight_count;
 		return b;
 	}
-	struct plan_range chains = plan_chain_range(plan, k->part);
-	b.state_count = (uint32_t)(chains.end - chains.begin);
-	b.states = mem_alloc(b.state_count, sizeof *b.states);
-	for (uint32_t i = 0; i < b.state_count; i++)
-		b.states[i] = (struct chain_state){mem_alloc(4, 1), 4};
-	b.moment_count = batch_moment_count(plan, LEASE_RENDER);
-	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
-	b.counters[COUNT_SAMPLES] = b.state_count * plan->epoch;
 	b.counters[COUNT_STUCK] = b.state_count;
 	b.counters[COUNT_LONGEST_STUCK] = 100 + k->group;
 	b.strategy_count = 2;
@@ -190,7 +182,7 @@ static void send_bootstrap(struct scripted *p, const struct lease_key *k)
 	struct error e;
 	struct plan_request r = peer_plan_request(NULL);
 	assert_int_equal(plan_make(&r, &plan, &e), 0);
-	struct batch b = peer_black_batch(k, &plan);
+	struct batch b = dark_batch(k, &plan, 0);
 	peer_send_batch(p, &b, &plan);
 	batch_fini(&b);
 }
@@ -280,7 +272,7 @@ static struct scripted *worker_with_result(struct scripted *client, struct desk 
 	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
 	while (d->count == 0)
 		peer_attend(worker, d);
-	struct batch b = peer_black_batch(&d->keys[0], &plan);
+	struct batch b = dark_batch(&d->keys[0], &plan, 0);
 	assert_int_equal(batch_pack(&b, &plan, frame, size, &e), 0);
 	batch_fini(&b);
 	return worker;
