@@ -1,7 +1,9 @@
-/* Preloaded: building a scene takes $HSLT_BUILD seconds; with $HSLT_BUILD_TICKS it says meanwhile that it gets on. */
+/* Preloaded: building a scene takes $HSLT_BUILD seconds, and its begin is a line on stderr; with $HSLT_BUILD_TICKS it says meanwhile
+ * that it gets on. */
 #define _GNU_SOURCE
 #include <dlfcn.h>
 #include <stdbool.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <time.h>
 
@@ -21,6 +23,7 @@ void rtcSetSceneProgressMonitorFunction(void *scene, monitor *f, void *user)
 void rtcCommitScene(void *scene)
 {
 	void (*next)(void *) = dlsym(RTLD_NEXT, "rtcCommitScene");
+	fputs("building\n", stderr);
 	for (double left = atof(getenv("HSLT_BUILD")); left > 0; left -= 0.1) {
 		nanosleep(&(struct timespec){0, 100000000}, NULL);
 		if (told && getenv("HSLT_BUILD_TICKS"))

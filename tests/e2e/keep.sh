@@ -20,7 +20,13 @@ sleep 1
 "$BIN/hslt-job" fetch j2 -o "$DIR/second.exr"
 stop $COORDINATOR_PID
 
-LISTEN=$COORDINATOR start_coordinator --keep-days 0.00001
+# For so long that j2 is old enough now, and j1 not yet ten times as old: then its record would go, too.
+ended() {
+	sed -n 's/.*"ended": *\([0-9.]*\).*/\1/p' "$DIR/spool/jobs/$1/job.json"
+}
+seconds=$(awk -v a="$(ended j1)" -v b="$(ended j2)" 'BEGIN { print (b - a > 2 ? b - a : 2) }')
+sleep "$(awk -v s="$seconds" -v b="$(ended j2)" -v now="$(date +%s.%N)" 'BEGIN { print (now - b < s ? s - now + b : 0) }')"
+LISTEN=$COORDINATOR start_coordinator --keep-days "$(awk -v s="$seconds" 'BEGIN { printf "%.9f", s / 86400 }')"
 until_true 20 test ! -e "$DIR/spool/jobs/j2/result.exr" || fail "its result is still there"
 for j in j1 j2; do
 	if "$BIN/hslt-job" fetch $j -o "$DIR/none.exr" 2>"$DIR/fetch.log"; then

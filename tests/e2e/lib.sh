@@ -84,6 +84,20 @@ until_true() {
 	done
 }
 
+# free_ports COUNT: so many in a row that nobody uses, below those that the kernel gives out; the first one is in port
+free_ports() {
+	port=$((10000 + $$ * 4 % 20000))
+	while [ $port -lt 32000 ]; do
+		busy=0
+		for k in $(seq 0 $(($1 - 1))); do
+			hex=$(printf ':%04X ' $((port + k)))
+			! cat /proc/net/tcp /proc/net/tcp6 2>/dev/null | grep -q "$hex" || busy=1
+		done
+		[ $busy = 1 ] || break
+		port=$((port + $1))
+	done
+}
+
 # start_coordinator [OPTION...]: at $LISTEN, or at any free port
 start_coordinator() {
 	rm -f "$DIR/port"

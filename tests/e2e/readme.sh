@@ -11,7 +11,8 @@ done
 for f in $(grep -o '`[a-z]*/`\|tests/e2e/[a-z]*\.sh\|deploy/[a-z]*/*[A-Za-z]*\.[a-z]*' "$ROOT/deploy/README.md" | tr -d '`' | sort -u); do
 	[ -e "$ROOT/$f" ] || [ -e "$ROOT/deploy/$f" ] || fail "deploy/README.md: there is no $f"
 done
-port=$((20000 + $$ % 20000))
+free_ports 2
+safe=$((port + 1))
 mkdir "$DIR/home"
 ln -s "$ROOT/tests" "$DIR/home/tests"
 mkdir -p "$DIR/home/build"
@@ -20,9 +21,12 @@ ln -s "$(cd "$BIN" && pwd)" "$DIR/home/build/bin"
 	echo 'set -eu'
 	echo 'RUNNING='
 	echo "trap 'code=\$?; kill \$RUNNING; wait; exit \$code' EXIT"
+	echo 'answers() { for k in $(seq 600); do ! hslt-job "$@" list >/dev/null 2>&1 || return 0; sleep 0.1; done; false; }'
 	# make has nothing left to do here, but it must agree. By hand there is time between two lines; here it is waited for.
 	awk '/^```sh$/ { on = 1; next } /^```$/ { on = 0 } on' "$ROOT/README.md" |
-		sed -e "s/7700/$port/g" -e "s|^make -s\$|make -s -C '$ROOT' programs|" -e 's/ &$/ \& RUNNING="$RUNNING $!"/' -e '/name two &/a sleep 1' -e '/node1 --threads 1 &/a sleep 1' -e "s/7701/$((port + 20000))/g"
+		sed -e "s/7700/$port/g" -e "s|^make -s\$|make -s -C '$ROOT' programs|" -e 's/ &$/ \& RUNNING="$RUNNING $!"/' \
+			-e "/name two &/a answers --coordinator 127.0.0.1:$port" \
+			-e "/node1 --threads 1 &/a answers --coordinator 127.0.0.1:$safe --tls farm-ca/ann" -e "s/7701/$safe/g"
 } >"$DIR/commands"
 [ "$(wc -l <"$DIR/commands")" -gt 12 ] || fail "the README has lost its commands"
 (cd "$DIR/home" && sh "$DIR/commands") >"$DIR/readme.log" 2>&1 || fail "a command of the README failed"

@@ -41,22 +41,8 @@ end_all() {
 }
 trap end_all EXIT
 
-# port: it and the next three are in nobody's use.
-free_ports() {
-	port=$((10000 + $$ % 5000 * 4))
-	while [ $port -lt 32000 ]; do
-		busy=0
-		for k in 0 1 2 3; do
-			hex=$(printf ':%04X ' $((port + k)))
-			! cat /proc/net/tcp /proc/net/tcp6 2>/dev/null | grep -q "$hex" || busy=1
-		done
-		[ $busy = 1 ] || break
-		port=$((port + 4))
-	done
-}
-
 start_cluster() {
-	free_ports
+	free_ports 4
 	host=$(hostname -s)
 	mkdir -p "$DIR/munge" "$DIR/state" "$DIR/slurmd"
 	chmod 711 "$DIR"
