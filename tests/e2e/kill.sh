@@ -9,6 +9,7 @@ submit "$BOX" -o "$DIR/calm.exr" $JOB --wait >/dev/null
 
 start_worker victim
 victim=$WORKER
+until_true 10 grep -q 'event=peer_hello.*name="victim"' "$DIR/coordinator.log" || fail "it does not come"
 id=$(submit "$BOX" -o "$DIR/disturbed.exr" $JOB)
 until_true 20 is_beyond "$id" 0.4 || fail "$id does not get on"
 kill -9 $victim

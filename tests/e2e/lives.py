@@ -25,7 +25,7 @@ def hello(name, home, start):
     body = field(1, VERSION) + field(2, 1) + field(3, name) + field(4, b"by hand") + field(5, 1) + field(6, start) + field(7, home)
     words = field(1, body)
     s = socket.create_connection(("127.0.0.1", int(sys.argv[1])))
-    s.settimeout(5)
+    s.settimeout(60)
     s.sendall(struct.pack(">II", len(words), 0) + words)
     return s, s.recv(4096)
 

@@ -9,7 +9,7 @@ refused() {
 	sentence=$1
 	shift
 	code=0
-	timeout 10 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --spool "$DIR/other" --status-socket "$AT" "$@" 2>"$DIR/err.log" || code=$?
+	timeout 100 "$BIN/hslt-coordinator" --listen 127.0.0.1:0 --spool "$DIR/other" --status-socket "$AT" "$@" 2>"$DIR/err.log" || code=$?
 	[ $code -ne 0 ] && [ $code -ne 124 ] || fail "it starts, or hangs ($code), though: $sentence"
 	grep -q -e "$sentence" "$DIR/err.log" || fail "it says: $(cat "$DIR/err.log")"
 }
@@ -52,7 +52,7 @@ refused "No such file"
 AT=$DIR/at
 refused "no group 'nobody-of-that-name'" --status-group nobody-of-that-name
 [ ! -e "$AT" ] || fail "a socket was left"
-timeout 5 env -u HSLT_STATUS_SOCKET "$BIN/hslt-coordinator" --spool "$DIR/other" --status-group daemon 2>"$DIR/err.log" && fail "a group for no socket"
+timeout 100 env -u HSLT_STATUS_SOCKET "$BIN/hslt-coordinator" --spool "$DIR/other" --status-group daemon 2>"$DIR/err.log" && fail "a group for no socket"
 
 # Another's live socket, by a link too; one that answers so slowly that nobody more can wait there; one of another kind.
 begin
@@ -81,7 +81,7 @@ for w in wait:
     except BlockingIOError:
         pass
 d.bind(kind + "/kind")
-time.sleep(60)' "$DIR" &
+time.sleep(600)' "$DIR" &
 	PIDS="$PIDS $!"
 	until_true 10 test -S "$DIR/kind" || fail "no sockets"
 	refused "somebody else answers"

@@ -91,7 +91,7 @@ COORDINATOR_PID=$!
 PIDS="$PIDS $COORDINATOR_PID"
 until_true 5 test -S "$DIR/status" || fail "no socket"
 "$BIN/hslt-status" >"$DIR/shown" || fail "the connection that starts the coordinator is not answered"
-grep -q READY=1 "$DIR/heard" || fail "it did not say that it is ready"
+until_true 5 grep -q READY=1 "$DIR/heard" || fail "it did not say that it is ready"
 HSLT_COORDINATOR=127.0.0.1:$(cat "$DIR/port")
 export HSLT_COORDINATOR
 socat -u "UNIX-RECV:$DIR/notify2" "OPEN:$DIR/heard2,creat,append" 2>>"$DIR/socat.log" &
@@ -103,7 +103,7 @@ PIDS="$PIDS $WORKER"
 submit "$BOX" -o "$DIR/unit.exr" --integrator hslt --bootstrap 20000 --mutations 60000 --wait >/dev/null || fail "the job: $?"
 until_true 5 grep -q 'WATCHDOG=1.*WATCHDOG=1' "$DIR/heard" || fail "the watchdog hears nothing: $(cat "$DIR/heard")"
 until_true 5 grep -q 'WATCHDOG=1.*WATCHDOG=1' "$DIR/heard2" || fail "the worker's watchdog hears nothing: $(cat "$DIR/heard2")"
-grep -q '^READY=1' "$DIR/heard2" || fail "the worker said $(cat "$DIR/heard2")"
+until_true 5 grep -q '^READY=1' "$DIR/heard2" || fail "the worker said $(cat "$DIR/heard2")"
 if [ "$(id -u)" = 0 ]; then
 	for f in coordinator worker; do
 		grep -q 'level=warn event=runs_as_root' "$DIR/$f.log" || fail "no warning that the $f runs as root"

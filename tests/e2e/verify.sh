@@ -21,7 +21,7 @@ if (unset HSLT_TEST; "$BIN/hslt-worker" --coordinator 127.0.0.1:1 --test-lie 1) 
 	fail "a worker lies outside of tests"
 fi
 
-start_coordinator --heartbeat 5
+start_coordinator --heartbeat 60
 python3 "$HERE/lives.py" "${COORDINATOR#*:}" || fail "lives of workers"
 stop $COORDINATOR_PID
 start_coordinator

@@ -8,7 +8,7 @@ for role, who in ((1, b"worker"), (2, b"client")):
         hello = field(1, version) + field(2, role) + field(3, b"skewed") + field(4, b"x") + field(5, 1)
         if version > VERSION:
             hello += field(99, b"what comes next")
-        s = socket.create_connection(("127.0.0.1", int(sys.argv[1])), 5)
+        s = socket.create_connection(("127.0.0.1", int(sys.argv[1])), 60)
         s.sendall(frame(field(1, hello)))
         heard = b""
         while True:
