@@ -89,8 +89,11 @@ systemd-socket-activate -l "$DIR/status" -E NOTIFY_SOCKET="$DIR/notify" -E WATCH
 	--spool "$DIR/spool" 2>>"$DIR/coordinator.log" &
 COORDINATOR_PID=$!
 PIDS="$PIDS $COORDINATOR_PID"
-until_true 5 test -S "$DIR/status" || fail "no socket"
-"$BIN/hslt-status" >"$DIR/shown" || fail "the connection that starts the coordinator is not answered"
+# There is a moment between the socket's name and that it listens.
+connects() {
+	"$BIN/hslt-status" >"$DIR/shown" 2>"$DIR/connect.log" || ! grep -q 'No such file\|refused' "$DIR/connect.log"
+}
+until_true 5 connects && [ -s "$DIR/shown" ] || fail "the connection that starts the coordinator is not answered: $(cat "$DIR/connect.log")"
 until_true 5 grep -q READY=1 "$DIR/heard" || fail "it did not say that it is ready"
 HSLT_COORDINATOR=127.0.0.1:$(cat "$DIR/port")
 export HSLT_COORDINATOR
