@@ -156,10 +156,12 @@ export HSLT_CA="$DIR/ca"
 { "$BIN/hslt-ca" init && "$BIN/hslt-ca" worker worker && "$BIN/hslt-ca" client client; } >>"$DIR/ca.log" 2>&1 || fail "hslt-ca"
 export HSLT_TLS="$HSLT_CA/client"
 start_coordinator --verbose --tls "$HSLT_CA/coordinator"
+id=$(submit "$BOX" -o "$DIR/elastic.exr" $LONG)
+# Whoever waits has this to do meanwhile, and does not leave.
+filler=$(submit "$BOX" -o "$DIR/filler.exr" --integrator path --spp 1000000 --epoch 4 --priority -100)
 batch --array=1 --export="ALL,HSLT_TLS=$HSLT_CA/worker,HSLT_GRACE=0" "$DEPLOY/slurm/workers.sbatch"
 first=$JOB
 until_true 20 has_workers 1 || fail "no worker came: $(squeue 2>&1)"
-id=$(submit "$BOX" -o "$DIR/elastic.exr" $LONG)
 until_true 30 is_beyond "$id" 0.1 || fail "$id does not get on with one worker"
 
 batch --array=2-3 --export="ALL,HSLT_TLS=$HSLT_CA/worker" "$DEPLOY/slurm/workers.sbatch"
@@ -191,6 +193,7 @@ has_worker "^${second}_3\.0@$node" || fail "the old worker on $node is gone, thi
 pause release
 is_beyond "$id" 0.95 && fail "$id was too fast, this tests nothing"
 until_true 60 is_state "$id" done || fail "$id is $(value "$id" state)"
+"$BIN/hslt-job" cancel "$filler" 2>>"$DIR/submit.log" || fail "$filler is $(value "$filler" state)"
 "$BIN/hslt-job" fetch "$id" -o "$DIR/elastic.exr" || fail "no image of $id"
 same "$DIR/long.exr" "$DIR/elastic.exr"
 

@@ -53,15 +53,20 @@ is_stalled() {
 fault slow_result 3 1 "results take longer than a worker may be silent"
 slow_result() {
 	through_proxy is_slow
-	[ "$(grep -c event=connect\  "$DIR/w1.log")" -eq 1 ] || fail "$NAME: the worker is cut off"
 }
 # The other worker stands still until the result is there, lest the job is done by it alone meanwhile.
 is_slow() {
 	kill -STOP "$OTHER"
-	before=$(merged)
-	happens slow 22
-	until_true 30 is_merged $((before + 2)) || fail "$NAME: the result does not come"
-	kill -CONT "$OTHER"
+	for try in 1 2 3 4 5; do # a machine that stands still for a second cuts it off, too
+		calls=$(grep -c event=connect\  "$DIR/w1.log")
+		before=$(merged)
+		happens slow 22
+		until_true 30 is_merged $((before + 2)) || fail "$NAME: the result does not come"
+		! has_said w1 event=connect\  $((calls + 1)) || continue
+		kill -CONT "$OTHER"
+		return 0
+	done
+	fail "$NAME: the worker is cut off"
 }
 
 fault late_result 3 1 "results come when their worker has been missed"
@@ -73,7 +78,11 @@ is_late() {
 	kill -STOP "$OTHER"
 	happens late 22
 	[ "$i" -eq "$TIMES" ] || return 0
-	until_true 10 is_missed || fail "$NAME: the late worker is not missed"
+	for try in 1 2 3 4 5; do # by a coordinator that stands still nobody is missed
+		! until_true 1 is_missed || break
+		happens late 22
+	done
+	is_missed || fail "$NAME: the late worker is not missed"
 	kill -CONT "$OTHER"
 }
 is_missed() {

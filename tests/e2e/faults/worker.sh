@@ -99,8 +99,12 @@ hang_worker() {
 	each_time one_thread_hangs
 	finish_job
 }
+# The job is held until it has come, lest the others have nothing left for it; if it has ended there is nothing to hang in.
 one_thread_hangs() {
+	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || { [ $i -gt 1 ] && return 0; } || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
 	worker "h$i" --threads 2 --stall 0.5 --test-hang 1
+	says "h$i" event=connect
+	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
 	CODE=0
 	wait "$WORKER" || CODE=$?
 	[ "$CODE" -eq 75 ] || fail "$NAME: it ended with $CODE"
