@@ -12,7 +12,7 @@ nobody_left() {
 	! grep -alF -f "$DIR/marks" /proc/[0-9]*/cmdline 2>/dev/null | grep -q .
 }
 
-timeout 120 sh "$DEMO" "$BUILD" "$DIR/out" --size 96x54 -D spp=1 >"$DIR/demo.out" 2>"$DIR/demo.log" || fail "the demo ended with $?"
+timeout 600 sh "$DEMO" "$BUILD" "$DIR/out" --size 96x54 -D spp=1 >"$DIR/demo.out" 2>"$DIR/demo.log" || fail "the demo ended with $?"
 [ "$(ls "$DIR/out" | tr '\n' ' ')" = "demo.exr demo.png " ] || fail "it left: $(ls "$DIR/out")"
 [ "$(od -An -tx1 -j16 -N8 "$DIR/out/demo.png" | tr -d ' ')" = 0000006000000036 ] || fail "the picture is not 96x54"
 grep -q '^worker2 ' "$DIR/demo.out" || fail "the farm's state is not shown: $(cat "$DIR/demo.out")"
@@ -30,7 +30,7 @@ stop $demo
 [ -z "$(ls "$TMPDIR")" ] || fail "interrupted, it left $(ls "$TMPDIR")"
 nobody_left || fail "interrupted, it left somebody running"
 
-if timeout 60 sh "$DEMO" "$BUILD" "$DIR/out" --no-such-option >"$DIR/demo.out" 2>"$DIR/demo.log"; then
+if timeout 600 sh "$DEMO" "$BUILD" "$DIR/out" --no-such-option >"$DIR/demo.out" 2>"$DIR/demo.log"; then
 	fail "a demo that cannot be submitted ended with 0"
 fi
 nobody_left || fail "failed, it left somebody running"

@@ -7,7 +7,7 @@ start_coordinator
 id=$(submit "$BOX" -o "$DIR/a.exr" --integrator pssmlt --bootstrap 20000 --mutations 300000 --name "a \"name\" with ü")
 is_state "$id" queued || fail "without workers a job waits"
 [ -n "$(value "$id" waiting)" ] || fail "it does not say why it waits"
-timeout 40 "$BIN/hslt-status" --json --watch "$id" >"$DIR/lines" &
+timeout 400 "$BIN/hslt-status" --json --watch "$id" >"$DIR/lines" &
 watcher=$!
 PIDS="$PIDS $watcher"
 start_worker w1

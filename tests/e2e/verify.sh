@@ -34,6 +34,7 @@ waits() {
 until_true 20 waits || fail "it waits for '$(value "$id" waiting)'"
 start_worker liar --test-lie 2
 liar=$WORKER
+until_true 10 grep -q 'event=peer_hello.*name="liar"' "$DIR/coordinator.log" || fail "the liar does not come"
 start_worker honest2
 b=$WORKER
 until_true 60 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" why)"

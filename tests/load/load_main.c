@@ -173,7 +173,7 @@ static void start(char *host_port, size_t size)
 	process_start(&coordinator, load.s.bin, log_file,
 		      "hslt-coordinator --listen 127.0.0.1:0 --port-file %s --spool %s/spool --status-socket %s --heartbeat %g%s %s",
 		      port_file, folder, status_socket, load.s.heartbeat, tls, load.s.options);
-	for (int i = 0; i < 200 && !*port; i++) {
+	for (int i = 0; i < 1200 && !*port; i++) {
 		usleep(50000);
 		FILE *f = fopen(port_file, "r");
 		if (f && !fgets(port, sizeof port, f))
