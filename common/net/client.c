@@ -334,8 +334,8 @@ static int fetch_rest(struct client *cl, struct client_message *first, uint64_t 
 		rc = fetch_chunk(cl, job, what, at, &more, e);
 		if (rc)
 			break;
-		if (more.envelope.message->fetch_chunk->size < size)
-			rc = error_set(e, EPROTO, "the file changed while it was fetched");
+		if (more.envelope.message->fetch_chunk->size != size)
+			rc = error_set(e, EIO, "the file changed while it was fetched");
 		if (!rc)
 			rc = write_all(fd, more.payload.bytes, more.payload.size, e);
 		at += more.payload.size;

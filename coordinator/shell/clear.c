@@ -27,7 +27,7 @@ struct clearing {
 static bool is_fetched(const struct server *s, uint64_t job)
 {
 	for (const struct session *p = s->sessions; p; p = p->next)
-		if (p->watched == job || (p->fetching == job && server_now(s) - p->fetched < fetching_seconds)) /* or waits for it */
+		if (p->watched == job || (p->fetch.job == job && server_now(s) - p->fetch.at < fetching_seconds)) /* or waits for it */
 			return true;
 	return false;
 }

@@ -1,20 +1,15 @@
-/* A client's side of a session: submit, list, watch, fetch; control.c has the rest. */
-#include "coordinator/shell/publish.h"
+/* A client's side of a session: submit, list, watch; fetch.c and control.c have the rest. */
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/trust.h"
 #include "coordinator/shell/upload.h"
 
-#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 
-#include <fcntl.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 enum { CHUNK = 1 << 20, HEADER_LIMIT = 1 << 20 };
-static const double preview_seconds = 5; /* a younger one is good enough */
 
 /* ---- submit ---- */
 
@@ -233,130 +228,6 @@ static void take_watch(struct session *p, uint64_t job)
 	session_tick(p);
 }
 
-static int read_chunk(const char *path, uint64_t offset, unsigned char *bytes, size_t *count, uint64_t *size,
-		      struct error *e)
-{
-	struct stat st;
-	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
-	int rc = fd < 0 || disk_fstat(fd, &st) ? error_set(e, errno, "%s", strerror(errno)) : 0;
-	if (!rc && offset > (uint64_t)st.st_size)
-		rc = error_set(e, EINVAL, "the file is shorter than that");
-	ssize_t n = rc ? 0 : disk_pread(fd, bytes, CHUNK, (off_t)offset);
-	if (n < 0)
-		rc = error_set(e, errno, "%s", strerror(errno));
-	if (!rc) {
-		*count = (size_t)n;
-		*size = (uint64_t)st.st_size;
-		if (*count > *size - offset) /* a log that has grown in between */
-			*size = offset + *count;
-	}
-	if (fd >= 0)
-		disk_close(fd);
-	return rc;
-}
-
-static const char *file_of(Farm__What what)
-{
-	switch (what) {
-	case FARM__WHAT__WHAT_RESULT:
-		return "result.exr";
-	case FARM__WHAT__WHAT_LOG:
-		return "log";
-	case FARM__WHAT__WHAT_PREVIEW:
-		return "preview.exr";
-	default:
-		return NULL; /* a number from outside */
-	}
-}
-
-static int cleared(const struct job_record *r, struct error *e)
-{
-	char day[32];
-	struct tm t;
-	time_t at = (time_t)r->cleared;
-	strftime(day, sizeof day, "%Y-%m-%d", gmtime_r(&at, &t));
-	return error_set(e, ENOENT, "job j%llu: its result was cleared on %s, by --keep-days or --keep-gb of the coordinator",
-			 (unsigned long long)r->id, day);
-}
-
-static int fetch(struct session *p, const Farm__Fetch *f, Farm__FetchChunk *chunk, struct job_view *v, unsigned char *bytes,
-		 size_t *count, struct error *e)
-{
-	char path[SPOOL_PATH_MAX];
-	const char *file = file_of(f->what);
-	if (!session_finds_job(p, f->job, v))
-		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)f->job);
-	if (!file)
-		return error_set(e, EINVAL, "there is nothing of that kind to fetch");
-	if (f->what == FARM__WHAT__WHAT_RESULT && v->record.cleared > 0)
-		return cleared(&v->record, e);
-	if (f->what == FARM__WHAT__WHAT_RESULT && !v->record.has_result)
-		return error_set(e, ENOENT, "job j%llu is %s: it has no result", (unsigned long long)f->job, v->record.state);
-	spool_job_path(p->server->spool, f->job, file, path);
-	int rc = bytes ? read_chunk(path, f->offset, bytes, count, &chunk->size, e) : error_set(e, ENOMEM, "no memory");
-	return rc == -ENOENT ? error_set(e, ENOENT, "job j%llu has no %s yet", (unsigned long long)f->job, file) : rc;
-}
-
-static void answer_fetch(struct session *p, const Farm__Fetch *f)
-{
-	Farm__FetchChunk chunk;
-	Farm__Envelope m;
-	struct job_view v;
-	struct error e = {""};
-	unsigned char *bytes = mem_alloc(CHUNK, 1);
-	size_t count = 0;
-	farm__fetch_chunk__init(&chunk);
-	farm__envelope__init(&m);
-	chunk.job = f->job;
-	chunk.what = f->what;
-	chunk.offset = f->offset;
-	chunk.error = e.text;
-	if (fetch(p, f, &chunk, &v, bytes, &count, &e) == 0)
-		chunk.output = v.record.output;
-	p->fetching = !*e.text && chunk.offset + count < chunk.size ? f->job : 0;
-	p->fetched = server_now(p->server);
-	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
-	m.fetch_chunk = &chunk;
-	session_send(p, &m, bytes, count);
-	mem_free(bytes);
-}
-
-/* Made when somebody asks: it holds up the job's results for as long as an image takes. */
-static bool is_preview_old(const struct server *s, const struct order *o)
-{
-	return o && o->canvas && !o->ended && (o->preview_made <= 0 || server_now(s) - o->preview_made > preview_seconds);
-}
-
-void session_previews(struct server *s, uint64_t job)
-{
-	for (struct session *p = s->sessions; p; p = p->next) {
-		struct order *o = server_order(s, job);
-		if (p->wants_preview != job || (o && o->busy))
-			continue;
-		if (is_preview_old(s, o)) {
-			publish_start(s, o, PUBLISH_PREVIEW, 0);
-			continue;
-		}
-		Farm__Fetch f;
-		farm__fetch__init(&f);
-		f.job = job;
-		f.what = FARM__WHAT__WHAT_PREVIEW;
-		p->wants_preview = 0;
-		answer_fetch(p, &f);
-	}
-}
-
-static void take_fetch(struct session *p, const Farm__Fetch *f)
-{
-	struct job_view v;
-	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset || !session_finds_job(p, f->job, &v)) {
-		answer_fetch(p, f);
-		return;
-	}
-	p->wants_preview = f->job;
-	session_previews(p->server, f->job);
-}
-
 void session_client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
 {
 	const Farm__Envelope *m = env->message;
@@ -382,7 +253,7 @@ void session_client_message(struct session *p, struct envelope *env, const unsig
 		take_watch(p, m->watch->job);
 		break;
 	case FARM__ENVELOPE__BODY_FETCH:
-		take_fetch(p, m->fetch);
+		session_fetch(p, m->fetch);
 		break;
 	case FARM__ENVELOPE__BODY_BYE:
 		conn_close(p->conn, "the client said goodbye");

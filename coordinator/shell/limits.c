@@ -8,8 +8,8 @@
 
 enum {
 	OF_JOB = 3,  /* descriptors: its log, its journal, the next one while a checkpoint is written */
-	SPARE = 128, /* the spool's and the database's, files on their way in and out, whoever looks at the status */
-	OTHERS = FARM_JOBS * OF_JOB + SPARE,
+	SPARE = 128, /* the spool's and the database's, files on their way in, whoever looks at the status */
+	OTHERS = FARM_JOBS * OF_JOB + FETCHES_MOST + SPARE,
 	FEWEST = 16, /* connections without which a coordinator is none */
 };
 

@@ -4,7 +4,7 @@
 
 #include "common/base/error.h"
 
-enum { CONNECTIONS_DEFAULT = 10000, CONNECTIONS_MOST = 1000000 };
+enum { CONNECTIONS_DEFAULT = 10000, CONNECTIONS_MOST = 1000000, FETCHES_MOST = 128 /* files on their way out */ };
 
 /* Raises the process's limit of file descriptors as far as the system lets it. asked 0: the default, or as many as there are
  * descriptors for. -EINVAL when more are asked for than that. */

@@ -31,6 +31,7 @@ struct server_config {
 	uint64_t journal_bytes; /* a job's journal that is longer is cut by a checkpoint */
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
 	unsigned max_connections; /* 0: by the file descriptors that there are */
+	unsigned max_fetches; /* files that clients have begun to fetch, at a time */
 	double verify;        /* least share of the leases of each job that two workers compute */
 	unsigned max_faults;  /* of a worker, before it is set aside */
 	const char *forgive;  /* the name of a worker that was set aside and may come back; NULL: none */
@@ -80,7 +81,7 @@ struct server {
 	struct spool *spool;
 	struct blob_store *blobs;
 	struct session *sessions, *by_id[SESSION_BUCKETS];
-	unsigned session_count;
+	unsigned session_count, fetches;
 	struct order *orders;
 	struct job_record *ended; /* ENDED_MAX, oldest first */
 	size_t ended_count;

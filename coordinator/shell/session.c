@@ -315,6 +315,7 @@ static void on_closed(void *user, const char *why)
 	struct server *s = p->server;
 	delist(s, p);
 	session_upload_abort(p);
+	session_fetch_end(p);
 	asks_drop(p);
 	log_event(conn_distrust(p->conn)	? LOG_PEER_REFUSED
 		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED

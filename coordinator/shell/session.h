@@ -30,8 +30,13 @@ struct session {
 	double heard; /* s on the loop's clock: when it was last told so amid a message */
 	struct upload *upload; /* a submission that waits for blobs */
 	uint64_t watched;      /* job; 0: none */
-	uint64_t fetching;     /* job of which it has not got all of a file yet; 0: none */
-	double fetched;        /* s on the loop's clock: its last piece */
+	struct fetch {         /* a file of which it has not got all yet */
+		uint64_t job;  /* 0: none */
+		Farm__What what;
+		int fd;
+		uint64_t size; /* when it was opened: a log grows */
+		double at;     /* s on the loop's clock: its last piece */
+	} fetch;
 	uint64_t wants_preview; /* job whose preview is being made for it; 0: none */
 	struct job_view *shown; /* what the watcher saw last */
 	struct extension wants; /* not answered yet: it waits until the job's films are free, or read; job 0: none */
@@ -70,6 +75,9 @@ void session_control(struct session *p, const Farm__Control *c);
 /* client.c again */
 void session_client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size);
 void session_upload_abort(struct session *p);
+/* fetch.c */
+void session_fetch(struct session *p, const Farm__Fetch *f);
+void session_fetch_end(struct session *p);
 /* The order's canvas is free, or the order has ended: who waits for its preview gets it, or it is made now. */
 void session_previews(struct server *s, uint64_t job);
 

@@ -99,6 +99,7 @@ int served_start(double hello_seconds, double heartbeat_seconds, double stall_se
 		c.spool = spool;
 		c.port_file = port_file;
 		c.max_connections = 8;
+		c.max_fetches = 2;
 		c.hello_seconds = hello_seconds;
 		c.heartbeat_seconds = heartbeat_seconds;
 		c.stall_seconds = stall_seconds;

@@ -10,7 +10,7 @@
 
 /* ---- the server ---- */
 
-/* Eight connections at most; 0: it listens. What a test does not wait for is to last longer than a busy machine stands still. */
+/* Eight connections at most, two of them with a fetch under way; 0: it listens. What a test does not wait for is to last longer than a busy machine stands still. */
 int served_start(double hello_seconds, double heartbeat_seconds, double stall_seconds);
 int served_stop(void **state); /* a teardown: fails when it did not end well */
 const char *served_folder(void); /* holds its spool; a file `nomem` there: its next connection gets no memory */

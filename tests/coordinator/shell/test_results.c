@@ -86,6 +86,81 @@ static void a_black_job_ends(void **state)
 	scripted_hang_up(worker);
 }
 
+/* ---- fetching ---- */
+
+enum { PIECE = 1 << 20, FILE_SIZE = 2 * PIECE + 5 };
+
+/* As the coordinator makes it: whole, in place of the one before. */
+static void make_preview(char letter)
+{
+	char path[96], temporary[112];
+	static char bytes[FILE_SIZE];
+	snprintf(path, sizeof path, "%s/spool/jobs/j1/preview.exr", served_folder());
+	snprintf(temporary, sizeof temporary, "%s.tmp", path);
+	memset(bytes, letter, sizeof bytes);
+	FILE *f = fopen(temporary, "w");
+	assert_non_null(f);
+	assert_int_equal(fwrite(bytes, 1, sizeof bytes, f), sizeof bytes);
+	assert_int_equal(fclose(f), 0);
+	assert_int_equal(rename(temporary, path), 0);
+}
+
+static const Farm__FetchChunk *piece(struct scripted *p, uint64_t offset)
+{
+	Farm__Fetch f;
+	Farm__Envelope m;
+	farm__fetch__init(&f);
+	farm__envelope__init(&m);
+	f.job = 1;
+	f.what = FARM__WHAT__WHAT_PREVIEW;
+	f.offset = offset;
+	m.body_case = FARM__ENVELOPE__BODY_FETCH;
+	m.fetch = &f;
+	peer_say(p, &m, NULL, 0);
+	const Farm__Envelope *answer = scripted_hear(p);
+	assert_true(answer && answer->body_case == FARM__ENVELOPE__BODY_FETCH_CHUNK);
+	return answer->fetch_chunk;
+}
+
+static void expect_piece(struct scripted *p, uint64_t offset, char letter)
+{
+	const Farm__FetchChunk *c = piece(p, offset);
+	assert_string_equal(c->error, "");
+	assert_int_equal(c->size, FILE_SIZE);
+	assert_int_equal(p->reader.payload.size, FILE_SIZE - offset < PIECE ? FILE_SIZE - offset : PIECE);
+	assert_int_equal(p->reader.payload.bytes[0], letter);
+	assert_int_equal(p->reader.payload.bytes[p->reader.payload.size - 1], letter);
+}
+
+static void what_is_fetched_is_one_file(void **state)
+{
+	(void)state;
+	struct scripted *client[3];
+	for (int i = 0; i < 3; i++) {
+		client[i] = peer_call();
+		assert_true(peer_hello(client[i], FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	}
+	make_preview('a');
+	assert_true(*piece(client[0], PIECE)->error); /* not begun */
+	expect_piece(client[0], 0, 'a');
+	make_preview('b');
+	expect_piece(client[1], 0, 'b');
+	expect_piece(client[0], PIECE, 'a');
+	expect_piece(client[0], 2 * PIECE, 'a');
+	assert_true(*piece(client[0], 2 * PIECE)->error); /* it was its last */
+	expect_piece(client[1], PIECE, 'b');
+	/* Of two that may be under way the silent one gives way, and no other one. */
+	expect_piece(client[0], 0, 'b');
+	expect_piece(client[1], PIECE, 'b');
+	expect_piece(client[2], 0, 'b');
+	expect_piece(client[1], 2 * PIECE, 'b');
+	assert_non_null(strstr(piece(client[0], PIECE)->error, "fetch it again"));
+	expect_piece(client[0], 0, 'b');
+	expect_piece(client[2], PIECE, 'b');
+	for (int i = 0; i < 3; i++)
+		scripted_hang_up(client[i]);
+}
+
 /* A lease of chains in the dark; of a bootstrap in even light. */
 static struct batch counting_batch(const struct lease_key *k, const struct plan *plan)
 {
@@ -449,7 +524,8 @@ static void a_failure_counts_whatever_its_text(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_black_job_ends), cmocka_unit_test(strategies_are_counted_once),
+		cmocka_unit_test(a_black_job_ends), cmocka_unit_test(what_is_fetched_is_one_file), /* of that job */
+		cmocka_unit_test(strategies_are_counted_once),
 		cmocka_unit_test(what_is_useless_does_not_wait),
 		cmocka_unit_test(extensions_wait_for_films), /* the job of strategies_are_counted_once lives again */
 		cmocka_unit_test(a_failure_counts_whatever_its_text),
