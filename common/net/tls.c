@@ -34,7 +34,8 @@ struct stamp { /* of a file; zeroes: not there */
 struct tls {
 	char folder[3072];
 	SSL_CTX *context;
-	struct stamp stamps[FILES];
+	struct stamp stamps[FILES]; /* of what holds */
+	struct stamp seen[FILES];   /* ... and what was there last, of use or not */
 	struct tls_peer self;
 	time_t authority_until;
 	time_t warned; /* 0: not since the files were read */
@@ -353,6 +354,7 @@ int tls_open(struct tls **out, const char *folder, struct error *e)
 	int rc = n < 0 || (size_t)n >= sizeof t->folder ? error_set(e, EINVAL, "%s: the name is too long", folder) : 0;
 	t->recheck = 60;
 	look(t, t->stamps);
+	memcpy(t->seen, t->stamps, sizeof t->seen);
 	if (!rc)
 		rc = load(t, is_there(&t->stamps[3]), &t->context, &t->self, e);
 	if (rc) {
@@ -378,13 +380,17 @@ int tls_refresh(struct tls *t, struct error *e)
 	struct tls_peer self;
 	SSL_CTX *fresh;
 	look(t, now);
+	bool news = memcmp(now, t->seen, sizeof now) != 0;
+	memcpy(t->seen, now, sizeof now);
 	if (memcmp(now, t->stamps, sizeof now) == 0)
 		return 0;
 	bool lost = is_there(&t->stamps[3]) && !is_there(&now[3]);
-	memcpy(t->stamps, now, sizeof now);
 	int rc = load(t, is_there(&now[3]), &fresh, &self, e);
+	if (rc && !news)
+		return 0;
 	if (rc)
 		return error_prefix(e, rc, "TLS, the files before still hold%s", lost ? ", crl.pem too, which is gone" : "");
+	memcpy(t->stamps, now, sizeof now);
 	SSL_CTX_free(t->context);
 	t->context = fresh;
 	t->self = self;

@@ -44,8 +44,9 @@ struct tls;
 int tls_open(struct tls **t, const char *folder, struct error *e);
 void tls_close(struct tls *t); /* links that live keep what they need */
 /* Reads the files again if they have changed. 1: they had, new links work by them, and live ones are judged by them when they
- * are checked again; negative: they had and are of no use, the old ones stay (said once, then 0). -ENOENT: crl.pem is gone; what it
- * said holds until there is another, the other files are taken up. */
+ * are checked again; negative: they had and are of no use, the old ones stay (said once, then 0; each call
+ * tries again, for what stood in the way may have passed). -ENOENT: crl.pem is gone; what it said holds until there is another, the
+ * other files are taken up. */
 int tls_refresh(struct tls *t, struct error *e);
 const struct tls_peer *tls_self(const struct tls *t);
 /* The end of the authority's certificate that signed ours; 0: there is none. */

@@ -1,5 +1,6 @@
 /*
- * Certificates that end soon are spoken of in time, again every day, and not when there is no need; clocks are arguments here.
+ * Certificates that end soon are spoken of in time, again every day, and not when there is no need; clocks are arguments here. Those
+ * that are new are taken up, if not at once, then later.
  */
 #include "common/net/authority.h"
 
@@ -12,6 +13,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/resource.h>
 
 enum { DAY = 86400 };
 
@@ -108,12 +110,36 @@ static void the_authoritys_end_is_named(void **state)
 	tls_close(t);
 }
 
+static void what_could_not_be_read_is_read_later(void **state)
+{
+	(void)state;
+	char ca[128];
+	struct error e;
+	struct rlimit limit, none;
+	struct tls *t = party("later", 400, 10);
+	time_t before = tls_self(t)->until;
+	snprintf(ca, sizeof ca, "%s/later", root);
+	assert_int_equal(authority_issue(ca, "node", TLS_WORKER, 300, true, &e), 0);
+	assert_int_equal(getrlimit(RLIMIT_NOFILE, &limit), 0);
+	none = (struct rlimit){0, limit.rlim_max};
+	assert_int_equal(setrlimit(RLIMIT_NOFILE, &none), 0);
+	int first = tls_refresh(t, &e), second = tls_refresh(t, &e);
+	assert_int_equal(setrlimit(RLIMIT_NOFILE, &limit), 0);
+	assert_true(first < 0 && second == 0); /* it is said once */
+	assert_true(tls_self(t)->until == before);
+	assert_int_equal(tls_refresh(t, &e), 1);
+	assert_true(tls_self(t)->until > before);
+	assert_int_equal(tls_refresh(t, &e), 0);
+	tls_close(t);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(a_long_one_is_no_matter),
 		cmocka_unit_test(it_is_said_once_a_day_and_after_files_were_read),
 		cmocka_unit_test(the_authoritys_end_is_named),
+		cmocka_unit_test(what_could_not_be_read_is_read_later),
 	};
 	return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
