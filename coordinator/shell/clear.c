@@ -32,6 +32,12 @@ static bool is_fetched(const struct server *s, uint64_t job)
 	return false;
 }
 
+/* Or comes to life: its films are being read, so that it goes on. */
+static bool lives(const struct server *s, uint64_t job)
+{
+	return server_order(s, job) || (s->reading && s->reading->id == job);
+}
+
 static uint64_t result_bytes(const struct server *s, uint64_t job)
 {
 	uint64_t sum = 0;
@@ -46,7 +52,7 @@ static uint64_t result_bytes(const struct server *s, uint64_t job)
 
 static void look(const struct server *s, struct clearing *c, uint64_t id)
 {
-	if (server_order(s, id))
+	if (lives(s, id))
 		return;
 	int rc = spool_read_record(s->spool, id, &c->record, NULL);
 	if (rc == -ENOENT) { /* if nothing is in it */
@@ -108,7 +114,7 @@ static void clear_job(struct server *s, struct clearing *c, const struct age_job
 {
 	if ((!j->no_films || !j->films) && (!j->no_result || !j->result) && !j->no_record)
 		return;
-	if (server_order(s, j->id) || is_fetched(s, j->id) || spool_read_record(s->spool, j->id, &c->record, NULL) || c->record.ended != j->ended)
+	if (lives(s, j->id) || is_fetched(s, j->id) || spool_read_record(s->spool, j->id, &c->record, NULL) || c->record.ended != j->ended)
 		return;
 	if (j->no_films && j->films) {
 		keep_drop(s, j->id);

@@ -158,11 +158,36 @@ static void what_has_changed_stays(void **state)
 	spool_close(server.spool);
 }
 
+/* Films are read while it is looked, and others while what was chosen goes. */
+static void what_is_read_stays(void **state)
+{
+	(void)state;
+	struct disk slow = disk_system;
+	struct order first = {.id = 3}, second = {.id = JOBS};
+	slow.fsync = no_flush;
+	slow.open = slow_open;
+	disk_use(&slow);
+	open_server();
+	for (uint64_t id = 1; id <= JOBS; id++)
+		add(id, (double)time(NULL) - 20 * DAY);
+	server.reading = &first;
+	do { /* the last job goes in a later tick than the first: 120 looks are more than one */
+		clear_tick(&server);
+		if (!has(1, "result.exr"))
+			server.reading = &second;
+	} while (server.clearing);
+	disk_use(NULL);
+	assert_true(has(3, "result.exr") && has(JOBS, "result.exr") && !has(1, NULL) && !has(2, NULL) && !has(4, NULL));
+	ledger_close(server.ledger);
+	spool_close(server.spool);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(old_jobs_go_bit_by_bit, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_has_changed_stays, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_is_read_stays, folder_set_up, folder_tear_down),
 	};
 	log_set_level(LOG_LEVEL_ERROR);
 	return cmocka_run_group_tests(tests, NULL, NULL);
