@@ -129,6 +129,8 @@ int durable_end(struct server *s, struct order *o)
 		s->endings = n;
 		s->endings_again = server_now(s) + s->config.retry_seconds;
 	}
+	if (!rc) /* the record says more than what still waits for a flush */
+		journal_settle(o->journal);
 	journal_release(o->journal); /* with its last holder it gives up its room, too */
 	o->journal = NULL;
 	return 0;
@@ -240,12 +242,23 @@ static void drop_ack(struct durable_ack *a)
 	mem_free(a);
 }
 
+static void queue(struct server *s, struct durable_ack *a)
+{
+	a->next = NULL;
+	*s->acks_last = a;
+	s->acks_last = &a->next;
+}
+
 /* It waits until the journal is a good one again. */
 static void park(struct server *s, struct durable_ack *a)
 {
 	struct order *o = s->stopping ? NULL : server_order(s, a->key.job);
 	if (!o) {
 		drop_ack(a);
+		return;
+	}
+	if (a->journal != o->journal) { /* which is settled by now */
+		queue(s, a);
 		return;
 	}
 	a->next = s->parked;
@@ -312,8 +325,7 @@ void durable_ack(struct server *s, const struct order *o, uint64_t peer, const s
 	}
 	*a = (struct durable_ack){.peer = peer, .key = *k, .ack = ack, .journal = o->journal};
 	journal_hold(a->journal);
-	*s->acks_last = a;
-	s->acks_last = &a->next;
+	queue(s, a);
 	flush_next(s);
 }
 
@@ -364,15 +376,13 @@ static void unpark(struct server *s)
 	for (struct durable_ack *a, *next = list; (a = next);) {
 		struct order *o = server_order(s, a->key.job);
 		next = a->next;
-		a->next = NULL;
 		if (!o) {
 			drop_ack(a);
 		} else if (a->journal == o->journal && journal_is_bad(a->journal)) {
 			a->next = s->parked;
 			s->parked = a;
 		} else {
-			*s->acks_last = a;
-			s->acks_last = &a->next;
+			queue(s, a);
 		}
 	}
 	flush_next(s);

@@ -191,6 +191,8 @@ static void run(uv_work_t *work)
 {
 	struct reading *w = work->data;
 	w->rc = restore_films(w->server->spool, w->order, &w->error);
+	if (!w->rc) /* results from before its end may still wait for a flush of the old file */
+		w->rc = journal_renew(w->order->journal, &w->error);
 }
 
 static void answer(struct session *p, int rc, const struct error *e, const char *text)

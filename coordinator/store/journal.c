@@ -202,8 +202,8 @@ void journal_release(struct journal *j)
 {
 	if (!j || atomic_fetch_sub(&j->holders, 1) > 1)
 		return;
-	if (j->fd >= 0 && !j->bad && !j->settled) { /* nobody was told that it is stored */
-		int rc = write_waiting(j);
+	if (j->fd >= 0 && !j->bad) {
+		int rc = j->settled ? 0 : write_waiting(j); /* nobody was told that it is stored */
 		if (!rc && j->room > j->written)
 			rc = cut_off(j); /* else it goes with the file */
 		(void)rc;
@@ -507,7 +507,7 @@ int journal_sync(struct journal *j, struct error *e)
 		}
 	}
 	atomic_fetch_sub(&j->flushes, 1);
-	return rc ? fault(j, -rc, e) : 0;
+	return rc && !j->settled ? fault(j, -rc, e) : 0;
 }
 
 void journal_clear(const char *folder, uint64_t keep)

@@ -55,11 +55,11 @@ int journal_write(struct journal *j, struct error *e);
  * time. */
 int journal_sync(struct journal *j, struct error *e);
 
-/* All of a bad journal into a new file, flushed, in the place of the old one; then it is a good one. -EAGAIN: a
- * flush is still under way. */
+/* All of a journal into a new file, flushed, in the place of the old one; then it is a good one, and what other handles of the old
+ * file do or did is nothing to it. -EAGAIN: a flush is still under way. */
 bool journal_is_bad(const struct journal *j);
 int journal_renew(struct journal *j, struct error *e);
-/* All that was appended is safe elsewhere: journal_sync has nothing more to do. */
+/* All that was appended is safe elsewhere: journal_sync has nothing more to do, and does not fail. */
 void journal_settle(struct journal *j);
 
 /* journal.G's of the folder but that of `keep` go; UINT64_MAX: all. */

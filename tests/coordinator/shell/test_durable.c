@@ -30,12 +30,15 @@ static struct {
 	_Atomic bool hold_up, held_up, go_on; /* a checkpoint on its way to its name */
 	_Atomic bool fail_folder;             /* then the flush of that name fails */
 	_Atomic bool fail_records;
+	_Atomic bool hold_flush, held_flush, end_flush; /* the first one of a journal */
+	_Atomic bool fail_flush;                        /* which then fails */
 } *disk;
 static _Thread_local bool fail_next_folder;
 
 static struct plan plan;
 static struct plan_request request = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .mutations = 3200,
 				      .max_depth = 5, .groups = 2, .chains = 8, .epoch = 100, .bootstrap = 64};
+static uint64_t journal_most, keep_most;
 static pid_t pid;
 static char spool[100], port_file[100];
 static struct scripted *client, *worker;
@@ -74,6 +77,21 @@ static int own_open(const char *path, int flags, mode_t mode)
 	return disk_system.open(path, flags, mode);
 }
 
+static int own_fdatasync(int fd)
+{
+	if (disk->hold_flush) {
+		disk->hold_flush = false;
+		disk->held_flush = true;
+		while (!disk->end_flush)
+			usleep(1000);
+		if (disk->fail_flush) {
+			errno = EIO;
+			return -1;
+		}
+	}
+	return disk_system.fdatasync(fd);
+}
+
 static void serve(void)
 {
 	struct disk own = disk_system;
@@ -82,13 +100,14 @@ static void serve(void)
 	prctl(PR_SET_PDEATHSIG, SIGKILL);
 	own.rename = own_rename;
 	own.open = own_open;
+	own.fdatasync = own_fdatasync;
 	disk_use(&own);
 	server_config_init(&c);
 	c.listen = "127.0.0.1:0";
 	c.spool = spool;
 	c.port_file = port_file;
-	c.journal_bytes = 2000;
-	c.keep_bytes = 0;
+	c.journal_bytes = journal_most;
+	c.keep_bytes = keep_most;
 	c.retry_seconds = 0.05;
 	log_set_level(LOG_LEVEL_ERROR);
 	_exit(server_run(&c, &e) ? 1 : 0);
@@ -167,6 +186,52 @@ static void fail_lease(const struct lease_key *k)
 	assert_true(scripted_say(worker, &m, NULL, 0));
 }
 
+static void extend(uint64_t job, uint64_t mutations)
+{
+	Farm__Control c;
+	Farm__Envelope m;
+	struct error e;
+	farm__control__init(&c);
+	farm__envelope__init(&m);
+	c.job = job;
+	c.verb = FARM__VERB__VERB_EXTEND;
+	c.more_mutations = mutations;
+	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
+	m.control = &c;
+	assert_true(scripted_say(client, &m, NULL, 0));
+	const Farm__Envelope *answer = scripted_hear(client);
+	assert_true(answer && answer->body_case == FARM__ENVELOPE__BODY_DONE && answer->done->ok);
+	struct plan_request longer = request;
+	longer.mutations += mutations;
+	assert_int_equal(plan_make(&longer, &plan, &e), 0);
+}
+
+static unsigned sent, acknowledged, open_count;
+static struct lease_key open_leases[8]; /* not answered yet */
+
+/* Until it has sent so many results in all, and heard that so many of them are merged. */
+static void work_until(unsigned results, unsigned acks)
+{
+	for (;;) {
+		for (; open_count && sent < results; sent++) {
+			struct batch b = scripted_batch(&open_leases[--open_count], &plan, STATE_BYTES);
+			assert_true(scripted_send(worker, &b, &plan));
+			batch_fini(&b);
+		}
+		if (sent == results && acknowledged >= acks)
+			return;
+		struct error e;
+		const Farm__Envelope *m = scripted_hear(worker);
+		assert_non_null(m);
+		if (m->body_case == FARM__ENVELOPE__BODY_LEASE_ACK)
+			acknowledged += m->lease_ack->verdict == FARM__VERDICT__VERDICT_MERGED;
+		if (m->body_case != FARM__ENVELOPE__BODY_LEASE_GRANT)
+			continue;
+		assert_true(open_count < 8);
+		assert_int_equal(lease_key_from_wire(m->lease_grant->key, &open_leases[open_count++], &e), 0);
+	}
+}
+
 /* Answers leases until this is so, but the first one of the image, if it is to be kept. */
 static void work(const _Atomic bool *until, struct lease_key *keep)
 {
@@ -215,6 +280,8 @@ static int set_up(void **state)
 	snprintf(spool, sizeof spool, "%s/spool", folder);
 	snprintf(port_file, sizeof port_file, "%s/port", folder);
 	memset(disk, 0, sizeof *disk);
+	journal_most = 2000;
+	keep_most = 0;
 	return rc ? rc : plan_make(&request, &plan, &e);
 }
 
@@ -314,12 +381,68 @@ static void a_record_is_written_later(void **state)
 	end(SIGTERM, true);
 }
 
+static int count_batch(void *user, enum journal_kind kind, double elapsed, const unsigned char *body, size_t size, struct error *e)
+{
+	(void)elapsed;
+	(void)body;
+	(void)size;
+	(void)e;
+	*(unsigned *)user += kind == JOURNAL_BATCH;
+	return 0;
+}
+
+/* Results of the job wait for a slow flush when it ends; it is extended, and others come, while the flush goes on. */
+static void extended_during_a_flush(bool fails)
+{
+	enum { MORE = 6, AFTER = 4 };
+	unsigned first = plan.groups * plan.parts * (unsigned)(plan.rounds + 1), there = 0;
+	char path[150];
+	uint64_t cut;
+	struct journal *j;
+	struct error e;
+	journal_most = keep_most = 1 << 30;
+	disk->fail_flush = fails;
+	disk->hold_flush = true;
+	sent = acknowledged = open_count = 0;
+	start();
+	uint64_t job = submit();
+	work_until(first, 0);
+	await_state(job, "done");
+	assert_true(disk->held_flush && acknowledged == 0);
+	extend(job, 6400);
+	assert_true(scripted_want(worker, 3));
+	work_until(first + MORE, 0);
+	disk->end_flush = true;
+	work_until(first + MORE, first + MORE);
+	work_until(first + MORE + AFTER, first + MORE + AFTER);
+	await_state(job, "running");
+	end(SIGKILL, false);
+	snprintf(path, sizeof path, "%s/jobs/j%llu", spool, (unsigned long long)job);
+	assert_int_equal(journal_open(&j, path, job, 0, count_batch, &there, &cut, &e), 0);
+	journal_release(j);
+	assert_true(there >= acknowledged);
+}
+
+static void extended_during_a_slow_flush(void **state)
+{
+	(void)state;
+	extended_during_a_flush(false);
+}
+
+static void extended_during_a_flush_that_fails(void **state)
+{
+	(void)state;
+	extended_during_a_flush(true);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(cancelled_while_its_checkpoint_fails, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(counted_while_a_checkpoint_is_written, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_record_is_written_later, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(extended_during_a_slow_flush, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(extended_during_a_flush_that_fails, set_up, folder_tear_down),
 	};
 	disk = mmap(NULL, sizeof *disk, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 	return disk == MAP_FAILED ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
