@@ -78,7 +78,9 @@ SlurmdLogFile=$DIR/slurmd-%n.log
 JobAcctGatherType=jobacct_gather/none
 AccountingStorageType=accounting_storage/none
 JobCompType=jobcomp/none
-KillWait=5
+KillWait=60
+MessageTimeout=100
+BatchStartTimeout=100
 MinJobAge=300
 SlurmdTimeout=60
 NodeName=n1 NodeHostname=$host NodeAddr=127.0.0.1 Port=$((port + 1)) CPUs=1 RealMemory=64 State=UNKNOWN
