@@ -13,7 +13,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 4 };
+enum { FARM_VERSION = 5 };
 
 struct envelope_block;
 

@@ -20,6 +20,7 @@ static void answer_submit(struct session *p, uint64_t job, const char *refusal, 
 	char text[1024] = "", plan[PLAN_TEXT + 200] = "";
 	struct blob_hash *hashes = NULL;
 	ProtobufCBinaryData *list = NULL;
+	struct job_view v;
 	farm__submit_answer__init(&answer);
 	farm__envelope__init(&m);
 	text_copy(text, sizeof text, refusal);
@@ -39,6 +40,7 @@ static void answer_submit(struct session *p, uint64_t job, const char *refusal, 
 		answer.missing = list;
 	}
 	answer.job = job;
+	answer.submitted = job && server_view(p->server, job, &v) ? v.record.submitted : 0;
 	answer.refusal = text;
 	answer.plan = plan;
 	m.body_case = FARM__ENVELOPE__BODY_SUBMIT_ANSWER;

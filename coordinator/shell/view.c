@@ -76,6 +76,7 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 	out->rate = v->rate;
 	out->eta = v->eta;
 	out->rounds = r->rounds;
+	out->submitted = r->submitted;
 	out->error = r->rel_error;
 	out->why = text_borrow(why_of(v));
 	out->reason = text_borrow(r->reason);

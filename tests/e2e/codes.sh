@@ -60,7 +60,7 @@ wait $waiter || got=$?
 
 code 4 "$BIN/hslt-submit" "$BOX" -o "$DIR/bound.exr" --integrator path --spp 16 --target-error 0.01% --wait
 code 0 "$BIN/hslt-submit" "$BOX" -o "$DIR/reached.exr" --integrator path --spp 64 --target-error 500% --wait --json
-grep -q '"id":"j4"' "$DIR/out" || fail "--json: $(cat "$DIR/out")"
+grep -q '"id":"j4".*"state":"done"' "$DIR/out" || fail "--json: $(cat "$DIR/out")"
 [ -s "$DIR/reached.exr" ] || fail "no image"
 
 stop $COORDINATOR_PID

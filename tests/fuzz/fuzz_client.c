@@ -115,7 +115,7 @@ static void submit(struct client *cl)
 	struct render_arguments args = {0};
 	struct submit_request r = {.name = "n", .output = "", .args = &args};
 	char text[PLAN_TEXT];
-	uint64_t job;
+	struct submitted job;
 	struct error e;
 	blob_hash_bytes(farm_scene, strlen(farm_scene), &file.hash, &e);
 	submit_send(cl, &r, &b, &job, text, sizeof text, &e);
@@ -134,7 +134,7 @@ static void want(struct client *cl, enum want w)
 		submit(cl);
 		break;
 	case WAIT:
-		submit_wait(cl, 1, &end, &e);
+		submit_wait(cl, &(struct submitted){.job = 1}, &end, &e);
 		break;
 	case FETCH:
 		fd = open("/dev/null", O_WRONLY | O_CLOEXEC);

@@ -42,6 +42,7 @@ void load_submit(struct load *l, const char *host_port, const char *tls, unsigne
 	struct asset_source assets = asset_folder(folder);
 	struct asset a;
 	struct client *cl;
+	struct submitted job;
 	struct error e;
 	snprintf(name, sizeof name, "load %u", index);
 	args.plan = request_of(&l->s, index);
@@ -58,8 +59,9 @@ void load_submit(struct load *l, const char *host_port, const char *tls, unsigne
 		rc = client_open(&cl, host_port, tls, l->s.insecure, "load", &e);
 	if (rc)
 		load_die("%s", e.text);
-	rc = submit_send(cl, &request, &bundle, &j->id, text, sizeof text, &e);
+	rc = submit_send(cl, &request, &bundle, &job, text, sizeof text, &e);
 	client_close(cl);
+	j->id = job.job;
 	j->acknowledged = mem_alloc((size_t)j->plan.groups * j->plan.parts, sizeof *j->acknowledged);
 	if (rc || !j->acknowledged)
 		load_die("%s", rc ? e.text : "no memory for a job");

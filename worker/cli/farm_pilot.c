@@ -10,7 +10,7 @@
 static int run(struct farm_pilot *p, const char *what, const struct plan_request *plan, struct error *e)
 {
 	char name[160], text[PLAN_TEXT];
-	uint64_t job;
+	struct submitted job;
 	int rc = plan_make(plan, &p->plan, e);
 	struct render_arguments *args = rc ? NULL : mem_alloc(1, sizeof *args);
 	if (!rc && !args)
@@ -27,9 +27,9 @@ static int run(struct farm_pilot *p, const char *what, const struct plan_request
 	rc = submit_send(p->client, &request, p->bundle, &job, text, sizeof text, e);
 	mem_free(args);
 	if (!rc)
-		rc = submit_wait(p->client, job, &p->end, e);
+		rc = submit_wait(p->client, &job, &p->end, e);
 	if (!rc && p->end.exit_code == 3)
-		rc = error_set(e, ECANCELED, "the %s, job j%llu, ended without an image: %s", what, (unsigned long long)job, p->end.why);
+		rc = error_set(e, ECANCELED, "the %s, job j%llu, ended without an image: %s", what, (unsigned long long)job.job, p->end.why);
 	return rc;
 }
 

@@ -166,7 +166,7 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 
 static int run(struct arguments *a, struct client **cl, const struct scene_bundle *b, int *code, struct error *e)
 {
-	uint64_t job = 0;
+	struct submitted job;
 	struct submit_end end = {0};
 	char plan[PLAN_TEXT] = "";
 	struct outlast o = {a->coordinator, a->tls, a->insecure, a->patience};
@@ -175,16 +175,16 @@ static int run(struct arguments *a, struct client **cl, const struct scene_bundl
 		return rc;
 	fprintf(stderr, "%s\n", plan);
 	if (!a->wait || !a->json)
-		print_id(a, job, plan, "queued");
+		print_id(a, job.job, plan, "queued");
 	if (!a->wait)
 		return 0;
-	rc = outlast_job(cl, &o, job, a->output, &end, e);
+	rc = outlast_job(cl, &o, &job, a->output, &end, e);
 	if (!rc && !end.has_result)
-		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job, end.why);
+		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job.job, end.why);
 	if (!rc && *end.note)
 		fprintf(stderr, "hslt-submit: note: %s\n", end.note);
 	if (!rc && a->json)
-		print_id(a, job, plan, end.exit_code == 3 ? "failed" : "done");
+		print_id(a, job.job, plan, end.state);
 	*code = (int)end.exit_code;
 	return rc;
 }

@@ -23,11 +23,11 @@ static bool is_gone(int rc)
 	return rc == -ECONNRESET || rc == -ECONNREFUSED || rc == -ETIMEDOUT || rc == -EHOSTUNREACH;
 }
 
-static int try_once(struct client *cl, uint64_t job, const char *output, struct submit_end *end, struct error *e)
+static int try_once(struct client *cl, const struct submitted *job, const char *output, struct submit_end *end, struct error *e)
 {
 	int rc = submit_wait(cl, job, end, e);
 	if (!rc && end->has_result)
-		rc = client_fetch(cl, job, FARM__WHAT__WHAT_RESULT, output, e);
+		rc = client_fetch(cl, job->job, FARM__WHAT__WHAT_RESULT, output, e);
 	return rc;
 }
 
@@ -45,7 +45,8 @@ static int call_again(struct client **cl, const struct outlast *o, struct error 
 	return rc;
 }
 
-int outlast_job(struct client **cl, const struct outlast *o, uint64_t job, const char *output, struct submit_end *end, struct error *e)
+int outlast_job(struct client **cl, const struct outlast *o, const struct submitted *job, const char *output, struct submit_end *end,
+		struct error *e)
 {
 	int rc;
 	while (is_gone(rc = try_once(*cl, job, output, end, e))) {
@@ -57,7 +58,7 @@ int outlast_job(struct client **cl, const struct outlast *o, uint64_t job, const
 			return error_set(e, ECONNREFUSED,
 					 "no coordinator at %s for %g s. The job is in its spool and goes on when it is back: "
 					 "hslt-job fetch j%llu -o %s",
-					 o->coordinator, o->patience, (unsigned long long)job, output);
+					 o->coordinator, o->patience, (unsigned long long)job->job, output);
 		if (rc)
 			break;
 	}

@@ -14,7 +14,9 @@ struct outlast {
 };
 
 /* Waits for the job's end and fetches its result, if it has one, into `output`. *cl may be another one afterwards, or NULL.
- * -ECONNREFUSED when nobody was there for longer than `patience`; the sentence says how the image can be had later. */
-int outlast_job(struct client **cl, const struct outlast *o, uint64_t job, const char *output, struct submit_end *end, struct error *e);
+ * -ECONNREFUSED when nobody was there for longer than `patience`; the sentence says how the image can be had later. -ESTALE: another job has
+ * its number. */
+int outlast_job(struct client **cl, const struct outlast *o, const struct submitted *job, const char *output, struct submit_end *end,
+		struct error *e);
 
 #endif

@@ -259,7 +259,7 @@ static int send_missing(struct client *cl, const struct scene_bundle *b, const F
 	return rc;
 }
 
-int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *bundle, uint64_t *job,
+int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *bundle, struct submitted *job,
 		char *plan_text, size_t plan_size, struct error *e)
 {
 	struct scene_bundle b = *bundle; /* messages borrow texts that are not const */
@@ -278,7 +278,7 @@ int submit_send(struct client *cl, const struct submit_request *r, const struct 
 	const Farm__SubmitAnswer *a = answer.envelope.message->submit_answer;
 	if (a->job == 0)
 		rc = error_set(e, EACCES, "the coordinator refuses the job: %s", a->refusal);
-	*job = a->job;
+	*job = (struct submitted){a->job, a->submitted};
 	text_copy(plan_text, plan_size, a->plan);
 	client_message_fini(&answer);
 	return rc;
@@ -330,14 +330,32 @@ static void take_looks(const Farm__JobStatus *s, struct submit_end *end)
 	}
 }
 
-int submit_wait(struct client *cl, uint64_t job, struct submit_end *end, struct error *e)
+/* ended: it has. */
+static int take_status(struct progress *p, const Farm__JobStatus *s, const struct submitted *job, struct submit_end *end, bool *ended,
+		       struct error *e)
+{
+	if (s->submitted != job->at)
+		return error_set(e, ESTALE, "j%llu is another job now, '%s': the coordinator goes on with another spool",
+				 (unsigned long long)job->job, s->name);
+	show(p, s);
+	*ended = s->ended;
+	take_looks(s, end);
+	end->exit_code = s->exit_code;
+	end->has_result = s->fetchable;
+	text_copy(end->state, sizeof end->state, s->state);
+	text_copy(end->why, sizeof end->why, s->why);
+	text_copy(end->note, sizeof end->note, s->note);
+	return 0;
+}
+
+int submit_wait(struct client *cl, const struct submitted *job, struct submit_end *end, struct error *e)
 {
 	struct progress p;
 	Farm__Watch watch;
 	Farm__Envelope m;
 	farm__watch__init(&watch);
 	farm__envelope__init(&m);
-	watch.job = job;
+	watch.job = job->job;
 	m.body_case = FARM__ENVELOPE__BODY_WATCH;
 	m.watch = &watch;
 	int rc = client_send(cl, &m, NULL, 0, e);
@@ -349,16 +367,8 @@ int submit_wait(struct client *cl, uint64_t job, struct submit_end *end, struct 
 		if (rc)
 			break;
 		const Farm__Envelope *got = message.envelope.message;
-		if (got->body_case == FARM__ENVELOPE__BODY_JOB_STATUS) {
-			const Farm__JobStatus *s = got->job_status;
-			show(&p, s);
-			ended = s->ended;
-			take_looks(s, end);
-			end->exit_code = s->exit_code;
-			end->has_result = s->fetchable;
-			text_copy(end->why, sizeof end->why, s->why);
-			text_copy(end->note, sizeof end->note, s->note);
-		}
+		if (got->body_case == FARM__ENVELOPE__BODY_JOB_STATUS)
+			rc = take_status(&p, got->job_status, job, end, &ended, e);
 		client_message_fini(&message);
 	}
 	progress_end(&p);

@@ -40,19 +40,26 @@ struct submit_request {
 	const struct render_arguments *args;
 };
 
+/* A job of a coordinator. Another spool counts from 1 again: the number alone could be another job's. */
+struct submitted {
+	uint64_t job;
+	double at; /* s since 1970, as the coordinator has it */
+};
+
 /* -EACCES: the coordinator refuses; the sentence is its own. plan_text: what was chosen and by which rule. */
-int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *b, uint64_t *job,
+int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *b, struct submitted *job,
 		char *plan_text, size_t plan_size, struct error *e);
 
 struct submit_end {
 	uint32_t exit_code; /* of a program that waited */
 	bool has_result;
+	char state[16]; /* done, failed, cancelled */
 	struct forecast_history looks; /* at the error; seconds from the first round on */
 	double cpu_seconds, bootstrap_cpu_seconds, bootstrap_seconds;
 	char why[256], note[1024]; /* why there is no result; what whoever looks at it should know */
 };
 
-/* Shows progress on stderr until the job has ended. */
-int submit_wait(struct client *cl, uint64_t job, struct submit_end *end, struct error *e);
+/* Shows progress on stderr until the job has ended. -ESTALE: another job has its number. */
+int submit_wait(struct client *cl, const struct submitted *job, struct submit_end *end, struct error *e);
 
 #endif
