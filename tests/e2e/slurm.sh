@@ -222,9 +222,14 @@ done
 
 # ---- a whole farm in a job ----
 
+# farm_port JOB.RESTART: of its coordinator, in a folder that no other life's is
+farm_port() {
+	cat "$DIR/hslt-farm-$1".*/port 2>/dev/null
+}
+
 running() {
-	[ -s "$DIR/hslt-farm-$1/port" ] &&
-		"$BIN/hslt-job" --coordinator "127.0.0.1:$(cat "$DIR/hslt-farm-$1/port")" list 2>/dev/null | grep -q running
+	farm_port "$1" >/dev/null &&
+		"$BIN/hslt-job" --coordinator "127.0.0.1:$(farm_port "$1")" list 2>/dev/null | grep -q running
 }
 
 # The batch job's state, and what it said.
@@ -255,7 +260,7 @@ same "$DIR/short.exr" "$DIR/farm.exr"
 
 batch --nodes=2 "$DEPLOY/slurm/farm.sbatch" "$BOX" -o "$DIR/cut.exr" $LONG
 until_true 20 running "$JOB.0" || fail "the farm does not run: $(squeue; told)"
-until_true 20 sh -c "'$BIN/hslt-job' --coordinator 127.0.0.1:$(cat "$DIR/hslt-farm-$JOB.0/port") fetch j1 --preview -o '$DIR/look.exr' 2>'$DIR/look.err'" ||
+until_true 20 sh -c "'$BIN/hslt-job' --coordinator 127.0.0.1:$(farm_port "$JOB.0") fetch j1 --preview -o '$DIR/look.exr' 2>'$DIR/look.err'" ||
 	fail "no preview"
 scancel --signal=TERM "$JOB"
 until_true 30 is_job "$JOB" FAILED || fail "the farm that was cut short is $(told)"
