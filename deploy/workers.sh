@@ -5,11 +5,12 @@ set -eu
 usage() {
 	cat <<'TEXT'
 Usage: deploy/workers.sh [OPTION...] HOST...
-Starts hslt-worker on each HOST over ssh (user@host works), in the background, with its log on that host.
+Starts hslt-worker on each HOST over ssh (user@host works), in the background, with its log on that host: one at a time, whose
+number is in ~/.hslt-worker.HOSTNAME.pid there.
 
   -c, --coordinator HOST:PORT  the coordinator, as the hosts reach it (or $HSLT_COORDINATOR)
   -t, --threads N              render threads (all cores of the host)
-  -p, --path PROGRAM           hslt-worker on the hosts (hslt-worker)
+  -p, --path PROGRAM           hslt-worker on the hosts (hslt-worker); one of another name must be said to --stop, too
   -l, --log FILE               log on the hosts (~/hslt-worker.log)
   -k, --tls DIR                the certificate's folder on the hosts (hslt-ca worker NAME makes one; deploy/README.md)
   -i, --insecure               without TLS, though the coordinator is not on the same host
@@ -65,8 +66,11 @@ case $threads in
 *[!0-9]*) die "--threads takes a number" ;;
 esac
 
+# Homes may be shared by hosts, and numbers of processes come again: whose is it?
+remote="f=~/.hslt-worker.\$(hostname).pid; lives() { p=\$(cat \"\$f\" 2>/dev/null) && readlink \"/proc/\$p/exe\" >/dev/null 2>&1 &&"
+remote="$remote case \$(cat \"/proc/\$p/comm\") in hslt-worker | $(quote "$(basename "$program" | cut -c 1-15)")) ;; *) false ;; esac; };"
 if [ -n "$stop" ]; then
-	remote='for f in ~/.hslt-worker.pid; do [ -s "$f" ] && kill "$(cat "$f")" && rm -f "$f" && echo stopped; done'
+	remote="$remote if lives; then kill \"\$p\" && rm -f \"\$f\" && echo stopped; else rm -f \"\$f\"; echo 'no worker of this script is here' >&2; exit 1; fi"
 else
 	command="$(quote "$program") --coordinator $(quote "$coordinator")"
 	[ -z "$threads" ] || command="$command --threads $threads"
@@ -74,8 +78,9 @@ else
 	[ -z "$insecure" ] || command="$command --insecure"
 	target='~/hslt-worker.log'
 	[ -z "$log" ] || target=$(quote "$log")
-	remote="nohup $command --name \"\$(hostname)\" >>$target 2>&1 </dev/null & echo \$! >~/.hslt-worker.pid;"
-	remote="$remote sleep 1; kill -0 \"\$(cat ~/.hslt-worker.pid)\" && echo started || { tail -n 3 $target; exit 1; }"
+	remote="$remote if lives; then echo \"a worker of this script is here (process \$p): --stop first\" >&2; exit 1; fi;"
+	remote="$remote nohup $command --name \"\$(hostname)\" >>$target 2>&1 </dev/null & echo \$! >\"\$f\";"
+	remote="$remote sleep 1; kill -0 \"\$(cat \"\$f\")\" && echo started || { tail -n 3 $target; exit 1; }"
 fi
 
 failed=0
