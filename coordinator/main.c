@@ -1,5 +1,6 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
+#include "common/base/output.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
 #include "coordinator/shell/limits.h"
@@ -175,6 +176,7 @@ int main(int argc, char **argv)
 	c.blob_bytes = 100000000000u;
 	c.status_socket = getenv("HSLT_STATUS_SOCKET");
 	c.tls = getenv("HSLT_TLS");
+	output_check_at_exit();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &c);
 	log_event(LOG_START, "program=hslt-coordinator version=%s", HSLT_VERSION);

@@ -1,4 +1,5 @@
 #include "common/base/mem.h"
+#include "common/base/output.h"
 #include "common/base/version.h"
 #include "common/net/authority.h"
 
@@ -171,6 +172,7 @@ int main(int argc, char **argv)
 	struct arguments a = {.ca = getenv("HSLT_CA")};
 	struct error e = {""};
 	char home[4000];
+	output_check_at_exit();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "init|coordinator|worker|client|operator|revoke|list [NAME]", doc, NULL, NULL, NULL},
 		   argc, argv, 0, NULL, &a);

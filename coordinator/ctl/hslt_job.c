@@ -1,5 +1,7 @@
 #include "coordinator/ctl/job_verbs.h"
 
+#include "common/base/output.h"
+
 #include <stdio.h>
 
 int main(int argc, char **argv)
@@ -7,6 +9,7 @@ int main(int argc, char **argv)
 	struct job_options o;
 	struct client *cl;
 	struct error e;
+	output_check_at_exit();
 	job_options_parse(&o, argc, argv);
 	int rc = client_open(&cl, o.coordinator, o.tls, o.insecure, "hslt-job", &e);
 	if (!rc) {

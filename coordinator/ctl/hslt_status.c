@@ -1,6 +1,7 @@
 #include "common/base/progress.h"
 #include "common/base/version.h"
 #include "common/base/error.h"
+#include "common/base/output.h"
 #include "common/film/agreement_json.h"
 #include "common/film/strategy.h"
 #include "common/film/strategy_json.h"
@@ -351,8 +352,7 @@ static bool show(const struct arguments *a, const json_t *snapshot, bool first, 
 			putchar('\n');
 		print_snapshot(snapshot, a->job);
 	}
-	fflush(stdout);
-	return a->watch && !(job && is_ended(job));
+	return !fflush(stdout) && !ferror(stdout) && a->watch && !(job && is_ended(job));
 }
 
 static int follow(const struct arguments *a, FILE *f)
@@ -384,6 +384,7 @@ int main(int argc, char **argv)
 {
 	struct arguments a = {.socket = getenv("HSLT_STATUS_SOCKET")};
 	struct error e;
+	output_check_at_exit();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "[JOB]", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &a);
 	FILE *f = reach(a.socket, &e);

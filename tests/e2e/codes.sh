@@ -8,6 +8,17 @@ for p in coordinator worker submit status job ca; do
 	grep -qi example "$DIR/out" || fail "hslt-$p --help has no examples"
 	code 2 "$BIN/hslt-$p" --no-such-option
 done
+# untold WANTED COMMAND...: its exit code when stdout is on a full disk
+untold() {
+	wanted=$1
+	shift
+	got=0
+	"$@" >/dev/full 2>"$DIR/err.log" || got=$?
+	[ $got -eq "$wanted" ] || fail "$* on a full disk ended with $got, not $wanted: $(cat "$DIR/err.log")"
+}
+for p in "$BIN"/hslt-*; do
+	untold 1 "$p" --version
+done
 code 2 "$BIN/hslt-coordinator" --listen 0.0.0.0:0 --spool "$DIR/open"
 grep -q -- --insecure "$DIR/err.log" || fail "it does not say how"
 code 2 "$BIN/hslt-worker" --coordinator 192.0.2.1:7700 --cache "$DIR/cache"
@@ -70,6 +81,12 @@ start_coordinator
 code 0 "$BIN/hslt-job" fetch j4 -o "$DIR/again.exr"
 cmp "$DIR/reached.exr" "$DIR/again.exr" || fail "another result after a restart"
 code 0 "$BIN/hslt-job" log j4
+untold 1 "$BIN/hslt-job" log j4
+untold 1 "$BIN/hslt-job" list
+untold 1 "$BIN/hslt-job" list --json
+untold 1 "$BIN/hslt-status"
+untold 1 "$BIN/hslt-status" --json
+untold 1 "$BIN/hslt-status" --watch
 grep -q event=job_done "$DIR/out" || fail "the log has no end"
 id=$(submit "$BOX" -o "$DIR/next.exr" --integrator path --spp 4 -D light=3)
 [ "$id" = j5 ] || fail "the next job is $id"
@@ -80,8 +97,11 @@ until_true 10 is_state "$id" running || fail "$id does not run"
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 start_coordinator
-is_state "$id" running || fail "$id is $(value "$id" state)"
+until_true 20 is_state "$id" running || fail "$id is $(value "$id" state)"
 code 0 "$BIN/hslt-job" cancel "$id"
 submit "$BOX" -o "$DIR/after.exr" --integrator path --spp 4 --wait >"$DIR/id" || fail "the worker did not come back"
 [ "$(cat "$DIR/id")" = j7 ] || fail "the job after the crash is $(cat "$DIR/id")"
+untold 1 "$BIN/hslt-submit" "$BOX" -o "$DIR/untold.exr" --integrator path --spp 4
+grep -q "the job's id is j8" "$DIR/err.log" || fail "it does not say which job it is: $(cat "$DIR/err.log")"
+until_true 20 is_state j8 done || fail "j8 is $(value j8 state)"
 echo "exit codes and restart"

@@ -1,4 +1,5 @@
 #include "common/base/mem.h"
+#include "common/base/output.h"
 #include "common/base/version.h"
 #include "common/film/image_file.h"
 #include "worker/cli/assemble.h"
@@ -61,6 +62,7 @@ int main(int argc, char **argv)
 	unsigned char *bytes = NULL;
 	size_t size;
 	bool disagree = false;
+	output_check_at_exit();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "CROP.exr...", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &a);
 	int rc = assemble(a.crops, a.count, &bytes, &size, &disagree, &e);

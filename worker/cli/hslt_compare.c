@@ -1,4 +1,5 @@
 #include "common/base/mem.h"
+#include "common/base/output.h"
 #include "common/base/version.h"
 #include "worker/cli/compare.h"
 
@@ -201,6 +202,7 @@ int main(int argc, char **argv)
 	struct picture p[2] = {0};
 	struct error e;
 	int code = 0;
+	output_check_at_exit();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "A.exr B.exr", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &a);
 	int rc = picture_read(&p[0], a.path[0], &e);

@@ -1,4 +1,5 @@
 #include "common/base/mem.h"
+#include "common/base/output.h"
 #include "common/base/progress.h"
 #include "common/base/version.h"
 #include "common/film/image_file.h"
@@ -365,6 +366,7 @@ int main(int argc, char **argv)
 	struct error e = {""};
 	mem_keep(1 << 20);
 	a.threads = option_threads_default();
+	output_check_at_exit();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
 	interrupt_watch();

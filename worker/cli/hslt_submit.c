@@ -1,3 +1,4 @@
+#include "common/base/output.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
 #include "common/film/image_file.h"
@@ -161,7 +162,8 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	} else {
 		puts(id);
 	}
-	fflush(stdout);
+	if (fflush(stdout) || ferror(stdout)) /* it is a job all the same */
+		fprintf(stderr, "hslt-submit: the job's id is %s\n", id);
 }
 
 static int run(struct arguments *a, struct client **cl, const struct scene_bundle *b, int *code, struct error *e)
@@ -236,6 +238,7 @@ int main(int argc, char **argv)
 	a.tls = getenv("HSLT_TLS");
 	a.request.args = &a.render;
 	a.patience = 600;
+	output_check_at_exit();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
 	int rc = a.wait ? image_file_probe(a.output, &e) : a.plot ? image_file_probe(a.plot, &e) : 0;

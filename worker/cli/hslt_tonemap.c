@@ -1,4 +1,5 @@
 #include "common/base/mem.h"
+#include "common/base/output.h"
 #include "common/base/version.h"
 #include "worker/cli/picture.h"
 #include "worker/cli/tonemap.h"
@@ -81,6 +82,7 @@ int main(int argc, char **argv)
 {
 	struct arguments a = {0};
 	struct error e;
+	output_check_at_exit();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "IN.exr OUT.png", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &a);
 	if (run(&a, &e) == 0)

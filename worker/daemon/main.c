@@ -1,5 +1,6 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
+#include "common/base/output.h"
 #include "common/base/version.h"
 #include "worker/daemon/agent.h"
 
@@ -131,6 +132,7 @@ int main(int argc, char **argv)
 				 .threads = cores > 0 && cores <= 1024 ? (unsigned)cores : 1,
 				 .grace_seconds = 20,
 				 .stall_seconds = 120};
+	output_check_at_exit();
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &c);
 	if (geteuid() == 0)

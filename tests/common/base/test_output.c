@@ -1,0 +1,54 @@
+/* A program whose stdout is a full disk does not end as if all were well. */
+#include "common/base/output.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+/* Its exit code. */
+static int ends(const char *path, size_t lines, bool flush, int code)
+{
+	int status = -1;
+	fflush(NULL);
+	pid_t pid = fork();
+	if (pid == 0) {
+		if (!freopen(path, "w", stdout) || !freopen("/dev/null", "w", stderr))
+			_exit(99);
+		output_check_at_exit();
+		for (size_t i = 0; i < lines; i++)
+			puts("j1");
+		if (flush)
+			fflush(stdout);
+		exit(code);
+	}
+	assert_int_equal(waitpid(pid, &status, 0), pid);
+	assert_true(WIFEXITED(status));
+	return WEXITSTATUS(status);
+}
+
+static void a_full_disk_is_noticed(void **state)
+{
+	(void)state;
+	for (int flush = 0; flush < 2; flush++) {
+		assert_int_equal(ends("/dev/full", 1, flush, 0), 1);
+		assert_int_equal(ends("/dev/full", 100000, flush, 0), 1); /* more than waits in memory */
+		assert_int_equal(ends("/dev/full", 1, flush, 75), 75);
+		assert_int_equal(ends("/dev/full", 0, flush, 0), 0);
+		assert_int_equal(ends("/dev/null", 100000, flush, 0), 0);
+		assert_int_equal(ends("/dev/null", 1, flush, 6), 6);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(a_full_disk_is_noticed)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
