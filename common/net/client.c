@@ -214,7 +214,7 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 		rc = tls_open(&cl->tls, tls, e);
 	if (rc) {
 		mem_free(cl);
-		return rc;
+		return rc == -EPERM ? rc : client_local(rc);
 	}
 	if (cl->tls)
 		tls_warning(cl->tls, time(NULL), cl->warning, sizeof cl->warning);
@@ -282,6 +282,11 @@ int client_exit_code(int rc)
 	return rc == -EACCES || rc == -EPROTO ? 6 : 1;
 }
 
+int client_local(int rc)
+{
+	return rc ? -EIO : 0;
+}
+
 /* ---- fetching ---- */
 
 static int fetch_chunk(struct client *cl, uint64_t job, Farm__What what, uint64_t offset, struct client_message *answer,
@@ -315,7 +320,7 @@ static int write_all(int fd, const unsigned char *bytes, size_t size, struct err
 	while (size) {
 		ssize_t n = write(fd, bytes, size);
 		if (n < 0 && errno != EINTR)
-			return error_set(e, errno, "cannot write: %s", strerror(errno));
+			return error_set(e, EIO, "cannot write: %s", strerror(errno));
 		if (n > 0) {
 			bytes += n;
 			size -= (size_t)n;
@@ -359,7 +364,7 @@ int client_fetch_stream(struct client *cl, uint64_t job, Farm__What what, int fd
 static int give_name(const char *temporary, const char *path, bool replace, struct error *e)
 {
 	if ((replace ? rename(temporary, path) : link(temporary, path)) != 0)
-		return error_set(e, errno, "%s: %s", path, strerror(errno));
+		return error_set(e, errno == EEXIST ? EEXIST : EIO, "%s: %s", path, strerror(errno));
 	if (!replace)
 		unlink(temporary);
 	return 0;
@@ -374,14 +379,14 @@ static int fetch_file(struct client *cl, struct client_message *first, uint64_t 
 		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
 	int fd = mkstemp(temporary);
 	if (fd < 0)
-		return error_set(e, errno, "%s: cannot make a file there: %s", path, strerror(errno));
+		return error_set(e, EIO, "%s: cannot make a file there: %s", path, strerror(errno));
 	mode_t mask = umask(0);
 	umask(mask);
 	int rc = fetch_rest(cl, first, job, what, fd, e);
 	if (!rc && (fchmod(fd, 0666 & ~mask) || fsync(fd)))
-		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+		rc = error_set(e, EIO, "%s: %s", path, strerror(errno));
 	if (close(fd) && !rc)
-		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+		rc = error_set(e, EIO, "%s: %s", path, strerror(errno));
 	if (!rc)
 		rc = give_name(temporary, path, replace, e);
 	if (rc)

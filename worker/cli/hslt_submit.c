@@ -208,7 +208,7 @@ static int estimate(const struct arguments *a, struct client *cl, const struct s
 			     .bootstrap_cpu = p.end.bootstrap_cpu_seconds,
 			     .bootstrap_seconds = p.end.bootstrap_seconds,
 			     .target = a->render.plan.target_error};
-	return estimate_report(&m, a->json, a->plot, e);
+	return client_local(estimate_report(&m, a->json, a->plot, e));
 }
 
 /* How long leases take is asked only where it matters; who gives --epoch knows it. */

@@ -234,7 +234,7 @@ static int send_file(struct client *cl, const struct scene_bundle *b, const stru
 	struct blob_hash hash;
 	int rc = folder.open(folder.user, f->name, &a, e);
 	if (rc)
-		return rc;
+		return client_local(rc);
 	rc = blob_hash_bytes(a.bytes, a.size, &hash, e);
 	if (!rc && !blob_hash_equal(&hash, &f->hash))
 		rc = error_set(e, EIO, "%s: it has changed meanwhile", f->name);

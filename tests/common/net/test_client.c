@@ -31,6 +31,7 @@ struct coordinator {
 	int listener;
 	char address[32];
 	const char *name;      /* answers one Fetch, and calls the result so */
+	uint64_t sizes[2];     /* or two, and says that the file is so long */
 	size_t flood, payload; /* or says so many unasked things of so many bytes before it reads on */
 };
 
@@ -64,7 +65,7 @@ static void say_hello(int fd)
 	say(fd, &m, NULL, 0);
 }
 
-static void say_chunk(int fd, const char *name)
+static void say_chunk(int fd, const char *name, uint64_t offset, uint64_t file_size)
 {
 	Farm__FetchChunk chunk;
 	Farm__Envelope m;
@@ -72,7 +73,8 @@ static void say_chunk(int fd, const char *name)
 	farm__fetch_chunk__init(&chunk);
 	farm__envelope__init(&m);
 	snprintf(output, sizeof output, "%s", name);
-	chunk.size = sizeof image;
+	chunk.offset = offset;
+	chunk.size = file_size;
 	chunk.output = output;
 	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
 	m.fetch_chunk = &chunk;
@@ -96,7 +98,9 @@ static void *coordinate(void *user)
 	for (size_t i = 0; i < c->flood; i++)
 		say(fd, &m, rubbish, c->payload);
 	if (c->name && recv(fd, bytes, sizeof bytes, 0) > 0)
-		say_chunk(fd, c->name);
+		say_chunk(fd, c->name, 0, sizeof image);
+	for (int i = 0; i < 2 && c->sizes[0] && recv(fd, bytes, sizeof bytes, 0) > 0; i++)
+		say_chunk(fd, "", (uint64_t)i * sizeof image, c->sizes[i]);
 	while (recv(fd, bytes, sizeof bytes, 0) > 0)
 		continue;
 	close(fd);
@@ -216,6 +220,38 @@ static void who_names_a_file_gets_it(void **state)
 	assert_true(holds("old.exr", image, sizeof image));
 }
 
+static void a_file_of_another_size_is_another_file(void **state)
+{
+	(void)state;
+	static const uint64_t sizes[] = {3 * sizeof image, 2 * sizeof image - 1, 2 * sizeof image};
+	for (size_t i = 0; i < 3; i++) {
+		struct coordinator c = {.sizes = {2 * sizeof image, sizes[i]}};
+		struct client *cl = meet(&c);
+		struct error e;
+		int rc = client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, "two.exr", &e);
+		part(&c, cl);
+		assert_int_equal(rc == 0, i == 2);
+		assert_int_equal(access("two.exr", F_OK) == 0, i == 2);
+	}
+}
+
+/* Neither the coordinator's refusal nor its absence, whatever the system calls it. */
+static void own_files_are_own_faults(void **state)
+{
+	(void)state;
+	struct coordinator c = {.name = "room.exr"};
+	struct client *cl = meet(&c);
+	struct error e;
+	assert_int_equal(mkdir("closed", 0500), 0);
+	bool root = geteuid() == 0;
+	assert_true(!root || seteuid(65534) == 0);
+	int rc = client_fetch(cl, 1, FARM__WHAT__WHAT_RESULT, "closed/room.exr", &e);
+	assert_true(!root || seteuid(0) == 0);
+	part(&c, cl);
+	assert_non_null(strstr(e.text, "closed/room.exr: cannot make a file there: Permission denied"));
+	assert_int_equal(client_exit_code(rc), 1);
+}
+
 /* ---- more than was asked for ---- */
 
 /* Takes what has come in until there is no more: how much that was. */
@@ -282,6 +318,8 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(names_lead_nowhere),
 		cmocka_unit_test(who_names_a_file_gets_it),
+		cmocka_unit_test(a_file_of_another_size_is_another_file),
+		cmocka_unit_test(own_files_are_own_faults),
 		cmocka_unit_test(floods_are_dammed),
 	};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
