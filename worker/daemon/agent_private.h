@@ -4,6 +4,7 @@
 
 #include "common/net/conn.h"
 #include "worker/daemon/agent.h"
+#include "worker/daemon/fetch.h"
 #include "worker/daemon/fingerprint.h"
 #include "worker/daemon/lease_task.h"
 
@@ -23,6 +24,7 @@ struct agent {
 	struct cache cache;
 	struct crew *crew;
 	struct bundle *bundles;
+	struct fetch *fetches;
 	struct lease_task *leases;
 	uint64_t clock; /* of uses of bundles */
 	uint64_t rendered; /* leases begun */

@@ -40,8 +40,6 @@ int bundle_new(struct bundle **out, uint64_t job, struct blob_store *blobs, stru
 void bundle_free(struct bundle *b)
 {
 	assert(b->state != BUNDLE_BUILDING);
-	if (b->writer)
-		blob_write_abort(b->writer);
 	for (size_t i = 0; b->info.message && b->held && i < info_of(b)->n_files; i++) {
 		struct blob_hash h = hash_of(info_of(b)->files[i]);
 		if (b->held[i])
@@ -116,11 +114,8 @@ bool bundle_is_of(const struct bundle *b, const Farm__JobInfo *info)
 	return same;
 }
 
-bool bundle_next_missing(struct bundle *b, uint64_t *offset)
+bool bundle_next_missing(struct bundle *b)
 {
-	*offset = b->writer ? blob_write_at(b->writer) : 0;
-	if (b->writer)
-		return true;
 	for (size_t i = 0; i < info_of(b)->n_files; i++) {
 		b->wanted = hash_of(info_of(b)->files[i]);
 		if (!b->held[i])
@@ -129,32 +124,6 @@ bool bundle_next_missing(struct bundle *b, uint64_t *offset)
 			return true;
 	}
 	return false;
-}
-
-int bundle_add(struct bundle *b, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e)
-{
-	int rc = 0;
-	if (*c->error)
-		return error_set(e, EIO, "the coordinator has a file of the scene no more: %s", c->error);
-	if (!b->writer)
-		rc = blob_write_begin(&b->writer, b->blobs, &b->wanted, c->size, e);
-	if (!rc && c->offset != blob_write_at(b->writer))
-		rc = error_set(e, EBADMSG, "a blob came out of order");
-	if (!rc && size == 0 && c->offset < c->size)
-		rc = error_set(e, EBADMSG, "a blob ended too early");
-	if (!rc)
-		rc = blob_write_add(b->writer, payload, size, e);
-	if (rc || blob_write_at(b->writer) < c->size)
-		return rc;
-	struct blob_hash got = b->wanted;
-	rc = blob_write_commit(b->writer, e);
-	b->writer = NULL;
-	if (!rc) {
-		uint64_t offset;
-		bundle_next_missing(b, &offset); /* holds it for its file */
-		blob_release(b->blobs, &got);
-	}
-	return rc;
 }
 
 /* ---- assets: the builder's thread ---- */

@@ -28,8 +28,7 @@ struct bundle {
 	struct blob_store *blobs;
 	bool *held;   /* by file: in the cache, held */
 	char **paths; /* by file, for the builder's thread */
-	struct blob_writer *writer;
-	struct blob_hash wanted; /* the blob that is being fetched */
+	struct blob_hash wanted; /* while FETCHING: the blob that it waits for */
 	struct world *world;
 	unsigned users;     /* leases that need it */
 	uint64_t last_used; /* counter */
@@ -48,10 +47,8 @@ void bundle_free(struct bundle *b);
 int bundle_set_info(struct bundle *b, struct envelope *info, struct error *e);
 /* Whether it is the same job: number and all, but for the bounds, which may have been moved. Where it cannot be known: not. */
 bool bundle_is_of(const struct bundle *b, const Farm__JobInfo *info);
-/* The next hash to fetch, into b->wanted, and from which byte on. false: all files are there. */
-bool bundle_next_missing(struct bundle *b, uint64_t *offset);
-/* A chunk of b->wanted. */
-int bundle_add(struct bundle *b, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e);
+/* Holds what is there; the next hash to fetch into b->wanted. false: all files are there. */
+bool bundle_next_missing(struct bundle *b);
 /* All files are there: builds the world on the crew. */
 int bundle_build(struct bundle *b, struct crew *c, struct error *e);
 

@@ -110,6 +110,24 @@ static void drop_bundle(struct agent *a, struct bundle *b)
 	bundle_free(b);
 }
 
+static struct bundle *who_wants(const struct agent *a, const struct blob_hash *h)
+{
+	for (struct bundle *b = a->bundles; b; b = b->next)
+		if (b->state == BUNDLE_FETCHING && blob_hash_equal(&b->wanted, h))
+			return b;
+	return NULL;
+}
+
+/* What is asked for stays until it is answered, so that an answer is never taken for another one's. */
+static void tidy_fetches(struct agent *a)
+{
+	for (struct fetch *f = a->fetches, *next; f; f = next) {
+		next = f->next;
+		if (!f->asked && !who_wants(a, &f->hash))
+			fetch_drop(a, f);
+	}
+}
+
 /* Idle bundles go when their job has ended, and the least recently used ones beyond WORLDS_KEPT. */
 static void tidy(struct agent *a)
 {
@@ -130,8 +148,9 @@ static void tidy(struct agent *a)
 		else if (idle > WORLDS_KEPT)
 			drop_bundle(a, oldest);
 		else
-			return;
+			break;
 	}
+	tidy_fetches(a);
 }
 
 static void drop_lease(struct agent *a, struct lease_task *l)
@@ -156,11 +175,11 @@ static void fail_leases_of(struct agent *a, struct bundle *b, const struct error
 	}
 }
 
+/* It goes with the next tidy(). */
 static void fail_bundle(struct agent *a, struct bundle *b, const struct error *e)
 {
 	b->state = BUNDLE_FAILED;
 	fail_leases_of(a, b, e);
-	tidy(a);
 }
 
 static void on_rendered(struct lease_task *l);
@@ -179,40 +198,32 @@ static void on_built(struct bundle *b)
 	struct agent *a = b->owner;
 	if (b->state == BUNDLE_FAILED) {
 		fail_bundle(a, b, &b->error);
-		agent_settle(a);
-		return;
+	} else {
+		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", number(b->job), b->build_seconds,
+			  world_embree_bytes(b->world));
+		for (struct lease_task *l = a->leases; l; l = l->next)
+			if (l->bundle == b && l->state == LEASE_WAITING)
+				start_lease(a, l);
 	}
-	log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", number(b->job), b->build_seconds,
-		  world_embree_bytes(b->world));
-	for (struct lease_task *l = a->leases; l; l = l->next)
-		if (l->bundle == b && l->state == LEASE_WAITING)
-			start_lease(a, l);
 	tidy(a);
 	agent_settle(a);
 }
 
-/* Asks for the next missing piece, or builds. */
+/* Asks for the next missing piece, unless another job has, or builds. */
 static void go_on(struct agent *a, struct bundle *b)
 {
 	struct error e;
-	uint64_t offset;
+	int rc;
 	if (b->state != BUNDLE_FETCHING)
 		return;
-	if (bundle_next_missing(b, &offset)) {
-		Farm__BlobGet get;
-		Farm__Envelope m;
-		farm__blob_get__init(&get);
-		farm__envelope__init(&m);
-		get.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, b->wanted.bytes};
-		get.offset = offset;
-		m.body_case = FARM__ENVELOPE__BODY_BLOB_GET;
-		m.blob_get = &get;
-		agent_send(a, &m);
-		return;
+	if (bundle_next_missing(b)) {
+		rc = fetch_want(a, &b->wanted, &e);
+	} else {
+		b->owner = a;
+		b->built = on_built;
+		rc = bundle_build(b, a->crew, &e);
 	}
-	b->owner = a;
-	b->built = on_built;
-	if (bundle_build(b, a->crew, &e))
+	if (rc)
 		fail_bundle(a, b, &e);
 }
 
@@ -399,29 +410,38 @@ static void take_job_info(struct agent *a, struct envelope *env)
 		disown(a, b);
 		return;
 	}
-	if (b->state == BUNDLE_ASKED && bundle_set_info(b, env, &e)) {
+	if (b->state == BUNDLE_ASKED && bundle_set_info(b, env, &e))
 		fail_bundle(a, b, &e);
-		return;
-	}
 	go_on(a, b);
 	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: results from before are welcome */
 		if (l->bundle == b && l->state == LEASE_RENDERED)
 			send_result(a, l);
+	tidy(a);
 }
 
+/* Where it cannot be fetched for one job the others that want it try for themselves: what the first one held makes room. */
 static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
 {
 	struct error e;
-	for (struct bundle *b = a->bundles; b; b = b->next) {
-		if (b->state != BUNDLE_FETCHING || c->hash.len != BLOB_HASH_SIZE ||
-		    memcmp(c->hash.data, b->wanted.bytes, BLOB_HASH_SIZE) != 0)
-			continue;
-		if (bundle_add(b, c, payload, size, &e))
-			fail_bundle(a, b, &e);
-		else
-			go_on(a, b);
+	struct fetch *f = fetch_answered(a, c);
+	if (!f) {
+		conn_close(a->conn, "the coordinator sends a piece of a file that it was not asked for");
 		return;
 	}
+	const struct blob_hash hash = f->hash;
+	struct bundle *first = who_wants(a, &hash);
+	enum fetch_end end = first ? fetch_add(f, a->cache.blobs, c, payload, size, &e) : FETCH_MORE;
+	if (end != FETCH_MORE)
+		fetch_drop(a, f);
+	if (end == FETCH_FAILED) {
+		fail_bundle(a, first, &e);
+		tidy(a);
+	}
+	for (struct bundle *b = a->bundles; b; b = b->next)
+		go_on(a, b);
+	if (end == FETCH_WHOLE)
+		blob_release(a->cache.blobs, &hash);
+	tidy(a);
 }
 
 void desk_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size)
@@ -460,6 +480,7 @@ void desk_welcome(struct agent *a)
 {
 	for (struct lease_task *l = a->leases; l; l = l->next)
 		l->sent = false;
+	fetch_reconnected(a);
 	/* Does the job live? The answer brings unfinished fetching and unsent results on their way. */
 	for (struct bundle *b = a->bundles; b; b = b->next)
 		if (!b->ended)
@@ -544,6 +565,8 @@ bool desk_is_idle(const struct agent *a)
 
 void desk_close(struct agent *a)
 {
+	while (a->fetches)
+		fetch_drop(a, a->fetches);
 	while (a->leases)
 		drop_lease(a, a->leases);
 	while (a->bundles) {

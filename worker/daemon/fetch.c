@@ -1,0 +1,99 @@
+#include "worker/daemon/fetch.h"
+
+#include "common/base/mem.h"
+#include "worker/daemon/agent_private.h"
+
+#include <string.h>
+
+static uint64_t at(const struct fetch *f)
+{
+	return f->writer ? blob_write_at(f->writer) : 0;
+}
+
+static void ask(struct agent *a, struct fetch *f)
+{
+	Farm__BlobGet get;
+	Farm__Envelope m;
+	farm__blob_get__init(&get);
+	farm__envelope__init(&m);
+	get.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, f->hash.bytes};
+	get.offset = at(f);
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_GET;
+	m.blob_get = &get;
+	f->asked = true;
+	agent_send(a, &m);
+}
+
+int fetch_want(struct agent *a, const struct blob_hash *h, struct error *e)
+{
+	struct fetch *f = a->fetches;
+	unsigned count = 0;
+	for (; f && !blob_hash_equal(&f->hash, h); f = f->next)
+		count++;
+	if (!f) {
+		if (count == FETCHES_MOST)
+			return error_set(e, ENOBUFS, "%u pieces of files were asked for, and none came", count);
+		f = mem_alloc(1, sizeof *f);
+		if (!f)
+			return error_set(e, ENOMEM, "no memory to fetch a file");
+		f->hash = *h;
+		f->next = a->fetches;
+		a->fetches = f;
+	}
+	if (!f->asked)
+		ask(a, f);
+	return 0;
+}
+
+struct fetch *fetch_answered(struct agent *a, const Farm__BlobChunk *c)
+{
+	if (c->hash.len != BLOB_HASH_SIZE)
+		return NULL;
+	for (struct fetch *f = a->fetches; f; f = f->next) {
+		if (memcmp(c->hash.data, f->hash.bytes, BLOB_HASH_SIZE) != 0)
+			continue;
+		if (!f->asked || c->offset != at(f))
+			return NULL;
+		f->asked = false;
+		return f;
+	}
+	return NULL;
+}
+
+enum fetch_end fetch_add(struct fetch *f, struct blob_store *s, const Farm__BlobChunk *c, const unsigned char *payload, size_t size,
+			 struct error *e)
+{
+	int rc = 0;
+	if (*c->error)
+		rc = error_set(e, EIO, "the coordinator has a file of the scene no more: %s", c->error);
+	else if (size == 0 && c->offset < c->size)
+		rc = error_set(e, EBADMSG, "a blob ended too early");
+	if (!rc && !f->writer)
+		rc = blob_write_begin(&f->writer, s, &f->hash, c->size, e);
+	if (!rc)
+		rc = blob_write_add(f->writer, payload, size, e);
+	if (rc)
+		return FETCH_FAILED;
+	if (at(f) < c->size)
+		return FETCH_MORE;
+	rc = blob_write_commit(f->writer, e);
+	f->writer = NULL;
+	return rc ? FETCH_FAILED : FETCH_WHOLE;
+}
+
+void fetch_drop(struct agent *a, struct fetch *f)
+{
+	struct fetch **place = &a->fetches;
+	while (*place != f)
+		place = &(*place)->next;
+	*place = f->next;
+	if (f->writer)
+		blob_write_abort(f->writer);
+	mem_free(f);
+}
+
+void fetch_reconnected(struct agent *a)
+{
+	for (struct fetch *f = a->fetches; f; f = f->next)
+		f->asked = false;
+}
