@@ -10,6 +10,7 @@
 #include "common/blob/blob.h"
 #include "common/film/merge.h"
 #include "common/wire/batch_wire.h"
+#include "coordinator/shell/publish.h"
 #include "coordinator/shell/view.h"
 #include "coordinator/store/journal.h"
 #include "coordinator/store/spool.h"
@@ -68,6 +69,7 @@ struct order {
 	uint64_t unpublished_rounds;
 	bool unrecorded;         /* ... but its record could not */
 	bool busy, ended;
+	struct publishing publishing; /* while busy */
 	bool black; /* as the image that was published, or the bootstrap */
 	double preview_made; /* s on the loop's clock; 0: never */
 	double cpu_seconds; /* of all merged leases */

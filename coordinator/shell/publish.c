@@ -12,20 +12,6 @@
 
 enum { HEADER_EFFECTS_MAX = 64 };
 
-struct publishing {
-	uv_work_t work;
-	struct server *server;
-	struct order *order;
-	enum publish_what what;
-	uint64_t rounds;
-	double wall_seconds;
-	enum job_end end;
-	struct canvas_image image;
-	struct agreement agreement;
-	int rc;
-	struct error error;
-};
-
 static const char *const files[] = {[PUBLISH_PREVIEW] = "preview.exr", [PUBLISH_RESULT] = "result.exr"};
 
 static const char *end_name(enum job_end end)
@@ -71,8 +57,10 @@ static void run(uv_work_t *work)
 		w->rc = write_image(w);
 }
 
+/* The two that tell the core: it may want the next image at once, or end the order, and w is not ours any more. */
 static void tell_error(const struct publishing *w)
 {
+	struct server *s = w->server;
 	struct event ev = {.kind = EVENT_ERROR_KNOWN,
 			   .job = w->order->id,
 			   .error_known = {.job = w->order->id,
@@ -81,8 +69,8 @@ static void tell_error(const struct publishing *w)
 					   .rel_mse = w->rc ? NAN : w->image.rel_mse,
 					   .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
 					   .cpu_seconds = w->order->cpu_seconds - w->order->record.bootstrap_cpu_seconds}};
-	server_step(w->server, &ev);
-	durable_look(w->server, ev.job);
+	server_step(s, &ev);
+	durable_look(s, ev.job);
 }
 
 static void tell_image(const struct publishing *w)
@@ -115,13 +103,10 @@ static void has_written(struct order *o)
 	o->record.why[0] = 0;
 }
 
-static void done(uv_work_t *work, int status)
+/* What came of it, for the order. */
+static void take(struct publishing *w)
 {
-	struct publishing *w = work->data;
-	struct server *s = w->server;
 	struct order *o = w->order;
-	assert(status == 0);
-	(void)status;
 	/* Every image says how good it is, asked for or not. */
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
 		o->record.rel_error = sqrt(w->image.rel_mse_upper);
@@ -133,39 +118,39 @@ static void done(uv_work_t *work, int status)
 		cannot_write(w);
 	else if (w->what == PUBLISH_RESULT)
 		has_written(o);
-	else if (w->what == PUBLISH_PREVIEW)
-		o->preview_made = server_now(s);
-	if (s->stopping) {
-		o->busy = false;
-	} else {
-		uint64_t id = o->id;
-		o->busy = false; /* the core may want the final image at once */
-		if (w->what == PUBLISH_ERROR_ONLY)
-			tell_error(w);
-		else if (w->what == PUBLISH_RESULT && !w->rc)
-			tell_image(w);
-		server_order_free_again(s);
-		session_previews(s, id);
-		s->changes++;
-	}
+	else if (w->rc)
+		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+	if (w->what == PUBLISH_PREVIEW)
+		o->preview_made = server_now(w->server);
 	canvas_image_fini(&w->image);
-	mem_free(w);
+}
+
+static void done(uv_work_t *work, int status)
+{
+	struct publishing *w = work->data;
+	struct server *s = w->server;
+	uint64_t id = w->order->id;
+	assert(status == 0);
+	(void)status;
+	take(w);
+	w->order->busy = false;
+	if (s->stopping)
+		return;
+	if (w->what == PUBLISH_ERROR_ONLY)
+		tell_error(w);
+	else if (w->what == PUBLISH_RESULT && !w->rc)
+		tell_image(w);
+	server_order_free_again(s);
+	session_previews(s, id);
+	s->changes++;
 }
 
 void publish_start(struct server *s, struct order *o, enum publish_what what, uint64_t rounds)
 {
 	assert(o && o->canvas);
 	assert(!o->busy);
-	struct publishing *w = mem_alloc(1, sizeof *w);
-	if (!w) {
-		server_job_broken(s, o->id, "no memory for its image");
-		return;
-	}
-	w->server = s;
-	w->order = o;
-	w->what = what;
-	w->rounds = rounds;
-	w->work.data = w;
+	struct publishing *w = &o->publishing;
+	*w = (struct publishing){.work.data = w, .server = s, .order = o, .what = what, .rounds = rounds};
 	struct job_status status; /* from the first lease to now */
 	if (farm_job(s->farm, o->id, server_now(s), &status)) {
 		w->end = status.end;

@@ -1,16 +1,38 @@
 /*
  * Work on a whole film: its error, its image as EXR in the spool. Runs in the pool; the order is busy meanwhile and its
- * results wait. Started and finished on the loop's thread.
+ * results wait. Started and finished on the loop's thread. Starting allocates nothing and cannot fail; an image of the result for
+ * which there is no memory or no disk is made again later.
  */
 #ifndef COORDINATOR_SHELL_PUBLISH_H
 #define COORDINATOR_SHELL_PUBLISH_H
 
-#include "coordinator/shell/server.h"
+#include "common/film/agreement.h"
+#include "common/film/canvas.h"
+#include "coordinator/core/farm.h"
+
+#include <uv.h>
+
+struct server;
+struct order;
 
 enum publish_what {
 	PUBLISH_ERROR_ONLY, /* answered by EVENT_ERROR_KNOWN */
 	PUBLISH_PREVIEW,    /* preview.exr */
 	PUBLISH_RESULT,     /* result.exr */
+};
+
+struct publishing { /* one of an order at a time */
+	uv_work_t work;
+	struct server *server;
+	struct order *order;
+	enum publish_what what;
+	uint64_t rounds;
+	double wall_seconds;
+	enum job_end end;
+	struct canvas_image image;
+	struct agreement agreement;
+	int rc;
+	struct error error;
 };
 
 void publish_start(struct server *s, struct order *o, enum publish_what what, uint64_t rounds);
