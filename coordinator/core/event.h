@@ -24,7 +24,8 @@ enum event_kind {
 	EVENT_PREPARED,       /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
 	EVENT_ERROR_KNOWN,    /* error_known: the answer to ACTION_EVALUATE_ERROR */
 	EVENT_IMAGE_KNOWN,    /* image_known: what the final image of ACTION_PUBLISH says; the job has ended */
-	EVENT_RESTORE,        /* tag, restore: a job of an earlier life goes on, or one that has ended */
+	EVENT_RESTORE,        /* tag, restore: a job of an earlier life goes on, or one that has ended. Without a tag there are
+				 never too many: only memory can be out */
 	EVENT_HOLD,           /* tag, job, hold, text: no more of its leases go out; without a text this hold is over */
 	EVENT_PRIORITY,       /* tag, job, priority: from the next lease on */
 	EVENT_EXTEND,         /* tag, job, plan: its own, but for the bounds; not fewer rounds */

@@ -45,6 +45,7 @@ int farm_new(struct farm **out, const struct farm_config *c, struct error *e)
 		return error_set(e, ENOMEM, "no memory for the farm");
 	f->config = *c;
 	f->next_job = c->first_job;
+	f->live_limit = c->max_jobs;
 	f->check_at = f->schedule_at = INFINITY;
 	f->now = -INFINITY;
 	list_init(&f->classes);

@@ -1,6 +1,8 @@
 /* Jobs of an earlier life, and ended ones that go on: put where their merged leases say that they were. */
 #include "coordinator/core/state.h"
 
+#include "common/base/mem.h"
+
 #include <assert.h>
 #include <math.h>
 
@@ -47,13 +49,34 @@ static void take_counts(struct job *j, const struct job_counts *c)
 	j->mismatched = c->mismatched;
 }
 
+/* Jobs of an earlier life are never too many: nobody would hear that they are refused. */
+static bool make_room(struct farm *f, bool asked)
+{
+	uint32_t room = asked ? f->config.max_jobs : f->live_limit;
+	if (asked || f->live_count < room)
+		return f->live_count < room;
+	uint32_t before = f->live_limit, limit = before + f->config.max_jobs, ended = f->config.max_ended + 1;
+	void *live = mem_grow(f->live, before * sizeof *f->live, limit * sizeof *f->live);
+	if (live)
+		f->live = live;
+	void *jobs = live ? mem_grow(f->jobs, (before + ended) * sizeof *f->jobs, (limit + ended) * sizeof *f->jobs) : NULL;
+	if (!jobs)
+		return false;
+	f->jobs = jobs;
+	f->live_limit = limit;
+	if (update_reserve(f, 0) == 0)
+		return true;
+	f->live_limit = before;
+	return false;
+}
+
 void restore_job(struct farm *f, const struct event *ev)
 {
 	const struct event_restore *r = &ev->restore;
 	struct job *ended = farm_find_job(f, r->job);
 	assert(!ended || !job_is_live(ended));
 	const char *refused = "the coordinator has as many jobs as it takes";
-	struct job *j = f->live_count < f->config.max_jobs ? job_new(f, &r->submit, &refused) : NULL;
+	struct job *j = make_room(f, ev->tag) ? job_new(f, &r->submit, &refused) : NULL;
 	if (!j) {
 		struct action *a = update_add(f, ACTION_REJECTED);
 		a->tag = ev->tag;

@@ -60,7 +60,7 @@ void rounds_submit(struct farm *f, const struct event *ev)
 		rounds_reject(f, ev, "a priority is from -100 to 100");
 		return;
 	}
-	if (f->live_count == f->config.max_jobs) {
+	if (f->live_count >= f->config.max_jobs) {
 		rounds_reject(f, ev, "the coordinator has as many jobs as it takes");
 		return;
 	}

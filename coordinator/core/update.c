@@ -10,7 +10,7 @@
 int update_reserve(struct farm *f, size_t more_leases)
 {
 	size_t leases = f->lease_limit + more_leases;
-	size_t want = 3 * leases + f->config.max_peers + 8 * (size_t)f->config.max_jobs + 64;
+	size_t want = 3 * leases + f->config.max_peers + 8 * (size_t)f->live_limit + 64;
 	if (want <= f->action_limit)
 		return 0;
 	want += want / 2;

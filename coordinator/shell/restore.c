@@ -312,7 +312,9 @@ static int restore_one(struct server *s, const struct ledger_job *j, struct erro
 		return rc;
 	o->next = s->orders;
 	s->orders = o;
-	return restore_tell(s, o, j->held, 0, e);
+	rc = restore_tell(s, o, j->held, 0, e);
+	struct job_counts known;
+	return rc || farm_counts(s->farm, o->id, &known) ? rc : error_set(e, ENOMEM, "no memory for a job");
 }
 
 /* Not of the machine, but of what is stored: the same at every start. ENOENT: its folder is gone. */

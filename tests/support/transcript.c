@@ -226,10 +226,11 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 	}
 }
 
-/* restore J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [options of submit] */
+/* restore [asked] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [options of submit] */
 static void take_restore(const char **at, struct event *ev, struct plan *p, char *fingerprint, uint64_t *next,
 			 const struct forecast_history *looks, char owner[WORD])
 {
+	bool asked = take(at, "asked");
 	struct event_restore r = { .job = take_id(at, "j"), .next = next, .fingerprint = fingerprint,
 				   .elapsed = NAN, .opened = NAN, .completed = NAN, .looks = looks };
 	r.kind = take(at, "boot") ? LEASE_BOOTSTRAP : LEASE_RENDER;
@@ -253,6 +254,8 @@ static void take_restore(const char **at, struct event *ev, struct plan *p, char
 	take_submit(at, ev, p, owner);
 	r.submit = ev->submit;
 	ev->kind = EVENT_RESTORE;
+	if (!asked)
+		ev->tag = 0;
 	ev->restore = r;
 }
 

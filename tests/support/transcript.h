@@ -7,7 +7,7 @@
  *   wN joins F threads=T | wN leaves | wN heard | wN wants N
  *   wN batch KEY [bad TEXT] | wN fails KEY TEXT | wN returns KEY        KEY: j1 g0 p0 e0, or j1 g0 p0 boot
  *   submit [NAME=VALUE ...]: priority mixed groups parts rounds seconds target boot owner
- *   restore J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [as submit]: the slots' next epochs
+ *   restore [asked] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [as submit]: the slots' next epochs
  *   hold [order] J TEXT | release [order] J | priority J N | extend J [as submit: the new plan]        (order: by somebody, not for want of room)
  *   cancel J | prepared J [black | bad TEXT] | error J R E | broken J TEXT | tick
  * "[60] unread=40 ...": with any of them: what came in the last so many seconds may not have been read.

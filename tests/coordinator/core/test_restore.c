@@ -4,6 +4,7 @@
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
+#include <stdio.h>
 
 #include <cmocka.h>
 
@@ -104,6 +105,39 @@ static void held(void **state)
 	farm_free(f);
 }
 
+/* All of them live, and no new one before there are fewer. */
+static void more_than_are_taken(void **state)
+{
+	(void)state;
+	enum { JOBS = 30 };
+	struct farm_config c;
+	struct farm *f;
+	struct job_status s;
+	farm_config_init(&c);
+	c.max_jobs = 2;
+	c.max_ended = 1;
+	c.max_peers = 1;
+	assert_int_equal(farm_new(&f, &c, NULL), 0);
+	for (int i = 1; i <= JOBS; i++) {
+		char line[64];
+		snprintf(line, sizeof line, "[0] restore j%d boot 0,0 -> -", i);
+		transcript_play(f, (const char *const[]){ line, NULL });
+	}
+	for (int i = 1; i <= JOBS; i++)
+		assert_true(farm_job(f, (uint64_t)i, 0, &s) && s.state == JOB_QUEUED);
+	for (int i = 1; i < JOBS; i++) {
+		char line[128], forgotten[32] = "";
+		if (i > 1)
+			snprintf(forgotten, sizeof forgotten, ", j%d forgotten", i - 1);
+		snprintf(line, sizeof line, "[%d] cancel j%d -> j%d cancelled, j%d is cancelled (cancelled: cancelled)%s", i, i, i, i, forgotten);
+		transcript_play(f, (const char *const[]){ "[0] submit -> rejected: the coordinator has as many jobs as it takes",
+							  "[0] restore asked j99 boot 0,0 -> rejected: the coordinator has as many jobs as it takes", line, NULL });
+	}
+	transcript_play(f, (const char *const[]){ "[40] submit -> j31 submitted, j31 is queued",
+						  "[41] submit -> rejected: the coordinator has as many jobs as it takes", NULL });
+	farm_free(f);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -112,6 +146,7 @@ int main(void)
 		cmocka_unit_test(before_anything),
 		cmocka_unit_test(bounds),
 		cmocka_unit_test(held),
+		cmocka_unit_test(more_than_are_taken),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

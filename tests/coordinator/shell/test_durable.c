@@ -1,9 +1,10 @@
 /*
  * What happens while the disk is asked: a checkpoint is held up in its last step, and meanwhile its job is cancelled or counts go on; a
- * record that cannot be written is written later.
+ * record that cannot be written is written later. And what happens without memory.
  */
 #include "common/base/disk.h"
 #include "common/base/mem.h"
+#include "coordinator/shell/publish.h"
 #include "coordinator/shell/server.h"
 #include "tests/support/folder.h"
 #include "tests/support/scripted.h"
@@ -435,6 +436,93 @@ static void extended_during_a_flush_that_fails(void **state)
 	extended_during_a_flush(true);
 }
 
+/* ---- without memory: the coordinator is in this process ---- */
+
+static struct server *open_here(void)
+{
+	struct server_config c;
+	struct server *s = NULL;
+	struct error e;
+	server_config_init(&c);
+	c.listen = "127.0.0.1:0";
+	c.spool = spool;
+	c.retry_seconds = 0.05;
+	return server_open(&s, &c, &e) ? NULL : s;
+}
+
+/* Half of its leases are merged. */
+static uint64_t begin_a_job(void)
+{
+	struct lease_key kept = {.job = 0};
+	disk->hold_up = true;
+	start();
+	uint64_t job = submit();
+	work(&disk->held_up, &kept);
+	end(SIGKILL, false);
+	return job;
+}
+
+/* Whatever its image is for, the job lives, and in the end there is one. */
+static void no_memory_for_an_image(void **state)
+{
+	(void)state;
+	uint64_t job = begin_a_job();
+	struct server *s = open_here();
+	assert_non_null(s);
+	struct order *o = server_order(s, job);
+	assert_true(o && o->canvas);
+	for (enum publish_what what = PUBLISH_ERROR_ONLY; what <= PUBLISH_RESULT; what++) {
+		mem_fail_after(0);
+		publish_start(s, o, what, order_rounds(o));
+		mem_fail_after(-1);
+		assert_true(o->busy && !s->deferred);
+		while (o->busy || (what == PUBLISH_RESULT && !o->record.has_result))
+			uv_run(&s->loop, UV_RUN_ONCE);
+		struct job_status status;
+		assert_true(farm_job(s->farm, job, server_now(s), &status) && status.state == JOB_RUNNING);
+	}
+	server_close(s);
+}
+
+/* Whether the allocation that was to fail had its turn. */
+static bool has_failed(void)
+{
+	void *p = mem_alloc(1, 1);
+	for (int i = 0; i < 1000 && p; i++) {
+		mem_free(p);
+		p = mem_alloc(1, 1);
+	}
+	mem_free(p);
+	mem_fail_after(-1);
+	return p != NULL;
+}
+
+static bool opens_without(long allocation)
+{
+	struct job_counts counts;
+	mem_fail_after(allocation);
+	struct server *s = open_here();
+	bool failed = has_failed();
+	assert_true(s || failed);
+	if (s) {
+		assert_true(s->orders && s->orders->canvas && farm_counts(s->farm, s->orders->id, &counts));
+		server_close(s);
+	}
+	return failed;
+}
+
+/* It starts with all its jobs or not at all. */
+static void no_memory_for_a_start(void **state)
+{
+	(void)state;
+	begin_a_job();
+	long n = 0;
+	while (opens_without(n))
+		n++;
+	print_message("   %ld allocations\n", n);
+	assert_true(n > 50);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -443,7 +531,10 @@ int main(void)
 		cmocka_unit_test_setup_teardown(a_record_is_written_later, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_during_a_slow_flush, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_during_a_flush_that_fails, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(no_memory_for_an_image, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(no_memory_for_a_start, set_up, folder_tear_down),
 	};
+	log_set_level(LOG_LEVEL_ERROR);
 	disk = mmap(NULL, sizeof *disk, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 	return disk == MAP_FAILED ? 1 : cmocka_run_group_tests(tests, NULL, NULL);
 }
