@@ -351,6 +351,26 @@ static int write_issued(const struct authority *a, const char *name, X509 *cert,
 	return rc ? rc : write_pem(path, pem_cert(cert), 0644, e);
 }
 
+/* A folder goes on with another certificate for the same name and role, or it is somebody else's. */
+static int may_renew(const struct authority *a, const char *name, enum tls_role role, struct error *e)
+{
+	char path[PATH_SIZE];
+	X509 *cert;
+	struct tls_peer who;
+	int rc = path_in(path, e, a->folder, name, "cert.pem");
+	if (rc || access(path, F_OK))
+		return rc;
+	rc = read_cert(path, &cert, e);
+	if (rc)
+		return rc;
+	rc = tls_read_peer(cert, &who, e);
+	X509_free(cert);
+	if (!rc && (who.role != role || strcmp(who.name, name) != 0))
+		rc = error_set(e, EEXIST, "%s is of the %s %s: --renew makes no %s of it", path, tls_role_name(who.role), who.name,
+			       tls_role_name(role));
+	return rc;
+}
+
 int authority_issue(const char *folder, const char *name, enum tls_role role, double days, bool renew, struct error *e)
 {
 	char path[PATH_SIZE];
@@ -364,6 +384,8 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 	rc = path_in(path, e, folder, "", name);
 	if (!rc && !renew && access(path, F_OK) == 0)
 		rc = error_set(e, EEXIST, "%s is there: --renew replaces its certificate and key", path);
+	if (!rc && renew)
+		rc = may_renew(&a, name, role, e);
 	if (!rc)
 		rc = make_folder(path, renew, e);
 	EVP_PKEY *key = rc ? NULL : EVP_EC_gen("P-256");

@@ -14,7 +14,7 @@
 /* -EEXIST: there is one already. */
 int authority_init(const char *folder, const char *name, double days, struct error *e);
 
-/* Writes FOLDER/NAME/. renew: replaces the certificate and key that are there; the old ones stay valid until they expire or
+/* Writes FOLDER/NAME/. renew: replaces the certificate and key that are there, of this name and role (else -EEXIST); the old ones stay valid until they expire or
  * are revoked. Valid from an hour ago (clocks differ) to `days` from now, but no longer than the authority. */
 int authority_issue(const char *folder, const char *name, enum tls_role role, double days, bool renew, struct error *e);
 

@@ -32,7 +32,7 @@ enum { OPTION_CA = 256, OPTION_DAYS, OPTION_RENEW, OPTION_NAME };
 static const struct argp_option options[] = {
 	{"ca", OPTION_CA, "DIR", 0, "The authority's folder (or $HSLT_CA; ~/.hslt-ca)", 0},
 	{"days", OPTION_DAYS, "N", 0, "How long the certificate is valid (825; the authority: 3650)", 0},
-	{"renew", OPTION_RENEW, NULL, 0, "Replace a certificate and key that are there", 0},
+	{"renew", OPTION_RENEW, NULL, 0, "Replace a certificate and key that are there, of the same name and role", 0},
 	{"name", OPTION_NAME, "NAME", 0, "init: the authority's name (hslt-farm)", 0},
 	{0},
 };

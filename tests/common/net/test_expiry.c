@@ -1,6 +1,6 @@
 /*
  * Certificates that end soon are spoken of in time, again every day, and not when there is no need; clocks are arguments here. Those
- * that are new are taken up, if not at once, then later.
+ * that are new are taken up, if not at once, then later, and are for whom the old ones were.
  */
 #include "common/net/authority.h"
 
@@ -133,6 +133,24 @@ static void what_could_not_be_read_is_read_later(void **state)
 	tls_close(t);
 }
 
+/* A folder stays the same party's. */
+static void renewed_is_what_it_was(void **state)
+{
+	(void)state;
+	char ca[128], from[160], to[160];
+	struct error e;
+	tls_close(party("kept", 100, 50));
+	snprintf(ca, sizeof ca, "%s/kept", root);
+	for (enum tls_role r = TLS_COORDINATOR; r < TLS_ROLES; r++)
+		assert_int_equal(authority_issue(ca, "node", r, 5, true, &e), r == TLS_WORKER ? 0 : -EEXIST);
+	assert_non_null(strstr(e.text, "/node/cert.pem is of the worker node: --renew makes no operator of it"));
+	snprintf(from, sizeof from, "%s/node", ca);
+	snprintf(to, sizeof to, "%s/moved", ca);
+	assert_int_equal(rename(from, to), 0);
+	assert_int_equal(authority_issue(ca, "moved", TLS_WORKER, 5, true, &e), -EEXIST);
+	assert_int_equal(authority_issue(ca, "node", TLS_CLIENT, 5, true, &e), 0); /* nothing is there any more */
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -140,6 +158,7 @@ int main(void)
 		cmocka_unit_test(it_is_said_once_a_day_and_after_files_were_read),
 		cmocka_unit_test(the_authoritys_end_is_named),
 		cmocka_unit_test(what_could_not_be_read_is_read_later),
+		cmocka_unit_test(renewed_is_what_it_was),
 	};
 	return cmocka_run_group_tests(tests, make_folder, remove_folder);
 }
