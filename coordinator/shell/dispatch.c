@@ -125,7 +125,9 @@ static void merge(struct server *s, const struct action *a)
 		keep_partials(s, &a->key);
 	uint64_t rounds = order_rounds(o);
 	int rc = durable_merged(s, o, &e);
-	if (!rc && (rc = order_merge(o, s->batch, &e)) == -ENOMEM) { /* half merged; nobody was told that it is stored */
+	if (!rc)
+		rc = order_merge(o, s->batch, &e);
+	if (rc == -ENOMEM) { /* half merged; nobody was told that it is stored */
 		log_event(LOG_STOP, "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
 		_exit(1);
 	}
@@ -141,7 +143,7 @@ static void acknowledge(struct server *s, const struct action *a)
 {
 	struct session *p = session_find(s, a->peer);
 	const struct order *o = server_order(s, a->job);
-	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && o && o->journal)) /* what it repeats may not be on the disk yet */
+	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && o)) /* what it repeats may not be on the disk yet */
 		durable_ack(s, o, a->peer, &a->key, a->ack);
 	else if (p)
 		session_send_ack(p, &a->key, a->ack, a->text);

@@ -114,7 +114,7 @@ static int end(struct server *s, const struct job_record *r, bool kept, struct e
 int durable_end(struct server *s, struct order *o)
 {
 	struct error e;
-	if (o->journal && journal_write(o->journal, &e)) /* for whoever extends it; what is not stored is computed again */
+	if (journal_write(o->journal, &e)) /* for whoever extends it; what is not stored is computed again */
 		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	int rc = end(s, &o->record, keep_order(s, o), &e);
 	if (rc)
@@ -178,7 +178,7 @@ int durable_reserve(struct server *s, struct order *o, struct error *e)
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
 	m.lease_result = result.to;
-	if (!o->journal || o->unsure)
+	if (o->unsure)
 		return error_set(e, EIO, "the job's files cannot be written");
 	int rc = envelope_pack(&m, NULL, 0, &s->frame, &s->frame_size, e);
 	if (rc)
@@ -210,15 +210,9 @@ static int write_pinned(struct server *s, struct order *o, double elapsed, struc
 int durable_merged(struct server *s, struct order *o, struct error *e)
 {
 	double elapsed = farm_elapsed(s->farm, o->id, server_now(s));
-	assert(s->frame && o->journal);
+	assert(s->frame);
 	int rc = write_pinned(s, o, elapsed, e);
-	if (!rc)
-		rc = journal_append(o->journal, JOURNAL_BATCH, elapsed, s->frame, s->frame_size, s->payload, e);
-	if (rc) { /* what is merged but not written must not be acknowledged */
-		journal_release(o->journal);
-		o->journal = NULL;
-	}
-	return rc;
+	return rc ? rc : journal_append(o->journal, JOURNAL_BATCH, elapsed, s->frame, s->frame_size, s->payload, e);
 }
 
 /* ---- group commit ---- */
@@ -319,10 +313,8 @@ static void flush_next(struct server *s)
 void durable_ack(struct server *s, const struct order *o, uint64_t peer, const struct lease_key *k, enum ack ack)
 {
 	struct durable_ack *a = mem_alloc(1, sizeof *a);
-	if (!a || !o->journal) { /* not answered: the worker offers it again, and it is a repeat */
-		mem_free(a);
+	if (!a) /* not answered: the worker offers it again, and it is a repeat */
 		return;
-	}
 	*a = (struct durable_ack){.peer = peer, .key = *k, .ack = ack, .journal = o->journal};
 	journal_hold(a->journal);
 	queue(s, a);
@@ -345,7 +337,7 @@ void durable_look(struct server *s, uint64_t job)
 	struct order *o = server_order(s, job);
 	struct job_status status;
 	struct error e;
-	if (!o || !o->journal || !farm_job(s->farm, job, server_now(s), &status) || status.looks->count == 0)
+	if (!o || !farm_job(s->farm, job, server_now(s), &status) || status.looks->count == 0)
 		return;
 	const struct forecast_look *l = &status.looks->looks[status.looks->count - 1];
 	if (l->work <= o->look_written)
@@ -362,7 +354,7 @@ static void write_counts(struct server *s, struct order *o)
 {
 	struct job_counts now;
 	struct error e;
-	if (o->ended || o->busy || !o->journal || !farm_counts(s->farm, o->id, &now) || memcmp(&now, &o->counts, sizeof now) == 0)
+	if (o->ended || o->busy || !farm_counts(s->farm, o->id, &now) || memcmp(&now, &o->counts, sizeof now) == 0)
 		return;
 	if (append_note(s, o, JOURNAL_COUNTS, o->times.elapsed, &now, sizeof now, &e) == 0)
 		o->counts = now;
@@ -391,7 +383,7 @@ static void unpark(struct server *s)
 /* 0: nothing stands in the way of its results any more. */
 static int mend(struct order *o, struct error *e)
 {
-	if (!o->journal || o->unsure)
+	if (o->unsure)
 		return -EAGAIN;
 	int rc = journal_is_bad(o->journal) ? journal_renew(o->journal, e) : 0;
 	if (rc && rc != -EAGAIN)

@@ -20,7 +20,7 @@ int durable_end(struct server *s, struct order *o);
 /* Before the core sees the batch of this event: the frame for the journal, and room on the disk for it. -ENOSPC, -EFBIG: the disk
  * is full: the job is held until there is room. */
 int durable_reserve(struct server *s, struct order *o, struct error *e);
-/* The core merges the batch of this event. */
+/* The core merges the batch of this event. -ENOMEM: the journal has it not, and it must not be acknowledged. */
 int durable_merged(struct server *s, struct order *o, struct error *e);
 /* The answer to a batch that is merged, by now or before, when what the order's journal holds is safe. */
 void durable_ack(struct server *s, const struct order *o, uint64_t peer, const struct lease_key *k, enum ack ack);

@@ -48,7 +48,7 @@ static int write_order(const struct server *s, const struct order *o, struct err
 bool keep_order(struct server *s, const struct order *o)
 {
 	struct error e;
-	if (!s->config.keep_bytes || !o->journal || !o->canvas || o->lit.black || canvas_rounds(o->canvas) == 0 ||
+	if (!s->config.keep_bytes || !o->canvas || o->lit.black || canvas_rounds(o->canvas) == 0 ||
 	    strcmp(o->record.state, job_state_name(JOB_DONE)) != 0)
 		return false;
 	if (write_order(s, o, &e) == 0)

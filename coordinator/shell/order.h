@@ -51,7 +51,7 @@ struct order {
 	uint32_t chains_per_lease;
 	int log; /* a file descriptor */
 	uint64_t log_bytes;
-	struct journal *journal; /* NULL: it cannot be written any more */
+	struct journal *journal;
 	bool pinned;             /* the journal knows whose it is */
 	struct job_counts counts; /* as they were written down last */
 	struct order_times times;

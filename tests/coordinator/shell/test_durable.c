@@ -10,6 +10,7 @@
 #include "tests/support/scripted.h"
 
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stddef.h>
@@ -33,6 +34,8 @@ static struct {
 	_Atomic bool fail_records;
 	_Atomic bool hold_flush, held_flush, end_flush; /* the first one of a journal */
 	_Atomic bool fail_flush;                        /* which then fails */
+	_Atomic bool fail_memory;                       /* of one allocation, when room was made for a result: */
+	_Atomic unsigned allocations;                   /* of the one after so many */
 } *disk;
 static _Thread_local bool fail_next_folder;
 
@@ -93,6 +96,15 @@ static int own_fdatasync(int fd)
 	return disk_system.fdatasync(fd);
 }
 
+static int own_fallocate(int fd, int mode, off_t at, off_t size)
+{
+	if (disk->fail_memory) {
+		disk->fail_memory = false;
+		mem_fail_after((long)disk->allocations);
+	}
+	return disk_system.fallocate(fd, mode, at, size);
+}
+
 static void serve(void)
 {
 	struct disk own = disk_system;
@@ -102,6 +114,7 @@ static void serve(void)
 	own.rename = own_rename;
 	own.open = own_open;
 	own.fdatasync = own_fdatasync;
+	own.fallocate = own_fallocate;
 	disk_use(&own);
 	server_config_init(&c);
 	c.listen = "127.0.0.1:0";
@@ -120,8 +133,10 @@ static void start(void)
 	unlink(port_file);
 	fflush(NULL);
 	pid = fork();
-	if (pid == 0)
+	if (pid == 0) {
+		signal(SIGSEGV, SIG_DFL); /* or the test would go on in it */
 		serve();
+	}
 	for (int i = 0; i < PATIENCE && !port; i++) {
 		FILE *f = fopen(port_file, "r");
 		if (f && fscanf(f, "%u", &port) != 1)
@@ -436,6 +451,50 @@ static void extended_during_a_flush_that_fails(void **state)
 	extended_during_a_flush(true);
 }
 
+/* Hears until the job ends or the coordinator does, and answers leases. false: it was the coordinator. */
+static bool work_on(void)
+{
+	for (const Farm__Envelope *m; (m = scripted_hear(worker));) {
+		struct lease_key k;
+		struct error e;
+		if (m->body_case == FARM__ENVELOPE__BODY_JOB_END)
+			return true;
+		if (m->body_case != FARM__ENVELOPE__BODY_LEASE_GRANT)
+			continue;
+		assert_int_equal(lease_key_from_wire(m->lease_grant->key, &k, &e), 0);
+		struct batch b = scripted_batch(&k, &plan, STATE_BYTES);
+		bool said = scripted_send(worker, &b, &plan);
+		batch_fini(&b);
+		if (!said)
+			return false;
+	}
+	return false;
+}
+
+/* Whichever allocation it is that fails while a result is merged: the job goes on, at the latest when the coordinator starts again. */
+static void without_memory_for_a_result(void **state)
+{
+	(void)state;
+	enum { TRIES = 6 };
+	unsigned ends = 0;
+	for (unsigned i = 0; i < TRIES; i++) {
+		disk->allocations = i;
+		start();
+		uint64_t job = submit();
+		disk->fail_memory = true;
+		if (!work_on()) {
+			ends++;
+			end(SIGKILL, false);
+			start();
+			assert_true(work_on());
+		}
+		await_state(job, "done");
+		assert_false(disk->fail_memory);
+		end(SIGTERM, true);
+	}
+	assert_true(ends > 0);
+}
+
 /* ---- without memory: the coordinator is in this process ---- */
 
 static struct server *open_here(void)
@@ -531,6 +590,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(a_record_is_written_later, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_during_a_slow_flush, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_during_a_flush_that_fails, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(without_memory_for_a_result, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(no_memory_for_an_image, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(no_memory_for_a_start, set_up, folder_tear_down),
 	};
