@@ -198,7 +198,8 @@ bool answer_all_failed(const struct farm *f, const struct job *j)
 	return here > 0;
 }
 
-/* Nothing of the job was ever made, and nobody is left who might: there is nothing to lose or to wait for. */
+/* Nothing of the job was ever made, and nobody is left who might: there is nothing to lose or to wait for. Who
+ * cannot for want of something on its own machine is not here, as far as that goes. */
 static bool never_works(const struct farm *f, const struct job *j)
 {
 	return j->tries >= TRIES_FATAL && answer_all_failed(f, j);
@@ -223,12 +224,14 @@ void answer_failed(struct farm *f, const struct event *ev)
 	struct job *j = l->job;
 	struct slot *s = l->slot;
 	lease_drop(f, l);
-	bool again = peer_avoids_until(p, j->id) > f->now; /* several at once: one reason */
-	peer_failed(f, p, j->id);
+	bool again = peer_avoids_until(p, j->id) > f->now && !peer_lacks(p, j->id); /* several at once: one reason */
+	peer_failed(f, p, j->id, ev->lease.own);
 	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
 	text_print(f->text, sizeof f->text, "%s: %s", p->name, p->text);
 	text_copy(j->text, sizeof j->text, f->text);
 	j->failures++;
+	if (ev->lease.own) /* says nothing about the job */
+		return;
 	j->tries += !again;
 	bool fatal = failers_add(&s->failers, f, p->who), in_all = failers_add(&j->failers, f, p->who);
 	bool made = j->bootstrap_merged + j->leases_merged + j->noted > 0;

@@ -104,6 +104,7 @@ struct event {
 			struct lease_key key;
 			bool valid; /* BATCH: batch_check and the frame's own checks passed; else text says what is wrong */
 			struct batch_digest digest; /* BATCH: of a lease that farm_verifies */
+			bool own; /* LEASE_FAILED: it says that its own machine is at fault, not the job */
 		} lease;
 		enum job_hold hold;
 		int priority;

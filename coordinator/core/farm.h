@@ -22,7 +22,8 @@
  *  - The job fails when one lease failed on three workers, of three certificates where the farm knows as many (failers.h):
  *    one worker never ends a job of which something is made, it waits for others, or for that one to mend. While nothing was
  *    merged or noted the job fails, too, when any leases of it failed on three such workers, or on all that are here and three
- *    times.
+ *    times. What a worker lays to its own machine (a full disk) makes it pause and counts for none of this: where all that are here
+ *    say so the job waits, and its status names them.
  *  - Of a job that is verified a share of the leases is computed by two workers, of two identities (roster.h) and one
  *    fingerprint. The first answer is noted; one that equals another worker's is merged; where two differ a third
  *    decides, and a fourth; then the job fails. Who said otherwise than two that agree has given a wrong result.

@@ -200,18 +200,21 @@ static struct avoid *room_to_avoid(const struct farm *f, struct identity *who)
 	return first;
 }
 
-void peer_failed(const struct farm *f, struct peer *p, uint64_t job)
+void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own)
 {
 	struct avoid *a = avoid_of(p, job);
 	p->failures++;
-	if (a && a->until > f->now)
+	if (a && a->until > f->now) {
+		a->own = a->own && own;
 		return;
+	}
 	if (!a) {
 		a = room_to_avoid(f, p->who);
 		*a = (struct avoid){ .job = job };
 	}
 	uint32_t doublings = a->failures < PAUSE_DOUBLINGS ? a->failures : PAUSE_DOUBLINGS;
 	a->failures++;
+	a->own = own;
 	a->until = f->now + ldexp(f->config.first_pause, (int)doublings);
 }
 
@@ -228,4 +231,10 @@ double peer_avoids_until(const struct peer *p, uint64_t job)
 {
 	const struct avoid *a = avoid_of(p, job);
 	return a ? a->until : -INFINITY;
+}
+
+bool peer_lacks(const struct peer *p, uint64_t job)
+{
+	const struct avoid *a = avoid_of(p, job);
+	return a && a->own;
 }

@@ -52,8 +52,9 @@ void peer_requeue(struct farm *f, struct peer *p);
 bool peer_has_wish(const struct peer *p);
 
 void peer_fault(struct farm *f, struct peer *p, const char *text);
-void peer_failed(const struct farm *f, struct peer *p, uint64_t job);
+void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own);
 void peer_succeeded(struct peer *p, uint64_t job);
 double peer_avoids_until(const struct peer *p, uint64_t job); /* -INFINITY: does not */
+bool peer_lacks(const struct peer *p, uint64_t job); /* its last failure with the job was its own machine's */
 
 #endif

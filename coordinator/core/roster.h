@@ -18,6 +18,7 @@ struct avoid {
 	uint64_t job; /* 0: free */
 	uint32_t failures;
 	double until;
+	bool own; /* each of its failures since the last pause was its own machine's */
 };
 
 struct identity {

@@ -67,6 +67,20 @@ static bool someone_avoids(const struct farm *f, const struct job *j)
 	return false;
 }
 
+/* Those whose own machines are at fault are named: somebody has to mend them. */
+static void put_failing(const struct farm *f, const struct job *j, char *text, size_t size)
+{
+	char names[100] = "";
+	struct text t = {names, sizeof names};
+	for (uint32_t i = 0; i < f->peer_count; i++)
+		if (f->peers[i]->state == PEER_ACTIVE && job_takes(j, f->peers[i]) && peer_lacks(f->peers[i], j->id))
+			text_put(&t, "%s%s", *names ? ", " : "", f->peers[i]->name);
+	if (*names)
+		text_print(text, size, "no worker can compute it, for want of something on the machines of %s; the last one: %s", names, j->text);
+	else
+		text_print(text, size, "no worker can compute it: %s", j->text);
+}
+
 /* all: other owners' jobs are named. */
 static void put_busy(char *text, size_t size, const struct job *j, const struct job *other, bool all)
 {
@@ -103,7 +117,7 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 	else if (verify_why(f, j, text, size))
 		return NULL;
 	else if (answer_all_failed(f, j))
-		text_print(text, size, "no worker can compute it: %s", j->text);
+		put_failing(f, j, text, size);
 	else if (someone_avoids(f, j))
 		text_print(text, size, "its workers failed and pause before they try again; the last one: %s", j->text);
 	else if (!other)

@@ -90,6 +90,7 @@ static void send_hello_ack(struct session *p, bool accepted, const char *said)
 	ack.accepted = accepted;
 	ack.text = text;
 	ack.version = FARM_VERSION;
+	ack.hears_own = true;
 	ack.heartbeat_ms = (uint32_t)(1000 * p->server->config.heartbeat_seconds);
 	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
 	m.hello_ack = &ack;
@@ -215,9 +216,10 @@ static void take_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 		return;
 	}
 	ev.job = ev.lease.key.job;
+	ev.lease.own = f->own;
 	struct order *o = server_order(p->server, ev.job);
 	if (o && *f->text)
-		order_log(o, LOG_LEASE_FAILED, "worker=%s text=%s", log_quote(p->name).text, log_quote(text).text);
+		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s", log_quote(p->name).text, f->own, log_quote(text).text);
 	server_step(p->server, &ev);
 }
 

@@ -27,7 +27,7 @@ finish() {
 			[ -s "$f" ] && echo "---- $(basename "$f")" && tail -n 15 "$f"
 		done
 	fi
-	[ -z "${HSLT_OWN_MOUNTS:-}" ] || umount "$DIR/spool" 2>/dev/null || :
+	[ -z "${HSLT_OWN_MOUNTS:-}" ] || umount "$DIR/spool" "$DIR/disk" 2>/dev/null || :
 	[ -z "${HSLT_KEEP:-}" ] || cp -r "$TOP" "$HSLT_KEEP"
 	rm -rf "$TOP"
 	exit $code

@@ -53,9 +53,10 @@ void sim_finish(struct world *w, const struct message *m)
 	}
 	k->busy--;
 	struct event ev = { .kind = EVENT_BATCH, .lease = { .key = m->key, .valid = true }, .text = "trouble" };
-	if (!sim_is_calm(w) && sim_chance(w, k->failure_rate))
+	if (!sim_is_calm(w) && sim_chance(w, k->failure_rate)) {
 		ev.kind = EVENT_LEASE_FAILED;
-	else if (!sim_is_calm(w) && sim_chance(w, k->fault_rate))
+		ev.lease.own = w->draws % 3 == 0;
+	} else if (!sim_is_calm(w) && sim_chance(w, k->fault_rate))
 		ev.lease.valid = false;
 	else if (!sim_is_calm(w) && sim_chance(w, 0.01))
 		ev.kind = EVENT_LEASE_RETURNED;

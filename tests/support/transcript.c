@@ -212,13 +212,16 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		ev->kind = EVENT_REQUEST;
 		ev->want = (uint32_t)take_count(at);
 	} else {
-		ev->kind = take(at, "batch")	  ? EVENT_BATCH
+		bool lacks = take(at, "lacks");
+		ev->kind = lacks		  ? EVENT_LEASE_FAILED
+			   : take(at, "batch")	  ? EVENT_BATCH
 			   : take(at, "delivers") ? EVENT_DELIVERED
 			   : take(at, "fails")	  ? EVENT_LEASE_FAILED
 						  : EVENT_LEASE_RETURNED;
 		if (ev->kind == EVENT_LEASE_RETURNED && !take(at, "returns"))
 			fail_msg("no such event: %s", *at);
 		ev->lease.key = take_key(at);
+		ev->lease.own = lacks;
 		ev->lease.valid = !take(at, "bad");
 		if (take(at, "says "))
 			memset(&ev->lease.digest, *(*at)++, sizeof ev->lease.digest);

@@ -135,7 +135,7 @@ struct mapping {
 
 static int open_asset(void *user, const char *name, struct asset *out, struct error *e)
 {
-	const struct bundle *b = user;
+	struct bundle *b = user;
 	const Farm__JobInfo *m = info_of(b);
 	size_t i = 0;
 	tick();
@@ -147,6 +147,7 @@ static int open_asset(void *user, const char *name, struct asset *out, struct er
 	struct stat st;
 	if (fd < 0 || fstat(fd, &st)) {
 		int rc = error_set(e, errno, "%s: %s", name, strerror(errno));
+		b->own = true;
 		if (fd >= 0)
 			close(fd);
 		return rc;
@@ -158,6 +159,7 @@ static int open_asset(void *user, const char *name, struct asset *out, struct er
 	close(fd);
 	if (!map || (st.st_size > 0 && at == MAP_FAILED)) {
 		mem_free(map);
+		b->own = true;
 		return error_set(e, ENOMEM, "%s: cannot be mapped", name);
 	}
 	*map = (struct mapping){st.st_size > 0 ? at : NULL, (size_t)st.st_size};

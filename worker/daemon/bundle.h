@@ -37,6 +37,7 @@ struct bundle {
 	void *owner;
 	void (*built)(struct bundle *); /* on the loop's thread: READY or FAILED */
 	struct error error;
+	bool own; /* FAILED: this machine is at fault, not the job */
 };
 
 int bundle_new(struct bundle **b, uint64_t job, struct blob_store *blobs, struct error *e);

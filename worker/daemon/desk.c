@@ -53,8 +53,8 @@ static void ask_job(struct agent *a, uint64_t job)
 	agent_send(a, &m);
 }
 
-/* An empty text gives the lease back without fault. */
-static void say_failed(struct agent *a, const struct lease_key *k, const char *text)
+/* An empty text gives the lease back without fault; own: this machine is at fault, not the job. */
+static void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
 {
 	char copy[1024];
 	Farm__LeaseKey key;
@@ -67,6 +67,7 @@ static void say_failed(struct agent *a, const struct lease_key *k, const char *t
 	text_clean(copy);
 	failed.key = &key;
 	failed.text = copy;
+	failed.own = own && a->hears_own;
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
 	m.lease_failed = &failed;
 	agent_send(a, &m);
@@ -170,7 +171,7 @@ static void fail_leases_of(struct agent *a, struct bundle *b, const struct error
 		next = l->next;
 		if (l->bundle != b || l->state != LEASE_WAITING)
 			continue;
-		say_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built");
+		say_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own);
 		drop_lease(a, l);
 	}
 }
@@ -223,8 +224,10 @@ static void go_on(struct agent *a, struct bundle *b)
 		b->built = on_built;
 		rc = bundle_build(b, a->crew, &e);
 	}
-	if (rc)
+	if (rc) {
+		b->own = rc == -ENOMEM;
 		fail_bundle(a, b, &e);
+	}
 }
 
 /* ---- leases ---- */
@@ -255,7 +258,7 @@ static void on_rendered(struct lease_task *l)
 	if (l->unwanted) {
 		drop_lease(a, l);
 	} else if (l->rc || l->end == LEASE_STOPPED) {
-		say_failed(a, &l->grant.key, l->rc ? l->error.text : "");
+		say_failed(a, &l->grant.key, l->rc ? l->error.text : "", false);
 		drop_lease(a, l);
 	} else {
 		send_result(a, l);
@@ -308,7 +311,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		return;
 	}
 	if (a->leaving || is_stuffed(a)) {
-		say_failed(a, &g.key, "");
+		say_failed(a, &g.key, "", false);
 		grant_fini(&g);
 		return;
 	}
@@ -324,7 +327,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	if (!rc)
 		rc = lease_task_new(&l, &g, b, &e);
 	if (rc) {
-		say_failed(a, &g.key, e.text);
+		say_failed(a, &g.key, e.text, true);
 		grant_fini(&g);
 		return;
 	}
@@ -433,7 +436,8 @@ static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned 
 	enum fetch_end end = first ? fetch_add(f, a->cache.blobs, c, payload, size, &e) : FETCH_MORE;
 	if (end != FETCH_MORE)
 		fetch_drop(a, f);
-	if (end == FETCH_FAILED) {
+	if (end == FETCH_FAILED || end == FETCH_UNSTORED) {
+		first->own = end == FETCH_UNSTORED;
 		fail_bundle(a, first, &e);
 		tidy(a);
 	}
@@ -495,7 +499,7 @@ void desk_leave(struct agent *a)
 		next = l->next;
 		if (l->state == LEASE_RENDERED || (l->state == LEASE_QUEUED && !crew_take_back(a->crew, &l->task)))
 			continue;
-		say_failed(a, &l->grant.key, "");
+		say_failed(a, &l->grant.key, "", false);
 		drop_lease(a, l);
 	}
 }
@@ -524,7 +528,7 @@ static bool watch_leases(struct agent *a)
 		if (l->state != LEASE_QUEUED || l->task.hung || !has_hung(&l->task))
 			continue;
 		if (!l->unwanted)
-			say_failed(a, &l->grant.key, text);
+			say_failed(a, &l->grant.key, text, false);
 		l->unwanted = l->task.hung = found = true;
 		atomic_store(&l->stop, true);
 	}

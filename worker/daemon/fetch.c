@@ -60,25 +60,31 @@ struct fetch *fetch_answered(struct agent *a, const Farm__BlobChunk *c)
 	return NULL;
 }
 
+/* What does not fit below the limit is too large for the worker as it was set up; wrong bytes are the coordinator's. */
+static enum fetch_end failed(int rc)
+{
+	return rc == -EFBIG || rc == -EBADMSG ? FETCH_FAILED : FETCH_UNSTORED;
+}
+
 enum fetch_end fetch_add(struct fetch *f, struct blob_store *s, const Farm__BlobChunk *c, const unsigned char *payload, size_t size,
 			 struct error *e)
 {
 	int rc = 0;
-	if (*c->error)
-		rc = error_set(e, EIO, "the coordinator has a file of the scene no more: %s", c->error);
-	else if (size == 0 && c->offset < c->size)
-		rc = error_set(e, EBADMSG, "a blob ended too early");
-	if (!rc && !f->writer)
+	if (*c->error || (size == 0 && c->offset < c->size)) {
+		error_set(e, EBADMSG, "the coordinator has a file of the scene no more: %s", *c->error ? c->error : "it ended too early");
+		return FETCH_FAILED;
+	}
+	if (!f->writer)
 		rc = blob_write_begin(&f->writer, s, &f->hash, c->size, e);
 	if (!rc)
 		rc = blob_write_add(f->writer, payload, size, e);
 	if (rc)
-		return FETCH_FAILED;
+		return failed(rc);
 	if (at(f) < c->size)
 		return FETCH_MORE;
 	rc = blob_write_commit(f->writer, e);
 	f->writer = NULL;
-	return rc ? FETCH_FAILED : FETCH_WHOLE;
+	return rc ? failed(rc) : FETCH_WHOLE;
 }
 
 void fetch_drop(struct agent *a, struct fetch *f)

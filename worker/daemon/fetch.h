@@ -20,7 +20,12 @@ struct fetch {
 	bool asked;                 /* on this connection, and not answered */
 };
 
-enum fetch_end { FETCH_MORE, FETCH_WHOLE /* in the cache, and held once */, FETCH_FAILED };
+enum fetch_end {
+	FETCH_MORE,
+	FETCH_WHOLE, /* in the cache, and held once */
+	FETCH_FAILED,
+	FETCH_UNSTORED, /* failed by this machine's fault: its disk is full, read-only, broken */
+};
 
 /* Asks for the next piece, unless somebody has. -ENOMEM, -ENOBUFS. */
 int fetch_want(struct agent *a, const struct blob_hash *h, struct error *e);

@@ -320,6 +320,61 @@ static void one_bad_worker(void **state)
 	farm_free(f);
 }
 
+/* Three machines with full disks end no job that a fourth can compute, whatever comes first. */
+static void three_full_disks(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=5 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=1 -> -", "[0] w2 joins A threads=1 -> -", "[0] w3 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot", "[0] w2 wants 1 -> w2 gets j1 g1 p0 boot",
+		"[0] w3 wants 1 -> w3 gets j1 g2 p0 boot",
+		"[1] w1 lacks j1 g0 p0 boot disk full -> -", "[1] w2 lacks j1 g1 p0 boot disk full -> -",
+		"[1] w3 lacks j1 g2 p0 boot disk full -> -",
+		/* they pause as others that failed, and it goes on like that for as long as nobody else comes */
+		"[1] wake -> 11",
+		"[11] tick -> w1 gets j1 g3 p0 boot, w2 gets j1 g4 p0 boot, w3 gets j1 g0 p0 boot",
+		"[12] w1 lacks j1 g3 p0 boot disk full -> -", "[12] w2 lacks j1 g4 p0 boot disk full -> -",
+		"[12] w3 lacks j1 g0 p0 boot disk full -> -",
+		NULL });
+	struct job_status s;
+	assert_true(farm_job(f, 1, 12, &s));
+	assert_int_equal(s.state, JOB_BOOTSTRAP);
+	assert_int_equal(s.failures, 6);
+	assert_string_equal(s.waiting, "no worker can compute it, for want of something on the machines of w1, w2, w3; the last one: w3: disk full");
+	transcript_play(f, (const char *const[]){
+		"[13] w4 joins A threads=1 -> -",
+		"[13] w4 wants 1 -> w4 gets j1 g1 p0 boot", "[14] w4 batch j1 g1 p0 boot -> merge, merged, w4 gets j1 g2 p0 boot",
+		NULL });
+	assert_true(farm_job(f, 1, 14, &s));
+	assert_string_equal(s.waiting, "");
+	farm_free(f);
+}
+
+/* It takes nothing away from what others say of the job: for its end who lacks something is not here. */
+static void full_disks_and_a_bad_scene(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=5 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=2 -> -", "[0] w2 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot", "[0] w2 wants 1 -> w2 gets j1 g1 p0 boot",
+		"[1] w1 lacks j1 g0 p0 boot disk full -> -",
+		"[1] w2 fails j1 g1 p0 boot no mesh -> -",
+		"[11] w1 wants 2 -> w1 gets j1 g2 p0 boot, w2 gets j1 g3 p0 boot, w1 gets j1 g4 p0 boot",
+		"[11] w1 lacks j1 g2 p0 boot disk full -> -",
+		"[11] w1 fails j1 g4 p0 boot no mesh -> -", /* a second reason: a second try */
+		"[12] w2 fails j1 g3 p0 boot no mesh -> j1 is failed (failed: w2: no mesh)",
+		"[13] submit groups=5 -> j2 submitted, j2 is queued, j2 is bootstrap, w1 gets j2 g0 p0 boot, w2 gets j2 g1 p0 boot, w1 gets j2 g2 p0 boot",
+		"[13] w1 wants 0 -> -", "[13] w1 lacks j2 g0 p0 boot disk full -> -", "[13] w1 lacks j2 g2 p0 boot disk full -> -",
+		"[13] w2 fails j2 g1 p0 boot no mesh -> -",
+		"[23] w2 heard -> w2 gets j2 g3 p0 boot", "[23] w2 fails j2 g3 p0 boot no mesh -> -",
+		"[33] w1 heard -> -", "[43] w2 heard -> w2 gets j2 g4 p0 boot",
+		"[43] w2 fails j2 g4 p0 boot no mesh -> j2 is failed (failed: w2: no mesh)",
+		NULL });
+}
+
 /* Names cost nothing, certificates do: where the farm knows three, three names of one are not three workers. */
 static void made_up_names(void **state)
 {
@@ -411,7 +466,7 @@ int main(void)
 		cmocka_unit_test(timeout),
 		cmocka_unit_test(timeout_after_median),
 		cmocka_unit_test(straggler),
-		cmocka_unit_test(failed_lease),
+		cmocka_unit_test(failed_lease), cmocka_unit_test(three_full_disks), cmocka_unit_test(full_disks_and_a_bad_scene),
 		cmocka_unit_test(never_a_success),
 		cmocka_unit_test(out_of_order),
 		cmocka_unit_test(out_of_order_all),

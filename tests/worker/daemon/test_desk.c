@@ -38,6 +38,7 @@ static struct desk_test {
 	struct scripted *at; /* the connection, from the coordinator's side */
 	struct file mesh, scenes[4];
 	unsigned char mesh_bytes[MESH];
+	bool hears_own, own; /* what it says in hello; what the last failure said */
 } t;
 
 static void make_file(struct file *f, const void *bytes, size_t size)
@@ -83,6 +84,7 @@ static void welcome(void)
 	ack.accepted = true;
 	ack.version = FARM_VERSION;
 	ack.heartbeat_ms = 600000;
+	ack.hears_own = t.hears_own;
 	m.hello_ack = &ack;
 	say(&m, FARM__ENVELOPE__BODY_HELLO_ACK, NULL, 0);
 }
@@ -193,14 +195,17 @@ static uint64_t hear_failed(const char *why)
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_LEASE_FAILED);
 	if (!strstr(m->lease_failed->text, why))
 		fail_msg("it says: %s", m->lease_failed->text);
+	t.own = m->lease_failed->own;
 	return m->lease_failed->key->job;
 }
 
 static void hear_built(int count)
 {
 	unsigned jobs = 0;
-	for (int i = 0; i < count; i++)
+	for (int i = 0; i < count; i++) {
 		jobs |= 1u << hear_failed("scene");
+		assert_false(t.own);
+	}
 	assert_int_equal(__builtin_popcount(jobs), count);
 }
 
@@ -380,9 +385,63 @@ static void a_store_without_room_fails_each_once(void **state)
 	begin_jobs(2);
 	serve_mesh(0, 1);
 	const uint64_t first = hear_failed("do not fit below its limit");
+	assert_false(t.own); /* it was set up so: no worker may have room for such a file */
 	serve_mesh(0, 1);
 	assert_int_equal(hear_failed("do not fit below its limit"), 3 - first);
 	hear_silence();
+	finish();
+}
+
+static ssize_t write_nothing(int fd, const void *bytes, size_t size)
+{
+	(void)fd;
+	(void)bytes;
+	(void)size;
+	errno = ENOSPC;
+	return -1;
+}
+
+/* Its machine is at fault, and it says so to who understands. */
+static void a_full_disk_is_its_own_fault(void **state)
+{
+	(void)state;
+	struct disk full = disk_system;
+	full.write = write_nothing;
+	for (int hears = 0; hears < 2; hears++) {
+		t.hears_own = hears;
+		start(0);
+		begin_jobs(1);
+		hear_blob_get(&t.mesh, 0);
+		disk_use(&full);
+		send_piece(&t.mesh, 0);
+		assert_int_equal(hear_failed("No space left on device"), 1);
+		assert_int_equal(t.own, hears);
+		disk_use(NULL);
+		grant(1); /* with room again it works */
+		describe(1);
+		serve_mesh(0, PIECES);
+		hear_built(1);
+		finish();
+		folder_tear_down(NULL);
+		folder_set_up(NULL);
+	}
+}
+
+/* What was in the cache is there no more. */
+static void a_lost_file_is_its_own_fault(void **state)
+{
+	(void)state;
+	char command[128];
+	t.hears_own = true;
+	start(0);
+	begin_jobs(1);
+	serve_mesh(0, PIECES - 1);
+	hear_blob_get(&t.mesh, (PIECES - 1) * PIECE);
+	snprintf(command, sizeof command, "rm -f '%s'/slot-0/[0-9a-f]???????*", folder);
+	assert_int_equal(system(command), 0);
+	send_piece(&t.mesh, (PIECES - 1) * PIECE);
+	hear_failed("No such file");
+	assert_true(t.own);
 	finish();
 }
 
@@ -398,6 +457,8 @@ int main(void)
 		TEST(what_was_not_asked_for_is_refused),
 		TEST(lies_are_noticed),
 		TEST(a_store_without_room_fails_each_once),
+		TEST(a_full_disk_is_its_own_fault),
+		TEST(a_lost_file_is_its_own_fault),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
