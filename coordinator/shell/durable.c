@@ -21,6 +21,7 @@ enum { NOBODY = 0 /* peers are counted from 1 */ };
 struct ending {
 	struct ending *next;
 	struct job_record record;
+	bool written; /* the record, but the row of the ledger is not */
 };
 
 struct durable_ack {
@@ -91,9 +92,8 @@ int durable_begin(struct server *s, struct order *o, struct error *e)
 }
 
 /* Its journal goes only when the record says for good that it has ended. kept: the films stay (keep.h). */
-static int end(struct server *s, const struct job_record *r, bool kept, struct error *e)
+static int write_end(struct server *s, const struct job_record *r, bool kept, struct error *e)
 {
-	struct error late;
 	int rc = spool_write_record(s->spool, r, e);
 	if (rc && !r->has_result) /* what it has merged is for nobody, and may be what fills the disk */
 		keep_drop(s, r->id);
@@ -101,14 +101,28 @@ static int end(struct server *s, const struct job_record *r, bool kept, struct e
 		keep_drop_all(s);
 	if (rc)
 		rc = spool_write_record(s->spool, r, e);
-	if (rc)
-		return rc;
-	if (!kept)
+	if (!rc && !kept)
 		keep_drop(s, r->id);
-	/* The record says it already: without this row the next start reads it there. */
-	if (ledger_end(s->ledger, r->id, r->state, &late))
-		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(late.text).text);
-	return 0;
+	return rc;
+}
+
+static void end_later(struct server *s, const struct job_record *r, bool written)
+{
+	struct ending *n = mem_alloc(1, sizeof *n);
+	if (!n)
+		return;
+	*n = (struct ending){s->endings, *r, written};
+	s->endings = n;
+	s->endings_again = server_now(s) + s->config.retry_seconds;
+}
+
+void durable_end_row(struct server *s, const struct job_record *r)
+{
+	struct error e;
+	if (ledger_end(s->ledger, r->id, r->extended, r->state, &e) == 0)
+		return;
+	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"it is tried again\"", (unsigned long long)r->id, log_quote(e.text).text);
+	end_later(s, r, true);
 }
 
 int durable_end(struct server *s, struct order *o)
@@ -116,21 +130,19 @@ int durable_end(struct server *s, struct order *o)
 	struct error e;
 	if (journal_write(o->journal, &e)) /* for whoever extends it; what is not stored is computed again */
 		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	int rc = end(s, &o->record, keep_order(s, o), &e);
+	int rc = write_end(s, &o->record, keep_order(s, o), &e);
 	if (rc)
 		order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
 	if (rc && o->record.has_result) {
 		text_copy(o->record.why, sizeof o->record.why, e.text);
 		return rc;
 	}
-	struct ending *n = rc ? mem_alloc(1, sizeof *n) : NULL;
-	if (n) {
-		*n = (struct ending){s->endings, o->record};
-		s->endings = n;
-		s->endings_again = server_now(s) + s->config.retry_seconds;
+	if (rc) {
+		end_later(s, &o->record, false);
+	} else {
+		durable_end_row(s, &o->record);
+		journal_settle(o->journal); /* the record says more than what still waits for a flush */
 	}
-	if (!rc) /* the record says more than what still waits for a flush */
-		journal_settle(o->journal);
 	journal_release(o->journal); /* with its last holder it gives up its room, too */
 	o->journal = NULL;
 	return 0;
@@ -142,7 +154,11 @@ static void end_again(struct server *s)
 	if (!s->endings || server_now(s) < s->endings_again)
 		return;
 	s->endings_again = server_now(s) + s->config.retry_seconds;
-	for (struct ending *n; (n = s->endings) && end(s, &n->record, false, &e) == 0;) {
+	for (struct ending *n; (n = s->endings);) {
+		const struct job_record *r = &n->record;
+		n->written = n->written || write_end(s, r, false, &e) == 0;
+		if (!n->written || ledger_end(s->ledger, r->id, r->extended, r->state, &e))
+			return;
 		s->endings = n->next;
 		mem_free(n);
 	}

@@ -16,6 +16,8 @@ int durable_pack(const struct order *o, struct ledger_job *j, unsigned char **su
 /* It has ended: its record is written, its films are kept (keep.h) or go. Not 0: its record cannot be written, and it has a
  * result, which nobody must be told of yet. Records of others are tried again. */
 int durable_end(struct server *s, struct order *o);
+/* A job's record says that it has ended: so does the ledger then, or when it can be written again. */
+void durable_end_row(struct server *s, const struct job_record *r);
 
 /* Before the core sees the batch of this event: the frame for the journal, and room on the disk for it. -ENOSPC, -EFBIG: the disk
  * is full: the job is held until there is room. */

@@ -50,7 +50,7 @@ static void set_bounds(struct order *o, const struct plan_request *asked, const 
 
 static int store(struct server *s, const struct order *o, struct error *e)
 {
-	struct ledger_job j = {.id = o->id};
+	struct ledger_job j = {.id = o->id, .extended = o->record.extended};
 	unsigned char *submission, *plan;
 	int rc = durable_pack(o, &j, &submission, &plan, e);
 	if (!rc)
@@ -138,11 +138,10 @@ static int read_job(const struct server *s, uint64_t job, struct ledger_job *j, 
 static int begin_again(struct session *p, struct order *o, const struct job_record *r, struct error *e)
 {
 	struct server *s = p->server;
-	struct error fault;
+	o->record.extended++;
 	int rc = store(s, o, e);
 	if (rc)
 		return rc;
-	o->record.extended++;
 	o->record.has_result = r->has_result;
 	o->next = s->orders;
 	s->orders = o;
@@ -154,8 +153,9 @@ static int begin_again(struct session *p, struct order *o, const struct job_reco
 		rc = error_set(e, EAGAIN, "%s", p->rejected);
 	s->orders = o->next;
 	dispatch_remember(s, r);
-	if (ledger_end(s->ledger, o->id, job_state_name(JOB_DONE), &fault)) /* then it goes on when the coordinator starts again */
-		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)o->id, log_quote(fault.text).text);
+	struct job_record over = *r;
+	over.extended = o->record.extended;
+	durable_end_row(s, &over);
 	return rc;
 }
 

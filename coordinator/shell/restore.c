@@ -334,7 +334,7 @@ static void give_up(struct server *s, struct job_record *r, const char *why)
 	r->exit_code = 3;
 	r->ended = (double)now.tv_sec;
 	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
-	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) || ledger_end(s->ledger, r->id, r->state, &e))
+	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) || ledger_end(s->ledger, r->id, r->extended, r->state, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	dispatch_remember(s, r);
 }
@@ -355,7 +355,7 @@ int restore_open(struct server *s, struct error *e)
 			break;
 		/* Its record was written before its end came into the ledger. */
 		if (there && record_is_ended(r) && r->extended == j.extended) {
-			rc = ledger_end(s->ledger, id, r->state, e);
+			rc = ledger_end(s->ledger, id, r->extended, r->state, e);
 			continue;
 		}
 		uint64_t *more = mem_grow(s->restored, s->restored_count * sizeof *more, (s->restored_count + 1) * sizeof *more);
@@ -399,6 +399,7 @@ int restore_jobs(struct server *s, struct error *e)
 				break;
 			if (!there)
 				*r = (struct job_record){.id = id, .rel_error = -1};
+			r->extended = j.extended;
 			give_up(s, r, why.text);
 		}
 	}

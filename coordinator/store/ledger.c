@@ -93,8 +93,8 @@ int ledger_open(struct ledger **out, const char *path, struct error *e)
 		rc = prepare(l, &l->add, "INSERT INTO jobs (id, owner, name, version, priority, mixed, state, submitted, submission, plan)"
 					 " VALUES (?, ?, ?, ?, ?, ?, 'live', ?, ?, ?)", e);
 	if (!rc)
-		rc = prepare(l, &l->end, "UPDATE jobs SET state = ?2, ended = ?3, submission = NULL, plan = NULL, held = '' WHERE id = ?1 AND ended IS NULL",
-			     e);
+		rc = prepare(l, &l->end, "UPDATE jobs SET state = ?2, ended = ?3, submission = NULL, plan = NULL, held = '' WHERE id = ?1 AND ended IS NULL"
+				       " AND extended = ?4", e);
 	if (!rc)
 		rc = prepare(l, &l->hold, "UPDATE jobs SET held = ?2 WHERE id = ?1", e);
 	if (!rc)
@@ -102,8 +102,7 @@ int ledger_open(struct ledger **out, const char *path, struct error *e)
 	if (!rc)
 		rc = prepare(l, &l->drop, "DELETE FROM jobs WHERE ended < ?1", e);
 	if (!rc)
-		rc = prepare(l, &l->extend, "UPDATE jobs SET submission = ?2, plan = ?3, extended = extended + (ended IS NOT NULL), ended = NULL,"
-					    " state = 'live' WHERE id = ?1", e);
+		rc = prepare(l, &l->extend, "UPDATE jobs SET submission = ?2, plan = ?3, extended = ?4, ended = NULL, state = 'live' WHERE id = ?1", e);
 	if (!rc)
 		rc = prepare(l, &l->next, "SELECT " COLUMNS " FROM jobs WHERE ended IS NULL AND id > ? ORDER BY id LIMIT 1", e);
 	if (!rc)
@@ -156,13 +155,14 @@ int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e)
 	return finish(l, s, e);
 }
 
-int ledger_end(struct ledger *l, uint64_t id, const char *state, struct error *e)
+int ledger_end(struct ledger *l, uint64_t id, uint64_t extended, const char *state, struct error *e)
 {
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
 	sqlite3_bind_int64(l->end, 1, (sqlite3_int64)id);
 	sqlite3_bind_text(l->end, 2, state, -1, SQLITE_STATIC);
 	sqlite3_bind_double(l->end, 3, (double)now.tv_sec);
+	sqlite3_bind_int64(l->end, 4, (sqlite3_int64)extended);
 	return finish(l, l->end, e);
 }
 
@@ -191,7 +191,11 @@ int ledger_extend(struct ledger *l, const struct ledger_job *j, struct error *e)
 	sqlite3_bind_int64(l->extend, 1, (sqlite3_int64)j->id);
 	sqlite3_bind_blob64(l->extend, 2, j->submission, j->submission_size, SQLITE_STATIC);
 	sqlite3_bind_blob64(l->extend, 3, j->plan, j->plan_size, SQLITE_STATIC);
-	return finish(l, l->extend, e);
+	sqlite3_bind_int64(l->extend, 4, (sqlite3_int64)j->extended);
+	int rc = finish(l, l->extend, e);
+	if (!rc && sqlite3_changes(l->db) == 0)
+		rc = error_set(e, ENOENT, "the database of jobs has no j%llu", (unsigned long long)j->id);
+	return rc;
 }
 
 static const char *text_at(sqlite3_stmt *s, int column)

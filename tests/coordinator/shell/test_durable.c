@@ -1,6 +1,6 @@
 /*
  * What happens while the disk is asked: a checkpoint is held up in its last step, and meanwhile its job is cancelled or counts go on; a
- * record that cannot be written is written later. And what happens without memory.
+ * record or a row that cannot be written is written later; a job goes on while an earlier flush lasts. And what happens without memory.
  */
 #include "common/base/disk.h"
 #include "common/base/mem.h"
@@ -11,6 +11,7 @@
 
 #include <setjmp.h>
 #include <signal.h>
+#include <sqlite3.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stddef.h>
@@ -83,25 +84,19 @@ static int own_open(const char *path, int flags, mode_t mode)
 
 static int own_fdatasync(int fd)
 {
-	if (disk->hold_flush) {
-		disk->hold_flush = false;
-		disk->held_flush = true;
-		while (!disk->end_flush)
-			usleep(1000);
-		if (disk->fail_flush) {
-			errno = EIO;
-			return -1;
-		}
-	}
-	return disk_system.fdatasync(fd);
+	if (!atomic_exchange(&disk->hold_flush, false))
+		return disk_system.fdatasync(fd);
+	disk->held_flush = true;
+	while (!disk->end_flush)
+		usleep(1000);
+	errno = EIO;
+	return disk->fail_flush ? -1 : disk_system.fdatasync(fd);
 }
 
 static int own_fallocate(int fd, int mode, off_t at, off_t size)
 {
-	if (disk->fail_memory) {
-		disk->fail_memory = false;
+	if (atomic_exchange(&disk->fail_memory, false))
 		mem_fail_after((long)disk->allocations);
-	}
 	return disk_system.fallocate(fd, mode, at, size);
 }
 
@@ -172,6 +167,13 @@ static uint64_t submit(void)
 	return m->submit_answer->job;
 }
 
+static void order(const Farm__Envelope *m)
+{
+	assert_true(scripted_say(client, m, NULL, 0));
+	const Farm__Envelope *answer = scripted_hear(client);
+	assert_true(answer && answer->body_case == FARM__ENVELOPE__BODY_DONE && answer->done->ok);
+}
+
 static void cancel(uint64_t job)
 {
 	Farm__Cancel c;
@@ -181,9 +183,7 @@ static void cancel(uint64_t job)
 	c.job = job;
 	m.body_case = FARM__ENVELOPE__BODY_CANCEL;
 	m.cancel = &c;
-	assert_true(scripted_say(client, &m, NULL, 0));
-	const Farm__Envelope *answer = scripted_hear(client);
-	assert_true(answer && answer->body_case == FARM__ENVELOPE__BODY_DONE && answer->done->ok);
+	order(&m);
 }
 
 static void fail_lease(const struct lease_key *k)
@@ -214,12 +214,19 @@ static void extend(uint64_t job, uint64_t mutations)
 	c.more_mutations = mutations;
 	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
 	m.control = &c;
-	assert_true(scripted_say(client, &m, NULL, 0));
-	const Farm__Envelope *answer = scripted_hear(client);
-	assert_true(answer && answer->body_case == FARM__ENVELOPE__BODY_DONE && answer->done->ok);
+	order(&m);
 	struct plan_request longer = request;
 	longer.mutations += mutations;
 	assert_int_equal(plan_make(&longer, &plan, &e), 0);
+}
+
+/* false: the coordinator is gone. */
+static bool answer_lease(const struct lease_key *k)
+{
+	struct batch b = scripted_batch(k, &plan, STATE_BYTES);
+	bool said = scripted_send(worker, &b, &plan);
+	batch_fini(&b);
+	return said;
 }
 
 static unsigned sent, acknowledged, open_count;
@@ -229,11 +236,8 @@ static struct lease_key open_leases[8]; /* not answered yet */
 static void work_until(unsigned results, unsigned acks)
 {
 	for (;;) {
-		for (; open_count && sent < results; sent++) {
-			struct batch b = scripted_batch(&open_leases[--open_count], &plan, STATE_BYTES);
-			assert_true(scripted_send(worker, &b, &plan));
-			batch_fini(&b);
-		}
+		for (; open_count && sent < results; sent++)
+			assert_true(answer_lease(&open_leases[--open_count]));
 		if (sent == results && acknowledged >= acks)
 			return;
 		struct error e;
@@ -263,13 +267,10 @@ static void work(const _Atomic bool *until, struct lease_key *keep)
 		if (m->body_case != FARM__ENVELOPE__BODY_LEASE_GRANT)
 			continue;
 		assert_int_equal(grant_unpack(&grant, m->lease_grant, worker->reader.payload.bytes, worker->reader.payload.size, &e), 0);
-		if (keep && grant.key.kind == LEASE_RENDER && !keep->job) {
+		if (keep && grant.key.kind == LEASE_RENDER && !keep->job)
 			*keep = grant.key;
-		} else {
-			struct batch b = scripted_batch(&grant.key, &plan, STATE_BYTES);
-			assert_true(scripted_send(worker, &b, &plan));
-			batch_fini(&b);
-		}
+		else
+			assert_true(answer_lease(&grant.key));
 		grant_fini(&grant);
 	}
 }
@@ -382,7 +383,7 @@ static void a_record_is_written_later(void **state)
 	await_state(job, "done");
 	end(SIGTERM, true);
 	assert_int_equal(ledger_open(&l, path, &e), 0);
-	j = (struct ledger_job){.id = job, .submission = submission, .submission_size = j.submission_size, .plan = frame, .plan_size = j.plan_size};
+	j = (struct ledger_job){.id = job, .extended = 1, .submission = submission, .submission_size = j.submission_size, .plan = frame, .plan_size = j.plan_size};
 	assert_int_equal(ledger_extend(l, &j, &e), 0);
 	ledger_close(l);
 	free(submission);
@@ -399,10 +400,7 @@ static void a_record_is_written_later(void **state)
 
 static int count_batch(void *user, enum journal_kind kind, double elapsed, const unsigned char *body, size_t size, struct error *e)
 {
-	(void)elapsed;
-	(void)body;
-	(void)size;
-	(void)e;
+	(void)elapsed, (void)body, (void)size, (void)e;
 	*(unsigned *)user += kind == JOURNAL_BATCH;
 	return 0;
 }
@@ -410,8 +408,7 @@ static int count_batch(void *user, enum journal_kind kind, double elapsed, const
 /* Results of the job wait for a slow flush when it ends; it is extended, and others come, while the flush goes on. */
 static void extended_during_a_flush(bool fails)
 {
-	enum { MORE = 6, AFTER = 4 };
-	unsigned first = plan.groups * plan.parts * (unsigned)(plan.rounds + 1), there = 0;
+	unsigned first = plan.groups * plan.parts * (unsigned)(plan.rounds + 1), more = first + 6, after = more + 4, there = 0;
 	char path[150];
 	uint64_t cut;
 	struct journal *j;
@@ -427,10 +424,10 @@ static void extended_during_a_flush(bool fails)
 	assert_true(disk->held_flush && acknowledged == 0);
 	extend(job, 6400);
 	assert_true(scripted_want(worker, 3));
-	work_until(first + MORE, 0);
+	work_until(more, 0);
 	disk->end_flush = true;
-	work_until(first + MORE, first + MORE);
-	work_until(first + MORE + AFTER, first + MORE + AFTER);
+	work_until(more, more);
+	work_until(after, after);
 	await_state(job, "running");
 	end(SIGKILL, false);
 	snprintf(path, sizeof path, "%s/jobs/j%llu", spool, (unsigned long long)job);
@@ -462,10 +459,7 @@ static bool work_on(void)
 		if (m->body_case != FARM__ENVELOPE__BODY_LEASE_GRANT)
 			continue;
 		assert_int_equal(lease_key_from_wire(m->lease_grant->key, &k, &e), 0);
-		struct batch b = scripted_batch(&k, &plan, STATE_BYTES);
-		bool said = scripted_send(worker, &b, &plan);
-		batch_fini(&b);
-		if (!said)
+		if (!answer_lease(&k))
 			return false;
 	}
 	return false;
@@ -495,7 +489,37 @@ static void without_memory_for_a_result(void **state)
 	assert_true(ends > 0);
 }
 
-/* ---- without memory: the coordinator is in this process ---- */
+/* From now on the ledger takes no end of a job before a job 2 is in it. */
+static void refuse_ends(void)
+{
+	char path[150];
+	sqlite3 *db;
+	start();
+	end(SIGTERM, true);
+	snprintf(path, sizeof path, "%s/jobs.db", spool);
+	assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+	assert_int_equal(sqlite3_exec(db, "CREATE TRIGGER refuse BEFORE UPDATE OF ended ON jobs WHEN NEW.ended IS NOT NULL AND NOT EXISTS"
+					  " (SELECT * FROM jobs WHERE id = 2) BEGIN SELECT RAISE(ABORT, 'no'); END", NULL, NULL, NULL), SQLITE_OK);
+	assert_int_equal(sqlite3_close(db), SQLITE_OK);
+}
+
+static void extended_before_its_row_has_ended(void **state)
+{
+	(void)state;
+	keep_most = 1 << 30;
+	refuse_ends();
+	start();
+	uint64_t job = submit();
+	assert_true(work_on());
+	await_state(job, "done");
+	extend(job, 6400);
+	end(SIGKILL, false);
+	start();
+	await_state(job, "running");
+	end(SIGKILL, false);
+}
+
+/* ---- the coordinator is in this process ---- */
 
 static struct server *open_here(void)
 {
@@ -507,6 +531,27 @@ static struct server *open_here(void)
 	c.spool = spool;
 	c.retry_seconds = 0.05;
 	return server_open(&s, &c, &e) ? NULL : s;
+}
+
+static void a_row_ends_later(void **state)
+{
+	(void)state;
+	struct ledger_job j = {.id = 2, .owner = "", .name = "", .version = ""};
+	struct error e;
+	refuse_ends();
+	start();
+	uint64_t job = submit();
+	end(SIGKILL, false);
+	struct server *s = open_here();
+	assert_non_null(s);
+	server_step(s, &(struct event){.kind = EVENT_CANCEL, .job = job});
+	assert_true(s->endings && !s->orders);
+	assert_int_equal(ledger_add(s->ledger, &j, &e), 0);
+	while (s->endings)
+		uv_run(&s->loop, UV_RUN_ONCE);
+	assert_int_equal(ledger_next(s->ledger, 0, &j, &e), 1);
+	assert_int_equal(j.id, 2);
+	server_close(s);
 }
 
 /* Half of its leases are merged. */
@@ -591,6 +636,8 @@ int main(void)
 		cmocka_unit_test_setup_teardown(extended_during_a_slow_flush, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(extended_during_a_flush_that_fails, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(without_memory_for_a_result, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(extended_before_its_row_has_ended, set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_row_ends_later, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(no_memory_for_an_image, set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(no_memory_for_a_start, set_up, folder_tear_down),
 	};

@@ -45,7 +45,7 @@ static void living_jobs(void **state)
 	assert_int_equal(ledger_next(l, 0, &j, &e), 0);
 	for (uint64_t id = 1; id <= 3; id++)
 		add(l, id);
-	assert_int_equal(ledger_end(l, 2, "done", &e), 0);
+	assert_int_equal(ledger_end(l, 2, 0, "done", &e), 0);
 	ledger_close(l);
 	l = open_ledger(path);
 	assert_int_equal(ledger_next(l, 0, &j, &e), 1);
@@ -130,7 +130,7 @@ static void orders(void **state)
 	ledger_close(l);
 }
 
-/* A job that ended lives again with another plan, and it is counted; one that lives gets the plan alone. */
+/* A job that ended lives again with another plan, whether the row knew of its end or not; and that end is not one of its next life. */
 static void extended(void **state)
 {
 	(void)state;
@@ -144,15 +144,23 @@ static void extended(void **state)
 	assert_int_equal(ledger_extend(l, &more, &e), 0);
 	assert_int_equal(ledger_next(l, 0, &j, &e), 1);
 	assert_true(j.extended == 0 && j.submission_size == 3 && j.plan_size == 2);
-	assert_int_equal(ledger_end(l, 1, "done", &e), 0);
+	more.extended = 1; /* its end could not be written */
+	assert_int_equal(ledger_extend(l, &more, &e), 0);
+	assert_int_equal(ledger_end(l, 1, 0, "done", &e), 0);
+	assert_int_equal(ledger_next(l, 0, &j, &e), 1);
+	assert_int_equal(j.extended, 1);
+	assert_int_equal(ledger_end(l, 1, 1, "done", &e), 0);
 	assert_int_equal(ledger_next(l, 0, &j, &e), 0);
 	assert_int_equal(ledger_get(l, 1, &j, &e), 1);
 	assert_true(j.submission_size == 0 && j.priority == -3 && j.mixed);
+	more.extended = 2;
 	assert_int_equal(ledger_extend(l, &more, &e), 0);
+	more.id = 2;
+	assert_int_equal(ledger_extend(l, &more, &e), -ENOENT);
 	ledger_close(l);
 	l = open_ledger(path);
 	assert_int_equal(ledger_next(l, 0, &j, &e), 1);
-	assert_true(j.id == 1 && j.extended == 1 && j.submission_size == 3 && j.plan_size == 2);
+	assert_true(j.id == 1 && j.extended == 2 && j.submission_size == 3 && j.plan_size == 2);
 	assert_string_equal(j.owner, "7");
 	assert_string_equal(j.held, ""); /* with the end of the job that is over, too */
 	assert_int_equal(ledger_get(l, 2, &j, &e), 0);
@@ -204,7 +212,7 @@ static void stays_small(void **state)
 		struct ledger_job j = {.id = id, .owner = "", .name = "", .version = "", .submission = big, .submission_size = sizeof big,
 				       .plan = big, .plan_size = 10};
 		assert_int_equal(ledger_add(l, &j, &e), 0);
-		assert_int_equal(ledger_end(l, id, "done", &e), 0);
+		assert_int_equal(ledger_end(l, id, 0, "done", &e), 0);
 	}
 	snprintf(wal, sizeof wal, "%s-wal", path);
 	assert_int_equal(stat(wal, &st), 0);
