@@ -90,7 +90,6 @@ static void send_hello_ack(struct session *p, bool accepted, const char *said)
 	ack.accepted = accepted;
 	ack.text = text;
 	ack.version = FARM_VERSION;
-	ack.hears_own = true;
 	ack.heartbeat_ms = (uint32_t)(1000 * p->server->config.heartbeat_seconds);
 	m.body_case = FARM__ENVELOPE__BODY_HELLO_ACK;
 	m.hello_ack = &ack;

@@ -120,7 +120,7 @@ static void put_series(struct page *s, const struct plot *p, size_t k)
 	const char *colour = colours[k % (sizeof colours / sizeof *colours)];
 	int shape = shapes[k % (sizeof shapes / sizeof *shapes)];
 	if (r->style != PLOT_BAND && r->low && r->high)
-		page_put(s, "$d%zu using 1:2:3:4 with yerrorbars ps 0 lw 1.4 lc rgb '%s', ", k, colour);
+		page_put(s, "$d%zu using 1:2:3:4 with yerrorbars pt 0 lw 1.4 lc rgb '%s', ", k, colour);
 	page_put(s, "$d%zu using ", k);
 	if (r->style == PLOT_BAND)
 		page_put(s, "1:3:4 with filledcurves lc rgb '%s'", colour);

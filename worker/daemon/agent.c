@@ -94,7 +94,6 @@ static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
 	}
 	uint64_t ms = ack->heartbeat_ms >= 10 ? ack->heartbeat_ms : 10;
 	a->welcome = true;
-	a->hears_own = ack->hears_own;
 	a->back_off = first_back_off;
 	log_event(LOG_CONNECT, "coordinator=%s start=%llu", a->config.coordinator, (unsigned long long)a->cache.life.restarts);
 	if (*ack->text)

@@ -19,7 +19,6 @@ struct agent {
 	struct tls *tls; /* NULL: plaintext */
 	struct conn *conn; /* NULL: not connected */
 	bool welcome;      /* hello was accepted */
-	bool hears_own;    /* the coordinator knows LeaseFailed.own */
 	double back_off;   /* s before the next attempt */
 	char fingerprint[FINGERPRINT_MAX];
 	struct cache cache;

@@ -67,7 +67,7 @@ static void say_failed(struct agent *a, const struct lease_key *k, const char *t
 	text_clean(copy);
 	failed.key = &key;
 	failed.text = copy;
-	failed.own = own && a->hears_own;
+	failed.own = own;
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
 	m.lease_failed = &failed;
 	agent_send(a, &m);
