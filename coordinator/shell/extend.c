@@ -286,8 +286,9 @@ static int extend_ended(struct session *p, const struct extension *x, const stru
 /* ---- both ---- */
 
 /* Its films are in use, or those of another job are being read. */
-static bool must_wait(const struct server *s, const struct order *o)
+static bool must_wait(const struct server *s, uint64_t job)
 {
+	const struct order *o = server_order(s, job);
 	return o ? o->busy || o->ended : s->reading != NULL;
 }
 
@@ -300,10 +301,6 @@ static void go_on(struct session *p)
 	struct error e = {""};
 	char text[256] = "";
 	int rc;
-	if (must_wait(s, o)) {
-		s->extend_waits = true;
-		return;
-	}
 	p->wants.job = 0;
 	p->rejected[0] = 0;
 	if (o)
@@ -320,22 +317,39 @@ static void go_on(struct session *p)
 
 void extend_job(struct session *p, const struct extension *x)
 {
+	struct session **at = &p->server->extending;
 	struct error e;
 	int rc = p->wants.job ? error_set(&e, EBUSY, "one extension at a time: the one before is not answered yet") : extend_check(x, &e);
 	if (rc) {
 		answer(p, rc, &e, "");
 		return;
 	}
+	while (*at)
+		at = &(*at)->behind;
+	*at = p;
 	p->wants = *x;
-	go_on(p);
+	extend_waiting(p->server);
 }
 
 void extend_waiting(struct server *s)
 {
-	if (!s->extend_waits)
-		return;
-	s->extend_waits = false;
-	for (struct session *p = s->sessions; p; p = p->next)
-		if (p->wants.job)
-			go_on(p); /* which may let it wait on */
+	for (struct session **at = &s->extending, *p; (p = *at);) {
+		if (must_wait(s, p->wants.job)) {
+			at = &p->behind;
+			continue;
+		}
+		*at = p->behind;
+		p->behind = NULL;
+		go_on(p);
+		at = &s->extending; /* others may have been served meanwhile */
+	}
+}
+
+void extend_forget(struct session *p)
+{
+	struct session **at = &p->server->extending;
+	while (*at && *at != p)
+		at = &(*at)->behind;
+	if (*at)
+		*at = p->behind;
 }

@@ -38,7 +38,8 @@ int extend_plan(const struct plan *p, const struct extension *x, const struct ex
 /* Does it, or puts it off until the job's films are free or read; the session gets its Done. One at a time of a session: another one
  * meanwhile is refused. */
 void extend_job(struct session *p, const struct extension *x);
-/* Films are free or read, or a job has ended: those that were put off. */
+/* Films are free or read, or a job has ended: those that were put off, in the order in which they came. */
 void extend_waiting(struct server *s);
+void extend_forget(struct session *p); /* it goes */
 
 #endif

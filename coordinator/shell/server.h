@@ -101,7 +101,7 @@ struct server {
 	bool stepping, stopping;
 	bool caller_waits; /* nobody could be let in: to be tried again */
 	bool checkpointing; /* of some job, by the pool */
-	bool extend_waits;  /* some session's extension does */
+	struct session *extending; /* those with extensions that wait, in the order in which they came */
 	const struct order *reading; /* of an ended job: the pool reads its films, and all else of it but id and plan is the pool's */
 	double tls_next; /* when its files are looked at again */
 	double watchdog, watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */

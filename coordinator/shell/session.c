@@ -318,6 +318,7 @@ static void on_closed(void *user, const char *why)
 	session_upload_abort(p);
 	session_fetch_end(p);
 	asks_drop(p);
+	extend_forget(p);
 	log_event(conn_distrust(p->conn)	? LOG_PEER_REFUSED
 		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED
 						: LOG_PEER_ACCEPT, "peer=%llu address=%s name=%s text=%s",

@@ -40,6 +40,7 @@ struct session {
 	uint64_t wants_preview; /* job whose preview is being made for it; 0: none */
 	struct job_view *shown; /* what the watcher saw last */
 	struct extension wants; /* not answered yet: it waits until the job's films are free, or read; job 0: none */
+	struct session *behind; /* of those that wait for that */
 	char rejected[256];    /* why the core refused; "" it did not */
 	uint64_t answered_job; /* SUBMITTED or CANCELLED came for it */
 };

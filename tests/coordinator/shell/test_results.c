@@ -521,6 +521,40 @@ static void a_failure_counts_whatever_its_text(void **state)
 	scripted_hang_up(worker);
 }
 
+/* A client whose extension of job 2 has come. */
+static void ask(struct scripted *p)
+{
+	say_extend(p, 2, 8, 1);
+	peer_say_empty(p, FARM__ENVELOPE__BODY_JOB_LIST);
+	const Farm__Envelope *m = scripted_hear(p);
+	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_LIST_ANSWER);
+}
+
+static void extensions_are_served_as_they_came(void **state)
+{
+	(void)state;
+	enum { CLIENTS = 4 };
+	static const unsigned order[CLIENTS] = {1, 3, 0, 2};
+	struct scripted *p[CLIENTS];
+	unsigned long long last = 0, rounds = 0;
+	for (int i = 0; i < CLIENTS; i++)
+		assert_true(peer_hello(p[i] = peer_call(), FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	served_set_busy(true);
+	for (int i = 0; i < CLIENTS; i++)
+		ask(p[order[i]]);
+	scripted_hang_up(p[order[1]]);
+	served_set_busy(false);
+	for (int i = 0; i < CLIENTS; i++, last = rounds) {
+		if (i == 1)
+			continue;
+		hear_done(p[order[i]], true, "it goes on until");
+		const char *text = strstr(p[order[i]]->env.message->done->text, "until ");
+		assert_int_equal(sscanf(text, "until %llu", &rounds), 1);
+		assert_true(rounds > last);
+		scripted_hang_up(p[order[i]]);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -528,6 +562,7 @@ int main(void)
 		cmocka_unit_test(strategies_are_counted_once),
 		cmocka_unit_test(what_is_useless_does_not_wait),
 		cmocka_unit_test(extensions_wait_for_films), /* the job of strategies_are_counted_once lives again */
+		cmocka_unit_test(extensions_are_served_as_they_came),
 		cmocka_unit_test(a_failure_counts_whatever_its_text),
 	};
 	const struct CMUnitTest slow[] = {cmocka_unit_test(a_slow_result_counts), cmocka_unit_test(half_a_result_is_no_word)};
