@@ -20,8 +20,9 @@ Example:
   deploy/crops.sh -g 5x5 -s 3840x2160 -c rack1:7700,rack2:7700 -o room.exr room.xml --target-error 2% --tls ~/.hslt-ca/ann
 
 Called again with the same options it goes on: crops that are there are not rendered again. Jobs that run when it is ended go on and
-are not found again by it: hslt-job list, hslt-job cancel. Exit codes are those of hslt-submit --wait (0 done, 5 done, but chains of some
-crop disagree, 2 usage); when a crop failed 1, and what its hslt-submit said.
+are not found again by it: hslt-job list, hslt-job cancel. Exit codes are those of hslt-submit --wait (0 done, 4 done, but a bound came
+before the target error in some crop, 5 done, but chains of some crop disagree, 2 usage); when a crop failed 1, and what its hslt-submit
+said.
 TEXT
 }
 
@@ -74,7 +75,7 @@ program() {
 crops=$output.crops
 mkdir -p "$crops"
 pids=
-trap 'trap - TERM; kill $pids 2>/dev/null; wait; exit 130' INT TERM
+trap 'trap - TERM; kill $pids 2>/dev/null || :; wait; exit 130' INT TERM
 
 # What must not be mixed with crops of another call
 printf '%s\n' "$grid" "$size" "$@" >"$crops/call.new"
@@ -89,6 +90,17 @@ turn() {
 	echo "$coordinators" | awk -F, -v n="$1" '{ print $(n % NF + 1) }'
 }
 
+# crop FILE OPTION...: renders it, with the job's id, what hslt-submit says and its exit code beside it
+crop() {
+	file=$1 code=0
+	shift
+	trap 'kill ${!:-} 2>/dev/null || :; wait; exit 130' TERM
+	"$(program hslt-submit)" "$@" -o "$file.exr" --wait >"$file.id" 2>"$file.log" &
+	wait $! || code=$?
+	echo $code >"$file.code"
+	return $code
+}
+
 n=0 row=0 files=
 while [ $row -lt "$rows" ]; do
 	column=0
@@ -97,9 +109,14 @@ while [ $row -lt "$rows" ]; do
 		x=$((width * column / columns)) w=$((width * (column + 1) / columns - width * column / columns))
 		file=$crops/$column-$row
 		if [ ! -f "$file.exr" ]; then
-			"$(program hslt-submit)" --coordinator "$(turn $n)" "$@" -o "$file.exr" --size "$size" --crop "$x,$y,$w,$h" --wait >"$file.log" 2>&1 &
+			rm -f "$file.id" "$file.code"
+			crop "$file" --coordinator "$(turn $n)" "$@" --size "$size" --crop "$x,$y,$w,$h" &
 			pids="$pids $!"
 			files="$files $column-$row"
+			# Each hslt-submit builds the scene, and then waits: one after the other.
+			until [ -s "$file.id" ] || ! kill -0 $! 2>/dev/null; do
+				sleep 0.05
+			done
 		fi
 		n=$((n + 1)) column=$((column + 1))
 	done
@@ -107,9 +124,9 @@ while [ $row -lt "$rows" ]; do
 done
 echo "crops.sh: $n crops, $(echo $pids | wc -w) of them to render" >&2
 
-failed=0 done=0
+failed=0 done=0 left=$pids
 for file in $files; do
-	pid=${pids# } && pid=${pid%% *} && pids=${pids# } && pids=${pids#"$pid"}
+	pid=${left# } && pid=${pid%% *} && left=${left# } && left=${left#"$pid"}
 	code=0
 	wait "$pid" || code=$?
 	done=$((done + 1))
@@ -123,5 +140,8 @@ done
 [ $failed -eq 0 ] || exit 1
 code=0
 "$(program hslt-assemble)" "$crops"/*.exr -o "$output" || code=$?
-[ $code -ne 0 ] && [ $code -ne 5 ] || rm -rf "$crops"
+if [ $code -eq 0 ] && cat "$crops"/*.code 2>/dev/null | grep -qx 4; then
+	code=4
+fi
+case $code in 0 | 4 | 5) rm -rf "$crops" ;; esac
 exit $code

@@ -34,11 +34,43 @@ cp "$DIR/hslt.exr" "$DIR/chains.exr.crops/0-0.exr"
 printf '%s\n' 2x1 80x40 "$BOX" --mutations 40000 >"$DIR/chains.exr.crops/call"
 code 2 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" --mutations 40001
 says "another"
-code 0 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" --mutations 40000
+# The crop that is there had not reached a target error: so the film has not.
+echo 4 >"$DIR/chains.exr.crops/0-0.code"
+code 4 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" --mutations 40000
+[ ! -d "$DIR/chains.exr.crops" ] || fail "the crops are still there"
 says "2 crops, 1 of them to render"
 code 2 sh "$CROPS" -g 2y1 -s 80x40 -c "$FARMS" -o "$DIR/x.exr" "$BOX"
 code 1 sh "$CROPS" -p "$BIN" -g 1x1 -s 80x40 -c "$FARMS" -o "$DIR/x.exr" "$DIR/none.xml"
 says "0-0 failed"
+
+code 4 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/far.exr" "$BOX" -i path --spp 1 --target-error 0.001%
+[ -s "$DIR/far.exr" ] || fail "no image"
+
+# They submit one after the other, and wait together; whoever ends it ends them all.
+mkdir "$DIR/programs"
+cat >"$DIR/programs/hslt-submit" <<TEXT
+#!/bin/sh
+mkdir "$DIR/submits" || echo more than one >>"$DIR/submitted"
+sleep 0.1
+rmdir "$DIR/submits"
+echo \$\$ >>"$DIR/submitted"
+echo j1
+trap 'kill \$!; exit 143' TERM
+sleep 60 &
+wait
+echo not ended >>"$DIR/submitted"
+TEXT
+chmod +x "$DIR/programs/hslt-submit"
+sh "$CROPS" -p "$DIR/programs" -g 2x2 -s 80x40 -c "$FARMS" -o "$DIR/many.exr" "$BOX" 2>"$DIR/err.log" &
+pid=$!
+PIDS="$PIDS $pid"
+until_true 6 grep -q "4 of them" "$DIR/err.log" || fail "not all of them wait: $(cat "$DIR/submitted")"
+stop $pid
+[ "$CODE" = 130 ] || fail "it ended with $CODE"
+[ "$(wc -l <"$DIR/submitted")" = 4 ] || fail "they submitted at once, or were not ended: $(cat "$DIR/submitted")"
+for p in $(cat "$DIR/submitted"); do
+	! kill -0 "$p" 2>/dev/null || fail "process $p is left"
+done
 
 # What does not fit together
 "$BIN/hslt-render" "$BOX" -o "$DIR/right.exr" -i hslt --size 80x40 --crop 40,0,40,40 --mutations 40000 --threads 1 --quiet
