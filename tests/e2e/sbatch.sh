@@ -78,6 +78,7 @@ case "$*" in
 	echo list >>"$DIR/asked"
 	[ "$(wc -l <"$DIR/asked")" != "$LIST_DIES" ] || kill -TERM $$
 	cat "$DIR/list"
+	[ -z "$THEN" ] || sh "$DIR/list_of" $THEN
 	;;
 *--preview*) exit 1 ;;
 *fetch*)
@@ -88,7 +89,7 @@ esac
 TEXT
 
 export PATH="$PROGRAMS:$PATH" TMPDIR="$DIR/tmp" HSLT_SPOOL="$DIR/shared" HSLT_GRACE=2.5 SLURM_JOB_ID=7 SLURM_RESTART_COUNT=0 SLURMD_NODENAME=n1 SLURM_CPUS_ON_NODE=1
-export SUBMIT=0 FETCH=0 JOB= NAPS= LIST_DIES= AGAIN= FOREIGN=
+export SUBMIT=0 FETCH=0 JOB= NAPS= LIST_DIES= THEN= AGAIN= FOREIGN=
 unset HSLT_BIN HSLT_CA HSLT_INSECURE SLURM_CPUS_PER_TASK
 
 # life CODE SPOOL [NAME=VALUE...]: what it ends with, and whether the spool is "kept" or "gone"
@@ -150,7 +151,8 @@ first 0 gone NAPS=150 # as often as 0.1 s are in 15 s
 next done 0 true 0 gone
 says "goes on from an earlier life"
 next done 5 true 5 gone
-next failed 3 false 3 gone FETCH=1
+next running 0 false 3 gone THEN="failed 3 false" FETCH=1
+next failed 3 false 0 gone SUBMIT=0 JOB="done 0 true" FETCH=1 # the life before ended while it submitted
 next done 0 true 1 kept FETCH=1
 next done 0 true 75 kept FETCH=75
 next done 0 true 143 kept FETCH=TERM
