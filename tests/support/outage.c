@@ -173,7 +173,7 @@ static void check_image(const unsigned char *bytes, size_t size, const struct pl
 /* false: it hung up. */
 static bool fetch(struct farm_run *f, uint64_t id, bool *there)
 {
-	const Farm__Envelope *m = ask(f->client, scripted_fetch(f->client, id, FARM__WHAT__WHAT_RESULT));
+	const Farm__Envelope *m = ask(f->client, scripted_fetch(f->client, id, FARM__WHAT__WHAT_RESULT, 0));
 	if (!m)
 		return false;
 	assert_int_equal(m->body_case, FARM__ENVELOPE__BODY_FETCH_CHUNK);

@@ -192,7 +192,7 @@ bool scripted_list(const struct scripted *p)
 	return scripted_say(p, &m, NULL, 0);
 }
 
-bool scripted_fetch(const struct scripted *p, uint64_t job, Farm__What what)
+bool scripted_fetch(const struct scripted *p, uint64_t job, Farm__What what, uint64_t offset)
 {
 	Farm__Fetch f;
 	Farm__Envelope m;
@@ -200,6 +200,7 @@ bool scripted_fetch(const struct scripted *p, uint64_t job, Farm__What what)
 	farm__envelope__init(&m);
 	f.job = job;
 	f.what = what;
+	f.offset = offset;
 	m.body_case = FARM__ENVELOPE__BODY_FETCH;
 	m.fetch = &f;
 	return scripted_say(p, &m, NULL, 0);

@@ -30,7 +30,7 @@ bool scripted_submit(const struct scripted *p, const struct plan_request *r, con
 bool scripted_send_scene(const struct scripted *p, const char *scene);
 bool scripted_want(const struct scripted *p, uint32_t leases);
 bool scripted_list(const struct scripted *p);
-bool scripted_fetch(const struct scripted *p, uint64_t job, Farm__What what);
+bool scripted_fetch(const struct scripted *p, uint64_t job, Farm__What what, uint64_t offset);
 
 /* Even-tempered light that is another in every lease; chain states of so many bytes that begin with a number of the lease. */
 struct batch scripted_batch(const struct lease_key *k, const struct plan *plan, uint32_t state_bytes);

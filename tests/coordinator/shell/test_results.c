@@ -107,16 +107,7 @@ static void make_preview(char letter)
 
 static const Farm__FetchChunk *piece(struct scripted *p, uint64_t offset)
 {
-	Farm__Fetch f;
-	Farm__Envelope m;
-	farm__fetch__init(&f);
-	farm__envelope__init(&m);
-	f.job = 1;
-	f.what = FARM__WHAT__WHAT_PREVIEW;
-	f.offset = offset;
-	m.body_case = FARM__ENVELOPE__BODY_FETCH;
-	m.fetch = &f;
-	peer_say(p, &m, NULL, 0);
+	assert_true(scripted_fetch(p, 1, FARM__WHAT__WHAT_PREVIEW, offset));
 	const Farm__Envelope *answer = scripted_hear(p);
 	assert_true(answer && answer->body_case == FARM__ENVELOPE__BODY_FETCH_CHUNK);
 	return answer->fetch_chunk;
