@@ -27,7 +27,7 @@ LIBS_COMMON := -lOpenEXRCore -lprotobuf-c -luv -lssl -lcrypto -ljansson -lsqlite
 LIBS_RENDER := $(EMBREE) -lexpat -lpng -ljpeg -lz
 
 COMMON_SRC := $(wildcard common/*/*.c)
-RENDER_SRC := $(filter-out %_gen.c,$(wildcard worker/math/*.c worker/scene/*.c worker/geom/*.c worker/texture/*.c worker/bsdf/*.c \
+RENDER_SRC := $(filter-out %_gen.c,$(wildcard worker/math/*.c worker/scene/*.c worker/shape/*.c worker/geom/*.c worker/texture/*.c worker/bsdf/*.c \
               worker/emitter/*.c worker/camera/*.c worker/world/*.c worker/path/*.c worker/halfvec/*.c worker/mutation/*.c worker/chain/*.c worker/render/*.c))
 CTL_SRC    := $(filter-out coordinator/ctl/hslt_%.c,$(wildcard coordinator/ctl/*.c))
 COORD_SRC  := $(wildcard coordinator/core/*.c coordinator/store/*.c coordinator/shell/*.c)

@@ -6,7 +6,7 @@
 #include "tests/fuzz/messages.h"
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
-#include "worker/scene/mesh.h"
+#include "worker/shape/shape.h"
 
 #include <string.h>
 

@@ -59,8 +59,9 @@ const struct plugin_decl *scene_tables(void)
 	size_t n = 0;
 	for (size_t i = 0; i < sizeof own / sizeof *own; i++)
 		all[n++] = own[i];
-	for (const struct plugin_decl *d = shape_decls; d->type; d++)
-		all[n++] = *d;
+	for (size_t i = 0; shape_registry[i]; i++)
+		all[n++] = (struct plugin_decl){PLUGIN_SHAPE, shape_registry[i]->type, shape_registry[i]->params,
+						shape_nested_classes, PARAM_UNDERSTOOD};
 	for (const struct plugin_decl *d = setting_decls; d->type; d++)
 		all[n++] = *d;
 	assert(n < sizeof all / sizeof *all);

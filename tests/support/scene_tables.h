@@ -2,7 +2,7 @@
 #ifndef TESTS_SUPPORT_SCENE_TABLES_H
 #define TESTS_SUPPORT_SCENE_TABLES_H
 
-#include "worker/scene/mesh.h"
+#include "worker/shape/shape.h"
 #include "worker/scene/settings.h"
 
 /* Shapes and settings of the program, materials, textures and emitters of the test. Ends with a NULL type. */

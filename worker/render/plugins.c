@@ -3,7 +3,7 @@
 
 #include "worker/bsdf/bsdf.h"
 #include "worker/emitter/emitter.h"
-#include "worker/scene/mesh.h"
+#include "worker/shape/shape.h"
 
 #include <assert.h>
 #include <pthread.h>
@@ -21,8 +21,9 @@ static void add(struct plugin_decl d)
 
 static void gather(void)
 {
-	for (const struct plugin_decl *d = shape_decls; d->type; d++)
-		add(*d);
+	for (size_t i = 0; shape_registry[i]; i++)
+		add((struct plugin_decl){PLUGIN_SHAPE, shape_registry[i]->type, shape_registry[i]->params, shape_nested_classes,
+					 PARAM_UNDERSTOOD});
 	for (const struct plugin_decl *d = setting_decls; d->type; d++)
 		add(*d);
 	for (size_t i = 0; bsdf_registry[i]; i++)

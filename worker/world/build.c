@@ -2,7 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/tick.h"
-#include "worker/scene/mesh.h"
+#include "worker/shape/shape.h"
 #include "worker/world/displacement.h"
 #include "worker/world/reach.h"
 

@@ -1,6 +1,6 @@
 #include "worker/world/displacement.h"
 
-#include "worker/scene/displace.h"
+#include "worker/shape/displace.h"
 #include "worker/texture/texture.h"
 
 const struct property *displacement_of(const struct scene_node *shape)

@@ -5,7 +5,7 @@
 #ifndef WORKER_WORLD_DISPLACEMENT_H
 #define WORKER_WORLD_DISPLACEMENT_H
 
-#include "worker/scene/mesh.h"
+#include "worker/shape/shape.h"
 
 /* The property; NULL: this shape is not displaced. */
 const struct property *displacement_of(const struct scene_node *shape);

@@ -1,6 +1,6 @@
 /* The public scenes in the folder that HSLT_SCENES names, with the program's own tables; skipped where it is not set. */
 #include "worker/render/render.h"
-#include "worker/scene/mesh.h"
+#include "worker/shape/shape.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,4 +1,4 @@
-#include "worker/scene/displace_grid.h"
+#include "worker/shape/displace_grid.h"
 
 #include <stdlib.h>
 

@@ -1,8 +1,8 @@
-#include "worker/scene/displace.h"
+#include "worker/shape/displace.h"
 
 #include "common/base/tick.h"
-#include "worker/scene/displace_grid.h"
-#include "worker/scene/mesh_raw.h"
+#include "worker/shape/displace_grid.h"
+#include "worker/shape/mesh.h"
 
 #include <string.h>
 

@@ -1,4 +1,4 @@
-#include "worker/scene/mesh_raw.h"
+#include "worker/shape/mesh.h"
 
 #include <string.h>
 
@@ -10,6 +10,14 @@ bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool norm
 	m->normal = normals ? arena_alloc(arena, vertices, sizeof *m->normal) : NULL;
 	m->uv = uv ? arena_alloc(arena, vertices, sizeof *m->uv) : NULL;
 	return m->position && m->index && (m->normal || !normals) && (m->uv || !uv);
+}
+
+void mesh_set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, double v)
+{
+	mesh_store(m->position[i], p);
+	mesh_store(m->normal[i], n);
+	m->uv[i][0] = u;
+	m->uv[i][1] = v;
 }
 
 static bool in_range(vec3 p)

@@ -1,11 +1,11 @@
 /*
  * Meshes while they are built: object space, normals perhaps missing. One thread; arrays in the arena given.
  */
-#ifndef WORKER_SCENE_MESH_RAW_H
-#define WORKER_SCENE_MESH_RAW_H
+#ifndef WORKER_SHAPE_MESH_H
+#define WORKER_SHAPE_MESH_H
 
 #include "common/base/arena.h"
-#include "worker/scene/mesh.h"
+#include "worker/shape/shape.h"
 
 enum { MESH_TRIANGLES_MAX = 1 << 27 };
 #define MESH_COORDINATE_MAX 1e60 /* so that squares of areas stay finite */
@@ -30,6 +30,9 @@ static inline double mesh_angle(vec3 a, vec3 b)
 /* Allocates the arrays; false: out of memory. */
 bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool normals, bool uv, struct arena *arena);
 
+/* Vertex i; n: a unit vector. */
+void mesh_set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, double v);
+
 struct mesh_finish {
 	mat4 to_world;
 	bool flip_normals, face_normals;
@@ -43,8 +46,5 @@ struct mesh_finish {
  */
 int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped, const struct scene_node *n,
 		struct error *e);
-
-int mesh_read_obj(const struct scene_node *n, const struct asset_source *assets, struct arena *arena, struct mesh *m,
-		  struct error *e);
 
 #endif

@@ -13,10 +13,10 @@
  * A sphere becomes a mesh of 8 * 4^level triangles (an octahedron's, pushed out to the sphere) with the sphere's (u,v).
  * One thread. Allocates in the arena given; what it needs besides is freed.
  */
-#ifndef WORKER_SCENE_DISPLACE_H
-#define WORKER_SCENE_DISPLACE_H
+#ifndef WORKER_SHAPE_DISPLACE_H
+#define WORKER_SHAPE_DISPLACE_H
 
-#include "worker/scene/mesh.h"
+#include "worker/shape/shape.h"
 
 enum { DISPLACE_LEVEL_MAX = 13 };
 

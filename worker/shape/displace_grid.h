@@ -3,11 +3,11 @@
  * triangles that share it in the base mesh (or its edge); a place is shared by all that lie there, whatever their normals.
  * Points inside a triangle are a vertex and have no place of their own. One thread.
  */
-#ifndef WORKER_SCENE_DISPLACE_GRID_H
-#define WORKER_SCENE_DISPLACE_GRID_H
+#ifndef WORKER_SHAPE_DISPLACE_GRID_H
+#define WORKER_SHAPE_DISPLACE_GRID_H
 
 #include "common/base/arena.h"
-#include "worker/scene/mesh.h"
+#include "worker/shape/shape.h"
 
 struct displace_side {
 	uint32_t vertices, places; /* the edge's number among those of vertices, and of places */

@@ -4,11 +4,23 @@
  */
 #include "common/base/mem.h"
 #include "common/base/tick.h"
-#include "worker/scene/mesh_raw.h"
 #include "worker/scene/number.h"
+#include "worker/shape/declare.h"
+#include "worker/shape/mesh.h"
 
 #include <stdlib.h>
 #include <string.h>
+
+static const struct param params[] = {
+	{"filename", UNDERSTOOD(VALUE_STRING)},
+	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
+	{"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)},
+	{"collapse", IGNORED},
+	{"load_materials", IGNORED}, /* .mtl files are never read */
+	{"max_smooth_angle", REFUSED},
+	{"shape_index", REFUSED},
+	SHAPE_PARAMS_END,
+};
 
 struct list {
 	void *items;
@@ -276,8 +288,8 @@ static int make_mesh(struct obj *o, struct arena *arena, struct mesh *m, bool fl
 	return ok ? 0 : out_of_memory(o);
 }
 
-int mesh_read_obj(const struct scene_node *n, const struct asset_source *assets, struct arena *arena, struct mesh *m,
-		  struct error *e)
+static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		 struct shape_geometry *out, struct error *e)
 {
 	const char *name = node_string(n, "filename", NULL);
 	if (!name)
@@ -296,7 +308,7 @@ int mesh_read_obj(const struct scene_node *n, const struct asset_source *assets,
 	r = a.size > UINT32_MAX ? node_error(n, e, EFBIG, "%s: larger than 4 GB", name) : read_lines(&o);
 	assets->close(assets->user, &a);
 	if (!r)
-		r = make_mesh(&o, arena, m, node_bool(n, "flip_tex_coords", true));
+		r = make_mesh(&o, arena, &out->mesh, node_bool(n, "flip_tex_coords", true));
 	mem_free(o.positions.items);
 	mem_free(o.normals.items);
 	mem_free(o.uvs.items);
@@ -304,3 +316,5 @@ int mesh_read_obj(const struct scene_node *n, const struct asset_source *assets,
 	mem_free(o.triangles.items);
 	return r;
 }
+
+const struct shape_ops shape_ops_obj = {"obj", params, build};

@@ -5,8 +5,8 @@
 #include "common/base/mem.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"
-#include "worker/scene/displace.h"
-#include "worker/scene/mesh_raw.h"
+#include "worker/shape/displace.h"
+#include "worker/shape/mesh.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
