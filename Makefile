@@ -106,7 +106,12 @@ LIB_TEST     := $(BUILD)/lib/libhslt-test.a
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
-tests: $(TEST_BIN)
+# What tests/run.sh ends a test by. It needs no library, and no sanitizer: it is no test.
+LIMIT := $(BUILD)/tests/limit/limit
+$(LIMIT): tests/limit/limit.c
+	@mkdir -p $(@D)
+	$(CC) $(CPPFLAGS) $(filter-out -fsanitize% -fno-sanitize%,$(CFLAGS)) $< -o $@
+tests: $(TEST_BIN) $(LIMIT)
 # Sanitized runs take 1/20 of the samples.
 test: programs tests $(BUILD)/load/load
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)

@@ -1,7 +1,10 @@
 # tests/run.sh counts and names what was skipped, as a whole and in part, and what failed; where everything is installed a test that
-# lacks something fails.
+# lacks something fails. A test ends by the processor time that it uses, or when it has long been idle; not because a machine is busy.
 . "$(dirname "$0")/lib.sh"
-mkdir -p "$DIR/tests/e2e" "$DIR/build/tests/one"
+LIMIT=$BUILD/tests/limit/limit
+[ -x "$LIMIT" ] || lacks "$LIMIT is not built"
+mkdir -p "$DIR/tests/e2e" "$DIR/build/tests/one" "$DIR/build/tests/limit"
+cp "$LIMIT" "$DIR/build/tests/limit/"
 cp "$HERE/../run.sh" "$DIR/tests/"
 cp "$HERE/lib.sh" "$DIR/tests/e2e/"
 script() {
@@ -54,4 +57,29 @@ skipped: one/test_one: wet: no rain
 2 passed, 1 failed, 3 skipped
 TEXT
 [ $CODE -eq 1 ] || fail "a test that lacks something where all is installed: $CODE"
-echo "what is skipped is named"
+
+# limited CPU IDLE CODE SAID SCRIPT [ARGUMENT...]: how it ends, and that nothing of it is left: its processes hold the other end of a pipe
+limited() {
+	wanted=$3 said=$4 CODE=0
+	cpu=$1 idle=$2
+	shift 4
+	{ "$LIMIT" "$cpu" "$idle" sh -c "$@" >"$DIR/said" 2>"$DIR/err.log" || echo $? >"$DIR/code"; } 7>&1 | cat
+	[ ! -s "$DIR/code" ] || CODE=$(cat "$DIR/code")
+	rm -f "$DIR/code"
+	{ [ $CODE -eq "$wanted" ] && cat "$DIR/said" "$DIR/err.log" | grep -q "$said"; } || fail "limit: $CODE: $(cat "$DIR/said" "$DIR/err.log")"
+}
+limited 60 60 3 yes 'echo yes; exit 3'
+limited 60 60 137 yes 'echo yes; kill -9 $$'
+limited 1 60 124 'has used the processor' 'while :; do :; done'
+# Also what it started and no longer waits for, and the sum of many that are short.
+limited 1 60 124 'has used the processor' 'setsid sh -c "(while :; do :; done) & exec sleep 1000" & wait'
+limited 1 60 124 'has used the processor' 'while :; do dd if=/dev/zero of=/dev/null bs=1M count=2000 2>/dev/null; done'
+limited 60 2 124 'has been idle' 'sleep 1000'
+limited 60 2 124 'has been idle' 'trap "" TERM; while :; do sleep 0.2; done & wait'
+limited 60 2 124 'has been idle' 'kill -STOP $$'
+limited 60 2 0 last 'for i in 1 2 3 4 5 6; do echo $i; sleep 0.7; done; echo last'
+# On a processor that another one takes, for three times as long as it may be idle: 30 ms of work a second, if that much.
+one=$(taskset -cp $$ | sed 's/.*: //; s/[-,].*//')
+taskset -c "$one" timeout 6 sh -c 'while :; do :; done' &
+limited 60 2 0 done 'exec taskset -c "$0" chrt --idle 0 sh -c "i=0; while [ \$i -lt 300000 ]; do i=\$((i + 1)); done; echo done"' "$one"
+echo "what is skipped is named, and limits hold"
