@@ -2,6 +2,22 @@
 
 #include <string.h>
 
+vec3 mesh_unit(vec3 v)
+{
+	double largest = fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
+	return largest > 0 ? vec3_normalize((vec3){v.x / largest, v.y / largest, v.z / largest}) : v;
+}
+
+int mesh_open(const struct scene_node *n, const struct asset_source *assets, struct asset *a, struct error *e)
+{
+	const char *name = node_string(n, "filename", NULL);
+	if (!name)
+		return node_error(n, e, EINVAL, "needs a filename");
+	struct error inner;
+	int r = assets->open(assets->user, name, a, &inner);
+	return r ? node_error(n, e, -r, "%s", inner.text) : 0;
+}
+
 bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool normals, bool uv, struct arena *arena)
 {
 	*m = (struct mesh){.vertex_count = vertices, .triangle_count = triangles};

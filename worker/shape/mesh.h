@@ -27,6 +27,12 @@ static inline double mesh_angle(vec3 a, vec3 b)
 	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
 }
 
+/* v without its length, however long it is; 0 where it has none. */
+vec3 mesh_unit(vec3 v);
+
+/* The file that a shape names; the caller closes it. */
+int mesh_open(const struct scene_node *n, const struct asset_source *assets, struct asset *a, struct error *e);
+
 /* Allocates the arrays; false: out of memory. */
 bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool normals, bool uv, struct arena *arena);
 

@@ -112,13 +112,7 @@ static int read_normal(struct obj *o)
 	if (r)
 		return r;
 	double *n = (double *)o->normals.items + 3 * (o->normals.count - 1);
-	double largest = fmax(fabs(n[0]), fmax(fabs(n[1]), fabs(n[2])));
-	if (largest > 0) {
-		vec3 unit = vec3_normalize((vec3){n[0] / largest, n[1] / largest, n[2] / largest});
-		n[0] = unit.x;
-		n[1] = unit.y;
-		n[2] = unit.z;
-	}
+	mesh_store(n, mesh_unit(mesh_load(n)));
 	return 0;
 }
 
@@ -291,15 +285,11 @@ static int make_mesh(struct obj *o, struct arena *arena, struct mesh *m, bool fl
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)
 {
-	const char *name = node_string(n, "filename", NULL);
-	if (!name)
-		return node_error(n, e, EINVAL, "needs a filename");
 	struct asset a;
-	struct error inner;
-	int r = assets->open(assets->user, name, &a, &inner);
+	int r = mesh_open(n, assets, &a, e);
 	if (r)
-		return node_error(n, e, -r, "%s", inner.text);
-	const char *bytes = (const char *)a.bytes;
+		return r;
+	const char *name = node_string(n, "filename", ""), *bytes = (const char *)a.bytes;
 	struct obj o = {.node = n, .name = name, .error = e, .p = bytes, .end = bytes + a.size};
 	o.positions.size = o.normals.size = 3 * sizeof(double);
 	o.uvs.size = 2 * sizeof(double);

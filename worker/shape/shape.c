@@ -29,6 +29,6 @@ int shape_build(const struct scene_node *n, const struct asset_source *assets, s
 	if (r || out->kind != SHAPE_MESH)
 		return r;
 	struct mesh_finish f = {node_transform(n, "to_world"), node_bool(n, "flip_normals", false),
-				node_bool(n, "face_normals", false)};
+				out->face_normals || node_bool(n, "face_normals", false)};
 	return mesh_finish(&out->mesh, &f, arena, dropped, n, e);
 }

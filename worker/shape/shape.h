@@ -30,6 +30,7 @@ enum shape_kind { SHAPE_MESH, SHAPE_SPHERE };
 struct shape_geometry {
 	enum shape_kind kind;
 	struct mesh mesh;     /* arrays owned by the arena given */
+	bool face_normals;    /* its file wants each triangle flat */
 	struct sphere sphere;
 };
 

@@ -1,5 +1,9 @@
 /* One line a shape: its const struct shape_ops is shape_ops_NAME. */
 SHAPE(obj)
+SHAPE(ply)
+SHAPE(serialized)
 SHAPE(rectangle)
 SHAPE(cube)
 SHAPE(sphere)
+SHAPE(disk)
+SHAPE(cylinder)

@@ -149,12 +149,88 @@ static void test_sphere(void **state)
 	assert_false(b.g.sphere.flip_normals);
 	assert_vec3(mat4_vector(&b.g.sphere.to_world, (vec3){1, 0, 0}), 0, 1, 0);
 	release(&b);
-	b = build("sphere", "<transform name='to_world'><scale x='2'/></transform>", NULL);
+	b = build("sphere", "<transform name='to_world'><scale z='0'/></transform>", NULL);
 	assert_int_equal(b.result, -EINVAL);
-	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"sphere\">: to_world must turn, move and scale"));
+	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"sphere\">: to_world flattens the shape"));
 	release(&b);
-	b = build("sphere", "<transform name='to_world'><matrix value='1 0.1 0 0 1 0 0 0 1'/></transform>", NULL);
+	b = build("sphere", "<float name='radius' value='1e50'/><transform name='to_world'><scale x='1e50'/></transform>", NULL);
+	assert_int_equal(b.result, -ERANGE);
+	release(&b);
+}
+
+static double area(const struct mesh *m)
+{
+	double sum = 0;
+	for (uint32_t i = 0; i < m->triangle_count; i++) {
+		vec3 a = at(m->position[m->index[i][0]]), b = at(m->position[m->index[i][1]]), c = at(m->position[m->index[i][2]]);
+		sum += 0.5 * vec3_length(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)));
+	}
+	return sum;
+}
+
+/* A sphere that is scaled unevenly, mirrored and sheared: its points and normals against those of x^T A x = 1. */
+static void test_ellipsoid(void **state)
+{
+	(void)state;
+	struct built b = build_ok("sphere", "<float name='radius' value='2'/><transform name='to_world'>"
+					    "<matrix value='-2 0 0 0.5 1 0 0 0 3'/></transform>", NULL);
+	const struct mesh *m = &b.g.mesh;
+	assert_int_equal(b.g.kind, SHAPE_MESH);
+	assert_non_null(m->uv);
+	for (uint32_t i = 0; i < m->vertex_count; i++) {
+		/* o = M^-1 p lies on the sphere, M^-T o is the normal's direction. */
+		const double *p = m->position[i];
+		vec3 o = {-p[0] / 2, p[1] + p[0] / 4, p[2] / 3};
+		assert_true(fabs(vec3_length(o) - 2) < 1e-12);
+		vec3 n = vec3_normalize((vec3){-o.x / 2 + o.y / 4, o.y, o.z / 3});
+		assert_true(vec3_length(vec3_sub(n, at(m->normal[i]))) < 1e-6);
+	}
+	assert_facing(m, 1);
+	release(&b);
+	b = build_ok("sphere", "<boolean name='flip_normals' value='true'/><transform name='to_world'><scale x='2'/></transform>", NULL);
+	assert_facing(&b.g.mesh, -1);
+	/* A prolate spheroid's area: 2 pi (1 + c / e asin e), c = 2, e^2 = 3/4. */
+	double e = sqrt(0.75);
+	assert_true(fabs(area(&b.g.mesh) / (2 * M_PI * (1 + 2 / e * asin(e))) - 1) < 1e-3);
+	release(&b);
+}
+
+static void test_disk(void **state)
+{
+	(void)state;
+	struct built b = build_ok("disk", "<transform name='to_world'><scale value='3'/><translate z='1'/></transform>", NULL);
+	const struct mesh *m = &b.g.mesh;
+	assert_true(fabs(area(m) / (9 * M_PI) - 1) < 1e-12);
+	for (uint32_t i = 0; i < m->triangle_count; i++)
+		assert_vec3(triangle_normal(m, i), 0, 0, 1);
+	for (uint32_t i = 0; i < m->vertex_count; i++) {
+		vec3 p = at(m->position[i]);
+		double r = hypot(p.x, p.y) / 3, u = m->uv[i][0], turn = atan2(p.y, p.x) / (2 * M_PI);
+		assert_true(p.z == 1 && fabs(r - u) < 1e-4 && m->uv[i][1] >= 0 && m->uv[i][1] <= 1);
+		assert_true(u == 0 || fabs(m->uv[i][1] - turn - floor(m->uv[i][1] - turn + 0.5)) < 1e-12);
+	}
+	release(&b);
+}
+
+static void test_cylinder(void **state)
+{
+	(void)state;
+	struct built b = build_ok("cylinder", "<point name='p0' x='1' y='0' z='0'/><point name='p1' x='1' y='4' z='0'/>"
+					      "<float name='radius' value='0.5'/>", NULL);
+	const struct mesh *m = &b.g.mesh;
+	assert_true(fabs(area(m) / (2 * M_PI * 0.5 * 4) - 1) < 1e-4);
+	for (uint32_t i = 0; i < m->vertex_count; i++) {
+		vec3 p = at(m->position[i]), out = vec3_normalize((vec3){p.x - 1, 0, p.z});
+		assert_true(fabs(hypot(p.x - 1, p.z) - 0.5) < 1e-4);
+		assert_true(vec3_length(vec3_sub(out, at(m->normal[i]))) < 1e-12);
+		assert_true(p.y == 4 * m->uv[i][1]);
+	}
+	for (uint32_t i = 0; i < m->triangle_count; i++)
+		assert_true(vec3_dot(triangle_normal(m, i), at(m->normal[m->index[i][0]])) > 0.99);
+	release(&b);
+	b = build("cylinder", "<point name='p0' x='1' y='0' z='0'/><point name='p1' x='1' y='0' z='0'/>", NULL);
 	assert_int_equal(b.result, -EINVAL);
+	assert_non_null(strstr(b.error.text, "a cylinder from (1, 0, 0) to (1, 0, 0)"));
 	release(&b);
 }
 
@@ -320,6 +396,9 @@ int main(void)
 		cmocka_unit_test(test_cube),
 		cmocka_unit_test(test_cube_uv),
 		cmocka_unit_test(test_sphere),
+		cmocka_unit_test(test_ellipsoid),
+		cmocka_unit_test(test_disk),
+		cmocka_unit_test(test_cylinder),
 		cmocka_unit_test(test_obj_polygons),
 		cmocka_unit_test(test_obj_attributes),
 		cmocka_unit_test(test_smooth_normals),

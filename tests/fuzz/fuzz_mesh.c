@@ -1,0 +1,60 @@
+/*
+ * libFuzzer: files of meshes. The first byte says what the rest is taken for.
+ */
+#include "tests/fuzz/seeds.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/mesh_files.h"
+#include "tests/support/scene_tables.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const char *const types[] = {"obj", "ply", "serialized"};
+enum { TYPES = sizeof types / sizeof *types };
+
+static void write_seed(uint8_t type, uint64_t number, const struct mesh_file *f)
+{
+	static unsigned char bytes[1 + sizeof f->bytes];
+	bytes[0] = type;
+	memcpy(bytes + 1, f->bytes, f->size);
+	seed_file("mesh", number, bytes, 1 + f->size);
+}
+
+int LLVMFuzzerInitialize(int *argc, char ***argv)
+{
+	(void)argc, (void)argv;
+	if (!seeds_wanted())
+		return 0;
+	static struct mesh_file f;
+	for (enum ply_kind k = 0; k < PLY_KINDS; k++) {
+		mesh_file_ply(&f, k);
+		write_seed(1, k, &f);
+	}
+	for (int version = 3; version <= 4; version++) {
+		mesh_file_serialized(&f, version, version == 4, 11, 2);
+		write_seed(2, 10 + (uint64_t)version, &f);
+	}
+	exit(0);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
+{
+	if (size == 0)
+		return 0;
+	char xml[256];
+	snprintf(xml, sizeof xml, "<scene version='3.0.0'><shape type='%s'><string name='filename' value='m'/></shape></scene>",
+		 types[bytes[0] % TYPES]);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m", bytes + 1, size - 1}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene scene;
+	struct error e;
+	if (scene_read(&scene, &assets, "s.xml", scene_tables(), NULL, 0, &e))
+		return 0;
+	struct arena arena = {.limit = 256 << 20};
+	struct shape_geometry g;
+	uint64_t dropped;
+	shape_build(scene.objects[0], &assets, &arena, &g, &dropped, &e);
+	arena_fini(&arena);
+	scene_fini(&scene);
+	return 0;
+}

@@ -1,0 +1,278 @@
+/*
+ * PLY and serialized meshes: every layout of the same solid gives the same mesh; no prefix and no damaged byte of a file does
+ * anything but give a mesh or a sentence.
+ */
+#include "common/base/mem.h"
+#include "tests/support/dice.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/mesh_files.h"
+#include "tests/support/scene_tables.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+struct built {
+	struct scene scene;
+	struct arena arena;
+	struct shape_geometry g;
+	uint64_t dropped;
+	struct error error;
+	int result;
+};
+
+static struct built build(const char *type, const char *content, const void *bytes, size_t size)
+{
+	char xml[1024];
+	snprintf(xml, sizeof xml, "<scene version='3.0.0'>\n<shape type='%s'><string name='filename' value='m'/>%s</shape></scene>",
+		 type, content);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m", bytes, size}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct built b = {.arena.limit = 64 << 20};
+	if (scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error))
+		fail_msg("%s", b.error.text);
+	b.result = shape_build(b.scene.objects[0], &assets, &b.arena, &b.g, &b.dropped, &b.error);
+	return b;
+}
+
+static void release(struct built *b)
+{
+	arena_fini(&b->arena);
+	scene_fini(&b->scene);
+}
+
+/* Every vertex where it belongs, in the file's order; values are exact in float. */
+static void assert_solid(const char *type, const char *content, const struct mesh_file *f, double scale, bool normals, bool uv, bool flip)
+{
+	struct built b = build(type, content, f->bytes, f->size);
+	if (b.result)
+		fail_msg("%s", b.error.text);
+	const struct mesh *m = &b.g.mesh;
+	assert_int_equal(m->vertex_count, SOLID_VERTICES);
+	assert_int_equal(m->triangle_count, SOLID_TRIANGLES);
+	assert_memory_equal(m->index, solid_index, sizeof solid_index);
+	assert_true((m->normal != NULL) == normals);
+	assert_true((m->uv != NULL) == uv);
+	for (int i = 0; i < SOLID_VERTICES; i++) {
+		for (int k = 0; k < 3; k++) {
+			assert_true(m->position[i][k] == scale * solid_position[i][k]);
+			assert_true(!normals || fabs(m->normal[i][k] - solid_position[i][k]) < 1e-15);
+		}
+		if (uv)
+			assert_true(m->uv[i][0] == solid_uv[i][0] && m->uv[i][1] == (flip ? 1 - solid_uv[i][1] : solid_uv[i][1]));
+	}
+	release(&b);
+}
+
+static void test_ply(void **state)
+{
+	(void)state;
+	static struct mesh_file f;
+	for (enum ply_kind k = 0; k < PLY_KINDS; k++) {
+		mesh_file_ply(&f, k);
+		assert_solid("ply", "", &f, 1, true, true, false);
+		assert_solid("ply", "<boolean name='flip_tex_coords' value='true'/>", &f, 1, true, true, true);
+		assert_solid("ply", "<boolean name='face_normals' value='true'/>", &f, 1, false, true, false);
+	}
+}
+
+#define HEAD "ply\nformat ascii 1.0\n"
+#define QUAD HEAD "element vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+
+static void test_ply_polygons(void **state)
+{
+	(void)state;
+	/* Faces before vertices, carriage returns, a polygon of four, no normals. */
+	const char *text = "ply\r\nformat ascii 1.0\r\nelement face 1\r\nproperty list uchar int vertex_index\r\nelement vertex 4\r\n"
+			   "property float x\r\nproperty float y\r\nproperty float z\r\nend_header\r\n4 0 1 2 3\r\n"
+			   "0 0 0\r\n1 0 0\r\n1 1 0\r\n0 1 0";
+	struct built b = build("ply", "", text, strlen(text));
+	if (b.result)
+		fail_msg("%s", b.error.text);
+	const uint32_t fan[2][3] = {{0, 1, 2}, {0, 2, 3}};
+	assert_int_equal(b.g.mesh.triangle_count, 2);
+	assert_memory_equal(b.g.mesh.index, fan, sizeof fan);
+	assert_true(b.g.mesh.normal && b.g.mesh.normal[0][2] == 1);
+	assert_null(b.g.mesh.uv);
+	release(&b);
+}
+
+static void test_serialized(void **state)
+{
+	(void)state;
+	static struct mesh_file f;
+	for (int version = 3; version <= 4; version++)
+		for (int doubles = 0; doubles < 2; doubles++)
+			for (uint32_t flags = 0; flags < 16; flags++) {
+				if (flags & 4)
+					continue; /* tangents were never written */
+				mesh_file_serialized(&f, version, doubles, flags, 3);
+				/* Where there are none they follow from the triangles: by symmetry a corner's is its place. */
+				assert_solid("serialized", "", &f, 1, true, flags & 2, false);
+				assert_solid("serialized", "<integer name='shape_index' value='2'/>", &f, 3, true, flags & 2, false);
+			}
+	mesh_file_serialized(&f, 4, 0, 1 | 16, 1);
+	assert_solid("serialized", "", &f, 1, false, false, false);
+}
+
+static void refuses(const char *type, const char *content, const void *bytes, size_t size, const char *text)
+{
+	struct built b = build(type, content, bytes, size);
+	if (b.result >= 0 || !strstr(b.error.text, text))
+		fail_msg("%d: %s\n not: %s", b.result, b.error.text, text);
+	release(&b);
+}
+
+static void test_bad_ply(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text, *error;
+	} cases[] = {
+		{"", "m:1: this is no PLY file"},
+		{"plyx\n", "this is no PLY file"},
+		{"ply\n", "the header does not end"},
+		{"ply\nformat binary 1.0\n", "m:2: the format is neither"},
+		{"ply\nelement vertex -1\nend_header\n", "m:2: an element needs a name and a count"},
+		{"ply\nproperty float x\nend_header\n", "m:2: a property before any element"},
+		{HEAD "element vertex 1\nproperty half x\nend_header\n", "m:4: a property of no known type"},
+		{HEAD "element vertex 1\nproperty list float int x\nend_header\n", "a property of no known type"},
+		{HEAD "element vertex 1\nproperty float\nend_header\n", "a property without a name"},
+		{HEAD "element vertex 1\nelement vertex 1\nend_header\n", "an element is given twice"},
+		{HEAD "what\nend_header\n", "m:3: neither comment"},
+		{"ply\nelement vertex 1\nproperty float x\nend_header\n1", "names no format"},
+		{HEAD "end_header\n", "m: has no vertices with x, y and z"},
+		{QUAD "end_header\n0 0 0 1 0 0 1 1 0 0 1 0", "has no faces"},
+		{QUAD "element face 1\nproperty list uchar float vertex_indices\nend_header\n", "indices must be whole numbers"},
+		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 4",
+		 "m: face 0: an index that is none of a vertex"},
+		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 -1", "an index"},
+		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 0.5", "an index"},
+		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 2 0 1",
+		 "a face needs three corners"},
+		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 -3 0 1 2", "without a length"},
+		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1", "ends here"},
+		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 nan 1 0 0 1 1 0 0 1 0 3 0 1 2",
+		 "m: vertex 0: not a number"},
+		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 1e99 1 0 0 1 1 0 0 1 0 3 0 1 2",
+		 "m: vertex 0: a number that is not finite, or beyond 1e60"},
+		{HEAD "element vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+		      "property list uchar int vertex_indices\nend_header\n0 0 0", "too short for 4000000000 vertices"},
+		{HEAD "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 99999999999\n"
+		      "property list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 0 1 0 3 0 1 2", "too short for 99999999999"},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
+		refuses("ply", "", cases[i].text, strlen(cases[i].text), cases[i].error);
+	/* A number that is none, where bytes can say so. */
+	static struct mesh_file f;
+	mesh_file_ply(&f, PLY_LITTLE);
+	const char *end = "end_header\n";
+	size_t at = 0;
+	while (memcmp(f.bytes + at, end, strlen(end)) != 0)
+		at++;
+	memcpy(f.bytes + at + strlen(end), "\0\0\xc0\x7f", 4);
+	refuses("ply", "", f.bytes, f.size, "m: vertex 0: a number that is not finite");
+}
+
+static void test_bad_serialized(void **state)
+{
+	(void)state;
+	static struct mesh_file f, g;
+	mesh_file_serialized(&f, 4, 0, 3, 2);
+	refuses("serialized", "", "", 0, "m: this is no serialized mesh");
+	refuses("serialized", "", "plyplyply", 9, "this is no serialized mesh");
+	refuses("serialized", "<integer name='shape_index' value='2'/>", f.bytes, f.size,
+		"m: shape_index=2, but it holds 2 meshes, counted from 0");
+	g = f;
+	g.bytes[2] = 9;
+	refuses("serialized", "", g.bytes, g.size, "m: version 9 is not supported (supported: 3, 4)");
+	g = f;
+	g.bytes[g.size - 1] = 0xff;
+	refuses("serialized", "", g.bytes, g.size, "the table of meshes at its end is damaged");
+	g = f;
+	g.bytes[g.size - 12] ^= 1; /* the second offset */
+	refuses("serialized", "<integer name='shape_index' value='1'/>", g.bytes, g.size, "the table of meshes at its end is damaged");
+	g = f;
+	g.bytes[40] ^= 0x10;
+	refuses("serialized", "", g.bytes, g.size, "m: the compressed mesh is damaged");
+}
+
+/* Any prefix, and any file with some bytes changed: a mesh or an error, never more (sanitizers watch). */
+static void test_damage(void **state)
+{
+	(void)state;
+	static struct mesh_file f, g;
+	for (int kind = 0; kind < PLY_KINDS + 2; kind++) {
+		const char *type = kind < PLY_KINDS ? "ply" : "serialized";
+		if (kind < PLY_KINDS)
+			mesh_file_ply(&f, (enum ply_kind)kind);
+		else
+			mesh_file_serialized(&f, kind - PLY_KINDS + 3, 0, 11, 2);
+		struct dice d = dice_of("damaged meshes");
+		size_t meshes = 0;
+		for (size_t size = 0; size < f.size; size += 1 + size / 97) {
+			struct built b = build(type, "", f.bytes, size);
+			assert_true(b.result <= 0);
+			release(&b);
+		}
+		for (int i = 0; i < 300; i++) {
+			g = f;
+			for (uint32_t n = 1 + (uint32_t)dice_below(&d, 3); n > 0; n--)
+				g.bytes[dice_below(&d, (uint32_t)g.size)] = (unsigned char)dice_below(&d, 256);
+			struct built b = build(type, "", g.bytes, g.size);
+			assert_true(b.result <= 0);
+			meshes += b.result == 0;
+			for (uint32_t k = 0; b.result == 0 && k < 3 * b.g.mesh.triangle_count; k++)
+				assert_true(b.g.mesh.index[k / 3][k % 3] < b.g.mesh.vertex_count);
+			release(&b);
+		}
+		assert_true(meshes > 0 || kind >= PLY_KINDS);
+	}
+}
+
+static void test_memory_runs_out(void **state)
+{
+	(void)state;
+	static struct mesh_file f;
+	for (int kind = 0; kind < 2; kind++) {
+		if (kind)
+			mesh_file_serialized(&f, 4, 0, 0, 1);
+		else
+			mesh_file_ply(&f, PLY_LITTLE);
+		struct built b = build(kind ? "serialized" : "ply", "", f.bytes, f.size);
+		const struct memory_file files[] = {{"m", f.bytes, f.size}, {0}};
+		struct asset_source assets = memory_assets(files);
+		int r = -1;
+		long n;
+		for (n = 0; r && n < 100; n++) {
+			struct arena arena = {0};
+			struct shape_geometry g;
+			mem_fail_after(n);
+			r = shape_build(b.scene.objects[0], &assets, &arena, &g, &b.dropped, &b.error);
+			mem_fail_after(-1);
+			assert_true(r == 0 || r == -ENOMEM);
+			arena_fini(&arena);
+		}
+		assert_int_equal(r, 0);
+		assert_true(n > 1);
+		release(&b);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_ply),
+		cmocka_unit_test(test_ply_polygons),
+		cmocka_unit_test(test_serialized),
+		cmocka_unit_test(test_bad_ply),
+		cmocka_unit_test(test_bad_serialized),
+		cmocka_unit_test(test_damage),
+		cmocka_unit_test(test_memory_runs_out),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
