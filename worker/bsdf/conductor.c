@@ -1,5 +1,6 @@
 /* A smooth metal on the side of the normal. */
 #include "worker/bsdf/metal.h"
+#include "worker/bsdf/microfacet.h"
 
 #include <float.h>
 
@@ -48,7 +49,7 @@ static int conductor_create(struct bsdf *b, const struct scene_node *n, const st
 	return metal_read(m, b, n, build, e);
 }
 
-static const struct param conductor_params[] = {METAL_PARAMS, {.name = NULL}};
+static const struct param conductor_params[] = {METAL_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_conductor = {
 	.type = "conductor",

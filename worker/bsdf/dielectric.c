@@ -1,6 +1,7 @@
 /* A smooth boundary between two transparent media: Fresnel's reflection and Snell's refraction. */
 #include "worker/bsdf/fresnel.h"
 #include "worker/bsdf/glass.h"
+#include "worker/bsdf/microfacet.h"
 
 #include <float.h>
 
@@ -75,7 +76,7 @@ static int dielectric_create(struct bsdf *b, const struct scene_node *n, const s
 	return glass_read(g, b, n, build, e);
 }
 
-static const struct param dielectric_params[] = {GLASS_PARAMS, {.name = NULL}};
+static const struct param dielectric_params[] = {GLASS_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_dielectric = {
 	.type = "dielectric",

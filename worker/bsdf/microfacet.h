@@ -51,4 +51,10 @@ int microfacet_read(struct microfacet *m, const struct scene_node *n, struct err
 	{.name = "distribution", .types = VALUE_STRING, .choices = "beckmann|ggx"},                                    \
 	{.name = "sample_visible", .types = VALUE_BOOL, .status = PARAM_IGNORED}
 
+/* Of smooth materials: what editors leave there when a rough one was made smooth. */
+#define MICROFACET_PARAMS_IGNORED                                                                                      \
+	{.name = "alpha", .status = PARAM_IGNORED}, {.name = "alpha_u", .status = PARAM_IGNORED},                      \
+		{.name = "alpha_v", .status = PARAM_IGNORED}, {.name = "distribution", .status = PARAM_IGNORED},       \
+		{.name = "sample_visible", .status = PARAM_IGNORED}
+
 #endif

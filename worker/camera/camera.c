@@ -34,6 +34,8 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	c->position = vec3_scale(world_scale, vec3_sub(mat4_point(&s->to_world, (vec3){0, 0, 0}), world_center));
 	c->width = s->width;
 	c->height = s->height;
+	c->center_x = s->width * (0.5 - s->principal_x);
+	c->center_y = s->height * (0.5 - s->principal_y);
 	c->scale = pixels_per_slope(s);
 	c->near_clip = s->near_clip * world_scale;
 	c->far_clip = s->far_clip * world_scale;
@@ -112,7 +114,7 @@ void camera_point_inverse(const struct camera *c, vec3 p, double u[2])
 
 vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double film_y)
 {
-	vec3 l = {(film_x - c->width / 2) / c->scale, (film_y - c->height / 2) / c->scale, 1};
+	vec3 l = {(film_x - c->center_x) / c->scale, (film_y - c->center_y) / c->scale, 1};
 	if (camera_has_aperture(c)) {
 		double x, y;
 		aperture_offset(c, x_k, &x, &y);
@@ -135,8 +137,8 @@ bool camera_project(const struct camera *c, vec3 x_k, vec3 d, double distance, d
 		slope_x += x / c->focus;
 		slope_y += y / c->focus;
 	}
-	*film_x = c->width / 2 + c->scale * slope_x;
-	*film_y = c->height / 2 + c->scale * slope_y;
+	*film_x = c->center_x + c->scale * slope_x;
+	*film_y = c->center_y + c->scale * slope_y;
 	return isfinite(*film_x) && isfinite(*film_y);
 }
 

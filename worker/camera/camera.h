@@ -22,6 +22,7 @@ struct camera {
 	vec3 position;     /* the pinhole, or the centre of the aperture */
 	struct frame axes; /* s: right on the image, t: down, n: forward */
 	double width, height, scale; /* pixels; scale: pixels per unit of slope */
+	double center_x, center_y;   /* the film point on the axis: the film's middle but for the principal point's offset */
 	double near_clip, far_clip;  /* along the axis, in the rescaled world */
 	bool lens;                   /* x_k is drawn and moved: the radius is above 0, or that was forced */
 	double aperture, focus;      /* radius; distance of the plane of focus along the axis */

@@ -304,6 +304,12 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 	p->width = s->width;
 	p->height = s->height;
 	p->border = s->border;
+	if (!p->crop_width) {
+		p->crop_x = s->crop_x;
+		p->crop_y = s->crop_y;
+		p->crop_width = s->crop_width;
+		p->crop_height = s->crop_height;
+	}
 	memcpy(p->knobs, a->render.knobs, sizeof p->knobs);
 	memcpy(p->effects, a->render.effects, sizeof p->effects);
 	if (!p->min_depth)

@@ -79,6 +79,9 @@ struct emitter {
 	void *data;
 };
 
+/* Is it one that lies on a shape? */
+bool emitter_needs_surface(const struct scene_node *n);
+
 int emitter_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e);
 
 extern const struct emitter_ops *const emitter_registry[]; /* ends with NULL */

@@ -21,6 +21,7 @@ struct id_entry {
 /* Reads one scene; all pointers lead into the scene's arena. */
 struct maker {
 	struct scene *scene;
+	const struct asset_source *assets_from;
 	const struct plugin_decl *decls;
 	struct error *error;
 	struct xml_tree *tree;
@@ -214,12 +215,13 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	if (r || !p)
 		return r;
 	struct value v;
-	r = value_read(el, &m->scene->arena, &v, m->error);
+	r = value_read(el, m->assets_from, &m->scene->arena, &v, m->error);
 	if (!r)
 		r = add_property(d, el, p, v, m->error);
 	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
 		r = *v.as.string ? add_asset(m, v.as.string) : xml_error(el, m->error, EINVAL, "an empty file name");
-	return r;
+	const char *file = v.type == VALUE_SPECTRUM ? xml_attribute(el, "filename") : NULL;
+	return r || !file ? r : add_asset(m, file);
 }
 
 static int compare_ids(const void *a, const void *b)
@@ -301,6 +303,7 @@ static int refuse_element(const struct xml_element *el, struct error *e)
 	spelling_offer(&s, "include");
 	spelling_offer(&s, "default");
 	spelling_offer(&s, "alias");
+	spelling_offer(&s, "path");
 	return xml_error(el, e, EINVAL, "has no place in <%.64s>, or is not supported%s", el->parent ? el->parent->name : "",
 			 spelling_hint(&s, hint, sizeof hint));
 }
@@ -497,6 +500,8 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 			r = read_include(m, el, objects);
 		else if (strcmp(el->name, "default") == 0)
 			r = value_check_element(el, "name|value", false, m->error);
+		else if (strcmp(el->name, "path") == 0)
+			r = value_check_element(el, "value", false, m->error);
 		else if (strcmp(el->name, "alias") != 0)
 			r = refuse_element(el, m->error);
 	}
@@ -527,6 +532,24 @@ static int list_assets(struct maker *m)
 	return 0;
 }
 
+/* A scene may hold several cameras; one image has one. */
+static int note_sensors(struct maker *m)
+{
+	const struct scene_node *first = NULL;
+	for (uint32_t i = 0; i < m->scene->object_count; i++) {
+		const struct scene_node *n = m->scene->objects[i];
+		if (n->cls != PLUGIN_SENSOR)
+			continue;
+		if (first) {
+			const struct xml_element place = {.name = "sensor", .file = n->file, .line = n->line};
+			return note(m, &place, "", "", "%s:%d: <sensor>: only the first sensor, in line %d, is rendered", n->file,
+				    n->line, first->line);
+		}
+		first = n;
+	}
+	return 0;
+}
+
 static int make_scene(struct maker *m)
 {
 	struct scene *s = m->scene;
@@ -541,6 +564,8 @@ static int make_scene(struct maker *m)
 	int r = collect_ids(m);
 	if (!r)
 		r = read_top(m, m->tree->root, objects);
+	if (!r)
+		r = note_sensors(m);
 	return r ? r : list_assets(m);
 }
 
@@ -548,7 +573,7 @@ int scene_read(struct scene *s, const struct asset_source *assets, const char *n
 	       const struct scene_define *defines, size_t define_count, struct error *e)
 {
 	*s = (struct scene){.arena.limit = XML_MEMORY_MAX};
-	struct maker m = {.scene = s, .decls = decls, .error = e};
+	struct maker m = {.scene = s, .assets_from = assets, .decls = decls, .error = e};
 	m.tree = allocate(&m, 1, sizeof *m.tree);
 	int r = m.tree ? xml_read(m.tree, assets, name, defines, define_count, &s->arena, e) : out_of_memory(&m);
 	if (!r)

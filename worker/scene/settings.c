@@ -22,7 +22,8 @@ enum { MAX_DEPTH = 128, FILM_PIXELS_MAX = 1 << 28, DEFAULT_WIDTH = 768, DEFAULT_
 		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},                              \
 		{"focal_length", UNDERSTOOD(VALUE_STRING)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},                         \
 		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, {"shutter_open", IGNORED}, {"shutter_close", IGNORED},               \
-		{"principal_point_offset_x", REFUSED}, {"principal_point_offset_y", REFUSED}, {"srf", REFUSED}
+		{"principal_point_offset_x", RANGE(VALUE_FLOAT, -10, 10)},                                                      \
+		{"principal_point_offset_y", RANGE(VALUE_FLOAT, -10, 10)}, {"srf", REFUSED}
 
 static const struct param perspective_params[] = {
 	CAMERA_PARAMS,
@@ -40,10 +41,10 @@ static const struct param thinlens_params[] = {
 static const struct param film_params[] = {
 	{"width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
 	{"height", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
-	{"crop_offset_x", REFUSED},
-	{"crop_offset_y", REFUSED},
-	{"crop_width", REFUSED},
-	{"crop_height", REFUSED},
+	{"crop_offset_x", RANGE(VALUE_INT, 0, PLAN_MAX_SIZE)},
+	{"crop_offset_y", RANGE(VALUE_INT, 0, PLAN_MAX_SIZE)},
+	{"crop_width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
+	{"crop_height", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
 	{"size", REFUSED},
 	{"filename", IGNORED},
 	{"file_format", IGNORED},
@@ -102,10 +103,28 @@ static const struct scene_node *find_object(const struct scene *s, enum plugin_c
 	*count = 0;
 	for (uint32_t i = 0; i < s->object_count; i++)
 		if (s->objects[i]->cls == cls) {
-			(*count)++;
-			found = s->objects[i];
+			if (++*count == 1)
+				found = s->objects[i];
 		}
 	return found;
+}
+
+/* A window of the whole film is none. */
+static int read_crop(const struct scene_node *film, struct scene_settings *out, struct error *e)
+{
+	uint64_t x = (uint64_t)node_int(film, "crop_offset_x", 0), y = (uint64_t)node_int(film, "crop_offset_y", 0);
+	uint64_t w = (uint64_t)node_int(film, "crop_width", out->width), h = (uint64_t)node_int(film, "crop_height", out->height);
+	if (x + w > out->width || y + h > out->height)
+		return node_error(film, e, ERANGE, "the crop window of %llu x %llu pixels at %llu, %llu leaves the film of %u x %u",
+				  (unsigned long long)w, (unsigned long long)h, (unsigned long long)x, (unsigned long long)y,
+				  out->width, out->height);
+	if (w == out->width && h == out->height)
+		return 0;
+	out->crop_x = (uint32_t)x;
+	out->crop_y = (uint32_t)y;
+	out->crop_width = (uint32_t)w;
+	out->crop_height = (uint32_t)h;
+	return 0;
 }
 
 static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t height, struct scene_settings *out,
@@ -122,7 +141,7 @@ static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t h
 	    (uint64_t)out->width * out->height > FILM_PIXELS_MAX)
 		return node_error(film ? film : sensor, e, ERANGE, "a film of %u x %u pixels; at most %d a side and %d in all",
 				  out->width, out->height, PLAN_MAX_SIZE, FILM_PIXELS_MAX);
-	return 0;
+	return film && !width && !height ? read_crop(film, out, e) : 0;
 }
 
 static int read_filter(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
@@ -205,6 +224,8 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	x = vec3_normalize(vec3_madd(x, -vec3_dot(x, z), z));
 	y = vec3_scale(hand, vec3_cross(z, x));
 	out->to_world = (mat4){{{x.x, y.x, z.x, m.m[0][3]}, {x.y, y.y, z.y, m.m[1][3]}, {x.z, y.z, z.z, m.m[2][3]}, {0, 0, 0, 1}}};
+	out->principal_x = node_float(sensor, "principal_point_offset_x", 0);
+	out->principal_y = node_float(sensor, "principal_point_offset_y", 0);
 	out->near_clip = node_float(sensor, "near_clip", 1e-2);
 	out->far_clip = node_float(sensor, "far_clip", 1e4);
 	if (!(out->near_clip < out->far_clip))
@@ -225,8 +246,6 @@ int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, 
 	const struct scene_node *sensor = find_object(s, PLUGIN_SENSOR, &sensors);
 	if (!sensor)
 		return error_set(e, EINVAL, "the scene has no <sensor>");
-	if (sensors > 1)
-		return node_error(sensor, e, EINVAL, "a second sensor in the scene; exactly one must be there");
 	const struct scene_node *sampler = node_child(sensor, PLUGIN_SAMPLER, 0);
 	out->spp = sampler ? (uint64_t)node_int(sampler, "sample_count", 0) : 0;
 	int r = read_film(sensor, width, height, out, e);

@@ -14,6 +14,7 @@ struct scene_settings {
 	enum filter_kind filter;
 	double filter_radius, filter_stddev; /* pixels; Mitsuba's defaults: box 0.5, tent 1, gaussian 0.5 and 4 x that */
 	uint32_t border;                     /* whole pixels by which the kernel reaches beyond a pixel: ceil(radius - 0.5) */
+	uint32_t crop_x, crop_y, crop_width, crop_height; /* what the scene's film wants rendered; width 0: all of it */
 	uint64_t spp;                        /* sampleCount; 0: none given */
 	uint32_t max_depth;                  /* edges, 1..128 (-1 and more become 128); 128 when none is given */
 	char integrator[32];                 /* the scene's own ("" none): ignored but for its depth */
@@ -21,11 +22,12 @@ struct scene_settings {
 	mat4 to_world; /* camera: +z forward, +x LEFT on the image, +y up; any scale is removed */
 	double fov;    /* degrees, along fov_axis */
 	char fov_axis[16]; /* x, y, diagonal, smaller, larger: resolved against the film size by the camera */
+	double principal_x, principal_y; /* offset of the principal point from the middle, of the film's size, as in Mitsuba 3 */
 	double near_clip, far_clip;
 	double aperture_radius, focus_distance; /* thinlens; radius 0: a pinhole, whatever the distance */
 };
 
-/* width, height: override the film's (0: keep). Exactly one sensor must be there. */
+/* width, height: override the film's (0: keep) and its crop window. Of several sensors the first is taken. */
 int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, struct scene_settings *out, struct error *e);
 
 /* Declarations of perspective, thinlens, hdrfilm, ldrfilm, box, tent, gaussian, all samplers, all integrators; NULL type ends. */

@@ -1,6 +1,7 @@
 #include "worker/scene/value.h"
 
 #include "worker/scene/number.h"
+#include "worker/scene/spectral.h"
 #include "worker/scene/spelling.h"
 #include "worker/scene/transform.h"
 #include "worker/scene/srgb.h"
@@ -72,8 +73,9 @@ static int read_bool(const struct xml_element *el, struct value *out, struct err
 	int r = need_value(el, &text, e);
 	if (r)
 		return r;
-	out->as.boolean = strcmp(text, "true") == 0;
-	if (!out->as.boolean && strcmp(text, "false") != 0)
+	/* Python's exporters write True. */
+	out->as.boolean = strcmp(text, "true") == 0 || strcmp(text, "True") == 0;
+	if (!out->as.boolean && strcmp(text, "false") != 0 && strcmp(text, "False") != 0)
 		return xml_error(el, e, EINVAL, "`%.64s` is neither true nor false", text);
 	return 0;
 }
@@ -138,75 +140,6 @@ static int read_rgb(const struct xml_element *el, struct value *out, struct erro
 	return 0;
 }
 
-/* "400:0.1, 500:0.2": the count of pairs, 0 when it is none of that. */
-static uint32_t scan_pairs(const char *text, double *nm, double *value)
-{
-	const char *end = text + strlen(text), *p = text;
-	uint32_t n = 0;
-	while (p < end) {
-		while (p < end && (number_is_blank(*p) || *p == ','))
-			p++;
-		if (p == end)
-			break;
-		double x, y;
-		p = number_scan(p, end, &x);
-		if (!p || p == end || *p != ':' || n == VALUE_SPECTRUM_MAX)
-			return 0;
-		p = number_scan(p + 1, end, &y);
-		if (!p || (p < end && !number_is_blank(*p) && *p != ','))
-			return 0;
-		if (nm) {
-			nm[n] = x;
-			value[n] = y;
-		}
-		n++;
-	}
-	return n;
-}
-
-static int read_pairs(const struct xml_element *el, const char *text, struct arena *arena, struct value *out, struct error *e)
-{
-	uint32_t n = scan_pairs(text, NULL, NULL);
-	if (n == 0)
-		return xml_error(el, e, EINVAL, "`%.64s` is neither a number nor a list nm:value, nm:value, ... of at most %d",
-				 text, VALUE_SPECTRUM_MAX);
-	if (n == 1)
-		return xml_error(el, e, EINVAL, "one pair nm:value is no spectrum; give a single number for a constant");
-	double *nm = arena_alloc(arena, n, sizeof *nm), *value = arena_alloc(arena, n, sizeof *value);
-	if (!nm || !value)
-		return xml_error(el, e, ENOMEM, "out of memory");
-	scan_pairs(text, nm, value);
-	for (uint32_t i = 0; i < n; i++)
-		if (!(nm[i] > 0) || (i && !(nm[i] > nm[i - 1])))
-			return xml_error(el, e, EINVAL, "wavelengths must be positive and ascend: %g nm does not", nm[i]);
-	out->as.spectrum.count = n;
-	out->as.spectrum.nm = nm;
-	out->as.spectrum.value = value;
-	return 0;
-}
-
-static int read_spectrum(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
-{
-	if (xml_attribute(el, "filename"))
-		return xml_error(el, e, EINVAL, "spectra from files are not supported; supported: value=\"0.5\", "
-				 "value=\"400:0.1, 500:0.2\"");
-	const char *text;
-	int r = need_value(el, &text, e);
-	if (r)
-		return r;
-	if (strchr(text, ':'))
-		return read_pairs(el, text, arena, out, e);
-	double *one = arena_alloc(arena, 1, sizeof *one);
-	if (!one)
-		return xml_error(el, e, ENOMEM, "out of memory");
-	if (!number_parse(text, one))
-		return xml_error(el, e, EINVAL, "`%.64s` is neither a number nor a list nm:value, nm:value, ...; three numbers "
-				 "belong into <rgb>", text);
-	out->as.spectrum.count = 1;
-	out->as.spectrum.value = one;
-	return 0;
-}
-
 /* Mitsuba 0.6 lets a value say whether it is a light's colour or a surface's; what differs from the place is refused. */
 static int check_intent(const struct xml_element *el, struct error *e)
 {
@@ -232,9 +165,9 @@ static const struct kind {
 	{"vector", VALUE_POINT, "name|value|x|y|z", false},
 	{"rgb", VALUE_RGB, "name|value|intent", false},
 	{"srgb", VALUE_RGB, "name|value", false},
-	{"spectrum", VALUE_SPECTRUM, "name|value|intent|filename", false},
+	{"spectrum", VALUE_SPECTRUM, "name|value|intent|filename|type|id", true},
 	{"transform", VALUE_TRANSFORM, "name", true},
-	{"blackbody", 0, NULL, false},
+	{"blackbody", VALUE_SPECTRUM, "name|temperature|scale", false},
 	{"animation", 0, NULL, false},
 	{"color", 0, NULL, false},
 };
@@ -260,12 +193,13 @@ void value_offer_elements(struct spelling *s)
 			spelling_offer(s, kinds[i].element);
 }
 
-int value_read(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
+int value_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena, struct value *out,
+	       struct error *e)
 {
 	const struct kind *k = find_kind(el->name);
 	if (!k || !k->type)
 		return xml_error(el, e, EINVAL, "is not supported; supported: boolean, integer, float, string, point, vector, "
-				 "rgb, srgb, spectrum, transform");
+				 "rgb, srgb, spectrum, blackbody, transform");
 	int r = value_check_element(el, k->attributes, k->children, e);
 	if (!r)
 		r = check_intent(el, e);
@@ -279,7 +213,9 @@ int value_read(const struct xml_element *el, struct arena *arena, struct value *
 	case VALUE_STRING: return read_string(el, out, e);
 	case VALUE_POINT: return read_point(el, out, e);
 	case VALUE_RGB: return read_rgb(el, out, e);
-	case VALUE_SPECTRUM: return read_spectrum(el, arena, out, e);
+	case VALUE_SPECTRUM:
+		return strcmp(el->name, "blackbody") == 0 ? spectral_read_blackbody(el, arena, out, e)
+							   : spectral_read(el, assets, arena, out, e);
 	default: return transform_read(el, &out->as.transform, e);
 	}
 }

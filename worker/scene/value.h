@@ -4,15 +4,15 @@
 
 #include "worker/scene/xml.h"
 
-enum { VALUE_SPECTRUM_MAX = 65536 }; /* pairs in a spectrum */
-
-/* Is it the name of a value's element (float, rgb, ... also those that are refused, like blackbody)? */
+/* Is it the name of a value's element (float, rgb, ... also those that are refused, like animation)? */
 bool value_is_element(const char *name);
 /* Hands all these names to a suggestion. */
 struct spelling;
 void value_offer_elements(struct spelling *s);
 
-int value_read(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e);
+/* assets: for spectra from files. */
+int value_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena, struct value *out,
+	       struct error *e);
 
 /* "float", "rgb" ... for messages; types: any of the bits, as a list. */
 void value_type_names(unsigned types, char *text, size_t size);

@@ -189,6 +189,62 @@ static int read_default(struct reader *r, const struct xml_element *el)
 	return c ? error_prefix(r->error, c, "%s:%d: <default>", el->file, el->line) : 0;
 }
 
+/* A folder in which the files that are named from here on are searched, after the scene's own. */
+static int read_path(struct reader *r, const struct xml_element *el)
+{
+	const char *value = xml_attribute(el, "value");
+	if (!value)
+		return xml_error(el, r->error, EINVAL, "needs a value, a folder");
+	if (r->tree->path_count == XML_PATHS_MAX)
+		return xml_error(el, r->error, E2BIG, "more than %d search paths", XML_PATHS_MAX);
+	r->tree->paths[r->tree->path_count++] = value;
+	return 0;
+}
+
+static bool is_there(const struct reader *r, const char *name)
+{
+	struct asset a;
+	struct error ignored;
+	if (r->assets->open(r->assets->user, name, &a, &ignored))
+		return false;
+	r->assets->close(r->assets->user, &a);
+	return true;
+}
+
+/* The first of the folders that has the file. A name that none has stays as it is, for whoever opens it to complain. */
+static int find_file(struct reader *r, const char **name)
+{
+	if (r->tree->path_count == 0 || is_there(r, *name))
+		return 0;
+	for (uint32_t i = 0; i < r->tree->path_count; i++) {
+		const char *folder = r->tree->paths[i];
+		size_t size = strlen(folder) + strlen(*name) + 2, length = strlen(folder);
+		char *joined = arena_alloc(r->arena, size, 1);
+		if (!joined)
+			return out_of_memory(r);
+		snprintf(joined, size, "%s%s%s", folder, length && folder[length - 1] == '/' ? "" : "/", *name);
+		if (is_there(r, joined)) {
+			*name = joined;
+			return 0;
+		}
+	}
+	return 0;
+}
+
+/* <include filename>, <spectrum filename> and <string name="filename" value>. */
+static int find_files(struct reader *r, struct xml_element *el)
+{
+	const char *named = xml_attribute(el, "name");
+	bool string = strcmp(el->name, "string") == 0 && named && strcmp(named, "filename") == 0;
+	for (uint32_t i = 0; i < el->attribute_count; i++)
+		if (strcmp(el->attributes[i].name, string ? "value" : "filename") == 0) {
+			int c = find_file(r, &el->attributes[i].value);
+			if (c)
+				return c;
+		}
+	return 0;
+}
+
 static int open_element(struct reader *r, const char *name, const char **attributes)
 {
 	if (r->depth >= XML_DEPTH_MAX)
@@ -215,8 +271,12 @@ static int open_element(struct reader *r, const char *name, const char **attribu
 	el->snake = r->snake;
 	if (!c)
 		c = append_element(r, el);
+	if (!c && !el->ignored)
+		c = find_files(r, el);
 	if (!c && !el->ignored && strcmp(name, "default") == 0)
 		c = read_default(r, el);
+	if (!c && !el->ignored && strcmp(name, "path") == 0)
+		c = read_path(r, el);
 	r->current = el;
 	r->depth++;
 	return c;

@@ -13,6 +13,7 @@ enum {
 	XML_DEPTH_MAX = 64,              /* elements inside elements, and objects that refer to objects */
 	XML_INCLUDE_MAX = 8,             /* files that include files */
 	XML_FILES_MAX = 1024,            /* files included in all */
+	XML_PATHS_MAX = 16,              /* folders that are searched for files */
 	XML_ELEMENTS_MAX = 1 << 20,
 	XML_ATTRIBUTES_MAX = 24,
 	XML_VALUE_MAX = 1 << 20,         /* bytes of an attribute's value */
@@ -31,7 +32,7 @@ struct xml_element {
 	bool ignored; /* it or one of those around it has no meaning here */
 	bool text;    /* holds text other than blanks */
 	uint32_t attribute_count;
-	const struct xml_attribute *attributes;
+	struct xml_attribute *attributes;
 	struct xml_element *parent, *first, *last, *next;
 	const struct scene_node *node; /* for the interpreter: what it became */
 	bool busy;                     /* for the interpreter: being made into a node */
@@ -41,8 +42,9 @@ struct xml_element {
 struct xml_tree {
 	struct xml_element *root; /* <scene>; includes stand as <scene> elements in the place of <include> */
 	bool dialect_3;
-	uint32_t element_count, include_count;
+	uint32_t element_count, include_count, path_count;
 	const char *includes[XML_FILES_MAX]; /* names of included files; repeated where included more than once */
+	const char *paths[XML_PATHS_MAX];    /* of <path>, in their order; names of files after them are searched there, too */
 };
 
 /* Elements for which this holds, and all inside them, are marked ignored. */

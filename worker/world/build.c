@@ -274,7 +274,8 @@ static int create_emitters(struct builder *b)
 	build.surface = NULL;
 	for (uint32_t i = 0; i < s->object_count; i++) {
 		const struct scene_node *n = s->objects[i];
-		if (n->cls != PLUGIN_EMITTER)
+		/* An area emitter that stands by itself is there for shapes to refer to. */
+		if (n->cls != PLUGIN_EMITTER || (n->id && emitter_needs_surface(n)))
 			continue;
 		struct emitter *em = &w->emitters[w->emitter_count];
 		int rc = emitter_create(em, n, &build, b->e);

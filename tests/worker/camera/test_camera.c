@@ -39,6 +39,25 @@ static void test_project_direction(void **state)
 	}
 }
 
+/* Mitsuba 3: the film point (x, y) sees what (x + offset_x width, y + offset_y height) would see without an offset. */
+static void test_principal_point(void **state)
+{
+	(void)state;
+	struct scene_settings s = {.width = 320, .height = 200, .fov = 50, .fov_axis = "x", .near_clip = 1e-3, .far_clip = 1e4};
+	s.to_world = mat4_identity();
+	struct camera plain, moved;
+	struct error e;
+	assert_int_equal(camera_init(&plain, &s, (vec3){0, 0, 0}, 1, &e), 0);
+	s.principal_x = 0.25;
+	s.principal_y = -0.5;
+	assert_int_equal(camera_init(&moved, &s, (vec3){0, 0, 0}, 1, &e), 0);
+	vec3 a = camera_direction(&moved, moved.position, 30, 170), b = camera_direction(&plain, plain.position, 30 + 80, 170 - 100);
+	assert_true(vec3_length(vec3_sub(a, b)) < 1e-15);
+	double x, y;
+	assert_true(camera_project(&moved, moved.position, a, 1, &x, &y));
+	assert_true(fabs(x - 30) < 1e-12 && fabs(y - 170) < 1e-12);
+}
+
 /* Solid angle of a small square of the film, by its two tangents. */
 static void test_jacobian(void **state)
 {
@@ -241,7 +260,8 @@ static void test_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_project_direction), cmocka_unit_test(test_jacobian), cmocka_unit_test(test_fov_axes),
+		cmocka_unit_test(test_project_direction), cmocka_unit_test(test_principal_point),
+		cmocka_unit_test(test_jacobian), cmocka_unit_test(test_fov_axes),
 		cmocka_unit_test(test_orientation),	  cmocka_unit_test(test_clip),	   cmocka_unit_test(test_refused),
 		cmocka_unit_test(test_aperture),	  cmocka_unit_test(test_lens),	   cmocka_unit_test(test_closed_lens),
 	};

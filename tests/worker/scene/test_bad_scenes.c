@@ -162,8 +162,23 @@ static void test_bad_values(void **state)
 	refuses(BSDF("<spectrum name='eta' value='500:1, 400:1'/>"), "must be positive and ascend");
 	refuses(BSDF("<spectrum name='eta' value='400:1, 500'/>"), "neither a number nor a list");
 	refuses(BSDF("<spectrum name='eta' value='1, 2, 3'/>"), "three numbers belong into <rgb>");
-	refuses(BSDF("<spectrum name='eta' filename='x.spd'/>"), "spectra from files are not supported");
-	refuses(BSDF("<blackbody name='eta' temperature='5000'/>"), "is not supported; supported: boolean");
+	refuses(BSDF("<spectrum name='eta' filename='x.spd'/>"), "s.xml:1: <spectrum>: x.spd: no such file");
+	refuses(BSDF("<spectrum name='eta'/>"), "needs either value or filename or type");
+	refuses(BSDF("<spectrum name='eta' value='1' type='d65'/>"), "needs either value or filename or type");
+	refuses(BSDF("<spectrum name='eta' type='d56'/>"), "there is no spectrum of this type; did you mean `d65`?");
+	refuses(BSDF("<spectrum name='eta' type='d65'><float name='gain' value='2'/></spectrum>"), "has no place in a spectrum of type `d65`");
+	refuses(BSDF("<spectrum name='eta' type='d65'><float name='scale' value='-1'/></spectrum>"), "scale=\"-1\" is not a number from 0");
+	refuses(BSDF("<spectrum name='eta' type='regular'><string name='values' value='1,2'/></spectrum>"), "needs `wavelength_min`");
+	refuses(BSDF("<spectrum name='eta' type='irregular'><string name='wavelengths' value='1,2'/>"
+		     "<string name='values' value='1,2,3'/></spectrum>"), "2 wavelengths, but 3 values");
+	refuses(BSDF("<spectrum name='eta' type='irregular'><string name='wavelengths' value='2,1'/>"
+		     "<string name='values' value='1,2'/></spectrum>"), "wavelengths must be positive and ascend");
+	refuses(BSDF("<spectrum name='eta' type='srgb'/>"), "needs `color`");
+	refuses(BSDF("<blackbody name='eta'/>"), "needs a temperature");
+	refuses(BSDF("<blackbody name='eta' temperature='hot'/>"), "temperature=\"hot\" is not a number");
+	refuses(BSDF("<blackbody name='eta' temperature='1'/>"), "a temperature of 1 K is outside [100, 1e+06]");
+	refuses(BSDF("<animation name='eta'/>"), "is not supported; supported: boolean");
+	refuses("<scene version='0.6.0'><path/></scene>", "s.xml:1: <path>: needs a value, a folder");
 	refuses(S "<shape type='sphere'><boolean name='flip_normals' value='yes'/></shape>" END, "neither true nor false");
 	refuses(S "<shape type='sphere'><float name='radius' value='0'/></shape>" END, "outside");
 	refuses(S "<shape type='sphere'><float name='radius' value='-1'/></shape>" END, "outside");
@@ -238,7 +253,8 @@ static void test_bad_films(void **state)
 	refuses(FILM("<integer name='height' value='1000000000'/>"), "height=1e+09 is outside");
 	refuses(FILM("<integer name='width' value='-5'/>"), "outside");
 	refuses(FILM("<integer name='width' value='99999999999999999999999'/>"), "is not a whole number");
-	refuses(FILM("<integer name='crop_width' value='5'/>"), "would change the image and is not supported");
+	refuses(FILM("<integer name='crop_width' value='0'/>"), "crop_width=0 is outside [1, 65536]");
+	refuses(FILM("<string name='size' value='5'/>"), "would change the image and is not supported");
 #undef FILM
 }
 

@@ -129,6 +129,42 @@ static void test_camera(void **state)
 	assert_true(fabs(s.fov - 2 * atan(43.266615305567875 / 48) * 180 / 3.14159265358979323846) < 1e-12);
 }
 
+/* The first sensor counts; a note says so. */
+static void test_several_sensors(void **state)
+{
+	(void)state;
+	const char *xml = "<scene version='3.0.0'>\n<sensor type='perspective'><float name='fov' value='20'/></sensor>\n"
+			  "<sensor type='perspective'><float name='fov' value='30'/></sensor></scene>";
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct scene_settings set;
+	struct error e;
+	assert_int_equal(scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
+	assert_int_equal(scene_settings_read(&s, 0, 0, &set, &e), 0);
+	assert_true(set.fov == 20);
+	assert_int_equal(s.note_count, 1);
+	assert_string_equal(s.notes[0], "s.xml:3: <sensor>: only the first sensor, in line 2, is rendered");
+	scene_fini(&s);
+}
+
+static void test_crop(void **state)
+{
+	(void)state;
+#define FILM "<film type='hdrfilm'><integer name='width' value='100'/><integer name='height' value='60'/>" CROP "</film>"
+#define CROP "<integer name='cropOffsetX' value='10'/><integer name='cropWidth' value='30'/><integer name='cropHeight' value='60'/>"
+	struct scene_settings s = read_ok("", FILM);
+	assert_true(s.width == 100 && s.height == 60);
+	assert_true(s.crop_x == 10 && s.crop_y == 0 && s.crop_width == 30 && s.crop_height == 60);
+#undef CROP
+#define CROP "<integer name='cropOffsetX' value='0'/><integer name='cropWidth' value='100'/>"
+	assert_int_equal(read_ok("", FILM).crop_width, 0); /* all of it is none */
+#undef CROP
+#undef FILM
+	s = read_ok("", "<float name='principalPointOffsetX' value='0.25'/><integer name='principalPointOffsetY' value='0'/>");
+	assert_true(s.principal_x == 0.25 && s.principal_y == 0);
+}
+
 static void test_size_is_overridden(void **state)
 {
 	(void)state;
@@ -148,7 +184,10 @@ static void test_refused(void **state)
 	(void)state;
 #define SENSOR(x) "<sensor type='perspective'>" x "</sensor>"
 	refuses("", "the scene has no <sensor>");
-	refuses(SENSOR("") SENSOR(""), "a second sensor");
+	refuses(SENSOR("<film type='hdrfilm'><integer name='width' value='10'/><integer name='crop_width' value='11'/></film>"),
+		"s.xml:1: <film type=\"hdrfilm\">: the crop window of 11 x 576 pixels at 0, 0 leaves the film of 10 x 576");
+	refuses(SENSOR("<film type='hdrfilm'><integer name='width' value='10'/><integer name='crop_offset_x' value='1'/></film>"),
+		"the crop window of 10 x 576 pixels at 1, 0 leaves");
 	refuses(SENSOR("<film type='hdrfilm'><integer name='width' value='32000'/><integer name='height' value='32000'/></film>"),
 		"a film of 32000 x 32000 pixels");
 	refuses(SENSOR("") "<integrator type='path'><integer name='max_depth' value='0'/></integrator>", "a depth of 0");
@@ -188,6 +227,8 @@ int main(void)
 		cmocka_unit_test(test_filters),
 		cmocka_unit_test(test_sampler_and_integrator),
 		cmocka_unit_test(test_camera),
+		cmocka_unit_test(test_several_sensors),
+		cmocka_unit_test(test_crop),
 		cmocka_unit_test(test_size_is_overridden),
 		cmocka_unit_test(test_refused),
 	};
