@@ -4,6 +4,10 @@ const double cie_observer[CIE_COUNT][3] = {
 #include "cie_observer.inc"
 };
 
+const struct wavelength_cell wavelength_cells[CIE_COUNT - 1] = {
+#include "wavelength_cells.inc"
+};
+
 const double cie_d65[CIE_COUNT] = {
 #include "cie_d65.inc"
 };

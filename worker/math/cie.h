@@ -11,4 +11,10 @@ enum { CIE_FIRST_NM = 360, CIE_LAST_NM = 830, CIE_COUNT = CIE_LAST_NM - CIE_FIRS
 extern const double cie_observer[CIE_COUNT][3];
 extern const double cie_d65[CIE_COUNT];
 
+/* The 1 nm from CIE_FIRST_NM + i on: what share of all wavelengths is drawn below it, and in it (so per nm, too). */
+struct wavelength_cell {
+	double below, share;
+};
+extern const struct wavelength_cell wavelength_cells[CIE_COUNT - 1];
+
 #endif

@@ -2,58 +2,72 @@
 
 #include "worker/math/cie.h"
 
+static int cell_of(double nm)
+{
+	int cell = (int)(nm - CIE_FIRST_NM);
+	return cell < 0 ? 0 : cell > CIE_COUNT - 2 ? CIE_COUNT - 2 : cell;
+}
+
+/* The wavelength below which the share u of all lies. */
+static double wavelength_at(double u)
+{
+	int low = 0;
+	for (int step = 256; step > 0; step /= 2) {
+		int next = low + step < CIE_COUNT - 1 ? low + step : low;
+		low = wavelength_cells[next].below <= u ? next : low;
+	}
+	double inside = (u - wavelength_cells[low].below) / wavelength_cells[low].share;
+	return CIE_FIRST_NM + low + fmin(inside, 1);
+}
+
+double wavelength_pdf(double nm)
+{
+	return wavelength_cells[cell_of(nm)].share;
+}
+
 struct wavelengths wavelengths_sample(double u)
 {
-	struct wavelengths w = {.grey = false};
-	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double x = u + (double)i / SPECTRUM_LANES;
-		w.nm[i] = WAVELENGTH_MIN + (WAVELENGTH_MAX - WAVELENGTH_MIN) * (x - floor(x));
-	}
-	return w;
+	return wavelengths_sample_few(u, SPECTRUM_LANES);
 }
 
 struct wavelengths wavelengths_sample_few(double u, unsigned count)
 {
-	if (count >= SPECTRUM_LANES)
-		return wavelengths_sample(u);
-	struct wavelengths w = {.grey = false, .few = count};
+	struct wavelengths w = {.grey = false, .few = count >= SPECTRUM_LANES ? 0 : count, .u = u};
 	for (unsigned i = 0; i < SPECTRUM_LANES; i++) {
 		double x = u + (double)(i % count) / count;
-		w.nm[i] = WAVELENGTH_MIN + (WAVELENGTH_MAX - WAVELENGTH_MIN) * (x - floor(x));
+		w.nm[i] = i < count ? wavelength_at(x - floor(x)) : w.nm[i - count];
 	}
 	return w;
 }
 
+/* Lane i's part of the three integrals where it carries 1. */
+static void lane_weights(const struct wavelengths *w, int i, double xyz[3])
+{
+	int cell = cell_of(w->nm[i]);
+	double b = w->nm[i] - CIE_FIRST_NM - cell, a = 1 - b;
+	double factor = 1 / (wavelength_cells[cell].share * (CIE_Y_SUM * SPECTRUM_LANES));
+	for (int k = 0; k < 3; k++)
+		xyz[k] = factor * (a * cie_observer[cell][k] + b * cie_observer[cell + 1][k]);
+}
+
 void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3])
 {
-	const double factor = (WAVELENGTH_MAX - WAVELENGTH_MIN) / (CIE_Y_SUM * SPECTRUM_LANES);
-	double x = 0, y = 0, z = 0;
+	xyz[0] = xyz[1] = xyz[2] = 0;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double position = w->nm[i] - CIE_FIRST_NM;
-		int cell = (int)position;
-		cell = cell < 0 ? 0 : cell > CIE_COUNT - 2 ? CIE_COUNT - 2 : cell;
-		double b = position - cell, a = 1 - b;
-		const double *p = cie_observer[cell], *q = cie_observer[cell + 1];
-		x += l.v[i] * (a * p[0] + b * q[0]);
-		y += l.v[i] * (a * p[1] + b * q[1]);
-		z += l.v[i] * (a * p[2] + b * q[2]);
+		double lane[3];
+		lane_weights(w, i, lane);
+		for (int k = 0; k < 3; k++)
+			xyz[k] += l.v[i] * lane[k];
 	}
-	xyz[0] = factor * x;
-	xyz[1] = factor * y;
-	xyz[2] = factor * z;
 }
 
 spectrum spectrum_intensity_weights(const struct wavelengths *w)
 {
-	const double factor = (WAVELENGTH_MAX - WAVELENGTH_MIN) / (CIE_Y_SUM * SPECTRUM_LANES);
 	spectrum sum;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
-		double position = w->nm[i] - CIE_FIRST_NM;
-		int cell = (int)position;
-		cell = cell < 0 ? 0 : cell > CIE_COUNT - 2 ? CIE_COUNT - 2 : cell;
-		double b = position - cell, a = 1 - b;
-		const double *p = cie_observer[cell], *q = cie_observer[cell + 1];
-		sum.v[i] = factor * (a * (p[0] + p[1] + p[2]) + b * (q[0] + q[1] + q[2]));
+		double lane[3];
+		lane_weights(w, i, lane);
+		sum.v[i] = lane[0] + lane[1] + lane[2];
 	}
 	return sum;
 }

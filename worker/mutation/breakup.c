@@ -12,8 +12,9 @@
 #define ROUNDING 0x1p-40
 /* Steps of x_0, in the numbers that make it. */
 #define EMITTER_STEP 0.1
-/* Wavelengths move by so many nanometres where something disperses (sec. 6); else all are as good. */
-#define WAVELENGTH_STEP 50.0
+/* By how much the number that makes the wavelengths moves at most where something disperses (sec. 6: 50 nm of 470); else all
+ * are as good. */
+#define WAVELENGTH_STEP (50.0 / 470)
 
 bool breakup_allows(const struct whole_path *x, unsigned b, unsigned c)
 {
@@ -28,7 +29,7 @@ static double move_wavelength(const struct path_context *c, double u, double r)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion))
 		return r;
-	double v = u + (2 * r - 1) * WAVELENGTH_STEP / (WAVELENGTH_MAX - WAVELENGTH_MIN);
+	double v = u + (2 * r - 1) * WAVELENGTH_STEP;
 	v = v < 0 ? -v : v >= 1 ? 2 - v : v;
 	return v < 1 ? v : u;
 }

@@ -250,7 +250,7 @@ bool whole_from_subpaths(struct path_context *c, unsigned s, unsigned edges, str
 	double pdf;
 	x->edges = edges;
 	x->wl = c->wl;
-	x->wavelength = !EFFECT_IS_ON(c->w, colour) ? 0 : (c->wl.nm[0] - WAVELENGTH_MIN) / (WAVELENGTH_MAX - WAVELENGTH_MIN);
+	x->wavelength = EFFECT_IS_ON(c->w, colour) ? c->wl.u : 0;
 	if (s > 0 && t > 1 && (z->kind != VERTEX_SURFACE || !z->bsdf->has_smooth))
 		return false;
 	if (s == 0) {

@@ -34,7 +34,7 @@ int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 struct color color_constant(double x);
 spectrum color_eval(const struct color *c, const struct wavelengths *w);
 double color_max(const struct color *c); /* upper bound over wavelengths */
-double color_mean(const struct color *c); /* over wavelengths, to choose among emitters */
+double color_mean(const struct color *c); /* over wavelengths as they are drawn, to choose among emitters */
 
 /* Fast reflectance of many rgb values (textures): from a table of coefficients made at build time. rgb in [0,1]. */
 spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelengths *w);

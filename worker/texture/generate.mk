@@ -1,5 +1,5 @@
 # Tables that are made at build time: published data as C initialisers, and the coefficients of upsampled colours.
-TABLES := $(addprefix $(BUILD)/gen/,cie_observer.inc cie_d65.inc conductors.inc upsample_table.inc)
+TABLES := $(addprefix $(BUILD)/gen/,cie_observer.inc cie_d65.inc wavelength_cells.inc conductors.inc upsample_table.inc)
 generated: $(TABLES)
 
 $(BUILD)/gen/cie_observer.inc: worker/math/data/cie1931_2deg_1nm.csv
@@ -9,6 +9,20 @@ $(BUILD)/gen/cie_observer.inc: worker/math/data/cie1931_2deg_1nm.csv
 $(BUILD)/gen/cie_d65.inc: worker/math/data/cie_d65_1nm.csv
 	@mkdir -p $(@D)
 	awk -F, '!/^#/ { printf "%s,\n", $$2 }' $< > $@.part && mv $@.part $@
+
+# Cell by cell of 1 nm: the share of wavelengths drawn below it and in it, a mixture of 95 % |r| + |g| + |b| and 5 % uniform
+# (worker/math/spectrum.h). r, g, b are the matching functions of linear Rec. 709, by the matrix of common/film/color.h.
+$(BUILD)/gen/wavelength_cells.inc: worker/math/data/cie1931_2deg_1nm.csv
+	@mkdir -p $(@D)
+	awk -F, 'function abs(v) { return v < 0 ? -v : v } \
+		!/^#/ { curve[n++] = abs(3.2404541621141054 * $$2 - 1.5371385127977166 * $$3 - 0.4985314095560162 * $$4) + \
+			abs(-0.9692660305051868 * $$2 + 1.8760108454466942 * $$3 + 0.0415560175303498 * $$4) + \
+			abs(0.0556434309591147 * $$2 - 0.2040259135167538 * $$3 + 1.0572251882231791 * $$4) } \
+		END { for (i = 0; i + 1 < n; i++) total += curve[i] + curve[i + 1]; \
+			for (i = 0; i + 1 < n; i++) { \
+				below = i == 0 ? 0 : sum; \
+				sum += 0.95 * (curve[i] + curve[i + 1]) / total + 0.05 / (n - 1); \
+				printf "{%.17g, %.17g},\n", below, (i + 2 < n ? sum : 1) - below } }' $< > $@.part && mv $@.part $@
 
 $(BUILD)/gen/conductors.inc: worker/bsdf/data/conductors.csv
 	@mkdir -p $(@D)

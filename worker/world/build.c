@@ -313,20 +313,21 @@ static int choose_emitters(struct builder *b)
 	return 0;
 }
 
-/* The colour that the grey value 1 stands for: the common illuminant's, as an emitter of rgb 1 or of a constant 1 has it. */
+/* The colour that the grey value 1 stands for: the common illuminant's, as an emitter of rgb 1 or of a constant 1 has it.
+ * By the midpoint rule; the density with which wavelengths are drawn cancels. */
 static void set_grey(struct world *w)
 {
 	for (int i = 0; i < 3; i++)
 		w->grey_xyz[i] = 0;
 	int samples = 4700;
+	double range = WAVELENGTH_MAX - WAVELENGTH_MIN;
 	for (int i = 0; i < samples; i++) {
 		struct wavelengths wl = {.grey = false};
-		double nm = WAVELENGTH_MIN + (i + 0.5) * (WAVELENGTH_MAX - WAVELENGTH_MIN) / samples;
+		double nm = WAVELENGTH_MIN + (i + 0.5) * range / samples;
 		for (int k = 0; k < SPECTRUM_LANES; k++)
 			wl.nm[k] = nm;
-		wl.grey = false;
-		double xyz[3];
-		spectrum_to_xyz(spectrum_of(w->effects.illuminant == COLOR_SHAPE_D65 ? color_d65(nm) : 1), &wl, xyz);
+		double xyz[3], l = w->effects.illuminant == COLOR_SHAPE_D65 ? color_d65(nm) : 1;
+		spectrum_to_xyz(spectrum_of(l * wavelength_pdf(nm) * range), &wl, xyz);
 		for (int k = 0; k < 3; k++)
 			w->grey_xyz[k] += xyz[k] / samples;
 	}
