@@ -1,13 +1,30 @@
 #include "worker/math/fptrap.h"
 
 #include <signal.h>
+#include <stddef.h>
 #include <stdlib.h>
+
+static _Thread_local jmp_buf *catcher;
+
+jmp_buf *fptrap_catch(jmp_buf *back)
+{
+	jmp_buf *before = catcher;
+	catcher = back;
+	return before;
+}
 
 #if defined(__x86_64__)
 _Thread_local bool fptrap_watching;
 
 void fptrap_fault(void)
 {
+	jmp_buf *back = catcher;
+	if (back) {
+		catcher = NULL;
+		fptrap_watching = false;
+		_mm_setcsr(_mm_getcsr() & ~(unsigned)_MM_EXCEPT_MASK);
+		longjmp(*back, 1);
+	}
 	raise(SIGFPE);
 	abort();
 }

@@ -8,6 +8,7 @@
 #include "worker/render/sums.h"
 
 #include <float.h>
+#include <stdio.h>
 #include <string.h>
 #include <time.h>
 
@@ -23,6 +24,7 @@ struct job {
 	struct chain *chain;
 	struct batch *out;
 	struct error *e;
+	uint64_t sequence, index; /* where it is: row and column, or chain and mutation; of a bootstrap the sample */
 };
 
 enum { STOP_INTERVAL = 256 }; /* samples between looks at the stop flag */
@@ -101,6 +103,8 @@ static enum lease_end run_samples(struct job *j)
 		for (uint64_t column = 0; column < (uint64_t)j->context.window.width; column++) {
 			if (column % STOP_INTERVAL == 0 && stopped(j))
 				return LEASE_STOPPED;
+			j->sequence = row;
+			j->index = column;
 			sample_pixel(j, column, row);
 		}
 	return LEASE_DONE;
@@ -131,6 +135,7 @@ static enum lease_end run_bootstrap(struct job *j)
 	for (uint64_t i = r.begin; i < r.end; i++) {
 		if (i % STOP_INTERVAL == 0 && stopped(j))
 			return LEASE_STOPPED;
+		j->index = i;
 		struct sampler_random s;
 		sampler_random_init(&s, j->plan->seed, RNG_BOOTSTRAP, i, 0);
 		j->integrator->evaluate(&j->context, &s.base, &j->sample);
@@ -161,6 +166,8 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 	const struct chain_ops *ops = j->integrator->chain;
 	*c = (struct chain){.integrator = j->integrator, .context = &j->context, .film = &j->film, .mixture = j->plan->mutations,
 			    .strategy = j->out->strategy, .seed = j->plan->seed, .id = id};
+	j->sequence = id;
+	j->index = 0;
 	bool ok = in->states ? ops->resume(c, &in->states[k]) : ops->start(c, in->seeds[k]);
 	if (!ok)
 		return error_set(j->e, EBADMSG, "chain %llu of group %u does not resume: its state is not one of this plan",
@@ -172,6 +179,7 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 			*end = LEASE_STOPPED;
 			return 0;
 		}
+		j->index = i + 1;
 		ops->step(c, &sums);
 	}
 	ops->flush(c);
@@ -270,6 +278,33 @@ static int run(struct job *j, const struct lease_input *in, enum lease_end *end)
 	return film_sums_take(&j->film, j->out, j->e);
 }
 
+static int invalid_operation(const struct job *j)
+{
+	char place[128];
+	unsigned long long sequence = j->sequence, index = j->index, group = j->key->group, epoch = j->key->epoch;
+	if (j->key->kind == LEASE_BOOTSTRAP)
+		snprintf(place, sizeof place, "bootstrap sample %llu of group %llu", index, group);
+	else if (j->plan->kind == PLAN_SAMPLES)
+		snprintf(place, sizeof place, "row %llu, column %llu of group %llu, epoch %llu", sequence, index, group, epoch);
+	else
+		snprintf(place, sizeof place, "mutation %llu of chain %llu, epoch %llu", index, sequence, epoch);
+	return error_set(j->e, EDOM, "an invalid floating-point operation (SIGFPE) in %s by '%s'", place, j->plan->integrator);
+}
+
+/* All memory is the job's, so that nothing is lost when an invalid operation leaves in the middle. */
+static int run_caught(struct job *j, const struct lease_input *in, enum lease_end *end)
+{
+	jmp_buf back;
+	if (setjmp(back))
+		return invalid_operation(j);
+	jmp_buf *caught = fptrap_catch(&back);
+	bool watched = fptrap_watch();
+	int rc = run(j, in, end);
+	fptrap_unwatch(watched);
+	fptrap_catch(caught);
+	return rc;
+}
+
 int render_lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
 		 const atomic_bool *stop, enum lease_end *end, struct batch *out, struct error *e)
 {
@@ -290,11 +325,8 @@ int render_lease(const struct world *w, const struct plan *p, const struct lease
 	j->e = e;
 	double start = thread_seconds();
 	rc = prepare(j, w, e);
-	if (!rc) {
-		bool watched = fptrap_watch();
-		rc = run(j, in, end);
-		fptrap_unwatch(watched);
-	}
+	if (!rc)
+		rc = run_caught(j, in, end);
 	film_sums_fini(&j->film);
 	mem_free(j->chain);
 	mem_free(j);

@@ -234,6 +234,40 @@ static void test_refused(void **state)
 	world_free(w);
 }
 
+/* A camera that looks nowhere makes 0/0 in the first path of every kind of lease: an error that says where, and nothing of it is
+ * left in the thread or the world. */
+static void test_invalid_operation(void **state)
+{
+	(void)state;
+#if defined(__x86_64__)
+	struct world *w = small_world("box");
+	const double width = w->camera.width;
+	for (size_t n = 0; render_integrator_at(n); n++) {
+		struct plan p = plan_of(w, render_integrator_at(n)->name);
+		uint64_t seeds[2];
+		find_seeds(w, &p, 0, seeds, 2);
+		struct lease_input in = {2, seeds, NULL};
+		for (int kind = LEASE_BOOTSTRAP; kind <= LEASE_RENDER; kind++) {
+			struct lease_key k = key((enum lease_kind)kind, 0, 0, 0);
+			struct batch good = run(w, &p, k, &in), b;
+			struct error e = {""};
+			enum lease_end end;
+			w->camera.width = INFINITY;
+			assert_int_equal(render_lease(w, &p, &k, &in, NULL, &end, &b, &e), -EDOM);
+			assert_true(strstr(e.text, "invalid floating-point operation (SIGFPE)") && strstr(e.text, p.integrator));
+			assert_true(strstr(e.text, kind == LEASE_BOOTSTRAP ? "bootstrap sample" : p.kind == PLAN_SAMPLES ? "row 0, column 0" : "mutation"));
+			assert_true(!b.tiles && !b.states && !b.weights && !b.moments);
+			w->camera.width = width;
+			struct batch again = run(w, &p, k, &in);
+			assert_same(&good, &again);
+			batch_fini(&good);
+			batch_fini(&again);
+		}
+	}
+	world_free(w);
+#endif
+}
+
 static void test_stop(void **state)
 {
 	(void)state;
@@ -453,6 +487,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_any_order), cmocka_unit_test(test_chains),  cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_invalid_operation),
 		cmocka_unit_test(test_stop),	  cmocka_unit_test(test_crop),	  cmocka_unit_test(test_borders),
 		cmocka_unit_test(test_kernels),	  cmocka_unit_test(test_no_memory),
 		cmocka_unit_test(test_no_memory_for_a_world),
