@@ -42,7 +42,7 @@ static int diffuse_create(struct bsdf *b, const struct scene_node *n, const stru
 }
 
 static const struct param diffuse_params[] = {
-	{.name = "reflectance", .types = VALUE_TEXTURE},
+	{.name = "reflectance", .types = VALUE_TEXTURE, .max = 1},
 	{.name = NULL},
 };
 

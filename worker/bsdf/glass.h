@@ -15,8 +15,8 @@ struct glass {
 int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 	       struct error *e);
 #define GLASS_PARAMS                                                                                                   \
-	IOR_PARAMS, {.name = "specular_reflectance", .types = VALUE_TEXTURE},                                          \
-	{.name = "specular_transmittance", .types = VALUE_TEXTURE}
+	IOR_PARAMS, {.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1},                                       \
+	{.name = "specular_transmittance", .types = VALUE_TEXTURE, .max = 1}
 
 /* Index below the surface over the one above. */
 double glass_eta(const struct glass *g, double nm);

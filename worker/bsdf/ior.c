@@ -51,10 +51,7 @@ int ior_read(const struct scene_node *n, const char *name, double fallback, doub
 			}
 		return node_error(n, e, ENOTSUP, "%s: no material \"%s\" is known; a number will do", name, p->value.as.string);
 	}
-	double x = node_float(n, name, fallback);
-	if (!(x > 0) || !isfinite(x))
-		return node_error(n, e, EINVAL, "%s = %g: an index of refraction must be above 0", name, x);
-	*out = x;
+	*out = node_float(n, name, fallback);
 	return 0;
 }
 
@@ -143,9 +140,10 @@ int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out
 	if (code)
 		return code;
 	double most = ior_at(out, WAVELENGTH_MIN), least = ior_at(out, WAVELENGTH_MAX);
-	if (!(most > 0 && isfinite(most) && least > 0 && isfinite(least)))
-		return node_error(n, e, EINVAL, "%s: the index of refraction is %g at %g nm and %g at %g nm",
-				  sellmeier ? name->sellmeier : name->cauchy, most, WAVELENGTH_MIN, least, WAVELENGTH_MAX);
+	if (!(fmax(most, least) <= PARAM_IOR_MAX && fmin(most, least) >= PARAM_IOR_MIN))
+		return node_error(n, e, ERANGE, "%s: the index of refraction is %g at %g nm and %g at %g nm, outside [%g, %g]",
+				  sellmeier ? name->sellmeier : name->cauchy, most, WAVELENGTH_MIN, least, WAVELENGTH_MAX, PARAM_IOR_MIN,
+				  PARAM_IOR_MAX);
 	out->n = ior_at(out, IOR_NM);
 	return 0;
 }

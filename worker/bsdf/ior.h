@@ -21,15 +21,16 @@ struct ior {
 
 enum ior_side { IOR_INT, IOR_EXT };
 
-/* The property `name` of n, a number > 0 or a name, as one number; `fallback` when absent. */
+/* The property `name` of n, a number of that range or a name, as one number; `fallback` when absent. */
 int ior_read(const struct scene_node *n, const char *name, double fallback, double *out, struct error *e);
 
 /* int_ior, int_cauchy_b, int_sellmeier or the three for ext; names have their own law where `dispersion` is on. Defaults are
- * Mitsuba's. What is returned is finite and positive over all wavelengths. */
+ * Mitsuba's. What is returned is within [PARAM_IOR_MIN, PARAM_IOR_MAX] over all wavelengths. */
 int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out, struct error *e);
+#define IOR_NUMBER(name_)                                                                                              \
+	{.name = name_, .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING, .min = PARAM_IOR_MIN, .max = PARAM_IOR_MAX}
 #define IOR_PARAMS                                                                                                     \
-	{.name = "int_ior", .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING},                                          \
-	{.name = "ext_ior", .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING},                                          \
+	IOR_NUMBER("int_ior"), IOR_NUMBER("ext_ior"),                                                                  \
 	{.name = "dispersion", .types = VALUE_BOOL},                                                                   \
 	{.name = "int_cauchy_b", .types = VALUE_FLOAT | VALUE_INT, .min = -1, .max = 1},                               \
 	{.name = "ext_cauchy_b", .types = VALUE_FLOAT | VALUE_INT, .min = -1, .max = 1},                               \

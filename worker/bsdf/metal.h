@@ -3,6 +3,7 @@
 #define WORKER_BSDF_METAL_H
 
 #include "worker/bsdf/create.h"
+#include "worker/bsdf/ior.h"
 
 struct metal {
 	struct color eta, k;
@@ -15,9 +16,9 @@ struct metal {
 int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 	       struct error *e);
 #define METAL_PARAMS                                                                                                   \
-	{.name = "material", .types = VALUE_STRING}, {.name = "eta", .types = VALUE_COLOR},                            \
-	{.name = "k", .types = VALUE_COLOR}, {.name = "ext_eta", .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING},      \
-	{.name = "specular_reflectance", .types = VALUE_TEXTURE}
+	{.name = "material", .types = VALUE_STRING}, {.name = "eta", .types = VALUE_COLOR, .max = PARAM_METAL_MAX},    \
+	{.name = "k", .types = VALUE_COLOR, .max = PARAM_METAL_MAX}, IOR_NUMBER("ext_eta"),                           \
+	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1}
 
 /* Reflectance for the cosine against the (micro)surface. */
 spectrum metal_fresnel(const struct metal *m, const struct bsdf_point *p, double cosine);

@@ -86,8 +86,8 @@ static int phong_create(struct bsdf *b, const struct scene_node *n, const struct
 }
 
 static const struct param phong_params[] = {
-	{.name = "diffuse_reflectance", .types = VALUE_TEXTURE},
-	{.name = "specular_reflectance", .types = VALUE_TEXTURE},
+	{.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .max = 1},
+	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1},
 	{.name = "exponent", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
 	{.name = NULL},
 };

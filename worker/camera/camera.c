@@ -42,6 +42,9 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	c->aperture = s->aperture_radius * world_scale;
 	c->focus = s->focus_distance * world_scale;
 	c->lens = c->aperture > 0;
+	double away = vec3_length(c->position) + c->aperture;
+	if (!(away <= PARAM_REACH_MAX))
+		return error_set(e, ERANGE, "the camera stands %g times the scene's radius away from it, beyond %g", away, PARAM_REACH_MAX);
 	if (!(c->aperture >= 0) || (c->aperture > 0 && !(c->focus > 0)))
 		return error_set(e, EINVAL, "an aperture of radius %g, focused at a distance of %g", s->aperture_radius, s->focus_distance);
 	return 0;

@@ -51,6 +51,8 @@ static void run(struct task *t)
 		pause();
 	if (!atomic_load(&l->stop))
 		l->rc = render_lease(l->bundle->world, p, &l->grant.key, &in, &l->stop, &l->end, &batch, &l->error);
+	if (!l->rc && l->end == LEASE_DONE) /* what the coordinator would refuse is the scene's fault, and is said before it is sent */
+		l->rc = batch_check(&batch, p, &l->error);
 	if (l->rc)
 		error_prefix(&l->error, l->rc, "%s", l->bundle->info.message->job_info->scene);
 	if (!l->rc && l->end == LEASE_DONE && l->lie)

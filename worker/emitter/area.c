@@ -15,7 +15,7 @@ struct area {
 };
 
 static const struct param params[] = {
-	{"radiance", VALUE_TEXTURE, PARAM_UNDERSTOOD, 0, 0, NULL},
+	{"radiance", VALUE_TEXTURE, PARAM_UNDERSTOOD, 0, PARAM_LIGHT_MAX, NULL},
 	{"sampling_weight", VALUE_FLOAT, PARAM_IGNORED, 0, 0, NULL},
 	{NULL, 0, PARAM_UNDERSTOOD, 0, 0, NULL},
 };

@@ -67,7 +67,7 @@ static int constant_create(struct emitter *em, const struct scene_node *n, const
 }
 
 static const struct param constant_params[] = {
-	{.name = "radiance", .types = VALUE_COLOR},
+	{.name = "radiance", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
 	{.name = NULL},
 };

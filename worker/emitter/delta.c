@@ -7,8 +7,11 @@ int delta_create(struct emitter *em, struct delta_light *l, const struct scene_n
 	int code = texture_from_node(&t, n, name, 1, COLOR_ILLUMINANT, build->assets, build->dialect_3, build->arena, e);
 	if (code)
 		return code;
-	if (!(factor > 0) || !isfinite(factor) || !vec3_is_finite(l->x.p))
-		return node_error(n, e, EINVAL, "this place cannot be told from the scene's in double");
+	double away = vec3_length(l->x.p);
+	if (!(away <= PARAM_REACH_MAX))
+		return node_error(n, e, ERANGE, "stands %g times the scene's radius away from it, beyond %g", away, PARAM_REACH_MAX);
+	if (!(factor > 0) || !isfinite(factor))
+		return node_error(n, e, EINVAL, "the scene's size leaves no number for this light's strength");
 	l->color = t.color;
 	l->factor = factor;
 	em->data = l;

@@ -31,8 +31,8 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 }
 
 static const struct param params[] = {
-	{.name = "irradiance", .types = VALUE_COLOR},
-	{.name = "direction", .types = VALUE_POINT},
+	{.name = "irradiance", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+	{.name = "direction", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
 	{.name = "to_world", .types = VALUE_TRANSFORM},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
 	{.name = NULL},

@@ -262,7 +262,7 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 
 static const struct param envmap_params[] = {
 	RASTER_PARAMS,
-	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e30},
+	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = PARAM_LIGHT_MAX},
 	{.name = "to_world", .types = VALUE_TRANSFORM},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
 	{.name = "mis_compensation", .types = VALUE_BOOL, .status = PARAM_IGNORED},

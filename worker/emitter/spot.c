@@ -73,7 +73,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 }
 
 static const struct param params[] = {
-	{.name = "intensity", .types = VALUE_COLOR},
+	{.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
 	{.name = "to_world", .types = VALUE_TRANSFORM},
 	{.name = "cutoff_angle", .types = VALUE_FLOAT | VALUE_INT, .min = 0.01, .max = 180},
 	{.name = "beam_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 180},

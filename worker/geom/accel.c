@@ -360,6 +360,14 @@ static vec3 lifted(const struct accel *a, vec3 p, vec3 ng, vec3 d)
 	return vec3_madd(p, copysign(a->reach, vec3_dot(ng, d)), ng);
 }
 
+/* Embree ends the program on rays beyond about 1.8e18 (FLT_LARGE). A number that is none fails, too. */
+static void check_ray(const struct RTCRay *r)
+{
+	float sum = fabsf(r->org_x) + fabsf(r->org_y) + fabsf(r->org_z) + fabsf(r->dir_x) + fabsf(r->dir_y) + fabsf(r->dir_z);
+	if (!(sum < 1e18f))
+		fptrap_fault();
+}
+
 /* Embree's ray runs beside the true one and begins before it, by as much as floats may be off: beside, so that a low ray does
  * not slip out along the edge of the triangle that it leaves and that is filtered; before, and beyond the end, so that
  * nothing near them is lost. What it does not meet in double between the ends is turned down by the callbacks. */
@@ -375,6 +383,7 @@ static void fill_ray(struct RTCRay *ray, const struct query *q, vec3 o, vec3 d, 
 			       .dir_z = (float)d.z,
 			       .tfar = (float)fmin(t_max + 2 * q->back, (double)FLT_MAX),
 			       .mask = 0xFFFFFFFFu};
+	check_ray(ray);
 }
 
 bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max, struct ray_hit *hit)
@@ -420,7 +429,7 @@ bool accel_occluded(const struct accel *a, const struct ray_end *from, const str
 	double length = vec3_length(q.d);
 	if (!(length > 0))
 		return false;
-	q.back = a->reach / length;
+	q.back = a->reach / fmax(length, a->reach * 0x1p-20); /* a segment that is shorter leaves Embree's floats no ray */
 	vec3 o = lifted(a, q.o, from->ng, d), end = lifted(a, to->p, to->ng, vec3_neg(d));
 	return occluded(a, &q, o, vec3_sub(end, o), 1);
 }

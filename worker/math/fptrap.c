@@ -16,16 +16,25 @@ jmp_buf *fptrap_catch(jmp_buf *back)
 #if defined(__x86_64__)
 _Thread_local bool fptrap_watching;
 
+static void forget(void)
+{
+	fptrap_watching = false;
+	_mm_setcsr(_mm_getcsr() & ~(unsigned)_MM_EXCEPT_MASK);
+}
+#else
+static void forget(void)
+{
+}
+#endif
+
 void fptrap_fault(void)
 {
 	jmp_buf *back = catcher;
 	if (back) {
 		catcher = NULL;
-		fptrap_watching = false;
-		_mm_setcsr(_mm_getcsr() & ~(unsigned)_MM_EXCEPT_MASK);
+		forget();
 		longjmp(*back, 1);
 	}
 	raise(SIGFPE);
 	abort();
 }
-#endif

@@ -19,12 +19,13 @@
 /* From here on a fault of this thread is a longjmp to `back` (with 1; nothing is watched or caught any more then); NULL: it is a
  * signal again. Returns what was before. */
 jmp_buf *fptrap_catch(jmp_buf *back);
+/* Numbers that a library cannot bear are at its door: a fault, watched or not. */
+void fptrap_fault(void) __attribute__((noreturn));
 
 #if defined(__x86_64__)
 #include <xmmintrin.h>
 
 extern _Thread_local bool fptrap_watching;
-void fptrap_fault(void) __attribute__((noreturn));
 
 /* From here on INVALID is a fault; returns what was before. */
 static inline bool fptrap_watch(void)

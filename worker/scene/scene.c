@@ -145,8 +145,20 @@ static int refuse_choice(const struct xml_element *el, const struct param *p, co
 			 spelling_hint(&s, hint, sizeof hint), list);
 }
 
+static int check_range(const struct xml_element *el, const struct param *p, const struct value *v, struct error *e)
+{
+	double scratch[3];
+	uint32_t count;
+	const double *x = value_numbers(v, scratch, &count);
+	for (uint32_t i = 0; i < count; i++)
+		if (!(x[i] >= p->min && x[i] <= p->max))
+			return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", p->name, x[i], p->min, p->max);
+	return 0;
+}
+
 static int check_value(const struct xml_element *el, const struct param *p, struct value *v, struct error *e)
 {
+	int r;
 	if (v->type == VALUE_INT && !(p->types & VALUE_INT) && (p->types & VALUE_FLOAT)) {
 		double x = (double)v->as.integer;
 		v->type = VALUE_FLOAT;
@@ -157,11 +169,8 @@ static int check_value(const struct xml_element *el, const struct param *p, stru
 		value_type_names(p->types, list, sizeof list);
 		return xml_error(el, e, EINVAL, "`%s` cannot be given like this (supported: %s)", p->name, list);
 	}
-	if (p->min < p->max && (v->type == VALUE_INT || v->type == VALUE_FLOAT)) {
-		double x = v->type == VALUE_INT ? (double)v->as.integer : v->as.number;
-		if (!(x >= p->min && x <= p->max))
-			return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", p->name, x, p->min, p->max);
-	}
+	if (p->min < p->max && (r = check_range(el, p, v, e)))
+		return r;
 	if (v->type == VALUE_STRING && p->choices) {
 		char one[64];
 		for (const char *rest = p->choices; (rest = value_next_name(rest, one, sizeof one));)

@@ -1,10 +1,19 @@
 #include "worker/scene/transform.h"
 
 #include "worker/scene/number.h"
+#include "worker/scene/param.h"
 #include "worker/scene/spelling.h"
 #include "worker/scene/value.h"
 
 #include <string.h>
+
+/* Any number of a transform: what squares of areas can hold. */
+static int check_number(const struct xml_element *el, const char *attribute, double x, struct error *e)
+{
+	if (fabs(x) <= PARAM_LENGTH_MAX)
+		return 0;
+	return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", attribute, x, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX);
+}
 
 static int read_triple(const struct xml_element *el, const char *attribute, vec3 *out, struct error *e)
 {
@@ -14,6 +23,11 @@ static int read_triple(const struct xml_element *el, const char *attribute, vec3
 		return xml_error(el, e, EINVAL, "needs an attribute `%s`", attribute);
 	if (number_list(text, v, 3) != 3)
 		return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not three numbers", attribute, text);
+	for (int i = 0; i < 3; i++) {
+		int r = check_number(el, attribute, v[i], e);
+		if (r)
+			return r;
+	}
 	*out = (vec3){v[0], v[1], v[2]};
 	return 0;
 }
@@ -40,6 +54,11 @@ int transform_read_vec3(const struct xml_element *el, double missing, bool one_f
 		else if (n != 3)
 			return xml_error(el, e, EINVAL, "value=\"%.64s\" is not three numbers%s", text,
 					 one_for_all ? " or one" : "");
+	}
+	for (int i = 0; i < 3; i++) {
+		int r = check_number(el, text ? "value" : axes[i], v[i], e);
+		if (r)
+			return r;
 	}
 	*out = (vec3){v[0], v[1], v[2]};
 	return 0;
@@ -71,6 +90,9 @@ static int read_rotate(const struct xml_element *el, mat4 *m, struct error *e)
 	const char *angle = xml_attribute(el, "angle");
 	if (!angle || !number_parse(angle, &degrees))
 		return xml_error(el, e, EINVAL, "needs an angle in degrees");
+	r = check_number(el, "angle", degrees, e);
+	if (r)
+		return r;
 	double length = vec3_length(axis);
 	if (!(length > 0) || !isfinite(length))
 		return xml_error(el, e, EINVAL, "has no axis: x, y, z are (%g, %g, %g)", axis.x, axis.y, axis.z);
@@ -78,11 +100,11 @@ static int read_rotate(const struct xml_element *el, mat4 *m, struct error *e)
 	return 0;
 }
 
-static bool is_finite(const mat4 *m)
+static bool is_in_range(const mat4 *m)
 {
 	for (int i = 0; i < 4; i++)
 		for (int j = 0; j < 4; j++)
-			if (!isfinite(m->m[i][j]))
+			if (!(fabs(m->m[i][j]) <= PARAM_LENGTH_MAX))
 				return false;
 	return true;
 }
@@ -98,7 +120,7 @@ static int read_lookat(const struct xml_element *el, mat4 *m, struct error *e)
 	if (r)
 		return r;
 	*m = mat4_look_at(origin, target, up);
-	if (!is_finite(m))
+	if (!is_in_range(m))
 		return xml_error(el, e, EINVAL, "origin and target are one point, or up points along the view");
 	return 0;
 }
@@ -112,8 +134,12 @@ static int read_matrix(const struct xml_element *el, mat4 *m, struct error *e)
 		return xml_error(el, e, EINVAL, "needs value=\"...\" with 16 or 9 numbers, row by row");
 	*m = mat4_identity();
 	int side = n == 16 ? 4 : 3;
-	for (int i = 0; i < n; i++)
+	for (int i = 0; i < n; i++) {
+		int r = check_number(el, "value", v[i], e);
+		if (r)
+			return r;
 		m->m[i / side][i % side] = v[i];
+	}
 	if (m->m[3][0] != 0 || m->m[3][1] != 0 || m->m[3][2] != 0 || m->m[3][3] != 1)
 		return xml_error(el, e, EINVAL, "the last row must be 0 0 0 1: only affine transforms are supported");
 	return 0;
@@ -161,8 +187,8 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 		if (r)
 			return r;
 		m = mat4_mul(one, m);
-		if (!is_finite(&m))
-			return xml_error(c, e, ERANGE, "the transform leaves the range of numbers");
+		if (!is_in_range(&m))
+			return xml_error(c, e, ERANGE, "the transform leaves the range of numbers: an element is outside [%g, %g]", -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX);
 	}
 	*out = m;
 	return 0;

@@ -233,3 +233,29 @@ void value_type_names(unsigned types, char *text, size_t size)
 		if (types & names[i].type)
 			spelling_list(text, size, names[i].name);
 }
+
+const double *value_numbers(const struct value *v, double scratch[3], uint32_t *count)
+{
+	const vec3 *p = &v->as.point;
+	*count = 1;
+	switch (v->type) {
+	case VALUE_INT:
+		scratch[0] = (double)v->as.integer;
+		return scratch;
+	case VALUE_FLOAT:
+		return &v->as.number;
+	case VALUE_POINT:
+		*count = 3;
+		memcpy(scratch, (double[3]){p->x, p->y, p->z}, 3 * sizeof *scratch);
+		return scratch;
+	case VALUE_RGB:
+		*count = 3;
+		return v->as.rgb;
+	case VALUE_SPECTRUM:
+		*count = v->as.spectrum.count;
+		return v->as.spectrum.value;
+	default:
+		*count = 0;
+		return NULL;
+	}
+}

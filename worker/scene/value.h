@@ -21,4 +21,8 @@ void value_type_names(unsigned types, char *text, size_t size);
 int value_check_element(const struct xml_element *el, const char *known, bool children, struct error *e);
 const char *value_next_name(const char *list, char *name, size_t size); /* walks such a list; NULL at the end */
 
+/* All numbers of a value, three of a point or rgb; none of what has none (transforms check theirs: transform.h). The
+ * result is in *v or in scratch. */
+const double *value_numbers(const struct value *v, double scratch[3], uint32_t *count);
+
 #endif

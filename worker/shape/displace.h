@@ -31,8 +31,8 @@ struct displacement {
 
 /* For the tables of shapes: the texture, and the two numbers that go with it. */
 #define DISPLACE_PARAMS                                                                                                \
-	{.name = "displacement", .types = VALUE_FLOAT | VALUE_NODE},                                                   \
-	{.name = "displacement_scale", .types = VALUE_FLOAT, .min = -1e60, .max = 1e60},                               \
+	{.name = "displacement", .types = VALUE_FLOAT | VALUE_NODE, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX}, \
+	{.name = "displacement_scale", .types = VALUE_FLOAT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},                               \
 	{.name = "displacement_level", .types = VALUE_INT, .min = 0, .max = DISPLACE_LEVEL_MAX}
 
 /* g becomes a mesh of its own, with normals; n is for messages. -E2BIG: more triangles than MESH_TRIANGLES_MAX. */

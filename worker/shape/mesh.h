@@ -8,7 +8,7 @@
 #include "worker/shape/shape.h"
 
 enum { MESH_TRIANGLES_MAX = 1 << 27 };
-#define MESH_COORDINATE_MAX 1e60 /* so that squares of areas stay finite */
+#define MESH_COORDINATE_MAX PARAM_LENGTH_MAX
 
 static inline vec3 mesh_load(const double v[3])
 {

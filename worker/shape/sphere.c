@@ -8,7 +8,7 @@
 #include <float.h>
 
 static const struct param params[] = {
-	{"center", UNDERSTOOD(VALUE_POINT)},
+	{"center", VALUE_POINT, PARAM_UNDERSTOOD, -MESH_COORDINATE_MAX, MESH_COORDINATE_MAX, NULL},
 	{"radius", VALUE_FLOAT, PARAM_UNDERSTOOD, DBL_MIN, MESH_COORDINATE_MAX, NULL},
 	SHAPE_PARAMS_END,
 };

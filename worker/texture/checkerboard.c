@@ -50,8 +50,8 @@ static enum color_shape checkerboard_shape(const struct texture *t)
 }
 
 static const struct param checkerboard_params[] = {
-	{.name = "color0", .types = VALUE_TEXTURE},
-	{.name = "color1", .types = VALUE_TEXTURE},
+	{.name = "color0", .types = VALUE_TEXTURE, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
+	{.name = "color1", .types = VALUE_TEXTURE, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
 	UV_PARAMS,
 	{.name = NULL},
 };

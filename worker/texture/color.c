@@ -111,11 +111,17 @@ static void coefficients_in_nm(const double t[3], double nm[3])
 	nm[2] = t[0] * r * r * center * center - t[1] * r * center + t[2];
 }
 
+/* The largest number that a colour of the role may have: of textures, which cannot know it from their tables. */
+static double role_max(enum color_role role)
+{
+	return role == COLOR_REFLECTANCE ? 1 : role == COLOR_ILLUMINANT ? PARAM_LIGHT_MAX : PARAM_METAL_MAX;
+}
+
 int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
 {
 	double largest = 0;
 	for (int k = 0; k < 3; k++) {
-		if (!(rgb[k] >= 0) || !isfinite(rgb[k]) || (role == COLOR_REFLECTANCE && rgb[k] > 1))
+		if (!(rgb[k] >= 0) || !(rgb[k] <= role_max(role)))
 			return -EINVAL;
 		largest = rgb[k] > largest ? rgb[k] : largest;
 	}
@@ -142,10 +148,8 @@ static int color_from_table(const struct value *v, enum color_role role, struct 
 	uint32_t n = v->as.spectrum.count;
 	for (uint32_t i = 0; i < n; i++) {
 		double x = v->as.spectrum.value[i], nm = v->as.spectrum.nm[i];
-		if (!(x >= 0) || !isfinite(x) || !isfinite(nm))
-			return error_set(e, EINVAL, "a spectrum needs finite values that are not negative");
-		if (role == COLOR_REFLECTANCE && x > 1)
-			return error_set(e, EINVAL, "a reflectance of %g at %g nm is above 1", x, nm);
+		if (!(x >= 0) || !(x <= role_max(role)) || !isfinite(nm))
+			return error_set(e, EINVAL, "%g at %g nm is outside [0, %g]", x, nm, role_max(role));
 		if (i && !(nm > v->as.spectrum.nm[i - 1]))
 			return error_set(e, EINVAL, "the wavelengths of a spectrum must increase");
 	}
@@ -165,9 +169,8 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 	switch (v->type) {
 	case VALUE_RGB:
 		if (color_from_rgb(v->as.rgb, role, out))
-			return error_set(e, EINVAL, "rgb %g %g %g: %s", v->as.rgb[0], v->as.rgb[1], v->as.rgb[2],
-					 role == COLOR_REFLECTANCE ? "a reflectance must be between 0 and 1"
-								   : "must be finite and not negative");
+			return error_set(e, EINVAL, "rgb %g %g %g: must be within [0, %g]", v->as.rgb[0], v->as.rgb[1], v->as.rgb[2],
+					 role_max(role));
 		return 0;
 	case VALUE_SPECTRUM:
 		if (v->as.spectrum.count > 1)
@@ -185,10 +188,8 @@ int color_from_value(const struct value *v, enum color_role role, struct arena *
 	default:
 		return error_set(e, EINVAL, "not a colour");
 	}
-	if (!(x >= 0) || !isfinite(x))
-		return error_set(e, EINVAL, "%g: must be finite and not negative", x);
-	if (role == COLOR_REFLECTANCE && x > 1)
-		return error_set(e, EINVAL, "%g: a reflectance must be between 0 and 1", x);
+	if (!(x >= 0) || !(x <= role_max(role)))
+		return error_set(e, EINVAL, "%g: must be within [0, %g]", x, role_max(role));
 	*out = color_white(x, role);
 	return 0;
 }

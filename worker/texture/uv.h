@@ -29,9 +29,10 @@ static inline void uv_map_apply(const struct uv_map *map, double *u, double *v)
 	*v = map->m[1][0] * x + map->m[1][1] * y + map->m[1][2];
 }
 
+/* Offsets and factors that are larger leave no digit of (u,v). */
+#define UV_NUMBER(name_) {.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX}
 #define UV_PARAMS                                                                                                      \
-	{.name = "to_uv", .types = VALUE_TRANSFORM}, {.name = "uvscale", .types = VALUE_FLOAT | VALUE_INT},             \
-	{.name = "uscale", .types = VALUE_FLOAT | VALUE_INT}, {.name = "vscale", .types = VALUE_FLOAT | VALUE_INT},     \
-	{.name = "uoffset", .types = VALUE_FLOAT | VALUE_INT}, {.name = "voffset", .types = VALUE_FLOAT | VALUE_INT}
+	{.name = "to_uv", .types = VALUE_TRANSFORM}, UV_NUMBER("uvscale"), UV_NUMBER("uscale"), UV_NUMBER("vscale"),    \
+	UV_NUMBER("uoffset"), UV_NUMBER("voffset")
 
 #endif

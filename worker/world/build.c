@@ -95,7 +95,13 @@ static int rescale(struct builder *b)
 	w->scale = ldexp(1, -exponent);
 	/* Rounding to float moves vertices by parts in 2^24: the sphere is to hold them all the same. */
 	w->radius = (r > 0 ? r * w->scale : 1) * (1 + 0x1p-20);
-	return camera_init(&w->camera, &w->settings, w->center, w->scale, b->e);
+	int rc = camera_init(&w->camera, &w->settings, w->center, w->scale, b->e);
+	for (uint32_t i = 0; rc && i < b->scene->object_count; i++) {
+		const struct scene_node *n = b->scene->objects[i];
+		if (n->cls == PLUGIN_SENSOR)
+			return error_prefix(b->e, rc, "%s:%d: <sensor>", n->file, n->line);
+	}
+	return rc;
 }
 
 static vec3 to_world_space(const struct world *w, const double p[3])
@@ -245,6 +251,11 @@ static struct emitter_surface emitter_surface_of(const struct geom_shape *g)
 	};
 }
 
+static int power_error(const struct scene_node *n, struct error *e)
+{
+	return node_error(n, e, ERANGE, "its power is not finite");
+}
+
 static int create_emitters(struct builder *b)
 {
 	struct world *w = b->w;
@@ -266,6 +277,8 @@ static int create_emitters(struct builder *b)
 		int rc = emitter_create(&w->emitters[w->emitter_count], n, &build, b->e);
 		if (rc)
 			return rc;
+		if (!isfinite(w->emitters[w->emitter_count].power))
+			return power_error(n, b->e);
 		w->emitter_shape[w->emitter_count] = i;
 		b->emitter_nodes[w->emitter_count] = n;
 		w->parts[i].emitter = (int32_t)w->emitter_count++;
@@ -286,6 +299,8 @@ static int create_emitters(struct builder *b)
 			return node_error(n, b->e, EINVAL, "a second environment: one is supported");
 		if (em->infinite)
 			em->power *= M_PI * w->radius * w->radius;
+		if (!isfinite(em->power))
+			return power_error(n, b->e);
 		if (environment)
 			w->environment = (int32_t)w->emitter_count;
 		b->emitter_nodes[w->emitter_count] = n;

@@ -360,7 +360,7 @@ static void test_bad_objs(void **state)
 	refuses("", SQUARE "f 1.5 2 3\n", "a face's corners are");
 	refuses("", SQUARE "f 1 1 1\n", "has no triangle with an area");
 	refuses("<transform name='to_world'><scale z='0'/></transform>", SQUARE "f 1 2 3\n", "to_world flattens the shape");
-	refuses("<transform name='to_world'><scale value='1e70'/></transform>", SQUARE "f 1 2 3\n", "a vertex lies beyond");
+	refuses("<transform name='to_world'><scale value='1e60'/></transform>", "v -2 -2 0\nv 2 -2 0\nv 2 2 0\nf 1 2 3\n", "a vertex lies beyond");
 	struct built b = build("obj", "<string name='filename' value='none.obj'/>", NULL);
 	assert_int_equal(b.result, -ENOENT);
 	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"obj\">: none.obj: no such file"));
