@@ -106,6 +106,14 @@ static inline void disk_forget(int fd)
 {
 	posix_fadvise(fd, 0, 0, POSIX_FADV_DONTNEED);
 }
+
+/* All of it will be read, from its beginning to its end, and soon. */
+static inline void disk_read_through(int fd)
+{
+	posix_fadvise(fd, 0, 0, POSIX_FADV_SEQUENTIAL);
+	posix_fadvise(fd, 0, 0, POSIX_FADV_WILLNEED);
+}
+
 static inline int disk_rename(const char *from, const char *to)
 {
 	return disk_calls->rename(from, to);

@@ -184,6 +184,25 @@ void answer_batch(struct farm *f, const struct event *ev)
 		give_up_where_hopeless(f, j, s, &ev->lease.key);
 }
 
+void answer_stored(struct farm *f, const struct event *ev)
+{
+	const struct lease_key *k = &ev->lease.key;
+	struct job *j = farm_find_job(f, k->job);
+	struct slot *s = j && job_is_live(j) ? slot_of(j, k) : NULL;
+	if (!is_next(j, s, k) || s->next - j->rounds > 1 || j->ending != END_NONE || (j->evaluating && would_complete(j, s)))
+		return;
+	struct action *a = update_add(f, ACTION_MERGE);
+	a->key = *k;
+	a->job = j->id;
+	a->verified = true; /* whatever it had to be, it was when it came */
+	lease_revoke_slot(f, s);
+	if (verify_chosen(j, k))
+		verify_settle(f, j, s, &ev->lease.digest);
+	j->progress_floor = job_progress(j, f->now);
+	if (job_merge(j, s, f->now, NAN))
+		rounds_complete(f, j);
+}
+
 bool answer_all_failed(const struct farm *f, const struct job *j)
 {
 	uint32_t here = 0;

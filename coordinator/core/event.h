@@ -16,6 +16,7 @@ enum event_kind {
 	EVENT_HEARD,          /* peer: a heartbeat (every other event of a peer counts as one) */
 	EVENT_REQUEST,        /* peer, want */
 	EVENT_BATCH,          /* peer, key, valid, text: the result of a lease */
+	EVENT_STORED,         /* key, digest: the result of a lease from an earlier life, which could not count before: it does now if it can */
 	EVENT_DELIVERED,      /* peer, key: its result is here and will be looked at later (EVENT_BATCH): it may have another lease */
 	EVENT_LEASE_FAILED,   /* peer, key, text: the worker tried and could not */
 	EVENT_LEASE_RETURNED, /* peer, key: given up unfinished (the worker is stopping); nobody's fault */
@@ -103,7 +104,7 @@ struct event {
 		struct {
 			struct lease_key key;
 			bool valid; /* BATCH: batch_check and the frame's own checks passed; else text says what is wrong */
-			struct batch_digest digest; /* BATCH: of a lease that farm_verifies */
+			struct batch_digest digest; /* BATCH, STORED: of a lease that farm_verifies */
 			bool own; /* LEASE_FAILED: it says that its own machine is at fault, not the job */
 		} lease;
 		enum job_hold hold;

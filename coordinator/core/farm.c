@@ -190,6 +190,7 @@ static void (*const on_event[])(struct farm *, const struct event *) = {
 	[EVENT_HEARD] = ticked,
 	[EVENT_REQUEST] = requested,
 	[EVENT_BATCH] = answer_batch,
+	[EVENT_STORED] = answer_stored,
 	[EVENT_DELIVERED] = answer_delivered,
 	[EVENT_LEASE_FAILED] = answer_failed,
 	[EVENT_LEASE_RETURNED] = answer_returned,

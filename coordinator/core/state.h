@@ -71,6 +71,7 @@ void restore_job(struct farm *f, const struct event *ev);
 
 /* answer.c: what workers send back. */
 void answer_batch(struct farm *f, const struct event *ev);
+void answer_stored(struct farm *f, const struct event *ev);
 void answer_failed(struct farm *f, const struct event *ev);
 void answer_delivered(struct farm *f, const struct event *ev);
 void answer_returned(struct farm *f, const struct event *ev);

@@ -221,7 +221,7 @@ void checkpoint_where_due(struct server *s)
 	if (s->stepping || s->stopping || s->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
 		return;
 	for (struct order *o = s->orders; o; o = o->next) {
-		if (!o->canvas || o->busy || o->ended)
+		if (!o->canvas || o->busy || o->ended || o->late_count) /* what waits is in the journal alone */
 			continue;
 		uint64_t limit = o->checkpoint_bytes > s->config.journal_bytes ? o->checkpoint_bytes : s->config.journal_bytes;
 		if ((journal_bytes(o->journal) > limit || o->unsure) && server_now(s) >= o->checkpoint_after)

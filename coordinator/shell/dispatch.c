@@ -7,6 +7,7 @@
 #include "coordinator/shell/clear.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/keep.h"
+#include "coordinator/shell/late.h"
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/trust.h"
 #include "coordinator/shell/upload.h"
@@ -124,7 +125,7 @@ static void merge(struct server *s, const struct action *a)
 	if (s->config.keep_partials)
 		keep_partials(s, &a->key);
 	uint64_t rounds = order_rounds(o);
-	int rc = durable_merged(s, o, &e);
+	int rc = s->stored ? 0 : durable_merged(s, o, &e);
 	if (!rc)
 		rc = order_merge(o, s->batch, &e);
 	if (rc == -ENOMEM) { /* half merged; nobody was told that it is stored */
@@ -135,8 +136,8 @@ static void merge(struct server *s, const struct action *a)
 		server_job_broken(s, a->job, e.text);
 	trust_merged(o, a);
 	order_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);
-	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
-		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
+	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", number(a->job),
+		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch), s->stored ? " late=1" : "");
 }
 
 static void acknowledge(struct server *s, const struct action *a)
@@ -162,7 +163,7 @@ static void send_lease(struct server *s, const struct action *a)
 {
 	struct session *p = session_find(s, a->peer);
 	struct order *o = server_order(s, a->job);
-	if (!p || !o)
+	if (!p || !o || late_withholds(o, &a->key, a->peer))
 		return;
 	order_count_worker(o, a->peer);
 	session_send_lease(p, o, &a->key);

@@ -220,7 +220,7 @@ static int write_pinned(struct server *s, struct order *o, double elapsed, struc
 	if (o->pinned || !farm_job(s->farm, o->id, server_now(s), &status) || !*status.fingerprint)
 		return 0;
 	o->pinned = true;
-	return journal_append(o->journal, JOURNAL_PINNED, elapsed, status.fingerprint, strlen(status.fingerprint), NULL, e);
+	return journal_append(o->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint, strlen(status.fingerprint), NULL, e);
 }
 
 int durable_merged(struct server *s, struct order *o, struct error *e)
@@ -228,7 +228,7 @@ int durable_merged(struct server *s, struct order *o, struct error *e)
 	double elapsed = farm_elapsed(s->farm, o->id, server_now(s));
 	assert(s->frame);
 	int rc = write_pinned(s, o, elapsed, e);
-	return rc ? rc : journal_append(o->journal, JOURNAL_BATCH, elapsed, s->frame, s->frame_size, s->payload, e);
+	return rc ? rc : journal_append(o->journal, JOURNAL_BATCH, &s->batch->key, elapsed, s->frame, s->frame_size, s->payload, e);
 }
 
 /* ---- group commit ---- */
@@ -342,7 +342,7 @@ void durable_ack(struct server *s, const struct order *o, uint64_t peer, const s
 /* What nobody waits for: it need not be safe at once, but soon. */
 static int append_note(struct server *s, const struct order *o, enum journal_kind kind, double elapsed, const void *bytes, size_t size, struct error *e)
 {
-	int rc = journal_append(o->journal, kind, elapsed, bytes, size, NULL, e);
+	int rc = journal_append(o->journal, kind, NULL, elapsed, bytes, size, NULL, e);
 	if (!rc)
 		durable_ack(s, o, NOBODY, &(struct lease_key){.job = o->id}, ACK_REPEAT);
 	return rc;

@@ -5,6 +5,7 @@
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/keep.h"
+#include "coordinator/shell/replay.h"
 #include "coordinator/shell/restore.h"
 #include "coordinator/shell/session.h"
 
@@ -190,7 +191,7 @@ struct reading {
 static void run(uv_work_t *work)
 {
 	struct reading *w = work->data;
-	w->rc = restore_films(w->server->spool, w->order, &w->error);
+	w->rc = replay_films(w->server->spool, w->order, &w->error);
 	if (!w->rc) /* results from before its end may still wait for a flush of the old file */
 		w->rc = journal_renew(w->order->journal, &w->error);
 }

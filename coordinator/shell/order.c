@@ -103,6 +103,7 @@ void order_free(struct order *o)
 	mem_free(o->states);
 	mem_free(o->seeds);
 	mem_free(o->credits);
+	mem_free(o->late);
 	bootstrap_free(o->bootstrap);
 	canvas_free(o->canvas);
 	if (o->log >= 0)

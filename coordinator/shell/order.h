@@ -36,6 +36,13 @@ struct order_credit {
 	uint64_t leases;
 };
 
+/* Where a result lies in the journal that cannot count yet (late.h). */
+struct late_result {
+	struct lease_key key;
+	uint64_t at;
+	uint64_t peer; /* to whom the core has given its lease meanwhile; 0: nobody */
+};
+
 struct order {
 	struct order *next;
 	uint64_t id;
@@ -78,6 +85,8 @@ struct order {
 	struct order_credit *credits;
 	size_t credit_count;
 	char doubts[512]; /* about those of workers that are set aside by now; "": none */
+	struct late_result *late;
+	size_t late_count, late_capacity;
 	struct waiting_batch *waiting, **waiting_last;
 	size_t waiting_bytes;
 };

@@ -4,138 +4,14 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
-#include "common/wire/frame.h"
 #include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/control.h"
 #include "coordinator/shell/dispatch.h"
+#include "coordinator/shell/replay.h"
 #include "coordinator/shell/trust.h"
 
 #include <string.h>
 #include <time.h>
-
-/* A journal on its way into an order. */
-struct replay {
-	struct order *order;
-	double elapsed;
-	uint64_t batches;
-};
-
-/* ---- frames */
-
-static int unpack(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
-		  const unsigned char **payload, size_t *payload_size, struct error *e)
-{
-	uint32_t header = 0, rest = 0;
-	*payload = NULL;
-	*payload_size = 0;
-	if (size >= FRAME_PREFIX)
-		frame_prefix_read(frame, &header, &rest);
-	if (size < FRAME_PREFIX || (uint64_t)header + rest != size - FRAME_PREFIX)
-		return error_set(e, EBADMSG, "a frame of another length");
-	int rc = envelope_unpack(env, frame + FRAME_PREFIX, header, e);
-	if (!rc && env->message->body_case != want) {
-		envelope_fini(env);
-		rc = error_set(e, EBADMSG, "another message than was expected");
-	}
-	*payload = frame + FRAME_PREFIX + header;
-	*payload_size = rest;
-	return rc;
-}
-
-/* ---- the journal */
-
-static int merge(struct replay *r, struct batch *b, struct error *e)
-{
-	struct order *o = r->order;
-	if ((b->key.kind == LEASE_BOOTSTRAP) != (o->bootstrap != NULL))
-		return error_set(e, EBADMSG, "a batch that is not of its time");
-	uint64_t rounds = order_rounds(o);
-	int rc = order_merge(o, b, e);
-	if (rc == -EEXIST || rc == -EAGAIN) /* of the films, not of the machine */
-		rc = error_prefix(e, -EBADMSG, "a batch out of its order");
-	order_note_times(o, r->elapsed, rounds);
-	if (!rc && o->bootstrap && bootstrap_missing(o->bootstrap) == 0)
-		rc = order_prepare(o, o->film_folder, e);
-	r->batches++;
-	return rc;
-}
-
-/* It was written whole: by a coordinator with other records. They are not thrown away. */
-static int strange(const struct replay *r, const char *what, size_t size, struct error *e)
-{
-	return error_set(e, EPROTO, "the journal of j%llu has %s of %zu bytes that mean nothing here: another coordinator wrote it",
-			 (unsigned long long)r->order->id, what, size);
-}
-
-static int take_batch(struct replay *r, const unsigned char *body, size_t size, struct error *e)
-{
-	struct envelope env;
-	struct batch batch = {0};
-	const unsigned char *payload;
-	size_t payload_size;
-	int rc = unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
-	if (rc)
-		return rc == -EBADMSG ? strange(r, "a result", size, e) : rc;
-	rc = batch_unpack(&batch, &r->order->plan, env.message->lease_result, payload, payload_size, e);
-	rc = !rc ? merge(r, &batch, e) : rc == -EBADMSG ? strange(r, "a result", size, e) : rc;
-	batch_fini(&batch);
-	envelope_fini(&env);
-	return rc;
-}
-
-static int take_record(void *user, enum journal_kind kind, double elapsed, const unsigned char *body, size_t size, struct error *e)
-{
-	struct replay *r = user;
-	struct order *o = r->order;
-	struct forecast_look look;
-	r->elapsed = elapsed;
-	switch (kind) {
-	case JOURNAL_BATCH:
-		return take_batch(r, body, size, e);
-	case JOURNAL_PINNED:
-		if (size >= sizeof o->fingerprint)
-			return strange(r, "a fingerprint", size, e);
-		memcpy(o->fingerprint, body, size);
-		o->fingerprint[size] = 0;
-		return 0;
-	case JOURNAL_LOOK:
-		if (size != sizeof look)
-			return strange(r, "a look", size, e);
-		memcpy(&look, body, size);
-		forecast_add_look(&o->record.looks, &look);
-		o->look_written = look.work;
-		return 0;
-	case JOURNAL_COUNTS:
-		if (size != sizeof o->counts)
-			return strange(r, "counts", size, e);
-		memcpy(&o->counts, body, size);
-		return 0;
-	default:
-		return strange(r, "a record", size, e);
-	}
-}
-
-int restore_films(const struct spool *spool, struct order *o, struct error *e)
-{
-	struct replay r = {.order = o};
-	char folder[SPOOL_PATH_MAX];
-	uint64_t cut = 0, generation = 0;
-	spool_job_path(spool, o->id, NULL, folder);
-	int rc = checkpoint_load(spool, o, &generation, e);
-	if (rc && rc != -ENOENT)
-		return rc;
-	rc = journal_open(&o->journal, folder, o->id, generation, take_record, &r, &cut, e);
-	if (rc == -ENOENT) /* its batches can be made again */
-		rc = journal_create(&o->journal, folder, o->id, generation, e);
-	if (rc)
-		return rc;
-	journal_clear(folder, generation);
-	o->pinned = *o->fingerprint != 0;
-	order_log(o, LOG_JOB_STATE, "state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu",
-		  (unsigned long long)r.batches, (unsigned long long)order_rounds(o), o->times.elapsed,
-		  (unsigned long long)o->checkpoint_bytes, (unsigned long long)journal_bytes(o->journal), (unsigned long long)cut);
-	return 0;
-}
 
 /* ---- the core */
 
@@ -241,14 +117,14 @@ static int make_order(struct server *s, const struct ledger_job *j, struct order
 	struct plan plan;
 	const unsigned char *payload;
 	size_t size;
-	int rc = unpack(&info, FARM__ENVELOPE__BODY_JOB_INFO, j->plan, j->plan_size, &payload, &size, e);
+	int rc = replay_unpack(&info, FARM__ENVELOPE__BODY_JOB_INFO, j->plan, j->plan_size, &payload, &size, e);
 	if (rc)
 		return not_known(j, rc, e);
 	rc = info.message->job_info->plan ? plan_from_wire(info.message->job_info->plan, &plan, e)
 					  : error_set(e, EBADMSG, "there is no plan");
 	envelope_fini(&info);
 	if (!rc)
-		rc = unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size, &payload, &size, e);
+		rc = replay_unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size, &payload, &size, e);
 	if (rc)
 		return not_known(j, rc, e);
 	rc = hold_blobs(s, submit.message->submit, e);
@@ -277,15 +153,17 @@ int restore_order(struct server *s, const struct ledger_job *j, struct order **o
 	return rc;
 }
 
-/* What is stored is damaged: the job's batches can be made again, with the same bits. */
+/* What is stored is damaged: the job's batches can be made again, with the same bits. Nothing is deleted: somebody may want to look at it. */
 static void begin_anew(struct server *s, struct order *o)
 {
-	char path[SPOOL_PATH_MAX];
-	order_log(o, LOG_JOB_STATE, "state=anew");
+	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
+	spool_job_path(s->spool, o->id, NULL, folder);
 	spool_job_path(s->spool, o->id, "checkpoint", path);
-	disk_unlink(path);
-	spool_job_path(s->spool, o->id, NULL, path);
-	journal_clear(path, UINT64_MAX);
+	spool_job_path(s->spool, o->id, "checkpoint.damaged", aside);
+	order_log(o, LOG_SPOOL_FAULT, "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
+	order_log(o, LOG_JOB_STATE, "state=anew");
+	disk_rename(path, aside);
+	journal_put_aside(folder);
 }
 
 static int restore(struct server *s, const struct ledger_job *j, bool anew, struct order **o, struct error *e)
@@ -293,7 +171,7 @@ static int restore(struct server *s, const struct ledger_job *j, bool anew, stru
 	int rc = restore_order(s, j, o, e);
 	if (rc)
 		return rc;
-	rc = restore_films(s->spool, *o, e);
+	rc = replay_films(s->spool, *o, e);
 	if (!rc)
 		return 0;
 	order_log(*o, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);

@@ -17,9 +17,6 @@ int restore_jobs(struct server *s, struct error *e);
 
 /* One job from its row, for nobody yet. -EBADMSG: something of it is damaged or gone. */
 int restore_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e);
-/* What was merged of it, from its checkpoint and its journal: a second and more. By any thread while nobody else has the order. When it
- * fails (-EBADMSG as above; -EPROTO: of another version) the order is of no use but for restore_drop. */
-int restore_films(const struct spool *spool, struct order *o, struct error *e);
 void restore_drop(struct server *s, struct order *o); /* and lets go of its files */
 /* The core hears of an order that is in the server's list. held: by whom, or "". Refusals carry the tag. */
 int restore_tell(struct server *s, const struct order *o, const char *held, uint64_t tag, struct error *e);

@@ -9,6 +9,7 @@
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/keep.h"
+#include "coordinator/shell/late.h"
 #include "coordinator/shell/limits.h"
 #include "coordinator/shell/restore.h"
 #include "coordinator/shell/session.h"
@@ -104,6 +105,7 @@ void server_step(struct server *s, struct event *ev)
 	}
 	s->stepping = false;
 	dispatch_finish_orders(s);
+	late_feed(s);
 	checkpoint_where_due(s);
 }
 
@@ -153,6 +155,7 @@ void server_order_free_again(struct server *s)
 	if (!s->stopping)
 		uv_timer_start(&s->drain, on_drain, 0, 0);
 	dispatch_finish_orders(s);
+	late_feed(s);
 }
 
 /* ---- views ---- */

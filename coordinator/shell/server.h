@@ -99,6 +99,7 @@ struct server {
 	uint64_t last_peer;
 	struct status_socket *status;
 	bool stepping, stopping;
+	bool feeding; /* late results */
 	bool caller_waits; /* nobody could be let in: to be tried again */
 	bool checkpointing; /* of some job, by the pool */
 	struct session *extending; /* those with extensions that wait, in the order in which they came */
@@ -110,6 +111,7 @@ struct server {
 	struct batch *batch;
 	const Farm__LeaseResult *result;
 	struct buf *payload;
+	bool stored; /* the journal has it already */
 	unsigned char *frame; /* the result as the journal takes it, but for the payload */
 	size_t frame_size;
 	struct session *submitter;

@@ -1,10 +1,9 @@
 #include "coordinator/store/journal.h"
 
 #include "common/base/buf.h"
-#include "common/base/crc.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
-#include "coordinator/store/spool.h"
+#include "coordinator/store/journal_file.h"
 
 #include <fcntl.h>
 #include <pthread.h>
@@ -12,6 +11,7 @@
 #include <stdbool.h>
 #include <stdio.h>
 #include <string.h>
+#include <unistd.h>
 
 enum { PATH_MOST = 4200 };
 /* Room is taken for several records at once: a file system that is writing back makes whoever asks for it wait. */
@@ -20,32 +20,23 @@ enum { AHEAD = 8, AHEAD_MOST = 1 << 28 };
 enum { UNWRITTEN_MOST = 1 << 28 };
 static _Atomic uint64_t unwritten_bytes;
 
-struct head { /* of the file */
-	char magic[8];
-	uint64_t job, generation;
-	uint32_t check, nothing;
-};
-
-struct record { /* before its body */
-	uint32_t size, check; /* of the body; over all but itself */
-	uint32_t kind, nothing;
-	double elapsed;
-};
-
 struct unwritten {
 	struct unwritten *next;
-	struct record record;
+	struct journal_record record;
 	struct buf a, b; /* its body */
 };
 
 struct journal {
 	int fd;
-	uint64_t generation;
+	uint64_t job, generation, salt;
 	atomic_uint holders;
 	pthread_mutex_t writer; /* held while the file is written or cut; taken before `list` */
-	pthread_mutex_t list;   /* held for a moment only: of the next three */
+	pthread_mutex_t list;   /* held for a moment only: of the next four */
 	struct unwritten *first, **last;
 	uint64_t waiting;                /* their bytes; what the file will have is written + waiting */
+	uint64_t number;                 /* of the next record */
+	uint64_t damaged;                /* records in the file that were not whole when it was read */
+	_Atomic uint64_t in_file, stored; /* records that are written, that are durable */
 	_Atomic uint64_t written, synced; /* in the file */
 	_Atomic uint64_t room;            /* the disk has it, up to this byte of the file */
 	_Atomic uint64_t record;          /* the size of one, as room was asked for last */
@@ -55,34 +46,19 @@ struct journal {
 	char path[PATH_MOST];
 };
 
-/* Its digits grow with every change of what a record is, the bodies included (the next ones, and batches as common/wire packs them). */
-static const char magic[8] = "hsltJ001";
-
-static uint32_t check_head(const struct head *h)
-{
-	return crc32c(0, h, offsetof(struct head, check));
-}
-
-static uint32_t check_record(const struct record *r, const void *a, size_t a_size, const void *b, size_t b_size)
-{
-	uint32_t c = crc32c(0, &r->size, sizeof r->size);
-	c = crc32c(c, &r->kind, sizeof *r - offsetof(struct record, kind));
-	c = crc32c(c, a, a_size);
-	return crc32c(c, b, b_size);
-}
-
 static int fault(const struct journal *j, int code, struct error *e)
 {
 	return error_set(e, code, "%s: %s", j->path, strerror(code));
 }
 
-static struct journal *make(const char *folder, uint64_t generation, int flags, struct error *e)
+static struct journal *make(const char *folder, uint64_t job, uint64_t generation, int flags, struct error *e)
 {
 	struct journal *j = mem_alloc(1, sizeof *j);
 	if (!j) {
 		error_set(e, ENOMEM, "no memory for a journal");
 		return NULL;
 	}
+	j->job = job;
 	j->generation = generation;
 	j->last = &j->first;
 	pthread_mutex_init(&j->writer, NULL);
@@ -108,7 +84,7 @@ static struct unwritten *front(struct journal *j)
 	return n;
 }
 
-static uint64_t size_of(const struct record *r)
+static uint64_t size_of(const struct journal_record *r)
 {
 	return sizeof *r + r->size;
 }
@@ -122,6 +98,7 @@ static void pop(struct journal *j)
 		j->last = &j->first;
 	j->waiting -= size_of(&n->record);
 	j->written += size_of(&n->record);
+	j->in_file = n->record.number + 1;
 	pthread_mutex_unlock(&j->list);
 	unwritten_bytes -= size_of(&n->record);
 	buf_fini(&n->a);
@@ -154,10 +131,11 @@ static int write_parts(int fd, off_t at, struct iovec *part, int count)
 	return 0;
 }
 
-static int write_one(int fd, uint64_t at, struct unwritten *n)
+static int write_one(const struct journal *j, int fd, uint64_t at, struct unwritten *n)
 {
-	struct record *r = &n->record;
-	r->check = check_record(r, n->a.bytes, n->a.size, n->b.bytes, n->b.size);
+	struct journal_record *r = &n->record;
+	r->stored = j->stored;
+	journal_record_seal(r, n->a.bytes, n->a.size, n->b.bytes, n->b.size);
 	struct iovec parts[3] = {{r, sizeof *r}, {n->a.bytes, n->a.size}, {n->b.bytes, n->b.size}};
 	return write_parts(fd, (off_t)at, parts, 3);
 }
@@ -185,7 +163,7 @@ static int write_waiting(struct journal *j)
 	uint64_t end = journal_bytes(j);
 	while (!rc && !j->bad && j->written < end) {
 		struct unwritten *n = front(j);
-		rc = write_one(j->fd, j->written, n);
+		rc = write_one(j, j->fd, j->written, n);
 		if (!rc) {
 			pop(j);
 			continue;
@@ -218,16 +196,17 @@ void journal_release(struct journal *j)
 
 int journal_create(struct journal **out, const char *folder, uint64_t job, uint64_t generation, struct error *e)
 {
-	struct journal *j = make(folder, generation, O_RDWR | O_CREAT | O_TRUNC, e);
+	struct journal *j = make(folder, job, generation, O_RDWR | O_CREAT | O_TRUNC, e);
 	if (!j)
 		return -ENOMEM;
-	struct head h = {.job = job, .generation = generation};
-	memcpy(h.magic, magic, sizeof h.magic);
-	h.check = check_head(&h);
+	struct journal_head h;
 	int rc = 0;
-	if (j->fd < 0)
+	if (getentropy(&j->salt, sizeof j->salt))
 		rc = fault(j, errno, e);
-	else if (disk_write_all(j->fd, &h, sizeof h) || disk_fsync(j->fd))
+	journal_head_make(&h, job, generation, j->salt);
+	if (!rc && j->fd < 0)
+		rc = fault(j, errno, e);
+	else if (!rc && (disk_write_all(j->fd, &h, sizeof h) || disk_fsync(j->fd)))
 		rc = fault(j, errno ? errno : ENOSPC, e);
 	if (!rc)
 		rc = disk_sync_folder(folder, e);
@@ -242,101 +221,123 @@ int journal_create(struct journal **out, const char *folder, uint64_t job, uint6
 
 /* ---- reading ---- */
 
-/* -ENODATA: the file ends before that. What cannot be read is not what is not there. */
-static int read_at(int fd, void *bytes, size_t size, uint64_t at)
+static int visit_piece(const struct journal *j, const struct journal_piece *p, journal_visit *visit, void *user, struct error *e)
 {
-	unsigned char *p = bytes;
-	while (size) {
-		ssize_t n = disk_pread(fd, p, size, (off_t)at);
-		if (n < 0 && errno == EINTR)
-			continue;
-		if (n <= 0)
-			return n < 0 ? -errno : -ENODATA;
-		p += n;
-		at += (uint64_t)n;
-		size -= (size_t)n;
+	struct journal_item item = {.at = p->from, .missing = p->what == JOURNAL_WHOLE ? 0 : p->count};
+	if (p->what != JOURNAL_UNKNOWN) {
+		item.kind = (enum journal_kind)p->record.kind;
+		item.elapsed = p->record.elapsed;
+		item.lease = journal_record_lease(&p->record, j->job);
+		item.body = p->body;
+		item.size = p->record.size;
 	}
-	return 0;
+	return visit(user, &item, e);
 }
 
-static bool head_fits(const struct head *h, uint64_t job, uint64_t generation)
+static int read_records(struct journal *j, uint64_t end, struct journal_gaps *gaps, journal_visit *visit, void *user, struct journal_found *found,
+			struct error *e)
 {
-	return memcmp(h->magic, magic, sizeof magic) == 0 && h->check == check_head(h) && h->job == job && h->generation == generation;
-}
-
-/* The record at `at` of a file with so many bytes; its body is mem_alloc'd. -ENODATA: it is not whole. */
-static int read_record(const struct journal *j, uint64_t at, uint64_t end, struct record *r, unsigned char **body, struct error *e)
-{
-	int rc = end - at < sizeof *r ? -ENODATA : read_at(j->fd, r, sizeof *r, at);
-	if (!rc && r->size > end - at - sizeof *r)
-		rc = -ENODATA;
-	if (!rc && !(*body = mem_alloc(r->size, 1)))
-		return error_set(e, ENOMEM, "no memory for a record of %u bytes", r->size);
-	if (!rc) {
-		rc = read_at(j->fd, *body, r->size, at + sizeof *r);
-		if (!rc && r->check != check_record(r, *body, r->size, NULL, 0))
-			rc = -ENODATA;
-		if (rc)
-			mem_free(*body);
+	struct journal_scan s;
+	struct journal_piece p;
+	int rc;
+	journal_scan_begin(&s, j->fd, end, j->salt);
+	while ((rc = journal_scan_next(&s, &p)) > 0) {
+		if (p.what != JOURNAL_WHOLE && p.count)
+			rc = journal_gaps_add(gaps, s.number - p.count, p.count, e);
+		if (rc >= 0 && (p.what == JOURNAL_WHOLE || p.count))
+			rc = visit_piece(j, &p, visit, user, e);
+		if (p.what == JOURNAL_WHOLE)
+			mem_free(p.body);
+		if (rc < 0) {
+			journal_scan_end(&s);
+			return rc;
+		}
 	}
-	return rc && rc != -ENODATA ? fault(j, -rc, e) : rc;
+	if (rc < 0)
+		fault(j, -rc, e);
+	journal_gaps_count(gaps, s.stored, &found->damaged, &found->lost);
+	found->cut = end - s.at;
+	j->written = s.at;
+	j->number = j->in_file = j->stored = s.number;
+	j->damaged = found->damaged;
+	journal_scan_end(&s);
+	return rc;
 }
 
-/* The record at j->written, and beyond it. 1, -ENODATA, or what the visitor says. */
-static int visit_next(struct journal *j, uint64_t end, journal_visit *visit, void *user, struct error *e)
+/* A damaged head is made anew when the records say that it is their file. */
+static int read_file_head(struct journal *j, uint64_t end, bool *anew, struct error *e)
 {
-	struct record r;
-	unsigned char *body;
-	int rc = read_record(j, j->written, end, &r, &body, e);
-	if (rc)
-		return rc;
-	rc = visit(user, (enum journal_kind)r.kind, r.elapsed, body, r.size, e);
-	j->written += sizeof r + r.size;
-	mem_free(body);
-	return rc ? rc : 1;
-}
-
-static int read_all(struct journal *j, uint64_t job, journal_visit *visit, void *user, uint64_t *cut, struct error *e)
-{
-	struct stat st;
-	struct head h;
-	if (disk_fstat(j->fd, &st))
-		return fault(j, errno, e);
-	uint64_t end = (uint64_t)st.st_size;
-	int rc = read_at(j->fd, &h, sizeof h, 0);
+	struct journal_head h;
+	int rc = end < sizeof h ? -ENODATA : journal_read_at(j->fd, &h, sizeof h, 0);
 	if (rc && rc != -ENODATA)
 		return fault(j, -rc, e);
-	if (!rc && (rc = spool_check_version(h.magic, magic, j->path, e)) == -EPROTO)
+	if (!rc && journal_head_fits(&h, j->job, j->generation)) {
+		j->salt = h.salt;
+		return 0;
+	}
+	if (!rc && journal_head_version(&h, j->path, e) == -EPROTO)
+		return -EPROTO;
+	bool another = !rc && journal_head_fits(&h, h.job, h.generation);
+	rc = another ? -EBADMSG : journal_scan_salt(j->fd, end, &j->salt);
+	*anew = !rc;
+	if (rc == -EBADMSG)
+		return error_set(e, EBADMSG, "%s: not the journal of j%llu", j->path, (unsigned long long)j->job);
+	return rc ? fault(j, -rc, e) : 0;
+}
+
+static int read_all(struct journal *j, journal_visit *visit, void *user, struct journal_found *found, struct error *e)
+{
+	struct stat st;
+	struct journal_head h;
+	struct journal_gaps gaps = {NULL, 0, 0};
+	bool anew = false;
+	if (disk_fstat(j->fd, &st))
+		return fault(j, errno, e);
+	int rc = read_file_head(j, (uint64_t)st.st_size, &anew, e);
+	if (!rc)
+		rc = read_records(j, (uint64_t)st.st_size, &gaps, visit, user, found, e);
+	mem_free(gaps.first);
+	if (rc)
 		return rc;
-	if (rc || !head_fits(&h, job, j->generation))
-		return error_set(e, EBADMSG, "%s: not the journal of j%llu", j->path, (unsigned long long)job);
-	j->written = sizeof h;
-	do
-		rc = visit_next(j, end, visit, user, e);
-	while (rc > 0);
-	if (rc != -ENODATA)
-		return rc;
-	*cut = end - j->written;
-	if (*cut && disk_ftruncate(j->fd, (off_t)j->written))
+	journal_head_make(&h, j->job, j->generation, j->salt);
+	struct iovec part = {&h, sizeof h};
+	if (anew && (rc = write_parts(j->fd, 0, &part, 1)))
+		return fault(j, -rc, e);
+	if (found->cut && disk_ftruncate(j->fd, (off_t)j->written))
 		return fault(j, errno, e);
 	return disk_fsync(j->fd) ? fault(j, errno, e) : 0;
 }
 
 int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_t generation, journal_visit *visit, void *user,
-		 uint64_t *cut, struct error *e)
+		 struct journal_found *found, struct error *e)
 {
-	*cut = 0;
-	struct journal *j = make(folder, generation, O_RDWR, e);
+	*found = (struct journal_found){0};
+	struct journal *j = make(folder, job, generation, O_RDWR, e);
 	if (!j)
 		return -ENOMEM;
-	int rc = j->fd < 0 ? fault(j, errno, e) : read_all(j, job, visit, user, cut, e);
+	int rc = j->fd < 0 ? fault(j, errno, e) : 0;
+	if (!rc) {
+		disk_read_through(j->fd);
+		rc = read_all(j, visit, user, found, e);
+	}
 	if (rc) {
+		*found = (struct journal_found){0};
 		journal_release(j);
 		return rc;
 	}
 	atomic_store(&j->synced, atomic_load(&j->written));
 	*out = j;
 	return 0;
+}
+
+int journal_body(struct journal *j, uint64_t at, unsigned char **body, size_t *size, struct error *e)
+{
+	struct journal_record r;
+	int rc = journal_read_record(j->fd, j->written, j->salt, at, &r, body);
+	*size = r.size;
+	if (rc < 0)
+		return fault(j, -rc, e);
+	return rc ? 0 : error_set(e, EBADMSG, "%s: a record that was whole is damaged", j->path);
 }
 
 /* ---- appending ---- */
@@ -368,7 +369,7 @@ static int room_for(struct journal *j, uint64_t size, struct error *e)
 
 int journal_reserve(struct journal *j, size_t body, struct error *e)
 {
-	j->record = sizeof(struct record) + body;
+	j->record = sizeof(struct journal_record) + body;
 	return room_for(j, j->record, e);
 }
 
@@ -380,20 +381,32 @@ static void reserve_ahead(struct journal *j)
 		reserve(j, end, AHEAD * size);
 }
 
-int journal_append(struct journal *j, enum journal_kind kind, double elapsed, const void *a, size_t a_size, struct buf *b,
-		   struct error *e)
+static struct journal_record record_of(const struct journal *j, enum journal_kind kind, const struct lease_key *lease, double elapsed, size_t size)
+{
+	struct journal_record r = {.size = (uint32_t)size, .kind = kind, .elapsed = elapsed, .salt = j->salt};
+	if (lease) {
+		r.lease_kind = lease->kind;
+		r.group = lease->group;
+		r.part = lease->part;
+		r.epoch = lease->epoch;
+	}
+	return r;
+}
+
+int journal_append(struct journal *j, enum journal_kind kind, const struct lease_key *lease, double elapsed, const void *a, size_t a_size,
+		   struct buf *b, struct error *e)
 {
 	size_t b_size = b ? b->size : 0;
 	if (a_size > UINT32_MAX || b_size > UINT32_MAX - a_size)
 		return error_set(e, EFBIG, "%s: a record of %zu bytes", j->path, a_size + b_size);
 	if (kind != JOURNAL_BATCH && kind != JOURNAL_PINNED && !j->bad) { /* it may stay away, but must not make the journal bad */
-		int rc = room_for(j, sizeof(struct record) + a_size + b_size, e);
+		int rc = room_for(j, sizeof(struct journal_record) + a_size + b_size, e);
 		if (rc)
 			return rc;
 	}
 	struct unwritten *n = mem_alloc(1, sizeof *n);
 	if (n)
-		*n = (struct unwritten){.record = {.size = (uint32_t)(a_size + b_size), .kind = kind, .elapsed = elapsed}, .a.limit = a_size};
+		*n = (struct unwritten){.record = record_of(j, kind, lease, elapsed, a_size + b_size), .a.limit = a_size};
 	if (!n || !buf_append(&n->a, a, a_size)) {
 		mem_free(n);
 		return error_set(e, ENOMEM, "no memory for a record of %zu bytes", a_size + b_size);
@@ -404,6 +417,7 @@ int journal_append(struct journal *j, enum journal_kind kind, double elapsed, co
 	}
 	uint64_t size = size_of(&n->record), bytes = atomic_fetch_add(&unwritten_bytes, size) + size;
 	pthread_mutex_lock(&j->list);
+	n->record.number = j->number++;
 	*j->last = n;
 	j->last = &n->next;
 	j->waiting += size;
@@ -423,23 +437,43 @@ void journal_settle(struct journal *j)
 	j->settled = true;
 }
 
-/* All records of the file as they are read, each checked again, and those that wait, into another file. */
+static int copy_bytes(struct journal *j, int to, uint64_t from, uint64_t end, struct error *e)
+{
+	unsigned char bytes[4096];
+	while (from < end) {
+		size_t n = end - from < sizeof bytes ? (size_t)(end - from) : sizeof bytes;
+		int rc = journal_read_at(j->fd, bytes, n, from);
+		if (!rc)
+			rc = disk_write_all(to, bytes, n);
+		if (rc)
+			return fault(j, -rc, e);
+		from += n;
+	}
+	return 0;
+}
+
+/* All records of the file, each checked again, at their places, and those that wait, into another file. What was damaged stays so: it is
+ * known to be missing. */
 static int copy_records(struct journal *j, int to, struct error *e)
 {
-	struct record r;
-	unsigned char *body;
-	uint64_t at = sizeof(struct head);
-	int rc = 0;
-	for (; !rc && at < j->written; at += size_of(&r)) {
-		rc = read_record(j, at, j->written, &r, &body, e);
-		if (rc)
-			return rc == -ENODATA ? fault(j, EIO, e) : rc;
-		if ((rc = disk_write_all(to, &r, sizeof r)) || (rc = disk_write_all(to, body, r.size)))
-			rc = fault(j, -rc, e);
-		mem_free(body);
+	struct journal_scan s;
+	struct journal_piece p;
+	uint64_t damaged = 0;
+	int rc;
+	journal_scan_begin(&s, j->fd, j->written, j->salt);
+	while ((rc = journal_scan_next(&s, &p)) > 0) {
+		damaged += p.what == JOURNAL_WHOLE ? 0 : p.count;
+		if (p.what == JOURNAL_WHOLE)
+			mem_free(p.body);
+		if ((rc = copy_bytes(j, to, p.from, p.to, e)))
+			break;
 	}
+	if (!rc && (damaged != j->damaged || s.at != j->written))
+		rc = fault(j, EIO, e);
+	journal_scan_end(&s);
+	uint64_t at = j->written;
 	for (struct unwritten *n = j->first; !rc && n; at += size_of(&n->record), n = n->next)
-		if ((rc = write_one(to, at, n)))
+		if ((rc = write_one(j, to, at, n)))
 			rc = fault(j, -rc, e);
 	return rc;
 }
@@ -447,14 +481,13 @@ static int copy_records(struct journal *j, int to, struct error *e)
 int journal_renew(struct journal *j, struct error *e)
 {
 	char path[PATH_MOST + 8], folder[PATH_MOST];
-	struct head h;
+	struct journal_head h;
 	snprintf(path, sizeof path, "%s.new", j->path);
 	snprintf(folder, sizeof folder, "%s", j->path);
 	*strrchr(folder, '/') = 0;
 	if (j->flushes)
 		return error_set(e, EAGAIN, "%s: is being flushed", j->path);
-	if (read_at(j->fd, &h, sizeof h, 0) || !head_fits(&h, h.job, j->generation))
-		return fault(j, EIO, e);
+	journal_head_make(&h, j->job, j->generation, j->salt);
 	int fd = disk_open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
 	int rc = fd < 0 ? fault(j, errno, e) : disk_write_all(fd, &h, sizeof h) ? fault(j, errno ? errno : ENOSPC, e) : copy_records(j, fd, e);
 	if (!rc && (disk_fsync(fd) || disk_rename(path, j->path)))
@@ -471,6 +504,7 @@ int journal_renew(struct journal *j, struct error *e)
 	j->fd = fd;
 	drop_all(j);
 	j->synced = j->written;
+	j->stored = j->in_file;
 	j->room = 0;
 	j->bad = false;
 	return 0;
@@ -493,7 +527,7 @@ int journal_sync(struct journal *j, struct error *e)
 		return 0;
 	atomic_fetch_add(&j->flushes, 1); /* before it is asked whether it is bad: a bad one may be renewed at any time */
 	int rc = j->bad ? -EIO : write_waiting(j);
-	uint64_t written = j->written;
+	uint64_t written = j->written, in_file = j->in_file;
 	if (!rc && j->bad) {
 		rc = -EIO;
 	} else if (!rc && written != j->synced) {
@@ -502,6 +536,7 @@ int journal_sync(struct journal *j, struct error *e)
 			j->bad = true;
 		} else {
 			j->synced = written;
+			j->stored = in_file;
 			disk_forget(j->fd);
 			reserve_ahead(j);
 		}
@@ -510,21 +545,44 @@ int journal_sync(struct journal *j, struct error *e)
 	return rc && !j->settled ? fault(j, -rc, e) : 0;
 }
 
+/* The generation; a file that was becoming a journal counts, too. */
+static bool is_journal(const char *name, uint64_t *generation)
+{
+	unsigned long long n;
+	char again[64];
+	if (sscanf(name, "journal.%llu", &n) != 1)
+		return false;
+	int length = snprintf(again, sizeof again, "journal.%llu", n);
+	*generation = n;
+	return strncmp(again, name, (size_t)length) == 0 && (!name[length] || strcmp(name + length, ".new") == 0);
+}
+
 void journal_clear(const char *folder, uint64_t keep)
 {
 	char path[PATH_MOST];
+	uint64_t generation;
 	DIR *d = disk_opendir(folder);
 	for (struct dirent *f; d && (f = readdir(d));) {
-		unsigned long long generation;
-		char again[64];
-		if (sscanf(f->d_name, "journal.%llu", &generation) != 1 || generation == keep)
-			continue;
-		snprintf(again, sizeof again, "journal.%llu", generation);
-		size_t n = strlen(again);
-		if (strncmp(again, f->d_name, n) != 0 || (f->d_name[n] && strcmp(f->d_name + n, ".new") != 0))
+		if (!is_journal(f->d_name, &generation) || generation == keep)
 			continue;
 		snprintf(path, sizeof path, "%s/%s", folder, f->d_name);
 		disk_unlink(path);
+	}
+	if (d)
+		closedir(d);
+}
+
+void journal_put_aside(const char *folder)
+{
+	char from[PATH_MOST], to[PATH_MOST + 16];
+	uint64_t generation;
+	DIR *d = disk_opendir(folder);
+	for (struct dirent *f; d && (f = readdir(d));) {
+		if (!is_journal(f->d_name, &generation))
+			continue;
+		snprintf(from, sizeof from, "%s/%s", folder, f->d_name);
+		snprintf(to, sizeof to, "%s.damaged", from);
+		disk_rename(from, to);
 	}
 	if (d)
 		closedir(d);

@@ -1,7 +1,8 @@
 /*
  * A job's journal: what was merged since its last checkpoint, one record after the other in jobs/jN/journal.G (G counts the
- * checkpoints). A record is believed when its checksum fits; the first that does not, and all behind it, were not whole when
- * the machine stopped, and are cut off. What is appended waits in memory, up to 256 MB of all journals, until journal_sync writes it and flushes it:
+ * checkpoints). A record is believed when its checksum fits (journal_file.h). Those behind the last one that is whole were not
+ * whole when the machine stopped, and are cut off; others that are not whole have been damaged since, and are left out alone.
+ * What is appended waits in memory, up to 256 MB of all journals, until journal_sync writes it and flushes it:
  * after that it is durable. So whoever appends does not wait for a disk that is busy.
  * A file of which a call failed is bad: it is neither written nor flushed again, because a flush that failed may have forgotten
  * what it did not write and would say next time that all is well. What is appended from then on stays in memory until
@@ -15,6 +16,7 @@
 
 #include "common/base/buf.h"
 #include "common/base/error.h"
+#include "common/film/batch.h"
 
 #include <stdbool.h>
 #include <stddef.h>
@@ -32,21 +34,41 @@ struct journal;
 /* A new one, durable with its name before it returns. The folder exists. */
 int journal_create(struct journal **j, const char *folder, uint64_t job, uint64_t generation, struct error *e);
 
-/* elapsed: as it was given to journal_append. Not 0: the reading stops with this code. */
-typedef int journal_visit(void *user, enum journal_kind kind, double elapsed, const unsigned char *body, size_t size, struct error *e);
+/* A record, or a place where some are missing. */
+struct journal_item {
+	enum journal_kind kind;
+	double elapsed;         /* as both were given to journal_append */
+	struct lease_key lease; /* .kind 0: none */
+	const unsigned char *body;
+	size_t size;
+	uint64_t at;      /* of the record in the file: journal_body */
+	uint64_t missing; /* 0: it is a record. Else so many are damaged: one, of which kind, elapsed and lease are known, or any of which
+			     nothing is (.kind 0) */
+};
+/* Not 0: the reading stops with this code. */
+typedef int journal_visit(void *user, const struct journal_item *item, struct error *e);
 
-/* Visits what is whole, cuts off the rest (*cut: so many bytes), goes on behind it. -ENOENT: there is none; -EBADMSG: that of
+struct journal_found {
+	uint64_t cut;  /* bytes at the end that were not whole */
+	uint64_t damaged; /* records in the middle that are not */
+	uint64_t lost;    /* of these: were durable once. The others perhaps never were */
+};
+
+/* Visits what is whole, cuts off what is not at the end, goes on behind it. -ENOENT: there is none; -EBADMSG: that of
  * another job or generation; -EPROTO: of another version. Whatever the error, also one of reading: the file is as it was. */
 int journal_open(struct journal **j, const char *folder, uint64_t job, uint64_t generation, journal_visit *visit, void *user,
-		 uint64_t *cut, struct error *e);
+		 struct journal_found *found, struct error *e);
+/* The body of a record that was visited, again; mem_alloc'd. The loop's thread, or whoever has the journal alone. -EBADMSG: it is damaged by now. */
+int journal_body(struct journal *j, uint64_t at, unsigned char **body, size_t *size, struct error *e);
 void journal_hold(struct journal *j);
 void journal_release(struct journal *j); /* NULL: nothing */
 
 /* Room on the disk for a record with a body of so many bytes, so that appending it does not fail for want of it. -ENOSPC */
 int journal_reserve(struct journal *j, size_t body, struct error *e);
-/* The body is a, copied, and b (NULL: nothing), taken if this succeeds. -ENOMEM, -EFBIG; and what is not of the result (looks,
+/* lease: NULL: none. The body is a, copied, and b (NULL: nothing), taken if this succeeds. -ENOMEM, -EFBIG; and what is not of the result (looks,
  * counts) is not taken when the disk has no room for it: -ENOSPC. A journal that is bad takes all. */
-int journal_append(struct journal *j, enum journal_kind kind, double elapsed, const void *a, size_t a_size, struct buf *b, struct error *e);
+int journal_append(struct journal *j, enum journal_kind kind, const struct lease_key *lease, double elapsed, const void *a, size_t a_size,
+		   struct buf *b, struct error *e);
 uint64_t journal_bytes(struct journal *j); /* all that was appended, or read */
 uint64_t journal_generation(const struct journal *j);
 /* All that was appended before the call is in the file when it returns; for whoever opens it. The machine may still lose it. */
@@ -64,5 +86,6 @@ void journal_settle(struct journal *j);
 
 /* journal.G's of the folder but that of `keep` go; UINT64_MAX: all. */
 void journal_clear(const char *folder, uint64_t keep);
+void journal_put_aside(const char *folder); /* all: they are called journal.G.damaged from now on */
 
 #endif

@@ -88,7 +88,7 @@ static void write_journal(const char *spool, const uint8_t *bytes, size_t size)
 	while (size > 3) {
 		size_t n = (size_t)bytes[1] << 8 | bytes[2];
 		n = n < size - 3 ? n : size - 3;
-		journal_append(j, (enum journal_kind)(*bytes % 5), *bytes, bytes + 3, n, NULL, &e);
+		journal_append(j, (enum journal_kind)(*bytes % 5), NULL, *bytes, bytes + 3, n, NULL, &e);
 		bytes += 3 + n;
 		size -= 3 + n;
 	}
@@ -215,18 +215,18 @@ static void write_seed(enum what what, size_t size)
 
 static size_t seeded;
 
-static int add_record(void *user, enum journal_kind kind, double elapsed, const unsigned char *body, size_t size, struct error *e)
+static int add_record(void *user, const struct journal_item *item, struct error *e)
 {
+	size_t size = item->size;
 	(void)user;
-	(void)elapsed;
 	(void)e;
-	if (size > 0xffff || seeded + 3 + size > sizeof seed - 1)
+	if (item->missing || size > 0xffff || seeded + 3 + size > sizeof seed - 1)
 		return 0;
 	uint8_t *at = seed + 1 + seeded;
-	at[0] = (uint8_t)kind;
+	at[0] = (uint8_t)item->kind;
 	at[1] = (uint8_t)(size >> 8);
 	at[2] = (uint8_t)size;
-	memcpy(at + 3, body, size);
+	memcpy(at + 3, item->body, size);
 	seeded += 3 + size;
 	return 0;
 }
@@ -248,7 +248,7 @@ static void write_seeds(const char *spool)
 	struct ledger *l;
 	struct ledger_job job;
 	struct error e;
-	uint64_t cut;
+	struct journal_found found;
 	path_in(spool, "jobs/j1/job.json", path);
 	write_seed(RECORD, take_file(path));
 	path_in(spool, "jobs/j2/checkpoint", path);
@@ -264,7 +264,7 @@ static void write_seeds(const char *spool)
 		write_seed(changed[i], EDIT);
 	}
 	snprintf(folder, sizeof folder, "%s/jobs/j%d", spool, FARM_BOOTSTRAP);
-	if (journal_open(&j, folder, FARM_BOOTSTRAP, 0, add_record, NULL, &cut, &e))
+	if (journal_open(&j, folder, FARM_BOOTSTRAP, 0, add_record, NULL, &found, &e))
 		abort();
 	journal_release(j);
 	write_seed(JOURNAL_BODIES, seeded);

@@ -40,7 +40,7 @@ static void serve(const struct farm_run *f)
 	c.listen = "127.0.0.1:0";
 	c.spool = outage.root;
 	c.port_file = port_file;
-	c.journal_bytes = 2000;
+	c.journal_bytes = outage.journal_bytes ? outage.journal_bytes : 2000;
 	c.blob_bytes = 1 << 20;
 	c.retry_seconds = 0.01;
 	c.film_bytes = 0; /* more files that can fail */

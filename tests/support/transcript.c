@@ -215,6 +215,7 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		bool lacks = take(at, "lacks");
 		ev->kind = lacks		  ? EVENT_LEASE_FAILED
 			   : take(at, "batch")	  ? EVENT_BATCH
+			   : take(at, "stored")	  ? EVENT_STORED
 			   : take(at, "delivers") ? EVENT_DELIVERED
 			   : take(at, "fails")	  ? EVENT_LEASE_FAILED
 						  : EVENT_LEASE_RETURNED;

@@ -48,6 +48,25 @@ static void in_a_round(void **state)
 	farm_free(f);
 }
 
+/* A result from an earlier life that waited for another one: it counts when it can, without a word to anybody but who has its lease. */
+static void stored_results(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] restore j7 render 0,1,0 fingerprint=A elapsed=10 groups=3 rounds=9 -> j7 is running",
+		"[0] w1 joins A threads=2 -> -",
+		"[0] w1 stored j7 g0 p0 e1 -> -", "[0] w1 stored j7 g1 p0 e0 -> -", "[0] w1 stored j7 g1 p0 e2 -> -", /* not yet, merged, not open */
+		"[0] w1 wants 2 -> w1 gets j7 g0 p0 e0, w1 gets j7 g2 p0 e0",
+		"[1] w1 batch j7 g0 p0 e0 -> merge, merged, w1 gets j7 g1 p0 e1",
+		"[1] w1 stored j7 g0 p0 e1 -> merge",
+		"[1] w1 stored j7 g0 p0 e1 -> -",
+		"[1] w1 stored j7 g1 p0 e1 -> merge, w1 loses j7 g1 p0 e1",
+		"[2] w1 stored j7 g2 p0 e0 -> merge, w1 loses j7 g2 p0 e0, j7 round 1, w1 gets j7 g2 p0 e1, w1 gets j7 g0 p0 e2",
+		"[3] cancel j7 -> j7 cancelled, w1 loses j7 g0 p0 e2, w1 loses j7 g2 p0 e1, j7 is cancelled (cancelled: cancelled)",
+		"[3] w1 stored j7 g2 p0 e1 -> -",
+		NULL });
+}
+
 static void before_anything(void **state)
 {
 	(void)state;
@@ -143,6 +162,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(in_the_bootstrap),
 		cmocka_unit_test(in_a_round),
+		cmocka_unit_test(stored_results),
 		cmocka_unit_test(before_anything),
 		cmocka_unit_test(bounds),
 		cmocka_unit_test(held),

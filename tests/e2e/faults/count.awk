@@ -53,7 +53,7 @@ function add(k, fresh) {
 			split("", film)
 		started = 0
 		if (event == "batch_merged")
-			add(key(get("kind"), get("epoch")), 1)
+			add(key(get("kind"), get("epoch")), get("late") == "") # late: from the journal
 		for (e = 0; event == "batch_restored" && e < get("epochs"); e++)
 			add(key(get("kind"), e))
 		if (event == "batch_restored" && get("kind") == 2) # after the bootstrap

@@ -1,0 +1,20 @@
+/*
+ * Results in a job's journal that cannot count yet, because one that comes before them was damaged (replay.h). They stay where they
+ * are, and count as soon as that one has been computed again: nobody computes them a second time. The loop's thread, but for what
+ * replay.h does with an order that nobody else has.
+ */
+#ifndef COORDINATOR_SHELL_LATE_H
+#define COORDINATOR_SHELL_LATE_H
+
+#include "coordinator/shell/order.h"
+
+struct server;
+
+int late_add(struct order *o, const struct lease_key *k, uint64_t at, struct error *e); /* -ENOMEM */
+void late_sort(struct order *o); /* as they can count */
+/* The core gives a lease to this worker: true: its result is here and will count soon, the worker need not hear of it. */
+bool late_withholds(struct order *o, const struct lease_key *k, uint64_t peer);
+/* All that can count now do. After every step of the core, and when films are free again. */
+void late_feed(struct server *s);
+
+#endif

@@ -1,0 +1,246 @@
+#include "coordinator/store/journal_file.h"
+
+#include "common/base/crc.h"
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "coordinator/store/spool.h"
+
+#include <string.h>
+
+enum { WINDOW = 1 << 20 /* bytes that are searched for a mark at a time */ };
+
+/* Its digits grow with every change of what a record is, the bodies included (journal_kind's, and batches as common/wire packs them). */
+static const char magic[8] = "hsltJ002";
+static const char mark[4] = {'\xf1', 'h', 'j', '\x0d'};
+
+_Static_assert(sizeof(struct journal_head) == 40 && sizeof(struct journal_record) == 80, "another layout is another version");
+
+static uint32_t check_head(const struct journal_head *h)
+{
+	return crc32c(0, h, offsetof(struct journal_head, check));
+}
+
+static uint32_t check_record(const struct journal_record *r)
+{
+	return crc32c(0, r, offsetof(struct journal_record, check));
+}
+
+void journal_head_make(struct journal_head *h, uint64_t job, uint64_t generation, uint64_t salt)
+{
+	*h = (struct journal_head){.job = job, .generation = generation, .salt = salt};
+	memcpy(h->magic, magic, sizeof h->magic);
+	h->check = check_head(h);
+}
+
+bool journal_head_fits(const struct journal_head *h, uint64_t job, uint64_t generation)
+{
+	return memcmp(h->magic, magic, sizeof magic) == 0 && h->check == check_head(h) && h->job == job && h->generation == generation;
+}
+
+int journal_head_version(const struct journal_head *h, const char *path, struct error *e)
+{
+	return spool_check_version(h->magic, magic, path, e);
+}
+
+void journal_record_seal(struct journal_record *r, const void *a, size_t a_size, const void *b, size_t b_size)
+{
+	memcpy(r->mark, mark, sizeof r->mark);
+	r->size = (uint32_t)(a_size + b_size);
+	r->body_check = crc32c(crc32c(0, a, a_size), b, b_size);
+	r->check = check_record(r);
+}
+
+struct lease_key journal_record_lease(const struct journal_record *r, uint64_t job)
+{
+	return (struct lease_key){.job = job, .kind = (enum lease_kind)r->lease_kind, .group = r->group, .part = r->part, .epoch = r->epoch};
+}
+
+int journal_read_at(int fd, void *bytes, size_t size, uint64_t at)
+{
+	unsigned char *p = bytes;
+	while (size) {
+		ssize_t n = disk_pread(fd, p, size, (off_t)at);
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n <= 0)
+			return n < 0 ? -errno : -ENODATA;
+		p += n;
+		at += (uint64_t)n;
+		size -= (size_t)n;
+	}
+	return 0;
+}
+
+/* ---- one record ---- */
+
+/* 1: its head is whole; 0: it is not. */
+static int read_head(const struct journal_scan *s, uint64_t at, struct journal_record *r)
+{
+	if (at > s->end || s->end - at < sizeof *r)
+		return 0;
+	int rc = journal_read_at(s->fd, r, sizeof *r, at);
+	if (rc)
+		return rc == -ENODATA ? 0 : rc;
+	return memcmp(r->mark, mark, sizeof mark) == 0 && r->check == check_record(r) && r->salt == s->salt && r->number >= s->number &&
+	       r->size <= s->end - at - sizeof *r;
+}
+
+/* 1: it is whole, and mem_alloc'd; 0: it is not. */
+static int read_body(const struct journal_scan *s, uint64_t at, const struct journal_record *r, unsigned char **body)
+{
+	*body = mem_alloc(r->size, 1);
+	if (!*body)
+		return -ENOMEM;
+	int rc = journal_read_at(s->fd, *body, r->size, at + sizeof *r);
+	if (!rc && r->body_check == crc32c(0, *body, r->size))
+		return 1;
+	mem_free(*body);
+	*body = NULL;
+	return rc == -ENODATA ? 0 : rc;
+}
+
+/* The first place from *at on that has a mark; 0: none has. */
+static int find_mark(const struct journal_scan *s, uint64_t *at)
+{
+	unsigned char *window = mem_alloc(WINDOW, 1);
+	int rc = window ? 0 : -ENOMEM;
+	while (!rc && s->end - *at >= sizeof(struct journal_record)) {
+		size_t size = s->end - *at < WINDOW ? (size_t)(s->end - *at) : WINDOW;
+		rc = journal_read_at(s->fd, window, size, *at);
+		const unsigned char *found = rc ? NULL : memmem(window, size, mark, sizeof mark);
+		if (found) {
+			*at += (uint64_t)(found - window);
+			rc = 1;
+		} else if (!rc) {
+			*at += size < WINDOW ? size : size - (sizeof mark - 1); /* one may lie across the edge */
+		}
+	}
+	mem_free(window);
+	return rc == -ENODATA ? 0 : rc;
+}
+
+/* ---- the scan ---- */
+
+void journal_scan_begin(struct journal_scan *s, int fd, uint64_t end, uint64_t salt)
+{
+	*s = (struct journal_scan){.fd = fd, .at = sizeof(struct journal_head), .end = end, .salt = salt};
+}
+
+void journal_scan_end(struct journal_scan *s)
+{
+	mem_free(s->found.body);
+	*s = (struct journal_scan){.fd = -1};
+}
+
+/* 1: the first whole record from s->at on is known. */
+static int look_ahead(struct journal_scan *s)
+{
+	struct journal_piece *p = &s->found;
+	uint64_t at = s->at;
+	for (;;) {
+		*p = (struct journal_piece){.what = JOURNAL_WHOLE, .from = at, .count = 1};
+		int rc = read_head(s, at, &p->record);
+		if (rc > 0) {
+			p->to = at + sizeof p->record + p->record.size;
+			rc = read_body(s, at, &p->record, &p->body);
+			if (rc > 0)
+				s->ahead = true;
+			if (rc)
+				return rc;
+			at = p->to;
+			continue;
+		}
+		at++;
+		if (!rc)
+			rc = s->end > at ? find_mark(s, &at) : 0;
+		if (rc <= 0)
+			return rc;
+	}
+}
+
+/* What lies before the record that was found: a damaged one whose head says so, or bytes that say nothing. */
+static int damage(struct journal_scan *s, struct journal_piece *p)
+{
+	uint64_t to = s->found.from, number = s->found.record.number;
+	*p = (struct journal_piece){.what = JOURNAL_UNKNOWN, .from = s->at};
+	struct journal_record r;
+	int rc = s->at < to ? read_head(s, s->at, &r) : 0;
+	if (rc < 0)
+		return rc;
+	if (rc > 0 && r.number < number && r.size <= to - s->at - sizeof r) {
+		p->count = r.number - s->number;
+		if (p->count == 0) {
+			*p = (struct journal_piece){.what = JOURNAL_DAMAGED, .from = s->at, .to = s->at + sizeof r + r.size, .count = 1, .record = r};
+			s->at = p->to;
+			s->number++;
+			return 1;
+		}
+		to = s->at;
+		number = r.number;
+	}
+	p->to = to;
+	p->count = number - s->number;
+	s->at = to;
+	s->number = number;
+	return 1;
+}
+
+int journal_scan_next(struct journal_scan *s, struct journal_piece *p)
+{
+	int rc = s->ahead ? 1 : look_ahead(s);
+	if (rc <= 0)
+		return rc;
+	if (s->at < s->found.from || s->number < s->found.record.number)
+		return damage(s, p);
+	*p = s->found;
+	s->found.body = NULL;
+	s->ahead = false;
+	s->at = p->to;
+	s->number++;
+	s->stored = p->record.stored > s->stored ? p->record.stored : s->stored;
+	return 1;
+}
+
+int journal_scan_salt(int fd, uint64_t end, uint64_t *salt)
+{
+	struct journal_record r;
+	int rc = end < sizeof(struct journal_head) + sizeof r ? -ENODATA : journal_read_at(fd, &r, sizeof r, sizeof(struct journal_head));
+	if (!rc && (memcmp(r.mark, mark, sizeof mark) != 0 || r.check != check_record(&r) || r.number != 0))
+		rc = -ENODATA;
+	*salt = rc ? 0 : r.salt;
+	return rc == -ENODATA ? -EBADMSG : rc;
+}
+
+int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct journal_record *r, unsigned char **body)
+{
+	struct journal_scan s = {.fd = fd, .end = end, .salt = salt};
+	int rc = read_head(&s, at, r);
+	return rc > 0 ? read_body(&s, at, r, body) : rc;
+}
+
+/* ---- damaged records ---- */
+
+int journal_gaps_add(struct journal_gaps *g, uint64_t number, uint64_t count, struct error *e)
+{
+	if (g->count == g->capacity) {
+		size_t want = g->capacity ? 2 * g->capacity : 16;
+		struct journal_gap *more = mem_grow(g->first, g->capacity * sizeof *more, want * sizeof *more);
+		if (!more)
+			return error_set(e, ENOMEM, "no memory for a journal");
+		g->first = more;
+		g->capacity = want;
+	}
+	g->first[g->count++] = (struct journal_gap){number, count};
+	return 0;
+}
+
+void journal_gaps_count(const struct journal_gaps *g, uint64_t stored, uint64_t *damaged, uint64_t *lost)
+{
+	*damaged = *lost = 0;
+	for (size_t i = 0; i < g->count; i++) {
+		const struct journal_gap *n = &g->first[i];
+		uint64_t durable = stored > n->number ? stored - n->number : 0;
+		*damaged += n->count;
+		*lost += durable < n->count ? durable : n->count;
+	}
+}
