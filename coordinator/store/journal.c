@@ -258,7 +258,9 @@ static int read_records(struct journal *j, uint64_t end, struct journal_gaps *ga
 	journal_gaps_count(gaps, s.stored, &found->damaged, &found->lost);
 	found->cut = end - s.at;
 	j->written = s.at;
-	j->number = j->in_file = j->stored = s.number;
+	j->number = s.number;
+	atomic_store(&j->in_file, s.number);
+	atomic_store(&j->stored, s.number);
 	j->damaged = found->damaged;
 	journal_scan_end(&s);
 	return rc;
@@ -504,7 +506,7 @@ int journal_renew(struct journal *j, struct error *e)
 	j->fd = fd;
 	drop_all(j);
 	j->synced = j->written;
-	j->stored = j->in_file;
+	j->stored = atomic_load(&j->in_file);
 	j->room = 0;
 	j->bad = false;
 	return 0;
