@@ -241,7 +241,7 @@ static void test_invalid_operation(void **state)
 	(void)state;
 #if defined(__x86_64__)
 	struct world *w = small_world("box");
-	const double width = w->camera.width;
+	const double center = w->camera.center_x;
 	for (size_t n = 0; render_integrator_at(n); n++) {
 		struct plan p = plan_of(w, render_integrator_at(n)->name);
 		uint64_t seeds[2];
@@ -252,12 +252,12 @@ static void test_invalid_operation(void **state)
 			struct batch good = run(w, &p, k, &in), b;
 			struct error e = {""};
 			enum lease_end end;
-			w->camera.width = INFINITY;
+			w->camera.center_x = INFINITY;
 			assert_int_equal(render_lease(w, &p, &k, &in, NULL, &end, &b, &e), -EDOM);
 			assert_true(strstr(e.text, "invalid floating-point operation (SIGFPE)") && strstr(e.text, p.integrator));
 			assert_true(strstr(e.text, kind == LEASE_BOOTSTRAP ? "bootstrap sample" : p.kind == PLAN_SAMPLES ? "row 0, column 0" : "mutation"));
 			assert_true(!b.tiles && !b.states && !b.weights && !b.moments);
-			w->camera.width = width;
+			w->camera.center_x = center;
 			struct batch again = run(w, &p, k, &in);
 			assert_same(&good, &again);
 			batch_fini(&good);
