@@ -18,6 +18,7 @@
 	X(PEER_HELLO, "peer_hello", INFO) \
 	X(PEER_REFUSED, "peer_refused", WARN) \
 	X(PEER_CLOSED, "peer_closed", INFO) \
+	X(PEER_GARBLED, "peer_garbled", WARN) \
 	X(PEER_FAULT, "peer_fault", WARN) \
 	X(TLS_READ, "tls_read", INFO) \
 	X(TLS_FAULT, "tls_fault", ERROR) \

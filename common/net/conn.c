@@ -20,11 +20,18 @@ enum {
 	FRAME_COST = 256, /* memory of a frame that waits, beside its bytes */
 };
 
+/* What goes out instead of a frame's own prefix. */
+struct head {
+	unsigned char bytes[FRAME_SEALED_PREFIX];
+	size_t size;
+};
+
 /* A frame that waits to be encrypted. */
 struct queued {
 	struct queued *next;
+	struct head head; /* empty: it is on its way */
 	unsigned char *bytes;
-	size_t size, at;
+	size_t size, at, plain; /* plain: what it still counts in unsent */
 };
 
 struct conn {
@@ -46,7 +53,8 @@ struct conn {
 	int open_handles;
 	bool accepted, sniffed, closing;
 	bool waits_for_peer; /* it is told why before it is cut off */
-	bool distrust;
+	bool distrust, garbled;
+	bool sent; /* the first frame is on its way */
 	char why[256];
 };
 
@@ -55,6 +63,7 @@ static _Thread_local char chunk[READ_BYTES];
 
 struct sending {
 	uv_write_t request;
+	struct head head;
 	unsigned char *bytes;
 	size_t size, plain; /* what it counts in in_flight, in unsent */
 };
@@ -126,7 +135,9 @@ static void deliver(struct conn *c)
 {
 	struct envelope env;
 	struct error e;
-	if (envelope_unpack(&env, c->reader.header.bytes, c->reader.header.size, &e)) {
+	int rc = envelope_unpack(&env, c->reader.header.bytes, c->reader.header.size, &e);
+	if (rc) {
+		c->garbled = rc == -EILSEQ;
 		conn_close(c, e.text);
 		return;
 	}
@@ -154,9 +165,10 @@ static void take(struct conn *c, const unsigned char *bytes, size_t size)
 		at += used;
 		if (!was_midway)
 			c->frame_begun = c->heard;
-		if (rc < 0)
+		if (rc < 0) {
+			c->garbled = rc == -EILSEQ;
 			conn_close(c, e.text);
-		else if (rc) {
+		} else if (rc) {
 			deliver(c);
 			frame_reader_drop(&c->reader); /* not only when the next one comes: that may be seconds */
 		}
@@ -165,8 +177,8 @@ static void take(struct conn *c, const unsigned char *bytes, size_t size)
 		c->events->heard(c->user);
 }
 
-/* Takes the mem_alloc'd bytes. */
-static void to_kernel(struct conn *c, unsigned char *bytes, size_t size, size_t plain)
+/* Takes the mem_alloc'd bytes; what is sent is `head`, then what is behind `skip` bytes of them. */
+static void to_kernel(struct conn *c, struct head head, unsigned char *bytes, size_t size, size_t skip, size_t plain)
 {
 	struct sending *s = mem_alloc(1, sizeof *s);
 	if (!s) {
@@ -174,24 +186,24 @@ static void to_kernel(struct conn *c, unsigned char *bytes, size_t size, size_t 
 		conn_close(c, "no memory to send");
 		return;
 	}
-	*s = (struct sending){.bytes = bytes, .size = size, .plain = plain};
+	*s = (struct sending){.head = head, .bytes = bytes, .size = head.size + size - skip, .plain = plain};
 	s->request.data = s;
-	uv_buf_t b = uv_buf_init((char *)bytes, (unsigned)size);
-	int rc = uv_write(&s->request, (uv_stream_t *)&c->tcp, &b, 1, on_sent);
+	uv_buf_t both[] = {uv_buf_init((char *)s->head.bytes, (unsigned)head.size), uv_buf_init((char *)bytes + skip, (unsigned)(size - skip))};
+	int rc = uv_write(&s->request, (uv_stream_t *)&c->tcp, both, 2, on_sent);
 	if (rc) {
 		mem_free(bytes);
 		mem_free(s);
 		conn_close(c, uv_strerror(rc));
 		return;
 	}
-	c->in_flight += size;
+	c->in_flight += head.size + size - skip;
 }
 
 static void copy_to_kernel(struct conn *c, const void *bytes, size_t size, size_t plain)
 {
 	unsigned char *copy = mem_alloc(size, 1);
 	if (copy)
-		to_kernel(c, memcpy(copy, bytes, size), size, plain);
+		to_kernel(c, (struct head){.size = 0}, memcpy(copy, bytes, size), size, 0, plain);
 	else
 		conn_close(c, "no memory to send");
 }
@@ -226,16 +238,27 @@ static void refuse(struct conn *c, int rc, const char *why)
 
 static void pump(struct conn *c)
 {
+	static _Thread_local unsigned char first[PIECE];
 	while (c->queue && tls_link_is_open(c->link) && c->in_flight < WINDOW && !c->closing) {
 		struct queued *q = c->queue;
 		struct error e;
-		size_t size = q->size - q->at < PIECE ? q->size - q->at : PIECE;
-		if (tls_link_write(c->link, q->bytes + q->at, size, &e)) {
+		size_t most = PIECE - q->head.size, size = q->size - q->at < most ? q->size - q->at : most;
+		const unsigned char *bytes = q->bytes + q->at;
+		if (q->head.size) { /* in the same record as what follows */
+			memcpy(first, q->head.bytes, q->head.size);
+			memcpy(first + q->head.size, bytes, size);
+			bytes = first;
+		}
+		if (tls_link_write(c->link, bytes, q->head.size + size, &e)) {
 			conn_close(c, e.text);
 			return;
 		}
+		q->head.size = 0;
 		q->at += size;
-		flush(c, size + (q->at == q->size ? FRAME_COST : 0));
+		if (q->at == q->size)
+			size = q->plain; /* what is left of it */
+		q->plain -= size;
+		flush(c, size);
 		if (q->at < q->size)
 			continue;
 		c->queue = q->next;
@@ -467,6 +490,11 @@ bool conn_distrust(const struct conn *c)
 	return c->distrust;
 }
 
+bool conn_garbled(const struct conn *c)
+{
+	return c->garbled;
+}
+
 /* ---- writing ---- */
 
 static void on_sent(uv_write_t *r, int status)
@@ -493,36 +521,53 @@ static void on_sent(uv_write_t *r, int status)
 		c->events->drained(c->user);
 }
 
-/* Takes the frame, also when it fails. */
-static void enqueue(struct conn *c, unsigned char *frame, size_t size)
+/* Takes the bytes, also when it fails. */
+static void enqueue(struct conn *c, struct head head, unsigned char *bytes, size_t size, size_t skip)
 {
 	struct queued *q = mem_alloc(1, sizeof *q);
 	if (!q) {
-		mem_free(frame);
+		mem_free(bytes);
 		conn_close(c, "no memory to send");
 		return;
 	}
-	*q = (struct queued){.bytes = frame, .size = size};
+	*q = (struct queued){.head = head, .bytes = bytes, .size = size, .at = skip, .plain = size + FRAME_COST};
 	*c->queue_last = q;
 	c->queue_last = &q->next;
-	c->unsent += size + FRAME_COST;
+	c->unsent += q->plain;
 	pump(c);
+}
+
+static void send_all(struct conn *c, struct head head, unsigned char *bytes, size_t size, size_t skip)
+{
+	size_t room = c->unsent < c->config.send_limit ? c->config.send_limit - c->unsent : 0;
+	if (c->closing || c->linger_until) {
+		mem_free(bytes);
+	} else if (c->unsent && size > room) {
+		mem_free(bytes);
+		conn_close(c, "the peer does not take what is sent to it");
+	} else if (c->link) {
+		enqueue(c, head, bytes, size, skip);
+	} else {
+		c->unsent += size + FRAME_COST;
+		to_kernel(c, head, bytes, size, skip, size + FRAME_COST);
+	}
 }
 
 void conn_send_frame(struct conn *c, unsigned char *frame, size_t size)
 {
-	size_t room = c->unsent < c->config.send_limit ? c->config.send_limit - c->unsent : 0;
-	if (c->closing || c->linger_until) {
-		mem_free(frame);
-	} else if (c->unsent && size > room) {
-		mem_free(frame);
-		conn_close(c, "the peer does not take what is sent to it");
-	} else if (c->link) {
-		enqueue(c, frame, size);
-	} else {
-		c->unsent += size + FRAME_COST;
-		to_kernel(c, frame, size, size + FRAME_COST);
-	}
+	struct head head = {.size = c->sent ? FRAME_SEALED_PREFIX : FRAME_PREFIX};
+	assert(size > FRAME_PREFIX);
+	if (c->sent)
+		frame_seal(head.bytes, frame, frame + FRAME_PREFIX, size - FRAME_PREFIX);
+	else
+		memcpy(head.bytes, frame, FRAME_PREFIX);
+	c->sent = true;
+	send_all(c, head, frame, size, FRAME_PREFIX);
+}
+
+void conn_send_bytes(struct conn *c, unsigned char *bytes, size_t size)
+{
+	send_all(c, (struct head){.size = 0}, bytes, size, 0);
 }
 
 void conn_send(struct conn *c, const Farm__Envelope *message, const void *payload, size_t payload_size)

@@ -47,10 +47,14 @@ const struct tls_peer *conn_peer(const struct conn *c); /* by its certificate; N
 /* In `closed`: it ended because one side does not accept the other's certificate, or only one of them speaks TLS. A client
  * may be `opened` and refused after that: the coordinator judges last. */
 bool conn_distrust(const struct conn *c);
+/* In `closed`: it ended because bytes from the peer did not have the checksum that came with them. */
+bool conn_garbled(const struct conn *c);
 
 /* Packs and sends; the payload is copied. A failure closes the connection, so callers need not look. */
 void conn_send(struct conn *c, const Farm__Envelope *message, const void *payload, size_t payload_size);
-void conn_send_frame(struct conn *c, unsigned char *frame, size_t size); /* takes the mem_alloc'd frame */
+void conn_send_frame(struct conn *c, unsigned char *frame, size_t size); /* takes the mem_alloc'd frame; sealed unless it is the first */
+/* The same of bytes as they are, for who plays a peer that sends anything. */
+void conn_send_bytes(struct conn *c, unsigned char *bytes, size_t size);
 /* Within `message`, once: its payload is the caller's from now on. */
 struct buf conn_take_payload(struct conn *c);
 size_t conn_unsent(const struct conn *c);

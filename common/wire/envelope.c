@@ -1,5 +1,6 @@
 #include "common/wire/envelope.h"
 
+#include "common/base/crc.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/wire/frame.h"
@@ -12,6 +13,7 @@ enum {
 	BLOCK_BYTES = 1 << 14,
 	AMPLIFICATION = 16, /* memory per byte of a message; honest ones need at most 8 (packed varints of one byte) */
 	LEAST_BYTES = 1 << 16,
+	CHECK_BYTES = 4, /* a fixed32, at the end of hello and its answer: its field has the highest number there */
 };
 
 struct envelope_block {
@@ -90,6 +92,29 @@ static bool is_known(const ProtobufCMessage *m)
 	return true;
 }
 
+/* The frame that they travel in has no checksum that other versions could read. */
+static bool has_check(const Farm__Envelope *m)
+{
+	return (m->body_case == FARM__ENVELOPE__BODY_HELLO && m->hello->version == FARM_VERSION) ||
+	       (m->body_case == FARM__ENVELOPE__BODY_HELLO_ACK && m->hello_ack->version == FARM_VERSION);
+}
+
+static bool check_holds(const unsigned char *bytes, size_t size)
+{
+	if (size < CHECK_BYTES)
+		return false;
+	const unsigned char *p = bytes + size - CHECK_BYTES;
+	uint32_t said = (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+	return crc32c(0, bytes, size - CHECK_BYTES) == said;
+}
+
+static void write_check(unsigned char *bytes, size_t size)
+{
+	uint32_t sum = crc32c(0, bytes, size - CHECK_BYTES);
+	for (int i = 0; i < CHECK_BYTES; i++)
+		bytes[size - CHECK_BYTES + (size_t)i] = (unsigned char)(sum >> 8 * i);
+}
+
 int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t size, struct error *e)
 {
 	memset(env, 0, sizeof *env);
@@ -108,6 +133,10 @@ int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t siz
 		envelope_fini(env);
 		return memory_out ? error_set(e, ENOMEM, "no memory for a message") : error_set(e, EBADMSG, "%s", fault);
 	}
+	if (has_check(m) && !check_holds(bytes, size)) {
+		envelope_fini(env);
+		return error_set(e, EILSEQ, "bytes of a hello were changed on their way");
+	}
 	env->message = m;
 	return 0;
 }
@@ -122,8 +151,8 @@ void envelope_fini(struct envelope *env)
 	memset(env, 0, sizeof *env);
 }
 
-int envelope_pack(const Farm__Envelope *message, const void *payload, size_t payload_size, unsigned char **bytes,
-		  size_t *size, struct error *e)
+static int pack(const Farm__Envelope *message, const void *payload, size_t payload_size, unsigned char **bytes, size_t *size,
+		struct error *e)
 {
 	size_t header = farm__envelope__get_packed_size(message);
 	if (header == 0 || header > UINT32_MAX || payload_size > UINT32_MAX)
@@ -135,11 +164,31 @@ int envelope_pack(const Farm__Envelope *message, const void *payload, size_t pay
 		return error_set(e, ENOMEM, "no memory for a frame of %zu bytes", all);
 	frame_prefix_write(p, (uint32_t)header, (uint32_t)payload_size);
 	farm__envelope__pack(message, p + FRAME_PREFIX);
+	if (has_check(message))
+		write_check(p + FRAME_PREFIX, header);
 	if (payload && payload_size)
 		memcpy(p + FRAME_PREFIX + header, payload, payload_size);
 	*bytes = p;
 	*size = all;
 	return 0;
+}
+
+int envelope_pack(const Farm__Envelope *message, const void *payload, size_t payload_size, unsigned char **bytes,
+		  size_t *size, struct error *e)
+{
+	Farm__Envelope copy = *message;
+	Farm__Hello hello;
+	Farm__HelloAck ack;
+	if (has_check(message) && message->body_case == FARM__ENVELOPE__BODY_HELLO) {
+		hello = *message->hello;
+		hello.check = 1; /* room for it: what is 0 is not packed */
+		copy.hello = &hello;
+	} else if (has_check(message)) {
+		ack = *message->hello_ack;
+		ack.check = 1;
+		copy.hello_ack = &ack;
+	}
+	return pack(&copy, payload, payload_size, bytes, size, e);
 }
 
 bool envelope_text_ok(const char *text, size_t max)

@@ -13,7 +13,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 5 };
+enum { FARM_VERSION = 6 };
 
 struct envelope_block;
 
@@ -25,12 +25,13 @@ struct envelope {
 	bool memory_out;
 };
 
-/* -EBADMSG: does not parse, unknown fields, no body, or needs more memory than its length may ask for; -ENOMEM. */
+/* -EBADMSG: does not parse, unknown fields, no body, or needs more memory than its length may ask for; -EILSEQ: hello or its answer, of
+ * this version, whose checksum (its last field) is not that of its bytes; -ENOMEM. */
 int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t size, struct error *e);
 void envelope_fini(struct envelope *env);
 
 /* A frame in one piece, mem_alloc'd: prefix, header and room for the payload, of which `payload` (if not NULL) is copied.
- * -EMSGSIZE when a length does not fit. */
+ * Hello and its answer get their checksum here. -EMSGSIZE when a length does not fit. */
 int envelope_pack(const Farm__Envelope *message, const void *payload, size_t payload_size, unsigned char **bytes,
 		  size_t *size, struct error *e);
 

@@ -1,5 +1,7 @@
 #include "common/wire/frame.h"
 
+#include "common/base/crc.h"
+
 #include <string.h>
 
 static uint32_t read_u32(const unsigned char *p)
@@ -27,6 +29,13 @@ void frame_prefix_read(const unsigned char in[FRAME_PREFIX], uint32_t *header_si
 	*payload_size = read_u32(in + 4);
 }
 
+void frame_seal(unsigned char out[FRAME_SEALED_PREFIX], const unsigned char prefix[FRAME_PREFIX], const unsigned char *content, size_t size)
+{
+	memcpy(out, prefix, FRAME_PREFIX);
+	write_u32(out + 8, crc32c(0, content, size));
+	write_u32(out + 12, crc32c(0, out, 12));
+}
+
 void frame_reader_init(struct frame_reader *r, struct frame_limits limits)
 {
 	memset(r, 0, sizeof *r);
@@ -39,9 +48,14 @@ void frame_reader_fini(struct frame_reader *r)
 	buf_fini(&r->payload);
 }
 
+static uint32_t prefix_wanted(const struct frame_reader *r)
+{
+	return r->sealed ? FRAME_SEALED_PREFIX : FRAME_PREFIX;
+}
+
 static bool is_whole(const struct frame_reader *r)
 {
-	return r->prefix_size == FRAME_PREFIX && r->header.size == r->header_size && r->payload.size == r->payload_size;
+	return r->prefix_size && r->prefix_size == prefix_wanted(r) && r->header.size == r->header_size && r->payload.size == r->payload_size;
 }
 
 bool frame_reader_is_midway(const struct frame_reader *r)
@@ -53,16 +67,25 @@ bool frame_reader_is_midway(const struct frame_reader *r)
 void frame_reader_drop(struct frame_reader *r)
 {
 	enum { KEEP = 1 << 16 };
+	bool whole = is_whole(r);
 	if (r->header.capacity > KEEP)
 		buf_fini(&r->header);
 	if (r->payload.capacity > KEEP)
 		buf_fini(&r->payload);
 	r->header.size = r->payload.size = 0;
-	r->prefix_size = r->header_size = r->payload_size = 0;
+	r->sealed = r->sealed || whole;
+	r->prefix_size = r->header_size = r->payload_size = r->sum = 0;
+}
+
+static int changed(struct error *e)
+{
+	return error_set(e, EILSEQ, "bytes were changed on their way: the checksum of a message is not that of its bytes");
 }
 
 static int take_prefix(struct frame_reader *r, struct error *e)
 {
+	if (r->sealed && crc32c(0, r->prefix, 12) != read_u32(r->prefix + 12))
+		return changed(e);
 	frame_prefix_read(r->prefix, &r->header_size, &r->payload_size);
 	if (r->header_size == 0)
 		return error_set(e, EBADMSG, "a frame without a header");
@@ -77,11 +100,13 @@ static int take_prefix(struct frame_reader *r, struct error *e)
 	return 0;
 }
 
-static int take_part(struct buf *b, size_t want, const unsigned char *bytes, size_t count, size_t *used, struct error *e)
+static int take_part(struct frame_reader *r, struct buf *b, size_t want, const unsigned char *bytes, size_t count, size_t *used, struct error *e)
 {
 	size_t n = want - b->size < count - *used ? want - b->size : count - *used;
 	if (!buf_append(b, bytes + *used, n))
 		return error_set(e, ENOMEM, "no memory for a frame of %zu bytes", want);
+	if (r->sealed)
+		r->sum = crc32c(r->sum, bytes + *used, n);
 	*used += n;
 	return 0;
 }
@@ -91,17 +116,20 @@ int frame_reader_take(struct frame_reader *r, const unsigned char *bytes, size_t
 	*used = 0;
 	if (is_whole(r))
 		frame_reader_drop(r);
-	if (r->prefix_size < FRAME_PREFIX) {
-		while (r->prefix_size < FRAME_PREFIX && *used < count)
+	uint32_t prefix = prefix_wanted(r);
+	if (r->prefix_size < prefix) {
+		while (r->prefix_size < prefix && *used < count)
 			r->prefix[r->prefix_size++] = bytes[(*used)++];
-		if (r->prefix_size < FRAME_PREFIX)
+		if (r->prefix_size < prefix)
 			return 0;
 		int rc = take_prefix(r, e);
 		if (rc)
 			return rc;
 	}
-	int rc = take_part(&r->header, r->header_size, bytes, count, used, e);
+	int rc = take_part(r, &r->header, r->header_size, bytes, count, used, e);
 	if (!rc)
-		rc = take_part(&r->payload, r->payload_size, bytes, count, used, e);
-	return rc ? rc : is_whole(r);
+		rc = take_part(r, &r->payload, r->payload_size, bytes, count, used, e);
+	if (rc || !is_whole(r))
+		return rc;
+	return r->sealed && r->sum != read_u32(r->prefix + 8) ? changed(e) : 1;
 }

@@ -97,6 +97,7 @@ struct server {
 	struct clearing *clearing; /* they are being looked at */
 	bool flushing;
 	uint64_t last_peer;
+	uint64_t garbled; /* connections on which bytes were changed */
 	struct status_socket *status;
 	bool stepping, stopping;
 	bool feeding; /* late results */

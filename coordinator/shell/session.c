@@ -319,7 +319,9 @@ static void on_closed(void *user, const char *why)
 	session_fetch_end(p);
 	asks_drop(p);
 	extend_forget(p);
-	log_event(conn_distrust(p->conn)	? LOG_PEER_REFUSED
+	s->garbled += conn_garbled(p->conn);
+	log_event(conn_garbled(p->conn)		? LOG_PEER_GARBLED
+		  : conn_distrust(p->conn)	? LOG_PEER_REFUSED
 		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED
 						: LOG_PEER_ACCEPT, "peer=%llu address=%s name=%s text=%s",
 		  (unsigned long long)p->id, p->address, log_quote(p->name).text, log_quote(why).text);

@@ -125,6 +125,7 @@ static json_t *snapshot(struct server *s)
 	json_object_set_new(o, "jobs", jobs_json(views, count));
 	add_workers(s, o);
 	add_tls(s, o);
+	json_object_set_new(o, "garbledConnections", json_integer((json_int_t)s->garbled));
 	mem_free(views);
 	return o;
 }

@@ -1,32 +1,18 @@
 """Lives of workers by hand: lives.py PORT fails when a later start does not take the place of the earlier one's open connection, when
 an earlier one is let in, or when strangers replace each other."""
-import os, re, socket, struct, sys
+import os, socket, sys
 
-here = os.path.dirname(os.path.abspath(__file__))
-VERSION = int(re.search(r"FARM_VERSION = (\d+)", open(here + "/../../common/wire/envelope.h").read()).group(1))
-
-
-def varint(n):
-    out = b""
-    while n > 127:
-        out += bytes([n & 127 | 128])
-        n >>= 7
-    return out + bytes([n])
-
-
-def field(number, value):
-    if isinstance(value, int):
-        return varint(number << 3) + varint(value)
-    return varint(number << 3 | 2) + varint(len(value)) + value
+sys.dont_write_bytecode = True
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.abspath(__file__)), "faults"))
+import wire
+from wire import field
 
 
 def hello(name, home, start):
     """The connection, and what it heard first."""
-    body = field(1, VERSION) + field(2, 1) + field(3, name) + field(4, b"by hand") + field(5, 1) + field(6, start) + field(7, home)
-    words = field(1, body)
     s = socket.create_connection(("127.0.0.1", int(sys.argv[1])))
     s.settimeout(60)
-    s.sendall(struct.pack(">II", len(words), 0) + words)
+    s.sendall(wire.hello(1, name, field(4, b"by hand") + field(5, 1) + field(6, start) + field(7, home)))
     return s, s.recv(4096)
 
 

@@ -6,6 +6,7 @@
 #include "coordinator/shell/session.h"
 #include "tests/fuzz/folders.h"
 #include "tests/support/dark.h"
+#include "tests/support/sealed_frame.h"
 
 #include <arpa/inet.h>
 #include <netinet/tcp.h>
@@ -194,12 +195,20 @@ void farm_say(struct farm_world *w, unsigned peer, const void *bytes, size_t siz
 
 void farm_say_message(struct farm_world *w, unsigned peer, const Farm__Envelope *m, const void *payload, size_t size)
 {
-	unsigned char *frame;
 	size_t n;
-	struct error e;
-	need(envelope_pack(m, payload, size, &frame, &n, &e) == 0, e.text);
+	unsigned char *frame = sealed_message(m, payload, size, &n);
+	w->peers[peer].has_spoken = true;
 	farm_say(w, peer, frame, n);
-	mem_free(frame);
+	free(frame);
+}
+
+void farm_say_parts(struct farm_world *w, unsigned peer, const struct step *step)
+{
+	size_t n;
+	unsigned char *frame = sealed_parts(step->header, step->header_size, step->payload, step->payload_size, !w->peers[peer].has_spoken, &n);
+	w->peers[peer].has_spoken = true;
+	farm_say(w, peer, frame, n);
+	free(frame);
 }
 
 void farm_hello(struct farm_world *w, unsigned peer, Farm__Role role)

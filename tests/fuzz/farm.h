@@ -10,6 +10,7 @@
 #include "common/film/batch.h"
 #include "common/wire/frame.h"
 #include "coordinator/shell/server.h"
+#include "tests/fuzz/messages.h"
 
 enum { FARM_DONE = 1, FARM_CHAINS = 2, FARM_BOOTSTRAP = 3, FARM_SAMPLES = 4, FARM_ENDED = 5 };
 enum { FARM_PEERS = 7 };
@@ -19,6 +20,7 @@ struct farm_peer {
 	struct frame_reader reader;
 	struct envelope heard;
 	bool has_frame;
+	bool has_spoken; /* what it says from now on is sealed */
 };
 
 struct farm_world {
@@ -40,6 +42,8 @@ void farm_settle(struct farm_world *w);         /* all hang up; until nothing is
 void farm_call(struct farm_world *w, unsigned peer, bool status_socket);
 void farm_hello(struct farm_world *w, unsigned peer, Farm__Role role);
 void farm_say(struct farm_world *w, unsigned peer, const void *bytes, size_t size);
+/* A frame of a header and a payload, with the checksums that belong to them: what is behind these is to be reached. */
+void farm_say_parts(struct farm_world *w, unsigned peer, const struct step *step);
 void farm_say_message(struct farm_world *w, unsigned peer, const Farm__Envelope *m, const void *payload, size_t size);
 void farm_drain(struct farm_world *w, unsigned peer); /* throws away what it was told */
 void farm_hang_up(struct farm_world *w, unsigned peer);

@@ -7,6 +7,7 @@
 #include "tests/fuzz/farm.h"
 #include "tests/fuzz/folders.h"
 #include "tests/fuzz/seeds.h"
+#include "tests/support/sealed_frame.h"
 #include "worker/cli/submit.h"
 
 #include <arpa/inet.h>
@@ -66,11 +67,10 @@ static void *speak(void *user)
 		say_hello_ack(fd);
 	for (size_t i = 0; i < now.count; i++) {
 		const struct step *s = &now.steps[i];
-		unsigned char prefix[FRAME_PREFIX];
-		frame_prefix_write(prefix, (uint32_t)s->header_size, (uint32_t)s->payload_size);
-		say(fd, prefix, sizeof prefix);
-		say(fd, s->header, s->header_size);
-		say(fd, s->payload, s->payload_size);
+		size_t size;
+		unsigned char *bytes = sealed_parts(s->header, s->header_size, s->payload, s->payload_size, i == 0 && !now.hello, &size);
+		say(fd, bytes, size);
+		free(bytes);
 	}
 	shutdown(fd, SHUT_WR);
 	while (recv(fd, bytes, sizeof bytes, 0) > 0)

@@ -42,13 +42,12 @@ static void speak(struct farm_world *w, const struct step *s)
 		if (who <= CLIENT_TWO || who == WORKER_THREE)
 			farm_hello(w, who, who <= WORKER_TWO || who == WORKER_THREE ? FARM__ROLE__ROLE_WORKER : FARM__ROLE__ROLE_CLIENT);
 	}
-	if (who != READER) {
-		unsigned char prefix[FRAME_PREFIX];
-		frame_prefix_write(prefix, (uint32_t)s->header_size, (uint32_t)s->payload_size);
-		farm_say(w, who, prefix, sizeof prefix);
+	if (who == READER) {
+		farm_say(w, who, s->header, s->header_size);
+		farm_say(w, who, s->payload, s->payload_size);
+	} else {
+		farm_say_parts(w, who, s);
 	}
-	farm_say(w, who, s->header, s->header_size);
-	farm_say(w, who, s->payload, s->payload_size);
 	farm_turn(w);
 	for (unsigned i = 0; i < FARM_PEERS; i++)
 		farm_drain(w, i);

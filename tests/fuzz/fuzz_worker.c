@@ -8,6 +8,7 @@
 #include "tests/fuzz/folders.h"
 #include "tests/fuzz/messages.h"
 #include "tests/fuzz/seeds.h"
+#include "tests/support/sealed_frame.h"
 #include "worker/daemon/agent_private.h"
 
 #include <arpa/inet.h>
@@ -213,15 +214,15 @@ static void work(void)
 
 static void step(const struct step *s)
 {
-	unsigned char prefix[FRAME_PREFIX];
+	unsigned char *bytes;
+	size_t size;
 	switch (s->who % SPEAKERS) {
 	case COORDINATOR:
 		if (now.fd < 0)
 			answer();
-		frame_prefix_write(prefix, (uint32_t)s->header_size, (uint32_t)s->payload_size);
-		say(prefix, sizeof prefix);
-		say(s->header, s->header_size);
-		say(s->payload, s->payload_size);
+		bytes = sealed_parts(s->header, s->header_size, s->payload, s->payload_size, false, &size);
+		say(bytes, size);
+		free(bytes);
 		break;
 	case CREW:
 		work();

@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 #include "common/blob/blob.h"
 #include "tests/support/dark.h"
+#include "tests/support/sealed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -21,21 +22,25 @@
 
 enum { PATIENCE_MS = 60000 };
 
-bool scripted_say(const struct scripted *p, const Farm__Envelope *m, const void *payload, size_t payload_size)
+/* Frees the bytes. */
+static bool send_all(const struct scripted *p, unsigned char *bytes, size_t size)
 {
-	unsigned char *frame;
-	size_t size;
-	struct error e;
-	assert_int_equal(envelope_pack(m, payload, payload_size, &frame, &size, &e), 0);
 	size_t done = 0;
 	while (done < size) {
-		ssize_t n = send(p->fd, frame + done, size - done, MSG_NOSIGNAL);
+		ssize_t n = send(p->fd, bytes + done, size - done, MSG_NOSIGNAL);
 		if (n <= 0)
 			break;
 		done += (size_t)n;
 	}
-	mem_free(frame);
+	free(bytes);
 	return done == size;
+}
+
+bool scripted_say(const struct scripted *p, const Farm__Envelope *m, const void *payload, size_t payload_size)
+{
+	size_t size;
+	unsigned char *bytes = sealed_message(m, payload, payload_size, &size);
+	return send_all(p, bytes, size);
 }
 
 bool scripted_has(struct scripted *p, int milliseconds)
@@ -271,13 +276,7 @@ bool scripted_send(const struct scripted *p, const struct batch *b, const struct
 	size_t size;
 	struct error e;
 	assert_int_equal(batch_pack(b, plan, &frame, &size, &e), 0);
-	size_t done = 0;
-	while (done < size) {
-		ssize_t n = send(p->fd, frame + done, size - done, MSG_NOSIGNAL);
-		if (n <= 0)
-			break;
-		done += (size_t)n;
-	}
+	unsigned char *bytes = sealed_frame(frame, size, &size);
 	mem_free(frame);
-	return done == size;
+	return send_all(p, bytes, size);
 }

@@ -2,6 +2,7 @@
 
 #include "common/base/mem.h"
 #include "coordinator/shell/server.h"
+#include "tests/support/sealed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -299,7 +300,9 @@ void peer_send_batch(struct scripted *p, const struct batch *b, const struct pla
 	size_t size;
 	struct error e;
 	assert_int_equal(batch_pack(b, plan, &frame, &size, &e), 0);
-	peer_say_bytes(p, frame, size);
+	unsigned char *bytes = sealed_frame(frame, size, &size);
+	peer_say_bytes(p, bytes, size);
+	free(bytes);
 	mem_free(frame);
 }
 

@@ -123,7 +123,7 @@ static void on_closed(void *user, const char *why)
 {
 	struct agent *a = user;
 	if (!a->gone)
-		log_event(a->welcome ? LOG_PEER_CLOSED : LOG_CONNECT_FAILED, "coordinator=%s text=%s",
+		log_event(conn_garbled(a->conn) ? LOG_PEER_GARBLED : a->welcome ? LOG_PEER_CLOSED : LOG_CONNECT_FAILED, "coordinator=%s text=%s",
 			  a->config.coordinator, log_quote(why).text);
 	a->conn = NULL;
 	a->welcome = false;

@@ -5,6 +5,7 @@
 #include "common/base/mem.h"
 #include "common/net/client.h"
 #include "common/wire/frame.h"
+#include "tests/support/sealed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -37,18 +38,15 @@ struct coordinator {
 
 static void say(int fd, const Farm__Envelope *m, const void *payload, size_t payload_size)
 {
-	unsigned char *frame;
 	size_t size;
-	struct error e;
-	if (envelope_pack(m, payload, payload_size, &frame, &size, &e))
-		abort();
+	unsigned char *frame = sealed_message(m, payload, payload_size, &size);
 	for (size_t at = 0; at < size;) {
 		ssize_t n = send(fd, frame + at, size - at, MSG_NOSIGNAL);
 		if (n <= 0)
 			break;
 		at += (size_t)n;
 	}
-	mem_free(frame);
+	free(frame);
 }
 
 static void say_hello(int fd)

@@ -5,6 +5,7 @@
 #include "common/base/mem.h"
 #include "common/net/authority.h"
 #include "common/net/conn.h"
+#include "tests/support/sealed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -49,7 +50,7 @@ struct end {
 	struct conn *conn;
 	int messages, closed, drained, heard;
 	size_t payload;
-	bool distrust;
+	bool distrust, garbled;
 	struct tls_peer peer; /* who the other one was when a message came */
 	char why[128];
 };
@@ -88,6 +89,7 @@ static void on_closed(void *user, const char *why)
 	struct end *x = user;
 	x->closed++;
 	x->distrust = conn_distrust(x->conn);
+	x->garbled = conn_garbled(x->conn);
 	x->conn = NULL;
 	snprintf(x->why, sizeof x->why, "%s", why);
 }
@@ -216,7 +218,7 @@ static void half_a_frame_is_not_waited_for(void **state)
 	connect_ends();
 	unsigned char *half = mem_alloc(11, 1);
 	memcpy(half, "\0\0\0\x20\0\0\0\0abc", 11);
-	conn_send_frame(here.conn, half, 11);
+	conn_send_bytes(here.conn, half, 11);
 	uint64_t begun = uv_hrtime();
 	while (!there.closed)
 		uv_run(&loop, UV_RUN_ONCE);
@@ -224,6 +226,36 @@ static void half_a_frame_is_not_waited_for(void **state)
 	assert_true(seconds > 0.4 && seconds < 60);
 	assert_non_null(strstr(there.why, "not finished"));
 	close_ends();
+}
+
+/* Of the second message one bit is another one than was sent, of the first (a hello in life) none. */
+static void changed_bytes_close(void **state)
+{
+	(void)state;
+	Farm__Bye bye;
+	Farm__Envelope m;
+	farm__bye__init(&bye);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_BYE;
+	m.bye = &bye;
+	for (int where = 0; where < 4; where++) {
+		size_t size;
+		unsigned char payload[1000] = {0}, *bytes = sealed_message(&m, payload, sizeof payload, &size);
+		static const size_t places[] = {1, 9, 17, 700}; /* a length, a checksum, the header, the payload */
+		bytes[places[where]] ^= 4;
+		connect_ends();
+		send_bye(&here, 10);
+		unsigned char *copy = mem_alloc(size, 1);
+		memcpy(copy, bytes, size);
+		conn_send_bytes(here.conn, copy, size);
+		while (!there.closed)
+			uv_run(&loop, UV_RUN_ONCE);
+		assert_true(there.garbled && !there.distrust);
+		assert_int_equal(there.messages, 1);
+		assert_non_null(strstr(there.why, "changed on their way"));
+		close_ends();
+		free(bytes);
+	}
 }
 
 static void silence_is_not_waited_for(void **state)
@@ -252,7 +284,7 @@ static void on_drip(uv_timer_t *t)
 	size_t n = d->size - d->at < PIECE ? d->size - d->at : PIECE;
 	unsigned char *piece = mem_alloc(n, 1);
 	memcpy(piece, d->bytes + d->at, n);
-	conn_send_frame(here.conn, piece, n);
+	conn_send_bytes(here.conn, piece, n);
 	d->at += n;
 	if (d->at == d->size)
 		uv_timer_stop(t);
@@ -264,7 +296,6 @@ static void a_slow_frame_is_heard(void **state)
 	(void)state;
 	Farm__Bye bye;
 	Farm__Envelope m;
-	struct error e;
 	struct drip d = {.at = 0};
 	unsigned char *payload = mem_alloc(PAYLOAD, 1);
 	for (size_t i = 0; i < PAYLOAD; i++)
@@ -273,7 +304,7 @@ static void a_slow_frame_is_heard(void **state)
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_BYE;
 	m.bye = &bye;
-	assert_int_equal(envelope_pack(&m, payload, PAYLOAD, &d.bytes, &d.size, &e), 0);
+	d.bytes = sealed_message(&m, payload, PAYLOAD, &d.size);
 	connect_ends();
 	send_bye(&here, 0);
 	while (!there.messages)
@@ -289,7 +320,7 @@ static void a_slow_frame_is_heard(void **state)
 	assert_true(there.heard >= 15);
 	uv_close((uv_handle_t *)&d.timer, NULL);
 	close_ends();
-	mem_free(d.bytes);
+	free(d.bytes);
 	mem_free(payload);
 }
 
@@ -411,7 +442,7 @@ static void a_live_connection_is_checked_again(void **state)
 #define EITHER_WAY \
 	cmocka_unit_test(frames_go_both_ways), cmocka_unit_test(the_last_words_arrive), cmocka_unit_test(limits_close), \
 		cmocka_unit_test(who_does_not_read_is_cut_off), cmocka_unit_test(half_a_frame_is_not_waited_for), \
-		cmocka_unit_test(silence_is_not_waited_for), cmocka_unit_test(a_slow_frame_is_heard), \
+		cmocka_unit_test(changed_bytes_close), cmocka_unit_test(silence_is_not_waited_for), cmocka_unit_test(a_slow_frame_is_heard), \
 		cmocka_unit_test(a_late_reader_waits)
 
 int main(void)

@@ -12,7 +12,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-static unsigned char *pack_hello(size_t *size)
+static unsigned char *pack_hello(uint32_t version, size_t *size)
 {
 	Farm__Hello hello;
 	Farm__Envelope m;
@@ -21,7 +21,7 @@ static unsigned char *pack_hello(size_t *size)
 	char name[] = "w1", print[] = "0123";
 	farm__hello__init(&hello);
 	farm__envelope__init(&m);
-	hello.version = 1;
+	hello.version = version;
 	hello.role = FARM__ROLE__ROLE_WORKER;
 	hello.name = name;
 	hello.fingerprint = print;
@@ -35,7 +35,7 @@ static void goes_out_and_comes_in(void **state)
 {
 	(void)state;
 	size_t size;
-	unsigned char *bytes = pack_hello(&size);
+	unsigned char *bytes = pack_hello(1, &size);
 	struct envelope env;
 	struct error e;
 	assert_memory_equal(bytes + size - 4, "tail", 4);
@@ -50,6 +50,30 @@ static void goes_out_and_comes_in(void **state)
 			envelope_fini(&env);
 		assert_null(env.blocks);
 	}
+	mem_free(bytes);
+}
+
+/* Whatever bit of a hello of this version is another one: nobody takes it for one. */
+static void a_changed_hello_is_none(void **state)
+{
+	(void)state;
+	size_t size;
+	unsigned char *bytes = pack_hello(FARM_VERSION, &size);
+	struct envelope env;
+	struct error e;
+	size_t header = size - FRAME_PREFIX - 4, noticed = 0;
+	assert_int_equal(envelope_unpack(&env, bytes + FRAME_PREFIX, header, &e), 0);
+	envelope_fini(&env);
+	for (size_t bit = 0; bit < 8 * header; bit++) {
+		bytes[FRAME_PREFIX + bit / 8] ^= (unsigned char)(1u << bit % 8);
+		int rc = envelope_unpack(&env, bytes + FRAME_PREFIX, header, &e);
+		noticed += rc == -EILSEQ;
+		if (!rc)
+			assert_true(env.message->body_case != FARM__ENVELOPE__BODY_HELLO || env.message->hello->version != FARM_VERSION);
+		envelope_fini(&env);
+		bytes[FRAME_PREFIX + bit / 8] ^= (unsigned char)(1u << bit % 8);
+	}
+	assert_true(noticed > 4 * header); /* the others make another message of it, or none */
 	mem_free(bytes);
 }
 
@@ -119,6 +143,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(goes_out_and_comes_in),
+		cmocka_unit_test(a_changed_hello_is_none),
 		cmocka_unit_test(memory_is_out),
 		cmocka_unit_test(what_is_not_known_is_refused),
 		cmocka_unit_test(a_bomb_is_defused),

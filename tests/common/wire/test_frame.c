@@ -9,8 +9,10 @@
 
 #include <string.h>
 
+/* The second one is sealed, by checksums that were computed elsewhere (a bit at a time, Python). */
 static const unsigned char two_frames[] = {0, 0, 0, 2, 0, 0, 0, 3, 'h', 'i', 'a', 'b', 'c', /* */
-					   0, 0, 0, 1, 0, 0, 0, 0, 'x'};
+					   0, 0, 0, 1, 0, 0, 0, 1, 0xda, 0x06, 0xef, 0x2c, 0x9e, 0x67, 0x09, 0x20, 'x', 'y'};
+enum { FIRST = 13 };
 
 static void any_cut_gives_the_same_frames(void **state)
 {
@@ -36,12 +38,42 @@ static void any_cut_gives_the_same_frames(void **state)
 			} else {
 				assert_int_equal(r.header.size, 1);
 				assert_memory_equal(r.header.bytes, "x", 1);
-				assert_int_equal(r.payload.size, 0);
+				assert_int_equal(r.payload.size, 1);
+				assert_memory_equal(r.payload.bytes, "y", 1);
 			}
 		}
 		assert_int_equal(frames, 2);
 		frame_reader_fini(&r);
 	}
+}
+
+static void any_changed_bit_is_noticed(void **state)
+{
+	(void)state;
+	for (size_t bit = 0; bit < 8 * (sizeof two_frames - FIRST); bit++) {
+		unsigned char changed[sizeof two_frames];
+		struct frame_reader r;
+		struct error e;
+		size_t used, at = 0;
+		int rc;
+		memcpy(changed, two_frames, sizeof changed);
+		changed[FIRST + bit / 8] ^= (unsigned char)(1u << bit % 8);
+		frame_reader_init(&r, (struct frame_limits){16, 16});
+		assert_int_equal(frame_reader_take(&r, changed, sizeof changed, &at, &e), 1);
+		while ((rc = frame_reader_take(&r, changed + at, sizeof changed - at, &used, &e)) == 0 && used)
+			at += used;
+		assert_int_equal(rc, -EILSEQ); /* also of the lengths: nobody waits for so many bytes */
+		frame_reader_fini(&r);
+	}
+}
+
+static void what_is_sealed_is_read(void **state)
+{
+	(void)state;
+	unsigned char prefix[FRAME_PREFIX], sealed[FRAME_SEALED_PREFIX];
+	frame_prefix_write(prefix, 1, 1);
+	frame_seal(sealed, prefix, (const unsigned char *)"xy", 2);
+	assert_memory_equal(sealed, two_frames + FIRST, sizeof sealed);
 }
 
 static int first_answer(const unsigned char prefix[8], struct frame_limits limits)
@@ -83,6 +115,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(any_cut_gives_the_same_frames),
+		cmocka_unit_test(any_changed_bit_is_noticed),
+		cmocka_unit_test(what_is_sealed_is_read),
 		cmocka_unit_test(lengths_are_held_against_limits),
 		cmocka_unit_test(the_prefix_is_what_is_read),
 	};

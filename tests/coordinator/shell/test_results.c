@@ -7,6 +7,7 @@
 #include "common/base/mem.h"
 #include "coordinator/store/record.h"
 #include "tests/support/dark.h"
+#include "tests/support/sealed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -339,7 +340,10 @@ static struct scripted *worker_with_result(struct scripted *client, struct desk 
 	while (d->count == 0)
 		peer_attend(worker, d);
 	struct batch b = dark_batch(&d->keys[0], &plan, 0);
-	assert_int_equal(batch_pack(&b, &plan, frame, size, &e), 0);
+	unsigned char *packed;
+	assert_int_equal(batch_pack(&b, &plan, &packed, size, &e), 0);
+	*frame = sealed_frame(packed, *size, size);
+	mem_free(packed);
 	batch_fini(&b);
 	return worker;
 }
@@ -386,7 +390,7 @@ static void a_slow_result_counts(void **state)
 		struct scripted *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
 		worker->heartbeats = 0;
 		done = sends_slowly(worker, frame, size);
-		mem_free(frame);
+		free(frame);
 		scripted_hang_up(client);
 		scripted_hang_up(worker);
 	}
@@ -403,7 +407,7 @@ static void half_a_result_is_no_word(void **state)
 	const Farm__Envelope *m;
 	while ((m = scripted_hear(worker)) && m->body_case != FARM__ENVELOPE__BODY_FAULT)
 		continue;
-	mem_free(frame);
+	free(frame);
 	scripted_hang_up(client);
 	scripted_hang_up(worker);
 }
@@ -422,13 +426,11 @@ static void say_extend(const struct scripted *p, uint64_t job, uint64_t spp, int
 	m.body_case = FARM__ENVELOPE__BODY_CONTROL;
 	m.control = &c;
 	for (int i = 0; i < times; i++) {
-		unsigned char *frame;
 		size_t size;
-		struct error e;
-		assert_int_equal(envelope_pack(&m, NULL, 0, &frame, &size, &e), 0);
+		unsigned char *frame = sealed_message(&m, NULL, 0, &size);
 		memcpy(all + at, frame, size);
 		at += size;
-		mem_free(frame);
+		free(frame);
 	}
 	peer_say_bytes(p, all, at);
 }

@@ -1,7 +1,7 @@
 """deaf.py PORT JOB STATUS-SOCKET: a client that asks for a job's log again and again, a worker that asks for the job, and a reader
 of the status socket that subscribes; none of them reads. Fails unless each is cut off within two minutes."""
 import socket, sys, time
-from wire import VERSION, field, frame
+from wire import field, frame, hello
 
 
 def is_cut_off(s, words, most):
@@ -25,7 +25,7 @@ def call(role):
     s = socket.socket()
     s.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     s.connect(("127.0.0.1", int(sys.argv[1])))
-    s.sendall(frame(field(1, field(1, VERSION) + field(2, role) + field(3, b"deaf") + field(4, b"none") + field(5, 1))))
+    s.sendall(hello(role, b"deaf", field(4, b"none") + field(5, 1)))
     s.recv(4)
     return s
 

@@ -95,6 +95,28 @@ twice_result() {
 	grep -q 'event=batch_repeated' "$DIR/coordinator.log" || fail "$NAME: nothing was repeated"
 }
 
+fault flip_bits 12 3 "the network flips a bit of a result, of a grant, of a heartbeat"
+flip_bits() {
+	through_proxy is_flipped
+	[ "$("$BIN/hslt-status" --json | grep -o '"garbledConnections":[0-9]*' | cut -d: -f2)" -eq \
+		"$(grep -c event=peer_garbled "$DIR/coordinator.log")" ] || fail "$NAME: the coordinator counts other connections than it tells of"
+}
+# Messages both ways, with a payload and without. The other worker stands still meanwhile, lest it does the job alone.
+is_flipped() {
+	kill -STOP "$OTHER"
+	flipped=$(cat "$DIR/coordinator.log" "$DIR/w1.log" | grep -c event=peer_garbled) || :
+	case $((i % 3)) in
+	1) is_cut flip 22 ;;
+	2) is_cut flip 21 ;;
+	0) is_cut flip 3 ;;
+	esac
+	until_true 30 is_told $((flipped + 1)) || fail "$NAME: nobody noticed"
+	kill -CONT "$OTHER"
+}
+is_told() {
+	[ "$(cat "$DIR/coordinator.log" "$DIR/w1.log" | grep -c event=peer_garbled)" -ge "$1" ]
+}
+
 fault deaf_client 3 1 "clients, workers and readers of the status ask for all there is and do not read"
 deaf_client() {
 	farm

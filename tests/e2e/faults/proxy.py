@@ -6,8 +6,9 @@ way, and the file goes:
   stall  half of it, then nothing more, either way, until one side hangs up
   twice  it is sent twice
   slow   it takes two seconds, piece by piece
-  late   it, and what is behind it, two and a half seconds later"""
-import asyncio, os, sys
+  late   it, and what is behind it, two and a half seconds later
+  flip   one of its bits is another one: of the first such message one in the middle, then any, also of its lengths and checksums"""
+import asyncio, os, random, sys
 
 port_file, target, order_file = sys.argv[1], int(sys.argv[2]), sys.argv[3]
 
@@ -40,13 +41,28 @@ class Pair:
         self.stalled = False
 
 
+chance = random.Random(0)
+flips = 0
+
+
+def flip(frame):
+    global flips
+    bit = chance.randrange(8 * len(frame)) if flips else 4 * len(frame)
+    flips += 1
+    changed = bytearray(frame)
+    changed[bit // 8] ^= 1 << bit % 8
+    return bytes(changed)
+
+
 async def one_way(pair, source, sink):
+    before = 8  # what is before the header: of the first frame the lengths alone
     try:
         while True:
-            prefix = await source.readexactly(8)
+            prefix = await source.readexactly(before)
             header = int.from_bytes(prefix[:4], "big")
-            frame = prefix + await source.readexactly(header + int.from_bytes(prefix[4:], "big"))
-            action = "" if pair.stalled else order_for(field_of(frame[8:]))
+            frame = prefix + await source.readexactly(header + int.from_bytes(prefix[4:8], "big"))
+            action = "" if pair.stalled else order_for(field_of(frame[before:]))
+            before = 16
             if pair.stalled:
                 continue
             if action in ("cut", "stall"):
@@ -62,6 +78,8 @@ async def one_way(pair, source, sink):
                     sink.write(frame[at:at + piece])
                     await asyncio.sleep(0.1)
                 frame = frame[(len(frame) - 1) // piece * piece:]
+            if action == "flip":
+                frame = flip(frame)
             if action == "late":
                 await asyncio.sleep(2.5)
             sink.write(frame * (2 if action == "twice" else 1))

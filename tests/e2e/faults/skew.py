@@ -1,7 +1,7 @@
 """skew.py PORT: workers and clients of the version before and after, these with fields that nobody here knows. Fails unless each is
 told which side is the older one."""
 import socket, sys
-from wire import VERSION, field, frame
+from wire import VERSION, field, first_frame
 
 for role, who in ((1, b"worker"), (2, b"client")):
     for version, older in ((VERSION - 1, who), (VERSION + 1, b"coordinator")):
@@ -9,7 +9,7 @@ for role, who in ((1, b"worker"), (2, b"client")):
         if version > VERSION:
             hello += field(99, b"what comes next")
         s = socket.create_connection(("127.0.0.1", int(sys.argv[1])), 60)
-        s.sendall(frame(field(1, hello)))
+        s.sendall(first_frame(field(1, hello)))
         heard = b""
         while True:
             got = s.recv(4096)

@@ -21,5 +21,37 @@ def field(number, value):
     return varint(number << 3 | 2) + varint(len(value)) + value
 
 
+def _table():
+    for c in range(256):
+        for _ in range(8):
+            c = c >> 1 ^ (0x82F63B78 if c & 1 else 0)
+        yield c
+
+
+TABLE = list(_table())
+
+
+def crc32c(data):
+    """Castagnoli, a byte at a time."""
+    c = 0xFFFFFFFF
+    for byte in data:
+        c = c >> 8 ^ TABLE[(c ^ byte) & 255]
+    return c ^ 0xFFFFFFFF
+
+
+def first_frame(message):
+    """The first one in its direction has no checksums."""
+    return struct.pack(">II", len(message), 0) + message
+
+
+def hello(role, name, more=b"", version=VERSION):
+    """With the checksum of its bytes; more: its fields from 4 on."""
+    def words(check):
+        return field(1, field(1, version) + field(2, role) + field(3, name) + more + struct.pack("<BI", 15 << 3 | 5, check))
+    return first_frame(words(crc32c(words(0)[:-4])))
+
+
 def frame(message, payload=b""):
-    return struct.pack(">II", len(message), len(payload)) + message + payload
+    """What is longer than anybody takes is refused by its length."""
+    head = struct.pack(">III", len(message), len(payload), crc32c(message + payload) if len(message) < 1 << 23 else 0)
+    return head + struct.pack(">I", crc32c(head)) + message + payload

@@ -8,6 +8,7 @@
 #include "worker/daemon/agent_private.h"
 #include "tests/support/folder.h"
 #include "tests/support/scripted.h"
+#include "tests/support/sealed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -108,7 +109,9 @@ static void grant(uint64_t job)
 	size_t size;
 	struct error e;
 	assert_int_equal(grant_pack(&k, NULL, NULL, 0, &frame, &size, &e), 0);
-	assert_int_equal(send(t.at->fd, frame, size, MSG_NOSIGNAL), size);
+	unsigned char *bytes = sealed_frame(frame, size, &size);
+	assert_int_equal(send(t.at->fd, bytes, size, MSG_NOSIGNAL), size);
+	free(bytes);
 	mem_free(frame);
 	hear_job_get(job);
 }
