@@ -68,9 +68,9 @@ static void *speak(void *user)
 	for (size_t i = 0; i < now.count; i++) {
 		const struct step *s = &now.steps[i];
 		size_t size;
-		unsigned char *bytes = sealed_parts(s->header, s->header_size, s->payload, s->payload_size, i == 0 && !now.hello, &size);
-		say(fd, bytes, size);
-		free(bytes);
+		unsigned char *sealed = sealed_parts(s->header, s->header_size, s->payload, s->payload_size, i == 0 && !now.hello, &size);
+		say(fd, sealed, size);
+		free(sealed);
 	}
 	shutdown(fd, SHUT_WR);
 	while (recv(fd, bytes, sizeof bytes, 0) > 0)
