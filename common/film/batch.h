@@ -45,6 +45,7 @@ enum batch_counter {
 	COUNT_RAYS_SHADOW,
 	COUNT_STUCK,          /* chains that accepted nothing during the epoch */
 	COUNT_LONGEST_STUCK,  /* most rejections in a row (merged by maximum) */
+	COUNT_STATES_LOST,    /* chains whose last state could not be read back: they begin the next epoch where they began this one */
 };
 
 /* What the chains of a lease count of each strategy of the plan's mixture; names in common/film/strategy.h. From

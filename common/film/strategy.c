@@ -146,6 +146,12 @@ void strategy_note(const struct plan *p, const struct canvas_counts *n, bool bla
 		text_put(&t, "%s%s contributions were not numbers, infinite or negative, and left out", then, thousands(bad, number[0]));
 		then = "; ";
 	}
+	uint64_t lost = n->counters[COUNT_STATES_LOST];
+	if (lost) {
+		text_put(&t, "%s%s of %s times a chain's state could not be read back, and the chain returned to where it began the epoch", then,
+		    thousands(lost, number[0]), thousands(chain_epochs(p, n), number[1]));
+		then = "; ";
+	}
 	if (stuck)
 		text_put(&t, "%s%s of %s times a chain accepted nothing during a whole epoch (%s chains); longest run: %s rejections", then,
 		    thousands(stuck, number[0]), thousands(chain_epochs(p, n), number[1]), thousands(p->chains, number[2]),

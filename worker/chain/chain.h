@@ -30,12 +30,15 @@ struct chain_ops {
 	/* From a bootstrap index; UINT64_MAX: the group's bootstrap was black, the chain looks for light by independent
 	 * proposals. false: the index carries no light (the coordinator's weights are not ours). */
 	bool (*start)(struct chain *c, uint64_t bootstrap_index);
-	/* After the bytes of `save`. false: not a state of this plan and world. */
+	/* After the bytes of `save`, which may be anybody's; c->step: how many mutations are behind it. false: not a state of this
+	 * plan and world. */
 	bool (*resume)(struct chain *c, const struct chain_state *state);
 	void (*step)(struct chain *c, struct chain_sums *sums);
 	/* Splats what the current state has gathered; at the end of each epoch. */
 	void (*flush)(struct chain *c);
-	int (*save)(const struct chain *c, struct chain_state *out); /* -ENOMEM */
+	/* What it saves it can resume from. A state of which that is not true is not saved: the chain is back where it began this
+	 * epoch (COUNT_STATES_LOST). -ENOMEM */
+	int (*save)(struct chain *c, struct chain_state *out);
 };
 
 /* What every kind does after a decision: counts, and the run of rejections. */
@@ -44,7 +47,7 @@ void chain_count(struct chain *c, bool accepted);
 /* The head of a state's bytes, little endian: id, step, run of rejections. */
 enum { CHAIN_STATE_HEAD = 24 };
 void chain_put_head(const struct chain *c, uint8_t *bytes);
-bool chain_get_head(struct chain *c, const uint8_t *bytes, size_t size); /* false: of another chain */
+bool chain_get_head(struct chain *c, const uint8_t *bytes, size_t size); /* false: of another chain or step */
 /* Copies bytes into memory of the batch's. -ENOMEM */
 int chain_give(const uint8_t *bytes, size_t size, struct chain_state *out);
 

@@ -3,6 +3,8 @@
 #include "worker/mutation/mixture.h"
 #include "worker/path/classes.h"
 
+#include <string.h>
+
 /* A state with what it has gathered and not splatted yet. */
 struct path_place {
 	struct whole_path path; /* 0 edges: black, looking for light */
@@ -15,6 +17,8 @@ struct path_chain {
 	struct mutation_ctx mutation;
 	struct path_place place[2];
 	struct path_place *current, *proposal; /* the proposal's path equals the current one between steps */
+	size_t began_size; /* the path with which the epoch began, as bytes */
+	uint8_t began[WHOLE_BYTES];
 };
 
 static struct path_chain *path_of(struct chain *c)
@@ -43,13 +47,26 @@ static void copy_whole(struct whole_path *to, const struct whole_path *from)
 	to->edges = from->edges;
 }
 
+/* The epoch begins with this path, which has been read or is black. */
+static void begin(struct path_chain *c, const uint8_t *bytes, size_t size)
+{
+	memcpy(c->began, bytes, size);
+	c->began_size = size;
+	copy_whole(&c->proposal->path, &c->current->path);
+}
+
 static bool start(struct chain *base, uint64_t bootstrap_index)
 {
+	static const struct whole_path black = {0};
 	struct path_chain *c = path_of(base);
+	uint8_t bytes[WHOLE_BYTES];
 	set_up(c);
 	c->current->path.edges = 0;
 	bool ok = bootstrap_index == UINT64_MAX || path_start(base->context, base->seed, bootstrap_index, &c->current->path);
-	copy_whole(&c->proposal->path, &c->current->path);
+	size_t size = path_write(base->context, &c->current->path, &c->proposal->path, bytes);
+	if (size == 0)
+		size = path_write(base->context, &black, &c->proposal->path, bytes);
+	begin(c, bytes, size);
 	return ok;
 }
 
@@ -57,19 +74,29 @@ static bool resume(struct chain *base, const struct chain_state *state)
 {
 	struct path_chain *c = path_of(base);
 	set_up(c);
-	if (!chain_get_head(base, state->bytes, state->size) ||
-	    !path_read(base->context, state->bytes + CHAIN_STATE_HEAD, state->size - CHAIN_STATE_HEAD, &c->current->path))
+	if (!chain_get_head(base, state->bytes, state->size))
 		return false;
-	copy_whole(&c->proposal->path, &c->current->path);
+	const uint8_t *bytes = state->bytes + CHAIN_STATE_HEAD;
+	size_t size = state->size - CHAIN_STATE_HEAD;
+	if (!path_read(base->context, bytes, size, &c->current->path))
+		return false;
+	begin(c, bytes, size);
 	return true;
 }
 
-static int save(const struct chain *base, struct chain_state *out)
+static int save(struct chain *base, struct chain_state *out)
 {
-	const struct path_chain *c = (const struct path_chain *)(const void *)base;
+	struct path_chain *c = path_of(base);
 	uint8_t bytes[CHAIN_STATE_HEAD + WHOLE_BYTES];
+	size_t size = path_write(base->context, &c->current->path, &c->proposal->path, bytes + CHAIN_STATE_HEAD);
+	if (size == 0) {
+		base->context->counters[COUNT_STATES_LOST]++;
+		size = c->began_size;
+		memcpy(bytes + CHAIN_STATE_HEAD, c->began, size);
+	}
+	copy_whole(&c->proposal->path, &c->current->path);
 	chain_put_head(base, bytes);
-	return chain_give(bytes, CHAIN_STATE_HEAD + path_write(base->context->w, &c->current->path, bytes + CHAIN_STATE_HEAD), out);
+	return chain_give(bytes, CHAIN_STATE_HEAD + size, out);
 }
 
 static void splat(struct path_chain *c, struct path_place *at)

@@ -15,11 +15,14 @@ extern const struct chain_ops chain_path;
  * path fell to rounding. */
 bool path_start(struct path_context *c, uint64_t seed, uint64_t bootstrap_index, struct whole_path *x);
 
-/* A path as bytes (little endian), and back: surfaces, modes and positions are taken from the world again. WHOLE_BYTES are
- * always enough. */
-enum { WHOLE_BYTES = 16 + 56 * WHOLE_MAX_VERTICES };
-size_t path_write(const struct world *w, const struct whole_path *x, uint8_t *bytes);
-/* false: not a path of this world, or a black one. */
+/* A path as bytes (little endian), and back: the same path bit by bit but for what was drawn on an emitter or the aperture.
+ * WHOLE_BYTES are always enough. */
+enum { WHOLE_BYTES = 24 + 40 * WHOLE_MAX_VERTICES };
+/* What is written is read again, into `again`: 0 where that fails, and the bytes are nobody's state. */
+size_t path_write(struct path_context *c, const struct whole_path *x, struct whole_path *again, uint8_t *bytes);
+/* Any bytes, and log f of the path that they make, whatever they say of it. false: not a path of this world. */
+bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct whole_path *x, double *contribution);
+/* Any bytes. false: not a path of this world that path_write wrote. */
 bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct whole_path *x);
 
 #endif

@@ -1,6 +1,7 @@
 #include "worker/chain/pss_chain.h"
 
 #include "worker/chain/pss.h"
+#include "worker/math/fptrap.h"
 
 #include <assert.h>
 
@@ -67,9 +68,9 @@ static void revisit(struct pss_chain *c)
 	evaluate(c, &s, c->current);
 }
 
-static int save(const struct chain *base, struct chain_state *out)
+static int save(struct chain *base, struct chain_state *out)
 {
-	const struct pss_chain *c = (const struct pss_chain *)(const void *)base;
+	const struct pss_chain *c = pss_of(base);
 	uint8_t bytes[CHAIN_STATE_HEAD + 8 + sizeof c->current->point.u];
 	chain_put_head(base, bytes);
 	size_t n = pss_write(&c->current->point, bytes + CHAIN_STATE_HEAD, sizeof bytes - CHAIN_STATE_HEAD);
@@ -83,7 +84,9 @@ static bool resume(struct chain *base, const struct chain_state *state)
 	set_places(c);
 	if (!chain_get_head(base, state->bytes, state->size))
 		return false;
+	unsigned flags = fptrap_leave(); /* the bytes may be anybody's: a signalling NaN is refused, and no fault of ours */
 	size_t n = pss_read(&c->current->point, state->bytes + CHAIN_STATE_HEAD, state->size - CHAIN_STATE_HEAD);
+	fptrap_return(flags);
 	if (n == 0 || n != state->size - CHAIN_STATE_HEAD)
 		return false;
 	if (c->current->point.used[SIDE_CAMERA] == 0) {

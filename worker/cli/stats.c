@@ -17,6 +17,7 @@ static const char *const counter_names[BATCH_COUNTERS] = {
 	[COUNT_INFINITE] = "infinite",	     [COUNT_NEGATIVE] = "negative",
 	[COUNT_RAYS_CLOSEST] = "raysClosest", [COUNT_RAYS_SHADOW] = "raysShadow",
 	[COUNT_STUCK] = "stuck",	     [COUNT_LONGEST_STUCK] = "longestStuck",
+	[COUNT_STATES_LOST] = "statesLost",
 };
 
 static json_t *plan_json(const struct stats *s)

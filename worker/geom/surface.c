@@ -276,7 +276,7 @@ bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct 
 	return !same && reproject_triangle(s, prim, o, d, x);
 }
 
-bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, double reach, struct surface_point *x)
+bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x)
 {
 	if (s->is_sphere) {
 		vec3 d = vec3_sub(p, s->center);
@@ -287,9 +287,18 @@ bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, doub
 	}
 	if (prim.prim >= s->triangle_count)
 		return false;
-	surface_on_triangle(s, prim, 1.0 / 3, 1.0 / 3, x);
-	const struct ray_hit hit = {prim, reach, 1.0 / 3, 1.0 / 3};
-	vec3 n = x->ng;
-	surface_from_hit(s, vec3_madd(p, -reach, n), n, &hit, x);
+	const uint32_t *i = s->index[prim.prim];
+	struct corner c = corner_of(s, i);
+	vec3 area = vec3_cross(c.e1, c.e2), d = vec3_sub(p, c.v0);
+	double square = vec3_dot(area, area);
+	if (!(square > 0))
+		return false;
+	double b1 = vec3_dot(vec3_cross(d, c.e2), area) / square, b2 = vec3_dot(vec3_cross(c.e1, d), area) / square;
+	if (!isfinite(b1) || !isfinite(b2))
+		return false;
+	if (b1 < 0 || b2 < 0 || b1 + b2 > 1)
+		move_inside(c.e1, c.e2, &b1, &b2);
+	x->prim = prim;
+	fill(s, i, &c, b1, b2, x);
 	return true;
 }

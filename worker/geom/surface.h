@@ -39,8 +39,8 @@ struct surface_change {
 	vec3 ddu[2];  /* of the field of unit du: 0 on a triangle, turning with the meridians on a sphere (not at its poles) */
 };
 
-/* The point of a primitive nearest to p, which should lie on it; reach: a length beyond which p is nowhere near. */
-bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, double reach, struct surface_point *x);
+/* The point of a primitive nearest to p, which should lie on it: as exact as the primitive is small, wherever it lies. */
+bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x);
 /* Where the ray o + t d meets the primitive named by the hit. */
 void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x);
 /* The point of barycentrics (b1, b2) on a triangle, or at unit normal direction w from a sphere's centre. */

@@ -173,7 +173,7 @@ static bool stands_on_surface(const struct path_context *c, struct path_vertex *
 	if (v->kind == VERTEX_INFINITE)
 		return false;
 	if (!v->bsdf) {
-		if (!surface_near(&c->w->shapes[v->x.prim.shape], v->x.prim, v->x.p, c->w->radius, &v->x))
+		if (!surface_near(&c->w->shapes[v->x.prim.shape], v->x.prim, v->x.p, &v->x))
 			return false;
 		v->bsdf = &c->w->bsdfs[c->w->parts[v->x.prim.shape].bsdf];
 	}

@@ -165,7 +165,8 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 	struct chain *c = j->chain;
 	const struct chain_ops *ops = j->integrator->chain;
 	*c = (struct chain){.integrator = j->integrator, .context = &j->context, .film = &j->film, .mixture = j->plan->mutations,
-			    .strategy = j->out->strategy, .seed = j->plan->seed, .id = id};
+			    .strategy = j->out->strategy, .seed = j->plan->seed, .id = id,
+			    .step = j->key->epoch * j->plan->epoch};
 	j->sequence = id;
 	j->index = 0;
 	bool ok = in->states ? ops->resume(c, &in->states[k]) : ops->start(c, in->seeds[k]);

@@ -223,7 +223,10 @@ static void headers_say_it(void **state)
 	assert_string_equal(attribute(&h, "hslt:stuck"), "1");
 	assert_string_equal(attribute(&h, "hslt:longestStuck"), "5211");
 	assert_non_null(strstr(attribute(&h, "hslt:note"), "1 of 1 times a chain accepted nothing"));
-	img.counts.counters[COUNT_STUCK] = 0;
+	img.counts.counters[COUNT_STATES_LOST] = 3;
+	header_fill(&h, &img, &p, &x);
+	assert_non_null(strstr(attribute(&h, "hslt:note"), "3 of 1 times a chain's state could not be read back"));
+	img.counts.counters[COUNT_STUCK] = img.counts.counters[COUNT_STATES_LOST] = 0;
 	memset(p.mutations, 0, sizeof p.mutations);
 	header_fill(&h, &img, &p, &x);
 	assert_null(attribute(&h, "hslt:mixture"));

@@ -6,6 +6,7 @@
 #include "tests/support/stats.h"
 #include "worker/chain/pss.h"
 #include "worker/chain/pss_chain.h"
+#include "worker/math/fptrap.h"
 
 #include "common/base/mem.h"
 
@@ -299,7 +300,10 @@ static void test_resume(void **state)
 			chain_pss.flush(parts);
 			assert_int_equal(chain_pss.save(parts, &s), 0);
 			memset(parts + 1, 0xa5, chain_pss.size - sizeof *parts);
-			parts->step = parts->rejected_run = 99;
+			parts->rejected_run = 99;
+			parts->step = whole->step + 1; /* of another epoch */
+			assert_false(chain_pss.resume(parts, &s));
+			parts->step = whole->step;
 			assert_true(chain_pss.resume(parts, &s));
 			assert_int_equal(chain_pss.save(parts, &t), 0);
 			assert_int_equal(s.size, t.size);
@@ -313,6 +317,16 @@ static void test_resume(void **state)
 			parts->id++;
 			assert_false(chain_pss.resume(parts, &s));
 			parts->id--;
+			if (s.size > CHAIN_STATE_HEAD + 8) { /* a signalling NaN: refused, and nobody's fault */
+				const uint64_t nan = UINT64_C(0x7ff4000000000000);
+				struct chain_state bad = {mem_alloc(s.size, 1), s.size};
+				memcpy(bad.bytes, s.bytes, s.size);
+				memcpy(bad.bytes + CHAIN_STATE_HEAD + 8, &nan, sizeof nan);
+				bool watched = fptrap_watch();
+				assert_false(chain_pss.resume(parts, &bad));
+				fptrap_unwatch(watched);
+				mem_free(bad.bytes);
+			}
 			assert_true(chain_pss.resume(parts, &s));
 			mem_free(s.bytes);
 			mem_free(t.bytes);

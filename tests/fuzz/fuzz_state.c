@@ -1,0 +1,117 @@
+/*
+ * States of chains as a worker gets them, in real worlds: the first byte says in which, the others are the state. Id and step are
+ * put right, and for every other input the contribution, too: as somebody would who wants to be believed. What resumes must go on
+ * for some mutations without an invalid operation, and what it saves then must resume again.
+ */
+#include "common/base/mem.h"
+#include "tests/fuzz/seeds.h"
+#include "tests/support/rooms.h"
+#include "tests/support/starts.h"
+#include "worker/chain/bytes.h"
+#include "worker/chain/path_chain.h"
+#include "worker/chain/pss_chain.h"
+#include "worker/math/fptrap.h"
+#include "worker/path/integrator.h"
+
+#include <string.h>
+
+enum { SIDE = 32, EDGES = 8, STEPS = 5, ROOMS_MOST = 64, STATE_MOST = 1 << 14, CHAIN = 3 };
+static const char mixture[] = "bidirectional=0.2,hslt=0.6,wavelength=0.1,lens=0.05,light=0.05";
+
+static struct world *worlds[ROOMS_MOST];
+static unsigned world_count;
+static struct path_context context;
+static struct film_sums film;
+static uint64_t counters[BATCH_COUNTERS], strategies[BATCH_STRATEGIES][STRATEGY_COUNTERS];
+
+static void set_up(void)
+{
+	static const struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
+	static const struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
+	if (world_count)
+		return;
+	while (world_count < ROOMS_MOST && rooms[world_count].name) {
+		worlds[world_count] = rooms[world_count].build();
+		world_count++;
+	}
+	if (film_sums_init(&film, &plan, &settings, NULL))
+		abort();
+}
+
+static const struct chain_ops *begin(struct chain *c, unsigned which)
+{
+	bool whole = which / world_count % 2 == 0;
+	starts_context(&context, worlds[which % world_count], 1, EDGES, counters);
+	*c = (struct chain){.integrator = integrator_find(whole ? "hslt" : "pssmlt"), .context = &context, .film = &film, .mixture = mixture,
+			    .strategy = strategies, .seed = 7, .id = CHAIN, .step = 1000};
+	return c->integrator->chain;
+}
+
+static void go_on(struct chain *c, const struct chain_ops *ops)
+{
+	struct chain_sums sums = {0, 0};
+	struct chain_state s = {0};
+	for (int i = 0; i < STEPS; i++)
+		ops->step(c, &sums);
+	ops->flush(c);
+	if (ops->save(c, &s) == 0 && !ops->resume(c, &s))
+		abort();
+	mem_free(s.bytes);
+}
+
+static void write_seeds(struct chain *c)
+{
+	for (unsigned which = 0; which < 2 * world_count; which++) {
+		const struct chain_ops *ops = begin(c, which);
+		struct chain_state s;
+		uint8_t bytes[1 + STATE_MOST] = {(uint8_t)which};
+		uint64_t index = 0;
+		while (!ops->start(c, index))
+			index++;
+		go_on(c, ops);
+		if (ops->save(c, &s) || s.size > STATE_MOST)
+			abort();
+		memcpy(bytes + 1, s.bytes, s.size);
+		seed_file("state", which, bytes, 1 + s.size);
+		mem_free(s.bytes);
+	}
+}
+
+static void put_right(const struct chain *c, uint8_t *bytes, size_t size)
+{
+	static struct whole_path x;
+	double contribution;
+	put64(bytes, CHAIN);
+	put64(bytes + 8, c->step);
+	if (size < CHAIN_STATE_HEAD + 16 || bytes[16] % 2)
+		return;
+	if (path_contribution(&context, bytes + CHAIN_STATE_HEAD, size - CHAIN_STATE_HEAD, &x, &contribution))
+		put_double(bytes + CHAIN_STATE_HEAD + 8, contribution);
+}
+
+int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
+{
+	static struct chain *chain;
+	static uint8_t state[STATE_MOST];
+	set_up();
+	if (!chain) {
+		size_t most = chain_path.size > chain_pss.size ? chain_path.size : chain_pss.size;
+		chain = mem_alloc(1, most);
+	}
+	if (seeds_wanted()) {
+		write_seeds(chain);
+		exit(0);
+	}
+	if (size < 1 + CHAIN_STATE_HEAD || size > 1 + STATE_MOST)
+		return 0;
+	const struct chain_ops *ops = begin(chain, bytes[0]);
+	struct chain_state s = {state, (uint32_t)(size - 1)};
+	memcpy(state, bytes + 1, s.size);
+	put_right(chain, state, s.size);
+	bool watched = fptrap_watch();
+	if (ops->resume(chain, &s))
+		go_on(chain, ops);
+	fptrap_unwatch(watched);
+	memset(film.xyz, 0, (size_t)SIDE * SIDE * 3 * sizeof *film.xyz);
+	return 0;
+}
