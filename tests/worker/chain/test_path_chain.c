@@ -10,6 +10,7 @@
 #include "tests/support/worlds.h"
 #include "worker/chain/bytes.h"
 #include "worker/chain/path_chain.h"
+#include "worker/math/fptrap.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -109,6 +110,7 @@ static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
 	struct chain_state s;
 	size_t refused = 0;
 	char text[200];
+	bool watched = fptrap_watch();
 	assert_int_equal(chain_path.save(c, &s), 0);
 	for (int i = 0; i < 200; i++) {
 		struct chain_state changed = {mem_alloc(s.size, 1), s.size};
@@ -125,6 +127,7 @@ static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
 		}
 		mem_free(changed.bytes);
 	}
+	fptrap_unwatch(watched);
 	mem_free(s.bytes);
 	return refused;
 }
