@@ -101,14 +101,19 @@ static void splat(struct pss_chain *c, struct pss_place *at)
 {
 	if (at->weight == 0)
 		return;
-	for (uint32_t i = 0; i < at->sample.count; i++)
-		film_sums_splat(c->base.film, &at->sample.splats[i], at->weight / at->sample.intensity);
+	/* Shares of the intensity: where it is denormal its reciprocal is infinite. */
+	double intensity = at->sample.intensity;
+	for (uint32_t i = 0; i < at->sample.count; i++) {
+		struct splat s = at->sample.splats[i];
+		for (int k = 0; k < 3; k++)
+			s.xyz[k] /= intensity;
+		film_sums_splat(c->base.film, &s, at->weight);
+	}
 	struct chain_moments *m = &c->base.film->moments;
-	double scale = at->weight / at->sample.intensity;
-	chain_moments_state(m, at->sample.splats, at->sample.count, at->sample.intensity, at->weight);
+	chain_moments_state(m, at->sample.splats, at->sample.count, intensity, at->weight);
 	for (uint32_t rest = at->sample.classes; rest; rest &= rest - 1) {
 		unsigned k = (unsigned)__builtin_ctz(rest);
-		chain_moments_class(m, k, scale * at->sample.of_class[k]);
+		chain_moments_class(m, k, at->sample.of_class[k] / intensity * at->weight);
 	}
 	at->weight = 0;
 }

@@ -18,13 +18,11 @@ unsigned path_class_whole(const struct whole_path *x)
 void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light, struct path_sample *out)
 {
 	k->out = out;
-	out->classes = 0;
+	classes_clear(out);
 	if (c->wl.grey)
 		k->weights = (spectrum){{c->w->grey_xyz[0] + c->w->grey_xyz[1] + c->w->grey_xyz[2]}};
 	else
 		k->weights = spectrum_intensity_weights(&c->wl);
-	for (int i = 0; i < PATH_CLASSES; i++)
-		out->of_class[i] = 0;
 	enum path_class_kind kind = PATH_NO_VERTEX;
 	k->camera[1] = k->emitter[1] = k->light[0] = k->light[1] = PATH_NO_VERTEX;
 	for (unsigned i = 1; i < camera; i++) {

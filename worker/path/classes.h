@@ -7,6 +7,8 @@
 
 #include "worker/path/whole.h"
 
+#include <string.h>
+
 unsigned path_class_whole(const struct whole_path *x);
 
 /* Classes of all paths that one pair of sub-paths makes, and what these carry. */
@@ -27,6 +29,13 @@ static inline unsigned classes_joined(const struct classes *k, unsigned s, unsig
 {
 	enum path_class_kind camera = (enum path_class_kind)(s > 0 ? k->camera[t] : k->emitter[t]);
 	return path_class(s + t - 1, path_class_kind_join(camera, (enum path_class_kind)k->light[s]));
+}
+
+/* What was added until now did not reach the film. */
+static inline void classes_clear(struct path_sample *out)
+{
+	out->classes = 0;
+	memset(out->of_class, 0, sizeof out->of_class);
 }
 
 /* Technique s contributes l. */

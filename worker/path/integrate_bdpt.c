@@ -31,8 +31,8 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 				classes_add(&classes, j, t, l);
 		}
 	}
-	if (!path_splat(c, out, film[0], film[1], sum))
-		out->classes = 0;
+	if (!path_splat(c, out, film[0], film[1], sum) && out->classes)
+		classes_clear(out);
 	for (unsigned j = 2; j <= light && j <= c->max_depth; j++) {
 		double at[2];
 		if (j < c->min_depth)

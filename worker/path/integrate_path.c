@@ -31,8 +31,8 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 				classes_add(&classes, j, t, l);
 		}
 	}
-	if (!path_splat(c, out, film[0], film[1], sum))
-		out->classes = 0;
+	if (!path_splat(c, out, film[0], film[1], sum) && out->classes)
+		classes_clear(out);
 }
 
 const struct integrator integrator_path = {

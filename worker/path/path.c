@@ -2,10 +2,13 @@
 
 #include "worker/path/measure.h"
 
+#include <float.h>
 #include <string.h>
 
 /* Russian roulette begins after this many scattering events, where it is allowed. */
 enum { ROULETTE_FROM = 5 };
+/* Fainter contributions are black: their parts, such as those of path classes, could be denormal and would not add up. */
+#define FAINTEST (DBL_MIN / DBL_EPSILON)
 
 struct film_window film_window_of(const struct plan *p)
 {
@@ -378,7 +381,7 @@ bool path_splat(struct path_context *c, struct path_sample *out, double x, doubl
 {
 	if (!path_accept(c, l) || out->count == PATH_MAX_SPLATS)
 		return false;
-	struct splat *s = &out->splats[out->count++];
+	struct splat *s = &out->splats[out->count];
 	s->x = x;
 	s->y = y;
 	if (!EFFECT_IS_ON(c->w, colour))
@@ -386,6 +389,14 @@ bool path_splat(struct path_context *c, struct path_sample *out, double x, doubl
 			s->xyz[i] = l.v[0] * c->w->grey_xyz[i];
 	else
 		spectrum_to_xyz(l, &c->wl, s->xyz);
-	out->intensity += s->xyz[0] + s->xyz[1] + s->xyz[2];
+	double sum = s->xyz[0] + s->xyz[1] + s->xyz[2];
+	if (out->intensity + sum > (double)FLT_MAX) {
+		c->counters[COUNT_INFINITE]++;
+		return false;
+	}
+	if (sum < FAINTEST)
+		return false;
+	out->intensity += sum;
+	out->count++;
 	return true;
 }

@@ -120,7 +120,8 @@ bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d,
 /* Unit direction and squared distance from a to b; b may lie at infinity (distance 1). */
 vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2);
 
-/* Adds L (f / p) at a film point; NaN, infinite and negative ones are counted and left out, as black ones are: false. */
+/* Adds L (f / p) at a film point; NaN, infinite (beyond a float in sum) and negative ones are counted and left
+ * out, as black ones are: false. */
 bool path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l);
 /* false: L is zero, or was counted as invalid. */
 bool path_accept(const struct path_context *c, spectrum l);

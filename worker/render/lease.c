@@ -7,7 +7,6 @@
 #include "worker/mutation/mixture.h"
 #include "worker/render/sums.h"
 
-#include <float.h>
 #include <stdio.h>
 #include <string.h>
 #include <time.h>
@@ -140,11 +139,6 @@ static enum lease_end run_bootstrap(struct job *j)
 		sampler_random_init(&s, j->plan->seed, RNG_BOOTSTRAP, i, 0);
 		j->integrator->evaluate(&j->context, &s.base, &j->sample);
 		double intensity = j->sample.intensity;
-		if (intensity > (double)FLT_MAX) {
-			out->counters[COUNT_INFINITE]++;
-			intensity = 0;
-			j->sample.classes = 0;
-		}
 		for (uint32_t rest = j->sample.classes; rest; rest &= rest - 1) {
 			int k = __builtin_ctz(rest);
 			out->classes[k] += j->sample.of_class[k];

@@ -33,7 +33,6 @@ void chain_moments_fini(struct chain_moments *m)
 void chain_moments_state(struct chain_moments *m, const struct splat *splats, uint32_t count, double intensity, double weight)
 {
 	uint32_t touched = 0;
-	double scale = 1 / intensity;
 	if (m->tiles == 0)
 		return;
 	for (uint32_t i = 0; i < count; i++) {
@@ -42,7 +41,7 @@ void chain_moments_state(struct chain_moments *m, const struct splat *splats, ui
 		if (!(x >= 0 && y >= 0 && x < m->width && y < m->height))
 			continue;
 		uint32_t tile = (uint32_t)y / TILE_SIZE * m->tiles_x + (uint32_t)x / TILE_SIZE;
-		double share = (s->xyz[0] + s->xyz[1] + s->xyz[2]) * scale;
+		double share = (s->xyz[0] + s->xyz[1] + s->xyz[2]) / intensity;
 		if (!(share > 0))
 			continue;
 		if (m->share[tile] == 0)

@@ -270,6 +270,73 @@ static void test_targets(void **state)
 	check_target("target with holes", evaluate_holes, 2);
 }
 
+/* Intensities where doubles end: most points are of one of two magnitudes, so that a chain stays there for a while. */
+static double magnitudes[2];
+
+static void evaluate_extremes(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	(void)c;
+	out->count = 0;
+	out->intensity = 0;
+	out->classes = 1;
+	const double *u = s->block(s, SIDE_CAMERA, 0);
+	put(out, u[0], u[1], 6 * magnitudes[u[5] < 0.5]);
+	put(out, u[0], u[1], 0);
+	out->of_class[0] = out->intensity;
+}
+
+static void check_finite(const struct film_sums *film, double weight)
+{
+	double sum = 0;
+	float first, second;
+	struct chain_moments m = film->moments;
+	for (int i = 0; i < SIDE * SIDE * 3; i++) {
+		assert_true(isfinite(film->xyz[i]));
+		sum += film->xyz[i];
+	}
+	double classes[PATH_CLASSES];
+	chain_moments_end(&m, &second, classes);
+	chain_moments_end_sequence(&m, &first);
+	assert_true(fabs(sum / weight - 1) < 1e-9);
+	assert_true(fabs((double)first / weight - 1) < 1e-6 && fabs((double)second / weight - 1) < 1e-6);
+	assert_true(fabs(classes[0] / weight - 1) < 1e-9);
+}
+
+/* No intensity makes a film, a moment or a sum infinite. Each mutation gives the film a weight of 1, whatever the
+ * intensity. */
+static void test_extreme_intensities(void **state)
+{
+	(void)state;
+	const double pairs[][2] = {{0x1p-1074, 0x1p-1074}, {0x1p-1074, 1e-310}, {0x1p-1074, 0}, {1e-300, 0x1p-1070}, {0x1p-1074, 1e30}, {1e-310, 3e38}};
+	struct chain *c = test_malloc(chain_pss.size);
+	static struct path_context context;
+	uint64_t counters[BATCH_COUNTERS];
+	context.counters = counters;
+	const struct integrator integrator = {.stream = RNG_BOOTSTRAP, .evaluate = evaluate_extremes};
+	struct plan plan = {.kind = PLAN_CHAINS, .width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
+	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
+	enum { STEPS = 2000 };
+	for (size_t k = 0; k < sizeof pairs / sizeof *pairs; k++) {
+		struct film_sums film;
+		struct chain_sums sums = {0, 0};
+		uint64_t blind = 0;
+		memcpy(magnitudes, pairs[k], sizeof magnitudes);
+		memset(counters, 0, sizeof counters);
+		assert_int_equal(film_sums_init(&film, &plan, &settings, NULL), 0);
+		*c = (struct chain){.integrator = &integrator, .context = &context, .film = &film, .seed = 3, .id = 1};
+		assert_true(chain_pss.start(c, UINT64_MAX));
+		for (int i = 0; i < STEPS; i++) {
+			chain_pss.step(c, &sums);
+			blind += counters[COUNT_ACCEPTED] == 0;
+		}
+		chain_pss.flush(c);
+		assert_true(isfinite(sums.sum) && isfinite(sums.square) && sums.sum > 0);
+		check_finite(&film, (double)(STEPS - blind));
+		film_sums_fini(&film);
+	}
+	test_free(c);
+}
+
 /* Saved and resumed between epochs, a chain goes on bit for bit. */
 static void test_resume(void **state)
 {
@@ -347,6 +414,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_small_step), cmocka_unit_test(test_both_ways), cmocka_unit_test(test_bytes),
 		cmocka_unit_test(test_targets),	   cmocka_unit_test(test_resume),
+		cmocka_unit_test(test_extreme_intensities),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -149,6 +149,33 @@ static void test_chains(void **state)
 	world_free(w);
 }
 
+/* Light so weak that contributions are denormal or zero, and as strong as a scene may have: every lease is a batch that passes
+ * its checks (run asks), whatever the integrator. */
+static void test_extreme_light(void **state)
+{
+	(void)state;
+	const char *radiance[] = {"1e-320", "1e-306", "1e-293", "1e-290", "1e-160", "1e30"};
+	for (size_t n = 0; n < sizeof radiance / sizeof *radiance; n++) {
+		struct world *w = world_of_text(
+			16, 16,
+			SENSOR("0,0,5", "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape>"
+			"<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='180'/><translate z='6'/></transform>"
+			"<emitter type='area'><rgb name='radiance' value='%s'/></emitter></shape>",
+			radiance[n]);
+		for (size_t i = 0; render_integrator_at(i); i++) {
+			struct plan p = plan_of(w, render_integrator_at(i)->name);
+			uint64_t seeds[2] = {UINT64_MAX, UINT64_MAX};
+			struct lease_input in = {2, seeds, NULL};
+			bool chains = p.kind == PLAN_CHAINS;
+			struct batch a = chains ? run(w, &p, key(LEASE_BOOTSTRAP, 1, 0, 0), NULL) : (struct batch){.key = {0}};
+			batch_fini(&a);
+			struct batch b = run(w, &p, key(LEASE_RENDER, 1, 0, 0), chains ? &in : NULL);
+			batch_fini(&b);
+		}
+		world_free(w);
+	}
+}
+
 static int end_of(const struct world *w, const struct plan *p, struct lease_key k, const struct lease_input *in)
 {
 	struct batch b;
@@ -486,7 +513,8 @@ static void test_no_memory_for_a_world(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_any_order), cmocka_unit_test(test_chains),  cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_any_order), cmocka_unit_test(test_chains), cmocka_unit_test(test_extreme_light),
+		cmocka_unit_test(test_refused),
 		cmocka_unit_test(test_invalid_operation),
 		cmocka_unit_test(test_stop),	  cmocka_unit_test(test_crop),	  cmocka_unit_test(test_borders),
 		cmocka_unit_test(test_kernels),	  cmocka_unit_test(test_no_memory),
