@@ -67,7 +67,12 @@ static void test_glossy(void **state)
 				"<shape type='rectangle'>" AT("<scale value='1.9'/><rotate x='1' angle='-90'/><translate y='-1.2'/>")
 				"<bsdf type='roughconductor'><string name='material' value='Au'/><float name='alpha' value='0.15'/>"
 				"<string name='distribution' value='ggx'/></bsdf></shape>"
-				BALL("0.4,-0.5,-0.6", "0.6", "<bsdf type='phong'><float name='exponent' value='30'/></bsdf>")),
+				BALL("0.4,-0.5,-0.6", "0.6", "<bsdf type='phong'><float name='exponent' value='30'/></bsdf>")
+				BALL("-0.9,-0.7,-0.4", "0.4", "<bsdf type='plastic'/>")
+				BALL("-0.5,0.6,-0.9", "0.4", "<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>")
+				"<shape type='rectangle'>" AT("<scale value='0.5'/><translate x='0.9' y='0.5' z='-0.3'/>")
+				"<bsdf type='mask'><float name='opacity' value='0.4'/><bsdf type='blendbsdf'><bsdf type='diffuse'/>"
+				"<bsdf type='conductor'><string name='material' value='Ag'/></bsdf></bsdf></bsdf></shape>"),
 		  6144, 6144, 0, 0);
 }
 

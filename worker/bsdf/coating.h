@@ -1,0 +1,40 @@
+/*
+ * A clear coating over a diffuse base, what `plastic` and `roughplastic` share: light that the boundary lets in is scattered by
+ * the base, reflected again and again between base and boundary, and leaves through the boundary (the model of Mitsuba's plug-ins):
+ *
+ *   f_diffuse = T(wo) T(wi) / eta^2  rho / (1 - rho' R) / pi
+ *
+ * with T the share that the boundary transmits from outside, R what it reflects of diffuse light from inside, rho the base's
+ * reflectance, and rho' = rho where `nonlinear` is on, which shifts colours as light does that meets the base several times, else 1.
+ */
+#ifndef WORKER_BSDF_COATING_H
+#define WORKER_BSDF_COATING_H
+
+#include "worker/bsdf/create.h"
+#include "worker/bsdf/ior.h"
+
+#define COATING_IOR_DEFAULT 1.49 /* polypropylene, what both Mitsuba dialects take */
+
+struct coating {
+	struct texture diffuse, specular;
+	double eta;             /* index of the coating over the one outside */
+	double internal;        /* R */
+	double specular_weight; /* share of the specular reflectance, for the choice of a lobe */
+	bool nonlinear;
+};
+
+/* Reads the parameters and enters them into b; `internal` is left to the caller. */
+int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
+#define COATING_PARAMS                                                                                                 \
+	{.name = "int_ior", .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING},                                          \
+		{.name = "ext_ior", .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING},                                  \
+		{.name = "diffuse_reflectance", .types = VALUE_TEXTURE},                                               \
+		{.name = "specular_reflectance", .types = VALUE_TEXTURE}, {.name = "nonlinear", .types = VALUE_BOOL}
+
+/* f_diffuse, with the two transmittances. */
+spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double transmitted_o, double transmitted_i);
+
+/* The probability of sampling the specular lobe where the boundary reflects the share `reflected` of wo's light. */
+double coating_specular_chance(const struct coating *c, double reflected);
+
+#endif
