@@ -122,7 +122,7 @@ static int blend_create(struct bsdf *b, const struct scene_node *n, const struct
 	return bsdf_texture(b, &m->weight, n, "weight", 0.5, build, e);
 }
 
-static const struct param blend_params[] = {{.name = "weight", .types = VALUE_TEXTURE}, {.name = NULL}};
+static const struct param blend_params[] = {{.name = "weight", .types = VALUE_TEXTURE, .min = 0, .max = 1}, {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_blendbsdf = {
 	.type = "blendbsdf",

@@ -24,12 +24,15 @@ int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, 
 	return 0;
 }
 
+/* eta^2 (1 - rho' (1 - E)) = eta^2 (1 - rho') + rho' E eta^2. */
 spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double transmitted_o, double transmitted_i)
 {
 	spectrum rho = texture_eval(&c->diffuse, p->u, p->v, p->w);
-	double common = transmitted_o * transmitted_i / (c->eta * c->eta * WARP_PI);
-	for (int i = 0; i < SPECTRUM_LANES; i++)
-		rho.v[i] *= common / (1 - (c->nonlinear ? rho.v[i] : 1) * c->internal);
+	double common = transmitted_o * transmitted_i / WARP_PI;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double again = c->nonlinear ? rho.v[i] : 1;
+		rho.v[i] *= common / (c->eta * c->eta * (1 - again) + again * c->escape);
+	}
 	return rho;
 }
 

@@ -59,14 +59,15 @@ static bool plastic_sample(const struct bsdf *b, const struct bsdf_point *p, vec
 	return out->pdf > 0;
 }
 
-/* What the boundary reflects of diffuse light from inside: the integral of F(c) 2 c over the cosine, by the midpoint rule in
- * the sine's square, where total reflection is a step and all else is smooth. */
-static double internal_reflectance(double eta)
+/* What the boundary lets in of diffuse light: the integral of T(c) 2 c over the cosine, by the midpoint rule in the cosine. */
+static double let_in(double eta)
 {
 	enum { STEPS = 4096 };
 	double sum = 0;
-	for (int i = 0; i < STEPS; i++)
-		sum += fresnel_dielectric(sqrt((i + 0.5) / STEPS), 1 / eta).reflected;
+	for (int i = 0; i < STEPS; i++) {
+		double c = (i + 0.5) / STEPS;
+		sum += fresnel_dielectric(c, eta).transmitted * 2 * c;
+	}
 	return sum / STEPS;
 }
 
@@ -78,7 +79,7 @@ static int plastic_create(struct bsdf *b, const struct scene_node *n, const stru
 	int code = coating_read(c, b, n, build, e);
 	if (code)
 		return code;
-	c->internal = internal_reflectance(c->eta);
+	c->escape = let_in(c->eta);
 	b->modes |= BSDF_DELTA;
 	b->has_delta = true;
 	b->alpha_mean = 1;

@@ -8,8 +8,7 @@
 #include "worker/bsdf/microfacet.h"
 #include "worker/bsdf/warp.h"
 
-/* From inside total reflection is a step: more directions, fewer facets each. */
-enum { NODES = 48, NODE_SIDE = 16, INNER = 512, INNER_SIDE = 8 };
+enum { NODES = 48, SIDE = 16, STEPS = 1024 };
 
 struct roughplastic {
 	struct coating coating;
@@ -18,18 +17,18 @@ struct roughplastic {
 };
 
 /* What a rough boundary reflects of light from v, to the same side: visible normals by the midpoint rule. */
-static double reflected_by(const struct microfacet *m, double eta, double cosine, int side)
+static double reflected_by(const struct microfacet *m, double eta, double cosine)
 {
 	double sum = 0;
 	vec3 v = {sqrt((1 - cosine) * (1 + cosine)), 0, cosine};
-	for (int i = 0; i < side * side; i++) {
-		vec3 h = microfacet_sample_visible(m, v, (i / side + 0.5) / side, (i % side + 0.5) / side);
+	for (int i = 0; i < SIDE * SIDE; i++) {
+		vec3 h = microfacet_sample_visible(m, v, (i / SIDE + 0.5) / SIDE, (i % SIDE + 0.5) / SIDE);
 		double c = fmin(vec3_dot(v, h), 1);
 		vec3 w = vec3_sub(vec3_scale(2 * c, h), v);
 		if (c > 0 && w.z > 0)
 			sum += fresnel_dielectric(c, eta).reflected * fmin(microfacet_g1_over_cos(m, vec3_normalize(w)) * w.z, 1);
 	}
-	return sum / (side * side);
+	return sum / (SIDE * SIDE);
 }
 
 static double node_cosine(int i)
@@ -107,11 +106,12 @@ static void tabulate(struct roughplastic *r)
 {
 	double sum = 0;
 	for (int i = 0; i < NODES; i++)
-		r->transmitted[i] = 1 - reflected_by(&r->facets, r->coating.eta, node_cosine(i), NODE_SIDE);
-	/* Diffuse light from inside, by the midpoint rule in the cosine's square. */
-	for (int i = 0; i < INNER; i++)
-		sum += reflected_by(&r->facets, 1 / r->coating.eta, sqrt((i + 0.5) / INNER), INNER_SIDE);
-	r->coating.internal = sum / INNER;
+		r->transmitted[i] = 1 - reflected_by(&r->facets, r->coating.eta, node_cosine(i));
+	for (int i = 0; i < STEPS; i++) {
+		double c = (i + 0.5) / STEPS;
+		sum += transmitted(r, c) * 2 * c;
+	}
+	r->coating.escape = sum / STEPS;
 }
 
 static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)

@@ -84,10 +84,10 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 }
 
 static const struct param thin_params[] = {
-	{.name = "int_ior", .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING},
-	{.name = "ext_ior", .types = VALUE_FLOAT | VALUE_INT | VALUE_STRING},
-	{.name = "specular_reflectance", .types = VALUE_TEXTURE},
-	{.name = "specular_transmittance", .types = VALUE_TEXTURE},
+	IOR_NUMBER("int_ior"),
+	IOR_NUMBER("ext_ior"),
+	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	{.name = "specular_transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 	MICROFACET_PARAMS_IGNORED,
 	{.name = NULL},
 };

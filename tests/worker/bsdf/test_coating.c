@@ -28,8 +28,7 @@ static double albedo(const struct bsdf *b, vec3 wo)
 	return sum * PI / (POLAR * AZIMUTH) + bsdf_eval_delta(b, &point, wo, BSDF_REFLECT, &wi, &chance).v[0];
 }
 
-/* Over a base that absorbs nothing a smooth coating gives back everything: that ties T from outside, R from inside and eta^2
- * together, which are computed each for itself. */
+/* Over a base that absorbs nothing a smooth coating gives back everything. */
 static void test_nothing_is_lost_under_a_smooth_coating(void **state)
 {
 	(void)state;
@@ -46,7 +45,24 @@ static void test_nothing_is_lost_under_a_smooth_coating(void **state)
 	}
 }
 
-/* A rough coating loses what facets reflect more than once: little where they are nearly flat. And it becomes the smooth one. */
+/* What comes out again of the light that is in, from Fresnel's factors inside: total reflection included. */
+static void test_escape_is_what_fresnel_says_inside(void **state)
+{
+	(void)state;
+	enum { STEPS = 1 << 20 };
+	struct arena a = {0};
+	struct bsdf b;
+	bsdf_make(&a, "plastic diffuse_reflectance=1 int_ior=1.7 ext_ior=1", &b);
+	double out = 0, t = fresnel_dielectric(1, 1.7).transmitted;
+	for (int i = 0; i < STEPS; i++)
+		out += fresnel_dielectric(sqrt((i + 0.5) / STEPS), 1 / 1.7).transmitted / STEPS;
+	vec3 straight = {0, 0, 1};
+	double f = b.ops->eval(&b, &point, straight, straight).v[0];
+	assert_true(fabs(f * PI * 1.7 * 1.7 * out / (t * t) - 1) < 1e-5);
+	arena_fini(&a);
+}
+
+/* A rough coating gives back what it lets in, too; and it becomes the smooth one. */
 static void test_rough_and_smooth_coatings_meet(void **state)
 {
 	(void)state;
@@ -111,6 +127,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_nothing_is_lost_under_a_smooth_coating),
+		cmocka_unit_test(test_escape_is_what_fresnel_says_inside),
 		cmocka_unit_test(test_rough_and_smooth_coatings_meet),
 		cmocka_unit_test(test_the_coating_is_a_dielectric),
 		cmocka_unit_test(test_a_sheet_is_a_series),

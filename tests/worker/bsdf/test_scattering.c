@@ -303,11 +303,11 @@ static void test_refusals_say_why(void **state)
 	} bad[] = {
 		{"hair", "hair"},
 		{"diffuse reflectance=1.5", "reflectance"},
-		{"diffuse reflectance=rgb(0.5,2,0.1)", "between 0 and 1"},
+		{"diffuse reflectance=rgb(0.5,2,0.1)", "must be within [0, 1]"},
 		{"conductor material=Unobtainium", "Unobtainium"},
 		{"roughconductor alpha_u=0.1 alpha_v=0.2", "isotropic"},
 		{"dielectric int_ior=cheese", "cheese"},
-		{"dielectric int_ior=-1", "above 0"},
+		{"dielectric int_ior=-1", "outside [0.001, 1000]"},
 		{"dielectric int_ior=amber dispersion=true", "amber"},
 		{"dielectric int_ior=1.5 dispersion=true", "wavelength"},
 		{"dielectric dispersion=true", "bk7"},
@@ -324,6 +324,10 @@ static void test_refusals_say_why(void **state)
 		{"twosided | diffuse | diffuse | diffuse", "one or two"},
 		{"twosided | dielectric", "two sides"},
 		{"twosided | hair", "hair"},
+		{"mask", "exactly one"},
+		{"mask | dielectric", "lets light through"},
+		{"blendbsdf | diffuse", "exactly two"},
+		{"blendbsdf | diffuse | thindielectric", "lets light through"},
 	};
 	for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
 		struct arena a = {0};
