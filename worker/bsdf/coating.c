@@ -29,6 +29,8 @@ spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, do
 {
 	spectrum rho = texture_eval(&c->diffuse, p->u, p->v, p->w);
 	double common = transmitted_o * transmitted_i / WARP_PI;
+	if (!(common > 0)) /* and perhaps nothing at all is let in: escape is 0 then */
+		return spectrum_of(0);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double again = c->nonlinear ? rho.v[i] : 1;
 		rho.v[i] *= common / (c->eta * c->eta * (1 - again) + again * c->escape);

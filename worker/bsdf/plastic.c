@@ -59,16 +59,15 @@ static bool plastic_sample(const struct bsdf *b, const struct bsdf_point *p, vec
 	return out->pdf > 0;
 }
 
-/* What the boundary lets in of diffuse light: the integral of T(c) 2 c over the cosine, by the midpoint rule in the cosine. */
+/* What the boundary lets in of diffuse light: the integral of T over the sine's square, up to total reflection, by the midpoint
+ * rule. */
 static double let_in(double eta)
 {
 	enum { STEPS = 4096 };
-	double sum = 0;
-	for (int i = 0; i < STEPS; i++) {
-		double c = (i + 0.5) / STEPS;
-		sum += fresnel_dielectric(c, eta).transmitted * 2 * c;
-	}
-	return sum / STEPS;
+	double sum = 0, most = fmin(eta * eta, 1);
+	for (int i = 0; i < STEPS; i++)
+		sum += fresnel_dielectric(sqrt(1 - most * (i + 0.5) / STEPS), eta).transmitted;
+	return most * sum / STEPS;
 }
 
 static int plastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
