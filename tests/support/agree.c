@@ -244,6 +244,16 @@ static struct verdict compare(const struct cell *a, const struct cell *b)
 	return (struct verdict){(a->mean - b->mean) / reference, sqrt(v) / reference, da + db > 0 ? v * v / (da + db) : 30};
 }
 
+static double least_found(const struct verdict *v)
+{
+	return (critical_t(LEVEL / (AGREE_CELLS + 1), v->degrees) + 1.645) * v->error;
+}
+
+static double p_of(const struct verdict *v)
+{
+	return v->error > 0 ? stats_student_t_p(v->difference / v->error, v->degrees) : v->difference == 0;
+}
+
 /* Holm over the cells; the power is that of the strictest step. */
 static void judge(const char *test, const struct verdict *v, bool powerful)
 {
@@ -252,8 +262,7 @@ static void judge(const char *test, const struct verdict *v, bool powerful)
 	int cells = AGREE_CELLS + 1;
 	double worst_block = 0, mean_power = 0;
 	for (int c = 0; c < cells; c++) {
-		double t = critical_t(LEVEL / cells, v[c].degrees), least = (t + 1.645) * v[c].error;
-		double p = v[c].error > 0 ? stats_student_t_p(v[c].difference / v[c].error, v[c].degrees) : v[c].difference == 0;
+		double least = least_found(&v[c]), p = p_of(&v[c]);
 		if (c < AGREE_CELLS)
 			worst_block = fmax(worst_block, least);
 		else
@@ -278,6 +287,19 @@ static void compare_images(const struct agree_image *a, const struct agree_image
 	for (int c = 0; c <= AGREE_CELLS; c++) {
 		struct cell x = cell_stats(a, c), y = cell_stats(b, c);
 		v[c] = compare(&x, &y);
+	}
+}
+
+void agree_measure(const struct agree_image *a, const struct agree_image *b, struct agree_difference *out)
+{
+	struct verdict v[AGREE_CELLS + 1];
+	compare_images(a, b, v);
+	const struct verdict *mean = &v[AGREE_CELLS];
+	*out = (struct agree_difference){mean->difference, mean->error, least_found(mean), 0, true};
+	for (int c = 0; c <= AGREE_CELLS; c++) {
+		if (c < AGREE_CELLS)
+			out->found_block = fmax(out->found_block, least_found(&v[c]));
+		out->holds &= p_of(&v[c]) >= LEVEL / (AGREE_CELLS + 1);
 	}
 }
 

@@ -42,6 +42,14 @@ void agree_check(const char *test, const struct agree_image *a, const struct agr
  * test. Returns the relative difference of the means. */
 double agree_within_errors(const char *test, const struct agree_image *a, const struct agree_image *b);
 
+/* The same as numbers, for tables: of the means and of the block that differs most. */
+struct agree_difference {
+	double mean, error;         /* a's mean against b's, and its standard error, relative to b's */
+	double found, found_block;  /* smallest bias of the mean, and of any block, that is found with 95 % probability */
+	bool holds;
+};
+void agree_measure(const struct agree_image *a, const struct agree_image *b, struct agree_difference *out);
+
 /* Fails unless every cell's mean is `expected` (same level and power, one-sample t). */
 void agree_expect(const char *test, const struct agree_image *a, double expected);
 

@@ -2,7 +2,8 @@
 
 #include "common/base/mem.h"
 #include "common/base/tick.h"
-#include "worker/geom/embree.h"
+#include "worker/geom/solved.h"
+#include "worker/geom/triangle.h"
 #include "worker/math/fptrap.h"
 
 #include <float.h>
@@ -10,33 +11,18 @@
 #include <stdio.h>
 #include <sys/types.h>
 
-struct sphere_prim {
-	vec3 center;
-	double radius;
-	uint32_t shape;
-};
-
 struct accel {
 	RTCDevice device;
 	RTCScene scene;
-	uint32_t sphere_count;
+	uint32_t count, sphere_count;
 	struct sphere_prim *spheres;
 	struct accel_shape *shapes;
+	struct wide_prims *wide; /* one a shape */
 	atomic_size_t bytes, peak;
 	vec3 low, high;
 	double size; /* sum of the sides */
 	double reach; /* how far Embree's floats can be off, see below */
-};
-
-/* What a query carries into Embree's callbacks. */
-struct query {
-	embree_context context;
-	vec3 o, d, end; /* in double: what Embree proposes is judged by these; end: o + d for a segment */
-	bool segment;
-	double t_min;
-	double reach; /* of the accel */
-	double back;  /* Embree's ray begins that much before o, in units of d */
-	struct prim_ref from, to;
+	double detail; /* of a scene of mixed scales: the extent of its smallest shape; else 0 */
 };
 
 static bool memory_monitor(void *user, ssize_t bytes, bool post)
@@ -57,44 +43,19 @@ static bool progress_monitor(void *counter, double done)
 	return true;
 }
 
-static vec3 vertex(const struct accel_shape *s, uint32_t i)
-{
-	return (vec3){(double)s->position[i][0], (double)s->position[i][1], (double)s->position[i][2]};
-}
-
-static double norm1(vec3 v)
-{
-	return fabs(v.x) + fabs(v.y) + fabs(v.z);
-}
-
-/* Height of the plane through v0 over p, times |n|; 0 when p lies in the plane as far as double can tell: p and n carry the
- * rounding of a few operations, of which `edges` bounds the terms. */
-static double height(vec3 p, vec3 v0, vec3 n, double edges)
-{
-	vec3 to = vec3_sub(v0, p);
-	double h = vec3_dot(n, to);
-	return fabs(h) <= 0x1p-49 * edges * (norm1(p) + norm1(to)) ? 0 : h;
-}
-
-/* The plane of the triangle is crossed after the start, and before the end of a segment. A ray that starts in the plane,
- * on a coplanar neighbour, does not cross it again. */
-static bool crosses(const struct query *q, const struct accel_shape *s, uint32_t prim)
-{
-	const uint32_t *i = s->index[prim];
-	vec3 v0 = vertex(s, i[0]), e1 = vec3_sub(vertex(s, i[1]), v0), e2 = vec3_sub(vertex(s, i[2]), v0);
-	vec3 n = vec3_cross(e1, e2);
-	double edges = norm1(e1) * norm1(e2), start = height(q->o, v0, n, edges);
-	double beyond = q->segment ? -height(q->end, v0, n, edges) : vec3_dot(n, q->d);
-	return (start > 0 && beyond > 0) || (start < 0 && beyond < 0);
-}
-
 /* So high over the triangle's plane at both ends that not even the normal that Embree makes of tiny triangles far away can
  * be wrong about the side: spares most hits the way to their vertices. */
 static bool clearly_crosses(const struct query *q, const struct RTCHit *hit, const struct RTCRay *ray)
 {
 	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
 	double t = (double)ray->tfar - q->back, nearer = q->segment ? fmin(t, 1 - t) : t;
-	return fabs(vec3_dot(n, q->d)) * nearer > 0x1p10 * q->reach * norm1(n);
+	return fabs(vec3_dot(n, q->d)) * nearer > 0x1p10 * q->reach * triangle_norm1(n);
+}
+
+/* Solved in double, as a primitive of its own (wide_root). */
+static bool is_wide(const struct query *q, const struct accel_shape *s, uint32_t prim)
+{
+	return isfinite(q->wide_from) && (double)triangle_extent(s->position, s->index[prim]) >= q->wide_from;
 }
 
 static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
@@ -105,8 +66,10 @@ static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
 	if ((hit->geomID == q->from.shape && hit->primID == q->from.prim) ||
 	    (hit->geomID == q->to.shape && hit->primID == q->to.prim))
 		args->valid[0] = 0;
+	else if (is_wide(q, args->geometryUserPtr, hit->primID))
+		args->valid[0] = 0;
 	else if (!clearly_crosses(q, hit, (const struct RTCRay *)(const void *)args->ray) &&
-		 !crosses(q, args->geometryUserPtr, hit->primID))
+		 !query_crosses(q, args->geometryUserPtr, hit->primID))
 		args->valid[0] = 0;
 }
 
@@ -119,73 +82,6 @@ static void filter_closest(const struct RTCFilterFunctionNArguments *args)
 	for (int k = 0; k < 3; k++)
 		__builtin_prefetch(s->position[i[k]]);
 	filter_triangle(args);
-}
-
-static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
-{
-	const struct sphere_prim *s = args->geometryUserPtr;
-	/* One part in 2^20 outwards: more than float rounding of the box and of Embree's slab test can take away. */
-	double r = s->radius * (1 + 0x1p-20) + 0x1p-20 * (fabs(s->center.x) + fabs(s->center.y) + fabs(s->center.z));
-	struct RTCBounds *b = args->bounds_o;
-	b->lower_x = (float)(s->center.x - r);
-	b->lower_y = (float)(s->center.y - r);
-	b->lower_z = (float)(s->center.z - r);
-	b->upper_x = (float)(s->center.x + r);
-	b->upper_y = (float)(s->center.y + r);
-	b->upper_z = (float)(s->center.z + r);
-}
-
-/* The nearest admissible root of |o + t d - c|^2 = r^2 in (t_min, t_max). Where the ray starts on the sphere one root is 0,
- * where a segment ends on it one root is 1: the other follows from Vieta without cancellation. Else the discriminant comes
- * from the distance of the line to the centre (Haines et al. 2019, Ray Tracing Gems ch. 7). */
-static bool sphere_root(const struct sphere_prim *s, const struct query *q, double t_max, double *t)
-{
-	vec3 oc = vec3_sub(q->o, s->center);
-	double a = vec3_dot(q->d, q->d), b = vec3_dot(oc, q->d);
-	double length = vec3_length(oc), c = (length - s->radius) * (length + s->radius);
-	bool starts = q->from.shape == s->shape, ends = q->to.shape == s->shape;
-	if (starts && ends)
-		return false;
-	if (starts || ends) {
-		*t = starts ? -2 * b / a : c / a;
-		return *t > q->t_min && *t < t_max;
-	}
-	vec3 nearest = vec3_madd(oc, -b / a, q->d);
-	double disc = s->radius * s->radius - vec3_dot(nearest, nearest);
-	if (!(disc >= 0))
-		return false;
-	double k = -b - copysign(sqrt(disc * a), b);
-	double t0 = k / a, t1 = k != 0 ? c / k : t0;
-	double first = fmin(t0, t1), second = fmax(t0, t1);
-	*t = first > q->t_min ? first : second;
-	return *t > q->t_min && *t < t_max;
-}
-
-static void sphere_intersect(const struct RTCIntersectFunctionNArguments *args)
-{
-	if (!args->valid[0])
-		return;
-	const struct query *q = (const struct query *)(const void *)args->context;
-	const struct sphere_prim *s = args->geometryUserPtr;
-	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit;
-	double t;
-	if (!sphere_root(s, q, (double)rh->ray.tfar - q->back, &t))
-		return;
-	rh->ray.tfar = (float)(t + q->back);
-	rh->hit.geomID = s->shape;
-	rh->hit.primID = 0;
-	rh->hit.u = rh->hit.v = 0;
-}
-
-static void sphere_occluded(const struct RTCOccludedFunctionNArguments *args)
-{
-	if (!args->valid[0])
-		return;
-	const struct query *q = (const struct query *)(const void *)args->context;
-	struct RTCRay *ray = (struct RTCRay *)(void *)args->ray;
-	double t;
-	if (sphere_root(args->geometryUserPtr, q, q->segment ? 1 : INFINITY, &t))
-		ray->tfar = -INFINITY;
 }
 
 static void attach(struct accel *a, RTCGeometry g, uint32_t id)
@@ -219,12 +115,37 @@ static int attach_sphere(struct accel *a, const struct accel_shape *s, uint32_t 
 	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
 	if (!g)
 		return -ENOMEM;
-	rtcSetGeometryUserPrimitiveCount(g, 1);
-	rtcSetGeometryUserData(g, prim);
-	rtcSetGeometryBoundsFunction(g, sphere_bounds, NULL);
-	rtcSetGeometryIntersectFunction(g, sphere_intersect);
-	rtcSetGeometryOccludedFunction(g, sphere_occluded);
+	solved_sphere(g, prim);
 	attach(a, g, id);
+	return 0;
+}
+
+/* The triangles of a shape that are `least` large, as a geometry of their own, of a number beyond those of the shapes. */
+static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, double least)
+{
+	struct wide_prims *w = &a->wide[id];
+	*w = (struct wide_prims){&a->shapes[id], id, 0, NULL};
+	if (a->shapes[id].is_sphere)
+		return 0;
+	for (int pass = 0; pass < 2; pass++) {
+		w->count = 0;
+		for (uint32_t i = 0; i < w->shape->triangle_count; i++) {
+			if (triangle_extent(w->shape->position, w->shape->index[i]) < least)
+				continue;
+			if (pass)
+				w->prim[w->count] = i;
+			w->count++;
+		}
+		if (w->count == 0)
+			return 0;
+		if (!pass && !(w->prim = mem_alloc(w->count, sizeof *w->prim)))
+			return -ENOMEM;
+	}
+	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
+	if (!g)
+		return -ENOMEM;
+	solved_triangles(g, w);
+	attach(a, g, shape_count + id);
 	return 0;
 }
 
@@ -262,6 +183,49 @@ static double rounding_reach(vec3 low, vec3 high)
 	return 0x1p-21 * fmax(m.x, fmax(m.y, m.z));
 }
 
+/* A scene has mixed scales where its smallest shape is so much smaller than the scene: what floats are off in all of it is
+ * then more than a thousandth of that shape. Triangles that are so much larger than that shape are solved in double. */
+#define MIXED 0x1p11
+
+static double extent_of(const struct accel_shape *s)
+{
+	if (s->is_sphere)
+		return 2 * s->radius;
+	float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, most = 0;
+	for (uint32_t i = 0; i < s->triangle_count; i++)
+		for (int j = 0; j < 3; j++)
+			for (int k = 0; k < 3; k++) {
+				low[k] = fminf(low[k], s->position[s->index[i][j]][k]);
+				high[k] = fmaxf(high[k], s->position[s->index[i][j]][k]);
+			}
+	for (int k = 0; k < 3; k++)
+		most = fmaxf(most, high[k] - low[k]);
+	return (double)most;
+}
+
+static void find_detail(struct accel *a, const struct accel_shape *shapes, uint32_t count)
+{
+	double least = INFINITY, reach = 0;
+	for (uint32_t i = 0; i < count; i++) {
+		const struct accel_shape *s = &shapes[i];
+		vec3 r = {s->radius, s->radius, s->radius};
+		least = fmin(least, extent_of(s));
+		if (s->is_sphere)
+			reach = fmax(reach, rounding_reach(vec3_sub(s->center, r), vec3_add(s->center, r)));
+		for (uint32_t k = 0; !s->is_sphere && k < s->vertex_count; k++) {
+			vec3 p = triangle_vertex(s->position, k);
+			reach = fmax(reach, rounding_reach(p, p));
+		}
+	}
+	a->detail = MIXED * least < 0x1p21 * reach ? least : 0;
+}
+
+static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
+{
+	int rc = a->shapes[id].is_sphere ? attach_sphere(a, &a->shapes[id], id) : attach_triangles(a, &a->shapes[id], id);
+	return rc || a->detail == 0 ? rc : attach_wide(a, count, id, MIXED * a->detail);
+}
+
 static int build(struct accel *a, const struct accel_shape *shapes, uint32_t count, struct error *e)
 {
 	a->device = rtcNewDevice(has_avx2() ? "threads=1,isa=avx2" : "threads=1");
@@ -273,9 +237,10 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 		return error_set(e, ENOMEM, "Embree's scene cannot be created");
 	rtcSetSceneFlags(a->scene, RTC_SCENE_FLAG_ROBUST);
 	rtcSetSceneBuildQuality(a->scene, RTC_BUILD_QUALITY_MEDIUM);
+	find_detail(a, shapes, count);
 	for (uint32_t i = 0; i < count; i++) {
 		a->shapes[i] = shapes[i];
-		int rc = shapes[i].is_sphere ? attach_sphere(a, &shapes[i], i) : attach_triangles(a, &a->shapes[i], i);
+		int rc = attach_shape(a, count, i);
 		if (rc)
 			return error_set(e, -rc, "Embree's geometry cannot be created");
 	}
@@ -301,8 +266,10 @@ int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t cou
 		return error_set(e, ENOMEM, "out of memory");
 	a->spheres = mem_alloc(count, sizeof *a->spheres);
 	a->shapes = mem_alloc(count, sizeof *a->shapes);
+	a->wide = mem_alloc(count, sizeof *a->wide);
+	a->count = count;
 	unsigned trap = fptrap_leave();
-	int rc = a->spheres && a->shapes ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
+	int rc = a->spheres && a->shapes && a->wide ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
 	fptrap_return(trap);
 	if (rc)
 		accel_free(a);
@@ -321,6 +288,9 @@ void accel_free(struct accel *a)
 	if (a->device)
 		rtcReleaseDevice(a->device);
 	fptrap_return(trap);
+	for (uint32_t i = 0; a->wide && i < a->count; i++)
+		mem_free(a->wide[i].prim);
+	mem_free(a->wide);
 	mem_free(a->spheres);
 	mem_free(a->shapes);
 	mem_free(a);
@@ -354,10 +324,38 @@ static double entry_distance(const struct accel *a, vec3 o, vec3 d)
 	return enter;
 }
 
+static double norm_max(vec3 v)
+{
+	return fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
+}
+
+/* rounding_reach of a ray at p. Of mixed scales: by what is there, not by the scene: the triangles that Embree solves, and the
+ * doubles of p itself on a triangle as large as the scene. */
+static double reach_at(const struct accel *a, vec3 p)
+{
+	if (a->detail == 0)
+		return a->reach;
+	return 0x1p-21 * (norm_max(p) + MIXED * a->detail) + 0x1p-50 * a->size;
+}
+
+/* A ray in float from o + t0 d on is off by parts of its distance from the origin, which is too much for what it meets far nearer
+ * to it: there another begins. In units of d. */
+static double part_end(const struct accel *a, vec3 o, vec3 d, double t0, double t_max)
+{
+	if (a->detail == 0)
+		return t_max;
+	vec3 p = vec3_madd(o, t0, d);
+	double from2 = vec3_dot(p, p), d2 = vec3_dot(d, d), to_nearest = -vec3_dot(p, d) / d2;
+	double next2 = from2 * 0x1p-8, left2 = next2 - (from2 - to_nearest * to_nearest * d2);
+	if (from2 <= 0x1p16 * a->detail * a->detail || to_nearest <= 0 || left2 <= 0)
+		return t_max;
+	return fmin(t0 + to_nearest - sqrt(left2 / d2), t_max);
+}
+
 /* To the side that d leaves for. */
 static vec3 lifted(const struct accel *a, vec3 p, vec3 ng, vec3 d)
 {
-	return vec3_madd(p, copysign(a->reach, vec3_dot(ng, d)), ng);
+	return vec3_madd(p, copysign(reach_at(a, p), vec3_dot(ng, d)), ng);
 }
 
 /* Embree ends the program on rays beyond about 1.8e18 (FLT_LARGE). A number that is none fails, too. */
@@ -368,11 +366,23 @@ static void check_ray(const struct RTCRay *r)
 		fptrap_fault();
 }
 
-/* Embree's ray runs beside the true one and begins before it, by as much as floats may be off: beside, so that a low ray does
- * not slip out along the edge of the triangle that it leaves and that is filtered; before, and beyond the end, so that
- * nothing near them is lost. What it does not meet in double between the ends is turned down by the callbacks. */
-static void fill_ray(struct RTCRay *ray, const struct query *q, vec3 o, vec3 d, double t_max)
+static struct query query_of(const struct accel *a, vec3 o, vec3 d)
 {
+	return (struct query){.o = o, .d = d, .from = PRIM_NONE, .to = PRIM_NONE,
+			      .wide_from = a->detail == 0 ? INFINITY : MIXED * a->detail};
+}
+
+/* Embree's ray for the part from t0 to t1 runs from o along d, beside the true one, and begins before it, by as much as floats
+ * may be off: beside, so that a low ray does not slip out along the edge of the triangle that it leaves and that is filtered;
+ * before, and beyond the end, so that nothing near them is lost. What it does not meet in double between the ends is turned
+ * down by the callbacks. */
+static void fill_ray(const struct accel *a, struct RTCRay *ray, struct query *q, double t_min, vec3 o, vec3 d, double t0, double t1)
+{
+	q->reach = reach_at(a, vec3_madd(q->o, t0, q->d));
+	/* A segment that is shorter leaves Embree's floats no ray. */
+	q->before = q->segment ? q->reach / fmax(vec3_length(q->d), q->reach * 0x1p-20) : q->reach;
+	q->back = q->before - t0;
+	q->t_min = t0 > 0 ? fmax(t_min, -q->back) : t_min;
 	o = vec3_madd(o, -q->back, d);
 	*ray = (struct RTCRay){.org_x = (float)o.x,
 			       .org_y = (float)o.y,
@@ -381,9 +391,25 @@ static void fill_ray(struct RTCRay *ray, const struct query *q, vec3 o, vec3 d, 
 			       .dir_x = (float)d.x,
 			       .dir_y = (float)d.y,
 			       .dir_z = (float)d.z,
-			       .tfar = (float)fmin(t_max + 2 * q->back, (double)FLT_MAX),
+			       .tfar = (float)fmin(t1 + 2 * q->before - t0, (double)FLT_MAX),
 			       .mask = 0xFFFFFFFFu};
 	check_ray(ray);
+}
+
+static bool closest(const struct accel *a, struct query *q, struct RTCRayHit *rh, vec3 o, double t_min, double t_max)
+{
+	double t0 = 0, t1 = 0;
+	do {
+		t0 = t1;
+		t1 = part_end(a, q->o, q->d, t0, t_max);
+		fill_ray(a, &rh->ray, q, t_min, o, q->d, t0, t1);
+		rh->hit.geomID = rh->hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+		unsigned trap = fptrap_leave();
+		EMBREE_INIT_CONTEXT(&q->context);
+		embree_intersect(a->scene, &q->context, rh);
+		fptrap_return(trap);
+	} while (t1 < t_max && rh->hit.geomID == RTC_INVALID_GEOMETRY_ID);
+	return rh->hit.geomID != RTC_INVALID_GEOMETRY_ID;
 }
 
 bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max, struct ray_hit *hit)
@@ -391,16 +417,10 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	double enter = entry_distance(a, from->p, d);
 	if (enter >= t_max)
 		return false;
-	struct query q = {.o = vec3_madd(from->p, enter, d), .d = d, .t_min = fmax(t_min - enter, 0), .reach = a->reach,
-			  .back = a->reach, .from = from->prim, .to = PRIM_NONE};
+	struct query q = query_of(a, vec3_madd(from->p, enter, d), d);
+	q.from = from->prim;
 	struct RTCRayHit rh;
-	fill_ray(&rh.ray, &q, lifted(a, q.o, from->ng, d), d, t_max - enter);
-	rh.hit.geomID = rh.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-	unsigned trap = fptrap_leave();
-	EMBREE_INIT_CONTEXT(&q.context);
-	embree_intersect(a->scene, &q.context, &rh);
-	fptrap_return(trap);
-	if (rh.hit.geomID == RTC_INVALID_GEOMETRY_ID)
+	if (!closest(a, &q, &rh, lifted(a, q.o, from->ng, d), fmax(t_min - enter, 0), t_max - enter))
 		return false;
 	double t = enter + fmax((double)rh.ray.tfar - q.back, 0);
 	*hit = (struct ray_hit){{rh.hit.geomID, rh.hit.primID}, t, (double)rh.hit.u, (double)rh.hit.v};
@@ -409,33 +429,48 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 
 static bool occluded(const struct accel *a, struct query *q, vec3 o, vec3 d, double t_max)
 {
-	struct RTCRay ray;
-	fill_ray(&ray, q, o, d, t_max);
-	unsigned trap = fptrap_leave();
-	EMBREE_INIT_CONTEXT(&q->context);
-	embree_occluded(a->scene, &q->context, &ray);
-	fptrap_return(trap);
-	return ray.tfar < 0;
+	bool met = false;
+	double t0 = 0, t1 = 0;
+	do {
+		struct RTCRay ray;
+		t0 = t1;
+		t1 = part_end(a, q->o, q->d, t0, t_max);
+		fill_ray(a, &ray, q, 0, o, d, t0, t1);
+		unsigned trap = fptrap_leave();
+		EMBREE_INIT_CONTEXT(&q->context);
+		embree_occluded(a->scene, &q->context, &ray);
+		fptrap_return(trap);
+		met = ray.tfar < 0;
+	} while (t1 < t_max && !met);
+	return met;
 }
 
 bool accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to)
 {
+	/* Floats are the better the nearer to the origin a ray begins. */
+	if (a->detail > 0 && norm_max(to->p) < norm_max(from->p)) {
+		const struct ray_end *other = from;
+		from = to;
+		to = other;
+	}
 	vec3 d = vec3_sub(to->p, from->p);
 	double enter = entry_distance(a, from->p, d);
 	if (enter >= 1)
 		return false;
-	struct query q = {.o = vec3_madd(from->p, enter, d), .d = vec3_scale(1 - enter, d), .end = to->p, .segment = true,
-			  .reach = a->reach, .from = from->prim, .to = to->prim};
-	double length = vec3_length(q.d);
-	if (!(length > 0))
+	struct query q = query_of(a, vec3_madd(from->p, enter, d), vec3_scale(1 - enter, d));
+	q.from = from->prim;
+	q.to = to->prim;
+	q.end = to->p;
+	q.segment = true;
+	if (!(vec3_length(q.d) > 0))
 		return false;
-	q.back = a->reach / fmax(length, a->reach * 0x1p-20); /* a segment that is shorter leaves Embree's floats no ray */
 	vec3 o = lifted(a, q.o, from->ng, d), end = lifted(a, to->p, to->ng, vec3_neg(d));
 	return occluded(a, &q, o, vec3_sub(end, o), 1);
 }
 
 bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d)
 {
-	struct query q = {.o = from->p, .d = d, .reach = a->reach, .back = a->reach, .from = from->prim, .to = PRIM_NONE};
+	struct query q = query_of(a, from->p, d);
+	q.from = from->prim;
 	return occluded(a, &q, lifted(a, from->p, from->ng, d), d, INFINITY);
 }

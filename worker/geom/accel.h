@@ -8,6 +8,10 @@
  * ends: a coplanar neighbour is not, however low the ray. So the ray that Embree gets in float may run off the true one by
  * what rounding can do in a scene of that extent, never by an absolute length.
  *
+ * In a scene whose smallest shape is less than 2^-11 of it that would be too much. There a ray runs off by what rounding does
+ * where it is: floats are the finer the nearer to the origin (worker/world/origin.h puts what is small there), a ray that comes
+ * from far is cut into parts that each begin nearer, and triangles that are large beside the smallest shape are solved in double.
+ *
  * Embree runs in robust mode with one build thread. It raises INVALID on ordinary rays: what it raises is wiped away.
  * Immutable after creation: any thread. Lengths: the rescaled world, whose radius is about 1.
  */

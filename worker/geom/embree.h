@@ -1,4 +1,4 @@
-/* Embree 3 and 4 under one spelling. Only accel.c includes this. */
+/* Embree 3 and 4 under one spelling. Only accel.c and solved.c see this. */
 #ifndef WORKER_GEOM_EMBREE_H
 #define WORKER_GEOM_EMBREE_H
 

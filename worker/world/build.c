@@ -4,6 +4,7 @@
 #include "common/base/tick.h"
 #include "worker/shape/shape.h"
 #include "worker/world/displacement.h"
+#include "worker/world/origin.h"
 #include "worker/world/reach.h"
 
 #include <string.h>
@@ -18,7 +19,7 @@ struct builder {
 	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
 	struct effects_choice forced;
 	struct emitter_surface *surfaces;
-	vec3 low, high;
+	struct box all, *boxes; /* boxes: one a shape */
 	struct error *e;
 };
 
@@ -27,22 +28,16 @@ static int out_of_memory(struct error *e)
 	return error_set(e, ENOMEM, "out of memory while building the scene");
 }
 
-static void grow_box(struct builder *b, vec3 p)
+static struct box box_of(const struct shape_geometry *g)
 {
-	b->low = (vec3){fmin(b->low.x, p.x), fmin(b->low.y, p.y), fmin(b->low.z, p.z)};
-	b->high = (vec3){fmax(b->high.x, p.x), fmax(b->high.y, p.y), fmax(b->high.z, p.z)};
-}
-
-static void grow_box_by_shape(struct builder *b, const struct shape_geometry *g)
-{
+	struct box b = {{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 	if (g->kind == SHAPE_SPHERE) {
 		vec3 r = {g->sphere.radius, g->sphere.radius, g->sphere.radius};
-		grow_box(b, vec3_add(g->sphere.center, r));
-		grow_box(b, vec3_sub(g->sphere.center, r));
-		return;
+		return (struct box){vec3_sub(g->sphere.center, r), vec3_add(g->sphere.center, r)};
 	}
 	for (uint32_t i = 0; i < g->mesh.vertex_count; i++)
-		grow_box(b, (vec3){g->mesh.position[i][0], g->mesh.position[i][1], g->mesh.position[i][2]});
+		box_grow(&b, (vec3){g->mesh.position[i][0], g->mesh.position[i][1], g->mesh.position[i][2]});
+	return b;
 }
 
 static bool is_displaced(const struct builder *b, const struct scene_node *shape)
@@ -59,10 +54,10 @@ static int read_shapes(struct builder *b)
 		w->shape_count += s->objects[i]->cls == PLUGIN_SHAPE;
 	b->geometry = arena_alloc(&b->scratch, w->shape_count, sizeof *b->geometry);
 	b->shape_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
-	if (!b->geometry || !b->shape_nodes)
+	b->boxes = arena_alloc(&b->scratch, w->shape_count, sizeof *b->boxes);
+	if (!b->geometry || !b->shape_nodes || !b->boxes)
 		return out_of_memory(b->e);
-	b->low = (vec3){INFINITY, INFINITY, INFINITY};
-	b->high = vec3_neg(b->low);
+	b->all = (struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 	for (uint32_t i = 0, k = 0; i < s->object_count; i++) {
 		if (s->objects[i]->cls != PLUGIN_SHAPE)
 			continue;
@@ -75,20 +70,26 @@ static int read_shapes(struct builder *b)
 		if (rc)
 			return rc;
 		b->shape_nodes[k] = s->objects[i];
-		grow_box_by_shape(b, &b->geometry[k++]);
+		b->boxes[k] = box_of(&b->geometry[k]);
+		box_grow(&b->all, b->boxes[k].low);
+		box_grow(&b->all, b->boxes[k++].high);
 	}
 	if (w->shape_count == 0)
-		b->low = b->high = (vec3){0, 0, 0};
+		b->all.low = b->all.high = (vec3){0, 0, 0};
 	return 0;
 }
 
 static int rescale(struct builder *b)
 {
 	struct world *w = b->w;
-	w->center = vec3_scale(0.5, vec3_add(b->low, b->high));
-	double r = 0.5 * vec3_length(vec3_sub(b->high, b->low));
-	if (!isfinite(r))
+	struct weighed *room = arena_alloc(&b->scratch, w->shape_count, sizeof *room);
+	if (!room)
+		return out_of_memory(b->e);
+	if (!isfinite(vec3_length(vec3_sub(b->all.high, b->all.low))))
 		return error_set(b->e, EINVAL, "the scene's extent is not finite");
+	w->center = origin_choose(&b->all, b->boxes, w->shape_count, room);
+	vec3 over = vec3_sub(b->all.high, w->center), under = vec3_sub(w->center, b->all.low);
+	double r = vec3_length((vec3){fmax(over.x, under.x), fmax(over.y, under.y), fmax(over.z, under.z)});
 	int exponent = 0;
 	if (r > 0)
 		frexp(r, &exponent);

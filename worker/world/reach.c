@@ -1,14 +1,12 @@
 #include "worker/world/reach.h"
 
+#include "worker/geom/triangle.h"
 #include "worker/world/displacement.h"
 
 #include <string.h>
 
 /* Shapes count as apart when this far from each other, in radii of the scene: floats are 2^-24. */
 #define MARGIN 0x1p-16
-/* A plane in floats. */
-#define FLAT 0x1p-20
-
 static vec3 vertex_of(const struct geom_shape *g, uint32_t i)
 {
 	return (vec3){(double)g->position[i][0], (double)g->position[i][1], (double)g->position[i][2]};
@@ -120,11 +118,19 @@ void reach_shapes(const struct world *w, const struct scene_node *const *nodes, 
 			shape[i] = dark ? REACH_DARK : REACH_DEPTH;
 }
 
+static bool lies_in(const struct triangle *plane, const struct geom_shape *g)
+{
+	for (uint32_t i = 0; i < g->triangle_count; i++)
+		for (int k = 0; k < 3; k++)
+			if (triangle_height(plane, vertex_of(g, g->index[i][k])) != 0)
+				return false;
+	return true;
+}
+
 uint32_t reach_depth(const struct world *w, const enum reach *shape)
 {
 	bool any = false;
-	vec3 n = {0, 0, 0};
-	double height = 0;
+	struct triangle plane;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct geom_shape *g = &w->shapes[i];
 		if (shape[i] != REACH_YES || w->bsdfs[w->parts[i].bsdf].black)
@@ -132,11 +138,9 @@ uint32_t reach_depth(const struct world *w, const enum reach *shape)
 		if (g->is_sphere)
 			return UINT32_MAX;
 		if (!any)
-			n = plane_of(g, 0, &height);
+			plane = triangle_from((const float(*)[3])g->position, g->index[0]);
 		any = true;
-		double low, high;
-		extent(g, n, &low, &high);
-		if (low < height - FLAT * w->radius || high > height + FLAT * w->radius)
+		if (!lies_in(&plane, g))
 			return UINT32_MAX;
 	}
 	return any ? 2 : 1;

@@ -1,6 +1,7 @@
 /*
  * The world that all threads share: built once from a description, immutable then. Lengths are rescaled in double by a
- * power of two so that the scene's radius lies in (1/2, 1], and moved so that its box is centred: floats begin after that.
+ * power of two so that the scene's radius lies in (1/2, 1], and moved so that its box is centred, or what is small in a scene of
+ * mixed scales (origin.h): floats begin after that.
  */
 #ifndef WORKER_WORLD_WORLD_H
 #define WORKER_WORLD_WORLD_H

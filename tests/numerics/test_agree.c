@@ -1,0 +1,76 @@
+/*
+ * Scenes that are hard on the numbers, by four integrators that reach the same light in different ways: what one of them gets wrong
+ * the others seldom do. One row each: bdpt, pssmlt and hslt against path, 2 x 2 blocks and the mean, at the level of
+ * tests/support/agree.h. The smallest bias that is found with 95 % probability stands in the row: at most 5 % of the mean for the
+ * table (HSLT_TEST_ROWS=1), 1.5 % with FULL=1, which takes 16 times the samples; a plain run, with a sixteenth, is there for
+ * what breaks altogether.
+ */
+#include "tests/numerics/rows.h"
+#include "tests/support/agree.h"
+#include "tests/support/agree_scenes.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <math.h>
+
+#include <cmocka.h>
+
+static struct rows rows;
+
+/* Samples in units of what a case names, and the least bias that has to be found. */
+static uint64_t samples(uint64_t spp)
+{
+	uint64_t n = rows_full() ? 64 * spp : getenv("HSLT_TEST_ROWS") ? 4 * spp : spp / 4;
+	return n < 32 ? 32 : n;
+}
+
+static double must_find(void)
+{
+	return rows_scale() > 1 ? INFINITY : rows_full() ? 0.015 : getenv("HSLT_TEST_ROWS") ? 0.05 : 0.25;
+}
+
+static void compare(const struct agree_case *k, const char *integrator, struct world *w, const struct agree_image *reference)
+{
+	static struct agree_image other;
+	struct agree_difference d;
+	char name[128], measured[300], bound[80];
+	struct agree_side side = {integrator, samples(k->spp), 16, 1, k->max_depth};
+	snprintf(name, sizeof name, "%s, %s", k->name, integrator);
+	agree_render(w, name, integrator, &side, &other);
+	agree_measure(&other, reference, &d);
+	snprintf(measured, sizeof measured, "differs from path by %+.2f %% +- %.2f %%; finds %.1f %% of the mean, %.1f %% of a block", 100 * d.mean,
+		 100 * d.error, 100 * d.found, 100 * d.found_block);
+	snprintf(bound, sizeof bound, "the same image; finds %.2g %% of the mean", 100 * must_find());
+	row(&rows, k->topic, name, measured, bound, d.holds && d.found <= must_find());
+}
+
+static void run(const struct agree_case *k)
+{
+	static struct agree_image reference;
+	const char *only = getenv("CASE");
+	if (only && !strstr(k->topic, only))
+		return;
+	struct world *w = k->make(k);
+	struct agree_side path = {"path", samples(k->path_spp), 16, 1, k->max_depth};
+	agree_render(w, k->name, "path", &path, &reference);
+	for (size_t i = 0; i < sizeof k->against / sizeof *k->against && k->against[i]; i++)
+		compare(k, k->against[i], w, &reference);
+	world_free(w);
+}
+
+static void test_agree(void **state)
+{
+	(void)state;
+	for (const struct agree_case *k = agree_cases; k->topic; k++)
+		run(k);
+	printf("integrators on hard scenes: %u comparisons, %u failed\n", rows.cases, rows.failed);
+	assert_int_equal(rows.failed, 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_agree)};
+	return cmocka_run_group_tests_name("integrators on hard scenes", tests, NULL, NULL);
+}

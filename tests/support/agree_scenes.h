@@ -1,0 +1,19 @@
+/* Scenes that are hard on the numbers, as tests/numerics/test_agree.c compares integrators on them. */
+#ifndef TESTS_SUPPORT_AGREE_SCENES_H
+#define TESTS_SUPPORT_AGREE_SCENES_H
+
+#include "worker/world/world.h"
+
+struct agree_case {
+	const char *topic, *name;
+	struct world *(*make)(const struct agree_case *k); /* the caller frees it */
+	double a, b;             /* what make takes */
+	uint32_t max_depth;
+	uint64_t path_spp, spp;  /* of path, of the others */
+	const char *against[3];
+};
+
+/* Ends with a NULL topic. */
+extern const struct agree_case agree_cases[];
+
+#endif

@@ -1,0 +1,45 @@
+/*
+ * Primitives that Embree asks us about, solved in double: spheres, and triangles too large for floats beside what is small in a
+ * scene of mixed scales. Runs inside Embree's traversal: any thread; allocates nothing.
+ */
+#ifndef WORKER_GEOM_SOLVED_H
+#define WORKER_GEOM_SOLVED_H
+
+#include "worker/geom/accel.h"
+#include "worker/geom/embree.h"
+
+/* What a query carries into Embree's callbacks. */
+struct query {
+	embree_context context;
+	vec3 o, d, end; /* in double: what Embree proposes is judged by these; end: o + d for a segment */
+	bool segment;
+	double t_min;
+	double reach;  /* how far Embree's floats can be off along this ray */
+	double before; /* the same in units of d */
+	double back;   /* Embree's ray begins that much before o, in units of d; below 0: after it */
+	double wide_from; /* extent from which on triangles are solved in double; INFINITY: none is */
+	struct prim_ref from, to;
+};
+
+struct sphere_prim {
+	vec3 center;
+	double radius;
+	uint32_t shape;
+};
+
+/* The triangles of a shape that are solved in double, in scenes of mixed scales. */
+struct wide_prims {
+	const struct accel_shape *shape;
+	uint32_t id, count;
+	uint32_t *prim;
+};
+
+/* The plane of a triangle is crossed after the start, and before the end of a segment. A ray that starts in the plane, on a
+ * coplanar neighbour, does not cross it again. */
+bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim);
+
+/* What a user geometry is made of; both outlive it. */
+void solved_sphere(RTCGeometry g, struct sphere_prim *s);
+void solved_triangles(RTCGeometry g, struct wide_prims *w);
+
+#endif
