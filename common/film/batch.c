@@ -2,6 +2,7 @@
 
 #include "common/base/mem.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -124,6 +125,49 @@ static int check_weights(const struct batch *b, const struct plan *p, struct err
 	return 0;
 }
 
+/* Sums of the same terms in another order, rounded to float here and there. */
+#define ROUNDING (1 + 1e-6)
+
+/* Far more of anything than a sample can count: rays of a path of 128 edges joined with each other, refused contributions. */
+#define PER_SAMPLE 0x1p20
+
+static int check_absurd(const struct batch *b, const struct plan *p, uint64_t samples, struct error *e)
+{
+	const uint64_t *c = b->counters;
+	bool chains = p->kind == PLAN_CHAINS && b->key.kind == LEASE_RENDER;
+	for (int i = 0; i < BATCH_COUNTERS; i++)
+		if (c[i] >> 56 || (i != COUNT_LONGEST_STUCK && !((double)c[i] <= ((double)samples + 1) * PER_SAMPLE)))
+			return error_set(e, EBADMSG, "counter %d is %llu, more than a lease can count", i, (unsigned long long)c[i]);
+	uint64_t most = chains ? (b->key.epoch + 1) * p->epoch : 0;
+	if (c[COUNT_LONGEST_STUCK] > most)
+		return error_set(e, EBADMSG, "%llu rejections in a row after %llu mutations of a chain",
+				 (unsigned long long)c[COUNT_LONGEST_STUCK], (unsigned long long)most);
+	return 0;
+}
+
+/* n terms, none of them negative: their sum and the sum of their squares, Cauchy and Schwarz's inequality, and float's range, which
+ * no sample exceeds. Squares may have been lost below double's range. */
+static int check_sums(const struct batch *b, struct error *e)
+{
+	const double sums[] = {b->independent_sum, b->independent_square, b->beyond_sum, b->cpu_seconds};
+	for (int i = 0; i < 4; i++)
+		if (!isfinite(sums[i]) || sums[i] < 0)
+			return error_set(e, EBADMSG, "a sum over independent samples is negative or not finite");
+	double n = (double)b->counters[COUNT_INDEPENDENT], sum = b->independent_sum, square = b->independent_square;
+	if (!(sum <= n * (double)FLT_MAX * ROUNDING))
+		return error_set(e, EBADMSG, "%g independent samples add up to %g", n, sum);
+	if (!(sum * sum <= n * (square * ROUNDING + DBL_MIN)) || !(square <= sum * sum * ROUNDING + n * DBL_MIN))
+		return error_set(e, EBADMSG, "%g independent samples add up to %g and their squares to %g", n, sum, square);
+	if (b->key.kind != LEASE_BOOTSTRAP)
+		return 0;
+	double weights = 0;
+	for (uint64_t i = 0; i < b->weight_count; i++)
+		weights += (double)b->weights[i];
+	if (!(fabs(weights - sum) <= (ROUNDING - 1) * sum + n * (double)FLT_MIN))
+		return error_set(e, EBADMSG, "bootstrap weights that add up to %g where their sum is %g", weights, sum);
+	return 0;
+}
+
 static int check_counts(const struct batch *b, const struct plan *p, uint64_t live, struct error *e)
 {
 	const uint64_t *c = b->counters;
@@ -140,22 +184,15 @@ static int check_counts(const struct batch *b, const struct plan *p, uint64_t li
 				 (unsigned long long)c[b->key.kind == LEASE_BOOTSTRAP ? COUNT_INDEPENDENT : COUNT_SAMPLES],
 				 (unsigned long long)samples);
 	if (c[COUNT_SAMPLES] > samples || c[COUNT_INDEPENDENT] > samples || c[COUNT_ACCEPTED] > samples ||
-	    c[COUNT_STUCK] > b->state_count)
-		return error_set(e, EBADMSG, "more accepted, independent or stuck than there are");
-	for (int i = 0; i < BATCH_COUNTERS; i++)
-		if (c[i] >> 56)
-			return error_set(e, EBADMSG, "counter %d is %llu, more than a lease can count", i,
-					 (unsigned long long)c[i]);
-	const double sums[] = {b->independent_sum, b->independent_square, b->beyond_sum, b->cpu_seconds};
-	for (int i = 0; i < 4; i++)
-		if (!isfinite(sums[i]) || sums[i] < 0)
-			return error_set(e, EBADMSG, "a sum over independent samples is negative or not finite");
-	return 0;
+	    c[COUNT_STUCK] > b->state_count || c[COUNT_STATES_LOST] > b->state_count)
+		return error_set(e, EBADMSG, "more accepted, independent, stuck or lost than there are");
+	int rc = check_absurd(b, p, samples, e);
+	return rc ? rc : check_sums(b, e);
 }
 
 static int check_strategies(const struct batch *b, const struct plan *p, struct error *e)
 {
-	uint64_t proposed = 0;
+	uint64_t proposed = 0, accepted = 0;
 	bool has = b->key.kind == LEASE_RENDER;
 	int expected = has ? plan_strategy_count(p->mutations) : 0;
 	if (b->strategy_count != 0 && (int64_t)b->strategy_count != expected)
@@ -166,16 +203,23 @@ static int check_strategies(const struct batch *b, const struct plan *p, struct 
 			if (c[k] >> 56 || ((k == STRATEGY_ACCEPTED || k >= STRATEGY_FAIL_FIRST) && c[k] > c[STRATEGY_PROPOSED]))
 				return error_set(e, EBADMSG, "counter %d of strategy %u is %llu of %llu proposals", k, i,
 						 (unsigned long long)c[k], (unsigned long long)c[STRATEGY_PROPOSED]);
+		uint64_t ended = c[STRATEGY_ACCEPTED];
+		for (int k = STRATEGY_FAIL_FIRST; k < STRATEGY_COUNTERS; k++)
+			ended += c[k];
+		if (ended > c[STRATEGY_PROPOSED])
+			return error_set(e, EBADMSG, "%llu proposals of strategy %u were accepted or failed, of %llu",
+					 (unsigned long long)ended, i, (unsigned long long)c[STRATEGY_PROPOSED]);
 		proposed += c[STRATEGY_PROPOSED];
+		accepted += c[STRATEGY_ACCEPTED];
 	}
+	if (accepted > b->counters[COUNT_ACCEPTED])
+		return error_set(e, EBADMSG, "%llu accepted proposals in %llu accepted mutations", (unsigned long long)accepted,
+				 (unsigned long long)b->counters[COUNT_ACCEPTED]);
 	if (proposed > b->counters[COUNT_SAMPLES])
 		return error_set(e, EBADMSG, "%llu proposals in %llu mutations", (unsigned long long)proposed,
 				 (unsigned long long)b->counters[COUNT_SAMPLES]);
 	return 0;
 }
-
-/* Sums of the same terms in another order, rounded to float here and there. */
-#define ROUNDING (1 + 1e-6)
 
 static int check_classes(const struct batch *b, const struct plan *p, struct error *e)
 {

@@ -115,7 +115,8 @@ void batch_fini(struct batch *b);
 /* All that can be checked without the scene: key inside the plan, tiles inside the crop, aligned, once, in order, values
  * finite, counts as the plan says (COUNT_SAMPLES of a render lease and COUNT_INDEPENDENT of a bootstrap lease exactly),
  * states bounded, weights >= 0, strategies as many as the plan's and none with more proposals than samples, no class and no
- * sequence with more time than its mutations, no tile with a second moment above the first. -EBADMSG with a sentence. */
+ * sequence with more time than its mutations, no tile with a second moment above the first, sums that numbers which are not
+ * negative can have, counters of the order of the samples. -EBADMSG with a sentence. */
 int batch_check(const struct batch *b, const struct plan *p, struct error *e);
 
 #endif

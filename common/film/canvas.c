@@ -213,6 +213,25 @@ static float largest(const struct tile *t)
 	return value;
 }
 
+/* The largest value of a filter's kernel, by far: settings bound its radius from below. */
+#define KERNEL_MOST 0x1p14
+
+int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e)
+{
+	bool chains = c->plan.kind == PLAN_CHAINS;
+	double limit = (double)(SUM_MOST / 8) * c->quantum;
+	if (chains)
+		limit = fmin(limit, KERNEL_MOST * (double)b->counters[COUNT_SAMPLES]);
+	for (uint32_t i = 0; i < b->tile_count; i++) {
+		const struct tile *t = &b->tiles[i];
+		double most = (double)largest(t);
+		if (!(most <= limit))
+			return error_set(e, chains ? EBADMSG : ERANGE, "a pixel of %g in the tile at %u,%u, and at most %g fit into one lease",
+					 most, t->x, t->y, limit);
+	}
+	return 0;
+}
+
 /* Adds a row, with the scale's sign. Loops without exits, each doing one thing: the compiler makes vectors of them. */
 static void add_row(int64_t *s, const float *v, size_t count, double scale, bool small)
 {

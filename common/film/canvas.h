@@ -34,6 +34,9 @@ bool canvas_is_mapped(const struct canvas *c); /* to a file */
 /* Bootstrap batches add only their independent sums. Counters and sums of render batches are those of their round.
  * -EEXIST: merged already; -EAGAIN: round not open; -ERANGE: a sum left the grid (an error of the job). */
 int canvas_add(struct canvas *c, const struct batch *b, struct error *e);
+/* Before anything is done with a render batch: no pixel of it takes an eighth of the film's range. -EBADMSG: of chains, which cannot
+ * be so long in one pixel; -ERANGE: of samples, which may be as bright as they like, but not here. */
+int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e);
 /* The plan ends after so many rounds now, not fewer than are open. */
 void canvas_set_rounds(struct canvas *c, uint64_t rounds);
 /* Room on the disk for the tiles of a render batch, so that adding it does not fail for want of it. -ENOSPC and what else a disk

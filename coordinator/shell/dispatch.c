@@ -132,6 +132,7 @@ static void merge(struct server *s, const struct action *a)
 		log_event(LOG_STOP, "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
 		_exit(1);
 	}
+	o->overflowed = o->overflowed || rc == -ERANGE;
 	if (rc)
 		server_job_broken(s, a->job, e.text);
 	trust_merged(o, a);
@@ -152,9 +153,9 @@ static void acknowledge(struct server *s, const struct action *a)
 		log_event(a->ack == ACK_REPEAT	 ? LOG_BATCH_REPEATED
 			  : a->ack == ACK_NOTED ? LOG_BATCH_NOTED
 						: LOG_BATCH_REFUSED,
-			  "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu text=%s", number(a->job),
-			  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch),
-			  log_quote(a->text).text);
+			  "job=j%llu peer=%llu worker=%s kind=%d group=%u part=%u epoch=%llu text=%s", number(a->job),
+			  number(a->peer), log_quote(p ? p->name : "?").text, (int)a->key.kind, a->key.group, a->key.part,
+			  number(a->key.epoch), log_quote(a->text).text);
 }
 
 /* ---- leases and peers ---- */

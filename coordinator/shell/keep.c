@@ -49,7 +49,7 @@ bool keep_order(struct server *s, const struct order *o)
 {
 	struct error e;
 	if (!s->config.keep_bytes || !o->canvas || o->lit.black || canvas_rounds(o->canvas) == 0 ||
-	    strcmp(o->record.state, job_state_name(JOB_DONE)) != 0)
+	    (strcmp(o->record.state, job_state_name(JOB_DONE)) != 0 && !o->overflowed))
 		return false;
 	if (write_order(s, o, &e) == 0)
 		return true;

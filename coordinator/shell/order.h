@@ -75,6 +75,7 @@ struct order {
 	bool unpublished;        /* it has ended, but its image could not be written yet */
 	uint64_t unpublished_rounds;
 	bool unrecorded;         /* ... but its record could not */
+	bool overflowed;         /* a sum of its batches left the films' range: they are kept as they are */
 	bool busy, ended;
 	struct publishing publishing; /* while busy */
 	bool black; /* as the image that was published, or the bootstrap */

@@ -15,6 +15,16 @@ static void refuse(struct server *s, uint64_t peer, const struct lease_key *k, c
 	server_step(s, &ev);
 }
 
+static void fail(struct server *s, struct order *o, uint64_t peer, const struct lease_key *k, const char *why)
+{
+	struct session *p = session_find(s, peer);
+	struct event ev = {.kind = EVENT_LEASE_FAILED, .peer = peer, .job = k->job, .text = why, .lease = {.key = *k}};
+	order_log(o, LOG_LEASE_FAILED, "worker=%s own=0 text=%s", log_quote(p ? p->name : "?").text, log_quote(why).text);
+	if (p)
+		session_send_ack(p, k, ACK_REFUSED, why);
+	server_step(s, &ev);
+}
+
 static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_BATCH, .peer = peer, .lease = {.valid = true}};
@@ -31,6 +41,13 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	int rc = o ? batch_unpack(&batch, &o->plan, m, payload->bytes, payload->size, &e) : 0;
 	if (o && !rc && farm_verifies(s->farm, &ev.lease.key))
 		rc = digest_batch(&batch, &ev.lease.digest, &e);
+	if (o && !rc && o->canvas && batch.key.kind == LEASE_RENDER)
+		rc = canvas_admits(o->canvas, &batch, &e);
+	if (rc == -ERANGE) { /* perhaps any worker's would be like that: as one that could not be computed */
+		fail(s, o, peer, &ev.lease.key, e.text);
+		batch_fini(&batch);
+		return;
+	}
 	ev.lease.valid = rc == 0;
 	ev.text = e.text;
 	s->batch = &batch;

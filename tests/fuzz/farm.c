@@ -312,7 +312,7 @@ struct batch farm_batch(const struct lease_key *k, const struct plan *plan)
 	} else if (k->job != FARM_DONE) {
 		for (uint64_t i = 0; i < b.weight_count; i++)
 			b.weights[i] = 1;
-		b.independent_sum = (double)b.weight_count;
+		b.independent_sum = b.independent_square = (double)b.weight_count;
 	}
 	return b;
 }

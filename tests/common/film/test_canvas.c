@@ -476,11 +476,42 @@ static void a_folder_that_is_not_there_is_an_error(void **unused)
 	assert_non_null(strstr(e.text, "/nonexistent/folder"));
 }
 
+/* Of a lease of chains no pixel holds more than its mutations; of samples no pixel takes an eighth of the range. */
+static void a_pixel_of_one_lease_is_bounded(void **unused)
+{
+	(void)unused;
+	const enum plan_kind kinds[] = {PLAN_CHAINS, PLAN_SAMPLES};
+	for (int i = 0; i < 2; i++) {
+		bool chains = kinds[i] == PLAN_CHAINS;
+		struct plan p = {.kind = kinds[i], .integrator = "hslt", .width = 64, .height = 64, .crop_width = 64, .crop_height = 64,
+				 .groups = 1, .parts = 1, .chains = chains ? 1 : 0, .bootstrap = 8, .epoch = 10, .rounds = 1000, .max_depth = 8};
+		struct canvas *c;
+		struct error e;
+		float *xyz = mem_alloc(64 * 64 * TILE_CHANNELS, sizeof *xyz);
+		struct tile tile = {0, 0, 64, 64, xyz};
+		struct batch b = {.key = {1, LEASE_RENDER, 0, 0, 0}, .tile_count = 1, .tiles = &tile, .counters = {[COUNT_SAMPLES] = 10}};
+		assert_int_equal(canvas_new(&c, &p, -30, NULL, NULL), 0);
+		float most = chains ? 0x1p14f * 10 : 0x1p29f; /* quantum 2^-30, sums below 2^62 of them */
+		xyz[77] = most;
+		assert_int_equal(canvas_admits(c, &b, &e), 0);
+		xyz[77] = -most;
+		assert_int_equal(canvas_admits(c, &b, &e), 0);
+		xyz[77] = nextafterf(most, INFINITY);
+		assert_int_equal(canvas_admits(c, &b, &e), chains ? -EBADMSG : -ERANGE);
+		assert_non_null(strstr(e.text, "tile at 0,0"));
+		xyz[77] = -3e38f;
+		assert_int_equal(canvas_admits(c, &b, &e), chains ? -EBADMSG : -ERANGE);
+		canvas_free(c);
+		mem_free(xyz);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(bits_do_not_depend_on_the_order),
 		cmocka_unit_test(a_sum_beyond_the_grid_adds_nothing),
+		cmocka_unit_test(a_pixel_of_one_lease_is_bounded),
 		cmocka_unit_test(only_complete_rounds_are_published),
 		cmocka_unit_test(chains_are_scaled_by_b),
 		cmocka_unit_test(grids_fit_their_values),

@@ -38,6 +38,7 @@ static struct batch make_batch(const struct plan *p, uint64_t epoch, uint32_t le
 	b.counters[COUNT_SAMPLES] = b.state_count * p->epoch;
 	b.counters[COUNT_INDEPENDENT] = 1;
 	b.independent_sum = 2;
+	b.independent_square = 4;
 	b.moment_count = batch_moment_count(p, LEASE_RENDER);
 	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
 	return b;

@@ -5,6 +5,7 @@
 #include "common/film/header.h"
 #include "common/film/strategy_json.h"
 
+#include <math.h>
 #include <setjmp.h>
 #include <stdarg.h>
 #include <stddef.h>
@@ -35,8 +36,9 @@ static struct batch make_batch(uint64_t epoch, uint32_t group, uint32_t part)
 	b.moment_count = batch_moment_count(&p, LEASE_RENDER);
 	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
 	b.counters[COUNT_SAMPLES] = 1000;
+	b.counters[COUNT_ACCEPTED] = 480;
 	b.counters[COUNT_STUCK] = group == 1;
-	b.counters[COUNT_LONGEST_STUCK] = 5210 + group;
+	b.counters[COUNT_LONGEST_STUCK] = 910 + group;
 	b.strategy[0][STRATEGY_PROPOSED] = 100;
 	b.strategy[0][STRATEGY_ACCEPTED] = 7;
 	b.strategy[0][STRATEGY_FAIL_DARK] = 91;
@@ -74,14 +76,14 @@ static void sums_are_of_each_batch_once(void **state)
 	assert_true(n.strategy[1][STRATEGY_RAYS] == UINT64_C(1) << 52);
 	assert_int_equal(n.strategy[2][STRATEGY_PROPOSED], 0);
 	assert_int_equal(n.counters[COUNT_STUCK], 2);
-	assert_int_equal(n.counters[COUNT_LONGEST_STUCK], 5211);
+	assert_int_equal(n.counters[COUNT_LONGEST_STUCK], 911);
 	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 	assert_memory_equal(&img.counts, &n, sizeof n);
 	canvas_image_fini(&img);
 	canvas_counts(c, true, &n);
 	assert_int_equal(n.strategy[0][STRATEGY_FAIL_DARK], 7 * 91);
 	assert_int_equal(n.strategy[1][STRATEGY_ACCEPTED], 7 * 450 + 22 + 11);
-	assert_int_equal(n.counters[COUNT_LONGEST_STUCK], 5211);
+	assert_int_equal(n.counters[COUNT_LONGEST_STUCK], 911);
 	canvas_free(c);
 }
 
@@ -120,6 +122,53 @@ static void a_batch_counts_within_bounds(void **state)
 	b = make_batch(0, 0, 0);
 	b.strategy[1][STRATEGY_RAYS] = UINT64_C(1) << 56;
 	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy[0][STRATEGY_FAIL_OUTSIDE] = 3; /* with those that were accepted or failed otherwise one too many */
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.counters[COUNT_ACCEPTED] = 456;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.counters[COUNT_LONGEST_STUCK] = 1001;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(1, 0, 0);
+	b.counters[COUNT_LONGEST_STUCK] = 1001;
+	expect(&p, &b, 0);
+	b = make_batch(0, 0, 0);
+	b.counters[COUNT_STATES_LOST] = 2;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.counters[COUNT_RAYS_SHADOW] = UINT64_C(1) << 40;
+	expect(&p, &b, -EBADMSG);
+}
+
+/* n samples with this sum and this sum of squares. */
+static void expect_sums(uint64_t n, double sum, double square, int rc)
+{
+	struct plan p = make_plan();
+	struct batch b = make_batch(0, 0, 0);
+	b.counters[COUNT_INDEPENDENT] = n;
+	b.independent_sum = sum;
+	b.independent_square = square;
+	expect(&p, &b, rc);
+}
+
+static void sums_are_of_samples_that_can_be(void **state)
+{
+	(void)state;
+	expect_sums(0, 0, 0, 0);
+	expect_sums(0, 1, 1, -EBADMSG);
+	expect_sums(4, 8, 16, 0);  /* all alike */
+	expect_sums(4, 8, 64, 0);  /* one has it all */
+	expect_sums(4, 8, 15.9, -EBADMSG); /* Cauchy and Schwarz */
+	expect_sums(4, 8, 64.1, -EBADMSG);
+	expect_sums(4, 8, 0, -EBADMSG);
+	expect_sums(4, 1e-200, 0, 0); /* the squares are below what there is */
+	expect_sums(1, 1.7e308, 1.7e308, -EBADMSG);
+	expect_sums(1, 1e100, 1e200, -EBADMSG); /* no float is as large */
+	expect_sums(4, -8, 64, -EBADMSG);
+	expect_sums(4, (double)INFINITY, (double)INFINITY, -EBADMSG);
+	expect_sums(4, (double)NAN, 1, -EBADMSG);
 }
 
 static void tables_are_readable(void **state)
@@ -153,7 +202,7 @@ static void tables_are_readable(void **state)
 	strategy_note(&p, &n, true, text, sizeof text);
 	assert_string_equal(text, "the image is black: no sample found light; 2,000 contributions were not numbers, infinite or negative, "
 				  "and left out; 1 of 8 times a chain accepted nothing during a whole epoch (4 chains); longest run: "
-				  "5,211 rejections");
+				  "911 rejections");
 	strategy_table(p.mutations, &n, small, sizeof small); /* cut, and ended */
 	assert_int_equal(strlen(small), sizeof small - 1);
 	strategy_lines(p.mutations, &n, text, sizeof text);
@@ -221,7 +270,7 @@ static void headers_say_it(void **state)
 	assert_non_null(strstr(attribute(&h, "hslt:options"), "--mutations independent=0.1,hslt=0.9 "));
 	assert_non_null(strstr(attribute(&h, "hslt:strategies"), "hslt: proposed 900 accepted 460 "));
 	assert_string_equal(attribute(&h, "hslt:stuck"), "1");
-	assert_string_equal(attribute(&h, "hslt:longestStuck"), "5211");
+	assert_string_equal(attribute(&h, "hslt:longestStuck"), "911");
 	assert_non_null(strstr(attribute(&h, "hslt:note"), "1 of 1 times a chain accepted nothing"));
 	img.counts.counters[COUNT_STATES_LOST] = 3;
 	header_fill(&h, &img, &p, &x);
@@ -251,6 +300,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(sums_are_of_each_batch_once),
 		cmocka_unit_test(a_batch_counts_within_bounds),
+		cmocka_unit_test(sums_are_of_samples_that_can_be),
 		cmocka_unit_test(tables_are_readable),
 		cmocka_unit_test(json_comes_back),
 		cmocka_unit_test(headers_say_it),

@@ -50,7 +50,7 @@ static void fill_tile(struct tile *t, uint32_t x, uint32_t y, uint32_t width, ui
 /* The second and the last tile of the crop, states of several sizes, one of them dead. */
 static struct batch chain_batch(const struct plan *p)
 {
-	struct batch b = {.key = {7, LEASE_RENDER, 3, 0, 2}, .independent_sum = 1.0 / 3, .independent_square = 1e-300,
+	struct batch b = {.key = {7, LEASE_RENDER, 3, 0, 2}, .independent_sum = 1.0 / 3, .independent_square = 0.05,
 			  .beyond_sum = 0, .cpu_seconds = 0.25};
 	uint32_t chains = p->chains / (p->groups * p->parts);
 	b.counters[COUNT_SAMPLES] = chains * p->epoch;
@@ -58,9 +58,13 @@ static struct batch chain_batch(const struct plan *p)
 	b.counters[COUNT_LONGEST_STUCK] = 77;
 	b.strategy_count = 2;
 	for (uint64_t i = 0; i < STRATEGY_COUNTERS; i++) {
-		b.strategy[0][i] = 30 - i;
-		b.strategy[1][i] = i < STRATEGY_FAIL_FIRST && i > STRATEGY_ACCEPTED ? UINT64_C(1) << (50 + i) : 40 - i;
+		bool fails = i >= STRATEGY_FAIL_FIRST;
+		b.strategy[0][i] = fails ? 1 : 30 - i;
+		b.strategy[1][i] = fails ? 2 : i > STRATEGY_ACCEPTED ? UINT64_C(1) << (50 + i) : 40 - i;
 	}
+	b.strategy[0][STRATEGY_ACCEPTED] = 5;
+	b.strategy[1][STRATEGY_ACCEPTED] = 6;
+	b.counters[COUNT_ACCEPTED] = 12;
 	b.tile_count = 2;
 	b.tiles = mem_alloc(2, sizeof *b.tiles);
 	fill_tile(&b.tiles[0], 10 + 64, 20, 36, 64);
@@ -266,7 +270,7 @@ static void weights_travel(void **state)
 	(void)state;
 	struct plan p = chain_plan();
 	struct plan_range range = plan_bootstrap_range(&p, 1, 0);
-	struct batch b = {.key = {7, LEASE_BOOTSTRAP, 1, 0, 0}, .independent_sum = 3, .classes = {1, 0, 2}}, back;
+	struct batch b = {.key = {7, LEASE_BOOTSTRAP, 1, 0, 0}, .classes = {0.25, 0, 0.5}}, back;
 	struct envelope env;
 	struct frame_reader r;
 	struct error e;
@@ -275,6 +279,10 @@ static void weights_travel(void **state)
 	b.weights = mem_alloc(b.weight_count, sizeof *b.weights);
 	for (uint64_t i = 0; i < b.weight_count; i++)
 		b.weights[i] = 1.0f / (float)(i + 1);
+	for (uint64_t i = 0; i < b.weight_count; i++) {
+		b.independent_sum += (double)b.weights[i];
+		b.independent_square += (double)b.weights[i] * (double)b.weights[i];
+	}
 	travel(&b, &p, &env, &r);
 	int rc = batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e);
 	if (rc)
@@ -284,6 +292,9 @@ static void weights_travel(void **state)
 	assert_memory_equal(back.weights, b.weights, b.weight_count * sizeof *b.weights);
 	assert_memory_equal(back.classes, b.classes, sizeof b.classes);
 	batch_fini(&back);
+	env.message->lease_result->independent_sum *= 1.001; /* not that of the weights */
+	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	env.message->lease_result->independent_sum = b.independent_sum;
 	env.message->lease_result->weight_count = UINT64_MAX / 4 + 2; /* times 4 it is small again */
 	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e), -EBADMSG);
 	envelope_fini(&env);

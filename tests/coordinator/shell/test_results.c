@@ -160,17 +160,30 @@ static struct batch counting_batch(const struct lease_key *k, const struct plan 
 	if (k->kind == LEASE_BOOTSTRAP) {
 		for (uint64_t i = 0; i < b.weight_count; i++)
 			b.weights[i] = 1;
-		b.independent_sum = (double)b.weight_count;
+		b.independent_sum = b.independent_square = (double)b.weight_count;
 		return b;
 	}
 	b.counters[COUNT_STUCK] = b.state_count;
-	b.counters[COUNT_LONGEST_STUCK] = 100 + k->group;
+	b.counters[COUNT_LONGEST_STUCK] = 1 + k->group;
 	b.strategy_count = 2;
 	b.strategy[0][STRATEGY_PROPOSED] = 3;
 	b.strategy[1][STRATEGY_PROPOSED] = b.counters[COUNT_SAMPLES] - 3;
 	b.strategy[1][STRATEGY_RAYS] = UINT64_C(1) << 40;
 	b.strategy[1][STRATEGY_FAIL_MODE] = 7 + k->part;
 	return b;
+}
+
+/* Finite, and more than all mutations of the job can bring. */
+static void send_with_huge_pixel(struct scripted *worker, struct batch *b, const struct plan *plan)
+{
+	size_t count = (size_t)plan->crop_width * plan->crop_height * TILE_CHANNELS;
+	struct tile tile = {plan->crop_x, plan->crop_y, plan->crop_width, plan->crop_height, mem_alloc(count, sizeof(float))};
+	struct batch with = *b;
+	tile.xyz[count / 2] = 1e30f;
+	with.tiles = &tile;
+	with.tile_count = 1;
+	peer_send_batch(worker, &with, plan);
+	mem_free(tile.xyz);
 }
 
 static void expect_counts_in_spool(const struct plan *plan)
@@ -187,16 +200,16 @@ static void expect_counts_in_spool(const struct plan *plan)
 	uint64_t leases = plan->rounds * plan->groups * plan->parts, chains = plan->chains * plan->rounds;
 	assert_int_equal(r.leases_merged, leases);
 	assert_int_equal(r.repeats, 1);
-	assert_int_equal(r.refused, 1);
+	assert_int_equal(r.refused, 2);
 	assert_string_equal(r.mixture, "independent=0.1,hslt=0.9");
 	assert_int_equal(r.strategy[0][STRATEGY_PROPOSED], 3 * leases);
 	assert_int_equal(r.strategy[1][STRATEGY_PROPOSED], plan->rounds * plan_round_mutations(plan) - 3 * leases);
 	assert_true(r.strategy[1][STRATEGY_RAYS] == leases << 40);
 	assert_int_equal(r.strategy[1][STRATEGY_FAIL_MODE], plan->rounds * plan->groups * (7 * plan->parts + plan->parts * (plan->parts - 1) / 2));
 	assert_int_equal(r.stuck, chains);
-	assert_int_equal(r.longest_stuck, 101);
+	assert_int_equal(r.longest_stuck, 2);
 	assert_non_null(strstr(r.note, "the image is black: no sample found light; "));
-	assert_non_null(strstr(r.note, "longest run: 101 rejections"));
+	assert_non_null(strstr(r.note, "longest run: 2 rejections"));
 }
 
 static void strategies_are_counted_once(void **state)
@@ -226,6 +239,8 @@ static void strategies_are_counted_once(void **state)
 			peer_send_batch(worker, &b, &plan);
 			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
 			b.strategy[0][STRATEGY_ACCEPTED] = 0;
+			send_with_huge_pixel(worker, &b, &plan);
+			assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_REFUSED);
 		}
 		peer_send_batch(worker, &b, &plan);
 		assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
