@@ -96,7 +96,7 @@ static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s,
 	j->verified += verified;
 	if (verified)
 		verify_settle(f, j, s, &ev->lease.digest);
-	peer_succeeded(p, j->id);
+	peer_succeeded(f, p, j->id);
 	if (!j->mixed)
 		job_pin(j, p->class);
 	j->progress_floor = job_progress(j, f->now);

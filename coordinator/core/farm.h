@@ -15,7 +15,11 @@
  *  - A lease goes back to the pool when its holder leaves, is silent, fails or returns it. After 10 x the job's median
  *    lease time (at least 60 s; doubled each time for the same lease) it is handed out again, the first answer wins.
  *    A worker without other work gets a second copy of a lease of the first incomplete round that takes longer
- *    than 1.5 medians; never more than two workers are on one lease otherwise.
+ *    than 1.5 medians; never more than two workers are on one lease otherwise. While the job has no median, which is so as
+ *    long as nobody has answered, that is after 30 s (leases are made to take about 20), and of two copies that are both
+ *    out the older one is given up after 120 s for a worker that has nothing else to do.
+ *  - What a worker holds at once is bounded by what it has given: 8 leases at first, twice as many after each that is merged,
+ *    half as many (8 at least) after each that was out for too long. A node of 64 threads is busy after its first three.
  *  - Invalid content is its sender's fault; after three faults in a row the worker gets no more leases.
  *    A failed lease is tried elsewhere; its worker, whatever its connection, waits 10, 20, 40 ... 640 s before it gets more of
  *    this job; what it fails with meanwhile is the same failure.
@@ -60,6 +64,8 @@ struct farm_config {
 	double silent_after;      /* s without a word: leases taken back */
 	double forget_after;      /* s without a word: hung up */
 	double first_timeout;     /* of a lease before the job has a median */
+	double first_copy;        /* before the job has a median: a worker without other work gets a second copy then */
+	double idle_timeout;      /* and the older of two copies is given up then, doubled each time for the same lease */
 	double min_timeout;
 	double first_pause;       /* of a worker that failed with a job, doubled each time */
 };

@@ -161,9 +161,14 @@ double job_lease_timeout(const struct farm_config *c, const struct job *j, const
 	return ldexp(t, s->timeouts < TIMEOUT_DOUBLINGS ? (int)s->timeouts : TIMEOUT_DOUBLINGS);
 }
 
-double job_straggles_at(const struct job *j, const struct slot *s)
+double job_idle_timeout(const struct farm_config *c, const struct slot *s)
 {
-	return isnan(j->median) ? INFINITY : s->since + straggler_medians * j->median;
+	return ldexp(c->idle_timeout, s->timeouts < TIMEOUT_DOUBLINGS ? (int)s->timeouts : TIMEOUT_DOUBLINGS);
+}
+
+double job_straggles_at(const struct farm_config *c, const struct job *j, const struct slot *s)
+{
+	return s->since + (isnan(j->median) ? c->first_copy : straggler_medians * j->median);
 }
 
 double job_lease_mutations(const struct job *j)

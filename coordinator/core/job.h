@@ -87,8 +87,9 @@ struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part);
 struct slot *job_ready(const struct job *j); /* NULL: none */
 /* Puts the slot into the list where it belongs after its holders or its next epoch changed. */
 void job_place(struct job *j, struct slot *s);
+double job_idle_timeout(const struct farm_config *c, const struct slot *s); /* see farm_config */
 double job_lease_timeout(const struct farm_config *c, const struct job *j, const struct slot *s);
-double job_straggles_at(const struct job *j, const struct slot *s); /* INFINITY: nobody knows */
+double job_straggles_at(const struct farm_config *c, const struct job *j, const struct slot *s);
 double job_lease_mutations(const struct job *j);
 
 /* The slot's next epoch is merged. true: its round is complete now. */

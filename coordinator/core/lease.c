@@ -124,6 +124,7 @@ void lease_expire(struct farm *f, struct lease *l)
 	l->job->timeouts++;
 	l->peer->timeouts++;
 	let_go(f, l);
+	peer_was_late(f, l->peer);
 }
 
 void lease_revoke_slot(struct farm *f, struct slot *s)

@@ -151,7 +151,7 @@ void peer_drop_leases(struct farm *f, struct peer *p, bool revoke)
 
 bool peer_has_wish(const struct peer *p)
 {
-	return p->state == PEER_ACTIVE && p->held < p->want && p->held + p->delivered < p->lease_limit;
+	return p->state == PEER_ACTIVE && p->held < p->want && p->held < p->who->window && p->held + p->delivered < p->lease_limit;
 }
 
 void peer_requeue(struct farm *f, struct peer *p)
@@ -218,13 +218,28 @@ void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own)
 	a->until = f->now + ldexp(f->config.first_pause, (int)doublings);
 }
 
-void peer_succeeded(struct peer *p, uint64_t job)
+/* What it may hold grows with what it gives: who takes what he can get and gives nothing holds up little. */
+static void set_window(struct farm *f, struct peer *p, uint32_t window)
+{
+	p->who->window = window;
+	if (peer_has_wish(p) == list_is_empty(&p->waiting))
+		peer_requeue(f, p);
+}
+
+void peer_was_late(struct farm *f, struct peer *p)
+{
+	set_window(f, p, p->who->window / 2 > PEER_WINDOW ? p->who->window / 2 : PEER_WINDOW);
+}
+
+void peer_succeeded(struct farm *f, struct peer *p, uint64_t job)
 {
 	struct avoid *a = avoid_of(p, job);
 	p->merged++;
 	p->who->faults_in_row = 0;
 	if (a)
 		*a = (struct avoid){ 0 };
+	if (p->who->window < f->config.max_peer_leases)
+		set_window(f, p, 2 * p->who->window);
 }
 
 double peer_avoids_until(const struct peer *p, uint64_t job)

@@ -7,6 +7,7 @@
 #include "coordinator/core/list.h"
 #include "coordinator/core/roster.h"
 
+enum { PEER_WINDOW = 8 /* leases that a worker may hold before it has given anything */ };
 enum { PEER_NAME = IDENTITY_NAME, FINGERPRINT_SIZE = 128 };
 
 /* Workers with the same numeric fingerprint. */
@@ -53,7 +54,8 @@ bool peer_has_wish(const struct peer *p);
 
 void peer_fault(struct farm *f, struct peer *p, const char *text);
 void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own);
-void peer_succeeded(struct peer *p, uint64_t job);
+void peer_succeeded(struct farm *f, struct peer *p, uint64_t job);
+void peer_was_late(struct farm *f, struct peer *p); /* with a lease that others get now */
 double peer_avoids_until(const struct peer *p, uint64_t job); /* -INFINITY: does not */
 bool peer_lacks(const struct peer *p, uint64_t job); /* its last failure with the job was its own machine's */
 

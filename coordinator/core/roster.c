@@ -64,7 +64,7 @@ struct identity *roster_use(struct farm *f, const struct event_join *e, const ch
 			*refused = "the coordinator has no room to remember another worker";
 			return NULL;
 		}
-		*k = (struct identity){ .id = ++f->identities };
+		*k = (struct identity){ .id = ++f->identities, .window = PEER_WINDOW };
 		k->certificate_id = certificate_id(f, e->certificate, k->id);
 		text_copy(k->certificate, sizeof k->certificate, e->certificate);
 	}

@@ -28,6 +28,7 @@ struct identity {
 	uint64_t restarts; /* of the home, as they were last told */
 	uint32_t uses;     /* connections, and answers that wait for a second one */
 	uint32_t faults_in_row, wrong;
+	uint32_t window; /* leases that it may hold: see peer_widen */
 	bool aside;
 	double seen;
 	struct avoid avoid[IDENTITY_AVOIDED];

@@ -114,7 +114,7 @@ static bool hand_out_copy(struct farm *f)
 			continue;
 		for (struct link *k = j->out[0].next; k != &j->out[0]; k = k->next) {
 			struct slot *s = list_entry(k, struct slot, link);
-			double at = job_straggles_at(j, s);
+			double at = job_straggles_at(&f->config, j, s);
 			if (at > f->now) {
 				call_again(f, at);
 				break;
@@ -129,6 +129,52 @@ static bool hand_out_copy(struct farm *f)
 	return false;
 }
 
+/* NULL: fewer than two hold it, or an answer of one is here and will be looked at. */
+static struct lease *older_copy(const struct slot *s)
+{
+	struct lease *older = NULL;
+	for (struct lease *l = s->leases; l; l = l->next) {
+		if (l->delivered)
+			return NULL;
+		if (!l->overdue && (!older || l->sent < older->sent))
+			older = l;
+	}
+	return s->holders > 1 ? older : NULL;
+}
+
+/* Nobody knows how long leases of this job take, two workers hold one for long, and another has nothing to do. true: there are such. */
+static bool give_up_copies(struct farm *f, struct job *j)
+{
+	bool any = false;
+	for (uint32_t i = 0; i < j->slot_count; i++) {
+		struct slot *s = &j->slots[i];
+		struct lease *l = s->next == j->rounds ? older_copy(s) : NULL;
+		if (!l)
+			continue;
+		any = true;
+		if (job_idle_timeout(&f->config, s) + l->sent <= f->now && waiting_for(f, j, s, false)) {
+			lease_expire(f, l);
+			while (f->waiting && hand_out_copy(f))
+				;
+		}
+	}
+	return any;
+}
+
+/* A scan of all leases, a few times a minute. */
+static void look_at_copies(struct farm *f)
+{
+	enum { PERIOD = 10 };
+	bool any = false;
+	for (uint32_t i = 0; f->waiting && f->now >= f->idle_at && i < f->live_count; i++)
+		if (job_is_open(f->live[i]) && isnan(f->live[i]->median))
+			any = give_up_copies(f, f->live[i]) || any;
+	if (any)
+		f->idle_at = f->now + PERIOD;
+	if (f->waiting && f->idle_at > f->now)
+		call_again(f, f->idle_at);
+}
+
 void schedule(struct farm *f)
 {
 	f->schedule_at = INFINITY;
@@ -137,6 +183,7 @@ void schedule(struct farm *f)
 		;
 	while (f->waiting && hand_out_copy(f))
 		;
+	look_at_copies(f);
 }
 
 static void expire_leases(struct farm *f, struct peer *p, double read)

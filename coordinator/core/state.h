@@ -26,6 +26,7 @@ struct farm {
 	uint32_t waiting; /* workers with a wish */
 	uint64_t queued;  /* counts who began to wait */
 	double check_at;  /* something may be silent or overdue then, not before */
+	double idle_at;  /* copies that are out are looked at then, not before */
 	double schedule_at; /* handing out may be possible then though nothing else happens */
 	struct action *actions;
 	size_t action_count, action_limit;

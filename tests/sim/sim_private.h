@@ -7,7 +7,8 @@
 
 #include <stdbool.h>
 
-enum { WORKERS = 8, JOBS = 5, SLOTS = 12, ROUNDS = 512, QUEUE = 64, MESSAGES = 1 << 14, STEPS_MOST = 400000 };
+enum { WORKERS = 8, JOBS = 5, SLOTS = 12, ROUNDS = 512, QUEUE = 64, MESSAGES = 1 << 14, STEPS_MOST = 400000,
+       HOARD = 4096 /* threads that one claims to have */ };
 
 enum message_kind { TO_CORE, TICK, SUBMIT, LEASE, REVOKE, FINISH, BEAT, CRASH, START, CALM, RESTART, ORDER };
 
@@ -32,6 +33,7 @@ struct worker {
 	uint32_t threads, busy, queued, want;
 	double speed, frozen_until;
 	double fault_rate, failure_rate, lie_rate;
+	bool hoards; /* until it is calm */
 	const char *fingerprint;
 	struct work queue[QUEUE];
 };

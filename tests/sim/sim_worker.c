@@ -28,6 +28,8 @@ static void tell_core(struct world *w, const struct worker *k, struct event ev, 
 static void work_on(struct world *w, uint32_t index)
 {
 	struct worker *k = &w->workers[index];
+	if (k->hoards && !sim_is_calm(w))
+		return;
 	while (k->busy < k->threads && k->queued > 0) {
 		struct work work = k->queue[0];
 		k->queued--;
@@ -93,6 +95,8 @@ void sim_beat(struct world *w, const struct message *m)
 		return;
 	if (k->frozen_until <= w->now) {
 		k->want = sim_is_calm(w) || !sim_chance(w, 0.02) ? k->threads + (k->threads > 1) : 0;
+		if (k->hoards && !sim_is_calm(w))
+			k->want = HOARD;
 		tell_core(w, k, (struct event){ .kind = EVENT_REQUEST, .want = k->want }, 0);
 		if (!sim_is_calm(w) && sim_chance(w, 0.05))
 			volunteer(w, k);
@@ -114,7 +118,8 @@ void sim_start(struct world *w, uint32_t index)
 	/* Honest ones in place of those that lied, as far as the core can see. */
 	snprintf(name, sizeof name, "%s%u", sim_is_calm(w) ? "calm" : "w", index);
 	struct event ev = { .kind = EVENT_JOINED,
-			    .join = { .peer = k->peer, .name = name, .fingerprint = k->fingerprint, .threads = k->threads } };
+			    .join = { .peer = k->peer, .name = name, .fingerprint = k->fingerprint,
+				      .threads = k->hoards && !sim_is_calm(w) ? HOARD : k->threads } };
 	sim_step(w, &ev, 0);
 	sim_push(w, (struct message){ .kind = BEAT, .time = w->now + sim_uniform(w), .worker = index, .peer = k->peer });
 	if (!sim_is_calm(w))
@@ -130,6 +135,7 @@ void sim_crash(struct world *w, const struct message *m)
 		return;
 	w->result.crashes++;
 	if (sim_chance(w, 0.3)) {
+		w->result.hung++;
 		k->frozen_until = w->now + 200 * sim_uniform(w);
 		sim_push(w, (struct message){ .kind = CRASH, .time = w->now + 300 * sim_uniform(w), .worker = m->worker, .peer = k->peer });
 		return;
@@ -166,6 +172,7 @@ void sim_receive_lease(struct world *w, const struct message *m)
 	struct worker *k = &w->workers[m->worker];
 	if (k->peer != m->peer || k->queued == QUEUE)
 		return;
+	w->result.hoarded += k->hoards && !sim_is_calm(w);
 	k->queue[k->queued++] = (struct work){ m->key, m->value };
 	work_on(w, m->worker);
 }

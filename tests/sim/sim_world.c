@@ -59,6 +59,7 @@ static void make_world(struct world *w)
 		k->fingerprint = sim_chance(w, 0.2) ? "B" : "A";
 		k->failure_rate = w->failure;
 		k->fault_rate = sim_chance(w, 0.1) ? 0.5 : 0;
+		k->hoards = i >= least && sim_mix(w->seed * WORKERS + i) % 5 == 0;
 		sim_push(w, (struct message){ .kind = START, .time = i ? 300 * sim_uniform(w) * sim_uniform(w) : 0, .worker = i });
 	}
 	for (uint32_t i = 0; i < w->job_count; i++) {

@@ -1,5 +1,6 @@
 /*
- * A farm in virtual time around the real core: workers that compute, crash, freeze, come back, fail, send what is torn or wrong and volunteer; a network that
+ * A farm in virtual time around the real core: workers that compute, crash, hang, come back, fail, send what is torn or wrong, volunteer, or take what
+ * they can get and give nothing; a network that
  * drops, repeats, delays and reorders; a coordinator that dies and remembers what is merged; jobs with priorities and bounds, some cancelled, held,
  * extended while they run or when they are done. Everything follows from one seed.
  * After `calm` seconds the trouble ends and every job must end too.
@@ -20,6 +21,7 @@
 struct sim_result {
 	uint64_t steps, merged, repeats, refused, crashes, done, failed, cancelled, copies, timeouts, restarts, extended;
 	uint64_t verified, mismatched, lies, aside; /* lies: wrong results that were found out */
+	uint64_t hung, hoarded; /* times that a worker stood still; leases that went to workers that never answer */
 	double time; /* virtual seconds */
 };
 

@@ -30,6 +30,8 @@ static void add(struct sim_result *sum, const struct sim_result *r)
 	sum->mismatched += r->mismatched;
 	sum->lies += r->lies;
 	sum->aside += r->aside;
+	sum->hung += r->hung;
+	sum->hoarded += r->hoarded;
 }
 
 static void simulate(void **state)
@@ -45,15 +47,16 @@ static void simulate(void **state)
 			fail_msg("HSLT_SIM_SEED=%" PRIu64 ": %s", seed, wrong);
 		add(&sum, &r);
 	}
-	print_message("seeds %" PRIu64 " to %" PRIu64 ": %" PRIu64 " steps, %" PRIu64 " merged, %" PRIu64 " repeats, %" PRIu64 " refused, %" PRIu64 " crashes, "
+	print_message("seeds %" PRIu64 " to %" PRIu64 ": %" PRIu64 " steps, %" PRIu64 " merged, %" PRIu64 " repeats, %" PRIu64 " refused, %" PRIu64 " crashes, %" PRIu64 " of them hangs, %" PRIu64 " hoarded, "
 		      "%" PRIu64 " copies, %" PRIu64 " timeouts, %" PRIu64 " restarts, %" PRIu64 " extended, %" PRIu64 " verified, %" PRIu64 " mismatched, %" PRIu64 " lies, %" PRIu64 " set aside; jobs: %" PRIu64 " done, %" PRIu64 " failed, %" PRIu64 " cancelled\n",
-		      first, first + count - 1, sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.copies, sum.timeouts, sum.restarts, sum.extended, sum.verified, sum.mismatched, sum.lies, sum.aside, sum.done,
+		      first, first + count - 1, sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.hung, sum.hoarded, sum.copies, sum.timeouts, sum.restarts, sum.extended, sum.verified, sum.mismatched, sum.lies, sum.aside, sum.done,
 		      sum.failed, sum.cancelled);
 	/* The worlds must be wild enough to mean something. */
 	if (!one) {
 		assert_true(sum.repeats > count && sum.copies > count / 4 && sum.timeouts > count / 4);
 		assert_true(sum.restarts > count / 2 && sum.extended > count / 2);
 		assert_true(sum.verified > 5 * count && sum.lies > count / 4 && sum.aside > count / 20);
+		assert_true(sum.hung > count / 2 && sum.hoarded > count);
 		assert_true(sum.crashes > count && sum.done > count && sum.cancelled > count / 20);
 	}
 }
