@@ -1,7 +1,9 @@
 #include "common/base/log.h"
 
+#include "common/base/log_limit.h"
 #include "common/base/text.h"
 
+#include <pthread.h>
 #include <stdarg.h>
 #include <stdatomic.h>
 #include <stdio.h>
@@ -18,6 +20,12 @@ static const struct {
 	LOG_EVENTS(LOG_ROW)
 #undef LOG_ROW
 };
+
+/* What anybody who reaches the port can cause. */
+static const enum log_event limited[] = {LOG_PEER_ACCEPT, LOG_PEER_HELLO, LOG_PEER_REFUSED, LOG_PEER_CLOSED, LOG_PEER_FAULT, LOG_PEER_GARBLED};
+enum { LIMITED = sizeof limited / sizeof *limited };
+static struct log_bucket buckets[LIMITED];
+static pthread_mutex_t bucket_lock = PTHREAD_MUTEX_INITIALIZER;
 
 static const char *const levels[] = {"debug", "info", "warn", "error"};
 
@@ -59,9 +67,40 @@ size_t log_format(char *line, size_t size, enum log_event event, const char *fie
 	return (size_t)n < size ? (size_t)n : size - 1;
 }
 
+static double seconds(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static bool may_say(enum log_event event)
+{
+	bool may = true;
+	for (int i = 0; i < LIMITED && atomic_load(&least_level) > LOG_LEVEL_DEBUG; i++) {
+		if (limited[i] != event)
+			continue;
+		pthread_mutex_lock(&bucket_lock);
+		may = log_bucket_take(&buckets[i], seconds());
+		pthread_mutex_unlock(&bucket_lock);
+	}
+	return may;
+}
+
+void log_tick(void)
+{
+	for (int i = 0; i < LIMITED; i++) {
+		pthread_mutex_lock(&bucket_lock);
+		uint64_t n = log_bucket_withheld(&buckets[i], seconds());
+		pthread_mutex_unlock(&bucket_lock);
+		if (n)
+			log_event(LOG_LOG_WITHHELD, "of=%s more=%llu", events[limited[i]].name, (unsigned long long)n);
+	}
+}
+
 void log_event(enum log_event event, const char *fields, ...)
 {
-	if ((int)events[event].level < atomic_load(&least_level))
+	if ((int)events[event].level < atomic_load(&least_level) || !may_say(event))
 		return;
 	char text[LINE_MAX_BYTES], line[LINE_MAX_BYTES];
 	va_list ap;

@@ -13,6 +13,7 @@
 	X(LISTEN, "listen", INFO) \
 	X(LIMITS, "limits", INFO) \
 	X(STOP, "stop", INFO) \
+	X(LOG_WITHHELD, "log_withheld", WARN) \
 	X(ROOT, "runs_as_root", WARN) \
 	X(PEER_ACCEPT, "peer_accept", DEBUG) \
 	X(PEER_HELLO, "peer_hello", INFO) \
@@ -70,6 +71,10 @@ struct log_value {
 };
 /* "text" with quotes, and without control characters, cut to fit. */
 struct log_value log_quote(const char *text);
+
+/* Lines about connections come in rushes: of each such kind 100 at once and 5 a second are said, the others counted (log_limit.h; not
+ * with LOG_LEVEL_DEBUG, where all are said). Called now and then it says how many of which kind that were. */
+void log_tick(void);
 
 /* The line as log_event writes it, without the newline; for logs of jobs. Returns its length. */
 size_t log_format(char *line, size_t size, enum log_event event, const char *fields);

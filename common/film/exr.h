@@ -30,6 +30,8 @@ struct exr_image {
 /* bytes: mem_alloc'd, to be mem_free'd. */
 int exr_write(const struct exr_image *img, unsigned char **bytes, size_t *size, struct error *e);
 int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img, struct error *e); /* half, float, uint channels */
+/* The same; -EFBIG, before anything is decoded, when its planes would take more bytes than that. */
+int exr_read_within(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img, struct error *e);
 void exr_image_fini(struct exr_image *img);
 
 /* Tiles of a batch. exr_tile_read: display window = the full film; refuses anything but what exr_tile_write makes. */

@@ -173,7 +173,8 @@ static int64_t pixel_bytes(const exr_attr_chlist_t *list)
 	return sum;
 }
 
-static int check_header(exr_context_t x, const struct exr_stream *s, struct exr_image *img, bool *tiled, struct error *e)
+static int check_header(exr_context_t x, const struct exr_stream *s, int64_t bytes_most, struct exr_image *img, bool *tiled,
+			struct error *e)
 {
 	int parts;
 	exr_storage_t storage;
@@ -192,6 +193,10 @@ static int check_header(exr_context_t x, const struct exr_stream *s, struct exr_
 	if (width < 1 || height < 1 || width > EXR_MAX_SIDE || height > EXR_MAX_SIDE || width * height > PIXELS_MOST ||
 	    width * height * channels->num_channels > VALUES_MOST)
 		return error_set(e, EBADMSG, "the EXR file has %lldx%lld pixels", (long long)width, (long long)height);
+	if (width * height * channels->num_channels * (int64_t)sizeof(float) > bytes_most)
+		return error_set(e, EFBIG, "%lld x %lld pixels of %d channels take %lld MB decoded; at most %lld MB", (long long)width, (long long)height,
+				 channels->num_channels, (long long)(width * height * channels->num_channels * (int64_t)sizeof(float)) >> 20,
+				 (long long)bytes_most >> 20);
 	if (width * height * pixel_bytes(channels) / INFLATION_MOST > (int64_t)s->size)
 		return error_set(e, EBADMSG, "the EXR file is too short for %lldx%lld pixels", (long long)width, (long long)height);
 	img->width = (uint32_t)width;
@@ -330,7 +335,7 @@ static int read_attributes(exr_context_t x, struct exr_image *img, struct error 
 	return rc;
 }
 
-int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img, struct error *e)
+int exr_read_within(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img, struct error *e)
 {
 	exr_context_t x;
 	struct exr_stream s;
@@ -339,7 +344,7 @@ int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img, str
 	int rc = exr_open_read(&x, &s, bytes, size, e);
 	if (rc)
 		return rc;
-	rc = check_header(x, &s, img, &tiled, e);
+	rc = check_header(x, &s, bytes_most, img, &tiled, e);
 	if (rc == 0)
 		rc = read_planes(x, &s, img, tiled, e);
 	if (rc == 0)
@@ -348,4 +353,9 @@ int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img, str
 	if (rc)
 		exr_image_fini(img);
 	return rc;
+}
+
+int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img, struct error *e)
+{
+	return exr_read_within(bytes, size, INT64_MAX, img, e);
 }

@@ -1,6 +1,7 @@
 #include "common/film/image_file.h"
 
 #include "common/base/mem.h"
+#include "common/base/target.h"
 
 #include <fcntl.h>
 #include <math.h>
@@ -83,7 +84,7 @@ static int write_all(int fd, const unsigned char *bytes, size_t size)
 		bytes += n < 0 ? 0 : n;
 		size -= n < 0 ? 0 : (size_t)n;
 	}
-	return fsync(fd);
+	return 0;
 }
 
 /* So that the new name survives a crash too; a folder that cannot be opened for it is not worth failing for. */
@@ -112,10 +113,13 @@ static int open_beside(const char *path, char temporary[PATH_ROOM], struct error
 int image_file_probe(const char *path, struct error *e)
 {
 	char temporary[PATH_ROOM];
-	struct stat st;
-	if (stat(path, &st) == 0 && S_ISDIR(st.st_mode))
-		return error_set(e, EISDIR, "%s: is a folder", path);
-	int fd = open_beside(path, temporary, e);
+	struct target t;
+	int rc = target_find(&t, path, e);
+	if (rc)
+		return rc;
+	if (t.through)
+		return t.descriptor < 0 && access(t.path, W_OK) ? failed(e, path, "write there") : 0;
+	int fd = open_beside(t.path, temporary, e);
 	if (fd < 0)
 		return fd;
 	close(fd);
@@ -123,7 +127,18 @@ int image_file_probe(const char *path, struct error *e)
 	return 0;
 }
 
-int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e)
+static int write_through(const struct target *t, const char *path, const unsigned char *bytes, size_t size, struct error *e)
+{
+	int fd = target_open(t, e);
+	if (fd < 0)
+		return fd;
+	int rc = write_all(fd, bytes, size) ? failed(e, path, "write") : 0;
+	if (close(fd) && !rc)
+		rc = failed(e, path, "write");
+	return rc;
+}
+
+static int replace(const char *path, const unsigned char *bytes, size_t size, struct error *e)
 {
 	char temporary[PATH_ROOM];
 	int fd = open_beside(path, temporary, e);
@@ -131,7 +146,7 @@ int image_file_write(const char *path, const unsigned char *bytes, size_t size, 
 		return fd;
 	mode_t mask = umask(0);
 	umask(mask);
-	int rc = write_all(fd, bytes, size) != 0 || fchmod(fd, 0666 & ~mask) != 0 ? failed(e, path, "write") : 0;
+	int rc = write_all(fd, bytes, size) != 0 || fsync(fd) != 0 || fchmod(fd, 0666 & ~mask) != 0 ? failed(e, path, "write") : 0;
 	if (close(fd) != 0 && rc == 0)
 		rc = failed(e, path, "write");
 	if (rc == 0 && rename(temporary, path) != 0)
@@ -141,6 +156,15 @@ int image_file_write(const char *path, const unsigned char *bytes, size_t size, 
 	else
 		sync_folder(path);
 	return rc;
+}
+
+int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e)
+{
+	struct target t;
+	int rc = target_find(&t, path, e);
+	if (rc)
+		return rc;
+	return t.through ? write_through(&t, path, bytes, size, e) : replace(t.path, bytes, size, e);
 }
 
 int image_file_read(const char *path, unsigned char **bytes, size_t *size, struct error *e)

@@ -9,7 +9,7 @@
 int image_file_encode(const struct canvas_image *img, const struct plan *p, const struct header_extra *x,
 		      unsigned char **bytes, size_t *size, struct error *e);
 
-/* Temporary file beside it, fsync, rename, fsync of the folder. */
+/* Temporary file beside it, fsync, rename, fsync of the folder; what is no regular file is written to (common/base/target.h). */
 int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e);
 
 /* Whether image_file_write could put a file there: asked before hours are spent. Leaves nothing behind. */

@@ -1,6 +1,7 @@
 #include "common/net/client.h"
 
 #include "common/base/mem.h"
+#include "common/base/target.h"
 #include "common/base/text.h"
 
 #include <assert.h>
@@ -370,10 +371,29 @@ static int give_name(const char *temporary, const char *path, bool replace, stru
 	return 0;
 }
 
+static int fetch_through(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, const struct target *t,
+			 struct error *e)
+{
+	int fd = target_open(t, e);
+	if (fd < 0)
+		return client_local(fd);
+	int rc = fetch_rest(cl, first, job, what, fd, e);
+	if (close(fd) && !rc)
+		rc = error_set(e, EIO, "%s: %s", t->path, strerror(errno));
+	return rc;
+}
+
 static int fetch_file(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, const char *path, bool replace,
 		      struct error *e)
 {
-	char temporary[4096];
+	char temporary[TARGET_PATH + 8];
+	struct target t;
+	int found = target_find(&t, path, e);
+	if (found)
+		return found;
+	if (t.through)
+		return fetch_through(cl, first, job, what, &t, e);
+	path = t.path;
 	int n = snprintf(temporary, sizeof temporary, "%s.XXXXXX", path);
 	if (n < 0 || (size_t)n >= sizeof temporary)
 		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);

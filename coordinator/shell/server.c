@@ -358,6 +358,7 @@ static void on_read(uv_check_t *h)
 static void on_tick(uv_timer_t *t)
 {
 	struct server *s = t->data;
+	log_tick();
 	refresh_tls(s);
 	if (s->caller_waits)
 		session_accept(s);

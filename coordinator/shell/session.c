@@ -79,7 +79,7 @@ static void delist(struct server *s, struct session *p)
 /* ---- hello ---- */
 
 /* said: why it is refused, or what a peer that is not should know. */
-static void send_hello_ack(struct session *p, bool accepted, const char *said)
+static void answer_hello(struct session *p, bool accepted, bool final, const char *said)
 {
 	char text[256];
 	Farm__HelloAck ack;
@@ -88,6 +88,7 @@ static void send_hello_ack(struct session *p, bool accepted, const char *said)
 	farm__envelope__init(&m);
 	text_copy(text, sizeof text, said);
 	ack.accepted = accepted;
+	ack.final = final;
 	ack.text = text;
 	ack.version = FARM_VERSION;
 	ack.heartbeat_ms = (uint32_t)(1000 * p->server->config.heartbeat_seconds);
@@ -100,6 +101,17 @@ static void send_hello_ack(struct session *p, bool accepted, const char *said)
 		p->state = SESSION_LEAVING;
 		conn_close_when_sent(p->conn, text);
 	}
+}
+
+static void send_hello_ack(struct session *p, bool accepted, const char *said)
+{
+	answer_hello(p, accepted, false, said);
+}
+
+/* What calling again does not mend. */
+static void refuse_for_good(struct session *p, const char *said)
+{
+	answer_hello(p, false, true, said);
 }
 
 static const char *set_aside(const struct session *p, char *text, size_t size)
@@ -164,18 +176,18 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		const char *who = h->role == FARM__ROLE__ROLE_WORKER ? "worker" : "client";
 		snprintf(text, sizeof text, "the %s speaks version %u of the protocol, the coordinator version %u: the %s is older and must be renewed",
 			 who, h->version, FARM_VERSION, h->version < FARM_VERSION ? who : "coordinator");
-		send_hello_ack(p, false, text);
+		refuse_for_good(p, text);
 		return;
 	}
 	if (!envelope_text_ok(h->name, sizeof p->name - 1) || !envelope_text_ok(h->fingerprint, 255) ||
 	    !home_ok(h->home) || h->threads > 4096) {
-		send_hello_ack(p, false, "a name or a number in hello is out of bounds");
+		refuse_for_good(p, "a name or a number in hello is out of bounds");
 		return;
 	}
 	text_copy(p->name, sizeof p->name, h->name);
 	const char *no = overreach(p, h->role, text, sizeof text);
 	if (no) {
-		send_hello_ack(p, false, no);
+		refuse_for_good(p, no);
 		return;
 	}
 	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, 0});
@@ -187,7 +199,7 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		p->state = SESSION_CLIENT;
 		send_hello_ack(p, true, "");
 	} else {
-		send_hello_ack(p, false, "hello must say whether it is a worker or a client");
+		refuse_for_good(p, "hello must say whether it is a worker or a client");
 	}
 }
 

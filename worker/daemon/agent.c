@@ -2,6 +2,7 @@
 
 #include "common/base/log.h"
 #include "common/base/mem.h"
+#include "common/base/text.h"
 #include "common/net/notify.h"
 
 #include <assert.h>
@@ -14,6 +15,7 @@ enum { HEADER_LIMIT = 1 << 22, PAYLOAD_LIMIT = 1 << 28, SEND_LIMIT = 1 << 30 };
 static const double first_back_off = 0.2, longest_back_off = 10, stall_seconds = 30, linger_seconds = 5;
 
 static void connect_now(struct agent *a);
+static void go(struct agent *a);
 
 void agent_send(struct agent *a, const Farm__Envelope *m)
 {
@@ -89,6 +91,8 @@ static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
 {
 	if (!ack->accepted) {
 		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(ack->text).text);
+		a->refused = ack->final || ack->version != FARM_VERSION;
+		text_copy(a->why, sizeof a->why, ack->text);
 		conn_close(a->conn, ack->text);
 		return;
 	}
@@ -128,7 +132,9 @@ static void on_closed(void *user, const char *why)
 	a->conn = NULL;
 	a->welcome = false;
 	uv_timer_stop(&a->heartbeat);
-	if (!a->gone)
+	if (a->refused)
+		go(a);
+	else if (!a->gone)
 		try_later(a);
 	agent_settle(a);
 }
@@ -348,7 +354,8 @@ int agent_run(const struct agent_config *c, struct error *e)
 	while (!a->gone || a->conn)
 		uv_run(&a->loop, UV_RUN_ONCE);
 	if (a->hung || crew_pending(a->crew)) /* nobody can wait for its threads; what was to be said has been sent */
-		_exit(a->hung ? AGENT_HUNG : 0);
+		_exit(a->hung ? AGENT_HUNG : a->refused ? AGENT_REFUSED : 0);
+	int refused = a->refused ? error_set(e, EACCES, "%s refuses: %s", a->config.coordinator, a->why) : 0;
 	agent_close(a);
-	return 0;
+	return refused;
 }

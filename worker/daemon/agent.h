@@ -1,6 +1,7 @@
 /*
  * The worker daemon: one loop thread that owns all state, a crew of render threads. Connects, asks for leases, fetches
- * what it needs, sends results and keeps them until they are acknowledged; reconnects for ever. On SIGTERM it finishes
+ * what it needs, sends results and keeps them until they are acknowledged; reconnects for ever,
+ * unless it is refused for good. On SIGTERM it finishes
  * what runs within the grace period, or gives it up, and leaves. Tells the service manager what it waits to hear
  * (common/net/notify.h). A lease that gets nowhere is given back as failed, and so are those that wait for a scene whose building
  * gets nowhere; a thread cannot be ended, so the worker leaves as on SIGTERM, and the program ends then and there, with AGENT_HUNG.
@@ -30,8 +31,10 @@ struct agent_config {
 };
 
 enum { AGENT_HUNG = 75 }; /* exit code: to be started again */
+enum { AGENT_REFUSED = 6 }; /* exit code of who gets -EACCES */
 
-/* Returns when the worker has left; where a thread is still at work the program ends instead. -EINVAL, -EPERM, -EHOSTUNREACH at once when the address is of no use. */
+/* Returns when the worker has left; where a thread is still at work the program ends instead. -EINVAL, -EPERM, -EHOSTUNREACH at once when the address is of no use;
+ * -EACCES: the coordinator refuses it, and calling again would not mend that (role, version, what hello says). */
 int agent_run(const struct agent_config *c, struct error *e);
 
 #endif

@@ -32,6 +32,8 @@ struct agent {
 	uint64_t busy_at;   /* ms of the loop: when it had a lease last */
 	bool watched;       /* the service manager waits to hear of us */
 	bool leaving, gone;
+	bool refused; /* for good */
+	char why[256];
 	bool hung; /* a thread of the crew is */
 };
 

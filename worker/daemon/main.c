@@ -20,11 +20,11 @@ static const char doc[] =
 	"  hslt-worker --coordinator farm.lan:7700 --tls ~/node1 --threads 8 --name $(hostname)\n"
 	"\n"
 	"SIGTERM: finishes the running epochs within the grace period or gives them up, sends what is done and leaves; the "
-	"second one ends it at once. It reconnects for ever; with --idle-exit it leaves when nobody has work for it. A lease that "
+	"second one ends it at once. It reconnects for ever unless it is refused for good; with --idle-exit it leaves when nobody has work for it. A lease that "
 	"makes no progress for --stall is given back as failed, as are those that wait for a scene whose building makes none, and "
 	"the worker leaves, to be started again. Under systemd it says when it is ready and feeds the watchdog.\n"
-	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 stopped, 1 failed, 2 usage, 75 a thread "
-	"hung.";
+	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 stopped, 1 failed, 2 usage, 6 refused "
+	"for good (a certificate of another role, another version), 75 a thread hung.";
 
 enum {
 	OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_LIE, OPTION_TLS,
@@ -140,5 +140,5 @@ int main(int argc, char **argv)
 	int rc = agent_run(&c, &e);
 	if (rc)
 		fprintf(stderr, "hslt-worker: %s\n", e.text);
-	return rc == 0 ? 0 : rc == -EPERM || rc == -EINVAL ? 2 : 1;
+	return rc == 0 ? 0 : rc == -EACCES ? AGENT_REFUSED : rc == -EPERM || rc == -EINVAL ? 2 : 1;
 }

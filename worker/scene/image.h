@@ -17,7 +17,8 @@ struct image {
 	float *pixels;                    /* [height][width][channels], finite, in the arena */
 };
 
-/* raw: no sRGB decoding of integer data. At most 2^28 pixels. */
+/* raw: no sRGB decoding of integer data. At most 2^27 pixels and 1 GiB of floats, and 4 GiB together with what the arena holds:
+ * -EFBIG names the file and its size before it is decoded. */
 int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
 	       struct error *e);
 

@@ -4,7 +4,9 @@
 
 #include "worker/scene/image.h"
 
-enum { IMAGE_PIXELS_MAX = 1 << 28 };
+/* Before anything is decoded: a small file may promise a large image. Of a mask 11,585 x 11,585 pixels, of colours 9,459 x 9,459. */
+enum { IMAGE_PIXELS_MAX = 1 << 27, IMAGE_BYTES_MAX = 1 << 30 };
+#define IMAGE_SCENE_BYTES_MAX ((size_t)4 << 30) /* of all that an arena holds */
 
 struct image_input {
 	const char *name;

@@ -36,7 +36,7 @@ static int copy_planes(const struct image_input *in, const struct exr_image *x, 
 int image_decode_exr(const struct image_input *in, struct image *out)
 {
 	struct exr_image x = {0};
-	int r = exr_read(in->bytes, in->size, &x, in->error);
+	int r = exr_read_within(in->bytes, in->size, IMAGE_BYTES_MAX, &x, in->error);
 	if (r)
 		return error_prefix(in->error, r, "%s", in->name);
 	r = copy_planes(in, &x, out);

@@ -105,15 +105,12 @@ static void test_bad_png(void **state)
 	free(png);
 }
 
-/* A header that promises 16384 x 16384 pixels and nothing behind it must not cost 3 GB first. */
-static void test_png_bomb(void **state)
+/* A PNG of one pixel whose header says that it has side x side. */
+static unsigned char *promising_png(unsigned side, int color, size_t *size)
 {
-	(void)state;
-	size_t size;
-	unsigned char *small = sample_png(1, 1, SAMPLE_RGB, 8, 0, &size);
-	static const unsigned char ihdr[] = {0, 0, 0, 13, 'I', 'H', 'D', 'R', 0, 0, 0x40, 0, 0, 0, 0x40, 0, 8, 2, 0, 0, 0,
-					     0xa8, 0xdd, 0xea, 0xc2};
-	memcpy(small + 8, ihdr, sizeof ihdr - 4);
+	unsigned char *small = sample_png(1, 1, SAMPLE_RGB, 8, 0, size), high = (unsigned char)(side >> 8), low = (unsigned char)side;
+	const unsigned char ihdr[] = {0, 0, 0, 13, 'I', 'H', 'D', 'R', 0, 0, high, low, 0, 0, high, low, 8, (unsigned char)color, 0, 0, 0};
+	memcpy(small + 8, ihdr, sizeof ihdr);
 	uint32_t crc = 0xffffffff;
 	for (size_t i = 12; i < 29; i++) {
 		crc ^= small[i];
@@ -123,8 +120,56 @@ static void test_png_bomb(void **state)
 	crc = ~crc;
 	for (int i = 0; i < 4; i++)
 		small[29 + i] = (unsigned char)(crc >> (24 - 8 * i));
-	refuses(small, size, "too short for 16384 x 16384 pixels");
-	free(small);
+	return small;
+}
+
+static void refuses_png(unsigned side, int color, const char *text)
+{
+	size_t size;
+	unsigned char *png = promising_png(side, color, &size);
+	refuses(png, size, text);
+	free(png);
+}
+
+/* A header that promises pixels and nothing behind it must not cost a gigabyte first; nor one with much behind it, more than that. */
+static void test_png_bomb(void **state)
+{
+	(void)state;
+	refuses_png(8192, 2, "i: too short for 8192 x 8192 pixels");
+	refuses_png(16000, 0, "i: 16000 x 16000 pixels; at most 134217728");
+	refuses_png(10000, 2, "i: 10000 x 10000 pixels take 1144 MB decoded; at most 1024 MB");
+}
+
+/* The size that a frame's header tells; a file of that size may be well compressed. */
+static void test_jpeg_bomb(void **state)
+{
+	(void)state;
+	static const unsigned char orange[] = {220, 130, 40};
+	size_t size, at = 2;
+	unsigned char *jpeg = sample_jpeg(8, 8, orange, 3, 0, &size);
+	while (jpeg[at + 1] != 0xc0)
+		at += 2 + ((size_t)jpeg[at + 2] << 8 | jpeg[at + 3]);
+	memcpy(jpeg + at + 5, "\x27\x10\x27\x10", 4);
+	refuses(jpeg, size, "i: 10000 x 10000 pixels take 1144 MB decoded; at most 1024 MB");
+	memcpy(jpeg + at + 5, "\x75\x30\x75\x30", 4);
+	refuses(jpeg, size, "i: 30000 x 30000 pixels; at most");
+	free(jpeg);
+}
+
+/* All images of a scene together: what was read before lies in the arena. */
+static void test_scene_limit(void **state)
+{
+	(void)state;
+	size_t size;
+	unsigned char *png = sample_png(13, 9, SAMPLE_GREY, 8, 0, &size);
+	struct arena arena = {.used = ((size_t)4 << 30) - 13 * 9 * 4};
+	struct image img;
+	struct error e;
+	assert_int_equal(decode(png, size, false, &arena, &img, &e), 0);
+	assert_int_equal(decode(png, size, false, &arena, &img, &e), -EFBIG);
+	assert_string_equal(e.text, "i: 13 x 9 pixels take 0 MB decoded, the scene before it 4096 MB; at most 4096 MB together");
+	arena_fini(&arena);
+	free(png);
 }
 
 static void check_jpeg(const unsigned char *color, int components, int progressive)
@@ -200,7 +245,8 @@ static void test_bad_hdr(void **state)
 	refuses(file, make_hdr(file, "-Y 1 +X 0", pixels, 12), "only the resolution line");
 	refuses(file, make_hdr(file, "-Y 99999999999999999999 +X 1", pixels, 12), "only the resolution line");
 	refuses(file, make_hdr(file, "-Y 100000 +X 100000", pixels, 12), "pixels; at most");
-	refuses(file, make_hdr(file, "-Y 10000 +X 10000", pixels, 12), "too short for");
+	refuses(file, make_hdr(file, "-Y 5000 +X 5000", pixels, 12), "too short for");
+	refuses(file, make_hdr(file, "-Y 10000 +X 10000", pixels, 12), "i: 10000 x 10000 pixels take 1144 MB decoded; at most 1024 MB");
 	refuses(file, make_hdr(file, "-Y 9223372036854775000 +X 9223372036854775000", pixels, 12), "pixels; at most");
 	refuses(file, make_hdr(file, "-Y 1 +X 8", pixels, 64), "run lengths that do not fill");
 	refuses(file, make_hdr(file, "-Y 1 +X 9", pixels, 64), "another width");
@@ -245,6 +291,12 @@ static void test_exr(void **state)
 		for (int k = 0; k < 3; k++)
 			assert_true(img.pixels[3 * i + k] == value[k] * (float)(i + 1));
 	refuses(exr, size / 2, "i: ");
+	mem_free(exr);
+	exr = make_exr(rgb, 3, value, &size);
+	for (size_t i = 0; i < size - 40; i++) /* xMin yMin xMax yMax behind the name, the type and a length */
+		if (memcmp(exr + i, "dataWindow\0box2i", 17) == 0)
+			memcpy(exr + i + 17 + 4 + 8, "\x0f\x27\0\0\x0f\x27\0", 8);
+	refuses(exr, size, "i: 10000 x 10000 pixels of 3 channels take 1144 MB decoded; at most 1024 MB");
 	mem_free(exr);
 	exr = make_exr(y, 1, value, &size);
 	img = decode_ok(exr, size, false, &arena);
@@ -297,6 +349,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_png),  cmocka_unit_test(test_bad_png), cmocka_unit_test(test_png_bomb),
 		cmocka_unit_test(test_jpeg), cmocka_unit_test(test_hdr),     cmocka_unit_test(test_bad_hdr),
+		cmocka_unit_test(test_jpeg_bomb), cmocka_unit_test(test_scene_limit),
 		cmocka_unit_test(test_exr),  cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,0 +1,30 @@
+#include "common/base/log_limit.h"
+
+static void fill(struct log_bucket *b, double now)
+{
+	double back = now > b->at ? (now - b->at) * LOG_PER_SECOND : 0;
+	b->used = b->used > back ? b->used - back : 0;
+	b->at = now > b->at ? now : b->at;
+}
+
+bool log_bucket_take(struct log_bucket *b, double now)
+{
+	fill(b, now);
+	if (b->used + 1 > LOG_BURST) {
+		b->withheld++;
+		return false;
+	}
+	b->used++;
+	return true;
+}
+
+uint64_t log_bucket_withheld(struct log_bucket *b, double now)
+{
+	uint64_t n = b->withheld;
+	fill(b, now);
+	if (!n || b->used + 1 > LOG_BURST)
+		return 0;
+	b->used++; /* the line that says so */
+	b->withheld = 0;
+	return n;
+}

@@ -1,0 +1,75 @@
+#include "common/base/target.h"
+
+#include <fcntl.h>
+#include <limits.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { LINKS_MOST = 40 };
+
+/* As /dev/fd/3 and /dev/stdout lead to: opened anew such a file would be written from its beginning. Negative: it is none. */
+static int own_descriptor(const char *path)
+{
+	char folder[TARGET_PATH], real[PATH_MAX], own[64];
+	const char *slash = strrchr(path, '/'), *name = slash ? slash + 1 : path;
+	size_t digits = strspn(name, "0123456789");
+	if (!slash || !digits || digits > 9 || name[digits])
+		return -1;
+	snprintf(folder, sizeof folder, "%.*s", (int)(slash - path), path);
+	snprintf(own, sizeof own, "/proc/%ld/fd", (long)getpid());
+	return realpath(folder, real) && strcmp(real, own) == 0 ? atoi(name) : -1;
+}
+
+/* One link further; `path` is the link. */
+static int follow(char path[TARGET_PATH], struct error *e)
+{
+	char to[TARGET_PATH], next[TARGET_PATH];
+	ssize_t n = readlink(path, to, sizeof to - 1);
+	if (n < 0)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	to[n] = 0;
+	const char *slash = strrchr(path, '/');
+	int folder = *to == '/' || !slash ? 0 : (int)(slash - path) + 1;
+	int size = snprintf(next, sizeof next, "%.*s%s", folder, path, to);
+	if (size < 0 || (size_t)size >= sizeof next)
+		return error_set(e, ENAMETOOLONG, "%s: the name that the link leads to is too long", path);
+	memcpy(path, next, (size_t)size + 1);
+	return 0;
+}
+
+int target_find(struct target *t, const char *path, struct error *e)
+{
+	*t = (struct target){.descriptor = -1};
+	if (strlen(path) >= sizeof t->path)
+		return error_set(e, ENAMETOOLONG, "%.100s...: the name is too long", path);
+	strcpy(t->path, path);
+	for (int links = 0; links < LINKS_MOST; links++) {
+		struct stat st;
+		t->descriptor = own_descriptor(t->path);
+		if (t->descriptor >= 0) {
+			t->through = true;
+			return 0;
+		}
+		if (lstat(t->path, &st))
+			return 0; /* whoever writes there says why it cannot be */
+		if (S_ISDIR(st.st_mode))
+			return error_set(e, EISDIR, "%s: is a folder", path);
+		t->through = !S_ISREG(st.st_mode);
+		if (!S_ISLNK(st.st_mode))
+			return 0;
+		int rc = follow(t->path, e);
+		if (rc)
+			return rc;
+		t->through = false;
+	}
+	return error_set(e, ELOOP, "%s: links that lead nowhere", path);
+}
+
+int target_open(const struct target *t, struct error *e)
+{
+	int fd = t->descriptor >= 0 ? fcntl(t->descriptor, F_DUPFD_CLOEXEC, 0) : open(t->path, O_WRONLY | O_NOCTTY | O_CLOEXEC);
+	return fd < 0 ? error_set(e, errno, "%s: cannot write there: %s", t->path, strerror(errno)) : fd;
+}
