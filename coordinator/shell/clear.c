@@ -2,6 +2,7 @@
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
+#include "coordinator/shell/ages.h"
 #include "coordinator/shell/keep.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/store/age.h"
@@ -21,6 +22,7 @@ struct clearing {
 	struct age_job *jobs; /* those that have ended */
 	size_t job_count, cleared, records;
 	double now; /* s since 1970, when it was chosen; 0: not yet */
+	/* The ids of those whose records went take the places of those that were looked at. */
 	struct job_record record; /* the one at hand */
 };
 
@@ -62,7 +64,13 @@ static void look(const struct server *s, struct clearing *c, uint64_t id)
 	}
 	if (rc || !record_is_ended(&c->record))
 		return;
-	c->jobs[c->job_count++] = (struct age_job){.id = id, .ended = c->record.ended, .films = keep_bytes(s, id),
+	double now = ages_now(s);
+	if (c->record.ended_seen < 0 || c->record.ended_seen > now) { /* nobody knows how old it is: it counts from here on */
+		c->record.ended_seen = now;
+		if (spool_write_record(s->spool, &c->record, NULL))
+			return;
+	}
+	c->jobs[c->job_count++] = (struct age_job){.id = id, .ended = c->record.ended_seen, .films = keep_bytes(s, id),
 						   .result = result_bytes(s, id), .busy = is_fetched(s, id)};
 }
 
@@ -94,7 +102,7 @@ static void drop_result(struct server *s, const struct age_job *j, struct job_re
 		disk_unlink(path);
 	}
 	log_event(LOG_JOB_CLEARED, "job=j%llu what=result bytes=%llu ended=%.0f", (unsigned long long)j->id, (unsigned long long)j->result,
-		  j->ended);
+		  r->ended);
 }
 
 static void drop_record(struct server *s, const struct age_job *j)
@@ -114,7 +122,7 @@ static void clear_job(struct server *s, struct clearing *c, const struct age_job
 {
 	if ((!j->no_films || !j->films) && (!j->no_result || !j->result) && !j->no_record)
 		return;
-	if (lives(s, j->id) || is_fetched(s, j->id) || spool_read_record(s->spool, j->id, &c->record, NULL) || c->record.ended != j->ended)
+	if (lives(s, j->id) || is_fetched(s, j->id) || spool_read_record(s->spool, j->id, &c->record, NULL) || c->record.ended_seen != j->ended)
 		return;
 	if (j->no_films && j->films) {
 		keep_drop(s, j->id);
@@ -124,7 +132,7 @@ static void clear_job(struct server *s, struct clearing *c, const struct age_job
 		drop_result(s, j, &c->record, c->now);
 	if (j->no_record) {
 		drop_record(s, j);
-		c->records++;
+		c->ids[c->records++] = j->id;
 	}
 	s->changes++;
 }
@@ -135,7 +143,7 @@ static void choose(const struct server *s, struct clearing *c)
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
 	c->now = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
-	age_choose(c->jobs, c->job_count, &limits, c->now);
+	age_choose(c->jobs, c->job_count, &limits, ages_now(s));
 }
 
 /* false: that was all. */
@@ -156,7 +164,7 @@ static bool step(struct server *s, struct clearing *c)
 static void drop_rows(struct server *s, const struct clearing *c)
 {
 	struct error e;
-	if (c->records && ledger_drop(s->ledger, c->now - AGE_RECORD * s->config.clear_seconds, &e))
+	if (c->records && ledger_drop(s->ledger, c->ids, c->records, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 }
 
@@ -197,6 +205,7 @@ void clear_tick(struct server *s)
 		if (now < s->clear_next)
 			return;
 		s->clear_next = now + every_seconds;
+		ages_keep(s);
 		if ((!(s->config.clear_seconds > 0) && !s->config.clear_bytes) || !begin(s))
 			return;
 	}

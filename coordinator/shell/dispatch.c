@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/film/exr.h"
+#include "coordinator/shell/ages.h"
 #include "coordinator/shell/clear.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/keep.h"
@@ -262,6 +263,7 @@ static void finish(struct server *s, struct order *o)
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
 	server_view(s, o->id, &v);
+	v.record.ended_seen = ages_now(s);
 	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 	o->record = v.record;
 	if (durable_end(s, o)) { /* again, later */

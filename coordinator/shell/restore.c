@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
+#include "coordinator/shell/ages.h"
 #include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/control.h"
 #include "coordinator/shell/dispatch.h"
@@ -211,6 +212,7 @@ static void give_up(struct server *s, struct job_record *r, const char *why)
 	text_copy(r->why, sizeof r->why, why);
 	r->exit_code = 3;
 	r->ended = (double)now.tv_sec;
+	r->ended_seen = ages_now(s);
 	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
 	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) || ledger_end(s->ledger, r->id, r->extended, r->state, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);

@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/net/notify.h"
+#include "coordinator/shell/ages.h"
 #include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/clear.h"
 #include "coordinator/shell/dispatch.h"
@@ -257,6 +258,8 @@ static int read_ended(struct server *s, struct error *e)
 			text_copy(r->reason, sizeof r->reason, job_end_name(END_FAILED));
 			text_copy(r->why, sizeof r->why, "the coordinator stopped before the job was accepted");
 			r->exit_code = 3;
+			r->ended = (double)time(NULL);
+			r->ended_seen = ages_now(s);
 			if (spool_write_record(s->spool, r, &fault))
 				log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(fault.text).text);
 		}
@@ -407,6 +410,8 @@ static int open_stores(struct server *s, struct error *e)
 	if (!rc)
 		rc = blob_store_open(&s->blobs, spool_blobs(s->spool), s->config.blob_bytes, e);
 	if (!rc)
+		ages_open(s);
+	if (!rc)
 		rc = restore_open(s, e);
 	if (!rc)
 		rc = read_ended(s, e);
@@ -467,6 +472,8 @@ static void close_stores(struct server *s)
 	}
 	durable_close(s);
 	clear_close(s);
+	if (s->seen.up > 0)
+		ages_keep(s);
 	if (s->farm)
 		farm_free(s->farm);
 	blob_store_close(s->blobs);

@@ -11,6 +11,7 @@
 #include "coordinator/shell/order.h"
 #include "coordinator/shell/quota.h"
 #include "coordinator/store/ledger.h"
+#include "coordinator/store/seen.h"
 #include "coordinator/store/spool.h"
 
 struct server_config {
@@ -93,6 +94,7 @@ struct server {
 	struct durable_ack *parked;            /* ... for a journal that failed to be a good one again */
 	struct ending *endings;                /* jobs that ended and whose records could not be written yet */
 	double endings_again;
+	struct seen seen;  /* when this life began */
 	double clear_next; /* when finished jobs are looked at again */
 	struct clearing *clearing; /* they are being looked at */
 	bool flushing;

@@ -11,7 +11,7 @@
 
 struct age_job {
 	uint64_t id;
-	double ended;               /* s since 1970 */
+	double ended;               /* s that had been seen to pass then (seen.h) */
 	uint64_t films, result;     /* bytes: what only serves to go on; result, preview and log */
 	bool busy;                  /* somebody fetches its result: it stays this time */
 	bool no_films, no_result, no_record; /* the answer */
@@ -23,7 +23,7 @@ struct age_limits {
 };
 enum { AGE_RECORD = 10 };
 
-/* Sorts the jobs, the one that ended first to the front. A clock that was set back makes nobody older. */
+/* Sorts the jobs, the one that ended first to the front. now: s that have been seen to pass. */
 void age_choose(struct age_job *jobs, size_t count, const struct age_limits *l, double now);
 
 #endif

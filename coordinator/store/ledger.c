@@ -100,7 +100,7 @@ int ledger_open(struct ledger **out, const char *path, struct error *e)
 	if (!rc)
 		rc = prepare(l, &l->priority, "UPDATE jobs SET priority = ?2 WHERE id = ?1", e);
 	if (!rc)
-		rc = prepare(l, &l->drop, "DELETE FROM jobs WHERE ended < ?1", e);
+		rc = prepare(l, &l->drop, "DELETE FROM jobs WHERE id = ?1 AND ended IS NOT NULL", e);
 	if (!rc)
 		rc = prepare(l, &l->extend, "UPDATE jobs SET submission = ?2, plan = ?3, extended = ?4, ended = NULL, state = 'live' WHERE id = ?1", e);
 	if (!rc)
@@ -166,10 +166,20 @@ int ledger_end(struct ledger *l, uint64_t id, uint64_t extended, const char *sta
 	return finish(l, l->end, e);
 }
 
-int ledger_drop(struct ledger *l, double ended, struct error *e)
+int ledger_drop(struct ledger *l, const uint64_t *ids, size_t count, struct error *e)
 {
-	sqlite3_bind_double(l->drop, 1, ended);
-	return finish(l, l->drop, e);
+	int rc = run(l, "BEGIN IMMEDIATE", e);
+	if (rc)
+		return rc;
+	for (size_t i = 0; !rc && i < count; i++) {
+		sqlite3_bind_int64(l->drop, 1, (sqlite3_int64)ids[i]);
+		rc = finish(l, l->drop, e);
+	}
+	if (!rc)
+		rc = run(l, "COMMIT", e);
+	if (rc)
+		run(l, "ROLLBACK", NULL);
+	return rc;
 }
 
 int ledger_hold(struct ledger *l, uint64_t id, const char *who, struct error *e)

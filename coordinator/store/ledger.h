@@ -33,7 +33,7 @@ void ledger_close(struct ledger *l); /* NULL: nothing */
 int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e);
 /* Its life after so many extensions is over; one that was extended since lives on. */
 int ledger_end(struct ledger *l, uint64_t id, uint64_t extended, const char *state, struct error *e);
-int ledger_drop(struct ledger *l, double ended, struct error *e); /* the rows of all jobs that ended before, s since 1970 */
+int ledger_drop(struct ledger *l, const uint64_t *ids, size_t count, struct error *e); /* the rows of these, at once; none of a living job */
 int ledger_hold(struct ledger *l, uint64_t id, const char *who, struct error *e); /* "": no longer */
 int ledger_priority(struct ledger *l, uint64_t id, int priority, struct error *e);
 /* Another submission, plan and number of extensions; a job that has ended lives again. -ENOENT */

@@ -137,6 +137,7 @@ int record_to_json(const struct job_record *r, char **out, struct error *e)
 		return error_set(e, json_error_code(&fault) == json_error_invalid_utf8 ? EINVAL : ENOMEM,
 				 "the record of job j%llu cannot be written: %s", (unsigned long long)r->id, fault.text);
 	json_object_set_new(o, "owner", json_string(r->owner));
+	json_object_set_new(o, "endedSeen", json_real(r->ended_seen));
 	json_object_set_new(o, "cleared", json_real(r->cleared));
 	json_object_set_new(o, "extended", json_integer((json_int_t)r->extended));
 	json_object_set_new(o, "verify", json_real(r->verify));
@@ -189,6 +190,8 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	r->verify = json_number_value(json_object_get(o, "verify"));
 	r->submitted = json_number_value(json_object_get(o, "submitted"));
 	r->ended = json_number_value(json_object_get(o, "ended"));
+	const json_t *seen = json_object_get(o, "endedSeen");
+	r->ended_seen = json_is_number(seen) ? json_number_value(seen) : -1;
 	r->progress = json_number_value(json_object_get(o, "progress"));
 	r->rel_error = json_number_value(json_object_get(o, "relError"));
 	take_text(o, "mixture", r->mixture, sizeof r->mixture);

@@ -32,6 +32,7 @@ struct job_record {
 	double cleared; /* its result was, s since 1970; 0: it was not */
 	uint64_t extended;  /* how often it went on after its end, as the ledger counts */
 	double submitted, ended; /* seconds since 1970; 0: not yet */
+	double ended_seen; /* s that had been seen to pass then (seen.h); negative: nobody knows */
 	double progress;
 	double rel_error; /* negative: not known */
 	double target_error; /* 0: none */

@@ -55,7 +55,7 @@ static void add(uint64_t id, double ended)
 {
 	struct error e;
 	struct job_record *r = calloc(1, sizeof *r);
-	*r = (struct job_record){.id = id, .state = "done", .ended = ended, .has_result = true, .rel_error = -1};
+	*r = (struct job_record){.id = id, .state = "done", .ended = ended, .ended_seen = 100.0 * DAY - (double)time(NULL) + ended, .has_result = true, .rel_error = -1};
 	if (id == LIVING)
 		strcpy(r->state, "running");
 	assert_int_equal(spool_take_job(server.spool, id, &e), 0);
@@ -92,6 +92,9 @@ static void open_server(void)
 	add_rows(path, (double)time(NULL));
 	assert_int_equal(ledger_open(&server.ledger, path, &e), 0);
 	server.config.clear_seconds = DAY;
+	struct timespec up;
+	clock_gettime(CLOCK_BOOTTIME, &up);
+	server.seen = (struct seen){.seconds = 100.0 * DAY, .up = (double)up.tv_sec};
 }
 
 static void old_jobs_go_bit_by_bit(void **state)
@@ -129,6 +132,38 @@ static void old_jobs_go_bit_by_bit(void **state)
 	spool_close(server.spool);
 }
 
+/* Records of an earlier version, and of a life whose clock went ahead: they are as young as they can be. */
+static void of_unknown_age(void **state)
+{
+	(void)state;
+	struct disk quick = disk_system;
+	struct error e;
+	struct job_record *r = calloc(1, sizeof *r);
+	quick.fsync = no_flush;
+	disk_use(&quick);
+	open_server();
+	for (uint64_t id = 1; id <= 2; id++) {
+		add(id, (double)time(NULL) - 20 * DAY);
+		assert_int_equal(spool_read_record(server.spool, id, r, &e), 0);
+		r->ended_seen = id == 1 ? -1 : 1000.0 * DAY;
+		assert_int_equal(spool_write_record(server.spool, r, &e), 0);
+	}
+	for (int day = 0; day < 3; day++, server.seen.seconds += 0.7 * DAY, server.clear_next = 0) {
+		do
+			clear_tick(&server);
+		while (server.clearing);
+		for (uint64_t id = 1; id <= 2; id++) {
+			assert_true(has(id, "result.exr") == (day < 2));
+			assert_int_equal(spool_read_record(server.spool, id, r, &e), 0);
+			assert_true(r->ended_seen >= 100.0 * DAY && r->ended_seen < 100.0 * DAY + 100);
+		}
+	}
+	disk_use(NULL);
+	free(r);
+	ledger_close(server.ledger);
+	spool_close(server.spool);
+}
+
 /* What ended once more between the look and the end of it. */
 static void what_has_changed_stays(void **state)
 {
@@ -146,7 +181,7 @@ static void what_has_changed_stays(void **state)
 	struct error e;
 	struct job_record *r = calloc(1, sizeof *r);
 	assert_int_equal(spool_read_record(server.spool, 1, r, &e), 0);
-	r->ended = now;
+	r->ended_seen += 20 * DAY;
 	assert_int_equal(spool_write_record(server.spool, r, &e), 0);
 	free(r);
 	while (server.clearing)
@@ -186,6 +221,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(old_jobs_go_bit_by_bit, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(of_unknown_age, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_has_changed_stays, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_is_read_stays, folder_set_up, folder_tear_down),
 	};

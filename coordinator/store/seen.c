@@ -1,0 +1,43 @@
+#include "coordinator/store/seen.h"
+
+#include "common/base/crc.h"
+
+#include <errno.h>
+#include <math.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+void seen_go_on(struct seen *now, const struct seen *last)
+{
+	now->seconds = last ? last->seconds : 0;
+	if (!last)
+		return;
+	if (*now->boot && strcmp(now->boot, last->boot) == 0)
+		now->seconds += fmax(0, now->up - last->up);
+	else
+		now->seconds += fmin(fmax(0, now->wall - last->wall), SEEN_CREDIT);
+}
+
+size_t seen_to_text(const struct seen *s, char text[SEEN_TEXT])
+{
+	int n = snprintf(text, SEEN_TEXT, "seen %.3f up %.3f wall %.3f boot %s", s->seconds, s->up, s->wall, *s->boot ? s->boot : "-");
+	n += snprintf(text + n, SEEN_TEXT - (size_t)n, " crc32c %08x\n", (unsigned)crc32c(0, text, (size_t)n));
+	return (size_t)n;
+}
+
+int seen_from_text(const char *text, size_t size, struct seen *s)
+{
+	char line[SEEN_TEXT], boot[SEEN_BOOT];
+	unsigned check;
+	if (size >= sizeof line)
+		return -EBADMSG;
+	memcpy(line, text, size);
+	line[size] = 0;
+	const char *end = strstr(line, " crc32c ");
+	if (!end || sscanf(end, " crc32c %8x", &check) != 1 || check != crc32c(0, line, (size_t)(end - line)) ||
+	    sscanf(line, "seen %lf up %lf wall %lf boot %39s", &s->seconds, &s->up, &s->wall, boot) != 4)
+		return -EBADMSG;
+	snprintf(s->boot, sizeof s->boot, "%s", strcmp(boot, "-") == 0 ? "" : boot);
+	return isfinite(s->seconds) && s->seconds >= 0 ? 0 : -EBADMSG;
+}

@@ -1,0 +1,67 @@
+/* Time that was seen to pass does not follow a wall clock that jumps. */
+#include "coordinator/store/seen.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+#define DAY 86400.0
+
+static double after(const char *boot, double up, double wall)
+{
+	struct seen last = {.seconds = 1000, .up = 500, .wall = 100 * DAY, .boot = "first"}, now = {.up = up, .wall = wall};
+	snprintf(now.boot, sizeof now.boot, "%s", boot);
+	seen_go_on(&now, &last);
+	return now.seconds;
+}
+
+static void wall_clock_jumps(void **state)
+{
+	(void)state;
+	struct seen first = {.seconds = 7, .up = 1, .wall = 2};
+	seen_go_on(&first, NULL);
+	assert_true(first.seconds == 0);
+	assert_true(after("first", 600, 140 * DAY) == 1100); /* 40 days ahead */
+	assert_true(after("first", 600, 0) == 1100);
+	assert_true(after("first", 400, 100 * DAY) == 1000); /* no clock of a machine does that */
+	assert_true(after("second", 10, 100 * DAY + 300) == 1300);
+	assert_true(after("second", 10, 140 * DAY) == 1000 + SEEN_CREDIT);
+	assert_true(after("second", 10, 0) == 1000);
+	assert_true(after("", 600, 100 * DAY + 60) == 1060); /* a system without such a name */
+}
+
+static void as_text(void **state)
+{
+	(void)state;
+	struct seen s = {.seconds = 12345.678, .up = 99.5, .wall = 1.7e9, .boot = "f3a1-22"}, back;
+	char text[SEEN_TEXT];
+	size_t size = seen_to_text(&s, text);
+	assert_int_equal(seen_from_text(text, size, &back), 0);
+	assert_true(back.seconds == s.seconds && back.up == s.up && back.wall == s.wall);
+	assert_string_equal(back.boot, s.boot);
+	for (size_t i = 0; i + 1 < size; i++)
+		for (int bit = 0; bit < 8; bit++) {
+			text[i] = (char)(text[i] ^ 1 << bit);
+			int rc = seen_from_text(text, size, &back);
+			assert_true(rc == -EBADMSG || (rc == 0 && back.seconds == s.seconds)); /* a hexadecimal digit of the other case */
+			text[i] = (char)(text[i] ^ 1 << bit);
+		}
+	for (size_t n = 0; n + 1 < size; n++)
+		assert_int_equal(seen_from_text(text, n, &back), -EBADMSG);
+	assert_int_equal(seen_from_text(text, SEEN_TEXT, &back), -EBADMSG);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(wall_clock_jumps),
+		cmocka_unit_test(as_text),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
