@@ -30,7 +30,7 @@ enum {
 	OPTION_SPOOL = 256, OPTION_STATUS, OPTION_GROUP, OPTION_PARTIALS, OPTION_PORT_FILE, OPTION_HEARTBEAT, OPTION_BLOBS,
 	OPTION_TLS, OPTION_TLS_CHECK, OPTION_INSECURE, OPTION_JOURNAL, OPTION_CONNECTIONS, OPTION_FILM_MEMORY,
 	OPTION_KEEP, OPTION_DAYS, OPTION_GB, OPTION_BANDWIDTH, OPTION_JOBS, OPTION_ASSETS, OPTION_FILM, OPTION_MUTATIONS,
-	OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE,
+	OPTION_VERIFY, OPTION_FAULTS, OPTION_FORGIVE, OPTION_LOSS,
 };
 
 static const struct argp_option options[] = {
@@ -59,6 +59,7 @@ static const struct argp_option options[] = {
 	{"verify", OPTION_VERIFY, "P", 0, "Least share of the epochs of each job, or percent, that two workers must compute alike (0)", 0},
 	{"max-faults", OPTION_FAULTS, "N", 0, "Wrong results, or invalid ones in a row, after which a worker is set aside for good (3)", 0},
 	{"forgive", OPTION_FORGIVE, "NAME", 0, "A worker that was set aside in an earlier life comes back", 0},
+	{"accept-loss", OPTION_LOSS, NULL, 0, "Start although the spool has lost jobs: what is left of them is put into SPOOL/lost", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Listen on other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log every lease, too", 0},
 	{0},
@@ -149,6 +150,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_FORGIVE:
 		c->forgive = arg;
+		return 0;
+	case OPTION_LOSS:
+		c->accept_loss = true;
 		return 0;
 	case OPTION_INSECURE:
 		c->insecure = true;

@@ -1,8 +1,8 @@
 #include "coordinator/shell/control.h"
 
 #include "common/base/text.h"
+#include "coordinator/shell/reconcile.h"
 #include "coordinator/shell/session.h"
-
 
 const char *control_held_by(const char *who, char text[256])
 {
@@ -41,6 +41,7 @@ static void hold(struct session *p, uint64_t job, const char *who)
 		not_for_long(p, &e);
 		return;
 	}
+	reconcile_row(s, job);
 	struct order *o = server_order(s, job);
 	if (o)
 		order_log(o, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released", log_quote(name_of(p)).text);
@@ -57,6 +58,7 @@ static void set_priority(struct session *p, uint64_t job, int priority)
 		not_for_long(p, &e);
 		return;
 	}
+	reconcile_row(s, job);
 	struct order *o = server_order(s, job);
 	if (o)
 		order_log(o, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);

@@ -9,6 +9,7 @@
 #include "coordinator/shell/keep.h"
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/session.h"
+#include "coordinator/store/row_file.h"
 
 #include <assert.h>
 #include <stdlib.h>
@@ -80,6 +81,12 @@ int durable_begin(struct server *s, struct order *o, struct error *e)
 		rc = journal_create(&o->journal, folder, o->id, 0, e);
 	if (!rc)
 		rc = ledger_add(s->ledger, &j, e);
+	if (!rc) { /* after the row: without one it says that the row was lost */
+		j.held = "";
+		rc = row_file_write(s->spool, &j, e);
+		if (rc)
+			ledger_end(s->ledger, o->id, 0, "failed", NULL);
+	}
 	if (rc) { /* should the row be there all the same: nobody waits for the job */
 		text_copy(o->record.state, sizeof o->record.state, "failed");
 		text_copy(o->record.why, sizeof o->record.why, e ? e->text : "");

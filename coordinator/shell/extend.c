@@ -5,9 +5,11 @@
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/keep.h"
+#include "coordinator/shell/reconcile.h"
 #include "coordinator/shell/replay.h"
 #include "coordinator/shell/restore.h"
 #include "coordinator/shell/session.h"
+#include "coordinator/store/row_file.h"
 
 #include <assert.h>
 #include <math.h>
@@ -56,6 +58,8 @@ static int store(struct server *s, const struct order *o, struct error *e)
 	int rc = durable_pack(o, &j, &submission, &plan, e);
 	if (!rc)
 		rc = ledger_extend(s->ledger, &j, e);
+	if (!rc)
+		reconcile_row(s, o->id);
 	mem_free(submission);
 	mem_free(plan);
 	return rc;
@@ -122,14 +126,12 @@ static void forget_end(struct server *s, uint64_t job)
 		}
 }
 
-/* Its row, and what is kept of it beside. */
-static int read_job(const struct server *s, uint64_t job, struct ledger_job *j, struct error *e)
+/* What is kept of it beside its row. */
+static int read_job(const struct server *s, uint64_t job, struct row_file *f, struct error *e)
 {
-	int rc = ledger_get(s->ledger, job, j, e);
-	if (rc == 0)
-		rc = -ENOENT;
-	if (rc > 0)
-		rc = keep_read(s, job, j, e);
+	struct ledger_job j;
+	int rc = ledger_get(s->ledger, job, &j, e);
+	rc = rc == 0 ? -ENOENT : rc < 0 ? rc : row_file_read(s->spool, job, f, e);
 	if (rc == -ENOENT)
 		return error_set(e, ENOENT, "its films have been cleared: %s", again);
 	return rc ? error_prefix(e, rc, "what was kept of it") : 0;
@@ -241,18 +243,13 @@ static int ask_beforehand(const struct session *p, const struct order *o, const 
 static int start_reading(struct session *p, const struct extension *x, const struct job_record *r, struct error *e)
 {
 	struct server *s = p->server;
-	struct ledger_job j;
-	int rc = read_job(s, r->id, &j, e);
+	struct row_file f;
+	int rc = read_job(s, r->id, &f, e);
 	if (rc)
 		return rc;
-	union {
-		const unsigned char *from;
-		unsigned char *to;
-	} submission = {j.submission}, frame = {j.plan}; /* ours */
 	struct reading *w = mem_alloc(1, sizeof *w);
-	rc = w ? restore_order(s, &j, &w->order, e) : error_set(e, ENOMEM, "no memory for a job");
-	mem_free(submission.to);
-	mem_free(frame.to);
+	rc = w ? restore_order(s, &f.job, &w->order, e) : error_set(e, ENOMEM, "no memory for a job");
+	row_file_free(&f);
 	if (rc) {
 		mem_free(w);
 		return error_prefix(e, rc, "it cannot go on, %s", again);

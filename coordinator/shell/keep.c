@@ -1,60 +1,18 @@
 #include "coordinator/shell/keep.h"
 
 #include "common/base/disk.h"
-#include "common/base/mem.h"
-#include "common/base/sealed.h"
-#include "coordinator/shell/durable.h"
 
-#include <stdio.h>
 #include <string.h>
-
-enum { FRAME_MOST = 1 << 26 };
-
-static int write_piece(struct sealed *out, const void *bytes, size_t size, struct error *e)
-{
-	uint64_t n = size;
-	int rc = sealed_write(out, &n, sizeof n, e);
-	return rc ? rc : sealed_write(out, bytes, size, e);
-}
-
-static int write_order(const struct server *s, const struct order *o, struct error *e)
-{
-	char name[SPOOL_PATH_MAX], temporary[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
-	struct ledger_job j = {.id = o->id};
-	struct sealed out = {.buffer = NULL};
-	unsigned char *submission = NULL, *plan = NULL;
-	spool_job_path(s->spool, o->id, "order", name);
-	spool_job_path(s->spool, o->id, "order.tmp", temporary);
-	spool_job_path(s->spool, o->id, NULL, folder);
-	int rc = durable_pack(o, &j, &submission, &plan, e);
-	bool begun = !rc && (rc = sealed_create(&out, temporary, e)) == 0;
-	if (!rc)
-		rc = write_piece(&out, submission, j.submission_size, e);
-	if (!rc)
-		rc = write_piece(&out, plan, j.plan_size, e);
-	if (!rc)
-		rc = sealed_finish(&out, e);
-	if (begun)
-		sealed_close(&out);
-	if (!rc)
-		rc = spool_rename(temporary, name, folder, e);
-	if (rc)
-		disk_unlink(temporary);
-	mem_free(submission);
-	mem_free(plan);
-	return rc;
-}
 
 bool keep_order(struct server *s, const struct order *o)
 {
-	struct error e;
+	char path[SPOOL_PATH_MAX];
+	struct stat st;
 	if (!s->config.keep_bytes || !o->canvas || o->lit.black || canvas_rounds(o->canvas) == 0 ||
 	    (strcmp(o->record.state, job_state_name(JOB_DONE)) != 0 && !o->overflowed))
 		return false;
-	if (write_order(s, o, &e) == 0)
-		return true;
-	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)o->id, log_quote(e.text).text);
-	return false;
+	spool_job_path(s->spool, o->id, "order", path);
+	return disk_stat(path, &st) == 0;
 }
 
 void keep_drop(const struct server *s, uint64_t job)
@@ -109,38 +67,4 @@ void keep_trim(const struct server *s)
 		else
 			left -= bytes;
 	}
-}
-
-static int read_piece(struct sealed *in, unsigned char **bytes, size_t *size, struct error *e)
-{
-	uint64_t n;
-	int rc = sealed_read(in, &n, sizeof n, e);
-	if (!rc && (n == 0 || n > FRAME_MOST))
-		rc = error_set(e, EBADMSG, "%s: a piece of %llu bytes", in->path, (unsigned long long)n);
-	if (!rc && !(*bytes = mem_alloc(n, 1)))
-		rc = error_set(e, ENOMEM, "no memory for a job");
-	*size = (size_t)(rc ? 0 : n);
-	return rc ? rc : sealed_read(in, *bytes, *size, e);
-}
-
-int keep_read(const struct server *s, uint64_t job, struct ledger_job *j, struct error *e)
-{
-	char name[SPOOL_PATH_MAX];
-	struct sealed in;
-	unsigned char *submission = NULL, *plan = NULL;
-	spool_job_path(s->spool, job, "order", name);
-	int rc = sealed_open(&in, name, e);
-	if (rc)
-		return rc;
-	rc = read_piece(&in, &submission, &j->submission_size, e);
-	if (!rc)
-		rc = read_piece(&in, &plan, &j->plan_size, e);
-	sealed_close(&in);
-	j->submission = submission;
-	j->plan = plan;
-	if (rc) {
-		mem_free(submission);
-		mem_free(plan);
-	}
-	return rc;
 }

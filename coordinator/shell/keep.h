@@ -1,6 +1,6 @@
 /*
- * What is kept of a job that is done, so that it can go on (extend.h): its last checkpoint and the journal behind it, and in
- * jobs/jN/order what was submitted and the plan. The films of the jobs that ended first go when all of them are more than the
+ * What is kept of a job that is done, so that it can go on (extend.h): its last checkpoint and the journal behind it, and
+ * jobs/jN/order (store/row_file.h). The films of the jobs that ended first go when all of them are more than the
  * limit, and all of them when a job that runs has no room; the results stay. The loop's thread.
  */
 #ifndef COORDINATOR_SHELL_KEEP_H
@@ -14,8 +14,5 @@ void keep_drop(const struct server *s, uint64_t job);
 uint64_t keep_bytes(const struct server *s, uint64_t job); /* on the disk */
 bool keep_drop_all(const struct server *s); /* of listed jobs; true: there was something */
 void keep_trim(const struct server *s);     /* after jobs have ended, and at the start */
-
-/* submission and plan are mem_alloc'd. -ENOENT: nothing is kept; -EBADMSG: it is damaged. */
-int keep_read(const struct server *s, uint64_t job, struct ledger_job *j, struct error *e);
 
 #endif

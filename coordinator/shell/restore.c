@@ -8,6 +8,7 @@
 #include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/control.h"
 #include "coordinator/shell/dispatch.h"
+#include "coordinator/shell/reconcile.h"
 #include "coordinator/shell/replay.h"
 #include "coordinator/shell/trust.h"
 
@@ -221,11 +222,9 @@ static void give_up(struct server *s, struct job_record *r, const char *why)
 
 int restore_open(struct server *s, struct error *e)
 {
-	char path[SPOOL_PATH_MAX];
 	struct ledger_job j;
 	struct job_record *r = mem_alloc(1, sizeof *r);
-	spool_path(s->spool, "jobs.db", path);
-	int rc = r ? ledger_open(&s->ledger, path, e) : error_set(e, ENOMEM, "no memory for the jobs");
+	int rc = r ? reconcile(s, e) : error_set(e, ENOMEM, "no memory for the jobs");
 	uint64_t id = 0;
 	while (!rc && (rc = ledger_next(s->ledger, id, &j, e)) > 0) {
 		id = j.id;

@@ -1,5 +1,6 @@
 #include "coordinator/store/record.h"
 
+#include "common/base/crc.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/film/agreement_json.h"
@@ -123,6 +124,29 @@ static void take_looks(const json_t *o, struct job_record *r)
 	forecast_looks_from_json(json_object_get(o, "looks"), &r->looks);
 }
 
+/* Of what it says, however it is laid out. -ENOMEM */
+static int checksum(const json_t *o, json_int_t *sum, struct error *e)
+{
+	char *text = json_dumps(o, JSON_COMPACT | JSON_SORT_KEYS);
+	if (!text)
+		return error_set(e, ENOMEM, "no memory for a record");
+	*sum = crc32c(0, text, strlen(text));
+	free(text);
+	return 0;
+}
+
+/* A record without one is of an earlier version. */
+static int check(json_t *o, struct error *e)
+{
+	const json_t *said = json_object_get(o, "crc32c");
+	json_int_t want = json_integer_value(said), got = 0;
+	if (!said)
+		return 0;
+	json_object_del(o, "crc32c");
+	int rc = checksum(o, &got, e);
+	return rc ? rc : got == want ? 0 : error_set(e, EBADMSG, "damaged: its checksum does not fit");
+}
+
 int record_to_json(const struct job_record *r, char **out, struct error *e)
 {
 	json_error_t fault;
@@ -146,6 +170,12 @@ int record_to_json(const struct job_record *r, char **out, struct error *e)
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	json_object_set_new(o, "effects", record_effects(r));
 	put_looks(o, r);
+	json_int_t sum = 0;
+	int rc = checksum(o, &sum, e);
+	if (rc || json_object_set_new(o, "crc32c", json_integer(sum))) {
+		json_decref(o);
+		return error_set(e, ENOMEM, "no memory for a record");
+	}
 	char *text = json_dumps(o, JSON_INDENT(2));
 	json_decref(o);
 	*out = text ? mem_strdup(text) : NULL;
@@ -173,6 +203,11 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 				 : error_set(e, EBADMSG, "not the record of a job: %s", o ? "no schema" : fault.text);
 		json_decref(o);
 		return rc;
+	}
+	int damaged = check(o, e);
+	if (damaged) {
+		json_decref(o);
+		return damaged;
 	}
 	r->id = (uint64_t)json_integer_value(json_object_get(o, "id"));
 	take_text(o, "name", r->name, sizeof r->name);

@@ -231,6 +231,12 @@ uint64_t spool_next_job(const struct spool *s)
 	return s->next;
 }
 
+void spool_skip_jobs(struct spool *s, uint64_t id)
+{
+	if (id >= s->next && id < UINT64_MAX / 2)
+		s->next = id + 1;
+}
+
 int spool_take_job(struct spool *s, uint64_t id, struct error *e)
 {
 	char text[32], path[SPOOL_PATH_MAX];

@@ -17,6 +17,8 @@ void spool_close(struct spool *s);
 
 /* Ids from here on were never given out. Reads the counter and the folders' names, whichever is more. */
 uint64_t spool_next_job(const struct spool *s);
+/* Ids up to this one were given out, whatever the counter says. */
+void spool_skip_jobs(struct spool *s, uint64_t id);
 /* The id is given out: makes the job's folder and moves the counter beyond it, for good, before it returns. */
 int spool_take_job(struct spool *s, uint64_t id, struct error *e);
 

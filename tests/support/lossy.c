@@ -500,10 +500,14 @@ static int do_rename(const char *from, const char *to)
 	int rc = rename(from, to);
 	struct lossy_node *a = parent_of(from, &gone), *b = parent_of(to, &made);
 	if (!rc && a) {
-		assert(a == b);
 		struct name *n = *find(&a->live, gone);
-		assert(n);
-		rename_in(a, gone, made, n->node);
+		assert(n && b);
+		if (a != b) { /* each folder for itself: one of them may keep what the other does not */
+			rename_in(b, NULL, made, n->node);
+			rename_in(a, gone, NULL, NULL);
+		} else {
+			rename_in(a, gone, made, n->node);
+		}
 	}
 	return (int)out(rc);
 }

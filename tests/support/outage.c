@@ -41,6 +41,7 @@ static void serve(const struct farm_run *f)
 	c.spool = outage.root;
 	c.port_file = port_file;
 	c.journal_bytes = outage.journal_bytes ? outage.journal_bytes : 2000;
+	c.accept_loss = outage.accept_loss;
 	c.blob_bytes = 1 << 20;
 	c.retry_seconds = 0.01;
 	c.film_bytes = 0; /* more files that can fail */

@@ -44,6 +44,7 @@ extern struct outage {
 	_Atomic uint64_t *counts;   /* of the disk; set by the test */
 	struct outage_found *found; /* set by the test */
 	bool loud;                  /* with the coordinator's log */
+	bool accept_loss;           /* --accept-loss */
 	uint64_t journal_bytes;     /* --journal; 0: a checkpoint after every result or two */
 	uint64_t quiet_calls;       /* of an undisturbed run, that change something */
 	char running[64];           /* the run that is under way; "": none */

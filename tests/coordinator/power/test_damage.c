@@ -13,6 +13,7 @@
 #include <cmocka.h>
 
 #include <glob.h>
+#include <sqlite3.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -134,10 +135,118 @@ static void a_bit_of_a_journal(void **state)
 	assert_true(runs > RUNS / 2 && all > runs / 2 && behind > 2 * runs);
 }
 
+/* ---- the database of jobs */
+
+static void in_root(const char *command)
+{
+	char text[600];
+	snprintf(text, sizeof text, "cd '%s' && { %s; }", outage.root, command);
+	assert_int_equal(system(text), 0);
+}
+
+static void change_rows(const char *sql)
+{
+	char path[256];
+	sqlite3 *db;
+	snprintf(path, sizeof path, "%s/jobs.db", outage.root);
+	assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+	assert_int_equal(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
+	assert_true(sqlite3_changes(db) > 0);
+	assert_int_equal(sqlite3_close(db), SQLITE_OK);
+}
+
+static void flip_in(const char *name, uint64_t seed)
+{
+	char path[256];
+	size_t size = largest(name, path);
+	assert_true(size > 0);
+	flip(path, seed * 7919 * 104729 % size);
+}
+
+/* All that was acknowledged is there afterwards, and nothing is computed again. */
+static void damaged_database(void **state)
+{
+	(void)state;
+	enum { KINDS = 12, RUNS = 3 * KINDS };
+	before(0);
+	for (uint64_t seed = 1; seed <= RUNS; seed++) {
+		begin(100 + seed);
+		switch (seed % KINDS) {
+		case 0:
+			in_root("rm jobs.db-wal");
+			break;
+		case 1:
+			in_root("rm jobs.db jobs.db-wal");
+			break;
+		case 2:
+			in_root("rm jobs.db");
+			break;
+		case 3:
+			in_root("truncate -s $(( $(stat -c %s jobs.db-wal) / 3 )) jobs.db-wal");
+			break;
+		case 4:
+			in_root("truncate -s 5000 jobs.db");
+			break;
+		case 5:
+			in_root("echo no database, and none that anybody would take for one >jobs.db; rm jobs.db-wal");
+			break;
+		case 6: /* the wal goes into the database first */
+			change_rows("UPDATE jobs SET plan = CAST(substr(plan, 1, length(plan) - 1) || x'07' AS BLOB) WHERE ended IS NULL");
+			break;
+		case 7:
+			change_rows("DELETE FROM jobs");
+			break;
+		case 8:
+			change_rows("UPDATE jobs SET ended = 5, state = 'done', submission = NULL, plan = NULL WHERE ended IS NULL");
+			break;
+		case 9:
+			change_rows("UPDATE jobs SET owner = 'ann'");
+			flip_in("jobs.db", seed);
+			break;
+		default:
+			flip_in("jobs.db-wal", seed);
+		}
+		snprintf(outage.running, sizeof outage.running, "seed %llu, kind %d", (unsigned long long)seed, (int)(seed % KINDS));
+		finish();
+		assert_int_equal(lost(), 0);
+	}
+}
+
+/* Neither the database nor its folder knows what a job is: the start is refused, and nothing is touched; then it is put aside, and the others
+ * go on. */
+static void what_is_lost(void **state)
+{
+	(void)state;
+	before(0);
+	uint64_t put_aside = 0;
+	for (uint64_t seed = 201; seed <= 206; seed++) {
+		char path[256];
+		begin(seed);
+		if (largest("jobs/j*/order", path) == 0)
+			continue;
+		in_root("for o in jobs/*/order; do ! grep -q '\"done\"' ${o%order}job.json || continue; j=${o%/order}; break; done; echo $j >lost-job");
+		in_root(seed % 2 ? "rm $(cat lost-job)/order" : "printf x | dd of=$(cat lost-job)/order bs=1 seek=20 conv=notrunc status=none");
+		in_root("rm jobs.db jobs.db-wal; find $(cat lost-job) -type f | sort | xargs sha256sum >sums");
+		run.faulty = true;
+		assert_false(outage_start(&run));
+		assert_int_equal(run.code, 1);
+		in_root("sha256sum --quiet -c sums && test ! -e lost");
+		outage.accept_loss = true;
+		finish();
+		outage.accept_loss = false;
+		assert_int_equal(lost(), 1);
+		in_root("j=$(basename $(cat lost-job)); sed s,jobs/,lost/, sums | sha256sum --quiet -c && grep -q jobs.db lost/$j/why");
+		put_aside++;
+	}
+	assert_true(put_aside > 3);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(a_bit_of_a_journal, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(damaged_database, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_is_lost, folder_set_up, folder_tear_down),
 	};
 	outage.counts = mmap(NULL, LOSSY_COUNTS * sizeof *outage.counts, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 	outage.found = &found;

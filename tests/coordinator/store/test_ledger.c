@@ -188,7 +188,7 @@ static void versions(void **state)
 	set_version(path, -1140850685);
 	assert_int_equal(ledger_open(&l, path, &e), -EBADMSG);
 	assert_non_null(strstr(e.text, "damaged"));
-	set_version(path, 3);
+	set_version(path, 4);
 	l = open_ledger(path);
 	ledger_close(l);
 	int fd = open(path, O_RDWR | O_TRUNC);

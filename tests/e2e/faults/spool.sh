@@ -70,3 +70,74 @@ clock_goes_ahead() {
 	sleep 0.5
 	echo 0 >"$DIR/clock"
 }
+
+fault jobs_database 8 2 "jobs.db or its WAL is gone, cut off, or has a wrong bit when the coordinator starts"
+jobs_database() {
+	farm
+	worker w0
+	worker w1
+	job
+	each_time database_is_damaged
+	finish_job
+	[ "$(grep -c 'level=error event=spool_fault' "$DIR/coordinator.log")" -gt 0 ] || fail "$NAME: it does not say what was lost"
+}
+database_is_damaged() {
+	kill -9 "$COORDINATOR_PID"
+	wait "$COORDINATOR_PID" 2>/dev/null || :
+	db=$DIR/spool/jobs.db
+	[ -s "$db-wal" ] || : >>"$db-wal"
+	case $((i % 4)) in
+	1) rm "$db-wal" ;;
+	2) flip "$db" 0.4 ;;
+	3) rm "$db" "$db-wal" ;;
+	0) truncate -s 3000 "$db" ;;
+	esac
+	again
+	[ -d "$DIR/spool/jobs/$ID" ] || fail "$NAME: the job's folder is gone"
+}
+
+fault plan_changed 2 1 "a number in the plan of a job's row is another one when the coordinator starts"
+plan_changed() {
+	farm
+	worker w0
+	worker w1
+	job
+	each_time plan_is_changed
+	finish_job
+	[ "$(grep -c 'its row in jobs.db was damaged: made anew from its folder' "$DIR/coordinator.log")" -eq "$TIMES" ] || fail "$NAME: not noticed"
+}
+plan_is_changed() {
+	kill -9 "$COORDINATOR_PID"
+	wait "$COORDINATOR_PID" 2>/dev/null || :
+	"$PYTHON" - "$DIR/spool/jobs.db" <<'TEXT' || fail "$NAME: no row"
+import sqlite3, sys
+db = sqlite3.connect(sys.argv[1])
+(plan,) = db.execute("SELECT plan FROM jobs WHERE ended IS NULL").fetchone()
+db.execute("UPDATE jobs SET plan = ? WHERE ended IS NULL", (plan[:-1] + bytes([plan[-1] ^ 1]),))
+db.commit()
+TEXT
+	again
+}
+
+fault row_lost 1 1 "a row of jobs.db and its copy in the job's folder are gone: the start is refused, --accept-loss goes on"
+row_lost() {
+	farm
+	worker w0
+	worker w1
+	other=$("$BIN/hslt-submit" "$BOX" -o "$DIR/other.exr" --integrator path --size 16x16 --spp 100000000 2>>"$DIR/submit.log") || fail "$NAME: no other job"
+	"$BIN/hslt-job" hold "$other" 2>>"$DIR/hold.log"
+	job
+	each_time row_is_lost
+	finish_job
+	[ -s "$DIR/spool/lost/$other/why" ] && [ -s "$DIR/spool/lost/$other/job.json" ] || fail "$NAME: what was left of $other is gone"
+}
+row_is_lost() {
+	kill -9 "$COORDINATOR_PID"
+	wait "$COORDINATOR_PID" 2>/dev/null || :
+	printf x >>"$DIR/spool/jobs/$other/order"
+	rm "$DIR/spool/jobs.db" "$DIR/spool/jobs.db-wal"
+	"$BIN/hslt-coordinator" --listen "$COORDINATOR" --spool "$DIR/spool" >"$DIR/refused.out" 2>"$DIR/refused.log" && fail "$NAME: it starts"
+	grep -q "has lost 1 job: $other .*--accept-loss" "$DIR/refused.log" || fail "$NAME: it says: $(tail -n 1 "$DIR/refused.log")"
+	[ -s "$DIR/spool/jobs/$other/job.json" ] || fail "$NAME: refused, and deleted"
+	again --accept-loss
+}
