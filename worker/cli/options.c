@@ -313,7 +313,7 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 	memcpy(p->knobs, a->render.knobs, sizeof p->knobs);
 	memcpy(p->effects, a->render.effects, sizeof p->effects);
 	if (!p->min_depth)
-		p->min_depth = 1;
+		p->min_depth = s->hide_emitters ? 2 : 1;
 	if (!p->max_depth)
 		p->max_depth = s->max_depth;
 	/* Longer paths carry no light; but what was asked for at least must be asked of something. */

@@ -1,7 +1,8 @@
 #include "worker/scene/scene.h"
 
-#include "common/base/text.h"
+#include "worker/scene/id_table.h"
 #include "worker/scene/plugin.h"
+#include "worker/scene/report.h"
 #include "worker/scene/value.h"
 #include "worker/scene/xml.h"
 
@@ -11,13 +12,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { NOTES_MAX = 256, NOTE_MAX = 512 };
-
-struct id_entry {
-	const char *id;
-	struct xml_element *element;
-};
-
 /* Reads one scene; all pointers lead into the scene's arena. */
 struct maker {
 	struct scene *scene;
@@ -25,9 +19,8 @@ struct maker {
 	const struct plugin_decl *decls;
 	struct error *error;
 	struct xml_tree *tree;
-	struct id_entry *ids; /* sorted */
-	size_t id_count;
-	const char **notes, **note_keys; /* NOTES_MAX */
+	struct id_table ids;
+	struct report report;
 	const char **assets;
 	size_t asset_count, asset_room;
 	int depth;
@@ -55,27 +48,13 @@ static void *allocate(struct maker *m, size_t count, size_t size)
 __attribute__((format(printf, 5, 6))) static int note(struct maker *m, const struct xml_element *el, const char *type,
 						      const char *property, const char *format, ...)
 {
-	char key[NOTE_MAX], text[NOTE_MAX];
+	char key[REPORT_TEXT_MAX];
 	snprintf(key, sizeof key, "%.64s/%.64s/%.64s", el->name, type, property);
-	struct scene *s = m->scene;
-	for (uint32_t i = 0; i < s->note_count; i++)
-		if (strcmp(m->note_keys[i], key) == 0)
-			return 0;
-	if (s->note_count == NOTES_MAX)
-		return 0;
 	va_list ap;
 	va_start(ap, format);
-	vsnprintf(text, sizeof text, format, ap);
+	int r = report_note(&m->report, el->file, key, m->error, format, ap);
 	va_end(ap);
-	text_clean(text);
-	if (s->note_count == NOTES_MAX - 1)
-		snprintf(text, sizeof text, "%s: more is ignored than is listed here", el->file);
-	m->notes[s->note_count] = arena_strdup(&s->arena, text);
-	m->note_keys[s->note_count] = arena_strdup(&s->arena, key);
-	if (!m->notes[s->note_count] || !m->note_keys[s->note_count])
-		return out_of_memory(m);
-	s->note_count++;
-	return 0;
+	return r;
 }
 
 static int note_property(struct maker *m, const struct xml_element *owner, const struct xml_element *el, const char *name)
@@ -233,30 +212,6 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	return r || !file ? r : add_asset(m, file);
 }
 
-static int compare_ids(const void *a, const void *b)
-{
-	const struct id_entry *x = a, *y = b;
-	return strcmp(x->id, y->id);
-}
-
-static int find_object(struct maker *m, const struct xml_element *el, const char *attribute, struct xml_element **out)
-{
-	const char *id = xml_attribute(el, attribute);
-	if (!id)
-		return xml_error(el, m->error, EINVAL, "needs an attribute `%s`", attribute);
-	struct id_entry key = {id, NULL};
-	const struct id_entry *found = bsearch(&key, m->ids, m->id_count, sizeof key, compare_ids);
-	if (found) {
-		*out = found->element;
-		return 0;
-	}
-	char hint[128];
-	struct spelling s = {.wanted = id};
-	for (size_t i = 0; i < m->id_count; i++)
-		spelling_offer(&s, m->ids[i].id);
-	return xml_error(el, m->error, ENOENT, "there is no object with id \"%.64s\"%s", id, spelling_hint(&s, hint, sizeof hint));
-}
-
 static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out);
 
 /* An object inside another or referred to there: by its name where the table has it, by its class else. */
@@ -335,7 +290,7 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	struct xml_element *target;
 	int r = value_check_element(el, "id|name", false, m->error);
 	if (!r)
-		r = find_object(m, el, "id", &target);
+		r = id_table_find(&m->ids, el, "id", &target, m->error);
 	return r ? r : read_object(m, d, owner, el, target);
 }
 
@@ -370,13 +325,15 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 	d->node->properties = d->properties;
 	d->node->children = d->children;
 	for (struct xml_element *c = el->first; c; c = c->next) {
-		int r = read_content(m, d, el, c);
+		int r = report_problem(&m->report, read_content(m, d, el, c), m->error);
 		if (r)
 			return r;
 	}
 	return 0;
 }
 
+/* An object with something wrong inside becomes a node all the same, so that all that is wrong is found; one that is no object of
+ * any kind does not, and is complained of once. */
 static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
 {
 	if (el->node) {
@@ -385,8 +342,11 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	}
 	if (el->busy)
 		return xml_error(el, m->error, ELOOP, "refers to itself");
+	if (el->told)
+		return REPORT_TOLD;
 	if (m->depth >= XML_DEPTH_MAX)
 		return xml_error(el, m->error, ELOOP, "objects refer to each other more than %d deep", XML_DEPTH_MAX);
+	el->told = true; /* unless it succeeds */
 	enum plugin_class cls;
 	plugin_class_find(el->name, &cls);
 	int r = value_check_element(el, "type|id|name", true, m->error);
@@ -414,80 +374,6 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	return r;
 }
 
-static struct xml_element *next_element(struct xml_element *el)
-{
-	if (el->first)
-		return el->first;
-	while (el && !el->next)
-		el = el->parent;
-	return el ? el->next : NULL;
-}
-
-static int check_unique(struct maker *m)
-{
-	qsort(m->ids, m->id_count, sizeof *m->ids, compare_ids);
-	for (size_t i = 1; i < m->id_count; i++) {
-		const struct xml_element *a = m->ids[i - 1].element, *b = m->ids[i].element;
-		if (strcmp(m->ids[i - 1].id, m->ids[i].id) == 0) {
-			bool b_later = b->line > a->line;
-			return xml_error(b_later ? b : a, m->error, EINVAL, "the id \"%.64s\" is given twice (also in %s:%d)",
-					 m->ids[i].id, a->file, b_later ? a->line : b->line);
-		}
-	}
-	return 0;
-}
-
-/* An alias may name an alias that stands before it. */
-static int read_alias(struct maker *m, const struct xml_element *el)
-{
-	const char *as = xml_attribute(el, "as");
-	struct xml_element *target;
-	if (!as)
-		return xml_error(el, m->error, EINVAL, "needs an attribute `as`");
-	int r = value_check_element(el, "id|as", false, m->error);
-	if (!r)
-		r = find_object(m, el, "id", &target);
-	if (r)
-		return r;
-	size_t at = m->id_count;
-	while (at > 0 && strcmp(m->ids[at - 1].id, as) > 0)
-		at--;
-	if (at > 0 && strcmp(m->ids[at - 1].id, as) == 0)
-		return xml_error(el, m->error, EINVAL, "the id \"%.64s\" is given twice (also in %s:%d)", as,
-				 m->ids[at - 1].element->file, m->ids[at - 1].element->line);
-	memmove(m->ids + at + 1, m->ids + at, (m->id_count - at) * sizeof *m->ids);
-	m->ids[at] = (struct id_entry){as, target};
-	m->id_count++;
-	return 0;
-}
-
-/* Objects may be referred to before they stand in the file, as 3.x allows and 0.6 does not. */
-static int collect_ids(struct maker *m)
-{
-	enum { ALIASES_MAX = 256 };
-	enum plugin_class cls;
-	size_t n = 0, aliases = 0;
-	for (struct xml_element *el = m->tree->root; el; el = next_element(el))
-		n += xml_attribute(el, "id") != NULL;
-	m->ids = allocate(m, n, sizeof *m->ids);
-	if (!m->ids)
-		return out_of_memory(m);
-	for (struct xml_element *el = m->tree->root; el; el = next_element(el)) {
-		const char *id = xml_attribute(el, "id");
-		if (id && !el->ignored && plugin_class_find(el->name, &cls))
-			m->ids[m->id_count++] = (struct id_entry){id, el};
-	}
-	int r = check_unique(m);
-	for (struct xml_element *el = m->tree->root; el && !r; el = next_element(el)) {
-		if (el->ignored || strcmp(el->name, "alias") != 0)
-			continue;
-		if (++aliases > ALIASES_MAX)
-			return xml_error(el, m->error, E2BIG, "more than %d aliases", ALIASES_MAX);
-		r = read_alias(m, el);
-	}
-	return r;
-}
-
 static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects);
 
 static int read_include(struct maker *m, const struct xml_element *el, const struct scene_node **objects)
@@ -499,12 +385,14 @@ static int read_include(struct maker *m, const struct xml_element *el, const str
 static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects)
 {
 	int r = value_check_element(scene, "version", true, m->error);
+	r = report_problem(&m->report, r, m->error);
 	for (struct xml_element *el = scene->first; el && !r; el = el->next) {
 		enum plugin_class cls;
+		const struct scene_node **next = &objects[m->scene->object_count];
 		if (el->ignored)
 			r = note_foreign(m, el);
 		else if (plugin_class_find(el->name, &cls))
-			r = make_node(m, el, &objects[m->scene->object_count++]);
+			m->scene->object_count += (r = make_node(m, el, next)) == 0;
 		else if (strcmp(el->name, "include") == 0)
 			r = read_include(m, el, objects);
 		else if (strcmp(el->name, "default") == 0)
@@ -513,6 +401,7 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 			r = value_check_element(el, "value", false, m->error);
 		else if (strcmp(el->name, "alias") != 0)
 			r = refuse_element(el, m->error);
+		r = report_problem(&m->report, r, m->error);
 	}
 	return r;
 }
@@ -541,52 +430,119 @@ static int list_assets(struct maker *m)
 	return 0;
 }
 
-/* A scene may hold several cameras; one image has one. */
-static int note_sensors(struct maker *m)
+__attribute__((format(printf, 4, 5))) static int note_object(struct maker *m, const struct scene_node *n, const char *key,
+							    const char *format, ...)
 {
-	const struct scene_node *first = NULL;
-	for (uint32_t i = 0; i < m->scene->object_count; i++) {
+	char text[REPORT_TEXT_MAX];
+	va_list ap;
+	va_start(ap, format);
+	vsnprintf(text, sizeof text, format, ap);
+	va_end(ap);
+	const struct xml_element place = {.name = plugin_class_name(n->cls), .file = n->file, .line = n->line};
+	return note(m, &place, key, "", "%s:%d: <%s type=\"%.64s\">: %s", n->file, n->line, place.name, n->type, text);
+}
+
+/* Whoever asks for a part of the light, or for something else than light, gets another picture: that is said. */
+static int note_integrator(struct maker *m, const struct scene_node *n)
+{
+	static const char *const others[] = {"direct", "volpath", "volpathmis", "prbvolpath", "volpath_simple", "aov", "stokes",
+					     "moment", "depth", "field", "ao", "vpl", "irrcache", "sppm", "ppm", "photonmapper"};
+	int r = 0;
+	for (size_t i = 0; i < sizeof others / sizeof *others && !r; i++)
+		if (strcmp(n->type, others[i]) == 0)
+			r = note_object(m, n, "other", "is not what is rendered: the picture is of all light on surfaces, without media%s",
+					strcmp(n->type, "direct") == 0 ? "; --max-depth 2 leaves out indirect light" : "");
+	return r;
+}
+
+static bool shines(const struct scene_node *n)
+{
+	return n->cls == PLUGIN_EMITTER || (n->cls == PLUGIN_SHAPE && node_child(n, PLUGIN_EMITTER, 0));
+}
+
+/* What only the whole scene says: a camera too many, a picture that will not be what was asked for, no light. */
+static int note_whole(struct maker *m)
+{
+	const struct scene_node *camera = NULL;
+	bool light = false;
+	int r = 0;
+	for (uint32_t i = 0; i < m->scene->object_count && !r; i++) {
 		const struct scene_node *n = m->scene->objects[i];
-		if (n->cls != PLUGIN_SENSOR)
-			continue;
-		if (first) {
-			const struct xml_element place = {.name = "sensor", .file = n->file, .line = n->line};
-			return note(m, &place, "", "", "%s:%d: <sensor>: only the first sensor, in line %d, is rendered", n->file,
-				    n->line, first->line);
-		}
-		first = n;
+		light |= shines(n);
+		if (n->cls == PLUGIN_INTEGRATOR)
+			r = note_integrator(m, n);
+		else if (n->cls == PLUGIN_SENSOR && camera)
+			r = note_object(m, n, "second", "only the first sensor, in line %d, is rendered", camera->line);
+		else if (n->cls == PLUGIN_SENSOR)
+			camera = n;
 	}
-	return 0;
+	if (!r && !light && camera && m->report.problem_count == 0)
+		r = note_object(m, camera, "dark", "the scene has no emitter: the picture is black");
+	return r;
 }
 
 static int make_scene(struct maker *m)
 {
 	struct scene *s = m->scene;
-	m->notes = allocate(m, NOTES_MAX, sizeof *m->notes);
-	m->note_keys = allocate(m, NOTES_MAX, sizeof *m->note_keys);
 	const struct scene_node **objects = allocate(m, m->tree->element_count, sizeof *objects);
-	if (!m->notes || !m->note_keys || !objects)
+	if (!objects)
 		return out_of_memory(m);
 	s->dialect_3 = m->tree->dialect_3;
-	s->notes = m->notes;
 	s->objects = objects;
-	int r = collect_ids(m);
+	int r = report_problem(&m->report, id_table_make(&m->ids, m->tree, &m->scene->arena, m->error), m->error);
 	if (!r)
 		r = read_top(m, m->tree->root, objects);
 	if (!r)
-		r = note_sensors(m);
+		r = note_whole(m);
 	return r ? r : list_assets(m);
+}
+
+/* All that can be said of the file; what is wrong with it ends in s->problems. */
+static int read_all(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
+		    const struct scene_define *defines, size_t define_count, struct maker *m)
+{
+	*s = (struct scene){.arena.limit = XML_MEMORY_MAX};
+	*m = (struct maker){.scene = s, .assets_from = assets, .decls = decls, .error = m->error};
+	m->tree = allocate(m, 1, sizeof *m->tree);
+	int r = m->tree ? report_init(&m->report, &s->arena, m->error) : out_of_memory(m);
+	if (r)
+		return r;
+	r = xml_read(m->tree, assets, name, defines, define_count, &s->arena, m->error);
+	if (r)
+		r = report_problem(&m->report, r, m->error);
+	else
+		r = make_scene(m);
+	s->notes = m->report.notes;
+	s->note_count = m->report.note_count;
+	s->problems = m->report.problems;
+	s->problem_count = m->report.problem_count;
+	return r;
+}
+
+int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
+		   const struct scene_define *defines, size_t define_count, struct error *e)
+{
+	struct maker m = {.error = e};
+	int r = read_all(s, assets, name, decls, defines, define_count, &m);
+	if (r)
+		scene_fini(s);
+	return r;
 }
 
 int scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
 	       const struct scene_define *defines, size_t define_count, struct error *e)
 {
-	*s = (struct scene){.arena.limit = XML_MEMORY_MAX};
-	struct maker m = {.scene = s, .assets_from = assets, .decls = decls, .error = e};
-	m.tree = allocate(&m, 1, sizeof *m.tree);
-	int r = m.tree ? xml_read(m.tree, assets, name, defines, define_count, &s->arena, e) : out_of_memory(&m);
-	if (!r)
-		r = make_scene(&m);
+	struct error unused;
+	struct maker m = {.error = e ? e : &unused};
+	int r = read_all(s, assets, name, decls, defines, define_count, &m);
+	if (!r && s->problem_count > 0) {
+		r = m.report.code;
+		uint32_t more = s->problem_count - 1;
+		if (more)
+			error_set(e, -r, "%.900s (and %u more: hslt-scene check lists them)", m.report.first.text, more);
+		else if (e)
+			*e = m.report.first;
+	}
 	if (r)
 		scene_fini(s);
 	return r;

@@ -60,6 +60,8 @@ struct scene {
 	const struct scene_node *const *objects; /* top level, in file order */
 	uint32_t asset_count;
 	const char *const *assets; /* names of all files that the description refers to, without the scene file, each once */
+	uint32_t problem_count; /* 0 but after scene_read_all */
+	const char *const *problems; /* "scene.xml:12: <bsdf>: ..." all that is wrong or not supported, in the file's order */
 	uint32_t note_count;
 	const char *const *notes; /* "scene.xml:12: ignored ..." once each, for the log */
 };
@@ -73,6 +75,11 @@ struct scene_define {
 int scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
 	       const struct scene_define *defines, size_t define_count, struct error *e);
 void scene_fini(struct scene *s);
+
+/* The same, but a scene with something wrong in it is no failure: it is as far as it could be read, and s->problems says all that is
+ * wrong. Not for rendering where there is any. -ENOMEM. */
+int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
+		   const struct scene_define *defines, size_t define_count, struct error *e);
 
 /* Look-ups; defaults are the caller's. A property that is there has passed its table's type and range. */
 const struct property *node_find(const struct scene_node *n, const char *name);

@@ -77,6 +77,7 @@ static const struct param sampler_params[] = {
 };
 static const struct param integrator_params[] = {
 	{"max_depth", RANGE(VALUE_INT, -1, 1 << 30)},
+	{"hide_emitters", UNDERSTOOD(VALUE_BOOL)},
 	{"*", IGNORED},
 	{NULL, 0, 0, 0, 0, NULL},
 };
@@ -181,6 +182,8 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	int64_t depth = -1;
 	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
 		depth = node_int(n, "max_depth", depth);
+	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
+		out->hide_emitters |= node_bool(n, "hide_emitters", false);
 	if (depth == 0)
 		return node_error(integrator, e, ERANGE, "a depth of 0 shows nothing; 1 is emitters seen directly, -1 no limit");
 	if (depth > 0 && depth < MAX_DEPTH)

@@ -17,6 +17,7 @@ struct scene_settings {
 	uint32_t crop_x, crop_y, crop_width, crop_height; /* what the scene's film wants rendered; width 0: all of it */
 	uint64_t spp;                        /* sampleCount; 0: none given */
 	uint32_t max_depth;                  /* edges, 1..128 (-1 and more become 128); 128 when none is given */
+	bool hide_emitters;                  /* paths of one edge, emitters seen directly, are not wanted */
 	char integrator[32];                 /* the scene's own ("" none): ignored but for its depth */
 	/* perspective, thinlens */
 	mat4 to_world; /* camera: +z forward, +x LEFT on the image, +y up; any scale is removed */

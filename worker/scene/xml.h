@@ -35,7 +35,7 @@ struct xml_element {
 	struct xml_attribute *attributes;
 	struct xml_element *parent, *first, *last, *next;
 	const struct scene_node *node; /* for the interpreter: what it became */
-	bool busy;                     /* for the interpreter: being made into a node */
+	bool busy, told;               /* for the interpreter: being made into a node; cannot be, and that has been said */
 };
 
 

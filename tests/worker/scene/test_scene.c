@@ -249,7 +249,7 @@ static void test_ignored_is_noted_once(void **state)
 				 "<dpt/></scene>");
 	assert_int_equal(s.note_count, 4);
 	assert_string_equal(s.notes[0], "s.xml:2: <mode> and all inside it is ignored");
-	assert_string_equal(s.notes[1], "s.xml:3: <integrator type=\"unheard\"> is ignored but for: max_depth");
+	assert_string_equal(s.notes[1], "s.xml:3: <integrator type=\"unheard\"> is ignored but for: max_depth, hide_emitters");
 	assert_non_null(strstr(s.notes[2], "s.xml:4: <bsdf type=\"roughdielectric\">: `sample_visible`"));
 	assert_non_null(strstr(s.notes[3], "s.xml:6: <dpt>"));
 	assert_int_equal(node_int(s.objects[0], "max_depth", 0), 7);
@@ -272,9 +272,33 @@ static void test_assets_are_sorted_and_unique(void **state)
 	scene_fini(&s);
 }
 
+/* All that is wrong, each with its place, an object that is no object once. */
+static void test_every_problem_is_told(void **state)
+{
+	(void)state;
+	const char *xml = "<scene version='3.0.0'>\n<bsdf type='hair' id='fur'/>\n<shape type='cube'><ref id='fur'/>\n"
+			  "<float name='radius' value='1'/></shape>\n<shape type='cube'><ref id='fur'/></shape>\n<shape type='cone'/>\n</scene>";
+	static const char *const want[] = {"s.xml:2: <bsdf type=\"hair\">", "s.xml:4: <float>", "s.xml:6: <shape type=\"cone\">"};
+	const struct memory_file memory[] = {{"s.xml", xml, strlen(xml)}, {0}};
+	struct asset_source assets = memory_assets(memory);
+	struct scene s;
+	struct error e;
+	assert_int_equal(scene_read_all(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
+	assert_int_equal(s.problem_count, 3);
+	for (uint32_t i = 0; i < 3; i++)
+		if (strncmp(s.problems[i], want[i], strlen(want[i])) != 0)
+			fail_msg("problem %u: %s\n not: %s", i, s.problems[i], want[i]);
+	assert_int_equal(s.object_count, 2); /* the cubes, as far as they could be read */
+	scene_fini(&s);
+	assert_int_equal(scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), -EINVAL);
+	assert_non_null(strstr(e.text, want[0]));
+	assert_non_null(strstr(e.text, "(and 2 more: hslt-scene check lists them)"));
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_every_problem_is_told),
 		cmocka_unit_test(test_rgb),
 		cmocka_unit_test(test_spectra),
 		cmocka_unit_test(test_plain_values),

@@ -98,6 +98,9 @@ static void test_sampler_and_integrator(void **state)
 	assert_int_equal(s.max_depth, 9);
 	assert_string_equal(s.integrator, "bdpt");
 	assert_int_equal(s.spp, 17);
+	assert_false(s.hide_emitters);
+	assert_true(read_ok("<integrator type='aov'><integrator type='path'><boolean name='hideEmitters' value='true'/></integrator>"
+			    "</integrator>", "").hide_emitters);
 	static const struct {
 		const char *depth;
 		uint32_t want;
@@ -133,8 +136,8 @@ static void test_camera(void **state)
 static void test_several_sensors(void **state)
 {
 	(void)state;
-	const char *xml = "<scene version='3.0.0'>\n<sensor type='perspective'><float name='fov' value='20'/></sensor>\n"
-			  "<sensor type='perspective'><float name='fov' value='30'/></sensor></scene>";
+	const char *xml = "<scene version='3.0.0'><emitter type='area' id='lamp'/>\n<sensor type='perspective'><float name='fov' "
+			  "value='20'/></sensor>\n<sensor type='perspective'><float name='fov' value='30'/></sensor></scene>";
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
 	struct asset_source assets = memory_assets(files);
 	struct scene s;
@@ -144,8 +147,37 @@ static void test_several_sensors(void **state)
 	assert_int_equal(scene_settings_read(&s, 0, 0, &set, &e), 0);
 	assert_true(set.fov == 20);
 	assert_int_equal(s.note_count, 1);
-	assert_string_equal(s.notes[0], "s.xml:3: <sensor>: only the first sensor, in line 2, is rendered");
+	assert_string_equal(s.notes[0], "s.xml:3: <sensor type=\"perspective\">: only the first sensor, in line 2, is rendered");
 	scene_fini(&s);
+}
+
+/* What will not be in the picture, or what will be, is said by name. */
+static void test_notes_on_the_whole(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *xml, *note;
+	} cases[] = {
+		{"<sensor type='perspective'/>", "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the picture is black"},
+		{"<integrator type='direct'/>", "s.xml:1: <integrator type=\"direct\">: is not what is rendered: the picture is of all light on "
+						"surfaces, without media; --max-depth 2 leaves out indirect light"},
+		{"<integrator type='volpath'/>", "without media"},
+	};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char xml[512];
+		snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", cases[i].xml);
+		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		struct scene s;
+		struct error e;
+		bool found = false;
+		assert_int_equal(scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
+		for (uint32_t k = 0; k < s.note_count; k++)
+			found |= strstr(s.notes[k], cases[i].note) != NULL;
+		if (!found)
+			fail_msg("%s: no note says: %s", cases[i].xml, cases[i].note);
+		scene_fini(&s);
+	}
 }
 
 static void test_crop(void **state)
@@ -228,6 +260,7 @@ int main(void)
 		cmocka_unit_test(test_sampler_and_integrator),
 		cmocka_unit_test(test_camera),
 		cmocka_unit_test(test_several_sensors),
+		cmocka_unit_test(test_notes_on_the_whole),
 		cmocka_unit_test(test_crop),
 		cmocka_unit_test(test_size_is_overridden),
 		cmocka_unit_test(test_refused),
