@@ -47,6 +47,7 @@
 	X(BLOB_STORED, "blob_stored", DEBUG) \
 	X(WORLD_BUILT, "world_built", INFO) \
 	X(WORLD_FAILED, "world_failed", ERROR) \
+	X(PROCESS_LOST, "process_lost", ERROR) \
 	X(CHECKPOINT, "checkpoint", INFO) \
 	X(JOB_CLEARED, "job_cleared", INFO) \
 	X(SPOOL_READ, "spool_read", INFO) \

@@ -224,25 +224,34 @@ static bool never_works(const struct farm *f, const struct job *j)
 	return j->tries >= TRIES_FATAL && answer_all_failed(f, j);
 }
 
-static struct lease *held(const struct farm *f, const struct event *ev)
+/* The slot whose next lease it is; NULL: not of a worker and a job that are here. */
+static struct slot *next_slot(const struct farm *f, const struct event *ev)
 {
-	struct peer *p = farm_find_peer(f, ev->peer);
 	struct job *j = farm_find_job(f, ev->lease.key.job);
-	if (!p || !j || !job_is_live(j))
+	if (!farm_find_peer(f, ev->peer) || !j || !job_is_live(j))
 		return NULL;
 	struct slot *s = slot_of(j, &ev->lease.key);
-	return is_next(j, s, &ev->lease.key) ? lease_of(s, p) : NULL;
+	return is_next(j, s, &ev->lease.key) ? s : NULL;
+}
+
+static struct lease *held(const struct farm *f, const struct event *ev)
+{
+	struct slot *s = next_slot(f, ev);
+	return s ? lease_of(s, farm_find_peer(f, ev->peer)) : NULL;
 }
 
 void answer_failed(struct farm *f, const struct event *ev)
 {
-	struct lease *l = held(f, ev);
-	if (!l)
+	struct slot *s = next_slot(f, ev);
+	struct peer *p = farm_find_peer(f, ev->peer);
+	struct lease *l = s ? lease_of(s, p) : NULL;
+	/* It may tell of a lease that an earlier life of it had, and that ended that life. */
+	bool was_lost = s && lost_take(&s->lost, p->who);
+	if (!l && !was_lost)
 		return;
-	struct peer *p = l->peer;
-	struct job *j = l->job;
-	struct slot *s = l->slot;
-	lease_drop(f, l);
+	struct job *j = farm_find_job(f, ev->lease.key.job);
+	if (l)
+		lease_drop(f, l);
 	bool again = peer_avoids_until(p, j->id) > f->now && !peer_lacks(p, j->id); /* several at once: one reason */
 	peer_failed(f, p, j->id, ev->lease.own);
 	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
@@ -253,9 +262,11 @@ void answer_failed(struct farm *f, const struct event *ev)
 		return;
 	j->tries += !again;
 	bool fatal = failers_add(&s->failers, f, p->who), in_all = failers_add(&j->failers, f, p->who);
-	bool made = j->bootstrap_merged + j->leases_merged + j->noted > 0;
-	if (fatal || (!made && (in_all || never_works(f, j))))
-		rounds_end(f, j, END_FAILED, f->text);
+	if (!fatal && (job_is_proven(j) || !(in_all || never_works(f, j))))
+		return;
+	if (was_lost)
+		owner_limit(j->owner, f->now);
+	rounds_end(f, j, END_FAILED, f->text);
 }
 
 enum farm_delivery farm_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k)

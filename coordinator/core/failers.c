@@ -31,8 +31,8 @@ static void add(struct failers *l, const struct identity *who)
 	l->of[place].certificate = who->certificate_id;
 }
 
-/* That those have who are trusted, here or not, as far as it matters. */
-static uint32_t certificates_known(const struct farm *f)
+/* Those that the trusted have, here or not, as far as it matters. */
+uint32_t failers_certificates(const struct farm *f)
 {
 	struct failers known = {.count = 0};
 	for (uint32_t i = 0; i < f->known_count && certificates(&known) < FAILERS_FATAL; i++)
@@ -44,5 +44,5 @@ static uint32_t certificates_known(const struct farm *f)
 bool failers_add(struct failers *l, const struct farm *f, const struct identity *who)
 {
 	add(l, who);
-	return l->count == FAILERS_FATAL && certificates(l) >= certificates_known(f);
+	return l->count == FAILERS_FATAL && certificates(l) >= failers_certificates(f);
 }

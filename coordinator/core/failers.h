@@ -21,6 +21,9 @@ struct failers {
 	} of[FAILERS_FATAL];
 };
 
+/* So many certificates must be among those who fail. */
+uint32_t failers_certificates(const struct farm *f);
+
 /* true: it is the thing's fault. */
 bool failers_add(struct failers *l, const struct farm *f, const struct identity *who);
 

@@ -159,7 +159,7 @@ static void left(struct farm *f, const struct event *ev)
 {
 	struct peer *p = farm_find_peer(f, ev->peer);
 	if (p)
-		peer_leave(f, p);
+		peer_lose(f, p);
 }
 
 static void requested(struct farm *f, const struct event *ev)

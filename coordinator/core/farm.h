@@ -28,6 +28,9 @@
  *    merged or noted the job fails, too, when any leases of it failed on three such workers, or on all that are here and three
  *    times. What a worker lays to its own machine (a full disk) makes it pause and counts for none of this: where all that are here
  *    say so the job waits, and its status names them.
+ *  - A worker that goes while it holds a lease is on that lease's list (lost.h): when it calls again it may say that the lease ended
+ *    it, and that is a failure like any. Those who never call again count only when eight in a row held the same lease. The owner
+ *    of a job that ended workers gets one lease at a time for a while, of all his jobs that nothing has been made of.
  *  - Of a job that is verified a share of the leases is computed by two workers, of two identities (roster.h) and one
  *    fingerprint. The first answer is noted; one that equals another worker's is merged; where two differ a third
  *    decides, and a fourth; then the job fails. Who said otherwise than two that agree has given a wrong result.

@@ -99,6 +99,11 @@ bool job_is_open(const struct job *j)
 	return job_is_live(j) && !j->preparing && j->ending == END_NONE && !job_is_held(j);
 }
 
+bool job_is_proven(const struct job *j)
+{
+	return j->bootstrap_merged + j->leases_merged + j->noted > 0;
+}
+
 bool job_is_held(const struct job *j)
 {
 	for (int i = 0; i < JOB_HOLDS; i++)
@@ -200,6 +205,7 @@ bool job_merge(struct job *j, struct slot *s, double now, double duration)
 		j->ahead++;
 	s->timeouts = 0;
 	s->failers.count = 0;
+	s->lost.count = 0;
 	if (j->kind == LEASE_BOOTSTRAP)
 		j->bootstrap_merged++;
 	else

@@ -7,6 +7,7 @@
 #include "coordinator/core/farm.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/list.h"
+#include "coordinator/core/lost.h"
 #include "coordinator/core/owner.h"
 #include "coordinator/core/peer.h"
 #include "coordinator/core/rate.h"
@@ -19,6 +20,7 @@ struct slot {
 	uint64_t next;        /* the first epoch that is not merged */
 	double since;         /* when the lease that is out was sent */
 	struct failers failers; /* with the next epoch */
+	struct lost lost;       /* while they held it */
 	uint32_t holders, timeouts;
 };
 
@@ -81,6 +83,7 @@ void job_free(struct job *j);
 bool job_is_live(const struct job *j);
 bool job_is_open(const struct job *j); /* leases may be handed out and merged */
 bool job_is_held(const struct job *j);
+bool job_is_proven(const struct job *j); /* something of it was made */
 void job_hold(struct job *j, enum job_hold which, const char *why, double now); /* why "": no longer */
 double job_elapsed(const struct job *j, double now); /* s since its first lease, the time that it was held left out; NAN: none yet */
 struct slot *job_slot(const struct job *j, uint32_t group, uint32_t part);

@@ -2,7 +2,9 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "coordinator/core/state.h"
 
+#include <math.h>
 #include <string.h>
 
 struct owner *owner_use(struct link *owners, const char *name)
@@ -21,6 +23,7 @@ struct owner *owner_use(struct link *owners, const char *name)
 		return NULL;
 	memcpy(o->name, cut, sizeof o->name);
 	o->uses = 1;
+	o->limited_until = -INFINITY;
 	list_init(&o->link);
 	list_append(owners, &o->link);
 	return o;
@@ -32,4 +35,26 @@ void owner_drop(struct owner *o)
 		return;
 	list_remove(&o->link);
 	mem_free(o);
+}
+
+void owner_limit(struct owner *o, double now)
+{
+	static const double first = 60;
+	enum { DOUBLINGS = 6 };
+	o->limited_until = now + ldexp(first, o->limits < DOUBLINGS ? (int)o->limits : DOUBLINGS);
+	o->limits++;
+}
+
+bool owner_is_limited(const struct farm *f, const struct job *j)
+{
+	return j->owner->limited_until > f->now && !job_is_proven(j);
+}
+
+uint32_t owner_unproven(const struct farm *f, const struct owner *o)
+{
+	uint32_t n = 0;
+	for (uint32_t i = 0; i < f->live_count; i++)
+		if (f->live[i]->owner == o && !job_is_proven(f->live[i]))
+			n += f->live[i]->leases_out;
+	return n;
 }

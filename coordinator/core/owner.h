@@ -4,6 +4,7 @@
 
 #include "coordinator/core/list.h"
 
+#include <stdbool.h>
 #include <stdint.h>
 
 enum { OWNER_NAME = 72 };
@@ -13,10 +14,20 @@ struct owner {
 	uint32_t uses;
 	uint32_t leases_out; /* of all its jobs */
 	double wants; /* share.c's */
+	uint32_t limits;      /* jobs of his that ended workers */
+	double limited_until; /* -INFINITY: is not */
 	char name[OWNER_NAME];
 };
 
 struct owner *owner_use(struct link *owners, const char *name); /* NULL: no memory */
 void owner_drop(struct owner *o);                               /* NULL: nothing */
+
+/* A job of his has ended workers: for 60 s, twice as long each time to an hour, his jobs that nothing has been made of get one
+ * lease at a time. Forgotten with the last of his jobs. */
+void owner_limit(struct owner *o, double now);
+struct farm;
+struct job;
+bool owner_is_limited(const struct farm *f, const struct job *j);
+uint32_t owner_unproven(const struct farm *f, const struct owner *o); /* leases out of such jobs */
 
 #endif

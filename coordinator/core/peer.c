@@ -119,6 +119,21 @@ void peer_leave(struct farm *f, struct peer *p)
 	mem_free(p);
 }
 
+void peer_lose_leases(struct farm *f, struct peer *p)
+{
+	for (uint32_t i = 0; i < p->lease_limit; i++)
+		if (p->leases[i].used)
+			lost_lease(f, &p->leases[i]);
+}
+
+void peer_lose(struct farm *f, struct peer *p)
+{
+	p->want = 0;
+	peer_requeue(f, p);
+	peer_lose_leases(f, p);
+	peer_leave(f, p);
+}
+
 void peer_set_state(struct farm *f, struct peer *p, enum peer_state s)
 {
 	if (p->state == PEER_ACTIVE && s != PEER_ACTIVE)
@@ -132,6 +147,7 @@ void peer_set_state(struct farm *f, struct peer *p, enum peer_state s)
 void peer_heard(struct farm *f, struct peer *p)
 {
 	p->heard = f->now;
+	p->who->calls += p->state == PEER_SILENT;
 	if (p->state == PEER_SILENT)
 		peer_set_state(f, p, p->who->aside ? PEER_ASIDE : PEER_ACTIVE);
 }

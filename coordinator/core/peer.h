@@ -33,6 +33,7 @@ struct peer {
 	struct link waiting;
 	uint64_t queued; /* when it began to wait, as a number */
 	double joined, heard;
+	bool returns; /* it has called again, and this connection goes */
 	uint64_t merged, repeats, refused, faults, failures, timeouts;
 	char text[256];
 	uint32_t lease_limit;
@@ -45,6 +46,9 @@ void peer_class_drop(struct peer_class *c);
 /* NULL with a sentence when it is refused. */
 struct peer *peer_join(struct farm *f, const struct event_join *e, const char **refused);
 void peer_leave(struct farm *f, struct peer *p);
+/* The same of one that has gone by itself; its leases count as lost by it. */
+void peer_lose(struct farm *f, struct peer *p);
+void peer_lose_leases(struct farm *f, struct peer *p);
 void peer_set_state(struct farm *f, struct peer *p, enum peer_state s);
 void peer_heard(struct farm *f, struct peer *p);
 void peer_drop_leases(struct farm *f, struct peer *p, bool revoke);

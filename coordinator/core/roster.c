@@ -76,6 +76,7 @@ struct identity *roster_use(struct farm *f, const struct event_join *e, const ch
 		text_copy(k->home, sizeof k->home, e->home);
 	}
 	k->seen = f->now;
+	k->calls++;
 	k->uses++;
 	return k;
 }
@@ -120,7 +121,8 @@ bool roster_replace(struct farm *f, const struct event_join *e, const char **ref
 		struct action *a = update_add(f, ACTION_CLOSE_PEER);
 		a->peer = p->id;
 		a->text = "the same worker has called again";
-		peer_leave(f, p);
+		p->returns = true;
+		peer_lose(f, p);
 	}
 	return true;
 }

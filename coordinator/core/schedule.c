@@ -80,6 +80,15 @@ static bool comes_first(const struct job *a, const struct job *b)
 	return a->owner == b->owner ? a->leases_out <= b->leases_out : true;
 }
 
+/* Of an owner whose job ended workers: one lease at a time of all his jobs of which nothing has been made yet. */
+static bool must_wait(struct farm *f, const struct job *j)
+{
+	bool waits = owner_is_limited(f, j) && owner_unproven(f, j->owner) > 0;
+	if (waits)
+		call_again(f, j->owner->limited_until);
+	return waits;
+}
+
 /* Among jobs of the highest priority that can use a waiting worker the one whose turn it is. */
 static bool hand_out_ready(struct farm *f)
 {
@@ -90,7 +99,7 @@ static bool hand_out_ready(struct farm *f)
 		struct job *j = f->live[i];
 		if (best && j->priority < best->priority)
 			break;
-		if (!job_is_open(j) || (best && comes_first(best, j)))
+		if (!job_is_open(j) || (best && comes_first(best, j)) || must_wait(f, j))
 			continue;
 		struct slot *s;
 		struct peer *p = taker(f, j, &s);
@@ -110,7 +119,7 @@ static bool hand_out_copy(struct farm *f)
 {
 	for (uint32_t i = 0; i < f->live_count; i++) {
 		struct job *j = f->live[i];
-		if (!job_is_open(j))
+		if (!job_is_open(j) || must_wait(f, j))
 			continue;
 		for (struct link *k = j->out[0].next; k != &j->out[0]; k = k->next) {
 			struct slot *s = list_entry(k, struct slot, link);
@@ -210,12 +219,12 @@ void schedule_expire(struct farm *f, double read)
 			struct action *a = update_add(f, ACTION_CLOSE_PEER);
 			a->peer = p->id;
 			a->text = "nothing heard for too long";
-			peer_leave(f, p);
+			peer_lose(f, p);
 			continue;
 		}
 		if (p->state != PEER_SILENT && p->heard + f->config.silent_after <= read) {
 			peer_set_state(f, p, PEER_SILENT);
-			peer_drop_leases(f, p, false);
+			peer_lose_leases(f, p);
 		}
 		double patience = p->state == PEER_SILENT ? f->config.forget_after : f->config.silent_after;
 		f->check_at = fmin(f->check_at, p->heard + patience);

@@ -116,6 +116,9 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 		snprintf(text, size, "no worker with fingerprint %s (%u with others)", j->fingerprint, active);
 	else if (verify_why(f, j, text, size))
 		return NULL;
+	else if (owner_is_limited(f, j) && owner_unproven(f, j->owner))
+		snprintf(text, size, "a job of its owner ended workers: one lease at a time until something of a job is made (for %.0f s)",
+			 j->owner->limited_until - f->now);
 	else if (answer_all_failed(f, j))
 		put_failing(f, j, text, size);
 	else if (someone_avoids(f, j))

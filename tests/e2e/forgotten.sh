@@ -10,7 +10,7 @@ start_worker w1
 worker=$WORKER
 id=$(submit "$BOX" -o "$DIR/old.exr" $JOB --mutations 100000000)
 until_true 30 is_state "$id" running || fail "$id is $(value "$id" state)"
-kill -STOP $worker
+kill -STOP "$(renders "$worker")"
 kill -9 $COORDINATOR_PID
 wait $COORDINATOR_PID 2>/dev/null || :
 rm -rf "$DIR/spool"
@@ -18,7 +18,7 @@ LISTEN=$COORDINATOR
 start_coordinator
 again=$(submit "$BOX" -o "$DIR/new.exr" $JOB -D light=3)
 [ "$again" = "$id" ] || fail "the new job is $again, the old one was $id"
-kill -CONT $worker
+kill -CONT "$(renders "$worker")"
 until_true 60 is_state "$again" done || fail "$again is $(value "$again" state): $(value "$again" why)"
 "$BIN/hslt-job" fetch "$again" -o "$DIR/new.exr"
 same "$DIR/alone.exr" "$DIR/new.exr"

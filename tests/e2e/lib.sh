@@ -119,6 +119,11 @@ start_worker() {
 	PIDS="$PIDS $WORKER"
 }
 
+# renders PID: the process of that worker that renders; the worker itself only sees to it
+renders() {
+	tr -d ' ' <"/proc/$1/task/$1/children"
+}
+
 # stop PID...: by SIGTERM, and waits; its exit code is in CODE
 stop() {
 	for p in "$@"; do

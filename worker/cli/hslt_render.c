@@ -1,3 +1,4 @@
+#include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/output.h"
 #include "common/base/progress.h"
@@ -367,6 +368,7 @@ int main(int argc, char **argv)
 	mem_keep(1 << 20);
 	a.threads = option_threads_default();
 	output_check_at_exit();
+	crash_exit("hslt-render");
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
 	interrupt_watch();

@@ -1,3 +1,4 @@
+#include "common/base/crash.h"
 #include "common/base/output.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
@@ -239,6 +240,7 @@ int main(int argc, char **argv)
 	a.request.args = &a.render;
 	a.patience = 600;
 	output_check_at_exit();
+	crash_exit("hslt-submit");
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
 	int rc = a.wait ? image_file_probe(a.output, &e) : a.plot ? image_file_probe(a.plot, &e) : 0;

@@ -1,5 +1,6 @@
 #include "worker/cli/local.h"
 
+#include "common/base/crash.h"
 #include "common/base/mem.h"
 
 #include <pthread.h>
@@ -120,6 +121,7 @@ static int lease(struct crew *c, uint32_t index)
 static void *work(void *arg)
 {
 	struct crew *c = arg;
+	crash_thread();
 	for (;;) {
 		pthread_mutex_lock(&c->lock);
 		uint32_t i = c->rc || stopped(c) ? c->leases : c->next;

@@ -5,7 +5,8 @@
  * what runs within the grace period, or gives it up, and leaves. Tells the service manager what it waits to hear
  * (common/net/notify.h). A lease that gets nowhere is given back as failed, and so are those that wait for a scene whose building
  * gets nowhere; a thread cannot be ended, so the worker leaves as on SIGTERM, and the program ends then and there, with AGENT_HUNG.
- * Nobody waits for a scene that is being built when the worker is to leave.
+ * Nobody waits for a scene that is being built when the worker is to leave. It runs in a process that may be ended by a signal at
+ * any time (supervise.h); the leases that the process before it had are given back as failed after the first welcome (work.h).
  */
 #ifndef WORKER_DAEMON_AGENT_H
 #define WORKER_DAEMON_AGENT_H
@@ -27,6 +28,7 @@ struct agent_config {
 	bool insecure;
 	unsigned lie; /* tests: one of so many results has a wrong bit; 0: none */
 	bool repeat; /* tests: every result is sent twice */
+	unsigned crash; /* tests: this lease, counted from 1, ends the process that renders; 0: none */
 	unsigned hang; /* tests: this lease, counted from 1, never ends; 0: none */
 };
 

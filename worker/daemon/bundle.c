@@ -2,6 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/tick.h"
+#include "worker/daemon/work.h"
 #include "worker/render/knobs.h"
 
 #include <assert.h>
@@ -247,8 +248,11 @@ static void run(struct task *t)
 {
 	struct bundle *b = (struct bundle *)t; /* its first member */
 	uint64_t begun = uv_hrtime();
+	if (b->waits.job)
+		work_begin(&b->waits, info_of(b)->scene);
 	if (build(b, &b->error))
 		b->world = NULL;
+	work_end();
 	b->build_seconds = (double)(uv_hrtime() - begun) * 1e-9;
 }
 

@@ -30,6 +30,7 @@ struct bundle {
 	char **paths; /* by file, for the builder's thread */
 	struct blob_hash wanted; /* while FETCHING: the blob that it waits for */
 	struct world *world;
+	struct lease_key waits; /* one of the leases that wait for the world; job 0: none */
 	unsigned users;     /* leases that need it */
 	uint64_t last_used; /* counter */
 	bool ended;         /* the coordinator needs it no more */

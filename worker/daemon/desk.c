@@ -4,6 +4,7 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
+#include "worker/daemon/work.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -191,6 +192,7 @@ static void start_lease(struct agent *a, struct lease_task *l)
 	l->finished = on_rendered;
 	l->lie = a->config.lie && a->rendered % a->config.lie == 0;
 	l->hangs = ++a->rendered == a->config.hang;
+	l->crashes = a->rendered == a->config.crash;
 	lease_task_start(l, a->crew);
 }
 
@@ -222,6 +224,9 @@ static void go_on(struct agent *a, struct bundle *b)
 	} else {
 		b->owner = a;
 		b->built = on_built;
+		for (const struct lease_task *l = a->leases; l; l = l->next)
+			if (l->bundle == b)
+				b->waits = l->grant.key;
 		rc = bundle_build(b, a->crew, &e);
 	}
 	if (rc) {
@@ -480,10 +485,22 @@ void desk_message(struct agent *a, struct envelope *env, const unsigned char *pa
 
 /* ---- connection and leaving ---- */
 
+/* What the processes before this one had when a signal ended them, before any lease is asked for. */
+static void tell_lost(struct agent *a)
+{
+	struct lost_lease *l;
+	for (unsigned i = 0; (l = work_lost(i)); i++)
+		if (!l->told) {
+			say_failed(a, &l->key, l->text, l->own);
+			l->told = true;
+		}
+}
+
 void desk_welcome(struct agent *a)
 {
 	for (struct lease_task *l = a->leases; l; l = l->next)
 		l->sent = false;
+	tell_lost(a);
 	fetch_reconnected(a);
 	/* Does the job live? The answer brings unfinished fetching and unsent results on their way. */
 	for (struct bundle *b = a->bundles; b; b = b->next)

@@ -1,7 +1,9 @@
 #include "worker/daemon/lease_task.h"
 
 #include "common/base/mem.h"
+#include "worker/daemon/work.h"
 
+#include <signal.h>
 #include <string.h>
 #include <unistd.h>
 
@@ -47,6 +49,9 @@ static void run(struct task *t)
 	struct lease_input in = {l->grant.chain_count, l->grant.seeds, l->grant.states};
 	const struct plan *p = &l->bundle->plan;
 	l->end = LEASE_STOPPED;
+	work_begin(&l->grant.key, l->bundle->info.message->job_info->scene);
+	if (l->crashes)
+		raise(SIGSEGV);
 	while (l->hangs)
 		pause();
 	if (!atomic_load(&l->stop))
@@ -60,6 +65,7 @@ static void run(struct task *t)
 	if (!l->rc && l->end == LEASE_DONE)
 		l->rc = batch_pack(&batch, p, &l->frame, &l->frame_size, &l->error);
 	batch_fini(&batch);
+	work_end();
 }
 
 static void done(struct task *t)

@@ -24,6 +24,7 @@ struct lease_task {
 	enum lease_task_state state;
 	atomic_bool stop;
 	bool hangs;    /* tests: it never ends */
+	bool crashes;  /* tests: by SIGSEGV */
 	bool unwanted; /* nobody waits for it: dropped when its thread lets go */
 	bool lie;      /* tests */
 	bool sent;     /* on this connection */

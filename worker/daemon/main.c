@@ -3,6 +3,7 @@
 #include "common/base/output.h"
 #include "common/base/version.h"
 #include "worker/daemon/agent.h"
+#include "worker/daemon/supervise.h"
 
 #include <argp.h>
 #include <stdio.h>
@@ -22,13 +23,15 @@ static const char doc[] =
 	"SIGTERM: finishes the running epochs within the grace period or gives them up, sends what is done and leaves; the "
 	"second one ends it at once. It reconnects for ever unless it is refused for good; with --idle-exit it leaves when nobody has work for it. A lease that "
 	"makes no progress for --stall is given back as failed, as are those that wait for a scene whose building makes none, and "
-	"the worker leaves, to be started again. Under systemd it says when it is ready and feeds the watchdog.\n"
+	"the worker leaves, to be started again. It renders in a process of its own: when a signal ends that (a fault in a scene's wake, "
+	"the machine's memory) the lease is given back as failed and the process is started again. Under systemd it says when it is "
+	"ready and feeds the watchdog.\n"
 	"HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls. Exit codes: 0 stopped, 1 failed, 2 usage, 6 refused "
 	"for good (a certificate of another role, another version), 75 a thread hung.";
 
 enum {
 	OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_LIE, OPTION_TLS,
-	OPTION_IDLE, OPTION_STALL, OPTION_HANG
+	OPTION_IDLE, OPTION_STALL, OPTION_HANG, OPTION_CRASH
 };
 
 static const struct argp_option options[] = {
@@ -45,6 +48,7 @@ static const struct argp_option options[] = {
 	{"verbose", 'v', NULL, 0, "Log more", 0},
 	{"test-lie", OPTION_LIE, "N", OPTION_HIDDEN, "Flip a bit in one of N results", 0},
 	{"test-repeat", OPTION_REPEAT, NULL, OPTION_HIDDEN, "Send every result twice", 0},
+	{"test-crash", OPTION_CRASH, "N", OPTION_HIDDEN, "The N-th lease of each process that renders ends it by SIGSEGV", 0},
 	{"test-hang", OPTION_HANG, "N", OPTION_HIDDEN, "The N-th lease never ends", 0},
 	{0},
 };
@@ -105,6 +109,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_HANG:
 		c->hang = (unsigned)number(state, "--test-hang", arg, 1, 1e9);
 		return 0;
+	case OPTION_CRASH:
+		c->crash = (unsigned)number(state, "--test-crash", arg, 1, 1e9);
+		return 0;
 	case OPTION_REPEAT:
 		c->repeat = true;
 		return 0;
@@ -117,10 +124,18 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	}
 }
 
+static int run(void *user)
+{
+	struct error e;
+	int rc = agent_run(user, &e);
+	if (rc)
+		fprintf(stderr, "hslt-worker: %s\n", e.text);
+	return rc == 0 ? 0 : rc == -EACCES ? AGENT_REFUSED : rc == -EPERM || rc == -EINVAL ? 2 : 1;
+}
+
 int main(int argc, char **argv)
 {
 	char host[64] = "worker", name[128];
-	struct error e;
 	mem_keep(1 << 20);
 	long cores = sysconf(_SC_NPROCESSORS_ONLN);
 	gethostname(host, sizeof host - 1);
@@ -137,8 +152,5 @@ int main(int argc, char **argv)
 	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &c);
 	if (geteuid() == 0)
 		log_event(LOG_ROOT, "text=\"a worker needs no privileges: scenes from others are read as root\"");
-	int rc = agent_run(&c, &e);
-	if (rc)
-		fprintf(stderr, "hslt-worker: %s\n", e.text);
-	return rc == 0 ? 0 : rc == -EACCES ? AGENT_REFUSED : rc == -EPERM || rc == -EINVAL ? 2 : 1;
+	return supervise(c.threads, run, &c);
 }

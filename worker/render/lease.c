@@ -1,5 +1,6 @@
 #include "worker/render/render.h"
 
+#include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/tick.h"
 #include "worker/chain/chain.h"
@@ -319,12 +320,14 @@ int render_lease(const struct world *w, const struct plan *p, const struct lease
 	j->out = out;
 	j->e = e;
 	double start = thread_seconds();
+	crash_place(k->kind == LEASE_BOOTSTRAP ? "rendering bootstrap samples" : "rendering", NULL, 0);
 	rc = prepare(j, w, e);
 	if (!rc)
 		rc = run_caught(j, in, end);
 	film_sums_fini(&j->film);
 	mem_free(j->chain);
 	mem_free(j);
+	crash_place(NULL, NULL, 0);
 	out->cpu_seconds = thread_seconds() - start;
 	if (rc || *end == LEASE_STOPPED)
 		batch_fini(out);

@@ -1,5 +1,6 @@
 #include "worker/world/world.h"
 
+#include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/tick.h"
 #include "worker/shape/shape.h"
@@ -63,6 +64,7 @@ static int read_shapes(struct builder *b)
 			continue;
 		uint64_t dropped = 0;
 		tick();
+		crash_place("building the scene", s->objects[i]->file, s->objects[i]->line);
 		int rc = shape_build(s->objects[i], b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
 		if (!rc && b->forced.of[EFFECT_DISPLACEMENT] >= 0)
 			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3, w->knobs.tessellation,
@@ -74,6 +76,7 @@ static int read_shapes(struct builder *b)
 		box_grow(&b->all, b->boxes[k].low);
 		box_grow(&b->all, b->boxes[k++].high);
 	}
+	crash_place("building the scene", NULL, 0);
 	if (w->shape_count == 0)
 		b->all.low = b->all.high = (vec3){0, 0, 0};
 	return 0;
@@ -417,9 +420,12 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 	struct builder b = {.scene = s, .assets = assets, .e = e, .w = mem_alloc(1, sizeof *b.w)};
 	if (!b.w)
 		return out_of_memory(e);
+	crash_place("building the scene", NULL, 0);
 	int rc = prepare(&b, o);
+	crash_place("building Embree's tree", NULL, 0);
 	if (!rc && with_accel)
 		rc = build_accel(&b);
+	crash_place(NULL, NULL, 0);
 	arena_fini(&b.scratch);
 	if (rc)
 		world_free(b.w);

@@ -53,10 +53,10 @@ static double farthest(const struct geom_shape *g, vec3 from)
 	return sqrt(far2);
 }
 
-/* Convex, closed, and light does not get through. */
+/* Convex, closed, and light does not get through. An ellipsoid is, too, but its mesh is looked at triangle by triangle. */
 static bool is_container(const struct world *w, const struct scene_node *node, uint32_t shape)
 {
-	bool convex = strcmp(node->type, "cube") == 0 || strcmp(node->type, "sphere") == 0;
+	bool convex = strcmp(node->type, "cube") == 0 || w->shapes[shape].is_sphere;
 	return convex && !displacement_of(node) && !(w->bsdfs[w->parts[shape].bsdf].modes & BSDF_TRANSMIT);
 }
 

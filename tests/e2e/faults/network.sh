@@ -45,9 +45,9 @@ stall_result() {
 }
 # The other worker stands still meanwhile, lest it does the job alone.
 is_stalled() {
-	kill -STOP "$OTHER"
+	kill -STOP "$(renders "$OTHER")"
 	is_cut stall 22
-	kill -CONT "$OTHER"
+	kill -CONT "$(renders "$OTHER")"
 }
 
 fault slow_result 3 1 "results take longer than a worker may be silent"
@@ -56,14 +56,14 @@ slow_result() {
 }
 # The other worker stands still until the result is there, lest the job is done by it alone meanwhile.
 is_slow() {
-	kill -STOP "$OTHER"
+	kill -STOP "$(renders "$OTHER")"
 	for try in 1 2 3 4 5; do # a machine that stands still for a second cuts it off, too
 		calls=$(grep -c event=connect\  "$DIR/w1.log")
 		before=$(merged)
 		happens slow 22
 		until_true 30 is_merged $((before + 2)) || fail "$NAME: the result does not come"
 		! has_said w1 event=connect\  $((calls + 1)) || continue
-		kill -CONT "$OTHER"
+		kill -CONT "$(renders "$OTHER")"
 		return 0
 	done
 	fail "$NAME: the worker is cut off"
@@ -75,7 +75,7 @@ late_result() {
 }
 # The other worker stands still until the last is late and was missed, lest it does the job alone.
 is_late() {
-	kill -STOP "$OTHER"
+	kill -STOP "$(renders "$OTHER")"
 	happens late 22
 	[ "$i" -eq "$TIMES" ] || return 0
 	for try in 1 2 3 4 5; do # by a coordinator that stands still nobody is missed
@@ -83,7 +83,7 @@ is_late() {
 		happens late 22
 	done
 	is_missed || fail "$NAME: the late worker is not missed"
-	kill -CONT "$OTHER"
+	kill -CONT "$(renders "$OTHER")"
 }
 is_missed() {
 	grep -q 'name="w1" text="nothing.* heard' "$DIR/coordinator.log"
@@ -103,7 +103,7 @@ flip_bits() {
 }
 # Messages both ways, with a payload and without. The other worker stands still meanwhile, lest it does the job alone.
 is_flipped() {
-	kill -STOP "$OTHER"
+	kill -STOP "$(renders "$OTHER")"
 	flipped=$(cat "$DIR/coordinator.log" "$DIR/w1.log" | grep -c event=peer_garbled) || :
 	case $((i % 3)) in
 	1) is_cut flip 22 ;;
@@ -111,7 +111,7 @@ is_flipped() {
 	0) is_cut flip 3 ;;
 	esac
 	until_true 30 is_told $((flipped + 1)) || fail "$NAME: nobody noticed"
-	kill -CONT "$OTHER"
+	kill -CONT "$(renders "$OTHER")"
 }
 is_told() {
 	[ "$(cat "$DIR/coordinator.log" "$DIR/w1.log" | grep -c event=peer_garbled)" -ge "$1" ]

@@ -83,11 +83,11 @@ no_descriptors_worker() {
 }
 worker_without_descriptors() {
 	says w1 event=connect
-	prlimit --pid "$WORKER" --nofile=3:20000
+	prlimit --pid "$(renders "$WORKER")" --nofile=3:20000
 	kill -9 "$COORDINATOR_PID"
 	again
 	until_true 30 grep -q 'event=connect_failed .*too many' "$DIR/w1.log" || fail "$NAME: it does not say why"
-	prlimit --pid "$WORKER" --nofile=20000:20000
+	prlimit --pid "$(renders "$WORKER")" --nofile=20000:20000
 	until_true 30 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: w1 does not come back"
 }
 
@@ -136,8 +136,8 @@ small_worker() {
 	farm
 	worker w1
 	says w1 event=connect
-	size=$(awk '/^VmSize/ { print $2 }' "/proc/$WORKER/status")
-	prlimit --pid "$WORKER" --as=$((size * 1024 + 20000000))
+	size=$(awk '/^VmSize/ { print $2 }' "/proc/$(renders "$WORKER")/status")
+	prlimit --pid "$(renders "$WORKER")" --as=$((size * 1024 + 20000000))
 	job
 	says w1 event=world_failed
 	worker w0

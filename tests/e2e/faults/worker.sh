@@ -55,9 +55,9 @@ stop_worker() {
 	blameless
 }
 one_worker_sleeps() {
-	kill -STOP "$WORKER"
+	kill -STOP "$(renders "$WORKER")"
 	until_true 30 has_said coordinator 'event=peer_closed .*name="w1"\|event=peer_fault .*nothing heard' $i || fail "$NAME: the silent worker is not missed"
-	kill -CONT "$WORKER"
+	kill -CONT "$(renders "$WORKER")"
 	until_true 30 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: it does not come back"
 }
 
@@ -67,9 +67,9 @@ slow_worker() {
 	worker w0
 	worker w1
 	(
-		while kill -STOP "$WORKER" 2>/dev/null; do
+		while kill -STOP "$(renders "$WORKER")" 2>/dev/null; do
 			sleep 0.18
-			kill -CONT "$WORKER" 2>/dev/null || break
+			kill -CONT "$(renders "$WORKER")" 2>/dev/null || break
 			sleep 0.02
 		done
 	) &
@@ -77,7 +77,7 @@ slow_worker() {
 	job
 	finish_job
 	[ "$(value "$ID" duplicates)" -gt 0 ] || fail "$NAME: nothing was computed twice"
-	kill -CONT "$WORKER"
+	kill -CONT "$(renders "$WORKER")"
 }
 
 fault repeat_worker 1 1 "a worker sends every result twice"
@@ -111,4 +111,73 @@ one_thread_hangs() {
 	# if others have computed it meanwhile, or the job has ended, there is nothing to give back
 	[ "$TIMES" -eq 1 ] || grep -q "event=lease_failed job=$ID .*no progress for 0.5 s" "$DIR/h$i.log" ||
 		grep -q "event=lease_taken_back job=$ID" "$DIR/coordinator.log" || fail "$NAME: h$i keeps its lease"
+}
+
+fault crash_worker 5 1 "a signal ends the process that renders, in the middle of a lease"
+crash_worker() {
+	farm
+	worker w0
+	OTHER=$WORKER
+	job
+	each_time one_process_crashes
+	finish_job
+	[ "$(value "$ID" failures)" -ge "$TIMES" ] || fail "$NAME: $(value "$ID" failures) failures"
+}
+# The worker stays: it says what ended the process, and pauses. The other one stands still meanwhile, lest it computes that lease.
+one_process_crashes() {
+	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	worker "h$i" --test-crash 1
+	says "h$i" event=connect
+	kill -STOP "$(renders "$OTHER")"
+	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	says "h$i" "event=process_lost signal=11 .*leases=1"
+	says coordinator "event=lease_failed job=$ID worker=\"h$i\" own=0 text=\"box.xml: .*ended by SIGSEGV .*($ID, "
+	kill -CONT "$(renders "$OTHER")"
+	kill -0 "$WORKER" || fail "$NAME: h$i is gone"
+	stop "$WORKER" # with 1 where another lease has ended it meanwhile
+	[ "$CODE" -le 1 ] || fail "$NAME: h$i ended with $CODE"
+}
+
+fault kill_renderer 5 1 "the machine runs out of memory: SIGKILL of the process that renders"
+kill_renderer() {
+	farm
+	worker w0
+	worker w1
+	job
+	each_time one_renderer_killed
+	finish_job
+}
+one_renderer_killed() {
+	kill -9 "$(renders "$WORKER")"
+	until_true 30 has_said w1 event=process_lost $i || fail "$NAME: nobody misses it"
+	until_true 30 has_said w1 event=connect\  $((i + 1)) || fail "$NAME: it does not come back"
+	kill -0 "$WORKER" || fail "$NAME: the worker is gone"
+}
+
+fault extreme_numbers 9 3 "a scene with numbers that no scene can have is submitted"
+extreme_numbers() {
+	farm
+	worker w0
+	worker w1
+	job
+	each_time one_extreme_scene
+	finish_job
+	blameless
+	! grep -q event=process_lost "$DIR"/w?.log || fail "$NAME: a process was lost"
+}
+# Each ended all workers once; and hslt-render with its own signal.
+one_extreme_scene() {
+	case $((i % 3)) in
+	0) set -- glass '<float name="intIOR" value="1.33"' '<float name="intIOR" value="1e-300"' int_ior=1e-300 ;;
+	1) set -- metal 'origin="0, 1.3, 5"' 'origin="3e38, 1.3, 5"' "3e+38 times\|times the scene's radius" ;;
+	2) set -- metal '<rgb name="k" value="3.9, 2.45, 2.14"' '<rgb name="k" value="3.9, 3e38, 2.14"' "k=3e+38" ;;
+	esac
+	mkdir "$DIR/extreme$i"
+	cp "$HERE/../scenes/numbers/"* "$DIR/extreme$i"
+	sed "s|$2|$3|" "$HERE/../scenes/numbers/$1.xml" >"$DIR/extreme$i/$1.xml"
+	! cmp -s "$HERE/../scenes/numbers/$1.xml" "$DIR/extreme$i/$1.xml" || fail "$NAME: no such number in $1.xml"
+	for program in hslt-submit hslt-render; do
+		code 1 "$BIN/$program" "$DIR/extreme$i/$1.xml" -o "$DIR/no.exr" --spp 1
+		grep -q "$1.xml:[0-9]*: .*\($4\)" "$DIR/err.log" || fail "$NAME: $program says $(cat "$DIR/err.log")"
+	done
 }

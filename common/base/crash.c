@@ -1,0 +1,122 @@
+#include "common/base/crash.h"
+
+#include <errno.h>
+#include <signal.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { STACK = 1 << 14 };
+
+static const struct {
+	int number;
+	const char *name;
+} signals[] = {{SIGSEGV, "SIGSEGV"}, {SIGBUS, "SIGBUS"}, {SIGFPE, "SIGFPE"}, {SIGILL, "SIGILL"}, {SIGABRT, "SIGABRT"}};
+enum { SIGNALS = sizeof signals / sizeof *signals };
+
+static _Thread_local struct {
+	const char *doing, *file;
+	int line;
+} place;
+static _Thread_local unsigned char stack[STACK];
+static void (*told)(int number, const char *text);
+static struct sigaction before[SIGNALS];
+static const char *program_name;
+
+void crash_place(const char *doing, const char *file, int line)
+{
+	place.doing = doing;
+	place.file = file;
+	place.line = line;
+}
+
+const char *crash_signal_name(int number)
+{
+	for (int i = 0; i < SIGNALS; i++)
+		if (signals[i].number == number)
+			return signals[i].name;
+	return number == SIGKILL ? "SIGKILL" : "a signal";
+}
+
+static size_t add(char *text, size_t used, const char *more)
+{
+	while (*more && used + 1 < CRASH_TEXT)
+		text[used++] = *more++;
+	text[used] = 0;
+	return used;
+}
+
+static size_t add_number(char *text, size_t used, int n)
+{
+	char digits[12];
+	size_t i = sizeof digits - 1;
+	digits[i] = 0;
+	do
+		digits[--i] = (char)('0' + n % 10);
+	while ((n /= 10) > 0);
+	return add(text, used, digits + i);
+}
+
+static void on_signal(int number)
+{
+	char text[CRASH_TEXT];
+	int kept = errno;
+	size_t n = add(text, 0, crash_signal_name(number));
+	if (place.doing) {
+		n = add(text, n, " while ");
+		n = add(text, n, place.doing);
+	}
+	if (place.doing && place.file) {
+		n = add(text, n, ": ");
+		n = add(text, n, place.file);
+		n = add(text, n, ":");
+		add_number(text, n, place.line);
+	}
+	told(number, text);
+	for (int i = 0; i < SIGNALS; i++)
+		if (signals[i].number == number)
+			sigaction(number, &before[i], NULL);
+	errno = kept;
+	raise(number); /* blocked until here is left; a faulting instruction comes again by itself */
+}
+
+void crash_thread(void)
+{
+	sigset_t all;
+	sigaltstack(&(stack_t){.ss_sp = stack, .ss_size = sizeof stack}, NULL);
+	sigemptyset(&all);
+	for (int i = 0; i < SIGNALS; i++)
+		sigaddset(&all, signals[i].number);
+	pthread_sigmask(SIG_UNBLOCK, &all, NULL); /* blocked, they end a program without a word */
+}
+
+void crash_catch(void (*last_words)(int number, const char *text))
+{
+	struct sigaction a = {.sa_handler = on_signal, .sa_flags = SA_ONSTACK};
+	sigemptyset(&a.sa_mask);
+	told = last_words;
+	crash_thread();
+	for (int i = 0; i < SIGNALS; i++)
+		sigaction(signals[i].number, &a, &before[i]);
+}
+
+static void say(const char *text)
+{
+	ssize_t n = write(STDERR_FILENO, text, strlen(text));
+	(void)n;
+}
+
+static void say_and_exit(int number, const char *text)
+{
+	(void)number;
+	say(program_name);
+	say(": ended by ");
+	say(text);
+	say(": a fault of this program or of a library that it uses\n");
+	_exit(1);
+}
+
+void crash_exit(const char *program)
+{
+	program_name = program;
+	crash_catch(say_and_exit);
+}

@@ -1,0 +1,78 @@
+#include "coordinator/core/lost.h"
+
+#include "common/base/text.h"
+#include "coordinator/core/state.h"
+
+enum { LOST_TOLD = 2 };
+
+static bool is_gone(const struct lost_worker *w)
+{
+	return w->who->id != w->id || w->who->calls == w->calls;
+}
+
+static uint32_t gone(const struct lost *l, uint32_t *certificates)
+{
+	uint32_t n = 0;
+	*certificates = 0;
+	for (uint32_t i = 0; i < l->count; i++) {
+		bool again = false;
+		if (!is_gone(&l->of[i]))
+			continue;
+		for (uint32_t k = 0; k < i; k++)
+			again |= is_gone(&l->of[k]) && l->of[k].certificate == l->of[i].certificate;
+		n++;
+		*certificates += !again;
+	}
+	return n;
+}
+
+/* Where it stands, a free place, one that came back, or one of several with its certificate. */
+static void add(struct lost *l, const struct identity *who)
+{
+	uint32_t place = l->count;
+	for (uint32_t i = l->count; i-- > 0;)
+		if (l->of[i].id == who->id)
+			place = i;
+	for (uint32_t i = 0; place == LOST_FATAL && i < l->count; i++)
+		if (!is_gone(&l->of[i]) || l->of[i].certificate == who->certificate_id)
+			place = i;
+	if (place == LOST_FATAL)
+		return;
+	l->count += place == l->count;
+	l->of[place] = (struct lost_worker){who, who->id, who->certificate_id, who->calls};
+}
+
+bool lost_take(struct lost *l, const struct identity *who)
+{
+	for (uint32_t i = 0; i < l->count; i++)
+		if (l->of[i].id == who->id) {
+			l->of[i] = l->of[--l->count];
+			return true;
+		}
+	return false;
+}
+
+void lost_lease(struct farm *f, struct lease *l)
+{
+	struct job *j = l->job;
+	struct slot *s = l->slot;
+	const struct lease_key k = lease_key(l);
+	const struct peer *p = l->peer;
+	uint32_t certificates, n;
+	bool counts = !l->overdue && !l->delivered;
+	lease_drop(f, l);
+	if (!counts)
+		return;
+	add(&s->lost, p->who);
+	p->who->calls += p->returns;
+	n = gone(&s->lost, &certificates);
+	if (n < LOST_TOLD)
+		return;
+	text_print(f->text, sizeof f->text, "%s: %u of %d workers that were lost in a row while they held %s group %u part %u epoch %llu; the last one: %s",
+		   j->name, n, LOST_FATAL, k.kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k.group, k.part, (unsigned long long)k.epoch, p->name);
+	text_copy(j->text, sizeof j->text, f->text);
+	if (n < LOST_FATAL || certificates < failers_certificates(f))
+		return;
+	owner_limit(j->owner, f->now);
+	rounds_end(f, j, END_FAILED, f->text);
+}

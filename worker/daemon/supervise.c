@@ -1,0 +1,120 @@
+#include "worker/daemon/supervise.h"
+
+#include "common/base/crash.h"
+#include "common/base/log.h"
+#include "worker/daemon/work.h"
+
+#include <signal.h>
+#include <stdbool.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <time.h>
+#include <unistd.h>
+
+static const double first_pause = 0.05, longest_pause = 10, long_life = 30;
+
+struct supervisor {
+	sigset_t heard, mask; /* signals that it waits for; the mask of before */
+	pid_t child;
+	int asked;    /* the last signal that was sent on; 0: none */
+	double pause; /* s before the next start */
+};
+
+static double now(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+/* The service manager's watchdog is fed by the process that renders. */
+static void take_over_watchdog(pid_t parent)
+{
+	const char *of = getenv("WATCHDOG_PID");
+	char own[24];
+	snprintf(own, sizeof own, "%ld", (long)getpid());
+	if (of && strtol(of, NULL, 10) == parent)
+		setenv("WATCHDOG_PID", own, 1);
+}
+
+static int start(struct supervisor *s, int (*run)(void *), void *user)
+{
+	pid_t parent = getpid();
+	fflush(NULL);
+	s->child = fork();
+	if (s->child != 0)
+		return s->child < 0 ? -errno : 0;
+	prctl(PR_SET_PDEATHSIG, SIGKILL);
+	if (getppid() != parent)
+		_exit(1);
+	take_over_watchdog(parent);
+	work_catch();
+	sigprocmask(SIG_SETMASK, &s->mask, NULL);
+	exit(run(user));
+}
+
+/* Until the process has ended; its status. */
+static int wait_for_end(struct supervisor *s)
+{
+	for (;;) {
+		int status, number = sigwaitinfo(&s->heard, NULL);
+		if (number == SIGCHLD) {
+			if (waitpid(s->child, &status, WNOHANG) == s->child)
+				return status;
+		} else if (number > 0) {
+			s->asked = number;
+			kill(s->child, number);
+		}
+	}
+}
+
+/* false: it is to end instead. */
+static bool pause_before_start(struct supervisor *s)
+{
+	double end = now() + s->pause;
+	for (double rest; (rest = end - now()) > 0;) {
+		struct timespec t = {(time_t)rest, (long)(1e9 * (rest - (double)(time_t)rest))};
+		int number = sigtimedwait(&s->heard, NULL, &t);
+		if (number > 0 && number != SIGCHLD)
+			return false;
+	}
+	return true;
+}
+
+int supervise(unsigned threads, int (*run)(void *), void *user)
+{
+	struct supervisor s = {.pause = first_pause};
+	struct error e;
+	if (work_share(threads, &e)) {
+		fprintf(stderr, "hslt-worker: %s\n", e.text);
+		return 1;
+	}
+	sigemptyset(&s.heard);
+	sigaddset(&s.heard, SIGCHLD);
+	sigaddset(&s.heard, SIGTERM);
+	sigaddset(&s.heard, SIGINT);
+	sigaddset(&s.heard, SIGHUP);
+	sigprocmask(SIG_BLOCK, &s.heard, &s.mask);
+	for (;;) {
+		double begun = now();
+		int rc = start(&s, run, user);
+		if (rc) {
+			fprintf(stderr, "hslt-worker: no process: %s\n", strerror(-rc));
+			return 1;
+		}
+		int status = wait_for_end(&s), number = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+		unsigned lost = work_lose(number);
+		if (!number && !lost)
+			return WEXITSTATUS(status);
+		if (s.asked)
+			return number == s.asked ? 0 : 1;
+		log_event(LOG_PROCESS_LOST, "signal=%d text=\"the process that renders was ended by %s\" leases=%u", number,
+			  crash_signal_name(number), lost);
+		s.pause = now() - begun > long_life ? first_pause : s.pause * 2 < longest_pause ? s.pause * 2 : longest_pause;
+		if (!pause_before_start(&s))
+			return 0;
+	}
+}
