@@ -23,5 +23,7 @@ enum rng_stream {
 
 /* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */
 void rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4]);
+/* The 256 random bits that they are made of. */
+void rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, uint64_t out[4]);
 
 #endif

@@ -3,9 +3,9 @@
 void sampler_fill(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, enum sampler_side side,
 		  unsigned vertex, double out[SAMPLER_BLOCK])
 {
-	uint64_t block = ((uint64_t)vertex * SAMPLER_SIDES + (uint64_t)side) * 2;
-	rng_uniform4(seed, stream, index, step, block, out);
-	rng_uniform4(seed, stream, index, step, block + 1, out + 4);
+	uint64_t half = sampler_half(side, vertex);
+	rng_uniform4(seed, stream, index, step, half, out);
+	rng_uniform4(seed, stream, index, step, half + 1, out + 4);
 }
 
 static const double *random_block(struct sampler *base, enum sampler_side side, unsigned vertex)

@@ -12,10 +12,11 @@ enum sampler_side { SIDE_CAMERA, SIDE_LIGHT, SAMPLER_SIDES };
 enum { SAMPLER_BLOCK = 8 };
 
 /* What the numbers of a block are for. Block 0 of the camera: film x, y, wavelength, point of the aperture. Block 0 of the
- * light: point, direction and choice of the emitter. All others: a vertex. */
-enum { DIM_FILM_X = 0, DIM_FILM_Y = 1, DIM_WAVELENGTH = 2, DIM_APERTURE_U = 3, DIM_APERTURE_V = 4 };
+ * light: point, direction and choice of the emitter. All others: a vertex. What is used together lies in one half of the block:
+ * low-discrepancy samplers (sobol.h) stratify the four numbers of a half together. */
+enum { DIM_FILM_X = 0, DIM_FILM_Y = 1, DIM_WAVELENGTH = 2, DIM_APERTURE_U = 4, DIM_APERTURE_V = 5 };
 enum { DIM_EMITTER_POINT = 0, DIM_EMITTER_DIRECTION = 2, DIM_EMITTER_CHOICE = 4 };
-enum { DIM_BSDF = 0, DIM_NEXT_EVENT = 3, DIM_ROULETTE = 6 };
+enum { DIM_BSDF = 0, DIM_ROULETTE = 3, DIM_NEXT_EVENT = 4 };
 
 struct sampler {
 	const double *(*block)(struct sampler *s, enum sampler_side side, unsigned vertex);
@@ -29,6 +30,12 @@ struct sampler_random {
 };
 
 void sampler_random_init(struct sampler_random *s, uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step);
+
+/* The number of a block's first half among all halves of a sample; the second half's is one more. */
+static inline uint64_t sampler_half(enum sampler_side side, unsigned vertex)
+{
+	return ((uint64_t)vertex * SAMPLER_SIDES + (uint64_t)side) * 2;
+}
 
 /* The eight numbers of one block from the counter-based generator. */
 void sampler_fill(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, enum sampler_side side,

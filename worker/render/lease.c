@@ -6,6 +6,7 @@
 #include "worker/chain/chain.h"
 #include "worker/math/fptrap.h"
 #include "worker/mutation/mixture.h"
+#include "worker/path/sobol.h"
 #include "worker/render/sums.h"
 
 #include <stdio.h>
@@ -50,16 +51,14 @@ static double thread_seconds(void)
 
 /* Stratified over pixels: block 0 of the camera with the film point moved into one pixel. */
 struct pixel_sampler {
-	struct sampler_random random;
+	struct sampler_sobol sobol;
 	double x, y, width, height; /* the pixel in units of the window, and a pixel's size */
 };
 
 static const double *pixel_block(struct sampler *base, enum sampler_side side, unsigned vertex)
 {
 	struct pixel_sampler *s = (struct pixel_sampler *)(void *)base;
-	struct sampler_random *r = &s->random;
-	double *u = r->value[side];
-	sampler_fill(r->seed, r->stream, r->index, r->step, side, vertex, u);
+	double *u = sampler_sobol_fill(&s->sobol, side, vertex);
 	if (side == SIDE_CAMERA && vertex == 0) {
 		u[DIM_FILM_X] = s->x + u[DIM_FILM_X] * s->width;
 		u[DIM_FILM_Y] = s->y + u[DIM_FILM_Y] * s->height;
@@ -83,10 +82,10 @@ static void sample_pixel(struct job *j, uint64_t column, uint64_t row)
 	struct pixel_sampler s = {.x = (double)column / w->width, .y = (double)row / w->height, .width = 1 / w->width,
 				  .height = 1 / w->height};
 	for (uint64_t i = 0; i < p->epoch; i++) {
-		uint64_t index = (j->key->epoch * p->epoch + i) * p->groups + j->key->group;
-		sampler_random_init(&s.random, p->seed, j->integrator->stream, pixel_index(w, column, row), index);
-		s.random.base.block = pixel_block;
-		j->integrator->evaluate(&j->context, &s.random.base, &j->sample);
+		sampler_sobol_init(&s.sobol, p->seed, j->integrator->stream, pixel_index(w, column, row), j->key->group,
+				   j->key->epoch * p->epoch + i);
+		s.sobol.base.block = pixel_block;
+		j->integrator->evaluate(&j->context, &s.sobol.base, &j->sample);
 		for (uint32_t k = 0; k < j->sample.count; k++)
 			film_sums_splat(&j->film, &j->sample.splats[k], 1 / area);
 		j->out->independent_sum += j->sample.intensity;
