@@ -3,6 +3,7 @@
 # make test-numerics   what is hard on the numbers, one row a case
 # make test-sim        10,000 schedules of faults in virtual time
 # make test-faults   what happens to machines, one fault after the other; writes the tables of tests/e2e/README.md
+# make test-states   chain states that one worker spoils, with 50 seeds
 # make demo bench fuzz install clean
 
 CC       ?= gcc
@@ -144,6 +145,11 @@ $(FUZZ_BIN): $(BUILD)/%: $(BUILD)/obj/tests/%.o $(LIB_FUZZ) $(LIB_TEST) $(LIB_DA
 fuzzers: $(FUZZ_BIN)
 fuzz:
 	MAKE="$(MAKE)" sh tests/fuzz/run.sh
+
+# A worker that spoils chain states among honest ones, 50 seeds; one of them is part of the tests.
+.PHONY: test-states
+test-states: programs
+	SEEDS="$$(seq -s ' ' 50)" sh tests/e2e/states.sh $(BUILD)
 
 # Benchmarks: one program from tests/bench/*.c; a table on stdout and $(BUILD)/bench.json. BENCH="path tiles" runs only these.
 BENCH_SRC := $(wildcard tests/bench/*.c)

@@ -13,7 +13,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 6 };
+enum { FARM_VERSION = 7 };
 
 struct envelope_block;
 

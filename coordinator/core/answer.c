@@ -96,6 +96,7 @@ static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s,
 	j->verified += verified;
 	if (verified)
 		verify_settle(f, j, s, &ev->lease.digest);
+	doubt_settle(f, j, s, p->who, &ev->lease.key);
 	peer_succeeded(f, p, j->id);
 	if (!j->mixed)
 		job_pin(j, p->class);
@@ -252,6 +253,12 @@ void answer_failed(struct farm *f, const struct event *ev)
 	struct job *j = farm_find_job(f, ev->lease.key.job);
 	if (l)
 		lease_drop(f, l);
+	if (l && ev->lease.bad_states && j->kind == LEASE_RENDER && j->plan.kind == PLAN_CHAINS && s->next > 0) {
+		p->failures++;
+		j->failures++;
+		doubt_refused(f, j, s, p, ev->text ? ev->text : "");
+		return;
+	}
 	bool again = peer_avoids_until(p, j->id) > f->now && !peer_lacks(p, j->id); /* several at once: one reason */
 	peer_failed(f, p, j->id, ev->lease.own);
 	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");

@@ -106,6 +106,7 @@ struct event {
 			bool valid; /* BATCH: batch_check and the frame's own checks passed; else text says what is wrong */
 			struct batch_digest digest; /* BATCH, STORED: of a lease that farm_verifies */
 			bool own; /* LEASE_FAILED: it says that its own machine is at fault, not the job */
+			bool bad_states; /* LEASE_FAILED: it says that the chains cannot go on from the states that came with it */
 		} lease;
 		enum job_hold hold;
 		int priority;

@@ -24,6 +24,7 @@ static void begin(struct job *j, enum lease_kind kind, uint64_t limit, double no
 		struct slot *s = &j->slots[i];
 		assert(!s->leases);
 		s->next = 0;
+		s->doubt = (struct doubt){ 0 };
 		job_place(j, s);
 	}
 }
@@ -157,7 +158,7 @@ void job_place(struct job *j, struct slot *s)
 	else if (s->holders >= verify_copies(j, s))
 		list_append(&j->out[ahead], &s->link);
 	else
-		list_append(verify_waits(j, s) ? &j->second[ahead] : &j->ready[ahead], &s->link);
+		list_append(verify_waits(j, s) || doubt_waits(s) ? &j->second[ahead] : &j->ready[ahead], &s->link);
 }
 
 double job_lease_timeout(const struct farm_config *c, const struct job *j, const struct slot *s)

@@ -3,6 +3,7 @@
 #define COORDINATOR_CORE_JOB_H
 
 #include "common/film/forecast.h"
+#include "coordinator/core/doubt.h"
 #include "coordinator/core/failers.h"
 #include "coordinator/core/farm.h"
 #include "coordinator/core/lease.h"
@@ -21,6 +22,7 @@ struct slot {
 	double since;         /* when the lease that is out was sent */
 	struct failers failers; /* with the next epoch */
 	struct lost lost;       /* while they held it */
+	struct doubt doubt;   /* about the states with which it begins */
 	uint32_t holders, timeouts;
 };
 
@@ -70,6 +72,7 @@ struct job {
 	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
 	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
 	struct failers failers; /* with any of its leases */
+	uint32_t anew;  /* leases whose chains began anew, their states lost */
 	uint32_t tries; /* that failed; several leases of one worker at once are one */
 	char text[256];
 	char held[JOB_HOLDS][256]; /* why no lease of it goes out; "" each when they do */

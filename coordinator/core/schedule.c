@@ -16,7 +16,7 @@ static struct peer *waiting_in(struct farm *f, const struct peer_class *c, const
 	struct peer *second = NULL;
 	for (struct link *k = c->waiting.next; k != &c->waiting; k = k->next) {
 		struct peer *p = list_entry(k, struct peer, waiting);
-		if (verify_bars(j, s, p))
+		if (verify_bars(j, s, p) || doubt_bars(f, j, s, p))
 			continue;
 		double until = peer_avoids_until(p, j->id);
 		if (until > f->now) {

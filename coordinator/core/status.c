@@ -114,7 +114,7 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 		snprintf(text, size, "no worker that answers and is trusted (%u are known)", f->peer_count);
 	else if (j->class && !j->mixed && j->class->active == 0)
 		snprintf(text, size, "no worker with fingerprint %s (%u with others)", j->fingerprint, active);
-	else if (verify_why(f, j, text, size))
+	else if (verify_why(f, j, text, size) || doubt_why(f, j, text, size))
 		return NULL;
 	else if (owner_is_limited(f, j) && owner_unproven(f, j->owner))
 		snprintf(text, size, "a job of its owner ended workers: one lease at a time until something of a job is made (for %.0f s)",

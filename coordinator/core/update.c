@@ -36,4 +36,5 @@ void update_lease(struct farm *f, enum action_kind kind, const struct lease *l)
 	a->peer = l->peer->id;
 	a->key = lease_key(l);
 	a->job = a->key.job;
+	a->anew = l->slot->doubt.anew;
 }

@@ -42,6 +42,7 @@ enum action_kind {
 	ACTION_PUBLISH,     /* job, rounds: write the image of the prefix; the job is done */
 	ACTION_JOB_CHANGED, /* job, state, end, text */
 	ACTION_JOB_FORGOTTEN, /* job: too many ended jobs; the core answers no more questions about it */
+	ACTION_CHAINS_ANEW, /* job, key, text: the chains of this lease begin from their seeds (doubt.h) */
 	ACTION_WRONG, /* who, job, key, text: a worker's answer, noted before, is not what two others say */
 	ACTION_ASIDE, /* who, text: a worker is set aside for good */
 	ACTION_CLOSE_PEER,    /* peer, text: hang up; the core has forgotten it already */
@@ -55,6 +56,7 @@ struct action {
 	enum job_state state;
 	enum job_end end;
 	bool verified;     /* MERGE: two workers agree */
+	bool anew;         /* SEND_LEASE: with seeds whatever its epoch */
 	uint64_t tag, peer;
 	uint64_t who;      /* of MERGE, WRONG, ASIDE: the worker, whatever its connection (struct peer_status) */
 	uint64_t job; /* also of actions with a key */

@@ -168,7 +168,7 @@ static void send_lease(struct server *s, const struct action *a)
 	if (!p || !o || late_withholds(o, &a->key, a->peer))
 		return;
 	order_count_worker(o, a->peer);
-	session_send_lease(p, o, &a->key);
+	session_send_lease(p, o, &a->key, a->anew);
 	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
 		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
 }
@@ -232,6 +232,9 @@ void dispatch_update(struct server *s, const struct update *u)
 			job_changed(s, a);
 			break;
 		case ACTION_JOB_FORGOTTEN:
+			break;
+		case ACTION_CHAINS_ANEW:
+			trust_anew(s, a);
 			break;
 		case ACTION_WRONG:
 			trust_wrong(s, a);

@@ -193,11 +193,11 @@ int order_prepare(struct order *o, const char *canvas_folder, struct error *e)
 	return 0;
 }
 
-int order_pack_lease(const struct order *o, const struct lease_key *k, unsigned char **frame, size_t *size, struct error *e)
+int order_pack_lease(const struct order *o, const struct lease_key *k, bool anew, unsigned char **frame, size_t *size, struct error *e)
 {
 	if (k->kind == LEASE_BOOTSTRAP || o->plan.kind != PLAN_CHAINS)
 		return grant_pack(k, NULL, NULL, 0, frame, size, e);
-	if (k->epoch > 0)
+	if (k->epoch > 0 && !anew)
 		return grant_pack(k, NULL, *states_at(o, k), o->chains_per_lease, frame, size, e);
 	struct plan_range r = plan_chain_range(&o->plan, k->part);
 	assert(r.end - r.begin == o->chains_per_lease);

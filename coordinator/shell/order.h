@@ -109,8 +109,8 @@ void order_note_times(struct order *o, double elapsed, uint64_t rounds);
 uint64_t order_rounds(const struct order *o); /* complete */
 /* All bootstrap batches are in: b, seeds, canvas. */
 int order_prepare(struct order *o, const char *canvas_folder, struct error *e);
-/* The lease as a frame for a worker. */
-int order_pack_lease(const struct order *o, const struct lease_key *k, unsigned char **frame, size_t *size, struct error *e);
+/* The lease as a frame for a worker. anew: with seeds, whatever its epoch. */
+int order_pack_lease(const struct order *o, const struct lease_key *k, bool anew, unsigned char **frame, size_t *size, struct error *e);
 void order_count_worker(struct order *o, uint64_t peer);
 
 /* Takes both. false: memory is out. */

@@ -228,9 +228,11 @@ static void take_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 	}
 	ev.job = ev.lease.key.job;
 	ev.lease.own = f->own;
+	ev.lease.bad_states = f->bad_states;
 	struct order *o = server_order(p->server, ev.job);
 	if (o && *f->text)
-		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s", log_quote(p->name).text, f->own, log_quote(text).text);
+		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d bad_states=%d text=%s", log_quote(p->name).text, f->own, f->bad_states,
+			  log_quote(text).text);
 	server_step(p->server, &ev);
 }
 
@@ -416,13 +418,13 @@ static void allow_lease(struct session *p, size_t size)
 	conn_set_send_limit(p->conn, PEER_SEND + p->leases_most);
 }
 
-void session_send_lease(struct session *p, const struct order *o, const struct lease_key *k)
+void session_send_lease(struct session *p, const struct order *o, const struct lease_key *k, bool anew)
 {
 	unsigned char *frame;
 	size_t size;
 	struct error e;
 	session_allow_results(p, o);
-	if (order_pack_lease(o, k, &frame, &size, &e)) {
+	if (order_pack_lease(o, k, anew, &frame, &size, &e)) {
 		conn_close(p->conn, e.text);
 		return;
 	}

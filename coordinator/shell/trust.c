@@ -136,14 +136,26 @@ void trust_wrong(struct server *s, const struct action *a)
 		order_log(o, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text, log_quote(a->text).text);
 }
 
-static void note(struct order *o, const char *name, uint64_t leases)
+static void note(struct order *o, const char *text)
+{
+	order_log(o, LOG_JOB_NOTE, "text=%s", log_quote(text).text);
+	size_t used = strlen(o->doubts);
+	text_print(o->doubts + used, sizeof o->doubts - used, "%s%s", used ? "; " : "", text);
+}
+
+static void note_credit(struct order *o, const char *name, uint64_t leases)
 {
 	char text[256];
 	text_print(text, sizeof text, "worker %s gave wrong results; %llu of its leases were merged unverified", name,
 		 (unsigned long long)leases);
-	order_log(o, LOG_JOB_NOTE, "text=%s", log_quote(text).text);
-	size_t used = strlen(o->doubts);
-	text_print(o->doubts + used, sizeof o->doubts - used, "%s%s", used ? "; " : "", text);
+	note(o, text);
+}
+
+void trust_anew(struct server *s, const struct action *a)
+{
+	struct order *o = server_order(s, a->job);
+	if (o)
+		note(o, a->text);
 }
 
 void trust_aside(struct server *s, const struct action *a)
@@ -155,5 +167,5 @@ void trust_aside(struct server *s, const struct action *a)
 	for (struct order *o = s->orders; o; o = o->next)
 		for (size_t i = 0; i < o->credit_count; i++)
 			if (o->credits[i].who == a->who)
-				note(o, name, o->credits[i].leases);
+				note_credit(o, name, o->credits[i].leases);
 }

@@ -18,6 +18,7 @@ double trust_share(const struct server *s, const Farm__Submit *m);
 
 void trust_merged(struct order *o, const struct action *a);
 void trust_wrong(struct server *s, const struct action *a);
+void trust_anew(struct server *s, const struct action *a); /* chains that lost their states */
 void trust_aside(struct server *s, const struct action *a);
 
 #endif

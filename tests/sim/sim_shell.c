@@ -205,6 +205,7 @@ static void act(struct world *w, const struct action *a, uint64_t value)
 		if (a->ack == ACK_NOTED && worker_of(w, a->peer, &index))
 			j->answered[slot_of(j, a->key)] |= 1u << index;
 		break;
+	case ACTION_CHAINS_ANEW: break;
 	case ACTION_WRONG: w->result.lies++; break;
 	case ACTION_ASIDE: w->result.aside++; break;
 	case ACTION_BOOTSTRAP_DONE: prepare(w, a, j); break;

@@ -58,6 +58,8 @@ static void say_action(struct said *s, const struct action *a)
 	case ACTION_REVOKE:
 		say(s, "w%" PRIu64 " %s ", a->peer, a->kind == ACTION_REVOKE ? "loses" : "gets");
 		say_key(s, &a->key);
+		if (a->anew)
+			say(s, " anew");
 		break;
 	case ACTION_MERGE: say(s, "merge"); break;
 	case ACTION_ACK: say_ack(s, a); break;
@@ -69,6 +71,7 @@ static void say_action(struct said *s, const struct action *a)
 		break;
 	case ACTION_JOB_CHANGED: say_changed(s, a); break;
 	case ACTION_JOB_FORGOTTEN: say(s, "j%" PRIu64 " forgotten", a->job); break;
+	case ACTION_CHAINS_ANEW: say(s, "anew"); break;
 	case ACTION_WRONG: say(s, "#%" PRIu64 " %s", a->who, a->text); break;
 	case ACTION_ASIDE: say(s, "#%" PRIu64 " aside", a->who); break;
 	case ACTION_CLOSE_PEER: say(s, "close w%" PRIu64, a->peer); break;
@@ -212,8 +215,8 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		ev->kind = EVENT_REQUEST;
 		ev->want = (uint32_t)take_count(at);
 	} else {
-		bool lacks = take(at, "lacks");
-		ev->kind = lacks		  ? EVENT_LEASE_FAILED
+		bool lacks = take(at, "lacks"), refuses = !lacks && take(at, "refuses");
+		ev->kind = lacks || refuses	  ? EVENT_LEASE_FAILED
 			   : take(at, "batch")	  ? EVENT_BATCH
 			   : take(at, "stored")	  ? EVENT_STORED
 			   : take(at, "delivers") ? EVENT_DELIVERED
@@ -223,6 +226,7 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 			fail_msg("no such event: %s", *at);
 		ev->lease.key = take_key(at);
 		ev->lease.own = lacks;
+		ev->lease.bad_states = refuses;
 		ev->lease.valid = !take(at, "bad");
 		if (take(at, "says "))
 			memset(&ev->lease.digest, *(*at)++, sizeof ev->lease.digest);

@@ -54,8 +54,8 @@ static void ask_job(struct agent *a, uint64_t job)
 	agent_send(a, &m);
 }
 
-/* An empty text gives the lease back without fault; own: this machine is at fault, not the job. */
-static void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
+/* An empty text gives the lease back without fault; own: this machine is at fault, not the job; bad_states: who made the states is. */
+static void say_unfinished(struct agent *a, const struct lease_key *k, const char *text, bool own, bool bad_states)
 {
 	char copy[1024];
 	Farm__LeaseKey key;
@@ -69,12 +69,18 @@ static void say_failed(struct agent *a, const struct lease_key *k, const char *t
 	failed.key = &key;
 	failed.text = copy;
 	failed.own = own;
+	failed.bad_states = bad_states;
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
 	m.lease_failed = &failed;
 	agent_send(a, &m);
 	if (*text)
 		log_event(LOG_LEASE_FAILED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k->job), k->group,
 			  k->part, number(k->epoch), log_quote(text).text);
+}
+
+static void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
+{
+	say_unfinished(a, k, text, own, false);
 }
 
 static void send_result(struct agent *a, struct lease_task *l)
@@ -190,6 +196,7 @@ static void start_lease(struct agent *a, struct lease_task *l)
 {
 	l->owner = a;
 	l->finished = on_rendered;
+	l->spoil = a->config.spoil && a->rendered % a->config.spoil == 0 ? a->rendered + 1 : 0;
 	l->lie = a->config.lie && a->rendered % a->config.lie == 0;
 	l->hangs = ++a->rendered == a->config.hang;
 	l->crashes = a->rendered == a->config.crash;
@@ -263,7 +270,7 @@ static void on_rendered(struct lease_task *l)
 	if (l->unwanted) {
 		drop_lease(a, l);
 	} else if (l->rc || l->end == LEASE_STOPPED) {
-		say_failed(a, &l->grant.key, l->rc ? l->error.text : "", false);
+		say_unfinished(a, &l->grant.key, l->rc ? l->error.text : "", false, l->rc == -EILSEQ);
 		drop_lease(a, l);
 	} else {
 		send_result(a, l);

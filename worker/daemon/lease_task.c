@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 #include "worker/daemon/work.h"
 
+#include <math.h>
 #include <signal.h>
 #include <string.h>
 #include <unistd.h>
@@ -41,6 +42,41 @@ static void lie(const struct batch *b)
 	memcpy(x, &bits, sizeof bits);
 }
 
+static uint64_t next(uint64_t *state)
+{
+	uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
+	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
+	return z ^ z >> 31;
+}
+
+/* Behind its id, so that it looks like the chain's: flipped bits, numbers that are none or huge or tiny, noise, the end cut off. */
+static void spoil_state(struct chain_state *s, uint64_t *dice)
+{
+	enum { ID = 8, MUTATIONS = 8 };
+	static const double numbers[] = {NAN, INFINITY, -INFINITY, 1e308, -1e308, 5e-324, 1e-310, -0.0};
+	if (s->size <= ID + sizeof *numbers)
+		return;
+	uint64_t kind = next(dice) % 4, left = s->size - ID;
+	for (int i = 0; i < MUTATIONS; i++) {
+		uint8_t *at = s->bytes + ID + next(dice) % left;
+		if (kind == 0)
+			*at ^= (uint8_t)(1u << next(dice) % 8);
+		else if (kind == 1)
+			memcpy(s->bytes + ID + next(dice) % (left / 8) * 8, &numbers[next(dice) % 8], sizeof *numbers);
+		else if (kind == 2)
+			*at = (uint8_t)next(dice);
+	}
+	if (kind == 3)
+		s->size -= (uint32_t)(1 + next(dice) % (left - 1));
+}
+
+static void spoil(const struct batch *b, uint64_t dice)
+{
+	for (uint32_t i = 0; i < b->state_count; i++)
+		spoil_state(&b->states[i], &dice);
+}
+
 /* Packed here, so that the loop's thread never encodes a film. */
 static void run(struct task *t)
 {
@@ -62,6 +98,8 @@ static void run(struct task *t)
 		error_prefix(&l->error, l->rc, "%s", l->bundle->info.message->job_info->scene);
 	if (!l->rc && l->end == LEASE_DONE && l->lie)
 		lie(&batch);
+	if (!l->rc && l->end == LEASE_DONE && l->spoil)
+		spoil(&batch, l->spoil);
 	if (!l->rc && l->end == LEASE_DONE)
 		l->rc = batch_pack(&batch, p, &l->frame, &l->frame_size, &l->error);
 	batch_fini(&batch);

@@ -27,6 +27,7 @@ struct lease_task {
 	bool crashes;  /* tests: by SIGSEGV */
 	bool unwanted; /* nobody waits for it: dropped when its thread lets go */
 	bool lie;      /* tests */
+	uint64_t spoil; /* tests: not 0: a number for what happens to its chain states */
 	bool sent;     /* on this connection */
 	unsigned char *frame;
 	size_t frame_size;

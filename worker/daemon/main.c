@@ -30,7 +30,7 @@ static const char doc[] =
 	"for good (a certificate of another role, another version), 75 a thread hung.";
 
 enum {
-	OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_LIE, OPTION_TLS,
+	OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_LIE, OPTION_SPOIL, OPTION_TLS,
 	OPTION_IDLE, OPTION_STALL, OPTION_HANG, OPTION_CRASH
 };
 
@@ -46,6 +46,7 @@ static const struct argp_option options[] = {
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log more", 0},
+	{"test-spoil-states", OPTION_SPOIL, "N", OPTION_HIDDEN, "Spoil the chain states of one of N results", 0},
 	{"test-lie", OPTION_LIE, "N", OPTION_HIDDEN, "Flip a bit in one of N results", 0},
 	{"test-repeat", OPTION_REPEAT, NULL, OPTION_HIDDEN, "Send every result twice", 0},
 	{"test-crash", OPTION_CRASH, "N", OPTION_HIDDEN, "The N-th lease of each process that renders ends it by SIGSEGV", 0},
@@ -102,6 +103,11 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		if (!getenv("HSLT_TEST"))
 			argp_error(state, "--test-lie is for tests alone: it makes wrong images");
 		c->lie = (unsigned)number(state, "--test-lie", arg, 1, 1e6);
+		return 0;
+	case OPTION_SPOIL:
+		if (!getenv("HSLT_TEST"))
+			argp_error(state, "--test-spoil-states is for tests alone: it makes wrong images");
+		c->spoil = (unsigned)number(state, "--test-spoil-states", arg, 1, 1e6);
 		return 0;
 	case OPTION_STALL:
 		c->stall_seconds = number(state, "--stall", arg, 0, 86400);

@@ -164,9 +164,13 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 	j->sequence = id;
 	j->index = 0;
 	bool ok = in->states ? ops->resume(c, &in->states[k]) : ops->start(c, in->seeds[k]);
-	if (!ok)
-		return error_set(j->e, EBADMSG, "chain %llu of group %u does not resume: its state is not one of this plan",
+	if (!ok && in->states)
+		return error_set(j->e, EILSEQ, "chain %llu of group %u does not resume: its state is not one of this plan",
 				 (unsigned long long)id, j->key->group);
+	if (!ok) { /* a seed that carries no light: the bootstrap's weights were not ours */
+		j->out->counters[COUNT_STATES_LOST]++;
+		ops->start(c, UINT64_MAX);
+	}
 	struct chain_sums sums = {0, 0};
 	uint64_t accepted = j->out->counters[COUNT_ACCEPTED];
 	for (uint64_t i = 0; i < j->plan->epoch; i++) {

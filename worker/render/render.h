@@ -90,17 +90,18 @@ void world_summary(const struct world *w, struct render_summary *out);
 double world_brightest(const struct world *w);
 size_t world_embree_bytes(const struct world *w);
 
-/* Seeds of a lease at epoch 0 (bootstrap indices, one a chain) or the states after the epoch before. */
+/* Seeds of a lease at epoch 0 (bootstrap indices, one a chain) or the states after the epoch before; seeds in their place where
+ * these are lost: the chains begin anew. */
 struct lease_input {
 	uint32_t chain_count;
-	const uint64_t *seeds;             /* NULL from epoch 1 on */
+	const uint64_t *seeds;             /* NULL where there are states */
 	const struct chain_state *states;  /* NULL at epoch 0 */
 };
 
 enum lease_end { LEASE_DONE, LEASE_STOPPED };
 
 /* Runs one lease and fills the batch (batch_fini frees it). `stop` may become true at any time: the lease is given up.
- * -ENOMEM, -EBADMSG (states that do not parse), -EINVAL (plan and world do not fit), -EDOM (an invalid floating-point
+ * -ENOMEM, -EILSEQ (states that cannot be gone on from), -EINVAL (plan and world do not fit), -EDOM (an invalid floating-point
  * operation; the sentence says where). Ticks (common/base/tick.h) at least every 256 samples or mutations. */
 int render_lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
 		 const atomic_bool *stop, enum lease_end *end, struct batch *out, struct error *e);

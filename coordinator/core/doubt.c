@@ -1,0 +1,114 @@
+#include "coordinator/core/doubt.h"
+
+#include "common/base/text.h"
+#include "coordinator/core/state.h"
+
+static struct identity *known(const struct farm *f, uint64_t who)
+{
+	for (uint32_t i = 0; i < f->known_count; i++)
+		if (f->known[i]->id == who)
+			return f->known[i];
+	return NULL;
+}
+
+static const char *name_of(const struct farm *f, uint64_t who)
+{
+	const struct identity *k = known(f, who);
+	return k ? k->name : "a worker that is forgotten";
+}
+
+static bool is_party(const struct slot *s, uint64_t who)
+{
+	return who == s->doubt.maker || who == s->doubt.refuser;
+}
+
+/* A worker that might be asked and is neither. */
+static bool third_is_here(const struct farm *f, const struct job *j, const struct slot *s)
+{
+	for (uint32_t i = 0; i < f->peer_count; i++) {
+		const struct peer *p = f->peers[i];
+		if (p->state == PEER_ACTIVE && job_takes(j, p) && !is_party(s, p->who->id))
+			return true;
+	}
+	return false;
+}
+
+static struct lease_key key_of(const struct job *j, const struct slot *s)
+{
+	uint32_t index = (uint32_t)(s - j->slots);
+	return (struct lease_key){ .job = j->id, .kind = j->kind, .group = index / j->plan.parts, .part = index % j->plan.parts,
+				   .epoch = s->next };
+}
+
+bool doubt_waits(const struct slot *s)
+{
+	return s->doubt.refuser && !s->doubt.anew;
+}
+
+bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p)
+{
+	return doubt_waits(s) && is_party(s, p->who->id) && third_is_here(f, j, s);
+}
+
+static void begin_anew(struct farm *f, struct job *j, struct slot *s)
+{
+	const struct lease_key k = key_of(j, s);
+	s->doubt.anew = true;
+	j->anew++;
+	text_print(f->text, sizeof f->text,
+		   "the chains of group %u part %u begin epoch %llu anew from their seeds: their states, made by %s, could not be read", k.group,
+		   k.part, (unsigned long long)k.epoch, s->doubt.maker ? name_of(f, s->doubt.maker) : "a worker before the coordinator's start");
+	struct action *a = update_add(f, ACTION_CHAINS_ANEW);
+	a->job = j->id;
+	a->key = k;
+	a->text = f->text;
+}
+
+void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, const char *text)
+{
+	struct doubt *d = &s->doubt;
+	uint64_t who = p->who->id;
+	if (d->anew)
+		return;
+	bool second = d->refuser && d->refuser != who && d->maker != who;
+	if (!d->refuser)
+		d->refuser = who;
+	text_print(j->text, sizeof j->text, "%s: %s (made by %s)", p->name, text,
+		   d->maker ? name_of(f, d->maker) : "a worker before the coordinator's start");
+	if (!second && third_is_here(f, j, s)) {
+		job_place(j, s);
+		return;
+	}
+	begin_anew(f, j, s);
+	struct identity *maker = second && !j->mixed && d->maker != d->refuser ? known(f, d->maker) : NULL;
+	if (maker) {
+		struct lease_key made = key_of(j, s);
+		made.epoch--;
+		roster_wrong(f, maker, &made);
+	}
+	job_place(j, s);
+}
+
+void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who, const struct lease_key *k)
+{
+	bool went_on = doubt_waits(s) && !is_party(s, who->id) && !j->mixed;
+	struct identity *refuser = went_on ? known(f, s->doubt.refuser) : NULL;
+	s->doubt = (struct doubt){ .maker = who->id };
+	if (refuser)
+		roster_wrong(f, refuser, k);
+}
+
+bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t size)
+{
+	for (uint32_t i = 0; i < j->slot_count; i++) {
+		const struct slot *s = &j->slots[i];
+		if (!doubt_waits(s) || s->holders)
+			continue;
+		const struct lease_key k = key_of(j, s);
+		text_print(text, size, "a third worker is to say whether the chain states of group %u part %u epoch %llu are wrong: %s made them, %s could not read them",
+			   k.group, k.part, (unsigned long long)k.epoch, s->doubt.maker ? name_of(f, s->doubt.maker) : "a worker before the coordinator's start",
+			   name_of(f, s->doubt.refuser));
+		return true;
+	}
+	return false;
+}

@@ -1,0 +1,144 @@
+/* Chain states that workers refuse, as transcripts: who is asked, who is to blame, and that no job fails by it. */
+#include "coordinator/core/roster.h"
+#include "tests/support/transcript.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* One slot; the first worker has made the states after epoch 0 and leaves the next lease to others. */
+#define START                                                                       \
+	"[0] submit groups=1 rounds=4 -> j1 submitted, j1 is queued",               \
+	"[0] w1 joins A threads=1 name=a -> -",                                     \
+	"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",                 \
+	"[1] w1 batch j1 g0 p0 boot -> merge, merged, j1 prepare",                  \
+	"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",                    \
+	"[2] w1 wants 0 -> -", "[2] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1"
+
+#define WORKER(N, NAME) "[3] w" #N " joins A threads=1 name=" NAME " -> -"
+
+static uint32_t wrong(const struct farm *f, uint64_t who)
+{
+	struct worker_status w;
+	assert_true(farm_worker(f, who, &w));
+	return w.wrong;
+}
+
+static void a_second_refusal_is_the_makers_fault(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START, WORKER(2, "b"), WORKER(3, "c"),
+		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+		"[4] w2 refuses j1 g0 p0 e1 not mine -> -", /* neither it nor who made them, though that one would */
+		"[4] w1 wants 1 -> -",
+		NULL });
+	struct job_status j;
+	assert_true(farm_job(f, 1, 4, &j));
+	assert_non_null(strstr(j.waiting, "a third worker is to say whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b could"));
+	transcript_play(f, (const char *const[]){
+		"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
+		"[6] w3 refuses j1 g0 p0 e1 not mine either -> anew, #1 wrong result: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
+		"[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2", /* from states again */
+		NULL });
+	assert_int_equal(wrong(f, 1), 1);
+	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
+	assert_true(farm_job(f, 1, 8, &j));
+	assert_int_equal(j.state, JOB_RUNNING);
+	farm_free(f);
+}
+
+static void a_third_that_goes_on_is_right(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START, WORKER(2, "b"), WORKER(3, "c"),
+		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+		"[3] w3 wants 1 -> -",
+		"[4] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
+		"[5] w3 batch j1 g0 p0 e1 -> merge, merged, #2 wrong result: j1 render group 0 part 0 epoch 1, j1 round 2, w2 gets j1 g0 p0 e2",
+		NULL });
+	assert_int_equal(wrong(f, 2), 1);
+	assert_int_equal(wrong(f, 1) + wrong(f, 3), 0);
+	farm_free(f);
+}
+
+/* One word against another: nobody is to blame, and the job goes on. */
+static void without_a_third_the_chains_begin_anew(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START, WORKER(2, "b"),
+		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+		"[4] w2 refuses j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
+		"[5] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
+		"[6] w2 refuses j1 g0 p0 e2 my own -> -", /* made by itself: the other is asked */
+		"[6] w1 wants 1 -> w1 gets j1 g0 p0 e2",
+		"[7] w1 refuses j1 g0 p0 e2 no -> anew, w2 gets j1 g0 p0 e2 anew",
+		NULL });
+	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
+	farm_free(f);
+}
+
+/* The third leaves before it has said anything: the two are asked again. */
+static void a_third_that_leaves(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START, WORKER(2, "b"), WORKER(3, "c"),
+		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+		"[4] w2 refuses j1 g0 p0 e1 no -> -",
+		"[5] w3 leaves -> w2 gets j1 g0 p0 e1",
+		"[6] w2 refuses j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
+		NULL });
+	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
+	farm_free(f);
+}
+
+/* Whoever refuses what others can go on from is set aside after three times. */
+static void a_liar_is_set_aside(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=3 rounds=4 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=3 name=a -> -",
+		"[0] w1 wants 3 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged", "[1] w1 batch j1 g1 p0 boot -> merge, merged",
+		"[1] w1 batch j1 g2 p0 boot -> merge, merged, j1 prepare",
+		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0, w1 gets j1 g2 p0 e0",
+		"[2] w1 wants 0 -> -", "[2] w1 batch j1 g0 p0 e0 -> merge, merged", "[2] w1 batch j1 g1 p0 e0 -> merge, merged",
+		"[2] w1 batch j1 g2 p0 e0 -> merge, merged, j1 round 1",
+		"[3] w2 joins A threads=3 name=b -> -", "[3] w3 joins A threads=3 name=c -> -",
+		"[3] w2 wants 3 -> w2 gets j1 g0 p0 e1, w2 gets j1 g1 p0 e1, w2 gets j1 g2 p0 e1",
+		"[4] w2 refuses j1 g0 p0 e1 no -> -", "[4] w2 refuses j1 g1 p0 e1 no -> -", "[4] w2 refuses j1 g2 p0 e1 no -> -",
+		"[5] w3 wants 3 -> w3 gets j1 g0 p0 e1, w3 gets j1 g1 p0 e1, w3 gets j1 g2 p0 e1",
+		"[6] w3 wants 0 -> -",
+		"[6] w3 batch j1 g0 p0 e1 -> merge, merged, #2 wrong result: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e2",
+		"[6] w3 batch j1 g1 p0 e1 -> merge, merged, #2 wrong result: j1 render group 1 part 0 epoch 1, w2 gets j1 g1 p0 e2",
+		NULL });
+	transcript_play(f, (const char *const[]){
+		"[6] w3 batch j1 g2 p0 e1 -> merge, merged, #2 wrong result: j1 render group 2 part 0 epoch 1, #2 aside, "
+		"w2 loses j1 g0 p0 e2, w2 loses j1 g1 p0 e2, j1 round 2",
+		NULL });
+	assert_int_equal(wrong(f, 1) + wrong(f, 3), 0);
+	farm_free(f);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_second_refusal_is_the_makers_fault),
+		cmocka_unit_test(a_third_that_goes_on_is_right),
+		cmocka_unit_test(without_a_third_the_chains_begin_anew),
+		cmocka_unit_test(a_third_that_leaves),
+		cmocka_unit_test(a_liar_is_set_aside),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
