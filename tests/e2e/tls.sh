@@ -40,7 +40,6 @@ turned_away() {
 	tries "$1"
 	until_true 20 grep -qs "$2" "$DIR/$3.log" || fail "$1: $(cat "$DIR/$3.log")"
 	"$BIN/hslt-status" --json | grep -q "\"name\":\"$3\"" && fail "$1: it has joined"
-	kill -9 "$WORKER"
 	row "$1" refused "$2"
 }
 
@@ -102,11 +101,17 @@ $list --tls "$CA/chief" | grep -q '^j1 ' || fail "an operator does not see it"
 same "$DIR/alone.exr" "$DIR/again.exr"
 
 start_worker as-client --tls "$CA/ann"
+as_client=$WORKER
 turned_away "a client's certificate leases" "cannot lease" as-client
+CODE=0
+wait "$as_client" || CODE=$?
+[ $CODE -eq 6 ] || fail "a worker with a client's certificate ends with $CODE, not 6: $(cat "$DIR/as-client.log")"
 start_worker foreign --tls "$DIR/other/eve-node"
 turned_away "a worker of another authority" "is not accepted" foreign
+kill -9 "$WORKER"
 start_worker plain --tls ""
 turned_away "a worker without TLS" "speaks TLS" plain
+kill -9 "$WORKER"
 
 # What is not TLS at all: an answer or a hang-up, never a wait.
 tries "HTTP to the TLS port"

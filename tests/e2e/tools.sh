@@ -41,6 +41,17 @@ code 0 "$BIN/hslt-compare" a.exr large.exr --size 16x16 --heatmap heat.png --tri
 grep -q '^left out  *2 of 256' out || fail "--trim says: $(cat out)"
 code 0 "$BIN/hslt-tonemap" a.exr a.png --exposure -1
 code 2 "$BIN/hslt-tonemap" a.exr a.png --exposure bright
+# What is no regular file is written to and stays; of a link the file that it leads to is replaced.
+code 0 "$BIN/hslt-tonemap" a.exr b.png --exposure -1
+"$BIN/hslt-tonemap" a.exr /dev/stdout --exposure -1 2>err.log | cmp - b.png || fail "/dev/stdout: $(cat err.log)"
+{ printf before && "$BIN/hslt-tonemap" a.exr /dev/stdout --exposure -1 2>err.log; } >after.png
+{ printf before && cat b.png; } | cmp - after.png || fail "/dev/stdout that is a file is written from its beginning"
+mkfifo pipe && { cmp pipe b.png & } && code 0 "$BIN/hslt-tonemap" a.exr pipe --exposure -1
+wait "$!" && [ -p pipe ] || fail "a pipe does not stay one"
+mkdir folder && echo old >folder/real.exr && ln -s folder/real.exr link.exr
+code 0 "$BIN/hslt-render" "$BOX" -o link.exr --integrator path --spp 4 --seed 1 --size 32x32 --threads 1 --quiet --stats /dev/null
+[ -L link.exr ] && [ -f folder/real.exr ] && [ -c /dev/null ] || fail "a link or a device does not stay one"
+code 0 "$BIN/hslt-compare" --exact a.exr folder/real.exr
 code 1 "$BIN/hslt-tonemap" a.exr none/a.png
 [ "$(ls -1 ./*.png* | tr '\n' ' ')" = "./a.png ./heat.png " ] || fail "files: $(ls)"
 # 8 bytes of signature, then IHDR with the size

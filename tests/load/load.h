@@ -11,7 +11,18 @@
 
 #include <stdbool.h>
 
+/* What becomes of a worker, from the last ones of the crowd on. */
+enum load_kind {
+	LOAD_HONEST,
+	LOAD_DIES,   /* in a third of its leases: hangs up without a word, and calls again */
+	LOAD_LIES,   /* every result holds what is no number */
+	LOAD_HOARDS, /* claims 4,096 threads, takes what it gets, and says nothing but heartbeats */
+	LOAD_HANGS,  /* in a third of its leases: says nothing more, not even heartbeats; when it is hung up on it calls again */
+	LOAD_KINDS
+};
+
 struct load_settings {
+	unsigned bad[LOAD_KINDS]; /* how many; LOAD_HONEST is the rest */
 	unsigned workers, width, height, groups, parts, jobs; /* jobs 0: as many as keep all of them busy */
 	double minutes, interval, ramp; /* s between a worker's batches; connections a second */
 	double heartbeat;
@@ -65,6 +76,7 @@ struct load {
 	uint64_t random;
 	/* counted from the first to the last moment */
 	uint64_t grants, again, merged, bootstrap_merged, repeated, refused, revoked, given_back, disordered, faults;
+	uint64_t deaths, lies, lies_refused, hoarded, hangs;
 	/* counted while measuring */
 	uint64_t batches, bytes;
 	struct load_times grant, first_grant, ack, send, beat, late;

@@ -20,7 +20,7 @@ static const char doc[] =
 	"within 100 ms.";
 
 enum { OPTION_BIN = 256, OPTION_MINUTES, OPTION_SIZE, OPTION_INTERVAL, OPTION_INSECURE, OPTION_JOBS, OPTION_GROUPS, OPTION_PARTS,
-       OPTION_RAMP, OPTION_SPOOL, OPTION_WANT, OPTION_HEARTBEAT, OPTION_COORDINATOR, OPTION_LOSSES };
+       OPTION_DYING, OPTION_LYING, OPTION_HOARDING, OPTION_HANGING, OPTION_RAMP, OPTION_SPOOL, OPTION_WANT, OPTION_HEARTBEAT, OPTION_COORDINATOR, OPTION_LOSSES };
 
 static const struct argp_option options[] = {
 	{"workers", 'w', "N", 0, "Connected workers (1000)", 0},
@@ -31,6 +31,10 @@ static const struct argp_option options[] = {
 	{"groups", OPTION_GROUPS, "N", 0, "Of each job (16)", 0},
 	{"parts", OPTION_PARTS, "N", 0, "Of each job (64)", 0},
 	{"want", OPTION_WANT, "N", 0, "Leases that a worker holds: the one it works on, and others at hand (2)", 0},
+	{"dying", OPTION_DYING, "N", 0, "Of the workers so many die in a third of their leases, and call again (0)", 0},
+	{"lying", OPTION_LYING, "N", 0, "... send results that cannot be (0)", 0},
+	{"hoarding", OPTION_HOARDING, "N", 0, "... claim 4,096 threads, take leases and give nothing (0)", 0},
+	{"hanging", OPTION_HANGING, "N", 0, "... stand still in a third of their leases, until they are hung up on (0)", 0},
 	{"ramp", OPTION_RAMP, "N", 0, "New connections a second (100)", 0},
 	{"heartbeat", OPTION_HEARTBEAT, "SECONDS", 0, "Of the coordinator (5)", 0},
 	{"spool", OPTION_SPOOL, "DIR", 0, "Where a folder for spool, certificates and logs is made and removed (/tmp)", 0},
@@ -108,6 +112,22 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_WANT:
 		s->want = (unsigned)number(state, arg, 1, 4);
+		return 0;
+	case OPTION_DYING:
+		s->bad[LOAD_DIES] = (unsigned)number(state, arg, 0, 1e5);
+		return 0;
+	case OPTION_LYING:
+		s->bad[LOAD_LIES] = (unsigned)number(state, arg, 0, 1e5);
+		return 0;
+	case OPTION_HOARDING:
+		s->bad[LOAD_HOARDS] = (unsigned)number(state, arg, 0, 1e5);
+		return 0;
+	case OPTION_HANGING:
+		s->bad[LOAD_HANGS] = (unsigned)number(state, arg, 0, 1e5);
+		return 0;
+	case ARGP_KEY_END:
+		if (s->bad[LOAD_DIES] + s->bad[LOAD_LIES] + s->bad[LOAD_HOARDS] + s->bad[LOAD_HANGS] >= s->workers)
+			argp_error(state, "one worker at least must be honest");
 		return 0;
 	case OPTION_RAMP:
 		s->ramp = number(state, arg, 1, 1e4);
@@ -265,7 +285,7 @@ static void on_phase(uv_timer_t *t)
 	clockwork.anonymous = fmax(clockwork.anonymous, anonymous);
 	if (!process_is_running(&coordinator))
 		load_die("the coordinator has ended");
-	if (!load.measuring && !load.leaving && load.connected == load.s.workers && load.merged >= load.s.workers) {
+	if (!load.measuring && !load.leaving && load.connected + load.s.bad[LOAD_DIES] + load.s.bad[LOAD_HANGS] >= load.s.workers && load.merged >= load.s.workers) {
 		load.measuring = true;
 		mark(0);
 		fprintf(stderr, "load: %u workers are connected and have sent a batch; measuring\n", load.connected);
@@ -356,11 +376,16 @@ static int report(double wrong, double peak)
 	printf("leases: %llu granted, %llu merged, %llu of bootstraps, %llu given back at the end, %llu copies taken back, %llu again to the same, %llu repeats\n",
 	       (unsigned long long)load.grants, (unsigned long long)load.merged, (unsigned long long)load.bootstrap_merged,
 	       (unsigned long long)load.given_back, (unsigned long long)load.revoked, (unsigned long long)load.again, (unsigned long long)load.repeated);
+	const unsigned *bad = load.s.bad;
+	printf("bad workers: %u die (%llu deaths), %u lie (%llu results, %llu refused), %u hoard (%llu leases), %u hang (%llu times)\n", bad[LOAD_DIES],
+	       (unsigned long long)load.deaths, bad[LOAD_LIES], (unsigned long long)load.lies, (unsigned long long)load.lies_refused,
+	       bad[LOAD_HOARDS], (unsigned long long)load.hoarded, bad[LOAD_HANGS], (unsigned long long)load.hangs);
 	if (load.faults)
 		printf("faults: %llu, the first: %s\n", (unsigned long long)load.faults, load.fault);
 	bool met = bound("leases lost", lost, "", 0, false);
 	met &= bound("acknowledged out of order", (double)load.disordered, "", 0, false);
 	met &= bound("merged more or less than once", wrong, "", 0, false);
+	met &= bound("wrong results that count", (double)(load.lies - load.lies_refused), "", 0, false);
 	met &= bound("coordinator's exit code", coordinator.code, "", 0, false);
 	met &= bound("connections lost, faults", (double)(load.closed + load.faults), "", 0, false);
 	if (load.s.losses)

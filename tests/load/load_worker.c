@@ -7,6 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
+enum { HOARD = 4096 };
 enum { LEASES = 8, WISHES = 8, HEADER_LIMIT = 1 << 22, PAYLOAD_LIMIT = 1 << 28, SEND_LIMIT = 1 << 30 };
 enum lease_state { FREE, WAITING, WORKING, SENDING, SENT };
 
@@ -21,6 +22,9 @@ struct load_worker {
 	struct conn *conn; /* NULL: gone */
 	uv_timer_t work, beat;
 	unsigned index;
+	int closing; /* timers, of a connection that is gone */
+	enum load_kind kind;
+	bool hangs;
 	uint64_t jobs_ready; /* bits: it has the job's files */
 	uint64_t jobs_asked;
 	struct held held[LEASES];
@@ -163,6 +167,10 @@ static void send_result(struct load_worker *w, struct held *h)
 	h->state = SENDING;
 	h->since = load_now();
 	wish(w, NAN);
+	if (w->kind == LOAD_LIES) {
+		memset(frame + size / 2, 0xff, 64); /* pixels of no value */
+		l->lies++;
+	}
 	if (l->measuring) {
 		l->batches++;
 		l->bytes += size;
@@ -170,10 +178,29 @@ static void send_result(struct load_worker *w, struct held *h)
 	conn_send_frame(w->conn, frame, size);
 }
 
+/* true: instead of sending what is ready it is gone. Not while an answer to another result is under way, which would not be counted. */
+static bool ends_badly(struct load_worker *w)
+{
+	struct load *l = w->load;
+	if ((w->kind != LOAD_DIES && w->kind != LOAD_HANGS) || in_state(w, SENDING) || in_state(w, SENT) || load_uniform(l) > 1. / 3)
+		return false;
+	if (w->kind == LOAD_DIES) {
+		l->deaths++;
+		conn_close(w->conn, "dies");
+	} else {
+		l->hangs++;
+		w->hangs = true;
+		uv_timer_stop(&w->beat);
+	}
+	return true;
+}
+
 static void on_worked(uv_timer_t *t)
 {
 	struct load_worker *w = t->data;
 	struct held *h = in_state(w, WORKING);
+	if (w->hangs || (h && w->conn && ends_badly(w)))
+		return;
 	if (h && w->conn)
 		send_result(w, h);
 	work_on(w);
@@ -183,7 +210,7 @@ static void work_on(struct load_worker *w)
 {
 	struct load *l = w->load;
 	unsigned i = 0;
-	struct held *h = l->leaving || in_state(w, WORKING) ? NULL : in_state(w, WAITING);
+	struct held *h = l->leaving || w->hangs || in_state(w, WORKING) ? NULL : in_state(w, WAITING);
 	if (!h || !job_of(l, h->key.job, &i) || !(w->jobs_ready >> i & 1))
 		return;
 	h->state = WORKING;
@@ -204,6 +231,10 @@ static void take_grant(struct load_worker *w, const Farm__LeaseGrant *m)
 	unsigned i;
 	struct held *h = in_state(w, FREE);
 	struct lease_key k;
+	if (w->kind == LOAD_HOARDS) {
+		l->hoarded++;
+		return;
+	}
 	if (!h || lease_key_from_wire(m->key, &k, &e) || !job_of(l, k.job, &i)) {
 		fault(w, "a lease that cannot be");
 		return;
@@ -260,6 +291,8 @@ static void take_ack(struct load_worker *w, const Farm__LeaseAck *m)
 		count_merged(l, &k);
 	else if (m->verdict == FARM__VERDICT__VERDICT_REPEATED)
 		l->repeated++;
+	else if (w->kind == LOAD_LIES)
+		l->lies_refused++;
 	else {
 		l->refused++;
 		fault(w, m->text);
@@ -306,6 +339,11 @@ static void take_welcome(struct load_worker *w, const Farm__HelloAck *ack)
 		return;
 	}
 	l->connected++;
+	if (w->kind == LOAD_HOARDS) {
+		uv_timer_start(&w->beat, on_beat, ack->heartbeat_ms, ack->heartbeat_ms);
+		request(w, HOARD + 1);
+		return;
+	}
 	uv_timer_start(&w->beat, on_beat, (uint64_t)((double)ack->heartbeat_ms * load_uniform(l)) + 1, ack->heartbeat_ms);
 	for (unsigned i = 0; i < l->s.want; i++)
 		wish(w, load_now());
@@ -372,7 +410,7 @@ static void on_opened(void *user)
 	h.role = FARM__ROLE__ROLE_WORKER;
 	h.name = name;
 	h.fingerprint = fingerprint;
-	h.threads = 1;
+	h.threads = w->kind == LOAD_HOARDS ? HOARD : 1;
 	m.hello = &h;
 	say(w, &m, FARM__ENVELOPE__BODY_HELLO);
 }
@@ -393,13 +431,30 @@ static void on_drained(void *user)
 			w->wish[i] = now;
 }
 
+/* Both timers: who dies or hangs calls again as another life of the same. */
+static void on_timer_closed(uv_handle_t *h)
+{
+	struct load_worker *w = h->data;
+	struct load *l = w->load;
+	unsigned index = w->index;
+	if (--w->closing || l->leaving || (w->kind != LOAD_DIES && w->kind != LOAD_HANGS))
+		return;
+	*w = (struct load_worker){0};
+	load_connect(l, index);
+}
+
 static void on_closed(void *user, const char *why)
 {
 	struct load_worker *w = user;
 	struct load *l = w->load;
 	w->conn = NULL;
-	uv_close((uv_handle_t *)&w->work, NULL);
-	uv_close((uv_handle_t *)&w->beat, NULL);
+	w->closing = 2;
+	uv_close((uv_handle_t *)&w->work, on_timer_closed);
+	uv_close((uv_handle_t *)&w->beat, on_timer_closed);
+	if (w->kind == LOAD_DIES || w->kind == LOAD_HANGS) {
+		l->connected--;
+		return;
+	}
 	if (!l->leaving) {
 		l->closed++;
 		fault(w, why);
@@ -411,6 +466,17 @@ struct load_worker *load_workers_new(unsigned count)
 	return mem_alloc(count, sizeof(struct load_worker));
 }
 
+static enum load_kind kind_of(const struct load_settings *s, unsigned index)
+{
+	unsigned from_last = s->workers - 1 - index;
+	for (int k = LOAD_KINDS - 1; k > LOAD_HONEST; k--) {
+		if (from_last < s->bad[k])
+			return (enum load_kind)k;
+		from_last -= s->bad[k];
+	}
+	return LOAD_HONEST;
+}
+
 void load_connect(struct load *l, unsigned index)
 {
 	static const struct conn_events events = {.opened = on_opened, .message = on_message, .drained = on_drained, .closed = on_closed};
@@ -420,6 +486,7 @@ void load_connect(struct load *l, unsigned index)
 	w->load = l;
 	w->index = index;
 	w->first = true;
+	w->kind = kind_of(&l->s, index);
 	uv_timer_init(&l->loop, &w->work);
 	uv_timer_init(&l->loop, &w->beat);
 	w->work.data = w->beat.data = w;

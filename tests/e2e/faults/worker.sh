@@ -20,6 +20,21 @@ blameless() {
 	[ "$(value "$ID" failures)" = 0 ] || fail "$NAME: counted as $(value "$ID" failures) failures"
 }
 
+fault hoard_leases 1 1 "a worker claims 4,096 threads, takes leases, says its heartbeats and answers nothing"
+hoard_leases() {
+	farm
+	worker w0
+	says w0 event=connect\ 
+	"$PYTHON" "$HERE/faults/hoard.py" "${COORDINATOR#*:}" "$(sed -n 's/.*event=start.* fingerprint="\([^"]*\)".*/\1/p' "$DIR/w0.log")" >"$DIR/hoard.log" 2>&1 &
+	PIDS="$PIDS $!"
+	says coordinator 'event=peer_hello.*name="hoarder"'
+	job
+	says hoard lease
+	finish_job
+	[ "$(grep -c 'event=lease_granted.* peer=2 ' "$DIR/coordinator.log")" -gt 0 ] || fail "$NAME: it gets no lease"
+	blameless
+}
+
 fault leave_worker 20 2 "SIGTERM of a worker: it finishes its epoch"
 leave_worker() {
 	farm
