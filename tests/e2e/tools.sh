@@ -3,7 +3,7 @@
 need hslt-render hslt-compare hslt-tonemap
 
 render() { # FILE SEED SIZE
-	code 0 "$BIN/hslt-render" "$BOX" -o "$DIR/$1.exr" --integrator path --spp 4 --seed "$2" --size "$3" --threads 1 --quiet
+	code 0 "$BIN/hslt-render" "$BOX" -o "$DIR/$1.exr" --integrator path --spp 4 --seed "$2" --size "$3" --threads 1 --quiet --stats /dev/null
 }
 
 for p in compare tonemap; do
@@ -20,6 +20,8 @@ render a 1 32x32
 render again 1 32x32
 render other 2 32x32
 render large 1 64x64
+mkdir "$DIR/folder" && echo old >"$DIR/folder/real.exr" && ln -s folder/real.exr "$DIR/link.exr"
+render link 1 32x32
 cd "$DIR"
 code 0 "$BIN/hslt-compare" --exact a.exr again.exr
 code 1 "$BIN/hslt-compare" --exact a.exr other.exr
@@ -48,10 +50,9 @@ code 0 "$BIN/hslt-tonemap" a.exr b.png --exposure -1
 { printf before && cat b.png; } | cmp - after.png || fail "/dev/stdout that is a file is written from its beginning"
 mkfifo pipe && { cmp pipe b.png & } && code 0 "$BIN/hslt-tonemap" a.exr pipe --exposure -1
 wait "$!" && [ -p pipe ] || fail "a pipe does not stay one"
-mkdir folder && echo old >folder/real.exr && ln -s folder/real.exr link.exr
-code 0 "$BIN/hslt-render" "$BOX" -o link.exr --integrator path --spp 4 --seed 1 --size 32x32 --threads 1 --quiet --stats /dev/null
 [ -L link.exr ] && [ -f folder/real.exr ] && [ -c /dev/null ] || fail "a link or a device does not stay one"
 code 0 "$BIN/hslt-compare" --exact a.exr folder/real.exr
+rm b.png after.png
 code 1 "$BIN/hslt-tonemap" a.exr none/a.png
 [ "$(ls -1 ./*.png* | tr '\n' ' ')" = "./a.png ./heat.png " ] || fail "files: $(ls)"
 # 8 bytes of signature, then IHDR with the size

@@ -387,7 +387,8 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 			fault(w, m->blob_chunk->error);
 		break;
 	case FARM__ENVELOPE__BODY_FAULT:
-		fault(w, m->fault->text);
+		if (w->kind != LOAD_HANGS) /* which is to hear that nothing was heard */
+			fault(w, m->fault->text);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_END:
 		fault(w, "a job has ended");
