@@ -55,7 +55,7 @@ static void ask_job(struct agent *a, uint64_t job)
 }
 
 /* An empty text gives the lease back without fault; own: this machine is at fault, not the job; bad_states: who made the states is. */
-static void say_unfinished(struct agent *a, const struct lease_key *k, const char *text, bool own, bool bad_states)
+static void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own, bool bad_states)
 {
 	char copy[1024];
 	Farm__LeaseKey key;
@@ -76,11 +76,6 @@ static void say_unfinished(struct agent *a, const struct lease_key *k, const cha
 	if (*text)
 		log_event(LOG_LEASE_FAILED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k->job), k->group,
 			  k->part, number(k->epoch), log_quote(text).text);
-}
-
-static void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
-{
-	say_unfinished(a, k, text, own, false);
 }
 
 static void send_result(struct agent *a, struct lease_task *l)
@@ -178,7 +173,7 @@ static void fail_leases_of(struct agent *a, struct bundle *b, const struct error
 		next = l->next;
 		if (l->bundle != b || l->state != LEASE_WAITING)
 			continue;
-		say_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own);
+		say_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own, false);
 		drop_lease(a, l);
 	}
 }
@@ -270,7 +265,7 @@ static void on_rendered(struct lease_task *l)
 	if (l->unwanted) {
 		drop_lease(a, l);
 	} else if (l->rc || l->end == LEASE_STOPPED) {
-		say_unfinished(a, &l->grant.key, l->rc ? l->error.text : "", false, l->rc == -EILSEQ);
+		say_failed(a, &l->grant.key, l->rc ? l->error.text : "", false, l->rc == -EILSEQ);
 		drop_lease(a, l);
 	} else {
 		send_result(a, l);
@@ -323,7 +318,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		return;
 	}
 	if (a->leaving || is_stuffed(a)) {
-		say_failed(a, &g.key, "", false);
+		say_failed(a, &g.key, "", false, false);
 		grant_fini(&g);
 		return;
 	}
@@ -339,7 +334,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	if (!rc)
 		rc = lease_task_new(&l, &g, b, &e);
 	if (rc) {
-		say_failed(a, &g.key, e.text, true);
+		say_failed(a, &g.key, e.text, true, false);
 		grant_fini(&g);
 		return;
 	}
@@ -498,7 +493,7 @@ static void tell_lost(struct agent *a)
 	struct lost_lease *l;
 	for (unsigned i = 0; (l = work_lost(i)); i++)
 		if (!l->told) {
-			say_failed(a, &l->key, l->text, l->own);
+			say_failed(a, &l->key, l->text, l->own, false);
 			l->told = true;
 		}
 }
@@ -523,7 +518,7 @@ void desk_leave(struct agent *a)
 		next = l->next;
 		if (l->state == LEASE_RENDERED || (l->state == LEASE_QUEUED && !crew_take_back(a->crew, &l->task)))
 			continue;
-		say_failed(a, &l->grant.key, "", false);
+		say_failed(a, &l->grant.key, "", false, false);
 		drop_lease(a, l);
 	}
 }
@@ -552,7 +547,7 @@ static bool watch_leases(struct agent *a)
 		if (l->state != LEASE_QUEUED || l->task.hung || !has_hung(&l->task))
 			continue;
 		if (!l->unwanted)
-			say_failed(a, &l->grant.key, text, false);
+			say_failed(a, &l->grant.key, text, false, false);
 		l->unwanted = l->task.hung = found = true;
 		atomic_store(&l->stop, true);
 	}
