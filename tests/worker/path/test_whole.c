@@ -134,12 +134,35 @@ static void test_ends(void **state)
 	check("lens and lamps, glass", world_of_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
 }
 
+/* Both directions lie on the same side of the shading and of the geometric normal, each, or nothing scatters: the eight cases of
+ * a normal that is bent by 60 degrees. */
+static void test_sides(void **state)
+{
+	(void)state;
+	static struct whole_path x;
+	const double bend = M_PI / 3;
+	x.edges = 2;
+	x.v[1].x.sh = frame_around((vec3){0, 0, 1});
+	x.v[1].x.ng = (vec3){sin(bend), 0, cos(bend)};
+	for (int i = 0; i < 36; i++)
+		for (int o = 0; o < 36; o++) {
+			double a = (i + 0.5) * M_PI / 18, b = (o + 0.5) * M_PI / 18;
+			vec3 wi = {sin(a), 0, cos(a)}, wo = {sin(b), 0, cos(b)};
+			bool up_i = cos(a) > 0, up_o = cos(b) > 0;
+			bool agree = up_i == (cos(a - bend) > 0) && up_o == (cos(b - bend) > 0);
+			x.edge[0].w = vec3_neg(wi);
+			x.edge[1].w = wo;
+			assert_int_equal(whole_mode(&x, 1), !agree ? 0 : up_i == up_o ? BSDF_REFLECT : BSDF_TRANSMIT);
+		}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_surfaces),
 		cmocka_unit_test(test_environment),
 		cmocka_unit_test(test_ends),
+		cmocka_unit_test(test_sides),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
