@@ -254,7 +254,6 @@ void answer_failed(struct farm *f, const struct event *ev)
 	if (l)
 		lease_drop(f, l);
 	if (l && ev->lease.bad_states && j->kind == LEASE_RENDER && j->plan.kind == PLAN_CHAINS && s->next > 0) {
-		p->failures++;
 		j->failures++;
 		doubt_refused(f, j, s, p, ev->text ? ev->text : "");
 		return;

@@ -13,8 +13,15 @@ static struct identity *known(const struct farm *f, uint64_t who)
 
 static const char *name_of(const struct farm *f, uint64_t who)
 {
-	const struct identity *k = known(f, who);
-	return k ? k->name : "a worker that is forgotten";
+	const struct identity *k = who ? known(f, who) : NULL;
+	return k ? k->name : who ? "a worker that is forgotten" : "a worker before the coordinator's start";
+}
+
+const char *farm_maker(const struct farm *f, const struct lease_key *k)
+{
+	const struct job *j = farm_find_job(f, k->job);
+	bool known_slot = j && job_is_live(j) && k->group < j->plan.groups && k->part < j->plan.parts;
+	return known_slot ? name_of(f, job_slot(j, k->group, k->part)->doubt.maker) : "?";
 }
 
 static bool is_party(const struct slot *s, uint64_t who)
@@ -57,7 +64,7 @@ static void begin_anew(struct farm *f, struct job *j, struct slot *s)
 	j->anew++;
 	text_print(f->text, sizeof f->text,
 		   "the chains of group %u part %u begin epoch %llu anew from their seeds: their states, made by %s, could not be read", k.group,
-		   k.part, (unsigned long long)k.epoch, s->doubt.maker ? name_of(f, s->doubt.maker) : "a worker before the coordinator's start");
+		   k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker));
 	struct action *a = update_add(f, ACTION_CHAINS_ANEW);
 	a->job = j->id;
 	a->key = k;
@@ -74,7 +81,7 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 	if (!d->refuser)
 		d->refuser = who;
 	text_print(j->text, sizeof j->text, "%s: %s (made by %s)", p->name, text,
-		   d->maker ? name_of(f, d->maker) : "a worker before the coordinator's start");
+		   name_of(f, d->maker));
 	if (!second && third_is_here(f, j, s)) {
 		job_place(j, s);
 		return;
@@ -106,7 +113,7 @@ bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t siz
 			continue;
 		const struct lease_key k = key_of(j, s);
 		text_print(text, size, "a third worker is to say whether the chain states of group %u part %u epoch %llu are wrong: %s made them, %s could not read them",
-			   k.group, k.part, (unsigned long long)k.epoch, s->doubt.maker ? name_of(f, s->doubt.maker) : "a worker before the coordinator's start",
+			   k.group, k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker),
 			   name_of(f, s->doubt.refuser));
 		return true;
 	}

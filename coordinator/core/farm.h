@@ -151,6 +151,8 @@ struct worker_status {
 	uint32_t wrong; /* results */
 	bool aside;
 };
+/* Who made the chain states that go with this lease, for the log. */
+const char *farm_maker(const struct farm *f, const struct lease_key *k);
 /* The smallest id above `after` (start with 0) of those that are set aside; 0: no more. */
 uint64_t farm_next_aside(const struct farm *f, uint64_t after);
 bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s); /* false: unknown */

@@ -230,9 +230,11 @@ static void take_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 	ev.lease.own = f->own;
 	ev.lease.bad_states = f->bad_states;
 	struct order *o = server_order(p->server, ev.job);
-	if (o && *f->text)
-		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d bad_states=%d text=%s", log_quote(p->name).text, f->own, f->bad_states,
-			  log_quote(text).text);
+	if (o && *f->text && f->bad_states)
+		order_log(o, LOG_LEASE_FAILED, "states_of=%s refused_by=%s text=%s", log_quote(farm_maker(p->server->farm, &ev.lease.key)).text,
+			  log_quote(p->name).text, log_quote(text).text);
+	else if (o && *f->text)
+		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s", log_quote(p->name).text, f->own, log_quote(text).text);
 	server_step(p->server, &ev);
 }
 

@@ -43,6 +43,7 @@ for seed in ${SEEDS:-1}; do
 		stop $liar
 	done
 done
+grep -q 'event=lease_failed .*states_of="liar-.*refused_by="honest' "$DIR/coordinator.log" || fail "the log does not say whose states were refused"
 [ "$anew" -gt 0 ] || fail "nobody noticed that states were spoiled"
 grep -q 'set aside: liar' "$DIR/shown" || fail "the liar is trusted: $(cat "$DIR/shown")"
 

@@ -45,8 +45,11 @@ static void a_second_refusal_is_the_makers_fault(void **state)
 		"[6] w3 refuses j1 g0 p0 e1 not mine either -> anew, #1 wrong result: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
 		"[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2", /* from states again */
 		NULL });
+	struct peer_status p;
 	assert_int_equal(wrong(f, 1), 1);
 	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
+	assert_true(farm_peer(f, 2, &p) && p.failures == 0 && p.faults == 0);
+	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 2}), "b");
 	assert_true(farm_job(f, 1, 8, &j));
 	assert_int_equal(j.state, JOB_RUNNING);
 	farm_free(f);
