@@ -105,6 +105,24 @@ static void a_third_that_leaves(void **state)
 	farm_free(f);
 }
 
+/* Who made the states goes on from them: that is no third opinion. */
+static void the_maker_goes_on(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START, WORKER(2, "b"), WORKER(3, "c"),
+		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+		"[3] w2 wants 0 -> -",
+		"[4] w2 refuses j1 g0 p0 e1 no -> -",
+		"[5] w3 leaves -> -",
+		"[5] w1 wants 1 -> w1 gets j1 g0 p0 e1",
+		"[6] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
+		NULL });
+	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
+	farm_free(f);
+}
+
 /* Whoever refuses what others can go on from is set aside after three times. */
 static void a_liar_is_set_aside(void **state)
 {
@@ -141,6 +159,7 @@ int main(void)
 		cmocka_unit_test(a_third_that_goes_on_is_right),
 		cmocka_unit_test(without_a_third_the_chains_begin_anew),
 		cmocka_unit_test(a_third_that_leaves),
+		cmocka_unit_test(the_maker_goes_on),
 		cmocka_unit_test(a_liar_is_set_aside),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
