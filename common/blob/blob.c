@@ -17,6 +17,8 @@ struct entry {
 	struct blob_hash hash;
 	uint64_t size, used; /* used: a counter that grows with every use */
 	unsigned holds;
+	double checked; /* when its bytes were last found to be right, s on a clock that never goes back; 0: not in this life */
+	bool gone;      /* or damaged: it is as if it were not there, but for its holds */
 };
 
 struct blob_store {
@@ -103,6 +105,20 @@ static struct entry *find(struct blob_store *s, const struct blob_hash *h)
 	return i < s->count && blob_hash_equal(&s->entries[i].hash, h) ? &s->entries[i] : NULL;
 }
 
+/* NULL, too, when it is gone. */
+static struct entry *find_there(struct blob_store *s, const struct blob_hash *h)
+{
+	struct entry *n = find(s, h);
+	return n && !n->gone ? n : NULL;
+}
+
+static double now(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
 static int reserve(struct blob_store *s, size_t count, struct error *e)
 {
 	if (count <= s->capacity)
@@ -123,7 +139,7 @@ static int add_entry(struct blob_store *s, const struct blob_hash *h, uint64_t s
 		return rc;
 	size_t i = place_of(s, h);
 	memmove(&s->entries[i + 1], &s->entries[i], (s->count++ - i) * sizeof *s->entries);
-	s->entries[i] = (struct entry){*h, size, ++s->clock, holds};
+	s->entries[i] = (struct entry){.hash = *h, .size = size, .used = ++s->clock, .holds = holds};
 	s->bytes += size;
 	return 0;
 }
@@ -196,7 +212,7 @@ static int read_folder(struct blob_store *s, struct error *e)
 	if (!rc)
 		rc = reserve(s, count, e);
 	for (size_t i = 0; !rc && i < count; i++) {
-		s->entries[s->count++] = (struct entry){all[i].hash, all[i].size, ++s->clock, 0};
+		s->entries[s->count++] = (struct entry){.hash = all[i].hash, .size = all[i].size, .used = ++s->clock};
 		s->bytes += all[i].size;
 	}
 	if (s->count)
@@ -260,7 +276,7 @@ void blob_store_trim(struct blob_store *s)
 
 static struct entry *touch(struct blob_store *s, const struct blob_hash *h)
 {
-	struct entry *n = find(s, h);
+	struct entry *n = find_there(s, h);
 	if (!n)
 		return NULL;
 	char path[PATH_MOST];
@@ -273,7 +289,7 @@ static struct entry *touch(struct blob_store *s, const struct blob_hash *h)
 
 bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size)
 {
-	struct entry *n = find(s, h);
+	struct entry *n = find_there(s, h);
 	if (n && size)
 		*size = n->size;
 	return n != NULL;
@@ -312,6 +328,71 @@ void blob_path(const struct blob_store *s, const struct blob_hash *h, char *path
 	char hex[BLOB_HEX_SIZE];
 	blob_hex(h, hex);
 	snprintf(path, size, "%s/%s", s->folder, hex);
+}
+
+/* ---- checking ---- */
+
+static int hash_file(const char *path, struct blob_hash *out, struct error *e)
+{
+	enum { PIECE = 1 << 18 };
+	int fd = disk_open(path, O_RDONLY | O_CLOEXEC | O_NOFOLLOW, 0);
+	if (fd < 0)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	unsigned char *bytes = mem_alloc(PIECE, 1);
+	EVP_MD_CTX *md = EVP_MD_CTX_new();
+	ssize_t n = 0;
+	bool ok = bytes && md && EVP_DigestInit_ex(md, EVP_sha256(), NULL) == 1;
+	while (ok && ((n = disk_read(fd, bytes, PIECE)) > 0 || (n < 0 && errno == EINTR)))
+		ok = n < 0 || EVP_DigestUpdate(md, bytes, (size_t)n) == 1;
+	int rc = !ok ? error_set(e, ENOMEM, "no memory to check %s", path) : n < 0 ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	if (!rc && EVP_DigestFinal_ex(md, out->bytes, NULL) != 1)
+		rc = error_set(e, EIO, "SHA-256 failed");
+	EVP_MD_CTX_free(md);
+	mem_free(bytes);
+	disk_close(fd);
+	return rc;
+}
+
+int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, struct error *e)
+{
+	char path[PATH_MOST], aside[PATH_MOST + 16], hex[BLOB_HEX_SIZE];
+	struct blob_hash got;
+	struct entry *n = find_there(s, h);
+	blob_hex(h, hex);
+	if (!n)
+		return error_set(e, ENOENT, "there is no blob %s", hex);
+	if (n->checked > 0 && now() - n->checked <= seconds)
+		return 0;
+	blob_path(s, h, path, sizeof path);
+	int rc = hash_file(path, &got, e);
+	if (rc && rc != -ENOENT)
+		return rc;
+	if (!rc && blob_hash_equal(&got, h)) {
+		n->checked = now();
+		return 0;
+	}
+	snprintf(aside, sizeof aside, "%s/damaged.%s", s->folder, hex);
+	if (!rc)
+		disk_rename(path, aside);
+	n->gone = true;
+	s->bytes -= n->size;
+	n->size = 0;
+	return error_set(e, EBADMSG, rc ? "%s is gone" : "%s is damaged: its bytes are not those of its name", path);
+}
+
+int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e)
+{
+	if (blob_hold(s, h))
+		return 0;
+	struct entry *n = find(s, h);
+	if (n) {
+		n->holds++;
+		return 0;
+	}
+	int rc = add_entry(s, h, 0, 1, e);
+	if (!rc)
+		find(s, h)->gone = true;
+	return rc;
 }
 
 /* ---- writing ---- */
@@ -384,7 +465,18 @@ static int finish(struct blob_writer *w, struct error *e)
 	if (disk_fsync(w->fd) || disk_rename(w->path, path))
 		return error_set(e, errno, "%s: %s", s->folder, strerror(errno));
 	int rc = disk_sync_folder(s->folder, e);
-	return rc ? rc : add_entry(s, &w->hash, w->size, 1, e);
+	struct entry *n = find(s, &w->hash); /* somebody waits for it */
+	if (!rc && n) {
+		n->gone = false;
+		n->size = w->size;
+		s->bytes += w->size;
+		n->holds++;
+	}
+	if (!rc && !n)
+		rc = add_entry(s, &w->hash, w->size, 1, e);
+	if (!rc)
+		find(s, &w->hash)->checked = now();
+	return rc;
 }
 
 static void writer_free(struct blob_writer *w)

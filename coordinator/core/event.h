@@ -37,6 +37,7 @@ enum event_kind {
 /* A job may be held for each of these at once; its leases go out when it is held for none. */
 enum job_hold {
 	HOLD_STORAGE, /* its results cannot be stored */
+	HOLD_FILES,   /* a file of its scene is gone or damaged */
 	HOLD_ORDERED, /* somebody wants it so */
 	JOB_HOLDS,
 };

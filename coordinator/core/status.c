@@ -92,6 +92,17 @@ static void put_busy(char *text, size_t size, const struct job *j, const struct 
 			   (unsigned long long)other->id, other->priority);
 }
 
+static void why_held(const struct job *j, char *text, size_t size)
+{
+	struct text t = {text, size};
+	const char *between = "";
+	for (int i = JOB_HOLDS; i-- > 0;)
+		if (*j->held[i]) {
+			text_put(&t, "%s%s", between, j->held[i]);
+			between = "; ";
+		}
+}
+
 /* The job that it waits for; NULL: it does not, or for something else. */
 static const struct job *why_waiting(const struct farm *f, const struct job *j, char *text, size_t size)
 {
@@ -100,10 +111,8 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 		return NULL;
 	uint32_t active = active_workers(f);
 	const struct job *other = busy_with(f, j);
-	if (*j->held[HOLD_STORAGE] && *j->held[HOLD_ORDERED])
-		text_print(text, size, "%s; %s", j->held[HOLD_ORDERED], j->held[HOLD_STORAGE]);
-	else if (job_is_held(j))
-		text_copy(text, size, *j->held[HOLD_ORDERED] ? j->held[HOLD_ORDERED] : j->held[HOLD_STORAGE]);
+	if (job_is_held(j))
+		why_held(j, text, size);
 	else if (j->preparing)
 		snprintf(text, size, "the bootstrap is being evaluated");
 	else if (j->evaluating && (j->ending != END_NONE || !job_ready(j)))

@@ -2,6 +2,7 @@
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
+#include "coordinator/shell/files.h"
 #include "coordinator/shell/session.h"
 
 enum {
@@ -51,7 +52,7 @@ static void send_piece(struct session *p, const struct ask *a)
 	farm__envelope__init(&m);
 	unsigned char *bytes = mem_alloc(BLOB_CHUNK, 1);
 	ssize_t n = 0;
-	int fd = blob_open(p->server->blobs, &h, &size, &e);
+	int fd = a->number == 0 && files_check(p->server, &h, FILES_CHECKED, &e) ? -1 : blob_open(p->server->blobs, &h, &size, &e);
 	if (fd >= 0 && bytes)
 		n = disk_pread(fd, bytes, BLOB_CHUNK, a->number <= size ? (off_t)a->number : 0);
 	if (fd >= 0 && (!bytes || n < 0 || a->number > size))

@@ -101,6 +101,14 @@ static int offer(struct server *s, const struct order *o, const struct late_resu
 	return rc;
 }
 
+void late_drop(struct server *s, struct order *o)
+{
+	while (o->late_count) {
+		struct late_result l = o->late[--o->late_count];
+		give_up(s, o, &l, "a result that waited in the journal is computed again");
+	}
+}
+
 /* true: one more counts, and others may now. */
 static bool feed_one(struct server *s, struct order *o)
 {

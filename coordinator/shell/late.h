@@ -14,6 +14,8 @@ int late_add(struct order *o, const struct lease_key *k, uint64_t at, struct err
 void late_sort(struct order *o); /* as they can count */
 /* The core gives a lease to this worker: true: its result is here and will count soon, the worker need not hear of it. */
 bool late_withholds(struct order *o, const struct lease_key *k, uint64_t peer);
+/* They are computed again, after all. */
+void late_drop(struct server *s, struct order *o);
 /* All that can count now do. After every step of the core, and when films are free again. */
 void late_feed(struct server *s);
 

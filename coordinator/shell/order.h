@@ -66,6 +66,7 @@ struct order {
 	uint64_t checkpoint_bytes;       /* of the last one */
 	double checkpoint_after;         /* s on the loop's clock: not before */
 	double look_written;     /* work of the last look in the journal */
+	bool lacks_file;         /* of its scene: it is held for that */
 	bool held;               /* the disk has no room for a result of so many bytes: */
 	size_t held_bytes;
 	double try_again;

@@ -8,6 +8,7 @@
 #include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/control.h"
 #include "coordinator/shell/dispatch.h"
+#include "coordinator/shell/files.h"
 #include "coordinator/shell/reconcile.h"
 #include "coordinator/shell/replay.h"
 #include "coordinator/shell/trust.h"
@@ -69,9 +70,9 @@ static int hold_blobs(struct server *s, const Farm__Submit *m, struct error *e)
 {
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = order_file_hash(m->files[i]);
-		if (blob_hold(s->blobs, &h))
+		int rc = blob_expect(s->blobs, &h, e);
+		if (!rc)
 			continue;
-		int rc = error_set(e, EBADMSG, "the spool has lost %s", m->files[i]->name);
 		while (i-- > 0) {
 			h = order_file_hash(m->files[i]);
 			blob_release(s->blobs, &h);
@@ -193,6 +194,8 @@ static int restore_one(struct server *s, const struct ledger_job *j, struct erro
 	o->next = s->orders;
 	s->orders = o;
 	rc = restore_tell(s, o, j->held, 0, e);
+	if (!rc)
+		files_look(s, o);
 	struct job_counts known;
 	return rc || farm_counts(s->farm, o->id, &known) ? rc : error_set(e, ENOMEM, "no memory for a job");
 }

@@ -9,6 +9,8 @@
 #include "coordinator/shell/clear.h"
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
+#include "coordinator/shell/files.h"
+#include "coordinator/shell/folder.h"
 #include "coordinator/shell/keep.h"
 #include "coordinator/shell/late.h"
 #include "coordinator/shell/limits.h"
@@ -369,6 +371,8 @@ static void on_tick(uv_timer_t *t)
 		session_tick(p);
 	status_tick(s->status);
 	durable_tick(s);
+	files_tick(s);
+	folder_tick(s);
 	clear_tick(s);
 	checkpoint_where_due(s);
 	if (s->watchdog > 0 && server_now(s) >= s->watchdog_next) {

@@ -96,6 +96,7 @@ struct server {
 	struct ending *endings;                /* jobs that ended and whose records could not be written yet */
 	double endings_again;
 	struct seen seen;  /* when this life began */
+	double folders_next; /* when jobs' folders are looked for */
 	double clear_next; /* when finished jobs are looked at again */
 	struct clearing *clearing; /* they are being looked at */
 	bool flushing;

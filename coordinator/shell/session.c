@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/shell/asks.h"
+#include "coordinator/shell/files.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -230,10 +231,15 @@ static void take_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 	ev.lease.own = f->own;
 	ev.lease.bad_states = f->bad_states;
 	struct order *o = server_order(p->server, ev.job);
-	if (o && *f->text && f->bad_states)
+	bool blamed = f->own || f->bad_states;
+	if (o && *f->text && !blamed && !files_are_right(p->server, o, FILES_DOUBTED)) { /* the spool's fault, not the worker's */
+		ev.kind = EVENT_LEASE_RETURNED;
+		text[0] = 0;
+	}
+	if (o && *text && f->bad_states)
 		order_log(o, LOG_LEASE_FAILED, "states_of=%s refused_by=%s text=%s", log_quote(farm_maker(p->server->farm, &ev.lease.key)).text,
 			  log_quote(p->name).text, log_quote(text).text);
-	else if (o && *f->text)
+	else if (o && *text)
 		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s", log_quote(p->name).text, f->own, log_quote(text).text);
 	server_step(p->server, &ev);
 }

@@ -1,6 +1,7 @@
 #include "coordinator/shell/upload.h"
 
 #include "common/base/mem.h"
+#include "coordinator/shell/files.h"
 
 #include <math.h>
 #include <stdlib.h>
@@ -160,7 +161,7 @@ static void look_for_blobs(struct upload *u)
 	u->missing_count = 0;
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = order_file_hash(m->files[i]);
-		u->held[i] = blob_hold(u->blobs, &h);
+		u->held[i] = blob_check(u->blobs, &h, FILES_CHECKED, NULL) == 0 && blob_hold(u->blobs, &h);
 		u->missing_count += !u->held[i];
 	}
 }

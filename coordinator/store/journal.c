@@ -434,6 +434,21 @@ bool journal_is_bad(const struct journal *j)
 	return j->bad;
 }
 
+bool journal_is_gone(const struct journal *j)
+{
+	struct stat ours, there;
+	if (j->fd < 0 || disk_fstat(j->fd, &ours))
+		return false;
+	if (disk_stat(j->path, &there))
+		return errno == ENOENT || errno == ENOTDIR;
+	return ours.st_ino != there.st_ino || ours.st_dev != there.st_dev;
+}
+
+void journal_distrust(struct journal *j)
+{
+	j->bad = true;
+}
+
 void journal_settle(struct journal *j)
 {
 	j->settled = true;
@@ -545,47 +560,4 @@ int journal_sync(struct journal *j, struct error *e)
 	}
 	atomic_fetch_sub(&j->flushes, 1);
 	return rc && !j->settled ? fault(j, -rc, e) : 0;
-}
-
-/* The generation; a file that was becoming a journal counts, too. */
-static bool is_journal(const char *name, uint64_t *generation)
-{
-	unsigned long long n;
-	char again[64];
-	if (sscanf(name, "journal.%llu", &n) != 1)
-		return false;
-	int length = snprintf(again, sizeof again, "journal.%llu", n);
-	*generation = n;
-	return strncmp(again, name, (size_t)length) == 0 && (!name[length] || strcmp(name + length, ".new") == 0);
-}
-
-void journal_clear(const char *folder, uint64_t keep)
-{
-	char path[PATH_MOST];
-	uint64_t generation;
-	DIR *d = disk_opendir(folder);
-	for (struct dirent *f; d && (f = readdir(d));) {
-		if (!is_journal(f->d_name, &generation) || generation == keep)
-			continue;
-		snprintf(path, sizeof path, "%s/%s", folder, f->d_name);
-		disk_unlink(path);
-	}
-	if (d)
-		closedir(d);
-}
-
-void journal_put_aside(const char *folder)
-{
-	char from[PATH_MOST], to[PATH_MOST + 16];
-	uint64_t generation;
-	DIR *d = disk_opendir(folder);
-	for (struct dirent *f; d && (f = readdir(d));) {
-		if (!is_journal(f->d_name, &generation))
-			continue;
-		snprintf(from, sizeof from, "%s/%s", folder, f->d_name);
-		snprintf(to, sizeof to, "%s.damaged", from);
-		disk_rename(from, to);
-	}
-	if (d)
-		closedir(d);
 }

@@ -81,6 +81,9 @@ int journal_sync(struct journal *j, struct error *e);
  * file do or did is nothing to it. -EAGAIN: a flush is still under way. */
 bool journal_is_bad(const struct journal *j);
 int journal_renew(struct journal *j, struct error *e);
+/* Its file is no longer where it was: it is bad from now on. What is in it can still be read, and brought into a new one. */
+bool journal_is_gone(const struct journal *j);
+void journal_distrust(struct journal *j);
 /* All that was appended is safe elsewhere: journal_sync has nothing more to do, and does not fail. */
 void journal_settle(struct journal *j);
 

@@ -3,10 +3,13 @@
 #include "common/base/crc.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
+#include "coordinator/store/journal.h"
 #include "coordinator/store/spool.h"
 
+#include <stdio.h>
 #include <string.h>
 
+enum { PATH_MOST = 4200 };
 enum { WINDOW = 1 << 20 /* bytes that are searched for a mark at a time */ };
 
 /* Its digits grow with every change of what a record is, the bodies included (journal_kind's, and batches as common/wire packs them). */
@@ -243,4 +246,49 @@ void journal_gaps_count(const struct journal_gaps *g, uint64_t stored, uint64_t 
 		*damaged += n->count;
 		*lost += durable < n->count ? durable : n->count;
 	}
+}
+
+/* ---- names ---- */
+
+/* The generation; a file that was becoming a journal counts, too. */
+static bool is_journal(const char *name, uint64_t *generation)
+{
+	unsigned long long n;
+	char again[64];
+	if (sscanf(name, "journal.%llu", &n) != 1)
+		return false;
+	int length = snprintf(again, sizeof again, "journal.%llu", n);
+	*generation = n;
+	return strncmp(again, name, (size_t)length) == 0 && (!name[length] || strcmp(name + length, ".new") == 0);
+}
+
+void journal_clear(const char *folder, uint64_t keep)
+{
+	char path[PATH_MOST];
+	uint64_t generation;
+	DIR *d = disk_opendir(folder);
+	for (struct dirent *f; d && (f = readdir(d));) {
+		if (!is_journal(f->d_name, &generation) || generation == keep)
+			continue;
+		snprintf(path, sizeof path, "%s/%s", folder, f->d_name);
+		disk_unlink(path);
+	}
+	if (d)
+		closedir(d);
+}
+
+void journal_put_aside(const char *folder)
+{
+	char from[PATH_MOST], to[PATH_MOST + 16];
+	uint64_t generation;
+	DIR *d = disk_opendir(folder);
+	for (struct dirent *f; d && (f = readdir(d));) {
+		if (!is_journal(f->d_name, &generation))
+			continue;
+		snprintf(from, sizeof from, "%s/%s", folder, f->d_name);
+		snprintf(to, sizeof to, "%s.damaged", from);
+		disk_rename(from, to);
+	}
+	if (d)
+		closedir(d);
 }

@@ -12,7 +12,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PATH_BYTES = 4200, DEFINES_MAX = 256 };
+enum { PATH_BYTES = 4200, DEFINES_MAX = 256, CHECKED_SECONDS = 60 /* a file that was right so lately is not read again */ };
 
 static const Farm__JobInfo *info_of(const struct bundle *b)
 {
@@ -119,7 +119,8 @@ bool bundle_next_missing(struct bundle *b)
 {
 	for (size_t i = 0; i < info_of(b)->n_files; i++) {
 		b->wanted = hash_of(info_of(b)->files[i]);
-		if (!b->held[i])
+		/* What lies in the cache may have been damaged since it came: then it is fetched again. */
+		if (!b->held[i] && blob_check(b->blobs, &b->wanted, CHECKED_SECONDS, NULL) == 0)
 			b->held[i] = blob_hold(b->blobs, &b->wanted);
 		if (!b->held[i])
 			return true;

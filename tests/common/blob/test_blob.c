@@ -231,6 +231,55 @@ static void a_disk_that_fails(void **state)
 	assert_int_equal(rc, -EIO);
 }
 
+/* Any byte of it: it is noticed, kept beside, no more given out; writing it again mends it, and who held it holds it still. */
+static void damaged_at_rest(void **state)
+{
+	(void)state;
+	static const char text[] = "bytes that are to stay as they are";
+	struct blob_store *s;
+	struct error e;
+	char path[4096], aside[300], hex[BLOB_HEX_SIZE];
+	uint64_t size;
+	assert_int_equal(blob_store_open(&s, folder, 1000, &e), 0);
+	struct blob_hash h = put(s, text), other;
+	assert_int_equal(blob_hash_bytes("x", 1, &other, &e), 0);
+	blob_path(s, &h, path, sizeof path);
+	blob_hex(&h, hex);
+	snprintf(aside, sizeof aside, "%s/damaged.%s", folder, hex);
+	for (size_t at = 0; at < strlen(text); at++) {
+		int fd = open(path, O_WRONLY);
+		char wrong = (char)(text[at] ^ 1);
+		assert_int_equal(pwrite(fd, &wrong, 1, (off_t)at), 1);
+		close(fd);
+		assert_int_equal(blob_check(s, &h, 1000, &e), 0); /* it was just written, and is not read again */
+		assert_int_equal(blob_check(s, &h, 0, &e), -EBADMSG);
+		assert_non_null(strstr(e.text, "damaged"));
+		assert_true(access(path, F_OK) != 0 && access(aside, F_OK) == 0);
+		assert_true(!blob_has(s, &h, NULL) && !blob_hold(s, &h) && blob_open(s, &h, &size, &e) == -ENOENT);
+		assert_int_equal(blob_check(s, &h, 0, &e), -ENOENT);
+		put(s, text);
+		assert_int_equal(blob_check(s, &h, 0, &e), 0);
+		assert_true(blob_has(s, &h, &size) && size == strlen(text));
+	}
+	unlink(path);
+	assert_int_equal(blob_check(s, &h, 0, &e), -EBADMSG);
+	assert_non_null(strstr(e.text, "gone"));
+	assert_int_equal(blob_expect(s, &h, &e), 0);
+	assert_int_equal(blob_expect(s, &other, &e), 0); /* never there */
+	assert_false(blob_has(s, &other, NULL));
+	put(s, "x");
+	blob_release(s, &other);
+	put(s, text);
+	for (int i = 0; i < 40; i++) { /* more than there is room for: what is held stays */
+		char more[64];
+		snprintf(more, sizeof more, "something else of fifty bytes or so, number %d", i);
+		struct blob_hash m = put(s, more);
+		blob_release(s, &m);
+	}
+	assert_true(blob_has(s, &h, NULL) && blob_has(s, &other, NULL));
+	blob_store_close(s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -240,6 +289,7 @@ int main(void)
 		cmocka_unit_test_setup_teardown(forgets_the_oldest_that_nobody_holds, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(room_is_promised_once, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(held_before_it_is_trimmed, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(damaged_at_rest, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_disk_that_fails, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(knows_many, folder_set_up, folder_tear_down),
 	};

@@ -141,3 +141,54 @@ row_is_lost() {
 	[ -s "$DIR/spool/jobs/$other/job.json" ] || fail "$NAME: refused, and deleted"
 	again --accept-loss
 }
+
+fault folder_gone 6 2 "a job's folder is removed, or moved away, while the job runs"
+folder_gone() {
+	farm --journal 0.2
+	worker w0
+	worker w1
+	job
+	each_time folder_goes
+	finish_job
+	[ "$(grep -c 'was removed or moved away while the job runs: made anew' "$DIR/coordinator.log")" -eq "$TIMES" ] || fail "$NAME: not noticed each time"
+	blameless
+}
+folder_goes() {
+	[ $((i % 2)) -eq 1 ] && rm -r "$DIR/spool/jobs/$ID" || mv "$DIR/spool/jobs/$ID" "$DIR/moved.$i"
+	until_true 30 has_said coordinator 'was removed or moved away while the job runs: made anew' "$i" || fail "$NAME: it does not notice"
+	[ "$i" -lt "$TIMES" ] || { until_true 30 is_stored && kill -9 "$COORDINATOR_PID" && again --journal 0.2; }
+}
+# there is something of the job in its new folder that a next life can go on from
+is_stored() {
+	[ -s "$DIR/spool/jobs/$ID/order" ] && ls "$DIR/spool/jobs/$ID"/journal.* >/dev/null 2>&1
+}
+
+fault file_damaged 4 1 "a file of the scene is damaged in the spool, and in a worker's cache: the job waits, says so, and the scene is sent again"
+file_damaged() {
+	farm
+	start_worker w0 -v --cache "$DIR/own"
+	job
+	until_true 60 is_merged 3 || fail "$NAME: nothing is merged"
+	each_time file_is_damaged
+	finish_job
+	blameless
+}
+file_is_damaged() {
+	for f in "$DIR/spool/blobs"/[0-9a-f]*; do
+		flip "$f" 0.5
+	done
+	stop "$WORKER"
+	for f in "$DIR/own"/*/[0-9a-f]*; do
+		[ ! -f "$f" ] || flip "$f" 0.5
+	done
+	[ $((i % 2)) -eq 0 ] || { kill -9 "$COORDINATOR_PID" && again; }
+	sleep 0.1
+	start_worker "w$i" -v --cache "$DIR/own"
+	until_true 60 waits_for_file || fail "$NAME: it does not wait: $(value "$ID" waiting)"
+	# shellcheck disable=SC2086
+	again_id=$("$BIN/hslt-submit" "$BOX" -o "$DIR/again.exr" $JOB 2>>"$DIR/submit.log") || fail "$NAME: $(tail -n 1 "$DIR/submit.log")"
+	"$BIN/hslt-job" cancel "$again_id" 2>>"$DIR/cancel.log"
+}
+waits_for_file() {
+	value "$ID" waiting | grep -q 'is damaged or gone in the spool: submit the scene again'
+}

@@ -1,0 +1,71 @@
+#include "coordinator/shell/files.h"
+
+#include "common/base/text.h"
+
+#include <string.h>
+
+static void hold(struct server *s, struct order *o, const char *text)
+{
+	struct event ev = {.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_FILES, .text = text};
+	o->lacks_file = *text != 0;
+	order_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
+	server_step(s, &ev);
+}
+
+/* The first one that is not there; NULL: all are. */
+static const Farm__File *lacking(const struct server *s, const struct order *o)
+{
+	const Farm__Submit *m = order_submit(o);
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = order_file_hash(m->files[i]);
+		if (!blob_has(s->blobs, &h, NULL))
+			return m->files[i];
+	}
+	return NULL;
+}
+
+bool files_look(struct server *s, struct order *o)
+{
+	char text[256];
+	const Farm__File *f = o->ended ? NULL : lacking(s, o);
+	if (f && !o->lacks_file) {
+		text_print(text, sizeof text, "its file %.100s is damaged or gone in the spool: submit the scene again (hslt-submit), and it goes on", f->name);
+		hold(s, o, text);
+	} else if (!f && o->lacks_file) {
+		hold(s, o, "");
+	}
+	return f == NULL;
+}
+
+int files_check(struct server *s, const struct blob_hash *h, double seconds, struct error *e)
+{
+	int rc = blob_check(s->blobs, h, seconds, e);
+	if (rc != -EBADMSG && rc != -ENOENT)
+		return rc;
+	if (rc == -EBADMSG)
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
+	for (struct order *o = s->orders, *next; o; o = next) {
+		next = o->next;
+		files_look(s, o);
+	}
+	return rc;
+}
+
+bool files_are_right(struct server *s, struct order *o, double seconds)
+{
+	const Farm__Submit *m = order_submit(o);
+	struct error e;
+	bool right = true;
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = order_file_hash(m->files[i]);
+		right = files_check(s, &h, seconds, &e) == 0 && right;
+	}
+	return right;
+}
+
+void files_tick(struct server *s)
+{
+	for (struct order *o = s->orders; o; o = o->next)
+		if (o->lacks_file && files_look(s, o))
+			return; /* the list may have changed; the others next time */
+}

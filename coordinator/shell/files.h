@@ -1,0 +1,21 @@
+/*
+ * Files of scenes in spool/blobs, which may be damaged while they lie there: they are checked before they are given to anybody. A job of
+ * which one is gone or damaged waits and says which; whoever submits the scene again brings it, and the job goes on. No worker is
+ * blamed for it. The loop's thread.
+ */
+#ifndef COORDINATOR_SHELL_FILES_H
+#define COORDINATOR_SHELL_FILES_H
+
+#include "coordinator/shell/server.h"
+
+enum { FILES_CHECKED = 60, FILES_DOUBTED = 5 /* s: what was right so lately need not be read again; when a worker complains */ };
+
+/* Of one that is asked for. Not 0: it cannot be given; jobs that need it wait. */
+int files_check(struct server *s, const struct blob_hash *h, double seconds, struct error *e);
+/* Whether a job has all its files, by what the store knows; it waits or goes on. */
+bool files_look(struct server *s, struct order *o);
+/* All of a job's. false: it waits for one. */
+bool files_are_right(struct server *s, struct order *o, double seconds);
+void files_tick(struct server *s); /* those that wait for files that are here now go on */
+
+#endif

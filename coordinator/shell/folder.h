@@ -1,0 +1,12 @@
+/*
+ * A job's folder that somebody removes, or moves away, while the job runs: it is made anew, and all that the job needs to go on is
+ * written into it, from memory and from the files that are still open. The loop's thread.
+ */
+#ifndef COORDINATOR_SHELL_FOLDER_H
+#define COORDINATOR_SHELL_FOLDER_H
+
+#include "coordinator/shell/server.h"
+
+void folder_tick(struct server *s); /* looks every second */
+
+#endif
