@@ -25,11 +25,11 @@ static void compare(const char *name, struct world *w, uint64_t bdpt_spp, uint64
 	uint64_t times = getenv("FULL") ? 16 : 1;
 	uint32_t depth = w->settings.max_depth < DEPTH ? w->settings.max_depth : DEPTH;
 	const struct agree_side bdpt = {"bdpt", times * bdpt_spp, GROUPS, 1, depth};
-	const struct agree_side chains = {RENDER_INTEGRATOR_DEFAULT, times * chain_spp, GROUPS, 1, depth};
+	const struct agree_side chains = {RENDER_INTEGRATOR_CHAINS, times * chain_spp, GROUPS, 1, depth};
 	char test[64];
-	snprintf(test, sizeof test, "%s %s", name, RENDER_INTEGRATOR_DEFAULT);
+	snprintf(test, sizeof test, "%s %s", name, RENDER_INTEGRATOR_CHAINS);
 	agree_render(w, name, "bdpt", &bdpt, &reference);
-	agree_render(w, test, RENDER_INTEGRATOR_DEFAULT, &chains, &image);
+	agree_render(w, test, RENDER_INTEGRATOR_CHAINS, &chains, &image);
 	agree_within_errors(test, &image, &reference);
 	world_free(w);
 }

@@ -173,6 +173,8 @@ static int check_reference(const struct session *s, struct error *e)
 static int design(struct session *s, struct error *e)
 {
 	struct render_arguments *r = &s->a->render;
+	if (integrator_is_open(&r->plan)) /* most settings are those of chains */
+		snprintf(r->plan.integrator, sizeof r->plan.integrator, RENDER_INTEGRATOR_CHAINS);
 	int rc = render_plan_from_scene(r, &s->summary, e);
 	if (!rc)
 		rc = accuracy_design(&s->design, &r->plan, &s->summary, s->a->knobs, e);

@@ -5,6 +5,7 @@
 #include "common/base/version.h"
 #include "common/film/image_file.h"
 #include "common/film/strategy.h"
+#include "worker/cli/choice.h"
 #include "worker/cli/estimate.h"
 #include "worker/cli/explain.h"
 #include "worker/cli/local_pilot.h"
@@ -127,7 +128,7 @@ struct session {
 	struct agreement agreement;
 	double forecast_seconds; /* from the first bootstrap sample to the target; 0: unknown */
 	char forecast[160];
-	double build_seconds;
+	double build_seconds, choice_seconds;
 	struct progress progress;
 	bool usage; /* what went wrong was asked for */
 };
@@ -161,12 +162,25 @@ static int load(struct session *s, struct error *e)
 	return 0;
 }
 
+static int choose(struct session *s, struct error *e)
+{
+	char text[PLAN_TEXT];
+	double begin = now();
+	int rc = choice_in_world(s->world, &s->a->render, text, sizeof text, e);
+	s->choice_seconds = now() - begin;
+	if (!rc && *text && !s->a->quiet)
+		fprintf(stderr, "%s (%.2f s)\n", text, s->choice_seconds);
+	return rc;
+}
+
 static int make_plan(struct session *s, struct error *e)
 {
 	struct plan_request *p = &s->a->render.plan;
 	char text[PLAN_TEXT];
 	int rc = render_plan_from_scene(&s->a->render, &s->summary, e);
 	s->usage = rc == -EINVAL;
+	if (!rc)
+		rc = choose(s, e);
 	if (!rc)
 		rc = plan_make(p, &s->plan, e);
 	if (rc || s->a->quiet)
@@ -314,6 +328,8 @@ static int estimate(struct session *s, struct error *e)
 		rc = pilot_plan_from_scene(&s->a->render, &s->summary, e);
 		s->usage = rc == -EINVAL;
 	}
+	if (!rc)
+		rc = choose(s, e);
 	if (rc)
 		return rc;
 	struct local_pilot p = {.world = s->world,

@@ -16,7 +16,7 @@ enum {
 
 static const struct argp_option options[] = {
 	{NULL, 0, NULL, 0, "What to render:", 1},
-	{"integrator", 'i', "NAME", 0, "(" RENDER_INTEGRATOR_DEFAULT "); the scene's own is ignored", 1}, /* see help */
+	{"integrator", 'i', "NAME", 0, "(" RENDER_INTEGRATOR_DEFAULT ": path, bdpt or hslt, by a short pilot); the scene's own is ignored", 1}, /* see help */
 	{"size", OPTION_SIZE, "WxH", 0, "Size of the film; keeps the angle of view", 1},
 	{"crop", OPTION_CROP, "X,Y,W,H", 0, "Part of the film, in its pixels", 1},
 	{"seed", OPTION_SEED, "S", 0, "Of all random numbers (0)", 1},
@@ -166,9 +166,14 @@ static void take_effects(struct render_arguments *a, const char *arg, const stru
 		argp_error(state, "--effects: %s", e.text);
 }
 
+bool integrator_is_open(const struct plan_request *r)
+{
+	return !*r->integrator || strcmp(r->integrator, RENDER_INTEGRATOR_DEFAULT) == 0;
+}
+
 static void check_mixture(const struct render_arguments *a, const struct argp_state *state)
 {
-	const char *name = *a->plan.integrator ? a->plan.integrator : RENDER_INTEGRATOR_DEFAULT;
+	const char *name = integrator_is_open(&a->plan) ? RENDER_INTEGRATOR_CHAINS : a->plan.integrator;
 	if (a->mixture && !render_integrator_find(name)->has_mutations)
 		argp_error(state, "--mutations %s: the integrator %s has no strategies to choose from", a->mixture, name);
 }
@@ -180,7 +185,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	uint32_t n[4] = {0};
 	switch (key) {
 	case 'i':
-		if (!render_integrator_find(arg))
+		if (!render_integrator_find(arg) && strcmp(arg, RENDER_INTEGRATOR_DEFAULT) != 0)
 			argp_error(state, "there is no integrator '%s'", arg);
 		text_copy(p->integrator, sizeof p->integrator, arg);
 		return 0;
@@ -297,9 +302,10 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 {
 	struct plan_request *p = &a->plan;
 	const struct scene_settings *s = &summary->settings;
-	if (!*p->integrator)
-		text_copy(p->integrator, sizeof p->integrator, RENDER_INTEGRATOR_DEFAULT);
-	const struct render_integrator *integrator = render_integrator_find(p->integrator);
+	bool open = integrator_is_open(p), chains = a->mixture || p->chains; /* who says how, wants them */
+	if (open)
+		text_copy(p->integrator, sizeof p->integrator, chains ? RENDER_INTEGRATOR_CHAINS : RENDER_INTEGRATOR_DEFAULT);
+	const struct render_integrator *integrator = render_integrator_find(open ? RENDER_INTEGRATOR_CHAINS : p->integrator);
 	p->kind = integrator->kind;
 	p->width = s->width;
 	p->height = s->height;

@@ -22,7 +22,10 @@ struct render_arguments {
 /* Input of the child: a struct render_arguments. Keys from 1000 on are its own, and the short ones 'i' and 'D'. */
 extern const struct argp render_argp;
 
-/* Fills in what the options left to the scene: integrator, film, depth, samples, mixture of mutations. -EINVAL: the mixture
+/* Which integrator is left to the scene: choice_make (worker/cli/choice.h) finds it after render_plan_from_scene. */
+bool integrator_is_open(const struct plan_request *r);
+
+/* Fills in what the options left to the scene: film, depth, samples, mixture of mutations. -EINVAL: the mixture
  * that was asked for is none, a usage error. */
 int render_plan_from_scene(struct render_arguments *a, const struct render_summary *s, struct error *e);
 

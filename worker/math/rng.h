@@ -19,6 +19,7 @@ enum rng_stream {
 	RNG_MUTATION = 7,
 	RNG_AROUND = 8,
 	RNG_TEST = 9,
+	RNG_CHOICE = 10,
 };
 
 /* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */

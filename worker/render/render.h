@@ -35,7 +35,9 @@ struct render_integrator {
 /* NULL when there is none of that name; index from 0, NULL at the end. */
 const struct render_integrator *render_integrator_find(const char *name);
 const struct render_integrator *render_integrator_at(size_t index);
-#define RENDER_INTEGRATOR_DEFAULT "hslt"
+/* Not one of them: that which the scene calls for, found by worker/render/choose.h before the plan is made. */
+#define RENDER_INTEGRATOR_DEFAULT "auto"
+#define RENDER_INTEGRATOR_CHAINS "hslt"
 
 /* Of the libraries that decide bits, for the numeric fingerprint: "embree 3.13.5 avx2". */
 const char *render_numeric_version(void);
