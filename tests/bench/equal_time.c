@@ -1,13 +1,17 @@
 /*
- * Errors at equal CPU time, one thread, bootstrap included: hslt, pssmlt, bdpt, path, and the breakup against its two parts
- * unbroken, against a long bdpt kept in build/bench-references (the error that it has itself is taken off, pixel by pixel).
- * HSLT_BENCH_SECONDS: other than 10 for each picture; references take ten times that.
+ * Relative errors squared times CPU seconds, one thread, pilot and bootstrap included: the default against hslt, pssmlt, bdpt and path,
+ * and the breakup against its two parts unbroken, each with several seeds, with and without the worst pixels. The reference is a long
+ * render by what the default chooses, kept in build/bench-references (the error that it has itself is taken off, pixel by pixel).
+ * HSLT_BENCH_SECONDS: other than 10 for each picture; references take ten times that. HSLT_BENCH_SEEDS: other than 5.
+ * HSLT_BENCH_METHODS: only the first so many.
  */
 #include "common/base/mem.h"
 #include "common/film/image_file.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/scenes.h"
+#include "tests/support/stats.h"
 #include "worker/cli/local.h"
+#include "worker/render/choose.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -15,7 +19,7 @@
 #include <string.h>
 #include <sys/stat.h>
 
-enum { REFERENCE_TIMES = 10, AROUND = 3 /* pixels */ };
+enum { REFERENCE_TIMES = 10, AROUND = 3 /* pixels */, SEEDS_MOST = 32, REFERENCE_SEED = 99 };
 #define TRIM 0.001 /* share of the pixels left out, the worst */
 
 static const struct trial_scene {
@@ -43,6 +47,7 @@ static const struct trial_scene {
 static const struct method {
 	const char *name, *integrator, *mutations;
 } methods[] = {
+	{"default", RENDER_INTEGRATOR_DEFAULT, NULL},
 	{"hslt", "hslt", NULL},
 	{"pssmlt", "pssmlt", NULL},
 	{"bdpt", "bdpt", NULL},
@@ -50,11 +55,12 @@ static const struct method {
 	{"breakup", "hslt", "hslt=0.95,bidirectional=0.05"},
 	{"unbroken", "hslt", "halfvec=0.475,multichain=0.475,bidirectional=0.05"},
 };
-enum { METHODS = sizeof methods / sizeof *methods, BREAKUP = 4, UNBROKEN = 5 };
+enum { METHODS = sizeof methods / sizeof *methods, DEFAULT = 0, BREAKUP = 5, UNBROKEN = 6 };
 
 struct shot {
 	struct canvas_image image;
 	double cpu;
+	char integrator[16];
 };
 
 static void shoot(const struct world *w, const struct method *m, uint64_t spp, uint64_t seed, struct shot *out)
@@ -63,28 +69,38 @@ static void shoot(const struct world *w, const struct method *m, uint64_t spp, u
 	struct render_summary s;
 	struct plan p;
 	world_summary(w, &s);
-	struct plan_request r = {.kind = render_integrator_find(m->integrator)->kind, .width = s.settings.width,
-				 .height = s.settings.height, .border = s.settings.border, .min_depth = 1,
+	struct plan_request r = {.width = s.settings.width, .height = s.settings.height, .border = s.settings.border, .min_depth = 1,
 				 .max_depth = s.settings.max_depth, .spp = spp, .seed = seed};
 	snprintf(r.integrator, sizeof r.integrator, "%s", m->integrator);
-	if (render_integrator_find(m->integrator)->has_mutations && render_mutations(m->mutations, &s, r.mixture, &e))
+	double begin = bench_cpu_seconds();
+	const struct render_integrator *face = render_integrator_find(m->integrator);
+	if (!face) {
+		struct render_choice choice;
+		if (render_choose(w, &r, &choice, &e))
+			bench_die(&e);
+		face = render_integrator_find(r.integrator);
+	} else if (face->has_mutations && render_mutations(m->mutations, &s, r.mixture, &e)) {
 		bench_die(&e);
+	}
+	r.kind = face->kind;
+	snprintf(out->integrator, sizeof out->integrator, "%s", r.integrator);
+	double pilot = bench_cpu_seconds() - begin;
 	if (plan_make(&r, &p, &e))
 		bench_die(&e);
 	struct local_run run = {.world = w, .plan = &p, .threads = 1};
 	if (local_run(&run, &e) || canvas_image(run.canvas, false, &out->image, &e))
 		bench_die(&e);
-	out->cpu = run.cpu_seconds;
+	out->cpu = run.cpu_seconds + pilot;
 	canvas_free(run.canvas);
 }
 
 /* As many samples a pixel as take about that long. */
-static void shoot_for(const struct world *w, const struct method *m, double seconds, uint64_t seed, struct shot *out)
+static uint64_t shoot_for(const struct world *w, const struct method *m, double seconds, uint64_t seed, struct shot *out)
 {
 	for (uint64_t spp = 1;;) {
 		shoot(w, m, spp, seed, out);
 		if (out->cpu > 0.85 * seconds)
-			return;
+			return spp;
 		/* The bootstrap and what a round costs: only a run that is not much shorter tells. */
 		double factor = fmin(seconds / out->cpu * (out->cpu < 0.1 * seconds ? 0.12 : 1), 100);
 		spp = (uint64_t)fmax((double)spp + 1, round((double)spp * factor));
@@ -120,16 +136,16 @@ static void write_reference(const char *path, const struct canvas_image *i)
 
 static void make_reference(const struct world *w, const struct trial_scene *s, double seconds, struct shot *out)
 {
-	const struct method *bdpt = &methods[2];
+	const struct method *by = &methods[DEFAULT];
 	char path[256];
 	mkdir("build", 0777);
 	mkdir("build/bench-references", 0777);
 	snprintf(path, sizeof path, "build/bench-references/%s-%ux%u-%.0fs", s->name, s->width, s->height, seconds);
-	shoot(w, bdpt, 32, 99, out); /* for its size, with errors */
+	shoot(w, by, 32, REFERENCE_SEED, out); /* for its size, with errors */
 	if (read_reference(path, &out->image))
 		return;
 	canvas_image_fini(&out->image);
-	shoot_for(w, bdpt, seconds, 99, out);
+	shoot_for(w, by, seconds, REFERENCE_SEED, out);
 	write_reference(path, &out->image);
 }
 
@@ -173,10 +189,10 @@ static double *scales_of(const struct canvas_image *r)
 	return scale;
 }
 
-/* In %, of squares by pixel and channel, without the worst pixels. */
-static double relative(const struct canvas_image *i, const double *square, const double *scale)
+/* relMSE of squares by pixel and channel, without a share of the pixels, the worst. */
+static double relative(const struct canvas_image *i, const double *square, const double *scale, double trim)
 {
-	size_t pixels = (size_t)i->width * i->height, out = (size_t)(TRIM * (double)pixels);
+	size_t pixels = (size_t)i->width * i->height, out = (size_t)(trim * (double)pixels);
 	double *of = doubles(pixels), sum = 0;
 	for (size_t k = 0; k < 3 * pixels; k++)
 		of[k / 3] += square[k] / scale[k] / 3;
@@ -184,18 +200,18 @@ static double relative(const struct canvas_image *i, const double *square, const
 	for (size_t k = out; k < pixels; k++)
 		sum += of[k];
 	mem_free(of);
-	return 100 * sqrt(fmax(sum, 0) / (double)(pixels - out));
+	return fmax(sum, 0) / (double)(pixels - out);
 }
 
 /* By how far the image is from the reference, without the reference's own part. */
-static double error_by_reference(const struct canvas_image *a, const struct canvas_image *r, const double *scale)
+static double error_by_reference(const struct canvas_image *a, const struct canvas_image *r, const double *scale, double trim)
 {
 	double *square = doubles(reference_size(r));
 	for (size_t i = 0; i < reference_size(r); i++) {
 		double d = (double)a->rgb[i] - (double)r->rgb[i], own = (double)r->error[i];
 		square[i] = d * d - own * own;
 	}
-	double e = relative(r, square, scale);
+	double e = relative(r, square, scale, trim);
 	mem_free(square);
 	return e;
 }
@@ -206,7 +222,7 @@ static double error_by_spread(const struct canvas_image *a, const double *scale)
 	double *square = doubles(reference_size(a));
 	for (size_t i = 0; i < reference_size(a); i++)
 		square[i] = (double)a->error[i] * (double)a->error[i];
-	double e = relative(a, square, scale);
+	double e = relative(a, square, scale, TRIM);
 	mem_free(square);
 	return e;
 }
@@ -219,54 +235,117 @@ static double brightness(const struct canvas_image *i)
 	return sum;
 }
 
-static void compare_all(const struct world *w, const struct trial_scene *s, double seconds)
+/* Of one method, seed by seed: relMSE times CPU seconds, [0] of all pixels, [1] trimmed. */
+struct trial {
+	double value[2][SEEDS_MOST], mean[2], brightness, by_spread;
+	char integrator[16];
+};
+
+static void shoot_trial(const struct world *w, const struct method *m, double seconds, unsigned seeds, const struct shot *reference,
+			 const double *scale, struct trial *out)
 {
-	struct shot reference;
-	double error[METHODS];
-	size_t best = 0;
-	make_reference(w, s, REFERENCE_TIMES * seconds, &reference);
-	double *scale = scales_of(&reference.image);
-	printf("  %-10s %8s %12s %10s %10s %10s\n", "", "CPU s", "samples", "error %", "by spread", "mean");
-	for (size_t i = 0; i < METHODS; i++) {
+	uint64_t spp = 0;
+	*out = (struct trial){.brightness = 0};
+	for (unsigned k = 0; k < seeds; k++) {
 		struct shot shot;
-		shoot_for(w, &methods[i], seconds, 1, &shot);
-		/* To the same time, by the square root of the rest. */
-		double same = sqrt(shot.cpu / seconds);
-		error[i] = same * error_by_reference(&shot.image, &reference.image, scale);
-		printf("  %-10s %8.2f %12llu %10.2f %10.2f %10.4f\n", methods[i].name, shot.cpu,
-		       (unsigned long long)shot.image.samples, error[i], same * error_by_spread(&shot.image, scale),
-		       brightness(&shot.image) / brightness(&reference.image));
-		fflush(stdout);
-		best = i < BREAKUP && error[i] < error[best] ? i : best;
+		if (k == 0)
+			spp = shoot_for(w, m, seconds, 1, &shot);
+		else
+			shoot(w, m, spp, 1 + k, &shot);
+		for (int t = 0; t < 2; t++) {
+			out->value[t][k] = shot.cpu * error_by_reference(&shot.image, &reference->image, scale, t ? TRIM : 0);
+			out->mean[t] += out->value[t][k] / seeds;
+		}
+		out->brightness += brightness(&shot.image) / brightness(&reference->image) / seeds;
+		out->by_spread += shot.cpu * error_by_spread(&shot.image, scale) / seeds;
+		snprintf(out->integrator, sizeof out->integrator, "%s", shot.integrator);
 		canvas_image_fini(&shot.image);
 	}
-	printf("  least: %s; the reference's own: %.2f %%\n", methods[best].name, error_by_spread(&reference.image, scale));
+}
+
+/* What |t| exceeds with a probability of 5 %. */
+static double student_95(double degrees)
+{
+	double low = 0, high = 1000;
+	for (int i = 0; i < 60; i++) {
+		double middle = 0.5 * (low + high);
+		*(stats_student_t_p(middle, degrees) > 0.05 ? &low : &high) = middle;
+	}
+	return high;
+}
+
+/* Mean of the first over that of the second, with a 95 % interval: of the means' logarithms, by the spread between seeds. */
+static void print_ratio(const char *says, const struct trial *a, const struct trial *b, int t, unsigned seeds)
+{
+	double ratio = a->mean[t] / b->mean[t], square = 0;
+	for (unsigned k = 0; k < seeds; k++) {
+		double x = a->value[t][k] / a->mean[t] - 1, y = b->value[t][k] / b->mean[t] - 1;
+		square += (x * x + y * y) / seeds / (seeds - 1);
+	}
+	double wide = exp(seeds > 1 ? student_95(2 * (seeds - 1)) * sqrt(square) : INFINITY);
+	printf("  %s: %.2f [%.2f, %.2f]\n", says, ratio, ratio / wide, ratio * wide);
+}
+
+static void compare_all(const struct world *w, const struct trial_scene *s, double seconds, unsigned seeds, size_t count)
+{
+	struct shot reference;
+	static struct trial of[METHODS];
+	size_t best[2] = {1, 1};
+	make_reference(w, s, REFERENCE_TIMES * seconds, &reference);
+	double *scale = scales_of(&reference.image);
+	printf("  %-18s %14s %14s %14s %10s\n", "relMSE x CPU s", "all pixels", "trimmed", "by spread", "mean");
+	for (size_t i = 0; i < count; i++) {
+		char name[40];
+		shoot_trial(w, &methods[i], seconds, seeds, &reference, scale, &of[i]);
+		snprintf(name, sizeof name, i == DEFAULT ? "%s: %s" : "%s", methods[i].name, of[i].integrator);
+		printf("  %-18s %14.5g %14.5g %14.5g %10.4f\n", name, of[i].mean[0], of[i].mean[1], of[i].by_spread, of[i].brightness);
+		fflush(stdout);
+		for (int t = 0; t < 2; t++)
+			best[t] = i > DEFAULT && i < BREAKUP && of[i].mean[t] < of[best[t]].mean[t] ? i : best[t];
+	}
+	for (int t = 0; t < 2 && count > 1; t++) {
+		char says[80];
+		snprintf(says, sizeof says, "default over the best, %s (%s)", t ? "trimmed" : "all pixels", methods[best[t]].name);
+		print_ratio(says, &of[DEFAULT], &of[best[t]], t, seeds);
+		bench_single(t ? "default / best, trimmed" : "default / best", of[DEFAULT].mean[t] / of[best[t]].mean[t], "of the time", BENCH_INFORMS, 0);
+	}
+	printf("  the reference's own relMSE: %.3g\n", error_by_spread(&reference.image, scale));
 	canvas_image_fini(&reference.image);
 	mem_free(scale);
-	for (size_t i = 0; i < METHODS; i++)
-		bench_single(methods[i].name, error[i], "% error", BENCH_INFORMS, 0);
-	bench_single("breakup / unbroken", error[BREAKUP] / error[UNBROKEN], "of the error", BENCH_INFORMS, 0);
+	for (size_t i = 0; i < count; i++)
+		bench_single(methods[i].name, of[i].mean[1], "relMSE s, trimmed", BENCH_INFORMS, 0);
+	if (count > UNBROKEN)
+		bench_single("breakup / unbroken", of[BREAKUP].mean[1] / of[UNBROKEN].mean[1], "of the time", BENCH_INFORMS, 0);
+}
+
+/* A whole number of the environment, within 1 and most; else the default. */
+static unsigned asked(const char *name, unsigned usual, unsigned most)
+{
+	const char *text = getenv(name);
+	long n = text ? atol(text) : 0;
+	return n < 1 ? usual : n > (long)most ? most : (unsigned)n;
 }
 
 void bench_equal_time(const char *bin)
 {
 	(void)bin;
-	const char *asked = getenv("HSLT_BENCH_SECONDS"), *only = getenv("HSLT_BENCH_SCENE");
-	double seconds = asked ? atof(asked) : 10;
+	const char *time = getenv("HSLT_BENCH_SECONDS"), *only = getenv("HSLT_BENCH_SCENE");
+	double seconds = time ? atof(time) : 10;
+	unsigned seeds = asked("HSLT_BENCH_SEEDS", 5, SEEDS_MOST), count = asked("HSLT_BENCH_METHODS", METHODS, METHODS);
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
 		const struct trial_scene *s = &scenes[i];
 		const struct render_options size = {.width = s->width, .height = s->height};
 		char says[128];
 		if (only && strcmp(only, s->name) != 0)
 			continue;
-		snprintf(says, sizeof says, "%s, %ux%u, %g CPU seconds each", s->name, s->width, s->height, seconds);
+		snprintf(says, sizeof says, "%s, %ux%u, %g CPU seconds and %u seeds each", s->name, s->width, s->height, seconds, seeds);
 		bench_group("equal-time", says);
 		struct world *w = bench_world(s->file, s->shipped, &size);
 		if (!w) {
 			bench_skip("HSLT_SCENES does not name a folder with this scene");
 			continue;
 		}
-		compare_all(w, s, seconds);
+		compare_all(w, s, seconds, seeds, count);
 		world_free(w);
 	}
 }

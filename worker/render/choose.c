@@ -21,7 +21,7 @@ enum {
  * all others, where the next is 0.1. */
 static const double rare_share = 0.28;
 /* bdpt errs less than the pilot says: it has the shorter tails. */
-static const double path_cost = 0.75, path_heavy = 1.5, heavy_least = 0.02;
+static const double path_cost = 0.75, path_heavy = 1.5, heavy_least = 0.05;
 
 /* ---- what samples bring */
 

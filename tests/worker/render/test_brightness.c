@@ -1,0 +1,105 @@
+/* The map of brightness: what is known shows, what a firefly made is spread. */
+#include "worker/render/brightness.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <cmocka.h>
+
+enum { SIDE = 64, SAMPLES = 1 << 13 };
+static const struct film_window window = {-2, 5, SIDE, SIDE};
+
+/* Samples stratified over the window; each contributes what `of` says of its place, over the density 1 / pixels. */
+static void fill(struct brightness *b, double (*of)(double x, double y))
+{
+	struct error e;
+	assert_int_equal(brightness_init(b, &window, SAMPLES, &e), 0);
+	for (int i = 0; i < SAMPLES; i++) {
+		double x = i % 128 * 0.5 + 0.25, y = i / 128 + 0.5, value = of(x, y) * SIDE * SIDE;
+		brightness_add(b, &(struct splat){window.x + x, window.y + y, {value / 2, value / 4, value / 4}});
+	}
+	brightness_settle(b, SAMPLES);
+}
+
+static double relative(const struct brightness *b, double x, double y)
+{
+	return brightness_scale(b, window.x + x, window.y + y) * SIDE * SIDE;
+}
+
+static double halves(double x, double y)
+{
+	(void)y;
+	return x < SIDE / 2 ? 10 : 0.5;
+}
+
+static void both_halves_have_their_brightness(void **state)
+{
+	(void)state;
+	struct brightness b;
+	fill(&b, halves);
+	for (double y = 1; y < SIDE; y += 7)
+		for (double x = 1; x < SIDE; x += 5) {
+			double product = relative(&b, x, y) * halves(x, y);
+			assert_true(product > 0.98 && product < 1.02); /* a hundredth of the mean is added in squares */
+		}
+	brightness_fini(&b);
+}
+
+static double firefly(double x, double y)
+{
+	return x == 40.25 && y == 20.5 ? 1e6 : 1;
+}
+
+static void a_firefly_does_not_show(void **state)
+{
+	(void)state;
+	struct brightness b;
+	fill(&b, firefly);
+	double there = relative(&b, 40.25, 20.5);
+	assert_true(there == relative(&b, 3, 3) && there == relative(&b, 60, 60)); /* the whole film: no quarter of it is known */
+	assert_true(there > 0 && there < 0.01);
+	brightness_fini(&b);
+}
+
+static double nothing(double x, double y)
+{
+	(void)x, (void)y;
+	return 0;
+}
+
+static void a_black_film_has_no_scale(void **state)
+{
+	(void)state;
+	struct brightness b;
+	fill(&b, nothing);
+	assert_true(relative(&b, 1, 1) == 0);
+	brightness_fini(&b);
+}
+
+static double dark_half(double x, double y)
+{
+	(void)y;
+	return x < SIDE / 2 ? 1 : 0;
+}
+
+static void darkness_has_the_least_that_the_error_knows(void **state)
+{
+	(void)state;
+	struct brightness b;
+	fill(&b, dark_half);
+	double least = 1 / relative(&b, 60, 30); /* a hundredth of the mean, 0.5 */
+	assert_true(least > 0.00499 && least < 0.00501);
+	brightness_fini(&b);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(both_halves_have_their_brightness),
+		cmocka_unit_test(a_firefly_does_not_show),
+		cmocka_unit_test(a_black_film_has_no_scale),
+		cmocka_unit_test(darkness_has_the_least_that_the_error_knows),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
