@@ -214,13 +214,25 @@ static int run(struct pilot *p, const struct plan *film, struct render_choice *o
 
 /* ---- the choice */
 
+/* A path from the camera never meets a delta emitter, and is not joined to one through an exactly specular lobe. */
+static bool path_misses(const struct world *w)
+{
+	bool emitter = false, lobe = false;
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		emitter = emitter || w->emitters[i].delta;
+	for (uint32_t i = 0; i < w->bsdf_count; i++)
+		lobe = lobe || w->bsdfs[i].has_delta;
+	return emitter && lobe;
+}
+
 const char *render_choice_of(const struct render_choice *c)
 {
 	bool dark = !(c->path.cost > 0) && !(c->bdpt.cost > 0); /* its bootstrap looks for light much longer */
-	if (dark || fmin(c->path.rare, c->bdpt.rare) > rare_share)
+	double rare = c->misses ? c->bdpt.rare : fmin(c->path.rare, c->bdpt.rare);
+	if (dark || rare > rare_share)
 		return "hslt";
 	bool tails = c->path.heavy > fmax(heavy_least, path_heavy * c->bdpt.heavy);
-	return c->path.cost > 0 && c->path.cost < path_cost * c->bdpt.cost && !tails ? "path" : "bdpt";
+	return !c->misses && c->path.cost > 0 && c->path.cost < path_cost * c->bdpt.cost && !tails ? "path" : "bdpt";
 }
 
 int render_choose(const struct world *w, struct plan_request *r, struct render_choice *out, struct error *e)
@@ -236,6 +248,7 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 		p->w = w;
 		p->seed = r->seed;
 		p->samples = pilot_samples(r, (uint64_t)film.crop_width * film.crop_height);
+		out->misses = path_misses(w);
 		rc = run(p, &film, out, e);
 	}
 	mem_free(p);

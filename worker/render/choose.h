@@ -24,6 +24,7 @@ struct render_found {
 
 struct render_choice {
 	struct render_found path, bdpt;
+	bool misses; /* path finds less than there is: light of a point or a direction through a specular lobe */
 };
 
 /* Sets integrator, kind and mixture of the request, all else of which stands. Ticks. -ENOMEM, -EINVAL */

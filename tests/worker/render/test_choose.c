@@ -61,6 +61,26 @@ static void a_lamp_in_view_is_not_rare_light(void **state)
 	world_free(w);
 }
 
+/* A caustic of a point light: path does not find it, so that what it finds looks clean. */
+static void path_is_not_chosen_where_it_misses_light(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(48, 48,
+		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR("0,2,6", "0,0,0")
+		"<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/></transform>"
+		"<bsdf type='diffuse'/></shape>"
+		"<shape type='sphere'><float name='radius' value='0.7'/><bsdf type='dielectric'/></shape>"
+		"<emitter type='point'><point name='position' x='1' y='3' z='0'/><rgb name='intensity' value='30,30,30'/></emitter>", 6);
+	for (uint64_t seed = 0; seed < SEEDS; seed++) {
+		struct plan_request r;
+		struct render_choice c;
+		choose(w, seed, 16, &r, &c);
+		assert_true(c.path.cost < 0.75 * c.bdpt.cost); /* it would be */
+		assert_string_equal(r.integrator, "bdpt");
+	}
+	world_free(w);
+}
+
 static void light_through_water_needs_chains(void **state)
 {
 	(void)state;
@@ -102,15 +122,17 @@ static void the_rule(void **state)
 		struct render_choice c; /* cost, rare, heavy of path, then of bdpt */
 		const char *name;
 	} cases[] = {
-		{{{1, 0, 0}, {2, 0, 0}}, "path"},
-		{{{1.9, 0, 0}, {2, 0, 0}}, "bdpt"}, /* not much better, and less sure */
-		{{{1, 0, 0.3}, {2, 0, 0.1}}, "bdpt"}, /* better but for its tails */
-		{{{1, 0, 0.3}, {2, 0, 0.3}}, "path"},
-		{{{1, 0.9, 0.9}, {2, 0, 0}}, "bdpt"}, /* bdpt finds what path does not */
-		{{{1, 0, 0}, {2, 0.9, 0.9}}, "path"},
-		{{{1, 0.5, 0.6}, {2, 0.5, 0.6}}, "hslt"},
-		{{{0, 0, 0}, {0, 0, 0}}, "hslt"},
-		{{{0, 0, 0}, {1, 0, 0}}, "bdpt"}, /* no path from the camera found light */
+		{{{1, 0, 0}, {2, 0, 0}, false}, "path"},
+		{{{1.9, 0, 0}, {2, 0, 0}, false}, "bdpt"}, /* not much better, and less sure */
+		{{{1, 0, 0.3}, {2, 0, 0.1}, false}, "bdpt"}, /* better but for its tails */
+		{{{1, 0, 0.3}, {2, 0, 0.3}, false}, "path"},
+		{{{1, 0.9, 0.9}, {2, 0, 0}, false}, "bdpt"}, /* bdpt finds what path does not */
+		{{{1, 0, 0}, {2, 0.9, 0.9}, false}, "path"},
+		{{{1, 0.5, 0.6}, {2, 0.5, 0.6}, false}, "hslt"},
+		{{{0, 0, 0}, {0, 0, 0}, false}, "hslt"},
+		{{{1, 0, 0}, {2, 0, 0}, true}, "bdpt"},
+		{{{1, 0, 0}, {2, 0.9, 0.9}, true}, "hslt"}, /* what path does not find says nothing */
+		{{{0, 0, 0}, {1, 0, 0}, false}, "bdpt"}, /* no path from the camera found light */
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
 		assert_string_equal(render_choice_of(&cases[i].c), cases[i].name);
@@ -134,6 +156,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(an_open_room_needs_no_chains),
 		cmocka_unit_test(a_lamp_in_view_is_not_rare_light),
+		cmocka_unit_test(path_is_not_chosen_where_it_misses_light),
 		cmocka_unit_test(light_through_water_needs_chains),
 		cmocka_unit_test(where_no_light_is_found_the_longest_search_goes_on),
 		cmocka_unit_test(the_same_request_gives_the_same_choice),
