@@ -9,9 +9,9 @@
 #include <string.h>
 
 enum {
-	SAMPLES_LEAST = 1 << 13,
+	SAMPLES_LEAST = 1 << 12,
 	SAMPLES_MOST = 1 << 15,
-	SAMPLES_SHARE = 64, /* one of so many samples of the render, of each kind */
+	SAMPLES_SHARE = 128, /* one of so many samples of the render, of each kind */
 	IN_PIXEL = 16,       /* samples of one pixel */
 	DROPPED = 3,         /* largest terms */
 	STREAM_MAP = 0, STREAM_PATH, STREAM_BDPT, STREAM_PIXEL, /* steps of RNG_CHOICE */
@@ -116,7 +116,8 @@ static const double *pixel_block(struct sampler *base, enum sampler_side side, u
 	return u;
 }
 
-static int make_map(struct pilot *p, struct error *e)
+/* By `path`, which is the cheaper one, where it finds all. */
+static int make_map(struct pilot *p, bool misses, struct error *e)
 {
 	int rc = brightness_init(&p->map, &p->context.window, p->samples, e);
 	for (uint64_t i = 0; i < p->samples && !rc; i++) {
@@ -124,7 +125,7 @@ static int make_map(struct pilot *p, struct error *e)
 		if (i % IN_PIXEL == 0)
 			tick();
 		sampler_random_init(&s, p->seed, RNG_CHOICE, i, STREAM_MAP);
-		path_trace_both_ways(&p->context, &s.base, &p->sample);
+		(misses ? path_trace_both_ways : path_trace)(&p->context, &s.base, &p->sample);
 		for (uint32_t k = 0; k < p->sample.count; k++)
 			brightness_add(&p->map, &p->sample.splats[k]);
 	}
@@ -203,7 +204,7 @@ static int run(struct pilot *p, const struct plan *film, struct render_choice *o
 {
 	p->context = (struct path_context){.w = p->w, .window = film_window_of(film), .min_depth = film->min_depth,
 					   .max_depth = film->max_depth, .roulette = true, .unclassed = true, .counters = p->counters};
-	int rc = make_map(p, e);
+	int rc = make_map(p, out->misses, e);
 	if (!rc) {
 		out->bdpt = look(p, STREAM_BDPT, path_trace_both_ways);
 		out->path = look(p, STREAM_PATH, path_trace);
