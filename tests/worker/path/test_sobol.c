@@ -181,6 +181,21 @@ static void test_marginals(void **state)
 	}
 }
 
+/* Numbers beyond 2^32 do not repeat those before. */
+static void test_long_sequences(void **state)
+{
+	(void)state;
+	uint64_t seed = stats_seed("long sequences"), same = 0;
+	for (uint64_t i = 0; i < 1000; i++) {
+		double u[SAMPLER_BLOCK], v[SAMPLER_BLOCK];
+		draw(seed, 1, 2, i, SIDE_CAMERA, 1, u);
+		draw(seed, 1, 2, i + (UINT64_C(1) << 32), SIDE_CAMERA, 1, v);
+		for (int d = 0; d < SAMPLER_BLOCK; d++)
+			same += fabs(u[d] - v[d]) < 0x1p-20;
+	}
+	assert_true(same < 4);
+}
+
 /* The same sample of two sequences, or of two blocks: pairs of numbers fill the square evenly. */
 static void check_pairs(const char *what, const uint64_t a[2], const uint64_t b[2], unsigned vertex, enum sampler_side side)
 {
@@ -256,7 +271,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_elementary_intervals), cmocka_unit_test(test_directions), cmocka_unit_test(test_marginals),
-		cmocka_unit_test(test_independence), cmocka_unit_test(test_means),
+		cmocka_unit_test(test_long_sequences), cmocka_unit_test(test_independence), cmocka_unit_test(test_means),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
