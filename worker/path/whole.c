@@ -99,9 +99,9 @@ static spectrum scatter(const struct whole_path *x, unsigned j, bool halfvec)
 
 spectrum whole_f(const struct path_context *c, struct whole_path *x, unsigned j)
 {
-	if (!(x->known_f >> j & 1)) {
+	if (!vertex_set_has(&x->known_f, j)) {
 		x->f[j] = j > 0 ? scatter(x, j, false) : path_emitted(c, &x->v[0], x->edge[0].w, &x->wl);
-		x->known_f |= (uint64_t)1 << j;
+		vertex_set_add(&x->known_f, j);
 	}
 	return x->f[j];
 }
@@ -109,9 +109,9 @@ spectrum whole_f(const struct path_context *c, struct whole_path *x, unsigned j)
 spectrum whole_fh(const struct path_context *c, struct whole_path *x, unsigned j)
 {
 	(void)c;
-	if (!(x->known_fh >> j & 1)) {
+	if (!vertex_set_has(&x->known_fh, j)) {
 		x->fh[j] = scatter(x, j, true);
-		x->known_fh |= (uint64_t)1 << j;
+		vertex_set_add(&x->known_fh, j);
 	}
 	return x->fh[j];
 }
@@ -125,22 +125,37 @@ double whole_specular_miss(const struct whole_path *x, unsigned j)
 	return vec3_length(vec3_sub(wi, frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w))));
 }
 
-static uint64_t bits(unsigned first, unsigned last)
+/* Those of first..last that lie in word i of a set. */
+static uint64_t bits(unsigned i, unsigned first, unsigned last)
 {
-	return (~(uint64_t)0 >> (63 - last)) & (~(uint64_t)0 << first);
+	unsigned begin = 64 * i, end = begin + 63;
+	if (last < begin || first > end)
+		return 0;
+	return (~(uint64_t)0 >> (last < end ? end - last : 0)) & (~(uint64_t)0 << (first > begin ? first - begin : 0));
 }
+
+/* first..last of `to` as in `from`. */
+static void take_range(struct vertex_set *to, const struct vertex_set *from, unsigned first, unsigned last)
+{
+	for (unsigned i = first / 64; i <= last / 64; i++) {
+		uint64_t range = bits(i, first, last);
+		to->word[i] = (to->word[i] & ~range) | (from->word[i] & range);
+	}
+}
+
+static const struct vertex_set NONE = {{0}};
 
 void whole_forget(struct whole_path *x, unsigned first, unsigned last)
 {
-	uint64_t keep = ~bits(first > 0 ? first - 1 : 0, last + 1);
-	x->known_f &= keep;
-	x->known_fh &= keep;
+	unsigned from = first > 0 ? first - 1 : 0, to = last < WHOLE_MAX_EDGES ? last + 1 : last;
+	take_range(&x->known_f, &NONE, from, to);
+	take_range(&x->known_fh, &NONE, from, to);
 }
 
 void whole_set_wavelength(const struct path_context *c, struct whole_path *x, double u)
 {
 	x->wavelength = u;
-	x->known_f = x->known_fh = 0;
+	x->known_f = x->known_fh = NONE;
 	if (EFFECT_IS_ON(c->w, colour))
 		x->wl = wavelengths_sample_few(u, (unsigned)c->w->knobs.wavelengths);
 	else
@@ -161,7 +176,7 @@ void whole_copy(struct whole_path *to, const struct whole_path *from, unsigned f
 {
 	unsigned n = last - first + 1, edge = first > 0 ? first - 1 : 0, edge_end = last < from->edges ? last + 1 : from->edges;
 	if (to->wavelength != from->wavelength)
-		to->known_f = to->known_fh = 0;
+		to->known_f = to->known_fh = NONE;
 	to->edges = from->edges;
 	to->wl = from->wl;
 	to->wavelength = from->wavelength;
@@ -176,9 +191,8 @@ void whole_copy(struct whole_path *to, const struct whole_path *from, unsigned f
 	n = last_cached - edge + 1;
 	memcpy(&to->f[edge], &from->f[edge], n * sizeof to->f[0]);
 	memcpy(&to->fh[edge], &from->fh[edge], n * sizeof to->fh[0]);
-	uint64_t range = bits(edge, last_cached);
-	to->known_f = (to->known_f & ~range) | (from->known_f & range);
-	to->known_fh = (to->known_fh & ~range) | (from->known_fh & range);
+	take_range(&to->known_f, &from->known_f, edge, last_cached);
+	take_range(&to->known_fh, &from->known_fh, edge, last_cached);
 }
 
 bool whole_visible(struct path_context *c, const struct whole_path *x, unsigned e)
@@ -222,7 +236,7 @@ static void take_emitter(struct whole_path *x, const struct path_vertex *from)
 
 bool whole_finish(const struct path_context *c, struct whole_path *x)
 {
-	x->known_f = x->known_fh = 0;
+	x->known_f = x->known_fh = NONE;
 	for (unsigned e = 0; e < x->edges; e++)
 		if (!whole_join(x, e))
 			return false;
@@ -277,7 +291,7 @@ void whole_colour(const struct path_context *c, struct whole_path *x, double xyz
 {
 	struct product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < x->edges; j++)
-		product_mul(&p, x->known_fh >> j & 1 ? x->fh[j] : whole_f(c, x, j));
+		product_mul(&p, vertex_set_has(&x->known_fh, j) ? x->fh[j] : whole_f(c, x, j));
 	to_xyz(c, x, p.v, xyz);
 	double sum = xyz[0] + xyz[1] + xyz[2];
 	for (int i = 0; i < 3; i++)

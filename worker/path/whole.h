@@ -16,9 +16,23 @@
 #include "worker/path/connect.h"
 
 enum {
-	WHOLE_MAX_EDGES = 32,
+	WHOLE_MAX_EDGES = PATH_MAX_EDGES,
 	WHOLE_MAX_VERTICES = WHOLE_MAX_EDGES + 1,
 };
+
+struct vertex_set {
+	uint64_t word[WHOLE_MAX_VERTICES / 64 + 1];
+};
+
+static inline bool vertex_set_has(const struct vertex_set *s, unsigned j)
+{
+	return s->word[j / 64] >> (j % 64) & 1;
+}
+
+static inline void vertex_set_add(struct vertex_set *s, unsigned j)
+{
+	s->word[j / 64] |= (uint64_t)1 << (j % 64);
+}
 
 struct whole_edge { /* v[e] - v[e + 1] */
 	vec3 w;           /* unit, from v[e] to v[e + 1] */
@@ -33,7 +47,7 @@ struct whole_path {
 	struct path_vertex v[WHOLE_MAX_VERTICES];
 	struct whole_edge edge[WHOLE_MAX_EDGES];
 	/* Caches, by vertex: read them through whole_f and whole_fh. */
-	uint64_t known_f, known_fh; /* bit j: that of v[j] */
+	struct vertex_set known_f, known_fh;
 	spectrum f[WHOLE_MAX_VERTICES], fh[WHOLE_MAX_VERTICES];
 };
 

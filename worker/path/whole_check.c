@@ -56,7 +56,7 @@ static bool check_specular(const struct whole_path *x, unsigned j, char *text, s
 static bool check_vertices(const struct path_context *c, const struct whole_path *x, char *text, size_t size)
 {
 	struct whole_path fresh = *x;
-	fresh.known_f = fresh.known_fh = 0;
+	fresh.known_f = fresh.known_fh = (struct vertex_set){{0}};
 	for (unsigned j = 0; j < x->edges; j++) {
 		const struct path_vertex *v = &x->v[j];
 		if (j > 0 && (v->mode & (BSDF_REFLECT | BSDF_TRANSMIT)) != whole_mode(x, j)) {
@@ -66,11 +66,11 @@ static bool check_vertices(const struct path_context *c, const struct whole_path
 		if (j > 0 && v->delta && !check_specular(x, j, text, size))
 			return false;
 		spectrum f = whole_f(c, &fresh, j);
-		if (spectrum_is_zero(f) || !spectrum_is_valid(f) || ((x->known_f >> j & 1) && !same_spectrum(f, x->f[j]))) {
+		if (spectrum_is_zero(f) || !spectrum_is_valid(f) || (vertex_set_has(&x->known_f, j) && !same_spectrum(f, x->f[j]))) {
 			snprintf(text, size, "f at vertex %u of %u is %g, cached %g", j, x->edges, f.v[0], x->f[j].v[0]);
 			return false;
 		}
-		if (j > 0 && (x->known_fh >> j & 1) && !same_spectrum(whole_fh(c, &fresh, j), x->fh[j])) {
+		if (j > 0 && vertex_set_has(&x->known_fh, j) && !same_spectrum(whole_fh(c, &fresh, j), x->fh[j])) {
 			snprintf(text, size, "fh at vertex %u of %u is %g, cached %g", j, x->edges, fresh.fh[j].v[0], x->fh[j].v[0]);
 			return false;
 		}

@@ -77,7 +77,7 @@ static enum strategy_counter drift(struct mutation_ctx *m, const struct mutation
 static void keep_f(struct path_context *c, struct whole_path *y, unsigned j)
 {
 	y->f[j] = whole_f(c, from, j);
-	y->known_f |= (uint64_t)1 << j;
+	vertex_set_add(&y->known_f, j);
 }
 
 static double stale_fixed(struct mutation_ctx *m, struct whole_path *into, const struct move *move, enum mutation_direction direction)
@@ -165,8 +165,8 @@ static const struct fault faults[] = {
 	{"3 % one way", "gold", "wavelength", {-1, -1}, BALANCE_ANY, 64, 64, propose, denser_upwards},
 	{"10 % in half of the states", "gold", "wavelength", {-1, -1}, BALANCE_ANY, 256, 8, propose, denser_above},
 	{"film step with a mean", "mirror", "multichain", {-1, -1}, BALANCE_ANY, 64, 2, drift, log_weight},
-	{"fixed part not evaluated again", "gold", "hslt", {-1, -1}, BALANCE_ANY, 128, 4, propose, stale_fixed},
-	{"f_c not evaluated again", "bent normals", "hslt", {-1, -1}, BALANCE_ANY, 64, 2, propose, stale_c},
+	{"fixed part not evaluated again", "gold", "hslt", {-1, -1}, BALANCE_ANY, 256, 8, propose, stale_fixed},
+	{"f_c not evaluated again", "bent normals", "hslt", {-1, -1}, BALANCE_ANY, 128, 8, propose, stale_c},
 	{"f_b not evaluated again", "bent normals", "hslt", {-1, -1}, BALANCE_ANY, 64, 2, propose, stale_b},
 	{"no transfer determinant", "rough glass", "halfvec", {-1, -1}, BALANCE_ANY, 64, 2, propose, no_transfer},
 	{"steps of x both ways", "rough glass", "halfvec", {-1, -1}, BALANCE_ANY, 64, 2, one_sigma, log_weight},
