@@ -11,6 +11,7 @@ struct agree_case {
 	uint32_t max_depth;
 	uint64_t path_spp, spp;  /* of path, of the others */
 	const char *against[3];
+	double find; /* smallest bias of the mean that the table must find */
 };
 
 /* Ends with a NULL topic. */
