@@ -213,6 +213,7 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 	struct agreement a;
 	agreement_judge(p, img, &a);
 	strategy_note(p, &img->counts, img->black, text, sizeof text);
+	strategy_add_beyond(img->beyond_share, text, sizeof text);
 	agreement_add_note(&a, text, sizeof text);
 	if (*text)
 		add_string(h, H_NOTE, text);

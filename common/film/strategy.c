@@ -157,3 +157,12 @@ void strategy_note(const struct plan *p, const struct canvas_counts *n, bool bla
 		    thousands(stuck, number[0]), thousands(chain_epochs(p, n), number[1]), thousands(p->chains, number[2]),
 		    thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
 }
+
+void strategy_add_beyond(double share, char *note, size_t size)
+{
+	size_t used = strnlen(note, size);
+	if (share > 0.001)
+		text_print(note + used, size - used,
+			   "%s%.2g %% of the light is missing: it comes by paths longer than the chains of this integrator hold (path has all of it)",
+			   used ? "; " : "", 100 * share);
+}

@@ -23,5 +23,7 @@ void strategy_lines(const char *mixture, const struct canvas_counts *n, char *te
  * 8,192 times a chain accepted nothing during a whole epoch (1,024 chains); longest run: 5,210 rejections". Empty: nothing. */
 enum { STRATEGY_NOTE = 1024 };
 void strategy_note(const struct plan *p, const struct canvas_counts *n, bool black, char *text, size_t size);
+/* Appends that this share of the energy is not in the image, since its paths are longer than chains hold; nothing below 0.1 %. */
+void strategy_add_beyond(double share, char *note, size_t size);
 
 #endif

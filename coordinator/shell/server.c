@@ -170,7 +170,7 @@ static void view_order(struct server *s, const struct order *o, struct job_view 
 	view_of_record(v, &o->record);
 	if (o->canvas) { /* in the end what the image holds, until then all that has come */
 		canvas_counts(o->canvas, !o->ended, &counted);
-		record_take_counted(&v->record, &o->plan, &counted, o->black);
+		record_take_counted(&v->record, &o->plan, &counted, o->black, o->lit.beyond_share);
 		record_add_note(&v->record, o->doubts);
 	}
 	if (!farm_job(s->farm, o->id, server_now(s), &status))

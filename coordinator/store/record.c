@@ -24,12 +24,13 @@ static const struct {
 	{"stuck", offsetof(struct job_record, stuck)},		 {"longestStuck", offsetof(struct job_record, longest_stuck)},
 };
 
-void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black)
+void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black, double beyond_share)
 {
 	r->stuck = n->counters[COUNT_STUCK];
 	r->longest_stuck = n->counters[COUNT_LONGEST_STUCK];
 	memcpy(r->strategy, n->strategy, sizeof r->strategy);
 	strategy_note(p, n, black, r->note, sizeof r->note);
+	strategy_add_beyond(beyond_share, r->note, sizeof r->note);
 	agreement_add_note(&r->agreement, r->note, sizeof r->note);
 }
 

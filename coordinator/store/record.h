@@ -54,7 +54,7 @@ struct job_record {
 };
 
 /* What the merged batches counted, and what is to be said about it. */
-void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black);
+void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black, double beyond_share);
 void record_add_note(struct job_record *r, const char *text); /* "": nothing to say */
 void record_take_agreement(struct job_record *r, const struct canvas_image *img, const struct agreement *a);
 void record_begin_agreement(struct job_record *r); /* nothing is known */

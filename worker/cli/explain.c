@@ -21,13 +21,23 @@ static void print_lines(const char *name, const struct render_summary *m, const 
 		const struct effect_line *l = &m->lines[i];
 		printf("%-13s %-12s  %s\n%27s %s: %s\n", l->name, state_of(l), l->why, "", l->on ? "without it" : "saves", l->saves);
 	}
+	const struct render_integrator *integrator = render_integrator_find(p->integrator);
 	printf("\n%s, paths of at most %u edges", p->integrator, p->max_depth);
+	if (p->max_depth > integrator->max_depth)
+		printf(" asked for, of at most %u held (what is longer is missing in the image: its note says how much)", integrator->max_depth);
 	if (*p->mixture)
 		printf(", mutations %s", p->mixture);
 	printf("\n");
 	render_effects_note(m, note, sizeof note);
 	if (*note)
 		printf("note: %s\n", note);
+}
+
+/* Edges of the longest path that the image has. */
+static uint32_t held_depth(const struct plan_request *p)
+{
+	uint32_t most = render_integrator_find(p->integrator)->max_depth;
+	return p->max_depth < most ? p->max_depth : most;
 }
 
 static int print_json(const char *name, const struct render_summary *m, const struct plan_request *p, struct error *e)
@@ -40,8 +50,8 @@ static int print_json(const char *name, const struct render_summary *m, const st
 		json_array_append_new(effects, json_pack("{s:s s:b s:b s:s s:s}", "name", l->name, "on", (int)l->on, "forced",
 							 (int)l->forced, "why", l->why, "saves", l->saves));
 	}
-	json_t *o = json_pack("{s:i s:s s:s s:s s:i s:o s:s}", "schema", 1, "scene", name, "integrator", p->integrator, "mixture",
-			      p->mixture, "maxDepth", (int)p->max_depth, "effects", effects, "note", note);
+	json_t *o = json_pack("{s:i s:s s:s s:s s:i s:i s:o s:s}", "schema", 1, "scene", name, "integrator", p->integrator, "mixture",
+			      p->mixture, "maxDepth", (int)p->max_depth, "heldDepth", (int)held_depth(p), "effects", effects, "note", note);
 	if (!o)
 		return error_set(e, ENOMEM, "no memory for the list of effects");
 	json_dumpf(o, stdout, JSON_COMPACT);

@@ -287,8 +287,6 @@ static void say(const struct session *s)
 		fprintf(stderr, ", relative error %.2f %% (95 %%: %.2f to %.2f %%)", 100 * sqrt(i->rel_mse), 100 * sqrt(i->rel_mse_95[0]),
 			100 * sqrt(i->rel_mse_95[1]));
 	fprintf(stderr, "; ended by %s\n", merge_end_name(s->run.end, s->run.lit.black));
-	if (i->beyond_share > 0.001)
-		fprintf(stderr, "%.2f %% of the energy lies in paths longer than %s can hold\n", 100 * i->beyond_share, p->integrator);
 	char text[STRATEGY_TABLE];
 	strategy_table(p->mutations, &i->counts, text, sizeof text);
 	if (s->a->stats)
@@ -297,6 +295,7 @@ static void say(const struct session *s)
 	if (s->a->stats)
 		fputs(text, stderr);
 	strategy_note(p, &i->counts, i->black, text, sizeof text);
+	strategy_add_beyond(i->beyond_share, text, sizeof text);
 	agreement_add_note(&s->agreement, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);

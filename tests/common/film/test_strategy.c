@@ -203,6 +203,11 @@ static void tables_are_readable(void **state)
 	assert_string_equal(text, "the image is black: no sample found light; 2,000 contributions were not numbers, infinite or negative, "
 				  "and left out; 1 of 8 times a chain accepted nothing during a whole epoch (4 chains); longest run: "
 				  "911 rejections");
+	strategy_add_beyond(0.0009, text, sizeof text); /* not worth a word */
+	assert_null(strstr(text, "missing"));
+	strategy_add_beyond(0.25, text, sizeof text);
+	assert_non_null(strstr(text, "911 rejections; 25 % of the light is missing: it comes by paths longer than the chains of this "
+				     "integrator hold (path has all of it)"));
 	strategy_table(p.mutations, &n, small, sizeof small); /* cut, and ended */
 	assert_int_equal(strlen(small), sizeof small - 1);
 	strategy_lines(p.mutations, &n, text, sizeof text);
@@ -214,6 +219,7 @@ static void tables_are_readable(void **state)
 	p.chains = UINT32_MAX;
 	p.epoch = 1;
 	strategy_note(&p, &n, true, text, sizeof text);
+	strategy_add_beyond(0.00123456, text, sizeof text);
 	assert_true(strlen(text) < STRATEGY_NOTE);
 	char lines[5120]; /* what the header keeps for them */
 	strategy_lines("aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa,b,c,d,e,f,g,h", &n, lines, sizeof lines);

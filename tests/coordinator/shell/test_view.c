@@ -21,7 +21,7 @@ static struct job_record record(void)
 	n.strategy[1][STRATEGY_PROPOSED] = 180000;
 	n.strategy[1][STRATEGY_ACCEPTED] = 90000;
 	n.strategy[1][STRATEGY_FAIL_REVERSE] = 11;
-	record_take_counted(&r, &p, &n, false);
+	record_take_counted(&r, &p, &n, false, 0.25);
 	return r;
 }
 
@@ -49,7 +49,9 @@ static void json_shows_the_strategies(void **state)
 	assert_int_equal(whole(json_array_get(list, 0), "proposed"), 20000);
 	assert_int_equal(whole(counts, "stuck"), 3);
 	assert_int_equal(whole(counts, "longestStuck"), 5210);
-	static const char note[] = "3 of 2,048 times a chain accepted nothing during a whole epoch (1,024 chains); longest run: 5,210 rejections";
+	static const char note[] = "3 of 2,048 times a chain accepted nothing during a whole epoch (1,024 chains); longest run: 5,210 rejections; "
+				   "25 % of the light is missing: it comes by paths longer than the chains of this integrator hold (path has "
+				   "all of it)";
 	assert_string_equal(json_string_value(json_object_get(o, "note")), note);
 	assert_string_equal(json_string_value(json_object_get(o, "mixture")), "independent=0.1,hslt=0.9");
 	json_decref(o);
