@@ -4,6 +4,7 @@
 # make test-sim        10,000 schedules of faults in virtual time
 # make test-faults   what happens to machines, one fault after the other; writes the tables of tests/e2e/README.md
 # make test-states   chain states that one worker spoils, with 50 seeds
+# make fuzz-numbers   scenes with extreme numbers against a farm of sanitized workers, FUZZ_SECONDS (60) long
 # make demo bench fuzz install clean
 
 CC       ?= gcc
@@ -150,6 +151,12 @@ fuzz:
 .PHONY: test-states
 test-states: programs
 	SEEDS="$$(seq -s ' ' 50)" sh tests/e2e/states.sh $(BUILD)
+
+# Scenes with extreme numbers against a farm of sanitized workers.
+.PHONY: fuzz-numbers
+fuzz-numbers: $(BUILD)/tests/worker/render/test_scene_numbers
+	$(MAKE) SAN=address,undefined programs
+	sh tests/fuzz/numbers.sh $(BUILD)/san $${FUZZ_SECONDS:-60}
 
 # Benchmarks: one program from tests/bench/*.c; a table on stdout and $(BUILD)/bench.json. BENCH="path tiles" runs only these.
 BENCH_SRC := $(wildcard tests/bench/*.c)

@@ -224,7 +224,9 @@ static bool sample_toward(const struct emitter *em, vec3 ref, const double u[2],
 	vec3 w = frame_to_world(&f, (vec3){s * cos(phi), s * sin(phi), c});
 	vec3 p = vec3_madd(ref, t, w);
 	x->infinite = false;
-	sphere_point(a, vec3_normalize(vec3_sub(p, a->surface.center)), x);
+	vec3 out = vec3_sub(p, a->surface.center);
+	/* So far away that rounding leaves a point of it: the one that is nearest. */
+	sphere_point(a, vec3_length(out) > 0 ? vec3_normalize(out) : vec3_neg(axis), x);
 	*pdf = sphere_pdf_area(ref, sin2, x);
 	return *pdf > 0;
 }
