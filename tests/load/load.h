@@ -76,7 +76,7 @@ struct load {
 	uint64_t random;
 	/* counted from the first to the last moment */
 	uint64_t grants, again, merged, bootstrap_merged, repeated, refused, revoked, given_back, disordered, faults;
-	uint64_t deaths, lies, lies_refused, hoarded, hangs;
+	uint64_t deaths, lies, lies_refused, lies_merged, hoarded, hangs;
 	/* counted while measuring */
 	uint64_t batches, bytes;
 	struct load_times grant, first_grant, ack, send, beat, late;

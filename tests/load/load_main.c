@@ -385,7 +385,7 @@ static int report(double wrong, double peak)
 	bool met = bound("leases lost", lost, "", 0, false);
 	met &= bound("acknowledged out of order", (double)load.disordered, "", 0, false);
 	met &= bound("merged more or less than once", wrong, "", 0, false);
-	met &= bound("wrong results that count", (double)(load.lies - load.lies_refused), "", 0, false);
+	met &= bound("wrong results that count", (double)load.lies_merged, "", 0, false);
 	met &= bound("coordinator's exit code", coordinator.code, "", 0, false);
 	met &= bound("connections lost, faults", (double)(load.closed + load.faults), "", 0, false);
 	if (load.s.losses)

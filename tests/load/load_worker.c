@@ -287,6 +287,7 @@ static void take_ack(struct load_worker *w, const Farm__LeaseAck *m)
 		fault(w, "an answer to nothing");
 		return;
 	}
+	l->lies_merged += w->kind == LOAD_LIES && m->verdict == FARM__VERDICT__VERDICT_MERGED;
 	if (m->verdict == FARM__VERDICT__VERDICT_MERGED)
 		count_merged(l, &k);
 	else if (m->verdict == FARM__VERDICT__VERDICT_REPEATED)
