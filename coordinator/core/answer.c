@@ -90,8 +90,12 @@ static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s,
 	acknowledge(f, ev, ACK_MERGED, "");
 	struct lease *l = lease_of(s, p);
 	double duration = l ? f->now - l->sent : NAN;
+	double sent = l ? l->sent : -INFINITY;
 	if (l)
 		lease_drop(f, l);
+	for (const struct lease *k = s->leases; k; k = k->next)
+		if (k->sent < sent && !k->delivered && !k->overdue) /* overtaken by a copy */
+			peer_was_late(f, k->peer);
 	lease_revoke_slot(f, s);
 	j->verified += verified;
 	if (verified)

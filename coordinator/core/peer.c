@@ -244,7 +244,7 @@ static void set_window(struct farm *f, struct peer *p, uint32_t window)
 
 void peer_was_late(struct farm *f, struct peer *p)
 {
-	set_window(f, p, p->who->window / 2 > PEER_WINDOW ? p->who->window / 2 : PEER_WINDOW);
+	set_window(f, p, p->who->window > 1 ? p->who->window / 2 : 1);
 }
 
 void peer_succeeded(struct farm *f, struct peer *p, uint64_t job)

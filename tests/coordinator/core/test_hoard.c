@@ -82,6 +82,30 @@ static void long_leases_are_waited_for(void **state)
 		NULL });
 }
 
+/* It holds half as many after each that others had to answer, and twice as many again once it gives something. */
+static void who_is_overtaken_holds_less(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] submit groups=8 rounds=9 -> j1 submitted, j1 is queued",
+		"[0] w1 joins A threads=64 -> -", "[0] w2 joins A threads=8 -> -",
+		"[0] w1 wants 65 -> j1 is bootstrap, " EIGHT,
+		"[20] w1 heard -> -",
+		"[20] w2 wants 4 -> -",
+		"[30] tick -> w2 gets j1 g0 p0 boot, w2 gets j1 g1 p0 boot, w2 gets j1 g2 p0 boot, w2 gets j1 g3 p0 boot",
+		"[31] w2 batch j1 g0 p0 boot -> merge, merged, w1 loses j1 g0 p0 boot, w2 gets j1 g4 p0 boot",
+		"[31] w2 batch j1 g1 p0 boot -> merge, merged, w1 loses j1 g1 p0 boot, w2 gets j1 g5 p0 boot",
+		"[31] w2 batch j1 g2 p0 boot -> merge, merged, w1 loses j1 g2 p0 boot, w2 gets j1 g6 p0 boot",
+		"[31] w2 batch j1 g3 p0 boot -> merge, merged, w1 loses j1 g3 p0 boot, w2 gets j1 g7 p0 boot",
+		"[32] w2 batch j1 g4 p0 boot -> merge, merged, w1 loses j1 g4 p0 boot",
+		"[32] w2 batch j1 g5 p0 boot -> merge, merged, w1 loses j1 g5 p0 boot",
+		"[32] w2 batch j1 g6 p0 boot -> merge, merged, w1 loses j1 g6 p0 boot",
+		"[32] w2 batch j1 g7 p0 boot -> merge, merged, w1 loses j1 g7 p0 boot, j1 prepare",
+		"[33] prepared j1 -> j1 is running, w2 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0, w2 gets j1 g2 p0 e0, w2 gets j1 g3 p0 e0, w2 gets j1 g4 p0 e0",
+		"[34] w1 batch j1 g1 p0 e0 -> merge, merged, w1 gets j1 g5 p0 e0, w1 gets j1 g6 p0 e0",
+		NULL });
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -89,6 +113,7 @@ int main(void)
 		cmocka_unit_test(what_is_held_grows_with_what_is_given),
 		cmocka_unit_test(two_hoarders_stall_it_for_minutes),
 		cmocka_unit_test(long_leases_are_waited_for),
+		cmocka_unit_test(who_is_overtaken_holds_less),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
