@@ -237,9 +237,12 @@ void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own)
 /* What it may hold grows with what it gives: who takes what he can get and gives nothing holds up little. */
 static void set_window(struct farm *f, struct peer *p, uint32_t window)
 {
+	struct peer **all = p->who->uses > 1 ? f->peers : &p; /* an old connection of the same worker may still be here */
+	uint32_t count = p->who->uses > 1 ? f->peer_count : 1;
 	p->who->window = window;
-	if (peer_has_wish(p) == list_is_empty(&p->waiting))
-		peer_requeue(f, p);
+	for (uint32_t i = 0; i < count; i++)
+		if (all[i]->who == p->who && peer_has_wish(all[i]) == list_is_empty(&all[i]->waiting))
+			peer_requeue(f, all[i]);
 }
 
 void peer_was_late(struct farm *f, struct peer *p)
