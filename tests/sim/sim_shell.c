@@ -229,6 +229,14 @@ static void act(struct world *w, const struct action *a, uint64_t value)
 	}
 }
 
+static bool is_held(const struct sim_job *j)
+{
+	for (int i = 0; i < JOB_HOLDS; i++)
+		if (j->held[i])
+			return true;
+	return false;
+}
+
 static void check_progress(struct world *w)
 {
 	for (uint32_t i = 0; i < w->job_count; i++) {
@@ -236,7 +244,7 @@ static void check_progress(struct world *w)
 		struct job_status s;
 		if (!j->submitted || !farm_job(w->farm, j->id, w->now, &s))
 			continue;
-		if (s.priority != j->priority || (s.state == JOB_HELD) != (!j->over && (j->held[0] || j->held[1])))
+		if (s.priority != j->priority || (s.state == JOB_HELD) != (!j->over && is_held(j)))
 			sim_wrong(w, "j%" PRIu64 " has priority %d, or is %s", j->id, s.priority, job_state_name(s.state));
 		if (s.workers > s.leases_out || !(s.share >= 0 && s.share <= s.machines))
 			sim_wrong(w, "%u leases at %u workers, %g machines of %u due", s.leases_out, s.workers, s.share, s.machines);
