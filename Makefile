@@ -1,6 +1,7 @@
 # make            programs into build/bin
 # make test       unit and end-to-end tests (SAN=address,undefined for sanitizers, FULL=1 for the long forms)
 # make test-numerics   what is hard on the numbers, one row a case
+# make test-mutants   plants faults of one line, one at a time, and asks whether a test notices
 # make test-sim        10,000 schedules of faults in virtual time
 # make test-faults   what happens to machines, one fault after the other; writes the tables of tests/e2e/README.md
 # make test-states   chain states that one worker spoils, with 50 seeds
@@ -123,6 +124,11 @@ test: programs tests $(BUILD)/load/load
 .PHONY: test-sim
 test-sim: $(BUILD)/tests/sim/test_farm
 	FULL=1 $(BUILD)/tests/sim/test_farm
+
+# Faults of one line each, planted in a copy of HEAD: which test notices (tests/mutants/README.md).
+.PHONY: test-mutants
+test-mutants:
+	CC="$(CC)" sh tests/mutants/run.sh
 
 # What is hard on the numbers, one row a case; the same programs are part of the tests.
 NUMERICS_BIN := $(filter $(BUILD)/tests/worker/halfvec/% $(BUILD)/tests/numerics/%,$(TEST_BIN))

@@ -1,0 +1,44 @@
+#!/bin/sh
+# Plants one fault at a time and asks whether a test notices: make test-mutants.
+#
+#     sh tests/mutants/run.sh [LIST]        LIST: tests/mutants/list.txt
+#
+# A line of the list: FILE, what stands there (once in the file), what is put in its place, the tests to run; tabs between, # begins
+# a comment. The commit at HEAD is copied to build/mutants and built there once. A fault is caught when a test of its line fails;
+# one that does not compile is a fault of the list. Ends with 1 when less than 95 % are caught or a line is faulty.
+list=${1:-tests/mutants/list.txt}
+list=$(cd "$(dirname "$list")" && pwd)/$(basename "$list")
+tree=build/mutants
+rm -rf "$tree" && mkdir -p "$tree" && git archive HEAD | tar x -C "$tree" && cd "$tree" || exit 1
+make -s ${CC:+CC="$CC"} programs $(awk -F'\t' '!/^#/ && NF { print $4 }' "$list" | tr ' ' '\n' | sort -u | sed 's|^|build/tests/|') || exit 1
+caught=0 survived=0 faulty=0
+tab=$(printf '\t')
+while IFS=$tab read -r file old new tests; do
+	case $file in '#'* | '') continue ;; esac
+	cp "$file" "$file.sound"
+	if ! OLD=$old NEW=$new awk 'BEGIN { old = ENVIRON["OLD"]; new = ENVIRON["NEW"] }
+		{ at = index($0, old); if (at) { n++; $0 = substr($0, 1, at - 1) new substr($0, at + length(old)) } print }
+		END { exit n != 1 }' "$file.sound" > "$file"; then
+		echo "faulty    $file: '$old' does not stand there once"
+		faulty=$((faulty + 1))
+	elif ! make -s ${CC:+CC="$CC"} $(echo "$tests" | tr ' ' '\n' | sed 's|^|build/tests/|') > make.log 2>&1; then
+		echo "faulty    $file: '$new' does not compile"
+		faulty=$((faulty + 1))
+	else
+		by=
+		for t in $tests; do
+			timeout 300 "build/tests/$t" > /dev/null 2>&1 || { by=$t && break; }
+		done
+		if [ "$by" ]; then
+			echo "caught    $file: '$old' -> '$new' by $by"
+			caught=$((caught + 1))
+		else
+			echo "SURVIVED  $file: '$old' -> '$new' ($tests)"
+			survived=$((survived + 1))
+		fi
+	fi
+	mv "$file.sound" "$file"
+	touch "$file"
+done < "$list"
+echo "$caught caught, $survived survived, $faulty faulty"
+[ $faulty -eq 0 ] && [ $((100 * caught)) -ge $((95 * (caught + survived))) ]
