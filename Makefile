@@ -2,6 +2,7 @@
 # make test       unit and end-to-end tests (SAN=address,undefined for sanitizers, FULL=1 for the long forms)
 # make test-numerics   what is hard on the numbers, one row a case
 # make test-mutants   plants faults of one line, one at a time, and asks whether a test notices
+# make calibration     stated errors against true ones, over scenes of three kinds; the table of tests/image/README.md
 # make test-sim        10,000 schedules of faults in virtual time
 # make test-faults   what happens to machines, one fault after the other; writes the tables of tests/e2e/README.md
 # make test-states   chain states that one worker spoils, with 50 seeds
@@ -171,6 +172,14 @@ $(BUILD)/bench/bench: $(call obj,$(BENCH_SRC)) $(LIB_TEST) $(LIB_CLI) $(LIB_REND
 BENCH_WRAP := -Wl,--wrap=accel_closest,--wrap=accel_occluded,--wrap=accel_occluded_to_infinity,--wrap=halfvec_walk_from,--wrap=whole_visible
 bench: programs $(BUILD)/bench/bench $(if $(filter effects,$(BENCH)),plain)
 	$(BUILD)/bench/bench --bin $(BUILD)/bin --json $(BUILD)/bench.json $(BENCH)
+
+# Stated errors against true ones: about an hour of one core. CALIBRATION="RENDERS LENGTHS SCENE" for less.
+CALIBRATION_SRC := $(filter-out tests/image/test_%.c,$(wildcard tests/image/*.c))
+$(BUILD)/calibration/calibration: $(call obj,$(CALIBRATION_SRC)) $(LIB_TEST) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
+	$(link) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+.PHONY: calibration
+calibration: $(BUILD)/calibration/calibration
+	$(BUILD)/calibration/calibration $(CALIBRATION) >$(BUILD)/calibration.md; code=$$?; cat $(BUILD)/calibration.md; exit $$code
 
 # Fake workers against the real coordinator: make load LOAD="--workers 1000 --minutes 10"
 LOAD_SRC := $(wildcard tests/load/*.c) tests/bench/process.c

@@ -64,14 +64,28 @@ struct path_class_energy {
 				compare */
 };
 
+/* Why the interval of an image's relMSE is not known; common/film/stated_error.h says it in words. */
+enum error_doubt {
+	ERROR_KNOWN,
+	ERROR_ONE_GROUP, /* too much of it comes from pixels where one group of samples outweighs the others: rare light */
+	ERROR_DARK,      /* ... from pixels whose brightness, by which errors are divided, is not known */
+	ERROR_WIDE,      /* the interval would span more than a factor of ten of the relative error */
+	ERROR_SHORT,     /* chains are too short to be judged (common/film/agreement.h) */
+};
+
 struct canvas_image {
 	uint32_t width, height; /* crop */
 	float *rgb;   /* linear Rec. 709, [height][width][3]; from the prefix of complete rounds */
 	float *error; /* one standard error, same shape and units; NULL when groups < 2 */
-	double rel_mse;         /* estimated relMSE of rgb at this resolution; NAN when groups < 2 */
-	double rel_mse_upper;   /* upper end of its 90 % interval */
+	/* relMSE of rgb against the truth B, at this resolution: mean over pixels and channels of (rgb - B)^2 / (B^2 + (0.01 m)^2), m the
+	 * mean of B; estimated. NAN when groups < 2 or nothing came. */
+	double rel_mse;
+	double rel_mse_upper;   /* upper end of the 90 % interval of this image's own; believed only where nothing is doubtful */
 	double rel_mse_degrees; /* of freedom: rel_mse is distributed as its expectation times chi-square over them; NAN: unknown */
-	double rel_mse_95[2];   /* interval that holds this image's own relMSE in 95 % of all cases */
+	double rel_mse_95[2];   /* interval that holds this image's own relMSE in 95 % of all cases; NAN where it is doubtful */
+	enum error_doubt rel_mse_doubt;
+	double doubtful_share;  /* of rel_mse: what the doubt is about */
+	uint64_t unvisited;     /* pixels to which no chain came; 0 of samples */
 	/* Chains only, of complete rounds; NULL for samples, previews and before the first round is complete. Per tile of
 	 * TILE_SIZE from the crop's corner: potential scale reduction (Gelman and Rubin 1992) of the share of a sequence's time
 	 * that falls into the tile, sqrt((n - 1) / n + V / W), n mutations a sequence, V the variance of the sequences' shares,

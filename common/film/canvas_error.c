@@ -1,10 +1,10 @@
 /*
- * The error of an image and the estimate of its relMSE, from the spread between groups. All loops run in a fixed order over
- * exact inputs, so that equal films give equal bits.
+ * The error of an image and what its relMSE is summed from, by the spread between groups: standard errors of pixels; weights,
+ * 1 / (B^2 + (0.01 m)^2), with brightnesses B that are no noisier than need be; sums of weighted errors, with bounds. What is made of
+ * the sums is canvas_interval.c's. All loops run in a fixed order over exact inputs, so that equal films give equal bits.
  */
 #include "common/film/canvas_private.h"
 #include "common/film/color.h"
-#include "common/film/quantile.h"
 
 #include "common/base/mem.h"
 
@@ -12,22 +12,27 @@
 #include <math.h>
 #include <string.h>
 
-enum { FOLDED = 16, VALUES = 3 * PLAN_MAX_GROUPS };
+enum { FOLDED = ERROR_FOLDED, VALUES = 3 * PLAN_MAX_GROUPS, BASE_GROUPS = 8 };
 
 /* Squared relative standard error below which a brightness is believed. */
 static const double believed = 0.08;
+
+/* A kurtosis above this share of the groups: one of them has most of the pixel's variance. One alone would have nearly 1. */
+static const double one_group = 0.6;
 
 /* A tile at work. Rows of `apart` hold three channels of `groups` values. */
 struct tile_error {
 	const struct canvas *c;
 	uint32_t groups, x, y, width, height; /* the tile's place and size in the crop */
 	double floor_square;
+	bool lit;                             /* chains, and some came to the tile */
+	double mean_square[3];                /* over the tile's pixels */
 	float *apart;                         /* [height][width][3][groups]: a group's image less the groups' mean */
 	double brightness[TILE_SIZE * TILE_SIZE][3], square[TILE_SIZE * TILE_SIZE][3]; /* of the mean: value, variance */
+	double base[TILE_SIZE * TILE_SIZE][3], base_square[TILE_SIZE * TILE_SIZE][3]; /* trimmed mean: value, variance */
+	double kurtosis[TILE_SIZE * TILE_SIZE][3]; /* of the groups' values */
 	bool settled[TILE_SIZE * TILE_SIZE][3];
-	double share, doubt; /* sums over settled squares: their part of the relMSE; its square times its weight's variance */
-	double gram[FOLDED][FOLDED];
-	double distance[PLAN_MAX_GROUPS]; /* a group's weighted error, squared, summed over the image */
+	struct error_sums sum;
 };
 
 /* ---- standard errors */
@@ -59,14 +64,27 @@ static void pixel_error(struct making *m, struct tile_error *t, const int64_t *c
 			rgb[k][g] -= mean;
 			apart[k * groups + g] = (float)rgb[k][g];
 		}
-		for (uint32_t g = 0; g < groups; g++)
-			square += rgb[k][g] * rgb[k][g];
+		double fourth = 0;
+		for (uint32_t g = 0; g < groups; g++) {
+			double q = rgb[k][g] * rgb[k][g];
+			square += q;
+			fourth += q * q;
+		}
 		t->square[pixel][k] = square / groups / (groups - 1);
+		t->kurtosis[pixel][k] = square > 0 ? fourth / (square * square) * groups : 0;
 	}
+}
+
+static bool is_dark(const struct tile_error *t, size_t pixel)
+{
+	return t->square[pixel][0] + t->square[pixel][1] + t->square[pixel][2] == 0;
 }
 
 static void tile_errors(struct making *m, struct tile_error *t)
 {
+	bool chains = m->c->plan.kind == PLAN_CHAINS;
+	t->lit = false;
+	memset(t->mean_square, 0, sizeof t->mean_square);
 	static const int64_t nothing[SLOT];
 	const int64_t *slot[PLAN_MAX_GROUPS];
 	size_t tile = (size_t)(t->y / TILE_SIZE) * m->c->tiles_across + t->x / TILE_SIZE;
@@ -80,8 +98,11 @@ static void tile_errors(struct making *m, struct tile_error *t)
 			pixel_error(m, t, slot, (size_t)y * SLOT_ROW + (size_t)x * TILE_CHANNELS, pixel);
 			for (size_t k = 0; k < 3; k++) {
 				t->brightness[pixel][k] = (double)m->img->rgb[out + k];
-				m->img->error[out + k] = (float)sqrt(t->square[pixel][k]);
+				t->mean_square[k] += t->square[pixel][k] / t->width / t->height;
 			}
+			bool dark = is_dark(t, pixel);
+			m->img->unvisited += chains && dark;
+			t->lit |= chains && !dark;
 		}
 }
 
@@ -91,6 +112,7 @@ static void tile_errors(struct making *m, struct tile_error *t)
 struct block {
 	uint32_t pixels, waiting[3];
 	double all[3], open[3];                       /* of the mean */
+	double rare[3], open_rare[3];                 /* of the mean less the base */
 	double all_apart[VALUES], open_apart[VALUES]; /* [3][groups] */
 };
 
@@ -110,8 +132,35 @@ static bool believe(double brightness, double square, double floor_square)
 static void add_share(struct tile_error *t, double part, double brightness, double square, double divisor)
 {
 	double slope = 2 * brightness * part / divisor;
-	t->share += part;
-	t->doubt += slope * slope * square;
+	t->sum.share += part;
+	t->sum.doubt += slope * slope * square;
+}
+
+/* The pixel's part of the relMSE with each group's deviation over the brightness that the other groups found: no sample is divided
+ * by the brightness that it makes itself. As large as the part can reasonably be, since light that came to one group only is
+ * missing in all its divisors. */
+static double by_others(const struct tile_error *t, size_t pixel, size_t k)
+{
+	const float *apart = apart_at(t, pixel) + k * t->groups;
+	double n = t->groups, sum = 0, all = t->square[pixel][k] * n * (n - 1);
+	for (uint32_t g = 0; g < t->groups; g++) {
+		double d = (double)apart[g], others = t->brightness[pixel][k] - d / (n - 1);
+		double square = n > 2 ? fmax(0, all - d * d * n / (n - 1)) / (n - 1) / (n - 2) : all;
+		sum += d * d / divisor_square(t, others, square, 3);
+	}
+	return sum / n / (n - 1);
+}
+
+/* Bounds of a part of the relMSE, and what makes it doubtful. The lower bound: over the brightness that the pixel has, all fireflies
+ * in it. */
+static void add_bounds(struct tile_error *t, size_t pixel, size_t k, double part, double high)
+{
+	double square = t->square[pixel][k];
+	t->sum.low += square / divisor_square(t, t->brightness[pixel][k], square, 1);
+	t->sum.high += high;
+	t->sum.kurtosis += part * t->kurtosis[pixel][k];
+	if (t->kurtosis[pixel][k] > one_group * t->groups)
+		t->sum.one_group += part;
 }
 
 /* By the pixel's own brightness. Where it is believed, a group's errors are divided by the brightness that the other groups found,
@@ -122,6 +171,7 @@ static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool beli
 	double divisor = divisor_square(t, brightness, square, believed_in ? 3 : 1);
 	float root = (float)(1 / sqrt(divisor)), slope = believed_in ? (float)(brightness / divisor / (t->groups - 1)) : 0;
 	float *apart = apart_at(t, pixel) + k * t->groups;
+	add_bounds(t, pixel, k, square / divisor, believed_in ? by_others(t, pixel, k) : square / divisor);
 	for (uint32_t g = 0; g < t->groups; g++) {
 		float x = slope * apart[g];
 		apart[g] *= root * (1 + x + x * x);
@@ -166,12 +216,58 @@ static uint32_t find_settled(struct tile_error *t)
 	return waiting;
 }
 
+/* Mean variance of the 3 x 3 pixels around one, as far as they lie in the tile. */
+static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
+{
+	double sum = 0, n = 0;
+	for (uint32_t j = y > 0 ? y - 1 : 0; j < t->height && j <= y + 1; j++)
+		for (uint32_t i = x > 0 ? x - 1 : 0; i < t->width && i <= x + 1; i++, n++)
+			sum += t->square[(size_t)j * t->width + i][k];
+	return sum / n;
+}
+
+/*
+ * Standard errors of the tile's pixels. Where the brightness is not believed a variance from few groups is mostly too small, since
+ * what comes in bursts has not come yet: it is averaged with its neighbours'. A pixel that chains never visited has a variance
+ * of 0, which would be a claim; it gets that of its neighbours, of its tile, or (write_unvisited) of the image.
+ */
+static void write_errors(struct making *m, const struct tile_error *t)
+{
+	for (uint32_t y = 0; y < t->height; y++)
+		for (uint32_t x = 0; x < t->width; x++)
+			for (size_t k = 0; k < 3; k++) {
+				size_t pixel = (size_t)y * t->width + x;
+				double own = t->square[pixel][k], around = own;
+				if (!t->settled[pixel][k] || own == 0)
+					around = (own + square_around(t, x, y, k)) / 2;
+				if (around == 0 && t->lit)
+					around = t->mean_square[k];
+				m->img->error[((size_t)(t->y + y) * m->img->width + t->x + x) * 3 + k] = (float)sqrt(around);
+			}
+}
+
 static double spread_square(const double *apart, uint32_t groups, double pixels)
 {
 	double square = 0;
 	for (uint32_t g = 0; g < groups; g++)
 		square += apart[g] * apart[g];
 	return square / (pixels * pixels) / groups / (groups - 1);
+}
+
+/* Where the groups agree about a pixel but for a few, its brightness is theirs, and what the few found is spread over the block:
+ * `rare` a pixel, with the variance `square`. A wall beside a lamp keeps its darkness so. */
+static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double rare, double square)
+{
+	double base = t->base[pixel][k] + rare, doubt = t->base_square[pixel][k] + square;
+	if (t->groups < BASE_GROUPS || !believe(base, doubt, t->floor_square))
+		return false;
+	double divisor = divisor_square(t, base, doubt, 1), part = t->square[pixel][k] / divisor;
+	float *apart = apart_at(t, pixel) + k * t->groups, root = (float)(1 / sqrt(divisor));
+	add_bounds(t, pixel, k, part, by_others(t, pixel, k));
+	for (uint32_t g = 0; g < t->groups; g++)
+		apart[g] *= root;
+	add_share(t, part, base, doubt, divisor);
+	return true;
 }
 
 /*
@@ -185,6 +281,7 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 	double n = b->pixels, waiting = b->waiting[k], part = 0;
 	bool other = b->all[k] / n > 2 * b->open[k] / waiting;
 	n = other ? waiting : n;
+	double rare = (other ? b->open_rare[k] : b->rare[k]) / n;
 	double brightness = (other ? b->open[k] : b->all[k]) / n;
 	const double *apart = (other ? b->open_apart : b->all_apart) + k * t->groups;
 	double square = spread_square(apart, t->groups, n);
@@ -203,17 +300,43 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 				continue;
 			}
 			float *own = apart_at(t, pixel) + k * t->groups;
+			if (settle_by_base(t, pixel, k, rare, square))
+				continue;
+			double own_part = t->square[pixel][k] / divisor;
+			add_bounds(t, pixel, k, own_part, own_part);
+			t->sum.dark += own_part;
 			for (uint32_t g = 0; g < t->groups; g++)
 				own[g] *= root;
 			part += t->square[pixel][k];
 		}
 	add_share(t, part / divisor, brightness, square, divisor);
 	b->waiting[k] = 0;
-	b->open[k] = 0;
+	b->open[k] = b->open_rare[k] = 0;
 	memset(b->open_apart + k * t->groups, 0, t->groups * sizeof *b->open_apart);
 }
 
-static void add_pixel(const struct tile_error *t, struct block *b, size_t pixel)
+/* Mean and its variance without the eighth of the groups that lie farthest from the others: the brightness without fireflies. */
+static void find_base(struct tile_error *t, size_t pixel, size_t k)
+{
+	double d[PLAN_MAX_GROUPS], mean = 0, square = 0;
+	const float *apart = apart_at(t, pixel) + k * t->groups;
+	uint32_t n = t->groups, drop = t->groups / 8;
+	for (uint32_t g = 0; g < n; g++)
+		d[g] = (double)apart[g];
+	for (; drop > 0; drop--) {
+		uint32_t far = 0;
+		for (uint32_t g = 1; g < n; g++)
+			far = fabs(d[g] - mean) > fabs(d[far] - mean) ? g : far;
+		mean = (mean * n - d[far]) / (n - 1);
+		d[far] = d[--n];
+	}
+	for (uint32_t g = 0; g < n; g++)
+		square += (d[g] - mean) * (d[g] - mean);
+	t->base[pixel][k] = t->brightness[pixel][k] + mean;
+	t->base_square[pixel][k] = square / n / (n - 1);
+}
+
+static void add_pixel(struct tile_error *t, struct block *b, size_t pixel)
 {
 	const float *apart = apart_at(t, pixel);
 	size_t groups = t->groups;
@@ -221,9 +344,14 @@ static void add_pixel(const struct tile_error *t, struct block *b, size_t pixel)
 	for (size_t i = 0; i < 3 * groups; i++)
 		b->all_apart[i] += (double)apart[i];
 	for (size_t k = 0; k < 3; k++) {
+		if (groups >= BASE_GROUPS)
+			find_base(t, pixel, k);
+		double rare = t->brightness[pixel][k] - t->base[pixel][k];
+		b->rare[k] += rare;
 		b->all[k] += t->brightness[pixel][k];
 		if (t->settled[pixel][k])
 			continue;
+		b->open_rare[k] += rare;
 		b->waiting[k]++;
 		b->open[k] += t->brightness[pixel][k];
 		for (size_t i = k * groups; i < (k + 1) * groups; i++)
@@ -237,6 +365,8 @@ static void add_block(struct block *b, const struct block *part, uint32_t groups
 	for (int k = 0; k < 3; k++) {
 		b->waiting[k] += part->waiting[k];
 		b->all[k] += part->all[k];
+		b->rare[k] += part->rare[k];
+		b->open_rare[k] += part->open_rare[k];
 		b->open[k] += part->open[k];
 	}
 	for (size_t i = 0; i < 3 * (size_t)groups; i++)
@@ -280,7 +410,7 @@ static void fold(struct tile_error *t, uint32_t first, const float *apart, float
 	for (uint32_t g = 0; g < FOLDED; g++)
 		folded[g] += v[g];
 	for (uint32_t g = 0; g < FOLDED && t->groups > FOLDED; g++)
-		t->distance[first + g] += (double)v[g] * (double)v[g];
+		t->sum.distance[first + g] += (double)v[g] * (double)v[g];
 }
 
 /* Products of the groups' weighted errors. More than FOLDED groups are folded onto so many: errors that add up are alike. A
@@ -301,7 +431,7 @@ static void add_row(struct tile_error *t, size_t first)
 	}
 	for (size_t i = 0; i < FOLDED; i++)
 		for (size_t j = i; j < FOLDED; j++)
-			t->gram[i][j] += (double)gram[i][j];
+			t->sum.gram[i][j] += (double)gram[i][j];
 }
 
 static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint32_t y)
@@ -311,7 +441,9 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 	t->width = m->img->width - x < TILE_SIZE ? m->img->width - x : TILE_SIZE;
 	t->height = m->img->height - y < TILE_SIZE ? m->img->height - y : TILE_SIZE;
 	tile_errors(m, t);
-	if (find_settled(t)) {
+	bool all_settled = find_settled(t) == 0;
+	write_errors(m, t);
+	if (!all_settled) {
 		struct block whole;
 		settle_square(t, 0, 0, TILE_SIZE, &whole);
 	} else {
@@ -321,76 +453,19 @@ static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint3
 		add_row(t, (size_t)row * t->width);
 }
 
-/* ---- degrees of freedom */
-
-/*
- * How many errors move apart in one error image: (sum l)^2 / sum l^2 over the eigenvalues l of the covariance of a group's
- * error; 1 when all pixels err together, as by an error of b. Both sums without bias from differences of disjoint pairs of
- * groups: |e1 - e2|^2 |e3 - e4|^2 / 4 and ((e1 - e2) . (e3 - e4))^2 / 4, averaged over all four groups. No fourth power of a
- * group's own error enters, so that a firefly does not pass for an error of everything; the second is never above the first.
- */
-static double own_degrees(const struct tile_error *t)
+/* Tiles to which no chain came have no variance of their own: they get the image's mean one. */
+static void write_unvisited(struct canvas_image *img)
 {
-	uint32_t n = t->groups < FOLDED ? t->groups : FOLDED;
-	double total = 0, square = 0, k[FOLDED][FOLDED];
-	for (uint32_t i = 0; i < n; i++)
-		for (uint32_t j = i; j < n; j++)
-			k[i][j] = k[j][i] = t->gram[i][j];
-	for (uint32_t a = 0; a < n; a++)
-		for (uint32_t b = a + 1; b < n; b++)
-			for (uint32_t c = a + 1; c < n; c++)
-				for (uint32_t d = c + 1; d < n; d++) {
-					if (c == b || d == b)
-						continue;
-					double cross = k[a][c] - k[a][d] - k[b][c] + k[b][d];
-					square += cross * cross;
-					total += (k[a][a] + k[b][b] - 2 * k[a][b]) * (k[c][c] + k[d][d] - 2 * k[c][d]);
-				}
-	double most = 1e6;
-	return !(total > square) ? 1 : total < most * square ? total / square : most;
-}
-
-/* Spread of the distances among the groups, relative, squared: 2 over the degrees of one group. The factor undoes the bias of
- * dividing by the mean distance, which is there when all pixels err together. */
-static double distance_spread(const struct tile_error *t, double mean)
-{
-	double groups = t->groups, square = 0;
-	for (uint32_t g = 0; g < t->groups; g++)
-		square += (t->distance[g] / mean - 1) * (t->distance[g] / mean - 1);
-	square /= groups - 1;
-	return square * (1 + fmin(square, 2) / groups);
-}
-
-/*
- * The estimate: mean over pixels and channels of the squared standard error over B^2 + (0.01 m)^2. It equals the mean over
- * groups of their squared distance from the mean, over groups - 1.
- *
- * Of its expectation it is about chi-square over its degrees of freedom, those with the spread that the distances show
- * (Satterthwaite 1946), but no more than own_degrees allows: 16 distances may lie together by chance, the products of pairs
- * hardly. The error at hand over the estimate is F with own_degrees and (groups - 1) times as many: heavy tails are in both. Own
- * degrees are fewer by (groups - 1) / (groups + 2), since they come from so many groups themselves: intervals are wider by as much as
- * Student's t is than the normal. The doubt of the weights adds to both, to own degrees
- * twice, since brightness that comes in hits is skewed. Where there are too few groups to tell, one degree of
- * freedom is taken.
- */
-static void find_rel_mse(struct making *m, struct tile_error *t)
-{
-	double groups = t->groups, mean = 0;
-	for (uint32_t g = 0; g < t->groups && t->groups <= FOLDED; g++)
-		t->distance[g] = t->gram[g][g];
-	for (uint32_t g = 0; g < t->groups; g++)
-		mean += t->distance[g] / groups;
-	struct canvas_image *img = m->img;
-	img->rel_mse = img->rel_mse_upper = img->rel_mse_95[0] = img->rel_mse_95[1] = mean / (groups - 1) / (3.0 * img->width * img->height);
-	if (!(mean > 0))
-		return;
-	double doubt = t->share > 0 ? t->doubt / (t->share * t->share) : 0, own = own_degrees(t);
-	double degrees = 1 / (0.5 * doubt + fmax(1 / own, 0.5 * distance_spread(t, mean)) / (groups - 1));
-	own = fmax(1, (groups - 1) / (groups + 2) / (1 / own + doubt));
-	img->rel_mse_degrees = degrees;
-	img->rel_mse_upper *= degrees / (t->groups == 2 ? 0.00393214 : chi_square_5(degrees));
-	img->rel_mse_95[0] *= f_quantile(0.025, own, own * (groups - 1));
-	img->rel_mse_95[1] *= f_quantile(0.975, own, own * (groups - 1));
+	size_t values = (size_t)img->width * img->height * 3;
+	double mean[3] = {0};
+	for (size_t i = 0; i < values; i++)
+		mean[i % 3] += (double)img->error[i] * (double)img->error[i] * 3 / (double)values;
+	for (size_t i = 0; i < values; i += 3) {
+		if (img->error[i] + img->error[i + 1] + img->error[i + 2] > 0)
+			continue;
+		for (size_t k = 0; k < 3; k++)
+			img->error[i + k] = (float)sqrt(mean[k]);
+	}
 }
 
 int canvas_error(struct making *m, struct error *e)
@@ -413,8 +488,11 @@ int canvas_error(struct making *m, struct error *e)
 	for (uint32_t y = 0; y < m->img->height; y += TILE_SIZE)
 		for (uint32_t x = 0; x < m->img->width; x += TILE_SIZE)
 			error_tile(m, t, x, y);
+	if (m->img->unvisited)
+		write_unvisited(m->img);
+	t->sum.groups = t->groups;
 	if (mean != 0) /* a black image has no relative error */
-		find_rel_mse(m, t);
+		canvas_interval(&t->sum, m->img);
 	mem_free(t->apart);
 	mem_free(t);
 	return 0;

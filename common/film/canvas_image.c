@@ -1,4 +1,5 @@
 /* From integer sums to an image. All loops run in a fixed order over exact inputs, so that equal films give equal bits. */
+#include "common/film/agreement.h"
 #include "common/film/canvas_private.h"
 #include "common/film/color.h"
 
@@ -129,6 +130,17 @@ static int find_moments(const struct making *m, struct error *e)
 	return moments_image(m->c->moments, groups, m->c->rounds, m->open_rounds, m->img, e);
 }
 
+/* Chains that are flagged and too short to be blamed for it: how far their errors reach is not known. */
+static void doubt_short_chains(struct making *m)
+{
+	struct agreement a;
+	agreement_judge(&m->c->plan, m->img, &a);
+	if (a.verdict != CHAINS_TOO_SHORT || m->img->rel_mse_doubt)
+		return;
+	m->img->rel_mse_doubt = ERROR_SHORT;
+	m->img->rel_mse_95[0] = m->img->rel_mse_95[1] = NAN;
+}
+
 int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e)
 {
 	const struct plan *p = &c->plan;
@@ -159,6 +171,8 @@ int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *
 	int rc = errors ? canvas_error(&m, e) : 0;
 	if (rc == 0)
 		rc = find_moments(&m, e);
+	if (rc == 0 && errors)
+		doubt_short_chains(&m);
 	if (rc)
 		canvas_image_fini(img);
 	mem_free(m.all);

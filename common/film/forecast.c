@@ -43,7 +43,8 @@ void forecast_add(struct forecast_history *h, const struct plan *p, const struct
 				  .seconds = seconds,
 				  .rel_mse = img->rel_mse,
 				  .rel_mse_upper = img->rel_mse_upper,
-				  .degrees = img->rel_mse_degrees > 0 ? img->rel_mse_degrees : p->groups - 1.0};
+				  .degrees = img->rel_mse_degrees > 0 ? img->rel_mse_degrees : p->groups - 1.0,
+				  .doubtful = img->rel_mse_doubt != ERROR_KNOWN};
 	forecast_add_look(h, &l);
 }
 
@@ -55,7 +56,7 @@ static const struct forecast_look *last(const struct forecast_history *h)
 const struct forecast_look *forecast_reached(const struct forecast_history *h, double target)
 {
 	for (uint32_t i = 0; i < h->count; i++)
-		if (sqrt(h->looks[i].rel_mse_upper) <= target)
+		if (!h->looks[i].doubtful && sqrt(h->looks[i].rel_mse_upper) <= target)
 			return &h->looks[i];
 	return NULL;
 }

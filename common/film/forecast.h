@@ -23,6 +23,7 @@ struct forecast_look {
 	double work;                 /* mutations or samples, as plan_round_mutations counts */
 	double cpu_seconds, seconds; /* of leases, of the wall clock; the bootstrap apart */
 	double rel_mse, rel_mse_upper, degrees;
+	uint64_t doubtful;           /* 1: the interval is not known (enum error_doubt), and no render ends by this look */
 };
 
 struct forecast_history {

@@ -18,9 +18,9 @@ json_t *forecast_looks_to_json(const struct forecast_history *h)
 	json_t *list = json_array();
 	for (uint32_t i = 0; i < h->count; i++) {
 		const struct forecast_look *l = &h->looks[i];
-		json_array_append_new(list, json_pack("{s:f s:f s:f s:f s:f s:o}", "mutations", l->work, "cpuSeconds", l->cpu_seconds,
+		json_array_append_new(list, json_pack("{s:f s:f s:f s:f s:f s:o s:b}", "mutations", l->work, "cpuSeconds", l->cpu_seconds,
 						      "wallSeconds", l->seconds, "relMSE", l->rel_mse, "relMSEUpper",
-						      l->rel_mse_upper, "degrees", forecast_real(l->degrees)));
+						      l->rel_mse_upper, "degrees", forecast_real(l->degrees), "doubtful", l->doubtful != 0));
 	}
 	return list;
 }
@@ -41,7 +41,8 @@ void forecast_looks_from_json(const json_t *list, struct forecast_history *h)
 					  .seconds = number(o, "wallSeconds"),
 					  .rel_mse = number(o, "relMSE"),
 					  .rel_mse_upper = number(o, "relMSEUpper"),
-					  .degrees = number(o, "degrees")};
+					  .degrees = number(o, "degrees"),
+					  .doubtful = json_is_true(json_object_get(o, "doubtful"))};
 		forecast_add_look(h, &l);
 	}
 }

@@ -2,6 +2,7 @@
 
 #include "common/base/version.h"
 #include "common/film/agreement.h"
+#include "common/film/stated_error.h"
 #include "common/film/strategy.h"
 
 #include <assert.h>
@@ -14,7 +15,8 @@
 
 enum header_name {
 	H_VERSION, H_SCENE, H_INTEGRATOR, H_MIXTURE, H_OPTIONS, H_SEED, H_MIN_DEPTH, H_MAX_DEPTH, H_GROUPS, H_CHAINS, H_BOOTSTRAP, H_EPOCH,
-	H_ROUNDS, H_MUTATIONS, H_SAMPLES, H_B, H_B_ERROR, H_BEYOND, H_REL_MSE, H_REL_MSE_UPPER, H_REL_MSE_LOW_95, H_REL_MSE_HIGH_95, H_ACCEPTED, H_INDEPENDENT,
+	H_ROUNDS, H_MUTATIONS, H_SAMPLES, H_B, H_B_ERROR, H_BEYOND, H_REL_MSE, H_REL_MSE_UPPER, H_REL_MSE_LOW_95, H_REL_MSE_HIGH_95,
+	H_REL_MSE_DEFINITION, H_REL_MSE_DOUBT, H_UNVISITED, H_ACCEPTED, H_INDEPENDENT,
 	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_STRATEGIES, H_NOTE, H_AGREEMENT, H_DISAGREEMENT,
 	H_R_HAT_MEDIAN, H_R_HAT_WORST, H_CLASSES, H_EFFECTS, H_MIXED, H_WALL,
 	H_CPU, H_WORKERS, H_DATE, H_END, H_CROPS,
@@ -46,9 +48,12 @@ const struct header_row header_rows[] = {
 	[H_B_ERROR] = {"hslt:bError", DOUBLE, false, "its standard error, from the groups"},
 	[H_BEYOND] = {"hslt:beyondShare", DOUBLE, false, "share of the energy in paths too long for the chains"},
 	[H_REL_MSE] = {"hslt:relMSE", DOUBLE, false, "estimated relMSE, from the variance between groups"},
-	[H_REL_MSE_UPPER] = {"hslt:relMSEUpper", DOUBLE, false, "upper end of its 90 % interval"},
-	[H_REL_MSE_LOW_95] = {"hslt:relMSELow95", DOUBLE, false, "lower end of the interval that holds this image's own relMSE in 95 % of all cases"},
-	[H_REL_MSE_HIGH_95] = {"hslt:relMSEHigh95", DOUBLE, false, "its upper end"},
+	[H_REL_MSE_UPPER] = {"hslt:relMSEUpper", DOUBLE, false, "upper end of its 90 % interval; absent where it is not known"},
+	[H_REL_MSE_LOW_95] = {"hslt:relMSELow95", DOUBLE, false, "lower end of the interval that holds this image's own relMSE in 95 % of all cases; absent where it is not known"},
+	[H_REL_MSE_HIGH_95] = {"hslt:relMSEHigh95", DOUBLE, false, "its upper end; absent where it is not known"},
+	[H_REL_MSE_DEFINITION] = {"hslt:relMSEDefinition", STRING, false, "what relMSE is"},
+	[H_REL_MSE_DOUBT] = {"hslt:relMSEDoubt", STRING, false, "why the interval of relMSE is not known"},
+	[H_UNVISITED] = {"hslt:unvisitedPixels", STRING, false, "pixels to which no chain came: their error is their neighbours' (Metropolis only)"},
 	[H_ACCEPTED] = {"hslt:accepted", STRING, false, "accepted mutations"},
 	[H_INDEPENDENT] = {"hslt:independent", STRING, false, "independent proposals of the chains"},
 	[H_NAN] = {"hslt:nan", STRING, false, "path contributions refused: not a number"},
@@ -182,6 +187,22 @@ static void add_agreement(struct header *h, const struct canvas_image *img, cons
 		add_string(h, H_CLASSES, table);
 }
 
+static void add_error(struct header *h, const struct canvas_image *img)
+{
+	char why[STATED_ERROR_TEXT];
+	stated_error_doubt(img, why, sizeof why);
+	if (*why) {
+		add_string(h, H_REL_MSE_DOUBT, why);
+	} else {
+		add_double(h, H_REL_MSE_UPPER, img->rel_mse_upper);
+		add_double(h, H_REL_MSE_LOW_95, img->rel_mse_95[0]);
+		add_double(h, H_REL_MSE_HIGH_95, img->rel_mse_95[1]);
+	}
+	add_string(h, H_REL_MSE_DEFINITION, REL_MSE_DEFINITION);
+	if (img->unvisited)
+		add_count(h, H_UNVISITED, img->unvisited);
+}
+
 static void add_result(struct header *h, const struct canvas_image *img, const struct plan *p)
 {
 	if (p->kind == PLAN_CHAINS) {
@@ -198,9 +219,7 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 		add_count(h, H_SAMPLES, img->rounds * p->groups * p->epoch);
 	}
 	add_double(h, H_REL_MSE, img->rel_mse);
-	add_double(h, H_REL_MSE_UPPER, img->rel_mse_upper);
-	add_double(h, H_REL_MSE_LOW_95, img->rel_mse_95[0]);
-	add_double(h, H_REL_MSE_HIGH_95, img->rel_mse_95[1]);
+	add_error(h, img);
 	add_count(h, H_NAN, img->counts.counters[COUNT_NAN]);
 	add_count(h, H_INFINITE, img->counts.counters[COUNT_INFINITE]);
 	add_count(h, H_NEGATIVE, img->counts.counters[COUNT_NEGATIVE]);

@@ -1,6 +1,7 @@
 #include "common/film/merge.h"
 
 #include "common/base/mem.h"
+#include "common/film/stated_error.h"
 
 #include <assert.h>
 #include <math.h>
@@ -146,7 +147,7 @@ bool merge_error_due(const struct plan *p, uint64_t rounds)
 
 enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img)
 {
-	if (img && p->target_error > 0 && sqrt(img->rel_mse_upper) <= p->target_error) /* false for NaN */
+	if (img && p->target_error > 0 && stated_error_meets(img, p->target_error))
 		return MERGE_ERROR;
 	if (rounds >= p->rounds)
 		return MERGE_ROUNDS;

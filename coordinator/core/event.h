@@ -122,6 +122,7 @@ struct event {
 		struct {
 			uint64_t job, rounds;
 			double rel_error; /* sqrt of the upper end of the estimated relMSE; NAN: cannot be known */
+			bool doubtful;    /* its interval is not known: no job ends by it */
 			double rel_mse, degrees; /* the estimate, and its degrees of freedom; 0: not told */
 			double cpu_seconds;      /* of all merged render leases */
 		} error_known;

@@ -80,7 +80,7 @@ struct forecast_range job_eta(const struct job *j, double now)
 				       seconds_left(j, total.high, now)};
 }
 
-void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, double cpu_seconds)
+void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, bool doubtful, double cpu_seconds)
 {
 	/* What workers have merged ahead of the prefix is paid for, but not in the picture yet. */
 	double in_prefix = (double)j->rounds * j->slot_count / (double)(j->leases_merged ? j->leases_merged : 1);
@@ -89,7 +89,8 @@ void job_note_look(struct job *j, double rel_error, double rel_mse, double degre
 				  .seconds = j->looked_at - j->opened,
 				  .rel_mse = rel_mse,
 				  .rel_mse_upper = rel_error * rel_error,
-				  .degrees = degrees > 0 ? degrees : j->plan.groups - 1.0};
+				  .degrees = degrees > 0 ? degrees : j->plan.groups - 1.0,
+				  .doubtful = doubtful};
 	uint32_t count = j->looks.count;
 	forecast_add_look(&j->looks, &l);
 	if (!j->looks.count || (count == j->looks.count && count < FORECAST_LOOKS))

@@ -113,7 +113,7 @@ double job_progress(const struct job *j, double now);
 /* s; middle NAN: unknown. */
 struct forecast_range job_eta(const struct job *j, double now);
 /* The error of the prefix is known. */
-void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, double cpu_seconds);
+void job_note_look(struct job *j, double rel_error, double rel_mse, double degrees, bool doubtful, double cpu_seconds);
 void job_forecast(struct job *j); /* anew, from its looks */
 /* Seconds until the error is half of what it is, at the present rate. */
 struct forecast_range job_halving_seconds(const struct job *j, double now);

@@ -32,7 +32,7 @@ static void take_looks(struct job *j, const struct forecast_history *looks)
 	if (looks->count == 0)
 		return;
 	const struct forecast_look *last = &looks->looks[looks->count - 1];
-	j->rel_error = sqrt(last->rel_mse_upper);
+	j->rel_error = last->doubtful ? NAN : sqrt(last->rel_mse_upper);
 	j->rel_error_rounds = (uint64_t)(last->work / (double)plan_round_mutations(&j->plan));
 	job_forecast(j);
 }

@@ -224,9 +224,10 @@ void rounds_error_known(struct farm *f, const struct event *ev)
 		return;
 	j->evaluating = false;
 	j->progress_floor = job_progress(j, f->now);
-	j->rel_error = ev->error_known.rel_error;
+	j->rel_error = ev->error_known.doubtful ? NAN : ev->error_known.rel_error;
 	j->rel_error_rounds = j->rounds;
-	job_note_look(j, ev->error_known.rel_error, ev->error_known.rel_mse, ev->error_known.degrees, ev->error_known.cpu_seconds);
+	job_note_look(j, ev->error_known.rel_error, ev->error_known.rel_mse, ev->error_known.degrees,
+		      ev->error_known.doubtful, ev->error_known.cpu_seconds);
 	/* A look that was taken because another bound was met does not count when that bound was lifted meanwhile. */
 	bool counts = j->ending != END_NONE || merge_error_due(&j->plan, j->rounds);
 	if (counts && j->rel_error <= j->plan.target_error)

@@ -25,8 +25,8 @@ struct head {
 	char fingerprint[256];
 };
 
-static const char magic[8] = "hsltC002";
-_Static_assert(sizeof(struct head) == 4016, "another layout is another version");
+static const char magic[8] = "hsltC003";
+_Static_assert(sizeof(struct head) == 4528, "another layout is another version");
 
 struct writing {
 	uv_work_t work;

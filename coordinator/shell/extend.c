@@ -21,7 +21,7 @@ static const char *const again = "submit it again (hslt-submit)";
 
 static double error_of(const struct forecast_history *h)
 {
-	return h->count ? sqrt(h->looks[h->count - 1].rel_mse_upper) : NAN;
+	return h->count && !h->looks[h->count - 1].doubtful ? sqrt(h->looks[h->count - 1].rel_mse_upper) : NAN;
 }
 
 static struct extension_from where(const struct order *o, double seconds, bool ended)

@@ -68,6 +68,7 @@ static void tell_error(const struct publishing *w)
 					   .rel_error = w->rc ? NAN : sqrt(w->image.rel_mse_upper),
 					   .rel_mse = w->rc ? NAN : w->image.rel_mse,
 					   .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
+					   .doubtful = !w->rc && w->image.rel_mse_doubt != ERROR_KNOWN,
 					   .cpu_seconds = w->order->cpu_seconds - w->order->record.bootstrap_cpu_seconds}};
 	server_step(s, &ev);
 	durable_look(s, ev.job);
@@ -109,7 +110,7 @@ static void take(struct publishing *w)
 	struct order *o = w->order;
 	/* Every image says how good it is, asked for or not. */
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
-		o->record.rel_error = sqrt(w->image.rel_mse_upper);
+		o->record.rel_error = w->image.rel_mse_doubt ? -1 : sqrt(w->image.rel_mse_upper);
 	if (!w->rc)
 		record_take_agreement(&o->record, &w->image, &w->agreement);
 	if (w->what == PUBLISH_RESULT && !w->rc)

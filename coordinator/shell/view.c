@@ -116,6 +116,7 @@ void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm
 		l->rel_mse = h->looks[i].rel_mse;
 		l->rel_mse_upper = h->looks[i].rel_mse_upper;
 		l->degrees = h->looks[i].degrees;
+		l->doubtful = h->looks[i].doubtful != 0;
 	}
 	out->n_looks = h->count;
 	out->looks = looks->at;

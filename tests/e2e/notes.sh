@@ -10,6 +10,18 @@ noted() {
 	grep -q "note: .*$2" "$1" || fail "it does not say '$2': $(cat "$1")"
 }
 
+# Ended in its first round: nothing is written, and nothing is said of an image that is not there.
+"$BIN/hslt-render" "$BOX" -o "$DIR/early.exr" --integrator path --size 64x64 --epoch 512 --spp 65536 2>"$DIR/early.log" &
+early=$!
+PIDS="$PIDS $early"
+until_true 60 grep -q '^running' "$DIR/early.log" || fail "its first lease does not end"
+kill -TERM $early
+got=0
+wait $early || got=$?
+[ $got = 1 ] && grep -q 'interrupted before the first round was complete: nothing to write' "$DIR/early.log" ||
+	fail "ended before its first round: $got, $(cat "$DIR/early.log")"
+[ ! -e "$DIR/early.exr" ] || fail "an image without a round was written"
+
 start_coordinator
 start_worker w1
 for kind in black stuck; do

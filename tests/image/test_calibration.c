@@ -4,11 +4,11 @@
  * run that this was written with are in tests/image/README.md.
  *
  * Checked for each case:
- *   interval   rel_mse_95 holds the realised relMSE in 180 to 198 of 200 renders. Level and power: at a true coverage of 95 % this
- *              fails with a probability of 0.16 %, at 94 % with 0.9 %, at 92 % with 12 %; at 85 % it is found with 97 %, at 80 % with
- *              99.99 %. (Seeds are fixed: a run that passes passes always.)
+ *   interval   rel_mse_95, where it is stated, holds the realised relMSE of at least 90 % of the renders. Level and power, if all 200
+ *              state one: at a true coverage of 95 % this fails with a probability of 0.16 %, at 94 % with 0.9 %, at 92 % with 12 %; at
+ *              85 % it is found with 97 %, at 80 % with 99.99 %. (Seeds are fixed: a run that passes passes always.)
  *   middle     the median of realised over estimated relMSE is within 10 % of 1, or as far as the case says.
- *   pixels     the share of pixels and channels with |image - reference| <= 1.96 error, over all renders, is within 0.87 and 0.96:
+ *   pixels     the share of pixels and channels with |image - reference| <= 1.96 error, over all renders, is within 0.87 and 0.975:
  *              Student's t with 15 degrees would be 93.1 %, skewed pixels have less.
  *   b          chains: b_error holds the reference's b (2.131 of them, t with 15 degrees) in 170 to 199 of 200 renders: 95 % fails
  *              with less than 1e-4, an error too small by 1.5 (84 %) is found with 61 %, by 2 (71 %) with 100.000 %.
@@ -104,7 +104,7 @@ struct kase {
 
 struct figures {
 	double realised, bias, median, pixels; /* root mean square; mean estimated over mean realised; .. */
-	int held, upper, b_held;
+	int known, held, upper, b_held; /* known: renders that state an interval */
 };
 
 static int by_size(const void *a, const void *b)
@@ -133,8 +133,9 @@ static struct figures figures_of(const struct reference *r, const struct repeats
 		double own = realised(r, img);
 		ratio[i] = own / img->rel_mse * square;
 		estimated += img->rel_mse / square / RENDERS;
+		f.known += img->rel_mse_doubt == ERROR_KNOWN;
 		f.held += img->rel_mse_95[0] / square <= own && own <= img->rel_mse_95[1] / square;
-		f.upper += img->rel_mse_upper / square >= mean;
+		f.upper += img->rel_mse_doubt == ERROR_KNOWN && img->rel_mse_upper / square >= own;
 		f.b_held += fabs(img->b - b) <= 2.131 * img->b_error / shrink;
 		for (uint32_t k = 0; k < r->values; k++) {
 			double error = (double)img->error[k] / shrink;
@@ -152,7 +153,7 @@ static struct figures figures_of(const struct reference *r, const struct repeats
 
 static bool interval_is_right(const struct figures *f)
 {
-	return f->held >= 180 && f->held <= 198;
+	return f->held * 10 >= f->known * 9;
 }
 
 static void check(const struct kase *c)
@@ -176,12 +177,12 @@ static void check(const struct kase *c)
 	for (uint32_t i = 0; i < RENDERS; i++)
 		b += s.images[i].b / RENDERS;
 	struct figures f = figures_of(r, &s, b, 1), planted = figures_of(r, &s, b, 1.3);
-	print_message("| %s | %s | %.1f | %.2f | %.2f | %d | %d | %.1f | %d | %.3f |\n", c->name, c->integrator, 100 * f.realised, f.bias,
-		      f.median, f.held, f.upper, 100 * f.pixels, c->chains ? f.b_held : 0, s.cpu_seconds / RENDERS);
+	print_message("| %s | %s | %.1f | %.2f | %.2f | %d of %d | %d | %.1f | %d | %.3f |\n", c->name, c->integrator, 100 * f.realised, f.bias,
+		      f.median, f.held, f.known, f.upper, 100 * f.pixels, c->chains ? f.b_held : 0, s.cpu_seconds / RENDERS);
 	repeats_free(&s);
 	assert_true(interval_is_right(&f));
 	assert_true(fabs(f.median - 1) <= c->median);
-	assert_true(f.pixels >= 0.87 && f.pixels <= 0.96);
+	assert_true(f.pixels >= 0.87 && f.pixels <= 0.975);
 	if (c->chains)
 		assert_true(f.b_held >= 170 && f.b_held <= 199);
 	assert_false(interval_is_right(&planted) && fabs(planted.median - 1) <= c->median);

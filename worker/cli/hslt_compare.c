@@ -1,6 +1,7 @@
 #include "common/base/mem.h"
 #include "common/base/output.h"
 #include "common/base/version.h"
+#include "common/film/stated_error.h"
 #include "worker/cli/compare.h"
 
 #include <argp.h>
@@ -128,15 +129,15 @@ static json_t *three(const double x[3])
 static void print_figures(const struct arguments *a, const struct compare_result *r)
 {
 	if (a->json) {
-		print_json(json_pack("{s:i s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:I s:I s:I}", "schema", 1, "a",
+		print_json(json_pack("{s:i s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:I s:I s:I s:s}", "schema", 1, "a",
 				     text(a->path[0]), "b", text(a->path[1]), "relMSE", real(r->rel_mse), "relativeError", real(r->relative_error), "rmse",
 				     real(r->rmse), "psnr", real(r->psnr), "peak", real(r->peak), "meanA", three(r->mean_a),
 				     "meanB", three(r->mean_b), "meanRatio", three(r->ratio), "luminanceRatio",
 				     real(r->luminance_ratio), "pixels", (json_int_t)r->pixels, "leftOut",
-				     (json_int_t)r->left_out, "notFinite", (json_int_t)r->not_finite));
+				     (json_int_t)r->left_out, "notFinite", (json_int_t)r->not_finite, "relMSEDefinition", REL_MSE_DEFINITION));
 		return;
 	}
-	printf("relMSE          %.6g\n", r->rel_mse);
+	printf("relMSE          %.6g (" REL_MSE_DEFINITION ")\n", r->rel_mse);
 	printf("relative error  %.4g %%\n", 100 * r->relative_error);
 	printf("RMSE            %.6g\n", r->rmse);
 	printf("PSNR            %.2f dB (peak %.6g)\n", r->psnr, r->peak);

@@ -4,6 +4,7 @@
 #include "common/base/progress.h"
 #include "common/base/version.h"
 #include "common/film/image_file.h"
+#include "common/film/stated_error.h"
 #include "common/film/strategy.h"
 #include "worker/cli/choice.h"
 #include "worker/cli/estimate.h"
@@ -250,7 +251,7 @@ static int render(struct session *s, struct error *e)
 		progress_end(&s->progress);
 	if (rc)
 		return rc;
-	if (!s->run.canvas)
+	if (!s->run.canvas || (canvas_rounds(s->run.canvas) == 0 && !s->run.lit.black))
 		return error_set(e, EINTR, "interrupted before the first round was complete: nothing to write");
 	rc = canvas_image(s->run.canvas, false, &s->image, e);
 	if (!rc)
@@ -283,11 +284,11 @@ static void say(const struct session *s)
 	const struct plan *p = &s->plan;
 	fprintf(stderr, "%llu rounds in %.1f s (%.1f s of processors)", (unsigned long long)i->rounds, s->run.seconds,
 		s->run.cpu_seconds);
-	if (isfinite(i->rel_mse))
-		fprintf(stderr, ", relative error %.2f %% (95 %%: %.2f to %.2f %%)", 100 * sqrt(i->rel_mse), 100 * sqrt(i->rel_mse_95[0]),
-			100 * sqrt(i->rel_mse_95[1]));
-	fprintf(stderr, "; ended by %s\n", merge_end_name(s->run.end, s->run.lit.black));
 	char text[STRATEGY_TABLE];
+	fprintf(stderr, "; ended by %s\n", merge_end_name(s->run.end, s->run.lit.black));
+	stated_error(i, text, sizeof text);
+	if (*text)
+		fprintf(stderr, "%s\n", text);
 	strategy_table(p->mutations, &i->counts, text, sizeof text);
 	if (s->a->stats)
 		fputs(text, stderr);
@@ -299,6 +300,14 @@ static void say(const struct session *s)
 	agreement_add_note(&s->agreement, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
+}
+
+/* What even --quiet says: how wrong the image is, nobody knows. */
+static void warn(const struct session *s)
+{
+	char text[STATED_ERROR_TEXT];
+	stated_error(&s->image, text, sizeof text);
+	fprintf(stderr, "hslt-render: warning: %s\n", text);
 }
 
 static int report(const struct session *s, const struct local_pilot *p, struct error *e)
@@ -369,6 +378,8 @@ static int run(struct session *s, struct error *e)
 				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->agreement, s->build_seconds, &s->looks}, e);
 	if (!rc && !s->a->quiet)
 		say(s);
+	else if (!rc && s->image.rel_mse_doubt)
+		warn(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)
 		rc = error_set(e, EINTR, "interrupted: %s holds the %llu complete rounds", s->a->output,
 			       (unsigned long long)s->image.rounds);

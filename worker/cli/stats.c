@@ -3,6 +3,7 @@
 #include "common/film/agreement_json.h"
 #include "common/film/forecast_json.h"
 #include "common/film/image_file.h"
+#include "common/film/stated_error.h"
 #include "common/film/strategy.h"
 #include "common/film/strategy_json.h"
 
@@ -40,9 +41,12 @@ static json_t *image_json(const struct canvas_image *i)
 	for (int k = 0; k < BATCH_COUNTERS; k++)
 		if (counter_names[k])
 			json_object_set_new(counters, counter_names[k], json_integer((json_int_t)i->counts.counters[k]));
-	return json_pack("{s:o s:o s:o s:o s:[oo] s:o s:o}", "b", forecast_real(i->b), "bError", forecast_real(i->b_error), "relMSE",
-			 forecast_real(i->rel_mse), "relMSEUpper", forecast_real(i->rel_mse_upper), "relMSE95",
-			 forecast_real(i->rel_mse_95[0]), forecast_real(i->rel_mse_95[1]), "beyondShare",
+	char doubt[STATED_ERROR_TEXT];
+	stated_error_doubt(i, doubt, sizeof doubt);
+	return json_pack("{s:o s:o s:o s:o s:[oo] s:s s:s s:I s:o s:o}", "b", forecast_real(i->b), "bError", forecast_real(i->b_error), "relMSE",
+			 forecast_real(i->rel_mse), "relMSEUpper", *doubt ? json_null() : forecast_real(i->rel_mse_upper), "relMSE95",
+			 forecast_real(i->rel_mse_95[0]), forecast_real(i->rel_mse_95[1]), "relMSEDefinition", REL_MSE_DEFINITION,
+			 "relMSEDoubt", doubt, "unvisitedPixels", (json_int_t)i->unvisited, "beyondShare",
 			 forecast_real(i->beyond_share), "counters", counters);
 }
 

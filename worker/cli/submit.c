@@ -326,7 +326,7 @@ static void take_looks(const Farm__JobStatus *s, struct submit_end *end)
 	for (size_t i = 0; i < s->n_looks; i++) {
 		const Farm__Look *l = s->looks[i];
 		forecast_add_look(&end->looks, &(struct forecast_look){l->work, l->cpu_seconds, l->seconds, l->rel_mse,
-								       l->rel_mse_upper, l->degrees});
+								       l->rel_mse_upper, l->degrees, l->doubtful != 0});
 	}
 }
 

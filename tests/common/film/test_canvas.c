@@ -420,7 +420,8 @@ static void blocks_of_groups_make_the_image(void **unused)
 		}
 		canvas_group_distances(c, weights, distance);
 		mem_free(weights);
-		assert_true(fabs((distance[0] + distance[1] + distance[2] + distance[3]) / (4 * 3 * squares) - 1) < 1e-6);
+		/* Variances of so much noise are averaged with their neighbours': the sum stays, but for borders. */
+		assert_true(fabs((distance[0] + distance[1] + distance[2] + distance[3]) / (4 * 3 * squares) - 1) < 0.03);
 		for (uint32_t g = 0; g < 4; g++) {
 			/* Undo the group's own b, so that the pooled one remains. */
 			double own = kind == PLAN_CHAINS ? (g + 1) / img.b : 1;

@@ -157,7 +157,7 @@ static void halving_costs_three_times_what_was_paid(void **state)
 	struct plan p = plan_of(64);
 	struct forecast_history h = {0};
 	for (double work = 1e5; work < 1e7; work *= 1.3)
-		forecast_add_look(&h, &(struct forecast_look){work, 1e-6 * work, 2e-6 * work, 1000 / work, 1050 / work, 3000});
+		forecast_add_look(&h, &(struct forecast_look){work, 1e-6 * work, 2e-6 * work, 1000 / work, 1050 / work, 3000, 0});
 	struct forecast_cost c;
 	struct forecast_range error;
 	const struct forecast_look *end = &h.looks[h.count - 1];
@@ -181,7 +181,7 @@ static void a_trend_is_seen(void **state)
 		struct forecast_cost c;
 		double power = i ? -0.6 : -1;
 		for (double work = 1e5; work < 2e6; work *= 1.25)
-			forecast_add_look(&h, &(struct forecast_look){work, work, work, pow(work, power), 1.05 * pow(work, power), 3000});
+			forecast_add_look(&h, &(struct forecast_look){work, work, work, pow(work, power), 1.05 * pow(work, power), 3000, 0});
 		const struct forecast_look *end = &h.looks[h.count - 1];
 		assert_true(forecast_target(&h, &p, sqrt(end->rel_mse_upper / 6), FORECAST_NEW, &c));
 		middle[i] = c.work.middle / (6 * end->work);
@@ -199,18 +199,20 @@ static void what_is_no_look_is_passed_over(void **state)
 	struct forecast_cost c;
 	struct plan p = plan_of(64);
 	assert_false(forecast_error(&h, &r) || forecast_target(&h, &p, 0.1, FORECAST_NEW, &c) || forecast_halving(&h, &p, &c));
-	const struct forecast_look none[] = {{1, 1, 1, NAN, NAN, 15}, {1, 1, 1, 0, 0, 15}, {1, 1, 1, INFINITY, INFINITY, 15},
-					     {1, 1, 1, 2, 1, 15}, {0, 1, 1, 1, 2, 15}, {9.9e228, 1, 1, 1, 2, 15}, {NAN, 1, 1, 1, 2, 15},
-					     {1, INFINITY, 1, 1, 2, 15}, {1, 1, NAN, 1, 2, 15}, {1, 1, 1, 1, 2, NAN}};
+	const struct forecast_look none[] = {{1, 1, 1, NAN, NAN, 15, 0}, {1, 1, 1, 0, 0, 15, 0}, {1, 1, 1, INFINITY, INFINITY, 15, 0},
+					     {1, 1, 1, 2, 1, 15, 0}, {0, 1, 1, 1, 2, 15, 0}, {9.9e228, 1, 1, 1, 2, 15, 0}, {NAN, 1, 1, 1, 2, 15, 0},
+					     {1, INFINITY, 1, 1, 2, 15, 0}, {1, 1, NAN, 1, 2, 15, 0}, {1, 1, 1, 1, 2, NAN, 0}};
 	for (size_t i = 0; i < sizeof none / sizeof *none; i++)
 		forecast_add_look(&h, &none[i]);
 	assert_int_equal(h.count, 0);
 	for (int i = 1; i <= 3 * FORECAST_LOOKS; i++)
-		forecast_add_look(&h, &(struct forecast_look){i, i, i, 1.0 / i, 1.1 / i, 100});
+		forecast_add_look(&h, &(struct forecast_look){i, i, i, 1.0 / i, 1.1 / i, 100, 0});
 	assert_int_equal(h.count, FORECAST_LOOKS);
 	assert_true(h.looks[FORECAST_LOOKS - 1].work == 3 * FORECAST_LOOKS);
 	assert_null(forecast_reached(&h, 1e-9));
 	assert_ptr_equal(forecast_reached(&h, 10), &h.looks[0]);
+	h.looks[0].doubtful = 1; /* no render would have ended by it */
+	assert_ptr_equal(forecast_reached(&h, 10), &h.looks[1]);
 	/* Out of reach is said, not computed with. */
 	assert_true(forecast_target(&h, &p, 1e-200, FORECAST_SAME, &c) && isinf(c.work.low));
 }
@@ -226,7 +228,7 @@ static void looks_travel_as_json(void **state)
 	assert_int_equal(back.count, h.count);
 	for (uint32_t i = 0; i < h.count; i++)
 		assert_true(back.looks[i].rel_mse == h.looks[i].rel_mse && back.looks[i].seconds == h.looks[i].seconds &&
-			    back.looks[i].cpu_seconds == h.looks[i].cpu_seconds && back.looks[i].degrees == h.looks[i].degrees &&
+			    back.looks[i].cpu_seconds == h.looks[i].cpu_seconds && back.looks[i].degrees == h.looks[i].degrees && back.looks[i].doubtful == h.looks[i].doubtful &&
 			    back.looks[i].rel_mse_upper == h.looks[i].rel_mse_upper && back.looks[i].work == h.looks[i].work);
 	forecast_looks_from_json(NULL, &back);
 	assert_int_equal(back.count, 0);

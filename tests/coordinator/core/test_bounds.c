@@ -214,6 +214,25 @@ static void progress_of_errors(void **state)
 	farm_free(f);
 }
 
+/* A look below the target whose interval is not known ends nothing; the next one does. */
+static void doubtful_looks_end_nothing(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START("rounds=inf target=0.1"),
+		"[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1", NULL });
+	struct event ev = {.kind = EVENT_ERROR_KNOWN, .time = 13.5,
+			   .error_known = {.job = 1, .rounds = 1, .rel_error = 0.05, .rel_mse = 0.002, .degrees = 2000, .doubtful = true, .cpu_seconds = 5}};
+	struct update u;
+	farm_step(f, &ev, &u);
+	struct job_status s = ask(f, 13.5);
+	assert_int_equal(s.state, JOB_RUNNING);
+	assert_true(isnan(s.rel_error) && s.looks->count == 1 && s.looks->looks[0].doubtful);
+	farm_free(f);
+}
+
 /* With what the error is made of, the forecast of common/film takes over. */
 static void looks_give_a_forecast(void **state)
 {
@@ -266,7 +285,7 @@ int main(void)
 		cmocka_unit_test(broken),
 		cmocka_unit_test(progress_and_rate),
 		cmocka_unit_test(progress_of_errors),
-		cmocka_unit_test(looks_give_a_forecast),
+		cmocka_unit_test(doubtful_looks_end_nothing), cmocka_unit_test(looks_give_a_forecast),
 		cmocka_unit_test(progress_of_time),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

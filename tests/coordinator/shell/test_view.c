@@ -79,7 +79,7 @@ static void json_shows_the_forecast(void **state)
 	struct job_view v;
 	r.target_error = 0.02;
 	for (int i = 1; i < 9; i++)
-		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200});
+		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200, 1});
 	view_of_record(&v, &r);
 	v.eta = 30;
 	v.eta_low = 20;
@@ -144,7 +144,7 @@ static void looks_travel(void **state)
 	static struct view_looks looks;
 	Farm__JobStatus wire;
 	for (int i = 1; i < 9; i++)
-		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200});
+		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200, 1});
 	view_of_record(&v, &r);
 	view_to_wire(&v, &wire);
 	assert_int_equal(wire.n_looks, 0);
@@ -152,7 +152,7 @@ static void looks_travel(void **state)
 	assert_int_equal(wire.n_looks, 8);
 	const Farm__Look *l = wire.looks[7];
 	assert_true(l->work == 1e5 * 8 && l->cpu_seconds == 0.1 * 8 && l->seconds == 0.05 * 8 && l->rel_mse == 0.04 / 8 &&
-		    l->rel_mse_upper == 0.05 / 8 && l->degrees == 200);
+		    l->rel_mse_upper == 0.05 / 8 && l->degrees == 200 && l->doubtful);
 }
 
 int main(void)

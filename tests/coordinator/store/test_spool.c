@@ -86,7 +86,7 @@ static void records_come_back(void **state)
 	r.bootstrap_cpu_seconds = 1.0 / 3;
 	r.bootstrap_seconds = 0.25;
 	for (int i = 1; i < 200; i++)
-		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.3 / i, 0.4 / i, 20});
+		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.3 / i, 0.4 / i, 20, 0});
 	assert_int_equal(spool_open(&s, folder, &e), 0);
 	assert_int_equal(spool_take_job(s, 7, &e), 0);
 	assert_int_equal(spool_write_record(s, &r, &e), 0);

@@ -1,0 +1,53 @@
+#include "common/film/stated_error.h"
+
+#include "common/base/text.h"
+
+#include <math.h>
+
+void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
+{
+	struct text t = {text, size};
+	if (size)
+		text[0] = 0;
+	double share = 100 * img->doubtful_share;
+	switch (img->rel_mse_doubt) {
+	case ERROR_KNOWN:
+		break;
+	case ERROR_ONE_GROUP:
+		text_put(&t, "%.0f %% of the estimate comes from pixels where one group of samples outweighs all others", share);
+		break;
+	case ERROR_DARK:
+		text_put(&t, "%.0f %% of the estimate comes from pixels whose brightness is not known well enough to divide by", share);
+		break;
+	case ERROR_WIDE:
+		text_put(&t, "it would span more than a factor of ten");
+		break;
+	case ERROR_SHORT:
+		text_put(&t, "the chains are too short to be judged");
+		break;
+	}
+}
+
+void stated_error(const struct canvas_image *img, char *text, size_t size)
+{
+	struct text t = {text, size};
+	char why[STATED_ERROR_TEXT];
+	if (size)
+		text[0] = 0;
+	if (!isfinite(img->rel_mse))
+		return;
+	stated_error_doubt(img, why, sizeof why);
+	if (*why)
+		text_put(&t, "relative error about %.3g %%, its interval is not known: %s", 100 * sqrt(img->rel_mse), why);
+	else
+		text_put(&t, "relative error %.2f %% (95 %%: %.2f to %.2f %%)", 100 * sqrt(img->rel_mse), 100 * sqrt(img->rel_mse_95[0]),
+			 100 * sqrt(img->rel_mse_95[1]));
+	if (img->unvisited)
+		text_put(&t, "; no chain came to %llu of %llu pixels", (unsigned long long)img->unvisited,
+			 (unsigned long long)img->width * img->height);
+}
+
+bool stated_error_meets(const struct canvas_image *img, double target)
+{
+	return img->rel_mse_doubt == ERROR_KNOWN && sqrt(img->rel_mse_upper) <= target; /* false for NAN */
+}
