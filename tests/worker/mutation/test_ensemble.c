@@ -29,10 +29,10 @@ static void begin(const struct world *w)
 	c.max_depth = EDGES;
 }
 
-/* A sub-path may have more than five vertices with probability 0.8 each. */
+/* A sub-path may have n > 5 vertices or more with probability (5/n)^2. */
 static double chance(unsigned vertices)
 {
-	return pow(0.8, vertices > 5 ? vertices - 5 : 0);
+	return vertices > 5 ? 25.0 / (vertices * vertices) : 1;
 }
 
 /* The path of candidate k of the pair at hand is in x. false: it lies just outside the film. */
@@ -147,7 +147,7 @@ static void test_chance_of_lengths(void **state)
 		}
 		for (unsigned side = 0; side < 2; side++)
 			for (unsigned k = sure; k <= EDGES + 1 - side; k++)
-				assert_true(fabs(count[side][k] / (double)N - pow(0.8, k - sure)) < 2.0 / N);
+				assert_true(fabs(count[side][k] / (double)N - (double)(sure * sure) / (k * k)) < 2.0 / N);
 	}
 }
 
