@@ -19,7 +19,7 @@
  *    long as nobody has answered, that is after 30 s (leases are made to take about 20), and of two copies that are both
  *    out the older one is given up after 120 s for a worker that has nothing else to do.
  *  - What a worker holds at once is bounded by what it has given: 8 leases at first, twice as many after each that is merged,
- *    half as many (1 at least) after each that was out for too long or that somebody else answered who got it later. A node of 64 threads is busy after its first three.
+ *    half as many (1 at least) after each that was out for too long or that somebody else answered who got it later. A node of 64 threads holds all it wants after its first four.
  *  - Invalid content is its sender's fault; after three faults in a row the worker gets no more leases.
  *    A failed lease is tried elsewhere; its worker, whatever its connection, waits 10, 20, 40 ... 640 s before it gets more of
  *    this job; what it fails with meanwhile is the same failure.

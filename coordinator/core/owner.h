@@ -22,7 +22,7 @@ struct owner {
 struct owner *owner_use(struct link *owners, const char *name); /* NULL: no memory */
 void owner_drop(struct owner *o);                               /* NULL: nothing */
 
-/* A job of his has ended workers: for 60 s, twice as long each time to an hour, his jobs that nothing has been made of get one
+/* A job of his has ended workers: for 60 s, twice as long each time up to 64 minutes, his jobs that nothing has been made of get one
  * lease at a time. Forgotten with the last of his jobs. */
 void owner_limit(struct owner *o, double now);
 struct farm;

@@ -61,11 +61,3 @@ vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t cou
 	}
 	return (vec3){at[0], at[1], at[2]};
 }
-
-double origin_rounding(const struct box *shape, vec3 origin)
-{
-	double far = 0;
-	for (int axis = 0; axis < 3; axis++)
-		far = fmax(far, fmax(fabs(along(shape->low, axis) - along(origin, axis)), fabs(along(shape->high, axis) - along(origin, axis))));
-	return 0x1p-24 * far / box_extent(shape);
-}

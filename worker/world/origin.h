@@ -24,7 +24,4 @@ double box_extent(const struct box *b); /* its largest side */
  * each axis of the shapes' centres, weighted by 1 / extent: amid what is small. `room` is for `count`. */
 vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighed *room);
 
-/* How large the rounding of a float coordinate of the shape is, in parts of the shape. */
-double origin_rounding(const struct box *shape, vec3 origin);
-
 #endif
