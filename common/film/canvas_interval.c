@@ -19,7 +19,10 @@
 
 #include <math.h>
 
-static const double tail_power = 1.5, dark_most = 0.5, one_group_most = 0.4, widest = 100;
+static const double tail_power = 1.5, dark_most = 0.5, one_group_most = 0.4;
+/* Upper over lower end, and that over what it would be without heavy tails and unsure brightness: an error that all pixels have in
+ * common may happen to be next to nothing, so that the lower end says little however much is known. */
+static const double widest = 100, widest_of_known = 4;
 
 /*
  * How many errors move apart in one error image: (sum l)^2 / sum l^2 over the eigenvalues l of the covariance of a group's
@@ -65,7 +68,8 @@ static double heavier_than_normal(const struct error_sums *s)
 	return kurtosis > 3 ? pow((kurtosis - 1) / 2, tail_power) : 1;
 }
 
-static void find_doubt(const struct error_sums *s, struct canvas_image *img)
+/* known: upper over lower end as they would be if only the degrees of freedom were in doubt. */
+static void find_doubt(const struct error_sums *s, double known, struct canvas_image *img)
 {
 	double dark = s->share > 0 ? s->dark / s->share : 0, one_group = s->share > 0 ? s->one_group / s->share : 0;
 	if (one_group > one_group_most) {
@@ -74,7 +78,7 @@ static void find_doubt(const struct error_sums *s, struct canvas_image *img)
 	} else if (dark > dark_most) {
 		img->rel_mse_doubt = ERROR_DARK;
 		img->doubtful_share = dark;
-	} else if (!(img->rel_mse_95[1] <= widest * img->rel_mse_95[0])) {
+	} else if (!(img->rel_mse_95[1] <= fmax(widest, widest_of_known * known) * img->rel_mse_95[0])) {
 		img->rel_mse_doubt = ERROR_WIDE;
 	}
 	if (img->rel_mse_doubt)
@@ -94,10 +98,12 @@ void canvas_interval(struct error_sums *s, struct canvas_image *img)
 	double doubt = s->share > 0 ? s->doubt / (s->share * s->share) : 0, own = own_degrees(s);
 	img->rel_mse_degrees = 1 / (0.5 * doubt + fmax(1 / own, 0.5 * distance_spread(s, mean)) / (groups - 1));
 	own = (groups - 1) / (groups + 2) / (1 / own + doubt);
+	own = fmax(own, 1);
+	double known = f_quantile(0.975, own, own * (groups - 1)) / f_quantile(0.025, own, own * (groups - 1));
 	own = fmax(1, own / heavier_than_normal(s));
 	double low = s->share > 0 ? fmin(1, s->low / s->share) : 1, high = s->share > 0 ? fmax(1, s->high / s->share) : 1;
 	img->rel_mse_upper *= high * f_quantile(0.95, own, own * (groups - 1));
 	img->rel_mse_95[0] *= low * f_quantile(0.025, own, own * (groups - 1));
 	img->rel_mse_95[1] *= high * f_quantile(0.975, own, own * (groups - 1));
-	find_doubt(s, img);
+	find_doubt(s, known, img);
 }
