@@ -31,12 +31,12 @@ done
 "$BIN/hslt-render" "$BOX" -o "$DIR/hslt.exr" -i hslt --size 80x40 --crop 0,0,40,40 --mutations 40000 --threads 1 --quiet
 mkdir "$DIR/chains.exr.crops"
 cp "$DIR/hslt.exr" "$DIR/chains.exr.crops/0-0.exr"
-printf '%s\n' 2x1 80x40 "$BOX" --mutations 40000 >"$DIR/chains.exr.crops/call"
-code 2 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" --mutations 40001
+printf '%s\n' 2x1 80x40 "$BOX" -i hslt --mutations 40000 >"$DIR/chains.exr.crops/call"
+code 2 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" -i hslt --mutations 40001
 says "another"
 # The crop that is there had not reached a target error: so the film has not.
 echo 4 >"$DIR/chains.exr.crops/0-0.code"
-code 4 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" --mutations 40000
+code 4 sh "$CROPS" -p "$BIN" -g 2x1 -s 80x40 -c "$FARMS" -o "$DIR/chains.exr" "$BOX" -i hslt --mutations 40000
 [ ! -d "$DIR/chains.exr.crops" ] || fail "the crops are still there"
 says "2 crops, 1 of them to render"
 code 2 sh "$CROPS" -g 2y1 -s 80x40 -c "$FARMS" -o "$DIR/x.exr" "$BOX"

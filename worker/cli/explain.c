@@ -13,6 +13,13 @@ static const char *state_of(const struct effect_line *l)
 	return l->on ? "on" : "off";
 }
 
+/* Edges of the longest path that the image has; as many as asked for where the integrator is still to be chosen. */
+static uint32_t held_depth(const struct plan_request *p)
+{
+	const struct render_integrator *integrator = render_integrator_find(p->integrator);
+	return integrator && integrator->max_depth < p->max_depth ? integrator->max_depth : p->max_depth;
+}
+
 static void print_lines(const char *name, const struct render_summary *m, const struct plan_request *p)
 {
 	char note[512];
@@ -21,23 +28,15 @@ static void print_lines(const char *name, const struct render_summary *m, const 
 		const struct effect_line *l = &m->lines[i];
 		printf("%-13s %-12s  %s\n%27s %s: %s\n", l->name, state_of(l), l->why, "", l->on ? "without it" : "saves", l->saves);
 	}
-	const struct render_integrator *integrator = render_integrator_find(p->integrator);
 	printf("\n%s, paths of at most %u edges", p->integrator, p->max_depth);
-	if (p->max_depth > integrator->max_depth)
-		printf(" asked for, of at most %u held (what is longer is missing in the image: its note says how much)", integrator->max_depth);
+	if (held_depth(p) < p->max_depth)
+		printf(" asked for, of at most %u held (what is longer is missing in the image: its note says how much)", held_depth(p));
 	if (*p->mixture)
 		printf(", mutations %s", p->mixture);
 	printf("\n");
 	render_effects_note(m, note, sizeof note);
 	if (*note)
 		printf("note: %s\n", note);
-}
-
-/* Edges of the longest path that the image has. */
-static uint32_t held_depth(const struct plan_request *p)
-{
-	uint32_t most = render_integrator_find(p->integrator)->max_depth;
-	return p->max_depth < most ? p->max_depth : most;
 }
 
 static int print_json(const char *name, const struct render_summary *m, const struct plan_request *p, struct error *e)

@@ -192,7 +192,8 @@ static uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels)
 	return n;
 }
 
-/* The film and the random numbers of the render, checked as it will be. */
+/* The film and the random numbers of the render, checked as it will be; then all of the film, so that a crop is rendered by what the
+ * whole is rendered by and has its pixels. */
 static int film_of(const struct plan_request *r, struct plan *p, struct error *e)
 {
 	struct plan_request of = *r;
@@ -202,7 +203,11 @@ static int film_of(const struct plan_request *r, struct plan *p, struct error *e
 	of.kind = PLAN_SAMPLES;
 	of.chains = 0;
 	of.groups = of.parts = 1;
-	return plan_make(&of, p, e);
+	int rc = plan_make(&of, p, e);
+	p->crop_x = p->crop_y = 0;
+	p->crop_width = p->width;
+	p->crop_height = p->height;
+	return rc;
 }
 
 static int run(struct pilot *p, const struct plan *film, struct render_choice *out, struct error *e)

@@ -115,6 +115,26 @@ static void the_same_request_gives_the_same_choice(void **state)
 	world_free(w);
 }
 
+/* Crops of a film are put together: all must be rendered by one integrator. */
+static void a_crop_is_rendered_as_the_whole_is(void **state)
+{
+	(void)state;
+	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
+	struct plan_request whole = {.integrator = RENDER_INTEGRATOR_DEFAULT, .width = 60, .height = 50, .spp = 16, .min_depth = 1,
+				     .max_depth = 8, .seed = 7},
+			    crop = whole;
+	struct render_choice c[2];
+	struct error e = {""};
+	crop.crop_x = crop.crop_y = 25;
+	crop.crop_width = crop.crop_height = 20;
+	assert_int_equal(render_choose(w, &whole, &c[0], &e), 0);
+	assert_int_equal(render_choose(w, &crop, &c[1], &e), 0);
+	assert_memory_equal(&c[0], &c[1], sizeof c[0]);
+	assert_string_equal(whole.integrator, crop.integrator);
+	assert_int_equal(crop.crop_width, 20);
+	world_free(w);
+}
+
 static void the_rule(void **state)
 {
 	(void)state;
@@ -160,6 +180,7 @@ int main(void)
 		cmocka_unit_test(light_through_water_needs_chains),
 		cmocka_unit_test(where_no_light_is_found_the_longest_search_goes_on),
 		cmocka_unit_test(the_same_request_gives_the_same_choice),
+		cmocka_unit_test(a_crop_is_rendered_as_the_whole_is),
 		cmocka_unit_test(the_rule),
 		cmocka_unit_test(what_cannot_be_rendered_is_said),
 	};
