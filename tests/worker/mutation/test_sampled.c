@@ -19,7 +19,7 @@
 
 #include <cmocka.h>
 
-enum { MOST = 6, BITS = 3, BINS = 1 << BITS, PILOT = 4000, LOOK = 64, STARTS = 600 };
+enum { MOST = 6, BITS = 3, BINS = 1 << BITS, PILOT = 4000, LOOK = 256, STARTS = 2400 };
 #define COMPARISONS 256
 #define LEVEL (1e-6 / COMPARISONS)
 /* Of the numbers in [0,1) that make points of the emitter and of the aperture, to both sides. */
@@ -113,7 +113,7 @@ static bool coordinates(const struct sampling *s, double *z, double *log_plane)
 		vec3 d = frame_to_local(&f, vec3_sub(y->p, x->p));
 		double cosine = vec3_dot(x->ng, y->ng);
 		bool sphere = c.w->shapes[x->prim.shape].is_sphere;
-		if (x->prim.shape != y->prim.shape || cosine < 0.1 || (!sphere && (cosine < 1 - 1e-9 || fabs(d.z) > 1e-9)))
+		if (x->prim.shape != y->prim.shape || cosine < 0.3 || (!sphere && (cosine < 1 - 1e-9 || fabs(d.z) > 1e-9)))
 			return false;
 		z[2 * i] = d.x;
 		z[2 * i + 1] = d.y;
@@ -149,15 +149,49 @@ static enum outcome propose(struct sampling *s, double *z, double *log_density)
 	return out;
 }
 
-/* Mean and covariance; false: something fails or leaves its surface. */
+static int bin_of(const struct sampling *s, const double *z, double radius);
+
+/* Within these many deviations is looked. Ends move uniformly, within 1.7 deviations. */
+static double radius_of(const struct sampling *s)
+{
+	static const double radii[] = {0, 1.2, 1.6, 2};
+	return s->ends ? 1.5 : radii[s->count];
+}
+
+/* A start from which proposals fill the ellipsoid as a normal distribution does, each part of it: not one whose cloud is bent, as at
+ * a sphere's limb. Asked of places alone, not of densities. */
+static bool fills(const struct sampling *s, const double z[][MOST], unsigned n)
+{
+	unsigned d = 2 * s->count, bins = d < BITS ? 1u << d : BINS, in[BINS] = {0}, all = 0;
+	double radius = radius_of(s), tail = 0, term = 1;
+	for (unsigned k = 0; k < s->count; k++) { /* chi-square with an even number of degrees of freedom */
+		tail += term;
+		term *= 0.5 * radius * radius / (k + 1);
+	}
+	double expected = (1 - exp(-0.5 * radius * radius) * tail) * n;
+	for (unsigned i = 0; i < n; i++) {
+		int bin = bin_of(s, z[i], radius);
+		if (bin >= 0) {
+			in[bin]++;
+			all++;
+		}
+	}
+	bool ok = s->ends || (all > 0.85 * expected && all < 1.15 * expected);
+	for (unsigned b = 0; b < bins && ok; b++)
+		ok = in[b] * bins > 0.7 * all;
+	return ok;
+}
+
+/* Mean and covariance; false: some fail or leave their surface, or they lie otherwise than the ellipsoid says. */
 static bool pilot(struct sampling *s)
 {
 	static double z[PILOT][MOST];
-	unsigned n = 0, d = 2 * s->count;
+	unsigned n = 0, d = 2 * s->count, failed = 0;
 	double density;
 	for (unsigned i = 0; i < PILOT || n < PILOT / 4; i++) {
 		enum outcome out = propose(s, z[n], &density);
-		if ((out != ARRIVED && out != OTHER) || i > 40 * PILOT || (i > LOOK && n == 0))
+		failed += out != ARRIVED && out != OTHER;
+		if (failed * 1000 > PILOT || i > 40 * PILOT || (i > LOOK && n == 0))
 			return false;
 		n += out == ARRIVED;
 		if (n == PILOT)
@@ -181,7 +215,7 @@ static bool pilot(struct sampling *s)
 				return false;
 			s->factor[a][b] = a == b ? sqrt(sum) : sum / s->factor[b][b];
 		}
-	return true;
+	return fills(s, (const double(*)[MOST])z, n);
 }
 
 static bool all_smooth(const struct whole_path *x)
@@ -214,9 +248,7 @@ static void sample(struct sampling *s, const char *name)
 {
 	unsigned d = 2 * s->count;
 	size_t n = dice_count(120000), failures = 0, bins = d < BITS ? 1u << d : BINS;
-	static const double radii[] = {0, 1.2, 1.6, 2};
-	/* Ends move uniformly, within 1.7 deviations. */
-	double radius = s->ends ? 1.5 : radii[s->count], volume = pow(M_PI, s->count) / tgamma(s->count + 1) * pow(radius, d);
+	double radius = radius_of(s), volume = pow(M_PI, s->count) / tgamma(s->count + 1) * pow(radius, d);
 	for (unsigned a = 0; a < d; a++)
 		volume *= s->factor[a][a];
 	double sum[BINS + 1] = {0}, square[BINS + 1] = {0}, worst = 0, error = 0, whole = 0, whole_error = 0;
@@ -262,7 +294,7 @@ static void test_example(void **state)
 	struct starts starts;
 	starts_context(&c, w, 1, e->edges, counters);
 	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(name), .limits = walk_limits_of(&knobs_default)};
-	starts_init(&starts, &c, m.seed, 0, 3000);
+	starts_init(&starts, &c, m.seed, 0, 12000);
 	s = (struct sampling){.example = e, .ops = mutation_find(e->strategy, strlen(e->strategy)), .x = &x, .y = &y};
 	list_vertices(&s);
 	assert_true(s.count >= 1 && 2 * s.count <= MOST);

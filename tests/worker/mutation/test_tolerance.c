@@ -20,7 +20,7 @@
 
 #include <cmocka.h>
 
-enum { GROUPS = 16, BLOCKS = 4, EDGES = 5, PAIRS = 4000, STARTS = 1500 };
+enum { GROUPS = 16, BLOCKS = 4, EDGES = 5, PAIRS = 4000, STARTS = 2000 };
 #define LEVEL 1e-6
 
 static struct path_context context;
