@@ -93,7 +93,7 @@ static void test_rough_glass(void **state)
 		  world_of_text(32, 32, DEPTH("5") ROOM LAMP
 				BALL("0,-0.6,-0.3", "0.8", "<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/>"
 				     "<float name='ext_ior' value='1'/><float name='alpha' value='0.25'/></bsdf>")),
-		  6144, 6144, 8192, 45056);
+		  6144, 6144, 9728, 45056);
 }
 
 static void test_environment(void **state)
