@@ -142,32 +142,6 @@ row_is_lost() {
 	again --accept-loss
 }
 
-fault folder_gone 6 2 "a job's folder is removed, or moved away, while the job runs"
-folder_gone() {
-	farm --journal 0.2
-	worker w0
-	worker w1
-	job
-	each_time folder_goes
-	finish_job
-	[ "$(grep -c 'was removed or moved away while the job runs: made anew' "$DIR/coordinator.log")" -eq "$TIMES" ] || fail "$NAME: not noticed each time"
-	blameless
-}
-folder_goes() {
-	# The coordinator may put a file into the folder while rm walks through it.
-	if [ $((i % 2)) -eq 1 ]; then
-		rm -r "$DIR/spool/jobs/$ID" 2>/dev/null || rm -rf "$DIR/spool/jobs/$ID" || :
-	else
-		mv "$DIR/spool/jobs/$ID" "$DIR/moved.$i"
-	fi
-	until_true 30 has_said coordinator 'was removed or moved away while the job runs: made anew' "$i" || fail "$NAME: it does not notice"
-	[ "$i" -lt "$TIMES" ] || { until_true 30 is_stored && kill -9 "$COORDINATOR_PID" && again --journal 0.2; }
-}
-# there is something of the job in its new folder that a next life can go on from
-is_stored() {
-	[ -s "$DIR/spool/jobs/$ID/order" ] && ls "$DIR/spool/jobs/$ID"/journal.* >/dev/null 2>&1
-}
-
 fault file_damaged 4 1 "a file of the scene is damaged in the spool, and in a worker's cache: the job waits, says so, and the scene is sent again"
 file_damaged() {
 	farm
