@@ -5,10 +5,63 @@
 # tests/e2e/*.sh (one test each; exit 77: skipped; a line `skipped in part: WHY`: one skipped beside the one that passed). The output
 # of what fails is shown. The last lines name what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`; the
 # exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
+#
+# As many programs run at a time as there are processors, the longest of the last run first; scripts mostly wait, and run one after the
+# other beside them. HSLT_TEST_JOBS sets the number of programs.
 # HSLT_TEST_KINDS: "unit script" (default both). No test has a limit of wall clock, which a busy machine would reach: it is ended when
 # its processes have used HSLT_TEST_CPU seconds of processor time (default 1800; with FULL=1 28800), or have been idle without output for
 # HSLT_TEST_IDLE seconds (900; 3600), see tests/limit/limit.c.
 set -u
+if [ "${1:-}" = --one ]; then # one test of the run in folder $2: its kind, its file
+	run=$2 kind=$3 file=$4
+	. "$run/settings"
+	log=$(mktemp -p "$run")
+	begin=$(date +%s)
+	case $kind in
+	unit) name=${file#"$BUILD"/tests/} && "$limit" "$cpu" "$idle" "$file" >"$log" 2>&1 ;;
+	*) name=${file#tests/} && "$limit" "$cpu" "$idle" sh "$file" "$BUILD" >"$log" 2>&1 ;;
+	esac
+	code=$?
+	took=$(($(date +%s) - begin))
+	echo "$took $file" >"$log.took"
+
+	count() { # of cmocka's closing lines: "[  PASSED  ] 3 test(s)."
+		sed -n "s/^\[ *$1 *\] \([0-9][0-9]*\) test(s).*/\1/p" "$log" | tail -n 1
+	}
+	if [ "$kind" = unit ]; then
+		ok=$(count PASSED) bad=$(count FAILED) out=$(count SKIPPED)
+		# By name, with what the test said before.
+		awk -v of="$name" '/^\[ *RUN/ { why = "" }
+			/^[^[]/ { why = $0; sub(/^skipped: /, "", why) }
+			/^\[ *SKIPPED *\] [^ ]*$/ && !seen[$NF]++ { print "skipped: " of ": " $NF (why ? ": " why : "") }' "$log" >"$log.skips"
+	elif [ $code -eq 77 ]; then
+		ok=0 bad=0 out=1
+		tail -n 1 "$log" | sed "s|^skipped: ||; s|^|skipped: $name: |" >"$log.skips"
+	else
+		ok=$((code == 0)) bad=0 out=0
+		if [ $code -eq 0 ]; then
+			sed -n "s|^skipped in part: |skipped: $name: |p" "$log" >"$log.skips"
+			out=$(grep -c . "$log.skips")
+		fi
+	fi
+	{
+		if [ $code -ne 0 ] && [ $code -ne 77 ]; then
+			# A crash, a limit or a leak report after the closing lines: one failure more than cmocka counted.
+			[ "${bad:-0}" != 0 ] || bad=1
+			echo "FAILED $name (exit $code)"
+			cat "$log"
+		else
+			echo "ok $name: ${ok:-0} passed, $took s"
+			# What tests print about themselves (figures, reasons for skipping) is part of the result.
+			[ "$kind" != unit ] || grep -v '^\[' "$log" | grep -v '^$' | sed 's/^/   /'
+		fi
+	} >"$log.shown"
+	echo "${ok:-0} ${bad:-0} ${out:-0}" >"$log.counts"
+	# In one piece, however many end at the same time.
+	flock "$run/settings" cat "$log.shown"
+	exit 0
+fi
+
 build=${1:?usage: tests/run.sh BUILD [PATTERN]}
 pattern=${2:-}
 kinds=${HSLT_TEST_KINDS:-unit script}
@@ -18,109 +71,41 @@ if [ "${FULL:-0}" = 0 ]; then
 else
 	cpu=28800 idle=3600
 fi
-cpu=${HSLT_TEST_CPU:-$cpu} idle=${HSLT_TEST_IDLE:-$idle}
 cd "$(dirname "$0")/.." || exit 1
 case $build in /*) ;; *) build=$PWD/$build ;; esac
 export BUILD="$build"
 limit=$build/tests/limit/limit
 [ -x "$limit" ] || { echo "tests/run.sh: no $limit; make tests builds it" >&2 && exit 1; }
-log=$(mktemp)
-trap 'rm -f "$log" "$log.counts" "$log.skips"' EXIT
-passed=0 failed=0 skipped=0
+run=$(mktemp -d)
+trap 'rm -rf "$run"' EXIT
+cat >"$run/settings" <<END
+cpu=${HSLT_TEST_CPU:-$cpu} idle=${HSLT_TEST_IDLE:-$idle} limit='$limit'
+END
+took=$build/tests/took # seconds and file of the last run
+touch "$took"
 
-count() { # of cmocka's closing lines: "[  PASSED  ] 3 test(s)."
-	sed -n "s/^\[ *$1 *\] \([0-9][0-9]*\) test(s).*/\1/p" "$log" | tail -n 1
-}
-
-run_program() {
-	name=${1#"$build"/tests/}
-	begin=$(date +%s)
-	"$limit" "$cpu" "$idle" "$1" >"$log" 2>&1
-	code=$?
-	ok=$(count PASSED) bad=$(count FAILED) out=$(count SKIPPED)
-	passed=$((passed + ${ok:-0})) failed=$((failed + ${bad:-0})) skipped=$((skipped + ${out:-0}))
-	# A crash, a limit or a leak report after the closing lines: one failure more than cmocka counted.
-	if [ $code -ne 0 ] && [ "${bad:-0}" = 0 ]; then
-		failed=$((failed + 1))
-	fi
-	if [ $code -ne 0 ]; then
-		echo "FAILED $name (exit $code)"
-		cat "$log"
-	else
-		echo "ok $name: ${ok:-0} passed, $(($(date +%s) - begin)) s"
-		# What tests print about themselves (figures, reasons for skipping) is part of the result.
-		grep -v '^\[' "$log" | grep -v '^$' | sed 's/^/   /'
-	fi
-	# By name, with what the test said before.
-	awk -v of="$name" '/^\[ *RUN/ { why = "" }
-		/^[^[]/ { why = $0; sub(/^skipped: /, "", why) }
-		/^\[ *SKIPPED *\] [^ ]*$/ && !seen[$NF]++ { print "skipped: " of ": " $NF (why ? ": " why : "") }' "$log" >>"$log.skips"
-}
-
-run_script() {
-	name=${1#tests/}
-	begin=$(date +%s)
-	"$limit" "$cpu" "$idle" sh "$1" "$build" >"$log" 2>&1
-	code=$?
-	case $code in
-	0)
-		passed=$((passed + 1))
-		echo "ok $name, $(($(date +%s) - begin)) s"
-		skipped=$((skipped + $(grep -c '^skipped in part: ' "$log")))
-		sed -n "s|^skipped in part: |skipped: $name: |p" "$log" | tee -a "$log.skips"
-		;;
-	77)
-		skipped=$((skipped + 1))
-		tail -n 1 "$log" | sed "s|^skipped: ||; s|^|skipped: $name: |" | tee -a "$log.skips"
-		;;
-	*)
-		failed=$((failed + 1))
-		echo "FAILED $name (exit $code)"
-		cat "$log"
-		;;
-	esac
-}
-
-# Runs all of a kind; the last line has the counts.
-lane() {
+# The tests of a kind, one a line; programs that took long the last time first, new ones before them.
+list() {
 	case $1 in
-	unit)
-		for t in $(find "$build/tests" -type f -name 'test_*' -perm -u+x 2>/dev/null | sort); do
-			case $t in *"$pattern"*) run_program "$t" ;; esac
-		done
-		;;
-	script)
-		for t in tests/lint/*.sh tests/e2e/*.sh; do
-			[ -f "$t" ] && [ "${t##*/}" != lib.sh ] || continue
-			case $t in *"$pattern"*) run_script "$t" ;; esac
-		done
-		;;
-	esac
-	echo "$passed $failed $skipped" >"$log.counts"
-	touch "$log.skips"
+	unit) find "$build/tests" -type f -name 'test_*' -perm -u+x | sort ;;
+	script) ls tests/lint/*.sh tests/e2e/*.sh | grep -v '/lib\.sh$' ;;
+	esac | grep -F -e "$pattern" |
+		awk -v took="$took" 'BEGIN { while ((getline l <took) > 0) { split(l, f, " "); s[f[2]] = f[1] } }
+			{ print ($0 in s ? s[$0] : 1e6), NR, $0 }' | sort -k1,1nr -k2,2n | cut -d' ' -f3
+}
+lane() { # lane KIND PROGRAMS_AT_A_TIME
+	case " $kinds " in *" $1 "*) ;; *) return ;; esac
+	list "$1" >"$run/$1.list"
+	xargs -r <"$run/$1.list" -n 1 -P "$2" sh tests/run.sh --one "$run" "$1"
 }
 
-# Scripts mostly wait: they do so beside the programs, and are shown behind them.
-beside=
-case " $kinds " in
-*" unit "*" script "*)
-	beside=$(mktemp)
-	(
-		log=$beside
-		lane script
-	) >"$beside.out" 2>&1 &
-	trap 'kill $! 2>/dev/null; rm -f "$log" "$log.counts" "$log.skips" "$beside" "$beside.out" "$beside.counts" "$beside.skips"' EXIT
-	lane unit
-	wait $!
-	cat "$beside.out"
-	;;
-*) for kind in $kinds; do lane "$kind"; done ;;
-esac
-if [ -n "$beside" ]; then
-	read -r p f s <"$beside.counts" || { echo "FAILED: the scripts did not end as they should" && f=1 p=0 s=0; }
-	passed=$((passed + p)) failed=$((failed + f)) skipped=$((skipped + s))
-	cat "$beside.skips" >>"$log.skips"
-fi
-cat "$log.skips" 2>/dev/null
-echo "$passed passed, $failed failed, $skipped skipped"
-[ $failed -eq 0 ] && [ $passed -gt 0 ]
+lane script 1 &
+lane unit "${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)}"
+wait
+cat "$run"/*.took "$took" 2>/dev/null | awk '!seen[$2]++' >"$took.new" && mv "$took.new" "$took"
+cat "$run"/*.skips 2>/dev/null | sort
+# One that left no counts was ended from outside: a failure.
+lost=$(($(cat "$run"/*.list | wc -l) - $(ls "$run" | grep -c '\.counts$')))
+[ "$lost" = 0 ] || echo "FAILED: $lost tests did not end as they should"
+{ echo "0 $lost 0" && cat "$run"/*.counts 2>/dev/null; } | awk '{ p += $1; f += $2; s += $3 }
+	END { print p + 0 " passed, " f + 0 " failed, " s + 0 " skipped"; exit !(f == 0 && p > 0) }'
