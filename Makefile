@@ -109,7 +109,9 @@ TEST_BIN     := $(patsubst tests/%.c,$(BUILD)/tests/%,$(TEST_SRC))
 LIB_TEST     := $(BUILD)/lib/libhslt-test.a
 $(LIB_TEST): $(call obj,$(TEST_SUPPORT))
 $(BUILD)/tests/%: $(BUILD)/obj/tests/%.o $(LIB_TEST) $(LIB_DAEMON) $(LIB_CLI) $(LIB_COORD) $(LIB_RENDER) $(LIB_COMMON)
-	$(link) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+	$(link) $(TEST_WRAP) -lcmocka $(LIBS_RENDER) $(LIBS_COMMON)
+# It notes which random numbers are asked for.
+$(BUILD)/tests/worker/render/test_groups: TEST_WRAP := -Wl,--wrap=rng_uniform4,--wrap=rng_bits4
 # What tests/run.sh ends a test by. It needs no library, and no sanitizer: it is no test.
 LIMIT := $(BUILD)/tests/limit/limit
 $(LIMIT): tests/limit/limit.c

@@ -1,0 +1,316 @@
+/*
+ * Groups are independent replicates, or the error that their spread tells is none (contract, section 2). The linker puts a wrapper
+ * around the random number generator (Makefile), which notes all numbers that a lease asks for: no two groups ask for the same
+ * one, each starts its chains from its own part of the bootstrap, and independent proposals that carry no light are counted.
+ * Nothing here is left to chance but the number of pssmlt's independent proposals.
+ */
+#include "common/film/merge.h"
+#include "tests/support/worlds.h"
+#include "worker/cli/local.h"
+#include "worker/math/rng.h"
+#include "worker/mutation/mixture.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { GROUPS = 4, PARTS = 2, CHAINS = 16, BOOTSTRAP = 2048, ROUNDS = 2, SPP_EPOCH = 2, EPOCH = 150 };
+
+/* ---- what was asked for */
+
+struct number {
+	uint64_t stream, index, step, block, owner;
+};
+
+static struct {
+	bool on;
+	uint64_t owner;
+	struct number *all;
+	size_t count, room;
+} noted;
+
+static void note(enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block)
+{
+	if (!noted.on)
+		return;
+	if (noted.count == noted.room) {
+		noted.room = noted.room ? 2 * noted.room : 1 << 16;
+		noted.all = realloc(noted.all, noted.room * sizeof *noted.all);
+		assert_non_null(noted.all);
+	}
+	noted.all[noted.count++] = (struct number){stream, index, step, block, noted.owner};
+}
+
+void __real_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4]);
+void __wrap_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4]);
+void __real_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, uint64_t out[4]);
+void __wrap_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, uint64_t out[4]);
+
+void __wrap_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4])
+{
+	note(stream, index, step, block);
+	__real_rng_uniform4(seed, stream, index, step, block, out);
+}
+
+void __wrap_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, uint64_t out[4])
+{
+	note(stream, index, step, block);
+	__real_rng_bits4(seed, stream, index, step, block, out);
+}
+
+static void listen(bool on)
+{
+	noted.on = on;
+	if (!on) {
+		free(noted.all);
+		noted.all = NULL;
+		noted.count = noted.room = 0;
+	}
+}
+
+static int by_number(const void *a, const void *b)
+{
+	return memcmp(a, b, sizeof(struct number));
+}
+
+/* ---- renders */
+
+/* About half of the paths find light. */
+static struct world *lit_world(void)
+{
+	return world_of_text(
+		24, 24,
+		SENSOR("0,1,5", "0,0.5,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform></shape>"
+		"<shape type='sphere'><point name='center' x='0' y='.6' z='0'/><float name='radius' value='.6'/>"
+		"<bsdf type='roughdielectric'/></shape><shape type='sphere'><point name='center' x='1' y='2' z='1'/><float name='radius' value='.3'/>"
+		"<emitter type='area'/></shape>");
+}
+
+static struct plan plan_of(const struct world *w, const struct render_integrator *i)
+{
+	bool chains = i->kind == PLAN_CHAINS;
+	struct plan p = {.kind = i->kind, .width = w->settings.width, .height = w->settings.height, .crop_width = w->settings.width,
+			 .crop_height = w->settings.height, .border = w->settings.border, .seed = 3, .groups = GROUPS, .parts = PARTS,
+			 .chains = chains ? CHAINS : 0, .bootstrap = BOOTSTRAP, .epoch = chains ? EPOCH : SPP_EPOCH, .rounds = ROUNDS,
+			 .min_depth = 1, .max_depth = 6};
+	struct render_summary summary;
+	struct error e = {""};
+	snprintf(p.integrator, sizeof p.integrator, "%s", i->name);
+	world_summary(w, &summary);
+	if (i->has_mutations && render_mutations(NULL, &summary, p.mutations, &e))
+		fail_msg("%s", e.text);
+	if (plan_check(&p, &e))
+		fail_msg("%s", e.text);
+	return p;
+}
+
+static struct batch run(const struct world *w, const struct plan *p, struct lease_key k, const struct lease_input *in)
+{
+	struct batch b;
+	struct error e = {""};
+	enum lease_end end;
+	if (render_lease(w, p, &k, in, NULL, &end, &b, &e) || batch_check(&b, p, &e))
+		fail_msg("%s: %s", p->integrator, e.text);
+	assert_int_equal(end, LEASE_DONE);
+	return b;
+}
+
+/* All leases of a job, what they ask for noted by group; `look` sees each batch. */
+static void run_all(const struct world *w, const struct plan *p, void (*look)(void *user, const struct batch *b), void *user)
+{
+	struct bootstrap *s;
+	struct batch before[GROUPS * PARTS] = {{.key = {0}}};
+	uint64_t seeds[GROUPS][CHAINS / GROUPS];
+	assert_int_equal(bootstrap_new(&s, p, NULL), 0);
+	for (uint32_t i = 0; i < GROUPS * PARTS; i++) {
+		noted.owner = i / PARTS;
+		struct batch b = run(w, p, (struct lease_key){1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, NULL);
+		assert_int_equal(bootstrap_add(s, &b, NULL), 0);
+		look(user, &b);
+		batch_fini(&b);
+	}
+	for (uint32_t g = 0; g < GROUPS && p->kind == PLAN_CHAINS; g++)
+		bootstrap_seeds(s, g, seeds[g]);
+	for (uint32_t i = 0; i < ROUNDS * GROUPS * PARTS; i++) {
+		uint32_t lease = i % (GROUPS * PARTS), group = lease / PARTS, part = lease % PARTS;
+		struct lease_input in = {CHAINS / GROUPS / PARTS, seeds[group] + plan_chain_range(p, part).begin * (p->kind == PLAN_CHAINS), NULL};
+		if (before[lease].states)
+			in = (struct lease_input){before[lease].state_count, NULL, before[lease].states};
+		noted.owner = group;
+		struct batch b = run(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)}, p->kind == PLAN_CHAINS ? &in : NULL);
+		look(user, &b);
+		batch_fini(&before[lease]);
+		before[lease] = b;
+	}
+	for (uint32_t i = 0; i < GROUPS * PARTS; i++)
+		batch_fini(&before[i]);
+	bootstrap_free(s);
+}
+
+static void ignore(void *user, const struct batch *b)
+{
+	(void)user;
+	(void)b;
+}
+
+static void groups_share_no_random_number(void **state)
+{
+	(void)state;
+	struct world *w = lit_world();
+	for (size_t i = 0; render_integrator_at(i); i++) {
+		struct plan p = plan_of(w, render_integrator_at(i));
+		size_t own[GROUPS] = {0};
+		listen(true);
+		run_all(w, &p, ignore, NULL);
+		qsort(noted.all, noted.count, sizeof *noted.all, by_number);
+		for (size_t n = 0; n < noted.count; n++) {
+			const struct number *a = &noted.all[n], *b = a + 1;
+			own[a->owner]++;
+			if (n + 1 < noted.count && memcmp(a, b, offsetof(struct number, owner)) == 0 && a->owner != b->owner)
+				fail_msg("%s: groups %u and %u ask for the same number: stream %u, index %llu, step %llu, block %llu", p.integrator,
+					 (unsigned)a->owner, (unsigned)b->owner, (unsigned)a->stream, (unsigned long long)a->index,
+					 (unsigned long long)a->step, (unsigned long long)a->block);
+		}
+		for (uint32_t g = 0; g < GROUPS; g++)
+			assert_true(own[g] > BOOTSTRAP / GROUPS + ROUNDS * EPOCH);
+		listen(false);
+	}
+	world_free(w);
+}
+
+/* A render as hslt-render makes it: what begins a chain is a path of the bootstrap that is looked at again, one of its own group's
+ * range; each group has some. */
+static void chains_start_from_their_groups_bootstrap(void **state)
+{
+	(void)state;
+	struct world *w = lit_world();
+	for (size_t i = 0; render_integrator_at(i); i++) {
+		if (render_integrator_at(i)->kind != PLAN_CHAINS)
+			continue;
+		struct plan p = plan_of(w, render_integrator_at(i));
+		size_t looks[BOOTSTRAP] = {0}, started[GROUPS] = {0};
+		atomic_bool stop = false;
+		struct local_run r = {.world = w, .plan = &p, .threads = 1, .stop = &stop};
+		struct error e = {""};
+		listen(true);
+		if (local_run(&r, &e))
+			fail_msg("%s", e.text);
+		canvas_free(r.canvas);
+		for (size_t n = 0; n < noted.count; n++)
+			if (noted.all[n].stream == RNG_BOOTSTRAP && noted.all[n].block == 0 && noted.all[n].step == 0)
+				looks[noted.all[n].index]++;
+		listen(false);
+		for (uint64_t n = 0; n < BOOTSTRAP; n++) {
+			assert_true(looks[n] > 0); /* all groups together have drawn all of it */
+			started[n / (BOOTSTRAP / GROUPS)] += looks[n] > 1;
+		}
+		for (uint32_t g = 0; g < GROUPS; g++)
+			assert_true(started[g] > 0 && started[g] <= CHAINS / GROUPS);
+	}
+	world_free(w);
+}
+
+/* Resampling's own random number differs, too, or all groups would take seeds at the same quantiles. */
+static void groups_resample_by_themselves(void **state)
+{
+	(void)state;
+	struct plan p = {.seed = 3, .groups = PLAN_MAX_GROUPS};
+	for (uint32_t g = 0; g < p.groups; g++)
+		for (uint32_t h = 0; h < g; h++)
+			assert_true(plan_resample_u(&p, g) != plan_resample_u(&p, h));
+}
+
+struct counted {
+	uint64_t weights, dark, bootstrap, samples, independent, proposed;
+	uint32_t strategy;
+};
+
+static void count(void *user, const struct batch *b)
+{
+	struct counted *c = user;
+	for (uint64_t i = 0; i < b->weight_count; i++)
+		c->dark += b->weights[i] == 0;
+	c->weights += b->weight_count;
+	if (b->key.kind == LEASE_BOOTSTRAP) {
+		c->bootstrap += b->counters[COUNT_INDEPENDENT];
+		return;
+	}
+	c->samples += b->counters[COUNT_SAMPLES];
+	c->independent += b->counters[COUNT_INDEPENDENT];
+	if (b->strategy_count)
+		c->proposed += b->strategy[c->strategy][STRATEGY_PROPOSED];
+}
+
+/* Half of what is sampled is dark, and counted: by the bootstrap and by samples all of it, by strategies all that they
+ * propose, by pssmlt 0.3 of the steps within five standard errors (without the dark ones it would be 20 of them less). */
+static void zeros_are_counted(void **state)
+{
+	(void)state;
+	struct world *w = lit_world();
+	for (size_t i = 0; render_integrator_at(i); i++) {
+		struct plan p = plan_of(w, render_integrator_at(i));
+		struct counted c = {0};
+		struct mixture m;
+		if (p.mutations[0]) {
+			assert_int_equal(mixture_parse(p.mutations, &m, NULL), 0);
+			c.strategy = m.independent;
+		}
+		run_all(w, &p, count, &c);
+		double share = (double)c.independent / (double)c.samples;
+		print_message("%s: %llu of %llu bootstrap samples dark, %.3f of %llu samples independent\n", p.integrator,
+			      (unsigned long long)c.dark, (unsigned long long)c.weights, share, (unsigned long long)c.samples);
+		assert_true(c.weights == BOOTSTRAP && c.dark > BOOTSTRAP / 3 && c.dark < BOOTSTRAP);
+		assert_true(c.bootstrap == c.weights);
+		if (p.kind == PLAN_SAMPLES)
+			assert_true(c.independent == c.samples && c.samples == ROUNDS * GROUPS * SPP_EPOCH * plan_extended_pixels(&p));
+		else if (p.mutations[0])
+			assert_true(c.independent == c.proposed && c.independent > 0);
+		else
+			assert_true(fabs(share - 0.3) < 5 * sqrt(0.3 * 0.7 / (double)c.samples));
+	}
+	world_free(w);
+}
+
+/* b of a group is its own sum over all of its own samples; those of all the pooled one. */
+static void each_group_has_its_own_b(void **state)
+{
+	(void)state;
+	struct plan p = {.kind = PLAN_CHAINS, .width = 1, .height = 1, .crop_width = 1, .crop_height = 1, .groups = GROUPS, .parts = PARTS,
+			 .chains = CHAINS, .bootstrap = 8 * GROUPS * PARTS, .epoch = 1, .rounds = 1, .min_depth = 1, .max_depth = 4};
+	struct bootstrap *s;
+	struct bootstrap_result r;
+	assert_int_equal(bootstrap_new(&s, &p, NULL), 0);
+	for (uint32_t i = 0; i < GROUPS * PARTS; i++) {
+		float weights[8] = {0};
+		struct batch b = {.key = {1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, .weights = weights, .weight_count = 8};
+		b.counters[COUNT_INDEPENDENT] = b.counters[COUNT_SAMPLES] = 8;
+		weights[i / PARTS] = i % PARTS ? 0 : (float)(1 << i / PARTS); /* the second part found nothing */
+		b.independent_sum = (double)weights[i / PARTS];
+		assert_int_equal(bootstrap_add(s, &b, NULL), 0);
+	}
+	bootstrap_merge(s, &r);
+	for (uint32_t g = 0; g < GROUPS; g++) {
+		uint64_t seeds[CHAINS / GROUPS];
+		assert_true(r.b[g] == (1 << g) / 16.0);
+		bootstrap_seeds(s, g, seeds);
+		for (size_t k = 0; k < CHAINS / GROUPS; k++)
+			assert_true(seeds[k] / (8 * PARTS) == g);
+	}
+	assert_true(r.b_pooled == 15 / 64.0);
+	bootstrap_free(s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(groups_share_no_random_number), cmocka_unit_test(chains_start_from_their_groups_bootstrap),
+		cmocka_unit_test(groups_resample_by_themselves), cmocka_unit_test(zeros_are_counted),
+		cmocka_unit_test(each_group_has_its_own_b),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
