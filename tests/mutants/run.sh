@@ -4,17 +4,26 @@
 #     sh tests/mutants/run.sh [LIST]        LIST: tests/mutants/list.txt
 #
 # A line of the list: FILE, what stands there (once in the file), what is put in its place, the tests to run; tabs between, # begins
-# a comment. The commit at HEAD is copied to build/mutants and built there once. A fault is caught when a test of its line fails;
-# one that does not compile is a fault of the list. Ends with 1 when less than 95 % are caught or a line is faulty.
+# a comment. The commit at HEAD is copied to build/mutants and built there once, by ccache where it is installed. A fault is caught
+# when a test of its line fails; one that does not compile is a fault of the list. One line for each, with the seconds that it took,
+# then a table by folder. Ends with 1 when less than 95 % are caught or a line is faulty.
 list=${1:-tests/mutants/list.txt}
 list=$(cd "$(dirname "$list")" && pwd)/$(basename "$list")
 tree=build/mutants
+command -v ccache > /dev/null && CC="ccache ${CC:-gcc}"
 rm -rf "$tree" && mkdir -p "$tree" && git archive HEAD | tar x -C "$tree" && cd "$tree" || exit 1
 make -s ${CC:+CC="$CC"} programs $(awk -F'\t' '!/^#/ && NF { print $4 }' "$list" | tr ' ' '\n' | sort -u | sed 's|^|build/tests/|') || exit 1
+# Without any fault all of them pass, or they would catch everything.
+for t in $(awk -F'\t' '!/^#/ && NF { print $4 }' "$list" | tr ' ' '\n' | sort -u); do
+	timeout 300 "build/tests/$t" > /dev/null 2>&1 || { echo "$t fails without a fault"; exit 1; }
+done
 caught=0 survived=0 faulty=0
+result=results.txt
+: > $result
 tab=$(printf '\t')
 while IFS=$tab read -r file old new tests; do
 	case $file in '#'* | '') continue ;; esac
+	begin=$(date +%s)
 	cp "$file" "$file.sound"
 	if ! OLD=$old NEW=$new awk 'BEGIN { old = ENVIRON["OLD"]; new = ENVIRON["NEW"] }
 		{ at = index($0, old); if (at) { n++; $0 = substr($0, 1, at - 1) new substr($0, at + length(old)) } print }
@@ -30,15 +39,20 @@ while IFS=$tab read -r file old new tests; do
 			timeout 300 "build/tests/$t" > /dev/null 2>&1 || { by=$t && break; }
 		done
 		if [ "$by" ]; then
-			echo "caught    $file: '$old' -> '$new' by $by"
+			echo "caught    $file: '$old' -> '$new' by $by, $(($(date +%s) - begin)) s"
+			echo "$file caught" >> $result
 			caught=$((caught + 1))
 		else
-			echo "SURVIVED  $file: '$old' -> '$new' ($tests)"
+			echo "SURVIVED  $file: '$old' -> '$new' ($tests), $(($(date +%s) - begin)) s"
+			echo "$file survived" >> $result
 			survived=$((survived + 1))
 		fi
 	fi
 	mv "$file.sound" "$file"
 	touch "$file"
 done < "$list"
+printf '| folder | faults | caught |\n| --- | --- | --- |\n'
+awk '{ sub("/[^/]*$", "", $1); all[$1]++; caught[$1] += $2 == "caught" }
+	END { for (f in all) print "| `" f "` | " all[f] " | " caught[f] + 0 " |" }' $result | sort
 echo "$caught caught, $survived survived, $faulty faulty"
 [ $faulty -eq 0 ] && [ $((100 * caught)) -ge $((95 * (caught + survived))) ]
