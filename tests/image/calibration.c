@@ -5,7 +5,8 @@
  * renders of a length, or in more than 99 % of a hundred or more. The reference's own variance is subtracted from each comparison; a
  * case whose reference has more than a tenth of the renders' relMSE is left out, and said so.
  *
- *   calibration [RENDERS [LENGTHS [SCENE]]]    20 renders a case, 3 lengths, scenes whose names begin with SCENE
+ *   calibration [RENDERS [LENGTHS [SCENE]]]    20 renders a case, half as many of each next length; 3 lengths; scenes whose names
+ *                                              begin with SCENE
  */
 #include "tests/image/calibration_scenes.h"
 #include "tests/support/repeats.h"
@@ -91,7 +92,7 @@ static void run_case(const struct calibration_scene *s, const struct world *w, c
 		     uint32_t renders, struct figures *all)
 {
 	char test[96];
-	snprintf(test, sizeof test, "%s %d", s->name, length);
+	snprintf(test, sizeof test, "%s, length %d", s->name, length + 1);
 	struct repeats_how how = {.integrator = integrators[k].name, .test = test, .count = renders, .spp = integrators[k].spp * lengths[length]};
 	struct repeats run;
 	struct figures f = {0};
@@ -136,7 +137,7 @@ int main(int argc, char **argv)
 		make_reference(s, w, &r);
 		for (size_t k = 0; k < sizeof integrators / sizeof *integrators; k++)
 			for (int length = 0; length < last; length++)
-				run_case(s, w, &r, k, length, renders, &all[length]);
+				run_case(s, w, &r, k, length, (renders >> length) + !(renders >> length), &all[length]);
 		world_free(w);
 	}
 	bool right = true;

@@ -413,15 +413,6 @@ static void blocks_of_groups_make_the_image(void **unused)
 			}
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 		canvas_group_blocks(c, 3, 2, block[0]);
-		double distance[4], squares = 0, *weights = mem_alloc(21000, sizeof *weights);
-		for (size_t i = 0; i < 21000; i++) {
-			weights[i] = uniform();
-			squares += weights[i] * (double)img.error[i] * (double)img.error[i];
-		}
-		canvas_group_distances(c, weights, distance);
-		mem_free(weights);
-		/* Variances of so much noise are averaged with their neighbours': the sum stays, but for borders. */
-		assert_true(fabs((distance[0] + distance[1] + distance[2] + distance[3]) / (4 * 3 * squares) - 1) < 0.03);
 		for (uint32_t g = 0; g < 4; g++) {
 			/* Undo the group's own b, so that the pooled one remains. */
 			double own = kind == PLAN_CHAINS ? (g + 1) / img.b : 1;
@@ -441,6 +432,61 @@ static void blocks_of_groups_make_the_image(void **unused)
 			if (!(fabs(sum[k] / mean - 1) < 1e-6))
 				fail_msg("kind %d, block %u: %.9g is not %.9g", kind, k, sum[k], mean);
 		}
+		canvas_image_fini(&img);
+		canvas_free(c);
+	}
+}
+
+/* Between groups that differ by a few percent: errors of pixels are not averaged with their neighbours' then. */
+static float nearly_one(void)
+{
+	return (float)(1 + 0.02 * uniform());
+}
+
+/* A group's distance over any weights, from nothing but what was put into its film; their sum is that of the squared errors. */
+static void distances_of_groups_are_the_errors(void **unused)
+{
+	(void)unused;
+	enum { GROUPS = 4, VALUES = 100 * 70 * 3 };
+	static const double rgb_of_xyz[3][3] = {{3.2404541621141054, -1.5371385127977166, -0.4985314095560162},
+						{-0.9692660305051868, 1.8760108454466942, 0.0415560175303498},
+						{0.0556434309591147, -0.2040259135167538, 1.0572251882231791}};
+	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++) {
+		struct plan p = make_plan((enum plan_kind)kind, 100, 70, GROUPS, 1);
+		struct canvas *c;
+		struct canvas_image img;
+		double(*rgb)[VALUES] = mem_alloc(GROUPS, sizeof *rgb), *weight = mem_alloc(VALUES, sizeof *weight);
+		double distance[GROUPS], want[GROUPS] = {0}, all = 0, squares = 0;
+		state = 78;
+		assert_int_equal(canvas_new(&c, &p, -32, NULL, NULL), 0);
+		for (uint32_t g = 0; g < GROUPS; g++) {
+			struct batch b = make_batch(&p, 0, g, 0, 4, nearly_one);
+			b.independent_sum = (1 + 0.01 * g) * (double)p.epoch;
+			double scale = kind == PLAN_CHAINS ? (1 + 0.01 * g) / (double)b.counters[COUNT_SAMPLES] : 1 / (double)p.epoch;
+			for (size_t t = 0; t < 4; t++)
+				for (size_t i = 0; i < (size_t)b.tiles[t].width * b.tiles[t].height * 9; i++) {
+					size_t pixel = i / 9, x = b.tiles[t].x - 3 + pixel % b.tiles[t].width, y = b.tiles[t].y - 2 + pixel / b.tiles[t].width;
+					rgb[g][(y * 100 + x) * 3 + i / 3 % 3] += scale * rgb_of_xyz[i / 3 % 3][i % 3] * (double)b.tiles[t].xyz[3 * pixel + i % 3];
+				}
+			assert_int_equal(canvas_add(c, &b, NULL), 0);
+			batch_fini(&b);
+		}
+		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		for (size_t i = 0; i < VALUES; i++) {
+			double mean = (rgb[0][i] + rgb[1][i] + rgb[2][i] + rgb[3][i]) / GROUPS;
+			weight[i] = uniform();
+			squares += weight[i] * (double)img.error[i] * (double)img.error[i];
+			for (int g = 0; g < GROUPS; g++)
+				want[g] += weight[i] * (rgb[g][i] - mean) * (rgb[g][i] - mean);
+		}
+		canvas_group_distances(c, weight, distance);
+		for (int g = 0; g < GROUPS; g++) {
+			all += distance[g];
+			assert_true(fabs(distance[g] / want[g] - 1) < 1e-6);
+		}
+		assert_true(fabs(all / (GROUPS * (GROUPS - 1) * squares) - 1) < 1e-6);
+		mem_free(rgb);
+		mem_free(weight);
 		canvas_image_fini(&img);
 		canvas_free(c);
 	}
@@ -519,6 +565,7 @@ int main(void)
 		cmocka_unit_test(estimated_error_covers_the_truth),
 		cmocka_unit_test(black_canvas_has_no_error),
 		cmocka_unit_test(blocks_of_groups_make_the_image),
+		cmocka_unit_test(distances_of_groups_are_the_errors),
 		cmocka_unit_test(failing_allocations_leak_nothing),
 		cmocka_unit_test(a_folder_that_is_not_there_is_an_error),
 	};
