@@ -3,19 +3,29 @@
 #
 #     sh tests/mutants/run.sh [LIST]        LIST: tests/mutants/list.txt
 #
-# A line of the list: FILE, what stands there (once in the file), what is put in its place, the tests to run; tabs between, # begins
-# a comment. The commit at HEAD is copied to build/mutants and built there once, by ccache where it is installed. A fault is caught
-# when a test of its line fails; one that does not compile is a fault of the list. One line for each, with the seconds that it took,
-# then a table by folder. Ends with 1 when less than 95 % are caught or a line is faulty.
+# A line of the list: FILE, what stands there (once in the file), what is put in its place, the tests to run (TEST@ROOM: in one of
+# their rooms); tabs between, # begins a comment. The commit at HEAD is copied to build/mutants and built there once, by ccache where
+# it is installed. A fault is caught when a test of its line fails; one that does not compile is a fault of the list. One line for
+# each, with the seconds that it took, then a table by folder. Ends with 1 when less than 95 % are caught or a line is faulty.
 list=${1:-tests/mutants/list.txt}
 list=$(cd "$(dirname "$list")" && pwd)/$(basename "$list")
 tree=build/mutants
 command -v ccache > /dev/null && CC="ccache ${CC:-gcc}"
 rm -rf "$tree" && mkdir -p "$tree" && git archive HEAD | tar x -C "$tree" && cd "$tree" || exit 1
-make -s ${CC:+CC="$CC"} programs $(awk -F'\t' '!/^#/ && NF { print $4 }' "$list" | tr ' ' '\n' | sort -u | sed 's|^|build/tests/|') || exit 1
+# run TEST, or TEST@ROOM: with that room alone.
+run() {
+	case $1 in
+	*@*) ROOM=${1#*@} timeout 300 "build/tests/${1%@*}" > /dev/null 2>&1 ;;
+	*) timeout 300 "build/tests/$1" > /dev/null 2>&1 ;;
+	esac
+}
+binaries() {
+	tr ' ' '\n' | sed 's|@.*||; s|^|build/tests/|' | sort -u
+}
+make -s ${CC:+CC="$CC"} programs $(awk -F'\t' '!/^#/ && NF { print $4 }' "$list" | binaries) > make.log 2>&1 || { cat make.log; exit 1; }
 # Without any fault all of them pass, or they would catch everything.
 for t in $(awk -F'\t' '!/^#/ && NF { print $4 }' "$list" | tr ' ' '\n' | sort -u); do
-	timeout 300 "build/tests/$t" > /dev/null 2>&1 || { echo "$t fails without a fault"; exit 1; }
+	run "$t" || { echo "$t fails without a fault"; exit 1; }
 done
 caught=0 survived=0 faulty=0
 result=results.txt
@@ -30,13 +40,13 @@ while IFS=$tab read -r file old new tests; do
 		END { exit n != 1 }' "$file.sound" > "$file"; then
 		echo "faulty    $file: '$old' does not stand there once"
 		faulty=$((faulty + 1))
-	elif ! make -s ${CC:+CC="$CC"} $(echo "$tests" | tr ' ' '\n' | sed 's|^|build/tests/|') > make.log 2>&1; then
+	elif ! make -s ${CC:+CC="$CC"} $(echo "$tests" | binaries) > make.log 2>&1; then
 		echo "faulty    $file: '$new' does not compile"
 		faulty=$((faulty + 1))
 	else
 		by=
 		for t in $tests; do
-			timeout 300 "build/tests/$t" > /dev/null 2>&1 || { by=$t && break; }
+			run "$t" || { by=$t && break; }
 		done
 		if [ "$by" ]; then
 			echo "caught    $file: '$old' -> '$new' by $by, $(($(date +%s) - begin)) s"
