@@ -156,10 +156,17 @@ static void print_job(const json_t *job, bool colors)
 	       number_of(job, "leases"), text_of(job, "name"));
 	const char *why = *text_of(job, "why") ? text_of(job, "why") : bound_of(job);
 	const char *verdict = text_of(json_object_get(job, "agreement"), "verdict");
-	bool disagree = strcmp(verdict, agreement_name(CHAINS_DISAGREE)) == 0;
+	const char *chains = strcmp(verdict, agreement_name(CHAINS_DISAGREE)) == 0 ? "its chains disagree" :
+			     is_ended(job) && strcmp(verdict, agreement_name(CHAINS_TOO_SHORT)) == 0 ? "its chains are too short to be judged" : "";
 	if (!*why && !is_ended(job))
 		why = text_of(job, "place");
-	printf("%s%s%s%s\n", *why || disagree ? "  # " : "", why, *why && disagree ? "; " : "", disagree ? "its chains disagree" : "");
+	printf("%s%s%s%s\n", *why || *chains ? "  # " : "", why, *why && *chains ? "; " : "", chains);
+}
+
+static void print_doubt(const json_t *job)
+{
+	if (*text_of(job, "errorDoubt"))
+		printf("       the error's interval is not known: %s\n", text_of(job, "errorDoubt"));
 }
 
 /* "3.2 % (3.0 - 3.5 %), half of it costs 12 min of processors, 6.0 min more; done in 31 min (25 min - 40 min)" */
@@ -306,6 +313,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 			if (*text_of(job, "note"))
 				printf("       note: %s\n", text_of(job, "note"));
 			print_share(job);
+			print_doubt(job);
 			print_forecast(job);
 			print_verified(job);
 			print_effects(job);

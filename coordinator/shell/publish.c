@@ -110,7 +110,7 @@ static void take(struct publishing *w)
 	struct order *o = w->order;
 	/* Every image says how good it is, asked for or not. */
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
-		o->record.rel_error = w->image.rel_mse_doubt ? -1 : sqrt(w->image.rel_mse_upper);
+		record_take_error(&o->record, &w->image);
 	if (!w->rc)
 		record_take_agreement(&o->record, &w->image, &w->agreement);
 	if (w->what == PUBLISH_RESULT && !w->rc)

@@ -172,6 +172,7 @@ json_t *view_to_json(const struct job_view *v)
 		return NULL;
 	json_object_set_new(o, "eta", number_or_null(v->eta, v->eta >= 0));
 	json_object_set_new(o, "error", number_or_null(r->rel_error, r->rel_error >= 0));
+	json_object_set_new(o, "errorDoubt", json_string(r->rel_error_doubt));
 	add_forecast(o, v);
 	add_share(o, v);
 	json_object_set_new(o, "counts", record_counts(r));

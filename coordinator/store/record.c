@@ -7,6 +7,7 @@
 #include "common/film/forecast_json.h"
 #include "common/film/strategy_json.h"
 
+#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -53,6 +54,12 @@ void record_take_agreement(struct job_record *r, const struct canvas_image *img,
 	r->agreement = *a;
 	r->b = img->b;
 	memcpy(r->classes, img->classes, sizeof r->classes);
+}
+
+void record_take_error(struct job_record *r, const struct canvas_image *img)
+{
+	r->rel_error = img->rel_mse_doubt ? -1 : sqrt(img->rel_mse_upper);
+	stated_error_doubt(img, r->rel_error_doubt, sizeof r->rel_error_doubt);
 }
 
 void record_take_effects(struct job_record *r, json_t *list)
@@ -162,6 +169,7 @@ int record_to_json(const struct job_record *r, char **out, struct error *e)
 		return error_set(e, json_error_code(&fault) == json_error_invalid_utf8 ? EINVAL : ENOMEM,
 				 "the record of job j%llu cannot be written: %s", (unsigned long long)r->id, fault.text);
 	json_object_set_new(o, "owner", json_string(r->owner));
+	json_object_set_new(o, "relErrorDoubt", json_string(r->rel_error_doubt));
 	json_object_set_new(o, "endedSeen", json_real(r->ended_seen));
 	json_object_set_new(o, "cleared", json_real(r->cleared));
 	json_object_set_new(o, "extended", json_integer((json_int_t)r->extended));
@@ -230,6 +238,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	r->ended_seen = json_is_number(seen) ? json_number_value(seen) : -1;
 	r->progress = json_number_value(json_object_get(o, "progress"));
 	r->rel_error = json_number_value(json_object_get(o, "relError"));
+	take_text(o, "relErrorDoubt", r->rel_error_doubt, sizeof r->rel_error_doubt);
 	take_text(o, "mixture", r->mixture, sizeof r->mixture);
 	take_text(o, "note", r->note, sizeof r->note);
 	take_counts(json_object_get(o, "counts"), r);

@@ -8,6 +8,7 @@
 #include "common/base/error.h"
 #include "common/film/agreement.h"
 #include "common/film/forecast.h"
+#include "common/film/stated_error.h"
 #include "common/film/strategy.h"
 
 #include <jansson.h>
@@ -35,6 +36,7 @@ struct job_record {
 	double ended_seen; /* s that had been seen to pass then (seen.h); negative: nobody knows */
 	double progress;
 	double rel_error; /* negative: not known */
+	char rel_error_doubt[STATED_ERROR_TEXT]; /* why not, where an estimate was made; "" */
 	double target_error; /* 0: none */
 	double cpu_seconds, bootstrap_cpu_seconds; /* of all merged leases, of those of the bootstrap */
 	double bootstrap_seconds; /* wall clock */
@@ -58,6 +60,7 @@ void record_take_counted(struct job_record *r, const struct plan *p, const struc
 void record_add_note(struct job_record *r, const char *text); /* "": nothing to say */
 void record_take_agreement(struct job_record *r, const struct canvas_image *img, const struct agreement *a);
 void record_begin_agreement(struct job_record *r); /* nothing is known */
+void record_take_error(struct job_record *r, const struct canvas_image *img); /* of one that has an estimate */
 void record_take_effects(struct job_record *r, json_t *list); /* takes the reference; NULL: none */
 json_t *record_effects(const struct job_record *r);    /* an array */
 json_t *record_counts(const struct job_record *r);     /* an object of its counts */

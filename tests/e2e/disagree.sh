@@ -64,8 +64,21 @@ LISTEN=$COORDINATOR
 start_coordinator
 look
 
-ends 0 "$DIR/short.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $SMALL $CHAINS --integrator hslt --mutations 256000
+SHORT="$SMALL $CHAINS --integrator hslt --mutations 256000"
+ends 0 "$DIR/short.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $SHORT --stats "$DIR/short.json"
 has "$DIR/short.log" 'note: chains are too short to be judged, 4000 mutations each: '
+# The farm says so, too, and why it states no error.
+doubt=$(sed -n 's/.*"relMSEDoubt": "\(.*\)".*/\1/p' "$DIR/short.json")
+[ "$doubt" ] || fail "the statistics do not say why no error is stated"
+ends 0 "$DIR/submit.log" "$BIN/hslt-submit" "$SCENE" -o "$DIR/farm.exr" $SHORT --wait
+id=$(cat "$DIR/out")
+"$BIN/hslt-status" --json "$id" >"$DIR/shown"
+has "$DIR/shown" "\"errorDoubt\":\"$doubt\""
+has "$DIR/shown" '"verdict":"too short"'
+"$BIN/hslt-status" "$id" >"$DIR/shown"
+has "$DIR/shown" "the error's interval is not known: $doubt"
+"$BIN/hslt-status" >"$DIR/shown"
+has "$DIR/shown" 'its chains are too short to be judged'
 ends 0 "$DIR/large.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $LARGE $CHAINS --integrator hslt --mutations 1280000
 grep -q 'note:' "$DIR/large.log" && fail "nothing is wrong, but: $(grep note: "$DIR/large.log")"
 grep -a -q hslt:disagreement "$DIR/b.exr" && fail "the header finds something wrong"

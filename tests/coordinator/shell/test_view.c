@@ -72,6 +72,25 @@ static void json_of_other_jobs_has_none(void **state)
 	json_decref(o);
 }
 
+/* An error that is not stated is null, and why stands beside it, until an image has one that is. */
+static void json_says_why_no_error_is_stated(void **state)
+{
+	(void)state;
+	struct job_record r = record();
+	struct canvas_image img = {.rel_mse = 0.04, .rel_mse_upper = 0.09, .rel_mse_doubt = ERROR_SHORT};
+	for (int known = 0; known < 2; known++) {
+		struct job_view v;
+		img.rel_mse_doubt = known ? ERROR_KNOWN : ERROR_SHORT;
+		record_take_error(&r, &img);
+		view_of_record(&v, &r);
+		json_t *o = view_to_json(&v);
+		const char *why = json_string_value(json_object_get(o, "errorDoubt"));
+		assert_string_equal(why, known ? "" : "the chains are too short to be judged");
+		assert_true(known ? fabs(json_number_value(json_object_get(o, "error")) - 0.3) < 1e-12 : json_is_null(json_object_get(o, "error")));
+		json_decref(o);
+	}
+}
+
 static void json_shows_the_forecast(void **state)
 {
 	(void)state;
@@ -160,6 +179,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(json_shows_the_strategies),
 		cmocka_unit_test(json_of_other_jobs_has_none),
+		cmocka_unit_test(json_says_why_no_error_is_stated),
 		cmocka_unit_test(json_shows_the_forecast),
 		cmocka_unit_test(shows_the_share),
 		cmocka_unit_test(looks_travel),

@@ -71,6 +71,7 @@ static void records_come_back(void **state)
 	strcpy(r.output, "a b.exr");
 	strcpy(r.mixture, "independent=0.1,hslt=0.9");
 	strcpy(r.note, "3 of 8 \"times\"");
+	strcpy(r.rel_error_doubt, "the chains are too short to be judged");
 	record_take_effects(&r, json_pack("[{s:s s:b s:s}]", "name", "dispersion", "on", 0, "why", "`glass` has constant eta"));
 	r.stuck = 3;
 	r.longest_stuck = 5210;
@@ -101,6 +102,7 @@ static void records_come_back(void **state)
 	assert_true(back.has_result && record_is_ended(&back));
 	assert_string_equal(back.mixture, r.mixture);
 	assert_string_equal(back.note, r.note);
+	assert_string_equal(back.rel_error_doubt, r.rel_error_doubt);
 	assert_true(*r.effects != 0);
 	assert_string_equal(back.effects, r.effects);
 	assert_true(back.stuck == 3 && back.longest_stuck == 5210);
