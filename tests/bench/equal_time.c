@@ -59,7 +59,7 @@ enum { METHODS = sizeof methods / sizeof *methods, DEFAULT = 0, BREAKUP = 5, UNB
 
 struct shot {
 	struct canvas_image image;
-	double cpu;
+	double cpu, pilot; /* of which the pilot */
 	char integrator[16];
 };
 
@@ -84,13 +84,13 @@ static void shoot(const struct world *w, const struct method *m, uint64_t spp, u
 	}
 	r.kind = face->kind;
 	snprintf(out->integrator, sizeof out->integrator, "%s", r.integrator);
-	double pilot = bench_cpu_seconds() - begin;
+	out->pilot = bench_cpu_seconds() - begin;
 	if (plan_make(&r, &p, &e))
 		bench_die(&e);
 	struct local_run run = {.world = w, .plan = &p, .threads = 1};
 	if (local_run(&run, &e) || canvas_image(run.canvas, false, &out->image, &e))
 		bench_die(&e);
-	out->cpu = run.cpu_seconds + pilot;
+	out->cpu = run.cpu_seconds + out->pilot;
 	canvas_free(run.canvas);
 }
 
@@ -237,30 +237,29 @@ static double brightness(const struct canvas_image *i)
 
 /* Of one method, seed by seed: relMSE times CPU seconds, [0] of all pixels, [1] trimmed. */
 struct trial {
+	uint64_t spp;
 	double value[2][SEEDS_MOST], mean[2], brightness, by_spread;
-	char integrator[16];
+	double pilot;                  /* its share of the CPU seconds */
+	char chosen[SEEDS_MOST][16]; /* integrators */
 };
 
-static void shoot_trial(const struct world *w, const struct method *m, double seconds, unsigned seeds, const struct shot *reference,
-			 const double *scale, struct trial *out)
+static void take_shot(const struct world *w, const struct method *m, double seconds, unsigned seeds, unsigned k,
+		      const struct shot *reference, const double *scale, struct trial *out)
 {
-	uint64_t spp = 0;
-	*out = (struct trial){.brightness = 0};
-	for (unsigned k = 0; k < seeds; k++) {
-		struct shot shot;
-		if (k == 0)
-			spp = shoot_for(w, m, seconds, 1, &shot);
-		else
-			shoot(w, m, spp, 1 + k, &shot);
-		for (int t = 0; t < 2; t++) {
-			out->value[t][k] = shot.cpu * error_by_reference(&shot.image, &reference->image, scale, t ? TRIM : 0);
-			out->mean[t] += out->value[t][k] / seeds;
-		}
-		out->brightness += brightness(&shot.image) / brightness(&reference->image) / seeds;
-		out->by_spread += shot.cpu * error_by_spread(&shot.image, scale) / seeds;
-		snprintf(out->integrator, sizeof out->integrator, "%s", shot.integrator);
-		canvas_image_fini(&shot.image);
+	struct shot shot;
+	if (k == 0)
+		out->spp = shoot_for(w, m, seconds, 1, &shot);
+	else
+		shoot(w, m, out->spp, 1 + k, &shot);
+	for (int t = 0; t < 2; t++) {
+		out->value[t][k] = shot.cpu * error_by_reference(&shot.image, &reference->image, scale, t ? TRIM : 0);
+		out->mean[t] += out->value[t][k] / seeds;
 	}
+	out->brightness += brightness(&shot.image) / brightness(&reference->image) / seeds;
+	out->pilot += shot.pilot / shot.cpu / seeds;
+	out->by_spread += shot.cpu * error_by_spread(&shot.image, scale) / seeds;
+	snprintf(out->chosen[k], sizeof out->chosen[k], "%s", shot.integrator);
+	canvas_image_fini(&shot.image);
 }
 
 /* What |t| exceeds with a probability of 5 %. */
@@ -274,16 +273,28 @@ static double student_95(double degrees)
 	return high;
 }
 
-/* Mean of the first over that of the second, with a 95 % interval: of the means' logarithms, by the spread between seeds. */
+/* Mean of the first over that of the second, with a 95 % interval: of the ratio's logarithm, by the spread between seeds, which both
+ * share, as they share the minute in which they were rendered. */
 static void print_ratio(const char *says, const struct trial *a, const struct trial *b, int t, unsigned seeds)
 {
 	double ratio = a->mean[t] / b->mean[t], square = 0;
 	for (unsigned k = 0; k < seeds; k++) {
 		double x = a->value[t][k] / a->mean[t] - 1, y = b->value[t][k] / b->mean[t] - 1;
-		square += (x * x + y * y) / seeds / (seeds - 1);
+		square += (x - y) * (x - y) / seeds / (seeds - 1);
 	}
-	double wide = exp(seeds > 1 ? student_95(2 * (seeds - 1)) * sqrt(square) : INFINITY);
+	double wide = exp(seeds > 1 ? student_95(seeds - 1) * sqrt(square) : INFINITY);
 	printf("  %s: %.2f [%.2f, %.2f]\n", says, ratio, ratio / wide, ratio * wide);
+}
+
+static void print_trials(const struct trial *of, size_t count, unsigned seeds)
+{
+	printf("  %-10s %14s %14s %14s %10s\n", "relMSE x s", "all pixels", "trimmed", "by spread", "mean");
+	for (size_t i = 0; i < count; i++)
+		printf("  %-10s %14.5g %14.5g %14.5g %10.4f\n", methods[i].name, of[i].mean[0], of[i].mean[1], of[i].by_spread, of[i].brightness);
+	printf("  chosen by the default:");
+	for (unsigned k = 0; k < seeds; k++)
+		printf(" %s", of[DEFAULT].chosen[k]);
+	printf("; its pilot took %.1f %% of the time\n", 100 * of[DEFAULT].pilot);
 }
 
 static void compare_all(const struct world *w, const struct trial_scene *s, double seconds, unsigned seeds, size_t count)
@@ -293,23 +304,22 @@ static void compare_all(const struct world *w, const struct trial_scene *s, doub
 	size_t best[2] = {1, 1};
 	make_reference(w, s, REFERENCE_TIMES * seconds, &reference);
 	double *scale = scales_of(&reference.image);
-	printf("  %-18s %14s %14s %14s %10s\n", "relMSE x CPU s", "all pixels", "trimmed", "by spread", "mean");
-	for (size_t i = 0; i < count; i++) {
-		char name[40];
-		shoot_trial(w, &methods[i], seconds, seeds, &reference, scale, &of[i]);
-		snprintf(name, sizeof name, i == DEFAULT ? "%s: %s" : "%s", methods[i].name, of[i].integrator);
-		printf("  %-18s %14.5g %14.5g %14.5g %10.4f\n", name, of[i].mean[0], of[i].mean[1], of[i].by_spread, of[i].brightness);
-		fflush(stdout);
+	memset(of, 0, sizeof of);
+	for (unsigned k = 0; k < seeds; k++)
+		for (size_t i = 0; i < count; i++)
+			take_shot(w, &methods[i], seconds, seeds, k, &reference, scale, &of[i]);
+	for (size_t i = DEFAULT + 1; i < count && i < BREAKUP; i++)
 		for (int t = 0; t < 2; t++)
-			best[t] = i > DEFAULT && i < BREAKUP && of[i].mean[t] < of[best[t]].mean[t] ? i : best[t];
-	}
+			best[t] = of[i].mean[t] < of[best[t]].mean[t] ? i : best[t];
+	print_trials(of, count, seeds);
 	for (int t = 0; t < 2 && count > 1; t++) {
 		char says[80];
 		snprintf(says, sizeof says, "default over the best, %s (%s)", t ? "trimmed" : "all pixels", methods[best[t]].name);
 		print_ratio(says, &of[DEFAULT], &of[best[t]], t, seeds);
 		bench_single(t ? "default / best, trimmed" : "default / best", of[DEFAULT].mean[t] / of[best[t]].mean[t], "of the time", BENCH_INFORMS, 0);
 	}
-	printf("  the reference's own relMSE: %.3g\n", error_by_spread(&reference.image, scale));
+	printf("  the reference, by %s: its own relMSE %.3g\n", reference.integrator, error_by_spread(&reference.image, scale));
+	fflush(stdout);
 	canvas_image_fini(&reference.image);
 	mem_free(scale);
 	for (size_t i = 0; i < count; i++)

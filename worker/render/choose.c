@@ -4,14 +4,16 @@
 #include "common/base/tick.h"
 #include "worker/path/integrator.h"
 #include "worker/render/brightness.h"
+#include "worker/render/tail.h"
 
 #include <stdio.h>
 #include <string.h>
 
 enum {
-	SAMPLES_LEAST = 1 << 13,
-	SAMPLES_MOST = 1 << 15,
+	SAMPLES_LEAST = 1 << 14, /* of 8,192 the tail says too little: 2.0 to 2.5 in cornell-box, 1.5 to 2.3 in three-spheres */
+	SAMPLES_MOST = 1 << 18,
 	SAMPLES_SHARE = 128, /* one of so many samples of the render, of each kind */
+	SHORTER = 4,         /* of bdpt, where only its cost is asked for */
 	IN_PIXEL = 16,       /* samples of one pixel */
 	DROPPED = 3,         /* largest terms */
 	STREAM_MAP = 0, STREAM_PATH, STREAM_BDPT, STREAM_PIXEL, /* steps of RNG_CHOICE */
@@ -20,16 +22,24 @@ enum {
 /* Of the scenes of tests/bench/README.md: more in the four where chains win by factors (pane and frosted, eight seeds each: 15 of 16
  * pilots of 8,192 samples, 16 of 16 of 16,384), 0.16 or less in all others but veach-door, where it is 0.1 to 0.34. */
 static const double rare_share = 0.28;
+/* With 16,384 samples, five seeds each: the larger of both extremes is 0.67 to 0.79 in half-sunk, where chains are as good as the
+ * others but for fireflies (four times better with them), and the smaller share of rare light 6 to 16 %. In all other scenes that do not
+ * call for chains one of them is 1.03 or more but for one pilot of displaced: 0.82, with 3 % of the light rare. */
+static const double extreme_least = 0.85, extreme_share = 0.05;
+/* The same of path's tail: 2.1 to 2.8 in cornell-box and veach-mis and more in box, where path is the best by 1.2 to 1.4 x; 0.9 to 2.0 but
+ * for one of rough-caustic (2.3) in that, three-spheres, demo, displaced and veach-door, where bdpt is, by up to 2.1 x (6 x with
+ * fireflies). */
+static const double tail_least = 2.1;
 /* bdpt errs less than the pilot says: it has the shorter tails. */
-static const double path_cost = 0.75, path_heavy = 1.5, heavy_least = 0.05;
+static const double path_cost = 0.75;
 
 /* ---- what samples bring */
 
 /* Sums over samples of one kind, relative to the brightness of their places. */
 struct tally {
 	double samples, rays;
-	double square, energy, rare, heavy;
-	double most, most_square[DROPPED]; /* the largest terms, falling */
+	double square, energy, rare;
+	struct tail *tail;
 };
 
 /* One sample of a pixel: what it brings there, and to other places. */
@@ -39,24 +49,14 @@ struct parts {
 	double elsewhere[PATH_MAX_SPLATS];
 };
 
-static void keep_most(double most[DROPPED], double term)
-{
-	for (int i = 0; i < DROPPED; i++)
-		if (term > most[i]) {
-			double smaller = most[i];
-			most[i] = term;
-			term = smaller;
-		}
-}
-
 static void add_term(struct tally *t, double y)
 {
+	if (!(y > 0))
+		return;
 	t->energy += y;
 	t->rare += fmax(y - RENDER_RARE, 0);
-	t->heavy += fmax(y - RENDER_HEAVY, 0);
 	t->square += y * y;
-	t->most = fmax(t->most, y);
-	keep_most(t->most_square, y * y);
+	tail_add(t->tail, y);
 }
 
 /* A pixel that is brighter than the map knows, a lamp's, is so in all its samples: each is held against what the others found,
@@ -75,20 +75,45 @@ static void add_pixel(struct tally *t, const struct parts *of)
 
 static struct render_found found(const struct tally *t)
 {
-	struct render_found f = {0, 0, 0};
+	struct render_found f = {0, 0, 1, 1};
+	const struct tail *tail = t->tail;
 	double square = t->square;
-	for (int i = 0; i < DROPPED; i++)
-		square -= t->most_square[i];
 	if (!(t->energy > 0))
 		return f;
+	tail_settle(t->tail);
+	for (size_t i = 0; i < DROPPED && i < tail->held; i++)
+		square -= tail->y[i] * tail->y[i];
 	f.cost = fmax(square, 0) / t->samples * t->rays / t->samples;
+	f.tail = tail_index(tail, (size_t)t->samples / RENDER_TAIL);
+	f.extreme = tail_index(tail, (size_t)t->samples / RENDER_EXTREME);
 	/* One sample alone proves nothing: the edge of a lamp that the pixel's others missed. */
-	double energy = t->energy - t->most;
-	if (energy > 0) {
-		f.rare = fmax(t->rare - fmax(t->most - RENDER_RARE, 0), 0) / energy;
-		f.heavy = fmax(t->heavy - fmax(t->most - RENDER_HEAVY, 0), 0) / energy;
-	}
+	double most = tail->y[0], energy = t->energy - most;
+	if (energy > 0)
+		f.rare = fmax(t->rare - fmax(most - RENDER_RARE, 0), 0) / energy;
 	return f;
+}
+
+/* ---- the choice */
+
+/* As far as one of the two says. No light: the bootstrap of chains looks for it much longer. */
+static bool wants_chains(const struct render_found *f)
+{
+	return !(f->cost > 0) || f->rare > rare_share || (f->rare > extreme_share && f->extreme < extreme_least);
+}
+
+bool render_choice_is_settled(const struct render_choice *c)
+{
+	return !c->misses && !wants_chains(&c->path) && c->path.tail < tail_least;
+}
+
+const char *render_choice_of(const struct render_choice *c)
+{
+	if (render_choice_is_settled(c))
+		return "bdpt";
+	if (wants_chains(&c->bdpt) && (c->misses || wants_chains(&c->path)))
+		return "hslt";
+	bool path = !c->misses && c->path.cost > 0 && c->path.tail >= tail_least && c->path.cost < path_cost * c->bdpt.cost;
+	return path ? "path" : "bdpt";
 }
 
 /* ---- the pilot */
@@ -100,6 +125,7 @@ struct pilot {
 	struct path_sample sample;
 	struct brightness map;
 	struct parts parts[IN_PIXEL];
+	struct tail tail;
 	uint64_t counters[BATCH_COUNTERS];
 };
 
@@ -155,12 +181,14 @@ static void take_parts(const struct pilot *p, const struct film_window *pixel, s
 	}
 }
 
-static struct render_found look(struct pilot *p, uint64_t stream, void (*trace)(struct path_context *, struct sampler *, struct path_sample *))
+static struct render_found look(struct pilot *p, uint64_t stream, uint64_t samples,
+				 void (*trace)(struct path_context *, struct sampler *, struct path_sample *))
 {
-	struct tally t = {.samples = (double)(p->samples / IN_PIXEL * IN_PIXEL)};
+	struct tally t = {.samples = (double)(samples / IN_PIXEL * IN_PIXEL), .tail = &p->tail};
 	const struct film_window *w = &p->context.window;
 	memset(p->counters, 0, sizeof p->counters);
-	for (uint64_t i = 0; i < p->samples / IN_PIXEL; i++) {
+	tail_clear(&p->tail);
+	for (uint64_t i = 0; i < samples / IN_PIXEL; i++) {
 		double u[4];
 		tick();
 		rng_uniform4(p->seed, RNG_CHOICE, i, STREAM_PIXEL, stream, u); /* pixels of its own */
@@ -179,7 +207,7 @@ static struct render_found look(struct pilot *p, uint64_t stream, void (*trace)(
 	return found(&t);
 }
 
-/* A power of two, so that nearly equal renders have equal pilots. */
+/* The nearest power of two, so that nearly equal renders have equal pilots. */
 static uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels)
 {
 	uint64_t total = UINT64_MAX, n = SAMPLES_LEAST;
@@ -187,7 +215,7 @@ static uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels)
 		total = r->spp * pixels;
 	if (r->mutations && r->mutations < total)
 		total = r->mutations;
-	while (n < SAMPLES_MOST && n < total / SAMPLES_SHARE)
+	while (n < SAMPLES_MOST && (double)n * M_SQRT2 < (double)(total / SAMPLES_SHARE))
 		n *= 2;
 	return n;
 }
@@ -214,16 +242,23 @@ static int run(struct pilot *p, const struct plan *film, struct render_choice *o
 {
 	p->context = (struct path_context){.w = p->w, .window = film_window_of(film), .min_depth = film->min_depth,
 					   .max_depth = film->max_depth, .roulette = true, .unclassed = true, .counters = p->counters};
-	int rc = make_map(p, out->misses, e);
+	int rc = tail_init(&p->tail, p->samples / RENDER_TAIL + 1);
+	rc = rc ? error_set(e, ENOMEM, "no memory for a pilot") : make_map(p, out->misses, e);
 	if (!rc) {
-		out->bdpt = look(p, STREAM_BDPT, path_trace_both_ways);
-		out->path = look(p, STREAM_PATH, path_trace);
+		out->path = look(p, STREAM_PATH, p->samples, path_trace);
+		out->settled = render_choice_is_settled(out);
+		out->samples = 2 * p->samples;
+		if (!out->settled) {
+			bool briefly = !out->misses && !wants_chains(&out->path);
+			uint64_t samples = p->samples / (briefly ? SHORTER : 1);
+			out->bdpt = look(p, STREAM_BDPT, samples, path_trace_both_ways);
+			out->samples += samples;
+		}
 	}
 	brightness_fini(&p->map);
+	tail_fini(&p->tail);
 	return rc;
 }
-
-/* ---- the choice */
 
 /* A path from the camera never meets a delta emitter, and is not joined to one through an exactly specular lobe. */
 static bool path_misses(const struct world *w)
@@ -236,21 +271,11 @@ static bool path_misses(const struct world *w)
 	return emitter && lobe;
 }
 
-const char *render_choice_of(const struct render_choice *c)
-{
-	bool dark = !(c->path.cost > 0) && !(c->bdpt.cost > 0); /* its bootstrap looks for light much longer */
-	double rare = c->misses ? c->bdpt.rare : fmin(c->path.rare, c->bdpt.rare);
-	if (dark || rare > rare_share)
-		return "hslt";
-	bool tails = c->path.heavy > fmax(heavy_least, path_heavy * c->bdpt.heavy);
-	return !c->misses && c->path.cost > 0 && c->path.cost < path_cost * c->bdpt.cost && !tails ? "path" : "bdpt";
-}
-
 int render_choose(const struct world *w, struct plan_request *r, struct render_choice *out, struct error *e)
 {
 	struct render_summary summary;
 	struct plan film;
-	*out = (struct render_choice){.path = {0, 0, 0}};
+	*out = (struct render_choice){.path = {0, 0, 1, 1}, .bdpt = {0, 0, 1, 1}};
 	int rc = film_of(r, &film, e);
 	struct pilot *p = rc ? NULL : mem_alloc(1, sizeof *p);
 	if (!rc && !p)
@@ -276,7 +301,14 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 
 void render_choice_text(const char *integrator, const struct render_choice *c, char *text, size_t size)
 {
-	snprintf(text, size, "%s, by a pilot: light beyond %d times the brightness of its place path %.3g %%, bdpt %.3g %%; "
-			     "second moment times rays path %.3g, bdpt %.3g",
-		 integrator, RENDER_RARE, 100 * c->path.rare, 100 * c->bdpt.rare, c->path.cost, c->bdpt.cost);
+	const struct render_found *p = &c->path, *b = &c->bdpt;
+	int n = snprintf(text, size, "%s, by a pilot: path: %.3g %% of the light beyond %d times the brightness of its place, tail index %.2f, "
+				     "of the extreme %.2f, second moment times rays %.3g",
+			 integrator, 100 * p->rare, RENDER_RARE, p->tail, p->extreme, p->cost);
+	if (n < 0 || (size_t)n >= size)
+		return;
+	if (c->settled)
+		snprintf(text + n, size - (size_t)n, "; so bdpt was not tried");
+	else
+		snprintf(text + n, size - (size_t)n, "; bdpt: %.3g %%, %.2f, %.2f, %.3g", 100 * b->rare, b->tail, b->extreme, b->cost);
 }
