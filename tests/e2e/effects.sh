@@ -14,6 +14,23 @@ SCENE=$DIR/scene/box.xml
 grep -q '^textures  *off' "$DIR/list" || fail "textures of a material that nobody uses: $(cat "$DIR/list")"
 grep -q '^aperture  *off' "$DIR/list" || fail "no word on the aperture"
 "$BIN/hslt-render" --explain --effects=+aperture "$SCENE" 2>/dev/null | grep -q '^aperture  *on (forced)' || fail "not forced"
+
+# Which integrators were considered, what was chosen, and why: by --explain and by --stats.
+"$BIN/hslt-render" --explain --json "$SCENE" --spp 32 >"$DIR/explained.json" 2>"$DIR/log" || fail "--explain --json: $(cat "$DIR/log")"
+"$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" --stats "$DIR/stats.json" --spp 32 --size 64x36 --quiet || fail "hslt-render --stats"
+python3 - "$DIR/explained.json" "$DIR/stats.json" <<-'END' || fail "$(cat "$DIR/explained.json")"
+	import json, sys
+	for name in sys.argv[1:]:
+	    o = json.load(open(name))
+	    c = o["choice"]
+	    assert o["integrator"] == "path" and c["considered"] == ["path", "bdpt", "hslt"] and c["why"].startswith("path, by a pilot:"), c
+	    assert c["pilotSamples"] >= 32768 and not c["pathMissesLight"], c
+	    assert c["path"]["tailIndex"] > 2.1 and 0 < c["path"]["secondMomentTimesRays"] < 0.75 * c["bdpt"]["secondMomentTimesRays"], c
+END
+"$BIN/hslt-render" --explain "$SCENE" --spp 32 | grep -q '^path, by a pilot' || fail "--explain does not say why"
+"$BIN/hslt-render" --explain "$SCENE" -i bdpt | grep -q '^asked for; else a pilot' || fail "--explain -i bdpt"
+"$BIN/hslt-render" --explain --json "$SCENE" -i bdpt | grep -q '"choice":null' || fail "--explain --json -i bdpt"
+
 for p in render submit; do
 	code=0
 	HSLT_COORDINATOR=127.0.0.1:1 "$BIN/hslt-$p" "$SCENE" -o "$DIR/a.exr" --effects=+apertur 2>"$DIR/wrong.log" || code=$?

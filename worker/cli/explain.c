@@ -1,6 +1,7 @@
 #include "worker/cli/explain.h"
 
 #include "common/base/mem.h"
+#include "worker/cli/choice.h"
 
 #include <jansson.h>
 #include <stdio.h>
@@ -13,14 +14,14 @@ static const char *state_of(const struct effect_line *l)
 	return l->on ? "on" : "off";
 }
 
-/* Edges of the longest path that the image has; as many as asked for where the integrator is still to be chosen. */
+/* Edges of the longest path that the image has. */
 static uint32_t held_depth(const struct plan_request *p)
 {
 	const struct render_integrator *integrator = render_integrator_find(p->integrator);
 	return integrator && integrator->max_depth < p->max_depth ? integrator->max_depth : p->max_depth;
 }
 
-static void print_lines(const char *name, const struct render_summary *m, const struct plan_request *p)
+static void print_lines(const char *name, const struct render_summary *m, const struct plan_request *p, const struct choice *c)
 {
 	char note[512];
 	printf("%s: %llu shapes, %llu triangles\n\n", name, (unsigned long long)m->shapes, (unsigned long long)m->triangles);
@@ -33,13 +34,14 @@ static void print_lines(const char *name, const struct render_summary *m, const 
 		printf(" asked for, of at most %u held (what is longer is missing in the image: its note says how much)", held_depth(p));
 	if (*p->mixture)
 		printf(", mutations %s", p->mixture);
-	printf("\n");
+	printf("\n%s\n", c->made ? c->text : "asked for; else a pilot would choose among path, bdpt and " RENDER_INTEGRATOR_CHAINS);
 	render_effects_note(m, note, sizeof note);
 	if (*note)
 		printf("note: %s\n", note);
 }
 
-static int print_json(const char *name, const struct render_summary *m, const struct plan_request *p, struct error *e)
+static int print_json(const char *name, const struct render_summary *m, const struct plan_request *p, const struct choice *c,
+		      struct error *e)
 {
 	char note[512];
 	render_effects_note(m, note, sizeof note);
@@ -49,8 +51,9 @@ static int print_json(const char *name, const struct render_summary *m, const st
 		json_array_append_new(effects, json_pack("{s:s s:b s:b s:s s:s}", "name", l->name, "on", (int)l->on, "forced",
 							 (int)l->forced, "why", l->why, "saves", l->saves));
 	}
-	json_t *o = json_pack("{s:i s:s s:s s:s s:i s:i s:o s:s}", "schema", 1, "scene", name, "integrator", p->integrator, "mixture",
-			      p->mixture, "maxDepth", (int)p->max_depth, "heldDepth", (int)held_depth(p), "effects", effects, "note", note);
+	json_t *o = json_pack("{s:i s:s s:s s:s s:i s:i s:o s:o s:s}", "schema", 1, "scene", name, "integrator", p->integrator, "mixture",
+			      p->mixture, "maxDepth", (int)p->max_depth, "heldDepth", (int)held_depth(p), "choice",
+			      choice_to_json(c), "effects", effects, "note", note);
 	if (!o)
 		return error_set(e, ENOMEM, "no memory for the list of effects");
 	json_dumpf(o, stdout, JSON_COMPACT);
@@ -84,10 +87,13 @@ int explain(const char *path, struct render_arguments *a, bool json, bool *usage
 		rc = render_plan_from_scene(a, &m, e);
 		*usage = rc == -EINVAL;
 	}
+	struct choice choice;
+	if (!rc)
+		rc = choice_make(a, folder, name, &choice, e);
 	if (!rc && json)
-		rc = print_json(name, &m, &a->plan, e);
+		rc = print_json(name, &m, &a->plan, &choice, e);
 	else if (!rc)
-		print_lines(name, &m, &a->plan);
+		print_lines(name, &m, &a->plan, &choice);
 	mem_free(folder);
 	mem_free(name);
 	return rc;

@@ -1,4 +1,5 @@
-/* hslt-render --explain: what a scene calls for, why, and what leaving the rest out saves. Renders nothing. */
+/* hslt-render --explain: what a scene calls for, why, and what leaving the rest out saves; which integrators were
+ * considered, and why one was chosen. Renders nothing but the pilot of that choice. */
 #ifndef WORKER_CLI_EXPLAIN_H
 #define WORKER_CLI_EXPLAIN_H
 

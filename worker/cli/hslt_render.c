@@ -129,7 +129,8 @@ struct session {
 	struct agreement agreement;
 	double forecast_seconds; /* from the first bootstrap sample to the target; 0: unknown */
 	char forecast[160];
-	double build_seconds, choice_seconds;
+	double build_seconds;
+	struct choice choice;
 	struct progress progress;
 	bool usage; /* what went wrong was asked for */
 };
@@ -165,12 +166,9 @@ static int load(struct session *s, struct error *e)
 
 static int choose(struct session *s, struct error *e)
 {
-	char text[PLAN_TEXT];
-	double begin = now();
-	int rc = choice_in_world(s->world, &s->a->render, text, sizeof text, e);
-	s->choice_seconds = now() - begin;
-	if (!rc && *text && !s->a->quiet)
-		fprintf(stderr, "%s (%.2f s)\n", text, s->choice_seconds);
+	int rc = choice_in_world(s->world, &s->a->render, &s->choice, e);
+	if (!rc && s->choice.made && !s->a->quiet)
+		fprintf(stderr, "%s (%.2f s)\n", s->choice.text, s->choice.seconds);
 	return rc;
 }
 
@@ -375,7 +373,8 @@ static int run(struct session *s, struct error *e)
 		rc = write_image(s, e);
 	if (!rc && s->a->stats)
 		rc = stats_write(s->a->stats,
-				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->agreement, s->build_seconds, &s->looks}, e);
+				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->agreement, s->build_seconds, &s->looks,
+						 &s->choice}, e);
 	if (!rc && !s->a->quiet)
 		say(s);
 	else if (!rc && s->image.rel_mse_doubt)

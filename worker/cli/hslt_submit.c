@@ -265,15 +265,15 @@ int main(int argc, char **argv)
 		fprintf(stderr, "hslt-submit: note: %s\n", note);
 	a.request.output = a.estimate ? "" : last_part(a.output);
 	a.request.name = a.name ? a.name : b.scene;
-	char choice[PLAN_TEXT];
-	rc = choice_make(&a.render, b.folder, b.scene, choice, sizeof choice, &e);
+	struct choice choice;
+	rc = choice_make(&a.render, b.folder, b.scene, &choice, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		scene_bundle_fini(&b);
 		return 1;
 	}
-	if (*choice)
-		fprintf(stderr, "%s\n", choice);
+	if (choice.made)
+		fprintf(stderr, "%s\n", choice.text);
 	measure(&a, &b);
 	rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {

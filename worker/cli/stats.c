@@ -76,6 +76,7 @@ int stats_write(const char *path, const struct stats *s, struct error *e)
 {
 	json_t *o = plan_json(s);
 	bool whole = json_object_update_new(o, image_json(s->image)) == 0 &&
+		     json_object_set_new(o, "choice", choice_to_json(s->choice)) == 0 &&
 		     json_object_set_new(o, "effects", effects_json(s->summary)) == 0 &&
 		     json_object_set_new(o, "looks", forecast_looks_to_json(s->looks)) == 0 &&
 		     json_object_update_new(o, end_json(s)) == 0;

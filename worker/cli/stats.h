@@ -1,11 +1,12 @@
 /*
- * What --stats FILE holds, as JSON: plan, times, counters, strategies, effects, which bound ended the render. One thread.
+ * What --stats FILE holds, as JSON: plan, why its integrator was chosen, times, counters, strategies, effects, which bound ended the render. One thread.
  */
 #ifndef WORKER_CLI_STATS_H
 #define WORKER_CLI_STATS_H
 
 #include "common/film/agreement.h"
 #include "common/film/forecast.h"
+#include "worker/cli/choice.h"
 #include "worker/cli/local.h"
 
 struct stats {
@@ -16,6 +17,7 @@ struct stats {
 	const struct agreement *agreement; /* of the image */
 	double build_seconds; /* of the world */
 	const struct forecast_history *looks;
+	const struct choice *choice; /* of the integrator */
 };
 
 int stats_write(const char *path, const struct stats *s, struct error *e);
