@@ -162,6 +162,11 @@ bool canvas_has(const struct canvas *c, const struct lease_key *k)
 	return canvas_lease_merged(c, lease_set(k), k->group, k->part);
 }
 
+void canvas_set_tail(struct canvas *c, double index)
+{
+	c->b_tail = index;
+}
+
 void canvas_set_rounds(struct canvas *c, uint64_t rounds)
 {
 	assert(rounds >= c->rounds);

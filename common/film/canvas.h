@@ -37,6 +37,8 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e);
 /* Before anything is done with a render batch: no pixel of it takes an eighth of the film's range. -EBADMSG: of chains, which cannot
  * be so long in one pixel; -ERANGE: of samples, which may be as bright as they like, but not here. */
 int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e);
+/* The tail index of the independent samples (common/film/tail.h), from the bootstrap. */
+void canvas_set_tail(struct canvas *c, double index);
 /* The plan ends after so many rounds now, not fewer than are open. */
 void canvas_set_rounds(struct canvas *c, uint64_t rounds);
 /* Room on the disk for the tiles of a render batch, so that adding it does not fail for want of it. -ENOSPC and what else a disk
@@ -96,7 +98,8 @@ struct canvas_image {
 	uint32_t tiles_across, tiles_down;
 	float *r_hat, *tile_error, *tile_share;
 	struct path_class_energy classes[PATH_CLASSES];
-	double b, b_error;      /* pooled b and its standard error (chains) */
+	double b, b_error;      /* pooled b and its standard error (chains); stated_b_doubt says where that is not to be believed */
+	double b_tail;          /* tail index of the independent samples that b is the mean of; 0: not known */
 	double beyond_share;
 	uint64_t samples, rounds;
 	struct canvas_counts counts; /* as the pixels; contributions refused in the bootstrap are added */

@@ -47,6 +47,7 @@ static void find_b(struct making *m)
 		square += (m->b[g] - mean) * (m->b[g] - mean);
 	m->img->b = ratio(exact_sum_value(&sum), (double)independent);
 	m->img->b_error = groups > 1 ? sqrt(square / groups / (groups - 1)) : NAN;
+	m->img->b_tail = m->c->plan.kind == PLAN_CHAINS ? m->c->b_tail : 0;
 	double outside = exact_sum_value(&beyond);
 	m->img->beyond_share = ratio(outside, outside + exact_sum_value(&bootstrap));
 }

@@ -34,6 +34,7 @@ struct canvas {
 	uint32_t merged[OPEN_ROUNDS]; /* leases of an open round, by its parity */
 	uint8_t *has;         /* [bootstrap, open parity 0, 1][group][part] */
 	struct tally prefix, open[OPEN_ROUNDS], bootstrap;
+	double b_tail; /* 0: not known */
 	struct moments *moments;
 };
 

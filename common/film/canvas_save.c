@@ -4,7 +4,7 @@
 
 #include <string.h>
 
-enum { VERSION = 1, END = UINT32_MAX };
+enum { VERSION = 2, END = UINT32_MAX };
 
 /* What must be equal for a file to fit. */
 struct head {
@@ -47,7 +47,7 @@ struct piece {
 	void *bytes;
 	size_t size;
 };
-enum { PIECES = 8 };
+enum { PIECES = 9 };
 
 static void pieces_of(struct canvas *c, struct piece p[PIECES])
 {
@@ -58,7 +58,8 @@ static void pieces_of(struct canvas *c, struct piece p[PIECES])
 					  {&c->prefix, sizeof c->prefix},
 					  {&c->open[0], sizeof c->open[0]},
 					  {&c->open[1], sizeof c->open[1]},
-					  {&c->bootstrap, sizeof c->bootstrap}};
+					  {&c->bootstrap, sizeof c->bootstrap},
+					  {&c->b_tail, sizeof c->b_tail}};
 	memcpy(p, all, sizeof all);
 }
 

@@ -16,7 +16,7 @@
 enum header_name {
 	H_VERSION, H_SCENE, H_INTEGRATOR, H_MIXTURE, H_OPTIONS, H_SEED, H_MIN_DEPTH, H_MAX_DEPTH, H_GROUPS, H_CHAINS, H_BOOTSTRAP, H_EPOCH,
 	H_ROUNDS, H_MUTATIONS, H_SAMPLES, H_B, H_B_ERROR, H_BEYOND, H_REL_MSE, H_REL_MSE_UPPER, H_REL_MSE_LOW_95, H_REL_MSE_HIGH_95,
-	H_REL_MSE_DEFINITION, H_REL_MSE_DOUBT, H_UNVISITED, H_ACCEPTED, H_INDEPENDENT,
+	H_REL_MSE_DEFINITION, H_REL_MSE_DOUBT, H_B_ERROR_DOUBT, H_UNVISITED, H_ACCEPTED, H_INDEPENDENT,
 	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_STRATEGIES, H_NOTE, H_AGREEMENT, H_DISAGREEMENT,
 	H_R_HAT_MEDIAN, H_R_HAT_WORST, H_CLASSES, H_EFFECTS, H_MIXED, H_WALL,
 	H_CPU, H_WORKERS, H_DATE, H_END, H_CROPS,
@@ -45,7 +45,8 @@ const struct header_row header_rows[] = {
 	[H_MUTATIONS] = {"hslt:mutations", STRING, false, "mutations that the image holds (Metropolis only)"},
 	[H_SAMPLES] = {"hslt:samples", STRING, false, "samples a pixel that the image holds (others)"},
 	[H_B] = {"hslt:b", DOUBLE, false, "integral of X+Y+Z over the image, pooled over groups (Metropolis only)"},
-	[H_B_ERROR] = {"hslt:bError", DOUBLE, false, "its standard error, from the groups"},
+	[H_B_ERROR] = {"hslt:bError", DOUBLE, false, "its standard error, from the groups; absent where it is not known"},
+	[H_B_ERROR_DOUBT] = {"hslt:bErrorDoubt", STRING, false, "why it is not known"},
 	[H_BEYOND] = {"hslt:beyondShare", DOUBLE, false, "share of the energy in paths too long for the chains"},
 	[H_REL_MSE] = {"hslt:relMSE", DOUBLE, false, "estimated relMSE, from the variance between groups"},
 	[H_REL_MSE_UPPER] = {"hslt:relMSEUpper", DOUBLE, false, "upper end of its 90 % interval; absent where it is not known"},
@@ -203,13 +204,23 @@ static void add_error(struct header *h, const struct canvas_image *img)
 		add_count(h, H_UNVISITED, img->unvisited);
 }
 
+static void add_b_error(struct header *h, const struct canvas_image *img)
+{
+	char why[STATED_ERROR_TEXT];
+	stated_b_doubt(img, why, sizeof why);
+	if (*why)
+		add_string(h, H_B_ERROR_DOUBT, why);
+	else
+		add_double(h, H_B_ERROR, img->b_error);
+}
+
 static void add_result(struct header *h, const struct canvas_image *img, const struct plan *p)
 {
 	if (p->kind == PLAN_CHAINS) {
 		add_int(h, H_CHAINS, p->chains);
 		add_count(h, H_MUTATIONS, img->samples);
 		add_double(h, H_B, img->b);
-		add_double(h, H_B_ERROR, img->b_error);
+		add_b_error(h, img);
 		add_double(h, H_BEYOND, img->beyond_share);
 		add_count(h, H_ACCEPTED, img->counts.counters[COUNT_ACCEPTED]);
 		add_count(h, H_INDEPENDENT, img->counts.counters[COUNT_INDEPENDENT]);

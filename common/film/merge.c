@@ -2,6 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/film/stated_error.h"
+#include "common/film/tail.h"
 
 #include <assert.h>
 #include <math.h>
@@ -12,7 +13,15 @@ struct bootstrap {
 	float *weights;        /* [bootstrap], in index order */
 	struct batch *batches; /* [group][part]: key, counters and sums only */
 	uint32_t missing;
+	struct tail tail; /* of all weights */
 };
+
+/* Of so many samples the largest that their tail is judged by: one in 512, but no less than give it a standard error of a quarter. */
+static size_t tail_count(const struct plan *p)
+{
+	uint64_t n = p->bootstrap / 512;
+	return n > 16 ? (size_t)n : 16;
+}
 
 int bootstrap_new(struct bootstrap **out, const struct plan *p, struct error *e)
 {
@@ -24,7 +33,7 @@ int bootstrap_new(struct bootstrap **out, const struct plan *p, struct error *e)
 		s->weights = mem_alloc(p->bootstrap, sizeof *s->weights);
 		s->batches = mem_alloc(s->missing, sizeof *s->batches);
 	}
-	if (!s || !s->weights || !s->batches) {
+	if (!s || !s->weights || !s->batches || tail_init(&s->tail, tail_count(p) + 1)) {
 		bootstrap_free(s);
 		return error_set(e, ENOMEM, "no memory for %llu bootstrap weights", (unsigned long long)p->bootstrap);
 	}
@@ -38,6 +47,7 @@ void bootstrap_free(struct bootstrap *s)
 		return;
 	mem_free(s->weights);
 	mem_free(s->batches);
+	tail_fini(&s->tail);
 	mem_free(s);
 }
 
@@ -64,6 +74,8 @@ int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
 	if (bootstrap_has(s, k->group, k->part))
 		return error_set(e, EEXIST, "the bootstrap lease is merged already");
 	memcpy(s->weights + r.begin, b->weights, b->weight_count * sizeof *b->weights);
+	for (size_t i = 0; i < b->weight_count; i++)
+		tail_add(&s->tail, (double)b->weights[i]);
 	struct batch *kept = batch_of(s, k->group, k->part);
 	kept->key = *k;
 	memcpy(kept->counters, b->counters, sizeof kept->counters);
@@ -111,9 +123,11 @@ void bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index)
 		index[k] = UINT64_MAX;
 }
 
-void bootstrap_to_canvas(const struct bootstrap *s, struct canvas *c)
+void bootstrap_to_canvas(struct bootstrap *s, struct canvas *c)
 {
 	assert(s->missing == 0);
+	tail_settle(&s->tail);
+	canvas_set_tail(c, tail_index(&s->tail, tail_count(&s->plan)));
 	for (uint32_t i = 0; i < s->plan.groups * s->plan.parts; i++) {
 		int rc = canvas_add(c, s->batches + i, NULL);
 		assert(rc == 0 || rc == -EEXIST);

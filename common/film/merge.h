@@ -22,8 +22,8 @@ void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r);
  * are those of plan_chain_range(). Where the group's bootstrap is black all are
  * UINT64_MAX: such a chain looks for light by independent proposals. */
 void bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index);
-/* Adds the independent sums of all batches to a new canvas. */
-void bootstrap_to_canvas(const struct bootstrap *s, struct canvas *c);
+/* Adds the independent sums of all batches, and what their largest samples say of b's error, to a new canvas. */
+void bootstrap_to_canvas(struct bootstrap *s, struct canvas *c);
 
 /* Which bound ended the job. Time and error are looked at after complete rounds only. */
 enum merge_end { MERGE_GOES_ON, MERGE_ROUNDS, MERGE_TIME, MERGE_ERROR };

@@ -28,6 +28,21 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 	}
 }
 
+/* The variance is finite above 2. Of 95 % intervals from 16 groups of 1,000 samples of a Pareto law 95 % hold at an index of 3, 93 % at 2.2,
+ * 91 % at 1.8, 80 % at 1.5, 28 % at 1.1 (3,000 trials each). The groups' own means do not tell: those that look regular are wrong more often. */
+static const double finite_variance = 2;
+
+void stated_b_doubt(const struct canvas_image *img, char *text, size_t size)
+{
+	struct text t = {text, size};
+	if (size)
+		text[0] = 0;
+	if (img->b_tail > 0 && img->b_tail < finite_variance)
+		text_put(&t, "independent samples that find light are too few or too unequal: their tail index is %.2f, and below %g their variance is "
+			     "infinite",
+			 img->b_tail, finite_variance);
+}
+
 void stated_error(const struct canvas_image *img, char *text, size_t size)
 {
 	struct text t = {text, size};

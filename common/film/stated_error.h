@@ -14,6 +14,10 @@ enum { STATED_ERROR_TEXT = 384 };
 /* Why the interval is not known: "78 % of it comes from pixels ...". Empty: it is known, or there is no estimate at all. */
 void stated_error_doubt(const struct canvas_image *img, char *text, size_t size);
 
+/* Why b's standard error is not known (chains): the spread between few groups of means whose variance is infinite says too little, as long
+ * as the rarest light has not come. Empty: it is known. */
+void stated_b_doubt(const struct canvas_image *img, char *text, size_t size);
+
 /* "relative error 8.60 % (95 %: 8.41 to 8.90 %)", or "relative error about 38 %, its interval is not known: ..."; where chains did
  * not come everywhere also how many pixels they left out. Empty: there is no estimate. */
 void stated_error(const struct canvas_image *img, char *text, size_t size);

@@ -25,7 +25,7 @@ struct head {
 	char fingerprint[256];
 };
 
-static const char magic[8] = "hsltC003";
+static const char magic[8] = "hsltC004";
 _Static_assert(sizeof(struct head) == 4528, "another layout is another version");
 
 struct writing {

@@ -41,9 +41,11 @@ static json_t *image_json(const struct canvas_image *i)
 	for (int k = 0; k < BATCH_COUNTERS; k++)
 		if (counter_names[k])
 			json_object_set_new(counters, counter_names[k], json_integer((json_int_t)i->counts.counters[k]));
-	char doubt[STATED_ERROR_TEXT];
+	char doubt[STATED_ERROR_TEXT], b_doubt[STATED_ERROR_TEXT];
 	stated_error_doubt(i, doubt, sizeof doubt);
-	return json_pack("{s:o s:o s:o s:o s:[oo] s:s s:s s:I s:o s:o}", "b", forecast_real(i->b), "bError", forecast_real(i->b_error), "relMSE",
+	stated_b_doubt(i, b_doubt, sizeof b_doubt);
+	return json_pack("{s:o s:o s:s s:o s:o s:[oo] s:s s:s s:I s:o s:o}", "b", forecast_real(i->b), "bError",
+			 *b_doubt ? json_null() : forecast_real(i->b_error), "bErrorDoubt", b_doubt, "relMSE",
 			 forecast_real(i->rel_mse), "relMSEUpper", *doubt ? json_null() : forecast_real(i->rel_mse_upper), "relMSE95",
 			 forecast_real(i->rel_mse_95[0]), forecast_real(i->rel_mse_95[1]), "relMSEDefinition", REL_MSE_DEFINITION,
 			 "relMSEDoubt", doubt, "unvisitedPixels", (json_int_t)i->unvisited, "beyondShare",

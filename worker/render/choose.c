@@ -2,9 +2,9 @@
 
 #include "common/base/mem.h"
 #include "common/base/tick.h"
+#include "common/film/tail.h"
 #include "worker/path/integrator.h"
 #include "worker/render/brightness.h"
-#include "worker/render/tail.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -51,8 +51,6 @@ struct parts {
 
 static void add_term(struct tally *t, double y)
 {
-	if (!(y > 0))
-		return;
 	t->energy += y;
 	t->rare += fmax(y - RENDER_RARE, 0);
 	t->square += y * y;

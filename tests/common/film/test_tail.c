@@ -4,8 +4,8 @@
  * Hill's estimate there is k a / Gamma(k): mean k / (k - 1), coefficient of variation 1 / sqrt(k - 2)). The bound is 4.5 standard
  * errors, two-sided level 7e-6 each; a bias of 7 % is found with more than 95 %.
  */
+#include "common/film/tail.h"
 #include "worker/math/rng.h"
-#include "worker/render/tail.h"
 
 #include <errno.h>
 #include <math.h>

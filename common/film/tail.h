@@ -3,15 +3,17 @@
  *
  * The tail index a is that of a Pareto law: of all numbers beyond y the share y^-a. Below 2 their variance is infinite, below 1 their
  * mean: more of them keep on finding larger ones, and what a few say of the sum is too small. Estimated by Hill (1975, A simple general
- * approach to inference about the tail of a distribution) from the k largest, with a relative standard error of 1 / sqrt(k). One thread.
+ * approach to inference about the tail of a distribution) from the k largest, with a relative standard error of 1 / sqrt(k). Numbers
+ * are positive and finite; others are left out. One thread.
  */
-#ifndef WORKER_RENDER_TAIL_H
-#define WORKER_RENDER_TAIL_H
+#ifndef COMMON_FILM_TAIL_H
+#define COMMON_FILM_TAIL_H
 
 #include <stddef.h>
 
 struct tail {
 	size_t held, most; /* most: of the largest that are kept; there is room for twice as many */
+	double least;      /* as many are known to be no less */
 	double *y;
 };
 
@@ -20,7 +22,7 @@ int tail_init(struct tail *t, size_t most);
 void tail_fini(struct tail *t);
 void tail_clear(struct tail *t);
 void tail_add(struct tail *t, double y);
-/* All numbers are there: y falls from now on. */
+/* Sorts: until more are added y[held] falls. */
 void tail_settle(struct tail *t);
 /* By the k largest, k < most. 1 where no more than k were added or k is 0; INFINITY where they are all equal. */
 double tail_index(const struct tail *t, size_t k);

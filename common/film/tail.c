@@ -1,4 +1,4 @@
-#include "worker/render/tail.h"
+#include "common/film/tail.h"
 
 #include "common/base/mem.h"
 
@@ -21,6 +21,7 @@ void tail_fini(struct tail *t)
 void tail_clear(struct tail *t)
 {
 	t->held = 0;
+	t->least = 0;
 }
 
 static int falling(const void *a, const void *b)
@@ -32,11 +33,16 @@ static int falling(const void *a, const void *b)
 void tail_settle(struct tail *t)
 {
 	qsort(t->y, t->held, sizeof *t->y, falling);
-	t->held = t->held < t->most ? t->held : t->most;
+	if (t->held < t->most)
+		return;
+	t->held = t->most;
+	t->least = t->y[t->most - 1];
 }
 
 void tail_add(struct tail *t, double y)
 {
+	if (!(y > t->least) || !isfinite(y))
+		return;
 	t->y[t->held++] = y;
 	if (t->held == 2 * t->most)
 		tail_settle(t);

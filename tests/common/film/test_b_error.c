@@ -1,0 +1,197 @@
+/*
+ * b's standard error, on independent samples whose law is known: 100 bootstraps each of 16 groups of 4,096 samples.
+ *
+ *   finite    of a Pareto law of index 3 and an exponential one the error is stated in at least 95 of 100, and b +- 2.131 errors (Student's
+ *             t, 15 degrees) holds the mean in at least 85 of 100. Level: a true coverage of 94 % gives less with a probability of
+ *             6e-4. Power: of errors that are too small by 2 (coverage 68 %) more than 99.9 % are found.
+ *   infinite  of indices 1.5 and 1.1 it is not stated, with the reason, in at least 95 of 100: the index by 128 samples has an error
+ *             of 9 %, so that one of 1.5 is taken for 2 or more once in 400. What it would have stated is printed: it holds the mean in 82
+ *             and 36 of 100.
+ *   words     header and reason; where few samples carry light; after the films were saved and read again.
+ */
+#include "common/base/mem.h"
+#include "common/film/canvas_save.h"
+#include "common/film/header.h"
+#include "common/film/merge.h"
+#include "common/film/stated_error.h"
+#include "tests/support/dice.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { GROUPS = 16, SAMPLES = 4096, TIMES = 100 };
+
+static const struct plan plan = {.integrator = "hslt", .kind = PLAN_CHAINS, .width = 4, .height = 4, .crop_width = 4, .crop_height = 4,
+				 .groups = GROUPS, .parts = 1, .chains = GROUPS, .epoch = 1, .bootstrap = GROUPS * SAMPLES,
+				 .rounds = UINT64_MAX, .seconds = 1, .max_depth = 8};
+
+typedef double law(struct dice *d, double index);
+
+static double pareto(struct dice *d, double index)
+{
+	return pow(1 - dice_throw(d), -1 / index);
+}
+
+static double exponential(struct dice *d, double unused)
+{
+	(void)unused;
+	return -log(1 - dice_throw(d));
+}
+
+static double seldom(struct dice *d, double share)
+{
+	return dice_throw(d) < share ? 1 : 0;
+}
+
+static struct canvas *film_of(struct dice *d, law *of, double index)
+{
+	struct bootstrap *s;
+	struct canvas *c;
+	struct bootstrap_result lit;
+	float *weights = mem_alloc(SAMPLES, sizeof *weights);
+	assert_non_null(weights);
+	assert_int_equal(bootstrap_new(&s, &plan, NULL), 0);
+	for (uint32_t g = 0; g < GROUPS; g++) {
+		struct batch b = {.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .weights = weights, .weight_count = SAMPLES};
+		for (int i = 0; i < SAMPLES; i++) {
+			weights[i] = (float)of(d, index);
+			b.independent_sum += (double)weights[i];
+		}
+		b.counters[COUNT_SAMPLES] = b.counters[COUNT_INDEPENDENT] = SAMPLES;
+		assert_int_equal(bootstrap_add(s, &b, NULL), 0);
+	}
+	bootstrap_merge(s, &lit);
+	assert_int_equal(canvas_new(&c, &plan, canvas_grid_exponent(&plan, lit.b_pooled, 1), NULL, NULL), 0);
+	bootstrap_to_canvas(s, c);
+	bootstrap_free(s);
+	mem_free(weights);
+	return c;
+}
+
+static void take_image(const struct canvas *c, struct canvas_image *img)
+{
+	struct error e;
+	if (canvas_image(c, false, img, &e))
+		fail_msg("%s", e.text);
+}
+
+struct found {
+	int stated, held; /* held: of all */
+};
+
+static struct found try_law(const char *name, law *of, double index, double mean)
+{
+	struct dice d = dice_of(name);
+	struct found f = {0, 0};
+	for (int k = 0; k < TIMES; k++) {
+		struct canvas_image img;
+		char why[STATED_ERROR_TEXT];
+		struct canvas *c = film_of(&d, of, index);
+		take_image(c, &img);
+		stated_b_doubt(&img, why, sizeof why);
+		f.stated += *why == 0;
+		f.held += fabs(img.b - mean) <= 2.131 * img.b_error;
+		canvas_image_fini(&img);
+		canvas_free(c);
+	}
+	print_message("%s: stated in %d of %d, b within 2.131 errors in %d\n", name, f.stated, TIMES, f.held);
+	return f;
+}
+
+static void a_finite_variance_has_an_error_that_holds(void **state)
+{
+	(void)state;
+	struct found f[] = {try_law("b error, pareto 3", pareto, 3, 1.5), try_law("b error, exponential", exponential, 0, 1)};
+	for (int i = 0; i < 2; i++) {
+		assert_in_range(f[i].stated, 95, TIMES);
+		assert_in_range(f[i].held, 85, TIMES);
+	}
+}
+
+static void an_infinite_one_has_none(void **state)
+{
+	(void)state;
+	struct found f[] = {try_law("b error, pareto 1.5", pareto, 1.5, 3), try_law("b error, pareto 1.1", pareto, 1.1, 11)};
+	for (int i = 0; i < 2; i++)
+		assert_in_range(f[i].stated, 0, TIMES - 95);
+}
+
+static bool header_has(const struct canvas_image *img, const char *name)
+{
+	static struct header h;
+	header_fill(&h, img, &plan, &(struct header_extra){.scene = "test.xml", .date = ""});
+	for (size_t i = 0; i < h.count; i++)
+		if (strcmp(h.attributes[i].name, name) == 0)
+			return true;
+	return false;
+}
+
+static void the_header_says_which(void **state)
+{
+	(void)state;
+	static const struct {
+		law *of;
+		double index;
+		bool known;
+	} cases[] = {{exponential, 0, true}, {pareto, 1.1, false}, {seldom, 0.5, true}, {seldom, 0.001, false}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct dice d = dice_of("b error in the header");
+		struct canvas_image img;
+		char why[STATED_ERROR_TEXT];
+		struct canvas *c = film_of(&d, cases[i].of, cases[i].index);
+		take_image(c, &img);
+		assert_int_equal(header_has(&img, "hslt:bError"), cases[i].known);
+		assert_int_equal(header_has(&img, "hslt:bErrorDoubt"), !cases[i].known);
+		stated_b_doubt(&img, why, sizeof why);
+		assert_int_equal(strstr(why, "variance is infinite") != NULL, !cases[i].known);
+		canvas_image_fini(&img);
+		canvas_free(c);
+	}
+}
+
+static void it_outlives_the_coordinator(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("b error, saved");
+	struct canvas *c = film_of(&d, pareto, 1.3), *again;
+	struct canvas_image img[2];
+	struct sealed out, in;
+	struct error e;
+	char path[] = "/tmp/hslt-b-error-XXXXXX";
+	int fd = mkstemp(path);
+	assert_true(fd >= 0);
+	close(fd);
+	assert_int_equal(sealed_create(&out, path, &e), 0);
+	assert_int_equal(canvas_save(c, &out, &e), 0);
+	assert_int_equal(sealed_finish(&out, &e), 0);
+	assert_int_equal(canvas_new(&again, &plan, canvas_grid_exponent(&plan, 1, 1), NULL, NULL), 0);
+	assert_int_equal(sealed_open(&in, path, &e), 0);
+	assert_int_equal(canvas_load(again, &in, &e), 0);
+	sealed_close(&in);
+	unlink(path);
+	take_image(c, &img[0]);
+	take_image(again, &img[1]);
+	assert_true(img[0].b_tail > 0.5 && img[0].b_tail == img[1].b_tail);
+	for (int i = 0; i < 2; i++)
+		canvas_image_fini(&img[i]);
+	canvas_free(c);
+	canvas_free(again);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(a_finite_variance_has_an_error_that_holds),
+		cmocka_unit_test(an_infinite_one_has_none),
+		cmocka_unit_test(the_header_says_which),
+		cmocka_unit_test(it_outlives_the_coordinator),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
