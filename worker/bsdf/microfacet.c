@@ -5,16 +5,18 @@
 #include <float.h>
 #include <string.h>
 
-static double sin2(vec3 v)
+/* The length of v's part in the plane, stretched along v by the ratio: times alpha it is the sine that masking sees. */
+static double stretched_sine(const struct microfacet *m, vec3 v)
 {
-	return v.x * v.x + v.y * v.y;
+	return sqrt(v.x * v.x + m->ratio * m->ratio * (v.y * v.y));
 }
 
 double microfacet_d(const struct microfacet *m, vec3 h)
 {
 	if (!(h.z > 0))
 		return 0;
-	double a2 = m->alpha * m->alpha, c2 = h.z * h.z, s2 = sin2(h);
+	/* alpha_u alpha_v, and the sum of squared slopes over their roughness, times it. */
+	double a2 = m->alpha * m->alpha * m->ratio, c2 = h.z * h.z, s2 = h.x * h.x * m->ratio + h.y * h.y / m->ratio;
 	if (m->ggx) {
 		double d = a2 * c2 + s2;
 		return a2 / (WARP_PI * d * d);
@@ -26,7 +28,7 @@ double microfacet_d(const struct microfacet *m, vec3 h)
 
 double microfacet_g1_over_cos(const struct microfacet *m, vec3 v)
 {
-	double c = v.z, s = m->alpha * sqrt(sin2(v));
+	double c = v.z, s = m->alpha * stretched_sine(m, v);
 	if (m->ggx)
 		return 2 / (c + sqrt(c * c + s * s));
 	if (c >= 6 * s) /* 1 - G1 is below the rounding of double */
@@ -92,19 +94,20 @@ static double visible_slope(double c, double s, double u)
 
 static vec3 beckmann_visible(const struct microfacet *m, vec3 v, double u0, double u1)
 {
-	double sv = sqrt(sin2(v)), s = m->alpha * sv, r = sqrt(s * s + v.z * v.z);
+	double sv = stretched_sine(m, v), s = m->alpha * sv, r = sqrt(s * s + v.z * v.z), along_v = m->alpha * m->ratio;
 	double x = visible_slope(v.z / r, s / r, u0);
 	double y = erf_inverse(fmin(fmax(2 * u1 - 1, -1 + 0x1p-52), 1 - 0x1p-52));
-	double cos_phi = sv > 0 ? v.x / sv : 1, sin_phi = sv > 0 ? v.y / sv : 0;
-	return vec3_normalize((vec3){-m->alpha * (cos_phi * x - sin_phi * y), -m->alpha * (sin_phi * x + cos_phi * y), 1});
+	double cos_phi = sv > 0 ? v.x / sv : 1, sin_phi = sv > 0 ? m->ratio * v.y / sv : 0;
+	return vec3_normalize((vec3){-m->alpha * (cos_phi * x - sin_phi * y), -along_v * (sin_phi * x + cos_phi * y), 1});
 }
 
 static vec3 ggx_visible(const struct microfacet *m, vec3 v, double u0, double u1)
 {
-	vec3 stretched = vec3_normalize((vec3){m->alpha * v.x, m->alpha * v.y, v.z});
+	double along_v = m->alpha * m->ratio;
+	vec3 stretched = vec3_normalize((vec3){m->alpha * v.x, along_v * v.y, v.z});
 	double z = (1 - u1) * (1 + stretched.z) - stretched.z, r = sqrt(fmax(0, (1 - z) * (1 + z)));
 	double phi = 2 * WARP_PI * u0;
-	vec3 h = {m->alpha * (r * cos(phi) + stretched.x), m->alpha * (r * sin(phi) + stretched.y), z + stretched.z};
+	vec3 h = {m->alpha * (r * cos(phi) + stretched.x), along_v * (r * sin(phi) + stretched.y), z + stretched.z};
 	/* The rim of the cap rounds to z = 0 and r = 0 at once only for v in the plane: any normal on it will do. */
 	return h.z > 0 ? vec3_normalize(h) : (vec3){0, 0, 1};
 }
@@ -114,14 +117,30 @@ vec3 microfacet_sample_visible(const struct microfacet *m, vec3 v, double u0, do
 	return m->ggx ? ggx_visible(m, v, u0, u1) : beckmann_visible(m, v, u0, u1);
 }
 
+void microfacet_set(struct microfacet *m, bool ggx, double alpha_u, double alpha_v)
+{
+	m->ggx = ggx;
+	m->alpha = fmax(alpha_u, MICROFACET_ALPHA_MIN);
+	m->ratio = fmax(alpha_v, MICROFACET_ALPHA_MIN) / m->alpha;
+}
+
+double microfacet_least(const struct microfacet *m)
+{
+	return m->alpha * fmin(m->ratio, 1);
+}
+
+double microfacet_mean(const struct microfacet *m)
+{
+	return m->alpha * sqrt(m->ratio);
+}
+
 int microfacet_read(struct microfacet *m, const struct scene_node *n, struct error *e)
 {
 	double alpha = node_float(n, "alpha", 0.1);
-	double along_u = node_float(n, "alpha_u", alpha), along_v = node_float(n, "alpha_v", alpha);
-	if (along_u != along_v)
-		return node_error(n, e, ENOTSUP, "alpha_u = %g and alpha_v = %g differ; only isotropic roughness is supported",
-				  along_u, along_v);
-	m->alpha = fmax(along_u, MICROFACET_ALPHA_MIN);
-	m->ggx = strcmp(node_string(n, "distribution", "beckmann"), "ggx") == 0;
+	bool ggx = strcmp(node_string(n, "distribution", "beckmann"), "ggx") == 0;
+	microfacet_set(m, ggx, node_float(n, "alpha_u", alpha), node_float(n, "alpha_v", alpha));
+	if (m->ratio > MICROFACET_RATIO_MAX || m->ratio < 1 / MICROFACET_RATIO_MAX)
+		return node_error(n, e, ERANGE, "alpha_u = %g and alpha_v = %g are more than a factor of %g apart", m->alpha,
+				  m->alpha * m->ratio, MICROFACET_RATIO_MAX);
 	return 0;
 }

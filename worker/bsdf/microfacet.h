@@ -1,6 +1,6 @@
 /*
- * Isotropic microfacet distributions, Beckmann and GGX (Walter et al. 2007, Microfacet Models for Refraction), with
- * Smith's masking. Shadowing and masking are taken as independent, G2 = G1 G1, as Mitsuba does. Everything stays finite
+ * Microfacet distributions, Beckmann and GGX (Walter et al. 2007, Microfacet Models for Refraction), with Smith's masking; the
+ * roughness along u and v may differ (Heitz 2014, section 5.3: the isotropic one, stretched). Shadowing and masking are taken as independent, G2 = G1 G1, as Mitsuba does. Everything stays finite
  * at grazing angles because G1 is only ever wanted over the cosine. Roughness from MICROFACET_ALPHA_MIN up.
  */
 #ifndef WORKER_BSDF_MICROFACET_H
@@ -12,11 +12,17 @@
 #include <stdbool.h>
 
 #define MICROFACET_ALPHA_MIN 1e-6
+#define MICROFACET_RATIO_MAX 1e4
 
 struct microfacet {
 	bool ggx;
-	double alpha;
+	double alpha; /* along u */
+	double ratio; /* of the roughness along v to it */
 };
+
+void microfacet_set(struct microfacet *m, bool ggx, double alpha_u, double alpha_v);
+double microfacet_least(const struct microfacet *m); /* the smaller roughness of the two */
+double microfacet_mean(const struct microfacet *m);  /* their geometric mean */
 
 /* Density of microfacet normals: the integral of D(h) h.z over the hemisphere is 1. h unit. */
 double microfacet_d(const struct microfacet *m, vec3 h);

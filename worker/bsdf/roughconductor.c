@@ -77,8 +77,9 @@ static int roughconductor_create(struct bsdf *b, const struct scene_node *n, con
 		return code;
 	b->modes = BSDF_REFLECT;
 	b->has_smooth = true;
-	b->alpha = b->alpha_mean = r->facets.alpha;
-	if (r->facets.alpha < build->least_roughness) {
+	b->alpha = microfacet_least(&r->facets);
+	b->alpha_mean = microfacet_mean(&r->facets);
+	if (b->alpha < build->least_roughness) {
 		extern const struct bsdf_ops bsdf_ops_conductor;
 		bsdf_make_smooth(b, &bsdf_ops_conductor);
 	}

@@ -164,9 +164,10 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 		return code;
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT;
 	b->has_smooth = true;
-	b->alpha = b->alpha_mean = r->facets.alpha;
+	b->alpha = microfacet_least(&r->facets);
+	b->alpha_mean = microfacet_mean(&r->facets);
 	/* With equal indices no facet bends light: all of it goes straight on. */
-	if ((b->eta == 1 && !b->dispersive) || r->facets.alpha < build->least_roughness) {
+	if ((b->eta == 1 && !b->dispersive) || b->alpha < build->least_roughness) {
 		extern const struct bsdf_ops bsdf_ops_dielectric;
 		bsdf_make_smooth(b, &bsdf_ops_dielectric);
 	}

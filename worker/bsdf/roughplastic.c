@@ -120,6 +120,8 @@ static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const
 	if (!r)
 		return -ENOMEM;
 	int code = microfacet_read(&r->facets, n, e);
+	if (!code && r->facets.ratio != 1)
+		code = node_error(n, e, ENOTSUP, "alpha_u and alpha_v differ; only isotropic coatings are supported");
 	if (!code)
 		code = coating_read(&r->coating, b, n, build, e);
 	if (code)
@@ -127,8 +129,8 @@ static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const
 	/* A diffuse base has nothing to gain from an exact mirror above it: the coating stays rough, as smooth as it may be. */
 	tabulate(r);
 	double chance = r->coating.specular_weight;
-	b->alpha = chance > 0 ? r->facets.alpha : INFINITY;
-	b->alpha_mean = chance * r->facets.alpha + (1 - chance);
+	b->alpha = chance > 0 ? microfacet_least(&r->facets) : INFINITY;
+	b->alpha_mean = chance * microfacet_mean(&r->facets) + (1 - chance);
 	return 0;
 }
 
