@@ -89,8 +89,12 @@ slow_worker() {
 		done
 	) &
 	PIDS="$PIDS $!"
-	job
-	finish_job
+	# Where the machine is busy the other worker may be as slow for a while: one job of a few must show it.
+	for _ in 1 2 3 4 5 6; do
+		job
+		finish_job
+		[ "$(value "$ID" duplicates)" -eq 0 ] || break
+	done
 	[ "$(value "$ID" duplicates)" -gt 0 ] || fail "$NAME: nothing was computed twice"
 	kill -CONT "$(renders "$WORKER")"
 }
