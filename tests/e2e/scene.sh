@@ -1,6 +1,6 @@
-# hslt-scene: everything that is wrong with a file in one run; what was read of a good one.
+# hslt-scene: everything that is wrong with a file in one run; what was read of a good one; what leniency makes of what is not supported.
 . "$(dirname "$0")/lib.sh"
-need hslt-scene hslt-render
+need hslt-scene hslt-render hslt-compare
 
 code 0 "$BIN/hslt-scene" --help
 grep -qi example "$DIR/out" || fail "--help has no examples"
@@ -46,4 +46,42 @@ sum=$(sha256sum "$BOX" | cut -c1-16)
 grep -q "^$sum .* box.xml$" "$DIR/out" || fail "show has no file box.xml with its hash: $(cat "$DIR/out")"
 code 0 "$BIN/hslt-scene" show --json "$BOX"
 grep -q "\"schema\":1.*\"sha256\":\"$(sha256sum "$BOX" | cut -d' ' -f1)\"" "$DIR/out" || fail "--json says: $(cat "$DIR/out")"
+# What is not supported, and the scene that is rendered instead.
+scene() { # scene FILE FILTER LIGHT BSDF INSIDE MORE
+	cat >"$DIR/$1" <<XML
+<scene version="3.0.0">
+<sensor type="perspective"><float name="fov" value="40"/>
+	<transform name="to_world"><lookat origin="0,-6,3" target="0,0,1" up="0,0,1"/></transform>
+	<film type="hdrfilm"><integer name="width" value="24"/><integer name="height" value="16"/><rfilter type="$2"/></film></sensor>
+<emitter type="constant"><rgb name="radiance" value="1 1 1"/></emitter>$3
+$4
+<shape type="sphere"><point name="center" x="0" y="0" z="1"/><ref id="stuff"/>$5</shape>$6
+<shape type="rectangle"><transform name="to_world"><scale value="10"/></transform>
+	<bsdf type="diffuse"><rgb name="reflectance" value="0.2 0.5 0.2"/></bsdf></shape>
+</scene>
+XML
+}
+scene strange.xml lanczos '<emitter type="aurora"><float name="power" value="3"/></emitter>' \
+	'<bsdf type="bark" id="stuff"><texture type="perlin" name="knots"/><bsdf type="hair"><rgb name="base_color" value="0.8 0.2 0.1"/><float name="melanin" value="0.3"/></bsdf></bsdf>' \
+	'<medium name="interior" type="homogeneous"><float name="albedo" value="0.5"/></medium>' \
+	'<shape type="hair"><string name="filename" value="h.hair"/></shape><volume type="grid"/>'
+scene plain.xml gaussian '' '<bsdf type="diffuse" id="stuff"><rgb name="reflectance" value="0.8 0.2 0.1"/></bsdf>' '' ''
+code 1 "$BIN/hslt-scene" check "$DIR/strange.xml"
+code 0 "$BIN/hslt-scene" check --lenient "$DIR/strange.xml"
+for word in lanczos aurora bark melanin interior '`hair`' '<bsdf type="hair">' volume; do
+	grep "^note: .*(lenient)" "$DIR/out" | grep -q "$word" || fail "nothing is noted of $word: $(cat "$DIR/out")"
+done
+code 1 "$BIN/hslt-render" -i path --spp 4 "$DIR/strange.xml" -o "$DIR/strange.exr"
+code 0 "$BIN/hslt-render" -i path --spp 4 --lenient "$DIR/strange.xml" -o "$DIR/strange.exr"
+grep -q "strange.xml:[0-9]*: .*melanin.*(lenient)" "$DIR/err.log" || fail "a lenient render does not note it: $(cat "$DIR/err.log")"
+grep -aq "lenient=yes" "$DIR/strange.exr" || fail "the image does not say that it was read leniently"
+code 0 "$BIN/hslt-render" -i path --spp 4 "$DIR/plain.xml" -o "$DIR/plain.exr"
+code 0 "$BIN/hslt-compare" "$DIR/strange.exr" "$DIR/plain.exr"
+grep -q "^relMSE  *0 " "$DIR/out" || fail "the lenient image is not that of the scene it stands for: $(cat "$DIR/out")"
+# Leniency is not for what is supported and wrong, nor for what has no stand-in.
+sed 's/value="24"/value="wide"/' "$DIR/strange.xml" >"$DIR/wrong.xml"
+code 1 "$BIN/hslt-scene" check --lenient "$DIR/wrong.xml"
+sed 's/"perspective"/"fisheye"/' "$DIR/strange.xml" >"$DIR/wrong.xml"
+code 1 "$BIN/hslt-scene" check --lenient "$DIR/wrong.xml"
+grep -q fisheye "$DIR/out" || fail "of a sensor without a stand-in it says: $(cat "$DIR/out")"
 echo "check and show: all problems with their places, and what a good scene holds"

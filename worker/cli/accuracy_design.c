@@ -118,6 +118,8 @@ static bool with_knob(const char *base, const char *name, const char *value, cha
 /* Why a knob of the renderer does nothing here; NULL: it does. */
 static const char *idle(const struct planner *p, const struct render_knob *k)
 {
+	if (!k->sweep[0])
+		return "it decides what is rendered, not how accurately";
 	if (k->place == KNOB_CHAINS && !p->integrator->has_mutations)
 		return "the integrator has no strategies that walk";
 	if (strcmp(k->name, "tessellation") == 0 && !render_effect_on(p->scene, "displacement"))

@@ -33,7 +33,7 @@ int choice_make(struct render_arguments *a, const char *folder, const char *name
 	if (!integrator_is_open(&a->plan))
 		return 0;
 	struct asset_source assets = asset_folder(folder);
-	int rc = scene_read(&scene, &assets, name, render_plugins(), a->defines, a->define_count, e);
+	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &a->render, e);
 	if (rc)
 		return rc;
 	rc = world_new(&w, &scene, &assets, &a->render, e);

@@ -66,7 +66,7 @@ static int summarise(const char *folder, const char *name, struct render_argumen
 {
 	struct scene scene;
 	struct asset_source assets = asset_folder(folder);
-	int rc = scene_read(&scene, &assets, name, render_plugins(), a->defines, a->define_count, e);
+	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &a->render, e);
 	if (rc)
 		return rc;
 	rc = render_check(&scene, &assets, &a->render, m, e);

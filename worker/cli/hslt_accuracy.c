@@ -150,7 +150,7 @@ static int load(struct session *s, struct error *e)
 	if (rc)
 		return rc;
 	s->assets = asset_folder(s->folder);
-	rc = scene_read(&s->scene, &s->assets, s->name, render_plugins(), r->defines, r->define_count, e);
+	rc = render_scene_read(&s->scene, &s->assets, s->name, r->defines, r->define_count, &r->render, e);
 	if (rc)
 		return rc;
 	s->scene_read = true;

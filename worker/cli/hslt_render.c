@@ -150,7 +150,7 @@ static int load(struct session *s, struct error *e)
 	if (rc)
 		return rc;
 	struct asset_source assets = asset_folder(s->folder);
-	rc = scene_read(&scene, &assets, s->name, render_plugins(), s->a->render.defines, s->a->render.define_count, e);
+	rc = render_scene_read(&scene, &assets, s->name, s->a->render.defines, s->a->render.define_count, &s->a->render.render, e);
 	if (rc)
 		return rc;
 	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)

@@ -24,6 +24,7 @@ static const char doc[] =
 
 static const struct argp_option options[] = {
 	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 0},
+	{"lenient", 'l', NULL, 0, "As --lenient of hslt-render: what is not supported is left out or replaced, and is no problem but a note", 0},
 	{"json", 'j', NULL, 0, "show: one JSON object", 0},
 	{0},
 };
@@ -52,6 +53,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	switch (key) {
 	case 'D':
 		take_define(&a->request, arg, state);
+		return 0;
+	case 'l':
+		a->request.lenient = true;
 		return 0;
 	case 'j':
 		a->json = true;

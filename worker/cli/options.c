@@ -12,6 +12,7 @@
 enum {
 	OPTION_SPP = 1000, OPTION_MUTATIONS, OPTION_TIME, OPTION_TARGET, OPTION_SIZE, OPTION_CROP, OPTION_SEED, OPTION_MIN_DEPTH,
 	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH, OPTION_SET, OPTION_EFFECTS, OPTION_PARTS,
+	OPTION_LENIENT,
 };
 
 static const struct argp_option options[] = {
@@ -28,6 +29,8 @@ static const struct argp_option options[] = {
 	 "What is simulated although the scene does not call for it, or not although it does: all, or such as -dispersion,+aperture "
 	 "(hslt-render --explain lists them)", 1},
 	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 1},
+	{"lenient", OPTION_LENIENT, NULL, 0,
+	 "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted: --set lenient=yes", 1},
 	{NULL, 0, NULL, 0, "When to stop (the first bound met; without any, the scene's sampleCount):", 2},
 	{"spp", OPTION_SPP, "N", 0, "Samples a pixel, rounded up to whole rounds", 2},
 	{"mutations", OPTION_MUTATIONS, "N|LIST", 0,
@@ -230,6 +233,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_MAX_DEPTH:
 		p->max_depth = a->render.max_depth = whole32(state, "--max-depth", arg);
+		return 0;
+	case OPTION_LENIENT:
+		take_set(a, RENDER_LENIENT, state);
 		return 0;
 	case OPTION_EFFECTS:
 		take_effects(a, arg, state);

@@ -65,7 +65,7 @@ int scene_report_check(const struct scene_request *r, bool *bad, struct error *e
 	int rc = open_scene(r, &o, e);
 	if (rc)
 		return rc;
-	rc = scene_read_all(&s, &o.assets, o.name, render_plugins(), r->defines, r->define_count, e);
+	rc = scene_read_all(&s, &o.assets, o.name, render_plugins(), r->defines, r->define_count, r->lenient, e);
 	if (!rc) {
 		rc = print_check(&s, &o.assets, o.name, bad);
 		scene_fini(&s);
@@ -173,7 +173,7 @@ int scene_report_show(const struct scene_request *r, bool json, struct error *e)
 	int rc = open_scene(r, &o, e);
 	if (rc)
 		return rc;
-	rc = scene_read(&s, &o.assets, o.name, render_plugins(), r->defines, r->define_count, e);
+	rc = (r->lenient ? scene_read_lenient : scene_read)(&s, &o.assets, o.name, render_plugins(), r->defines, r->define_count, e);
 	if (!rc) {
 		json_t *all = describe(&s, &o, e);
 		if (all && json)

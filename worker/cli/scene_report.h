@@ -8,6 +8,7 @@ struct scene_request {
 	const char *path;
 	struct scene_define defines[256];
 	size_t define_count;
+	bool lenient; /* what is not supported is left out or replaced, and noted */
 };
 
 /* Prints a line for everything that is wrong, not supported, or ignored, and one that sums up. *bad: the scene cannot be

@@ -70,7 +70,7 @@ int speed_measure(const struct render_arguments *a, const char *folder, const ch
 	if (r.kind == PLAN_SAMPLES)
 		shrink(&o, &r);
 	struct asset_source assets = asset_folder(folder);
-	int rc = scene_read(&scene, &assets, name, render_plugins(), a->defines, a->define_count, e);
+	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &o, e);
 	if (rc)
 		return rc;
 	rc = world_new(&w, &scene, &assets, &o, e);

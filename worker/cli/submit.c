@@ -76,7 +76,7 @@ int scene_bundle_read(struct scene_bundle *b, const char *path, const struct sce
 		return rc;
 	struct opened opened = {asset_folder(b->folder), b};
 	struct asset_source assets = {&opened, open_remembered, close_remembered};
-	rc = scene_read(&scene, &assets, b->scene, render_plugins(), defines, define_count, e);
+	rc = render_scene_read(&scene, &assets, b->scene, defines, define_count, o, e);
 	if (!rc) {
 		rc = render_check(&scene, &assets, o, &b->summary, e);
 		if (!rc)

@@ -228,7 +228,7 @@ static int build(struct bundle *b, struct error *e)
 	struct scene scene;
 	for (size_t i = 0; i < m->n_defines; i++)
 		defines[i] = (struct scene_define){m->defines[i]->name, m->defines[i]->value};
-	int rc = scene_read(&scene, &assets, m->scene, render_plugins(), defines, m->n_defines, e);
+	int rc = render_scene_read(&scene, &assets, m->scene, defines, m->n_defines, &options, e);
 	if (rc)
 		return rc;
 	rc = check_plan(b, &scene, &options, e);

@@ -27,3 +27,5 @@ KNOB(roughness, "roughness", KNOB_REAL, KNOB_WORLD, 0, 0, 1, NULL,
 KNOB(tessellation, "tessellation", KNOB_REAL, KNOB_WORLD, 1, 1e-3, 64, NULL,
      "Factor of the parts into which displacement cuts an edge",
      "0.125", "0.25", "0.5", "1", "2")
+KNOB(lenient, "lenient", KNOB_CHOICE, KNOB_WORLD, 0, 0, 1, "no yes",
+     "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted", NULL)

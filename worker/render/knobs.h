@@ -27,7 +27,8 @@ struct render_knob {
 	double standard, least, greatest; /* standard: the default */
 	const char *choices;              /* of KNOB_CHOICE, with spaces between; a choice that is a number is worth that number,
 					     another one its place from 0 on */
-	const char *sweep[KNOB_SWEEP_MAX + 1]; /* values worth comparing, NULL at the end */
+	const char *sweep[KNOB_SWEEP_MAX + 1]; /* values worth comparing, NULL at the end; none: it is no matter
+						  * of accuracy */
 };
 
 /* NULL at the end. */

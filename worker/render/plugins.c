@@ -3,6 +3,7 @@
 
 #include "worker/bsdf/bsdf.h"
 #include "worker/emitter/emitter.h"
+#include "worker/render/knobs.h"
 #include "worker/shape/shape.h"
 
 #include <assert.h>
@@ -42,4 +43,14 @@ const struct plugin_decl *render_plugins(void)
 	static pthread_once_t once = PTHREAD_ONCE_INIT;
 	pthread_once(&once, gather);
 	return decls;
+}
+
+int render_scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct scene_define *defines,
+		      size_t define_count, const struct render_options *o, struct error *e)
+{
+	struct knobs k;
+	int code = knobs_read(o->knobs, &k, e);
+	if (code)
+		return code;
+	return (k.lenient > 0 ? scene_read_lenient : scene_read)(s, assets, name, render_plugins(), defines, define_count, e);
 }

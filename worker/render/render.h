@@ -63,6 +63,11 @@ struct render_summary {
 int render_check(const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 		 struct render_summary *out, struct error *e);
 
+/* Reads a scene by the tables of all plug-ins: scene_read, or scene_read_lenient where the options have RENDER_LENIENT. */
+int render_scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct scene_define *defines,
+		      size_t define_count, const struct render_options *o, struct error *e);
+#define RENDER_LENIENT "lenient=yes"
+
 /* The strategies that there are: a name and what it moves; NULL at the end. */
 const char *render_mutation_at(size_t index, const char **summary);
 

@@ -18,12 +18,19 @@ int report_init(struct report *r, struct arena *arena, struct error *e)
 __attribute__((format(printf, 5, 0))) int report_note(struct report *r, const char *file, const char *key, struct error *e, const char *format, va_list ap)
 {
 	char text[REPORT_TEXT_MAX];
+	vsnprintf(text, sizeof text, format, ap);
+	return report_text(r, file, key, text, e);
+}
+
+int report_text(struct report *r, const char *file, const char *key, const char *said, struct error *e)
+{
+	char text[REPORT_TEXT_MAX];
 	for (uint32_t i = 0; i < r->note_count; i++)
 		if (strcmp(r->note_keys[i], key) == 0)
 			return 0;
 	if (r->note_count == REPORT_NOTES_MAX)
 		return 0;
-	vsnprintf(text, sizeof text, format, ap);
+	snprintf(text, sizeof text, "%s", said);
 	text_clean(text);
 	if (r->note_count == REPORT_NOTES_MAX - 1)
 		snprintf(text, sizeof text, "%s: more is ignored than is listed here", file);

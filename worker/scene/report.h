@@ -26,6 +26,8 @@ int report_init(struct report *r, struct arena *arena, struct error *e);
 /* key: what kind of thing it is about; said before, it is not said again. 0 or -ENOMEM. */
 int report_note(struct report *r, const char *file, const char *key, struct error *e, const char *format, va_list ap);
 
+int report_text(struct report *r, const char *file, const char *key, const char *said, struct error *e);
+
 /* Something failed with `code` and the text in e. What can be gone on after is kept, and 0 returned; no memory cannot. 0 stays 0,
  * and REPORT_TOLD becomes 0: it has been kept before. */
 enum { REPORT_TOLD = 1 };

@@ -1,7 +1,9 @@
 #include "worker/scene/scene.h"
 
 #include "worker/scene/id_table.h"
+#include "worker/scene/lenient.h"
 #include "worker/scene/plugin.h"
+#include "worker/scene/remarks.h"
 #include "worker/scene/report.h"
 #include "worker/scene/value.h"
 #include "worker/scene/xml.h"
@@ -24,12 +26,14 @@ struct maker {
 	const char **assets;
 	size_t asset_count, asset_room;
 	int depth;
+	bool lenient;
 };
 
 /* A node while it grows. */
 struct draft {
 	struct scene_node *node;
 	const struct plugin_decl *decl;
+	bool stands_in; /* for a plug-in that is not supported */
 	struct property *properties;
 	const struct scene_node **children;
 };
@@ -67,6 +71,13 @@ static int note_property(struct maker *m, const struct xml_element *owner, const
 static int note_foreign(struct maker *m, const struct xml_element *el)
 {
 	return note(m, el, "", "", "%s:%d: <%.64s> and all inside it is ignored", el->file, el->line, el->name);
+}
+
+/* What is not supported goes, and that is said. */
+static int leave_out(struct maker *m, const struct xml_element *el, const char *type, const char *property, const char *what)
+{
+	return note(m, el, type, property, "%s:%d: <%.64s>: %s `%.64s` is not supported and left out (lenient)", el->file, el->line,
+		    el->name, what, *property ? property : type);
 }
 
 static int add_asset(struct maker *m, const char *name)
@@ -176,12 +187,14 @@ static int add_property(struct draft *d, const struct xml_element *el, const str
 static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner, const struct xml_element *el,
 		   const char *name, const struct param **p)
 {
-	const struct param *found = plugin_param(d->decl, name);
+	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, name) : name);
 	*p = NULL;
 	if (d->decl->status == PARAM_IGNORED) {
 		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
 		return 0;
 	}
+	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
+		return leave_out(m, el, xml_attribute(owner, "type"), name, "the parameter");
 	if (!found || found->status == PARAM_REFUSED)
 		return refuse_property(d, el, name, found, m->error);
 	if (found->status == PARAM_IGNORED)
@@ -206,6 +219,8 @@ static int read_property(struct maker *m, struct draft *d, const struct xml_elem
 	r = value_read(el, m->assets_from, &m->scene->arena, &v, m->error);
 	if (!r)
 		r = add_property(d, el, p, v, m->error);
+	if (r == -EINVAL && m->lenient && p->choices)
+		return leave_out(m, el, written, xml_attribute(el, "value"), "the value");
 	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
 		r = *v.as.string ? add_asset(m, v.as.string) : xml_error(el, m->error, EINVAL, "an empty file name");
 	const char *file = v.type == VALUE_SPECTRUM ? xml_attribute(el, "filename") : NULL;
@@ -239,6 +254,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	if (!p && !nested) {
 		if (d->decl->status == PARAM_IGNORED)
 			return 0;
+		if (m->lenient)
+			return leave_out(m, el, plugin_class_name(cls), d->node->type, "its use in");
 		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">", plugin_class_name(cls),
 				 written ? "" : " without a name", owner->name, d->node->type);
 	}
@@ -272,6 +289,11 @@ static int refuse_element(const struct xml_element *el, struct error *e)
 			 spelling_hint(&s, hint, sizeof hint));
 }
 
+static int foreign_element(struct maker *m, const struct xml_element *el)
+{
+	return m->lenient ? leave_out(m, el, el->name, "", "the element") : refuse_element(el, m->error);
+}
+
 static int read_content(struct maker *m, struct draft *d, const struct xml_element *owner, struct xml_element *el)
 {
 	enum plugin_class cls;
@@ -284,7 +306,7 @@ static int read_content(struct maker *m, struct draft *d, const struct xml_eleme
 	if (strcmp(el->name, "default") == 0)
 		return 0;
 	if (strcmp(el->name, "ref") != 0)
-		return d->decl->status == PARAM_IGNORED ? 0 : refuse_element(el, m->error);
+		return d->decl->status == PARAM_IGNORED ? 0 : foreign_element(m, el);
 	if (d->decl->status == PARAM_IGNORED && !d->decl->nested_classes)
 		return 0;
 	struct xml_element *target;
@@ -332,6 +354,49 @@ static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
 	return 0;
 }
 
+/* The BSDF inside one that is not supported; NULL: none. */
+static struct xml_element *inner_bsdf(struct maker *m, const struct xml_element *el)
+{
+	struct error unused;
+	enum plugin_class cls;
+	for (struct xml_element *c = el->first; c; c = c->next) {
+		struct xml_element *target = c;
+		if (strcmp(c->name, "ref") == 0 && id_table_find(&m->ids, c, "id", &target, &unused))
+			continue;
+		if (plugin_class_find(target->name, &cls) && cls == PLUGIN_BSDF)
+			return target;
+	}
+	return NULL;
+}
+
+/* Of a plug-in that is not supported: refuses it, or finds the table and the type that stand in for it, or makes *out of what is
+ * inside (*decl stays NULL). REPORT_TOLD: it is left out. */
+static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class cls, const char **type, const struct plugin_decl **decl,
+		    const struct scene_node **out)
+{
+	const char *other;
+	enum lenient_way way = m->lenient ? lenient_plugin(cls, *type, &other) : LENIENT_REFUSE;
+	if (way == LENIENT_REFUSE)
+		return refuse_type(m, el, cls, *type);
+	struct xml_element *inner = way == LENIENT_INNER ? inner_bsdf(m, el) : NULL;
+	int r = way == LENIENT_LEAVE_OUT ? leave_out(m, el, *type, "", "the plug-in") :
+		note(m, el, *type, "", "%s:%d: <%.64s type=\"%.64s\"> is not supported; %s%s stands in for it (lenient)", el->file, el->line,
+		     el->name, *type, inner ? "the BSDF inside" : "a standard ", inner ? "" : other);
+	if (r || way == LENIENT_LEAVE_OUT)
+		return r ? r : REPORT_TOLD;
+	if (inner) {
+		el->busy = true;
+		m->depth++;
+		r = make_node(m, inner, out);
+		m->depth--;
+		el->busy = false;
+		return r;
+	}
+	*type = other;
+	*decl = plugin_find(m->decls, cls, other);
+	return *decl ? 0 : refuse_type(m, el, cls, *type);
+}
+
 /* An object with something wrong inside becomes a node all the same, so that all that is wrong is found; one that is no object of
  * any kind does not, and is complained of once. */
 static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
@@ -356,11 +421,14 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	if (!type)
 		return xml_error(el, m->error, EINVAL, "needs an attribute `type`");
 	const struct plugin_decl *decl = plugin_find(m->decls, cls, type);
-	if (!decl)
-		return refuse_type(m, el, cls, type);
+	bool stands_in = !decl;
+	if (!decl && (r = stand_in(m, el, cls, &type, &decl, out)))
+		return r;
+	if (!decl) /* *out does */
+		return el->node = *out, 0;
 	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(m, el, decl)))
 		return r;
-	struct draft d = {.node = allocate(m, 1, sizeof *d.node), .decl = decl};
+	struct draft d = {.node = allocate(m, 1, sizeof *d.node), .decl = decl, .stands_in = stands_in};
 	if (!d.node)
 		return out_of_memory(m);
 	*d.node = (struct scene_node){.cls = cls, .type = type, .id = xml_attribute(el, "id"), .file = el->file,
@@ -400,7 +468,7 @@ static int read_top(struct maker *m, const struct xml_element *scene, const stru
 		else if (strcmp(el->name, "path") == 0)
 			r = value_check_element(el, "value", false, m->error);
 		else if (strcmp(el->name, "alias") != 0)
-			r = refuse_element(el, m->error);
+			r = foreign_element(m, el);
 		r = report_problem(&m->report, r, m->error);
 	}
 	return r;
@@ -430,57 +498,6 @@ static int list_assets(struct maker *m)
 	return 0;
 }
 
-__attribute__((format(printf, 4, 5))) static int note_object(struct maker *m, const struct scene_node *n, const char *key,
-							    const char *format, ...)
-{
-	char text[REPORT_TEXT_MAX];
-	va_list ap;
-	va_start(ap, format);
-	vsnprintf(text, sizeof text, format, ap);
-	va_end(ap);
-	const struct xml_element place = {.name = plugin_class_name(n->cls), .file = n->file, .line = n->line};
-	return note(m, &place, key, "", "%s:%d: <%s type=\"%.64s\">: %s", n->file, n->line, place.name, n->type, text);
-}
-
-/* Whoever asks for a part of the light, or for something else than light, gets another picture: that is said. */
-static int note_integrator(struct maker *m, const struct scene_node *n)
-{
-	static const char *const others[] = {"direct", "volpath", "volpathmis", "prbvolpath", "volpath_simple", "aov", "stokes",
-					     "moment", "depth", "field", "ao", "vpl", "irrcache", "sppm", "ppm", "photonmapper"};
-	int r = 0;
-	for (size_t i = 0; i < sizeof others / sizeof *others && !r; i++)
-		if (strcmp(n->type, others[i]) == 0)
-			r = note_object(m, n, "other", "is not what is rendered: the picture is of all light on surfaces, without media%s",
-					strcmp(n->type, "direct") == 0 ? "; --max-depth 2 leaves out indirect light" : "");
-	return r;
-}
-
-static bool shines(const struct scene_node *n)
-{
-	return n->cls == PLUGIN_EMITTER || (n->cls == PLUGIN_SHAPE && node_child(n, PLUGIN_EMITTER, 0));
-}
-
-/* What only the whole scene says: a camera too many, a picture that will not be what was asked for, no light. */
-static int note_whole(struct maker *m)
-{
-	const struct scene_node *camera = NULL;
-	bool light = false;
-	int r = 0;
-	for (uint32_t i = 0; i < m->scene->object_count && !r; i++) {
-		const struct scene_node *n = m->scene->objects[i];
-		light |= shines(n);
-		if (n->cls == PLUGIN_INTEGRATOR)
-			r = note_integrator(m, n);
-		else if (n->cls == PLUGIN_SENSOR && camera)
-			r = note_object(m, n, "second", "only the first sensor, in line %d, is rendered", camera->line);
-		else if (n->cls == PLUGIN_SENSOR)
-			camera = n;
-	}
-	if (!r && !light && camera && m->report.problem_count == 0)
-		r = note_object(m, camera, "dark", "the scene has no emitter: the picture is black");
-	return r;
-}
-
 static int make_scene(struct maker *m)
 {
 	struct scene *s = m->scene;
@@ -493,16 +510,16 @@ static int make_scene(struct maker *m)
 	if (!r)
 		r = read_top(m, m->tree->root, objects);
 	if (!r)
-		r = note_whole(m);
+		r = remarks_on(m->scene, &m->report, m->error);
 	return r ? r : list_assets(m);
 }
 
 /* All that can be said of the file; what is wrong with it ends in s->problems. */
 static int read_all(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
-		    const struct scene_define *defines, size_t define_count, struct maker *m)
+		    const struct scene_define *defines, size_t define_count, bool lenient, struct maker *m)
 {
 	*s = (struct scene){.arena.limit = XML_MEMORY_MAX};
-	*m = (struct maker){.scene = s, .assets_from = assets, .decls = decls, .error = m->error};
+	*m = (struct maker){.scene = s, .assets_from = assets, .decls = decls, .error = m->error, .lenient = lenient};
 	m->tree = allocate(m, 1, sizeof *m->tree);
 	int r = m->tree ? report_init(&m->report, &s->arena, m->error) : out_of_memory(m);
 	if (r)
@@ -520,21 +537,21 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 }
 
 int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
-		   const struct scene_define *defines, size_t define_count, struct error *e)
+		   const struct scene_define *defines, size_t define_count, bool lenient, struct error *e)
 {
 	struct maker m = {.error = e};
-	int r = read_all(s, assets, name, decls, defines, define_count, &m);
+	int r = read_all(s, assets, name, decls, defines, define_count, lenient, &m);
 	if (r)
 		scene_fini(s);
 	return r;
 }
 
-int scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
-	       const struct scene_define *defines, size_t define_count, struct error *e)
+static int read_whole(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
+		      const struct scene_define *defines, size_t define_count, bool lenient, struct error *e)
 {
 	struct error unused;
 	struct maker m = {.error = e ? e : &unused};
-	int r = read_all(s, assets, name, decls, defines, define_count, &m);
+	int r = read_all(s, assets, name, decls, defines, define_count, lenient, &m);
 	if (!r && s->problem_count > 0) {
 		r = m.report.code;
 		uint32_t more = s->problem_count - 1;
@@ -546,6 +563,18 @@ int scene_read(struct scene *s, const struct asset_source *assets, const char *n
 	if (r)
 		scene_fini(s);
 	return r;
+}
+
+int scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
+	       const struct scene_define *defines, size_t define_count, struct error *e)
+{
+	return read_whole(s, assets, name, decls, defines, define_count, false, e);
+}
+
+int scene_read_lenient(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
+		       const struct scene_define *defines, size_t define_count, struct error *e)
+{
+	return read_whole(s, assets, name, decls, defines, define_count, true, e);
 }
 
 void scene_fini(struct scene *s)

@@ -76,10 +76,14 @@ int scene_read(struct scene *s, const struct asset_source *assets, const char *n
 	       const struct scene_define *defines, size_t define_count, struct error *e);
 void scene_fini(struct scene *s);
 
+/* The same, but what is not supported is left out or replaced by what is nearest (lenient.h), with a note each. */
+int scene_read_lenient(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
+		       const struct scene_define *defines, size_t define_count, struct error *e);
+
 /* The same, but a scene with something wrong in it is no failure: it is as far as it could be read, and s->problems says all that is
  * wrong. Not for rendering where there is any. -ENOMEM. */
 int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
-		   const struct scene_define *defines, size_t define_count, struct error *e);
+		   const struct scene_define *defines, size_t define_count, bool lenient, struct error *e);
 
 /* Look-ups; defaults are the caller's. A property that is there has passed its table's type and range. */
 const struct property *node_find(const struct scene_node *n, const char *name);

@@ -283,7 +283,7 @@ static void test_every_problem_is_told(void **state)
 	struct asset_source assets = memory_assets(memory);
 	struct scene s;
 	struct error e;
-	assert_int_equal(scene_read_all(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
+	assert_int_equal(scene_read_all(&s, &assets, "s.xml", scene_tables(), NULL, 0, false, &e), 0);
 	assert_int_equal(s.problem_count, 3);
 	for (uint32_t i = 0; i < 3; i++)
 		if (strncmp(s.problems[i], want[i], strlen(want[i])) != 0)
