@@ -101,8 +101,10 @@ again # in the midst of it
 done_in 60 "$e"
 again # and after its end
 first=$(value "$e" rounds)
+before=$(value "$e" merged)
 job extend "$e" --spp 300
-job extend "$e" --spp +100 # while it runs, or just after
+until_true 60 merged_more "$e" "$before" || fail "nothing more of $e is merged"
+job extend "$e" --spp +100 # while it runs, at a worker that knows the bound of before, or just after
 until_true 60 more_rounds "$e" "$first" || fail "$e does not go on after $first rounds"
 done_in 60 "$e"
 job fetch "$e" -o "$DIR/extended.exr"

@@ -79,6 +79,7 @@ int bundle_set_info(struct bundle *b, struct envelope *info, struct error *e)
 		mem_free(paths);
 		return error_set(e, ENOMEM, "no memory for a job");
 	}
+	b->plan.rounds = UINT64_MAX; /* the bound may be moved while the job runs, and what a lease computes does not depend on it */
 	b->held = held;
 	b->paths = paths;
 	b->info = *info;
