@@ -82,7 +82,9 @@ static int fill(struct sealed *s, struct error *e)
 	s->at = 0;
 	s->filled = n > 0 ? (size_t)n : 0;
 	s->from += s->filled;
-	return n < 0 ? fault(s, errno, e) : 0;
+	if (n < 0)
+		return fault(s, errno, e);
+	return s->heard ? s->heard(s->user, s->filled, e) : 0;
 }
 
 static int take(struct sealed *s, void *bytes, size_t size, struct error *e)
@@ -124,16 +126,23 @@ static int check(struct sealed *s, struct error *e)
 	return rc ? rc : want == crc ? 0 : error_set(e, EBADMSG, "%s: damaged", s->path);
 }
 
-int sealed_open(struct sealed *s, const char *path, struct error *e)
+int sealed_open_heard(struct sealed *s, const char *path, sealed_heard *heard, void *user, struct error *e)
 {
 	int rc = open_file(s, path, O_RDONLY, e);
 	if (rc)
 		return rc;
+	s->heard = heard;
+	s->user = user;
 	rc = check(s, e);
 	s->at = s->filled = s->from = 0;
 	if (rc)
 		sealed_close(s);
 	return rc;
+}
+
+int sealed_open(struct sealed *s, const char *path, struct error *e)
+{
+	return sealed_open_heard(s, path, NULL, NULL, e);
 }
 
 int sealed_read(struct sealed *s, void *bytes, size_t size, struct error *e)

@@ -11,6 +11,9 @@
 #include <stddef.h>
 #include <stdint.h>
 
+/* Hears of so many more bytes that were read. Not 0: no more is read, and the reading ends with this code. */
+typedef int sealed_heard(void *user, size_t bytes, struct error *e);
+
 struct sealed {
 	int fd;
 	uint32_t crc;
@@ -19,6 +22,8 @@ struct sealed {
 	uint64_t from;         /* reading: the buffer's end in the file */
 	uint64_t left, bytes; /* reading: until the CRC; writing: so far */
 	const char *path;     /* the caller's */
+	sealed_heard *heard;  /* reading: NULL: nobody listens */
+	void *user;
 };
 
 int sealed_create(struct sealed *s, const char *path, struct error *e);
@@ -28,6 +33,8 @@ int sealed_finish(struct sealed *s, struct error *e);
 
 /* -EBADMSG: the CRC does not fit; -ENOENT. */
 int sealed_open(struct sealed *s, const char *path, struct error *e);
+/* The same; each byte is read twice in all, once to check it. */
+int sealed_open_heard(struct sealed *s, const char *path, sealed_heard *heard, void *user, struct error *e);
 int sealed_read(struct sealed *s, void *bytes, size_t size, struct error *e); /* -EBADMSG: there is not so much */
 void sealed_close(struct sealed *s); /* at any time; what was being written has no seal then */
 

@@ -32,6 +32,7 @@ struct client {
 	uv_timer_t timeout, heartbeat;
 	struct conn *conn; /* NULL: closed */
 	struct waiting *first, **last;
+	uint64_t patience_ms; /* of who waits */
 	unsigned waiting_count;
 	size_t waiting_bytes;
 	struct tls *tls; /* NULL: plaintext */
@@ -45,14 +46,23 @@ static void on_opened(void *user)
 	cl->opened = true;
 }
 
+static void on_timeout(uv_timer_t *t)
+{
+	struct client *cl = t->data;
+	cl->timed_out = true;
+}
+
 static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
 {
 	struct client *cl = user;
-	struct waiting *w = mem_alloc(1, sizeof *w);
-	if (env->message->body_case == FARM__ENVELOPE__BODY_HEARTBEAT || !w) {
-		mem_free(w);
+	if (env->message->body_case == FARM__ENVELOPE__BODY_HEARTBEAT) { /* the answer takes longer */
+		if (uv_is_active((uv_handle_t *)&cl->timeout))
+			uv_timer_start(&cl->timeout, on_timeout, cl->patience_ms, 0);
 		return;
 	}
+	struct waiting *w = mem_alloc(1, sizeof *w);
+	if (!w)
+		return;
 	w->message.payload.limit = size;
 	cl->waiting_bytes += env->used + size;
 	if (++cl->waiting_count > WAITING_MAX || cl->waiting_bytes > WAITING_BYTES || !buf_append(&w->message.payload, payload, size)) {
@@ -76,12 +86,6 @@ static void on_closed(void *user, const char *why)
 
 static const struct conn_events events = {.opened = on_opened, .message = on_message, .closed = on_closed};
 
-static void on_timeout(uv_timer_t *t)
-{
-	struct client *cl = t->data;
-	cl->timed_out = true;
-}
-
 static void on_heartbeat(uv_timer_t *t)
 {
 	struct client *cl = t->data;
@@ -100,8 +104,9 @@ static void start_clock(struct client *cl, double seconds)
 	cl->timed_out = false;
 	uv_timer_stop(&cl->timeout);
 	uv_update_time(&cl->loop);
+	cl->patience_ms = (uint64_t)(1000 * (seconds >= 0 ? seconds : 0));
 	if (seconds >= 0)
-		uv_timer_start(&cl->timeout, on_timeout, (uint64_t)(1000 * seconds), 0);
+		uv_timer_start(&cl->timeout, on_timeout, cl->patience_ms, 0);
 }
 
 int client_send(struct client *cl, const Farm__Envelope *m, const void *payload, size_t size, struct error *e)
@@ -194,6 +199,10 @@ static int say_hello(struct client *cl, const char *host_port, const char *name,
 		rc = error_set(e, EPROTO, "the coordinator at %s refuses: %s", host_port, a->hello_ack->text);
 	else if (a->hello_ack->heartbeat_ms >= 10)
 		uv_timer_start(&cl->heartbeat, on_heartbeat, a->hello_ack->heartbeat_ms, a->hello_ack->heartbeat_ms);
+	if (!rc && *a->hello_ack->text && !*cl->warning) {
+		text_copy(cl->warning, sizeof cl->warning, a->hello_ack->text);
+		text_clean(cl->warning);
+	}
 	client_message_fini(&answer);
 	return rc;
 }

@@ -22,12 +22,12 @@ struct client_message { /* fini with client_message_fini */
  * the other's certificate or only one speaks TLS, -EPERM, -EIO when our own folder is no good. */
 int client_open(struct client **cl, const char *host_port, const char *tls, bool insecure, const char *name, struct error *e);
 void client_close(struct client *cl);
-/* What its user should know about the certificates (they expire soon); "": nothing. */
+/* What its user should know: that certificates expire soon, or what the coordinator says of itself; "": nothing. */
 const char *client_warning(const struct client *cl);
 
 /* Sends and waits until it is with the kernel. */
 int client_send(struct client *cl, const Farm__Envelope *m, const void *payload, size_t size, struct error *e);
-/* The next message. -ETIMEDOUT after `seconds` (< 0: waits for ever), -ECONNRESET when the connection is gone, -EPROTO
+/* The next message. -ETIMEDOUT after `seconds` without a word, heartbeats included (< 0: waits for ever), -ECONNRESET when the connection is gone, -EPROTO
  * when the coordinator found fault with us. */
 int client_wait(struct client *cl, double seconds, struct client_message *m, struct error *e);
 /* Sends, and waits for a message of this kind; any other is -EPROTO. */

@@ -308,14 +308,14 @@ static int read_all(struct order *o, struct sealed *in, uint64_t *generation, st
 	return rc;
 }
 
-int checkpoint_load(const struct spool *spool, struct order *o, uint64_t *generation, struct error *e)
+int checkpoint_load(const struct spool *spool, struct order *o, uint64_t *generation, sealed_heard *heard, void *user, struct error *e)
 {
 	char name[SPOOL_PATH_MAX];
 	struct sealed in;
 	spool_job_path(spool, o->id, "checkpoint.tmp", name);
 	disk_unlink(name); /* of a life that ended before it was whole */
 	spool_job_path(spool, o->id, "checkpoint", name);
-	int rc = sealed_open(&in, name, e);
+	int rc = sealed_open_heard(&in, name, heard, user, e);
 	if (rc)
 		return rc;
 	in.bytes = in.left;

@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "coordinator/shell/ages.h"
 #include "coordinator/shell/keep.h"
+#include "coordinator/shell/recovery.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/store/age.h"
 
@@ -37,7 +38,7 @@ static bool is_fetched(const struct server *s, uint64_t job)
 /* Or comes to life: its films are being read, so that it goes on. */
 static bool lives(const struct server *s, uint64_t job)
 {
-	return server_order(s, job) || (s->reading && s->reading->id == job);
+	return server_order(s, job) || recovery_has(s, job) || (s->reading && s->reading->id == job);
 }
 
 static uint64_t result_bytes(const struct server *s, uint64_t job)

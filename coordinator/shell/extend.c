@@ -193,7 +193,7 @@ struct reading {
 static void run(uv_work_t *work)
 {
 	struct reading *w = work->data;
-	w->rc = replay_films(w->server->spool, w->order, &w->error);
+	w->rc = replay_films(w->server->spool, w->order, NULL, &w->error);
 	if (!w->rc) /* results from before its end may still wait for a flush of the old file */
 		w->rc = journal_renew(w->order->journal, &w->error);
 }

@@ -1,6 +1,7 @@
 #include "coordinator/shell/keep.h"
 
 #include "common/base/disk.h"
+#include "coordinator/shell/recovery.h"
 
 #include <string.h>
 
@@ -18,7 +19,7 @@ bool keep_order(struct server *s, const struct order *o)
 void keep_drop(const struct server *s, uint64_t job)
 {
 	char path[SPOOL_PATH_MAX];
-	if (s->reading && s->reading->id == job)
+	if (recovery_has(s, job) || (s->reading && s->reading->id == job))
 		return;
 	spool_job_path(s->spool, job, NULL, path);
 	journal_clear(path, UINT64_MAX);

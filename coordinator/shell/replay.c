@@ -1,5 +1,6 @@
 #include "coordinator/shell/replay.h"
 
+#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/wire/frame.h"
@@ -12,6 +13,7 @@ enum { DAMAGED_MOST = 16 /* leases that are named */ };
 
 struct replay {
 	struct order *order;
+	struct replay_progress *progress; /* NULL: nobody looks */
 	double elapsed;
 	uint64_t batches;
 	struct lease_key damaged[DAMAGED_MOST]; /* whose records are */
@@ -103,6 +105,15 @@ static void note_damage(struct replay *r, const struct journal_item *item)
 		r->damaged[r->damaged_count++] = item->lease;
 }
 
+static int go_on(void *user, size_t bytes, struct error *e)
+{
+	struct replay_progress *p = ((struct replay *)user)->progress;
+	if (!p)
+		return 0;
+	atomic_fetch_add(&p->read, bytes);
+	return atomic_load(&p->stop) ? error_set(e, ECANCELED, "the coordinator stops") : 0;
+}
+
 static int take_record(void *user, const struct journal_item *item, struct error *e)
 {
 	struct replay *r = user;
@@ -110,6 +121,9 @@ static int take_record(void *user, const struct journal_item *item, struct error
 	struct forecast_look look;
 	const unsigned char *body = item->body;
 	size_t size = item->size;
+	int rc = go_on(r, size, e);
+	if (rc)
+		return rc;
 	if (item->missing) {
 		note_damage(r, item);
 		return 0;
@@ -183,14 +197,34 @@ static void say_damage(const struct replay *r, const struct journal_found *found
 		  (unsigned long long)found->damaged, o->late_count, (unsigned long long)found->lost, *text ? text : ": none any more");
 }
 
-int replay_films(const struct spool *spool, struct order *o, struct error *e)
+uint64_t replay_bytes(const struct spool *spool, uint64_t job)
 {
-	struct replay r = {.order = o};
+	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
+	uint64_t sum = 0;
+	struct stat st;
+	spool_job_path(spool, job, NULL, folder);
+	DIR *d = disk_opendir(folder);
+	for (struct dirent *f; d && (f = readdir(d));) {
+		bool checkpoint = strcmp(f->d_name, "checkpoint") == 0;
+		if (!checkpoint && strncmp(f->d_name, "journal.", 8) != 0)
+			continue;
+		spool_job_path(spool, job, f->d_name, path);
+		if (disk_stat(path, &st) == 0)
+			sum += (uint64_t)st.st_size << checkpoint;
+	}
+	if (d)
+		closedir(d);
+	return sum;
+}
+
+int replay_films(const struct spool *spool, struct order *o, struct replay_progress *p, struct error *e)
+{
+	struct replay r = {.order = o, .progress = p};
 	struct journal_found found;
 	char folder[SPOOL_PATH_MAX];
 	uint64_t generation = 0;
 	spool_job_path(spool, o->id, NULL, folder);
-	int rc = checkpoint_load(spool, o, &generation, e);
+	int rc = checkpoint_load(spool, o, &generation, go_on, &r, e);
 	if (rc && rc != -ENOENT)
 		return rc;
 	rc = journal_open(&o->journal, folder, o->id, generation, take_record, &r, &found, e);

@@ -8,9 +8,19 @@
 
 #include "coordinator/shell/order.h"
 
+#include <stdatomic.h>
+
+/* Of a replay that another thread looks at. */
+struct replay_progress {
+	_Atomic uint64_t read; /* of the bytes that replay_bytes says */
+	atomic_bool stop;      /* it is to end soon, with -ECANCELED */
+};
+/* How much is read of this job: its journals once, its checkpoint twice. */
+uint64_t replay_bytes(const struct spool *spool, uint64_t job);
+
 /* A second and more. By any thread while nobody else has the order. When it fails (-EBADMSG: something of it is damaged or gone;
- * -EPROTO: of another version) the order is of no use but to be dropped. */
-int replay_films(const struct spool *spool, struct order *o, struct error *e);
+ * -EPROTO: of another version) the order is of no use but to be dropped. p: NULL: nobody looks. */
+int replay_films(const struct spool *spool, struct order *o, struct replay_progress *p, struct error *e);
 
 /* A frame as it was stored, with this message. -EBADMSG, -ENOMEM. The payload is a part of the frame. */
 int replay_unpack(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size, const unsigned char **payload,

@@ -1,20 +1,14 @@
 #include "coordinator/shell/restore.h"
 
-#include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
-#include "coordinator/shell/ages.h"
-#include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/control.h"
-#include "coordinator/shell/dispatch.h"
-#include "coordinator/shell/files.h"
 #include "coordinator/shell/reconcile.h"
 #include "coordinator/shell/replay.h"
 #include "coordinator/shell/trust.h"
 
 #include <string.h>
-#include <time.h>
 
 /* ---- the core */
 
@@ -82,8 +76,7 @@ static int hold_blobs(struct server *s, const Farm__Submit *m, struct error *e)
 	return 0;
 }
 
-/* 0: it is there, and whole. What cannot be read just now is an error. */
-static int read_record(const struct server *s, uint64_t id, struct job_record *r, bool *there, struct error *e)
+int restore_record(const struct server *s, uint64_t id, struct job_record *r, bool *there, struct error *e)
 {
 	int rc = spool_read_record(s->spool, id, r, e);
 	*there = rc == 0;
@@ -98,7 +91,7 @@ static int take_record_of(const struct server *s, const struct ledger_job *j, st
 	struct job_record *r = mem_alloc(1, sizeof *r);
 	bool there;
 	int rc = r ? 0 : error_set(e, ENOMEM, "no memory for a job");
-	if (!rc && j->extended && (rc = read_record(s, o->id, r, &there, e)) == 0 && there)
+	if (!rc && j->extended && (rc = restore_record(s, o->id, r, &there, e)) == 0 && there)
 		o->record.has_result = r->has_result;
 	mem_free(r);
 	return rc;
@@ -156,73 +149,6 @@ int restore_order(struct server *s, const struct ledger_job *j, struct order **o
 	return rc;
 }
 
-/* What is stored is damaged: the job's batches can be made again, with the same bits. Nothing is deleted: somebody may want to look at it. */
-static void begin_anew(struct server *s, struct order *o)
-{
-	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
-	spool_job_path(s->spool, o->id, NULL, folder);
-	spool_job_path(s->spool, o->id, "checkpoint", path);
-	spool_job_path(s->spool, o->id, "checkpoint.damaged", aside);
-	order_log(o, LOG_SPOOL_FAULT, "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
-	order_log(o, LOG_JOB_STATE, "state=anew");
-	disk_rename(path, aside);
-	journal_put_aside(folder);
-}
-
-static int restore(struct server *s, const struct ledger_job *j, bool anew, struct order **o, struct error *e)
-{
-	int rc = restore_order(s, j, o, e);
-	if (rc)
-		return rc;
-	rc = replay_films(s->spool, *o, e);
-	if (!rc)
-		return 0;
-	order_log(*o, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
-	anew = anew && rc == -EBADMSG;
-	if (anew)
-		begin_anew(s, *o);
-	restore_drop(s, *o);
-	return anew ? restore(s, j, false, o, e) : rc;
-}
-
-static int restore_one(struct server *s, const struct ledger_job *j, struct error *e)
-{
-	struct order *o;
-	int rc = restore(s, j, true, &o, e);
-	if (rc)
-		return rc;
-	o->next = s->orders;
-	s->orders = o;
-	rc = restore_tell(s, o, j->held, 0, e);
-	if (!rc)
-		files_look(s, o);
-	struct job_counts known;
-	return rc || farm_counts(s->farm, o->id, &known) ? rc : error_set(e, ENOMEM, "no memory for a job");
-}
-
-/* Not of the machine, but of what is stored: the same at every start. ENOENT: its folder is gone. */
-static bool is_lasting(int rc)
-{
-	return rc == -EBADMSG || rc == -ERANGE || rc == -ENOENT;
-}
-
-static void give_up(struct server *s, struct job_record *r, const char *why)
-{
-	struct timespec now;
-	struct error e;
-	clock_gettime(CLOCK_REALTIME, &now);
-	text_copy(r->state, sizeof r->state, "failed");
-	text_copy(r->reason, sizeof r->reason, job_end_name(END_FAILED));
-	text_copy(r->why, sizeof r->why, why);
-	r->exit_code = 3;
-	r->ended = (double)now.tv_sec;
-	r->ended_seen = ages_now(s);
-	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
-	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) || ledger_end(s->ledger, r->id, r->extended, r->state, &e))
-		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	dispatch_remember(s, r);
-}
-
 int restore_open(struct server *s, struct error *e)
 {
 	struct ledger_job j;
@@ -232,7 +158,7 @@ int restore_open(struct server *s, struct error *e)
 	while (!rc && (rc = ledger_next(s->ledger, id, &j, e)) > 0) {
 		id = j.id;
 		bool there;
-		rc = read_record(s, id, r, &there, e);
+		rc = restore_record(s, id, r, &there, e);
 		if (rc)
 			break;
 		/* Its record was written before its end came into the ledger. */
@@ -256,35 +182,4 @@ bool restore_lives(const struct server *s, uint64_t job)
 		if (s->restored[i] == job)
 			return true;
 	return false;
-}
-
-int restore_jobs(struct server *s, struct error *e)
-{
-	struct ledger_job j;
-	uint64_t id = 0;
-	int rc;
-	struct job_record *r = mem_alloc(1, sizeof *r);
-	if (!r)
-		return error_set(e, ENOMEM, "no memory for the jobs");
-	while ((rc = ledger_next(s->ledger, id, &j, e)) > 0) {
-		id = j.id;
-		rc = restore_one(s, &j, e);
-		if (rc && !is_lasting(rc)) {
-			rc = error_prefix(e, rc, "j%llu", (unsigned long long)id);
-			break;
-		}
-		if (rc) {
-			struct error why = *e;
-			bool there;
-			rc = read_record(s, id, r, &there, e);
-			if (rc)
-				break;
-			if (!there)
-				*r = (struct job_record){.id = id, .rel_error = -1};
-			r->extended = j.extended;
-			give_up(s, r, why.text);
-		}
-	}
-	mem_free(r);
-	return rc;
 }

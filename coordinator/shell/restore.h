@@ -1,7 +1,6 @@
 /*
- * Jobs of an earlier life, at the start: from the ledger and their journals into orders and the core, by the code that live
- * batches go through, so that the bits are the same. The core hears which leases are merged and no more: what was out when the
- * coordinator stopped comes back with its worker, or is handed out again.
+ * A job of an earlier life, from the ledger into an order and from there into the core; its films come in between (replay.h). The core hears
+ * which leases are merged and no more: what was out when the coordinator stopped comes back with its worker, or is handed out again.
  */
 #ifndef COORDINATOR_SHELL_RESTORE_H
 #define COORDINATOR_SHELL_RESTORE_H
@@ -10,10 +9,8 @@
 
 int restore_open(struct server *s, struct error *e);           /* the ledger */
 bool restore_lives(const struct server *s, uint64_t job);      /* it had not ended */
-/* Jobs whose checkpoint or journal is damaged begin anew, those without a folder, a plan or a scene fail with a sentence. An error is
- * one of the machine, and another start may go better, or -EPROTO: another version of the coordinator wrote it. Then all is as it
- * was: nothing stored is given up because it could not be read. */
-int restore_jobs(struct server *s, struct error *e);
+/* 0: its record is there, and whole, or not; what cannot be read just now is an error. */
+int restore_record(const struct server *s, uint64_t id, struct job_record *r, bool *there, struct error *e);
 
 /* One job from its row, for nobody yet. -EBADMSG: something of it is damaged or gone. */
 int restore_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e);

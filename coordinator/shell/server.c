@@ -11,9 +11,10 @@
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/files.h"
 #include "coordinator/shell/folder.h"
-#include "coordinator/shell/keep.h"
+#include "coordinator/shell/held.h"
 #include "coordinator/shell/late.h"
 #include "coordinator/shell/limits.h"
+#include "coordinator/shell/recovery.h"
 #include "coordinator/shell/restore.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/status.h"
@@ -122,7 +123,7 @@ static void on_wake(uv_timer_t *t)
 
 const char *server_film_folder(const struct server *s, const struct plan *p)
 {
-	uint64_t bytes = canvas_bytes(p) + (s->reading ? canvas_bytes(&s->reading->plan) : 0);
+	uint64_t bytes = canvas_bytes(p) + recovery_film_bytes(s) + (s->reading ? canvas_bytes(&s->reading->plan) : 0);
 	for (const struct order *o = s->orders; o; o = o->next)
 		if (o->canvas && !canvas_is_mapped(o->canvas))
 			bytes += canvas_bytes(&o->plan);
@@ -194,6 +195,8 @@ bool server_view(struct server *s, uint64_t job, struct job_view *v)
 		view_order(s, o, v);
 		return true;
 	}
+	if (recovery_view(s, job, v))
+		return true;
 	for (size_t i = 0; i < s->ended_count; i++)
 		if (s->ended[i].id == job) {
 			view_of_record(v, &s->ended[i]);
@@ -213,7 +216,7 @@ static int by_id(const void *a, const void *b)
 
 size_t server_views(struct server *s, struct job_view **views)
 {
-	size_t count = s->ended_count, n = 0;
+	size_t count = s->ended_count + recovery_views(s, NULL), n = 0;
 	for (struct order *o = s->orders; o; o = o->next)
 		count++;
 	*views = mem_alloc(count, sizeof **views);
@@ -223,6 +226,7 @@ size_t server_views(struct server *s, struct job_view **views)
 		view_of_record(&(*views)[n++], &s->ended[i]);
 	for (struct order *o = s->orders; o; o = o->next)
 		view_order(s, o, &(*views)[n++]);
+	n += recovery_views(s, *views + n);
 	qsort(*views, count, sizeof **views, by_id);
 	return count;
 }
@@ -367,8 +371,12 @@ static void on_tick(uv_timer_t *t)
 	refresh_tls(s);
 	if (s->caller_waits)
 		session_accept(s);
-	for (struct session *p = s->sessions; p; p = p->next)
+	for (struct session *p = s->sessions; p; p = p->next) {
 		session_tick(p);
+		held_tick(p);
+	}
+	if (recovery_is_on(s))
+		s->changes++;
 	status_tick(s->status);
 	durable_tick(s);
 	files_tick(s);
@@ -381,7 +389,7 @@ static void on_tick(uv_timer_t *t)
 	}
 }
 
-static void stop(struct server *s)
+void server_stop(struct server *s)
 {
 	if (s->stopping)
 		return;
@@ -399,12 +407,13 @@ static void stop(struct server *s)
 		conn_close(p->conn, "the coordinator stops");
 	status_close(s->status);
 	s->status = NULL;
+	recovery_stop(s);
 }
 
 static void on_signal(uv_signal_t *h, int number)
 {
 	log_event(LOG_STOP, "signal=%d", number);
-	stop(h->data);
+	server_stop(h->data);
 }
 
 static int open_stores(struct server *s, struct error *e)
@@ -435,12 +444,8 @@ static int open_stores(struct server *s, struct error *e)
 	if (!rc)
 		rc = trust_open(s, e);
 	if (!rc)
-		rc = restore_jobs(s, e);
-	if (rc)
-		return rc;
-	blob_store_trim(s->blobs); /* the files of living jobs are held by now */
-	keep_trim(s);
-	return 0;
+		rc = recovery_begin(s, e);
+	return rc;
 }
 
 static void init_handles(struct server *s)
@@ -464,6 +469,7 @@ static void init_handles(struct server *s)
 
 static void close_stores(struct server *s)
 {
+	recovery_close(s);
 	while (s->orders) {
 		struct order *next = s->orders->next;
 		order_free(s->orders);
@@ -488,7 +494,7 @@ static void close_stores(struct server *s)
 
 void server_close(struct server *s)
 {
-	stop(s);
+	server_stop(s);
 	uv_run(&s->loop, UV_RUN_DEFAULT);
 	int closed = uv_loop_close(&s->loop);
 	assert(closed == 0);
@@ -531,6 +537,14 @@ int server_open(struct server **out, const struct server_config *c, struct error
 	return rc;
 }
 
+int server_await_jobs(struct server *s, struct error *e)
+{
+	while (recovery_is_on(s) && !s->stopping)
+		uv_run(&s->loop, UV_RUN_ONCE);
+	*e = s->fault_error;
+	return s->fault;
+}
+
 int server_run(const struct server_config *c, struct error *e)
 {
 	struct server *s;
@@ -539,6 +553,8 @@ int server_run(const struct server_config *c, struct error *e)
 		return rc;
 	notify_send("READY=1");
 	uv_run(&s->loop, UV_RUN_DEFAULT);
+	rc = s->fault;
+	*e = s->fault_error;
 	server_close(s);
-	return 0;
+	return rc;
 }

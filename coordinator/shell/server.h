@@ -50,13 +50,16 @@ int server_run(const struct server_config *c, struct error *e);
 
 struct server;
 
+/* It listens; the jobs of an earlier life are read by its loop (recovery.h). */
 int server_open(struct server **s, const struct server_config *c, struct error *e);
+int server_await_jobs(struct server *s, struct error *e); /* turns the loop until they are */
 void server_close(struct server *s); /* stops it, if no signal has */
 
 struct session;
 struct status_socket;
 struct clearing;
 struct durable_ack;
+struct recovery;
 struct ending;
 
 /* An event for the core that came up while its last update was carried out. */
@@ -89,6 +92,10 @@ struct server {
 	size_t ended_count;
 	struct deferred *deferred, **deferred_last;
 	struct ledger *ledger;
+	struct recovery *recovery; /* the jobs of an earlier life are being read; NULL: no more */
+	size_t held_bytes; /* of what peers ask for meanwhile */
+	int fault;         /* why it stops by itself; 0: it does not */
+	struct error fault_error;
 	uint64_t *restored; /* ids of the jobs that went on when this life began */
 	size_t restored_count;
 	struct durable_ack *acks, **acks_last; /* that wait for a flush */
@@ -122,6 +129,8 @@ struct server {
 	struct session *submitter;
 };
 
+/* No more is begun; the loop ends when what is under way has ended. */
+void server_stop(struct server *s);
 double server_now(const struct server *s);
 /* Gives the event to the core and carries out the update and all that follows from it. */
 void server_step(struct server *s, struct event *ev);
@@ -137,7 +146,7 @@ void server_order_free_again(struct server *s);
 /* A result from a worker: now, or when the canvas is free. May take either. */
 void server_result(struct server *s, uint64_t peer, struct envelope *env, struct buf *payload);
 
-/* false: no such job. Looks at living jobs, then at ended ones, then into the spool. */
+/* false: no such job. Looks at living jobs, at those that are being read, then at ended ones, then into the spool. */
 bool server_view(struct server *s, uint64_t job, struct job_view *v);
 /* All that are listed, ascending by id; mem_alloc'd. */
 size_t server_views(struct server *s, struct job_view **views);

@@ -4,6 +4,8 @@
 #include "common/base/text.h"
 #include "coordinator/shell/asks.h"
 #include "coordinator/shell/files.h"
+#include "coordinator/shell/held.h"
+#include "coordinator/shell/recovery.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -115,18 +117,22 @@ static void refuse_for_good(struct session *p, const char *said)
 	answer_hello(p, false, true, said);
 }
 
-static const char *set_aside(const struct session *p, char *text, size_t size)
+/* What a peer that is welcome should know. */
+static const char *what_to_know(const struct session *p, char *text, size_t size)
 {
 	struct peer_status s;
 	*text = 0;
-	if (farm_peer(p->server->farm, p->id, &s) && s.state == PEER_ASIDE)
+	if (recovery_is_on(p->server))
+		text_print(text, size, "the coordinator is reading its jobs, %u %%: what is asked for waits until they are there",
+			   (unsigned)(100 * recovery_share(p->server)));
+	if (p->joined && farm_peer(p->server->farm, p->id, &s) && s.state == PEER_ASIDE)
 		text_print(text, size, "this worker is set aside and gets no work: %s", s.text);
 	return text;
 }
 
 static void join(struct session *p, const Farm__Hello *h)
 {
-	char aside[256];
+	char text[256];
 	struct event ev = {.kind = EVENT_JOINED,
 			   .peer = p->id,
 			   .join = {.peer = p->id, .name = p->name, .fingerprint = h->fingerprint, .threads = h->threads,
@@ -144,7 +150,7 @@ static void join(struct session *p, const Farm__Hello *h)
 		  (unsigned long long)p->id, p->address, log_quote(p->name).text, *p->who.name ? p->who.name : "-", *h->home ? h->home : "-",
 		  (unsigned long long)h->restarts, h->threads,
 		  log_quote(h->fingerprint).text);
-	send_hello_ack(p, true, set_aside(p, aside, sizeof aside));
+	send_hello_ack(p, true, what_to_know(p, text, sizeof text));
 }
 
 /* What the certificate does not allow; NULL: it does. */
@@ -198,7 +204,7 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 		join(p, h);
 	} else if (h->role == FARM__ROLE__ROLE_CLIENT) {
 		p->state = SESSION_CLIENT;
-		send_hello_ack(p, true, "");
+		send_hello_ack(p, true, what_to_know(p, text, sizeof text));
 	} else {
 		refuse_for_good(p, "hello must say whether it is a worker or a client");
 	}
@@ -319,9 +325,8 @@ static void worker_message(struct session *p, struct envelope *env)
 
 /* ---- the connection ---- */
 
-static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
+void session_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
 {
-	struct session *p = user;
 	if (p->state == SESSION_NEW && env->message->body_case == FARM__ENVELOPE__BODY_HELLO)
 		take_hello(p, env->message->hello);
 	else if (p->state == SESSION_NEW)
@@ -332,6 +337,14 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 		session_client_message(p, env, payload, size);
 }
 
+static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	struct session *p = user;
+	bool known = p->state == SESSION_WORKER || p->state == SESSION_CLIENT;
+	if (!known || !held_take(p, env))
+		session_message(p, env, payload, size);
+}
+
 static void on_closed(void *user, const char *why)
 {
 	struct session *p = user;
@@ -340,6 +353,7 @@ static void on_closed(void *user, const char *why)
 	session_upload_abort(p);
 	session_fetch_end(p);
 	asks_drop(p);
+	held_drop(p);
 	extend_forget(p);
 	s->garbled += conn_garbled(p->conn);
 	log_event(conn_garbled(p->conn)		? LOG_PEER_GARBLED

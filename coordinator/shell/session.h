@@ -41,6 +41,9 @@ struct session {
 	struct job_view *shown; /* what the watcher saw last */
 	struct extension wants; /* not answered yet: it waits until the job's films are free, or read; job 0: none */
 	struct session *behind; /* of those that wait for that */
+	struct held *held, **held_last; /* what waits until the jobs are read */
+	size_t held_bytes;
+	double told; /* s on the loop's clock: that we are here, meanwhile */
 	char rejected[256];    /* why the core refused; "" it did not */
 	uint64_t answered_job; /* SUBMITTED or CANCELLED came for it */
 };
@@ -48,6 +51,8 @@ struct session {
 void session_accept(struct server *s);
 struct session *session_find(const struct server *s, uint64_t id);
 void session_send(struct session *p, const Farm__Envelope *m, const void *payload, size_t size);
+/* What the peer says. May take the envelope. */
+void session_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size);
 /* Says why and hangs up. */
 __attribute__((format(printf, 2, 3))) void session_fault(struct session *p, const char *format, ...);
 

@@ -1,6 +1,7 @@
 #include "coordinator/shell/status.h"
 
 #include "common/base/mem.h"
+#include "coordinator/shell/recovery.h"
 #include "coordinator/shell/session.h"
 
 #include <errno.h>
@@ -126,6 +127,8 @@ static json_t *snapshot(struct server *s)
 	add_workers(s, o);
 	add_tls(s, o);
 	json_object_set_new(o, "garbledConnections", json_integer((json_int_t)s->garbled));
+	if (recovery_is_on(s))
+		json_object_set_new(o, "reading", json_real(recovery_share(s)));
 	mem_free(views);
 	return o;
 }

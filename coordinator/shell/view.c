@@ -13,7 +13,7 @@ void view_of_record(struct job_view *v, const struct job_record *r)
 	memset(v, 0, sizeof *v);
 	v->record = *r;
 	v->eta = record_is_ended(r) ? 0 : -1;
-	v->share = -1;
+	v->share = v->reading = -1;
 }
 
 void view_add_status(struct job_view *v, const struct job_status *s)
@@ -175,6 +175,7 @@ json_t *view_to_json(const struct job_view *v)
 	json_object_set_new(o, "errorDoubt", json_string(r->rel_error_doubt));
 	add_forecast(o, v);
 	add_share(o, v);
+	json_object_set_new(o, "reading", number_or_null(v->reading, v->reading >= 0));
 	json_object_set_new(o, "counts", record_counts(r));
 	json_object_set_new(o, "verify", json_real(r->verify));
 	json_object_set_new(o, "mixture", json_string(r->mixture));

@@ -21,6 +21,7 @@ struct job_view {
 	uint32_t workers, machines; /* that hold them, that might */
 	double share;      /* machines that it would have by its priority; negative: not known */
 	char place[160];   /* in words */
+	double reading; /* share of what was stored of it that has been read; negative: it is not being read */
 	char waiting[256]; /* why nothing is being done for it */
 	char owners_place[160], owners_waiting[256]; /* the same for its owner */
 };

@@ -98,8 +98,13 @@ free_ports() {
 	done
 }
 
-# start_coordinator [OPTION...]: at $LISTEN, or at any free port
-start_coordinator() {
+# the coordinator has read the jobs of an earlier life, or is gone
+has_read() {
+	! "$BIN/hslt-status" --json 2>/dev/null | grep -q '"reading": *[0-9]'
+}
+
+# listen [OPTION...]: the coordinator, at $LISTEN, or at any free port
+listen() {
 	rm -f "$DIR/port"
 	"$BIN/hslt-coordinator" --listen "${LISTEN:-127.0.0.1:0}" --port-file "$DIR/port" --spool "$DIR/spool" \
 		--status-socket "$DIR/status" --heartbeat 0.5 "$@" 2>>"$DIR/coordinator.log" &
@@ -108,6 +113,12 @@ start_coordinator() {
 	until_true 10 test -s "$DIR/port" || fail "the coordinator does not listen"
 	COORDINATOR=127.0.0.1:$(cat "$DIR/port")
 	export HSLT_COORDINATOR="$COORDINATOR"
+}
+
+# start_coordinator [OPTION...]: until it has read its jobs
+start_coordinator() {
+	listen "$@"
+	until_true 60 has_read || fail "the coordinator does not read its jobs"
 }
 
 # start_worker NAME [OPTION...]: its process id is in WORKER

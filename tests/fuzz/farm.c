@@ -69,7 +69,15 @@ int farm_world_open(struct farm_world *w, struct error *e)
 	c.heartbeat_seconds = c.hello_seconds = c.stall_seconds = 3600; /* what is found must not depend on the machine's load */
 	for (unsigned i = 0; i < FARM_PEERS; i++)
 		w->peers[i].fd = -1;
-	return server_open(&w->server, &c, e);
+	int rc = server_open(&w->server, &c, e);
+	if (rc)
+		return rc;
+	rc = server_await_jobs(w->server, e);
+	if (rc) {
+		server_close(w->server);
+		w->server = NULL;
+	}
+	return rc;
 }
 
 void farm_world_close(struct farm_world *w)

@@ -33,7 +33,7 @@ struct farm_world {
 struct farm_world *farm_world_new(void);        /* on a copy of that spool */
 void farm_world_free(struct farm_world *w);     /* its folder goes */
 void farm_spool_copy(const char *to);           /* the spool alone, for those who damage it first */
-int farm_world_open(struct farm_world *w, struct error *e); /* server_open on w->spool as it is */
+int farm_world_open(struct farm_world *w, struct error *e); /* server_open on w->spool as it is, until its jobs are read */
 void farm_world_close(struct farm_world *w);
 
 void farm_turn(struct farm_world *w);           /* what can be done at once */

@@ -27,7 +27,7 @@ struct outage outage;
 static struct exr_image reference;
 static uint64_t reference_results; /* that its film holds */
 static bool has_reference;
-static char port_file[80], after[80];
+static char port_file[80], listens_file[80], after[80];
 
 /* ---- a life ---- */
 
@@ -39,7 +39,7 @@ static void serve(const struct farm_run *f)
 	server_config_init(&c);
 	c.listen = "127.0.0.1:0";
 	c.spool = outage.root;
-	c.port_file = port_file;
+	c.port_file = listens_file;
 	c.journal_bytes = outage.journal_bytes ? outage.journal_bytes : 2000;
 	c.accept_loss = outage.accept_loss;
 	c.blob_bytes = 1 << 20;
@@ -49,7 +49,16 @@ static void serve(const struct farm_run *f)
 	if (!outage.loud && !freopen("/dev/null", "w", stderr))
 		_exit(1);
 	lossy_begin(&f->disk);
-	int rc = server_run(&c, &e);
+	struct server *s;
+	int rc = server_open(&s, &c, &e);
+	if (!rc)
+		rc = server_await_jobs(s, &e);
+	if (!rc && rename(listens_file, port_file))
+		rc = -errno;
+	if (!rc) {
+		uv_run(&s->loop, UV_RUN_DEFAULT);
+		server_close(s);
+	}
 	if (rc)
 		fprintf(stderr, "%s\n", e.text);
 	_exit(rc ? 1 : 0);
@@ -66,7 +75,7 @@ int outage_gone(struct farm_run *f, bool wait)
 	return f->code;
 }
 
-/* false: the power went before it listened. */
+/* false: the power went before it had read its jobs. */
 bool outage_start(struct farm_run *f)
 {
 	unlink(port_file);
@@ -348,6 +357,7 @@ void outage_begin(struct farm_run *f, uint64_t seed)
 	snprintf(outage.root, sizeof outage.root, "%s/spool", folder);
 	snprintf(after, sizeof after, "%s/after", folder);
 	snprintf(port_file, sizeof port_file, "%s/port", folder);
+	snprintf(listens_file, sizeof listens_file, "%s/listens", folder);
 	char command[512];
 	snprintf(command, sizeof command, "rm -rf '%s' '%s' && mkdir '%s'", outage.root, after, outage.root);
 	assert_int_equal(system(command), 0);

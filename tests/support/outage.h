@@ -52,7 +52,7 @@ extern struct outage {
 } outage;
 
 void outage_begin(struct farm_run *f, uint64_t seed); /* from nothing */
-bool outage_start(struct farm_run *f);                /* false: the power went before it listened, or it did not start */
+bool outage_start(struct farm_run *f);                /* false: the power went before it had read its jobs, or it did not start */
 bool outage_work(struct farm_run *f);                 /* to the end of all jobs; false: the power went */
 void outage_hang_up(struct farm_run *f);
 int outage_gone(struct farm_run *f, bool wait); /* 0: it runs; else its exit code, -1 for 0 */

@@ -49,6 +49,11 @@ bool scripted_has(struct scripted *p, int milliseconds)
 	return p->at < p->size || poll(&ready, 1, milliseconds) == 1;
 }
 
+bool scripted_is_merged(const Farm__Envelope *m)
+{
+	return m && m->body_case == FARM__ENVELOPE__BODY_LEASE_ACK && m->lease_ack->verdict == FARM__VERDICT__VERDICT_MERGED;
+}
+
 const Farm__Envelope *scripted_hear(struct scripted *p)
 {
 	for (;;) {

@@ -24,6 +24,7 @@ void scripted_hang_up(struct scripted *p); /* NULL: nothing */
 bool scripted_say(const struct scripted *p, const Farm__Envelope *m, const void *payload, size_t size); /* false: it hung up */
 /* The next message but heartbeats, valid until the next call; the payload is in p->reader. */
 const Farm__Envelope *scripted_hear(struct scripted *p);
+bool scripted_is_merged(const Farm__Envelope *m); /* the word that a result is, and stored; NULL is not */
 bool scripted_has(struct scripted *p, int milliseconds); /* something to hear, or the end */
 
 bool scripted_submit(const struct scripted *p, const struct plan_request *r, const char *scene);

@@ -74,3 +74,42 @@ patient_client() {
 	"$BIN/hslt-status" >"$DIR/status.log" 2>&1 && fail "$NAME: somebody is there"
 	grep -q 'no coordinator\|not there\|refused' "$DIR/status.log" || fail "$NAME: hslt-status says: $(cat "$DIR/status.log")"
 }
+
+fault long_journal 3 1 "a journal takes long to read when the coordinator starts again: it listens, says how far it is, and peers wait"
+long_journal() {
+	${CC:-cc} -shared -fPIC -O1 -o "$DIR/slow.so" "$HERE/faults/slow.c" 2>"$DIR/cc.log" || fail "$NAME: no compiler: $(cat "$DIR/cc.log")"
+	export HSLT_SLOW=20000
+	farm
+	worker w0
+	worker w1
+	job
+	each_time journal_is_read_slowly
+	finish_job
+	unset HSLT_SLOW
+	[ "$(grep -c 'is reading its jobs, [0-9]* %: what is asked for waits' "$DIR"/w[01].log | awk -F: '{ n += $2 } END { print n }')" -ge "$TIMES" ] ||
+		fail "$NAME: no worker called meanwhile"
+	blameless
+}
+# two shares that are not the same, a list, and an order that is carried out when the journal has been read
+journal_is_read_slowly() {
+	kill -9 "$COORDINATOR_PID"
+	wait "$COORDINATOR_PID" 2>/dev/null || :
+	export LD_PRELOAD="$DIR/slow.so"
+	LISTEN=$COORDINATOR listen -v --heartbeat 0.2
+	unset LD_PRELOAD
+	until_true 30 test -S "$DIR/status" || fail "$NAME: no status"
+	share=$(share_read)
+	[ -n "$share" ] || fail "$NAME: it does not say how far it is: $("$BIN/hslt-status" 2>&1)"
+	"$BIN/hslt-job" list >"$DIR/list" 2>>"$DIR/list.log"
+	grep -q "^$ID  *reading " "$DIR/list" || fail "$NAME: the list says: $(cat "$DIR/list")"
+	until_true 30 is_further || fail "$NAME: it stays at $share %"
+	somebody_holds
+	has_read || fail "$NAME: an order was carried out before the job was there"
+}
+share_read() {
+	"$BIN/hslt-status" 2>/dev/null | sed -n "s/^$ID  *reading .*# reading, \([0-9]*\) %.*/\1/p"
+}
+is_further() {
+	now=$(share_read)
+	[ "$now" != "$share" ]
+}
