@@ -79,6 +79,53 @@ static struct world *fibre(const struct agree_case *k)
 			     0.01 * k->a, 1 + 0.1 * k->a, 0.5 * k->a, 0.5 * k->a);
 }
 
+#define GLASS(ior) "<bsdf type='dielectric'><float name='int_ior' value='" ior "'/></bsdf>"
+#define SKY "<emitter type='constant'><rgb name='radiance' value='0.3'/></emitter>"
+#define GROUND "<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/>" TURN) GREY("0.6") "</shape>"
+#define LOOK_AT_IT "<sensor type='perspective'><float name='fov' value='35'/>" AT("<lookat origin='0.4,2.2,5' target='0,0.7,0' up='0,1,0'/>" TURN) FILM "</sensor>"
+
+/* A lamp that shines down lies in the lower side of a slab of glass and across its rim; another, which shines up, in the upper side, a
+ * times as wide as the slab. */
+static struct world *lamp_in_glass(const struct agree_case *k)
+{
+	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY
+			     "<shape type='cube'>" AT("<scale x='0.8' y='0.2' z='0.8'/><translate y='1.2'/>" TURN) GLASS("1.5") "</shape>"
+			     "<shape type='rectangle'>" AT("<scale value='%.17g'/><rotate x='1' angle='90'/><translate x='0.3' y='1'/>" TURN)
+			     "<emitter type='area'><rgb name='radiance' value='2'/></emitter></shape>"
+			     "<shape type='rectangle'>" AT("<scale value='%.17g'/><rotate x='1' angle='-90'/><translate x='0.3' y='1.4'/>" TURN)
+			     "<emitter type='area'><rgb name='radiance' value='2'/></emitter></shape>",
+			     0.8 * k->a, 0.8 * k->a);
+}
+
+/* Glass and water, side by side with a face in common, on a ground whose plane holds the lower faces of both. */
+static struct world *glass_and_water(const struct agree_case *k)
+{
+	(void)k;
+	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY
+			     "<shape type='cube'>" AT("<scale value='0.5'/><translate x='-0.5' y='0.5'/>" TURN) GLASS("1.5") "</shape>"
+			     "<shape type='cube'>" AT("<scale x='0.5' y='0.4' z='0.7'/><translate x='0.5' y='0.4'/>" TURN) GLASS("1.33") "</shape>");
+}
+
+/* A ball of glass holds one of water, that one of air, and there is another ball of glass in the same place. */
+static struct world *balls_in_balls(const struct agree_case *k)
+{
+#define BALL(radius, bsdf) "<shape type='sphere'><point name='center' x='0' y='0.8' z='0'/><float name='radius' value='" radius "'/>" bsdf "</shape>"
+#define BETWEEN(inner, outer) "<bsdf type='dielectric'><float name='int_ior' value='" inner "'/><float name='ext_ior' value='" outer "'/></bsdf>"
+	(void)k;
+	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY BALL("0.8", GLASS("1.5")) BALL("0.7", BETWEEN("1.33", "1.5"))
+			     BALL("0.4", BETWEEN("1", "1.33")) BALL("0.8", GLASS("2.4")));
+}
+
+/* The same lamp three times, as someone pastes it: it shines once. */
+static struct world *lamp_pasted(const struct agree_case *k)
+{
+#define LAMP "<shape type='rectangle'>" AT("<scale value='0.6'/><rotate x='1' angle='90'/><translate y='1.6'/>" TURN) \
+	"<emitter type='area'><rgb name='radiance' value='2'/></emitter></shape>"
+	(void)k;
+	return world_of_text(32, 32, LOOK_AT_IT GROUND LAMP LAMP LAMP
+			     "<shape type='cube'>" AT("<scale value='0.3'/><translate y='0.3'/>" TURN) GREY("0.5") "</shape>");
+}
+
 const struct agree_case agree_cases[] = {
 	{"mixed scales", "1 on a floor of 10", on_a_floor, 1, 10, 5, 1024, 512, ALL, 0.05},
 	{"mixed scales", "1 on a floor of 1e6", on_a_floor, 1, 1e6, 5, 1024, 512, ALL, 0.05},
@@ -88,5 +135,10 @@ const struct agree_case agree_cases[] = {
 	{"mixed scales", "1e-6 on 1 on 1e6", on_a_table, 1e-6, 1e6, 5, 1024, 512, ALL, 0.05},
 	{"mirror box", "0.95 to depth 64", mirror_box, 0.95, 0, 64, 256, 128, {"bdpt", "hslt"}, 0.15},
 	{"fibre", "100 times as long as wide", fibre, 0.02, 0, 128, 1024, 256, {"bdpt", "hslt"}, 0.6},
+	{"coinciding surfaces", "lamps in the planes of glass", lamp_in_glass, 0.7, 0, 6, 256, 256, ALL, 0.03},
+	{"coinciding surfaces", "lamps wider than the glass", lamp_in_glass, 1.3, 0, 6, 256, 1024, ALL, 0.04},
+	{"coinciding surfaces", "glass beside water on a ground", glass_and_water, 0, 0, 8, 256, 256, ALL, 0.03},
+	{"coinciding surfaces", "balls of glass, water and air", balls_in_balls, 0, 0, 8, 256, 256, ALL, 0.03},
+	{"coinciding surfaces", "a lamp three times", lamp_pasted, 0, 0, 5, 256, 768, ALL, 0.04},
 	{NULL, NULL, NULL, 0, 0, 0, 0, 0, {NULL}, 0},
 };

@@ -98,11 +98,11 @@ struct accel *body_accel(const struct geom_shape *shapes, uint32_t count)
 	for (uint32_t i = 0; i < count; i++) {
 		const struct geom_shape *g = &shapes[i];
 		a[i] = (struct accel_shape){g->is_sphere, g->center, g->radius, g->vertex_count, g->triangle_count,
-					    (const float(*)[3])g->position, (const uint32_t(*)[3])g->index};
+					    (const float(*)[3])g->position, (const uint32_t(*)[3])g->index, SURFACE_OPAQUE};
 	}
 	struct accel *accel;
 	struct error e = {""};
-	if (accel_new(&accel, a, count, &e))
+	if (accel_new(&accel, a, count, NULL, &e))
 		fail_msg("%s", e.text);
 	mem_free(a);
 	return accel;

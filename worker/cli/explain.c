@@ -35,8 +35,7 @@ static void print_lines(const char *name, const struct render_summary *m, const 
 	if (*p->mixture)
 		printf(", mutations %s", p->mixture);
 	printf("\n%s\n", c->made ? c->text : "asked for; else a pilot would choose among path, bdpt and " RENDER_INTEGRATOR_CHAINS);
-	render_effects_note(m, note, sizeof note);
-	if (*note)
+	for (size_t i = 0; render_scene_note(m, i, note, sizeof note); i++)
 		printf("note: %s\n", note);
 }
 

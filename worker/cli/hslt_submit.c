@@ -260,8 +260,7 @@ int main(int argc, char **argv)
 		return rc == -EINVAL ? 2 : 1;
 	}
 	char note[512];
-	render_effects_note(&b.summary, note, sizeof note);
-	if (*note)
+	for (size_t i = 0; render_scene_note(&b.summary, i, note, sizeof note); i++)
 		fprintf(stderr, "hslt-submit: note: %s\n", note);
 	a.request.output = a.estimate ? "" : last_part(a.output);
 	a.request.name = a.name ? a.name : b.scene;

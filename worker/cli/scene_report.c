@@ -39,7 +39,7 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 {
 	static struct render_summary m; /* large */
 	struct error deeper;
-	uint32_t problems = s->problem_count;
+	uint32_t problems = s->problem_count, notes = s->note_count;
 	for (uint32_t i = 0; i < s->problem_count; i++)
 		printf("%s\n", s->problems[i]);
 	const struct render_options as_it_is = {0};
@@ -49,12 +49,15 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	}
 	for (uint32_t i = 0; i < s->note_count; i++)
 		printf("note: %s\n", s->notes[i]);
+	char text[512];
+	for (size_t i = 0; !problems && render_scene_note(&m, i, text, sizeof text); i++, notes++)
+		printf("note: %s\n", text);
 	*bad = problems > 0;
 	if (*bad)
-		printf("%s: %u problem%s, %u note%s\n", name, problems, plural(problems), s->note_count, plural(s->note_count));
+		printf("%s: %u problem%s, %u note%s\n", name, problems, plural(problems), notes, plural(notes));
 	else
 		printf("%s: can be rendered: %llu shapes, %llu triangles, %u files, %u note%s\n", name, (unsigned long long)m.shapes,
-		       (unsigned long long)m.triangles, s->asset_count + 1, s->note_count, plural(s->note_count));
+		       (unsigned long long)m.triangles, s->asset_count + 1, notes, plural(notes));
 	return 0;
 }
 
@@ -128,6 +131,9 @@ static json_t *describe(const struct scene *s, const struct opened *o, struct er
 		return NULL;
 	for (uint32_t i = 0; i < s->note_count; i++)
 		json_array_append_new(notes, json_string(s->notes[i]));
+	char text[512];
+	for (size_t i = 0; render_scene_note(&m, i, text, sizeof text); i++)
+		json_array_append_new(notes, json_string(text));
 	const struct scene_settings *f = &m.settings;
 	json_t *all = json_pack("{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:o s:o s:o}", "schema", 1, "scene", o->name, "dialect",
 				s->dialect_3 ? "3.x" : "0.6", "width", (int)f->width, "height", (int)f->height, "sampleCount",

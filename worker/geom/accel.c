@@ -17,6 +17,7 @@ struct accel {
 	uint32_t count, sphere_count;
 	struct sphere_prim *spheres;
 	struct accel_shape *shapes;
+	const struct coincidence *coincidence;
 	struct wide_prims *wide; /* one a shape */
 	atomic_size_t bytes, peak;
 	vec3 low, high;
@@ -68,7 +69,10 @@ static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
 		args->valid[0] = 0;
 	else if (is_wide(q, args->geometryUserPtr, hit->primID))
 		args->valid[0] = 0;
-	else if (!clearly_crosses(q, hit, (const struct RTCRay *)(const void *)args->ray) &&
+	else if (query_hides(q, hit->geomID)) {
+		if (!query_crosses_there(q, (struct prim_ref){hit->geomID, hit->primID}))
+			args->valid[0] = 0;
+	} else if (!clearly_crosses(q, hit, (const struct RTCRay *)(const void *)args->ray) &&
 		 !query_crosses(q, args->geometryUserPtr, hit->primID))
 		args->valid[0] = 0;
 }
@@ -220,8 +224,11 @@ static void find_detail(struct accel *a, const struct accel_shape *shapes, uint3
 	a->detail = MIXED * least < 0x1p21 * reach ? least : 0;
 }
 
+/* A sphere is hidden wholly or not at all. */
 static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
 {
+	if (a->shapes[id].is_sphere && coincide_there(a->coincidence, a->shapes, (struct prim_ref){id, 0}, a->shapes[id].center).shape != id)
+		return 0;
 	int rc = a->shapes[id].is_sphere ? attach_sphere(a, &a->shapes[id], id) : attach_triangles(a, &a->shapes[id], id);
 	return rc || a->detail == 0 ? rc : attach_wide(a, count, id, MIXED * a->detail);
 }
@@ -238,8 +245,9 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 	rtcSetSceneFlags(a->scene, RTC_SCENE_FLAG_ROBUST);
 	rtcSetSceneBuildQuality(a->scene, RTC_BUILD_QUALITY_MEDIUM);
 	find_detail(a, shapes, count);
-	for (uint32_t i = 0; i < count; i++) {
+	for (uint32_t i = 0; i < count; i++)
 		a->shapes[i] = shapes[i];
+	for (uint32_t i = 0; i < count; i++) {
 		int rc = attach_shape(a, count, i);
 		if (rc)
 			return error_set(e, -rc, "Embree's geometry cannot be created");
@@ -258,7 +266,7 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 	return 0;
 }
 
-int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t count, struct error *e)
+int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t count, const struct coincidence *c, struct error *e)
 {
 	*out = NULL;
 	struct accel *a = mem_alloc(1, sizeof *a);
@@ -268,6 +276,7 @@ int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t cou
 	a->shapes = mem_alloc(count, sizeof *a->shapes);
 	a->wide = mem_alloc(count, sizeof *a->wide);
 	a->count = count;
+	a->coincidence = c;
 	unsigned trap = fptrap_leave();
 	int rc = a->spheres && a->shapes && a->wide ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
 	fptrap_return(trap);
@@ -369,7 +378,16 @@ static void check_ray(const struct RTCRay *r)
 static struct query query_of(const struct accel *a, vec3 o, vec3 d)
 {
 	return (struct query){.o = o, .d = d, .from = PRIM_NONE, .to = PRIM_NONE,
-			      .wide_from = a->detail == 0 ? INFINITY : MIXED * a->detail};
+			      .wide_from = a->detail == 0 ? INFINITY : MIXED * a->detail, .coincidence = a->coincidence, .shapes = a->shapes};
+}
+
+/* It lies on a surface where another is. */
+static bool is_hidden(const struct accel *a, const struct ray_end *end)
+{
+	if (!a->coincidence || end->prim.shape == PRIM_NONE.shape)
+		return false;
+	struct prim_ref there = coincide_there(a->coincidence, a->shapes, end->prim, end->p);
+	return there.shape != end->prim.shape || there.prim != end->prim.prim;
 }
 
 /* Embree's ray for the part from t0 to t1 runs from o along d, beside the true one, and begins before it, by as much as floats
@@ -415,7 +433,7 @@ static bool closest(const struct accel *a, struct query *q, struct RTCRayHit *rh
 bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max, struct ray_hit *hit)
 {
 	double enter = entry_distance(a, from->p, d);
-	if (enter >= t_max)
+	if (enter >= t_max || is_hidden(a, from))
 		return false;
 	struct query q = query_of(a, vec3_madd(from->p, enter, d), d);
 	q.from = from->prim;
@@ -423,7 +441,7 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	if (!closest(a, &q, &rh, lifted(a, q.o, from->ng, d), fmax(t_min - enter, 0), t_max - enter))
 		return false;
 	double t = enter + fmax((double)rh.ray.tfar - q.back, 0);
-	*hit = (struct ray_hit){{rh.hit.geomID, rh.hit.primID}, t, (double)rh.hit.u, (double)rh.hit.v};
+	*hit = (struct ray_hit){query_there(&q, (struct prim_ref){rh.hit.geomID, rh.hit.primID}), t, (double)rh.hit.u, (double)rh.hit.v};
 	return true;
 }
 
@@ -455,6 +473,8 @@ bool accel_occluded(const struct accel *a, const struct ray_end *from, const str
 	}
 	vec3 d = vec3_sub(to->p, from->p);
 	double enter = entry_distance(a, from->p, d);
+	if (is_hidden(a, from) || is_hidden(a, to))
+		return true;
 	if (enter >= 1)
 		return false;
 	struct query q = query_of(a, vec3_madd(from->p, enter, d), vec3_scale(1 - enter, d));
@@ -470,6 +490,8 @@ bool accel_occluded(const struct accel *a, const struct ray_end *from, const str
 
 bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d)
 {
+	if (is_hidden(a, from))
+		return true;
 	struct query q = query_of(a, from->p, d);
 	q.from = from->prim;
 	return occluded(a, &q, lifted(a, from->p, from->ng, d), d, INFINITY);

@@ -26,6 +26,16 @@
 #include <stdint.h>
 
 struct accel;
+struct coincidence; /* coincide.h */
+
+/* Of surfaces that coincide the one of least rank is there. */
+enum surface_rank {
+	SURFACE_SHINES,
+	SURFACE_OPAQUE,
+	SURFACE_TRANSMITS,
+	SURFACE_PASSES, /* lets light go straight on: null, mask */
+	SURFACE_RANKS
+};
 
 struct accel_shape {
 	bool is_sphere;
@@ -35,6 +45,7 @@ struct accel_shape {
 						  the start of the last vertex */
 	const float (*position)[3];
 	const uint32_t (*index)[3];
+	enum surface_rank rank;
 };
 
 struct prim_ref {
@@ -54,14 +65,16 @@ struct ray_hit {
 	double u, v; /* Embree's barycentrics, for rays that lie in the triangle's plane */
 };
 
-int accel_new(struct accel **a, const struct accel_shape *shapes, uint32_t count, struct error *e);
+/* c: what coincide_find found among the shapes; NULL: nothing. It outlives the accel. */
+int accel_new(struct accel **a, const struct accel_shape *shapes, uint32_t count, const struct coincidence *c, struct error *e);
 void accel_free(struct accel *a);
 size_t accel_bytes(const struct accel *a); /* what Embree allocated, without our vertices and indices */
 size_t accel_peak_bytes(const struct accel *a); /* the most of it, while it built */
 
 /* Closest hit along the unit direction d, in (t_min, t_max). */
 bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max, struct ray_hit *hit);
-/* Something lies between the two ends. */
+/* Something lies between the two ends, or one of them lies on a surface that is hidden there (coincide.h), from which no ray leaves
+ * either: the others say that they meet nothing, or something. */
 bool accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to);
 /* Something lies along the unit direction d, to infinity. */
 bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d);

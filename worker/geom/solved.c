@@ -15,6 +15,28 @@ bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t 
 	return (start > 0 && beyond > 0) || (start < 0 && beyond < 0);
 }
 
+struct prim_ref query_there(const struct query *q, struct prim_ref prim)
+{
+	if (!query_hides(q, prim.shape))
+		return prim;
+	const struct triangle t = triangle_of(&q->shapes[prim.shape], prim.prim);
+	double slope = vec3_dot(t.n, q->d);
+	if (slope == 0)
+		return prim;
+	return coincide_there(q->coincidence, q->shapes, prim, vec3_madd(q->o, vec3_dot(t.n, vec3_sub(t.v[0], q->o)) / slope, q->d));
+}
+
+static bool is_end(const struct query *q, struct prim_ref p)
+{
+	return (p.shape == q->from.shape && p.prim == q->from.prim) || (p.shape == q->to.shape && p.prim == q->to.prim);
+}
+
+bool query_crosses_there(const struct query *q, struct prim_ref prim)
+{
+	struct prim_ref there = query_there(q, prim);
+	return !is_end(q, there) && query_crosses(q, &q->shapes[there.shape], there.prim);
+}
+
 static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
 {
 	const struct sphere_prim *s = args->geometryUserPtr;
@@ -100,8 +122,8 @@ static void wide_bounds(const struct RTCBoundsFunctionArguments *args)
 /* As the filter has it for triangles that Embree solves; those are never PRIM_NONE. */
 static bool wide_root(const struct wide_prims *w, uint32_t prim, const struct query *q, double t_max, double *t)
 {
-	bool starts = w->id == q->from.shape && prim == q->from.prim, ends = w->id == q->to.shape && prim == q->to.prim;
-	if (starts || ends || !query_crosses(q, w->shape, prim))
+	const struct prim_ref ref = {w->id, prim};
+	if (is_end(q, ref) || !(query_hides(q, w->id) ? query_crosses_there(q, ref) : query_crosses(q, w->shape, prim)))
 		return false;
 	const struct triangle k = triangle_of(w->shape, prim);
 	return triangle_meets(&k, q->o, q->d, t) && *t > q->t_min && *t < t_max;

@@ -6,6 +6,7 @@
 #define WORKER_GEOM_SOLVED_H
 
 #include "worker/geom/accel.h"
+#include "worker/geom/coincide.h"
 #include "worker/geom/embree.h"
 
 /* What a query carries into Embree's callbacks. */
@@ -19,6 +20,8 @@ struct query {
 	double back;   /* Embree's ray begins that much before o, in units of d; below 0: after it */
 	double wide_from; /* extent from which on triangles are solved in double; INFINITY: none is */
 	struct prim_ref from, to;
+	const struct coincidence *coincidence; /* NULL: no surfaces coincide */
+	const struct accel_shape *shapes;
 };
 
 struct sphere_prim {
@@ -37,6 +40,16 @@ struct wide_prims {
 /* The plane of a triangle is crossed after the start, and before the end of a segment. A ray that starts in the plane, on a
  * coplanar neighbour, does not cross it again. */
 bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim);
+
+/* Which triangle is there where the ray crosses the plane of this one: it, or what hides it (coincide.h). */
+struct prim_ref query_there(const struct query *q, struct prim_ref prim);
+/* Some of this shape is hidden. */
+static inline bool query_hides(const struct query *q, uint32_t shape)
+{
+	return q->coincidence && q->coincidence->first[shape] < q->coincidence->first[shape + 1];
+}
+/* The same as query_crosses, of what is there; no end of the ray lies on that. */
+bool query_crosses_there(const struct query *q, struct prim_ref prim);
 
 /* What a user geometry is made of; both outlive it. */
 void solved_sphere(RTCGeometry g, struct sphere_prim *s);

@@ -49,6 +49,14 @@ struct render_options {
 	uint32_t max_depth;
 };
 
+/* Shapes of which surfaces coincide, a sentence each with the names of two. */
+enum { RENDER_COINCIDENT_MAX = 8 };
+struct render_coincident {
+	char text[RENDER_COINCIDENT_MAX][400];
+	size_t count, total; /* sentences; of how many */
+	bool incomplete;     /* there are more than were looked for */
+};
+
 struct render_summary {
 	struct scene_settings settings; /* with the overrides of the options */
 	uint32_t useful_depth;          /* edges of the longest path that can carry light, at most what was asked for */
@@ -56,6 +64,7 @@ struct render_summary {
 	size_t line_count;
 	uint64_t shapes, triangles;
 	double brightest; /* see world_brightest */
+	struct render_coincident coincident;
 };
 
 /* Reads every mesh, texture and material and says what the scene calls for; all but Embree's own building. What passes
@@ -81,6 +90,9 @@ int render_mutations(const char *text, const struct render_summary *summary, cha
 int render_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct error *e);
 /* "the image is of another scene: without dispersion" where an effect that the scene calls for was switched off; else "". */
 void render_effects_note(const struct render_summary *scene, char *text, size_t size);
+
+/* The i-th of the sentences about the scene as a whole: the note on effects, surfaces that coincide; false: there are no more. */
+bool render_scene_note(const struct render_summary *scene, size_t i, char *text, size_t size);
 
 /* false also where there is no effect of that name. */
 bool render_effect_on(const struct render_summary *scene, const char *name);

@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/tick.h"
 #include "worker/shape/shape.h"
+#include "worker/world/coincident.h"
 #include "worker/world/displacement.h"
 #include "worker/world/origin.h"
 #include "worker/world/reach.h"
@@ -357,22 +358,16 @@ static int build_accel(struct builder *b)
 	struct world *w = b->w;
 	/* The meshes as they were read are half as large as what Embree is about to need. */
 	arena_fini(&b->scratch);
-	struct accel_shape *s = arena_alloc(&b->scratch, w->shape_count, sizeof *s);
+	struct accel_shape *s = coincident_shapes(w, &b->scratch);
 	if (!s)
 		return out_of_memory(b->e);
-	for (uint32_t i = 0; i < w->shape_count; i++) {
-		const struct geom_shape *g = &w->shapes[i];
-		s[i] = (struct accel_shape){
-			.is_sphere = g->is_sphere,
-			.center = g->center,
-			.radius = g->radius,
-			.vertex_count = g->vertex_count,
-			.triangle_count = g->triangle_count,
-			.position = (const float(*)[3])g->position,
-			.index = (const uint32_t(*)[3])g->index,
-		};
-	}
-	return accel_new(&w->accel, s, w->shape_count, b->e);
+	return accel_new(&w->accel, s, w->shape_count, w->coincidence, b->e);
+}
+
+static int find_coincidence(struct builder *b)
+{
+	struct accel_shape *s = coincident_shapes(b->w, &b->scratch);
+	return s ? coincident_find(b->w, b->shape_nodes, s, b->e) : out_of_memory(b->e);
 }
 
 static int find_effects(struct builder *b, uint32_t max_depth)
@@ -404,6 +399,8 @@ static int prepare(struct builder *b, const struct render_options *o)
 		rc = create_bsdfs(b);
 	if (!rc)
 		rc = create_emitters(b);
+	if (!rc)
+		rc = find_coincidence(b);
 	if (!rc)
 		rc = find_effects(b, o ? o->max_depth : 0);
 	if (!rc)

@@ -297,6 +297,15 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 	static const enum effect absent[] = {EFFECT_BUMP, EFFECT_ALPHA, EFFECT_INSTANCING};
 	for (size_t i = 0; i < sizeof absent / sizeof *absent; i++)
 		line(r, absent[i], false, "%s", effect_table[absent[i]].refuse);
+	const struct render_coincident *k = &w->coincident;
+	if (k->total > 1)
+		line(r, EFFECT_COINCIDENCE, true, "%zu pairs of shapes coincide, of which one sees", k->total);
+	else if (k->total == 1)
+		line(r, EFFECT_COINCIDENCE, true, "%s", k->text[0]);
+	else if (w->coincidence)
+		line(r, EFFECT_COINCIDENCE, true, "opaque bodies touch");
+	else
+		line(r, EFFECT_COINCIDENCE, false, "no surfaces lie in one place");
 }
 
 static bool lights(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many, const char *none)

@@ -24,6 +24,7 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_DISPLACEMENT] = {"displacement", ON | SCENE, "no finer meshes are made: time and memory of building", NULL},
 	[EFFECT_BUMP] = {"bump", 0, "normals are the mesh's", "the scene language here has no bump or normal maps"},
 	[EFFECT_ALPHA] = {"alpha", 0, "no ray asks for opacity: one filter less in Embree", "the scene language here has no masks"},
+	[EFFECT_COINCIDENCE] = {"coincidence", 0, "no ray asks which of two surfaces is there", "surfaces coincide or they do not"},
 	[EFFECT_INSTANCING] = {"instancing", 0, "no transforms between rays and meshes", "the scene language here has no instances"},
 	[EFFECT_ENVIRONMENT] = {"environment", ON | SCENE, "rays that escape end there", NULL},
 	[EFFECT_AREA_LIGHT] = {"area-light", ON | SCENE, "nothing: only paths that end on one pay", NULL},
@@ -125,4 +126,23 @@ void render_effects_note(const struct render_summary *scene, char *text, size_t 
 			used += (size_t)snprintf(text + used, size - used, "%s%s", used ? ", " : "the image is of another scene: without ",
 						 l->name);
 	}
+}
+
+bool render_scene_note(const struct render_summary *scene, size_t i, char *text, size_t size)
+{
+	const struct render_coincident *c = &scene->coincident;
+	render_effects_note(scene, text, size);
+	if (*text && i-- == 0)
+		return true;
+	if (i < c->count) {
+		snprintf(text, size, "%s", c->text[i]);
+		return true;
+	}
+	i -= c->count;
+	if (c->total > c->count && i-- == 0) {
+		snprintf(text, size, "%zu more pairs of shapes coincide", c->total - c->count);
+		return true;
+	}
+	snprintf(text, size, "more surfaces coincide than are looked for: of the others chance decides which is met");
+	return c->incomplete && i == 0;
 }

@@ -1,6 +1,7 @@
 #include "worker/world/world.h"
 
 #include "common/base/mem.h"
+#include "worker/geom/coincide.h"
 
 #include <string.h>
 
@@ -21,7 +22,7 @@ int32_t world_pick_emitter(const struct world *w, double u)
 void world_summary(const struct world *w, struct render_summary *out)
 {
 	*out = (struct render_summary){.settings = w->settings, .useful_depth = w->effects.max_depth, .line_count = w->effects.line_count, .shapes = w->shape_count,
-				       .brightest = world_brightest(w)};
+				       .brightest = world_brightest(w), .coincident = w->coincident};
 	memcpy(out->lines, w->effects.lines, sizeof out->lines);
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		out->triangles += w->shapes[i].triangle_count;
@@ -49,6 +50,7 @@ void world_free(struct world *w)
 	if (!w)
 		return;
 	accel_free(w->accel);
+	coincide_free(w->coincidence);
 	arena_fini(&w->arena);
 	mem_free(w);
 }

@@ -33,6 +33,8 @@ struct world {
 	double *emitter_pdf, *emitter_cdf; /* choice among emitters by power */
 	int32_t environment;               /* index of the emitter that escaping rays meet; -1: none */
 	double grey_xyz[3];                /* CIE XYZ of grey value 1 */
+	struct coincidence *coincidence; /* of surfaces; NULL: none */
+	struct render_coincident coincident; /* what there is to say of it */
 	struct accel *accel;
 };
 

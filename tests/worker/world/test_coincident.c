@@ -1,0 +1,91 @@
+/* What is said of shapes that coincide: which of two is there and why, by name; nothing where nobody can see it. */
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define AT(inner) "<transform name='to_world'>" inner "</transform>"
+#define SHINES "<emitter type='area'><rgb name='radiance' value='1'/></emitter>"
+#define RED "<bsdf type='diffuse'><rgb name='reflectance' value='0.5,0.1,0.1'/></bsdf>"
+#define GREY "<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf>"
+#define GLASS "<bsdf type='dielectric'/>"
+#define FLOOR(inside) "<shape type='rectangle' id='floor'>" AT("<rotate x='1' angle='-90'/><scale value='4'/>") inside "</shape>\n"
+#define CUBE(id, x, y, inside) "<shape type='cube' id='" id "'>" AT("<scale value='0.5'/><translate x='" x "' y='" y "'/>") inside "</shape>\n"
+#define LAMP "<shape type='rectangle' id='lamp'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>") SHINES "</shape>\n"
+#define VIEW SENSOR("0,3,8", "0,0,0") "\n"
+
+/* NULL: nothing is said. on: whether rays have to ask. */
+static void expect(const char *text, const char *first, const char *second, bool on)
+{
+	struct world *w = world_of_text(8, 8, "%s", text);
+	struct render_summary s;
+	const char *wanted[3] = {first, second, NULL};
+	char note[512];
+	size_t i = 0;
+	world_summary(w, &s);
+	for (; render_scene_note(&s, i, note, sizeof note); i++) {
+		assert_true(i < 2);
+		if (!wanted[i])
+			fail_msg("%s", note);
+		assert_string_equal(note, wanted[i]);
+	}
+	assert_null(wanted[i]);
+	assert_int_equal(render_effect_on(&s, "coincidence"), on);
+	world_free(w);
+}
+
+static void test_notes(void **state)
+{
+	(void)state;
+	expect(VIEW FLOOR(GREY) CUBE("block", "2", "0.6", GREY) LAMP, NULL, NULL, false);
+	expect(VIEW CUBE("glass", "0", "0.5", GLASS) LAMP,
+	       "`glass` (line 2) and `lamp` (line 3) coincide: where they overlap only the latter is there, because it shines", NULL, true);
+	expect(VIEW CUBE("glass", "0", "0.5", GLASS) FLOOR(GREY),
+	       "`glass` (line 2) and `floor` (line 3) coincide: where they overlap only the latter is there, because it is opaque", NULL, true);
+	expect(VIEW CUBE("glass", "0", "0.5", GLASS) CUBE("ice", "1", "0.5", GLASS) CUBE("hole", "-1", "0.5", "<bsdf type='null'/>"),
+	       "`ice` (line 3) and `glass` (line 2) coincide: where they overlap only the latter is there, because it comes first in the file"
+	       "; where two media touch, one surface with the int_ior and ext_ior of both is meant",
+	       "`hole` (line 4) and `glass` (line 2) coincide: where they overlap only the latter is there, because it refracts or scatters", true);
+	/* A block on a floor shows nothing of it; a picture on the wall that is the wall does. */
+	expect(VIEW FLOOR(GREY) CUBE("block", "0", "0.5", RED), NULL, NULL, true);
+	expect(VIEW FLOOR(GREY) "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>") RED "</shape>",
+	       "the rectangle in line 3 and `floor` (line 2) coincide: where they overlap only the latter is there, because it comes first in the file",
+	       NULL, true);
+}
+
+/* Of many not more is said than a few, and how many more there are. */
+static void test_many(void **state)
+{
+	(void)state;
+	char text[8192] = VIEW FLOOR(GREY), note[512];
+	for (int i = 0; i < 20; i++) {
+		size_t used = strlen(text);
+		snprintf(text + used, sizeof text - used, "<shape type='cube'>" AT("<scale value='0.1'/><translate x='%d' y='0.1'/>") GLASS "</shape>\n",
+			 i - 30);
+		if (i >= 10)
+			continue;
+		used = strlen(text);
+		snprintf(text + used, sizeof text - used, "<shape type='cube'>" AT("<scale value='0.1'/><translate x='%g' z='2' y='0.1'/>") GLASS "</shape>\n",
+			 0.3 * i);
+	}
+	struct world *w = world_of_text(8, 8, "%s", text);
+	struct render_summary s;
+	size_t i = 0;
+	world_summary(w, &s);
+	while (render_scene_note(&s, i, note, sizeof note))
+		i++;
+	assert_int_equal(i, RENDER_COINCIDENT_MAX + 1);
+	assert_true(render_scene_note(&s, RENDER_COINCIDENT_MAX, note, sizeof note));
+	assert_string_equal(note, "2 more pairs of shapes coincide");
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_notes), cmocka_unit_test(test_many)};
+	return cmocka_run_group_tests_name("what is said of coinciding surfaces", tests, NULL, NULL);
+}
