@@ -19,7 +19,7 @@
 /* A primitive that is hidden, in part or wholly, by another of which it lies no farther than vertices are rounded. */
 struct coincide_pair {
 	struct prim_ref hidden, by;
-	uint8_t rank; /* of `by` */
+	enum surface_rank rank; /* of `by` */
 	bool wholly;
 	bool same_side; /* their normals agree */
 };

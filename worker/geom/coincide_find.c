@@ -259,8 +259,8 @@ static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigne
 static int compare_pairs(const void *x, const void *y)
 {
 	const struct coincide_pair *a = x, *b = y;
-	const uint32_t u[] = {a->hidden.shape, a->hidden.prim, a->rank, a->by.shape, a->by.prim};
-	const uint32_t v[] = {b->hidden.shape, b->hidden.prim, b->rank, b->by.shape, b->by.prim};
+	const uint32_t u[] = {a->hidden.shape, a->hidden.prim, (uint32_t)a->rank, a->by.shape, a->by.prim};
+	const uint32_t v[] = {b->hidden.shape, b->hidden.prim, (uint32_t)b->rank, b->by.shape, b->by.prim};
 	for (int i = 0; i < 5; i++)
 		if (u[i] != v[i])
 			return u[i] < v[i] ? -1 : 1;
