@@ -318,7 +318,7 @@ static void compare_all(const struct world *w, const struct trial_scene *s, doub
 		print_ratio(says, &of[DEFAULT], &of[best[t]], t, seeds);
 		bench_single(t ? "default / best, trimmed" : "default / best", of[DEFAULT].mean[t] / of[best[t]].mean[t], "of the time", BENCH_INFORMS, 0);
 	}
-	printf("  the reference, by %s: its own relMSE %.3g\n", reference.integrator, error_by_spread(&reference.image, scale));
+	printf("  the reference's own relMSE: %.3g\n", error_by_spread(&reference.image, scale));
 	fflush(stdout);
 	canvas_image_fini(&reference.image);
 	mem_free(scale);

@@ -8,6 +8,10 @@ const struct wavelength_cell wavelength_cells[CIE_COUNT - 1] = {
 #include "wavelength_cells.inc"
 };
 
+const unsigned short wavelength_guide[WAVELENGTH_GUIDE] = {
+#include "wavelength_guide.inc"
+};
+
 const double cie_d65[CIE_COUNT] = {
 #include "cie_d65.inc"
 };

@@ -16,5 +16,8 @@ struct wavelength_cell {
 	double below, share;
 };
 extern const struct wavelength_cell wavelength_cells[CIE_COUNT - 1];
+/* The cell in which the share k / WAVELENGTH_GUIDE lies. */
+enum { WAVELENGTH_GUIDE = 512 };
+extern const unsigned short wavelength_guide[WAVELENGTH_GUIDE];
 
 #endif

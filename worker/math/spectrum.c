@@ -11,11 +11,10 @@ static int cell_of(double nm)
 /* The wavelength below which the share u of all lies. */
 static double wavelength_at(double u)
 {
-	int low = 0;
-	for (int step = 256; step > 0; step /= 2) {
-		int next = low + step < CIE_COUNT - 1 ? low + step : low;
-		low = wavelength_cells[next].below <= u ? next : low;
-	}
+	int part = (int)(u * WAVELENGTH_GUIDE); /* u may be 1 by rounding */
+	int low = wavelength_guide[part < WAVELENGTH_GUIDE ? part : WAVELENGTH_GUIDE - 1];
+	while (low + 1 < CIE_COUNT - 1 && wavelength_cells[low + 1].below <= u)
+		low++;
 	double inside = (u - wavelength_cells[low].below) / wavelength_cells[low].share;
 	return CIE_FIRST_NM + low + fmin(inside, 1);
 }

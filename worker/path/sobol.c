@@ -91,7 +91,7 @@ static void fill(const struct sampler_sobol *s, uint64_t half, double out[DIMENS
 	uint64_t hash[4], point[2] = {0, 0};
 	for (int i = 0; i < 4; i++)
 		hash[i] = mix(s->key[i] + half * UINT64_C(0x9e3779b97f4a7c15));
-	uint32_t order = permute((uint32_t)(reverse(s->sample) >> 32), (uint32_t)hash[0]);
+	uint32_t order = permute(s->reversed, (uint32_t)hash[0]);
 	uint32_t number = (uint32_t)(reverse(order) >> 32);
 	for (int i = 0; i < 8; i++, number >>= 4) {
 		point[0] ^= first_two[i][number & 15];
@@ -120,5 +120,6 @@ void sampler_sobol_init(struct sampler_sobol *s, uint64_t seed, enum rng_stream 
 {
 	s->base.block = sobol_block;
 	s->sample = sample;
+	s->reversed = (uint32_t)(reverse(sample) >> 32);
 	rng_bits4(seed, stream, index, replicate, sample >> 32, s->key);
 }

@@ -20,6 +20,7 @@
 struct sampler_sobol {
 	struct sampler base;
 	uint64_t sample, key[4];
+	uint32_t reversed; /* the bits of sample */
 	double value[SAMPLER_SIDES][SAMPLER_BLOCK];
 };
 

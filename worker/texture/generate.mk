@@ -1,5 +1,5 @@
 # Tables that are made at build time: published data as C initialisers, and the coefficients of upsampled colours.
-TABLES := $(addprefix $(BUILD)/gen/,cie_observer.inc cie_d65.inc wavelength_cells.inc conductors.inc upsample_table.inc)
+TABLES := $(addprefix $(BUILD)/gen/,cie_observer.inc cie_d65.inc wavelength_cells.inc wavelength_guide.inc conductors.inc upsample_table.inc)
 generated: $(TABLES)
 
 $(BUILD)/gen/cie_observer.inc: worker/math/data/cie1931_2deg_1nm.csv
@@ -24,6 +24,13 @@ $(BUILD)/gen/wavelength_cells.inc: worker/math/data/cie1931_2deg_1nm.csv
 				sum += 0.95 * (curve[i] + curve[i + 1]) / total + 0.05 / (n - 1); \
 				printf "{%.17g, %.17g},\n", below, (i + 2 < n ? sum : 1) - below } }' $< > $@.part && mv $@.part $@
 
+# For each of WAVELENGTH_GUIDE equal parts of [0,1) the cell in which it begins.
+$(BUILD)/gen/wavelength_guide.inc: $(BUILD)/gen/wavelength_cells.inc
+	awk -F'[{,]' '{ below[n++] = $$2 } \
+		END { for (k = 0; k < 512; k++) { \
+				while (cell + 1 < n && below[cell + 1] <= k / 512) cell++; \
+				printf "%d,\n", cell } }' $< > $@.part && mv $@.part $@
+
 $(BUILD)/gen/conductors.inc: worker/bsdf/data/conductors.csv
 	@mkdir -p $(@D)
 	awk -F, '!/^#/ { if ($$1 != name) printf "%s{\"%s\", {\n", (name != "" ? "}},\n" : ""), $$1; name = $$1; \
@@ -32,7 +39,7 @@ $(BUILD)/gen/conductors.inc: worker/bsdf/data/conductors.csv
 # The generator is a program of this machine without sanitizers: it runs for seconds, once.
 UPSAMPLE_GEN_SRC := worker/texture/upsample_gen.c worker/texture/upsample.c worker/math/cie.c
 $(BUILD)/gen/upsample_gen: $(UPSAMPLE_GEN_SRC) worker/texture/upsample.h worker/math/cie.h \
-		$(BUILD)/gen/cie_observer.inc $(BUILD)/gen/cie_d65.inc
+		$(BUILD)/gen/cie_observer.inc $(BUILD)/gen/cie_d65.inc $(BUILD)/gen/wavelength_guide.inc
 	@mkdir -p $(@D)
 	$(CC) -D_GNU_SOURCE -I. -I$(BUILD)/gen -std=c17 -O2 -ffp-contract=off $(WARN) $(UPSAMPLE_GEN_SRC) -o $@ -lm
 
