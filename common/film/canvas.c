@@ -117,7 +117,8 @@ int canvas_new(struct canvas **out, const struct plan *p, int grid_exponent, con
 	c->flags = mem_alloc(films * canvas_tiles(c), 1);
 	c->bound = mem_alloc(films, sizeof *c->bound);
 	c->has = mem_alloc((size_t)(1 + OPEN_ROUNDS) * p->groups * p->parts, 1);
-	int rc = c->flags && c->bound && c->has ? map_sums(c, folder, e) : error_set(e, ENOMEM, "no memory for the films");
+	c->missing = mem_alloc((size_t)p->groups * p->parts, sizeof *c->missing);
+	int rc = c->flags && c->bound && c->has && c->missing ? map_sums(c, folder, e) : error_set(e, ENOMEM, "no memory for the films");
 	if (rc == 0)
 		rc = moments_new(&c->moments, p, e);
 	if (rc) {
@@ -139,6 +140,7 @@ void canvas_free(struct canvas *c)
 	mem_free(c->flags);
 	mem_free(c->bound);
 	mem_free(c->has);
+	mem_free(c->missing);
 	moments_free(c->moments);
 	mem_free(c);
 }
@@ -153,10 +155,31 @@ static uint32_t lease_set(const struct lease_key *k)
 	return k->kind == LEASE_BOOTSTRAP ? 0 : 1 + parity(k->epoch);
 }
 
+static uint32_t *missing_of(const struct canvas *c, const struct lease_key *k)
+{
+	return &c->missing[(size_t)k->group * c->plan.parts + k->part];
+}
+
+/* Of a render lease: its round is closed, so that its sums are or were in the prefix. */
+static bool is_closed(const struct canvas *c, const struct lease_key *k)
+{
+	return k->epoch < c->rounds;
+}
+
+static size_t film_of(const struct canvas *c, const struct lease_key *k)
+{
+	return canvas_film(k->group, is_closed(c, k) ? FILM_PREFIX : FILM_OPEN + parity(k->epoch));
+}
+
+static struct tally *tally_of(struct canvas *c, const struct lease_key *k)
+{
+	return is_closed(c, k) ? &c->prefix : &c->open[parity(k->epoch)];
+}
+
 bool canvas_has(const struct canvas *c, const struct lease_key *k)
 {
-	if (k->kind == LEASE_RENDER && k->epoch < c->rounds)
-		return true;
+	if (k->kind == LEASE_RENDER && is_closed(c, k))
+		return k->epoch < c->rounds - *missing_of(c, k);
 	if (k->kind == LEASE_RENDER && k->epoch >= c->rounds + OPEN_ROUNDS)
 		return false;
 	return canvas_lease_merged(c, lease_set(k), k->group, k->part);
@@ -178,9 +201,17 @@ uint64_t canvas_rounds(const struct canvas *c)
 	return c->rounds;
 }
 
+uint64_t canvas_missing(const struct canvas *c)
+{
+	uint64_t missing = 0;
+	for (uint32_t i = 0; i < c->plan.groups * c->plan.parts; i++)
+		missing += c->missing[i];
+	return missing;
+}
+
 uint64_t canvas_merged(const struct canvas *c)
 {
-	return c->rounds * c->plan.groups * c->plan.parts + c->merged[0] + c->merged[1];
+	return c->rounds * c->plan.groups * c->plan.parts + c->merged[0] + c->merged[1] - canvas_missing(c);
 }
 
 /* ---- pixels */
@@ -296,7 +327,7 @@ static size_t tile_index(const struct canvas *c, const struct tile *t)
 
 int canvas_reserve(struct canvas *c, const struct batch *b, struct error *e)
 {
-	size_t prefix = canvas_film(b->key.group, FILM_PREFIX), open = prefix + FILM_OPEN + parity(b->key.epoch);
+	size_t prefix = canvas_film(b->key.group, FILM_PREFIX), open = film_of(c, &b->key);
 	int rc = 0;
 	for (uint32_t i = 0; i < b->tile_count && rc == 0; i++) {
 		size_t tile = tile_index(c, &b->tiles[i]);
@@ -310,7 +341,7 @@ int canvas_reserve(struct canvas *c, const struct batch *b, struct error *e)
 
 static int add_tiles(struct canvas *c, const struct batch *b, struct error *e)
 {
-	size_t prefix = canvas_film(b->key.group, FILM_PREFIX), open = prefix + FILM_OPEN + parity(b->key.epoch);
+	size_t prefix = canvas_film(b->key.group, FILM_PREFIX), open = film_of(c, &b->key);
 	int rc = canvas_reserve(c, b, e);
 	if (rc)
 		return rc;
@@ -394,6 +425,22 @@ static void tally_batch(struct tally *t, const struct batch *b)
 	(void)finite;
 }
 
+/* But the longest that a chain stood still, which is a maximum: it stays. */
+static void tally_take_back(struct tally *t, const struct batch *b)
+{
+	uint32_t g = b->key.group;
+	for (int i = 0; i < BATCH_COUNTERS; i++)
+		t->counts.counters[i] -= i == COUNT_LONGEST_STUCK ? 0 : b->counters[i];
+	for (uint32_t i = 0; i < b->strategy_count; i++)
+		for (int k = 0; k < STRATEGY_COUNTERS; k++)
+			t->counts.strategy[i][k] -= b->strategy[i][k];
+	t->group[g].samples -= b->counters[COUNT_SAMPLES];
+	t->group[g].independent -= b->counters[COUNT_INDEPENDENT];
+	bool finite = exact_sum_add(&t->group[g].sum, -b->independent_sum) && exact_sum_add(&t->group[g].beyond, -b->beyond_sum);
+	assert(finite); /* as when it was added */
+	(void)finite;
+}
+
 static void tally_merge(struct tally *to, const struct tally *from, uint32_t groups)
 {
 	canvas_add_counts(&to->counts, &from->counts);
@@ -432,11 +479,13 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e)
 	uint8_t *has = &c->has[((size_t)lease_set(k) * c->plan.groups + k->group) * c->plan.parts + k->part];
 	if (k->kind == LEASE_BOOTSTRAP) {
 		tally_batch(&c->bootstrap, b);
-		moments_add(c->moments, b);
+		moments_add(c->moments, b, false);
 		*has = 1;
 		return 0;
 	}
-	if (k->epoch >= c->rounds + OPEN_ROUNDS || k->epoch >= c->plan.rounds)
+	uint32_t *missing = missing_of(c, k);
+	bool closed = is_closed(c, k);
+	if (k->epoch >= c->rounds + OPEN_ROUNDS || k->epoch >= c->plan.rounds || (*missing && k->epoch != c->rounds - *missing))
 		return error_set(e, EAGAIN, "round %llu is not open yet: %llu are complete", (unsigned long long)k->epoch,
 				 (unsigned long long)c->rounds);
 	int rc = moments_fit(c->moments, k, e);
@@ -444,11 +493,37 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e)
 		rc = add_tiles(c, b, e);
 	if (rc)
 		return rc;
-	tally_batch(&c->open[parity(k->epoch)], b);
-	moments_add(c->moments, b);
+	tally_batch(tally_of(c, k), b);
+	moments_add(c->moments, b, closed);
+	if (closed) {
+		--*missing;
+		return 0;
+	}
 	*has = 1;
 	c->merged[parity(k->epoch)]++;
 	while (c->merged[parity(c->rounds)] == c->plan.groups * c->plan.parts)
 		close_round(c);
 	return 0;
+}
+
+void canvas_take_back(struct canvas *c, const struct batch *b)
+{
+	const struct lease_key *k = &b->key;
+	size_t film = film_of(c, k);
+	uint64_t bound = 0;
+	assert(k->kind == LEASE_RENDER && canvas_has(c, k));
+	for (uint32_t i = 0; i < b->tile_count; i++) {
+		bool on_grid = add_tile(c, canvas_slot(c, film, tile_index(c, &b->tiles[i])), &b->tiles[i], -1, &bound);
+		assert(on_grid); /* as when it was added */
+		(void)on_grid;
+	}
+	c->bound[film] = bound > c->bound[film] ? bound : c->bound[film];
+	tally_take_back(tally_of(c, k), b);
+	moments_take_back(c->moments, b, is_closed(c, k));
+	if (is_closed(c, k)) {
+		++*missing_of(c, k);
+		return;
+	}
+	c->has[((size_t)lease_set(k) * c->plan.groups + k->group) * c->plan.parts + k->part] = 0;
+	c->merged[parity(k->epoch)]--;
 }

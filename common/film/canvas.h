@@ -32,8 +32,12 @@ size_t canvas_bytes(const struct plan *p); /* of its films */
 bool canvas_is_mapped(const struct canvas *c); /* to a file */
 
 /* Bootstrap batches add only their independent sums. Counters and sums of render batches are those of their round.
- * -EEXIST: merged already; -EAGAIN: round not open; -ERANGE: a sum left the grid (an error of the job). */
+ * -EEXIST: merged already; -EAGAIN: round not open, or an earlier batch is taken back; -ERANGE: a sum left the grid (an error of the job). */
 int canvas_add(struct canvas *c, const struct batch *b, struct error *e);
+/* Of a (group, part) the last render batch that was added, as it was then: its sums are taken out, exactly, and it may be added again,
+ * with another content; until then no round is closed. COUNT_LONGEST_STUCK stays what it was. */
+void canvas_take_back(struct canvas *c, const struct batch *b);
+uint64_t canvas_missing(const struct canvas *c); /* batches of complete rounds that are taken back */
 /* Before anything is done with a render batch: no pixel of it takes an eighth of the film's range. -EBADMSG: of chains, which cannot
  * be so long in one pixel; -ERANGE: of samples, which may be as bright as they like, but not here. */
 int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e);

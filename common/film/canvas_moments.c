@@ -81,36 +81,45 @@ int moments_fit(const struct moments *m, const struct lease_key *k, struct error
 	return error_set(e, ERANGE, "after %llu rounds the moments of chains leave their range", (unsigned long long)epochs);
 }
 
-static void add_grid(int64_t *to, const float *from, size_t count)
+static void add_grid(int64_t *to, const float *from, size_t count, int sign)
 {
 	for (size_t i = 0; i < count; i++)
-		to[i] += llrint((double)from[i] * GRID);
+		to[i] += sign * llrint((double)from[i] * GRID);
 }
 
-static void add_classes(struct exact_sum *to, const double classes[PATH_CLASSES])
+static void add_classes(struct exact_sum *to, const double classes[PATH_CLASSES], int sign)
 {
 	for (int k = 0; k < PATH_CLASSES; k++)
 		if (classes[k] != 0) {
-			bool finite = exact_sum_add(&to[k], classes[k]);
+			bool finite = exact_sum_add(&to[k], sign * classes[k]);
 			assert(finite); /* batch_check */
 			(void)finite;
 		}
 }
 
-void moments_add(struct moments *m, const struct batch *b)
+static void add_render(struct moments *m, const struct batch *b, bool closed, int sign)
 {
 	const struct lease_key *k = &b->key;
-	size_t group = (size_t)k->group * PATH_CLASSES, set = SET_OPEN + k->epoch % 2;
-	if (k->kind == LEASE_BOOTSTRAP) {
-		add_classes(m->bootstrap + group, b->classes);
-		return;
-	}
-	add_classes(m->time + set * class_count(m) + group, b->classes);
+	size_t group = (size_t)k->group * PATH_CLASSES, set = closed ? SET_PREFIX : SET_OPEN + k->epoch % 2;
+	add_classes(m->time + set * class_count(m) + group, b->classes, sign);
 	if (b->moment_count == 0)
 		return;
 	size_t lease = (size_t)k->group * m->plan.parts + k->part, own = (size_t)m->per_lease * m->tiles;
-	add_grid(m->first + set * first_count(m) + lease * own, b->moments, own);
-	add_grid(m->second + set * second_count(m) + lease * m->tiles, b->moments + own, m->tiles);
+	add_grid(m->first + set * first_count(m) + lease * own, b->moments, own, sign);
+	add_grid(m->second + set * second_count(m) + lease * m->tiles, b->moments + own, m->tiles, sign);
+}
+
+void moments_add(struct moments *m, const struct batch *b, bool closed)
+{
+	if (b->key.kind == LEASE_BOOTSTRAP)
+		add_classes(m->bootstrap + (size_t)b->key.group * PATH_CLASSES, b->classes, 1);
+	else
+		add_render(m, b, closed, 1);
+}
+
+void moments_take_back(struct moments *m, const struct batch *b, bool closed)
+{
+	add_render(m, b, closed, -1);
 }
 
 /* What is 0 is left alone, so that its page stays untouched. */

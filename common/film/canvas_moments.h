@@ -17,7 +17,9 @@ void moments_free(struct moments *m);
 
 /* -ERANGE: after so many rounds a sum could leave the grid. To be asked before moments_add, which cannot fail. */
 int moments_fit(const struct moments *m, const struct lease_key *k, struct error *e);
-void moments_add(struct moments *m, const struct batch *b);
+/* closed: to the prefix. */
+void moments_add(struct moments *m, const struct batch *b, bool closed);
+void moments_take_back(struct moments *m, const struct batch *b, bool closed); /* of a render lease, as it was added */
 void moments_close_round(struct moments *m, uint64_t round);
 
 int moments_save(const struct moments *m, struct sealed *out, struct error *e);

@@ -33,6 +33,7 @@ struct canvas {
 	uint64_t rounds;      /* complete */
 	uint32_t merged[OPEN_ROUNDS]; /* leases of an open round, by its parity */
 	uint8_t *has;         /* [bootstrap, open parity 0, 1][group][part] */
+	uint32_t *missing;    /* [group][part]: so many of the last complete rounds lack its batch, which was taken back */
 	struct tally prefix, open[OPEN_ROUNDS], bootstrap;
 	double b_tail; /* 0: not known */
 	struct moments *moments;

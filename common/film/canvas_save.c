@@ -2,6 +2,7 @@
 
 #include "common/film/canvas_private.h"
 
+#include <assert.h>
 #include <string.h>
 
 enum { VERSION = 2, END = UINT32_MAX };
@@ -81,6 +82,7 @@ static int save_tiles(const struct canvas *c, struct sealed *out, struct error *
 int canvas_save(const struct canvas *c, struct sealed *out, struct error *e)
 {
 	struct head h = head_of(c);
+	assert(canvas_missing(c) == 0);
 	struct canvas copy = *c; /* its pieces are only read */
 	struct piece p[PIECES];
 	pieces_of(&copy, p);

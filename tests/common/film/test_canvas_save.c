@@ -1,4 +1,5 @@
-/* A canvas that was saved and loaded goes on with the same bits, wherever between two batches it was saved. */
+/* A canvas that was saved and loaded goes on with the same bits, wherever between two batches it was saved; so does one of which batches
+ * are taken back and replaced. */
 #include "common/film/canvas_save.h"
 
 #include "common/base/mem.h"
@@ -201,6 +202,85 @@ static void what_is_loaded_is_what_was_saved(void **unused)
 	canvas_free(again);
 }
 
+/* What somebody made up instead: another batch's content, under this key. */
+static struct batch make_wrong(const struct plan *p, const struct lease_key *k, uint64_t salt)
+{
+	struct batch b = make_batch(p, LEASE_RENDER, 1000 + salt, k->group, k->part);
+	b.key.epoch = k->epoch;
+	b.counters[COUNT_LONGEST_STUCK] = 0; /* a maximum is not taken back */
+	return b;
+}
+
+static void add_wrong(struct canvas *c, const struct plan *p, const struct lease_key *k, uint64_t salt)
+{
+	struct batch b = make_wrong(p, k, salt);
+	struct error e;
+	if (canvas_add(c, &b, &e))
+		fail_msg("%s", e.text);
+	batch_fini(&b);
+}
+
+static bool all_right(const struct canvas *c, const uint64_t *done, const uint64_t *wrong)
+{
+	for (unsigned i = 0; i < GROUPS * PARTS; i++)
+		if (done[i] < ROUNDS || wrong[i])
+			return false;
+	return canvas_rounds(c) == ROUNDS && canvas_missing(c) == 0;
+}
+
+/* A batch is wrong in two of three cases at first; up to two of a lease are, one after the other, and noticed later, when their rounds
+ * may be complete. */
+static void what_is_taken_back_leaves_nothing(void **unused)
+{
+	(void)unused;
+	enum { LEASES = GROUPS * PARTS };
+	for (uint64_t trial = 0; trial < 8; trial++) {
+		struct plan p = make_plan(trial % 2 ? PLAN_CHAINS : PLAN_SAMPLES);
+		struct canvas *plain = make(&p, NULL), *mended = make(&p, trial & 2 ? folder : NULL);
+		uint64_t done[LEASES] = {0}, wrong[LEASES] = {0}, dice = 4711 + trial, closed = 0;
+		for (unsigned n = 0; n < LEASES; n++) {
+			add_nth(plain, &p, n);
+			add_nth(mended, &p, n);
+		}
+		while (!all_right(mended, done, wrong)) {
+			state = dice = dice * 6364136223846793005u + 1442695040888963407u;
+			unsigned i = (unsigned)(next() >> 20) % LEASES;
+			struct lease_key k = {1, LEASE_RENDER, i / PARTS, i % PARTS, done[i]};
+			bool lie = next() % 3 && wrong[i] < 2, notice = next() % 4 == 0;
+			if (wrong[i] && (notice || done[i] >= canvas_rounds(mended) + 2 || done[i] >= ROUNDS)) {
+				k.epoch--;
+				closed += k.epoch < canvas_rounds(mended);
+				struct batch b = make_wrong(&p, &k, k.epoch + trial);
+				canvas_take_back(mended, &b);
+				batch_fini(&b);
+				wrong[i]--;
+				done[i]--;
+				assert_false(canvas_has(mended, &k));
+				continue;
+			}
+			if (done[i] >= ROUNDS || done[i] >= canvas_rounds(mended) + 2)
+				continue;
+			if (lie) {
+				add_wrong(mended, &p, &k, k.epoch + trial);
+				wrong[i]++;
+			} else if (wrong[i] == 0) {
+				add(mended, &p, LEASE_RENDER, k.epoch, k.group, k.part);
+			} else {
+				continue;
+			}
+			done[i]++;
+			assert_true(canvas_has(mended, &k));
+		}
+		for (uint64_t epoch = 0; epoch < ROUNDS; epoch++)
+			for (unsigned i = 0; i < LEASES; i++)
+				add(plain, &p, LEASE_RENDER, epoch, i / PARTS, i % PARTS);
+		assert_true(closed > 0);
+		assert_same(plain, mended, &p);
+		canvas_free(plain);
+		canvas_free(mended);
+	}
+}
+
 /* Of another plan or grid, torn, or with a bit wrong: refused, and nothing of it is used. */
 static void others_are_refused(void **unused)
 {
@@ -256,6 +336,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(goes_on_with_the_same_bits, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_is_loaded_is_what_was_saved, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_is_taken_back_leaves_nothing, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(others_are_refused, folder_set_up, folder_tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
