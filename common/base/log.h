@@ -38,6 +38,7 @@
 	X(BATCH_STORED, "batch_stored", DEBUG) \
 	X(BATCH_ACKNOWLEDGED, "batch_acknowledged", DEBUG) \
 	X(BATCH_RESTORED, "batch_restored", DEBUG) \
+	X(BATCH_TAKEN_BACK, "batch_taken_back", WARN) \
 	X(BATCH_REPEATED, "batch_repeated", INFO) \
 	X(BATCH_NOTED, "batch_noted", DEBUG) \
 	X(WORKER_WRONG, "worker_wrong", WARN) \

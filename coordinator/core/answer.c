@@ -203,6 +203,7 @@ void answer_stored(struct farm *f, const struct event *ev)
 	lease_revoke_slot(f, s);
 	if (verify_chosen(j, k))
 		verify_settle(f, j, s, &ev->lease.digest);
+	s->doubt = (struct doubt){ 0 };
 	j->progress_floor = job_progress(j, f->now);
 	if (job_merge(j, s, f->now, NAN))
 		rounds_complete(f, j);
@@ -259,7 +260,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 		lease_drop(f, l);
 	if (l && ev->lease.bad_states && j->kind == LEASE_RENDER && j->plan.kind == PLAN_CHAINS && s->next > 0) {
 		j->failures++;
-		doubt_refused(f, j, s, p, ev->text ? ev->text : "");
+		doubt_refused(f, j, s, p, ev->lease.can_take_back, ev->text ? ev->text : "");
 		return;
 	}
 	bool again = peer_avoids_until(p, j->id) > f->now && !peer_lacks(p, j->id); /* several at once: one reason */

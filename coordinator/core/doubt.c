@@ -26,10 +26,11 @@ const char *farm_maker(const struct farm *f, const struct lease_key *k)
 
 static bool is_party(const struct slot *s, uint64_t who)
 {
-	return who == s->doubt.maker || who == s->doubt.refuser;
+	const struct doubt *d = &s->doubt;
+	return who == d->barred || (doubt_waits(s) && (who == d->maker || who == d->refuser));
 }
 
-/* A worker that might be asked and is neither. */
+/* A worker that might be asked and is none of them. */
 static bool third_is_here(const struct farm *f, const struct job *j, const struct slot *s)
 {
 	for (uint32_t i = 0; i < f->peer_count; i++) {
@@ -54,7 +55,23 @@ bool doubt_waits(const struct slot *s)
 
 bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p)
 {
-	return doubt_waits(s) && is_party(s, p->who->id) && third_is_here(f, j, s);
+	return is_party(s, p->who->id) && third_is_here(f, j, s);
+}
+
+/* The states may be wrong without that epoch's sums being so: it is not asked. */
+static void take_back(struct farm *f, struct job *j, struct slot *s)
+{
+	struct doubt *d = &s->doubt;
+	uint64_t maker = d->maker, reach = d->reach > s->next ? d->reach : s->next;
+	job_take_back(f, j, s);
+	*d = (struct doubt){ .maker = d->before, .barred = maker, .reach = reach, .again = d->again + 1 };
+	struct action *a = update_add(f, ACTION_TAKE_BACK);
+	a->who = maker;
+	a->job = j->id;
+	a->key = key_of(j, s);
+	text_print(f->text, sizeof f->text, "group %u part %u epoch %llu is computed again: its chain states, made by %s, could not be read",
+		   a->key.group, a->key.part, (unsigned long long)a->key.epoch, name_of(f, maker));
+	a->text = f->text;
 }
 
 static void begin_anew(struct farm *f, struct job *j, struct slot *s)
@@ -71,7 +88,7 @@ static void begin_anew(struct farm *f, struct job *j, struct slot *s)
 	a->text = f->text;
 }
 
-void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, const char *text)
+void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can, const char *text)
 {
 	struct doubt *d = &s->doubt;
 	uint64_t who = p->who->id;
@@ -86,21 +103,25 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 		job_place(j, s);
 		return;
 	}
-	begin_anew(f, j, s);
+	struct lease_key made = key_of(j, s);
+	made.epoch--;
 	struct identity *maker = second && !j->mixed && d->maker != d->refuser ? known(f, d->maker) : NULL;
-	if (maker) {
-		struct lease_key made = key_of(j, s);
-		made.epoch--;
+	if (can && d->again < AGAIN_MOST)
+		take_back(f, j, s);
+	else
+		begin_anew(f, j, s);
+	if (maker)
 		roster_wrong(f, maker, &made);
-	}
 	job_place(j, s);
 }
 
 void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who, const struct lease_key *k)
 {
+	struct doubt *d = &s->doubt;
 	bool went_on = doubt_waits(s) && !is_party(s, who->id) && !j->mixed;
-	struct identity *refuser = went_on ? known(f, s->doubt.refuser) : NULL;
-	s->doubt = (struct doubt){ .maker = who->id };
+	struct identity *refuser = went_on ? known(f, d->refuser) : NULL;
+	bool behind = s->next < d->reach;
+	*d = (struct doubt){ .maker = who->id, .before = d->anew ? 0 : d->maker, .reach = behind ? d->reach : 0, .again = behind ? d->again : 0 };
 	if (refuser)
 		roster_wrong(f, refuser, k);
 }

@@ -2,10 +2,14 @@
  * Chain states that a worker could not go on from. Who refuses them is not to blame, nor is who made them until a second worker
  * says the same: the lease goes to another worker, neither to the one nor to the other while there is a third.
  *  - The third goes on: the refusal was wrong, and is counted as a wrong result.
- *  - The third refuses, too: the states are wrong, which is counted against who made them. The chains of the lease begin anew from
- *    their seeds: an epoch that depends on the plan alone. What the epoch before brought to the films stays.
- *  - There is no third: the chains begin anew, and nobody is to blame.
- * A job does not fail by it. Memory of a slot; nothing survives a restart of the coordinator, which asks again.
+ *  - The third refuses, too: the states are wrong, which is counted against who made them. The epoch that they are the end of is
+ *    taken back, sums and all, and computed again from the states before it, not by who made them while there is another: the job
+ *    has the bits that it would have had.
+ *  - There is no third: the same, and nobody is to blame.
+ * Where the shell no longer has what came before, or an epoch was computed again AGAIN_MOST times and its states are refused still,
+ * the chains begin anew from their seeds: an epoch that depends on the plan alone, and what came before it stays in the films.
+ * A job does not fail by it. Memory of a slot; but for who made its states nothing survives a restart of the coordinator, which asks
+ * again.
  */
 #ifndef COORDINATOR_CORE_DOUBT_H
 #define COORDINATOR_CORE_DOUBT_H
@@ -23,12 +27,17 @@ struct slot;
 
 struct doubt {
 	uint64_t maker;   /* the worker whose states the next epoch begins with; 0: not known */
+	uint64_t before;  /* the one whose states that worker began with; 0: not known */
 	uint64_t refuser; /* the first that could not read them; 0: nobody */
+	uint64_t barred;  /* whose epoch is computed again; 0: nobody's */
+	uint64_t reach;   /* epochs were taken back from here */
+	uint32_t again;   /* so many since then */
 	bool anew;        /* its chains begin the next epoch from their seeds */
 };
+enum { AGAIN_MOST = 4 };
 
-/* The lease of this worker is dropped already. */
-void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, const char *text);
+/* The lease of this worker is dropped already. can: the shell has what it takes to compute the epoch before again. */
+void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can, const char *text);
 /* Somebody else is asked about the states. */
 bool doubt_waits(const struct slot *s);
 bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p);

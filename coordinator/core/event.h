@@ -80,6 +80,8 @@ struct event_restore {
 	const char *fingerprint; /* "": it belongs to none */
 	enum lease_kind kind;    /* of its open leases; render: b and seeds are there */
 	const uint64_t *next;    /* [groups][parts]: the first epoch of that kind that is not merged */
+	const struct event_join *makers; /* as many: who gave the batch before (but for peer, fingerprint, threads); name NULL: not known.
+					    NULL: of none of them */
 	bool black;              /* as EVENT_PREPARED said */
 	/* Seconds after its first lease: now, when the first round opened, when the last round was complete. NAN: was not yet.
 	 * The time in between lives does not count. */
@@ -108,6 +110,7 @@ struct event {
 			struct batch_digest digest; /* BATCH, STORED: of a lease that farm_verifies */
 			bool own; /* LEASE_FAILED: it says that its own machine is at fault, not the job */
 			bool bad_states; /* LEASE_FAILED: it says that the chains cannot go on from the states that came with it */
+			bool can_take_back; /* ... and the batch that these came with can be taken out, and the states before it are there */
 		} lease;
 		enum job_hold hold;
 		int priority;

@@ -17,6 +17,7 @@ static void begin(struct job *j, enum lease_kind kind, uint64_t limit, double no
 	j->limit = limit;
 	j->rounds = 0;
 	j->done = j->ahead = 0;
+	j->spread = false;
 	j->duration_count = 0;
 	j->median = NAN;
 	rate_init(&j->rate, now);
@@ -197,6 +198,20 @@ static void add_duration(struct job *j, double duration)
 	j->median = sorted[n / 2];
 }
 
+/* Counts and lists, from how far each slot is. */
+static void place_all(struct job *j)
+{
+	j->done = j->ahead = 0;
+	j->spread = false;
+	for (uint32_t i = 0; i < j->slot_count; i++) {
+		uint64_t merged = j->slots[i].next - j->rounds;
+		j->done += merged > 0;
+		j->ahead += merged > 1;
+		j->spread = j->spread || merged > 2;
+		job_place(j, &j->slots[i]);
+	}
+}
+
 bool job_merge(struct job *j, struct slot *s, double now, double duration)
 {
 	assert(!s->leases && s->next - j->rounds <= 1);
@@ -215,7 +230,10 @@ bool job_merge(struct job *j, struct slot *s, double now, double duration)
 		add_duration(j, duration);
 	rate_add(&j->rate, now, job_lease_mutations(j));
 	bool complete = j->done == j->slot_count;
-	if (complete) {
+	if (complete && j->spread) {
+		j->rounds++;
+		place_all(j);
+	} else if (complete) {
 		j->rounds++;
 		j->done = j->ahead;
 		j->ahead = 0;
@@ -228,6 +246,26 @@ bool job_merge(struct job *j, struct slot *s, double now, double duration)
 	}
 	job_place(j, s);
 	return complete;
+}
+
+void job_take_back(struct farm *f, struct job *j, struct slot *s)
+{
+	assert(j->kind == LEASE_RENDER && s->next > 0);
+	j->progress_floor = job_progress(j, f->now);
+	lease_revoke_slot(f, s);
+	s->next--;
+	s->timeouts = 0;
+	s->failers.count = 0;
+	s->lost.count = 0;
+	j->leases_merged--;
+	if (s->next < j->rounds) {
+		j->rounds = s->next;
+		j->evaluating = false; /* the answer is about more */
+	}
+	for (uint32_t i = 0; i < j->slot_count; i++)
+		if (j->slots[i].next - j->rounds > 1)
+			lease_revoke_slot(f, &j->slots[i]);
+	place_all(j);
 }
 
 void job_raise_limit(struct job *j)
@@ -256,13 +294,11 @@ void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, doub
 		rounds = next[i] < rounds ? next[i] : rounds;
 	j->rounds = rounds;
 	for (uint32_t i = 0; i < j->slot_count; i++) {
-		assert(next[i] - rounds <= 2 && next[i] <= j->limit);
+		assert(next[i] <= j->limit);
 		j->slots[i].next = next[i];
 		merged += next[i];
-		j->done += next[i] > rounds;
-		j->ahead += next[i] > rounds + 1;
-		job_place(j, &j->slots[i]);
 	}
+	place_all(j);
 	if (kind == LEASE_RENDER)
 		j->leases_merged = merged;
 	else

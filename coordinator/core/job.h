@@ -50,6 +50,7 @@ struct job {
 	uint64_t rounds;          /* complete, of this kind */
 	uint64_t limit;           /* rounds of this kind */
 	uint32_t done, ahead;     /* slots that have merged round `rounds`; the one after it too */
+	bool spread;              /* some slot has merged even more: epochs of another were taken back */
 	struct link ready[2], out[2]; /* by round: the first incomplete one and the next; `out` has one holder */
 	struct link second[2];    /* the same: verified, and waits for a worker that has not had it */
 	struct link blocked;      /* the round after those */
@@ -100,6 +101,9 @@ double job_lease_mutations(const struct job *j);
 
 /* The slot's next epoch is merged. true: its round is complete now. */
 bool job_merge(struct job *j, struct slot *s, double now, double duration);
+/* The batch of the slot's last epoch is none: that epoch is next again. The rounds that it was in are open again, and nobody works on
+ * what lies more than one round behind them. */
+void job_take_back(struct farm *f, struct job *j, struct slot *s);
 /* Of a job without merged leases: these are. next: see struct event_restore. */
 void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, double now);
 void job_raise_limit(struct job *j); /* to the plan's rounds */

@@ -16,6 +16,19 @@ static void pin(struct farm *f, struct job *j, const char *fingerprint)
 	peer_class_drop(c);
 }
 
+/* A worker that nobody knows any more has made them as well as one that is here. */
+static void take_makers(struct farm *f, struct job *j, const struct event_join *makers)
+{
+	for (uint32_t i = 0; makers && i < j->slot_count; i++) {
+		const char *refused;
+		struct identity *k = makers[i].name ? roster_use(f, &makers[i], &refused) : NULL;
+		if (!k)
+			continue;
+		j->slots[i].doubt.maker = k->id;
+		roster_drop(f, k);
+	}
+}
+
 static void take_times(struct farm *f, struct job *j, const struct event_restore *r)
 {
 	if (isnan(r->elapsed))
@@ -92,6 +105,7 @@ void restore_job(struct farm *f, const struct event *ev)
 	rounds_enlist(f, j);
 	take_counts(j, &r->counts);
 	job_restore(j, r->kind, r->next, f->now);
+	take_makers(f, j, r->makers);
 	take_times(f, j, r);
 	take_looks(j, r->looks);
 	pin(f, j, r->fingerprint);

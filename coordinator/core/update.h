@@ -42,6 +42,9 @@ enum action_kind {
 	ACTION_PUBLISH,     /* job, rounds: write the image of the prefix; the job is done */
 	ACTION_JOB_CHANGED, /* job, state, end, text */
 	ACTION_JOB_FORGOTTEN, /* job: too many ended jobs; the core answers no more questions about it */
+	/* who, job, key, text: the batch of this lease, the last of its (group, part), is taken out of the films, and the states before it
+	 * are the last ones again; its lease goes out once more. Only where the event says that the shell can. */
+	ACTION_TAKE_BACK,
 	ACTION_CHAINS_ANEW, /* job, key, text: the chains of this lease begin from their seeds (doubt.h) */
 	ACTION_WRONG, /* who, job, key, text: a worker's answer, noted before, is not what two others say */
 	ACTION_ASIDE, /* who, text: a worker is set aside for good */
@@ -58,7 +61,7 @@ struct action {
 	bool verified;     /* MERGE: two workers agree */
 	bool anew;         /* SEND_LEASE: with seeds whatever its epoch */
 	uint64_t tag, peer;
-	uint64_t who;      /* of MERGE, WRONG, ASIDE: the worker, whatever its connection (struct peer_status) */
+	uint64_t who;      /* of MERGE, TAKE_BACK (0: not known), WRONG, ASIDE: the worker, whatever its connection (struct peer_status) */
 	uint64_t job; /* also of actions with a key */
 	uint64_t rounds;
 	struct lease_key key;

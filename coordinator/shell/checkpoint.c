@@ -3,6 +3,7 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/film/canvas_save.h"
+#include "coordinator/shell/back.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/session.h"
 
@@ -34,7 +35,9 @@ struct writing {
 	struct order *order;
 	struct journal *journal; /* the one that follows */
 	struct head head;
-	uint64_t bytes;
+	uint64_t bytes, kept_most;
+	struct merged_record *merged; /* in that one */
+	size_t merged_count, merged_capacity;
 	char folder[SPOOL_PATH_MAX];
 	int rc;
 	bool unsure; /* it has its name, but perhaps not for good */
@@ -82,6 +85,8 @@ static void run(uv_work_t *work)
 	snprintf(name, sizeof name, "%s/checkpoint", w->folder);
 	snprintf(temporary, sizeof temporary, "%s/checkpoint.tmp", w->folder);
 	w->rc = journal_create(&w->journal, w->folder, w->head.job, w->head.generation, &w->error);
+	if (!w->rc)
+		back_copy(w->order, w->journal, w->kept_most, &w->merged, &w->merged_count, &w->merged_capacity);
 	if (!w->rc)
 		w->rc = sealed_create(&out, temporary, &w->error);
 	if (!w->rc)
@@ -171,7 +176,14 @@ static void done(uv_work_t *work, int status)
 		tidy(s, o->journal, w->folder, w->head.generation);
 		o->journal = w->journal;
 		o->checkpoint_bytes = w->bytes;
+		mem_free(o->merged);
+		o->merged = w->merged;
+		o->merged_count = w->merged_count;
+		o->kept_bytes = journal_bytes(o->journal);
+		o->merged_capacity = w->merged ? w->merged_capacity : 0;
+		w->merged = NULL;
 	}
+	mem_free(w->merged);
 	o->busy = false;
 	s->checkpointing = s->checkpointing && !w->rc;
 	if (!s->stopping && o->unsure)
@@ -181,6 +193,12 @@ static void done(uv_work_t *work, int status)
 		session_previews(s, id);
 	}
 	mem_free(w);
+}
+
+/* Of a journal. */
+static uint64_t limit_of(const struct server *s, const struct order *o)
+{
+	return o->checkpoint_bytes > s->config.journal_bytes ? o->checkpoint_bytes : s->config.journal_bytes;
 }
 
 static void start(struct server *s, struct order *o)
@@ -195,6 +213,7 @@ static void start(struct server *s, struct order *o)
 	w->server = s;
 	w->order = o;
 	w->work.data = w;
+	w->kept_most = limit_of(s, o);
 	spool_job_path(s->spool, o->id, NULL, w->folder);
 	w->head = (struct head){.bytes = sizeof w->head,
 				.worker_count = o->worker_count,
@@ -223,8 +242,10 @@ void checkpoint_where_due(struct server *s)
 	for (struct order *o = s->orders; o; o = o->next) {
 		if (!o->canvas || o->busy || o->ended || o->late_count) /* what waits is in the journal alone */
 			continue;
-		uint64_t limit = o->checkpoint_bytes > s->config.journal_bytes ? o->checkpoint_bytes : s->config.journal_bytes;
-		if ((journal_bytes(o->journal) > limit || o->unsure) && server_now(s) >= o->checkpoint_after)
+		if (canvas_missing(o->canvas)) /* what was taken back is computed at this time */
+			continue;
+		uint64_t limit = limit_of(s, o);
+		if ((journal_bytes(o->journal) - o->kept_bytes > limit || o->unsure) && server_now(s) >= o->checkpoint_after)
 			start(s, o);
 		if (s->checkpointing)
 			return;

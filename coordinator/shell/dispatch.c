@@ -5,6 +5,7 @@
 #include "common/base/text.h"
 #include "common/film/exr.h"
 #include "coordinator/shell/ages.h"
+#include "coordinator/shell/back.h"
 #include "coordinator/shell/clear.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/keep.h"
@@ -126,9 +127,12 @@ static void merge(struct server *s, const struct action *a)
 	if (s->config.keep_partials)
 		keep_partials(s, &a->key);
 	uint64_t rounds = order_rounds(o);
-	int rc = s->stored ? 0 : durable_merged(s, o, &e);
+	uint64_t at = s->stored_at;
+	int rc = s->stored ? 0 : durable_merged(s, o, &at, &e);
 	if (!rc)
 		rc = order_merge(o, s->batch, &e);
+	if (!rc)
+		back_note(o, &a->key, at, s->result->maker);
 	if (rc == -ENOMEM) { /* half merged; nobody was told that it is stored */
 		log_event(LOG_STOP, "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
 		_exit(1);
@@ -140,6 +144,16 @@ static void merge(struct server *s, const struct action *a)
 	order_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", number(a->job),
 		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch), s->stored ? " late=1" : "");
+}
+
+static void take_back(struct server *s, const struct action *a)
+{
+	struct order *o = server_order(s, a->job);
+	assert(o && !o->busy && s->back);
+	back_take(o, s->back);
+	trust_taken_back(o, a->who);
+	order_log(o, LOG_BATCH_TAKEN_BACK, "kind=%d group=%u part=%u epoch=%llu text=%s", (int)a->key.kind, a->key.group, a->key.part,
+		  number(a->key.epoch), log_quote(a->text).text);
 }
 
 static void acknowledge(struct server *s, const struct action *a)
@@ -232,6 +246,9 @@ void dispatch_update(struct server *s, const struct update *u)
 			job_changed(s, a);
 			break;
 		case ACTION_JOB_FORGOTTEN:
+			break;
+		case ACTION_TAKE_BACK:
+			take_back(s, a);
 			break;
 		case ACTION_CHAINS_ANEW:
 			trust_anew(s, a);

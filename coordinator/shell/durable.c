@@ -230,12 +230,15 @@ static int write_pinned(struct server *s, struct order *o, double elapsed, struc
 	return journal_append(o->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint, strlen(status.fingerprint), NULL, e);
 }
 
-int durable_merged(struct server *s, struct order *o, struct error *e)
+int durable_merged(struct server *s, struct order *o, uint64_t *at, struct error *e)
 {
+	const struct lease_key *k = &s->batch->key;
+	bool again = k->kind == LEASE_RENDER && o->again[(size_t)k->group * o->plan.parts + k->part];
 	double elapsed = farm_elapsed(s->farm, o->id, server_now(s));
 	assert(s->frame);
 	int rc = write_pinned(s, o, elapsed, e);
-	return rc ? rc : journal_append(o->journal, JOURNAL_BATCH, &s->batch->key, elapsed, s->frame, s->frame_size, s->payload, e);
+	*at = journal_bytes(o->journal);
+	return rc ? rc : journal_append(o->journal, again ? JOURNAL_AGAIN : JOURNAL_BATCH, k, elapsed, s->frame, s->frame_size, s->payload, e);
 }
 
 /* ---- group commit ---- */

@@ -23,7 +23,7 @@ void durable_end_row(struct server *s, const struct job_record *r);
  * is full: the job is held until there is room. */
 int durable_reserve(struct server *s, struct order *o, struct error *e);
 /* The core merges the batch of this event. -ENOMEM: the journal has it not, and it must not be acknowledged. */
-int durable_merged(struct server *s, struct order *o, struct error *e);
+int durable_merged(struct server *s, struct order *o, uint64_t *at, struct error *e);
 /* The answer to a batch that is merged, by now or before, when what the order's journal holds is safe. */
 void durable_ack(struct server *s, const struct order *o, uint64_t peer, const struct lease_key *k, enum ack ack);
 /* The last look at the job's error, if it is new. */

@@ -22,6 +22,20 @@ int late_add(struct order *o, const struct lease_key *k, uint64_t at, struct err
 	return 0;
 }
 
+static void drop(struct order *o, size_t i)
+{
+	memmove(&o->late[i], &o->late[i + 1], (--o->late_count - i) * sizeof *o->late);
+}
+
+void late_forget(struct order *o, const struct lease_key *k)
+{
+	for (size_t i = o->late_count; i-- > 0;) {
+		const struct lease_key *l = &o->late[i].key;
+		if (l->kind == k->kind && l->group == k->group && l->part == k->part && l->epoch >= k->epoch)
+			drop(o, i);
+	}
+}
+
 static int by_time(const void *a, const void *b)
 {
 	const struct late_result *x = a, *y = b;
@@ -57,11 +71,6 @@ static void give_up(struct server *s, struct order *o, const struct late_result 
 		server_step(s, &ev);
 }
 
-static void drop(struct order *o, size_t i)
-{
-	memmove(&o->late[i], &o->late[i + 1], (--o->late_count - i) * sizeof *o->late);
-}
-
 /* To the core, which says whether it counts. */
 static int offer(struct server *s, const struct order *o, const struct late_result *l, struct error *e)
 {
@@ -91,6 +100,7 @@ static int offer(struct server *s, const struct order *o, const struct late_resu
 		s->result = env.message->lease_result;
 		s->payload = &copy;
 		s->stored = true;
+		s->stored_at = l->at;
 		server_step(s, &ev);
 		s->stored = false;
 	}

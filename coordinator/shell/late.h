@@ -11,6 +11,8 @@
 struct server;
 
 int late_add(struct order *o, const struct lease_key *k, uint64_t at, struct error *e); /* -ENOMEM */
+/* Those of that (group, part) from this epoch on do not count any more. */
+void late_forget(struct order *o, const struct lease_key *k);
 void late_sort(struct order *o); /* as they can count */
 /* The core gives a lease to this worker: true: its result is here and will count soon, the worker need not hear of it. */
 bool late_withholds(struct order *o, const struct lease_key *k, uint64_t peer);

@@ -64,12 +64,14 @@ int order_new(struct order **out, uint64_t id, struct envelope *submit, const st
 	o->times = (struct order_times){NAN, NAN, NAN};
 	begin_record(o, owner, submitted);
 	o->states = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->states);
+	o->makers = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->makers);
+	o->again = mem_alloc((size_t)plan->groups * plan->parts, sizeof *o->again);
 	if (plan->kind == PLAN_CHAINS) {
 		o->chains_per_lease = plan->chains / (plan->groups * plan->parts);
 		o->seeds = mem_alloc(plan->chains, sizeof *o->seeds);
 	}
 	int rc = 0;
-	if (!o->states || (plan->kind == PLAN_CHAINS && !o->seeds))
+	if (!o->states || !o->makers || !o->again || (plan->kind == PLAN_CHAINS && !o->seeds))
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	if (!rc)
 		rc = bootstrap_new(&o->bootstrap, plan, e);
@@ -101,6 +103,9 @@ void order_free(struct order *o)
 	for (uint32_t i = 0; o->states && i < o->plan.groups * o->plan.parts; i++)
 		states_fini(o->states[i], o->chains_per_lease);
 	mem_free(o->states);
+	mem_free(o->makers);
+	mem_free(o->again);
+	mem_free(o->merged);
 	mem_free(o->seeds);
 	mem_free(o->credits);
 	mem_free(o->late);
@@ -157,6 +162,7 @@ int order_merge(struct order *o, struct batch *b, struct error *e)
 		*at = b->states;
 		b->states = NULL;
 		b->state_count = 0;
+		o->again[at - o->states] = false;
 	}
 	return rc;
 }

@@ -43,6 +43,18 @@ struct late_result {
 	uint64_t peer; /* to whom the core has given its lease meanwhile; 0: nobody */
 };
 
+/* Where a batch that is merged lies in the journal (back.h). */
+struct merged_record {
+	uint32_t slot;
+	uint64_t epoch, at;
+};
+
+/* Who gave the last batch; name "": nobody knows. */
+struct order_maker {
+	char name[128], certificate[72], home[40];
+	uint64_t restarts;
+};
+
 struct order {
 	struct order *next;
 	uint64_t id;
@@ -55,6 +67,11 @@ struct order {
 	struct bootstrap_result lit;
 	uint64_t *seeds;             /* [groups][chains / groups]; NULL for samples */
 	struct chain_state **states; /* [groups x parts]; NULL entries: no epoch merged yet */
+	struct order_maker *makers;  /* as many: of those */
+	bool *again;                 /* as many: the next batch comes in the place of one that was taken back */
+	struct merged_record *merged; /* as they were merged */
+	size_t merged_count, merged_capacity;
+	uint64_t kept_bytes;          /* of the journal: what is merged in its checkpoint */
 	uint32_t chains_per_lease;
 	int log; /* a file descriptor */
 	uint64_t log_bytes;

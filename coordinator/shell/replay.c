@@ -4,6 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/wire/frame.h"
+#include "coordinator/shell/back.h"
 #include "coordinator/shell/checkpoint.h"
 #include "coordinator/shell/late.h"
 
@@ -48,12 +49,12 @@ enum replay_place replay_place(const struct order *o, const struct lease_key *k)
 		return o->bootstrap && !bootstrap_has(o->bootstrap, k->group, k->part) ? REPLAY_FITS : REPLAY_MERGED;
 	if (o->bootstrap)
 		return REPLAY_LATE;
-	uint64_t rounds = canvas_rounds(o->canvas);
-	if (k->epoch < rounds || (k->epoch - rounds <= 1 && canvas_has(o->canvas, k)))
+	if (canvas_has(o->canvas, k))
 		return REPLAY_MERGED;
 	struct lease_key before = *k;
 	before.epoch--;
-	return k->epoch == rounds || (k->epoch == rounds + 1 && canvas_has(o->canvas, &before)) ? REPLAY_FITS : REPLAY_LATE;
+	bool open = k->epoch <= canvas_rounds(o->canvas) + 1;
+	return open && (k->epoch == 0 || canvas_has(o->canvas, &before)) ? REPLAY_FITS : REPLAY_LATE;
 }
 
 static int merge(struct replay *r, struct batch *b, struct error *e)
@@ -89,9 +90,20 @@ static int take_batch(struct replay *r, const struct journal_item *item, struct 
 	rc = batch_unpack(&batch, &r->order->plan, env.message->lease_result, payload, payload_size, e);
 	if (rc == -EBADMSG)
 		rc = strange(r, "a result", item->size, e);
+	if (!rc && item->kind == JOURNAL_AGAIN)
+		rc = back_replay(r->order, item->journal, &batch.key, e);
+	if (!rc && item->kind == JOURNAL_KEPT) {
+		r->order->kept_bytes += item->size;
+		back_note(r->order, &batch.key, item->at, env.message->lease_result->maker);
+		batch_fini(&batch);
+		envelope_fini(&env);
+		return 0;
+	}
 	enum replay_place place = rc ? REPLAY_MERGED : replay_place(r->order, &batch.key);
 	if (place == REPLAY_FITS)
 		rc = merge(r, &batch, e);
+	if (place == REPLAY_FITS && !rc)
+		back_note(r->order, &batch.key, item->at, env.message->lease_result->maker);
 	else if (place == REPLAY_LATE)
 		rc = late_add(r->order, &batch.key, item->at, e);
 	batch_fini(&batch);
@@ -101,7 +113,7 @@ static int take_batch(struct replay *r, const struct journal_item *item, struct 
 
 static void note_damage(struct replay *r, const struct journal_item *item)
 {
-	if (item->kind == JOURNAL_BATCH && r->damaged_count < DAMAGED_MOST)
+	if ((item->kind == JOURNAL_BATCH || item->kind == JOURNAL_AGAIN) && r->damaged_count < DAMAGED_MOST)
 		r->damaged[r->damaged_count++] = item->lease;
 }
 
@@ -126,11 +138,13 @@ static int take_record(void *user, const struct journal_item *item, struct error
 		return rc;
 	if (item->missing) {
 		note_damage(r, item);
-		return 0;
+		return item->kind == JOURNAL_AGAIN ? back_replay(o, item->journal, &item->lease, e) : 0;
 	}
 	r->elapsed = item->elapsed;
 	switch (item->kind) {
 	case JOURNAL_BATCH:
+	case JOURNAL_AGAIN:
+	case JOURNAL_KEPT:
 		return take_batch(r, item, e);
 	case JOURNAL_PINNED:
 		if (size >= sizeof o->fingerprint)

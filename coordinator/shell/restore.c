@@ -17,6 +17,11 @@ static uint64_t next_epoch(const struct order *o, uint32_t group, uint32_t part)
 	if (o->bootstrap)
 		return bootstrap_has(o->bootstrap, group, part);
 	struct lease_key k = {.job = o->id, .kind = LEASE_RENDER, .group = group, .part = part, .epoch = canvas_rounds(o->canvas)};
+	for (struct lease_key before = k; k.epoch > 0; k.epoch--) { /* what was taken back is missing */
+		before.epoch = k.epoch - 1;
+		if (canvas_has(o->canvas, &before))
+			break;
+	}
 	while (k.epoch < o->plan.rounds && canvas_has(o->canvas, &k))
 		k.epoch++;
 	return k.epoch;
@@ -26,10 +31,16 @@ int restore_tell(struct server *s, const struct order *o, const char *held, uint
 {
 	uint32_t slots = o->plan.groups * o->plan.parts;
 	uint64_t *next = mem_alloc(slots, sizeof *next);
-	if (!next)
+	struct event_join *makers = mem_alloc(slots, sizeof *makers);
+	if (!next || !makers) {
+		mem_free(next);
+		mem_free(makers);
 		return error_set(e, ENOMEM, "no memory for a job");
+	}
 	for (uint32_t i = 0; i < slots; i++) {
+		const struct order_maker *m = &o->makers[i];
 		next[i] = next_epoch(o, i / o->plan.parts, i % o->plan.parts);
+		makers[i] = (struct event_join){.name = *m->name ? m->name : NULL, .certificate = m->certificate, .home = m->home, .restarts = m->restarts};
 		log_event(LOG_BATCH_RESTORED, "job=j%llu kind=%d group=%u part=%u epochs=%llu", (unsigned long long)o->id,
 			  (int)(o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER), i / o->plan.parts, i % o->plan.parts,
 			  (unsigned long long)next[i]);
@@ -43,6 +54,7 @@ int restore_tell(struct server *s, const struct order *o, const char *held, uint
 				       .fingerprint = o->fingerprint,
 				       .kind = o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
 				       .next = next,
+				       .makers = makers,
 				       .black = o->lit.black,
 				       .elapsed = o->times.elapsed,
 				       .opened = o->times.opened,
@@ -51,6 +63,7 @@ int restore_tell(struct server *s, const struct order *o, const char *held, uint
 				       .counts = o->counts}};
 	server_step(s, &ev);
 	mem_free(next);
+	mem_free(makers);
 	if (*held) {
 		ev = (struct event){.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_ORDERED, .text = control_held_by(held, text)};
 		server_step(s, &ev);

@@ -4,6 +4,7 @@
 #include "coordinator/shell/session.h"
 
 #include "common/base/mem.h"
+#include "common/base/text.h"
 
 /* It can be made again. */
 static void refuse(struct server *s, uint64_t peer, const struct lease_key *k, const char *why)
@@ -48,10 +49,23 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 		batch_fini(&batch);
 		return;
 	}
+	struct peer_status from;
+	struct worker_status who;
+	Farm__LeaseResult stored = *m;
+	Farm__Maker maker;
+	farm__maker__init(&maker);
+	bool known = farm_peer(s->farm, peer, &from) && farm_worker(s->farm, from.who, &who);
+	if (known) {
+		maker.name = text_borrow(who.name);
+		maker.certificate = text_borrow(who.certificate);
+		maker.home = text_borrow(who.home);
+		maker.restarts = who.restarts;
+	}
+	stored.maker = known ? &maker : NULL;
 	ev.lease.valid = rc == 0;
 	ev.text = e.text;
 	s->batch = &batch;
-	s->result = m;
+	s->result = &stored;
 	s->payload = payload;
 	if (rc == -ENOMEM || (o && ev.lease.valid && durable_reserve(s, o, &e))) /* no room for it, here or on the disk */
 		refuse(s, peer, &ev.lease.key, e.text);
@@ -88,8 +102,28 @@ static void put_off(struct server *s, struct order *o, uint64_t peer, const stru
 	server_step(s, &ev);
 }
 
+/* Its states are refused: looked at when nobody reads the film. */
+static void take_refusal(struct server *s, uint64_t peer, struct envelope *env, struct buf *payload)
+{
+	const Farm__LeaseFailed *m = env->message->lease_failed;
+	struct session *p = session_find(s, peer);
+	struct order *o = m->key ? server_order(s, m->key->job) : NULL;
+	struct lease_key k;
+	struct error e;
+	if (!o || !o->busy || lease_key_from_wire(m->key, &k, &e)) {
+		if (p)
+			session_lease_failed(p, m);
+	} else if (!has_room(s, payload) || !order_put_off(o, peer, &k, env, payload)) {
+		refuse(s, peer, &k, "no room for results that wait");
+	}
+}
+
 void server_result(struct server *s, uint64_t peer, struct envelope *env, struct buf *payload)
 {
+	if (env->message->body_case == FARM__ENVELOPE__BODY_LEASE_FAILED) {
+		take_refusal(s, peer, env, payload);
+		return;
+	}
 	const Farm__LeaseResult *m = env->message->lease_result;
 	struct order *o = m->key ? server_order(s, m->key->job) : NULL;
 	struct lease_key k;

@@ -123,7 +123,9 @@ struct server {
 	struct batch *batch;
 	const Farm__LeaseResult *result;
 	struct buf *payload;
-	bool stored; /* the journal has it already */
+	bool stored; /* the journal has it already, */
+	uint64_t stored_at; /* there */
+	struct back *back; /* what may be taken back in this step; NULL: nothing */
 	unsigned char *frame; /* the result as the journal takes it, but for the payload */
 	size_t frame_size;
 	struct session *submitter;

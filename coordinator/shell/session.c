@@ -3,6 +3,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/shell/asks.h"
+#include "coordinator/shell/back.h"
 #include "coordinator/shell/files.h"
 #include "coordinator/shell/held.h"
 #include "coordinator/shell/recovery.h"
@@ -221,7 +222,17 @@ void session_allow_results(struct session *p, const struct order *o)
 	}
 }
 
-static void take_lease_failed(struct session *p, const Farm__LeaseFailed *f)
+/* One that makes an epoch be taken back must not come while others read the films. */
+static void take_lease_failed(struct session *p, struct envelope *env)
+{
+	struct buf nothing = {0};
+	if (env->message->lease_failed->bad_states)
+		server_result(p->server, p->id, env, &nothing);
+	else
+		session_lease_failed(p, env->message->lease_failed);
+}
+
+void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 {
 	struct error e;
 	char text[1024];
@@ -247,7 +258,13 @@ static void take_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 			  log_quote(p->name).text, log_quote(text).text);
 	else if (o && *text)
 		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s", log_quote(p->name).text, f->own, log_quote(text).text);
+	struct back back = {0};
+	if (o && *text && f->bad_states && !o->busy && !p->server->stepping && journal_write(o->journal, &e) == 0)
+		ev.lease.can_take_back = back_read(o, o->journal, &ev.lease.key, &back, &e) == 0;
+	p->server->back = &back;
 	server_step(p->server, &ev);
+	p->server->back = NULL;
+	back_fini(&back);
 }
 
 static void take_blob_get(struct session *p, const Farm__BlobGet *g)
@@ -307,7 +324,7 @@ static void worker_message(struct session *p, struct envelope *env)
 			take_lease_result(p, env);
 		break;
 	case FARM__ENVELOPE__BODY_LEASE_FAILED:
-		take_lease_failed(p, m->lease_failed);
+		take_lease_failed(p, env);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_GET:
 		asks_take(p, &(struct ask){.number = m->job_get->job});

@@ -60,6 +60,8 @@ __attribute__((format(printf, 2, 3))) void session_fault(struct session *p, cons
 void session_allow_results(struct session *p, const struct order *o);
 
 /* What the core wants said to workers. */
+/* A lease that a worker could not do; p is one. */
+void session_lease_failed(struct session *p, const Farm__LeaseFailed *f);
 void session_send_lease(struct session *p, const struct order *o, const struct lease_key *k, bool anew); /* with seeds */
 void session_send_revoke(struct session *p, const struct lease_key *k);
 void session_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text);

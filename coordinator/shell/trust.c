@@ -121,6 +121,13 @@ void trust_merged(struct order *o, const struct action *a)
 	o->credits[o->credit_count++] = (struct order_credit){a->who, 1};
 }
 
+void trust_taken_back(struct order *o, uint64_t who)
+{
+	for (size_t i = 0; i < o->credit_count; i++)
+		if (o->credits[i].who == who && o->credits[i].leases > 0)
+			o->credits[i].leases--;
+}
+
 static const char *name_of(const struct server *s, uint64_t who, char name[JOIN_NAME])
 {
 	struct worker_status w;
@@ -166,6 +173,6 @@ void trust_aside(struct server *s, const struct action *a)
 	write_aside(s);
 	for (struct order *o = s->orders; o; o = o->next)
 		for (size_t i = 0; i < o->credit_count; i++)
-			if (o->credits[i].who == a->who)
+			if (o->credits[i].who == a->who && o->credits[i].leases > 0)
 				note_credit(o, name, o->credits[i].leases);
 }

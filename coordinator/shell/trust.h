@@ -17,6 +17,7 @@ int trust_open(struct server *s, struct error *e);
 double trust_share(const struct server *s, const Farm__Submit *m);
 
 void trust_merged(struct order *o, const struct action *a);
+void trust_taken_back(struct order *o, uint64_t who); /* one of its results counts no more */
 void trust_wrong(struct server *s, const struct action *a);
 void trust_anew(struct server *s, const struct action *a); /* chains that lost their states */
 void trust_aside(struct server *s, const struct action *a);

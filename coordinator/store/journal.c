@@ -221,9 +221,9 @@ int journal_create(struct journal **out, const char *folder, uint64_t job, uint6
 
 /* ---- reading ---- */
 
-static int visit_piece(const struct journal *j, const struct journal_piece *p, journal_visit *visit, void *user, struct error *e)
+static int visit_piece(struct journal *j, const struct journal_piece *p, journal_visit *visit, void *user, struct error *e)
 {
-	struct journal_item item = {.at = p->from, .missing = p->what == JOURNAL_WHOLE ? 0 : p->count};
+	struct journal_item item = {.journal = j, .at = p->from, .missing = p->what == JOURNAL_WHOLE ? 0 : p->count};
 	if (p->what != JOURNAL_UNKNOWN) {
 		item.kind = (enum journal_kind)p->record.kind;
 		item.elapsed = p->record.elapsed;
@@ -231,6 +231,7 @@ static int visit_piece(const struct journal *j, const struct journal_piece *p, j
 		item.body = p->body;
 		item.size = p->record.size;
 	}
+	j->written = p->to; /* so far it can be read */
 	return visit(user, &item, e);
 }
 
@@ -401,7 +402,7 @@ int journal_append(struct journal *j, enum journal_kind kind, const struct lease
 	size_t b_size = b ? b->size : 0;
 	if (a_size > UINT32_MAX || b_size > UINT32_MAX - a_size)
 		return error_set(e, EFBIG, "%s: a record of %zu bytes", j->path, a_size + b_size);
-	if (kind != JOURNAL_BATCH && kind != JOURNAL_PINNED && !j->bad) { /* it may stay away, but must not make the journal bad */
+	if (kind != JOURNAL_BATCH && kind != JOURNAL_AGAIN && kind != JOURNAL_PINNED && !j->bad) { /* it may stay away, but must not make the journal bad */
 		int rc = room_for(j, sizeof(struct journal_record) + a_size + b_size, e);
 		if (rc)
 			return rc;

@@ -27,6 +27,9 @@ enum journal_kind {
 	JOURNAL_PINNED = 2, /* the fingerprint that the job belongs to */
 	JOURNAL_LOOK = 3,   /* struct forecast_look */
 	JOURNAL_COUNTS = 4, /* struct job_counts: in all, not since the last */
+	JOURNAL_AGAIN = 5,  /* as JOURNAL_BATCH, in the place of the last one of that lease, which is taken back with all of its (group, part)
+			       after it */
+	JOURNAL_KEPT = 6,   /* as JOURNAL_BATCH: merged before the checkpoint, and kept because it may be taken back */
 };
 
 struct journal;
@@ -36,6 +39,7 @@ int journal_create(struct journal **j, const char *folder, uint64_t job, uint64_
 
 /* A record, or a place where some are missing. */
 struct journal_item {
+	struct journal *journal; /* for journal_body of those before it */
 	enum journal_kind kind;
 	double elapsed;         /* as both were given to journal_append */
 	struct lease_key lease; /* .kind 0: none */

@@ -72,6 +72,10 @@ static void say_action(struct said *s, const struct action *a)
 	case ACTION_JOB_CHANGED: say_changed(s, a); break;
 	case ACTION_JOB_FORGOTTEN: say(s, "j%" PRIu64 " forgotten", a->job); break;
 	case ACTION_CHAINS_ANEW: say(s, "anew"); break;
+	case ACTION_TAKE_BACK:
+		say(s, "back ");
+		say_key(s, &a->key);
+		break;
 	case ACTION_WRONG: say(s, "#%" PRIu64 " %s", a->who, a->text); break;
 	case ACTION_ASIDE: say(s, "#%" PRIu64 " aside", a->who); break;
 	case ACTION_CLOSE_PEER: say(s, "close w%" PRIu64, a->peer); break;
@@ -215,7 +219,7 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		ev->kind = EVENT_REQUEST;
 		ev->want = (uint32_t)take_count(at);
 	} else {
-		bool lacks = take(at, "lacks"), refuses = !lacks && take(at, "refuses");
+		bool lacks = take(at, "lacks"), lost = !lacks && take(at, "denies"), refuses = lost || (!lacks && take(at, "refuses"));
 		ev->kind = lacks || refuses	  ? EVENT_LEASE_FAILED
 			   : take(at, "batch")	  ? EVENT_BATCH
 			   : take(at, "stored")	  ? EVENT_STORED
@@ -227,6 +231,7 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		ev->lease.key = take_key(at);
 		ev->lease.own = lacks;
 		ev->lease.bad_states = refuses;
+		ev->lease.can_take_back = refuses && !lost;
 		ev->lease.valid = !take(at, "bad");
 		if (take(at, "says "))
 			memset(&ev->lease.digest, *(*at)++, sizeof ev->lease.digest);

@@ -50,14 +50,15 @@ static uint64_t next(uint64_t *state)
 	return z ^ z >> 31;
 }
 
-/* Behind its id, so that it looks like the chain's: flipped bits, numbers that are none or huge or tiny, noise, the end cut off. */
+/* Behind its id, so that it looks like the chain's: flipped bits, numbers that are none or huge or tiny, noise here and there, the end cut
+ * off, noise throughout. */
 static void spoil_state(struct chain_state *s, uint64_t *dice)
 {
 	enum { ID = 8, MUTATIONS = 8 };
 	static const double numbers[] = {NAN, INFINITY, -INFINITY, 1e308, -1e308, 5e-324, 1e-310, -0.0};
 	if (s->size <= ID + sizeof *numbers)
 		return;
-	uint64_t kind = next(dice) % 4, left = s->size - ID;
+	uint64_t kind = next(dice) % 5, left = s->size - ID;
 	for (int i = 0; i < MUTATIONS; i++) {
 		uint8_t *at = s->bytes + ID + next(dice) % left;
 		if (kind == 0)
@@ -67,6 +68,8 @@ static void spoil_state(struct chain_state *s, uint64_t *dice)
 		else if (kind == 2)
 			*at = (uint8_t)next(dice);
 	}
+	for (uint64_t i = 0; kind == 4 && i < left; i++)
+		s->bytes[ID + i] = (uint8_t)next(dice);
 	if (kind == 3)
 		s->size -= (uint32_t)(1 + next(dice) % (left - 1));
 }

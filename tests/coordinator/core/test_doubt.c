@@ -27,14 +27,14 @@ static uint32_t wrong(const struct farm *f, uint64_t who)
 	return w.wrong;
 }
 
-static void a_second_refusal_is_the_makers_fault(void **state)
+static void without_what_came_before_the_chains_begin_anew(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
 		START, WORKER(2, "b"), WORKER(3, "c"),
 		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-		"[4] w2 refuses j1 g0 p0 e1 not mine -> -", /* neither it nor who made them, though that one would */
+		"[4] w2 denies j1 g0 p0 e1 not mine -> -", /* neither it nor who made them, though that one would */
 		"[4] w1 wants 1 -> -",
 		NULL });
 	struct job_status j;
@@ -42,7 +42,7 @@ static void a_second_refusal_is_the_makers_fault(void **state)
 	assert_non_null(strstr(j.waiting, "a third worker is to say whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b could"));
 	transcript_play(f, (const char *const[]){
 		"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
-		"[6] w3 refuses j1 g0 p0 e1 not mine either -> anew, #1 wrong result: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
+		"[6] w3 denies j1 g0 p0 e1 not mine either -> anew, #1 wrong result: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
 		"[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2", /* from states again */
 		NULL });
 	struct peer_status p;
@@ -63,7 +63,7 @@ static void a_third_that_goes_on_is_right(void **state)
 		START, WORKER(2, "b"), WORKER(3, "c"),
 		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
 		"[3] w3 wants 1 -> -",
-		"[4] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
+		"[4] w2 denies j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
 		"[5] w3 batch j1 g0 p0 e1 -> merge, merged, #2 wrong result: j1 render group 0 part 0 epoch 1, j1 round 2, w2 gets j1 g0 p0 e2",
 		NULL });
 	assert_int_equal(wrong(f, 2), 1);
@@ -79,11 +79,11 @@ static void without_a_third_the_chains_begin_anew(void **state)
 	transcript_play(f, (const char *const[]){
 		START, WORKER(2, "b"),
 		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-		"[4] w2 refuses j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
+		"[4] w2 denies j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
 		"[5] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
-		"[6] w2 refuses j1 g0 p0 e2 my own -> -", /* made by itself: the other is asked */
+		"[6] w2 denies j1 g0 p0 e2 my own -> -", /* made by itself: the other is asked */
 		"[6] w1 wants 1 -> w1 gets j1 g0 p0 e2",
-		"[7] w1 refuses j1 g0 p0 e2 no -> anew, w2 gets j1 g0 p0 e2 anew",
+		"[7] w1 denies j1 g0 p0 e2 no -> anew, w2 gets j1 g0 p0 e2 anew",
 		NULL });
 	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
 	farm_free(f);
@@ -97,9 +97,9 @@ static void a_third_that_leaves(void **state)
 	transcript_play(f, (const char *const[]){
 		START, WORKER(2, "b"), WORKER(3, "c"),
 		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-		"[4] w2 refuses j1 g0 p0 e1 no -> -",
+		"[4] w2 denies j1 g0 p0 e1 no -> -",
 		"[5] w3 leaves -> w2 gets j1 g0 p0 e1",
-		"[6] w2 refuses j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
+		"[6] w2 denies j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
 		NULL });
 	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
 	farm_free(f);
@@ -114,12 +114,103 @@ static void the_maker_goes_on(void **state)
 		START, WORKER(2, "b"), WORKER(3, "c"),
 		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
 		"[3] w2 wants 0 -> -",
-		"[4] w2 refuses j1 g0 p0 e1 no -> -",
+		"[4] w2 denies j1 g0 p0 e1 no -> -",
 		"[5] w3 leaves -> -",
 		"[5] w1 wants 1 -> w1 gets j1 g0 p0 e1",
 		"[6] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
 		NULL });
 	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
+	farm_free(f);
+}
+
+/* The epoch that the states are the end of is computed again, by somebody else; a round that it was in is open again. */
+static void a_second_refusal_takes_the_epoch_back(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START, WORKER(2, "b"), WORKER(3, "c"),
+		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+		"[4] w2 refuses j1 g0 p0 e1 no -> -",
+		"[5] w1 wants 1 -> -",
+		"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
+		"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong result: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+		NULL });
+	struct job_status j;
+	assert_true(farm_job(f, 1, 6, &j));
+	assert_int_equal(j.rounds, 0);
+	assert_int_equal(j.leases_merged, 0);
+	assert_true(j.progress > 0);
+	transcript_play(f, (const char *const[]){
+		"[6] w1 batch j1 g0 p0 e1 -> refused: the epoch is not open",
+		"[7] w2 wants 0 -> -",
+		"[7] w2 returns j1 g0 p0 e0 -> w3 gets j1 g0 p0 e0", /* not who made them, while there is another */
+		"[7] w2 wants 1 -> -", "[7] w3 wants 0 -> -", "[7] w3 returns j1 g0 p0 e0 -> w2 gets j1 g0 p0 e0",
+		"[8] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
+		"[9] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
+		NULL });
+	assert_int_equal(wrong(f, 1), 1);
+	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
+	farm_free(f);
+}
+
+/* Nobody holds a job up for ever by saying so again and again. */
+static void after_four_times_the_chains_begin_anew(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){ START, WORKER(2, "b"), "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1", NULL });
+	for (int i = 0; i < 4; i++)
+		transcript_play(f, (const char *const[]){
+			"[4] w2 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, w2 gets j1 g0 p0 e0", /* made by the other one */
+			"[4] w2 wants 0 -> -", "[4] w2 returns j1 g0 p0 e0 -> -",
+			"[4] w1 wants 1 -> -", /* whose epoch it is, while another is here */
+			"[4] w2 leaves -> w1 gets j1 g0 p0 e0",
+			"[5] w1 wants 0 -> -", "[5] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1",
+			"[5] w2 joins A threads=1 name=b -> -", "[5] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+			NULL });
+	transcript_play(f, (const char *const[]){
+		"[6] w2 refuses j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
+		"[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
+		NULL });
+	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
+	farm_free(f);
+}
+
+/* One worker made several epochs in a row, and only the last states were looked at so far. */
+static void one_epoch_after_the_other_is_taken_back(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		"[0] submit groups=2 rounds=4 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=2 name=a -> -",
+		"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+		"[1] w1 batch j1 g0 p0 boot -> merge, merged", "[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
+		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0",
+		"[2] w2 joins A threads=2 name=b -> -", "[2] w3 joins A threads=2 name=c -> -",
+		"[2] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
+		"[2] w1 wants 1 -> -",
+		"[2] w1 batch j1 g0 p0 e1 -> merge, merged",
+		"[2] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g1 p0 e1",
+		"[2] w2 wants 1 -> w2 gets j1 g0 p0 e2",
+		"[2] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g1 p0 e2",
+		"[3] w2 refuses j1 g0 p0 e2 no -> -",
+		"[3] w3 wants 1 -> w3 gets j1 g0 p0 e2",
+		"[4] w3 refuses j1 g0 p0 e2 no -> back j1 g0 p0 e1, #1 wrong result: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e1",
+		NULL });
+	transcript_play(f, (const char *const[]){
+		"[5] w1 wants 0 -> -",
+		"[5] w1 batch j1 g1 p0 e2 -> merge, merged", /* one round ahead */
+		"[5] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
+		"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong result: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+		"[7] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1",
+		"[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2, w3 gets j1 g1 p0 e3",
+		"[9] w2 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, w2 gets j1 g0 p0 e3",
+		"[9] w3 batch j1 g1 p0 e3 -> merge, merged",
+		"[9] w2 batch j1 g0 p0 e3 -> merge, merged, j1 round 4, j1 publish 4, j1 is done (mutations)",
+		NULL });
+	assert_int_equal(wrong(f, 1), 2);
+	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
 	farm_free(f);
 }
 
@@ -138,7 +229,7 @@ static void a_liar_is_set_aside(void **state)
 		"[2] w1 batch j1 g2 p0 e0 -> merge, merged, j1 round 1",
 		"[3] w2 joins A threads=3 name=b -> -", "[3] w3 joins A threads=3 name=c -> -",
 		"[3] w2 wants 3 -> w2 gets j1 g0 p0 e1, w2 gets j1 g1 p0 e1, w2 gets j1 g2 p0 e1",
-		"[4] w2 refuses j1 g0 p0 e1 no -> -", "[4] w2 refuses j1 g1 p0 e1 no -> -", "[4] w2 refuses j1 g2 p0 e1 no -> -",
+		"[4] w2 denies j1 g0 p0 e1 no -> -", "[4] w2 denies j1 g1 p0 e1 no -> -", "[4] w2 denies j1 g2 p0 e1 no -> -",
 		"[5] w3 wants 3 -> w3 gets j1 g0 p0 e1, w3 gets j1 g1 p0 e1, w3 gets j1 g2 p0 e1",
 		"[6] w3 wants 0 -> -",
 		"[6] w3 batch j1 g0 p0 e1 -> merge, merged, #2 wrong result: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e2",
@@ -155,11 +246,14 @@ static void a_liar_is_set_aside(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_second_refusal_is_the_makers_fault),
+		cmocka_unit_test(without_what_came_before_the_chains_begin_anew),
 		cmocka_unit_test(a_third_that_goes_on_is_right),
 		cmocka_unit_test(without_a_third_the_chains_begin_anew),
 		cmocka_unit_test(a_third_that_leaves),
 		cmocka_unit_test(the_maker_goes_on),
+		cmocka_unit_test(a_second_refusal_takes_the_epoch_back),
+		cmocka_unit_test(after_four_times_the_chains_begin_anew),
+		cmocka_unit_test(one_epoch_after_the_other_is_taken_back),
 		cmocka_unit_test(a_liar_is_set_aside),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
