@@ -156,7 +156,7 @@ fuzzers: $(FUZZ_BIN)
 fuzz:
 	MAKE="$(MAKE)" sh tests/fuzz/run.sh
 
-# A worker that spoils chain states among honest ones, 50 seeds; one of them is part of the tests.
+# A worker that spoils chain states among honest ones, 50 seeds: the bits of hslt-render; one of them is part of the tests.
 .PHONY: test-states
 test-states: programs
 	SEEDS="$$(seq -s ' ' 50)" sh tests/e2e/states.sh $(BUILD)

@@ -27,3 +27,62 @@ liar() {
 	blameless
 	unset HSLT_TEST
 }
+
+fault spoiled_states 5 1 "a worker returns wrong results and spoils their chain states: who goes on from these finds out, nothing is verified"
+spoiled_states() {
+	export HSLT_TEST=1
+	farm
+	worker w0
+	job
+	each_time somebody_spoils
+	worker w1
+	worker w2
+	finish_job
+	taken_back
+	unset HSLT_TEST
+}
+somebody_spoils() {
+	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	worker "liar$i" --cache "$DIR/cache$i" --test-spoil-states 1 --test-lie 1 # of no life of another
+	says coordinator "event=peer_hello .*name=\"liar$i\""
+	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	says "liar$i" 'event=batch_acknowledged .*kind=2'
+	kill -9 "$WORKER"
+}
+taken_back() {
+	grep -q "event=batch_taken_back job=$ID .*made by liar" "$DIR/coordinator.log" || fail "$NAME: no result of a liar is taken back"
+	! grep -q "event=batch_taken_back job=$ID .*made by w" "$DIR/coordinator.log" || fail "$NAME: a result of an honest worker is taken back"
+	! grep -q 'event=worker_wrong .*worker="w' "$DIR/coordinator.log" || fail "$NAME: an honest worker is blamed"
+	! value "$ID" note | grep -q anew || fail "$NAME: $(value "$ID" note)"
+	[ "$(value "$ID" failures)" -gt 0 ] || fail "$NAME: nobody refused the states"
+}
+
+CHECKPOINTS=
+fault spoiled_restart 5 1 "the same, and the coordinator is killed and started again before the states are refused"
+spoiled_restart() {
+	export HSLT_TEST=1
+	# shellcheck disable=SC2086
+	farm $CHECKPOINTS
+	worker w0
+	job
+	each_time spoils_before_a_restart
+	worker w1
+	worker w2
+	finish_job
+	taken_back
+	unset HSLT_TEST
+}
+spoils_before_a_restart() {
+	somebody_spoils
+	kill -9 "$COORDINATOR_PID"
+	# shellcheck disable=SC2086
+	again $CHECKPOINTS
+}
+
+fault spoiled_checkpoint 5 1 "the same, with a checkpoint after every few results and kept results of epochs before it"
+spoiled_checkpoint() {
+	CHECKPOINTS="--journal 2"
+	spoiled_restart
+	grep -q 'event=checkpoint ' "$DIR/coordinator.log" || fail "$NAME: never a checkpoint"
+	CHECKPOINTS=
+}
