@@ -1,5 +1,6 @@
 #include "common/base/text.h"
 
+#include <errno.h>
 #include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
@@ -131,6 +132,42 @@ bool text_share(const char *text, double *share)
 		return false;
 	*share = x;
 	return true;
+}
+
+/* A number that is not negative, and behind it at most one letter of `units`, worth the factor of its place. */
+static bool with_unit(const char *text, const char *units, const double *factors, double *value)
+{
+	char *end;
+	if ((!(*text >= '0' && *text <= '9') && *text != '.') || text[strcspn(text, "xX")])
+		return false;
+	double x = strtod(text, &end);
+	const char *unit = *end ? strchr(units, *end) : NULL;
+	if (end == text || (*end && (!unit || end[1])))
+		return false;
+	*value = unit ? x * factors[unit - units] : x;
+	return isfinite(*value);
+}
+
+bool text_count(const char *text, uint64_t *count)
+{
+	static const double thousands[] = {1e3, 1e3, 1e6, 1e9};
+	if (text[strspn(text, "0123456789")] == 0) { /* exact beyond 2^53, too */
+		errno = 0;
+		unsigned long long n = strtoull(text, NULL, 10);
+		*count = n;
+		return *text && !errno;
+	}
+	double x;
+	if (!with_unit(text, "kKMG", thousands, &x) || x != floor(x) || x >= 0x1p63)
+		return false;
+	*count = (uint64_t)x;
+	return true;
+}
+
+bool text_seconds(const char *text, double *seconds)
+{
+	static const double units[] = {1, 60, 3600, 86400};
+	return with_unit(text, "smhd", units, seconds);
 }
 
 char *text_borrow(const char *text)

@@ -4,6 +4,7 @@
 
 #include <stdbool.h>
 #include <stddef.h>
+#include <stdint.h>
 
 /* Copies, cutting what does not fit, never in the middle of a UTF-8 sequence. */
 void text_copy(char *out, size_t size, const char *from);
@@ -21,6 +22,11 @@ char *text_borrow(const char *text);
 /* "0.05" or "5%". false: no number. A share is from 0 to 1. */
 bool text_ratio(const char *text, double *ratio);
 bool text_share(const char *text, double *share);
+
+/* "1000", "1.5k", "2M", "1G": a whole number, by powers of 1000. "90", "90s", "5m", "2h", "1d": seconds. false: none of these, or
+ * the number is not finite, negative, or not whole. */
+bool text_count(const char *text, uint64_t *count);
+bool text_seconds(const char *text, double *seconds);
 
 /* Appends to a fixed array: what does not fit is cut as above, and nothing comes after it. Begin with {array, size}. */
 struct text {

@@ -34,6 +34,12 @@ code 1 "$BIN/hslt-submit" "$BOX" -o "$DIR/no/such/folder.exr" --wait
 code 1 "$BIN/hslt-submit" "$DIR/none.xml" -o "$DIR/a.exr"
 code 2 "$BIN/hslt-submit" "$BOX" -o "$DIR/a.exr" --crop 0,0,0,0,0
 for p in render submit; do
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.png"
+	grep -q "hslt-tonemap" "$DIR/err.log" || fail "hslt-$p -o a.png says: $(cat "$DIR/err.log")"
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" -i hsl
+	grep -q 'did you mean `hslt`' "$DIR/err.log" || fail "hslt-$p -i hsl says: $(cat "$DIR/err.log")"
+	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --target-error 5
+	grep -q "500 %.*5%" "$DIR/err.log" || fail "hslt-$p --target-error 5 says: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --mutations independent --integrator pssmlt --mutations 1000
 	grep -q "pssmlt has no strategies" "$DIR/err.log" || fail "hslt-$p says: $(cat "$DIR/err.log")"
 	code 2 "$BIN/hslt-$p" "$BOX" -o "$DIR/a.exr" --integrator path --mutations hslt=0.9,independent=0.1

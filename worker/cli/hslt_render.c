@@ -71,7 +71,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		state->child_inputs[0] = &a->render;
 		return 0;
 	case 'o':
-		a->output = arg;
+		a->output = option_image(state, arg);
 		return 0;
 	case OPTION_THREADS:
 		a->threads = option_threads(state, arg);

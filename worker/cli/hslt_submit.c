@@ -81,7 +81,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		a->coordinator = arg;
 		return 0;
 	case 'o':
-		a->output = arg;
+		a->output = option_image(state, arg);
 		return 0;
 	case OPTION_PRIORITY:
 		a->request.priority = (int)strtol(arg, &end, 10);

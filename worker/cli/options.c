@@ -3,10 +3,12 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "worker/render/knobs.h"
+#include "worker/scene/spelling.h"
 
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 #include <unistd.h>
 
 enum {
@@ -18,7 +20,7 @@ enum {
 static const struct argp_option options[] = {
 	{NULL, 0, NULL, 0, "What to render:", 1},
 	{"integrator", 'i', "NAME", 0, "(" RENDER_INTEGRATOR_DEFAULT ": path, bdpt or hslt, by a short pilot); the scene's own is ignored", 1}, /* see help */
-	{"size", OPTION_SIZE, "WxH", 0, "Size of the film; keeps the angle of view", 1},
+	{"size", OPTION_SIZE, "W[xH]", 0, "Size of the film; keeps the angle of view. Without H the film keeps its shape", 1},
 	{"crop", OPTION_CROP, "X,Y,W,H", 0, "Part of the film, in its pixels", 1},
 	{"seed", OPTION_SEED, "S", 0, "Of all random numbers (0)", 1},
 	{"min-depth", OPTION_MIN_DEPTH, "K", 0, "Shortest paths, in edges (1: emitters seen directly)", 1},
@@ -32,11 +34,11 @@ static const struct argp_option options[] = {
 	{"lenient", OPTION_LENIENT, NULL, 0,
 	 "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted: --set lenient=yes", 1},
 	{NULL, 0, NULL, 0, "When to stop (the first bound met; without any, the scene's sampleCount):", 2},
-	{"spp", OPTION_SPP, "N", 0, "Samples a pixel, rounded up to whole rounds", 2},
+	{"spp", OPTION_SPP, "N", 0, "Samples a pixel (64, 1.5k), rounded up to whole rounds", 2},
 	{"mutations", OPTION_MUTATIONS, "N|LIST", 0,
 	 "N: mutations or samples in all. LIST: the strategies that propose mutations, with weights (1), such as "
 	 "hslt=0.9,bidirectional=0.1; part of the plan. May be given twice, once for each", 2},
-	{"time", OPTION_TIME, "SECONDS", 0, "Wall clock, looked at after complete rounds", 2},
+	{"time", OPTION_TIME, "SECONDS", 0, "Wall clock (90, 5m, 2h), looked at after complete rounds", 2},
 	{"target-error", OPTION_TARGET, "E", 0, "Estimated relative error: 0.02 or 2%", 2},
 	{NULL, 0, NULL, 0, "The plan (part of what decides the bits):", 3},
 	{"chains", OPTION_CHAINS, "N", 0, "Markov chains (1024, fewer for tiny jobs)", 3},
@@ -49,11 +51,9 @@ static const struct argp_option options[] = {
 
 uint64_t option_whole(const struct argp_state *state, const char *option, const char *arg)
 {
-	char *end;
-	errno = 0;
-	unsigned long long n = strtoull(arg, &end, 10);
-	if (*arg < '0' || *arg > '9' || *end || errno)
-		argp_error(state, "%s takes a whole number, not '%s'", option, arg);
+	uint64_t n = 0;
+	if (!text_count(arg, &n))
+		argp_error(state, "%s takes a whole number such as 4000 or 1.5k, not '%s'", option, arg);
 	return n;
 }
 
@@ -81,11 +81,22 @@ static uint32_t whole32(const struct argp_state *state, const char *option, cons
 
 double option_seconds(const struct argp_state *state, const char *option, const char *arg)
 {
-	char *end;
-	double x = strtod(arg, &end);
-	if (end == arg || *end || !(x > 0 && x < 1e9))
-		argp_error(state, "%s takes seconds, not '%s'", option, arg);
+	double x = 0;
+	if (!text_seconds(arg, &x) || !(x > 0 && x < 1e9))
+		argp_error(state, "%s takes a time such as 90, 90s, 5m or 2h, not '%s'", option, arg);
 	return x;
+}
+
+const char *option_image(const struct argp_state *state, const char *arg)
+{
+	static const char *const others[] = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".bmp", ".ppm", ".pfm"};
+	size_t n = strlen(arg);
+	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
+		size_t k = strlen(others[i]);
+		if (n > k && strcasecmp(arg + n - k, others[i]) == 0)
+			argp_error(state, "images are OpenEXR, and '%s' would not be what its name says; hslt-tonemap makes a PNG of one", arg);
+	}
+	return arg;
 }
 
 static double target_error(const struct argp_state *state, const char *arg)
@@ -93,6 +104,8 @@ static double target_error(const struct argp_state *state, const char *arg)
 	double x;
 	if (!text_ratio(arg, &x) || !(x > 0 && x < 1e3))
 		argp_error(state, "--target-error takes something like 0.02 or 2%%, not '%s'", arg);
+	if (x > 1 && !strchr(arg, '%'))
+		argp_error(state, "--target-error %s is an error of %g %%; for %s percent write %s%%", arg, 100 * x, arg, arg);
 	return x;
 }
 
@@ -181,6 +194,31 @@ static void check_mixture(const struct render_arguments *a, const struct argp_st
 		argp_error(state, "--mutations %s: the integrator %s has no strategies to choose from", a->mixture, name);
 }
 
+static void check_integrator(const char *name, const struct argp_state *state)
+{
+	const struct render_integrator *r;
+	char hint[128];
+	struct spelling s = {.wanted = name};
+	if (render_integrator_find(name) || strcmp(name, RENDER_INTEGRATOR_DEFAULT) == 0)
+		return;
+	spelling_offer(&s, RENDER_INTEGRATOR_DEFAULT);
+	for (size_t i = 0; (r = render_integrator_at(i)) != NULL; i++)
+		spelling_offer(&s, r->name);
+	argp_error(state, "there is no integrator '%s'%s", name, spelling_hint(&s, hint, sizeof hint));
+}
+
+/* "640x360", or "640": the height that keeps the scene's shape. */
+static void take_size(struct render_arguments *a, const char *arg, const struct argp_state *state)
+{
+	uint32_t n[2] = {0, 0};
+	bool both = strchr(arg, 'x') != NULL;
+	take_numbers(state, "--size", arg, "x", n, both ? 2 : 1);
+	if (n[0] == 0 || (both && n[1] == 0))
+		argp_error(state, "--size takes a film of at least 1x1 pixels");
+	a->render.width = n[0];
+	a->render.height = n[1];
+}
+
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
 	struct render_arguments *a = state->input;
@@ -188,8 +226,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	uint32_t n[4] = {0};
 	switch (key) {
 	case 'i':
-		if (!render_integrator_find(arg) && strcmp(arg, RENDER_INTEGRATOR_DEFAULT) != 0)
-			argp_error(state, "there is no integrator '%s'", arg);
+		check_integrator(arg, state);
 		text_copy(p->integrator, sizeof p->integrator, arg);
 		return 0;
 	case 'D':
@@ -210,11 +247,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		p->target_error = target_error(state, arg);
 		return 0;
 	case OPTION_SIZE:
-		take_numbers(state, "--size", arg, "x", n, 2);
-		a->render.width = n[0];
-		a->render.height = n[1];
-		if (n[0] == 0 || n[1] == 0)
-			argp_error(state, "--size takes a film of at least 1x1 pixels");
+		take_size(a, arg, state);
 		return 0;
 	case OPTION_CROP:
 		take_numbers(state, "--crop", arg, ",,,", n, 4);

@@ -29,11 +29,14 @@ bool integrator_is_open(const struct plan_request *r);
  * that was asked for is none, a usage error. */
 int render_plan_from_scene(struct render_arguments *a, const struct render_summary *s, struct error *e);
 
-/* A whole number, or the usage error of `option`. */
+/* A whole number, also as "1.5k", or the usage error of `option`. Seconds: also as "5m" or "2h". */
 uint64_t option_whole(const struct argp_state *state, const char *option, const char *arg);
 unsigned option_threads(const struct argp_state *state, const char *arg);
 unsigned option_threads_default(void); /* as many as processors */
 double option_seconds(const struct argp_state *state, const char *option, const char *arg);
+
+/* The file of an image, which is OpenEXR: the usage error where its name says that it is something else. */
+const char *option_image(const struct argp_state *state, const char *arg);
 
 /* "a/b/room.xml" -> "a/b" and "room.xml"; both to be mem_free'd. */
 int scene_path_split(const char *path, char **folder, char **name, struct error *e);

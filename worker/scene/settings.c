@@ -132,12 +132,14 @@ static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t h
 		     struct error *e)
 {
 	const struct scene_node *film = node_child(sensor, PLUGIN_FILM, 0);
-	out->width = width ? width : DEFAULT_WIDTH;
-	out->height = height ? height : DEFAULT_HEIGHT;
-	if (film && !width)
-		out->width = (uint32_t)node_int(film, "width", DEFAULT_WIDTH);
-	if (film && !height)
-		out->height = (uint32_t)node_int(film, "height", DEFAULT_HEIGHT);
+	out->width = film ? (uint32_t)node_int(film, "width", DEFAULT_WIDTH) : DEFAULT_WIDTH;
+	out->height = film ? (uint32_t)node_int(film, "height", DEFAULT_HEIGHT) : DEFAULT_HEIGHT;
+	if (width && !height) /* the film keeps its shape */
+		out->height = (uint32_t)fmin(fmax(floor((double)width * out->height / out->width + 0.5), 1), PLAN_MAX_SIZE + 1.0);
+	if (width)
+		out->width = width;
+	if (height)
+		out->height = height;
 	if (out->width > PLAN_MAX_SIZE || out->height > PLAN_MAX_SIZE ||
 	    (uint64_t)out->width * out->height > FILM_PIXELS_MAX)
 		return node_error(film ? film : sensor, e, ERANGE, "a film of %u x %u pixels; at most %d a side and %d in all",

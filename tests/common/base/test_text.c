@@ -128,9 +128,47 @@ static void figures_read_well(void **state)
 	}
 }
 
+static void test_counts_with_units(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		uint64_t count;
+	} good[] = {{"0", 0}, {"17", 17}, {"1.5k", 1500}, {"2K", 2000}, {"0.25M", 250000}, {"3G", 3000000000u}, {".5k", 500},
+		    {"18446744073709551615", UINT64_MAX}, {"9007199254740993", 9007199254740993u}};
+	static const char *const bad[] = {"", "k", "1.5", "1.2345k", "-1", "+1", " 1", "1 ", "1kk", "1m", "1e400", "nan", "inf", "0x10k",
+					  "18446744073709551616", "1e30G"};
+	uint64_t n;
+	for (size_t i = 0; i < sizeof good / sizeof *good; i++)
+		if (!text_count(good[i].text, &n) || n != good[i].count)
+			fail_msg("'%s' is read as %llu", good[i].text, (unsigned long long)n);
+	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+		if (text_count(bad[i], &n))
+			fail_msg("'%s' is taken for %llu", bad[i], (unsigned long long)n);
+}
+
+static void test_times_with_units(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		double seconds;
+	} good[] = {{"90", 90}, {"0.5", 0.5}, {"90s", 90}, {"5m", 300}, {"1.5h", 5400}, {"2d", 172800}};
+	static const char *const bad[] = {"", "m", "5 m", "5min", "-5", "5M", "1e999", "nan", "inf", "5mm"};
+	double x;
+	for (size_t i = 0; i < sizeof good / sizeof *good; i++)
+		if (!text_seconds(good[i].text, &x) || x != good[i].seconds)
+			fail_msg("'%s' is read as %g", good[i].text, x);
+	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
+		if (text_seconds(bad[i], &x))
+			fail_msg("'%s' is taken for %g s", bad[i], x);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_counts_with_units),
+		cmocka_unit_test(test_times_with_units),
 		cmocka_unit_test(buffers_keep_their_limit),
 		cmocka_unit_test(texts_are_cut_between_characters),
 		cmocka_unit_test(texts_are_made_clean),
