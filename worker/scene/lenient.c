@@ -10,13 +10,29 @@ static bool is_one_of(const char *name, const char *const *list)
 	return false;
 }
 
+/* What is like it, by class. */
+static const struct {
+	enum plugin_class cls;
+	const char *type, *stand_in;
+} likes[] = {
+	{PLUGIN_BSDF, "pplastic", "roughplastic"},   {PLUGIN_BSDF, "ward", "roughplastic"},
+	{PLUGIN_BSDF, "measured", "roughplastic"},   {PLUGIN_BSDF, "principledthin", "principled"},
+	{PLUGIN_BSDF, "polarizer", "null"},	     {PLUGIN_BSDF, "retarder", "null"},
+	{PLUGIN_BSDF, "circular", "null"},	     {PLUGIN_EMITTER, "sky", "constant"},
+	{PLUGIN_EMITTER, "sunsky", "constant"},	     {PLUGIN_EMITTER, "directionalarea", "area"},
+};
+
 enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in)
 {
-	static const char *const metals[] = {"ward", "measured", NULL};
 	*stand_in = NULL;
+	for (size_t i = 0; i < sizeof likes / sizeof *likes; i++)
+		if (likes[i].cls == cls && strcmp(likes[i].type, type) == 0) {
+			*stand_in = likes[i].stand_in;
+			return LENIENT_REPLACE;
+		}
 	switch (cls) {
 	case PLUGIN_BSDF:
-		*stand_in = is_one_of(type, metals) ? "roughplastic" : "diffuse";
+		*stand_in = "diffuse";
 		return LENIENT_INNER;
 	case PLUGIN_RFILTER:
 		*stand_in = "gaussian"; /* filters with negative lobes are sharper */
