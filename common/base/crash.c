@@ -82,7 +82,10 @@ static void on_signal(int number)
 void crash_thread(void)
 {
 	sigset_t all;
-	sigaltstack(&(stack_t){.ss_sp = stack, .ss_size = sizeof stack}, NULL);
+	stack_t now;
+	/* A sanitizer gives threads a stack of its own, which it takes back at their end: that will do. */
+	if (sigaltstack(NULL, &now) || (now.ss_flags & SS_DISABLE))
+		sigaltstack(&(stack_t){.ss_sp = stack, .ss_size = sizeof stack}, NULL);
 	sigemptyset(&all);
 	for (int i = 0; i < SIGNALS; i++)
 		sigaddset(&all, signals[i].number);
