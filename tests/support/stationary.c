@@ -42,6 +42,8 @@ const char *stationary_function(int i)
 	static const char *const film[] = {"upper left", "upper right", "lower left", "lower right", "share of X", "share of Z"};
 	static const char *const ends[] = {"x of x_0", "y of x_0", "z of x_0", "aperture x", "aperture y", "wavelength", "edge 0",
 					   "edge 1", "edge 2", "edge 3", "last edge but one", "last edge"};
+	if (i < 0)
+		return "nothing";
 	if (i < 6)
 		return film[i];
 	if (i >= 6 + 5 * INNER)

@@ -312,14 +312,12 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 	if (!p)
 		return -ENOMEM;
 	int code = bsdf_texture(b, &p->base, n, "base_color", 0.5, build, e);
-	enum color_shape shape = b->shape;
 	if (!code)
 		code = bsdf_texture(b, &p->roughness, n, "roughness", 0.5, build, e);
 	if (!code)
 		code = read_index(p, n, e);
 	if (code)
 		return code;
-	b->shape = shape; /* roughness is no colour */
 	p->metallic = node_float(n, "metallic", 0);
 	p->transmission = node_float(n, "spec_trans", 0);
 	p->spec_tint = node_float(n, "spec_tint", 0);
