@@ -64,6 +64,8 @@ static int place_vertices(struct mesh *m, const struct mesh_finish *f, const str
 		if (!in_range(p))
 			return node_error(n, e, ERANGE, "a vertex lies beyond %g", MESH_COORDINATE_MAX);
 		mesh_store(m->position[i], p);
+		if (m->uv && !(fabs(m->uv[i][0]) <= MESH_UV_MAX && fabs(m->uv[i][1]) <= MESH_UV_MAX))
+			return node_error(n, e, ERANGE, "a texture coordinate lies beyond %g", MESH_UV_MAX);
 		if (!m->normal)
 			continue;
 		/* Normals come as unit vectors or as nothing; scaling first keeps tiny and huge transforms in range. */

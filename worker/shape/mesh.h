@@ -9,6 +9,7 @@
 
 enum { MESH_TRIANGLES_MAX = 1 << 27 };
 #define MESH_COORDINATE_MAX PARAM_LENGTH_MAX
+#define MESH_UV_MAX 1e12 /* a double has a ten-thousandth of a texture's width there, and tangents are no shorter than 1e-12 of an edge */
 
 static inline vec3 mesh_load(const double v[3])
 {
