@@ -134,7 +134,8 @@ test-mutants:
 	CC="$(CC)" sh tests/mutants/run.sh
 
 # What is hard on the numbers, one row a case; the same programs are part of the tests.
-NUMERICS_BIN := $(filter $(BUILD)/tests/worker/halfvec/% $(BUILD)/tests/numerics/%,$(TEST_BIN))
+NUMERICS_BIN := $(filter $(BUILD)/tests/worker/halfvec/% $(BUILD)/tests/numerics/% $(BUILD)/tests/worker/render/test_%_numbers \
+	$(BUILD)/tests/worker/render/test_number_%,$(TEST_BIN))
 .PHONY: test-numerics
 test-numerics: programs $(NUMERICS_BIN)
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/numerics/run.sh $(BUILD)

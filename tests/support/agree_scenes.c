@@ -1,6 +1,10 @@
 #include "tests/support/agree_scenes.h"
 
+#include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
+
+#include <stdio.h>
+#include <string.h>
 
 #define AT(inner) "<transform name='to_world'>" inner "</transform>"
 #define GREY(value) "<bsdf type='diffuse'><rgb name='reflectance' value='" value "'/></bsdf>"
@@ -126,6 +130,56 @@ static struct world *lamp_pasted(const struct agree_case *k)
 			     "<shape type='cube'>" AT("<scale value='0.3'/><translate y='0.3'/>" TURN) GREY("0.5") "</shape>");
 }
 
+/* The pole of a displaced ball, where the meridians of its texture meet: steps as high as a, near and from above; of metal
+ * (b = 0) or glass. */
+static struct world *displaced_pole(const struct agree_case *k)
+{
+	static const char *const matter[] = {"<bsdf type='roughconductor'><string name='material' value='Au'/><float name='alpha' value='0.2'/></bsdf>",
+					     "<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>"};
+	return world_of_text(32, 32,
+			     "<sensor type='perspective'><float name='fov' value='12'/>" AT("<lookat origin='0.3,1.2,2.5' target='0,0,0.75' up='0,1,0'/>" TURN) FILM
+			     "</sensor><emitter type='constant'><rgb name='radiance' value='0.3'/></emitter>"
+			     "<shape type='sphere'>" AT("<scale value='0.8'/>" TURN) "<texture name='displacement' type='checkerboard'><float name='color0' value='0'/>"
+			     "<float name='color1' value='1'/><transform name='to_uv'><scale x='12' y='12'/></transform></texture>"
+			     "<float name='displacement_scale' value='%.17g'/><integer name='displacement_level' value='6'/>%s</shape>"
+			     "<shape type='rectangle'>" AT("<scale value='3'/><translate z='-1.5'/>" TURN) GREY("0.5") "</shape>"
+			     "<shape type='rectangle'>" AT("<scale value='0.7'/><rotate x='1' angle='90'/><translate y='2.4' z='1'/>" TURN)
+			     "<emitter type='area'><rgb name='radiance' value='4'/></emitter></shape>",
+			     k->a, matter[(int)k->b]);
+}
+
+/* A lamp lies on a block of glass, which it touches in a point; another stands on it with its edge. */
+static struct world *lamp_on_glass(const struct agree_case *k)
+{
+	(void)k;
+	return world_of_text(32, 32, LOOK_AT_IT GROUND SKY
+			     "<shape type='cube'>" AT("<scale value='0.5'/><translate y='0.7'/>" TURN) GLASS("1.5") "</shape>"
+			     "<shape type='sphere'>" AT("<scale value='0.2'/><translate x='-0.2' y='1.4'/>" TURN)
+			     "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>"
+			     "<shape type='rectangle'>" AT("<scale value='0.2'/><rotate y='1' angle='-60'/><translate x='0.25' y='1.4'/>" TURN)
+			     "<emitter type='area'><rgb name='radiance' value='3'/></emitter></shape>");
+}
+
+/* A sky of 16 x 8 texels of about 1, one of which is 1.3e8. */
+static struct world *bright_texel(const struct agree_case *k)
+{
+	enum { WIDTH = 16, HEIGHT = 8 };
+	static const char head[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 8 +X 16\n";
+	static char xml[1 << 12];
+	unsigned char hdr[sizeof head - 1 + 4 * WIDTH * HEIGHT];
+	(void)k;
+	memcpy(hdr, head, sizeof head - 1);
+	for (size_t i = 0; i < WIDTH * HEIGHT; i++)
+		memcpy(hdr + sizeof head - 1 + 4 * i, (unsigned char[]){0x80, 0x80, 0x80, i == 2 * WIDTH + 5 ? 0x9c : 0x81}, 4);
+	int n = snprintf(xml, sizeof xml,
+			 "<scene version='3.0.0'>" LOOK_AT_IT GROUND "<emitter type='envmap'><string name='filename' value='sky.hdr'/></emitter>"
+			 "<shape type='sphere'>" AT("<scale value='0.5'/><translate x='-0.6' y='0.6'/>" TURN)
+			 "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf></shape>"
+			 "<shape type='cube'>" AT("<scale value='0.4'/><translate x='0.6' y='0.4'/>" TURN) GREY("0.5") "</shape></scene>");
+	const struct memory_file files[] = {{"test.xml", xml, (size_t)n}, {"sky.hdr", hdr, sizeof hdr}, {NULL, NULL, 0}};
+	return world_of_files(32, 32, files);
+}
+
 const struct agree_case agree_cases[] = {
 	{"mixed scales", "1 on a floor of 10", on_a_floor, 1, 10, 5, 1024, 512, ALL, 0.05},
 	{"mixed scales", "1 on a floor of 1e6", on_a_floor, 1, 1e6, 5, 1024, 512, ALL, 0.05},
@@ -133,12 +187,24 @@ const struct agree_case agree_cases[] = {
 	{"mixed scales", "1 beside the middle of 1e6", beside_a_floor, 1, 1e6, 5, 1024, 512, ALL, 0.05},
 	{"mixed scales", "1 on a ball of 1e6", on_a_ball, 1, 1e6, 5, 1024, 512, ALL, 0.05},
 	{"mixed scales", "1e-6 on 1 on 1e6", on_a_table, 1e-6, 1e6, 5, 1024, 512, ALL, 0.05},
-	{"mirror box", "0.95 to depth 64", mirror_box, 0.95, 0, 64, 256, 128, {"bdpt", "hslt"}, 0.15},
-	{"fibre", "100 times as long as wide", fibre, 0.02, 0, 128, 1024, 256, {"bdpt", "hslt"}, 0.6},
+	{"mirror box", "0.95 to depth 64", mirror_box, 0.95, 0, 64, 256, 128, {"bdpt"}, 0.03},
+	{"mirror box", "0.95 to depth 64", mirror_box, 0.95, 0, 64, 256, 128, {"hslt"}, 0.15},
+	{"fibre", "100 times as long as wide", fibre, 0.02, 0, 128, 1024, 256, {"bdpt"}, 0.12},
+	{"fibre", "100 times as long as wide", fibre, 0.02, 0, 128, 1024, 256, {"hslt"}, 0.6},
 	{"coinciding surfaces", "lamps in the planes of glass", lamp_in_glass, 0.7, 0, 6, 256, 256, ALL, 0.03},
 	{"coinciding surfaces", "lamps wider than the glass", lamp_in_glass, 1.3, 0, 6, 256, 1024, ALL, 0.04},
 	{"coinciding surfaces", "glass beside water on a ground", glass_and_water, 0, 0, 8, 256, 256, ALL, 0.03},
 	{"coinciding surfaces", "balls of glass, water and air", balls_in_balls, 0, 0, 8, 256, 256, ALL, 0.03},
 	{"coinciding surfaces", "a lamp three times", lamp_pasted, 0, 0, 5, 256, 768, ALL, 0.04},
+	{"emitter touches glass", "in a point and in an edge", lamp_on_glass, 0, 0, 6, 256, 256, {"bdpt", "pssmlt"}, 0.04},
+	{"emitter touches glass", "in a point and in an edge", lamp_on_glass, 0, 0, 6, 256, 256, {"hslt"}, 0.08},
+	{"bright texel", "1.3e8 in a sky of 1", bright_texel, 0, 0, 5, 256, 256, {"bdpt", "pssmlt"}, 0.04},
+	{"bright texel", "1.3e8 in a sky of 1", bright_texel, 0, 0, 5, 256, 256, {"hslt"}, 0.08},
+	{"displaced pole", "rough metal, steps of 0.02", displaced_pole, 0.02, 0, 6, 256, 256, ALL, 0.04},
+	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 256, 256, {"bdpt", "pssmlt"}, 0.04},
+	{"displaced pole", "rough metal, steps of 0.2", displaced_pole, 0.2, 0, 6, 256, 256, {"hslt"}, 0.15},
+	{"displaced pole", "rough glass, steps of 0.2", displaced_pole, 0.2, 1, 8, 256, 256, {"bdpt"}, 0.05},
+	{"displaced pole", "rough glass, steps of 0.2", displaced_pole, 0.2, 1, 8, 256, 256, {"pssmlt"}, 0.1},
+	{"mixed scales", "1 on a floor of 1e12", on_a_floor, 1, 1e12, 5, 1024, 512, {"bdpt"}, 0.02},
 	{NULL, NULL, NULL, 0, 0, 0, 0, 0, {NULL}, 0},
 };

@@ -65,6 +65,7 @@ struct render_summary {
 	uint64_t shapes, triangles;
 	double brightest; /* see world_brightest */
 	struct render_coincident coincident;
+	char scales[256]; /* a shape that is too small beside another, by name; "": none is */
 };
 
 /* Reads every mesh, texture and material and says what the scene calls for; all but Embree's own building. What passes
@@ -91,7 +92,8 @@ int render_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct er
 /* "the image is of another scene: without dispersion" where an effect that the scene calls for was switched off; else "". */
 void render_effects_note(const struct render_summary *scene, char *text, size_t size);
 
-/* The i-th of the sentences about the scene as a whole: the note on effects, surfaces that coincide; false: there are no more. */
+/* The i-th of the sentences about the scene as a whole: the note on effects, scales, surfaces that coincide;
+ * false: there are no more. */
 bool render_scene_note(const struct render_summary *scene, size_t i, char *text, size_t size);
 
 /* false also where there is no effect of that name. */

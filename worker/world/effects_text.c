@@ -134,6 +134,10 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 	render_effects_note(scene, text, size);
 	if (*text && i-- == 0)
 		return true;
+	if (*scene->scales && i-- == 0) {
+		snprintf(text, size, "%s", scene->scales);
+		return true;
+	}
 	if (i < c->count) {
 		snprintf(text, size, "%s", c->text[i]);
 		return true;

@@ -35,6 +35,7 @@ struct world {
 	double grey_xyz[3];                /* CIE XYZ of grey value 1 */
 	struct coincidence *coincidence; /* of surfaces; NULL: none */
 	struct render_coincident coincident; /* what there is to say of it */
+	char scales[256];                    /* of shapes that are too small beside others; "": nothing */
 	struct accel *accel;
 };
 

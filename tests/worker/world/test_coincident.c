@@ -1,4 +1,5 @@
-/* What is said of shapes that coincide: which of two is there and why, by name; nothing where nobody can see it. */
+/* What is said of shapes that coincide: which of two is there and why, by name; nothing where nobody can see it. And of shapes that
+ * are too small beside others. */
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -57,6 +58,24 @@ static void test_notes(void **state)
 	       NULL, true);
 }
 
+/* From where on doubles do not hold both. */
+static void test_scales(void **state)
+{
+	(void)state;
+	for (int far = 0; far < 2; far++) {
+		struct world *w = world_of_text(8, 8, VIEW CUBE("block", "0", "0.6", GREY) "<shape type='rectangle'>"
+						AT("<rotate x='1' angle='-90'/><scale value='%s'/>") "</shape>", far ? "1e13" : "1e12");
+		struct render_summary s;
+		char note[512];
+		world_summary(w, &s);
+		assert_int_equal(render_scene_note(&s, 0, note, sizeof note), far);
+		if (far)
+			assert_string_equal(note, "the cube in line 2 is so much smaller than the scene, with the rectangle in line 3, that numbers are "
+						  "too short for both: what is seen of it can be wrong");
+		world_free(w);
+	}
+}
+
 /* Of many not more is said than a few, and how many more there are. */
 static void test_many(void **state)
 {
@@ -86,6 +105,6 @@ static void test_many(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_notes), cmocka_unit_test(test_many)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_notes), cmocka_unit_test(test_scales), cmocka_unit_test(test_many)};
 	return cmocka_run_group_tests_name("what is said of coinciding surfaces", tests, NULL, NULL);
 }
