@@ -5,6 +5,7 @@
 #include "coordinator/shell/late.h"
 #include "coordinator/shell/reconcile.h"
 
+#include <errno.h>
 #include <string.h>
 
 static const double every_seconds = 1;
@@ -56,13 +57,24 @@ static void go_on(struct server *s, struct order *o)
 	durable_hold(s, o, "its results cannot be stored", "its folder was removed, and is made anew");
 }
 
+/* A journal that is bad already has no file to look for: then the folder itself, which may go while it is being made anew. */
+static bool is_gone(const struct server *s, const struct order *o)
+{
+	char folder[SPOOL_PATH_MAX];
+	struct stat st;
+	if (!journal_is_bad(o->journal))
+		return journal_is_gone(o->journal);
+	spool_job_path(s->spool, o->id, NULL, folder);
+	return disk_stat(folder, &st) && (errno == ENOENT || errno == ENOTDIR);
+}
+
 void folder_tick(struct server *s)
 {
 	if (server_now(s) < s->folders_next)
 		return;
 	s->folders_next = server_now(s) + every_seconds;
 	for (struct order *o = s->orders; o; o = o->next)
-		if (!o->busy && o->journal && !journal_is_bad(o->journal) && journal_is_gone(o->journal)) {
+		if (!o->busy && o->journal && is_gone(s, o)) {
 			go_on(s, o);
 			return; /* the list may have changed; the others next time */
 		}

@@ -142,6 +142,50 @@ row_is_lost() {
 	again --accept-loss
 }
 
+fault folder_gone 6 2 "a job's folder is removed, moved away, or removed twice, while the job runs"
+folder_gone() {
+	farm # from the first life's journal a new one is made, in the second one there are checkpoints
+	worker w0
+	worker w1
+	job
+	i=0
+	while [ $i -lt "$TIMES" ]; do # in the first half of the job: the folder of one that is over would be gone, image and all
+		i=$((i + 1))
+		until_true 60 is_merged $((RESULTS * i / (2 * TIMES))) || fail "$NAME: $(merged) of $RESULTS results at time $i"
+		folder_goes
+	done
+	finish_job
+	blameless
+}
+# The job is held meanwhile, lest it end before it is noticed.
+folder_goes() {
+	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	seen=$(times_noticed)
+	case $((i % 3)) in
+	1) mv "$DIR/spool/jobs/$ID" "$DIR/moved.$i" ;;
+	2) remove_folder && until_true 30 is_noticed && seen=$(times_noticed) && remove_folder ;;
+	0) remove_folder ;;
+	esac
+	until_true 30 is_noticed || fail "$NAME: it does not notice"
+	until_true 30 is_mended || fail "$NAME: it is not mended: $(tail -n 3 "$DIR/coordinator.log")"
+	[ "$i" -ne 2 ] || { kill -9 "$COORDINATOR_PID" && again --journal 0.2; } # all is in the new folder
+	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+}
+# The coordinator may put a file into the folder while rm walks through it.
+remove_folder() {
+	rm -r "$DIR/spool/jobs/$ID" 2>/dev/null || rm -rf "$DIR/spool/jobs/$ID" 2>/dev/null || :
+}
+times_noticed() {
+	grep -c 'was removed or moved away while the job runs: made anew' "$DIR/coordinator.log" || :
+}
+is_noticed() {
+	[ "$(times_noticed)" -gt "$seen" ]
+}
+# its results can be stored again since it was made anew
+is_mended() {
+	grep 'made anew\|state=released text=""' "$DIR/coordinator.log" | tail -n 1 | grep -q state=released
+}
+
 fault file_damaged 4 1 "a file of the scene is damaged in the spool, and in a worker's cache: the job waits, says so, and the scene is sent again"
 file_damaged() {
 	farm
