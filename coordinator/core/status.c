@@ -103,11 +103,34 @@ static void why_held(const struct job *j, char *text, size_t size)
 		}
 }
 
+/* All leases that are out are late, and nobody has brought a result: who holds the oldest one. false: somebody works on it. */
+static bool put_late(const struct farm *f, const struct job *j, char *text, size_t size)
+{
+	const struct lease *oldest = NULL;
+	uint32_t count = 0;
+	for (uint32_t i = 0; i < j->slot_count; i++) {
+		const struct slot *s = &j->slots[i];
+		for (const struct lease *l = s->leases; l; l = l->next) {
+			if (l->overdue)
+				continue;
+			if (l->delivered || job_straggles_at(&f->config, j, s) > f->now)
+				return false;
+			count++;
+			if (!oldest || l->sent < oldest->sent)
+				oldest = l;
+		}
+	}
+	if (oldest)
+		text_print(text, size, "no answer to its leases (%u are out): %s has had the oldest one for %.0f s", count, oldest->peer->name,
+			   f->now - oldest->sent);
+	return oldest != NULL;
+}
+
 /* The job that it waits for; NULL: it does not, or for something else. */
 static const struct job *why_waiting(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	text[0] = 0;
-	if (!job_is_live(j) || (j->leases_out && !job_is_held(j)))
+	if (!job_is_live(j) || (j->leases_out && !job_is_held(j) && !put_late(f, j, text, size)) || *text)
 		return NULL;
 	uint32_t active = active_workers(f);
 	const struct job *other = busy_with(f, j);

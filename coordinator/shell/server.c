@@ -181,6 +181,8 @@ static void view_order(struct server *s, const struct order *o, struct job_view 
 		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
 		if (*o->record.why)
 			text_print(v->waiting, sizeof v->waiting, "its %s cannot be written: %s", o->unrecorded ? "record" : "image", o->record.why);
+		else
+			text_copy(v->waiting, sizeof v->waiting, "its image is being written");
 		memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);
 		v->record.reason[0] = 0;
 		v->record.exit_code = 0;

@@ -388,11 +388,26 @@ struct farm *transcript_farm(void)
 	return f;
 }
 
+/* A living job for which nobody works, or that is held, says what it waits for; also to its owner. */
+static bool says_why(const struct farm *f, const char *line)
+{
+	enum { JOBS = 64 };
+	bool all = true;
+	for (uint64_t id = 1; id <= JOBS; id++) {
+		struct job_status s;
+		if (!farm_job(f, id, 0, &s) || job_state_is_end(s.state) || (s.leases_out && s.state != JOB_HELD) || (*s.waiting && *s.owners_waiting))
+			continue;
+		print_error("\"%s\": j%llu waits and does not say for what\n", line, (unsigned long long)id);
+		all = false;
+	}
+	return all;
+}
+
 void transcript_play(struct farm *f, const char *const *lines)
 {
 	int wrong = 0;
 	for (; *lines; lines++)
-		wrong += !play_line(f, *lines);
+		wrong += !play_line(f, *lines) + !says_why(f, *lines);
 	assert_int_equal(wrong, 0);
 }
 

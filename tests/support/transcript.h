@@ -13,7 +13,8 @@
  *   cancel J | prepared J [black | bad TEXT] | error J R E | broken J TEXT | tick
  * "[60] unread=40 ...": with any of them: what came in the last so many seconds may not have been read.
  * "[0] wake -> T": when the core wants to be called again, as it said last.
- * "-> -" is silence. A line that does not fit is printed beside what was said, and the test fails at the end.
+ * "-> -" is silence. A line that does not fit is printed beside what was said, and the test fails at the end; so it does when, after
+ * a line, a job waits and does not say for what.
  */
 #ifndef TESTS_SUPPORT_TRANSCRIPT_H
 #define TESTS_SUPPORT_TRANSCRIPT_H

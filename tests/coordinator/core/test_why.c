@@ -1,0 +1,69 @@
+/* Why a job waits is said in each state in which one can wait, and not while somebody works on it. */
+#include "tests/support/transcript.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { LINES = 24 };
+
+static const struct {
+	const char *lines[LINES]; /* that lead there */
+	const char *why;          /* of job 1 then; "": it does not wait */
+} states[] = {
+	{{"[0] submit -> j1 submitted, j1 is queued"}, "no worker"},
+	{{"[0] submit -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -"}, "no worker asks for work"},
+	{{"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> -", "[0] submit groups=2 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot"}, ""},
+	{{"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> -", "[0] submit groups=2 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot",
+	  "[1] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot", "[1] w1 leaves -> -", "[2] w2 joins B threads=1 -> -", "[2] w2 wants 1 -> -"},
+	 "no worker with fingerprint A (1 with others)"},
+	{{"[0] submit -> j1 submitted, j1 is queued", "[0] hold order j1 held by ann -> -"}, "held by ann"},
+	{{"[0] submit -> j1 submitted, j1 is queued", "[0] hold j1 no room -> -"}, "no room"},
+	{{"[0] submit groups=1 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+	  "[1] w1 batch j1 g0 p0 boot -> merge, merged, j1 prepare"}, "the bootstrap is being evaluated"},
+	/* all leases are with one who gives nothing: not at once, but before others get copies */
+	{{"[0] submit groups=2 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=64 -> -", "[0] w1 wants 65 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+	  "[20] w1 heard -> -"}, ""},
+	{{"[0] submit groups=2 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=64 -> -", "[0] w1 wants 65 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+	  "[20] w1 heard -> -", "[40] w1 heard -> -"}, "no answer to its leases (2 are out): w1 has had the oldest one for 40 s"},
+	{{"[0] submit groups=3 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=64 -> -",
+	  "[0] w1 wants 65 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot",
+	  "[10] w1 batch j1 g0 p0 boot -> merge, merged", "[14] w1 heard -> -"}, ""},
+	{{"[0] submit groups=3 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=64 -> -",
+	  "[0] w1 wants 65 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot",
+	  "[10] w1 batch j1 g0 p0 boot -> merge, merged", "[16] w1 heard -> -"}, "no answer to its leases (2 are out): w1 has had the oldest one for 16 s"},
+	{{"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> -", "[0] submit groups=1 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot",
+	  "[1] w1 fails j1 g0 p0 boot sorry -> -"}, "no worker can compute it: w1: sorry"},
+	{{"[0] submit -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -", "[30] tick -> -"}, "no worker that answers and is trusted (1 are known)"},
+	{{"[0] submit groups=2 verify=1 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 name=a -> -", "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+	  "[1] w1 batch j1 g0 p0 boot says x -> noted, w1 gets j1 g1 p0 boot", "[1] w1 batch j1 g1 p0 boot says x -> noted"},
+	 "verification waits for a second worker (2 leases have one answer)"},
+	{{"[0] submit groups=1 priority=-1 -> j1 submitted, j1 is queued", "[0] submit groups=1 priority=5 -> j2 submitted, j2 is queued", "[0] w1 joins A threads=1 -> -",
+	  "[0] w1 wants 1 -> j2 is bootstrap, w1 gets j2 g0 p0 boot"}, "waits for j2 of higher priority (5)"},
+	{{"[0] submit groups=1 -> j1 submitted, j1 is queued", "[0] submit groups=1 priority=5 -> j2 submitted, j2 is queued", "[0] w1 joins A threads=1 -> -",
+	  "[0] w1 wants 1 -> j2 is bootstrap, w1 gets j2 g0 p0 boot", "[0] priority j2 -1 -> -"}, "workers busy with j2 (priority -1)"},
+};
+
+static void every_state(void **state)
+{
+	(void)state;
+	for (size_t i = 0; i < sizeof states / sizeof *states; i++) {
+		struct job_status s;
+		struct farm *f = transcript_farm();
+		transcript_play(f, states[i].lines);
+		assert_true(farm_job(f, 1, 100, &s));
+		if (strcmp(s.waiting, states[i].why) != 0)
+			fail_msg("state %zu: '%s', not '%s'", i, s.waiting, states[i].why);
+		assert_true(!*s.waiting == !*s.owners_waiting);
+		farm_free(f);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(every_state)};
+	return cmocka_run_group_tests_name("coordinator/core/test_why", tests, NULL, NULL);
+}
