@@ -324,29 +324,64 @@ static double critical_t(void)
 	return high;
 }
 
+/* What function i says of the ratio's relative fault, and its standard error; false: nothing. */
+static bool fault_of(const struct balance_trial *t, int i, double *fault, double *error)
+{
+	double column[BALANCE_GROUPS], size = 0;
+	for (int g = 0; g < BALANCE_GROUPS; g++) {
+		column[g] = t->sum[g][i];
+		size += t->size[g][i] / BALANCE_GROUPS;
+	}
+	struct stats_mean s = stats_mean_test(column, BALANCE_GROUPS, 0);
+	if (!(s.error > 0) || !(size > 0))
+		return false;
+	/* A ratio that is wrong by 1 + d one way shifts a phi by d / 2 of |a phi|. */
+	*fault = 2 * s.mean / size;
+	*error = 2 * s.error / size;
+	return true;
+}
+
+static void judge(struct balance_verdict *v, int i, double fault, double error)
+{
+	double p = stats_student_t_p(fault / error, BALANCE_GROUPS - 1);
+	v->power = fmin(v->power, (critical_t() + 1.645) * error);
+	if (p < v->p) {
+		v->t = fault / error;
+		v->p = p;
+		v->fault = fault;
+		v->function = functions[i];
+	}
+	v->balanced = !(v->p < LEVEL);
+}
+
+static const struct balance_verdict nothing_known = {.p = 1, .power = INFINITY, .function = "", .balanced = true};
+
 struct balance_verdict balance_judge(const struct balance_trial *t)
 {
-	struct balance_verdict v = {.p = 1, .power = INFINITY, .function = "", .balanced = true};
-	double critical = critical_t();
-	for (int i = 0; i < BALANCE_FUNCTIONS; i++) {
-		double column[BALANCE_GROUPS], size = 0;
-		for (int g = 0; g < BALANCE_GROUPS; g++) {
-			column[g] = t->sum[g][i];
-			size += t->size[g][i] / BALANCE_GROUPS;
+	struct balance_verdict v = nothing_known;
+	double fault, error;
+	for (int i = 0; i < BALANCE_FUNCTIONS; i++)
+		if (fault_of(t, i, &fault, &error))
+			judge(&v, i, fault, error);
+	return v;
+}
+
+void balance_pool_add(struct balance_pool *p, const struct balance_trial *t)
+{
+	double fault, error;
+	for (int i = 0; i < BALANCE_FUNCTIONS; i++)
+		if (fault_of(t, i, &fault, &error)) {
+			p->certainty[i] += 1 / (error * error);
+			p->weighted[i] += fault / (error * error);
 		}
-		struct stats_mean s = stats_mean_test(column, BALANCE_GROUPS, 0);
-		if (!(s.error > 0) || !(size > 0))
-			continue;
-		/* A ratio that is wrong by 1 + d one way shifts a phi by d / 2 of |a phi|. */
-		v.power = fmin(v.power, 2 * (critical + 1.645) * s.error / size);
-		if (s.p < v.p) {
-			v.t = s.mean / s.error;
-			v.p = s.p;
-			v.fault = 2 * s.mean / size;
-			v.function = functions[i];
-		}
-	}
-	v.balanced = !(v.p < LEVEL);
+}
+
+struct balance_verdict balance_pool_judge(const struct balance_pool *p)
+{
+	struct balance_verdict v = nothing_known;
+	for (int i = 0; i < BALANCE_FUNCTIONS; i++)
+		if (p->certainty[i] > 0)
+			judge(&v, i, p->weighted[i] / p->certainty[i], 1 / sqrt(p->certainty[i]));
 	return v;
 }
 

@@ -40,6 +40,14 @@ struct balance_verdict {
 void balance_run(const struct world *w, const char *test, struct balance_trial *trials, size_t count, size_t starts, size_t pairs);
 struct balance_verdict balance_judge(const struct balance_trial *t);
 void balance_name(const struct balance_trial *t, char text[48]);
+/* The same strategy in several worlds: a relative fault that all of them share is found by all of them together, each weighted by how
+ * well it tells. Begins as zeros. */
+struct balance_pool {
+	double certainty[BALANCE_FUNCTIONS], weighted[BALANCE_FUNCTIONS]; /* sums of 1 / error^2, and of the faults times that */
+};
+void balance_pool_add(struct balance_pool *p, const struct balance_trial *t);
+struct balance_verdict balance_pool_judge(const struct balance_pool *p);
+
 /* A line of a table: pairs, accepted, the worst t and the power. */
 void balance_print(const char *test, const struct balance_trial *t, const struct balance_verdict *v);
 

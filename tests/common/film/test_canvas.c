@@ -259,14 +259,15 @@ static void chains_are_scaled_by_b(void **unused)
 	struct canvas_image img;
 	assert_int_equal(canvas_new(&c, &p, canvas_grid_exponent(&p, 1, 1), NULL, NULL), 0);
 	for (uint32_t g = 0; g < 2; g++) {
-		struct batch boot = {.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .independent_sum = g ? 24 : 8, .beyond_sum = 8};
+		struct batch boot = {.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .independent_sum = g ? 24 : 16, .beyond_sum = 8};
 		boot.counters[COUNT_INDEPENDENT] = 8;
 		boot.counters[COUNT_SAMPLES] = 8;
 		assert_int_equal(canvas_add(c, &boot, NULL), 0);
 		assert_int_equal(canvas_add(c, &boot, NULL), -EEXIST);
 		struct batch b = make_batch(&p, 0, g, 0, 1, one);
 		b.counters[COUNT_INDEPENDENT] = 8;
-		b.independent_sum = g ? 40 : 8;
+		b.independent_sum = g ? 40 : 0; /* no light: its samples count all the same */
+		b.counters[COUNT_LONGEST_STUCK] = g ? 5 : 7;
 		assert_int_equal(canvas_add(c, &b, NULL), 0);
 		batch_fini(&b);
 	}
@@ -279,7 +280,8 @@ static void chains_are_scaled_by_b(void **unused)
 	/* b: group 0 16/16, group 1 64/16, pooled 80/32; standard error |4 - 1| / 2. 8 mutations a group. */
 	assert_true(img.b == 2.5 && fabs(img.b_error - 1.5) < 1e-12);
 	assert_int_equal(img.samples, 16);
-	assert_true(fabs(img.beyond_share - 16.0 / 48) < 1e-12);
+	assert_int_equal(img.counts.counters[COUNT_LONGEST_STUCK], 7);
+	assert_true(fabs(img.beyond_share - 16.0 / 56) < 1e-12);
 	double y = 0.2126729 * (double)img.rgb[0] + 0.7151522 * (double)img.rgb[1] + 0.0721750 * (double)img.rgb[2];
 	assert_true(fabs(y - 2.5 * 2 / 16) < 1e-6);
 	/* Group images are 1/8 and 4/8 in each of X, Y, Z: error 3/16 of the white of XYZ (1,1,1). */
@@ -392,6 +394,28 @@ static float some(void)
 	return (float)uniform();
 }
 
+/* Beside a value that fills a double's mantissa, too: to the nearest, not towards zero. */
+static void values_are_rounded_to_the_grid(void **unused)
+{
+	(void)unused;
+	for (int large = 0; large < 2; large++) {
+		struct plan p = make_plan(PLAN_SAMPLES, 2, 1, 1, 1);
+		struct canvas *c;
+		double block[3];
+		assert_int_equal(canvas_new(&c, &p, 0, NULL, NULL), 0);
+		struct batch b = make_batch(&p, 0, 0, 0, 1, one);
+		b.tiles[0].xyz[0] = large ? 0x1p52f : 1;
+		b.tiles[0].xyz[3] = 0.75f;
+		b.tiles[0].xyz[4] = -1.75f;
+		b.tiles[0].xyz[5] = 2.5f;
+		assert_int_equal(canvas_add(c, &b, NULL), 0);
+		batch_fini(&b);
+		canvas_group_blocks(c, 2, 1, block);
+		assert_true(block[1] == (1.0 - 2 + 2) / (double)p.epoch);
+		canvas_free(c);
+	}
+}
+
 /* The mean over groups of the blocks is the image's, where the groups have as many samples; each group's b stands for its share. */
 static void blocks_of_groups_make_the_image(void **unused)
 {
@@ -462,7 +486,13 @@ static void distances_of_groups_are_the_errors(void **unused)
 		for (uint32_t g = 0; g < GROUPS; g++) {
 			struct batch b = make_batch(&p, 0, g, 0, 4, nearly_one);
 			b.independent_sum = (1 + 0.01 * g) * (double)p.epoch;
-			double scale = kind == PLAN_CHAINS ? (1 + 0.01 * g) / (double)b.counters[COUNT_SAMPLES] : 1 / (double)p.epoch;
+			double scale = 1 / (double)p.epoch;
+			if (kind == PLAN_CHAINS) {
+				struct batch boot = {.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .independent_sum = 8 * (1 - 0.02 * g)};
+				boot.counters[COUNT_INDEPENDENT] = boot.counters[COUNT_SAMPLES] = 8;
+				assert_int_equal(canvas_add(c, &boot, NULL), 0);
+				scale = (b.independent_sum + boot.independent_sum) / (double)(8 + p.epoch) / (double)b.counters[COUNT_SAMPLES];
+			}
 			for (size_t t = 0; t < 4; t++)
 				for (size_t i = 0; i < (size_t)b.tiles[t].width * b.tiles[t].height * 9; i++) {
 					size_t pixel = i / 9, x = b.tiles[t].x - 3 + pixel % b.tiles[t].width, y = b.tiles[t].y - 2 + pixel / b.tiles[t].width;
@@ -564,6 +594,7 @@ int main(void)
 		cmocka_unit_test(grids_fit_their_values),
 		cmocka_unit_test(estimated_error_covers_the_truth),
 		cmocka_unit_test(black_canvas_has_no_error),
+		cmocka_unit_test(values_are_rounded_to_the_grid),
 		cmocka_unit_test(blocks_of_groups_make_the_image),
 		cmocka_unit_test(distances_of_groups_are_the_errors),
 		cmocka_unit_test(failing_allocations_leak_nothing),

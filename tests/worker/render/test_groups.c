@@ -215,6 +215,34 @@ static void chains_start_from_their_groups_bootstrap(void **state)
 	world_free(w);
 }
 
+/* What is looked at again is what had the weight. */
+static void chains_start_from_the_samples_that_were_chosen(void **state)
+{
+	(void)state;
+	struct world *w = lit_world();
+	for (size_t i = 0; render_integrator_at(i); i++) {
+		if (render_integrator_at(i)->kind != PLAN_CHAINS)
+			continue;
+		struct plan p = plan_of(w, render_integrator_at(i));
+		struct batch boot = run(w, &p, (struct lease_key){1, LEASE_BOOTSTRAP, 1, 0, 0}, NULL);
+		uint64_t first = plan_bootstrap_range(&p, 1, 0).begin, n = 0, looks = 0;
+		while (!(boot.weights[n] > 0))
+			n++;
+		batch_fini(&boot);
+		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
+		listen(true);
+		boot = run(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0}, &(struct lease_input){CHAINS / GROUPS / PARTS, seeds, NULL});
+		batch_fini(&boot);
+		for (size_t k = 0; k < noted.count; k++) {
+			looks += noted.all[k].stream == RNG_BOOTSTRAP;
+			assert_true(noted.all[k].stream != RNG_BOOTSTRAP || noted.all[k].index == first + n);
+		}
+		assert_true(looks > 0);
+		listen(false);
+	}
+	world_free(w);
+}
+
 /* Resampling's own random number differs, too, or all groups would take seeds at the same quantiles. */
 static void groups_resample_by_themselves(void **state)
 {
@@ -299,7 +327,7 @@ static void each_group_has_its_own_b(void **state)
 		assert_true(r.b[g] == (1 << g) / 16.0);
 		bootstrap_seeds(s, g, seeds);
 		for (size_t k = 0; k < CHAINS / GROUPS; k++)
-			assert_true(seeds[k] / (8 * PARTS) == g);
+			assert_true(seeds[k] == plan_bootstrap_range(&p, g, 0).begin + g); /* the only one with light */
 	}
 	assert_true(r.b_pooled == 15 / 64.0);
 	bootstrap_free(s);
@@ -309,7 +337,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(groups_share_no_random_number), cmocka_unit_test(chains_start_from_their_groups_bootstrap),
-		cmocka_unit_test(groups_resample_by_themselves), cmocka_unit_test(zeros_are_counted),
+		cmocka_unit_test(chains_start_from_the_samples_that_were_chosen), cmocka_unit_test(groups_resample_by_themselves), cmocka_unit_test(zeros_are_counted),
 		cmocka_unit_test(each_group_has_its_own_b),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
