@@ -11,12 +11,13 @@ list=${1:-tests/mutants/list.txt}
 list=$(cd "$(dirname "$list")" && pwd)/$(basename "$list")
 tree=build/mutants
 command -v ccache > /dev/null && CC="ccache ${CC:-gcc}"
-rm -rf "$tree" && mkdir -p "$tree" && git archive HEAD | tar x -C "$tree" && cd "$tree" || exit 1
+rm -rf "$tree" && mkdir -p "$tree" && git archive HEAD | tar x -C "$tree" && cp "$list" "$tree/list" && cd "$tree" || exit 1
+list=list
 # run TEST, or TEST@ROOM: with that room alone.
 run() {
 	case $1 in
-	*@*) ROOM=${1#*@} timeout 300 "build/tests/${1%@*}" > /dev/null 2>&1 ;;
-	*) timeout 300 "build/tests/$1" > /dev/null 2>&1 ;;
+	*@*) ROOM=${1#*@} timeout 300 "build/tests/${1%@*}" < /dev/null > /dev/null 2>&1 ;;
+	*) timeout 300 "build/tests/$1" < /dev/null > /dev/null 2>&1 ;;
 	esac
 }
 binaries() {
