@@ -109,11 +109,20 @@ static void refuses_what_is_not_finite(void **unused)
 	assert_memory_equal(&s, &empty, sizeof s);
 }
 
+/* A carry goes on through words that are full. */
+static void carries_go_all_the_way(void **unused)
+{
+	(void)unused;
+	struct exact_sum a = {{UINT64_MAX, UINT64_MAX, UINT64_MAX, 4}}, b = {{1, 0, 0, 0}};
+	exact_sum_merge(&a, &b);
+	assert_true(a.word[0] == 0 && a.word[1] == 0 && a.word[2] == 0 && a.word[3] == 5);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(sum_of_one_value_is_the_value),
-		cmocka_unit_test(large_values_cancel),
+		cmocka_unit_test(large_values_cancel), cmocka_unit_test(carries_go_all_the_way),
 		cmocka_unit_test(rounds_once_to_nearest_even),
 		cmocka_unit_test(small_sums_agree_with_long_integers),
 		cmocka_unit_test(order_and_grouping_do_not_matter),

@@ -283,6 +283,70 @@ static void a_bandwidth_makes_epochs_longer(void **state)
 	}
 }
 
+/* Systematic resampling, by hand: of 4 seeds over a total of 4 the marks stand at u, 1 + u, 2 + u, 3 + u. */
+static void seeds_stand_at_even_marks(void **state)
+{
+	(void)state;
+	struct plan p = {.groups = 2, .parts = 1, .bootstrap = 8};
+	static const float rare[4] = {0, 1, 0, 3}, even[4] = {1, 1, 1, 1};
+	static const struct {
+		const float *weight;
+		double u;
+		uint64_t index[4];
+	} cases[] = {{rare, 0.5, {5, 7, 7, 7}}, {rare, 0, {5, 7, 7, 7}}, {even, 0, {4, 5, 6, 7}}, {even, 0.9, {4, 5, 6, 7}}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		uint64_t index[4];
+		assert_true(plan_resample(&p, 1, cases[i].weight, 4, cases[i].u, 4, index));
+		assert_memory_equal(index, cases[i].index, sizeof index);
+	}
+	uint64_t two[2];
+	assert_true(plan_resample(&p, 0, even, 4, 0.6, 2, two)); /* 1.2 and 3.2 of 4 */
+	assert_true(two[0] == 1 && two[1] == 3);
+}
+
+static void the_least_bound_counts_in_whole_rounds(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_CHAINS, "");
+	struct plan p;
+	struct error e;
+	r.chains = 16;
+	r.epoch = 10;
+	r.spp = 0;
+	for (uint64_t n = 159; n <= 161; n++) {
+		r.mutations = n;
+		assert_int_equal(plan_make(&r, &p, &e), 0);
+		assert_int_equal(p.chains, 16);
+		assert_int_equal(p.rounds, n <= 160 ? 1 : 2);
+	}
+	r.spp = 1; /* 2048 of them: 13 rounds of 160 */
+	r.mutations = 1u << 20;
+	assert_int_equal(plan_make(&r, &p, &e), 0);
+	assert_int_equal(p.rounds, 13);
+	r.mutations = 1000;
+	assert_int_equal(plan_make(&r, &p, &e), 0);
+	assert_int_equal(p.rounds, 7);
+}
+
+static void limits_are_held(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_SAMPLES, "");
+	struct plan p, q;
+	struct error e;
+	r.border = 3;
+	assert_int_equal(plan_make(&r, &p, &e), 0);
+	assert_int_equal(plan_round_mutations(&p), p.groups * p.epoch * (64 + 6) * (32 + 6));
+	q = p;
+	q.bootstrap++;
+	assert_int_equal(plan_check(&q, &e), -EINVAL);
+	q = p;
+	q.min_depth = q.max_depth; /* paths of one length */
+	assert_int_equal(plan_check(&q, &e), 0);
+	q.min_depth++;
+	assert_int_equal(plan_check(&q, &e), -EINVAL);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -291,7 +355,8 @@ int main(void)
 		cmocka_unit_test(entries_are_counted_and_named),
 		cmocka_unit_test(rounds_without_a_bound_follow_the_film), cmocka_unit_test(parts_are_asked_for),
 		cmocka_unit_test(leases_take_twenty_seconds), cmocka_unit_test(short_jobs_ask_for_no_pilot),
-		cmocka_unit_test(a_bandwidth_makes_epochs_longer),
+		cmocka_unit_test(a_bandwidth_makes_epochs_longer), cmocka_unit_test(seeds_stand_at_even_marks),
+		cmocka_unit_test(the_least_bound_counts_in_whole_rounds), cmocka_unit_test(limits_are_held),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

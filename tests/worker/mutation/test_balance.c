@@ -19,7 +19,7 @@ enum { TRIALS = 64 };
 
 /* Proposals from a start. Strategies that choose for themselves get more than forced ones; those that the room has by default so many
  * that all rooms together find a fault of 2 %. */
-enum { REPEAT = 2, REPEAT_DEFAULT = 9, REPEAT_MORE = 14, REPEAT_RARE = 200 };
+enum { REPEAT = 2, REPEAT_DEFAULT = 9, REPEAT_MORE = 14, REPEAT_RARE = 25, STARTS_RARE = 5 };
 #define MUST_FIND 0.02
 
 /* Of the strategies that rooms have by default, over all rooms. */
@@ -42,8 +42,6 @@ static unsigned repeats(const struct world *w, const struct mutation_ops *ops)
 {
 	if (!is_default(w, ops))
 		return REPEAT;
-	if (strcmp(ops->name, "lens") == 0) /* one room has an aperture */
-		return REPEAT_RARE;
 	bool noisy = ops->independent || strcmp(ops->name, "light") == 0; /* fewer rooms have a lamp that can be moved on */
 	return noisy ? REPEAT_MORE : REPEAT_DEFAULT;
 }
@@ -60,6 +58,15 @@ static void check_alone(const struct world *w, const struct room *room, const st
 	}
 	balance_print(room->name, &t, &v);
 	assert_true(v.balanced && (v.power <= MUST_FIND || dice_count(48) < 48));
+}
+
+/* One room has an aperture: it must find alone what the others find together. */
+static void pool_rare(const struct world *w, const struct room *room, const struct mutation_ops *ops, struct balance_pool *p)
+{
+	static struct balance_trial t;
+	t = (struct balance_trial){.ops = ops, .how = {-1, -1}, .repeat = REPEAT_RARE};
+	balance_run(w, room->name, &t, 1, dice_count(48) * STARTS_RARE, 800 * STARTS_RARE);
+	balance_pool_add(p, &t);
 }
 
 static size_t all_trials(const struct world *w, struct balance_trial *t)
@@ -93,7 +100,10 @@ static void check_room(const struct room *room)
 	}
 	for (size_t i = 0; mutation_registry[i]; i++) {
 		if (is_default(w, mutation_registry[i])) {
-			balance_pool_add(&pool[i], &trials[i]);
+			if (strcmp(mutation_registry[i]->name, "lens") == 0)
+				pool_rare(w, room, mutation_registry[i], &pool[i]);
+			else
+				balance_pool_add(&pool[i], &trials[i]);
 			if (is_full())
 				check_alone(w, room, mutation_registry[i]);
 		}

@@ -228,6 +228,12 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 		uint64_t first = plan_bootstrap_range(&p, 1, 0).begin, n = 0, looks = 0;
 		while (!(boot.weights[n] > 0))
 			n++;
+		for (uint64_t k = 0; k < boot.weight_count; k++) /* no weight is negative, however small */
+			if (boot.weights[k] == 0) {
+				boot.weights[k] = -1e-30f;
+				assert_int_equal(batch_check(&boot, &p, NULL), -EBADMSG);
+				break;
+			}
 		batch_fini(&boot);
 		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
 		listen(true);
@@ -268,6 +274,8 @@ static void count(void *user, const struct batch *b)
 		c->bootstrap += b->counters[COUNT_INDEPENDENT];
 		return;
 	}
+	if (b->state_count) /* of two chains no run of rejections is half of all */
+		assert_true(2 * b->counters[COUNT_LONGEST_STUCK] < b->counters[COUNT_SAMPLES] - b->counters[COUNT_ACCEPTED]);
 	c->samples += b->counters[COUNT_SAMPLES];
 	c->independent += b->counters[COUNT_INDEPENDENT];
 	if (b->strategy_count)
