@@ -45,6 +45,25 @@ static void test_nothing_is_lost_under_a_smooth_coating(void **state)
 	}
 }
 
+/* Light that stays inside meets a base of reflectance 0.5 again and again: linear, as if that base gave all of it back from the second time
+ * on; nonlinear, each time half of it. */
+static void test_nonlinear_loses_light_at_each_bounce(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf linear, nonlinear;
+	bsdf_make(&a, "plastic diffuse_reflectance=0.5 int_ior=1.7 ext_ior=1", &linear);
+	bsdf_make(&a, "plastic diffuse_reflectance=0.5 int_ior=1.7 ext_ior=1 nonlinear=true", &nonlinear);
+	vec3 straight = {0, 0, 1};
+	double t = fresnel_dielectric(1, 1.7).transmitted, once = linear.ops->eval(&linear, &point, straight, straight).v[0];
+	double out = 0.5 * t * t / PI / once / (1.7 * 1.7); /* the part of diffuse light that leaves at a time */
+	double series = 0.5 * out / (1 - 0.5 * (1 - out));  /* 0.5 out + 0.5 (1 - out) 0.5 out + ... */
+	double want = once * series / 0.5;
+	assert_true(out > 0.2 && out < 0.5);
+	assert_true(fabs(nonlinear.ops->eval(&nonlinear, &point, straight, straight).v[0] / want - 1) < 1e-6);
+	arena_fini(&a);
+}
+
 /* What comes out again of the light that is in, from Fresnel's factors inside: total reflection included. */
 static void test_escape_is_what_fresnel_says_inside(void **state)
 {
@@ -127,6 +146,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_nothing_is_lost_under_a_smooth_coating),
+		cmocka_unit_test(test_nonlinear_loses_light_at_each_bounce),
 		cmocka_unit_test(test_escape_is_what_fresnel_says_inside),
 		cmocka_unit_test(test_rough_and_smooth_coatings_meet),
 		cmocka_unit_test(test_the_coating_is_a_dielectric),
