@@ -129,7 +129,7 @@ static void test_all_rooms(void **state)
 		printf("all rooms      %-22s worst t %+6.2f (%s), finds %5.2f %%%s\n", mutation_registry[i]->name, v.t, v.function, 100 * v.power,
 		       v.balanced ? "" : " NOT BALANCED");
 		faults += !v.balanced;
-		weak += !(v.power <= MUST_FIND) && dice_count(48) == 48;
+		weak += !(v.power <= MUST_FIND) && dice_count(48) >= 48 && !getenv("ROOM");
 	}
 	assert_int_equal(faults, 0);
 	assert_int_equal(weak, 0);
@@ -143,7 +143,6 @@ int main(void)
 	for (const struct room *r = rooms; r->name; r++)
 		if (!only || strcmp(only, r->name) == 0)
 			tests[n++] = (struct CMUnitTest){r->name, test_room, NULL, NULL, (void *)(uintptr_t)r};
-	if (!only)
-		tests[n++] = (struct CMUnitTest){"all rooms", test_all_rooms, NULL, NULL, NULL};
+	tests[n++] = (struct CMUnitTest){"all rooms", test_all_rooms, NULL, NULL, NULL};
 	return _cmocka_run_group_tests("balance", tests, n, NULL, NULL);
 }
