@@ -27,6 +27,7 @@ struct agent_config {
 	double stall_seconds; /* a lease or a building that makes no progress for so long hangs; 0: nobody looks */
 	bool insecure;
 	unsigned spoil; /* tests: of so many leases one is answered with spoiled chain states; 0: none */
+	unsigned large; /* tests: one of so many results has a pixel of 1e30; 0: none */
 	unsigned lie; /* tests: one of so many results has a wrong bit; 0: none */
 	bool repeat; /* tests: every result is sent twice */
 	unsigned crash; /* tests: this lease, counted from 1, ends the process that renders; 0: none */

@@ -42,6 +42,14 @@ static void lie(const struct batch *b)
 	memcpy(x, &bits, sizeof bits);
 }
 
+/* As no light of a scene is. */
+static void exaggerate(const struct batch *b)
+{
+	float *x = b->tile_count ? b->tiles[0].xyz : b->weight_count ? b->weights : NULL;
+	if (x)
+		*x = 1e30f;
+}
+
 static uint64_t next(uint64_t *state)
 {
 	uint64_t z = *state += UINT64_C(0x9e3779b97f4a7c15);
@@ -101,6 +109,8 @@ static void run(struct task *t)
 		error_prefix(&l->error, l->rc, "%s", l->bundle->info.message->job_info->scene);
 	if (!l->rc && l->end == LEASE_DONE && l->lie)
 		lie(&batch);
+	if (!l->rc && l->end == LEASE_DONE && l->large)
+		exaggerate(&batch);
 	if (!l->rc && l->end == LEASE_DONE && l->spoil)
 		spoil(&batch, l->spoil);
 	if (!l->rc && l->end == LEASE_DONE)

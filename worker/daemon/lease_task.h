@@ -26,7 +26,7 @@ struct lease_task {
 	bool hangs;    /* tests: it never ends */
 	bool crashes;  /* tests: by SIGSEGV */
 	bool unwanted; /* nobody waits for it: dropped when its thread lets go */
-	bool lie;      /* tests */
+	bool lie, large; /* tests */
 	uint64_t spoil; /* tests: not 0: a number for what happens to its chain states */
 	bool sent;     /* on this connection */
 	unsigned char *frame;

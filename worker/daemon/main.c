@@ -30,7 +30,7 @@ static const char doc[] =
 	"for good (a certificate of another role, another version), 75 a thread hung.";
 
 enum {
-	OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_LIE, OPTION_SPOIL, OPTION_TLS,
+	OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_LARGE, OPTION_LIE, OPTION_SPOIL, OPTION_TLS,
 	OPTION_IDLE, OPTION_STALL, OPTION_HANG, OPTION_CRASH
 };
 
@@ -47,6 +47,7 @@ static const struct argp_option options[] = {
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log more", 0},
 	{"test-spoil-states", OPTION_SPOIL, "N", OPTION_HIDDEN, "Spoil the chain states of one of N results", 0},
+	{"test-large", OPTION_LARGE, "N", OPTION_HIDDEN, "Make a pixel of one of N results 1e30", 0},
 	{"test-lie", OPTION_LIE, "N", OPTION_HIDDEN, "Flip a bit in one of N results", 0},
 	{"test-repeat", OPTION_REPEAT, NULL, OPTION_HIDDEN, "Send every result twice", 0},
 	{"test-crash", OPTION_CRASH, "N", OPTION_HIDDEN, "The N-th lease of each process that renders ends it by SIGSEGV", 0},
@@ -98,6 +99,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case 'v':
 		log_set_level(LOG_LEVEL_DEBUG);
+		return 0;
+	case OPTION_LARGE:
+		c->large = (unsigned)number(state, "--test-large", arg, 1, 1e6);
 		return 0;
 	case OPTION_LIE:
 		if (!getenv("HSLT_TEST"))

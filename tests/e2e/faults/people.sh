@@ -34,25 +34,16 @@ spoiled_states() {
 	farm
 	worker w0
 	job
-	while_chains_go_on somebody_spoils
+	each_time somebody_spoils
 	worker w1
 	worker w2
 	finish_job
 	taken_back
 	unset HSLT_TEST
 }
-# after the bootstrap, and long before the last epochs: nobody goes on from those
-while_chains_go_on() {
-	i=0
-	while [ $i -lt "$TIMES" ]; do
-		i=$((i + 1))
-		until_true 60 is_merged $((RESULTS * (2 + i) / (2 * (TIMES + 3)))) || fail "$NAME: $(merged) of $RESULTS results at time $i"
-		"$@"
-	done
-}
 somebody_spoils() {
 	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
-	worker "liar$i" --cache "$DIR/cache$i" --test-spoil-states 1 --test-lie 1 --test-hang 3 # of no life of another
+	worker "liar$i" --cache "$DIR/cache$i" --test-spoil-states 1 --test-lie 1 # of no life of another
 	says coordinator "event=peer_hello .*name=\"liar$i\""
 	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
 	says "liar$i" 'event=batch_acknowledged .*kind=2'
@@ -63,17 +54,18 @@ taken_back() {
 	! grep -q "event=batch_taken_back job=$ID .*made by w" "$DIR/coordinator.log" || fail "$NAME: a result of an honest worker is taken back"
 	! grep -q 'event=worker_wrong .*worker="w' "$DIR/coordinator.log" || fail "$NAME: an honest worker is blamed"
 	! value "$ID" note | grep -q anew || fail "$NAME: $(value "$ID" note)"
+	[ "$(value "$ID" failures)" -gt 0 ] || fail "$NAME: nobody refused the states"
 }
 
 CHECKPOINTS=
-fault spoiled_restart 5 1 "the same, and the coordinator is killed and started again right after that"
+fault spoiled_restart 5 1 "the same, and the coordinator is killed and started again before the states are refused"
 spoiled_restart() {
 	export HSLT_TEST=1
 	# shellcheck disable=SC2086
 	farm $CHECKPOINTS
 	worker w0
 	job
-	while_chains_go_on spoils_before_a_restart
+	each_time spoils_before_a_restart
 	worker w1
 	worker w2
 	finish_job
@@ -87,10 +79,25 @@ spoils_before_a_restart() {
 	again $CHECKPOINTS
 }
 
-fault spoiled_checkpoint 5 1 "the same, with checkpoints that take the last results along"
+fault spoiled_checkpoint 5 1 "the same, with a checkpoint after every few results and kept results of epochs before it"
 spoiled_checkpoint() {
-	CHECKPOINTS="--journal 5"
+	CHECKPOINTS="--journal 2"
 	spoiled_restart
 	grep -q 'event=checkpoint ' "$DIR/coordinator.log" || fail "$NAME: never a checkpoint"
 	CHECKPOINTS=
+}
+
+fault large_pixel 1 1 "a worker sends results with a pixel of 1e30: they are refused, and it is set aside"
+large_pixel() {
+	farm
+	worker w0
+	worker w1
+	worker w2 --test-large 1
+	until_true 30 grep -q 'event=peer_hello.*name="w2"' "$DIR/coordinator.log" || fail "$NAME: w2 does not come"
+	job
+	finish_job
+	[ "$(grep -c 'event=batch_refused .*worker="w2" ' "$DIR/coordinator.log")" -ge 3 ] || fail "$NAME: it is not named"
+	! grep 'event=batch_refused' "$DIR/coordinator.log" | grep -v 'worker="w2"' || fail "$NAME: others are refused"
+	"$BIN/hslt-status" | grep -q '^w2 .* aside ' || fail "$NAME: $("$BIN/hslt-status")"
+	blameless
 }
