@@ -259,7 +259,8 @@ void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 	else if (o && *text)
 		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s", log_quote(p->name).text, f->own, log_quote(text).text);
 	struct back back = {0};
-	if (o && *text && f->bad_states && !o->busy && !p->server->stepping && journal_write(o->journal, &e) == 0)
+	bool holds = farm_awaits(p->server->farm, p->id, &ev.lease.key) == DELIVERY_AWAITED; /* else nothing is read for it */
+	if (o && *text && f->bad_states && holds && !o->busy && !p->server->stepping && journal_write(o->journal, &e) == 0)
 		ev.lease.can_take_back = back_read(o, o->journal, &ev.lease.key, &back, &e) == 0;
 	p->server->back = &back;
 	server_step(p->server, &ev);

@@ -334,7 +334,9 @@ static const Farm__Envelope *hear(struct farm_world *w, unsigned peer)
 		struct error e;
 		unsigned char byte;
 		size_t used;
-		if (recv(p->fd, &byte, 1, MSG_DONTWAIT) != 1) {
+		ssize_t got = recv(p->fd, &byte, 1, MSG_DONTWAIT);
+		need(got != 0, "the coordinator has hung up");
+		if (got != 1) {
 			uv_run(&w->server->loop, UV_RUN_ONCE);
 			continue;
 		}
@@ -400,7 +402,10 @@ static void answer(struct farm_world *w, unsigned worker, struct lease_key k)
 	size_t size;
 	struct error e;
 	need(batch_pack(&b, &plan, &frame, &size, &e) == 0, e.text);
-	farm_say(w, worker, frame, size);
+	size_t n;
+	unsigned char *sealed = sealed_frame(frame, size, &n);
+	farm_say(w, worker, sealed, n);
+	free(sealed);
 	const Farm__LeaseAck *a = hear_kind(w, worker, FARM__ENVELOPE__BODY_LEASE_ACK)->lease_ack;
 	bool noted = a->verdict == FARM__VERDICT__VERDICT_NOTED;
 	need(noted || a->verdict == FARM__VERDICT__VERDICT_MERGED, a->text);

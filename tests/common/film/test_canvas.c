@@ -406,12 +406,12 @@ static void values_are_rounded_to_the_grid(void **unused)
 		struct batch b = make_batch(&p, 0, 0, 0, 1, one);
 		b.tiles[0].xyz[0] = large ? 0x1p52f : 1;
 		b.tiles[0].xyz[3] = 0.75f;
-		b.tiles[0].xyz[4] = -1.75f;
+		b.tiles[0].xyz[4] = 1.75f;
 		b.tiles[0].xyz[5] = 2.5f;
 		assert_int_equal(canvas_add(c, &b, NULL), 0);
 		batch_fini(&b);
 		canvas_group_blocks(c, 2, 1, block);
-		assert_true(block[1] == (1.0 - 2 + 2) / (double)p.epoch);
+		assert_true(block[1] == (1.0 + 2 + 2) / (double)p.epoch);
 		canvas_free(c);
 	}
 }
