@@ -1,11 +1,17 @@
 #!/bin/sh
-# Every command of the README's ```sh blocks, in order, as a reader would type them; in a folder of its own and at a port of
+# Every command of the ```sh blocks of the README and of docs/, in order, as a reader would type them; in a folder of its own and at a port of
 # its own. The two commands above them are tests of their own: demo.sh here, and the run that this is part of.
 . "$(dirname "$0")/lib.sh"
 need hslt-ca hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare hslt-tonemap
 ROOT=$(cd "$HERE/../.." && pwd)
 for command in deploy/demo.sh deploy/test.sh deploy/workers.sh; do
-	grep -q "sh $command" "$ROOT/README.md" && [ -f "$ROOT/$command" ] || fail "$command is not both in the README and there"
+	cat "$ROOT/README.md" "$ROOT/docs/farm.md" | grep -q "sh $command" && [ -f "$ROOT/$command" ] || fail "$command is not both in the README or docs/farm.md and there"
+done
+# Links of the first pages lead somewhere.
+for page in "$ROOT/README.md" "$ROOT"/docs/*.md; do
+	for link in $(grep -o '](\([^)#]*\)' "$page" | sed 's/^](//' | grep -v '^http' | sort -u); do
+		[ -e "$(dirname "$page")/$link" ] || fail "$page: there is no $link"
+	done
 done
 # What deploy/README.md names is there.
 for f in $(grep -o '`[a-z]*/`\|tests/e2e/[a-z]*\.sh\|deploy/[a-z]*/*[A-Za-z]*\.[a-z]*' "$ROOT/deploy/README.md" | tr -d '`' | sort -u); do
@@ -23,7 +29,7 @@ ln -s "$(cd "$BIN" && pwd)" "$DIR/home/build/bin"
 	echo "trap 'code=\$?; kill \$RUNNING; wait; exit \$code' EXIT"
 	echo 'answers() { for k in $(seq 600); do ! hslt-job "$@" list >/dev/null 2>&1 || return 0; sleep 0.1; done; false; }'
 	# make has nothing left to do here, but it must agree. By hand there is time between two lines; here it is waited for.
-	awk '/^```sh$/ { on = 1; next } /^```$/ { on = 0 } on' "$ROOT/README.md" |
+	awk '/^```sh$/ { on = 1; next } /^```$/ { on = 0 } on' "$ROOT/README.md" "$ROOT"/docs/*.md |
 		sed -e "s/7700/$port/g" -e "s|^make -s\$|make -s -C '$ROOT' programs|" -e 's/ &$/ \& RUNNING="$RUNNING $!"/' \
 			-e "/name two &/a answers --coordinator 127.0.0.1:$port" \
 			-e "/node1 --threads 1 &/a answers --coordinator 127.0.0.1:$safe --tls farm-ca/ann" -e "s/7701/$safe/g"
