@@ -1,5 +1,5 @@
 /*
- * Whether the chains of an image agree, from what its batches say besides pixels (contract sections 1 and 2): tiles whose
+ * Whether the chains of an image agree, from what its batches say besides pixels (docs/design.md, rules 1 and 2): tiles whose
  * potential scale reduction (Gelman and Rubin 1992) says that chains have not mixed, classes of paths whose energy in the
  * chains differs from the bootstrap's or from group to group, chains that stand still. Pure; any thread; allocates nothing.
  * Samples (path, bdpt) always agree. Energies are in units of b's. How often each criterion fires on scenes that are fine, and

@@ -1,5 +1,5 @@
 /*
- * The merged films of a job: one film a group, sums on an integer grid, so that adding is order-free (contract section 1).
+ * The merged films of a job: one film a group, sums on an integer grid, so that adding is order-free (docs/design.md, rules 1).
  * Round r's batches go into the open film of r; when all have come the round is closed and its sums move into the prefix.
  * The published image is the prefix of complete rounds. Two rounds may be open: the first incomplete one and the next.
  * Memory: 8 bytes x 3 channels x pixels x groups x 3, in mapped files below `folder` (unlinked at once) or, with folder

@@ -1,5 +1,5 @@
 /*
- * A job's plan (contract section 1): fixed when the job starts, the same for hslt-render and the farm, never a function
+ * A job's plan (docs/design.md, rules 1): fixed when the job starts, the same for hslt-render and the farm, never a function
  * of workers or threads. Pure; any thread.
  *
  * Work is cut into leases. A lease is (kind, group, part, epoch); its result depends on the plan and on these alone.
@@ -122,7 +122,7 @@ void plan_strategy_name(const char *mixture, uint32_t i, char *name, size_t size
 /* A text of a plan: ends within `size` bytes, nothing behind its end, and nothing in it that a shell would take for its own. */
 bool plan_text_ok(const char *text, size_t size);
 
-/* Systematic resampling of a group's seeds over its bootstrap weights, in index order (contract section 2).
+/* Systematic resampling of a group's seeds over its bootstrap weights, in index order (docs/design.md, rules 2).
  * weight[i] >= 0 and finite, i in the group's range; writes `count` bootstrap indices. false: all weights are 0. */
 bool plan_resample(const struct plan *p, uint32_t group, const float *weight, uint64_t weight_count, double u,
 		   uint32_t count, uint64_t *index);

@@ -1,5 +1,5 @@
 /*
- * Do two integrators make the same image? (contract, section 7.) Each side is rendered as 16 or more independent groups,
+ * Do two integrators make the same image? (docs/design.md, rules 7.) Each side is rendered as 16 or more independent groups,
  * with a seed of its own; blocks of the image and the mean are compared by Welch's t between the groups' means.
  *
  * Level: 1e-4 over all tests of the suite, shared equally among comparisons and by Holm's method within one. Power: the

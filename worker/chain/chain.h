@@ -1,6 +1,6 @@
 /*
  * One Markov chain: selection, acceptance, counting, splatting. The target is I = X+Y+Z of a path's contribution; expected
- * values: the current state gets 1-a, the proposal a (Veach 1997, sec. 11.3.1; contract section 2). No acceptance is ever
+ * values: the current state gets 1-a, the proposal a (Veach 1997, sec. 11.3.1; docs/design.md, rules 2). No acceptance is ever
  * forced. Independent proposals also estimate b. Nothing allocates inside a step. A table entry a kind of state space.
  */
 #ifndef WORKER_CHAIN_CHAIN_H

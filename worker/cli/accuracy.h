@@ -86,7 +86,7 @@ struct accuracy_run {
 int accuracy_render(struct accuracy_run *r, struct error *e);
 void accuracy_run_fini(struct accuracy_run *r);
 
-/* The figures of one setting. Errors are relative errors of the contract; at 95 %. */
+/* The figures of one setting. Errors are relative errors of docs/design.md, rules 4; at 95 %. */
 struct accuracy_figures {
 	uint64_t mutations, rounds;
 	double cpu_seconds;

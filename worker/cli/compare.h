@@ -1,5 +1,5 @@
 /*
- * How far picture A is from reference B: the figures of the project's contract, and whether two images are the same bits.
+ * How far picture A is from reference B: the figures of docs/design.md, rules 4, and whether two images are the same bits.
  * One thread.
  */
 #ifndef WORKER_CLI_COMPARE_H

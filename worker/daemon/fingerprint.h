@@ -1,5 +1,5 @@
 /*
- * The numeric fingerprint (contract section 1): what decides the bits of a result beside plan and scene. Workers with
+ * The numeric fingerprint (docs/design.md, rules 1): what decides the bits of a result beside plan and scene. Workers with
  * equal texts give equal bits. Any thread.
  */
 #ifndef WORKER_DAEMON_FINGERPRINT_H

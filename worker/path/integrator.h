@@ -1,6 +1,6 @@
 /*
  * Integrators as table entries: one file and one line in integrator_list.h each. An integrator turns one point of the space
- * of random numbers into a contribution f / p over the whole film window (contract section 2); whether independent points are
+ * of random numbers into a contribution f / p over the whole film window (docs/design.md, rules 2); whether independent points are
  * averaged or a Markov chain walks among them is the caller's.
  */
 #ifndef WORKER_PATH_INTEGRATOR_H

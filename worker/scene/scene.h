@@ -1,6 +1,6 @@
 /*
  * The scene description: Mitsuba's XML (0.5/0.6 and 3.x dialects) as a tree of typed, checked nodes. Knows no
- * physics. contract.md section 5. The whole description lives in one arena.
+ * physics. docs/design.md, rules 5. The whole description lives in one arena.
  */
 #ifndef WORKER_SCENE_SCENE_H
 #define WORKER_SCENE_SCENE_H

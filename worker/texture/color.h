@@ -1,5 +1,5 @@
 /*
- * Colour values as functions of wavelength (contract section 3).
+ * Colour values as functions of wavelength (docs/design.md, rules 3).
  * Reflectances: Jakob and Hanika 2019 sigmoid polynomials, round trip under D65. Illuminants: largest component x
  * upsampled colour x D65 normalised to give Rec. 709 (1,1,1) for rgb 1. Unbounded (eta, k): scaled into [0,1] by
  * twice the maximum and back. Immutable after creation; any thread; evaluation allocates nothing.

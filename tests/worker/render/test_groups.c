@@ -1,5 +1,5 @@
 /*
- * Groups are independent replicates, or the error that their spread tells is none (contract, section 2). The linker puts a wrapper
+ * Groups are independent replicates, or the error that their spread tells is none (docs/design.md, rules 2). The linker puts a wrapper
  * around the random number generator (Makefile), which notes all numbers that a lease asks for: no two groups ask for the same
  * one, each starts its chains from its own part of the bootstrap, and independent proposals that carry no light are counted.
  * Nothing here is left to chance but the number of pssmlt's independent proposals.

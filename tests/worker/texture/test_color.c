@@ -129,7 +129,7 @@ static void test_emitters_give_their_rgb(void **state)
 	for (int i = 0; i < CIE_COUNT; i++)
 		y += cie_observer[i][1] * color_d65(CIE_FIRST_NM + i) / CIE_Y_SUM;
 	assert_true(fabs(y - 1) < 1e-5);
-	/* Without an illuminant a constant spectrum is reddish: the contract's figures. */
+	/* Without an illuminant a constant spectrum is reddish: its Rec. 709 values. */
 	struct color flat = color_constant(1);
 	double rgb[3];
 	rgb_of(at_color, &flat, false, rgb);
