@@ -92,9 +92,9 @@ slow_worker() {
 	# Where the machine is busy the other worker may be as slow for a while: one job of a few must show it.
 	for _ in 1 2 3 4 5 6; do
 		job
-		finish_job
-		[ "$(value "$ID" duplicates)" -eq 0 ] || break
+		until_true 120 is_state "$ID" done && [ "$(value "$ID" duplicates)" -eq 0 ] || break
 	done
+	finish_job
 	[ "$(value "$ID" duplicates)" -gt 0 ] || fail "$NAME: nothing was computed twice"
 	kill -CONT "$(renders "$WORKER")"
 }
