@@ -20,8 +20,9 @@ static const char *name_of(const struct farm *f, uint64_t who)
 const char *farm_maker(const struct farm *f, const struct lease_key *k)
 {
 	const struct job *j = farm_find_job(f, k->job);
-	bool known_slot = j && job_is_live(j) && k->group < j->plan.groups && k->part < j->plan.parts;
-	return known_slot ? name_of(f, job_slot(j, k->group, k->part)->doubt.maker) : "?";
+	bool known_slot = j && job_is_live(j) && k->kind == j->kind && k->group < j->plan.groups && k->part < j->plan.parts;
+	const struct slot *s = known_slot ? job_slot(j, k->group, k->part) : NULL;
+	return s && s->next == k->epoch && k->epoch > 0 ? name_of(f, s->doubt.maker) : "?"; /* who made others is not remembered */
 }
 
 static bool is_party(const struct slot *s, uint64_t who)
@@ -59,7 +60,7 @@ bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s,
 }
 
 /* The states may be wrong without that epoch's sums being so: it is not asked. */
-static void take_back(struct farm *f, struct job *j, struct slot *s)
+static void take_back(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
 	struct doubt *d = &s->doubt;
 	uint64_t maker = d->maker, reach = d->reach > s->next ? d->reach : s->next;
@@ -69,19 +70,19 @@ static void take_back(struct farm *f, struct job *j, struct slot *s)
 	a->who = maker;
 	a->job = j->id;
 	a->key = key_of(j, s);
-	text_print(f->text, sizeof f->text, "group %u part %u epoch %llu is computed again: its chain states, made by %s, could not be read",
-		   a->key.group, a->key.part, (unsigned long long)a->key.epoch, name_of(f, maker));
+	text_print(f->text, sizeof f->text, "group %u part %u epoch %llu is computed again: its chain states, made by %s, could not be read by %s",
+		   a->key.group, a->key.part, (unsigned long long)a->key.epoch, name_of(f, maker), refusers);
 	a->text = f->text;
 }
 
-static void begin_anew(struct farm *f, struct job *j, struct slot *s)
+static void begin_anew(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
 	const struct lease_key k = key_of(j, s);
 	s->doubt.anew = true;
 	j->anew++;
 	text_print(f->text, sizeof f->text,
-		   "the chains of group %u part %u begin epoch %llu anew from their seeds: their states, made by %s, could not be read", k.group,
-		   k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker));
+		   "the chains of group %u part %u begin epoch %llu anew from their seeds: their states, made by %s, could not be read by %s", k.group,
+		   k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker), refusers);
 	struct action *a = update_add(f, ACTION_CHAINS_ANEW);
 	a->job = j->id;
 	a->key = k;
@@ -105,13 +106,18 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 	}
 	struct lease_key made = key_of(j, s);
 	made.epoch--;
+	char refusers[2 * JOIN_NAME];
+	if (d->refuser == who)
+		text_copy(refusers, sizeof refusers, p->name);
+	else
+		text_print(refusers, sizeof refusers, "%s and %s", name_of(f, d->refuser), p->name);
 	struct identity *maker = second && !j->mixed && d->maker != d->refuser ? known(f, d->maker) : NULL;
 	if (can && d->again < AGAIN_MOST)
-		take_back(f, j, s);
+		take_back(f, j, s, refusers);
 	else
-		begin_anew(f, j, s);
+		begin_anew(f, j, s, refusers);
 	if (maker)
-		roster_wrong(f, maker, &made);
+		roster_wrong(f, maker, "wrong chain states", &made);
 	job_place(j, s);
 }
 
@@ -123,7 +129,7 @@ void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const str
 	bool behind = s->next < d->reach;
 	*d = (struct doubt){ .maker = who->id, .before = d->anew ? 0 : d->maker, .reach = behind ? d->reach : 0, .again = behind ? d->again : 0 };
 	if (refuser)
-		roster_wrong(f, refuser, k);
+		roster_wrong(f, refuser, "refused good chain states", k);
 }
 
 bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t size)

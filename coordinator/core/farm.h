@@ -151,7 +151,7 @@ struct worker_status {
 	uint32_t wrong; /* results */
 	bool aside;
 };
-/* Who made the chain states that go with this lease, for the log. */
+/* Who made the chain states that go with this lease, for the log; "?": it is not the next one of its group and part. */
 const char *farm_maker(const struct farm *f, const struct lease_key *k);
 /* The smallest id above `after` (start with 0) of those that are set aside; 0: no more. */
 uint64_t farm_next_aside(const struct farm *f, uint64_t after);

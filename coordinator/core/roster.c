@@ -163,9 +163,9 @@ void roster_set_aside(struct farm *f, struct identity *who)
 	verify_forget_worker(f, who);
 }
 
-void roster_wrong(struct farm *f, struct identity *who, const struct lease_key *k)
+void roster_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k)
 {
-	snprintf(who->text, sizeof who->text, "wrong result: j%llu %s group %u part %u epoch %llu", (unsigned long long)k->job,
+	snprintf(who->text, sizeof who->text, "%s: j%llu %s group %u part %u epoch %llu", what, (unsigned long long)k->job,
 		 k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group, k->part, (unsigned long long)k->epoch);
 	who->wrong++;
 	struct action *a = update_add(f, ACTION_WRONG);

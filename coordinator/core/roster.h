@@ -44,8 +44,8 @@ void roster_free(struct farm *f);
 /* The connections of an earlier life of the same home are closed. false with a sentence: this one is of an earlier life. */
 bool roster_replace(struct farm *f, const struct event_join *e, const char **refused);
 
-/* It gave a wrong result. */
-void roster_wrong(struct farm *f, struct identity *who, const struct lease_key *k);
+/* Counted as a wrong result; what it was in a few words. */
+void roster_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k);
 /* For good: no leases, nothing that it sends counts. */
 void roster_set_aside(struct farm *f, struct identity *who);
 

@@ -108,7 +108,7 @@ void verify_settle(struct farm *f, struct job *j, struct slot *s, const struct b
 	forget(f, j, p);
 	for (uint32_t i = 0; i < said.count; i++)
 		if (memcmp(&said.digest[i], right, sizeof *right) != 0)
-			roster_wrong(f, said.who[i], &k);
+			roster_wrong(f, said.who[i], "wrong result", &k);
 }
 
 void verify_names(const struct job *j, const struct slot *s, char *text, size_t size)

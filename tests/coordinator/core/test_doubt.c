@@ -42,7 +42,7 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 	assert_non_null(strstr(j.waiting, "a third worker is to say whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b could"));
 	transcript_play(f, (const char *const[]){
 		"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
-		"[6] w3 denies j1 g0 p0 e1 not mine either -> anew, #1 wrong result: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
+		"[6] w3 denies j1 g0 p0 e1 not mine either -> anew, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
 		"[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2", /* from states again */
 		NULL });
 	struct peer_status p;
@@ -50,6 +50,10 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
 	assert_true(farm_peer(f, 2, &p) && p.failures == 0 && p.faults == 0);
 	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 2}), "b");
+	/* Who made the states of other leases is not said: of an epoch before, of one that nobody has, of no states at all. */
+	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 1}), "?");
+	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 3}), "?");
+	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_BOOTSTRAP, 0, 0, 0}), "?");
 	assert_true(farm_job(f, 1, 8, &j));
 	assert_int_equal(j.state, JOB_RUNNING);
 	farm_free(f);
@@ -64,7 +68,7 @@ static void a_third_that_goes_on_is_right(void **state)
 		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
 		"[3] w3 wants 1 -> -",
 		"[4] w2 denies j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
-		"[5] w3 batch j1 g0 p0 e1 -> merge, merged, #2 wrong result: j1 render group 0 part 0 epoch 1, j1 round 2, w2 gets j1 g0 p0 e2",
+		"[5] w3 batch j1 g0 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 0 part 0 epoch 1, j1 round 2, w2 gets j1 g0 p0 e2",
 		NULL });
 	assert_int_equal(wrong(f, 2), 1);
 	assert_int_equal(wrong(f, 1) + wrong(f, 3), 0);
@@ -134,7 +138,7 @@ static void a_second_refusal_takes_the_epoch_back(void **state)
 		"[4] w2 refuses j1 g0 p0 e1 no -> -",
 		"[5] w1 wants 1 -> -",
 		"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
-		"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong result: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+		"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
 		NULL });
 	struct job_status j;
 	assert_true(farm_job(f, 1, 6, &j));
@@ -196,13 +200,13 @@ static void one_epoch_after_the_other_is_taken_back(void **state)
 		"[2] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g1 p0 e2",
 		"[3] w2 refuses j1 g0 p0 e2 no -> -",
 		"[3] w3 wants 1 -> w3 gets j1 g0 p0 e2",
-		"[4] w3 refuses j1 g0 p0 e2 no -> back j1 g0 p0 e1, #1 wrong result: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e1",
+		"[4] w3 refuses j1 g0 p0 e2 no -> back j1 g0 p0 e1, #1 wrong chain states: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e1",
 		NULL });
 	transcript_play(f, (const char *const[]){
 		"[5] w1 wants 0 -> -",
 		"[5] w1 batch j1 g1 p0 e2 -> merge, merged", /* one round ahead */
 		"[5] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
-		"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong result: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+		"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
 		"[7] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1",
 		"[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2, w3 gets j1 g1 p0 e3",
 		"[9] w2 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, w2 gets j1 g0 p0 e3",
@@ -232,11 +236,11 @@ static void a_liar_is_set_aside(void **state)
 		"[4] w2 denies j1 g0 p0 e1 no -> -", "[4] w2 denies j1 g1 p0 e1 no -> -", "[4] w2 denies j1 g2 p0 e1 no -> -",
 		"[5] w3 wants 3 -> w3 gets j1 g0 p0 e1, w3 gets j1 g1 p0 e1, w3 gets j1 g2 p0 e1",
 		"[6] w3 wants 0 -> -",
-		"[6] w3 batch j1 g0 p0 e1 -> merge, merged, #2 wrong result: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e2",
-		"[6] w3 batch j1 g1 p0 e1 -> merge, merged, #2 wrong result: j1 render group 1 part 0 epoch 1, w2 gets j1 g1 p0 e2",
+		"[6] w3 batch j1 g0 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e2",
+		"[6] w3 batch j1 g1 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 1 part 0 epoch 1, w2 gets j1 g1 p0 e2",
 		NULL });
 	transcript_play(f, (const char *const[]){
-		"[6] w3 batch j1 g2 p0 e1 -> merge, merged, #2 wrong result: j1 render group 2 part 0 epoch 1, #2 aside, "
+		"[6] w3 batch j1 g2 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 2 part 0 epoch 1, #2 aside, "
 		"w2 loses j1 g0 p0 e2, w2 loses j1 g1 p0 e2, j1 round 2",
 		NULL });
 	assert_int_equal(wrong(f, 1) + wrong(f, 3), 0);
