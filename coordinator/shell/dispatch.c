@@ -192,8 +192,8 @@ static void revoke_lease(struct server *s, const struct action *a)
 	struct session *p = session_find(s, a->peer);
 	if (p)
 		session_send_revoke(p, &a->key);
-	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu group=%u part=%u epoch=%llu", number(a->job),
-		  number(a->peer), a->key.group, a->key.part, number(a->key.epoch));
+	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
+		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
 }
 
 static void close_peer(struct server *s, const struct action *a)

@@ -20,7 +20,8 @@ static void fail(struct server *s, struct order *o, uint64_t peer, const struct 
 {
 	struct session *p = session_find(s, peer);
 	struct event ev = {.kind = EVENT_LEASE_FAILED, .peer = peer, .job = k->job, .text = why, .lease = {.key = *k}};
-	order_log(o, LOG_LEASE_FAILED, "worker=%s own=0 text=%s", log_quote(p ? p->name : "?").text, log_quote(why).text);
+	order_log(o, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%d group=%u part=%u epoch=%llu", log_quote(p ? p->name : "?").text,
+		  log_quote(why).text, (int)k->kind, k->group, k->part, (unsigned long long)k->epoch);
 	if (p)
 		session_send_ack(p, k, ACK_REFUSED, why);
 	server_step(s, &ev);

@@ -40,8 +40,8 @@ void session_fault(struct session *p, const char *format, ...)
 	fault.text = text;
 	m.body_case = FARM__ENVELOPE__BODY_FAULT;
 	m.fault = &fault;
-	log_event(LOG_PEER_FAULT, "peer=%llu address=%s text=%s", (unsigned long long)p->id, p->address,
-		  log_quote(text).text);
+	log_event(LOG_PEER_FAULT, "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
+		  log_quote(p->name).text, log_quote(text).text);
 	session_send(p, &m, NULL, 0);
 	p->state = SESSION_LEAVING;
 	conn_close_when_sent(p->conn, text);
@@ -100,8 +100,8 @@ static void answer_hello(struct session *p, bool accepted, bool final, const cha
 	m.hello_ack = &ack;
 	session_send(p, &m, NULL, 0);
 	if (!accepted) {
-		log_event(LOG_PEER_REFUSED, "peer=%llu address=%s text=%s", (unsigned long long)p->id, p->address,
-			  log_quote(text).text);
+		log_event(LOG_PEER_REFUSED, "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
+			  log_quote(p->name).text, log_quote(text).text);
 		p->state = SESSION_LEAVING;
 		conn_close_when_sent(p->conn, text);
 	}
@@ -232,6 +232,19 @@ static void take_lease_failed(struct session *p, struct envelope *env)
 		session_lease_failed(p, env->message->lease_failed);
 }
 
+/* Who does not hold the lease was given no states: nobody made them. */
+static void log_failure(const struct session *p, struct order *o, const Farm__LeaseFailed *f, const struct lease_key *k, const char *text, bool holds)
+{
+	struct log_value name = log_quote(p->name), said = log_quote(text);
+	unsigned long long epoch = k->epoch;
+	if (f->bad_states)
+		order_log(o, LOG_LEASE_FAILED, "states_of=%s refused_by=%s text=%s kind=%d group=%u part=%u epoch=%llu",
+			  log_quote(holds ? farm_maker(p->server->farm, k) : "?").text, name.text, said.text, (int)k->kind, k->group, k->part, epoch);
+	else
+		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%d group=%u part=%u epoch=%llu", name.text, f->own, said.text,
+			  (int)k->kind, k->group, k->part, epoch);
+}
+
 void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 {
 	struct error e;
@@ -253,13 +266,10 @@ void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
 	}
-	if (o && *text && f->bad_states)
-		order_log(o, LOG_LEASE_FAILED, "states_of=%s refused_by=%s text=%s", log_quote(farm_maker(p->server->farm, &ev.lease.key)).text,
-			  log_quote(p->name).text, log_quote(text).text);
-	else if (o && *text)
-		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s", log_quote(p->name).text, f->own, log_quote(text).text);
 	struct back back = {0};
 	bool holds = farm_awaits(p->server->farm, p->id, &ev.lease.key) == DELIVERY_AWAITED; /* else nothing is read for it */
+	if (o && *text)
+		log_failure(p, o, f, &ev.lease.key, text, holds);
 	if (o && *text && f->bad_states && holds && !o->busy && !p->server->stepping && journal_write(o->journal, &e) == 0)
 		ev.lease.can_take_back = back_read(o, o->journal, &ev.lease.key, &back, &e) == 0;
 	p->server->back = &back;

@@ -114,7 +114,7 @@ void trust_merged(struct order *o, const struct action *a)
 		}
 	struct order_credit *more = mem_grow(o->credits, o->credit_count * sizeof *more, (o->credit_count + 1) * sizeof *more);
 	if (!more) {
-		log_event(LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
+		order_log(o, LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
 		return;
 	}
 	o->credits = more;
@@ -150,10 +150,10 @@ static void note(struct order *o, const char *text)
 	text_print(o->doubts + used, sizeof o->doubts - used, "%s%s", used ? "; " : "", text);
 }
 
-static void note_credit(struct order *o, const char *name, uint64_t leases)
+static void note_credit(struct order *o, const char *name, const char *why, uint64_t leases)
 {
 	char text[256];
-	text_print(text, sizeof text, "worker %s gave wrong results; %llu of its leases were merged unverified", name,
+	text_print(text, sizeof text, "worker %s is set aside (%s); %llu of its leases were merged unverified", name, why,
 		 (unsigned long long)leases);
 	note(o, text);
 }
@@ -174,5 +174,5 @@ void trust_aside(struct server *s, const struct action *a)
 	for (struct order *o = s->orders; o; o = o->next)
 		for (size_t i = 0; i < o->credit_count; i++)
 			if (o->credits[i].who == a->who && o->credits[i].leases > 0)
-				note_credit(o, name, o->credits[i].leases);
+				note_credit(o, name, a->text, o->credits[i].leases);
 }

@@ -78,7 +78,7 @@ start_worker honest3
 start_worker honest4
 until_true 60 is_state "$id" done || fail "$id is $(value "$id" state): $(value "$id" why)"
 "$BIN/hslt-status" "$id" >"$DIR/shown"
-says "$DIR/shown" "worker liar gave wrong results; "
+says "$DIR/shown" "worker liar is set aside (wrong result: j"
 says "$DIR/shown" "of its leases were merged unverified"
 "$BIN/hslt-job" log "$id" >"$DIR/log"
 says "$DIR/log" "merged unverified"
