@@ -279,6 +279,8 @@ static int compare_shapes(const void *x, const void *y)
 static size_t unique_pairs(struct coincide_pair *p, size_t n)
 {
 	size_t kept = 0;
+	if (n == 0) /* p may be NULL then, which qsort may not be given */
+		return 0;
 	qsort(p, n, sizeof *p, compare_pairs);
 	for (size_t i = 0; i < n; i++)
 		if (kept == 0 || compare_pairs(&p[kept - 1], &p[i]) != 0)
@@ -291,7 +293,8 @@ static void list_shapes(struct coincidence *c)
 	struct coincide_shapes *s = c->shapes;
 	for (size_t i = 0; i < c->pair_count; i++)
 		s[i] = (struct coincide_shapes){c->pairs[i].hidden.shape, c->pairs[i].by.shape, c->pairs[i].same_side};
-	qsort(s, c->pair_count, sizeof *s, compare_shapes);
+	if (c->pair_count > 1)
+		qsort(s, c->pair_count, sizeof *s, compare_shapes);
 	for (size_t i = 0; i < c->pair_count; i++) {
 		if (c->shapes_count == 0 || compare_shapes(&s[c->shapes_count - 1], &s[i]) != 0)
 			s[c->shapes_count++] = s[i];
