@@ -17,9 +17,10 @@ aside() {
 
 JOB="--integrator hslt --size 96x96 --bootstrap 20000 --mutations 640000 --chains 64 --epoch 2500"
 "$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" $JOB 2>"$DIR/render.log"
-if (unset HSLT_TEST; "$BIN/hslt-worker" --coordinator 127.0.0.1:1 --test-lie 1) 2>/dev/null; then
-	fail "a worker lies outside of tests"
-fi
+for o in lie large spoil-states; do
+	(unset HSLT_TEST; code 2 timeout 100 "$BIN/hslt-worker" --coordinator 127.0.0.1:1 --test-$o 1)
+	grep -q -e "--test-$o is for tests alone" "$DIR/err.log" || fail "--test-$o outside of tests: $(cat "$DIR/err.log")"
+done
 
 start_coordinator --heartbeat 60
 python3 "$HERE/lives.py" "${COORDINATOR#*:}" || fail "lives of workers"

@@ -101,6 +101,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		log_set_level(LOG_LEVEL_DEBUG);
 		return 0;
 	case OPTION_LARGE:
+		if (!getenv("HSLT_TEST"))
+			argp_error(state, "--test-large is for tests alone: it makes wrong images");
 		c->large = (unsigned)number(state, "--test-large", arg, 1, 1e6);
 		return 0;
 	case OPTION_LIE:

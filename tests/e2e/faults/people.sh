@@ -97,6 +97,7 @@ spoiled_checkpoint() {
 
 fault large_pixel 1 1 "a worker sends results with a pixel of 1e30: they are refused, and it is set aside"
 large_pixel() {
+	export HSLT_TEST=1
 	farm
 	worker w0
 	worker w1
@@ -108,4 +109,5 @@ large_pixel() {
 	! grep 'event=batch_refused' "$DIR/coordinator.log" | grep -v 'worker="w2"' || fail "$NAME: others are refused"
 	"$BIN/hslt-status" | grep -q '^w2 .* aside ' || fail "$NAME: $("$BIN/hslt-status")"
 	blameless
+	unset HSLT_TEST
 }
