@@ -6,8 +6,8 @@
 # of what fails is shown. The last lines name what was skipped, as `skipped: NAME: WHY`, and sum up: `N passed, N failed, N skipped`; the
 # exit code is 0 when something ran and nothing failed. PATTERN: only names that hold it.
 #
-# As many programs run at a time as there are processors, the longest of the last run first; scripts mostly wait, and run one after the
-# other beside them. HSLT_TEST_JOBS sets the number of programs.
+# As many tests run at a time as there are processors (HSLT_TEST_JOBS), the longest of the last run first. Scripts run one after the
+# other; programs have the other processors, and all of them when the scripts have ended.
 # HSLT_TEST_KINDS: "unit script" (default both). No test has a limit of wall clock, which a busy machine would reach: it is ended when
 # its processes have used HSLT_TEST_CPU seconds of processor time (default 1800; with FULL=1 28800), or have been idle without output for
 # HSLT_TEST_IDLE seconds (900; 3600), see tests/limit/limit.c.
@@ -103,15 +103,25 @@ list() {
 			}
 			{ name = $0; sub(/.*\/tests\//, "", name); print ($0 in s ? s[$0] : 1000000 + first[name]), NR, $0 }' | sort -k1,1nr -k2,2n | cut -d' ' -f3
 }
-lane() { # lane KIND PROGRAMS_AT_A_TIME
-	case " $kinds " in *" $1 "*) ;; *) return ;; esac
-	list "$1" >"$run/$1.list"
-	xargs -r <"$run/$1.list" -n 1 -P "$2" sh tests/run.sh --one "$run" "$1"
+one() { # one KIND PROGRAMS_AT_A_TIME: the process is the caller's
+	exec xargs -r <"$run/$1.list" -n 1 -P "$2" sh tests/run.sh --one "$run" "$1"
 }
 
-lane script 1 &
-lane unit "${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)}"
-wait
+for kind in unit script; do
+	case " $kinds " in *" $kind "*) list $kind ;; esac >"$run/$kind.list"
+done
+jobs=${HSLT_TEST_JOBS:-$(nproc 2>/dev/null || echo 2)} beside=0
+[ ! -s "$run/script.list" ] || [ "$jobs" -lt 2 ] || beside=1
+one script 1 &
+scripts=$!
+one unit $((jobs - beside)) &
+units=$!
+wait $scripts
+if [ $beside = 1 ]; then
+	sleep 1 # xargs has begun
+	kill -USR1 $units 2>/dev/null # one more at a time
+fi
+wait $units
 cat "$run"/*.took "$took" 2>/dev/null | awk '!seen[$2]++' >"$took.new" && mv "$took.new" "$took"
 cat "$run"/*.skips 2>/dev/null | sort
 # One that left no counts was ended from outside: a failure.
