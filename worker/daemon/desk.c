@@ -3,95 +3,14 @@
 
 #include "common/base/log.h"
 #include "common/base/mem.h"
-#include "common/base/text.h"
+#include "worker/daemon/say.h"
 #include "worker/daemon/work.h"
 
 #include <stdio.h>
-#include <string.h>
 
 static unsigned long long number(uint64_t n)
 {
 	return n;
-}
-
-/* ---- what is said ---- */
-
-static void request_leases(struct agent *a)
-{
-	Farm__LeaseRequest request;
-	Farm__Envelope m;
-	farm__lease_request__init(&request);
-	farm__envelope__init(&m);
-	request.want = a->leaving || a->backlog ? 0 : a->config.threads + 1;
-	m.body_case = FARM__ENVELOPE__BODY_LEASE_REQUEST;
-	m.lease_request = &request;
-	agent_send(a, &m);
-}
-
-/* Where leases are short and the coordinator's disk is slow results pile up: it asks for no more until they have gone. */
-static void pace(struct agent *a)
-{
-	enum { RESULTS_MANY = 256, RESULTS_FEW = 128 };
-	unsigned results = 0;
-	for (const struct lease_task *l = a->leases; l; l = l->next)
-		results += l->state == LEASE_RENDERED;
-	bool backlog = a->backlog ? results > RESULTS_FEW : results >= RESULTS_MANY;
-	if (backlog == a->backlog)
-		return;
-	a->backlog = backlog;
-	request_leases(a);
-}
-
-static void ask_job(struct agent *a, uint64_t job)
-{
-	Farm__JobGet get;
-	Farm__Envelope m;
-	farm__job_get__init(&get);
-	farm__envelope__init(&m);
-	get.job = job;
-	m.body_case = FARM__ENVELOPE__BODY_JOB_GET;
-	m.job_get = &get;
-	agent_send(a, &m);
-}
-
-/* An empty text gives the lease back without fault; own: this machine is at fault, not the job; bad_states: who made the states is. */
-static void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own, bool bad_states)
-{
-	char copy[1024];
-	Farm__LeaseKey key;
-	Farm__LeaseFailed failed;
-	Farm__Envelope m;
-	lease_key_to_wire(k, &key);
-	farm__lease_failed__init(&failed);
-	farm__envelope__init(&m);
-	text_copy(copy, sizeof copy, text);
-	text_clean(copy);
-	failed.key = &key;
-	failed.text = copy;
-	failed.own = own;
-	failed.bad_states = bad_states;
-	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
-	m.lease_failed = &failed;
-	agent_send(a, &m);
-	if (*text)
-		log_event(LOG_LEASE_FAILED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k->job), k->group,
-			  k->part, number(k->epoch), log_quote(text).text);
-}
-
-static void send_result(struct agent *a, struct lease_task *l)
-{
-	if (!a->conn || !a->welcome || l->sent)
-		return;
-	for (int i = 0; i < 1 + a->config.repeat; i++) {
-		unsigned char *copy = mem_alloc(l->frame_size, 1);
-		if (!copy) { /* offered again after the next connect */
-			conn_close(a->conn, "no memory to send a result");
-			return;
-		}
-		memcpy(copy, l->frame, l->frame_size);
-		conn_send_frame(a->conn, copy, l->frame_size);
-	}
-	l->sent = true;
 }
 
 /* ---- bundles ---- */
@@ -239,6 +158,20 @@ static void go_on(struct agent *a, struct bundle *b)
 
 /* ---- leases ---- */
 
+/* Where leases are short and the coordinator's disk is slow results pile up: it asks for no more until they have gone. */
+static void pace(struct agent *a)
+{
+	enum { RESULTS_MANY = 256, RESULTS_FEW = 128 };
+	unsigned results = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		results += l->state == LEASE_RENDERED;
+	bool backlog = a->backlog ? results > RESULTS_FEW : results >= RESULTS_MANY;
+	if (backlog == a->backlog)
+		return;
+	a->backlog = backlog;
+	say_request(a);
+}
+
 static struct lease_task *find_lease(const struct agent *a, const struct lease_key *k)
 {
 	for (struct lease_task *l = a->leases; l; l = l->next)
@@ -268,7 +201,7 @@ static void on_rendered(struct lease_task *l)
 		say_failed(a, &l->grant.key, l->rc ? l->error.text : "", false, l->rc == -EILSEQ);
 		drop_lease(a, l);
 	} else {
-		send_result(a, l);
+		say_result(a, l);
 	}
 	pace(a);
 	tidy(a);
@@ -308,7 +241,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	l = find_lease(a, &g.key);
 	if (l) { /* it is at work here already, from an earlier connection */
 		if (l->state == LEASE_RENDERED)
-			send_result(a, l);
+			say_result(a, l);
 		grant_fini(&g);
 		return;
 	}
@@ -329,7 +262,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	if (!rc && fresh) {
 		b->next = a->bundles;
 		a->bundles = b;
-		ask_job(a, b->job);
+		say_job_get(a, b->job);
 	}
 	if (!rc)
 		rc = lease_task_new(&l, &g, b, &e);
@@ -425,7 +358,7 @@ static void take_job_info(struct agent *a, struct envelope *env)
 	go_on(a, b);
 	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: results from before are welcome */
 		if (l->bundle == b && l->state == LEASE_RENDERED)
-			send_result(a, l);
+			say_result(a, l);
 	tidy(a);
 }
 
@@ -507,13 +440,13 @@ void desk_welcome(struct agent *a)
 	/* Does the job live? The answer brings unfinished fetching and unsent results on their way. */
 	for (struct bundle *b = a->bundles; b; b = b->next)
 		if (!b->ended)
-			ask_job(a, b->job);
-	request_leases(a);
+			say_job_get(a, b->job);
+	say_request(a);
 }
 
 void desk_leave(struct agent *a)
 {
-	request_leases(a);
+	say_request(a);
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->state == LEASE_RENDERED || (l->state == LEASE_QUEUED && !crew_take_back(a->crew, &l->task)))

@@ -1,0 +1,75 @@
+#include "worker/daemon/say.h"
+
+#include "common/base/log.h"
+#include "common/base/mem.h"
+#include "common/base/text.h"
+
+#include <string.h>
+
+static unsigned long long number(uint64_t n)
+{
+	return n;
+}
+
+void say_request(struct agent *a)
+{
+	Farm__LeaseRequest request;
+	Farm__Envelope m;
+	farm__lease_request__init(&request);
+	farm__envelope__init(&m);
+	request.want = a->leaving || a->backlog ? 0 : a->config.threads + 1;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_REQUEST;
+	m.lease_request = &request;
+	agent_send(a, &m);
+}
+
+void say_job_get(struct agent *a, uint64_t job)
+{
+	Farm__JobGet get;
+	Farm__Envelope m;
+	farm__job_get__init(&get);
+	farm__envelope__init(&m);
+	get.job = job;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_GET;
+	m.job_get = &get;
+	agent_send(a, &m);
+}
+
+void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own, bool bad_states)
+{
+	char copy[1024];
+	Farm__LeaseKey key;
+	Farm__LeaseFailed failed;
+	Farm__Envelope m;
+	lease_key_to_wire(k, &key);
+	farm__lease_failed__init(&failed);
+	farm__envelope__init(&m);
+	text_copy(copy, sizeof copy, text);
+	text_clean(copy);
+	failed.key = &key;
+	failed.text = copy;
+	failed.own = own;
+	failed.bad_states = bad_states;
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
+	m.lease_failed = &failed;
+	agent_send(a, &m);
+	if (*text)
+		log_event(LOG_LEASE_FAILED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k->job), k->group,
+			  k->part, number(k->epoch), log_quote(text).text);
+}
+
+void say_result(struct agent *a, struct lease_task *l)
+{
+	if (!a->conn || !a->welcome || l->sent)
+		return;
+	for (int i = 0; i < 1 + a->config.repeat; i++) {
+		unsigned char *copy = mem_alloc(l->frame_size, 1);
+		if (!copy) { /* offered again after the next connect */
+			conn_close(a->conn, "no memory to send a result");
+			return;
+		}
+		memcpy(copy, l->frame, l->frame_size);
+		conn_send_frame(a->conn, copy, l->frame_size);
+	}
+	l->sent = true;
+}

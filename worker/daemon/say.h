@@ -1,0 +1,16 @@
+/*
+ * What a worker says of jobs and leases; nothing where it is not connected. Loop's thread. A message that cannot be packed for want of
+ * memory ends the connection: all is said again after the next.
+ */
+#ifndef WORKER_DAEMON_SAY_H
+#define WORKER_DAEMON_SAY_H
+
+#include "worker/daemon/agent_private.h"
+
+void say_request(struct agent *a); /* how many leases it wants to hold */
+void say_job_get(struct agent *a, uint64_t job);
+/* An empty text gives the lease back without fault; own: this machine is at fault, not the job; bad_states: who made the states is. */
+void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own, bool bad_states);
+void say_result(struct agent *a, struct lease_task *l); /* once a connection */
+
+#endif
