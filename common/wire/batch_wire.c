@@ -29,6 +29,48 @@ uint32_t batch_payload_max(const struct plan *p)
 	return n < PAYLOAD_MOST ? (uint32_t)n : PAYLOAD_MOST;
 }
 
+/* ---- digests of chain states ---- */
+
+int states_digest(const struct chain_state *states, uint32_t count, struct blob_hash *out, struct error *e)
+{
+	struct blob_hash *each = mem_alloc(count, sizeof *each);
+	if (!each)
+		return error_set(e, ENOMEM, "no memory for a digest of %u chain states", count);
+	int rc = 0;
+	for (uint32_t i = 0; i < count && !rc; i++)
+		rc = blob_hash_bytes(states[i].size ? (const void *)states[i].bytes : "", states[i].size, &each[i], e);
+	if (!rc)
+		rc = blob_hash_bytes(each, count * sizeof *each, out, e);
+	mem_free(each);
+	return rc ? -ENOMEM : 0;
+}
+
+/* The message borrows the digest. */
+static int digest_to_wire(const struct chain_state *states, uint32_t count, struct blob_hash *h, ProtobufCBinaryData *out, struct error *e)
+{
+	if (count == 0)
+		return 0;
+	*out = (ProtobufCBinaryData){sizeof h->bytes, h->bytes};
+	return states_digest(states, count, h, e);
+}
+
+int states_digest_from_wire(const ProtobufCBinaryData *m, struct blob_hash *out, struct error *e)
+{
+	if (m->len != sizeof out->bytes)
+		return error_set(e, EBADMSG, "a digest of chain states with %zu bytes", m->len);
+	memcpy(out->bytes, m->data, sizeof out->bytes);
+	return 0;
+}
+
+static int check_digest(const struct chain_state *states, uint32_t count, const ProtobufCBinaryData *m, struct blob_hash *out, struct error *e)
+{
+	struct blob_hash said;
+	int rc = states_digest_from_wire(m, &said, e);
+	if (!rc)
+		rc = states_digest(states, count, out, e);
+	return rc || blob_hash_equal(&said, out) ? rc : error_set(e, EBADMSG, "the chain states are not those of their digest");
+}
+
 /* ---- packing ---- */
 
 struct packing {
@@ -109,15 +151,16 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 	struct packing k;
 	uint64_t counters[BATCH_COUNTERS], strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS];
 	double classes[PATH_CLASSES];
+	struct blob_hash digest;
+	Farm__LeaseKey key;
+	Farm__LeaseResult m;
+	Farm__Envelope env;
 	memcpy(counters, b->counters, sizeof counters);
 	memcpy(strategy, b->strategy, sizeof strategy);
 	memcpy(classes, b->classes, sizeof classes);
 	int rc = packing_init(&k, b, p, e);
 	if (!rc) {
-		Farm__LeaseKey key;
-		Farm__LeaseResult m;
 		farm__lease_result__init(&m);
-		Farm__Envelope env;
 		farm__envelope__init(&env);
 		lease_key_to_wire(&b->key, &key);
 		m.key = &key;
@@ -139,10 +182,12 @@ int batch_pack(const struct batch *b, const struct plan *p, unsigned char **fram
 		m.moment_count = b->moment_count;
 		env.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
 		env.lease_result = &m;
-		rc = envelope_pack(&env, NULL, k.payload, frame, size, e);
-		if (!rc)
-			write_payload(*frame + *size - k.payload, b, &k);
+		rc = digest_to_wire(b->states, b->state_count, &digest, &m.states_digest, e);
 	}
+	if (!rc)
+		rc = envelope_pack(&env, NULL, k.payload, frame, size, e);
+	if (!rc)
+		write_payload(*frame + *size - k.payload, b, &k);
 	packing_fini(&k, b->tile_count);
 	return rc;
 }
@@ -228,6 +273,7 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 		 size_t payload_size, struct error *e)
 {
 	struct cutter c = cutter_of(payload, payload_size);
+	struct blob_hash digest;
 	memset(b, 0, sizeof *b);
 	int rc = lease_key_from_wire(m->key, &b->key, e);
 	if (!rc && m->n_counters != BATCH_COUNTERS)
@@ -255,6 +301,8 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 		b->state_count = (uint32_t)m->n_state_sizes;
 		rc = cut_states(&c, m->state_sizes, m->n_state_sizes, &b->states, e);
 	}
+	if (!rc && m->states_digest.len)
+		rc = check_digest(b->states, b->state_count, &m->states_digest, &digest, e);
 	if (!rc)
 		rc = cut_floats(&c, "weights", m->weight_count, &b->weights, &b->weight_count, e);
 	if (!rc)
@@ -286,6 +334,7 @@ int grant_pack(const struct lease_key *k, const uint64_t *seeds, const struct ch
 	farm__lease_grant__init(&m);
 	Farm__Envelope env;
 	farm__envelope__init(&env);
+	struct blob_hash digest;
 	uint64_t *seed_copy = seeds ? mem_alloc(chain_count, sizeof *seed_copy) : NULL;
 	uint32_t *sizes = states ? mem_alloc(chain_count, sizeof *sizes) : NULL;
 	size_t payload = 0;
@@ -303,8 +352,10 @@ int grant_pack(const struct lease_key *k, const uint64_t *seeds, const struct ch
 		m.state_sizes = sizes;
 		env.body_case = FARM__ENVELOPE__BODY_LEASE_GRANT;
 		env.lease_grant = &m;
-		rc = envelope_pack(&env, NULL, payload, frame, size, e);
+		rc = digest_to_wire(states, states ? chain_count : 0, &digest, &m.states_digest, e);
 	}
+	if (!rc)
+		rc = envelope_pack(&env, NULL, payload, frame, size, e);
 	if (!rc && states) {
 		unsigned char *at = *frame + *size - payload;
 		for (uint32_t i = 0; i < chain_count; at += states[i++].size)
@@ -335,6 +386,8 @@ int grant_unpack(struct grant *g, const Farm__LeaseGrant *m, const unsigned char
 	if (!rc && m->n_state_sizes) {
 		g->chain_count = (uint32_t)m->n_state_sizes;
 		rc = cut_states(&c, m->state_sizes, m->n_state_sizes, &g->states, e);
+		if (!rc)
+			rc = check_digest(g->states, g->chain_count, &m->states_digest, &g->digest, e);
 	}
 	if (!rc && c.left)
 		rc = error_set(e, EBADMSG, "%zu bytes too many behind a lease", c.left);

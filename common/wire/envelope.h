@@ -13,7 +13,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 7 };
+enum { FARM_VERSION = 8 };
 
 struct envelope_block;
 

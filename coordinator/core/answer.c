@@ -246,9 +246,17 @@ static struct lease *held(const struct farm *f, const struct event *ev)
 	return s ? lease_of(s, farm_find_peer(f, ev->peer)) : NULL;
 }
 
+/* Of an earlier grant of this lease. Its worker has, or will have, the one of the states that are there now. */
+static bool is_late_refusal(const struct slot *s, const struct event *ev)
+{
+	return ev->lease.bad_states && (ev->lease.other_states || s->doubt.anew);
+}
+
 void answer_failed(struct farm *f, const struct event *ev)
 {
 	struct slot *s = next_slot(f, ev);
+	if (s && is_late_refusal(s, ev))
+		return;
 	struct peer *p = farm_find_peer(f, ev->peer);
 	struct lease *l = s ? lease_of(s, p) : NULL;
 	/* It may tell of a lease that an earlier life of it had, and that ended that life. */

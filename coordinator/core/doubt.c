@@ -78,6 +78,7 @@ static void take_back(struct farm *f, struct job *j, struct slot *s, const char 
 static void begin_anew(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
 	const struct lease_key k = key_of(j, s);
+	lease_revoke_slot(f, s); /* who has the states still */
 	s->doubt.anew = true;
 	j->anew++;
 	text_print(f->text, sizeof f->text,
@@ -93,8 +94,6 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 {
 	struct doubt *d = &s->doubt;
 	uint64_t who = p->who->id;
-	if (d->anew)
-		return;
 	bool second = d->refuser && d->refuser != who && d->maker != who;
 	if (!d->refuser)
 		d->refuser = who;

@@ -110,6 +110,7 @@ struct event {
 			struct batch_digest digest; /* BATCH, STORED: of a lease that farm_verifies */
 			bool own; /* LEASE_FAILED: it says that its own machine is at fault, not the job */
 			bool bad_states; /* LEASE_FAILED: it says that the chains cannot go on from the states that came with it */
+			bool other_states; /* ... and these are not the ones that the lease begins with now: it was given before with others */
 			bool can_take_back; /* ... and the batch that these came with can be taken out, and the states before it are there */
 		} lease;
 		enum job_hold hold;

@@ -211,6 +211,15 @@ int order_pack_lease(const struct order *o, const struct lease_key *k, bool anew
 	return grant_pack(k, seeds, NULL, o->chains_per_lease, frame, size, e);
 }
 
+bool order_gives_states(const struct order *o, const struct lease_key *k, const struct blob_hash *digest)
+{
+	struct blob_hash own;
+	struct error e;
+	bool begins_with_states = k->kind == LEASE_RENDER && o->plan.kind == PLAN_CHAINS && k->group < o->plan.groups && k->part < o->plan.parts &&
+				  k->epoch > 0 && *states_at(o, k);
+	return begins_with_states && states_digest(*states_at(o, k), o->chains_per_lease, &own, &e) == 0 && blob_hash_equal(&own, digest);
+}
+
 void order_count_worker(struct order *o, uint64_t peer)
 {
 	enum { KNOWN = sizeof o->last_workers / sizeof *o->last_workers };

@@ -127,6 +127,8 @@ void order_note_times(struct order *o, double elapsed, uint64_t rounds);
 uint64_t order_rounds(const struct order *o); /* complete */
 /* All bootstrap batches are in: b, seeds, canvas. */
 int order_prepare(struct order *o, const char *canvas_folder, struct error *e);
+/* A lease begins with chain states, those of the epoch before, and they are those of this digest. */
+bool order_gives_states(const struct order *o, const struct lease_key *k, const struct blob_hash *digest);
 /* The lease as a frame for a worker. anew: with seeds, whatever its epoch. */
 int order_pack_lease(const struct order *o, const struct lease_key *k, bool anew, unsigned char **frame, size_t *size, struct error *e);
 void order_count_worker(struct order *o, uint64_t peer);

@@ -41,6 +41,8 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	ev.job = ev.lease.key.job;
 	struct order *o = server_order(s, ev.job);
 	int rc = o ? batch_unpack(&batch, &o->plan, m, payload->bytes, payload->size, &e) : 0;
+	if (o && !rc && batch.state_count && !m->states_digest.len)
+		rc = error_set(&e, EBADMSG, "chain states without a digest");
 	if (o && !rc && farm_verifies(s->farm, &ev.lease.key))
 		rc = digest_batch(&batch, &ev.lease.digest, &e);
 	if (o && !rc && o->canvas && batch.key.kind == LEASE_RENDER)

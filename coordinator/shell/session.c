@@ -232,7 +232,7 @@ static void take_lease_failed(struct session *p, struct envelope *env)
 		session_lease_failed(p, env->message->lease_failed);
 }
 
-/* Who does not hold the lease was given no states: nobody made them. */
+/* Who does not hold the lease, or refuses states that it had before, refuses nothing that is there: nobody made it. */
 static void log_failure(const struct session *p, struct order *o, const Farm__LeaseFailed *f, const struct lease_key *k, const char *text, bool holds)
 {
 	struct log_value name = log_quote(p->name), said = log_quote(text);
@@ -249,25 +249,27 @@ void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 {
 	struct error e;
 	char text[1024];
+	struct blob_hash states = {{0}};
 	struct event ev = {.kind = *f->text ? EVENT_LEASE_FAILED : EVENT_LEASE_RETURNED, .peer = p->id, .text = text};
 	/* Whatever it says, it failed: many texts of a scene's author are in it. */
 	text_copy(text, sizeof text, f->text);
 	text_clean(text);
-	if (lease_key_from_wire(f->key, &ev.lease.key, &e)) {
+	if (lease_key_from_wire(f->key, &ev.lease.key, &e) || (f->bad_states && states_digest_from_wire(&f->states_digest, &states, &e))) {
 		session_fault(p, "a lease cannot fail like this");
 		return;
 	}
 	ev.job = ev.lease.key.job;
+	struct order *o = server_order(p->server, ev.job);
 	ev.lease.own = f->own;
 	ev.lease.bad_states = f->bad_states;
-	struct order *o = server_order(p->server, ev.job);
+	ev.lease.other_states = f->bad_states && !(o && order_gives_states(o, &ev.lease.key, &states));
 	bool blamed = f->own || f->bad_states;
 	if (o && *f->text && !blamed && !files_are_right(p->server, o, FILES_DOUBTED)) { /* the spool's fault, not the worker's */
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
 	}
 	struct back back = {0};
-	bool holds = farm_awaits(p->server->farm, p->id, &ev.lease.key) == DELIVERY_AWAITED; /* else nothing is read for it */
+	bool holds = farm_awaits(p->server->farm, p->id, &ev.lease.key) == DELIVERY_AWAITED && !ev.lease.other_states; /* else nothing is read for it */
 	if (o && *text)
 		log_failure(p, o, f, &ev.lease.key, text, holds);
 	if (o && *text && f->bad_states && holds && !o->busy && !p->server->stepping && journal_write(o->journal, &e) == 0)

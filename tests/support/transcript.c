@@ -219,7 +219,8 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		ev->kind = EVENT_REQUEST;
 		ev->want = (uint32_t)take_count(at);
 	} else {
-		bool lacks = take(at, "lacks"), lost = !lacks && take(at, "denies"), refuses = lost || (!lacks && take(at, "refuses"));
+		bool lacks = take(at, "lacks"), lost = !lacks && take(at, "denies"), late = !lacks && !lost && take(at, "recalls");
+		bool refuses = lost || late || (!lacks && take(at, "refuses"));
 		ev->kind = lacks || refuses	  ? EVENT_LEASE_FAILED
 			   : take(at, "batch")	  ? EVENT_BATCH
 			   : take(at, "stored")	  ? EVENT_STORED
@@ -232,6 +233,7 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		ev->lease.own = lacks;
 		ev->lease.bad_states = refuses;
 		ev->lease.can_take_back = refuses && !lost;
+		ev->lease.other_states = late;
 		ev->lease.valid = !take(at, "bad");
 		if (take(at, "says "))
 			memset(&ev->lease.digest, *(*at)++, sizeof ev->lease.digest);

@@ -5,7 +5,7 @@
  *
  * Events:
  *   wN joins F threads=T | wN leaves | wN heard | wN wants N
- *   wN batch KEY [bad TEXT] | wN fails KEY TEXT | wN lacks KEY TEXT (its own machine's fault) | wN refuses KEY TEXT (its states) | wN denies KEY TEXT
+ *   wN batch KEY [bad TEXT] | wN fails KEY TEXT | wN lacks KEY TEXT (its own machine's fault) | wN refuses KEY TEXT (its states) | wN denies KEY TEXT | wN recalls KEY TEXT
  *   (the same, and what came before them is gone) | wN returns KEY        KEY: j1 g0 p0 e0, or j1 g0 p0 boot
  *   submit [NAME=VALUE ...]: priority mixed groups parts rounds seconds target boot owner
  *   restore [asked] J boot|render N,N,... [fingerprint=F] [elapsed=T] [completed=T] [black] [as submit]: the slots' next epochs

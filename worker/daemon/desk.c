@@ -92,7 +92,7 @@ static void fail_leases_of(struct agent *a, struct bundle *b, const struct error
 		next = l->next;
 		if (l->bundle != b || l->state != LEASE_WAITING)
 			continue;
-		say_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own, false);
+		say_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own);
 		drop_lease(a, l);
 	}
 }
@@ -198,7 +198,10 @@ static void on_rendered(struct lease_task *l)
 	if (l->unwanted) {
 		drop_lease(a, l);
 	} else if (l->rc || l->end == LEASE_STOPPED) {
-		say_failed(a, &l->grant.key, l->rc ? l->error.text : "", false, l->rc == -EILSEQ);
+		if (l->rc == -EILSEQ)
+			say_bad_states(a, &l->grant, l->error.text);
+		else
+			say_failed(a, &l->grant.key, l->rc ? l->error.text : "", false);
 		drop_lease(a, l);
 	} else {
 		say_result(a, l);
@@ -239,6 +242,10 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	}
 	struct bundle *b = find_bundle(a, g.key.job);
 	l = find_lease(a, &g.key);
+	if (l && !blob_hash_equal(&l->grant.digest, &g.digest)) { /* the epoch before was computed again: this one is another now */
+		forget_lease(a, l);
+		l = NULL;
+	}
 	if (l) { /* it is at work here already, from an earlier connection */
 		if (l->state == LEASE_RENDERED)
 			say_result(a, l);
@@ -251,7 +258,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 		return;
 	}
 	if (a->leaving || is_stuffed(a)) {
-		say_failed(a, &g.key, "", false, false);
+		say_failed(a, &g.key, "", false);
 		grant_fini(&g);
 		return;
 	}
@@ -267,7 +274,7 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	if (!rc)
 		rc = lease_task_new(&l, &g, b, &e);
 	if (rc) {
-		say_failed(a, &g.key, e.text, true, false);
+		say_failed(a, &g.key, e.text, true);
 		grant_fini(&g);
 		return;
 	}
@@ -426,7 +433,7 @@ static void tell_lost(struct agent *a)
 	struct lost_lease *l;
 	for (unsigned i = 0; (l = work_lost(i)); i++)
 		if (!l->told) {
-			say_failed(a, &l->key, l->text, l->own, false);
+			say_failed(a, &l->key, l->text, l->own);
 			l->told = true;
 		}
 }
@@ -451,7 +458,7 @@ void desk_leave(struct agent *a)
 		next = l->next;
 		if (l->state == LEASE_RENDERED || (l->state == LEASE_QUEUED && !crew_take_back(a->crew, &l->task)))
 			continue;
-		say_failed(a, &l->grant.key, "", false, false);
+		say_failed(a, &l->grant.key, "", false);
 		drop_lease(a, l);
 	}
 }
@@ -480,7 +487,7 @@ static bool watch_leases(struct agent *a)
 		if (l->state != LEASE_QUEUED || l->task.hung || !has_hung(&l->task))
 			continue;
 		if (!l->unwanted)
-			say_failed(a, &l->grant.key, text, false, false);
+			say_failed(a, &l->grant.key, text, false);
 		l->unwanted = l->task.hung = found = true;
 		atomic_store(&l->stop, true);
 	}

@@ -35,9 +35,11 @@ void say_job_get(struct agent *a, uint64_t job)
 	agent_send(a, &m);
 }
 
-void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own, bool bad_states)
+/* states: their digest; NULL: they are not at fault. */
+static void say(struct agent *a, const struct lease_key *k, const char *text, bool own, const struct blob_hash *states)
 {
 	char copy[1024];
+	struct blob_hash digest;
 	Farm__LeaseKey key;
 	Farm__LeaseFailed failed;
 	Farm__Envelope m;
@@ -49,13 +51,27 @@ void say_failed(struct agent *a, const struct lease_key *k, const char *text, bo
 	failed.key = &key;
 	failed.text = copy;
 	failed.own = own;
-	failed.bad_states = bad_states;
+	failed.bad_states = states != NULL;
+	if (states) {
+		digest = *states;
+		failed.states_digest = (ProtobufCBinaryData){sizeof digest.bytes, digest.bytes};
+	}
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
 	m.lease_failed = &failed;
 	agent_send(a, &m);
 	if (*text)
 		log_event(LOG_LEASE_FAILED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k->job), k->group,
 			  k->part, number(k->epoch), log_quote(text).text);
+}
+
+void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
+{
+	say(a, k, text, own, NULL);
+}
+
+void say_bad_states(struct agent *a, const struct grant *g, const char *text)
+{
+	say(a, &g->key, text, false, &g->digest);
 }
 
 void say_result(struct agent *a, struct lease_task *l)

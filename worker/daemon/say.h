@@ -9,8 +9,10 @@
 
 void say_request(struct agent *a); /* how many leases it wants to hold */
 void say_job_get(struct agent *a, uint64_t job);
-/* An empty text gives the lease back without fault; own: this machine is at fault, not the job; bad_states: who made the states is. */
-void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own, bool bad_states);
+/* An empty text gives the lease back without fault; own: this machine is at fault, not the job. */
+void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own);
+/* Who made the chain states that came with it is at fault. */
+void say_bad_states(struct agent *a, const struct grant *g, const char *text);
 void say_result(struct agent *a, struct lease_task *l); /* once a connection */
 
 #endif

@@ -158,6 +158,45 @@ static void a_second_refusal_takes_the_epoch_back(void **state)
 	farm_free(f);
 }
 
+/* Its grant crossed with the refusal of states that are gone: it has the lease still, and nobody is to blame. */
+static void a_late_refusal_is_of_no_consequence(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START, WORKER(2, "b"), WORKER(3, "c"),
+		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1", "[3] w3 wants 1 -> -",
+		"[4] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
+		"[5] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+		"[6] w2 wants 0 -> -", "[6] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1",
+		"[7] w3 recalls j1 g0 p0 e1 no -> -",
+		"[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
+		NULL });
+	assert_int_equal(wrong(f, 1), 1);
+	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
+	farm_free(f);
+}
+
+/* A copy of the lease is out with the states that are given up: it is taken back, and what its worker says of them is late. */
+static void who_has_states_that_are_given_up_loses_them(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+		START, WORKER(2, "b"), WORKER(3, "c"),
+		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+		"[4] w3 wants 1 -> -", "[6] w2 heard -> w3 gets j1 g0 p0 e1",
+		"[6] w4 joins A threads=1 name=d -> -",
+		"[7] w2 wants 0 -> -", "[7] w2 refuses j1 g0 p0 e1 no -> -",
+		"[7] w4 wants 1 -> -", "[12] w3 heard -> w4 gets j1 g0 p0 e1",
+		"[13] w4 denies j1 g0 p0 e1 no -> w3 loses j1 g0 p0 e1, anew, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w4 gets j1 g0 p0 e1 anew",
+		"[13] w3 refuses j1 g0 p0 e1 no -> -", /* what it had before */
+		"[13] w4 refuses j1 g0 p0 e1 no -> -", /* the same */
+		"[14] w4 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
+		NULL });
+	farm_free(f);
+}
+
 /* Nobody holds a job up for ever by saying so again and again. */
 static void after_four_times_the_chains_begin_anew(void **state)
 {
@@ -256,6 +295,8 @@ int main(void)
 		cmocka_unit_test(a_third_that_leaves),
 		cmocka_unit_test(the_maker_goes_on),
 		cmocka_unit_test(a_second_refusal_takes_the_epoch_back),
+		cmocka_unit_test(a_late_refusal_is_of_no_consequence),
+		cmocka_unit_test(who_has_states_that_are_given_up_loses_them),
 		cmocka_unit_test(after_four_times_the_chains_begin_anew),
 		cmocka_unit_test(one_epoch_after_the_other_is_taken_back),
 		cmocka_unit_test(a_liar_is_set_aside),

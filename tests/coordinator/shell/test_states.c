@@ -1,0 +1,216 @@
+/*
+ * The coordinator's shell and a worker that says by digest which chain states it made and which it refuses: a refusal counts against the
+ * states that it names and no others; states that are not those of their digest are refused before they are stored.
+ */
+#include "tests/support/served.h"
+
+#include "common/base/mem.h"
+#include "tests/support/sealed_frame.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <stdio.h>
+
+enum { STATE_BYTES = 16 };
+
+static struct fixture {
+	struct plan plan;
+	struct scripted *client, *worker;
+	struct grant grant; /* the last one */
+	bool granted;       /* it has come and was not looked at */
+	Farm__Verdict verdict; /* the last one */
+	char text[256];        /* of it */
+} t;
+
+static int set_up(void **state)
+{
+	(void)state;
+	struct plan_request r = peer_plan_request(NULL);
+	struct error e;
+	int rc = served_start(60, 60, 60);
+	t.granted = false;
+	assert_int_equal(plan_make(&r, &t.plan, &e), 0);
+	t.client = peer_call();
+	t.worker = peer_call();
+	assert_true(peer_hello(t.client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
+	peer_submit(t.client, NULL, "<scene/>", "s.xml", "s.xml");
+	assert_int_equal(peer_submit_answer(t.client)->n_missing, 1);
+	peer_send_blob(t.client, "<scene/>", "<scene/>");
+	assert_int_equal(peer_submit_answer(t.client)->job, 1);
+	assert_true(peer_hello(t.worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
+	assert_true(scripted_want(t.worker, 1));
+	return rc;
+}
+
+static int tear_down(void **state)
+{
+	grant_fini(&t.grant);
+	scripted_hang_up(t.worker);
+	scripted_hang_up(t.client);
+	return served_stop(state);
+}
+
+/* Grants may come before the verdict on what was sent before them. */
+static void attend(void)
+{
+	struct error e;
+	const Farm__Envelope *m = scripted_hear(t.worker);
+	assert_non_null(m);
+	if (m->body_case == FARM__ENVELOPE__BODY_LEASE_ACK) {
+		t.verdict = m->lease_ack->verdict;
+		snprintf(t.text, sizeof t.text, "%s", m->lease_ack->text);
+	}
+	if (m->body_case != FARM__ENVELOPE__BODY_LEASE_GRANT)
+		return;
+	assert_false(t.granted);
+	grant_fini(&t.grant);
+	assert_int_equal(grant_unpack(&t.grant, m->lease_grant, t.worker->reader.payload.bytes, t.worker->reader.payload.size, &e), 0);
+	t.granted = true;
+}
+
+static Farm__Verdict verdict(void)
+{
+	for (t.verdict = FARM__VERDICT__VERDICT_NONE; t.verdict == FARM__VERDICT__VERDICT_NONE;)
+		attend();
+	return t.verdict;
+}
+
+static struct batch result(uint8_t mark)
+{
+	struct batch b = scripted_batch(&t.grant.key, &t.plan, STATE_BYTES);
+	for (uint32_t i = 0; i < b.state_count; i++)
+		b.states[i].bytes[STATE_BYTES - 1] = mark;
+	return b;
+}
+
+/* Its states end with this byte. */
+static void answer(uint8_t mark)
+{
+	struct batch b = result(mark);
+	peer_send_batch(t.worker, &b, &t.plan);
+	batch_fini(&b);
+	if (verdict() != FARM__VERDICT__VERDICT_MERGED)
+		fail_msg("refused: %s", t.text);
+}
+
+static void hear_grant(void)
+{
+	while (!t.granted)
+		attend();
+	t.granted = false;
+}
+
+static void come_to_states(void)
+{
+	for (hear_grant(); !t.grant.states; hear_grant())
+		answer(1);
+}
+
+/* Answers others until it holds this one. */
+static void come_to(const struct lease_key *k)
+{
+	for (hear_grant(); !lease_key_equal(&t.grant.key, k); hear_grant())
+		answer(1);
+}
+
+static void refuse(const struct lease_key *k, const struct blob_hash *states)
+{
+	Farm__LeaseKey key;
+	Farm__LeaseFailed failed;
+	Farm__Envelope m;
+	struct blob_hash copy = *states;
+	char text[] = "it does not resume";
+	farm__lease_failed__init(&failed);
+	farm__envelope__init(&m);
+	lease_key_to_wire(k, &key);
+	failed.key = &key;
+	failed.text = text;
+	failed.bad_states = true;
+	failed.states_digest = (ProtobufCBinaryData){sizeof copy.bytes, copy.bytes};
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_FAILED;
+	m.lease_failed = &failed;
+	peer_say(t.worker, &m, NULL, 0);
+}
+
+/* The worker refuses the states of a lease, the epoch that they are the end of is computed again, with other states, and the lease is
+ * given with these: the same refusal, come again or late, says nothing about them. */
+static void a_refusal_is_of_the_states_that_it_names(void **state)
+{
+	(void)state;
+	come_to_states();
+	const struct lease_key k = t.grant.key;
+	const struct blob_hash first = t.grant.digest;
+	struct lease_key before = k, after = k;
+	before.epoch--;
+	after.epoch++;
+	refuse(&k, &first);
+	come_to(&before);
+	answer(2);
+	come_to(&k);
+	assert_false(blob_hash_equal(&t.grant.digest, &first));
+	assert_int_equal(t.grant.states[0].bytes[STATE_BYTES - 1], 2);
+	refuse(&k, &first);
+	answer(3); /* else it would be refused: its epoch is not open */
+	/* The ones that are there now can be refused. */
+	come_to(&after);
+	refuse(&after, &t.grant.digest);
+	come_to(&k);
+	answer(3);
+}
+
+/* Damaged after the digest was made, or without one. */
+static void send_damaged(bool without)
+{
+	struct batch b = result(5);
+	struct envelope env;
+	struct frame_reader r;
+	struct error e;
+	unsigned char *frame;
+	size_t size, used;
+	assert_int_equal(batch_pack(&b, &t.plan, &frame, &size, &e), 0);
+	batch_fini(&b);
+	frame_reader_init(&r, (struct frame_limits){1 << 20, 1 << 24});
+	assert_int_equal(frame_reader_take(&r, frame, size, &used, &e), 1);
+	assert_int_equal(envelope_unpack(&env, r.header.bytes, r.header.size, &e), 0);
+	mem_free(frame);
+	Farm__LeaseResult *m = env.message->lease_result;
+	size_t tiles = 0;
+	for (size_t i = 0; i < m->n_tile_sizes; i++)
+		tiles += m->tile_sizes[i];
+	if (without)
+		m->states_digest.len = 0;
+	else
+		r.payload.bytes[tiles + STATE_BYTES - 1] ^= 4;
+	peer_say(t.worker, env.message, r.payload.bytes, r.payload.size);
+	envelope_fini(&env);
+	frame_reader_fini(&r);
+}
+
+static void states_that_are_not_those_of_their_digest_are_refused(void **state)
+{
+	(void)state;
+	come_to_states();
+	const struct lease_key k = t.grant.key;
+	send_damaged(false);
+	assert_int_equal(verdict(), FARM__VERDICT__VERDICT_REFUSED);
+	assert_string_equal(t.text, "the chain states are not those of their digest");
+	come_to(&k);
+	send_damaged(true);
+	assert_int_equal(verdict(), FARM__VERDICT__VERDICT_REFUSED);
+	assert_string_equal(t.text, "chain states without a digest");
+	come_to(&k);
+	answer(6);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(a_refusal_is_of_the_states_that_it_names, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(states_that_are_not_those_of_their_digest_are_refused, set_up, tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
