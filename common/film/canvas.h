@@ -76,7 +76,7 @@ enum error_doubt {
 	ERROR_ONE_GROUP, /* too much of it comes from pixels where one group of samples outweighs the others: rare light */
 	ERROR_DARK,      /* ... from pixels whose brightness, by which errors are divided, is not known */
 	ERROR_WIDE,      /* the interval would span more than a factor of ten of the relative error */
-	ERROR_SHORT,     /* chains are too short to be judged (common/film/agreement.h) */
+	ERROR_SHORT,     /* chains are too short to be judged (common/film/convergence.h) */
 };
 
 struct canvas_image {

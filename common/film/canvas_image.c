@@ -1,5 +1,5 @@
 /* From integer sums to an image. All loops run in a fixed order over exact inputs, so that equal films give equal bits. */
-#include "common/film/agreement.h"
+#include "common/film/convergence.h"
 #include "common/film/canvas_private.h"
 #include "common/film/color.h"
 
@@ -134,8 +134,8 @@ static int find_moments(const struct making *m, struct error *e)
 /* Chains that are flagged and too short to be blamed for it: how far their errors reach is not known. */
 static void doubt_short_chains(struct making *m)
 {
-	struct agreement a;
-	agreement_judge(&m->c->plan, m->img, &a);
+	struct convergence a;
+	convergence_judge(&m->c->plan, m->img, &a);
 	if (a.verdict != CHAINS_TOO_SHORT || m->img->rel_mse_doubt)
 		return;
 	m->img->rel_mse_doubt = ERROR_SHORT;

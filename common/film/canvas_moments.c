@@ -147,7 +147,7 @@ void moments_close_round(struct moments *m, uint64_t round)
 /* ---- files */
 
 /* Runs of a film's tiles, or of a group's classes; one of zeros is a byte. */
-static int save_runs(struct sealed *out, const void *bytes, size_t run, size_t count, struct error *e)
+static int save_runs(struct checked_file *out, const void *bytes, size_t run, size_t count, struct error *e)
 {
 	const unsigned char *p = bytes;
 	int rc = 0;
@@ -155,31 +155,31 @@ static int save_runs(struct sealed *out, const void *bytes, size_t run, size_t c
 		unsigned char any = 0;
 		for (size_t k = 0; k < run && !any; k++)
 			any = p[k] != 0;
-		rc = sealed_write(out, &any, 1, e);
+		rc = checked_file_write(out, &any, 1, e);
 		if (!rc && any)
-			rc = sealed_write(out, p, run, e);
+			rc = checked_file_write(out, p, run, e);
 	}
 	return rc;
 }
 
-static int load_runs(struct sealed *in, void *bytes, size_t run, size_t count, struct error *e)
+static int load_runs(struct checked_file *in, void *bytes, size_t run, size_t count, struct error *e)
 {
 	unsigned char *p = bytes;
 	int rc = 0;
 	for (size_t i = 0; i < count && !rc; i++, p += run) {
 		unsigned char any;
-		rc = sealed_read(in, &any, 1, e);
+		rc = checked_file_read(in, &any, 1, e);
 		if (!rc && any)
-			rc = sealed_read(in, p, run, e);
+			rc = checked_file_read(in, p, run, e);
 	}
 	return rc;
 }
 
-int moments_save(const struct moments *m, struct sealed *out, struct error *e)
+int moments_save(const struct moments *m, struct checked_file *out, struct error *e)
 {
 	size_t film = m->tiles * sizeof *m->first, sum = sizeof *m->time;
 	uint32_t shape[4] = {m->per_lease, m->leases, m->tiles, PATH_CLASSES};
-	int rc = sealed_write(out, shape, sizeof shape, e);
+	int rc = checked_file_write(out, shape, sizeof shape, e);
 	if (!rc)
 		rc = save_runs(out, m->first, film, SETS * first_count(m) / m->tiles, e);
 	if (!rc)
@@ -189,11 +189,11 @@ int moments_save(const struct moments *m, struct sealed *out, struct error *e)
 	return rc ? rc : save_runs(out, m->bootstrap, sum, class_count(m), e);
 }
 
-int moments_load(struct moments *m, struct sealed *in, struct error *e)
+int moments_load(struct moments *m, struct checked_file *in, struct error *e)
 {
 	size_t film = m->tiles * sizeof *m->first, sum = sizeof *m->time;
 	uint32_t shape[4];
-	int rc = sealed_read(in, shape, sizeof shape, e);
+	int rc = checked_file_read(in, shape, sizeof shape, e);
 	if (!rc && (shape[0] != m->per_lease || shape[1] != m->leases || shape[2] != m->tiles || shape[3] != PATH_CLASSES))
 		rc = error_set(e, EBADMSG, "moments of other chains");
 	if (!rc)

@@ -7,7 +7,7 @@
 #ifndef COMMON_FILM_CANVAS_MOMENTS_H
 #define COMMON_FILM_CANVAS_MOMENTS_H
 
-#include "common/base/sealed.h"
+#include "common/base/checked_file.h"
 #include "common/film/canvas.h"
 
 struct moments;
@@ -22,8 +22,8 @@ void moments_add(struct moments *m, const struct batch *b, bool closed);
 void moments_take_back(struct moments *m, const struct batch *b, bool closed); /* of a render lease, as it was added */
 void moments_close_round(struct moments *m, uint64_t round);
 
-int moments_save(const struct moments *m, struct sealed *out, struct error *e);
-int moments_load(struct moments *m, struct sealed *in, struct error *e); /* into new ones of the same plan */
+int moments_save(const struct moments *m, struct checked_file *out, struct error *e);
+int moments_load(struct moments *m, struct checked_file *in, struct error *e); /* into new ones of the same plan */
 
 /* What moments_image needs of a group: independent samples of its bootstrap, mutations that are merged, b. */
 struct moments_group {

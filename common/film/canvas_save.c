@@ -64,7 +64,7 @@ static void pieces_of(struct canvas *c, struct piece p[PIECES])
 	memcpy(p, all, sizeof all);
 }
 
-static int save_tiles(const struct canvas *c, struct sealed *out, struct error *e)
+static int save_tiles(const struct canvas *c, struct checked_file *out, struct error *e)
 {
 	int rc = 0;
 	for (size_t film = 0; film < films_of(c) && !rc; film++)
@@ -72,33 +72,33 @@ static int save_tiles(const struct canvas *c, struct sealed *out, struct error *
 			if (!(*canvas_flags(c, film, tile) & TILE_USED))
 				continue;
 			struct place at = {(uint32_t)film, (uint32_t)tile};
-			rc = sealed_write(out, &at, sizeof at, e);
+			rc = checked_file_write(out, &at, sizeof at, e);
 			if (!rc)
-				rc = sealed_write(out, canvas_slot(c, film, tile), SLOT * sizeof *c->sums, e);
+				rc = checked_file_write(out, canvas_slot(c, film, tile), SLOT * sizeof *c->sums, e);
 		}
-	return rc ? rc : sealed_write(out, &(struct place){END, END}, sizeof(struct place), e);
+	return rc ? rc : checked_file_write(out, &(struct place){END, END}, sizeof(struct place), e);
 }
 
-int canvas_save(const struct canvas *c, struct sealed *out, struct error *e)
+int canvas_save(const struct canvas *c, struct checked_file *out, struct error *e)
 {
 	struct head h = head_of(c);
 	assert(canvas_missing(c) == 0);
 	struct canvas copy = *c; /* its pieces are only read */
 	struct piece p[PIECES];
 	pieces_of(&copy, p);
-	int rc = sealed_write(out, &h, sizeof h, e);
+	int rc = checked_file_write(out, &h, sizeof h, e);
 	for (int i = 0; i < PIECES && !rc; i++)
-		rc = sealed_write(out, p[i].bytes, p[i].size, e);
+		rc = checked_file_write(out, p[i].bytes, p[i].size, e);
 	if (!rc)
 		rc = moments_save(c->moments, out, e);
 	return rc ? rc : save_tiles(c, out, e);
 }
 
-static int load_tiles(struct canvas *c, struct sealed *in, struct error *e)
+static int load_tiles(struct canvas *c, struct checked_file *in, struct error *e)
 {
 	for (;;) {
 		struct place at;
-		int rc = sealed_read(in, &at, sizeof at, e);
+		int rc = checked_file_read(in, &at, sizeof at, e);
 		if (rc || at.film == END)
 			return rc;
 		if (at.film >= films_of(c) || at.tile >= canvas_tiles(c))
@@ -108,18 +108,18 @@ static int load_tiles(struct canvas *c, struct sealed *in, struct error *e)
 		if (!rc)
 			rc = canvas_back_tile(c, canvas_film(at.film / FILMS, FILM_PREFIX), at.tile, e);
 		if (!rc)
-			rc = sealed_read(in, canvas_slot(c, at.film, at.tile), SLOT * sizeof *c->sums, e);
+			rc = checked_file_read(in, canvas_slot(c, at.film, at.tile), SLOT * sizeof *c->sums, e);
 		if (rc)
 			return rc;
 		*canvas_flags(c, at.film, at.tile) |= TILE_USED;
 	}
 }
 
-int canvas_load(struct canvas *c, struct sealed *in, struct error *e)
+int canvas_load(struct canvas *c, struct checked_file *in, struct error *e)
 {
 	struct head h, want = head_of(c);
 	struct piece p[PIECES];
-	int rc = sealed_read(in, &h, sizeof h, e);
+	int rc = checked_file_read(in, &h, sizeof h, e);
 	if (rc)
 		return rc;
 	if (h.version != want.version || h.tally_bytes != want.tally_bytes || h.slot != want.slot)
@@ -129,7 +129,7 @@ int canvas_load(struct canvas *c, struct sealed *in, struct error *e)
 		return error_set(e, EBADMSG, "%s: the films of another plan", in->path);
 	pieces_of(c, p);
 	for (int i = 0; i < PIECES && !rc; i++)
-		rc = sealed_read(in, p[i].bytes, p[i].size, e);
+		rc = checked_file_read(in, p[i].bytes, p[i].size, e);
 	if (!rc)
 		rc = moments_load(c->moments, in, e);
 	return rc ? rc : load_tiles(c, in, e);

@@ -5,11 +5,11 @@
 #ifndef COMMON_FILM_CANVAS_SAVE_H
 #define COMMON_FILM_CANVAS_SAVE_H
 
-#include "common/base/sealed.h"
+#include "common/base/checked_file.h"
 #include "common/film/canvas.h"
 
-int canvas_save(const struct canvas *c, struct sealed *out, struct error *e);
+int canvas_save(const struct canvas *c, struct checked_file *out, struct error *e);
 /* Into a new canvas of the same plan and grid. -EBADMSG: of another one; -EPROTO: of another version; the canvas is of no use then. */
-int canvas_load(struct canvas *c, struct sealed *in, struct error *e);
+int canvas_load(struct canvas *c, struct checked_file *in, struct error *e);
 
 #endif

@@ -1,7 +1,7 @@
 #include "common/film/header.h"
 
 #include "common/base/version.h"
-#include "common/film/agreement.h"
+#include "common/film/convergence.h"
 #include "common/film/stated_error.h"
 #include "common/film/strategy.h"
 
@@ -171,19 +171,19 @@ static void add_plan(struct header *h, const struct plan *p, uint64_t rounds)
 	add_count(h, H_ROUNDS, rounds);
 }
 
-static void add_agreement(struct header *h, const struct canvas_image *img, const struct plan *p, const struct agreement *a)
+static void add_convergence(struct header *h, const struct canvas_image *img, const struct plan *p, const struct convergence *a)
 {
 	if (p->kind != PLAN_CHAINS)
 		return;
-	char table[AGREEMENT_TABLE];
-	add_string(h, H_AGREEMENT, agreement_name(a->verdict));
+	char table[CONVERGENCE_TABLE];
+	add_string(h, H_AGREEMENT, convergence_name(a->verdict));
 	if (*a->text)
 		add_string(h, H_DISAGREEMENT, a->text);
 	if (!isnan(a->r_hat_worst)) {
 		add_double(h, H_R_HAT_MEDIAN, a->r_hat_median);
 		add_double(h, H_R_HAT_WORST, a->r_hat_worst);
 	}
-	agreement_table(img->classes, img->b, a, table, sizeof table);
+	convergence_table(img->classes, img->b, a, table, sizeof table);
 	if (*table)
 		add_string(h, H_CLASSES, table);
 }
@@ -240,14 +240,14 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 	strategy_lines(p->mutations, &img->counts, text, sizeof text);
 	if (*text)
 		add_string(h, H_STRATEGIES, text);
-	struct agreement a;
-	agreement_judge(p, img, &a);
+	struct convergence a;
+	convergence_judge(p, img, &a);
 	strategy_note(p, &img->counts, img->black, text, sizeof text);
 	strategy_add_beyond(img->beyond_share, text, sizeof text);
-	agreement_add_note(&a, text, sizeof text);
+	convergence_add_note(&a, text, sizeof text);
 	if (*text)
 		add_string(h, H_NOTE, text);
-	add_agreement(h, img, p, &a);
+	add_convergence(h, img, p, &a);
 }
 
 static void add_extra(struct header *h, const struct header_extra *x)

@@ -310,7 +310,7 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 	};
 	memcpy(p->integrator, r->integrator, sizeof p->integrator);
 	memcpy(p->mutations, r->mixture, strnlen(r->mixture, sizeof p->mutations));
-	memcpy(p->knobs, r->knobs, strnlen(r->knobs, sizeof p->knobs));
+	memcpy(p->accuracy, r->accuracy, strnlen(r->accuracy, sizeof p->accuracy));
 	memcpy(p->effects, r->effects, strnlen(r->effects, sizeof p->effects));
 	if (r->crop_width == 0) {
 		p->crop_x = p->crop_y = 0;
@@ -353,7 +353,7 @@ static int check_mutations(const struct plan *p, struct error *e)
 				 PLAN_MAX_STRATEGIES, PLAN_MUTATIONS_MAX - 1);
 	if (!plan_text_ok(p->mutations, sizeof p->mutations))
 		return error_set(e, EINVAL, "the mixture of mutations does not end with its text");
-	if (!plan_text_ok(p->knobs, sizeof p->knobs) || !plan_text_ok(p->effects, sizeof p->effects))
+	if (!plan_text_ok(p->accuracy, sizeof p->accuracy) || !plan_text_ok(p->effects, sizeof p->effects))
 		return error_set(e, EINVAL, "the settings or the effects are not a text of letters, digits and @=,.:+-_");
 	if (n > 0 && p->kind != PLAN_CHAINS)
 		return error_set(e, EINVAL, "a plan without chains has a mixture of mutations");

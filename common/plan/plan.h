@@ -32,7 +32,7 @@ enum {
 	PLAN_MAX_DEPTH = 128,      /* edges */
 	PLAN_MUTATIONS_MAX = 160,  /* bytes of the mixture's text, the last a 0 */
 	PLAN_MAX_STRATEGIES = 8,   /* entries of the mixture */
-	PLAN_KNOBS_MAX = 256,      /* bytes of the text, the last a 0 */
+	PLAN_ACCURACY_MAX = 256,      /* bytes of the text, the last a 0 */
 	PLAN_EFFECTS_MAX = 256,
 };
 
@@ -54,7 +54,7 @@ struct plan_request {
 	double speed;     /* mutations or samples a second of one thread, by a pilot: bounds a lease's time; 0: not known */
 	double bandwidth; /* bytes of tiles a second that one thread may send, a setting of the coordinator; 0: any */
 	char mixture[PLAN_MUTATIONS_MAX]; /* see mutations below; the count of them has the word here */
-	char knobs[PLAN_KNOBS_MAX], effects[PLAN_EFFECTS_MAX];
+	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
 };
 
 struct plan {
@@ -75,7 +75,7 @@ struct plan {
 	/* As the renderer spells them, bytes behind the text are 0: settings that differ from the default, "tolerance=1e-05";
 	 * effects that the scene does not call for and that are simulated all the same, or the other way round:
 	 * "all", "-dispersion,+aperture". Empty: nothing differs. */
-	char knobs[PLAN_KNOBS_MAX], effects[PLAN_EFFECTS_MAX];
+	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
 };
 
 /* Checks the request (sizes, crop, counts) and fills in what it leaves open. -EINVAL with a sentence. */

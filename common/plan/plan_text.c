@@ -55,8 +55,8 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 		    p->integrator, p->groups, epoch, p->groups * p->parts, bootstrap);
 	if (*p->mutations)
 		text_put(&t, ", mutations %s", p->mutations);
-	if (*p->knobs)
-		text_put(&t, ", %s", p->knobs);
+	if (*p->accuracy)
+		text_put(&t, ", %s", p->accuracy);
 	if (*p->effects)
 		text_put(&t, ", effects %s", p->effects);
 	text_put(&t, "; ");
@@ -114,8 +114,8 @@ void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size
 		text_put(&t, " --parts %u", p->parts);
 	if (*p->mutations)
 		text_put(&t, " --mutations %s", p->mutations);
-	if (*p->knobs)
-		text_put(&t, " --set %s", p->knobs);
+	if (*p->accuracy)
+		text_put(&t, " --set %s", p->accuracy);
 	if (*p->effects)
 		text_put(&t, " --effects=%s", p->effects);
 	if (p->kind == PLAN_CHAINS)

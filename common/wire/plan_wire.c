@@ -28,7 +28,7 @@ void plan_to_wire(const struct plan *p, Farm__Plan *out)
 	out->min_depth = p->min_depth;
 	out->max_depth = p->max_depth;
 	out->mutations = text_borrow(p->mutations);
-	out->knobs = text_borrow(p->knobs);
+	out->accuracy = text_borrow(p->accuracy);
 	out->effects = text_borrow(p->effects);
 }
 
@@ -72,7 +72,7 @@ int plan_from_wire(const Farm__Plan *m, struct plan *p, struct error *e)
 	if (!rc)
 		rc = mixture_from_wire(m->mutations, p->mutations, e);
 	if (!rc)
-		rc = text_from_wire(m->knobs, p->knobs, sizeof p->knobs, e);
+		rc = text_from_wire(m->accuracy, p->accuracy, sizeof p->accuracy, e);
 	if (!rc)
 		rc = text_from_wire(m->effects, p->effects, sizeof p->effects, e);
 	if (rc)
@@ -124,7 +124,7 @@ void plan_request_to_wire(const struct plan_request *r, Farm__PlanRequest *out)
 	out->bootstrap = r->bootstrap;
 	out->epoch = r->epoch;
 	out->mixture = text_borrow(r->mixture);
-	out->knobs = text_borrow(r->knobs);
+	out->accuracy = text_borrow(r->accuracy);
 	out->effects = text_borrow(r->effects);
 }
 
@@ -137,7 +137,7 @@ int plan_request_from_wire(const Farm__PlanRequest *m, struct plan_request *r, s
 	if (!rc)
 		rc = mixture_from_wire(m->mixture, r->mixture, e);
 	if (!rc)
-		rc = text_from_wire(m->knobs, r->knobs, sizeof r->knobs, e);
+		rc = text_from_wire(m->accuracy, r->accuracy, sizeof r->accuracy, e);
 	if (!rc)
 		rc = text_from_wire(m->effects, r->effects, sizeof r->effects, e);
 	if (!rc && !(m->speed >= 0 && m->speed < 1e15))

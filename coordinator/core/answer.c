@@ -280,7 +280,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 	if (ev->lease.own) /* says nothing about the job */
 		return;
 	j->tries += !again;
-	bool fatal = failers_add(&s->failers, f, p->who), in_all = failers_add(&j->failers, f, p->who);
+	bool fatal = failure_quorum_add(&s->failure_quorum, f, p->who), in_all = failure_quorum_add(&j->failure_quorum, f, p->who);
 	if (!fatal && (job_is_proven(j) || !(in_all || never_works(f, j))))
 		return;
 	if (was_lost)

@@ -116,7 +116,7 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 	else
 		begin_anew(f, j, s, refusers);
 	if (maker)
-		roster_wrong(f, maker, "wrong chain states", &made);
+		worker_registry_wrong(f, maker, "wrong chain states", &made);
 	job_place(j, s);
 }
 
@@ -128,7 +128,7 @@ void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const str
 	bool behind = s->next < d->reach;
 	*d = (struct doubt){ .maker = who->id, .before = d->anew ? 0 : d->maker, .reach = behind ? d->reach : 0, .again = behind ? d->again : 0 };
 	if (refuser)
-		roster_wrong(f, refuser, "refused good chain states", k);
+		worker_registry_wrong(f, refuser, "refused good chain states", k);
 }
 
 bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t size)

@@ -132,7 +132,7 @@ struct event {
 		} error_known;
 		struct {
 			uint64_t job;
-			bool disagrees; /* its chains do: common/film/agreement.h */
+			bool disagrees; /* its chains do: common/film/convergence.h */
 		} image_known;
 	};
 };

@@ -76,7 +76,7 @@ void farm_free(struct farm *f)
 			peer_class_drop(f->jobs[i]->class);
 		job_free(f->jobs[i]);
 	}
-	roster_free(f);
+	worker_registry_free(f);
 	mem_free(f->jobs);
 	mem_free(f->live);
 	mem_free(f->peers);
@@ -142,7 +142,7 @@ static void joined(struct farm *f, const struct event *ev)
 	const struct event_join join = complete(&ev->join);
 	const char *refused = "";
 	assert(join.peer && !farm_find_peer(f, join.peer));
-	if (roster_replace(f, &join, &refused) && peer_join(f, &join, &refused))
+	if (worker_registry_replace(f, &join, &refused) && peer_join(f, &join, &refused))
 		return;
 	struct action *a = update_add(f, ACTION_REJECTED);
 	a->peer = ev->join.peer;
@@ -152,7 +152,7 @@ static void joined(struct farm *f, const struct event *ev)
 static void aside(struct farm *f, const struct event *ev)
 {
 	const struct event_join join = complete(&ev->join);
-	roster_aside(f, &join, ev->text);
+	worker_registry_restore_quarantined(f, &join, ev->text);
 }
 
 static void left(struct farm *f, const struct event *ev)

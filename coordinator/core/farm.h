@@ -31,7 +31,7 @@
  *  - A worker that goes while it holds a lease is on that lease's list (lost.h): when it calls again it may say that the lease ended
  *    it, and that is a failure like any. Those who never call again count only when eight in a row held the same lease. The owner
  *    of a job that ended workers gets one lease at a time for a while, of all his jobs that nothing has been made of.
- *  - Of a job that is verified a share of the leases is computed by two workers, of two identities (roster.h) and one
+ *  - Of a job that is verified a share of the leases is computed by two workers, of two identities (worker registry.h) and one
  *    fingerprint. The first answer is noted; one that equals another worker's is merged; where two differ a third
  *    decides, and a fourth; then the job fails. Who said otherwise than two that agree has given a wrong result.
  *  - A worker is set aside for good, by identity, after three faults in a row or three wrong results. Nothing that it sends
@@ -154,7 +154,7 @@ struct worker_status {
 /* Who made the chain states that go with this lease, for the log; "?": it is not the next one of its group and part. */
 const char *farm_maker(const struct farm *f, const struct lease_key *k);
 /* The smallest id above `after` (start with 0) of those that are set aside; 0: no more. */
-uint64_t farm_next_aside(const struct farm *f, uint64_t after);
+uint64_t farm_next_quarantined(const struct farm *f, uint64_t after);
 bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s); /* false: unknown */
 bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *s);   /* false: unknown */
 bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c); /* false: unknown */

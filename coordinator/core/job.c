@@ -220,7 +220,7 @@ bool job_merge(struct job *j, struct slot *s, double now, double duration)
 	else
 		j->ahead++;
 	s->timeouts = 0;
-	s->failers.count = 0;
+	s->failure_quorum.count = 0;
 	s->lost.count = 0;
 	if (j->kind == LEASE_BOOTSTRAP)
 		j->bootstrap_merged++;
@@ -255,7 +255,7 @@ void job_take_back(struct farm *f, struct job *j, struct slot *s)
 	lease_revoke_slot(f, s);
 	s->next--;
 	s->timeouts = 0;
-	s->failers.count = 0;
+	s->failure_quorum.count = 0;
 	s->lost.count = 0;
 	j->leases_merged--;
 	if (s->next < j->rounds) {

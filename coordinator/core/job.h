@@ -4,7 +4,7 @@
 
 #include "common/film/forecast.h"
 #include "coordinator/core/doubt.h"
-#include "coordinator/core/failers.h"
+#include "coordinator/core/failure_quorum.h"
 #include "coordinator/core/farm.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/list.h"
@@ -20,7 +20,7 @@ struct slot {
 	struct lease *leases; /* overdue ones too */
 	uint64_t next;        /* the first epoch that is not merged */
 	double since;         /* when the lease that is out was sent */
-	struct failers failers; /* with the next epoch */
+	struct failure_quorum failure_quorum; /* with the next epoch */
 	struct lost lost;       /* while they held it */
 	struct doubt doubt;   /* about the states with which it begins */
 	uint32_t holders, timeouts;
@@ -72,7 +72,7 @@ struct job {
 	struct forecast_cost stop, halving;
 	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
 	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
-	struct failers failers; /* with any of its leases */
+	struct failure_quorum failure_quorum; /* with any of its leases */
 	uint32_t anew;  /* leases whose chains began anew, their states lost */
 	uint32_t tries; /* that failed; several leases of one worker at once are one */
 	char text[256];

@@ -70,12 +70,12 @@ struct peer *peer_join(struct farm *f, const struct event_join *e, const char **
 	uint32_t limit = f->config.max_peer_leases;
 	if (e->threads < limit / 2)
 		limit = 2 * e->threads < 4 ? (limit < 4 ? limit : 4) : 2 * e->threads;
-	struct identity *who = roster_use(f, e, refused);
+	struct identity *who = worker_registry_use(f, e, refused);
 	if (!who)
 		return NULL;
 	struct peer *p = make(f, e, limit);
 	if (!p) {
-		roster_drop(f, who);
+		worker_registry_drop(f, who);
 		*refused = "the coordinator has no memory for another worker";
 		return NULL;
 	}
@@ -109,7 +109,7 @@ void peer_leave(struct farm *f, struct peer *p)
 	if (p->state == PEER_ACTIVE)
 		p->class->active--;
 	peer_class_drop(p->class);
-	roster_drop(f, p->who);
+	worker_registry_drop(f, p->who);
 	f->lease_limit -= p->lease_limit;
 	uint32_t i = 0;
 	while (f->peers[i] != p)
@@ -190,7 +190,7 @@ void peer_fault(struct farm *f, struct peer *p, const char *text)
 	text_copy(p->text, sizeof p->text, text);
 	memcpy(p->who->text, p->text, sizeof p->text);
 	if (p->who->faults_in_row >= f->config.max_faults)
-		roster_set_aside(f, p->who);
+		worker_registry_quarantine(f, p->who);
 }
 
 static struct avoid *avoid_of(const struct peer *p, uint64_t job)

@@ -5,7 +5,7 @@
 #include "coordinator/core/farm.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/list.h"
-#include "coordinator/core/roster.h"
+#include "coordinator/core/worker_registry.h"
 
 enum { PEER_WINDOW = 8 /* leases that a worker may hold before it has given anything */ };
 enum { PEER_NAME = IDENTITY_NAME, FINGERPRINT_SIZE = 128 };

@@ -21,11 +21,11 @@ static void take_makers(struct farm *f, struct job *j, const struct event_join *
 {
 	for (uint32_t i = 0; makers && i < j->slot_count; i++) {
 		const char *refused;
-		struct identity *k = makers[i].name ? roster_use(f, &makers[i], &refused) : NULL;
+		struct identity *k = makers[i].name ? worker_registry_use(f, &makers[i], &refused) : NULL;
 		if (!k)
 			continue;
 		j->slots[i].doubt.maker = k->id;
-		roster_drop(f, k);
+		worker_registry_drop(f, k);
 	}
 }
 

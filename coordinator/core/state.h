@@ -6,7 +6,7 @@
 #include "coordinator/core/job.h"
 #include "coordinator/core/lease.h"
 #include "coordinator/core/peer.h"
-#include "coordinator/core/roster.h"
+#include "coordinator/core/worker_registry.h"
 #include "coordinator/core/verify.h"
 
 struct farm {

@@ -293,7 +293,7 @@ bool farm_verifies(const struct farm *f, const struct lease_key *k)
 	return j && verify_chosen(j, k);
 }
 
-uint64_t farm_next_aside(const struct farm *f, uint64_t after)
+uint64_t farm_next_quarantined(const struct farm *f, uint64_t after)
 {
 	uint64_t next = 0;
 	for (uint32_t i = 0; i < f->known_count; i++) {

@@ -96,7 +96,7 @@ static void forget(struct farm *f, struct job *j, struct proof *p)
 {
 	j->noted -= p->count > 0;
 	for (uint32_t i = 0; i < p->count; i++)
-		roster_drop(f, p->who[i]);
+		worker_registry_drop(f, p->who[i]);
 	p->count = 0;
 }
 
@@ -108,7 +108,7 @@ void verify_settle(struct farm *f, struct job *j, struct slot *s, const struct b
 	forget(f, j, p);
 	for (uint32_t i = 0; i < said.count; i++)
 		if (memcmp(&said.digest[i], right, sizeof *right) != 0)
-			roster_wrong(f, said.who[i], "wrong result", &k);
+			worker_registry_wrong(f, said.who[i], "wrong result", &k);
 }
 
 void verify_names(const struct job *j, const struct slot *s, char *text, size_t size)
@@ -136,7 +136,7 @@ static void forget_answers(struct farm *f, struct job *j, const struct identity 
 		for (uint32_t k = 0; k < p->count; k++) {
 			if (p->who[k] != who)
 				continue;
-			roster_drop(f, p->who[k]);
+			worker_registry_drop(f, p->who[k]);
 			p->count--;
 			p->who[k] = p->who[p->count];
 			p->digest[k] = p->digest[p->count];

@@ -8,7 +8,7 @@
 #define COORDINATOR_CORE_VERIFY_H
 
 #include "common/film/batch.h"
-#include "coordinator/core/roster.h"
+#include "coordinator/core/worker_registry.h"
 
 #include <stdbool.h>
 

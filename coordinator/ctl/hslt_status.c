@@ -2,7 +2,7 @@
 #include "common/base/version.h"
 #include "common/base/error.h"
 #include "common/base/output.h"
-#include "common/film/agreement_json.h"
+#include "common/film/convergence_json.h"
 #include "common/film/strategy.h"
 #include "common/film/strategy_json.h"
 
@@ -156,8 +156,8 @@ static void print_job(const json_t *job, bool colors)
 	       number_of(job, "leases"), text_of(job, "name"));
 	const char *why = *text_of(job, "why") ? text_of(job, "why") : bound_of(job);
 	const char *verdict = text_of(json_object_get(job, "agreement"), "verdict");
-	const char *chains = strcmp(verdict, agreement_name(CHAINS_DISAGREE)) == 0 ? "its chains disagree" :
-			     is_ended(job) && strcmp(verdict, agreement_name(CHAINS_TOO_SHORT)) == 0 ? "its chains are too short to be judged" : "";
+	const char *chains = strcmp(verdict, convergence_name(CHAINS_DISAGREE)) == 0 ? "its chains disagree" :
+			     is_ended(job) && strcmp(verdict, convergence_name(CHAINS_TOO_SHORT)) == 0 ? "its chains are too short to be judged" : "";
 	if (!*why && !is_ended(job))
 		why = text_of(job, "place");
 	printf("%s%s%s%s\n", *why || *chains ? "  # " : "", why, *why && *chains ? "; " : "", chains);
@@ -228,18 +228,18 @@ static void print_strategies(const json_t *job)
 
 static void print_agreement(const json_t *job)
 {
-	struct agreement a;
+	struct convergence a;
 	struct path_class_energy classes[PATH_CLASSES];
-	char text[AGREEMENT_TABLE];
+	char text[CONVERGENCE_TABLE];
 	const json_t *o = json_object_get(job, "agreement");
 	if (!json_is_number(json_object_get(job, "b")))
 		return;
-	agreement_from_json(o, &a);
+	convergence_from_json(o, &a);
 	classes_from_json(json_object_get(job, "classes"), classes);
 	if (json_is_number(json_object_get(o, "rHatWorst")))
 		printf("       chains: %s; R-hat %.3g in the middle, %.3g in the worst of %u tiles\n", text_of(o, "verdict"), a.r_hat_median,
 		       a.r_hat_worst, a.tiles);
-	agreement_table(classes, number_of(job, "b"), &a, text, sizeof text);
+	convergence_table(classes, number_of(job, "b"), &a, text, sizeof text);
 	fputs(text, stdout);
 }
 
@@ -269,7 +269,7 @@ static void print_warnings(const json_t *snapshot)
 			printf("warning: %s: %s\n", text_of(worker, "name"), text_of(worker, "warning"));
 }
 
-static void print_aside(const json_t *snapshot)
+static void print_quarantined(const json_t *snapshot)
 {
 	size_t i;
 	const json_t *worker;
@@ -325,7 +325,7 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 	if (!only) {
 		print_workers(snapshot);
 		print_warnings(snapshot);
-		print_aside(snapshot);
+		print_quarantined(snapshot);
 	}
 }
 

@@ -8,19 +8,19 @@
 #include <assert.h>
 #include <string.h>
 
-static uint32_t slot_of(const struct order *o, const struct lease_key *k)
+static uint32_t slot_of(const struct live_job *o, const struct lease_key *k)
 {
 	return k->group * o->plan.parts + k->part;
 }
 
-static struct lease_key key_of(const struct order *o, const struct merged_record *r)
+static struct lease_key key_of(const struct live_job *o, const struct merged_record *r)
 {
 	return (struct lease_key){o->id, LEASE_RENDER, r->slot / o->plan.parts, r->slot % o->plan.parts, r->epoch};
 }
 
-static void take_maker(struct order_maker *to, const Farm__Maker *from)
+static void take_maker(struct live_job_maker *to, const Farm__Maker *from)
 {
-	*to = (struct order_maker){0};
+	*to = (struct live_job_maker){0};
 	if (!from)
 		return;
 	text_copy(to->name, sizeof to->name, from->name);
@@ -29,7 +29,7 @@ static void take_maker(struct order_maker *to, const Farm__Maker *from)
 	to->restarts = from->restarts;
 }
 
-void back_note(struct order *o, const struct lease_key *k, uint64_t at, const Farm__Maker *maker)
+void back_note(struct live_job *o, const struct lease_key *k, uint64_t at, const Farm__Maker *maker)
 {
 	if (o->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER)
 		return;
@@ -46,7 +46,7 @@ void back_note(struct order *o, const struct lease_key *k, uint64_t at, const Fa
 }
 
 /* SIZE_MAX: it is not there. */
-static size_t find(const struct order *o, uint32_t slot, uint64_t epoch)
+static size_t find(const struct live_job *o, uint32_t slot, uint64_t epoch)
 {
 	for (size_t i = o->merged_count; i-- > 0;)
 		if (o->merged[i].slot == slot && o->merged[i].epoch == epoch)
@@ -54,7 +54,7 @@ static size_t find(const struct order *o, uint32_t slot, uint64_t epoch)
 	return SIZE_MAX;
 }
 
-static int read_batch(const struct order *o, struct journal *j, const struct lease_key *k, struct batch *b, struct order_maker *maker, struct error *e)
+static int read_batch(const struct live_job *o, struct journal *j, const struct lease_key *k, struct batch *b, struct live_job_maker *maker, struct error *e)
 {
 	size_t i = find(o, slot_of(o, k), k->epoch), size, payload_size;
 	unsigned char *body;
@@ -77,7 +77,7 @@ static int read_batch(const struct order *o, struct journal *j, const struct lea
 	return rc;
 }
 
-int back_read(const struct order *o, struct journal *j, const struct lease_key *k, struct back *b, struct error *e)
+int back_read(const struct live_job *o, struct journal *j, const struct lease_key *k, struct back *b, struct error *e)
 {
 	struct lease_key last = *k;
 	struct batch before = {0};
@@ -87,7 +87,7 @@ int back_read(const struct order *o, struct journal *j, const struct lease_key *
 	    !o->canvas || canvas_has(o->canvas, k) || !canvas_has(o->canvas, &last))
 		return error_set(e, ENOENT, "not the lease that is next");
 	int rc = read_batch(o, j, &last, &b->batch, &b->maker, e);
-	b->maker = (struct order_maker){0};
+	b->maker = (struct live_job_maker){0};
 	if (!rc && last.epoch > 0) {
 		last.epoch--;
 		rc = read_batch(o, j, &last, &before, &b->maker, e);
@@ -101,7 +101,7 @@ int back_read(const struct order *o, struct journal *j, const struct lease_key *
 	return rc;
 }
 
-void back_take(struct order *o, struct back *b)
+void back_take(struct live_job *o, struct back *b)
 {
 	const struct lease_key *k = &b->batch.key;
 	uint32_t slot = slot_of(o, k);
@@ -126,7 +126,7 @@ void back_fini(struct back *b)
 	*b = (struct back){0};
 }
 
-int back_replay(struct order *o, struct journal *j, const struct lease_key *k, struct error *e)
+int back_replay(struct live_job *o, struct journal *j, const struct lease_key *k, struct error *e)
 {
 	int rc = 0;
 	late_forget(o, k);
@@ -148,7 +148,7 @@ int back_replay(struct order *o, struct journal *j, const struct lease_key *k, s
 	return rc;
 }
 
-static uint64_t copy_one(const struct order *o, struct journal *to, const struct merged_record *r, uint64_t most, struct merged_record *out)
+static uint64_t copy_one(const struct live_job *o, struct journal *to, const struct merged_record *r, uint64_t most, struct merged_record *out)
 {
 	struct error e;
 	unsigned char *body;
@@ -162,7 +162,7 @@ static uint64_t copy_one(const struct order *o, struct journal *to, const struct
 	return copied ? size : 0;
 }
 
-void back_copy(const struct order *o, struct journal *to, uint64_t most, struct merged_record **list, size_t *count, size_t *capacity)
+void back_copy(const struct live_job *o, struct journal *to, uint64_t most, struct merged_record **list, size_t *count, size_t *capacity)
 {
 	enum { LAST = 2 };
 	uint32_t slots = o->plan.groups * o->plan.parts;

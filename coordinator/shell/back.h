@@ -10,27 +10,27 @@
 #ifndef COORDINATOR_SHELL_BACK_H
 #define COORDINATOR_SHELL_BACK_H
 
-#include "coordinator/shell/order.h"
+#include "coordinator/shell/live_job.h"
 
 /* A batch as it was merged, and the states before it (NULL: it began with seeds). */
 struct back {
 	struct batch batch;
 	struct chain_state *states;
-	struct order_maker maker; /* of those */
+	struct live_job_maker maker; /* of those */
 };
 
 /* The batch is merged, and its record begins there; without memory it cannot be taken back. maker NULL: not known. */
-void back_note(struct order *o, const struct lease_key *k, uint64_t at, const Farm__Maker *maker);
+void back_note(struct live_job *o, const struct lease_key *k, uint64_t at, const Farm__Maker *maker);
 /* Reads the last batch of that lease's (group, part). Its epoch must be the one before k's. -ENOENT: it is not known where it lies. */
-int back_read(const struct order *o, struct journal *j, const struct lease_key *k, struct back *b, struct error *e);
+int back_read(const struct live_job *o, struct journal *j, const struct lease_key *k, struct back *b, struct error *e);
 /* Takes it out of the order; that cannot fail. Its states go over to the order. */
-void back_take(struct order *o, struct back *b);
+void back_take(struct live_job *o, struct back *b);
 void back_fini(struct back *b);
 
 /* A batch of that lease comes in the place of one that is merged, as the journal says: that one goes, and all after it. */
-int back_replay(struct order *o, struct journal *j, const struct lease_key *k, struct error *e);
+int back_replay(struct live_job *o, struct journal *j, const struct lease_key *k, struct error *e);
 
 /* Into another journal, at most so many bytes; *list, of *count, says where they are there (mem_alloc'd). What does not fit is left out. */
-void back_copy(const struct order *o, struct journal *to, uint64_t most, struct merged_record **list, size_t *count, size_t *capacity);
+void back_copy(const struct live_job *o, struct journal *to, uint64_t most, struct merged_record **list, size_t *count, size_t *capacity);
 
 #endif

@@ -19,7 +19,7 @@ struct head {
 	uint32_t bytes, worker_count;
 	uint64_t job, generation;
 	double cpu_seconds, bootstrap_cpu_seconds, look_written;
-	struct order_times times;
+	struct live_job_times times;
 	struct bootstrap_result lit;
 	struct forecast_history looks;
 	struct job_counts counts;
@@ -32,7 +32,7 @@ _Static_assert(sizeof(struct head) == 4528, "another layout is another version")
 struct writing {
 	uv_work_t work;
 	struct server *server;
-	struct order *order;
+	struct live_job *order;
 	struct journal *journal; /* the one that follows */
 	struct head head;
 	uint64_t bytes, kept_most;
@@ -44,34 +44,34 @@ struct writing {
 	struct error error;
 };
 
-static uint32_t slots_of(const struct order *o)
+static uint32_t slots_of(const struct live_job *o)
 {
 	return o->plan.groups * o->plan.parts;
 }
 
 /* ---- writing */
 
-static int write_states(const struct order *o, struct sealed *out, struct error *e)
+static int write_states(const struct live_job *o, struct checked_file *out, struct error *e)
 {
 	int rc = 0;
 	for (uint32_t i = 0; i < slots_of(o) && !rc; i++) {
 		uint32_t there = o->states[i] != NULL;
-		rc = sealed_write(out, &there, sizeof there, e);
+		rc = checked_file_write(out, &there, sizeof there, e);
 		for (uint32_t k = 0; there && k < o->chains_per_lease && !rc; k++) {
-			rc = sealed_write(out, &o->states[i][k].size, sizeof o->states[i][k].size, e);
+			rc = checked_file_write(out, &o->states[i][k].size, sizeof o->states[i][k].size, e);
 			if (!rc)
-				rc = sealed_write(out, o->states[i][k].bytes, o->states[i][k].size, e);
+				rc = checked_file_write(out, o->states[i][k].bytes, o->states[i][k].size, e);
 		}
 	}
 	return rc;
 }
 
-static int write_all(struct writing *w, struct sealed *out, struct error *e)
+static int write_all(struct writing *w, struct checked_file *out, struct error *e)
 {
-	const struct order *o = w->order;
-	int rc = sealed_write(out, &w->head, sizeof w->head, e);
+	const struct live_job *o = w->order;
+	int rc = checked_file_write(out, &w->head, sizeof w->head, e);
 	if (!rc && o->seeds)
-		rc = sealed_write(out, o->seeds, o->plan.chains * sizeof *o->seeds, e);
+		rc = checked_file_write(out, o->seeds, o->plan.chains * sizeof *o->seeds, e);
 	if (!rc)
 		rc = write_states(o, out, e);
 	return rc ? rc : canvas_save(o->canvas, out, e);
@@ -80,7 +80,7 @@ static int write_all(struct writing *w, struct sealed *out, struct error *e)
 static void run(uv_work_t *work)
 {
 	struct writing *w = work->data;
-	struct sealed out = {0};
+	struct checked_file out = {0};
 	char name[SPOOL_PATH_MAX + 16], temporary[SPOOL_PATH_MAX + 16];
 	snprintf(name, sizeof name, "%s/checkpoint", w->folder);
 	snprintf(temporary, sizeof temporary, "%s/checkpoint.tmp", w->folder);
@@ -88,12 +88,12 @@ static void run(uv_work_t *work)
 	if (!w->rc)
 		back_copy(w->order, w->journal, w->kept_most, &w->merged, &w->merged_count, &w->merged_capacity);
 	if (!w->rc)
-		w->rc = sealed_create(&out, temporary, &w->error);
+		w->rc = checked_file_create(&out, temporary, &w->error);
 	if (!w->rc)
 		w->rc = write_all(w, &out, &w->error);
 	if (!w->rc)
-		w->rc = sealed_finish(&out, &w->error);
-	sealed_close(&out);
+		w->rc = checked_file_finish(&out, &w->error);
+	checked_file_close(&out);
 	w->bytes = out.bytes;
 	if (!w->rc)
 		w->rc = disk_rename(temporary, name) ? error_set(&w->error, errno, "%s: %s", name, strerror(errno)) : 0;
@@ -155,7 +155,7 @@ static void done(uv_work_t *work, int status)
 {
 	struct writing *w = work->data;
 	struct server *s = w->server;
-	struct order *o = w->order;
+	struct live_job *o = w->order;
 	uint64_t id = o->id;
 	assert(status == 0);
 	(void)status;
@@ -164,7 +164,7 @@ static void done(uv_work_t *work, int status)
 		o->generation_least = w->head.generation + 1;
 		o->checkpoint_after = server_now(s) + s->config.retry_seconds;
 	} else if (w->rc) { /* the old ones go on */
-		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 		o->checkpoint_after = server_now(s) + pause_seconds;
 		journal_clear(w->folder, journal_generation(o->journal));
 	} else {
@@ -196,12 +196,12 @@ static void done(uv_work_t *work, int status)
 }
 
 /* Of a journal. */
-static uint64_t limit_of(const struct server *s, const struct order *o)
+static uint64_t limit_of(const struct server *s, const struct live_job *o)
 {
 	return o->checkpoint_bytes > s->config.journal_bytes ? o->checkpoint_bytes : s->config.journal_bytes;
 }
 
-static void start(struct server *s, struct order *o)
+static void start(struct server *s, struct live_job *o)
 {
 	struct job_status status;
 	struct writing *w = mem_alloc(1, sizeof *w);
@@ -239,7 +239,7 @@ void checkpoint_where_due(struct server *s)
 {
 	if (s->stepping || s->stopping || s->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
 		return;
-	for (struct order *o = s->orders; o; o = o->next) {
+	for (struct live_job *o = s->orders; o; o = o->next) {
 		if (!o->canvas || o->busy || o->ended || o->late_count) /* what waits is in the journal alone */
 			continue;
 		if (canvas_missing(o->canvas)) /* what was taken back is computed at this time */
@@ -254,12 +254,12 @@ void checkpoint_where_due(struct server *s)
 
 /* ---- reading */
 
-static int read_states(struct order *o, struct sealed *in, struct error *e)
+static int read_states(struct live_job *o, struct checked_file *in, struct error *e)
 {
 	int rc = 0;
 	for (uint32_t i = 0; i < slots_of(o) && !rc; i++) {
 		uint32_t there;
-		rc = sealed_read(in, &there, sizeof there, e);
+		rc = checked_file_read(in, &there, sizeof there, e);
 		if (rc || !there)
 			continue;
 		o->states[i] = mem_alloc(o->chains_per_lease, sizeof *o->states[i]);
@@ -268,21 +268,21 @@ static int read_states(struct order *o, struct sealed *in, struct error *e)
 		for (uint32_t k = 0; k < o->chains_per_lease && !rc; k++) {
 			struct chain_state *c = &o->states[i][k];
 			uint32_t size;
-			rc = sealed_read(in, &size, sizeof size, e);
+			rc = checked_file_read(in, &size, sizeof size, e);
 			if (!rc && (size == 0 || size > CHAIN_STATE_MAX))
 				rc = error_set(e, EBADMSG, "the state of a chain has %u bytes", size);
 			if (!rc && !(c->bytes = mem_alloc(size, 1)))
 				rc = error_set(e, ENOMEM, "no memory for chains");
 			if (!rc) {
 				c->size = size;
-				rc = sealed_read(in, c->bytes, size, e);
+				rc = checked_file_read(in, c->bytes, size, e);
 			}
 		}
 	}
 	return rc;
 }
 
-static void take_head(struct order *o, const struct head *h)
+static void take_head(struct live_job *o, const struct head *h)
 {
 	o->worker_count = h->worker_count;
 	o->cpu_seconds = o->record.cpu_seconds = h->cpu_seconds;
@@ -297,17 +297,17 @@ static void take_head(struct order *o, const struct head *h)
 	snprintf(o->fingerprint, sizeof o->fingerprint, "%s", h->fingerprint);
 }
 
-static int read_all(struct order *o, struct sealed *in, uint64_t *generation, struct error *e)
+static int read_all(struct live_job *o, struct checked_file *in, uint64_t *generation, struct error *e)
 {
 	struct head h;
-	int rc = sealed_read(in, &h, offsetof(struct head, worker_count), e); /* another version's may be shorter */
+	int rc = checked_file_read(in, &h, offsetof(struct head, worker_count), e); /* another version's may be shorter */
 	if (!rc)
 		rc = spool_check_version(h.magic, magic, in->path, e);
 	if (!rc && h.bytes != sizeof h)
 		rc = error_set(e, EPROTO, "%s: its head has %u bytes instead of %zu: a coordinator for another machine wrote it", in->path, h.bytes,
 			       sizeof h);
 	if (!rc)
-		rc = sealed_read(in, &h.worker_count, sizeof h - offsetof(struct head, worker_count), e);
+		rc = checked_file_read(in, &h.worker_count, sizeof h - offsetof(struct head, worker_count), e);
 	if (!rc && h.job != o->id)
 		rc = error_set(e, EBADMSG, "%s: of j%llu", in->path, (unsigned long long)h.job);
 	if (rc)
@@ -315,10 +315,10 @@ static int read_all(struct order *o, struct sealed *in, uint64_t *generation, st
 	h.fingerprint[sizeof h.fingerprint - 1] = 0;
 	take_head(o, &h);
 	*generation = h.generation;
-	int exponent = canvas_grid_exponent(&o->plan, o->lit.b_pooled, order_submit(o)->brightest);
+	int exponent = canvas_grid_exponent(&o->plan, o->lit.b_pooled, live_job_submit(o)->brightest);
 	rc = canvas_new(&o->canvas, &o->plan, exponent, o->film_folder, e);
 	if (!rc && o->seeds)
-		rc = sealed_read(in, o->seeds, o->plan.chains * sizeof *o->seeds, e);
+		rc = checked_file_read(in, o->seeds, o->plan.chains * sizeof *o->seeds, e);
 	if (!rc)
 		rc = read_states(o, in, e);
 	if (!rc)
@@ -329,18 +329,18 @@ static int read_all(struct order *o, struct sealed *in, uint64_t *generation, st
 	return rc;
 }
 
-int checkpoint_load(const struct spool *spool, struct order *o, uint64_t *generation, sealed_heard *heard, void *user, struct error *e)
+int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation, checked_file_heard *heard, void *user, struct error *e)
 {
 	char name[SPOOL_PATH_MAX];
-	struct sealed in;
+	struct checked_file in;
 	spool_job_path(spool, o->id, "checkpoint.tmp", name);
 	disk_unlink(name); /* of a life that ended before it was whole */
 	spool_job_path(spool, o->id, "checkpoint", name);
-	int rc = sealed_open_heard(&in, name, heard, user, e);
+	int rc = checked_file_open_heard(&in, name, heard, user, e);
 	if (rc)
 		return rc;
 	in.bytes = in.left;
 	rc = read_all(o, &in, generation, e);
-	sealed_close(&in);
+	checked_file_close(&in);
 	return rc;
 }

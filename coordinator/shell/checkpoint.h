@@ -8,7 +8,7 @@
 #ifndef COORDINATOR_SHELL_CHECKPOINT_H
 #define COORDINATOR_SHELL_CHECKPOINT_H
 
-#include "common/base/sealed.h"
+#include "common/base/checked_file.h"
 #include "coordinator/shell/server.h"
 
 /* Starts one for each order whose journal is long enough. Not while an update is carried out. */
@@ -16,6 +16,6 @@ void checkpoint_where_due(struct server *s);
 
 /* Into a new order without merged batches, by any thread. -ENOENT: there is none; -EBADMSG: it is damaged; -EPROTO: of another version; the order is of
  * no use then. generation: of the journal that follows. heard: as in sealed.h. */
-int checkpoint_load(const struct spool *spool, struct order *o, uint64_t *generation, sealed_heard *heard, void *user, struct error *e);
+int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation, checked_file_heard *heard, void *user, struct error *e);
 
 #endif

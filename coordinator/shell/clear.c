@@ -38,7 +38,7 @@ static bool is_fetched(const struct server *s, uint64_t job)
 /* Or comes to life: its films are being read, so that it goes on. */
 static bool lives(const struct server *s, uint64_t job)
 {
-	return server_order(s, job) || recovery_has(s, job) || (s->reading && s->reading->id == job);
+	return server_live_job(s, job) || recovery_has(s, job) || (s->reading && s->reading->id == job);
 }
 
 static uint64_t result_bytes(const struct server *s, uint64_t job)

@@ -72,11 +72,11 @@ int session_within_quota(const struct session *p, uint64_t job, const struct pla
 	struct quota_use has = {0};
 	if (p->who.role == TLS_OPERATOR)
 		return 0;
-	for (const struct order *o = p->server->orders; o; o = o->next) {
+	for (const struct live_job *o = p->server->orders; o; o = o->next) {
 		if (o->ended || o->id == job || strcmp(o->record.owner, p->who.name) != 0)
 			continue;
 		has.jobs++;
-		has.asset_bytes += bytes_of(order_submit(o));
+		has.asset_bytes += bytes_of(live_job_submit(o));
 	}
 	for (const struct session *other = p->server->sessions; other; other = other->next)
 		if (other != p && other->upload && strcmp(other->who.name, p->who.name) == 0)

@@ -42,9 +42,9 @@ static void hold(struct session *p, uint64_t job, const char *who)
 		return;
 	}
 	reconcile_row(s, job);
-	struct order *o = server_order(s, job);
+	struct live_job *o = server_live_job(s, job);
 	if (o)
-		order_log(o, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released", log_quote(name_of(p)).text);
+		live_job_log(o, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released", log_quote(name_of(p)).text);
 }
 
 static void set_priority(struct session *p, uint64_t job, int priority)
@@ -59,9 +59,9 @@ static void set_priority(struct session *p, uint64_t job, int priority)
 		return;
 	}
 	reconcile_row(s, job);
-	struct order *o = server_order(s, job);
+	struct live_job *o = server_live_job(s, job);
 	if (o)
-		order_log(o, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);
+		live_job_log(o, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);
 }
 
 /* The core need not know a job that is over any more. false: p->rejected says why. */
@@ -69,7 +69,7 @@ static bool finds(struct session *p, uint64_t job, bool over_too)
 {
 	struct job_view v;
 	bool there = session_finds_job(p, job, &v);
-	text_copy(p->rejected, sizeof p->rejected, !there ? "no such job" : over_too || server_order(p->server, job) ? "" : "the job is over");
+	text_copy(p->rejected, sizeof p->rejected, !there ? "no such job" : over_too || server_live_job(p->server, job) ? "" : "the job is over");
 	return !*p->rejected;
 }
 

@@ -30,18 +30,18 @@ static unsigned long long number(uint64_t n)
 static void submitted(struct server *s, const struct action *a)
 {
 	struct session *p = s->submitter;
-	struct order *o;
+	struct live_job *o;
 	struct error e;
 	assert(p && p->upload && p->id == a->tag);
 	const Farm__Submit *m = p->upload->submit.message->submit;
 	p->answered_job = a->job;
 	int rc = spool_take_job(s->spool, a->job, &e);
 	if (!rc)
-		rc = order_new(&o, a->job, &p->upload->submit, &p->upload->plan, p->who.name, 0, s->spool, &e);
+		rc = live_job_new(&o, a->job, &p->upload->submit, &p->upload->plan, p->who.name, 0, s->spool, &e);
 	if (!rc && (rc = durable_begin(s, o, &e))) {
 		p->upload->submit = o->submit;
 		memset(&o->submit, 0, sizeof o->submit);
-		order_free(o);
+		live_job_free(o);
 	}
 	if (rc) {
 		text_copy(p->rejected, sizeof p->rejected, e.text);
@@ -52,12 +52,12 @@ static void submitted(struct server *s, const struct action *a)
 	s->orders = o;
 	char plan[PLAN_TEXT];
 	plan_describe(&o->plan, plan, sizeof plan);
-	order_log(o, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s", log_quote(o->record.name).text, p->address,
+	live_job_log(o, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s", log_quote(o->record.name).text, p->address,
 		  *p->who.name ? p->who.name : "-", log_quote(plan).text, log_quote(p->upload->rule).text);
 	for (size_t i = 0; i < m->n_notes; i++)
-		order_log(o, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
+		live_job_log(o, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
 	for (size_t i = 0; i < m->n_effects; i++)
-		order_log(o, LOG_JOB_NOTE, "effect=%s on=%d why=%s", log_quote(m->effects[i]->name).text,
+		live_job_log(o, LOG_JOB_NOTE, "effect=%s on=%d why=%s", log_quote(m->effects[i]->name).text,
 			  (int)m->effects[i]->on, log_quote(m->effects[i]->why).text);
 }
 
@@ -70,29 +70,29 @@ static void rejected(struct server *s, const struct action *a)
 
 static void job_changed(struct server *s, const struct action *a)
 {
-	struct order *o = server_order(s, a->job);
+	struct live_job *o = server_live_job(s, a->job);
 	if (!o)
 		return;
-	order_log(o, a->state == JOB_FAILED ? LOG_JOB_FAILED : a->state == JOB_DONE ? LOG_JOB_DONE : LOG_JOB_STATE,
+	live_job_log(o, a->state == JOB_FAILED ? LOG_JOB_FAILED : a->state == JOB_DONE ? LOG_JOB_DONE : LOG_JOB_STATE,
 		  "state=%s reason=%s rounds=%llu text=%s", job_state_name(a->state),
 		  a->end == END_NONE ? "none" : job_end_name(a->end), number(a->rounds), log_quote(a->text).text);
 	o->ended = job_state_is_end(a->state);
 }
 
-void dispatch_prepare(struct server *s, struct order *o)
+void dispatch_prepare(struct server *s, struct live_job *o)
 {
 	struct error e = {""};
-	int rc = order_prepare(o, server_film_folder(s, &o->plan), &e);
+	int rc = live_job_prepare(o, server_film_folder(s, &o->plan), &e);
 	if (rc && rc != -ENOMEM) {
 		if (!o->unprepared)
-			order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+			live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
 		o->unprepared = true;
 		o->try_again = server_now(s) + s->config.retry_seconds;
 		return;
 	}
 	o->unprepared = false;
 	if (!rc)
-		order_log(o, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d", o->lit.b_pooled,
+		live_job_log(o, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d", o->lit.b_pooled,
 			  o->lit.beyond_share, (int)o->lit.black);
 	struct event ev = {.kind = EVENT_PREPARED,
 			   .job = o->id,
@@ -121,16 +121,16 @@ static void keep_partials(const struct server *s, const struct lease_key *k)
 
 static void merge(struct server *s, const struct action *a)
 {
-	struct order *o = server_order(s, a->job);
+	struct live_job *o = server_live_job(s, a->job);
 	struct error e;
 	assert(o && s->batch && !o->busy);
 	if (s->config.keep_partials)
 		keep_partials(s, &a->key);
-	uint64_t rounds = order_rounds(o);
+	uint64_t rounds = live_job_rounds(o);
 	uint64_t at = s->stored_at;
 	int rc = s->stored ? 0 : durable_merged(s, o, &at, &e);
 	if (!rc)
-		rc = order_merge(o, s->batch, &e);
+		rc = live_job_merge(o, s->batch, &e);
 	if (!rc)
 		back_note(o, &a->key, at, s->result->maker);
 	if (rc == -ENOMEM) { /* half merged; nobody was told that it is stored */
@@ -141,25 +141,25 @@ static void merge(struct server *s, const struct action *a)
 	if (rc)
 		server_job_broken(s, a->job, e.text);
 	trust_merged(o, a);
-	order_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);
+	live_job_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", number(a->job),
 		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch), s->stored ? " late=1" : "");
 }
 
 static void take_back(struct server *s, const struct action *a)
 {
-	struct order *o = server_order(s, a->job);
+	struct live_job *o = server_live_job(s, a->job);
 	assert(o && !o->busy && s->back);
 	back_take(o, s->back);
 	trust_taken_back(o, a->who);
-	order_log(o, LOG_BATCH_TAKEN_BACK, "kind=%d group=%u part=%u epoch=%llu text=%s", (int)a->key.kind, a->key.group, a->key.part,
+	live_job_log(o, LOG_BATCH_TAKEN_BACK, "kind=%d group=%u part=%u epoch=%llu text=%s", (int)a->key.kind, a->key.group, a->key.part,
 		  number(a->key.epoch), log_quote(a->text).text);
 }
 
 static void acknowledge(struct server *s, const struct action *a)
 {
 	struct session *p = session_find(s, a->peer);
-	const struct order *o = server_order(s, a->job);
+	const struct live_job *o = server_live_job(s, a->job);
 	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && o)) /* what it repeats may not be on the disk yet */
 		durable_ack(s, o, a->peer, &a->key, a->ack);
 	else if (p)
@@ -178,10 +178,10 @@ static void acknowledge(struct server *s, const struct action *a)
 static void send_lease(struct server *s, const struct action *a)
 {
 	struct session *p = session_find(s, a->peer);
-	struct order *o = server_order(s, a->job);
+	struct live_job *o = server_live_job(s, a->job);
 	if (!p || !o || late_withholds(o, &a->key, a->peer))
 		return;
-	order_count_worker(o, a->peer);
+	live_job_count_worker(o, a->peer);
 	session_send_lease(p, o, &a->key, a->anew);
 	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
 		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
@@ -232,15 +232,15 @@ void dispatch_update(struct server *s, const struct update *u)
 			acknowledge(s, a);
 			break;
 		case ACTION_BOOTSTRAP_DONE:
-			dispatch_prepare(s, server_order(s, a->job));
+			dispatch_prepare(s, server_live_job(s, a->job));
 			break;
 		case ACTION_ROUND_DONE:
 			break;
 		case ACTION_EVALUATE_ERROR:
-			publish_start(s, server_order(s, a->job), PUBLISH_ERROR_ONLY, a->rounds);
+			publish_start(s, server_live_job(s, a->job), PUBLISH_ERROR_ONLY, a->rounds);
 			break;
 		case ACTION_PUBLISH:
-			publish_start(s, server_order(s, a->job), PUBLISH_RESULT, a->rounds);
+			publish_start(s, server_live_job(s, a->job), PUBLISH_RESULT, a->rounds);
 			break;
 		case ACTION_JOB_CHANGED:
 			job_changed(s, a);
@@ -257,7 +257,7 @@ void dispatch_update(struct server *s, const struct update *u)
 			trust_wrong(s, a);
 			break;
 		case ACTION_ASIDE:
-			trust_aside(s, a);
+			trust_quarantined(s, a);
 			break;
 		case ACTION_CLOSE_PEER:
 			close_peer(s, a);
@@ -277,7 +277,7 @@ void dispatch_remember(struct server *s, const struct job_record *r)
 	s->ended[s->ended_count++] = *r;
 }
 
-static void finish(struct server *s, struct order *o)
+static void finish(struct server *s, struct live_job *o)
 {
 	struct job_view v;
 	struct timespec now;
@@ -297,15 +297,15 @@ static void finish(struct server *s, struct order *o)
 			session_send_job_end(p, o->id);
 	keep_trim(s);
 	clear_soon(s);
-	order_release_blobs(order_submit(o), s->blobs);
-	struct order **at = &s->orders;
+	live_job_release_blobs(live_job_submit(o), s->blobs);
+	struct live_job **at = &s->orders;
 	while (*at != o)
 		at = &(*at)->next;
 	*at = o->next;
 	struct waiting_batch *late = o->waiting;
 	o->waiting = NULL;
 	o->waiting_last = &o->waiting;
-	order_free(o);
+	live_job_free(o);
 	while (late) { /* the core says that the job is over */
 		struct waiting_batch *next = late->next;
 		server_result(s, late->peer, &late->envelope, &late->payload);
@@ -317,7 +317,7 @@ static void finish(struct server *s, struct order *o)
 void dispatch_finish_orders(struct server *s)
 {
 	bool finished = false;
-	for (struct order *o = s->orders, *next; o; o = next) {
+	for (struct live_job *o = s->orders, *next; o; o = next) {
 		next = o->next;
 		if (o->ended && !o->busy && !o->unpublished && !o->unrecorded) {
 			finish(s, o);
@@ -326,7 +326,7 @@ void dispatch_finish_orders(struct server *s)
 		}
 	}
 	for (struct session *p = finished ? s->sessions : NULL; p; p = p->next)
-		if (p->watched && p->shown && !server_order(s, p->watched))
+		if (p->watched && p->shown && !server_live_job(s, p->watched))
 			session_tick(p);
 	extend_waiting(s);
 }

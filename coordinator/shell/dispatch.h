@@ -10,6 +10,6 @@ void dispatch_remember(struct server *s, const struct job_record *r); /* it has 
 void dispatch_finish_orders(struct server *s);
 
 /* All of its bootstrap is merged: its films, or another try later, when the disk has no room for them. */
-void dispatch_prepare(struct server *s, struct order *o);
+void dispatch_prepare(struct server *s, struct live_job *o);
 
 #endif

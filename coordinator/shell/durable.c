@@ -43,7 +43,7 @@ struct flush {
 
 /* ---- jobs ---- */
 
-static int pack_plan(const struct order *o, unsigned char **frame, size_t *size, struct error *e)
+static int pack_plan(const struct live_job *o, unsigned char **frame, size_t *size, struct error *e)
 {
 	Farm__JobInfo info;
 	Farm__Plan plan;
@@ -58,7 +58,7 @@ static int pack_plan(const struct order *o, unsigned char **frame, size_t *size,
 	return envelope_pack(&m, NULL, 0, frame, size, e);
 }
 
-int durable_pack(const struct order *o, struct ledger_job *j, unsigned char **submission, unsigned char **plan, struct error *e)
+int durable_pack(const struct live_job *o, struct ledger_job *j, unsigned char **submission, unsigned char **plan, struct error *e)
 {
 	*submission = *plan = NULL;
 	int rc = envelope_pack(o->submit.message, NULL, 0, submission, &j->submission_size, e);
@@ -69,12 +69,12 @@ int durable_pack(const struct order *o, struct ledger_job *j, unsigned char **su
 	return rc;
 }
 
-int durable_begin(struct server *s, struct order *o, struct error *e)
+int durable_begin(struct server *s, struct live_job *o, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX];
 	unsigned char *submission, *plan;
 	struct ledger_job j = {.id = o->id, .owner = o->record.owner, .name = o->record.name, .version = HSLT_VERSION,
-			       .priority = o->record.priority, .mixed = order_submit(o)->mixed, .submitted = o->record.submitted};
+			       .priority = o->record.priority, .mixed = live_job_submit(o)->mixed, .submitted = o->record.submitted};
 	spool_job_path(s->spool, o->id, NULL, folder);
 	int rc = durable_pack(o, &j, &submission, &plan, e);
 	if (!rc)
@@ -132,14 +132,14 @@ void durable_end_row(struct server *s, const struct job_record *r)
 	end_later(s, r, true);
 }
 
-int durable_end(struct server *s, struct order *o)
+int durable_end(struct server *s, struct live_job *o)
 {
 	struct error e;
 	if (journal_write(o->journal, &e)) /* for whoever extends it; what is not stored is computed again */
-		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	int rc = write_end(s, &o->record, keep_order(s, o), &e);
 	if (rc)
-		order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
 	if (rc && o->record.has_result) {
 		text_copy(o->record.why, sizeof o->record.why, e.text);
 		return rc;
@@ -173,25 +173,25 @@ static void end_again(struct server *s)
 
 /* ---- batches ---- */
 
-static void hold(struct server *s, struct order *o, const char *text)
+static void hold(struct server *s, struct live_job *o, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = o->id, .text = text};
 	if (!*text != !o->held) {
-		order_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
+		live_job_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
 		o->held = *text != 0;
 	}
 	o->try_again = server_now(s) + s->config.retry_seconds;
 	server_step(s, &ev);
 }
 
-void durable_hold(struct server *s, struct order *o, const char *what, const char *why)
+void durable_hold(struct server *s, struct live_job *o, const char *what, const char *why)
 {
 	char text[256];
 	text_print(text, sizeof text, "%s: %s", what, why);
 	hold(s, o, text);
 }
 
-int durable_reserve(struct server *s, struct order *o, struct error *e)
+int durable_reserve(struct server *s, struct live_job *o, struct error *e)
 {
 	union {
 		const Farm__LeaseResult *from;
@@ -221,7 +221,7 @@ int durable_reserve(struct server *s, struct order *o, struct error *e)
 }
 
 /* Whose it is, once, before its first batch. */
-static int write_pinned(struct server *s, struct order *o, double elapsed, struct error *e)
+static int write_pinned(struct server *s, struct live_job *o, double elapsed, struct error *e)
 {
 	struct job_status status;
 	if (o->pinned || !farm_job(s->farm, o->id, server_now(s), &status) || !*status.fingerprint)
@@ -230,7 +230,7 @@ static int write_pinned(struct server *s, struct order *o, double elapsed, struc
 	return journal_append(o->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint, strlen(status.fingerprint), NULL, e);
 }
 
-int durable_merged(struct server *s, struct order *o, uint64_t *at, struct error *e)
+int durable_merged(struct server *s, struct live_job *o, uint64_t *at, struct error *e)
 {
 	const struct lease_key *k = &s->batch->key;
 	bool again = k->kind == LEASE_RENDER && o->again[(size_t)k->group * o->plan.parts + k->part];
@@ -272,7 +272,7 @@ static void queue(struct server *s, struct durable_ack *a)
 /* It waits until the journal is a good one again. */
 static void park(struct server *s, struct durable_ack *a)
 {
-	struct order *o = s->stopping ? NULL : server_order(s, a->key.job);
+	struct live_job *o = s->stopping ? NULL : server_live_job(s, a->key.job);
 	if (!o) {
 		drop_ack(a);
 		return;
@@ -336,7 +336,7 @@ static void flush_next(struct server *s)
 	(void)rc;
 }
 
-void durable_ack(struct server *s, const struct order *o, uint64_t peer, const struct lease_key *k, enum ack ack)
+void durable_ack(struct server *s, const struct live_job *o, uint64_t peer, const struct lease_key *k, enum ack ack)
 {
 	struct durable_ack *a = mem_alloc(1, sizeof *a);
 	if (!a) /* not answered: the worker offers it again, and it is a repeat */
@@ -350,7 +350,7 @@ void durable_ack(struct server *s, const struct order *o, uint64_t peer, const s
 /* ---- the rest ---- */
 
 /* What nobody waits for: it need not be safe at once, but soon. */
-static int append_note(struct server *s, const struct order *o, enum journal_kind kind, double elapsed, const void *bytes, size_t size, struct error *e)
+static int append_note(struct server *s, const struct live_job *o, enum journal_kind kind, double elapsed, const void *bytes, size_t size, struct error *e)
 {
 	int rc = journal_append(o->journal, kind, NULL, elapsed, bytes, size, NULL, e);
 	if (!rc)
@@ -360,7 +360,7 @@ static int append_note(struct server *s, const struct order *o, enum journal_kin
 
 void durable_look(struct server *s, uint64_t job)
 {
-	struct order *o = server_order(s, job);
+	struct live_job *o = server_live_job(s, job);
 	struct job_status status;
 	struct error e;
 	if (!o || !farm_job(s->farm, job, server_now(s), &status) || status.looks->count == 0)
@@ -376,7 +376,7 @@ void durable_look(struct server *s, uint64_t job)
 
 /* Not before each answer: it is for the record alone. Nor while a checkpoint is written, which has the last ones and takes the
  * journal's place. */
-static void write_counts(struct server *s, struct order *o)
+static void write_counts(struct server *s, struct live_job *o)
 {
 	struct job_counts now;
 	struct error e;
@@ -392,7 +392,7 @@ static void unpark(struct server *s)
 	struct durable_ack *list = s->parked;
 	s->parked = NULL;
 	for (struct durable_ack *a, *next = list; (a = next);) {
-		struct order *o = server_order(s, a->key.job);
+		struct live_job *o = server_live_job(s, a->key.job);
 		next = a->next;
 		if (!o) {
 			drop_ack(a);
@@ -407,24 +407,24 @@ static void unpark(struct server *s)
 }
 
 /* 0: nothing stands in the way of its results any more. */
-static int mend(struct order *o, struct error *e)
+static int mend(struct live_job *o, struct error *e)
 {
 	if (o->unsure)
 		return -EAGAIN;
 	int rc = journal_is_bad(o->journal) ? journal_renew(o->journal, e) : 0;
 	if (rc && rc != -EAGAIN)
-		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
 	return rc ? rc : journal_reserve(o->journal, 2 * o->held_bytes, e);
 }
 
 void durable_tick(struct server *s)
 {
-	for (struct order *o = s->orders; o; o = o->next)
+	for (struct live_job *o = s->orders; o; o = o->next)
 		write_counts(s, o);
 	if (s->parked)
 		unpark(s);
 	end_again(s);
-	for (struct order *o = s->orders; o; o = o->next) {
+	for (struct live_job *o = s->orders; o; o = o->next) {
 		struct error e;
 		if (server_now(s) < o->try_again || o->busy)
 			continue;

@@ -24,21 +24,21 @@ static double error_of(const struct forecast_history *h)
 	return h->count && !h->looks[h->count - 1].doubtful ? sqrt(h->looks[h->count - 1].rel_mse_upper) : NAN;
 }
 
-static struct extension_from where(const struct order *o, double seconds, bool ended)
+static struct extension_from where(const struct live_job *o, double seconds, bool ended)
 {
-	return (struct extension_from){.rounds = order_rounds(o), .seconds = seconds, .error = error_of(&o->record.looks), .ended = ended};
+	return (struct extension_from){.rounds = live_job_rounds(o), .seconds = seconds, .error = error_of(&o->record.looks), .ended = ended};
 }
 
-static int plan_of(const struct session *p, const struct order *o, const struct extension *x, const struct extension_from *from,
+static int plan_of(const struct session *p, const struct live_job *o, const struct extension *x, const struct extension_from *from,
 		   struct plan_request *asked, struct plan *plan, struct error *e)
 {
-	int rc = plan_request_from_wire(order_submit(o)->plan, asked, e);
+	int rc = plan_request_from_wire(live_job_submit(o)->plan, asked, e);
 	if (!rc)
 		rc = extend_plan(&o->plan, x, from, asked, plan, e);
-	return rc ? rc : session_within_quota(p, o->id, plan, order_submit(o), e);
+	return rc ? rc : session_within_quota(p, o->id, plan, live_job_submit(o), e);
 }
 
-static void set_bounds(struct order *o, const struct plan_request *asked, const struct plan *plan)
+static void set_bounds(struct live_job *o, const struct plan_request *asked, const struct plan *plan)
 {
 	Farm__PlanRequest *r = o->submit.message->submit->plan;
 	r->spp = asked->spp;
@@ -51,7 +51,7 @@ static void set_bounds(struct order *o, const struct plan_request *asked, const 
 		canvas_set_rounds(o->canvas, plan->rounds);
 }
 
-static int store(struct server *s, const struct order *o, struct error *e)
+static int store(struct server *s, const struct live_job *o, struct error *e)
 {
 	struct ledger_job j = {.id = o->id, .extended = o->record.extended};
 	unsigned char *submission, *plan;
@@ -66,11 +66,11 @@ static int store(struct server *s, const struct order *o, struct error *e)
 }
 
 /* The bounds that the job has now, for its log and for the client. */
-static void describe(const struct order *o, char *text, size_t size)
+static void describe(const struct live_job *o, char *text, size_t size)
 {
 	struct text t = {text, size};
 	const char *comma = "";
-	text_put(&t, "after %llu rounds it goes on until", (unsigned long long)order_rounds(o));
+	text_put(&t, "after %llu rounds it goes on until", (unsigned long long)live_job_rounds(o));
 	if (o->plan.rounds != UINT64_MAX) {
 		text_put(&t, " %llu are done", (unsigned long long)o->plan.rounds);
 		comma = " or";
@@ -83,22 +83,22 @@ static void describe(const struct order *o, char *text, size_t size)
 		text_put(&t, "%s its error is %.3g %%", comma, 100 * o->plan.target_error);
 }
 
-static void note(const struct session *p, struct order *o, char *text, size_t size)
+static void note(const struct session *p, struct live_job *o, char *text, size_t size)
 {
 	describe(o, text, size);
-	order_log(o, LOG_JOB_STATE, "state=extended by=%s text=%s", *p->who.name ? p->who.name : "-", log_quote(text).text);
+	live_job_log(o, LOG_JOB_STATE, "state=extended by=%s text=%s", *p->who.name ? p->who.name : "-", log_quote(text).text);
 }
 
 /* ---- a job that runs ---- */
 
-static int extend_live(struct session *p, struct order *o, const struct extension *x, char *text, size_t size, struct error *e)
+static int extend_live(struct session *p, struct live_job *o, const struct extension *x, char *text, size_t size, struct error *e)
 {
 	struct server *s = p->server;
 	struct plan_request asked, old_asked;
 	struct plan plan, old = o->plan;
 	double seconds = farm_elapsed(s->farm, o->id, server_now(s));
 	struct extension_from from = where(o, isnan(seconds) ? 0 : seconds, false);
-	int rc = plan_request_from_wire(order_submit(o)->plan, &old_asked, e);
+	int rc = plan_request_from_wire(live_job_submit(o)->plan, &old_asked, e);
 	if (!rc)
 		rc = plan_of(p, o, x, &from, &asked, &plan, e);
 	if (rc)
@@ -138,7 +138,7 @@ static int read_job(const struct server *s, uint64_t job, struct row_file *f, st
 }
 
 /* r: as it was remembered. */
-static int begin_again(struct session *p, struct order *o, const struct job_record *r, struct error *e)
+static int begin_again(struct session *p, struct live_job *o, const struct job_record *r, struct error *e)
 {
 	struct server *s = p->server;
 	o->record.extended++;
@@ -162,12 +162,12 @@ static int begin_again(struct session *p, struct order *o, const struct job_reco
 	return rc;
 }
 
-static int extend_read(struct session *p, struct order *o, const struct extension *x, const struct job_record *r, char *text, size_t size,
+static int extend_read(struct session *p, struct live_job *o, const struct extension *x, const struct job_record *r, char *text, size_t size,
 		       struct error *e)
 {
 	struct plan_request asked;
 	struct plan plan;
-	if (order_rounds(o) == 0)
+	if (live_job_rounds(o) == 0)
 		return error_set(e, ENOENT, "its films have been cleared: %s", again);
 	struct extension_from from = where(o, isnan(o->times.completed) ? 0 : o->times.completed, true);
 	int rc = plan_of(p, o, x, &from, &asked, &plan, e);
@@ -185,7 +185,7 @@ struct reading {
 	uint64_t peer; /* who asked for it, and may have gone meanwhile */
 	struct extension what;
 	struct job_record record; /* of its end */
-	struct order *order;
+	struct live_job *order;
 	int rc;
 	struct error error;
 };
@@ -214,7 +214,7 @@ static void done(uv_work_t *work, int status)
 	(void)status;
 	s->reading = NULL;
 	if (w->rc)
-		order_log(w->order, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+		live_job_log(w->order, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 	int rc = w->rc ? error_prefix(&w->error, w->rc, "it cannot go on, %s", again) : p ? 0 : -ECANCELED;
 	if (p) {
 		p->wants.job = 0;
@@ -232,7 +232,7 @@ static void done(uv_work_t *work, int status)
 }
 
 /* All that can be said without its films: of less than was done, so that nothing is refused which they would allow. */
-static int ask_beforehand(const struct session *p, const struct order *o, const struct extension *x, const struct job_record *r,
+static int ask_beforehand(const struct session *p, const struct live_job *o, const struct extension *x, const struct job_record *r,
 			  struct error *e)
 {
 	struct plan_request asked;
@@ -248,7 +248,7 @@ static int start_reading(struct session *p, const struct extension *x, const str
 	if (rc)
 		return rc;
 	struct reading *w = mem_alloc(1, sizeof *w);
-	rc = w ? restore_order(s, &f.job, &w->order, e) : error_set(e, ENOMEM, "no memory for a job");
+	rc = w ? restore_live_job(s, &f.job, &w->order, e) : error_set(e, ENOMEM, "no memory for a job");
 	row_file_free(&f);
 	if (rc) {
 		mem_free(w);
@@ -286,7 +286,7 @@ static int extend_ended(struct session *p, const struct extension *x, const stru
 /* Its films are in use, or those of another job are being read. */
 static bool must_wait(const struct server *s, uint64_t job)
 {
-	const struct order *o = server_order(s, job);
+	const struct live_job *o = server_live_job(s, job);
 	return o ? o->busy || o->ended : s->reading != NULL;
 }
 
@@ -294,7 +294,7 @@ static void go_on(struct session *p)
 {
 	struct server *s = p->server;
 	const struct extension x = p->wants;
-	struct order *o = server_order(s, x.job);
+	struct live_job *o = server_live_job(s, x.job);
 	struct job_view v;
 	struct error e = {""};
 	char text[256] = "";

@@ -48,7 +48,7 @@ static bool same_bits(const struct plan *a, const struct plan *b)
 	       a->groups == c.groups && a->parts == c.parts && a->chains == c.chains && a->bootstrap == c.bootstrap &&
 	       a->epoch == c.epoch && a->min_depth == c.min_depth && a->max_depth == c.max_depth &&
 	       memcmp(a->integrator, c.integrator, sizeof a->integrator) == 0 && memcmp(a->mutations, c.mutations, sizeof a->mutations) == 0 &&
-	       memcmp(a->knobs, c.knobs, sizeof a->knobs) == 0 && memcmp(a->effects, c.effects, sizeof a->effects) == 0;
+	       memcmp(a->accuracy, c.accuracy, sizeof a->accuracy) == 0 && memcmp(a->effects, c.effects, sizeof a->effects) == 0;
 }
 
 int extend_check(const struct extension *x, struct error *e)

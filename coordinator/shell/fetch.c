@@ -142,7 +142,7 @@ static void answer(struct session *p, const Farm__Fetch *f)
 }
 
 /* Made when somebody asks: it holds up the job's results for as long as an image takes. */
-static bool is_preview_old(const struct server *s, const struct order *o)
+static bool is_preview_old(const struct server *s, const struct live_job *o)
 {
 	return o && o->canvas && !o->ended && (o->preview_made <= 0 || server_now(s) - o->preview_made > preview_seconds);
 }
@@ -150,7 +150,7 @@ static bool is_preview_old(const struct server *s, const struct order *o)
 void session_previews(struct server *s, uint64_t job)
 {
 	for (struct session *p = s->sessions; p; p = p->next) {
-		struct order *o = server_order(s, job);
+		struct live_job *o = server_live_job(s, job);
 		if (p->wants_preview != job || (o && o->busy))
 			continue;
 		if (is_preview_old(s, o)) {

@@ -4,27 +4,27 @@
 
 #include <string.h>
 
-static void hold(struct server *s, struct order *o, const char *text)
+static void hold(struct server *s, struct live_job *o, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_FILES, .text = text};
 	o->lacks_file = *text != 0;
-	order_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
+	live_job_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
 	server_step(s, &ev);
 }
 
 /* The first one that is not there; NULL: all are. */
-static const Farm__File *lacking(const struct server *s, const struct order *o)
+static const Farm__File *lacking(const struct server *s, const struct live_job *o)
 {
-	const Farm__Submit *m = order_submit(o);
+	const Farm__Submit *m = live_job_submit(o);
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = order_file_hash(m->files[i]);
+		struct blob_hash h = live_job_file_hash(m->files[i]);
 		if (!blob_has(s->blobs, &h, NULL))
 			return m->files[i];
 	}
 	return NULL;
 }
 
-bool files_look(struct server *s, struct order *o)
+bool files_look(struct server *s, struct live_job *o)
 {
 	char text[256];
 	const Farm__File *f = o->ended ? NULL : lacking(s, o);
@@ -44,20 +44,20 @@ int files_check(struct server *s, const struct blob_hash *h, double seconds, str
 		return rc;
 	if (rc == -EBADMSG)
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
-	for (struct order *o = s->orders, *next; o; o = next) {
+	for (struct live_job *o = s->orders, *next; o; o = next) {
 		next = o->next;
 		files_look(s, o);
 	}
 	return rc;
 }
 
-bool files_are_right(struct server *s, struct order *o, double seconds)
+bool files_are_right(struct server *s, struct live_job *o, double seconds)
 {
-	const Farm__Submit *m = order_submit(o);
+	const Farm__Submit *m = live_job_submit(o);
 	struct error e;
 	bool right = true;
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = order_file_hash(m->files[i]);
+		struct blob_hash h = live_job_file_hash(m->files[i]);
 		right = files_check(s, &h, seconds, &e) == 0 && right;
 	}
 	return right;
@@ -65,7 +65,7 @@ bool files_are_right(struct server *s, struct order *o, double seconds)
 
 void files_tick(struct server *s)
 {
-	for (struct order *o = s->orders; o; o = o->next)
+	for (struct live_job *o = s->orders; o; o = o->next)
 		if (o->lacks_file && files_look(s, o))
 			return; /* the list may have changed; the others next time */
 }

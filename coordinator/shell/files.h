@@ -13,9 +13,9 @@ enum { FILES_CHECKED = 60, FILES_DOUBTED = 5 /* s: what was right so lately need
 /* Of one that is asked for. Not 0: it cannot be given; jobs that need it wait. */
 int files_check(struct server *s, const struct blob_hash *h, double seconds, struct error *e);
 /* Whether a job has all its files, by what the store knows; it waits or goes on. */
-bool files_look(struct server *s, struct order *o);
+bool files_look(struct server *s, struct live_job *o);
 /* All of a job's. false: it waits for one. */
-bool files_are_right(struct server *s, struct order *o, double seconds);
+bool files_are_right(struct server *s, struct live_job *o, double seconds);
 void files_tick(struct server *s); /* those that wait for files that are here now go on */
 
 #endif

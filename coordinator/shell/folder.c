@@ -10,7 +10,7 @@
 
 static const double every_seconds = 1;
 
-static int make_anew(struct server *s, struct order *o, struct error *e)
+static int make_anew(struct server *s, struct live_job *o, struct error *e)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_path(s->spool, "jobs", path);
@@ -32,13 +32,13 @@ static int make_anew(struct server *s, struct order *o, struct error *e)
 }
 
 /* What was merged is in memory or in the old journal, whose file is open: the one goes into a checkpoint, the other into a new file. */
-static void go_on(struct server *s, struct order *o)
+static void go_on(struct server *s, struct live_job *o)
 {
 	char folder[SPOOL_PATH_MAX];
 	struct error e;
 	spool_job_path(s->spool, o->id, NULL, folder);
 	int rc = make_anew(s, o, &e);
-	order_log(o, LOG_SPOOL_FAULT, "text=\"%s was removed or moved away while the job runs: %s\"", folder, rc ? e.text : "made anew, and the job goes on");
+	live_job_log(o, LOG_SPOOL_FAULT, "text=\"%s was removed or moved away while the job runs: %s\"", folder, rc ? e.text : "made anew, and the job goes on");
 	if (rc) {
 		if (!o->ended)
 			durable_hold(s, o, "its folder is gone and cannot be made anew", e.text);
@@ -58,7 +58,7 @@ static void go_on(struct server *s, struct order *o)
 }
 
 /* A journal that is bad already has no file to look for: then the folder itself, which may go while it is being made anew. */
-static bool is_gone(const struct server *s, const struct order *o)
+static bool is_gone(const struct server *s, const struct live_job *o)
 {
 	char folder[SPOOL_PATH_MAX];
 	struct stat st;
@@ -73,7 +73,7 @@ void folder_tick(struct server *s)
 	if (server_now(s) < s->folders_next)
 		return;
 	s->folders_next = server_now(s) + every_seconds;
-	for (struct order *o = s->orders; o; o = o->next)
+	for (struct live_job *o = s->orders; o; o = o->next)
 		if (!o->busy && o->journal && is_gone(s, o)) {
 			go_on(s, o);
 			return; /* the list may have changed; the others next time */

@@ -5,7 +5,7 @@
 
 #include <string.h>
 
-bool keep_order(struct server *s, const struct order *o)
+bool keep_order(struct server *s, const struct live_job *o)
 {
 	char path[SPOOL_PATH_MAX];
 	struct stat st;

@@ -9,7 +9,7 @@
 #include "coordinator/shell/server.h"
 
 /* Of a job that has just ended. false: it cannot go on, and nothing is to be kept. */
-bool keep_order(struct server *s, const struct order *o);
+bool keep_order(struct server *s, const struct live_job *o);
 void keep_drop(const struct server *s, uint64_t job);
 uint64_t keep_bytes(const struct server *s, uint64_t job); /* on the disk */
 bool keep_drop_all(const struct server *s); /* of listed jobs; true: there was something */

@@ -8,7 +8,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-int late_add(struct order *o, const struct lease_key *k, uint64_t at, struct error *e)
+int late_add(struct live_job *o, const struct lease_key *k, uint64_t at, struct error *e)
 {
 	if (o->late_count == o->late_capacity) {
 		size_t want = o->late_capacity ? 2 * o->late_capacity : 64;
@@ -22,12 +22,12 @@ int late_add(struct order *o, const struct lease_key *k, uint64_t at, struct err
 	return 0;
 }
 
-static void drop(struct order *o, size_t i)
+static void drop(struct live_job *o, size_t i)
 {
 	memmove(&o->late[i], &o->late[i + 1], (--o->late_count - i) * sizeof *o->late);
 }
 
-void late_forget(struct order *o, const struct lease_key *k)
+void late_forget(struct live_job *o, const struct lease_key *k)
 {
 	for (size_t i = o->late_count; i-- > 0;) {
 		const struct lease_key *l = &o->late[i].key;
@@ -46,13 +46,13 @@ static int by_time(const void *a, const void *b)
 	return (x->at > y->at) - (x->at < y->at);
 }
 
-void late_sort(struct order *o)
+void late_sort(struct live_job *o)
 {
 	if (o->late_count)
 		qsort(o->late, o->late_count, sizeof *o->late, by_time);
 }
 
-bool late_withholds(struct order *o, const struct lease_key *k, uint64_t peer)
+bool late_withholds(struct live_job *o, const struct lease_key *k, uint64_t peer)
 {
 	for (size_t i = 0; i < o->late_count; i++)
 		if (lease_key_equal(&o->late[i].key, k)) {
@@ -63,16 +63,16 @@ bool late_withholds(struct order *o, const struct lease_key *k, uint64_t peer)
 }
 
 /* It is damaged by now, too: its lease is open. */
-static void give_up(struct server *s, struct order *o, const struct late_result *l, const char *why)
+static void give_up(struct server *s, struct live_job *o, const struct late_result *l, const char *why)
 {
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = l->peer, .job = o->id, .lease = {.key = l->key}};
-	order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(why).text);
+	live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(why).text);
 	if (l->peer)
 		server_step(s, &ev);
 }
 
 /* To the core, which says whether it counts. */
-static int offer(struct server *s, const struct order *o, const struct late_result *l, struct error *e)
+static int offer(struct server *s, const struct live_job *o, const struct late_result *l, struct error *e)
 {
 	struct event ev = {.kind = EVENT_STORED, .job = o->id, .lease = {.key = l->key, .valid = true}};
 	struct envelope env;
@@ -111,7 +111,7 @@ static int offer(struct server *s, const struct order *o, const struct late_resu
 	return rc;
 }
 
-void late_drop(struct server *s, struct order *o)
+void late_drop(struct server *s, struct live_job *o)
 {
 	while (o->late_count) {
 		struct late_result l = o->late[--o->late_count];
@@ -120,7 +120,7 @@ void late_drop(struct server *s, struct order *o)
 }
 
 /* true: one more counts, and others may now. */
-static bool feed_one(struct server *s, struct order *o)
+static bool feed_one(struct server *s, struct live_job *o)
 {
 	for (size_t i = 0; i < o->late_count; i++) {
 		struct late_result l = o->late[i];
@@ -147,7 +147,7 @@ void late_feed(struct server *s)
 	if (s->feeding || s->stepping || s->stopping)
 		return;
 	s->feeding = true;
-	for (struct order *o = s->orders; o;) {
+	for (struct live_job *o = s->orders; o;) {
 		bool fed = o->late_count && !o->busy && !o->ended && feed_one(s, o);
 		o = fed ? s->orders : o->next; /* the list may have changed */
 	}

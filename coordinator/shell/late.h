@@ -6,18 +6,18 @@
 #ifndef COORDINATOR_SHELL_LATE_H
 #define COORDINATOR_SHELL_LATE_H
 
-#include "coordinator/shell/order.h"
+#include "coordinator/shell/live_job.h"
 
 struct server;
 
-int late_add(struct order *o, const struct lease_key *k, uint64_t at, struct error *e); /* -ENOMEM */
+int late_add(struct live_job *o, const struct lease_key *k, uint64_t at, struct error *e); /* -ENOMEM */
 /* Those of that (group, part) from this epoch on do not count any more. */
-void late_forget(struct order *o, const struct lease_key *k);
-void late_sort(struct order *o); /* as they can count */
+void late_forget(struct live_job *o, const struct lease_key *k);
+void late_sort(struct live_job *o); /* as they can count */
 /* The core gives a lease to this worker: true: its result is here and will count soon, the worker need not hear of it. */
-bool late_withholds(struct order *o, const struct lease_key *k, uint64_t peer);
+bool late_withholds(struct live_job *o, const struct lease_key *k, uint64_t peer);
 /* They are computed again, after all. */
-void late_drop(struct server *s, struct order *o);
+void late_drop(struct server *s, struct live_job *o);
 /* All that can count now do. After every step of the core, and when films are free again. */
 void late_feed(struct server *s);
 

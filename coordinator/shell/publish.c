@@ -23,8 +23,8 @@ static const char *end_name(enum job_end end)
 
 static int write_image(struct publishing *w)
 {
-	const struct order *o = w->order;
-	const Farm__Submit *m = order_submit(o);
+	const struct live_job *o = w->order;
+	const Farm__Submit *m = live_job_submit(o);
 	const char *slash = strrchr(m->scene, '/');
 	struct header_effect effects[HEADER_EFFECTS_MAX];
 	struct header_extra x = {.scene = slash ? slash + 1 : m->scene,
@@ -52,7 +52,7 @@ static void run(uv_work_t *work)
 	struct publishing *w = work->data;
 	w->rc = canvas_image(w->order->canvas, w->what == PUBLISH_PREVIEW, &w->image, &w->error);
 	if (!w->rc)
-		agreement_judge(&w->order->plan, &w->image, &w->agreement);
+		convergence_judge(&w->order->plan, &w->image, &w->agreement);
 	if (!w->rc && w->what != PUBLISH_ERROR_ONLY)
 		w->rc = write_image(w);
 }
@@ -78,7 +78,7 @@ static void tell_image(const struct publishing *w)
 {
 	uint64_t job = w->order->id;
 	if (*w->agreement.text)
-		order_log(w->order, LOG_JOB_NOTE, "text=%s", log_quote(w->agreement.text).text);
+		live_job_log(w->order, LOG_JOB_NOTE, "text=%s", log_quote(w->agreement.text).text);
 	struct event ev = {.kind = EVENT_IMAGE_KNOWN,
 			   .job = job,
 			   .image_known = {.job = job, .disagrees = w->agreement.verdict == CHAINS_DISAGREE}};
@@ -88,16 +88,16 @@ static void tell_image(const struct publishing *w)
 /* The core's job is done; all that it is made of stays until the disk takes the image. */
 static void cannot_write(struct publishing *w)
 {
-	struct order *o = w->order;
+	struct live_job *o = w->order;
 	o->unpublished = true;
 	o->unpublished_rounds = w->rounds;
 	o->try_again = server_now(w->server) + w->server->config.retry_seconds;
 	if (strcmp(o->record.why, w->error.text) != 0)
-		order_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(w->error.text).text);
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(w->error.text).text);
 	text_copy(o->record.why, sizeof o->record.why, w->error.text);
 }
 
-static void has_written(struct order *o)
+static void has_written(struct live_job *o)
 {
 	o->record.has_result = true;
 	o->record.cleared = 0;
@@ -107,12 +107,12 @@ static void has_written(struct order *o)
 /* What came of it, for the order. */
 static void take(struct publishing *w)
 {
-	struct order *o = w->order;
+	struct live_job *o = w->order;
 	/* Every image says how good it is, asked for or not. */
 	if (!w->rc && isfinite(w->image.rel_mse_upper))
 		record_take_error(&o->record, &w->image);
 	if (!w->rc)
-		record_take_agreement(&o->record, &w->image, &w->agreement);
+		record_take_convergence(&o->record, &w->image, &w->agreement);
 	if (w->what == PUBLISH_RESULT && !w->rc)
 		o->black = w->image.black;
 	if (w->what == PUBLISH_RESULT && w->rc)
@@ -120,7 +120,7 @@ static void take(struct publishing *w)
 	else if (w->what == PUBLISH_RESULT)
 		has_written(o);
 	else if (w->rc)
-		order_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 	if (w->what == PUBLISH_PREVIEW)
 		o->preview_made = server_now(w->server);
 	canvas_image_fini(&w->image);
@@ -146,7 +146,7 @@ static void done(uv_work_t *work, int status)
 	s->changes++;
 }
 
-void publish_start(struct server *s, struct order *o, enum publish_what what, uint64_t rounds)
+void publish_start(struct server *s, struct live_job *o, enum publish_what what, uint64_t rounds)
 {
 	assert(o && o->canvas);
 	assert(!o->busy);

@@ -6,14 +6,14 @@
 #ifndef COORDINATOR_SHELL_PUBLISH_H
 #define COORDINATOR_SHELL_PUBLISH_H
 
-#include "common/film/agreement.h"
+#include "common/film/convergence.h"
 #include "common/film/canvas.h"
 #include "coordinator/core/farm.h"
 
 #include <uv.h>
 
 struct server;
-struct order;
+struct live_job;
 
 enum publish_what {
 	PUBLISH_ERROR_ONLY, /* answered by EVENT_ERROR_KNOWN */
@@ -24,17 +24,17 @@ enum publish_what {
 struct publishing { /* one of an order at a time */
 	uv_work_t work;
 	struct server *server;
-	struct order *order;
+	struct live_job *order;
 	enum publish_what what;
 	uint64_t rounds;
 	double wall_seconds;
 	enum job_end end;
 	struct canvas_image image;
-	struct agreement agreement;
+	struct convergence agreement;
 	int rc;
 	struct error error;
 };
 
-void publish_start(struct server *s, struct order *o, enum publish_what what, uint64_t rounds);
+void publish_start(struct server *s, struct live_job *o, enum publish_what what, uint64_t rounds);
 
 #endif

@@ -17,7 +17,7 @@
 
 struct found { /* a job */
 	struct found *next;
-	struct order *order; /* all but its id is the pool's while it is read */
+	struct live_job *order; /* all but its id is the pool's while it is read */
 	struct job_record record; /* as it is shown meanwhile */
 	uint64_t bytes;
 	struct replay_progress progress;
@@ -105,14 +105,14 @@ uint64_t recovery_film_bytes(const struct server *s)
 /* ---- what cannot be read */
 
 /* What is stored is damaged: the job's batches can be made again, with the same bits. Nothing is deleted: somebody may want to look at it. */
-static void put_aside(struct server *s, struct order *o)
+static void put_aside(struct server *s, struct live_job *o)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
 	spool_job_path(s->spool, o->id, NULL, folder);
 	spool_job_path(s->spool, o->id, "checkpoint", path);
 	spool_job_path(s->spool, o->id, "checkpoint.damaged", aside);
-	order_log(o, LOG_SPOOL_FAULT, "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
-	order_log(o, LOG_JOB_STATE, "state=anew");
+	live_job_log(o, LOG_SPOOL_FAULT, "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
+	live_job_log(o, LOG_JOB_STATE, "state=anew");
 	disk_rename(path, aside);
 	journal_put_aside(folder);
 }
@@ -176,7 +176,7 @@ static int finish(struct server *s, struct error *e)
 	for (struct found *f; !rc && (f = r->first);) {
 		struct ledger_job j;
 		struct job_counts known;
-		struct order *o = f->order;
+		struct live_job *o = f->order;
 		r->first = f->next;
 		o->next = s->orders;
 		s->orders = o;
@@ -240,7 +240,7 @@ static int take_failure(struct server *s, struct error *e)
 	uint64_t id = f->record.id, extended = f->order->record.extended;
 	int rc = r->rc;
 	*e = r->error;
-	order_log(f->order, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
+	live_job_log(f->order, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
 	bool anew = rc == -EBADMSG && !f->anew;
 	if (anew)
 		put_aside(s, f->order);
@@ -249,7 +249,7 @@ static int take_failure(struct server *s, struct error *e)
 	if (anew) {
 		f->anew = true;
 		rc = ledger_get(s->ledger, id, &j, e);
-		rc = rc > 0 ? restore_order(s, &j, &f->order, e) : rc < 0 ? rc : error_set(e, ENOENT, "its row is gone");
+		rc = rc > 0 ? restore_live_job(s, &j, &f->order, e) : rc < 0 ? rc : error_set(e, ENOENT, "its row is gone");
 		if (!rc)
 			return 0;
 	}
@@ -291,7 +291,7 @@ static int add(struct server *s, const struct ledger_job *j, struct error *e)
 	if (!f)
 		return error_set(e, ENOMEM, "no memory for the jobs");
 	uint64_t id = j->id, extended = j->extended;
-	int rc = restore_order(s, j, &f->order, e);
+	int rc = restore_live_job(s, j, &f->order, e);
 	if (rc) {
 		mem_free(f);
 		return give_up(s, id, extended, rc, e);
@@ -342,7 +342,7 @@ void recovery_close(struct server *s)
 	while (r->first) {
 		struct found *next = r->first->next;
 		if (r->first->order)
-			order_free(r->first->order);
+			live_job_free(r->first->order);
 		mem_free(r->first);
 		r->first = next;
 	}

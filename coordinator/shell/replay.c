@@ -13,7 +13,7 @@
 enum { DAMAGED_MOST = 16 /* leases that are named */ };
 
 struct replay {
-	struct order *order;
+	struct live_job *order;
 	struct replay_progress *progress; /* NULL: nobody looks */
 	double elapsed;
 	uint64_t batches;
@@ -43,7 +43,7 @@ int replay_unpack(struct envelope *env, Farm__Envelope__BodyCase want, const uns
 
 /* ---- the journal */
 
-enum replay_place replay_place(const struct order *o, const struct lease_key *k)
+enum replay_place replay_place(const struct live_job *o, const struct lease_key *k)
 {
 	if (k->kind == LEASE_BOOTSTRAP)
 		return o->bootstrap && !bootstrap_has(o->bootstrap, k->group, k->part) ? REPLAY_FITS : REPLAY_MERGED;
@@ -59,14 +59,14 @@ enum replay_place replay_place(const struct order *o, const struct lease_key *k)
 
 static int merge(struct replay *r, struct batch *b, struct error *e)
 {
-	struct order *o = r->order;
-	uint64_t rounds = order_rounds(o);
-	int rc = order_merge(o, b, e);
+	struct live_job *o = r->order;
+	uint64_t rounds = live_job_rounds(o);
+	int rc = live_job_merge(o, b, e);
 	if (rc == -EEXIST || rc == -EAGAIN) /* of the films, not of the machine */
 		rc = error_prefix(e, -EBADMSG, "a batch out of its order");
-	order_note_times(o, r->elapsed, rounds);
+	live_job_note_times(o, r->elapsed, rounds);
 	if (!rc && o->bootstrap && bootstrap_missing(o->bootstrap) == 0)
-		rc = order_prepare(o, o->film_folder, e);
+		rc = live_job_prepare(o, o->film_folder, e);
 	r->batches++;
 	return rc;
 }
@@ -129,7 +129,7 @@ static int go_on(void *user, size_t bytes, struct error *e)
 static int take_record(void *user, const struct journal_item *item, struct error *e)
 {
 	struct replay *r = user;
-	struct order *o = r->order;
+	struct live_job *o = r->order;
 	struct forecast_look look;
 	const unsigned char *body = item->body;
 	size_t size = item->size;
@@ -172,7 +172,7 @@ static int take_record(void *user, const struct journal_item *item, struct error
 /* Those that waited for others behind them in the file. */
 static int take_late(struct replay *r, struct error *e)
 {
-	struct order *o = r->order;
+	struct live_job *o = r->order;
 	size_t kept = 0;
 	int rc = 0;
 	late_sort(o);
@@ -196,7 +196,7 @@ static int take_late(struct replay *r, struct error *e)
 /* Which of the damaged ones are computed again; those that have been since then are there. */
 static void say_damage(const struct replay *r, const struct journal_found *found)
 {
-	struct order *o = r->order;
+	struct live_job *o = r->order;
 	char text[400] = "";
 	struct text t = {text, sizeof text};
 	uint64_t open = 0;
@@ -207,7 +207,7 @@ static void say_damage(const struct replay *r, const struct journal_found *found
 		text_put(&t, "%s%s group %u part %u epoch %llu", open++ ? ", " : ": ", k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group,
 			 k->part, (unsigned long long)k->epoch);
 	}
-	order_log(o, LOG_SPOOL_FAULT, "damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; computed again%s\"",
+	live_job_log(o, LOG_SPOOL_FAULT, "damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; computed again%s\"",
 		  (unsigned long long)found->damaged, o->late_count, (unsigned long long)found->lost, *text ? text : ": none any more");
 }
 
@@ -231,7 +231,7 @@ uint64_t replay_bytes(const struct spool *spool, uint64_t job)
 	return sum;
 }
 
-int replay_films(const struct spool *spool, struct order *o, struct replay_progress *p, struct error *e)
+int replay_films(const struct spool *spool, struct live_job *o, struct replay_progress *p, struct error *e)
 {
 	struct replay r = {.order = o, .progress = p};
 	struct journal_found found;
@@ -243,7 +243,7 @@ int replay_films(const struct spool *spool, struct order *o, struct replay_progr
 		return rc;
 	rc = journal_open(&o->journal, folder, o->id, generation, take_record, &r, &found, e);
 	if (rc == -ENOENT) { /* its batches can be made again */
-		order_log(o, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"", folder, (unsigned long long)generation);
+		live_job_log(o, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"", folder, (unsigned long long)generation);
 		rc = journal_create(&o->journal, folder, o->id, generation, e);
 	}
 	if (!rc && o->late_count)
@@ -254,8 +254,8 @@ int replay_films(const struct spool *spool, struct order *o, struct replay_progr
 		say_damage(&r, &found);
 	journal_clear(folder, generation);
 	o->pinned = *o->fingerprint != 0;
-	order_log(o, LOG_JOB_STATE, "state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu damaged=%llu",
-		  (unsigned long long)r.batches, (unsigned long long)order_rounds(o), o->times.elapsed,
+	live_job_log(o, LOG_JOB_STATE, "state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu damaged=%llu",
+		  (unsigned long long)r.batches, (unsigned long long)live_job_rounds(o), o->times.elapsed,
 		  (unsigned long long)o->checkpoint_bytes, (unsigned long long)journal_bytes(o->journal), (unsigned long long)found.cut,
 		  (unsigned long long)found.damaged);
 	return 0;

@@ -6,7 +6,7 @@
 #ifndef COORDINATOR_SHELL_REPLAY_H
 #define COORDINATOR_SHELL_REPLAY_H
 
-#include "coordinator/shell/order.h"
+#include "coordinator/shell/live_job.h"
 
 #include <stdatomic.h>
 
@@ -20,7 +20,7 @@ uint64_t replay_bytes(const struct spool *spool, uint64_t job);
 
 /* A second and more. By any thread while nobody else has the order. When it fails (-EBADMSG: something of it is damaged or gone;
  * -EPROTO: of another version) the order is of no use but to be dropped. p: NULL: nobody looks. */
-int replay_films(const struct spool *spool, struct order *o, struct replay_progress *p, struct error *e);
+int replay_films(const struct spool *spool, struct live_job *o, struct replay_progress *p, struct error *e);
 
 /* A frame as it was stored, with this message. -EBADMSG, -ENOMEM. The payload is a part of the frame. */
 int replay_unpack(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size, const unsigned char **payload,
@@ -28,6 +28,6 @@ int replay_unpack(struct envelope *env, Farm__Envelope__BodyCase want, const uns
 
 /* Whether a result can be merged now. */
 enum replay_place { REPLAY_FITS, REPLAY_MERGED /* it is */, REPLAY_LATE /* something is missing before it */ };
-enum replay_place replay_place(const struct order *o, const struct lease_key *k);
+enum replay_place replay_place(const struct live_job *o, const struct lease_key *k);
 
 #endif

@@ -12,7 +12,7 @@
 
 /* ---- the core */
 
-static uint64_t next_epoch(const struct order *o, uint32_t group, uint32_t part)
+static uint64_t next_epoch(const struct live_job *o, uint32_t group, uint32_t part)
 {
 	if (o->bootstrap)
 		return bootstrap_has(o->bootstrap, group, part);
@@ -27,7 +27,7 @@ static uint64_t next_epoch(const struct order *o, uint32_t group, uint32_t part)
 	return k.epoch;
 }
 
-int restore_tell(struct server *s, const struct order *o, const char *held, uint64_t tag, struct error *e)
+int restore_tell(struct server *s, const struct live_job *o, const char *held, uint64_t tag, struct error *e)
 {
 	uint32_t slots = o->plan.groups * o->plan.parts;
 	uint64_t *next = mem_alloc(slots, sizeof *next);
@@ -38,7 +38,7 @@ int restore_tell(struct server *s, const struct order *o, const char *held, uint
 		return error_set(e, ENOMEM, "no memory for a job");
 	}
 	for (uint32_t i = 0; i < slots; i++) {
-		const struct order_maker *m = &o->makers[i];
+		const struct live_job_maker *m = &o->makers[i];
 		next[i] = next_epoch(o, i / o->plan.parts, i % o->plan.parts);
 		makers[i] = (struct event_join){.name = *m->name ? m->name : NULL, .certificate = m->certificate, .home = m->home, .restarts = m->restarts};
 		log_event(LOG_BATCH_RESTORED, "job=j%llu kind=%d group=%u part=%u epochs=%llu", (unsigned long long)o->id,
@@ -50,7 +50,7 @@ int restore_tell(struct server *s, const struct order *o, const char *held, uint
 			   .tag = tag,
 			   .restore = {.job = o->id,
 				       .submit = {.plan = &o->plan, .name = o->record.name, .priority = o->record.priority,
-						  .mixed = order_submit(o)->mixed, .owner = o->record.owner, .verify = trust_share(s, order_submit(o))},
+						  .mixed = live_job_submit(o)->mixed, .owner = o->record.owner, .verify = trust_share(s, live_job_submit(o))},
 				       .fingerprint = o->fingerprint,
 				       .kind = o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
 				       .next = next,
@@ -76,12 +76,12 @@ int restore_tell(struct server *s, const struct order *o, const char *held, uint
 static int hold_blobs(struct server *s, const Farm__Submit *m, struct error *e)
 {
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = order_file_hash(m->files[i]);
+		struct blob_hash h = live_job_file_hash(m->files[i]);
 		int rc = blob_expect(s->blobs, &h, e);
 		if (!rc)
 			continue;
 		while (i-- > 0) {
-			h = order_file_hash(m->files[i]);
+			h = live_job_file_hash(m->files[i]);
 			blob_release(s->blobs, &h);
 		}
 		return rc;
@@ -97,7 +97,7 @@ int restore_record(const struct server *s, uint64_t id, struct job_record *r, bo
 }
 
 /* What the submission does not say, but its earlier end: its image is there until the next one is. */
-static int take_record_of(const struct server *s, const struct ledger_job *j, struct order *o, struct error *e)
+static int take_record_of(const struct server *s, const struct ledger_job *j, struct live_job *o, struct error *e)
 {
 	o->record.priority = j->priority;
 	o->record.extended = j->extended;
@@ -120,7 +120,7 @@ static int not_known(const struct ledger_job *j, int rc, struct error *e)
 	return error_prefix(e, -EPROTO, "version %.40s of the coordinator took it, and this is %s", j->version, HSLT_VERSION);
 }
 
-static int make_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e)
+static int make_order(struct server *s, const struct ledger_job *j, struct live_job **o, struct error *e)
 {
 	struct envelope submit, info;
 	struct plan plan;
@@ -137,19 +137,19 @@ static int make_order(struct server *s, const struct ledger_job *j, struct order
 	if (rc)
 		return not_known(j, rc, e);
 	rc = hold_blobs(s, submit.message->submit, e);
-	if (!rc && (rc = order_new(o, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e)))
-		order_release_blobs(submit.message->submit, s->blobs);
+	if (!rc && (rc = live_job_new(o, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e)))
+		live_job_release_blobs(submit.message->submit, s->blobs);
 	envelope_fini(&submit);
 	return rc;
 }
 
-void restore_drop(struct server *s, struct order *o)
+void restore_drop(struct server *s, struct live_job *o)
 {
-	order_release_blobs(order_submit(o), s->blobs);
-	order_free(o);
+	live_job_release_blobs(live_job_submit(o), s->blobs);
+	live_job_free(o);
 }
 
-int restore_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e)
+int restore_live_job(struct server *s, const struct ledger_job *j, struct live_job **o, struct error *e)
 {
 	int rc = make_order(s, j, o, e);
 	if (rc)

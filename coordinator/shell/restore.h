@@ -13,9 +13,9 @@ bool restore_lives(const struct server *s, uint64_t job);      /* it had not end
 int restore_record(const struct server *s, uint64_t id, struct job_record *r, bool *there, struct error *e);
 
 /* One job from its row, for nobody yet. -EBADMSG: something of it is damaged or gone. */
-int restore_order(struct server *s, const struct ledger_job *j, struct order **o, struct error *e);
-void restore_drop(struct server *s, struct order *o); /* and lets go of its files */
+int restore_live_job(struct server *s, const struct ledger_job *j, struct live_job **o, struct error *e);
+void restore_drop(struct server *s, struct live_job *o); /* and lets go of its files */
 /* The core hears of an order that is in the server's list. held: by whom, or "". Refusals carry the tag. */
-int restore_tell(struct server *s, const struct order *o, const char *held, uint64_t tag, struct error *e);
+int restore_tell(struct server *s, const struct live_job *o, const char *held, uint64_t tag, struct error *e);
 
 #endif

@@ -16,11 +16,11 @@ static void refuse(struct server *s, uint64_t peer, const struct lease_key *k, c
 	server_step(s, &ev);
 }
 
-static void fail(struct server *s, struct order *o, uint64_t peer, const struct lease_key *k, const char *why)
+static void fail(struct server *s, struct live_job *o, uint64_t peer, const struct lease_key *k, const char *why)
 {
 	struct session *p = session_find(s, peer);
 	struct event ev = {.kind = EVENT_LEASE_FAILED, .peer = peer, .job = k->job, .text = why, .lease = {.key = *k}};
-	order_log(o, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%d group=%u part=%u epoch=%llu", log_quote(p ? p->name : "?").text,
+	live_job_log(o, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%d group=%u part=%u epoch=%llu", log_quote(p ? p->name : "?").text,
 		  log_quote(why).text, (int)k->kind, k->group, k->part, (unsigned long long)k->epoch);
 	if (p)
 		session_send_ack(p, k, ACK_REFUSED, why);
@@ -39,7 +39,7 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 		return;
 	}
 	ev.job = ev.lease.key.job;
-	struct order *o = server_order(s, ev.job);
+	struct live_job *o = server_live_job(s, ev.job);
 	int rc = o ? batch_unpack(&batch, &o->plan, m, payload->bytes, payload->size, &e) : 0;
 	if (o && !rc && batch.state_count && !m->states_digest.len)
 		rc = error_set(&e, EBADMSG, "chain states without a digest");
@@ -82,23 +82,23 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 static bool has_room(const struct server *s, const struct buf *payload)
 {
 	uint64_t bytes = payload->capacity;
-	for (const struct order *o = s->orders; o; o = o->next)
+	for (const struct live_job *o = s->orders; o; o = o->next)
 		bytes += o->waiting_bytes;
 	return bytes <= s->config.waiting_bytes;
 }
 
 /* Nobody may look at the film now. What the core would merge waits, one result of each lease that its worker holds, and one of
  * those that nobody's waits for. */
-static void put_off(struct server *s, struct order *o, uint64_t peer, const struct lease_key *k, struct envelope *env, struct buf *payload)
+static void put_off(struct server *s, struct live_job *o, uint64_t peer, const struct lease_key *k, struct envelope *env, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
 	enum farm_delivery awaited = farm_awaits(s->farm, peer, k);
-	const struct waiting_batch *w = awaited == DELIVERY_OPEN ? order_waits_for(o, k) : NULL;
+	const struct waiting_batch *w = awaited == DELIVERY_OPEN ? live_job_waits_for(o, k) : NULL;
 	if (w && w->peer == peer) /* the answer to that one is the answer to this one */
 		return;
 	if (awaited == DELIVERY_USELESS)
 		ev.kind = EVENT_BATCH;
-	else if (w || !has_room(s, payload) || !order_put_off(o, peer, k, env, payload)) {
+	else if (w || !has_room(s, payload) || !live_job_put_off(o, peer, k, env, payload)) {
 		refuse(s, peer, k, w ? "another worker's result of this lease waits" : "no room for results that wait");
 		return;
 	}
@@ -110,13 +110,13 @@ static void take_refusal(struct server *s, uint64_t peer, struct envelope *env, 
 {
 	const Farm__LeaseFailed *m = env->message->lease_failed;
 	struct session *p = session_find(s, peer);
-	struct order *o = m->key ? server_order(s, m->key->job) : NULL;
+	struct live_job *o = m->key ? server_live_job(s, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
 	if (!o || !o->busy || lease_key_from_wire(m->key, &k, &e)) {
 		if (p)
 			session_lease_failed(p, m);
-	} else if (!has_room(s, payload) || !order_put_off(o, peer, &k, env, payload)) {
+	} else if (!has_room(s, payload) || !live_job_put_off(o, peer, &k, env, payload)) {
 		refuse(s, peer, &k, "no room for results that wait");
 	}
 }
@@ -128,7 +128,7 @@ void server_result(struct server *s, uint64_t peer, struct envelope *env, struct
 		return;
 	}
 	const Farm__LeaseResult *m = env->message->lease_result;
-	struct order *o = m->key ? server_order(s, m->key->job) : NULL;
+	struct live_job *o = m->key ? server_live_job(s, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
 	if (o && o->busy && lease_key_from_wire(m->key, &k, &e) == 0)

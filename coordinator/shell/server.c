@@ -124,15 +124,15 @@ static void on_wake(uv_timer_t *t)
 const char *server_film_folder(const struct server *s, const struct plan *p)
 {
 	uint64_t bytes = canvas_bytes(p) + recovery_film_bytes(s) + (s->reading ? canvas_bytes(&s->reading->plan) : 0);
-	for (const struct order *o = s->orders; o; o = o->next)
+	for (const struct live_job *o = s->orders; o; o = o->next)
 		if (o->canvas && !canvas_is_mapped(o->canvas))
 			bytes += canvas_bytes(&o->plan);
 	return bytes <= s->config.film_bytes ? NULL : spool_canvas(s->spool);
 }
 
-struct order *server_order(const struct server *s, uint64_t job)
+struct live_job *server_live_job(const struct server *s, uint64_t job)
 {
-	for (struct order *o = s->orders; o; o = o->next)
+	for (struct live_job *o = s->orders; o; o = o->next)
 		if (o->id == job)
 			return o;
 	return NULL;
@@ -142,12 +142,12 @@ struct order *server_order(const struct server *s, uint64_t job)
 static void on_drain(uv_timer_t *t)
 {
 	struct server *s = t->data;
-	struct order *o = s->orders;
+	struct live_job *o = s->orders;
 	while (o && (o->busy || !o->waiting))
 		o = o->next;
 	if (!o)
 		return;
-	struct waiting_batch *w = order_take_waiting(o);
+	struct waiting_batch *w = live_job_take_waiting(o);
 	server_result(s, w->peer, &w->envelope, &w->payload);
 	waiting_batch_free(w);
 	if (!s->stopping)
@@ -164,7 +164,7 @@ void server_order_free_again(struct server *s)
 
 /* ---- views ---- */
 
-static void view_order(struct server *s, const struct order *o, struct job_view *v)
+static void view_order(struct server *s, const struct live_job *o, struct job_view *v)
 {
 	struct job_status status;
 	struct canvas_counts counted;
@@ -192,7 +192,7 @@ static void view_order(struct server *s, const struct order *o, struct job_view 
 bool server_view(struct server *s, uint64_t job, struct job_view *v)
 {
 	struct job_record r;
-	struct order *o = server_order(s, job);
+	struct live_job *o = server_live_job(s, job);
 	if (o) {
 		view_order(s, o, v);
 		return true;
@@ -219,14 +219,14 @@ static int by_id(const void *a, const void *b)
 size_t server_views(struct server *s, struct job_view **views)
 {
 	size_t count = s->ended_count + recovery_views(s, NULL), n = 0;
-	for (struct order *o = s->orders; o; o = o->next)
+	for (struct live_job *o = s->orders; o; o = o->next)
 		count++;
 	*views = mem_alloc(count, sizeof **views);
 	if (!*views)
 		return 0;
 	for (size_t i = 0; i < s->ended_count; i++)
 		view_of_record(&(*views)[n++], &s->ended[i]);
-	for (struct order *o = s->orders; o; o = o->next)
+	for (struct live_job *o = s->orders; o; o = o->next)
 		view_order(s, o, &(*views)[n++]);
 	n += recovery_views(s, *views + n);
 	qsort(*views, count, sizeof **views, by_id);
@@ -473,8 +473,8 @@ static void close_stores(struct server *s)
 {
 	recovery_close(s);
 	while (s->orders) {
-		struct order *next = s->orders->next;
-		order_free(s->orders);
+		struct live_job *next = s->orders->next;
+		live_job_free(s->orders);
 		s->orders = next;
 	}
 	while (s->deferred) {

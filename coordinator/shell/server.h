@@ -8,7 +8,7 @@
 #include "common/blob/blob.h"
 #include "common/net/conn.h"
 #include "coordinator/core/farm.h"
-#include "coordinator/shell/order.h"
+#include "coordinator/shell/live_job.h"
 #include "coordinator/shell/quota.h"
 #include "coordinator/store/ledger.h"
 #include "coordinator/store/seen.h"
@@ -87,7 +87,7 @@ struct server {
 	struct blob_store *blobs;
 	struct session *sessions, *by_id[SESSION_BUCKETS];
 	unsigned session_count, fetches;
-	struct order *orders;
+	struct live_job *orders;
 	struct job_record *ended; /* ENDED_MAX, oldest first */
 	size_t ended_count;
 	struct deferred *deferred, **deferred_last;
@@ -115,7 +115,7 @@ struct server {
 	bool caller_waits; /* nobody could be let in: to be tried again */
 	bool checkpointing; /* of some job, by the pool */
 	struct session *extending; /* those with extensions that wait, in the order in which they came */
-	const struct order *reading; /* of an ended job: the pool reads its films, and all else of it but id and plan is the pool's */
+	const struct live_job *reading; /* of an ended job: the pool reads its films, and all else of it but id and plan is the pool's */
 	double tls_next; /* when its files are looked at again */
 	double watchdog, watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */
 	uint64_t changes; /* grows with whatever the status shows */
@@ -140,7 +140,7 @@ void server_step(struct server *s, struct event *ev);
 void server_defer(struct server *s, const struct event *ev);
 void server_job_broken(struct server *s, uint64_t job, const char *text);
 
-struct order *server_order(const struct server *s, uint64_t job);
+struct live_job *server_live_job(const struct server *s, uint64_t job);
 /* Where the films of a job of this plan go: NULL: into memory, which is never kept waiting by the disk. */
 const char *server_film_folder(const struct server *s, const struct plan *p);
 /* Some order is not busy any more: what waited for its canvas goes on. Orders that have ended are gone then. */

@@ -2,7 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/shell/asks.h"
+#include "coordinator/shell/worker_requests.h"
 #include "coordinator/shell/back.h"
 #include "coordinator/shell/files.h"
 #include "coordinator/shell/held.h"
@@ -213,7 +213,7 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 
 /* ---- a worker speaks ---- */
 
-void session_allow_results(struct session *p, const struct order *o)
+void session_allow_results(struct session *p, const struct live_job *o)
 {
 	uint32_t need = batch_payload_max(&o->plan);
 	if (need > p->payload_limit) {
@@ -233,15 +233,15 @@ static void take_lease_failed(struct session *p, struct envelope *env)
 }
 
 /* Who does not hold the lease, or refuses states that it had before, refuses nothing that is there: nobody made it. */
-static void log_failure(const struct session *p, struct order *o, const Farm__LeaseFailed *f, const struct lease_key *k, const char *text, bool holds)
+static void log_failure(const struct session *p, struct live_job *o, const Farm__LeaseFailed *f, const struct lease_key *k, const char *text, bool holds)
 {
 	struct log_value name = log_quote(p->name), said = log_quote(text);
 	unsigned long long epoch = k->epoch;
 	if (f->bad_states)
-		order_log(o, LOG_LEASE_FAILED, "states_of=%s refused_by=%s text=%s kind=%d group=%u part=%u epoch=%llu",
+		live_job_log(o, LOG_LEASE_FAILED, "states_of=%s refused_by=%s text=%s kind=%d group=%u part=%u epoch=%llu",
 			  log_quote(holds ? farm_maker(p->server->farm, k) : "?").text, name.text, said.text, (int)k->kind, k->group, k->part, epoch);
 	else
-		order_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%d group=%u part=%u epoch=%llu", name.text, f->own, said.text,
+		live_job_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%d group=%u part=%u epoch=%llu", name.text, f->own, said.text,
 			  (int)k->kind, k->group, k->part, epoch);
 }
 
@@ -259,10 +259,10 @@ void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 		return;
 	}
 	ev.job = ev.lease.key.job;
-	struct order *o = server_order(p->server, ev.job);
+	struct live_job *o = server_live_job(p->server, ev.job);
 	ev.lease.own = f->own;
 	ev.lease.bad_states = f->bad_states;
-	ev.lease.other_states = f->bad_states && !(o && order_gives_states(o, &ev.lease.key, &states));
+	ev.lease.other_states = f->bad_states && !(o && live_job_gives_states(o, &ev.lease.key, &states));
 	bool blamed = f->own || f->bad_states;
 	if (o && *f->text && !blamed && !files_are_right(p->server, o, FILES_DOUBTED)) { /* the spool's fault, not the worker's */
 		ev.kind = EVENT_LEASE_RETURNED;
@@ -282,13 +282,13 @@ void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 
 static void take_blob_get(struct session *p, const Farm__BlobGet *g)
 {
-	struct ask a = {.blob = true, .number = g->offset};
+	struct worker_request a = {.blob = true, .number = g->offset};
 	if (g->hash.len != BLOB_HASH_SIZE) {
 		session_fault(p, "a blob's name has %zu bytes", g->hash.len);
 		return;
 	}
 	memcpy(a.hash.bytes, g->hash.data, sizeof a.hash.bytes);
-	asks_take(p, &a);
+	worker_requests_take(p, &a);
 }
 
 static void take_lease_result(struct session *p, struct envelope *env)
@@ -340,7 +340,7 @@ static void worker_message(struct session *p, struct envelope *env)
 		take_lease_failed(p, env);
 		break;
 	case FARM__ENVELOPE__BODY_JOB_GET:
-		asks_take(p, &(struct ask){.number = m->job_get->job});
+		worker_requests_take(p, &(struct worker_request){.number = m->job_get->job});
 		break;
 	case FARM__ENVELOPE__BODY_BLOB_GET:
 		take_blob_get(p, m->blob_get);
@@ -382,7 +382,7 @@ static void on_closed(void *user, const char *why)
 	delist(s, p);
 	session_upload_abort(p);
 	session_fetch_end(p);
-	asks_drop(p);
+	worker_requests_drop(p);
 	held_drop(p);
 	extend_forget(p);
 	s->garbled += conn_garbled(p->conn);
@@ -402,7 +402,7 @@ static void on_closed(void *user, const char *why)
 
 static void on_drained(void *user)
 {
-	asks_go_on(user);
+	worker_requests_go_on(user);
 }
 
 static const struct conn_events events = {.message = on_message, .heard = on_heard, .drained = on_drained, .closed = on_closed};
@@ -470,13 +470,13 @@ static void allow_lease(struct session *p, size_t size)
 	conn_set_send_limit(p->conn, PEER_SEND + p->leases_most);
 }
 
-void session_send_lease(struct session *p, const struct order *o, const struct lease_key *k, bool anew)
+void session_send_lease(struct session *p, const struct live_job *o, const struct lease_key *k, bool anew)
 {
 	unsigned char *frame;
 	size_t size;
 	struct error e;
 	session_allow_results(p, o);
-	if (order_pack_lease(o, k, anew, &frame, &size, &e)) {
+	if (live_job_pack_lease(o, k, anew, &frame, &size, &e)) {
 		conn_close(p->conn, e.text);
 		return;
 	}

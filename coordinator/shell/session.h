@@ -11,7 +11,7 @@
 enum session_state { SESSION_NEW, SESSION_WORKER, SESSION_CLIENT, SESSION_LEAVING };
 
 struct upload;
-struct ask;
+struct worker_request;
 
 struct session {
 	struct session *next, **place; /* all; where they point to this one */
@@ -25,7 +25,7 @@ struct session {
 	struct tls_peer who; /* by its certificate; TLS_NOBODY without TLS, and then everybody may do everything */
 	uint32_t payload_limit;
 	size_t leases_most; /* bytes of as many leases as it wanted */
-	struct ask *asks;  /* that wait for it to read */
+	struct worker_request *asks;  /* that wait for it to read */
 	unsigned ask_count;
 	double heard; /* s on the loop's clock: when it was last told so amid a message */
 	struct upload *upload; /* a submission that waits for blobs */
@@ -57,12 +57,12 @@ void session_message(struct session *p, struct envelope *env, const unsigned cha
 __attribute__((format(printf, 2, 3))) void session_fault(struct session *p, const char *format, ...);
 
 /* Results of this job may come from now on, and they may be so long. */
-void session_allow_results(struct session *p, const struct order *o);
+void session_allow_results(struct session *p, const struct live_job *o);
 
 /* What the core wants said to workers. */
 /* A lease that a worker could not do; p is one. */
 void session_lease_failed(struct session *p, const Farm__LeaseFailed *f);
-void session_send_lease(struct session *p, const struct order *o, const struct lease_key *k, bool anew); /* with seeds */
+void session_send_lease(struct session *p, const struct live_job *o, const struct lease_key *k, bool anew); /* with seeds */
 void session_send_revoke(struct session *p, const struct lease_key *k);
 void session_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text);
 void session_send_job_end(struct session *p, uint64_t job);

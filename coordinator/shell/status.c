@@ -89,11 +89,11 @@ static void add_tls(const struct server *s, json_t *o)
 }
 
 /* Here or not. */
-static json_t *aside_json(const struct server *s)
+static json_t *quarantined_json(const struct server *s)
 {
 	json_t *list = json_array();
 	struct worker_status w;
-	for (uint64_t who = 0; (who = farm_next_aside(s->farm, who)) && farm_worker(s->farm, who, &w);)
+	for (uint64_t who = 0; (who = farm_next_quarantined(s->farm, who)) && farm_worker(s->farm, who, &w);)
 		json_array_append_new(list, view_aside_to_json(&w));
 	return list;
 }
@@ -114,7 +114,7 @@ static void add_workers(struct server *s, json_t *o)
 			json_array_append_new(leases, view_lease_to_json(&l, p.name, now));
 	}
 	json_object_set_new(o, "workers", workers);
-	json_object_set_new(o, "aside", aside_json(s));
+	json_object_set_new(o, "aside", quarantined_json(s));
 	json_object_set_new(o, "leases", leases);
 }
 

@@ -20,13 +20,13 @@ static int add_worker(json_t *list, const struct worker_status *w, struct error 
 	return json_array_append_new(list, o) ? error_set(e, ENOMEM, "no memory for the list of those that are set aside") : 0;
 }
 
-static void write_aside(struct server *s)
+static void write_quarantined(struct server *s)
 {
 	struct worker_status w;
 	struct error e;
 	int rc = 0;
 	json_t *list = json_array(), *o = json_pack("{s:i s:o}", "schema", 1, "workers", list);
-	for (uint64_t who = 0; !rc && (who = farm_next_aside(s->farm, who)) && farm_worker(s->farm, who, &w);)
+	for (uint64_t who = 0; !rc && (who = farm_next_quarantined(s->farm, who)) && farm_worker(s->farm, who, &w);)
 		rc = add_worker(list, &w, &e);
 	char *text = json_dumps(o, JSON_INDENT(1));
 	json_decref(o);
@@ -92,7 +92,7 @@ int trust_open(struct server *s, struct error *e)
 	json_decref(o);
 	mem_free(text);
 	if (!rc && s->config.forgive)
-		write_aside(s);
+		write_quarantined(s);
 	return rc;
 }
 
@@ -103,7 +103,7 @@ double trust_share(const struct server *s, const Farm__Submit *m)
 	return m->mixed ? 0 : m->verify > s->config.verify ? m->verify : s->config.verify;
 }
 
-void trust_merged(struct order *o, const struct action *a)
+void trust_merged(struct live_job *o, const struct action *a)
 {
 	if (a->verified)
 		return;
@@ -112,16 +112,16 @@ void trust_merged(struct order *o, const struct action *a)
 			o->credits[i].leases++;
 			return;
 		}
-	struct order_credit *more = mem_grow(o->credits, o->credit_count * sizeof *more, (o->credit_count + 1) * sizeof *more);
+	struct live_job_credit *more = mem_grow(o->credits, o->credit_count * sizeof *more, (o->credit_count + 1) * sizeof *more);
 	if (!more) {
-		order_log(o, LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
+		live_job_log(o, LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
 		return;
 	}
 	o->credits = more;
-	o->credits[o->credit_count++] = (struct order_credit){a->who, 1};
+	o->credits[o->credit_count++] = (struct live_job_credit){a->who, 1};
 }
 
-void trust_taken_back(struct order *o, uint64_t who)
+void trust_taken_back(struct live_job *o, uint64_t who)
 {
 	for (size_t i = 0; i < o->credit_count; i++)
 		if (o->credits[i].who == who && o->credits[i].leases > 0)
@@ -138,19 +138,19 @@ static const char *name_of(const struct server *s, uint64_t who, char name[JOIN_
 void trust_wrong(struct server *s, const struct action *a)
 {
 	char name[JOIN_NAME];
-	struct order *o = server_order(s, a->job);
+	struct live_job *o = server_live_job(s, a->job);
 	if (o)
-		order_log(o, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text, log_quote(a->text).text);
+		live_job_log(o, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text, log_quote(a->text).text);
 }
 
-static void note(struct order *o, const char *text)
+static void note(struct live_job *o, const char *text)
 {
-	order_log(o, LOG_JOB_NOTE, "text=%s", log_quote(text).text);
+	live_job_log(o, LOG_JOB_NOTE, "text=%s", log_quote(text).text);
 	size_t used = strlen(o->doubts);
 	text_print(o->doubts + used, sizeof o->doubts - used, "%s%s", used ? "; " : "", text);
 }
 
-static void note_credit(struct order *o, const char *name, const char *why, uint64_t leases)
+static void note_credit(struct live_job *o, const char *name, const char *why, uint64_t leases)
 {
 	char text[256];
 	text_print(text, sizeof text, "worker %s is set aside (%s); %llu of its leases were merged unverified", name, why,
@@ -160,18 +160,18 @@ static void note_credit(struct order *o, const char *name, const char *why, uint
 
 void trust_anew(struct server *s, const struct action *a)
 {
-	struct order *o = server_order(s, a->job);
+	struct live_job *o = server_live_job(s, a->job);
 	if (o)
 		note(o, a->text);
 }
 
-void trust_aside(struct server *s, const struct action *a)
+void trust_quarantined(struct server *s, const struct action *a)
 {
 	char name[JOIN_NAME];
 	name_of(s, a->who, name);
 	log_event(LOG_WORKER_ASIDE, "name=%s why=%s", log_quote(name).text, log_quote(a->text).text);
-	write_aside(s);
-	for (struct order *o = s->orders; o; o = o->next)
+	write_quarantined(s);
+	for (struct live_job *o = s->orders; o; o = o->next)
 		for (size_t i = 0; i < o->credit_count; i++)
 			if (o->credits[i].who == a->who && o->credits[i].leases > 0)
 				note_credit(o, name, a->text, o->credits[i].leases);

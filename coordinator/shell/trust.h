@@ -16,10 +16,10 @@ int trust_open(struct server *s, struct error *e);
 /* Of the job's leases that two workers compute: as it asks for, and no less than is asked of all; none of a mixed one. */
 double trust_share(const struct server *s, const Farm__Submit *m);
 
-void trust_merged(struct order *o, const struct action *a);
-void trust_taken_back(struct order *o, uint64_t who); /* one of its results counts no more */
+void trust_merged(struct live_job *o, const struct action *a);
+void trust_taken_back(struct live_job *o, uint64_t who); /* one of its results counts no more */
 void trust_wrong(struct server *s, const struct action *a);
 void trust_anew(struct server *s, const struct action *a); /* chains that lost their states */
-void trust_aside(struct server *s, const struct action *a);
+void trust_quarantined(struct server *s, const struct action *a);
 
 #endif

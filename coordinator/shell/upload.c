@@ -8,7 +8,7 @@
 #include <string.h>
 
 enum { FILES_MAX = 10000, DEFINES_MAX = 256, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_MAX_BYTES = 1024 };
-static const uint64_t bundle_max = 1ull << 34; /* 16 GiB */
+static const uint64_t job_cache_max = 1ull << 34; /* 16 GiB */
 
 /* A relative path without "..": what a scene may ask for, and what a worker may look up. */
 static bool name_ok(const char *name)
@@ -34,8 +34,8 @@ static int check_files(const Farm__Submit *m, struct error *e)
 		const Farm__File *f = m->files[i];
 		if (!name_ok(f->name) || f->hash.len != BLOB_HASH_SIZE)
 			return error_set(e, EINVAL, "file %zu of the bundle has no proper name or hash", i);
-		if (f->size > bundle_max - total)
-			return error_set(e, EINVAL, "the bundle is larger than %llu bytes", (unsigned long long)bundle_max);
+		if (f->size > job_cache_max - total)
+			return error_set(e, EINVAL, "the bundle is larger than %llu bytes", (unsigned long long)job_cache_max);
 		total += f->size;
 		scene = scene || strcmp(f->name, m->scene) == 0;
 	}
@@ -160,7 +160,7 @@ static void look_for_blobs(struct upload *u)
 	const Farm__Submit *m = u->submit.message->submit;
 	u->missing_count = 0;
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = order_file_hash(m->files[i]);
+		struct blob_hash h = live_job_file_hash(m->files[i]);
 		u->held[i] = blob_check(u->blobs, &h, FILES_CHECKED, NULL) == 0 && blob_hold(u->blobs, &h);
 		u->missing_count += !u->held[i];
 	}
@@ -171,7 +171,7 @@ static int check_sizes(const struct upload *u, struct error *e)
 {
 	const Farm__Submit *m = u->submit.message->submit;
 	for (size_t i = 0; i < m->n_files; i++) {
-		struct blob_hash h = order_file_hash(m->files[i]);
+		struct blob_hash h = live_job_file_hash(m->files[i]);
 		uint64_t size;
 		if (u->held[i] && (!blob_has(u->blobs, &h, &size) || size != m->files[i]->size))
 			return error_set(e, EINVAL, "%s: another size than its content has", m->files[i]->name);
@@ -221,7 +221,7 @@ void upload_free(struct upload *u)
 		blob_write_abort(u->writer);
 	const Farm__Submit *m = u->submit.message ? u->submit.message->submit : NULL;
 	for (size_t i = 0; m && i < m->n_files; i++) {
-		struct blob_hash h = order_file_hash(m->files[i]);
+		struct blob_hash h = live_job_file_hash(m->files[i]);
 		if (u->held[i])
 			blob_release(u->blobs, &h);
 	}
@@ -273,7 +273,7 @@ size_t upload_missing(const struct upload *u, struct blob_hash *hashes)
 	const Farm__Submit *m = u->submit.message->submit;
 	size_t count = 0;
 	for (size_t at = 0; at < m->n_files; at++) {
-		struct blob_hash h = order_file_hash(m->files[u->by_hash[at]]);
+		struct blob_hash h = live_job_file_hash(m->files[u->by_hash[at]]);
 		if (!u->held[u->by_hash[at]] && (count == 0 || !blob_hash_equal(&hashes[count - 1], &h)))
 			hashes[count++] = h;
 	}

@@ -1,7 +1,7 @@
 #include "coordinator/shell/view.h"
 
 #include "common/base/text.h"
-#include "common/film/agreement_json.h"
+#include "common/film/convergence_json.h"
 #include "common/film/forecast_json.h"
 
 #include <math.h>
@@ -182,7 +182,7 @@ json_t *view_to_json(const struct job_view *v)
 	json_object_set_new(o, "strategies", record_strategies(r));
 	json_object_set_new(o, "note", json_string(r->note));
 	json_object_set_new(o, "cleared", number_or_null(r->cleared, r->cleared > 0));
-	json_object_set_new(o, "agreement", agreement_to_json(&r->agreement));
+	json_object_set_new(o, "agreement", convergence_to_json(&r->agreement));
 	json_object_set_new(o, "b", number_or_null(r->b, r->b > 0));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	json_object_set_new(o, "effects", record_effects(r));

@@ -3,7 +3,7 @@
 #include "common/base/crc.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/film/agreement_json.h"
+#include "common/film/convergence_json.h"
 #include "common/film/forecast_json.h"
 #include "common/film/strategy_json.h"
 
@@ -32,7 +32,7 @@ void record_take_counted(struct job_record *r, const struct plan *p, const struc
 	memcpy(r->strategy, n->strategy, sizeof r->strategy);
 	strategy_note(p, n, black, r->note, sizeof r->note);
 	strategy_add_beyond(beyond_share, r->note, sizeof r->note);
-	agreement_add_note(&r->agreement, r->note, sizeof r->note);
+	convergence_add_note(&r->agreement, r->note, sizeof r->note);
 }
 
 void record_add_note(struct job_record *r, const char *text)
@@ -42,14 +42,14 @@ void record_add_note(struct job_record *r, const char *text)
 		text_print(r->note + used, sizeof r->note - used, "%s%s", used ? "; " : "", text);
 }
 
-void record_begin_agreement(struct job_record *r)
+void record_begin_convergence(struct job_record *r)
 {
-	agreement_from_json(NULL, &r->agreement);
+	convergence_from_json(NULL, &r->agreement);
 	classes_from_json(NULL, r->classes);
 	r->b = 0;
 }
 
-void record_take_agreement(struct job_record *r, const struct canvas_image *img, const struct agreement *a)
+void record_take_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a)
 {
 	r->agreement = *a;
 	r->b = img->b;
@@ -174,7 +174,7 @@ int record_to_json(const struct job_record *r, char **out, struct error *e)
 	json_object_set_new(o, "cleared", json_real(r->cleared));
 	json_object_set_new(o, "extended", json_integer((json_int_t)r->extended));
 	json_object_set_new(o, "verify", json_real(r->verify));
-	json_object_set_new(o, "agreement", agreement_to_json(&r->agreement));
+	json_object_set_new(o, "agreement", convergence_to_json(&r->agreement));
 	json_object_set_new(o, "b", json_real(r->b));
 	json_object_set_new(o, "classes", classes_to_json(r->classes));
 	json_object_set_new(o, "effects", record_effects(r));
@@ -243,7 +243,7 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	take_text(o, "note", r->note, sizeof r->note);
 	take_counts(json_object_get(o, "counts"), r);
 	take_strategies(o, r);
-	agreement_from_json(json_object_get(o, "agreement"), &r->agreement);
+	convergence_from_json(json_object_get(o, "agreement"), &r->agreement);
 	r->b = json_number_value(json_object_get(o, "b"));
 	classes_from_json(json_object_get(o, "classes"), r->classes);
 	take_looks(o, r);

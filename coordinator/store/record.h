@@ -6,7 +6,7 @@
 #define COORDINATOR_STORE_RECORD_H
 
 #include "common/base/error.h"
-#include "common/film/agreement.h"
+#include "common/film/convergence.h"
 #include "common/film/forecast.h"
 #include "common/film/stated_error.h"
 #include "common/film/strategy.h"
@@ -50,7 +50,7 @@ struct job_record {
 	char note[STRATEGY_NOTE];
 	char effects[RECORD_EFFECTS]; /* a JSON array: what the scene calls for, and why; "": not known, or too long */
 	uint64_t strategy[BATCH_STRATEGIES][STRATEGY_COUNTERS]; /* of the mixture */
-	struct agreement agreement; /* of the last image that was made */
+	struct convergence agreement; /* of the last image that was made */
 	double b;                   /* of it, as the classes; 0: none was made */
 	struct path_class_energy classes[PATH_CLASSES];
 };
@@ -58,8 +58,8 @@ struct job_record {
 /* What the merged batches counted, and what is to be said about it. */
 void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black, double beyond_share);
 void record_add_note(struct job_record *r, const char *text); /* "": nothing to say */
-void record_take_agreement(struct job_record *r, const struct canvas_image *img, const struct agreement *a);
-void record_begin_agreement(struct job_record *r); /* nothing is known */
+void record_take_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a);
+void record_begin_convergence(struct job_record *r); /* nothing is known */
 void record_take_error(struct job_record *r, const struct canvas_image *img); /* of one that has an estimate */
 void record_take_effects(struct job_record *r, json_t *list); /* takes the reference; NULL: none */
 json_t *record_effects(const struct job_record *r);    /* an array */

@@ -2,7 +2,7 @@
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
-#include "common/base/sealed.h"
+#include "common/base/checked_file.h"
 
 #include <string.h>
 
@@ -23,7 +23,7 @@ int row_file_write(const struct spool *s, const struct ledger_job *j, struct err
 {
 	char name[SPOOL_PATH_MAX], temporary[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
 	const void *pieces[PIECES] = {j->owner, j->name, j->version, j->held, j->submission, j->plan};
-	struct sealed out = {.buffer = NULL};
+	struct checked_file out = {.buffer = NULL};
 	struct head h = {.id = j->id, .extended = j->extended, .revision = j->revision, .submitted = j->submitted, .priority = j->priority,
 			 .mixed = j->mixed,
 			 .sizes = {strlen(j->owner) + 1, strlen(j->name) + 1, strlen(j->version) + 1, strlen(j->held) + 1, j->submission_size,
@@ -32,15 +32,15 @@ int row_file_write(const struct spool *s, const struct ledger_job *j, struct err
 	spool_job_path(s, j->id, "order", name);
 	spool_job_path(s, j->id, "order.tmp", temporary);
 	spool_job_path(s, j->id, NULL, folder);
-	int rc = sealed_create(&out, temporary, e);
+	int rc = checked_file_create(&out, temporary, e);
 	if (rc)
 		return rc;
-	rc = sealed_write(&out, &h, sizeof h, e);
+	rc = checked_file_write(&out, &h, sizeof h, e);
 	for (int i = 0; i < PIECES && !rc; i++)
-		rc = sealed_write(&out, pieces[i], h.sizes[i], e);
+		rc = checked_file_write(&out, pieces[i], h.sizes[i], e);
 	if (!rc)
-		rc = sealed_finish(&out, e);
-	sealed_close(&out);
+		rc = checked_file_finish(&out, e);
+	checked_file_close(&out);
 	if (!rc)
 		rc = spool_rename(temporary, name, folder, e);
 	if (rc)
@@ -48,16 +48,16 @@ int row_file_write(const struct spool *s, const struct ledger_job *j, struct err
 	return rc;
 }
 
-static int read_pieces(struct sealed *in, uint64_t job, struct row_file *out, struct error *e)
+static int read_pieces(struct checked_file *in, uint64_t job, struct row_file *out, struct error *e)
 {
 	struct head h;
 	size_t all = 0, at = 0;
 	char *piece[PIECES];
-	int rc = sealed_read(in, &h, sizeof h.magic, e);
+	int rc = checked_file_read(in, &h, sizeof h.magic, e);
 	if (!rc)
 		rc = spool_check_version(h.magic, magic, in->path, e);
 	if (!rc)
-		rc = sealed_read(in, &h.id, sizeof h - sizeof h.magic, e);
+		rc = checked_file_read(in, &h.id, sizeof h - sizeof h.magic, e);
 	for (int i = 0; i < PIECES && !rc; i++) {
 		if (h.sizes[i] == 0 || h.sizes[i] > piece_most || h.id != job)
 			rc = error_set(e, EBADMSG, "%s: damaged", in->path);
@@ -66,7 +66,7 @@ static int read_pieces(struct sealed *in, uint64_t job, struct row_file *out, st
 	if (!rc && !(out->memory = mem_alloc(all, 1)))
 		rc = error_set(e, ENOMEM, "no memory for a job");
 	if (!rc)
-		rc = sealed_read(in, out->memory, all, e);
+		rc = checked_file_read(in, out->memory, all, e);
 	if (rc)
 		return rc;
 	for (int i = 0; i < PIECES; at += h.sizes[i++])
@@ -84,14 +84,14 @@ static int read_pieces(struct sealed *in, uint64_t job, struct row_file *out, st
 int row_file_read(const struct spool *s, uint64_t job, struct row_file *out, struct error *e)
 {
 	char name[SPOOL_PATH_MAX];
-	struct sealed in;
+	struct checked_file in;
 	*out = (struct row_file){.memory = NULL};
 	spool_job_path(s, job, "order", name);
-	int rc = sealed_open(&in, name, e);
+	int rc = checked_file_open(&in, name, e);
 	if (rc)
 		return rc;
 	rc = read_pieces(&in, job, out, e);
-	sealed_close(&in);
+	checked_file_close(&in);
 	if (rc)
 		row_file_free(out);
 	return rc;

@@ -5,8 +5,8 @@
 #include "common/wire/batch_wire.h"
 #include "coordinator/shell/session.h"
 #include "tests/fuzz/folders.h"
-#include "tests/support/dark.h"
-#include "tests/support/sealed_frame.h"
+#include "tests/support/black_results.h"
+#include "tests/support/checksummed_frame.h"
 
 #include <arpa/inet.h>
 #include <netinet/tcp.h>
@@ -36,7 +36,7 @@ void farm_turn(struct farm_world *w)
 
 static bool is_at_work(const struct server *s)
 {
-	for (const struct order *o = s->orders; o; o = o->next)
+	for (const struct live_job *o = s->orders; o; o = o->next)
 		if (o->busy)
 			return true;
 	return s->flushing || s->session_count;
@@ -204,7 +204,7 @@ void farm_say(struct farm_world *w, unsigned peer, const void *bytes, size_t siz
 void farm_say_message(struct farm_world *w, unsigned peer, const Farm__Envelope *m, const void *payload, size_t size)
 {
 	size_t n;
-	unsigned char *frame = sealed_message(m, payload, size, &n);
+	unsigned char *frame = checksummed_message(m, payload, size, &n);
 	w->peers[peer].has_spoken = true;
 	farm_say(w, peer, frame, n);
 	free(frame);
@@ -213,7 +213,7 @@ void farm_say_message(struct farm_world *w, unsigned peer, const Farm__Envelope 
 void farm_say_parts(struct farm_world *w, unsigned peer, const struct step *step)
 {
 	size_t n;
-	unsigned char *frame = sealed_parts(step->header, step->header_size, step->payload, step->payload_size, !w->peers[peer].has_spoken, &n);
+	unsigned char *frame = checked_file_parts(step->header, step->header_size, step->payload, step->payload_size, !w->peers[peer].has_spoken, &n);
 	w->peers[peer].has_spoken = true;
 	farm_say(w, peer, frame, n);
 	free(frame);
@@ -314,7 +314,7 @@ static void light(struct batch *b, const struct plan *plan)
 
 struct batch farm_batch(const struct lease_key *k, const struct plan *plan)
 {
-	struct batch b = dark_batch(k, plan, 4);
+	struct batch b = black_batch(k, plan, 4);
 	if (k->kind == LEASE_RENDER) {
 		light(&b, plan);
 	} else if (k->job != FARM_DONE) {
@@ -403,7 +403,7 @@ static void answer(struct farm_world *w, unsigned worker, struct lease_key k)
 	struct error e;
 	need(batch_pack(&b, &plan, &frame, &size, &e) == 0, e.text);
 	size_t n;
-	unsigned char *sealed = sealed_frame(frame, size, &n);
+	unsigned char *sealed = checksummed_frame(frame, size, &n);
 	farm_say(w, worker, sealed, n);
 	free(sealed);
 	const Farm__LeaseAck *a = hear_kind(w, worker, FARM__ENVELOPE__BODY_LEASE_ACK)->lease_ack;

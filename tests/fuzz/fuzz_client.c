@@ -7,7 +7,7 @@
 #include "tests/fuzz/farm.h"
 #include "tests/fuzz/folders.h"
 #include "tests/fuzz/seeds.h"
-#include "tests/support/sealed_frame.h"
+#include "tests/support/checksummed_frame.h"
 #include "worker/cli/submit.h"
 
 #include <arpa/inet.h>
@@ -68,7 +68,7 @@ static void *speak(void *user)
 	for (size_t i = 0; i < now.count; i++) {
 		const struct step *s = &now.steps[i];
 		size_t size;
-		unsigned char *sealed = sealed_parts(s->header, s->header_size, s->payload, s->payload_size, i == 0 && !now.hello, &size);
+		unsigned char *sealed = checked_file_parts(s->header, s->header_size, s->payload, s->payload_size, i == 0 && !now.hello, &size);
 		say(fd, sealed, size);
 		free(sealed);
 	}

@@ -5,7 +5,7 @@
 #include "common/wire/batch_wire.h"
 #include "common/wire/frame.h"
 #include "tests/fuzz/messages.h"
-#include "tests/support/sealed_frame.h"
+#include "tests/support/checksummed_frame.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -56,10 +56,10 @@ static void read_all(const uint8_t *bytes, size_t size)
 }
 
 /* The frames of an input with the checksums that belong to them: what is behind these is to be reached. malloc'd. */
-static uint8_t *seal_all(const uint8_t *bytes, size_t size, size_t *sealed_size)
+static uint8_t *seal_all(const uint8_t *bytes, size_t size, size_t *checked_file_size)
 {
 	uint8_t *all = NULL;
-	*sealed_size = 0;
+	*checked_file_size = 0;
 	for (size_t at = 0; size - at >= FRAME_PREFIX;) {
 		uint32_t header, payload;
 		size_t n;
@@ -67,12 +67,12 @@ static uint8_t *seal_all(const uint8_t *bytes, size_t size, size_t *sealed_size)
 		at += FRAME_PREFIX;
 		header = header < size - at ? header : (uint32_t)(size - at);
 		payload = payload < size - at - header ? payload : (uint32_t)(size - at - header);
-		uint8_t *frame = sealed_parts(bytes + at, header, bytes + at + header, payload, !all, &n);
-		all = realloc(all, *sealed_size + n);
+		uint8_t *frame = checked_file_parts(bytes + at, header, bytes + at + header, payload, !all, &n);
+		all = realloc(all, *checked_file_size + n);
 		if (!all)
 			abort();
-		memcpy(all + *sealed_size, frame, n);
-		*sealed_size += n;
+		memcpy(all + *checked_file_size, frame, n);
+		*checked_file_size += n;
 		free(frame);
 		at += header + payload;
 	}
@@ -81,9 +81,9 @@ static uint8_t *seal_all(const uint8_t *bytes, size_t size, size_t *sealed_size)
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {
-	size_t sealed_size;
-	uint8_t *sealed = seal_all(bytes, size, &sealed_size);
-	read_all(sealed, sealed_size);
+	size_t checked_file_size;
+	uint8_t *sealed = seal_all(bytes, size, &checked_file_size);
+	read_all(sealed, checked_file_size);
 	free(sealed);
 	read_all(bytes, size); /* whose checksums are hardly ever right */
 	return 0;

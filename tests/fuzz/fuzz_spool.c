@@ -4,7 +4,7 @@
  * it starts, it answers.
  */
 #include "common/base/mem.h"
-#include "common/base/sealed.h"
+#include "common/base/checked_file.h"
 #include "common/wire/batch_wire.h"
 #include "coordinator/store/journal.h"
 #include "coordinator/store/ledger.h"
@@ -66,12 +66,12 @@ static void change_file(const char *path, const uint8_t *edits, size_t size)
 
 static void seal(const char *path, const void *bytes, size_t size)
 {
-	struct sealed s;
+	struct checked_file s;
 	struct error e;
 	unlink(path);
-	if (sealed_create(&s, path, &e) || sealed_write(&s, bytes, size, &e) || sealed_finish(&s, &e))
+	if (checked_file_create(&s, path, &e) || checked_file_write(&s, bytes, size, &e) || checked_file_finish(&s, &e))
 		abort();
-	sealed_close(&s);
+	checked_file_close(&s);
 }
 
 /* Each: kind, u16 BE size, body. */

@@ -1,5 +1,5 @@
 /*
- * A live worker and a coordinator that says what it likes. Its crew is one here that works when it is told to, on small leases only:
+ * A live worker and a coordinator that says what it likes. Its thread pool is one here that works when it is told to, on small leases only:
  * long work is what a coordinator may ask for. Everything it fetched is forgotten after each input but the cache.
  */
 #include "common/base/log.h"
@@ -8,7 +8,7 @@
 #include "tests/fuzz/folders.h"
 #include "tests/fuzz/messages.h"
 #include "tests/fuzz/seeds.h"
-#include "tests/support/sealed_frame.h"
+#include "tests/support/checksummed_frame.h"
 #include "worker/daemon/agent_private.h"
 
 #include <arpa/inet.h>
@@ -21,14 +21,14 @@
 enum speaker { COORDINATOR, CREW, NETWORK, SIGNAL, SPEAKERS };
 enum { WORK_MOST = 3000, PIXELS_MOST = 10000 };
 
-/* ---- the crew ---- */
+/* ---- the thread pool ---- */
 
-struct crew {
+struct thread_pool {
 	struct task *first;
 	unsigned pending;
 };
 
-int crew_new(struct crew **c, uv_loop_t *loop, unsigned threads, struct error *e)
+int thread_pool_new(struct thread_pool **c, uv_loop_t *loop, unsigned threads, struct error *e)
 {
 	(void)loop;
 	(void)threads;
@@ -36,7 +36,7 @@ int crew_new(struct crew **c, uv_loop_t *loop, unsigned threads, struct error *e
 	return *c ? 0 : error_set(e, ENOMEM, "no memory for a crew");
 }
 
-void crew_add(struct crew *c, struct task *t)
+void thread_pool_add(struct thread_pool *c, struct task *t)
 {
 	struct task **at = &c->first;
 	while (*at)
@@ -46,7 +46,7 @@ void crew_add(struct crew *c, struct task *t)
 	c->pending++;
 }
 
-bool crew_take_back(struct crew *c, struct task *t)
+bool thread_pool_take_back(struct thread_pool *c, struct task *t)
 {
 	for (struct task **at = &c->first; *at; at = &(*at)->next)
 		if (*at == t) {
@@ -57,12 +57,12 @@ bool crew_take_back(struct crew *c, struct task *t)
 	return false;
 }
 
-unsigned crew_pending(const struct crew *c)
+unsigned thread_pool_pending(const struct thread_pool *c)
 {
 	return c->pending;
 }
 
-void crew_close(struct crew *c)
+void thread_pool_close(struct thread_pool *c)
 {
 	mem_free(c);
 }
@@ -184,7 +184,7 @@ static bool is_small(const struct plan *p)
 
 static bool is_building(const struct task *t)
 {
-	for (const struct bundle *b = now.agent->bundles; b; b = b->next)
+	for (const struct job_cache *b = now.agent->bundles; b; b = b->next)
 		if (&b->task == t)
 			return true;
 	return false;
@@ -193,16 +193,16 @@ static bool is_building(const struct task *t)
 /* What has begun is let go of on the way back, as by a thread. */
 static void work(void)
 {
-	struct crew *c = now.agent->crew;
+	struct thread_pool *c = now.agent->thread_pool;
 	struct task *t = c->first;
 	if (!t)
 		return;
 	c->first = t->next;
 	if (is_building(t)) {
-		if (is_small(&((struct bundle *)t)->plan))
+		if (is_small(&((struct job_cache *)t)->plan))
 			t->run(t);
 		else
-			((struct bundle *)t)->state = BUNDLE_FAILED;
+			((struct job_cache *)t)->state = JOB_CACHE_FAILED;
 	} else {
 		struct lease_task *l = (struct lease_task *)t;
 		atomic_store(&l->stop, !is_small(&l->bundle->plan));
@@ -220,7 +220,7 @@ static void step(const struct step *s)
 	case COORDINATOR:
 		if (now.fd < 0)
 			answer();
-		bytes = sealed_parts(s->header, s->header_size, s->payload, s->payload_size, false, &size);
+		bytes = checked_file_parts(s->header, s->header_size, s->payload, s->payload_size, false, &size);
 		say(bytes, size);
 		free(bytes);
 		break;
@@ -233,7 +233,7 @@ static void step(const struct step *s)
 	case SIGNAL:
 		if (!now.agent->leaving) {
 			now.agent->leaving = true;
-			desk_leave(now.agent);
+			lease_queue_leave(now.agent);
 			agent_settle(now.agent);
 		}
 	}
@@ -251,8 +251,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 		step(&steps[i]);
 	hang_up();
 	if (!now.agent->gone)
-		*now.agent->crew = (struct crew){0};
-	desk_close(now.agent);
+		*now.agent->thread_pool = (struct thread_pool){0};
+	lease_queue_close(now.agent);
 	if (now.agent->leaving) {
 		agent_close(now.agent);
 		now.agent = NULL;

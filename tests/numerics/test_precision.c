@@ -72,7 +72,7 @@ static int by_size(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-static void note(struct errors *e, double program, const struct world *w, const struct whole_path *x, const struct whole_path *y)
+static void note(struct errors *e, double program, const struct world *w, const struct full_path_path *x, const struct full_path_path *y)
 {
 	long double truth = in_long_log_weight(w, y) - in_long_log_weight(w, x);
 	double twice = in_double_log_weight(w, y) - in_double_log_weight(w, x);
@@ -90,14 +90,14 @@ static void run(const struct precision_case *p, unsigned most, struct errors *e)
 {
 	static struct path_context c;
 	static struct mutation_ctx m;
-	static struct whole_path x, y;
+	static struct full_path_path x, y;
 	static uint64_t counters[BATCH_COUNTERS], strategy[STRATEGY_COUNTERS];
 	const struct mutation_ops *ops = mutation_find("hslt", 4);
 	const struct mutation_setting how = {(int)p->edges, 0};
 	struct world *w = world_of_text(32, 32, SCENE, p->index, p->alpha);
 	uint64_t seed = stats_seed(p->name);
 	c = (struct path_context){.w = w, .window = {0, 0, 32, 32}, .min_depth = p->edges, .max_depth = p->edges, .counters = counters};
-	m = (struct mutation_ctx){.path = &c, .seed = seed, .count = strategy, .limits = walk_limits_of(&knobs_default)};
+	m = (struct mutation_ctx){.path = &c, .seed = seed, .count = strategy, .limits = walk_limits_of(&accuracy_settings_default)};
 	for (uint64_t i = 0; e->count < most && i < 400 * most; i++) {
 		struct move move = {0};
 		bool through = false;
@@ -107,7 +107,7 @@ static void run(const struct precision_case *p, unsigned most, struct errors *e)
 			through |= x.v[j].bsdf->eta != 1;
 		if (!through)
 			continue;
-		whole_copy(&y, &x, 0, x.edges);
+		full_path_copy(&y, &x, 0, x.edges);
 		m.chain = i;
 		if (ops->propose(&m, &how, &x, &y, &move))
 			continue;

@@ -157,7 +157,7 @@ static void make_plan(const struct world *w, const char *test, const char *side,
 			   .min_depth = how->min_depth ? how->min_depth : 1,
 			   .max_depth = how->max_depth ? how->max_depth : w->settings.max_depth};
 	strcpy(p->integrator, how->integrator);
-	knobs_print(&w->knobs, p->knobs);
+	accuracy_settings_print(&w->accuracy, p->accuracy);
 	struct error e = {""};
 	struct render_summary summary;
 	world_summary(w, &summary);

@@ -40,7 +40,7 @@ enum { WAYS_BACK = 4 };
 #define ROUNDING 1e-9
 
 /* |h_j|, and how exactly; nothing where it is exactly specular. */
-static double slope(const struct whole_path *x, unsigned j, double *blur)
+static double slope(const struct full_path_path *x, unsigned j, double *blur)
 {
 	if (j == 0 || j >= x->edges || x->v[j].delta)
 		return 0;
@@ -49,7 +49,7 @@ static double slope(const struct whole_path *x, unsigned j, double *blur)
 	return hypot(h.x, h.y);
 }
 
-static void measure(struct path_context *c, struct whole_path *x, double *g, double *blur)
+static void measure(struct path_context *c, struct full_path_path *x, double *g, double *blur)
 {
 	unsigned k = x->edges;
 	double lengths = 0, roughness = 0;
@@ -61,7 +61,7 @@ static void measure(struct path_context *c, struct whole_path *x, double *g, dou
 	double first = slope(x, 1, &at_light), last = slope(x, k - 1, &at_camera);
 	vec3 near = x->v[k - 1].x.p, far = x->v[k > 1 ? 1 : 0].x.p, light = x->v[0].x.p;
 	const double all[BALANCE_FUNCTIONS] = {
-		x->film[0], x->film[1], hypot(x->film[0] - 16, x->film[1] - 16), fmod(floor(x->film[0]), 2), whole_log_f(c, x),
+		x->film[0], x->film[1], hypot(x->film[0] - 16, x->film[1] - 16), fmod(floor(x->film[0]), 2), full_path_log_f(c, x),
 		x->wavelength, near.x, near.z, far.y, far.z, light.x, light.z, lengths, x->edge[k - 1].distance2, first, last,
 		roughness, k, x->v[k].x.p.x, k > 1 ? fabs(vec3_dot(x->v[1].x.sh.n, x->edge[0].w)) : 0, x->wavelength,
 	};
@@ -77,7 +77,7 @@ struct run {
 	const char *test;
 	struct path_context *c;
 	struct mutation_ctx *m;
-	struct whole_path *x, *y;
+	struct full_path_path *x, *y;
 	double weight, strict_weight; /* of strategies that keep the number of edges; of all */
 	double g[BALANCE_FUNCTIONS], blur[BALANCE_FUNCTIONS]; /* of x */
 	uint64_t checked, doubts;
@@ -134,10 +134,10 @@ static void check_accepted(struct run *r, struct balance_trial *t)
 /* y becomes x again by the vertices that the move names. */
 static void restore(struct run *r, const struct balance_trial *t, const struct move *move)
 {
-	const struct whole_path *x = r->x;
-	struct whole_path *y = r->y;
+	const struct full_path_path *x = r->x;
+	struct full_path_path *y = r->y;
 	bool all = t->ops->independent || y->edges != x->edges;
-	whole_copy(y, x, all ? 0 : move->first, all ? x->edges : move->last);
+	full_path_copy(y, x, all ? 0 : move->first, all ? x->edges : move->last);
 	for (unsigned i = 0; i <= x->edges; i++) {
 		const struct path_vertex *a = &x->v[i], *b = &y->v[i];
 		bool same = memcmp(&a->x.p, &b->x.p, sizeof a->x.p) == 0 && a->kind == b->kind && a->mode == b->mode &&
@@ -166,9 +166,9 @@ static void compare(const struct run *r, const double *g, const double *blur, do
 }
 
 /* log P(b) P(c | b) by the heuristic. */
-static double log_choice(struct run *r, const struct whole_path *x, const struct move *move)
+static double log_choice(struct run *r, const struct full_path_path *x, const struct move *move)
 {
-	double weight[WHOLE_MAX_VERTICES], p;
+	double weight[FULL_PATH_MAX_VERTICES], p;
 	heuristic_roughness.weigh_b(r->c, x, weight);
 	p = heuristic_probability(weight, x->edges + 1, move->b);
 	if (move->b > 0) {
@@ -178,23 +178,23 @@ static double log_choice(struct run *r, const struct whole_path *x, const struct
 	return log(p);
 }
 
-static double log_fixed(struct run *r, struct whole_path *x, const struct move *move)
+static double log_fixed(struct run *r, struct full_path_path *x, const struct move *move)
 {
 	double sum = 0;
 	for (unsigned j = 0; j < move->c; j++)
-		sum += log(spectrum_max(whole_f(r->c, x, j)));
+		sum += log(spectrum_max(full_path_f(r->c, x, j)));
 	return sum;
 }
 
 /* Half vectors of x, asked of a walk that begins at y, do not lead to x: there is no way back. */
 static bool stays_away(struct run *r, const struct move *move)
 {
-	static struct whole_path back;
+	static struct full_path_path back;
 	static struct walk_scratch scratch;
-	struct walk_target target[WHOLE_MAX_VERTICES];
-	const struct whole_path *x = r->x, *y = r->y;
+	struct walk_target target[FULL_PATH_MAX_VERTICES];
+	const struct full_path_path *x = r->x, *y = r->y;
 	unsigned b = move->b, c = move->c;
-	whole_copy(&back, y, 0, y->edges);
+	full_path_copy(&back, y, 0, y->edges);
 	back.v[b] = x->v[b];
 	back.v[c] = x->v[c];
 	back.wl = x->wl;
@@ -271,7 +271,7 @@ static void run_group(struct run *r, unsigned group, struct starts *s, struct ba
 		for (size_t i = 0; i < starts && weight > 0; i++) {
 			if (!starts_path(s, k, ((double)i + u[0]) / (double)starts, r->x))
 				continue;
-			whole_copy(r->y, r->x, 0, k);
+			full_path_copy(r->y, r->x, 0, k);
 			r->strict_weight = weight;
 			r->weight = weight / scale[k];
 			measure(r->c, r->x, r->g, r->blur);
@@ -286,12 +286,12 @@ void balance_run(const struct world *w, const char *test, struct balance_trial *
 {
 	static struct path_context c;
 	static struct mutation_ctx m;
-	static struct whole_path x, y;
+	static struct full_path_path x, y;
 	static uint64_t counters[BATCH_COUNTERS];
 	starts_context(&c, w, 1, BALANCE_EDGES, counters);
 	m.path = &c;
 	m.seed = stats_seed(test);
-	m.limits = walk_limits_of(&knobs_default);
+	m.limits = walk_limits_of(&accuracy_settings_default);
 	struct run r = {.test = test, .c = &c, .m = &m, .x = &x, .y = &y};
 	static struct starts s[BALANCE_GROUPS];
 	double scale[BALANCE_EDGES + 1] = {0}; /* all lengths are to count alike */

@@ -48,7 +48,7 @@ static void serve(const struct farm_run *f)
 	log_set_level(LOG_LEVEL_DEBUG);
 	if (!outage.loud && !freopen("/dev/null", "w", stderr))
 		_exit(1);
-	lossy_begin(&f->disk);
+	faulty_disk_begin(&f->disk);
 	struct server *s;
 	int rc = server_open(&s, &c, &e);
 	if (!rc)
@@ -95,7 +95,7 @@ bool outage_start(struct farm_run *f)
 		}
 		int code = outage_gone(f, false);
 		if (code) {
-			assert_true(code == LOSSY_EXIT || (f->faulty && code == 1));
+			assert_true(code == FAULTY_DISK_EXIT || (f->faulty && code == 1));
 			return false;
 		}
 		usleep(500);
@@ -350,9 +350,9 @@ void outage_begin(struct farm_run *f, uint64_t seed)
 	f->request = (struct plan_request){.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .mutations = 3200,
 					   .max_depth = 5, .groups = 2, .chains = 8, .epoch = 100, .bootstrap = 64};
 	assert_int_equal(plan_make(&f->request, &f->plan, &e), 0);
-	f->disk = (struct lossy){.root = outage.root, .after = after, .seed = seed, .counts = outage.counts};
+	f->disk = (struct faulty_disk){.root = outage.root, .after = after, .seed = seed, .counts = outage.counts};
 	if (getenv("HSLT_POWER_FORGET"))
-		f->disk.forget = (enum lossy_forget)atoi(getenv("HSLT_POWER_FORGET"));
+		f->disk.forget = (enum faulty_disk_forget)atoi(getenv("HSLT_POWER_FORGET"));
 	f->disk.forget_name = getenv("HSLT_POWER_FORGET_NAME");
 	snprintf(outage.root, sizeof outage.root, "%s/spool", folder);
 	snprintf(after, sizeof after, "%s/after", folder);
@@ -379,7 +379,7 @@ void outage_stop_in_the_dark(struct farm_run *f)
 	if (m)
 		scripted_send_scene(f->client, "<scene version='2'/>");
 	outage_hang_up(f);
-	assert_int_equal(outage_gone(f, true), LOSSY_EXIT);
+	assert_int_equal(outage_gone(f, true), FAULTY_DISK_EXIT);
 	outage_swap_folders(f);
 }
 void outage_quiet_run(void)

@@ -1,5 +1,5 @@
 /*
- * A coordinator on a disk that loses what was not synchronised, or whose calls fail (tests/support/lossy.h), and a client and a worker
+ * A coordinator on a disk that loses what was not synchronised, or whose calls fail (tests/support/faulty_disk.h), and a client and a worker
  * that remember what was acknowledged: life after life, each from what the disk kept. What must not be is counted: results that were
  * acknowledged and are not there, that a film holds twice, images of other bits than those of an undisturbed run. Everything else
  * that is wrong ends the test. One process at a time in each folder (tests/support/folder.h).
@@ -7,7 +7,7 @@
 #ifndef TESTS_SUPPORT_OUTAGE_H
 #define TESTS_SUPPORT_OUTAGE_H
 
-#include "tests/support/lossy.h"
+#include "tests/support/faulty_disk.h"
 #include "tests/support/scripted.h"
 
 #include <stdatomic.h>
@@ -22,7 +22,7 @@ struct outage_job {
 };
 
 struct farm_run {
-	struct lossy disk;
+	struct faulty_disk disk;
 	struct plan plan;
 	struct plan_request request;
 	pid_t pid;

@@ -2,8 +2,8 @@
 
 #include "common/base/mem.h"
 #include "common/blob/blob.h"
-#include "tests/support/dark.h"
-#include "tests/support/sealed_frame.h"
+#include "tests/support/black_results.h"
+#include "tests/support/checksummed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -39,7 +39,7 @@ static bool send_all(const struct scripted *p, unsigned char *bytes, size_t size
 bool scripted_say(const struct scripted *p, const Farm__Envelope *m, const void *payload, size_t payload_size)
 {
 	size_t size;
-	unsigned char *bytes = sealed_message(m, payload, payload_size, &size);
+	unsigned char *bytes = checksummed_message(m, payload, payload_size, &size);
 	return send_all(p, bytes, size);
 }
 
@@ -261,7 +261,7 @@ static void add_tiles(struct batch *b, const struct plan *plan, uint64_t tag)
 
 struct batch scripted_batch(const struct lease_key *k, const struct plan *plan, uint32_t state_bytes)
 {
-	struct batch b = dark_batch(k, plan, state_bytes);
+	struct batch b = black_batch(k, plan, state_bytes);
 	uint64_t tag = scripted_tag(k);
 	b.cpu_seconds = 1;
 	if (k->kind == LEASE_BOOTSTRAP) {
@@ -281,7 +281,7 @@ bool scripted_send(const struct scripted *p, const struct batch *b, const struct
 	size_t size;
 	struct error e;
 	assert_int_equal(batch_pack(b, plan, &frame, &size, &e), 0);
-	unsigned char *bytes = sealed_frame(frame, size, &size);
+	unsigned char *bytes = checksummed_frame(frame, size, &size);
 	mem_free(frame);
 	return send_all(p, bytes, size);
 }

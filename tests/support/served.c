@@ -2,7 +2,7 @@
 
 #include "common/base/mem.h"
 #include "coordinator/shell/server.h"
-#include "tests/support/sealed_frame.h"
+#include "tests/support/checksummed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -40,7 +40,7 @@ static void on_look(uv_timer_t *t)
 		return;
 	held = wanted;
 	snprintf(path, sizeof path, "%s/held", folder);
-	for (struct order *o = s->orders; o; o = o->next)
+	for (struct live_job *o = s->orders; o; o = o->next)
 		o->busy = wanted;
 	if (!wanted)
 		server_order_free_again(s);
@@ -300,13 +300,13 @@ void peer_send_batch(struct scripted *p, const struct batch *b, const struct pla
 	size_t size;
 	struct error e;
 	assert_int_equal(batch_pack(b, plan, &frame, &size, &e), 0);
-	unsigned char *bytes = sealed_frame(frame, size, &size);
+	unsigned char *bytes = checksummed_frame(frame, size, &size);
 	peer_say_bytes(p, bytes, size);
 	free(bytes);
 	mem_free(frame);
 }
 
-Farm__Verdict peer_attend(struct scripted *p, struct desk *d)
+Farm__Verdict peer_attend(struct scripted *p, struct lease_queue *d)
 {
 	struct error e;
 	const Farm__Envelope *m = scripted_hear(p);
@@ -321,7 +321,7 @@ Farm__Verdict peer_attend(struct scripted *p, struct desk *d)
 	return FARM__VERDICT__VERDICT_NONE;
 }
 
-Farm__Verdict peer_verdict(struct scripted *p, struct desk *d)
+Farm__Verdict peer_verdict(struct scripted *p, struct lease_queue *d)
 {
 	Farm__Verdict v;
 	while ((v = peer_attend(p, d)) == FARM__VERDICT__VERDICT_NONE)

@@ -37,15 +37,15 @@ const Farm__SubmitAnswer *peer_submit_answer(struct scripted *p);
 void peer_send_blob(struct scripted *p, const char *true_text, const char *sent_text);
 
 /* Leases that came and were not answered yet. */
-struct desk {
+struct lease_queue {
 	struct lease_key keys[64];
 	size_t count;
 	bool job_ended;
 };
 
 /* Hears one message. Its verdict, or VERDICT_NONE when it was none. */
-Farm__Verdict peer_attend(struct scripted *p, struct desk *d);
-Farm__Verdict peer_verdict(struct scripted *p, struct desk *d); /* the next one */
+Farm__Verdict peer_attend(struct scripted *p, struct lease_queue *d);
+Farm__Verdict peer_verdict(struct scripted *p, struct lease_queue *d); /* the next one */
 void peer_send_batch(struct scripted *p, const struct batch *b, const struct plan *plan);
 
 #endif

@@ -71,7 +71,7 @@ double starts_weight(const struct starts *s, unsigned edges)
 	return n ? s->of[edges].at[n - 1].sum / (double)s->pairs : 0;
 }
 
-bool starts_path(struct starts *s, unsigned edges, double u, struct whole_path *x)
+bool starts_path(struct starts *s, unsigned edges, double u, struct full_path_path *x)
 {
 	size_t n = s->of[edges].count, low = 0;
 	if (n == 0)
@@ -87,5 +87,5 @@ bool starts_path(struct starts *s, unsigned edges, double u, struct whole_path *
 	unsigned camera, light;
 	const struct start *chosen = &s->of[edges].at[low];
 	walk(s, chosen->index, &camera, &light);
-	return whole_from_subpaths(s->c, chosen->s, edges, x);
+	return full_path_from_subpaths(s->c, chosen->s, edges, x);
 }

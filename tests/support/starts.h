@@ -6,7 +6,7 @@
 #ifndef TESTS_SUPPORT_STARTS_H
 #define TESTS_SUPPORT_STARTS_H
 
-#include "worker/path/whole.h"
+#include "worker/path/full_path.h"
 
 enum { STARTS_MAX_EDGES = 8 };
 
@@ -37,6 +37,6 @@ void starts_fini(struct starts *s);
 double starts_weight(const struct starts *s, unsigned edges);
 
 /* The path at u in [0,1) of the sum. false: there is none (or it lies just outside the film's border). */
-bool starts_path(struct starts *s, unsigned edges, double u, struct whole_path *x);
+bool starts_path(struct starts *s, unsigned edges, double u, struct full_path_path *x);
 
 #endif

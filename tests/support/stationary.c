@@ -30,7 +30,7 @@ struct group {
 	char failure[256];
 	struct path_context context;
 	struct mutation_ctx mutation;
-	struct whole_path place[2];
+	struct full_path_path place[2];
 };
 
 static const char *const inner_names[INNER] = {"first", "middle", "last"};
@@ -58,7 +58,7 @@ static double unit(double a, double radius)
 }
 
 /* By their geometry terms: both ends move, and a join depends on nothing else. */
-static void look_at_edges(const struct path_context *c, const struct whole_path *x, double out[EDGES])
+static void look_at_edges(const struct path_context *c, const struct full_path_path *x, double out[EDGES])
 {
 	unsigned k = x->edges;
 	for (unsigned i = 0; i < EDGES; i++) {
@@ -66,19 +66,19 @@ static void look_at_edges(const struct path_context *c, const struct whole_path 
 		out[i] = 0;
 		if (e >= k || (i >= FROM_LIGHT && e < FROM_LIGHT))
 			continue;
-		const struct whole_edge *g = &x->edge[e];
+		const struct full_path_edge *g = &x->edge[e];
 		double cosines = path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) * c->w->radius * c->w->radius;
 		out[i] = cosines / (cosines + g->distance2);
 	}
 }
 
 /* All between 0 and 1, or nearly so. */
-static void look_at(const struct path_context *c, struct whole_path *x, double out[STATIONARY_FUNCTIONS])
+static void look_at(const struct path_context *c, struct full_path_path *x, double out[STATIONARY_FUNCTIONS])
 {
 	const struct film_window *f = &c->window;
 	double u = (x->film[0] - f->x) / f->width, v = (x->film[1] - f->y) / f->height, xyz[3], *at = out, r = c->w->radius;
 	unsigned k = x->edges, inner[INNER] = {k - 1, (k + 1) / 2, 1};
-	whole_colour(c, x, xyz);
+	full_path_colour(c, x, xyz);
 	*at++ = (1 - u) * (1 - v);
 	*at++ = u * (1 - v);
 	*at++ = (1 - u) * v;
@@ -135,12 +135,12 @@ static bool resample(struct group *g, uint64_t *index)
 }
 
 /* Of the edge at which x_b was joined. */
-static double log_geometry(const struct whole_path *x, unsigned b)
+static double log_geometry(const struct full_path_path *x, unsigned b)
 {
 	return b > 0 ? log(path_cosine(&x->v[b - 1], x->edge[b - 1].w) / x->edge[b - 1].distance2) : 0;
 }
 
-static double planted(enum stationary_fault fault, const struct move *m, const struct whole_path *x, const struct whole_path *y)
+static double planted(enum stationary_fault fault, const struct move *m, const struct full_path_path *x, const struct full_path_path *y)
 {
 	switch (fault) {
 	case STATIONARY_NO_TRANSFER:
@@ -165,7 +165,7 @@ static void count_unsound(struct group *g, double log_weight, bool state)
 }
 
 /* The probability of acceptance of y. */
-static double propose(struct group *g, struct whole_path *x, struct whole_path *y, struct move *move)
+static double propose(struct group *g, struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	const struct mutation_ops *ops = g->entry->ops;
 	enum strategy_counter end = ops->propose(&g->mutation, &g->entry->how, x, y, move);
@@ -184,7 +184,7 @@ static double propose(struct group *g, struct whole_path *x, struct whole_path *
 
 static void run_start(struct group *g, uint64_t chain, uint64_t index)
 {
-	struct whole_path *x = &g->place[0], *y = &g->place[1];
+	struct full_path_path *x = &g->place[0], *y = &g->place[1];
 	double now[STATIONARY_FUNCTIONS], next[STATIONARY_FUNCTIONS], first[STATIONARY_FUNCTIONS], r[4];
 	if (!path_start(&g->context, g->seed, index, x)) {
 		snprintf(g->failure, sizeof g->failure, "start %llu is black", (unsigned long long)index);
@@ -192,7 +192,7 @@ static void run_start(struct group *g, uint64_t chain, uint64_t index)
 	}
 	if (x->edges == 0)
 		return;
-	whole_copy(y, x, 0, x->edges);
+	full_path_copy(y, x, 0, x->edges);
 	look_at(&g->context, x, first);
 	memcpy(now, first, sizeof now);
 	g->mutation.chain = chain;
@@ -207,16 +207,16 @@ static void run_start(struct group *g, uint64_t chain, uint64_t index)
 			g->change[f] += (a > 0 ? a * next[f] + (1 - a) * now[f] : now[f]) - first[f];
 		mutation_random(&g->mutation, BLOCK_STRATEGY, r);
 		if (r[1] < a) {
-			struct whole_path *swap = x;
+			struct full_path_path *swap = x;
 			x = y;
 			y = swap;
 			memcpy(now, next, sizeof now);
 			g->accepted++;
 		}
 		if (y->edges != x->edges || g->entry->ops->independent)
-			whole_copy(y, x, 0, x->edges);
+			full_path_copy(y, x, 0, x->edges);
 		else
-			whole_copy(y, x, move.first, move.last);
+			full_path_copy(y, x, move.first, move.last);
 	}
 	for (int f = 0; f < STATIONARY_FUNCTIONS; f++)
 		g->first[f] += first[f];
@@ -232,7 +232,7 @@ static void run_group(struct group *g)
 	const struct scene_settings *s = &g->w->settings;
 	g->context = (struct path_context){.w = g->w, .window = {0, 0, s->width, s->height}, .min_depth = g->how->min_edges,
 					   .max_depth = g->how->max_edges, .counters = g->counters};
-	g->mutation = (struct mutation_ctx){.path = &g->context, .seed = g->seed, .count = g->strategy, .limits = walk_limits_of(&g->w->knobs)};
+	g->mutation = (struct mutation_ctx){.path = &g->context, .seed = g->seed, .count = g->strategy, .limits = walk_limits_of(&g->w->accuracy)};
 	bool watched = fptrap_watch();
 	if (resample(g, index))
 		for (uint32_t i = 0; i < g->starts && !g->failure[0]; i++)

@@ -10,7 +10,7 @@
 
 #include <cmocka.h>
 
-const char *worlds_knobs, *worlds_effects;
+const char *worlds_accuracy, *worlds_effects;
 
 static struct world *build(const struct asset_source *assets, const char *name, uint32_t width, uint32_t height)
 {
@@ -18,7 +18,7 @@ static struct world *build(const struct asset_source *assets, const char *name, 
 	struct scene s;
 	struct world *w = NULL;
 	struct render_options o = {.width = width, .height = height};
-	snprintf(o.knobs, sizeof o.knobs, "%s", worlds_knobs ? worlds_knobs : "");
+	snprintf(o.accuracy, sizeof o.accuracy, "%s", worlds_accuracy ? worlds_accuracy : "");
 	snprintf(o.effects, sizeof o.effects, "%s", worlds_effects ? worlds_effects : "");
 	int rc = scene_read(&s, assets, name, render_plugins(), NULL, 0, &e);
 	if (!rc) {

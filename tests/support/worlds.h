@@ -15,7 +15,7 @@ __attribute__((format(printf, 3, 4))) struct world *world_of_text(uint32_t width
 	"<integer name='height' value='32'/><rfilter type='box'/></film></sensor>"
 
 /* Of the worlds that are built from now on; NULL: all at their defaults. */
-extern const char *worlds_knobs;
+extern const char *worlds_accuracy;
 /* Effects that the next worlds force, as a plan spells them; NULL: none. */
 extern const char *worlds_effects;
 

@@ -6,7 +6,7 @@
 #include "worker/path/integrator.h"
 
 const struct integrator integrator_hslt = {
-	.face = {"hslt", "improved half vector space light transport", PLAN_CHAINS, WHOLE_MAX_EDGES, .has_mutations = true},
+	.face = {"hslt", "improved half vector space light transport", PLAN_CHAINS, FULL_PATH_MAX_EDGES, .has_mutations = true},
 	.stream = RNG_BOOTSTRAP,
 	.evaluate = path_trace_both_ways,
 	.chain = &chain_path,

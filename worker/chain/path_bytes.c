@@ -153,7 +153,7 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 }
 
 /* Without its contribution. */
-static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size, struct whole_path *x)
+static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x)
 {
 	if (size < PATH_EDGES)
 		return false;
@@ -162,7 +162,7 @@ static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size,
 	if (edges == 0)
 		return size == PATH_EDGES;
 	size_t head = head_bytes(c->w);
-	if (edges > c->max_depth || edges > WHOLE_MAX_EDGES)
+	if (edges > c->max_depth || edges > FULL_PATH_MAX_EDGES)
 		return false;
 	x->edges = (unsigned)edges;
 	unsigned vertices = vertex_count(c->w, x->edges);
@@ -176,11 +176,11 @@ static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size,
 			return false;
 	if (vertices == x->edges)
 		x->v[x->edges] = pinhole(c->w);
-	whole_set_wavelength(c, x, u);
-	if (!whole_finish(c, x))
+	full_path_set_wavelength(c, x, u);
+	if (!full_path_finish(c, x))
 		return false;
 	for (unsigned j = 1; j < x->edges; j++)
-		if (x->v[j].delta && !(whole_specular_miss(x, j) <= SPECULAR))
+		if (x->v[j].delta && !(full_path_specular_miss(x, j) <= SPECULAR))
 			return false;
 	return true;
 }
@@ -188,16 +188,16 @@ static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size,
 /* Our code, but the bytes may be anybody's: what they make invalid (a signalling NaN, infinity less infinity) is refused and no
  * fault. A call, so that nothing of it is computed before or after the flags are looked at. stated: as the bytes say. */
 __attribute__((noinline)) static bool contribution_of(struct path_context *c, const uint8_t *bytes, size_t size, bool stated,
-						      struct whole_path *x, double *contribution)
+						      struct full_path_path *x, double *contribution)
 {
 	bool ok = read_path(c, bytes, size, x);
-	*contribution = ok && x->edges ? whole_log_f(c, x) : 0;
+	*contribution = ok && x->edges ? full_path_log_f(c, x) : 0;
 	if (ok && stated && x->edges)
 		ok = fabs(*contribution - get_double(bytes + PATH_EDGES)) <= CONTRIBUTION;
 	return ok && isfinite(*contribution);
 }
 
-static bool read_guarded(struct path_context *c, const uint8_t *bytes, size_t size, bool stated, struct whole_path *x, double *contribution)
+static bool read_guarded(struct path_context *c, const uint8_t *bytes, size_t size, bool stated, struct full_path_path *x, double *contribution)
 {
 	unsigned flags = fptrap_leave();
 	bool ok = contribution_of(c, bytes, size, stated, x, contribution);
@@ -205,18 +205,18 @@ static bool read_guarded(struct path_context *c, const uint8_t *bytes, size_t si
 	return ok;
 }
 
-bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct whole_path *x, double *contribution)
+bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x, double *contribution)
 {
 	return read_guarded(c, bytes, size, false, x, contribution);
 }
 
-bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct whole_path *x)
+bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x)
 {
 	double contribution;
 	return read_guarded(c, bytes, size, true, x, &contribution);
 }
 
-size_t path_write(struct path_context *c, const struct whole_path *x, struct whole_path *again, uint8_t *bytes)
+size_t path_write(struct path_context *c, const struct full_path_path *x, struct full_path_path *again, uint8_t *bytes)
 {
 	put64(bytes, x->edges);
 	if (x->edges == 0)

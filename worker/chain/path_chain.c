@@ -10,7 +10,7 @@
 
 /* A state with what it has gathered and not splatted yet. */
 struct path_place {
-	struct whole_path path; /* 0 edges: black, looking for light */
+	struct full_path_path path; /* 0 edges: black, looking for light */
 	double weight;
 };
 
@@ -40,13 +40,13 @@ static void set_up(struct path_chain *c)
 	c->mutation.path = c->base.context;
 	c->mutation.seed = c->base.seed;
 	c->mutation.chain = c->base.id;
-	c->mutation.limits = walk_limits_of(&c->base.context->w->knobs);
+	c->mutation.limits = walk_limits_of(&c->base.context->w->accuracy);
 }
 
-static void copy_whole(struct whole_path *to, const struct whole_path *from)
+static void copy_whole(struct full_path_path *to, const struct full_path_path *from)
 {
 	if (from->edges)
-		whole_copy(to, from, 0, from->edges);
+		full_path_copy(to, from, 0, from->edges);
 	to->edges = from->edges;
 }
 
@@ -60,7 +60,7 @@ static void begin(struct path_chain *c, const uint8_t *bytes, size_t size)
 
 static bool start(struct chain *base, uint64_t bootstrap_index)
 {
-	static const struct whole_path black = {0};
+	static const struct full_path_path black = {0};
 	struct path_chain *c = path_of(base);
 	uint8_t bytes[WHOLE_BYTES];
 	set_up(c);
@@ -107,7 +107,7 @@ static void splat(struct path_chain *c, struct path_place *at)
 	if (at->weight == 0)
 		return;
 	struct splat s = {.x = at->path.film[0], .y = at->path.film[1]};
-	whole_colour(c->base.context, &at->path, s.xyz);
+	full_path_colour(c->base.context, &at->path, s.xyz);
 	film_sums_splat(c->base.film, &s, at->weight);
 	chain_moments_state(&c->base.film->moments, &s, 1, 1, at->weight);
 	chain_moments_class(&c->base.film->moments, path_class_whole(&at->path), at->weight);
@@ -141,7 +141,7 @@ static bool is_sound(struct path_chain *c, double log_weight, bool independent)
 static double propose(struct path_chain *c, const struct mixture_entry *entry, struct move *move, struct chain_sums *sums)
 {
 	struct mutation_ctx *m = &c->mutation;
-	struct whole_path *x = &c->current->path, *y = &c->proposal->path;
+	struct full_path_path *x = &c->current->path, *y = &c->proposal->path;
 	enum strategy_counter end = entry->ops->propose(m, &entry->how, x, y, move);
 	double to_y = end ? -INFINITY : entry->ops->log_weight(m, y, move, X_TO_Y);
 	if (!end && !(to_y > -INFINITY && is_sound(c, to_y, entry->ops->independent)))
@@ -197,7 +197,7 @@ static void step(struct chain *base, struct chain_sums *sums)
 	if (c->proposal->path.edges != c->current->path.edges || entry->ops->independent)
 		copy_whole(&c->proposal->path, &c->current->path);
 	else
-		whole_copy(&c->proposal->path, &c->current->path, move.first, move.last);
+		full_path_copy(&c->proposal->path, &c->current->path, move.first, move.last);
 }
 
 const struct chain_ops chain_path = {

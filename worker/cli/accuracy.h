@@ -18,22 +18,22 @@ enum { ACCURACY_SETTINGS = 96, ACCURACY_SWEEPS = 24, ACCURACY_VALUES = 12, ACCUR
 #define ACCURACY_TRIM 0.005
 
 struct accuracy_setting {
-	char knob[32], value[48]; /* "default" and "reference" are knobs without value */
+	char parameter[32], value[48]; /* "default" and "reference" are settings without value */
 	double share;             /* of the time, in units of the others' */
 	bool other_image;         /* it is known to make another image, however small the difference */
 	uint32_t max_depth;
-	char knobs[PLAN_KNOBS_MAX], mixture[PLAN_MUTATIONS_MAX];
+	char accuracy[PLAN_ACCURACY_MAX], mixture[PLAN_MUTATIONS_MAX];
 };
 
-struct accuracy_sweep { /* of one knob; the default's value among the others, in order */
-	char knob[32];
+struct accuracy_sweep { /* of one parameter; the default's value among the others, in order */
+	char parameter[32];
 	const char *summary;
 	size_t count, setting[ACCURACY_VALUES];
 	char value[ACCURACY_VALUES][48];
 };
 
 struct accuracy_left_out {
-	char knob[32], why[160];
+	char parameter[32], why[160];
 };
 
 struct accuracy_design {
@@ -45,7 +45,7 @@ struct accuracy_design {
 enum { ACCURACY_DEFAULT, ACCURACY_REFERENCE };
 
 /* Around the request's settings, what the scene calls for. only: NAME,NAME: sweeps to make; NULL: all. -EINVAL: there is no such
- * knob, with a sentence. */
+ * parameter, with a sentence. */
 int accuracy_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene, const char *only,
 		    struct error *e);
 

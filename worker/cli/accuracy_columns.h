@@ -3,7 +3,7 @@
 #define WORKER_CLI_ACCURACY_COLUMNS_H
 
 #include "worker/cli/accuracy.h"
-#include "worker/cli/page.h"
+#include "worker/cli/text_file.h"
 
 struct accuracy_column {
 	const char *name, *meaning; /* meaning "": the other end of the interval */

@@ -3,9 +3,9 @@
 #include <math.h>
 
 const struct accuracy_column accuracy_columns[] = {
-	{"setting", "knob and value"},
+	{"setting", "parameter and value"},
 	{"knob", "what differs from the default"},
-	{"value", "of that knob"},
+	{"value", "of that parameter"},
 	{"role", "default, reference or sweep"},
 	{"max_depth", "longest paths, in edges"},
 	{"mixture", "strategies and their weights, as --mutations takes them"},
@@ -40,22 +40,22 @@ const struct accuracy_column accuracy_columns[] = {
 	{0},
 };
 
-static void put_number(struct page *p, double x)
+static void put_number(struct text_file *p, double x)
 {
 	if (isfinite(x))
-		page_put(p, ",%.6g", x);
+		text_file_put(p, ",%.6g", x);
 	else
-		page_put(p, ",");
+		text_file_put(p, ",");
 }
 
-static void put_interval(struct page *p, struct interval x)
+static void put_interval(struct text_file *p, struct interval x)
 {
 	put_number(p, x.value);
 	put_number(p, x.low);
 	put_number(p, x.high);
 }
 
-static void put_row(struct page *p, const struct accuracy_context *x, size_t i)
+static void put_row(struct text_file *p, const struct accuracy_context *x, size_t i)
 {
 	const struct accuracy_judgement *j = x->judgement;
 	const struct accuracy_setting *s = &x->design->settings[i];
@@ -63,16 +63,16 @@ static void put_row(struct page *p, const struct accuracy_context *x, size_t i)
 	char name[96];
 	bool reference = i == ACCURACY_REFERENCE, front = f->beaten_by == i;
 	accuracy_name(s, name, sizeof name);
-	page_field(p, name);
-	page_put(p, ",");
-	page_field(p, s->knob);
-	page_put(p, ",");
-	page_field(p, s->value);
-	page_put(p, ",%s,%u,", i == ACCURACY_DEFAULT ? "default" : reference ? "reference" : "sweep", s->max_depth);
-	page_field(p, s->mixture);
-	page_put(p, ",");
-	page_field(p, s->knobs);
-	page_put(p, ",%llu,%llu", (unsigned long long)f->mutations, (unsigned long long)f->rounds);
+	text_file_field(p, name);
+	text_file_put(p, ",");
+	text_file_field(p, s->parameter);
+	text_file_put(p, ",");
+	text_file_field(p, s->value);
+	text_file_put(p, ",%s,%u,", i == ACCURACY_DEFAULT ? "default" : reference ? "reference" : "sweep", s->max_depth);
+	text_file_field(p, s->mixture);
+	text_file_put(p, ",");
+	text_file_field(p, s->accuracy);
+	text_file_put(p, ",%llu,%llu", (unsigned long long)f->mutations, (unsigned long long)f->rounds);
 	put_number(p, f->cpu_seconds);
 	put_interval(p, f->cost);
 	put_number(p, f->acceptance);
@@ -82,26 +82,26 @@ static void put_row(struct page *p, const struct accuracy_context *x, size_t i)
 	put_interval(p, f->equal_time);
 	put_interval(p, f->bias_mean);
 	put_interval(p, f->bias_block);
-	page_put(p, ",%u,%u", f->block % j->across, f->block / j->across);
+	text_file_put(p, ",%u,%u", f->block % j->across, f->block / j->across);
 	put_number(p, f->bias_seen);
 	put_number(p, f->bias_bound);
-	page_put(p, reference ? ",," : ",%d,", front);
+	text_file_put(p, reference ? ",," : ",%d,", front);
 	if (!front) {
 		accuracy_name(&x->design->settings[f->beaten_by], name, sizeof name);
-		page_field(p, name);
+		text_file_field(p, name);
 	}
-	page_put(p, "\n");
+	text_file_put(p, "\n");
 }
 
 int accuracy_csv(const struct accuracy_context *x, const char *path, struct error *e)
 {
-	struct page p = {.full = false};
+	struct text_file p = {.full = false};
 	for (size_t i = 0; accuracy_columns[i].name; i++)
-		page_put(&p, "%s%s", i ? "," : "", accuracy_columns[i].name);
-	page_put(&p, "\n");
+		text_file_put(&p, "%s%s", i ? "," : "", accuracy_columns[i].name);
+	text_file_put(&p, "\n");
 	for (size_t i = 0; i < x->design->count; i++)
 		put_row(&p, x, i);
-	int rc = page_write(&p, path, e);
-	page_fini(&p);
+	int rc = text_file_write(&p, path, e);
+	text_file_fini(&p);
 	return rc;
 }

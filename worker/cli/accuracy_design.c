@@ -1,25 +1,25 @@
 #include "worker/cli/accuracy.h"
 
 #include "common/base/text.h"
-#include "worker/render/knobs.h"
+#include "worker/render/accuracy_settings.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-/* The reference: values at which what a knob may bias is far below what can be measured. Those of the roughness and the
+/* The reference: values at which what a parameter may bias is far below what can be measured. Those of the roughness and the
  * tessellation are the finest that are worth a sweep. */
 static const struct {
-	const char *knob, *value;
+	const char *parameter, *value;
 } careful[] = {{"tolerance", "1e-06"}, {"iterations", "30"}, {"reverse-tolerance", "1e-05"}, {"roughness", "0"}, {"tessellation", "2"}};
 
 /* What one would try who is in a hurry. */
 static const struct {
-	const char *name, *knobs;
+	const char *name, *accuracy;
 } presets[] = {{"fast", "tolerance=0.01,iterations=6,reverse-tolerance=0.01"}};
 
-/* Knobs that are not of the list of worker/render/knobs.h. */
+/* Knobs that are not of the list of worker/render/accuracy_settings.h. */
 #define DEPTH "max-depth"
 #define SHARE "independent"
 #define MIXTURE "mixture"
@@ -43,45 +43,45 @@ static bool listed(const char *list, const char *name)
 	return list == NULL;
 }
 
-static const struct render_knob *knob_find(const char *name)
+static const struct render_setting *setting_find(const char *name)
 {
-	const struct render_knob *k;
-	for (size_t i = 0; (k = render_knob_at(i)) != NULL; i++)
+	const struct render_setting *k;
+	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++)
 		if (strcmp(k->name, name) == 0)
 			return k;
 	return NULL;
 }
 
-static void leave_out(struct planner *p, const char *knob, const char *why)
+static void leave_out(struct planner *p, const char *parameter, const char *why)
 {
 	if (p->d->left_out_count == ACCURACY_SWEEPS)
 		return;
 	struct accuracy_left_out *l = &p->d->left_out[p->d->left_out_count++];
-	text_copy(l->knob, sizeof l->knob, knob);
+	text_copy(l->parameter, sizeof l->parameter, parameter);
 	text_copy(l->why, sizeof l->why, why);
 }
 
-static struct accuracy_sweep *new_sweep(struct planner *p, const char *knob, const char *summary)
+static struct accuracy_sweep *new_sweep(struct planner *p, const char *parameter, const char *summary)
 {
 	if (p->d->sweep_count == ACCURACY_SWEEPS)
 		return NULL;
 	struct accuracy_sweep *s = &p->d->sweeps[p->d->sweep_count++];
 	*s = (struct accuracy_sweep){.summary = summary};
-	text_copy(s->knob, sizeof s->knob, knob);
+	text_copy(s->parameter, sizeof s->parameter, parameter);
 	return s;
 }
 
 /* Another setting that is the default but for what the caller changes; NULL: the table is full. */
-static struct accuracy_setting *new_setting(struct planner *p, const char *knob, const char *value)
+static struct accuracy_setting *new_setting(struct planner *p, const char *parameter, const char *value)
 {
 	struct accuracy_design *d = p->d;
 	if (d->count == ACCURACY_SETTINGS)
 		return NULL;
 	struct accuracy_setting *s = &d->settings[d->count++];
 	*s = (struct accuracy_setting){.share = 1, .max_depth = p->base->max_depth};
-	text_copy(s->knob, sizeof s->knob, knob);
+	text_copy(s->parameter, sizeof s->parameter, parameter);
 	text_copy(s->value, sizeof s->value, value);
-	text_copy(s->knobs, sizeof s->knobs, p->base->knobs);
+	text_copy(s->accuracy, sizeof s->accuracy, p->base->accuracy);
 	text_copy(s->mixture, sizeof s->mixture, p->base->mixture);
 	return s;
 }
@@ -100,27 +100,27 @@ static struct accuracy_setting *swept(struct planner *p, struct accuracy_sweep *
 {
 	if (!add_value(s, value, p->d->count))
 		return NULL;
-	struct accuracy_setting *setting = new_setting(p, s->knob, value);
+	struct accuracy_setting *setting = new_setting(p, s->parameter, value);
 	if (!setting)
 		s->count--;
 	return setting;
 }
 
-/* The base's knobs with one more; false: it is the base's value already, or no value. */
-static bool with_knob(const char *base, const char *name, const char *value, char out[PLAN_KNOBS_MAX])
+/* The base's settings with one more; false: it is the base's value already, or no value. */
+static bool with_setting(const char *base, const char *name, const char *value, char out[PLAN_ACCURACY_MAX])
 {
-	char text[2 * PLAN_KNOBS_MAX];
+	char text[2 * PLAN_ACCURACY_MAX];
 	struct error e;
 	snprintf(text, sizeof text, "%s%s%s=%s", base, *base ? "," : "", name, value);
-	return render_knobs_canonical(text, out, &e) == 0 && strcmp(out, base) != 0;
+	return render_settings_canonical(text, out, &e) == 0 && strcmp(out, base) != 0;
 }
 
-/* Why a knob of the renderer does nothing here; NULL: it does. */
-static const char *idle(const struct planner *p, const struct render_knob *k)
+/* Why a parameter of the renderer does nothing here; NULL: it does. */
+static const char *idle(const struct planner *p, const struct render_setting *k)
 {
 	if (!k->sweep[0])
 		return "it decides what is rendered, not how accurately";
-	if (k->place == KNOB_CHAINS && !p->integrator->has_mutations)
+	if (k->place == SETTING_CHAINS && !p->integrator->has_mutations)
 		return "the integrator has no strategies that walk";
 	if (strcmp(k->name, "tessellation") == 0 && !render_effect_on(p->scene, "displacement"))
 		return "no shape is displaced";
@@ -131,29 +131,29 @@ static const char *idle(const struct planner *p, const struct render_knob *k)
 	return NULL;
 }
 
-static void sweep_knob(struct planner *p, const struct render_knob *k)
+static void sweep_setting(struct planner *p, const struct render_setting *k)
 {
-	struct knobs now;
+	struct accuracy_settings now;
 	char standard[32];
 	size_t index = 0;
-	while (render_knob_at(index) != k)
+	while (render_setting_at(index) != k)
 		index++;
-	if (knobs_read(p->base->knobs, &now, NULL))
+	if (accuracy_settings_read(p->base->accuracy, &now, NULL))
 		return;
-	knobs_value(&now, index, standard, sizeof standard);
+	accuracy_settings_value(&now, index, standard, sizeof standard);
 	struct accuracy_sweep *s = new_sweep(p, k->name, k->summary);
 	bool placed = false;
 	for (size_t i = 0; s && k->sweep[i]; i++) {
-		char knobs[PLAN_KNOBS_MAX];
-		if (!with_knob(p->base->knobs, k->name, k->sweep[i], knobs)) {
+		char accuracy[PLAN_ACCURACY_MAX];
+		if (!with_setting(p->base->accuracy, k->name, k->sweep[i], accuracy)) {
 			placed |= add_value(s, standard, ACCURACY_DEFAULT);
 			continue;
 		}
 		struct accuracy_setting *setting = swept(p, s, k->sweep[i]);
 		if (!setting)
 			continue;
-		memcpy(setting->knobs, knobs, sizeof knobs);
-		setting->other_image = k->place == KNOB_WORLD;
+		memcpy(setting->accuracy, accuracy, sizeof accuracy);
+		setting->other_image = k->place == SETTING_WORLD;
 	}
 	if (s && !placed)
 		add_value(s, standard, ACCURACY_DEFAULT);
@@ -307,17 +307,17 @@ static void sweep_presets(struct planner *p)
 {
 	struct accuracy_sweep *s = new_sweep(p, PRESET, "Several knobs at once");
 	for (size_t i = 0; s && i < sizeof presets / sizeof *presets; i++) {
-		char text[2 * PLAN_KNOBS_MAX], knobs[PLAN_KNOBS_MAX];
-		snprintf(text, sizeof text, "%s%s%s", p->base->knobs, *p->base->knobs ? "," : "", presets[i].knobs);
-		struct accuracy_setting *setting = render_knobs_canonical(text, knobs, p->e) == 0 ? swept(p, s, presets[i].name) : NULL;
+		char text[2 * PLAN_ACCURACY_MAX], accuracy[PLAN_ACCURACY_MAX];
+		snprintf(text, sizeof text, "%s%s%s", p->base->accuracy, *p->base->accuracy ? "," : "", presets[i].accuracy);
+		struct accuracy_setting *setting = render_settings_canonical(text, accuracy, p->e) == 0 ? swept(p, s, presets[i].name) : NULL;
 		if (setting)
-			memcpy(setting->knobs, knobs, sizeof knobs);
+			memcpy(setting->accuracy, accuracy, sizeof accuracy);
 	}
 	if (s) {
 		add_value(s, "default", ACCURACY_DEFAULT);
 		struct accuracy_setting *same = swept(p, s, "careful");
 		if (same)
-			memcpy(same->knobs, p->d->settings[ACCURACY_REFERENCE].knobs, sizeof same->knobs);
+			memcpy(same->accuracy, p->d->settings[ACCURACY_REFERENCE].accuracy, sizeof same->accuracy);
 	}
 }
 
@@ -326,10 +326,10 @@ static void add_reference(struct planner *p)
 	struct accuracy_setting *s = new_setting(p, "reference", "");
 	s->share = ACCURACY_REFERENCE_SHARE;
 	for (size_t i = 0; i < sizeof careful / sizeof *careful; i++) {
-		const struct render_knob *k = knob_find(careful[i].knob);
-		char knobs[PLAN_KNOBS_MAX];
-		if (k && !idle(p, k) && with_knob(s->knobs, careful[i].knob, careful[i].value, knobs))
-			memcpy(s->knobs, knobs, sizeof knobs);
+		const struct render_setting *k = setting_find(careful[i].parameter);
+		char accuracy[PLAN_ACCURACY_MAX];
+		if (k && !idle(p, k) && with_setting(s->accuracy, careful[i].parameter, careful[i].value, accuracy))
+			memcpy(s->accuracy, accuracy, sizeof accuracy);
 	}
 }
 
@@ -340,15 +340,15 @@ static int check_only(struct planner *p)
 	struct text t = {known, sizeof known};
 	for (size_t i = 0; i < sizeof own / sizeof *own; i++)
 		text_put(&t, "%s%s", i ? ", " : "", own[i]);
-	for (size_t i = 0; render_knob_at(i); i++)
-		text_put(&t, ", %s", render_knob_at(i)->name);
+	for (size_t i = 0; render_setting_at(i); i++)
+		text_put(&t, ", %s", render_setting_at(i)->name);
 	for (const char *at = p->only; at && *at;) {
 		size_t n = strcspn(at, ",");
 		bool found = false;
 		snprintf(name, sizeof name, "%.*s", (int)(n < sizeof name ? n : sizeof name - 1), at);
 		for (size_t i = 0; i < sizeof own / sizeof *own; i++)
 			found |= strcmp(name, own[i]) == 0;
-		if (!found && !knob_find(name))
+		if (!found && !setting_find(name))
 			return error_set(p->e, EINVAL, "there is no knob '%s'; there are %s", name, known);
 		at += n + (at[n] == ',');
 	}
@@ -365,15 +365,15 @@ int accuracy_design(struct accuracy_design *d, const struct plan_request *base, 
 	*d = (struct accuracy_design){.count = 0};
 	new_setting(&p, "default", "");
 	add_reference(&p);
-	const struct render_knob *k;
-	for (size_t i = 0; (k = render_knob_at(i)) != NULL; i++) {
+	const struct render_setting *k;
+	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
 		const char *why = idle(&p, k);
 		if (!listed(only, k->name))
 			continue;
 		if (why)
 			leave_out(&p, k->name, why);
 		else
-			sweep_knob(&p, k);
+			sweep_setting(&p, k);
 	}
 	if (listed(only, DEPTH))
 		sweep_depth(&p);
@@ -394,5 +394,5 @@ int accuracy_design(struct accuracy_design *d, const struct plan_request *base, 
 void accuracy_name(const struct accuracy_setting *s, char *text, size_t size)
 {
 	struct text t = {text, size};
-	text_put(&t, "%s%s%s", s->knob, *s->value ? " " : "", s->value);
+	text_put(&t, "%s%s%s", s->parameter, *s->value ? " " : "", s->value);
 }

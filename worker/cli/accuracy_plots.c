@@ -6,21 +6,21 @@
 #include <math.h>
 #include <string.h>
 
-static void put_plot(struct page *p, const struct plot *plot)
+static void put_plot(struct text_file *p, const struct plot *plot)
 {
 	char *svg;
 	size_t size;
 	struct error e;
 	if (plot_svg(plot, &svg, &size, &e)) {
-		page_put(p, "<p class=\"note\">");
-		page_escaped(p, e.text);
-		page_put(p, "</p>\n");
+		text_file_put(p, "<p class=\"note\">");
+		text_file_escaped(p, e.text);
+		text_file_put(p, "</p>\n");
 		return;
 	}
 	/* Inside a page it has no declaration of its own. */
 	const char *begin = strstr(svg, "<svg");
 	if (begin)
-		page_bytes(p, begin, size - (size_t)(begin - svg));
+		text_file_bytes(p, begin, size - (size_t)(begin - svg));
 	mem_free(svg);
 }
 
@@ -45,7 +45,7 @@ static struct plot_series series_of(const struct points *p, const char *name)
 	return (struct plot_series){.name = name, .style = PLOT_POINTS, .count = p->count, .x = p->x, .y = p->y, .low = p->low, .high = p->high};
 }
 
-void accuracy_plot_sweep(struct page *p, const struct accuracy_context *x, const struct accuracy_sweep *s)
+void accuracy_plot_sweep(struct text_file *p, const struct accuracy_context *x, const struct accuracy_sweep *s)
 {
 	static struct points error, standard, mean, block;
 	const char *names[ACCURACY_VALUES];
@@ -63,15 +63,15 @@ void accuracy_plot_sweep(struct page *p, const struct accuracy_context *x, const
 	}
 	const struct plot_series errors[2] = {series_of(&error, "sweep"), series_of(&standard, "default")};
 	const struct plot_series biases[2] = {series_of(&mean, "mean"), series_of(&block, "worst block")};
-	page_put(p, "<div class=\"plots\">\n");
-	put_plot(p, &(struct plot){.title = "Error at equal time", .x_label = s->knob, .y_label = "relative error, %", .series_count = 2,
+	text_file_put(p, "<div class=\"plots\">\n");
+	put_plot(p, &(struct plot){.title = "Error at equal time", .x_label = s->parameter, .y_label = "relative error, %", .series_count = 2,
 				   .series = errors, .x_names = names, .x_name_count = s->count});
-	put_plot(p, &(struct plot){.title = "Bias against the reference", .x_label = s->knob, .y_label = "bias, %", .series_count = 2,
+	put_plot(p, &(struct plot){.title = "Bias against the reference", .x_label = s->parameter, .y_label = "bias, %", .series_count = 2,
 				   .series = biases, .x_names = names, .x_name_count = s->count});
-	page_put(p, "</div>\n");
+	text_file_put(p, "</div>\n");
 }
 
-void accuracy_plot_front(struct page *p, const struct accuracy_context *x)
+void accuracy_plot_front(struct text_file *p, const struct accuracy_context *x)
 {
 	static struct points kinds[3];
 	static const char *const names[3] = {"beaten", "on the front", "default"};
@@ -93,8 +93,8 @@ void accuracy_plot_front(struct page *p, const struct accuracy_context *x)
 		s[k] = series_of(&kinds[k], names[k]);
 		s[k].labels = kinds[k].label;
 	}
-	page_put(p, "<div class=\"wide\">\n");
+	text_file_put(p, "<div class=\"wide\">\n");
 	put_plot(p, &(struct plot){.title = "Every setting (named where a bias was seen)", .x_label = "relative error at equal time, %",
 				   .y_label = "bias of the mean, %", .log_x = true, .series_count = 3, .series = s});
-	page_put(p, "</div>\n");
+	text_file_put(p, "</div>\n");
 }

@@ -3,11 +3,11 @@
 #define WORKER_CLI_ACCURACY_PLOTS_H
 
 #include "worker/cli/accuracy.h"
-#include "worker/cli/page.h"
+#include "worker/cli/text_file.h"
 
-/* Error at equal time and bias against the knob's values. */
-void accuracy_plot_sweep(struct page *p, const struct accuracy_context *x, const struct accuracy_sweep *s);
+/* Error at equal time and bias against the parameter's values. */
+void accuracy_plot_sweep(struct text_file *p, const struct accuracy_context *x, const struct accuracy_sweep *s);
 /* All settings: bias against error at equal time. */
-void accuracy_plot_front(struct page *p, const struct accuracy_context *x);
+void accuracy_plot_front(struct text_file *p, const struct accuracy_context *x);
 
 #endif

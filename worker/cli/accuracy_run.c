@@ -57,7 +57,7 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	struct plan *p = &r->jobs[i].plan;
 	double each = expected_seconds(r, pilot);
 	q.max_depth = s->max_depth;
-	memcpy(q.knobs, s->knobs, sizeof q.knobs);
+	memcpy(q.accuracy, s->accuracy, sizeof q.accuracy);
 	memcpy(q.mixture, s->mixture, sizeof q.mixture);
 	q.seed += i; /* what is compared shares no random numbers */
 	q.seconds = 1e8;
@@ -89,7 +89,7 @@ static int find_world(struct accuracy_run *r, struct accuracy_job *j, struct err
 	struct render_options options = *r->render;
 	for (size_t k = 0; k < r->world_count; k++) {
 		bool fits;
-		int rc = world_set_knobs(r->worlds[k], j->plan.knobs, &fits, e);
+		int rc = world_set_accuracy(r->worlds[k], j->plan.accuracy, &fits, e);
 		if (rc)
 			return rc;
 		if (fits) {
@@ -97,7 +97,7 @@ static int find_world(struct accuracy_run *r, struct accuracy_job *j, struct err
 			return 0;
 		}
 	}
-	memcpy(options.knobs, j->plan.knobs, sizeof options.knobs);
+	memcpy(options.accuracy, j->plan.accuracy, sizeof options.accuracy);
 	int rc = world_new(&j->world, r->scene, r->assets, &options, e);
 	if (!rc)
 		r->worlds[r->world_count++] = j->world;
@@ -127,7 +127,7 @@ static int step(struct accuracy_run *r, size_t i, struct error *e)
 {
 	struct accuracy_job *j = &r->jobs[i];
 	bool fits;
-	int rc = world_set_knobs(j->world, j->plan.knobs, &fits, e);
+	int rc = world_set_accuracy(j->world, j->plan.accuracy, &fits, e);
 	double before = j->run.cpu_seconds;
 	uint64_t rounds = canvas_rounds(j->run.canvas);
 	if (!rc)

@@ -134,7 +134,7 @@ static int paste(struct assembly *a, const struct exr_image *img, struct error *
 	return 0;
 }
 
-static void add_agreement(struct sums *s, const struct exr_image *img)
+static void add_convergence(struct sums *s, const struct exr_image *img)
 {
 	const char *agreement = string_of(img, "hslt:agreement"), *text = string_of(img, "hslt:disagreement");
 	s->agree |= strcmp(agreement, "agree") == 0;
@@ -164,7 +164,7 @@ static void add_header(struct assembly *a, const struct exr_image *img)
 	s->wall = fmax(s->wall, number_of(img, "hslt:wallSeconds"));
 	const struct exr_attribute *mixed = attribute(img, "hslt:mixed");
 	s->mixed |= mixed && mixed->type == EXR_ATTRIBUTE_INT && mixed->integer;
-	add_agreement(s, img);
+	add_convergence(s, img);
 	for (size_t i = 0; i < a->first.attribute_count; i++)
 		a->kept[i] &= equal(&a->first.attributes[i], attribute(img, a->first.attributes[i].name));
 }

@@ -27,7 +27,7 @@ static const char doc[] =
 	"Interrupted, it reports what there is once each setting had a round, and ends with 1.\n"
 	"Exit codes: 0 done, 1 failed, 2 usage.";
 
-enum { OPTION_THREADS = 256, OPTION_QUIET, OPTION_CSV, OPTION_BUDGET, OPTION_SECONDS, OPTION_ROUNDS, OPTION_KNOBS, OPTION_REFERENCE };
+enum { OPTION_THREADS = 256, OPTION_QUIET, OPTION_CSV, OPTION_BUDGET, OPTION_SECONDS, OPTION_ROUNDS, OPTION_SETTINGS, OPTION_REFERENCE };
 
 static const struct argp_option options[] = {
 	{"output", 'o', "FILE", 0, "The report (HTML)", 0},
@@ -37,7 +37,7 @@ static const struct argp_option options[] = {
 	{"rounds", OPTION_ROUNDS, "N", 0,
 	 "Rounds of each setting, in place of a budget: with --epoch, --chains and --bootstrap all but the times repeats", 0},
 	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors)", 0},
-	{"knobs", OPTION_KNOBS, "LIST", 0,
+	{"knobs", OPTION_SETTINGS, "LIST", 0,
 	 "Only these: settings of --set (its help names them), max-depth, independent, mixture, preset; with commas between", 0},
 	{"reference", OPTION_REFERENCE, "FILE", 0, "An image (OpenEXR) to measure the bias against, in place of a careful render", 0},
 	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
@@ -46,7 +46,7 @@ static const struct argp_option options[] = {
 static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
 
 struct arguments {
-	const char *scene, *output, *csv, *knobs, *reference;
+	const char *scene, *output, *csv, *accuracy, *reference;
 	unsigned threads;
 	double budget, seconds;
 	uint64_t rounds;
@@ -99,8 +99,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_THREADS:
 		a->threads = option_threads(state, arg);
 		return 0;
-	case OPTION_KNOBS:
-		a->knobs = arg;
+	case OPTION_SETTINGS:
+		a->accuracy = arg;
 		return 0;
 	case OPTION_REFERENCE:
 		a->reference = arg;
@@ -177,7 +177,7 @@ static int design(struct session *s, struct error *e)
 		snprintf(r->plan.integrator, sizeof r->plan.integrator, RENDER_INTEGRATOR_CHAINS);
 	int rc = render_plan_from_scene(r, &s->summary, e);
 	if (!rc)
-		rc = accuracy_design(&s->design, &r->plan, &s->summary, s->a->knobs, e);
+		rc = accuracy_design(&s->design, &r->plan, &s->summary, s->a->accuracy, e);
 	if (!rc)
 		rc = check_reference(s, e);
 	s->usage = rc == -EINVAL;
@@ -185,7 +185,7 @@ static int design(struct session *s, struct error *e)
 		return rc;
 	fprintf(stderr, "%zu settings: the default, a reference and %zu knobs\n", s->design.count, s->design.sweep_count);
 	for (size_t i = 0; i < s->design.left_out_count; i++)
-		fprintf(stderr, "left out: %s (%s)\n", s->design.left_out[i].knob, s->design.left_out[i].why);
+		fprintf(stderr, "left out: %s (%s)\n", s->design.left_out[i].parameter, s->design.left_out[i].why);
 	return 0;
 }
 

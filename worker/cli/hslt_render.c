@@ -126,7 +126,7 @@ struct session {
 	struct local_run run;
 	struct canvas_image image;
 	struct forecast_history looks;
-	struct agreement agreement;
+	struct convergence agreement;
 	double forecast_seconds; /* from the first bootstrap sample to the target; 0: unknown */
 	char forecast[160];
 	double build_seconds;
@@ -252,7 +252,7 @@ static int render(struct session *s, struct error *e)
 		return error_set(e, EINTR, "interrupted before the first round was complete: nothing to write");
 	rc = canvas_image(s->run.canvas, false, &s->image, e);
 	if (!rc)
-		agreement_judge(&s->plan, &s->image, &s->agreement);
+		convergence_judge(&s->plan, &s->image, &s->agreement);
 	return rc;
 }
 
@@ -289,12 +289,12 @@ static void say(const struct session *s)
 	strategy_table(p->mutations, &i->counts, text, sizeof text);
 	if (s->a->stats)
 		fputs(text, stderr);
-	agreement_table(i->classes, i->b, &s->agreement, text, sizeof text);
+	convergence_table(i->classes, i->b, &s->agreement, text, sizeof text);
 	if (s->a->stats)
 		fputs(text, stderr);
 	strategy_note(p, &i->counts, i->black, text, sizeof text);
 	strategy_add_beyond(i->beyond_share, text, sizeof text);
-	agreement_add_note(&s->agreement, text, sizeof text);
+	convergence_add_note(&s->agreement, text, sizeof text);
 	if (*text)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 }

@@ -7,7 +7,7 @@
 #include "worker/cli/estimate.h"
 #include "worker/cli/farm_pilot.h"
 #include "worker/cli/options.h"
-#include "worker/cli/outlast.h"
+#include "worker/cli/reconnect.h"
 #include "worker/cli/pilot.h"
 #include "worker/cli/speed.h"
 
@@ -173,7 +173,7 @@ static int run(struct arguments *a, struct client **cl, const struct scene_bundl
 	struct submitted job;
 	struct submit_end end = {0};
 	char plan[PLAN_TEXT] = "";
-	struct outlast o = {a->coordinator, a->tls, a->insecure, a->patience};
+	struct reconnect o = {a->coordinator, a->tls, a->insecure, a->patience};
 	int rc = submit_send(*cl, &a->request, b, &job, plan, sizeof plan, e);
 	if (rc)
 		return rc;
@@ -182,7 +182,7 @@ static int run(struct arguments *a, struct client **cl, const struct scene_bundl
 		print_id(a, job.job, plan, "queued");
 	if (!a->wait)
 		return 0;
-	rc = outlast_job(cl, &o, &job, a->output, &end, e);
+	rc = reconnect_job(cl, &o, &job, a->output, &end, e);
 	if (!rc && !end.has_result)
 		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job.job, end.why);
 	if (!rc && *end.note)

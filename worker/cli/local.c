@@ -7,7 +7,7 @@
 #include <string.h>
 #include <time.h>
 
-struct crew {
+struct thread_pool {
 	struct local_run *run;
 	struct bootstrap *bootstrap;
 	uint64_t *seeds;              /* [groups][chains / groups] */
@@ -23,7 +23,7 @@ struct crew {
 };
 
 struct local_job {
-	struct crew crew;
+	struct thread_pool thread_pool;
 };
 
 static double since(const struct timespec *begin)
@@ -33,7 +33,7 @@ static double since(const struct timespec *begin)
 	return (double)(now.tv_sec - begin->tv_sec) + 1e-9 * (double)(now.tv_nsec - begin->tv_nsec);
 }
 
-static bool stopped(const struct crew *c)
+static bool stopped(const struct thread_pool *c)
 {
 	return c->run->stop && atomic_load(c->run->stop);
 }
@@ -53,7 +53,7 @@ static void free_states(struct chain_state *s, uint32_t count)
 	mem_free(s);
 }
 
-static void show(struct crew *c)
+static void show(struct thread_pool *c)
 {
 	struct local_run *r = c->run;
 	if (!r->progress)
@@ -66,7 +66,7 @@ static void show(struct crew *c)
 }
 
 /* Under the lock: the batch's content goes where the farm's goes. */
-static int merge(struct crew *c, struct batch *b)
+static int merge(struct thread_pool *c, struct batch *b)
 {
 	const struct plan *p = c->run->plan;
 	c->run->cpu_seconds += b->cpu_seconds;
@@ -83,7 +83,7 @@ static int merge(struct crew *c, struct batch *b)
 	return 0;
 }
 
-static int lease(struct crew *c, uint32_t index)
+static int lease(struct thread_pool *c, uint32_t index)
 {
 	const struct plan *p = c->run->plan;
 	struct lease_key k = {.kind = c->kind, .group = index / p->parts, .part = index % p->parts, .epoch = c->epoch};
@@ -120,7 +120,7 @@ static int lease(struct crew *c, uint32_t index)
 
 static void *work(void *arg)
 {
-	struct crew *c = arg;
+	struct thread_pool *c = arg;
 	crash_thread();
 	for (;;) {
 		pthread_mutex_lock(&c->lock);
@@ -133,7 +133,7 @@ static void *work(void *arg)
 }
 
 /* All leases of one phase on all threads. */
-static int phase(struct crew *c, enum lease_kind kind, uint64_t epoch)
+static int phase(struct thread_pool *c, enum lease_kind kind, uint64_t epoch)
 {
 	enum { THREADS_MAX = 1024 };
 	pthread_t threads[THREADS_MAX];
@@ -142,7 +142,7 @@ static int phase(struct crew *c, enum lease_kind kind, uint64_t epoch)
 	c->epoch = epoch;
 	c->next = 0;
 	c->leases = c->run->plan->groups * c->run->plan->parts;
-	/* This thread is one of the crew, so that the phase ends even where no other can be made. */
+	/* This thread is one of the thread pool, so that the phase ends even where no other can be made. */
 	while (started + 1 < wanted && pthread_create(&threads[started], NULL, work, c) == 0)
 		started++;
 	work(c);
@@ -151,7 +151,7 @@ static int phase(struct crew *c, enum lease_kind kind, uint64_t epoch)
 	return c->rc;
 }
 
-static int begin_rounds(struct crew *c)
+static int begin_rounds(struct thread_pool *c)
 {
 	struct local_run *r = c->run;
 	const struct plan *p = r->plan;
@@ -167,7 +167,7 @@ static int begin_rounds(struct crew *c)
 	return 0;
 }
 
-static int look(struct crew *c, uint64_t rounds, enum merge_end *end)
+static int look(struct thread_pool *c, uint64_t rounds, enum merge_end *end)
 {
 	struct local_run *r = c->run;
 	struct canvas_image img;
@@ -193,7 +193,7 @@ static int look(struct crew *c, uint64_t rounds, enum merge_end *end)
 }
 
 /* The bootstrap, and what the rounds begin with. */
-static int run_bootstrap(struct crew *c)
+static int run_bootstrap(struct thread_pool *c)
 {
 	struct local_run *r = c->run;
 	int rc = phase(c, LEASE_BOOTSTRAP, 0);
@@ -210,9 +210,9 @@ static int run_bootstrap(struct crew *c)
 /* On errors the canvas goes: what it holds cannot be trusted. */
 static int fail(struct local_job *j, int rc, struct error *e)
 {
-	*e = j->crew.error;
-	canvas_free(j->crew.run->canvas);
-	j->crew.run->canvas = NULL;
+	*e = j->thread_pool.error;
+	canvas_free(j->thread_pool.run->canvas);
+	j->thread_pool.run->canvas = NULL;
 	return rc;
 }
 
@@ -222,7 +222,7 @@ int local_start(struct local_run *r, struct local_job **out, struct error *e)
 	struct local_job *j = *out = mem_alloc(1, sizeof *j);
 	if (!j)
 		return error_set(e, ENOMEM, "no memory for a job");
-	struct crew *c = &j->crew;
+	struct thread_pool *c = &j->thread_pool;
 	c->run = r;
 	pthread_mutex_init(&c->lock, NULL);
 	r->canvas = NULL;
@@ -246,7 +246,7 @@ int local_start(struct local_run *r, struct local_job **out, struct error *e)
 
 int local_step(struct local_job *j, struct error *e)
 {
-	struct crew *c = &j->crew;
+	struct thread_pool *c = &j->thread_pool;
 	if (!c->run->canvas || c->run->lit.black || stopped(c))
 		return 0;
 	int rc = phase(c, LEASE_RENDER, canvas_rounds(c->run->canvas));
@@ -256,7 +256,7 @@ int local_step(struct local_job *j, struct error *e)
 
 void local_end(struct local_job *j)
 {
-	struct crew *c = &j->crew;
+	struct thread_pool *c = &j->thread_pool;
 	const struct plan *p = c->run->plan;
 	for (uint32_t i = 0; c->states && i < p->groups * p->parts; i++)
 		free_states(c->states[i], chains_of(p, i % p->parts));
@@ -273,16 +273,16 @@ int local_run(struct local_run *r, struct error *e)
 	int rc = local_start(r, &j, e);
 	if (rc)
 		return rc;
-	while (!rc && r->canvas && r->end == MERGE_GOES_ON && !stopped(&j->crew)) {
+	while (!rc && r->canvas && r->end == MERGE_GOES_ON && !stopped(&j->thread_pool)) {
 		uint64_t before = canvas_rounds(r->canvas);
 		rc = local_step(j, e);
 		if (rc || canvas_rounds(r->canvas) == before)
 			break;
-		rc = look(&j->crew, before + 1, &r->end);
+		rc = look(&j->thread_pool, before + 1, &r->end);
 		if (rc)
 			fail(j, rc, e);
 	}
-	r->seconds = since(&j->crew.begin);
+	r->seconds = since(&j->thread_pool.begin);
 	local_end(j);
 	return rc;
 }

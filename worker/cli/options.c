@@ -2,7 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "worker/render/knobs.h"
+#include "worker/render/accuracy_settings.h"
 #include "worker/scene/spelling.h"
 
 #include <stdio.h>
@@ -149,14 +149,14 @@ static void take_mutations(struct render_arguments *a, const char *arg, const st
 	a->mixture = arg;
 }
 
-/* Every knob, its default, its range and what it does. */
-static void list_knobs(void)
+/* Every setting, its default, its range and what it does. */
+static void list_settings(void)
 {
-	const struct render_knob *k;
-	for (size_t i = 0; (k = render_knob_at(i)) != NULL; i++) {
+	const struct render_setting *k;
+	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
 		char standard[32], range[80];
-		knobs_value(&knobs_default, i, standard, sizeof standard);
-		render_knob_range(k, range, sizeof range);
+		accuracy_settings_value(&accuracy_settings_default, i, standard, sizeof standard);
+		render_setting_range(k, range, sizeof range);
 		printf("%s=%s (%s)\n    %s\n", k->name, standard, range, k->summary);
 	}
 	exit(0);
@@ -164,14 +164,14 @@ static void list_knobs(void)
 
 static void take_set(struct render_arguments *a, const char *arg, const struct argp_state *state)
 {
-	char all[2 * PLAN_KNOBS_MAX];
+	char all[2 * PLAN_ACCURACY_MAX];
 	struct error e;
 	if (strcmp(arg, "help") == 0)
-		list_knobs();
-	int n = snprintf(all, sizeof all, "%s%s%s", a->render.knobs, *a->render.knobs ? "," : "", arg);
+		list_settings();
+	int n = snprintf(all, sizeof all, "%s%s%s", a->render.accuracy, *a->render.accuracy ? "," : "", arg);
 	if (n < 0 || (size_t)n >= sizeof all)
 		argp_error(state, "--set: the text is too long");
-	if (render_knobs_canonical(all, a->render.knobs, &e))
+	if (render_settings_canonical(all, a->render.accuracy, &e))
 		argp_error(state, "--set: %s", e.text);
 }
 
@@ -320,10 +320,10 @@ static char *help(int key, const char *text, void *input)
 			used += n < 0 ? 0 : (size_t)n;
 		}
 	} else if (key == OPTION_SET) {
-		const struct render_knob *k;
-		for (size_t i = 0; (k = render_knob_at(i)) != NULL && used < sizeof names; i++) {
+		const struct render_setting *k;
+		for (size_t i = 0; (k = render_setting_at(i)) != NULL && used < sizeof names; i++) {
 			char standard[32];
-			knobs_value(&knobs_default, i, standard, sizeof standard);
+			accuracy_settings_value(&accuracy_settings_default, i, standard, sizeof standard);
 			int n = snprintf(names + used, sizeof names - used, "%s%s=%s", i == 0 ? "" : ", ", k->name, standard);
 			used += n < 0 ? 0 : (size_t)n;
 		}
@@ -355,7 +355,7 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 		p->crop_width = s->crop_width;
 		p->crop_height = s->crop_height;
 	}
-	memcpy(p->knobs, a->render.knobs, sizeof p->knobs);
+	memcpy(p->accuracy, a->render.accuracy, sizeof p->accuracy);
 	memcpy(p->effects, a->render.effects, sizeof p->effects);
 	if (!p->min_depth)
 		p->min_depth = s->hide_emitters ? 2 : 1;

@@ -2,7 +2,7 @@
 
 #include "common/base/mem.h"
 #include "common/film/image_file.h"
-#include "worker/cli/page.h"
+#include "worker/cli/text_file.h"
 #include "worker/cli/plot_axis.h"
 
 #include <fcntl.h>
@@ -22,71 +22,71 @@ enum { OUTPUT_MAX = 1 << 26 };
 extern char **environ;
 
 /* In single quotes gnuplot takes nothing for its own but the quote itself; a line cannot go on there, so controls are blanks. */
-static void put_quoted(struct page *s, const char *text)
+static void put_quoted(struct text_file *s, const char *text)
 {
 	enum { LONGEST = 400 };
 	const char *end = text + strlen(text);
-	page_bytes(s, "'", 1);
+	text_file_bytes(s, "'", 1);
 	for (size_t done = 0; text < end && done < LONGEST; done++) {
-		size_t n = page_character(text);
+		size_t n = text_file_character(text);
 		if (n == 0 || *text == '\t' || *text == '\n')
-			page_bytes(s, *text > 0 ? " " : "?", 1);
+			text_file_bytes(s, *text > 0 ? " " : "?", 1);
 		else if (*text == '\'')
-			page_bytes(s, "''", 2);
+			text_file_bytes(s, "''", 2);
 		else
-			page_bytes(s, text, n);
+			text_file_bytes(s, text, n);
 		text += n ? n : 1;
 	}
-	page_bytes(s, "'", 1);
+	text_file_bytes(s, "'", 1);
 }
 
 /* Blue, vermilion, green, purple, orange, sky (Okabe and Ito 2008): apart for every kind of eyes, on white and in print. */
 static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#aa4499", "#e69f00", "#56b4e9"};
 static const int shapes[] = {7, 5, 9, 13, 11, 4};
 
-static void put_axis(struct page *s, char which, const struct plot_axis *a, const char *label)
+static void put_axis(struct text_file *s, char which, const struct plot_axis *a, const char *label)
 {
-	page_put(s, "set %clabel ", which);
+	text_file_put(s, "set %clabel ", which);
 	put_quoted(s, label);
-	page_put(s, "\nset %crange [%.9g:%.9g]\n", which, a->low, a->high);
+	text_file_put(s, "\nset %crange [%.9g:%.9g]\n", which, a->low, a->high);
 	if (!a->log)
 		return;
-	page_put(s, "set logscale %c\nset %ctics (", which, which);
+	text_file_put(s, "set logscale %c\nset %ctics (", which, which);
 	for (size_t i = 0; i < a->tic_count; i++)
-		page_put(s, "%s'%.6g' %.9g", i ? "," : "", a->tic[i], a->tic[i]);
-	page_put(s, ")\n");
+		text_file_put(s, "%s'%.6g' %.9g", i ? "," : "", a->tic[i], a->tic[i]);
+	text_file_put(s, ")\n");
 }
 
-static void put_names(struct page *s, const struct plot *p)
+static void put_names(struct text_file *s, const struct plot *p)
 {
 	if (!p->x_names)
 		return;
-	page_put(s, "set xrange [0.5:%zu.5]\nset xtics (", p->x_name_count);
+	text_file_put(s, "set xrange [0.5:%zu.5]\nset xtics (", p->x_name_count);
 	for (size_t i = 0; i < p->x_name_count; i++) {
-		page_put(s, i ? "," : "");
+		text_file_put(s, i ? "," : "");
 		put_quoted(s, p->x_names[i]);
-		page_put(s, " %zu", i + 1);
+		text_file_put(s, " %zu", i + 1);
 	}
-	page_put(s, ")\n");
+	text_file_put(s, ")\n");
 }
 
-static void put_style(struct page *s, bool png, uint64_t name)
+static void put_style(struct text_file *s, bool png, uint64_t name)
 {
 	if (png)
-		page_put(s, "set terminal pngcairo noenhanced size 1440,880 fontscale 1.7 linewidth 1.6 pointscale 1.7 font 'DejaVu Sans,11' "
+		text_file_put(s, "set terminal pngcairo noenhanced size 1440,880 fontscale 1.7 linewidth 1.6 pointscale 1.7 font 'DejaVu Sans,11' "
 		       "background '#ffffff'\n");
 	else
-		page_put(s, "set terminal svg noenhanced size 720,440 name 'p%016llx' font 'DejaVu Sans,Verdana,Helvetica,Arial,sans-serif,13' "
+		text_file_put(s, "set terminal svg noenhanced size 720,440 name 'p%016llx' font 'DejaVu Sans,Verdana,Helvetica,Arial,sans-serif,13' "
 		       "background '#ffffff'\n", (unsigned long long)name);
-	page_put(s, "set encoding utf8\nset border 3 lw 1 lc rgb '#555555'\nset tics out nomirror scale 0.6 textcolor rgb '#222222'\n"
+	text_file_put(s, "set encoding utf8\nset border 3 lw 1 lc rgb '#555555'\nset tics out nomirror scale 0.6 textcolor rgb '#222222'\n"
 	       "set xzeroaxis lt 1 lw 1 lc rgb '#777777'\nset grid lc rgb '#dddddd' lt 1 lw 0.8\nset key tmargin center horizontal reverse Left noautotitle samplen 2 width 2 textcolor rgb '#222222'\n"
 	       "set style fill transparent solid 0.2 noborder\nset bars 0.6\nset format '%%.6g'\n");
 }
 
-static void put_data(struct page *s, const struct plot *p, const struct plot_axis *y_axis, size_t k)
+static void put_data(struct text_file *s, const struct plot *p, const struct plot_axis *y_axis, size_t k)
 {
 	const struct plot_series *r = &p->series[k];
-	page_put(s, "$d%zu << EOD\n", k);
+	text_file_put(s, "$d%zu << EOD\n", k);
 	for (size_t i = 0; i < r->count; i++) {
 		if (!plot_point_shown(p, r, i))
 			continue;
@@ -94,15 +94,15 @@ static void put_data(struct page *s, const struct plot *p, const struct plot_axi
 		bool bars = r->low && r->high && isfinite(r->low[i]) && isfinite(r->high[i]) && (!p->log_y || r->high[i] > 0);
 		double low = bars ? r->low[i] : y, high = bars ? r->high[i] : y;
 		/* On a logarithmic axis a bar that reaches 0 goes to the edge. */
-		page_put(s, "%.9g %.9g %.9g %.9g\n", r->x[i], y, p->log_y && !(low > y_axis->low) ? y_axis->low : low, high);
+		text_file_put(s, "%.9g %.9g %.9g %.9g\n", r->x[i], y, p->log_y && !(low > y_axis->low) ? y_axis->low : low, high);
 	}
-	page_put(s, "EOD\n");
+	text_file_put(s, "EOD\n");
 	for (size_t i = 0; r->labels && i < r->count; i++) {
 		if (!r->labels[i] || !*r->labels[i] || !plot_point_shown(p, r, i))
 			continue;
-		page_put(s, "set label ");
+		text_file_put(s, "set label ");
 		put_quoted(s, r->labels[i]);
-		page_put(s, " at %.9g,%.9g left offset character 0.7,0.5 textcolor rgb '#444444' front\n", r->x[i], r->y ? r->y[i] : r->low[i]);
+		text_file_put(s, " at %.9g,%.9g left offset character 0.7,0.5 textcolor rgb '#444444' front\n", r->x[i], r->y ? r->y[i] : r->low[i]);
 	}
 }
 
@@ -114,22 +114,22 @@ static bool has_points(const struct plot *p, size_t k)
 	return false;
 }
 
-static void put_series(struct page *s, const struct plot *p, size_t k)
+static void put_series(struct text_file *s, const struct plot *p, size_t k)
 {
 	const struct plot_series *r = &p->series[k];
 	const char *colour = colours[k % (sizeof colours / sizeof *colours)];
 	int shape = shapes[k % (sizeof shapes / sizeof *shapes)];
 	if (r->style != PLOT_BAND && r->low && r->high)
-		page_put(s, "$d%zu using 1:2:3:4 with yerrorbars pt 0 lw 1.4 lc rgb '%s', ", k, colour);
-	page_put(s, "$d%zu using ", k);
+		text_file_put(s, "$d%zu using 1:2:3:4 with yerrorbars pt 0 lw 1.4 lc rgb '%s', ", k, colour);
+	text_file_put(s, "$d%zu using ", k);
 	if (r->style == PLOT_BAND)
-		page_put(s, "1:3:4 with filledcurves lc rgb '%s'", colour);
+		text_file_put(s, "1:3:4 with filledcurves lc rgb '%s'", colour);
 	else if (r->style == PLOT_LINE)
-		page_put(s, "1:2 with lines lw 2 lc rgb '%s'", colour);
+		text_file_put(s, "1:2 with lines lw 2 lc rgb '%s'", colour);
 	else
-		page_put(s, "1:2 with points pt %d ps 0.8 lc rgb '%s'", shape, colour);
+		text_file_put(s, "1:2 with points pt %d ps 0.8 lc rgb '%s'", shape, colour);
 	if (*r->name) {
-		page_put(s, " title ");
+		text_file_put(s, " title ");
 		put_quoted(s, r->name);
 	}
 }
@@ -142,15 +142,15 @@ static uint64_t hash(const struct buf *b)
 	return h;
 }
 
-static int write_script(struct page *s, const struct plot *p, bool png, struct error *e)
+static int write_script(struct text_file *s, const struct plot *p, bool png, struct error *e)
 {
 	struct plot_axis x, y;
-	struct page body = {.full = false};
+	struct text_file body = {.full = false};
 	if (!plot_axes(p, &x, &y))
 		return error_set(e, EINVAL, "the plot '%.80s' has no point that could be shown", p->title);
-	page_put(&body, "set title ");
+	text_file_put(&body, "set title ");
 	put_quoted(&body, p->title);
-	page_put(&body, "\n");
+	text_file_put(&body, "\n");
 	put_axis(&body, 'x', &x, p->x_label);
 	put_axis(&body, 'y', &y, p->y_label);
 	put_names(&body, p);
@@ -159,15 +159,15 @@ static int write_script(struct page *s, const struct plot *p, bool png, struct e
 	for (size_t k = 0, shown = 0; k < p->series_count; k++) {
 		if (!has_points(p, k))
 			continue;
-		page_put(&body, shown++ ? ", " : "plot ");
+		text_file_put(&body, shown++ ? ", " : "plot ");
 		put_series(&body, p, k);
 	}
-	page_put(&body, "\n");
+	text_file_put(&body, "\n");
 	/* Plots in one page have names of their own for their parts: from what they show, so that they stay the same. */
 	put_style(s, png, hash(&body.text));
-	page_bytes(s, body.text.bytes, body.text.size);
+	text_file_bytes(s, body.text.bytes, body.text.size);
 	s->full = s->full || body.full;
-	page_fini(&body);
+	text_file_fini(&body);
 	return s->full ? error_set(e, ENOMEM, "the plot '%.80s' has too many points", p->title) : 0;
 }
 
@@ -257,7 +257,7 @@ static bool feed(int fd, const struct buf *b)
 static int draw(const struct plot *p, bool png, char **bytes, size_t *size, struct error *e)
 {
 	static const char *const names[3] = {"plot-script", "plot-output", "plot-errors"};
-	struct page s = {.full = false};
+	struct text_file s = {.full = false};
 	int fd[3] = {-1, -1, -1};
 	int rc = write_script(&s, p, png, e);
 	for (int i = 0; !rc && i < 3; i++) {
@@ -277,7 +277,7 @@ static int draw(const struct plot *p, bool png, char **bytes, size_t *size, stru
 	for (int i = 0; i < 3; i++)
 		if (fd[i] >= 0)
 			close(fd[i]);
-	page_fini(&s);
+	text_file_fini(&s);
 	return rc;
 }
 

@@ -1,6 +1,6 @@
 #include "worker/cli/stats.h"
 
-#include "common/film/agreement_json.h"
+#include "common/film/convergence_json.h"
 #include "common/film/forecast_json.h"
 #include "common/film/image_file.h"
 #include "common/film/stated_error.h"
@@ -68,9 +68,9 @@ static json_t *end_json(const struct stats *s)
 	char note[STRATEGY_NOTE];
 	strategy_note(p, &s->image->counts, s->image->black, note, sizeof note);
 	strategy_add_beyond(s->image->beyond_share, note, sizeof note);
-	agreement_add_note(s->agreement, note, sizeof note);
+	convergence_add_note(s->agreement, note, sizeof note);
 	return json_pack("{s:s s:s s:o s:s s:o s:o}", "end", merge_end_name(s->run->end, s->run->lit.black), "mixture", p->mutations, "strategies",
-			 strategy_to_json(p->mutations, &s->image->counts), "note", note, "agreement", agreement_to_json(s->agreement),
+			 strategy_to_json(p->mutations, &s->image->counts), "note", note, "agreement", convergence_to_json(s->agreement),
 			 "classes", classes_to_json(s->image->classes));
 }
 

@@ -4,7 +4,7 @@
 #ifndef WORKER_CLI_STATS_H
 #define WORKER_CLI_STATS_H
 
-#include "common/film/agreement.h"
+#include "common/film/convergence.h"
 #include "common/film/forecast.h"
 #include "worker/cli/choice.h"
 #include "worker/cli/local.h"
@@ -14,7 +14,7 @@ struct stats {
 	const struct render_summary *summary;
 	const struct local_run *run; /* has ended */
 	const struct canvas_image *image;
-	const struct agreement *agreement; /* of the image */
+	const struct convergence *agreement; /* of the image */
 	double build_seconds; /* of the world */
 	const struct forecast_history *looks;
 	const struct choice *choice; /* of the integrator */

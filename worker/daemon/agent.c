@@ -104,7 +104,7 @@ static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
 		log_event(LOG_PEER_FAULT, "text=%s", log_quote(ack->text).text);
 	uv_timer_start(&a->heartbeat, on_heartbeat, ms, ms);
 	conn_set_quiet(a->conn, 6e-3 * (double)ms + 1);
-	desk_welcome(a);
+	lease_queue_welcome(a);
 }
 
 static void on_message(void *user, struct envelope *env, const unsigned char *payload, size_t size)
@@ -115,7 +115,7 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 		log_event(LOG_PEER_FAULT, "text=%s", log_quote(m->fault->text).text);
 		conn_close(a->conn, m->fault->text);
 	} else if (a->welcome) {
-		desk_message(a, env, payload, size);
+		lease_queue_message(a, env, payload, size);
 	} else if (m->body_case == FARM__ENVELOPE__BODY_HELLO_ACK) {
 		take_hello_ack(a, m->hello_ack);
 	} else {
@@ -192,14 +192,14 @@ static void on_grace_over(uv_timer_t *t)
 {
 	struct agent *a = t->data;
 	log_event(LOG_STOP, "text=\"the grace period is over: unfinished leases are given up\"");
-	desk_stop_all(a);
+	lease_queue_stop_all(a);
 	uv_timer_start(&a->grace, on_linger_over, (uint64_t)(1000 * linger_seconds), 0);
 	agent_settle(a);
 }
 
 void agent_settle(struct agent *a)
 {
-	if (a->leaving && !a->gone && desk_is_idle(a))
+	if (a->leaving && !a->gone && lease_queue_is_idle(a))
 		go(a);
 }
 
@@ -207,7 +207,7 @@ static void leave(struct agent *a)
 {
 	notify_send("STOPPING=1");
 	a->leaving = true;
-	desk_leave(a);
+	lease_queue_leave(a);
 	uv_timer_start(&a->grace, on_grace_over, (uint64_t)(1000 * a->config.grace_seconds), 0);
 	agent_settle(a);
 }
@@ -215,7 +215,7 @@ static void leave(struct agent *a)
 static void on_watch(uv_timer_t *t)
 {
 	struct agent *a = t->data;
-	if (!desk_watch(a))
+	if (!lease_queue_watch(a))
 		return;
 	log_event(LOG_STOP, "text=\"a thread hangs: the others finish, and the worker ends to be started again\"");
 	a->hung = true;
@@ -296,7 +296,7 @@ static int start(struct agent *a, struct error *e)
 	rc = uv_loop_init(&a->loop);
 	if (rc)
 		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
-	rc = crew_new(&a->crew, &a->loop, a->config.threads, e);
+	rc = thread_pool_new(&a->thread_pool, &a->loop, a->config.threads, e);
 	if (rc) {
 		uv_run(&a->loop, UV_RUN_DEFAULT);
 		uv_loop_close(&a->loop);
@@ -333,12 +333,12 @@ int agent_open(struct agent **out, const struct agent_config *c, struct error *e
 void agent_close(struct agent *a)
 {
 	go(a);
-	crew_close(a->crew);
+	thread_pool_close(a->thread_pool);
 	uv_run(&a->loop, UV_RUN_DEFAULT);
 	int closed = uv_loop_close(&a->loop);
 	assert(closed == 0);
 	(void)closed;
-	desk_close(a);
+	lease_queue_close(a);
 	cache_close(&a->cache);
 	tls_close(a->tls);
 	mem_free(a);
@@ -353,7 +353,7 @@ int agent_run(const struct agent_config *c, struct error *e)
 	notify_send("READY=1"); /* it may wait for its coordinator for long */
 	while (!a->gone || a->conn)
 		uv_run(&a->loop, UV_RUN_ONCE);
-	if (a->hung || crew_pending(a->crew)) /* nobody can wait for its threads; what was to be said has been sent */
+	if (a->hung || thread_pool_pending(a->thread_pool)) /* nobody can wait for its threads; what was to be said has been sent */
 		_exit(a->hung ? AGENT_HUNG : a->refused ? AGENT_REFUSED : 0);
 	int refused = a->refused ? error_set(e, EACCES, "%s refuses: %s", a->config.coordinator, a->why) : 0;
 	agent_close(a);

@@ -1,5 +1,5 @@
 /*
- * The worker daemon: one loop thread that owns all state, a crew of render threads. Connects, asks for leases, fetches
+ * The worker daemon: one loop thread that owns all state, a thread pool of render threads. Connects, asks for leases, fetches
  * what it needs, sends results and keeps them until they are acknowledged; reconnects for ever,
  * unless it is refused for good. On SIGTERM it finishes
  * what runs within the grace period, or gives it up, and leaves. Tells the service manager what it waits to hear

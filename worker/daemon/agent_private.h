@@ -1,4 +1,4 @@
-/* The daemon's state, for its two halves: agent.c (connection, life) and desk.c (jobs and leases). */
+/* The daemon's state, for its two halves: agent.c (connection, life) and lease_queue.c (jobs and leases). */
 #ifndef WORKER_DAEMON_AGENT_PRIVATE_H
 #define WORKER_DAEMON_AGENT_PRIVATE_H
 
@@ -22,8 +22,8 @@ struct agent {
 	double back_off;   /* s before the next attempt */
 	char fingerprint[FINGERPRINT_MAX];
 	struct cache cache;
-	struct crew *crew;
-	struct bundle *bundles;
+	struct thread_pool *thread_pool;
+	struct job_cache *bundles;
 	struct fetch *fetches;
 	struct lease_task *leases;
 	uint64_t clock; /* of uses of bundles */
@@ -34,7 +34,7 @@ struct agent {
 	bool leaving, gone;
 	bool refused; /* for good */
 	char why[256];
-	bool hung; /* a thread of the crew is */
+	bool hung; /* a thread of the thread pool is */
 };
 
 /* agent.c */
@@ -44,14 +44,14 @@ void agent_send(struct agent *a, const Farm__Envelope *m);
 /* Leaves when nothing is left to do. */
 void agent_settle(struct agent *a);
 
-/* desk.c */
-void desk_welcome(struct agent *a); /* (re)connected: asks for work, offers what is still unsent */
-void desk_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size);
-void desk_leave(struct agent *a);      /* gives back what has not begun */
-void desk_stop_all(struct agent *a);   /* gives up what runs */
+/* lease_queue.c */
+void lease_queue_welcome(struct agent *a); /* (re)connected: asks for work, offers what is still unsent */
+void lease_queue_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size);
+void lease_queue_leave(struct agent *a);      /* gives back what has not begun */
+void lease_queue_stop_all(struct agent *a);   /* gives up what runs */
 enum { STALL_LOOKS = 8 }; /* without progress, until a thread hangs */
-bool desk_watch(struct agent *a);      /* true: a thread hangs that did not at the last look */
-bool desk_is_idle(const struct agent *a); /* no lease is at work, none waits to be acknowledged */
-void desk_close(struct agent *a);      /* after the crew has been closed */
+bool lease_queue_watch(struct agent *a);      /* true: a thread hangs that did not at the last look */
+bool lease_queue_is_idle(const struct agent *a); /* no lease is at work, none waits to be acknowledged */
+void lease_queue_close(struct agent *a);      /* after the thread pool has been closed */
 
 #endif

@@ -6,12 +6,12 @@
 #define WORKER_DAEMON_CACHE_H
 
 #include "common/blob/blob.h"
-#include "worker/daemon/life.h"
+#include "worker/daemon/worker_identity.h"
 
 struct cache {
 	struct blob_store *blobs;
 	int lock;
-	struct life life; /* of the slot */
+	struct worker_identity life; /* of the slot */
 };
 
 /* folder NULL: $XDG_CACHE_HOME/hslt or ~/.cache/hslt. limit: bytes of one slot. */

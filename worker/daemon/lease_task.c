@@ -8,7 +8,7 @@
 #include <string.h>
 #include <unistd.h>
 
-int lease_task_new(struct lease_task **out, struct grant *g, struct bundle *b, struct error *e)
+int lease_task_new(struct lease_task **out, struct grant *g, struct job_cache *b, struct error *e)
 {
 	struct lease_task *l = mem_alloc(1, sizeof *l);
 	if (!l)
@@ -125,10 +125,10 @@ static void done(struct task *t)
 	l->finished(l);
 }
 
-void lease_task_start(struct lease_task *l, struct crew *c)
+void lease_task_start(struct lease_task *l, struct thread_pool *c)
 {
 	l->state = LEASE_QUEUED;
 	l->task.run = run;
 	l->task.done = done;
-	crew_add(c, &l->task);
+	thread_pool_add(c, &l->task);
 }

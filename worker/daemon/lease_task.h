@@ -1,12 +1,12 @@
 /*
- * A lease in a worker's hands: from the grant through a thread of the crew to the frame that carries its result, which is
+ * A lease in a worker's hands: from the grant through a thread of the thread pool to the frame that carries its result, which is
  * kept until the coordinator has acknowledged it. Loop's thread, but for the run itself.
  */
 #ifndef WORKER_DAEMON_LEASE_TASK_H
 #define WORKER_DAEMON_LEASE_TASK_H
 
 #include "common/wire/batch_wire.h"
-#include "worker/daemon/bundle.h"
+#include "worker/daemon/job_cache.h"
 
 #include <stdatomic.h>
 
@@ -20,7 +20,7 @@ struct lease_task {
 	struct task task;
 	struct lease_task *next;
 	struct grant grant;
-	struct bundle *bundle;
+	struct job_cache *bundle;
 	enum lease_task_state state;
 	atomic_bool stop;
 	bool hangs;    /* tests: it never ends */
@@ -39,8 +39,8 @@ struct lease_task {
 	void (*finished)(struct lease_task *);
 };
 
-int lease_task_new(struct lease_task **l, struct grant *g, struct bundle *b, struct error *e); /* takes the grant */
+int lease_task_new(struct lease_task **l, struct grant *g, struct job_cache *b, struct error *e); /* takes the grant */
 void lease_task_free(struct lease_task *l); /* not while a thread has it */
-void lease_task_start(struct lease_task *l, struct crew *c);
+void lease_task_start(struct lease_task *l, struct thread_pool *c);
 
 #endif

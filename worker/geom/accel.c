@@ -1,7 +1,7 @@
 #include "worker/geom/accel.h"
 
 #include "common/base/mem.h"
-#include "common/base/tick.h"
+#include "common/base/liveness.h"
 #include "worker/geom/solved.h"
 #include "worker/geom/triangle.h"
 #include "worker/math/fptrap.h"

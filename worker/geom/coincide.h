@@ -8,7 +8,7 @@
  * of one shape that does not shine are left as they are: it does not matter which of them is met. Work and memory are bounded in
  * proportion to the number of triangles; where that does not do, what was found holds and `incomplete` says so.
  *
- * What was found is immutable: any thread. Finding allocates and ticks (common/base/tick.h); asking does not.
+ * What was found is immutable: any thread. Finding allocates and ticks (common/base/liveness.h); asking does not.
  */
 #ifndef WORKER_GEOM_COINCIDE_H
 #define WORKER_GEOM_COINCIDE_H

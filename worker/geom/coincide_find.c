@@ -6,7 +6,7 @@
 #include "worker/geom/coincide.h"
 
 #include "common/base/mem.h"
-#include "common/base/tick.h"
+#include "common/base/liveness.h"
 
 #include <stdlib.h>
 

@@ -18,8 +18,8 @@
 #define WORKER_HALFVEC_CONSTRAINT_H
 
 #include "worker/math/mat2.h"
-#include "worker/path/whole.h"
-#include "worker/render/knobs.h"
+#include "worker/path/full_path.h"
+#include "worker/render/accuracy_settings.h"
 
 struct constraint {
 	vec2 h;
@@ -27,9 +27,9 @@ struct constraint {
 };
 
 /* Constraints of the inner vertices c+1..b-1 of x, k[j] for vertex j. Needs edges c..b-1 joined and the inner modes. */
-void constraints_of(const struct world *w, const struct whole_path *x, unsigned b, unsigned c, struct constraint *k);
+void constraints_of(const struct world *w, const struct full_path_path *x, unsigned b, unsigned c, struct constraint *k);
 /* h alone. */
-vec2 halfvec_of(const struct whole_path *x, unsigned j);
+vec2 halfvec_of(const struct full_path_path *x, unsigned j);
 
 /*
  * The block tridiagonal system of the vertices c+1..b-1 between the fixed ends x_b and x_c (b - c >= 2):
@@ -40,26 +40,26 @@ vec2 halfvec_of(const struct whole_path *x, unsigned j);
 enum constraint_end { CONSTRAINT_OK, CONSTRAINT_SINGULAR };
 
 struct constraint_factors {
-	mat2 inverse[WHOLE_MAX_VERTICES]; /* of L_j, by vertex */
-	double det[WHOLE_MAX_VERTICES];   /* of L_j */
+	mat2 inverse[FULL_PATH_MAX_VERTICES]; /* of L_j, by vertex */
+	double det[FULL_PATH_MAX_VERTICES];   /* of L_j */
 	/* banded factors, when pivoted: the layout is constraint_system.inc's */
-	double band[2 * WHOLE_MAX_VERTICES][10];
+	double band[2 * FULL_PATH_MAX_VERTICES][10];
 };
 
 struct constraint_single {
 	mat2_single a, b, c;
 };
 struct constraint_factors_single {
-	mat2_single inverse[WHOLE_MAX_VERTICES];
-	float det[WHOLE_MAX_VERTICES];
-	float band[2 * WHOLE_MAX_VERTICES][10];
-	struct constraint_single k[WHOLE_MAX_VERTICES]; /* what was factored */
+	mat2_single inverse[FULL_PATH_MAX_VERTICES];
+	float det[FULL_PATH_MAX_VERTICES];
+	float band[2 * FULL_PATH_MAX_VERTICES][10];
+	struct constraint_single k[FULL_PATH_MAX_VERTICES]; /* what was factored */
 };
 
 struct constraint_system {
 	unsigned b, c;
 	bool pivoted;
-	unsigned char order[2 * WHOLE_MAX_VERTICES]; /* of the banded factors */
+	unsigned char order[2 * FULL_PATH_MAX_VERTICES]; /* of the banded factors */
 	double log_det;      /* log |det M| */
 	double log_transfer; /* log |det d x_{b-1} / d x_c| with all h held: prod |det a_j| / |det M| */
 	union {
@@ -81,9 +81,9 @@ struct constraint_solver {
 };
 extern const struct constraint_solver constraint_double, constraint_single;
 
-static inline const struct constraint_solver *constraint_solver_of(const struct knobs *k)
+static inline const struct constraint_solver *constraint_solver_of(const struct accuracy_settings *k)
 {
-	return k->precision == KNOB_SINGLE ? &constraint_single : &constraint_double;
+	return k->precision == SETTING_SINGLE ? &constraint_single : &constraint_double;
 }
 
 #endif

@@ -44,7 +44,7 @@ static enum constraint_end factor_single_to_solve(const struct constraint *k, un
 static void solve_single(const struct constraint *k, const struct constraint_system *m, const vec2 *dh, vec2 *dx)
 {
 	(void)k;
-	vec2_single right[WHOLE_MAX_VERTICES], x[WHOLE_MAX_VERTICES];
+	vec2_single right[FULL_PATH_MAX_VERTICES], x[FULL_PATH_MAX_VERTICES];
 	double largest = 0;
 	for (unsigned j = m->c + 1; j < m->b; j++)
 		largest = fmax(largest, fmax(fabs(dh[j].x), fabs(dh[j].y)));
@@ -58,8 +58,8 @@ static void solve_single(const struct constraint *k, const struct constraint_sys
 
 static enum constraint_end differentials_single(const struct constraint *k, unsigned b, unsigned c, mat2 *d)
 {
-	struct constraint_single narrow[WHOLE_MAX_VERTICES];
-	mat2_single out[WHOLE_MAX_VERTICES];
+	struct constraint_single narrow[FULL_PATH_MAX_VERTICES];
+	mat2_single out[FULL_PATH_MAX_VERTICES];
 	narrow_down(k, b, c, narrow);
 	if (differentials(narrow, b, c, out) != CONSTRAINT_OK)
 		return CONSTRAINT_SINGULAR;

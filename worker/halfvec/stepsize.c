@@ -22,13 +22,13 @@ double halfvec_lobe_width(const struct path_vertex *v)
 
 static double bsdf_limit(const struct path_context *c, const struct path_vertex *v)
 {
-	return c->w->knobs.step_scale * halfvec_lobe_width(v) / sqrt(M_PI);
+	return c->w->accuracy.step_scale * halfvec_lobe_width(v) / sqrt(M_PI);
 }
 
 /* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale a pixel, meet the plane of the geometric normal. */
-static bool pixel_footprint(const struct camera *camera, const struct whole_path *x, mat2 *j)
+static bool pixel_footprint(const struct camera *camera, const struct full_path_path *x, mat2 *j)
 {
-	const struct whole_edge *e = &x->edge[x->edges - 1];
+	const struct full_path_edge *e = &x->edge[x->edges - 1];
 	const struct surface_point *at = &x->v[x->edges - 1].x;
 	vec3 w = vec3_neg(e->w), du, dv, d[2];
 	double depth = sqrt(e->distance2) * vec3_dot(camera->axes.n, w), cosine = vec3_dot(at->ng, w);
@@ -84,17 +84,17 @@ struct halfvec_step halfvec_step_of(mat2 e, double scale, double limit)
 	return s;
 }
 
-void halfvec_steps(const struct path_context *c, const struct whole_path *x, const struct constraint *k, unsigned b,
+void halfvec_steps(const struct path_context *c, const struct full_path_path *x, const struct constraint *k, unsigned b,
 		   unsigned c_end, struct halfvec_step *step)
 {
 	const struct camera *camera = &c->w->camera;
 	double sum = 0, pixels = halfvec_film_step(camera);
-	mat2 d[WHOLE_MAX_VERTICES], footprint = {0, 0, 0, 0};
+	mat2 d[FULL_PATH_MAX_VERTICES], footprint = {0, 0, 0, 0};
 	for (unsigned j = c_end + 1; j < b; j++)
 		if (!x->v[j].delta)
 			sum += bsdf_limit(c, &x->v[j]);
 	bool differentials = b == x->edges && pixel_footprint(camera, x, &footprint) &&
-			     constraint_solver_of(&c->w->knobs)->differentials(k, b, c_end, d) == CONSTRAINT_OK;
+			     constraint_solver_of(&c->w->accuracy)->differentials(k, b, c_end, d) == CONSTRAINT_OK;
 	for (unsigned j = c_end + 1; j < b; j++) {
 		if (x->v[j].delta)
 			continue;

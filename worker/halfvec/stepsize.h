@@ -6,7 +6,7 @@
  * Where the sub-path begins at the camera (b = k) ray differentials say what change of h_j moves the image by a pixel:
  * E_j = D_j^-1 J, with J = d x_{k-1} / d pixel in the geometric tangent plane at a fixed x_k and D_j = d x_{k-1} / d h_j. From
  * E_j = U diag(s) V^T, sigma is s times the vertex's share of the given number of pixels (shares as the roughnesses), at most
- * alpha / sqrt(pi), the mean |slope| of a Beckmann lobe (times the knob step-scale). Otherwise, and where E_j is not to be had, U = 1 and that limit.
+ * alpha / sqrt(pi), the mean |slope| of a Beckmann lobe (times the setting step-scale). Otherwise, and where E_j is not to be had, U = 1 and that limit.
  * Pure; any thread; nothing allocates.
  */
 #ifndef WORKER_HALFVEC_STEPSIZE_H
@@ -26,7 +26,7 @@ double halfvec_lobe_width(const struct path_vertex *v);
 
 /* Of those vertices among c_end+1..b-1 that are not specular (the others are not written), from their constraints. On the
  * image all vertices together move by at most halfvec_film_step. */
-void halfvec_steps(const struct path_context *c, const struct whole_path *x, const struct constraint *k, unsigned b,
+void halfvec_steps(const struct path_context *c, const struct full_path_path *x, const struct constraint *k, unsigned b,
 		   unsigned c_end, struct halfvec_step *step);
 
 /* The step for E = e (any entries that are numbers), `scale` pixels and at most `limit` (> 0). */

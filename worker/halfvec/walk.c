@@ -2,7 +2,7 @@
 
 #include <assert.h>
 
-struct walk_limits walk_limits_of(const struct knobs *k)
+struct walk_limits walk_limits_of(const struct accuracy_settings *k)
 {
 	return (struct walk_limits){(unsigned)k->iterations, k->least_step, 1, k->tolerance, k->reverse_tolerance,
 				     constraint_solver_of(k)};
@@ -11,7 +11,7 @@ struct walk_limits walk_limits_of(const struct knobs *k)
 /* One walk while it goes on. Predictions start at the kept state alone, so that a refused trial leaves nothing to undo. */
 struct walk {
 	struct path_context *c;
-	struct whole_path *y; /* the trial */
+	struct full_path_path *y; /* the trial */
 	unsigned b, end;
 	const struct walk_target *target;
 	const struct constraint_solver *solver;
@@ -19,7 +19,7 @@ struct walk {
 	struct walk_scratch *s;
 	uint64_t above; /* by vertex: where light leaves on the side of the geometric normal */
 	uint64_t seen;  /* by edge: a ray of this trial has met the next vertex along it */
-	vec3 move[WHOLE_MAX_VERTICES]; /* a full step of Newton from the kept state */
+	vec3 move[FULL_PATH_MAX_VERTICES]; /* a full step of Newton from the kept state */
 };
 
 static uint64_t bit(unsigned i)
@@ -27,14 +27,14 @@ static uint64_t bit(unsigned i)
 	return (uint64_t)1 << i;
 }
 
-static bool light_above(const struct whole_path *y, unsigned j)
+static bool light_above(const struct full_path_path *y, unsigned j)
 {
 	return vec3_dot(y->v[j].x.ng, y->edge[j - 1].w) < 0;
 }
 
-static bool mode_holds(const struct whole_path *y, unsigned j)
+static bool mode_holds(const struct full_path_path *y, unsigned j)
 {
-	return whole_mode(y, j) == (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT));
+	return full_path_mode(y, j) == (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT));
 }
 
 /* By a ray: onto another primitive of the same material. */
@@ -80,7 +80,7 @@ static enum walk_end put_back(struct walk *m, unsigned j, double step)
 
 static enum walk_end trial(struct walk *m, double step)
 {
-	struct whole_path *y = m->y;
+	struct full_path_path *y = m->y;
 	m->seen = 0;
 	for (unsigned j = m->b - 1;; j--) {
 		if (j > m->end) {
@@ -88,7 +88,7 @@ static enum walk_end trial(struct walk *m, double step)
 			if (put != WALK_OK)
 				return put;
 		}
-		if (!whole_join(y, j))
+		if (!full_path_join(y, j))
 			return WALK_SINGULAR;
 		if (j + 1 < m->b && (!mode_holds(y, j + 1) || light_above(y, j + 1) != ((m->above >> (j + 1)) & 1)))
 			return WALK_MODE;
@@ -135,9 +135,9 @@ static enum walk_end keep(struct walk *m, bool factored)
 
 static enum walk_end start(struct walk *m)
 {
-	struct whole_path *y = m->y;
+	struct full_path_path *y = m->y;
 	for (unsigned e = m->end; e < m->b; e++)
-		if (!whole_join(y, e))
+		if (!full_path_join(y, e))
 			return WALK_SINGULAR;
 	for (unsigned j = m->end + 1; j < m->b; j++) {
 		if (!mode_holds(y, j))
@@ -151,7 +151,7 @@ static enum walk_end start(struct walk *m)
 static bool all_visible(const struct walk *m)
 {
 	for (unsigned e = m->b; e-- > m->end;)
-		if (!(m->seen & bit(e)) && !whole_visible(m->c, m->y, e))
+		if (!(m->seen & bit(e)) && !full_path_visible(m->c, m->y, e))
 			return false;
 	return true;
 }
@@ -217,7 +217,7 @@ static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, u
 	return last == WALK_OK ? WALK_ITERATIONS : last;
 }
 
-enum walk_end halfvec_walk_from(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+enum walk_end halfvec_walk_from(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
 				const struct walk_target *target, bool visible, const struct walk_limits *limits,
 				unsigned stale, struct walk_scratch *s)
 {
@@ -225,7 +225,7 @@ enum walk_end halfvec_walk_from(struct path_context *c, struct whole_path *y, un
 	struct walk m = {.c = c, .y = y, .b = b, .end = c_end, .target = target, .solver = limits->solver,
 		         .scale = limits->scale, .s = s};
 	s->iterations = 0;
-	whole_forget(y, c_end + 1, b - 1);
+	full_path_forget(y, c_end + 1, b - 1);
 	enum walk_end end = start(&m);
 	if (end == WALK_OK)
 		end = iterate(&m, limits, stale, visible);
@@ -238,7 +238,7 @@ enum walk_end halfvec_walk_from(struct path_context *c, struct whole_path *y, un
 	return WALK_OK;
 }
 
-enum walk_end halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+enum walk_end halfvec_walk(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
 			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
 			   struct walk_scratch *s)
 {

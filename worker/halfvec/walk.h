@@ -32,7 +32,7 @@ struct walk_limits {
 	double back;          /* how near to where the walk began the way back ends, of the largest step that a vertex made */
 	const struct constraint_solver *solver;
 };
-struct walk_limits walk_limits_of(const struct knobs *k);
+struct walk_limits walk_limits_of(const struct accuracy_settings *k);
 
 struct walk_target {
 	vec2 h;           /* of the vertex where the walk ends, in its frame; (0,0) where specular */
@@ -41,10 +41,10 @@ struct walk_target {
 
 /* Caller's storage for one walk. */
 struct walk_scratch {
-	struct constraint k[WHOLE_MAX_VERTICES];
+	struct constraint k[FULL_PATH_MAX_VERTICES];
 	struct constraint_system system;
-	vec2 residual[WHOLE_MAX_VERTICES], dx[WHOLE_MAX_VERTICES];
-	struct path_vertex kept[WHOLE_MAX_VERTICES];
+	vec2 residual[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
+	struct path_vertex kept[FULL_PATH_MAX_VERTICES];
 	unsigned iterations; /* out: of the last walk */
 };
 
@@ -53,14 +53,14 @@ struct walk_scratch {
  * walk back, do not ask for occlusion, the caller knows. On failure y's vertices c+1..b-1 are not to be read. What y knew of f there is forgotten.
  * A walk back tells for certain whether it finds the path again when its tolerances are tighter than those of the way there
  * (scale 0.1: 0.2 iterations more, no rays). */
-enum walk_end halfvec_walk(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+enum walk_end halfvec_walk(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
 			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
 			   struct walk_scratch *s);
 
 /* What no longer holds of s->k and s->system, which are of the path where the walk starts: nothing; the constraint next to an
  * end that has moved since, and the system; all. */
 enum walk_stale { WALK_STALE_B = 1, WALK_STALE_C = 2, WALK_STALE = 4 };
-enum walk_end halfvec_walk_from(struct path_context *c, struct whole_path *y, unsigned b, unsigned c_end,
+enum walk_end halfvec_walk_from(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
 				const struct walk_target *target, bool visible, const struct walk_limits *limits,
 				unsigned stale, struct walk_scratch *s);
 

@@ -12,8 +12,8 @@
 
 enum { BLOCK_LENGTHS = BLOCK_VERTEX, BLOCK_AROUND };
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct whole_path *x,
-				     struct whole_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
+				     struct full_path_path *y, struct move *move)
 {
 	(void)how;
 	struct path_context *c = m->path;
@@ -40,7 +40,7 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 	return STRATEGY_PROPOSED;
 }
 
-static double log_weight(struct mutation_ctx *m, struct whole_path *into, const struct move *move, enum mutation_direction direction)
+static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
 {
 	(void)m, (void)into;
 	return -move->log_density[direction];

@@ -16,7 +16,7 @@
  * are as good. */
 #define WAVELENGTH_STEP (50.0 / 470)
 
-bool breakup_allows(const struct whole_path *x, unsigned b, unsigned c)
+bool breakup_allows(const struct full_path_path *x, unsigned b, unsigned c)
 {
 	unsigned k = x->edges;
 	if (b > k || (b > 0 && b < k && x->v[b].delta))
@@ -35,7 +35,7 @@ static double move_wavelength(const struct path_context *c, double u, double r)
 }
 
 /* Some vertex that stays where it is would have to move for another wavelength. */
-static bool holds_wavelength(const struct path_context *c, const struct whole_path *x, unsigned b, unsigned c_end)
+static bool holds_wavelength(const struct path_context *c, const struct full_path_path *x, unsigned b, unsigned c_end)
 {
 	if (!EFFECT_IS_ON(c->w, dispersion) || b == 0)
 		return false;
@@ -45,7 +45,7 @@ static bool holds_wavelength(const struct path_context *c, const struct whole_pa
 	return false;
 }
 
-static bool move_emitter(struct mutation_ctx *m, const struct whole_path *x, struct whole_path *y, struct move *move)
+static bool move_emitter(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	const struct path_context *c = m->path;
 	const struct path_vertex *v = &x->v[0];
@@ -94,7 +94,7 @@ static double tolerance_of(const struct mutation_ctx *m, const struct path_verte
 }
 
 /* Steps of the half vectors, and what they aim at. */
-static void aim(struct mutation_ctx *m, const struct breakup *how, const struct whole_path *x)
+static void aim(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x)
 {
 	struct mutation_scratch *s = &m->scratch;
 	for (unsigned j = how->c + 1; j < how->b; j++) {
@@ -112,7 +112,7 @@ static void aim(struct mutation_ctx *m, const struct breakup *how, const struct 
 	}
 }
 
-static void add_step_densities(struct mutation_ctx *m, const struct breakup *how, const struct whole_path *x, struct move *move)
+static void add_step_densities(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x, struct move *move)
 {
 	const struct mutation_scratch *s = &m->scratch;
 	for (unsigned j = how->c + 1; how->halfvecs && j < how->b; j++) {
@@ -124,7 +124,7 @@ static void add_step_densities(struct mutation_ctx *m, const struct breakup *how
 }
 
 /* What of the constraints of one path does not hold when the walk to the other starts from it. */
-static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct whole_path *x, const struct whole_path *y)
+static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x, const struct full_path_path *y)
 {
 	if (EFFECT_IS_ON(m->path->w, dispersion) && x->wavelength != y->wavelength)
 		return WALK_STALE;
@@ -134,12 +134,12 @@ static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how
 }
 
 /* The walk from y leads back to x: else the proposal has no way back, and detailed balance wants it refused. */
-static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct whole_path *x, const struct whole_path *y)
+static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x, const struct full_path_path *y)
 {
 	struct mutation_scratch *s = &m->scratch;
 	unsigned b = how->b, c = how->c;
-	struct whole_path *back = &s->back;
-	whole_copy(back, y, c, b);
+	struct full_path_path *back = &s->back;
+	full_path_copy(back, y, c, b);
 	back->v[b] = x->v[b];
 	back->v[c] = x->v[c];
 	back->wl = x->wl;
@@ -169,7 +169,7 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 }
 
 /* Between x_b and x_c by half vectors. */
-static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *how, struct whole_path *x, struct whole_path *y,
+static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *how, struct full_path_path *x, struct full_path_path *y,
 				  struct move *move)
 {
 	struct mutation_scratch *s = &m->scratch;
@@ -194,22 +194,22 @@ static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *
 	return leads_back(m, how, x, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_REVERSE;
 }
 
-static enum strategy_counter join(struct mutation_ctx *m, unsigned e, struct whole_path *y)
+static enum strategy_counter join(struct mutation_ctx *m, unsigned e, struct full_path_path *y)
 {
-	return whole_join(y, e) && whole_visible(m->path, y, e) ? STRATEGY_PROPOSED : STRATEGY_FAIL_BLOCKED;
+	return full_path_join(y, e) && full_path_visible(m->path, y, e) ? STRATEGY_PROPOSED : STRATEGY_FAIL_BLOCKED;
 }
 
 /* How x_j scatters now that its neighbours have moved. */
-static bool set_mode(struct whole_path *y, unsigned j)
+static bool set_mode(struct full_path_path *y, unsigned j)
 {
 	if (j == 0 || j == y->edges)
 		return true;
-	y->v[j].mode = whole_mode(y, j);
+	y->v[j].mode = full_path_mode(y, j);
 	return y->v[j].mode != 0;
 }
 
-enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct whole_path *x,
-				      struct whole_path *y, struct move *move)
+enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path_path *x,
+				      struct full_path_path *y, struct move *move)
 {
 	struct path_context *c = m->path;
 	unsigned k = x->edges, b = how->b, c_end = b > 0 ? how->c : 0;
@@ -217,7 +217,7 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 	if (how->wavelength && EFFECT_IS_ON(c->w, colour) && !holds_wavelength(c, x, b, c_end)) {
 		double r[4];
 		mutation_random(m, BLOCK_ENDS, r);
-		whole_set_wavelength(c, y, move_wavelength(c, x->wavelength, r[0]));
+		full_path_set_wavelength(c, y, move_wavelength(c, x->wavelength, r[0]));
 	}
 	bool aperture = how->aperture && EFFECT_IS_ON(c->w, aperture);
 	enum strategy_counter end = STRATEGY_PROPOSED;
@@ -234,31 +234,31 @@ enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct break
 	move->first = c_end;
 	if (end)
 		return end;
-	whole_forget(y, c_end + 1, k);
+	full_path_forget(y, c_end + 1, k);
 	if (!set_mode(y, b) || !set_mode(y, c_end))
 		return STRATEGY_FAIL_MODE;
 	return b < k || whole_film(c, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_OUTSIDE;
 }
 
 /* Cosines, distances and Jacobians that do not cancel between f and T, by sec. 5: one geometric normal, at x_{b-1}. */
-static double log_geometry(const struct path_context *c, const struct whole_path *x, unsigned b, unsigned c_end)
+static double log_geometry(const struct path_context *c, const struct full_path_path *x, unsigned b, unsigned c_end)
 {
 	if (b == 0 || b == c_end)
 		return 0;
-	const struct whole_edge *e = &x->edge[b - 1];
+	const struct full_path_edge *e = &x->edge[b - 1];
 	double log_g = log(path_cosine(&x->v[b - 1], e->w) / e->distance2);
 	if (b == x->edges)
 		return log_g + log(camera_jac_film_from_solid(&c->w->camera, vec3_neg(e->w)));
 	return log_g + log(fabs(vec3_dot(x->v[b].x.sh.n, e->w)));
 }
 
-double breakup_log_weight(struct mutation_ctx *m, struct whole_path *into, const struct move *move,
+double breakup_log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
 			  enum mutation_direction direction)
 {
 	const struct path_context *c = m->path;
 	struct product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < into->edges; j++)
-		product_mul(&p, j <= move->c || j == move->b ? whole_f(c, into, j) : whole_fh(c, into, j));
+		product_mul(&p, j <= move->c || j == move->b ? full_path_f(c, into, j) : full_path_fh(c, into, j));
 	return product_log_intensity(c, into, &p) + log_geometry(c, into, move->b, move->c) + move->log_transfer[direction] -
 	       move->log_density[direction];
 }

@@ -10,7 +10,7 @@ static double roughness(const struct path_vertex *v)
 
 /* P(b = i) ~ a_i, 0.1 for both ends. Where all inner vertices are specular, or there is only the emitter beside x_k, half
  * vectors have nothing to move; an emitter that cannot be hit is not found by tracing. */
-static void weigh_b(const struct path_context *c, const struct whole_path *x, double *weight)
+static void weigh_b(const struct path_context *c, const struct full_path_path *x, double *weight)
 {
 	unsigned k = x->edges;
 	bool any = false;
@@ -23,7 +23,7 @@ static void weigh_b(const struct path_context *c, const struct whole_path *x, do
 }
 
 /* P(c = i | b) ~ a_i |x_i - x_{i+1}|^2; a of the emitter is 1, the scene's diameter stands for infinity. */
-static void weigh_c(const struct path_context *c, const struct whole_path *x, unsigned b, double *weight)
+static void weigh_c(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight)
 {
 	/* Below b = k nothing moves before a vertex with a half vector does: c = k - 1 would be the identity on a pinhole. */
 	bool moves = b < x->edges;

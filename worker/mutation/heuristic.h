@@ -6,14 +6,14 @@
 #ifndef WORKER_MUTATION_HEURISTIC_H
 #define WORKER_MUTATION_HEURISTIC_H
 
-#include "worker/path/whole.h"
+#include "worker/path/full_path.h"
 
 struct heuristic {
 	const char *name;
 	/* weight[0..k], not normalised; 0: never. */
-	void (*weigh_b)(const struct path_context *c, const struct whole_path *x, double *weight);
+	void (*weigh_b)(const struct path_context *c, const struct full_path_path *x, double *weight);
 	/* weight[0..b-1]. */
-	void (*weigh_c)(const struct path_context *c, const struct whole_path *x, unsigned b, double *weight);
+	void (*weigh_c)(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight);
 };
 
 /* By roughness, as in the paper. A vertex that is exactly specular is never x_b or x_c. */

@@ -29,8 +29,8 @@ static unsigned technique_count(unsigned edges)
 	return edges == 1 ? 1 : edges + 1;
 }
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct whole_path *x,
-				     struct whole_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
+				     struct full_path_path *y, struct move *move)
 {
 	(void)how, (void)x;
 	struct path_context *c = m->path;
@@ -44,17 +44,17 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 	c->one_way = true;
 	if (path_walk_camera(c, &sampler.base, t, film) < t || (s >= 2 && path_walk_light(c, &sampler.base, s) < s))
 		return STRATEGY_FAIL_MISSED;
-	return whole_from_subpaths(c, s, k, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_DARK;
+	return full_path_from_subpaths(c, s, k, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_DARK;
 }
 
-static double log_weight(struct mutation_ctx *m, struct whole_path *into, const struct move *move, enum mutation_direction direction)
+static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
 {
 	(void)move, (void)direction;
 	unsigned k = into->edges;
-	double log_pdf[WHOLE_MAX_VERTICES];
-	whole_log_techniques(m->path, into, log_pdf);
+	double log_pdf[FULL_PATH_MAX_VERTICES];
+	full_path_log_techniques(m->path, into, log_pdf);
 	double log_t = log_edges(m->path, k) - log(technique_count(k)) + log_sum_exp(log_pdf, k + 1);
-	return whole_log_f(m->path, into) - log_t;
+	return full_path_log_f(m->path, into) - log_t;
 }
 
 static double useful(const struct render_summary *scene)

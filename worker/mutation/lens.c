@@ -2,7 +2,7 @@
 #include "worker/mutation/strategy.h"
 
 /* Any vertex that is not exactly specular will do: even x_{k-1}, which another x_k sees at another film point. */
-static void weigh_c(const struct path_context *c, const struct whole_path *x, unsigned b, double *weight)
+static void weigh_c(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight)
 {
 	(void)c;
 	for (unsigned i = 0; i < b; i++)
@@ -12,8 +12,8 @@ static void weigh_c(const struct path_context *c, const struct whole_path *x, un
 static const struct heuristic any_end = {"any", NULL, weigh_c};
 static const struct strategy strategy = {&any_end, STRATEGY_CAMERA, STRATEGY_DRAWN, .aperture = true};
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct whole_path *x,
-				     struct whole_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
+				     struct full_path_path *y, struct move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, aperture))
 		return STRATEGY_FAIL_INAPPLICABLE;

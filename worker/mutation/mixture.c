@@ -20,7 +20,7 @@ static bool parse_forced(const char *text, size_t length, struct mutation_settin
 		if (!choice || *choice >= 0 || at[1] < '0' || at[1] > '9')
 			return false;
 		long v = strtol(at + 1, &at, 10);
-		if (v > WHOLE_MAX_EDGES)
+		if (v > FULL_PATH_MAX_EDGES)
 			return false;
 		*choice = (int)v;
 	}

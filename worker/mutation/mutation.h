@@ -37,12 +37,12 @@ struct move {
 
 struct mutation_scratch {
 	struct walk_scratch walk;
-	struct constraint k[WHOLE_MAX_VERTICES]; /* of x */
-	struct halfvec_step step[2][WHOLE_MAX_VERTICES]; /* of x, of y */
-	struct walk_target target[WHOLE_MAX_VERTICES];
-	double weight[WHOLE_MAX_VERTICES];
-	vec2 dh[WHOLE_MAX_VERTICES];
-	struct whole_path back;
+	struct constraint k[FULL_PATH_MAX_VERTICES]; /* of x */
+	struct halfvec_step step[2][FULL_PATH_MAX_VERTICES]; /* of x, of y */
+	struct walk_target target[FULL_PATH_MAX_VERTICES];
+	double weight[FULL_PATH_MAX_VERTICES];
+	vec2 dh[FULL_PATH_MAX_VERTICES];
+	struct full_path_path back;
 };
 
 struct mutation_ctx {
@@ -59,10 +59,10 @@ struct mutation_ops {
 	/* Weight in the default mixture of a scene with these effects; 0 leaves it out. */
 	double (*useful)(const struct render_summary *scene);
 	/* STRATEGY_PROPOSED: y is made, and every ray of it was cast. Else the reason, and y's vertices first..last are waste. */
-	enum strategy_counter (*propose)(struct mutation_ctx *m, const struct mutation_setting *how, struct whole_path *x,
-					 struct whole_path *y, struct move *move);
+	enum strategy_counter (*propose)(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
+					 struct full_path_path *y, struct move *move);
 	/* Into: y for X_TO_Y, x for Y_TO_X. -INFINITY: black. */
-	double (*log_weight)(struct mutation_ctx *m, struct whole_path *into, const struct move *move,
+	double (*log_weight)(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
 			     enum mutation_direction direction);
 };
 

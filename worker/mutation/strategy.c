@@ -12,7 +12,7 @@ static unsigned fixed_b(int b, unsigned k)
 
 /* Which b: weights of the heuristic, without what the strategy cannot use. */
 static void weigh_b(const struct strategy *s, const struct choice *forced, const struct mutation_ctx *m,
-		    const struct whole_path *x, double *weight)
+		    const struct full_path_path *x, double *weight)
 {
 	s->heuristic->weigh_b(m->path, x, weight);
 	if (forced->c >= 0)
@@ -22,7 +22,7 @@ static void weigh_b(const struct strategy *s, const struct choice *forced, const
 
 /* log P(b) P(c | b) of x by the heuristic; what is forced has probability 1. -INFINITY: never chosen. */
 static double log_choice(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
-			 const struct whole_path *x, unsigned b, unsigned c)
+			 const struct full_path_path *x, unsigned b, unsigned c)
 {
 	double *weight = m->scratch.weight, p = 1;
 	if (forced->b == STRATEGY_DRAWN) {
@@ -36,7 +36,7 @@ static double log_choice(const struct strategy *s, const struct choice *forced, 
 	return log(p);
 }
 
-static bool choose(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m, const struct whole_path *x,
+static bool choose(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m, const struct full_path_path *x,
 		   struct breakup *out)
 {
 	double *weight = m->scratch.weight, r[4];
@@ -66,7 +66,7 @@ static bool choose(const struct strategy *s, const struct choice *forced, struct
 }
 
 enum strategy_counter strategy_propose(const struct strategy *s, struct mutation_ctx *m, const struct mutation_setting *how,
-				       struct whole_path *x, struct whole_path *y, struct move *move)
+				       struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	struct choice forced = {how->b >= 0 ? how->b : s->b, how->c >= 0 ? how->c : s->c};
 	struct breakup br = {.halfvecs = s->halfvecs, .wavelength = s->wavelength, .aperture = s->aperture};

@@ -14,6 +14,6 @@ struct strategy {
 
 /* A breakup by this strategy; what `how` forces goes first. */
 enum strategy_counter strategy_propose(const struct strategy *s, struct mutation_ctx *m, const struct mutation_setting *how,
-				       struct whole_path *x, struct whole_path *y, struct move *move);
+				       struct full_path_path *x, struct full_path_path *y, struct move *move);
 
 #endif

@@ -7,7 +7,7 @@
 /* The line between the two vertices must show that much of itself in both tangent planes to turn frames by. */
 #define LEAST_PROJECTION 1e-3
 
-bool trace_move_aperture(struct mutation_ctx *m, const struct whole_path *x, struct whole_path *y)
+bool trace_move_aperture(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y)
 {
 	const struct camera *camera = &m->path->w->camera;
 	double u[2], r[4];
@@ -19,7 +19,7 @@ bool trace_move_aperture(struct mutation_ctx *m, const struct whole_path *x, str
 	return true;
 }
 
-static bool move_film(struct mutation_ctx *m, const struct whole_path *x, struct whole_path *y, struct move *move)
+static bool move_film(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	double r[4], g[2], sigma = halfvec_film_step(&m->path->w->camera);
 	mutation_random(m, BLOCK_FILM, r);
@@ -64,7 +64,7 @@ static bool follow(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
 }
 
 /* The direction in which the path goes on from y_j. */
-static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct whole_path *x, struct whole_path *y, struct move *move,
+static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_path_path *x, struct full_path_path *y, struct move *move,
 		       vec3 *d)
 {
 	const struct path_vertex *from = &x->v[j];
@@ -74,7 +74,7 @@ static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct whole_pa
 	v->delta = from->delta;
 	if (from->delta) {
 		double chance;
-		if (!v->bsdf->has_delta || spectrum_is_zero(whole_specular(y, j, &i, &chance)))
+		if (!v->bsdf->has_delta || spectrum_is_zero(full_path_specular(y, j, &i, &chance)))
 			return false;
 	} else {
 		if (!v->bsdf->has_smooth || !(v->bsdf->modes & v->mode))
@@ -86,7 +86,7 @@ static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct whole_pa
 		turn(from, v, &h);
 		h = vec2_add(h, (vec2){sigma * g[0], sigma * g[1]});
 		move->log_symmetric -= 0.5 * (g[0] * g[0] + g[1] * g[1]) + log(2 * M_PI * sigma * sigma);
-		if (!follow(o, h, v->mode & BSDF_TRANSMIT, whole_eta(y, j), &i))
+		if (!follow(o, h, v->mode & BSDF_TRANSMIT, full_path_eta(y, j), &i))
 			return false;
 	}
 	*d = vec3_normalize(frame_to_world(&v->x.sh, i));
@@ -107,7 +107,7 @@ static enum strategy_counter arrive(struct path_context *c, unsigned b, struct p
 	return path_can_be_hit(c, v) ? STRATEGY_PROPOSED : STRATEGY_FAIL_EMITTER;
 }
 
-enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct whole_path *x, struct whole_path *y,
+enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path_path *x, struct full_path_path *y,
 				  struct move *move)
 {
 	struct path_context *c = m->path;
@@ -127,9 +127,9 @@ enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool apert
 			return STRATEGY_FAIL_MISSED;
 		if (j - 1 > b && y->v[j - 1].kind != VERTEX_SURFACE)
 			return STRATEGY_FAIL_MISSED;
-		if (!whole_join(y, j - 1))
+		if (!full_path_join(y, j - 1))
 			return STRATEGY_FAIL_MISSED;
-		if (j < k && whole_mode(y, j) != (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
+		if (j < k && full_path_mode(y, j) != (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
 			return STRATEGY_FAIL_MODE;
 	}
 	return arrive(c, b, &y->v[b]);

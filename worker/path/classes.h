@@ -5,11 +5,11 @@
 #ifndef WORKER_PATH_CLASSES_H
 #define WORKER_PATH_CLASSES_H
 
-#include "worker/path/whole.h"
+#include "worker/path/full_path.h"
 
 #include <string.h>
 
-unsigned path_class_whole(const struct whole_path *x);
+unsigned path_class_whole(const struct full_path_path *x);
 
 /* Classes of all paths that one pair of sub-paths makes, and what these carry. */
 struct classes {

@@ -76,7 +76,7 @@ void ensemble_draw(struct path_context *c, struct sampler *s, const struct ensem
 	gather(c, camera, light, n->capped, NULL, out);
 }
 
-bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct whole_path *x)
+bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path_path *x)
 {
 	if (e->count == 0)
 		return false;
@@ -84,14 +84,14 @@ bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u,
 	unsigned i = 0;
 	while (i + 1 < e->count && rest >= e->of[i].intensity)
 		rest -= e->of[i++].intensity;
-	return whole_from_subpaths(c, e->of[i].s, e->of[i].edges, x);
+	return full_path_from_subpaths(c, e->of[i].s, e->of[i].edges, x);
 }
 
 /* Contribution over density of going on from beta across edge e to a vertex of density pdf, by scattering f at `at`. */
-static spectrum carry(const struct whole_path *x, spectrum beta, spectrum f, unsigned at, unsigned e, double pdf)
+static spectrum carry(const struct full_path_path *x, spectrum beta, spectrum f, unsigned at, unsigned e, double pdf)
 {
 	const struct path_vertex *v = &x->v[at];
-	const struct whole_edge *g = &x->edge[e];
+	const struct full_path_edge *g = &x->edge[e];
 	double geometry = path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2;
 	if (at > 0 && !v->delta)
 		geometry *= fabs(vec3_dot(v->x.sh.n, x->edge[at - 1].w) / vec3_dot(v->x.ng, x->edge[at - 1].w));
@@ -106,7 +106,7 @@ static void keep_numbers(struct sampler *s, enum sampler_side side, unsigned ver
 }
 
 /* x_k .. x_{k-t+1} as the camera's sub-path; t >= 2. */
-static void put_camera(struct path_context *c, struct sampler *s, struct whole_path *x, unsigned t)
+static void put_camera(struct path_context *c, struct sampler *s, struct full_path_path *x, unsigned t)
 {
 	unsigned k = x->edges;
 	struct path_vertex *v = c->camera;
@@ -119,12 +119,12 @@ static void put_camera(struct path_context *c, struct sampler *s, struct whole_p
 	v[0].beta = spectrum_of(1);
 	v[1].beta = spectrum_of(c->window.width * c->window.height);
 	for (unsigned i = 2; i < t; i++)
-		v[i].beta = carry(x, v[i - 1].beta, whole_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
+		v[i].beta = carry(x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
 	v[t - 1].delta = false;
 }
 
 /* x_0 .. x_{s-1} as the light's sub-path; s >= 2. */
-static void put_light(struct path_context *c, struct sampler *s_numbers, struct whole_path *x, unsigned s)
+static void put_light(struct path_context *c, struct sampler *s_numbers, struct full_path_path *x, unsigned s)
 {
 	struct path_vertex *v = c->light;
 	for (unsigned i = 0; i < s; i++) {
@@ -137,7 +137,7 @@ static void put_light(struct path_context *c, struct sampler *s_numbers, struct 
 	}
 	v[0].beta = spectrum_of(1 / v[0].pdf);
 	for (unsigned i = 1; i < s; i++)
-		v[i].beta = carry(x, v[i - 1].beta, whole_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
+		v[i].beta = carry(x, v[i - 1].beta, full_path_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
 	v[s - 1].delta = false;
 }
 
@@ -162,7 +162,7 @@ static const double *pinned_block(struct sampler *base, enum sampler_side side, 
 	return p->block;
 }
 
-static unsigned walk_camera(struct path_context *c, struct sampler *s, const struct whole_path *x, unsigned most)
+static unsigned walk_camera(struct path_context *c, struct sampler *s, const struct full_path_path *x, unsigned most)
 {
 	struct pinned_sampler pinned = {.base = {pinned_block}, .under = s, .wavelength = x->wavelength};
 	double film[2];
@@ -198,14 +198,14 @@ static unsigned choose_technique(const double *log_pdf, unsigned k, double log_s
 	return s;
 }
 
-void ensemble_around(struct path_context *c, struct sampler *sampler, struct whole_path *x, const double u[3], struct ensemble *out)
+void ensemble_around(struct path_context *c, struct sampler *sampler, struct full_path_path *x, const double u[3], struct ensemble *out)
 {
 	unsigned k = x->edges;
-	double log_pdf[WHOLE_MAX_VERTICES];
-	whole_log_techniques(c, x, log_pdf);
+	double log_pdf[FULL_PATH_MAX_VERTICES];
+	full_path_log_techniques(c, x, log_pdf);
 	double log_sum = log_sum_exp(log_pdf, k + 1);
 	unsigned s = choose_technique(log_pdf, k, log_sum, u[0]), t = k + 1 - s;
-	const struct candidate known = {exp(whole_log_f(c, x) - log_sum), s, k};
+	const struct candidate known = {exp(full_path_log_f(c, x) - log_sum), s, k};
 	struct ensemble_lengths n = ensemble_lengths_of(c, u + 1, t, s);
 	c->one_way = false;
 	c->wl = x->wl;

@@ -9,7 +9,7 @@
 #ifndef WORKER_PATH_ENSEMBLE_H
 #define WORKER_PATH_ENSEMBLE_H
 
-#include "worker/path/whole.h"
+#include "worker/path/full_path.h"
 
 struct candidate {
 	double intensity;
@@ -19,7 +19,7 @@ struct candidate {
 struct ensemble {
 	double total; /* sum of intensities */
 	unsigned count;
-	struct candidate of[WHOLE_MAX_VERTICES * WHOLE_MAX_VERTICES];
+	struct candidate of[FULL_PATH_MAX_VERTICES * FULL_PATH_MAX_VERTICES];
 };
 
 struct ensemble_lengths {
@@ -34,9 +34,9 @@ struct ensemble_lengths ensemble_all_lengths(const struct path_context *c);
 /* Draws a pair of sub-paths into c and gathers its candidates. */
 void ensemble_draw(struct path_context *c, struct sampler *s, const struct ensemble_lengths *n, struct ensemble *out);
 /* A pair among whose candidates x is. u: three numbers in [0,1), for the technique and the lengths. */
-void ensemble_around(struct path_context *c, struct sampler *s, struct whole_path *x, const double u[3], struct ensemble *out);
+void ensemble_around(struct path_context *c, struct sampler *s, struct full_path_path *x, const double u[3], struct ensemble *out);
 
 /* The candidate that u in [0,1) chooses, as a path; only right after ensemble_draw. false: there is none. */
-bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct whole_path *x);
+bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path_path *x);
 
 #endif

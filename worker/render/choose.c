@@ -1,7 +1,7 @@
 #include "worker/render/choose.h"
 
 #include "common/base/mem.h"
-#include "common/base/tick.h"
+#include "common/base/liveness.h"
 #include "common/film/tail.h"
 #include "worker/path/integrator.h"
 #include "worker/render/brightness.h"

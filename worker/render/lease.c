@@ -2,7 +2,7 @@
 
 #include "common/base/crash.h"
 #include "common/base/mem.h"
-#include "common/base/tick.h"
+#include "common/base/liveness.h"
 #include "worker/chain/chain.h"
 #include "worker/math/fptrap.h"
 #include "worker/mutation/mixture.h"
@@ -219,10 +219,10 @@ static int check(const struct world *w, const struct plan *p, const struct integ
 		return error_set(e, EINVAL, "the plan's film is %u x %u with a border of %u pixels, the scene's %u x %u with %u",
 				 p->width, p->height, p->border, w->settings.width, w->settings.height, w->settings.border);
 	struct mixture unused;
-	char knobs[PLAN_KNOBS_MAX];
-	knobs_print(&w->knobs, knobs);
-	if (strcmp(knobs, p->knobs) != 0)
-		return error_set(e, EINVAL, "the plan's settings are '%s', those of the world '%s'", p->knobs, knobs);
+	char accuracy[PLAN_ACCURACY_MAX];
+	accuracy_settings_print(&w->accuracy, accuracy);
+	if (strcmp(accuracy, p->accuracy) != 0)
+		return error_set(e, EINVAL, "the plan's settings are '%s', those of the world '%s'", p->accuracy, accuracy);
 	if (i->face.has_mutations && mixture_parse(p->mutations, &unused, e))
 		return -EINVAL;
 	if (p->max_depth < 1 || p->max_depth > PATH_MAX_EDGES)

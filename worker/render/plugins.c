@@ -3,7 +3,7 @@
 
 #include "worker/bsdf/bsdf.h"
 #include "worker/emitter/emitter.h"
-#include "worker/render/knobs.h"
+#include "worker/render/accuracy_settings.h"
 #include "worker/shape/shape.h"
 
 #include <assert.h>
@@ -48,8 +48,8 @@ const struct plugin_decl *render_plugins(void)
 int render_scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct scene_define *defines,
 		      size_t define_count, const struct render_options *o, struct error *e)
 {
-	struct knobs k;
-	int code = knobs_read(o->knobs, &k, e);
+	struct accuracy_settings k;
+	int code = accuracy_settings_read(o->accuracy, &k, e);
 	if (code)
 		return code;
 	return (k.lenient > 0 ? scene_read_lenient : scene_read)(s, assets, name, render_plugins(), defines, define_count, e);

@@ -45,7 +45,7 @@ const char *render_numeric_version(void);
 /* What hslt-submit and hslt-render let the user override; all zero: as the scene says. The texts are those of a plan. */
 struct render_options {
 	uint32_t width, height;
-	char knobs[PLAN_KNOBS_MAX], effects[PLAN_EFFECTS_MAX];
+	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
 	uint32_t max_depth;
 };
 
@@ -99,13 +99,13 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 /* false also where there is no effect of that name. */
 bool render_effect_on(const struct render_summary *scene, const char *name);
 
-/* Builds Embree's scene, and ticks meanwhile (common/base/tick.h). The scene description may be freed afterwards. */
+/* Builds Embree's scene, and ticks meanwhile (common/base/liveness.h). The scene description may be freed afterwards. */
 int world_new(struct world **w, const struct scene *s, const struct asset_source *assets, const struct render_options *o,
 	      struct error *e);
 void world_free(struct world *w);
-/* Other settings (render_options.knobs) for a world that is there, while no lease runs in it: whether those that differ can do
+/* Other settings (render_options.settings) for a world that is there, while no lease runs in it: whether those that differ can do
  * without building again, and then they are set. *fits false: a new world is needed, this one is as it was. */
-int world_set_knobs(struct world *w, const char *knobs, bool *fits, struct error *e);
+int world_set_accuracy(struct world *w, const char *accuracy, bool *fits, struct error *e);
 void world_summary(const struct world *w, struct render_summary *out);
 /* X+Y+Z of the brightest emitter, for canvas_grid_exponent when the bootstrap is black. */
 double world_brightest(const struct world *w);
@@ -123,7 +123,7 @@ enum lease_end { LEASE_DONE, LEASE_STOPPED };
 
 /* Runs one lease and fills the batch (batch_fini frees it). `stop` may become true at any time: the lease is given up.
  * -ENOMEM, -EILSEQ (states that cannot be gone on from), -EINVAL (plan and world do not fit), -EDOM (an invalid floating-point
- * operation; the sentence says where). Ticks (common/base/tick.h) at least every 256 samples or mutations. */
+ * operation; the sentence says where). Ticks (common/base/liveness.h) at least every 256 samples or mutations. */
 int render_lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
 		 const atomic_bool *stop, enum lease_end *end, struct batch *out, struct error *e);
 

@@ -1,6 +1,6 @@
 #include "worker/shape/displace.h"
 
-#include "common/base/tick.h"
+#include "common/base/liveness.h"
 #include "worker/shape/displace_grid.h"
 #include "worker/shape/mesh.h"
 

@@ -3,7 +3,7 @@
  * where it stands, so that an error has a line.
  */
 #include "common/base/mem.h"
-#include "common/base/tick.h"
+#include "common/base/liveness.h"
 #include "worker/scene/number.h"
 #include "worker/shape/declare.h"
 #include "worker/shape/mesh.h"

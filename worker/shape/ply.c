@@ -8,7 +8,7 @@
  * Failures: a header that is none, a file that ends too early, indices out of range, numbers that are not finite. No count of
  * the header is believed before the file was seen to be long enough for it.
  */
-#include "common/base/tick.h"
+#include "common/base/liveness.h"
 #include "worker/scene/number.h"
 #include "worker/shape/declare.h"
 #include "worker/shape/mesh.h"

@@ -8,7 +8,7 @@
  * Failures: a table that leads out of the file, a stream that is damaged or ends too early, indices out of range, numbers that
  * are not finite. Counts are believed only as far as the compressed bytes could hold them.
  */
-#include "common/base/tick.h"
+#include "common/base/liveness.h"
 #include "worker/shape/declare.h"
 #include "worker/shape/mesh.h"
 

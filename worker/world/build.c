@@ -2,12 +2,12 @@
 
 #include "common/base/crash.h"
 #include "common/base/mem.h"
-#include "common/base/tick.h"
+#include "common/base/liveness.h"
 #include "worker/shape/shape.h"
 #include "worker/world/coincident.h"
 #include "worker/world/displacement.h"
 #include "worker/world/origin.h"
-#include "worker/world/reach.h"
+#include "worker/world/visibility_bounds.h"
 
 #include <stdio.h>
 #include <string.h>
@@ -69,7 +69,7 @@ static int read_shapes(struct builder *b)
 		crash_place("building the scene", s->objects[i]->file, s->objects[i]->line);
 		int rc = shape_build(s->objects[i], b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
 		if (!rc && b->forced.of[EFFECT_DISPLACEMENT] >= 0)
-			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3, w->knobs.tessellation,
+			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3, w->accuracy.tessellation,
 						&b->scratch, b->e);
 		if (rc)
 			return rc;
@@ -236,7 +236,7 @@ static int create_bsdfs(struct builder *b)
 	b->bsdf_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
 	if (!w->bsdfs || !b->bsdf_nodes)
 		return out_of_memory(b->e);
-	struct bsdf_build build = {b->assets, &w->arena, b->scene->dialect_3, w->knobs.roughness};
+	struct bsdf_build build = {b->assets, &w->arena, b->scene->dialect_3, w->accuracy.roughness};
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct scene_node *n = node_child(b->shape_nodes[i], PLUGIN_BSDF, 0);
 		const struct scene_node *light = node_child(b->shape_nodes[i], PLUGIN_EMITTER, 0), *key = n ? n : light;
@@ -395,7 +395,7 @@ static int find_coincidence(struct builder *b)
 static int find_effects(struct builder *b, uint32_t max_depth)
 {
 	struct world *w = b->w;
-	enum reach *reached = arena_alloc(&b->scratch, w->shape_count, sizeof *reached);
+	enum visibility_bounds *reached = arena_alloc(&b->scratch, w->shape_count, sizeof *reached);
 	if (!reached)
 		return out_of_memory(b->e);
 	const struct effects_source src = {b->scene, b->shape_nodes, b->bsdf_nodes, b->emitter_nodes, max_depth};
@@ -410,7 +410,7 @@ static int prepare(struct builder *b, const struct render_options *o)
 	if (!rc)
 		rc = scene_settings_read(b->scene, o ? o->width : 0, o ? o->height : 0, &b->w->settings, b->e);
 	if (!rc)
-		rc = knobs_read(o ? o->knobs : NULL, &b->w->knobs, b->e);
+		rc = accuracy_settings_read(o ? o->accuracy : NULL, &b->w->accuracy, b->e);
 	if (!rc)
 		rc = read_shapes(b);
 	if (!rc)

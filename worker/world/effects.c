@@ -2,7 +2,7 @@
 
 #include "common/base/text.h"
 #include "worker/world/displacement.h"
-#include "worker/world/reach.h"
+#include "worker/world/visibility_bounds.h"
 
 #include <stdarg.h>
 #include <stdio.h>
@@ -45,7 +45,7 @@ struct census {
 	struct tally specular, glossy, diffuse, transmission, textured, coloured, dispersive, constant_eta;
 	struct tally hidden_specular, hidden_dispersive, unused_dispersive; /* of those that no path meets; that no shape uses */
 	struct tally environment, area, delta, textured_light, coloured_light;
-	enum reach why_hidden;
+	enum visibility_bounds why_hidden;
 	size_t shape[3];
 };
 
@@ -71,7 +71,7 @@ static void add_material(struct census *c, const struct bsdf *b, const struct sc
 		count(&c->constant_eta, n, nameless);
 }
 
-static void add_hidden(struct census *c, const struct bsdf *b, const struct scene_node *n, enum reach why)
+static void add_hidden(struct census *c, const struct bsdf *b, const struct scene_node *n, enum visibility_bounds why)
 {
 	c->why_hidden = why;
 	if (b->has_delta)
@@ -80,13 +80,13 @@ static void add_hidden(struct census *c, const struct bsdf *b, const struct scen
 		count(&c->hidden_dispersive, n, "");
 }
 
-static enum reach reach_of_bsdf(const struct world *w, const enum reach *shape, uint32_t bsdf)
+static enum visibility_bounds reach_of_bsdf(const struct world *w, const enum visibility_bounds *shape, uint32_t bsdf)
 {
-	enum reach r = REACH_YES;
+	enum visibility_bounds r = VISIBILITY_YES;
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		if (w->parts[i].bsdf == bsdf) {
-			if (shape[i] == REACH_YES)
-				return REACH_YES;
+			if (shape[i] == VISIBILITY_YES)
+				return VISIBILITY_YES;
 			r = shape[i];
 		}
 	return r;
@@ -123,18 +123,18 @@ static void add_emitter(struct census *c, const struct emitter *em, const struct
 	c->shape[em->shape]++;
 }
 
-static struct census take(const struct world *w, const struct effects_source *src, const enum reach *shape)
+static struct census take(const struct world *w, const struct effects_source *src, const enum visibility_bounds *shape)
 {
-	struct census c = {.why_hidden = REACH_YES};
+	struct census c = {.why_hidden = VISIBILITY_YES};
 	for (uint32_t i = 0; i < w->bsdf_count; i++) {
-		enum reach r = reach_of_bsdf(w, shape, i);
-		if (r == REACH_YES)
+		enum visibility_bounds r = reach_of_bsdf(w, shape, i);
+		if (r == VISIBILITY_YES)
 			add_material(&c, &w->bsdfs[i], src->bsdf[i]);
 		else
 			add_hidden(&c, &w->bsdfs[i], src->bsdf[i], r);
 	}
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		if (reach_emitter(w, shape, i))
+		if (visibility_bounds_emitter(w, shape, i))
 			add_emitter(&c, &w->emitters[i], src->emitter[i]);
 	add_unused(&c, w, src);
 	return c;
@@ -164,16 +164,16 @@ __attribute__((format(printf, 4, 5))) static bool line(struct report *r, enum ef
 	return l->on;
 }
 
-static const char *hidden_because(enum reach r)
+static const char *hidden_because(enum visibility_bounds r)
 {
 	switch (r) {
-	case REACH_ENCLOSED:
+	case VISIBILITY_ENCLOSED:
 		return "a closed opaque shape is around it";
-	case REACH_DARK:
+	case VISIBILITY_DARK:
 		return "nothing shines";
-	case REACH_DEPTH:
+	case VISIBILITY_DEPTH:
 		return "paths of one edge do not scatter";
-	case REACH_YES:
+	case VISIBILITY_YES:
 		break;
 	}
 	return "";
@@ -325,9 +325,9 @@ static void emitter_moves(struct report *r, const struct census *c)
 		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, false, c->delta.count ? "all emitters are single points or directions" : "nothing shines");
 }
 
-static void depth(struct report *r, const struct world *w, const struct effects_source *src, const enum reach *shape)
+static void depth(struct report *r, const struct world *w, const struct effects_source *src, const enum visibility_bounds *shape)
 {
-	uint32_t asked = src->max_depth ? src->max_depth : w->settings.max_depth, bound = reach_depth(w, shape);
+	uint32_t asked = src->max_depth ? src->max_depth : w->settings.max_depth, bound = visibility_bounds_depth(w, shape);
 	uint32_t useful = bound < asked ? bound : asked;
 	bool on;
 	if (useful < asked)
@@ -338,11 +338,11 @@ static void depth(struct report *r, const struct world *w, const struct effects_
 	r->fx->max_depth = on ? asked : useful;
 }
 
-void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced, enum reach *shape)
+void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced, enum visibility_bounds *shape)
 {
 	struct effects *fx = &w->effects;
 	*fx = (struct effects){.line_count = 0};
-	reach_shapes(w, src->shape, src->max_depth ? src->max_depth : w->settings.max_depth, shape);
+	visibility_bounds_shapes(w, src->shape, src->max_depth ? src->max_depth : w->settings.max_depth, shape);
 	struct census c = take(w, src, shape);
 	struct report r = {fx, forced};
 	spectral(&r, &c);

@@ -78,16 +78,16 @@ struct effects_source {
 };
 
 /* Whether a path between camera and light can meet a shape; why not. */
-enum reach {
-	REACH_YES,
-	REACH_ENCLOSED, /* within a closed opaque shape that the camera is outside of */
-	REACH_DARK,     /* nothing shines in the scene, or what does is enclosed */
-	REACH_DEPTH,    /* paths are too short to scatter */
+enum visibility_bounds {
+	VISIBILITY_YES,
+	VISIBILITY_ENCLOSED, /* within a closed opaque shape that the camera is outside of */
+	VISIBILITY_DARK,     /* nothing shines in the scene, or what does is enclosed */
+	VISIBILITY_DEPTH,    /* paths are too short to scatter */
 };
 
 /* Fills w->effects from shapes, BSDFs and emitters, and shape[] (one a shape, see reach.h). */
-void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced, enum reach *shape);
+void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced, enum visibility_bounds *shape);
 /* Leaves out of the world what no path meets and what was switched off. */
-int effects_apply(struct world *w, const struct effects_choice *forced, const enum reach *shape, struct error *e);
+int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape, struct error *e);
 
 #endif

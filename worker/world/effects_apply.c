@@ -1,6 +1,6 @@
 /* What effects change in a world: shapes that no path meets turn black, what was switched off goes. */
-#include "worker/bsdf/without.h"
-#include "worker/world/reach.h"
+#include "worker/bsdf/lobe_filter.h"
+#include "worker/world/visibility_bounds.h"
 
 static void remove_emitter(struct world *w, uint32_t i)
 {
@@ -18,15 +18,15 @@ static bool is_switched_off(const struct emitter *em, const struct effects_choic
 }
 
 /* What no path meets, in the way of none: nothing of it is asked for. Not where something is forced on: that may be of it. */
-static void leave_out(struct world *w, const enum reach *shape)
+static void leave_out(struct world *w, const enum visibility_bounds *shape)
 {
 	uint32_t black = w->bsdf_count++; /* there is room for one more than shapes */
 	bsdf_black(&w->bsdfs[black]);
 	for (uint32_t i = 0; i < w->shape_count; i++)
-		if (shape[i] != REACH_YES || w->bsdfs[w->parts[i].bsdf].black)
+		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->parts[i].bsdf].black)
 			w->parts[i].bsdf = black;
 	for (uint32_t i = 0; i < w->emitter_count; i++)
-		if (!reach_emitter(w, shape, i))
+		if (!visibility_bounds_emitter(w, shape, i))
 			remove_emitter(w, i);
 }
 
@@ -42,7 +42,7 @@ static unsigned lobes_without(const struct bsdf *b, const struct effects_choice 
 	return without;
 }
 
-int effects_apply(struct world *w, const struct effects_choice *forced, const enum reach *shape, struct error *e)
+int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape, struct error *e)
 {
 	if (!forced->any_on)
 		leave_out(w, shape);
@@ -54,7 +54,7 @@ int effects_apply(struct world *w, const struct effects_choice *forced, const en
 		else if (forced->of[EFFECT_DISPERSION] > 0 && b->eta != 1)
 			b->dispersive = true;
 		unsigned without = lobes_without(b, forced);
-		int rc = without ? bsdf_without(b, without, &w->arena, e) : 0;
+		int rc = without ? bsdf_filter_lobes(b, without, &w->arena, e) : 0;
 		if (rc)
 			return rc;
 	}

@@ -29,20 +29,20 @@ void world_summary(const struct world *w, struct render_summary *out)
 		out->triangles += w->shapes[i].triangle_count;
 }
 
-int world_set_knobs(struct world *w, const char *text, bool *fits, struct error *e)
+int world_set_accuracy(struct world *w, const char *text, bool *fits, struct error *e)
 {
-	struct knobs knobs;
-	const struct render_knob *k;
-	int rc = knobs_read(text, &knobs, e);
+	struct accuracy_settings accuracy;
+	const struct render_setting *k;
+	int rc = accuracy_settings_read(text, &accuracy, e);
 	*fits = rc == 0;
-	for (size_t i = 0; *fits && (k = render_knob_at(i)) != NULL; i++) {
+	for (size_t i = 0; *fits && (k = render_setting_at(i)) != NULL; i++) {
 		char old[32], new[32];
-		knobs_value(&w->knobs, i, old, sizeof old);
-		knobs_value(&knobs, i, new, sizeof new);
-		*fits = k->place != KNOB_WORLD || strcmp(old, new) == 0;
+		accuracy_settings_value(&w->accuracy, i, old, sizeof old);
+		accuracy_settings_value(&accuracy, i, new, sizeof new);
+		*fits = k->place != SETTING_WORLD || strcmp(old, new) == 0;
 	}
 	if (*fits)
-		w->knobs = knobs;
+		w->accuracy = accuracy;
 	return rc;
 }
 

@@ -8,7 +8,7 @@
 
 #include "worker/camera/camera.h"
 #include "worker/geom/surface.h"
-#include "worker/render/knobs.h"
+#include "worker/render/accuracy_settings.h"
 #include "worker/world/effects.h"
 
 struct world_shape {
@@ -20,7 +20,7 @@ struct world {
 	struct arena arena;
 	struct scene_settings settings;
 	struct effects effects;
-	struct knobs knobs;
+	struct accuracy_settings accuracy;
 	struct camera camera;
 	vec3 center;
 	double scale, radius; /* of the rescaled bounding sphere around the origin */

@@ -106,9 +106,9 @@ static void bits_do_not_depend_on_the_order(void **unused)
 	enum { LEASES = 64 };
 	struct plan p = make_plan(PLAN_SAMPLES, 5, 4, 16, 4);
 	struct canvas_image first = {0};
-	for (int order_seed = 0; order_seed < 3; order_seed++) {
+	for (int live_job_seed = 0; live_job_seed < 3; live_job_seed++) {
 		struct canvas *c;
-		assert_int_equal(canvas_new(&c, &p, -8, order_seed == 2 ? "/tmp" : NULL, NULL), 0);
+		assert_int_equal(canvas_new(&c, &p, -8, live_job_seed == 2 ? "/tmp" : NULL, NULL), 0);
 		for (int pair = 0; pair < scaled(79); pair++) {
 			struct batch batches[2 * LEASES];
 			uint32_t order[2 * LEASES];
@@ -117,8 +117,8 @@ static void bits_do_not_depend_on_the_order(void **unused)
 				batches[i] = make_batch(&p, (uint64_t)pair * 2 + i / LEASES, i % 16, i / 16 % 4, 1, wide_value);
 				order[i] = i;
 			}
-			state = (uint64_t)(77 + order_seed * 1000 + pair);
-			if (order_seed)
+			state = (uint64_t)(77 + live_job_seed * 1000 + pair);
+			if (live_job_seed)
 				shuffle(order, 2 * LEASES);
 			for (uint32_t i = 0; i < 2 * LEASES; i++) {
 				struct error e;
@@ -131,7 +131,7 @@ static void bits_do_not_depend_on_the_order(void **unused)
 		}
 		struct canvas_image img;
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
-		if (order_seed == 0) {
+		if (live_job_seed == 0) {
 			first = img;
 		} else {
 			assert_memory_equal(img.rgb, first.rgb, 5 * 4 * 3 * sizeof(float));

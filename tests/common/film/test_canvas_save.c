@@ -113,19 +113,19 @@ static void path_of(char path[128])
 static struct canvas *through_file(struct canvas *c, const struct plan *p, const char *films)
 {
 	char path[128];
-	struct sealed s;
+	struct checked_file s;
 	struct error e;
 	path_of(path);
-	assert_int_equal(sealed_create(&s, path, &e), 0);
+	assert_int_equal(checked_file_create(&s, path, &e), 0);
 	assert_int_equal(canvas_save(c, &s, &e), 0);
-	assert_int_equal(sealed_finish(&s, &e), 0);
+	assert_int_equal(checked_file_finish(&s, &e), 0);
 	canvas_free(c);
 	c = make(p, films);
-	assert_int_equal(sealed_open(&s, path, &e), 0);
+	assert_int_equal(checked_file_open(&s, path, &e), 0);
 	if (canvas_load(c, &s, &e))
 		fail_msg("%s", e.text);
 	assert_int_equal(s.left, 0);
-	sealed_close(&s);
+	checked_file_close(&s);
 	return c;
 }
 
@@ -286,7 +286,7 @@ static void others_are_refused(void **unused)
 {
 	(void)unused;
 	char path[128];
-	struct sealed s;
+	struct checked_file s;
 	struct error e;
 	struct stat st;
 	struct plan p = make_plan(PLAN_CHAINS), q = p;
@@ -299,14 +299,14 @@ static void others_are_refused(void **unused)
 	q.groups = 2;
 	q.chains /= 2;
 	assert_int_equal(canvas_new(&c, &q, EXPONENT, NULL, NULL), 0);
-	assert_int_equal(sealed_open(&s, path, &e), 0);
+	assert_int_equal(checked_file_open(&s, path, &e), 0);
 	assert_int_equal(canvas_load(c, &s, &e), -EBADMSG);
-	sealed_close(&s);
+	checked_file_close(&s);
 	canvas_free(c);
 	assert_int_equal(canvas_new(&c, &p, EXPONENT + 1, NULL, NULL), 0);
-	assert_int_equal(sealed_open(&s, path, &e), 0);
+	assert_int_equal(checked_file_open(&s, path, &e), 0);
 	assert_int_equal(canvas_load(c, &s, &e), -EBADMSG);
-	sealed_close(&s);
+	checked_file_close(&s);
 	canvas_free(c);
 	assert_int_equal(stat(path, &st), 0);
 	for (int i = 0; i < 40; i++) {
@@ -316,19 +316,19 @@ static void others_are_refused(void **unused)
 		assert_int_equal(pread(fd, &byte, 1, at), 1);
 		byte ^= 16;
 		assert_int_equal(pwrite(fd, &byte, 1, at), 1);
-		assert_int_equal(sealed_open(&s, path, &e), -EBADMSG);
+		assert_int_equal(checked_file_open(&s, path, &e), -EBADMSG);
 		byte ^= 16;
 		assert_int_equal(pwrite(fd, &byte, 1, at), 1);
 		close(fd);
 	}
-	assert_int_equal(sealed_open(&s, path, &e), 0);
-	sealed_close(&s);
+	assert_int_equal(checked_file_open(&s, path, &e), 0);
+	checked_file_close(&s);
 	for (off_t cut = 1; cut < st.st_size; cut *= 3) {
 		assert_int_equal(truncate(path, st.st_size - cut), 0);
-		assert_int_equal(sealed_open(&s, path, &e), -EBADMSG);
+		assert_int_equal(checked_file_open(&s, path, &e), -EBADMSG);
 	}
 	unlink(path);
-	assert_int_equal(sealed_open(&s, path, &e), -ENOENT);
+	assert_int_equal(checked_file_open(&s, path, &e), -ENOENT);
 }
 
 int main(void)

@@ -5,7 +5,7 @@
 #include "common/base/mem.h"
 #include "common/net/client.h"
 #include "common/wire/frame.h"
-#include "tests/support/sealed_frame.h"
+#include "tests/support/checksummed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -39,7 +39,7 @@ struct coordinator {
 static void say(int fd, const Farm__Envelope *m, const void *payload, size_t payload_size)
 {
 	size_t size;
-	unsigned char *frame = sealed_message(m, payload, payload_size, &size);
+	unsigned char *frame = checksummed_message(m, payload, payload_size, &size);
 	for (size_t at = 0; at < size;) {
 		ssize_t n = send(fd, frame + at, size - at, MSG_NOSIGNAL);
 		if (n <= 0)

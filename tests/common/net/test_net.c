@@ -5,7 +5,7 @@
 #include "common/base/mem.h"
 #include "common/net/authority.h"
 #include "common/net/conn.h"
-#include "tests/support/sealed_frame.h"
+#include "tests/support/checksummed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -240,7 +240,7 @@ static void changed_bytes_close(void **state)
 	m.bye = &bye;
 	for (int where = 0; where < 4; where++) {
 		size_t size;
-		unsigned char payload[1000] = {0}, *bytes = sealed_message(&m, payload, sizeof payload, &size);
+		unsigned char payload[1000] = {0}, *bytes = checksummed_message(&m, payload, sizeof payload, &size);
 		static const size_t places[] = {1, 9, 17, 700}; /* a length, a checksum, the header, the payload */
 		bytes[places[where]] ^= 4;
 		connect_ends();
@@ -304,7 +304,7 @@ static void a_slow_frame_is_heard(void **state)
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_BYE;
 	m.bye = &bye;
-	d.bytes = sealed_message(&m, payload, PAYLOAD, &d.size);
+	d.bytes = checksummed_message(&m, payload, PAYLOAD, &d.size);
 	connect_ends();
 	send_bye(&here, 0);
 	while (!there.messages)

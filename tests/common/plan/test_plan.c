@@ -44,14 +44,14 @@ static void settings_and_effects_are_kept_and_told(void **state)
 	struct plan p;
 	struct error e;
 	char text[PLAN_TEXT];
-	strcpy(r.knobs, "tolerance=1e-05");
+	strcpy(r.accuracy, "tolerance=1e-05");
 	strcpy(r.effects, "-dispersion,+aperture");
 	assert_int_equal(plan_make(&r, &p, &e), 0);
 	plan_options(&p, 1, text, sizeof text);
 	assert_non_null(strstr(text, " --set tolerance=1e-05 --effects=-dispersion,+aperture --chains"));
-	p.knobs[40] = 'x'; /* something behind the end */
+	p.accuracy[40] = 'x'; /* something behind the end */
 	assert_int_equal(plan_check(&p, &e), -EINVAL);
-	p.knobs[40] = 0;
+	p.accuracy[40] = 0;
 	strcpy(p.effects, "a;b");
 	assert_int_equal(plan_check(&p, &e), -EINVAL);
 	memset(p.effects, 'a', sizeof p.effects);

@@ -367,7 +367,7 @@ static void plans_travel(void **state)
 	memset(longest, 'a', PLAN_MUTATIONS_MAX);
 	char *mixtures[] = {longest, control};
 	struct plan_request request = {.integrator = "hslt", .kind = PLAN_CHAINS, .mixture = "hslt=1",
-				       .knobs = "tolerance=1e-05", .effects = "all", .parts = 64, .speed = 31000.5}, again;
+				       .accuracy = "tolerance=1e-05", .effects = "all", .parts = 64, .speed = 31000.5}, again;
 	Farm__PlanRequest rm;
 	plan_request_to_wire(&request, &rm);
 	assert_int_equal(plan_request_from_wire(&rm, &again, &e), 0);
@@ -375,10 +375,10 @@ static void plans_travel(void **state)
 	rm.speed = -1;
 	assert_int_equal(plan_request_from_wire(&rm, &again, &e), -EBADMSG);
 	rm.speed = 0;
-	char long_text[PLAN_KNOBS_MAX + 1] = "";
-	memset(long_text, 'a', PLAN_KNOBS_MAX);
+	char long_text[PLAN_ACCURACY_MAX + 1] = "";
+	memset(long_text, 'a', PLAN_ACCURACY_MAX);
 	plan_to_wire(&p, &m);
-	m.knobs = long_text;
+	m.accuracy = long_text;
 	assert_int_equal(plan_from_wire(&m, &back, &e), -EBADMSG);
 	plan_to_wire(&p, &m);
 	m.effects = control;

@@ -1,5 +1,5 @@
 /* Chain states that workers refuse, as transcripts: who is asked, who is to blame, and that no job fails by it. */
-#include "coordinator/core/roster.h"
+#include "coordinator/core/worker_registry.h"
 #include "tests/support/transcript.h"
 
 #include <setjmp.h>

@@ -1,5 +1,5 @@
 /* Leases that two workers compute, and workers that are set aside, as transcripts. */
-#include "coordinator/core/roster.h"
+#include "coordinator/core/worker_registry.h"
 #include "tests/support/transcript.h"
 
 #include <setjmp.h>
@@ -37,7 +37,7 @@ static void agree(void **state)
 	assert_int_equal(j.verified, 3);
 	assert_int_equal(j.mismatched, 0);
 	assert_int_equal(j.duplicates, 0);
-	assert_int_equal(farm_next_aside(f, 0), 0);
+	assert_int_equal(farm_next_quarantined(f, 0), 0);
 	farm_free(f);
 }
 
@@ -202,8 +202,8 @@ static void set_aside(void **state)
 	struct job_status j;
 	assert_true(farm_peer(f, 6, &p));
 	assert_int_equal(p.state, PEER_ASIDE);
-	assert_int_equal(farm_next_aside(f, 0), 3);
-	assert_int_equal(farm_next_aside(f, 3), 0);
+	assert_int_equal(farm_next_quarantined(f, 0), 3);
+	assert_int_equal(farm_next_quarantined(f, 3), 0);
 	assert_true(farm_worker(f, 3, &w));
 	assert_int_equal(w.wrong, 3);
 	assert_string_equal(w.name, "c");
@@ -330,14 +330,14 @@ static void names_without_end(void **state)
 		snprintf(name, sizeof name, "n%u", (unsigned)i);
 		give_faults(f, i, "a", name);
 	}
-	uint64_t who = farm_next_aside(f, 0);
+	uint64_t who = farm_next_quarantined(f, 0);
 	assert_true(farm_worker(f, who, &w) && strcmp(w.certificate, "b") == 0);
 	int count = 0;
-	while ((who = farm_next_aside(f, who))) {
+	while ((who = farm_next_quarantined(f, who))) {
 		assert_true(farm_worker(f, who, &w));
 		count++;
 	}
-	assert_int_equal(count, IDENTITY_ASIDE);
+	assert_int_equal(count, IDENTITY_QUARANTINED);
 	assert_string_equal(w.name, "n499");
 	farm_free(f);
 }

@@ -198,7 +198,7 @@ static void what_is_read_stays(void **state)
 {
 	(void)state;
 	struct disk slow = disk_system;
-	struct order first = {.id = 3}, second = {.id = JOBS};
+	struct live_job first = {.id = 3}, second = {.id = JOBS};
 	slow.fsync = no_flush;
 	slow.open = slow_open;
 	disk_use(&slow);

@@ -578,11 +578,11 @@ static void no_memory_for_an_image(void **state)
 	uint64_t job = begin_a_job();
 	struct server *s = open_here();
 	assert_non_null(s);
-	struct order *o = server_order(s, job);
+	struct live_job *o = server_live_job(s, job);
 	assert_true(o && o->canvas);
 	for (enum publish_what what = PUBLISH_ERROR_ONLY; what <= PUBLISH_RESULT; what++) {
 		mem_fail_after(0);
-		publish_start(s, o, what, order_rounds(o));
+		publish_start(s, o, what, live_job_rounds(o));
 		mem_fail_after(-1);
 		assert_true(o->busy && !s->deferred);
 		while (o->busy || (what == PUBLISH_RESULT && !o->record.has_result))

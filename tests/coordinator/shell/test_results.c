@@ -6,8 +6,8 @@
 
 #include "common/base/mem.h"
 #include "coordinator/store/record.h"
-#include "tests/support/dark.h"
-#include "tests/support/sealed_frame.h"
+#include "tests/support/black_results.h"
+#include "tests/support/checksummed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>
@@ -54,14 +54,14 @@ static void a_black_job_ends(void **state)
 	assert_int_equal(a->job, 1);
 	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
 	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
-	struct desk d = {.count = 0};
+	struct lease_queue d = {.count = 0};
 	bool first = true;
 	while (!d.job_ended) {
 		if (d.count == 0) {
 			peer_attend(worker, &d);
 			continue;
 		}
-		struct batch b = dark_batch(&d.keys[--d.count], &plan, 0);
+		struct batch b = black_batch(&d.keys[--d.count], &plan, 0);
 		if (first) { /* wrong ones; then the right ones; then a repeat */
 			b.weights[0] = NAN;
 			peer_send_batch(worker, &b, &plan);
@@ -156,7 +156,7 @@ static void what_is_fetched_is_one_file(void **state)
 /* A lease of chains in the dark; of a bootstrap in even light. */
 static struct batch counting_batch(const struct lease_key *k, const struct plan *plan)
 {
-	struct batch b = dark_batch(k, plan, 4);
+	struct batch b = black_batch(k, plan, 4);
 	if (k->kind == LEASE_BOOTSTRAP) {
 		for (uint64_t i = 0; i < b.weight_count; i++)
 			b.weights[i] = 1;
@@ -225,7 +225,7 @@ static void strategies_are_counted_once(void **state)
 	assert_int_equal(peer_submit_answer(client)->job, 2); /* the scene is still there */
 	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
 	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
-	struct desk d = {.count = 0};
+	struct lease_queue d = {.count = 0};
 	bool first = true;
 	while (!d.job_ended) {
 		if (d.count == 0) {
@@ -264,7 +264,7 @@ static void send_bootstrap(struct scripted *p, const struct lease_key *k)
 	struct error e;
 	struct plan_request r = peer_plan_request(NULL);
 	assert_int_equal(plan_make(&r, &plan, &e), 0);
-	struct batch b = dark_batch(k, &plan, 0);
+	struct batch b = black_batch(k, &plan, 0);
 	peer_send_batch(p, &b, &plan);
 	batch_fini(&b);
 }
@@ -286,7 +286,7 @@ static void what_is_useless_does_not_wait(void **state)
 {
 	(void)state;
 	struct scripted *client = peer_call(), *worker = peer_call(), *other = peer_call();
-	struct desk d = {.count = 0}, none = {.count = 0};
+	struct lease_queue d = {.count = 0}, none = {.count = 0};
 	assert_true(peer_hello(client, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
 	peer_submit(client, NULL, "<scene/>", "s.xml", "s.xml");
 	uint64_t job = peer_submit_answer(client)->job;
@@ -336,8 +336,8 @@ static void what_is_useless_does_not_wait(void **state)
 
 /* ---- slow links ---- */
 
-/* A worker with a lease of a new job, and its result. The keys of what came stay in the desk. */
-static struct scripted *worker_with_result(struct scripted *client, struct desk *d, unsigned char **frame, size_t *size)
+/* A worker with a lease of a new job, and its result. The keys of what came stay in the lease queue. */
+static struct scripted *worker_with_result(struct scripted *client, struct lease_queue *d, unsigned char **frame, size_t *size)
 {
 	struct scripted *worker = peer_call();
 	struct plan plan;
@@ -354,10 +354,10 @@ static struct scripted *worker_with_result(struct scripted *client, struct desk 
 	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
 	while (d->count == 0)
 		peer_attend(worker, d);
-	struct batch b = dark_batch(&d->keys[0], &plan, 0);
+	struct batch b = black_batch(&d->keys[0], &plan, 0);
 	unsigned char *packed;
 	assert_int_equal(batch_pack(&b, &plan, &packed, size, &e), 0);
-	*frame = sealed_frame(packed, *size, size);
+	*frame = checksummed_frame(packed, *size, size);
 	mem_free(packed);
 	batch_fini(&b);
 	return worker;
@@ -387,7 +387,7 @@ static bool sends_slowly(struct scripted *worker, const unsigned char *frame, si
 	}
 	if (longest > 4 * QUICK)
 		return false;
-	struct desk d = {.count = 0};
+	struct lease_queue d = {.count = 0};
 	assert_true(sent);
 	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
 	assert_true(worker->heartbeats >= (last - begun) / (QUICK + longest) / 2 && worker->heartbeats <= (now() - begun) / QUICK + 2);
@@ -401,7 +401,7 @@ static void a_slow_result_counts(void **state)
 	for (bool done = false; !done;) {
 		unsigned char *frame;
 		size_t size;
-		struct desk d = {.count = 0};
+		struct lease_queue d = {.count = 0};
 		struct scripted *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
 		worker->heartbeats = 0;
 		done = sends_slowly(worker, frame, size);
@@ -416,7 +416,7 @@ static void half_a_result_is_no_word(void **state)
 	(void)state;
 	unsigned char *frame;
 	size_t size;
-	struct desk d = {.count = 0};
+	struct lease_queue d = {.count = 0};
 	struct scripted *client = peer_call(), *worker = worker_with_result(client, &d, &frame, &size);
 	peer_say_bytes(worker, frame, size / 2);
 	const Farm__Envelope *m;
@@ -442,7 +442,7 @@ static void say_extend(const struct scripted *p, uint64_t job, uint64_t spp, int
 	m.control = &c;
 	for (int i = 0; i < times; i++) {
 		size_t size;
-		unsigned char *frame = sealed_message(&m, NULL, 0, &size);
+		unsigned char *frame = checksummed_message(&m, NULL, 0, &size);
 		memcpy(all + at, frame, size);
 		at += size;
 		free(frame);
@@ -515,7 +515,7 @@ static void a_failure_counts_whatever_its_text(void **state)
 	assert_true(peer_submit_answer(client)->job);
 	assert_true(peer_hello(worker, FARM_VERSION, FARM__ROLE__ROLE_WORKER)->accepted);
 	peer_say_empty(worker, FARM__ENVELOPE__BODY_LEASE_REQUEST);
-	struct desk d = {.count = 0};
+	struct lease_queue d = {.count = 0};
 	while (d.count == 0)
 		peer_attend(worker, &d);
 	say_failed(worker, &d.keys[0], "half a letter \xc3\nof a file");

@@ -5,7 +5,7 @@
 #include "tests/support/served.h"
 
 #include "common/base/mem.h"
-#include "tests/support/sealed_frame.h"
+#include "tests/support/checksummed_frame.h"
 
 #include <stdarg.h>
 #include <stddef.h>

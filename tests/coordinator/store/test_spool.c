@@ -77,8 +77,8 @@ static void records_come_back(void **state)
 	r.longest_stuck = 5210;
 	for (uint64_t i = 0; i < 2 * STRATEGY_COUNTERS; i++)
 		r.strategy[i / STRATEGY_COUNTERS][i % STRATEGY_COUNTERS] = i * i;
-	record_begin_agreement(&r);
-	r.agreement = (struct agreement){CHAINS_DISAGREE, 12, 3, 0.125, 1.01, 2.5, 64, 128, 1U << 7 | 1, 1U << 19 | 2, 0.25, "chains \"disagree\""};
+	record_begin_convergence(&r);
+	r.agreement = (struct convergence){CHAINS_DISAGREE, 12, 3, 0.125, 1.01, 2.5, 64, 128, 1U << 7 | 1, 1U << 19 | 2, 0.25, "chains \"disagree\""};
 	r.b = 1.0 / 7;
 	r.classes[7] = (struct path_class_energy){0.1, 0.01, 0.2, 0.02, -12.5};
 	r.classes[0] = (struct path_class_energy){0.3, NAN, 0.4, NAN, NAN};
@@ -107,7 +107,7 @@ static void records_come_back(void **state)
 	assert_string_equal(back.effects, r.effects);
 	assert_true(back.stuck == 3 && back.longest_stuck == 5210);
 	assert_memory_equal(back.strategy, r.strategy, sizeof r.strategy);
-	const struct agreement *a = &back.agreement;
+	const struct convergence *a = &back.agreement;
 	assert_true(a->verdict == CHAINS_DISAGREE && a->tiles == 12 && a->tiles_flagged == 3 && a->energy_flagged == 0.125);
 	assert_true(a->r_hat_median == 1.01 && a->r_hat_worst == 2.5 && a->worst_x == 64 && a->worst_y == 128);
 	assert_true(a->classes_flagged == r.agreement.classes_flagged && a->classes_apart == r.agreement.classes_apart && a->stuck_share == 0.25 && back.b == r.b);

@@ -2,7 +2,7 @@
  * waits: for that one. */
 #include "coordinator/shell/server.h"
 #include "tests/support/folder.h"
-#include "worker/cli/outlast.h"
+#include "worker/cli/reconnect.h"
 
 #include "common/base/log.h"
 
@@ -167,7 +167,7 @@ static int wait_for(struct client **cl, const struct submitted *job, struct subm
 {
 	char output[96];
 	snprintf(output, sizeof output, "%s/image.exr", folder);
-	return outlast_job(cl, &(struct outlast){.coordinator = address, .patience = 60}, job, output, end, e);
+	return reconnect_job(cl, &(struct reconnect){.coordinator = address, .patience = 60}, job, output, end, e);
 }
 
 /* The coordinator comes back, with its spool or with another one in which our number is somebody else's. */

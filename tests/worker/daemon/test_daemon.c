@@ -1,8 +1,8 @@
 /* The worker's parts: threads and their way back, the cache's slots, what is fetched, the fingerprint. */
 #include "common/base/mem.h"
-#include "worker/daemon/bundle.h"
+#include "worker/daemon/job_cache.h"
 #include "worker/daemon/cache.h"
-#include "worker/daemon/crew.h"
+#include "worker/daemon/thread_pool.h"
 #include "worker/daemon/fingerprint.h"
 #include "tests/support/folder.h"
 
@@ -20,7 +20,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* ---- crew ---- */
+/* ---- thread pool ---- */
 
 struct job {
 	struct task task;
@@ -57,31 +57,31 @@ static void the_crew_works(void **state)
 	static struct job jobs[JOBS];
 	atomic_int running = 0, most = 0, gate = 0;
 	uv_loop_t loop;
-	struct crew *c;
+	struct thread_pool *c;
 	struct error e;
 	loop_thread = pthread_self();
 	assert_int_equal(uv_loop_init(&loop), 0);
-	assert_int_equal(crew_new(&c, &loop, 3, &e), 0);
+	assert_int_equal(thread_pool_new(&c, &loop, 3, &e), 0);
 	for (int i = 0; i < JOBS; i++) {
 		jobs[i] = (struct job){.task = {.run = run, .done = done}, .running = &running, .most = &most, .gate = &gate};
-		crew_add(c, &jobs[i].task);
+		thread_pool_add(c, &jobs[i].task);
 	}
 	while (atomic_load(&running) < 3)
 		usleep(100);
-	assert_false(crew_take_back(c, &jobs[0].task)); /* it runs */
-	assert_true(crew_take_back(c, &jobs[50].task));
-	assert_true(crew_take_back(c, &jobs[JOBS - 1].task));
-	assert_false(crew_take_back(c, &jobs[50].task));
-	assert_int_equal(crew_pending(c), JOBS - 2);
-	crew_add(c, &jobs[50].task); /* behind the others */
+	assert_false(thread_pool_take_back(c, &jobs[0].task)); /* it runs */
+	assert_true(thread_pool_take_back(c, &jobs[50].task));
+	assert_true(thread_pool_take_back(c, &jobs[JOBS - 1].task));
+	assert_false(thread_pool_take_back(c, &jobs[50].task));
+	assert_int_equal(thread_pool_pending(c), JOBS - 2);
+	thread_pool_add(c, &jobs[50].task); /* behind the others */
 	atomic_store(&gate, 1);
-	while (crew_pending(c))
+	while (thread_pool_pending(c))
 		uv_run(&loop, UV_RUN_ONCE);
 	for (int i = 0; i < JOBS; i++)
 		assert_int_equal(jobs[i].done, i != JOBS - 1);
 	assert_false(pthread_equal(jobs[0].ran_on, loop_thread));
 	assert_int_equal(atomic_load(&most), 3);
-	crew_close(c);
+	thread_pool_close(c);
 	uv_run(&loop, UV_RUN_DEFAULT);
 	assert_int_equal(uv_loop_close(&loop), 0);
 }
@@ -148,7 +148,7 @@ static void a_cache_of_others_is_not_used(void **state)
 
 /* ---- bundle ---- */
 
-static void set_info(struct bundle *b, const char *texts[], size_t count)
+static void set_info(struct job_cache *b, const char *texts[], size_t count)
 {
 	Farm__JobInfo info;
 	Farm__Plan plan;
@@ -183,7 +183,7 @@ static void set_info(struct bundle *b, const char *texts[], size_t count)
 	m.job_info = &info;
 	assert_int_equal(envelope_pack(&m, NULL, 0, &frame, &size, &e), 0);
 	assert_int_equal(envelope_unpack(&env, frame + 8, size - 8, &e), 0);
-	assert_int_equal(bundle_set_info(b, &env, &e), 0);
+	assert_int_equal(job_cache_set_info(b, &env, &e), 0);
 	mem_free(frame);
 }
 
@@ -199,45 +199,45 @@ static void give(struct cache *c, const char *text)
 	blob_release(c->blobs, &h);
 }
 
-static void on_built(struct bundle *b)
+static void on_built(struct job_cache *b)
 {
-	assert_true(b->state == BUNDLE_READY || b->state == BUNDLE_FAILED);
+	assert_true(b->state == JOB_CACHE_READY || b->state == JOB_CACHE_FAILED);
 }
 
 static void a_bundle_holds_what_it_needs(void **state)
 {
 	(void)state;
 	struct cache cache;
-	struct bundle *b;
+	struct job_cache *b;
 	struct error e;
-	struct crew *crew;
+	struct thread_pool *thread_pool;
 	uv_loop_t loop;
 	const char *texts[] = {"<scene>", "second file", "<scene>", ""};
 	struct blob_hash first;
 	assert_int_equal(cache_open(&cache, folder, 1000, &e), 0);
-	assert_int_equal(bundle_new(&b, 5, cache.blobs, &e), 0);
+	assert_int_equal(job_cache_new(&b, 5, cache.blobs, &e), 0);
 	set_info(b, texts, 4);
 	assert_int_equal(blob_hash_bytes(texts[0], 7, &first, &e), 0);
-	assert_true(bundle_next_missing(b));
+	assert_true(job_cache_next_missing(b));
 	assert_true(blob_hash_equal(&b->wanted, &first));
 	give(&cache, texts[0]);
-	assert_true(bundle_next_missing(b));
+	assert_true(job_cache_next_missing(b));
 	assert_false(blob_hash_equal(&b->wanted, &first));
 	give(&cache, texts[1]);
-	assert_true(bundle_next_missing(b)); /* the third is the first again; the empty one is left */
+	assert_true(job_cache_next_missing(b)); /* the third is the first again; the empty one is left */
 	give(&cache, texts[3]);
-	assert_false(bundle_next_missing(b));
+	assert_false(job_cache_next_missing(b));
 	/* The scene is none: that is found by the builder, and said. */
 	assert_int_equal(uv_loop_init(&loop), 0);
-	assert_int_equal(crew_new(&crew, &loop, 1, &e), 0);
+	assert_int_equal(thread_pool_new(&thread_pool, &loop, 1, &e), 0);
 	b->built = on_built;
-	assert_int_equal(bundle_build(b, crew, &e), 0);
-	while (b->state == BUNDLE_BUILDING)
+	assert_int_equal(job_cache_build(b, thread_pool, &e), 0);
+	while (b->state == JOB_CACHE_BUILDING)
 		uv_run(&loop, UV_RUN_ONCE);
-	assert_int_equal(b->state, BUNDLE_FAILED);
+	assert_int_equal(b->state, JOB_CACHE_FAILED);
 	assert_non_null(strstr(b->error.text, "f0"));
-	bundle_free(b);
-	crew_close(crew);
+	job_cache_free(b);
+	thread_pool_close(thread_pool);
 	uv_run(&loop, UV_RUN_DEFAULT);
 	assert_int_equal(uv_loop_close(&loop), 0);
 	cache_close(&cache);

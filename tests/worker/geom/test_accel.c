@@ -3,7 +3,7 @@
  * lies between and nothing else, but for those that pass an edge by less than floats can tell. Deterministic: every count below
  * is exact, no rate is estimated.
  */
-#include "common/base/tick.h"
+#include "common/base/liveness.h"
 #include "tests/support/bodies.h"
 #include "worker/geom/accel.h"
 

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-enum { DENSE_MOST = 2 * WHOLE_MAX_VERTICES };
+enum { DENSE_MOST = 2 * FULL_PATH_MAX_VERTICES };
 
 struct dense {
 	unsigned n;

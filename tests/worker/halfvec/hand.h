@@ -15,23 +15,23 @@ enum hand_uv { HAND_UV_NONE, HAND_UV, HAND_UV_DEGENERATE };
 
 struct hand {
 	struct world w;
-	struct whole_path x;
-	struct geom_shape shape[WHOLE_MAX_VERTICES];
-	struct bsdf bsdf[WHOLE_MAX_VERTICES];
-	float position[WHOLE_MAX_VERTICES][3][3], normal[WHOLE_MAX_VERTICES][3][3], uv[WHOLE_MAX_VERTICES][3][2];
-	uint32_t index[WHOLE_MAX_VERTICES][1][3];
+	struct full_path_path x;
+	struct geom_shape shape[FULL_PATH_MAX_VERTICES];
+	struct bsdf bsdf[FULL_PATH_MAX_VERTICES];
+	float position[FULL_PATH_MAX_VERTICES][3][3], normal[FULL_PATH_MAX_VERTICES][3][3], uv[FULL_PATH_MAX_VERTICES][3][2];
+	uint32_t index[FULL_PATH_MAX_VERTICES][1][3];
 };
 
 static inline void hand_begin(struct hand *h, unsigned edges)
 {
 	memset(h, 0, sizeof *h);
 	h->x.edges = edges;
-	h->w.knobs = knobs_default;
+	h->w.accuracy = accuracy_settings_default;
 	h->w.shapes = h->shape;
-	h->w.shape_count = WHOLE_MAX_VERTICES;
+	h->w.shape_count = FULL_PATH_MAX_VERTICES;
 	h->w.camera = (struct camera){.axes = {{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}, .width = 640, .height = 480, .scale = 700,
 				      .far_clip = INFINITY};
-	for (unsigned j = 0; j < WHOLE_MAX_VERTICES; j++) {
+	for (unsigned j = 0; j < FULL_PATH_MAX_VERTICES; j++) {
 		h->bsdf[j] = (struct bsdf){.eta = 1, .alpha = 0.1, .alpha_mean = 0.1, .has_smooth = true};
 		h->x.v[j].bsdf = &h->bsdf[j];
 		h->x.v[j].emitter = -1;
@@ -119,7 +119,7 @@ static inline void hand_emitter(struct hand *h, vec3 p, vec3 ng)
 static inline void hand_join(struct hand *h)
 {
 	for (unsigned e = 0; e < h->x.edges; e++) {
-		bool apart = whole_join(&h->x, e);
+		bool apart = full_path_join(&h->x, e);
 		assert(apart);
 		(void)apart;
 	}
@@ -137,8 +137,8 @@ static inline void hand_scatters(struct hand *h, unsigned j, double eta)
 static inline bool hand_chain(struct hand *h, unsigned edges, double bent, struct dice *d)
 {
 	static const double etas[] = {1.5, 1 / 1.5, 1.33, 1.2};
-	vec3 p[WHOLE_MAX_VERTICES];
-	double eta[WHOLE_MAX_VERTICES] = {0};
+	vec3 p[FULL_PATH_MAX_VERTICES];
+	double eta[FULL_PATH_MAX_VERTICES] = {0};
 	hand_begin(h, edges);
 	for (unsigned j = 0; j <= edges; j++)
 		p[j] = (vec3){dice_between(d, -1, 1), dice_between(d, -1, 1), dice_between(d, -1, 1)};

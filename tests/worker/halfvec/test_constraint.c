@@ -193,7 +193,7 @@ static double step_of(const struct hand *h)
 		if (j < 2)
 			l = fmin(l, sqrt(h->x.edge[j].distance2));
 	}
-	vec3 sum = vec3_sub(vec3_scale(whole_eta(&h->x, 1), h->x.edge[1].w), h->x.edge[0].w);
+	vec3 sum = vec3_sub(vec3_scale(full_path_eta(&h->x, 1), h->x.edge[1].w), h->x.edge[0].w);
 	return 1e-8 * l * fmin(fabs(vec3_dot(sum, h->x.v[1].x.sh.n)), 1);
 }
 
@@ -257,7 +257,7 @@ static void test_corners(void **state)
 static double solid_per_slopes(const struct hand *h, unsigned j)
 {
 	vec3 i = vec3_neg(h->x.edge[j - 1].w), o = h->x.edge[j].w, n = h->x.v[j].x.sh.n;
-	double eta = whole_eta(&h->x, j);
+	double eta = full_path_eta(&h->x, j);
 	vec3 half = vec3_normalize(vec3_madd(i, eta, o));
 	double hn = fabs(vec3_dot(half, n)), ih = vec3_dot(i, half), oh = vec3_dot(o, half);
 	double per_half = h->x.v[j].mode == BSDF_REFLECT ? 4 * fabs(ih) : (ih + eta * oh) * (ih + eta * oh) / fabs(ih);
@@ -278,7 +278,7 @@ static void test_identity(void **state)
 	struct dice d = dice_of("the chain identity");
 	double worst[2] = {0, 0};
 	static struct hand h;
-	static struct constraint k[WHOLE_MAX_VERTICES];
+	static struct constraint k[FULL_PATH_MAX_VERTICES];
 	static struct constraint_system m;
 	for (unsigned bent = 0; bent < 2; bent++) {
 		for (size_t made = 0; made < dice_count(600);) {

@@ -15,8 +15,8 @@
 
 #include <cmocka.h>
 
-static struct constraint k[WHOLE_MAX_VERTICES];
-static struct halfvec_step step[WHOLE_MAX_VERTICES];
+static struct constraint k[FULL_PATH_MAX_VERTICES];
+static struct halfvec_step step[FULL_PATH_MAX_VERTICES];
 static struct hand h;
 
 /* With that many pixels as the film's step. */
@@ -97,7 +97,7 @@ static bool make_seen(struct dice *d)
 	h.bsdf[1].alpha = INFINITY;
 	hand_join(&h);
 	hand_scatters(&h, 1, dice_throw(d) < 0.5 ? 0 : 1.5);
-	vec3 sum = vec3_sub(vec3_scale(whole_eta(&h.x, 1), h.x.edge[1].w), h.x.edge[0].w);
+	vec3 sum = vec3_sub(vec3_scale(full_path_eta(&h.x, 1), h.x.edge[1].w), h.x.edge[0].w);
 	return fabs(vec3_dot(sum, h.x.v[1].x.sh.n)) > 0.2 && fabs(vec3_dot(h.x.v[1].x.ng, h.x.edge[1].w)) > 0.1 &&
 	       fabs(vec3_dot(h.x.v[1].x.sh.n, h.x.edge[1].w)) > 0.1;
 }

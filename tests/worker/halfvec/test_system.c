@@ -14,7 +14,7 @@
 
 #include <cmocka.h>
 
-static struct constraint k[WHOLE_MAX_VERTICES];
+static struct constraint k[FULL_PATH_MAX_VERTICES];
 static struct constraint_system system_;
 static struct dense dense;
 /* Which of the two is looked at, and what it rounds by. */
@@ -57,7 +57,7 @@ static void focus(struct dice *d, unsigned b, unsigned c)
 static void singular(struct dice *d, unsigned b, unsigned c)
 {
 	random_system(d, b, c, 1);
-	vec2 x[WHOLE_MAX_VERTICES] = {{0, 0}};
+	vec2 x[FULL_PATH_MAX_VERTICES] = {{0, 0}};
 	for (unsigned j = c + 1; j < b; j++)
 		x[j] = (vec2){dice_between(d, 0.5, 1), dice_between(d, 0.5, 1)};
 	for (unsigned j = c + 1; j < b; j++) {
@@ -74,8 +74,8 @@ static void singular(struct dice *d, unsigned b, unsigned c)
 /* Rows in units of their own, columns in theirs, as slopes at different vertices and lengths at different distances. */
 static void rescale(struct dice *d, unsigned b, unsigned c, int most)
 {
-	double row[WHOLE_MAX_VERTICES][2], column[WHOLE_MAX_VERTICES + 1][2];
-	for (unsigned j = 0; j < WHOLE_MAX_VERTICES; j++)
+	double row[FULL_PATH_MAX_VERTICES][2], column[FULL_PATH_MAX_VERTICES + 1][2];
+	for (unsigned j = 0; j < FULL_PATH_MAX_VERTICES; j++)
 		for (int i = 0; i < 2; i++) {
 			row[j][i] = ldexp(1, (int)dice_below(d, (uint32_t)(2 * most + 1)) - most);
 			column[j][i] = ldexp(1, (int)dice_below(d, (uint32_t)(2 * most + 1)) - most);
@@ -198,8 +198,8 @@ static double long_log_transfer(unsigned b, unsigned c, double *condition)
 /* refused: counts systems that float takes for singular. */
 static unsigned compare_system(struct dice *d, unsigned b, unsigned c, struct worst *w, size_t *refused)
 {
-	vec2 dh[WHOLE_MAX_VERTICES], dx[WHOLE_MAX_VERTICES];
-	mat2 dj[WHOLE_MAX_VERTICES];
+	vec2 dh[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
+	mat2 dj[FULL_PATH_MAX_VERTICES];
 	dense_fill(&dense, k, b, c);
 	assert_true(dense_invert(&dense));
 	enum constraint_end end = solver->factor(k, b, c, &system_);
@@ -242,7 +242,7 @@ static void compare_all(void)
 		size_t pivoted = 0, refused = 0, count = dice_count(kinds[i].most > 12 ? 10 : 300);
 		for (size_t s = 0; s < count; s++) {
 			unsigned inside = kinds[i].least + dice_below(&d, kinds[i].most - kinds[i].least + 1);
-			unsigned c = dice_below(&d, (uint32_t)(WHOLE_MAX_VERTICES - 1 - inside)), b = c + inside + 1;
+			unsigned c = dice_below(&d, (uint32_t)(FULL_PATH_MAX_VERTICES - 1 - inside)), b = c + inside + 1;
 			make_system(&kinds[i], &d, b, c);
 			pivoted += compare_system(&d, b, c, &w, &refused);
 		}
@@ -280,7 +280,7 @@ static void test_singular(void **state)
 	(void)state;
 	struct dice d = dice_of("singular systems");
 	size_t count = dice_count(2000);
-	mat2 dj[WHOLE_MAX_VERTICES];
+	mat2 dj[FULL_PATH_MAX_VERTICES];
 	for (size_t s = 0; s < count; s++) {
 		unsigned inside = 1 + dice_below(&d, 8), c = dice_below(&d, 4), b = c + inside + 1;
 		singular(&d, b, c);
@@ -300,8 +300,8 @@ static void test_singular(void **state)
 static void extremes_of(const struct constraint_solver *solver_, const double *values)
 {
 	struct dice d = dice_of("extreme systems");
-	vec2 dh[WHOLE_MAX_VERTICES], dx[WHOLE_MAX_VERTICES];
-	mat2 dj[WHOLE_MAX_VERTICES];
+	vec2 dh[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
+	mat2 dj[FULL_PATH_MAX_VERTICES];
 	size_t refused = 0, count = dice_count(20000);
 	for (size_t s = 0; s < count; s++) {
 		unsigned inside = 1 + dice_below(&d, s % 50 ? 6 : 31), b = inside + 1, few = s % 2 ? 12 : 9;
@@ -367,7 +367,7 @@ static void test_units(void **state)
 static void chain_halves(const struct quad_vertex *v, const struct quad_problem *q, const quad offset[][2], unsigned edges,
 			 quad h[][2])
 {
-	struct quad_place p[WHOLE_MAX_VERTICES];
+	struct quad_place p[FULL_PATH_MAX_VERTICES];
 	for (unsigned j = 0; j <= edges; j++)
 		p[j] = quad_at(&v[j], offset[j][0], offset[j][1]);
 	for (unsigned j = 1; j < edges; j++)
@@ -378,8 +378,8 @@ static void chain_halves(const struct quad_vertex *v, const struct quad_problem 
 static void solve_chain(const struct quad_vertex *v, const struct quad_problem *q, const quad target[][2], quad offset[][2],
 			unsigned edges)
 {
-	quad h[WHOLE_MAX_VERTICES][2];
-	vec2 dh[WHOLE_MAX_VERTICES], dx[WHOLE_MAX_VERTICES];
+	quad h[FULL_PATH_MAX_VERTICES][2];
+	vec2 dh[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
 	for (int turn = 0; turn < 6; turn++) {
 		chain_halves(v, q, (const quad(*)[2])offset, edges, h);
 		double scale = 0;
@@ -402,10 +402,10 @@ static void solve_chain(const struct quad_vertex *v, const struct quad_problem *
 static vec2 resolved(const struct hand *h, unsigned what, int i)
 {
 	unsigned edges = h->x.edges;
-	struct quad_vertex v[WHOLE_MAX_VERTICES];
-	struct quad_problem q[WHOLE_MAX_VERTICES];
-	quad base[WHOLE_MAX_VERTICES][2], result[2][2];
-	const quad still[WHOLE_MAX_VERTICES][2] = {{0, 0}};
+	struct quad_vertex v[FULL_PATH_MAX_VERTICES];
+	struct quad_problem q[FULL_PATH_MAX_VERTICES];
+	quad base[FULL_PATH_MAX_VERTICES][2], result[2][2];
+	const quad still[FULL_PATH_MAX_VERTICES][2] = {{0, 0}};
 	const double step = 1e-13;
 	for (unsigned j = 0; j <= edges; j++)
 		v[j] = quad_of_surface(h, j);
@@ -413,7 +413,7 @@ static vec2 resolved(const struct hand *h, unsigned what, int i)
 		q[j] = quad_problem_of(h, j);
 	chain_halves(v, q, still, edges, base);
 	for (int side = 0; side < 2; side++) {
-		quad offset[WHOLE_MAX_VERTICES][2] = {{0, 0}}, target[WHOLE_MAX_VERTICES][2], move = side ? -step : step;
+		quad offset[FULL_PATH_MAX_VERTICES][2] = {{0, 0}}, target[FULL_PATH_MAX_VERTICES][2], move = side ? -step : step;
 		memcpy(target, base, sizeof target);
 		if (what == 0)
 			offset[0][i] = move;
@@ -432,7 +432,7 @@ static void test_solved_again(void **state)
 	(void)state;
 	struct dice d = dice_of("paths solved again");
 	static struct hand h;
-	mat2 dj[WHOLE_MAX_VERTICES];
+	mat2 dj[FULL_PATH_MAX_VERTICES];
 	double worst_transfer = 0, worst_differential = 0;
 	size_t pivoted = 0;
 	for (size_t made = 0; made < dice_count(100);) {

@@ -92,7 +92,7 @@ static wide direction(const struct path_vertex *a, const struct path_vertex *b)
 }
 
 /* The half vector at vertex j; also whether the vertex lies on its shape and scatters in its mode. */
-static void measure(const struct world *w, const struct whole_path *y, unsigned j, long double h[2])
+static void measure(const struct world *w, const struct full_path_path *y, unsigned j, long double h[2])
 {
 	const struct path_vertex *v = &y->v[j];
 	wide p, n, s, i = direction(v, &y->v[j - 1]), o = direction(v, &y->v[j + 1]);
@@ -119,7 +119,7 @@ static struct ray_end end_of(const struct path_vertex *v)
 	return (struct ray_end){v->x.p, v->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : v->x.ng, v->x.prim};
 }
 
-static bool occluded(const struct world *w, const struct whole_path *y, unsigned e)
+static bool occluded(const struct world *w, const struct full_path_path *y, unsigned e)
 {
 	struct ray_end a = end_of(&y->v[e + 1]), b = end_of(&y->v[e]);
 	if (y->v[e].kind == VERTEX_INFINITE)
@@ -143,7 +143,7 @@ static struct path_context context_of(const struct world *w, uint64_t *counters)
 }
 
 /* The camera's sub-path as a whole path. false: too short to have inner vertices. */
-static bool draw_path(struct path_context *c, uint64_t seed, uint64_t i, struct whole_path *x)
+static bool draw_path(struct path_context *c, uint64_t seed, uint64_t i, struct full_path_path *x)
 {
 	struct sampler_random s;
 	double film[2];
@@ -158,7 +158,7 @@ static bool draw_path(struct path_context *c, uint64_t seed, uint64_t i, struct 
 	if (x->v[0].kind == VERTEX_SURFACE && x->v[0].emitter >= 0)
 		x->v[0].kind = VERTEX_EMITTER;
 	for (unsigned e = 0; e < x->edges; e++)
-		if (!whole_join(x, e))
+		if (!full_path_join(x, e))
 			return false;
 	return true;
 }
@@ -169,7 +169,7 @@ static double gauss(struct dice *d)
 }
 
 /* Moves x_b where the ray from the vertex before it, turned a little, meets the same material. */
-static void move_end(struct path_context *c, struct dice *d, struct whole_path *y, unsigned b)
+static void move_end(struct path_context *c, struct dice *d, struct full_path_path *y, unsigned b)
 {
 	if (b == y->edges)
 		return;
@@ -187,7 +187,7 @@ static void move_end(struct path_context *c, struct dice *d, struct whole_path *
 }
 
 /* Steps as mutations make them: the width of the lobe, or what moves the vertex by some hundredth of its distance. */
-static double step_of(const struct whole_path *x, const struct constraint *k, unsigned j)
+static double step_of(const struct full_path_path *x, const struct constraint *k, unsigned j)
 {
 	if (x->v[j].delta)
 		return 0;
@@ -195,7 +195,7 @@ static double step_of(const struct whole_path *x, const struct constraint *k, un
 	return fmin(alpha / sqrt(M_PI), reach * sqrt(mat2_norm2(k[j].b)));
 }
 
-static void check_residuals(const struct world *w, const struct whole_path *y, unsigned b, unsigned end,
+static void check_residuals(const struct world *w, const struct full_path_path *y, unsigned b, unsigned end,
 			    const struct walk_target *target, double scale, struct tally *t)
 {
 	for (unsigned j = end + 1; j < b; j++) {
@@ -203,13 +203,13 @@ static void check_residuals(const struct world *w, const struct whole_path *y, u
 		measure(w, y, j, h);
 		double off = (double)hypotl(h[0] - (long double)target[j].h.x, h[1] - (long double)target[j].h.y);
 		/* What double loses of directions that nearly cancel, next to an index of 1, no walk can see. */
-		vec3 half = vec3_sub(vec3_scale(whole_eta(y, j), y->edge[j].w), y->edge[j - 1].w);
+		vec3 half = vec3_sub(vec3_scale(full_path_eta(y, j), y->edge[j].w), y->edge[j - 1].w);
 		double rounding = 0x1p-52 / fabs(vec3_dot(half, y->v[j].x.sh.n));
 		t->worst = fmax(t->worst, (off - rounding) / (scale * target[j].tolerance));
 	}
 }
 
-static void check_arrival(struct path_context *c, const struct whole_path *x, const struct whole_path *y, unsigned b, unsigned end,
+static void check_arrival(struct path_context *c, const struct full_path_path *x, const struct full_path_path *y, unsigned b, unsigned end,
 			  const struct walk_target *target, double scale, struct tally *t)
 {
 	check_residuals(c->w, y, b, end, target, scale, t);
@@ -229,18 +229,18 @@ static void check_arrival(struct path_context *c, const struct whole_path *x, co
 }
 
 static struct walk_scratch s;
-static struct knobs knobs;
+static struct accuracy_settings accuracy;
 
 /* Back from y to x: x_b and the half vectors of x. */
-static void walk_back(struct path_context *c, const struct whole_path *x, struct whole_path *y, unsigned b, unsigned end,
+static void walk_back(struct path_context *c, const struct full_path_path *x, struct full_path_path *y, unsigned b, unsigned end,
 		      struct walk_target *target, const struct constraint *k, struct tally *t)
 {
-	static struct whole_path z;
+	static struct full_path_path z;
 	z = *y;
 	z.v[b] = x->v[b];
 	for (unsigned j = end + 1; j < b; j++)
 		target[j].h = x->v[j].delta ? (vec2){0, 0} : k[j].h;
-	struct walk_limits limits = walk_limits_of(&knobs);
+	struct walk_limits limits = walk_limits_of(&accuracy);
 	limits.scale = 0.1; /* tighter than the way there: where x lies is known, only its own residual is to tell */
 	enum walk_end back = halfvec_walk(c, &z, b, end, target, true, &limits, &s);
 	t->back_ends[back]++;
@@ -259,7 +259,7 @@ static void walk_back(struct path_context *c, const struct whole_path *x, struct
 }
 
 /* Largest distance between the inner vertices. */
-static double apart(const struct whole_path *x, const struct whole_path *y, unsigned b, unsigned end)
+static double apart(const struct full_path_path *x, const struct full_path_path *y, unsigned b, unsigned end)
 {
 	double most = 0;
 	for (unsigned j = end + 1; j < b; j++)
@@ -268,14 +268,14 @@ static double apart(const struct whole_path *x, const struct whole_path *y, unsi
 }
 
 /* To where it is: one iteration, which moves it by rounding alone. */
-static void walk_nowhere(struct path_context *c, const struct whole_path *x, unsigned b, unsigned end, struct walk_target *target,
+static void walk_nowhere(struct path_context *c, const struct full_path_path *x, unsigned b, unsigned end, struct walk_target *target,
 			 const struct constraint *k, struct tally *t)
 {
-	static struct whole_path y;
+	static struct full_path_path y;
 	y = *x;
 	for (unsigned j = end + 1; j < b; j++)
 		target[j].h = k[j].h;
-	struct walk_limits limits = walk_limits_of(&knobs);
+	struct walk_limits limits = walk_limits_of(&accuracy);
 	t->stays++;
 	if (halfvec_walk(c, &y, b, end, target, false, &limits, &s) != WALK_OK || s.iterations != 1)
 		t->left++;
@@ -284,12 +284,12 @@ static void walk_nowhere(struct path_context *c, const struct whole_path *x, uns
 }
 
 /* From the same start with half the tolerance: to the same place y, as far as the whole tolerance says where that is. */
-static void walk_again(struct path_context *c, const struct whole_path *start, const struct whole_path *y, unsigned b, unsigned end,
+static void walk_again(struct path_context *c, const struct full_path_path *start, const struct full_path_path *y, unsigned b, unsigned end,
 		       const struct walk_target *target, struct tally *t)
 {
-	static struct whole_path z;
+	static struct full_path_path z;
 	z = *start;
-	struct walk_limits limits = walk_limits_of(&knobs);
+	struct walk_limits limits = walk_limits_of(&accuracy);
 	limits.scale = 0.5;
 	t->again++;
 	if (halfvec_walk(c, &z, b, end, target, false, &limits, &s) != WALK_OK || apart(&z, y, b, end) > 0.01 * apart(start, y, b, end))
@@ -298,11 +298,11 @@ static void walk_again(struct path_context *c, const struct whole_path *start, c
 		check_residuals(c->w, &z, b, end, target, limits.scale, t);
 }
 
-static void walk_once(struct path_context *c, struct dice *d, const struct whole_path *x, struct tally *t)
+static void walk_once(struct path_context *c, struct dice *d, const struct full_path_path *x, struct tally *t)
 {
-	static struct whole_path y, start;
-	static struct constraint k[WHOLE_MAX_VERTICES];
-	struct walk_target target[WHOLE_MAX_VERTICES];
+	static struct full_path_path y, start;
+	static struct constraint k[FULL_PATH_MAX_VERTICES];
+	struct walk_target target[FULL_PATH_MAX_VERTICES];
 	unsigned b = 2 + dice_below(d, x->edges - 1), end = dice_below(d, b - 1);
 	y = *x;
 	constraints_of(c->w, x, b, end, k);
@@ -319,7 +319,7 @@ static void walk_once(struct path_context *c, struct dice *d, const struct whole
 		return;
 	start = y;
 	struct path_vertex first = y.v[b], last = y.v[end];
-	struct walk_limits limits = walk_limits_of(&knobs);
+	struct walk_limits limits = walk_limits_of(&accuracy);
 	uint64_t before = c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW];
 	enum walk_end e = halfvec_walk(c, &y, b, end, target, false, &limits, &s);
 	t->rays += c->counters[COUNT_RAYS_CLOSEST] + c->counters[COUNT_RAYS_SHADOW] - before;
@@ -370,7 +370,7 @@ static void check_rate(size_t hits, size_t of, double expected)
 static struct tally walk_in(const char *name, struct world *w, double arrive, double come_back)
 {
 	static struct path_context c;
-	static struct whole_path x;
+	static struct full_path_path x;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	struct tally t = {0};
 	struct dice d = dice_of(name);
@@ -500,14 +500,14 @@ static void test_meshes(void **state)
 /* Steps are shortened more often than by default, so that the search has something to do; two points more arrive. */
 static void as_measured(void)
 {
-	knobs = knobs_default;
-	knobs.least_step = 0.03;
+	accuracy = accuracy_settings_default;
+	accuracy.least_step = 0.03;
 }
 
 /* The same walks by matrices in float: as many arrive, as near their targets, and come back. */
 static void test_in_float(void **state)
 {
-	knobs.precision = KNOB_SINGLE;
+	accuracy.precision = SETTING_SINGLE;
 	test_spheres(state);
 	test_rough_glass(state);
 	test_smooth_glass(state);

@@ -16,9 +16,9 @@
 
 static struct path_context c;
 static uint64_t counters[BATCH_COUNTERS];
-static struct whole_path x, y;
+static struct full_path_path x, y;
 static struct walk_scratch s;
-static struct constraint k[WHOLE_MAX_VERTICES];
+static struct constraint k[FULL_PATH_MAX_VERTICES];
 
 static vec3 in_world(const struct world *w, vec3 p)
 {
@@ -40,11 +40,11 @@ static void lay_path(const struct world *w, const vec3 *p, unsigned n)
 		*to = (struct path_vertex){.kind = VERTEX_EMITTER, .x = {.p = target, .prim = PRIM_NONE}, .mode = BSDF_REFLECT};
 		if (j > 0)
 			assert_true(path_extend(&c, from, vec3_normalize(vec3_sub(target, from->x.p)), 0, INFINITY, to));
-		assert_true(whole_join(&x, j));
+		assert_true(full_path_join(&x, j));
 	}
 	for (unsigned j = 1; j + 1 < n; j++) {
 		assert_int_equal(x.v[j].kind, VERTEX_SURFACE);
-		assert_int_equal(whole_mode(&x, j), BSDF_REFLECT);
+		assert_int_equal(full_path_mode(&x, j), BSDF_REFLECT);
 	}
 	memset(counters, 0, sizeof counters);
 }
@@ -52,7 +52,7 @@ static void lay_path(const struct world *w, const vec3 *p, unsigned n)
 /* Walks x to half vectors h from its own, to 1e-9. */
 static enum walk_end walk_by(const vec2 *h, bool visible, struct walk_limits limits)
 {
-	struct walk_target target[WHOLE_MAX_VERTICES];
+	struct walk_target target[FULL_PATH_MAX_VERTICES];
 	constraints_of(c.w, &x, x.edges, 0, k);
 	for (unsigned j = 1; j < x.edges; j++)
 		target[j] = (struct walk_target){vec2_add(k[j].h, h[j]), 1e-9};
@@ -229,7 +229,7 @@ static void test_singular(void **state)
 
 int main(void)
 {
-	normal = walk_limits_of(&knobs_default);
+	normal = walk_limits_of(&accuracy_settings_default);
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_occluder), cmocka_unit_test(test_names),	  cmocka_unit_test(test_other_material),
 		cmocka_unit_test(test_focus),	 cmocka_unit_test(test_singular),

@@ -16,10 +16,10 @@
 #define EXPLICIT_HALFVEC 0.01
 
 /* log |n.i| |d omega_i / d h_par| at vertex j by the cosine `n_i`. */
-static inline double explicit_log_turn(const struct whole_path *x, unsigned j, double n_i)
+static inline double explicit_log_turn(const struct full_path_path *x, unsigned j, double n_i)
 {
 	vec2 h = halfvec_of(x, j);
-	double length2 = 1 + vec2_dot(h, h), eta = whole_eta(x, j);
+	double length2 = 1 + vec2_dot(h, h), eta = full_path_eta(x, j);
 	vec3 n = vec3_scale(1 / sqrt(length2), (vec3){h.x, h.y, 1});
 	vec3 o = frame_to_local(&x->v[j].x.sh, x->edge[j].w), i = frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w));
 	double ih = vec3_dot(i, n), sum = ih + eta * vec3_dot(o, n);
@@ -32,7 +32,7 @@ static inline double explicit_log_gauss(double dx, double dy, double sigma)
 }
 
 /* The half vector of x_j as it is in the frame of y_j (sec. 4), by angles. */
-static inline vec2 explicit_turned(const struct whole_path *x, const struct whole_path *y, unsigned j)
+static inline vec2 explicit_turned(const struct full_path_path *x, const struct full_path_path *y, unsigned j)
 {
 	vec2 h = halfvec_of(x, j);
 	vec3 d = vec3_sub(y->v[j].x.p, x->v[j].x.p);
@@ -45,13 +45,13 @@ static inline vec2 explicit_turned(const struct whole_path *x, const struct whol
 }
 
 /* Arriving at y_j from y_{j+1}: per solid angle to per area. */
-static inline double explicit_log_arrive(const struct whole_path *y, unsigned j)
+static inline double explicit_log_arrive(const struct full_path_path *y, unsigned j)
 {
 	return log(path_cosine(&y->v[j], y->edge[j].w) / y->edge[j].distance2);
 }
 
 /* log_choices: of all symmetric choices, those of the film and the traced half vectors. */
-static inline double explicit_log_traced(const struct path_context *c, const struct whole_path *x, const struct whole_path *y,
+static inline double explicit_log_traced(const struct path_context *c, const struct full_path_path *x, const struct full_path_path *y,
 					 unsigned b, double *log_choices)
 {
 	unsigned k = y->edges;
@@ -78,12 +78,12 @@ static inline double explicit_log_traced(const struct path_context *c, const str
 }
 
 /* Between the ends, at y; steps drawn at x, dh from x to y, or none. */
-static inline double explicit_log_between(const struct path_context *c, const struct whole_path *x, const struct whole_path *y,
+static inline double explicit_log_between(const struct path_context *c, const struct full_path_path *x, const struct full_path_path *y,
 					  unsigned b, unsigned c_end, const vec2 *dh, double sign)
 {
-	static struct constraint at_x[WHOLE_MAX_VERTICES], at_y[WHOLE_MAX_VERTICES];
+	static struct constraint at_x[FULL_PATH_MAX_VERTICES], at_y[FULL_PATH_MAX_VERTICES];
 	static struct constraint_system system;
-	static struct halfvec_step step[WHOLE_MAX_VERTICES];
+	static struct halfvec_step step[FULL_PATH_MAX_VERTICES];
 	if (b < c_end + 2)
 		return 0;
 	constraints_of(c->w, y, b, c_end, at_y);
@@ -104,9 +104,9 @@ static inline double explicit_log_between(const struct path_context *c, const st
 
 /* Choice of b and c, where the strategy draws them by the heuristic. */
 static inline double explicit_log_choice(const struct path_context *c, const char *strategy, const struct mutation_setting *how,
-					 const struct whole_path *x, unsigned b, unsigned c_end)
+					 const struct full_path_path *x, unsigned b, unsigned c_end)
 {
-	double weight[WHOLE_MAX_VERTICES], p = 1;
+	double weight[FULL_PATH_MAX_VERTICES], p = 1;
 	bool hslt = strcmp(strategy, "hslt") == 0 && how->b < 0, light = strcmp(strategy, "light") == 0;
 	if (hslt || light) {
 		heuristic_roughness.weigh_b(c, x, weight);

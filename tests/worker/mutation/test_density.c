@@ -44,7 +44,7 @@ static size_t all_trials(struct trial *t)
 	return n;
 }
 
-static double log_t(const struct trial *t, const struct move *move, const struct whole_path *x, const struct whole_path *y,
+static double log_t(const struct trial *t, const struct move *move, const struct full_path_path *x, const struct full_path_path *y,
 		    double sign, double *log_choices)
 {
 	unsigned b = move->b, end = move->c;
@@ -61,7 +61,7 @@ static double log_t(const struct trial *t, const struct move *move, const struct
 	return sum;
 }
 
-static void compare(struct trial *t, struct whole_path *x, struct whole_path *y)
+static void compare(struct trial *t, struct full_path_path *x, struct full_path_path *y)
 {
 	struct move move = {0};
 	m.step++;
@@ -71,7 +71,7 @@ static void compare(struct trial *t, struct whole_path *x, struct whole_path *y)
 	if (to_y > -INFINITY) {
 		double to_x = t->ops->log_weight(&m, x, &move, Y_TO_X), choices, back;
 		double there = log_t(t, &move, x, y, 1, &choices), here = log_t(t, &move, y, x, -1, &back);
-		double want = whole_log_f(&c, y) - whole_log_f(&c, x) + here - there;
+		double want = full_path_log_f(&c, y) - full_path_log_f(&c, x) + here - there;
 		double off = fabs(to_y - to_x - want) / fmax(1, fabs(want));
 		t->compared++;
 		t->beyond += !(off <= TOLERANCE);
@@ -80,7 +80,7 @@ static void compare(struct trial *t, struct whole_path *x, struct whole_path *y)
 		t->worst_choice = fmax(t->worst_choice, symmetric / fmax(1, fabs(choices)));
 	}
 	bool all = y->edges != x->edges;
-	whole_copy(y, x, all ? 0 : move.first, all ? x->edges : move.last);
+	full_path_copy(y, x, all ? 0 : move.first, all ? x->edges : move.last);
 }
 
 static void print(const char *room, const struct trial *t)
@@ -96,18 +96,18 @@ static void test_ratio(void **state)
 {
 	const struct room *room = *state;
 	static struct trial trials[TRIALS];
-	static struct whole_path x, y;
+	static struct full_path_path x, y;
 	struct world *w = room->build();
 	struct starts s;
 	size_t count = all_trials(trials), n = dice_count(400), bad = 0;
 	starts_context(&c, w, 1, EDGES, counters);
-	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&knobs_default)};
+	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&accuracy_settings_default)};
 	starts_init(&s, &c, m.seed, 0, 2000);
 	for (unsigned k = 1; k <= EDGES; k++)
 		for (size_t i = 0; i < n; i++) {
 			if (!starts_path(&s, k, ((double)i + 0.5) / (double)n, &x))
 				continue;
-			whole_copy(&y, &x, 0, k);
+			full_path_copy(&y, &x, 0, k);
 			for (size_t j = 0; j < count; j++)
 				if (trials[j].how.b <= (int)k)
 					compare(&trials[j], &x, &y);

@@ -21,7 +21,7 @@ enum { TRIALS = 3000, EDGES = 12 };
 static struct path_context c;
 static uint64_t counters[BATCH_COUNTERS];
 static struct ensemble drawn, around, capped;
-static struct whole_path x, y;
+static struct full_path_path x, y;
 
 static void begin(const struct world *w)
 {
@@ -163,7 +163,7 @@ static void test_streams_of_a_proposal(void **state)
 	unsigned proposed = 0, same = 0;
 	begin(w);
 	const struct ensemble_lengths all = ensemble_all_lengths(&c);
-	m = (struct mutation_ctx){.path = &c, .seed = seed, .chain = 5, .count = count, .limits = walk_limits_of(&knobs_default)};
+	m = (struct mutation_ctx){.path = &c, .seed = seed, .chain = 5, .count = count, .limits = walk_limits_of(&accuracy_settings_default)};
 	for (uint64_t i = 0; i < TRIALS / 4; i++) {
 		draw(seed, i, &all, &drawn);
 		if (drawn.count == 0 || !choose(0))

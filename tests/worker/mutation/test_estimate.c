@@ -28,7 +28,7 @@ enum { GROUPS = 32, EDGES = 5 };
 /* Means of f / T by number of edges. */
 static void estimate(struct mutation_ctx *m, const struct mutation_ops *ops, size_t n, double *mean)
 {
-	static struct whole_path x, y;
+	static struct full_path_path x, y;
 	static uint64_t count[STRATEGY_COUNTERS];
 	m->count = count;
 	for (size_t i = 0; i < n; i++) {
@@ -99,7 +99,7 @@ static void test_integral(void **state)
 	size_t n = dice_count(1000);
 	unsigned faults = 0;
 	starts_context(&c, w, 1, EDGES, counters);
-	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&knobs_default)};
+	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&accuracy_settings_default)};
 	for (unsigned g = 0; g < GROUPS; g++) {
 		struct starts s;
 		starts_init(&s, &c, m.seed, g, n);

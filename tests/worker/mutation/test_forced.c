@@ -5,7 +5,7 @@
  * Level: 1e-6 a case. Power: the smallest bias of a soft quarter of the image that is found with 95 % probability is printed and
  * is 2 % at most; colours and what is looked at besides images have theirs printed. Of the whole image's mean there is nothing
  * to find: a mutation keeps the number of edges, and how much all paths of that length bring is b, which independent proposals
- * alone estimate (tests/worker/path/test_whole.c compares their densities path by path, test_integrators.c images of
+ * alone estimate (tests/worker/path/test_full_path.c compares their densities path by path, test_integrators.c images of
  * mixtures). They go anywhere on the film, so that nothing cancels: 2 % by FULL=1 only, with k = 3, 10 % else.
  * Of the accepted moves at least 10 % are the forced choice's, the starts counting as accepted independent proposals.
  *

@@ -62,8 +62,8 @@ static uint64_t counters[BATCH_COUNTERS], strategy_counters[STRATEGY_COUNTERS];
 struct sampling {
 	const struct example *example;
 	const struct mutation_ops *ops;
-	struct whole_path *x, *y;
-	unsigned vertex[WHOLE_MAX_VERTICES], count, ends; /* that move; of these ends of the path */
+	struct full_path_path *x, *y;
+	unsigned vertex[FULL_PATH_MAX_VERTICES], count, ends; /* that move; of these ends of the path */
 	double mean[MOST], factor[MOST][MOST];      /* Cholesky's of the covariance */
 	unsigned long failures;
 };
@@ -125,7 +125,7 @@ static bool coordinates(const struct sampling *s, double *z, double *log_plane)
 static enum outcome propose(struct sampling *s, double *z, double *log_density)
 {
 	const struct example *e = s->example;
-	struct move move = {.b = WHOLE_MAX_VERTICES};
+	struct move move = {.b = FULL_PATH_MAX_VERTICES};
 	double log_plane, unused;
 	m.step++;
 	m.count = strategy_counters;
@@ -145,7 +145,7 @@ static enum outcome propose(struct sampling *s, double *z, double *log_density)
 		}
 		*log_density -= 2 * s->ends * log(2 * END_STEP);
 	}
-	whole_copy(s->y, s->x, move.b > s->x->edges ? 0 : move.first, move.b > s->x->edges ? s->x->edges : move.last);
+	full_path_copy(s->y, s->x, move.b > s->x->edges ? 0 : move.first, move.b > s->x->edges ? s->x->edges : move.last);
 	return out;
 }
 
@@ -218,7 +218,7 @@ static bool pilot(struct sampling *s)
 	return fills(s, (const double(*)[MOST])z, n);
 }
 
-static bool all_smooth(const struct whole_path *x)
+static bool all_smooth(const struct full_path_path *x)
 {
 	for (unsigned j = 1; j < x->edges; j++)
 		if (x->v[j].delta)
@@ -251,7 +251,7 @@ static void sample(struct sampling *s, const char *name)
 	double radius = radius_of(s), volume = pow(M_PI, s->count) / tgamma(s->count + 1) * pow(radius, d);
 	for (unsigned a = 0; a < d; a++)
 		volume *= s->factor[a][a];
-	double sum[BINS + 1] = {0}, square[BINS + 1] = {0}, worst = 0, error = 0, whole = 0, whole_error = 0;
+	double sum[BINS + 1] = {0}, square[BINS + 1] = {0}, worst = 0, error = 0, whole = 0, full_path_error = 0;
 	for (size_t i = 0; i < n; i++) {
 		double z[MOST], density;
 		enum outcome out = propose(s, z, &density);
@@ -274,11 +274,11 @@ static void sample(struct sampling *s, const char *name)
 		worst = fabs(t) > fabs(worst) ? t : worst;
 		error = b < BINS ? fmax(error, sigma) : error;
 		whole = mean;
-		whole_error = sigma;
+		full_path_error = sigma;
 	}
 	/* 6.8 standard errors for the level, 1.645 for 95 % to find. */
 	printf("%-42s %u vertices, whole %.4f, worst t %+.2f, finds %.1f %% on it and %.1f %% on a bin, failed %.2g\n", name, s->count, whole,
-	       worst, 845 * whole_error, 845 * error, (double)failures / (double)n);
+	       worst, 845 * full_path_error, 845 * error, (double)failures / (double)n);
 	assert_true(right);
 	assert_true((double)failures < 0.002 * (double)n + 3);
 }
@@ -286,14 +286,14 @@ static void sample(struct sampling *s, const char *name)
 static void test_example(void **state)
 {
 	const struct example *e = *state;
-	static struct whole_path x, y;
+	static struct full_path_path x, y;
 	static struct sampling s;
 	char name[64];
 	snprintf(name, sizeof name, "%s, %s, k = %u, b = %u, c = %u", e->room, e->strategy, e->edges, e->b, e->c);
 	struct world *w = room_of(e->room);
 	struct starts starts;
 	starts_context(&c, w, 1, e->edges, counters);
-	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(name), .limits = walk_limits_of(&knobs_default)};
+	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(name), .limits = walk_limits_of(&accuracy_settings_default)};
 	starts_init(&starts, &c, m.seed, 0, 12000);
 	s = (struct sampling){.example = e, .ops = mutation_find(e->strategy, strlen(e->strategy)), .x = &x, .y = &y};
 	list_vertices(&s);
@@ -302,7 +302,7 @@ static void test_example(void **state)
 	for (unsigned i = 0; i < STARTS && !found; i++) {
 		if (!starts_path(&starts, e->edges, ((i * 377) % STARTS + 0.5) / STARTS, &x) || !all_smooth(&x))
 			continue;
-		whole_copy(&y, &x, 0, e->edges);
+		full_path_copy(&y, &x, 0, e->edges);
 		found = pilot(&s);
 	}
 	if (!found)

@@ -25,7 +25,7 @@ enum { GROUPS = 16, BLOCKS = 4, EDGES = 5, PAIRS = 4000, STARTS = 2000 };
 
 static struct path_context context;
 static struct mutation_ctx mutation;
-static struct whole_path x, y[2];
+static struct full_path_path x, y[2];
 
 struct tally {
 	uint64_t proposals, one_only, both;
@@ -38,12 +38,12 @@ static unsigned block_of(const double film[2])
 	return (film[0] >= 16) + 2u * (film[1] >= 16);
 }
 
-static double propose(const struct mutation_ops *ops, double scale, struct whole_path *into)
+static double propose(const struct mutation_ops *ops, double scale, struct full_path_path *into)
 {
 	const struct mutation_setting how = {-1, -1};
 	struct move move = {0};
-	whole_copy(into, &x, 0, x.edges);
-	mutation.limits = walk_limits_of(&knobs_default);
+	full_path_copy(into, &x, 0, x.edges);
+	mutation.limits = walk_limits_of(&accuracy_settings_default);
 	mutation.limits.scale = scale;
 	if (ops->propose(&mutation, &how, &x, into, &move))
 		return 0;

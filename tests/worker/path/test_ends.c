@@ -21,7 +21,7 @@ struct effort {
 };
 
 /* The first that runs is what the others are to agree with. Takes the world. */
-static void check_agreement(const char *name, struct world *w, struct effort e)
+static void check_convergence(const char *name, struct world *w, struct effort e)
 {
 	static struct agree_image image[2];
 	const struct agree_side sides[] = {{"path", e.path, 32, 0, 0}, {"bdpt", e.bdpt, 32, 0, 0}, {"pssmlt", e.pssmlt, 32, 0, 0}};
@@ -53,7 +53,7 @@ static void check_agreement(const char *name, struct world *w, struct effort e)
 static void test_defocus(void **state)
 {
 	(void)state;
-	check_agreement("defocus",
+	check_convergence("defocus",
 			world_of_text(16, 16, "%s%s", DEPTH("3") LENS("0.3", "1.5", "gaussian", "0,0.6,1.9", "0,-0.2,-1"),
 				      "<shape type='rectangle'>" AT("<scale value='5'/><rotate x='1' angle='-90'/><translate y='-1'/>")
 				      DIFFUSE("0.5") "</shape><emitter type='constant'><float name='radiance' value='.5'/></emitter>"
@@ -207,7 +207,7 @@ static void test_lit_by_a_mirror(void **state)
 static void test_rough_in_delta_light(void **state)
 {
 	(void)state;
-	check_agreement("rough bodies in delta light",
+	check_convergence("rough bodies in delta light",
 			world_of_text(16, 16, "%s%s", DEPTH("4") SENSOR("0,2.4,1.8", "0,-1,-0.1"),
 				      "<shape type='rectangle'>" AT("<scale value='2.4'/><rotate x='1' angle='-90'/><translate y='-1'/>") DIFFUSE("0.5") "</shape>"
 				      "<emitter type='point'><point name='position' x='1' y='2' z='1'/><float name='intensity' value='3'/></emitter>"

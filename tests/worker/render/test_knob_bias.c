@@ -17,13 +17,13 @@
 
 enum { STARTS = 120, BOOTSTRAP = 1024 };
 
-struct knob_case {
-	const char *knobs, *scene;
+struct setting_case {
+	const char *accuracy, *scene;
 	unsigned edges;
 	const char *mutation;
 };
 
-static const struct knob_case cases[] = {
+static const struct setting_case cases[] = {
 	{"precision=single", "glossy", 3, "hslt@b3c0"},
 	{"precision=single", "rough glass", 4, "hslt@b4c0"},
 	{"precision=single", "bent normals", 4, "hslt"},
@@ -48,18 +48,18 @@ static bool scaled(void)
 	return text && atoi(text) > 1;
 }
 
-static void run(const struct knob_case *c, struct stationary_result *r)
+static void run(const struct setting_case *c, struct stationary_result *r)
 {
 	struct stationary_how how = {c->mutation, c->edges, c->edges, STARTS, BOOTSTRAP, STATIONARY_SOUND};
 	char name[96];
-	snprintf(name, sizeof name, "%s %s", c->scene, c->knobs);
-	worlds_knobs = c->knobs;
+	snprintf(name, sizeof name, "%s %s", c->scene, c->accuracy);
+	worlds_accuracy = c->accuracy;
 	struct world *w = test_world(c->scene);
-	worlds_knobs = NULL;
+	worlds_accuracy = NULL;
 	assert_non_null(w);
 	stationary_run(w, name, &how, r);
 	world_free(w);
-	print_message("%-24s %-15s k%u %-10s accepts %4.1f %%; finds %.2f %% on a quarter, %.1f %% of vertices; p %.1g %s; %.2f s %s\n", c->knobs,
+	print_message("%-24s %-15s k%u %-10s accepts %4.1f %%; finds %.2f %% on a quarter, %.1f %% of vertices; p %.1g %s; %.2f s %s\n", c->accuracy,
 		      c->scene, c->edges, c->mutation, 100 * (double)r->accepted / (double)r->proposals, 100 * r->least_block,
 		      100 * r->least_other, r->p, r->worst >= 0 ? stationary_function(r->worst) : "", r->seconds, r->failure);
 }
@@ -80,7 +80,7 @@ static void test_bias_is_found(void **state)
 {
 	(void)state;
 	static struct stationary_result r;
-	run(&(struct knob_case){"tolerance=1", "rough glass", 4, "hslt@b4c0"}, &r);
+	run(&(struct setting_case){"tolerance=1", "rough glass", 4, "hslt@b4c0"}, &r);
 	assert_true(scaled() || !stationary_holds(&r));
 }
 
@@ -89,16 +89,16 @@ static void test_wavelengths(void **state)
 {
 	(void)state;
 	static struct agree_image image[3];
-	static const char *const knobs[] = {"", "wavelengths=1", "wavelengths=2"};
+	static const char *const accuracy[] = {"", "wavelengths=1", "wavelengths=2"};
 	for (int i = 0; i < 3; i++) {
-		worlds_knobs = knobs[i];
+		worlds_accuracy = accuracy[i];
 		struct world *w = world_of_text(8, 8,
 						"<integrator type='path'><integer name='max_depth' value='3'/></integrator>" SENSOR("0,1,5", "0,-0.2,0")
 						PLATE("-1", DIFFUSE("0.4,0.6,0.7")) BALL("0,-0.2,0", "0.8", METAL("0.4"))
 						"<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>");
-		worlds_knobs = NULL;
+		worlds_accuracy = NULL;
 		struct agree_side how = {"path", 5 << 14, 64, 0, 0};
-		agree_render(w, "wavelengths", *knobs[i] ? knobs[i] : "four", &how, &image[i]);
+		agree_render(w, "wavelengths", *accuracy[i] ? accuracy[i] : "four", &how, &image[i]);
 		world_free(w);
 	}
 	agree_check("1 wavelength against 4", &image[1], &image[0]);

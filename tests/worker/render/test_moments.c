@@ -37,7 +37,7 @@ static bool same_place(const struct path_vertex *a, const struct path_vertex *b)
 }
 
 /* Technique s of the sub-paths in c makes x. */
-static bool is_made(const struct path_context *c, const struct whole_path *x, unsigned s)
+static bool is_made(const struct path_context *c, const struct full_path_path *x, unsigned s)
 {
 	unsigned k = x->edges;
 	for (unsigned i = 0; s >= 2 && i < s; i++)
@@ -55,7 +55,7 @@ struct seen {
 };
 
 /* x was made by technique `from`; a pair of sub-paths around it is drawn that another technique may have made. */
-static void check_around(struct path_context *c, struct whole_path *x, unsigned from, uint64_t index, struct dice *d, struct seen *seen)
+static void check_around(struct path_context *c, struct full_path_path *x, unsigned from, uint64_t index, struct dice *d, struct seen *seen)
 {
 	static struct ensemble around;
 	struct sampler_random s;
@@ -93,7 +93,7 @@ static void check_techniques(const struct world *w, const char *name)
 	const struct ensemble_lengths all = ensemble_all_lengths(&c);
 	for (uint64_t index = 0; index < dice_count(3000); index++) {
 		struct sampler_random s;
-		struct whole_path x;
+		struct full_path_path x;
 		sampler_random_init(&s, stats_seed(name), RNG_BOOTSTRAP, index, 0);
 		path_trace_both_ways(&c, &s.base, &sample);
 		double by_class[PATH_CLASSES] = {0}, sum = 0;
@@ -112,7 +112,7 @@ static void check_techniques(const struct world *w, const char *name)
 			const struct candidate *a = &e.of[i];
 			unsigned class = classes_joined(&classes, a->s, a->edges + 1 - a->s);
 			by_class[class] += a->intensity;
-			if (!whole_from_subpaths(&c, a->s, a->edges, &x))
+			if (!full_path_from_subpaths(&c, a->s, a->edges, &x))
 				continue; /* on the film's very border */
 			assert_int_equal(path_class_whole(&x), class);
 			seen.paths++;
@@ -122,7 +122,7 @@ static void check_techniques(const struct world *w, const char *name)
 			assert_true(fabs(by_class[k] - (sample.classes >> k & 1 ? sample.of_class[k] : 0)) <= 1e-12 * sum);
 		if (e.count > 0) {
 			const struct candidate *a = &e.of[dice_below(&d, e.count)];
-			if (whole_from_subpaths(&c, a->s, a->edges, &x))
+			if (full_path_from_subpaths(&c, a->s, a->edges, &x))
 				check_around(&c, &x, a->s, index, &d, &seen);
 		}
 	}

@@ -1,0 +1,162 @@
+#include "common/base/checked_file.h"
+
+#include "common/base/crc.h"
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+
+#include <fcntl.h>
+#include <string.h>
+
+enum { BUFFER = 1 << 16 };
+
+static int fault(const struct checked_file *s, int code, struct error *e)
+{
+	return error_set(e, code, "%s: %s", s->path, strerror(code));
+}
+
+static int open_file(struct checked_file *s, const char *path, int flags, struct error *e)
+{
+	*s = (struct checked_file){.path = path, .fd = disk_open(path, flags | O_CLOEXEC, 0666)};
+	if (s->fd < 0)
+		return fault(s, errno, e);
+	s->buffer = mem_alloc(BUFFER, 1);
+	if (s->buffer)
+		return 0;
+	disk_close(s->fd);
+	return error_set(e, ENOMEM, "no memory to open %s", path);
+}
+
+int checked_file_create(struct checked_file *s, const char *path, struct error *e)
+{
+	return open_file(s, path, O_WRONLY | O_CREAT | O_TRUNC, e);
+}
+
+static int flush(struct checked_file *s, struct error *e)
+{
+	int rc = disk_write_all(s->fd, s->buffer, s->filled);
+	s->filled = 0;
+	return rc ? fault(s, -rc, e) : 0;
+}
+
+int checked_file_write(struct checked_file *s, const void *bytes, size_t size, struct error *e)
+{
+	s->crc = crc32c(s->crc, bytes, size);
+	s->bytes += size;
+	for (const unsigned char *p = bytes; size;) {
+		size_t n = size < BUFFER - s->filled ? size : BUFFER - s->filled;
+		memcpy(s->buffer + s->filled, p, n);
+		s->filled += n;
+		p += n;
+		size -= n;
+		int rc = s->filled == BUFFER ? flush(s, e) : 0;
+		if (rc)
+			return rc;
+	}
+	return 0;
+}
+
+int checked_file_finish(struct checked_file *s, struct error *e)
+{
+	uint32_t crc = s->crc;
+	int rc = checked_file_write(s, &crc, sizeof crc, e);
+	if (!rc)
+		rc = flush(s, e);
+	if (!rc && disk_fsync(s->fd))
+		rc = fault(s, errno, e);
+	if (!rc)
+		disk_forget(s->fd);
+	if (disk_close(s->fd) && !rc)
+		rc = fault(s, errno, e);
+	mem_free(s->buffer);
+	s->buffer = NULL;
+	return rc;
+}
+
+/* Fills the buffer anew; at the end of the file it stays empty. */
+static int fill(struct checked_file *s, struct error *e)
+{
+	ssize_t n;
+	do
+		n = disk_pread(s->fd, s->buffer, BUFFER, (off_t)s->from);
+	while (n < 0 && errno == EINTR);
+	s->at = 0;
+	s->filled = n > 0 ? (size_t)n : 0;
+	s->from += s->filled;
+	if (n < 0)
+		return fault(s, errno, e);
+	return s->heard ? s->heard(s->user, s->filled, e) : 0;
+}
+
+static int take(struct checked_file *s, void *bytes, size_t size, struct error *e)
+{
+	for (unsigned char *p = bytes; size;) {
+		int rc = s->at == s->filled ? fill(s, e) : 0;
+		if (rc)
+			return rc;
+		size_t n = s->filled - s->at < size ? s->filled - s->at : size;
+		if (n == 0)
+			return error_set(e, EBADMSG, "%s: ends too early", s->path);
+		memcpy(p, s->buffer + s->at, n);
+		s->at += n;
+		p += n;
+		size -= n;
+	}
+	return 0;
+}
+
+static int check(struct checked_file *s, struct error *e)
+{
+	struct stat st;
+	uint32_t crc = 0, want;
+	if (disk_fstat(s->fd, &st))
+		return fault(s, errno, e);
+	if ((uint64_t)st.st_size < sizeof want)
+		return error_set(e, EBADMSG, "%s: too short", s->path);
+	s->left = (uint64_t)st.st_size - sizeof want;
+	for (uint64_t left = s->left; left;) {
+		int rc = s->at == s->filled ? fill(s, e) : 0;
+		size_t n = s->filled - s->at < left ? s->filled - s->at : (size_t)left;
+		if (rc || n == 0)
+			return rc ? rc : error_set(e, EBADMSG, "%s: ends too early", s->path);
+		crc = crc32c(crc, s->buffer + s->at, n);
+		s->at += n;
+		left -= n;
+	}
+	int rc = take(s, &want, sizeof want, e);
+	return rc ? rc : want == crc ? 0 : error_set(e, EBADMSG, "%s: damaged", s->path);
+}
+
+int checked_file_open_heard(struct checked_file *s, const char *path, checked_file_heard *heard, void *user, struct error *e)
+{
+	int rc = open_file(s, path, O_RDONLY, e);
+	if (rc)
+		return rc;
+	s->heard = heard;
+	s->user = user;
+	rc = check(s, e);
+	s->at = s->filled = s->from = 0;
+	if (rc)
+		checked_file_close(s);
+	return rc;
+}
+
+int checked_file_open(struct checked_file *s, const char *path, struct error *e)
+{
+	return checked_file_open_heard(s, path, NULL, NULL, e);
+}
+
+int checked_file_read(struct checked_file *s, void *bytes, size_t size, struct error *e)
+{
+	if (size > s->left)
+		return error_set(e, EBADMSG, "%s: ends too early", s->path);
+	s->left -= size;
+	return take(s, bytes, size, e);
+}
+
+void checked_file_close(struct checked_file *s)
+{
+	if (s->buffer)
+		disk_close(s->fd);
+	mem_free(s->buffer);
+	s->buffer = NULL;
+}

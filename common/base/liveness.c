@@ -1,0 +1,3 @@
+#include "common/base/liveness.h"
+
+_Thread_local atomic_ullong *tick_counter;

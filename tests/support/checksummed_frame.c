@@ -1,0 +1,83 @@
+#include "tests/support/checksummed_frame.h"
+
+#include "common/base/mem.h"
+#include "common/wire/frame.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static unsigned char *seal(const unsigned char prefix[FRAME_PREFIX], const unsigned char *content, size_t size, bool first, size_t *checked_file_size)
+{
+	size_t head = first ? FRAME_PREFIX : FRAME_SEALED_PREFIX;
+	unsigned char *sealed = malloc(head + size + 1);
+	if (!sealed)
+		abort();
+	if (first)
+		memcpy(sealed, prefix, FRAME_PREFIX);
+	else
+		frame_seal(sealed, prefix, content, size);
+	if (size)
+		memcpy(sealed + head, content, size);
+	*checked_file_size = head + size;
+	return sealed;
+}
+
+static bool is_first(const unsigned char *header, size_t size)
+{
+	struct envelope env;
+	struct error e;
+	if (envelope_unpack(&env, header, size, &e))
+		return false;
+	bool first = env.message->body_case == FARM__ENVELOPE__BODY_HELLO || env.message->body_case == FARM__ENVELOPE__BODY_HELLO_ACK;
+	envelope_fini(&env);
+	return first;
+}
+
+unsigned char *checksummed_frame(const unsigned char *frame, size_t size, size_t *checked_file_size)
+{
+	uint32_t header, payload;
+	frame_prefix_read(frame, &header, &payload);
+	return seal(frame, frame + FRAME_PREFIX, size - FRAME_PREFIX, is_first(frame + FRAME_PREFIX, header), checked_file_size);
+}
+
+/* Of what may have been changed since it was packed; NULL: it is none, or has fields of another version. */
+static unsigned char *checked_hello(const void *header, size_t size, size_t *checked_file_size)
+{
+	Farm__Envelope *m = farm__envelope__unpack(NULL, size, header);
+	const ProtobufCMessage *hello = !m ? NULL : m->body_case == FARM__ENVELOPE__BODY_HELLO ? &m->hello->base :
+				       m->body_case == FARM__ENVELOPE__BODY_HELLO_ACK ? &m->hello_ack->base : NULL;
+	unsigned char *sealed = hello && !hello->n_unknown_fields && !m->base.n_unknown_fields ? checksummed_message(m, NULL, 0, checked_file_size) : NULL;
+	if (m)
+		farm__envelope__free_unpacked(m, NULL);
+	return sealed;
+}
+
+unsigned char *checked_file_parts(const void *header, size_t header_size, const void *payload, size_t payload_size, bool first, size_t *checked_file_size)
+{
+	unsigned char *hello = first && !payload_size ? checked_hello(header, header_size, checked_file_size) : NULL;
+	if (hello)
+		return hello;
+	unsigned char prefix[FRAME_PREFIX], *both = malloc(header_size + payload_size + 1);
+	if (!both)
+		abort();
+	frame_prefix_write(prefix, (uint32_t)header_size, (uint32_t)payload_size);
+	if (header_size)
+		memcpy(both, header, header_size);
+	if (payload_size)
+		memcpy(both + header_size, payload, payload_size);
+	unsigned char *sealed = seal(prefix, both, header_size + payload_size, first, checked_file_size);
+	free(both);
+	return sealed;
+}
+
+unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload, size_t payload_size, size_t *checked_file_size)
+{
+	unsigned char *frame;
+	size_t size;
+	struct error e;
+	if (envelope_pack(m, payload, payload_size, &frame, &size, &e))
+		abort();
+	unsigned char *sealed = checksummed_frame(frame, size, checked_file_size);
+	mem_free(frame);
+	return sealed;
+}

@@ -1,0 +1,624 @@
+#include "tests/support/faulty_disk.h"
+
+#include "common/base/disk.h"
+
+#include <assert.h>
+#include <fcntl.h>
+#include <pthread.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+enum { SECTOR = 512, FDS = 4096, PATH_MOST = 4400 };
+
+/* Done to a file since its last flush. */
+struct change {
+	struct change *next;
+	uint64_t at, size;
+	unsigned char *bytes; /* NULL: it was cut to `size` */
+};
+
+struct name {
+	struct name *next;
+	char *text;
+	struct faulty_disk_node *node;
+};
+
+/* Done to a folder since its last flush: `gone` is no name any more, `made` is one (either may be NULL). */
+struct renaming {
+	struct renaming *next;
+	char *gone, *made;
+	struct faulty_disk_node *node;
+};
+
+struct faulty_disk_node {
+	bool folder;
+	char last[64]; /* of its first name */
+	unsigned char *bytes; /* a file: what is safe */
+	uint64_t size;
+	struct change *changes, **changes_last;
+	struct name *live, *safe; /* a folder: its names */
+	struct renaming *renamings, **renamings_last;
+};
+
+static struct faulty_disk setup;
+static struct faulty_disk_node *root;
+static struct faulty_disk_node *open_files[FDS];
+static pthread_mutex_t mutex = PTHREAD_MUTEX_INITIALIZER;
+static uint64_t calls, changing_calls, since_failure, dice;
+static atomic_bool failed;
+static _Atomic uint64_t unasked[FAULTY_DISK_COUNTS];
+
+static void *must(void *p)
+{
+	if (!p)
+		abort();
+	return p;
+}
+
+static double roll(void)
+{
+	uint64_t z = dice += UINT64_C(0x9e3779b97f4a7c15);
+	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
+	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
+	return (double)((z ^ z >> 31) >> 11) * 0x1p-53;
+}
+
+/* ---- names ---- */
+
+static struct faulty_disk_node *node_new(bool folder, const char *last)
+{
+	struct faulty_disk_node *n = must(calloc(1, sizeof *n));
+	n->folder = folder;
+	memcpy(n->last, last, strnlen(last, sizeof n->last - 1));
+	n->changes_last = &n->changes;
+	n->renamings_last = &n->renamings;
+	return n;
+}
+
+static struct name **find(struct name **list, const char *text)
+{
+	while (*list && strcmp((*list)->text, text) != 0)
+		list = &(*list)->next;
+	return list;
+}
+
+static void forget_name(struct name **list, const char *text)
+{
+	struct name **at = find(list, text), *gone = *at;
+	if (!gone)
+		return;
+	*at = gone->next;
+	free(gone->text);
+	free(gone);
+}
+
+static void set_name(struct name **list, const char *text, struct faulty_disk_node *node)
+{
+	forget_name(list, text);
+	struct name *n = must(malloc(sizeof *n));
+	*n = (struct name){*list, must(strdup(text)), node};
+	*list = n;
+}
+
+static struct name *copy_names(const struct name *from)
+{
+	struct name *list = NULL;
+	for (; from; from = from->next)
+		set_name(&list, from->text, from->node);
+	return list;
+}
+
+static void apply(struct name **list, const struct renaming *r)
+{
+	if (r->gone)
+		forget_name(list, r->gone);
+	if (r->made)
+		set_name(list, r->made, r->node);
+}
+
+static void rename_in(struct faulty_disk_node *folder, const char *gone, const char *made, struct faulty_disk_node *node)
+{
+	struct renaming *r = must(calloc(1, sizeof *r));
+	*r = (struct renaming){NULL, gone ? must(strdup(gone)) : NULL, made ? must(strdup(made)) : NULL, node};
+	apply(&folder->live, r);
+	*folder->renamings_last = r;
+	folder->renamings_last = &r->next;
+}
+
+/* The folder that the path's last part is in; NULL: the path is not below the root, or there is no such folder. */
+static struct faulty_disk_node *parent_of(const char *path, const char **last)
+{
+	size_t n = strlen(setup.root);
+	if (strncmp(path, setup.root, n) != 0 || (path[n] && path[n] != '/'))
+		return NULL;
+	struct faulty_disk_node *at = root;
+	const char *part = path + n;
+	for (;;) {
+		char text[256];
+		while (*part == '/')
+			part++;
+		size_t size = strcspn(part, "/");
+		if (!part[size] || !part[size + strspn(part + size, "/")]) {
+			*last = part;
+			return at;
+		}
+		assert(size < sizeof text);
+		memcpy(text, part, size);
+		text[size] = 0;
+		struct name *next = *find(&at->live, text);
+		if (!next || !next->node->folder)
+			return NULL;
+		at = next->node;
+		part += size;
+	}
+}
+
+static struct faulty_disk_node *node_at(const char *path, bool create, bool folder)
+{
+	const char *last;
+	struct faulty_disk_node *in = parent_of(path, &last);
+	if (!in || !*last)
+		return in;
+	struct name *n = *find(&in->live, last);
+	if (n || !create)
+		return n ? n->node : NULL;
+	struct faulty_disk_node *made = node_new(folder, last);
+	rename_in(in, NULL, last, made);
+	return made;
+}
+
+struct faulty_disk_node *faulty_disk_node_of(const char *path, bool create)
+{
+	return node_at(path, create, false);
+}
+
+/* ---- what a flush makes safe ---- */
+
+static void resize(unsigned char **bytes, uint64_t *size, uint64_t want)
+{
+	*bytes = must(realloc(*bytes, want + 1));
+	if (want > *size)
+		memset(*bytes + *size, 0, want - *size);
+	*size = want;
+}
+
+static void put(unsigned char **bytes, uint64_t *size, const void *from, uint64_t n, uint64_t at)
+{
+	if (at + n > *size)
+		resize(bytes, size, at + n);
+	if (n)
+		memcpy(*bytes + at, from, n);
+}
+
+static bool is_forgotten(const struct faulty_disk_node *n, enum faulty_disk_forget kind)
+{
+	return (setup.forget & kind) && (!setup.forget_name || strncmp(n->last, setup.forget_name, strlen(setup.forget_name)) == 0);
+}
+
+void faulty_disk_flushed(struct faulty_disk_node *n, bool database)
+{
+	if (!n || is_forgotten(n, database ? FAULTY_DISK_FORGET_DATABASE : n->folder ? FAULTY_DISK_FORGET_FOLDERS : FAULTY_DISK_FORGET_FILES))
+		return;
+	for (struct change *c; (c = n->changes);) {
+		n->changes = c->next;
+		if (c->bytes)
+			put(&n->bytes, &n->size, c->bytes, c->size, c->at);
+		else
+			resize(&n->bytes, &n->size, c->size);
+		free(c->bytes);
+		free(c);
+	}
+	n->changes_last = &n->changes;
+	for (struct renaming *r; (r = n->renamings);) {
+		n->renamings = r->next;
+		apply(&n->safe, r);
+		free(r->gone);
+		free(r->made);
+		free(r);
+	}
+	n->renamings_last = &n->renamings;
+}
+
+void faulty_disk_failed(struct faulty_disk_node *n)
+{
+	while (n && !n->folder && n->changes) {
+		struct change *c = n->changes;
+		n->changes = c->next;
+		free(c->bytes);
+		free(c);
+	}
+	if (n && !n->folder)
+		n->changes_last = &n->changes;
+}
+
+void faulty_disk_flushed_folder_of(const char *path)
+{
+	const char *last;
+	faulty_disk_flushed(parent_of(path, &last), true);
+}
+
+static void add_change(struct faulty_disk_node *n, const void *bytes, uint64_t size, uint64_t at)
+{
+	struct change *c = must(calloc(1, sizeof *c));
+	c->at = at;
+	c->size = size;
+	if (bytes) {
+		c->bytes = must(malloc(size + 1));
+		memcpy(c->bytes, bytes, size);
+	}
+	*n->changes_last = c;
+	n->changes_last = &c->next;
+}
+
+void faulty_disk_wrote(struct faulty_disk_node *n, const void *bytes, size_t size, uint64_t at)
+{
+	if (n && size)
+		add_change(n, bytes, size, at);
+}
+
+void faulty_disk_cut(struct faulty_disk_node *n, uint64_t size)
+{
+	if (n)
+		add_change(n, NULL, size, 0);
+}
+
+void faulty_disk_removed(const char *path)
+{
+	const char *last;
+	struct faulty_disk_node *in = parent_of(path, &last);
+	if (in)
+		rename_in(in, last, NULL, NULL);
+}
+
+/* ---- the power goes ---- */
+
+struct odds {
+	double bytes, lengths, names; /* that what was not flushed is there all the same */
+};
+
+static void write_out(const struct faulty_disk_node *n, const char *path, const struct odds *p, uint64_t *lost)
+{
+	unsigned char *bytes = NULL;
+	uint64_t size = 0;
+	put(&bytes, &size, n->bytes ? n->bytes : (const unsigned char *)"", n->size, 0);
+	for (const struct change *c = n->changes; c; c = c->next) {
+		if (!c->bytes) {
+			if (roll() < p->lengths)
+				resize(&bytes, &size, c->size);
+			continue;
+		}
+		if (roll() < p->lengths && c->at + c->size > size)
+			resize(&bytes, &size, c->at + c->size);
+		for (uint64_t at = c->at, end; at < c->at + c->size; at = end) {
+			end = at / SECTOR * SECTOR + SECTOR;
+			end = end < c->at + c->size ? end : c->at + c->size;
+			if (roll() < p->bytes)
+				put(&bytes, &size, c->bytes + (at - c->at), end - at, at);
+			else
+				++*lost;
+		}
+	}
+	int fd = open(path, O_WRONLY | O_CREAT | O_EXCL, 0600);
+	for (uint64_t done = 0; fd >= 0 && done < size;) {
+		ssize_t w = write(fd, bytes + done, size - done);
+		if (w <= 0)
+			abort();
+		done += (uint64_t)w;
+	}
+	if (fd < 0 || close(fd))
+		abort();
+	free(bytes);
+}
+
+static void write_folder(const struct faulty_disk_node *n, const char *path, const struct odds *p, uint64_t *lost)
+{
+	struct name *names = copy_names(n->safe);
+	if (mkdir(path, 0700))
+		abort();
+	for (const struct renaming *r = n->renamings; r; r = r->next) {
+		if (roll() < p->names)
+			apply(&names, r);
+		else
+			++*lost;
+	}
+	for (const struct name *m = names; m; m = m->next) {
+		char below[PATH_MOST];
+		snprintf(below, sizeof below, "%s/%s", path, m->text);
+		if (m->node->folder)
+			write_folder(m->node, below, p, lost);
+		else
+			write_out(m->node, below, p, lost);
+	}
+}
+
+static void go_dark(void)
+{
+	static const double shares[] = {0, 0.1, 0.5, 0.9, 1};
+	uint64_t lost = 0;
+	struct odds p;
+	p.bytes = shares[(int)(5 * roll())];
+	p.lengths = shares[(int)(5 * roll())];
+	p.names = shares[(int)(5 * roll())];
+	write_folder(root, setup.after, &p, &lost);
+	atomic_fetch_add(&setup.counts[3], lost);
+	_exit(FAULTY_DISK_EXIT);
+}
+
+void faulty_disk_power_off(void)
+{
+	pthread_mutex_lock(&mutex);
+	go_dark();
+}
+
+int faulty_disk_enter(enum faulty_disk_call what)
+{
+	pthread_mutex_lock(&mutex);
+	atomic_store(&setup.counts[1], ++calls);
+	if (what != FAULTY_DISK_READS) {
+		atomic_store(&setup.counts[0], ++changing_calls);
+		since_failure += setup.lose_after && atomic_load(&failed);
+		if (changing_calls == setup.lose_at || (setup.lose_after && since_failure == setup.lose_after) || atomic_load(&setup.counts[4]))
+			go_dark();
+	}
+	if (!setup.fail_from || calls < setup.fail_from || calls - setup.fail_from >= setup.fail_count)
+		return 0;
+	if (setup.fail_writes_only && what != FAULTY_DISK_WRITES && what != FAULTY_DISK_FLUSHES)
+		return 0;
+	atomic_fetch_add(&setup.counts[2], 1);
+	atomic_store(&failed, true);
+	return setup.fail_with;
+}
+
+void faulty_disk_leave(void)
+{
+	pthread_mutex_unlock(&mutex);
+}
+
+/* ---- the door ---- */
+
+static bool is_refused(enum faulty_disk_call what)
+{
+	int code = faulty_disk_enter(what);
+	if (!code)
+		return false;
+	faulty_disk_leave();
+	errno = code;
+	return true;
+}
+
+/* Keeps errno. */
+static long out(long result)
+{
+	faulty_disk_leave();
+	return result;
+}
+
+static int do_open(const char *path, int flags, mode_t mode)
+{
+	bool hidden = (flags & O_TMPFILE) == O_TMPFILE, changes = !hidden && (flags & (O_CREAT | O_TRUNC));
+	if (is_refused(changes ? FAULTY_DISK_OPENS : FAULTY_DISK_READS))
+		return -1;
+	int fd = open(path, flags, mode);
+	if (fd >= 0 && fd < FDS)
+		open_files[fd] = hidden ? NULL : node_at(path, (flags & O_CREAT) != 0, false);
+	if (fd >= 0 && fd < FDS && open_files[fd] && (flags & O_TRUNC))
+		faulty_disk_cut(open_files[fd], 0);
+	return (int)out(fd);
+}
+
+static int do_close(int fd)
+{
+	faulty_disk_enter(FAULTY_DISK_READS); /* a close that fails has closed all the same */
+	if (fd >= 0 && fd < FDS)
+		open_files[fd] = NULL;
+	return (int)out(close(fd));
+}
+
+static struct faulty_disk_node *file_of(int fd)
+{
+	return fd >= 0 && fd < FDS ? open_files[fd] : NULL;
+}
+
+static ssize_t do_read(int fd, void *bytes, size_t size)
+{
+	return is_refused(FAULTY_DISK_READS) ? -1 : out(read(fd, bytes, size));
+}
+
+static ssize_t do_pread(int fd, void *bytes, size_t size, off_t at)
+{
+	return is_refused(FAULTY_DISK_READS) ? -1 : out(pread(fd, bytes, size, at));
+}
+
+static ssize_t do_write(int fd, const void *bytes, size_t size)
+{
+	if (is_refused(FAULTY_DISK_WRITES))
+		return -1;
+	bool at_end = fcntl(fd, F_GETFL) & O_APPEND;
+	off_t at = lseek(fd, 0, at_end ? SEEK_END : SEEK_CUR);
+	ssize_t n = write(fd, bytes, size);
+	if (n > 0)
+		faulty_disk_wrote(file_of(fd), bytes, (size_t)n, (uint64_t)at);
+	return out(n);
+}
+
+static ssize_t do_pwritev(int fd, const struct iovec *parts, int count, off_t at)
+{
+	if (is_refused(FAULTY_DISK_WRITES))
+		return -1;
+	ssize_t n = pwritev(fd, parts, count, at);
+	for (size_t left = n > 0 ? (size_t)n : 0; left; parts++) {
+		size_t size = parts->iov_len < left ? parts->iov_len : left;
+		faulty_disk_wrote(file_of(fd), parts->iov_base, size, (uint64_t)at);
+		at += (off_t)size;
+		left -= size;
+	}
+	return out(n);
+}
+
+static int do_ftruncate(int fd, off_t size)
+{
+	if (is_refused(FAULTY_DISK_REMOVES))
+		return -1;
+	int rc = ftruncate(fd, size);
+	if (!rc)
+		faulty_disk_cut(file_of(fd), (uint64_t)size);
+	return (int)out(rc);
+}
+
+static int do_fallocate(int fd, int mode, off_t at, off_t size)
+{
+	assert(mode == FALLOC_FL_KEEP_SIZE);
+	return is_refused(FAULTY_DISK_WRITES) ? -1 : (int)out(fallocate(fd, mode, at, size));
+}
+
+static int do_posix_fallocate(int fd, off_t at, off_t size)
+{
+	int code = faulty_disk_enter(FAULTY_DISK_WRITES);
+	return (int)out(code ? code : posix_fallocate(fd, at, size));
+}
+
+static int do_fsync(int fd)
+{
+	int code = faulty_disk_enter(FAULTY_DISK_FLUSHES);
+	if (code)
+		faulty_disk_failed(file_of(fd));
+	else
+		faulty_disk_flushed(file_of(fd), false);
+	faulty_disk_leave();
+	errno = code;
+	return code ? -1 : 0;
+}
+
+static int do_rename(const char *from, const char *to)
+{
+	const char *gone, *made;
+	if (is_refused(FAULTY_DISK_OPENS))
+		return -1;
+	int rc = rename(from, to);
+	struct faulty_disk_node *a = parent_of(from, &gone), *b = parent_of(to, &made);
+	if (!rc && a) {
+		struct name *n = *find(&a->live, gone);
+		assert(n && b);
+		if (a != b) { /* each folder for itself: one of them may keep what the other does not */
+			rename_in(b, NULL, made, n->node);
+			rename_in(a, gone, NULL, NULL);
+		} else {
+			rename_in(a, gone, made, n->node);
+		}
+	}
+	return (int)out(rc);
+}
+
+static int do_unlink(const char *path)
+{
+	if (is_refused(FAULTY_DISK_REMOVES))
+		return -1;
+	int rc = unlink(path);
+	if (!rc)
+		faulty_disk_removed(path);
+	return (int)out(rc);
+}
+
+static int do_mkdir(const char *path, mode_t mode)
+{
+	if (is_refused(FAULTY_DISK_OPENS))
+		return -1;
+	int rc = mkdir(path, mode);
+	if (!rc)
+		node_at(path, true, true);
+	return (int)out(rc);
+}
+
+static int do_rmdir(const char *path)
+{
+	if (is_refused(FAULTY_DISK_REMOVES))
+		return -1;
+	int rc = rmdir(path);
+	if (!rc)
+		faulty_disk_removed(path);
+	return (int)out(rc);
+}
+
+static int do_stat(const char *path, struct stat *st)
+{
+	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(lstat(path, st));
+}
+
+static int do_fstat(int fd, struct stat *st)
+{
+	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(fstat(fd, st));
+}
+
+static int do_touch(const char *path)
+{
+	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(disk_system.touch(path));
+}
+
+static int do_flock(int fd, int what)
+{
+	return is_refused(FAULTY_DISK_READS) ? -1 : (int)out(disk_system.flock(fd, what));
+}
+
+static DIR *do_opendir(const char *path)
+{
+	if (is_refused(FAULTY_DISK_READS))
+		return NULL;
+	DIR *d = opendir(path);
+	faulty_disk_leave();
+	return d;
+}
+
+static const struct disk door = {
+	do_open,  do_close,  do_read,   do_pread,  do_write, do_pwritev, do_ftruncate, do_fallocate, do_posix_fallocate, do_fsync,
+	do_fsync, do_rename, do_unlink, do_mkdir,  do_rmdir, do_stat,  do_fstat,   do_touch,     do_flock,     do_opendir,
+};
+
+/* ---- the start: all that is there is safe ---- */
+
+static void load_file(struct faulty_disk_node *n, const char *path)
+{
+	unsigned char part[1 << 14];
+	ssize_t got;
+	int fd = open(path, O_RDONLY);
+	while (fd >= 0 && (got = read(fd, part, sizeof part)) > 0)
+		put(&n->bytes, &n->size, part, (uint64_t)got, n->size);
+	if (fd < 0 || close(fd))
+		abort();
+}
+
+static void load_folder(struct faulty_disk_node *n, const char *path)
+{
+	DIR *d = must(opendir(path));
+	for (struct dirent *f; (f = readdir(d));) {
+		char below[PATH_MOST];
+		struct stat st;
+		if (strcmp(f->d_name, ".") == 0 || strcmp(f->d_name, "..") == 0)
+			continue;
+		snprintf(below, sizeof below, "%s/%s", path, f->d_name);
+		if (lstat(below, &st))
+			abort();
+		struct faulty_disk_node *m = node_new(S_ISDIR(st.st_mode), f->d_name);
+		set_name(&n->live, f->d_name, m);
+		set_name(&n->safe, f->d_name, m);
+		if (m->folder)
+			load_folder(m, below);
+		else
+			load_file(m, below);
+	}
+	closedir(d);
+}
+
+void faulty_disk_begin(const struct faulty_disk *l)
+{
+	setup = *l;
+	if (!setup.counts)
+		setup.counts = unasked;
+	dice = setup.seed;
+	root = node_new(true, "");
+	load_folder(root, setup.root);
+	disk_use(&door);
+	faulty_disk_vfs_begin();
+}

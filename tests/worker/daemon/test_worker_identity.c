@@ -1,0 +1,110 @@
+/* Starts are counted, whatever the file says; a home stays what it is while its file does. */
+#include "worker/daemon/worker_identity.h"
+
+#include "common/base/disk.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static char folder[] = "/tmp/hslt-life.XXXXXX";
+
+static struct worker_identity next(const char *name)
+{
+	struct worker_identity l;
+	struct error e;
+	assert_int_equal(worker_identity_begin(&l, folder, name, &e), 0);
+	assert_int_equal(strlen(l.home), WORKER_IDENTITY_HOME - 1);
+	assert_int_equal(strspn(l.home, "0123456789abcdef"), WORKER_IDENTITY_HOME - 1);
+	return l;
+}
+
+static void write_text(const char *name, const char *text)
+{
+	char path[256];
+	snprintf(path, sizeof path, "%s/%s", folder, name);
+	FILE *f = fopen(path, "w");
+	assert_non_null(f);
+	fputs(text, f);
+	fclose(f);
+}
+
+static void counts(void **state)
+{
+	(void)state;
+	struct worker_identity first = next("a");
+	assert_int_equal(first.restarts, 1);
+	for (uint64_t i = 2; i < 20; i++) {
+		struct worker_identity l = next("a");
+		assert_int_equal(l.restarts, i);
+		assert_string_equal(l.home, first.home);
+	}
+	assert_string_not_equal(next("b").home, first.home);
+}
+
+static void damaged(void **state)
+{
+	(void)state;
+	static const char *const texts[] = { "", "\n", "7", "zz 3\n", "0123456789abcdef 3\n", "0123456789abcdef0123456789abcdef",
+					     "0123456789abcdef0123456789abcdef -1\n",
+					     "0123456789abcdef0123456789abcdef 18446744073709551615\n" };
+	struct worker_identity first = next("c");
+	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
+		write_text("c", texts[i]);
+		struct worker_identity l = next("c");
+		assert_int_equal(l.restarts, 1);
+		assert_string_not_equal(l.home, first.home);
+	}
+	write_text("c", "0123456789abcdef0123456789abcdef 41\n");
+	assert_int_equal(next("c").restarts, 42);
+}
+
+static int full(int fd)
+{
+	(void)fd;
+	errno = ENOSPC;
+	return -1;
+}
+
+/* Nobody counts, and what was there stays. */
+static void disk_full(void **state)
+{
+	(void)state;
+	struct disk bad = disk_system;
+	struct worker_identity before = next("d"), l;
+	struct error e;
+	bad.fsync = full;
+	disk_use(&bad);
+	int rc = worker_identity_begin(&l, folder, "d", &e);
+	disk_use(NULL);
+	assert_int_equal(rc, -ENOSPC);
+	assert_string_equal(l.home, "");
+	l = next("d");
+	assert_int_equal(l.restarts, 2);
+	assert_string_equal(l.home, before.home);
+}
+
+static int begin(void **state)
+{
+	(void)state;
+	return mkdtemp(folder) ? 0 : -1;
+}
+
+static int end(void **state)
+{
+	(void)state;
+	char command[64];
+	snprintf(command, sizeof command, "rm -r %s", folder);
+	return system(command);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = { cmocka_unit_test(counts), cmocka_unit_test(damaged), cmocka_unit_test(disk_full) };
+	return cmocka_run_group_tests(tests, begin, end);
+}

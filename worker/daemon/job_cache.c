@@ -1,0 +1,284 @@
+#include "worker/daemon/job_cache.h"
+
+#include "common/base/mem.h"
+#include "common/base/liveness.h"
+#include "worker/daemon/work.h"
+#include "worker/render/accuracy_settings.h"
+
+#include <assert.h>
+#include <fcntl.h>
+#include <string.h>
+#include <sys/mman.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { PATH_BYTES = 4200, DEFINES_MAX = 256, CHECKED_SECONDS = 60 /* a file that was right so lately is not read again */ };
+
+static const Farm__JobInfo *info_of(const struct job_cache *b)
+{
+	return b->info.message->job_info;
+}
+
+static struct blob_hash hash_of(const Farm__File *f)
+{
+	struct blob_hash h;
+	assert(f->hash.len == BLOB_HASH_SIZE);
+	memcpy(h.bytes, f->hash.data, BLOB_HASH_SIZE);
+	return h;
+}
+
+int job_cache_new(struct job_cache **out, uint64_t job, struct blob_store *blobs, struct error *e)
+{
+	struct job_cache *b = mem_alloc(1, sizeof *b);
+	if (!b)
+		return error_set(e, ENOMEM, "no memory for a job");
+	b->job = job;
+	b->blobs = blobs;
+	*out = b;
+	return 0;
+}
+
+void job_cache_free(struct job_cache *b)
+{
+	assert(b->state != JOB_CACHE_BUILDING);
+	for (size_t i = 0; b->info.message && b->held && i < info_of(b)->n_files; i++) {
+		struct blob_hash h = hash_of(info_of(b)->files[i]);
+		if (b->held[i])
+			blob_release(b->blobs, &h);
+		if (b->paths)
+			mem_free(b->paths[i]);
+	}
+	mem_free(b->held);
+	mem_free(b->paths);
+	if (b->world)
+		world_free(b->world);
+	envelope_fini(&b->info);
+	mem_free(b);
+}
+
+static int check_info(const Farm__JobInfo *m, struct error *e)
+{
+	bool ok = envelope_text_ok(m->name, 1024) && envelope_text_ok(m->scene, 1024) && m->n_defines <= DEFINES_MAX;
+	for (size_t i = 0; ok && i < m->n_files; i++)
+		ok = envelope_text_ok(m->files[i]->name, 1024) && m->files[i]->hash.len == BLOB_HASH_SIZE;
+	return ok ? 0 : error_set(e, EBADMSG, "the coordinator's description of the job is not in order");
+}
+
+int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error *e)
+{
+	const Farm__JobInfo *m = info->message->job_info;
+	int rc = check_info(m, e);
+	if (!rc)
+		rc = plan_from_wire(m->plan, &b->plan, e);
+	if (rc)
+		return rc;
+	bool *held = mem_alloc(m->n_files, sizeof *held);
+	char **paths = mem_alloc(m->n_files, sizeof *paths);
+	if (!held || !paths) {
+		mem_free(held);
+		mem_free(paths);
+		return error_set(e, ENOMEM, "no memory for a job");
+	}
+	b->plan.rounds = UINT64_MAX; /* the bound may be moved while the job runs, and what a lease computes does not depend on it */
+	b->held = held;
+	b->paths = paths;
+	b->info = *info;
+	memset(info, 0, sizeof *info);
+	b->state = JOB_CACHE_FETCHING;
+	return 0;
+}
+
+static unsigned char *pack_unbounded(const Farm__JobInfo *m, size_t *size)
+{
+	Farm__JobInfo job = *m;
+	Farm__Plan plan = *m->plan;
+	plan.rounds = 0;
+	plan.seconds = plan.target_error = 0;
+	job.plan = &plan;
+	*size = farm__job_info__get_packed_size(&job);
+	unsigned char *bytes = mem_alloc(*size, 1);
+	if (bytes)
+		farm__job_info__pack(&job, bytes);
+	return bytes;
+}
+
+bool job_cache_is_of(const struct job_cache *b, const Farm__JobInfo *info)
+{
+	size_t known_size, size;
+	if (!b->info.message)
+		return true;
+	if (!info->plan)
+		return false;
+	unsigned char *known = pack_unbounded(info_of(b), &known_size), *told = pack_unbounded(info, &size);
+	bool same = known && told && size == known_size && memcmp(known, told, size) == 0;
+	mem_free(known);
+	mem_free(told);
+	return same;
+}
+
+bool job_cache_next_missing(struct job_cache *b)
+{
+	for (size_t i = 0; i < info_of(b)->n_files; i++) {
+		b->wanted = hash_of(info_of(b)->files[i]);
+		/* What lies in the cache may have been damaged since it came: then it is fetched again. */
+		if (!b->held[i] && blob_check(b->blobs, &b->wanted, CHECKED_SECONDS, NULL) == 0)
+			b->held[i] = blob_hold(b->blobs, &b->wanted);
+		if (!b->held[i])
+			return true;
+	}
+	return false;
+}
+
+/* ---- assets: the builder's thread ---- */
+
+struct mapping {
+	void *at;
+	size_t size;
+};
+
+static int open_asset(void *user, const char *name, struct asset *out, struct error *e)
+{
+	struct job_cache *b = user;
+	const Farm__JobInfo *m = info_of(b);
+	size_t i = 0;
+	tick();
+	while (i < m->n_files && strcmp(m->files[i]->name, name) != 0)
+		i++;
+	if (i == m->n_files)
+		return error_set(e, ENOENT, "%s: the file was not sent with the job", name);
+	int fd = open(b->paths[i], O_RDONLY | O_CLOEXEC);
+	struct stat st;
+	if (fd < 0 || fstat(fd, &st)) {
+		int rc = error_set(e, errno, "%s: %s", name, strerror(errno));
+		b->own = true;
+		if (fd >= 0)
+			close(fd);
+		return rc;
+	}
+	struct mapping *map = mem_alloc(1, sizeof *map);
+	void *at = MAP_FAILED;
+	if (map && st.st_size > 0)
+		at = mmap(NULL, (size_t)st.st_size, PROT_READ, MAP_PRIVATE, fd, 0);
+	close(fd);
+	if (!map || (st.st_size > 0 && at == MAP_FAILED)) {
+		mem_free(map);
+		b->own = true;
+		return error_set(e, ENOMEM, "%s: cannot be mapped", name);
+	}
+	*map = (struct mapping){st.st_size > 0 ? at : NULL, (size_t)st.st_size};
+	*out = (struct asset){st.st_size > 0 ? at : (const unsigned char *)"", (size_t)st.st_size, map};
+	return 0;
+}
+
+static void close_asset(void *user, struct asset *a)
+{
+	(void)user;
+	struct mapping *map = a->handle;
+	if (map && map->at)
+		munmap(map->at, map->size);
+	mem_free(map);
+	memset(a, 0, sizeof *a);
+}
+
+/* ---- the world ---- */
+
+/* What this worker reads must be what the client read, or the image would not be the one that was planned. */
+static int check_plan(const struct job_cache *b, const struct scene *s, const struct render_options *o, struct error *e)
+{
+	struct scene_settings set;
+	const struct plan *p = &b->plan;
+	int rc = scene_settings_read(s, o->width, o->height, &set, e);
+	if (rc)
+		return rc;
+	if (set.width != p->width || set.height != p->height || set.border != p->border)
+		return error_set(e, EINVAL,
+				 "this worker reads a film of %ux%u with a border of %u from the scene, the plan says %ux%u "
+				 "and %u: other versions?",
+				 set.width, set.height, set.border, p->width, p->height, p->border);
+	const struct render_integrator *i = render_integrator_find(p->integrator);
+	if (!i || i->kind != p->kind)
+		return error_set(e, EINVAL, "this worker has no integrator '%s' of that kind", p->integrator);
+	char own[PLAN_ACCURACY_MAX];
+	rc = render_settings_canonical(p->accuracy, own, e);
+	if (!rc && strcmp(own, p->accuracy) != 0)
+		rc = error_set(e, EINVAL, "this worker spells the settings '%s', the plan '%s': other versions?", own, p->accuracy);
+	return rc;
+}
+
+static int check_mutations(const struct job_cache *b, struct error *e)
+{
+	const struct plan *p = &b->plan;
+	char own[PLAN_MUTATIONS_MAX] = "";
+	struct render_summary summary;
+	world_summary(b->world, &summary);
+	int rc = render_integrator_find(p->integrator)->has_mutations ? render_mutations(p->mutations, &summary, own, e) : 0;
+	if (!rc && strcmp(own, p->mutations) != 0)
+		rc = error_set(e, EINVAL, "this worker spells the mixture of mutations '%s', the plan '%s': other versions?", own,
+			       p->mutations);
+	return rc;
+}
+
+static int build(struct job_cache *b, struct error *e)
+{
+	const Farm__JobInfo *m = info_of(b);
+	struct scene_define defines[DEFINES_MAX];
+	struct asset_source assets = {b, open_asset, close_asset};
+	struct render_options options = {.width = m->render_width, .height = m->render_height, .max_depth = b->plan.max_depth};
+	memcpy(options.accuracy, b->plan.accuracy, sizeof options.accuracy);
+	memcpy(options.effects, b->plan.effects, sizeof options.effects);
+	struct scene scene;
+	for (size_t i = 0; i < m->n_defines; i++)
+		defines[i] = (struct scene_define){m->defines[i]->name, m->defines[i]->value};
+	int rc = render_scene_read(&scene, &assets, m->scene, defines, m->n_defines, &options, e);
+	if (rc)
+		return rc;
+	rc = check_plan(b, &scene, &options, e);
+	if (!rc)
+		rc = world_new(&b->world, &scene, &assets, &options, e);
+	scene_fini(&scene);
+	if (rc)
+		return rc;
+	rc = check_mutations(b, e);
+	if (rc) {
+		world_free(b->world);
+		b->world = NULL;
+	}
+	return rc;
+}
+
+static void run(struct task *t)
+{
+	struct job_cache *b = (struct job_cache *)t; /* its first member */
+	uint64_t begun = uv_hrtime();
+	if (b->waits.job)
+		work_begin(&b->waits, info_of(b)->scene);
+	if (build(b, &b->error))
+		b->world = NULL;
+	work_end();
+	b->build_seconds = (double)(uv_hrtime() - begun) * 1e-9;
+}
+
+static void done(struct task *t)
+{
+	struct job_cache *b = (struct job_cache *)t;
+	b->state = b->world ? JOB_CACHE_READY : JOB_CACHE_FAILED;
+	b->built(b);
+}
+
+int job_cache_build(struct job_cache *b, struct thread_pool *c, struct error *e)
+{
+	const Farm__JobInfo *m = info_of(b);
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = hash_of(m->files[i]);
+		if (!b->paths[i])
+			b->paths[i] = mem_alloc(PATH_BYTES, 1);
+		if (!b->paths[i])
+			return error_set(e, ENOMEM, "no memory for a job");
+		blob_path(b->blobs, &h, b->paths[i], PATH_BYTES);
+	}
+	b->state = JOB_CACHE_BUILDING;
+	b->task.run = run;
+	b->task.done = done;
+	thread_pool_add(c, &b->task);
+	return 0;
+}

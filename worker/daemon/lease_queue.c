@@ -1,0 +1,540 @@
+/* Jobs and leases of the worker daemon. */
+#include "worker/daemon/agent_private.h"
+
+#include "common/base/log.h"
+#include "common/base/mem.h"
+#include "worker/daemon/say.h"
+#include "worker/daemon/work.h"
+
+#include <stdio.h>
+
+static unsigned long long number(uint64_t n)
+{
+	return n;
+}
+
+/* ---- bundles ---- */
+
+static struct job_cache *find_job_cache(const struct agent *a, uint64_t job)
+{
+	for (struct job_cache *b = a->bundles; b; b = b->next)
+		if (b->job == job)
+			return b;
+	return NULL;
+}
+
+static void drop_job_cache(struct agent *a, struct job_cache *b)
+{
+	struct job_cache **at = &a->bundles;
+	while (*at != b)
+		at = &(*at)->next;
+	*at = b->next;
+	job_cache_free(b);
+}
+
+static struct job_cache *who_wants(const struct agent *a, const struct blob_hash *h)
+{
+	for (struct job_cache *b = a->bundles; b; b = b->next)
+		if (b->state == JOB_CACHE_FETCHING && blob_hash_equal(&b->wanted, h))
+			return b;
+	return NULL;
+}
+
+/* What is asked for stays until it is answered, so that an answer is never taken for another one's. */
+static void tidy_fetches(struct agent *a)
+{
+	for (struct fetch *f = a->fetches, *next; f; f = next) {
+		next = f->next;
+		if (!f->asked && !who_wants(a, &f->hash))
+			fetch_drop(a, f);
+	}
+}
+
+/* Idle bundles go when their job has ended, and the least recently used ones beyond WORLDS_KEPT. */
+static void tidy(struct agent *a)
+{
+	for (;;) {
+		struct job_cache *oldest = NULL, *ended = NULL;
+		unsigned idle = 0;
+		for (struct job_cache *b = a->bundles; b; b = b->next) {
+			if (b->users || b->state == JOB_CACHE_BUILDING)
+				continue;
+			idle++;
+			if (b->ended || b->state == JOB_CACHE_FAILED)
+				ended = b;
+			if (!oldest || b->last_used < oldest->last_used)
+				oldest = b;
+		}
+		if (ended)
+			drop_job_cache(a, ended);
+		else if (idle > WORLDS_KEPT)
+			drop_job_cache(a, oldest);
+		else
+			break;
+	}
+	tidy_fetches(a);
+}
+
+static void drop_lease(struct agent *a, struct lease_task *l)
+{
+	struct lease_task **at = &a->leases;
+	while (*at != l)
+		at = &(*at)->next;
+	*at = l->next;
+	a->busy_at = uv_now(&a->loop);
+	lease_task_free(l);
+}
+
+static void fail_leases_of(struct agent *a, struct job_cache *b, const struct error *e)
+{
+	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", number(b->job), log_quote(e->text).text);
+	for (struct lease_task *l = a->leases, *next; l; l = next) {
+		next = l->next;
+		if (l->bundle != b || l->state != LEASE_WAITING)
+			continue;
+		say_failed(a, &l->grant.key, *e->text ? e->text : "the scene cannot be built", b->own);
+		drop_lease(a, l);
+	}
+}
+
+/* It goes with the next tidy(). */
+static void fail_job_cache(struct agent *a, struct job_cache *b, const struct error *e)
+{
+	b->state = JOB_CACHE_FAILED;
+	fail_leases_of(a, b, e);
+}
+
+static void on_rendered(struct lease_task *l);
+static void start_lease(struct agent *a, struct lease_task *l)
+{
+	l->owner = a;
+	l->finished = on_rendered;
+	l->spoil = a->config.spoil && a->rendered % a->config.spoil == 0 ? a->rendered + 1 : 0;
+	l->large = a->config.large && a->rendered % a->config.large == 0;
+	l->lie = a->config.lie && a->rendered % a->config.lie == 0;
+	l->hangs = ++a->rendered == a->config.hang;
+	l->crashes = a->rendered == a->config.crash;
+	lease_task_start(l, a->thread_pool);
+}
+
+static void on_built(struct job_cache *b)
+{
+	struct agent *a = b->owner;
+	if (b->state == JOB_CACHE_FAILED) {
+		fail_job_cache(a, b, &b->error);
+	} else {
+		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", number(b->job), b->build_seconds,
+			  world_embree_bytes(b->world));
+		for (struct lease_task *l = a->leases; l; l = l->next)
+			if (l->bundle == b && l->state == LEASE_WAITING)
+				start_lease(a, l);
+	}
+	tidy(a);
+	agent_settle(a);
+}
+
+/* Asks for the next missing piece, unless another job has, or builds. */
+static void go_on(struct agent *a, struct job_cache *b)
+{
+	struct error e;
+	int rc;
+	if (b->state != JOB_CACHE_FETCHING)
+		return;
+	if (job_cache_next_missing(b)) {
+		rc = fetch_want(a, &b->wanted, &e);
+	} else {
+		b->owner = a;
+		b->built = on_built;
+		for (const struct lease_task *l = a->leases; l; l = l->next)
+			if (l->bundle == b)
+				b->waits = l->grant.key;
+		rc = job_cache_build(b, a->thread_pool, &e);
+	}
+	if (rc) {
+		b->own = rc == -ENOMEM;
+		fail_job_cache(a, b, &e);
+	}
+}
+
+/* ---- leases ---- */
+
+/* Where leases are short and the coordinator's disk is slow results pile up: it asks for no more until they have gone. */
+static void pace(struct agent *a)
+{
+	enum { RESULTS_MANY = 256, RESULTS_FEW = 128 };
+	unsigned results = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		results += l->state == LEASE_RENDERED;
+	bool backlog = a->backlog ? results > RESULTS_FEW : results >= RESULTS_MANY;
+	if (backlog == a->backlog)
+		return;
+	a->backlog = backlog;
+	say_request(a);
+}
+
+static struct lease_task *find_lease(const struct agent *a, const struct lease_key *k)
+{
+	for (struct lease_task *l = a->leases; l; l = l->next)
+		if (!l->unwanted && lease_key_equal(&l->grant.key, k))
+			return l;
+	return NULL;
+}
+
+/* Nobody wants it any more. What a thread has is dropped when the thread lets go. */
+static void forget_lease(struct agent *a, struct lease_task *l)
+{
+	if (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)) {
+		l->unwanted = true;
+		atomic_store(&l->stop, true);
+		return;
+	}
+	drop_lease(a, l);
+}
+
+static void on_rendered(struct lease_task *l)
+{
+	struct agent *a = l->owner;
+	l->state = LEASE_RENDERED;
+	if (l->unwanted) {
+		drop_lease(a, l);
+	} else if (l->rc || l->end == LEASE_STOPPED) {
+		if (l->rc == -EILSEQ)
+			say_bad_states(a, &l->grant, l->error.text);
+		else
+			say_failed(a, &l->grant.key, l->rc ? l->error.text : "", false);
+		drop_lease(a, l);
+	} else {
+		say_result(a, l);
+	}
+	pace(a);
+	tidy(a);
+	agent_settle(a);
+}
+
+/* Far more than were asked for: no coordinator of ours does that. */
+static bool is_flood(const struct agent *a)
+{
+	unsigned open = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		open += l->state != LEASE_RENDERED;
+	return open >= 4 * (a->config.threads + 1) + 16;
+}
+
+/* Results that are not acknowledged are many where leases are short and the coordinator's disk is slow. Whoever hung up then
+ * would send them all again, and have no fewer. */
+static bool is_stuffed(const struct agent *a)
+{
+	enum { ANSWERS_MOST = 1024 };
+	unsigned answered = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next)
+		answered += l->state == LEASE_RENDERED;
+	return answered >= ANSWERS_MOST;
+}
+
+static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigned char *payload, size_t size)
+{
+	struct grant g;
+	struct lease_task *l = NULL;
+	struct error e;
+	if (grant_unpack(&g, m, payload, size, &e)) {
+		conn_close(a->conn, e.text);
+		return;
+	}
+	struct job_cache *b = find_job_cache(a, g.key.job);
+	l = find_lease(a, &g.key);
+	if (l && !blob_hash_equal(&l->grant.digest, &g.digest)) { /* the epoch before was computed again: this one is another now */
+		forget_lease(a, l);
+		l = NULL;
+	}
+	if (l) { /* it is at work here already, from an earlier connection */
+		if (l->state == LEASE_RENDERED)
+			say_result(a, l);
+		grant_fini(&g);
+		return;
+	}
+	if (is_flood(a)) {
+		grant_fini(&g);
+		conn_close(a->conn, "the coordinator grants more leases than it is asked for");
+		return;
+	}
+	if (a->leaving || is_stuffed(a)) {
+		say_failed(a, &g.key, "", false);
+		grant_fini(&g);
+		return;
+	}
+	int rc = 0;
+	bool fresh = !b;
+	if (fresh)
+		rc = job_cache_new(&b, g.key.job, a->cache.blobs, &e);
+	if (!rc && fresh) {
+		b->next = a->bundles;
+		a->bundles = b;
+		say_job_get(a, b->job);
+	}
+	if (!rc)
+		rc = lease_task_new(&l, &g, b, &e);
+	if (rc) {
+		say_failed(a, &g.key, e.text, true);
+		grant_fini(&g);
+		return;
+	}
+	b->last_used = ++a->clock;
+	struct lease_task **end = &a->leases; /* the oldest first: rounds complete in order */
+	while (*end)
+		end = &(*end)->next;
+	*end = l;
+	if (b->state == JOB_CACHE_READY)
+		start_lease(a, l);
+	tidy(a);
+}
+
+static void take_ack(struct agent *a, const Farm__LeaseAck *m)
+{
+	struct lease_key k;
+	struct error e;
+	if (lease_key_from_wire(m->key, &k, &e)) {
+		conn_close(a->conn, e.text);
+		return;
+	}
+	struct lease_task *l = find_lease(a, &k);
+	if (m->verdict == FARM__VERDICT__VERDICT_REFUSED)
+		log_event(LOG_BATCH_REFUSED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k.job), k.group, k.part,
+			  number(k.epoch), log_quote(m->text).text);
+	else if (m->verdict != FARM__VERDICT__VERDICT_NOTED)
+		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu kind=%d group=%u part=%u epoch=%llu repeat=%d", number(k.job),
+			  (int)k.kind, k.group, k.part, number(k.epoch), m->verdict == FARM__VERDICT__VERDICT_REPEATED);
+	if (l && l->state == LEASE_RENDERED) {
+		drop_lease(a, l);
+		pace(a);
+		tidy(a);
+	}
+}
+
+static void take_revoke(struct agent *a, const Farm__LeaseRevoke *m)
+{
+	struct lease_key k;
+	struct error e;
+	struct lease_task *l = lease_key_from_wire(m->key, &k, &e) ? NULL : find_lease(a, &k);
+	if (l && l->state != LEASE_RENDERED) /* a result that was sent is acknowledged all the same */
+		forget_lease(a, l);
+	tidy(a);
+}
+
+static void take_job_end(struct agent *a, uint64_t job)
+{
+	struct job_cache *b = find_job_cache(a, job);
+	if (!b)
+		return;
+	for (struct lease_task *l = a->leases, *next; l; l = next) {
+		next = l->next;
+		if (l->bundle == b && !l->unwanted)
+			forget_lease(a, l);
+	}
+	b->ended = true;
+	pace(a);
+	tidy(a);
+}
+
+/* The coordinator has begun anew, and the job's number is another job's now: what was made of the old one is nobody's. */
+static void disown(struct agent *a, struct job_cache *b)
+{
+	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job of this number\"", number(b->job));
+	for (struct lease_task *l = a->leases, *next; l; l = next) {
+		next = l->next;
+		if (l->bundle == b && !l->unwanted)
+			forget_lease(a, l);
+	}
+	pace(a);
+	b->ended = true;
+	b->job = 0;
+	tidy(a);
+}
+
+static void take_job_info(struct agent *a, struct envelope *env)
+{
+	struct job_cache *b = find_job_cache(a, env->message->job_info->job);
+	struct error e;
+	if (!b)
+		return;
+	if (!job_cache_is_of(b, env->message->job_info)) {
+		disown(a, b);
+		return;
+	}
+	if (b->state == JOB_CACHE_ASKED && job_cache_set_info(b, env, &e))
+		fail_job_cache(a, b, &e);
+	go_on(a, b);
+	for (struct lease_task *l = a->leases; l; l = l->next) /* the job lives: results from before are welcome */
+		if (l->bundle == b && l->state == LEASE_RENDERED)
+			say_result(a, l);
+	tidy(a);
+}
+
+/* Where it cannot be fetched for one job the others that want it try for themselves: what the first one held makes room. */
+static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
+{
+	struct error e;
+	struct fetch *f = fetch_answered(a, c);
+	if (!f) {
+		conn_close(a->conn, "the coordinator sends a piece of a file that it was not asked for");
+		return;
+	}
+	const struct blob_hash hash = f->hash;
+	struct job_cache *first = who_wants(a, &hash);
+	enum fetch_end end = first ? fetch_add(f, a->cache.blobs, c, payload, size, &e) : FETCH_MORE;
+	if (end != FETCH_MORE)
+		fetch_drop(a, f);
+	if (end == FETCH_FAILED || end == FETCH_UNSTORED) {
+		first->own = end == FETCH_UNSTORED;
+		fail_job_cache(a, first, &e);
+		tidy(a);
+	}
+	for (struct job_cache *b = a->bundles; b; b = b->next)
+		go_on(a, b);
+	if (end == FETCH_WHOLE)
+		blob_release(a->cache.blobs, &hash);
+	tidy(a);
+}
+
+void lease_queue_message(struct agent *a, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	const Farm__Envelope *m = env->message;
+	switch (m->body_case) {
+	case FARM__ENVELOPE__BODY_HEARTBEAT:
+		break;
+	case FARM__ENVELOPE__BODY_LEASE_GRANT:
+		take_grant(a, m->lease_grant, payload, size);
+		break;
+	case FARM__ENVELOPE__BODY_LEASE_ACK:
+		take_ack(a, m->lease_ack);
+		break;
+	case FARM__ENVELOPE__BODY_LEASE_REVOKE:
+		take_revoke(a, m->lease_revoke);
+		break;
+	case FARM__ENVELOPE__BODY_JOB_INFO:
+		take_job_info(a, env);
+		break;
+	case FARM__ENVELOPE__BODY_JOB_END:
+		take_job_end(a, m->job_end->job);
+		break;
+	case FARM__ENVELOPE__BODY_BLOB_CHUNK:
+		take_blob(a, m->blob_chunk, payload, size);
+		break;
+	default:
+		conn_close(a->conn, "not a message that a coordinator says to a worker");
+	}
+	agent_settle(a);
+}
+
+/* ---- connection and leaving ---- */
+
+/* What the processes before this one had when a signal ended them, before any lease is asked for. */
+static void tell_lost(struct agent *a)
+{
+	struct lost_lease *l;
+	for (unsigned i = 0; (l = work_lost(i)); i++)
+		if (!l->told) {
+			say_failed(a, &l->key, l->text, l->own);
+			l->told = true;
+		}
+}
+
+void lease_queue_welcome(struct agent *a)
+{
+	for (struct lease_task *l = a->leases; l; l = l->next)
+		l->sent = false;
+	tell_lost(a);
+	fetch_reconnected(a);
+	/* Does the job live? The answer brings unfinished fetching and unsent results on their way. */
+	for (struct job_cache *b = a->bundles; b; b = b->next)
+		if (!b->ended)
+			say_job_get(a, b->job);
+	say_request(a);
+}
+
+void lease_queue_leave(struct agent *a)
+{
+	say_request(a);
+	for (struct lease_task *l = a->leases, *next; l; l = next) {
+		next = l->next;
+		if (l->state == LEASE_RENDERED || (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)))
+			continue;
+		say_failed(a, &l->grant.key, "", false);
+		drop_lease(a, l);
+	}
+}
+
+void lease_queue_stop_all(struct agent *a)
+{
+	for (struct lease_task *l = a->leases; l; l = l->next)
+		atomic_store(&l->stop, true);
+}
+
+/* Looks are counted, not seconds: a worker that was stopped as a whole has not hung. */
+static bool has_hung(struct task *t)
+{
+	unsigned long long now = atomic_load(&t->ticks);
+	t->still = now && now == t->seen ? t->still + 1 : 0;
+	t->seen = now;
+	return t->still >= STALL_LOOKS;
+}
+
+static bool watch_leases(struct agent *a)
+{
+	char text[128];
+	bool found = false;
+	snprintf(text, sizeof text, "no progress for %g s: its thread hangs", a->config.stall_seconds);
+	for (struct lease_task *l = a->leases; l; l = l->next) {
+		if (l->state != LEASE_QUEUED || l->task.hung || !has_hung(&l->task))
+			continue;
+		if (!l->unwanted)
+			say_failed(a, &l->grant.key, text, false);
+		l->unwanted = l->task.hung = found = true;
+		atomic_store(&l->stop, true);
+	}
+	return found;
+}
+
+static bool watch_builds(struct agent *a)
+{
+	bool found = false;
+	for (struct job_cache *b = a->bundles; b; b = b->next) {
+		struct error e;
+		if (b->state != JOB_CACHE_BUILDING || b->task.hung || !has_hung(&b->task))
+			continue;
+		error_set(&e, ETIMEDOUT, "no progress for %g s in building the scene: its thread hangs", a->config.stall_seconds);
+		fail_leases_of(a, b, &e);
+		b->task.hung = found = true;
+	}
+	return found;
+}
+
+bool lease_queue_watch(struct agent *a)
+{
+	bool lease = watch_leases(a);
+	return watch_builds(a) || lease;
+}
+
+/* But for threads that hang, and scenes that are being built for nobody. */
+bool lease_queue_is_idle(const struct agent *a)
+{
+	unsigned left = 0;
+	for (const struct lease_task *l = a->leases; l; l = l->next, left++)
+		if (!l->task.hung)
+			return false;
+	for (const struct job_cache *b = a->bundles; b; b = b->next)
+		left += b->state == JOB_CACHE_BUILDING;
+	return thread_pool_pending(a->thread_pool) == left;
+}
+
+void lease_queue_close(struct agent *a)
+{
+	while (a->fetches)
+		fetch_drop(a, a->fetches);
+	while (a->leases)
+		drop_lease(a, a->leases);
+	while (a->bundles) {
+		if (a->bundles->state == JOB_CACHE_BUILDING) /* its thread is gone */
+			a->bundles->state = a->bundles->world ? JOB_CACHE_READY : JOB_CACHE_FAILED;
+		drop_job_cache(a, a->bundles);
+	}
+}
