@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Renders a film in crops, each a job of its own, on one coordinator or several, and puts them together.
 set -eu
 

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Renders the demo scene with programs that are built: deploy/demo-run.sh BUILD OUT [OPTION OF hslt-submit...]
 #
 # A coordinator and two workers on loopback, with a spool that goes afterwards; OUT/demo.exr and OUT/demo.png stay.

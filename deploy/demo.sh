@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Installs what is missing, builds, and renders the demo scene on a farm of two workers on this machine: one of the two
 # commands of the README. The picture: build/demo/demo.png and demo.exr. Nothing that it starts is left running.
 set -eu

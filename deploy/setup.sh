@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Installs what building and testing need, through the system's package manager (Debian 12 or 13, and what is like them).
 # Says what it installs; does nothing where all is there.
 #

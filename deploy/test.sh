@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Installs what is missing, builds, and runs the tests: one of the two commands of the README.
 #
 #   sh deploy/test.sh          all that the build packages allow; says what it skipped

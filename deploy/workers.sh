@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Starts (or stops) hslt-worker on named hosts over ssh.
 set -eu
 

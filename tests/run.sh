@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Runs all tests of a build folder and sums them up: tests/run.sh BUILD [PATTERN]
 #
 # Test programs are BUILD/tests/**/test_* (cmocka: each of their tests is counted); scripts are tests/lint/*.sh and

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Memory that lives and dies together: one arena per scene description, one per world.
  * Not safe for two threads at once. Zeroed; aligned to 64 bytes.

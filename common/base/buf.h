@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Bytes that grow up to a hard limit. One thread at a time. Zeroed memory with `limit` set is an empty buffer.
  */

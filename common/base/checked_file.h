@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A file that is believed as a whole or not at all: bytes, and the CRC-32C of them behind. Written to its end and flushed before
  * it gets its name; read through once and checked before anything in it is used. Any thread, one at a time for a file. Numbers are

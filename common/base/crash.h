@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The last words of a program that a signal ends (SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT: a fault of ours or of a library,
  * an assertion): which signal, and what its thread was doing. What is said meanwhile uses no memory but its own and no lock.

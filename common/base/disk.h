@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The one door for file I/O of whatever must survive: the coordinator's spool, stores of blobs, files of films, sealed files. The
  * calls are the system's, with its conventions (-1 and errno), through a table that tests replace: by a disk that is full, fails, or

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Work that says that it gets on: a thread's ticks count up a counter of its own, and whoever watches that sees it stand still
  * when the thread hangs. Code that may run for long ticks more often than once a second. Threads that nobody watches lose a

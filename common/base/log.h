@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Log lines of the daemons: one logfmt line an event on stderr, "time=... level=... event=... key=value ...".
  * The vocabulary is the table below: what is not in it is not logged, so that a line can be searched for by name.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/log_limit.h"
 
 static void fill(struct log_bucket *b, double now)

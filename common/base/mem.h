@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The one door for memory. A test makes the n-th allocation fail and sees that nothing leaks or crashes.
  * Returned memory is zeroed. Any thread.

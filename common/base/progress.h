@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Progress on stderr: a bar that redraws itself on a terminal, a plain line now and then elsewhere. One thread.
  */

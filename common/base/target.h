@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Where a path leads that a program is told to write to. A regular file, or none, is replaced as a whole: what is written beside it
  * takes its name. Of a link the file that it leads to is replaced, and the link stays. Anything else, a pipe, a terminal, a device,

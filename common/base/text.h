@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Short texts in fixed arrays. Any thread. */
 #ifndef COMMON_BASE_TEXT_H
 #define COMMON_BASE_TEXT_H

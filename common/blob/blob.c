@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/blob/blob.h"
 
 #include "common/base/disk.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Bytes named by their SHA-256: a folder of files, put there whole or not at all (temporary file, check, fsync,
  * rename, fsync of the folder).

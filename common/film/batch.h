@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A batch: the result of one lease. Its content depends on (plan, kind, group, part, epoch) only.
  * In memory here; on the wire a message header followed by one EXR per tile (common/film/exr.h).

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The merged films of a job: one film a group, sums on an integer grid, so that adding is order-free (docs/design.md, rules 1).
  * Round r's batches go into the open film of r; when all have come the round is closed and its sums move into the prefix.

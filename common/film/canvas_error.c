@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The error of an image and what its relMSE is summed from, by the spread between groups: standard errors of pixels; weights,
  * 1 / (B^2 + (0.01 m)^2), with brightnesses B that are no noisier than need be; sums of weighted errors, with bounds. What is made of

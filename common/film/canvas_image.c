@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* From integer sums to an image. All loops run in a fixed order over exact inputs, so that equal films give equal bits. */
 #include "common/film/convergence.h"
 #include "common/film/canvas_private.h"

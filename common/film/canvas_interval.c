@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The relMSE of an image from the sums over its pixels, and the interval of it.
  *

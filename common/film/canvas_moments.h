@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What a canvas keeps besides pixels to say whether chains agree: by sequence and tile the cumulated first moments, by lease
  * and tile the second ones, by group and path class the chains' time and the bootstrap's energy (struct batch). As films are:

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The inside of struct canvas, for canvas.c (adding), canvas_image.c (making images) and canvas_error.c (their errors).
  * A film holds one slot of TILE_SIZE x TILE_SIZE x 3 integers per tile of the crop, so that a tile that nothing touched

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/film/canvas_save.h"
 
 #include "common/film/canvas_private.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A canvas in a file and back, open rounds too: whoever adds the same batches to both gets the same bits. What no batch touched
  * takes no room. The form is that of this build (versioned; numbers as they lie in memory). One thread at a time.

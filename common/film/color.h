@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* CIE XYZ to linear Rec. 709 (IEC 61966-2-1 primaries, D65). Values outside the gamut stay negative. Pure. */
 #ifndef COMMON_FILM_COLOR_H
 #define COMMON_FILM_COLOR_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Whether the chains of an image agree, from what its batches say besides pixels (docs/design.md, rules 1 and 2): tiles whose
  * potential scale reduction (Gelman and Rubin 1992) says that chains have not mixed, classes of paths whose energy in the

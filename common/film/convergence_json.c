@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/film/convergence_json.h"
 
 #include "common/base/text.h"

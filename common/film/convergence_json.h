@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Agreement of chains and energies of classes as JSON: in the statistics of hslt-render, the status, the spool. Any thread. */
 #ifndef COMMON_FILM_CONVERGENCE_JSON_H
 #define COMMON_FILM_CONVERGENCE_JSON_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The one door to OpenEXR (Core, C). Images: R G B float (and error.R,G,B), ZIP, scan lines. Tiles: one-part, tiled, X Y Z
  * float, uncompressed, data window at their place. All in memory; any thread; foreign bytes are checked before decoding.

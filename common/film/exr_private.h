@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Files in memory for OpenEXRCore; shared by exr_image.c and exr_tile.c. One thread each. */
 #ifndef COMMON_FILM_EXR_PRIVATE_H
 #define COMMON_FILM_EXR_PRIVATE_H

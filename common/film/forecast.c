@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/film/forecast.h"
 
 #include "common/film/merge.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What a smaller error will cost: from the looks at the error of a render so far, or of a pilot, the work and the time at
  * which a render will stop by its target (common/film/merge.h), with 90 % intervals. Pure, deterministic, no allocation; any

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Looks and forecasts as JSON, for the status, the spool and statistics. Pure but for memory; any thread. */
 #ifndef COMMON_FILM_FORECAST_JSON_H
 #define COMMON_FILM_FORECAST_JSON_H

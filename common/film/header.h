@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The image's header attributes "hslt:...", in one table: what each is called, its type, what it means. EXR has no 64-bit
  * integer, so counts are strings of decimal digits. The coordinator and hslt-render fill them in by the same function, so

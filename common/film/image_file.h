@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The image as a file: EXR with header, errors beside colours, and put in place as a whole or not at all. Any thread. */
 #ifndef COMMON_FILM_IMAGE_FILE_H
 #define COMMON_FILM_IMAGE_FILE_H

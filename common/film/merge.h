@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What the coordinator and hslt-render do alike: gather the bootstrap in any order, draw the chains' seeds from it, and
  * decide after complete rounds whether the job is done. Depends on the plan and on batches alone, so that both sides give

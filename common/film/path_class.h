@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Classes of paths, by how many edges they have and where their smooth vertices lie (Heckbert 1990). What chains say of the
  * energy of each is held against what the bootstrap says: a class that independent sampling hardly finds is where chains

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What an image says of its own error, in words, the same wherever it is said. Pure; any thread; allocates nothing.
  */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What the strategies of a mixture did, for people and programs: names of the counters, a table; and the notes on an image
  * that its counters give reason for. Pure; any thread.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/film/strategy_json.h"
 
 #include "common/film/strategy.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Counters of strategies as JSON: in the statistics of hslt-render, the coordinator's status and its spool. Any thread. */
 #ifndef COMMON_FILM_STRATEGY_JSON_H
 #define COMMON_FILM_STRATEGY_JSON_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * "HOST:PORT", "[::1]:PORT": where a daemon listens and whom a peer calls. Whatever is not loopback needs TLS or must be asked
  * for (--insecure).

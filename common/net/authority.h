@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A farm's own certificate authority in a folder: ca.pem, ca.key (0600), crl.pem, issued/SERIAL.pem, and a folder for each
  * name with what a program's --tls wants: ca.pem, cert.pem, key.pem (0600), crl.pem. ECDSA on P-256 with SHA-256; X.509 v3

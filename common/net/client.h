@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The client's side of the conversation (hslt-submit, hslt-job): says hello, then sends and waits, one step at a time,
  * with a loop of its own. One thread.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * One connection: frames in and out over a TCP stream of libuv, through TLS or not, with limits. All calls and callbacks on the loop's thread.
  * The connection owns its memory: after conn_close (or a fault) `closed` comes exactly once, from the loop and never from

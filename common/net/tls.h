@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * TLS 1.3 (RFC 8446) with certificates on both sides, as a filter between a socket and the frames: bytes in, bytes out, no
  * socket of its own. A folder has ca.pem (the farm's authority), cert.pem and key.pem (our own), and crl.pem (what the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/plan/plan.h"
 
 #include <Random123/threefry.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A job's plan (docs/design.md, rules 1): fixed when the job starts, the same for hslt-render and the farm, never a function
  * of workers or threads. Pure; any thread.

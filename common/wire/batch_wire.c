@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/wire/batch_wire.h"
 
 #include "common/base/mem.h"

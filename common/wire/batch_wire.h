@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A batch between memory and the LeaseResult message with its payload: the tiles' EXRs, the chain states, the weights
  * (float32, little endian), one after the other. Chain states of a grant travel the same way, both with the states' digest, which is

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The one door to protobuf-c: a frame's header is one Farm__Envelope (proto/farm.proto). Messages are unpacked into
  * memory that is bounded by a multiple of their length, and one with fields that this version does not know is

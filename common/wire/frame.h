@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Frames. In memory and in journals: u32 BE header length (1..), u32 BE payload length, header, payload. On a connection all but the
  * first one in each direction, which is hello or its answer and must be readable whatever version speaks, are sealed: after the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What workers send back: merged, repeated, refused, failed. */
 #include "common/base/text.h"
 #include "coordinator/core/state.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Chain states that a worker could not go on from. Who refuses them is not to blame, nor is who made them until a second worker
  * says the same: the lease goes to another worker, neither to the one nor to the other while there is a third.

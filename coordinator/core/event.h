@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What happened, told to the coordinator's core (farm.h). The caller owns everything in an event; the core copies what it
  * keeps. Times are seconds on a clock that never goes back (the core treats an earlier time as "no time passed").

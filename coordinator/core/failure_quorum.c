@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/core/failure_quorum.h"
 
 #include "coordinator/core/state.h"

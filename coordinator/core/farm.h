@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The coordinator's core: a pure state machine. No I/O, clock, threads; time is a field of the event.
  * One thread at a time. Allocates when a worker joins or a job is submitted, never later: those two can be refused, so a

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A job and its slots. A slot is one (group, part): the chain of leases of which exactly one is next. */
 #ifndef COORDINATOR_CORE_JOB_H
 #define COORDINATOR_CORE_JOB_H

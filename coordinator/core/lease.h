@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One worker's hold on one open lease. Lives in its worker's table; linked to its slot. */
 #ifndef COORDINATOR_CORE_LEASE_H
 #define COORDINATOR_CORE_LEASE_H

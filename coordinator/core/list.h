@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Doubly linked lists inside the things they link. A head is a link that points to itself; a lone link too. */
 #ifndef COORDINATOR_CORE_LIST_H
 #define COORDINATOR_CORE_LIST_H

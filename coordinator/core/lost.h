@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Workers that went while they held the same lease, in a row. A worker that renders in a process of its own says itself, when it
  * calls again, which lease ended that process, and that counts as a failure (failers.h); the list knows that it had the lease. Who

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What people want of jobs that are there: that they wait, go on, come earlier or later, last longer. */
 #include "coordinator/core/state.h"
 

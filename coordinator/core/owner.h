@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Whose jobs they are: a name each, counted by its jobs, gone with the last of them. */
 #ifndef COORDINATOR_CORE_OWNER_H
 #define COORDINATOR_CORE_OWNER_H

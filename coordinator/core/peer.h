@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A worker as the core sees it. Waiting workers queue by fingerprint, the one that has waited longest first. */
 #ifndef COORDINATOR_CORE_PEER_H
 #define COORDINATOR_CORE_PEER_H

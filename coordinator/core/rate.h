@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* How much a second, over the last RATE_BUCKETS x RATE_WIDTH seconds. Pure; allocates nothing. */
 #ifndef COORDINATOR_CORE_RATE_H
 #define COORDINATOR_CORE_RATE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Jobs of an earlier life, and ended ones that go on: put where their merged leases say that they were. */
 #include "coordinator/core/state.h"
 

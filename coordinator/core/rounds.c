@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What a job goes through: submitted, bootstrap, rounds, the bounds, its end. */
 #include "coordinator/core/state.h"
 

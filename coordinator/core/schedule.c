@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Who gets what, and what has been out for too long. */
 #include "coordinator/core/state.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What a priority means in machines: who computes for a job, and what it would have if all stayed as it is. Of the machines
  * that may work for it jobs of higher priority take what they can use (a job has as many leases at once as groups x parts),

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Answers to questions about the farm. */
 #include "common/base/text.h"
 #include "coordinator/core/share.h"

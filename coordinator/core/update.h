@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What the shell has to do after a step of the core (farm.h): a list of actions, to be carried out in their order.
  * The list and its texts belong to the core and are valid until the next farm_step.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/core/verify.h"
 
 #include "common/base/text.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Leases that two workers compute: whose answers are held against each other before one counts. Which ones is a hash of the
  * job and the lease's key, so that it depends on no worker and no order. An answer is known by the digest of what decides

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Who workers are, for longer than their connections last: what a worker did wrong is not forgotten when it calls again. A
  * worker is known by the name in its certificate ("" without TLS) together with the name that it gives itself or its home,

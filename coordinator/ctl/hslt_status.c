@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/progress.h"
 #include "common/base/version.h"
 #include "common/base/error.h"

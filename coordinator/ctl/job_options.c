@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/ctl/job_options.h"
 
 #include "common/base/text.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* hslt-job's command line. Texts are borrowed from argv; a command that makes no sense ends the program with 2. */
 #ifndef COORDINATOR_CTL_JOB_OPTIONS_H
 #define COORDINATOR_CTL_JOB_OPTIONS_H

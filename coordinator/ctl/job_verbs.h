@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What hslt-job can do: one function a verb, which asks the coordinator and prints the answer. */
 #ifndef COORDINATOR_CTL_JOB_VERBS_H
 #define COORDINATOR_CTL_JOB_VERBS_H

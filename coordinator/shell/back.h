@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What was merged last of each (group, part) and may be taken back: where its batches lie in the journal, and who gave the last one.
  * Chain states that nobody can go on from (coordinator/core/doubt.h) say that the batch they came with is not to be trusted: its sums are

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A job's checkpoint (jobs/jN/checkpoint): films, seeds, chain states and the rest of an order, so that its journal can begin anew.
  * Written when the journal is longer than the limit and than the last checkpoint, so that disk and bytes written stay within a small

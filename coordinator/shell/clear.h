@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Finished jobs go by age and by space (store/age.h): at the start, every hour, and soon after a job has ended. Never a living
  * job's files nor those of one that is being read to go on, never a result that a client is fetching or waits for. The record says

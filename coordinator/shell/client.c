@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A client's side of a session: submit, list, watch; fetch.c and control.c have the rest. */
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/trust.h"

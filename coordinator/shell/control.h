@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What clients want of jobs that are there: cancel, hold, release, priority. The loop's thread. */
 #ifndef COORDINATOR_SHELL_CONTROL_H
 #define COORDINATOR_SHELL_CONTROL_H

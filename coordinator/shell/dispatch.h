@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What the core's update asks for, carried out action by action. The loop's thread. */
 #ifndef COORDINATOR_SHELL_DISPATCH_H
 #define COORDINATOR_SHELL_DISPATCH_H

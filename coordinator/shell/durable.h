@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What survives the coordinator: its jobs in the ledger, their merged batches in journals, each flushed before it is
  * acknowledged. Batches that come while a flush is under way share the next one (group commit), which runs in the pool.

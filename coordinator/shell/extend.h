@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A job goes on beyond its bounds, while it runs or after it is done: the same bits as if it had been submitted with the later
  * ones. What is named is added to what was asked for (to what is done, where nothing was); a bound that is not named and is met

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What a client fetches, piece by piece, is one file from its first piece to its last: it is opened once, however often another one gets
  * its name meanwhile.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Files of scenes in spool/blobs, which may be damaged while they lie there: they are checked before they are given to anybody. A job of
  * which one is gone or damaged waits and says which; whoever submits the scene again brings it, and the job goes on. No worker is

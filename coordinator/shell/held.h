@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What peers ask for while the jobs of an earlier life are read (recovery.h): it waits, and is answered in the order in which it came. Greetings,
  * heartbeats and lists of jobs are answered at once. Who waits hears a heartbeat as often as workers must be heard. The loop's thread.

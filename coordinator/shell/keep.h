@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What is kept of a job that is done, so that it can go on (extend.h): its last checkpoint and the journal behind it, and
  * jobs/jN/order (store/row_file.h). The films of the jobs that ended first go when all of them are more than the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Results in a job's journal that cannot count yet, because one that comes before them was damaged (replay.h). They stay where they
  * are, and count as soon as that one has been computed again: nobody computes them a second time. The loop's thread, but for what

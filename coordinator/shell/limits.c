@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/shell/limits.h"
 
 #include "common/base/log.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* How many connections the coordinator takes, and the file descriptors that they need. */
 #ifndef COORDINATOR_SHELL_LIMITS_H
 #define COORDINATOR_SHELL_LIMITS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * An order: a live job with all its weight, beside the few numbers that the core (coordinator/core) keeps of it. Scene
  * bundle as submitted, bootstrap, canvas, seeds, the chain states of each (group, part)'s last merged epoch, its log.

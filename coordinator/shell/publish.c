@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/durable.h"
 #include "coordinator/shell/session.h"

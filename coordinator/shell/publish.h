@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Work on a whole film: its error, its image as EXR in the spool. Runs in the pool; the order is busy meanwhile and its
  * results wait. Started and finished on the loop's thread. Starting allocates nothing and cannot fail; an image of the result for

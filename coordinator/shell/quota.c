@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/shell/quota.h"
 
 #include "common/film/canvas.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * How much of the farm one owner may take: the name in a client's certificate, or without TLS all clients together. Operators
  * are free. Looked at when a job is submitted, before its files are sent; pure.

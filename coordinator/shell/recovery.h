@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The jobs that had not ended when an earlier life did: read by the pool while the coordinator listens, so that a spool of gigabytes keeps
  * nobody from an answer. Their rows and plans are read before it listens; their films, one job after the other, behind that. The core hears

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What was merged of a job, from its checkpoint and its journal into its order, by the code that live batches go through, so that
  * the bits are the same. A result counts when the one before it of its chains is there and its round is open. One that was damaged on the

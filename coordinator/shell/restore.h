@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A job of an earlier life, from the ledger into an order and from there into the core; its films come in between (replay.h). The core hears
  * which leases are merged and no more: what was out when the coordinator stopped comes back with its worker, or is handed out again.

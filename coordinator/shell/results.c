@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Results of leases on their way to the core: now, or when nobody reads their film any more. */
 #include "coordinator/shell/digest.h"
 #include "coordinator/shell/durable.h"

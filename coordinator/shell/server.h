@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The coordinator's shell: carries out what the core says. One loop, one thread; heavy work on films goes to the pool.
  * server_run returns when a signal has stopped it.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * One peer's conversation: hello, then as a worker or as a client. Limits depend on where the conversation is. The
  * session belongs to its connection and goes with it.

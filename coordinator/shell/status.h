@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The status socket: a Unix stream socket (mode 0600, or 0660 for a group). On connect one snapshot line at once (JSON); a line
  * {"subscribe":["jobs"]} (jobs, workers, snapshot) then gets lines when something changes. Every object has schema, type,

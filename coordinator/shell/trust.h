@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Workers that gave wrong results: what is written down about them. Those that are set aside stand in the spool's file
  * `aside`, so that they are after a restart, too; an operator lets one back by --forgive. A job's log and note say how many

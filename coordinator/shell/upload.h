@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A submission that is on its way: checked, and waiting for the blobs that the spool misses. When the last one is there
  * the job is given to the core. Belongs to its session. The loop's thread.

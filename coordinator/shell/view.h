@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A job as it is shown: on the wire (JobStatus), on the status socket (JSON), in the spool (its record). Pure but for
  * memory; the loop's thread.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/shell/worker_requests.h"
 
 #include "common/base/disk.h"

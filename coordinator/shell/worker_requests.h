@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What workers ask for: jobs, and pieces of their files. It is answered in the order in which it was asked, a few megabytes ahead of
  * what the worker takes, so that one who asks and does not read costs no more.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Which finished jobs give up what: by age their films and results, then their records; by space the films of the job that ended
  * first before any result, results in the same order. Pure; any thread.

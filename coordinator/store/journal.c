@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/store/journal.h"
 
 #include "common/base/buf.h"

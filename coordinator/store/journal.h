@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A job's journal: what was merged since its last checkpoint, one record after the other in jobs/jN/journal.G (G counts the
  * checkpoints). A record is believed when its checksum fits (journal_file.h). Those behind the last one that is whole were not

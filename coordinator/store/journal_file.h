@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A journal as bytes of a file (journal.h): a head, then records, each with a head of its own and a body. A record's head has a mark,
  * a checksum and a number that the journal drew (salt), which no peer knows: so the next record is found wherever bytes before it are

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The farm's jobs in an SQLite database (spool/jobs.db; the one door to SQLite): who wants what, and whether it has ended. WAL,
  * synchronous FULL: what a call has written is durable when it returns. Each row has a checksum, because SQLite has none; a change of a

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What is remembered of a job in its spool folder (jobs/jN/job.json): enough to list it and to fetch its result after a
  * restart. Pure but for memory.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Time that was seen to pass, in seconds: what the ages of finished jobs are made of. It grows by the clock of the machine since it was
  * started, which nobody sets, while it runs and from one life of the coordinator to the next. Where the machine has been started anew

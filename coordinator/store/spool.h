@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The coordinator's folder: lock, next-job, blobs/, canvas/, jobs.db, jobs/jN/{job.json, journal.G, checkpoint, order, result.exr,
  * preview.exr, log}. Names are flushed with their folders (common/base/disk.h). One coordinator a spool

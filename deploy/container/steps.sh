@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # What an image is made by, on a bare Debian 12 or 13, as root. Containerfile says how the two steps go together.
 #
 #   steps.sh build SOURCE OUT    installs what building needs, builds, and leaves in OUT the programs, the names of the packages

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The benchmarks' table: each figure is the median of at least ten measurements with the order-statistic interval that
  * holds the median with 97.8 % (the 2nd least to the 2nd largest of ten). Times are CPU seconds, by the thread's

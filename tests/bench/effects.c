@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Instructions a mutation (callgrind), of whole renders of two lengths, so that building and the bootstrap fall out: for each
  * effect in a scene that calls for it, as it is and with the effect forced off; in a scene that does not, as it is and forced

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Relative errors squared times CPU seconds, one thread, pilot and bootstrap included: the default against hslt, pssmlt, bdpt and path,
  * and the breakup against its two parts unbroken, each with several seeds, with and without the worst pixels. The reference is a long

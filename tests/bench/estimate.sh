@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Does hslt-render --estimate hold what it promises? Each row: a pilot with one seed says what a target costs, a render with
 # another seed goes there. Wanted: in 80 % of the rows the processor time lies in the predicted 90 % interval, and the median
 # of predicted over real is within a factor 1.25. Beside it the same in mutations, which do not depend on who else uses the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The farm's processes against hslt-render on the same plan, and their memory. */
 #include "common/plan/plan.h"
 #include "tests/bench/bench.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What HSLT's mutations cost: how many are made in the CPU time in which Embree alone casts a million rays, rays, acceptance,
  * walks that fail; the share of time inside Embree; the breakup against its two parts unbroken.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* make bench: runs all benchmarks, or those named. */
 #include "tests/bench/bench.h"
 

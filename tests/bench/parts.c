@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Nanoseconds of the renderer's parts, to see what is worth a look: random blocks, spectra, the film, each BSDF. */
 #include "common/base/arena.h"
 #include "tests/bench/bench.h"

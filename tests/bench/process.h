@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Programs run and watched by the benchmarks: CPU time, peak memory. One thread.
  * What still runs when the bench ends is killed. */
 #ifndef TESTS_BENCH_PROCESS_H

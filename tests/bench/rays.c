@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What the renderer makes of Embree's rays: an integrator's rate against the same rays sent through the door alone, and
  * against Embree itself with a scene of its own.

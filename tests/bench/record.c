@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/bench/record.h"
 
 bool __real_accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Scenes of the benchmarks. Any failure ends the bench with the reader's sentence. */
 #ifndef TESTS_BENCH_SCENES_H
 #define TESTS_BENCH_SCENES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What the coordinator does with each pixel of a partial result: decode the EXR tiles, check the batch, add it to the film. */
 #include "common/base/mem.h"
 #include "common/film/canvas.h"

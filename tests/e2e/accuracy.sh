@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # hslt-accuracy: exit codes, a report that is XML and a CSV that is complete, a bias that is there and is seen, interruption.
 . "$(dirname "$0")/lib.sh"
 need hslt-accuracy

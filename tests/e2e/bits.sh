@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The same bits for 1, 2 and 4 workers as from hslt-render: samples, chains, both directions, other settings, a crop that ends by its error.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-render hslt-compare

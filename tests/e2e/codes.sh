@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Exit codes, what is refused, and what outlives the coordinator.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-ca

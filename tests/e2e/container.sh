@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # deploy/container without a container engine: its Containerfile carried out line by line in two fresh Debians, and a small farm
 # as the image's user; then deploy/systemd there, booted by systemd-nspawn. Minutes and downloads: only with FULL=1, as by
 # deploy/test.sh --full; the tests of every day and CI name it among what they skip.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A film in crops on two coordinators, each with a worker of its own: put together it is the film that one render makes.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-assemble hslt-compare hslt-render

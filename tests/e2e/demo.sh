@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The demo, small: it ends well, leaves its two pictures and nothing else; it stops what it started when it is interrupted.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-tonemap

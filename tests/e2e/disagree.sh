@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Chains that disagree: a lamp in glass, seen in a mirror. Independent samples find such a path once in 100,000 times, chains that
 # began there never leave: images without noise that differ from seed to seed. Said by exit code 5, note, header, statistics,
 # status, list and the spool's record; not with a filament that samples find, nor by path; nor of chains too short to be judged.

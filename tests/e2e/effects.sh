@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What a scene calls for: listed, overridden, in the bits of farm and hslt-render alike; and what it does not is not sent.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The length of an epoch: by a pilot where a job is long, longer where the coordinator bounds the bandwidth, as asked with --epoch;
 # and where a job is short, as hslt-render makes it. Parts: the farm's bits are hslt-render's.
 . "$(dirname "$0")/lib.sh"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What errors will cost: the estimate of hslt-render and of the farm, against a render that goes there; what the status says.
 . "$(dirname "$0")/lib.sh"
 need hslt-render hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What happens to machines, one fault after the other, while a job runs: nothing acknowledged is lost, nothing counts twice, the
 # image has the bits of an undisturbed one. Each fault is a row of the table in README.md; this is the short form, `make
 # test-faults` injects each as often as the table says and writes the table.

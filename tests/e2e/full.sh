@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A spool without room: nothing is acknowledged that is not stored, the job is held and says why, no new one is taken, the
 # coordinator answers. With room again the job goes on by itself, to the same bits. Cancelling a job needs no room.
 if [ -z "${HSLT_OWN_MOUNTS:-}" ]; then

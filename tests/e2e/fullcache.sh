@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Workers whose cache's disk is full, three of them before any other comes: no job ends by it. It waits, its status names them, the
 # first worker that has room renders it.
 if [ -z "${HSLT_OWN_MOUNTS:-}" ]; then

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # --idle-exit: a worker that nobody has work for leaves with 0, not before, also when there is no coordinator.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare

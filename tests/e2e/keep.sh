@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Results of finished jobs go by age and by space, and who asks for one hears when it went; a living job keeps all.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job

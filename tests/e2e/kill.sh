@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A worker killed with -9 half-way, and one that comes late: the same bits as from one undisturbed worker.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-compare

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # deploy/kubernetes field by field against the published API, and against the programs' options; certificates as a kubelet lays
 # Secrets out are taken, and taken up when they change; the workers' preStop hook lets a worker that is process 1 hand over its
 # epochs. No cluster runs here.

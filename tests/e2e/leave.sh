@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # SIGTERM: a worker finishes or gives back its leases and leaves with 0; the job loses nothing and nobody is blamed. It does so
 # also while its thread builds a scene and does not come back; where nobody tells it to leave it notices that, and ends with 75,
 # but not where the building only takes long.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # For end-to-end tests with real processes on loopback: sourced by tests/e2e/*.sh, which are called with the build folder.
 # Each test has a folder of its own and ends what it started; HSLT_KEEP=FOLDER copies it there. Exit codes: 0 passed, 77 skipped, else failed.
 set -eu

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Lives of workers by hand: lives.py PORT fails when a later start does not take the place of the earlier one's open connection, when
 an earlier one is let in, or when strangers replace each other."""
 import os, socket, sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A crowd of fake workers over TLS, of whom some die, lie, hoard and hang: nothing lost, nothing counted twice, nothing wrong counted. How fast it is, is for make load.
 BUILD=${1:-build}
 [ -x "$BUILD/load/load" ] || { echo "skipped: $BUILD/load/load is not built"; exit 77; }

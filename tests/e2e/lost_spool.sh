@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A coordinator whose spool is gone gives numbers out again. A worker that still has something of the old j1 must not take the new
 # j1 for it: neither its world nor its results count, and it is not blamed for them.
 . "$(dirname "$0")/lib.sh"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """Manifests against the models that Kubernetes' Python client has from the published API, field by field, and against
 each other and the programs' options. manifests.py PROGRAMS FILE...; prints what is wrong; exit code 1 if anything is.
 manifests.py --hook FILE prints the workers' preStop command, a word a line."""

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What an image's counters give reason to say: black scenes and chains that do not move, alone and on a farm.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What is ordered of jobs that are there: hold, release, priority; and all of it after kill -9 of the coordinator.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-compare

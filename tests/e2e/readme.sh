@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Every command of the ```sh blocks of the README and of docs/, in order, as a reader would type them; in a folder of its own and at a port of
 # its own. The two commands above them are tests of their own: demo.sh here, and the run that this is part of.
 . "$(dirname "$0")/lib.sh"

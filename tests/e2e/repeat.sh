@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A worker that sends every result twice: each is merged once.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-compare

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The coordinator killed with -9 again and again, in the bootstrap, between rounds and just after an acknowledgement, with a job
 # of chains, one of samples and one with a target error under way: all go on where they were, nothing counts twice, the bits
 # are those of quiet runs.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # tests/run.sh counts and names what was skipped, as a whole and in part, and what failed; where everything is installed a test that
 # lacks something fails. A test ends by the processor time that it uses, or when it has long been idle; not because a machine is busy.
 . "$(dirname "$0")/lib.sh"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # deploy/slurm/farm.sbatch without Slurm and without a farm: programs that end as they are told. What its exit code is, and when the
 # spool goes: with the image, with a job that failed, or when there is none in it. tests/e2e/slurm.sh has the real ones.
 . "$(dirname "$0")/lib.sh"

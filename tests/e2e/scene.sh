@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # hslt-scene: everything that is wrong with a file in one run; what was read of a good one; what leniency makes of what is not supported.
 . "$(dirname "$0")/lib.sh"
 need hslt-scene hslt-render hslt-compare

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # deploy/slurm on a cluster of three nodes with a slurmctld, slurmds and a munged of its own, on loopback, in a folder that goes:
 # workers come, are told to leave, are preempted, are requeued off a node whose daemon is dead, leave when there is nothing to do;
 # a whole farm is requeued, one is cut short. All over TLS. The images have the bits of hslt-render's, and each loss repeats at most

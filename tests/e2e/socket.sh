@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The status socket's file: who may connect, and that what lies at its path is never followed, taken over or removed when it is
 # somebody else's.
 . "$(dirname "$0")/lib.sh"

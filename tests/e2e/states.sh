@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A worker that spoils the chain states of each result (flipped bits, numbers that are none, noise, ends cut off), among honest ones
 # that go on from them: no honest worker ends or is set aside, the liar is, what it made is computed again, and each job has the bits of
 # hslt-render. SEEDS="1 2 ..." (1): two jobs each; make test-states has 50.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # The status socket during a job: valid JSON, progress that grows, lines for subscribers, nobody else may read it.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Mixtures of strategies: what is one, the options that give the same bits again, and counters that a farm and hslt-render share.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-render hslt-compare

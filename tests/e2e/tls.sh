@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A farm over TLS: equal bits, and everybody who must not get in does not. README.md has the table of the attempts, and must have it
 # as it is today.
 #   sh tests/e2e/tls.sh BUILD [--write]     --write: writes the table

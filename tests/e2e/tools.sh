@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # hslt-compare and hslt-tonemap as programs: exit codes, what they print, the files they leave.
 . "$(dirname "$0")/lib.sh"
 need hslt-render hslt-compare hslt-tonemap

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Two jobs at once: the one of higher priority ends first, and both have the bits that they have alone. Only files that the
 # spool misses travel.
 . "$(dirname "$0")/lib.sh"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A scene that no worker can build (a file larger than their caches) fails its job once, with one, two and four workers, and whoever
 # submitted it is told what a worker said: by --wait, the status, the log. Where one of three can build it, it is rendered. The farms
 # run at the same time: most of it is pauses.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # deploy/systemd: systemd finds nothing wrong with the units and little exposed; the system calls that the daemons make are
 # those that the units let through; with a socket, a watchdog and a notification socket as from systemd, the coordinator does
 # its part.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # A worker whose results have one wrong bit, among honest ones: with --verify 1 the image is that of hslt-render, the liar is set
 # aside for good, and nothing of it counts as the job's failures. A share finds one that lies now and then. What was merged
 # unverified is said. Before: what becomes of connections when a worker starts again.

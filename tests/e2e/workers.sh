@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # deploy/workers.sh starts workers over ssh; here ssh is a shell on this machine.
 . "$(dirname "$0")/lib.sh"
 need hslt-coordinator hslt-worker hslt-status

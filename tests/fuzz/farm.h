@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A coordinator to speak to, in this process: its loop turns when it is told to. It begins with the state of a spool that is made
  * once: job 1 is done, 2 lacks the chains of one lease in each of its rounds, 3 is in its bootstrap, 4 waits for its first samples and

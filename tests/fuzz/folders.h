@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Folders of the fuzzers: below one that goes when the program ends, in memory where there is such a place. */
 #ifndef TESTS_FUZZ_FOLDERS_H
 #define TESTS_FUZZ_FOLDERS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A client and a coordinator that says what it likes: all of it at once, whatever is asked, then it hangs up. The first byte says what
  * the client wants: a list, a submission, to wait for a job, a file.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Whole conversations with a live coordinator: workers, clients and strangers who say what they like, and readers of the status. In
  * the script the speaker says hello by itself where it has a role. The world begins anew when something was stored.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One message, without its frame: the parser, and all that is made of what it says (plans, requests, keys, grants). */
 #include "common/wire/batch_wire.h"
 #include "tests/fuzz/messages.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Bytes from a peer, cut into frames whose bounds are the fuzzer's; what is made of messages that carry payloads. The bytes come in
  * pieces, as from a network.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * libFuzzer: files of meshes. The first byte says what the rest is taken for.
  */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A coordinator that starts on a spool which came back damaged. The first byte says which file, and what the others are: its bytes,
  * places of it that are changed, or what is in it behind checksums that fit. It may refuse to start, begin a job anew or fail it; if

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * States of chains as a worker gets them, in real worlds: the first byte says in which, the others are the state. Id and step are
  * put right, and for every other input the contribution, too: as somebody would who wants to be believed. What resumes must go on

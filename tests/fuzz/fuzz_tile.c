@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Tiles as workers send them. The first byte says which: a tile of a film; the result of a lease with one tile, or with two,
  * whose message is made here so that the bytes reach the decoder; an image as the coordinator keeps it.

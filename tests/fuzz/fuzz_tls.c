@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * TLS in memory. The first byte says what the others are: what a stranger says to a listener or to a caller; places where one
  * direction of a handshake and what follows is changed; records to an established link; a certificate. Whatever is changed, no link

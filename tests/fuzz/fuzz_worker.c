@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A live worker and a coordinator that says what it likes. Its thread pool is one here that works when it is told to, on small leases only:
  * long work is what a coordinator may ask for. Everything it fetched is forgotten after each input but the cache.

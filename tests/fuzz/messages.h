@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What the fuzzers of conversations share: an input is a script of steps, each of which is said by somebody and is a frame (an
  * Envelope and its payload). Any bytes are a script; the mutator keeps steps whole and changes the fields of their messages

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Whole scenes with extreme numbers against a farm of real workers: `make fuzz-numbers FUZZ_SECONDS=600`.
 #   sh tests/fuzz/numbers.sh BUILD SECONDS [FIRST]
 # The programs are BUILD's (sanitized ones tell more), the scenes those of tests/worker/render/test_scene_numbers.c from FIRST on

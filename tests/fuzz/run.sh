@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Builds every tests/fuzz/fuzz_*.c with clang and runs each for FUZZ_SECONDS (60), one after the other; FUZZ_TARGETS="frame tile": only
 # these. Seeds: what a target makes of today's messages, tests/fuzz/corpus/NAME, the small files of tests/scenes. Nothing is written
 # into the tree: what is found stays in BUILD/findings and ends the run with 1; a corpus that grows is BUILD/corpus.

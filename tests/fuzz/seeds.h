@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Seeds of the fuzzers of conversations, made from the messages of now: a target that is started with HSLT_FUZZ_SEEDS=FOLDER writes
  * its own there and ends.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * make calibration: is the error that an image states its error? Small renders of scenes of three kinds (calibration_scenes.h), by
  * each integrator, at three lengths, which differ in their seeds only, against references made with other seeds. Writes the table

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/image/calibration_scenes.h"
 
 #include "tests/support/worlds.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Scenes by which stated errors are compared with true ones: those of the tree, the public ones (HSLT_SCENES), and small hard
  * ones made for it, in which light comes rarely, in clumps, or into dark surroundings.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Is the error that an image carries its error? 200 small renders of a case, which differ in their seeds only, are compared with a
  * long reference of another integrator or more samples, whose own variance is subtracted from each comparison. The figures of the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What a scene does not call for changes nothing: each effect is forced on where it is off, and the image stays. Bit for bit
  * (sums of each block of each group) where nothing else is drawn by it; else the two agree by t between 32 groups, level 1e-6

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * `path` against reference images of another renderer, where HSLT_SCENES names the folder of public scenes.
  *

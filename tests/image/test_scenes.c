@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The default integrator against bdpt on whole scenes: those that are shipped, and the public ones where HSLT_SCENES names
  * their folder. Within the errors of both, at the level of all comparisons; how small a bias would have been found is printed.

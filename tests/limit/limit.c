@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* limit CPU IDLE COMMAND...: runs a test and ends it when it has used CPU seconds of processor time, or has been idle for IDLE seconds.
  *
  * Both count all processes that the command started, also those that left their session or lost their parent. Idle is time in which none

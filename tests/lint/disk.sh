@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Files are touched through common/base/disk.h alone by whatever keeps what must survive, so that tests can take the power away
 # there. Not of it: sockets (shell/status.c) and the programs of clients (coordinator/ctl).
 cd "$(dirname "$0")/../.." || exit 1

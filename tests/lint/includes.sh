@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Who includes whom, against includes.txt; no unfinished marks; no overlong files. A line for each check, then what is wrong.
 cd "$(dirname "$0")/../.." || exit 1
 LIST=tests/lint/includes.txt

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A farm under load: the real coordinator in a process of its own, its real protocol over TLS, and workers that render nothing: they
  * say hello, fetch the job's files, ask for leases, wait as long as a lease would take, and send a batch that was made once. One

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Jobs as a client submits them, and what the status socket says of them. */
 #include "tests/load/load.h"
 

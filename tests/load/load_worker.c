@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One of the crowd: the conversation of proto/README.md from a worker's side. */
 #include "tests/load/load.h"
 

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # Plants one fault at a time and asks whether a test notices: make test-mutants.
 #
 #     sh tests/mutants/run.sh [LIST]        LIST: tests/mutants/list.txt

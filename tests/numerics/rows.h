@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Rows of `make test-numerics`: topic, case, what was measured, what it must be, verdict; by tabs. Without HSLT_TEST_ROWS=1 only
  * those that fail are shown.

@@ -1,4 +1,5 @@
 #!/bin/sh
+# SPDX-License-Identifier: Apache-2.0
 # One row a case, of everything that is hard on the numbers: topic, case, what was measured, what it must be, verdict.
 # tests/numerics/run.sh BUILD; FULL=1: the long forms. Exit code 0: no case failed.
 set -u

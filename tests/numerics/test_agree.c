@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Scenes that are hard on the numbers, by four integrators that reach the same light in different ways: what one of them gets wrong
  * the others seldom do. One row each: bdpt, pssmlt and hslt against path, 2 x 2 blocks and the mean, at the level of

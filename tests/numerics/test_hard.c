@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Scenes that are hard on the numbers (tests/support/hard_scenes.h), one row each. A strategy alone leaves bdpt's paths distributed
  * as they are (tests/support/stationary.h: level 1e-6; every 16th of its last paths passes path_check), and chains of the whole

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Many mutations of the whole mixture over all hard scenes and those of the forced tests: not one NaN, infinity or negative
  * value reaches a film; how many were caught is printed, and where: in a contribution (by kind), or as a proposal that failed

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Acceptance ratios of walks from the camera to the light, from the positions of the vertices: the program's against an implementation of
  * its own in long double (weight.inc), and what the same formulas would make of it in double and in float. Densities of the steps are

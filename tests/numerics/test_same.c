@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The same scene in other units and at other places, by hslt: the image stays. Powers of two and moves that are exact give the same
  * bits. Others differ by roundings of the coordinates, and a chain that once decides otherwise goes its own way until the next

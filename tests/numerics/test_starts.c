@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * How chains begin: nothing but darkness, light that the bootstrap did not find, and one bootstrap sample that outweighs all others. The last: 16
  * films of chains that all start from that sample against 16 of resampled ones, quarter by quarter; level 1e-6 each.

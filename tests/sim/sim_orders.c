@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The coordinator dies and comes back; jobs are held, released, given another priority, and extended while they run or are done. */
 #include "tests/sim/sim_private.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The simulated farm's insides, for sim_*.c: what there is, what happens when, who does what. One thread. */
 #ifndef TESTS_SIM_SIM_PRIVATE_H
 #define TESTS_SIM_SIM_PRIVATE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Workers that compute, crash, freeze, come back, fail, lie and volunteer. */
 #include "tests/sim/sim_private.h"
 

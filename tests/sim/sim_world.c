@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/sim/sim_private.h"
 
 #include "common/base/mem.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A farm in virtual time around the real core: workers that compute, crash, hang, come back, fail, send what is torn or wrong, volunteer, or take what
  * they can get and give nothing; a network that

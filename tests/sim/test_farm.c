@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Many seeds of the farm's simulator; FULL=1: more of them; HSLT_SIM_SEED=N: that one, with everything that is said. */
 #include "tests/sim/sim_world.h"
 

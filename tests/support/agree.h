@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Do two integrators make the same image? (docs/design.md, rules 7.) Each side is rendered as 16 or more independent groups,
  * with a seed of its own; blocks of the image and the mean are compared by Welch's t between the groups' means.

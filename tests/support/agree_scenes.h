@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Scenes that are hard on the numbers, as tests/numerics/test_agree.c compares integrators on them. */
 #ifndef TESTS_SUPPORT_AGREE_SCENES_H
 #define TESTS_SUPPORT_AGREE_SCENES_H

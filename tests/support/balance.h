@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Detailed balance of mutations, shown or refuted: X in proportion to f (tests/support/starts.h), one proposal Y with its
  * acceptance a, and for every antisymmetric phi E[a phi(X, Y)] = 0. phi is the sign of g(Y) - g(X) for some twenty g (film,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Results as long as the plan says, of a scene in which there is no light: what tests begin with that need no renderer. */
 #ifndef TESTS_SUPPORT_BLACK_RESULTS_H
 #define TESTS_SUPPORT_BLACK_RESULTS_H

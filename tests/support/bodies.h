@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Meshes for tests of geometry, made here: closed bodies without cracks (vertices are shared) and exactly flat planes.
  */

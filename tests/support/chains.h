@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Chains of whole paths as a farm runs them, in one group: what they count, and the film that they leave. */
 #ifndef TESTS_SUPPORT_CHAINS_H
 #define TESTS_SUPPORT_CHAINS_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Frames as a connection sends them, for tests that write to sockets themselves. */
 #ifndef TESTS_SUPPORT_CHECKSUMMED_FRAME_H
 #define TESTS_SUPPORT_CHECKSUMMED_FRAME_H

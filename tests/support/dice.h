@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Random numbers and sample counts for tests: a stream of the counter-based generator, seeded by the test's name, so that
  * a run is the same every time. HSLT_TEST_SCALE divides counts (sanitized runs), FULL=1 multiplies them by 8.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A disk of tests behind common/base/disk.h and behind SQLite: below one folder it does what is asked of it and keeps beside, in
  * memory, what a loss of power would leave. A file's bytes and length are safe after a flush of the file, its name after a flush of

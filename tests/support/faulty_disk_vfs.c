@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* SQLite on the disk of lossy.h: a VFS around the system's. */
 #include "tests/support/faulty_disk.h"
 

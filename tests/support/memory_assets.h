@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Assets from memory: what a scene refers to, without files. */
 #ifndef TESTS_SUPPORT_MEMORY_ASSETS_H
 #define TESTS_SUPPORT_MEMORY_ASSETS_H

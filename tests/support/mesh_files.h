@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Files of meshes, made in memory: what readers of meshes are tested with. */
 #ifndef TESTS_SUPPORT_MESH_FILES_H
 #define TESTS_SUPPORT_MESH_FILES_H

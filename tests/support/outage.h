@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A coordinator on a disk that loses what was not synchronised, or whose calls fail (tests/support/faulty_disk.h), and a client and a worker
  * that remember what was acknowledged: life after life, each from what the disk kept. What must not be is counted: results that were

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Pictures in memory, as Radiance HDR files behind an asset source: pixel values must be exact in 8 bits of mantissa a
  * pixel (small multiples of powers of two). One thread; names are "p0", "p1", ...

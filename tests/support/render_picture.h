@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A whole picture of a world by plain leases, on two threads, with neither farm nor program: for comparing with references.
  * The same bits at each run. Anything wrong fails the test, contributions that were refused too.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Many renders of one world that differ in their seeds only, as hslt-render makes them, on two threads: for tests of what is
  * said about errors. Seeds follow from the test's name, so that results are the same at each run.

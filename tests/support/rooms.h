@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Small worlds that between them have what paths can meet, for tests of the methods that move paths: a room or an open floor
  * with one thing of interest in it. Films of 32 x 32 with a box filter. Each call builds; free with world_free.

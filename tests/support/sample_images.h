@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Small valid pictures in memory, made by the libraries' encoders. Free with free(). */
 #ifndef TESTS_SUPPORT_SAMPLE_IMAGES_H
 #define TESTS_SUPPORT_SAMPLE_IMAGES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Scene files with some of their numbers made extreme: 0, denormal, 1e-300 to 1e300, other signs, beyond what a double or an
  * integer holds, infinite, no number. Numbers are found in the attributes that hold them (value, x, origin, ...) and in the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Small tables of plug-ins, enough for the public scenes: tests of the reader need no renderer. */
 #ifndef TESTS_SUPPORT_SCENE_TABLES_H
 #define TESTS_SUPPORT_SCENE_TABLES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/support/scene_trial.h"
 
 #include "worker/render/render.h"

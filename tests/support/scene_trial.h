@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A whole scene in a process of its own: read, checked, built, and a small lease of every integrator. What ends it, and what
  * it said, comes back.

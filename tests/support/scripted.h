@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Peers of a coordinator, of a few lines each: a client, and a worker whose results depend on the lease alone and take no time.
  * Blocking, one thread. A coordinator that hangs up is an answer (NULL), one that says nothing for a minute fails the test.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A coordinator's shell in a process of its own, and peers of it that say what a test wants them to say, well or badly. Blocking, one
  * thread, one server at a time; what does not answer within a minute fails the test. They hear and hang up as scripted.h has it.

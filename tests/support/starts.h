@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Whole paths in exact proportion to f, for tests of what a Markov chain does with them: the paths that bdpt makes of
  * independent pairs of sub-paths, resampled by what each contributes there. A group's paths are independent of all other

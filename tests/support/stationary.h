@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Does a mutation leave the distribution of paths as it is? A test of one mutation alone, also of one forced (b, c), on paths
  * of given lengths.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What statistical tests share: p-values, seeds, random numbers. Pure; any thread; allocates nothing.
  */

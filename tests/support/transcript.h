@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Conversations with the coordinator's core as readable text, one line an event and all that the core says to it:
  *

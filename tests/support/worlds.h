@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Worlds from XML in a string, for tests. */
 #ifndef TESTS_SUPPORT_WORLDS_H
 #define TESTS_SUPPORT_WORLDS_H

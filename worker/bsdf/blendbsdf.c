@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Two opaque BSDFs, mixed by a weight: 0 is the first, 1 the second. */
 #include "worker/bsdf/create.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/bsdf/bsdf.h"
 
 #include "worker/bsdf/create.h"

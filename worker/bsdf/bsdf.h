@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Bidirectional scattering. One file per plug-in and one line in bsdf_list.h; the generic tests pick it up.
  *

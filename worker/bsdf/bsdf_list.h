@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One line a BSDF: its const struct bsdf_ops is bsdf_ops_NAME. */
 BSDF(diffuse)
 BSDF(conductor)

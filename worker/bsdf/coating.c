@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/bsdf/coating.h"
 
 #include "worker/bsdf/warp.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A clear coating over a diffuse base, what `plastic` and `roughplastic` share: light that the boundary lets in is scattered by
  * the base, reflected again and again between base and boundary, and leaves through the boundary (the model of Mitsuba's plug-ins):

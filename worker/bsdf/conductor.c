@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A smooth metal on the side of the normal. */
 #include "worker/bsdf/metal.h"
 #include "worker/bsdf/microfacet.h"

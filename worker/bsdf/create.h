@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What the creation of every BSDF shares. Private to worker/bsdf. */
 #ifndef WORKER_BSDF_CREATE_H
 #define WORKER_BSDF_CREATE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A smooth boundary between two transparent media: Fresnel's reflection and Snell's refraction. */
 #include "worker/bsdf/fresnel.h"
 #include "worker/bsdf/glass.h"

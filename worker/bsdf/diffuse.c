@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Lambert's reflectance on the side of the normal. */
 #include "worker/bsdf/create.h"
 #include "worker/bsdf/warp.h"

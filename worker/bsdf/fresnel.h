@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Reflection at a smooth boundary, unpolarised. Cosines on the side that the light is on, in [0,1]. */
 #ifndef WORKER_BSDF_FRESNEL_H
 #define WORKER_BSDF_FRESNEL_H

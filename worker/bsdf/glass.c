@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/bsdf/glass.h"
 
 double glass_eta(const struct glass *g, double nm)

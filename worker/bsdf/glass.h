@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What dielectric and roughdielectric share: the index and the factors of the two modes. */
 #ifndef WORKER_BSDF_GLASS_H
 #define WORKER_BSDF_GLASS_H

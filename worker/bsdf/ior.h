@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Indices of refraction: one number, by value or by name, as in Mitsuba; or, where the scene asks for it, a function of the
  * wavelength by Cauchy's or Sellmeier's law (Sellmeier 1871). Wavelengths in nm outside, in micrometres in coefficients.

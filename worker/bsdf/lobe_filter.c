@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/bsdf/lobe_filter.h"
 
 #include "worker/bsdf/glass.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A BSDF without some of its lobes, which then absorb. */
 #ifndef WORKER_BSDF_LOBE_FILTER_H
 #define WORKER_BSDF_LOBE_FILTER_H

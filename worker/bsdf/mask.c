@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * An opaque BSDF with holes: the share `opacity` of the light meets it, the rest goes straight on. The way through is a specular
  * lobe, so a path counts an edge more for it, and next event estimation does not look through.

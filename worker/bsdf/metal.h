@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The complex index of a conductor, relative to what is outside: shared by conductor and roughconductor. */
 #ifndef WORKER_BSDF_METAL_H
 #define WORKER_BSDF_METAL_H

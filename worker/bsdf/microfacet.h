@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Microfacet distributions, Beckmann and GGX (Walter et al. 2007, Microfacet Models for Refraction), with Smith's masking; the
  * roughness along u and v may differ (Heitz 2014, section 5.3: the isotropic one, stretched). Shadowing and masking are taken as independent, G2 = G1 G1, as Mitsuba does. Everything stays finite

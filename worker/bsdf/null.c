@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Nothing: light goes straight on. A path counts an edge more for it, and next event estimation does not look through. */
 #include "worker/bsdf/create.h"
 #include "worker/bsdf/straight.h"

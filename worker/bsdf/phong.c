@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Phong's lobe, modified to be reciprocal and normalised (Lafortune and Willems 1994), over a diffuse base. As in
  * Mitsuba 0.6, where the two reflectances can add up to more than 1 both are scaled by 0.99 over their sum.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A diffuse base under a smooth clear coating, on the side of the normal: coating.h. */
 #include "worker/bsdf/coating.h"
 #include "worker/bsdf/fresnel.h"

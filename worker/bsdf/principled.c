@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The "principled" BSDF of artists' tools: Burley 2012, Physically Based Shading at Disney, and 2015, Extending the Disney BRDF to a
  * BSDF; parameters and defaults are those of Mitsuba 3's plug-in. With m = metallic, t = spec_trans, c = base_color, and a rough

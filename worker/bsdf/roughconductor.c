@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A rough metal on the side of the normal: Walter et al. 2007, eq. 20, visible normals sampled. */
 #include "worker/bsdf/metal.h"
 #include "worker/bsdf/microfacet.h"

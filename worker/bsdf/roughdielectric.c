@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A rough boundary between two transparent media: Walter et al. 2007, eqs. 19-21, visible normals sampled, the mode
  * chosen by Fresnel's factor at the microfacet. Everything is mirrored so that wo is on the side of the normal.

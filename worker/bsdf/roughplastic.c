@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A diffuse base under a rough clear coating, on the side of the normal: coating.h. The boundary is that of roughdielectric
  * (Walter et al. 2007, eq. 20); what it transmits is one minus what it reflects, tabulated over the cosine when the material

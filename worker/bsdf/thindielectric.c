@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A sheet of glass without thickness: light that is let in goes straight on, reflections between its two sides included
  * (R' = 2 R / (1 + R) where R is Fresnel's share at one side, as in Mitsuba). The way through is not bent: eta is 1.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One or two opaque BSDFs: the first on the side of the normal, the second (or the first again) on the other. */
 #include "worker/bsdf/create.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* From the unit square to directions around +z. */
 #ifndef WORKER_BSDF_WARP_H
 #define WORKER_BSDF_WARP_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The camera: a pinhole (Mitsuba's `perspective`) or an ideal thin lens (`thinlens`). Film coordinates are pixels of the
  * full film, x to the right, y down.

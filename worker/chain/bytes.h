@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Numbers in states: little endian. */
 #ifndef WORKER_CHAIN_BYTES_H
 #define WORKER_CHAIN_BYTES_H

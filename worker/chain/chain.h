@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * One Markov chain: selection, acceptance, counting, splatting. The target is I = X+Y+Z of a path's contribution; expected
  * values: the current state gets 1-a, the proposal a (Veach 1997, sec. 11.3.1; docs/design.md, rules 2). No acceptance is ever

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Improved half vector space light transport (Hanika, Kaplanyan, Dachsbacher 2015): chains of whole paths. Their bootstrap is
  * that of bdpt.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Primary sample space Metropolis light transport (Kelemen et al. 2002), over the bidirectional path tracer.
  */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Paths as bytes. A vertex on a surface is written as what its point was made of (the primitive, and barycentrics or the
  * direction from a sphere's centre), so that reading makes the same point bit by bit, however small the primitive is next to the

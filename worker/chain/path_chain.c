@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/chain/path_chain.h"
 
 #include "worker/mutation/mixture.h"

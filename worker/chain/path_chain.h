@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Chains whose states are whole paths, moved by a mixture of mutations (Veach and Guibas 1997; worker/mutation). The target is
  * I = X+Y+Z of the path's contribution per area; independent proposals also estimate b by f / T.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/chain/pss.h"
 
 #include "worker/chain/bytes.h"

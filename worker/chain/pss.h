@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Primary sample space (Kelemen, Szirmay-Kalos, Antal, Csonka 2002): a chain's state is the random numbers of a path, block
  * by block. Numbers that the current path does not use are not kept: given the ones it uses they are uniform, so drawing

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/chain/pss_chain.h"
 
 #include "worker/chain/pss.h"

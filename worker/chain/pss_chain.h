@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Chains in primary sample space over the bidirectional path tracer (Kelemen et al. 2002). */
 #ifndef WORKER_CHAIN_PSS_CHAIN_H
 #define WORKER_CHAIN_PSS_CHAIN_H

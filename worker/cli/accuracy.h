@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What accuracy costs in time: settings around a default, one of them changed at a time, rendered in turns and compared. The
  * parts: design (which settings), run (rendering), judge (figures), csv and html (reports). One thread besides those of the leases.

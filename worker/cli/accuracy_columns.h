@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The columns of hslt-accuracy's CSV, in order, with what they mean; the report explains them. */
 #ifndef WORKER_CLI_ACCURACY_COLUMNS_H
 #define WORKER_CLI_ACCURACY_COLUMNS_H

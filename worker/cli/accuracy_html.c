@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
 #include "common/base/version.h"
 #include "worker/cli/accuracy_columns.h"

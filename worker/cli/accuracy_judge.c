@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * From films to figures. Errors of all settings are weighted by one picture, the mean over the settings, so that only their noise
  * differs and not what it is measured by.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The report's plots, as SVG inside the page. Where one cannot be drawn, the reason stands in its place. */
 #ifndef WORKER_CLI_ACCURACY_PLOTS_H
 #define WORKER_CLI_ACCURACY_PLOTS_H

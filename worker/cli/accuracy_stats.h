@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Intervals, and which of several settings lie on the front of error and bias. Pure; any thread; allocates nothing.
  */

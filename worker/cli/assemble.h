@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Crops of one render, each an image of its own with its place in the film, into one image. Their groups and chains are independent, so
  * that errors of pixels stay what they were and relMSE is the mean over pixels. One thread; holds the whole film and one crop.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The choice of the integrator (worker/render/choose.h) where it is left to the scene. */
 #ifndef WORKER_CLI_CHOICE_H
 #define WORKER_CLI_CHOICE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/compare.h"
 
 #include "common/base/mem.h"

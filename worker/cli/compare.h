@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * How far picture A is from reference B: the figures of docs/design.md, rules 4, and whether two images are the same bits.
  * One thread.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/estimate.h"
 
 #include "common/base/progress.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What an estimate says: a table of errors and what they cost, the same as JSON, and a plot of error against time. One
  * thread.

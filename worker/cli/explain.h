@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* hslt-render --explain: what a scene calls for, why, and what leaving the rest out saves; which integrators were
  * considered, and why one was chosen. Renders nothing but the pilot of that choice. */
 #ifndef WORKER_CLI_EXPLAIN_H

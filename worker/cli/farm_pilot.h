@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A pilot on a farm (pilot.h): a probe and a short render as jobs of their own, whose looks come with their status. One
  * thread; shows progress on stderr.

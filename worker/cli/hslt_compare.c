@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/mem.h"
 #include "common/base/output.h"
 #include "common/base/version.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * SIGINT and SIGTERM as a flag that renders look at: the first asks for an end that leaves what is complete, the second one
  * kills. One a process.

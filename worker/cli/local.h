@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A plan on this machine, without a farm: the same leases, the same merge, the same bits. Threads are made for each phase;
  * results are merged under one lock.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/local_pilot.h"
 
 #include "worker/cli/pilot.h"

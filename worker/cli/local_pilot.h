@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A pilot on this machine (pilot.h): a probe, then a short render whose looks are kept. Threads as local.h. */
 #ifndef WORKER_CLI_LOCAL_PILOT_H
 #define WORKER_CLI_LOCAL_PILOT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Pictures for the programs that look at them: R, G, B of an EXR file, averaged down where asked, and PNG files out. Planes
  * of floats, linear. One thread.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Plots, drawn by gnuplot as a process of its own: the data goes through its standard input, nothing through a shell. One
  * thread. Where gnuplot is not installed: -ENOENT with a sentence that says what to install; whoever asked goes on without.

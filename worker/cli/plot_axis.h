@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Ranges of a plot's axes and, where they are logarithmic, marks at round numbers. Pure. */
 #ifndef WORKER_CLI_PLOT_AXIS_H
 #define WORKER_CLI_PLOT_AXIS_H

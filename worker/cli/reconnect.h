@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Waiting for a job through restarts of its coordinator: who waits calls again, later each time, and goes on watching. One
  * thread.

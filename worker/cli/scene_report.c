@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/scene_report.h"
 
 #include "common/base/mem.h"

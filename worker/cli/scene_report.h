@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* hslt-scene: what is wrong with a scene file, and what was read of it. Renders nothing. */
 #ifndef WORKER_CLI_SCENE_REPORT_H
 #define WORKER_CLI_SCENE_REPORT_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * How fast one thread of this machine is with a scene, for the length of an epoch (struct plan_request.speed): a render of about a
  * second on its own, in processor time, so that a busy machine does not show. Threads as local.h.

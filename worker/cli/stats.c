@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/stats.h"
 
 #include "common/film/convergence_json.h"

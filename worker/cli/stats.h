@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What --stats FILE holds, as JSON: plan, why its integrator was chosen, times, counters, strategies, effects, which bound ended the render. One thread.
  */

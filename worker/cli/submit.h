@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What hslt-submit does: collects a scene's files by their hashes, sends the job and what the coordinator misses of it,
  * waits for it and fetches its result. One thread.

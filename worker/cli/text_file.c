@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/text_file.h"
 
 #include "common/base/mem.h"

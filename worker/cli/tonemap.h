@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Linear light to bytes for screens: exposure, the sRGB curve (IEC 61966-2-1), clipping. Pure; any thread. */
 #ifndef WORKER_CLI_TONEMAP_H
 #define WORKER_CLI_TONEMAP_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The worker daemon: one loop thread that owns all state, a thread pool of render threads. Connects, asks for leases, fetches
  * what it needs, sends results and keeps them until they are acknowledged; reconnects for ever,

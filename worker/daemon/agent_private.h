@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The daemon's state, for its two halves: agent.c (connection, life) and lease_queue.c (jobs and leases). */
 #ifndef WORKER_DAEMON_AGENT_PRIVATE_H
 #define WORKER_DAEMON_AGENT_PRIVATE_H

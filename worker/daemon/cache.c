@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/daemon/cache.h"
 
 #include "common/base/log.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Where a worker keeps blobs between jobs and lives: a folder with a slot for each worker of this machine that runs at the
  * same time, each a blob store with its own lock. The loop's thread.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Files on their way from the coordinator into the cache, each once, however many jobs want it: whoever of them is still there when
  * a piece comes has it written. A piece is an answer to one question; one that nobody asked for is none. What is under way when the

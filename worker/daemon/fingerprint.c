@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/daemon/fingerprint.h"
 
 #include "common/base/version.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/daemon/job_cache.h"
 
 #include "common/base/mem.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A job at a worker: what it is (JobInfo), its files in the cache, its world. The world is built on a thread of the thread pool
  * and shared by all leases; everything else is the loop's thread.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Jobs and leases of the worker daemon. */
 #include "worker/daemon/agent_private.h"
 

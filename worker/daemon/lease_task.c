@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/daemon/lease_task.h"
 
 #include "common/base/mem.h"

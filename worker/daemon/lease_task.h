@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A lease in a worker's hands: from the grant through a thread of the thread pool to the frame that carries its result, which is
  * kept until the coordinator has acknowledged it. Loop's thread, but for the run itself.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A process that renders, and one that sees to it: when a signal ends the first (a fault in a scene's wake, the machine's memory),
  * the second starts it again and the new one tells the coordinator which leases the old one had (work.h). The supervisor does

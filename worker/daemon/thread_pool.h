@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The render threads: a queue of tasks to them, a queue of finished ones back to the loop through one uv_async_t. All
  * calls on the loop's thread; `run` alone is called on a thread of the thread pool. Signals go to the loop's thread.

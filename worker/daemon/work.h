@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What the render threads are at work on, in memory that outlives their process: when a signal ends that the next one knows which
  * leases it had, and which of them the signal hit. Made by the supervisor (supervise.h) before it starts the process that

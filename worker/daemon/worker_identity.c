@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/daemon/worker_identity.h"
 
 #include "common/base/disk.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Which life of which worker this is, so that a coordinator knows the next one from a stranger: a home, a random number made
  * with the folder (hashed with the machine's name, so that a copy of the folder elsewhere is another home), and how often a

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Light from a surface, the same in all directions of the side that its normal points to.
  * Meshes: uniform per area. Spheres: uniform per area for light paths; seen from outside, uniform over the cone that the

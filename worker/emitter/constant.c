@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The same radiance from everywhere. */
 #include "worker/emitter/emitter.h"
 #include "worker/emitter/uniform.h"

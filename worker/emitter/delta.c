@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/emitter/delta.h"
 
 int delta_create(struct emitter *em, struct delta_light *l, const struct scene_node *n, const char *name, double factor,

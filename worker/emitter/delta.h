@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What delta emitters share: one point that is always drawn. `data` of such an emitter begins with struct delta_light.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Parallel light from infinity: irradiance across the direction in which it travels, `direction` or to_world's +z. */
 #include "worker/emitter/delta.h"
 

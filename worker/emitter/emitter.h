@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Emitters. One file per plug-in and one line in emitter_list.h; the generic tests pick it up.
  * A point on an emitter is a position with a normal, or for emitters at infinity the unit direction from the scene

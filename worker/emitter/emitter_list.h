@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One line an emitter: its const struct emitter_ops is emitter_ops_NAME. */
 EMITTER(area)
 EMITTER(constant)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * An equirectangular picture of the surroundings. Local +y is up (the top row), the middle column looks along +z
  * and the one a quarter from the left along +x: u = atan2(x, -z) / 2 pi, v = acos(y) / pi, in both dialects. Pixel centres lie at

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A point that shines alike in all directions: intensity, at a position or at the origin of to_world. */
 #include "worker/emitter/delta.h"
 #include "worker/emitter/uniform.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A point that shines into a cone around to_world's +z: `intensity` up to the angle `beam_width` from the axis, from there
  * linear in the angle to 0 at `cutoff_angle` (degrees; 20, and 3/4 of the cut-off, where nothing is said). Light paths leave

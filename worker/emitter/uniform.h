@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The unit square onto the unit sphere, areas in one proportion, and back. Pure. */
 #ifndef WORKER_EMITTER_UNIFORM_H
 #define WORKER_EMITTER_UNIFORM_H

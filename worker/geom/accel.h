@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The one door to Embree (3.13 or 4). Rays in double go in, primitives come out; where on the primitive the ray met it is
  * solved again in double by surface.h.

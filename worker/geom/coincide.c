@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Asking which of coinciding primitives is there, and whether two coincide. The latter is decided on the polygon in which the one
  * projects onto the other: its corners lie no farther from the other's plane than the vertices of both are rounded, 2^-24 of each

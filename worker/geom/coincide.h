@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Surfaces that coincide: triangles that overlap in one plane as far as float vertices can tell, and spheres that are one. Which
  * of them a ray meets would be chance, and what samples points on one of them would not ask. So one rule holds for whatever asks

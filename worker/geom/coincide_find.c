@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The search of coincide.h. Primitives go into halves of a box, those across the middle into both, until a part holds one shape
  * that does not shine (nothing to find), a few primitives, or cannot be told apart by place; what is left is compared two by two, in

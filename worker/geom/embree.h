@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Embree 3 and 4 under one spelling. Only accel.c and solved.c see this. */
 #ifndef WORKER_GEOM_EMBREE_H
 #define WORKER_GEOM_EMBREE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Primitives that Embree asks us about, solved in double: spheres, and triangles too large for floats beside what is small in a
  * scene of mixed scales. Runs inside Embree's traversal: any thread; allocates nothing.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/geom/surface.h"
 
 #include "worker/math/sphere.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A point on a primitive, in double: positions solved from the primitive itself (triangles in the plane of their float
  * vertices, spheres analytically), geometric normal, interpolated shading frame, texture coordinates.

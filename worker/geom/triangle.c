@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/geom/triangle.h"
 
 float triangle_extent(const float (*position)[3], const uint32_t i[3])

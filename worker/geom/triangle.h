@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One triangle with float vertices, in double: its plane, and where a line meets it. Pure; any thread. */
 #ifndef WORKER_GEOM_TRIANGLE_H
 #define WORKER_GEOM_TRIANGLE_H

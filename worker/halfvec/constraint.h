@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Half vectors of a whole path and their derivatives (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3.1 and 3.2; the paper's
  * indices: x_0 on the light, i towards the light, o towards the camera).

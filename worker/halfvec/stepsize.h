@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Step sizes in half vector space (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3.3 and 7): how far a proposal moves the half
  * vectors of the vertices between x_b and x_c. h' = h + U diag(sigma) g with two standard normals g; U and sigma are functions

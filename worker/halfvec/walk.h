@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The predictor-corrector walk (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3 and 6; Jakob 2013): moves the inner vertices of a
  * sub-path between two fixed ends until their half vectors are the ones asked for.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/math/cie.h"
 
 const double cie_observer[CIE_COUNT][3] = {

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The CIE's published tables at 1 nm, 360-830 nm: 1931 2-degree observer and illuminant D65 (100 at 560 nm).
  * Generated from worker/math/data at build time. Constants; any thread.

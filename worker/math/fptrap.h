@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Invalid floating-point operations (0/0, inf - inf, sqrt of a negative): a fault of ours goes back to where the thread said
  * that faults are caught (fptrap_catch), and stops the program by SIGFPE where it did not; a library that raises INVALID on

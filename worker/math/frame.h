@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* An orthonormal frame; local z is n. */
 #ifndef WORKER_MATH_FRAME_H
 #define WORKER_MATH_FRAME_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Sums of numbers that are given by their logarithms. */
 #ifndef WORKER_MATH_LOGSUM_H
 #define WORKER_MATH_LOGSUM_H

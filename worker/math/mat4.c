@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/math/mat4.h"
 
 #define RADIANS_PER_DEGREE 0.017453292519943295769

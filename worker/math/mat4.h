@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Affine transforms, row major: p' = M p. */
 #ifndef WORKER_MATH_MAT4_H
 #define WORKER_MATH_MAT4_H

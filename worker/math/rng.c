@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/math/rng.h"
 
 #include <Random123/threefry.h>

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Counter-based random numbers: (seed, stream, index, step, dimension) -> value, by Threefry-4x64-20 (Salmon et al.
  * 2011, through Random123). One stream constant a use, so that no two uses share numbers. Values are multiples of

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Radiance, reflectance or importance at the wavelengths a path carries: four lanes that travel together where
  * nothing disperses (hero wavelength, Wilkie et al. 2014).

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The (u, v) of a sphere: longitude around the axes' n from s, and the angle from n, each over its range. */
 #ifndef WORKER_MATH_SPHERE_H
 #define WORKER_MATH_SPHERE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Three doubles by copy: points, directions, normals. World lengths are those of the rescaled scene. */
 #ifndef WORKER_MATH_VEC3_H
 #define WORKER_MATH_VEC3_H

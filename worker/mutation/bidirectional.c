@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Independent proposals from all techniques at once: a pair of sub-paths is drawn, and one of the paths that it makes, in
  * proportion to contributions by the balance heuristic. What the state has to say against it is the sum over a pair of

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/mutation/breakup.h"
 
 #include "worker/mutation/trace.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The breakup of a path (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4 and 5), in the paper's indices: x_k .. x_b is traced
  * from the camera by perturbed half vectors (multi chain perturbation), x_b .. x_c moves by half vectors between its two ends

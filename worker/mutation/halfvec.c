@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* All half vectors of a path move, its two ends stay (Kaplanyan, Hanika, Dachsbacher 2014). */
 #include "worker/mutation/strategy.h"
 

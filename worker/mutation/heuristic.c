@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/mutation/heuristic.h"
 
 /* Of the two ends: nothing but half vectors (b = k), nothing but tracing (b = 0). */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Improved half vector space light transport: the breakup by roughness (Hanika, Kaplanyan, Dachsbacher 2015, sec. 5). */
 #include "worker/mutation/strategy.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Independent proposals: a number of edges, then a bidirectional technique, and a path made by it from fresh random numbers.
  * The density is summed over all techniques that could have made the path (Veach 1997, sec. 10.2), so that chains change

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The point on the aperture moves; half vectors up to x_c stay as they are. */
 #include "worker/mutation/strategy.h"
 

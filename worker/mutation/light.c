@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The point on the emitter moves; half vectors up to it stay as they are. */
 #include "worker/mutation/strategy.h"
 

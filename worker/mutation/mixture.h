@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Which strategies a chain uses, and how often: "independent=0.1,hslt=0.9", as a plan has it. Forced choices for tests:
  * "hslt@b3c1". Pure.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The whole path is traced anew by perturbed half vectors (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4). */
 #include "worker/mutation/strategy.h"
 

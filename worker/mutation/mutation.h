@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Mutations of whole paths: one file and one line in mutation_list.h each. A mutation only proposes and says how likely its
  * proposal is; the chain alone selects, accepts, counts and splats.

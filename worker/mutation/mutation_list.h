@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One line a strategy: MUTATION(name) stands for `const struct mutation_ops mutation_<name>`. */
 MUTATION(bidirectional)
 MUTATION(independent)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The path is traced from the camera to x_b by slightly perturbed half vectors and joined to x_{b-1}; where that is x_0 it
  * moves on its emitter, too. No walk, no derivative: where all lobes are wide, b is uniform over the inner vertices, and an

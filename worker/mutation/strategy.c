@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/mutation/strategy.h"
 
 /* Forced and drawn choices of one proposal. */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Strategies that are breakups: which b and c they allow, and what moves. */
 #ifndef WORKER_MUTATION_STRATEGY_H
 #define WORKER_MUTATION_STRATEGY_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/mutation/trace.h"
 
 /* Half vectors take steps of so many lobe widths. */

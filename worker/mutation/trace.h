@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The half vector multi chain perturbation (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4): from a film point nearby, a path is
  * traced whose half vectors are those of the old path, turned into the new tangent frames, plus a little noise.

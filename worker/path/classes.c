@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/path/classes.h"
 
 _Static_assert(PATH_CLASSES <= 32, "a bit a class");

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The class of a path (common/film/path_class.h), the same whichever technique makes it: an inner vertex is smooth where it
  * scatters by a delta lobe, or by a BSDF whose mean roughness is below PATH_CLASS_ALPHA. Nothing allocates.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Techniques: a path of k edges can be made from s vertices of a light sub-path and t = k + 1 - s of a camera sub-path.
  * x_0 lies on the emitter, x_k is the pinhole or a point of the aperture, the same for all techniques of one evaluation.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * All paths that one pair of sub-paths makes, each with its contribution by the balance heuristic: what bdpt averages, seen as
  * candidates of which one can be drawn in proportion to its contribution.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A whole path from an emitter to the camera: the state of chains in path space.
  *

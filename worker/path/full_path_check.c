@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/path/full_path.h"
 
 #include <stdio.h>

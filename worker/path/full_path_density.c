@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The contribution of a whole path and the densities of all techniques that could have made it: the explicit products, in
  * logarithms, that proposals in half vector space never multiply out. */
 #include "worker/path/measure.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Bidirectional path tracing (Veach 1997, ch. 10): every way of joining a light with a camera sub-path, by the balance
  * heuristic. One light sub-path a camera sub-path; those that are joined to the pinhole land anywhere on the film.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The path tracer: a camera sub-path, at each vertex next event estimation and the emitter met by chance, weighted against
  * each other by the balance heuristic (Veach 1997, sec. 9.2.4). The reference for all other integrators.

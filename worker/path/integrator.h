@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Integrators as table entries: one file and one line in integrator_list.h each. An integrator turns one point of the space
  * of random numbers into a contribution f / p over the whole film window (docs/design.md, rules 2); whether independent points are

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One line an integrator: INTEGRATOR(name) stands for `const struct integrator integrator_<name>`. */
 INTEGRATOR(path)
 INTEGRATOR(bdpt)

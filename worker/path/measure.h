@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The only place where Jacobians between measures live. Names read to_from. omega points from the vertex where the
  * direction was chosen to the next one; ng is a geometric normal.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Paths as vertices with explicit densities (Veach 1997, ch. 8 and 10).
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/path/sampler.h"
 
 void sampler_fill(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, enum sampler_side side,

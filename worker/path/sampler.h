@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Where a path's random choices come from. Each vertex of each sub-path owns a block of eight numbers in [0,1), so that a
  * choice keeps its number when an earlier vertex changes (Kelemen et al. 2002 mutate exactly these numbers).

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Low-discrepancy samples: Owen-scrambled Sobol' points (Owen 1995; scrambled by hashing as in Burley 2020), a sequence for each
  * (seed, stream, index, replicate), of which `sample` is one point. Any prefix of 2^m points is stratified in all elementary

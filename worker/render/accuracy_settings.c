@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/accuracy_settings.h"
 
 #include "common/base/text.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The settings that trade accuracy for time (tolerances, limits, precision), each with a name, a range and a default: a line in
  * setting_list.h. A plan carries those that differ from the default as text, "tolerance=1e-05,iterations=30"; a world is built by

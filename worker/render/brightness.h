@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A map of how bright an image is, from few samples: what fireflies made is spread over the place that they may have come from.
  *

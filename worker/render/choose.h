@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Which integrator a scene calls for: `path`, `bdpt`, or the chains of `hslt`. Decided once, before the plan is made, from a pilot
  * that counts rays instead of seconds and draws random numbers of its own: the same on every machine for the same request, and

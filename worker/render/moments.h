@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Where the chains of one lease spend their time: within-chain moments by tile and the time of each path class (struct batch in
  * common/film/batch.h defines both). Filled when a state is splatted, with the weight that it has gathered.

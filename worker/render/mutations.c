@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/render.h"
 
 #include "worker/mutation/mixture.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Every plug-in that a scene may name, gathered from the registries: the one list for the scene reader. */
 #include "worker/render/render.h"
 

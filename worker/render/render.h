@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The renderer: a library without network. This is its one public header for the daemon and the command line.
  * A world is immutable and shared by all threads; a lease is run by one thread.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The film of one lease: per pixel of the crop a sum in double, rounded once when the tiles are taken. Every integrator
  * splats with the continuous filter kernel, normalised to integral 1 over the plane (docs/design.md, rules 3).

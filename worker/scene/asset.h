@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Where a scene's files come from: a folder (hslt-render, hslt-submit) or a content-addressed store (workers).
  * Names are those in the scene file, with '/' between parts.

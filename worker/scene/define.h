@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The values of $name: from the command line, and from <default> where the command line says nothing. One thread. */
 #ifndef WORKER_SCENE_DEFINE_H
 #define WORKER_SCENE_DEFINE_H

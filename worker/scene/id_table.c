@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/scene/id_table.h"
 
 #include "worker/scene/plugin.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Objects of a scene by their ids, aliases included. One thread; lives in the arena given. */
 #ifndef WORKER_SCENE_ID_TABLE_H
 #define WORKER_SCENE_ID_TABLE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, EXR, Radiance HDR by content. PNG (8 and 16
  * bits) and JPEG are sRGB, whatever gamma they claim. Damaged files are an error, never half an image. Any thread, each

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The formats behind image_read: each decodes bytes in memory; whatever they hold, it answers with an image or an error. */
 #ifndef WORKER_SCENE_IMAGE_DECODE_H
 #define WORKER_SCENE_IMAGE_DECODE_H

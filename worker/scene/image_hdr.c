@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Radiance pictures: mantissas of red, green, blue and a common exponent (Ward 1991, Real Pixels), flat or with
  * run lengths by component. EXPOSURE is not applied, as in Mitsuba.

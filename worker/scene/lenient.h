@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What stands in for what is not supported, where the user asked for leniency. Whatever is replaced or left out is noted by the
  * reader. Pure; any thread.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Numbers as text, always with a point, whatever the process's locale. NaN, infinity, hexadecimal and values that
  * overflow are no numbers. Any thread; allocates nothing (but the locale, once).

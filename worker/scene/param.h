@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Parameter tables: what a plug-in understands, declared where it is implemented, read by the scene reader.
  * Names are those of Mitsuba 3 (to_world, int_ior, max_depth); 0.5/0.6 names are the same in camelCase and are

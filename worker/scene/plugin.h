@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Looking things up in the tables of plug-ins, and saying what is in them. Pure; any thread. */
 #ifndef WORKER_SCENE_PLUGIN_H
 #define WORKER_SCENE_PLUGIN_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/scene/remarks.h"
 
 #include "worker/scene/plugin.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What there is to say of a scene while it is read: what is ignored, each kind of thing once, and what is wrong, all of it. One
  * thread; texts live in the arena given.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/scene/scene.h"
 
 #include "worker/scene/id_table.h"

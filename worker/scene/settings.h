@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What sensor, film, filter, sampler and integrator of a scene say, as plain numbers: for hslt-submit, hslt-render and
  * the world. Needs no Embree and opens no asset.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Spectra of scene files: <spectrum value="..."/> and filename="....spd", <spectrum type="..."> of 3.x, <blackbody> of 0.6. All
  * become a constant or a table of wavelengths and values (struct value), for light and surfaces alike. One thread; allocates in

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Names: Mitsuba 0.6's camelCase in 3.x spelling, and what a mistyped one may have meant. Pure; any thread. */
 #ifndef WORKER_SCENE_SPELLING_H
 #define WORKER_SCENE_SPELLING_H

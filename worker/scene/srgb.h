@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The sRGB transfer function (IEC 61966-2-1), decoding only; odd beyond [0,1]. */
 #ifndef WORKER_SCENE_SRGB_H
 #define WORKER_SCENE_SRGB_H

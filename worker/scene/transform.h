@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* <transform>: its contents apply in the order they stand in, each to the result of those before. Pure. */
 #ifndef WORKER_SCENE_TRANSFORM_H
 #define WORKER_SCENE_TRANSFORM_H

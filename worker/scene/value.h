@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Values of the scene language from their elements: <float>, <rgb>, <transform> ... One thread; allocates in the arena. */
 #ifndef WORKER_SCENE_VALUE_H
 #define WORKER_SCENE_VALUE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A scene file as a tree of elements, through expat: includes opened, defaults substituted, nothing interpreted.
  * Any DOCTYPE is refused, and with it every entity; depth, sizes and counts are bounded. One thread; the tree lives in

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* From -1 to 1 in each direction. */
 #include "worker/shape/declare.h"
 #include "worker/shape/quad.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* An open cylinder from p0 to p1, facing outwards. u is the angle over 2 pi, v the place between p0 and p1. */
 #include "worker/shape/declare.h"
 #include "worker/shape/quad.h"

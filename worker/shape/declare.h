@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* For the parameter tables of shapes. */
 #ifndef WORKER_SHAPE_DECLARE_H
 #define WORKER_SHAPE_DECLARE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The unit disk in x and y, facing z. As in Mitsuba u is the distance from the centre, v the angle over 2 pi. */
 #include "worker/shape/declare.h"
 #include "worker/shape/round.h"

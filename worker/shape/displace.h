@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Displacement (Cook 1984, Shade Trees): every triangle is cut into 4^level alike, and each point p of the finer mesh moves
  * to p + scale height(u,v) n, with n the unit normal interpolated there.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Where the points lie that cutting each edge of a mesh into `parts` makes, and who shares them. A vertex is shared by
  * triangles that share it in the base mesh (or its edge); a place is shared by all that lie there, whatever their normals.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Meshes while they are built: object space, normals perhaps missing. One thread; arrays in the arena given.
  */

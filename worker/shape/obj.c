@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Wavefront OBJ: v, vt, vn, f; everything else (groups, materials, lines) has no meaning here. Every index is checked
  * where it stands, so that an error has a line.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Stanford PLY: ascii and both byte orders, any order of elements and properties.
  *

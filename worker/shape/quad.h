@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Parallelograms of meshes. */
 #ifndef WORKER_SHAPE_QUAD_H
 #define WORKER_SHAPE_QUAD_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A square from -1 to 1 in x and y, facing z. */
 #include "worker/shape/declare.h"
 #include "worker/shape/quad.h"

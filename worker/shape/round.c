@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/shape/round.h"
 
 vec3 round_direction(uint32_t i)

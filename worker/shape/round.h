@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Round bodies as meshes: disks, cylinders and ellipsoids are prisms of ROUND_SEGMENTS sides with the body's own normals. Radii
  * are a little larger than asked for, so that a disk's area is right; 256 sides leave the silhouette of a body of radius 1 within

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Mitsuba's own binary meshes (.serialized, versions 3 and 4): any number of meshes in one file, each compressed by itself,
  * found through a table of offsets at the file's end; `shape_index` says which.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Shapes. One file per plug-in and one line in shape_list.h: the scene reader knows it, and the generic tests pick it up.
  *

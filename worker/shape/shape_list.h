@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One line a shape: its const struct shape_ops is shape_ops_NAME. */
 SHAPE(obj)
 SHAPE(ply)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A true sphere. What to_world scales unevenly is an ellipsoid: a mesh of 8 * 4^ELLIPSOID_LEVEL triangles with the ellipsoid's
  * own normals.

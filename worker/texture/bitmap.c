@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * An image file. (u,v) = (0,0) is the upper left corner of the picture in both dialects: Mitsuba's loaders of OBJ files
  * turn v over (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Interpolation is of linear

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Two textures in a 2 x 2 pattern on the unit square; color0 where both halves agree. */
 #include "worker/texture/texture.h"
 #include "worker/texture/uv.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/texture/color.h"
 
 #include "worker/math/cie.h"

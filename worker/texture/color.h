@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Colour values as functions of wavelength (docs/design.md, rules 3).
  * Reflectances: Jakob and Hanika 2019 sigmoid polynomials, round trip under D65. Illuminants: largest component x

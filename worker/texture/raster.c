@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/texture/raster.h"
 
 int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,

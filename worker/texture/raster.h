@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * An image as a function on the plane: u to the right, v DOWN, the unit square is the image once. Pixel centres lie at
  * ((i + 1/2) / width, (j + 1/2) / height). Immutable; any thread.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Textures: a colour, or a height, that may depend on (u,v). One file per plug-in and one line in texture_list.h.
  * Immutable after creation; any thread.

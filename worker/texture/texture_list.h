@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* One line a texture: its const struct texture_ops is texture_ops_NAME. */
 TEXTURE(bitmap)
 TEXTURE(checkerboard)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Reflectance spectra from linear Rec. 709 colours: a sigmoid of a quadratic in wavelength (Jakob and Hanika 2019,
  * A Low-Dimensional Function Space for Efficient Spectral Upsampling), fitted in CIELAB under D65. Shared by the

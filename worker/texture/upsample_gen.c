@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Prints the table of upsampling coefficients as a C initialiser: [largest component][its value][y][x][3]. */
 #include "worker/texture/upsample.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The affine map from a surface's (u,v) to a texture's: to_uv of 3.x, uscale ... voffset of 0.5/0.6. */
 #ifndef WORKER_TEXTURE_UV_H
 #define WORKER_TEXTURE_UV_H

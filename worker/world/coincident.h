@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Which surfaces of a world coincide (worker/geom/coincide.h), which of them is there, and what there is to say of it: shapes are
  * named where one of two shines or lets light through, or where both face the same way with different materials. Opaque bodies that

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/world/displacement.h"
 
 #include "worker/shape/displace.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Displacement as a scene asks for it: a texture named `displacement` in a shape, with displacement_scale (world units, 1) and
  * displacement_level. Heights are plain numbers: of a bitmap the pixels as they are stored, not as sRGB. One thread.

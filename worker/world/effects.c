@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/world/effects.h"
 
 #include "common/base/text.h"

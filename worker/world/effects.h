@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What can happen at all in a scene, read off its description before Embree is built. Each effect decides what is built
  * and run; each is reported on or off, why, and what leaving it out saves. What the user forces goes first.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What effects change in a world: shapes that no path meets turn black, what was switched off goes. */
 #include "worker/bsdf/lobe_filter.h"
 #include "worker/world/visibility_bounds.h"

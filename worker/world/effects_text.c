@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Names of effects, what each saves, and the text in which a plan overrides them. */
 #include "worker/scene/spelling.h"
 #include "worker/world/effects.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Where the world's floats are finest. They have 24 bits of a coordinate: what is small has to stand near the origin, or rays and
  * vertices are rounded by more than it is large. Pure; one thread.

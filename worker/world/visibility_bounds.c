@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/world/visibility_bounds.h"
 
 #include "worker/geom/triangle.h"

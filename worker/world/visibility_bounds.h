@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Which shapes a path between camera and light can meet, and how long such a path can be: only what is proved from depth,
  * emitters that do not shine, black materials, and closed opaque shapes (cubes and spheres as the scene language makes them)

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The world that all threads share: built once from a description, immutable then. Lengths are rescaled in double by a
  * power of two so that the scene's radius lies in (1/2, 1], and moved so that its box is centred, or what is small in a scene of

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Draws what an estimate said beside what renders then cost.
 
     hslt-render --estimate SCENE ... --json > estimate.json

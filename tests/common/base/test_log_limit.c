@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A rush of lines is cut, counted and told of; a trickle passes. */
 #include "common/base/log_limit.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A program whose stdout is a full disk does not end as if all were well. */
 #include "common/base/output.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Buffers keep their limit, texts are cut between characters, log values cannot forge a line, figures read well. */
 #include "common/base/buf.h"
 #include "common/base/error.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The store keeps what it was given under its true name, refuses what is not it, and forgets the oldest first. */
 #include "common/base/disk.h"
 #include "common/blob/blob.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * b's standard error, on independent samples whose law is known: 100 bootstraps each of 16 groups of 4,096 samples.
  *

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A canvas that was saved and loaded goes on with the same bits, wherever between two batches it was saved; so does one of which batches
  * are taken back and replaced. */
 #include "common/film/canvas_save.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What makes chains disagree, from synthetic images: each criterion alone, on both sides of its limit, and its words. */
 #include "common/film/convergence.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Forecasts against renders played with exact chi-square statistics: groups whose pixels' deviations are Brownian in work.
  * Level: each share of intervals that hold is a binomial of 300 renders whose expectation is 0.93 or more (the prior of the

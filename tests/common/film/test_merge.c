@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* When the error is looked at, and what stopping by it does: the ladder, and renders that are stopped by their targets. */
 #include "common/base/mem.h"
 #include "common/film/merge.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What canvas_image says of chains: potential scale reduction of sequences whose answer is known, the error of a tile, energies
  * of path classes; and that the order of batches changes no bit.

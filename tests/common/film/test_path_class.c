@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Classes of paths against their definition, said in another way: over all words of smooth and rough vertices. */
 #include "common/film/path_class.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Against tables of the F and chi-square distributions, and against closed forms. */
 #include "common/film/quantile.h"
 

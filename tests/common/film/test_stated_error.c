@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What an image says of its own error, on groups whose truth is known: 300 pictures each of grain, of hits that come by the clump,
  * and of light that seldom comes, in bright and dark surroundings.

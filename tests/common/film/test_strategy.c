@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Counters of strategies: exact sums over rounds, what a batch may say, and the table that people see. */
 #include "common/film/strategy.h"
 

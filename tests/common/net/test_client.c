@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The client against a coordinator of a few lines that means it no good: names of files that lead elsewhere, and more than was asked
  * for.

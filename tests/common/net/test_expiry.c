@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Certificates that end soon are spoken of in time, again every day, and not when there is no need; clocks are arguments here. Those
  * that are new are taken up, if not at once, then later, and are for whom the old ones were.

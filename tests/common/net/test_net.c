@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Addresses are read strictly; connections carry frames both ways, tell once that they end, and never grow without bound: in
  * plaintext and through TLS. Where only one end speaks it, both are told at once.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Service managers are told what they asked for, by path and by abstract name; their sockets are taken, others' are not. */
 #include "common/net/notify.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Handshakes in memory, between folders that an authority of the test has made: who is let in, who is not and why, and what
  * becomes of streams that are cut, changed, or no TLS at all.

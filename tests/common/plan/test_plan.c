@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The mixture of mutations in a plan: what is one and what is not, and the texts that it appears in. */
 #include "common/plan/plan.h"
 

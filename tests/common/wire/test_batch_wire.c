@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Batches, grants and plans come out of the wire as they went in; what does not fit its plan or its payload is refused. */
 #include "common/wire/batch_wire.h"
 #include "common/base/mem.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Messages go out and come in again; unknown fields, memory bombs and broken bytes do not. */
 #include "common/wire/envelope.h"
 #include "common/wire/frame.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Frames come out whole however the bytes are cut, and nothing beyond the limits is believed. */
 #include "common/wire/frame.h"
 

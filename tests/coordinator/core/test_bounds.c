@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* How a job ends, as transcripts; and what is said about it on the way. */
 #include "tests/support/transcript.h"
 

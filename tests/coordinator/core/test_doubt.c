@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Chain states that workers refuse, as transcripts: who is asked, who is to blame, and that no job fails by it. */
 #include "coordinator/core/worker_registry.h"
 #include "tests/support/transcript.h"

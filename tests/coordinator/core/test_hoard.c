@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Workers that take what they can get and give nothing: what they hold is little, and others get it soon. */
 #include "tests/support/transcript.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Workers that go while they hold leases: which of that is held against a job and its owner, as transcripts. */
 #include "tests/support/transcript.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What people want of jobs that are there, as transcripts: hold, release, priority. */
 #include "tests/support/transcript.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Jobs of an earlier life, and jobs that are held, as transcripts. */
 #include "tests/support/transcript.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What is merged, repeated, refused and handed out again, as transcripts. */
 #include "tests/support/transcript.h"
 

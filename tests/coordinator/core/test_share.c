@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What a priority means in machines, as the status says it. */
 #include "tests/support/transcript.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Several jobs and several kinds of workers: priority, fairness, fingerprints, limits, and why a job waits. */
 #include "tests/support/transcript.h"
 

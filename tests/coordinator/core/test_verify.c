@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Leases that two workers compute, and workers that are set aside, as transcripts. */
 #include "coordinator/core/worker_registry.h"
 #include "tests/support/transcript.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Why a job waits is said in each state in which one can wait, and not while somebody works on it. */
 #include "tests/support/transcript.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The spool is damaged while no coordinator runs. What is not known is never deleted; what can be known again is; what was lost is said
  * and computed again, to the same bits, and nothing else is. Each run: the power goes in the middle of the work, something is damaged,

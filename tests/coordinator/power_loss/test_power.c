@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The power goes at a random call of the disk, again and again, while a coordinator takes jobs, merges, writes checkpoints and
  * results; each life goes on with what the disk kept (tests/support/faulty_disk.h). Whatever was acknowledged is there: jobs, batches (a

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Finished jobs that are old go, with all that is in their folders and their rows, and nobody waits for it. */
 #include "common/base/disk.h"
 #include "common/base/log.h"

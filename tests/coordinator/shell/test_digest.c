@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What decides bits is in the digest of a batch, and the time that it took is not. */
 #include "coordinator/shell/digest.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What happens while the disk is asked: a checkpoint is held up in its last step, and meanwhile its job is cancelled or counts go on; a
  * record or a row that cannot be written is written later; a job goes on while an earlier flush lasts. And what happens without memory.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The plan of a job that goes on: the later bounds, and nothing that decides bits. */
 #include "coordinator/shell/extend.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Films of finished jobs: those that ended first go when there are too many, all go for a running job; results stay. */
 #include "coordinator/shell/keep.h"
 #include "tests/support/folder.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* As many connections as there are file descriptors for; more than that is refused with a sentence. */
 #include "coordinator/shell/limits.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The coordinator's shell against peers that say rubbish, lie, straggle, crowd, or do not read. */
 #include "tests/support/served.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Quotas at their edges: what is exactly allowed passes, one more does not, and what overflows is more than anything. */
 #include "common/film/canvas.h"
 #include "coordinator/shell/quota.h"

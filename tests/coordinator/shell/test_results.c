@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The coordinator's shell and workers that answer every lease at once with what the test wants: results counted once, late, slow, useless,
  * failed; extensions of what is done.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The coordinator's shell and a worker that says by digest which chain states it made and which it refuses: a refusal counts against the
  * states that it names and no others; states that are not those of their digest are refused before they are stored.

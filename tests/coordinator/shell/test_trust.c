@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Who was set aside is known after a restart, however long the list has become; a damaged list stops no farm. */
 #include "coordinator/shell/server.h"
 #include "tests/support/folder.h"

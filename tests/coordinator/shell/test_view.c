@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A job as JSON: the counters of its strategies, and what is to be said about it. */
 #include "coordinator/shell/view.h"
 

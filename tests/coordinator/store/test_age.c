@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What finished jobs give up, by a clock of the test. */
 #include "coordinator/store/age.h"
 

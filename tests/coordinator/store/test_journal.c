@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A journal gives back what was appended and whole, wherever the machine stopped and whatever bit fell over. */
 #include "coordinator/store/journal.h"
 #include "common/base/crc.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The database of jobs: what was added is there again, what has ended is not, another version is refused. */
 #include "coordinator/store/ledger.h"
 #include "tests/support/folder.h"

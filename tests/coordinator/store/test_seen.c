@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Time that was seen to pass does not follow a wall clock that jumps. */
 #include "coordinator/store/seen.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A spool has one master, never gives an id twice, and remembers its jobs. */
 #include "coordinator/store/spool.h"
 #include "common/base/mem.h"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Faults of the coordinator.
 
 fault kill_coordinator 20 2 "the coordinator is killed (kill -9) and started again"

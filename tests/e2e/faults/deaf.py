@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """deaf.py PORT JOB STATUS-SOCKET: a client that asks for a job's log again and again, a worker that asks for the job, and a reader
 of the status socket that subscribes; none of them reads. Fails unless each is cut off within two minutes."""
 import socket, sys, time

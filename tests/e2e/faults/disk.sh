@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Faults of the disk: those of tests/coordinator/power, where the coordinator's calls go through a disk that loses what was not
 # synchronised. The test counts for itself: what was acknowledged and is not there, what a film holds too often, images of other bits.
 

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """hoard.py PORT FINGERPRINT: a worker of that fingerprint that claims 4,096 threads, takes all leases that it gets, says its heartbeats,
 and answers nothing; until it is hung up on. Prints a line for each lease."""
 import socket, sys

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What the faults have in common: a farm of their own each, a job that runs meanwhile, moments, and the count at the end.
 # A fault is a function of the same name:
 #   fault NAME TIMES SHORT "what the table says"

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Faults of the network, by a proxy between one of two workers and the coordinator (proxy.py).
 
 through_proxy() {

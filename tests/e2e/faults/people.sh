@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What people do to a job, and workers that lie.
 
 fault held 10 1 "the job is held, and released"

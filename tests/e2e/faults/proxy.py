@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """A network of our own: proxy.py PORT-FILE TARGET-PORT ORDER-FILE passes frames on between who connects and the target.
 
 When ORDER-FILE holds "ACTION FIELD", that is done to the next message of this field of the envelope (proto/farm.proto), either

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # What machines run out of.
 
 # A spool of its own size, where that is possible.

@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """skew.py PORT: workers and clients of the version before and after, these with fields that nobody here knows. Fails unless each is
 told which side is the older one."""
 import socket, sys

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* A disk that is slow to read, for LD_PRELOAD: each piece of a job's journal takes HSLT_SLOW microseconds longer. */
 #define _GNU_SOURCE
 #include <stdio.h>

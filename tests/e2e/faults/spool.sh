@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Faults of what lies in the spool: bits that fall over, files that are gone.
 
 # flip FILE SHARE: one bit, so far into the file

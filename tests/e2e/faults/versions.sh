@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Programs that do not fit together.
 
 fault skew 3 1 "workers and clients of an older and of a newer protocol call"

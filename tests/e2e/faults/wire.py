@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 """The conversation's words, as bytes (proto/farm.proto), for peers that tests make up."""
 import os, re, struct, sys
 

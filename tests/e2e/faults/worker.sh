@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: Apache-2.0
 # Faults of workers.
 
 fault kill_worker 20 2 "a worker is killed (kill -9), another comes"

@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: Apache-2.0
 """Makes the height maps of the displaced scene (they are in the repository; run this to change them)."""
 import math
 import random

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The BSDFs that the generic tests run over: several parameter sets each, as text (see tests/support/nodes.h), nested
  * ones after '|'. A BSDF of the registry without a set here fails the tests.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* plastic, roughplastic and thindielectric against what their formulas stand for. */
 #include "tests/worker/bsdf/bsdf_cases.h"
 #include "worker/bsdf/fresnel.h"

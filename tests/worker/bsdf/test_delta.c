@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Exactly specular lobes asked for by name, against the ones that sample() finds; and the mean roughness. */
 #include "tests/support/dice.h"
 #include "tests/worker/bsdf/bsdf_cases.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Indices of refraction as functions of the wavelength: against the makers' catalogues and handbooks, through a prism against
  * Snell's law worked out here, and what a BSDF says of itself. Deterministic.

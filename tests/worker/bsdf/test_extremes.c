@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Nothing but finite numbers, at grazing angles, with roughness from 1e-6 to 2, indices next to 1 and far from it, and
  * random numbers at the ends of their range. Invalid operations trap.

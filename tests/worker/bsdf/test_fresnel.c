@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Fresnel's equations with a complex index, in complex arithmetic, at all angles of incidence. */
 #include "worker/bsdf/fresnel.h"
 

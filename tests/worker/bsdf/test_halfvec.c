@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * eval_halfvec: against the product of f, cosine and Jacobian (which bsdf.c forms where a BSDF has no eval_halfvec of its
  * own); that Jacobian against finite differences of the map from half vectors to directions; and microfacets against the

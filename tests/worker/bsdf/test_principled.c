@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The principled BSDF where it is another plug-in, and its lobes where only one is there, against their formulas. */
 #include "tests/worker/bsdf/bsdf_cases.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * sample() against pdf_solid(): chi-square over the sphere for every BSDF, from 16 directions each.
  *

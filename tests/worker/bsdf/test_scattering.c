@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What light may do at a surface: reciprocity, energy, colour, closed forms, refusals. */
 #include "tests/support/stats.h"
 #include "tests/worker/bsdf/bsdf_cases.h"

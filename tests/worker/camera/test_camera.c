@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The pinhole and the thin lens against what these are. Exact but for rounding; derivatives by central differences. */
 #include "tests/support/dice.h"
 #include "worker/camera/camera.h"

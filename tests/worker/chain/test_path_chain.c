@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * States of chains of whole paths: what is saved comes back as the same path, two that resume from the same bytes go on bit by
  * bit alike, and bytes that somebody has changed are refused, or so little changed that the path is as good as the same.

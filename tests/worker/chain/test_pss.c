@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Primary sample space: small steps are symmetric, states survive bytes, and a chain does what Metropolis says: on targets
  * known in closed form the histogram of its splats is the target. Level 1e-6 each; seeds are the hash of the test's name.

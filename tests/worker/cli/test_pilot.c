@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* How a pilot is cut: like the render but for its epoch, with enough rounds in its time, its bootstrap bounded. */
 #include "worker/cli/pilot.h"
 

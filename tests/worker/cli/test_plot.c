@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/plot_axis.h"
 
 #include "common/base/mem.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The worker's parts: threads and their way back, the cache's slots, what is fetched, the fingerprint. */
 #include "common/base/mem.h"
 #include "worker/daemon/job_cache.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Starts are counted, whatever the file says; a home stays what it is while its file does. */
 #include "worker/daemon/worker_identity.h"
 

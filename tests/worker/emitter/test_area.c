@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Area emitters: what is sampled is distributed as the pdf functions say, and these integrate to one. Chi-square at level
  * 1e-6 each, over cells of the (u,v) square of the emitter's surface; seeds are the hash of the test's name. A density wrong

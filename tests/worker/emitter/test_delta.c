@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Emitters that nothing hits: where they are, what they send out in which direction, and that directions are drawn as
  * densities say. Chi-square at level 1e-6; a density wrong by 3 % everywhere in a half of the cells is found with certainty.

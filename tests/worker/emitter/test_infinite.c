@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Emitters at infinity: sampling against density, density against radiance, orientation.
  *

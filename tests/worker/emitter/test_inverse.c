@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * point_inverse against sample_point: there and back, and the density as one over the area that a square of random numbers
  * covers, by central differences of step h (h^2 and eps / h). Deterministic.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Rays that begin and end on surfaces: none meets what it starts from, none slips through a closed body, segments see what
  * lies between and nothing else, but for those that pass an edge by less than floats can tell. Deterministic: every count below

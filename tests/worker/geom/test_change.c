@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * How points of a surface change as they move, against points a little further on: central differences of 1e-5 lengths,
  * extrapolated once, leave less than 1e-7 of what is small beside nothing nearby.

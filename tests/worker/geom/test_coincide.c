@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Surfaces that coincide. Two triangles: against their separation along the edges of each (an axis on which they lie apart), in
  * planes of any direction, near the origin and far from it, with vertices rounded to float. The search: against all pairs. Rays and

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Rays in a scene of mixed scales: a floor of two triangles, and on the middle of it a bumpy ball, half sunk, and a sphere, both a
  * millionth or less as large. From near and from far, with the far end first or last, every ray meets what a search in double meets,

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Points put back onto one primitive along a ray through a point of it. Tolerances: a few roundings of the coordinates over
  * the cosine between ray and normal.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Where rays meet primitives, refined in double: on the primitive, and on the ray. Tolerances are a few roundings of double
  * times the condition of the problem, said where they are used.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Small dense systems in long double, by elimination with full pivoting. */
 #ifndef TESTS_WORKER_HALFVEC_DENSE_H
 #define TESTS_WORKER_HALFVEC_DENSE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Whole paths built by hand for tests of their derivatives: every vertex on a shape of its own (one triangle or a sphere),
  * with a made-up material that has an index of refraction and a roughness. One at a time, on the caller's stack or static.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The half vector as a function of where three vertices lie, in 113 bits of mantissa, and its derivatives by differences: an
  * implementation of its own, that shares no formula of a derivative with the program.

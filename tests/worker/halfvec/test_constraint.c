@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A, B, C and h against differences of the half vector in 113 bits (quad.h): error at most max(1e-12, 100 eps x condition),
  * the condition found by shaking every number of the problem by a rounding in extended precision; and at most 1e-9 wherever

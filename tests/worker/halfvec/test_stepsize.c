@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Step sizes: the singular values against one-sided Jacobi rotations in long double, ray differentials against rays through
  * neighbouring film points, the density against samples, and that nothing makes them infinite or 0.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The block tridiagonal system against dense elimination in long double, and against the paths themselves: ends and half
  * vectors moved by a little, the path solved again in 113 bits. Error at most max(1e-12, 100 eps x condition), each condition

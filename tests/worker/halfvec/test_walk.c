@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Walks to random half vectors in worlds that are hard in different ways. Where a walk says that it arrived, that is checked
  * from the outside: half vectors are worked out here in long double from the shapes' own vertices, positions must lie on the

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Walks whose end is known beforehand: every failure by its name, an occluder of the same material that a walk which looked
  * only where its last ray ends would mistake for the light, foci where a pivot block or the whole matrix is singular.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* An invalid operation of ours ends the program, or goes to where it is caught; one of a library's does neither. */
 #include "worker/math/fptrap.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/math/mat4.h"
 
 #include "worker/math/rng.h"

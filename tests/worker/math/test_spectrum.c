@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "common/film/color.h"
 #include "worker/math/cie.h"
 #include "worker/math/spectrum.h"

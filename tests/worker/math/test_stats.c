@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The statistics that other tests rely on, against published quantiles. */
 #include "tests/support/stats.h"
 

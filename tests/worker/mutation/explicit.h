@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * log T(x -> y) of breakups, multiplied out per area of every vertex that moves, by section 5 and 4 of the paper and nothing
  * of worker/mutation: to hold against the products that leave out what cancels. In the measure of path.h; delta distributions

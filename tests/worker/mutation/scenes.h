@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Small closed scenes for tests of mutations, each with something of its own. The caller frees the world. */
 #ifndef TESTS_WORKER_MUTATION_SCENES_H
 #define TESTS_WORKER_MUTATION_SCENES_H

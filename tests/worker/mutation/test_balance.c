@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Detailed balance of every strategy of the registry, and of the breakup with each b and c forced, in worlds that between them
  * have what paths can meet. How it is tested, level and power: tests/support/balance.h. A fault of 2 % in the ratio of a strategy that

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Strategies broken on purpose, made of the real ones: the test of detailed balance must catch each, and must pass the real
  * one from the same starts. Level and power: tests/support/balance.h.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The ratio of f and T that mutations say, against both multiplied out per area (tests/worker/mutation/explicit.h): to rounding.
  */

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What bidirectional proposals are made of, each against what it must be, number by number: a candidate's contribution does not
  * depend on whether its pair was drawn afresh or around the path itself, lengths and the chance of them belong together, the two

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Independent proposals estimate what all light is that reaches the film: E[f / T] over them is the integral of f that bdpt
  * finds, for each number of edges and for all. What chains are scaled by hangs on this.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Each mutation alone and each forced (b, c) leaves bdpt's distribution of paths as it is, on paths of exactly k edges
  * (tests/support/stationary.h: what is compared, and why it is so much sharper than two images).

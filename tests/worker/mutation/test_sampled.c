@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * T(x -> y) against sampling. From one x, whose proposals all arrive, the positions of all vertices that move are whitened by
  * a pilot; inside an ellipsoid of known volume E[1{y in bin} / T(x -> y)] is the bin's volume, whatever T's shape: of the eight

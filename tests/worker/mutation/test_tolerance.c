@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Halving the tolerances of the walks, there and back, changes no image: the same states, the same random numbers, one
  * proposal each with the tolerances as they are and with half of them. What the chain would put on the film, expected values

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Images that are known without rendering: furnaces, directly lit planes, two plates; and scenes at the edge of what numbers
  * can hold. Statistics as in tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).

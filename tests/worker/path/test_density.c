@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The density of every technique for a given path, whichever technique made it (the balance heuristic stands and falls with
  * that). Sub-paths are walked at random and joined in all ways; the densities of all their vertices, in both directions, are

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Paths through glass that disperses: bidirectional against plain path tracing, smooth and rough; and glass whose index hardly
  * varies, where paths carry one wavelength, against the plain glass, where they carry four. Levels and power: agree.h.

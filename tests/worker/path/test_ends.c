@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The ends of paths: a camera with an aperture, emitters that cannot be hit. Integrators against each other and against
  * closed forms. Statistics as in tests/support/agree.h: level 1e-4 over the suite; biases of 2 % on a quarter of the

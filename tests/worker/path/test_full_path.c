@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Whole paths against the sub-paths that they are made of: contribution and densities, multiplied out one way by the
  * connections of bdpt and the other way vertex by vertex, and every cached quantity.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Every integrator of the registry against the path tracer, on small scenes that each exercise something of their own:
  * diffuse light and textures, glossy metal, smooth glass, rough glass, shading normals, light from infinity.

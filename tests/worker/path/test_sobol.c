@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Low-discrepancy samples: the generator matrices are those of the named polynomials, every elementary interval holds its share,
  * each number alone is uniform, halves of a block, pixels and replicates are independent, and means are those of independent

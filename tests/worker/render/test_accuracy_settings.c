@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Settings that trade accuracy for time: the spelling that a plan holds comes back as it is, everything else is refused, and each
  * reaches what works by it. */
 #include "tests/support/worlds.h"

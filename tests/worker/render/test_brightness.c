@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* The map of brightness: what is known shows, what a firefly made is spread. */
 #include "worker/render/brightness.h"
 

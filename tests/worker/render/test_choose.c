@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Which integrator a scene calls for: scenes whose light is easy and hard to find, the rule itself, and the same choice twice. */
 #include "tests/support/worlds.h"
 #include "worker/render/choose.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Groups are independent replicates, or the error that their spread tells is none (docs/design.md, rules 2). The linker puts a wrapper
  * around the random number generator (Makefile), which notes all numbers that a lease asks for: no two groups ask for the same

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Settings that must not bias, one at a time: mutations leave bdpt's distribution of paths as it is (tests/support/stationary.h),
  * and images by fewer wavelengths are those by four (tests/support/agree.h).

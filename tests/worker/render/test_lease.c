@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Leases: results that depend on plan and key alone, in any order; stopping; what comes from outside refused; a crop's pixels;
  * memory that runs out; and the film of one lease.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What leases say besides pixels. Classes of paths: every technique that makes a path gives it the same class; path, bdpt, and the
  * chains of pssmlt and hslt find the same energy in each class. Moments: what they say of a tile is what the film says of it.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What is a mixture of mutations: the spelling that a plan holds comes back as it is, everything else is refused. */
 #include "worker/render/render.h"
 

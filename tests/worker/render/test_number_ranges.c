@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Every number of every table of plug-ins has a range. What is beyond is refused with file, line, value and range; its ends
  * and what lies between render without an invalid operation, or are refused with a place by a rule of their own (two numbers that

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Whole scenes with one to three of their numbers made extreme (tests/support/scene_numbers.h): each is refused with its place,
  * file and line, or rendered by every integrator without an invalid operation. Each in a process of its own, which no signal

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Every bad input is answered with an error that names the place, and what would be right where that is known. */
 #include "common/base/mem.h"
 #include "tests/support/memory_assets.h"

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What leniency puts in the place of what is not supported: every stand-in is a plug-in of its class that there is. */
 #include "worker/render/render.h"
 #include "worker/scene/lenient.h"

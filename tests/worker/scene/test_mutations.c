@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Valid files, damaged at random (fixed seed): the readers answer with a result that holds what it promises, or with an
  * error that says something. Run under the sanitizers this is a small fuzzer; tests/fuzz has the large ones.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* Spectra in all spellings, search paths, and booleans as Python writes them. */
 #include "tests/support/memory_assets.h"
 #include "tests/support/scene_tables.h"

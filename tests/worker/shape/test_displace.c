@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Displaced meshes against what they stand for: no cracks whatever the base, the base itself at height 0, and positions,
  * normals and derivatives of normals that approach the analytic surface's at the expected order.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * PLY and serialized meshes: every layout of the same solid gives the same mesh; no prefix and no damaged byte of a file does
  * anything but give a mesh or a sentence.

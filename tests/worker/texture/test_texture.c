@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 #include "tests/support/nodes.h"
 #include "tests/support/pictures.h"
 #include "worker/texture/texture.h"

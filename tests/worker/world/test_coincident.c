@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What is said of shapes that coincide: which of two is there and why, by name; nothing where nobody can see it. And of shapes that
  * are too small beside others. */
 #include "tests/support/worlds.h"

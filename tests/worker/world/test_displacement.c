@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Displacement in scenes: what the reader takes and refuses, heights as bitmaps have them, the effect that is reported, the
  * same image at height zero, and that the integrators agree on displaced matter and displaced light.

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /* What scenes call for: reachability, the sentence that says why, and what is forced. Nothing is rendered. */
 #include "tests/support/worlds.h"
 

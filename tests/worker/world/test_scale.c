@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The same scene in other units and at other places. Factors of a power of two and moves that double can hold exactly give the
  * same rescaled world, so the same bits; others differ by roundings of the coordinates, 1e-16 of the distance from the origin
