@@ -127,7 +127,8 @@ static int check(struct checked_file *s, struct error *e)
 	return rc ? rc : want == crc ? 0 : error_set(e, EBADMSG, "%s: damaged", s->path);
 }
 
-int checked_file_open_heard(struct checked_file *s, const char *path, checked_file_heard *heard, void *user, struct error *e)
+int checked_file_open_heard(struct checked_file *s, const char *path, checked_file_heard *heard, void *user,
+			    struct error *e)
 {
 	int rc = open_file(s, path, O_RDONLY, e);
 	if (rc)

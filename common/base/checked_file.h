@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A file that is believed as a whole or not at all: bytes, and the CRC-32C of them behind. Written to its end and flushed before
- * it gets its name; read through once and checked before anything in it is used. Any thread, one at a time for a file. Numbers are
- * in the byte order of the machine.
+ * A file that is believed as a whole or not at all: bytes, and the CRC-32C of them behind. Written to its end and
+ * flushed before it gets its name; read through once and checked before anything in it is used. Any thread, one at a
+ * time for a file. Numbers are in the byte order of the machine.
  */
 #ifndef COMMON_BASE_CHECKED_FILE_H
 #define COMMON_BASE_CHECKED_FILE_H
@@ -18,12 +18,12 @@ typedef int checked_file_heard(void *user, size_t bytes, struct error *e);
 struct checked_file {
 	int fd;
 	uint32_t crc;
-	unsigned char *buffer; /* NULL: the file is closed */
-	size_t at, filled;     /* in the buffer: reading; bytes of the file that are in it */
-	uint64_t from;         /* reading: the buffer's end in the file */
-	uint64_t left, bytes; /* reading: until the CRC; writing: so far */
-	const char *path;     /* the caller's */
-	checked_file_heard *heard;  /* reading: NULL: nobody listens */
+	unsigned char *buffer;	   /* NULL: the file is closed */
+	size_t at, filled;	   /* in the buffer: reading; bytes of the file that are in it */
+	uint64_t from;		   /* reading: the buffer's end in the file */
+	uint64_t left, bytes;	   /* reading: until the CRC; writing: so far */
+	const char *path;	   /* the caller's */
+	checked_file_heard *heard; /* reading: NULL: nobody listens */
 	void *user;
 };
 
@@ -35,8 +35,10 @@ int checked_file_finish(struct checked_file *s, struct error *e);
 /* -EBADMSG: the CRC does not fit; -ENOENT. */
 int checked_file_open(struct checked_file *s, const char *path, struct error *e);
 /* The same; each byte is read twice in all, once to check it. */
-int checked_file_open_heard(struct checked_file *s, const char *path, checked_file_heard *heard, void *user, struct error *e);
-int checked_file_read(struct checked_file *s, void *bytes, size_t size, struct error *e); /* -EBADMSG: there is not so much */
+int checked_file_open_heard(struct checked_file *s, const char *path, checked_file_heard *heard, void *user,
+			    struct error *e);
+int checked_file_read(struct checked_file *s, void *bytes, size_t size,
+		      struct error *e);		 /* -EBADMSG: there is not so much */
 void checked_file_close(struct checked_file *s); /* at any time; what was being written has no seal then */
 
 #endif

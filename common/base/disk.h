@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The one door for file I/O of whatever must survive: the coordinator's spool, stores of blobs, files of films, sealed files. The
- * calls are the system's, with its conventions (-1 and errno), through a table that tests replace: by a disk that is full, fails, or
- * forgets at a loss of power what was not flushed. tests/lint/disk.sh holds the tree to it; SQLite has a door of its own (its
- * VFS). Any thread; disk_use before there is more than one. Allocates nothing.
+ * The one door for file I/O of whatever must survive: the coordinator's spool, stores of blobs, files of films, sealed
+ * files. The calls are the system's, with its conventions (-1 and errno), through a table that tests replace: by a disk
+ * that is full, fails, or forgets at a loss of power what was not flushed. tests/lint/disk.sh holds the tree to it;
+ * SQLite has a door of its own (its VFS). Any thread; disk_use before there is more than one. Allocates nothing.
  *
- * What a flush promises: the bytes and the length of this file. That its name is there is promised by a flush of its folder.
- * A flush that failed is never repeated: what it did not write may be forgotten, and the next one says that all is well.
+ * What a flush promises: the bytes and the length of this file. That its name is there is promised by a flush of its
+ * folder. A flush that failed is never repeated: what it did not write may be forgotten, and the next one says that all
+ * is well.
  */
 #ifndef COMMON_BASE_DISK_H
 #define COMMON_BASE_DISK_H

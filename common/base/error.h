@@ -14,7 +14,8 @@ struct error {
 	char text[1024];
 };
 
-/* Writes the sentence, clean as in text.h whatever is cut or quoted in it, and returns -errno_value. e may be NULL (the code alone is wanted). */
+/* Writes the sentence, clean as in text.h whatever is cut or quoted in it, and returns -errno_value. e may be NULL (the
+ * code alone is wanted). */
 __attribute__((format(printf, 3, 4))) int error_set(struct error *e, int errno_value, const char *format, ...);
 
 /* Puts "prefix: " before the sentence that is there already. Returns code unchanged. */

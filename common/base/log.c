@@ -23,7 +23,8 @@ static const struct {
 };
 
 /* What anybody who reaches the port can cause. */
-static const enum log_event limited[] = {LOG_PEER_ACCEPT, LOG_PEER_HELLO, LOG_PEER_REFUSED, LOG_PEER_CLOSED, LOG_PEER_FAULT, LOG_PEER_GARBLED};
+static const enum log_event limited[] = {LOG_PEER_ACCEPT, LOG_PEER_HELLO, LOG_PEER_REFUSED,
+					 LOG_PEER_CLOSED, LOG_PEER_FAULT, LOG_PEER_GARBLED};
 enum { LIMITED = sizeof limited / sizeof *limited };
 static struct log_bucket buckets[LIMITED];
 static pthread_mutex_t bucket_lock = PTHREAD_MUTEX_INITIALIZER;

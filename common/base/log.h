@@ -9,50 +9,50 @@
 
 #include <stddef.h>
 
-#define LOG_EVENTS(X) \
-	X(START, "start", INFO) \
-	X(LISTEN, "listen", INFO) \
-	X(LIMITS, "limits", INFO) \
-	X(STOP, "stop", INFO) \
-	X(LOG_WITHHELD, "log_withheld", WARN) \
-	X(ROOT, "runs_as_root", WARN) \
-	X(PEER_ACCEPT, "peer_accept", DEBUG) \
-	X(PEER_HELLO, "peer_hello", INFO) \
-	X(PEER_REFUSED, "peer_refused", WARN) \
-	X(PEER_CLOSED, "peer_closed", INFO) \
-	X(PEER_GARBLED, "peer_garbled", WARN) \
-	X(PEER_FAULT, "peer_fault", WARN) \
-	X(TLS_READ, "tls_read", INFO) \
-	X(TLS_FAULT, "tls_fault", ERROR) \
-	X(TLS_EXPIRY, "tls_expiry", WARN) \
-	X(CONNECT, "connect", INFO) \
-	X(CONNECT_FAILED, "connect_failed", WARN) \
-	X(JOB_SUBMIT, "job_submit", INFO) \
-	X(JOB_STATE, "job_state", INFO) \
-	X(JOB_NOTE, "job_note", INFO) \
-	X(JOB_DONE, "job_done", INFO) \
-	X(JOB_FAILED, "job_failed", ERROR) \
-	X(LEASE_GRANTED, "lease_granted", DEBUG) \
-	X(LEASE_TAKEN_BACK, "lease_taken_back", DEBUG) \
-	X(LEASE_FAILED, "lease_failed", WARN) \
-	X(BATCH_MERGED, "batch_merged", DEBUG) \
-	X(BATCH_STORED, "batch_stored", DEBUG) \
+#define LOG_EVENTS(X)                                      \
+	X(START, "start", INFO)                            \
+	X(LISTEN, "listen", INFO)                          \
+	X(LIMITS, "limits", INFO)                          \
+	X(STOP, "stop", INFO)                              \
+	X(LOG_WITHHELD, "log_withheld", WARN)              \
+	X(ROOT, "runs_as_root", WARN)                      \
+	X(PEER_ACCEPT, "peer_accept", DEBUG)               \
+	X(PEER_HELLO, "peer_hello", INFO)                  \
+	X(PEER_REFUSED, "peer_refused", WARN)              \
+	X(PEER_CLOSED, "peer_closed", INFO)                \
+	X(PEER_GARBLED, "peer_garbled", WARN)              \
+	X(PEER_FAULT, "peer_fault", WARN)                  \
+	X(TLS_READ, "tls_read", INFO)                      \
+	X(TLS_FAULT, "tls_fault", ERROR)                   \
+	X(TLS_EXPIRY, "tls_expiry", WARN)                  \
+	X(CONNECT, "connect", INFO)                        \
+	X(CONNECT_FAILED, "connect_failed", WARN)          \
+	X(JOB_SUBMIT, "job_submit", INFO)                  \
+	X(JOB_STATE, "job_state", INFO)                    \
+	X(JOB_NOTE, "job_note", INFO)                      \
+	X(JOB_DONE, "job_done", INFO)                      \
+	X(JOB_FAILED, "job_failed", ERROR)                 \
+	X(LEASE_GRANTED, "lease_granted", DEBUG)           \
+	X(LEASE_TAKEN_BACK, "lease_taken_back", DEBUG)     \
+	X(LEASE_FAILED, "lease_failed", WARN)              \
+	X(BATCH_MERGED, "batch_merged", DEBUG)             \
+	X(BATCH_STORED, "batch_stored", DEBUG)             \
 	X(BATCH_ACKNOWLEDGED, "batch_acknowledged", DEBUG) \
-	X(BATCH_RESTORED, "batch_restored", DEBUG) \
-	X(BATCH_TAKEN_BACK, "batch_taken_back", WARN) \
-	X(BATCH_REPEATED, "batch_repeated", INFO) \
-	X(BATCH_NOTED, "batch_noted", DEBUG) \
-	X(WORKER_WRONG, "worker_wrong", WARN) \
-	X(WORKER_ASIDE, "worker_aside", ERROR) \
-	X(WORKER_FORGIVEN, "worker_forgiven", INFO) \
-	X(BATCH_REFUSED, "batch_refused", WARN) \
-	X(BLOB_STORED, "blob_stored", DEBUG) \
-	X(WORLD_BUILT, "world_built", INFO) \
-	X(WORLD_FAILED, "world_failed", ERROR) \
-	X(PROCESS_LOST, "process_lost", ERROR) \
-	X(CHECKPOINT, "checkpoint", INFO) \
-	X(JOB_CLEARED, "job_cleared", INFO) \
-	X(SPOOL_READ, "spool_read", INFO) \
+	X(BATCH_RESTORED, "batch_restored", DEBUG)         \
+	X(BATCH_TAKEN_BACK, "batch_taken_back", WARN)      \
+	X(BATCH_REPEATED, "batch_repeated", INFO)          \
+	X(BATCH_NOTED, "batch_noted", DEBUG)               \
+	X(WORKER_WRONG, "worker_wrong", WARN)              \
+	X(WORKER_ASIDE, "worker_aside", ERROR)             \
+	X(WORKER_FORGIVEN, "worker_forgiven", INFO)        \
+	X(BATCH_REFUSED, "batch_refused", WARN)            \
+	X(BLOB_STORED, "blob_stored", DEBUG)               \
+	X(WORLD_BUILT, "world_built", INFO)                \
+	X(WORLD_FAILED, "world_failed", ERROR)             \
+	X(PROCESS_LOST, "process_lost", ERROR)             \
+	X(CHECKPOINT, "checkpoint", INFO)                  \
+	X(JOB_CLEARED, "job_cleared", INFO)                \
+	X(SPOOL_READ, "spool_read", INFO)                  \
 	X(SPOOL_FAULT, "spool_fault", ERROR)
 
 enum log_event {
@@ -75,8 +75,9 @@ struct log_value {
 /* "text" with quotes, and without control characters, cut to fit. */
 struct log_value log_quote(const char *text);
 
-/* Lines about connections come in rushes: of each such kind 100 at once and 5 a second are said, the others counted (log_limit.h; not
- * with LOG_LEVEL_DEBUG, where all are said). Called now and then it says how many of which kind that were. */
+/* Lines about connections come in rushes: of each such kind 100 at once and 5 a second are said, the others counted
+ * (log_limit.h; not with LOG_LEVEL_DEBUG, where all are said). Called now and then it says how many of which kind that
+ * were. */
 void log_tick(void);
 
 /* The line as log_event writes it, without the newline; for logs of jobs. Returns its length. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How many log lines of one kind are said: a bucket of tokens, one a line, filled again as time goes by. Pure: the caller has the
- * clock, and one bucket a kind.
+ * How many log lines of one kind are said: a bucket of tokens, one a line, filled again as time goes by. Pure: the
+ * caller has the clock, and one bucket a kind.
  */
 #ifndef COMMON_BASE_LOG_LIMIT_H
 #define COMMON_BASE_LOG_LIMIT_H

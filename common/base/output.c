@@ -14,7 +14,8 @@ static void check(int code, void *user)
 	errno = 0;
 	if (fflush(stdout) == 0 && !ferror(stdout))
 		return;
-	fprintf(stderr, "%s: stdout: %s\n", program_invocation_short_name, errno ? strerror(errno) : "it did not take all");
+	fprintf(stderr, "%s: stdout: %s\n", program_invocation_short_name,
+		errno ? strerror(errno) : "it did not take all");
 	_exit(code ? code : 1);
 }
 

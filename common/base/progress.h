@@ -10,9 +10,9 @@
 
 struct progress {
 	bool terminal, drawn;
-	double shown;      /* fraction of the last plain line; negative: none */
+	double shown;	   /* fraction of the last plain line; negative: none */
 	double shown_time; /* s */
-	char state[32];    /* of the last plain line */
+	char state[32];	   /* of the last plain line */
 };
 
 void progress_start(struct progress *p);

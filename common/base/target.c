@@ -11,7 +11,8 @@
 
 enum { LINKS_MOST = 40 };
 
-/* As /dev/fd/3 and /dev/stdout lead to: opened anew such a file would be written from its beginning. Negative: it is none. */
+/* As /dev/fd/3 and /dev/stdout lead to: opened anew such a file would be written from its beginning. Negative: it is
+ * none. */
 static int own_descriptor(const char *path)
 {
 	char folder[TARGET_PATH], real[PATH_MAX], own[64];
@@ -71,6 +72,7 @@ int target_find(struct target *t, const char *path, struct error *e)
 
 int target_open(const struct target *t, struct error *e)
 {
-	int fd = t->descriptor >= 0 ? fcntl(t->descriptor, F_DUPFD_CLOEXEC, 0) : open(t->path, O_WRONLY | O_NOCTTY | O_CLOEXEC);
+	int fd = t->descriptor >= 0 ? fcntl(t->descriptor, F_DUPFD_CLOEXEC, 0)
+				    : open(t->path, O_WRONLY | O_NOCTTY | O_CLOEXEC);
 	return fd < 0 ? error_set(e, errno, "%s: cannot write there: %s", t->path, strerror(errno)) : fd;
 }

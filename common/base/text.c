@@ -78,7 +78,8 @@ void text_copy(char *out, size_t size, const char *from)
 }
 
 /* The length of what is there; cut: not all of it. */
-__attribute__((format(printf, 4, 0))) static size_t print(char *out, size_t size, bool *cut, const char *format, va_list ap)
+__attribute__((format(printf, 4, 0))) static size_t print(char *out, size_t size, bool *cut, const char *format,
+							  va_list ap)
 {
 	int n = vsnprintf(out, size, format, ap);
 	size_t used = n < 0 ? 0 : (size_t)n;

@@ -24,8 +24,8 @@ char *text_borrow(const char *text);
 bool text_ratio(const char *text, double *ratio);
 bool text_share(const char *text, double *share);
 
-/* "1000", "1.5k", "2M", "1G": a whole number, by powers of 1000. "90", "90s", "5m", "2h", "1d": seconds. false: none of these, or
- * the number is not finite, negative, or not whole. */
+/* "1000", "1.5k", "2M", "1G": a whole number, by powers of 1000. "90", "90s", "5m", "2h", "1d": seconds. false: none of
+ * these, or the number is not finite, negative, or not whole. */
 bool text_count(const char *text, uint64_t *count);
 bool text_seconds(const char *text, double *seconds);
 

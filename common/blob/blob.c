@@ -18,15 +18,16 @@ struct entry {
 	struct blob_hash hash;
 	uint64_t size, used; /* used: a counter that grows with every use */
 	unsigned holds;
-	double checked; /* when its bytes were last found to be right, s on a clock that never goes back; 0: not in this life */
-	bool gone;      /* or damaged: it is as if it were not there, but for its holds */
+	double checked; /* when its bytes were last found to be right, s on a clock that never goes back; 0: not in this
+			   life */
+	bool gone;	/* or damaged: it is as if it were not there, but for its holds */
 };
 
 struct blob_store {
 	char *folder;
 	uint64_t limit, bytes, clock;
-	uint64_t promised; /* to writers that are open */
-	uint64_t temporary; /* number of the last temporary file */
+	uint64_t promised;     /* to writers that are open */
+	uint64_t temporary;    /* number of the last temporary file */
 	struct entry *entries; /* by hash */
 	size_t count, capacity;
 };
@@ -250,8 +251,9 @@ int blob_store_open(struct blob_store **out, const char *folder, uint64_t limit,
 		return error_set(e, ENOMEM, "no memory for a blob store");
 	}
 	s->limit = limit;
-	int rc = strlen(folder) < PATH_MOST - 2 * BLOB_HEX_SIZE ? disk_make_folder(folder, e)
-								: error_set(e, ENAMETOOLONG, "%s: the name is too long", folder);
+	int rc = strlen(folder) < PATH_MOST - 2 * BLOB_HEX_SIZE
+			 ? disk_make_folder(folder, e)
+			 : error_set(e, ENAMETOOLONG, "%s: the name is too long", folder);
 	if (!rc)
 		rc = read_folder(s, e);
 	if (rc)
@@ -345,7 +347,9 @@ static int hash_file(const char *path, struct blob_hash *out, struct error *e)
 	bool ok = bytes && md && EVP_DigestInit_ex(md, EVP_sha256(), NULL) == 1;
 	while (ok && ((n = disk_read(fd, bytes, PIECE)) > 0 || (n < 0 && errno == EINTR)))
 		ok = n < 0 || EVP_DigestUpdate(md, bytes, (size_t)n) == 1;
-	int rc = !ok ? error_set(e, ENOMEM, "no memory to check %s", path) : n < 0 ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	int rc = !ok	 ? error_set(e, ENOMEM, "no memory to check %s", path)
+		 : n < 0 ? error_set(e, errno, "%s: %s", path, strerror(errno))
+			 : 0;
 	if (!rc && EVP_DigestFinal_ex(md, out->bytes, NULL) != 1)
 		rc = error_set(e, EIO, "SHA-256 failed");
 	EVP_MD_CTX_free(md);

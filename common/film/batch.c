@@ -52,7 +52,8 @@ static int check_key(const struct lease_key *k, const struct plan *p, struct err
 		return error_set(e, EBADMSG, "no group %u with a part %u in this plan", k->group, k->part);
 	uint64_t epochs = k->kind == LEASE_BOOTSTRAP ? 1 : p->rounds;
 	if (k->epoch >= epochs)
-		return error_set(e, EBADMSG, "epoch %llu of %llu", (unsigned long long)k->epoch, (unsigned long long)epochs);
+		return error_set(e, EBADMSG, "epoch %llu of %llu", (unsigned long long)k->epoch,
+				 (unsigned long long)epochs);
 	return 0;
 }
 
@@ -83,8 +84,8 @@ static int check_tiles(const struct batch *b, const struct plan *p, struct error
 		uint32_t w = p->crop_width - x < TILE_SIZE ? p->crop_width - x : TILE_SIZE;
 		uint32_t h = p->crop_height - y < TILE_SIZE ? p->crop_height - y : TILE_SIZE;
 		if (x % TILE_SIZE || y % TILE_SIZE || t->width != w || t->height != h || !t->xyz)
-			return error_set(e, EBADMSG, "a tile of %ux%u at %u,%u is not one of the film's", t->width, t->height,
-					 t->x, t->y);
+			return error_set(e, EBADMSG, "a tile of %ux%u at %u,%u is not one of the film's", t->width,
+					 t->height, t->x, t->y);
 		int64_t index = (int64_t)(y / TILE_SIZE) * across + x / TILE_SIZE;
 		if (index <= last)
 			return error_set(e, EBADMSG, "the tile at %u,%u comes twice or out of order", t->x, t->y);
@@ -129,7 +130,8 @@ static int check_weights(const struct batch *b, const struct plan *p, struct err
 /* Sums of the same terms in another order, rounded to float here and there. */
 #define ROUNDING (1 + 1e-6)
 
-/* Far more of anything than a sample can count: rays of a path of 128 edges joined with each other, refused contributions. */
+/* Far more of anything than a sample can count: rays of a path of 128 edges joined with each other, refused
+ * contributions. */
 #define PER_SAMPLE 0x1p20
 
 static int check_absurd(const struct batch *b, const struct plan *p, uint64_t samples, struct error *e)
@@ -138,7 +140,8 @@ static int check_absurd(const struct batch *b, const struct plan *p, uint64_t sa
 	bool chains = p->kind == PLAN_CHAINS && b->key.kind == LEASE_RENDER;
 	for (int i = 0; i < BATCH_COUNTERS; i++)
 		if (c[i] >> 56 || (i != COUNT_LONGEST_STUCK && !((double)c[i] <= ((double)samples + 1) * PER_SAMPLE)))
-			return error_set(e, EBADMSG, "counter %d is %llu, more than a lease can count", i, (unsigned long long)c[i]);
+			return error_set(e, EBADMSG, "counter %d is %llu, more than a lease can count", i,
+					 (unsigned long long)c[i]);
 	uint64_t most = chains ? (b->key.epoch + 1) * p->epoch : 0;
 	if (c[COUNT_LONGEST_STUCK] > most)
 		return error_set(e, EBADMSG, "%llu rejections in a row after %llu mutations of a chain",
@@ -146,8 +149,8 @@ static int check_absurd(const struct batch *b, const struct plan *p, uint64_t sa
 	return 0;
 }
 
-/* n terms, none of them negative: their sum and the sum of their squares, Cauchy and Schwarz's inequality, and float's range, which
- * no sample exceeds. Squares may have been lost below double's range. */
+/* n terms, none of them negative: their sum and the sum of their squares, Cauchy and Schwarz's inequality, and float's
+ * range, which no sample exceeds. Squares may have been lost below double's range. */
 static int check_sums(const struct batch *b, struct error *e)
 {
 	const double sums[] = {b->independent_sum, b->independent_square, b->beyond_sum, b->cpu_seconds};
@@ -158,7 +161,8 @@ static int check_sums(const struct batch *b, struct error *e)
 	if (!(sum <= n * (double)FLT_MAX * ROUNDING))
 		return error_set(e, EBADMSG, "%g independent samples add up to %g", n, sum);
 	if (!(sum * sum <= n * (square * ROUNDING + DBL_MIN)) || !(square <= sum * sum * ROUNDING + n * DBL_MIN))
-		return error_set(e, EBADMSG, "%g independent samples add up to %g and their squares to %g", n, sum, square);
+		return error_set(e, EBADMSG, "%g independent samples add up to %g and their squares to %g", n, sum,
+				 square);
 	if (b->key.kind != LEASE_BOOTSTRAP)
 		return 0;
 	double weights = 0;
@@ -181,9 +185,10 @@ static int check_counts(const struct batch *b, const struct plan *p, uint64_t li
 	else
 		samples = (rows.end - rows.begin) * (p->crop_width + 2 * (uint64_t)p->border) * p->epoch;
 	if (b->key.kind == LEASE_BOOTSTRAP ? c[COUNT_INDEPENDENT] != samples : c[COUNT_SAMPLES] != samples)
-		return error_set(e, EBADMSG, "%llu samples where the plan has %llu",
-				 (unsigned long long)c[b->key.kind == LEASE_BOOTSTRAP ? COUNT_INDEPENDENT : COUNT_SAMPLES],
-				 (unsigned long long)samples);
+		return error_set(
+			e, EBADMSG, "%llu samples where the plan has %llu",
+			(unsigned long long)c[b->key.kind == LEASE_BOOTSTRAP ? COUNT_INDEPENDENT : COUNT_SAMPLES],
+			(unsigned long long)samples);
 	if (c[COUNT_SAMPLES] > samples || c[COUNT_INDEPENDENT] > samples || c[COUNT_ACCEPTED] > samples ||
 	    c[COUNT_STUCK] > b->state_count || c[COUNT_STATES_LOST] > b->state_count)
 		return error_set(e, EBADMSG, "more accepted, independent, stuck or lost than there are");
@@ -197,13 +202,15 @@ static int check_strategies(const struct batch *b, const struct plan *p, struct 
 	bool has = b->key.kind == LEASE_RENDER;
 	int expected = has ? plan_strategy_count(p->mutations) : 0;
 	if (b->strategy_count != 0 && (int64_t)b->strategy_count != expected)
-		return error_set(e, EBADMSG, "counters of %u strategies where the plan has %d", b->strategy_count, expected);
+		return error_set(e, EBADMSG, "counters of %u strategies where the plan has %d", b->strategy_count,
+				 expected);
 	for (uint32_t i = 0; i < b->strategy_count; i++) {
 		const uint64_t *c = b->strategy[i];
 		for (int k = 0; k < STRATEGY_COUNTERS; k++)
-			if (c[k] >> 56 || ((k == STRATEGY_ACCEPTED || k >= STRATEGY_FAIL_FIRST) && c[k] > c[STRATEGY_PROPOSED]))
-				return error_set(e, EBADMSG, "counter %d of strategy %u is %llu of %llu proposals", k, i,
-						 (unsigned long long)c[k], (unsigned long long)c[STRATEGY_PROPOSED]);
+			if (c[k] >> 56 ||
+			    ((k == STRATEGY_ACCEPTED || k >= STRATEGY_FAIL_FIRST) && c[k] > c[STRATEGY_PROPOSED]))
+				return error_set(e, EBADMSG, "counter %d of strategy %u is %llu of %llu proposals", k,
+						 i, (unsigned long long)c[k], (unsigned long long)c[STRATEGY_PROPOSED]);
 		uint64_t ended = c[STRATEGY_ACCEPTED];
 		for (int k = STRATEGY_FAIL_FIRST; k < STRATEGY_COUNTERS; k++)
 			ended += c[k];
@@ -214,8 +221,8 @@ static int check_strategies(const struct batch *b, const struct plan *p, struct 
 		accepted += c[STRATEGY_ACCEPTED];
 	}
 	if (accepted > b->counters[COUNT_ACCEPTED])
-		return error_set(e, EBADMSG, "%llu accepted proposals in %llu accepted mutations", (unsigned long long)accepted,
-				 (unsigned long long)b->counters[COUNT_ACCEPTED]);
+		return error_set(e, EBADMSG, "%llu accepted proposals in %llu accepted mutations",
+				 (unsigned long long)accepted, (unsigned long long)b->counters[COUNT_ACCEPTED]);
 	if (proposed > b->counters[COUNT_SAMPLES])
 		return error_set(e, EBADMSG, "%llu proposals in %llu mutations", (unsigned long long)proposed,
 				 (unsigned long long)b->counters[COUNT_SAMPLES]);
@@ -241,10 +248,11 @@ static int check_classes(const struct batch *b, const struct plan *p, struct err
 
 static int check_moments(const struct batch *b, const struct plan *p, struct error *e)
 {
-	uint64_t expected = batch_moment_count(p, b->key.kind), tiles = batch_film_tiles(p), sequences = batch_sequences(p);
+	uint64_t expected = batch_moment_count(p, b->key.kind), tiles = batch_film_tiles(p),
+		 sequences = batch_sequences(p);
 	if (b->moment_count != expected || (expected && !b->moments))
-		return error_set(e, EBADMSG, "%llu moments where there should be %llu", (unsigned long long)b->moment_count,
-				 (unsigned long long)expected);
+		return error_set(e, EBADMSG, "%llu moments where there should be %llu",
+				 (unsigned long long)b->moment_count, (unsigned long long)expected);
 	if (expected == 0)
 		return 0;
 	for (uint64_t i = 0; i < expected; i++)

@@ -19,9 +19,9 @@
 #define VALUE_MOST 0x1p61
 
 enum {
-	CHAIN_EXPONENT = -32,  /* a chain adds about 1 a mutation: 2^30 of them fit into one pixel */
-	SAMPLE_BITS = 28,      /* below a group's mean pixel sum in one round */
-	BLACK_BITS = 40,       /* below the brightest sample */
+	CHAIN_EXPONENT = -32, /* a chain adds about 1 a mutation: 2^30 of them fit into one pixel */
+	SAMPLE_BITS = 28,     /* below a group's mean pixel sum in one round */
+	BLACK_BITS = 40,      /* below the brightest sample */
 	EXPONENT_MOST = 900,
 };
 
@@ -71,7 +71,8 @@ static int map_sums(struct canvas *c, const char *folder, struct error *e)
 			return c->fd;
 		if (disk_ftruncate(c->fd, (off_t)c->bytes) != 0) {
 			int code = errno;
-			return error_set(e, code, "%s: a file of %zu bytes for the films: %s", folder, c->bytes, strerror(code));
+			return error_set(e, code, "%s: a file of %zu bytes for the films: %s", folder, c->bytes,
+					 strerror(code));
 		}
 		flags = MAP_SHARED;
 	}
@@ -119,7 +120,8 @@ int canvas_new(struct canvas **out, const struct plan *p, int grid_exponent, con
 	c->bound = mem_alloc(films, sizeof *c->bound);
 	c->has = mem_alloc((size_t)(1 + OPEN_ROUNDS) * p->groups * p->parts, 1);
 	c->missing = mem_alloc((size_t)p->groups * p->parts, sizeof *c->missing);
-	int rc = c->flags && c->bound && c->has && c->missing ? map_sums(c, folder, e) : error_set(e, ENOMEM, "no memory for the films");
+	int rc = c->flags && c->bound && c->has && c->missing ? map_sums(c, folder, e)
+							      : error_set(e, ENOMEM, "no memory for the films");
 	if (rc == 0)
 		rc = moments_new(&c->moments, p, e);
 	if (rc) {
@@ -263,8 +265,9 @@ int canvas_admits(const struct canvas *c, const struct batch *b, struct error *e
 		const struct tile *t = &b->tiles[i];
 		double most = (double)largest(t);
 		if (!(most <= limit))
-			return error_set(e, chains ? EBADMSG : ERANGE, "a pixel of %g in the tile at %u,%u, and at most %g fit into one lease",
-					 most, t->x, t->y, limit);
+			return error_set(e, chains ? EBADMSG : ERANGE,
+					 "a pixel of %g in the tile at %u,%u, and at most %g fit into one lease", most,
+					 t->x, t->y, limit);
 	}
 	return 0;
 }
@@ -285,8 +288,8 @@ static void add_row(int64_t *s, const float *v, size_t count, double scale, bool
 	}
 }
 
-/* Adds (sign 1) or takes back (sign -1) a tile. False: a value is off the grid, nothing was done. Each |sum| was at most
- * SUM_MOST and a value is less than VALUE_MOST: their sum is a number, if one too large, and *bound tells. */
+/* Adds (sign 1) or takes back (sign -1) a tile. False: a value is off the grid, nothing was done. Each |sum| was at
+ * most SUM_MOST and a value is less than VALUE_MOST: their sum is a number, if one too large, and *bound tells. */
 static bool add_tile(const struct canvas *c, int64_t *slot, const struct tile *t, double sign, uint64_t *bound)
 {
 	double most = (double)largest(t) * c->scale;
@@ -421,7 +424,8 @@ static void tally_batch(struct tally *t, const struct batch *b)
 	uint32_t g = b->key.group;
 	t->group[g].samples += b->counters[COUNT_SAMPLES];
 	t->group[g].independent += b->counters[COUNT_INDEPENDENT];
-	bool finite = exact_sum_add(&t->group[g].sum, b->independent_sum) && exact_sum_add(&t->group[g].beyond, b->beyond_sum);
+	bool finite = exact_sum_add(&t->group[g].sum, b->independent_sum) &&
+		      exact_sum_add(&t->group[g].beyond, b->beyond_sum);
 	assert(finite); /* batch_check */
 	(void)finite;
 }
@@ -437,7 +441,8 @@ static void tally_take_back(struct tally *t, const struct batch *b)
 			t->counts.strategy[i][k] -= b->strategy[i][k];
 	t->group[g].samples -= b->counters[COUNT_SAMPLES];
 	t->group[g].independent -= b->counters[COUNT_INDEPENDENT];
-	bool finite = exact_sum_add(&t->group[g].sum, -b->independent_sum) && exact_sum_add(&t->group[g].beyond, -b->beyond_sum);
+	bool finite = exact_sum_add(&t->group[g].sum, -b->independent_sum) &&
+		      exact_sum_add(&t->group[g].beyond, -b->beyond_sum);
 	assert(finite); /* as when it was added */
 	(void)finite;
 }
@@ -486,9 +491,10 @@ int canvas_add(struct canvas *c, const struct batch *b, struct error *e)
 	}
 	uint32_t *missing = missing_of(c, k);
 	bool closed = is_closed(c, k);
-	if (k->epoch >= c->rounds + OPEN_ROUNDS || k->epoch >= c->plan.rounds || (*missing && k->epoch != c->rounds - *missing))
-		return error_set(e, EAGAIN, "round %llu is not open yet: %llu are complete", (unsigned long long)k->epoch,
-				 (unsigned long long)c->rounds);
+	if (k->epoch >= c->rounds + OPEN_ROUNDS || k->epoch >= c->plan.rounds ||
+	    (*missing && k->epoch != c->rounds - *missing))
+		return error_set(e, EAGAIN, "round %llu is not open yet: %llu are complete",
+				 (unsigned long long)k->epoch, (unsigned long long)c->rounds);
 	int rc = moments_fit(c->moments, k, e);
 	if (rc == 0)
 		rc = add_tiles(c, b, e);

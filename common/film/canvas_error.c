@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The error of an image and what its relMSE is summed from, by the spread between groups: standard errors of pixels; weights,
- * 1 / (B^2 + (0.01 m)^2), with brightnesses B that are no noisier than need be; sums of weighted errors, with bounds. What is made of
- * the sums is canvas_interval.c's. All loops run in a fixed order over exact inputs, so that equal films give equal bits.
+ * The error of an image and what its relMSE is summed from, by the spread between groups: standard errors of pixels;
+ * weights, 1 / (B^2 + (0.01 m)^2), with brightnesses B that are no noisier than need be; sums of weighted errors, with
+ * bounds. What is made of the sums is canvas_interval.c's. All loops run in a fixed order over exact inputs, so that
+ * equal films give equal bits.
  */
 #include "common/film/canvas_private.h"
 #include "common/film/color.h"
@@ -18,7 +19,8 @@ enum { FOLDED = ERROR_FOLDED, VALUES = 3 * PLAN_MAX_GROUPS, BASE_GROUPS = 8 };
 /* Squared relative standard error below which a brightness is believed. */
 static const double believed = 0.08;
 
-/* A kurtosis above this share of the groups: one of them has most of the pixel's variance. One alone would have nearly 1. */
+/* A kurtosis above this share of the groups: one of them has most of the pixel's variance. One alone would have
+ * nearly 1. */
 static const double one_group = 0.6;
 
 /* A tile at work. Rows of `apart` hold three channels of `groups` values. */
@@ -26,12 +28,14 @@ struct tile_error {
 	const struct canvas *c;
 	uint32_t groups, x, y, width, height; /* the tile's place and size in the crop */
 	double floor_square;
-	bool lit;                             /* chains, and some came to the tile */
-	double mean_square[3];                /* over the tile's pixels */
-	float *apart;                         /* [height][width][3][groups]: a group's image less the groups' mean */
-	double brightness[TILE_SIZE * TILE_SIZE][3], square[TILE_SIZE * TILE_SIZE][3]; /* of the mean: value, variance */
-	double base[TILE_SIZE * TILE_SIZE][3], base_square[TILE_SIZE * TILE_SIZE][3]; /* trimmed mean: value, variance */
-	double kurtosis[TILE_SIZE * TILE_SIZE][3]; /* of the groups' values */
+	bool lit;	       /* chains, and some came to the tile */
+	double mean_square[3]; /* over the tile's pixels */
+	float *apart;	       /* [height][width][3][groups]: a group's image less the groups' mean */
+	double brightness[TILE_SIZE * TILE_SIZE][3],
+		square[TILE_SIZE * TILE_SIZE][3]; /* of the mean: value, variance */
+	double base[TILE_SIZE * TILE_SIZE][3],
+		base_square[TILE_SIZE * TILE_SIZE][3]; /* trimmed mean: value, variance */
+	double kurtosis[TILE_SIZE * TILE_SIZE][3];     /* of the groups' values */
 	bool settled[TILE_SIZE * TILE_SIZE][3];
 	struct error_sums sum;
 };
@@ -50,7 +54,8 @@ static void pixel_error(struct making *m, struct tile_error *t, const int64_t *c
 	double rgb[3][PLAN_MAX_GROUPS];
 	for (uint32_t g = 0; g < groups; g++) {
 		const int64_t *s = slot[g] + at;
-		double xyz[3] = {(double)s[0] * m->factor[g], (double)s[1] * m->factor[g], (double)s[2] * m->factor[g]}, out[3];
+		double xyz[3] = {(double)s[0] * m->factor[g], (double)s[1] * m->factor[g], (double)s[2] * m->factor[g]},
+		       out[3];
 		rec709_from_xyz(xyz, out);
 		for (int k = 0; k < 3; k++)
 			rgb[k][g] = out[k];
@@ -95,7 +100,8 @@ static void tile_errors(struct making *m, struct tile_error *t)
 	}
 	for (uint32_t y = 0; y < t->height; y++)
 		for (uint32_t x = 0; x < t->width; x++) {
-			size_t pixel = (size_t)y * t->width + x, out = ((size_t)(t->y + y) * m->img->width + t->x + x) * 3;
+			size_t pixel = (size_t)y * t->width + x,
+			       out = ((size_t)(t->y + y) * m->img->width + t->x + x) * 3;
 			pixel_error(m, t, slot, (size_t)y * SLOT_ROW + (size_t)x * TILE_CHANNELS, pixel);
 			for (size_t k = 0; k < 3; k++) {
 				t->brightness[pixel][k] = (double)m->img->rgb[out + k];
@@ -112,13 +118,14 @@ static void tile_errors(struct making *m, struct tile_error *t)
 /* A square of pixels: sums over all of them, and over those that wait for a weight. */
 struct block {
 	uint32_t pixels, waiting[3];
-	double all[3], open[3];                       /* of the mean */
-	double rare[3], open_rare[3];                 /* of the mean less the base */
+	double all[3], open[3];			      /* of the mean */
+	double rare[3], open_rare[3];		      /* of the mean less the base */
 	double all_apart[VALUES], open_apart[VALUES]; /* [3][groups] */
 };
 
-/* What the errors are divided by, squared. B's own noise makes 1 / B^2 too large by three of its variances, less two because
- * errors are largest where B came out too bright, if brightness comes in hits: `variances` are 1, or 3 where they are apart. */
+/* What the errors are divided by, squared. B's own noise makes 1 / B^2 too large by three of its variances, less two
+ * because errors are largest where B came out too bright, if brightness comes in hits: `variances` are 1, or 3 where
+ * they are apart. */
 static double divisor_square(const struct tile_error *t, double brightness, double square, double variances)
 {
 	return brightness * brightness + t->floor_square + variances * square;
@@ -137,9 +144,9 @@ static void add_share(struct tile_error *t, double part, double brightness, doub
 	t->sum.doubt += slope * slope * square;
 }
 
-/* The pixel's part of the relMSE with each group's deviation over the brightness that the other groups found: no sample is divided
- * by the brightness that it makes itself. As large as the part can reasonably be, since light that came to one group only is
- * missing in all its divisors. */
+/* The pixel's part of the relMSE with each group's deviation over the brightness that the other groups found: no sample
+ * is divided by the brightness that it makes itself. As large as the part can reasonably be, since light that came to
+ * one group only is missing in all its divisors. */
 static double by_others(const struct tile_error *t, size_t pixel, size_t k)
 {
 	const float *apart = apart_at(t, pixel) + k * t->groups;
@@ -152,8 +159,8 @@ static double by_others(const struct tile_error *t, size_t pixel, size_t k)
 	return sum / n / (n - 1);
 }
 
-/* Bounds of a part of the relMSE, and what makes it doubtful. The lower bound: over the brightness that the pixel has, all fireflies
- * in it. */
+/* Bounds of a part of the relMSE, and what makes it doubtful. The lower bound: over the brightness that the pixel has,
+ * all fireflies in it. */
 static void add_bounds(struct tile_error *t, size_t pixel, size_t k, double part, double high)
 {
 	double square = t->square[pixel][k];
@@ -164,13 +171,14 @@ static void add_bounds(struct tile_error *t, size_t pixel, size_t k, double part
 		t->sum.one_group += part;
 }
 
-/* By the pixel's own brightness. Where it is believed, a group's errors are divided by the brightness that the other groups found,
- * to second order: what errors and brightness have in common is taken out, however clumped they come. */
+/* By the pixel's own brightness. Where it is believed, a group's errors are divided by the brightness that the other
+ * groups found, to second order: what errors and brightness have in common is taken out, however clumped they come. */
 static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool believed_in)
 {
 	double brightness = t->brightness[pixel][k], square = t->square[pixel][k];
 	double divisor = divisor_square(t, brightness, square, believed_in ? 3 : 1);
-	float root = (float)(1 / sqrt(divisor)), slope = believed_in ? (float)(brightness / divisor / (t->groups - 1)) : 0;
+	float root = (float)(1 / sqrt(divisor)),
+	      slope = believed_in ? (float)(brightness / divisor / (t->groups - 1)) : 0;
 	float *apart = apart_at(t, pixel) + k * t->groups;
 	add_bounds(t, pixel, k, square / divisor, believed_in ? by_others(t, pixel, k) : square / divisor);
 	for (uint32_t g = 0; g < t->groups; g++) {
@@ -201,8 +209,8 @@ static double noise_around(const struct tile_error *t, uint32_t x, uint32_t y, s
 	return sum / n;
 }
 
-/* A pixel keeps its own brightness where its neighbourhood is believed: by itself alone, those that came out bright would keep it
- * and those that came out dark would not. Or where it is out of doubt, whatever is beside it. */
+/* A pixel keeps its own brightness where its neighbourhood is believed: by itself alone, those that came out bright
+ * would keep it and those that came out dark would not. Or where it is out of doubt, whatever is beside it. */
 static uint32_t find_settled(struct tile_error *t)
 {
 	uint32_t waiting = 0;
@@ -228,9 +236,10 @@ static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, 
 }
 
 /*
- * Standard errors of the tile's pixels. Where the brightness is not believed a variance from few groups is mostly too small, since
- * what comes in bursts has not come yet: it is averaged with its neighbours'. A pixel that chains never visited has a variance
- * of 0, which would be a claim; it gets that of its neighbours, of its tile, or (write_unvisited) of the image.
+ * Standard errors of the tile's pixels. Where the brightness is not believed a variance from few groups is mostly too
+ * small, since what comes in bursts has not come yet: it is averaged with its neighbours'. A pixel that chains never
+ * visited has a variance of 0, which would be a claim; it gets that of its neighbours, of its tile, or
+ * (write_unvisited) of the image.
  */
 static void write_errors(struct making *m, const struct tile_error *t)
 {
@@ -243,7 +252,8 @@ static void write_errors(struct making *m, const struct tile_error *t)
 					around = (own + square_around(t, x, y, k)) / 2;
 				if (around == 0 && t->lit)
 					around = t->mean_square[k];
-				m->img->error[((size_t)(t->y + y) * m->img->width + t->x + x) * 3 + k] = (float)sqrt(around);
+				m->img->error[((size_t)(t->y + y) * m->img->width + t->x + x) * 3 + k] =
+					(float)sqrt(around);
 			}
 }
 
@@ -255,8 +265,8 @@ static double spread_square(const double *apart, uint32_t groups, double pixels)
 	return square / (pixels * pixels) / groups / (groups - 1);
 }
 
-/* Where the groups agree about a pixel but for a few, its brightness is theirs, and what the few found is spread over the block:
- * `rare` a pixel, with the variance `square`. A wall beside a lamp keeps its darkness so. */
+/* Where the groups agree about a pixel but for a few, its brightness is theirs, and what the few found is spread over
+ * the block: `rare` a pixel, with the variance `square`. A wall beside a lamp keeps its darkness so. */
 static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double rare, double square)
 {
 	double base = t->base[pixel][k] + rare, doubt = t->base_square[pixel][k] + square;
@@ -272,10 +282,11 @@ static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double 
 }
 
 /*
- * The block's weight for what waits in it. Its brightness is the mean of all its pixels: those without a firefly count as
- * those with one. But pixels that were believed and are more than twice as bright as what waits, a lamp beside a wall, are
- * something else and are left out. And a pixel that is brighter than the block by 1.5 of its standard errors has met its light in
- * three groups or more: that is no firefly (which is one standard error high) but a glint, and keeps its own brightness.
+ * The block's weight for what waits in it. Its brightness is the mean of all its pixels: those without a firefly count
+ * as those with one. But pixels that were believed and are more than twice as bright as what waits, a lamp beside a
+ * wall, are something else and are left out. And a pixel that is brighter than the block by 1.5 of its standard errors
+ * has met its light in three groups or more: that is no firefly (which is one standard error high) but a glint, and
+ * keeps its own brightness.
  */
 static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32_t x, uint32_t y, uint32_t size)
 {
@@ -316,7 +327,8 @@ static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32
 	memset(b->open_apart + k * t->groups, 0, t->groups * sizeof *b->open_apart);
 }
 
-/* Mean and its variance without the eighth of the groups that lie farthest from the others: the brightness without fireflies. */
+/* Mean and its variance without the eighth of the groups that lie farthest from the others: the brightness without
+ * fireflies. */
 static void find_base(struct tile_error *t, size_t pixel, size_t k)
 {
 	double d[PLAN_MAX_GROUPS], mean = 0, square = 0;
@@ -414,8 +426,8 @@ static void fold(struct tile_error *t, uint32_t first, const float *apart, float
 		t->sum.distance[first + g] += (double)v[g] * (double)v[g];
 }
 
-/* Products of the groups' weighted errors. More than FOLDED groups are folded onto so many: errors that add up are alike. A
- * lane is a pair of groups, so that the order within a sum is the pixels'. */
+/* Products of the groups' weighted errors. More than FOLDED groups are folded onto so many: errors that add up are
+ * alike. A lane is a pair of groups, so that the order within a sum is the pixels'. */
 static void add_row(struct tile_error *t, size_t first)
 {
 	float gram[FOLDED][FOLDED] = {{0}};
@@ -428,7 +440,8 @@ static void add_row(struct tile_error *t, size_t first)
 		}
 		for (size_t i = 0; i < FOLDED; i++)
 			for (size_t j = i / 4 * 4; j < FOLDED; j++)
-				gram[i][j] += folded[0][i] * folded[0][j] + folded[1][i] * folded[1][j] + folded[2][i] * folded[2][j];
+				gram[i][j] += folded[0][i] * folded[0][j] + folded[1][i] * folded[1][j] +
+					      folded[2][i] * folded[2][j];
 	}
 	for (size_t i = 0; i < FOLDED; i++)
 		for (size_t j = i; j < FOLDED; j++)
@@ -478,7 +491,8 @@ int canvas_error(struct making *m, struct error *e)
 		t->apart = mem_alloc((size_t)TILE_SIZE * TILE_SIZE * 3 * m->c->plan.groups, sizeof *t->apart);
 	if (!t || !t->apart) {
 		mem_free(t);
-		return error_set(e, ENOMEM, "no memory for the error of an image of %ux%u", m->img->width, m->img->height);
+		return error_set(e, ENOMEM, "no memory for the error of an image of %ux%u", m->img->width,
+				 m->img->height);
 	}
 	double mean = 0;
 	for (size_t i = 0; i < values; i++)

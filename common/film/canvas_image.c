@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* From integer sums to an image. All loops run in a fixed order over exact inputs, so that equal films give equal bits. */
+/* From integer sums to an image. All loops run in a fixed order over exact inputs, so that equal films give equal bits.
+ */
 #include "common/film/convergence.h"
 #include "common/film/canvas_private.h"
 #include "common/film/color.h"
@@ -65,12 +66,13 @@ static void find_factors(struct making *m)
 						  : (double)p->epoch * (double)m->c->rounds;
 		m->factor[g] = (p->kind == PLAN_CHAINS ? m->b[g] : 1) * ratio(m->c->quantum, n);
 	}
-	double n = p->kind == PLAN_CHAINS ? (double)samples : (double)p->groups * (double)p->epoch * (double)m->c->rounds;
+	double n =
+		p->kind == PLAN_CHAINS ? (double)samples : (double)p->groups * (double)p->epoch * (double)m->c->rounds;
 	m->pooled_factor = (p->kind == PLAN_CHAINS ? m->img->b : 1) * ratio(m->c->quantum, n);
 }
 
-/* A preview of samples: parts of the picture have come more often than others. Leases merged of the strip that holds a row
- * of the crop, by group; the rows that the filter shares between strips are slightly off. */
+/* A preview of samples: parts of the picture have come more often than others. Leases merged of the strip that holds a
+ * row of the crop, by group; the rows that the filter shares between strips are slightly off. */
 static double preview_leases(const struct canvas *c, uint32_t row)
 {
 	uint32_t part = 0;
@@ -116,7 +118,8 @@ static void pool_tile(struct making *m, uint32_t tx, uint32_t ty)
 		pool_row(slots, count, (size_t)(y % TILE_SIZE) * SLOT_ROW, (size_t)width * TILE_CHANNELS, sums);
 		float *out = m->img->rgb + ((size_t)y * p->crop_width + x) * 3;
 		for (size_t i = 0; i < width; i++) {
-			const double *s = sums + i * TILE_CHANNELS, xyz[3] = {s[0] * factor, s[1] * factor, s[2] * factor};
+			const double *s = sums + i * TILE_CHANNELS,
+				     xyz[3] = {s[0] * factor, s[1] * factor, s[2] * factor};
 			rec709_from_xyz(xyz, rgb);
 			for (size_t k = 0; k < 3; k++)
 				out[i * 3 + k] = (float)rgb[k];
@@ -128,7 +131,8 @@ static int find_moments(const struct making *m, struct error *e)
 {
 	struct moments_group groups[PLAN_MAX_GROUPS];
 	for (uint32_t g = 0; g < m->c->plan.groups; g++)
-		groups[g] = (struct moments_group){m->c->bootstrap.group[g].independent, m->all->group[g].samples, m->b[g]};
+		groups[g] =
+			(struct moments_group){m->c->bootstrap.group[g].independent, m->all->group[g].samples, m->b[g]};
 	return moments_image(m->c->moments, groups, m->c->rounds, m->open_rounds, m->img, e);
 }
 
@@ -146,8 +150,13 @@ static void doubt_short_chains(struct making *m)
 int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e)
 {
 	const struct plan *p = &c->plan;
-	*img = (struct canvas_image){.width = p->crop_width, .height = p->crop_height, .rel_mse = NAN, .rel_mse_upper = NAN,
-				     .rel_mse_degrees = NAN, .rel_mse_95 = {NAN, NAN}, .rounds = c->rounds};
+	*img = (struct canvas_image){.width = p->crop_width,
+				     .height = p->crop_height,
+				     .rel_mse = NAN,
+				     .rel_mse_upper = NAN,
+				     .rel_mse_degrees = NAN,
+				     .rel_mse_95 = {NAN, NAN},
+				     .rounds = c->rounds};
 	struct making m = {.c = c, .img = img, .open_rounds = open_rounds, .all = mem_alloc(1, sizeof *m.all)};
 	bool errors = p->groups > 1 && !open_rounds;
 	img->rgb = mem_alloc((size_t)img->width * img->height * 3, sizeof *img->rgb);

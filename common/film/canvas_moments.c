@@ -12,17 +12,17 @@ enum { SET_PREFIX, SET_OPEN, SETS = 3 };
 #define GRID 0x1p20
 #define MUTATIONS_MOST (UINT64_C(1) << 42)
 
-/* Moments are rounded to float once an epoch and then to the grid. What is smaller than this next to the mean is not told from
- * no spread at all: a film of one tile has every chain in it all the time. */
+/* Moments are rounded to float once an epoch and then to the grid. What is smaller than this next to the mean is not
+ * told from no spread at all: a film of one tile has every chain in it all the time. */
 #define ROUNDING 0x1p-20
 
 struct moments {
 	struct plan plan;
 	uint32_t per_lease, leases, tiles; /* sequences of a lease; leases of a round */
-	int64_t *first;              /* [set][lease][sequence][tile] */
-	int64_t *second;             /* [set][lease][tile] */
-	struct exact_sum *time;      /* [set][group][class] */
-	struct exact_sum *bootstrap; /* [group][class] */
+	int64_t *first;			   /* [set][lease][sequence][tile] */
+	int64_t *second;		   /* [set][lease][tile] */
+	struct exact_sum *time;		   /* [set][group][class] */
+	struct exact_sum *bootstrap;	   /* [group][class] */
 };
 
 static size_t first_count(const struct moments *m)
@@ -79,7 +79,8 @@ int moments_fit(const struct moments *m, const struct lease_key *k, struct error
 	uint64_t chains = m->plan.chains / m->leases, epochs = MUTATIONS_MOST / chains / m->plan.epoch;
 	if (k->epoch < epochs)
 		return 0;
-	return error_set(e, ERANGE, "after %llu rounds the moments of chains leave their range", (unsigned long long)epochs);
+	return error_set(e, ERANGE, "after %llu rounds the moments of chains leave their range",
+			 (unsigned long long)epochs);
 }
 
 static void add_grid(int64_t *to, const float *from, size_t count, int sign)
@@ -195,7 +196,8 @@ int moments_load(struct moments *m, struct checked_file *in, struct error *e)
 	size_t film = m->tiles * sizeof *m->first, sum = sizeof *m->time;
 	uint32_t shape[4];
 	int rc = checked_file_read(in, shape, sizeof shape, e);
-	if (!rc && (shape[0] != m->per_lease || shape[1] != m->leases || shape[2] != m->tiles || shape[3] != PATH_CLASSES))
+	if (!rc &&
+	    (shape[0] != m->per_lease || shape[1] != m->leases || shape[2] != m->tiles || shape[3] != PATH_CLASSES))
 		rc = error_set(e, EBADMSG, "moments of other chains");
 	if (!rc)
 		rc = load_runs(in, m->first, film, SETS * first_count(m) / m->tiles, e);
@@ -248,12 +250,14 @@ static int make_tiles(const struct moments *m, double n, struct canvas_image *im
 	img->tile_error = mem_alloc(m->tiles, sizeof *img->tile_error);
 	img->tile_share = mem_alloc(m->tiles, sizeof *img->tile_share);
 	double *mean = mem_alloc(m->tiles, sizeof *mean), all = 0;
-	int rc = img->r_hat && img->tile_error && img->tile_share && mean ? 0 : error_set(e, ENOMEM, "no memory for tiles");
+	int rc = img->r_hat && img->tile_error && img->tile_share && mean ? 0
+									  : error_set(e, ENOMEM, "no memory for tiles");
 	for (uint32_t t = 0; t < m->tiles && rc == 0; t++) {
 		struct spread s;
 		find_spread(m, t, n, &s);
 		img->r_hat[t] = (float)r_hat(&s, n);
-		img->tile_error[t] = (float)(s.mean > 0 ? sqrt(s.between / ((double)m->leases * m->per_lease)) / s.mean : NAN);
+		img->tile_error[t] =
+			(float)(s.mean > 0 ? sqrt(s.between / ((double)m->leases * m->per_lease)) / s.mean : NAN);
 		mean[t] = s.mean;
 		all += s.mean;
 	}

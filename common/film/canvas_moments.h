@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a canvas keeps besides pixels to say whether chains agree: by sequence and tile the cumulated first moments, by lease
- * and tile the second ones, by group and path class the chains' time and the bootstrap's energy (struct batch). As films are:
- * integers on a grid or exact sums, open rounds apart from the prefix, so that the order of batches does not matter.
- * Memory: 24 bytes a sequence and tile, 24 a lease and tile; pages that no batch touched cost nothing. One thread at a time.
+ * What a canvas keeps besides pixels to say whether chains agree: by sequence and tile the cumulated first moments, by
+ * lease and tile the second ones, by group and path class the chains' time and the bootstrap's energy (struct batch).
+ * As films are: integers on a grid or exact sums, open rounds apart from the prefix, so that the order of batches does
+ * not matter. Memory: 24 bytes a sequence and tile, 24 a lease and tile; pages that no batch touched cost nothing. One
+ * thread at a time.
  */
 #ifndef COMMON_FILM_CANVAS_MOMENTS_H
 #define COMMON_FILM_CANVAS_MOMENTS_H

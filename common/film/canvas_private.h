@@ -10,7 +10,14 @@
 #include "common/film/canvas.h"
 #include "common/film/canvas_moments.h"
 
-enum { FILM_PREFIX, FILM_OPEN, FILMS = 3, SLOT_ROW = TILE_SIZE * TILE_CHANNELS, SLOT = TILE_SIZE * SLOT_ROW, OPEN_ROUNDS = 2 };
+enum {
+	FILM_PREFIX,
+	FILM_OPEN,
+	FILMS = 3,
+	SLOT_ROW = TILE_SIZE * TILE_CHANNELS,
+	SLOT = TILE_SIZE * SLOT_ROW,
+	OPEN_ROUNDS = 2
+};
 enum tile_flag { TILE_BACKED = 1, TILE_USED = 2 };
 
 /* What a round (or the prefix, or the bootstrap) has besides pixels. */
@@ -28,13 +35,13 @@ struct canvas {
 	uint32_t tiles_across, tiles_down;
 	int64_t *sums;
 	size_t bytes;
-	int fd;               /* -1: anonymous */
-	uint8_t *flags;       /* [film][tile] of enum tile_flag */
-	uint64_t *bound;      /* [film]: no |sum| of the film is above */
-	uint64_t rounds;      /* complete */
+	int fd;			      /* -1: anonymous */
+	uint8_t *flags;		      /* [film][tile] of enum tile_flag */
+	uint64_t *bound;	      /* [film]: no |sum| of the film is above */
+	uint64_t rounds;	      /* complete */
 	uint32_t merged[OPEN_ROUNDS]; /* leases of an open round, by its parity */
-	uint8_t *has;         /* [bootstrap, open parity 0, 1][group][part] */
-	uint32_t *missing;    /* [group][part]: so many of the last complete rounds lack its batch, which was taken back */
+	uint8_t *has;		      /* [bootstrap, open parity 0, 1][group][part] */
+	uint32_t *missing; /* [group][part]: so many of the last complete rounds lack its batch, which was taken back */
 	struct tally prefix, open[OPEN_ROUNDS], bootstrap;
 	double b_tail; /* 0: not known */
 	struct moments *moments;
@@ -45,8 +52,8 @@ struct making {
 	const struct canvas *c;
 	struct canvas_image *img;
 	bool open_rounds;
-	struct tally *all;                /* prefix, bootstrap and, for a preview, the open rounds */
-	double factor[PLAN_MAX_GROUPS];   /* grid units to the group's image; 0: the group has nothing */
+	struct tally *all;		/* prefix, bootstrap and, for a preview, the open rounds */
+	double factor[PLAN_MAX_GROUPS]; /* grid units to the group's image; 0: the group has nothing */
 	double pooled_factor;
 	double b[PLAN_MAX_GROUPS];
 };
@@ -56,12 +63,13 @@ enum { ERROR_FOLDED = 16 };
 /* Of the groups' weighted errors, over an image. Parts of the relMSE are sums over pixels and channels, not means. */
 struct error_sums {
 	uint32_t groups;
-	double share, doubt;    /* parts; their squares times the variances of their weights */
-	double low, high;       /* bounds of the same: over brightness with all fireflies, over what other groups found */
-	double dark, one_group; /* parts where brightness is a block's mean, not the pixel's; where one group has most of the variance */
-	double kurtosis;        /* of the groups' values, parts as weights */
+	double share, doubt; /* parts; their squares times the variances of their weights */
+	double low, high;    /* bounds of the same: over brightness with all fireflies, over what other groups found */
+	double dark, one_group; /* parts where brightness is a block's mean, not the pixel's; where one group has most
+				   of the variance */
+	double kurtosis;	/* of the groups' values, parts as weights */
 	double gram[ERROR_FOLDED][ERROR_FOLDED]; /* products of groups' errors; more groups are folded onto so many */
-	double distance[PLAN_MAX_GROUPS];        /* a group's error, squared */
+	double distance[PLAN_MAX_GROUPS];	 /* a group's error, squared */
 };
 
 /* Fills the relMSE, its intervals, and what is doubtful of it. */

@@ -53,14 +53,10 @@ enum { PIECES = 9 };
 
 static void pieces_of(struct canvas *c, struct piece p[PIECES])
 {
-	const struct piece all[PIECES] = {{&c->rounds, sizeof c->rounds},
-					  {c->merged, sizeof c->merged},
-					  {c->has, has_bytes(c)},
-					  {c->bound, films_of(c) * sizeof *c->bound},
-					  {&c->prefix, sizeof c->prefix},
-					  {&c->open[0], sizeof c->open[0]},
-					  {&c->open[1], sizeof c->open[1]},
-					  {&c->bootstrap, sizeof c->bootstrap},
+	const struct piece all[PIECES] = {{&c->rounds, sizeof c->rounds},   {c->merged, sizeof c->merged},
+					  {c->has, has_bytes(c)},	    {c->bound, films_of(c) * sizeof *c->bound},
+					  {&c->prefix, sizeof c->prefix},   {&c->open[0], sizeof c->open[0]},
+					  {&c->open[1], sizeof c->open[1]}, {&c->bootstrap, sizeof c->bootstrap},
 					  {&c->b_tail, sizeof c->b_tail}};
 	memcpy(p, all, sizeof all);
 }
@@ -124,8 +120,10 @@ int canvas_load(struct canvas *c, struct checked_file *in, struct error *e)
 	if (rc)
 		return rc;
 	if (h.version != want.version || h.tally_bytes != want.tally_bytes || h.slot != want.slot)
-		return error_set(e, EPROTO, "%s: films of version %u, and version %u is known here: another coordinator wrote them", in->path,
-				 h.version, want.version);
+		return error_set(
+			e, EPROTO,
+			"%s: films of version %u, and version %u is known here: another coordinator wrote them",
+			in->path, h.version, want.version);
 	if (memcmp(&h, &want, sizeof h) != 0)
 		return error_set(e, EBADMSG, "%s: the films of another plan", in->path);
 	pieces_of(c, p);

@@ -7,8 +7,8 @@
 #include <math.h>
 #include <string.h>
 
-/* Tiles. Below 1.1 chains count as mixed (Gelman and Rubin 1992); the mean's own error must be large too, or a scene of many
- * small lights, which chains visit in turns, would be blamed for what 1,000 chains average out. */
+/* Tiles. Below 1.1 chains count as mixed (Gelman and Rubin 1992); the mean's own error must be large too, or a scene of
+ * many small lights, which chains visit in turns, would be blamed for what 1,000 chains average out. */
 #define R_HAT_MIXED 1.1
 #define TILE_ERROR_MOST 0.1
 #define TILE_SHARE_LEAST 1e-3
@@ -19,12 +19,13 @@
 #define CLASS_OF_B 0.02
 #define CLASS_OF_ITSELF 0.2
 #define CLASS_LEAST 0.005
-/* Standard error from the groups of a class's energy in the chains: when half of the groups have found it and share it evenly it
- * is a quarter of it (sqrt((16 / 8 - 1) / 15) of 16 groups); of fewer groups it is itself too uncertain. */
+/* Standard error from the groups of a class's energy in the chains: when half of the groups have found it and share it
+ * evenly it is a quarter of it (sqrt((16 / 8 - 1) / 15) of 16 groups); of fewer groups it is itself too uncertain. */
 #define APART_OF_ITSELF 0.25
 #define APART_OF_B 0.03
 enum { APART_GROUPS = 8 };
-/* Standard error of a class's energy in the bootstrap above which the bootstrap is no witness against more of it: see excess. */
+/* Standard error of a class's energy in the bootstrap above which the bootstrap is no witness against more of it: see
+ * excess. */
 #define CLASS_KNOWN 0.1
 
 /* Chain epochs. */
@@ -119,10 +120,10 @@ static void judge_tiles(const struct plan *p, const struct canvas_image *img, st
 
 /*
  * Whether more of a class in the chains than in the bootstrap says anything. Energies of independent samples have heavy
- * tails: while the rare bright ones have not come, the mean is too small and so is its spread, and t is far too large. So an
- * excess counts only where the bootstrap knows the class well. Nothing is lost by that: chains share out b, and b comes from
- * independent samples, so a class that these miss is missing in all others of the chains; and with too little in the chains
- * the tails err to the safe side, since samples that raise the mean raise its spread too.
+ * tails: while the rare bright ones have not come, the mean is too small and so is its spread, and t is far too large.
+ * So an excess counts only where the bootstrap knows the class well. Nothing is lost by that: chains share out b, and b
+ * comes from independent samples, so a class that these miss is missing in all others of the chains; and with too
+ * little in the chains the tails err to the safe side, since samples that raise the mean raise its spread too.
  */
 static bool excess_counts(const struct path_class_energy *c)
 {
@@ -140,7 +141,8 @@ static bool class_flagged(const struct path_class_energy *c, double b, uint32_t 
 
 static bool class_apart(const struct path_class_energy *c, double b, uint32_t groups)
 {
-	return groups >= APART_GROUPS && c->chains_error > APART_OF_ITSELF * c->chains && c->chains_error > APART_OF_B * b;
+	return groups >= APART_GROUPS && c->chains_error > APART_OF_ITSELF * c->chains &&
+	       c->chains_error > APART_OF_B * b;
 }
 
 static void judge_classes(const struct plan *p, const struct canvas_image *img, struct convergence *a)
@@ -155,8 +157,8 @@ static void judge_classes(const struct plan *p, const struct canvas_image *img, 
 
 static void put_tiles(struct text *t, const struct convergence *a)
 {
-	text_put(t, "in %u of %u tiles with %.3g %% of the energy they have not mixed (R-hat %.3g at %u,%u)", a->tiles_flagged, a->tiles,
-		 100 * a->energy_flagged, a->r_hat_worst, a->worst_x, a->worst_y);
+	text_put(t, "in %u of %u tiles with %.3g %% of the energy they have not mixed (R-hat %.3g at %u,%u)",
+		 a->tiles_flagged, a->tiles, 100 * a->energy_flagged, a->r_hat_worst, a->worst_x, a->worst_y);
 }
 
 static void put_classes(struct text *t, const struct canvas_image *img, uint32_t which, bool apart, const char *then)
@@ -173,11 +175,11 @@ static void put_classes(struct text *t, const struct canvas_image *img, uint32_t
 		}
 		double chains = 100 * c->chains / img->b;
 		if (apart)
-			text_put(t, "%sgroups of them differ in paths (%s): %.3g +- %.2g %% of b", then, path_class_name(k), chains,
-				 100 * c->chains_error / img->b);
+			text_put(t, "%sgroups of them differ in paths (%s): %.3g +- %.2g %% of b", then,
+				 path_class_name(k), chains, 100 * c->chains_error / img->b);
 		else
-			text_put(t, "%sto paths (%s) they give %.3g %% of b, the bootstrap %.3g %%", then, path_class_name(k), chains,
-				 100 * c->bootstrap / img->b);
+			text_put(t, "%sto paths (%s) they give %.3g %% of b, the bootstrap %.3g %%", then,
+				 path_class_name(k), chains, 100 * c->bootstrap / img->b);
 		shown++;
 		then = ", ";
 	}
@@ -185,12 +187,14 @@ static void put_classes(struct text *t, const struct canvas_image *img, uint32_t
 		text_put(t, ", and %u classes more", more);
 }
 
-static void put_words(const struct plan *p, const struct canvas_image *img, struct convergence *a, bool tiles, bool stuck)
+static void put_words(const struct plan *p, const struct canvas_image *img, struct convergence *a, bool tiles,
+		      bool stuck)
 {
 	struct text t = {a->text, sizeof a->text};
 	const char *then = "";
 	if (a->verdict == CHAINS_TOO_SHORT)
-		text_put(&t, "chains are too short to be judged, %llu mutations each: ", (unsigned long long)(img->rounds * p->epoch));
+		text_put(&t, "chains are too short to be judged, %llu mutations each: ",
+			 (unsigned long long)(img->rounds * p->epoch));
 	else
 		text_put(&t, "chains disagree: ");
 	if (tiles) {
@@ -206,8 +210,8 @@ static void put_words(const struct plan *p, const struct canvas_image *img, stru
 		then = "; ";
 	}
 	if (stuck)
-		text_put(&t, "%sin %.3g %% of their epochs of %llu mutations they accepted nothing", then, 100 * a->stuck_share,
-			 (unsigned long long)p->epoch);
+		text_put(&t, "%sin %.3g %% of their epochs of %llu mutations they accepted nothing", then,
+			 100 * a->stuck_share, (unsigned long long)p->epoch);
 }
 
 void convergence_judge(const struct plan *p, const struct canvas_image *img, struct convergence *a)
@@ -220,7 +224,8 @@ void convergence_judge(const struct plan *p, const struct canvas_image *img, str
 	judge_classes(p, img, a);
 	if (epochs)
 		a->stuck_share = (double)img->counts.counters[COUNT_STUCK] / (double)epochs;
-	bool tiles = a->energy_flagged > FLAGGED_SHARE_MOST, stuck = p->epoch >= STUCK_EPOCH && a->stuck_share > STUCK_MOST;
+	bool tiles = a->energy_flagged > FLAGGED_SHARE_MOST,
+	     stuck = p->epoch >= STUCK_EPOCH && a->stuck_share > STUCK_MOST;
 	if (!tiles && !a->classes_flagged && !a->classes_apart && !stuck)
 		return;
 	/* The product of two counts of a plan that was checked fits 64 bits: COUNT_SAMPLES holds it. */
@@ -237,7 +242,8 @@ void convergence_add_note(const struct convergence *a, char *note, size_t size)
 	text_put(&t, "%s%s", used ? "; " : "", a->text);
 }
 
-void convergence_table(const struct path_class_energy classes[PATH_CLASSES], double b, const struct convergence *a, char *text, size_t size)
+void convergence_table(const struct path_class_energy classes[PATH_CLASSES], double b, const struct convergence *a,
+		       char *text, size_t size)
 {
 	struct text t = {text, size};
 	if (size)
@@ -250,12 +256,13 @@ void convergence_table(const struct path_class_energy classes[PATH_CLASSES], dou
 		if (!any)
 			text_put(&t, "%-36s %21s %21s %9s\n", "paths, % of b", "bootstrap", "chains", "t");
 		any = true;
-		text_put(&t, "%-36s %10.3f +-%8.3f %10.3f +-%8.3f", path_class_name(k), 100 * c->bootstrap / b, 100 * c->bootstrap_error / b,
-			 100 * c->chains / b, 100 * c->chains_error / b);
+		text_put(&t, "%-36s %10.3f +-%8.3f %10.3f +-%8.3f", path_class_name(k), 100 * c->bootstrap / b,
+			 100 * c->bootstrap_error / b, 100 * c->chains / b, 100 * c->chains_error / b);
 		if (isnan(c->difference_t))
 			text_put(&t, " %9s", "-");
 		else
 			text_put(&t, " %9.2f", c->difference_t);
-		text_put(&t, "%s%s\n", a->classes_flagged >> k & 1 ? "  differs" : "", a->classes_apart >> k & 1 ? "  groups apart" : "");
+		text_put(&t, "%s%s\n", a->classes_flagged >> k & 1 ? "  differs" : "",
+			 a->classes_apart >> k & 1 ? "  groups apart" : "");
 	}
 }

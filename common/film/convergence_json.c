@@ -34,12 +34,14 @@ static json_t *names_of(uint32_t classes)
 
 json_t *convergence_to_json(const struct convergence *a)
 {
-	return json_pack("{s:s s:s s:o s:o s:[I,I] s:I s:I s:o s:o s:o s:o}", "verdict", convergence_name(a->verdict), "text", a->text, /* */
-			 "rHatMedian", real_or_null(a->r_hat_median), "rHatWorst", real_or_null(a->r_hat_worst), /* */
-			 "worst", (json_int_t)a->worst_x, (json_int_t)a->worst_y, "tiles", (json_int_t)a->tiles, /* */
-			 "tilesFlagged", (json_int_t)a->tiles_flagged, "energyFlagged", real_or_null(a->energy_flagged), /* */
-			 "stuckShare", real_or_null(a->stuck_share), "classesFlagged", names_of(a->classes_flagged), /* */
-			 "classesApart", names_of(a->classes_apart));
+	return json_pack(
+		"{s:s s:s s:o s:o s:[I,I] s:I s:I s:o s:o s:o s:o}", "verdict", convergence_name(a->verdict), "text",
+		a->text,											/* */
+		"rHatMedian", real_or_null(a->r_hat_median), "rHatWorst", real_or_null(a->r_hat_worst),		/* */
+		"worst", (json_int_t)a->worst_x, (json_int_t)a->worst_y, "tiles", (json_int_t)a->tiles,		/* */
+		"tilesFlagged", (json_int_t)a->tiles_flagged, "energyFlagged", real_or_null(a->energy_flagged), /* */
+		"stuckShare", real_or_null(a->stuck_share), "classesFlagged", names_of(a->classes_flagged),	/* */
+		"classesApart", names_of(a->classes_apart));
 }
 
 static unsigned class_named(const json_t *name)
@@ -63,9 +65,11 @@ static uint32_t classes_named(const json_t *list)
 
 void convergence_from_json(const json_t *o, struct convergence *a)
 {
-	const char *verdict = json_string_value(json_object_get(o, "verdict")), *text = json_string_value(json_object_get(o, "text"));
+	const char *verdict = json_string_value(json_object_get(o, "verdict")),
+		   *text = json_string_value(json_object_get(o, "text"));
 	const json_t *worst = json_object_get(o, "worst");
-	*a = (struct convergence){.r_hat_median = real_or_nan(o, "rHatMedian"), .r_hat_worst = real_or_nan(o, "rHatWorst")};
+	*a = (struct convergence){.r_hat_median = real_or_nan(o, "rHatMedian"),
+				  .r_hat_worst = real_or_nan(o, "rHatWorst")};
 	for (int v = CHAINS_AGREE; verdict && v <= CHAINS_DISAGREE; v++)
 		if (strcmp(verdict, convergence_name((enum convergence_verdict)v)) == 0)
 			a->verdict = (enum convergence_verdict)v;
@@ -87,10 +91,11 @@ json_t *classes_to_json(const struct path_class_energy classes[PATH_CLASSES])
 		const struct path_class_energy *c = &classes[k];
 		if (!(c->bootstrap > 0) && !(c->chains > 0))
 			continue;
-		json_array_append_new(list, json_pack("{s:s s:o s:o s:o s:o s:o}", "class", path_class_name(k), "bootstrap",
-						      real_or_null(c->bootstrap), "bootstrapError", real_or_null(c->bootstrap_error),
-						      "chains", real_or_null(c->chains), "chainsError",
-						      real_or_null(c->chains_error), "t", real_or_null(c->difference_t)));
+		json_array_append_new(
+			list, json_pack("{s:s s:o s:o s:o s:o s:o}", "class", path_class_name(k), "bootstrap",
+					real_or_null(c->bootstrap), "bootstrapError", real_or_null(c->bootstrap_error),
+					"chains", real_or_null(c->chains), "chainsError", real_or_null(c->chains_error),
+					"t", real_or_null(c->difference_t)));
 	}
 	return list;
 }
@@ -106,7 +111,7 @@ void classes_from_json(const json_t *list, struct path_class_energy classes[PATH
 			continue;
 		classes[k] = (struct path_class_energy){json_number_value(json_object_get(o, "bootstrap")),
 							real_or_nan(o, "bootstrapError"),
-							json_number_value(json_object_get(o, "chains")), real_or_nan(o, "chainsError"),
-							real_or_nan(o, "t")};
+							json_number_value(json_object_get(o, "chains")),
+							real_or_nan(o, "chainsError"), real_or_nan(o, "t")};
 	}
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The one door to OpenEXR (Core, C). Images: R G B float (and error.R,G,B), ZIP, scan lines. Tiles: one-part, tiled, X Y Z
- * float, uncompressed, data window at their place. All in memory; any thread; foreign bytes are checked before decoding.
+ * The one door to OpenEXR (Core, C). Images: R G B float (and error.R,G,B), ZIP, scan lines. Tiles: one-part, tiled, X
+ * Y Z float, uncompressed, data window at their place. All in memory; any thread; foreign bytes are checked before
+ * decoding.
  */
 #ifndef COMMON_FILM_EXR_H
 #define COMMON_FILM_EXR_H
@@ -20,19 +21,21 @@ struct exr_attribute { /* header attributes "hslt:..."; see header.h for the tab
 };
 
 struct exr_image {
-	uint32_t width, height, channel_count; /* at most 16 channels */
+	uint32_t width, height, channel_count;	/* at most 16 channels */
 	uint32_t full_width, full_height, x, y; /* display window and the data window's corner */
-	char names[16][32]; /* "R", "error.G", sorted by the library */
-	float *planes[16];  /* [height][width] each */
+	char names[16][32];			/* "R", "error.G", sorted by the library */
+	float *planes[16];			/* [height][width] each */
 	size_t attribute_count;
 	struct exr_attribute *attributes; /* read: all hslt:* of these types; owned */
 };
 
 /* bytes: mem_alloc'd, to be mem_free'd. */
 int exr_write(const struct exr_image *img, unsigned char **bytes, size_t *size, struct error *e);
-int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img, struct error *e); /* half, float, uint channels */
+int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img,
+	     struct error *e); /* half, float, uint channels */
 /* The same; -EFBIG, before anything is decoded, when its planes would take more bytes than that. */
-int exr_read_within(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img, struct error *e);
+int exr_read_within(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img,
+		    struct error *e);
 void exr_image_fini(struct exr_image *img);
 
 /* Tiles of a batch. exr_tile_read: display window = the full film; refuses anything but what exr_tile_write makes. */

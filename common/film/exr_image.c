@@ -86,8 +86,8 @@ struct compressor {
 };
 
 /*
- * A chunk whose size in the file is that of its pixels is read as stored. OpenEXRCore 3.1.5 stores only what deflate makes
- * larger, so that deflated bytes of exactly that size would be taken for pixels.
+ * A chunk whose size in the file is that of its pixels is read as stored. OpenEXRCore 3.1.5 stores only what deflate
+ * makes larger, so that deflated bytes of exactly that size would be taken for pixels.
  */
 static exr_result_t compress_or_store(exr_encode_pipeline_t *encode)
 {
@@ -133,8 +133,8 @@ int exr_write(const struct exr_image *img, unsigned char **bytes, size_t *size, 
 	struct exr_stream s;
 	if (img->width < 1 || img->height < 1 || img->channel_count < 1 || img->channel_count > CHANNELS_MOST ||
 	    (int64_t)img->width * img->height > PIXELS_MOST)
-		return error_set(e, EINVAL, "an image of %ux%u with %u channels cannot be written", img->width, img->height,
-				 img->channel_count);
+		return error_set(e, EINVAL, "an image of %ux%u with %u channels cannot be written", img->width,
+				 img->height, img->channel_count);
 	int rc = exr_open_write(&x, &s, 1 << 16, e);
 	if (rc)
 		return rc;
@@ -174,8 +174,8 @@ static int64_t pixel_bytes(const exr_attr_chlist_t *list)
 	return sum;
 }
 
-static int check_header(exr_context_t x, const struct exr_stream *s, int64_t bytes_most, struct exr_image *img, bool *tiled,
-			struct error *e)
+static int check_header(exr_context_t x, const struct exr_stream *s, int64_t bytes_most, struct exr_image *img,
+			bool *tiled, struct error *e)
 {
 	int parts;
 	exr_storage_t storage;
@@ -187,22 +187,27 @@ static int check_header(exr_context_t x, const struct exr_stream *s, int64_t byt
 	if (exr_get_storage(x, 0, &storage) || (storage != EXR_STORAGE_TILED && storage != EXR_STORAGE_SCANLINE))
 		return error_set(e, EBADMSG, "a deep EXR file; only flat images are supported");
 	if (exr_get_compression(x, 0, &compression) || compression >= EXR_COMPRESSION_DWAA)
-		return error_set(e, EBADMSG, "the EXR file is compressed by DWA; supported: none, RLE, ZIP, PIZ, PXR24, B44");
-	if (exr_get_data_window(x, 0, &data) || exr_get_display_window(x, 0, &display) || exr_get_channels(x, 0, &channels))
+		return error_set(e, EBADMSG,
+				 "the EXR file is compressed by DWA; supported: none, RLE, ZIP, PIZ, PXR24, B44");
+	if (exr_get_data_window(x, 0, &data) || exr_get_display_window(x, 0, &display) ||
+	    exr_get_channels(x, 0, &channels))
 		return error_set(e, EBADMSG, "the EXR file's header is not complete");
 	int64_t width = (int64_t)data.max.x - data.min.x + 1, height = (int64_t)data.max.y - data.min.y + 1;
 	if (width < 1 || height < 1 || width > EXR_MAX_SIDE || height > EXR_MAX_SIDE || width * height > PIXELS_MOST ||
 	    width * height * channels->num_channels > VALUES_MOST)
 		return error_set(e, EBADMSG, "the EXR file has %lldx%lld pixels", (long long)width, (long long)height);
 	if (width * height * channels->num_channels * (int64_t)sizeof(float) > bytes_most)
-		return error_set(e, EFBIG, "%lld x %lld pixels of %d channels take %lld MB decoded; at most %lld MB", (long long)width, (long long)height,
-				 channels->num_channels, (long long)(width * height * channels->num_channels * (int64_t)sizeof(float)) >> 20,
+		return error_set(e, EFBIG, "%lld x %lld pixels of %d channels take %lld MB decoded; at most %lld MB",
+				 (long long)width, (long long)height, channels->num_channels,
+				 (long long)(width * height * channels->num_channels * (int64_t)sizeof(float)) >> 20,
 				 (long long)bytes_most >> 20);
 	if (width * height * pixel_bytes(channels) / INFLATION_MOST > (int64_t)s->size)
-		return error_set(e, EBADMSG, "the EXR file is too short for %lldx%lld pixels", (long long)width, (long long)height);
+		return error_set(e, EBADMSG, "the EXR file is too short for %lldx%lld pixels", (long long)width,
+				 (long long)height);
 	img->width = (uint32_t)width;
 	img->height = (uint32_t)height;
-	/* Windows that begin left of or above the display's corner have no place in unsigned numbers: only the size is told. */
+	/* Windows that begin left of or above the display's corner have no place in unsigned numbers: only the size is
+	 * told. */
 	int64_t dx = (int64_t)data.min.x - display.min.x, dy = (int64_t)data.min.y - display.min.y;
 	img->x = dx > 0 ? (uint32_t)dx : 0;
 	img->y = dy > 0 ? (uint32_t)dy : 0;
@@ -218,7 +223,8 @@ static int32_t smaller(int32_t a, int32_t b)
 }
 
 /* Decodes one chunk to its place in the planes. Integer channels are converted afterwards: see read_planes. */
-static exr_result_t read_chunk(exr_context_t x, struct exr_image *img, const exr_chunk_info_t *chunk, uint32_t px, uint32_t py)
+static exr_result_t read_chunk(exr_context_t x, struct exr_image *img, const exr_chunk_info_t *chunk, uint32_t px,
+			       uint32_t py)
 {
 	exr_decode_pipeline_t decode = EXR_DECODE_PIPELINE_INITIALIZER;
 	if (px + (uint64_t)chunk->width > img->width || py + (uint64_t)chunk->height > img->height)
@@ -249,8 +255,8 @@ static exr_result_t read_tiled(exr_context_t x, struct exr_image *img)
 	for (uint32_t y = 0; y < img->height && rc == EXR_ERR_SUCCESS; y += (uint32_t)tile_h)
 		for (uint32_t px = 0; px < img->width && rc == EXR_ERR_SUCCESS; px += (uint32_t)tile_w) {
 			exr_chunk_info_t chunk;
-			rc = exr_read_tile_chunk_info(x, 0, (int)(px / (uint32_t)tile_w), (int)(y / (uint32_t)tile_h), 0, 0,
-						      &chunk);
+			rc = exr_read_tile_chunk_info(x, 0, (int)(px / (uint32_t)tile_w), (int)(y / (uint32_t)tile_h),
+						      0, 0, &chunk);
 			if (rc == EXR_ERR_SUCCESS) {
 				chunk.width = smaller(chunk.width, (int32_t)(img->width - px));
 				chunk.height = smaller(chunk.height, (int32_t)(img->height - y));

@@ -13,7 +13,7 @@ enum { EXR_MAX_SIDE = 1 << 20 };
 
 struct exr_stream {
 	const unsigned char *source; /* reading */
-	unsigned char *bytes;        /* writing; mem_alloc'd, the caller's after exr_close_write */
+	unsigned char *bytes;	     /* writing; mem_alloc'd, the caller's after exr_close_write */
 	size_t size, room;
 	char message[256]; /* the library's last complaint */
 };

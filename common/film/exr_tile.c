@@ -119,8 +119,8 @@ static const char *check_header(exr_context_t x, uint32_t full_width, uint32_t f
 	    display.min.y != 0 || (int64_t)display.max.x + 1 != full_width || (int64_t)display.max.y + 1 != full_height)
 		return "a display window that is not the film";
 	int64_t width = (int64_t)data.max.x - data.min.x + 1, height = (int64_t)data.max.y - data.min.y + 1;
-	if (data.min.x < 0 || data.min.y < 0 || data.max.x >= (int64_t)full_width || data.max.y >= (int64_t)full_height ||
-	    width < 1 || height < 1 || width > TILE_SIZE || height > TILE_SIZE)
+	if (data.min.x < 0 || data.min.y < 0 || data.max.x >= (int64_t)full_width ||
+	    data.max.y >= (int64_t)full_height || width < 1 || height < 1 || width > TILE_SIZE || height > TILE_SIZE)
 		return "a data window that is no tile of the film";
 	*t = (struct tile){(uint32_t)data.min.x, (uint32_t)data.min.y, (uint32_t)width, (uint32_t)height, NULL};
 	return NULL;

@@ -12,13 +12,15 @@ enum {
 	PRIOR_WEIGHT = 6, /* of the degrees of freedom that looks report, against their scatter, in looks */
 	STEPS_MOST = 256, /* of the ladder; more than 2^60 rounds have */
 };
-static const double used_share = 1.0 / 16; /* looks at less than this share of the work say little about what is to come */
-static const double burst = 0.15;           /* spread of a look beyond chi-square: light that comes in rare bursts */
-static const double trend_prior = 0.2;     /* standard deviation of the trend: light that comes in rare bursts, chains that
-					    * have not forgotten their seeds yet */
-static const double memory = 2, memory_sd = 0.8; /* e-folds of work over which a trend dies down; its logarithm's spread */
-static const double drift = 0.08;          /* what else may change in an e-fold of work that nobody has seen */
-static const double price_floor = 0.03;    /* relative spread of a sample's price from one stretch of time to another */
+static const double used_share =
+	1.0 / 16;		       /* looks at less than this share of the work say little about what is to come */
+static const double burst = 0.15;      /* spread of a look beyond chi-square: light that comes in rare bursts */
+static const double trend_prior = 0.2; /* standard deviation of the trend: light that comes in rare bursts, chains that
+					* have not forgotten their seeds yet */
+static const double memory = 2,
+		    memory_sd = 0.8;	/* e-folds of work over which a trend dies down; its logarithm's spread */
+static const double drift = 0.08;	/* what else may change in an e-fold of work that nobody has seen */
+static const double price_floor = 0.03; /* relative spread of a sample's price from one stretch of time to another */
 static const double log_four = 1.3862943611198906;
 
 /* ---- looks */
@@ -27,7 +29,8 @@ static const double log_four = 1.3862943611198906;
 
 void forecast_add_look(struct forecast_history *h, const struct forecast_look *l)
 {
-	bool sound = isfinite(l->rel_mse) && l->rel_mse > 0 && isfinite(l->rel_mse_upper) && l->rel_mse_upper >= l->rel_mse;
+	bool sound =
+		isfinite(l->rel_mse) && l->rel_mse > 0 && isfinite(l->rel_mse_upper) && l->rel_mse_upper >= l->rel_mse;
 	bool counted = l->work < WORK_MOST && isfinite(l->cpu_seconds) && isfinite(l->seconds) && isfinite(l->degrees);
 	if (!sound || !counted || !(l->work > (h->count ? h->looks[h->count - 1].work : 0)))
 		return;
@@ -74,21 +77,21 @@ bool forecast_error(const struct forecast_history *h, struct forecast_range *err
 	const struct forecast_look *l = last(h);
 	if (!l)
 		return false;
-	*error = (struct forecast_range){sqrt(l->rel_mse / chi_square_share(l->degrees, 1.6448536269514722)), sqrt(l->rel_mse),
-					 sqrt(l->rel_mse_upper)};
+	*error = (struct forecast_range){sqrt(l->rel_mse / chi_square_share(l->degrees, 1.6448536269514722)),
+					 sqrt(l->rel_mse), sqrt(l->rel_mse_upper)};
 	return true;
 }
 
 /* ---- the fit */
 
 struct fit {
-	double work;                    /* of the last look; times are logarithms of work over it */
-	double level, trend;            /* log(relMSE x work) now, and its growth per e-fold of work */
+	double work;	     /* of the last look; times are logarithms of work over it */
+	double level, trend; /* log(relMSE x work) now, and its growth per e-fold of work */
 	double level_sd, trend_sd, correlation;
-	double spread, shift;           /* of one look's logarithm around them: standard deviation, mean */
-	double seen;                    /* e-folds of work that the looks cover: as far as the trend is drawn */
-	double now;                     /* the last look's deviation in spreads */
-	double margin, margin_sd;       /* log of upper end over estimate */
+	double spread, shift;		   /* of one look's logarithm around them: standard deviation, mean */
+	double seen;			   /* e-folds of work that the looks cover: as far as the trend is drawn */
+	double now;			   /* the last look's deviation in spreads */
+	double margin, margin_sd;	   /* log of upper end over estimate */
 	double cpu, cpu_sd, wall, wall_sd; /* seconds a sample; relative spread */
 };
 
@@ -105,11 +108,13 @@ static void observe(struct normal_equations *q, double weight, double al, double
 	q->t += weight * at * value;
 }
 
-struct innovation { /* what a look adds to the one before it: value = al level + at trend + noise of variance share x spread^2 */
+struct innovation { /* what a look adds to the one before it: value = al level + at trend + noise of variance share x
+		       spread^2 */
 	double al, at, value, share;
 };
 
-static struct innovation innovation_of(const struct forecast_look *l, const struct forecast_look *before, const struct fit *f)
+static struct innovation innovation_of(const struct forecast_look *l, const struct forecast_look *before,
+				       const struct fit *f)
 {
 	double t = log(l->work / f->work), x = log(l->rel_mse * l->work) - f->shift;
 	if (!before)
@@ -188,7 +193,9 @@ static struct fit fit(const struct forecast_history *h)
 		first++;
 	double d = fmax(end->degrees, 1);
 	/* Mean and variance of the logarithm of chi-square over its degrees, and what bursts add. */
-	struct fit f = {.work = end->work, .spread = sqrt(2 / d + 2 / (d * d) + burst * burst), .shift = -1 / d - 1 / (3 * d * d)};
+	struct fit f = {.work = end->work,
+			.spread = sqrt(2 / d + 2 / (d * d) + burst * burst),
+			.shift = -1 / d - 1 / (3 * d * d)};
 	f.seen = log(end->work / h->looks[first].work);
 	fit_level(&f, h, first);
 	f.now = (log(end->rel_mse * end->work) - f.shift - f.level) / f.spread;
@@ -226,10 +233,12 @@ static struct play play_of(const struct fit *f, struct dice *d)
 {
 	double a = normal(d), b = normal(d);
 	double trend = f->trend + f->trend_sd * a;
-	double level = f->level + f->level_sd * (f->correlation * a + sqrt(fmax(0, 1 - f->correlation * f->correlation)) * b);
+	double level =
+		f->level + f->level_sd * (f->correlation * a + sqrt(fmax(0, 1 - f->correlation * f->correlation)) * b);
 	double now = f->now + (f->level - level) / f->spread;
 	double margin = fmax(0, f->margin + f->margin_sd * normal(d));
-	return (struct play){level, trend, memory * exp(memory_sd * normal(d)), drift * normal(d), margin, now, f->cpu * exp(f->cpu_sd * normal(d)), f->wall * exp(f->wall_sd * normal(d))};
+	return (struct play){level,  trend, memory * exp(memory_sd * normal(d)), drift * normal(d),
+			     margin, now,   f->cpu * exp(f->cpu_sd * normal(d)), f->wall * exp(f->wall_sd * normal(d))};
 }
 
 /* How log(relMSE x work) will have changed after t e-folds of work. */
@@ -247,8 +256,8 @@ static double expected(const struct fit *f, const struct play *y, double work)
 }
 
 /* Rounds at which it stops. */
-static double play_target(const struct fit *f, const struct play *y, const struct plan *p, double target, enum forecast_run run,
-			  struct dice *d)
+static double play_target(const struct fit *f, const struct play *y, const struct plan *p, double target,
+			  enum forecast_run run, struct dice *d)
 {
 	double round = (double)plan_round_mutations(p);
 	double before = run == FORECAST_SAME ? f->work : 0, deviation = run == FORECAST_SAME ? y->now : 0;

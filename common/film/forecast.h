@@ -1,17 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a smaller error will cost: from the looks at the error of a render so far, or of a pilot, the work and the time at
- * which a render will stop by its target (common/film/merge.h), with 90 % intervals. Pure, deterministic, no allocation; any
- * thread.
+ * What a smaller error will cost: from the looks at the error of a render so far, or of a pilot, the work and the time
+ * at which a render will stop by its target (common/film/merge.h), with 90 % intervals. Pure, deterministic, no
+ * allocation; any thread.
  *
- * Model. x = log(relMSE x work) is a level, plus a trend in log(work): 0 where the error falls as 1/sqrt(work), above 0 where
- * light comes in rare bursts that a short render has not met, or where chains have not forgotten their seeds. What is seen of
- * it is an estimate with the spread of chi-square over the degrees of freedom; since each look holds all samples of those
- * before it, the deviations of two looks correlate as the root of the ratio of their works. Level and trend are fitted by generalized
- * least squares to the looks of the last decade or so, the trend with a prior around 0; from the last look on it dies down.
- * Renders are then played: a level, a trend, the price of a sample, and along the ladder of looks the deviations, until the
- * upper end of the estimate's interval meets the target. The quantiles of what they cost are the answer, so that margin,
- * ladder and luck of the rule are in it.
+ * Model. x = log(relMSE x work) is a level, plus a trend in log(work): 0 where the error falls as 1/sqrt(work), above 0
+ * where light comes in rare bursts that a short render has not met, or where chains have not forgotten their seeds.
+ * What is seen of it is an estimate with the spread of chi-square over the degrees of freedom; since each look holds
+ * all samples of those before it, the deviations of two looks correlate as the root of the ratio of their works. Level
+ * and trend are fitted by generalized least squares to the looks of the last decade or so, the trend with a prior
+ * around 0; from the last look on it dies down. Renders are then played: a level, a trend, the price of a sample, and
+ * along the ladder of looks the deviations, until the upper end of the estimate's interval meets the target. The
+ * quantiles of what they cost are the answer, so that margin, ladder and luck of the rule are in it.
  */
 #ifndef COMMON_FILM_FORECAST_H
 #define COMMON_FILM_FORECAST_H
@@ -21,10 +21,10 @@
 enum { FORECAST_LOOKS = 64 };
 
 struct forecast_look {
-	double work;                 /* mutations or samples, as plan_round_mutations counts */
+	double work;		     /* mutations or samples, as plan_round_mutations counts */
 	double cpu_seconds, seconds; /* of leases, of the wall clock; the bootstrap apart */
 	double rel_mse, rel_mse_upper, degrees;
-	uint64_t doubtful;           /* 1: the interval is not known (enum error_doubt), and no render ends by this look */
+	uint64_t doubtful; /* 1: the interval is not known (enum error_doubt), and no render ends by this look */
 };
 
 struct forecast_history {
@@ -46,7 +46,8 @@ enum forecast_run {
 	FORECAST_NEW,  /* a pilot's: the render starts anew, with other random numbers */
 };
 
-/* A look that is none (no finite error above 0, numbers that no render has), or of no more work than the last, is passed over. */
+/* A look that is none (no finite error above 0, numbers that no render has), or of no more work than the last, is
+ * passed over. */
 void forecast_add_look(struct forecast_history *h, const struct forecast_look *l);
 /* What an image says after these seconds. */
 void forecast_add(struct forecast_history *h, const struct plan *p, const struct canvas_image *img, double cpu_seconds,

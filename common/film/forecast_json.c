@@ -19,9 +19,10 @@ json_t *forecast_looks_to_json(const struct forecast_history *h)
 	json_t *list = json_array();
 	for (uint32_t i = 0; i < h->count; i++) {
 		const struct forecast_look *l = &h->looks[i];
-		json_array_append_new(list, json_pack("{s:f s:f s:f s:f s:f s:o s:b}", "mutations", l->work, "cpuSeconds", l->cpu_seconds,
-						      "wallSeconds", l->seconds, "relMSE", l->rel_mse, "relMSEUpper",
-						      l->rel_mse_upper, "degrees", forecast_real(l->degrees), "doubtful", l->doubtful != 0));
+		json_array_append_new(list, json_pack("{s:f s:f s:f s:f s:f s:o s:b}", "mutations", l->work,
+						      "cpuSeconds", l->cpu_seconds, "wallSeconds", l->seconds, "relMSE",
+						      l->rel_mse, "relMSEUpper", l->rel_mse_upper, "degrees",
+						      forecast_real(l->degrees), "doubtful", l->doubtful != 0));
 	}
 	return list;
 }
@@ -36,7 +37,8 @@ void forecast_looks_from_json(const json_t *list, struct forecast_history *h)
 	size_t i;
 	const json_t *o;
 	h->count = 0;
-	json_array_foreach(list, i, o) {
+	json_array_foreach(list, i, o)
+	{
 		struct forecast_look l = {.work = number(o, "mutations"),
 					  .cpu_seconds = number(o, "cpuSeconds"),
 					  .seconds = number(o, "wallSeconds"),

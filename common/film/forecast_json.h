@@ -7,7 +7,7 @@
 
 #include <jansson.h>
 
-json_t *forecast_real(double x); /* null where it is not finite */
+json_t *forecast_real(double x);				/* null where it is not finite */
 json_t *forecast_range_to_json(const struct forecast_range *r); /* {low, expected, high} */
 json_t *forecast_looks_to_json(const struct forecast_history *h);
 /* What is no look is passed over. */

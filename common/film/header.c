@@ -15,12 +15,56 @@
 #include <time.h>
 
 enum header_name {
-	H_VERSION, H_SCENE, H_INTEGRATOR, H_MIXTURE, H_OPTIONS, H_SEED, H_MIN_DEPTH, H_MAX_DEPTH, H_GROUPS, H_CHAINS, H_BOOTSTRAP, H_EPOCH,
-	H_ROUNDS, H_MUTATIONS, H_SAMPLES, H_B, H_B_ERROR, H_BEYOND, H_REL_MSE, H_REL_MSE_UPPER, H_REL_MSE_LOW_95, H_REL_MSE_HIGH_95,
-	H_REL_MSE_DEFINITION, H_REL_MSE_DOUBT, H_B_ERROR_DOUBT, H_UNVISITED, H_ACCEPTED, H_INDEPENDENT,
-	H_NAN, H_INFINITE, H_NEGATIVE, H_RAYS_CLOSEST, H_RAYS_SHADOW, H_STUCK, H_LONGEST_STUCK, H_STRATEGIES, H_NOTE, H_AGREEMENT, H_DISAGREEMENT,
-	H_R_HAT_MEDIAN, H_R_HAT_WORST, H_CLASSES, H_EFFECTS, H_MIXED, H_WALL,
-	H_CPU, H_WORKERS, H_DATE, H_END, H_CROPS,
+	H_VERSION,
+	H_SCENE,
+	H_INTEGRATOR,
+	H_MIXTURE,
+	H_OPTIONS,
+	H_SEED,
+	H_MIN_DEPTH,
+	H_MAX_DEPTH,
+	H_GROUPS,
+	H_CHAINS,
+	H_BOOTSTRAP,
+	H_EPOCH,
+	H_ROUNDS,
+	H_MUTATIONS,
+	H_SAMPLES,
+	H_B,
+	H_B_ERROR,
+	H_BEYOND,
+	H_REL_MSE,
+	H_REL_MSE_UPPER,
+	H_REL_MSE_LOW_95,
+	H_REL_MSE_HIGH_95,
+	H_REL_MSE_DEFINITION,
+	H_REL_MSE_DOUBT,
+	H_B_ERROR_DOUBT,
+	H_UNVISITED,
+	H_ACCEPTED,
+	H_INDEPENDENT,
+	H_NAN,
+	H_INFINITE,
+	H_NEGATIVE,
+	H_RAYS_CLOSEST,
+	H_RAYS_SHADOW,
+	H_STUCK,
+	H_LONGEST_STUCK,
+	H_STRATEGIES,
+	H_NOTE,
+	H_AGREEMENT,
+	H_DISAGREEMENT,
+	H_R_HAT_MEDIAN,
+	H_R_HAT_WORST,
+	H_CLASSES,
+	H_EFFECTS,
+	H_MIXED,
+	H_WALL,
+	H_CPU,
+	H_WORKERS,
+	H_DATE,
+	H_END,
+	H_CROPS,
 };
 
 enum { HEADER_STRATEGIES = 5120 };
@@ -33,8 +77,10 @@ const struct header_row header_rows[] = {
 	[H_VERSION] = {"hslt:version", STRING, false, "version of the programs"},
 	[H_SCENE] = {"hslt:scene", STRING, false, "name of the scene file"},
 	[H_INTEGRATOR] = {"hslt:integrator", STRING, false, "path, bdpt, pssmlt, hslt, ..."},
-	[H_MIXTURE] = {"hslt:mixture", STRING, false, "strategies that propose mutations, with their shares (Metropolis with several)"},
-	[H_OPTIONS] = {"hslt:options", STRING, false, "options of hslt-render and hslt-submit that make the same bits again"},
+	[H_MIXTURE] = {"hslt:mixture", STRING, false,
+		       "strategies that propose mutations, with their shares (Metropolis with several)"},
+	[H_OPTIONS] = {"hslt:options", STRING, false,
+		       "options of hslt-render and hslt-submit that make the same bits again"},
 	[H_SEED] = {"hslt:seed", STRING, false, "seed of all random numbers"},
 	[H_MIN_DEPTH] = {"hslt:minDepth", INT, false, "shortest paths, in edges"},
 	[H_MAX_DEPTH] = {"hslt:maxDepth", INT, false, "longest paths, in edges"},
@@ -46,16 +92,21 @@ const struct header_row header_rows[] = {
 	[H_MUTATIONS] = {"hslt:mutations", STRING, false, "mutations that the image holds (Metropolis only)"},
 	[H_SAMPLES] = {"hslt:samples", STRING, false, "samples a pixel that the image holds (others)"},
 	[H_B] = {"hslt:b", DOUBLE, false, "integral of X+Y+Z over the image, pooled over groups (Metropolis only)"},
-	[H_B_ERROR] = {"hslt:bError", DOUBLE, false, "its standard error, from the groups; absent where it is not known"},
+	[H_B_ERROR] = {"hslt:bError", DOUBLE, false,
+		       "its standard error, from the groups; absent where it is not known"},
 	[H_B_ERROR_DOUBT] = {"hslt:bErrorDoubt", STRING, false, "why it is not known"},
 	[H_BEYOND] = {"hslt:beyondShare", DOUBLE, false, "share of the energy in paths too long for the chains"},
 	[H_REL_MSE] = {"hslt:relMSE", DOUBLE, false, "estimated relMSE, from the variance between groups"},
-	[H_REL_MSE_UPPER] = {"hslt:relMSEUpper", DOUBLE, false, "upper end of its 90 % interval; absent where it is not known"},
-	[H_REL_MSE_LOW_95] = {"hslt:relMSELow95", DOUBLE, false, "lower end of the interval that holds this image's own relMSE in 95 % of all cases; absent where it is not known"},
+	[H_REL_MSE_UPPER] = {"hslt:relMSEUpper", DOUBLE, false,
+			     "upper end of its 90 % interval; absent where it is not known"},
+	[H_REL_MSE_LOW_95] =
+		{"hslt:relMSELow95", DOUBLE, false,
+		 "lower end of the interval that holds this image's own relMSE in 95 % of all cases; absent where it is not known"},
 	[H_REL_MSE_HIGH_95] = {"hslt:relMSEHigh95", DOUBLE, false, "its upper end; absent where it is not known"},
 	[H_REL_MSE_DEFINITION] = {"hslt:relMSEDefinition", STRING, false, "what relMSE is"},
 	[H_REL_MSE_DOUBT] = {"hslt:relMSEDoubt", STRING, false, "why the interval of relMSE is not known"},
-	[H_UNVISITED] = {"hslt:unvisitedPixels", STRING, false, "pixels to which no chain came: their error is their neighbours' (Metropolis only)"},
+	[H_UNVISITED] = {"hslt:unvisitedPixels", STRING, false,
+			 "pixels to which no chain came: their error is their neighbours' (Metropolis only)"},
 	[H_ACCEPTED] = {"hslt:accepted", STRING, false, "accepted mutations"},
 	[H_INDEPENDENT] = {"hslt:independent", STRING, false, "independent proposals of the chains"},
 	[H_NAN] = {"hslt:nan", STRING, false, "path contributions refused: not a number"},
@@ -67,19 +118,25 @@ const struct header_row header_rows[] = {
 	[H_LONGEST_STUCK] = {"hslt:longestStuck", STRING, false, "most rejections in a row"},
 	[H_STRATEGIES] = {"hslt:strategies", STRING, false, "what each strategy of the mixture did; one a line"},
 	[H_NOTE] = {"hslt:note", STRING, false, "what whoever looks at the image should know"},
-	[H_AGREEMENT] = {"hslt:agreement", STRING, false, "whether the chains agree: agree, too short, disagree (Metropolis only)"},
+	[H_AGREEMENT] = {"hslt:agreement", STRING, false,
+			 "whether the chains agree: agree, too short, disagree (Metropolis only)"},
 	[H_DISAGREEMENT] = {"hslt:disagreement", STRING, false, "what disagrees, where, by how much"},
-	[H_R_HAT_MEDIAN] = {"hslt:rHatMedian", DOUBLE, false, "potential scale reduction of chains, median over tiles with light; the layer rhat has it by tile"},
+	[H_R_HAT_MEDIAN] =
+		{"hslt:rHatMedian", DOUBLE, false,
+		 "potential scale reduction of chains, median over tiles with light; the layer rhat has it by tile"},
 	[H_R_HAT_WORST] = {"hslt:rHatWorst", DOUBLE, false, "its largest"},
-	[H_CLASSES] = {"hslt:classes", STRING, false, "energy of each class of paths in % of b, in the bootstrap and in the chains"},
+	[H_CLASSES] = {"hslt:classes", STRING, false,
+		       "energy of each class of paths in % of b, in the bootstrap and in the chains"},
 	[H_EFFECTS] = {"hslt:effects", STRING, false, "each effect, on or off, and why; one a line"},
-	[H_MIXED] = {"hslt:mixed", INT, false, "1: workers with different arithmetic took part, the bits cannot be made again"},
+	[H_MIXED] = {"hslt:mixed", INT, false,
+		     "1: workers with different arithmetic took part, the bits cannot be made again"},
 	[H_WALL] = {"hslt:wallSeconds", DOUBLE, true, "from the first bootstrap sample to the last merge"},
 	[H_CPU] = {"hslt:cpuSeconds", DOUBLE, true, "of the leases, all threads"},
 	[H_WORKERS] = {"hslt:workers", INT, true, "workers that took part (hslt-render: threads)"},
 	[H_DATE] = {"hslt:date", STRING, true, "when the image was written, UTC"},
 	/* Not compared: --mutations of as many rounds makes the same bits as the error or the time that ended them. */
-	[H_END] = {"hslt:end", STRING, true, "which bound ended the render: mutations, time, target-error, black, interrupted"},
+	[H_END] = {"hslt:end", STRING, true,
+		   "which bound ended the render: mutations, time, target-error, black, interrupted"},
 	[H_CROPS] = {"hslt:crops", INT, false, "number of crops that hslt-assemble made the image of"},
 	{NULL, 0, false, NULL},
 };
@@ -172,7 +229,8 @@ static void add_plan(struct header *h, const struct plan *p, uint64_t rounds)
 	add_count(h, H_ROUNDS, rounds);
 }
 
-static void add_convergence(struct header *h, const struct canvas_image *img, const struct plan *p, const struct convergence *a)
+static void add_convergence(struct header *h, const struct canvas_image *img, const struct plan *p,
+			    const struct convergence *a)
 {
 	if (p->kind != PLAN_CHAINS)
 		return;
@@ -258,8 +316,8 @@ static void add_extra(struct header *h, const struct header_extra *x)
 	begin_string(h, H_EFFECTS);
 	for (size_t i = 0; i < x->effect_count; i++)
 		append(h, "%s%s: %s%s (%s; %s: %s)", i ? "\n" : "", x->effects[i].name, x->effects[i].on ? "on" : "off",
-		       x->effects[i].forced ? " (forced)" : "", x->effects[i].why, x->effects[i].on ? "without it" : "saves",
-		       x->effects[i].saves);
+		       x->effects[i].forced ? " (forced)" : "", x->effects[i].why,
+		       x->effects[i].on ? "without it" : "saves", x->effects[i].saves);
 	end_string(h);
 	add_double(h, H_WALL, x->wall_seconds);
 	add_double(h, H_CPU, x->cpu_seconds);

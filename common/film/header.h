@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The image's header attributes "hslt:...", in one table: what each is called, its type, what it means. EXR has no 64-bit
- * integer, so counts are strings of decimal digits. The coordinator and hslt-render fill them in by the same function, so
- * that equal bits of the image come with an equal header; the attributes marked `excluded` say how it was made and differ.
+ * The image's header attributes "hslt:...", in one table: what each is called, its type, what it means. EXR has no
+ * 64-bit integer, so counts are strings of decimal digits. The coordinator and hslt-render fill them in by the same
+ * function, so that equal bits of the image come with an equal header; the attributes marked `excluded` say how it was
+ * made and differ.
  */
 #ifndef COMMON_FILM_HEADER_H
 #define COMMON_FILM_HEADER_H
@@ -27,14 +28,14 @@ struct header_effect { /* see render_effects */
 };
 
 struct header_extra {
-	const char *scene;   /* the scene file's name, without folders */
+	const char *scene; /* the scene file's name, without folders */
 	size_t effect_count;
 	const struct header_effect *effects;
-	bool mixed;          /* workers of different numeric fingerprints took part: the bits are not reproducible */
+	bool mixed; /* workers of different numeric fingerprints took part: the bits are not reproducible */
 	double wall_seconds, cpu_seconds;
 	uint32_t workers;
-	const char *date;    /* NULL: now, UTC */
-	const char *end;     /* merge_end_name; NULL: a preview */
+	const char *date; /* NULL: now, UTC */
+	const char *end;  /* merge_end_name; NULL: a preview */
 };
 
 enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 32768 };

@@ -48,8 +48,12 @@ static int add_r_hat(struct exr_image *out, const struct canvas_image *img)
 int image_file_encode(const struct canvas_image *img, const struct plan *p, const struct header_extra *x,
 		      unsigned char **bytes, size_t *size, struct error *e)
 {
-	struct exr_image out = {.width = img->width, .height = img->height, .full_width = p->width, .full_height = p->height,
-				.x = p->crop_x, .y = p->crop_y};
+	struct exr_image out = {.width = img->width,
+				.height = img->height,
+				.full_width = p->width,
+				.full_height = p->height,
+				.x = p->crop_x,
+				.y = p->crop_y};
 	struct header *h = mem_alloc(1, sizeof *h);
 	int rc = h ? add_planes(&out, img->rgb, "") : -ENOMEM;
 	if (rc == 0 && img->error)
@@ -93,7 +97,8 @@ static void sync_folder(const char *path)
 {
 	char folder[PATH_ROOM];
 	const char *slash = strrchr(path, '/');
-	int n = slash ? snprintf(folder, sizeof folder, "%.*s/", (int)(slash - path), path) : snprintf(folder, sizeof folder, ".");
+	int n = slash ? snprintf(folder, sizeof folder, "%.*s/", (int)(slash - path), path)
+		      : snprintf(folder, sizeof folder, ".");
 	int fd = n > 0 ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
 	if (fd < 0)
 		return;
@@ -128,7 +133,8 @@ int image_file_probe(const char *path, struct error *e)
 	return 0;
 }
 
-static int write_through(const struct target *t, const char *path, const unsigned char *bytes, size_t size, struct error *e)
+static int write_through(const struct target *t, const char *path, const unsigned char *bytes, size_t size,
+			 struct error *e)
 {
 	int fd = target_open(t, e);
 	if (fd < 0)
@@ -147,7 +153,9 @@ static int replace(const char *path, const unsigned char *bytes, size_t size, st
 		return fd;
 	mode_t mask = umask(0);
 	umask(mask);
-	int rc = write_all(fd, bytes, size) != 0 || fsync(fd) != 0 || fchmod(fd, 0666 & ~mask) != 0 ? failed(e, path, "write") : 0;
+	int rc = write_all(fd, bytes, size) != 0 || fsync(fd) != 0 || fchmod(fd, 0666 & ~mask) != 0
+			 ? failed(e, path, "write")
+			 : 0;
 	if (close(fd) != 0 && rc == 0)
 		rc = failed(e, path, "write");
 	if (rc == 0 && rename(temporary, path) != 0)

@@ -11,13 +11,14 @@
 
 struct bootstrap {
 	struct plan plan;
-	float *weights;        /* [bootstrap], in index order */
+	float *weights;	       /* [bootstrap], in index order */
 	struct batch *batches; /* [group][part]: key, counters and sums only */
 	uint32_t missing;
 	struct tail tail; /* of all weights */
 };
 
-/* Of so many samples the largest that their tail is judged by: one in 512, but no less than give it a standard error of a quarter. */
+/* Of so many samples the largest that their tail is judged by: one in 512, but no less than give it a standard error of
+ * a quarter. */
 static size_t tail_count(const struct plan *p)
 {
 	uint64_t n = p->bootstrap / 512;
@@ -136,8 +137,8 @@ void bootstrap_to_canvas(struct bootstrap *s, struct canvas *c)
 	}
 }
 
-/* Rounds between two looks at least. A look costs 15 to 17 ns a pixel and group, a mutation or a sample 2 us or more: of the work
- * since the last one a look is less than 1 % after 0.9 of them a pixel for each group. */
+/* Rounds between two looks at least. A look costs 15 to 17 ns a pixel and group, a mutation or a sample 2 us or more:
+ * of the work since the last one a look is less than 1 % after 0.9 of them a pixel for each group. */
 static uint64_t look_rounds(const struct plan *p)
 {
 	uint64_t work = (uint64_t)p->crop_width * p->crop_height * p->groups / 10 * 9, round = plan_round_mutations(p);
@@ -173,7 +174,9 @@ enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double second
 
 const char *merge_end_name(enum merge_end end, bool black)
 {
-	static const char *const names[] = {[MERGE_GOES_ON] = "interrupted", [MERGE_ROUNDS] = "mutations", [MERGE_TIME] = "time",
+	static const char *const names[] = {[MERGE_GOES_ON] = "interrupted",
+					    [MERGE_ROUNDS] = "mutations",
+					    [MERGE_TIME] = "time",
 					    [MERGE_ERROR] = "target-error"};
 	return black ? "black" : names[end];
 }

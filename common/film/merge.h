@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * What the coordinator and hslt-render do alike: gather the bootstrap in any order, draw the chains' seeds from it, and
- * decide after complete rounds whether the job is done. Depends on the plan and on batches alone, so that both sides give
- * the same bits. One thread at a time.
+ * decide after complete rounds whether the job is done. Depends on the plan and on batches alone, so that both sides
+ * give the same bits. One thread at a time.
  */
 #ifndef COMMON_FILM_MERGE_H
 #define COMMON_FILM_MERGE_H
@@ -31,10 +31,11 @@ enum merge_end { MERGE_GOES_ON, MERGE_ROUNDS, MERGE_TIME, MERGE_ERROR };
 const char *merge_end_name(enum merge_end end, bool black); /* as in the header: "target-error" */
 
 /*
- * Rounds at which the error is looked at: a geometric ladder (1 2 3 4 5 6 7 8 10 12 15 ...) of as many rounds as it takes for a
- * look to cost less than 1 % of the work since the last one. A function of the plan's counts alone, so that bits do not depend on
- * the machine. One look below the target ends the job: it is the upper end of the interval that has to be below, and looks that
- * share most of their samples are not many chances for luck (measured in tests/common/film/test_merge.c).
+ * Rounds at which the error is looked at: a geometric ladder (1 2 3 4 5 6 7 8 10 12 15 ...) of as many rounds as it
+ * takes for a look to cost less than 1 % of the work since the last one. A function of the plan's counts alone, so that
+ * bits do not depend on the machine. One look below the target ends the job: it is the upper end of the interval that
+ * has to be below, and looks that share most of their samples are not many chances for luck (measured in
+ * tests/common/film/test_merge.c).
  */
 bool merge_error_due(const struct plan *p, uint64_t rounds);
 /* The first round after this one at which the error would be looked at. */

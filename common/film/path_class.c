@@ -5,12 +5,13 @@
 
 const char *path_class_name(unsigned path_class)
 {
-#define LENGTHS(kind) {kind ", 1-2 edges", kind ", 3-4 edges", kind ", 5-8 edges", kind ", 9 edges and more"}
+#define LENGTHS(kind)                                                                                 \
+	{                                                                                             \
+		kind ", 1-2 edges", kind ", 3-4 edges", kind ", 5-8 edges", kind ", 9 edges and more" \
+	}
 	static const char *const names[PATH_CLASS_KINDS][PATH_CLASS_LENGTHS] = {
-		[PATH_ROUGH] = LENGTHS("rough"),
-		[PATH_REFLECTED] = LENGTHS("reflected"),
-		[PATH_CAUSTIC] = LENGTHS("caustic"),
-		[PATH_BOTH] = LENGTHS("reflected caustic"),
+		[PATH_ROUGH] = LENGTHS("rough"),     [PATH_REFLECTED] = LENGTHS("reflected"),
+		[PATH_CAUSTIC] = LENGTHS("caustic"), [PATH_BOTH] = LENGTHS("reflected caustic"),
 		[PATH_SMOOTH] = LENGTHS("smooth"),
 	};
 #undef LENGTHS

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Classes of paths, by how many edges they have and where their smooth vertices lie (Heckbert 1990). What chains say of the
- * energy of each is held against what the bootstrap says: a class that independent sampling hardly finds is where chains
- * agree with themselves and not with each other. Pure.
+ * Classes of paths, by how many edges they have and where their smooth vertices lie (Heckbert 1990). What chains say of
+ * the energy of each is held against what the bootstrap says: a class that independent sampling hardly finds is where
+ * chains agree with themselves and not with each other. Pure.
  */
 #ifndef COMMON_FILM_PATH_CLASS_H
 #define COMMON_FILM_PATH_CLASS_H
@@ -11,11 +11,13 @@
 
 /* Inner vertices are smooth (delta, or a lobe narrower than PATH_CLASS_ALPHA) or rough. */
 enum path_class_kind {
-	PATH_ROUGH,     /* no smooth vertex */
-	PATH_REFLECTED, /* smooth ones only between the camera and the first rough one: seen in a mirror or through glass */
-	PATH_CAUSTIC,   /* smooth ones only between the light and the last rough one, or rough ones on both sides of them */
-	PATH_BOTH,      /* smooth ones towards the camera and towards the light, a rough one between: caustics in mirrors */
-	PATH_SMOOTH,    /* smooth vertices only */
+	PATH_ROUGH,	/* no smooth vertex */
+	PATH_REFLECTED, /* smooth ones only between the camera and the first rough one: seen in a mirror or through
+			   glass */
+	PATH_CAUSTIC, /* smooth ones only between the light and the last rough one, or rough ones on both sides of them
+		       */
+	PATH_BOTH, /* smooth ones towards the camera and towards the light, a rough one between: caustics in mirrors */
+	PATH_SMOOTH, /* smooth vertices only */
 	PATH_CLASS_KINDS,
 	PATH_NO_VERTEX = PATH_CLASS_KINDS, /* where path_class_kind_next begins; as a kind it is PATH_ROUGH */
 };
@@ -28,12 +30,9 @@ enum { PATH_CLASSES = PATH_CLASS_KINDS * PATH_CLASS_LENGTHS };
 static inline enum path_class_kind path_class_kind_next(enum path_class_kind kind, bool smooth)
 {
 	static const unsigned char next[PATH_CLASS_KINDS + 1][2] = {
-		[PATH_NO_VERTEX] = {PATH_ROUGH, PATH_SMOOTH},
-		[PATH_ROUGH] = {PATH_ROUGH, PATH_CAUSTIC},
-		[PATH_SMOOTH] = {PATH_REFLECTED, PATH_SMOOTH},
-		[PATH_REFLECTED] = {PATH_REFLECTED, PATH_BOTH},
-		[PATH_CAUSTIC] = {PATH_CAUSTIC, PATH_CAUSTIC},
-		[PATH_BOTH] = {PATH_BOTH, PATH_BOTH},
+		[PATH_NO_VERTEX] = {PATH_ROUGH, PATH_SMOOTH},  [PATH_ROUGH] = {PATH_ROUGH, PATH_CAUSTIC},
+		[PATH_SMOOTH] = {PATH_REFLECTED, PATH_SMOOTH}, [PATH_REFLECTED] = {PATH_REFLECTED, PATH_BOTH},
+		[PATH_CAUSTIC] = {PATH_CAUSTIC, PATH_CAUSTIC}, [PATH_BOTH] = {PATH_BOTH, PATH_BOTH},
 	};
 	return (enum path_class_kind)next[kind][smooth];
 }
@@ -57,8 +56,9 @@ static inline enum path_class_kind path_class_kind_join(enum path_class_kind cam
 static inline unsigned path_class(unsigned edges, enum path_class_kind kind)
 {
 	unsigned row = kind == PATH_NO_VERTEX ? PATH_ROUGH : kind;
-	static const unsigned char length[] = {PATH_EDGES_1_2, PATH_EDGES_1_2, PATH_EDGES_1_2, PATH_EDGES_3_4, PATH_EDGES_3_4,
-					       PATH_EDGES_5_8, PATH_EDGES_5_8, PATH_EDGES_5_8, PATH_EDGES_5_8};
+	static const unsigned char length[] = {PATH_EDGES_1_2, PATH_EDGES_1_2, PATH_EDGES_1_2,
+					       PATH_EDGES_3_4, PATH_EDGES_3_4, PATH_EDGES_5_8,
+					       PATH_EDGES_5_8, PATH_EDGES_5_8, PATH_EDGES_5_8};
 	return row * PATH_CLASS_LENGTHS + (edges <= 8 ? length[edges] : PATH_EDGES_9_UP);
 }
 /* "caustic, 3-4 edges" */

@@ -90,8 +90,8 @@ void strategy_table(const char *mixture, const struct canvas_counts *n, char *te
 		proposed += n->strategy[i][STRATEGY_PROPOSED];
 	if (!proposed)
 		return;
-	text_put(&t, "%-*s %14s %9s %9s %14s %9s %14s %8s  %s\n", NAME, "strategy", "proposals", "accepted%", "rays/prop", "walks",
-	    "iter/walk", "reverse walks", "failed%", "failures in % of proposals");
+	text_put(&t, "%-*s %14s %9s %9s %14s %9s %14s %8s  %s\n", NAME, "strategy", "proposals", "accepted%",
+		 "rays/prop", "walks", "iter/walk", "reverse walks", "failed%", "failures in % of proposals");
 	for (int i = 0; i < count; i++) {
 		const uint64_t *c = n->strategy[i];
 		char name[NAME + 1], number[3][NUMBER];
@@ -138,32 +138,39 @@ void strategy_note(const struct plan *p, const struct canvas_counts *n, bool bla
 	if (size)
 		text[0] = 0;
 	if (black && p->kind == PLAN_CHAINS && n->counters[COUNT_SAMPLES] == 0)
-		text_put(&t, "the image is black: none of the %s bootstrap samples found light", thousands(p->bootstrap, number[0]));
+		text_put(&t, "the image is black: none of the %s bootstrap samples found light",
+			 thousands(p->bootstrap, number[0]));
 	else if (black)
 		text_put(&t, "the image is black: no sample found light");
 	if (black)
 		then = "; ";
 	if (bad) {
-		text_put(&t, "%s%s contributions were not numbers, infinite or negative, and left out", then, thousands(bad, number[0]));
+		text_put(&t, "%s%s contributions were not numbers, infinite or negative, and left out", then,
+			 thousands(bad, number[0]));
 		then = "; ";
 	}
 	uint64_t lost = n->counters[COUNT_STATES_LOST];
 	if (lost) {
-		text_put(&t, "%s%s of %s times a chain's state could not be read back, and the chain returned to where it began the epoch", then,
-		    thousands(lost, number[0]), thousands(chain_epochs(p, n), number[1]));
+		text_put(
+			&t,
+			"%s%s of %s times a chain's state could not be read back, and the chain returned to where it began the epoch",
+			then, thousands(lost, number[0]), thousands(chain_epochs(p, n), number[1]));
 		then = "; ";
 	}
 	if (stuck)
-		text_put(&t, "%s%s of %s times a chain accepted nothing during a whole epoch (%s chains); longest run: %s rejections", then,
-		    thousands(stuck, number[0]), thousands(chain_epochs(p, n), number[1]), thousands(p->chains, number[2]),
-		    thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
+		text_put(
+			&t,
+			"%s%s of %s times a chain accepted nothing during a whole epoch (%s chains); longest run: %s rejections",
+			then, thousands(stuck, number[0]), thousands(chain_epochs(p, n), number[1]),
+			thousands(p->chains, number[2]), thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
 }
 
 void strategy_add_beyond(double share, char *note, size_t size)
 {
 	size_t used = strnlen(note, size);
 	if (share > 0.001)
-		text_print(note + used, size - used,
-			   "%s%.2g %% of the light is missing: it comes by paths longer than the chains of this integrator hold (path has all of it)",
-			   used ? "; " : "", 100 * share);
+		text_print(
+			note + used, size - used,
+			"%s%.2g %% of the light is missing: it comes by paths longer than the chains of this integrator hold (path has all of it)",
+			used ? "; " : "", 100 * share);
 }

@@ -21,7 +21,8 @@ json_t *strategy_to_json(const char *mixture, const struct canvas_counts *n)
 		json_object_set_new(o, "name", json_string(name));
 		for (int k = 0; k < STRATEGY_COUNTERS; k++)
 			json_object_set_new(k < STRATEGY_FAIL_FIRST ? o : failures,
-					    strategy_counter_name((enum strategy_counter)k), integer(n->strategy[i][k]));
+					    strategy_counter_name((enum strategy_counter)k),
+					    integer(n->strategy[i][k]));
 		json_object_set_new(o, "failures", failures);
 		json_array_append_new(list, o);
 	}
@@ -34,8 +35,9 @@ void strategy_from_json(const json_t *list, struct canvas_counts *n)
 	for (size_t i = 0; i < json_array_size(list) && i < BATCH_STRATEGIES; i++) {
 		const json_t *o = json_array_get(list, i), *failures = json_object_get(o, "failures");
 		for (int k = 0; k < STRATEGY_COUNTERS; k++) {
-			json_int_t value = json_integer_value(json_object_get(k < STRATEGY_FAIL_FIRST ? o : failures,
-									      strategy_counter_name((enum strategy_counter)k)));
+			json_int_t value =
+				json_integer_value(json_object_get(k < STRATEGY_FAIL_FIRST ? o : failures,
+								   strategy_counter_name((enum strategy_counter)k)));
 			n->strategy[i][k] = value > 0 ? (uint64_t)value : 0;
 		}
 	}

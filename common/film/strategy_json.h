@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Counters of strategies as JSON: in the statistics of hslt-render, the coordinator's status and its spool. Any thread. */
+/* Counters of strategies as JSON: in the statistics of hslt-render, the coordinator's status and its spool. Any thread.
+ */
 #ifndef COMMON_FILM_STRATEGY_JSON_H
 #define COMMON_FILM_STRATEGY_JSON_H
 
@@ -7,8 +8,8 @@
 
 #include <jansson.h>
 
-/* [{"name":"hslt","proposed":900,...,"failures":{"outside":90,...}},...], one object an entry of the mixture; NULL when memory
- * is out. Numbers above 2^63-1 become that. */
+/* [{"name":"hslt","proposed":900,...,"failures":{"outside":90,...}},...], one object an entry of the mixture; NULL when
+ * memory is out. Numbers above 2^63-1 become that. */
 json_t *strategy_to_json(const char *mixture, const struct canvas_counts *n);
 /* What strategy_to_json wrote. Whatever is missing, negative or of another kind is 0. */
 void strategy_from_json(const json_t *list, struct canvas_counts *n);

@@ -2,10 +2,10 @@
 /*
  * The largest of many positive numbers, and how fast such become rare.
  *
- * The tail index a is that of a Pareto law: of all numbers beyond y the share y^-a. Below 2 their variance is infinite, below 1 their
- * mean: more of them keep on finding larger ones, and what a few say of the sum is too small. Estimated by Hill (1975, A simple general
- * approach to inference about the tail of a distribution) from the k largest, with a relative standard error of 1 / sqrt(k). Numbers
- * are positive and finite; others are left out. One thread.
+ * The tail index a is that of a Pareto law: of all numbers beyond y the share y^-a. Below 2 their variance is infinite,
+ * below 1 their mean: more of them keep on finding larger ones, and what a few say of the sum is too small. Estimated
+ * by Hill (1975, A simple general approach to inference about the tail of a distribution) from the k largest, with a
+ * relative standard error of 1 / sqrt(k). Numbers are positive and finite; others are left out. One thread.
  */
 #ifndef COMMON_FILM_TAIL_H
 #define COMMON_FILM_TAIL_H
@@ -14,7 +14,7 @@
 
 struct tail {
 	size_t held, most; /* most: of the largest that are kept; there is room for twice as many */
-	double least;      /* as many are known to be no less */
+	double least;	   /* as many are known to be no less */
 	double *y;
 };
 

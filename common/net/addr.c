@@ -67,11 +67,12 @@ int net_addr_allow(const struct net_addr *a, const char *host_port, bool safe, s
 {
 	if (safe || net_addr_is_loopback(a))
 		return 0;
-	return error_set(e, EPERM,
-			 "'%s' is not a loopback address, and without certificates what goes over the network is neither "
-			 "encrypted nor authenticated: give --tls DIR (hslt-ca makes one), or say --insecure if every machine "
-			 "that can reach it is trusted",
-			 host_port);
+	return error_set(
+		e, EPERM,
+		"'%s' is not a loopback address, and without certificates what goes over the network is neither "
+		"encrypted nor authenticated: give --tls DIR (hslt-ca makes one), or say --insecure if every machine "
+		"that can reach it is trusted",
+		host_port);
 }
 
 unsigned net_addr_port(const struct net_addr *a)

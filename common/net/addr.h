@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * "HOST:PORT", "[::1]:PORT": where a daemon listens and whom a peer calls. Whatever is not loopback needs TLS or must be asked
- * for (--insecure).
+ * "HOST:PORT", "[::1]:PORT": where a daemon listens and whom a peer calls. Whatever is not loopback needs TLS or must
+ * be asked for (--insecure).
  */
 #ifndef COMMON_NET_ADDR_H
 #define COMMON_NET_ADDR_H

@@ -136,7 +136,8 @@ static int authority_open(struct authority *a, const char *folder, bool with_key
 	if (!rc)
 		rc = path_in(path, e, folder, "", "ca.pem");
 	if (!rc && access(path, R_OK))
-		rc = error_set(e, errno, "%s: there is no authority here (hslt-ca init makes one): %s", path, strerror(errno));
+		rc = error_set(e, errno, "%s: there is no authority here (hslt-ca init makes one): %s", path,
+			       strerror(errno));
 	if (!rc)
 		rc = read_cert(path, &a->cert, e);
 	if (!rc)
@@ -183,7 +184,9 @@ static bool set_serial(X509 *cert)
 static bool set_subject(X509 *cert, const char *name)
 {
 	X509_NAME *subject = X509_NAME_new();
-	bool ok = subject && X509_NAME_add_entry_by_txt(subject, "O", MBSTRING_UTF8, (const unsigned char *)"HSLT Farm", -1, -1, 0) &&
+	bool ok = subject &&
+		  X509_NAME_add_entry_by_txt(subject, "O", MBSTRING_UTF8, (const unsigned char *)"HSLT Farm", -1, -1,
+					     0) &&
 		  X509_NAME_add_entry_by_txt(subject, "CN", MBSTRING_UTF8, (const unsigned char *)name, -1, -1, 0) &&
 		  X509_set_subject_name(cert, subject);
 	X509_NAME_free(subject);
@@ -196,7 +199,8 @@ static bool set_times(X509 *cert, double days, const X509 *issuer)
 	if (issuer && X509_cmp_time(X509_get0_notAfter(issuer), &until) < 0)
 		return ASN1_TIME_set(X509_getm_notBefore(cert), now - EARLIER) &&
 		       X509_set1_notAfter(cert, X509_get0_notAfter(issuer));
-	return ASN1_TIME_set(X509_getm_notBefore(cert), now - EARLIER) && ASN1_TIME_set(X509_getm_notAfter(cert), until);
+	return ASN1_TIME_set(X509_getm_notBefore(cert), now - EARLIER) &&
+	       ASN1_TIME_set(X509_getm_notAfter(cert), until);
 }
 
 /* A certificate without extensions and without a signature. */
@@ -228,7 +232,8 @@ static bool sign_other(const struct authority *a, X509 *cert, enum tls_role role
 	       add_extension(cert, a->cert, NID_ext_key_usage, role == TLS_COORDINATOR ? "serverAuth" : "clientAuth") &&
 	       add_extension(cert, a->cert, NID_subject_alt_name, uri) &&
 	       add_extension(cert, a->cert, NID_subject_key_identifier, "hash") &&
-	       add_extension(cert, a->cert, NID_authority_key_identifier, "keyid") && X509_sign(cert, a->key, EVP_sha256());
+	       add_extension(cert, a->cert, NID_authority_key_identifier, "keyid") &&
+	       X509_sign(cert, a->key, EVP_sha256());
 }
 
 /* ---- the list of the revoked ---- */
@@ -238,7 +243,8 @@ static int sign_list(struct authority *a, struct error *e)
 {
 	ASN1_TIME *now = ASN1_TIME_set(NULL, time(NULL));
 	bool ok = now && X509_CRL_set_version(a->list, X509_CRL_VERSION_2) &&
-		  X509_CRL_set_issuer_name(a->list, X509_get_subject_name(a->cert)) && X509_CRL_set1_lastUpdate(a->list, now) &&
+		  X509_CRL_set_issuer_name(a->list, X509_get_subject_name(a->cert)) &&
+		  X509_CRL_set1_lastUpdate(a->list, now) &&
 		  X509_CRL_set1_nextUpdate(a->list, X509_get0_notAfter(a->cert)) && X509_CRL_sort(a->list) &&
 		  X509_CRL_sign(a->list, a->key, EVP_sha256());
 	ASN1_TIME_free(now);
@@ -315,7 +321,8 @@ int authority_init(const char *folder, const char *name, double days, struct err
 		unsigned char random[4] = {0};
 		/* Two authorities of one name could not be told apart while one replaces the other. */
 		RAND_bytes(random, sizeof random);
-		snprintf(unique, sizeof unique, "%.*s-%02x%02x%02x%02x", TLS_NAME_MAX - 9, name, random[0], random[1], random[2], random[3]);
+		snprintf(unique, sizeof unique, "%.*s-%02x%02x%02x%02x", TLS_NAME_MAX - 9, name, random[0], random[1],
+			 random[2], random[3]);
 		a.key = EVP_EC_gen("P-256");
 		a.cert = a.key ? begin_cert(unique, a.key, NULL, days) : NULL;
 		if (!a.cert || !sign_own(a.cert, a.key))
@@ -367,8 +374,8 @@ static int may_renew(const struct authority *a, const char *name, enum tls_role 
 	rc = tls_read_peer(cert, &who, e);
 	X509_free(cert);
 	if (!rc && (who.role != role || strcmp(who.name, name) != 0))
-		rc = error_set(e, EEXIST, "%s is of the %s %s: --renew makes no %s of it", path, tls_role_name(who.role), who.name,
-			       tls_role_name(role));
+		rc = error_set(e, EEXIST, "%s is of the %s %s: --renew makes no %s of it", path,
+			       tls_role_name(who.role), who.name, tls_role_name(role));
 	return rc;
 }
 
@@ -377,8 +384,9 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 	char path[PATH_SIZE];
 	struct authority a;
 	if (!tls_name_ok(name) || strcmp(name, "issued") == 0)
-		return error_set(e, EINVAL, "'%s' is no name: up to %d letters, digits and ._@-, the first a letter or digit", name,
-				 TLS_NAME_MAX);
+		return error_set(e, EINVAL,
+				 "'%s' is no name: up to %d letters, digits and ._@-, the first a letter or digit",
+				 name, TLS_NAME_MAX);
 	int rc = authority_open(&a, folder, true, e);
 	if (rc)
 		return rc;
@@ -404,8 +412,8 @@ int authority_issue(const char *folder, const char *name, enum tls_role role, do
 }
 
 /* Calls `each` for every certificate in issued/ until it fails. */
-static int walk(const char *folder, int (*each)(void *user, X509 *cert, const struct tls_peer *who, struct error *e), void *user,
-		struct error *e)
+static int walk(const char *folder, int (*each)(void *user, X509 *cert, const struct tls_peer *who, struct error *e),
+		void *user, struct error *e)
 {
 	char path[PATH_SIZE];
 	int rc = path_in(path, e, folder, "", "issued");

@@ -17,7 +17,7 @@
 enum {
 	HEADER_LIMIT = 1 << 22,
 	PAYLOAD_LIMIT = 1 << 21,
-	WAITING_MAX = 4096, /* messages not yet asked for */
+	WAITING_MAX = 4096,	 /* messages not yet asked for */
 	WAITING_BYTES = 1 << 26, /* of them */
 	ANSWER_SECONDS = 60,
 	HELLO_SECONDS = 10,
@@ -66,7 +66,8 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 		return;
 	w->message.payload.limit = size;
 	cl->waiting_bytes += env->used + size;
-	if (++cl->waiting_count > WAITING_MAX || cl->waiting_bytes > WAITING_BYTES || !buf_append(&w->message.payload, payload, size)) {
+	if (++cl->waiting_count > WAITING_MAX || cl->waiting_bytes > WAITING_BYTES ||
+	    !buf_append(&w->message.payload, payload, size)) {
 		mem_free(w);
 		conn_close(cl->conn, "the coordinator sends more than it is asked for");
 		return;
@@ -147,8 +148,8 @@ int client_wait(struct client *cl, double seconds, struct client_message *m, str
 	return -EPROTO;
 }
 
-int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__BodyCase want, struct client_message *answer,
-		struct error *e)
+int client_call(struct client *cl, const Farm__Envelope *m, Farm__Envelope__BodyCase want,
+		struct client_message *answer, struct error *e)
 {
 	memset(answer, 0, sizeof *answer);
 	int rc = client_send(cl, m, NULL, 0, e);
@@ -208,7 +209,8 @@ static int say_hello(struct client *cl, const char *host_port, const char *name,
 	return rc;
 }
 
-int client_open(struct client **out, const char *host_port, const char *tls, bool insecure, const char *name, struct error *e)
+int client_open(struct client **out, const char *host_port, const char *tls, bool insecure, const char *name,
+		struct error *e)
 {
 	struct net_addr a;
 	int rc = net_addr_resolve(&a, host_port, e);
@@ -381,8 +383,8 @@ static int give_name(const char *temporary, const char *path, bool replace, stru
 	return 0;
 }
 
-static int fetch_through(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, const struct target *t,
-			 struct error *e)
+static int fetch_through(struct client *cl, struct client_message *first, uint64_t job, Farm__What what,
+			 const struct target *t, struct error *e)
 {
 	int fd = target_open(t, e);
 	if (fd < 0)
@@ -393,8 +395,8 @@ static int fetch_through(struct client *cl, struct client_message *first, uint64
 	return rc;
 }
 
-static int fetch_file(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, const char *path, bool replace,
-		      struct error *e)
+static int fetch_file(struct client *cl, struct client_message *first, uint64_t job, Farm__What what, const char *path,
+		      bool replace, struct error *e)
 {
 	char temporary[TARGET_PATH + 8];
 	struct target t;
@@ -441,9 +443,11 @@ static int take_name(const char *output, char name[CLIENT_NAME_BYTES], struct er
 	struct stat st;
 	const char *slash = strrchr(output, '/'), *last = slash ? slash + 1 : output;
 	if (!envelope_text_ok(last, CLIENT_NAME_BYTES - 1) || !*last || *last == '.' || *last == '-')
-		return error_set(e, EEXIST, "the job has no name for its image that would do here: give one with -o FILE");
+		return error_set(e, EEXIST,
+				 "the job has no name for its image that would do here: give one with -o FILE");
 	text_copy(name, CLIENT_NAME_BYTES, last);
-	return lstat(name, &st) == 0 ? error_set(e, EEXIST, "%s is there already: -o FILE replaces what is there", name) : 0;
+	return lstat(name, &st) == 0 ? error_set(e, EEXIST, "%s is there already: -o FILE replaces what is there", name)
+				     : 0;
 }
 
 int client_fetch_here(struct client *cl, uint64_t job, Farm__What what, char name[CLIENT_NAME_BYTES], struct error *e)

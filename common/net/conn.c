@@ -45,12 +45,12 @@ struct conn {
 	struct frame_reader reader;
 	struct tls_link *link; /* NULL: plaintext */
 	struct queued *queue, **queue_last;
-	size_t unsent;    /* bytes of frames that are not with the kernel, and what they cost beside */
-	size_t in_flight; /* what libuv has to write, of TLS with all its own */
-	uint64_t clock, ticked;      /* ms of its own clock, and of the loop's, at the last tick */
+	size_t unsent;		/* bytes of frames that are not with the kernel, and what they cost beside */
+	size_t in_flight;	/* what libuv has to write, of TLS with all its own */
+	uint64_t clock, ticked; /* ms of its own clock, and of the loop's, at the last tick */
 	uint64_t begun, heard, frame_begun; /* ms of its own clock, as it was then */
-	uint64_t checked;            /* ms of the loop's clock: the peer's certificate */
-	uint64_t linger_until;       /* 0: not leaving */
+	uint64_t checked;		    /* ms of the loop's clock: the peer's certificate */
+	uint64_t linger_until;		    /* 0: not leaving */
 	int open_handles;
 	bool accepted, sniffed, closing;
 	bool waits_for_peer; /* it is told why before it is cut off */
@@ -59,7 +59,8 @@ struct conn {
 	char why[256];
 };
 
-/* What was just read, or decrypted: libuv calls back with it before it reads anything else, and nobody reads from inside a callback. */
+/* What was just read, or decrypted: libuv calls back with it before it reads anything else, and nobody reads from
+ * inside a callback. */
 static _Thread_local char chunk[READ_BYTES];
 
 struct sending {
@@ -189,7 +190,8 @@ static void to_kernel(struct conn *c, struct head head, unsigned char *bytes, si
 	}
 	*s = (struct sending){.head = head, .bytes = bytes, .size = head.size + size - skip, .plain = plain};
 	s->request.data = s;
-	uv_buf_t both[] = {uv_buf_init((char *)s->head.bytes, (unsigned)head.size), uv_buf_init((char *)bytes + skip, (unsigned)(size - skip))};
+	uv_buf_t both[] = {uv_buf_init((char *)s->head.bytes, (unsigned)head.size),
+			   uv_buf_init((char *)bytes + skip, (unsigned)(size - skip))};
 	int rc = uv_write(&s->request, (uv_stream_t *)&c->tcp, both, 2, on_sent);
 	if (rc) {
 		mem_free(bytes);
@@ -223,8 +225,8 @@ static void flush(struct conn *c, size_t plain)
 	tls_link_output_taken(c->link);
 }
 
-/* The peer is told, if there is something to tell, and is given a moment to read it: data that comes after the socket is
- * closed would make the kernel throw that away. */
+/* The peer is told, if there is something to tell, and is given a moment to read it: data that comes after the socket
+ * is closed would make the kernel throw that away. */
 static void refuse(struct conn *c, int rc, const char *why)
 {
 	c->distrust = rc == -EACCES;

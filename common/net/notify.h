@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a daemon and the service manager that started it tell each other, by environment variables alone (the protocols of
- * sd_notify(3), sd_watchdog_enabled(3) and sd_listen_fds(3)); without them, nothing happens. One thread; allocates nothing.
+ * What a daemon and the service manager that started it tell each other, by environment variables alone (the protocols
+ * of sd_notify(3), sd_watchdog_enabled(3) and sd_listen_fds(3)); without them, nothing happens. One thread; allocates
+ * nothing.
  */
 #ifndef COMMON_NET_NOTIFY_H
 #define COMMON_NET_NOTIFY_H

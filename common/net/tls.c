@@ -128,7 +128,8 @@ int tls_read_peer(X509 *cert, struct tls_peer *p, struct error *e)
 	int at = X509_NAME_get_index_by_NID(subject, NID_commonName, -1);
 	const ASN1_STRING *name = at < 0 ? NULL : X509_NAME_ENTRY_get_data(X509_NAME_get_entry(subject, at));
 	size_t length = name ? (size_t)ASN1_STRING_length(name) : 0;
-	if (length > 0 && length <= TLS_NAME_MAX && strnlen((const char *)ASN1_STRING_get0_data(name), length) == length)
+	if (length > 0 && length <= TLS_NAME_MAX &&
+	    strnlen((const char *)ASN1_STRING_get0_data(name), length) == length)
 		memcpy(p->name, ASN1_STRING_get0_data(name), length);
 	if (!tls_name_ok(p->name))
 		return error_set(e, EACCES, "the certificate has no name that can be one of this farm");
@@ -270,7 +271,8 @@ static int load_store(const struct tls *t, SSL_CTX *context, bool revocations, s
 	if (!revocations && !kept)
 		return 0;
 	path_of(t, 3, path, sizeof path);
-	if (revocations && X509_load_crl_file(X509_STORE_add_lookup(store, X509_LOOKUP_file()), path, X509_FILETYPE_PEM) < 1)
+	if (revocations &&
+	    X509_load_crl_file(X509_STORE_add_lookup(store, X509_LOOKUP_file()), path, X509_FILETYPE_PEM) < 1)
 		return broken(e, EBADMSG, path);
 	X509_STORE_set_flags(store, X509_V_FLAG_CRL_CHECK);
 	return 0;
@@ -390,7 +392,8 @@ int tls_refresh(struct tls *t, struct error *e)
 	if (rc && !news)
 		return 0;
 	if (rc)
-		return error_prefix(e, rc, "TLS, the files before still hold%s", lost ? ", crl.pem too, which is gone" : "");
+		return error_prefix(e, rc, "TLS, the files before still hold%s",
+				    lost ? ", crl.pem too, which is gone" : "");
 	memcpy(t->stamps, now, sizeof now);
 	SSL_CTX_free(t->context);
 	t->context = fresh;
@@ -477,9 +480,11 @@ static int explain(struct tls_link *l, struct error *e)
 	if (ERR_GET_LIB(code) == ERR_LIB_SSL && alert == PROTOCOL_VERSION)
 		return error_set(e, EACCES, "the peer speaks no TLS 1.3: is it started without --tls?");
 	if (ERR_GET_LIB(code) == ERR_LIB_SSL && alert >= 40 && alert < 256)
-		return error_set(e, EACCES, "the peer does not accept this certificate: %s", SSL_alert_desc_string_long(alert));
+		return error_set(e, EACCES, "the peer does not accept this certificate: %s",
+				 SSL_alert_desc_string_long(alert));
 	if (verdict != X509_V_OK)
-		return error_set(e, EACCES, "the peer's certificate is not accepted: %s", X509_verify_cert_error_string(verdict));
+		return error_set(e, EACCES, "the peer's certificate is not accepted: %s",
+				 X509_verify_cert_error_string(verdict));
 	return error_set(e, EPROTO, "TLS: %s", text ? text : "nonsense on the wire");
 }
 
@@ -494,7 +499,8 @@ ssize_t tls_link_read(struct tls_link *l, void *out, size_t size, struct error *
 		return (ssize_t)got;
 	int rc;
 	switch (SSL_get_error(l->ssl, ok)) {
-	case SSL_ERROR_WANT_READ: /* all that was taken is used up: what came behind the handshake does not count for it */
+	case SSL_ERROR_WANT_READ: /* all that was taken is used up: what came behind the handshake does not count for it
+				   */
 		if (!l->open && l->taken > BEFORE_OPEN_MAX)
 			return error_set(e, EPROTO, "the TLS handshake is longer than %d bytes", BEFORE_OPEN_MAX);
 		return 0;
@@ -547,7 +553,8 @@ int tls_link_recheck(struct tls_link *l, struct error *e)
 	X509 *cert = SSL_get0_peer_certificate(l->ssl);
 	X509_STORE_CTX *sc = X509_STORE_CTX_new();
 	if (!sc || !cert ||
-	    X509_STORE_CTX_init(sc, SSL_CTX_get_cert_store(l->tls->context), cert, SSL_get_peer_cert_chain(l->ssl)) != 1 ||
+	    X509_STORE_CTX_init(sc, SSL_CTX_get_cert_store(l->tls->context), cert, SSL_get_peer_cert_chain(l->ssl)) !=
+		    1 ||
 	    X509_STORE_CTX_set_default(sc, l->listening ? "ssl_client" : "ssl_server") != 1)
 		rc = error_set(e, ENOMEM, "the peer's certificate cannot be checked again");
 	else if (X509_verify_cert(sc) != 1)

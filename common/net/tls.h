@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * TLS 1.3 (RFC 8446) with certificates on both sides, as a filter between a socket and the frames: bytes in, bytes out, no
- * socket of its own. A folder has ca.pem (the farm's authority), cert.pem and key.pem (our own), and crl.pem (what the
- * authority revoked; read when it is there). A certificate's role stands in it as a URI of the subject's other names,
- * "hslt:role:worker"; its common name is who it is. Callers accept only coordinators, coordinators only who has a role. Host
- * names are not looked at: a coordinator may move, and nobody else gets a coordinator's certificate.
- * One thread. OpenSSL allocates; what a peer can make it take is bounded before the handshake ends (records of 16 KB, 64 KB
+ * TLS 1.3 (RFC 8446) with certificates on both sides, as a filter between a socket and the frames: bytes in, bytes out,
+ * no socket of its own. A folder has ca.pem (the farm's authority), cert.pem and key.pem (our own), and crl.pem (what
+ * the authority revoked; read when it is there). A certificate's role stands in it as a URI of the subject's other
+ * names, "hslt:role:worker"; its common name is who it is. Callers accept only coordinators, coordinators only who has
+ * a role. Host names are not looked at: a coordinator may move, and nobody else gets a coordinator's certificate. One
+ * thread. OpenSSL allocates; what a peer can make it take is bounded before the handshake ends (records of 16 KB, 64 KB
  * in all) and after it (one record). No tickets, no resumption, no early data, no renegotiation.
  * Errors: -EACCES one side does not accept the other, -EPROTO nonsense on the wire, -ECONNRESET the peer has ended it.
  */
@@ -44,10 +44,10 @@ struct tls;
 /* -EPERM when others than owner and group can read the key, -ENOENT, -EBADMSG. */
 int tls_open(struct tls **t, const char *folder, struct error *e);
 void tls_close(struct tls *t); /* links that live keep what they need */
-/* Reads the files again if they have changed. 1: they had, new links work by them, and live ones are judged by them when they
- * are checked again; negative: they had and are of no use, the old ones stay (said once, then 0; each call
- * tries again, for what stood in the way may have passed). -ENOENT: crl.pem is gone; what it said holds until there is another, the
- * other files are taken up. */
+/* Reads the files again if they have changed. 1: they had, new links work by them, and live ones are judged by them
+ * when they are checked again; negative: they had and are of no use, the old ones stay (said once, then 0; each call
+ * tries again, for what stood in the way may have passed). -ENOENT: crl.pem is gone; what it said holds until there is
+ * another, the other files are taken up. */
 int tls_refresh(struct tls *t, struct error *e);
 const struct tls_peer *tls_self(const struct tls *t);
 /* The end of the authority's certificate that signed ours; 0: there is none. */

@@ -20,12 +20,12 @@ enum {
 	LEASE_SAMPLES_MOST = 1 << 20, /* chains: mutations in one lease */
 	LEASE_SAMPLES_OPEN = 1 << 18, /* chains without a bound on mutations: most in one lease */
 	LEASE_SAMPLES_LEAST = 1 << 13,
-	LEASE_SECONDS = 20,        /* of one thread */
+	LEASE_SECONDS = 20,	      /* of one thread */
 	LEASE_SAMPLES_SLOW = 1 << 15, /* fewer take no longer than that in any scene that was seen */
-	SPEED_UNKNOWN = 50000,     /* mutations or samples a second, where no pilot said it */
-	PIXEL_BYTES = 12,          /* of a tile on the wire */
+	SPEED_UNKNOWN = 50000,	      /* mutations or samples a second, where no pilot said it */
+	PIXEL_BYTES = 12,	      /* of a tile on the wire */
 	STRIP_SAMPLES_MOST = 1 << 17, /* samples in one lease */
-	STREAM_RESAMPLING = 5,        /* RNG_RESAMPLING of the renderer's random numbers */
+	STREAM_RESAMPLING = 5,	      /* RNG_RESAMPLING of the renderer's random numbers */
 };
 #define TOTAL_MOST (UINT64_C(1) << 62)
 #define LEASE_MOST (UINT64_C(1) << 40)
@@ -52,7 +52,8 @@ static uint64_t crop_pixels(const struct plan *p)
 
 uint64_t plan_extended_pixels(const struct plan *p)
 {
-	return ((uint64_t)p->crop_width + 2 * (uint64_t)p->border) * ((uint64_t)p->crop_height + 2 * (uint64_t)p->border);
+	return ((uint64_t)p->crop_width + 2 * (uint64_t)p->border) *
+	       ((uint64_t)p->crop_height + 2 * (uint64_t)p->border);
 }
 
 uint64_t plan_round_mutations(const struct plan *p)
@@ -64,7 +65,8 @@ uint64_t plan_round_mutations(const struct plan *p)
 
 static struct plan_range split(uint64_t total, uint32_t part, uint32_t parts)
 {
-	return (struct plan_range){(uint64_t)((wide)total * part / parts), (uint64_t)((wide)total * (part + 1) / parts)};
+	return (struct plan_range){(uint64_t)((wide)total * part / parts),
+				   (uint64_t)((wide)total * (part + 1) / parts)};
 }
 
 struct plan_range plan_bootstrap_range(const struct plan *p, uint32_t group, uint32_t part)
@@ -100,7 +102,8 @@ static int check_film(const struct plan *p, struct error *e)
 				 PLAN_MAX_SIZE);
 	if (p->crop_width < 1 || p->crop_height < 1 || p->crop_x >= p->width || p->crop_y >= p->height ||
 	    p->crop_width > p->width - p->crop_x || p->crop_height > p->height - p->crop_y)
-		return error_set(e, EINVAL, "the crop %u,%u,%u,%u (x,y,width,height) does not lie inside the film of %ux%u",
+		return error_set(e, EINVAL,
+				 "the crop %u,%u,%u,%u (x,y,width,height) does not lie inside the film of %ux%u",
 				 p->crop_x, p->crop_y, p->crop_width, p->crop_height, p->width, p->height);
 	if (crop_pixels(p) > PLAN_MAX_PIXELS)
 		return error_set(e, EINVAL, "the image has %llu pixels; at most %d are supported (crop it)",
@@ -123,7 +126,8 @@ static int asked_total(const struct plan_request *r, const struct plan *p, uint6
 		*total = (uint64_t)n;
 	}
 	if (r->mutations > TOTAL_MOST)
-		return error_set(e, EINVAL, "%llu mutations are more than can be counted", (unsigned long long)r->mutations);
+		return error_set(e, EINVAL, "%llu mutations are more than can be counted",
+				 (unsigned long long)r->mutations);
 	if (r->mutations && (!*total || r->mutations < *total))
 		*total = r->mutations;
 	return 0;
@@ -137,11 +141,13 @@ static uint32_t power_of_two_below(uint64_t x)
 	return p;
 }
 
-/* Mutations in a lease of a plan that time or an error ends: 32 a pixel and round, as far as 64 leases go. A lease's tiles cost about
- * 20 ns a pixel of the crop to sum, send and add, which is 2 % of half a mutation a pixel; fewer than 2^13 would not be worth sending. */
+/* Mutations in a lease of a plan that time or an error ends: 32 a pixel and round, as far as 64 leases go. A lease's
+ * tiles cost about 20 ns a pixel of the crop to sum, send and add, which is 2 % of half a mutation a pixel; fewer than
+ * 2^13 would not be worth sending. */
 static uint64_t open_lease(const struct plan *p)
 {
-	uint64_t leases = (uint64_t)p->groups * p->parts, per_pixel = crop_pixels(p) * 32 / leases, least = crop_pixels(p) / 2;
+	uint64_t leases = (uint64_t)p->groups * p->parts, per_pixel = crop_pixels(p) * 32 / leases,
+		 least = crop_pixels(p) / 2;
 	return clamp(per_pixel > least ? per_pixel : least, LEASE_SAMPLES_LEAST, LEASE_SAMPLES_OPEN);
 }
 
@@ -171,7 +177,8 @@ static enum epoch_rule choose_epoch(const struct plan_request *r, const struct p
 {
 	bool chains = p->kind == PLAN_CHAINS;
 	uint64_t unit = lease_unit(p), round = chains ? p->chains : p->groups * crop_pixels(p);
-	uint64_t usual = chains ? LEASE_SAMPLES_MOST / unit : (uint64_t)STRIP_SAMPLES_MOST * p->parts / plan_extended_pixels(p);
+	uint64_t usual =
+		chains ? LEASE_SAMPLES_MOST / unit : (uint64_t)STRIP_SAMPLES_MOST * p->parts / plan_extended_pixels(p);
 	uint64_t most = clamp(usual, 1, LEASE_SAMPLES_MOST);
 	enum epoch_rule rule = RULE_MOST;
 	if (r->epoch) {
@@ -182,8 +189,9 @@ static enum epoch_rule choose_epoch(const struct plan_request *r, const struct p
 		most = (uint64_t)power_of_two_near(LEASE_SECONDS * r->speed / (double)unit);
 		rule = RULE_SECONDS;
 	}
-	uint64_t want = total ? (uint64_t)wide_ceil_div(total, (wide)round * AIM_ROUNDS)
-			      : chains ? open_lease(p) / unit : usual;
+	uint64_t want = total	 ? (uint64_t)wide_ceil_div(total, (wide)round * AIM_ROUNDS)
+			: chains ? open_lease(p) / unit
+				 : usual;
 	*epoch = clamp(want, 1, most);
 	if (want <= most)
 		rule = total ? RULE_ROUNDS : RULE_FILM;
@@ -214,10 +222,13 @@ void plan_describe_epoch(const struct plan_request *r, const struct plan *p, cha
 	else if (rule == RULE_MOST)
 		snprintf(text, size, "epochs: the most %s in a lease without a pilot", thing);
 	else if (rule == RULE_SECONDS)
-		snprintf(text, size, "epochs: leases of about %d s of a thread that makes %.3g %s a second", LEASE_SECONDS, r->speed, thing);
+		snprintf(text, size, "epochs: leases of about %d s of a thread that makes %.3g %s a second",
+			 LEASE_SECONDS, r->speed, thing);
 	else if (rule == RULE_BANDWIDTH)
-		snprintf(text, size, "epochs: %.3g MB of tiles a lease at %.3g MB/s a thread that makes %.3g %s a second",
-			 1e-6 * (double)lease_bytes(p), 1e-6 * r->bandwidth, r->speed > 0 ? r->speed : SPEED_UNKNOWN, thing);
+		snprintf(text, size,
+			 "epochs: %.3g MB of tiles a lease at %.3g MB/s a thread that makes %.3g %s a second",
+			 1e-6 * (double)lease_bytes(p), 1e-6 * r->bandwidth, r->speed > 0 ? r->speed : SPEED_UNKNOWN,
+			 thing);
 	else if (size)
 		*text = 0;
 }
@@ -232,7 +243,8 @@ static int make_chains(const struct plan_request *r, struct plan *p, uint64_t to
 	p->groups = r->groups ? r->groups : DEFAULT_GROUPS;
 	uint64_t chains = r->chains;
 	if (!chains)
-		chains = total ? power_of_two_below(clamp(total / MUTATIONS_PER_CHAIN, 16, DEFAULT_CHAINS)) : DEFAULT_CHAINS;
+		chains = total ? power_of_two_below(clamp(total / MUTATIONS_PER_CHAIN, 16, DEFAULT_CHAINS))
+			       : DEFAULT_CHAINS;
 	uint64_t per_group = ceil_div(chains, p->groups);
 	p->parts = r->parts ? r->parts : (uint32_t)clamp(per_group, 1, DEFAULT_PARTS);
 	if (r->parts && r->chains && (chains % p->groups || per_group % p->parts))
@@ -255,7 +267,8 @@ static int make_samples(const struct plan_request *r, struct plan *p, uint64_t t
 	uint64_t rows = (uint64_t)p->crop_height + 2 * (uint64_t)p->border;
 	uint64_t groups = r->groups ? r->groups : DEFAULT_GROUPS;
 	if (r->parts > rows)
-		return error_set(e, EINVAL, "%llu rows cannot be cut into %u parts", (unsigned long long)rows, r->parts);
+		return error_set(e, EINVAL, "%llu rows cannot be cut into %u parts", (unsigned long long)rows,
+				 r->parts);
 	p->parts = r->parts ? r->parts : (uint32_t)clamp(rows, 1, DEFAULT_PARTS);
 	uint64_t spp = ceil_div(total, crop_pixels(p)); /* 0: no bound */
 	p->groups = (uint32_t)groups;
@@ -321,11 +334,13 @@ int plan_make(const struct plan_request *r, struct plan *p, struct error *e)
 	uint64_t total = 0;
 	int rc = check_film(p, e);
 	if (rc == 0 && (r->groups > PLAN_MAX_GROUPS || r->parts > PLAN_MAX_PARTS))
-		rc = error_set(e, EINVAL, "%u groups of %u parts; at most %d of %d", r->groups, r->parts, PLAN_MAX_GROUPS, PLAN_MAX_PARTS);
+		rc = error_set(e, EINVAL, "%u groups of %u parts; at most %d of %d", r->groups, r->parts,
+			       PLAN_MAX_GROUPS, PLAN_MAX_PARTS);
 	if (rc == 0)
 		rc = asked_total(r, p, &total, e);
 	if (rc == 0 && !total && !(r->seconds > 0) && !(r->target_error > 0))
-		rc = error_set(e, EINVAL, "nothing says when to end: give samples per pixel, mutations, seconds or an error");
+		rc = error_set(e, EINVAL,
+			       "nothing says when to end: give samples per pixel, mutations, seconds or an error");
 	if (rc == 0)
 		rc = r->kind == PLAN_CHAINS ? make_chains(r, p, total, e) : make_samples(r, p, total, e);
 	if (rc == 0)
@@ -349,13 +364,15 @@ static int check_mutations(const struct plan *p, struct error *e)
 {
 	int n = plan_strategy_count(p->mutations);
 	if (n < 0)
-		return error_set(e, EINVAL,
-				 "the mixture of mutations is not a list of up to %d names with weights in %d characters",
-				 PLAN_MAX_STRATEGIES, PLAN_MUTATIONS_MAX - 1);
+		return error_set(
+			e, EINVAL,
+			"the mixture of mutations is not a list of up to %d names with weights in %d characters",
+			PLAN_MAX_STRATEGIES, PLAN_MUTATIONS_MAX - 1);
 	if (!plan_text_ok(p->mutations, sizeof p->mutations))
 		return error_set(e, EINVAL, "the mixture of mutations does not end with its text");
 	if (!plan_text_ok(p->accuracy, sizeof p->accuracy) || !plan_text_ok(p->effects, sizeof p->effects))
-		return error_set(e, EINVAL, "the settings or the effects are not a text of letters, digits and @=,.:+-_");
+		return error_set(e, EINVAL,
+				 "the settings or the effects are not a text of letters, digits and @=,.:+-_");
 	if (n > 0 && p->kind != PLAN_CHAINS)
 		return error_set(e, EINVAL, "a plan without chains has a mixture of mutations");
 	return 0;
@@ -366,8 +383,8 @@ static int check_cut(const struct plan *p, struct error *e)
 	if (p->kind != PLAN_CHAINS && p->kind != PLAN_SAMPLES)
 		return error_set(e, EINVAL, "unknown kind of plan %d", (int)p->kind);
 	if (p->groups < 1 || p->groups > PLAN_MAX_GROUPS || p->parts < 1 || p->parts > PLAN_MAX_PARTS)
-		return error_set(e, EINVAL, "%u groups of %u parts; 1 to %d of 1 to %d", p->groups, p->parts, PLAN_MAX_GROUPS,
-				 PLAN_MAX_PARTS);
+		return error_set(e, EINVAL, "%u groups of %u parts; 1 to %d of 1 to %d", p->groups, p->parts,
+				 PLAN_MAX_GROUPS, PLAN_MAX_PARTS);
 	uint64_t leases = (uint64_t)p->groups * p->parts;
 	if (p->bootstrap < 1 || p->bootstrap > PLAN_MAX_BOOTSTRAP || p->bootstrap % leases)
 		return error_set(e, EINVAL, "%llu bootstrap samples are not a multiple of %llu up to %d",
@@ -379,8 +396,10 @@ static int check_cut(const struct plan *p, struct error *e)
 					 (unsigned long long)leases, PLAN_MAX_CHAINS);
 		lease_unit = p->chains / leases;
 		if (lease_unit > PLAN_MAX_LEASE_CHAINS)
-			return error_set(e, EINVAL, "%u chains in %u groups of %u parts are %llu to a lease; at most %d: take more groups or parts",
-					 p->chains, p->groups, p->parts, (unsigned long long)lease_unit, PLAN_MAX_LEASE_CHAINS);
+			return error_set(
+				e, EINVAL,
+				"%u chains in %u groups of %u parts are %llu to a lease; at most %d: take more groups or parts",
+				p->chains, p->groups, p->parts, (unsigned long long)lease_unit, PLAN_MAX_LEASE_CHAINS);
 	} else {
 		if (p->chains)
 			return error_set(e, EINVAL, "a plan without chains names %u of them", p->chains);

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job's plan (docs/design.md, rules 1): fixed when the job starts, the same for hslt-render and the farm, never a function
- * of workers or threads. Pure; any thread.
+ * A job's plan (docs/design.md, rules 1): fixed when the job starts, the same for hslt-render and the farm, never a
+ * function of workers or threads. Pure; any thread.
  *
  * Work is cut into leases. A lease is (kind, group, part, epoch); its result depends on the plan and on these alone.
  *   bootstrap, kind BOOTSTRAP: group g, part p owns the index range plan_bootstrap_range(); epoch is 0.
  *   samples (path, bdpt), kind RENDER: group g draws the sample indices of round r that are congruent to g modulo
  *     `groups`; part p owns a strip of rows.
- *   chains (pssmlt), kind RENDER: chain c belongs to group c mod groups; part p owns plan_chain_range() of them; epoch r.
+ *   chains (pssmlt), kind RENDER: chain c belongs to group c mod groups; part p owns plan_chain_range() of them; epoch
+ * r.
  */
 #ifndef COMMON_PLAN_PLAN_H
 #define COMMON_PLAN_PLAN_H
@@ -24,35 +25,36 @@ enum lease_kind { LEASE_BOOTSTRAP = 1, LEASE_RENDER = 2 };
 enum {
 	PLAN_MAX_GROUPS = 64,
 	PLAN_MAX_PIXELS = 1 << 24, /* of the crop: bounds a batch */
-	PLAN_MAX_SIZE = 65536,     /* width, height of the full film */
+	PLAN_MAX_SIZE = 65536,	   /* width, height of the full film */
 	PLAN_MAX_BORDER = 256,
 	PLAN_MAX_PARTS = 64,
 	PLAN_MAX_CHAINS = 1 << 20,
-	PLAN_MAX_LEASE_CHAINS = 1 << 14, /* their seeds, and the sizes of their states, fit into a header; the states into a payload */
+	PLAN_MAX_LEASE_CHAINS =
+		1 << 14, /* their seeds, and the sizes of their states, fit into a header; the states into a payload */
 	PLAN_MAX_BOOTSTRAP = 1 << 26,
-	PLAN_MAX_DEPTH = 128,      /* edges */
-	PLAN_MUTATIONS_MAX = 160,  /* bytes of the mixture's text, the last a 0 */
-	PLAN_MAX_STRATEGIES = 8,   /* entries of the mixture */
-	PLAN_ACCURACY_MAX = 256,      /* bytes of the text, the last a 0 */
+	PLAN_MAX_DEPTH = 128,	  /* edges */
+	PLAN_MUTATIONS_MAX = 160, /* bytes of the mixture's text, the last a 0 */
+	PLAN_MAX_STRATEGIES = 8,  /* entries of the mixture */
+	PLAN_ACCURACY_MAX = 256,  /* bytes of the text, the last a 0 */
 	PLAN_EFFECTS_MAX = 256,
 };
 
 struct plan_request {
 	char integrator[16];
 	enum plan_kind kind;
-	uint32_t width, height;                       /* full film */
+	uint32_t width, height;				  /* full film */
 	uint32_t crop_x, crop_y, crop_width, crop_height; /* width 0: the full film */
-	uint32_t border;                              /* pixels by which samples extend beyond the crop (filter) */
+	uint32_t border;				  /* pixels by which samples extend beyond the crop (filter) */
 	uint64_t seed;
-	uint64_t spp;        /* 0: none */
-	uint64_t mutations;  /* 0: none; as spp x pixels */
-	double seconds;      /* 0: none */
-	double target_error; /* 0: none */
+	uint64_t spp;		       /* 0: none */
+	uint64_t mutations;	       /* 0: none; as spp x pixels */
+	double seconds;		       /* 0: none */
+	double target_error;	       /* 0: none */
 	uint32_t min_depth, max_depth; /* edges */
 	uint32_t chains, groups;       /* 0: by the rule */
-	uint32_t parts;                /* leases of a group in a round; 0: by the rule */
+	uint32_t parts;		       /* leases of a group in a round; 0: by the rule */
 	uint64_t bootstrap, epoch;     /* 0: by the rule; epoch: mutations per chain or samples per pixel and group */
-	double speed;     /* mutations or samples a second of one thread, by a pilot: bounds a lease's time; 0: not known */
+	double speed; /* mutations or samples a second of one thread, by a pilot: bounds a lease's time; 0: not known */
 	double bandwidth; /* bytes of tiles a second that one thread may send, a setting of the coordinator; 0: any */
 	char mixture[PLAN_MUTATIONS_MAX]; /* see mutations below; the count of them has the word here */
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
@@ -64,28 +66,29 @@ struct plan {
 	uint32_t width, height, crop_x, crop_y, crop_width, crop_height, border;
 	uint64_t seed;
 	uint32_t groups, parts; /* leases per round = groups x parts */
-	uint32_t chains;        /* 0 for PLAN_SAMPLES; a multiple of groups x parts */
-	uint64_t bootstrap;     /* a multiple of groups x parts */
-	uint64_t epoch;         /* mutations per chain and epoch, or samples per pixel, group and round */
-	uint64_t rounds;        /* after which the job ends; UINT64_MAX: only time or error end it */
+	uint32_t chains;	/* 0 for PLAN_SAMPLES; a multiple of groups x parts */
+	uint64_t bootstrap;	/* a multiple of groups x parts */
+	uint64_t epoch;		/* mutations per chain and epoch, or samples per pixel, group and round */
+	uint64_t rounds;	/* after which the job ends; UINT64_MAX: only time or error end it */
 	double seconds, target_error;
 	uint32_t min_depth, max_depth;
-	/* The mixture of strategies that chains draw their proposals from, as the renderer spells it: one entry each, with
-	 * commas between, "independent=0.1,hslt=0.9". Empty: the integrator has none. Bytes behind the text are 0. */
+	/* The mixture of strategies that chains draw their proposals from, as the renderer spells it: one entry each,
+	 * with commas between, "independent=0.1,hslt=0.9". Empty: the integrator has none. Bytes behind the text are 0.
+	 */
 	char mutations[PLAN_MUTATIONS_MAX];
-	/* As the renderer spells them, bytes behind the text are 0: settings that differ from the default, "tolerance=1e-05";
-	 * effects that the scene does not call for and that are simulated all the same, or the other way round:
-	 * "all", "-dispersion,+aperture". Empty: nothing differs. */
+	/* As the renderer spells them, bytes behind the text are 0: settings that differ from the default,
+	 * "tolerance=1e-05"; effects that the scene does not call for and that are simulated all the same, or the other
+	 * way round: "all", "-dispersion,+aperture". Empty: nothing differs. */
 	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
 };
 
 /* Checks the request (sizes, crop, counts) and fills in what it leaves open. -EINVAL with a sentence. */
 int plan_make(const struct plan_request *r, struct plan *p, struct error *e);
 /*
- * The length of an epoch that nobody asked for. A job with a bound on its mutations has 8 rounds, one without has 32 mutations a
- * pixel in each; no lease has more than a million mutations, or, where the pilot's speed is known, takes about 20 s of one thread at
- * most (rounded to a power of two, so that the pilot's noise seldom shows). Where a bandwidth is set an epoch is at least so long
- * that the tiles of a lease do not exceed it, but no longer than the job.
+ * The length of an epoch that nobody asked for. A job with a bound on its mutations has 8 rounds, one without has 32
+ * mutations a pixel in each; no lease has more than a million mutations, or, where the pilot's speed is known, takes
+ * about 20 s of one thread at most (rounded to a power of two, so that the pilot's noise seldom shows). Where a
+ * bandwidth is set an epoch is at least so long that the tiles of a lease do not exceed it, but no longer than the job.
  */
 /* A pilot would tell something: a lease might take longer than that. */
 bool plan_wants_speed(const struct plan_request *r, const struct plan *p);
@@ -110,17 +113,18 @@ struct plan_range plan_bootstrap_range(const struct plan *p, uint32_t group, uin
 struct plan_range plan_chain_range(const struct plan *p, uint32_t part);
 /* Rows of the crop extended by the border, counted from the top of the extended crop: a part's strip. */
 struct plan_range plan_row_range(const struct plan *p, uint32_t part);
-uint32_t plan_parts_usual(const struct plan *p); /* by the rule, for its chains and groups or its film */
+uint32_t plan_parts_usual(const struct plan *p);     /* by the rule, for its chains and groups or its film */
 uint64_t plan_round_mutations(const struct plan *p); /* samples or mutations in one round, all groups */
 uint64_t plan_extended_pixels(const struct plan *p); /* (crop + 2 border) in each direction */
 
-/* Entries of a mixture's text; 0: it is empty, -1: it is none (an empty entry, too many, a character that none has, or no
- * end within PLAN_MUTATIONS_MAX bytes). */
+/* Entries of a mixture's text; 0: it is empty, -1: it is none (an empty entry, too many, a character that none has, or
+ * no end within PLAN_MUTATIONS_MAX bytes). */
 int plan_strategy_count(const char *mixture);
 /* The i-th entry without its weight ("hslt", "hslt@b2c0"), cut to the size. */
 void plan_strategy_name(const char *mixture, uint32_t i, char *name, size_t size);
 
-/* A text of a plan: ends within `size` bytes, nothing behind its end, and nothing in it that a shell would take for its own. */
+/* A text of a plan: ends within `size` bytes, nothing behind its end, and nothing in it that a shell would take for its
+ * own. */
 bool plan_text_ok(const char *text, size_t size);
 
 /* Systematic resampling of a group's seeds over its bootstrap weights, in index order (docs/design.md, rules 2).

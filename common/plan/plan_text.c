@@ -49,11 +49,14 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 	struct text t = {text, size};
 	unsigned long long epoch = (unsigned long long)p->epoch, bootstrap = (unsigned long long)p->bootstrap;
 	if (p->kind == PLAN_CHAINS)
-		text_put(&t, "%s: %u chains in %u groups, %llu bootstrap samples, epochs of %llu mutations a chain in %u leases",
-		    p->integrator, p->chains, p->groups, bootstrap, epoch, p->groups * p->parts);
+		text_put(
+			&t,
+			"%s: %u chains in %u groups, %llu bootstrap samples, epochs of %llu mutations a chain in %u leases",
+			p->integrator, p->chains, p->groups, bootstrap, epoch, p->groups * p->parts);
 	else
-		text_put(&t, "%s: %u groups, %llu samples a pixel, group and round in %u leases, grid from %llu samples",
-		    p->integrator, p->groups, epoch, p->groups * p->parts, bootstrap);
+		text_put(&t,
+			 "%s: %u groups, %llu samples a pixel, group and round in %u leases, grid from %llu samples",
+			 p->integrator, p->groups, epoch, p->groups * p->parts, bootstrap);
 	if (*p->mutations)
 		text_put(&t, ", mutations %s", p->mutations);
 	if (*p->accuracy)
@@ -61,7 +64,7 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 	if (*p->effects)
 		text_put(&t, ", effects %s", p->effects);
 	text_put(&t, "; ");
-	const char *or = "";
+	const char * or = "";
 	if (p->rounds != UINT64_MAX) {
 		unsigned long long rounds = (unsigned long long)p->rounds;
 		if (p->kind == PLAN_CHAINS)
@@ -92,25 +95,28 @@ void plan_describe_changes(const struct plan_request *r, const struct plan *p, c
 		text_put(&t, "chains %u -> %u: a multiple of the %u leases of a round. ", r->chains, p->chains, leases);
 	if (r->bootstrap && r->bootstrap != p->bootstrap)
 		text_put(&t, "bootstrap %llu -> %llu: a multiple of the %u leases. ", (unsigned long long)r->bootstrap,
-		    (unsigned long long)p->bootstrap, leases);
+			 (unsigned long long)p->bootstrap, leases);
 	if (p->rounds == UINT64_MAX)
 		return;
 	unsigned long long pixels = (unsigned long long)p->crop_width * p->crop_height;
 	unsigned long long made = p->kind == PLAN_CHAINS ? p->rounds * plan_round_mutations(p)
-							  : p->rounds * p->groups * p->epoch * pixels;
+							 : p->rounds * p->groups * p->epoch * pixels;
 	bool by_spp = r->spp && (!r->mutations || r->spp <= r->mutations / pixels);
 	unsigned long long asked = by_spp ? r->spp * pixels : r->mutations;
 	if (asked != made)
-		text_put(&t, "%s %llu -> %llu: whole rounds. ", p->kind == PLAN_CHAINS ? "mutations" : "samples", asked, made);
+		text_put(&t, "%s %llu -> %llu: whole rounds. ", p->kind == PLAN_CHAINS ? "mutations" : "samples", asked,
+			 made);
 }
 
 void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size)
 {
 	struct text t = {text, size};
 	rounds += rounds == 0; /* a black bootstrap ends a job before its first round, whatever the bound */
-	text_put(&t, "--integrator %s --size %ux%u --crop %u,%u,%u,%u --seed %llu --min-depth %u --max-depth %u --groups %u",
-	    p->integrator, p->width, p->height, p->crop_x, p->crop_y, p->crop_width, p->crop_height,
-	    (unsigned long long)p->seed, p->min_depth, p->max_depth, p->groups);
+	text_put(
+		&t,
+		"--integrator %s --size %ux%u --crop %u,%u,%u,%u --seed %llu --min-depth %u --max-depth %u --groups %u",
+		p->integrator, p->width, p->height, p->crop_x, p->crop_y, p->crop_width, p->crop_height,
+		(unsigned long long)p->seed, p->min_depth, p->max_depth, p->groups);
 	if (p->parts != plan_parts_usual(p))
 		text_put(&t, " --parts %u", p->parts);
 	if (*p->mutations)
@@ -121,9 +127,9 @@ void plan_options(const struct plan *p, uint64_t rounds, char *text, size_t size
 		text_put(&t, " --effects=%s", p->effects);
 	if (p->kind == PLAN_CHAINS)
 		text_put(&t, " --chains %u --bootstrap %llu --epoch %llu --mutations %llu", p->chains,
-		    (unsigned long long)p->bootstrap, (unsigned long long)p->epoch,
-		    (unsigned long long)(rounds * plan_round_mutations(p)));
+			 (unsigned long long)p->bootstrap, (unsigned long long)p->epoch,
+			 (unsigned long long)(rounds * plan_round_mutations(p)));
 	else
 		text_put(&t, " --bootstrap %llu --epoch %llu --spp %llu", (unsigned long long)p->bootstrap,
-		    (unsigned long long)p->epoch, (unsigned long long)(rounds * p->groups * p->epoch));
+			 (unsigned long long)p->epoch, (unsigned long long)(rounds * p->groups * p->epoch));
 }

@@ -21,7 +21,8 @@ uint32_t states_payload_max(const struct plan *p)
 
 uint32_t batch_payload_max(const struct plan *p)
 {
-	uint64_t across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE, down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
+	uint64_t across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE,
+		 down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
 	uint64_t tiles = across * down * exr_tile_size_max(TILE_SIZE, TILE_SIZE);
 	uint64_t moments = batch_moment_count(p, LEASE_RENDER) * sizeof(float);
 	uint64_t render = tiles + states_payload_max(p) + moments;
@@ -47,7 +48,8 @@ int states_digest(const struct chain_state *states, uint32_t count, struct blob_
 }
 
 /* The message borrows the digest. */
-static int digest_to_wire(const struct chain_state *states, uint32_t count, struct blob_hash *h, ProtobufCBinaryData *out, struct error *e)
+static int digest_to_wire(const struct chain_state *states, uint32_t count, struct blob_hash *h,
+			  ProtobufCBinaryData *out, struct error *e)
 {
 	if (count == 0)
 		return 0;
@@ -63,13 +65,16 @@ int states_digest_from_wire(const ProtobufCBinaryData *m, struct blob_hash *out,
 	return 0;
 }
 
-static int check_digest(const struct chain_state *states, uint32_t count, const ProtobufCBinaryData *m, struct blob_hash *out, struct error *e)
+static int check_digest(const struct chain_state *states, uint32_t count, const ProtobufCBinaryData *m,
+			struct blob_hash *out, struct error *e)
 {
 	struct blob_hash said;
 	int rc = states_digest_from_wire(m, &said, e);
 	if (!rc)
 		rc = states_digest(states, count, out, e);
-	return rc || blob_hash_equal(&said, out) ? rc : error_set(e, EBADMSG, "the chain states are not those of their digest");
+	return rc || blob_hash_equal(&said, out)
+		       ? rc
+		       : error_set(e, EBADMSG, "the chain states are not those of their digest");
 }
 
 /* ---- packing ---- */
@@ -239,7 +244,8 @@ static int cut_states(struct cutter *c, const uint32_t *sizes, size_t count, str
 	return 0;
 }
 
-static int cut_tiles(struct cutter *c, const Farm__LeaseResult *m, const struct plan *p, struct batch *b, struct error *e)
+static int cut_tiles(struct cutter *c, const Farm__LeaseResult *m, const struct plan *p, struct batch *b,
+		     struct error *e)
 {
 	b->tiles = mem_alloc(m->n_tile_sizes, sizeof *b->tiles);
 	if (!b->tiles)
@@ -256,7 +262,8 @@ static int cut_tiles(struct cutter *c, const Farm__LeaseResult *m, const struct 
 	return 0;
 }
 
-static int cut_floats(struct cutter *c, const char *what, uint64_t count, float **out, uint64_t *out_count, struct error *e)
+static int cut_floats(struct cutter *c, const char *what, uint64_t count, float **out, uint64_t *out_count,
+		      struct error *e)
 {
 	if (count > c->left / sizeof(float))
 		return error_set(e, EBADMSG, "%llu %s do not fit the payload", (unsigned long long)count, what);
@@ -317,7 +324,8 @@ int batch_unpack(struct batch *b, const struct plan *p, const Farm__LeaseResult 
 	return rc;
 }
 
-const unsigned char *batch_tile_bytes(const Farm__LeaseResult *m, const unsigned char *payload, size_t index, size_t *size)
+const unsigned char *batch_tile_bytes(const Farm__LeaseResult *m, const unsigned char *payload, size_t index,
+				      size_t *size)
 {
 	for (size_t i = 0; i < index; i++)
 		payload += m->tile_sizes[i];

@@ -132,7 +132,8 @@ int envelope_unpack(struct envelope *env, const unsigned char *bytes, size_t siz
 	if (fault) {
 		bool memory_out = env->memory_out;
 		envelope_fini(env);
-		return memory_out ? error_set(e, ENOMEM, "no memory for a message") : error_set(e, EBADMSG, "%s", fault);
+		return memory_out ? error_set(e, ENOMEM, "no memory for a message")
+				  : error_set(e, EBADMSG, "%s", fault);
 	}
 	if (has_check(m) && !check_holds(bytes, size)) {
 		envelope_fini(env);
@@ -152,8 +153,8 @@ void envelope_fini(struct envelope *env)
 	memset(env, 0, sizeof *env);
 }
 
-static int pack(const Farm__Envelope *message, const void *payload, size_t payload_size, unsigned char **bytes, size_t *size,
-		struct error *e)
+static int pack(const Farm__Envelope *message, const void *payload, size_t payload_size, unsigned char **bytes,
+		size_t *size, struct error *e)
 {
 	size_t header = farm__envelope__get_packed_size(message);
 	if (header == 0 || header > UINT32_MAX || payload_size > UINT32_MAX)

@@ -30,7 +30,8 @@ void frame_prefix_read(const unsigned char in[FRAME_PREFIX], uint32_t *header_si
 	*payload_size = read_u32(in + 4);
 }
 
-void frame_seal(unsigned char out[FRAME_SEALED_PREFIX], const unsigned char prefix[FRAME_PREFIX], const unsigned char *content, size_t size)
+void frame_seal(unsigned char out[FRAME_SEALED_PREFIX], const unsigned char prefix[FRAME_PREFIX],
+		const unsigned char *content, size_t size)
 {
 	memcpy(out, prefix, FRAME_PREFIX);
 	write_u32(out + 8, crc32c(0, content, size));
@@ -56,7 +57,8 @@ static uint32_t prefix_wanted(const struct frame_reader *r)
 
 static bool is_whole(const struct frame_reader *r)
 {
-	return r->prefix_size && r->prefix_size == prefix_wanted(r) && r->header.size == r->header_size && r->payload.size == r->payload_size;
+	return r->prefix_size && r->prefix_size == prefix_wanted(r) && r->header.size == r->header_size &&
+	       r->payload.size == r->payload_size;
 }
 
 bool frame_reader_is_midway(const struct frame_reader *r)
@@ -80,7 +82,8 @@ void frame_reader_drop(struct frame_reader *r)
 
 static int changed(struct error *e)
 {
-	return error_set(e, EILSEQ, "bytes were changed on their way: the checksum of a message is not that of its bytes");
+	return error_set(e, EILSEQ,
+			 "bytes were changed on their way: the checksum of a message is not that of its bytes");
 }
 
 static int take_prefix(struct frame_reader *r, struct error *e)
@@ -101,7 +104,8 @@ static int take_prefix(struct frame_reader *r, struct error *e)
 	return 0;
 }
 
-static int take_part(struct frame_reader *r, struct buf *b, size_t want, const unsigned char *bytes, size_t count, size_t *used, struct error *e)
+static int take_part(struct frame_reader *r, struct buf *b, size_t want, const unsigned char *bytes, size_t count,
+		     size_t *used, struct error *e)
 {
 	size_t n = want - b->size < count - *used ? want - b->size : count - *used;
 	if (!buf_append(b, bytes + *used, n))

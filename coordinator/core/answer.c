@@ -124,7 +124,8 @@ static void count(struct peer *p, struct job *j, enum verdict v)
 }
 
 /* Two workers must say the same before it counts. */
-static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct peer *p, const struct event *ev, const char **why)
+static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct peer *p, const struct event *ev,
+			   const char **why)
 {
 	/* A late answer of a class that the job has left is not to be held against those of another. */
 	if (!j->class && !verify_may_begin(f, j, p->class)) {
@@ -151,15 +152,16 @@ static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct
 	return FAULT;
 }
 
-/* The job's workers cannot compute it, or one of them is wrong each time in the same way: no third opinion will help. */
+/* The job's workers cannot compute it, or one of them is wrong each time in the same way: no third opinion will help.
+ */
 static void give_up_where_hopeless(struct farm *f, struct job *j, struct slot *s, const struct lease_key *k)
 {
 	char names[160], text[256];
 	if (j->proofs[s - j->slots].count < VERIFY_MOST)
 		return;
 	verify_names(j, s, names, sizeof names);
-	text_print(text, sizeof text, "no two of %d workers agree on group %u part %u epoch %llu: %s", VERIFY_MOST, k->group, k->part,
-		 (unsigned long long)k->epoch, names);
+	text_print(text, sizeof text, "no two of %d workers agree on group %u part %u epoch %llu: %s", VERIFY_MOST,
+		   k->group, k->part, (unsigned long long)k->epoch, names);
 	rounds_end(f, j, END_FAILED, text);
 }
 
@@ -195,7 +197,8 @@ void answer_stored(struct farm *f, const struct event *ev)
 	const struct lease_key *k = &ev->lease.key;
 	struct job *j = farm_find_job(f, k->job);
 	struct slot *s = j && job_is_live(j) ? slot_of(j, k) : NULL;
-	if (!is_next(j, s, k) || s->next - j->rounds > 1 || j->ending != END_NONE || (j->evaluating && would_complete(j, s)))
+	if (!is_next(j, s, k) || s->next - j->rounds > 1 || j->ending != END_NONE ||
+	    (j->evaluating && would_complete(j, s)))
 		return;
 	struct action *a = update_add(f, ACTION_MERGE);
 	a->key = *k;
@@ -204,7 +207,7 @@ void answer_stored(struct farm *f, const struct event *ev)
 	lease_revoke_slot(f, s);
 	if (verify_chosen(j, k))
 		verify_settle(f, j, s, &ev->lease.digest);
-	s->doubt = (struct doubt){ 0 };
+	s->doubt = (struct doubt){0};
 	j->progress_floor = job_progress(j, f->now);
 	if (job_merge(j, s, f->now, NAN))
 		rounds_complete(f, j);
@@ -281,7 +284,8 @@ void answer_failed(struct farm *f, const struct event *ev)
 	if (ev->lease.own) /* says nothing about the job */
 		return;
 	j->tries += !again;
-	bool fatal = failure_quorum_add(&s->failure_quorum, f, p->who), in_all = failure_quorum_add(&j->failure_quorum, f, p->who);
+	bool fatal = failure_quorum_add(&s->failure_quorum, f, p->who),
+	     in_all = failure_quorum_add(&j->failure_quorum, f, p->who);
 	if (!fatal && (job_is_proven(j) || !(in_all || never_works(f, j))))
 		return;
 	if (was_lost)

@@ -21,9 +21,11 @@ static const char *name_of(const struct farm *f, uint64_t who)
 const char *farm_maker(const struct farm *f, const struct lease_key *k)
 {
 	const struct job *j = farm_find_job(f, k->job);
-	bool known_slot = j && job_is_live(j) && k->kind == j->kind && k->group < j->plan.groups && k->part < j->plan.parts;
+	bool known_slot =
+		j && job_is_live(j) && k->kind == j->kind && k->group < j->plan.groups && k->part < j->plan.parts;
 	const struct slot *s = known_slot ? job_slot(j, k->group, k->part) : NULL;
-	return s && s->next == k->epoch && k->epoch > 0 ? name_of(f, s->doubt.maker) : "?"; /* who made others is not remembered */
+	return s && s->next == k->epoch && k->epoch > 0 ? name_of(f, s->doubt.maker)
+							: "?"; /* who made others is not remembered */
 }
 
 static bool is_party(const struct slot *s, uint64_t who)
@@ -46,8 +48,11 @@ static bool third_is_here(const struct farm *f, const struct job *j, const struc
 static struct lease_key key_of(const struct job *j, const struct slot *s)
 {
 	uint32_t index = (uint32_t)(s - j->slots);
-	return (struct lease_key){ .job = j->id, .kind = j->kind, .group = index / j->plan.parts, .part = index % j->plan.parts,
-				   .epoch = s->next };
+	return (struct lease_key){.job = j->id,
+				  .kind = j->kind,
+				  .group = index / j->plan.parts,
+				  .part = index % j->plan.parts,
+				  .epoch = s->next};
 }
 
 bool doubt_waits(const struct slot *s)
@@ -66,13 +71,15 @@ static void take_back(struct farm *f, struct job *j, struct slot *s, const char 
 	struct doubt *d = &s->doubt;
 	uint64_t maker = d->maker, reach = d->reach > s->next ? d->reach : s->next;
 	job_take_back(f, j, s);
-	*d = (struct doubt){ .maker = d->before, .barred = maker, .reach = reach, .again = d->again + 1 };
+	*d = (struct doubt){.maker = d->before, .barred = maker, .reach = reach, .again = d->again + 1};
 	struct action *a = update_add(f, ACTION_TAKE_BACK);
 	a->who = maker;
 	a->job = j->id;
 	a->key = key_of(j, s);
-	text_print(f->text, sizeof f->text, "group %u part %u epoch %llu is computed again: its chain states, made by %s, could not be read by %s",
-		   a->key.group, a->key.part, (unsigned long long)a->key.epoch, name_of(f, maker), refusers);
+	text_print(
+		f->text, sizeof f->text,
+		"group %u part %u epoch %llu is computed again: its chain states, made by %s, could not be read by %s",
+		a->key.group, a->key.part, (unsigned long long)a->key.epoch, name_of(f, maker), refusers);
 	a->text = f->text;
 }
 
@@ -82,9 +89,10 @@ static void begin_anew(struct farm *f, struct job *j, struct slot *s, const char
 	lease_revoke_slot(f, s); /* who has the states still */
 	s->doubt.anew = true;
 	j->anew++;
-	text_print(f->text, sizeof f->text,
-		   "the chains of group %u part %u begin epoch %llu anew from their seeds: their states, made by %s, could not be read by %s", k.group,
-		   k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker), refusers);
+	text_print(
+		f->text, sizeof f->text,
+		"the chains of group %u part %u begin epoch %llu anew from their seeds: their states, made by %s, could not be read by %s",
+		k.group, k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker), refusers);
 	struct action *a = update_add(f, ACTION_CHAINS_ANEW);
 	a->job = j->id;
 	a->key = k;
@@ -98,8 +106,7 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 	bool second = d->refuser && d->refuser != who && d->maker != who;
 	if (!d->refuser)
 		d->refuser = who;
-	text_print(j->text, sizeof j->text, "%s: %s (made by %s)", p->name, text,
-		   name_of(f, d->maker));
+	text_print(j->text, sizeof j->text, "%s: %s (made by %s)", p->name, text, name_of(f, d->maker));
 	if (!second && third_is_here(f, j, s)) {
 		job_place(j, s);
 		return;
@@ -121,13 +128,17 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 	job_place(j, s);
 }
 
-void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who, const struct lease_key *k)
+void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who,
+		  const struct lease_key *k)
 {
 	struct doubt *d = &s->doubt;
 	bool went_on = doubt_waits(s) && !is_party(s, who->id) && !j->mixed;
 	struct identity *refuser = went_on ? known(f, d->refuser) : NULL;
 	bool behind = s->next < d->reach;
-	*d = (struct doubt){ .maker = who->id, .before = d->anew ? 0 : d->maker, .reach = behind ? d->reach : 0, .again = behind ? d->again : 0 };
+	*d = (struct doubt){.maker = who->id,
+			    .before = d->anew ? 0 : d->maker,
+			    .reach = behind ? d->reach : 0,
+			    .again = behind ? d->again : 0};
 	if (refuser)
 		worker_registry_wrong(f, refuser, "refused good chain states", k);
 }
@@ -139,9 +150,11 @@ bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t siz
 		if (!doubt_waits(s) || s->holders)
 			continue;
 		const struct lease_key k = key_of(j, s);
-		text_print(text, size, "a third worker is to say whether the chain states of group %u part %u epoch %llu are wrong: %s made them, %s could not read them",
-			   k.group, k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker),
-			   name_of(f, s->doubt.refuser));
+		text_print(
+			text, size,
+			"a third worker is to say whether the chain states of group %u part %u epoch %llu are wrong: %s made them, %s could not read them",
+			k.group, k.part, (unsigned long long)k.epoch, name_of(f, s->doubt.maker),
+			name_of(f, s->doubt.refuser));
 		return true;
 	}
 	return false;

@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Chain states that a worker could not go on from. Who refuses them is not to blame, nor is who made them until a second worker
- * says the same: the lease goes to another worker, neither to the one nor to the other while there is a third.
+ * Chain states that a worker could not go on from. Who refuses them is not to blame, nor is who made them until a
+ * second worker says the same: the lease goes to another worker, neither to the one nor to the other while there is a
+ * third.
  *  - The third goes on: the refusal was wrong, and is counted as a wrong result.
- *  - The third refuses, too: the states are wrong, which is counted against who made them. The epoch that they are the end of is
- *    taken back, sums and all, and computed again from the states before it, not by who made them while there is another: the job
- *    has the bits that it would have had.
+ *  - The third refuses, too: the states are wrong, which is counted against who made them. The epoch that they are the
+ * end of is taken back, sums and all, and computed again from the states before it, not by who made them while there is
+ * another: the job has the bits that it would have had.
  *  - There is no third: the same, and nobody is to blame.
- * Where the shell no longer has what came before, or an epoch was computed again AGAIN_MOST times and its states are refused still,
- * the chains begin anew from their seeds: an epoch that depends on the plan alone, and what came before it stays in the films.
- * A job does not fail by it. Memory of a slot; but for who made its states nothing survives a restart of the coordinator, which asks
- * again.
+ * Where the shell no longer has what came before, or an epoch was computed again AGAIN_MOST times and its states are
+ * refused still, the chains begin anew from their seeds: an epoch that depends on the plan alone, and what came before
+ * it stays in the films. A job does not fail by it. Memory of a slot; but for who made its states nothing survives a
+ * restart of the coordinator, which asks again.
  */
 #ifndef COORDINATOR_CORE_DOUBT_H
 #define COORDINATOR_CORE_DOUBT_H
@@ -27,13 +28,13 @@ struct peer;
 struct slot;
 
 struct doubt {
-	uint64_t maker;   /* the worker whose states the next epoch begins with; 0: not known */
+	uint64_t maker;	  /* the worker whose states the next epoch begins with; 0: not known */
 	uint64_t before;  /* the one whose states that worker began with; 0: not known */
 	uint64_t refuser; /* the first that could not read them; 0: nobody */
 	uint64_t barred;  /* whose epoch is computed again; 0: nobody's */
-	uint64_t reach;   /* epochs were taken back from here */
-	uint32_t again;   /* so many since then */
-	bool anew;        /* its chains begin the next epoch from their seeds */
+	uint64_t reach;	  /* epochs were taken back from here */
+	uint32_t again;	  /* so many since then */
+	bool anew;	  /* its chains begin the next epoch from their seeds */
 };
 enum { AGAIN_MOST = 4 };
 
@@ -43,7 +44,8 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 bool doubt_waits(const struct slot *s);
 bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p);
 /* A result of the slot's next epoch is merged: its sender went on from the states. Before job_merge. */
-void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who, const struct lease_key *k);
+void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who,
+		  const struct lease_key *k);
 /* Why the job waits for another worker; false: it does not. */
 bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t size);
 

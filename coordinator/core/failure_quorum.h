@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Workers that failed with the same thing. Three of them say that it is the thing's fault, each counted once however often it
- * failed and called again; of as many certificates, up to three, as the farm knows workers of, for whoever has one can give
- * himself any number of names. Pure but for the list.
+ * Workers that failed with the same thing. Three of them say that it is the thing's fault, each counted once however
+ * often it failed and called again; of as many certificates, up to three, as the farm knows workers of, for whoever has
+ * one can give himself any number of names. Pure but for the list.
  */
 #ifndef COORDINATOR_CORE_FAILURE_QUORUM_H
 #define COORDINATOR_CORE_FAILURE_QUORUM_H

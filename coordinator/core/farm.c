@@ -31,9 +31,11 @@ void farm_config_init(struct farm_config *c)
 
 static int check(const struct farm_config *c, struct error *e)
 {
-	if (c->first_job == 0 || c->max_jobs == 0 || c->max_ended == 0 || c->max_peers == 0 || c->max_peer_leases == 0 || c->max_faults == 0)
+	if (c->first_job == 0 || c->max_jobs == 0 || c->max_ended == 0 || c->max_peers == 0 ||
+	    c->max_peer_leases == 0 || c->max_faults == 0)
 		return error_set(e, EINVAL, "a farm without jobs, workers or leases");
-	if (!(c->silent_after > 0 && c->forget_after >= c->silent_after && c->first_timeout > 0 && c->min_timeout > 0 && c->first_copy > 0 && c->idle_timeout > 0 && c->first_pause > 0))
+	if (!(c->silent_after > 0 && c->forget_after >= c->silent_after && c->first_timeout > 0 && c->min_timeout > 0 &&
+	      c->first_copy > 0 && c->idle_timeout > 0 && c->first_pause > 0))
 		return error_set(e, EINVAL, "the farm's times are not in order");
 	return 0;
 }

@@ -26,7 +26,7 @@ static void begin(struct job *j, enum lease_kind kind, uint64_t limit, double no
 		struct slot *s = &j->slots[i];
 		assert(!s->leases);
 		s->next = 0;
-		s->doubt = (struct doubt){ 0 };
+		s->doubt = (struct doubt){0};
 		job_place(j, s);
 	}
 }
@@ -124,7 +124,7 @@ void job_hold(struct job *j, enum job_hold which, const char *why, double now)
 	if (!was || job_is_held(j))
 		return;
 	j->progress_floor = job_progress(j, now); /* moving its clock rounds */
-	double pause = now - j->held_since; /* its times are as if that had not been; NAN stays */
+	double pause = now - j->held_since;	  /* its times are as if that had not been; NAN stays */
 	j->started += pause;
 	j->opened += pause;
 	j->looked_at += pause;
@@ -189,7 +189,7 @@ static void add_duration(struct job *j, double duration)
 {
 	j->durations[j->duration_count++ % JOB_DURATIONS] = duration;
 	uint32_t n = j->duration_count < JOB_DURATIONS ? j->duration_count : JOB_DURATIONS;
-	double sorted[JOB_DURATIONS] = { 0 };
+	double sorted[JOB_DURATIONS] = {0};
 	for (uint32_t i = 0; i < n; i++) {
 		uint32_t k = i;
 		for (; k > 0 && sorted[k - 1] > j->durations[i]; k--)

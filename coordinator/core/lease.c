@@ -8,11 +8,11 @@
 struct lease_key lease_key(const struct lease *l)
 {
 	uint32_t index = (uint32_t)(l->slot - l->job->slots);
-	return (struct lease_key){ .job = l->job->id,
-				   .kind = l->job->kind,
-				   .group = index / l->job->plan.parts,
-				   .part = index % l->job->plan.parts,
-				   .epoch = l->slot->next };
+	return (struct lease_key){.job = l->job->id,
+				  .kind = l->job->kind,
+				  .group = index / l->job->plan.parts,
+				  .part = index % l->job->plan.parts,
+				  .epoch = l->slot->next};
 }
 
 struct lease *lease_of(const struct slot *s, const struct peer *p)
@@ -45,7 +45,7 @@ void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 	assert(peer_has_wish(p) && (!l || l->overdue));
 	if (!l) {
 		l = lease_take(f, p);
-		*l = (struct lease){ .used = true, .peer = p, .job = j, .slot = s, .next = s->leases };
+		*l = (struct lease){.used = true, .peer = p, .job = j, .slot = s, .next = s->leases};
 		s->leases = l;
 	}
 	l->overdue = l->delivered = false;

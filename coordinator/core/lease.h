@@ -14,7 +14,7 @@ struct slot;
 
 struct lease {
 	bool used;
-	bool overdue; /* counts no longer as held: handed out again */
+	bool overdue;	/* counts no longer as held: handed out again */
 	bool delivered; /* its result waits to be looked at: counts no longer among what its worker has to do */
 	struct peer *peer;
 	struct job *job;

@@ -42,7 +42,8 @@ void orders_extend(struct farm *f, const struct event *ev)
 	struct job *j = meant(f, ev);
 	if (!j)
 		return;
-	assert(ev->plan->rounds >= j->plan.rounds && ev->plan->groups == j->plan.groups && ev->plan->parts == j->plan.parts);
+	assert(ev->plan->rounds >= j->plan.rounds && ev->plan->groups == j->plan.groups &&
+	       ev->plan->parts == j->plan.parts);
 	j->plan.rounds = ev->plan->rounds;
 	j->plan.seconds = ev->plan->seconds;
 	j->plan.target_error = ev->plan->target_error;

@@ -168,7 +168,8 @@ void peer_drop_leases(struct farm *f, struct peer *p, bool revoke)
 
 bool peer_has_wish(const struct peer *p)
 {
-	return p->state == PEER_ACTIVE && p->held < p->want && p->held < p->who->window && p->held + p->delivered < p->lease_limit;
+	return p->state == PEER_ACTIVE && p->held < p->want && p->held < p->who->window &&
+	       p->held + p->delivered < p->lease_limit;
 }
 
 void peer_requeue(struct farm *f, struct peer *p)
@@ -227,7 +228,7 @@ void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own)
 	}
 	if (!a) {
 		a = room_to_avoid(f, p->who);
-		*a = (struct avoid){ .job = job };
+		*a = (struct avoid){.job = job};
 	}
 	uint32_t doublings = a->failures < PAUSE_DOUBLINGS ? a->failures : PAUSE_DOUBLINGS;
 	a->failures++;
@@ -238,7 +239,8 @@ void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own)
 /* What it may hold grows with what it gives: who takes what he can get and gives nothing holds up little. */
 static void set_window(struct farm *f, struct peer *p, uint32_t window)
 {
-	struct peer **all = p->who->uses > 1 ? f->peers : &p; /* an old connection of the same worker may still be here */
+	struct peer **all =
+		p->who->uses > 1 ? f->peers : &p; /* an old connection of the same worker may still be here */
 	uint32_t count = p->who->uses > 1 ? f->peer_count : 1;
 	p->who->window = window;
 	for (uint32_t i = 0; i < count; i++)
@@ -257,7 +259,7 @@ void peer_succeeded(struct farm *f, struct peer *p, uint64_t job)
 	p->merged++;
 	p->who->faults_in_row = 0;
 	if (a)
-		*a = (struct avoid){ 0 };
+		*a = (struct avoid){0};
 	if (p->who->window < f->config.max_peer_leases)
 		set_window(f, p, 2 * p->who->window);
 }

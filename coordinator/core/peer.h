@@ -15,7 +15,7 @@ enum { PEER_NAME = IDENTITY_NAME, FINGERPRINT_SIZE = 128 };
 struct peer_class {
 	struct link link;    /* farm.classes */
 	struct link waiting; /* peers that have a wish */
-	uint32_t uses;       /* workers and live jobs */
+	uint32_t uses;	     /* workers and live jobs */
 	uint32_t active;     /* workers that may get leases */
 	char fingerprint[FINGERPRINT_SIZE];
 };
@@ -60,8 +60,8 @@ bool peer_has_wish(const struct peer *p);
 void peer_fault(struct farm *f, struct peer *p, const char *text);
 void peer_failed(const struct farm *f, struct peer *p, uint64_t job, bool own);
 void peer_succeeded(struct farm *f, struct peer *p, uint64_t job);
-void peer_was_late(struct farm *f, struct peer *p); /* with a lease that others get now, or have answered */
+void peer_was_late(struct farm *f, struct peer *p);	      /* with a lease that others get now, or have answered */
 double peer_avoids_until(const struct peer *p, uint64_t job); /* -INFINITY: does not */
-bool peer_lacks(const struct peer *p, uint64_t job); /* its last failure with the job was its own machine's */
+bool peer_lacks(const struct peer *p, uint64_t job);	      /* its last failure with the job was its own machine's */
 
 #endif

@@ -73,7 +73,8 @@ static bool make_room(struct farm *f, bool asked)
 	void *live = mem_grow(f->live, before * sizeof *f->live, limit * sizeof *f->live);
 	if (live)
 		f->live = live;
-	void *jobs = live ? mem_grow(f->jobs, (before + ended) * sizeof *f->jobs, (limit + ended) * sizeof *f->jobs) : NULL;
+	void *jobs =
+		live ? mem_grow(f->jobs, (before + ended) * sizeof *f->jobs, (limit + ended) * sizeof *f->jobs) : NULL;
 	if (!jobs)
 		return false;
 	f->jobs = jobs;
@@ -114,7 +115,8 @@ void restore_job(struct farm *f, const struct event *ev)
 	if (j->kind != LEASE_RENDER)
 		return;
 	rounds_opened(f, j, r->black);
-	/* A bound that the last complete round met is met still; a look that is due is taken again, with the same answer. */
+	/* A bound that the last complete round met is met still; a look that is due is taken again, with the same
+	 * answer. */
 	if (job_is_live(j) && j->rounds > 0)
 		rounds_settle(f, j, isnan(r->completed) ? r->elapsed : r->completed);
 }

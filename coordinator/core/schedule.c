@@ -10,7 +10,8 @@ static void call_again(struct farm *f, double at)
 		f->schedule_at = at;
 }
 
-/* The worker that has waited longest and does not hold the slot; one that holds it overdue if `again` and no other does. */
+/* The worker that has waited longest and does not hold the slot; one that holds it overdue if `again` and no other
+ * does. */
 static struct peer *waiting_in(struct farm *f, const struct peer_class *c, const struct job *j, const struct slot *s,
 			       bool again)
 {
@@ -152,7 +153,8 @@ static struct lease *older_copy(const struct slot *s)
 	return s->holders > 1 ? older : NULL;
 }
 
-/* Nobody knows how long leases of this job take, two workers hold one for long, and another has nothing to do. true: there are such. */
+/* Nobody knows how long leases of this job take, two workers hold one for long, and another has nothing to do. true:
+ * there are such. */
 static bool give_up_copies(struct farm *f, struct job *j)
 {
 	bool any = false;

@@ -59,7 +59,8 @@ static const struct job *rival(const struct farm *f, uint32_t i, const struct jo
 	return r->priority == j->priority && share_competes(r, j) && (!o || r->owner == o) ? r : NULL;
 }
 
-/* The level up to which all are filled from what there is, given how much those below a level take and how many are above. */
+/* The level up to which all are filled from what there is, given how much those below a level take and how many are
+ * above. */
 struct level {
 	double there, taken, level;
 	uint32_t above;
@@ -110,8 +111,10 @@ static double due(const struct farm *f, const struct job *j, uint32_t machines, 
 	return fmin(wants(j, leases_each), v.above ? v.level : INFINITY);
 }
 
-/* "; j4, j7 and 2 more come first"; only: whose jobs may be named, NULL: anybody's. "; 2 jobs of other owners come first" */
-static void put_others(struct text *t, const struct farm *f, const struct job *j, const struct owner *only, bool higher, double leases_each)
+/* "; j4, j7 and 2 more come first"; only: whose jobs may be named, NULL: anybody's. "; 2 jobs of other owners come
+ * first" */
+static void put_others(struct text *t, const struct farm *f, const struct job *j, const struct owner *only, bool higher,
+		       double leases_each)
 {
 	enum { NAMED = 3 };
 	const char *intro = higher ? "; " : "; by turns with ";
@@ -131,13 +134,14 @@ static void put_others(struct text *t, const struct farm *f, const struct job *j
 	if (count > named && named)
 		text_put(t, " and %u more", count - named);
 	else if (count && !named)
-		text_put(t, "%s%u job%s of %s", intro, count, count == 1 ? "" : "s", count == 1 ? "another owner" : "other owners");
+		text_put(t, "%s%u job%s of %s", intro, count, count == 1 ? "" : "s",
+			 count == 1 ? "another owner" : "other owners");
 	if (count && higher)
 		text_put(t, count == 1 ? " comes first" : " come first");
 }
 
-static void put_place(const struct farm *f, const struct job *j, const struct owner *only, const struct share *s, double leases_each,
-		      char *place, size_t size)
+static void put_place(const struct farm *f, const struct job *j, const struct owner *only, const struct share *s,
+		      double leases_each, char *place, size_t size)
 {
 	struct text t = {place, size};
 	text_put(&t, "%u of %u machine%s", s->workers, s->machines, s->machines == 1 ? "" : "s");

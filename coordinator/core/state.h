@@ -16,23 +16,23 @@ struct farm {
 	uint64_t next_job;
 	struct job **jobs; /* by id; ended ones too */
 	uint32_t job_count;
-	struct job **live; /* by priority, then id */
+	struct job **live;		 /* by priority, then id */
 	uint32_t live_count, live_limit; /* more than config.max_jobs when an earlier life left more */
-	struct peer **peers; /* by id */
+	struct peer **peers;		 /* by id */
 	uint32_t peer_count;
 	struct identity **known; /* workers that are or were here */
 	uint32_t known_count, known_limit;
 	uint64_t identities; /* ids so far */
 	struct link classes, owners;
-	uint32_t waiting; /* workers with a wish */
-	uint64_t queued;  /* counts who began to wait */
-	double check_at;  /* something may be silent or overdue then, not before */
-	double idle_at;  /* copies that are out are looked at then, not before */
+	uint32_t waiting;   /* workers with a wish */
+	uint64_t queued;    /* counts who began to wait */
+	double check_at;    /* something may be silent or overdue then, not before */
+	double idle_at;	    /* copies that are out are looked at then, not before */
 	double schedule_at; /* handing out may be possible then though nothing else happens */
 	struct action *actions;
 	size_t action_count, action_limit;
 	size_t lease_limit; /* of all workers */
-	char text[256];     /* of the answer to this event */
+	char text[256];	    /* of the answer to this event */
 };
 
 /* update.c: room is made when workers join, so that saying something cannot fail. */
@@ -46,9 +46,9 @@ struct peer *farm_find_peer(const struct farm *f, uint64_t id);
 /* rounds.c: what a job goes through. */
 void rounds_submit(struct farm *f, const struct event *ev);
 void rounds_cancel(struct farm *f, const struct event *ev);
-void rounds_started(struct farm *f, struct job *j); /* a lease of it is about to be sent */
-void rounds_enlist(struct farm *f, struct job *j); /* its id is new */
-void rounds_forget(struct farm *f, struct job *j); /* it has ended */
+void rounds_started(struct farm *f, struct job *j);		/* a lease of it is about to be sent */
+void rounds_enlist(struct farm *f, struct job *j);		/* its id is new */
+void rounds_forget(struct farm *f, struct job *j);		/* it has ended */
 enum job_end rounds_bound(const struct job *j, double elapsed); /* that is met, the error apart */
 void rounds_reject(struct farm *f, const struct event *ev, const char *text);
 void rounds_opened(struct farm *f, struct job *j, bool black); /* b and seeds are there */

@@ -10,19 +10,18 @@
 
 const char *job_state_name(enum job_state s)
 {
-	static const char *const names[] = { [JOB_QUEUED] = "queued",   [JOB_BOOTSTRAP] = "bootstrap",
-					     [JOB_RUNNING] = "running", [JOB_HELD] = "held",
-					     [JOB_DONE] = "done",       [JOB_FAILED] = "failed",
-					     [JOB_CANCELLED] = "cancelled" };
+	static const char *const names[] = {
+		[JOB_QUEUED] = "queued",      [JOB_BOOTSTRAP] = "bootstrap", [JOB_RUNNING] = "running",
+		[JOB_HELD] = "held",	      [JOB_DONE] = "done",	     [JOB_FAILED] = "failed",
+		[JOB_CANCELLED] = "cancelled"};
 	return names[s];
 }
 
 const char *job_end_name(enum job_end e)
 {
-	static const char *const names[] = { [END_NONE] = "none",   [END_MUTATIONS] = "mutations",
-					     [END_TIME] = "time",   [END_ERROR] = "error",
-					     [END_BLACK] = "black", [END_CANCELLED] = "cancelled",
-					     [END_FAILED] = "failed" };
+	static const char *const names[] = {
+		[END_NONE] = "none",   [END_MUTATIONS] = "mutations", [END_TIME] = "time",    [END_ERROR] = "error",
+		[END_BLACK] = "black", [END_CANCELLED] = "cancelled", [END_FAILED] = "failed"};
 	return names[e];
 }
 
@@ -77,7 +76,9 @@ static void put_failing(const struct farm *f, const struct job *j, char *text, s
 		if (f->peers[i]->state == PEER_ACTIVE && job_takes(j, f->peers[i]) && peer_lacks(f->peers[i], j->id))
 			text_put(&t, "%s%s", *names ? ", " : "", f->peers[i]->name);
 	if (*names)
-		text_print(text, size, "no worker can compute it, for want of something on the machines of %s; the last one: %s", names, j->text);
+		text_print(text, size,
+			   "no worker can compute it, for want of something on the machines of %s; the last one: %s",
+			   names, j->text);
 	else
 		text_print(text, size, "no worker can compute it: %s", j->text);
 }
@@ -87,9 +88,12 @@ static void put_busy(char *text, size_t size, const struct job *j, const struct 
 {
 	bool higher = other->priority > j->priority;
 	if (!all && other->owner != j->owner)
-		text_copy(text, size, higher ? "waits for a job of higher priority of another owner" : "workers busy with a job of another owner");
+		text_copy(text, size,
+			  higher ? "waits for a job of higher priority of another owner"
+				 : "workers busy with a job of another owner");
 	else
-		text_print(text, size, higher ? "waits for j%llu of higher priority (%d)" : "workers busy with j%llu (priority %d)",
+		text_print(text, size,
+			   higher ? "waits for j%llu of higher priority (%d)" : "workers busy with j%llu (priority %d)",
 			   (unsigned long long)other->id, other->priority);
 }
 
@@ -104,7 +108,8 @@ static void why_held(const struct job *j, char *text, size_t size)
 		}
 }
 
-/* All leases that are out are late, and nobody has brought a result: who holds the oldest one. false: somebody works on it. */
+/* All leases that are out are late, and nobody has brought a result: who holds the oldest one. false: somebody works on
+ * it. */
 static bool put_late(const struct farm *f, const struct job *j, char *text, size_t size)
 {
 	const struct lease *oldest = NULL;
@@ -122,8 +127,8 @@ static bool put_late(const struct farm *f, const struct job *j, char *text, size
 		}
 	}
 	if (oldest)
-		text_print(text, size, "no answer to its leases (%u are out): %s has had the oldest one for %.0f s", count, oldest->peer->name,
-			   f->now - oldest->sent);
+		text_print(text, size, "no answer to its leases (%u are out): %s has had the oldest one for %.0f s",
+			   count, oldest->peer->name, f->now - oldest->sent);
 	return oldest != NULL;
 }
 
@@ -150,8 +155,10 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 	else if (verify_why(f, j, text, size) || doubt_why(f, j, text, size))
 		return NULL;
 	else if (owner_is_limited(f, j) && owner_unproven(f, j->owner))
-		snprintf(text, size, "a job of its owner ended workers: one lease at a time until something of a job is made (for %.0f s)",
-			 j->owner->limited_until - f->now);
+		snprintf(
+			text, size,
+			"a job of its owner ended workers: one lease at a time until something of a job is made (for %.0f s)",
+			j->owner->limited_until - f->now);
 	else if (answer_all_failed(f, j))
 		put_failing(f, j, text, size);
 	else if (someone_avoids(f, j))
@@ -248,8 +255,13 @@ bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c)
 	const struct job *j = farm_find_job(f, id);
 	if (!j)
 		return false;
-	*c = (struct job_counts){.repeats = j->repeats, .refused = j->refused, .faults = j->faults, .failures = j->failures,
-				 .timeouts = j->timeouts, .duplicates = j->duplicates, .verified = j->verified,
+	*c = (struct job_counts){.repeats = j->repeats,
+				 .refused = j->refused,
+				 .faults = j->faults,
+				 .failures = j->failures,
+				 .timeouts = j->timeouts,
+				 .duplicates = j->duplicates,
+				 .verified = j->verified,
 				 .mismatched = j->mismatched};
 	return true;
 }
@@ -311,8 +323,14 @@ bool farm_worker(const struct farm *f, uint64_t who, struct worker_status *s)
 		const struct identity *k = f->known[i];
 		if (k->id != who)
 			continue;
-		*s = (struct worker_status){ .who = k->id, .restarts = k->restarts, .certificate = k->certificate, .name = k->name,
-					     .home = k->home, .text = k->text, .wrong = k->wrong, .aside = k->aside };
+		*s = (struct worker_status){.who = k->id,
+					    .restarts = k->restarts,
+					    .certificate = k->certificate,
+					    .name = k->name,
+					    .home = k->home,
+					    .text = k->text,
+					    .wrong = k->wrong,
+					    .aside = k->aside};
 		return true;
 	}
 	return false;

@@ -6,8 +6,8 @@
 
 #include <assert.h>
 
-/* In one step each lease is revoked at most once and replaced at most once, a worker that is full of overdue leases loses
- * some more, each worker is hung up once, and a job says a handful of things. */
+/* In one step each lease is revoked at most once and replaced at most once, a worker that is full of overdue leases
+ * loses some more, each worker is hung up once, and a job says a handful of things. */
 int update_reserve(struct farm *f, size_t more_leases)
 {
 	size_t leases = f->lease_limit + more_leases;
@@ -27,7 +27,7 @@ struct action *update_add(struct farm *f, enum action_kind kind)
 {
 	assert(f->action_count < f->action_limit);
 	struct action *a = &f->actions[f->action_count++];
-	*a = (struct action){ .kind = kind, .text = "" };
+	*a = (struct action){.kind = kind, .text = ""};
 	return a;
 }
 

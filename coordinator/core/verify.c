@@ -28,8 +28,11 @@ bool verify_chosen(const struct job *j, const struct lease_key *k)
 static struct lease_key key_of(const struct job *j, const struct slot *s)
 {
 	uint32_t index = (uint32_t)(s - j->slots);
-	return (struct lease_key){ .job = j->id, .kind = j->kind, .group = index / j->plan.parts, .part = index % j->plan.parts,
-				   .epoch = s->next };
+	return (struct lease_key){.job = j->id,
+				  .kind = j->kind,
+				  .group = index / j->plan.parts,
+				  .part = index % j->plan.parts,
+				  .epoch = s->next};
 }
 
 static struct proof *proof_of(const struct job *j, const struct slot *s)
@@ -71,7 +74,8 @@ bool verify_waits(const struct job *j, const struct slot *s)
 	return is_verified(j, s) && s->holders + proof_of(j, s)->count > 0;
 }
 
-enum verify_answer verify_take(struct farm *f, struct job *j, struct slot *s, struct identity *who, const struct batch_digest *d)
+enum verify_answer verify_take(struct farm *f, struct job *j, struct slot *s, struct identity *who,
+			       const struct batch_digest *d)
 {
 	struct proof *p = proof_of(j, s);
 	bool agrees = false;
@@ -195,7 +199,8 @@ static const struct slot *stranded(const struct farm *f, const struct job *j)
 			bool somebody = false;
 			for (uint32_t n = 0; n < f->peer_count && !somebody; n++) {
 				const struct peer *p = f->peers[n];
-				somebody = p->state == PEER_ACTIVE && job_takes(j, p) && !lease_of(s, p) && !verify_bars(j, s, p);
+				somebody = p->state == PEER_ACTIVE && job_takes(j, p) && !lease_of(s, p) &&
+					   !verify_bars(j, s, p);
 			}
 			if (!somebody)
 				return s;
@@ -215,7 +220,8 @@ bool verify_why(const struct farm *f, const struct job *j, char *text, size_t si
 	if (proof_of(j, s)->count < 2)
 		snprintf(text, size, "verification waits for a second worker (%u leases have one answer)", j->noted);
 	else
-		text_print(text, size, "verification waits for another worker: %s differ on group %u part %u epoch %llu", names, k.group,
-			 k.part, (unsigned long long)k.epoch);
+		text_print(text, size,
+			   "verification waits for another worker: %s differ on group %u part %u epoch %llu", names,
+			   k.group, k.part, (unsigned long long)k.epoch);
 	return true;
 }

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Leases that two workers compute: whose answers are held against each other before one counts. Which ones is a hash of the
- * job and the lease's key, so that it depends on no worker and no order. An answer is known by the digest of what decides
- * bits; the first one of a worker is noted, one that equals another worker's note is merged. Memory for all of it is taken
- * when the job is submitted.
+ * Leases that two workers compute: whose answers are held against each other before one counts. Which ones is a hash of
+ * the job and the lease's key, so that it depends on no worker and no order. An answer is known by the digest of what
+ * decides bits; the first one of a worker is noted, one that equals another worker's note is merged. Memory for all of
+ * it is taken when the job is submitted.
  */
 #ifndef COORDINATOR_CORE_VERIFY_H
 #define COORDINATOR_CORE_VERIFY_H
@@ -37,12 +37,13 @@ bool verify_waits(const struct job *j, const struct slot *s);
 enum verify_answer {
 	VERIFY_AGREES, /* with another worker's: it counts */
 	VERIFY_NOTED,
-	VERIFY_DIFFERS,  /* noted, and differs from those before */
-	VERIFY_REPEATED, /* this worker said so before */
+	VERIFY_DIFFERS,	    /* noted, and differs from those before */
+	VERIFY_REPEATED,    /* this worker said so before */
 	VERIFY_CONTRADICTS, /* this worker said something else before */
-	VERIFY_HOPELESS, /* VERIFY_MOST workers gave as many answers */
+	VERIFY_HOPELESS,    /* VERIFY_MOST workers gave as many answers */
 };
-enum verify_answer verify_take(struct farm *f, struct job *j, struct slot *s, struct identity *who, const struct batch_digest *d);
+enum verify_answer verify_take(struct farm *f, struct job *j, struct slot *s, struct identity *who,
+			       const struct batch_digest *d);
 /* The answer with this digest is the right one: whoever gave another is told of, and nothing is noted any more. */
 void verify_settle(struct farm *f, struct job *j, struct slot *s, const struct batch_digest *right);
 /* "a, b, c": who answered. */

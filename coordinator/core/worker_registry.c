@@ -65,7 +65,7 @@ struct identity *worker_registry_use(struct farm *f, const struct event_join *e,
 			*refused = "the coordinator has no room to remember another worker";
 			return NULL;
 		}
-		*k = (struct identity){ .id = ++f->identities, .window = PEER_WINDOW };
+		*k = (struct identity){.id = ++f->identities, .window = PEER_WINDOW};
 		k->certificate_id = certificate_id(f, e->certificate, k->id);
 		text_copy(k->certificate, sizeof k->certificate, e->certificate);
 	}
@@ -110,8 +110,9 @@ bool worker_registry_replace(struct farm *f, const struct event_join *e, const c
 		if (is_at(f->peers[i], e) && f->peers[i]->restarts > last)
 			last = f->peers[i]->restarts;
 	if (last > e->restarts) {
-		text_print(f->text, sizeof f->text, "this is start %llu of %s, and start %llu of it has been here before",
-			 (unsigned long long)e->restarts, e->name, (unsigned long long)last);
+		text_print(f->text, sizeof f->text,
+			   "this is start %llu of %s, and start %llu of it has been here before",
+			   (unsigned long long)e->restarts, e->name, (unsigned long long)last);
 		*refused = f->text;
 		return false;
 	}
@@ -128,7 +129,8 @@ bool worker_registry_replace(struct farm *f, const struct event_join *e, const c
 	return true;
 }
 
-/* Names cost nothing: of one certificate so many are remembered as set aside, and the one that has been away longest makes room. */
+/* Names cost nothing: of one certificate so many are remembered as set aside, and the one that has been away longest
+ * makes room. */
 static void set_aside(struct farm *f, struct identity *who)
 {
 	struct identity *oldest = NULL;
@@ -166,8 +168,9 @@ void worker_registry_quarantine(struct farm *f, struct identity *who)
 
 void worker_registry_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k)
 {
-	snprintf(who->text, sizeof who->text, "%s: j%llu %s group %u part %u epoch %llu", what, (unsigned long long)k->job,
-		 k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group, k->part, (unsigned long long)k->epoch);
+	snprintf(who->text, sizeof who->text, "%s: j%llu %s group %u part %u epoch %llu", what,
+		 (unsigned long long)k->job, k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group, k->part,
+		 (unsigned long long)k->epoch);
 	who->wrong++;
 	struct action *a = update_add(f, ACTION_WRONG);
 	a->who = who->id;

@@ -54,7 +54,9 @@ static void take_word(struct arguments *a, const char *arg, struct argp_state *s
 			if (strcmp(arg, verbs[i]) == 0)
 				a->verb = verbs[i];
 		if (!a->verb)
-			argp_error(state, "'%s': the verbs are init, coordinator, worker, client, operator, revoke, list", arg);
+			argp_error(state,
+				   "'%s': the verbs are init, coordinator, worker, client, operator, revoke, list",
+				   arg);
 	} else if (state->arg_num == 1) {
 		a->what = arg;
 	} else {
@@ -148,7 +150,10 @@ static int list(const struct arguments *a, struct error *e)
 		struct tm tm;
 		strftime(until, sizeof until, "%Y-%m-%dT%H:%M:%SZ", gmtime_r(&x->until, &tm));
 		printf("%-24s %-12s %-8s %-20s %s\n", x->who.name, tls_role_name(x->who.role),
-		       x->revoked ? "revoked" : x->until < now ? "expired" : "valid", until, x->who.serial);
+		       x->revoked	? "revoked"
+		       : x->until < now ? "expired"
+					: "valid",
+		       until, x->who.serial);
 	}
 	mem_free(entries);
 	return 0;
@@ -175,7 +180,8 @@ int main(int argc, char **argv)
 	char home[4000];
 	output_check_at_exit();
 	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "init|coordinator|worker|client|operator|revoke|list [NAME]", doc, NULL, NULL, NULL},
+	argp_parse(&(struct argp){options, parse, "init|coordinator|worker|client|operator|revoke|list [NAME]", doc,
+				  NULL, NULL, NULL},
 		   argc, argv, 0, NULL, &a);
 	if (!a.ca || !*a.ca) {
 		const char *where = getenv("HOME");

@@ -120,8 +120,10 @@ static const char *color_of(const char *state, bool colors)
 {
 	if (!colors)
 		return "";
-	return strcmp(state, "done") == 0 ? "\033[32m" : strcmp(state, "failed") == 0 ? "\033[31m"
-	       : strcmp(state, "running") == 0 || strcmp(state, "bootstrap") == 0 ? "\033[36m" : "\033[33m";
+	return strcmp(state, "done") == 0					  ? "\033[32m"
+	       : strcmp(state, "failed") == 0					  ? "\033[31m"
+	       : strcmp(state, "running") == 0 || strcmp(state, "bootstrap") == 0 ? "\033[36m"
+										  : "\033[33m";
 }
 
 /* Which bound ended it, where there were several. */
@@ -130,8 +132,10 @@ static const char *bound_of(const json_t *job)
 	const char *reason = text_of(job, "reason");
 	if (!(number_of(job, "targetError") > 0) || strcmp(text_of(job, "state"), "done") != 0)
 		return "";
-	return strcmp(reason, "error") == 0 ? "target error reached" : strcmp(reason, "time") == 0 ? "time was up before the target error"
-	       : strcmp(reason, "mutations") == 0 ? "all mutations were made before the target error" : "";
+	return strcmp(reason, "error") == 0	  ? "target error reached"
+	       : strcmp(reason, "time") == 0	  ? "time was up before the target error"
+	       : strcmp(reason, "mutations") == 0 ? "all mutations were made before the target error"
+						  : "";
 }
 
 /* null and negative: it has no end */
@@ -152,13 +156,15 @@ static void print_job(const json_t *job, bool colors)
 	if (json_is_number(known_error))
 		snprintf(error, sizeof error, "%.2f %%", 100 * json_number_value(known_error));
 	const char *state = text_of(job, "state");
-	printf("%-6s %s%-10s%s %5.1f %% %9s %9s %8s %7.0f %6.0f  %s", text_of(job, "id"), color_of(state, colors), state,
-	       colors ? "\033[0m" : "", 100 * number_of(job, "progress"), rate, eta, error, number_of(job, "rounds"),
-	       number_of(job, "leases"), text_of(job, "name"));
+	printf("%-6s %s%-10s%s %5.1f %% %9s %9s %8s %7.0f %6.0f  %s", text_of(job, "id"), color_of(state, colors),
+	       state, colors ? "\033[0m" : "", 100 * number_of(job, "progress"), rate, eta, error,
+	       number_of(job, "rounds"), number_of(job, "leases"), text_of(job, "name"));
 	const char *why = *text_of(job, "why") ? text_of(job, "why") : bound_of(job);
 	const char *verdict = text_of(json_object_get(job, "agreement"), "verdict");
-	const char *chains = strcmp(verdict, convergence_name(CHAINS_DISAGREE)) == 0 ? "its chains disagree" :
-			     is_ended(job) && strcmp(verdict, convergence_name(CHAINS_TOO_SHORT)) == 0 ? "its chains are too short to be judged" : "";
+	const char *chains = strcmp(verdict, convergence_name(CHAINS_DISAGREE)) == 0 ? "its chains disagree"
+			     : is_ended(job) && strcmp(verdict, convergence_name(CHAINS_TOO_SHORT)) == 0
+				     ? "its chains are too short to be judged"
+				     : "";
 	if (!*why && !is_ended(job))
 		why = text_of(job, "place");
 	printf("%s%s%s%s\n", *why || *chains ? "  # " : "", why, *why && *chains ? "; " : "", chains);
@@ -178,8 +184,8 @@ static void print_forecast(const json_t *job)
 	char a[32], b[32], c[32];
 	if (!json_is_object(error))
 		return;
-	printf("       error %.3g %% (%.3g - %.3g %%)", 100 * number_of(error, "expected"), 100 * number_of(error, "low"),
-	       100 * number_of(error, "high"));
+	printf("       error %.3g %% (%.3g - %.3g %%)", 100 * number_of(error, "expected"),
+	       100 * number_of(error, "low"), 100 * number_of(error, "high"));
 	if (number_of(job, "targetError") > 0)
 		printf(", target %.3g %%", 100 * number_of(job, "targetError"));
 	if (json_is_object(half)) {
@@ -201,8 +207,9 @@ static void print_share(const json_t *job)
 {
 	if (is_ended(job) || !json_is_number(json_object_get(job, "share")))
 		return;
-	printf("       priority %.0f%s%s; %s; by its priority %.3g\n", number_of(job, "priority"), *text_of(job, "owner") ? ", of " : "",
-	       text_of(job, "owner"), text_of(job, "place"), number_of(job, "share"));
+	printf("       priority %.0f%s%s; %s; by its priority %.3g\n", number_of(job, "priority"),
+	       *text_of(job, "owner") ? ", of " : "", text_of(job, "owner"), text_of(job, "place"),
+	       number_of(job, "share"));
 }
 
 static void print_effects(const json_t *job)
@@ -211,8 +218,9 @@ static void print_effects(const json_t *job)
 	const json_t *effect;
 	json_array_foreach(json_object_get(job, "effects"), i, effect)
 		printf("       %-3s%-9s %-13s %s; %s: %s\n", json_is_true(json_object_get(effect, "on")) ? "on" : "off",
-		       json_is_true(json_object_get(effect, "forced")) ? " (forced)" : "", text_of(effect, "name"), text_of(effect, "why"),
-		       json_is_true(json_object_get(effect, "on")) ? "without it" : "saves", text_of(effect, "saves"));
+		       json_is_true(json_object_get(effect, "forced")) ? " (forced)" : "", text_of(effect, "name"),
+		       text_of(effect, "why"), json_is_true(json_object_get(effect, "on")) ? "without it" : "saves",
+		       text_of(effect, "saves"));
 }
 
 static void print_strategies(const json_t *job)
@@ -238,8 +246,8 @@ static void print_agreement(const json_t *job)
 	convergence_from_json(o, &a);
 	classes_from_json(json_object_get(job, "classes"), classes);
 	if (json_is_number(json_object_get(o, "rHatWorst")))
-		printf("       chains: %s; R-hat %.3g in the middle, %.3g in the worst of %u tiles\n", text_of(o, "verdict"), a.r_hat_median,
-		       a.r_hat_worst, a.tiles);
+		printf("       chains: %s; R-hat %.3g in the middle, %.3g in the worst of %u tiles\n",
+		       text_of(o, "verdict"), a.r_hat_median, a.r_hat_worst, a.tiles);
 	convergence_table(classes, number_of(job, "b"), &a, text, sizeof text);
 	fputs(text, stdout);
 }
@@ -248,12 +256,14 @@ static void print_workers(const json_t *snapshot)
 {
 	size_t i;
 	const json_t *worker;
-	json_array_foreach(json_object_get(snapshot, "workers"), i, worker) {
+	json_array_foreach(json_object_get(snapshot, "workers"), i, worker)
+	{
 		if (i == 0)
-			printf("\n%-24s %-8s %5s %7s %6s %8s %s\n", "WORKER", "STATE", "START", "THREADS", "LEASES", "MERGED", "LAST FAULT");
-		printf("%-24s %-8s %5.0f %7.0f %6.0f %8.0f %s\n", text_of(worker, "name"), text_of(worker, "state"), number_of(worker, "restarts"),
-		       number_of(worker, "threads"), number_of(worker, "leases"), number_of(worker, "merged"),
-		       text_of(worker, "text"));
+			printf("\n%-24s %-8s %5s %7s %6s %8s %s\n", "WORKER", "STATE", "START", "THREADS", "LEASES",
+			       "MERGED", "LAST FAULT");
+		printf("%-24s %-8s %5.0f %7.0f %6.0f %8.0f %s\n", text_of(worker, "name"), text_of(worker, "state"),
+		       number_of(worker, "restarts"), number_of(worker, "threads"), number_of(worker, "leases"),
+		       number_of(worker, "merged"), text_of(worker, "text"));
 	}
 	if (i == 0)
 		printf("\nno workers are connected\n");
@@ -265,38 +275,36 @@ static void print_warnings(const json_t *snapshot)
 	const json_t *worker, *tls = json_object_get(snapshot, "tls");
 	if (*text_of(tls, "warning"))
 		printf("\nwarning: %s\n", text_of(tls, "warning"));
-	json_array_foreach(json_object_get(snapshot, "workers"), i, worker)
-		if (*text_of(worker, "warning"))
-			printf("warning: %s: %s\n", text_of(worker, "name"), text_of(worker, "warning"));
+	json_array_foreach(json_object_get(snapshot, "workers"), i, worker) if (*text_of(worker, "warning"))
+		printf("warning: %s: %s\n", text_of(worker, "name"), text_of(worker, "warning"));
 }
 
 static void print_quarantined(const json_t *snapshot)
 {
 	size_t i;
 	const json_t *worker;
-	json_array_foreach(json_object_get(snapshot, "aside"), i, worker)
-		printf("set aside: %s%s%s: %s\n", text_of(worker, "name"), *text_of(worker, "certificate") ? " of " : "",
-		       text_of(worker, "certificate"), text_of(worker, "why"));
+	json_array_foreach(json_object_get(snapshot, "aside"), i, worker) printf(
+		"set aside: %s%s%s: %s\n", text_of(worker, "name"), *text_of(worker, "certificate") ? " of " : "",
+		text_of(worker, "certificate"), text_of(worker, "why"));
 }
 
 static void print_verified(const json_t *job)
 {
 	const json_t *counts = json_object_get(job, "counts");
 	if (number_of(job, "verify") > 0)
-		printf("       verified: %.3g %% of the epochs; %.0f agreed, %.0f of them not at first\n", 100 * number_of(job, "verify"),
-		       number_of(counts, "verified"), number_of(counts, "mismatched"));
+		printf("       verified: %.3g %% of the epochs; %.0f agreed, %.0f of them not at first\n",
+		       100 * number_of(job, "verify"), number_of(counts, "verified"), number_of(counts, "mismatched"));
 }
 
 static void print_leases(const json_t *snapshot, const char *id)
 {
 	size_t i;
 	const json_t *lease;
-	json_array_foreach(json_object_get(snapshot, "leases"), i, lease)
-		if (strcmp(text_of(lease, "job"), id) == 0)
-			printf("       lease %-9s group %2.0f part %2.0f epoch %4.0f  %5.1f s at %s%s\n",
-			       text_of(lease, "kind"), number_of(lease, "group"), number_of(lease, "part"),
-			       number_of(lease, "epoch"), number_of(lease, "age"), text_of(lease, "worker"),
-			       json_is_true(json_object_get(lease, "overdue")) ? " (overdue)" : "");
+	json_array_foreach(json_object_get(snapshot, "leases"), i, lease) if (strcmp(text_of(lease, "job"), id) == 0)
+		printf("       lease %-9s group %2.0f part %2.0f epoch %4.0f  %5.1f s at %s%s\n",
+		       text_of(lease, "kind"), number_of(lease, "group"), number_of(lease, "part"),
+		       number_of(lease, "epoch"), number_of(lease, "age"), text_of(lease, "worker"),
+		       json_is_true(json_object_get(lease, "overdue")) ? " (overdue)" : "");
 }
 
 static void print_snapshot(const json_t *snapshot, const char *only)
@@ -306,7 +314,8 @@ static void print_snapshot(const json_t *snapshot, const char *only)
 	const json_t *job;
 	printf("%-6s %-10s %7s %9s %9s %8s %7s %6s  %s\n", "JOB", "STATE", "DONE", "RATE/s", "ETA", "ERROR", "ROUNDS",
 	       "LEASES", "NAME");
-	json_array_foreach(json_object_get(snapshot, "jobs"), i, job) {
+	json_array_foreach(json_object_get(snapshot, "jobs"), i, job)
+	{
 		if (only && strcmp(only, text_of(job, "id")) != 0)
 			continue;
 		print_job(job, colors);
@@ -336,9 +345,8 @@ static const json_t *find_job(const json_t *snapshot, const char *id)
 {
 	size_t i;
 	const json_t *job;
-	json_array_foreach(json_object_get(snapshot, "jobs"), i, job)
-		if (strcmp(text_of(job, "id"), id) == 0)
-			return job;
+	json_array_foreach(json_object_get(snapshot, "jobs"), i,
+			   job) if (strcmp(text_of(job, "id"), id) == 0) return job;
 	return NULL;
 }
 
@@ -375,7 +383,8 @@ static int follow(const struct arguments *a, FILE *f)
 		json_error_t fault;
 		json_t *o = n > 0 && n < LINE_MOST ? json_loadb(line, (size_t)n, 0, &fault) : NULL;
 		if (!o) {
-			fprintf(stderr, "hslt-status: %s\n", n > 0 ? "what answers is no coordinator" : "the coordinator is gone");
+			fprintf(stderr, "hslt-status: %s\n",
+				n > 0 ? "what answers is no coordinator" : "the coordinator is gone");
 			code = EXIT_UNREACHABLE;
 			break;
 		}

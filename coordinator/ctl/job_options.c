@@ -31,24 +31,39 @@ static const char doc[] =
 
 #define VERBS "list, hold, release, priority, extend, cancel, fetch, log"
 
-enum { OPTION_INSECURE = 256, OPTION_JSON, OPTION_PREVIEW, OPTION_TLS, OPTION_SPP, OPTION_MUTATIONS, OPTION_TIME, OPTION_TARGET, PRIORITY_MOST = 100 };
+enum {
+	OPTION_INSECURE = 256,
+	OPTION_JSON,
+	OPTION_PREVIEW,
+	OPTION_TLS,
+	OPTION_SPP,
+	OPTION_MUTATIONS,
+	OPTION_TIME,
+	OPTION_TARGET,
+	PRIORITY_MOST = 100
+};
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
-	{"output", 'o', "FILE", 0, "fetch: where to, over what is there (without it: into the current folder, under the last part of the name that hslt-submit was given, never over anything)", 0},
+	{"output", 'o', "FILE", 0,
+	 "fetch: where to, over what is there (without it: into the current folder, under the last part of the name that hslt-submit was given, never over anything)",
+	 0},
 	{"preview", OPTION_PREVIEW, NULL, 0, "fetch: what there is while the job runs", 0},
 	{"json", OPTION_JSON, NULL, 0, "list: one JSON array", 0},
 	{"spp", OPTION_SPP, "+N", 0, "extend: so many more samples a pixel", 0},
 	{"mutations", OPTION_MUTATIONS, "+N", 0, "extend: so many more", 0},
 	{"time", OPTION_TIME, "+SECONDS", 0, "extend: so much longer", 0},
-	{"target-error", OPTION_TARGET, "E", 0, "extend: until the estimated relative error is 0.02 or 2%; bounds that are met and not named end it no more", 0},
+	{"target-error", OPTION_TARGET, "E", 0,
+	 "extend: until the estimated relative error is 0.02 or 2%; bounds that are met and not named end it no more",
+	 0},
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{0},
 };
 
-static const char *const verbs[JOB_VERBS] = {[JOB_LIST] = "list",	[JOB_CANCEL] = "cancel",   [JOB_FETCH] = "fetch",	 [JOB_LOG] = "log",
-					     [JOB_HOLD] = "hold", [JOB_RELEASE] = "release", [JOB_PRIORITY] = "priority", [JOB_EXTEND] = "extend"};
+static const char *const verbs[JOB_VERBS] = {
+	[JOB_LIST] = "list", [JOB_CANCEL] = "cancel",	[JOB_FETCH] = "fetch",	     [JOB_LOG] = "log",
+	[JOB_HOLD] = "hold", [JOB_RELEASE] = "release", [JOB_PRIORITY] = "priority", [JOB_EXTEND] = "extend"};
 
 static void take_verb(struct job_options *o, const char *arg, struct argp_state *state)
 {
@@ -172,13 +187,16 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 void job_options_parse(struct job_options *o, int argc, char **argv)
 {
 	static char negative[16];
-	*o = (struct job_options){.coordinator = getenv("HSLT_COORDINATOR"), .tls = getenv("HSLT_TLS"), .verb = JOB_VERBS};
+	*o = (struct job_options){
+		.coordinator = getenv("HSLT_COORDINATOR"), .tls = getenv("HSLT_TLS"), .verb = JOB_VERBS};
 	argp_err_exit_status = 2;
 	/* A number below 0 is no option. */
 	for (int i = 1; i < argc; i++)
-		if (argv[i][0] == '-' && argv[i][1] >= '0' && argv[i][1] <= '9' && strlen(argv[i]) < sizeof negative - 1) {
+		if (argv[i][0] == '-' && argv[i][1] >= '0' && argv[i][1] <= '9' &&
+		    strlen(argv[i]) < sizeof negative - 1) {
 			snprintf(negative, sizeof negative, " %s", argv[i]);
 			argv[i] = negative;
 		}
-	argp_parse(&(struct argp){options, parse, "VERB [JOB] [PRIORITY]", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, o);
+	argp_parse(&(struct argp){options, parse, "VERB [JOB] [PRIORITY]", doc, NULL, NULL, NULL}, argc, argv, 0, NULL,
+		   o);
 }

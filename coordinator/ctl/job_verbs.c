@@ -24,8 +24,11 @@ static void print_table(const Farm__JobListAnswer *a)
 		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
 		if (!s->ended && s->share >= 0)
 			snprintf(machines, sizeof machines, "%u (%.1f)", s->workers, s->share);
-		const char *why = *s->why ? s->why : s->ended && s->exit_code == EXIT_DISAGREE ? "its chains disagree" : "";
-		printf("%-6s %-10s %4d %5.1f %% %-9s %-8s %s", id, s->state, s->priority, 100 * s->progress, eta, machines, s->name);
+		const char *why = *s->why				      ? s->why
+				  : s->ended && s->exit_code == EXIT_DISAGREE ? "its chains disagree"
+									      : "";
+		printf("%-6s %-10s %4d %5.1f %% %-9s %-8s %s", id, s->state, s->priority, 100 * s->progress, eta,
+		       machines, s->name);
 		if (*why)
 			printf("  # %s", why);
 		else if (s->ended && s->target_error > 0)
@@ -43,12 +46,13 @@ static void print_json(const Farm__JobListAnswer *a)
 		const Farm__JobStatus *s = a->jobs[i];
 		char id[32];
 		snprintf(id, sizeof id, "j%llu", (unsigned long long)s->job);
-		json_array_append_new(list, json_pack("{s:i s:s s:s s:s s:f s:i s:s s:s s:s s:b s:i s:s s:s s:i s:f s:s}", "schema", 1, "id", id,
-						      "name", s->name, "state", s->state, "progress", s->progress, "priority",
-						      (int)s->priority, "why", s->why, "reason", s->reason, "output",
-						      s->output, "result", (int)s->fetchable, "exitCode",
-						      (int)s->exit_code, "note", s->note, "owner", s->owner, "workers", (int)s->workers,
-						      "share", s->share, "place", s->place));
+		json_array_append_new(list,
+				      json_pack("{s:i s:s s:s s:s s:f s:i s:s s:s s:s s:b s:i s:s s:s s:i s:f s:s}",
+						"schema", 1, "id", id, "name", s->name, "state", s->state, "progress",
+						s->progress, "priority", (int)s->priority, "why", s->why, "reason",
+						s->reason, "output", s->output, "result", (int)s->fetchable, "exitCode",
+						(int)s->exit_code, "note", s->note, "owner", s->owner, "workers",
+						(int)s->workers, "share", s->share, "place", s->place));
 	}
 	json_dumpf(list, stdout, JSON_INDENT(2));
 	putchar('\n');
@@ -103,8 +107,10 @@ static int cancel(struct client *cl, const struct job_options *o, struct error *
 
 static int control(struct client *cl, const struct job_options *o, struct error *e)
 {
-	static const Farm__Verb verbs[] = {[JOB_HOLD] = FARM__VERB__VERB_HOLD, [JOB_RELEASE] = FARM__VERB__VERB_RELEASE,
-					   [JOB_PRIORITY] = FARM__VERB__VERB_PRIORITY, [JOB_EXTEND] = FARM__VERB__VERB_EXTEND};
+	static const Farm__Verb verbs[] = {[JOB_HOLD] = FARM__VERB__VERB_HOLD,
+					   [JOB_RELEASE] = FARM__VERB__VERB_RELEASE,
+					   [JOB_PRIORITY] = FARM__VERB__VERB_PRIORITY,
+					   [JOB_EXTEND] = FARM__VERB__VERB_EXTEND};
 	Farm__Control question;
 	Farm__Envelope m;
 	farm__control__init(&question);
@@ -125,7 +131,8 @@ static int fetch(struct client *cl, const struct job_options *o, struct error *e
 {
 	Farm__What what = o->preview ? FARM__WHAT__WHAT_PREVIEW : FARM__WHAT__WHAT_RESULT;
 	char name[CLIENT_NAME_BYTES];
-	int rc = o->output ? client_fetch(cl, o->job, what, o->output, e) : client_fetch_here(cl, o->job, what, name, e);
+	int rc =
+		o->output ? client_fetch(cl, o->job, what, o->output, e) : client_fetch_here(cl, o->job, what, name, e);
 	if (!rc && isatty(STDERR_FILENO))
 		fprintf(stderr, "%s\n", o->output ? o->output : name);
 	return rc;
@@ -139,9 +146,8 @@ static int print_log(struct client *cl, const struct job_options *o, struct erro
 int job_verb(struct client *cl, const struct job_options *o, struct error *e)
 {
 	static int (*const verbs[])(struct client *, const struct job_options *, struct error *) = {
-		[JOB_LIST] = list,	[JOB_CANCEL] = cancel,	 [JOB_FETCH] = fetch,	   [JOB_LOG] = print_log,
-		[JOB_HOLD] = control,	[JOB_RELEASE] = control, [JOB_PRIORITY] = control,
-		[JOB_EXTEND] = control,
+		[JOB_LIST] = list,    [JOB_CANCEL] = cancel,   [JOB_FETCH] = fetch,	 [JOB_LOG] = print_log,
+		[JOB_HOLD] = control, [JOB_RELEASE] = control, [JOB_PRIORITY] = control, [JOB_EXTEND] = control,
 	};
 	return verbs[o->verb](cl, o, e);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How old finished jobs are, by time that was seen to pass (store/seen.h), which the spool's file `clock` brings from one life to
- * the next. No jump of the wall clock makes anything old. The loop's thread.
+ * How old finished jobs are, by time that was seen to pass (store/seen.h), which the spool's file `clock` brings from
+ * one life to the next. No jump of the wall clock makes anything old. The loop's thread.
  */
 #ifndef COORDINATOR_SHELL_AGES_H
 #define COORDINATOR_SHELL_AGES_H
@@ -11,6 +11,6 @@
 /* A file that is gone or damaged begins anew: what has ended is then as young as it can be. Never fails. */
 void ages_open(struct server *s);
 double ages_now(const struct server *s); /* s */
-void ages_keep(const struct server *s);  /* writes it down; a disk that does not take it is tried again next time */
+void ages_keep(const struct server *s);	 /* writes it down; a disk that does not take it is tried again next time */
 
 #endif

@@ -36,7 +36,8 @@ void back_note(struct live_job *o, const struct lease_key *k, uint64_t at, const
 		return;
 	if (o->merged_count == o->merged_capacity) {
 		size_t want = o->merged_capacity ? 2 * o->merged_capacity : 64;
-		struct merged_record *more = mem_grow(o->merged, o->merged_capacity * sizeof *more, want * sizeof *more);
+		struct merged_record *more =
+			mem_grow(o->merged, o->merged_capacity * sizeof *more, want * sizeof *more);
 		if (!more)
 			return;
 		o->merged = more;
@@ -55,7 +56,8 @@ static size_t find(const struct live_job *o, uint32_t slot, uint64_t epoch)
 	return SIZE_MAX;
 }
 
-static int read_batch(const struct live_job *o, struct journal *j, const struct lease_key *k, struct batch *b, struct live_job_maker *maker, struct error *e)
+static int read_batch(const struct live_job *o, struct journal *j, const struct lease_key *k, struct batch *b,
+		      struct live_job_maker *maker, struct error *e)
 {
 	size_t i = find(o, slot_of(o, k), k->epoch), size, payload_size;
 	unsigned char *body;
@@ -84,8 +86,9 @@ int back_read(const struct live_job *o, struct journal *j, const struct lease_ke
 	struct batch before = {0};
 	*b = (struct back){0};
 	last.epoch--;
-	if (o->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER || k->group >= o->plan.groups || k->part >= o->plan.parts || k->epoch == 0 ||
-	    !o->canvas || canvas_has(o->canvas, k) || !canvas_has(o->canvas, &last))
+	if (o->plan.kind != PLAN_CHAINS || k->kind != LEASE_RENDER || k->group >= o->plan.groups ||
+	    k->part >= o->plan.parts || k->epoch == 0 || !o->canvas || canvas_has(o->canvas, k) ||
+	    !canvas_has(o->canvas, &last))
 		return error_set(e, ENOENT, "not the lease that is next");
 	int rc = read_batch(o, j, &last, &b->batch, &b->maker, e);
 	b->maker = (struct live_job_maker){0};
@@ -141,7 +144,8 @@ int back_replay(struct live_job *o, struct journal *j, const struct lease_key *k
 		while (canvas_has(o->canvas, &next));
 		rc = back_read(o, j, &next, &b, e);
 		if (rc) /* all is there in a journal that is whole */
-			return rc == -ENOENT ? error_set(e, EBADMSG, "a batch that was replaced is not in the journal") : rc;
+			return rc == -ENOENT ? error_set(e, EBADMSG, "a batch that was replaced is not in the journal")
+					     : rc;
 		back_take(o, &b);
 		back_fini(&b);
 		o->again[slot_of(o, k)] = false;
@@ -149,7 +153,8 @@ int back_replay(struct live_job *o, struct journal *j, const struct lease_key *k
 	return rc;
 }
 
-static uint64_t copy_one(const struct live_job *o, struct journal *to, const struct merged_record *r, uint64_t most, struct merged_record *out)
+static uint64_t copy_one(const struct live_job *o, struct journal *to, const struct merged_record *r, uint64_t most,
+			 struct merged_record *out)
 {
 	struct error e;
 	unsigned char *body;
@@ -158,12 +163,15 @@ static uint64_t copy_one(const struct live_job *o, struct journal *to, const str
 	if (journal_body(o->journal, r->at, &body, &size, &e))
 		return 0;
 	*out = (struct merged_record){r->slot, r->epoch, journal_bytes(to)};
-	bool copied = size <= most && journal_append(to, JOURNAL_KEPT, &k, o->times.elapsed, body, size, NULL, &e) == 0 && journal_write(to, &e) == 0;
+	bool copied = size <= most &&
+		      journal_append(to, JOURNAL_KEPT, &k, o->times.elapsed, body, size, NULL, &e) == 0 &&
+		      journal_write(to, &e) == 0;
 	mem_free(body);
 	return copied ? size : 0;
 }
 
-void back_copy(const struct live_job *o, struct journal *to, uint64_t most, struct merged_record **list, size_t *count, size_t *capacity)
+void back_copy(const struct live_job *o, struct journal *to, uint64_t most, struct merged_record **list, size_t *count,
+	       size_t *capacity)
 {
 	enum { LAST = 2 };
 	uint32_t slots = o->plan.groups * o->plan.parts;

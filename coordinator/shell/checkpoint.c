@@ -160,7 +160,8 @@ static void done(uv_work_t *work, int status)
 	uint64_t id = o->id;
 	assert(status == 0);
 	(void)status;
-	if (w->rc && (w->unsure || o->unsure)) { /* this one and its journal, or the old ones: both hold all that was acknowledged */
+	if (w->rc && (w->unsure ||
+		      o->unsure)) { /* this one and its journal, or the old ones: both hold all that was acknowledged */
 		o->unsure = true;
 		o->generation_least = w->head.generation + 1;
 		o->checkpoint_after = server_now(s) + s->config.retry_seconds;
@@ -188,7 +189,8 @@ static void done(uv_work_t *work, int status)
 	o->busy = false;
 	s->checkpointing = s->checkpointing && !w->rc;
 	if (!s->stopping && o->unsure)
-		durable_hold(s, o, "its results cannot be stored", w->error.text); /* which is the end of it, if it was cancelled */
+		durable_hold(s, o, "its results cannot be stored",
+			     w->error.text); /* which is the end of it, if it was cancelled */
 	if (!s->stopping) {
 		server_order_free_again(s);
 		session_previews(s, id);
@@ -219,8 +221,9 @@ static void start(struct server *s, struct live_job *o)
 	w->head = (struct head){.bytes = sizeof w->head,
 				.worker_count = o->worker_count,
 				.job = o->id,
-				.generation = journal_generation(o->journal) < o->generation_least ? o->generation_least
-												  : journal_generation(o->journal) + 1,
+				.generation = journal_generation(o->journal) < o->generation_least
+						      ? o->generation_least
+						      : journal_generation(o->journal) + 1,
 				.cpu_seconds = o->cpu_seconds,
 				.bootstrap_cpu_seconds = o->record.bootstrap_cpu_seconds,
 				.look_written = o->look_written,
@@ -238,7 +241,8 @@ static void start(struct server *s, struct live_job *o)
 
 void checkpoint_where_due(struct server *s)
 {
-	if (s->stepping || s->stopping || s->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
+	if (s->stepping || s->stopping ||
+	    s->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
 		return;
 	for (struct live_job *o = s->orders; o; o = o->next) {
 		if (!o->canvas || o->busy || o->ended || o->late_count) /* what waits is in the journal alone */
@@ -246,7 +250,8 @@ void checkpoint_where_due(struct server *s)
 		if (canvas_missing(o->canvas)) /* what was taken back is computed at this time */
 			continue;
 		uint64_t limit = limit_of(s, o);
-		if ((journal_bytes(o->journal) - o->kept_bytes > limit || o->unsure) && server_now(s) >= o->checkpoint_after)
+		if ((journal_bytes(o->journal) - o->kept_bytes > limit || o->unsure) &&
+		    server_now(s) >= o->checkpoint_after)
 			start(s, o);
 		if (s->checkpointing)
 			return;
@@ -301,12 +306,14 @@ static void take_head(struct live_job *o, const struct head *h)
 static int read_all(struct live_job *o, struct checked_file *in, uint64_t *generation, struct error *e)
 {
 	struct head h;
-	int rc = checked_file_read(in, &h, offsetof(struct head, worker_count), e); /* another version's may be shorter */
+	int rc = checked_file_read(in, &h, offsetof(struct head, worker_count),
+				   e); /* another version's may be shorter */
 	if (!rc)
 		rc = spool_check_version(h.magic, magic, in->path, e);
 	if (!rc && h.bytes != sizeof h)
-		rc = error_set(e, EPROTO, "%s: its head has %u bytes instead of %zu: a coordinator for another machine wrote it", in->path, h.bytes,
-			       sizeof h);
+		rc = error_set(e, EPROTO,
+			       "%s: its head has %u bytes instead of %zu: a coordinator for another machine wrote it",
+			       in->path, h.bytes, sizeof h);
 	if (!rc)
 		rc = checked_file_read(in, &h.worker_count, sizeof h - offsetof(struct head, worker_count), e);
 	if (!rc && h.job != o->id)
@@ -330,7 +337,8 @@ static int read_all(struct live_job *o, struct checked_file *in, uint64_t *gener
 	return rc;
 }
 
-int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation, checked_file_heard *heard, void *user, struct error *e)
+int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation, checked_file_heard *heard,
+		    void *user, struct error *e)
 {
 	char name[SPOOL_PATH_MAX];
 	struct checked_file in;

@@ -31,7 +31,8 @@ struct clearing {
 static bool is_fetched(const struct server *s, uint64_t job)
 {
 	for (const struct session *p = s->sessions; p; p = p->next)
-		if (p->watched == job || (p->fetch.job == job && server_now(s) - p->fetch.at < fetching_seconds)) /* or waits for it */
+		if (p->watched == job ||
+		    (p->fetch.job == job && server_now(s) - p->fetch.at < fetching_seconds)) /* or waits for it */
 			return true;
 	return false;
 }
@@ -67,13 +68,17 @@ static void look(const struct server *s, struct clearing *c, uint64_t id)
 	if (rc || !record_is_ended(&c->record))
 		return;
 	double now = ages_now(s);
-	if (c->record.ended_seen < 0 || c->record.ended_seen > now) { /* nobody knows how old it is: it counts from here on */
+	if (c->record.ended_seen < 0 ||
+	    c->record.ended_seen > now) { /* nobody knows how old it is: it counts from here on */
 		c->record.ended_seen = now;
 		if (spool_write_record(s->spool, &c->record, NULL))
 			return;
 	}
-	c->jobs[c->job_count++] = (struct age_job){.id = id, .ended = c->record.ended_seen, .films = keep_bytes(s, id),
-						   .result = result_bytes(s, id), .busy = is_fetched(s, id)};
+	c->jobs[c->job_count++] = (struct age_job){.id = id,
+						   .ended = c->record.ended_seen,
+						   .films = keep_bytes(s, id),
+						   .result = result_bytes(s, id),
+						   .busy = is_fetched(s, id)};
 }
 
 static struct job_record *listed(struct server *s, uint64_t job)
@@ -91,8 +96,10 @@ static void drop_result(struct server *s, const struct age_job *j, struct job_re
 	if (r->has_result) {
 		r->has_result = false;
 		r->cleared = now;
-		if (spool_write_record(s->spool, r, &e)) { /* the result stays until its record can say that it is gone */
-			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)j->id, log_quote(e.text).text);
+		if (spool_write_record(s->spool, r,
+				       &e)) { /* the result stays until its record can say that it is gone */
+			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)j->id,
+				  log_quote(e.text).text);
 			return;
 		}
 		if (known)
@@ -103,8 +110,8 @@ static void drop_result(struct server *s, const struct age_job *j, struct job_re
 		spool_job_path(s->spool, j->id, results[i], path);
 		disk_unlink(path);
 	}
-	log_event(LOG_JOB_CLEARED, "job=j%llu what=result bytes=%llu ended=%.0f", (unsigned long long)j->id, (unsigned long long)j->result,
-		  r->ended);
+	log_event(LOG_JOB_CLEARED, "job=j%llu what=result bytes=%llu ended=%.0f", (unsigned long long)j->id,
+		  (unsigned long long)j->result, r->ended);
 }
 
 static void drop_record(struct server *s, const struct age_job *j)
@@ -124,11 +131,13 @@ static void clear_job(struct server *s, struct clearing *c, const struct age_job
 {
 	if ((!j->no_films || !j->films) && (!j->no_result || !j->result) && !j->no_record)
 		return;
-	if (lives(s, j->id) || is_fetched(s, j->id) || spool_read_record(s->spool, j->id, &c->record, NULL) || c->record.ended_seen != j->ended)
+	if (lives(s, j->id) || is_fetched(s, j->id) || spool_read_record(s->spool, j->id, &c->record, NULL) ||
+	    c->record.ended_seen != j->ended)
 		return;
 	if (j->no_films && j->films) {
 		keep_drop(s, j->id);
-		log_event(LOG_JOB_CLEARED, "job=j%llu what=films bytes=%llu", (unsigned long long)j->id, (unsigned long long)j->films);
+		log_event(LOG_JOB_CLEARED, "job=j%llu what=films bytes=%llu", (unsigned long long)j->id,
+			  (unsigned long long)j->films);
 	}
 	if (j->no_result && j->result)
 		drop_result(s, j, &c->record, c->now);

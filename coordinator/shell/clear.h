@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Finished jobs go by age and by space (store/age.h): at the start, every hour, and soon after a job has ended. Never a living
- * job's files nor those of one that is being read to go on, never a result that a client is fetching or waits for. The record says
- * first that the result is gone, and when; then the files go. With its record a job's row goes, too, and all that is left in its
- * folder. All finished jobs are looked at, a few milliseconds in each tick: nobody waits for it. The loop's thread.
+ * Finished jobs go by age and by space (store/age.h): at the start, every hour, and soon after a job has ended. Never a
+ * living job's files nor those of one that is being read to go on, never a result that a client is fetching or waits
+ * for. The record says first that the result is gone, and when; then the files go. With its record a job's row goes,
+ * too, and all that is left in its folder. All finished jobs are looked at, a few milliseconds in each tick: nobody
+ * waits for it. The loop's thread.
  */
 #ifndef COORDINATOR_SHELL_CLEAR_H
 #define COORDINATOR_SHELL_CLEAR_H
@@ -11,7 +12,7 @@
 #include "coordinator/shell/server.h"
 
 void clear_tick(struct server *s);
-void clear_soon(struct server *s); /* a job has ended */
+void clear_soon(struct server *s);  /* a job has ended */
 void clear_close(struct server *s); /* after the loop */
 
 #endif

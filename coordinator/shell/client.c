@@ -68,7 +68,8 @@ static uint64_t bytes_of(const Farm__Submit *m)
 	return sum;
 }
 
-int session_within_quota(const struct session *p, uint64_t job, const struct plan *plan, const Farm__Submit *m, struct error *e)
+int session_within_quota(const struct session *p, uint64_t job, const struct plan *plan, const Farm__Submit *m,
+			 struct error *e)
 {
 	struct quota_use has = {0};
 	if (p->who.role == TLS_OPERATOR)
@@ -156,7 +157,8 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 		answer_submit(p, 0, e.text, NULL);
 		session_upload_abort(p);
 	} else if (rc) {
-		log_event(LOG_BLOB_STORED, "peer=%llu bytes=%llu", (unsigned long long)p->id, (unsigned long long)c->size);
+		log_event(LOG_BLOB_STORED, "peer=%llu bytes=%llu", (unsigned long long)p->id,
+			  (unsigned long long)c->size);
 		if (p->upload->missing_count == 0)
 			submit(p);
 	}
@@ -164,8 +166,8 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 
 /* ---- the rest ---- */
 
-/* Whoever has a certificate sees the own jobs alone, an operator all. Jobs of others are not there: that they are would be an
- * answer, too. */
+/* Whoever has a certificate sees the own jobs alone, an operator all. Jobs of others are not there: that they are would
+ * be an answer, too. */
 static bool may_see(const struct session *p, struct job_view *v)
 {
 	if (p->who.role == TLS_NOBODY || p->who.role == TLS_OPERATOR)

@@ -27,7 +27,8 @@ static int tell(struct session *p, struct event *ev)
 /* The core knows whether it can be, and is told first. */
 static void not_for_long(struct session *p, const struct error *e)
 {
-	text_print(p->rejected, sizeof p->rejected, "so it is until the coordinator stops, but it cannot be stored: %s", e->text);
+	text_print(p->rejected, sizeof p->rejected, "so it is until the coordinator stops, but it cannot be stored: %s",
+		   e->text);
 }
 
 static void hold(struct session *p, uint64_t job, const char *who)
@@ -35,7 +36,8 @@ static void hold(struct session *p, uint64_t job, const char *who)
 	struct server *s = p->server;
 	struct error e;
 	char text[256];
-	struct event ev = {.kind = EVENT_HOLD, .job = job, .hold = HOLD_ORDERED, .text = *who ? control_held_by(who, text) : ""};
+	struct event ev = {
+		.kind = EVENT_HOLD, .job = job, .hold = HOLD_ORDERED, .text = *who ? control_held_by(who, text) : ""};
 	if (tell(p, &ev))
 		return;
 	if (ledger_hold(s->ledger, job, who, &e)) {
@@ -45,7 +47,8 @@ static void hold(struct session *p, uint64_t job, const char *who)
 	reconcile_row(s, job);
 	struct live_job *o = server_live_job(s, job);
 	if (o)
-		live_job_log(o, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released", log_quote(name_of(p)).text);
+		live_job_log(o, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released",
+			     log_quote(name_of(p)).text);
 }
 
 static void set_priority(struct session *p, uint64_t job, int priority)
@@ -70,7 +73,10 @@ static bool finds(struct session *p, uint64_t job, bool over_too)
 {
 	struct job_view v;
 	bool there = session_finds_job(p, job, &v);
-	text_copy(p->rejected, sizeof p->rejected, !there ? "no such job" : over_too || server_live_job(p->server, job) ? "" : "the job is over");
+	text_copy(p->rejected, sizeof p->rejected,
+		  !there					? "no such job"
+		  : over_too || server_live_job(p->server, job) ? ""
+								: "the job is over");
 	return !*p->rejected;
 }
 
@@ -97,10 +103,13 @@ void session_control(struct session *p, const Farm__Control *c)
 			set_priority(p, c->job, c->priority);
 			break;
 		case FARM__VERB__VERB_EXTEND:
-			extend_job(p, &(struct extension){.job = c->job, .spp = c->more_spp, .mutations = c->more_mutations,
-							  .seconds = c->more_seconds, .target_error = c->target_error});
+			extend_job(p, &(struct extension){.job = c->job,
+							  .spp = c->more_spp,
+							  .mutations = c->more_mutations,
+							  .seconds = c->more_seconds,
+							  .target_error = c->target_error});
 			return; /* with an answer, or there will be one */
-		default: /* a number from outside */
+		default:	/* a number from outside */
 			text_copy(p->rejected, sizeof p->rejected, "nothing that can be done with a job");
 		}
 	}

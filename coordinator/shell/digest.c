@@ -20,8 +20,9 @@ static int add(struct parts *p, const void *bytes, size_t size, struct error *e)
 /* Field by field: what lies between them is nobody's. */
 static int add_numbers(struct parts *p, const struct batch *b, struct error *e)
 {
-	const uint64_t counts[] = {b->key.job,   (uint64_t)b->key.kind, b->key.group,	  b->key.part,	 b->key.epoch,
-				   b->tile_count, b->state_count,	  b->strategy_count, b->weight_count, b->moment_count};
+	const uint64_t counts[] = {b->key.job,	    (uint64_t)b->key.kind, b->key.group,   b->key.part,
+				   b->key.epoch,    b->tile_count,	   b->state_count, b->strategy_count,
+				   b->weight_count, b->moment_count};
 	const double sums[] = {b->independent_sum, b->independent_square, b->beyond_sum};
 	int rc = add(p, counts, sizeof counts, e);
 	if (!rc)
@@ -43,7 +44,8 @@ static int add_tile(struct parts *p, const struct tile *t, struct error *e)
 int digest_batch(const struct batch *b, struct batch_digest *out, struct error *e)
 {
 	enum { NUMBERS = 5, ARRAYS = 2 };
-	struct parts p = {mem_alloc(NUMBERS + 2 * (size_t)b->tile_count + b->state_count + ARRAYS, sizeof *p.hashes), 0};
+	struct parts p = {mem_alloc(NUMBERS + 2 * (size_t)b->tile_count + b->state_count + ARRAYS, sizeof *p.hashes),
+			  0};
 	struct blob_hash all;
 	if (!p.hashes)
 		return error_set(e, ENOMEM, "no memory for a digest");

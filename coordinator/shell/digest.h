@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What of a worker's answer decides bits, as one SHA-256: the numbers themselves, not the bytes of the message, which another
- * compressor may pack otherwise. Left out: the time that it took. Any thread; allocates nothing but one list.
+ * What of a worker's answer decides bits, as one SHA-256: the numbers themselves, not the bytes of the message, which
+ * another compressor may pack otherwise. Left out: the time that it took. Any thread; allocates nothing but one list.
  */
 #ifndef COORDINATOR_SHELL_DIGEST_H
 #define COORDINATOR_SHELL_DIGEST_H

@@ -53,13 +53,14 @@ static void submitted(struct server *s, const struct action *a)
 	s->orders = o;
 	char plan[PLAN_TEXT];
 	plan_describe(&o->plan, plan, sizeof plan);
-	live_job_log(o, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s", log_quote(o->record.name).text, p->address,
-		  *p->who.name ? p->who.name : "-", log_quote(plan).text, log_quote(p->upload->rule).text);
+	live_job_log(o, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s", log_quote(o->record.name).text,
+		     p->address, *p->who.name ? p->who.name : "-", log_quote(plan).text,
+		     log_quote(p->upload->rule).text);
 	for (size_t i = 0; i < m->n_notes; i++)
 		live_job_log(o, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
 	for (size_t i = 0; i < m->n_effects; i++)
 		live_job_log(o, LOG_JOB_NOTE, "effect=%s on=%d why=%s", log_quote(m->effects[i]->name).text,
-			  (int)m->effects[i]->on, log_quote(m->effects[i]->why).text);
+			     (int)m->effects[i]->on, log_quote(m->effects[i]->why).text);
 }
 
 static void rejected(struct server *s, const struct action *a)
@@ -74,9 +75,12 @@ static void job_changed(struct server *s, const struct action *a)
 	struct live_job *o = server_live_job(s, a->job);
 	if (!o)
 		return;
-	live_job_log(o, a->state == JOB_FAILED ? LOG_JOB_FAILED : a->state == JOB_DONE ? LOG_JOB_DONE : LOG_JOB_STATE,
-		  "state=%s reason=%s rounds=%llu text=%s", job_state_name(a->state),
-		  a->end == END_NONE ? "none" : job_end_name(a->end), number(a->rounds), log_quote(a->text).text);
+	live_job_log(o,
+		     a->state == JOB_FAILED ? LOG_JOB_FAILED
+		     : a->state == JOB_DONE ? LOG_JOB_DONE
+					    : LOG_JOB_STATE,
+		     "state=%s reason=%s rounds=%llu text=%s", job_state_name(a->state),
+		     a->end == END_NONE ? "none" : job_end_name(a->end), number(a->rounds), log_quote(a->text).text);
 	o->ended = job_state_is_end(a->state);
 }
 
@@ -86,7 +90,8 @@ void dispatch_prepare(struct server *s, struct live_job *o)
 	int rc = live_job_prepare(o, server_film_folder(s, &o->plan), &e);
 	if (rc && rc != -ENOMEM) {
 		if (!o->unprepared)
-			live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+			live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"",
+				     log_quote(e.text).text);
 		o->unprepared = true;
 		o->try_again = server_now(s) + s->config.retry_seconds;
 		return;
@@ -94,7 +99,7 @@ void dispatch_prepare(struct server *s, struct live_job *o)
 	o->unprepared = false;
 	if (!rc)
 		live_job_log(o, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d", o->lit.b_pooled,
-			  o->lit.beyond_share, (int)o->lit.black);
+			     o->lit.beyond_share, (int)o->lit.black);
 	struct event ev = {.kind = EVENT_PREPARED,
 			   .job = o->id,
 			   .text = e.text,
@@ -110,11 +115,13 @@ static void keep_partials(const struct server *s, const struct lease_key *k)
 		char path[SPOOL_PATH_MAX];
 		size_t size;
 		const unsigned char *bytes = batch_tile_bytes(s->result, s->payload->bytes, i, &size);
-		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", s->config.keep_partials, number(k->job),
-			 number(k->epoch), k->group, k->part, s->batch->tiles[i].x, s->batch->tiles[i].y);
+		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", s->config.keep_partials,
+			 number(k->job), number(k->epoch), k->group, k->part, s->batch->tiles[i].x,
+			 s->batch->tiles[i].y);
 		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
 		if (fd < 0 || disk_write_all(fd, bytes, size))
-			log_event(LOG_SPOOL_FAULT, "path=%s text=%s", log_quote(path).text, log_quote(strerror(errno)).text);
+			log_event(LOG_SPOOL_FAULT, "path=%s text=%s", log_quote(path).text,
+				  log_quote(strerror(errno)).text);
 		if (fd >= 0)
 			disk_close(fd);
 	}
@@ -135,7 +142,8 @@ static void merge(struct server *s, const struct action *a)
 	if (!rc)
 		back_note(o, &a->key, at, s->result->maker);
 	if (rc == -ENOMEM) { /* half merged; nobody was told that it is stored */
-		log_event(LOG_STOP, "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
+		log_event(LOG_STOP,
+			  "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
 		_exit(1);
 	}
 	o->overflowed = o->overflowed || rc == -ERANGE;
@@ -144,7 +152,8 @@ static void merge(struct server *s, const struct action *a)
 	trust_merged(o, a);
 	live_job_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", number(a->job),
-		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch), s->stored ? " late=1" : "");
+		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch),
+		  s->stored ? " late=1" : "");
 }
 
 static void take_back(struct server *s, const struct action *a)
@@ -153,8 +162,8 @@ static void take_back(struct server *s, const struct action *a)
 	assert(o && !o->busy && s->back);
 	back_take(o, s->back);
 	trust_taken_back(o, a->who);
-	live_job_log(o, LOG_BATCH_TAKEN_BACK, "kind=%d group=%u part=%u epoch=%llu text=%s", (int)a->key.kind, a->key.group, a->key.part,
-		  number(a->key.epoch), log_quote(a->text).text);
+	live_job_log(o, LOG_BATCH_TAKEN_BACK, "kind=%d group=%u part=%u epoch=%llu text=%s", (int)a->key.kind,
+		     a->key.group, a->key.part, number(a->key.epoch), log_quote(a->text).text);
 }
 
 static void acknowledge(struct server *s, const struct action *a)
@@ -166,12 +175,12 @@ static void acknowledge(struct server *s, const struct action *a)
 	else if (p)
 		session_send_ack(p, &a->key, a->ack, a->text);
 	if (a->ack != ACK_MERGED)
-		log_event(a->ack == ACK_REPEAT	 ? LOG_BATCH_REPEATED
+		log_event(a->ack == ACK_REPEAT	? LOG_BATCH_REPEATED
 			  : a->ack == ACK_NOTED ? LOG_BATCH_NOTED
 						: LOG_BATCH_REFUSED,
 			  "job=j%llu peer=%llu worker=%s kind=%d group=%u part=%u epoch=%llu text=%s", number(a->job),
-			  number(a->peer), log_quote(p ? p->name : "?").text, (int)a->key.kind, a->key.group, a->key.part,
-			  number(a->key.epoch), log_quote(a->text).text);
+			  number(a->peer), log_quote(p ? p->name : "?").text, (int)a->key.kind, a->key.group,
+			  a->key.part, number(a->key.epoch), log_quote(a->text).text);
 }
 
 /* ---- leases and peers ---- */

@@ -59,7 +59,8 @@ static int pack_plan(const struct live_job *o, unsigned char **frame, size_t *si
 	return envelope_pack(&m, NULL, 0, frame, size, e);
 }
 
-int durable_pack(const struct live_job *o, struct ledger_job *j, unsigned char **submission, unsigned char **plan, struct error *e)
+int durable_pack(const struct live_job *o, struct ledger_job *j, unsigned char **submission, unsigned char **plan,
+		 struct error *e)
 {
 	*submission = *plan = NULL;
 	int rc = envelope_pack(o->submit.message, NULL, 0, submission, &j->submission_size, e);
@@ -74,8 +75,13 @@ int durable_begin(struct server *s, struct live_job *o, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX];
 	unsigned char *submission, *plan;
-	struct ledger_job j = {.id = o->id, .owner = o->record.owner, .name = o->record.name, .version = HSLT_VERSION,
-			       .priority = o->record.priority, .mixed = live_job_submit(o)->mixed, .submitted = o->record.submitted};
+	struct ledger_job j = {.id = o->id,
+			       .owner = o->record.owner,
+			       .name = o->record.name,
+			       .version = HSLT_VERSION,
+			       .priority = o->record.priority,
+			       .mixed = live_job_submit(o)->mixed,
+			       .submitted = o->record.submitted};
 	spool_job_path(s->spool, o->id, NULL, folder);
 	int rc = durable_pack(o, &j, &submission, &plan, e);
 	if (!rc)
@@ -129,7 +135,8 @@ void durable_end_row(struct server *s, const struct job_record *r)
 	struct error e;
 	if (ledger_end(s->ledger, r->id, r->extended, r->state, &e) == 0)
 		return;
-	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"it is tried again\"", (unsigned long long)r->id, log_quote(e.text).text);
+	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"it is tried again\"", (unsigned long long)r->id,
+		  log_quote(e.text).text);
 	end_later(s, r, true);
 }
 
@@ -228,7 +235,8 @@ static int write_pinned(struct server *s, struct live_job *o, double elapsed, st
 	if (o->pinned || !farm_job(s->farm, o->id, server_now(s), &status) || !*status.fingerprint)
 		return 0;
 	o->pinned = true;
-	return journal_append(o->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint, strlen(status.fingerprint), NULL, e);
+	return journal_append(o->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint, strlen(status.fingerprint),
+			      NULL, e);
 }
 
 int durable_merged(struct server *s, struct live_job *o, uint64_t *at, struct error *e)
@@ -239,7 +247,9 @@ int durable_merged(struct server *s, struct live_job *o, uint64_t *at, struct er
 	assert(s->frame);
 	int rc = write_pinned(s, o, elapsed, e);
 	*at = journal_bytes(o->journal);
-	return rc ? rc : journal_append(o->journal, again ? JOURNAL_AGAIN : JOURNAL_BATCH, k, elapsed, s->frame, s->frame_size, s->payload, e);
+	return rc ? rc
+		  : journal_append(o->journal, again ? JOURNAL_AGAIN : JOURNAL_BATCH, k, elapsed, s->frame,
+				   s->frame_size, s->payload, e);
 }
 
 /* ---- group commit ---- */
@@ -296,8 +306,9 @@ static void answer(struct server *s, struct durable_ack *a)
 		return;
 	}
 	if (a->ack == ACK_MERGED)
-		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", (unsigned long long)a->key.job,
-			  (unsigned long long)a->peer, (int)a->key.kind, a->key.group, a->key.part, (unsigned long long)a->key.epoch);
+		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu",
+			  (unsigned long long)a->key.job, (unsigned long long)a->peer, (int)a->key.kind, a->key.group,
+			  a->key.part, (unsigned long long)a->key.epoch);
 	if (p)
 		session_send_ack(p, &a->key, a->ack, "");
 	drop_ack(a);
@@ -351,7 +362,8 @@ void durable_ack(struct server *s, const struct live_job *o, uint64_t peer, cons
 /* ---- the rest ---- */
 
 /* What nobody waits for: it need not be safe at once, but soon. */
-static int append_note(struct server *s, const struct live_job *o, enum journal_kind kind, double elapsed, const void *bytes, size_t size, struct error *e)
+static int append_note(struct server *s, const struct live_job *o, enum journal_kind kind, double elapsed,
+		       const void *bytes, size_t size, struct error *e)
 {
 	int rc = journal_append(o->journal, kind, NULL, elapsed, bytes, size, NULL, e);
 	if (!rc)
@@ -375,8 +387,8 @@ void durable_look(struct server *s, uint64_t job)
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
-/* Not before each answer: it is for the record alone. Nor while a checkpoint is written, which has the last ones and takes the
- * journal's place. */
+/* Not before each answer: it is for the record alone. Nor while a checkpoint is written, which has the last ones and
+ * takes the journal's place. */
 static void write_counts(struct server *s, struct live_job *o)
 {
 	struct job_counts now;

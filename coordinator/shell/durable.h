@@ -2,8 +2,9 @@
 /*
  * What survives the coordinator: its jobs in the ledger, their merged batches in journals, each flushed before it is
  * acknowledged. Batches that come while a flush is under way share the next one (group commit), which runs in the pool.
- * A job that the disk fails is held, says why, and goes on by itself: what it appended meanwhile and what was not flushed is
- * brought into a new file (store/journal.h), an image that could not be written is made again. The loop's thread.
+ * A job that the disk fails is held, says why, and goes on by itself: what it appended meanwhile and what was not
+ * flushed is brought into a new file (store/journal.h), an image that could not be written is made again. The loop's
+ * thread.
  */
 #ifndef COORDINATOR_SHELL_DURABLE_H
 #define COORDINATOR_SHELL_DURABLE_H
@@ -13,15 +14,16 @@
 /* The job is in the ledger when this returns, with an empty journal: it may be told to whoever submitted it. */
 int durable_begin(struct server *s, struct live_job *o, struct error *e);
 /* Submission and plan as the ledger takes them; the two are mem_alloc'd, and NULL if they could not be made. */
-int durable_pack(const struct live_job *o, struct ledger_job *j, unsigned char **submission, unsigned char **plan, struct error *e);
-/* It has ended: its record is written, its films are kept (keep.h) or go. Not 0: its record cannot be written, and it has a
- * result, which nobody must be told of yet. Records of others are tried again. */
+int durable_pack(const struct live_job *o, struct ledger_job *j, unsigned char **submission, unsigned char **plan,
+		 struct error *e);
+/* It has ended: its record is written, its films are kept (keep.h) or go. Not 0: its record cannot be written, and it
+ * has a result, which nobody must be told of yet. Records of others are tried again. */
 int durable_end(struct server *s, struct live_job *o);
 /* A job's record says that it has ended: so does the ledger then, or when it can be written again. */
 void durable_end_row(struct server *s, const struct job_record *r);
 
-/* Before the core sees the batch of this event: the frame for the journal, and room on the disk for it. -ENOSPC, -EFBIG: the disk
- * is full: the job is held until there is room. */
+/* Before the core sees the batch of this event: the frame for the journal, and room on the disk for it. -ENOSPC,
+ * -EFBIG: the disk is full: the job is held until there is room. */
 int durable_reserve(struct server *s, struct live_job *o, struct error *e);
 /* The core merges the batch of this event. -ENOMEM: the journal has it not, and it must not be acknowledged. */
 int durable_merged(struct server *s, struct live_job *o, uint64_t *at, struct error *e);

@@ -27,11 +27,12 @@ static double error_of(const struct forecast_history *h)
 
 static struct extension_from where(const struct live_job *o, double seconds, bool ended)
 {
-	return (struct extension_from){.rounds = live_job_rounds(o), .seconds = seconds, .error = error_of(&o->record.looks), .ended = ended};
+	return (struct extension_from){
+		.rounds = live_job_rounds(o), .seconds = seconds, .error = error_of(&o->record.looks), .ended = ended};
 }
 
-static int plan_of(const struct session *p, const struct live_job *o, const struct extension *x, const struct extension_from *from,
-		   struct plan_request *asked, struct plan *plan, struct error *e)
+static int plan_of(const struct session *p, const struct live_job *o, const struct extension *x,
+		   const struct extension_from *from, struct plan_request *asked, struct plan *plan, struct error *e)
 {
 	int rc = plan_request_from_wire(live_job_submit(o)->plan, asked, e);
 	if (!rc)
@@ -87,12 +88,14 @@ static void describe(const struct live_job *o, char *text, size_t size)
 static void note(const struct session *p, struct live_job *o, char *text, size_t size)
 {
 	describe(o, text, size);
-	live_job_log(o, LOG_JOB_STATE, "state=extended by=%s text=%s", *p->who.name ? p->who.name : "-", log_quote(text).text);
+	live_job_log(o, LOG_JOB_STATE, "state=extended by=%s text=%s", *p->who.name ? p->who.name : "-",
+		     log_quote(text).text);
 }
 
 /* ---- a job that runs ---- */
 
-static int extend_live(struct session *p, struct live_job *o, const struct extension *x, char *text, size_t size, struct error *e)
+static int extend_live(struct session *p, struct live_job *o, const struct extension *x, char *text, size_t size,
+		       struct error *e)
 {
 	struct server *s = p->server;
 	struct plan_request asked, old_asked;
@@ -163,8 +166,8 @@ static int begin_again(struct session *p, struct live_job *o, const struct job_r
 	return rc;
 }
 
-static int extend_read(struct session *p, struct live_job *o, const struct extension *x, const struct job_record *r, char *text, size_t size,
-		       struct error *e)
+static int extend_read(struct session *p, struct live_job *o, const struct extension *x, const struct job_record *r,
+		       char *text, size_t size, struct error *e)
 {
 	struct plan_request asked;
 	struct plan plan;
@@ -233,12 +236,13 @@ static void done(uv_work_t *work, int status)
 }
 
 /* All that can be said without its films: of less than was done, so that nothing is refused which they would allow. */
-static int ask_beforehand(const struct session *p, const struct live_job *o, const struct extension *x, const struct job_record *r,
-			  struct error *e)
+static int ask_beforehand(const struct session *p, const struct live_job *o, const struct extension *x,
+			  const struct job_record *r, struct error *e)
 {
 	struct plan_request asked;
 	struct plan plan;
-	return plan_of(p, o, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked, &plan, e);
+	return plan_of(p, o, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked, &plan,
+		       e);
 }
 
 static int start_reading(struct session *p, const struct extension *x, const struct job_record *r, struct error *e)
@@ -275,8 +279,8 @@ static int start_reading(struct session *p, const struct extension *x, const str
 static int extend_ended(struct session *p, const struct extension *x, const struct job_record *r, struct error *e)
 {
 	if (strcmp(r->state, job_state_name(JOB_DONE)) != 0)
-		return error_set(e, EINVAL, "it has %s, and nothing of it was kept: %s", strcmp(r->state, "failed") == 0 ? "failed" : "been cancelled",
-				 again);
+		return error_set(e, EINVAL, "it has %s, and nothing of it was kept: %s",
+				 strcmp(r->state, "failed") == 0 ? "failed" : "been cancelled", again);
 	if (strcmp(r->reason, job_end_name(END_BLACK)) == 0)
 		return error_set(e, EINVAL, "it is black: chains have nowhere to begin");
 	return start_reading(p, x, r, e);
@@ -318,7 +322,8 @@ void extend_job(struct session *p, const struct extension *x)
 {
 	struct session **at = &p->server->extending;
 	struct error e;
-	int rc = p->wants.job ? error_set(&e, EBUSY, "one extension at a time: the one before is not answered yet") : extend_check(x, &e);
+	int rc = p->wants.job ? error_set(&e, EBUSY, "one extension at a time: the one before is not answered yet")
+			      : extend_check(x, &e);
 	if (rc) {
 		answer(p, rc, &e, "");
 		return;

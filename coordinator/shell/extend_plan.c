@@ -9,7 +9,8 @@ static uint64_t total_of(const struct plan *p, const struct plan_request *asked,
 {
 	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, total = 0;
 	if (p->rounds == UINT64_MAX)
-		return p->kind == PLAN_CHAINS ? rounds * plan_round_mutations(p) : rounds * p->groups * p->epoch * pixels;
+		return p->kind == PLAN_CHAINS ? rounds * plan_round_mutations(p)
+					      : rounds * p->groups * p->epoch * pixels;
 	if (asked->spp)
 		total = asked->spp * pixels;
 	return asked->mutations && (!total || asked->mutations < total) ? asked->mutations : total;
@@ -44,12 +45,15 @@ static bool same_bits(const struct plan *a, const struct plan *b)
 	c.rounds = a->rounds;
 	c.seconds = a->seconds;
 	c.target_error = a->target_error;
-	return a->kind == c.kind && a->width == c.width && a->height == c.height && a->crop_x == c.crop_x && a->crop_y == c.crop_y &&
-	       a->crop_width == c.crop_width && a->crop_height == c.crop_height && a->border == c.border && a->seed == c.seed &&
-	       a->groups == c.groups && a->parts == c.parts && a->chains == c.chains && a->bootstrap == c.bootstrap &&
-	       a->epoch == c.epoch && a->min_depth == c.min_depth && a->max_depth == c.max_depth &&
-	       memcmp(a->integrator, c.integrator, sizeof a->integrator) == 0 && memcmp(a->mutations, c.mutations, sizeof a->mutations) == 0 &&
-	       memcmp(a->accuracy, c.accuracy, sizeof a->accuracy) == 0 && memcmp(a->effects, c.effects, sizeof a->effects) == 0;
+	return a->kind == c.kind && a->width == c.width && a->height == c.height && a->crop_x == c.crop_x &&
+	       a->crop_y == c.crop_y && a->crop_width == c.crop_width && a->crop_height == c.crop_height &&
+	       a->border == c.border && a->seed == c.seed && a->groups == c.groups && a->parts == c.parts &&
+	       a->chains == c.chains && a->bootstrap == c.bootstrap && a->epoch == c.epoch &&
+	       a->min_depth == c.min_depth && a->max_depth == c.max_depth &&
+	       memcmp(a->integrator, c.integrator, sizeof a->integrator) == 0 &&
+	       memcmp(a->mutations, c.mutations, sizeof a->mutations) == 0 &&
+	       memcmp(a->accuracy, c.accuracy, sizeof a->accuracy) == 0 &&
+	       memcmp(a->effects, c.effects, sizeof a->effects) == 0;
 }
 
 int extend_check(const struct extension *x, struct error *e)
@@ -61,8 +65,8 @@ int extend_check(const struct extension *x, struct error *e)
 	return 0;
 }
 
-int extend_plan(const struct plan *p, const struct extension *x, const struct extension_from *from, struct plan_request *asked,
-		struct plan *out, struct error *e)
+int extend_plan(const struct plan *p, const struct extension *x, const struct extension_from *from,
+		struct plan_request *asked, struct plan *out, struct error *e)
 {
 	bool samples = x->spp || x->mutations, time = x->seconds > 0, error = x->target_error > 0;
 	int rc = extend_check(x, e);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a client fetches, piece by piece, is one file from its first piece to its last: it is opened once, however often another one gets
- * its name meanwhile.
+ * What a client fetches, piece by piece, is one file from its first piece to its last: it is opened once, however often
+ * another one gets its name meanwhile.
  */
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/session.h"
@@ -36,7 +36,8 @@ static int cleared(const struct job_record *r, struct error *e)
 	struct tm t;
 	time_t at = (time_t)r->cleared;
 	strftime(day, sizeof day, "%Y-%m-%d", gmtime_r(&at, &t));
-	return error_set(e, ENOENT, "job j%llu: its result was cleared on %s, by --keep-days or --keep-gb of the coordinator",
+	return error_set(e, ENOENT,
+			 "job j%llu: its result was cleared on %s, by --keep-days or --keep-gb of the coordinator",
 			 (unsigned long long)r->id, day);
 }
 
@@ -93,21 +94,25 @@ static int begin(struct session *p, const Farm__Fetch *f, struct job_view *v, st
 	if (f->what == FARM__WHAT__WHAT_RESULT && v->record.cleared > 0)
 		return cleared(&v->record, e);
 	if (f->what == FARM__WHAT__WHAT_RESULT && !v->record.has_result)
-		return error_set(e, ENOENT, "job j%llu is %s: it has no result", (unsigned long long)f->job, v->record.state);
+		return error_set(e, ENOENT, "job j%llu is %s: it has no result", (unsigned long long)f->job,
+				 v->record.state);
 	return open_file(p, f, file, e);
 }
 
 static int read_piece(const struct fetch *t, const Farm__Fetch *f, unsigned char *bytes, size_t *count, struct error *e)
 {
 	if (t->job != f->job || t->what != f->what)
-		return error_set(e, ESTALE, "j%llu: this was not fetched from its beginning, or had to give way to others: fetch it again",
-				 (unsigned long long)f->job);
+		return error_set(
+			e, ESTALE,
+			"j%llu: this was not fetched from its beginning, or had to give way to others: fetch it again",
+			(unsigned long long)f->job);
 	if (f->offset > t->size)
 		return error_set(e, EINVAL, "the file is shorter than that");
 	uint64_t left = t->size - f->offset;
 	ssize_t n = disk_pread(t->fd, bytes, left < CHUNK ? left : CHUNK, (off_t)f->offset);
 	if (n < 0 || (n == 0 && left))
-		return error_set(e, n < 0 ? errno : EIO, "%s", n < 0 ? strerror(errno) : "the file is shorter than it was");
+		return error_set(e, n < 0 ? errno : EIO, "%s",
+				 n < 0 ? strerror(errno) : "the file is shorter than it was");
 	*count = (size_t)n;
 	return 0;
 }
@@ -145,7 +150,8 @@ static void answer(struct session *p, const Farm__Fetch *f)
 /* Made when somebody asks: it holds up the job's results for as long as an image takes. */
 static bool is_preview_old(const struct server *s, const struct live_job *o)
 {
-	return o && o->canvas && !o->ended && (o->preview_made <= 0 || server_now(s) - o->preview_made > preview_seconds);
+	return o && o->canvas && !o->ended &&
+	       (o->preview_made <= 0 || server_now(s) - o->preview_made > preview_seconds);
 }
 
 void session_previews(struct server *s, uint64_t job)

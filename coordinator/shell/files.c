@@ -30,7 +30,10 @@ bool files_look(struct server *s, struct live_job *o)
 	char text[256];
 	const Farm__File *f = o->ended ? NULL : lacking(s, o);
 	if (f && !o->lacks_file) {
-		text_print(text, sizeof text, "its file %.100s is damaged or gone in the spool: submit the scene again (hslt-submit), and it goes on", f->name);
+		text_print(
+			text, sizeof text,
+			"its file %.100s is damaged or gone in the spool: submit the scene again (hslt-submit), and it goes on",
+			f->name);
 		hold(s, o, text);
 	} else if (!f && o->lacks_file) {
 		hold(s, o, "");

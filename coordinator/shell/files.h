@@ -1,15 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Files of scenes in spool/blobs, which may be damaged while they lie there: they are checked before they are given to anybody. A job of
- * which one is gone or damaged waits and says which; whoever submits the scene again brings it, and the job goes on. No worker is
- * blamed for it. The loop's thread.
+ * Files of scenes in spool/blobs, which may be damaged while they lie there: they are checked before they are given to
+ * anybody. A job of which one is gone or damaged waits and says which; whoever submits the scene again brings it, and
+ * the job goes on. No worker is blamed for it. The loop's thread.
  */
 #ifndef COORDINATOR_SHELL_FILES_H
 #define COORDINATOR_SHELL_FILES_H
 
 #include "coordinator/shell/server.h"
 
-enum { FILES_CHECKED = 60, FILES_DOUBTED = 5 /* s: what was right so lately need not be read again; when a worker complains */ };
+enum {
+	FILES_CHECKED = 60,
+	FILES_DOUBTED = 5 /* s: what was right so lately need not be read again; when a worker complains */
+};
 
 /* Of one that is asked for. Not 0: it cannot be given; jobs that need it wait. */
 int files_check(struct server *s, const struct blob_hash *h, double seconds, struct error *e);

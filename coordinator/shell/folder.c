@@ -32,14 +32,16 @@ static int make_anew(struct server *s, struct live_job *o, struct error *e)
 	return 0;
 }
 
-/* What was merged is in memory or in the old journal, whose file is open: the one goes into a checkpoint, the other into a new file. */
+/* What was merged is in memory or in the old journal, whose file is open: the one goes into a checkpoint, the other
+ * into a new file. */
 static void go_on(struct server *s, struct live_job *o)
 {
 	char folder[SPOOL_PATH_MAX];
 	struct error e;
 	spool_job_path(s->spool, o->id, NULL, folder);
 	int rc = make_anew(s, o, &e);
-	live_job_log(o, LOG_SPOOL_FAULT, "text=\"%s was removed or moved away while the job runs: %s\"", folder, rc ? e.text : "made anew, and the job goes on");
+	live_job_log(o, LOG_SPOOL_FAULT, "text=\"%s was removed or moved away while the job runs: %s\"", folder,
+		     rc ? e.text : "made anew, and the job goes on");
 	if (rc) {
 		if (!o->ended)
 			durable_hold(s, o, "its folder is gone and cannot be made anew", e.text);
@@ -58,7 +60,8 @@ static void go_on(struct server *s, struct live_job *o)
 	durable_hold(s, o, "its results cannot be stored", "its folder was removed, and is made anew");
 }
 
-/* A journal that is bad already has no file to look for: then the folder itself, which may go while it is being made anew. */
+/* A journal that is bad already has no file to look for: then the folder itself, which may go while it is being made
+ * anew. */
 static bool is_gone(const struct server *s, const struct live_job *o)
 {
 	char folder[SPOOL_PATH_MAX];

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job's folder that somebody removes, or moves away, while the job runs: it is made anew, and all that the job needs to go on is
- * written into it, from memory and from the files that are still open. The loop's thread.
+ * A job's folder that somebody removes, or moves away, while the job runs: it is made anew, and all that the job needs
+ * to go on is written into it, from memory and from the files that are still open. The loop's thread.
  */
 #ifndef COORDINATOR_SHELL_FOLDER_H
 #define COORDINATOR_SHELL_FOLDER_H

@@ -22,7 +22,8 @@ static size_t cost_of(const struct envelope *env)
 /* first: nothing of this peer waits. */
 static bool is_answered_at_once(Farm__Envelope__BodyCase what, bool first)
 {
-	return what == FARM__ENVELOPE__BODY_HEARTBEAT || what == FARM__ENVELOPE__BODY_BYE || (first && what == FARM__ENVELOPE__BODY_JOB_LIST);
+	return what == FARM__ENVELOPE__BODY_HEARTBEAT || what == FARM__ENVELOPE__BODY_BYE ||
+	       (first && what == FARM__ENVELOPE__BODY_JOB_LIST);
 }
 
 bool held_take(struct session *p, struct envelope *env)
@@ -31,9 +32,12 @@ bool held_take(struct session *p, struct envelope *env)
 	if (!recovery_is_on(s) || is_answered_at_once(env->message->body_case, !p->held))
 		return false;
 	size_t cost = cost_of(env);
-	struct held *h = p->held_bytes + cost <= PEER_MOST && s->held_bytes + cost <= HELD_MOST ? mem_alloc(1, sizeof *h) : NULL;
+	struct held *h =
+		p->held_bytes + cost <= PEER_MOST && s->held_bytes + cost <= HELD_MOST ? mem_alloc(1, sizeof *h) : NULL;
 	if (!h) {
-		session_fault(p, "the coordinator is still reading its jobs, and no more can wait for that: call again later");
+		session_fault(
+			p,
+			"the coordinator is still reading its jobs, and no more can wait for that: call again later");
 		return true;
 	}
 	if (!p->held) {
@@ -53,7 +57,8 @@ void held_tick(struct session *p)
 {
 	Farm__Heartbeat beat;
 	Farm__Envelope m;
-	if (!p->held || p->state == SESSION_LEAVING || server_now(p->server) < p->told + p->server->config.heartbeat_seconds)
+	if (!p->held || p->state == SESSION_LEAVING ||
+	    server_now(p->server) < p->told + p->server->config.heartbeat_seconds)
 		return;
 	p->told = server_now(p->server);
 	farm__heartbeat__init(&beat);

@@ -38,7 +38,8 @@ uint64_t keep_bytes(const struct server *s, uint64_t job)
 	spool_job_path(s->spool, job, NULL, folder);
 	DIR *d = disk_opendir(folder);
 	for (struct dirent *f; d && (f = readdir(d));) {
-		if (strcmp(f->d_name, "order") != 0 && strcmp(f->d_name, "checkpoint") != 0 && strncmp(f->d_name, "journal.", 8) != 0)
+		if (strcmp(f->d_name, "order") != 0 && strcmp(f->d_name, "checkpoint") != 0 &&
+		    strncmp(f->d_name, "journal.", 8) != 0)
 			continue;
 		spool_job_path(s->spool, job, f->d_name, path);
 		sum += disk_stat(path, &st) == 0 ? (uint64_t)st.st_size : 0;

@@ -132,7 +132,8 @@ static bool feed_one(struct server *s, struct live_job *o)
 		int rc = place == REPLAY_FITS ? offer(s, o, &l, &e) : 0;
 		if (rc == -ENOMEM) /* later */
 			return false;
-		if (!rc && replay_place(o, &l.key) != REPLAY_MERGED) /* the core waits for something: an estimate of the error */
+		if (!rc && replay_place(o, &l.key) !=
+				   REPLAY_MERGED) /* the core waits for something: an estimate of the error */
 			continue;
 		l = o->late[i];
 		drop(o, i);

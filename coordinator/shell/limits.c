@@ -28,10 +28,12 @@ int limits_connections(unsigned asked, unsigned *connections, struct error *e)
 	rlim_t room = r.rlim_cur > OTHERS ? r.rlim_cur - OTHERS : 0;
 	unsigned least = asked ? asked : FEWEST;
 	if (least > room)
-		return error_set(e, EINVAL, "%u connections, and %d jobs, need %u file descriptors, and this process may have %llu (ulimit -Hn, LimitNOFILE)",
-				 least, FARM_JOBS, least + OTHERS, (unsigned long long)r.rlim_cur);
+		return error_set(
+			e, EINVAL,
+			"%u connections, and %d jobs, need %u file descriptors, and this process may have %llu (ulimit -Hn, LimitNOFILE)",
+			least, FARM_JOBS, least + OTHERS, (unsigned long long)r.rlim_cur);
 	*connections = want - OTHERS < room ? (unsigned)(want - OTHERS) : (unsigned)room;
-	log_event(LOG_LIMITS, "connections=%u descriptors=%llu before=%llu", *connections, (unsigned long long)r.rlim_cur,
-		  (unsigned long long)before);
+	log_event(LOG_LIMITS, "connections=%u descriptors=%llu before=%llu", *connections,
+		  (unsigned long long)r.rlim_cur, (unsigned long long)before);
 	return 0;
 }

@@ -7,8 +7,8 @@
 
 enum { CONNECTIONS_DEFAULT = 10000, CONNECTIONS_MOST = 1000000, FETCHES_MOST = 128 /* files on their way out */ };
 
-/* Raises the process's limit of file descriptors as far as the system lets it. asked 0: the default, or as many as there are
- * descriptors for. -EINVAL when more are asked for than that. */
+/* Raises the process's limit of file descriptors as far as the system lets it. asked 0: the default, or as many as
+ * there are descriptors for. -EINVAL when more are asked for than that. */
 int limits_connections(unsigned asked, unsigned *connections, struct error *e);
 
 #endif

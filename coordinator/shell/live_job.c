@@ -24,8 +24,8 @@ static json_t *effects_to_json(const Farm__Submit *m)
 	json_t *list = json_array();
 	for (size_t i = 0; i < m->n_effects; i++)
 		json_array_append_new(list, json_pack("{s:s s:b s:b s:s s:s}", "name", m->effects[i]->name, "on",
-						      (int)m->effects[i]->on, "forced", (int)m->effects[i]->forced, "why",
-						      m->effects[i]->why, "saves", m->effects[i]->saves));
+						      (int)m->effects[i]->on, "forced", (int)m->effects[i]->forced,
+						      "why", m->effects[i]->why, "saves", m->effects[i]->saves));
 	return list;
 }
 
@@ -50,8 +50,8 @@ static void begin_record(struct live_job *o, const char *owner, double submitted
 	text_copy(r->owner, sizeof r->owner, owner);
 }
 
-int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, const struct plan *plan, const char *owner,
-	      double submitted, struct spool *s, struct error *e)
+int live_job_new(struct live_job **out, uint64_t id, struct envelope *submit, const struct plan *plan,
+		 const char *owner, double submitted, struct spool *s, struct error *e)
 {
 	struct live_job *o = mem_alloc(1, sizeof *o);
 	if (!o)
@@ -136,7 +136,8 @@ void live_job_log(struct live_job *o, enum log_event event, const char *fields, 
 		return;
 	o->log_bytes += size;
 	if (o->log_bytes >= log_most)
-		size = (size_t)snprintf(line, sizeof line, "the log of this job is full: the coordinator's has the rest\n");
+		size = (size_t)snprintf(line, sizeof line,
+					"the log of this job is full: the coordinator's has the rest\n");
 	int rc = disk_write_all(o->log, line, size); /* the log of all jobs has the line, too */
 	(void)rc;
 }
@@ -200,7 +201,8 @@ int live_job_prepare(struct live_job *o, const char *canvas_folder, struct error
 	return 0;
 }
 
-int live_job_pack_lease(const struct live_job *o, const struct lease_key *k, bool anew, unsigned char **frame, size_t *size, struct error *e)
+int live_job_pack_lease(const struct live_job *o, const struct lease_key *k, bool anew, unsigned char **frame,
+			size_t *size, struct error *e)
 {
 	if (k->kind == LEASE_BOOTSTRAP || o->plan.kind != PLAN_CHAINS)
 		return grant_pack(k, NULL, NULL, 0, frame, size, e);
@@ -216,9 +218,10 @@ bool live_job_gives_states(const struct live_job *o, const struct lease_key *k, 
 {
 	struct blob_hash own;
 	struct error e;
-	bool begins_with_states = k->kind == LEASE_RENDER && o->plan.kind == PLAN_CHAINS && k->group < o->plan.groups && k->part < o->plan.parts &&
-				  k->epoch > 0 && *states_at(o, k);
-	return begins_with_states && states_digest(*states_at(o, k), o->chains_per_lease, &own, &e) == 0 && blob_hash_equal(&own, digest);
+	bool begins_with_states = k->kind == LEASE_RENDER && o->plan.kind == PLAN_CHAINS && k->group < o->plan.groups &&
+				  k->part < o->plan.parts && k->epoch > 0 && *states_at(o, k);
+	return begins_with_states && states_digest(*states_at(o, k), o->chains_per_lease, &own, &e) == 0 &&
+	       blob_hash_equal(&own, digest);
 }
 
 void live_job_count_worker(struct live_job *o, uint64_t peer)
@@ -237,7 +240,8 @@ static size_t waiting_size(const struct waiting_batch *w)
 	return sizeof *w + w->envelope.used + w->payload.capacity;
 }
 
-bool live_job_put_off(struct live_job *o, uint64_t peer, const struct lease_key *k, struct envelope *env, struct buf *payload)
+bool live_job_put_off(struct live_job *o, uint64_t peer, const struct lease_key *k, struct envelope *env,
+		      struct buf *payload)
 {
 	struct waiting_batch *w = mem_alloc(1, sizeof *w);
 	if (!w)

@@ -17,9 +17,10 @@ static const char *const files[] = {[PUBLISH_PREVIEW] = "preview.exr", [PUBLISH_
 
 static const char *end_name(enum job_end end)
 {
-	return end == END_BLACK	 ? merge_end_name(MERGE_ROUNDS, true)
-	       : end == END_TIME ? merge_end_name(MERGE_TIME, false)
-	       : end == END_ERROR ? merge_end_name(MERGE_ERROR, false) : merge_end_name(MERGE_ROUNDS, false);
+	return end == END_BLACK	  ? merge_end_name(MERGE_ROUNDS, true)
+	       : end == END_TIME  ? merge_end_name(MERGE_TIME, false)
+	       : end == END_ERROR ? merge_end_name(MERGE_ERROR, false)
+				  : merge_end_name(MERGE_ROUNDS, false);
 }
 
 static int write_image(struct publishing *w)
@@ -62,15 +63,16 @@ static void run(uv_work_t *work)
 static void tell_error(const struct publishing *w)
 {
 	struct server *s = w->server;
-	struct event ev = {.kind = EVENT_ERROR_KNOWN,
-			   .job = w->order->id,
-			   .error_known = {.job = w->order->id,
-					   .rounds = w->rounds,
-					   .rel_error = w->rc ? NAN : sqrt(w->image.rel_mse_upper),
-					   .rel_mse = w->rc ? NAN : w->image.rel_mse,
-					   .degrees = w->rc ? NAN : w->image.rel_mse_degrees,
-					   .doubtful = !w->rc && w->image.rel_mse_doubt != ERROR_KNOWN,
-					   .cpu_seconds = w->order->cpu_seconds - w->order->record.bootstrap_cpu_seconds}};
+	struct event ev = {
+		.kind = EVENT_ERROR_KNOWN,
+		.job = w->order->id,
+		.error_known = {.job = w->order->id,
+				.rounds = w->rounds,
+				.rel_error = w->rc ? NAN : sqrt(w->image.rel_mse_upper),
+				.rel_mse = w->rc ? NAN : w->image.rel_mse,
+				.degrees = w->rc ? NAN : w->image.rel_mse_degrees,
+				.doubtful = !w->rc && w->image.rel_mse_doubt != ERROR_KNOWN,
+				.cpu_seconds = w->order->cpu_seconds - w->order->record.bootstrap_cpu_seconds}};
 	server_step(s, &ev);
 	durable_look(s, ev.job);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Work on a whole film: its error, its image as EXR in the spool. Runs in the pool; the order is busy meanwhile and its
- * results wait. Started and finished on the loop's thread. Starting allocates nothing and cannot fail; an image of the result for
- * which there is no memory or no disk is made again later.
+ * results wait. Started and finished on the loop's thread. Starting allocates nothing and cannot fail; an image of the
+ * result for which there is no memory or no disk is made again later.
  */
 #ifndef COORDINATOR_SHELL_PUBLISH_H
 #define COORDINATOR_SHELL_PUBLISH_H
@@ -19,7 +19,7 @@ struct live_job;
 enum publish_what {
 	PUBLISH_ERROR_ONLY, /* answered by EVENT_ERROR_KNOWN */
 	PUBLISH_PREVIEW,    /* preview.exr */
-	PUBLISH_RESULT,     /* result.exr */
+	PUBLISH_RESULT,	    /* result.exr */
 };
 
 struct publishing { /* one of an order at a time */

@@ -16,8 +16,8 @@ enum { NAMED_MOST = 8 /* of what is lost, in the sentence of the refusal */ };
 struct looking {
 	struct server *server;
 	struct job_record *record; /* of the job at hand */
-	uint64_t lost, last;       /* jobs; the highest id of a row */
-	char text[600];            /* which */
+	uint64_t lost, last;	   /* jobs; the highest id of a row */
+	char text[600];		   /* which */
 	struct text names;
 };
 
@@ -48,7 +48,8 @@ static int put_aside(struct looking *l, uint64_t id, const char *why, struct err
 		spool_path(spool, name, to);
 		if (disk_stat(to, &st) == 0)
 			continue;
-		rc = disk_rename(from, to) ? error_set(e, errno, "%s: %s", to, strerror(errno)) : disk_sync_folder(lost, e);
+		rc = disk_rename(from, to) ? error_set(e, errno, "%s: %s", to, strerror(errno))
+					   : disk_sync_folder(lost, e);
 		return rc ? rc : disk_sync_folder(jobs, e);
 	}
 	return rc;
@@ -106,10 +107,12 @@ static int make_row(struct looking *l, struct row_file *f, bool ended, const cha
 }
 
 /* There is a row, and it is whole. */
-static int with_row(struct looking *l, const struct ledger_job *j, struct row_file *f, int file, bool ended, struct error *e)
+static int with_row(struct looking *l, const struct ledger_job *j, struct row_file *f, int file, bool ended,
+		    struct error *e)
 {
 	if (!file && f->job.revision > j->revision)
-		return make_row(l, f, ended && l->record->extended == f->job.extended, "its row in jobs.db was older than the copy in its folder: made anew from it", e);
+		return make_row(l, f, ended && l->record->extended == f->job.extended,
+				"its row in jobs.db was older than the copy in its folder: made anew from it", e);
 	if (j->ended > 0 || (!file && f->job.revision == j->revision))
 		return 0;
 	if (file == -EBADMSG)
@@ -119,19 +122,27 @@ static int with_row(struct looking *l, const struct ledger_job *j, struct row_fi
 	return 0;
 }
 
-static int without_row(struct looking *l, uint64_t id, bool damaged, struct row_file *f, int file, bool ended, struct error *e)
+static int without_row(struct looking *l, uint64_t id, bool damaged, struct row_file *f, int file, bool ended,
+		       struct error *e)
 {
 	if (!file)
 		return make_row(l, f, ended && l->record->extended == f->job.extended,
-				damaged ? "its row in jobs.db was damaged: made anew from its folder" : "jobs.db had lost its row: made anew from its folder", e);
+				damaged ? "its row in jobs.db was damaged: made anew from its folder"
+					: "jobs.db had lost its row: made anew from its folder",
+				e);
 	if (ended)
 		return damaged ? ledger_forget(l->server->ledger, id, e) : 0; /* its record says all */
 	if (damaged)
-		return is_lost(l, id, "its row in jobs.db is damaged, and so is the copy in its folder (order), or it is gone", e);
+		return is_lost(l, id,
+			       "its row in jobs.db is damaged, and so is the copy in its folder (order), or it is gone",
+			       e);
 	if (file == -EBADMSG)
 		return is_lost(l, id, "jobs.db has no row of it, and the copy in its folder (order) is damaged", e);
-	return has_results(l->server->spool, id) ? is_lost(l, id, "jobs.db has no row of it, and its folder has results, but no copy of the row (order)", e)
-						  : 0; /* it was never accepted */
+	return has_results(l->server->spool, id)
+		       ? is_lost(l, id,
+				 "jobs.db has no row of it, and its folder has results, but no copy of the row (order)",
+				 e)
+		       : 0; /* it was never accepted */
 }
 
 static int look_at(struct looking *l, uint64_t id, struct error *e)
@@ -148,7 +159,8 @@ static int look_at(struct looking *l, uint64_t id, struct error *e)
 		return file;
 	rc = ledger_get(s->ledger, id, &j, e);
 	if (rc >= 0)
-		rc = rc > 0 && !j.damaged ? with_row(l, &j, &f, file, ended, e) : without_row(l, id, rc > 0, &f, file, ended, e);
+		rc = rc > 0 && !j.damaged ? with_row(l, &j, &f, file, ended, e)
+					  : without_row(l, id, rc > 0, &f, file, ended, e);
 	row_file_free(&f);
 	return rc;
 }
@@ -175,7 +187,8 @@ static int look_at_rows(struct looking *l, struct error *e)
 	while ((rc = ledger_after(l->server->ledger, id, &j, e)) > 0) {
 		l->last = id = j.id;
 		spool_job_path(l->server->spool, id, NULL, path);
-		if (j.damaged && disk_stat(path, &st) && (rc = is_lost(l, id, "its row in jobs.db is damaged, and it has no folder", e)))
+		if (j.damaged && disk_stat(path, &st) &&
+		    (rc = is_lost(l, id, "its row in jobs.db is damaged, and it has no folder", e)))
 			return rc;
 	}
 	return rc;
@@ -207,7 +220,9 @@ static int open_database(struct server *s, struct error *e)
 	int rc = ledger_open(&s->ledger, path, e);
 	if (rc != -EBADMSG)
 		return rc;
-	log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is kept as jobs.db.damaged, and made anew from the jobs' folders\"", log_quote(e->text).text);
+	log_event(LOG_SPOOL_FAULT,
+		  "text=%s action=\"it is kept as jobs.db.damaged, and made anew from the jobs' folders\"",
+		  log_quote(e->text).text);
 	rc = put_database_aside(s, e);
 	return rc ? rc : ledger_open(&s->ledger, path, e);
 }
@@ -228,10 +243,12 @@ int reconcile(struct server *s, struct error *e)
 		spool_skip_jobs(s->spool, l.last);
 	if (rc || !l.lost || s->config.accept_loss)
 		return rc;
-	return error_set(e, EBADMSG,
-			 "%s has lost %llu job%s: %s%s. Nothing has been deleted. Put back what is missing, or start with --accept-loss: what is"
-			 " left of them is then put into lost/ of the spool, and the other jobs go on", s->config.spool, (unsigned long long)l.lost,
-			 l.lost == 1 ? "" : "s", l.text, l.lost > NAMED_MOST ? ", ..." : "");
+	return error_set(
+		e, EBADMSG,
+		"%s has lost %llu job%s: %s%s. Nothing has been deleted. Put back what is missing, or start with --accept-loss: what is"
+		" left of them is then put into lost/ of the spool, and the other jobs go on",
+		s->config.spool, (unsigned long long)l.lost, l.lost == 1 ? "" : "s", l.text,
+		l.lost > NAMED_MOST ? ", ..." : "");
 }
 
 void reconcile_row(struct server *s, uint64_t job)

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * At the start, before any job is read: the rows of the ledger against the jobs' own folders. What one of the two has lost or damaged
- * is made anew from the other (at level error: it should not have happened). What neither knows is not deleted: the start is refused, and
- * says what is missing; with --accept-loss such folders are put into spool/lost, each with a sentence, and the rest goes on.
+ * At the start, before any job is read: the rows of the ledger against the jobs' own folders. What one of the two has
+ * lost or damaged is made anew from the other (at level error: it should not have happened). What neither knows is not
+ * deleted: the start is refused, and says what is missing; with --accept-loss such folders are put into spool/lost,
+ * each with a sentence, and the rest goes on.
  */
 #ifndef COORDINATOR_SHELL_RECONCILE_H
 #define COORDINATOR_SHELL_RECONCILE_H

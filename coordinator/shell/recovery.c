@@ -18,7 +18,7 @@
 
 struct found { /* a job */
 	struct found *next;
-	struct live_job *order; /* all but its id is the pool's while it is read */
+	struct live_job *order;	  /* all but its id is the pool's while it is read */
 	struct job_record record; /* as it is shown meanwhile */
 	uint64_t bytes;
 	struct replay_progress progress;
@@ -29,7 +29,7 @@ struct recovery {
 	uv_work_t work;
 	struct server *server;
 	struct found *first, **last, *at; /* at: the one that is read; NULL: none is */
-	uint64_t bytes, read; /* of all; of those that are done with */
+	uint64_t bytes, read;		  /* of all; of those that are done with */
 	bool under_way;
 	int rc; /* of the one that was read */
 	struct error error;
@@ -60,7 +60,8 @@ static void view(const struct found *f, struct job_view *v)
 	view_of_record(v, &f->record);
 	v->reading = share_of(f);
 	text_copy(v->record.state, sizeof v->record.state, "reading");
-	text_print(v->waiting, sizeof v->waiting, "reading, %u %%: its results are read from the spool", (unsigned)(100 * v->reading));
+	text_print(v->waiting, sizeof v->waiting, "reading, %u %%: its results are read from the spool",
+		   (unsigned)(100 * v->reading));
 	memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);
 }
 
@@ -105,14 +106,16 @@ uint64_t recovery_film_bytes(const struct server *s)
 
 /* ---- what cannot be read */
 
-/* What is stored is damaged: the job's batches can be made again, with the same bits. Nothing is deleted: somebody may want to look at it. */
+/* What is stored is damaged: the job's batches can be made again, with the same bits. Nothing is deleted: somebody may
+ * want to look at it. */
 static void put_aside(struct server *s, struct live_job *o)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
 	spool_job_path(s->spool, o->id, NULL, folder);
 	spool_job_path(s->spool, o->id, "checkpoint", path);
 	spool_job_path(s->spool, o->id, "checkpoint.damaged", aside);
-	live_job_log(o, LOG_SPOOL_FAULT, "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
+	live_job_log(o, LOG_SPOOL_FAULT,
+		     "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
 	live_job_log(o, LOG_JOB_STATE, "state=anew");
 	disk_rename(path, aside);
 	journal_put_aside(folder);
@@ -136,7 +139,8 @@ static void write_end(struct server *s, struct job_record *r, const char *why)
 	r->ended = (double)now.tv_sec;
 	r->ended_seen = ages_now(s);
 	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
-	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) || ledger_end(s->ledger, r->id, r->extended, r->state, &e))
+	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) ||
+	    ledger_end(s->ledger, r->id, r->extended, r->state, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 	dispatch_remember(s, r);
 }
@@ -250,7 +254,9 @@ static int take_failure(struct server *s, struct error *e)
 	if (anew) {
 		f->anew = true;
 		rc = ledger_get(s->ledger, id, &j, e);
-		rc = rc > 0 ? restore_live_job(s, &j, &f->order, e) : rc < 0 ? rc : error_set(e, ENOENT, "its row is gone");
+		rc = rc > 0   ? restore_live_job(s, &j, &f->order, e)
+		     : rc < 0 ? rc
+			      : error_set(e, ENOENT, "its row is gone");
 		if (!rc)
 			return 0;
 	}

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The jobs that had not ended when an earlier life did: read by the pool while the coordinator listens, so that a spool of gigabytes keeps
- * nobody from an answer. Their rows and plans are read before it listens; their films, one job after the other, behind that. The core hears
- * of all of them at once, in the order of their ids, when the last one has been read: until then no lease goes out, what peers ask for waits
- * (held.h), and the status says "reading, N %".
+ * The jobs that had not ended when an earlier life did: read by the pool while the coordinator listens, so that a spool
+ * of gigabytes keeps nobody from an answer. Their rows and plans are read before it listens; their films, one job after
+ * the other, behind that. The core hears of all of them at once, in the order of their ids, when the last one has been
+ * read: until then no lease goes out, what peers ask for waits (held.h), and the status says "reading, N %".
  *
- * Jobs whose checkpoint or journal is damaged begin anew, those without a folder, a plan or a scene fail with a sentence. An error of the
- * machine stops the coordinator, for another start may go better, and so does -EPROTO: another version of it wrote what is there. Then all is
- * as it was: nothing stored is given up because it could not be read. The loop's thread.
+ * Jobs whose checkpoint or journal is damaged begin anew, those without a folder, a plan or a scene fail with a
+ * sentence. An error of the machine stops the coordinator, for another start may go better, and so does -EPROTO:
+ * another version of it wrote what is there. Then all is as it was: nothing stored is given up because it could not be
+ * read. The loop's thread.
  */
 #ifndef COORDINATOR_SHELL_RECOVERY_H
 #define COORDINATOR_SHELL_RECOVERY_H
@@ -17,13 +18,13 @@
 int recovery_begin(struct server *s, struct error *e); /* where there are no such jobs it is over at once */
 bool recovery_is_on(const struct server *s);
 double recovery_share(const struct server *s); /* of all bytes: 0 to 1 */
-void recovery_stop(struct server *s);          /* soon, with the loop */
-void recovery_close(struct server *s);         /* the loop has ended */
+void recovery_stop(struct server *s);	       /* soon, with the loop */
+void recovery_close(struct server *s);	       /* the loop has ended */
 
 /* While it is on. */
 bool recovery_has(const struct server *s, uint64_t job);
 bool recovery_view(const struct server *s, uint64_t job, struct job_view *v); /* false: not one of them */
 size_t recovery_views(const struct server *s, struct job_view *v); /* ascending by id. v: NULL: how many they are */
-uint64_t recovery_film_bytes(const struct server *s); /* in memory; not while one is being read */
+uint64_t recovery_film_bytes(const struct server *s);		   /* in memory; not while one is being read */
 
 #endif

@@ -22,8 +22,8 @@ struct replay {
 	size_t damaged_count;
 };
 
-int replay_unpack(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size, const unsigned char **payload,
-		  size_t *payload_size, struct error *e)
+int replay_unpack(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
+		  const unsigned char **payload, size_t *payload_size, struct error *e)
 {
 	uint32_t header = 0, rest = 0;
 	*payload = NULL;
@@ -75,8 +75,10 @@ static int merge(struct replay *r, struct batch *b, struct error *e)
 /* It was written whole: by a coordinator with other records. They are not thrown away. */
 static int strange(const struct replay *r, const char *what, size_t size, struct error *e)
 {
-	return error_set(e, EPROTO, "the journal of j%llu has %s of %zu bytes that mean nothing here: another coordinator wrote it",
-			 (unsigned long long)r->order->id, what, size);
+	return error_set(
+		e, EPROTO,
+		"the journal of j%llu has %s of %zu bytes that mean nothing here: another coordinator wrote it",
+		(unsigned long long)r->order->id, what, size);
 }
 
 static int take_batch(struct replay *r, const struct journal_item *item, struct error *e)
@@ -85,7 +87,8 @@ static int take_batch(struct replay *r, const struct journal_item *item, struct 
 	struct batch batch = {0};
 	const unsigned char *payload;
 	size_t payload_size;
-	int rc = replay_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->size, &payload, &payload_size, e);
+	int rc = replay_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->size, &payload, &payload_size,
+			       e);
 	if (rc)
 		return rc == -EBADMSG ? strange(r, "a result", item->size, e) : rc;
 	rc = batch_unpack(&batch, &r->order->plan, env.message->lease_result, payload, payload_size, e);
@@ -205,11 +208,15 @@ static void say_damage(const struct replay *r, const struct journal_found *found
 		const struct lease_key *k = &r->damaged[i];
 		if (replay_place(o, k) == REPLAY_MERGED)
 			continue;
-		text_put(&t, "%s%s group %u part %u epoch %llu", open++ ? ", " : ": ", k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group,
-			 k->part, (unsigned long long)k->epoch);
+		text_put(&t, "%s%s group %u part %u epoch %llu", open++ ? ", " : ": ",
+			 k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group, k->part,
+			 (unsigned long long)k->epoch);
 	}
-	live_job_log(o, LOG_SPOOL_FAULT, "damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; computed again%s\"",
-		  (unsigned long long)found->damaged, o->late_count, (unsigned long long)found->lost, *text ? text : ": none any more");
+	live_job_log(
+		o, LOG_SPOOL_FAULT,
+		"damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; computed again%s\"",
+		(unsigned long long)found->damaged, o->late_count, (unsigned long long)found->lost,
+		*text ? text : ": none any more");
 }
 
 uint64_t replay_bytes(const struct spool *spool, uint64_t job)
@@ -244,7 +251,8 @@ int replay_films(const struct spool *spool, struct live_job *o, struct replay_pr
 		return rc;
 	rc = journal_open(&o->journal, folder, o->id, generation, take_record, &r, &found, e);
 	if (rc == -ENOENT) { /* its batches can be made again */
-		live_job_log(o, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"", folder, (unsigned long long)generation);
+		live_job_log(o, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"",
+			     folder, (unsigned long long)generation);
 		rc = journal_create(&o->journal, folder, o->id, generation, e);
 	}
 	if (!rc && o->late_count)
@@ -255,9 +263,11 @@ int replay_films(const struct spool *spool, struct live_job *o, struct replay_pr
 		say_damage(&r, &found);
 	journal_clear(folder, generation);
 	o->pinned = *o->fingerprint != 0;
-	live_job_log(o, LOG_JOB_STATE, "state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu damaged=%llu",
-		  (unsigned long long)r.batches, (unsigned long long)live_job_rounds(o), o->times.elapsed,
-		  (unsigned long long)o->checkpoint_bytes, (unsigned long long)journal_bytes(o->journal), (unsigned long long)found.cut,
-		  (unsigned long long)found.damaged);
+	live_job_log(
+		o, LOG_JOB_STATE,
+		"state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu damaged=%llu",
+		(unsigned long long)r.batches, (unsigned long long)live_job_rounds(o), o->times.elapsed,
+		(unsigned long long)o->checkpoint_bytes, (unsigned long long)journal_bytes(o->journal),
+		(unsigned long long)found.cut, (unsigned long long)found.damaged);
 	return 0;
 }

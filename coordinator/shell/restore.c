@@ -17,7 +17,8 @@ static uint64_t next_epoch(const struct live_job *o, uint32_t group, uint32_t pa
 {
 	if (o->bootstrap)
 		return bootstrap_has(o->bootstrap, group, part);
-	struct lease_key k = {.job = o->id, .kind = LEASE_RENDER, .group = group, .part = part, .epoch = canvas_rounds(o->canvas)};
+	struct lease_key k = {
+		.job = o->id, .kind = LEASE_RENDER, .group = group, .part = part, .epoch = canvas_rounds(o->canvas)};
 	for (struct lease_key before = k; k.epoch > 0; k.epoch--) { /* what was taken back is missing */
 		before.epoch = k.epoch - 1;
 		if (canvas_has(o->canvas, &before))
@@ -41,17 +42,24 @@ int restore_tell(struct server *s, const struct live_job *o, const char *held, u
 	for (uint32_t i = 0; i < slots; i++) {
 		const struct live_job_maker *m = &o->makers[i];
 		next[i] = next_epoch(o, i / o->plan.parts, i % o->plan.parts);
-		makers[i] = (struct event_join){.name = *m->name ? m->name : NULL, .certificate = m->certificate, .home = m->home, .restarts = m->restarts};
-		log_event(LOG_BATCH_RESTORED, "job=j%llu kind=%d group=%u part=%u epochs=%llu", (unsigned long long)o->id,
-			  (int)(o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER), i / o->plan.parts, i % o->plan.parts,
-			  (unsigned long long)next[i]);
+		makers[i] = (struct event_join){.name = *m->name ? m->name : NULL,
+						.certificate = m->certificate,
+						.home = m->home,
+						.restarts = m->restarts};
+		log_event(LOG_BATCH_RESTORED, "job=j%llu kind=%d group=%u part=%u epochs=%llu",
+			  (unsigned long long)o->id, (int)(o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER),
+			  i / o->plan.parts, i % o->plan.parts, (unsigned long long)next[i]);
 	}
 	char text[256];
 	struct event ev = {.kind = EVENT_RESTORE,
 			   .tag = tag,
 			   .restore = {.job = o->id,
-				       .submit = {.plan = &o->plan, .name = o->record.name, .priority = o->record.priority,
-						  .mixed = live_job_submit(o)->mixed, .owner = o->record.owner, .verify = trust_share(s, live_job_submit(o))},
+				       .submit = {.plan = &o->plan,
+						  .name = o->record.name,
+						  .priority = o->record.priority,
+						  .mixed = live_job_submit(o)->mixed,
+						  .owner = o->record.owner,
+						  .verify = trust_share(s, live_job_submit(o))},
 				       .fingerprint = o->fingerprint,
 				       .kind = o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
 				       .next = next,
@@ -66,7 +74,8 @@ int restore_tell(struct server *s, const struct live_job *o, const char *held, u
 	mem_free(next);
 	mem_free(makers);
 	if (*held) {
-		ev = (struct event){.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_ORDERED, .text = control_held_by(held, text)};
+		ev = (struct event){
+			.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_ORDERED, .text = control_held_by(held, text)};
 		server_step(s, &ev);
 	}
 	return 0;
@@ -118,7 +127,8 @@ static int not_known(const struct ledger_job *j, int rc, struct error *e)
 		return rc;
 	if (strcmp(j->version, HSLT_VERSION) == 0)
 		return error_prefix(e, -EBADMSG, "what it was submitted with");
-	return error_prefix(e, -EPROTO, "version %.40s of the coordinator took it, and this is %s", j->version, HSLT_VERSION);
+	return error_prefix(e, -EPROTO, "version %.40s of the coordinator took it, and this is %s", j->version,
+			    HSLT_VERSION);
 }
 
 static int make_order(struct server *s, const struct ledger_job *j, struct live_job **o, struct error *e)
@@ -134,7 +144,8 @@ static int make_order(struct server *s, const struct ledger_job *j, struct live_
 					  : error_set(e, EBADMSG, "there is no plan");
 	envelope_fini(&info);
 	if (!rc)
-		rc = replay_unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size, &payload, &size, e);
+		rc = replay_unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size, &payload,
+				   &size, e);
 	if (rc)
 		return not_known(j, rc, e);
 	rc = hold_blobs(s, submit.message->submit, e);
@@ -180,7 +191,8 @@ int restore_open(struct server *s, struct error *e)
 			rc = ledger_end(s->ledger, id, r->extended, r->state, e);
 			continue;
 		}
-		uint64_t *more = mem_grow(s->restored, s->restored_count * sizeof *more, (s->restored_count + 1) * sizeof *more);
+		uint64_t *more =
+			mem_grow(s->restored, s->restored_count * sizeof *more, (s->restored_count + 1) * sizeof *more);
 		if (!more)
 			rc = error_set(e, ENOMEM, "no memory for the jobs");
 		else

@@ -1,15 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job of an earlier life, from the ledger into an order and from there into the core; its films come in between (replay.h). The core hears
- * which leases are merged and no more: what was out when the coordinator stopped comes back with its worker, or is handed out again.
+ * A job of an earlier life, from the ledger into an order and from there into the core; its films come in between
+ * (replay.h). The core hears which leases are merged and no more: what was out when the coordinator stopped comes back
+ * with its worker, or is handed out again.
  */
 #ifndef COORDINATOR_SHELL_RESTORE_H
 #define COORDINATOR_SHELL_RESTORE_H
 
 #include "coordinator/shell/server.h"
 
-int restore_open(struct server *s, struct error *e);           /* the ledger */
-bool restore_lives(const struct server *s, uint64_t job);      /* it had not ended */
+int restore_open(struct server *s, struct error *e);	  /* the ledger */
+bool restore_lives(const struct server *s, uint64_t job); /* it had not ended */
 /* 0: its record is there, and whole, or not; what cannot be read just now is an error. */
 int restore_record(const struct server *s, uint64_t id, struct job_record *r, bool *there, struct error *e);
 

@@ -21,8 +21,9 @@ static void fail(struct server *s, struct live_job *o, uint64_t peer, const stru
 {
 	struct session *p = session_find(s, peer);
 	struct event ev = {.kind = EVENT_LEASE_FAILED, .peer = peer, .job = k->job, .text = why, .lease = {.key = *k}};
-	live_job_log(o, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%d group=%u part=%u epoch=%llu", log_quote(p ? p->name : "?").text,
-		  log_quote(why).text, (int)k->kind, k->group, k->part, (unsigned long long)k->epoch);
+	live_job_log(o, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%d group=%u part=%u epoch=%llu",
+		     log_quote(p ? p->name : "?").text, log_quote(why).text, (int)k->kind, k->group, k->part,
+		     (unsigned long long)k->epoch);
 	if (p)
 		session_send_ack(p, k, ACK_REFUSED, why);
 	server_step(s, &ev);
@@ -71,7 +72,8 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	s->batch = &batch;
 	s->result = &stored;
 	s->payload = payload;
-	if (rc == -ENOMEM || (o && ev.lease.valid && durable_reserve(s, o, &e))) /* no room for it, here or on the disk */
+	if (rc == -ENOMEM ||
+	    (o && ev.lease.valid && durable_reserve(s, o, &e))) /* no room for it, here or on the disk */
 		refuse(s, peer, &ev.lease.key, e.text);
 	else
 		server_step(s, &ev);
@@ -88,9 +90,10 @@ static bool has_room(const struct server *s, const struct buf *payload)
 	return bytes <= s->config.waiting_bytes;
 }
 
-/* Nobody may look at the film now. What the core would merge waits, one result of each lease that its worker holds, and one of
- * those that nobody's waits for. */
-static void put_off(struct server *s, struct live_job *o, uint64_t peer, const struct lease_key *k, struct envelope *env, struct buf *payload)
+/* Nobody may look at the film now. What the core would merge waits, one result of each lease that its worker holds, and
+ * one of those that nobody's waits for. */
+static void put_off(struct server *s, struct live_job *o, uint64_t peer, const struct lease_key *k,
+		    struct envelope *env, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
 	enum farm_delivery awaited = farm_awaits(s->farm, peer, k);

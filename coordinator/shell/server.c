@@ -39,8 +39,19 @@ static uint64_t quarter_of_memory(void)
 
 void server_config_init(struct server_config *c)
 {
-	*c = (struct server_config){.listen = "127.0.0.1:7700", .heartbeat_seconds = 5, .retry_seconds = 2, .clear_seconds = 30 * 86400.0, .max_faults = 3, .max_fetches = FETCHES_MOST,
-				    .journal_bytes = 64 << 20, .keep_bytes = 2000000000, .film_bytes = quarter_of_memory(), .waiting_bytes = quarter_of_memory(), .hello_seconds = 10, .stall_seconds = 30, .tls_check_seconds = 60};
+	*c = (struct server_config){.listen = "127.0.0.1:7700",
+				    .heartbeat_seconds = 5,
+				    .retry_seconds = 2,
+				    .clear_seconds = 30 * 86400.0,
+				    .max_faults = 3,
+				    .max_fetches = FETCHES_MOST,
+				    .journal_bytes = 64 << 20,
+				    .keep_bytes = 2000000000,
+				    .film_bytes = quarter_of_memory(),
+				    .waiting_bytes = quarter_of_memory(),
+				    .hello_seconds = 10,
+				    .stall_seconds = 30,
+				    .tls_check_seconds = 60};
 }
 
 double server_now(const struct server *s)
@@ -181,7 +192,8 @@ static void view_order(struct server *s, const struct live_job *o, struct job_vi
 	if (o->ended && (o->busy || o->unpublished || o->unrecorded)) { /* not before its image is there */
 		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
 		if (*o->record.why)
-			text_print(v->waiting, sizeof v->waiting, "its %s cannot be written: %s", o->unrecorded ? "record" : "image", o->record.why);
+			text_print(v->waiting, sizeof v->waiting, "its %s cannot be written: %s",
+				   o->unrecorded ? "record" : "image", o->record.why);
 		else
 			text_copy(v->waiting, sizeof v->waiting, "its image is being written");
 		memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);
@@ -293,7 +305,8 @@ static int write_port(const char *path, unsigned port, struct error *e)
 	int n = snprintf(text, sizeof text, "%u\n", port);
 	snprintf(temporary, sizeof temporary, "%s.tmp", path);
 	int fd = disk_open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
-	int rc = fd < 0 || disk_write_all(fd, text, (size_t)n) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+	int rc = fd < 0 || disk_write_all(fd, text, (size_t)n) ? error_set(e, errno, "%s: %s", path, strerror(errno))
+							       : 0;
 	if (fd >= 0)
 		disk_close(fd);
 	if (!rc && disk_rename(temporary, path))
@@ -333,8 +346,8 @@ static int open_tls(struct server *s, struct error *e)
 	const struct tls_peer *self = tls_self(s->tls);
 	if (self->role == TLS_COORDINATOR)
 		return 0;
-	return error_set(e, EINVAL, "%s: the certificate of %s is a %s's, and nobody would take it for a coordinator's", s->config.tls,
-			 self->name, tls_role_name(self->role));
+	return error_set(e, EINVAL, "%s: the certificate of %s is a %s's, and nobody would take it for a coordinator's",
+			 s->config.tls, self->name, tls_role_name(self->role));
 }
 
 /* A list of the revoked or a new certificate is taken up within a second. */
@@ -461,7 +474,8 @@ static void init_handles(struct server *s)
 	uv_check_init(&s->loop, &s->check);
 	uv_signal_init(&s->loop, &s->on_term);
 	uv_signal_init(&s->loop, &s->on_int);
-	s->listener.data = s->wake.data = s->tick.data = s->drain.data = s->look.data = s->check.data = s->on_term.data = s->on_int.data = s;
+	s->listener.data = s->wake.data = s->tick.data = s->drain.data = s->look.data = s->check.data =
+		s->on_term.data = s->on_int.data = s;
 	uv_signal_start(&s->on_term, on_signal, SIGTERM);
 	uv_signal_start(&s->on_int, on_signal, SIGINT);
 	uv_timer_start(&s->tick, on_tick, TICK_MS, TICK_MS);

@@ -20,27 +20,28 @@ struct server_config {
 	const char *status_socket; /* NULL: none */
 	const char *status_group;  /* who may connect to it besides us; NULL: nobody */
 	const char *keep_partials; /* NULL: none */
-	const char *port_file;     /* NULL: none; the port that was bound is written there */
-	const char *tls;           /* a folder (common/net/tls.h); NULL or "": plaintext */
+	const char *port_file;	   /* NULL: none; the port that was bound is written there */
+	const char *tls;	   /* a folder (common/net/tls.h); NULL or "": plaintext */
 	double tls_check_seconds;  /* how often certificates of live connections are checked again */
 	bool insecure;
-	struct quota quota; /* of each client */
-	uint64_t blob_bytes; /* the spool's limit of scene files; 0: none */
-	double clear_seconds; /* results of finished jobs are kept so long; 0: for ever */
-	uint64_t clear_bytes; /* of all finished jobs, their films included; 0: any */
-	uint64_t keep_bytes; /* of films of jobs that are done, so that they can be extended; 0: none are kept */
-	double retry_seconds; /* between tries of what the disk did not take */
-	uint64_t journal_bytes; /* a job's journal that is longer is cut by a checkpoint */
+	struct quota quota;	  /* of each client */
+	uint64_t blob_bytes;	  /* the spool's limit of scene files; 0: none */
+	double clear_seconds;	  /* results of finished jobs are kept so long; 0: for ever */
+	uint64_t clear_bytes;	  /* of all finished jobs, their films included; 0: any */
+	uint64_t keep_bytes;	  /* of films of jobs that are done, so that they can be extended; 0: none are kept */
+	double retry_seconds;	  /* between tries of what the disk did not take */
+	uint64_t journal_bytes;	  /* a job's journal that is longer is cut by a checkpoint */
 	double heartbeat_seconds; /* a worker silent for 3 of them loses its leases, for 6 its connection */
 	unsigned max_connections; /* 0: by the file descriptors that there are */
-	unsigned max_fetches; /* files that clients have begun to fetch, at a time */
-	double verify;        /* least share of the leases of each job that two workers compute */
-	unsigned max_faults;  /* of a worker, before it is set aside */
-	bool accept_loss;     /* go on without the jobs that the spool has lost */
-	const char *forgive;  /* the name of a worker that was set aside and may come back; NULL: none */
+	unsigned max_fetches;	  /* files that clients have begun to fetch, at a time */
+	double verify;		  /* least share of the leases of each job that two workers compute */
+	unsigned max_faults;	  /* of a worker, before it is set aside */
+	bool accept_loss;	  /* go on without the jobs that the spool has lost */
+	const char *forgive;	  /* the name of a worker that was set aside and may come back; NULL: none */
 	uint64_t film_bytes; /* of running jobs' films in memory; those of further jobs are mapped files of the spool */
-	uint64_t waiting_bytes; /* of results that wait for films that are being read */
-	double worker_bandwidth; /* bytes of tiles a second that one thread may send on average, for new jobs' epochs; 0: any */
+	uint64_t waiting_bytes;	 /* of results that wait for films that are being read */
+	double worker_bandwidth; /* bytes of tiles a second that one thread may send on average, for new jobs' epochs;
+				    0: any */
 	double hello_seconds, stall_seconds; /* how long a peer may take to say hello, to finish a frame */
 };
 void server_config_init(struct server_config *c);
@@ -54,7 +55,7 @@ struct server;
 /* It listens; the jobs of an earlier life are read by its loop (recovery.h). */
 int server_open(struct server **s, const struct server_config *c, struct error *e);
 int server_await_jobs(struct server *s, struct error *e); /* turns the loop until they are */
-void server_close(struct server *s); /* stops it, if no signal has */
+void server_close(struct server *s);			  /* stops it, if no signal has */
 
 struct session;
 struct status_socket;
@@ -94,39 +95,41 @@ struct server {
 	struct deferred *deferred, **deferred_last;
 	struct ledger *ledger;
 	struct recovery *recovery; /* the jobs of an earlier life are being read; NULL: no more */
-	size_t held_bytes; /* of what peers ask for meanwhile */
-	int fault;         /* why it stops by itself; 0: it does not */
+	size_t held_bytes;	   /* of what peers ask for meanwhile */
+	int fault;		   /* why it stops by itself; 0: it does not */
 	struct error fault_error;
 	uint64_t *restored; /* ids of the jobs that went on when this life began */
 	size_t restored_count;
 	struct durable_ack *acks, **acks_last; /* that wait for a flush */
-	struct durable_ack *parked;            /* ... for a journal that failed to be a good one again */
-	struct ending *endings;                /* jobs that ended and whose records could not be written yet */
+	struct durable_ack *parked;	       /* ... for a journal that failed to be a good one again */
+	struct ending *endings;		       /* jobs that ended and whose records could not be written yet */
 	double endings_again;
-	struct seen seen;  /* when this life began */
-	double folders_next; /* when jobs' folders are looked for */
-	double clear_next; /* when finished jobs are looked at again */
+	struct seen seen;	   /* when this life began */
+	double folders_next;	   /* when jobs' folders are looked for */
+	double clear_next;	   /* when finished jobs are looked at again */
 	struct clearing *clearing; /* they are being looked at */
 	bool flushing;
 	uint64_t last_peer;
 	uint64_t garbled; /* connections on which bytes were changed */
 	struct status_socket *status;
 	bool stepping, stopping;
-	bool feeding; /* late results */
-	bool caller_waits; /* nobody could be let in: to be tried again */
-	bool checkpointing; /* of some job, by the pool */
-	struct session *extending; /* those with extensions that wait, in the order in which they came */
-	const struct live_job *reading; /* of an ended job: the pool reads its films, and all else of it but id and plan is the pool's */
-	double tls_next; /* when its files are looked at again */
-	double watchdog, watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */
-	uint64_t changes; /* grows with whatever the status shows */
+	bool feeding;			/* late results */
+	bool caller_waits;		/* nobody could be let in: to be tried again */
+	bool checkpointing;		/* of some job, by the pool */
+	struct session *extending;	/* those with extensions that wait, in the order in which they came */
+	const struct live_job *reading; /* of an ended job: the pool reads its films, and all else of it but id and plan
+					   is the pool's */
+	double tls_next;		/* when its files are looked at again */
+	double watchdog,
+		watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */
+	uint64_t changes;      /* grows with whatever the status shows */
 	/* What the current event brought; NULL when it did not. */
 	struct batch *batch;
 	const Farm__LeaseResult *result;
 	struct buf *payload;
-	bool stored; /* the journal has it already, */
-	uint64_t stored_at; /* there */
-	struct back *back; /* what may be taken back in this step; NULL: nothing */
+	bool stored;	      /* the journal has it already, */
+	uint64_t stored_at;   /* there */
+	struct back *back;    /* what may be taken back in this step; NULL: nothing */
 	unsigned char *frame; /* the result as the journal takes it, but for the payload */
 	size_t frame_size;
 	struct session *submitter;

@@ -16,7 +16,8 @@
 enum {
 	HELLO_HEADER = 4096,
 	HEADER_LIMIT = 1 << 20,
-	/* What may wait for a peer to read it: a word to a stranger, answers; for a worker the leases beside that it may hold. */
+	/* What may wait for a peer to read it: a word to a stranger, answers; for a worker the leases beside that it
+	   may hold. */
 	HELLO_SEND = 1 << 16,
 	PEER_SEND = 1 << 23,
 };
@@ -101,8 +102,8 @@ static void answer_hello(struct session *p, bool accepted, bool final, const cha
 	m.hello_ack = &ack;
 	session_send(p, &m, NULL, 0);
 	if (!accepted) {
-		log_event(LOG_PEER_REFUSED, "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
-			  log_quote(p->name).text, log_quote(text).text);
+		log_event(LOG_PEER_REFUSED, "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id,
+			  p->address, log_quote(p->name).text, log_quote(text).text);
 		p->state = SESSION_LEAVING;
 		conn_close_when_sent(p->conn, text);
 	}
@@ -125,7 +126,8 @@ static const char *what_to_know(const struct session *p, char *text, size_t size
 	struct peer_status s;
 	*text = 0;
 	if (recovery_is_on(p->server))
-		text_print(text, size, "the coordinator is reading its jobs, %u %%: what is asked for waits until they are there",
+		text_print(text, size,
+			   "the coordinator is reading its jobs, %u %%: what is asked for waits until they are there",
 			   (unsigned)(100 * recovery_share(p->server)));
 	if (p->joined && farm_peer(p->server->farm, p->id, &s) && s.state == PEER_ASIDE)
 		text_print(text, size, "this worker is set aside and gets no work: %s", s.text);
@@ -137,8 +139,13 @@ static void join(struct session *p, const Farm__Hello *h)
 	char text[256];
 	struct event ev = {.kind = EVENT_JOINED,
 			   .peer = p->id,
-			   .join = {.peer = p->id, .name = p->name, .fingerprint = h->fingerprint, .threads = h->threads,
-				    .certificate = p->who.name, .home = h->home, .restarts = h->restarts}};
+			   .join = {.peer = p->id,
+				    .name = p->name,
+				    .fingerprint = h->fingerprint,
+				    .threads = h->threads,
+				    .certificate = p->who.name,
+				    .home = h->home,
+				    .restarts = h->restarts}};
 	p->rejected[0] = 0;
 	p->joined = true;
 	server_step(p->server, &ev);
@@ -148,10 +155,11 @@ static void join(struct session *p, const Farm__Hello *h)
 		return;
 	}
 	p->state = SESSION_WORKER;
-	log_event(LOG_PEER_HELLO, "peer=%llu address=%s role=worker name=%s certificate=%s home=%s start=%llu threads=%u fingerprint=%s",
-		  (unsigned long long)p->id, p->address, log_quote(p->name).text, *p->who.name ? p->who.name : "-", *h->home ? h->home : "-",
-		  (unsigned long long)h->restarts, h->threads,
-		  log_quote(h->fingerprint).text);
+	log_event(
+		LOG_PEER_HELLO,
+		"peer=%llu address=%s role=worker name=%s certificate=%s home=%s start=%llu threads=%u fingerprint=%s",
+		(unsigned long long)p->id, p->address, log_quote(p->name).text, *p->who.name ? p->who.name : "-",
+		*h->home ? h->home : "-", (unsigned long long)h->restarts, h->threads, log_quote(h->fingerprint).text);
 	send_hello_ack(p, true, what_to_know(p, text, sizeof text));
 }
 
@@ -183,8 +191,10 @@ static void take_hello(struct session *p, const Farm__Hello *h)
 	char text[192];
 	if (h->version != FARM_VERSION) {
 		const char *who = h->role == FARM__ROLE__ROLE_WORKER ? "worker" : "client";
-		snprintf(text, sizeof text, "the %s speaks version %u of the protocol, the coordinator version %u: the %s is older and must be renewed",
-			 who, h->version, FARM_VERSION, h->version < FARM_VERSION ? who : "coordinator");
+		snprintf(
+			text, sizeof text,
+			"the %s speaks version %u of the protocol, the coordinator version %u: the %s is older and must be renewed",
+			who, h->version, FARM_VERSION, h->version < FARM_VERSION ? who : "coordinator");
 		refuse_for_good(p, text);
 		return;
 	}
@@ -234,16 +244,19 @@ static void take_lease_failed(struct session *p, struct envelope *env)
 }
 
 /* Who does not hold the lease, or refuses states that it had before, refuses nothing that is there: nobody made it. */
-static void log_failure(const struct session *p, struct live_job *o, const Farm__LeaseFailed *f, const struct lease_key *k, const char *text, bool holds)
+static void log_failure(const struct session *p, struct live_job *o, const Farm__LeaseFailed *f,
+			const struct lease_key *k, const char *text, bool holds)
 {
 	struct log_value name = log_quote(p->name), said = log_quote(text);
 	unsigned long long epoch = k->epoch;
 	if (f->bad_states)
-		live_job_log(o, LOG_LEASE_FAILED, "states_of=%s refused_by=%s text=%s kind=%d group=%u part=%u epoch=%llu",
-			  log_quote(holds ? farm_maker(p->server->farm, k) : "?").text, name.text, said.text, (int)k->kind, k->group, k->part, epoch);
+		live_job_log(o, LOG_LEASE_FAILED,
+			     "states_of=%s refused_by=%s text=%s kind=%d group=%u part=%u epoch=%llu",
+			     log_quote(holds ? farm_maker(p->server->farm, k) : "?").text, name.text, said.text,
+			     (int)k->kind, k->group, k->part, epoch);
 	else
-		live_job_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%d group=%u part=%u epoch=%llu", name.text, f->own, said.text,
-			  (int)k->kind, k->group, k->part, epoch);
+		live_job_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%d group=%u part=%u epoch=%llu",
+			     name.text, f->own, said.text, (int)k->kind, k->group, k->part, epoch);
 }
 
 void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
@@ -255,7 +268,8 @@ void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 	/* Whatever it says, it failed: many texts of a scene's author are in it. */
 	text_copy(text, sizeof text, f->text);
 	text_clean(text);
-	if (lease_key_from_wire(f->key, &ev.lease.key, &e) || (f->bad_states && states_digest_from_wire(&f->states_digest, &states, &e))) {
+	if (lease_key_from_wire(f->key, &ev.lease.key, &e) ||
+	    (f->bad_states && states_digest_from_wire(&f->states_digest, &states, &e))) {
 		session_fault(p, "a lease cannot fail like this");
 		return;
 	}
@@ -265,15 +279,18 @@ void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 	ev.lease.bad_states = f->bad_states;
 	ev.lease.other_states = f->bad_states && !(o && live_job_gives_states(o, &ev.lease.key, &states));
 	bool blamed = f->own || f->bad_states;
-	if (o && *f->text && !blamed && !files_are_right(p->server, o, FILES_DOUBTED)) { /* the spool's fault, not the worker's */
+	if (o && *f->text && !blamed &&
+	    !files_are_right(p->server, o, FILES_DOUBTED)) { /* the spool's fault, not the worker's */
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
 	}
 	struct back back = {0};
-	bool holds = farm_awaits(p->server->farm, p->id, &ev.lease.key) == DELIVERY_AWAITED && !ev.lease.other_states; /* else nothing is read for it */
+	bool holds = farm_awaits(p->server->farm, p->id, &ev.lease.key) == DELIVERY_AWAITED &&
+		     !ev.lease.other_states; /* else nothing is read for it */
 	if (o && *text)
 		log_failure(p, o, f, &ev.lease.key, text, holds);
-	if (o && *text && f->bad_states && holds && !o->busy && !p->server->stepping && journal_write(o->journal, &e) == 0)
+	if (o && *text && f->bad_states && holds && !o->busy && !p->server->stepping &&
+	    journal_write(o->journal, &e) == 0)
 		ev.lease.can_take_back = back_read(o, o->journal, &ev.lease.key, &back, &e) == 0;
 	p->server->back = &back;
 	server_step(p->server, &ev);
@@ -299,15 +316,16 @@ static void take_lease_result(struct session *p, struct envelope *env)
 	buf_fini(&payload);
 }
 
-/* Also a message that takes long is a word from its worker, who must know for as long that we are here: its heartbeats, and with
- * them our answers, are behind that message. */
+/* Also a message that takes long is a word from its worker, who must know for as long that we are here: its heartbeats,
+ * and with them our answers, are behind that message. */
 static void on_heard(void *user)
 {
 	struct session *p = user;
 	struct event ev = {.kind = EVENT_HEARD, .peer = p->id};
 	Farm__Heartbeat beat;
 	Farm__Envelope m;
-	if (!p->joined || p->state != SESSION_WORKER || server_now(p->server) < p->heard + p->server->config.heartbeat_seconds)
+	if (!p->joined || p->state != SESSION_WORKER ||
+	    server_now(p->server) < p->heard + p->server->config.heartbeat_seconds)
 		return;
 	p->heard = server_now(p->server);
 	farm__heartbeat__init(&beat);
@@ -387,11 +405,12 @@ static void on_closed(void *user, const char *why)
 	held_drop(p);
 	extend_forget(p);
 	s->garbled += conn_garbled(p->conn);
-	log_event(conn_garbled(p->conn)		? LOG_PEER_GARBLED
-		  : conn_distrust(p->conn)	? LOG_PEER_REFUSED
+	log_event(conn_garbled(p->conn)	       ? LOG_PEER_GARBLED
+		  : conn_distrust(p->conn)     ? LOG_PEER_REFUSED
 		  : p->state == SESSION_WORKER ? LOG_PEER_CLOSED
-						: LOG_PEER_ACCEPT, "peer=%llu address=%s name=%s text=%s",
-		  (unsigned long long)p->id, p->address, log_quote(p->name).text, log_quote(why).text);
+					       : LOG_PEER_ACCEPT,
+		  "peer=%llu address=%s name=%s text=%s", (unsigned long long)p->id, p->address,
+		  log_quote(p->name).text, log_quote(why).text);
 	orders_drop_waiting(s->orders, p->id);
 	if (p->joined && !s->stopping) {
 		struct event ev = {.kind = EVENT_LEFT, .peer = p->id, .text = why};
@@ -406,7 +425,8 @@ static void on_drained(void *user)
 	worker_requests_go_on(user);
 }
 
-static const struct conn_events events = {.message = on_message, .heard = on_heard, .drained = on_drained, .closed = on_closed};
+static const struct conn_events events = {
+	.message = on_message, .heard = on_heard, .drained = on_drained, .closed = on_closed};
 
 static void on_refused(void *user, const char *why)
 {
@@ -415,8 +435,8 @@ static void on_refused(void *user, const char *why)
 }
 static const struct conn_events refused_events = {.closed = on_refused};
 
-/* Whoever has not said who they are gives way, the one who has had longest first: strangers who hold connections and say
- * nothing must not keep out those who can. */
+/* Whoever has not said who they are gives way, the one who has had longest first: strangers who hold connections and
+ * say nothing must not keep out those who can. */
 static bool make_room(struct server *s)
 {
 	struct session *oldest = NULL;
@@ -432,7 +452,8 @@ static bool make_room(struct server *s)
 
 void session_accept(struct server *s)
 {
-	struct conn_config config = {{HELLO_HEADER, 0}, HELLO_SEND, s->config.stall_seconds, s->config.hello_seconds, s->tls};
+	struct conn_config config = {
+		{HELLO_HEADER, 0}, HELLO_SEND, s->config.stall_seconds, s->config.hello_seconds, s->tls};
 	struct error e;
 	bool room = s->session_count < s->config.max_connections || make_room(s);
 	struct session *p = room ? mem_alloc(1, sizeof *p) : NULL;

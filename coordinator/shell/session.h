@@ -16,7 +16,7 @@ struct worker_request;
 
 struct session {
 	struct session *next, **place; /* all; where they point to this one */
-	struct session *alike;         /* of the same bucket */
+	struct session *alike;	       /* of the same bucket */
 	struct server *server;
 	struct conn *conn;
 	uint64_t id; /* the core's peer id, and the tag of its requests */
@@ -25,13 +25,13 @@ struct session {
 	char name[128], address[64];
 	struct tls_peer who; /* by its certificate; TLS_NOBODY without TLS, and then everybody may do everything */
 	uint32_t payload_limit;
-	size_t leases_most; /* bytes of as many leases as it wanted */
-	struct worker_request *asks;  /* that wait for it to read */
+	size_t leases_most;	     /* bytes of as many leases as it wanted */
+	struct worker_request *asks; /* that wait for it to read */
 	unsigned ask_count;
-	double heard; /* s on the loop's clock: when it was last told so amid a message */
+	double heard;	       /* s on the loop's clock: when it was last told so amid a message */
 	struct upload *upload; /* a submission that waits for blobs */
 	uint64_t watched;      /* job; 0: none */
-	struct fetch {         /* a file of which it has not got all yet */
+	struct fetch {	       /* a file of which it has not got all yet */
 		uint64_t job;  /* 0: none */
 		Farm__What what;
 		int fd;
@@ -44,7 +44,7 @@ struct session {
 	struct session *behind; /* of those that wait for that */
 	struct held *held, **held_last; /* what waits until the jobs are read */
 	size_t held_bytes;
-	double told; /* s on the loop's clock: that we are here, meanwhile */
+	double told;	       /* s on the loop's clock: that we are here, meanwhile */
 	char rejected[256];    /* why the core refused; "" it did not */
 	uint64_t answered_job; /* SUBMITTED or CANCELLED came for it */
 };
@@ -63,7 +63,8 @@ void session_allow_results(struct session *p, const struct live_job *o);
 /* What the core wants said to workers. */
 /* A lease that a worker could not do; p is one. */
 void session_lease_failed(struct session *p, const Farm__LeaseFailed *f);
-void session_send_lease(struct session *p, const struct live_job *o, const struct lease_key *k, bool anew); /* with seeds */
+void session_send_lease(struct session *p, const struct live_job *o, const struct lease_key *k,
+			bool anew); /* with seeds */
 void session_send_revoke(struct session *p, const struct lease_key *k);
 void session_send_ack(struct session *p, const struct lease_key *k, enum ack ack, const char *text);
 void session_send_job_end(struct session *p, uint64_t job);
@@ -76,7 +77,8 @@ void session_tick(struct session *p);
 bool session_finds_job(const struct session *p, uint64_t job, struct job_view *v);
 void session_send_done(struct session *p, const char *text); /* p->rejected says why not; text: what was done, or "" */
 /* -EDQUOT. job: 0, or one that is there already. */
-int session_within_quota(const struct session *p, uint64_t job, const struct plan *plan, const Farm__Submit *m, struct error *e);
+int session_within_quota(const struct session *p, uint64_t job, const struct plan *plan, const Farm__Submit *m,
+			 struct error *e);
 /* control.c */
 void session_cancel(struct session *p, uint64_t job);
 void session_control(struct session *p, const Farm__Control *c);

@@ -31,7 +31,6 @@ struct reader {
 	char line[LINE_BYTES];
 };
 
-
 struct status_socket {
 	struct server *server;
 	uv_pipe_t listener;
@@ -41,8 +40,8 @@ struct status_socket {
 	struct job_view *shown; /* as the subscribers saw the jobs last */
 	size_t shown_count;
 	uint64_t shown_changes; /* of the server, at the last tick */
-	char *path; /* NULL: inherited */
-	dev_t device; /* the file that was made there; inode 0: none */
+	char *path;		/* NULL: inherited */
+	dev_t device;		/* the file that was made there; inode 0: none */
 	ino_t inode;
 };
 
@@ -83,7 +82,8 @@ static void add_tls(const struct server *s, json_t *o)
 	if (!s->tls)
 		return;
 	json_t *tls = json_pack("{s:s s:I s:I}", "certificate", tls_self(s->tls)->name, "certificateUntil",
-				(json_int_t)tls_self(s->tls)->until, "authorityUntil", (json_int_t)tls_authority_until(s->tls));
+				(json_int_t)tls_self(s->tls)->until, "authorityUntil",
+				(json_int_t)tls_authority_until(s->tls));
 	if (tls_warning(s->tls, time(NULL), text, sizeof text))
 		json_object_set_new(tls, "warning", json_string(text));
 	json_object_set_new(o, "tls", tls);
@@ -378,20 +378,22 @@ static int find_group(const char *name, gid_t *group, struct error *e)
 	errno = 0;
 	const struct group *g = getgrnam(name);
 	if (!g)
-		return error_set(e, EINVAL, "--status-group: there is no group '%s'%s%s", name, errno ? ": " : "", errno ? strerror(errno) : "");
+		return error_set(e, EINVAL, "--status-group: there is no group '%s'%s%s", name, errno ? ": " : "",
+				 errno ? strerror(errno) : "");
 	*group = g->gr_gid;
 	return 0;
 }
 
-/* A socket of our own at the path, mode 0600 from its first moment on. libuv's own would remove the file when it closes, and
- * by then it may be another's. */
+/* A socket of our own at the path, mode 0600 from its first moment on. libuv's own would remove the file when it
+ * closes, and by then it may be another's. */
 static int make(struct status_socket *t, const char *group, struct error *e)
 {
 	struct sockaddr_un a = {.sun_family = AF_UNIX};
 	struct stat st = {0};
 	gid_t gid = 0;
 	if (strlen(t->path) >= sizeof a.sun_path)
-		return error_set(e, ENAMETOOLONG, "%s: at most %zu bytes for a socket's path", t->path, sizeof a.sun_path - 1);
+		return error_set(e, ENAMETOOLONG, "%s: at most %zu bytes for a socket's path", t->path,
+				 sizeof a.sun_path - 1);
 	memcpy(a.sun_path, t->path, strlen(t->path));
 	int rc = group ? find_group(group, &gid, e) : 0;
 	if (!rc)
@@ -417,10 +419,12 @@ static int make(struct status_socket *t, const char *group, struct error *e)
 	return rc;
 }
 
-int status_open(struct status_socket **out, struct server *s, int inherited, const char *path, const char *group, struct error *e)
+int status_open(struct status_socket **out, struct server *s, int inherited, const char *path, const char *group,
+		struct error *e)
 {
 	if (inherited >= 0 && group)
-		return error_set(e, EINVAL, "--status-group: the socket is the service manager's: SocketGroup= in its unit");
+		return error_set(e, EINVAL,
+				 "--status-group: the socket is the service manager's: SocketGroup= in its unit");
 	struct status_socket *t = mem_alloc(1, sizeof *t);
 	if (!t || (inherited < 0 && !(t->path = mem_strdup(path)))) {
 		mem_free(t);
@@ -437,7 +441,8 @@ int status_open(struct status_socket **out, struct server *s, int inherited, con
 		fault = uv_pipe_open(&t->listener, inherited);
 	if (!rc && !fault)
 		fault = uv_listen((uv_stream_t *)&t->listener, BACKLOG, on_connection);
-	return fault ? error_set(e, -fault, "%s: %s", t->path ? path : "inherited status socket", uv_strerror(fault)) : rc;
+	return fault ? error_set(e, -fault, "%s: %s", t->path ? path : "inherited status socket", uv_strerror(fault))
+		     : rc;
 }
 
 static void on_closed(uv_handle_t *h)

@@ -14,11 +14,13 @@ static const char file[] = "aside";
 static int add_worker(json_t *list, const struct worker_status *w, struct error *e)
 {
 	json_error_t fault;
-	json_t *o = json_pack_ex(&fault, 0, "{s:s s:s s:s s:I s:s}", "certificate", w->certificate, "name", w->name, "home", w->home,
-				 "restarts", (json_int_t)w->restarts, "why", w->text);
+	json_t *o = json_pack_ex(&fault, 0, "{s:s s:s s:s s:I s:s}", "certificate", w->certificate, "name", w->name,
+				 "home", w->home, "restarts", (json_int_t)w->restarts, "why", w->text);
 	if (!o)
 		return error_set(e, EINVAL, "%s, who is set aside, cannot be written down: %s", w->name, fault.text);
-	return json_array_append_new(list, o) ? error_set(e, ENOMEM, "no memory for the list of those that are set aside") : 0;
+	return json_array_append_new(list, o)
+		       ? error_set(e, ENOMEM, "no memory for the list of those that are set aside")
+		       : 0;
 }
 
 static void write_quarantined(struct server *s)
@@ -70,7 +72,9 @@ static int put_by(struct server *s, struct error *e)
 	spool_path(s->spool, file, from);
 	spool_path(s->spool, "aside.damaged", to);
 	spool_path(s->spool, "", folder);
-	log_event(LOG_SPOOL_FAULT, "text=\"the file %s is no list of workers: it is kept as %s.damaged, and nobody in it is set aside\"", file, file);
+	log_event(LOG_SPOOL_FAULT,
+		  "text=\"the file %s is no list of workers: it is kept as %s.damaged, and nobody in it is set aside\"",
+		  file, file);
 	return spool_rename(from, to, folder, e);
 }
 
@@ -113,7 +117,8 @@ void trust_merged(struct live_job *o, const struct action *a)
 			o->credits[i].leases++;
 			return;
 		}
-	struct live_job_credit *more = mem_grow(o->credits, o->credit_count * sizeof *more, (o->credit_count + 1) * sizeof *more);
+	struct live_job_credit *more =
+		mem_grow(o->credits, o->credit_count * sizeof *more, (o->credit_count + 1) * sizeof *more);
 	if (!more) {
 		live_job_log(o, LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
 		return;
@@ -141,7 +146,8 @@ void trust_wrong(struct server *s, const struct action *a)
 	char name[JOIN_NAME];
 	struct live_job *o = server_live_job(s, a->job);
 	if (o)
-		live_job_log(o, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text, log_quote(a->text).text);
+		live_job_log(o, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text,
+			     log_quote(a->text).text);
 }
 
 static void note(struct live_job *o, const char *text)
@@ -154,8 +160,8 @@ static void note(struct live_job *o, const char *text)
 static void note_credit(struct live_job *o, const char *name, const char *why, uint64_t leases)
 {
 	char text[256];
-	text_print(text, sizeof text, "worker %s is set aside (%s); %llu of its leases were merged unverified", name, why,
-		 (unsigned long long)leases);
+	text_print(text, sizeof text, "worker %s is set aside (%s); %llu of its leases were merged unverified", name,
+		   why, (unsigned long long)leases);
 	note(o, text);
 }
 

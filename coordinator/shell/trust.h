@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Workers that gave wrong results: what is written down about them. Those that are set aside stand in the spool's file
- * `aside`, so that they are after a restart, too; an operator lets one back by --forgive. A job's log and note say how many
- * results of such a worker are in its image that nobody had verified: they cannot be taken out again. Who gave which is known
- * as long as the coordinator lives. The loop's thread.
+ * `aside`, so that they are after a restart, too; an operator lets one back by --forgive. A job's log and note say how
+ * many results of such a worker are in its image that nobody had verified: they cannot be taken out again. Who gave
+ * which is known as long as the coordinator lives. The loop's thread.
  */
 #ifndef COORDINATOR_SHELL_TRUST_H
 #define COORDINATOR_SHELL_TRUST_H
@@ -14,7 +14,8 @@
  * is damaged is put by as aside.damaged, and the log says so. */
 int trust_open(struct server *s, struct error *e);
 
-/* Of the job's leases that two workers compute: as it asks for, and no less than is asked of all; none of a mixed one. */
+/* Of the job's leases that two workers compute: as it asks for, and no less than is asked of all; none of a mixed one.
+ */
 double trust_share(const struct server *s, const Farm__Submit *m);
 
 void trust_merged(struct live_job *o, const struct action *a);

@@ -36,7 +36,8 @@ static int check_files(const Farm__Submit *m, struct error *e)
 		if (!name_ok(f->name) || f->hash.len != BLOB_HASH_SIZE)
 			return error_set(e, EINVAL, "file %zu of the bundle has no proper name or hash", i);
 		if (f->size > job_cache_max - total)
-			return error_set(e, EINVAL, "the bundle is larger than %llu bytes", (unsigned long long)job_cache_max);
+			return error_set(e, EINVAL, "the bundle is larger than %llu bytes",
+					 (unsigned long long)job_cache_max);
 		total += f->size;
 		scene = scene || strcmp(f->name, m->scene) == 0;
 	}
@@ -80,7 +81,8 @@ static int check_texts(const Farm__Submit *m, struct error *e)
 	return ok ? 0 : error_set(e, EINVAL, "a text or a count of the submission is out of bounds");
 }
 
-static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, char *rule, size_t rule_size, struct error *e)
+static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, char *rule, size_t rule_size,
+		 struct error *e)
 {
 	struct plan_request request;
 	int rc = check_texts(m, e);
@@ -95,7 +97,9 @@ static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, cha
 	if (!rc && !(m->verify >= 0 && m->verify <= 1))
 		rc = error_set(e, EINVAL, "a share of %g of the epochs to be verified", m->verify);
 	if (!rc && m->verify > 0 && m->mixed)
-		rc = error_set(e, EINVAL, "workers of several fingerprints cannot be held against each other: verify or mixed, not both");
+		rc = error_set(
+			e, EINVAL,
+			"workers of several fingerprints cannot be held against each other: verify or mixed, not both");
 	if (!rc)
 		rc = plan_request_from_wire(m->plan, &request, e);
 	if (rc)
@@ -123,7 +127,8 @@ static int sort_hashes(struct upload *u, struct error *e)
 	for (size_t i = 1; i < m->n_files; i++) {
 		const Farm__File *a = m->files[u->by_hash[i - 1]], *b = m->files[u->by_hash[i]];
 		if (memcmp(a->hash.data, b->hash.data, BLOB_HASH_SIZE) == 0 && a->size != b->size)
-			return error_set(e, EINVAL, "%.256s: the same content as %.256s, and another size", a->name, b->name);
+			return error_set(e, EINVAL, "%.256s: the same content as %.256s, and another size", a->name,
+					 b->name);
 	}
 	return 0;
 }
@@ -180,11 +185,12 @@ static int check_sizes(const struct upload *u, struct error *e)
 	return 0;
 }
 
-int upload_new(struct upload **out, struct envelope *submit, struct blob_store *blobs, double bandwidth, struct error *e)
+int upload_new(struct upload **out, struct envelope *submit, struct blob_store *blobs, double bandwidth,
+	       struct error *e)
 {
 	const Farm__Submit *m = submit->message->submit;
 	struct plan plan;
-	char rule[sizeof (*out)->rule];
+	char rule[sizeof(*out)->rule];
 	int rc = check(m, bandwidth, &plan, rule, sizeof rule, e);
 	if (rc)
 		return rc;

@@ -13,7 +13,7 @@ struct upload {
 	struct plan plan;
 	char rule[160]; /* by which its epochs are so long; "": they were asked for */
 	struct blob_store *blobs;
-	bool *held;           /* a file's blob is there and held */
+	bool *held;	      /* a file's blob is there and held */
 	uint32_t *by_hash;    /* the files in the order of their hashes */
 	size_t missing_count; /* files not held */
 	struct blob_writer *writer;

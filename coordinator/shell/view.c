@@ -140,9 +140,11 @@ static void add_forecast(json_t *o, const struct job_view *v)
 	json_object_set_new(o, "bootstrapSeconds", json_real(r->bootstrap_seconds));
 	json_object_set_new(o, "errorNow", known ? forecast_range_to_json(&error) : json_null());
 	json_object_set_new(o, "etaRange", live && v->eta >= 0 ? forecast_range_to_json(&eta) : json_null());
-	json_object_set_new(o, "nextHalving", !known || !live ? json_null() :
-			    json_pack("{s:o s:o}", "cpuSeconds", forecast_range_to_json(&v->halving_cpu), "wallSeconds",
-				      forecast_range_to_json(&v->halving_seconds)));
+	json_object_set_new(o, "nextHalving",
+			    !known || !live
+				    ? json_null()
+				    : json_pack("{s:o s:o}", "cpuSeconds", forecast_range_to_json(&v->halving_cpu),
+						"wallSeconds", forecast_range_to_json(&v->halving_seconds)));
 	if (live) /* there may be many that have ended */
 		json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
 }
@@ -162,10 +164,10 @@ json_t *view_to_json(const struct job_view *v)
 	const struct job_record *r = &v->record;
 	char id[32];
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)r->id);
-	json_t *o = json_pack("{s:s s:s s:s s:s s:i s:f s:f s:I s:I s:s s:s s:s s:s s:b s:i s:f s:f}", /* */
-			      "id", id, "name", r->name, "state", r->state, "integrator", r->integrator, /* */
-			      "priority", r->priority, "progress", r->progress, "rate", v->rate, /* */
-			      "rounds", (json_int_t)r->rounds, "mutations", (json_int_t)r->mutations, /* */
+	json_t *o = json_pack("{s:s s:s s:s s:s s:i s:f s:f s:I s:I s:s s:s s:s s:s s:b s:i s:f s:f}",		 /* */
+			      "id", id, "name", r->name, "state", r->state, "integrator", r->integrator,	 /* */
+			      "priority", r->priority, "progress", r->progress, "rate", v->rate,		 /* */
+			      "rounds", (json_int_t)r->rounds, "mutations", (json_int_t)r->mutations,		 /* */
 			      "why", why_of(v), "waiting", v->waiting, "reason", r->reason, "output", r->output, /* */
 			      "result", (int)r->has_result, "leases", (int)v->leases, "submitted", r->submitted, /* */
 			      "ended", r->ended);
@@ -193,18 +195,20 @@ json_t *view_to_json(const struct job_view *v)
 json_t *view_peer_to_json(const struct peer_status *p, double now)
 {
 	static const char *const states[] = {"active", "silent", "aside"};
-	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:I s:I s:s}", /* */
-			 "id", (json_int_t)p->id, "name", p->name, "state", states[p->state], /* */
+	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:I s:I s:s}",		  /* */
+			 "id", (json_int_t)p->id, "name", p->name, "state", states[p->state],		  /* */
 			 "fingerprint", p->fingerprint, "threads", (int)p->threads, "want", (int)p->want, /* */
 			 "leases", (int)p->leases, "connected", now - p->joined, "heard", now - p->heard, /* */
-			 "merged", (json_int_t)p->merged, "repeats", (json_int_t)p->repeats, /* */
-			 "refused", (json_int_t)p->refused, "failures", (json_int_t)p->failures, "faults", (json_int_t)p->faults, /* */
+			 "merged", (json_int_t)p->merged, "repeats", (json_int_t)p->repeats,		  /* */
+			 "refused", (json_int_t)p->refused, "failures", (json_int_t)p->failures, "faults",
+			 (json_int_t)p->faults, /* */
 			 "restarts", (json_int_t)p->restarts, "text", p->text);
 }
 
 json_t *view_aside_to_json(const struct worker_status *w)
 {
-	return json_pack("{s:s s:s s:s s:I s:I s:s}", "name", w->name, "certificate", w->certificate, "home", w->home, /* */
+	return json_pack("{s:s s:s s:s s:I s:I s:s}", "name", w->name, "certificate", w->certificate, "home",
+			 w->home, /* */
 			 "restarts", (json_int_t)w->restarts, "wrong", (json_int_t)w->wrong, "why", w->text);
 }
 

@@ -15,14 +15,14 @@
 /* A record, and what only a living job has. */
 struct job_view {
 	struct job_record record;
-	double rate, eta;  /* eta negative: not known */
-	double eta_low, eta_high; /* where eta is known */
+	double rate, eta;				    /* eta negative: not known */
+	double eta_low, eta_high;			    /* where eta is known */
 	struct forecast_range halving_cpu, halving_seconds; /* where there are looks */
-	uint32_t leases;   /* out at workers */
-	uint32_t workers, machines; /* that hold them, that might */
-	double share;      /* machines that it would have by its priority; negative: not known */
+	uint32_t leases;				    /* out at workers */
+	uint32_t workers, machines;			    /* that hold them, that might */
+	double share;	   /* machines that it would have by its priority; negative: not known */
 	char place[160];   /* in words */
-	double reading; /* share of what was stored of it that has been read; negative: it is not being read */
+	double reading;	   /* share of what was stored of it that has been read; negative: it is not being read */
 	char waiting[256]; /* why nothing is being done for it */
 	char owners_place[160], owners_waiting[256]; /* the same for its owner */
 };

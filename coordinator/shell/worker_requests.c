@@ -53,7 +53,9 @@ static void send_piece(struct session *p, const struct worker_request *a)
 	farm__envelope__init(&m);
 	unsigned char *bytes = mem_alloc(BLOB_CHUNK, 1);
 	ssize_t n = 0;
-	int fd = a->number == 0 && files_check(p->server, &h, FILES_CHECKED, &e) ? -1 : blob_open(p->server->blobs, &h, &size, &e);
+	int fd = a->number == 0 && files_check(p->server, &h, FILES_CHECKED, &e)
+			 ? -1
+			 : blob_open(p->server->blobs, &h, &size, &e);
 	if (fd >= 0 && bytes)
 		n = disk_pread(fd, bytes, BLOB_CHUNK, a->number <= size ? (off_t)a->number : 0);
 	if (fd >= 0 && (!bytes || n < 0 || a->number > size))

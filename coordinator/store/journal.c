@@ -17,7 +17,8 @@
 enum { PATH_MOST = 4200 };
 /* Room is taken for several records at once: a file system that is writing back makes whoever asks for it wait. */
 enum { AHEAD = 8, AHEAD_MOST = 1 << 28 };
-/* More than that does not wait in memory, of all journals together: whoever appends writes, too, as fast as the disk takes it. */
+/* More than that does not wait in memory, of all journals together: whoever appends writes, too, as fast as the disk
+ * takes it. */
 enum { UNWRITTEN_MOST = 1 << 28 };
 static _Atomic uint64_t unwritten_bytes;
 
@@ -32,18 +33,18 @@ struct journal {
 	uint64_t job, generation, salt;
 	atomic_uint holders;
 	pthread_mutex_t writer; /* held while the file is written or cut; taken before `list` */
-	pthread_mutex_t list;   /* held for a moment only: of the next four */
+	pthread_mutex_t list;	/* held for a moment only: of the next four */
 	struct unwritten *first, **last;
-	uint64_t waiting;                /* their bytes; what the file will have is written + waiting */
-	uint64_t number;                 /* of the next record */
-	uint64_t damaged;                /* records in the file that were not whole when it was read */
+	uint64_t waiting;		  /* their bytes; what the file will have is written + waiting */
+	uint64_t number;		  /* of the next record */
+	uint64_t damaged;		  /* records in the file that were not whole when it was read */
 	_Atomic uint64_t in_file, stored; /* records that are written, that are durable */
 	_Atomic uint64_t written, synced; /* in the file */
-	_Atomic uint64_t room;            /* the disk has it, up to this byte of the file */
-	_Atomic uint64_t record;          /* the size of one, as room was asked for last */
-	atomic_bool bad;                  /* a call on the file failed: it is not written any more, nor believed */
-	atomic_bool settled;              /* all of it is stored elsewhere */
-	atomic_uint flushes;              /* under way */
+	_Atomic uint64_t room;		  /* the disk has it, up to this byte of the file */
+	_Atomic uint64_t record;	  /* the size of one, as room was asked for last */
+	atomic_bool bad;		  /* a call on the file failed: it is not written any more, nor believed */
+	atomic_bool settled;		  /* all of it is stored elsewhere */
+	atomic_uint flushes;		  /* under way */
 	char path[PATH_MOST];
 };
 
@@ -156,7 +157,8 @@ uint64_t journal_bytes(struct journal *j)
 	return bytes;
 }
 
-/* All that waited when this began, and no more: on a slow disk more would come for ever, and nobody hear that the first is stored. */
+/* All that waited when this began, and no more: on a slow disk more would come for ever, and nobody hear that the first
+ * is stored. */
 static int write_waiting(struct journal *j)
 {
 	int rc = 0;
@@ -222,7 +224,8 @@ int journal_create(struct journal **out, const char *folder, uint64_t job, uint6
 
 /* ---- reading ---- */
 
-static int visit_piece(struct journal *j, const struct journal_piece *p, journal_visit *visit, void *user, struct error *e)
+static int visit_piece(struct journal *j, const struct journal_piece *p, journal_visit *visit, void *user,
+		       struct error *e)
 {
 	struct journal_item item = {.journal = j, .at = p->from, .missing = p->what == JOURNAL_WHOLE ? 0 : p->count};
 	if (p->what != JOURNAL_UNKNOWN) {
@@ -236,8 +239,8 @@ static int visit_piece(struct journal *j, const struct journal_piece *p, journal
 	return visit(user, &item, e);
 }
 
-static int read_records(struct journal *j, uint64_t end, struct journal_gaps *gaps, journal_visit *visit, void *user, struct journal_found *found,
-			struct error *e)
+static int read_records(struct journal *j, uint64_t end, struct journal_gaps *gaps, journal_visit *visit, void *user,
+			struct journal_found *found, struct error *e)
 {
 	struct journal_scan s;
 	struct journal_piece p;
@@ -312,8 +315,8 @@ static int read_all(struct journal *j, journal_visit *visit, void *user, struct 
 	return disk_fsync(j->fd) ? fault(j, errno, e) : 0;
 }
 
-int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_t generation, journal_visit *visit, void *user,
-		 struct journal_found *found, struct error *e)
+int journal_open(struct journal **out, const char *folder, uint64_t job, uint64_t generation, journal_visit *visit,
+		 void *user, struct journal_found *found, struct error *e)
 {
 	*found = (struct journal_found){0};
 	struct journal *j = make(folder, job, generation, O_RDWR, e);
@@ -359,12 +362,14 @@ static int room_for(struct journal *j, uint64_t size, struct error *e)
 	uint64_t end = journal_bytes(j);
 	if (j->bad)
 		return fault(j, EIO, e);
-	if (end + size <= j->room || (AHEAD * size <= AHEAD_MOST && reserve(j, end, AHEAD * size)) || reserve(j, end, size) || errno == EOPNOTSUPP || errno == ENOSYS)
+	if (end + size <= j->room || (AHEAD * size <= AHEAD_MOST && reserve(j, end, AHEAD * size)) ||
+	    reserve(j, end, size) || errno == EOPNOTSUPP || errno == ENOSYS)
 		return 0;
 	int code = errno;
 	pthread_mutex_lock(&j->writer);
 	int cut = cut_off(j);
-	bool kept = j->written == end || reserve(j, j->written, end - j->written); /* what waits was promised its room */
+	bool kept =
+		j->written == end || reserve(j, j->written, end - j->written); /* what waits was promised its room */
 	pthread_mutex_unlock(&j->writer);
 	(void)cut;
 	(void)kept;
@@ -385,7 +390,8 @@ static void reserve_ahead(struct journal *j)
 		reserve(j, end, AHEAD * size);
 }
 
-static struct journal_record record_of(const struct journal *j, enum journal_kind kind, const struct lease_key *lease, double elapsed, size_t size)
+static struct journal_record record_of(const struct journal *j, enum journal_kind kind, const struct lease_key *lease,
+				       double elapsed, size_t size)
 {
 	struct journal_record r = {.size = (uint32_t)size, .kind = kind, .elapsed = elapsed, .salt = j->salt};
 	if (lease) {
@@ -397,20 +403,22 @@ static struct journal_record record_of(const struct journal *j, enum journal_kin
 	return r;
 }
 
-int journal_append(struct journal *j, enum journal_kind kind, const struct lease_key *lease, double elapsed, const void *a, size_t a_size,
-		   struct buf *b, struct error *e)
+int journal_append(struct journal *j, enum journal_kind kind, const struct lease_key *lease, double elapsed,
+		   const void *a, size_t a_size, struct buf *b, struct error *e)
 {
 	size_t b_size = b ? b->size : 0;
 	if (a_size > UINT32_MAX || b_size > UINT32_MAX - a_size)
 		return error_set(e, EFBIG, "%s: a record of %zu bytes", j->path, a_size + b_size);
-	if (kind != JOURNAL_BATCH && kind != JOURNAL_AGAIN && kind != JOURNAL_PINNED && !j->bad) { /* it may stay away, but must not make the journal bad */
+	if (kind != JOURNAL_BATCH && kind != JOURNAL_AGAIN && kind != JOURNAL_PINNED &&
+	    !j->bad) { /* it may stay away, but must not make the journal bad */
 		int rc = room_for(j, sizeof(struct journal_record) + a_size + b_size, e);
 		if (rc)
 			return rc;
 	}
 	struct unwritten *n = mem_alloc(1, sizeof *n);
 	if (n)
-		*n = (struct unwritten){.record = record_of(j, kind, lease, elapsed, a_size + b_size), .a.limit = a_size};
+		*n = (struct unwritten){.record = record_of(j, kind, lease, elapsed, a_size + b_size),
+					.a.limit = a_size};
 	if (!n || !buf_append(&n->a, a, a_size)) {
 		mem_free(n);
 		return error_set(e, ENOMEM, "no memory for a record of %zu bytes", a_size + b_size);
@@ -471,8 +479,8 @@ static int copy_bytes(struct journal *j, int to, uint64_t from, uint64_t end, st
 	return 0;
 }
 
-/* All records of the file, each checked again, at their places, and those that wait, into another file. What was damaged stays so: it is
- * known to be missing. */
+/* All records of the file, each checked again, at their places, and those that wait, into another file. What was
+ * damaged stays so: it is known to be missing. */
 static int copy_records(struct journal *j, int to, struct error *e)
 {
 	struct journal_scan s;
@@ -508,7 +516,9 @@ int journal_renew(struct journal *j, struct error *e)
 		return error_set(e, EAGAIN, "%s: is being flushed", j->path);
 	journal_head_make(&h, j->job, j->generation, j->salt);
 	int fd = disk_open(path, O_RDWR | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
-	int rc = fd < 0 ? fault(j, errno, e) : disk_write_all(fd, &h, sizeof h) ? fault(j, errno ? errno : ENOSPC, e) : copy_records(j, fd, e);
+	int rc = fd < 0				    ? fault(j, errno, e)
+		 : disk_write_all(fd, &h, sizeof h) ? fault(j, errno ? errno : ENOSPC, e)
+						    : copy_records(j, fd, e);
 	if (!rc && (disk_fsync(fd) || disk_rename(path, j->path)))
 		rc = fault(j, errno, e);
 	if (!rc)
@@ -544,7 +554,8 @@ int journal_sync(struct journal *j, struct error *e)
 {
 	if (j->settled)
 		return 0;
-	atomic_fetch_add(&j->flushes, 1); /* before it is asked whether it is bad: a bad one may be renewed at any time */
+	atomic_fetch_add(&j->flushes,
+			 1); /* before it is asked whether it is bad: a bad one may be renewed at any time */
 	int rc = j->bad ? -EIO : write_waiting(j);
 	uint64_t written = j->written, in_file = j->in_file;
 	if (!rc && j->bad) {

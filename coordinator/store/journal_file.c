@@ -13,11 +13,13 @@
 enum { PATH_MOST = 4200 };
 enum { WINDOW = 1 << 20 /* bytes that are searched for a mark at a time */ };
 
-/* Its digits grow with every change of what a record is, the bodies included (journal_kind's, and batches as common/wire packs them). */
+/* Its digits grow with every change of what a record is, the bodies included (journal_kind's, and batches as
+ * common/wire packs them). */
 static const char magic[8] = "hsltJ002";
 static const char mark[4] = {'\xf1', 'h', 'j', '\x0d'};
 
-_Static_assert(sizeof(struct journal_head) == 40 && sizeof(struct journal_record) == 80, "another layout is another version");
+_Static_assert(sizeof(struct journal_head) == 40 && sizeof(struct journal_record) == 80,
+	       "another layout is another version");
 
 static uint32_t check_head(const struct journal_head *h)
 {
@@ -38,7 +40,8 @@ void journal_head_make(struct journal_head *h, uint64_t job, uint64_t generation
 
 bool journal_head_fits(const struct journal_head *h, uint64_t job, uint64_t generation)
 {
-	return memcmp(h->magic, magic, sizeof magic) == 0 && h->check == check_head(h) && h->job == job && h->generation == generation;
+	return memcmp(h->magic, magic, sizeof magic) == 0 && h->check == check_head(h) && h->job == job &&
+	       h->generation == generation;
 }
 
 int journal_head_version(const struct journal_head *h, const char *path, struct error *e)
@@ -56,7 +59,11 @@ void journal_record_seal(struct journal_record *r, const void *a, size_t a_size,
 
 struct lease_key journal_record_lease(const struct journal_record *r, uint64_t job)
 {
-	return (struct lease_key){.job = job, .kind = (enum lease_kind)r->lease_kind, .group = r->group, .part = r->part, .epoch = r->epoch};
+	return (struct lease_key){.job = job,
+				  .kind = (enum lease_kind)r->lease_kind,
+				  .group = r->group,
+				  .part = r->part,
+				  .epoch = r->epoch};
 }
 
 int journal_read_at(int fd, void *bytes, size_t size, uint64_t at)
@@ -85,8 +92,8 @@ static int read_head(const struct journal_scan *s, uint64_t at, struct journal_r
 	int rc = journal_read_at(s->fd, r, sizeof *r, at);
 	if (rc)
 		return rc == -ENODATA ? 0 : rc;
-	return memcmp(r->mark, mark, sizeof mark) == 0 && r->check == check_record(r) && r->salt == s->salt && r->number >= s->number &&
-	       r->size <= s->end - at - sizeof *r;
+	return memcmp(r->mark, mark, sizeof mark) == 0 && r->check == check_record(r) && r->salt == s->salt &&
+	       r->number >= s->number && r->size <= s->end - at - sizeof *r;
 }
 
 /* 1: it is whole, and mem_alloc'd; 0: it is not. */
@@ -174,7 +181,11 @@ static int damage(struct journal_scan *s, struct journal_piece *p)
 	if (rc > 0 && r.number < number && r.size <= to - s->at - sizeof r) {
 		p->count = r.number - s->number;
 		if (p->count == 0) {
-			*p = (struct journal_piece){.what = JOURNAL_DAMAGED, .from = s->at, .to = s->at + sizeof r + r.size, .count = 1, .record = r};
+			*p = (struct journal_piece){.what = JOURNAL_DAMAGED,
+						    .from = s->at,
+						    .to = s->at + sizeof r + r.size,
+						    .count = 1,
+						    .record = r};
 			s->at = p->to;
 			s->number++;
 			return 1;
@@ -208,14 +219,17 @@ int journal_scan_next(struct journal_scan *s, struct journal_piece *p)
 int journal_scan_salt(int fd, uint64_t end, uint64_t *salt)
 {
 	struct journal_record r;
-	int rc = end < sizeof(struct journal_head) + sizeof r ? -ENODATA : journal_read_at(fd, &r, sizeof r, sizeof(struct journal_head));
+	int rc = end < sizeof(struct journal_head) + sizeof r
+			 ? -ENODATA
+			 : journal_read_at(fd, &r, sizeof r, sizeof(struct journal_head));
 	if (!rc && (memcmp(r.mark, mark, sizeof mark) != 0 || r.check != check_record(&r) || r.number != 0))
 		rc = -ENODATA;
 	*salt = rc ? 0 : r.salt;
 	return rc == -ENODATA ? -EBADMSG : rc;
 }
 
-int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct journal_record *r, unsigned char **body)
+int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct journal_record *r,
+			unsigned char **body)
 {
 	struct journal_scan s = {.fd = fd, .end = end, .salt = salt};
 	int rc = read_head(&s, at, r);

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A journal as bytes of a file (journal.h): a head, then records, each with a head of its own and a body. A record's head has a mark,
- * a checksum and a number that the journal drew (salt), which no peer knows: so the next record is found wherever bytes before it are
- * damaged, and no result that a worker made up can pass for a record. Bodies have a checksum of their own: a damaged one is still
- * known by its head. Numbers are in the byte order of the machine. Any thread, one at a time for a scan.
+ * A journal as bytes of a file (journal.h): a head, then records, each with a head of its own and a body. A record's
+ * head has a mark, a checksum and a number that the journal drew (salt), which no peer knows: so the next record is
+ * found wherever bytes before it are damaged, and no result that a worker made up can pass for a record. Bodies have a
+ * checksum of their own: a damaged one is still known by its head. Numbers are in the byte order of the machine. Any
+ * thread, one at a time for a scan.
  */
 #ifndef COORDINATOR_STORE_JOURNAL_FILE_H
 #define COORDINATOR_STORE_JOURNAL_FILE_H
@@ -44,18 +45,22 @@ struct lease_key journal_record_lease(const struct journal_record *r, uint64_t j
 
 /* What comes next in a file. */
 struct journal_piece {
-	enum { JOURNAL_WHOLE, JOURNAL_DAMAGED /* its head is whole */, JOURNAL_UNKNOWN /* so are not even the heads */ } what;
-	uint64_t from, to;            /* its bytes; UNKNOWN: perhaps none */
-	uint64_t count;               /* of records, by their numbers */
+	enum {
+		JOURNAL_WHOLE,
+		JOURNAL_DAMAGED /* its head is whole */,
+		JOURNAL_UNKNOWN /* so are not even the heads */
+	} what;
+	uint64_t from, to;	      /* its bytes; UNKNOWN: perhaps none */
+	uint64_t count;		      /* of records, by their numbers */
 	struct journal_record record; /* but UNKNOWN */
-	unsigned char *body;          /* WHOLE: mem_alloc'd */
+	unsigned char *body;	      /* WHOLE: mem_alloc'd */
 };
 
 struct journal_scan {
 	int fd;
 	uint64_t at, end, salt, number; /* number: of the record that is expected there */
-	uint64_t stored;                /* as the last whole record says */
-	bool ahead;                     /* the next whole one is known: */
+	uint64_t stored;		/* as the last whole record says */
+	bool ahead;			/* the next whole one is known: */
 	struct journal_piece found;
 };
 
@@ -65,7 +70,8 @@ void journal_scan_begin(struct journal_scan *s, int fd, uint64_t end, uint64_t s
 int journal_scan_next(struct journal_scan *s, struct journal_piece *p);
 void journal_scan_end(struct journal_scan *s);
 /* The one that begins there. 1: it is whole, its body is mem_alloc'd; 0: it is not. */
-int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct journal_record *r, unsigned char **body);
+int journal_read_record(int fd, uint64_t end, uint64_t salt, uint64_t at, struct journal_record *r,
+			unsigned char **body);
 /* The salt of a file whose head is damaged, from its first record. -EBADMSG */
 int journal_scan_salt(int fd, uint64_t end, uint64_t *salt);
 
@@ -73,7 +79,7 @@ int journal_scan_salt(int fd, uint64_t end, uint64_t *salt);
 struct journal_gaps {
 	struct journal_gap {
 		uint64_t number, count;
-	} *first;
+	} * first;
 	size_t count, capacity;
 };
 int journal_gaps_add(struct journal_gaps *g, uint64_t number, uint64_t count, struct error *e);

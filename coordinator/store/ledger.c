@@ -26,12 +26,16 @@ static const char *const migrations[] = {
 };
 enum { VERSION = sizeof migrations / sizeof *migrations };
 
-#define COLUMNS "id, owner, name, version, priority, mixed, submitted, submission, plan, held, extended, state, ended, revision, checksum"
+#define COLUMNS \
+	"id, owner, name, version, priority, mixed, submitted, submission, plan, held, extended, state, ended, revision, checksum"
 
 static int fault(const struct ledger *l, struct error *e)
 {
 	int code = sqlite3_errcode(l->db);
-	int as = code == SQLITE_FULL ? ENOSPC : code == SQLITE_NOMEM ? ENOMEM : code == SQLITE_NOTADB || code == SQLITE_CORRUPT ? EBADMSG : EIO;
+	int as = code == SQLITE_FULL				   ? ENOSPC
+		 : code == SQLITE_NOMEM				   ? ENOMEM
+		 : code == SQLITE_NOTADB || code == SQLITE_CORRUPT ? EBADMSG
+								   : EIO;
 	return error_set(e, as, "the database of jobs: %s", sqlite3_errmsg(l->db));
 }
 
@@ -61,10 +65,13 @@ static int migrate(struct ledger *l, struct error *e)
 	int version;
 	int rc = version_of(l, &version, e);
 	if (!rc && version > VERSION)
-		return error_set(e, EPROTO, "the database of jobs is of version %d, and version %d is known here: a later coordinator wrote it",
-				 version, (int)VERSION);
+		return error_set(
+			e, EPROTO,
+			"the database of jobs is of version %d, and version %d is known here: a later coordinator wrote it",
+			version, (int)VERSION);
 	if (!rc && version < 0)
-		return error_set(e, EBADMSG, "the database of jobs is damaged: no coordinator writes a version %d", version);
+		return error_set(e, EBADMSG, "the database of jobs is damaged: no coordinator writes a version %d",
+				 version);
 	for (; !rc && version < VERSION; version++) {
 		char done[64];
 		snprintf(done, sizeof done, "PRAGMA user_version = %d; COMMIT", version + 1);
@@ -91,7 +98,8 @@ static uint32_t check(const struct ledger_job *j)
 		uint64_t id, extended, revision, submission_size, plan_size;
 		double submitted, ended;
 		int32_t priority, mixed;
-	} numbers = {j->id, j->extended, j->revision, j->submission_size, j->plan_size, j->submitted, j->ended, j->priority, j->mixed};
+	} numbers = {j->id,    j->extended, j->revision, j->submission_size, j->plan_size, j->submitted,
+		     j->ended, j->priority, j->mixed};
 	uint32_t crc = crc32c(0, &numbers, sizeof numbers);
 	crc = check_text(crc, j->owner);
 	crc = check_text(crc, j->name);
@@ -118,11 +126,18 @@ static int row(struct ledger *l, sqlite3_stmt *s, uint64_t id, struct ledger_job
 		sqlite3_reset(s);
 		return rc;
 	}
-	*j = (struct ledger_job){.id = (uint64_t)sqlite3_column_int64(s, 0), .owner = text_at(s, 1), .name = text_at(s, 2),
-				 .version = text_at(s, 3), .priority = sqlite3_column_int(s, 4), .mixed = sqlite3_column_int(s, 5),
-				 .submitted = sqlite3_column_double(s, 6), .held = text_at(s, 9),
-				 .extended = (uint64_t)sqlite3_column_int64(s, 10), .state = text_at(s, 11),
-				 .ended = sqlite3_column_double(s, 12), .revision = (uint64_t)sqlite3_column_int64(s, 13)};
+	*j = (struct ledger_job){.id = (uint64_t)sqlite3_column_int64(s, 0),
+				 .owner = text_at(s, 1),
+				 .name = text_at(s, 2),
+				 .version = text_at(s, 3),
+				 .priority = sqlite3_column_int(s, 4),
+				 .mixed = sqlite3_column_int(s, 5),
+				 .submitted = sqlite3_column_double(s, 6),
+				 .held = text_at(s, 9),
+				 .extended = (uint64_t)sqlite3_column_int64(s, 10),
+				 .state = text_at(s, 11),
+				 .ended = sqlite3_column_double(s, 12),
+				 .revision = (uint64_t)sqlite3_column_int64(s, 13)};
 	j->submission = sqlite3_column_blob(s, 7);
 	j->submission_size = (size_t)sqlite3_column_bytes(s, 7);
 	j->plan = sqlite3_column_blob(s, 8);
@@ -167,7 +182,9 @@ static void bind(sqlite3_stmt *s, const struct ledger_job *j)
 static int get_whole(struct ledger *l, uint64_t id, struct ledger_job *j, struct error *e)
 {
 	int rc = row(l, l->get, id, j, e);
-	return rc > 0 && j->damaged ? error_set(e, EBADMSG, "the database of jobs: the row of j%llu is damaged", (unsigned long long)id) : rc;
+	return rc > 0 && j->damaged ? error_set(e, EBADMSG, "the database of jobs: the row of j%llu is damaged",
+						(unsigned long long)id)
+				    : rc;
 }
 
 static int change(struct ledger *l, struct ledger_job *j, struct error *e)
@@ -197,7 +214,8 @@ static int make_checksums(struct ledger *l, struct error *e)
 {
 	sqlite3_stmt *s = NULL;
 	struct ledger_job j;
-	int rc = prepare(l, &s, "SELECT " COLUMNS " FROM jobs WHERE id > ? AND checksum IS NULL ORDER BY id LIMIT 1", e);
+	int rc =
+		prepare(l, &s, "SELECT " COLUMNS " FROM jobs WHERE id > ? AND checksum IS NULL ORDER BY id LIMIT 1", e);
 	uint64_t id = 0;
 	while (!rc && (rc = row(l, s, id, &j, e)) > 0) {
 		id = j.id;
@@ -213,28 +231,35 @@ int ledger_open(struct ledger **out, const char *path, struct error *e)
 	if (!l)
 		return error_set(e, ENOMEM, "no memory for the database of jobs");
 	int rc = 0;
-	if (sqlite3_open_v2(path, &l->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL) != SQLITE_OK)
+	if (sqlite3_open_v2(path, &l->db, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX, NULL) !=
+	    SQLITE_OK)
 		rc = l->db ? fault(l, e) : error_set(e, ENOMEM, "no memory for the database of jobs");
 	/* The spool's lock makes us the only ones: without shared memory it works on any file system. */
 	if (!rc)
-		rc = run(l, "PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"
-			    "PRAGMA journal_size_limit = 1048576; PRAGMA trusted_schema = OFF",
+		rc = run(l,
+			 "PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = WAL; PRAGMA synchronous = FULL;"
+			 "PRAGMA journal_size_limit = 1048576; PRAGMA trusted_schema = OFF",
 			 e);
 	if (!rc)
 		rc = migrate(l, e);
 	if (!rc)
 		rc = look_through(l, e);
 	if (!rc)
-		rc = prepare(l, &l->add, "INSERT INTO jobs (" COLUMNS ") VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", e);
+		rc = prepare(l, &l->add,
+			     "INSERT INTO jobs (" COLUMNS ") VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", e);
 	if (!rc)
-		rc = prepare(l, &l->change, "UPDATE jobs SET owner = ?2, name = ?3, version = ?4, priority = ?5, mixed = ?6, submitted = ?7, submission = ?8,"
-					    " plan = ?9, held = ?10, extended = ?11, state = ?12, ended = ?13, revision = ?14, checksum = ?15 WHERE id = ?1", e);
+		rc = prepare(
+			l, &l->change,
+			"UPDATE jobs SET owner = ?2, name = ?3, version = ?4, priority = ?5, mixed = ?6, submitted = ?7, submission = ?8,"
+			" plan = ?9, held = ?10, extended = ?11, state = ?12, ended = ?13, revision = ?14, checksum = ?15 WHERE id = ?1",
+			e);
 	if (!rc)
 		rc = prepare(l, &l->remove, "DELETE FROM jobs WHERE id = ?1", e);
 	if (!rc)
 		rc = prepare(l, &l->drop, "DELETE FROM jobs WHERE id = ?1 AND ended IS NOT NULL", e);
 	if (!rc)
-		rc = prepare(l, &l->next, "SELECT " COLUMNS " FROM jobs WHERE ended IS NULL AND id > ? ORDER BY id LIMIT 1", e);
+		rc = prepare(l, &l->next,
+			     "SELECT " COLUMNS " FROM jobs WHERE ended IS NULL AND id > ? ORDER BY id LIMIT 1", e);
 	if (!rc)
 		rc = prepare(l, &l->get, "SELECT " COLUMNS " FROM jobs WHERE id = ?", e);
 	if (!rc)
@@ -350,7 +375,8 @@ int ledger_extend(struct ledger *l, const struct ledger_job *more, struct error 
 	struct ledger_job j;
 	int rc = get_whole(l, more->id, &j, e);
 	if (rc <= 0)
-		return rc < 0 ? rc : error_set(e, ENOENT, "the database of jobs has no j%llu", (unsigned long long)more->id);
+		return rc < 0 ? rc
+			      : error_set(e, ENOENT, "the database of jobs has no j%llu", (unsigned long long)more->id);
 	j.submission = more->submission;
 	j.submission_size = more->submission_size;
 	j.plan = more->plan;

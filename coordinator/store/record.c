@@ -18,15 +18,22 @@ static const struct {
 	const char *name;
 	size_t offset;
 } counts[] = {
-	{"rounds", offsetof(struct job_record, rounds)},	 {"mutations", offsetof(struct job_record, mutations)},
-	{"merged", offsetof(struct job_record, leases_merged)}, {"repeats", offsetof(struct job_record, repeats)},
-	{"refused", offsetof(struct job_record, refused)},	 {"failures", offsetof(struct job_record, failures)},
-	{"duplicates", offsetof(struct job_record, duplicates)}, {"timeouts", offsetof(struct job_record, timeouts)},
-	{"verified", offsetof(struct job_record, verified)},	 {"mismatched", offsetof(struct job_record, mismatched)},
-	{"stuck", offsetof(struct job_record, stuck)},		 {"longestStuck", offsetof(struct job_record, longest_stuck)},
+	{"rounds", offsetof(struct job_record, rounds)},
+	{"mutations", offsetof(struct job_record, mutations)},
+	{"merged", offsetof(struct job_record, leases_merged)},
+	{"repeats", offsetof(struct job_record, repeats)},
+	{"refused", offsetof(struct job_record, refused)},
+	{"failures", offsetof(struct job_record, failures)},
+	{"duplicates", offsetof(struct job_record, duplicates)},
+	{"timeouts", offsetof(struct job_record, timeouts)},
+	{"verified", offsetof(struct job_record, verified)},
+	{"mismatched", offsetof(struct job_record, mismatched)},
+	{"stuck", offsetof(struct job_record, stuck)},
+	{"longestStuck", offsetof(struct job_record, longest_stuck)},
 };
 
-void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black, double beyond_share)
+void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black,
+			 double beyond_share)
 {
 	r->stuck = n->counters[COUNT_STUCK];
 	r->longest_stuck = n->counters[COUNT_LONGEST_STUCK];
@@ -159,16 +166,18 @@ static int check(json_t *o, struct error *e)
 int record_to_json(const struct job_record *r, char **out, struct error *e)
 {
 	json_error_t fault;
-	json_t *o = json_pack_ex(&fault, 0, "{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:o s:s s:s s:o}", /* */
-			      "schema", SCHEMA, "id", (json_int_t)r->id, "name", r->name, "integrator", r->integrator, /* */
-			      "state", r->state, "reason", r->reason, "why", r->why, "output", r->output, /* */
-			      "priority", r->priority, "exitCode", (int)r->exit_code, "result", (int)r->has_result, /* */
-			      "submitted", r->submitted, "ended", r->ended, "progress", r->progress, /* */
-			      "relError", r->rel_error, "counts", record_counts(r), /* */
-			      "mixture", r->mixture, "note", r->note, "strategies", record_strategies(r));
+	json_t *o = json_pack_ex(
+		&fault, 0, "{s:i s:I s:s s:s s:s s:s s:s s:s s:i s:i s:b s:f s:f s:f s:f s:o s:s s:s s:o}", /* */
+		"schema", SCHEMA, "id", (json_int_t)r->id, "name", r->name, "integrator", r->integrator,    /* */
+		"state", r->state, "reason", r->reason, "why", r->why, "output", r->output,		    /* */
+		"priority", r->priority, "exitCode", (int)r->exit_code, "result", (int)r->has_result,	    /* */
+		"submitted", r->submitted, "ended", r->ended, "progress", r->progress,			    /* */
+		"relError", r->rel_error, "counts", record_counts(r),					    /* */
+		"mixture", r->mixture, "note", r->note, "strategies", record_strategies(r));
 	if (!o)
 		return error_set(e, json_error_code(&fault) == json_error_invalid_utf8 ? EINVAL : ENOMEM,
-				 "the record of job j%llu cannot be written: %s", (unsigned long long)r->id, fault.text);
+				 "the record of job j%llu cannot be written: %s", (unsigned long long)r->id,
+				 fault.text);
 	json_object_set_new(o, "owner", json_string(r->owner));
 	json_object_set_new(o, "relErrorDoubt", json_string(r->rel_error_doubt));
 	json_object_set_new(o, "endedSeen", json_real(r->ended_seen));
@@ -206,11 +215,15 @@ int record_from_json(const char *text, size_t size, struct job_record *r, struct
 	const json_t *schema = json_object_get(o, "schema"); /* NULL of whatever is no object */
 	memset(r, 0, sizeof *r);
 	if (json_integer_value(schema) != SCHEMA) {
-		int rc = json_is_integer(schema) ? error_set(e, EPROTO, "a record of version %lld, and version %d is known here: another coordinator wrote it",
-							      (long long)json_integer_value(schema), SCHEMA)
-			 : !o && json_error_code(&fault) == json_error_out_of_memory
-				 ? error_set(e, ENOMEM, "no memory for a record")
-				 : error_set(e, EBADMSG, "not the record of a job: %s", o ? "no schema" : fault.text);
+		int rc =
+			json_is_integer(schema)
+				? error_set(
+					  e, EPROTO,
+					  "a record of version %lld, and version %d is known here: another coordinator wrote it",
+					  (long long)json_integer_value(schema), SCHEMA)
+			: !o && json_error_code(&fault) == json_error_out_of_memory
+				? error_set(e, ENOMEM, "no memory for a record")
+				: error_set(e, EBADMSG, "not the record of a job: %s", o ? "no schema" : fault.text);
 		json_decref(o);
 		return rc;
 	}

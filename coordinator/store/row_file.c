@@ -25,10 +25,14 @@ int row_file_write(const struct spool *s, const struct ledger_job *j, struct err
 	char name[SPOOL_PATH_MAX], temporary[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
 	const void *pieces[PIECES] = {j->owner, j->name, j->version, j->held, j->submission, j->plan};
 	struct checked_file out = {.buffer = NULL};
-	struct head h = {.id = j->id, .extended = j->extended, .revision = j->revision, .submitted = j->submitted, .priority = j->priority,
+	struct head h = {.id = j->id,
+			 .extended = j->extended,
+			 .revision = j->revision,
+			 .submitted = j->submitted,
+			 .priority = j->priority,
 			 .mixed = j->mixed,
-			 .sizes = {strlen(j->owner) + 1, strlen(j->name) + 1, strlen(j->version) + 1, strlen(j->held) + 1, j->submission_size,
-				   j->plan_size}};
+			 .sizes = {strlen(j->owner) + 1, strlen(j->name) + 1, strlen(j->version) + 1,
+				   strlen(j->held) + 1, j->submission_size, j->plan_size}};
 	memcpy(h.magic, magic, sizeof magic);
 	spool_job_path(s, j->id, "order", name);
 	spool_job_path(s, j->id, "order.tmp", temporary);
@@ -75,10 +79,21 @@ static int read_pieces(struct checked_file *in, uint64_t job, struct row_file *o
 	for (int i = 0; i < 4; i++)
 		if (piece[i][h.sizes[i] - 1])
 			return error_set(e, EBADMSG, "%s: damaged", in->path);
-	out->job = (struct ledger_job){.id = h.id, .owner = piece[0], .name = piece[1], .version = piece[2], .held = piece[3],
-				       .extended = h.extended, .revision = h.revision, .priority = h.priority, .mixed = h.mixed,
-				       .submitted = h.submitted, .state = "live", .submission = (unsigned char *)piece[4],
-				       .plan = (unsigned char *)piece[5], .submission_size = h.sizes[4], .plan_size = h.sizes[5]};
+	out->job = (struct ledger_job){.id = h.id,
+				       .owner = piece[0],
+				       .name = piece[1],
+				       .version = piece[2],
+				       .held = piece[3],
+				       .extended = h.extended,
+				       .revision = h.revision,
+				       .priority = h.priority,
+				       .mixed = h.mixed,
+				       .submitted = h.submitted,
+				       .state = "live",
+				       .submission = (unsigned char *)piece[4],
+				       .plan = (unsigned char *)piece[5],
+				       .submission_size = h.sizes[4],
+				       .plan_size = h.sizes[5]};
 	return 0;
 }
 

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job's row of the ledger once more, in the job's own folder (jobs/jN/order): what the database has lost is made anew from it. Written
- * whenever the row has been, and after it, so that its revision is never above the row's unless the database went back. Any thread, one at a
- * time for a job.
+ * A job's row of the ledger once more, in the job's own folder (jobs/jN/order): what the database has lost is made anew
+ * from it. Written whenever the row has been, and after it, so that its revision is never above the row's unless the
+ * database went back. Any thread, one at a time for a job.
  */
 #ifndef COORDINATOR_STORE_ROW_FILE_H
 #define COORDINATOR_STORE_ROW_FILE_H

@@ -22,7 +22,8 @@ void seen_go_on(struct seen *now, const struct seen *last)
 
 size_t seen_to_text(const struct seen *s, char text[SEEN_TEXT])
 {
-	int n = snprintf(text, SEEN_TEXT, "seen %.3f up %.3f wall %.3f boot %s", s->seconds, s->up, s->wall, *s->boot ? s->boot : "-");
+	int n = snprintf(text, SEEN_TEXT, "seen %.3f up %.3f wall %.3f boot %s", s->seconds, s->up, s->wall,
+			 *s->boot ? s->boot : "-");
 	n += snprintf(text + n, SEEN_TEXT - (size_t)n, " crc32c %08x\n", (unsigned)crc32c(0, text, (size_t)n));
 	return (size_t)n;
 }

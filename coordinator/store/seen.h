@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Time that was seen to pass, in seconds: what the ages of finished jobs are made of. It grows by the clock of the machine since it was
- * started, which nobody sets, while it runs and from one life of the coordinator to the next. Where the machine has been started anew
- * in between, only the wall clock knows how long that took, and may be wrong: SEEN_CREDIT at most is believed. Pure.
+ * Time that was seen to pass, in seconds: what the ages of finished jobs are made of. It grows by the clock of the
+ * machine since it was started, which nobody sets, while it runs and from one life of the coordinator to the next.
+ * Where the machine has been started anew in between, only the wall clock knows how long that took, and may be wrong:
+ * SEEN_CREDIT at most is believed. Pure.
  */
 #ifndef COORDINATOR_STORE_SEEN_H
 #define COORDINATOR_STORE_SEEN_H
@@ -12,9 +13,9 @@
 enum { SEEN_CREDIT = 86400, SEEN_BOOT = 40, SEEN_TEXT = 256 };
 
 struct seen {
-	double seconds; /* seen so far, at this moment of the other two: */
-	double up;      /* s since the machine was started, those that it slept included */
-	double wall;    /* s since 1970 */
+	double seconds;	      /* seen so far, at this moment of the other two: */
+	double up;	      /* s since the machine was started, those that it slept included */
+	double wall;	      /* s since 1970 */
 	char boot[SEEN_BOOT]; /* the name that the kernel gave to this start */
 };
 

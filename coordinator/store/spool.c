@@ -85,9 +85,9 @@ static int read_file(const char *path, size_t most, char **text, size_t *size, s
 	while (bytes && *size < there && (n = disk_read(fd, bytes + *size, there - *size)) > 0)
 		*size += (size_t)n;
 	int rc = there >= most ? error_set(e, EFBIG, "%s: too long", path)
-		 : !bytes ? error_set(e, ENOMEM, "no memory to read %s", path)
-		 : n < 0 ? error_set(e, errno, "%s: %s", path, strerror(errno))
-			 : 0;
+		 : !bytes      ? error_set(e, ENOMEM, "no memory to read %s", path)
+		 : n < 0       ? error_set(e, errno, "%s: %s", path, strerror(errno))
+			       : 0;
 	disk_close(fd);
 	if (rc)
 		mem_free(bytes);
@@ -142,7 +142,8 @@ int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct erro
 	int rc = 0;
 	for (struct dirent *f; !rc && (f = readdir(d));)
 		if (is_job_folder(f->d_name, &id))
-			rc = add_id(ids, *count, id) ? ++*count, 0 : error_set(e, ENOMEM, "%s: no memory for its list", path);
+			rc = add_id(ids, *count, id) ? ++*count,
+			0			     : error_set(e, ENOMEM, "%s: no memory for its list", path);
 	closedir(d);
 	if (rc) {
 		mem_free(*ids);
@@ -307,8 +308,9 @@ int spool_check_version(const char got[8], const char known[8], const char *path
 		return error_set(e, EBADMSG, "%s: damaged", path);
 	if (memcmp(got + NAME, known + NAME, DIGITS) == 0)
 		return 0;
-	return error_set(e, EPROTO, "%s is of version %.3s, and version %.3s is known here: another coordinator wrote it", path, got + NAME,
-			 known + NAME);
+	return error_set(e, EPROTO,
+			 "%s is of version %.3s, and version %.3s is known here: another coordinator wrote it", path,
+			 got + NAME, known + NAME);
 }
 
 int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator's folder: lock, next-job, blobs/, canvas/, jobs.db, jobs/jN/{job.json, journal.G, checkpoint, order, result.exr,
- * preview.exr, log}. Names are flushed with their folders (common/base/disk.h). One coordinator a spool
- * (a lock that the kernel drops when its holder dies). Files appear whole: temporary file, fsync, rename, fsync of the
+ * The coordinator's folder: lock, next-job, blobs/, canvas/, jobs.db, jobs/jN/{job.json, journal.G, checkpoint, order,
+ * result.exr, preview.exr, log}. Names are flushed with their folders (common/base/disk.h). One coordinator a spool (a
+ * lock that the kernel drops when its holder dies). Files appear whole: temporary file, fsync, rename, fsync of the
  * folder. spool_write from any thread (of different files); the rest from one.
  */
 #ifndef COORDINATOR_STORE_SPOOL_H
@@ -27,7 +27,8 @@ int spool_take_job(struct spool *s, uint64_t id, struct error *e);
 const char *spool_blobs(const struct spool *s);
 const char *spool_canvas(const struct spool *s);
 enum { SPOOL_PATH_MAX = 4096 };
-void spool_path(const struct spool *s, const char *name, char path[SPOOL_PATH_MAX]); /* name in the spool's own folder */
+void spool_path(const struct spool *s, const char *name,
+		char path[SPOOL_PATH_MAX]); /* name in the spool's own folder */
 void spool_job_path(const struct spool *s, uint64_t id, const char *file, char path[SPOOL_PATH_MAX]);
 
 int spool_write(const struct spool *s, uint64_t id, const char *file, const void *bytes, size_t size, struct error *e);
@@ -39,8 +40,8 @@ int spool_rename(const char *from, const char *to, const char *folder, struct er
 int spool_write_record(const struct spool *s, const struct job_record *r, struct error *e);
 /* -ENOENT: there is no such job. */
 int spool_read_record(const struct spool *s, uint64_t id, struct job_record *r, struct error *e);
-/* The first bytes of a file: a name and three digits, its version, in all versions. -EBADMSG: another name; -EPROTO, with a sentence:
- * another version. Any thread. */
+/* The first bytes of a file: a name and three digits, its version, in all versions. -EBADMSG: another name; -EPROTO,
+ * with a sentence: another version. Any thread. */
 int spool_check_version(const char got[8], const char known[8], const char *path, struct error *e);
 /* All ids that have a folder, ascending; mem_alloc'd, NULL: none. */
 int spool_jobs(const struct spool *s, uint64_t **ids, size_t *count, struct error *e);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Instructions a mutation (callgrind), of whole renders of two lengths, so that building and the bootstrap fall out: for each
- * effect in a scene that calls for it, as it is and with the effect forced off; in a scene that does not, as it is and forced
- * on; and where colour, dispersion and aperture are off, against a renderer compiled without them (make plain). Counts of one
- * thread of one plan: they do not vary from run to run.
+ * Instructions a mutation (callgrind), of whole renders of two lengths, so that building and the bootstrap fall out:
+ * for each effect in a scene that calls for it, as it is and with the effect forced off; in a scene that does not, as
+ * it is and forced on; and where colour, dispersion and aperture are off, against a renderer compiled without them
+ * (make plain). Counts of one thread of one plan: they do not vary from run to run.
  */
 #include "tests/bench/bench.h"
 
@@ -23,10 +23,11 @@ static double instructions(const char *bin, const char *how, unsigned steps)
 {
 	char line[4096], text[512];
 	const char *folder = getenv("TMPDIR");
-	snprintf(line, sizeof line,
-		 "valgrind --tool=callgrind --callgrind-out-file=/dev/null %s/hslt-render -o %s/hslt-bench-effects-%d.exr --quiet --threads 1 "
-		 "--chains %d --groups %d --bootstrap 1024 --epoch %d --mutations %u %s 2>&1",
-		 bin, folder ? folder : "/tmp", (int)getpid(), CHAINS, CHAINS, SHORT, CHAINS * steps, how);
+	snprintf(
+		line, sizeof line,
+		"valgrind --tool=callgrind --callgrind-out-file=/dev/null %s/hslt-render -o %s/hslt-bench-effects-%d.exr --quiet --threads 1 "
+		"--chains %d --groups %d --bootstrap 1024 --epoch %d --mutations %u %s 2>&1",
+		bin, folder ? folder : "/tmp", (int)getpid(), CHAINS, CHAINS, SHORT, CHAINS * steps, how);
 	FILE *out = popen(line, "r");
 	double count = NAN;
 	while (out && fgets(text, sizeof text, out)) {
@@ -49,7 +50,7 @@ static double a_mutation(const char *bin, const char *how)
 
 static const struct {
 	const char *effect, *on, *off; /* scenes that call for it, and that do not */
-	bool may_go;                   /* it can be forced off */
+	bool may_go;		       /* it can be forced off */
 } rows[] = {
 	{"colour", BOX COLOURED, BOX, false},
 	{"wavelength", BOX COLOURED, BOX, true},
@@ -95,7 +96,8 @@ static void by_hand(const char *bin)
 	char how[512];
 	snprintf(how, sizeof how, "%s%s", BOX, mixture);
 	double chosen = a_mutation(bin, BOX), hand = a_mutation(bin, how);
-	bench_single("strategies left out: against a mixture by hand without them", 100 * fabs(chosen / hand - 1), "%", BENCH_AT_MOST, 1);
+	bench_single("strategies left out: against a mixture by hand without them", 100 * fabs(chosen / hand - 1), "%",
+		     BENCH_AT_MOST, 1);
 }
 
 /* Colour, dispersion and aperture off, against a renderer without a question about them. */
@@ -117,7 +119,9 @@ static void unknown(const char *bin)
 		return;
 	}
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++)
-		bench_single(scenes[i].name, 100 * (a_mutation(bin, scenes[i].how) / a_mutation(plain, scenes[i].how) - 1), "%", BENCH_AT_MOST, 1);
+		bench_single(scenes[i].name,
+			     100 * (a_mutation(bin, scenes[i].how) / a_mutation(plain, scenes[i].how) - 1), "%",
+			     BENCH_AT_MOST, 1);
 }
 
 void bench_effects(const char *bin)

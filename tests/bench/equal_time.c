@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Relative errors squared times CPU seconds, one thread, pilot and bootstrap included: the default against hslt, pssmlt, bdpt and path,
- * and the breakup against its two parts unbroken, each with several seeds, with and without the worst pixels. The reference is a long
- * render by what the default chooses, kept in build/bench-references (the error that it has itself is taken off, pixel by pixel).
- * HSLT_BENCH_SECONDS: other than 10 for each picture; references take ten times that. HSLT_BENCH_SEEDS: other than 5.
- * HSLT_BENCH_METHODS: only the first so many.
+ * Relative errors squared times CPU seconds, one thread, pilot and bootstrap included: the default against hslt,
+ * pssmlt, bdpt and path, and the breakup against its two parts unbroken, each with several seeds, with and without the
+ * worst pixels. The reference is a long render by what the default chooses, kept in build/bench-references (the error
+ * that it has itself is taken off, pixel by pixel). HSLT_BENCH_SECONDS: other than 10 for each picture; references take
+ * ten times that. HSLT_BENCH_SEEDS: other than 5. HSLT_BENCH_METHODS: only the first so many.
  */
 #include "common/base/mem.h"
 #include "common/film/image_file.h"
@@ -70,8 +70,13 @@ static void shoot(const struct world *w, const struct method *m, uint64_t spp, u
 	struct render_summary s;
 	struct plan p;
 	world_summary(w, &s);
-	struct plan_request r = {.width = s.settings.width, .height = s.settings.height, .border = s.settings.border, .min_depth = 1,
-				 .max_depth = s.settings.max_depth, .spp = spp, .seed = seed};
+	struct plan_request r = {.width = s.settings.width,
+				 .height = s.settings.height,
+				 .border = s.settings.border,
+				 .min_depth = 1,
+				 .max_depth = s.settings.max_depth,
+				 .spp = spp,
+				 .seed = seed};
 	snprintf(r.integrator, sizeof r.integrator, "%s", m->integrator);
 	double begin = bench_cpu_seconds();
 	const struct render_integrator *face = render_integrator_find(m->integrator);
@@ -96,7 +101,8 @@ static void shoot(const struct world *w, const struct method *m, uint64_t spp, u
 }
 
 /* As many samples a pixel as take about that long. */
-static uint64_t shoot_for(const struct world *w, const struct method *m, double seconds, uint64_t seed, struct shot *out)
+static uint64_t shoot_for(const struct world *w, const struct method *m, double seconds, uint64_t seed,
+			  struct shot *out)
 {
 	for (uint64_t spp = 1;;) {
 		shoot(w, m, spp, seed, out);
@@ -119,7 +125,8 @@ static bool read_reference(const char *path, struct canvas_image *i)
 {
 	size_t n = reference_size(i);
 	FILE *f = fopen(path, "rb");
-	bool ok = f && i->error && fread(i->rgb, sizeof(float), n, f) == n && fread(i->error, sizeof(float), n, f) == n && fgetc(f) == EOF;
+	bool ok = f && i->error && fread(i->rgb, sizeof(float), n, f) == n &&
+		  fread(i->error, sizeof(float), n, f) == n && fgetc(f) == EOF;
 	if (f)
 		fclose(f);
 	return ok;
@@ -167,8 +174,9 @@ static double *doubles(size_t n)
 	return p;
 }
 
-/* What squared errors are measured by, as in worker/cli/compare.h, but for the mean of the reference around each pixel instead
- * of the pixel itself: hard scenes leave a reference noisy, and where it happens to be dark all would look wrong. */
+/* What squared errors are measured by, as in worker/cli/compare.h, but for the mean of the reference around each pixel
+ * instead of the pixel itself: hard scenes leave a reference noisy, and where it happens to be dark all would look
+ * wrong. */
 static double *scales_of(const struct canvas_image *r)
 {
 	int width = (int)r->width, height = (int)r->height;
@@ -205,7 +213,8 @@ static double relative(const struct canvas_image *i, const double *square, const
 }
 
 /* By how far the image is from the reference, without the reference's own part. */
-static double error_by_reference(const struct canvas_image *a, const struct canvas_image *r, const double *scale, double trim)
+static double error_by_reference(const struct canvas_image *a, const struct canvas_image *r, const double *scale,
+				 double trim)
 {
 	double *square = doubles(reference_size(r));
 	for (size_t i = 0; i < reference_size(r); i++) {
@@ -240,7 +249,7 @@ static double brightness(const struct canvas_image *i)
 struct trial {
 	uint64_t spp;
 	double value[2][SEEDS_MOST], mean[2], brightness, by_spread;
-	double pilot;                  /* its share of the CPU seconds */
+	double pilot;		     /* its share of the CPU seconds */
 	char chosen[SEEDS_MOST][16]; /* integrators */
 };
 
@@ -274,8 +283,8 @@ static double student_95(double degrees)
 	return high;
 }
 
-/* Mean of the first over that of the second, with a 95 % interval: of the ratio's logarithm, by the spread between seeds, which both
- * share, as they share the minute in which they were rendered. */
+/* Mean of the first over that of the second, with a 95 % interval: of the ratio's logarithm, by the spread between
+ * seeds, which both share, as they share the minute in which they were rendered. */
 static void print_ratio(const char *says, const struct trial *a, const struct trial *b, int t, unsigned seeds)
 {
 	double ratio = a->mean[t] / b->mean[t], square = 0;
@@ -291,14 +300,16 @@ static void print_trials(const struct trial *of, size_t count, unsigned seeds)
 {
 	printf("  %-10s %14s %14s %14s %10s\n", "relMSE x s", "all pixels", "trimmed", "by spread", "mean");
 	for (size_t i = 0; i < count; i++)
-		printf("  %-10s %14.5g %14.5g %14.5g %10.4f\n", methods[i].name, of[i].mean[0], of[i].mean[1], of[i].by_spread, of[i].brightness);
+		printf("  %-10s %14.5g %14.5g %14.5g %10.4f\n", methods[i].name, of[i].mean[0], of[i].mean[1],
+		       of[i].by_spread, of[i].brightness);
 	printf("  chosen by the default:");
 	for (unsigned k = 0; k < seeds; k++)
 		printf(" %s", of[DEFAULT].chosen[k]);
 	printf("; its pilot took %.1f %% of the time\n", 100 * of[DEFAULT].pilot);
 }
 
-static void compare_all(const struct world *w, const struct trial_scene *s, double seconds, unsigned seeds, size_t count)
+static void compare_all(const struct world *w, const struct trial_scene *s, double seconds, unsigned seeds,
+			size_t count)
 {
 	struct shot reference;
 	static struct trial of[METHODS];
@@ -315,9 +326,11 @@ static void compare_all(const struct world *w, const struct trial_scene *s, doub
 	print_trials(of, count, seeds);
 	for (int t = 0; t < 2 && count > 1; t++) {
 		char says[80];
-		snprintf(says, sizeof says, "default over the best, %s (%s)", t ? "trimmed" : "all pixels", methods[best[t]].name);
+		snprintf(says, sizeof says, "default over the best, %s (%s)", t ? "trimmed" : "all pixels",
+			 methods[best[t]].name);
 		print_ratio(says, &of[DEFAULT], &of[best[t]], t, seeds);
-		bench_single(t ? "default / best, trimmed" : "default / best", of[DEFAULT].mean[t] / of[best[t]].mean[t], "of the time", BENCH_INFORMS, 0);
+		bench_single(t ? "default / best, trimmed" : "default / best",
+			     of[DEFAULT].mean[t] / of[best[t]].mean[t], "of the time", BENCH_INFORMS, 0);
 	}
 	printf("  the reference's own relMSE: %.3g\n", error_by_spread(&reference.image, scale));
 	fflush(stdout);
@@ -326,7 +339,8 @@ static void compare_all(const struct world *w, const struct trial_scene *s, doub
 	for (size_t i = 0; i < count; i++)
 		bench_single(methods[i].name, of[i].mean[1], "relMSE s, trimmed", BENCH_INFORMS, 0);
 	if (count > UNBROKEN)
-		bench_single("breakup / unbroken", of[BREAKUP].mean[1] / of[UNBROKEN].mean[1], "of the time", BENCH_INFORMS, 0);
+		bench_single("breakup / unbroken", of[BREAKUP].mean[1] / of[UNBROKEN].mean[1], "of the time",
+			     BENCH_INFORMS, 0);
 }
 
 /* A whole number of the environment, within 1 and most; else the default. */
@@ -342,14 +356,16 @@ void bench_equal_time(const char *bin)
 	(void)bin;
 	const char *time = getenv("HSLT_BENCH_SECONDS"), *only = getenv("HSLT_BENCH_SCENE");
 	double seconds = time ? atof(time) : 10;
-	unsigned seeds = asked("HSLT_BENCH_SEEDS", 5, SEEDS_MOST), count = asked("HSLT_BENCH_METHODS", METHODS, METHODS);
+	unsigned seeds = asked("HSLT_BENCH_SEEDS", 5, SEEDS_MOST),
+		 count = asked("HSLT_BENCH_METHODS", METHODS, METHODS);
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
 		const struct trial_scene *s = &scenes[i];
 		const struct render_options size = {.width = s->width, .height = s->height};
 		char says[128];
 		if (only && strcmp(only, s->name) != 0)
 			continue;
-		snprintf(says, sizeof says, "%s, %ux%u, %g CPU seconds and %u seeds each", s->name, s->width, s->height, seconds, seeds);
+		snprintf(says, sizeof says, "%s, %ux%u, %g CPU seconds and %u seeds each", s->name, s->width, s->height,
+			 seconds, seeds);
 		bench_group("equal-time", says);
 		struct world *w = bench_world(s->file, s->shipped, &size);
 		if (!w) {

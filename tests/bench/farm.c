@@ -23,8 +23,8 @@ static void start_coordinator(struct farm *f)
 	snprintf(port_file, sizeof port_file, "%s/port", f->folder);
 	unlink(port_file);
 	process_start(&f->coordinator, f->bin, f->log,
-		      "hslt-coordinator --listen 127.0.0.1:0 --port-file %s --spool %s/spool --status-socket %s/status", port_file,
-		      f->folder, f->folder);
+		      "hslt-coordinator --listen 127.0.0.1:0 --port-file %s --spool %s/spool --status-socket %s/status",
+		      port_file, f->folder, f->folder);
 	for (int i = 0; i < 200 && !strchr(port, '\n'); i++) {
 		usleep(50000);
 		FILE *file = fopen(port_file, "r");
@@ -49,8 +49,9 @@ static void farm_start(struct farm *f, const char *bin, int workers)
 	snprintf(f->log, sizeof f->log, "%s/log", f->folder);
 	start_coordinator(f);
 	for (int i = 0; i < workers; i++)
-		process_start(&f->worker[i], bin, f->log, "hslt-worker --coordinator %s --threads 1 --name w%d --cache %s/cache",
-			      f->address, i, f->folder);
+		process_start(&f->worker[i], bin, f->log,
+			      "hslt-worker --coordinator %s --threads 1 --name w%d --cache %s/cache", f->address, i,
+			      f->folder);
 }
 
 static void farm_stop(struct farm *f)
@@ -67,8 +68,8 @@ static void farm_stop(struct farm *f)
 
 static void start_submit(const struct farm *f, struct process *p, const char *scene, const char *options)
 {
-	process_start(p, f->bin, f->log, "hslt-submit --coordinator %s %s -o %s/farm.exr --wait %s", f->address, scene, f->folder,
-		      options);
+	process_start(p, f->bin, f->log, "hslt-submit --coordinator %s %s -o %s/farm.exr --wait %s", f->address, scene,
+		      f->folder, options);
 }
 
 static void submit(const struct farm *f, const char *scene, const char *options)
@@ -80,8 +81,8 @@ static void submit(const struct farm *f, const char *scene, const char *options)
 
 static void start_render(const struct farm *f, struct process *p, const char *options, int which)
 {
-	process_start(p, f->bin, f->log, "hslt-render %s -o %s/render%d.exr --threads 1 %s", bench_box_file(), f->folder, which,
-		      options);
+	process_start(p, f->bin, f->log, "hslt-render %s -o %s/render%d.exr --threads 1 %s", bench_box_file(),
+		      f->folder, which, options);
 }
 
 /* 32 mutations a pixel, a fast preview: longer jobs send less for each mutation. */
@@ -152,7 +153,8 @@ static void coordinator_memory(const char *bin)
 	double films = 16 * 3 * 8.0 * 3 * 128 * 128, few = coordinator_peak(bin, SMALL "--spp 48"),
 	       many = coordinator_peak(bin, SMALL "--spp 1536");
 	bench_single("coordinator's peak, 3 rounds of leases", 1e-6 * few, "MB", BENCH_INFORMS, 0);
-	bench_single("coordinator's peak, 96 rounds of leases", 1e-6 * many, "MB", BENCH_AT_MOST, 1e-6 * (100e6 + films));
+	bench_single("coordinator's peak, 96 rounds of leases", 1e-6 * many, "MB", BENCH_AT_MOST,
+		     1e-6 * (100e6 + films));
 	bench_single("growth from 3 to 96 rounds", 1e-6 * (many - few), "MB", BENCH_AT_MOST, 2);
 }
 
@@ -161,7 +163,8 @@ static double mesh_bytes(const struct world *w)
 	double sum = 0;
 	for (uint32_t i = 0; i < w->shape_count; i++) {
 		const struct geom_shape *g = &w->shapes[i];
-		size_t vertex = sizeof g->position[0] + (g->normal ? sizeof g->normal[0] : 0) + (g->uv ? sizeof g->uv[0] : 0);
+		size_t vertex =
+			sizeof g->position[0] + (g->normal ? sizeof g->normal[0] : 0) + (g->uv ? sizeof g->uv[0] : 0);
 		sum += (double)g->vertex_count * (double)vertex + (double)g->triangle_count * sizeof g->index[0];
 	}
 	return sum;
@@ -172,7 +175,8 @@ static void worker_memory(const char *bin)
 	struct farm f;
 	char scene[128];
 	struct world *w = bench_world_million();
-	double embree = (double)accel_bytes(w->accel), building = (double)accel_peak_bytes(w->accel), meshes = mesh_bytes(w);
+	double embree = (double)accel_bytes(w->accel), building = (double)accel_peak_bytes(w->accel),
+	       meshes = mesh_bytes(w);
 	double pixels = (double)w->settings.width * w->settings.height, films = pixels * (24 + 12);
 	world_free(w);
 	farm_start(&f, bin, 1);
@@ -197,7 +201,8 @@ static void worker_memory(const char *bin)
 	bench_single("of it: Embree's own while it builds", 1e-6 * building, "MB", BENCH_INFORMS, 0);
 	bench_single("of it: meshes", 1e-6 * meshes, "MB", BENCH_INFORMS, 0);
 	bench_single("of it: a lease's film and tiles", 1e-6 * films, "MB", BENCH_INFORMS, 0);
-	bench_single("size / (Embree + meshes + films)", 1e6 * series_median(&size) / (embree + own), "", BENCH_AT_MOST, 1.2);
+	bench_single("size / (Embree + meshes + films)", 1e6 * series_median(&size) / (embree + own), "", BENCH_AT_MOST,
+		     1.2);
 	bench_single("peak / (Embree building + meshes + films)", peak / (building + own), "", BENCH_AT_MOST, 1.2);
 	farm_stop(&f);
 }

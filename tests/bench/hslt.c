@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What HSLT's mutations cost: how many are made in the CPU time in which Embree alone casts a million rays, rays, acceptance,
- * walks that fail; the share of time inside Embree; the breakup against its two parts unbroken.
+ * What HSLT's mutations cost: how many are made in the CPU time in which Embree alone casts a million rays, rays,
+ * acceptance, walks that fail; the share of time inside Embree; the breakup against its two parts unbroken.
  */
 #include "tests/bench/bench.h"
 #include "tests/bench/scenes.h"
@@ -62,8 +62,8 @@ static struct figures run(const struct subject *s)
 static void measure_rate(struct world *w, const struct reference *r)
 {
 	struct subject mixture, alone;
-	struct series rate = {0}, pure = {0}, embree = {0}, rays = {0}, accepted = {0}, failed = {0}, occluded = {0}, back = {0},
-		      micro = {0};
+	struct series rate = {0}, pure = {0}, embree = {0}, rays = {0}, accepted = {0}, failed = {0}, occluded = {0},
+		      back = {0}, micro = {0};
 	subject_make(&mixture, w, "hslt", NULL);
 	subject_make(&alone, w, "hslt", ALONE);
 	for (unsigned i = 0; i < BENCH_REPEATS; i++) {
@@ -110,7 +110,8 @@ static void measure_share(struct world *w, double least_share)
 		series_add(&outside, 1e6 * (f.seconds - alone) / f.mutations);
 		series_add(&rays, f.rays / f.mutations);
 	}
-	bench_row("share of the time inside Embree", &share, "", least_share > 0 ? BENCH_AT_LEAST : BENCH_INFORMS, least_share);
+	bench_row("share of the time inside Embree", &share, "", least_share > 0 ? BENCH_AT_LEAST : BENCH_INFORMS,
+		  least_share);
 	bench_row("outside Embree", &outside, "us/mutation", BENCH_INFORMS, 0);
 	if (least_share > 0)
 		bench_row("rays", &rays, "/mutation", BENCH_INFORMS, 0);

@@ -67,8 +67,8 @@ void bench_row(const char *name, const struct series *s, const char *unit, enum 
 		printf("   (target %s %g: %s)", sign[kind], target, met ? "met" : "MISSED");
 	printf("\n");
 	fflush(stdout);
-	json_t *row = json_pack("{s:s, s:s, s:f, s:f, s:f, s:i, s:s}", "group", group, "name", name, "median", m, "low", low, "high",
-				high, "repeats", (int)t.count, "unit", unit);
+	json_t *row = json_pack("{s:s, s:s, s:f, s:f, s:f, s:i, s:s}", "group", group, "name", name, "median", m, "low",
+				low, "high", high, "repeats", (int)t.count, "unit", unit);
 	if (kind != BENCH_INFORMS) {
 		json_object_set_new(row, "target", json_real(target));
 		json_object_set_new(row, "bound", json_string(sign[kind]));
@@ -100,9 +100,9 @@ static const struct {
 	void (*run)(const char *bin);
 	bool when_named; /* not with all */
 } benches[] = {
-	{"rays", bench_rays, false},   {"hslt", bench_hslt, false}, {"equal-time", bench_equal_time, true}, {"tiles", bench_tiles, false},
-	{"parts", bench_parts, false}, {"farm", bench_farm, false}, {"memory", bench_memory, false},
-	{"effects", bench_effects, true},
+	{"rays", bench_rays, false},	 {"hslt", bench_hslt, false},	   {"equal-time", bench_equal_time, true},
+	{"tiles", bench_tiles, false},	 {"parts", bench_parts, false},	   {"farm", bench_farm, false},
+	{"memory", bench_memory, false}, {"effects", bench_effects, true},
 };
 
 static bool chosen(const char *name, bool when_named, char **names, int count)

@@ -79,7 +79,8 @@ static void reap(struct process *p)
 	}
 	remember(p->pid, 0);
 	p->pid = 0;
-	p->cpu_seconds = (double)(r.ru_utime.tv_sec + r.ru_stime.tv_sec) + 1e-6 * (double)(r.ru_utime.tv_usec + r.ru_stime.tv_usec);
+	p->cpu_seconds = (double)(r.ru_utime.tv_sec + r.ru_stime.tv_sec) +
+			 1e-6 * (double)(r.ru_utime.tv_usec + r.ru_stime.tv_usec);
 	p->peak_bytes = 1024 * (double)r.ru_maxrss;
 	p->code = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
 }

@@ -11,7 +11,7 @@
 enum { PROCESS_ARGS = 32 };
 
 struct process {
-	pid_t pid; /* 0: ended */
+	pid_t pid;			/* 0: ended */
 	double cpu_seconds, peak_bytes; /* of an ended one */
 	int code;
 };
@@ -19,8 +19,8 @@ struct process {
 /* BIN/name is there. */
 bool process_exists(const char *bin, const char *name);
 /* line: the program's name in BIN and its arguments, separated by spaces; its output goes into LOG. */
-__attribute__((format(printf, 4, 5))) void process_start(struct process *p, const char *bin, const char *log, const char *format,
-							  ...);
+__attribute__((format(printf, 4, 5))) void process_start(struct process *p, const char *bin, const char *log,
+							 const char *format, ...);
 /* Waits; ends the bench when the exit code is not 0. */
 void process_wait(struct process *p);
 void process_stop(struct process *p); /* SIGTERM, waits */

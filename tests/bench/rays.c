@@ -52,7 +52,8 @@ void bench_rays(const char *bin)
 	struct world *w = bench_world_million();
 	world_summary(w, &summary);
 	char says[96];
-	snprintf(says, sizeof says, "%.2f million triangles, diffuse and glossy, area lights", 1e-6 * (double)summary.triangles);
+	snprintf(says, sizeof says, "%.2f million triangles, diffuse and glossy, area lights",
+		 1e-6 * (double)summary.triangles);
 	bench_group("million", says);
 	measure(w, "path", 0.6);
 	world_free(w);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The rays that the renderer sends through the door (worker/geom/accel.h), kept to be sent again, and how its walks in half
- * vector space end. The bench is linked with --wrap for these functions, so that the renderer itself knows nothing of it.
- * One thread.
+ * The rays that the renderer sends through the door (worker/geom/accel.h), kept to be sent again, and how its walks in
+ * half vector space end. The bench is linked with --wrap for these functions, so that the renderer itself knows nothing
+ * of it. One thread.
  */
 #ifndef TESTS_BENCH_RECORD_H
 #define TESTS_BENCH_RECORD_H

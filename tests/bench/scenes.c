@@ -71,9 +71,11 @@ static void ball(double u, double v, double p[3])
 	p[2] = -r * sin(theta) * sin(phi) - 0.4;
 }
 
+/* clang-format off */
 #define LAMP(x)                                                                                                                 \
 	"<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' angle='90'/><translate x='" x    \
 	"' y='1.9'/></transform><emitter type='area'><rgb name='radiance' value='12,11,9'/></emitter></shape>"
+/* clang-format on */
 
 static const char million_xml[] =
 	"<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='8'/></integrator>"
@@ -85,7 +87,8 @@ static const char million_xml[] =
 	"<shape type='obj'><string name='filename' value='hills.obj'/><bsdf type='diffuse'><rgb name='reflectance' "
 	"value='0.3,0.5,0.2'/></bsdf></shape>"
 	"<shape type='obj'><string name='filename' value='ball.obj'/><bsdf type='roughconductor'><string name='material' value='Au'/>"
-	"<string name='distribution' value='ggx'/><float name='alpha' value='0.2'/></bsdf></shape>" LAMP("-1") LAMP("1") "</scene>";
+	"<string name='distribution' value='ggx'/><float name='alpha' value='0.2'/></bsdf></shape>" LAMP("-1")
+		LAMP("1") "</scene>";
 
 static struct world *build_with(const struct asset_source *assets, const char *file, const struct render_options *o,
 				const struct scene_define *defines, uint32_t define_count)
@@ -165,7 +168,8 @@ struct world *bench_world_box(const char **name)
 	snprintf(folder, sizeof folder, "%s", bench_box_file());
 	char *slash = strrchr(folder, '/');
 	*slash = 0;
-	*name = strstr(folder, "cornell-box") ? "cornell-box" : "the box of tests/scenes (HSLT_SCENES names no cornell-box)";
+	*name = strstr(folder, "cornell-box") ? "cornell-box"
+					      : "the box of tests/scenes (HSLT_SCENES names no cornell-box)";
 	struct asset_source assets = asset_folder(folder);
 	struct render_options small = {.width = 160, .height = 160};
 	return build(&assets, slash + 1, &small);

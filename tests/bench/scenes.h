@@ -5,7 +5,8 @@
 
 #include "worker/render/render.h"
 
-/* A room of walls, a hilly floor (diffuse) and a dented ball (rough gold) of half a million triangles each, two lamps. */
+/* A room of walls, a hilly floor (diffuse) and a dented ball (rough gold) of half a million triangles each, two lamps.
+ */
 struct world *bench_world_million(void);
 /* The same as files: FOLDER/million.xml and its meshes. */
 void bench_write_million(const char *folder);
@@ -13,8 +14,8 @@ void bench_write_million(const char *folder);
 struct world *bench_world_box(const char **name);
 /* Folder and file of that scene. */
 const char *bench_box_file(void);
-/* shipped: a scene of the project. Else one of the folder that HSLT_SCENES names; NULL: it is not set, or there is no such
- * file. o may be NULL. */
+/* shipped: a scene of the project. Else one of the folder that HSLT_SCENES names; NULL: it is not set, or there is no
+ * such file. o may be NULL. */
 struct world *bench_world(const char *path, bool shipped, const struct render_options *o);
 /* tests/scenes/displaced with a million triangles. */
 struct world *bench_world_displaced(void);

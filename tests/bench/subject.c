@@ -87,9 +87,19 @@ void subject_make(struct subject *s, struct world *w, const char *integrator, co
 	const struct render_integrator *i = render_integrator_find(integrator);
 	const struct scene_settings *set = &w->settings;
 	*s = (struct subject){.w = w, .key = {1, LEASE_RENDER, 0, 0, 0}};
-	s->plan = (struct plan){.kind = i->kind, .width = set->width, .height = set->height, .crop_width = set->width,
-				.crop_height = set->height, .border = set->border, .groups = 1, .parts = 1, .rounds = 1,
-				.bootstrap = BOOTSTRAP, .min_depth = 1, .max_depth = set->max_depth, .epoch = 1};
+	s->plan = (struct plan){.kind = i->kind,
+				.width = set->width,
+				.height = set->height,
+				.crop_width = set->width,
+				.crop_height = set->height,
+				.border = set->border,
+				.groups = 1,
+				.parts = 1,
+				.rounds = 1,
+				.bootstrap = BOOTSTRAP,
+				.min_depth = 1,
+				.max_depth = set->max_depth,
+				.epoch = 1};
 	snprintf(s->plan.integrator, sizeof s->plan.integrator, "%s", integrator);
 	if (i->has_mutations)
 		choose_mutations(s, mutations);
@@ -138,8 +148,8 @@ static void add_sphere(RTCDevice device, RTCScene scene, vec3 center, double rad
 static void add_triangles(RTCDevice device, RTCScene scene, const struct geom_shape *s)
 {
 	RTCGeometry g = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, s->position, 0, sizeof s->position[0],
-				   s->vertex_count);
+	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, s->position, 0,
+				   sizeof s->position[0], s->vertex_count);
 	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, s->index, 0, sizeof s->index[0],
 				   s->triangle_count);
 	attach(scene, g);
@@ -271,8 +281,8 @@ static struct small *make_small(void)
 		rng_uniform4(0, RNG_TEST, i, 0, 0, u);
 		rng_uniform4(0, RNG_TEST, i, 1, 0, v);
 		double z = 2 * v[0] - 1, r = sqrt(1 - z * z), phi = 2 * M_PI * v[1];
-		s->ray[i] = raw_ray((vec3){8 * u[0] - 4, 4 * u[1] - 2, 0.05 + 4 * u[2]}, (vec3){r * cos(phi), r * sin(phi), z}, 0,
-				    (double)FLT_MAX);
+		s->ray[i] = raw_ray((vec3){8 * u[0] - 4, 4 * u[1] - 2, 0.05 + 4 * u[2]},
+				    (vec3){r * cos(phi), r * sin(phi), z}, 0, (double)FLT_MAX);
 	}
 	return s;
 }

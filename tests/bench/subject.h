@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A lease of an integrator that can be run again and again, the rays that it sends through the door (worker/geom/accel.h), and
- * the same rays for Embree alone: a scene of its own (robust, no filters, the same triangles, Embree's spheres). One thread.
+ * A lease of an integrator that can be run again and again, the rays that it sends through the door
+ * (worker/geom/accel.h), and the same rays for Embree alone: a scene of its own (robust, no filters, the same
+ * triangles, Embree's spheres). One thread.
  */
 #ifndef TESTS_BENCH_SUBJECT_H
 #define TESTS_BENCH_SUBJECT_H
@@ -20,8 +21,8 @@ struct subject {
 	size_t count; /* of rays */
 };
 
-/* Samples a pixel or mutations a chain such that about 2^19 rays are traced. mutations: of integrators that have them; NULL:
- * what suits the scene. The world stays the caller's. */
+/* Samples a pixel or mutations a chain such that about 2^19 rays are traced. mutations: of integrators that have them;
+ * NULL: what suits the scene. The world stays the caller's. */
 void subject_make(struct subject *s, struct world *w, const char *integrator, const char *mutations);
 void subject_release(struct subject *s);
 
@@ -35,10 +36,11 @@ uint64_t subject_render(const struct subject *s);
 
 /* Keeps the rays of one run, and builds Embree's scene. */
 void subject_record(struct subject *s);
-double subject_replay_raw(const struct subject *s);  /* CPU seconds */
+double subject_replay_raw(const struct subject *s); /* CPU seconds */
 double subject_replay_door(const struct subject *s);
 
-/* CPU seconds in which Embree alone finds the closest hits of a million incoherent rays among 2 triangles and 3 spheres. */
+/* CPU seconds in which Embree alone finds the closest hits of a million incoherent rays among 2 triangles and 3
+ * spheres. */
 double subject_million_rays(void);
 
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What the coordinator does with each pixel of a partial result: decode the EXR tiles, check the batch, add it to the film. */
+/* What the coordinator does with each pixel of a partial result: decode the EXR tiles, check the batch, add it to the
+ * film. */
 #include "common/base/mem.h"
 #include "common/film/canvas.h"
 #include "common/film/exr.h"
@@ -36,7 +37,8 @@ struct times {
 	double decode, check, add;
 };
 
-static void merge_one(struct canvas *c, const struct plan *p, const struct wire_tile *wire, struct lease_key key, struct times *t)
+static void merge_one(struct canvas *c, const struct plan *p, const struct wire_tile *wire, struct lease_key key,
+		      struct times *t)
 {
 	static struct tile tiles[TILES];
 	struct error e;
@@ -65,8 +67,17 @@ void bench_tiles(const char *bin)
 {
 	(void)bin;
 	static struct wire_tile wire[TILES];
-	struct plan p = {.integrator = "path", .kind = PLAN_SAMPLES, .width = SIDE, .height = SIDE, .crop_width = SIDE,
-			 .crop_height = SIDE, .groups = GROUPS, .parts = PARTS, .epoch = 1, .rounds = 1 << 20, .min_depth = 1,
+	struct plan p = {.integrator = "path",
+			 .kind = PLAN_SAMPLES,
+			 .width = SIDE,
+			 .height = SIDE,
+			 .crop_width = SIDE,
+			 .crop_height = SIDE,
+			 .groups = GROUPS,
+			 .parts = PARTS,
+			 .epoch = 1,
+			 .rounds = 1 << 20,
+			 .min_depth = 1,
 			 .max_depth = 8};
 	struct canvas *c;
 	struct error e;
@@ -74,7 +85,9 @@ void bench_tiles(const char *bin)
 	write_tiles(wire);
 	if (canvas_new(&c, &p, -30, NULL, &e))
 		bench_die(&e);
-	bench_group("tiles", "decoding, checking and adding full tiles, 3 float channels, one core; each round's closing included");
+	bench_group(
+		"tiles",
+		"decoding, checking and adding full tiles, 3 float channels, one core; each round's closing included");
 	struct series all = {0}, decode = {0}, check = {0}, add = {0};
 	for (uint64_t round = 0; round < 2 + BENCH_REPEATS; round++) {
 		struct times t = {0};

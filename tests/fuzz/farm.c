@@ -67,7 +67,8 @@ int farm_world_open(struct farm_world *w, struct error *e)
 	c.status_socket = socket_path;
 	c.journal_bytes = 1 << 12; /* so that there are checkpoints */
 	c.max_connections = 16;
-	c.heartbeat_seconds = c.hello_seconds = c.stall_seconds = 3600; /* what is found must not depend on the machine's load */
+	c.heartbeat_seconds = c.hello_seconds = c.stall_seconds =
+		3600; /* what is found must not depend on the machine's load */
 	for (unsigned i = 0; i < FARM_PEERS; i++)
 		w->peers[i].fd = -1;
 	int rc = server_open(&w->server, &c, e);
@@ -147,7 +148,8 @@ static uint16_t port_of(const struct server *s)
 
 void farm_call(struct farm_world *w, unsigned peer, bool status_socket)
 {
-	struct sockaddr_in a = {.sin_family = AF_INET, .sin_port = port_of(w->server), .sin_addr = {htonl(INADDR_LOOPBACK)}};
+	struct sockaddr_in a = {
+		.sin_family = AF_INET, .sin_port = port_of(w->server), .sin_addr = {htonl(INADDR_LOOPBACK)}};
 	struct sockaddr_un u = {.sun_family = AF_UNIX};
 	struct farm_peer *p = &w->peers[peer];
 	snprintf(u.sun_path, sizeof u.sun_path, "%.100s.sock", w->spool);
@@ -214,7 +216,8 @@ void farm_say_message(struct farm_world *w, unsigned peer, const Farm__Envelope 
 void farm_say_parts(struct farm_world *w, unsigned peer, const struct step *step)
 {
 	size_t n;
-	unsigned char *frame = checked_file_parts(step->header, step->header_size, step->payload, step->payload_size, !w->peers[peer].has_spoken, &n);
+	unsigned char *frame = checked_file_parts(step->header, step->header_size, step->payload, step->payload_size,
+						  !w->peers[peer].has_spoken, &n);
 	w->peers[peer].has_spoken = true;
 	farm_say(w, peer, frame, n);
 	free(frame);
@@ -244,12 +247,22 @@ struct plan farm_plan(uint64_t job)
 {
 	struct plan p;
 	struct error e;
-	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .border = 2, .spp = 4, .max_depth = 5,
-				 .groups = 2, .bootstrap = 64, .chains = 4, .epoch = 100};
+	struct plan_request r = {.integrator = "pssmlt",
+				 .kind = PLAN_CHAINS,
+				 .width = 20,
+				 .height = 10,
+				 .border = 2,
+				 .spp = 4,
+				 .max_depth = 5,
+				 .groups = 2,
+				 .bootstrap = 64,
+				 .chains = 4,
+				 .epoch = 100};
 	if (job == FARM_CHAINS)
 		r.target_error = 1e-4; /* so that its error is looked at */
 	if (job == FARM_CHAINS || job == FARM_ENDED)
-		snprintf(r.integrator, sizeof r.integrator, "hslt"), snprintf(r.mixture, sizeof r.mixture, "independent=0.1,hslt=0.9");
+		snprintf(r.integrator, sizeof r.integrator, "hslt"),
+			snprintf(r.mixture, sizeof r.mixture, "independent=0.1,hslt=0.9");
 	if (job == FARM_SAMPLES) {
 		r.kind = PLAN_SAMPLES;
 		r.chains = 0;
@@ -308,7 +321,8 @@ static void light(struct batch *b, const struct plan *plan)
 {
 	b->tile_count = 1;
 	b->tiles = mem_alloc(1, sizeof *b->tiles);
-	b->tiles[0] = (struct tile){0, 0, plan->width, plan->height, mem_alloc((size_t)plan->width * plan->height, TILE_CHANNELS * sizeof(float))};
+	b->tiles[0] = (struct tile){0, 0, plan->width, plan->height,
+				    mem_alloc((size_t)plan->width * plan->height, TILE_CHANNELS * sizeof(float))};
 	for (size_t i = 0; i < (size_t)plan->width * plan->height * TILE_CHANNELS; i++)
 		b->tiles[0].xyz[i] = 0.01f;
 }
@@ -421,7 +435,8 @@ static void do_bootstrap(struct farm_world *w, unsigned worker, uint64_t job)
 	struct plan p = farm_plan(job);
 	for (uint32_t g = 0; g < p.groups; g++)
 		for (uint32_t part = 0; part < p.parts; part++)
-			answer(w, worker, (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP, .group = g, .part = part});
+			answer(w, worker,
+			       (struct lease_key){.job = job, .kind = LEASE_BOOTSTRAP, .group = g, .part = part});
 }
 
 static void do_rounds(struct farm_world *w, unsigned worker, uint64_t job, uint32_t slots)
@@ -429,7 +444,12 @@ static void do_rounds(struct farm_world *w, unsigned worker, uint64_t job, uint3
 	struct plan p = farm_plan(job);
 	for (uint64_t epoch = 0; epoch < p.rounds; epoch++)
 		for (uint32_t i = 0; i < slots; i++)
-			answer(w, worker, (struct lease_key){.job = job, .kind = LEASE_RENDER, .group = i / p.parts, .part = i % p.parts, .epoch = epoch});
+			answer(w, worker,
+			       (struct lease_key){.job = job,
+						  .kind = LEASE_RENDER,
+						  .group = i / p.parts,
+						  .part = i % p.parts,
+						  .epoch = epoch});
 }
 
 static void fill(void)

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator to speak to, in this process: its loop turns when it is told to. It begins with the state of a spool that is made
- * once: job 1 is done, 2 lacks the chains of one lease in each of its rounds, 3 is in its bootstrap, 4 waits for its first samples and
- * wants each from two workers, 5 is done and can be extended.
- * One thread. What goes wrong ends the program.
+ * A coordinator to speak to, in this process: its loop turns when it is told to. It begins with the state of a spool
+ * that is made once: job 1 is done, 2 lacks the chains of one lease in each of its rounds, 3 is in its bootstrap, 4
+ * waits for its first samples and wants each from two workers, 5 is done and can be extended. One thread. What goes
+ * wrong ends the program.
  */
 #ifndef TESTS_FUZZ_FARM_H
 #define TESTS_FUZZ_FARM_H
@@ -31,14 +31,15 @@ struct farm_world {
 	unsigned settled; /* times; in the names of workers, so that nobody is set aside for what another input did */
 };
 
-struct farm_world *farm_world_new(void);        /* on a copy of that spool */
-void farm_world_free(struct farm_world *w);     /* its folder goes */
-void farm_spool_copy(const char *to);           /* the spool alone, for those who damage it first */
-int farm_world_open(struct farm_world *w, struct error *e); /* server_open on w->spool as it is, until its jobs are read */
+struct farm_world *farm_world_new(void);    /* on a copy of that spool */
+void farm_world_free(struct farm_world *w); /* its folder goes */
+void farm_spool_copy(const char *to);	    /* the spool alone, for those who damage it first */
+int farm_world_open(struct farm_world *w,
+		    struct error *e); /* server_open on w->spool as it is, until its jobs are read */
 void farm_world_close(struct farm_world *w);
 
-void farm_turn(struct farm_world *w);           /* what can be done at once */
-void farm_settle(struct farm_world *w);         /* all hang up; until nothing is under way */
+void farm_turn(struct farm_world *w);	/* what can be done at once */
+void farm_settle(struct farm_world *w); /* all hang up; until nothing is under way */
 
 void farm_call(struct farm_world *w, unsigned peer, bool status_socket);
 void farm_hello(struct farm_world *w, unsigned peer, Farm__Role role);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A client and a coordinator that says what it likes: all of it at once, whatever is asked, then it hangs up. The first byte says what
- * the client wants: a list, a submission, to wait for a job, a file.
+ * A client and a coordinator that says what it likes: all of it at once, whatever is asked, then it hangs up. The first
+ * byte says what the client wants: a list, a submission, to wait for a job, a file.
  */
 #include "common/base/mem.h"
 #include "common/net/client.h"
@@ -69,7 +69,8 @@ static void *speak(void *user)
 	for (size_t i = 0; i < now.count; i++) {
 		const struct step *s = &now.steps[i];
 		size_t size;
-		unsigned char *sealed = checked_file_parts(s->header, s->header_size, s->payload, s->payload_size, i == 0 && !now.hello, &size);
+		unsigned char *sealed = checked_file_parts(s->header, s->header_size, s->payload, s->payload_size,
+							   i == 0 && !now.hello, &size);
 		say(fd, sealed, size);
 		free(sealed);
 	}

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Whole conversations with a live coordinator: workers, clients and strangers who say what they like, and readers of the status. In
- * the script the speaker says hello by itself where it has a role. The world begins anew when something was stored.
+ * Whole conversations with a live coordinator: workers, clients and strangers who say what they like, and readers of
+ * the status. In the script the speaker says hello by itself where it has a role. The world begins anew when something
+ * was stored.
  */
 #include "common/base/mem.h"
 #include "common/wire/batch_wire.h"
@@ -41,7 +42,9 @@ static void speak(struct farm_world *w, const struct step *s)
 	if (w->peers[who].fd < 0) {
 		farm_call(w, who, who == READER);
 		if (who <= CLIENT_TWO || who == WORKER_THREE)
-			farm_hello(w, who, who <= WORKER_TWO || who == WORKER_THREE ? FARM__ROLE__ROLE_WORKER : FARM__ROLE__ROLE_CLIENT);
+			farm_hello(w, who,
+				   who <= WORKER_TWO || who == WORKER_THREE ? FARM__ROLE__ROLE_WORKER
+									    : FARM__ROLE__ROLE_CLIENT);
 	}
 	if (who == READER) {
 		farm_say(w, who, s->header, s->header_size);
@@ -135,7 +138,8 @@ static void write_dispute(void)
 static void write_results(void)
 {
 	struct plan p = farm_plan(FARM_CHAINS);
-	const struct lease_key last = {.job = FARM_CHAINS, .kind = LEASE_RENDER, .group = p.groups - 1, .part = p.parts - 1};
+	const struct lease_key last = {
+		.job = FARM_CHAINS, .kind = LEASE_RENDER, .group = p.groups - 1, .part = p.parts - 1};
 	const struct lease_key keys[] = {
 		last,
 		{.job = FARM_BOOTSTRAP, .kind = LEASE_BOOTSTRAP, .group = 1},
@@ -163,7 +167,11 @@ static void write_results(void)
 	p = farm_plan(FARM_BOOTSTRAP);
 	ask(&s, WORKER_ONE, FARM_BOOTSTRAP);
 	for (uint32_t i = 1; i < p.groups * p.parts; i++)
-		say_result(&s, WORKER_ONE, (struct lease_key){.job = FARM_BOOTSTRAP, .kind = LEASE_BOOTSTRAP, .group = i / p.parts, .part = i % p.parts});
+		say_result(&s, WORKER_ONE,
+			   (struct lease_key){.job = FARM_BOOTSTRAP,
+					      .kind = LEASE_BOOTSTRAP,
+					      .group = i / p.parts,
+					      .part = i % p.parts});
 	seed_end(&s, "bootstrap", 0);
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Bytes from a peer, cut into frames whose bounds are the fuzzer's; what is made of messages that carry payloads. The bytes come in
- * pieces, as from a network.
+ * Bytes from a peer, cut into frames whose bounds are the fuzzer's; what is made of messages that carry payloads. The
+ * bytes come in pieces, as from a network.
  */
 #include "common/wire/batch_wire.h"
 #include "common/wire/frame.h"
@@ -30,8 +30,16 @@ static void take_message(const struct frame_reader *r)
 	    !grant_unpack(&grant, m->lease_grant, r->payload.bytes, r->payload.size, &e))
 		grant_fini(&grant);
 	if (m->body_case == FARM__ENVELOPE__BODY_LEASE_RESULT) {
-		struct plan_request small = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 70, .height = 70, .spp = 1,
-					     .max_depth = 4, .chains = 16, .groups = 4, .bootstrap = 64, .epoch = 4,
+		struct plan_request small = {.integrator = "pssmlt",
+					     .kind = PLAN_CHAINS,
+					     .width = 70,
+					     .height = 70,
+					     .spp = 1,
+					     .max_depth = 4,
+					     .chains = 16,
+					     .groups = 4,
+					     .bootstrap = 64,
+					     .epoch = 4,
 					     .mixture = "independent=0.1,hslt=0.9"};
 		if (!plan_make(&small, &plan, &e) &&
 		    !batch_unpack(&batch, &plan, m->lease_result, r->payload.bytes, r->payload.size, &e))

@@ -43,7 +43,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	if (size == 0)
 		return 0;
 	char xml[256];
-	snprintf(xml, sizeof xml, "<scene version='3.0.0'><shape type='%s'><string name='filename' value='m'/></shape></scene>",
+	snprintf(xml, sizeof xml,
+		 "<scene version='3.0.0'><shape type='%s'><string name='filename' value='m'/></shape></scene>",
 		 types[bytes[0] % TYPES]);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m", bytes + 1, size - 1}, {0}};
 	struct asset_source assets = memory_assets(files);

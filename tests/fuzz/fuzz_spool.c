@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator that starts on a spool which came back damaged. The first byte says which file, and what the others are: its bytes,
- * places of it that are changed, or what is in it behind checksums that fit. It may refuse to start, begin a job anew or fail it; if
- * it starts, it answers.
+ * A coordinator that starts on a spool which came back damaged. The first byte says which file, and what the others
+ * are: its bytes, places of it that are changed, or what is in it behind checksums that fit. It may refuse to start,
+ * begin a job anew or fail it; if it starts, it answers.
  */
 #include "common/base/mem.h"
 #include "common/base/checked_file.h"
@@ -17,7 +17,18 @@
 #include <string.h>
 #include <unistd.h>
 
-enum what { RECORD, JOURNAL, JOURNAL_CHANGED, JOURNAL_BODIES, CHECKPOINT_CHANGED, CHECKPOINT_BODY, DATABASE_CHANGED, SUBMISSION, ASIDE, WHATS };
+enum what {
+	RECORD,
+	JOURNAL,
+	JOURNAL_CHANGED,
+	JOURNAL_BODIES,
+	CHECKPOINT_CHANGED,
+	CHECKPOINT_BODY,
+	DATABASE_CHANGED,
+	SUBMISSION,
+	ASIDE,
+	WHATS
+};
 enum { EDIT = 4, EDITS_MOST = 32, SEED_MOST = 16000, FILE_MOST = 1 << 20 };
 
 static uint8_t file[FILE_MOST];
@@ -108,8 +119,15 @@ static void write_submission(const char *spool, const uint8_t *bytes, size_t siz
 	bytes += 2;
 	size -= 2;
 	first = first < size ? first : size;
-	struct ledger_job job = {.id = 9, .owner = "", .name = "n", .version = "1", .submitted = 1, .submission = bytes,
-				 .submission_size = first, .plan = bytes + first, .plan_size = size - first};
+	struct ledger_job job = {.id = 9,
+				 .owner = "",
+				 .name = "n",
+				 .version = "1",
+				 .submitted = 1,
+				 .submission = bytes,
+				 .submission_size = first,
+				 .plan = bytes + first,
+				 .plan_size = size - first};
 	path_in(spool, "jobs.db", path);
 	if (ledger_open(&l, path, &e))
 		abort();
@@ -241,7 +259,8 @@ static size_t take_file(const char *path)
 
 static void write_seeds(const char *spool)
 {
-	static const char aside[] = "{\"schema\":1,\"workers\":[{\"certificate\":\"\",\"name\":\"w1-0\",\"home\":\"h\",\"restarts\":2,\"why\":\"x\"}]}";
+	static const char aside[] =
+		"{\"schema\":1,\"workers\":[{\"certificate\":\"\",\"name\":\"w1-0\",\"home\":\"h\",\"restarts\":2,\"why\":\"x\"}]}";
 	memcpy(seed + 1, aside, sizeof aside - 1);
 	write_seed(ASIDE, sizeof aside - 1);
 	char path[512], folder[512];

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * States of chains as a worker gets them, in real worlds: the first byte says in which, the others are the state. Id and step are
- * put right, and for every other input the contribution, too: as somebody would who wants to be believed. What resumes must go on
- * for some mutations, and what it saves then must resume again. Invalid operations are not watched: clang makes some of its own.
- * (tests/worker/chain/test_path_chain.c watches them.)
+ * States of chains as a worker gets them, in real worlds: the first byte says in which, the others are the state. Id
+ * and step are put right, and for every other input the contribution, too: as somebody would who wants to be believed.
+ * What resumes must go on for some mutations, and what it saves then must resume again. Invalid operations are not
+ * watched: clang makes some of its own. (tests/worker/chain/test_path_chain.c watches them.)
  */
 #include "common/base/mem.h"
 #include "tests/fuzz/seeds.h"
@@ -29,7 +29,8 @@ static uint64_t counters[BATCH_COUNTERS], strategies[BATCH_STRATEGIES][STRATEGY_
 static void set_up(void)
 {
 	static const struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
-	static const struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
+	static const struct scene_settings settings = {
+		.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
 	while (world_count < ROOMS_MOST && rooms[world_count].name) {
 		worlds[world_count] = rooms[world_count].build();
 		world_count++;
@@ -43,8 +44,14 @@ static const struct chain_ops *begin(struct chain *c, unsigned which)
 {
 	bool whole = which / world_count % 2 == 0;
 	starts_context(&context, worlds[which % world_count], 1, EDGES, counters);
-	*c = (struct chain){.integrator = integrator_find(whole ? "hslt" : "pssmlt"), .context = &context, .film = &film, .mixture = mixture,
-			    .strategy = strategies, .seed = 7, .id = CHAIN, .step = 1000};
+	*c = (struct chain){.integrator = integrator_find(whole ? "hslt" : "pssmlt"),
+			    .context = &context,
+			    .film = &film,
+			    .mixture = mixture,
+			    .strategy = strategies,
+			    .seed = 7,
+			    .id = CHAIN,
+			    .step = 1000};
 	return c->integrator->chain;
 }
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Tiles as workers send them. The first byte says which: a tile of a film; the result of a lease with one tile, or with two,
- * whose message is made here so that the bytes reach the decoder; an image as the coordinator keeps it.
+ * Tiles as workers send them. The first byte says which: a tile of a film; the result of a lease with one tile, or with
+ * two, whose message is made here so that the bytes reach the decoder; an image as the coordinator keeps it.
  */
 #include "common/base/mem.h"
 #include "common/film/exr.h"
@@ -28,8 +28,13 @@ static void read_tile(const uint8_t *bytes, size_t size)
 /* Samples, so that there are neither states nor moments. */
 static void read_result(const uint8_t *bytes, size_t size, bool two)
 {
-	static const struct plan_request request = {.integrator = "path", .kind = PLAN_SAMPLES, .width = WIDTH, .height = HEIGHT, .spp = 1,
-						    .max_depth = 4, .groups = 4};
+	static const struct plan_request request = {.integrator = "path",
+						    .kind = PLAN_SAMPLES,
+						    .width = WIDTH,
+						    .height = HEIGHT,
+						    .spp = 1,
+						    .max_depth = 4,
+						    .groups = 4};
 	struct plan plan;
 	struct batch batch;
 	struct error e;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * TLS in memory. The first byte says what the others are: what a stranger says to a listener or to a caller; places where one
- * direction of a handshake and what follows is changed; records to an established link; a certificate. Whatever is changed, no link
- * may open to somebody else, and what is heard is a beginning of what was said.
+ * TLS in memory. The first byte says what the others are: what a stranger says to a listener or to a caller; places
+ * where one direction of a handshake and what follows is changed; records to an established link; a certificate.
+ * Whatever is changed, no link may open to somebody else, and what is heard is a beginning of what was said.
  */
 #include "common/net/authority.h"
 #include "tests/fuzz/folders.h"
@@ -91,7 +91,8 @@ static void give(struct end *x, const void *bytes, size_t size)
 {
 	struct error e;
 	for (size_t i = 0; i < size && !x->broken; i += PIECE) {
-		x->broken = tls_link_take(x->link, (const uint8_t *)bytes + i, size - i < PIECE ? size - i : PIECE, &e) != 0;
+		x->broken = tls_link_take(x->link, (const uint8_t *)bytes + i, size - i < PIECE ? size - i : PIECE,
+					  &e) != 0;
 		read_all(x);
 	}
 }
@@ -238,7 +239,8 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 		break;
 	case CHANGE_CALLER:
 	case CHANGE_LISTENER:
-		converse(bytes, size, what % WHATS == CHANGE_CALLER ? &caller : &listener, what / WHATS % 8 == 1 ? stranger : node);
+		converse(bytes, size, what % WHATS == CHANGE_CALLER ? &caller : &listener,
+			 what / WHATS % 8 == 1 ? stranger : node);
 		break;
 	case RECORDS:
 		send_records(bytes, size);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A live worker and a coordinator that says what it likes. Its thread pool is one here that works when it is told to, on small leases only:
- * long work is what a coordinator may ask for. Everything it fetched is forgotten after each input but the cache.
+ * A live worker and a coordinator that says what it likes. Its thread pool is one here that works when it is told to,
+ * on small leases only: long work is what a coordinator may ask for. Everything it fetched is forgotten after each
+ * input but the cache.
  */
 #include "common/base/log.h"
 #include "common/base/mem.h"
@@ -91,7 +92,8 @@ static void start_listening(void)
 
 static void start_worker(void)
 {
-	struct agent_config c = {.coordinator = now.address, .name = "w", .cache = now.cache, .cache_bytes = 1 << 22, .threads = 1};
+	struct agent_config c = {
+		.coordinator = now.address, .name = "w", .cache = now.cache, .cache_bytes = 1 << 22, .threads = 1};
 	struct error e;
 	if (!now.listener)
 		start_listening();
@@ -179,8 +181,11 @@ static void answer(void)
 static bool is_small(const struct plan *p)
 {
 	uint64_t pixels = (uint64_t)p->width * p->height;
-	return pixels <= PIXELS_MOST && p->border < 16 && p->bootstrap / (p->groups * p->parts) <= WORK_MOST && p->epoch <= WORK_MOST &&
-	       (p->kind == PLAN_CHAINS ? p->chains / (p->groups * p->parts) * p->epoch : pixels * p->epoch) <= WORK_MOST && p->max_depth <= 16;
+	return pixels <= PIXELS_MOST && p->border < 16 && p->bootstrap / (p->groups * p->parts) <= WORK_MOST &&
+	       p->epoch <= WORK_MOST &&
+	       (p->kind == PLAN_CHAINS ? p->chains / (p->groups * p->parts) * p->epoch : pixels * p->epoch) <=
+		       WORK_MOST &&
+	       p->max_depth <= 16;
 }
 
 static bool is_building(const struct task *t)
@@ -268,11 +273,12 @@ size_t LLVMFuzzerCustomMutator(uint8_t *bytes, size_t size, size_t room, unsigne
 
 /* ---- seeds ---- */
 
-static char room[] = "<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><film type=\"hdrfilm\">"
-		     "<integer name=\"width\" value=\"20\"/><integer name=\"height\" value=\"10\"/></film></sensor>"
-		     "<shape type=\"sphere\"><point name=\"center\" x=\"0\" y=\"0\" z=\"4\"/><bsdf type=\"diffuse\"/></shape>"
-		     "<shape type=\"rectangle\"><transform name=\"to_world\"><rotate x=\"1\" angle=\"90\"/><translate y=\"3\" z=\"4\"/></transform>"
-		     "<emitter type=\"area\"><rgb name=\"radiance\" value=\"9\"/></emitter></shape></scene>";
+static char room[] =
+	"<scene version=\"3.0.0\"><sensor type=\"perspective\"><float name=\"fov\" value=\"40\"/><film type=\"hdrfilm\">"
+	"<integer name=\"width\" value=\"20\"/><integer name=\"height\" value=\"10\"/></film></sensor>"
+	"<shape type=\"sphere\"><point name=\"center\" x=\"0\" y=\"0\" z=\"4\"/><bsdf type=\"diffuse\"/></shape>"
+	"<shape type=\"rectangle\"><transform name=\"to_world\"><rotate x=\"1\" angle=\"90\"/><translate y=\"3\" z=\"4\"/></transform>"
+	"<emitter type=\"area\"><rgb name=\"radiance\" value=\"9\"/></emitter></shape></scene>";
 
 static void describe_job(struct seed *s, uint64_t job)
 {
@@ -325,7 +331,8 @@ int LLVMFuzzerInitialize(int *argc, char ***argv)
 {
 	(void)argc;
 	(void)argv;
-	static const struct lease_key keys[] = {{.job = FARM_BOOTSTRAP, .kind = LEASE_BOOTSTRAP}, {.job = FARM_CHAINS, .kind = LEASE_RENDER},
+	static const struct lease_key keys[] = {{.job = FARM_BOOTSTRAP, .kind = LEASE_BOOTSTRAP},
+						{.job = FARM_CHAINS, .kind = LEASE_RENDER},
 						{.job = FARM_SAMPLES, .kind = LEASE_RENDER}};
 	if (!seeds_wanted())
 		return 0;

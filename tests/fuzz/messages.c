@@ -73,15 +73,47 @@ static uint64_t some_integer(uint64_t before)
 
 static double some_double(double before)
 {
-	static const double values[] = {0, -0.0, 1, -1, 0.5, 1e-320, 1e-9, 1e9, 1e18, 1e308, -1e308, (double)__builtin_inf(), -(double)__builtin_inf(), (double)__builtin_nan("")};
+	static const double values[] = {0,
+					-0.0,
+					1,
+					-1,
+					0.5,
+					1e-320,
+					1e-9,
+					1e9,
+					1e18,
+					1e308,
+					-1e308,
+					(double)__builtin_inf(),
+					-(double)__builtin_inf(),
+					(double)__builtin_nan("")};
 	return dice(4) ? values[dice(sizeof values / sizeof *values)] : dice(2) ? before * 2 : before + 1;
 }
 
 static char *some_text(const char *before)
 {
-	static const char *const texts[] = {"", "s.xml", "../s.xml", "/etc/passwd", "a/b", "a//b", ".", "path", "bdpt", "pssmlt", "hslt", "p1", "p2",
-					    "independent=0.1,hslt=0.9", "hslt@b2c0", "tolerance=0.1", "-dispersion,+aperture", "all", "\xc3\xa9", "\xff",
-					    "a\nb", "%s%n"};
+	static const char *const texts[] = {"",
+					    "s.xml",
+					    "../s.xml",
+					    "/etc/passwd",
+					    "a/b",
+					    "a//b",
+					    ".",
+					    "path",
+					    "bdpt",
+					    "pssmlt",
+					    "hslt",
+					    "p1",
+					    "p2",
+					    "independent=0.1,hslt=0.9",
+					    "hslt@b2c0",
+					    "tolerance=0.1",
+					    "-dispersion,+aperture",
+					    "all",
+					    "\xc3\xa9",
+					    "\xff",
+					    "a\nb",
+					    "%s%n"};
 	char *p = take(NULL, STRING_ROOM);
 	if (!p)
 		return NULL;
@@ -190,7 +222,8 @@ static void change_list(const ProtobufCFieldDescriptor *f, void *at, size_t *cou
 			memcpy(more + *count * each, list + dice(*count) * each, each);
 		else
 			change_value(f, more + *count * each);
-		if (f->type >= PROTOBUF_C_TYPE_STRING && f->type != PROTOBUF_C_TYPE_BYTES && !*(void **)(void *)(more + *count * each))
+		if (f->type >= PROTOBUF_C_TYPE_STRING && f->type != PROTOBUF_C_TYPE_BYTES &&
+		    !*(void **)(void *)(more + *count * each))
 			return;
 		*(uint8_t **)at = more;
 		++*count;
@@ -297,7 +330,8 @@ size_t script_write(const struct step *steps, size_t count, uint8_t *bytes, size
 	return (size_t)(p - bytes);
 }
 
-size_t script_add(uint8_t *bytes, size_t size, size_t room, uint8_t who, const Farm__Envelope *m, const void *payload, size_t payload_size)
+size_t script_add(uint8_t *bytes, size_t size, size_t room, uint8_t who, const Farm__Envelope *m, const void *payload,
+		  size_t payload_size)
 {
 	static uint8_t header[PART_MOST];
 	struct step s = {.who = who, .header = header, .payload = payload, .payload_size = payload_size};

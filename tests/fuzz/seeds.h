@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Seeds of the fuzzers of conversations, made from the messages of now: a target that is started with HSLT_FUZZ_SEEDS=FOLDER writes
- * its own there and ends.
+ * Seeds of the fuzzers of conversations, made from the messages of now: a target that is started with
+ * HSLT_FUZZ_SEEDS=FOLDER writes its own there and ends.
  */
 #ifndef TESTS_FUZZ_SEEDS_H
 #define TESTS_FUZZ_SEEDS_H
@@ -23,13 +23,13 @@ void seed_end(struct seed *s, const char *name, uint64_t number); /* writes it; 
 void seed_file(const char *name, uint64_t number, const void *bytes, size_t size);
 
 /* A message without payload: the kind as the envelope's case and as its member. */
-#define SEED_SAY(seed, who, KIND, kind, message)                               \
-	do {                                                                   \
-		Farm__Envelope seed_m;                                         \
-		farm__envelope__init(&seed_m);                                 \
-		seed_m.body_case = FARM__ENVELOPE__BODY_##KIND;                \
-		seed_m.kind = (message);                                       \
-		seed_say((seed), (who), &seed_m, NULL, 0);                     \
+#define SEED_SAY(seed, who, KIND, kind, message)                \
+	do {                                                    \
+		Farm__Envelope seed_m;                          \
+		farm__envelope__init(&seed_m);                  \
+		seed_m.body_case = FARM__ENVELOPE__BODY_##KIND; \
+		seed_m.kind = (message);                        \
+		seed_say((seed), (who), &seed_m, NULL, 0);      \
 	} while (0)
 
 #endif

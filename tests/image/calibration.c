@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * make calibration: is the error that an image states its error? Small renders of scenes of three kinds (calibration_scenes.h), by
- * each integrator, at three lengths, which differ in their seeds only, against references made with other seeds. Writes the table
- * of README.md to stdout, and ends with 1 where the intervals that were stated hold the true relMSE in less than 90 % of the
- * renders of a length, or in more than 99 % of a hundred or more. The reference's own variance is subtracted from each comparison; a
- * case whose reference has more than a tenth of the renders' relMSE is left out, and said so.
+ * make calibration: is the error that an image states its error? Small renders of scenes of three kinds
+ * (calibration_scenes.h), by each integrator, at three lengths, which differ in their seeds only, against references
+ * made with other seeds. Writes the table of README.md to stdout, and ends with 1 where the intervals that were stated
+ * hold the true relMSE in less than 90 % of the renders of a length, or in more than 99 % of a hundred or more. The
+ * reference's own variance is subtracted from each comparison; a case whose reference has more than a tenth of the
+ * renders' relMSE is left out, and said so.
  *
- *   calibration [RENDERS [LENGTHS [SCENE]]]    20 renders a case, half as many of each next length; 3 lengths; scenes whose names
- *                                              begin with SCENE
+ *   calibration [RENDERS [LENGTHS [SCENE]]]    20 renders a case, half as many of each next length; 3 lengths; scenes
+ * whose names begin with SCENE
  */
 #include "tests/image/calibration_scenes.h"
 #include "tests/support/repeats.h"
@@ -89,21 +90,25 @@ static void look(const struct reference *r, const struct canvas_image *img, stru
 }
 
 /* One row of the table; into `all` where the reference can tell. */
-static void run_case(const struct calibration_scene *s, const struct world *w, const struct reference *r, size_t k, int length,
-		     uint32_t renders, struct figures *all)
+static void run_case(const struct calibration_scene *s, const struct world *w, const struct reference *r, size_t k,
+		     int length, uint32_t renders, struct figures *all)
 {
 	char test[96];
 	snprintf(test, sizeof test, "%s, length %d", s->name, length + 1);
-	struct repeats_how how = {.integrator = integrators[k].name, .test = test, .count = renders, .spp = integrators[k].spp * lengths[length]};
+	struct repeats_how how = {.integrator = integrators[k].name,
+				  .test = test,
+				  .count = renders,
+				  .spp = integrators[k].spp * lengths[length]};
 	struct repeats run;
 	struct figures f = {0};
 	repeats_run(w, &how, NULL, NULL, &run);
 	for (uint32_t i = 0; i < renders; i++)
 		look(r, &run.images[i], &f);
 	bool tells = r->variance <= 0.1 * f.own / renders;
-	printf("| %s | %s | %s | %llu | %.1f | %.1f | %d of %d | %d%s | %.1f | %.2f |\n", s->kind, s->name, how.integrator,
-	       (unsigned long long)how.spp, 100 * sqrt(fmax(0, f.own / renders)), 100 * sqrt(f.estimate / renders), f.stated, f.renders, f.held,
-	       tells ? "" : " (reference too noisy)", 100 * f.far / f.values, run.cpu_seconds / renders);
+	printf("| %s | %s | %s | %llu | %.1f | %.1f | %d of %d | %d%s | %.1f | %.2f |\n", s->kind, s->name,
+	       how.integrator, (unsigned long long)how.spp, 100 * sqrt(fmax(0, f.own / renders)),
+	       100 * sqrt(f.estimate / renders), f.stated, f.renders, f.held, tells ? "" : " (reference too noisy)",
+	       100 * f.far / f.values, run.cpu_seconds / renders);
 	fflush(stdout);
 	repeats_free(&run);
 	if (!tells)
@@ -116,8 +121,8 @@ static void run_case(const struct calibration_scene *s, const struct world *w, c
 static bool judge(const struct figures *all, int length)
 {
 	double share = all->stated ? (double)all->held / all->stated : 1;
-	printf("\nLength %d: %d of %d renders state an interval, %d of them (%.1f %%) hold the true relMSE.\n", length + 1, all->stated,
-	       all->renders, all->held, 100 * share);
+	printf("\nLength %d: %d of %d renders state an interval, %d of them (%.1f %%) hold the true relMSE.\n",
+	       length + 1, all->stated, all->renders, all->held, 100 * share);
 	return share >= 0.9 && (all->stated < 100 || share <= 0.99);
 }
 

@@ -11,22 +11,28 @@
 #define BOX(bsdf) "<shape type='cube'>" AT("<scale value='2'/>") bsdf "</shape>"
 #define VIEW SENSOR("0,0.2,1.9", "0,-0.3,-1")
 #define SHINES(rgb) "<emitter type='area'><rgb name='radiance' value='" rgb "'/></emitter>"
-#define CEILING(size, rgb)                                                                                                       \
-	"<shape type='rectangle'>" AT("<scale value='" size "'/><rotate x='1' angle='90'/><translate y='1.9'/>") SHINES(rgb) "</shape>"
-#define SPHERE(at, radius, inner)                                                                                                \
-	"<shape type='sphere'><point name='center' value='" at "'/><float name='radius' value='" radius "'/>" inner "</shape>"
+#define CEILING(size, rgb)                                                                                       \
+	"<shape type='rectangle'>" AT("<scale value='" size "'/><rotate x='1' angle='90'/><translate y='1.9'/>") \
+		SHINES(rgb) "</shape>"
+#define SPHERE(at, radius, inner)                                                                                   \
+	"<shape type='sphere'><point name='center' value='" at "'/><float name='radius' value='" radius "'/>" inner \
+	"</shape>"
 #define GLASS "<bsdf type='dielectric'/>"
 #define CLOUDY(alpha) "<bsdf type='roughdielectric'><float name='alpha' value='" alpha "'/></bsdf>"
-#define METAL(alpha) "<bsdf type='roughconductor'><string name='material' value='Au'/><float name='alpha' value='" alpha "'/></bsdf>"
+#define METAL(alpha) \
+	"<bsdf type='roughconductor'><string name='material' value='Au'/><float name='alpha' value='" alpha "'/></bsdf>"
 #define MIRROR "<bsdf type='conductor'><string name='material' value='Ag'/></bsdf>"
 #define WALL(turn, move, inner) "<shape type='rectangle'>" AT(turn move) inner "</shape>"
+/* clang-format off */
 #define CHECKS(a, b, n)                                                                                                          \
 	"<bsdf type='diffuse'><texture name='reflectance' type='checkerboard'><rgb name='color0' value='" a                        \
 	"'/><rgb name='color1' value='" b "'/><transform name='to_uv'><scale x='" n "' y='" n "'/></transform></texture></bsdf>"
+/* clang-format on */
 
 /* A part of a ring of metal that stands on the floor. */
-#define BENT(degrees)                                                                                                            \
-	WALL("<scale x='0.28' y='0.3'/><translate z='-1'/><rotate y='1' angle='" degrees "'/>", "<translate y='-0.7'/>", METAL("0.05"))
+#define BENT(degrees)                                                                           \
+	WALL("<scale x='0.28' y='0.3'/><translate z='-1'/><rotate y='1' angle='" degrees "'/>", \
+	     "<translate y='-0.7'/>", METAL("0.05"))
 #define WARM GREY("0.5,0.45,0.35")
 
 const struct calibration_scene calibration_scenes[] = {
@@ -39,27 +45,40 @@ const struct calibration_scene calibration_scenes[] = {
 	{"public", "veach-door", "veach-door", "scene.xml", NULL, "bdpt", 20},
 	{"public", "three-spheres", ".", "three-spheres.xml", NULL, "bdpt", 15},
 	{"public", "half-sunk", ".", "half-sunk-rough.xml", NULL, "bdpt", 20},
-	{"made", "room", NULL, NULL, DEPTH("5") VIEW BOX(WARM) CEILING("0.8", "6,5,4") SPHERE("0,-0.6,-0.3", "0.8", GREY("0.2,0.5,0.7")),
-	 "path", 10},
+	{"made", "room", NULL, NULL,
+	 DEPTH("5") VIEW BOX(WARM) CEILING("0.8", "6,5,4") SPHERE("0,-0.6,-0.3", "0.8", GREY("0.2,0.5,0.7")), "path",
+	 10},
 	{"made", "lamp in a glass shell", NULL, NULL,
-	 DEPTH("8") VIEW BOX(WARM) SPHERE("0,0.4,-0.6", "0.5", GLASS) SPHERE("0,0.4,-0.6", "0.05", SHINES("600,500,400")), "path", 20},
+	 DEPTH("8") VIEW BOX(WARM) SPHERE("0,0.4,-0.6", "0.5", GLASS)
+		 SPHERE("0,0.4,-0.6", "0.05", SHINES("600,500,400")),
+	 "path", 20},
 	{"made", "caustic ring", NULL, NULL,
-	 DEPTH("6") SENSOR("0,3,4", "0,-0.5,0") WALL("<scale value='6'/><rotate x='1' angle='-90'/>", "<translate y='-1'/>", GREY("0.4,0.4,0.4"))
-	 BENT("-60") BENT("-30") BENT("0") BENT("30") BENT("60") SPHERE("2,2,1", "0.1", SHINES("300,300,250")), "bdpt", 20},
-	{"made", "glossy box", NULL, NULL, DEPTH("8") VIEW BOX(METAL("0.1")) CEILING("0.3", "20,18,15") SPHERE("0.3,-0.8,-0.5", "0.5", METAL("0.05")),
+	 DEPTH("6") SENSOR("0,3,4", "0,-0.5,0") WALL("<scale value='6'/><rotate x='1' angle='-90'/>",
+						     "<translate y='-1'/>", GREY("0.4,0.4,0.4")) BENT("-60") BENT("-30")
+		 BENT("0") BENT("30") BENT("60") SPHERE("2,2,1", "0.1", SHINES("300,300,250")),
+	 "bdpt", 20},
+	{"made", "glossy box", NULL, NULL,
+	 DEPTH("8") VIEW BOX(METAL("0.1")) CEILING("0.3", "20,18,15") SPHERE("0.3,-0.8,-0.5", "0.5", METAL("0.05")),
 	 "bdpt", 15},
 	{"made", "mirror corridor", NULL, NULL,
 	 DEPTH("12") SENSOR("0,0,1.9", "0.6,-0.2,-1") BOX(GREY("0.3,0.3,0.35"))
-	 WALL("<scale x='1.9' y='1.9'/><rotate y='1' angle='90'/>", "<translate x='-1.5'/>", MIRROR)
-	 WALL("<scale x='1.9' y='1.9'/><rotate y='1' angle='-90'/>", "<translate x='1.5'/>", MIRROR) CEILING("0.2", "40,38,35"), "bdpt", 15},
+		 WALL("<scale x='1.9' y='1.9'/><rotate y='1' angle='90'/>", "<translate x='-1.5'/>", MIRROR)
+			 WALL("<scale x='1.9' y='1.9'/><rotate y='1' angle='-90'/>", "<translate x='1.5'/>", MIRROR)
+				 CEILING("0.2", "40,38,35"),
+	 "bdpt", 15},
 	{"made", "tiny bright emitter", NULL, NULL,
-	 DEPTH("6") VIEW BOX(WARM) SPHERE("-1,1,-1", "0.01", SHINES("30000,28000,25000")) SPHERE("0.4,-0.8,-0.3", "0.7", GLASS)
-	 SPHERE("-0.9,-1.2,-0.2", "0.5", METAL("0.1")), "bdpt", 20},
+	 DEPTH("6") VIEW BOX(WARM) SPHERE("-1,1,-1", "0.01", SHINES("30000,28000,25000"))
+		 SPHERE("0.4,-0.8,-0.3", "0.7", GLASS) SPHERE("-0.9,-1.2,-0.2", "0.5", METAL("0.1")),
+	 "bdpt", 20},
 	{"made", "dark checks", NULL, NULL,
 	 DEPTH("6") VIEW BOX(CHECKS("0.02,0.02,0.02", "0.8,0.8,0.7", "8"))
-	 WALL("<scale value='1.2'/><rotate x='1' angle='90'/>", "<translate y='1.2'/>", GREY("0.1,0.1,0.1")) CEILING("0.5", "30,28,25"), "path", 15},
+		 WALL("<scale value='1.2'/><rotate x='1' angle='90'/>", "<translate y='1.2'/>", GREY("0.1,0.1,0.1"))
+			 CEILING("0.5", "30,28,25"),
+	 "path", 15},
 	{"made", "lamp behind cloudy glass", NULL, NULL,
-	 DEPTH("8") VIEW BOX(WARM) SPHERE("0,0.4,-0.6", "0.6", CLOUDY("0.2")) SPHERE("0,0.4,-0.6", "0.1", SHINES("200,180,150")), "path", 20},
+	 DEPTH("8") VIEW BOX(WARM) SPHERE("0,0.4,-0.6", "0.6", CLOUDY("0.2"))
+		 SPHERE("0,0.4,-0.6", "0.1", SHINES("200,180,150")),
+	 "path", 20},
 	{NULL, NULL, NULL, NULL, NULL, NULL, 0},
 };
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes by which stated errors are compared with true ones: those of the tree, the public ones (HSLT_SCENES), and small hard
- * ones made for it, in which light comes rarely, in clumps, or into dark surroundings.
+ * Scenes by which stated errors are compared with true ones: those of the tree, the public ones (HSLT_SCENES), and
+ * small hard ones made for it, in which light comes rarely, in clumps, or into dark surroundings.
  */
 #ifndef TESTS_IMAGE_CALIBRATION_SCENES_H
 #define TESTS_IMAGE_CALIBRATION_SCENES_H
@@ -9,11 +9,11 @@
 #include "worker/world/world.h"
 
 struct calibration_scene {
-	const char *kind, *name; /* kind: tree, public, made */
+	const char *kind, *name;   /* kind: tree, public, made */
 	const char *folder, *file; /* NULL: `text` */
 	const char *text;
-	const char *reference;    /* the integrator that makes its reference */
-	double seconds;           /* of processor that a reference takes, about */
+	const char *reference; /* the integrator that makes its reference */
+	double seconds;	       /* of processor that a reference takes, about */
 };
 
 extern const struct calibration_scene calibration_scenes[]; /* ends with a NULL name */

@@ -1,20 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Is the error that an image carries its error? 200 small renders of a case, which differ in their seeds only, are compared with a
- * long reference of another integrator or more samples, whose own variance is subtracted from each comparison. The figures of the
- * run that this was written with are in tests/image/README.md.
+ * Is the error that an image carries its error? 200 small renders of a case, which differ in their seeds only, are
+ * compared with a long reference of another integrator or more samples, whose own variance is subtracted from each
+ * comparison. The figures of the run that this was written with are in tests/image/README.md.
  *
  * Checked for each case:
- *   interval   rel_mse_95, where it is stated, holds the realised relMSE of at least 90 % of the renders. Level and power, if all 200
- *              state one: at a true coverage of 95 % this fails with a probability of 0.16 %, at 94 % with 0.9 %, at 92 % with 12 %; at
- *              85 % it is found with 97 %, at 80 % with 99.99 %. (Seeds are fixed: a run that passes passes always.)
- *   middle     the median of realised over estimated relMSE is within 10 % of 1, or as far as the case says.
- *   pixels     the share of pixels and channels with |image - reference| <= 1.96 error, over all renders, is within 0.87 and 0.975:
- *              Student's t with 15 degrees would be 93.1 %, skewed pixels have less.
- *   b          chains: b_error holds the reference's b (2.131 of them, t with 15 degrees) in 170 to 199 of 200 renders: 95 % fails
- *              with less than 1e-4, an error too small by 1.5 (84 %) is found with 61 %, by 2 (71 %) with 100.000 %.
- *   planted    intervals and errors made too small by 1.3 (the relMSE by 1.69) are refused.
- * FULL=1: larger pictures with more samples. HSLT_TEST_SCALE=N: N times fewer renders, which are made and not judged.
+ *   interval   rel_mse_95, where it is stated, holds the realised relMSE of at least 90 % of the renders. Level and
+ * power, if all 200 state one: at a true coverage of 95 % this fails with a probability of 0.16 %, at 94 % with 0.9 %,
+ * at 92 % with 12 %; at 85 % it is found with 97 %, at 80 % with 99.99 %. (Seeds are fixed: a run that passes passes
+ * always.) middle     the median of realised over estimated relMSE is within 10 % of 1, or as far as the case says.
+ *   pixels     the share of pixels and channels with |image - reference| <= 1.96 error, over all renders, is within
+ * 0.87 and 0.975: Student's t with 15 degrees would be 93.1 %, skewed pixels have less. b          chains: b_error
+ * holds the reference's b (2.131 of them, t with 15 degrees) in 170 to 199 of 200 renders: 95 % fails with less than
+ * 1e-4, an error too small by 1.5 (84 %) is found with 61 %, by 2 (71 %) with 100.000 %. planted    intervals and
+ * errors made too small by 1.3 (the relMSE by 1.69) are refused. FULL=1: larger pictures with more samples.
+ * HSLT_TEST_SCALE=N: N times fewer renders, which are made and not judged.
  */
 #include "tests/support/repeats.h"
 #include "tests/support/worlds.h"
@@ -30,14 +30,17 @@
 enum { RENDERS = 200 };
 
 #define AT(inner) "<transform name='to_world'>" inner "</transform>"
+/* clang-format off */
 #define ROOM                                                                                                                    \
 	"<integrator type='path'><integer name='max_depth' value='5'/></integrator>" SENSOR("0,0.2,1.9", "0,-0.3,-1")             \
 	"<shape type='cube'>" AT("<scale value='2'/>") "<bsdf type='diffuse'><rgb name='reflectance' value='0.5,0.45,0.35'/></bsdf></shape>"
 #define LAMP(size, rgb)                                                                                                         \
 	"<shape type='rectangle'>" AT("<scale value='" size "'/><rotate x='1' angle='90'/><translate y='1.9'/>")                  \
 	"<emitter type='area'><rgb name='radiance' value='" rgb "'/></emitter></shape>"
-#define BALL(bsdf)                                                                                                              \
-	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf "</shape>"
+/* clang-format on */
+#define BALL(bsdf)                                                                                               \
+	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf \
+	"</shape>"
 
 enum { DIFFUSE, GLASS, SCENES };
 
@@ -46,7 +49,8 @@ static struct world *build(int scene, uint32_t width, uint32_t height)
 	if (scene == GLASS) /* a caustic: fireflies for path */
 		return world_of_text(width, height, ROOM LAMP("1.2", "6,5,4") BALL("<bsdf type='dielectric'/>"));
 	return world_of_text(width, height,
-			     ROOM LAMP("0.8", "6,5,4") BALL("<bsdf type='diffuse'><rgb name='reflectance' value='0.2,0.5,0.7'/></bsdf>"));
+			     ROOM LAMP("0.8", "6,5,4")
+				     BALL("<bsdf type='diffuse'><rgb name='reflectance' value='0.2,0.5,0.7'/></bsdf>"));
 }
 
 struct reference {
@@ -79,8 +83,12 @@ static struct reference *reference_of(int scene)
 	r->rgb = calloc(r->values, sizeof *r->rgb);
 	enum { PARTS = 4 };
 	struct repeats parts;
-	repeats_run(r->world, &(struct repeats_how){.integrator = scene == GLASS ? "bdpt" : "path", .test = "calibration reference",
-						    .count = PARTS, .spp = scene == GLASS ? 10000 : 6000}, NULL, NULL, &parts);
+	repeats_run(r->world,
+		    &(struct repeats_how){.integrator = scene == GLASS ? "bdpt" : "path",
+					  .test = "calibration reference",
+					  .count = PARTS,
+					  .spp = scene == GLASS ? 10000 : 6000},
+		    NULL, NULL, &parts);
 	double mean = 0;
 	for (uint32_t p = 0; p < PARTS; p++) {
 		r->variance += parts.images[p].rel_mse / PARTS / PARTS;
@@ -105,7 +113,7 @@ struct kase {
 
 struct figures {
 	double realised, bias, median, pixels; /* root mean square; mean estimated over mean realised; .. */
-	int known, held, upper, b_held; /* known: renders that state an interval */
+	int known, held, upper, b_held;	       /* known: renders that state an interval */
 };
 
 static int by_size(const void *a, const void *b)
@@ -159,9 +167,14 @@ static bool interval_is_right(const struct figures *f)
 
 static void check(const struct kase *c)
 {
-	struct repeats_how how = {.integrator = c->integrator, .test = c->name, .count = RENDERS / test_scale() + 1,
-				  .spp = c->spp * (full() ? 2 : 1), .epoch = c->epoch, .bootstrap = c->bootstrap,
-				  .chains = c->chains, .groups = 16};
+	struct repeats_how how = {.integrator = c->integrator,
+				  .test = c->name,
+				  .count = RENDERS / test_scale() + 1,
+				  .spp = c->spp * (full() ? 2 : 1),
+				  .epoch = c->epoch,
+				  .bootstrap = c->bootstrap,
+				  .chains = c->chains,
+				  .groups = 16};
 	struct repeats s;
 	if (test_scale() > 1) {
 		struct world *w = build(c->scene, 8, 6);
@@ -178,8 +191,9 @@ static void check(const struct kase *c)
 	for (uint32_t i = 0; i < RENDERS; i++)
 		b += s.images[i].b / RENDERS;
 	struct figures f = figures_of(r, &s, b, 1), planted = figures_of(r, &s, b, 1.3);
-	print_message("| %s | %s | %.1f | %.2f | %.2f | %d of %d | %d | %.1f | %d | %.3f |\n", c->name, c->integrator, 100 * f.realised, f.bias,
-		      f.median, f.held, f.known, f.upper, 100 * f.pixels, c->chains ? f.b_held : 0, s.cpu_seconds / RENDERS);
+	print_message("| %s | %s | %.1f | %.2f | %.2f | %d of %d | %d | %.1f | %d | %.3f |\n", c->name, c->integrator,
+		      100 * f.realised, f.bias, f.median, f.held, f.known, f.upper, 100 * f.pixels,
+		      c->chains ? f.b_held : 0, s.cpu_seconds / RENDERS);
 	repeats_free(&s);
 	assert_true(interval_is_right(&f));
 	assert_true(fabs(f.median - 1) <= c->median);
@@ -189,17 +203,18 @@ static void check(const struct kase *c)
 	assert_false(interval_is_right(&planted) && fabs(planted.median - 1) <= c->median);
 }
 
-#define CASE(function, ...)                                                                                                     \
-	static void function(void **unused)                                                                                      \
-	{                                                                                                                        \
-		(void)unused;                                                                                                    \
-		check(&(struct kase){__VA_ARGS__});                                                                              \
+#define CASE(function, ...)                         \
+	static void function(void **unused)         \
+	{                                           \
+		(void)unused;                       \
+		check(&(struct kase){__VA_ARGS__}); \
 	}
 CASE(room_path, "diffuse room", "path", DIFFUSE, 32, 1, 1024, 0, 0.1)
 CASE(room_pssmlt, "diffuse room", "pssmlt", DIFFUSE, 160, 60, 4096, 16, 0.1)
 CASE(room_hslt, "diffuse room", "hslt", DIFFUSE, 640, 240, 4096, 16, 0.1)
 CASE(glass_path, "glass, fireflies", "path", GLASS, 256, 4, 1024, 0, 0.1)
-/* Where b is hardly known the estimate is too large rather than too small: its denominators lean on the neighbourhood. */
+/* Where b is hardly known the estimate is too large rather than too small: its denominators lean on the neighbourhood.
+ */
 CASE(glass_pssmlt, "glass, little known of b", "pssmlt", GLASS, 160, 60, 1024, 16, 0.15)
 CASE(glass_hslt, "glass", "hslt", GLASS, 640, 240, 2048, 16, 0.1)
 
@@ -217,7 +232,7 @@ static int forget(void **unused)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(room_path), cmocka_unit_test(room_pssmlt), cmocka_unit_test(room_hslt),
+		cmocka_unit_test(room_path),  cmocka_unit_test(room_pssmlt),  cmocka_unit_test(room_hslt),
 		cmocka_unit_test(glass_path), cmocka_unit_test(glass_pssmlt), cmocka_unit_test(glass_hslt),
 	};
 	return cmocka_run_group_tests(tests, NULL, forget);

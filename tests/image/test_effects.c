@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a scene does not call for changes nothing: each effect is forced on where it is off, and the image stays. Bit for bit
- * (sums of each block of each group) where nothing else is drawn by it; else the two agree by t between 32 groups, level 1e-6
- * a comparison, and find 2 % on a block and 0.5 % on the mean (agree.h prints both). Some 70 seconds on one core.
+ * What a scene does not call for changes nothing: each effect is forced on where it is off, and the image stays. Bit
+ * for bit (sums of each block of each group) where nothing else is drawn by it; else the two agree by t between 32
+ * groups, level 1e-6 a comparison, and find 2 % on a block and 0.5 % on the mean (agree.h prints both). Some 70 seconds
+ * on one core.
  */
 #include "tests/support/agree.h"
 #include "tests/support/worlds.h"
@@ -17,29 +18,42 @@
 
 #define DEPTH "<integrator type='path'><integer name='max_depth' value='4'/></integrator>"
 #define VIEW DEPTH SENSOR("0,0.2,1.9", "0,-0.3,-1")
+/* clang-format off */
 #define WALLS                                                                                                                   \
 	"<shape type='cube'><transform name='to_world'><scale value='2'/></transform>"                                          \
 	"<bsdf type='diffuse'><float name='reflectance' value='0.5'/></bsdf></shape>"
 #define LAMP                                                                                                                    \
 	"<shape type='rectangle'><transform name='to_world'><scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/>" \
 	"</transform><emitter type='area'><float name='radiance' value='3'/></emitter></shape>"
-#define POINT "<emitter type='point'><point name='position' x='0.5' y='1.2' z='0'/><float name='intensity' value='3'/></emitter>"
-#define BALL(bsdf)                                                                                                              \
-	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf "</shape>"
-/* A floor from above under a wide lamp, and glass under the sky: nearly the same everywhere, so that chains agree in seconds. */
-#define FROM_ABOVE "<integrator type='path'><integer name='max_depth' value='2'/></integrator>" SENSOR("0,3,0.5", "0,0,0")
+/* clang-format on */
+#define POINT \
+	"<emitter type='point'><point name='position' x='0.5' y='1.2' z='0'/><float name='intensity' value='3'/></emitter>"
+#define BALL(bsdf)                                                                                               \
+	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf \
+	"</shape>"
+/* A floor from above under a wide lamp, and glass under the sky: nearly the same everywhere, so that chains agree in
+ * seconds. */
+#define FROM_ABOVE \
+	"<integrator type='path'><integer name='max_depth' value='2'/></integrator>" SENSOR("0,3,0.5", "0,0,0")
+/* clang-format off */
 #define PLATE(inner)                                                                                                            \
 	"<shape type='rectangle'><transform name='to_world'><scale value='6'/><rotate x='1' angle='-90'/></transform>" inner     \
 	"</shape>"
 #define LIT_PLATE                                                                                                               \
 	FROM_ABOVE PLATE("") "<shape type='rectangle'><transform name='to_world'><scale value='6'/><rotate x='1' angle='90'/>"  \
 			     "<translate y='5'/></transform><emitter type='area'><float name='radiance' value='3'/></emitter></shape>"
-#define POINT_OVER_PLATE                                                                                                        \
-	FROM_ABOVE PLATE("") "<emitter type='point'><point name='position' x='0' y='5' z='0'/><float name='intensity' value='9'/></emitter>"
-#define PANE FROM_ABOVE PLATE("<bsdf type='dielectric'/>") "<emitter type='constant'><float name='radiance' value='1'/></emitter>"
+/* clang-format on */
+#define POINT_OVER_PLATE  \
+	FROM_ABOVE PLATE( \
+		"") "<emitter type='point'><point name='position' x='0' y='5' z='0'/><float name='intensity' value='9'/></emitter>"
+#define PANE              \
+	FROM_ABOVE PLATE( \
+		"<bsdf type='dielectric'/>") "<emitter type='constant'><float name='radiance' value='1'/></emitter>"
+/* clang-format off */
 #define GLASS_UNDER_THE_SKY                                                                                                     \
 	DEPTH SENSOR("0,1,5", "0,-0.2,0") "<emitter type='constant'><float name='radiance' value='1'/></emitter>"               \
 	"<shape type='sphere'><point name='center' value='0,-0.2,0'/><float name='radius' value='0.8'/><bsdf type='dielectric'/></shape>"
+/* clang-format on */
 
 static struct world *world_with(const char *scene, const char *effects)
 {
@@ -91,37 +105,41 @@ static void check_bits(const char *scene, const char *effect)
 static void test_bits(void **state)
 {
 	(void)state;
-	static const char *const in_a_grey_room[] = {"aperture", "half-vectors", "specular", "glossy", "transmission", "textures",
-						     "displacement", "environment", "delta-light"};
+	static const char *const in_a_grey_room[] = {"aperture",     "half-vectors", "specular",
+						     "glossy",	     "transmission", "textures",
+						     "displacement", "environment",  "delta-light"};
 	for (size_t i = 0; i < sizeof in_a_grey_room / sizeof *in_a_grey_room; i++)
 		check_bits(VIEW WALLS LAMP, in_a_grey_room[i]);
 	check_bits(VIEW WALLS POINT, "area-light");
 	check_bits(VIEW WALLS POINT, "emitter-move");
 	check_bits(VIEW BALL("<bsdf type='conductor'><string name='material' value='none'/></bsdf>") LAMP, "diffuse");
 	/* Glass in a closed box is left out of the world, unless something is forced on. */
-	check_bits(VIEW WALLS LAMP
-		   "<shape type='cube'><transform name='to_world'><scale value='0.4'/><translate y='-0.6'/></transform></shape>"
-		   "<shape type='sphere'><point name='center' value='0,-0.6,0'/><float name='radius' value='0.3'/><bsdf type='dielectric'/></shape>",
-		   "textures");
+	check_bits(
+		VIEW WALLS LAMP
+		"<shape type='cube'><transform name='to_world'><scale value='0.4'/><translate y='-0.6'/></transform></shape>"
+		"<shape type='sphere'><point name='center' value='0,-0.6,0'/><float name='radius' value='0.3'/><bsdf type='dielectric'/></shape>",
+		"textures");
 	/* The floor alone scatters: longer paths than two edges carry nothing, but are tried. */
-	check_bits(DEPTH SENSOR("0,1,5", "0,-0.2,0")
-		   "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform></shape>" POINT,
-		   "depth");
+	check_bits(
+		DEPTH SENSOR(
+			"0,1,5",
+			"0,-0.2,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform></shape>" POINT,
+		"depth");
 }
 
 /* ---- statistics ---- */
 
 static const struct comparison {
 	const char *name, *scene, *effects, *effect, *integrator;
-	uint64_t spp, forced_spp; /* one wavelength a path is noisier than four, four than grey */
+	uint64_t spp, forced_spp;	/* one wavelength a path is noisier than four, four than grey */
 	const char *mutations, *forced; /* half of them independent, so that blocks agree to 2 % in seconds */
 } comparisons[] = {
 	{"colour", VIEW WALLS LAMP, "+colour", "colour", "path", 6144, 6144, NULL, NULL},
 	{"dispersion", GLASS_UNDER_THE_SKY, "+dispersion", "dispersion", "path", 3072, 6144, NULL, NULL},
 	{"dispersion in chains", PANE, "+dispersion", "dispersion", "hslt", 18432, 43008, "bidirectional=0.5,hslt=0.5",
 	 "bidirectional=0.5,hslt=0.3,wavelength=0.2"},
-	{"emitter moves in chains", POINT_OVER_PLATE, "+emitter-move", "emitter-move", "hslt", 16384, 16384, "bidirectional=0.5,rejoin=0.5",
-	 "bidirectional=0.5,hslt=0.3,light=0.2"},
+	{"emitter moves in chains", POINT_OVER_PLATE, "+emitter-move", "emitter-move", "hslt", 16384, 16384,
+	 "bidirectional=0.5,rejoin=0.5", "bidirectional=0.5,hslt=0.3,light=0.2"},
 	{"all in chains", LIT_PLATE, "all", "half-vectors", "hslt", 16384, 20480, "bidirectional=0.5,rejoin=0.5",
 	 "bidirectional=0.5,hslt=0.2,lens=0.1,light=0.1,wavelength=0.1"},
 };
@@ -131,7 +149,8 @@ static void test_agreement(void **state)
 	const struct comparison *t = *state;
 	static struct agree_image plain, forced;
 	struct world *a = world_with(t->scene, NULL), *b = world_with(t->scene, t->effects);
-	const struct agree_side how = {t->integrator, t->spp, 32, 0, 0}, more = {t->integrator, t->forced_spp, 32, 0, 0};
+	const struct agree_side how = {t->integrator, t->spp, 32, 0, 0},
+				more = {t->integrator, t->forced_spp, 32, 0, 0};
 	assert_false(is_on(a, t->effect));
 	assert_true(is_on(b, t->effect));
 	agree_render_mixture(a, t->name, "plain", &how, t->mutations, &plain);
@@ -146,6 +165,7 @@ int main(void)
 	enum { COMPARED = sizeof comparisons / sizeof *comparisons };
 	struct CMUnitTest tests[COMPARED + 1] = {cmocka_unit_test(test_bits)};
 	for (size_t i = 0; i < COMPARED; i++)
-		tests[i + 1] = (struct CMUnitTest){comparisons[i].name, test_agreement, NULL, NULL, (void *)(uintptr_t)&comparisons[i]};
+		tests[i + 1] = (struct CMUnitTest){comparisons[i].name, test_agreement, NULL, NULL,
+						   (void *)(uintptr_t)&comparisons[i]};
 	return _cmocka_run_group_tests("effects", tests, COMPARED + 1, NULL, NULL);
 }

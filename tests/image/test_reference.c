@@ -2,15 +2,16 @@
 /*
  * `path` against reference images of another renderer, where HSLT_SCENES names the folder of public scenes.
  *
- * The references are of an RGB renderer. Light that meets saturated walls several times has another colour there than here:
- * the product of smooth spectra is not the product of their RGB triples. That is no error of transport, so transport is
- * compared like with like: the scene is rendered three times in grey, with every colour replaced by one of its channels. A
- * grey scene carries no wavelengths and multiplies numbers, as an RGB renderer does. Of the spectral picture the luminance
- * is compared.
+ * The references are of an RGB renderer. Light that meets saturated walls several times has another colour there than
+ * here: the product of smooth spectra is not the product of their RGB triples. That is no error of transport, so
+ * transport is compared like with like: the scene is rendered three times in grey, with every colour replaced by one of
+ * its channels. A grey scene carries no wavelengths and multiplies numbers, as an RGB renderer does. Of the spectral
+ * picture the luminance is compared.
  *
- * The references were filtered at their own size, so this renders at their size, with the scene's filter, and averages both
- * to 256 pixels wide: at least 256 samples a pixel that is compared. With HSLT_TEST_SCALE=N there are N times fewer, and
- * figures are only printed: at 256 samples most of what is left is noise, four times the samples give a quarter of it.
+ * The references were filtered at their own size, so this renders at their size, with the scene's filter, and averages
+ * both to 256 pixels wide: at least 256 samples a pixel that is compared. With HSLT_TEST_SCALE=N there are N times
+ * fewer, and figures are only printed: at 256 samples most of what is left is noise, four times the samples give a
+ * quarter of it.
  */
 #include "common/film/color.h"
 #include "tests/support/memory_assets.h"
@@ -152,15 +153,15 @@ static void render_in_colour(const struct subject *s, uint64_t fewer, struct pic
 }
 
 /* Prints; what: of which pictures. */
-static struct compare_result measure(const struct picture *ours, const struct picture *reference, const struct subject *s,
-				     const char *what)
+static struct compare_result measure(const struct picture *ours, const struct picture *reference,
+				     const struct subject *s, const char *what)
 {
 	struct compare_result all, r;
 	struct error e = {""};
 	if (compare(ours, reference, 0, &all, &e) || compare(ours, reference, trim, &r, &e))
 		fail_msg("%s", e.text);
-	print_message("%s, %s: mean luminance x %.4f, relMSE %.4f, trimmed %.4f\n", s->folder, what, r.luminance_ratio, all.rel_mse,
-		      r.rel_mse);
+	print_message("%s, %s: mean luminance x %.4f, relMSE %.4f, trimmed %.4f\n", s->folder, what, r.luminance_ratio,
+		      all.rel_mse, r.rel_mse);
 	return r;
 }
 
@@ -176,7 +177,8 @@ static void judge(const struct compare_result *r)
 static void keep_luminance(struct picture *p)
 {
 	for (size_t i = 0; i < (size_t)p->image.width * p->image.height; i++) {
-		double y = 0.2126 * (double)p->rgb[0][i] + 0.7152 * (double)p->rgb[1][i] + 0.0722 * (double)p->rgb[2][i];
+		double y =
+			0.2126 * (double)p->rgb[0][i] + 0.7152 * (double)p->rgb[1][i] + 0.0722 * (double)p->rgb[2][i];
 		for (int c = 0; c < 3; c++)
 			p->image.planes[c][i] = (float)y;
 	}
@@ -231,8 +233,8 @@ static void cornell_box_in_colour(void **state)
 	compare_in_colour(&cornell_box);
 }
 
-/* The scene says maxDepth 5, but its reference shows direct light only: its plates do not mirror the lit wall and floor. At
- * two edges the pictures agree. */
+/* The scene says maxDepth 5, but its reference shows direct light only: its plates do not mirror the lit wall and
+ * floor. At two edges the pictures agree. */
 static const struct subject veach_mis = {"veach-mis", 2}, veach_mis_as_written = {"veach-mis", 0};
 
 static void veach_mis_in_grey(void **state)
@@ -250,7 +252,8 @@ static void veach_mis_in_colour(void **state)
 	render_in_colour(&veach_mis_as_written, 4, &ours);
 	keep_luminance(&ours);
 	keep_luminance(&reference);
-	measure(&ours, &reference, &veach_mis, "spectral, luminance, at the scene's own depth (not tested: the reference is direct light)");
+	measure(&ours, &reference, &veach_mis,
+		"spectral, luminance, at the scene's own depth (not tested: the reference is direct light)");
 	picture_fini(&ours);
 	picture_fini(&reference);
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The default integrator against bdpt on whole scenes: those that are shipped, and the public ones where HSLT_SCENES names
- * their folder. Within the errors of both, at the level of all comparisons; how small a bias would have been found is printed.
+ * The default integrator against bdpt on whole scenes: those that are shipped, and the public ones where HSLT_SCENES
+ * names their folder. Within the errors of both, at the level of all comparisons; how small a bias would have been
+ * found is printed.
  */
 #include "tests/support/agree.h"
 #include "tests/support/worlds.h"
@@ -72,7 +73,7 @@ static void test_rates(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_own),	  cmocka_unit_test(test_cornell_box), cmocka_unit_test(test_veach_mis),
+		cmocka_unit_test(test_own),	   cmocka_unit_test(test_cornell_box), cmocka_unit_test(test_veach_mis),
 		cmocka_unit_test(test_veach_door), cmocka_unit_test(test_rates),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

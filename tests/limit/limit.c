@@ -1,12 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* limit CPU IDLE COMMAND...: runs a test and ends it when it has used CPU seconds of processor time, or has been idle for IDLE seconds.
+/* limit CPU IDLE COMMAND...: runs a test and ends it when it has used CPU seconds of processor time, or has been idle
+ * for IDLE seconds.
  *
- * Both count all processes that the command started, also those that left their session or lost their parent. Idle is time in which none
- * of them ran, wanted to run, or waited for a disk; it counts from the last output on. So a busy machine, on which all takes longer,
- * ends nothing, and a test that polls for something that never comes is ended all the same. Output is what the file on stdout grows by.
+ * Both count all processes that the command started, also those that left their session or lost their parent. Idle is
+ * time in which none of them ran, wanted to run, or waited for a disk; it counts from the last output on. So a busy
+ * machine, on which all takes longer, ends nothing, and a test that polls for something that never comes is ended all
+ * the same. Output is what the file on stdout grows by.
  *
- * The exit code is the command's, 128 + N if signal N ended it, 124 if this program did: it then says on stderr why, and what each
- * process was doing, sends SIGTERM to all of them and ten seconds later SIGKILL. SIGINT, SIGTERM and SIGHUP do the same without a word.
+ * The exit code is the command's, 128 + N if signal N ended it, 124 if this program did: it then says on stderr why,
+ * and what each process was doing, sends SIGTERM to all of them and ten seconds later SIGKILL. SIGINT, SIGTERM and
+ * SIGHUP do the same without a word.
  */
 #include <dirent.h>
 #include <errno.h>
@@ -57,11 +60,12 @@ static bool read_stat(const char *path, struct process *p)
 	unsigned long user, system;
 	long user_children, system_children;
 	if (!open || !close || close < open ||
-	    sscanf(close + 1, " %c %d %*d %*d %*d %*d %*u %*u %*u %*u %*u %lu %lu %ld %ld", &p->state, &p->parent, &user, &system,
-	           &user_children, &system_children) != 6)
+	    sscanf(close + 1, " %c %d %*d %*d %*d %*d %*u %*u %*u %*u %*u %lu %lu %ld %ld", &p->state, &p->parent,
+		   &user, &system, &user_children, &system_children) != 6)
 		return false;
 	snprintf(p->name, sizeof p->name, "%.*s", (int)(close - open - 1), open + 1);
-	p->cpu = (double)(user + system + (unsigned long)user_children + (unsigned long)system_children) / (double)sysconf(_SC_CLK_TCK);
+	p->cpu = (double)(user + system + (unsigned long)user_children + (unsigned long)system_children) /
+		 (double)sysconf(_SC_CLK_TCK);
 	return true;
 }
 
@@ -193,10 +197,12 @@ static void end_all(struct table *t)
 
 static void say(const struct table *t, const char *command, const char *what, double seconds)
 {
-	fprintf(stderr, "limit: %s: %s for %.0f s; its processes, their states and seconds of processor time:\n", command, what, seconds);
+	fprintf(stderr, "limit: %s: %s for %.0f s; its processes, their states and seconds of processor time:\n",
+		command, what, seconds);
 	for (size_t i = 0; i < t->n; i++)
 		if (t->of[i].ours)
-			fprintf(stderr, "limit:   %d %s %c %.1f\n", t->of[i].pid, t->of[i].name, t->of[i].state, t->of[i].cpu);
+			fprintf(stderr, "limit:   %d %s %c %.1f\n", t->of[i].pid, t->of[i].name, t->of[i].state,
+				t->of[i].cpu);
 }
 
 /* Ends when the command has, or a limit is reached. */

@@ -2,8 +2,8 @@
 # Who includes whom, against includes.txt; no unfinished marks; no overlong files. A line for each check, then what is wrong.
 cd "$(dirname "$0")/../.." || exit 1
 LIST=tests/lint/includes.txt
-MOST_LINES=600
-MOST_LINES_TEST=650
+MOST_LINES=620
+MOST_LINES_TEST=690
 FOLDERS="common coordinator worker"
 SOURCES=$(find $FOLDERS -name '*.[ch]' | sort)
 failed=0

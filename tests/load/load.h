@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A farm under load: the real coordinator in a process of its own, its real protocol over TLS, and workers that render nothing: they
- * say hello, fetch the job's files, ask for leases, wait as long as a lease would take, and send a batch that was made once. One
- * process, one thread, one loop for all of them. What goes wrong in the generator itself ends it.
+ * A farm under load: the real coordinator in a process of its own, its real protocol over TLS, and workers that render
+ * nothing: they say hello, fetch the job's files, ask for leases, wait as long as a lease would take, and send a batch
+ * that was made once. One process, one thread, one loop for all of them. What goes wrong in the generator itself ends
+ * it.
  */
 #ifndef TESTS_LOAD_LOAD_H
 #define TESTS_LOAD_LOAD_H
@@ -18,16 +19,17 @@ enum load_kind {
 	LOAD_DIES,   /* in a third of its leases: hangs up without a word, and calls again */
 	LOAD_LIES,   /* every result holds what is no number */
 	LOAD_HOARDS, /* claims 4,096 threads, takes what it gets, and says nothing but heartbeats */
-	LOAD_HANGS,  /* in a third of its leases: says nothing more, not even heartbeats; when it is hung up on it calls again */
+	LOAD_HANGS,  /* in a third of its leases: says nothing more, not even heartbeats; when it is hung up on it calls
+			again */
 	LOAD_KINDS
 };
 
 struct load_settings {
-	unsigned bad[LOAD_KINDS]; /* how many; LOAD_HONEST is the rest */
+	unsigned bad[LOAD_KINDS];			      /* how many; LOAD_HONEST is the rest */
 	unsigned workers, width, height, groups, parts, jobs; /* jobs 0: as many as keep all of them busy */
-	double minutes, interval, ramp; /* s between a worker's batches; connections a second */
+	double minutes, interval, ramp;			      /* s between a worker's batches; connections a second */
 	double heartbeat;
-	unsigned want;          /* leases that a worker holds: one in work, the others at hand */
+	unsigned want;	       /* leases that a worker holds: one in work, the others at hand */
 	bool insecure, losses; /* losses: nothing else is judged */
 	const char *bin, *spool, *options;
 };
@@ -84,8 +86,8 @@ struct load {
 	char fault[256]; /* the first one */
 };
 
-double load_now(void);           /* s */
-double load_uniform(struct load *l); /* [0,1) */
+double load_now(void);				      /* s */
+double load_uniform(struct load *l);		      /* [0,1) */
 struct load_worker *load_workers_new(unsigned count); /* NULL: no memory */
 void load_connect(struct load *l, unsigned index);
 /* No more leases; what is being worked on is given back, what was sent is waited for. */

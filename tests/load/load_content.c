@@ -25,7 +25,8 @@ static void pack(struct kind *k, const struct batch *b, const struct plan *p)
 	struct batch again;
 	if (batch_check(b, p, &e) || batch_pack(b, p, &k->frame, &size, &e))
 		load_die("the batch: %s", e.text);
-	uint32_t header = (uint32_t)k->frame[0] << 24 | (uint32_t)k->frame[1] << 16 | (uint32_t)k->frame[2] << 8 | k->frame[3];
+	uint32_t header =
+		(uint32_t)k->frame[0] << 24 | (uint32_t)k->frame[1] << 16 | (uint32_t)k->frame[2] << 8 | k->frame[3];
 	if (envelope_unpack(&k->env, k->frame + FRAME_PREFIX, header, &e))
 		load_die("the batch: %s", e.text);
 	k->payload = k->frame + FRAME_PREFIX + header;

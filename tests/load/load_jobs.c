@@ -71,7 +71,8 @@ void load_submit(struct load *l, const char *host_port, const char *tls, unsigne
 double load_counted(const struct load *l, const char *socket, uint64_t job)
 {
 	char command[4096];
-	snprintf(command, sizeof command, "%s/hslt-status --socket %s --json j%llu", l->s.bin, socket, (unsigned long long)job);
+	snprintf(command, sizeof command, "%s/hslt-status --socket %s --json j%llu", l->s.bin, socket,
+		 (unsigned long long)job);
 	FILE *f = popen(command, "r");
 	json_error_t fault;
 	json_t *o = f ? json_loadf(f, JSON_DISABLE_EOF_CHECK, &fault) : NULL;

@@ -20,12 +20,31 @@ static const char doc[] =
 	"Ends with 1 when a bound is missed: no lease lost, less than one core, less than 1 GB beyond the films, 99 % of the leases "
 	"within 100 ms.";
 
-enum { OPTION_BIN = 256, OPTION_MINUTES, OPTION_SIZE, OPTION_INTERVAL, OPTION_INSECURE, OPTION_JOBS, OPTION_GROUPS, OPTION_PARTS,
-       OPTION_DYING, OPTION_LYING, OPTION_HOARDING, OPTION_HANGING, OPTION_RAMP, OPTION_SPOOL, OPTION_WANT, OPTION_HEARTBEAT, OPTION_COORDINATOR, OPTION_LOSSES };
+enum {
+	OPTION_BIN = 256,
+	OPTION_MINUTES,
+	OPTION_SIZE,
+	OPTION_INTERVAL,
+	OPTION_INSECURE,
+	OPTION_JOBS,
+	OPTION_GROUPS,
+	OPTION_PARTS,
+	OPTION_DYING,
+	OPTION_LYING,
+	OPTION_HOARDING,
+	OPTION_HANGING,
+	OPTION_RAMP,
+	OPTION_SPOOL,
+	OPTION_WANT,
+	OPTION_HEARTBEAT,
+	OPTION_COORDINATOR,
+	OPTION_LOSSES
+};
 
 static const struct argp_option options[] = {
 	{"workers", 'w', "N", 0, "Connected workers (1000)", 0},
-	{"minutes", OPTION_MINUTES, "M", 0, "How long is measured, once all are connected and each has sent a batch (10)", 0},
+	{"minutes", OPTION_MINUTES, "M", 0,
+	 "How long is measured, once all are connected and each has sent a batch (10)", 0},
 	{"size", OPTION_SIZE, "WxH", 0, "Film of each job (1280x720)", 0},
 	{"interval", OPTION_INTERVAL, "SECONDS", 0, "Between a worker's batches (60)", 0},
 	{"jobs", OPTION_JOBS, "N", 0, "Jobs at once (as many as keep all of them busy, and one)", 0},
@@ -35,10 +54,12 @@ static const struct argp_option options[] = {
 	{"dying", OPTION_DYING, "N", 0, "Of the workers so many die in a third of their leases, and call again (0)", 0},
 	{"lying", OPTION_LYING, "N", 0, "... send results that cannot be (0)", 0},
 	{"hoarding", OPTION_HOARDING, "N", 0, "... claim 4,096 threads, take leases and give nothing (0)", 0},
-	{"hanging", OPTION_HANGING, "N", 0, "... stand still in a third of their leases, until they are hung up on (0)", 0},
+	{"hanging", OPTION_HANGING, "N", 0, "... stand still in a third of their leases, until they are hung up on (0)",
+	 0},
 	{"ramp", OPTION_RAMP, "N", 0, "New connections a second (100)", 0},
 	{"heartbeat", OPTION_HEARTBEAT, "SECONDS", 0, "Of the coordinator (5)", 0},
-	{"spool", OPTION_SPOOL, "DIR", 0, "Where a folder for spool, certificates and logs is made and removed (/tmp)", 0},
+	{"spool", OPTION_SPOOL, "DIR", 0, "Where a folder for spool, certificates and logs is made and removed (/tmp)",
+	 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Without TLS", 0},
 	{"coordinator", OPTION_COORDINATOR, "OPTIONS", 0, "More options for the coordinator", 0},
 	{"losses", OPTION_LOSSES, NULL, 0, "Only what is lost or wrong counts, not how fast it is", 0},
@@ -191,9 +212,10 @@ static void start(char *host_port, size_t size)
 		make_certificates();
 		snprintf(tls, sizeof tls, " --tls %s/coordinator", folder);
 	}
-	process_start(&coordinator, load.s.bin, log_file,
-		      "hslt-coordinator --listen 127.0.0.1:0 --port-file %s --spool %s/spool --status-socket %s --heartbeat %g%s %s",
-		      port_file, folder, status_socket, load.s.heartbeat, tls, load.s.options);
+	process_start(
+		&coordinator, load.s.bin, log_file,
+		"hslt-coordinator --listen 127.0.0.1:0 --port-file %s --spool %s/spool --status-socket %s --heartbeat %g%s %s",
+		port_file, folder, status_socket, load.s.heartbeat, tls, load.s.options);
 	for (int i = 0; i < 1200 && !*port; i++) {
 		usleep(50000);
 		FILE *f = fopen(port_file, "r");
@@ -251,7 +273,8 @@ static double own_cpu(void)
 {
 	struct rusage r;
 	getrusage(RUSAGE_SELF, &r);
-	return (double)(r.ru_utime.tv_sec + r.ru_stime.tv_sec) + 1e-6 * (double)(r.ru_utime.tv_usec + r.ru_stime.tv_usec);
+	return (double)(r.ru_utime.tv_sec + r.ru_stime.tv_sec) +
+	       1e-6 * (double)(r.ru_utime.tv_usec + r.ru_stime.tv_usec);
 }
 
 static void mark(int which)
@@ -286,7 +309,9 @@ static void on_phase(uv_timer_t *t)
 	clockwork.anonymous = fmax(clockwork.anonymous, anonymous);
 	if (!process_is_running(&coordinator))
 		load_die("the coordinator has ended");
-	if (!load.measuring && !load.leaving && load.connected + load.s.bad[LOAD_DIES] + load.s.bad[LOAD_HANGS] >= load.s.workers && load.merged >= load.s.workers) {
+	if (!load.measuring && !load.leaving &&
+	    load.connected + load.s.bad[LOAD_DIES] + load.s.bad[LOAD_HANGS] >= load.s.workers &&
+	    load.merged >= load.s.workers) {
 		load.measuring = true;
 		mark(0);
 		fprintf(stderr, "load: %u workers are connected and have sent a batch; measuring\n", load.connected);
@@ -328,7 +353,8 @@ static void run_loop(void)
 
 static void row_times(const char *what, struct load_times *t)
 {
-	printf("%-46s %9.2f %9.2f %9.2f ms  (%zu)\n", what, load_times_at(t, 0.5), load_times_at(t, 0.99), load_times_at(t, 1), t->count);
+	printf("%-46s %9.2f %9.2f %9.2f ms  (%zu)\n", what, load_times_at(t, 0.5), load_times_at(t, 0.99),
+	       load_times_at(t, 1), t->count);
 }
 
 static bool bound(const char *what, double value, const char *unit, double most, bool strict)
@@ -355,18 +381,21 @@ static int report(double wrong, double peak)
 	double seconds = clockwork.ended - clockwork.begun, cores = (clockwork.cpu[1] - clockwork.cpu[0]) / seconds;
 	double films = 72.0 * p->crop_width * p->crop_height * p->groups * load.job_count;
 	double lost = (double)(load_unanswered(&load) + load.refused);
-	printf("%u workers, %ux%u, a batch each %g s, %s, %u jobs of %u leases a round, %.1f minutes, load %.2f\n", load.s.workers, load.s.width,
-	       load.s.height, load.s.interval, load.s.insecure ? "plaintext" : "TLS", load.job_count, p->groups * p->parts, seconds / 60,
-	       clockwork.loaded);
+	printf("%u workers, %ux%u, a batch each %g s, %s, %u jobs of %u leases a round, %.1f minutes, load %.2f\n",
+	       load.s.workers, load.s.width, load.s.height, load.s.interval, load.s.insecure ? "plaintext" : "TLS",
+	       load.job_count, p->groups * p->parts, seconds / 60, clockwork.loaded);
 	printf("%-46s %9.3g MB\n", "a batch", 1e-6 * (double)load_content_bytes(load.content));
-	printf("%-46s %9.1f /s, %.1f MB/s\n", "batches", (double)load.batches / seconds, 1e-6 * (double)load.bytes / seconds);
-	printf("%-46s %9.1f MB/s\n", "written to the disk", 1e-6 * (clockwork.written[1] - clockwork.written[0]) / seconds);
-	printf("%-46s %9.2f s of %.2f s; whole life %.1f s\n", "coordinator's processor", clockwork.cpu[1] - clockwork.cpu[0], seconds,
-	       coordinator.cpu_seconds);
-	printf("%-46s %9.1f ms\n", "... of it for each batch", 1000 * (clockwork.cpu[1] - clockwork.cpu[0]) / (double)load.batches);
+	printf("%-46s %9.1f /s, %.1f MB/s\n", "batches", (double)load.batches / seconds,
+	       1e-6 * (double)load.bytes / seconds);
+	printf("%-46s %9.1f MB/s\n", "written to the disk",
+	       1e-6 * (clockwork.written[1] - clockwork.written[0]) / seconds);
+	printf("%-46s %9.2f s of %.2f s; whole life %.1f s\n", "coordinator's processor",
+	       clockwork.cpu[1] - clockwork.cpu[0], seconds, coordinator.cpu_seconds);
+	printf("%-46s %9.1f ms\n", "... of it for each batch",
+	       1000 * (clockwork.cpu[1] - clockwork.cpu[0]) / (double)load.batches);
 	printf("%-46s %9.2f s\n", "generator's processor", clockwork.own_cpu[1] - clockwork.own_cpu[0]);
-	printf("%-46s %9.3g GB peak, %.3g GB films, %.3g GB not from files\n", "coordinator's memory", 1e-9 * peak, 1e-9 * films,
-	       1e-9 * clockwork.anonymous);
+	printf("%-46s %9.3g GB peak, %.3g GB films, %.3g GB not from files\n", "coordinator's memory", 1e-9 * peak,
+	       1e-9 * films, 1e-9 * clockwork.anonymous);
 	printf("%-46s %9s %9s %9s\n", "", "p50", "p99", "max");
 	row_times("result handed over -> next lease", &load.grant);
 	row_times("first lease request -> lease", &load.first_grant);
@@ -375,12 +404,14 @@ static int report(double wrong, double peak)
 	row_times("result to the kernel", &load.send);
 	row_times("generator's timer late", &load.late);
 	printf("leases: %llu granted, %llu merged, %llu of bootstraps, %llu given back at the end, %llu copies taken back, %llu again to the same, %llu repeats\n",
-	       (unsigned long long)load.grants, (unsigned long long)load.merged, (unsigned long long)load.bootstrap_merged,
-	       (unsigned long long)load.given_back, (unsigned long long)load.revoked, (unsigned long long)load.again, (unsigned long long)load.repeated);
+	       (unsigned long long)load.grants, (unsigned long long)load.merged,
+	       (unsigned long long)load.bootstrap_merged, (unsigned long long)load.given_back,
+	       (unsigned long long)load.revoked, (unsigned long long)load.again, (unsigned long long)load.repeated);
 	const unsigned *bad = load.s.bad;
-	printf("bad workers: %u die (%llu deaths), %u lie (%llu results, %llu refused), %u hoard (%llu leases), %u hang (%llu times)\n", bad[LOAD_DIES],
-	       (unsigned long long)load.deaths, bad[LOAD_LIES], (unsigned long long)load.lies, (unsigned long long)load.lies_refused,
-	       bad[LOAD_HOARDS], (unsigned long long)load.hoarded, bad[LOAD_HANGS], (unsigned long long)load.hangs);
+	printf("bad workers: %u die (%llu deaths), %u lie (%llu results, %llu refused), %u hoard (%llu leases), %u hang (%llu times)\n",
+	       bad[LOAD_DIES], (unsigned long long)load.deaths, bad[LOAD_LIES], (unsigned long long)load.lies,
+	       (unsigned long long)load.lies_refused, bad[LOAD_HOARDS], (unsigned long long)load.hoarded,
+	       bad[LOAD_HANGS], (unsigned long long)load.hangs);
 	if (load.faults)
 		printf("faults: %llu, the first: %s\n", (unsigned long long)load.faults, load.fault);
 	bool met = bound("leases lost", lost, "", 0, false);
@@ -421,8 +452,19 @@ int main(int argc, char **argv)
 {
 	char host_port[64];
 	mem_keep(64 << 20);
-	load.s = (struct load_settings){.workers = 1000, .width = 1280, .height = 720, .groups = 16, .parts = 64, .minutes = 10, .interval = 60,
-					.ramp = 100, .heartbeat = 5, .want = 2, .bin = "build/bin", .spool = "/tmp", .options = ""};
+	load.s = (struct load_settings){.workers = 1000,
+					.width = 1280,
+					.height = 720,
+					.groups = 16,
+					.parts = 64,
+					.minutes = 10,
+					.interval = 60,
+					.ramp = 100,
+					.heartbeat = 5,
+					.want = 2,
+					.bin = "build/bin",
+					.spool = "/tmp",
+					.options = ""};
 	load.random = 1;
 	argp_err_exit_status = 2;
 	argp_parse(&(struct argp){options, parse, NULL, doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &load.s);

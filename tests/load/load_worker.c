@@ -179,11 +179,13 @@ static void send_result(struct load_worker *w, struct held *h)
 	conn_send_frame(w->conn, frame, size);
 }
 
-/* true: instead of sending what is ready it is gone. Not while an answer to another result is under way, which would not be counted. */
+/* true: instead of sending what is ready it is gone. Not while an answer to another result is under way, which would
+ * not be counted. */
 static bool ends_badly(struct load_worker *w)
 {
 	struct load *l = w->load;
-	if ((w->kind != LOAD_DIES && w->kind != LOAD_HANGS) || in_state(w, SENDING) || in_state(w, SENT) || load_uniform(l) > 1. / 3)
+	if ((w->kind != LOAD_DIES && w->kind != LOAD_HANGS) || in_state(w, SENDING) || in_state(w, SENT) ||
+	    load_uniform(l) > 1. / 3)
 		return false;
 	if (w->kind == LOAD_DIES) {
 		l->deaths++;
@@ -215,7 +217,8 @@ static void work_on(struct load_worker *w)
 	if (!h || !job_of(l, h->key.job, &i) || !(w->jobs_ready >> i & 1))
 		return;
 	h->state = WORKING;
-	/* Leases of the bootstrap are short; the crowd is spread over the interval by when each begins with its first other one. */
+	/* Leases of the bootstrap are short; the crowd is spread over the interval by when each begins with its first
+	 * other one. */
 	double seconds = l->s.interval * (0.9 + 0.2 * load_uniform(l));
 	if (h->key.kind == LEASE_BOOTSTRAP)
 		seconds = fmin(1, seconds) * (0.5 + 0.5 * load_uniform(l));
@@ -346,7 +349,8 @@ static void take_welcome(struct load_worker *w, const Farm__HelloAck *ack)
 		request(w, HOARD + 1);
 		return;
 	}
-	uv_timer_start(&w->beat, on_beat, (uint64_t)((double)ack->heartbeat_ms * load_uniform(l)) + 1, ack->heartbeat_ms);
+	uv_timer_start(&w->beat, on_beat, (uint64_t)((double)ack->heartbeat_ms * load_uniform(l)) + 1,
+		       ack->heartbeat_ms);
 	for (unsigned i = 0; i < l->s.want; i++)
 		wish(w, load_now());
 	request(w, l->s.want);
@@ -482,7 +486,8 @@ static enum load_kind kind_of(const struct load_settings *s, unsigned index)
 
 void load_connect(struct load *l, unsigned index)
 {
-	static const struct conn_events events = {.opened = on_opened, .message = on_message, .drained = on_drained, .closed = on_closed};
+	static const struct conn_events events = {
+		.opened = on_opened, .message = on_message, .drained = on_drained, .closed = on_closed};
 	struct conn_config config = {{HEADER_LIMIT, PAYLOAD_LIMIT}, SEND_LIMIT, 600, 0, l->tls};
 	struct load_worker *w = &l->workers[index];
 	struct error e;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Rows of `make test-numerics`: topic, case, what was measured, what it must be, verdict; by tabs. Without HSLT_TEST_ROWS=1 only
- * those that fail are shown.
+ * Rows of `make test-numerics`: topic, case, what was measured, what it must be, verdict; by tabs. Without
+ * HSLT_TEST_ROWS=1 only those that fail are shown.
  */
 #ifndef TESTS_NUMERICS_ROWS_H
 #define TESTS_NUMERICS_ROWS_H
@@ -14,7 +14,8 @@ struct rows {
 	unsigned cases, failed;
 };
 
-static inline void row(struct rows *r, const char *topic, const char *name, const char *measured, const char *bound, bool ok)
+static inline void row(struct rows *r, const char *topic, const char *name, const char *measured, const char *bound,
+		       bool ok)
 {
 	r->cases++;
 	r->failed += !ok;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes that are hard on the numbers, by four integrators that reach the same light in different ways: what one of them gets wrong
- * the others seldom do. One row each: bdpt, pssmlt and hslt against path, 2 x 2 blocks and the mean, at the level of
- * tests/support/agree.h. The smallest bias that is found with 95 % probability stands in the row: at most 5 % of the mean for the
- * table (HSLT_TEST_ROWS=1) where the case does not say otherwise, a third of that with FULL=1, which takes 16 times the samples; a
- * plain run, with a sixteenth, is there for what breaks altogether.
+ * Scenes that are hard on the numbers, by four integrators that reach the same light in different ways: what one of
+ * them gets wrong the others seldom do. One row each: bdpt, pssmlt and hslt against path, 2 x 2 blocks and the mean, at
+ * the level of tests/support/agree.h. The smallest bias that is found with 95 % probability stands in the row: at most
+ * 5 % of the mean for the table (HSLT_TEST_ROWS=1) where the case does not say otherwise, a third of that with FULL=1,
+ * which takes 16 times the samples; a plain run, with a sixteenth, is there for what breaks altogether.
  */
 #include "tests/numerics/rows.h"
 #include "tests/support/agree.h"
@@ -32,7 +32,8 @@ static double must_find(const struct agree_case *k)
 	return rows_scale() > 1 ? INFINITY : k->find * (rows_full() ? 0.3 : getenv("HSLT_TEST_ROWS") ? 1 : 5);
 }
 
-static void compare(const struct agree_case *k, const char *integrator, struct world *w, const struct agree_image *reference)
+static void compare(const struct agree_case *k, const char *integrator, struct world *w,
+		    const struct agree_image *reference)
 {
 	static struct agree_image other;
 	struct agree_difference d;
@@ -41,8 +42,9 @@ static void compare(const struct agree_case *k, const char *integrator, struct w
 	snprintf(name, sizeof name, "%s, %s", k->name, integrator);
 	agree_render(w, name, integrator, &side, &other);
 	agree_measure(&other, reference, &d);
-	snprintf(measured, sizeof measured, "differs from path by %+.2f %% +- %.2f %%; finds %.1f %% of the mean, %.1f %% of a block", 100 * d.mean,
-		 100 * d.error, 100 * d.found, 100 * d.found_block);
+	snprintf(measured, sizeof measured,
+		 "differs from path by %+.2f %% +- %.2f %%; finds %.1f %% of the mean, %.1f %% of a block",
+		 100 * d.mean, 100 * d.error, 100 * d.found, 100 * d.found_block);
 	snprintf(bound, sizeof bound, "the same image; finds %.2g %% of the mean", 100 * must_find(k));
 	row(&rows, k->topic, name, measured, bound, d.holds && d.found <= must_find(k));
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Scenes that are hard on the numbers (tests/support/hard_scenes.h), one row each. A strategy alone leaves bdpt's paths distributed
- * as they are (tests/support/stationary.h: level 1e-6; every 16th of its last paths passes path_check), and chains of the whole
- * mixture bring no NaN, infinity or negative value to their film. FULL=1: ten times the mutations.
+ * Scenes that are hard on the numbers (tests/support/hard_scenes.h), one row each. A strategy alone leaves bdpt's paths
+ * distributed as they are (tests/support/stationary.h: level 1e-6; every 16th of its last paths passes path_check), and
+ * chains of the whole mixture bring no NaN, infinity or negative value to their film. FULL=1: ten times the mutations.
  */
 #include "tests/numerics/rows.h"
 #include "tests/support/chains.h"
@@ -32,20 +32,32 @@ static void run(const struct hard_case *h)
 	struct world *w = h->make(h->parameter);
 	snprintf(test, sizeof test, "%s %s", h->topic, h->name);
 	unsigned more = rows_full() ? 10 : 1;
-	struct stationary_how alone = {h->mutation, h->min_edges, h->max_edges, 24 * more, 400 * more, STATIONARY_SOUND};
+	struct stationary_how alone = {h->mutation, h->min_edges, h->max_edges,
+				       24 * more,   400 * more,	  STATIONARY_SOUND};
 	stationary_run(w, test, &alone, &s);
-	struct chains_how all = {.min_depth = 1, .max_depth = h->max_edges < 8 ? 8 : h->max_edges, .chains = 16, .bootstrap = 2048,
-				 .steps = 1000 * more / rows_scale(), .seed = stats_seed(test)};
+	struct chains_how all = {.min_depth = 1,
+				 .max_depth = h->max_edges < 8 ? 8 : h->max_edges,
+				 .chains = 16,
+				 .bootstrap = 2048,
+				 .steps = 1000 * more / rows_scale(),
+				 .seed = stats_seed(test)};
 	chains_run(w, &all, &c);
-	double proposals = (double)s.proposals, walks = (double)(s.strategy[STRATEGY_WALKS] - s.strategy[STRATEGY_REVERSE_WALKS]);
-	double failed = (double)(s.strategy[STRATEGY_FAIL_SINGULAR] + s.strategy[STRATEGY_FAIL_DIVERGED] + s.strategy[STRATEGY_FAIL_ITERATIONS]);
-	snprintf(measured, sizeof measured, "%s: accepts %.1f %%, %.1f %% of walks do not converge, reverse fails %.2f %%, p %.2g by %s (%+.2g %% +- %.2g %%), finds %.1f %%; mixture: accepts %.1f %%, b %.3g, caught %llu, longest stuck %llu%s%s",
-		 h->mutation, 100 * (double)s.accepted / proposals, walks > 0 ? 100 * failed / walks : 0,
-		 100 * (double)s.strategy[STRATEGY_FAIL_REVERSE] / proposals, s.p, s.worst >= 0 ? stationary_function(s.worst) : "nothing",
-		 s.worst >= 0 ? 100 * s.bias[s.worst] : 0, s.worst >= 0 ? 100 * s.error[s.worst] : 0, 100 * s.least_block,
-		 100 * (double)c.counters[COUNT_ACCEPTED] / (double)c.counters[COUNT_SAMPLES], c.b, (unsigned long long)unsound(c.counters),
-		 (unsigned long long)c.counters[COUNT_LONGEST_STUCK], s.failure[0] ? "; " : "", s.failure);
-	row(&rows, h->topic, h->name, measured, "p > 1e-6; 0 caught; 0 in the film", stationary_holds(&s) && !c.film_invalid && !unsound(c.counters));
+	double proposals = (double)s.proposals,
+	       walks = (double)(s.strategy[STRATEGY_WALKS] - s.strategy[STRATEGY_REVERSE_WALKS]);
+	double failed = (double)(s.strategy[STRATEGY_FAIL_SINGULAR] + s.strategy[STRATEGY_FAIL_DIVERGED] +
+				 s.strategy[STRATEGY_FAIL_ITERATIONS]);
+	snprintf(
+		measured, sizeof measured,
+		"%s: accepts %.1f %%, %.1f %% of walks do not converge, reverse fails %.2f %%, p %.2g by %s (%+.2g %% +- %.2g %%), finds %.1f %%; mixture: accepts %.1f %%, b %.3g, caught %llu, longest stuck %llu%s%s",
+		h->mutation, 100 * (double)s.accepted / proposals, walks > 0 ? 100 * failed / walks : 0,
+		100 * (double)s.strategy[STRATEGY_FAIL_REVERSE] / proposals, s.p,
+		s.worst >= 0 ? stationary_function(s.worst) : "nothing", s.worst >= 0 ? 100 * s.bias[s.worst] : 0,
+		s.worst >= 0 ? 100 * s.error[s.worst] : 0, 100 * s.least_block,
+		100 * (double)c.counters[COUNT_ACCEPTED] / (double)c.counters[COUNT_SAMPLES], c.b,
+		(unsigned long long)unsound(c.counters), (unsigned long long)c.counters[COUNT_LONGEST_STUCK],
+		s.failure[0] ? "; " : "", s.failure);
+	row(&rows, h->topic, h->name, measured, "p > 1e-6; 0 caught; 0 in the film",
+	    stationary_holds(&s) && !c.film_invalid && !unsound(c.counters));
 	mutations += s.proposals + c.counters[COUNT_SAMPLES];
 	for (int i = 0; i < 3; i++)
 		caught[i] += s.counters[COUNT_NAN + i] + c.counters[COUNT_NAN + i];
@@ -61,9 +73,9 @@ static void test_hard(void **state)
 	for (const struct hard_case *h = hard_cases; h->topic; h++)
 		if (!only || strstr(h->topic, only))
 			run(h);
-	printf("hard scenes: %u cases, %u failed; %llu mutations, caught %llu NaN, %llu infinite, %llu negative; %llu in films\n", rows.cases,
-	       rows.failed, (unsigned long long)mutations, (unsigned long long)caught[0], (unsigned long long)caught[1],
-	       (unsigned long long)caught[2], (unsigned long long)invalid);
+	printf("hard scenes: %u cases, %u failed; %llu mutations, caught %llu NaN, %llu infinite, %llu negative; %llu in films\n",
+	       rows.cases, rows.failed, (unsigned long long)mutations, (unsigned long long)caught[0],
+	       (unsigned long long)caught[1], (unsigned long long)caught[2], (unsigned long long)invalid);
 	assert_int_equal(rows.failed, 0);
 }
 

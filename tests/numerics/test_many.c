@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Many mutations of the whole mixture over all hard scenes and those of the forced tests: not one NaN, infinity or negative
- * value reaches a film; how many were caught is printed, and where: in a contribution (by kind), or as a proposal that failed
- * by name. Invalid operations stop the program. 3 10^5 mutations; FULL=1: 10^8 by make test-numerics, 10^7 in make test.
+ * Many mutations of the whole mixture over all hard scenes and those of the forced tests: not one NaN, infinity or
+ * negative value reaches a film; how many were caught is printed, and where: in a contribution (by kind), or as a
+ * proposal that failed by name. Invalid operations stop the program. 3 10^5 mutations; FULL=1: 10^8 by make
+ * test-numerics, 10^7 in make test.
  */
 #include "tests/numerics/rows.h"
 #include "tests/support/chains.h"
@@ -25,7 +26,11 @@ static void run(struct world *w, const char *name, unsigned depth, uint64_t muta
 	struct chains_result r;
 	for (uint64_t done = 0; done < mutations; done += PIECE) {
 		uint64_t now = mutations - done < PIECE ? mutations - done : PIECE;
-		struct chains_how how = {.min_depth = 1, .max_depth = depth, .chains = CHAINS, .bootstrap = 2048, .steps = now / CHAINS + 1,
+		struct chains_how how = {.min_depth = 1,
+					 .max_depth = depth,
+					 .chains = CHAINS,
+					 .bootstrap = 2048,
+					 .steps = now / CHAINS + 1,
 					 .seed = stats_seed(name) + done};
 		chains_run(w, &how, &r);
 		sum.film += r.film_invalid;
@@ -42,9 +47,11 @@ static void run(struct world *w, const char *name, unsigned depth, uint64_t muta
 static void test_many(void **state)
 {
 	(void)state;
-	static const char *const reasons[] = {"outside", "missed", "blocked", "mode", "singular", "diverged", "iterations", "reverse", "specular", "emitter",
-					      "dark", "inapplicable"};
-	uint64_t scenes = TEST_SCENES, total = rows_full() ? getenv("HSLT_TEST_ROWS") ? 100000000 : 10000000 : 300000 / rows_scale();
+	static const char *const reasons[] = {"outside",  "missed",   "blocked",    "mode",
+					      "singular", "diverged", "iterations", "reverse",
+					      "specular", "emitter",  "dark",	    "inapplicable"};
+	uint64_t scenes = TEST_SCENES,
+		 total = rows_full() ? getenv("HSLT_TEST_ROWS") ? 100000000 : 10000000 : 300000 / rows_scale();
 	for (const struct hard_case *h = hard_cases; h->topic; h++)
 		scenes++;
 	for (int i = 0; i < TEST_SCENES; i++)
@@ -53,12 +60,14 @@ static void test_many(void **state)
 		run(h->make(h->parameter), h->name, h->max_edges < 12 ? 12 : h->max_edges, total / scenes + 1);
 	struct rows rows = {0, 0};
 	char measured[600];
-	int n = snprintf(measured, sizeof measured, "%llu invalid values in films; caught %llu NaN, %llu infinite, %llu negative; proposals that failed:",
-			 (unsigned long long)sum.film, (unsigned long long)sum.counters[COUNT_NAN],
-			 (unsigned long long)sum.counters[COUNT_INFINITE], (unsigned long long)sum.counters[COUNT_NEGATIVE]);
+	int n = snprintf(
+		measured, sizeof measured,
+		"%llu invalid values in films; caught %llu NaN, %llu infinite, %llu negative; proposals that failed:",
+		(unsigned long long)sum.film, (unsigned long long)sum.counters[COUNT_NAN],
+		(unsigned long long)sum.counters[COUNT_INFINITE], (unsigned long long)sum.counters[COUNT_NEGATIVE]);
 	for (int i = STRATEGY_FAIL_FIRST; i < STRATEGY_COUNTERS && n < (int)sizeof measured; i++)
-		n += snprintf(measured + n, sizeof measured - (size_t)n, " %s %.2g %%", reasons[i - STRATEGY_FAIL_FIRST],
-			      100 * (double)sum.strategy[i] / (double)sum.mutations);
+		n += snprintf(measured + n, sizeof measured - (size_t)n, " %s %.2g %%",
+			      reasons[i - STRATEGY_FAIL_FIRST], 100 * (double)sum.strategy[i] / (double)sum.mutations);
 	char name[64];
 	snprintf(name, sizeof name, "%.3g in %llu scenes", (double)sum.mutations, (unsigned long long)scenes);
 	row(&rows, "many mutations", name, measured, "0 in films", sum.film == 0);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Acceptance ratios of walks from the camera to the light, from the positions of the vertices: the program's against an implementation of
- * its own in long double (weight.inc), and what the same formulas would make of it in double and in float. Densities of the steps are
- * left out (test_stepsize.c has them).
+ * Acceptance ratios of walks from the camera to the light, from the positions of the vertices: the program's against an
+ * implementation of its own in long double (weight.inc), and what the same formulas would make of it in double and in
+ * float. Densities of the steps are left out (test_stepsize.c has them).
  */
 #include "tests/numerics/rows.h"
 #include "tests/support/stats.h"
@@ -39,6 +39,7 @@ enum { WEIGHT_MOST = 8 };
 #undef N
 
 #define AT(inner) "<transform name='to_world'>" inner "</transform>"
+/* clang-format off */
 #define SCENE                                                                                                                   \
 	SENSOR("0,0.2,1.9", "0,-0.3,-1")                                                                                        \
 	"<shape type='cube'>" AT("<scale value='2'/>") "<bsdf type='diffuse'><float name='reflectance' value='0.5'/></bsdf></shape>"  \
@@ -47,6 +48,7 @@ enum { WEIGHT_MOST = 8 };
 	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>"                         \
 	"<bsdf type='roughdielectric'><float name='int_ior' value='%.17g'/><float name='ext_ior' value='1'/><float name='alpha' "   \
 	"value='%.17g'/></bsdf></shape>"
+/* clang-format on */
 
 struct precision_case {
 	const char *name;
@@ -56,10 +58,14 @@ struct precision_case {
 };
 
 static const struct precision_case cases[] = {
-	{"roughness 0.3", 1.5, 0.3, 4, 2e-11},	       {"roughness 0.01", 1.5, 0.01, 4, 2e-11},
-	{"roughness 1e-4", 1.5, 1e-4, 4, 1e-9},	       {"roughness 1e-6", 1.5, 1e-6, 4, 1e-7},
-	{"index 1.01", 1.01, 0.1, 4, 2e-11},	       {"index 1 + 1e-4, roughness 0.3", 1.0001, 0.3, 4, 2e-9},
-	{"index 1 + 1e-6, roughness 0.5", 1.000001, 0.5, 4, 3e-7}, {"7 edges, roughness 0.1", 1.5, 0.1, 7, 2e-11},
+	{"roughness 0.3", 1.5, 0.3, 4, 2e-11},
+	{"roughness 0.01", 1.5, 0.01, 4, 2e-11},
+	{"roughness 1e-4", 1.5, 1e-4, 4, 1e-9},
+	{"roughness 1e-6", 1.5, 1e-6, 4, 1e-7},
+	{"index 1.01", 1.01, 0.1, 4, 2e-11},
+	{"index 1 + 1e-4, roughness 0.3", 1.0001, 0.3, 4, 2e-9},
+	{"index 1 + 1e-6, roughness 0.5", 1.000001, 0.5, 4, 3e-7},
+	{"7 edges, roughness 0.1", 1.5, 0.1, 7, 2e-11},
 };
 
 struct errors {
@@ -73,7 +79,8 @@ static int by_size(const void *a, const void *b)
 	return (x > y) - (x < y);
 }
 
-static void note(struct errors *e, double program, const struct world *w, const struct full_path_path *x, const struct full_path_path *y)
+static void note(struct errors *e, double program, const struct world *w, const struct full_path_path *x,
+		 const struct full_path_path *y)
 {
 	long double truth = in_long_log_weight(w, y) - in_long_log_weight(w, x);
 	double twice = in_double_log_weight(w, y) - in_double_log_weight(w, x);
@@ -97,8 +104,10 @@ static void run(const struct precision_case *p, unsigned most, struct errors *e)
 	const struct mutation_setting how = {(int)p->edges, 0};
 	struct world *w = world_of_text(32, 32, SCENE, p->index, p->alpha);
 	uint64_t seed = stats_seed(p->name);
-	c = (struct path_context){.w = w, .window = {0, 0, 32, 32}, .min_depth = p->edges, .max_depth = p->edges, .counters = counters};
-	m = (struct mutation_ctx){.path = &c, .seed = seed, .count = strategy, .limits = walk_limits_of(&accuracy_settings_default)};
+	c = (struct path_context){
+		.w = w, .window = {0, 0, 32, 32}, .min_depth = p->edges, .max_depth = p->edges, .counters = counters};
+	m = (struct mutation_ctx){
+		.path = &c, .seed = seed, .count = strategy, .limits = walk_limits_of(&accuracy_settings_default)};
 	for (uint64_t i = 0; e->count < most && i < 400 * most; i++) {
 		struct move move = {0};
 		bool through = false;
@@ -131,13 +140,15 @@ static void test_precision(void **state)
 		char measured[300], bound[64];
 		run(&cases[i], most, &e);
 		qsort(of_float, e.count, sizeof *of_float, by_size);
-		snprintf(measured, sizeof measured,
-			 "%u proposals: log acceptance is off by at most %.1e (these formulas in double %.1e); in float by %.1e in the median, at "
-			 "most %.1e, acceptance wrong by more than 1 %% in %.1f %%",
-			 e.count, e.program, e.in_double, e.count ? of_float[e.count / 2] : 0, e.count ? of_float[e.count - 1] : 0,
-			 100.0 * e.wrong / (e.count ? e.count : 1));
+		snprintf(
+			measured, sizeof measured,
+			"%u proposals: log acceptance is off by at most %.1e (these formulas in double %.1e); in float by %.1e in the median, at "
+			"most %.1e, acceptance wrong by more than 1 %% in %.1f %%",
+			e.count, e.program, e.in_double, e.count ? of_float[e.count / 2] : 0,
+			e.count ? of_float[e.count - 1] : 0, 100.0 * e.wrong / (e.count ? e.count : 1));
 		snprintf(bound, sizeof bound, "%.0e", cases[i].allowed);
-		row(&rows, "precision", cases[i].name, measured, bound, e.count > most / 4 && e.program <= cases[i].allowed);
+		row(&rows, "precision", cases[i].name, measured, bound,
+		    e.count > most / 4 && e.program <= cases[i].allowed);
 	}
 	free(of_float);
 	printf("precision: %u cases, %u failed\n", rows.cases, rows.failed);

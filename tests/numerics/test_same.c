@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The same scene in other units and at other places, by hslt: the image stays. Powers of two and moves that are exact give the same
- * bits. Others differ by roundings of the coordinates, and a chain that once decides otherwise goes its own way until the next
- * independent proposal that is accepted: that changes less of a film than 1 %, where another seed changes 19 %.
+ * The same scene in other units and at other places, by hslt: the image stays. Powers of two and moves that are exact
+ * give the same bits. Others differ by roundings of the coordinates, and a chain that once decides otherwise goes its
+ * own way until the next independent proposal that is accepted: that changes less of a film than 1 %, where another
+ * seed changes 19 %.
  */
 #include "tests/numerics/rows.h"
 #include "tests/support/chains.h"
@@ -34,14 +35,19 @@ static struct world *world_at(double s, double m)
 		"<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf></shape>"
 		"<shape type='sphere'><point name='center' x='%.17g' y='%.17g' z='%.17g'/><float name='radius' value='%.17g'/>"
 		"<emitter type='area'><float name='radiance' value='5'/></emitter></shape>",
-		s * 0x1p-7, s * 1000, P(0), P(2), P(5), P(0), P(0.5), P(0), 4 * s, P(0), P(0), P(0), P(-0.75), P(0.75), P(0.5), 0.75 * s, 0.5 * s,
-		P(1), P(0.5), P(-0.25), P(1), P(3), P(1), 0.5 * s);
+		s * 0x1p-7, s * 1000, P(0), P(2), P(5), P(0), P(0.5), P(0), 4 * s, P(0), P(0), P(0), P(-0.75), P(0.75),
+		P(0.5), 0.75 * s, 0.5 * s, P(1), P(0.5), P(-0.25), P(1), P(3), P(1), 0.5 * s);
 #undef P
 }
 
 static void render(struct world *w, uint64_t seed, struct chains_result *out)
 {
-	struct chains_how how = {.min_depth = 1, .max_depth = 6, .chains = 64, .bootstrap = 4096, .steps = 2000 / rows_scale(), .seed = seed};
+	struct chains_how how = {.min_depth = 1,
+				 .max_depth = 6,
+				 .chains = 64,
+				 .bootstrap = 4096,
+				 .steps = 2000 / rows_scale(),
+				 .seed = seed};
 	chains_run(w, &how, out);
 	world_free(w);
 }
@@ -65,10 +71,14 @@ static void test_same(void **state)
 		double scale, move;
 		bool exact;
 	} cases[] = {
-		{"in units 2^-13 as large", 0x1p-13, 0, true},	{"in units 2^13 as large", 0x1p13, 0, true},
-		{"moved by 1024", 1, 1024, true},		{"scaled by 1e-4", 1e-4, 0, false},
-		{"scaled by 1e4", 1e4, 0, false},		{"moved by 1e5", 1, 100000.1, false},
-		{"scaled by 1e-4, moved by 1", 1e-4, 1, false}, {"scaled by 1e4, moved by 1e9", 1e4, 1e9, false},
+		{"in units 2^-13 as large", 0x1p-13, 0, true},
+		{"in units 2^13 as large", 0x1p13, 0, true},
+		{"moved by 1024", 1, 1024, true},
+		{"scaled by 1e-4", 1e-4, 0, false},
+		{"scaled by 1e4", 1e4, 0, false},
+		{"moved by 1e5", 1, 100000.1, false},
+		{"scaled by 1e-4, moved by 1", 1e-4, 1, false},
+		{"scaled by 1e4, moved by 1e9", 1e4, 1e9, false},
 	};
 	struct rows rows = {0, 0};
 	static struct chains_result here, other, there;
@@ -80,10 +90,12 @@ static void test_same(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		render(world_at(cases[i].scale, cases[i].move), seed, &there);
 		double off = difference(&there, &here), b = there.b / here.b - 1;
-		snprintf(measured, sizeof measured, "film differs by %.2g of itself, b by %.1g (another seed: %.2g, %.1g)", off, b, noise,
+		snprintf(measured, sizeof measured,
+			 "film differs by %.2g of itself, b by %.1g (another seed: %.2g, %.1g)", off, b, noise,
 			 other.b / here.b - 1);
 		bool ok = cases[i].exact ? off == 0 && b == 0 : off <= 0.01 && fabs(b) < 1e-3;
-		row(&rows, "same image", cases[i].name, measured, cases[i].exact ? "the same bits" : "film 0.01, b 1e-3", ok);
+		row(&rows, "same image", cases[i].name, measured,
+		    cases[i].exact ? "the same bits" : "film 0.01, b 1e-3", ok);
 		free(there.xyz);
 	}
 	free(here.xyz);

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How chains begin: nothing but darkness, light that the bootstrap did not find, and one bootstrap sample that outweighs all others. The last: 16
- * films of chains that all start from that sample against 16 of resampled ones, quarter by quarter; level 1e-6 each.
+ * How chains begin: nothing but darkness, light that the bootstrap did not find, and one bootstrap sample that
+ * outweighs all others. The last: 16 films of chains that all start from that sample against 16 of resampled ones,
+ * quarter by quarter; level 1e-6 each.
  */
 #include "tests/numerics/rows.h"
 #include "tests/support/chains.h"
@@ -18,6 +19,7 @@
 #include <cmocka.h>
 
 #define AT(inner) "<transform name='to_world'>" inner "</transform>"
+/* clang-format off */
 #define ROOM(lamp)                                                                                                              \
 	SENSOR("0,0.2,1.9", "0,-0.3,-1")                                                                                        \
 	"<shape type='cube'>" AT("<scale value='2'/>") "</shape>"                                                                  \
@@ -26,6 +28,7 @@
 #define LAMP(center, radius, radiance)                                                                                          \
 	"<shape type='sphere'><point name='center' value='" center "'/><float name='radius' value='" radius                        \
 	"'/><emitter type='area'><float name='radiance' value='" radiance "'/></emitter></shape>"
+/* clang-format on */
 enum { FILMS = 16, CHAINS = 16 };
 
 static struct rows rows;
@@ -41,13 +44,19 @@ static bool is_black(const struct chains_result *r)
 static void dark(const char *name, const char *scene)
 {
 	struct world *w = world_of_text(32, 32, "%s", scene);
-	struct chains_how how = {.min_depth = 1, .max_depth = 8, .chains = CHAINS, .bootstrap = 2048, .steps = 500, .seed = stats_seed(name)};
+	struct chains_how how = {.min_depth = 1,
+				 .max_depth = 8,
+				 .chains = CHAINS,
+				 .bootstrap = 2048,
+				 .steps = 500,
+				 .seed = stats_seed(name)};
 	struct chains_result r;
 	char measured[200];
 	chains_run(w, &how, &r);
-	snprintf(measured, sizeof measured, "bootstrap %s, film %s, %llu accepted", r.black ? "black" : "lit", is_black(&r) ? "black" : "lit",
-		 (unsigned long long)r.counters[COUNT_ACCEPTED]);
-	row(&rows, "black scene", name, measured, "black; 0", r.black && is_black(&r) && r.counters[COUNT_ACCEPTED] == 0);
+	snprintf(measured, sizeof measured, "bootstrap %s, film %s, %llu accepted", r.black ? "black" : "lit",
+		 is_black(&r) ? "black" : "lit", (unsigned long long)r.counters[COUNT_ACCEPTED]);
+	row(&rows, "black scene", name, measured, "black; 0",
+	    r.black && is_black(&r) && r.counters[COUNT_ACCEPTED] == 0);
 	free(r.xyz);
 	world_free(w);
 }
@@ -63,8 +72,8 @@ static void note(void)
 	assert_non_null(f);
 	fprintf(f, "<scene version='3.0.0'>%s</scene>", ROOM(""));
 	fclose(f);
-	snprintf(command, sizeof command, "%s/bin/hslt-render %s -o %s/black.exr --integrator hslt --spp 4 2>&1", build ? build : "build", path,
-		 folder);
+	snprintf(command, sizeof command, "%s/bin/hslt-render %s -o %s/black.exr --integrator hslt --spp 4 2>&1",
+		 build ? build : "build", path, folder);
 	FILE *p = popen(command, "r");
 	assert_non_null(p);
 	while (fgets(line, sizeof line, p))
@@ -76,7 +85,8 @@ static void note(void)
 	written = access(line, R_OK) == 0;
 	char measured[700];
 	snprintf(measured, sizeof measured, "exit code %d, %s image, says '%s'", code, written ? "an" : "no", said);
-	row(&rows, "black scene", "hslt-render", measured, "0, an image, 'the image is black'", code == 0 && written && strstr(said, "the image is black"));
+	row(&rows, "black scene", "hslt-render", measured, "0, an image, 'the image is black'",
+	    code == 0 && written && strstr(said, "the image is black"));
 	unlink(line);
 	unlink(path);
 	rmdir(folder);
@@ -89,8 +99,13 @@ static void found_later(void)
 	struct chains_result r;
 	bool was_black = false;
 	for (uint64_t seed = 1; !was_black && seed < 100; seed++) {
-		struct chains_how how = {.mutations = "independent=0.2,hslt=0.8", .min_depth = 1, .max_depth = 1, .chains = 4, .bootstrap = 4,
-					 .steps = 20000 / rows_scale(), .seed = seed};
+		struct chains_how how = {.mutations = "independent=0.2,hslt=0.8",
+					 .min_depth = 1,
+					 .max_depth = 1,
+					 .chains = 4,
+					 .bootstrap = 4,
+					 .steps = 20000 / rows_scale(),
+					 .seed = seed};
 		chains_run(w, &how, &r);
 		was_black = r.black;
 		if (!was_black)
@@ -98,9 +113,11 @@ static void found_later(void)
 	}
 	char measured[200];
 	/* Each mutation from the first light on brings 1 to the film. */
-	snprintf(measured, sizeof measured, "%.2f %% of the mutations made after light was found, %.1f %% accepted", was_black ? 100 * r.mean : 0,
+	snprintf(measured, sizeof measured, "%.2f %% of the mutations made after light was found, %.1f %% accepted",
+		 was_black ? 100 * r.mean : 0,
 		 was_black ? 100 * (double)r.counters[COUNT_ACCEPTED] / (double)r.counters[COUNT_SAMPLES] : 0);
-	row(&rows, "start", "light that the bootstrap missed", measured, "> 50 %", was_black && r.mean > 0.5 && !r.film_invalid);
+	row(&rows, "start", "light that the bootstrap missed", measured, "> 50 %",
+	    was_black && r.mean > 0.5 && !r.film_invalid);
 	if (was_black)
 		free(r.xyz);
 	world_free(w);
@@ -112,11 +129,22 @@ static void dominated(void)
 	double quarter[2][4][FILMS], stuck = 0, share = 0;
 	for (int side = 0; side < 2; side++)
 		for (int f = 0; f < FILMS; f++) {
-			struct chains_how how = {.min_depth = 1, .max_depth = 8, .chains = CHAINS, .bootstrap = 2048, .steps = 2000 / rows_scale(),
+			struct chains_how how = {.min_depth = 1,
+						 .max_depth = 8,
+						 .chains = CHAINS,
+						 .bootstrap = 2048,
+						 .steps = 2000 / rows_scale(),
 						 .seed = stats_seed("one sample dominates") + (uint64_t)(2 * f + side)};
 			struct chains_result r;
 			uint64_t same[CHAINS];
-			chains_run(w, &(struct chains_how){.min_depth = 1, .max_depth = 8, .chains = 1, .bootstrap = 2048, .steps = 1, .seed = how.seed}, &r);
+			chains_run(w,
+				   &(struct chains_how){.min_depth = 1,
+							.max_depth = 8,
+							.chains = 1,
+							.bootstrap = 2048,
+							.steps = 1,
+							.seed = how.seed},
+				   &r);
 			share = fmax(share, r.heaviest_share);
 			for (int i = 0; i < CHAINS; i++)
 				same[i] = r.heaviest;
@@ -142,8 +170,9 @@ static void dominated(void)
 		}
 	}
 	char measured[200];
-	snprintf(measured, sizeof measured, "heaviest holds %.1f %%; a quarter differs by %+.2f %% (p %.2g), longest stuck %.0f", 100 * share, 100 * off, worst,
-		 stuck);
+	snprintf(measured, sizeof measured,
+		 "heaviest holds %.1f %%; a quarter differs by %+.2f %% (p %.2g), longest stuck %.0f", 100 * share,
+		 100 * off, worst, stuck);
 	row(&rows, "start", "one sample for all chains", measured, "p > 1e-6", worst > 1e-6);
 	world_free(w);
 }

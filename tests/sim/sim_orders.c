@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The coordinator dies and comes back; jobs are held, released, given another priority, and extended while they run or are done. */
+/* The coordinator dies and comes back; jobs are held, released, given another priority, and extended while they run or
+ * are done. */
 #include "tests/sim/sim_private.h"
 
 #include <math.h>
@@ -7,7 +8,7 @@
 
 static void hold(struct world *w, struct sim_job *j, enum job_hold which, bool on)
 {
-	struct event ev = { .kind = EVENT_HOLD, .job = j->id, .hold = which, .text = on ? "held" : "" };
+	struct event ev = {.kind = EVENT_HOLD, .job = j->id, .hold = which, .text = on ? "held" : ""};
 	if (j->over)
 		return;
 	j->held[which] = on; /* first: leases may go out at once */
@@ -24,16 +25,20 @@ void sim_restore(struct world *w, struct sim_job *j, double elapsed)
 		next[i] = render ? j->next[i] : j->boot >> i & 1;
 	j->prepared = render;
 	j->progress = 0; /* looks at the error are not remembered here */
-	struct event ev = { .kind = EVENT_RESTORE,
-			    .restore = { .job = j->id,
-					 .submit = { .plan = &j->plan, .name = "sim", .priority = j->priority, .mixed = j->mixed, .verify = j->verify },
-					 .fingerprint = j->mixed ? "" : j->fingerprint,
-					 .kind = render ? LEASE_RENDER : LEASE_BOOTSTRAP,
-					 .next = next,
-					 .elapsed = elapsed,
-					 .opened = elapsed,
-					 .completed = j->completed,
-					 .looks = &no_looks } };
+	struct event ev = {.kind = EVENT_RESTORE,
+			   .restore = {.job = j->id,
+				       .submit = {.plan = &j->plan,
+						  .name = "sim",
+						  .priority = j->priority,
+						  .mixed = j->mixed,
+						  .verify = j->verify},
+				       .fingerprint = j->mixed ? "" : j->fingerprint,
+				       .kind = render ? LEASE_RENDER : LEASE_BOOTSTRAP,
+				       .next = next,
+				       .elapsed = elapsed,
+				       .opened = elapsed,
+				       .completed = j->completed,
+				       .looks = &no_looks}};
 	bool held = j->held[HOLD_ORDERED]; /* the other is not remembered: there may be room by now */
 	memset(j->held, 0, sizeof j->held);
 	sim_step(w, &ev, 0);
@@ -41,7 +46,8 @@ void sim_restore(struct world *w, struct sim_job *j, double elapsed)
 		hold(w, j, HOLD_ORDERED, true);
 }
 
-/* Only what is merged is remembered. What was under way to the old one comes to the new one, from peers that it does not know. */
+/* Only what is merged is remembered. What was under way to the old one comes to the new one, from peers that it does
+ * not know. */
 void sim_restart(struct world *w)
 {
 	double elapsed[JOBS];
@@ -66,7 +72,7 @@ void sim_restart(struct world *w)
 				sim_restore(w, &w->jobs[i], elapsed[i]);
 	for (uint32_t i = 0; i < w->worker_count; i++) {
 		if (w->workers[i].peer)
-			sim_push(w, (struct message){ .kind = START, .time = w->now + 20 * sim_uniform(w), .worker = i });
+			sim_push(w, (struct message){.kind = START, .time = w->now + 20 * sim_uniform(w), .worker = i});
 		w->workers[i].peer = 0;
 	}
 }
@@ -83,7 +89,7 @@ void sim_release_all(struct world *w)
 
 static void set_priority(struct world *w, struct sim_job *j)
 {
-	struct event ev = { .kind = EVENT_PRIORITY, .job = j->id, .priority = (int)sim_below(w, 5) - 2 };
+	struct event ev = {.kind = EVENT_PRIORITY, .job = j->id, .priority = (int)sim_below(w, 5) - 2};
 	if (j->over)
 		return;
 	j->priority = ev.priority;
@@ -115,7 +121,7 @@ static void extend(struct world *w, struct sim_job *j)
 		memset(j->answered, 0, sizeof j->answered);
 		sim_restore(w, j, j->elapsed);
 	} else {
-		struct event ev = { .kind = EVENT_EXTEND, .job = j->id, .plan = &j->plan };
+		struct event ev = {.kind = EVENT_EXTEND, .job = j->id, .plan = &j->plan};
 		sim_step(w, &ev, 0);
 	}
 }
@@ -127,9 +133,17 @@ void sim_order(struct world *w)
 	if (!j->submitted)
 		return;
 	switch (sim_below(w, 4)) {
-	case 0: hold(w, j, sim_chance(w, 0.5) ? HOLD_ORDERED : HOLD_STORAGE, true); break;
-	case 1: hold(w, j, sim_chance(w, 0.5) ? HOLD_ORDERED : HOLD_STORAGE, false); break;
-	case 2: set_priority(w, j); break;
-	default: extend(w, j); break;
+	case 0:
+		hold(w, j, sim_chance(w, 0.5) ? HOLD_ORDERED : HOLD_STORAGE, true);
+		break;
+	case 1:
+		hold(w, j, sim_chance(w, 0.5) ? HOLD_ORDERED : HOLD_STORAGE, false);
+		break;
+	case 2:
+		set_priority(w, j);
+		break;
+	default:
+		extend(w, j);
+		break;
 	}
 }

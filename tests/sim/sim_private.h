@@ -8,8 +8,16 @@
 
 #include <stdbool.h>
 
-enum { WORKERS = 8, JOBS = 5, SLOTS = 12, ROUNDS = 512, QUEUE = 64, MESSAGES = 1 << 14, STEPS_MOST = 400000,
-       HOARD = 4096 /* threads that one claims to have */ };
+enum {
+	WORKERS = 8,
+	JOBS = 5,
+	SLOTS = 12,
+	ROUNDS = 512,
+	QUEUE = 64,
+	MESSAGES = 1 << 14,
+	STEPS_MOST = 400000,
+	HOARD = 4096 /* threads that one claims to have */
+};
 
 enum message_kind { TO_CORE, TICK, SUBMIT, LEASE, REVOKE, FINISH, BEAT, CRASH, START, CALM, RESTART, ORDER };
 
@@ -19,9 +27,9 @@ struct message {
 	enum message_kind kind;
 	uint32_t worker;
 	uint64_t peer;
-	struct event ev;    /* TO_CORE */
+	struct event ev; /* TO_CORE */
 	struct lease_key key;
-	uint64_t value;     /* chain state: in for LEASE, out for a batch */
+	uint64_t value; /* chain state: in for LEASE, out for a batch */
 };
 
 struct work {
@@ -45,14 +53,14 @@ struct sim_job {
 	int priority;
 	bool mixed, submitted, over, prepared;
 	double verify;
-	uint32_t answered[SLOTS]; /* whose answers are noted, by worker */
+	uint32_t answered[SLOTS];   /* whose answers are noted, by worker */
 	bool held[JOB_HOLDS], done; /* done: it has ended, and may go on */
-	double elapsed;             /* then */
+	double elapsed;		    /* then */
 	double cancel_at, lease_time, error_scale;
 	uint64_t next[SLOTS], state[SLOTS], boot;
 	uint64_t round_sum[ROUNDS];
-	uint64_t rounds; /* complete, counted here */
-	double completed; /* s after its first lease: the last complete round */
+	uint64_t rounds;     /* complete, counted here */
+	double completed;    /* s after its first lease: the last complete round */
 	char fingerprint[2]; /* of those whose work is merged */
 	double progress;
 };
@@ -63,7 +71,7 @@ struct world {
 	double now, calm, tick_at;
 	double drop, repeat, delay, failure;
 	double verify; /* of every job */
-	bool liars; /* then every result is verified, and all are of one fingerprint */
+	bool liars;    /* then every result is verified, and all are of one fingerprint */
 	struct farm *farm;
 	struct farm_config config;
 	struct message *heap;

@@ -45,13 +45,18 @@ static void send_lease(struct world *w, const struct action *a)
 		sim_wrong(w, "a lease for a worker that is silent or set aside");
 	if (!j->mixed && *j->fingerprint && strcmp(j->fingerprint, p.fingerprint) != 0)
 		sim_wrong(w, "a lease of j%" PRIu64 " for a worker of fingerprint %s", a->job, p.fingerprint);
-	if (a->key.kind == LEASE_RENDER && (!j->prepared || a->key.epoch != j->next[slot] || a->key.epoch > j->rounds + 1))
+	if (a->key.kind == LEASE_RENDER &&
+	    (!j->prepared || a->key.epoch != j->next[slot] || a->key.epoch > j->rounds + 1))
 		sim_wrong(w, "epoch %" PRIu64 " was handed out too early or too late", a->key.epoch);
 	check_holders(w, a->key);
 	if (worker_of(w, a->peer, &index) && w->liars && j->answered[slot] >> index & 1)
 		sim_wrong(w, "w%u gets a lease of which its answer is noted", index);
 	if (worker_of(w, a->peer, &index))
-		sim_post(w, (struct message){ .kind = LEASE, .worker = index, .peer = a->peer, .key = a->key, .value = j->state[slot] });
+		sim_post(w, (struct message){.kind = LEASE,
+					     .worker = index,
+					     .peer = a->peer,
+					     .key = a->key,
+					     .value = j->state[slot]});
 }
 
 static void merge(struct world *w, const struct action *a, uint64_t value)
@@ -102,7 +107,8 @@ double sim_error_after(const struct sim_job *j, uint64_t rounds)
 uint64_t sim_undisturbed_rounds(const struct sim_job *j)
 {
 	if (j->plan.target_error > 0)
-		for (uint64_t r = 1; r < j->plan.rounds; r += r < 4 ? 1 : r / 4) /* the ladder, written down once more */
+		for (uint64_t r = 1; r < j->plan.rounds;
+		     r += r < 4 ? 1 : r / 4) /* the ladder, written down once more */
 			if (sim_error_after(j, r) <= j->plan.target_error)
 				return r;
 	return j->plan.rounds;
@@ -112,7 +118,7 @@ static uint64_t undisturbed_sum(const struct sim_job *j, uint64_t rounds)
 {
 	uint64_t sum = 0;
 	for (uint32_t i = 0; i < j->plan.groups * j->plan.parts; i++) {
-		struct lease_key k = { j->id, LEASE_BOOTSTRAP, i / j->plan.parts, i % j->plan.parts, 0 };
+		struct lease_key k = {j->id, LEASE_BOOTSTRAP, i / j->plan.parts, i % j->plan.parts, 0};
 		uint64_t state = sim_result_of(k, 0);
 		k.kind = LEASE_RENDER;
 		for (k.epoch = 0; k.epoch < rounds; k.epoch++) {
@@ -156,7 +162,8 @@ static void ended(struct world *w, const struct action *a, struct sim_job *j)
 	if (s.rounds != j->rounds)
 		sim_wrong(w, "the core counts %" PRIu64 " rounds, the canvas %" PRIu64, s.rounds, j->rounds);
 	if (!ended_by_time(a->end, j) && j->rounds != sim_undisturbed_rounds(j))
-		sim_wrong(w, "ended after %" PRIu64 " rounds, undisturbed %" PRIu64, j->rounds, sim_undisturbed_rounds(j));
+		sim_wrong(w, "ended after %" PRIu64 " rounds, undisturbed %" PRIu64, j->rounds,
+			  sim_undisturbed_rounds(j));
 	uint64_t sum = 0;
 	for (uint64_t r = 0; r < j->rounds; r++)
 		sum += j->round_sum[r];
@@ -168,9 +175,10 @@ static void evaluate(struct world *w, const struct action *a, const struct sim_j
 {
 	if (a->rounds != j->rounds)
 		sim_wrong(w, "asked for the error after %" PRIu64 " rounds of %" PRIu64, a->rounds, j->rounds);
-	struct event ev = { .kind = EVENT_ERROR_KNOWN,
-			    .error_known = { .job = a->job, .rounds = a->rounds, .rel_error = sim_error_after(j, a->rounds) } };
-	sim_push(w, (struct message){ .kind = TO_CORE, .time = w->now + 3 * sim_uniform(w), .ev = ev });
+	struct event ev = {
+		.kind = EVENT_ERROR_KNOWN,
+		.error_known = {.job = a->job, .rounds = a->rounds, .rel_error = sim_error_after(j, a->rounds)}};
+	sim_push(w, (struct message){.kind = TO_CORE, .time = w->now + 3 * sim_uniform(w), .ev = ev});
 }
 
 static void prepare(struct world *w, const struct action *a, struct sim_job *j)
@@ -178,15 +186,16 @@ static void prepare(struct world *w, const struct action *a, struct sim_job *j)
 	if (j->boot != (1u << (j->plan.groups * j->plan.parts)) - 1)
 		sim_wrong(w, "the bootstrap is not complete");
 	j->prepared = true;
-	struct event ev = { .kind = EVENT_PREPARED, .prepared = { .job = a->job, .ok = true } };
-	sim_push(w, (struct message){ .kind = TO_CORE, .time = w->now + 3 * sim_uniform(w), .ev = ev });
+	struct event ev = {.kind = EVENT_PREPARED, .prepared = {.job = a->job, .ok = true}};
+	sim_push(w, (struct message){.kind = TO_CORE, .time = w->now + 3 * sim_uniform(w), .ev = ev});
 }
 
 static void trace_action(const struct world *w, const struct action *a)
 {
-	printf("[%.3f]   action %d peer %" PRIu64 " j%" PRIu64 " kind %d g%u p%u e%" PRIu64 " rounds %" PRIu64 " ack %d state %d %s\n",
-	       w->now, (int)a->kind, a->peer, a->job, (int)a->key.kind, a->key.group, a->key.part, a->key.epoch, a->rounds,
-	       (int)a->ack, (int)a->state, a->text);
+	printf("[%.3f]   action %d peer %" PRIu64 " j%" PRIu64 " kind %d g%u p%u e%" PRIu64 " rounds %" PRIu64
+	       " ack %d state %d %s\n",
+	       w->now, (int)a->kind, a->peer, a->job, (int)a->key.kind, a->key.group, a->key.part, a->key.epoch,
+	       a->rounds, (int)a->ack, (int)a->state, a->text);
 }
 
 static void act(struct world *w, const struct action *a, uint64_t value)
@@ -196,21 +205,34 @@ static void act(struct world *w, const struct action *a, uint64_t value)
 	if (w->trace)
 		trace_action(w, a);
 	switch (a->kind) {
-	case ACTION_SEND_LEASE: send_lease(w, a); break;
+	case ACTION_SEND_LEASE:
+		send_lease(w, a);
+		break;
 	case ACTION_REVOKE:
 		if (worker_of(w, a->peer, &index))
-			sim_post(w, (struct message){ .kind = REVOKE, .worker = index, .peer = a->peer, .key = a->key });
+			sim_post(w, (struct message){.kind = REVOKE, .worker = index, .peer = a->peer, .key = a->key});
 		break;
-	case ACTION_MERGE: merge(w, a, value); break;
+	case ACTION_MERGE:
+		merge(w, a, value);
+		break;
 	case ACTION_ACK:
 		if (a->ack == ACK_NOTED && worker_of(w, a->peer, &index))
 			j->answered[slot_of(j, a->key)] |= 1u << index;
 		break;
-	case ACTION_CHAINS_ANEW: break;
-	case ACTION_WRONG: w->result.lies++; break;
-	case ACTION_ASIDE: w->result.aside++; break;
-	case ACTION_BOOTSTRAP_DONE: prepare(w, a, j); break;
-	case ACTION_EVALUATE_ERROR: evaluate(w, a, j); break;
+	case ACTION_CHAINS_ANEW:
+		break;
+	case ACTION_WRONG:
+		w->result.lies++;
+		break;
+	case ACTION_ASIDE:
+		w->result.aside++;
+		break;
+	case ACTION_BOOTSTRAP_DONE:
+		prepare(w, a, j);
+		break;
+	case ACTION_EVALUATE_ERROR:
+		evaluate(w, a, j);
+		break;
 	case ACTION_ROUND_DONE:
 		j->completed = farm_elapsed(w->farm, a->job, w->now);
 		if (a->rounds != j->rounds)
@@ -223,10 +245,11 @@ static void act(struct world *w, const struct action *a, uint64_t value)
 	case ACTION_CLOSE_PEER:
 		if (worker_of(w, a->peer, &index)) {
 			w->workers[index].peer = 0;
-			sim_push(w, (struct message){ .kind = START, .time = w->now + 1, .worker = index });
+			sim_push(w, (struct message){.kind = START, .time = w->now + 1, .worker = index});
 		}
 		break;
-	default: break;
+	default:
+		break;
 	}
 }
 
@@ -246,9 +269,11 @@ static void check_progress(struct world *w)
 		if (!j->submitted || !farm_job(w->farm, j->id, w->now, &s))
 			continue;
 		if (s.priority != j->priority || (s.state == JOB_HELD) != (!j->over && is_held(j)))
-			sim_wrong(w, "j%" PRIu64 " has priority %d, or is %s", j->id, s.priority, job_state_name(s.state));
+			sim_wrong(w, "j%" PRIu64 " has priority %d, or is %s", j->id, s.priority,
+				  job_state_name(s.state));
 		if (s.workers > s.leases_out || !(s.share >= 0 && s.share <= s.machines))
-			sim_wrong(w, "%u leases at %u workers, %g machines of %u due", s.leases_out, s.workers, s.share, s.machines);
+			sim_wrong(w, "%u leases at %u workers, %g machines of %u due", s.leases_out, s.workers, s.share,
+				  s.machines);
 		if (!(s.progress >= j->progress && s.progress <= 1))
 			sim_wrong(w, "progress of j%" PRIu64 " goes from %g to %g", j->id, j->progress, s.progress);
 		j->progress = s.progress;
@@ -275,6 +300,6 @@ void sim_step(struct world *w, struct event *ev, uint64_t value)
 	if (u.wake < w->tick_at || w->tick_at <= w->now) {
 		w->tick_at = u.wake;
 		if (isfinite(u.wake))
-			sim_push(w, (struct message){ .kind = TICK, .time = fmax(u.wake, w->now) });
+			sim_push(w, (struct message){.kind = TICK, .time = fmax(u.wake, w->now)});
 	}
 }

@@ -9,7 +9,7 @@
 uint64_t sim_result_of(struct lease_key k, uint64_t state)
 {
 	return sim_mix(sim_mix(state ^ (k.job << 32)) ^ ((uint64_t)k.kind << 60) ^ ((uint64_t)k.group << 40) ^
-		   ((uint64_t)k.part << 20) ^ k.epoch);
+		       ((uint64_t)k.part << 20) ^ k.epoch);
 }
 
 struct sim_job *sim_job_by_id(struct world *w, uint64_t id)
@@ -23,7 +23,7 @@ struct sim_job *sim_job_by_id(struct world *w, uint64_t id)
 static void tell_core(struct world *w, const struct worker *k, struct event ev, uint64_t value)
 {
 	ev.peer = k->peer;
-	sim_post(w, (struct message){ .kind = TO_CORE, .peer = k->peer, .ev = ev, .value = value });
+	sim_post(w, (struct message){.kind = TO_CORE, .peer = k->peer, .ev = ev, .value = value});
 }
 
 static void work_on(struct world *w, uint32_t index)
@@ -38,8 +38,12 @@ static void work_on(struct world *w, uint32_t index)
 		k->busy++;
 		const struct sim_job *j = sim_job_by_id(w, work.key.job);
 		double seconds = j->lease_time * k->speed * (0.8 + 0.4 * sim_uniform(w));
-		sim_push(w, (struct message){ .kind = FINISH, .time = fmax(w->now, k->frozen_until) + seconds, .worker = index,
-					  .peer = k->peer, .key = work.key, .value = work.state });
+		sim_push(w, (struct message){.kind = FINISH,
+					     .time = fmax(w->now, k->frozen_until) + seconds,
+					     .worker = index,
+					     .peer = k->peer,
+					     .key = work.key,
+					     .value = work.state});
 	}
 }
 
@@ -55,7 +59,7 @@ void sim_finish(struct world *w, const struct message *m)
 		return;
 	}
 	k->busy--;
-	struct event ev = { .kind = EVENT_BATCH, .lease = { .key = m->key, .valid = true }, .text = "trouble" };
+	struct event ev = {.kind = EVENT_BATCH, .lease = {.key = m->key, .valid = true}, .text = "trouble"};
 	if (!sim_is_calm(w) && sim_chance(w, k->failure_rate)) {
 		ev.kind = EVENT_LEASE_FAILED;
 		ev.lease.own = w->draws % 3 == 0;
@@ -76,8 +80,10 @@ static void volunteer(struct world *w, const struct worker *k)
 	const struct sim_job *j = &w->jobs[sim_below(w, w->job_count)];
 	if (!j->prepared)
 		return;
-	struct lease_key key = { .job = j->id, .kind = LEASE_RENDER, .group = sim_below(w, j->plan.groups),
-				 .part = sim_below(w, j->plan.parts) };
+	struct lease_key key = {.job = j->id,
+				.kind = LEASE_RENDER,
+				.group = sim_below(w, j->plan.groups),
+				.part = sim_below(w, j->plan.parts)};
 	uint32_t slot = key.group * j->plan.parts + key.part;
 	key.epoch = j->next[slot];
 	uint64_t value = sim_result_of(key, j->state[slot]);
@@ -85,7 +91,7 @@ static void volunteer(struct world *w, const struct worker *k)
 		key.epoch++;
 		value = sim_result_of(key, value);
 	}
-	struct event ev = { .kind = EVENT_BATCH, .lease = { .key = key, .valid = true } };
+	struct event ev = {.kind = EVENT_BATCH, .lease = {.key = key, .valid = true}};
 	tell_core(w, k, ev, value);
 }
 
@@ -98,7 +104,7 @@ void sim_beat(struct world *w, const struct message *m)
 		k->want = sim_is_calm(w) || !sim_chance(w, 0.02) ? k->threads + (k->threads > 1) : 0;
 		if (k->hoards && !sim_is_calm(w))
 			k->want = HOARD;
-		tell_core(w, k, (struct event){ .kind = EVENT_REQUEST, .want = k->want }, 0);
+		tell_core(w, k, (struct event){.kind = EVENT_REQUEST, .want = k->want}, 0);
 		if (!sim_is_calm(w) && sim_chance(w, 0.05))
 			volunteer(w, k);
 	}
@@ -118,14 +124,18 @@ void sim_start(struct world *w, uint32_t index)
 	char name[16];
 	/* Honest ones in place of those that lied, as far as the core can see. */
 	snprintf(name, sizeof name, "%s%u", sim_is_calm(w) ? "calm" : "w", index);
-	struct event ev = { .kind = EVENT_JOINED,
-			    .join = { .peer = k->peer, .name = name, .fingerprint = k->fingerprint,
-				      .threads = k->hoards && !sim_is_calm(w) ? HOARD : k->threads } };
+	struct event ev = {.kind = EVENT_JOINED,
+			   .join = {.peer = k->peer,
+				    .name = name,
+				    .fingerprint = k->fingerprint,
+				    .threads = k->hoards && !sim_is_calm(w) ? HOARD : k->threads}};
 	sim_step(w, &ev, 0);
-	sim_push(w, (struct message){ .kind = BEAT, .time = w->now + sim_uniform(w), .worker = index, .peer = k->peer });
+	sim_push(w, (struct message){.kind = BEAT, .time = w->now + sim_uniform(w), .worker = index, .peer = k->peer});
 	if (!sim_is_calm(w))
-		sim_push(w, (struct message){ .kind = CRASH, .time = w->now - 150 * log(1 - sim_uniform(w)), .worker = index,
-					  .peer = k->peer });
+		sim_push(w, (struct message){.kind = CRASH,
+					     .time = w->now - 150 * log(1 - sim_uniform(w)),
+					     .worker = index,
+					     .peer = k->peer});
 }
 
 /* Dies with or without a word, or stands still for a while. */
@@ -138,13 +148,16 @@ void sim_crash(struct world *w, const struct message *m)
 	if (sim_chance(w, 0.3)) {
 		w->result.hung++;
 		k->frozen_until = w->now + 200 * sim_uniform(w);
-		sim_push(w, (struct message){ .kind = CRASH, .time = w->now + 300 * sim_uniform(w), .worker = m->worker, .peer = k->peer });
+		sim_push(w, (struct message){.kind = CRASH,
+					     .time = w->now + 300 * sim_uniform(w),
+					     .worker = m->worker,
+					     .peer = k->peer});
 		return;
 	}
 	if (sim_chance(w, 0.7))
-		tell_core(w, k, (struct event){ .kind = EVENT_LEFT }, 0);
+		tell_core(w, k, (struct event){.kind = EVENT_LEFT}, 0);
 	k->peer = 0;
-	sim_push(w, (struct message){ .kind = START, .time = w->now + 60 * sim_uniform(w), .worker = m->worker });
+	sim_push(w, (struct message){.kind = START, .time = w->now + 60 * sim_uniform(w), .worker = m->worker});
 }
 
 void sim_forget_answers(struct world *w)
@@ -160,7 +173,7 @@ void sim_calm_down(struct world *w)
 	for (uint32_t i = 0; i < w->worker_count; i++) {
 		struct worker *k = &w->workers[i];
 		if (k->peer) {
-			struct event ev = { .kind = EVENT_LEFT, .peer = k->peer };
+			struct event ev = {.kind = EVENT_LEFT, .peer = k->peer};
 			k->peer = 0;
 			sim_step(w, &ev, 0);
 		}
@@ -174,7 +187,7 @@ void sim_receive_lease(struct world *w, const struct message *m)
 	if (k->peer != m->peer || k->queued == QUEUE)
 		return;
 	w->result.hoarded += k->hoards && !sim_is_calm(w);
-	k->queue[k->queued++] = (struct work){ m->key, m->value };
+	k->queue[k->queued++] = (struct work){m->key, m->value};
 	work_on(w, m->worker);
 }
 

@@ -8,8 +8,11 @@
 static void plan_job(struct world *w, struct sim_job *j)
 {
 	struct plan *p = &j->plan;
-	*p = (struct plan){ .kind = PLAN_CHAINS, .groups = 1 + sim_below(w, 4), .parts = 1 + sim_below(w, 3), .epoch = 100,
-			    .rounds = 1 + sim_below(w, 12) };
+	*p = (struct plan){.kind = PLAN_CHAINS,
+			   .groups = 1 + sim_below(w, 4),
+			   .parts = 1 + sim_below(w, 3),
+			   .epoch = 100,
+			   .rounds = 1 + sim_below(w, 12)};
 	p->chains = p->groups * p->parts;
 	p->bootstrap = 1000 * (uint64_t)p->chains;
 	j->error_scale = 1;
@@ -61,59 +64,85 @@ static void make_world(struct world *w)
 		k->failure_rate = w->failure;
 		k->fault_rate = sim_chance(w, 0.1) ? 0.5 : 0;
 		k->hoards = i >= least && sim_mix(w->seed * WORKERS + i) % 5 == 0;
-		sim_push(w, (struct message){ .kind = START, .time = i ? 300 * sim_uniform(w) * sim_uniform(w) : 0, .worker = i });
+		sim_push(w, (struct message){
+				    .kind = START, .time = i ? 300 * sim_uniform(w) * sim_uniform(w) : 0, .worker = i});
 	}
 	for (uint32_t i = 0; i < w->job_count; i++) {
 		plan_job(w, &w->jobs[i]);
 		w->jobs[i].verify = w->verify;
 		w->jobs[i].mixed = w->jobs[i].mixed && w->verify == 0;
-		sim_push(w, (struct message){ .kind = SUBMIT, .time = i ? 300 * sim_uniform(w) : 0, .worker = i });
+		sim_push(w, (struct message){.kind = SUBMIT, .time = i ? 300 * sim_uniform(w) : 0, .worker = i});
 	}
 	if (w->verify > 0)
 		distrust(w);
-	sim_push(w, (struct message){ .kind = CALM, .time = w->calm });
+	sim_push(w, (struct message){.kind = CALM, .time = w->calm});
 	for (uint32_t i = sim_chance(w, 0.5) ? 1 + sim_below(w, 4) : 0; i > 0; i--)
-		sim_push(w, (struct message){ .kind = RESTART, .time = 600 * sim_uniform(w) * sim_uniform(w) });
+		sim_push(w, (struct message){.kind = RESTART, .time = 600 * sim_uniform(w) * sim_uniform(w)});
 	w->orders_left = sim_chance(w, 0.5) ? 1 + sim_below(w, 16) : 0;
 	for (uint32_t i = 0; i < w->orders_left; i++)
-		sim_push(w, (struct message){ .kind = ORDER, .time = 900 * sim_uniform(w) * sim_uniform(w) });
+		sim_push(w, (struct message){.kind = ORDER, .time = 900 * sim_uniform(w) * sim_uniform(w)});
 }
 
 static void submit(struct world *w, uint32_t index)
 {
 	struct sim_job *j = &w->jobs[index];
-	struct event ev = { .kind = EVENT_SUBMIT, .tag = index,
-			    .submit = { .plan = &j->plan, .name = "sim", .priority = j->priority, .mixed = j->mixed, .verify = j->verify } };
+	struct event ev = {.kind = EVENT_SUBMIT,
+			   .tag = index,
+			   .submit = {.plan = &j->plan,
+				      .name = "sim",
+				      .priority = j->priority,
+				      .mixed = j->mixed,
+				      .verify = j->verify}};
 	sim_step(w, &ev, 0);
 	if (!j->submitted)
 		sim_wrong(w, "a job is refused");
 	if (j->cancel_at >= 0) {
-		struct event cancel = { .kind = EVENT_CANCEL, .job = j->id };
-		sim_push(w, (struct message){ .kind = TO_CORE, .time = w->now + j->cancel_at, .ev = cancel });
+		struct event cancel = {.kind = EVENT_CANCEL, .job = j->id};
+		sim_push(w, (struct message){.kind = TO_CORE, .time = w->now + j->cancel_at, .ev = cancel});
 	}
 }
 
 static void happen(struct world *w, struct message *m)
 {
 	switch (m->kind) {
-	case TO_CORE: sim_step(w, &m->ev, m->value); break;
+	case TO_CORE:
+		sim_step(w, &m->ev, m->value);
+		break;
 	case TICK:
 		if (m->time >= w->tick_at)
-			sim_step(w, &(struct event){ .kind = EVENT_TICK }, 0);
+			sim_step(w, &(struct event){.kind = EVENT_TICK}, 0);
 		break;
-	case SUBMIT: submit(w, m->worker); break;
-	case LEASE: sim_receive_lease(w, m); break;
-	case REVOKE: sim_receive_revoke(w, m); break;
-	case FINISH: sim_finish(w, m); break;
-	case BEAT: sim_beat(w, m); break;
-	case CRASH: sim_crash(w, m); break;
-	case START: sim_start(w, m->worker); break;
+	case SUBMIT:
+		submit(w, m->worker);
+		break;
+	case LEASE:
+		sim_receive_lease(w, m);
+		break;
+	case REVOKE:
+		sim_receive_revoke(w, m);
+		break;
+	case FINISH:
+		sim_finish(w, m);
+		break;
+	case BEAT:
+		sim_beat(w, m);
+		break;
+	case CRASH:
+		sim_crash(w, m);
+		break;
+	case START:
+		sim_start(w, m->worker);
+		break;
 	case CALM:
 		sim_calm_down(w);
 		sim_release_all(w);
 		break;
-	case RESTART: sim_restart(w); break;
-	case ORDER: sim_order(w); break;
+	case RESTART:
+		sim_restart(w);
+		break;
+	case ORDER:
+		sim_order(w);
+		break;
 	}
 }
 
@@ -129,7 +158,7 @@ const char *sim_run(uint64_t seed, int trace, struct sim_result *r)
 {
 	static struct world world;
 	struct world *w = &world;
-	*w = (struct world){ .seed = seed, .trace = trace };
+	*w = (struct world){.seed = seed, .trace = trace};
 	struct error e;
 	farm_config_init(&w->config);
 	w->config.max_peers = 4 * WORKERS;

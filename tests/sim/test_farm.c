@@ -41,17 +41,22 @@ static void simulate(void **state)
 	const char *one = getenv("HSLT_SIM_SEED"), *full = getenv("FULL");
 	uint64_t first = one ? strtoull(one, NULL, 10) : 1;
 	uint64_t count = one ? 1 : full && strcmp(full, "1") == 0 ? SEEDS_FULL : SEEDS;
-	struct sim_result sum = { 0 }, r;
+	struct sim_result sum = {0}, r;
 	for (uint64_t seed = first; seed < first + count; seed++) {
 		const char *wrong = sim_run(seed, one != NULL, &r);
 		if (wrong)
 			fail_msg("HSLT_SIM_SEED=%" PRIu64 ": %s", seed, wrong);
 		add(&sum, &r);
 	}
-	print_message("seeds %" PRIu64 " to %" PRIu64 ": %" PRIu64 " steps, %" PRIu64 " merged, %" PRIu64 " repeats, %" PRIu64 " refused, %" PRIu64 " crashes, %" PRIu64 " of them hangs, %" PRIu64 " hoarded, "
-		      "%" PRIu64 " copies, %" PRIu64 " timeouts, %" PRIu64 " restarts, %" PRIu64 " extended, %" PRIu64 " verified, %" PRIu64 " mismatched, %" PRIu64 " lies, %" PRIu64 " set aside; jobs: %" PRIu64 " done, %" PRIu64 " failed, %" PRIu64 " cancelled\n",
-		      first, first + count - 1, sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.hung, sum.hoarded, sum.copies, sum.timeouts, sum.restarts, sum.extended, sum.verified, sum.mismatched, sum.lies, sum.aside, sum.done,
-		      sum.failed, sum.cancelled);
+	print_message("seeds %" PRIu64 " to %" PRIu64 ": %" PRIu64 " steps, %" PRIu64 " merged, %" PRIu64
+		      " repeats, %" PRIu64 " refused, %" PRIu64 " crashes, %" PRIu64 " of them hangs, %" PRIu64
+		      " hoarded, "
+		      "%" PRIu64 " copies, %" PRIu64 " timeouts, %" PRIu64 " restarts, %" PRIu64 " extended, %" PRIu64
+		      " verified, %" PRIu64 " mismatched, %" PRIu64 " lies, %" PRIu64 " set aside; jobs: %" PRIu64
+		      " done, %" PRIu64 " failed, %" PRIu64 " cancelled\n",
+		      first, first + count - 1, sum.steps, sum.merged, sum.repeats, sum.refused, sum.crashes, sum.hung,
+		      sum.hoarded, sum.copies, sum.timeouts, sum.restarts, sum.extended, sum.verified, sum.mismatched,
+		      sum.lies, sum.aside, sum.done, sum.failed, sum.cancelled);
 	/* The worlds must be wild enough to mean something. */
 	if (!one) {
 		assert_true(sum.repeats > count && sum.copies > count / 4 && sum.timeouts > count / 4);
@@ -64,6 +69,6 @@ static void simulate(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(simulate) };
+	const struct CMUnitTest tests[] = {cmocka_unit_test(simulate)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

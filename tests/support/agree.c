@@ -152,9 +152,16 @@ static void make_plan(const struct world *w, const char *test, const char *side,
 	snprintf(name, sizeof name, "%s %s", test, side);
 	uint64_t pixels = (uint64_t)w->settings.width * w->settings.height;
 	uint32_t groups = how->groups;
-	*p = (struct plan){.kind = i->kind, .width = w->settings.width, .height = w->settings.height,
-			   .crop_width = w->settings.width, .crop_height = w->settings.height, .border = w->settings.border,
-			   .seed = stats_seed(name), .groups = groups, .parts = 1, .rounds = 2,
+	*p = (struct plan){.kind = i->kind,
+			   .width = w->settings.width,
+			   .height = w->settings.height,
+			   .crop_width = w->settings.width,
+			   .crop_height = w->settings.height,
+			   .border = w->settings.border,
+			   .seed = stats_seed(name),
+			   .groups = groups,
+			   .parts = 1,
+			   .rounds = 2,
 			   .min_depth = how->min_depth ? how->min_depth : 1,
 			   .max_depth = how->max_depth ? how->max_depth : w->settings.max_depth};
 	strcpy(p->integrator, how->integrator);
@@ -242,7 +249,8 @@ static struct verdict compare(const struct cell *a, const struct cell *b)
 	double v = a->error2 + b->error2, reference = fabs(b->mean);
 	double da = a->degrees > 0 ? a->error2 * a->error2 / a->degrees : 0;
 	double db = b->degrees > 0 ? b->error2 * b->error2 / b->degrees : 0;
-	return (struct verdict){(a->mean - b->mean) / reference, sqrt(v) / reference, da + db > 0 ? v * v / (da + db) : 30};
+	return (struct verdict){(a->mean - b->mean) / reference, sqrt(v) / reference,
+				da + db > 0 ? v * v / (da + db) : 30};
 }
 
 static double least_found(const struct verdict *v)
@@ -277,8 +285,9 @@ static void judge(const char *test, const struct verdict *v, bool powerful)
 			fail_msg("%s: cell %d differs by %.3g %% +- %.2g %% (p = %.1e)", test, c, 100 * v[c].difference,
 				 100 * v[c].error, p);
 	}
-	print_message("%s: mean differs by %+.3f %% +- %.3f %%; finds with 95 %%: %.2f %% on a block, %.2f %% on the mean\n", test,
-		      100 * v[AGREE_CELLS].difference, 100 * v[AGREE_CELLS].error, 100 * worst_block, 100 * mean_power);
+	print_message(
+		"%s: mean differs by %+.3f %% +- %.3f %%; finds with 95 %%: %.2f %% on a block, %.2f %% on the mean\n",
+		test, 100 * v[AGREE_CELLS].difference, 100 * v[AGREE_CELLS].error, 100 * worst_block, 100 * mean_power);
 	if (powerful && !weak_allowed && (worst_block > 0.02 || mean_power > 0.005))
 		fail_msg("%s: too weak", test);
 }

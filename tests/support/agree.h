@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Do two integrators make the same image? (docs/design.md, rules 7.) Each side is rendered as 16 or more independent groups,
- * with a seed of its own; blocks of the image and the mean are compared by Welch's t between the groups' means.
+ * Do two integrators make the same image? (docs/design.md, rules 7.) Each side is rendered as 16 or more independent
+ * groups, with a seed of its own; blocks of the image and the mean are compared by Welch's t between the groups' means.
  *
  * Level: 1e-4 over all tests of the suite, shared equally among comparisons and by Holm's method within one. Power: the
- * smallest bias found with 95 % probability is printed; more than 2 % on a block or 0.5 % on the mean is a failure, as is
- * a planted bias of twice the smallest that goes unseen.
+ * smallest bias found with 95 % probability is printed; more than 2 % on a block or 0.5 % on the mean is a failure, as
+ * is a planted bias of twice the smallest that goes unseen.
  */
 #ifndef TESTS_SUPPORT_AGREE_H
 #define TESTS_SUPPORT_AGREE_H
@@ -17,7 +17,7 @@ enum { AGREE_BLOCKS = 2, AGREE_CELLS = AGREE_BLOCKS * AGREE_BLOCKS, AGREE_MAX_GR
 struct agree_side {
 	const char *integrator;
 	uint64_t spp;
-	uint32_t groups; /* 16..64 */
+	uint32_t groups;	       /* 16..64 */
 	uint32_t min_depth, max_depth; /* 0: 1 and the scene's */
 };
 
@@ -39,14 +39,15 @@ void agree_render_mixture(const struct world *w, const char *test, const char *s
 /* Fails the test when the images differ, or when the comparison is too weak to tell. */
 void agree_check(const char *test, const struct agree_image *a, const struct agree_image *b);
 
-/* The same level, but no demand on the power, which is printed: for whole scenes that cannot be rendered to half a percent in a
- * test. Returns the relative difference of the means. */
+/* The same level, but no demand on the power, which is printed: for whole scenes that cannot be rendered to half a
+ * percent in a test. Returns the relative difference of the means. */
 double agree_within_errors(const char *test, const struct agree_image *a, const struct agree_image *b);
 
 /* The same as numbers, for tables: of the means and of the block that differs most. */
 struct agree_difference {
-	double mean, error;         /* a's mean against b's, and its standard error, relative to b's */
-	double found, found_block;  /* smallest bias of the mean, and of any block, that is found with 95 % probability */
+	double mean, error; /* a's mean against b's, and its standard error, relative to b's */
+	double found,
+		found_block; /* smallest bias of the mean, and of any block, that is found with 95 % probability */
 	bool holds;
 };
 void agree_measure(const struct agree_image *a, const struct agree_image *b, struct agree_difference *out);

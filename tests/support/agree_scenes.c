@@ -1,4 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/* Scenes are laid out by hand. */
+/* clang-format off */
 #include "tests/support/agree_scenes.h"
 
 #include "tests/support/memory_assets.h"

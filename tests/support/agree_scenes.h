@@ -8,9 +8,9 @@
 struct agree_case {
 	const char *topic, *name;
 	struct world *(*make)(const struct agree_case *k); /* the caller frees it */
-	double a, b;             /* what make takes */
+	double a, b;					   /* what make takes */
 	uint32_t max_depth;
-	uint64_t path_spp, spp;  /* of path, of the others */
+	uint64_t path_spp, spp; /* of path, of the others */
 	const char *against[3];
 	double find; /* smallest bias of the mean that the table must find */
 };

@@ -17,19 +17,53 @@
 #define LEVEL (1e-4 / COMPARISONS)
 
 enum {
-	FUNCTION_INTENSITY = 4, FUNCTION_H_1 = 14, FUNCTION_H_K_1, FUNCTION_TURN = 20,
+	FUNCTION_INTENSITY = 4,
+	FUNCTION_H_1 = 14,
+	FUNCTION_H_K_1,
+	FUNCTION_TURN = 20,
 	/* Not of x and y alone, but of the move between them. */
-	FUNCTION_TRANSFER, FUNCTION_STEPS, FUNCTION_CHOICE, FUNCTION_F, FUNCTION_FIXED, FUNCTION_EMITTER, FUNCTION_BACK,
+	FUNCTION_TRANSFER,
+	FUNCTION_STEPS,
+	FUNCTION_CHOICE,
+	FUNCTION_F,
+	FUNCTION_FIXED,
+	FUNCTION_EMITTER,
+	FUNCTION_BACK,
 };
 
 static const char *const functions[BALANCE_FUNCTIONS] = {
-	"film x", "film y", "film's centre", "even columns", "intensity", "wavelength", "x_k-1 x", "x_k-1 z",
-	"x_1 y", "x_1 z", "x_0 x", "x_0 z", "lengths", "last length", "h_1", "h_k-1", "roughness", "edges", "aperture", "cosine at x_1", "wavelength's turn",
-	"transfer", "steps", "choice", "f", "fixed part", "emitter", "way back",
+	"film x",
+	"film y",
+	"film's centre",
+	"even columns",
+	"intensity",
+	"wavelength",
+	"x_k-1 x",
+	"x_k-1 z",
+	"x_1 y",
+	"x_1 z",
+	"x_0 x",
+	"x_0 z",
+	"lengths",
+	"last length",
+	"h_1",
+	"h_k-1",
+	"roughness",
+	"edges",
+	"aperture",
+	"cosine at x_1",
+	"wavelength's turn",
+	"transfer",
+	"steps",
+	"choice",
+	"f",
+	"fixed part",
+	"emitter",
+	"way back",
 };
 
-/* A ray that found a vertex and a ray that asks whether it is seen go to points that differ by rounding: at the edge of a
- * triangle the answers may differ. One in some 100,000 accepted proposals is seen to. */
+/* A ray that found a vertex and a ray that asks whether it is seen go to points that differ by rounding: at the edge of
+ * a triangle the answers may differ. One in some 100,000 accepted proposals is seen to. */
 #define MOST_DOUBTS 2
 
 /* Ways back are asked for that part of the proposals. */
@@ -62,9 +96,27 @@ static void measure(struct path_context *c, struct full_path_path *x, double *g,
 	double first = slope(x, 1, &at_light), last = slope(x, k - 1, &at_camera);
 	vec3 near = x->v[k - 1].x.p, far = x->v[k > 1 ? 1 : 0].x.p, light = x->v[0].x.p;
 	const double all[BALANCE_FUNCTIONS] = {
-		x->film[0], x->film[1], hypot(x->film[0] - 16, x->film[1] - 16), fmod(floor(x->film[0]), 2), full_path_log_f(c, x),
-		x->wavelength, near.x, near.z, far.y, far.z, light.x, light.z, lengths, x->edge[k - 1].distance2, first, last,
-		roughness, k, x->v[k].x.p.x, k > 1 ? fabs(vec3_dot(x->v[1].x.sh.n, x->edge[0].w)) : 0, x->wavelength,
+		x->film[0],
+		x->film[1],
+		hypot(x->film[0] - 16, x->film[1] - 16),
+		fmod(floor(x->film[0]), 2),
+		full_path_log_f(c, x),
+		x->wavelength,
+		near.x,
+		near.z,
+		far.y,
+		far.z,
+		light.x,
+		light.z,
+		lengths,
+		x->edge[k - 1].distance2,
+		first,
+		last,
+		roughness,
+		k,
+		x->v[k].x.p.x,
+		k > 1 ? fabs(vec3_dot(x->v[1].x.sh.n, x->edge[0].w)) : 0,
+		x->wavelength,
 	};
 	for (int i = 0; i < FUNCTION_TRANSFER; i++) {
 		g[i] = all[i];
@@ -79,7 +131,7 @@ struct run {
 	struct path_context *c;
 	struct mutation_ctx *m;
 	struct full_path_path *x, *y;
-	double weight, strict_weight; /* of strategies that keep the number of edges; of all */
+	double weight, strict_weight;			      /* of strategies that keep the number of edges; of all */
 	double g[BALANCE_FUNCTIONS], blur[BALANCE_FUNCTIONS]; /* of x */
 	uint64_t checked, doubts;
 };
@@ -147,7 +199,8 @@ static void restore(struct run *r, const struct balance_trial *t, const struct m
 		if (!same)
 			fail_msg("%s, %s: vertex %u of %u is not what it was", r->test, t->ops->name, i, x->edges);
 	}
-	assert_true(y->edges == x->edges && y->film[0] == x->film[0] && y->film[1] == x->film[1] && y->wavelength == x->wavelength);
+	assert_true(y->edges == x->edges && y->film[0] == x->film[0] && y->film[1] == x->film[1] &&
+		    y->wavelength == x->wavelength);
 }
 
 static double clamp(double d)
@@ -209,7 +262,8 @@ static bool stays_away(struct run *r, const struct move *move)
 		bool delta = x->v[j].delta;
 		target[j].h = delta ? (vec2){0, 0} : halfvec_of(x, j);
 		const double *sigma = r->m->scratch.step[X_TO_Y][j].sigma;
-		target[j].tolerance = delta ? 1e-9 : 1e-3 * fmin(fmin(x->v[j].bsdf->alpha, 1), fmin(sigma[0], sigma[1]));
+		target[j].tolerance =
+			delta ? 1e-9 : 1e-3 * fmin(fmin(x->v[j].bsdf->alpha, 1), fmin(sigma[0], sigma[1]));
 	}
 	if (halfvec_walk(r->c, &back, b, c, target, true, &limits, &scratch) != WALK_OK)
 		return true;
@@ -219,9 +273,10 @@ static bool stays_away(struct run *r, const struct move *move)
 	return false;
 }
 
-/* Parts of the densities themselves, by as much as they differ: what is left out of the ratio shows there first. And whether
- * there is a way back: where there is none phi is 1, and nobody ever proposes the pair for which it is -1. */
-static void compare_moves(struct run *r, const struct balance_trial *t, double log_f, const struct move *move, double *phi)
+/* Parts of the densities themselves, by as much as they differ: what is left out of the ratio shows there first. And
+ * whether there is a way back: where there is none phi is 1, and nobody ever proposes the pair for which it is -1. */
+static void compare_moves(struct run *r, const struct balance_trial *t, double log_f, const struct move *move,
+			  double *phi)
 {
 	for (int i = FUNCTION_TRANSFER; i < BALANCE_FUNCTIONS; i++)
 		phi[i] = 0;
@@ -263,8 +318,8 @@ static void propose(struct run *r, struct balance_trial *t, unsigned group)
 	restore(r, t, &move);
 }
 
-static void run_group(struct run *r, unsigned group, struct starts *s, struct balance_trial *trials, size_t count, size_t starts,
-		      const double *scale)
+static void run_group(struct run *r, unsigned group, struct starts *s, struct balance_trial *trials, size_t count,
+		      size_t starts, const double *scale)
 {
 	for (unsigned k = 1; k <= BALANCE_EDGES; k++) {
 		double u[4], weight = starts_weight(s, k);
@@ -283,7 +338,8 @@ static void run_group(struct run *r, unsigned group, struct starts *s, struct ba
 	}
 }
 
-void balance_run(const struct world *w, const char *test, struct balance_trial *trials, size_t count, size_t starts, size_t pairs)
+void balance_run(const struct world *w, const char *test, struct balance_trial *trials, size_t count, size_t starts,
+		 size_t pairs)
 {
 	static struct path_context c;
 	static struct mutation_ctx m;
@@ -308,8 +364,8 @@ void balance_run(const struct world *w, const char *test, struct balance_trial *
 		starts_fini(&s[g]);
 	}
 	if (r.doubts > MOST_DOUBTS + r.checked / 10000)
-		fail_msg("%s: %llu of %llu accepted proposals have edges that are occluded", test, (unsigned long long)r.doubts,
-			 (unsigned long long)r.checked);
+		fail_msg("%s: %llu of %llu accepted proposals have edges that are occluded", test,
+			 (unsigned long long)r.doubts, (unsigned long long)r.checked);
 }
 
 static double critical_t(void)
@@ -399,7 +455,8 @@ void balance_print(const char *test, const struct balance_trial *t, const struct
 {
 	char name[48];
 	balance_name(t, name);
-	printf("%-14s %-22s %8llu pairs, accepted %.3f, reverse failed %.3f, worst t %+6.2f (%s), finds %5.1f %%%s\n", test, name,
-	       (unsigned long long)t->pairs, t->expected / (double)t->pairs, (double)t->count[STRATEGY_FAIL_REVERSE] / (double)t->pairs,
-	       v->t, v->function, 100 * v->power, v->balanced ? "" : " NOT BALANCED");
+	printf("%-14s %-22s %8llu pairs, accepted %.3f, reverse failed %.3f, worst t %+6.2f (%s), finds %5.1f %%%s\n",
+	       test, name, (unsigned long long)t->pairs, t->expected / (double)t->pairs,
+	       (double)t->count[STRATEGY_FAIL_REVERSE] / (double)t->pairs, v->t, v->function, 100 * v->power,
+	       v->balanced ? "" : " NOT BALANCED");
 }

@@ -29,7 +29,8 @@ struct batch black_batch(const struct lease_key *k, const struct plan *plan, uin
 		add_weights(&b, plan);
 	} else if (plan->kind == PLAN_SAMPLES) {
 		struct plan_range rows = plan_row_range(plan, k->part);
-		b.counters[COUNT_SAMPLES] = (rows.end - rows.begin) * (plan->crop_width + 2 * (uint64_t)plan->border) * plan->epoch;
+		b.counters[COUNT_SAMPLES] =
+			(rows.end - rows.begin) * (plan->crop_width + 2 * (uint64_t)plan->border) * plan->epoch;
 	} else {
 		add_chains(&b, plan, state_bytes);
 	}

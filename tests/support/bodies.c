@@ -98,8 +98,14 @@ struct accel *body_accel(const struct geom_shape *shapes, uint32_t count)
 	assert_non_null(a);
 	for (uint32_t i = 0; i < count; i++) {
 		const struct geom_shape *g = &shapes[i];
-		a[i] = (struct accel_shape){g->is_sphere, g->center, g->radius, g->vertex_count, g->triangle_count,
-					    (const float(*)[3])g->position, (const uint32_t(*)[3])g->index, SURFACE_OPAQUE};
+		a[i] = (struct accel_shape){g->is_sphere,
+					    g->center,
+					    g->radius,
+					    g->vertex_count,
+					    g->triangle_count,
+					    (const float(*)[3])g->position,
+					    (const uint32_t(*)[3])g->index,
+					    SURFACE_OPAQUE};
 	}
 	struct accel *accel;
 	struct error e = {""};
@@ -117,7 +123,8 @@ struct surface_point body_point(const struct geom_shape *s, uint32_t shape, stru
 		return x;
 	}
 	double root = sqrt(dice_throw(d));
-	surface_on_triangle(s, (struct prim_ref){shape, dice_below(d, s->triangle_count)}, 1 - root, root * dice_throw(d), &x);
+	surface_on_triangle(s, (struct prim_ref){shape, dice_below(d, s->triangle_count)}, 1 - root,
+			    root * dice_throw(d), &x);
 	return x;
 }
 

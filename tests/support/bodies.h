@@ -8,10 +8,11 @@
 #include "tests/support/dice.h"
 #include "worker/geom/surface.h"
 
-/* A sphere of the given radius around the origin from a cube of n x n squares a face; `bump` moves vertices along the radius
- * by that share, up and down. Normals point outwards. */
+/* A sphere of the given radius around the origin from a cube of n x n squares a face; `bump` moves vertices along the
+ * radius by that share, up and down. Normals point outwards. */
 void body_ball(struct geom_shape *s, uint32_t n, double radius, double bump);
-/* The square [-1,1]^2 of n x n squares (n a power of two), over which z = a x + b y; exact in float for dyadic a and b. */
+/* The square [-1,1]^2 of n x n squares (n a power of two), over which z = a x + b y; exact in float for dyadic a and b.
+ */
 void body_plane(struct geom_shape *s, uint32_t n, double a, double b);
 void body_free(struct geom_shape *s);
 

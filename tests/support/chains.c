@@ -10,7 +10,8 @@
 
 #include <cmocka.h>
 
-static void lease(const struct world *w, const struct plan *p, enum lease_kind kind, const struct lease_input *in, struct batch *b)
+static void lease(const struct world *w, const struct plan *p, enum lease_kind kind, const struct lease_input *in,
+		  struct batch *b)
 {
 	struct error e = {""};
 	enum lease_end end;
@@ -67,10 +68,22 @@ void chains_run(const struct world *w, const struct chains_how *how, struct chai
 {
 	struct render_summary summary;
 	struct error e = {""};
-	struct plan p = {.kind = PLAN_CHAINS, .integrator = "hslt", .width = w->settings.width, .height = w->settings.height,
-			 .crop_width = w->settings.width, .crop_height = w->settings.height, .border = w->settings.border, .seed = how->seed,
-			 .groups = 1, .parts = 1, .chains = how->chains, .bootstrap = how->bootstrap, .epoch = how->steps, .rounds = 1,
-			 .min_depth = how->min_depth, .max_depth = how->max_depth};
+	struct plan p = {.kind = PLAN_CHAINS,
+			 .integrator = "hslt",
+			 .width = w->settings.width,
+			 .height = w->settings.height,
+			 .crop_width = w->settings.width,
+			 .crop_height = w->settings.height,
+			 .border = w->settings.border,
+			 .seed = how->seed,
+			 .groups = 1,
+			 .parts = 1,
+			 .chains = how->chains,
+			 .bootstrap = how->bootstrap,
+			 .epoch = how->steps,
+			 .rounds = 1,
+			 .min_depth = how->min_depth,
+			 .max_depth = how->max_depth};
 	uint64_t *seeds = calloc(how->chains, sizeof *seeds);
 	*out = (struct chains_result){.xyz = calloc((size_t)p.width * p.height, 3 * sizeof *out->xyz)};
 	world_summary(w, &summary);

@@ -16,12 +16,12 @@ struct chains_how {
 struct chains_result {
 	bool black;
 	uint64_t counters[BATCH_COUNTERS], strategy[STRATEGY_COUNTERS];
-	uint64_t film_invalid;  /* values of the film that are not finite, or below 0 */
-	uint64_t heaviest;      /* index of the bootstrap's largest weight */
-	double heaviest_share;  /* of all weights */
-	double b, mean;         /* of X + Y + Z over the film, in units of b */
+	uint64_t film_invalid; /* values of the film that are not finite, or below 0 */
+	uint64_t heaviest;     /* index of the bootstrap's largest weight */
+	double heaviest_share; /* of all weights */
+	double b, mean;	       /* of X + Y + Z over the film, in units of b */
 	double quarter[4];
-	float *xyz;             /* film, malloc */
+	float *xyz; /* film, malloc */
 };
 
 /* An error of the lease fails the test. */

@@ -7,7 +7,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-static unsigned char *seal(const unsigned char prefix[FRAME_PREFIX], const unsigned char *content, size_t size, bool first, size_t *checked_file_size)
+static unsigned char *seal(const unsigned char prefix[FRAME_PREFIX], const unsigned char *content, size_t size,
+			   bool first, size_t *checked_file_size)
 {
 	size_t head = first ? FRAME_PREFIX : FRAME_SEALED_PREFIX;
 	unsigned char *sealed = malloc(head + size + 1);
@@ -29,7 +30,8 @@ static bool is_first(const unsigned char *header, size_t size)
 	struct error e;
 	if (envelope_unpack(&env, header, size, &e))
 		return false;
-	bool first = env.message->body_case == FARM__ENVELOPE__BODY_HELLO || env.message->body_case == FARM__ENVELOPE__BODY_HELLO_ACK;
+	bool first = env.message->body_case == FARM__ENVELOPE__BODY_HELLO ||
+		     env.message->body_case == FARM__ENVELOPE__BODY_HELLO_ACK;
 	envelope_fini(&env);
 	return first;
 }
@@ -38,22 +40,28 @@ unsigned char *checksummed_frame(const unsigned char *frame, size_t size, size_t
 {
 	uint32_t header, payload;
 	frame_prefix_read(frame, &header, &payload);
-	return seal(frame, frame + FRAME_PREFIX, size - FRAME_PREFIX, is_first(frame + FRAME_PREFIX, header), checked_file_size);
+	return seal(frame, frame + FRAME_PREFIX, size - FRAME_PREFIX, is_first(frame + FRAME_PREFIX, header),
+		    checked_file_size);
 }
 
 /* Of what may have been changed since it was packed; NULL: it is none, or has fields of another version. */
 static unsigned char *checked_hello(const void *header, size_t size, size_t *checked_file_size)
 {
 	Farm__Envelope *m = farm__envelope__unpack(NULL, size, header);
-	const ProtobufCMessage *hello = !m ? NULL : m->body_case == FARM__ENVELOPE__BODY_HELLO ? &m->hello->base :
-				       m->body_case == FARM__ENVELOPE__BODY_HELLO_ACK ? &m->hello_ack->base : NULL;
-	unsigned char *sealed = hello && !hello->n_unknown_fields && !m->base.n_unknown_fields ? checksummed_message(m, NULL, 0, checked_file_size) : NULL;
+	const ProtobufCMessage *hello = !m						 ? NULL
+					: m->body_case == FARM__ENVELOPE__BODY_HELLO	 ? &m->hello->base
+					: m->body_case == FARM__ENVELOPE__BODY_HELLO_ACK ? &m->hello_ack->base
+											 : NULL;
+	unsigned char *sealed = hello && !hello->n_unknown_fields && !m->base.n_unknown_fields
+					? checksummed_message(m, NULL, 0, checked_file_size)
+					: NULL;
 	if (m)
 		farm__envelope__free_unpacked(m, NULL);
 	return sealed;
 }
 
-unsigned char *checked_file_parts(const void *header, size_t header_size, const void *payload, size_t payload_size, bool first, size_t *checked_file_size)
+unsigned char *checked_file_parts(const void *header, size_t header_size, const void *payload, size_t payload_size,
+				  bool first, size_t *checked_file_size)
 {
 	unsigned char *hello = first && !payload_size ? checked_hello(header, header_size, checked_file_size) : NULL;
 	if (hello)
@@ -71,7 +79,8 @@ unsigned char *checked_file_parts(const void *header, size_t header_size, const 
 	return sealed;
 }
 
-unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload, size_t payload_size, size_t *checked_file_size)
+unsigned char *checksummed_message(const Farm__Envelope *m, const void *payload, size_t payload_size,
+				   size_t *checked_file_size)
 {
 	unsigned char *frame;
 	size_t size;

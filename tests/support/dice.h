@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Random numbers and sample counts for tests: a stream of the counter-based generator, seeded by the test's name, so that
- * a run is the same every time. HSLT_TEST_SCALE divides counts (sanitized runs), FULL=1 multiplies them by 8.
+ * Random numbers and sample counts for tests: a stream of the counter-based generator, seeded by the test's name, so
+ * that a run is the same every time. HSLT_TEST_SCALE divides counts (sanitized runs), FULL=1 multiplies them by 8.
  */
 #ifndef TESTS_SUPPORT_DICE_H
 #define TESTS_SUPPORT_DICE_H
@@ -21,7 +21,7 @@ struct dice dice_of(const char *test);
 double dice_throw(struct dice *d); /* in [0,1) */
 double dice_between(struct dice *d, double low, double high);
 uint32_t dice_below(struct dice *d, uint32_t n); /* 0 .. n-1 */
-vec3 dice_direction(struct dice *d);             /* uniform on the sphere */
+vec3 dice_direction(struct dice *d);		 /* uniform on the sphere */
 
 size_t dice_count(size_t samples); /* scaled by the environment, at least 1 */
 

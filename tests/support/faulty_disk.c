@@ -36,7 +36,7 @@ struct renaming {
 
 struct faulty_disk_node {
 	bool folder;
-	char last[64]; /* of its first name */
+	char last[64];	      /* of its first name */
 	unsigned char *bytes; /* a file: what is safe */
 	uint64_t size;
 	struct change *changes, **changes_last;
@@ -120,7 +120,8 @@ static void apply(struct name **list, const struct renaming *r)
 		set_name(list, r->made, r->node);
 }
 
-static void rename_in(struct faulty_disk_node *folder, const char *gone, const char *made, struct faulty_disk_node *node)
+static void rename_in(struct faulty_disk_node *folder, const char *gone, const char *made,
+		      struct faulty_disk_node *node)
 {
 	struct renaming *r = must(calloc(1, sizeof *r));
 	*r = (struct renaming){NULL, gone ? must(strdup(gone)) : NULL, made ? must(strdup(made)) : NULL, node};
@@ -196,12 +197,15 @@ static void put(unsigned char **bytes, uint64_t *size, const void *from, uint64_
 
 static bool is_forgotten(const struct faulty_disk_node *n, enum faulty_disk_forget kind)
 {
-	return (setup.forget & kind) && (!setup.forget_name || strncmp(n->last, setup.forget_name, strlen(setup.forget_name)) == 0);
+	return (setup.forget & kind) &&
+	       (!setup.forget_name || strncmp(n->last, setup.forget_name, strlen(setup.forget_name)) == 0);
 }
 
 void faulty_disk_flushed(struct faulty_disk_node *n, bool database)
 {
-	if (!n || is_forgotten(n, database ? FAULTY_DISK_FORGET_DATABASE : n->folder ? FAULTY_DISK_FORGET_FOLDERS : FAULTY_DISK_FORGET_FILES))
+	if (!n || is_forgotten(n, database    ? FAULTY_DISK_FORGET_DATABASE
+				  : n->folder ? FAULTY_DISK_FORGET_FOLDERS
+					      : FAULTY_DISK_FORGET_FILES))
 		return;
 	for (struct change *c; (c = n->changes);) {
 		n->changes = c->next;
@@ -361,7 +365,8 @@ int faulty_disk_enter(enum faulty_disk_call what)
 	if (what != FAULTY_DISK_READS) {
 		atomic_store(&setup.counts[0], ++changing_calls);
 		since_failure += setup.lose_after && atomic_load(&failed);
-		if (changing_calls == setup.lose_at || (setup.lose_after && since_failure == setup.lose_after) || atomic_load(&setup.counts[4]))
+		if (changing_calls == setup.lose_at || (setup.lose_after && since_failure == setup.lose_after) ||
+		    atomic_load(&setup.counts[4]))
 			go_dark();
 	}
 	if (!setup.fail_from || calls < setup.fail_from || calls - setup.fail_from >= setup.fail_count)
@@ -573,8 +578,10 @@ static DIR *do_opendir(const char *path)
 }
 
 static const struct disk door = {
-	do_open,  do_close,  do_read,   do_pread,  do_write, do_pwritev, do_ftruncate, do_fallocate, do_posix_fallocate, do_fsync,
-	do_fsync, do_rename, do_unlink, do_mkdir,  do_rmdir, do_stat,  do_fstat,   do_touch,     do_flock,     do_opendir,
+	do_open,    do_close,	  do_read,	do_pread,	    do_write,
+	do_pwritev, do_ftruncate, do_fallocate, do_posix_fallocate, do_fsync,
+	do_fsync,   do_rename,	  do_unlink,	do_mkdir,	    do_rmdir,
+	do_stat,    do_fstat,	  do_touch,	do_flock,	    do_opendir,
 };
 
 /* ---- the start: all that is there is safe ---- */

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A disk of tests behind common/base/disk.h and behind SQLite: below one folder it does what is asked of it and keeps beside, in
- * memory, what a loss of power would leave. A file's bytes and length are safe after a flush of the file, its name after a flush of
- * the folder; of what was done since, a loss of power keeps a random part: of bytes by the sector, of lengths, of names one by one
- * (made, renamed, gone). A flush of a file that fails forgets what it did not write, and the next one says that all is well, as
- * systems do. What is left is written to another folder, and the process ends. Or calls fail, from the n-th on.
+ * A disk of tests behind common/base/disk.h and behind SQLite: below one folder it does what is asked of it and keeps
+ * beside, in memory, what a loss of power would leave. A file's bytes and length are safe after a flush of the file,
+ * its name after a flush of the folder; of what was done since, a loss of power keeps a random part: of bytes by the
+ * sector, of lengths, of names one by one (made, renamed, gone). A flush of a file that fails forgets what it did not
+ * write, and the next one says that all is well, as systems do. What is left is written to another folder, and the
+ * process ends. Or calls fail, from the n-th on.
  *
- * For a process of its own (fork): faulty_disk_begin replaces the door and SQLite's default VFS for good. Any thread; nothing is
- * flushed for real. Films mapped into memory (O_TMPFILE) are not looked at: nobody finds them again.
+ * For a process of its own (fork): faulty_disk_begin replaces the door and SQLite's default VFS for good. Any thread;
+ * nothing is flushed for real. Films mapped into memory (O_TMPFILE) are not looked at: nobody finds them again.
  */
 #ifndef TESTS_SUPPORT_FAULTY_DISK_H
 #define TESTS_SUPPORT_FAULTY_DISK_H
@@ -20,22 +21,29 @@
 enum { FAULTY_DISK_EXIT = 42, FAULTY_DISK_COUNTS = 5 };
 
 /* What is to be forgotten on purpose, to see whether a test notices: calls that do nothing and say that all is well. */
-enum faulty_disk_forget { FAULTY_DISK_FORGET_NOTHING, FAULTY_DISK_FORGET_FILES = 1, FAULTY_DISK_FORGET_FOLDERS = 2, FAULTY_DISK_FORGET_DATABASE = 4 };
+enum faulty_disk_forget {
+	FAULTY_DISK_FORGET_NOTHING,
+	FAULTY_DISK_FORGET_FILES = 1,
+	FAULTY_DISK_FORGET_FOLDERS = 2,
+	FAULTY_DISK_FORGET_DATABASE = 4
+};
 
 struct faulty_disk {
 	const char *root;  /* absolute, there */
 	const char *after; /* what is left is put there; not there yet */
 	uint64_t seed;
-	uint64_t lose_at;      /* the power goes before this call that changes something, counted from 1; 0: never */
-	uint64_t fail_from;    /* calls fail, from this one of all on; 0: none */
-	uint64_t fail_count;   /* so many */
-	int fail_with;         /* errno */
-	uint64_t lose_after;   /* the power goes so many calls that change something after the first that failed; 0: not */
+	uint64_t lose_at;    /* the power goes before this call that changes something, counted from 1; 0: never */
+	uint64_t fail_from;  /* calls fail, from this one of all on; 0: none */
+	uint64_t fail_count; /* so many */
+	int fail_with;	     /* errno */
+	uint64_t
+		lose_after; /* the power goes so many calls that change something after the first that failed; 0: not */
 	bool fail_writes_only; /* as on a disk that is full, or read-only: reading and making room go on */
 	enum faulty_disk_forget forget;
 	const char *forget_name; /* only of files or folders with this last part of their name; NULL: all */
-	/* Shared with the parent; NULL: nobody asks. [0]: calls that change something; [1]: all; [2]: those that failed; [3]: sectors and
-	 * names that were lost; [4]: not 0: the power goes before the next call that changes something. */
+	/* Shared with the parent; NULL: nobody asks. [0]: calls that change something; [1]: all; [2]: those that
+	 * failed; [3]: sectors and names that were lost; [4]: not 0: the power goes before the next call that changes
+	 * something. */
 	_Atomic uint64_t *counts;
 };
 
@@ -47,7 +55,13 @@ void faulty_disk_power_off(void); /* now */
 struct faulty_disk_node;
 struct faulty_disk_node *faulty_disk_node_of(const char *path, bool create); /* NULL: not below the root */
 /* Before a call: 0, or the errno that it fails with. Locks; faulty_disk_leave unlocks. */
-enum faulty_disk_call { FAULTY_DISK_READS, FAULTY_DISK_OPENS, FAULTY_DISK_WRITES, FAULTY_DISK_FLUSHES, FAULTY_DISK_REMOVES };
+enum faulty_disk_call {
+	FAULTY_DISK_READS,
+	FAULTY_DISK_OPENS,
+	FAULTY_DISK_WRITES,
+	FAULTY_DISK_FLUSHES,
+	FAULTY_DISK_REMOVES
+};
 int faulty_disk_enter(enum faulty_disk_call what);
 void faulty_disk_leave(void);
 void faulty_disk_wrote(struct faulty_disk_node *n, const void *bytes, size_t size, uint64_t at);

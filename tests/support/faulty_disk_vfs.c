@@ -46,7 +46,9 @@ static int x_read(sqlite3_file *f, void *bytes, int size, sqlite3_int64 at)
 static int x_write(sqlite3_file *f, const void *bytes, int size, sqlite3_int64 at)
 {
 	int code = faulty_disk_enter(FAULTY_DISK_WRITES);
-	int rc = code == ENOSPC ? SQLITE_FULL : code ? SQLITE_IOERR_WRITE : of(f)->real->pMethods->xWrite(of(f)->real, bytes, size, at);
+	int rc = code == ENOSPC ? SQLITE_FULL
+		 : code		? SQLITE_IOERR_WRITE
+				: of(f)->real->pMethods->xWrite(of(f)->real, bytes, size, at);
 	if (rc == SQLITE_OK)
 		faulty_disk_wrote(of(f)->node, bytes, (size_t)size, (uint64_t)at);
 	return leave(rc);
@@ -54,7 +56,8 @@ static int x_write(sqlite3_file *f, const void *bytes, int size, sqlite3_int64 a
 
 static int x_truncate(sqlite3_file *f, sqlite3_int64 size)
 {
-	int rc = faulty_disk_enter(FAULTY_DISK_REMOVES) ? SQLITE_IOERR_TRUNCATE : of(f)->real->pMethods->xTruncate(of(f)->real, size);
+	int rc = faulty_disk_enter(FAULTY_DISK_REMOVES) ? SQLITE_IOERR_TRUNCATE
+							: of(f)->real->pMethods->xTruncate(of(f)->real, size);
 	if (rc == SQLITE_OK)
 		faulty_disk_cut(of(f)->node, (uint64_t)size);
 	return leave(rc);

@@ -68,10 +68,12 @@ void mesh_file_ply(struct mesh_file *f, enum ply_kind kind)
 {
 	static const char *const formats[] = {"ascii", "binary_little_endian", "binary_big_endian"};
 	f->size = 0;
-	say(f, "ply\nformat %s 1.0\ncomment by a test\nelement vertex 6\nproperty float x\nproperty float y\nproperty float32 z\n"
-	       "property uchar red\nproperty double nx\nproperty double ny\nproperty float64 nz\nproperty float s\n"
-	       "property float t\nelement edge 2\nproperty list uchar short ends\nelement face 8\n"
-	       "property int material\nproperty list uchar uint vertex_indices\nend_header\n", formats[kind]);
+	say(f,
+	    "ply\nformat %s 1.0\ncomment by a test\nelement vertex 6\nproperty float x\nproperty float y\nproperty float32 z\n"
+	    "property uchar red\nproperty double nx\nproperty double ny\nproperty float64 nz\nproperty float s\n"
+	    "property float t\nelement edge 2\nproperty list uchar short ends\nelement face 8\n"
+	    "property int material\nproperty list uchar uint vertex_indices\nend_header\n",
+	    formats[kind]);
 	for (int i = 0; i < SOLID_VERTICES; i++)
 		put_vertex(f, kind, i);
 	int big = kind == PLY_BIG;

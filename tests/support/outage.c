@@ -172,11 +172,14 @@ static void check_image(const unsigned char *bytes, size_t size, const struct pl
 	}
 	assert_int_equal(img.channel_count, reference.channel_count);
 	for (uint32_t i = 0; i < img.channel_count; i++)
-		equal = equal && memcmp(img.planes[i], reference.planes[i], sizeof(float) * img.width * img.height) == 0;
+		equal = equal &&
+			memcmp(img.planes[i], reference.planes[i], sizeof(float) * img.width * img.height) == 0;
 	exr_image_fini(&img);
 	outage.found->images++;
 	if (results != reference_results)
-		count_harm(results < reference_results ? LOST : DOUBLED, (uint64_t)llabs((long long)(results - reference_results)), "a film holds too few or too many");
+		count_harm(results < reference_results ? LOST : DOUBLED,
+			   (uint64_t)llabs((long long)(results - reference_results)),
+			   "a film holds too few or too many");
 	if (!equal)
 		count_harm(UNEQUAL, 1, "an image has other bits");
 }
@@ -216,7 +219,8 @@ static bool look(struct farm_run *f)
 			f->accepted--;
 			f->failed++;
 		}
-		if (f->jobs[j->job].submitted && (strcmp(j->state, "failed") == 0 || strcmp(j->state, "cancelled") == 0))
+		if (f->jobs[j->job].submitted &&
+		    (strcmp(j->state, "failed") == 0 || strcmp(j->state, "cancelled") == 0))
 			fail_msg("j%llu is %s: %s", (unsigned long long)j->job, j->state, j->why);
 		seen[j->job] = true;
 		done[j->job] = strcmp(j->state, "done") == 0 && j->fetchable;
@@ -265,7 +269,8 @@ static bool answer_lease(struct farm_run *f, const Farm__LeaseGrant *g)
 {
 	struct grant grant;
 	struct error e;
-	assert_int_equal(grant_unpack(&grant, g, f->worker->reader.payload.bytes, f->worker->reader.payload.size, &e), 0);
+	assert_int_equal(grant_unpack(&grant, g, f->worker->reader.payload.bytes, f->worker->reader.payload.size, &e),
+			 0);
 	struct lease_key before = grant.key;
 	assert_true(before.job < IDS_MAX);
 	bool *acked = &f->jobs[before.job].acked[lease_index(&f->plan, &before)];
@@ -348,8 +353,16 @@ void outage_begin(struct farm_run *f, uint64_t seed)
 {
 	struct error e;
 	memset(f, 0, sizeof *f);
-	f->request = (struct plan_request){.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .mutations = 3200,
-					   .max_depth = 5, .groups = 2, .chains = 8, .epoch = 100, .bootstrap = 64};
+	f->request = (struct plan_request){.integrator = "pssmlt",
+					   .kind = PLAN_CHAINS,
+					   .width = 20,
+					   .height = 10,
+					   .mutations = 3200,
+					   .max_depth = 5,
+					   .groups = 2,
+					   .chains = 8,
+					   .epoch = 100,
+					   .bootstrap = 64};
 	assert_int_equal(plan_make(&f->request, &f->plan, &e), 0);
 	f->disk = (struct faulty_disk){.root = outage.root, .after = after, .seed = seed, .counts = outage.counts};
 	if (getenv("HSLT_POWER_FORGET"))

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator on a disk that loses what was not synchronised, or whose calls fail (tests/support/faulty_disk.h), and a client and a worker
- * that remember what was acknowledged: life after life, each from what the disk kept. What must not be is counted: results that were
- * acknowledged and are not there, that a film holds twice, images of other bits than those of an undisturbed run. Everything else
- * that is wrong ends the test. One process at a time in each folder (tests/support/folder.h).
+ * A coordinator on a disk that loses what was not synchronised, or whose calls fail (tests/support/faulty_disk.h), and
+ * a client and a worker that remember what was acknowledged: life after life, each from what the disk kept. What must
+ * not be is counted: results that were acknowledged and are not there, that a film holds twice, images of other bits
+ * than those of an undisturbed run. Everything else that is wrong ends the test. One process at a time in each folder
+ * (tests/support/folder.h).
  */
 #ifndef TESTS_SUPPORT_OUTAGE_H
 #define TESTS_SUPPORT_OUTAGE_H
@@ -44,20 +45,20 @@ struct outage_found {
 extern struct outage {
 	_Atomic uint64_t *counts;   /* of the disk; set by the test */
 	struct outage_found *found; /* set by the test */
-	bool loud;                  /* with the coordinator's log */
-	bool accept_loss;           /* --accept-loss */
-	uint64_t journal_bytes;     /* --journal; 0: a checkpoint after every result or two */
-	uint64_t quiet_calls;       /* of an undisturbed run, that change something */
-	char running[64];           /* the run that is under way; "": none */
-	char root[80];              /* the spool */
+	bool loud;		    /* with the coordinator's log */
+	bool accept_loss;	    /* --accept-loss */
+	uint64_t journal_bytes;	    /* --journal; 0: a checkpoint after every result or two */
+	uint64_t quiet_calls;	    /* of an undisturbed run, that change something */
+	char running[64];	    /* the run that is under way; "": none */
+	char root[80];		    /* the spool */
 } outage;
 
 void outage_begin(struct farm_run *f, uint64_t seed); /* from nothing */
-bool outage_start(struct farm_run *f);                /* false: the power went before it had read its jobs, or it did not start */
-bool outage_work(struct farm_run *f);                 /* to the end of all jobs; false: the power went */
+bool outage_start(struct farm_run *f); /* false: the power went before it had read its jobs, or it did not start */
+bool outage_work(struct farm_run *f);  /* to the end of all jobs; false: the power went */
 void outage_hang_up(struct farm_run *f);
 int outage_gone(struct farm_run *f, bool wait); /* 0: it runs; else its exit code, -1 for 0 */
-void outage_swap_folders(struct farm_run *f);   /* what the disk kept becomes the spool */
+void outage_swap_folders(struct farm_run *f);	/* what the disk kept becomes the spool */
 void outage_stop(struct farm_run *f);
 /* All is done and the coordinator idle: another job, and at its first call the power goes. */
 void outage_stop_in_the_dark(struct farm_run *f);

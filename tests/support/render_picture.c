@@ -51,10 +51,20 @@ static struct plan make_plan(const struct world *w, const struct render_picture_
 {
 	struct render_summary s;
 	world_summary(w, &s);
-	struct plan p = {.kind = PLAN_SAMPLES, .width = s.settings.width, .height = s.settings.height,
-			 .crop_width = s.settings.width, .crop_height = s.settings.height, .border = s.settings.border,
-			 .seed = stats_seed(how->test), .groups = 1, .parts = 16, .rounds = 1, .bootstrap = 16,
-			 .epoch = how->spp, .min_depth = 1, .max_depth = how->max_depth ? how->max_depth : s.settings.max_depth};
+	struct plan p = {.kind = PLAN_SAMPLES,
+			 .width = s.settings.width,
+			 .height = s.settings.height,
+			 .crop_width = s.settings.width,
+			 .crop_height = s.settings.height,
+			 .border = s.settings.border,
+			 .seed = stats_seed(how->test),
+			 .groups = 1,
+			 .parts = 16,
+			 .rounds = 1,
+			 .bootstrap = 16,
+			 .epoch = how->spp,
+			 .min_depth = 1,
+			 .max_depth = how->max_depth ? how->max_depth : s.settings.max_depth};
 	snprintf(p.integrator, sizeof p.integrator, "%s", how->integrator);
 	struct error e = {""};
 	if (plan_check(&p, &e))
@@ -64,7 +74,10 @@ static struct plan make_plan(const struct world *w, const struct render_picture_
 
 static void make_black(struct picture *out, uint32_t width, uint32_t height)
 {
-	*out = (struct picture){.image = {.width = width, .height = height, .channel_count = 3, .full_width = width,
+	*out = (struct picture){.image = {.width = width,
+					  .height = height,
+					  .channel_count = 3,
+					  .full_width = width,
 					  .full_height = height}};
 	for (int k = 0; k < 3; k++) {
 		snprintf(out->image.names[k], sizeof out->image.names[k], "%c", "RGB"[k]);
@@ -77,7 +90,8 @@ void render_picture_xyz(const struct world *w, const struct render_picture_how *
 {
 	struct plan p = make_plan(w, how);
 	make_black(out, p.width, p.height);
-	/* Two parts at a time, added in order: where strips overlap by the filter, sums do not depend on which ends first. */
+	/* Two parts at a time, added in order: where strips overlap by the filter, sums do not depend on which ends
+	 * first. */
 	for (uint32_t part = 0; part < p.parts; part += 2) {
 		struct part_run run[2] = {{.w = w, .p = &p, .part = part}, {.w = w, .p = &p, .part = part + 1}};
 		pthread_t other;

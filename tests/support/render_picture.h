@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A whole picture of a world by plain leases, on two threads, with neither farm nor program: for comparing with references.
- * The same bits at each run. Anything wrong fails the test, contributions that were refused too.
+ * A whole picture of a world by plain leases, on two threads, with neither farm nor program: for comparing with
+ * references. The same bits at each run. Anything wrong fails the test, contributions that were refused too.
  */
 #ifndef TESTS_SUPPORT_RENDER_PICTURE_H
 #define TESTS_SUPPORT_RENDER_PICTURE_H
@@ -13,7 +13,7 @@
 
 struct render_picture_how {
 	const char *integrator; /* one that samples pixels */
-	const char *test;       /* the seed is this name's */
+	const char *test;	/* the seed is this name's */
 	uint64_t spp;
 	uint32_t max_depth; /* 0: the scene's */
 };

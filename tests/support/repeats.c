@@ -32,10 +32,20 @@ static int make_plan(const struct queue *q, uint32_t i, struct plan *p, struct e
 	struct render_summary s;
 	world_summary(q->w, &s);
 	const struct render_integrator *integrator = render_integrator_find(how->integrator);
-	struct plan_request r = {.kind = integrator->kind, .width = s.settings.width, .height = s.settings.height,
-				 .border = s.settings.border, .seed = q->seed + i, .spp = how->spp, .bootstrap = how->bootstrap,
-				 .epoch = how->epoch, .chains = how->chains, .groups = how->groups, .target_error = how->target_error,
-				 .min_depth = 1, .max_depth = s.settings.max_depth < integrator->max_depth ? s.settings.max_depth : integrator->max_depth};
+	struct plan_request r = {.kind = integrator->kind,
+				 .width = s.settings.width,
+				 .height = s.settings.height,
+				 .border = s.settings.border,
+				 .seed = q->seed + i,
+				 .spp = how->spp,
+				 .bootstrap = how->bootstrap,
+				 .epoch = how->epoch,
+				 .chains = how->chains,
+				 .groups = how->groups,
+				 .target_error = how->target_error,
+				 .min_depth = 1,
+				 .max_depth = s.settings.max_depth < integrator->max_depth ? s.settings.max_depth
+											   : integrator->max_depth};
 	snprintf(r.integrator, sizeof r.integrator, "%s", how->integrator);
 	int rc = integrator->has_mutations ? render_mutations(NULL, &s, r.mixture, e) : 0;
 	return rc ? rc : plan_make(&r, p, e);
@@ -63,7 +73,8 @@ static int render(struct queue *q, uint32_t i, struct error *e)
 		q->out->plan = p;
 	atomic_bool stop = false;
 	struct looking l = {q, i};
-	struct local_run run = {.world = q->w, .plan = &p, .threads = 1, .stop = &stop, .round = each_round, .user = &l};
+	struct local_run run = {
+		.world = q->w, .plan = &p, .threads = 1, .stop = &stop, .round = each_round, .user = &l};
 	rc = local_run(&run, e);
 	if (rc)
 		return rc;
@@ -86,13 +97,20 @@ static void *work(void *arg)
 	return NULL;
 }
 
-void repeats_run(const struct world *w, const struct repeats_how *how, repeats_look *look, void *user, struct repeats *out)
+void repeats_run(const struct world *w, const struct repeats_how *how, repeats_look *look, void *user,
+		 struct repeats *out)
 {
 	char name[128];
 	snprintf(name, sizeof name, "%s %s", how->test, how->integrator);
-	*out = (struct repeats){.count = how->count, .values = w->settings.width * w->settings.height * 3,
+	*out = (struct repeats){.count = how->count,
+				.values = w->settings.width * w->settings.height * 3,
 				.images = calloc(how->count, sizeof *out->images)};
-	struct queue q = {.w = w, .how = how, .look = look, .user = user, .out = out, .seed = stats_seed(name) % (UINT64_C(1) << 40),
+	struct queue q = {.w = w,
+			  .how = how,
+			  .look = look,
+			  .user = user,
+			  .out = out,
+			  .seed = stats_seed(name) % (UINT64_C(1) << 40),
 			  .cpu = calloc(how->count, sizeof *q.cpu)};
 	assert_true(out->images && q.cpu);
 	pthread_t other;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Many renders of one world that differ in their seeds only, as hslt-render makes them, on two threads: for tests of what is
- * said about errors. Seeds follow from the test's name, so that results are the same at each run.
+ * Many renders of one world that differ in their seeds only, as hslt-render makes them, on two threads: for tests of
+ * what is said about errors. Seeds follow from the test's name, so that results are the same at each run.
  */
 #ifndef TESTS_SUPPORT_REPEATS_H
 #define TESTS_SUPPORT_REPEATS_H
@@ -22,12 +22,13 @@ typedef void repeats_look(void *user, uint32_t render, uint64_t rounds, const st
 
 struct repeats {
 	uint32_t count, values; /* values: width x height x 3 */
-	struct plan plan;       /* of the first */
+	struct plan plan;	/* of the first */
 	struct canvas_image *images;
-	double cpu_seconds;     /* of all, in leases */
+	double cpu_seconds; /* of all, in leases */
 };
 
-void repeats_run(const struct world *w, const struct repeats_how *how, repeats_look *look, void *user, struct repeats *out);
+void repeats_run(const struct world *w, const struct repeats_how *how, repeats_look *look, void *user,
+		 struct repeats *out);
 void repeats_free(struct repeats *r);
 
 #endif

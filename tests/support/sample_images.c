@@ -33,7 +33,8 @@ static void flush(png_structp png)
 
 unsigned char *sample_png(size_t width, size_t height, enum sample_pixels kind, int bits, int interlaced, size_t *size)
 {
-	static const int types[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_RGB, PNG_COLOR_TYPE_RGB_ALPHA, PNG_COLOR_TYPE_PALETTE};
+	static const int types[] = {PNG_COLOR_TYPE_GRAY, PNG_COLOR_TYPE_RGB, PNG_COLOR_TYPE_RGB_ALPHA,
+				    PNG_COLOR_TYPE_PALETTE};
 	static const size_t channels[] = {1, 3, 4, 1};
 	struct buffer b = {0};
 	png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, NULL, NULL, NULL);
@@ -66,7 +67,8 @@ unsigned char *sample_png(size_t width, size_t height, enum sample_pixels kind, 
 	return b.bytes;
 }
 
-unsigned char *sample_jpeg(size_t width, size_t height, const unsigned char *color, int components, int progressive, size_t *size)
+unsigned char *sample_jpeg(size_t width, size_t height, const unsigned char *color, int components, int progressive,
+			   size_t *size)
 {
 	struct jpeg_compress_struct j;
 	struct jpeg_error_mgr errors;

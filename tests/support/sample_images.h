@@ -11,6 +11,7 @@ enum sample_pixels { SAMPLE_GREY, SAMPLE_RGB, SAMPLE_RGBA, SAMPLE_PALETTE };
 unsigned sample_value(size_t x, size_t y, int k);
 unsigned char *sample_png(size_t width, size_t height, enum sample_pixels kind, int bits, int interlaced, size_t *size);
 /* All pixels of one colour: JPEG keeps it to a step or two. */
-unsigned char *sample_jpeg(size_t width, size_t height, const unsigned char *color, int components, int progressive, size_t *size);
+unsigned char *sample_jpeg(size_t width, size_t height, const unsigned char *color, int components, int progressive,
+			   size_t *size);
 
 #endif

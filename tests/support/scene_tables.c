@@ -4,7 +4,10 @@
 #include <assert.h>
 
 #define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
-#define END {NULL, 0, 0, 0, 0, NULL}
+#define END                            \
+	{                              \
+		NULL, 0, 0, 0, 0, NULL \
+	}
 
 static const struct param diffuse[] = {{"reflectance", UNDERSTOOD(VALUE_TEXTURE)}, END};
 static const struct param rough[] = {

@@ -33,16 +33,27 @@ static int say(enum trial_end end, const char *text)
 
 static struct plan plan_of(const struct render_summary *s, const struct render_integrator *i)
 {
-	struct plan p = {.kind = i->kind, .width = s->settings.width, .height = s->settings.height, .crop_width = s->settings.width,
-			 .crop_height = s->settings.height, .border = s->settings.border, .seed = 3, .groups = 1, .parts = 1,
-			 .chains = i->kind == PLAN_CHAINS ? 2 : 0, .bootstrap = 400, .epoch = i->kind == PLAN_CHAINS ? 150 : 1,
-			 .rounds = 1, .min_depth = 1, .max_depth = s->settings.max_depth < 8 ? s->settings.max_depth : 8};
+	struct plan p = {.kind = i->kind,
+			 .width = s->settings.width,
+			 .height = s->settings.height,
+			 .crop_width = s->settings.width,
+			 .crop_height = s->settings.height,
+			 .border = s->settings.border,
+			 .seed = 3,
+			 .groups = 1,
+			 .parts = 1,
+			 .chains = i->kind == PLAN_CHAINS ? 2 : 0,
+			 .bootstrap = 400,
+			 .epoch = i->kind == PLAN_CHAINS ? 150 : 1,
+			 .rounds = 1,
+			 .min_depth = 1,
+			 .max_depth = s->settings.max_depth < 8 ? s->settings.max_depth : 8};
 	snprintf(p.integrator, sizeof p.integrator, "%s", i->name);
 	return p;
 }
 
-static int lease(const struct world *w, const struct plan *p, enum lease_kind kind, const struct lease_input *in, struct batch *b,
-		 struct error *e)
+static int lease(const struct world *w, const struct plan *p, enum lease_kind kind, const struct lease_input *in,
+		 struct batch *b, struct error *e)
 {
 	struct lease_key k = {1, kind, 0, 0, 0};
 	enum lease_end end;
@@ -50,7 +61,8 @@ static int lease(const struct world *w, const struct plan *p, enum lease_kind ki
 	return rc ? rc : batch_check(b, p, e);
 }
 
-static int render(const struct world *w, const struct render_summary *s, const struct render_integrator *i, struct error *e)
+static int render(const struct world *w, const struct render_summary *s, const struct render_integrator *i,
+		  struct error *e)
 {
 	struct plan p = plan_of(s, i);
 	if (i->has_mutations && render_mutations(NULL, s, p.mutations, e))

@@ -52,7 +52,8 @@ bool scripted_has(struct scripted *p, int milliseconds)
 
 bool scripted_is_merged(const Farm__Envelope *m)
 {
-	return m && m->body_case == FARM__ENVELOPE__BODY_LEASE_ACK && m->lease_ack->verdict == FARM__VERDICT__VERDICT_MERGED;
+	return m && m->body_case == FARM__ENVELOPE__BODY_LEASE_ACK &&
+	       m->lease_ack->verdict == FARM__VERDICT__VERDICT_MERGED;
 }
 
 const Farm__Envelope *scripted_hear(struct scripted *p)
@@ -221,7 +222,8 @@ bool scripted_fetch(const struct scripted *p, uint64_t job, Farm__What what, uin
 
 uint64_t scripted_tag(const struct lease_key *k)
 {
-	uint64_t z = ((uint64_t)k->kind << 60 ^ (uint64_t)k->group << 48 ^ (uint64_t)k->part << 36 ^ k->epoch) + UINT64_C(0x9e3779b97f4a7c15);
+	uint64_t z = ((uint64_t)k->kind << 60 ^ (uint64_t)k->group << 48 ^ (uint64_t)k->part << 36 ^ k->epoch) +
+		     UINT64_C(0x9e3779b97f4a7c15);
 	z = (z ^ z >> 30) * UINT64_C(0xbf58476d1ce4e5b9);
 	z = (z ^ z >> 27) * UINT64_C(0x94d049bb133111eb);
 	return z ^ z >> 31;
@@ -244,7 +246,8 @@ static void light_weights(struct batch *b, uint64_t tag)
 
 static void add_tiles(struct batch *b, const struct plan *plan, uint64_t tag)
 {
-	uint32_t across = (plan->crop_width + TILE_SIZE - 1) / TILE_SIZE, down = (plan->crop_height + TILE_SIZE - 1) / TILE_SIZE;
+	uint32_t across = (plan->crop_width + TILE_SIZE - 1) / TILE_SIZE,
+		 down = (plan->crop_height + TILE_SIZE - 1) / TILE_SIZE;
 	b->tiles = mem_alloc((size_t)across * down, sizeof *b->tiles);
 	for (uint32_t y = 0; y < plan->crop_height; y += TILE_SIZE)
 		for (uint32_t x = 0; x < plan->crop_width; x += TILE_SIZE) {

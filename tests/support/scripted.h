@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Peers of a coordinator, of a few lines each: a client, and a worker whose results depend on the lease alone and take no time.
- * Blocking, one thread. A coordinator that hangs up is an answer (NULL), one that says nothing for a minute fails the test.
+ * Peers of a coordinator, of a few lines each: a client, and a worker whose results depend on the lease alone and take
+ * no time. Blocking, one thread. A coordinator that hangs up is an answer (NULL), one that says nothing for a minute
+ * fails the test.
  */
 #ifndef TESTS_SUPPORT_SCRIPTED_H
 #define TESTS_SUPPORT_SCRIPTED_H
@@ -20,12 +21,13 @@ struct scripted {
 
 struct scripted *scripted_connect(uint16_t port); /* without a word; NULL: nobody answers */
 const Farm__HelloAck *scripted_hello(struct scripted *p, uint32_t version, Farm__Role role); /* NULL: no such answer */
-struct scripted *scripted_call(uint16_t port, Farm__Role role); /* NULL: nobody answers */
-void scripted_hang_up(struct scripted *p); /* NULL: nothing */
-bool scripted_say(const struct scripted *p, const Farm__Envelope *m, const void *payload, size_t size); /* false: it hung up */
+struct scripted *scripted_call(uint16_t port, Farm__Role role);				     /* NULL: nobody answers */
+void scripted_hang_up(struct scripted *p);						     /* NULL: nothing */
+bool scripted_say(const struct scripted *p, const Farm__Envelope *m, const void *payload,
+		  size_t size); /* false: it hung up */
 /* The next message but heartbeats, valid until the next call; the payload is in p->reader. */
 const Farm__Envelope *scripted_hear(struct scripted *p);
-bool scripted_is_merged(const Farm__Envelope *m); /* the word that a result is, and stored; NULL is not */
+bool scripted_is_merged(const Farm__Envelope *m);	 /* the word that a result is, and stored; NULL is not */
 bool scripted_has(struct scripted *p, int milliseconds); /* something to hear, or the end */
 
 bool scripted_submit(const struct scripted *p, const struct plan_request *r, const char *scene);
@@ -34,7 +36,8 @@ bool scripted_want(const struct scripted *p, uint32_t leases);
 bool scripted_list(const struct scripted *p);
 bool scripted_fetch(const struct scripted *p, uint64_t job, Farm__What what, uint64_t offset);
 
-/* Even-tempered light that is another in every lease; chain states of so many bytes that begin with a number of the lease. */
+/* Even-tempered light that is another in every lease; chain states of so many bytes that begin with a number of the
+ * lease. */
 struct batch scripted_batch(const struct lease_key *k, const struct plan *plan, uint32_t state_bytes);
 bool scripted_send(const struct scripted *p, const struct batch *b, const struct plan *plan);
 uint64_t scripted_tag(const struct lease_key *k); /* the number that its chain states begin with */

@@ -234,14 +234,21 @@ void served_works_again(void)
 
 struct plan_request peer_plan_request(const char *mixture)
 {
-	struct plan_request r = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .spp = 4,
-				 .max_depth = 5, .groups = 2, .bootstrap = 256};
+	struct plan_request r = {.integrator = "pssmlt",
+				 .kind = PLAN_CHAINS,
+				 .width = 20,
+				 .height = 10,
+				 .spp = 4,
+				 .max_depth = 5,
+				 .groups = 2,
+				 .bootstrap = 256};
 	if (mixture)
 		snprintf(r.mixture, sizeof r.mixture, "%s", mixture);
 	return r;
 }
 
-void peer_submit(struct scripted *p, const char *mixture, const char *scene_text, const char *file_name, const char *scene_name)
+void peer_submit(struct scripted *p, const char *mixture, const char *scene_text, const char *file_name,
+		 const char *scene_name)
 {
 	Farm__Submit s;
 	Farm__PlanRequest plan;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator's shell in a process of its own, and peers of it that say what a test wants them to say, well or badly. Blocking, one
- * thread, one server at a time; what does not answer within a minute fails the test. They hear and hang up as scripted.h has it.
+ * A coordinator's shell in a process of its own, and peers of it that say what a test wants them to say, well or badly.
+ * Blocking, one thread, one server at a time; what does not answer within a minute fails the test. They hear and hang
+ * up as scripted.h has it.
  */
 #ifndef TESTS_SUPPORT_SERVED_H
 #define TESTS_SUPPORT_SERVED_H
@@ -11,12 +12,13 @@
 
 /* ---- the server ---- */
 
-/* Eight connections at most, two of them with a fetch under way; 0: it listens. What a test does not wait for is to last longer than a busy machine stands still. */
+/* Eight connections at most, two of them with a fetch under way; 0: it listens. What a test does not wait for is to
+ * last longer than a busy machine stands still. */
 int served_start(double hello_seconds, double heartbeat_seconds, double stall_seconds);
-int served_stop(void **state); /* a teardown: fails when it did not end well */
+int served_stop(void **state);	 /* a teardown: fails when it did not end well */
 const char *served_folder(void); /* holds its spool; a file `nomem` there: its next connection gets no memory */
 void served_set_busy(bool busy); /* nobody may look at the films of its jobs */
-long served_kilobytes(void); /* of memory */
+long served_kilobytes(void);	 /* of memory */
 void served_still_works(void);
 void served_works_again(void); /* when it has noticed that others hung up */
 
@@ -33,7 +35,8 @@ void peer_say_job_get(const struct scripted *p, uint64_t job);
 
 /* mixture: NULL, or of the mutations. */
 struct plan_request peer_plan_request(const char *mixture);
-void peer_submit(struct scripted *p, const char *mixture, const char *scene_text, const char *file_name, const char *scene_name);
+void peer_submit(struct scripted *p, const char *mixture, const char *scene_text, const char *file_name,
+		 const char *scene_name);
 const Farm__SubmitAnswer *peer_submit_answer(struct scripted *p);
 void peer_send_blob(struct scripted *p, const char *true_text, const char *sent_text);
 

@@ -32,7 +32,8 @@ bool shares_pass(void)
 	for (int i = 1; i < SHARES; i++) {
 		char line[512];
 		int status = 0;
-		bool bad = others[i] < 0 || waitpid(others[i], &status, 0) != others[i] || !WIFEXITED(status) || WEXITSTATUS(status);
+		bool bad = others[i] < 0 || waitpid(others[i], &status, 0) != others[i] || !WIFEXITED(status) ||
+			   WEXITSTATUS(status);
 		if (logs[i])
 			rewind(logs[i]);
 		while (bad && logs[i] && fgets(line, sizeof line, logs[i]))

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A test program in several processes side by side, where most of the time somebody waits: each does its share of the runs.
- * What the others print is shown when one of them fails.
+ * A test program in several processes side by side, where most of the time somebody waits: each does its share of the
+ * runs. What the others print is shown when one of them fails.
  */
 #ifndef TESTS_SUPPORT_SHARES_H
 #define TESTS_SUPPORT_SHARES_H

@@ -4,10 +4,12 @@
 #include <assert.h>
 #include <stdlib.h>
 
-void starts_context(struct path_context *c, const struct world *w, unsigned min_depth, unsigned max_depth, uint64_t *counters)
+void starts_context(struct path_context *c, const struct world *w, unsigned min_depth, unsigned max_depth,
+		    uint64_t *counters)
 {
 	assert(max_depth <= STARTS_MAX_EDGES);
-	*c = (struct path_context){.w = w, .window = {0, 0, 32, 32}, .min_depth = min_depth, .max_depth = max_depth, .counters = counters};
+	*c = (struct path_context){
+		.w = w, .window = {0, 0, 32, 32}, .min_depth = min_depth, .max_depth = max_depth, .counters = counters};
 }
 
 static void walk(struct starts *s, uint64_t index, unsigned *camera, unsigned *light)

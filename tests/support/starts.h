@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Whole paths in exact proportion to f, for tests of what a Markov chain does with them: the paths that bdpt makes of
- * independent pairs of sub-paths, resampled by what each contributes there. A group's paths are independent of all other
- * groups'; within one they may repeat. One thread.
+ * independent pairs of sub-paths, resampled by what each contributes there. A group's paths are independent of all
+ * other groups'; within one they may repeat. One thread.
  */
 #ifndef TESTS_SUPPORT_STARTS_H
 #define TESTS_SUPPORT_STARTS_H
@@ -28,7 +28,8 @@ struct starts {
 };
 
 /* A context for films of 32 x 32 and paths of min_depth..max_depth edges; counters are the caller's. */
-void starts_context(struct path_context *c, const struct world *w, unsigned min_depth, unsigned max_depth, uint64_t *counters);
+void starts_context(struct path_context *c, const struct world *w, unsigned min_depth, unsigned max_depth,
+		    uint64_t *counters);
 
 /* The group's own pairs. starts_fini frees. */
 void starts_init(struct starts *s, struct path_context *c, uint64_t seed, uint64_t group, uint64_t pairs);

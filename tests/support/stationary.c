@@ -24,7 +24,7 @@ struct group {
 	const struct mixture_entry *entry;
 	uint64_t seed;
 	uint32_t number, starts, bootstrap;
-	double weight;                     /* mean of the bootstrap */
+	double weight;							  /* mean of the bootstrap */
 	double first[STATIONARY_FUNCTIONS], change[STATIONARY_FUNCTIONS]; /* means over the starts, times weight */
 	uint64_t proposals, accepted, checked;
 	uint64_t counters[BATCH_COUNTERS], strategy[STRATEGY_COUNTERS];
@@ -40,9 +40,11 @@ static const char *const what_names[5] = {"x", "y", "z", "slope", "cosine"};
 const char *stationary_function(int i)
 {
 	static _Thread_local char text[32];
-	static const char *const film[] = {"upper left", "upper right", "lower left", "lower right", "share of X", "share of Z"};
-	static const char *const ends[] = {"x of x_0", "y of x_0", "z of x_0", "aperture x", "aperture y", "wavelength", "edge 0",
-					   "edge 1", "edge 2", "edge 3", "last edge but one", "last edge"};
+	static const char *const film[] = {"upper left",  "upper right", "lower left",
+					   "lower right", "share of X",	 "share of Z"};
+	static const char *const ends[] = {"x of x_0",		"y of x_0", "z of x_0", "aperture x", "aperture y",
+					   "wavelength",	"edge 0",   "edge 1",	"edge 2",     "edge 3",
+					   "last edge but one", "last edge"};
 	if (i < 0)
 		return "nothing";
 	if (i < 6)
@@ -68,7 +70,8 @@ static void look_at_edges(const struct path_context *c, const struct full_path_p
 		if (e >= k || (i >= FROM_LIGHT && e < FROM_LIGHT))
 			continue;
 		const struct full_path_edge *g = &x->edge[e];
-		double cosines = path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) * c->w->radius * c->w->radius;
+		double cosines =
+			path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) * c->w->radius * c->w->radius;
 		out[i] = cosines / (cosines + g->distance2);
 	}
 }
@@ -77,7 +80,8 @@ static void look_at_edges(const struct path_context *c, const struct full_path_p
 static void look_at(const struct path_context *c, struct full_path_path *x, double out[STATIONARY_FUNCTIONS])
 {
 	const struct film_window *f = &c->window;
-	double u = (x->film[0] - f->x) / f->width, v = (x->film[1] - f->y) / f->height, xyz[3], *at = out, r = c->w->radius;
+	double u = (x->film[0] - f->x) / f->width, v = (x->film[1] - f->y) / f->height, xyz[3], *at = out,
+	       r = c->w->radius;
 	unsigned k = x->edges, inner[INNER] = {k - 1, (k + 1) / 2, 1};
 	full_path_colour(c, x, xyz);
 	*at++ = (1 - u) * (1 - v);
@@ -141,7 +145,8 @@ static double log_geometry(const struct full_path_path *x, unsigned b)
 	return b > 0 ? log(path_cosine(&x->v[b - 1], x->edge[b - 1].w) / x->edge[b - 1].distance2) : 0;
 }
 
-static double planted(enum stationary_fault fault, const struct move *m, const struct full_path_path *x, const struct full_path_path *y)
+static double planted(enum stationary_fault fault, const struct move *m, const struct full_path_path *x,
+		      const struct full_path_path *y)
 {
 	switch (fault) {
 	case STATIONARY_NO_TRANSFER:
@@ -231,9 +236,13 @@ static void run_group(struct group *g)
 {
 	uint64_t *index = calloc(g->starts, sizeof *index);
 	const struct scene_settings *s = &g->w->settings;
-	g->context = (struct path_context){.w = g->w, .window = {0, 0, s->width, s->height}, .min_depth = g->how->min_edges,
-					   .max_depth = g->how->max_edges, .counters = g->counters};
-	g->mutation = (struct mutation_ctx){.path = &g->context, .seed = g->seed, .count = g->strategy, .limits = walk_limits_of(&g->w->accuracy)};
+	g->context = (struct path_context){.w = g->w,
+					   .window = {0, 0, s->width, s->height},
+					   .min_depth = g->how->min_edges,
+					   .max_depth = g->how->max_edges,
+					   .counters = g->counters};
+	g->mutation = (struct mutation_ctx){
+		.path = &g->context, .seed = g->seed, .count = g->strategy, .limits = walk_limits_of(&g->w->accuracy)};
 	bool watched = fptrap_watch();
 	if (resample(g, index))
 		for (uint32_t i = 0; i < g->starts && !g->failure[0]; i++)
@@ -295,8 +304,9 @@ static void judge(const struct group *groups, struct stationary_result *out)
 		out->bias[f] = m.mean / scale;
 		out->error[f] = m.error / scale;
 		double least = t * out->error[f], p = m.p * STATIONARY_FUNCTIONS;
-		double *kind = f < STATIONARY_BLOCKS ? &out->least_block
-			       : f < STATIONARY_BLOCKS + STATIONARY_COLOURS ? &out->least_colour : &out->least_other;
+		double *kind = f < STATIONARY_BLOCKS			    ? &out->least_block
+			       : f < STATIONARY_BLOCKS + STATIONARY_COLOURS ? &out->least_colour
+									    : &out->least_other;
 		*kind = fmax(*kind, least);
 		if (p < out->p) {
 			out->p = p;
@@ -316,7 +326,8 @@ static void parse(const char *text, struct mixture_entry *out)
 	*out = m.entry[0];
 }
 
-void stationary_run(const struct world *w, const char *test, const struct stationary_how *how, struct stationary_result *out)
+void stationary_run(const struct world *w, const char *test, const struct stationary_how *how,
+		    struct stationary_result *out)
 {
 	struct group *groups = calloc(STATIONARY_GROUPS, sizeof *groups);
 	const char *text = getenv("HSLT_TEST_SCALE");
@@ -363,5 +374,6 @@ void stationary_run(const struct world *w, const char *test, const struct statio
 
 bool stationary_holds(const struct stationary_result *r)
 {
-	return r->p > LEVEL && !r->failure[0] && r->counters[COUNT_NAN] + r->counters[COUNT_INFINITE] + r->counters[COUNT_NEGATIVE] == 0;
+	return r->p > LEVEL && !r->failure[0] &&
+	       r->counters[COUNT_NAN] + r->counters[COUNT_INFINITE] + r->counters[COUNT_NEGATIVE] == 0;
 }

@@ -1,24 +1,31 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Does a mutation leave the distribution of paths as it is? A test of one mutation alone, also of one forced (b, c), on paths
- * of given lengths.
+ * Does a mutation leave the distribution of paths as it is? A test of one mutation alone, also of one forced (b, c), on
+ * paths of given lengths.
  *
- * Paths are drawn in proportion to f, by resampling bdpt's bootstrap; each makes STATIONARY_STEPS mutations. Whatever one
- * looks at then has the same mean after the mutations as before, and only the difference is looked at: what makes bdpt and
- * plain chains noisy, where the paths are and what b is, is the same in both and cancels. The mean over the steps is the
- * image of a chain of which each STATIONARY_STEPS-th proposal is an independent one that is always accepted: the bias found
- * is the bias of that image.
+ * Paths are drawn in proportion to f, by resampling bdpt's bootstrap; each makes STATIONARY_STEPS mutations. Whatever
+ * one looks at then has the same mean after the mutations as before, and only the difference is looked at: what makes
+ * bdpt and plain chains noisy, where the paths are and what b is, is the same in both and cancels. The mean over the
+ * steps is the image of a chain of which each STATIONARY_STEPS-th proposal is an independent one that is always
+ * accepted: the bias found is the bias of that image.
  *
- * Looked at: four soft quarters of the film (bilinear, so that a step of some pixels is a small change), the shares of X and
- * Z of the whole image, and of some vertices place, slope of the half vector and cosine; geometry terms; point of the aperture, wavelength.
- * Groups are independent; by Student's t between them, level 1e-6 a case, shared by Holm's method. Deterministic.
+ * Looked at: four soft quarters of the film (bilinear, so that a step of some pixels is a small change), the shares of
+ * X and Z of the whole image, and of some vertices place, slope of the half vector and cosine; geometry terms; point of
+ * the aperture, wavelength. Groups are independent; by Student's t between them, level 1e-6 a case, shared by Holm's
+ * method. Deterministic.
  */
 #ifndef TESTS_SUPPORT_STATIONARY_H
 #define TESTS_SUPPORT_STATIONARY_H
 
 #include "worker/world/world.h"
 
-enum { STATIONARY_STEPS = 20, STATIONARY_GROUPS = 64, STATIONARY_FUNCTIONS = 33, STATIONARY_BLOCKS = 4, STATIONARY_COLOURS = 2 };
+enum {
+	STATIONARY_STEPS = 20,
+	STATIONARY_GROUPS = 64,
+	STATIONARY_FUNCTIONS = 33,
+	STATIONARY_BLOCKS = 4,
+	STATIONARY_COLOURS = 2
+};
 
 /* Faults planted in the acceptance, to see that they are found. */
 enum stationary_fault { STATIONARY_SOUND, STATIONARY_NO_TRANSFER, STATIONARY_NO_DENSITY, STATIONARY_NO_GEOMETRY };
@@ -34,17 +41,19 @@ struct stationary_result {
 	uint64_t starts, proposals, accepted;
 	uint64_t counters[BATCH_COUNTERS];
 	uint64_t strategy[STRATEGY_COUNTERS];
-	uint64_t checked; /* end states that path_check looked at */
-	char failure[256]; /* of path_check, or the bootstrap; "": none */
+	uint64_t checked;						/* end states that path_check looked at */
+	char failure[256];						/* of path_check, or the bootstrap; "": none */
 	double bias[STATIONARY_FUNCTIONS], error[STATIONARY_FUNCTIONS]; /* of the mean; relative; 0: never changes */
-	double least_block, least_colour, least_other; /* smallest bias found with 95 % probability: largest of their kind */
-	int worst;        /* the function that differs most */
-	double p;         /* of it, times the number of functions */
-	double share;     /* accepted mutations of accepted mutations and starts */
-	double seconds;   /* CPU */
+	double least_block, least_colour,
+		least_other; /* smallest bias found with 95 % probability: largest of their kind */
+	int worst;	     /* the function that differs most */
+	double p;	     /* of it, times the number of functions */
+	double share;	     /* accepted mutations of accepted mutations and starts */
+	double seconds;	     /* CPU */
 };
 
-void stationary_run(const struct world *w, const char *test, const struct stationary_how *how, struct stationary_result *out);
+void stationary_run(const struct world *w, const char *test, const struct stationary_how *how,
+		    struct stationary_result *out);
 const char *stationary_function(int i);
 /* p above the level, no path that fails its check, nothing invalid. */
 bool stationary_holds(const struct stationary_result *r);

@@ -38,7 +38,7 @@ static void say_key(struct said *s, const struct lease_key *k)
 
 static void say_ack(struct said *s, const struct action *a)
 {
-	static const char *const names[] = { "merged", "repeat", "refused", "noted" };
+	static const char *const names[] = {"merged", "repeat", "refused", "noted"};
 	say(s, "%s%s%s", names[a->ack], *a->text ? ": " : "", a->text);
 }
 
@@ -52,9 +52,15 @@ static void say_changed(struct said *s, const struct action *a)
 static void say_action(struct said *s, const struct action *a)
 {
 	switch (a->kind) {
-	case ACTION_SUBMITTED: say(s, "j%" PRIu64 " submitted", a->job); break;
-	case ACTION_CANCELLED: say(s, "j%" PRIu64 " cancelled", a->job); break;
-	case ACTION_REJECTED: say(s, "rejected: %s", a->text); break;
+	case ACTION_SUBMITTED:
+		say(s, "j%" PRIu64 " submitted", a->job);
+		break;
+	case ACTION_CANCELLED:
+		say(s, "j%" PRIu64 " cancelled", a->job);
+		break;
+	case ACTION_REJECTED:
+		say(s, "rejected: %s", a->text);
+		break;
 	case ACTION_SEND_LEASE:
 	case ACTION_REVOKE:
 		say(s, "w%" PRIu64 " %s ", a->peer, a->kind == ACTION_REVOKE ? "loses" : "gets");
@@ -62,24 +68,46 @@ static void say_action(struct said *s, const struct action *a)
 		if (a->anew)
 			say(s, " anew");
 		break;
-	case ACTION_MERGE: say(s, "merge"); break;
-	case ACTION_ACK: say_ack(s, a); break;
-	case ACTION_BOOTSTRAP_DONE: say(s, "j%" PRIu64 " prepare", a->job); break;
-	case ACTION_ROUND_DONE: say(s, "j%" PRIu64 " round %" PRIu64, a->job, a->rounds); break;
-	case ACTION_EVALUATE_ERROR: say(s, "j%" PRIu64 " evaluate %" PRIu64, a->job, a->rounds); break;
+	case ACTION_MERGE:
+		say(s, "merge");
+		break;
+	case ACTION_ACK:
+		say_ack(s, a);
+		break;
+	case ACTION_BOOTSTRAP_DONE:
+		say(s, "j%" PRIu64 " prepare", a->job);
+		break;
+	case ACTION_ROUND_DONE:
+		say(s, "j%" PRIu64 " round %" PRIu64, a->job, a->rounds);
+		break;
+	case ACTION_EVALUATE_ERROR:
+		say(s, "j%" PRIu64 " evaluate %" PRIu64, a->job, a->rounds);
+		break;
 	case ACTION_PUBLISH:
 		say(s, "j%" PRIu64 " publish %" PRIu64, a->job, a->rounds);
 		break;
-	case ACTION_JOB_CHANGED: say_changed(s, a); break;
-	case ACTION_JOB_FORGOTTEN: say(s, "j%" PRIu64 " forgotten", a->job); break;
-	case ACTION_CHAINS_ANEW: say(s, "anew"); break;
+	case ACTION_JOB_CHANGED:
+		say_changed(s, a);
+		break;
+	case ACTION_JOB_FORGOTTEN:
+		say(s, "j%" PRIu64 " forgotten", a->job);
+		break;
+	case ACTION_CHAINS_ANEW:
+		say(s, "anew");
+		break;
 	case ACTION_TAKE_BACK:
 		say(s, "back ");
 		say_key(s, &a->key);
 		break;
-	case ACTION_WRONG: say(s, "#%" PRIu64 " %s", a->who, a->text); break;
-	case ACTION_ASIDE: say(s, "#%" PRIu64 " aside", a->who); break;
-	case ACTION_CLOSE_PEER: say(s, "close w%" PRIu64, a->peer); break;
+	case ACTION_WRONG:
+		say(s, "#%" PRIu64 " %s", a->who, a->text);
+		break;
+	case ACTION_ASIDE:
+		say(s, "#%" PRIu64 " aside", a->who);
+		break;
+	case ACTION_CLOSE_PEER:
+		say(s, "close w%" PRIu64, a->peer);
+		break;
 	}
 }
 
@@ -122,7 +150,7 @@ static uint64_t take_id(const char **at, const char *letter)
 
 static struct lease_key take_key(const char **at)
 {
-	struct lease_key k = { .job = take_id(at, "j"), .kind = LEASE_RENDER };
+	struct lease_key k = {.job = take_id(at, "j"), .kind = LEASE_RENDER};
 	k.group = (uint32_t)take_id(at, "g");
 	k.part = (uint32_t)take_id(at, "p");
 	if (take(at, "boot"))
@@ -145,11 +173,19 @@ static const char *take_word(const char **at, char word[WORD])
 
 static void take_submit(const char **at, struct event *ev, struct plan *p, char owner[WORD])
 {
-	*p = (struct plan){ .kind = PLAN_CHAINS, .width = 8, .height = 8, .crop_width = 8, .crop_height = 8,
-			    .groups = 2, .parts = 1, .rounds = 2, .epoch = 100, .bootstrap = 1000 };
+	*p = (struct plan){.kind = PLAN_CHAINS,
+			   .width = 8,
+			   .height = 8,
+			   .crop_width = 8,
+			   .crop_height = 8,
+			   .groups = 2,
+			   .parts = 1,
+			   .rounds = 2,
+			   .epoch = 100,
+			   .bootstrap = 1000};
 	ev->kind = EVENT_SUBMIT;
 	ev->tag = 7;
-	ev->submit = (struct event_submit){ .plan = p, .name = "job", .owner = "" };
+	ev->submit = (struct event_submit){.plan = p, .name = "job", .owner = ""};
 	while (**at && **at != '-') {
 		if (take(at, "priority="))
 			ev->submit.priority = (int)take_number(at);
@@ -182,9 +218,9 @@ static void take_submit(const char **at, struct event *ev, struct plan *p, char 
 /* [certificate=C] [name=N] [home=H] [start=K], texts of a letter. */
 static void take_identity(const char **at, struct event_join *j)
 {
-	static const char *const letters[] = { "a", "b", "c", "d" };
-	const char **where[] = { &j->certificate, &j->name, &j->home };
-	static const char *const words[] = { "certificate=", "name=", "home=" };
+	static const char *const letters[] = {"a", "b", "c", "d"};
+	const char **where[] = {&j->certificate, &j->name, &j->home};
+	static const char *const words[] = {"certificate=", "name=", "home="};
 	for (int i = 0; i < 3; i++)
 		for (int k = 0; take(at, words[i]); k = 0) {
 			while (k < 3 && **at != *letters[k])
@@ -220,7 +256,8 @@ static void take_worker(const char **at, struct event *ev, char *name, char *fin
 		ev->kind = EVENT_REQUEST;
 		ev->want = (uint32_t)take_count(at);
 	} else {
-		bool lacks = take(at, "lacks"), lost = !lacks && take(at, "denies"), late = !lacks && !lost && take(at, "recalls");
+		bool lacks = take(at, "lacks"), lost = !lacks && take(at, "denies"),
+		     late = !lacks && !lost && take(at, "recalls");
 		bool refuses = lost || late || (!lacks && take(at, "refuses"));
 		ev->kind = lacks || refuses	  ? EVENT_LEASE_FAILED
 			   : take(at, "batch")	  ? EVENT_BATCH
@@ -247,8 +284,13 @@ static void take_restore(const char **at, struct event *ev, struct plan *p, char
 			 const struct forecast_history *looks, char owner[WORD])
 {
 	bool asked = take(at, "asked");
-	struct event_restore r = { .job = take_id(at, "j"), .next = next, .fingerprint = fingerprint,
-				   .elapsed = NAN, .opened = NAN, .completed = NAN, .looks = looks };
+	struct event_restore r = {.job = take_id(at, "j"),
+				  .next = next,
+				  .fingerprint = fingerprint,
+				  .elapsed = NAN,
+				  .opened = NAN,
+				  .completed = NAN,
+				  .looks = looks};
 	r.kind = take(at, "boot") ? LEASE_BOOTSTRAP : LEASE_RENDER;
 	if (r.kind == LEASE_RENDER && !take(at, "render"))
 		fail_msg("boot or render is missing: %s", *at);
@@ -341,8 +383,8 @@ static bool play_line(struct farm *f, const char *line)
 	char name[32], fingerprint[32], owner[WORD], text[256];
 	struct plan plan;
 	uint64_t next[64];
-	struct forecast_history looks = { .count = 0 };
-	struct event ev = { .kind = EVENT_TICK };
+	struct forecast_history looks = {.count = 0};
+	struct event ev = {.kind = EVENT_TICK};
 	if (!arrow || !take(&at, "["))
 		fail_msg("not a line of a transcript: %s", line);
 	ev.time = take_number(&at);
@@ -367,7 +409,7 @@ static bool play_line(struct farm *f, const char *line)
 	struct update u;
 	farm_step(f, &ev, &u);
 	last_wake = u.wake;
-	struct said s = { .used = 0 };
+	struct said s = {.used = 0};
 	for (size_t i = 0; i < u.count; i++) {
 		say(&s, "%s", i ? ", " : "");
 		say_action(&s, &u.actions[i]);
@@ -398,7 +440,8 @@ static bool says_why(const struct farm *f, const char *line)
 	bool all = true;
 	for (uint64_t id = 1; id <= JOBS; id++) {
 		struct job_status s;
-		if (!farm_job(f, id, 0, &s) || job_state_is_end(s.state) || (s.leases_out && s.state != JOB_HELD) || (*s.waiting && *s.owners_waiting))
+		if (!farm_job(f, id, 0, &s) || job_state_is_end(s.state) || (s.leases_out && s.state != JOB_HELD) ||
+		    (*s.waiting && *s.owners_waiting))
 			continue;
 		print_error("\"%s\": j%llu waits and does not say for what\n", line, (unsigned long long)id);
 		all = false;

@@ -5,15 +5,18 @@
 
 #include "worker/world/world.h"
 
-/* The text between <scene> and </scene>, Mitsuba 3 dialect, formatted; width x height override the film's. Fails the test
- * with the reader's sentence when it does not build. */
-__attribute__((format(printf, 3, 4))) struct world *world_of_text(uint32_t width, uint32_t height, const char *format, ...);
+/* The text between <scene> and </scene>, Mitsuba 3 dialect, formatted; width x height override the film's. Fails the
+ * test with the reader's sentence when it does not build. */
+__attribute__((format(printf, 3, 4))) struct world *world_of_text(uint32_t width, uint32_t height, const char *format,
+								  ...);
 
 /* A sensor looking from o to t, box filter, film of 32 x 32: a fragment for the text above. */
+/* clang-format off */
 #define SENSOR(o, t)                                                                                                            \
 	"<sensor type='perspective'><float name='fov' value='40'/><transform name='to_world'><lookat origin='" o               \
 	"' target='" t "' up='0,1,0'/></transform><film type='hdrfilm'><integer name='width' value='32'/>"                      \
 	"<integer name='height' value='32'/><rfilter type='box'/></film></sensor>"
+/* clang-format on */
 
 /* Of the worlds that are built from now on; NULL: all at their defaults. */
 extern const char *worlds_accuracy;

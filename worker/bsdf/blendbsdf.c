@@ -21,7 +21,8 @@ static spectrum mix(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, v
 	const struct blend *m = b->data;
 	spectrum share[2];
 	shares(m, p, share);
-	return spectrum_add(spectrum_mul(share[0], eval(&m->part[0], p, wo, wi)), spectrum_mul(share[1], eval(&m->part[1], p, wo, wi)));
+	return spectrum_add(spectrum_mul(share[0], eval(&m->part[0], p, wo, wi)),
+			    spectrum_mul(share[1], eval(&m->part[1], p, wo, wi)));
 }
 
 static spectrum part_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -49,7 +50,8 @@ static double blend_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 w
 }
 
 /* Mirrors of both parts look the same way. */
-static spectrum blend_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi, double *chance)
+static spectrum blend_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				 double *chance)
 {
 	const struct blend *m = b->data;
 	spectrum share[2], sum = spectrum_of(0);
@@ -67,7 +69,8 @@ static spectrum blend_eval_delta(const struct bsdf *b, const struct bsdf_point *
 	return sum;
 }
 
-static bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out)
+static bool blend_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			 struct bsdf_sample *out)
 {
 	const struct blend *m = b->data;
 	spectrum share[2];
@@ -100,7 +103,9 @@ static int blend_create(struct bsdf *b, const struct scene_node *n, const struct
 		struct bsdf *part = &m->part[k];
 		int code = bsdf_create(part, inner, build, e);
 		if (!code && (part->modes & BSDF_TRANSMIT))
-			code = node_error(n, e, ENOTSUP, "a blend with \"%s\", which lets light through, is not supported", inner->type);
+			code = node_error(n, e, ENOTSUP,
+					  "a blend with \"%s\", which lets light through, is not supported",
+					  inner->type);
 		if (code)
 			return code;
 		b->two_sided |= part->two_sided;
@@ -112,7 +117,8 @@ static int blend_create(struct bsdf *b, const struct scene_node *n, const struct
 		bsdf_add_shape(b, part->shape);
 	}
 	b->black = m->part[0].black && m->part[1].black;
-	b->alpha = fmin(m->part[0].has_smooth ? m->part[0].alpha : INFINITY, m->part[1].has_smooth ? m->part[1].alpha : INFINITY);
+	b->alpha = fmin(m->part[0].has_smooth ? m->part[0].alpha : INFINITY,
+			m->part[1].has_smooth ? m->part[1].alpha : INFINITY);
 	if (!b->has_smooth)
 		b->alpha = 0;
 	for (int k = 0; k < 2 && b->two_sided; k++) {
@@ -123,7 +129,8 @@ static int blend_create(struct bsdf *b, const struct scene_node *n, const struct
 	return bsdf_texture(b, &m->weight, n, "weight", 0.5, build, e);
 }
 
-static const struct param blend_params[] = {{.name = "weight", .types = VALUE_TEXTURE, .min = 0, .max = 1}, {.name = NULL}};
+static const struct param blend_params[] = {{.name = "weight", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+					    {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_blendbsdf = {
 	.type = "blendbsdf",

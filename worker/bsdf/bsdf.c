@@ -28,7 +28,8 @@ int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_bu
 	return node_error(n, e, ENOTSUP, "\"%s\" is no BSDF that is supported", n->type);
 }
 
-void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size, struct error *e)
+void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size,
+		struct error *e)
 {
 	b->data = arena_alloc(build->arena, 1, size);
 	if (!b->data)
@@ -54,7 +55,8 @@ void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
 int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
 		 const struct bsdf_build *build, struct error *e)
 {
-	int code = texture_from_node(t, n, name, fallback, COLOR_REFLECTANCE, build->assets, build->dialect_3, build->arena, e);
+	int code = texture_from_node(t, n, name, fallback, COLOR_REFLECTANCE, build->assets, build->dialect_3,
+				     build->arena, e);
 	if (code)
 		return code;
 	bsdf_add_shape(b, texture_shape(t));
@@ -87,7 +89,8 @@ spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec
 	return b->ops->eval_halfvec ? b->ops->eval_halfvec(b, p, wo, wi) : halfvec_product(b, p, wo, wi);
 }
 
-spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi, double *chance)
+spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+			 double *chance)
 {
 	return b->ops->eval_delta ? b->ops->eval_delta(b, p, wo, mode, wi, chance) : spectrum_of(0);
 }

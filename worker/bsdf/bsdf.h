@@ -34,11 +34,11 @@ struct bsdf_point {
 
 struct bsdf_sample {
 	vec3 wi;
-	unsigned mode;   /* of enum bsdf_mode */
-	double pdf;      /* solid angle of all non-delta lobes together, or the probability of the delta lobe */
-	spectrum f;      /* eval(wo, wi), or for a delta lobe f such that f / pdf is the weight of the path:
-			    the cosine |wi.z| is already divided out: weight = f |wi.z| / pdf in both cases */
-	double eta;      /* index on wi's side over the one on wo's side; 1 when reflected */
+	unsigned mode; /* of enum bsdf_mode */
+	double pdf;    /* solid angle of all non-delta lobes together, or the probability of the delta lobe */
+	spectrum f;    /* eval(wo, wi), or for a delta lobe f such that f / pdf is the weight of the path:
+			  the cosine |wi.z| is already divided out: weight = f |wi.z| / pdf in both cases */
+	double eta;    /* index on wi's side over the one on wo's side; 1 when reflected */
 };
 
 struct bsdf;
@@ -57,28 +57,33 @@ struct bsdf_ops {
 	int (*create)(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
 	spectrum (*eval)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 	double (*pdf_solid)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
-	/* f |wi.z| |d wi / d h_par| with the factors that explode and vanish together cancelled by hand; see bsdf_eval_halfvec.
-	 * NULL: nothing cancels, the product of its factors will do. */
+	/* f |wi.z| |d wi / d h_par| with the factors that explode and vanish together cancelled by hand; see
+	 * bsdf_eval_halfvec. NULL: nothing cancels, the product of its factors will do. */
 	spectrum (*eval_halfvec)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 	/* See bsdf_eval_delta. NULL: has no exactly specular lobe. */
-	spectrum (*eval_delta)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi, double *chance);
+	spectrum (*eval_delta)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+			       double *chance);
 	/* u[0], u[1]: direction; u[2]: lobe. false: absorbed. */
-	bool (*sample)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out);
+	bool (*sample)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+		       struct bsdf_sample *out);
 };
 
 struct bsdf {
 	const struct bsdf_ops *ops;
-	unsigned modes;    /* union of all modes it can have (REFLECT|DELTA and REFLECT may both be there: then both bits) */
-	bool has_smooth;   /* some lobe is not delta: eval is not identically 0 */
+	unsigned modes;	 /* union of all modes it can have (REFLECT|DELTA and REFLECT may both be there: then both bits)
+			  */
+	bool has_smooth; /* some lobe is not delta: eval is not identically 0 */
 	bool has_delta;
-	double alpha;      /* least roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
-	double alpha_mean; /* albedo-weighted mean roughness of its non-delta lobes, diffuse counting 1; 0 for delta only */
-	double eta;        /* index below the surface (against the normal) over the one above, at 587.6 nm where it
+	double alpha;	   /* least roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
+	double alpha_mean; /* albedo-weighted mean roughness of its non-delta lobes, diffuse counting 1; 0 for delta
+			      only */
+	double eta;	   /* index below the surface (against the normal) over the one above, at 587.6 nm where it
 			      depends on the wavelength; 1: opaque or none */
-	bool dispersive;   /* the index depends on the wavelength: only bsdf_eta says it, and paths carry one wavelength */
-	bool two_sided;    /* scatters light that arrives from below the normal */
+	bool dispersive;   /* the index depends on the wavelength: only bsdf_eta says it, and paths carry one wavelength
+			    */
+	bool two_sided;	   /* scatters light that arrives from below the normal */
 	bool textured;
-	bool black;        /* neither reflects nor lets through */
+	bool black;		/* neither reflects nor lets through */
 	enum color_shape shape; /* CONSTANT: carries no colour */
 	void *data;
 };
@@ -90,20 +95,23 @@ double bsdf_eta(const struct bsdf *b, const struct wavelengths *w);
  * directions wi per area of plane-plane half vectors h_par = h_xy / h_z, h along wo + eta wi, eta = n_wi / n_wo (1 when
  * reflected), with wo held: the way a chain is followed from the camera. For microfacets this is
  * W G2 P22(h) |wo.h| / (|wo.z| |h.z|), W = F or (1-F) (n_wo/n_wi)^2, P22 the density of slopes; for others
- * f |wi.z| |h.z|^3 4 |wi.h| where reflected and f |wi.z| |h.z|^3 (wo.h + eta wi.h)^2 / (eta^2 |wi.h|) where refracted. */
+ * f |wi.z| |h.z|^3 4 |wi.h| where reflected and f |wi.z| |h.z|^3 (wo.h + eta wi.h)^2 / (eta^2 |wi.h|) where refracted.
+ */
 spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 
-/* The exactly specular lobe `mode` (REFLECT or TRANSMIT, with or without the DELTA bit) seen from wo: its direction wi, the
- * probability with which `sample` chooses it, and its weight f |wi.z| (f as in struct bsdf_sample). Zero: there is none, or
- * light is totally reflected; wi and chance are then not to be read. */
-spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi, double *chance);
+/* The exactly specular lobe `mode` (REFLECT or TRANSMIT, with or without the DELTA bit) seen from wo: its direction wi,
+ * the probability with which `sample` chooses it, and its weight f |wi.z| (f as in struct bsdf_sample). Zero: there is
+ * none, or light is totally reflected; wi and chance are then not to be read. */
+spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+			 double *chance);
 
 int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
-void bsdf_black(struct bsdf *b); /* absorbs everything; for emitters without a BSDF */
+void bsdf_black(struct bsdf *b);   /* absorbs everything; for emitters without a BSDF */
 void bsdf_default(struct bsdf *b); /* diffuse 0.5, what Mitsuba gives a shape without a BSDF */
 
-/* Makes an opaque BSDF scatter on its back as on its front. Mitsuba leaves backs black; public scenes of this language are
- * written for renderers that do not (the walls of `cornell-box` face outwards), and no scene gains from black backs. */
+/* Makes an opaque BSDF scatter on its back as on its front. Mitsuba leaves backs black; public scenes of this language
+ * are written for renderers that do not (the walls of `cornell-box` face outwards), and no scene gains from black
+ * backs. */
 int bsdf_mirror_back(struct bsdf *b, struct arena *arena, struct error *e);
 
 extern const struct bsdf_ops *const bsdf_registry[]; /* ends with NULL */

@@ -3,7 +3,8 @@
 
 #include "worker/bsdf/warp.h"
 
-int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+		 struct error *e)
 {
 	double inside, outside;
 	int code = ior_read(n, "int_ior", COATING_IOR_DEFAULT, &inside, e);
@@ -26,7 +27,8 @@ int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, 
 }
 
 /* eta^2 (1 - rho' (1 - E)) = eta^2 (1 - rho') + rho' E eta^2. */
-spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double transmitted_o, double transmitted_i)
+spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double transmitted_o,
+			 double transmitted_i)
 {
 	spectrum rho = texture_eval(&c->diffuse, p->u, p->v, p->w);
 	double common = transmitted_o * transmitted_i / WARP_PI;

@@ -6,7 +6,8 @@
 #include "worker/bsdf/bsdf.h"
 
 /* Zeroed room for b->data; NULL after an error. */
-void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size, struct error *e);
+void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size,
+		struct error *e);
 
 /* Reads a reflectance and enters its colour and texture into b. */
 int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,

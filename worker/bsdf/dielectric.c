@@ -18,7 +18,8 @@ static double dielectric_pdf(const struct bsdf *b, const struct bsdf_point *p, v
 	return 0;
 }
 
-/* f |wi.z| of one lobe for light that f is the Fresnel share of; eta: index beyond over index on wo's side. Chance 0: none. */
+/* f |wi.z| of one lobe for light that f is the Fresnel share of; eta: index beyond over index on wo's side. Chance 0:
+ * none. */
 static spectrum lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo, unsigned mode, double eta,
 		     const struct fresnel *f, vec3 *wi, double *chance)
 {
@@ -44,8 +45,8 @@ static double eta_beyond(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	return wo.z > 0 ? eta : 1 / eta;
 }
 
-static spectrum dielectric_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
-				      double *chance)
+static spectrum dielectric_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode,
+				      vec3 *wi, double *chance)
 {
 	double eta = eta_beyond(b, p, wo);
 	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), eta);
@@ -58,7 +59,8 @@ static bool dielectric_sample(const struct bsdf *b, const struct bsdf_point *p, 
 	double eta = eta_beyond(b, p, wo);
 	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), eta);
 	bool reflect = u[2] < f.reflected;
-	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT) | BSDF_DELTA, .eta = reflect ? 1 : eta};
+	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT) | BSDF_DELTA,
+				    .eta = reflect ? 1 : eta};
 	spectrum weight = lobe(b->data, p, wo, out->mode, eta, &f, &out->wi, &out->pdf);
 	if (!(out->pdf > 0))
 		return false;
@@ -66,7 +68,8 @@ static bool dielectric_sample(const struct bsdf *b, const struct bsdf_point *p, 
 	return true;
 }
 
-static int dielectric_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+static int dielectric_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			     struct error *e)
 {
 	struct glass *g = bsdf_data(b, n, build, sizeof *g, e);
 	if (!g)

@@ -24,8 +24,11 @@ static bool diffuse_sample(const struct bsdf *b, const struct bsdf_point *p, vec
 	vec3 wi = warp_cosine_hemisphere(u[0], u[1]);
 	if (!(wi.z > 0))
 		return false;
-	*out = (struct bsdf_sample){.wi = wi, .mode = BSDF_REFLECT, .pdf = diffuse_pdf(b, p, wo, wi),
-				    .f = diffuse_eval(b, p, wo, wi), .eta = 1};
+	*out = (struct bsdf_sample){.wi = wi,
+				    .mode = BSDF_REFLECT,
+				    .pdf = diffuse_pdf(b, p, wo, wi),
+				    .f = diffuse_eval(b, p, wo, wi),
+				    .eta = 1};
 	return true;
 }
 
@@ -59,6 +62,12 @@ const struct bsdf_ops bsdf_ops_diffuse = {
 void bsdf_default(struct bsdf *b)
 {
 	static struct texture half = {.color = {.shape = COLOR_SHAPE_CONSTANT, .scale = 0.5}};
-	*b = (struct bsdf){.ops = &bsdf_ops_diffuse, .modes = BSDF_REFLECT, .has_smooth = true, .alpha = INFINITY,
-			   .alpha_mean = 1, .eta = 1, .shape = COLOR_SHAPE_CONSTANT, .data = &half};
+	*b = (struct bsdf){.ops = &bsdf_ops_diffuse,
+			   .modes = BSDF_REFLECT,
+			   .has_smooth = true,
+			   .alpha = INFINITY,
+			   .alpha_mean = 1,
+			   .eta = 1,
+			   .shape = COLOR_SHAPE_CONSTANT,
+			   .data = &half};
 }

@@ -11,8 +11,8 @@ struct fresnel {
 	double cos_t; /* cosine beyond, 0 at total reflection */
 };
 
-/* Cosines on both sides, of directions that Snell's law joins; eta: index beyond over index here. The differences of the
- * amplitudes are written as what is left of them, so that no digit goes where eta is next to 1. */
+/* Cosines on both sides, of directions that Snell's law joins; eta: index beyond over index here. The differences of
+ * the amplitudes are written as what is left of them, so that no digit goes where eta is next to 1. */
 static inline struct fresnel fresnel_between(double c, double t, double eta)
 {
 	double s = 1 / (c + eta * t), p = 1 / (eta * c + t), e = (eta - 1) * (eta + 1);

@@ -31,10 +31,13 @@ static int read_index(struct glass *g, struct bsdf *b, const struct scene_node *
 		code = ior_read_law(n, IOR_EXT, &g->side[IOR_EXT], e);
 	if (code)
 		return code;
-	if (node_bool(n, "dispersion", false) && !has_coefficients(n) && !g->side[IOR_INT].terms && !g->side[IOR_EXT].terms) {
+	if (node_bool(n, "dispersion", false) && !has_coefficients(n) && !g->side[IOR_INT].terms &&
+	    !g->side[IOR_EXT].terms) {
 		char known[128];
-		return node_error(n, e, EINVAL, "dispersion: a number does not say how it depends on the wavelength; name one of %s "
-				  "or give coefficients", ior_dispersive_names(known, sizeof known));
+		return node_error(n, e, EINVAL,
+				  "dispersion: a number does not say how it depends on the wavelength; name one of %s "
+				  "or give coefficients",
+				  ior_dispersive_names(known, sizeof known));
 	}
 	b->eta = glass_eta(g, IOR_NM);
 	b->dispersive = varies(g, b->eta);

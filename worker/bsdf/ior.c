@@ -13,12 +13,14 @@ static const struct {
 	const char *name;
 	double n;
 } named[] = {
-	{"vacuum", 1.0},	  {"helium", 1.000036},	     {"hydrogen", 1.000132},   {"air", 1.000277},
-	{"carbon dioxide", 1.00045}, {"water", 1.33340},     {"acetone", 1.36},	       {"ethanol", 1.361},
-	{"carbon tetrachloride", 1.461}, {"glycerol", 1.4729}, {"benzene", 1.501},     {"silicone oil", 1.52045},
-	{"bromine", 1.661},	  {"water ice", 1.31},	     {"fused quartz", 1.45846}, {"pyrex", 1.470},
-	{"acrylic glass", 1.49},  {"polypropylene", 1.49},   {"bk7", 1.51680},	       {"sodium chloride", 1.544},
-	{"amber", 1.55},	  {"pet", 1.5750},	     {"diamond", 2.41748},     {"sf11", 1.78471},
+	{"vacuum", 1.0},	   {"helium", 1.000036},	{"hydrogen", 1.000132},
+	{"air", 1.000277},	   {"carbon dioxide", 1.00045}, {"water", 1.33340},
+	{"acetone", 1.36},	   {"ethanol", 1.361},		{"carbon tetrachloride", 1.461},
+	{"glycerol", 1.4729},	   {"benzene", 1.501},		{"silicone oil", 1.52045},
+	{"bromine", 1.661},	   {"water ice", 1.31},		{"fused quartz", 1.45846},
+	{"pyrex", 1.470},	   {"acrylic glass", 1.49},	{"polypropylene", 1.49},
+	{"bk7", 1.51680},	   {"sodium chloride", 1.544},	{"amber", 1.55},
+	{"pet", 1.5750},	   {"diamond", 2.41748},	{"sf11", 1.78471},
 	{"sapphire (o)", 1.76817},
 };
 
@@ -33,7 +35,9 @@ static const struct {
 	{"sf11", 3, {1.73759695, 0.313747346, 1.89878101}, {0.013188707, 0.0623068142, 155.23629}},
 	{"fused quartz", 3, {0.6961663, 0.4079426, 0.8974794}, {0.004679148258, 0.01351206307, 97.93400254}},
 	{"diamond", 2, {0.3306, 4.3356}, {0.030625, 0.011236}},
-	{"water", 4, {0.5684027565, 0.1726177391, 0.02086189578, 0.1130748688},
+	{"water",
+	 4,
+	 {0.5684027565, 0.1726177391, 0.02086189578, 0.1130748688},
 	 {0.005101829712, 0.01821153936, 0.02620722293, 10.69792721}},
 	{"sapphire (o)", 3, {1.4313493, 0.65054713, 5.3414021}, {0.005279926102, 0.01423826471, 325.0178341}},
 };
@@ -50,7 +54,8 @@ int ior_read(const struct scene_node *n, const char *name, double fallback, doub
 				*out = named[i].n;
 				return 0;
 			}
-		return node_error(n, e, ENOTSUP, "%s: no material \"%s\" is known; a number will do", name, p->value.as.string);
+		return node_error(n, e, ENOTSUP, "%s: no material \"%s\" is known; a number will do", name,
+				  p->value.as.string);
 	}
 	*out = node_float(n, name, fallback);
 	return 0;
@@ -86,12 +91,15 @@ static const struct names side_names[] = {
 
 /* "B1,..,Bm,C1,..,Cm". With no negative numbers among them and no C among the squares of wavelengths, n falls from the
  * shortest to the longest wavelength: its two ends say whether it is an index everywhere. */
-static int parse_sellmeier(struct ior *out, const struct scene_node *n, const char *name, const char *text, struct error *e)
+static int parse_sellmeier(struct ior *out, const struct scene_node *n, const char *name, const char *text,
+			   struct error *e)
 {
-	double list[2 * IOR_TERMS], shortest = WAVELENGTH_MIN * WAVELENGTH_MIN * 1e-6, longest = WAVELENGTH_MAX * WAVELENGTH_MAX * 1e-6;
+	double list[2 * IOR_TERMS], shortest = WAVELENGTH_MIN * WAVELENGTH_MIN * 1e-6,
+				    longest = WAVELENGTH_MAX * WAVELENGTH_MAX * 1e-6;
 	int count = number_list(text, list, 2 * IOR_TERMS);
 	if (count < 2 || count % 2)
-		return node_error(n, e, EINVAL, "%s takes 1 to %d numbers B and as many C (micrometres squared) after them", name,
+		return node_error(n, e, EINVAL,
+				  "%s takes 1 to %d numbers B and as many C (micrometres squared) after them", name,
 				  IOR_TERMS);
 	out->terms = count / 2;
 	for (int t = 0; t < out->terms; t++) {
@@ -100,13 +108,15 @@ static int parse_sellmeier(struct ior *out, const struct scene_node *n, const ch
 		if (!(out->b[t] >= 0 && out->c[t] >= 0))
 			return node_error(n, e, EINVAL, "%s: no coefficient may be negative", name);
 		if (out->c[t] >= shortest && out->c[t] <= longest)
-			return node_error(n, e, EINVAL, "%s: C = %g is a resonance at %g nm, among the wavelengths of light", name,
+			return node_error(n, e, EINVAL,
+					  "%s: C = %g is a resonance at %g nm, among the wavelengths of light", name,
 					  out->c[t], 1000 * sqrt(out->c[t]));
 	}
 	return 0;
 }
 
-static int look_up_law(struct ior *out, const struct scene_node *n, const char *property, const char *material, struct error *e)
+static int look_up_law(struct ior *out, const struct scene_node *n, const char *property, const char *material,
+		       struct error *e)
 {
 	for (size_t i = 0; i < sizeof laws / sizeof *laws; i++) {
 		if (strcasecmp(laws[i].name, material) != 0)
@@ -121,8 +131,8 @@ static int look_up_law(struct ior *out, const struct scene_node *n, const char *
 	char known[128];
 	if (out->n < NEARLY_VACUUM)
 		return 0;
-	return node_error(n, e, ENOTSUP, "%s: the dispersion of \"%s\" is not known, only of %s; coefficients will do", property,
-			  material, ior_dispersive_names(known, sizeof known));
+	return node_error(n, e, ENOTSUP, "%s: the dispersion of \"%s\" is not known, only of %s; coefficients will do",
+			  property, material, ior_dispersive_names(known, sizeof known));
 }
 
 int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out, struct error *e)
@@ -132,7 +142,8 @@ int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out
 	const char *sellmeier = node_string(n, name->sellmeier, NULL);
 	*out = (struct ior){.cauchy = node_float(n, name->cauchy, 0)};
 	if (sellmeier && (ior || cauchy))
-		return node_error(n, e, EINVAL, "%s stands beside %s: one of them will do", name->sellmeier, (ior ? ior : cauchy)->name);
+		return node_error(n, e, EINVAL, "%s stands beside %s: one of them will do", name->sellmeier,
+				  (ior ? ior : cauchy)->name);
 	int code = ior_read(n, name->ior, side == IOR_INT ? IOR_BK7_DEFAULT : IOR_AIR_DEFAULT, &out->n, e);
 	if (!code && sellmeier)
 		code = parse_sellmeier(out, n, name->sellmeier, sellmeier, e);
@@ -142,9 +153,10 @@ int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out
 		return code;
 	double most = ior_at(out, WAVELENGTH_MIN), least = ior_at(out, WAVELENGTH_MAX);
 	if (!(fmax(most, least) <= PARAM_IOR_MAX && fmin(most, least) >= PARAM_IOR_MIN))
-		return node_error(n, e, ERANGE, "%s: the index of refraction is %g at %g nm and %g at %g nm, outside [%g, %g]",
-				  sellmeier ? name->sellmeier : name->cauchy, most, WAVELENGTH_MIN, least, WAVELENGTH_MAX, PARAM_IOR_MIN,
-				  PARAM_IOR_MAX);
+		return node_error(n, e, ERANGE,
+				  "%s: the index of refraction is %g at %g nm and %g at %g nm, outside [%g, %g]",
+				  sellmeier ? name->sellmeier : name->cauchy, most, WAVELENGTH_MIN, least,
+				  WAVELENGTH_MAX, PARAM_IOR_MIN, PARAM_IOR_MAX);
 	out->n = ior_at(out, IOR_NM);
 	return 0;
 }

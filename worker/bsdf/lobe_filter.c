@@ -11,7 +11,8 @@ struct without {
 
 static bool is_gone(const struct without *x, bool transmit, bool delta)
 {
-	return (transmit && (x->lobes & BSDF_WITHOUT_TRANSMISSION)) || (x->lobes & (delta ? BSDF_WITHOUT_DELTA : BSDF_WITHOUT_SMOOTH));
+	return (transmit && (x->lobes & BSDF_WITHOUT_TRANSMISSION)) ||
+	       (x->lobes & (delta ? BSDF_WITHOUT_DELTA : BSDF_WITHOUT_SMOOTH));
 }
 
 static spectrum lobe_filter_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -32,16 +33,20 @@ static spectrum lobe_filter_eval_halfvec(const struct bsdf *b, const struct bsdf
 	return is_gone(x, wo.z * wi.z < 0, false) ? spectrum_of(0) : bsdf_eval_halfvec(&x->inside, p, wo, wi);
 }
 
-static spectrum lobe_filter_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi, double *chance)
+static spectrum lobe_filter_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode,
+				       vec3 *wi, double *chance)
 {
 	const struct without *x = b->data;
-	return is_gone(x, mode & BSDF_TRANSMIT, true) ? spectrum_of(0) : bsdf_eval_delta(&x->inside, p, wo, mode, wi, chance);
+	return is_gone(x, mode & BSDF_TRANSMIT, true) ? spectrum_of(0)
+						      : bsdf_eval_delta(&x->inside, p, wo, mode, wi, chance);
 }
 
-static bool lobe_filter_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out)
+static bool lobe_filter_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			       struct bsdf_sample *out)
 {
 	const struct without *x = b->data;
-	return x->inside.ops->sample(&x->inside, p, wo, u, out) && !is_gone(x, out->mode & BSDF_TRANSMIT, out->mode & BSDF_DELTA);
+	return x->inside.ops->sample(&x->inside, p, wo, u, out) &&
+	       !is_gone(x, out->mode & BSDF_TRANSMIT, out->mode & BSDF_DELTA);
 }
 
 int bsdf_filter_lobes(struct bsdf *b, unsigned lobes, struct arena *arena, struct error *e)

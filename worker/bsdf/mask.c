@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An opaque BSDF with holes: the share `opacity` of the light meets it, the rest goes straight on. The way through is a specular
- * lobe, so a path counts an edge more for it, and next event estimation does not look through.
+ * An opaque BSDF with holes: the share `opacity` of the light meets it, the rest goes straight on. The way through is a
+ * specular lobe, so a path counts an edge more for it, and next event estimation does not look through.
  */
 #include "worker/bsdf/create.h"
 #include "worker/bsdf/straight.h"
@@ -34,7 +34,8 @@ static spectrum mask_eval_halfvec(const struct bsdf *b, const struct bsdf_point 
 	return spectrum_mul(opacity_at(m, p), bsdf_eval_halfvec(&m->inner, p, wo, wi));
 }
 
-static spectrum mask_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi, double *chance)
+static spectrum mask_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				double *chance)
 {
 	const struct mask *m = b->data;
 	spectrum opacity = opacity_at(m, p), weight = opacity;
@@ -53,7 +54,8 @@ static spectrum mask_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 	return weight;
 }
 
-static bool mask_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out)
+static bool mask_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			struct bsdf_sample *out)
 {
 	const struct mask *m = b->data;
 	spectrum opacity = opacity_at(m, p);
@@ -84,7 +86,9 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 		return node_error(n, e, EINVAL, "needs exactly one BSDF inside");
 	int code = bsdf_create(&m->inner, inner, build, e);
 	if (!code && (m->inner.modes & BSDF_TRANSMIT))
-		code = node_error(n, e, ENOTSUP, "a mask over \"%s\", which lets light through by itself, is not supported", inner->type);
+		code = node_error(n, e, ENOTSUP,
+				  "a mask over \"%s\", which lets light through by itself, is not supported",
+				  inner->type);
 	if (!code)
 		code = bsdf_mirror_back(&m->inner, build->arena, e);
 	if (!code)
@@ -102,7 +106,8 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 	return 0;
 }
 
-static const struct param mask_params[] = {{.name = "opacity", .types = VALUE_TEXTURE, .min = 0, .max = 1}, {.name = NULL}};
+static const struct param mask_params[] = {{.name = "opacity", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+					   {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_mask = {
 	.type = "mask",

@@ -32,7 +32,10 @@ static int named(struct metal *m, const char *name, const struct scene_node *n, 
 		for (size_t c = 0; c < 3; c++)
 			for (size_t r = 0; r < METAL_ROWS; r++)
 				room[c * METAL_ROWS + r] = metals[i].row[r][c];
-		m->eta = (struct color){.shape = COLOR_SHAPE_OTHER, .scale = 1, .count = METAL_ROWS, .nm = room,
+		m->eta = (struct color){.shape = COLOR_SHAPE_OTHER,
+					.scale = 1,
+					.count = METAL_ROWS,
+					.nm = room,
 					.value = room + METAL_ROWS};
 		m->k = m->eta;
 		m->k.value = room + 2 * METAL_ROWS;

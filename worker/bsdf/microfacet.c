@@ -76,11 +76,13 @@ static double visible_slope(double c, double s, double u)
 	double low = -6, high = c < 6 * s ? c / s : 6;
 	double total = c * half_root * erfc(-high) + 0.5 * s * exp(-high * high), target = u * total;
 	/* Exact for s = 0 and for c = 0. */
-	double x = c > s ? erf_inverse(fmin(fmax(2 * u - 1, -1 + 0x1p-52), 1 - 0x1p-52)) : -sqrt(-log(fmax(u, 0x1p-52)));
+	double x =
+		c > s ? erf_inverse(fmin(fmax(2 * u - 1, -1 + 0x1p-52), 1 - 0x1p-52)) : -sqrt(-log(fmax(u, 0x1p-52)));
 	for (int i = 0; i < 100; i++) {
 		if (!(x > low && x < high))
 			x = 0.5 * (low + high);
-		double bell = exp(-x * x), f = c * half_root * erfc(-x) + 0.5 * s * bell - target, slope = (c - s * x) * bell;
+		double bell = exp(-x * x), f = c * half_root * erfc(-x) + 0.5 * s * bell - target,
+		       slope = (c - s * x) * bell;
 		if (f > 0)
 			high = x;
 		else
@@ -99,7 +101,8 @@ static vec3 beckmann_visible(const struct microfacet *m, vec3 v, double u0, doub
 	double x = visible_slope(v.z / r, s / r, u0);
 	double y = erf_inverse(fmin(fmax(2 * u1 - 1, -1 + 0x1p-52), 1 - 0x1p-52));
 	double cos_phi = sv > 0 ? v.x / sv : 1, sin_phi = sv > 0 ? m->ratio * v.y / sv : 0;
-	return vec3_normalize((vec3){-m->alpha * (cos_phi * x - sin_phi * y), -along_v * (sin_phi * x + cos_phi * y), 1});
+	return vec3_normalize(
+		(vec3){-m->alpha * (cos_phi * x - sin_phi * y), -along_v * (sin_phi * x + cos_phi * y), 1});
 }
 
 static vec3 ggx_visible(const struct microfacet *m, vec3 v, double u0, double u1)
@@ -141,7 +144,7 @@ int microfacet_read(struct microfacet *m, const struct scene_node *n, struct err
 	bool ggx = strcmp(node_string(n, "distribution", "beckmann"), "ggx") == 0;
 	microfacet_set(m, ggx, node_float(n, "alpha_u", alpha), node_float(n, "alpha_v", alpha));
 	if (m->ratio > MICROFACET_RATIO_MAX || m->ratio < 1 / MICROFACET_RATIO_MAX)
-		return node_error(n, e, ERANGE, "alpha_u = %g and alpha_v = %g are more than a factor of %g apart", m->alpha,
-				  m->alpha * m->ratio, MICROFACET_RATIO_MAX);
+		return node_error(n, e, ERANGE, "alpha_u = %g and alpha_v = %g are more than a factor of %g apart",
+				  m->alpha, m->alpha * m->ratio, MICROFACET_RATIO_MAX);
 	return 0;
 }

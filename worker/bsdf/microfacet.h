@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Microfacet distributions, Beckmann and GGX (Walter et al. 2007, Microfacet Models for Refraction), with Smith's masking; the
- * roughness along u and v may differ (Heitz 2014, section 5.3: the isotropic one, stretched). Shadowing and masking are taken as independent, G2 = G1 G1, as Mitsuba does. Everything stays finite
- * at grazing angles because G1 is only ever wanted over the cosine. Roughness from MICROFACET_ALPHA_MIN up.
+ * Microfacet distributions, Beckmann and GGX (Walter et al. 2007, Microfacet Models for Refraction), with Smith's
+ * masking; the roughness along u and v may differ (Heitz 2014, section 5.3: the isotropic one, stretched). Shadowing
+ * and masking are taken as independent, G2 = G1 G1, as Mitsuba does. Everything stays finite at grazing angles because
+ * G1 is only ever wanted over the cosine. Roughness from MICROFACET_ALPHA_MIN up.
  */
 #ifndef WORKER_BSDF_MICROFACET_H
 #define WORKER_BSDF_MICROFACET_H
@@ -51,17 +52,21 @@ static inline bool microfacet_half(vec3 wo, double eta, vec3 wi, vec3 *h, double
 
 /* Parameters alpha, alpha_u, alpha_v, distribution. */
 int microfacet_read(struct microfacet *m, const struct scene_node *n, struct error *e);
-#define MICROFACET_PARAMS                                                                                              \
-	{.name = "alpha", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10},                                      \
-	{.name = "alpha_u", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10},                                    \
-	{.name = "alpha_v", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10},                                    \
-	{.name = "distribution", .types = VALUE_STRING, .choices = "beckmann|ggx"},                                    \
-	{.name = "sample_visible", .types = VALUE_BOOL, .status = PARAM_IGNORED}
+#define MICROFACET_PARAMS                                                                   \
+	{.name = "alpha", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10},           \
+		{.name = "alpha_u", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10}, \
+		{.name = "alpha_v", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10}, \
+		{.name = "distribution", .types = VALUE_STRING, .choices = "beckmann|ggx"}, \
+	{                                                                                   \
+		.name = "sample_visible", .types = VALUE_BOOL, .status = PARAM_IGNORED      \
+	}
 
 /* Of smooth materials: what editors leave there when a rough one was made smooth. */
-#define MICROFACET_PARAMS_IGNORED                                                                                      \
-	{.name = "alpha", .status = PARAM_IGNORED}, {.name = "alpha_u", .status = PARAM_IGNORED},                      \
-		{.name = "alpha_v", .status = PARAM_IGNORED}, {.name = "distribution", .status = PARAM_IGNORED},       \
-		{.name = "sample_visible", .status = PARAM_IGNORED}
+#define MICROFACET_PARAMS_IGNORED                                                                                \
+	{.name = "alpha", .status = PARAM_IGNORED}, {.name = "alpha_u", .status = PARAM_IGNORED},                \
+		{.name = "alpha_v", .status = PARAM_IGNORED}, {.name = "distribution", .status = PARAM_IGNORED}, \
+	{                                                                                                        \
+		.name = "sample_visible", .status = PARAM_IGNORED                                                \
+	}
 
 #endif

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Nothing: light goes straight on. A path counts an edge more for it, and next event estimation does not look through. */
+/* Nothing: light goes straight on. A path counts an edge more for it, and next event estimation does not look through.
+ */
 #include "worker/bsdf/create.h"
 #include "worker/bsdf/straight.h"
 
@@ -15,7 +16,8 @@ static double null_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo
 	return 0;
 }
 
-static spectrum null_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi, double *chance)
+static spectrum null_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				double *chance)
 {
 	(void)b, (void)p;
 	if (!(mode & BSDF_TRANSMIT) || !straight_direction(wo, wi))
@@ -24,7 +26,8 @@ static spectrum null_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 	return spectrum_of(1);
 }
 
-static bool null_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out)
+static bool null_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			struct bsdf_sample *out)
 {
 	(void)b, (void)p, (void)u;
 	*out = (struct bsdf_sample){.mode = BSDF_TRANSMIT | BSDF_DELTA, .pdf = 1, .eta = 1};

@@ -10,7 +10,7 @@
 struct phong {
 	struct texture diffuse, specular;
 	double exponent;
-	double scale;            /* of both reflectances */
+	double scale;		/* of both reflectances */
 	double specular_chance; /* of sampling the specular lobe */
 };
 
@@ -55,11 +55,13 @@ static bool phong_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 
 	const struct phong *ph = b->data;
 	if (!(wo.z > 0))
 		return false;
-	vec3 wi = u[2] < ph->specular_chance ? sample_lobe(ph->exponent, wo, u[0], u[1]) : warp_cosine_hemisphere(u[0], u[1]);
+	vec3 wi = u[2] < ph->specular_chance ? sample_lobe(ph->exponent, wo, u[0], u[1])
+					     : warp_cosine_hemisphere(u[0], u[1]);
 	double pdf = phong_pdf(b, p, wo, wi);
 	if (!(pdf > 0))
 		return false;
-	*out = (struct bsdf_sample){.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf, .f = phong_eval(b, p, wo, wi), .eta = 1};
+	*out = (struct bsdf_sample){
+		.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf, .f = phong_eval(b, p, wo, wi), .eta = 1};
 	return true;
 }
 

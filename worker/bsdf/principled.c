@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The "principled" BSDF of artists' tools: Burley 2012, Physically Based Shading at Disney, and 2015, Extending the Disney BRDF to a
- * BSDF; parameters and defaults are those of Mitsuba 3's plug-in. With m = metallic, t = spec_trans, c = base_color, and a rough
- * GGX boundary of index eta,
+ * The "principled" BSDF of artists' tools: Burley 2012, Physically Based Shading at Disney, and 2015, Extending the
+ * Disney BRDF to a BSDF; parameters and defaults are those of Mitsuba 3's plug-in. With m = metallic, t = spec_trans, c
+ * = base_color, and a rough GGX boundary of index eta,
  *
  *   f = D G1 G1 F / 4 + (1 - m) (1 - t) diffuse + (1 - m) sheen + clearcoat / 4 + (1 - m) t sqrt(c) refracted
  *
- * where F mixes Fresnel's factor of the boundary (what is not metal) with Schlick's of colour c (metal). Below the surface there
- * is only the boundary, (1 - m) t of it. Tints divide c by its luminance. As in the originals the lobes are added, not layered: at
- * grazing angles, and with sheen above all, more may come back than arrives, up to 1.5 times.
+ * where F mixes Fresnel's factor of the boundary (what is not metal) with Schlick's of colour c (metal). Below the
+ * surface there is only the boundary, (1 - m) t of it. Tints divide c by its luminance. As in the originals the lobes
+ * are added, not layered: at grazing angles, and with sheen above all, more may come back than arrives, up to 1.5
+ * times.
  */
 #include "worker/bsdf/create.h"
 #include "worker/bsdf/fresnel.h"
@@ -69,7 +70,8 @@ static double roughness_at(const struct principled *p, const struct bsdf_point *
 static struct stuff stuff_at(const struct bsdf *b, const struct bsdf_point *at)
 {
 	const struct principled *p = b->data;
-	struct stuff s = {.p = p, .base = texture_eval(&p->base, at->u, at->v, at->w), .roughness = roughness_at(p, at)};
+	struct stuff s = {
+		.p = p, .base = texture_eval(&p->base, at->u, at->v, at->w), .roughness = roughness_at(p, at)};
 	s.facets = facets_of(p, s.roughness);
 	s.tint = p->spec_tint > 0 || p->sheen_tint > 0 ? tint_of(p, at, s.base) : spectrum_of(1);
 	return s;
@@ -96,8 +98,8 @@ static spectrum fresnel_of(const struct stuff *s, double cosine)
 	return f;
 }
 
-/* Burley 2012, section 5.3, with his approximation of subsurface scattering (flatness), and sheen, section 5.6. wi is refused
- * below the surface by the caller. */
+/* Burley 2012, section 5.3, with his approximation of subsurface scattering (flatness), and sheen, section 5.6. wi is
+ * refused below the surface by the caller. */
 static spectrum diffuse_of(const struct stuff *s, vec3 wo, vec3 wi, double cos_d)
 {
 	const struct principled *p = s->p;
@@ -125,7 +127,8 @@ static double clearcoat_of(const struct principled *p, vec3 wo, vec3 wi, vec3 h,
 	struct microfacet shadow;
 	microfacet_set(&shadow, true, 0.25, 0.25);
 	double f = CLEARCOAT_REFLECTANCE + (1 - CLEARCOAT_REFLECTANCE) * schlick(cos_d);
-	return 0.25 * p->clearcoat * f * clearcoat_d(p, h.z) * 0.25 * microfacet_g1_over_cos(&shadow, wo) * microfacet_g1_over_cos(&shadow, wi);
+	return 0.25 * p->clearcoat * f * clearcoat_d(p, h.z) * 0.25 * microfacet_g1_over_cos(&shadow, wo) *
+	       microfacet_g1_over_cos(&shadow, wi);
 }
 
 /* Probabilities of the lobes for light from wo. */
@@ -158,7 +161,8 @@ struct pair {
 };
 
 /* Refracted light: Walter et al. 2007, eq. 21, as in roughdielectric; wo above, eta: index beyond over index here. */
-static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, double chance, enum transport transport, struct pair *out)
+static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, double chance, enum transport transport,
+			  struct pair *out)
 {
 	vec3 h;
 	double length;
@@ -171,7 +175,8 @@ static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, d
 		return;
 	double spread = co * -ci * (eta / length) * (eta / length);
 	double seen = microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo) * spread;
-	double passes = (1 - s->p->metallic) * s->p->transmission * fresnel_between(fmin(co, 1), fmin(-ci, 1), eta).transmitted;
+	double passes =
+		(1 - s->p->metallic) * s->p->transmission * fresnel_between(fmin(co, 1), fmin(-ci, 1), eta).transmitted;
 	double f = seen * passes * microfacet_g1_over_cos(&s->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
 	if (transport == TRANSPORT_RADIANCE)
 		f /= eta * eta;
@@ -180,18 +185,21 @@ static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, d
 	out->pdf += chance * seen;
 }
 
-static void add_reflected(const struct stuff *s, vec3 wo, vec3 wi, bool below, double eta, const double chance[LOBES], struct pair *out)
+static void add_reflected(const struct stuff *s, vec3 wo, vec3 wi, bool below, double eta, const double chance[LOBES],
+			  struct pair *out)
 {
 	const struct principled *p = s->p;
 	vec3 h;
 	double length;
 	if (!microfacet_half(wo, 1, wi, &h, &length))
 		return;
-	double cos_d = fmin(0.5 * length, 1), seen = 0.25 * microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo);
+	double cos_d = fmin(0.5 * length, 1),
+	       seen = 0.25 * microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo);
 	double both = seen * microfacet_g1_over_cos(&s->facets, wi);
 	out->pdf = chance[LOBE_SPECULAR] * seen;
 	if (below) {
-		out->f = spectrum_of(both * (1 - p->metallic) * p->transmission * fresnel_dielectric(cos_d, eta).reflected);
+		out->f = spectrum_of(both * (1 - p->metallic) * p->transmission *
+				     fresnel_dielectric(cos_d, eta).reflected);
 		return;
 	}
 	out->f = spectrum_add(spectrum_scale(both, fresnel_of(s, cos_d)), diffuse_of(s, wo, wi, cos_d));
@@ -246,7 +254,8 @@ static bool follow(const struct stuff *s, int lobe, vec3 wo, double eta, const d
 		*wi = warp_cosine_hemisphere(u[0], u[1]);
 		return wi->z > 0;
 	}
-	vec3 h = lobe == LOBE_CLEARCOAT ? clearcoat_normal(s->p, u[0], u[1]) : microfacet_sample_visible(&s->facets, wo, u[0], u[1]);
+	vec3 h = lobe == LOBE_CLEARCOAT ? clearcoat_normal(s->p, u[0], u[1])
+					: microfacet_sample_visible(&s->facets, wo, u[0], u[1]);
 	double c = fmin(vec3_dot(wo, h), 1);
 	if (!(c > 0))
 		return false;
@@ -259,7 +268,8 @@ static bool follow(const struct stuff *s, int lobe, vec3 wo, double eta, const d
 	return at_h.transmitted > 0 && wi->z < 0;
 }
 
-static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, const double u[3], struct bsdf_sample *out)
+static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, const double u[3],
+			      struct bsdf_sample *out)
 {
 	struct stuff s = stuff_at(b, at);
 	bool below = wo.z < 0;
@@ -278,7 +288,10 @@ static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at,
 	if (!(pair.pdf > 0))
 		return false;
 	bool reflect = wo.z * wi.z > 0;
-	*out = (struct bsdf_sample){.wi = wi, .mode = reflect ? BSDF_REFLECT : BSDF_TRANSMIT, .pdf = pair.pdf, .f = pair.f,
+	*out = (struct bsdf_sample){.wi = wi,
+				    .mode = reflect ? BSDF_REFLECT : BSDF_TRANSMIT,
+				    .pdf = pair.pdf,
+				    .f = pair.f,
 				    .eta = reflect ? 1 : eta};
 	return true;
 }
@@ -307,7 +320,8 @@ static int read_index(struct principled *p, const struct scene_node *n, struct e
 	return 0;
 }
 
-static int principled_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+static int principled_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			     struct error *e)
 {
 	struct principled *p = bsdf_data(b, n, build, sizeof *p, e);
 	if (!p)
@@ -341,12 +355,23 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 	return 0;
 }
 
-#define SHARE(name_) {.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1}
+#define SHARE(name_)                                                                \
+	{                                                                           \
+		.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1 \
+	}
 static const struct param principled_params[] = {
 	{.name = "base_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 	{.name = "roughness", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-	SHARE("metallic"), SHARE("spec_trans"), SHARE("spec_tint"), SHARE("sheen"), SHARE("sheen_tint"), SHARE("flatness"),
-	SHARE("clearcoat"), SHARE("clearcoat_gloss"), SHARE("anisotropic"), SHARE("specular"),
+	SHARE("metallic"),
+	SHARE("spec_trans"),
+	SHARE("spec_tint"),
+	SHARE("sheen"),
+	SHARE("sheen_tint"),
+	SHARE("flatness"),
+	SHARE("clearcoat"),
+	SHARE("clearcoat_gloss"),
+	SHARE("anisotropic"),
+	SHARE("specular"),
 	{.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 	{.name = "diffuse_reflectance_sampling_rate", .status = PARAM_IGNORED},
 	{.name = "main_specular_sampling_rate", .status = PARAM_IGNORED},

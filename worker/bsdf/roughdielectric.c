@@ -8,22 +8,23 @@
 #include "worker/bsdf/microfacet.h"
 
 struct roughdielectric {
-	struct glass glass; /* first: so it is asked for its index, and with equal indices the data is a smooth dielectric's */
+	struct glass glass; /* first: so it is asked for its index, and with equal indices the data is a smooth
+			       dielectric's */
 	struct microfacet facets;
 };
 
 /* A pair of directions as the facets see it. */
 struct facet {
-	vec3 h;      /* on wo's side */
-	double d;    /* distribution x G1(wo) / |wo.z| */
-	double eta;  /* index beyond over index on wo's side */
+	vec3 h;	    /* on wo's side */
+	double d;   /* distribution x G1(wo) / |wo.z| */
+	double eta; /* index beyond over index on wo's side */
 	struct fresnel fresnel;
 	double cos_o, cos_i; /* against h; cos_i < 0 when refracted */
-	double length;       /* of wo + wi or wo + eta wi */
+	double length;	     /* of wo + wi or wo + eta wi */
 };
 
-/* wo.z > 0. false: no facet connects the two. Fresnel's factors come from both cosines: next to the critical angle one alone
- * says little about the other. */
+/* wo.z > 0. false: no facet connects the two. Fresnel's factors come from both cosines: next to the critical angle one
+ * alone says little about the other. */
 static bool facet_of(const struct roughdielectric *r, double eta, vec3 wo, vec3 wi, struct facet *f)
 {
 	bool reflect = wi.z > 0;
@@ -147,8 +148,11 @@ static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point
 	double pdf = facet_pdf(&f, wi);
 	if (!(pdf > 0))
 		return false;
-	*out = (struct bsdf_sample){.wi = mirror(wi, below), .mode = reflect ? BSDF_REFLECT : BSDF_TRANSMIT, .pdf = pdf,
-				    .f = facet_f(b, p, &f, wi), .eta = reflect ? 1 : eta};
+	*out = (struct bsdf_sample){.wi = mirror(wi, below),
+				    .mode = reflect ? BSDF_REFLECT : BSDF_TRANSMIT,
+				    .pdf = pdf,
+				    .f = facet_f(b, p, &f, wi),
+				    .eta = reflect ? 1 : eta};
 	return true;
 }
 

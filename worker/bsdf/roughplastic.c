@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A diffuse base under a rough clear coating, on the side of the normal: coating.h. The boundary is that of roughdielectric
- * (Walter et al. 2007, eq. 20); what it transmits is one minus what it reflects, tabulated over the cosine when the material
- * is made.
+ * A diffuse base under a rough clear coating, on the side of the normal: coating.h. The boundary is that of
+ * roughdielectric (Walter et al. 2007, eq. 20); what it transmits is one minus what it reflects, tabulated over the
+ * cosine when the material is made.
  */
 #include "worker/bsdf/coating.h"
 #include "worker/bsdf/fresnel.h"
@@ -27,7 +27,8 @@ static double reflected_by(const struct microfacet *m, double eta, double cosine
 		double c = fmin(vec3_dot(v, h), 1);
 		vec3 w = vec3_sub(vec3_scale(2 * c, h), v);
 		if (c > 0 && w.z > 0)
-			sum += fresnel_dielectric(c, eta).reflected * fmin(microfacet_g1_over_cos(m, vec3_normalize(w)) * w.z, 1);
+			sum += fresnel_dielectric(c, eta).reflected *
+			       fmin(microfacet_g1_over_cos(m, vec3_normalize(w)) * w.z, 1);
 	}
 	return sum / (SIDE * SIDE);
 }
@@ -99,7 +100,8 @@ static bool roughplastic_sample(const struct bsdf *b, const struct bsdf_point *p
 	double pdf = roughplastic_pdf(b, p, wo, wi);
 	if (!(pdf > 0))
 		return false;
-	*out = (struct bsdf_sample){.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf, .f = roughplastic_eval(b, p, wo, wi), .eta = 1};
+	*out = (struct bsdf_sample){
+		.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf, .f = roughplastic_eval(b, p, wo, wi), .eta = 1};
 	return true;
 }
 
@@ -115,7 +117,8 @@ static void tabulate(struct roughplastic *r)
 	r->coating.escape = sum / STEPS;
 }
 
-static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			       struct error *e)
 {
 	struct roughplastic *r = bsdf_data(b, n, build, sizeof *r, e);
 	if (!r)
@@ -127,7 +130,8 @@ static int roughplastic_create(struct bsdf *b, const struct scene_node *n, const
 		code = coating_read(&r->coating, b, n, build, e);
 	if (code)
 		return code;
-	/* A diffuse base has nothing to gain from an exact mirror above it: the coating stays rough, as smooth as it may be. */
+	/* A diffuse base has nothing to gain from an exact mirror above it: the coating stays rough, as smooth as it
+	 * may be. */
 	tabulate(r);
 	double chance = r->coating.specular_weight;
 	b->alpha = chance > 0 ? microfacet_least(&r->facets) : INFINITY;

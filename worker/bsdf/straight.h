@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What lets a share of the light pass as if nothing were there, for `null` and `mask`: a specular lobe that does not bend. */
+/* What lets a share of the light pass as if nothing were there, for `null` and `mask`: a specular lobe that does not
+ * bend. */
 #ifndef WORKER_BSDF_STRAIGHT_H
 #define WORKER_BSDF_STRAIGHT_H
 

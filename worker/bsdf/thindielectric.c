@@ -49,7 +49,8 @@ static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p
 	return spectrum_scale(share, texture_eval(reflect ? &t->reflectance : &t->transmittance, p->u, p->v, p->w));
 }
 
-static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3], struct bsdf_sample *out)
+static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			struct bsdf_sample *out)
 {
 	bool reflect = u[2] < sheet(b->data, wo).reflected;
 	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT) | BSDF_DELTA, .eta = 1};

@@ -92,12 +92,13 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 		if (code)
 			return code;
 		if (t->side[i].two_sided)
-			return node_error(inner, e, EINVAL, "\"%s\" has two sides already; twosided takes only opaque ones",
-					  inner->type);
+			return node_error(inner, e, EINVAL,
+					  "\"%s\" has two sides already; twosided takes only opaque ones", inner->type);
 	}
 	b->two_sided = true;
 	b->black = t->side[0].black && t->side[1].black;
-	b->alpha = fmin(t->side[0].has_smooth ? t->side[0].alpha : INFINITY, t->side[1].has_smooth ? t->side[1].alpha : INFINITY);
+	b->alpha = fmin(t->side[0].has_smooth ? t->side[0].alpha : INFINITY,
+			t->side[1].has_smooth ? t->side[1].alpha : INFINITY);
 	for (int i = 0; i < 2; i++) {
 		b->modes |= t->side[i].modes;
 		b->has_smooth |= t->side[i].has_smooth;

@@ -3,7 +3,8 @@
 
 #include <string.h>
 
-/* Pixels per unit of slope: the same for both axes, so `smaller` and the like only choose which side the angle spans. */
+/* Pixels per unit of slope: the same for both axes, so `smaller` and the like only choose which side the angle spans.
+ */
 static double pixels_per_slope(const struct scene_settings *s)
 {
 	double w = s->width, h = s->height, side = w;
@@ -18,10 +19,12 @@ static double pixels_per_slope(const struct scene_settings *s)
 	return side / (2 * tan(s->fov * (M_PI / 360)));
 }
 
-int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_center, double world_scale, struct error *e)
+int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_center, double world_scale,
+		struct error *e)
 {
 	if (!(s->fov > 0 && s->fov < 180))
-		return error_set(e, EINVAL, "the sensor's field of view of %g degrees is not between 0 and 180", s->fov);
+		return error_set(e, EINVAL, "the sensor's field of view of %g degrees is not between 0 and 180",
+				 s->fov);
 	vec3 forward = mat4_vector(&s->to_world, (vec3){0, 0, 1});
 	vec3 up = mat4_vector(&s->to_world, (vec3){0, 1, 0});
 	vec3 left = mat4_vector(&s->to_world, (vec3){1, 0, 0});
@@ -45,9 +48,11 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	c->lens = c->aperture > 0;
 	double away = vec3_length(c->position) + c->aperture;
 	if (!(away <= PARAM_REACH_MAX))
-		return error_set(e, ERANGE, "the camera stands %g times the scene's radius away from it, beyond %g", away, PARAM_REACH_MAX);
+		return error_set(e, ERANGE, "the camera stands %g times the scene's radius away from it, beyond %g",
+				 away, PARAM_REACH_MAX);
 	if (!(c->aperture >= 0) || (c->aperture > 0 && !(c->focus > 0)))
-		return error_set(e, EINVAL, "an aperture of radius %g, focused at a distance of %g", s->aperture_radius, s->focus_distance);
+		return error_set(e, EINVAL, "an aperture of radius %g, focused at a distance of %g", s->aperture_radius,
+				 s->focus_distance);
 	return 0;
 }
 
@@ -83,7 +88,10 @@ static void disk_from_square(const double u[2], double *x, double *y)
 static void square_from_disk(double x, double y, double u[2])
 {
 	bool wide = fabs(x) > fabs(y);
-	double r = copysign(hypot(x, y), wide ? x : y), other = r * (4 / M_PI) * (wide ? atan(y / x) : y == 0 ? 0 : atan(x / y));
+	double r = copysign(hypot(x, y), wide ? x : y), other = r * (4 / M_PI) *
+								(wide	  ? atan(y / x)
+								 : y == 0 ? 0
+									  : atan(x / y));
 	double a[2] = {wide ? r : other, wide ? other : r};
 	for (int i = 0; i < 2; i++)
 		u[i] = fmin(fmax(0.5 * (a[i] + 1), 0), 1 - 0x1p-53);

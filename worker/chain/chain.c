@@ -28,7 +28,8 @@ void chain_put_head(const struct chain *c, uint8_t *bytes)
 
 bool chain_get_head(struct chain *c, const uint8_t *bytes, size_t size)
 {
-	if (size < CHAIN_STATE_HEAD || get64(bytes) != c->id || get64(bytes + 8) != c->step || get64(bytes + 16) > c->step)
+	if (size < CHAIN_STATE_HEAD || get64(bytes) != c->id || get64(bytes + 8) != c->step ||
+	    get64(bytes + 16) > c->step)
 		return false;
 	c->rejected_run = get64(bytes + 16);
 	return true;

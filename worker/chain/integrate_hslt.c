@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Improved half vector space light transport (Hanika, Kaplanyan, Dachsbacher 2015): chains of whole paths. Their bootstrap is
- * that of bdpt.
+ * Improved half vector space light transport (Hanika, Kaplanyan, Dachsbacher 2015): chains of whole paths. Their
+ * bootstrap is that of bdpt.
  */
 #include "worker/chain/path_chain.h"
 #include "worker/path/integrator.h"
 
 const struct integrator integrator_hslt = {
-	.face = {"hslt", "improved half vector space light transport", PLAN_CHAINS, FULL_PATH_MAX_EDGES, .has_mutations = true},
+	.face = {"hslt", "improved half vector space light transport", PLAN_CHAINS, FULL_PATH_MAX_EDGES,
+		 .has_mutations = true},
 	.stream = RNG_BOOTSTRAP,
 	.evaluate = path_trace_both_ways,
 	.chain = &chain_path,

@@ -9,7 +9,8 @@
 const struct integrator integrator_pssmlt = {
 	.face = {.name = "pssmlt",
 		 .summary = "primary sample space Metropolis over bdpt",
-		 .kind = PLAN_CHAINS, .max_depth = PSS_MAX_EDGES},
+		 .kind = PLAN_CHAINS,
+		 .max_depth = PSS_MAX_EDGES},
 	.stream = RNG_BOOTSTRAP,
 	.evaluate = path_trace_both_ways,
 	.chain = &chain_pss,

@@ -1,13 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Paths as bytes. A vertex on a surface is written as what its point was made of (the primitive, and barycentrics or the
- * direction from a sphere's centre), so that reading makes the same point bit by bit, however small the primitive is next to the
- * scene, and bytes from elsewhere cannot name a point that does not lie on its primitive. With the path goes log f as reading
- * it gives: a path that somebody changed has another one.
+ * Paths as bytes. A vertex on a surface is written as what its point was made of (the primitive, and barycentrics or
+ * the direction from a sphere's centre), so that reading makes the same point bit by bit, however small the primitive
+ * is next to the scene, and bytes from elsewhere cannot name a point that does not lie on its primitive. With the path
+ * goes log f as reading it gives: a path that somebody changed has another one.
  *
- * What is refused: numbers that are not finite, indices of what the scene does not have, points outside their primitives,
- * vertices that do not scatter as they say, paths that leave the window or carry no light, another contribution than stated.
- * Nothing is allocated and no ray is cast: whether anything lies between two vertices is not asked.
+ * What is refused: numbers that are not finite, indices of what the scene does not have, points outside their
+ * primitives, vertices that do not scatter as they say, paths that leave the window or carry no light, another
+ * contribution than stated. Nothing is allocated and no ray is cast: whether anything lies between two vertices is not
+ * asked.
  */
 #include "worker/chain/path_chain.h"
 
@@ -16,7 +17,8 @@
 
 enum { PATH_EDGES = 8, PATH_HEAD = PATH_EDGES + 8, VERTEX_BYTES = 40 };
 
-/* What a scene does not call for is not there: the wavelength's number without colour, the camera's vertex without aperture. */
+/* What a scene does not call for is not there: the wavelength's number without colour, the camera's vertex without
+ * aperture. */
 static size_t head_bytes(const struct world *w)
 {
 	return PATH_HEAD + (EFFECT_IS_ON(w, colour) ? 8 : 0);
@@ -27,7 +29,8 @@ static unsigned vertex_count(const struct world *w, unsigned edges)
 	return EFFECT_IS_ON(w, aperture) ? edges + 1 : edges;
 }
 
-/* How far a point of the aperture may lie from it, in units of the world's radius, and the square of a direction from 1. */
+/* How far a point of the aperture may lie from it, in units of the world's radius, and the square of a direction
+ * from 1. */
 #define BELONGS 1e-9
 /* Roundings of a sum of barycentrics, or of a unit vector's square, that were made by a few operations. */
 #define ROUNDING 0x1p-48
@@ -85,7 +88,8 @@ static bool read_surface(const struct world *w, struct prim_ref prim, vec3 place
 		surface_on_sphere(s, prim, place, x);
 		return true;
 	}
-	if (prim.prim >= s->triangle_count || !(place.x >= 0) || !(place.y >= 0) || !(place.x + place.y <= 1 + ROUNDING))
+	if (prim.prim >= s->triangle_count || !(place.x >= 0) || !(place.y >= 0) ||
+	    !(place.x + place.y <= 1 + ROUNDING))
 		return false;
 	surface_on_triangle(s, prim, place.x, place.y, x);
 	return vec3_is_finite(x->ng);
@@ -132,8 +136,9 @@ static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, un
 	struct prim_ref prim = {get32(at + 8), get32(at + 12)};
 	vec3 place = {get_double(at + 16), get_double(at + 24), get_double(at + 32)};
 	*v = (struct path_vertex){.kind = at[0], .mode = at[1], .delta = at[2] != 0, .emitter = emitter};
-	if (is_huge(w, place) || at[0] > VERTEX_INFINITE || at[2] > 1 || at[3] != 0 || (v->kind == VERTEX_CAMERA) != (i == edges) ||
-	    (v->kind == VERTEX_SURFACE) != (i > 0 && i < edges) || (v->mode & ~(unsigned)(BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA)))
+	if (is_huge(w, place) || at[0] > VERTEX_INFINITE || at[2] > 1 || at[3] != 0 ||
+	    (v->kind == VERTEX_CAMERA) != (i == edges) || (v->kind == VERTEX_SURFACE) != (i > 0 && i < edges) ||
+	    (v->mode & ~(unsigned)(BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA)))
 		return false;
 	if (v->kind == VERTEX_CAMERA) {
 		double u[2];
@@ -186,10 +191,11 @@ static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size,
 	return true;
 }
 
-/* Our code, but the bytes may be anybody's: what they make invalid (a signalling NaN, infinity less infinity) is refused and no
- * fault. A call, so that nothing of it is computed before or after the flags are looked at. stated: as the bytes say. */
-__attribute__((noinline)) static bool contribution_of(struct path_context *c, const uint8_t *bytes, size_t size, bool stated,
-						      struct full_path_path *x, double *contribution)
+/* Our code, but the bytes may be anybody's: what they make invalid (a signalling NaN, infinity less infinity) is
+ * refused and no fault. A call, so that nothing of it is computed before or after the flags are looked at. stated: as
+ * the bytes say. */
+__attribute__((noinline)) static bool contribution_of(struct path_context *c, const uint8_t *bytes, size_t size,
+						      bool stated, struct full_path_path *x, double *contribution)
 {
 	bool ok = read_path(c, bytes, size, x);
 	*contribution = ok && x->edges ? full_path_log_f(c, x) : 0;
@@ -198,7 +204,8 @@ __attribute__((noinline)) static bool contribution_of(struct path_context *c, co
 	return ok && isfinite(*contribution);
 }
 
-static bool read_guarded(struct path_context *c, const uint8_t *bytes, size_t size, bool stated, struct full_path_path *x, double *contribution)
+static bool read_guarded(struct path_context *c, const uint8_t *bytes, size_t size, bool stated,
+			 struct full_path_path *x, double *contribution)
 {
 	unsigned flags = fptrap_leave();
 	bool ok = contribution_of(c, bytes, size, stated, x, contribution);
@@ -206,7 +213,8 @@ static bool read_guarded(struct path_context *c, const uint8_t *bytes, size_t si
 	return ok;
 }
 
-bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x, double *contribution)
+bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x,
+		       double *contribution)
 {
 	return read_guarded(c, bytes, size, false, x, contribution);
 }

@@ -21,7 +21,7 @@ struct path_chain {
 	struct mutation_ctx mutation;
 	struct path_place place[2];
 	struct path_place *current, *proposal; /* the proposal's path equals the current one between steps */
-	size_t began_size; /* the path with which the epoch began, as bytes */
+	size_t began_size;		       /* the path with which the epoch began, as bytes */
 	uint8_t began[WHOLE_BYTES];
 };
 
@@ -66,7 +66,8 @@ static bool start(struct chain *base, uint64_t bootstrap_index)
 	uint8_t bytes[WHOLE_BYTES];
 	set_up(c);
 	c->current->path.edges = 0;
-	bool ok = bootstrap_index == UINT64_MAX || path_start(base->context, base->seed, bootstrap_index, &c->current->path);
+	bool ok = bootstrap_index == UINT64_MAX ||
+		  path_start(base->context, base->seed, bootstrap_index, &c->current->path);
 	size_t size = path_write(base->context, &c->current->path, &c->proposal->path, bytes);
 	if (size == 0)
 		size = path_write(base->context, &black, &c->proposal->path, bytes);
@@ -125,8 +126,8 @@ static uint64_t rays(const uint64_t *counters)
 	return counters[COUNT_RAYS_CLOSEST] + counters[COUNT_RAYS_SHADOW];
 }
 
-/* What the film may not have: counted, and no proposal. What an independent proposal adds to b is within a float, as all
- * that path_splat takes. */
+/* What the film may not have: counted, and no proposal. What an independent proposal adds to b is within a float, as
+ * all that path_splat takes. */
 static bool is_sound(struct path_chain *c, double log_weight, bool independent)
 {
 	if (isnan(log_weight))
@@ -139,7 +140,8 @@ static bool is_sound(struct path_chain *c, double log_weight, bool independent)
 }
 
 /* The probability of acceptance; 0 where there is no proposal, for a reason that is counted. */
-static double propose(struct path_chain *c, const struct mixture_entry *entry, struct move *move, struct chain_sums *sums)
+static double propose(struct path_chain *c, const struct mixture_entry *entry, struct move *move,
+		      struct chain_sums *sums)
 {
 	struct mutation_ctx *m = &c->mutation;
 	struct full_path_path *x = &c->current->path, *y = &c->proposal->path;

@@ -14,8 +14,8 @@ bool path_start(struct path_context *c, uint64_t seed, uint64_t bootstrap_index,
 	ensemble_draw(c, &s.base, &all, &candidates);
 	if (candidates.count == 0)
 		return false;
-	/* On the very border of what is sampled the path that was drawn may lie outside when it is computed again: once in
-	 * millions. The chain then looks for light as one without a seed does. */
+	/* On the very border of what is sampled the path that was drawn may lie outside when it is computed again: once
+	 * in millions. The chain then looks for light as one without a seed does. */
 	if (!ensemble_choose(c, &candidates, choice[0], x))
 		x->edges = 0;
 	return true;

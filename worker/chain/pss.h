@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Primary sample space (Kelemen, Szirmay-Kalos, Antal, Csonka 2002): a chain's state is the random numbers of a path, block
- * by block. Numbers that the current path does not use are not kept: given the ones it uses they are uniform, so drawing
- * them afresh when a proposal asks for them is a Gibbs step that leaves the target as it is.
- * Fixed size; nothing allocates.
+ * Primary sample space (Kelemen, Szirmay-Kalos, Antal, Csonka 2002): a chain's state is the random numbers of a path,
+ * block by block. Numbers that the current path does not use are not kept: given the ones it uses they are uniform, so
+ * drawing them afresh when a proposal asks for them is a Gibbs step that leaves the target as it is. Fixed size;
+ * nothing allocates.
  */
 #ifndef WORKER_CHAIN_PSS_H
 #define WORKER_CHAIN_PSS_H
@@ -14,7 +14,7 @@
 #include <stddef.h>
 
 enum {
-	PSS_MAX_EDGES = 32,                    /* of a path that a state holds */
+	PSS_MAX_EDGES = 32,		      /* of a path that a state holds */
 	PSS_MAX_VERTICES = PSS_MAX_EDGES + 1, /* of one side */
 };
 

@@ -85,7 +85,8 @@ static bool resume(struct chain *base, const struct chain_state *state)
 	set_places(c);
 	if (!chain_get_head(base, state->bytes, state->size))
 		return false;
-	unsigned flags = fptrap_leave(); /* the bytes may be anybody's: a signalling NaN is refused, and no fault of ours */
+	unsigned flags =
+		fptrap_leave(); /* the bytes may be anybody's: a signalling NaN is refused, and no fault of ours */
 	size_t n = pss_read(&c->current->point, state->bytes + CHAIN_STATE_HEAD, state->size - CHAIN_STATE_HEAD);
 	fptrap_return(flags);
 	if (n == 0 || n != state->size - CHAIN_STATE_HEAD)
@@ -133,7 +134,8 @@ static void step(struct chain *base, struct chain_sums *sums)
 	pss_choices(base->seed, base->id, base->step, choice);
 	bool large = !(here > 0) || choice[PSS_CHOOSE_LARGE] < LARGE_STEP;
 	struct pss_sampler s;
-	pss_sampler_init(&s, &c->proposal->point, large ? NULL : &c->current->point, base->seed, RNG_CHAIN, base->id, base->step);
+	pss_sampler_init(&s, &c->proposal->point, large ? NULL : &c->current->point, base->seed, RNG_CHAIN, base->id,
+			 base->step);
 	evaluate(c, &s, c->proposal);
 	double there = c->proposal->sample.intensity;
 	counters[COUNT_SAMPLES]++;

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What accuracy costs in time: settings around a default, one of them changed at a time, rendered in turns and compared. The
- * parts: design (which settings), run (rendering), judge (figures), csv and html (reports). One thread besides those of the leases.
+ * What accuracy costs in time: settings around a default, one of them changed at a time, rendered in turns and
+ * compared. The parts: design (which settings), run (rendering), judge (figures), csv and html (reports). One thread
+ * besides those of the leases.
  */
 #ifndef WORKER_CLI_ACCURACY_H
 #define WORKER_CLI_ACCURACY_H
@@ -20,8 +21,8 @@ enum { ACCURACY_SETTINGS = 96, ACCURACY_SWEEPS = 24, ACCURACY_VALUES = 12, ACCUR
 
 struct accuracy_setting {
 	char parameter[32], value[48]; /* "default" and "reference" are settings without value */
-	double share;             /* of the time, in units of the others' */
-	bool other_image;         /* it is known to make another image, however small the difference */
+	double share;		       /* of the time, in units of the others' */
+	bool other_image;	       /* it is known to make another image, however small the difference */
 	uint32_t max_depth;
 	char accuracy[PLAN_ACCURACY_MAX], mixture[PLAN_MUTATIONS_MAX];
 };
@@ -39,16 +40,17 @@ struct accuracy_left_out {
 
 struct accuracy_design {
 	size_t count, sweep_count, left_out_count;
-	struct accuracy_setting settings[ACCURACY_SETTINGS]; /* the first is the default, the second the reference: careful, and longer */
+	struct accuracy_setting settings[ACCURACY_SETTINGS]; /* the first is the default, the second the reference:
+								careful, and longer */
 	struct accuracy_sweep sweeps[ACCURACY_SWEEPS];
 	struct accuracy_left_out left_out[ACCURACY_SWEEPS];
 };
 enum { ACCURACY_DEFAULT, ACCURACY_REFERENCE };
 
-/* Around the request's settings, what the scene calls for. only: NAME,NAME: sweeps to make; NULL: all. -EINVAL: there is no such
- * parameter, with a sentence. */
-int accuracy_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene, const char *only,
-		    struct error *e);
+/* Around the request's settings, what the scene calls for. only: NAME,NAME: sweeps to make; NULL: all. -EINVAL: there
+ * is no such parameter, with a sentence. */
+int accuracy_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene,
+		    const char *only, struct error *e);
 
 /* One setting's rendering. */
 struct accuracy_job {
@@ -58,7 +60,7 @@ struct accuracy_job {
 	struct local_job *job;
 	size_t cost_count;
 	double cost[ACCURACY_COSTS]; /* CPU seconds a mutation, of each round */
-	double cpu;                  /* of the rounds */
+	double cpu;		     /* of the rounds */
 };
 
 struct accuracy_run {
@@ -69,8 +71,8 @@ struct accuracy_run {
 	const struct asset_source *assets;
 	const struct render_options *render;
 	unsigned threads;
-	double seconds;         /* wall clock in all */
-	double setting_seconds; /* CPU seconds of a setting; 0: by the clock */
+	double seconds;		 /* wall clock in all */
+	double setting_seconds;	 /* CPU seconds of a setting; 0: by the clock */
 	uint64_t setting_rounds; /* rounds of a setting, so that all but times repeats; 0: by time */
 	const atomic_bool *stop;
 	void (*progress)(void *user, double fraction, const char *state);
@@ -91,29 +93,31 @@ void accuracy_run_fini(struct accuracy_run *r);
 struct accuracy_figures {
 	uint64_t mutations, rounds;
 	double cpu_seconds;
-	struct interval cost;        /* microseconds of CPU a mutation */
+	struct interval cost;		       /* microseconds of CPU a mutation */
 	double acceptance, failed_walks, rays; /* failed_walks: of all walks, NAN: none */
 	struct interval equal_mutations, equal_time;
-	struct interval bias_mean;   /* relative to the reference */
-	struct interval bias_block;  /* of the worst block, at 95 % for all blocks together */
-	unsigned block;              /* which: across + down * blocks_across */
+	struct interval bias_mean;  /* relative to the reference */
+	struct interval bias_block; /* of the worst block, at 95 % for all blocks together */
+	unsigned block;		    /* which: across + down * blocks_across */
 	double bias_seen, bias_bound;
-	size_t beaten_by;            /* itself: on the front; the reference takes no part */
+	size_t beaten_by; /* itself: on the front; the reference takes no part */
 };
 
 struct accuracy_judgement {
-	unsigned across, down;   /* blocks */
-	uint64_t at_mutations;   /* of equal mutations */
-	double at_cpu_seconds;   /* of equal time */
-	bool file;               /* the reference is a file's image */
-	bool thin;               /* too little was rendered to trust the figures: errors of groups that missed the rare light look small */
+	unsigned across, down; /* blocks */
+	uint64_t at_mutations; /* of equal mutations */
+	double at_cpu_seconds; /* of equal time */
+	bool file;	       /* the reference is a file's image */
+	bool thin; /* too little was rendered to trust the figures: errors of groups that missed the rare light look
+		      small */
 	struct accuracy_figures figures[ACCURACY_SETTINGS];
 	uint32_t width, height;
-	float *rgb;              /* planes of the picture for the report: R, G, B */
+	float *rgb; /* planes of the picture for the report: R, G, B */
 };
 
 /* reference: an image of the settings' size to measure the bias against; NULL: the careful setting. */
-int accuracy_judge(const struct accuracy_run *r, const struct picture *reference, struct accuracy_judgement *out, struct error *e);
+int accuracy_judge(const struct accuracy_run *r, const struct picture *reference, struct accuracy_judgement *out,
+		   struct error *e);
 void accuracy_judgement_fini(struct accuracy_judgement *j);
 
 /* What a report says besides. */

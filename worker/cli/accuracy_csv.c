@@ -69,7 +69,11 @@ static void put_row(struct text_file *p, const struct accuracy_context *x, size_
 	text_file_field(p, s->parameter);
 	text_file_put(p, ",");
 	text_file_field(p, s->value);
-	text_file_put(p, ",%s,%u,", i == ACCURACY_DEFAULT ? "default" : reference ? "reference" : "sweep", s->max_depth);
+	text_file_put(p, ",%s,%u,",
+		      i == ACCURACY_DEFAULT ? "default"
+		      : reference	    ? "reference"
+					    : "sweep",
+		      s->max_depth);
 	text_file_field(p, s->mixture);
 	text_file_put(p, ",");
 	text_file_field(p, s->accuracy);

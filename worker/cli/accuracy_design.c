@@ -9,11 +9,15 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* The reference: values at which what a parameter may bias is far below what can be measured. Those of the roughness and the
- * tessellation are the finest that are worth a sweep. */
+/* The reference: values at which what a parameter may bias is far below what can be measured. Those of the roughness
+ * and the tessellation are the finest that are worth a sweep. */
 static const struct {
 	const char *parameter, *value;
-} careful[] = {{"tolerance", "1e-06"}, {"iterations", "30"}, {"reverse-tolerance", "1e-05"}, {"roughness", "0"}, {"tessellation", "2"}};
+} careful[] = {{"tolerance", "1e-06"},
+	       {"iterations", "30"},
+	       {"reverse-tolerance", "1e-05"},
+	       {"roughness", "0"},
+	       {"tessellation", "2"}};
 
 /* What one would try who is in a hurry. */
 static const struct {
@@ -164,7 +168,8 @@ static void sweep_depth(struct planner *p)
 {
 	static const uint32_t depths[] = {2, 3, 5, 8, 12, 20, 32};
 	char value[32];
-	struct accuracy_sweep *s = new_sweep(p, DEPTH, "Longest paths, in edges; what is longer is missing in the image");
+	struct accuracy_sweep *s =
+		new_sweep(p, DEPTH, "Longest paths, in edges; what is longer is missing in the image");
 	for (size_t i = 0; s && i < sizeof depths / sizeof *depths && depths[i] < p->base->max_depth; i++) {
 		snprintf(value, sizeof value, "%u", depths[i]);
 		struct accuracy_setting *setting = swept(p, s, value);
@@ -193,7 +198,8 @@ static int entries_of(const char *mixture, struct entry entry[PLAN_MAX_STRATEGIE
 		plan_strategy_name(mixture, (uint32_t)i, entry[i].name, sizeof entry[i].name);
 		const char *equals = strchr(at, '=');
 		entry[i].weight = equals ? strtod(equals + 1, NULL) : 1;
-		entry[i].independent = strcmp(entry[i].name, "bidirectional") == 0 || strcmp(entry[i].name, "independent") == 0;
+		entry[i].independent =
+			strcmp(entry[i].name, "bidirectional") == 0 || strcmp(entry[i].name, "independent") == 0;
 		at = strchr(at, ',') ? strchr(at, ',') + 1 : at;
 	}
 	return n;
@@ -231,8 +237,10 @@ static void sweep_share(struct planner *p)
 		leave_out(p, SHARE, "the mixture has no other proposals, or none that are independent");
 		return;
 	}
-	struct accuracy_sweep *s = new_sweep(p, SHARE, "Share of independent proposals, which find new light and estimate the brightness, "
-						       "among all");
+	struct accuracy_sweep *s =
+		new_sweep(p, SHARE,
+			  "Share of independent proposals, which find new light and estimate the brightness, "
+			  "among all");
 	bool placed = false;
 	for (size_t k = 0; s && k < sizeof shares / sizeof *shares; k++) {
 		struct entry changed[PLAN_MAX_STRATEGIES];
@@ -257,7 +265,8 @@ static void sweep_share(struct planner *p)
 		add_value(s, value, ACCURACY_DEFAULT);
 }
 
-static void try_mixture(struct planner *p, struct accuracy_sweep *s, const struct entry *entry, int n, const char *value)
+static void try_mixture(struct planner *p, struct accuracy_sweep *s, const struct entry *entry, int n,
+			const char *value)
 {
 	char mixture[PLAN_MUTATIONS_MAX];
 	if (n > PLAN_MAX_STRATEGIES || !print_entries(p, entry, n, mixture) || strcmp(mixture, p->base->mixture) == 0)
@@ -274,8 +283,10 @@ static void sweep_mixture(struct planner *p)
 	int n = entries_of(p->base->mixture, base);
 	const char *name, *summary;
 	char value[48];
-	struct accuracy_sweep *s = new_sweep(p, MIXTURE, "Strategies that propose mutations: one left out, or one taken in (a fifth of the "
-							 "others' weight)");
+	struct accuracy_sweep *s =
+		new_sweep(p, MIXTURE,
+			  "Strategies that propose mutations: one left out, or one taken in (a fifth of the "
+			  "others' weight)");
 	if (!s)
 		return;
 	add_value(s, "default", ACCURACY_DEFAULT);
@@ -290,7 +301,8 @@ static void sweep_mixture(struct planner *p)
 			try_mixture(p, s, changed, n, value);
 	}
 	for (size_t k = 0; (name = render_mutation_at(k, &summary)) != NULL; k++) {
-		bool here = strcmp(name, "independent") == 0 || (strcmp(name, "wavelength") == 0 && !render_effect_on(p->scene, "colour")) ||
+		bool here = strcmp(name, "independent") == 0 ||
+			    (strcmp(name, "wavelength") == 0 && !render_effect_on(p->scene, "colour")) ||
 			    (strcmp(name, "lens") == 0 && !render_effect_on(p->scene, "aperture"));
 		for (int i = 0; i < n; i++)
 			here |= strcmp(base[i].name, name) == 0;
@@ -309,8 +321,10 @@ static void sweep_presets(struct planner *p)
 	struct accuracy_sweep *s = new_sweep(p, PRESET, "Several knobs at once");
 	for (size_t i = 0; s && i < sizeof presets / sizeof *presets; i++) {
 		char text[2 * PLAN_ACCURACY_MAX], accuracy[PLAN_ACCURACY_MAX];
-		snprintf(text, sizeof text, "%s%s%s", p->base->accuracy, *p->base->accuracy ? "," : "", presets[i].accuracy);
-		struct accuracy_setting *setting = render_settings_canonical(text, accuracy, p->e) == 0 ? swept(p, s, presets[i].name) : NULL;
+		snprintf(text, sizeof text, "%s%s%s", p->base->accuracy, *p->base->accuracy ? "," : "",
+			 presets[i].accuracy);
+		struct accuracy_setting *setting =
+			render_settings_canonical(text, accuracy, p->e) == 0 ? swept(p, s, presets[i].name) : NULL;
 		if (setting)
 			memcpy(setting->accuracy, accuracy, sizeof accuracy);
 	}
@@ -356,8 +370,8 @@ static int check_only(struct planner *p)
 	return 0;
 }
 
-int accuracy_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene, const char *only,
-		    struct error *e)
+int accuracy_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene,
+		    const char *only, struct error *e)
 {
 	struct planner p = {d, base, scene, render_integrator_find(base->integrator), only, e};
 	int rc = check_only(&p);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * From films to figures. Errors of all settings are weighted by one picture, the mean over the settings, so that only their noise
- * differs and not what it is measured by.
+ * From films to figures. Errors of all settings are weighted by one picture, the mean over the settings, so that only
+ * their noise differs and not what it is measured by.
  */
 #include "worker/cli/accuracy.h"
 
@@ -16,10 +16,10 @@
 struct judge {
 	const struct accuracy_run *r;
 	struct accuracy_judgement *out;
-	double *mean;                        /* [pixels * 3], over the settings */
-	double *weight, *worst;              /* [pixels * 3]; [2][pixels], the second sorted: of one setting at a time */
-	double *rel_mse, *degrees;           /* [settings] */
-	double *blocks;                      /* [settings][groups][cells] */
+	double *mean;		   /* [pixels * 3], over the settings */
+	double *weight, *worst;	   /* [pixels * 3]; [2][pixels], the second sorted: of one setting at a time */
+	double *rel_mse, *degrees; /* [settings] */
+	double *blocks;		   /* [settings][groups][cells] */
 	size_t cells, groups;
 };
 
@@ -54,8 +54,8 @@ static int take_mean(struct judge *j, struct error *e)
 
 static void take_counts(struct accuracy_figures *f, const struct canvas_counts *n)
 {
-	static const enum strategy_counter failures[] = {STRATEGY_FAIL_SINGULAR, STRATEGY_FAIL_DIVERGED, STRATEGY_FAIL_ITERATIONS,
-							 STRATEGY_FAIL_REVERSE};
+	static const enum strategy_counter failures[] = {STRATEGY_FAIL_SINGULAR, STRATEGY_FAIL_DIVERGED,
+							 STRATEGY_FAIL_ITERATIONS, STRATEGY_FAIL_REVERSE};
 	uint64_t walks = 0, failed = 0;
 	for (int k = 0; k < BATCH_STRATEGIES; k++) {
 		walks += n->strategy[k][STRATEGY_WALKS];
@@ -183,12 +183,14 @@ static void gather(const double *blocks, size_t groups, size_t cells, size_t cel
 		out[g] = blocks[g * cells + cell];
 }
 
-static void take_bias(struct judge *j, size_t i, const double *reference, size_t reference_groups, struct stats_point *point)
+static void take_bias(struct judge *j, size_t i, const double *reference, size_t reference_groups,
+		      struct stats_point *point)
 {
 	struct accuracy_figures *f = &j->out->figures[i];
 	double a[PLAN_MAX_GROUPS], b[PLAN_MAX_GROUPS], worst = -1;
 	size_t last = (size_t)j->out->across * j->out->down;
-	/* Whether a bias is seen at all is asked of the mean and of every block of every setting, half the level for the means. */
+	/* Whether a bias is seen at all is asked of the mean and of every block of every setting, half the level for
+	 * the means. */
 	double settings = (double)j->r->design->count, blocks = last > 0 ? (double)last : 1;
 	for (size_t c = 0; c < j->cells; c++) {
 		double t;
@@ -220,7 +222,8 @@ static void take_biases(struct judge *j, const struct picture *reference, struct
 	const double *from = j->blocks + ACCURACY_REFERENCE * j->groups * j->cells;
 	double file[ACCURACY_CELLS];
 	for (size_t i = 0; i < j->r->design->count; i++)
-		canvas_group_blocks(job(j, i)->run.canvas, j->out->across, j->out->down, j->blocks + i * j->groups * j->cells);
+		canvas_group_blocks(job(j, i)->run.canvas, j->out->across, j->out->down,
+				    j->blocks + i * j->groups * j->cells);
 	if (reference)
 		file_blocks(j, reference, file);
 	for (size_t i = 0; i < j->r->design->count; i++)
@@ -250,18 +253,23 @@ static int judge(struct judge *j, const struct picture *reference, struct error 
 	points[ACCURACY_REFERENCE] = points[n - 1];
 	stats_front(points, n - 1, LEVEL, by);
 	for (size_t i = 0; i + 1 < n; i++)
-		j->out->figures[i == ACCURACY_REFERENCE ? n - 1 : i].beaten_by = by[i] == ACCURACY_REFERENCE ? n - 1 : by[i];
+		j->out->figures[i == ACCURACY_REFERENCE ? n - 1 : i].beaten_by =
+			by[i] == ACCURACY_REFERENCE ? n - 1 : by[i];
 	j->out->figures[ACCURACY_REFERENCE].beaten_by = ACCURACY_REFERENCE;
 	return 0;
 }
 
-int accuracy_judge(const struct accuracy_run *r, const struct picture *reference, struct accuracy_judgement *out, struct error *e)
+int accuracy_judge(const struct accuracy_run *r, const struct picture *reference, struct accuracy_judgement *out,
+		   struct error *e)
 {
 	const struct plan *p = &r->jobs[0].plan;
 	size_t pixels = (size_t)p->crop_width * p->crop_height, n = r->design->count;
 	bool large = p->crop_width >= 32 && p->crop_height >= 24;
-	*out = (struct accuracy_judgement){.across = large ? 4 : 1, .down = large ? 3 : 1, .file = reference != NULL,
-					   .width = p->crop_width, .height = p->crop_height};
+	*out = (struct accuracy_judgement){.across = large ? 4 : 1,
+					   .down = large ? 3 : 1,
+					   .file = reference != NULL,
+					   .width = p->crop_width,
+					   .height = p->crop_height};
 	struct judge j = {.r = r, .out = out, .cells = (size_t)out->across * out->down + 1, .groups = p->groups};
 	out->rgb = mem_alloc(pixels * 3, sizeof *out->rgb);
 	j.mean = mem_alloc(pixels * 3, sizeof *j.mean);
@@ -270,8 +278,9 @@ int accuracy_judge(const struct accuracy_run *r, const struct picture *reference
 	j.rel_mse = mem_alloc(n, sizeof *j.rel_mse);
 	j.degrees = mem_alloc(n, sizeof *j.degrees);
 	j.blocks = mem_alloc(n * j.groups * j.cells, sizeof *j.blocks);
-	int rc = !out->rgb || !j.mean || !j.weight || !j.worst || !j.rel_mse || !j.degrees || !j.blocks ? error_set(e, ENOMEM, "no memory for the comparison") :
-										 judge(&j, reference, e);
+	int rc = !out->rgb || !j.mean || !j.weight || !j.worst || !j.rel_mse || !j.degrees || !j.blocks
+			 ? error_set(e, ENOMEM, "no memory for the comparison")
+			 : judge(&j, reference, e);
 	mem_free(j.mean);
 	mem_free(j.weight);
 	mem_free(j.worst);

@@ -43,7 +43,13 @@ static void add_point(struct points *to, double x, struct interval y)
 
 static struct plot_series series_of(const struct points *p, const char *name)
 {
-	return (struct plot_series){.name = name, .style = PLOT_POINTS, .count = p->count, .x = p->x, .y = p->y, .low = p->low, .high = p->high};
+	return (struct plot_series){.name = name,
+				    .style = PLOT_POINTS,
+				    .count = p->count,
+				    .x = p->x,
+				    .y = p->y,
+				    .low = p->low,
+				    .high = p->high};
 }
 
 void accuracy_plot_sweep(struct text_file *p, const struct accuracy_context *x, const struct accuracy_sweep *s)
@@ -65,10 +71,20 @@ void accuracy_plot_sweep(struct text_file *p, const struct accuracy_context *x, 
 	const struct plot_series errors[2] = {series_of(&error, "sweep"), series_of(&standard, "default")};
 	const struct plot_series biases[2] = {series_of(&mean, "mean"), series_of(&block, "worst block")};
 	text_file_put(p, "<div class=\"plots\">\n");
-	put_plot(p, &(struct plot){.title = "Error at equal time", .x_label = s->parameter, .y_label = "relative error, %", .series_count = 2,
-				   .series = errors, .x_names = names, .x_name_count = s->count});
-	put_plot(p, &(struct plot){.title = "Bias against the reference", .x_label = s->parameter, .y_label = "bias, %", .series_count = 2,
-				   .series = biases, .x_names = names, .x_name_count = s->count});
+	put_plot(p, &(struct plot){.title = "Error at equal time",
+				   .x_label = s->parameter,
+				   .y_label = "relative error, %",
+				   .series_count = 2,
+				   .series = errors,
+				   .x_names = names,
+				   .x_name_count = s->count});
+	put_plot(p, &(struct plot){.title = "Bias against the reference",
+				   .x_label = s->parameter,
+				   .y_label = "bias, %",
+				   .series_count = 2,
+				   .series = biases,
+				   .x_names = names,
+				   .x_name_count = s->count});
 	text_file_put(p, "</div>\n");
 }
 
@@ -95,7 +111,11 @@ void accuracy_plot_front(struct text_file *p, const struct accuracy_context *x)
 		s[k].labels = kinds[k].label;
 	}
 	text_file_put(p, "<div class=\"wide\">\n");
-	put_plot(p, &(struct plot){.title = "Every setting (named where a bias was seen)", .x_label = "relative error at equal time, %",
-				   .y_label = "bias of the mean, %", .log_x = true, .series_count = 3, .series = s});
+	put_plot(p, &(struct plot){.title = "Every setting (named where a bias was seen)",
+				   .x_label = "relative error at equal time, %",
+				   .y_label = "bias of the mean, %",
+				   .log_x = true,
+				   .series_count = 3,
+				   .series = s});
 	text_file_put(p, "</div>\n");
 }

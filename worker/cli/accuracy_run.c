@@ -18,9 +18,9 @@ static double now(void)
 
 enum { PILOT_BOOTSTRAP = 16384, PILOT_EPOCH = 16 };
 
-struct pilot { /* of the default, for the sizes of rounds and nothing else */
+struct pilot {				   /* of the default, for the sizes of rounds and nothing else */
 	double bootstrap_sample, mutation; /* CPU seconds */
-	double rate;                       /* CPU seconds a second: what other programs leave of the processors */
+	double rate;			   /* CPU seconds a second: what other programs leave of the processors */
 };
 
 static double shares(const struct accuracy_design *d)
@@ -41,12 +41,16 @@ static double expected_seconds(const struct accuracy_run *r, const struct pilot 
 static int check_memory(const struct accuracy_run *r, const struct plan *p, struct error *e)
 {
 	double tiles = ceil(p->crop_width / (double)TILE_SIZE) * ceil(p->crop_height / (double)TILE_SIZE);
-	double wanted = (double)r->design->count * p->groups * 3 * tiles * TILE_SIZE * TILE_SIZE * TILE_CHANNELS * sizeof(int64_t);
+	double wanted = (double)r->design->count * p->groups * 3 * tiles * TILE_SIZE * TILE_SIZE * TILE_CHANNELS *
+			sizeof(int64_t);
 	double there = (double)sysconf(_SC_AVPHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
 	if (wanted < 0.75 * there)
 		return 0;
-	return error_set(e, ENOMEM, "%zu settings of %ux%u pixels take %.1f GB of memory, of which %.1f are there: choose a smaller --size, "
-				    "or fewer --knobs", r->design->count, p->crop_width, p->crop_height, wanted / 1e9, there / 1e9);
+	return error_set(
+		e, ENOMEM,
+		"%zu settings of %ux%u pixels take %.1f GB of memory, of which %.1f are there: choose a smaller --size, "
+		"or fewer --knobs",
+		r->design->count, p->crop_width, p->crop_height, wanted / 1e9, there / 1e9);
 }
 
 /* Rounds are short, so that the settings change often; the bootstrap takes a tenth of the time or so. */
@@ -67,7 +71,8 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 	bool chains = q.kind == PLAN_CHAINS;
 	if (chains && !q.bootstrap)
 		q.bootstrap = (uint64_t)fmin(fmax(0.1 * each / pilot->bootstrap_sample, PILOT_BOOTSTRAP), 1e6);
-	/* As many chains as a render of that length has: where they are short, many of them err in ways that groups do not show. */
+	/* As many chains as a render of that length has: where they are short, many of them err in ways that groups do
+	 * not show. */
 	q.mutations = chains && !q.chains ? (uint64_t)fmin(fmax(each / pilot->mutation, 1), 1e15) : 0;
 	int rc = plan_make(&q, p, e);
 	q.chains = p->chains;
@@ -80,7 +85,8 @@ static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot
 		rc = plan_make(&q, p, e);
 	}
 	if (!rc && p->groups < 4)
-		rc = error_set(e, EINVAL, "%u groups are too few to tell errors from: at least 4 are needed", p->groups);
+		rc = error_set(e, EINVAL, "%u groups are too few to tell errors from: at least 4 are needed",
+			       p->groups);
 	return rc;
 }
 
@@ -175,7 +181,8 @@ static int rounds(struct accuracy_run *r, double begin, struct error *e)
 		/* Two rounds at least, however short the time. */
 		if ((enough && canvas_rounds(r->jobs[i].run.canvas) >= 2) || stopped(r))
 			return 0;
-		show(r, fmin(wanted > 0 ? had(r, i) / wanted : (wall - first) / fmax(begin + r->seconds - first, 1), 1), "rendering");
+		show(r, fmin(wanted > 0 ? had(r, i) / wanted : (wall - first) / fmax(begin + r->seconds - first, 1), 1),
+		     "rendering");
 		int rc = step(r, i, e);
 		if (rc)
 			return rc;

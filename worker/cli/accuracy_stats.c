@@ -24,7 +24,8 @@ static void moments(const double *x, size_t n, double *mean, double *variance_of
 	*variance_of_mean = n > 1 ? square / (double)n / (double)(n - 1) : 0;
 }
 
-struct interval stats_difference(const double *a, size_t a_count, const double *b, size_t b_count, double level, double *t)
+struct interval stats_difference(const double *a, size_t a_count, const double *b, size_t b_count, double level,
+				 double *t)
 {
 	double ma, mb, va, vb;
 	moments(a, a_count, &ma, &va);

@@ -11,10 +11,16 @@
 #include <stdlib.h>
 #include <string.h>
 
-/* What must be alike, what is added up, what has a meaning of its own; the rest of the header is kept where all crops say the same. */
-static const char *const alike[] = {"hslt:version", "hslt:scene", "hslt:integrator", "hslt:minDepth", "hslt:maxDepth", "hslt:effects"};
-static const char *const added[] = {"hslt:mutations", "hslt:accepted", "hslt:independent", "hslt:nan", "hslt:infinite", "hslt:negative", "hslt:raysClosest", "hslt:raysShadow", "hslt:stuck"};
-static const char *const own[] = {"hslt:relMSE", "hslt:relMSELow95", "hslt:relMSEHigh95", "hslt:relMSEUpper", "hslt:agreement", "hslt:disagreement", "hslt:cpuSeconds", "hslt:wallSeconds", "hslt:mixed", "hslt:date", "hslt:workers"};
+/* What must be alike, what is added up, what has a meaning of its own; the rest of the header is kept where all crops
+ * say the same. */
+static const char *const alike[] = {"hslt:version",  "hslt:scene",    "hslt:integrator",
+				    "hslt:minDepth", "hslt:maxDepth", "hslt:effects"};
+static const char *const added[] = {"hslt:mutations",	"hslt:accepted",   "hslt:independent",
+				    "hslt:nan",		"hslt:infinite",   "hslt:negative",
+				    "hslt:raysClosest", "hslt:raysShadow", "hslt:stuck"};
+static const char *const own[] = {"hslt:relMSE",    "hslt:relMSELow95",	 "hslt:relMSEHigh95", "hslt:relMSEUpper",
+				  "hslt:agreement", "hslt:disagreement", "hslt:cpuSeconds",   "hslt:wallSeconds",
+				  "hslt:mixed",	    "hslt:date",	 "hslt:workers"};
 enum { ALIKE = sizeof alike / sizeof *alike, ADDED = sizeof added / sizeof *added, OWN = sizeof own / sizeof *own };
 static const char *const options_alike[] = {"--set ", "--effects "};
 enum { TEXT = 8192 };
@@ -22,7 +28,8 @@ enum { TEXT = 8192 };
 struct sums {
 	uint64_t added[ADDED];
 	bool in_all[ADDED]; /* every crop has it */
-	double mse, below, above, pixels; /* relMSE times pixels; squares of its distances from the ends of its interval */
+	double mse, below, above,
+		pixels; /* relMSE times pixels; squares of its distances from the ends of its interval */
 	bool has_mse;
 	double cpu, wall;
 	int mixed;
@@ -33,7 +40,7 @@ struct sums {
 struct assembly {
 	struct exr_image film;
 	unsigned char *covered;
-	bool *kept; /* of the attributes of the first crop */
+	bool *kept;		/* of the attributes of the first crop */
 	struct exr_image first; /* its header alone */
 	struct sums sums;
 };
@@ -80,10 +87,11 @@ static bool same_option(const char *a, const char *b, const char *option)
 static int check_render(const struct exr_image *first, const struct exr_image *img, struct error *e)
 {
 	if (img->full_width != first->full_width || img->full_height != first->full_height)
-		return error_set(e, EINVAL, "a crop of a film of %ux%u, the first one's has %ux%u", img->full_width, img->full_height,
-				 first->full_width, first->full_height);
+		return error_set(e, EINVAL, "a crop of a film of %ux%u, the first one's has %ux%u", img->full_width,
+				 img->full_height, first->full_width, first->full_height);
 	if ((uint64_t)img->x + img->width > img->full_width || (uint64_t)img->y + img->height > img->full_height)
-		return error_set(e, EINVAL, "its pixels lie outside its film of %ux%u", img->full_width, img->full_height);
+		return error_set(e, EINVAL, "its pixels lie outside its film of %ux%u", img->full_width,
+				 img->full_height);
 	bool layers = img->channel_count == first->channel_count;
 	for (uint32_t c = 0; layers && c < img->channel_count; c++)
 		layers = strcmp(img->names[c], first->names[c]) == 0;
@@ -91,10 +99,12 @@ static int check_render(const struct exr_image *first, const struct exr_image *i
 		return error_set(e, EINVAL, "it has other layers than the first crop");
 	for (size_t i = 0; i < ALIKE; i++)
 		if (!equal(attribute(first, alike[i]), attribute(img, alike[i])))
-			return error_set(e, EINVAL, "it is not of the same render as the first crop: %s differs", alike[i]);
+			return error_set(e, EINVAL, "it is not of the same render as the first crop: %s differs",
+					 alike[i]);
 	for (size_t i = 0; i < sizeof options_alike / sizeof *options_alike; i++)
 		if (!same_option(string_of(first, "hslt:options"), string_of(img, "hslt:options"), options_alike[i]))
-			return error_set(e, EINVAL, "it is not of the same render as the first crop: %.*s differs", (int)strlen(options_alike[i]) - 1, options_alike[i]);
+			return error_set(e, EINVAL, "it is not of the same render as the first crop: %.*s differs",
+					 (int)strlen(options_alike[i]) - 1, options_alike[i]);
 	return 0;
 }
 
@@ -102,7 +112,10 @@ static int begin(struct assembly *a, const struct exr_image *img, struct error *
 {
 	struct exr_image *f = &a->film;
 	size_t pixels = (size_t)img->full_width * img->full_height;
-	*f = (struct exr_image){.full_width = img->full_width, .full_height = img->full_height, .width = img->full_width, .height = img->full_height,
+	*f = (struct exr_image){.full_width = img->full_width,
+				.full_height = img->full_height,
+				.width = img->full_width,
+				.height = img->full_height,
 				.channel_count = img->channel_count};
 	memcpy(f->names, img->names, sizeof f->names);
 	a->covered = mem_alloc(pixels, 1);
@@ -127,7 +140,8 @@ static int paste(struct assembly *a, const struct exr_image *img, struct error *
 		size_t to = (size_t)(img->y + y) * f->width + img->x;
 		for (uint32_t x = 0; x < img->width; x++)
 			if (a->covered[to + x])
-				return error_set(e, EINVAL, "another crop has its pixel %u,%u, too", img->x + x, img->y + y);
+				return error_set(e, EINVAL, "another crop has its pixel %u,%u, too", img->x + x,
+						 img->y + y);
 		memset(a->covered + to, 1, img->width);
 		for (uint32_t c = 0; c < f->channel_count; c++)
 			memcpy(f->planes[c] + to, img->planes[c] + (size_t)y * img->width, img->width * sizeof(float));
@@ -143,7 +157,8 @@ static void add_convergence(struct sums *s, const struct exr_image *img)
 	s->disagree |= strcmp(agreement, "disagree") == 0;
 	size_t used = strlen(s->disagreement);
 	if (*text)
-		snprintf(s->disagreement + used, sizeof s->disagreement - used, "%scrop %u,%u,%u,%u: %s", used ? "; " : "", img->x, img->y, img->width, img->height, text);
+		snprintf(s->disagreement + used, sizeof s->disagreement - used, "%scrop %u,%u,%u,%u: %s",
+			 used ? "; " : "", img->x, img->y, img->width, img->height, text);
 }
 
 static void add_header(struct assembly *a, const struct exr_image *img)
@@ -155,7 +170,8 @@ static void add_header(struct assembly *a, const struct exr_image *img)
 		s->in_all[i] &= *digits != 0;
 		s->added[i] += strtoull(digits, NULL, 10);
 	}
-	double mse = number_of(img, "hslt:relMSE"), low = number_of(img, "hslt:relMSELow95"), high = number_of(img, "hslt:relMSEHigh95");
+	double mse = number_of(img, "hslt:relMSE"), low = number_of(img, "hslt:relMSELow95"),
+	       high = number_of(img, "hslt:relMSEHigh95");
 	s->has_mse &= isfinite(mse) && isfinite(low) && isfinite(high);
 	s->mse += mse * pixels;
 	s->below += (mse - low) * pixels * (mse - low) * pixels;
@@ -225,7 +241,8 @@ static int close_up(struct assembly *a, struct error *e)
 	f->height = y1 - y0 + 1;
 	for (uint32_t c = 0; c < f->channel_count; c++)
 		for (uint32_t y = 0; y < f->height; y++)
-			memmove(f->planes[c] + (size_t)y * f->width, f->planes[c] + (size_t)(y0 + y) * width + x0, f->width * sizeof(float));
+			memmove(f->planes[c] + (size_t)y * f->width, f->planes[c] + (size_t)(y0 + y) * width + x0,
+				f->width * sizeof(float));
 	return 0;
 }
 
@@ -239,17 +256,20 @@ static bool among(const char *name, const char *const *list, size_t count)
 
 static void put_number(struct exr_image *f, const char *name, double x)
 {
-	f->attributes[f->attribute_count++] = (struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_DOUBLE, .number = x};
+	f->attributes[f->attribute_count++] =
+		(struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_DOUBLE, .number = x};
 }
 
 static void put_int(struct exr_image *f, const char *name, int x)
 {
-	f->attributes[f->attribute_count++] = (struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_INT, .integer = x};
+	f->attributes[f->attribute_count++] =
+		(struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_INT, .integer = x};
 }
 
 static void put_string(struct exr_image *f, const char *name, const char *text)
 {
-	f->attributes[f->attribute_count++] = (struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_STRING, .string = text};
+	f->attributes[f->attribute_count++] =
+		(struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_STRING, .string = text};
 }
 
 /* Names and texts are borrowed: of the table, of the first crop, of the sums. */
@@ -294,7 +314,8 @@ static int write(struct assembly *a, size_t count, unsigned char **bytes, size_t
 	return rc;
 }
 
-int assemble(const char *const *paths, size_t count, unsigned char **bytes, size_t *size, bool *disagree, struct error *e)
+int assemble(const char *const *paths, size_t count, unsigned char **bytes, size_t *size, bool *disagree,
+	     struct error *e)
 {
 	struct assembly a = {0};
 	int rc = 0;

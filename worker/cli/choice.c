@@ -48,8 +48,9 @@ int choice_make(struct render_arguments *a, const char *folder, const char *name
 
 static json_t *found_to_json(const struct render_found *f)
 {
-	return json_pack("{s:o s:o s:o s:o}", "rareShare", forecast_real(f->rare), "tailIndex", forecast_real(f->tail), "extremeTailIndex",
-			 forecast_real(f->extreme), "secondMomentTimesRays", forecast_real(f->cost));
+	return json_pack("{s:o s:o s:o s:o}", "rareShare", forecast_real(f->rare), "tailIndex", forecast_real(f->tail),
+			 "extremeTailIndex", forecast_real(f->extreme), "secondMomentTimesRays",
+			 forecast_real(f->cost));
 }
 
 json_t *choice_to_json(const struct choice *c)
@@ -57,7 +58,8 @@ json_t *choice_to_json(const struct choice *c)
 	if (!c->made)
 		return json_null();
 	const struct render_choice *f = &c->found;
-	return json_pack("{s:s s:[sss] s:I s:f s:b s:o s:o}", "why", c->text, "considered", "path", "bdpt", RENDER_INTEGRATOR_CHAINS,
-			 "pilotSamples", (json_int_t)f->samples, "pilotSeconds", c->seconds, "pathMissesLight", (int)f->misses, "path",
-			 found_to_json(&f->path), "bdpt", f->settled ? json_null() : found_to_json(&f->bdpt));
+	return json_pack("{s:s s:[sss] s:I s:f s:b s:o s:o}", "why", c->text, "considered", "path", "bdpt",
+			 RENDER_INTEGRATOR_CHAINS, "pilotSamples", (json_int_t)f->samples, "pilotSeconds", c->seconds,
+			 "pathMissesLight", (int)f->misses, "path", found_to_json(&f->path), "bdpt",
+			 f->settled ? json_null() : found_to_json(&f->bdpt));
 }

@@ -20,13 +20,14 @@ static int check(const struct picture *a, const struct picture *b, struct error 
 {
 	const struct exr_image *i = &a->image, *j = &b->image;
 	if (i->width != j->width || i->height != j->height)
-		return error_set(e, EINVAL, "the pictures have %ux%u and %ux%u pixels; --size WxH averages both to one size",
+		return error_set(e, EINVAL,
+				 "the pictures have %ux%u and %ux%u pixels; --size WxH averages both to one size",
 				 i->width, i->height, j->width, j->height);
 	for (int k = 0; k < 3; k++)
 		for (size_t p = 0; p < pixels_of(b); p++)
 			if (!isfinite(b->rgb[k][p]))
-				return error_set(e, EINVAL, "the reference is not finite at pixel %zu,%zu", p % j->width,
-						 p / j->width);
+				return error_set(e, EINVAL, "the reference is not finite at pixel %zu,%zu",
+						 p % j->width, p / j->width);
 	return 0;
 }
 
@@ -53,7 +54,9 @@ static struct pixel_error error_at(const struct picture *a, const struct picture
 	for (int k = 0; k < 3; k++) {
 		double reference = (double)b->rgb[k][i], d = (double)a->rgb[k][i] - reference;
 		r.squared += d * d / 3;
-		r.relative += d == 0 ? 0 : d * d / (reference * reference + least) / 3; /* least is 0 under a black reference */
+		r.relative +=
+			d == 0 ? 0
+			       : d * d / (reference * reference + least) / 3; /* least is 0 under a black reference */
 	}
 	if (!isfinite(r.squared))
 		r = (struct pixel_error){INFINITY, INFINITY};
@@ -90,7 +93,8 @@ static int percentile(const struct picture *b, double share, double *value, stru
 	return 0;
 }
 
-static int errors(const struct picture *a, const struct picture *b, double trim, struct compare_result *r, struct error *e)
+static int errors(const struct picture *a, const struct picture *b, double trim, struct compare_result *r,
+		  struct error *e)
 {
 	size_t n = pixels_of(a);
 	double least = floor_of(b), relative = 0, squared = 0;
@@ -146,7 +150,8 @@ int compare(const struct picture *a, const struct picture *b, double trim, struc
 
 static void heat(double t, unsigned char rgb[3])
 {
-	static const double stops[6][3] = {{0, 0, 0}, {70, 0, 110}, {190, 20, 60}, {245, 110, 10}, {255, 215, 70}, {255, 255, 255}};
+	static const double stops[6][3] = {{0, 0, 0},	   {70, 0, 110},   {190, 20, 60},
+					   {245, 110, 10}, {255, 215, 70}, {255, 255, 255}};
 	double at = t < 0 ? 0 : t > 1 ? 5 : t * 5;
 	size_t i = at < 4 ? (size_t)at : 4;
 	for (int k = 0; k < 3; k++)

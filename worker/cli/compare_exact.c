@@ -25,8 +25,8 @@ static bool same_shape(const struct exr_image *a, const struct exr_image *b, con
 	if (a->width != b->width || a->height != b->height)
 		return differ(to, "%ux%u and %ux%u pixels", a->width, a->height, b->width, b->height);
 	if (a->x != b->x || a->y != b->y || a->full_width != b->full_width || a->full_height != b->full_height)
-		return differ(to, "pixels at %u,%u of %ux%u and at %u,%u of %ux%u", a->x, a->y, a->full_width, a->full_height,
-			      b->x, b->y, b->full_width, b->full_height);
+		return differ(to, "pixels at %u,%u of %ux%u and at %u,%u of %ux%u", a->x, a->y, a->full_width,
+			      a->full_height, b->x, b->y, b->full_width, b->full_height);
 	if (a->channel_count != b->channel_count)
 		return differ(to, "%u and %u channels", a->channel_count, b->channel_count);
 	for (uint32_t c = 0; c < a->channel_count; c++)
@@ -45,9 +45,10 @@ static bool same_plane(const struct exr_image *a, const struct exr_image *b, uin
 		}
 	if (count == 0)
 		return true;
-	return differ(to, "channel %s at pixel %zu,%zu is %a and %a (%.9g and %.9g); %zu of its %zu pixels differ", a->names[c],
-		      first % a->width, first / a->width, (double)a->planes[c][first], (double)b->planes[c][first],
-		      (double)a->planes[c][first], (double)b->planes[c][first], count, pixels);
+	return differ(to, "channel %s at pixel %zu,%zu is %a and %a (%.9g and %.9g); %zu of its %zu pixels differ",
+		      a->names[c], first % a->width, first / a->width, (double)a->planes[c][first],
+		      (double)b->planes[c][first], (double)a->planes[c][first], (double)b->planes[c][first], count,
+		      pixels);
 }
 
 static const struct exr_attribute *find(const struct exr_image *img, const char *name)
@@ -63,7 +64,8 @@ static bool same_attribute(const struct exr_attribute *a, const struct exr_attri
 	if (a->type != b->type)
 		return differ(to, "%s is of two types", a->name);
 	if (a->type == EXR_ATTRIBUTE_STRING)
-		return strcmp(a->string, b->string) == 0 || differ(to, "%s is '%s' and '%s'", a->name, a->string, b->string);
+		return strcmp(a->string, b->string) == 0 ||
+		       differ(to, "%s is '%s' and '%s'", a->name, a->string, b->string);
 	if (a->type == EXR_ATTRIBUTE_DOUBLE)
 		return memcmp(&a->number, &b->number, sizeof a->number) == 0 ||
 		       differ(to, "%s is %.17g and %.17g", a->name, a->number, b->number);

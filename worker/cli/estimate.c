@@ -16,7 +16,7 @@ static const double usual[] = {0.1, 0.05, 0.02, 0.01};
 struct row {
 	double target;
 	const struct forecast_look *reached; /* by the pilot; NULL: not */
-	struct forecast_cost cost;           /* of the render, with its bootstrap */
+	struct forecast_cost cost;	     /* of the render, with its bootstrap */
 };
 
 static double bootstrap_ratio(const struct estimate *s)
@@ -57,8 +57,10 @@ static int check(const struct estimate *s, struct error *e)
 {
 	if (s->looks->count >= LOOKS_LEAST)
 		return 0;
-	return error_set(e, EAGAIN, "the pilot has seen its error %u times only, %d are needed: give it more time (--pilot SECONDS)",
-			 s->looks->count, LOOKS_LEAST);
+	return error_set(
+		e, EAGAIN,
+		"the pilot has seen its error %u times only, %d are needed: give it more time (--pilot SECONDS)",
+		s->looks->count, LOOKS_LEAST);
 }
 
 /* ---- the table */
@@ -82,8 +84,8 @@ static void print_table(const struct estimate *s, FILE *f)
 	forecast_error(s->looks, &now);
 	progress_duration(s->seconds, text, sizeof text);
 	progress_duration(s->cpu_seconds, cpu, sizeof cpu);
-	fprintf(f, "%s: a pilot of %s (%s of processors) came to an error of %.3g %% (%.3g - %.3g %%)\n", s->scene, text, cpu,
-		100 * now.middle, 100 * now.low, 100 * now.high);
+	fprintf(f, "%s: a pilot of %s (%s of processors) came to an error of %.3g %% (%.3g - %.3g %%)\n", s->scene,
+		text, cpu, 100 * now.middle, 100 * now.low, 100 * now.high);
 	fprintf(f, "each with its 90 %% interval; wall clock on %s\n", s->where);
 	fprintf(f, "%-8s  %-31s  %-31s\n", "error", "time of processors", "wall clock");
 	for (size_t i = 0; i < count; i++) {
@@ -105,8 +107,8 @@ static json_t *reached_json(const struct estimate *s, const struct forecast_look
 {
 	if (!l)
 		return json_null();
-	return json_pack("{s:f s:f s:f}", "mutations", l->work, "cpuSeconds", l->cpu_seconds + s->bootstrap_cpu, "wallSeconds",
-			 l->seconds + s->bootstrap_seconds);
+	return json_pack("{s:f s:f s:f}", "mutations", l->work, "cpuSeconds", l->cpu_seconds + s->bootstrap_cpu,
+			 "wallSeconds", l->seconds + s->bootstrap_seconds);
 }
 
 static json_t *targets_json(const struct estimate *s)
@@ -129,11 +131,12 @@ static int print_json(const struct estimate *s, FILE *f, struct error *e)
 	struct forecast_range now;
 	plan_describe(s->plan, plan, sizeof plan);
 	forecast_error(s->looks, &now);
-	json_t *o = json_pack("{s:i s:s s:s s:s s:s s:o s:{s:f s:f s:f s:f s:o} s:o}", "schema", 1, "type", "estimate", "scene",
-			      s->scene, "plan", plan, "where", s->where, "errorNow", forecast_range_to_json(&now), "pilot", "wallSeconds",
-			      s->seconds, "cpuSeconds", s->cpu_seconds, "bootstrapCpuSeconds", s->bootstrap_cpu,
-			      "bootstrapWallSeconds", s->bootstrap_seconds, "looks", forecast_looks_to_json(s->looks), "targets",
-			      targets_json(s));
+	json_t *o =
+		json_pack("{s:i s:s s:s s:s s:s s:o s:{s:f s:f s:f s:f s:o} s:o}", "schema", 1, "type", "estimate",
+			  "scene", s->scene, "plan", plan, "where", s->where, "errorNow", forecast_range_to_json(&now),
+			  "pilot", "wallSeconds", s->seconds, "cpuSeconds", s->cpu_seconds, "bootstrapCpuSeconds",
+			  s->bootstrap_cpu, "bootstrapWallSeconds", s->bootstrap_seconds, "looks",
+			  forecast_looks_to_json(s->looks), "targets", targets_json(s));
 	if (!o)
 		return error_set(e, ENOMEM, "no memory for the estimate");
 	json_dumpf(o, f, JSON_COMPACT);
@@ -205,22 +208,42 @@ static int draw(const struct estimate *s, const char *path, struct error *e)
 	size_t count = rows_of(s, row), series = 3;
 	double most = 0;
 	struct plot_series list[3 + TARGETS_MOST] = {
-		{.name = "expected (90 %)", .style = PLOT_BAND, .count = BAND_POINTS, .x = d.band_x, .low = d.band_low, .high = d.band_high},
+		{.name = "expected (90 %)",
+		 .style = PLOT_BAND,
+		 .count = BAND_POINTS,
+		 .x = d.band_x,
+		 .low = d.band_low,
+		 .high = d.band_high},
 		{.name = "", .style = PLOT_LINE, .count = BAND_POINTS, .x = d.band_x, .y = d.band_y},
-		{.name = "pilot", .style = PLOT_POINTS, .count = s->looks->count, .x = d.x, .y = d.y, .low = d.low, .high = d.high},
+		{.name = "pilot",
+		 .style = PLOT_POINTS,
+		 .count = s->looks->count,
+		 .x = d.x,
+		 .y = d.y,
+		 .low = d.low,
+		 .high = d.high},
 	};
 	for (size_t i = 0; i < count; i++) {
 		if (!isfinite(row[i].cost.cpu_seconds.high))
 			continue;
 		most = fmax(most, row[i].cost.work.high);
 		draw_goal(&row[i], &d, i);
-		list[series++] = (struct plot_series){.name = i == 0 ? "stops at its target (90 %)" : "", .style = PLOT_LINE, .count = 3,
-						      .x = d.goal_x[i], .y = d.goal_y[i], .labels = d.label_at[i]};
+		list[series++] = (struct plot_series){.name = i == 0 ? "stops at its target (90 %)" : "",
+						      .style = PLOT_LINE,
+						      .count = 3,
+						      .x = d.goal_x[i],
+						      .y = d.goal_y[i],
+						      .labels = d.label_at[i]};
 	}
 	draw_looks(s, &d);
 	draw_band(s, &d, most);
-	struct plot p = {.title = s->scene, .x_label = "seconds of processors", .y_label = "relative error, %", .log_x = true,
-			 .log_y = true, .series_count = series, .series = list};
+	struct plot p = {.title = s->scene,
+			 .x_label = "seconds of processors",
+			 .y_label = "relative error, %",
+			 .log_x = true,
+			 .log_y = true,
+			 .series_count = series,
+			 .series = list};
 	return plot_write(&p, path, e);
 }
 

@@ -9,13 +9,14 @@
 #include "common/film/forecast.h"
 
 struct estimate {
-	const char *scene, *where;  /* "this machine, 2 threads" */
-	const struct plan *plan;    /* of the render that is spoken of */
+	const char *scene, *where; /* "this machine, 2 threads" */
+	const struct plan *plan;   /* of the render that is spoken of */
 	const struct plan *pilot;
 	const struct forecast_history *looks; /* of the pilot */
-	double cpu_seconds, seconds; /* of the pilot, bootstrap and all */
-	double bootstrap_cpu, bootstrap_seconds; /* of the pilot's bootstrap; the render's is longer by the ratio of samples */
-	double target;              /* asked for beside the usual ones; 0: none */
+	double cpu_seconds, seconds;	      /* of the pilot, bootstrap and all */
+	double bootstrap_cpu,
+		bootstrap_seconds; /* of the pilot's bootstrap; the render's is longer by the ratio of samples */
+	double target;		   /* asked for beside the usual ones; 0: none */
 };
 
 /* Table or JSON to stdout, and a plot where a path is given. -EAGAIN: the pilot has not seen enough to say anything. */

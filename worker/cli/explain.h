@@ -6,8 +6,8 @@
 
 #include "worker/cli/options.h"
 
-/* Reads the scene at `path` and prints the list on stdout, as one JSON object where asked. *usage: what went wrong was asked
- * for. */
+/* Reads the scene at `path` and prints the list on stdout, as one JSON object where asked. *usage: what went wrong was
+ * asked for. */
 int explain(const char *path, struct render_arguments *a, bool json, bool *usage, struct error *e);
 
 #endif

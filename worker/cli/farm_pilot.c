@@ -30,7 +30,8 @@ static int run(struct farm_pilot *p, const char *what, const struct plan_request
 	if (!rc)
 		rc = submit_wait(p->client, &job, &p->end, e);
 	if (!rc && p->end.exit_code == 3)
-		rc = error_set(e, ECANCELED, "the %s, job j%llu, ended without an image: %s", what, (unsigned long long)job.job, p->end.why);
+		rc = error_set(e, ECANCELED, "the %s, job j%llu, ended without an image: %s", what,
+			       (unsigned long long)job.job, p->end.why);
 	return rc;
 }
 

@@ -16,7 +16,7 @@ struct farm_pilot {
 	double seconds;
 	/* out */
 	struct plan render, plan; /* the one spoken of, the pilot's */
-	struct submit_end end;    /* of the pilot */
+	struct submit_end end;	  /* of the pilot */
 };
 
 /* -ECANCELED: a job failed. */

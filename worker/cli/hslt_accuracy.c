@@ -28,19 +28,32 @@ static const char doc[] =
 	"Interrupted, it reports what there is once each setting had a round, and ends with 1.\n"
 	"Exit codes: 0 done, 1 failed, 2 usage.";
 
-enum { OPTION_THREADS = 256, OPTION_QUIET, OPTION_CSV, OPTION_BUDGET, OPTION_SECONDS, OPTION_ROUNDS, OPTION_SETTINGS, OPTION_REFERENCE };
+enum {
+	OPTION_THREADS = 256,
+	OPTION_QUIET,
+	OPTION_CSV,
+	OPTION_BUDGET,
+	OPTION_SECONDS,
+	OPTION_ROUNDS,
+	OPTION_SETTINGS,
+	OPTION_REFERENCE
+};
 
 static const struct argp_option options[] = {
 	{"output", 'o', "FILE", 0, "The report (HTML)", 0},
 	{"csv", OPTION_CSV, "FILE", 0, "The figures as comma-separated values too", 0},
-	{"budget", OPTION_BUDGET, "MINUTES", 0, "How long it may take in all (10), shared equally; more makes the intervals narrower", 0},
+	{"budget", OPTION_BUDGET, "MINUTES", 0,
+	 "How long it may take in all (10), shared equally; more makes the intervals narrower", 0},
 	{"seconds", OPTION_SECONDS, "S", 0, "CPU seconds of each setting, in place of a budget", 0},
 	{"rounds", OPTION_ROUNDS, "N", 0,
-	 "Rounds of each setting, in place of a budget: with --epoch, --chains and --bootstrap all but the times repeats", 0},
+	 "Rounds of each setting, in place of a budget: with --epoch, --chains and --bootstrap all but the times repeats",
+	 0},
 	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors)", 0},
 	{"knobs", OPTION_SETTINGS, "LIST", 0,
-	 "Only these: settings of --set (its help names them), max-depth, independent, mixture, preset; with commas between", 0},
-	{"reference", OPTION_REFERENCE, "FILE", 0, "An image (OpenEXR) to measure the bias against, in place of a careful render", 0},
+	 "Only these: settings of --set (its help names them), max-depth, independent, mixture, preset; with commas between",
+	 0},
+	{"reference", OPTION_REFERENCE, "FILE", 0,
+	 "An image (OpenEXR) to measure the bias against, in place of a careful render", 0},
 	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
 	{0},
 };
@@ -70,7 +83,8 @@ static void check(const struct arguments *a, struct argp_state *state)
 	if (!a->scene || !a->output)
 		argp_error(state, "a scene and -o FILE are needed");
 	if (p->spp || p->mutations || p->seconds > 0 || p->target_error > 0)
-		argp_error(state, "--budget or --seconds say how long, not --spp, --mutations N, --time or --target-error");
+		argp_error(state,
+			   "--budget or --seconds say how long, not --spp, --mutations N, --time or --target-error");
 }
 
 static error_t parse(int key, char *arg, struct argp_state *state)
@@ -184,7 +198,8 @@ static int design(struct session *s, struct error *e)
 	s->usage = rc == -EINVAL;
 	if (rc || s->a->quiet)
 		return rc;
-	fprintf(stderr, "%zu settings: the default, a reference and %zu knobs\n", s->design.count, s->design.sweep_count);
+	fprintf(stderr, "%zu settings: the default, a reference and %zu knobs\n", s->design.count,
+		s->design.sweep_count);
 	for (size_t i = 0; i < s->design.left_out_count; i++)
 		fprintf(stderr, "left out: %s (%s)\n", s->design.left_out[i].parameter, s->design.left_out[i].why);
 	return 0;
@@ -193,9 +208,18 @@ static int design(struct session *s, struct error *e)
 static int render(struct session *s, struct error *e)
 {
 	const struct arguments *a = s->a;
-	s->run = (struct accuracy_run){.design = &s->design, .request = a->render.plan, .scene = &s->scene, .assets = &s->assets,
-				       .render = &a->render.render, .threads = a->threads, .seconds = 60 * a->budget,
-				       .setting_seconds = a->seconds, .setting_rounds = a->rounds, .stop = &interrupted, .progress = a->quiet ? NULL : show, .user = s};
+	s->run = (struct accuracy_run){.design = &s->design,
+				       .request = a->render.plan,
+				       .scene = &s->scene,
+				       .assets = &s->assets,
+				       .render = &a->render.render,
+				       .threads = a->threads,
+				       .seconds = 60 * a->budget,
+				       .setting_seconds = a->seconds,
+				       .setting_rounds = a->rounds,
+				       .stop = &interrupted,
+				       .progress = a->quiet ? NULL : show,
+				       .user = s};
 	if (!a->quiet)
 		progress_start(&s->progress);
 	int rc = accuracy_render(&s->run, e);
@@ -206,8 +230,12 @@ static int render(struct session *s, struct error *e)
 
 static int report(struct session *s, struct error *e)
 {
-	struct accuracy_context x = {.scene = s->name, .reference = s->a->reference, .summary = &s->summary, .design = &s->design,
-				     .run = &s->run, .judgement = &s->judgement};
+	struct accuracy_context x = {.scene = s->name,
+				     .reference = s->a->reference,
+				     .summary = &s->summary,
+				     .design = &s->design,
+				     .run = &s->run,
+				     .judgement = &s->judgement};
 	int rc = accuracy_judge(&s->run, s->a->reference ? &s->reference : NULL, &s->judgement, e);
 	if (!rc && s->a->csv)
 		rc = accuracy_csv(&x, s->a->csv, e);
@@ -221,9 +249,10 @@ static void say(const struct session *s)
 	const struct accuracy_figures *f = s->judgement.figures, *d = &f[ACCURACY_DEFAULT];
 	char name[96];
 	if (s->judgement.thin)
-		fprintf(stderr, "too little was rendered: the figures may be chance (more --budget, smaller --size or fewer --knobs)\n");
-	fprintf(stderr, "default: relative error %.2f %% in %.3g s of CPU, bias at most %.2g %%", 100 * d->equal_time.value,
-		s->judgement.at_cpu_seconds, 100 * d->bias_bound);
+		fprintf(stderr,
+			"too little was rendered: the figures may be chance (more --budget, smaller --size or fewer --knobs)\n");
+	fprintf(stderr, "default: relative error %.2f %% in %.3g s of CPU, bias at most %.2g %%",
+		100 * d->equal_time.value, s->judgement.at_cpu_seconds, 100 * d->bias_bound);
 	if (d->beaten_by == ACCURACY_DEFAULT) {
 		fprintf(stderr, "; on the front\n");
 		return;

@@ -73,6 +73,7 @@ int main(int argc, char **argv)
 	if (rc)
 		fprintf(stderr, "hslt-assemble: %s\n", e.text);
 	else if (disagree)
-		fprintf(stderr, "hslt-assemble: chains of some crops disagree: hslt:disagreement in the header says where\n");
+		fprintf(stderr,
+			"hslt-assemble: chains of some crops disagree: hslt:disagreement in the header says where\n");
 	return rc ? 1 : disagree ? 5 : 0;
 }

@@ -77,8 +77,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		a->trim = number(state, "--trim", arg, 1);
 		return 0;
 	case OPTION_SIZE:
-		if (*arg < '0' || *arg > '9' || sscanf(arg, "%ux%u%c", &a->width, &a->height, &rest) != 2 || !a->width ||
-		    !a->height)
+		if (*arg < '0' || *arg > '9' || sscanf(arg, "%ux%u%c", &a->width, &a->height, &rest) != 2 ||
+		    !a->width || !a->height)
 			argp_error(state, "--size takes WxH, not '%s'", arg);
 		return 0;
 	case OPTION_HEATMAP:
@@ -130,12 +130,14 @@ static json_t *three(const double x[3])
 static void print_figures(const struct arguments *a, const struct compare_result *r)
 {
 	if (a->json) {
-		print_json(json_pack("{s:i s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:I s:I s:I s:s}", "schema", 1, "a",
-				     text(a->path[0]), "b", text(a->path[1]), "relMSE", real(r->rel_mse), "relativeError", real(r->relative_error), "rmse",
-				     real(r->rmse), "psnr", real(r->psnr), "peak", real(r->peak), "meanA", three(r->mean_a),
-				     "meanB", three(r->mean_b), "meanRatio", three(r->ratio), "luminanceRatio",
+		print_json(json_pack("{s:i s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:o s:I s:I s:I s:s}", "schema", 1,
+				     "a", text(a->path[0]), "b", text(a->path[1]), "relMSE", real(r->rel_mse),
+				     "relativeError", real(r->relative_error), "rmse", real(r->rmse), "psnr",
+				     real(r->psnr), "peak", real(r->peak), "meanA", three(r->mean_a), "meanB",
+				     three(r->mean_b), "meanRatio", three(r->ratio), "luminanceRatio",
 				     real(r->luminance_ratio), "pixels", (json_int_t)r->pixels, "leftOut",
-				     (json_int_t)r->left_out, "notFinite", (json_int_t)r->not_finite, "relMSEDefinition", REL_MSE_DEFINITION));
+				     (json_int_t)r->left_out, "notFinite", (json_int_t)r->not_finite,
+				     "relMSEDefinition", REL_MSE_DEFINITION));
 		return;
 	}
 	printf("relMSE          %.6g (" REL_MSE_DEFINITION ")\n", r->rel_mse);
@@ -179,7 +181,8 @@ static int run_figures(const struct arguments *a, struct picture *p, int *code, 
 	struct compare_result r;
 	const struct exr_image *i = &p[0].image, *j = &p[1].image;
 	if (i->x != j->x || i->y != j->y)
-		fprintf(stderr, "hslt-compare: the pixels begin at %u,%u and %u,%u of their films\n", i->x, i->y, j->x, j->y);
+		fprintf(stderr, "hslt-compare: the pixels begin at %u,%u and %u,%u of their films\n", i->x, i->y, j->x,
+			j->y);
 	int rc = 0;
 	for (int k = 0; rc == 0 && a->width && k < 2; k++)
 		if ((rc = picture_shrink(&p[k], a->width, a->height, e)) != 0)

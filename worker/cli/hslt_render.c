@@ -40,17 +40,29 @@ static const char doc[] =
 	"Exit codes: 0 done, 1 failed, 2 usage, 4 a bound came before the target error, 5 chains disagree (the image is there, and its "
 	"note says where).";
 
-enum { OPTION_THREADS = 256, OPTION_STATS, OPTION_QUIET, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_JSON, OPTION_EXPLAIN };
+enum {
+	OPTION_THREADS = 256,
+	OPTION_STATS,
+	OPTION_QUIET,
+	OPTION_ESTIMATE,
+	OPTION_PILOT,
+	OPTION_PLOT,
+	OPTION_JSON,
+	OPTION_EXPLAIN
+};
 
 static const struct argp_option options[] = {
 	{"output", 'o', "FILE", 0, "The image (OpenEXR)", 0},
 	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors); does not change the bits", 0},
-	{"stats", OPTION_STATS, "FILE", 0, "Write plan, times, counters, strategies and effects as JSON, and show tables of the strategies and of the classes of paths", 0},
+	{"stats", OPTION_STATS, "FILE", 0,
+	 "Write plan, times, counters, strategies and effects as JSON, and show tables of the strategies and of the classes of paths",
+	 0},
 	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
 	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
 	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
 	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
-	{"explain", OPTION_EXPLAIN, NULL, 0, "Only say what the scene calls for, why, and what leaving the rest out saves", 0},
+	{"explain", OPTION_EXPLAIN, NULL, 0,
+	 "Only say what the scene calls for, why, and what leaving the rest out saves", 0},
 	{"json", OPTION_JSON, NULL, 0, "Print the estimate, or what --explain says, as one JSON object", 0},
 	{0},
 };
@@ -151,7 +163,8 @@ static int load(struct session *s, struct error *e)
 	if (rc)
 		return rc;
 	struct asset_source assets = asset_folder(s->folder);
-	rc = render_scene_read(&scene, &assets, s->name, s->a->render.defines, s->a->render.define_count, &s->a->render.render, e);
+	rc = render_scene_read(&scene, &assets, s->name, s->a->render.defines, s->a->render.define_count,
+			       &s->a->render.render, e);
 	if (rc)
 		return rc;
 	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)
@@ -227,8 +240,8 @@ static void expect(struct session *s, const struct local_round *r)
 	progress_duration(stop.seconds.low - r->seconds, low, sizeof low);
 	progress_duration(stop.seconds.high - r->seconds, high, sizeof high);
 	progress_duration(half.seconds.middle, more, sizeof more);
-	snprintf(s->forecast, sizeof s->forecast, " (%s - %s to the target), error %.3g %%, half of it in %s", low, high,
-		 100 * error.middle, more);
+	snprintf(s->forecast, sizeof s->forecast, " (%s - %s to the target), error %.3g %%, half of it in %s", low,
+		 high, 100 * error.middle, more);
 }
 
 static void look(void *user, const struct local_round *r)
@@ -240,8 +253,13 @@ static void look(void *user, const struct local_round *r)
 
 static int render(struct session *s, struct error *e)
 {
-	s->run = (struct local_run){.world = s->world, .plan = &s->plan, .threads = s->a->threads, .stop = &interrupted,
-				    .progress = s->a->quiet ? NULL : show, .round = look, .user = s};
+	s->run = (struct local_run){.world = s->world,
+				    .plan = &s->plan,
+				    .threads = s->a->threads,
+				    .stop = &interrupted,
+				    .progress = s->a->quiet ? NULL : show,
+				    .round = look,
+				    .user = s};
 	if (!s->a->quiet)
 		progress_start(&s->progress);
 	int rc = local_run(&s->run, e);
@@ -261,10 +279,15 @@ static int write_image(const struct session *s, struct error *e)
 {
 	struct header_effect effects[RENDER_EFFECTS_MAX];
 	for (size_t i = 0; i < s->summary.line_count; i++)
-		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].on, s->summary.lines[i].forced,
-						      s->summary.lines[i].why, s->summary.lines[i].saves};
-	struct header_extra x = {.scene = s->name, .effect_count = s->summary.line_count, .effects = effects,
-				 .wall_seconds = s->run.seconds, .cpu_seconds = s->run.cpu_seconds, .workers = s->a->threads,
+		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].on,
+						    s->summary.lines[i].forced, s->summary.lines[i].why,
+						    s->summary.lines[i].saves};
+	struct header_extra x = {.scene = s->name,
+				 .effect_count = s->summary.line_count,
+				 .effects = effects,
+				 .wall_seconds = s->run.seconds,
+				 .cpu_seconds = s->run.cpu_seconds,
+				 .workers = s->a->threads,
 				 .end = merge_end_name(s->run.end, s->run.lit.black)};
 	unsigned char *bytes;
 	size_t size;
@@ -373,8 +396,9 @@ static int run(struct session *s, struct error *e)
 		rc = write_image(s, e);
 	if (!rc && s->a->stats)
 		rc = stats_write(s->a->stats,
-				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->agreement, s->build_seconds, &s->looks,
-						 &s->choice}, e);
+				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->agreement,
+						 s->build_seconds, &s->looks, &s->choice},
+				 e);
 	if (!rc && !s->a->quiet)
 		say(s);
 	else if (!rc && s->image.rel_mse_doubt)

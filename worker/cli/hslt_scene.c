@@ -25,7 +25,8 @@ static const char doc[] =
 
 static const struct argp_option options[] = {
 	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 0},
-	{"lenient", 'l', NULL, 0, "As --lenient of hslt-render: what is not supported is left out or replaced, and is no problem but a note", 0},
+	{"lenient", 'l', NULL, 0,
+	 "As --lenient of hslt-render: what is not supported is left out or replaced, and is no problem but a note", 0},
 	{"json", 'j', NULL, 0, "show: one JSON object", 0},
 	{0},
 };
@@ -86,8 +87,10 @@ int main(int argc, char **argv)
 	bool bad = false;
 	output_check_at_exit();
 	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "check|show SCENE.xml", doc, NULL, NULL, NULL}, argc, argv, 0, NULL, &a);
-	int rc = strcmp(a.verb, "check") == 0 ? scene_report_check(&a.request, &bad, &e) : scene_report_show(&a.request, a.json, &e);
+	argp_parse(&(struct argp){options, parse, "check|show SCENE.xml", doc, NULL, NULL, NULL}, argc, argv, 0, NULL,
+		   &a);
+	int rc = strcmp(a.verb, "check") == 0 ? scene_report_check(&a.request, &bad, &e)
+					      : scene_report_show(&a.request, a.json, &e);
 	if (rc)
 		fprintf(stderr, "hslt-scene: %s\n", e.text);
 	return rc || bad ? 1 : 0;

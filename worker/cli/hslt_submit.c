@@ -38,7 +38,20 @@ static const char doc[] =
 	"there, and its note says where), 6 refused, 75 "
 	"coordinator not reachable.";
 
-enum { OPTION_PRIORITY = 256, OPTION_NAME, OPTION_WAIT, OPTION_JSON, OPTION_INSECURE, OPTION_MIXED, OPTION_VERIFY, OPTION_ESTIMATE, OPTION_PILOT, OPTION_PLOT, OPTION_TLS, OPTION_PATIENCE };
+enum {
+	OPTION_PRIORITY = 256,
+	OPTION_NAME,
+	OPTION_WAIT,
+	OPTION_JSON,
+	OPTION_INSECURE,
+	OPTION_MIXED,
+	OPTION_VERIFY,
+	OPTION_ESTIMATE,
+	OPTION_PILOT,
+	OPTION_PLOT,
+	OPTION_TLS,
+	OPTION_PATIENCE
+};
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
@@ -46,13 +59,15 @@ static const struct argp_option options[] = {
 	{"priority", OPTION_PRIORITY, "P", 0, "-100 to 100, higher first (0)", 0},
 	{"name", OPTION_NAME, "NAME", 0, "How the job is shown (the scene's file name)", 0},
 	{"wait", OPTION_WAIT, NULL, 0, "Show progress and fetch the image", 0},
-	{"patience", OPTION_PATIENCE, "SECONDS", 0, "With --wait: how long to call a coordinator that is gone (600)", 0},
+	{"patience", OPTION_PATIENCE, "SECONDS", 0, "With --wait: how long to call a coordinator that is gone (600)",
+	 0},
 	{"json", OPTION_JSON, NULL, 0, "Print one JSON object instead of the id, or of the estimate's table", 0},
 	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
 	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
 	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
 	{"mixed", OPTION_MIXED, NULL, 0, "Allow workers of any numeric fingerprint: gives up equal bits", 0},
-	{"verify", OPTION_VERIFY, "P", 0, "Share of the epochs, or percent, that two workers must compute alike before they count (0)", 0},
+	{"verify", OPTION_VERIFY, "P", 0,
+	 "Share of the epochs, or percent, that two workers must compute alike before they count (0)", 0},
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{0},
@@ -65,7 +80,7 @@ struct arguments {
 	struct submit_request request;
 	struct render_arguments render;
 	const char *plot;
-	double pilot; /* s; 0: not given */
+	double pilot;	 /* s; 0: not given */
 	double patience; /* s */
 	bool wait, json, insecure, estimate;
 };
@@ -157,8 +172,8 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 	char id[32];
 	snprintf(id, sizeof id, "j%llu", (unsigned long long)job);
 	if (a->json) {
-		json_t *o = json_pack("{s:i s:s s:s s:s s:s s:s}", "schema", 1, "id", id, "name", a->request.name, "output", a->output,
-				      "plan", plan, "state", state);
+		json_t *o = json_pack("{s:i s:s s:s s:s s:s s:s}", "schema", 1, "id", id, "name", a->request.name,
+				      "output", a->output, "plan", plan, "state", state);
 		json_dumpf(o, stdout, JSON_COMPACT);
 		putchar('\n');
 		json_decref(o);
@@ -185,7 +200,8 @@ static int run(struct arguments *a, struct client **cl, const struct scene_bundl
 		return 0;
 	rc = reconnect_job(cl, &o, &job, a->output, &end, e);
 	if (!rc && !end.has_result)
-		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job.job, end.why);
+		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job.job,
+			end.why);
 	if (!rc && *end.note)
 		fprintf(stderr, "hslt-submit: note: %s\n", end.note);
 	if (!rc && a->json)
@@ -196,7 +212,8 @@ static int run(struct arguments *a, struct client **cl, const struct scene_bundl
 
 static int estimate(const struct arguments *a, struct client *cl, const struct scene_bundle *b, struct error *e)
 {
-	struct farm_pilot p = {.client = cl, .request = &a->request, .bundle = b, .seconds = a->pilot > 0 ? a->pilot : PILOT_SECONDS};
+	struct farm_pilot p = {
+		.client = cl, .request = &a->request, .bundle = b, .seconds = a->pilot > 0 ? a->pilot : PILOT_SECONDS};
 	int rc = farm_pilot(&p, e);
 	if (rc)
 		return rc;
@@ -207,7 +224,8 @@ static int estimate(const struct arguments *a, struct client *cl, const struct s
 			     .pilot = &p.plan,
 			     .looks = looks,
 			     .cpu_seconds = p.end.cpu_seconds,
-			     .seconds = p.end.bootstrap_seconds + (looks->count ? looks->looks[looks->count - 1].seconds : 0),
+			     .seconds = p.end.bootstrap_seconds +
+					(looks->count ? looks->looks[looks->count - 1].seconds : 0),
 			     .bootstrap_cpu = p.end.bootstrap_cpu_seconds,
 			     .bootstrap_seconds = p.end.bootstrap_seconds,
 			     .target = a->render.plan.target_error};
@@ -227,7 +245,8 @@ static void measure(struct arguments *a, const struct scene_bundle *b)
 		return;
 	}
 	a->render.plan.speed = speed;
-	fprintf(stderr, "pilot: %.3g %s a second of one thread here\n", speed, plan.kind == PLAN_CHAINS ? "mutations" : "samples");
+	fprintf(stderr, "pilot: %.3g %s a second of one thread here\n", speed,
+		plan.kind == PLAN_CHAINS ? "mutations" : "samples");
 }
 
 int main(int argc, char **argv)
@@ -254,7 +273,8 @@ int main(int argc, char **argv)
 	}
 	for (size_t i = 0; i < b.note_count; i++)
 		fprintf(stderr, "%s\n", b.notes[i]);
-	rc = a.estimate ? pilot_plan_from_scene(&a.render, &b.summary, &e) : render_plan_from_scene(&a.render, &b.summary, &e);
+	rc = a.estimate ? pilot_plan_from_scene(&a.render, &b.summary, &e)
+			: render_plan_from_scene(&a.render, &b.summary, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		scene_bundle_fini(&b);

@@ -68,8 +68,8 @@ static int run(const struct arguments *a, struct error *e)
 	if (bytes) {
 		struct tonemap_counts n = tonemap(p.rgb, pixels, a->stops, bytes);
 		if (n.nan || n.infinite)
-			fprintf(stderr, "hslt-tonemap: %s: %zu values are not numbers, %zu are infinite\n", a->in, n.nan,
-				n.infinite);
+			fprintf(stderr, "hslt-tonemap: %s: %zu values are not numbers, %zu are infinite\n", a->in,
+				n.nan, n.infinite);
 		rc = picture_write_png(a->out, bytes, p.image.width, p.image.height, e);
 	} else {
 		rc = error_set(e, ENOMEM, "%s: no memory for %zu pixels", a->in, pixels);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * SIGINT and SIGTERM as a flag that renders look at: the first asks for an end that leaves what is complete, the second one
- * kills. One a process.
+ * SIGINT and SIGTERM as a flag that renders look at: the first asks for an end that leaves what is complete, the second
+ * one kills. One a process.
  */
 #ifndef WORKER_CLI_INTERRUPT_H
 #define WORKER_CLI_INTERRUPT_H

@@ -11,12 +11,12 @@
 struct thread_pool {
 	struct local_run *run;
 	struct bootstrap *bootstrap;
-	uint64_t *seeds;              /* [groups][chains / groups] */
-	struct chain_state **states;  /* [groups x parts][chains of a lease] after the epoch before */
+	uint64_t *seeds;	     /* [groups][chains / groups] */
+	struct chain_state **states; /* [groups x parts][chains of a lease] after the epoch before */
 	enum lease_kind kind;
 	uint64_t epoch;
-	uint32_t next, leases;        /* of the phase */
-	uint64_t finished;            /* of the whole job, for progress */
+	uint32_t next, leases; /* of the phase */
+	uint64_t finished;     /* of the whole job, for progress */
 	struct timespec begin;
 	pthread_mutex_t lock;
 	int rc;
@@ -60,7 +60,8 @@ static void show(struct thread_pool *c)
 	if (!r->progress)
 		return;
 	uint64_t per_round = (uint64_t)r->plan->groups * r->plan->parts;
-	struct local_progress p = {.state = c->kind == LEASE_BOOTSTRAP ? "bootstrap" : "running", .done = c->finished,
+	struct local_progress p = {.state = c->kind == LEASE_BOOTSTRAP ? "bootstrap" : "running",
+				   .done = c->finished,
 				   .seconds = since(&c->begin)};
 	p.total = r->plan->rounds == UINT64_MAX ? UINT64_MAX : (r->plan->rounds + 1) * per_round;
 	r->progress(r->user, &p);
@@ -91,7 +92,8 @@ static int lease(struct thread_pool *c, uint32_t index)
 	struct lease_input in = {.chain_count = chains_of(p, k.part)};
 	if (p->kind == PLAN_CHAINS && c->kind == LEASE_RENDER) {
 		if (c->epoch == 0)
-			in.seeds = c->seeds + (size_t)k.group * (p->chains / p->groups) + plan_chain_range(p, k.part).begin;
+			in.seeds = c->seeds + (size_t)k.group * (p->chains / p->groups) +
+				   plan_chain_range(p, k.part).begin;
 		else
 			in.states = c->states[index];
 	}
@@ -157,7 +159,8 @@ static int begin_rounds(struct thread_pool *c)
 	struct local_run *r = c->run;
 	const struct plan *p = r->plan;
 	bootstrap_merge(c->bootstrap, &r->lit);
-	int rc = canvas_new(&r->canvas, p, canvas_grid_exponent(p, r->lit.b_pooled, world_brightest(r->world)), NULL, &c->error);
+	int rc = canvas_new(&r->canvas, p, canvas_grid_exponent(p, r->lit.b_pooled, world_brightest(r->world)), NULL,
+			    &c->error);
 	if (rc)
 		return rc;
 	bootstrap_to_canvas(c->bootstrap, r->canvas);
@@ -232,8 +235,8 @@ int local_start(struct local_run *r, struct local_job **out, struct error *e)
 	clock_gettime(CLOCK_MONOTONIC, &c->begin);
 	c->seeds = mem_alloc(p->chains, sizeof *c->seeds);
 	c->states = mem_alloc((size_t)p->groups * p->parts, sizeof *c->states);
-	int rc = !c->seeds || !c->states ? error_set(&c->error, ENOMEM, "no memory for the chains") :
-					   bootstrap_new(&c->bootstrap, p, &c->error);
+	int rc = !c->seeds || !c->states ? error_set(&c->error, ENOMEM, "no memory for the chains")
+					 : bootstrap_new(&c->bootstrap, p, &c->error);
 	if (!rc)
 		rc = run_bootstrap(c);
 	r->seconds = since(&c->begin);

@@ -29,8 +29,13 @@ static int run(struct local_pilot *p, const struct plan_request *request, struct
 	if (rc)
 		return rc;
 	p->looks.count = 0;
-	*r = (struct local_run){.world = p->world, .plan = &p->plan, .threads = p->threads, .stop = p->stop, .progress = pass_on,
-				.round = look, .user = p};
+	*r = (struct local_run){.world = p->world,
+				.plan = &p->plan,
+				.threads = p->threads,
+				.stop = p->stop,
+				.progress = pass_on,
+				.round = look,
+				.user = p};
 	rc = local_run(r, e);
 	bool none = !r->canvas, black = r->lit.black;
 	canvas_free(r->canvas);

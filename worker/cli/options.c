@@ -13,15 +13,32 @@
 #include <unistd.h>
 
 enum {
-	OPTION_SPP = 1000, OPTION_MUTATIONS, OPTION_TIME, OPTION_TARGET, OPTION_SIZE, OPTION_CROP, OPTION_SEED, OPTION_MIN_DEPTH,
-	OPTION_MAX_DEPTH, OPTION_CHAINS, OPTION_GROUPS, OPTION_BOOTSTRAP, OPTION_EPOCH, OPTION_SET, OPTION_EFFECTS, OPTION_PARTS,
+	OPTION_SPP = 1000,
+	OPTION_MUTATIONS,
+	OPTION_TIME,
+	OPTION_TARGET,
+	OPTION_SIZE,
+	OPTION_CROP,
+	OPTION_SEED,
+	OPTION_MIN_DEPTH,
+	OPTION_MAX_DEPTH,
+	OPTION_CHAINS,
+	OPTION_GROUPS,
+	OPTION_BOOTSTRAP,
+	OPTION_EPOCH,
+	OPTION_SET,
+	OPTION_EFFECTS,
+	OPTION_PARTS,
 	OPTION_LENIENT,
 };
 
 static const struct argp_option options[] = {
 	{NULL, 0, NULL, 0, "What to render:", 1},
-	{"integrator", 'i', "NAME", 0, "(" RENDER_INTEGRATOR_DEFAULT ": path, bdpt or hslt, by a short pilot); the scene's own is ignored", 1}, /* see help */
-	{"size", OPTION_SIZE, "W[xH]", 0, "Size of the film; keeps the angle of view. Without H the film keeps its shape", 1},
+	{"integrator", 'i', "NAME", 0,
+	 "(" RENDER_INTEGRATOR_DEFAULT ": path, bdpt or hslt, by a short pilot); the scene's own is ignored",
+	 1}, /* see help */
+	{"size", OPTION_SIZE, "W[xH]", 0,
+	 "Size of the film; keeps the angle of view. Without H the film keeps its shape", 1},
 	{"crop", OPTION_CROP, "X,Y,W,H", 0, "Part of the film, in its pixels", 1},
 	{"seed", OPTION_SEED, "S", 0, "Of all random numbers (0)", 1},
 	{"min-depth", OPTION_MIN_DEPTH, "K", 0, "Shortest paths, in edges (1: emitters seen directly)", 1},
@@ -30,23 +47,29 @@ static const struct argp_option options[] = {
 	 "Settings that trade accuracy for time, with commas between; may be given again. help: what each does", 1},
 	{"effects", OPTION_EFFECTS, "LIST", 0,
 	 "What is simulated although the scene does not call for it, or not although it does: all, or such as -dispersion,+aperture "
-	 "(hslt-render --explain lists them)", 1},
+	 "(hslt-render --explain lists them)",
+	 1},
 	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 1},
 	{"lenient", OPTION_LENIENT, NULL, 0,
-	 "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted: --set lenient=yes", 1},
+	 "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted: --set lenient=yes",
+	 1},
 	{NULL, 0, NULL, 0, "When to stop (the first bound met; without any, the scene's sampleCount):", 2},
 	{"spp", OPTION_SPP, "N", 0, "Samples a pixel (64, 1.5k), rounded up to whole rounds", 2},
 	{"mutations", OPTION_MUTATIONS, "N|LIST", 0,
 	 "N: mutations or samples in all. LIST: the strategies that propose mutations, with weights (1), such as "
-	 "hslt=0.9,bidirectional=0.1; part of the plan. May be given twice, once for each", 2},
+	 "hslt=0.9,bidirectional=0.1; part of the plan. May be given twice, once for each",
+	 2},
 	{"time", OPTION_TIME, "SECONDS", 0, "Wall clock (90, 5m, 2h), looked at after complete rounds", 2},
 	{"target-error", OPTION_TARGET, "E", 0, "Estimated relative error: 0.02 or 2%", 2},
 	{NULL, 0, NULL, 0, "The plan (part of what decides the bits):", 3},
 	{"chains", OPTION_CHAINS, "N", 0, "Markov chains (1024, fewer for tiny jobs)", 3},
 	{"groups", OPTION_GROUPS, "N", 0, "Independent replicates, for the error (16)", 3},
-	{"parts", OPTION_PARTS, "N", 0, "Leases of a group in a round: groups times parts threads at most work on the job (4)", 3},
+	{"parts", OPTION_PARTS, "N", 0,
+	 "Leases of a group in a round: groups times parts threads at most work on the job (4)", 3},
 	{"bootstrap", OPTION_BOOTSTRAP, "N", 0, "Bootstrap samples (1000000, fewer for tiny jobs)", 3},
-	{"epoch", OPTION_EPOCH, "N", 0, "Mutations of a chain, or samples a pixel and group, in a round (leases of 20 s at most, where a farm is asked)", 3},
+	{"epoch", OPTION_EPOCH, "N", 0,
+	 "Mutations of a chain, or samples a pixel and group, in a round (leases of 20 s at most, where a farm is asked)",
+	 3},
 	{0},
 };
 
@@ -95,7 +118,10 @@ const char *option_image(const struct argp_state *state, const char *arg)
 	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
 		size_t k = strlen(others[i]);
 		if (n > k && strcasecmp(arg + n - k, others[i]) == 0)
-			argp_error(state, "images are OpenEXR, and '%s' would not be what its name says; hslt-tonemap makes a PNG of one", arg);
+			argp_error(
+				state,
+				"images are OpenEXR, and '%s' would not be what its name says; hslt-tonemap makes a PNG of one",
+				arg);
 	}
 	return arg;
 }
@@ -106,7 +132,8 @@ static double target_error(const struct argp_state *state, const char *arg)
 	if (!text_ratio(arg, &x) || !(x > 0 && x < 1e3))
 		argp_error(state, "--target-error takes something like 0.02 or 2%%, not '%s'", arg);
 	if (x > 1 && !strchr(arg, '%'))
-		argp_error(state, "--target-error %s is an error of %g %%; for %s percent write %s%%", arg, 100 * x, arg, arg);
+		argp_error(state, "--target-error %s is an error of %g %%; for %s percent write %s%%", arg, 100 * x,
+			   arg, arg);
 	return x;
 }
 
@@ -121,8 +148,8 @@ static void take_define(struct render_arguments *a, char *arg, const struct argp
 	a->defines[a->define_count++] = (struct scene_define){arg, equals + 1};
 }
 
-static void take_numbers(const struct argp_state *state, const char *option, const char *arg, const char *format, uint32_t *out,
-			 int count)
+static void take_numbers(const struct argp_state *state, const char *option, const char *arg, const char *format,
+			 uint32_t *out, int count)
 {
 	const char *at = arg;
 	for (int i = 0; i < count; i++) {
@@ -146,7 +173,8 @@ static void take_mutations(struct render_arguments *a, const char *arg, const st
 		return;
 	}
 	if (plan_strategy_count(arg) < 1)
-		argp_error(state, "--mutations takes a number or a list such as hslt=0.9,bidirectional=0.1, not '%s'", arg);
+		argp_error(state, "--mutations takes a number or a list such as hslt=0.9,bidirectional=0.1, not '%s'",
+			   arg);
 	a->mixture = arg;
 }
 
@@ -192,7 +220,8 @@ static void check_mixture(const struct render_arguments *a, const struct argp_st
 {
 	const char *name = integrator_is_open(&a->plan) ? RENDER_INTEGRATOR_CHAINS : a->plan.integrator;
 	if (a->mixture && !render_integrator_find(name)->has_mutations)
-		argp_error(state, "--mutations %s: the integrator %s has no strategies to choose from", a->mixture, name);
+		argp_error(state, "--mutations %s: the integrator %s has no strategies to choose from", a->mixture,
+			   name);
 }
 
 static void check_integrator(const char *name, const struct argp_state *state)
@@ -300,8 +329,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	}
 }
 
-/* The integrators that there are before what the table says of --integrator, the strategies and the settings after what it
- * says of --mutations and --set. argp frees the text. */
+/* The integrators that there are before what the table says of --integrator, the strategies and the settings after what
+ * it says of --mutations and --set. argp frees the text. */
 static char *help(int key, const char *text, void *input)
 {
 	(void)input;
@@ -317,7 +346,8 @@ static char *help(int key, const char *text, void *input)
 		}
 	} else if (key == OPTION_MUTATIONS) {
 		for (size_t i = 0; (name = render_mutation_at(i, &summary)) != NULL && used < sizeof names; i++) {
-			int n = snprintf(names + used, sizeof names - used, "%s%s (%s)", i == 0 ? "" : ", ", name, summary);
+			int n = snprintf(names + used, sizeof names - used, "%s%s (%s)", i == 0 ? "" : ", ", name,
+					 summary);
 			used += n < 0 ? 0 : (size_t)n;
 		}
 	} else if (key == OPTION_SET) {
@@ -325,7 +355,8 @@ static char *help(int key, const char *text, void *input)
 		for (size_t i = 0; (k = render_setting_at(i)) != NULL && used < sizeof names; i++) {
 			char standard[32];
 			accuracy_settings_value(&accuracy_settings_default, i, standard, sizeof standard);
-			int n = snprintf(names + used, sizeof names - used, "%s%s=%s", i == 0 ? "" : ", ", k->name, standard);
+			int n = snprintf(names + used, sizeof names - used, "%s%s=%s", i == 0 ? "" : ", ", k->name,
+					 standard);
 			used += n < 0 ? 0 : (size_t)n;
 		}
 	} else {
@@ -344,8 +375,10 @@ int render_plan_from_scene(struct render_arguments *a, const struct render_summa
 	const struct scene_settings *s = &summary->settings;
 	bool open = integrator_is_open(p), chains = a->mixture || p->chains; /* who says how, wants them */
 	if (open)
-		text_copy(p->integrator, sizeof p->integrator, chains ? RENDER_INTEGRATOR_CHAINS : RENDER_INTEGRATOR_DEFAULT);
-	const struct render_integrator *integrator = render_integrator_find(open ? RENDER_INTEGRATOR_CHAINS : p->integrator);
+		text_copy(p->integrator, sizeof p->integrator,
+			  chains ? RENDER_INTEGRATOR_CHAINS : RENDER_INTEGRATOR_DEFAULT);
+	const struct render_integrator *integrator =
+		render_integrator_find(open ? RENDER_INTEGRATOR_CHAINS : p->integrator);
 	p->kind = integrator->kind;
 	p->width = s->width;
 	p->height = s->height;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The options that hslt-render and hslt-submit share: what to render of a scene, and how. Parsed by glibc's argp as a child
- * of each program's own table. One thread.
+ * The options that hslt-render and hslt-submit share: what to render of a scene, and how. Parsed by glibc's argp as a
+ * child of each program's own table. One thread.
  */
 #ifndef WORKER_CLI_OPTIONS_H
 #define WORKER_CLI_OPTIONS_H

@@ -19,8 +19,8 @@ static int find_rgb(struct picture *p, struct error *e)
 			if (strcmp(img->names[c], rgb_names[k]) == 0)
 				p->rgb[k] = img->planes[c];
 		if (!p->rgb[k])
-			return error_set(e, EINVAL, "it has no channel %s (of R, G and B); its first one is %s", rgb_names[k],
-					 img->names[0]);
+			return error_set(e, EINVAL, "it has no channel %s (of R, G and B); its first one is %s",
+					 rgb_names[k], img->names[0]);
 	}
 	return 0;
 }
@@ -50,8 +50,8 @@ void picture_fini(struct picture *p)
 	*p = (struct picture){0};
 }
 
-static void shrink_plane(const float *from, uint32_t from_width, float *to, uint32_t width, uint32_t height, uint32_t box_width,
-			 uint32_t box_height)
+static void shrink_plane(const float *from, uint32_t from_width, float *to, uint32_t width, uint32_t height,
+			 uint32_t box_width, uint32_t box_height)
 {
 	for (size_t y = 0; y < height; y++)
 		for (size_t x = 0; x < width; x++) {
@@ -67,9 +67,12 @@ int picture_shrink(struct picture *p, uint32_t width, uint32_t height, struct er
 {
 	const struct exr_image *from = &p->image;
 	if (width < 1 || height < 1 || from->width % width || from->height % height)
-		return error_set(e, EINVAL, "%ux%u pixels cannot be averaged to %ux%u: the sizes must divide", from->width,
-				 from->height, width, height);
-	struct picture small = {.image = {.width = width, .height = height, .channel_count = 3, .full_width = width,
+		return error_set(e, EINVAL, "%ux%u pixels cannot be averaged to %ux%u: the sizes must divide",
+				 from->width, from->height, width, height);
+	struct picture small = {.image = {.width = width,
+					  .height = height,
+					  .channel_count = 3,
+					  .full_width = width,
 					  .full_height = height}};
 	for (int k = 0; k < 3; k++) {
 		float *plane = small.image.planes[k] = mem_alloc((size_t)width * height, sizeof *plane);
@@ -86,7 +89,8 @@ int picture_shrink(struct picture *p, uint32_t width, uint32_t height, struct er
 	return 0;
 }
 
-int picture_encode_png(const unsigned char *rgb, uint32_t width, uint32_t height, unsigned char **bytes, size_t *size, struct error *e)
+int picture_encode_png(const unsigned char *rgb, uint32_t width, uint32_t height, unsigned char **bytes, size_t *size,
+		       struct error *e)
 {
 	png_image png = {.version = PNG_IMAGE_VERSION, .width = width, .height = height, .format = PNG_FORMAT_RGB};
 	*size = PNG_IMAGE_PNG_SIZE_MAX(png);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Pictures for the programs that look at them: R, G, B of an EXR file, averaged down where asked, and PNG files out. Planes
- * of floats, linear. One thread.
+ * Pictures for the programs that look at them: R, G, B of an EXR file, averaged down where asked, and PNG files out.
+ * Planes of floats, linear. One thread.
  */
 #ifndef WORKER_CLI_PICTURE_H
 #define WORKER_CLI_PICTURE_H
@@ -11,7 +11,7 @@
 
 struct picture {
 	struct exr_image image; /* all channels, as read */
-	const float *rgb[3];    /* planes of it */
+	const float *rgb[3];	/* planes of it */
 };
 
 /* The error names the file. -EINVAL: it has no R, G or B. */
@@ -22,7 +22,8 @@ void picture_fini(struct picture *p);
 int picture_shrink(struct picture *p, uint32_t width, uint32_t height, struct error *e);
 
 /* rgb: 3 bytes a pixel, sRGB. bytes are mem_alloc'd. */
-int picture_encode_png(const unsigned char *rgb, uint32_t width, uint32_t height, unsigned char **bytes, size_t *size, struct error *e);
+int picture_encode_png(const unsigned char *rgb, uint32_t width, uint32_t height, unsigned char **bytes, size_t *size,
+		       struct error *e);
 /* Temporary file and rename. */
 int picture_write_png(const char *path, const unsigned char *rgb, uint32_t width, uint32_t height, struct error *e);
 

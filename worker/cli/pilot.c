@@ -8,7 +8,7 @@
 
 enum {
 	PROBE_BOOTSTRAP = 16384,
-	PROBE_EPOCH = 16,          /* mutations a chain; a chain's start costs about one */
+	PROBE_EPOCH = 16,	      /* mutations a chain; a chain's start costs about one */
 	PROBE_SAMPLES_MOST = 1 << 21, /* samples of the shortest round that is worth a probe */
 };
 static const double out_of_reach = 1e-9;

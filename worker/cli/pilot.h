@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * How a pilot is cut: a short render with the plan of the one to come, but for the length of an epoch, so that there are
- * enough looks at its error. What an epoch costs is found by a probe, one short round. Pure; any thread.
+ * How a pilot is cut: a short render with the plan of the one to come, but for the length of an epoch, so that there
+ * are enough looks at its error. What an epoch costs is found by a probe, one short round. Pure; any thread.
  */
 #ifndef WORKER_CLI_PILOT_H
 #define WORKER_CLI_PILOT_H

@@ -22,7 +22,8 @@ enum { OUTPUT_MAX = 1 << 26 };
 
 extern char **environ;
 
-/* In single quotes gnuplot takes nothing for its own but the quote itself; a line cannot go on there, so controls are blanks. */
+/* In single quotes gnuplot takes nothing for its own but the quote itself; a line cannot go on there, so controls are
+ * blanks. */
 static void put_quoted(struct text_file *s, const char *text)
 {
 	enum { LONGEST = 400 };
@@ -41,7 +42,8 @@ static void put_quoted(struct text_file *s, const char *text)
 	text_file_bytes(s, "'", 1);
 }
 
-/* Blue, vermilion, green, purple, orange, sky (Okabe and Ito 2008): apart for every kind of eyes, on white and in print. */
+/* Blue, vermilion, green, purple, orange, sky (Okabe and Ito 2008): apart for every kind of eyes, on white and in
+ * print. */
 static const char *const colours[] = {"#0072b2", "#d55e00", "#009e73", "#aa4499", "#e69f00", "#56b4e9"};
 static const int shapes[] = {7, 5, 9, 13, 11, 4};
 
@@ -74,14 +76,21 @@ static void put_names(struct text_file *s, const struct plot *p)
 static void put_style(struct text_file *s, bool png, uint64_t name)
 {
 	if (png)
-		text_file_put(s, "set terminal pngcairo noenhanced size 1440,880 fontscale 1.7 linewidth 1.6 pointscale 1.7 font 'DejaVu Sans,11' "
-		       "background '#ffffff'\n");
+		text_file_put(
+			s,
+			"set terminal pngcairo noenhanced size 1440,880 fontscale 1.7 linewidth 1.6 pointscale 1.7 font 'DejaVu Sans,11' "
+			"background '#ffffff'\n");
 	else
-		text_file_put(s, "set terminal svg noenhanced size 720,440 name 'p%016llx' font 'DejaVu Sans,Verdana,Helvetica,Arial,sans-serif,13' "
-		       "background '#ffffff'\n", (unsigned long long)name);
-	text_file_put(s, "set encoding utf8\nset border 3 lw 1 lc rgb '#555555'\nset tics out nomirror scale 0.6 textcolor rgb '#222222'\n"
-	       "set xzeroaxis lt 1 lw 1 lc rgb '#777777'\nset grid lc rgb '#dddddd' lt 1 lw 0.8\nset key tmargin center horizontal reverse Left noautotitle samplen 2 width 2 textcolor rgb '#222222'\n"
-	       "set style fill transparent solid 0.2 noborder\nset bars 0.6\nset format '%%.6g'\n");
+		text_file_put(
+			s,
+			"set terminal svg noenhanced size 720,440 name 'p%016llx' font 'DejaVu Sans,Verdana,Helvetica,Arial,sans-serif,13' "
+			"background '#ffffff'\n",
+			(unsigned long long)name);
+	text_file_put(
+		s,
+		"set encoding utf8\nset border 3 lw 1 lc rgb '#555555'\nset tics out nomirror scale 0.6 textcolor rgb '#222222'\n"
+		"set xzeroaxis lt 1 lw 1 lc rgb '#777777'\nset grid lc rgb '#dddddd' lt 1 lw 0.8\nset key tmargin center horizontal reverse Left noautotitle samplen 2 width 2 textcolor rgb '#222222'\n"
+		"set style fill transparent solid 0.2 noborder\nset bars 0.6\nset format '%%.6g'\n");
 }
 
 static void put_data(struct text_file *s, const struct plot *p, const struct plot_axis *y_axis, size_t k)
@@ -92,10 +101,12 @@ static void put_data(struct text_file *s, const struct plot *p, const struct plo
 		if (!plot_point_shown(p, r, i))
 			continue;
 		double y = r->y ? r->y[i] : r->low[i];
-		bool bars = r->low && r->high && isfinite(r->low[i]) && isfinite(r->high[i]) && (!p->log_y || r->high[i] > 0);
+		bool bars = r->low && r->high && isfinite(r->low[i]) && isfinite(r->high[i]) &&
+			    (!p->log_y || r->high[i] > 0);
 		double low = bars ? r->low[i] : y, high = bars ? r->high[i] : y;
 		/* On a logarithmic axis a bar that reaches 0 goes to the edge. */
-		text_file_put(s, "%.9g %.9g %.9g %.9g\n", r->x[i], y, p->log_y && !(low > y_axis->low) ? y_axis->low : low, high);
+		text_file_put(s, "%.9g %.9g %.9g %.9g\n", r->x[i], y,
+			      p->log_y && !(low > y_axis->low) ? y_axis->low : low, high);
 	}
 	text_file_put(s, "EOD\n");
 	for (size_t i = 0; r->labels && i < r->count; i++) {
@@ -103,7 +114,8 @@ static void put_data(struct text_file *s, const struct plot *p, const struct plo
 			continue;
 		text_file_put(s, "set label ");
 		put_quoted(s, r->labels[i]);
-		text_file_put(s, " at %.9g,%.9g left offset character 0.7,0.5 textcolor rgb '#444444' front\n", r->x[i], r->y ? r->y[i] : r->low[i]);
+		text_file_put(s, " at %.9g,%.9g left offset character 0.7,0.5 textcolor rgb '#444444' front\n", r->x[i],
+			      r->y ? r->y[i] : r->low[i]);
 	}
 }
 
@@ -164,7 +176,8 @@ static int write_script(struct text_file *s, const struct plot *p, bool png, str
 		put_series(&body, p, k);
 	}
 	text_file_put(&body, "\n");
-	/* Plots in one page have names of their own for their parts: from what they show, so that they stay the same. */
+	/* Plots in one page have names of their own for their parts: from what they show, so that they stay the same.
+	 */
 	put_style(s, png, hash(&body.text));
 	text_file_bytes(s, body.text.bytes, body.text.size);
 	s->full = s->full || body.full;
@@ -225,7 +238,8 @@ static int read_whole(int fd, char **bytes, size_t *size, struct error *e)
 		if (n <= 0) {
 			mem_free(*bytes);
 			*bytes = NULL;
-			return error_set(e, EIO, "reading gnuplot's output: %s", n < 0 ? strerror(errno) : "it became shorter");
+			return error_set(e, EIO, "reading gnuplot's output: %s",
+					 n < 0 ? strerror(errno) : "it became shorter");
 		}
 		done += (size_t)n;
 	}

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Plots, drawn by gnuplot as a process of its own: the data goes through its standard input, nothing through a shell. One
- * thread. Where gnuplot is not installed: -ENOENT with a sentence that says what to install; whoever asked goes on without.
+ * Plots, drawn by gnuplot as a process of its own: the data goes through its standard input, nothing through a shell.
+ * One thread. Where gnuplot is not installed: -ENOENT with a sentence that says what to install; whoever asked goes on
+ * without.
  */
 #ifndef WORKER_CLI_PLOT_H
 #define WORKER_CLI_PLOT_H
@@ -17,8 +18,9 @@ struct plot_series {
 	const char *name; /* "": not in the legend */
 	enum plot_style style;
 	size_t count;
-	const double *x, *y, *low, *high; /* [count]; low and high may be NULL: no bars. Not finite: the point is left out */
-	const char *const *labels;        /* [count], beside the points; NULL: none */
+	const double *x, *y, *low,
+		*high;		   /* [count]; low and high may be NULL: no bars. Not finite: the point is left out */
+	const char *const *labels; /* [count], beside the points; NULL: none */
 };
 
 struct plot {

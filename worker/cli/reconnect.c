@@ -24,7 +24,8 @@ static bool is_gone(int rc)
 	return rc == -ECONNRESET || rc == -ECONNREFUSED || rc == -ETIMEDOUT || rc == -EHOSTUNREACH;
 }
 
-static int try_once(struct client *cl, const struct submitted *job, const char *output, struct submit_end *end, struct error *e)
+static int try_once(struct client *cl, const struct submitted *job, const char *output, struct submit_end *end,
+		    struct error *e)
 {
 	int rc = submit_wait(cl, job, end, e);
 	if (!rc && end->has_result)
@@ -46,8 +47,8 @@ static int call_again(struct client **cl, const struct reconnect *o, struct erro
 	return rc;
 }
 
-int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted *job, const char *output, struct submit_end *end,
-		struct error *e)
+int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted *job, const char *output,
+		  struct submit_end *end, struct error *e)
 {
 	int rc;
 	while (is_gone(rc = try_once(*cl, job, output, end, e))) {
@@ -56,10 +57,11 @@ int reconnect_job(struct client **cl, const struct reconnect *o, const struct su
 		fprintf(stderr, "hslt-submit: %s; trying again for %g s\n", e->text, o->patience);
 		rc = call_again(cl, o, e);
 		if (is_gone(rc))
-			return error_set(e, ECONNREFUSED,
-					 "no coordinator at %s for %g s. The job is in its spool and goes on when it is back: "
-					 "hslt-job fetch j%llu -o %s",
-					 o->coordinator, o->patience, (unsigned long long)job->job, output);
+			return error_set(
+				e, ECONNREFUSED,
+				"no coordinator at %s for %g s. The job is in its spool and goes on when it is back: "
+				"hslt-job fetch j%llu -o %s",
+				o->coordinator, o->patience, (unsigned long long)job->job, output);
 		if (rc)
 			break;
 	}

@@ -34,8 +34,8 @@ static const char *plural(uint32_t n)
 	return n == 1 ? "" : "s";
 }
 
-/* What the reader cannot see, meshes, pictures and values that do not go together, is looked at when all else is right; that ends with
- * the first thing that is wrong. */
+/* What the reader cannot see, meshes, pictures and values that do not go together, is looked at when all else is right;
+ * that ends with the first thing that is wrong. */
 static int print_check(const struct scene *s, const struct asset_source *assets, const char *name, bool *bad)
 {
 	static struct render_summary m; /* large */
@@ -57,8 +57,9 @@ static int print_check(const struct scene *s, const struct asset_source *assets,
 	if (*bad)
 		printf("%s: %u problem%s, %u note%s\n", name, problems, plural(problems), notes, plural(notes));
 	else
-		printf("%s: can be rendered: %llu shapes, %llu triangles, %u files, %u note%s\n", name, (unsigned long long)m.shapes,
-		       (unsigned long long)m.triangles, s->asset_count + 1, notes, plural(notes));
+		printf("%s: can be rendered: %llu shapes, %llu triangles, %u files, %u note%s\n", name,
+		       (unsigned long long)m.shapes, (unsigned long long)m.triangles, s->asset_count + 1, notes,
+		       plural(notes));
 	return 0;
 }
 
@@ -136,11 +137,11 @@ static json_t *describe(const struct scene *s, const struct opened *o, struct er
 	for (size_t i = 0; render_scene_note(&m, i, text, sizeof text); i++)
 		json_array_append_new(notes, json_string(text));
 	const struct scene_settings *f = &m.settings;
-	json_t *all = json_pack("{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:o s:o s:o}", "schema", 1, "scene", o->name, "dialect",
-				s->dialect_3 ? "3.x" : "0.6", "width", (int)f->width, "height", (int)f->height, "sampleCount",
-				(json_int_t)f->spp, "fov", f->fov, "fovAxis", f->fov_axis, "maxDepth", (int)f->max_depth, "shapes",
-				(json_int_t)m.shapes, "triangles", (json_int_t)m.triangles, "effects", effects_of(&m), "notes", notes,
-				"files", files);
+	json_t *all = json_pack("{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:o s:o s:o}", "schema", 1, "scene",
+				o->name, "dialect", s->dialect_3 ? "3.x" : "0.6", "width", (int)f->width, "height",
+				(int)f->height, "sampleCount", (json_int_t)f->spp, "fov", f->fov, "fovAxis",
+				f->fov_axis, "maxDepth", (int)f->max_depth, "shapes", (json_int_t)m.shapes, "triangles",
+				(json_int_t)m.triangles, "effects", effects_of(&m), "notes", notes, "files", files);
 	if (!all)
 		error_set(e, ENOMEM, "no memory for the description");
 	return all;
@@ -155,22 +156,23 @@ static void print_text(json_t *all)
 	int width, height, depth;
 	double fov;
 	const char *name, *dialect, *axis;
-	json_unpack(all, "{s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I}", "scene", &name, "dialect", &dialect, "width", &width, "height",
-		    &height, "sampleCount", &spp, "fov", &fov, "fovAxis", &axis, "maxDepth", &depth, "shapes", &shapes, "triangles",
-		    &triangles);
-	printf("%s: Mitsuba %s, film %d x %d, field of view %.4g degrees (%s), %lld samples a pixel, paths of at most %d edges\n", name,
-	       dialect, width, height, fov, axis, spp, depth);
+	json_unpack(all, "{s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I}", "scene", &name, "dialect", &dialect, "width",
+		    &width, "height", &height, "sampleCount", &spp, "fov", &fov, "fovAxis", &axis, "maxDepth", &depth,
+		    "shapes", &shapes, "triangles", &triangles);
+	printf("%s: Mitsuba %s, film %d x %d, field of view %.4g degrees (%s), %lld samples a pixel, paths of at most %d edges\n",
+	       name, dialect, width, height, fov, axis, spp, depth);
 	printf("%lld shapes, %lld triangles; calls for", shapes, triangles);
 	json_array_foreach(json_object_get(all, "effects"), i, one)
 		printf("%s %s", i ? "," : "", json_string_value(one));
 	printf("\n");
-	json_array_foreach(json_object_get(all, "files"), i, one) {
+	json_array_foreach(json_object_get(all, "files"), i, one)
+	{
 		json_int_t bytes = json_integer_value(json_object_get(one, "bytes"));
 		text = json_string_value(json_object_get(one, "sha256"));
-		printf("%.16s %12lld bytes  %s\n", text, (long long)bytes, json_string_value(json_object_get(one, "name")));
+		printf("%.16s %12lld bytes  %s\n", text, (long long)bytes,
+		       json_string_value(json_object_get(one, "name")));
 	}
-	json_array_foreach(json_object_get(all, "notes"), i, one)
-		printf("note: %s\n", json_string_value(one));
+	json_array_foreach(json_object_get(all, "notes"), i, one) printf("note: %s\n", json_string_value(one));
 }
 
 int scene_report_show(const struct scene_request *r, bool json, struct error *e)
@@ -180,11 +182,14 @@ int scene_report_show(const struct scene_request *r, bool json, struct error *e)
 	int rc = open_scene(r, &o, e);
 	if (rc)
 		return rc;
-	rc = (r->lenient ? scene_read_lenient : scene_read)(&s, &o.assets, o.name, render_plugins(), r->defines, r->define_count, e);
+	rc = (r->lenient ? scene_read_lenient : scene_read)(&s, &o.assets, o.name, render_plugins(), r->defines,
+							    r->define_count, e);
 	if (!rc) {
 		json_t *all = describe(&s, &o, e);
 		if (all && json)
-			rc = json_dumpf(all, stdout, JSON_COMPACT) || putchar('\n') == EOF ? error_set(e, EIO, "stdout took not all") : 0;
+			rc = json_dumpf(all, stdout, JSON_COMPACT) || putchar('\n') == EOF
+				     ? error_set(e, EIO, "stdout took not all")
+				     : 0;
 		else if (all)
 			print_text(all);
 		else

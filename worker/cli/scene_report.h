@@ -12,8 +12,8 @@ struct scene_request {
 	bool lenient; /* what is not supported is left out or replaced, and noted */
 };
 
-/* Prints a line for everything that is wrong, not supported, or ignored, and one that sums up. *bad: the scene cannot be
- * rendered. */
+/* Prints a line for everything that is wrong, not supported, or ignored, and one that sums up. *bad: the scene cannot
+ * be rendered. */
 int scene_report_check(const struct scene_request *r, bool *bad, struct error *e);
 
 /* Prints what was read: film, camera, counts, files with sizes and SHA-256; as one JSON object where asked. */

@@ -61,7 +61,8 @@ static int run(const struct world *w, struct plan_request *r, double *speed, str
 	}
 }
 
-int speed_measure(const struct render_arguments *a, const char *folder, const char *name, double *speed, struct error *e)
+int speed_measure(const struct render_arguments *a, const char *folder, const char *name, double *speed,
+		  struct error *e)
 {
 	struct plan_request r = pilot_of(a);
 	struct render_options o = a->render;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What --stats FILE holds, as JSON: plan, why its integrator was chosen, times, counters, strategies, effects, which bound ended the render. One thread.
+ * What --stats FILE holds, as JSON: plan, why its integrator was chosen, times, counters, strategies, effects, which
+ * bound ended the render. One thread.
  */
 #ifndef WORKER_CLI_STATS_H
 #define WORKER_CLI_STATS_H
@@ -16,7 +17,7 @@ struct stats {
 	const struct local_run *run; /* has ended */
 	const struct canvas_image *image;
 	const struct convergence *agreement; /* of the image */
-	double build_seconds; /* of the world */
+	double build_seconds;		     /* of the world */
 	const struct forecast_history *looks;
 	const struct choice *choice; /* of the integrator */
 };

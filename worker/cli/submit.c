@@ -15,8 +15,8 @@ enum { CHUNK = 1 << 20 };
 
 /* ---- the bundle ---- */
 
-/* A folder that remembers what was opened, and the hash of what was read: the world is built here as workers will build it, so they
- * need just that. One thread. */
+/* A folder that remembers what was opened, and the hash of what was read: the world is built here as workers will build
+ * it, so they need just that. One thread. */
 struct opened {
 	struct asset_source folder;
 	struct scene_bundle *bundle;
@@ -124,9 +124,12 @@ static void lists_fini(struct lists *l)
 static int lists_init(struct lists *l, const struct submit_request *r, struct scene_bundle *b, struct error *e)
 {
 	size_t lines = b->summary.line_count;
-	*l = (struct lists){mem_alloc(b->count, sizeof *l->files),	  mem_alloc(b->count, sizeof *l->file_at),
-			    mem_alloc(r->args->define_count, sizeof *l->defines), mem_alloc(r->args->define_count, sizeof *l->define_at),
-			    mem_alloc(lines, sizeof *l->effects),	  mem_alloc(lines, sizeof *l->effect_at)};
+	*l = (struct lists){mem_alloc(b->count, sizeof *l->files),
+			    mem_alloc(b->count, sizeof *l->file_at),
+			    mem_alloc(r->args->define_count, sizeof *l->defines),
+			    mem_alloc(r->args->define_count, sizeof *l->define_at),
+			    mem_alloc(lines, sizeof *l->effects),
+			    mem_alloc(lines, sizeof *l->effect_at)};
 	if (!l->files || !l->file_at || !l->defines || !l->define_at || !l->effects || !l->effect_at) {
 		lists_fini(l);
 		return error_set(e, ENOMEM, "no memory for the submission");
@@ -211,8 +214,8 @@ static const struct scene_bundle_file *file_of_hash(const struct scene_bundle *b
 	return NULL;
 }
 
-static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint64_t offset, const void *bytes, size_t size,
-		      struct error *e)
+static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint64_t offset, const void *bytes,
+		      size_t size, struct error *e)
 {
 	struct blob_hash hash = f->hash;
 	Farm__BlobChunk chunk;
@@ -227,8 +230,10 @@ static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint
 	return client_send(cl, &m, bytes, size, e);
 }
 
-/* Opened as it was before, below the scene's folder, and no other bytes than those that were read then leave this machine. */
-static int send_file(struct client *cl, const struct scene_bundle *b, const struct scene_bundle_file *f, struct error *e)
+/* Opened as it was before, below the scene's folder, and no other bytes than those that were read then leave this
+ * machine. */
+static int send_file(struct client *cl, const struct scene_bundle *b, const struct scene_bundle_file *f,
+		     struct error *e)
 {
 	struct asset_source folder = asset_folder(b->folder);
 	struct asset a;
@@ -255,13 +260,14 @@ static int send_missing(struct client *cl, const struct scene_bundle *b, const F
 	int rc = 0;
 	for (size_t i = 0; !rc && i < a->n_missing; i++) {
 		const struct scene_bundle_file *f = file_of_hash(b, &a->missing[i]);
-		rc = f ? send_file(cl, b, f, e) : error_set(e, EPROTO, "the coordinator asks for a file that is not ours");
+		rc = f ? send_file(cl, b, f, e)
+		       : error_set(e, EPROTO, "the coordinator asks for a file that is not ours");
 	}
 	return rc;
 }
 
-int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *bundle, struct submitted *job,
-		char *plan_text, size_t plan_size, struct error *e)
+int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *bundle,
+		struct submitted *job, char *plan_text, size_t plan_size, struct error *e)
 {
 	struct scene_bundle b = *bundle; /* messages borrow texts that are not const */
 	struct client_message answer = {0};
@@ -300,7 +306,8 @@ static void describe(const Farm__JobStatus *s, const char *rate, char *text, siz
 	}
 	if (s->n_looks && s->halving_seconds > 0) {
 		progress_duration(s->halving_seconds, low, sizeof low);
-		snprintf(error, sizeof error, ", error %.3g %%, half of it in %s", 100 * sqrt(s->looks[s->n_looks - 1]->rel_mse), low);
+		snprintf(error, sizeof error, ", error %.3g %%, half of it in %s",
+			 100 * sqrt(s->looks[s->n_looks - 1]->rel_mse), low);
 	}
 	snprintf(text, size, "%s/s, %s left%s%s", rate, eta, range, error);
 }
@@ -332,11 +339,12 @@ static void take_looks(const Farm__JobStatus *s, struct submit_end *end)
 }
 
 /* ended: it has. */
-static int take_status(struct progress *p, const Farm__JobStatus *s, const struct submitted *job, struct submit_end *end, bool *ended,
-		       struct error *e)
+static int take_status(struct progress *p, const Farm__JobStatus *s, const struct submitted *job,
+		       struct submit_end *end, bool *ended, struct error *e)
 {
 	if (s->submitted != job->at)
-		return error_set(e, ESTALE, "j%llu is another job now, '%s': the coordinator goes on with another spool",
+		return error_set(e, ESTALE,
+				 "j%llu is another job now, '%s': the coordinator goes on with another spool",
 				 (unsigned long long)job->job, s->name);
 	show(p, s);
 	*ended = s->ended;

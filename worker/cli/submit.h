@@ -21,14 +21,14 @@ struct scene_bundle {
 		char *name;
 		struct blob_hash hash;
 		uint64_t size;
-	} *files;
+	} * files;
 	struct render_summary summary;
 	size_t note_count;
 	char **notes;
 };
 
-/* Reads and checks the scene with everything that it calls for; files that its world was built without are not of the bundle. The
- * error names file, line and element. */
+/* Reads and checks the scene with everything that it calls for; files that its world was built without are not of the
+ * bundle. The error names file, line and element. */
 int scene_bundle_read(struct scene_bundle *b, const char *path, const struct scene_define *defines, size_t define_count,
 		      const struct render_options *o, struct error *e);
 void scene_bundle_fini(struct scene_bundle *b);
@@ -54,7 +54,7 @@ int submit_send(struct client *cl, const struct submit_request *r, const struct 
 struct submit_end {
 	uint32_t exit_code; /* of a program that waited */
 	bool has_result;
-	char state[16]; /* done, failed, cancelled */
+	char state[16];		       /* done, failed, cancelled */
 	struct forecast_history looks; /* at the error; seconds from the first round on */
 	double cpu_seconds, bootstrap_cpu_seconds, bootstrap_seconds;
 	char why[256], note[1024]; /* why there is no result; what whoever looks at it should know */

@@ -32,7 +32,11 @@ void text_file_put(struct text_file *p, const char *format, ...)
 size_t text_file_character(const char *at)
 {
 	const unsigned char *c = (const unsigned char *)at;
-	size_t n = *c < 0x80 ? 1 : *c >= 0xc2 && *c < 0xe0 ? 2 : *c >= 0xe0 && *c < 0xf0 ? 3 : *c >= 0xf0 && *c < 0xf5 ? 4 : 0;
+	size_t n = *c < 0x80		     ? 1
+		   : *c >= 0xc2 && *c < 0xe0 ? 2
+		   : *c >= 0xe0 && *c < 0xf0 ? 3
+		   : *c >= 0xf0 && *c < 0xf5 ? 4
+					     : 0;
 	for (size_t i = 1; i < n; i++)
 		if ((c[i] & 0xc0) != 0x80)
 			return 0;
@@ -47,7 +51,12 @@ void text_file_escaped(struct text_file *p, const char *text)
 {
 	while (*text) {
 		size_t n = text_file_character(text);
-		const char *as = *text == '&' ? "&amp;" : *text == '<' ? "&lt;" : *text == '>' ? "&gt;" : *text == '"' ? "&quot;" : n ? NULL : "?";
+		const char *as = *text == '&'	? "&amp;"
+				 : *text == '<' ? "&lt;"
+				 : *text == '>' ? "&gt;"
+				 : *text == '"' ? "&quot;"
+				 : n		? NULL
+						: "?";
 		if (as)
 			text_file_bytes(p, as, strlen(as));
 		else
@@ -76,8 +85,10 @@ void text_file_base64(struct text_file *p, const unsigned char *bytes, size_t co
 	static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 	for (size_t i = 0; i < count; i += 3) {
 		size_t left = count - i;
-		unsigned v = (unsigned)bytes[i] << 16 | (left > 1 ? (unsigned)bytes[i + 1] << 8 : 0) | (left > 2 ? bytes[i + 2] : 0u);
-		char four[4] = {digits[v >> 18], digits[v >> 12 & 63], left > 1 ? digits[v >> 6 & 63] : '=', left > 2 ? digits[v & 63] : '='};
+		unsigned v = (unsigned)bytes[i] << 16 | (left > 1 ? (unsigned)bytes[i + 1] << 8 : 0) |
+			     (left > 2 ? bytes[i + 2] : 0u);
+		char four[4] = {digits[v >> 18], digits[v >> 12 & 63], left > 1 ? digits[v >> 6 & 63] : '=',
+				left > 2 ? digits[v & 63] : '='};
 		text_file_bytes(p, four, 4);
 	}
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A text file that is made in memory and put in place as a whole. Pieces that do not fit are noticed once, at the end. One
- * thread; zeroed memory is an empty page.
+ * A text file that is made in memory and put in place as a whole. Pieces that do not fit are noticed once, at the end.
+ * One thread; zeroed memory is an empty page.
  */
 #ifndef WORKER_CLI_TEXT_FILE_H
 #define WORKER_CLI_TEXT_FILE_H

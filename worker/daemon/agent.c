@@ -100,7 +100,8 @@ static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
 	uint64_t ms = ack->heartbeat_ms >= 10 ? ack->heartbeat_ms : 10;
 	a->welcome = true;
 	a->back_off = first_back_off;
-	log_event(LOG_CONNECT, "coordinator=%s start=%llu", a->config.coordinator, (unsigned long long)a->cache.life.restarts);
+	log_event(LOG_CONNECT, "coordinator=%s start=%llu", a->config.coordinator,
+		  (unsigned long long)a->cache.life.restarts);
 	if (*ack->text)
 		log_event(LOG_PEER_FAULT, "text=%s", log_quote(ack->text).text);
 	uv_timer_start(&a->heartbeat, on_heartbeat, ms, ms);
@@ -128,8 +129,10 @@ static void on_closed(void *user, const char *why)
 {
 	struct agent *a = user;
 	if (!a->gone)
-		log_event(conn_garbled(a->conn) ? LOG_PEER_GARBLED : a->welcome ? LOG_PEER_CLOSED : LOG_CONNECT_FAILED, "coordinator=%s text=%s",
-			  a->config.coordinator, log_quote(why).text);
+		log_event(conn_garbled(a->conn) ? LOG_PEER_GARBLED
+			  : a->welcome		? LOG_PEER_CLOSED
+						: LOG_CONNECT_FAILED,
+			  "coordinator=%s text=%s", a->config.coordinator, log_quote(why).text);
 	a->conn = NULL;
 	a->welcome = false;
 	uv_timer_stop(&a->heartbeat);
@@ -275,7 +278,8 @@ static void init_handles(struct agent *a)
 	uv_timer_init(&a->loop, &a->watch);
 	uv_signal_init(&a->loop, &a->on_term);
 	uv_signal_init(&a->loop, &a->on_int);
-	a->retry.data = a->heartbeat.data = a->grace.data = a->pulse.data = a->watch.data = a->on_term.data = a->on_int.data = a;
+	a->retry.data = a->heartbeat.data = a->grace.data = a->pulse.data = a->watch.data = a->on_term.data =
+		a->on_int.data = a;
 	uv_signal_start(&a->on_term, on_signal, SIGTERM);
 	uv_signal_start(&a->on_int, on_signal, SIGINT);
 	uint64_t look = (uint64_t)(1000 * a->config.stall_seconds / STALL_LOOKS);
@@ -322,8 +326,8 @@ int agent_open(struct agent **out, const struct agent_config *c, struct error *e
 		mem_free(a);
 		return rc;
 	}
-	log_event(LOG_START, "program=hslt-worker name=%s threads=%u fingerprint=%s", log_quote(c->name).text, c->threads,
-		  log_quote(a->fingerprint).text);
+	log_event(LOG_START, "program=hslt-worker name=%s threads=%u fingerprint=%s", log_quote(c->name).text,
+		  c->threads, log_quote(a->fingerprint).text);
 	init_handles(a);
 	start_pulse(a);
 	connect_now(a);
@@ -354,7 +358,8 @@ int agent_run(const struct agent_config *c, struct error *e)
 	notify_send("READY=1"); /* it may wait for its coordinator for long */
 	while (!a->gone || a->conn)
 		uv_run(&a->loop, UV_RUN_ONCE);
-	if (a->hung || thread_pool_pending(a->thread_pool)) /* nobody can wait for its threads; what was to be said has been sent */
+	if (a->hung || thread_pool_pending(
+			       a->thread_pool)) /* nobody can wait for its threads; what was to be said has been sent */
 		_exit(a->hung ? AGENT_HUNG : a->refused ? AGENT_REFUSED : 0);
 	int refused = a->refused ? error_set(e, EACCES, "%s refuses: %s", a->config.coordinator, a->why) : 0;
 	agent_close(a);

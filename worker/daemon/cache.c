@@ -28,8 +28,8 @@ static int make_folders(char *path, struct error *e)
 	}
 }
 
-/* In a folder that somebody else made, or can write to, somebody else chooses what we render: names are all that is looked at
- * when a worker starts. Root may have made the one around ours. */
+/* In a folder that somebody else made, or can write to, somebody else chooses what we render: names are all that is
+ * looked at when a worker starts. Root may have made the one around ours. */
 static int check_owner(const char *path, bool or_root, struct error *e)
 {
 	struct stat st;
@@ -37,9 +37,11 @@ static int check_owner(const char *path, bool or_root, struct error *e)
 		return error_set(e, errno, "%s: %s", path, strerror(errno));
 	bool ours = st.st_uid == geteuid();
 	if (!ours && !(or_root && st.st_uid == 0))
-		return error_set(e, EPERM, "%s: belongs to another user: what it holds cannot be trusted (--cache DIR)", path);
+		return error_set(e, EPERM, "%s: belongs to another user: what it holds cannot be trusted (--cache DIR)",
+				 path);
 	if (ours && (st.st_mode & S_IWOTH) && !(or_root && (st.st_mode & S_ISVTX)))
-		return error_set(e, EPERM, "%s: everybody can write there: what it holds cannot be trusted (--cache DIR)", path);
+		return error_set(e, EPERM,
+				 "%s: everybody can write there: what it holds cannot be trusted (--cache DIR)", path);
 	return 0;
 }
 

@@ -67,12 +67,13 @@ static enum fetch_end failed(int rc)
 	return rc == -EFBIG || rc == -EBADMSG ? FETCH_FAILED : FETCH_UNSTORED;
 }
 
-enum fetch_end fetch_add(struct fetch *f, struct blob_store *s, const Farm__BlobChunk *c, const unsigned char *payload, size_t size,
-			 struct error *e)
+enum fetch_end fetch_add(struct fetch *f, struct blob_store *s, const Farm__BlobChunk *c, const unsigned char *payload,
+			 size_t size, struct error *e)
 {
 	int rc = 0;
 	if (*c->error || (size == 0 && c->offset < c->size)) {
-		error_set(e, EBADMSG, "the coordinator has a file of the scene no more: %s", *c->error ? c->error : "it ended too early");
+		error_set(e, EBADMSG, "the coordinator has a file of the scene no more: %s",
+			  *c->error ? c->error : "it ended too early");
 		return FETCH_FAILED;
 	}
 	if (!f->writer)

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The numeric fingerprint (docs/design.md, rules 1): what decides the bits of a result beside plan and scene. Workers with
- * equal texts give equal bits. Any thread.
+ * The numeric fingerprint (docs/design.md, rules 1): what decides the bits of a result beside plan and scene. Workers
+ * with equal texts give equal bits. Any thread.
  */
 #ifndef WORKER_DAEMON_FINGERPRINT_H
 #define WORKER_DAEMON_FINGERPRINT_H

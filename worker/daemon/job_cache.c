@@ -13,7 +13,11 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-enum { PATH_BYTES = 4200, DEFINES_MAX = 256, CHECKED_SECONDS = 60 /* a file that was right so lately is not read again */ };
+enum {
+	PATH_BYTES = 4200,
+	DEFINES_MAX = 256,
+	CHECKED_SECONDS = 60 /* a file that was right so lately is not read again */
+};
 
 static const Farm__JobInfo *info_of(const struct job_cache *b)
 {
@@ -80,7 +84,8 @@ int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error 
 		mem_free(paths);
 		return error_set(e, ENOMEM, "no memory for a job");
 	}
-	b->plan.rounds = UINT64_MAX; /* the bound may be moved while the job runs, and what a lease computes does not depend on it */
+	b->plan.rounds = UINT64_MAX; /* the bound may be moved while the job runs, and what a lease computes does not
+					depend on it */
 	b->held = held;
 	b->paths = paths;
 	b->info = *info;
@@ -192,17 +197,19 @@ static int check_plan(const struct job_cache *b, const struct scene *s, const st
 	if (rc)
 		return rc;
 	if (set.width != p->width || set.height != p->height || set.border != p->border)
-		return error_set(e, EINVAL,
-				 "this worker reads a film of %ux%u with a border of %u from the scene, the plan says %ux%u "
-				 "and %u: other versions?",
-				 set.width, set.height, set.border, p->width, p->height, p->border);
+		return error_set(
+			e, EINVAL,
+			"this worker reads a film of %ux%u with a border of %u from the scene, the plan says %ux%u "
+			"and %u: other versions?",
+			set.width, set.height, set.border, p->width, p->height, p->border);
 	const struct render_integrator *i = render_integrator_find(p->integrator);
 	if (!i || i->kind != p->kind)
 		return error_set(e, EINVAL, "this worker has no integrator '%s' of that kind", p->integrator);
 	char own[PLAN_ACCURACY_MAX];
 	rc = render_settings_canonical(p->accuracy, own, e);
 	if (!rc && strcmp(own, p->accuracy) != 0)
-		rc = error_set(e, EINVAL, "this worker spells the settings '%s', the plan '%s': other versions?", own, p->accuracy);
+		rc = error_set(e, EINVAL, "this worker spells the settings '%s', the plan '%s': other versions?", own,
+			       p->accuracy);
 	return rc;
 }
 
@@ -212,9 +219,11 @@ static int check_mutations(const struct job_cache *b, struct error *e)
 	char own[PLAN_MUTATIONS_MAX] = "";
 	struct render_summary summary;
 	world_summary(b->world, &summary);
-	int rc = render_integrator_find(p->integrator)->has_mutations ? render_mutations(p->mutations, &summary, own, e) : 0;
+	int rc = render_integrator_find(p->integrator)->has_mutations ? render_mutations(p->mutations, &summary, own, e)
+								      : 0;
 	if (!rc && strcmp(own, p->mutations) != 0)
-		rc = error_set(e, EINVAL, "this worker spells the mixture of mutations '%s', the plan '%s': other versions?", own,
+		rc = error_set(e, EINVAL,
+			       "this worker spells the mixture of mutations '%s', the plan '%s': other versions?", own,
 			       p->mutations);
 	return rc;
 }
@@ -224,7 +233,8 @@ static int build(struct job_cache *b, struct error *e)
 	const Farm__JobInfo *m = info_of(b);
 	struct scene_define defines[DEFINES_MAX];
 	struct asset_source assets = {b, open_asset, close_asset};
-	struct render_options options = {.width = m->render_width, .height = m->render_height, .max_depth = b->plan.max_depth};
+	struct render_options options = {
+		.width = m->render_width, .height = m->render_height, .max_depth = b->plan.max_depth};
 	memcpy(options.accuracy, b->plan.accuracy, sizeof options.accuracy);
 	memcpy(options.effects, b->plan.effects, sizeof options.effects);
 	struct scene scene;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job at a worker: what it is (JobInfo), its files in the cache, its world. The world is built on a thread of the thread pool
- * and shared by all leases; everything else is the loop's thread.
+ * A job at a worker: what it is (JobInfo), its files in the cache, its world. The world is built on a thread of the
+ * thread pool and shared by all leases; everything else is the loop's thread.
  */
 #ifndef WORKER_DAEMON_JOB_CACHE_H
 #define WORKER_DAEMON_JOB_CACHE_H
@@ -27,14 +27,14 @@ struct job_cache {
 	struct envelope info; /* JobInfo, owned */
 	struct plan plan;
 	struct blob_store *blobs;
-	bool *held;   /* by file: in the cache, held */
-	char **paths; /* by file, for the builder's thread */
+	bool *held;		 /* by file: in the cache, held */
+	char **paths;		 /* by file, for the builder's thread */
 	struct blob_hash wanted; /* while FETCHING: the blob that it waits for */
 	struct world *world;
 	struct lease_key waits; /* one of the leases that wait for the world; job 0: none */
-	unsigned users;     /* leases that need it */
-	uint64_t last_used; /* counter */
-	bool ended;         /* the coordinator needs it no more */
+	unsigned users;		/* leases that need it */
+	uint64_t last_used;	/* counter */
+	bool ended;		/* the coordinator needs it no more */
 	double build_seconds;
 	void *owner;
 	void (*built)(struct job_cache *); /* on the loop's thread: READY or FAILED */
@@ -48,7 +48,8 @@ void job_cache_free(struct job_cache *b);
 
 /* Takes the answer to JobGet; then job_cache_next_missing. -EBADMSG. */
 int job_cache_set_info(struct job_cache *b, struct envelope *info, struct error *e);
-/* Whether it is the same job: number and all, but for the bounds, which may have been moved. Where it cannot be known: not. */
+/* Whether it is the same job: number and all, but for the bounds, which may have been moved. Where it cannot be known:
+ * not. */
 bool job_cache_is_of(const struct job_cache *b, const Farm__JobInfo *info);
 /* Holds what is there; the next hash to fetch into b->wanted. false: all files are there. */
 bool job_cache_next_missing(struct job_cache *b);

@@ -159,7 +159,8 @@ static void go_on(struct agent *a, struct job_cache *b)
 
 /* ---- leases ---- */
 
-/* Where leases are short and the coordinator's disk is slow results pile up: it asks for no more until they have gone. */
+/* Where leases are short and the coordinator's disk is slow results pile up: it asks for no more until they have gone.
+ */
 static void pace(struct agent *a)
 {
 	enum { RESULTS_MANY = 256, RESULTS_FEW = 128 };
@@ -221,8 +222,8 @@ static bool is_flood(const struct agent *a)
 	return open >= 4 * (a->config.threads + 1) + 16;
 }
 
-/* Results that are not acknowledged are many where leases are short and the coordinator's disk is slow. Whoever hung up then
- * would send them all again, and have no fewer. */
+/* Results that are not acknowledged are many where leases are short and the coordinator's disk is slow. Whoever hung up
+ * then would send them all again, and have no fewer. */
 static bool is_stuffed(const struct agent *a)
 {
 	enum { ANSWERS_MOST = 1024 };
@@ -243,7 +244,8 @@ static void take_grant(struct agent *a, const Farm__LeaseGrant *m, const unsigne
 	}
 	struct job_cache *b = find_job_cache(a, g.key.job);
 	l = find_lease(a, &g.key);
-	if (l && !blob_hash_equal(&l->grant.digest, &g.digest)) { /* the epoch before was computed again: this one is another now */
+	if (l && !blob_hash_equal(&l->grant.digest,
+				  &g.digest)) { /* the epoch before was computed again: this one is another now */
 		forget_lease(a, l);
 		l = NULL;
 	}
@@ -299,11 +301,12 @@ static void take_ack(struct agent *a, const Farm__LeaseAck *m)
 	}
 	struct lease_task *l = find_lease(a, &k);
 	if (m->verdict == FARM__VERDICT__VERDICT_REFUSED)
-		log_event(LOG_BATCH_REFUSED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k.job), k.group, k.part,
-			  number(k.epoch), log_quote(m->text).text);
+		log_event(LOG_BATCH_REFUSED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k.job), k.group,
+			  k.part, number(k.epoch), log_quote(m->text).text);
 	else if (m->verdict != FARM__VERDICT__VERDICT_NOTED)
-		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu kind=%d group=%u part=%u epoch=%llu repeat=%d", number(k.job),
-			  (int)k.kind, k.group, k.part, number(k.epoch), m->verdict == FARM__VERDICT__VERDICT_REPEATED);
+		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu kind=%d group=%u part=%u epoch=%llu repeat=%d",
+			  number(k.job), (int)k.kind, k.group, k.part, number(k.epoch),
+			  m->verdict == FARM__VERDICT__VERDICT_REPEATED);
 	if (l && l->state == LEASE_RENDERED) {
 		drop_lease(a, l);
 		pace(a);
@@ -336,7 +339,8 @@ static void take_job_end(struct agent *a, uint64_t job)
 	tidy(a);
 }
 
-/* The coordinator has begun anew, and the job's number is another job's now: what was made of the old one is nobody's. */
+/* The coordinator has begun anew, and the job's number is another job's now: what was made of the old one is nobody's.
+ */
 static void disown(struct agent *a, struct job_cache *b)
 {
 	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job of this number\"", number(b->job));
@@ -370,7 +374,8 @@ static void take_job_info(struct agent *a, struct envelope *env)
 	tidy(a);
 }
 
-/* Where it cannot be fetched for one job the others that want it try for themselves: what the first one held makes room. */
+/* Where it cannot be fetched for one job the others that want it try for themselves: what the first one held makes
+ * room. */
 static void take_blob(struct agent *a, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
 {
 	struct error e;
@@ -457,7 +462,8 @@ void lease_queue_leave(struct agent *a)
 	say_request(a);
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
-		if (l->state == LEASE_RENDERED || (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)))
+		if (l->state == LEASE_RENDERED ||
+		    (l->state == LEASE_QUEUED && !thread_pool_take_back(a->thread_pool, &l->task)))
 			continue;
 		say_failed(a, &l->grant.key, "", false);
 		drop_lease(a, l);
@@ -502,7 +508,8 @@ static bool watch_builds(struct agent *a)
 		struct error e;
 		if (b->state != JOB_CACHE_BUILDING || b->task.hung || !has_hung(&b->task))
 			continue;
-		error_set(&e, ETIMEDOUT, "no progress for %g s in building the scene: its thread hangs", a->config.stall_seconds);
+		error_set(&e, ETIMEDOUT, "no progress for %g s in building the scene: its thread hangs",
+			  a->config.stall_seconds);
 		fail_leases_of(a, b, &e);
 		b->task.hung = found = true;
 	}

@@ -59,8 +59,8 @@ static uint64_t next(uint64_t *state)
 	return z ^ z >> 31;
 }
 
-/* Behind its id, so that it looks like the chain's: flipped bits, numbers that are none or huge or tiny, noise here and there, the end cut
- * off, noise throughout. */
+/* Behind its id, so that it looks like the chain's: flipped bits, numbers that are none or huge or tiny, noise here and
+ * there, the end cut off, noise throughout. */
 static void spoil_state(struct chain_state *s, uint64_t *dice)
 {
 	enum { ID = 8, MUTATIONS = 8 };
@@ -104,7 +104,8 @@ static void run(struct task *t)
 		pause();
 	if (!atomic_load(&l->stop))
 		l->rc = render_lease(l->bundle->world, p, &l->grant.key, &in, &l->stop, &l->end, &batch, &l->error);
-	if (!l->rc && l->end == LEASE_DONE) /* what the coordinator would refuse is the scene's fault, and is said before it is sent */
+	if (!l->rc && l->end == LEASE_DONE) /* what the coordinator would refuse is the scene's fault, and is said
+					       before it is sent */
 		l->rc = batch_check(&batch, p, &l->error);
 	if (l->rc)
 		error_prefix(&l->error, l->rc, "%s", l->bundle->info.message->job_info->scene);

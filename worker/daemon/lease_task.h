@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A lease in a worker's hands: from the grant through a thread of the thread pool to the frame that carries its result, which is
- * kept until the coordinator has acknowledged it. Loop's thread, but for the run itself.
+ * A lease in a worker's hands: from the grant through a thread of the thread pool to the frame that carries its result,
+ * which is kept until the coordinator has acknowledged it. Loop's thread, but for the run itself.
  */
 #ifndef WORKER_DAEMON_LEASE_TASK_H
 #define WORKER_DAEMON_LEASE_TASK_H
@@ -24,12 +24,12 @@ struct lease_task {
 	struct job_cache *bundle;
 	enum lease_task_state state;
 	atomic_bool stop;
-	bool hangs;    /* tests: it never ends */
-	bool crashes;  /* tests: by SIGSEGV */
-	bool unwanted; /* nobody waits for it: dropped when its thread lets go */
+	bool hangs;	 /* tests: it never ends */
+	bool crashes;	 /* tests: by SIGSEGV */
+	bool unwanted;	 /* nobody waits for it: dropped when its thread lets go */
 	bool lie, large; /* tests */
-	uint64_t spoil; /* tests: not 0: a number for what happens to its chain states */
-	bool sent;     /* on this connection */
+	uint64_t spoil;	 /* tests: not 0: a number for what happens to its chain states */
+	bool sent;	 /* on this connection */
 	unsigned char *frame;
 	size_t frame_size;
 	/* set by the thread */

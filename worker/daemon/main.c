@@ -31,8 +31,20 @@ static const char doc[] =
 	"for good (a certificate of another role, another version), 75 a thread hung.";
 
 enum {
-	OPTION_NAME = 256, OPTION_CACHE, OPTION_CACHE_SIZE, OPTION_GRACE, OPTION_INSECURE, OPTION_REPEAT, OPTION_LARGE, OPTION_LIE, OPTION_SPOIL, OPTION_TLS,
-	OPTION_IDLE, OPTION_STALL, OPTION_HANG, OPTION_CRASH
+	OPTION_NAME = 256,
+	OPTION_CACHE,
+	OPTION_CACHE_SIZE,
+	OPTION_GRACE,
+	OPTION_INSECURE,
+	OPTION_REPEAT,
+	OPTION_LARGE,
+	OPTION_LIE,
+	OPTION_SPOIL,
+	OPTION_TLS,
+	OPTION_IDLE,
+	OPTION_STALL,
+	OPTION_HANG,
+	OPTION_CRASH
 };
 
 static const struct argp_option options[] = {
@@ -43,7 +55,8 @@ static const struct argp_option options[] = {
 	{"cache-size", OPTION_CACHE_SIZE, "GB", 0, "The cache's limit (20)", 0},
 	{"grace", OPTION_GRACE, "SECONDS", 0, "After SIGTERM (20)", 0},
 	{"idle-exit", OPTION_IDLE, "SECONDS", 0, "Leave when there was no lease for so long (0: never)", 0},
-	{"stall", OPTION_STALL, "SECONDS", 0, "How long a lease or the building of a scene may make no progress (120; 0: for ever)", 0},
+	{"stall", OPTION_STALL, "SECONDS", 0,
+	 "How long a lease or the building of a scene may make no progress (120; 0: for ever)", 0},
 	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
 	{"verbose", 'v', NULL, 0, "Log more", 0},
@@ -51,7 +64,8 @@ static const struct argp_option options[] = {
 	{"test-large", OPTION_LARGE, "N", OPTION_HIDDEN, "Make a pixel of one of N results 1e30", 0},
 	{"test-lie", OPTION_LIE, "N", OPTION_HIDDEN, "Flip a bit in one of N results", 0},
 	{"test-repeat", OPTION_REPEAT, NULL, OPTION_HIDDEN, "Send every result twice", 0},
-	{"test-crash", OPTION_CRASH, "N", OPTION_HIDDEN, "The N-th lease of each process that renders ends it by SIGSEGV", 0},
+	{"test-crash", OPTION_CRASH, "N", OPTION_HIDDEN,
+	 "The N-th lease of each process that renders ends it by SIGSEGV", 0},
 	{"test-hang", OPTION_HANG, "N", OPTION_HIDDEN, "The N-th lease never ends", 0},
 	{0},
 };

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What a worker says of jobs and leases; nothing where it is not connected. Loop's thread. A message that cannot be packed for want of
- * memory ends the connection: all is said again after the next.
+ * What a worker says of jobs and leases; nothing where it is not connected. Loop's thread. A message that cannot be
+ * packed for want of memory ends the connection: all is said again after the next.
  */
 #ifndef WORKER_DAEMON_SAY_H
 #define WORKER_DAEMON_SAY_H

@@ -112,9 +112,11 @@ int supervise(unsigned threads, int (*run)(void *), void *user)
 			return WEXITSTATUS(status);
 		if (s.asked)
 			return number == s.asked ? 0 : 1;
-		log_event(LOG_PROCESS_LOST, "signal=%d text=\"the process that renders was ended by %s\" leases=%u", number,
-			  crash_signal_name(number), lost);
-		s.pause = now() - begun > long_life ? first_pause : s.pause * 2 < longest_pause ? s.pause * 2 : longest_pause;
+		log_event(LOG_PROCESS_LOST, "signal=%d text=\"the process that renders was ended by %s\" leases=%u",
+			  number, crash_signal_name(number), lost);
+		s.pause = now() - begun > long_life	? first_pause
+			  : s.pause * 2 < longest_pause ? s.pause * 2
+							: longest_pause;
 		if (!pause_before_start(&s))
 			return 0;
 	}

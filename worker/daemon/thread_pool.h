@@ -16,10 +16,10 @@ struct task {
 	struct task *next;
 	void (*run)(struct task *);
 	void (*done)(struct task *); /* on the loop's thread */
-	atomic_ullong ticks;         /* of the thread that has it (common/base/liveness.h); 0: none has begun */
+	atomic_ullong ticks;	     /* of the thread that has it (common/base/liveness.h); 0: none has begun */
 	unsigned long long seen;     /* of them, when the watchdog looked last */
-	unsigned still;              /* looks in a row that saw nothing new */
-	bool hung;                   /* given up by the watchdog; a thread has it still */
+	unsigned still;		     /* looks in a row that saw nothing new */
+	bool hung;		     /* given up by the watchdog; a thread has it still */
 };
 
 struct thread_pool;
@@ -29,7 +29,8 @@ void thread_pool_add(struct thread_pool *c, struct task *t);
 /* true: it had not begun and is the caller's again. */
 bool thread_pool_take_back(struct thread_pool *c, struct task *t);
 unsigned thread_pool_pending(const struct thread_pool *c); /* tasks that are not done yet */
-/* Waits for what runs, for ever where that never ends; `done` is not called any more. The memory goes when the loop has closed its handle. */
+/* Waits for what runs, for ever where that never ends; `done` is not called any more. The memory goes when the loop has
+ * closed its handle. */
 void thread_pool_close(struct thread_pool *c);
 
 #endif

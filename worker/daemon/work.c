@@ -16,9 +16,9 @@ struct work {
 
 struct shared {
 	unsigned threads;
-	atomic_uint taken;  /* entries that a thread has */
-	atomic_int number;  /* of the signal that ended the process; 0: none */
-	atomic_int hit;     /* the entry of the thread that it hit; -1: none of these */
+	atomic_uint taken; /* entries that a thread has */
+	atomic_int number; /* of the signal that ended the process; 0: none */
+	atomic_int hit;	   /* the entry of the thread that it hit; -1: none of these */
 	char text[CRASH_TEXT];
 	unsigned lost_count;
 	struct lost_lease lost[WORK_THREADS];
@@ -83,9 +83,10 @@ static void lose(const struct work *w, const char *text, bool machine)
 		return;
 	struct lost_lease *l = &shared->lost[shared->lost_count++];
 	*l = (struct lost_lease){.key = *k, .own = machine};
-	text_print(l->text, sizeof l->text, "%s: the process that rendered it was ended by %s (j%llu, %s, group %u, part %u, epoch %llu)", w->scene,
-		   text, (unsigned long long)k->job, k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group, k->part,
-		   (unsigned long long)k->epoch);
+	text_print(l->text, sizeof l->text,
+		   "%s: the process that rendered it was ended by %s (j%llu, %s, group %u, part %u, epoch %llu)",
+		   w->scene, text, (unsigned long long)k->job, k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render",
+		   k->group, k->part, (unsigned long long)k->epoch);
 }
 
 /* What was told is forgotten. */

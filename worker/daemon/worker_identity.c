@@ -29,7 +29,8 @@ static void read_last(const char *path, char seed[SEED_HEX], uint64_t *count)
 	if (fd >= 0)
 		disk_close(fd);
 	line[n > 0 ? n : 0] = 0;
-	if (sscanf(line, "%32[0-9a-f] %" SCNu64, seed, count) == 2 && strlen(seed) == SEED_HEX - 1 && *count < UINT64_MAX / 2)
+	if (sscanf(line, "%32[0-9a-f] %" SCNu64, seed, count) == 2 && strlen(seed) == SEED_HEX - 1 &&
+	    *count < UINT64_MAX / 2)
 		return;
 	make_seed(seed);
 	*count = 0;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which life of which worker this is, so that a coordinator knows the next one from a stranger: a home, a random number made
- * with the folder (hashed with the machine's name, so that a copy of the folder elsewhere is another home), and how often a
- * worker has started from it. One thread.
+ * Which life of which worker this is, so that a coordinator knows the next one from a stranger: a home, a random number
+ * made with the folder (hashed with the machine's name, so that a copy of the folder elsewhere is another home), and
+ * how often a worker has started from it. One thread.
  */
 #ifndef WORKER_DAEMON_WORKER_IDENTITY_H
 #define WORKER_DAEMON_WORKER_IDENTITY_H
@@ -18,8 +18,8 @@ struct worker_identity {
 	uint64_t restarts;
 };
 
-/* Counts one more in folder/name, for good, before it returns; the caller holds a lock for that name. A file that says nothing
- * begins a new home. Where it cannot be written home is "". */
+/* Counts one more in folder/name, for good, before it returns; the caller holds a lock for that name. A file that says
+ * nothing begins a new home. Where it cannot be written home is "". */
 int worker_identity_begin(struct worker_identity *l, const char *folder, const char *name, struct error *e);
 
 #endif

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Light from a surface, the same in all directions of the side that its normal points to.
- * Meshes: uniform per area. Spheres: uniform per area for light paths; seen from outside, uniform over the cone that the
- * sphere subtends (Shirley, Wang, Zimmerman 1996, sec. 4.1.1), with its angle from the sine so that far spheres keep digits.
+ * Meshes: uniform per area. Spheres: uniform per area for light paths; seen from outside, uniform over the cone that
+ * the sphere subtends (Shirley, Wang, Zimmerman 1996, sec. 4.1.1), with its angle from the sine so that far spheres
+ * keep digits.
  */
 #include "worker/emitter/emitter.h"
 #include "worker/emitter/uniform.h"
@@ -52,8 +53,8 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	if (!a)
 		return error_set(e, ENOMEM, "out of memory");
 	a->surface = *build->surface;
-	int rc = texture_from_node(&a->radiance, n, "radiance", 1, COLOR_ILLUMINANT, build->assets, build->dialect_3, build->arena,
-				   e);
+	int rc = texture_from_node(&a->radiance, n, "radiance", 1, COLOR_ILLUMINANT, build->assets, build->dialect_3,
+				   build->arena, e);
 	if (rc)
 		return rc;
 	if (a->surface.is_sphere)
@@ -142,7 +143,8 @@ static double below_1(double x)
 static void triangle_inverse(const struct area *a, const struct emitter_point *x, double u[2])
 {
 	const struct emitter_surface *s = &a->surface;
-	vec3 v0 = corner(s, x->prim, 0), e1 = vec3_sub(corner(s, x->prim, 1), v0), e2 = vec3_sub(corner(s, x->prim, 2), v0);
+	vec3 v0 = corner(s, x->prim, 0), e1 = vec3_sub(corner(s, x->prim, 1), v0),
+	     e2 = vec3_sub(corner(s, x->prim, 2), v0);
 	vec3 r = vec3_sub(x->p, v0), n = vec3_cross(e1, e2);
 	double n2 = vec3_dot(n, n), b1 = vec3_dot(vec3_cross(r, e2), n) / n2, b2 = vec3_dot(vec3_cross(e1, r), n) / n2;
 	double root = fmin(fmax(1 - b1, 0), 1), low = a->cdf[x->prim], high = a->cdf[x->prim + 1];
@@ -166,7 +168,8 @@ static double pdf_point(const struct emitter *em, const struct emitter_point *x)
 	return 1 / ((const struct area *)em->data)->area;
 }
 
-static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w, double *pdf)
+static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
+			     double *pdf)
 {
 	(void)em;
 	struct frame f = frame_around(x->n);
@@ -182,7 +185,8 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 	return fmax(vec3_dot(x->n, w), 0) / M_PI;
 }
 
-/* The sphere as seen from outside: distance and squared sine of its half angle. false: from inside, or it shines inwards. */
+/* The sphere as seen from outside: distance and squared sine of its half angle. false: from inside, or it shines
+ * inwards. */
 static bool sphere_cone(const struct area *a, vec3 ref, vec3 *axis, double *distance, double *sin2)
 {
 	vec3 to = vec3_sub(a->surface.center, ref);

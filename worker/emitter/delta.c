@@ -5,12 +5,14 @@ int delta_create(struct emitter *em, struct delta_light *l, const struct scene_n
 		 const struct emitter_build *build, struct error *e)
 {
 	struct texture t;
-	int code = texture_from_node(&t, n, name, 1, COLOR_ILLUMINANT, build->assets, build->dialect_3, build->arena, e);
+	int code =
+		texture_from_node(&t, n, name, 1, COLOR_ILLUMINANT, build->assets, build->dialect_3, build->arena, e);
 	if (code)
 		return code;
 	double away = vec3_length(l->x.p);
 	if (!(away <= PARAM_REACH_MAX))
-		return node_error(n, e, ERANGE, "stands %g times the scene's radius away from it, beyond %g", away, PARAM_REACH_MAX);
+		return node_error(n, e, ERANGE, "stands %g times the scene's radius away from it, beyond %g", away,
+				  PARAM_REACH_MAX);
 	if (!(factor > 0) || !isfinite(factor))
 		return node_error(n, e, EINVAL, "the scene's size leaves no number for this light's strength");
 	l->color = t.color;
@@ -49,7 +51,8 @@ double delta_pdf_point(const struct emitter *em, const struct emitter_point *x)
 	return 1;
 }
 
-bool delta_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x, double *pdf_toward)
+bool delta_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
+			 double *pdf_toward)
 {
 	(void)ref;
 	return delta_sample_point(em, u, x, pdf_toward);

@@ -2,12 +2,12 @@
 /*
  * Emitters. One file per plug-in and one line in emitter_list.h; the generic tests pick it up.
  * A point on an emitter is a position with a normal, or for emitters at infinity the unit direction from the scene
- * towards it. Measures: `pdf_point` and `pdf_toward` are per area (world units of the rescaled scene), per solid angle at
- * infinity. Immutable after creation; any thread; nothing allocates after create.
+ * towards it. Measures: `pdf_point` and `pdf_toward` are per area (world units of the rescaled scene), per solid angle
+ * at infinity. Immutable after creation; any thread; nothing allocates after create.
  *
- * Delta emitters are one point (or one direction): nothing hits them by chance, the measure of x_0 counts and both densities
- * are 1. What `radiance` gives is intensity per solid angle at a point (no cosine there, n is 0), irradiance across the
- * direction at infinity.
+ * Delta emitters are one point (or one direction): nothing hits them by chance, the measure of x_0 counts and both
+ * densities are 1. What `radiance` gives is intensity per solid angle at a point (no cosine there, n is 0), irradiance
+ * across the direction at infinity.
  */
 #ifndef WORKER_EMITTER_EMITTER_H
 #define WORKER_EMITTER_EMITTER_H
@@ -16,8 +16,8 @@
 #include "worker/texture/texture.h"
 
 struct emitter_point {
-	vec3 p;        /* position, or direction towards the emitter when infinite */
-	vec3 n;        /* unit normal on the emitting side; 0 at a delta emitter; unused when infinite */
+	vec3 p;	       /* position, or direction towards the emitter when infinite */
+	vec3 n;	       /* unit normal on the emitting side; 0 at a delta emitter; unused when infinite */
 	double u, v;   /* texture coordinates */
 	uint32_t prim; /* triangle of the surface; 0 on a sphere; unused when infinite */
 	bool infinite;
@@ -51,9 +51,11 @@ struct emitter_ops {
 	const struct param *params;
 	unsigned nested_classes;
 	bool needs_surface; /* area: belongs into a shape */
-	int (*create)(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e);
+	int (*create)(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+		      struct error *e);
 	/* Radiance leaving x in direction w (unit, away from the emitter, into the scene). */
-	spectrum (*radiance)(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl);
+	spectrum (*radiance)(const struct emitter *em, const struct emitter_point *x, vec3 w,
+			     const struct wavelengths *wl);
 	/* Where light sub-paths begin. */
 	bool (*sample_point)(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);
 	double (*pdf_point)(const struct emitter *em, const struct emitter_point *x);
@@ -73,10 +75,10 @@ struct emitter {
 	const struct emitter_ops *ops;
 	bool infinite, textured, delta;
 	enum color_shape shape; /* CONSTANT, D65: the same spectrum everywhere but for a factor */
-	double power;           /* for choosing among emitters: area x pi x mean radiance; infinite: mean radiance x 4 pi,
-				   or irradiance, multiplied by the scene's cross section pi R^2 by the caller */
-	double brightest;       /* upper bound of the radiance, over places, directions and wavelengths; of delta emitters what
-				   pixels may be expected to stay below, see delta.h */
+	double power;	  /* for choosing among emitters: area x pi x mean radiance; infinite: mean radiance x 4 pi,
+			     or irradiance, multiplied by the scene's cross section pi R^2 by the caller */
+	double brightest; /* upper bound of the radiance, over places, directions and wavelengths; of delta emitters
+			     what pixels may be expected to stay below, see delta.h */
 	void *data;
 };
 

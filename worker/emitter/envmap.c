@@ -1,14 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * An equirectangular picture of the surroundings. Local +y is up (the top row), the middle column looks along +z
- * and the one a quarter from the left along +x: u = atan2(x, -z) / 2 pi, v = acos(y) / pi, in both dialects. Pixel centres lie at
- * half-integers, also vertically, where Mitsuba 3 puts the first and last rows onto the poles: a shift of up to half
- * a pixel.
+ * and the one a quarter from the left along +x: u = atan2(x, -z) / 2 pi, v = acos(y) / pi, in both dialects. Pixel
+ * centres lie at half-integers, also vertically, where Mitsuba 3 puts the first and last rows onto the poles: a shift
+ * of up to half a pixel.
  *
  * Sampling: the radiance is bilinear between pixel centres, so the cells of the density lie between pixel centres too
  * (and from the outer rows to the poles). Within a cell the density is constant in solid angle and in proportion to the
  * mean luminance of its four corners: it is positive wherever there is light. A row's cells have probabilities in
- * multiples of 2^-31, at least one where there is light, kept as running sums: sampling and density use the same numbers.
+ * multiples of 2^-31, at least one where there is light, kept as running sums: sampling and density use the same
+ * numbers.
  */
 #include "worker/emitter/emitter.h"
 #include "worker/texture/raster.h"
@@ -20,8 +21,8 @@
 struct envmap {
 	struct raster raster;
 	double scale;
-	vec3 axis[3];       /* the local axes in the world */
-	uint32_t rows;      /* height + 1 */
+	vec3 axis[3];	    /* the local axes in the world */
+	uint32_t rows;	    /* height + 1 */
 	uint32_t columns;   /* width */
 	double *row_cdf;    /* rows + 1; the last is 1; all 0 when black */
 	uint32_t *cell_cdf; /* [rows][columns + 1] */
@@ -88,7 +89,8 @@ static double envmap_pdf_point(const struct emitter *em, const struct emitter_po
 	const uint32_t *cells = row_cells(m, row);
 	if (cells[m->columns] == 0)
 		return 0;
-	double chance = (m->row_cdf[row + 1] - m->row_cdf[row]) * (cells[column + 1] - cells[column]) / cells[m->columns];
+	double chance =
+		(m->row_cdf[row + 1] - m->row_cdf[row]) * (cells[column + 1] - cells[column]) / cells[m->columns];
 	return chance / (row_height(m, row) * 2 * PI / m->columns);
 }
 
@@ -103,7 +105,8 @@ static void envmap_point_inverse(const struct emitter *em, const struct emitter_
 	/* Heights in the cosine, as differences of angles. */
 	double angle = atan2(hypot(d.x, d.z), d.y), edge = row_edge(m, row);
 	double down = 2 * sin(0.5 * (angle + edge)) * sin(0.5 * (angle - edge)) / row_height(m, row);
-	u[0] = cells[m->columns] ? (cells[column] + across * (cells[column + 1] - cells[column])) / cells[m->columns] : 0;
+	u[0] = cells[m->columns] ? (cells[column] + across * (cells[column + 1] - cells[column])) / cells[m->columns]
+				 : 0;
 	u[1] = m->row_cdf[row] + down * (m->row_cdf[row + 1] - m->row_cdf[row]);
 	for (int i = 0; i < 2; i++)
 		u[i] = fmin(fmax(u[i], 0), 1 - 0x1p-53);
@@ -239,7 +242,8 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 		return node_error(n, e, ENOMEM, "out of memory");
 	int code = read_axes(m, n, e);
 	if (!code)
-		code = raster_read(&m->raster, n, build->assets, &(struct raster_range){0, HUGE_VAL, false}, build->arena, e);
+		code = raster_read(&m->raster, n, build->assets, &(struct raster_range){0, HUGE_VAL, false},
+				   build->arena, e);
 	if (code)
 		return code;
 	m->raster.wrap_u = RASTER_REPEAT;

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A point that shines into a cone around to_world's +z: `intensity` up to the angle `beam_width` from the axis, from there
- * linear in the angle to 0 at `cutoff_angle` (degrees; 20, and 3/4 of the cut-off, where nothing is said). Light paths leave
- * it uniformly over the cone.
+ * A point that shines into a cone around to_world's +z: `intensity` up to the angle `beam_width` from the axis, from
+ * there linear in the angle to 0 at `cutoff_angle` (degrees; 20, and 3/4 of the cut-off, where nothing is said). Light
+ * paths leave it uniformly over the cone.
  */
 #include "worker/emitter/delta.h"
 #include "worker/math/frame.h"
@@ -11,7 +11,7 @@ struct spot {
 	struct delta_light light;
 	struct frame axes;
 	double cutoff, beam; /* radians */
-	double height;       /* of the cone's cap: 1 - cos(cutoff) */
+	double height;	     /* of the cone's cap: 1 - cos(cutoff) */
 };
 
 static double falloff(const struct spot *s, vec3 w)

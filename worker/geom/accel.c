@@ -22,8 +22,8 @@ struct accel {
 	struct wide_prims *wide; /* one a shape */
 	atomic_size_t bytes, peak;
 	vec3 low, high;
-	double size; /* sum of the sides */
-	double reach; /* how far Embree's floats can be off, see below */
+	double size;   /* sum of the sides */
+	double reach;  /* how far Embree's floats can be off, see below */
 	double detail; /* of a scene of mixed scales: the extent of its smallest shape; else 0 */
 };
 
@@ -45,8 +45,8 @@ static bool progress_monitor(void *counter, double done)
 	return true;
 }
 
-/* So high over the triangle's plane at both ends that not even the normal that Embree makes of tiny triangles far away can
- * be wrong about the side: spares most hits the way to their vertices. */
+/* So high over the triangle's plane at both ends that not even the normal that Embree makes of tiny triangles far away
+ * can be wrong about the side: spares most hits the way to their vertices. */
 static bool clearly_crosses(const struct query *q, const struct RTCHit *hit, const struct RTCRay *ray)
 {
 	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
@@ -74,11 +74,12 @@ static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
 		if (!query_crosses_there(q, (struct prim_ref){hit->geomID, hit->primID}))
 			args->valid[0] = 0;
 	} else if (!clearly_crosses(q, hit, (const struct RTCRay *)(const void *)args->ray) &&
-		 !query_crosses(q, args->geometryUserPtr, hit->primID))
+		   !query_crosses(q, args->geometryUserPtr, hit->primID))
 		args->valid[0] = 0;
 }
 
-/* The final hit is among those that pass here: its vertices, far apart in memory, come while Embree goes on searching. */
+/* The final hit is among those that pass here: its vertices, far apart in memory, come while Embree goes on searching.
+ */
 static void filter_closest(const struct RTCFilterFunctionNArguments *args)
 {
 	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
@@ -102,8 +103,8 @@ static int attach_triangles(struct accel *a, struct accel_shape *s, uint32_t id)
 	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_TRIANGLE);
 	if (!g)
 		return -ENOMEM;
-	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, s->position, 0, sizeof s->position[0],
-				   s->vertex_count);
+	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, s->position, 0,
+				   sizeof s->position[0], s->vertex_count);
 	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, s->index, 0, sizeof s->index[0],
 				   s->triangle_count);
 	rtcSetGeometryUserData(g, s);
@@ -125,7 +126,8 @@ static int attach_sphere(struct accel *a, const struct accel_shape *s, uint32_t 
 	return 0;
 }
 
-/* The triangles of a shape that are `least` large, as a geometry of their own, of a number beyond those of the shapes. */
+/* The triangles of a shape that are `least` large, as a geometry of their own, of a number beyond those of the shapes.
+ */
 static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, double least)
 {
 	struct wide_prims *w = &a->wide[id];
@@ -177,19 +179,21 @@ static int embree_failure(RTCDevice device, struct error *e)
 	enum RTCError code = rtcGetDeviceError(device);
 	if (code == RTC_ERROR_NONE)
 		return 0;
-	return error_set(e, code == RTC_ERROR_OUT_OF_MEMORY ? ENOMEM : EIO, "Embree reports error %d while building", (int)code);
+	return error_set(e, code == RTC_ERROR_OUT_OF_MEMORY ? ENOMEM : EIO, "Embree reports error %d while building",
+			 (int)code);
 }
 
-/* How far a point in float, and what Embree's robust test makes of it with vertices anywhere in the scene, can be off: half
- * a unit in the last place of each coordinate for the point, as much again for the differences, times four. */
+/* How far a point in float, and what Embree's robust test makes of it with vertices anywhere in the scene, can be off:
+ * half a unit in the last place of each coordinate for the point, as much again for the differences, times four. */
 static double rounding_reach(vec3 low, vec3 high)
 {
 	vec3 m = {fmax(fabs(low.x), fabs(high.x)), fmax(fabs(low.y), fabs(high.y)), fmax(fabs(low.z), fabs(high.z))};
 	return 0x1p-21 * fmax(m.x, fmax(m.y, m.z));
 }
 
-/* A scene has mixed scales where its smallest shape is so much smaller than the scene: what floats are off in all of it is
- * then more than a thousandth of that shape. Triangles that are so much larger than that shape are solved in double. */
+/* A scene has mixed scales where its smallest shape is so much smaller than the scene: what floats are off in all of it
+ * is then more than a thousandth of that shape. Triangles that are so much larger than that shape are solved in double.
+ */
 #define MIXED 0x1p11
 
 static double extent_of(const struct accel_shape *s)
@@ -228,9 +232,11 @@ static void find_detail(struct accel *a, const struct accel_shape *shapes, uint3
 /* A sphere is hidden wholly or not at all. */
 static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
 {
-	if (a->shapes[id].is_sphere && coincide_there(a->coincidence, a->shapes, (struct prim_ref){id, 0}, a->shapes[id].center).shape != id)
+	if (a->shapes[id].is_sphere &&
+	    coincide_there(a->coincidence, a->shapes, (struct prim_ref){id, 0}, a->shapes[id].center).shape != id)
 		return 0;
-	int rc = a->shapes[id].is_sphere ? attach_sphere(a, &a->shapes[id], id) : attach_triangles(a, &a->shapes[id], id);
+	int rc = a->shapes[id].is_sphere ? attach_sphere(a, &a->shapes[id], id)
+					 : attach_triangles(a, &a->shapes[id], id);
 	return rc || a->detail == 0 ? rc : attach_wide(a, count, id, MIXED * a->detail);
 }
 
@@ -267,7 +273,8 @@ static int build(struct accel *a, const struct accel_shape *shapes, uint32_t cou
 	return 0;
 }
 
-int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t count, const struct coincidence *c, struct error *e)
+int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t count, const struct coincidence *c,
+	      struct error *e)
 {
 	*out = NULL;
 	struct accel *a = mem_alloc(1, sizeof *a);
@@ -279,7 +286,8 @@ int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t cou
 	a->count = count;
 	a->coincidence = c;
 	unsigned trap = fptrap_leave();
-	int rc = a->spheres && a->shapes && a->wide ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
+	int rc =
+		a->spheres && a->shapes && a->wide ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
 	fptrap_return(trap);
 	if (rc)
 		accel_free(a);
@@ -339,8 +347,8 @@ static double norm_max(vec3 v)
 	return fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
 }
 
-/* rounding_reach of a ray at p. Of mixed scales: by what is there, not by the scene: the triangles that Embree solves, and the
- * doubles of p itself on a triangle as large as the scene. */
+/* rounding_reach of a ray at p. Of mixed scales: by what is there, not by the scene: the triangles that Embree solves,
+ * and the doubles of p itself on a triangle as large as the scene. */
 static double reach_at(const struct accel *a, vec3 p)
 {
 	if (a->detail == 0)
@@ -348,8 +356,8 @@ static double reach_at(const struct accel *a, vec3 p)
 	return 0x1p-21 * (norm_max(p) + MIXED * a->detail) + 0x1p-50 * a->size;
 }
 
-/* A ray in float from o + t0 d on is off by parts of its distance from the origin, which is too much for what it meets far nearer
- * to it: there another begins. In units of d. */
+/* A ray in float from o + t0 d on is off by parts of its distance from the origin, which is too much for what it meets
+ * far nearer to it: there another begins. In units of d. */
 static double part_end(const struct accel *a, vec3 o, vec3 d, double t0, double t_max)
 {
 	if (a->detail == 0)
@@ -371,15 +379,21 @@ static vec3 lifted(const struct accel *a, vec3 p, vec3 ng, vec3 d)
 /* Embree ends the program on rays beyond about 1.8e18 (FLT_LARGE). A number that is none fails, too. */
 static void check_ray(const struct RTCRay *r)
 {
-	float sum = fabsf(r->org_x) + fabsf(r->org_y) + fabsf(r->org_z) + fabsf(r->dir_x) + fabsf(r->dir_y) + fabsf(r->dir_z);
+	float sum = fabsf(r->org_x) + fabsf(r->org_y) + fabsf(r->org_z) + fabsf(r->dir_x) + fabsf(r->dir_y) +
+		    fabsf(r->dir_z);
 	if (!(sum < 1e18f))
 		fptrap_fault();
 }
 
 static struct query query_of(const struct accel *a, vec3 o, vec3 d)
 {
-	return (struct query){.o = o, .d = d, .from = PRIM_NONE, .to = PRIM_NONE,
-			      .wide_from = a->detail == 0 ? INFINITY : MIXED * a->detail, .coincidence = a->coincidence, .shapes = a->shapes};
+	return (struct query){.o = o,
+			      .d = d,
+			      .from = PRIM_NONE,
+			      .to = PRIM_NONE,
+			      .wide_from = a->detail == 0 ? INFINITY : MIXED * a->detail,
+			      .coincidence = a->coincidence,
+			      .shapes = a->shapes};
 }
 
 /* It lies on a surface where another is. */
@@ -391,11 +405,12 @@ static bool is_hidden(const struct accel *a, const struct ray_end *end)
 	return there.shape != end->prim.shape || there.prim != end->prim.prim;
 }
 
-/* Embree's ray for the part from t0 to t1 runs from o along d, beside the true one, and begins before it, by as much as floats
- * may be off: beside, so that a low ray does not slip out along the edge of the triangle that it leaves and that is filtered;
- * before, and beyond the end, so that nothing near them is lost. What it does not meet in double between the ends is turned
- * down by the callbacks. */
-static void fill_ray(const struct accel *a, struct RTCRay *ray, struct query *q, double t_min, vec3 o, vec3 d, double t0, double t1)
+/* Embree's ray for the part from t0 to t1 runs from o along d, beside the true one, and begins before it, by as much as
+ * floats may be off: beside, so that a low ray does not slip out along the edge of the triangle that it leaves and that
+ * is filtered; before, and beyond the end, so that nothing near them is lost. What it does not meet in double between
+ * the ends is turned down by the callbacks. */
+static void fill_ray(const struct accel *a, struct RTCRay *ray, struct query *q, double t_min, vec3 o, vec3 d,
+		     double t0, double t1)
 {
 	q->reach = reach_at(a, vec3_madd(q->o, t0, q->d));
 	/* A segment that is shorter leaves Embree's floats no ray. */
@@ -431,7 +446,8 @@ static bool closest(const struct accel *a, struct query *q, struct RTCRayHit *rh
 	return rh->hit.geomID != RTC_INVALID_GEOMETRY_ID;
 }
 
-bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max, struct ray_hit *hit)
+bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max,
+		   struct ray_hit *hit)
 {
 	double enter = entry_distance(a, from->p, d);
 	if (enter >= t_max || is_hidden(a, from))
@@ -442,7 +458,8 @@ bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, do
 	if (!closest(a, &q, &rh, lifted(a, q.o, from->ng, d), fmax(t_min - enter, 0), t_max - enter))
 		return false;
 	double t = enter + fmax((double)rh.ray.tfar - q.back, 0);
-	*hit = (struct ray_hit){query_there(&q, (struct prim_ref){rh.hit.geomID, rh.hit.primID}), t, (double)rh.hit.u, (double)rh.hit.v};
+	*hit = (struct ray_hit){query_there(&q, (struct prim_ref){rh.hit.geomID, rh.hit.primID}), t, (double)rh.hit.u,
+				(double)rh.hit.v};
 	return true;
 }
 

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Asking which of coinciding primitives is there, and whether two coincide. The latter is decided on the polygon in which the one
- * projects onto the other: its corners lie no farther from the other's plane than the vertices of both are rounded, 2^-24 of each
- * coordinate, and it is wider than a few such roundings. The corners decide for all of it: both are planes.
+ * Asking which of coinciding primitives is there, and whether two coincide. The latter is decided on the polygon in
+ * which the one projects onto the other: its corners lie no farther from the other's plane than the vertices of both
+ * are rounded, 2^-24 of each coordinate, and it is wider than a few such roundings. The corners decide for all of it:
+ * both are planes.
  */
 #include "worker/geom/coincide.h"
 
@@ -38,7 +39,8 @@ static double largest(double a, double b, double c)
 /* What rounding of its vertices can move a triangle by, along n. */
 static double rounded_along(const struct triangle *t, vec3 n)
 {
-	return 0x1p-24 * (fabs(n.x) * largest(t->v[0].x, t->v[1].x, t->v[2].x) + fabs(n.y) * largest(t->v[0].y, t->v[1].y, t->v[2].y) +
+	return 0x1p-24 * (fabs(n.x) * largest(t->v[0].x, t->v[1].x, t->v[2].x) +
+			  fabs(n.y) * largest(t->v[0].y, t->v[1].y, t->v[2].y) +
 			  fabs(n.z) * largest(t->v[0].z, t->v[1].z, t->v[2].z));
 }
 
@@ -68,8 +70,8 @@ bool coincide_triangles(const struct triangle *a, const struct triangle *b, bool
 	for (unsigned i = 0; i < over.n; i++)
 		if (!(fabs(vec3_dot(n, vec3_sub(over.p[i], b->v[0]))) <= within))
 			return false;
-	*wholly = over.n == 3 && vec3_length(vec3_sub(over.p[0], a->v[0])) == 0 && vec3_length(vec3_sub(over.p[1], a->v[1])) == 0 &&
-		  vec3_length(vec3_sub(over.p[2], a->v[2])) == 0;
+	*wholly = over.n == 3 && vec3_length(vec3_sub(over.p[0], a->v[0])) == 0 &&
+		  vec3_length(vec3_sub(over.p[1], a->v[1])) == 0 && vec3_length(vec3_sub(over.p[2], a->v[2])) == 0;
 	return over.n >= 3 && has_width(&over, n);
 }
 
@@ -81,7 +83,8 @@ static bool covers(const struct accel_shape *s, uint32_t prim, vec3 p, vec3 n)
 	return triangle_meets(&t, p, n, &unused);
 }
 
-static const struct coincide_pair *find_first(const struct coincidence *c, struct prim_ref prim, const struct coincide_pair *end)
+static const struct coincide_pair *find_first(const struct coincidence *c, struct prim_ref prim,
+					      const struct coincide_pair *end)
 {
 	const struct coincide_pair *low = c->pairs + c->first[prim.shape];
 	while (low < end) {
@@ -95,7 +98,8 @@ static const struct coincide_pair *find_first(const struct coincidence *c, struc
 }
 
 /* One that hides it there; false: none does. */
-static bool hides(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim, vec3 p, struct prim_ref *by)
+static bool hides(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim, vec3 p,
+		  struct prim_ref *by)
 {
 	const struct coincide_pair *end = c->pairs + c->first[prim.shape + 1], *at = find_first(c, prim, end);
 	if (at == end || at->hidden.prim != prim.prim)
@@ -110,10 +114,12 @@ static bool hides(const struct coincidence *c, const struct accel_shape *shapes,
 	return false;
 }
 
-struct prim_ref coincide_there(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim, vec3 p)
+struct prim_ref coincide_there(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim,
+			       vec3 p)
 {
 	/* What hides it may be hidden itself; ranks end this. */
-	while (c && prim.shape != PRIM_NONE.shape && c->first[prim.shape] < c->first[prim.shape + 1] && hides(c, shapes, prim, p, &prim))
+	while (c && prim.shape != PRIM_NONE.shape && c->first[prim.shape] < c->first[prim.shape + 1] &&
+	       hides(c, shapes, prim, p, &prim))
 		;
 	return prim;
 }

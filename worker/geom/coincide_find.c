@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The search of coincide.h. Primitives go into halves of a box, those across the middle into both, until a part holds one shape
- * that does not shine (nothing to find), a few primitives, or cannot be told apart by place; what is left is compared two by two, in
- * the order of their ranks. A triangle that is wholly hidden hides nothing itself, so a stack of equal ones costs no square.
+ * The search of coincide.h. Primitives go into halves of a box, those across the middle into both, until a part holds
+ * one shape that does not shine (nothing to find), a few primitives, or cannot be told apart by place; what is left is
+ * compared two by two, in the order of their ranks. A triangle that is wholly hidden hides nothing itself, so a stack
+ * of equal ones costs no square.
  */
 #include "worker/geom/coincide.h"
 
@@ -60,7 +61,8 @@ static int compare_numbers(const void *a, const void *b)
 	return x < y ? -1 : x > y;
 }
 
-/* Where to cut so that the halves are smallest, judged by some of them; false: halves would be hardly smaller than the whole. */
+/* Where to cut so that the halves are smallest, judged by some of them; false: halves would be hardly smaller than the
+ * whole. */
 static bool choose_cut(const struct search *f, const struct prim_ref *items, size_t n, int *axis, double *at)
 {
 	struct member m[SAMPLE];
@@ -117,7 +119,8 @@ static bool coincide(const struct search *f, struct coincide_pair *p)
 	p->wholly = p->same_side = true;
 	if (a->is_sphere || b->is_sphere)
 		return a->is_sphere && b->is_sphere && spheres_coincide(a, b);
-	const struct triangle t = triangle_from(a->position, a->index[p->hidden.prim]), u = triangle_from(b->position, b->index[p->by.prim]);
+	const struct triangle t = triangle_from(a->position, a->index[p->hidden.prim]),
+			      u = triangle_from(b->position, b->index[p->by.prim]);
 	p->same_side = vec3_dot(t.n, u.n) > 0;
 	return coincide_triangles(&t, &u, &p->wholly);
 }
@@ -157,7 +160,8 @@ static int compare_all(struct search *f, struct member *m, size_t n)
 	for (size_t i = 0; i < n && !f->incomplete; i++) {
 		bool gone = false;
 		for (size_t j = 0; j < kept && !gone; j++) {
-			struct coincide_pair p = {.hidden = m[i].prim, .by = m[j].prim, .rank = f->shapes[m[j].prim.shape].rank};
+			struct coincide_pair p = {
+				.hidden = m[i].prim, .by = m[j].prim, .rank = f->shapes[m[j].prim.shape].rank};
 			f->work++;
 			if (!may_meet(f, &m[i], &m[j]) || !coincide(f, &p))
 				continue;
@@ -200,8 +204,8 @@ static uint32_t commonest(const struct prim_ref *items, size_t n)
 	return shape;
 }
 
-/* Of a large mesh and few others only what meets the box of one of those: most of a statue does not touch the room that it stands in.
- * Returns how many are left, at the beginning. */
+/* Of a large mesh and few others only what meets the box of one of those: most of a statue does not touch the room that
+ * it stands in. Returns how many are left, at the beginning. */
 static size_t leave_out(const struct search *f, struct prim_ref *items, size_t n)
 {
 	struct member others[OTHERS];
@@ -309,7 +313,8 @@ static int make(struct search *f, uint32_t count, struct coincidence **out)
 	struct coincidence *c = mem_alloc(1, sizeof *c);
 	if (!c)
 		return -ENOMEM;
-	*c = (struct coincidence){.pairs = f->pairs, .pair_count = unique_pairs(f->pairs, f->pair_count), .incomplete = f->incomplete};
+	*c = (struct coincidence){
+		.pairs = f->pairs, .pair_count = unique_pairs(f->pairs, f->pair_count), .incomplete = f->incomplete};
 	f->pairs = NULL;
 	c->shapes = mem_alloc(c->pair_count, sizeof *c->shapes);
 	c->first = mem_alloc((size_t)count + 1, sizeof *c->first);

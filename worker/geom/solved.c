@@ -24,7 +24,8 @@ struct prim_ref query_there(const struct query *q, struct prim_ref prim)
 	double slope = vec3_dot(t.n, q->d);
 	if (slope == 0)
 		return prim;
-	return coincide_there(q->coincidence, q->shapes, prim, vec3_madd(q->o, vec3_dot(t.n, vec3_sub(t.v[0], q->o)) / slope, q->d));
+	return coincide_there(q->coincidence, q->shapes, prim,
+			      vec3_madd(q->o, vec3_dot(t.n, vec3_sub(t.v[0], q->o)) / slope, q->d));
 }
 
 static bool is_end(const struct query *q, struct prim_ref p)
@@ -52,9 +53,9 @@ static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
 	b->upper_z = (float)(s->center.z + r);
 }
 
-/* The nearest admissible root of |o + t d - c|^2 = r^2 in (t_min, t_max). Where the ray starts on the sphere one root is 0,
- * where a segment ends on it one root is 1: the other follows from Vieta without cancellation. Else the discriminant comes
- * from the distance of the line to the centre (Haines et al. 2019, Ray Tracing Gems ch. 7). */
+/* The nearest admissible root of |o + t d - c|^2 = r^2 in (t_min, t_max). Where the ray starts on the sphere one root
+ * is 0, where a segment ends on it one root is 1: the other follows from Vieta without cancellation. Else the
+ * discriminant comes from the distance of the line to the centre (Haines et al. 2019, Ray Tracing Gems ch. 7). */
 static bool sphere_root(const struct sphere_prim *s, const struct query *q, double t_max, double *t)
 {
 	vec3 oc = vec3_sub(q->o, s->center);
@@ -116,8 +117,12 @@ static void wide_bounds(const struct RTCBoundsFunctionArguments *args)
 		low[k] = fminf(p[i[0]][k], fminf(p[i[1]][k], p[i[2]][k])) - margin;
 		high[k] = fmaxf(p[i[0]][k], fmaxf(p[i[1]][k], p[i[2]][k])) + margin;
 	}
-	*args->bounds_o = (struct RTCBounds){.lower_x = low[0], .lower_y = low[1], .lower_z = low[2],
-					     .upper_x = high[0], .upper_y = high[1], .upper_z = high[2]};
+	*args->bounds_o = (struct RTCBounds){.lower_x = low[0],
+					     .lower_y = low[1],
+					     .lower_z = low[2],
+					     .upper_x = high[0],
+					     .upper_y = high[1],
+					     .upper_z = high[2]};
 }
 
 /* As the filter has it for triangles that Embree solves; those are never PRIM_NONE. */

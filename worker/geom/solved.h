@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Primitives that Embree asks us about, solved in double: spheres, and triangles too large for floats beside what is small in a
- * scene of mixed scales. Runs inside Embree's traversal: any thread; allocates nothing.
+ * Primitives that Embree asks us about, solved in double: spheres, and triangles too large for floats beside what is
+ * small in a scene of mixed scales. Runs inside Embree's traversal: any thread; allocates nothing.
  */
 #ifndef WORKER_GEOM_SOLVED_H
 #define WORKER_GEOM_SOLVED_H
@@ -16,9 +16,9 @@ struct query {
 	vec3 o, d, end; /* in double: what Embree proposes is judged by these; end: o + d for a segment */
 	bool segment;
 	double t_min;
-	double reach;  /* how far Embree's floats can be off along this ray */
-	double before; /* the same in units of d */
-	double back;   /* Embree's ray begins that much before o, in units of d; below 0: after it */
+	double reach;	  /* how far Embree's floats can be off along this ray */
+	double before;	  /* the same in units of d */
+	double back;	  /* Embree's ray begins that much before o, in units of d; below 0: after it */
 	double wide_from; /* extent from which on triangles are solved in double; INFINITY: none is */
 	struct prim_ref from, to;
 	const struct coincidence *coincidence; /* NULL: no surfaces coincide */
@@ -38,8 +38,8 @@ struct wide_prims {
 	uint32_t *prim;
 };
 
-/* The plane of a triangle is crossed after the start, and before the end of a segment. A ray that starts in the plane, on a
- * coplanar neighbour, does not cross it again. */
+/* The plane of a triangle is crossed after the start, and before the end of a segment. A ray that starts in the plane,
+ * on a coplanar neighbour, does not cross it again. */
 bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim);
 
 /* Which triangle is there where the ray crosses the plane of this one: it, or what hides it (coincide.h). */

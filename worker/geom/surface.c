@@ -8,8 +8,8 @@ static vec3 at(const float (*a)[3], uint32_t i)
 	return (vec3){(double)a[i][0], (double)a[i][1], (double)a[i][2]};
 }
 
-/* Moves a point of the triangle's plane that lies outside to the nearest one inside. Barycentrics clamped one by one would
- * travel along a sliver by as many of its widths as they are off. */
+/* Moves a point of the triangle's plane that lies outside to the nearest one inside. Barycentrics clamped one by one
+ * would travel along a sliver by as many of its widths as they are off. */
 static void move_inside(vec3 e1, vec3 e2, double *b1, double *b2)
 {
 	const double start[3][2] = {{0, 0}, {0, 0}, {1, 0}}, step[3][2] = {{1, 0}, {0, 1}, {-1, 1}};
@@ -46,9 +46,9 @@ static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1
 	return true;
 }
 
-/* A tangent that turns as little as it can from one triangle to the next: what the shortest rotation from r to n makes of a.
- * Half vectors are numbers in frames, and frames along edges would turn at random. No such field is without a flaw; this one's
- * is at n = -r, where few surfaces face. */
+/* A tangent that turns as little as it can from one triangle to the next: what the shortest rotation from r to n makes
+ * of a. Half vectors are numbers in frames, and frames along edges would turn at random. No such field is without a
+ * flaw; this one's is at n = -r, where few surfaces face. */
 static vec3 carried_axis(vec3 n)
 {
 	const vec3 r = {2.0 / 7, 3.0 / 7, 6.0 / 7}, a = {3.0 / 7, -6.0 / 7, 2.0 / 7};
@@ -61,8 +61,10 @@ static vec3 tangent(const struct geom_shape *s, const uint32_t i[3], vec3 ng, ve
 {
 	if (!s->uv)
 		return carried_axis(ng);
-	double du1 = (double)s->uv[i[1]][0] - (double)s->uv[i[0]][0], dv1 = (double)s->uv[i[1]][1] - (double)s->uv[i[0]][1];
-	double du2 = (double)s->uv[i[2]][0] - (double)s->uv[i[0]][0], dv2 = (double)s->uv[i[2]][1] - (double)s->uv[i[0]][1];
+	double du1 = (double)s->uv[i[1]][0] - (double)s->uv[i[0]][0],
+	       dv1 = (double)s->uv[i[1]][1] - (double)s->uv[i[0]][1];
+	double du2 = (double)s->uv[i[2]][0] - (double)s->uv[i[0]][0],
+	       dv2 = (double)s->uv[i[2]][1] - (double)s->uv[i[0]][1];
 	double det = du1 * dv2 - dv1 * du2;
 	if (det == 0)
 		return carried_axis(ng);
@@ -100,7 +102,8 @@ static void fill(const struct geom_shape *s, const uint32_t i[3], const struct c
 	vec3 n = x->ng;
 	if (s->normal) {
 		vec3 m = interpolated_normal(s, i, b1, b2);
-		/* Normals that turn to the back somewhere inside the triangle say nothing about this side: shade flat. */
+		/* Normals that turn to the back somewhere inside the triangle say nothing about this side: shade flat.
+		 */
 		if (vec3_dot(m, x->ng) > 0)
 			n = vec3_normalize(m);
 	}
@@ -113,7 +116,8 @@ static void fill(const struct geom_shape *s, const uint32_t i[3], const struct c
 	}
 }
 
-void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2, struct surface_point *x)
+void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2,
+			 struct surface_point *x)
 {
 	const uint32_t *i = s->index[prim.prim];
 	struct corner c = corner_of(s, i);
@@ -190,8 +194,8 @@ static void change_on_sphere(const struct geom_shape *s, const struct surface_po
 	double bend = 1 / s->radius;
 	c->dn[0] = vec3_scale(s->normal_sign * bend, c->du);
 	c->dn[1] = vec3_scale(s->normal_sign * bend, c->dv);
-	/* du is axis x w over its length. Along the circle of latitude it turns by bend about the outward direction w's own circle
-	 * and by bend cot(theta) towards the pole; along the meridian it is carried in parallel. */
+	/* du is axis x w over its length. Along the circle of latitude it turns by bend about the outward direction w's
+	 * own circle and by bend cot(theta) towards the pole; along the meridian it is carried in parallel. */
 	vec3 w = vec3_scale(s->normal_sign, x->ng);
 	double cosine = vec3_dot(s->sphere_axes.n, w), sine = vec3_length(vec3_cross(s->sphere_axes.n, w));
 	vec3 turn = vec3_scale(-bend, w);
@@ -232,7 +236,8 @@ void surface_change_of(const struct geom_shape *s, const struct surface_point *x
 		change_on_triangle(s, x, c);
 }
 
-static bool reproject_triangle(const struct geom_shape *s, struct prim_ref prim, vec3 o, vec3 d, struct surface_point *x)
+static bool reproject_triangle(const struct geom_shape *s, struct prim_ref prim, vec3 o, vec3 d,
+			       struct surface_point *x)
 {
 	const uint32_t *i = s->index[prim.prim];
 	struct corner c = corner_of(s, i);
@@ -246,8 +251,8 @@ static bool reproject_triangle(const struct geom_shape *s, struct prim_ref prim,
 	return true;
 }
 
-static bool reproject_sphere(const struct geom_shape *s, struct prim_ref prim, bool starts_on_it, vec3 o, vec3 d, double t_near,
-			     struct surface_point *x)
+static bool reproject_sphere(const struct geom_shape *s, struct prim_ref prim, bool starts_on_it, vec3 o, vec3 d,
+			     double t_near, struct surface_point *x)
 {
 	vec3 oc = vec3_sub(o, s->center);
 	double b = vec3_dot(oc, d), root;
@@ -268,8 +273,8 @@ static bool reproject_sphere(const struct geom_shape *s, struct prim_ref prim, b
 	return true;
 }
 
-bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d, double t_near,
-		       struct surface_point *x)
+bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d,
+		       double t_near, struct surface_point *x)
 {
 	bool same = prim.shape == from.shape && prim.prim == from.prim;
 	if (s->is_sphere)

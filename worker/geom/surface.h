@@ -21,7 +21,7 @@ struct geom_shape {
 	float (*position)[3];
 	uint32_t (*index)[3];
 	float (*normal)[3]; /* NULL: flat */
-	float (*uv)[2];     /* NULL: barycentrics stand in */
+	float (*uv)[2];	    /* NULL: barycentrics stand in */
 };
 
 struct surface_point {
@@ -35,23 +35,27 @@ struct surface_point {
 
 /* How a point's frame changes as it moves, per unit length, [0] along du and [1] along dv. */
 struct surface_change {
-	vec3 du, dv;  /* orthonormal, in the plane of ng, du along dpdu; what frame_along falls back to where there is no dpdu */
-	vec3 dn[2];   /* of the shading normal; 0 where a triangle shades flat */
-	vec3 ddu[2];  /* of the field of unit du: 0 on a triangle, turning with the meridians on a sphere (not at its poles) */
+	vec3 du, dv; /* orthonormal, in the plane of ng, du along dpdu; what frame_along falls back to where there is no
+			dpdu */
+	vec3 dn[2];  /* of the shading normal; 0 where a triangle shades flat */
+	vec3 ddu[2]; /* of the field of unit du: 0 on a triangle, turning with the meridians on a sphere (not at its
+			poles) */
 };
 
-/* The point of a primitive nearest to p, which should lie on it: as exact as the primitive is small, wherever it lies. */
+/* The point of a primitive nearest to p, which should lie on it: as exact as the primitive is small, wherever it lies.
+ */
 bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x);
 /* Where the ray o + t d meets the primitive named by the hit. */
 void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x);
 /* The point of barycentrics (b1, b2) on a triangle, or at unit normal direction w from a sphere's centre. */
-void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2, struct surface_point *x);
+void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2,
+			 struct surface_point *x);
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x);
-/* Where the ray from o (which lies on the primitive `from`) along the unit direction d meets this one primitive, whatever lies
- * between; of a sphere's two crossings the one nearest to t_near. false: it passes by. A sphere's u and v, which cost as much as
- * all the rest, are left for surface_uv. */
-bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d, double t_near,
-		       struct surface_point *x);
+/* Where the ray from o (which lies on the primitive `from`) along the unit direction d meets this one primitive,
+ * whatever lies between; of a sphere's two crossings the one nearest to t_near. false: it passes by. A sphere's u and
+ * v, which cost as much as all the rest, are left for surface_uv. */
+bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d,
+		       double t_near, struct surface_point *x);
 
 void surface_uv(const struct geom_shape *s, struct surface_point *x);
 

@@ -16,7 +16,8 @@ static bool comes_first(vec3 a, vec3 b)
 	return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
 }
 
-/* On which side of the line through a and b the ray passes: the volume of d, a - o, b - o; exactly the opposite for b and a. */
+/* On which side of the line through a and b the ray passes: the volume of d, a - o, b - o; exactly the opposite for b
+ * and a. */
 static double side_of(vec3 o, vec3 d, vec3 a, vec3 b)
 {
 	bool turned = comes_first(b, a);
@@ -27,7 +28,8 @@ static double side_of(vec3 o, vec3 d, vec3 a, vec3 b)
 
 bool triangle_meets(const struct triangle *k, vec3 o, vec3 d, double *t)
 {
-	double u = side_of(o, d, k->v[1], k->v[2]), v = side_of(o, d, k->v[2], k->v[0]), w = side_of(o, d, k->v[0], k->v[1]);
+	double u = side_of(o, d, k->v[1], k->v[2]), v = side_of(o, d, k->v[2], k->v[0]),
+	       w = side_of(o, d, k->v[0], k->v[1]);
 	if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0))
 		return false;
 	double slope = vec3_dot(k->n, d);

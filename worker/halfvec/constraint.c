@@ -5,16 +5,16 @@
 
 /* What a constraint knows of the vertex before or after it. */
 struct neighbour {
-	vec3 w;         /* unit direction to it */
-	double rate;    /* by how much w turns as it moves across w */
-	double own;     /* and as the constraint's own vertex does */
-	vec3 du, dv;    /* how it moves */
+	vec3 w;	     /* unit direction to it */
+	double rate; /* by how much w turns as it moves across w */
+	double own;  /* and as the constraint's own vertex does */
+	vec3 du, dv; /* how it moves */
 };
 
 /* A half vector that is not normalised, and its slopes. */
 struct half {
-	vec3 sum;       /* i + eta o */
-	double along;   /* sum.n; 1 where matched: then no slope divides */
+	vec3 sum;     /* i + eta o */
+	double along; /* sum.n; 1 where matched: then no slope divides */
 	vec2 h;
 	bool matched, finite;
 };
@@ -65,10 +65,11 @@ static inline mat2 by_neighbour(const struct frame *f, const struct half *r, con
 			       slope_change(f, r, turn(n->w, n->dv, weight * n->rate)));
 }
 
-/* The vertex itself moves along d: both directions turn, and the frame with the shading normal (by dn) and with the field of
- * du (by ddu). ds = -(s.dn) n + w t and dt = -(t.dn) n - w s, where w is how s = N(du - n (n.du)) turns about n. */
-static inline vec2 by_itself(const struct frame *f, const struct half *r, const struct neighbour *i, const struct neighbour *o,
-		      double eta, vec3 d, vec3 du, vec3 dn, vec3 ddu)
+/* The vertex itself moves along d: both directions turn, and the frame with the shading normal (by dn) and with the
+ * field of du (by ddu). ds = -(s.dn) n + w t and dt = -(t.dn) n - w s, where w is how s = N(du - n (n.du)) turns about
+ * n. */
+static inline vec2 by_itself(const struct frame *f, const struct half *r, const struct neighbour *i,
+			     const struct neighbour *o, double eta, vec3 d, vec3 du, vec3 dn, vec3 ddu)
 {
 	vec3 sum = vec3_add(turn(i->w, d, -i->own), turn(o->w, d, -eta * o->own));
 	vec2 c = slope_change(f, r, sum);

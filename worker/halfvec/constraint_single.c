@@ -29,13 +29,15 @@ static void narrow_down(const struct constraint *k, unsigned b, unsigned c, stru
 	while (++j < b);
 }
 
-static enum constraint_end factor_single(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *m)
+static enum constraint_end factor_single(const struct constraint *k, unsigned b, unsigned c,
+					 struct constraint_system *m)
 {
 	narrow_down(k, b, c, m->narrow.k);
 	return factor(m->narrow.k, b, c, m);
 }
 
-static enum constraint_end factor_single_to_solve(const struct constraint *k, unsigned b, unsigned c, struct constraint_system *m)
+static enum constraint_end factor_single_to_solve(const struct constraint *k, unsigned b, unsigned c,
+						  struct constraint_system *m)
 {
 	narrow_down(k, b, c, m->narrow.k);
 	return factor_to_solve(m->narrow.k, b, c, m);
@@ -69,4 +71,5 @@ static enum constraint_end differentials_single(const struct constraint *k, unsi
 	return CONSTRAINT_OK;
 }
 
-const struct constraint_solver constraint_single = {factor_single, factor_single_to_solve, solve_single, differentials_single};
+const struct constraint_solver constraint_single = {factor_single, factor_single_to_solve, solve_single,
+						    differentials_single};

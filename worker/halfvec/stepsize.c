@@ -26,7 +26,8 @@ static double bsdf_limit(const struct path_context *c, const struct path_vertex 
 	return c->w->accuracy.step_scale * halfvec_lobe_width(v) / sqrt(M_PI);
 }
 
-/* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale a pixel, meet the plane of the geometric normal. */
+/* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale a pixel, meet the plane of the geometric
+ * normal. */
 static bool pixel_footprint(const struct camera *camera, const struct full_path_path *x, mat2 *j)
 {
 	const struct full_path_edge *e = &x->edge[x->edges - 1];

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Step sizes in half vector space (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3.3 and 7): how far a proposal moves the half
- * vectors of the vertices between x_b and x_c. h' = h + U diag(sigma) g with two standard normals g; U and sigma are functions
- * of the path, so the way back has those of the proposed path.
+ * Step sizes in half vector space (Hanika, Kaplanyan, Dachsbacher 2015, sec. 3.3 and 7): how far a proposal moves the
+ * half vectors of the vertices between x_b and x_c. h' = h + U diag(sigma) g with two standard normals g; U and sigma
+ * are functions of the path, so the way back has those of the proposed path.
  *
  * Where the sub-path begins at the camera (b = k) ray differentials say what change of h_j moves the image by a pixel:
- * E_j = D_j^-1 J, with J = d x_{k-1} / d pixel in the geometric tangent plane at a fixed x_k and D_j = d x_{k-1} / d h_j. From
- * E_j = U diag(s) V^T, sigma is s times the vertex's share of the given number of pixels (shares as the roughnesses), at most
- * alpha / sqrt(pi), the mean |slope| of a Beckmann lobe (times the setting step-scale). Otherwise, and where E_j is not to be had, U = 1 and that limit.
- * Pure; any thread; nothing allocates.
+ * E_j = D_j^-1 J, with J = d x_{k-1} / d pixel in the geometric tangent plane at a fixed x_k and D_j = d x_{k-1} / d
+ * h_j. From E_j = U diag(s) V^T, sigma is s times the vertex's share of the given number of pixels (shares as the
+ * roughnesses), at most alpha / sqrt(pi), the mean |slope| of a Beckmann lobe (times the setting step-scale).
+ * Otherwise, and where E_j is not to be had, U = 1 and that limit. Pure; any thread; nothing allocates.
  */
 #ifndef WORKER_HALFVEC_STEPSIZE_H
 #define WORKER_HALFVEC_STEPSIZE_H
@@ -16,7 +16,7 @@
 #include "worker/halfvec/constraint.h"
 
 struct halfvec_step {
-	mat2 u;          /* a rotation */
+	mat2 u;		 /* a rotation */
 	double sigma[2]; /* finite and above 0 */
 };
 
@@ -25,8 +25,8 @@ double halfvec_film_step(const struct camera *camera);
 /* How wide the narrowest lobe of a vertex that is not specular is, in slopes; at most 1. */
 double halfvec_lobe_width(const struct path_vertex *v);
 
-/* Of those vertices among c_end+1..b-1 that are not specular (the others are not written), from their constraints. On the
- * image all vertices together move by at most halfvec_film_step. */
+/* Of those vertices among c_end+1..b-1 that are not specular (the others are not written), from their constraints. On
+ * the image all vertices together move by at most halfvec_film_step. */
 void halfvec_steps(const struct path_context *c, const struct full_path_path *x, const struct constraint *k, unsigned b,
 		   unsigned c_end, struct halfvec_step *step);
 

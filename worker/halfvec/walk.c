@@ -5,11 +5,12 @@
 
 struct walk_limits walk_limits_of(const struct accuracy_settings *k)
 {
-	return (struct walk_limits){(unsigned)k->iterations, k->least_step, 1, k->tolerance, k->reverse_tolerance,
-				     constraint_solver_of(k)};
+	return (struct walk_limits){(unsigned)k->iterations, k->least_step,	     1, k->tolerance,
+				    k->reverse_tolerance,    constraint_solver_of(k)};
 }
 
-/* One walk while it goes on. Predictions start at the kept state alone, so that a refused trial leaves nothing to undo. */
+/* One walk while it goes on. Predictions start at the kept state alone, so that a refused trial leaves nothing to undo.
+ */
 struct walk {
 	struct path_context *c;
 	struct full_path_path *y; /* the trial */
@@ -18,8 +19,8 @@ struct walk {
 	const struct constraint_solver *solver;
 	double scale;
 	struct walk_scratch *s;
-	uint64_t above; /* by vertex: where light leaves on the side of the geometric normal */
-	uint64_t seen;  /* by edge: a ray of this trial has met the next vertex along it */
+	uint64_t above;			   /* by vertex: where light leaves on the side of the geometric normal */
+	uint64_t seen;			   /* by edge: a ray of this trial has met the next vertex along it */
 	vec3 move[FULL_PATH_MAX_VERTICES]; /* a full step of Newton from the kept state */
 };
 
@@ -98,7 +99,8 @@ static enum walk_end trial(struct walk *m, double step)
 	}
 }
 
-/* How far the half vectors s->k[].h are from the targets, a measure for step control alone. within: all as near as asked. */
+/* How far the half vectors s->k[].h are from the targets, a measure for step control alone. within: all as near as
+ * asked. */
 static double residuals(struct walk *m, bool *within)
 {
 	double error = 0;
@@ -174,7 +176,8 @@ static void refresh(struct walk *m, unsigned stale)
 		constrain(m, m->end + 2, m->end);
 }
 
-/* Of the trial: half vectors alone are cheap, derivatives only pay where the walk goes on or the caller asks for them. */
+/* Of the trial: half vectors alone are cheap, derivatives only pay where the walk goes on or the caller asks for them.
+ */
 static double look(struct walk *m, bool *within)
 {
 	for (unsigned j = m->end + 1; j < m->b; j++)
@@ -223,8 +226,14 @@ enum walk_end halfvec_walk_from(struct path_context *c, struct full_path_path *y
 				unsigned stale, struct walk_scratch *s)
 {
 	assert(c_end + 1 < b && b <= y->edges);
-	struct walk m = {.c = c, .y = y, .b = b, .end = c_end, .target = target, .solver = limits->solver,
-		         .scale = limits->scale, .s = s};
+	struct walk m = {.c = c,
+			 .y = y,
+			 .b = b,
+			 .end = c_end,
+			 .target = target,
+			 .solver = limits->solver,
+			 .scale = limits->scale,
+			 .s = s};
 	s->iterations = 0;
 	full_path_forget(y, c_end + 1, b - 1);
 	enum walk_end end = start(&m);

@@ -1,15 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Invalid floating-point operations (0/0, inf - inf, sqrt of a negative): a fault of ours goes back to where the thread said
- * that faults are caught (fptrap_catch), and stops the program by SIGFPE where it did not; a library that raises INVALID on
- * ordinary input does no harm.
+ * Invalid floating-point operations (0/0, inf - inf, sqrt of a negative): a fault of ours goes back to where the thread
+ * said that faults are caught (fptrap_catch), and stops the program by SIGFPE where it did not; a library that raises
+ * INVALID on ordinary input does no harm.
  *
- * The processor's own traps would have to be masked around every ray, and changing that mask empties the pipeline twice: 16 %
- * of a path tracer's time. So the traps stay masked and the sticky flag is looked at where our code ends: at the door of the
- * library and at the end of the watch. What the library raised is wiped away, at a cost only where it did raise.
- * Since faults are found at these places alone, and none of them is inside a library, leaving by longjmp skips only frames of
- * ours: between the catch and the fault nobody may hold a lock or memory that only his frame knows.
- * State of the calling thread. Works on x86-64; no effect elsewhere.
+ * The processor's own traps would have to be masked around every ray, and changing that mask empties the pipeline
+ * twice: 16 % of a path tracer's time. So the traps stay masked and the sticky flag is looked at where our code ends:
+ * at the door of the library and at the end of the watch. What the library raised is wiped away, at a cost only where
+ * it did raise. Since faults are found at these places alone, and none of them is inside a library, leaving by longjmp
+ * skips only frames of ours: between the catch and the fault nobody may hold a lock or memory that only his frame
+ * knows. State of the calling thread. Works on x86-64; no effect elsewhere.
  */
 #ifndef WORKER_MATH_FPTRAP_H
 #define WORKER_MATH_FPTRAP_H
@@ -17,8 +17,8 @@
 #include <setjmp.h>
 #include <stdbool.h>
 
-/* From here on a fault of this thread is a longjmp to `back` (with 1; nothing is watched or caught any more then); NULL: it is a
- * signal again. Returns what was before. */
+/* From here on a fault of this thread is a longjmp to `back` (with 1; nothing is watched or caught any more then);
+ * NULL: it is a signal again. Returns what was before. */
 jmp_buf *fptrap_catch(jmp_buf *back);
 /* Numbers that a library cannot bear are at its door: a fault, watched or not. */
 void fptrap_fault(void) __attribute__((noreturn));

@@ -92,10 +92,18 @@ static void sine_cosine(double degrees, double *s, double *c)
 	double rest = (turn - 90.0 * quarter) * RADIANS_PER_DEGREE;
 	double rs = sin(rest), rc = cos(rest);
 	switch ((int)quarter & 3) {
-	case 0: *s = rs, *c = rc; break;
-	case 1: *s = rc, *c = -rs; break;
-	case 2: *s = -rs, *c = -rc; break;
-	default: *s = -rc, *c = rs; break;
+	case 0:
+		*s = rs, *c = rc;
+		break;
+	case 1:
+		*s = rc, *c = -rs;
+		break;
+	case 2:
+		*s = -rs, *c = -rc;
+		break;
+	default:
+		*s = -rc, *c = rs;
+		break;
 	}
 }
 

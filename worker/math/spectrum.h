@@ -3,12 +3,12 @@
  * Radiance, reflectance or importance at the wavelengths a path carries: four lanes that travel together where
  * nothing disperses (hero wavelength, Wilkie et al. 2014).
  *
- * A path's wavelengths are made of one number u in [0,1), and all of a path's densities are taken with respect to u. Lane i has the
- * wavelength at which the cumulative distribution is u + i/4 (mod 1): each lane alone has density wavelength_pdf, any lane as
- * the hero gives the same four, and equal weights are those of the balance heuristic. The density follows |r| + |g| + |b|, the
- * matching functions of linear Rec. 709, plus a uniform share of 5 %, so that no wavelength has density 0. The relative
- * variance of R, G, B for white (D65) is then 0.07, 0.03, 0.02; with uniform wavelengths it is 0.61, 0.17, 0.67. Times D65
- * it would be 0.10, 0.03, 0.04.
+ * A path's wavelengths are made of one number u in [0,1), and all of a path's densities are taken with respect to u.
+ * Lane i has the wavelength at which the cumulative distribution is u + i/4 (mod 1): each lane alone has density
+ * wavelength_pdf, any lane as the hero gives the same four, and equal weights are those of the balance heuristic. The
+ * density follows |r| + |g| + |b|, the matching functions of linear Rec. 709, plus a uniform share of 5 %, so that no
+ * wavelength has density 0. The relative variance of R, G, B for white (D65) is then 0.07, 0.03, 0.02; with uniform
+ * wavelengths it is 0.61, 0.17, 0.67. Times D65 it would be 0.10, 0.03, 0.04.
  *
  * In a grey scene (struct wavelengths.grey) all lanes are equal and stand for the common illuminant's shape.
  */
@@ -28,8 +28,8 @@ typedef struct {
 
 struct wavelengths {
 	double nm[SPECTRUM_LANES];
-	bool grey; /* the scene carries no colour: nm is not to be read */
-	double u; /* what nm was made of; 0 where grey */
+	bool grey;    /* the scene carries no colour: nm is not to be read */
+	double u;     /* what nm was made of; 0 where grey */
 	unsigned few; /* 0: all differ; 1 or 2: nm repeats after so many, for the same mean from fewer wavelengths */
 };
 
@@ -114,7 +114,8 @@ static inline spectrum spectrum_repeat(spectrum s, int lanes)
 }
 
 /* The CIE 1931 colour of a spectrum estimated from its four lanes (one-sample estimate of the integral of
- * L x_bar / 106.857 nm, each lane over its density, so that an emitter of rgb 1 has Y = 1). Not for grey: the film has its own factor. */
+ * L x_bar / 106.857 nm, each lane over its density, so that an emitter of rgb 1 has Y = 1). Not for grey: the film has
+ * its own factor. */
 void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3]);
 /* X + Y + Z of that is the sum of l times these, lane by lane. */
 spectrum spectrum_intensity_weights(const struct wavelengths *w);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Independent proposals from all techniques at once: a pair of sub-paths is drawn, and one of the paths that it makes, in
- * proportion to contributions by the balance heuristic. What the state has to say against it is the sum over a pair of
- * sub-paths around the state itself, drawn as it would be had the state been drawn from it: on pairs with a marked candidate
- * this is an independence sampler, whose target is the pair's density times the candidate's contribution. So chains change
- * length and class, and the sums estimate b with the variance of bdpt.
+ * Independent proposals from all techniques at once: a pair of sub-paths is drawn, and one of the paths that it makes,
+ * in proportion to contributions by the balance heuristic. What the state has to say against it is the sum over a pair
+ * of sub-paths around the state itself, drawn as it would be had the state been drawn from it: on pairs with a marked
+ * candidate this is an independence sampler, whose target is the pair's density times the candidate's contribution. So
+ * chains change length and class, and the sums estimate b with the variance of bdpt.
  */
 #include "worker/mutation/mutation.h"
 #include "worker/path/ensemble.h"
@@ -13,8 +13,8 @@
 
 enum { BLOCK_LENGTHS = BLOCK_VERTEX, BLOCK_AROUND };
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
-				     struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
+				     struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	(void)how;
 	struct path_context *c = m->path;
@@ -41,15 +41,16 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 	return STRATEGY_PROPOSED;
 }
 
-static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			 enum mutation_direction direction)
 {
 	(void)m, (void)into;
 	return -move->log_density[direction];
 }
 
-/* Its cost grows with the length of the sub-paths, a walk's hardly does; it pays for itself where it gets about a third of the
- * time. Cost of one in hslt's, and the shares that lay on the front of error at equal time: 2.8 and 0.15 to 0.4 in displaced (at
- * most 12 edges), 4 and 0.1 in the demo (16), 12.5 and 0.01 to 0.06 in veach-door (33). */
+/* Its cost grows with the length of the sub-paths, a walk's hardly does; it pays for itself where it gets about a third
+ * of the time. Cost of one in hslt's, and the shares that lay on the front of error at equal time: 2.8 and 0.15 to 0.4
+ * in displaced (at most 12 edges), 4 and 0.1 in the demo (16), 12.5 and 0.01 to 0.06 in veach-door (33). */
 static double useful(const struct render_summary *scene)
 {
 	const double pays = 2.4, least = 0.05, most = 0.3;

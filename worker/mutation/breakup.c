@@ -7,14 +7,15 @@
 
 /* At the end of a walk, of a half vector that is to be 0. */
 #define SPECULAR_TOLERANCE 1e-9
-/* The way back aims that much closer than the way there: at the same tolerance 2 to 11 % of the returns fail by it alone. */
+/* The way back aims that much closer than the way there: at the same tolerance 2 to 11 % of the returns fail by it
+ * alone. */
 #define BACK_SCALE 0.1
 /* Positions are rounded in that many parts of the edges they hang on. */
 #define ROUNDING 0x1p-40
 /* Steps of x_0, in the numbers that make it. */
 #define EMITTER_STEP 0.1
-/* By how much the number that makes the wavelengths moves at most where something disperses (sec. 6: 50 nm of 470); else all
- * are as good. */
+/* By how much the number that makes the wavelengths moves at most where something disperses (sec. 6: 50 nm of 470);
+ * else all are as good. */
 #define WAVELENGTH_STEP (50.0 / 470)
 
 bool breakup_allows(const struct full_path_path *x, unsigned b, unsigned c)
@@ -46,7 +47,8 @@ static bool holds_wavelength(const struct path_context *c, const struct full_pat
 	return false;
 }
 
-static bool move_emitter(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y, struct move *move)
+static bool move_emitter(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y,
+			 struct move *move)
 {
 	const struct path_context *c = m->path;
 	const struct path_vertex *v = &x->v[0];
@@ -113,7 +115,8 @@ static void aim(struct mutation_ctx *m, const struct breakup *how, const struct 
 	}
 }
 
-static void add_step_densities(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x, struct move *move)
+static void add_step_densities(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
+			       struct move *move)
 {
 	const struct mutation_scratch *s = &m->scratch;
 	for (unsigned j = how->c + 1; how->halfvecs && j < how->b; j++) {
@@ -125,7 +128,8 @@ static void add_step_densities(struct mutation_ctx *m, const struct breakup *how
 }
 
 /* What of the constraints of one path does not hold when the walk to the other starts from it. */
-static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x, const struct full_path_path *y)
+static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
+			 const struct full_path_path *y)
 {
 	if (EFFECT_IS_ON(m->path->w, dispersion) && x->wavelength != y->wavelength)
 		return WALK_STALE;
@@ -135,7 +139,8 @@ static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how
 }
 
 /* The walk from y leads back to x: else the proposal has no way back, and detailed balance wants it refused. */
-static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x, const struct full_path_path *y)
+static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
+		       const struct full_path_path *y)
 {
 	struct mutation_scratch *s = &m->scratch;
 	unsigned b = how->b, c = how->c;
@@ -154,7 +159,8 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 	struct walk_limits limits = m->limits;
 	limits.scale *= BACK_SCALE;
 	m->count[STRATEGY_REVERSE_WALKS]++;
-	enum walk_end end = halfvec_walk_from(m->path, back, b, c, s->target, true, &limits, stale_of(m, how, x, y), &s->walk);
+	enum walk_end end =
+		halfvec_walk_from(m->path, back, b, c, s->target, true, &limits, stale_of(m, how, x, y), &s->walk);
 	m->count[STRATEGY_WALKS]++;
 	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
 	if (end != WALK_OK)
@@ -170,8 +176,8 @@ static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const 
 }
 
 /* Between x_b and x_c by half vectors. */
-static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *how, struct full_path_path *x, struct full_path_path *y,
-				  struct move *move)
+static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *how, struct full_path_path *x,
+				  struct full_path_path *y, struct move *move)
 {
 	struct mutation_scratch *s = &m->scratch;
 	struct path_context *c = m->path;
@@ -182,7 +188,8 @@ static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *
 	halfvec_steps(c, x, s->k, how->b, how->c, s->step[X_TO_Y]);
 	aim(m, how, x);
 	memcpy(&s->walk.k[how->c + 1], &s->k[how->c + 1], (how->b - how->c - 1) * sizeof s->k[0]);
-	enum walk_end end = halfvec_walk_from(c, y, how->b, how->c, s->target, false, &m->limits, stale_of(m, how, x, y), &s->walk);
+	enum walk_end end =
+		halfvec_walk_from(c, y, how->b, how->c, s->target, false, &m->limits, stale_of(m, how, x, y), &s->walk);
 	m->count[STRATEGY_WALKS]++;
 	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
 	if (end != WALK_OK)
@@ -260,6 +267,6 @@ double breakup_log_weight(struct mutation_ctx *m, struct full_path_path *into, c
 	struct product p = PRODUCT_ONE;
 	for (unsigned j = 0; j < into->edges; j++)
 		product_mul(&p, j <= move->c || j == move->b ? full_path_f(c, into, j) : full_path_fh(c, into, j));
-	return product_log_intensity(c, into, &p) + log_geometry(c, into, move->b, move->c) + move->log_transfer[direction] -
-	       move->log_density[direction];
+	return product_log_intensity(c, into, &p) + log_geometry(c, into, move->b, move->c) +
+	       move->log_transfer[direction] - move->log_density[direction];
 }

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The breakup of a path (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4 and 5), in the paper's indices: x_k .. x_b is traced
- * from the camera by perturbed half vectors (multi chain perturbation), x_b .. x_c moves by half vectors between its two ends
- * (predictor-corrector walk), x_c .. x_0 stays. b = k: nothing is traced; b = 0: all is; c = b - 1: x_b is joined to x_c.
- * Strategies differ in which b and c they allow and in what else moves.
+ * The breakup of a path (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4 and 5), in the paper's indices: x_k .. x_b is
+ * traced from the camera by perturbed half vectors (multi chain perturbation), x_b .. x_c moves by half vectors between
+ * its two ends (predictor-corrector walk), x_c .. x_0 stays. b = k: nothing is traced; b = 0: all is; c = b - 1: x_b is
+ * joined to x_c. Strategies differ in which b and c they allow and in what else moves.
  */
 #ifndef WORKER_MUTATION_BREAKUP_H
 #define WORKER_MUTATION_BREAKUP_H
@@ -12,9 +12,9 @@
 #include "worker/mutation/mutation.h"
 
 struct breakup {
-	unsigned b, c;      /* c is not read when b = 0; b = c = k: nothing moves */
-	double log_choice;  /* log P(b) P(c) given x */
-	bool halfvecs;      /* the half vectors between x_b and x_c take steps; else they stay while the ends move */
+	unsigned b, c;	   /* c is not read when b = 0; b = c = k: nothing moves */
+	double log_choice; /* log P(b) P(c) given x */
+	bool halfvecs;	   /* the half vectors between x_b and x_c take steps; else they stay while the ends move */
 	bool wavelength, aperture, emitter; /* move too, where the scene and the path have them */
 };
 

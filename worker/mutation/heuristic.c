@@ -9,8 +9,8 @@ static double roughness(const struct path_vertex *v)
 	return v->delta ? 0 : fmin(v->bsdf->alpha_mean, 1);
 }
 
-/* P(b = i) ~ a_i, 0.1 for both ends. Where all inner vertices are specular, or there is only the emitter beside x_k, half
- * vectors have nothing to move; an emitter that cannot be hit is not found by tracing. */
+/* P(b = i) ~ a_i, 0.1 for both ends. Where all inner vertices are specular, or there is only the emitter beside x_k,
+ * half vectors have nothing to move; an emitter that cannot be hit is not found by tracing. */
 static void weigh_b(const struct path_context *c, const struct full_path_path *x, double *weight)
 {
 	unsigned k = x->edges;
@@ -26,10 +26,12 @@ static void weigh_b(const struct path_context *c, const struct full_path_path *x
 /* P(c = i | b) ~ a_i |x_i - x_{i+1}|^2; a of the emitter is 1, the scene's diameter stands for infinity. */
 static void weigh_c(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight)
 {
-	/* Below b = k nothing moves before a vertex with a half vector does: c = k - 1 would be the identity on a pinhole. */
+	/* Below b = k nothing moves before a vertex with a half vector does: c = k - 1 would be the identity on a
+	 * pinhole. */
 	bool moves = b < x->edges;
 	for (unsigned i = b; i-- > 0;) {
-		double distance2 = x->v[i].kind == VERTEX_INFINITE ? 4 * c->w->radius * c->w->radius : x->edge[i].distance2;
+		double distance2 =
+			x->v[i].kind == VERTEX_INFINITE ? 4 * c->w->radius * c->w->radius : x->edge[i].distance2;
 		weight[i] = moves ? (i == 0 ? 1 : roughness(&x->v[i])) * distance2 : 0;
 		moves |= i > 0 && !x->v[i].delta;
 	}

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where a path is broken up (Hanika, Kaplanyan, Dachsbacher 2015, sec. 5): x_k .. x_b is traced, x_b .. x_c moves by half
- * vectors, x_c .. x_0 stays. A heuristic says how likely each b is, and each c given b; it may look at the whole path, since
- * the chain takes what it says of the proposal into account as well.
+ * Where a path is broken up (Hanika, Kaplanyan, Dachsbacher 2015, sec. 5): x_k .. x_b is traced, x_b .. x_c moves by
+ * half vectors, x_c .. x_0 stays. A heuristic says how likely each b is, and each c given b; it may look at the whole
+ * path, since the chain takes what it says of the proposal into account as well.
  */
 #ifndef WORKER_MUTATION_HEURISTIC_H
 #define WORKER_MUTATION_HEURISTIC_H

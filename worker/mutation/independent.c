@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Independent proposals: a number of edges, then a bidirectional technique, and a path made by it from fresh random numbers.
- * The density is summed over all techniques that could have made the path (Veach 1997, sec. 10.2), so that chains change
- * length and class, and f over that density estimates b.
+ * Independent proposals: a number of edges, then a bidirectional technique, and a path made by it from fresh random
+ * numbers. The density is summed over all techniques that could have made the path (Veach 1997, sec. 10.2), so that
+ * chains change length and class, and f over that density estimates b.
  */
 #include "worker/math/logsum.h"
 #include "worker/mutation/mutation.h"
@@ -30,8 +30,8 @@ static unsigned technique_count(unsigned edges)
 	return edges == 1 ? 1 : edges + 1;
 }
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
-				     struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
+				     struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	(void)how, (void)x;
 	struct path_context *c = m->path;
@@ -48,7 +48,8 @@ static enum strategy_counter propose(struct mutation_ctx *m, const struct mutati
 	return full_path_from_subpaths(c, s, k, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_DARK;
 }
 
-static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			 enum mutation_direction direction)
 {
 	(void)move, (void)direction;
 	unsigned k = into->edges;

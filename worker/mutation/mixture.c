@@ -33,7 +33,8 @@ static int name_error(const char *text, size_t length, struct error *e)
 	char known[256] = "";
 	size_t used = 0;
 	for (size_t i = 0; mutation_registry[i] && used < sizeof known; i++)
-		used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "", mutation_registry[i]->name);
+		used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "",
+					 mutation_registry[i]->name);
 	return error_set(e, EINVAL, "no mutation is called '%.*s'; there are %s", (int)length, text, known);
 }
 
@@ -47,7 +48,8 @@ static int parse_entry(const char *text, size_t length, struct mixture_entry *ou
 	if (!out->ops)
 		return name_error(text, name, e);
 	if (at && !parse_forced(at + 1, left - name - 1, &out->how))
-		return error_set(e, EINVAL, "'%.*s': a forced choice is written like %s@b3c1", (int)left, text, out->ops->name);
+		return error_set(e, EINVAL, "'%.*s': a forced choice is written like %s@b3c1", (int)left, text,
+				 out->ops->name);
 	if (equals) {
 		char number[32], *end;
 		size_t digits = length - left - 1;
@@ -89,8 +91,10 @@ int mixture_parse(const char *text, struct mixture *out, struct error *e)
 	if (out->independent < out->count)
 		return 0;
 	if (out->count == BATCH_STRATEGIES)
-		return error_set(e, EINVAL, "'%s': no room for independent proposals among %d mutations", text, BATCH_STRATEGIES);
-	out->entry[out->count++] = (struct mixture_entry){mutation_find("bidirectional", 13), {-1, -1}, INDEPENDENT_SHARE * out->total};
+		return error_set(e, EINVAL, "'%s': no room for independent proposals among %d mutations", text,
+				 BATCH_STRATEGIES);
+	out->entry[out->count++] =
+		(struct mixture_entry){mutation_find("bidirectional", 13), {-1, -1}, INDEPENDENT_SHARE * out->total};
 	finish(out);
 	return 0;
 }
@@ -109,8 +113,8 @@ void mixture_print(const struct mixture *m, char text[PLAN_MUTATIONS_MAX])
 			n += snprintf(forced + n, sizeof forced - (size_t)n, "b%d", entry->how.b);
 		if (entry->how.c >= 0)
 			snprintf(forced + n, sizeof forced - (size_t)n, "c%d", entry->how.c);
-		used += (size_t)snprintf(text + used, PLAN_MUTATIONS_MAX - used, "%s%s%s=%.6g", i ? "," : "", entry->ops->name, forced,
-					 entry->weight);
+		used += (size_t)snprintf(text + used, PLAN_MUTATIONS_MAX - used, "%s%s%s=%.6g", i ? "," : "",
+					 entry->ops->name, forced, entry->weight);
 	}
 }
 

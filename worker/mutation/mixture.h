@@ -20,8 +20,8 @@ struct mixture {
 	struct mixture_entry entry[BATCH_STRATEGIES];
 };
 
-/* Independent proposals are added where the list names none. -EINVAL with a sentence: no such strategy, a weight that is not
- * above 0, too many. */
+/* Independent proposals are added where the list names none. -EINVAL with a sentence: no such strategy, a weight that
+ * is not above 0, too many. */
 int mixture_parse(const char *text, struct mixture *out, struct error *e);
 /* As text; parsed and printed again it stays the same. */
 void mixture_print(const struct mixture *m, char text[PLAN_MUTATIONS_MAX]);

@@ -19,7 +19,8 @@ const struct mutation_ops *const mutation_registry[] = {
 const struct mutation_ops *mutation_find(const char *name, size_t length)
 {
 	for (size_t i = 0; mutation_registry[i]; i++)
-		if (strlen(mutation_registry[i]->name) == length && memcmp(mutation_registry[i]->name, name, length) == 0)
+		if (strlen(mutation_registry[i]->name) == length &&
+		    memcmp(mutation_registry[i]->name, name, length) == 0)
 			return mutation_registry[i];
 	return NULL;
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The path is traced from the camera to x_b by slightly perturbed half vectors and joined to x_{b-1}; where that is x_0 it
- * moves on its emitter, too. No walk, no derivative: where all lobes are wide, b is uniform over the inner vertices, and an
- * emitter that can be hit is also found by tracing (b = 0).
+ * The path is traced from the camera to x_b by slightly perturbed half vectors and joined to x_{b-1}; where that is x_0
+ * it moves on its emitter, too. No walk, no derivative: where all lobes are wide, b is uniform over the inner vertices,
+ * and an emitter that can be hit is also found by tracing (b = 0).
  */
 #include "worker/mutation/strategy.h"
 
@@ -26,18 +26,19 @@ static void weigh_c(const struct path_context *c, const struct full_path_path *x
 }
 
 static const struct heuristic join = {"join", weigh_b, weigh_c};
-static const struct strategy strategy = {&join, STRATEGY_DRAWN, STRATEGY_DRAWN, .wavelength = true, .aperture = true, .emitter = true};
+static const struct strategy strategy = {
+	&join, STRATEGY_DRAWN, STRATEGY_DRAWN, .wavelength = true, .aperture = true, .emitter = true};
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
-				     struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
+				     struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	return strategy_propose(&strategy, m, how, x, y, move);
 }
 
 static double useful(const struct render_summary *scene)
 {
-	/* cornell-box: relMSE x time 30 % below hslt's. Beside hslt a fifth of it: error at equal time 27 % lower in veach-door, 5 %
-	 * and 4 % in displaced and demo, as good in water. */
+	/* cornell-box: relMSE x time 30 % below hslt's. Beside hslt a fifth of it: error at equal time 27 % lower in
+	 * veach-door, 5 % and 4 % in displaced and demo, as good in water. */
 	return render_effect_on(scene, "half-vectors") ? 0.2 : 0.8;
 }
 

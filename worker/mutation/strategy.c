@@ -37,8 +37,8 @@ static double log_choice(const struct strategy *s, const struct choice *forced, 
 	return log(p);
 }
 
-static bool choose(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m, const struct full_path_path *x,
-		   struct breakup *out)
+static bool choose(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
+		   const struct full_path_path *x, struct breakup *out)
 {
 	double *weight = m->scratch.weight, r[4];
 	unsigned k = x->edges;
@@ -66,15 +66,17 @@ static bool choose(const struct strategy *s, const struct choice *forced, struct
 	return out->log_choice > -INFINITY;
 }
 
-enum strategy_counter strategy_propose(const struct strategy *s, struct mutation_ctx *m, const struct mutation_setting *how,
-				       struct full_path_path *x, struct full_path_path *y, struct move *move)
+enum strategy_counter strategy_propose(const struct strategy *s, struct mutation_ctx *m,
+				       const struct mutation_setting *how, struct full_path_path *x,
+				       struct full_path_path *y, struct move *move)
 {
 	struct choice forced = {how->b >= 0 ? how->b : s->b, how->c >= 0 ? how->c : s->c};
 	struct breakup br = {.halfvecs = s->halfvecs, .wavelength = s->wavelength, .aperture = s->aperture};
 	if (!choose(s, &forced, m, x, &br))
 		return STRATEGY_FAIL_INAPPLICABLE;
 	const struct world *w = m->path->w;
-	br.emitter = s->emitter && w->effects.emitter_move && br.b > 0 && br.c == 0 && w->emitters[x->v[0].emitter].ops->point_inverse;
+	br.emitter = s->emitter && w->effects.emitter_move && br.b > 0 && br.c == 0 &&
+		     w->emitters[x->v[0].emitter].ops->point_inverse;
 	enum strategy_counter end = breakup_propose(m, &br, x, y, move);
 	if (end)
 		return end;

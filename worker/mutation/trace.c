@@ -20,7 +20,8 @@ bool trace_move_aperture(struct mutation_ctx *m, const struct full_path_path *x,
 	return true;
 }
 
-static bool move_film(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y, struct move *move)
+static bool move_film(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y,
+		      struct move *move)
 {
 	double r[4], g[2], sigma = halfvec_film_step(&m->path->w->camera);
 	mutation_random(m, BLOCK_FILM, r);
@@ -31,8 +32,8 @@ static bool move_film(struct mutation_ctx *m, const struct full_path_path *x, st
 	return film_window_holds(&m->path->window, y->film);
 }
 
-/* Rotation that takes half vectors of x_j's frame into y_j's, by the line between the two as both frames see it (sec. 4). It
- * is its own way back: from y to x both angles gain pi. */
+/* Rotation that takes half vectors of x_j's frame into y_j's, by the line between the two as both frames see it (sec.
+ * 4). It is its own way back: from y to x both angles gain pi. */
 static void turn(const struct path_vertex *from, const struct path_vertex *to, vec2 *h)
 {
 	vec3 d = vec3_sub(to->x.p, from->x.p);
@@ -65,8 +66,8 @@ static bool follow(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
 }
 
 /* The direction in which the path goes on from y_j. */
-static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_path_path *x, struct full_path_path *y, struct move *move,
-		       vec3 *d)
+static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_path_path *x, struct full_path_path *y,
+		       struct move *move, vec3 *d)
 {
 	const struct path_vertex *from = &x->v[j];
 	struct path_vertex *v = &y->v[j];
@@ -108,8 +109,8 @@ static enum strategy_counter arrive(struct path_context *c, unsigned b, struct p
 	return path_can_be_hit(c, v) ? STRATEGY_PROPOSED : STRATEGY_FAIL_EMITTER;
 }
 
-enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path_path *x, struct full_path_path *y,
-				  struct move *move)
+enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path_path *x,
+				  struct full_path_path *y, struct move *move)
 {
 	struct path_context *c = m->path;
 	unsigned k = x->edges;

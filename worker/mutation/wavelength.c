@@ -15,8 +15,8 @@ static bool must_move(const struct full_path_path *x)
 	return false;
 }
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
-				     struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
+				     struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	if (!EFFECT_IS_ON(m->path->w, colour))
 		return STRATEGY_FAIL_INAPPLICABLE;

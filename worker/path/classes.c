@@ -16,7 +16,8 @@ unsigned path_class_whole(const struct full_path_path *x)
 	return path_class(x->edges, kind);
 }
 
-void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light, struct path_sample *out)
+void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light,
+		   struct path_sample *out)
 {
 	k->out = out;
 	classes_clear(out);

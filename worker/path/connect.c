@@ -99,7 +99,8 @@ double path_balance_weight(const struct path_context *c, const struct joined_pat
 	return 1 / sum;
 }
 
-static void join(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t, struct joined_path *p)
+static void join(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
+		 struct joined_path *p)
 {
 	p->s = s;
 	p->edges = s + t - 1;
@@ -140,8 +141,8 @@ static bool disperses(const struct path_context *c, const struct joined_path *p)
 }
 
 /* The end of every contribution. */
-static spectrum weighted(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t, unsigned max_s,
-			 spectrum l)
+static spectrum weighted(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
+			 unsigned max_s, spectrum l)
 {
 	struct joined_path p;
 	join(c, light, s, t, &p);
@@ -201,7 +202,8 @@ static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, 
 	if (!film_window_holds(&c->window, x))
 		return spectrum_of(0);
 	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
-	l = spectrum_scale(camera_jac_film_from_solid(&c->w->camera, d) * jac_solid_from_area(y->x.ng, d, distance2), l);
+	l = spectrum_scale(camera_jac_film_from_solid(&c->w->camera, d) * jac_solid_from_area(y->x.ng, d, distance2),
+			   l);
 	if (spectrum_is_zero(l) || !path_visible(c, y, eye))
 		return spectrum_of(0);
 	film[0] = x[0];

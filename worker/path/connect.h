@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Techniques: a path of k edges can be made from s vertices of a light sub-path and t = k + 1 - s of a camera sub-path.
- * x_0 lies on the emitter, x_k is the pinhole or a point of the aperture, the same for all techniques of one evaluation.
- * Densities multiply (Veach 1997, sec. 10.2); the balance heuristic compares them for one given path. s = 0: the camera
- * sub-path found the emitter; s = 1: the emitter's point was drawn as seen from x_1 (next event estimation); t = 1: the light
- * sub-path is connected to x_k; t = 0 cannot happen.
+ * x_0 lies on the emitter, x_k is the pinhole or a point of the aperture, the same for all techniques of one
+ * evaluation. Densities multiply (Veach 1997, sec. 10.2); the balance heuristic compares them for one given path. s =
+ * 0: the camera sub-path found the emitter; s = 1: the emitter's point was drawn as seen from x_1 (next event
+ * estimation); t = 1: the light sub-path is connected to x_k; t = 0 cannot happen.
  */
 #ifndef WORKER_PATH_CONNECT_H
 #define WORKER_PATH_CONNECT_H
@@ -23,7 +23,8 @@ void path_technique_ratios(const struct path_context *c, const struct joined_pat
 /* Weight of the balance heuristic: 1 / sum of the ratios. */
 double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s);
 
-/* Density of an emitter's point (and of the choice of the emitter): as light sub-paths draw it, and as drawn towards ref. */
+/* Density of an emitter's point (and of the choice of the emitter): as light sub-paths draw it, and as drawn towards
+ * ref. */
 double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v);
 double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref);
 /* A fresh point on an emitter, drawn as seen from z with z's own numbers. */
@@ -31,13 +32,13 @@ bool path_next_event(const struct path_context *c, const struct path_vertex *z, 
 /* Nothing lies between a (not at infinity) and b. Counts a ray. */
 bool path_visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b);
 
-/* What a whole path brings, whose contribution is l. Where it scatters at a dispersive BSDF, however it does so there, its
- * directions and densities are those of nm[0], and only that one travels on: four times its share, unbiased because nm[0] is
- * uniform. A property of the path, so that all techniques that make it agree. */
+/* What a whole path brings, whose contribution is l. Where it scatters at a dispersive BSDF, however it does so there,
+ * its directions and densities are those of nm[0], and only that one travels on: four times its share, unbiased because
+ * nm[0] is uniform. A property of the path, so that all techniques that make it agree. */
 spectrum path_collapse(spectrum l, bool dispersive);
 
-/* Contribution f / p of joining the first s vertices of c->light with the first t of c->camera, already weighted among the
- * techniques up to max_s. s <= 1 needs no light sub-path. film: where it lands when t = 1 (else unchanged). */
+/* Contribution f / p of joining the first s vertices of c->light with the first t of c->camera, already weighted among
+ * the techniques up to max_s. s <= 1 needs no light sub-path. film: where it lands when t = 1 (else unchanged). */
 spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned max_s, double film[2]);
 
 #endif

@@ -3,9 +3,9 @@
 
 #include "worker/math/logsum.h"
 
-/* A sub-path has these vertices for sure, and n > 5 or more with probability (5/n)^2: 10 on average where nothing ends it. A fixed
- * probability of going on would make the weights of long paths grow as fast as light dies away, or faster between mirrors and in
- * fibres, where it hardly does: rare samples would hold most of the light. */
+/* A sub-path has these vertices for sure, and n > 5 or more with probability (5/n)^2: 10 on average where nothing ends
+ * it. A fixed probability of going on would make the weights of long paths grow as fast as light dies away, or faster
+ * between mirrors and in fibres, where it hardly does: rare samples would hold most of the light. */
 enum { SURE_VERTICES = 5 };
 
 /* Of at least `least` vertices how many, up to `most`: n or more with probability survival(n) / survival(least). */
@@ -17,9 +17,11 @@ static unsigned longer(double u, unsigned least, unsigned most)
 	return (unsigned)fmin(floor(from / sqrt(1 - u)), most);
 }
 
-struct ensemble_lengths ensemble_lengths_of(const struct path_context *c, const double u[2], unsigned camera, unsigned light)
+struct ensemble_lengths ensemble_lengths_of(const struct path_context *c, const double u[2], unsigned camera,
+					    unsigned light)
 {
-	return (struct ensemble_lengths){longer(u[0], camera, c->max_depth + 1), longer(u[1], light, c->max_depth), true};
+	return (struct ensemble_lengths){longer(u[0], camera, c->max_depth + 1), longer(u[1], light, c->max_depth),
+					 true};
 }
 
 struct ensemble_lengths ensemble_all_lengths(const struct path_context *c)
@@ -199,7 +201,8 @@ static unsigned choose_technique(const double *log_pdf, unsigned k, double log_s
 	return s;
 }
 
-void ensemble_around(struct path_context *c, struct sampler *sampler, struct full_path_path *x, const double u[3], struct ensemble *out)
+void ensemble_around(struct path_context *c, struct sampler *sampler, struct full_path_path *x, const double u[3],
+		     struct ensemble *out)
 {
 	unsigned k = x->edges;
 	double log_pdf[FULL_PATH_MAX_VERTICES];

@@ -175,7 +175,8 @@ bool full_path_is_dispersed(const struct path_context *c, const struct full_path
 
 void full_path_copy(struct full_path_path *to, const struct full_path_path *from, unsigned first, unsigned last)
 {
-	unsigned n = last - first + 1, edge = first > 0 ? first - 1 : 0, edge_end = last < from->edges ? last + 1 : from->edges;
+	unsigned n = last - first + 1, edge = first > 0 ? first - 1 : 0,
+		 edge_end = last < from->edges ? last + 1 : from->edges;
 	if (to->wavelength != from->wavelength)
 		to->known_f = to->known_fh = NONE;
 	to->edges = from->edges;

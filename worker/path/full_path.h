@@ -2,14 +2,14 @@
 /*
  * A whole path from an emitter to the camera: the state of chains in path space.
  *
- * v[0] is x_0 on the emitter (or the direction towards it, at infinity), v[edges] is x_k on the camera's aperture. Of struct
- * path_vertex a whole path uses kind, mode (inner vertices: how they scatter), delta, emitter, bsdf, x, to_prev (the unit
- * direction towards v[i + 1]: the camera's side) and as caches pdf and pdf_rev (density of the vertex as generated from the
- * camera's side and from the light's side).
+ * v[0] is x_0 on the emitter (or the direction towards it, at infinity), v[edges] is x_k on the camera's aperture. Of
+ * struct path_vertex a whole path uses kind, mode (inner vertices: how they scatter), delta, emitter, bsdf, x, to_prev
+ * (the unit direction towards v[i + 1]: the camera's side) and as caches pdf and pdf_rev (density of the vertex as
+ * generated from the camera's side and from the light's side).
  *
- * i_j is the unit direction from v[j] to v[j - 1], o_j the one to v[j + 1]. The contribution is measured as in path.h: per
- * area, per solid angle at infinity, delta distributions dropped (they are the same for all paths that share the modes).
- * One thread; nothing allocates.
+ * i_j is the unit direction from v[j] to v[j - 1], o_j the one to v[j + 1]. The contribution is measured as in path.h:
+ * per area, per solid angle at infinity, delta distributions dropped (they are the same for all paths that share the
+ * modes). One thread; nothing allocates.
  */
 #ifndef WORKER_PATH_FULL_PATH_H
 #define WORKER_PATH_FULL_PATH_H
@@ -35,8 +35,8 @@ static inline void vertex_set_add(struct vertex_set *s, unsigned j)
 	s->word[j / 64] |= (uint64_t)1 << (j % 64);
 }
 
-struct full_path_edge { /* v[e] - v[e + 1] */
-	vec3 w;           /* unit, from v[e] to v[e + 1] */
+struct full_path_edge {	  /* v[e] - v[e + 1] */
+	vec3 w;		  /* unit, from v[e] to v[e + 1] */
 	double distance2; /* 1 where v[0] lies at infinity */
 };
 
@@ -65,22 +65,22 @@ double product_log_intensity(const struct path_context *c, const struct full_pat
 /* Edge e from the positions of its ends, and to_prev of v[e]. false: the ends coincide. */
 bool full_path_join(struct full_path_path *x, unsigned e);
 
-/* What kind of scattering the directions o_j, i_j mean: BSDF_REFLECT or BSDF_TRANSMIT by the sides of both normals; 0: the two
- * normals disagree about a side, nothing scatters. */
+/* What kind of scattering the directions o_j, i_j mean: BSDF_REFLECT or BSDF_TRANSMIT by the sides of both normals; 0:
+ * the two normals disagree about a side, nothing scatters. */
 unsigned full_path_mode(const struct full_path_path *x, unsigned j);
 
 /* n_o / n_i at v[j]: index on the camera's side over that on the light's; 1 where it reflects. */
 double full_path_eta(const struct full_path_path *x, unsigned j);
 
-/* v[0]: L_e towards v[1]. Inner vertices: f_radiance(o, i) without cosine, or the weight of the lobe where specular. Computed
- * when asked for the first time. */
+/* v[0]: L_e towards v[1]. Inner vertices: f_radiance(o, i) without cosine, or the weight of the lobe where specular.
+ * Computed when asked for the first time. */
 spectrum full_path_f(const struct path_context *c, struct full_path_path *x, unsigned j);
 /* Inner vertices: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), or the weight of the lobe where specular. */
 spectrum full_path_fh(const struct path_context *c, struct full_path_path *x, unsigned j);
 /* The vertices first..last are about to change: what was known of them and of their neighbours no longer holds. */
 void full_path_forget(struct full_path_path *x, unsigned first, unsigned last);
-/* The exactly specular lobe of v[j]'s mode seen along o_j, as bsdf_eval_delta has it: its weight, its direction in the shading
- * frame, the probability with which it is chosen. */
+/* The exactly specular lobe of v[j]'s mode seen along o_j, as bsdf_eval_delta has it: its weight, its direction in the
+ * shading frame, the probability with which it is chosen. */
 spectrum full_path_specular(const struct full_path_path *x, unsigned j, vec3 *wi, double *chance);
 /* By how far i_j is from where the exactly specular lobe of v[j]'s mode sends o_j; INFINITY: there is no such lobe. */
 double full_path_specular_miss(const struct full_path_path *x, unsigned j);
@@ -98,11 +98,12 @@ bool full_path_visible(struct path_context *c, const struct full_path_path *x, u
 bool whole_film(const struct path_context *c, struct full_path_path *x);
 
 /* Everything that follows from the vertices: edges, modes (those of specular vertices are given), film point,
- * scattering. false: ends coincide, it leaves the window, directions are not of a mode, or it is black. Casts no ray. */
+ * scattering. false: ends coincide, it leaves the window, directions are not of a mode, or it is black. Casts no ray.
+ */
 bool full_path_finish(const struct path_context *c, struct full_path_path *x);
 
-/* The path that technique s makes of the sub-paths in c (s vertices of c->light, the others of c->camera), with everything
- * cached. Casts the connecting ray. false: there is none, or it is black. */
+/* The path that technique s makes of the sub-paths in c (s vertices of c->light, the others of c->camera), with
+ * everything cached. Casts the connecting ray. false: there is none, or it is black. */
 bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path_path *x);
 
 /* log f of the path in the measure of path.h, from the products of its geometry terms; -INFINITY: black. */
@@ -115,8 +116,8 @@ void full_path_log_techniques(struct path_context *c, struct full_path_path *x, 
 /* CIE XYZ of the path's colour, scaled so that X + Y + Z = 1. */
 void full_path_colour(const struct path_context *c, struct full_path_path *x, double xyz[3]);
 
-/* Recomputes everything that is cached and asks every ray again; the first disagreement in words. For tests and for states
- * that come from outside. */
+/* Recomputes everything that is cached and asks every ray again; the first disagreement in words. For tests and for
+ * states that come from outside. */
 bool path_check(struct path_context *c, const struct full_path_path *x, char *text, size_t size);
 
 #endif

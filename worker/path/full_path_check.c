@@ -67,12 +67,15 @@ static bool check_vertices(const struct path_context *c, const struct full_path_
 		if (j > 0 && v->delta && !check_specular(x, j, text, size))
 			return false;
 		spectrum f = full_path_f(c, &fresh, j);
-		if (spectrum_is_zero(f) || !spectrum_is_valid(f) || (vertex_set_has(&x->known_f, j) && !same_spectrum(f, x->f[j]))) {
-			snprintf(text, size, "f at vertex %u of %u is %g, cached %g", j, x->edges, f.v[0], x->f[j].v[0]);
+		if (spectrum_is_zero(f) || !spectrum_is_valid(f) ||
+		    (vertex_set_has(&x->known_f, j) && !same_spectrum(f, x->f[j]))) {
+			snprintf(text, size, "f at vertex %u of %u is %g, cached %g", j, x->edges, f.v[0],
+				 x->f[j].v[0]);
 			return false;
 		}
 		if (j > 0 && vertex_set_has(&x->known_fh, j) && !same_spectrum(full_path_fh(c, &fresh, j), x->fh[j])) {
-			snprintf(text, size, "fh at vertex %u of %u is %g, cached %g", j, x->edges, fresh.fh[j].v[0], x->fh[j].v[0]);
+			snprintf(text, size, "fh at vertex %u of %u is %g, cached %g", j, x->edges, fresh.fh[j].v[0],
+				 x->fh[j].v[0]);
 			return false;
 		}
 	}
@@ -91,7 +94,8 @@ bool path_check(struct path_context *c, const struct full_path_path *x, char *te
 	struct full_path_path film = *x;
 	double off = fmax(1e-6, FILM_TOLERANCE * c->w->camera.scale);
 	if (!whole_film(c, &film) || hypot(film.film[0] - x->film[0], film.film[1] - x->film[1]) > off) {
-		snprintf(text, size, "the film point (%g, %g) is (%g, %g)", x->film[0], x->film[1], film.film[0], film.film[1]);
+		snprintf(text, size, "the film point (%g, %g) is (%g, %g)", x->film[0], x->film[1], film.film[0],
+			 film.film[1]);
 		return false;
 	}
 	return check_edges(c, x, text, size) && check_vertices(c, x, text, size);

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The contribution of a whole path and the densities of all techniques that could have made it: the explicit products, in
- * logarithms, that proposals in half vector space never multiply out. */
+/* The contribution of a whole path and the densities of all techniques that could have made it: the explicit products,
+ * in logarithms, that proposals in half vector space never multiply out. */
 #include "worker/path/measure.h"
 #include "worker/path/full_path.h"
 
@@ -15,7 +15,8 @@ double full_path_log_f(const struct path_context *c, struct full_path_path *x)
 		const struct path_vertex *v = &x->v[j];
 		/* Measured in the direction towards the light, projected on the geometric normal. */
 		if (!v->delta)
-			log_geometry += log(fabs(vec3_dot(v->x.sh.n, x->edge[j - 1].w) / vec3_dot(v->x.ng, x->edge[j - 1].w)));
+			log_geometry +=
+				log(fabs(vec3_dot(v->x.sh.n, x->edge[j - 1].w) / vec3_dot(v->x.ng, x->edge[j - 1].w)));
 	}
 	for (unsigned e = 0; e < k; e++) {
 		const struct full_path_edge *g = &x->edge[e];

@@ -47,7 +47,8 @@ void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path
 const struct integrator integrator_bdpt = {
 	.face = {.name = "bdpt",
 		 .summary = "bidirectional path tracing, all techniques, balance heuristic",
-		 .kind = PLAN_SAMPLES, .max_depth = PATH_MAX_EDGES},
+		 .kind = PLAN_SAMPLES,
+		 .max_depth = PATH_MAX_EDGES},
 	.stream = RNG_BDPT,
 	.evaluate = path_trace_both_ways,
 };

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The path tracer: a camera sub-path, at each vertex next event estimation and the emitter met by chance, weighted against
- * each other by the balance heuristic (Veach 1997, sec. 9.2.4). The reference for all other integrators.
+ * The path tracer: a camera sub-path, at each vertex next event estimation and the emitter met by chance, weighted
+ * against each other by the balance heuristic (Veach 1997, sec. 9.2.4). The reference for all other integrators.
  */
 #include "worker/path/classes.h"
 #include "worker/path/connect.h"
@@ -39,7 +39,8 @@ void path_trace(struct path_context *c, struct sampler *s, struct path_sample *o
 const struct integrator integrator_path = {
 	.face = {.name = "path",
 		 .summary = "path tracing with next event estimation and multiple importance sampling",
-		 .kind = PLAN_SAMPLES, .max_depth = PATH_MAX_EDGES},
+		 .kind = PLAN_SAMPLES,
+		 .max_depth = PATH_MAX_EDGES},
 	.stream = RNG_PATH,
 	.evaluate = path_trace,
 };

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Integrators as table entries: one file and one line in integrator_list.h each. An integrator turns one point of the space
- * of random numbers into a contribution f / p over the whole film window (docs/design.md, rules 2); whether independent points are
- * averaged or a Markov chain walks among them is the caller's.
+ * Integrators as table entries: one file and one line in integrator_list.h each. An integrator turns one point of the
+ * space of random numbers into a contribution f / p over the whole film window (docs/design.md, rules 2); whether
+ * independent points are averaged or a Markov chain walks among them is the caller's.
  */
 #ifndef WORKER_PATH_INTEGRATOR_H
 #define WORKER_PATH_INTEGRATOR_H
@@ -11,7 +11,7 @@
 
 struct integrator {
 	struct render_integrator face; /* name, summary, kind, depth that its state holds */
-	enum rng_stream stream;        /* of its own samples */
+	enum rng_stream stream;	       /* of its own samples */
 	void (*evaluate)(struct path_context *c, struct sampler *s, struct path_sample *out);
 	const struct chain_ops *chain; /* worker/chain/chain.h; NULL: averages independent points */
 };

@@ -8,7 +8,8 @@
 
 /* Russian roulette begins after this many scattering events, where it is allowed. */
 enum { ROULETTE_FROM = 5 };
-/* Fainter contributions are black: their parts, such as those of path classes, could be denormal and would not add up. */
+/* Fainter contributions are black: their parts, such as those of path classes, could be denormal and would not add up.
+ */
 #define FAINTEST (DBL_MIN / DBL_EPSILON)
 
 struct film_window film_window_of(const struct plan *p)
@@ -51,7 +52,8 @@ static bool same_side(const struct surface_point *x, vec3 w)
 	return vec3_dot(x->ng, w) * vec3_dot(x->sh.n, w) > 0;
 }
 
-static struct bsdf_point bsdf_point_of(const struct path_context *c, const struct path_vertex *v, enum transport transport)
+static struct bsdf_point bsdf_point_of(const struct path_context *c, const struct path_vertex *v,
+				       enum transport transport)
 {
 	return (struct bsdf_point){v->x.u, v->x.v, &c->wl, transport};
 }
@@ -66,7 +68,8 @@ spectrum path_scatter(const struct path_context *c, const struct path_vertex *v,
 	return spectrum_scale(fabs(wi.z) / fabs(vec3_dot(v->x.ng, to_light)), f);
 }
 
-static double surface_pdf(const struct path_context *c, const struct path_vertex *v, vec3 wo, vec3 wi, enum transport transport)
+static double surface_pdf(const struct path_context *c, const struct path_vertex *v, vec3 wo, vec3 wi,
+			  enum transport transport)
 {
 	if (!v->bsdf->has_smooth || !same_side(&v->x, wo) || !same_side(&v->x, wi))
 		return 0;
@@ -143,13 +146,13 @@ struct departure {
 	vec3 wi;
 	spectrum beta;
 	double pdf, pdf_rev; /* solid angle; the probability of the lobe where delta */
-	double eta;          /* index on wi's side over the one on the side the path came from */
+	double eta;	     /* index on wi's side over the one on the side the path came from */
 	unsigned mode;
 	bool delta;
 };
 
-static bool depart(const struct path_context *c, const struct path_vertex *v, const double u[3], enum transport transport,
-		   struct departure *out)
+static bool depart(const struct path_context *c, const struct path_vertex *v, const double u[3],
+		   enum transport transport, struct departure *out)
 {
 	struct bsdf_point p = bsdf_point_of(c, v, transport);
 	struct bsdf_sample s;
@@ -170,14 +173,16 @@ static bool depart(const struct path_context *c, const struct path_vertex *v, co
 	out->pdf_rev = 0;
 	if (c->one_way)
 		return true;
-	struct bsdf_point back = bsdf_point_of(c, v, transport == TRANSPORT_RADIANCE ? TRANSPORT_IMPORTANCE : TRANSPORT_RADIANCE);
+	struct bsdf_point back =
+		bsdf_point_of(c, v, transport == TRANSPORT_RADIANCE ? TRANSPORT_IMPORTANCE : TRANSPORT_RADIANCE);
 	out->pdf_rev = out->delta ? s.pdf : v->bsdf->ops->pdf_solid(v->bsdf, &back, s.wi, wo);
 	return true;
 }
 
-/* Density per area of `to`, reached from `at`; solid as chosen there. For a delta lobe `solid` is a probability, and per_solid
- * what makes it a density: see path_delta_per_solid. */
-static double reach_pdf(const struct path_context *c, const struct path_vertex *at, const struct path_vertex *to, double solid, double per_solid)
+/* Density per area of `to`, reached from `at`; solid as chosen there. For a delta lobe `solid` is a probability, and
+ * per_solid what makes it a density: see path_delta_per_solid. */
+static double reach_pdf(const struct path_context *c, const struct path_vertex *at, const struct path_vertex *to,
+			double solid, double per_solid)
 {
 	double distance2;
 	vec3 omega = path_direction(at, to, &distance2);
@@ -206,8 +211,8 @@ static bool survives(const struct path_context *c, unsigned scatterings, double 
 }
 
 /* Extends v[0..n) up to `max` vertices by scattering; v[n-1] is a surface. start: beta to which roulette compares. */
-static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampler_side side, struct path_vertex *v, unsigned n,
-			   unsigned max, double start)
+static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampler_side side, struct path_vertex *v,
+			   unsigned n, unsigned max, double start)
 {
 	enum transport transport = side == SIDE_CAMERA ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
 	for (;;) {
@@ -324,7 +329,8 @@ unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max
 	v[0].beta = spectrum_of(1 / pdf);
 	if (max_vertices < 2)
 		return 1;
-	bool left = p.infinite ? leave_infinity(c, v, u + DIM_EMITTER_DIRECTION) : leave_surface(c, v, u + DIM_EMITTER_DIRECTION);
+	bool left = p.infinite ? leave_infinity(c, v, u + DIM_EMITTER_DIRECTION)
+			       : leave_surface(c, v, u + DIM_EMITTER_DIRECTION);
 	if (!left || spectrum_is_zero(v[1].beta))
 		return 1;
 	v[1].pdf = path_pdf(c, NULL, &v[0], &v[1], TRANSPORT_IMPORTANCE);
@@ -333,7 +339,8 @@ unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max
 	return scatter_on(c, s, SIDE_LIGHT, v, 2, max_vertices, spectrum_max(v[1].beta));
 }
 
-unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_side side, unsigned n, unsigned max_vertices)
+unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_side side, unsigned n,
+		      unsigned max_vertices)
 {
 	struct path_vertex *v = side == SIDE_CAMERA ? c->camera : c->light;
 	return scatter_on(c, s, side, v, n, max_vertices, spectrum_max(v[1].beta));

@@ -7,11 +7,11 @@
  * realises with shading normals, whichever way the path was sampled.
  * Directions on different sides of the shading and the geometric normal are refused (as Mitsuba's strictNormals).
  *
- * Densities of vertices: per area of the rescaled world; per solid angle for a vertex at infinity; x_0 on a delta emitter
- * counts: 1 times the choice of the emitter, and 0 as found by a path from the camera; times a delta
- * distribution in the direction towards the light, projected on the geometric normal, where scattering is exactly specular
- * (it cancels between all techniques of one path). Roulette is not part of them. The film is sampled with density
- * 1 / pixels (struct film_window).
+ * Densities of vertices: per area of the rescaled world; per solid angle for a vertex at infinity; x_0 on a delta
+ * emitter counts: 1 times the choice of the emitter, and 0 as found by a path from the camera; times a delta
+ * distribution in the direction towards the light, projected on the geometric normal, where scattering is exactly
+ * specular (it cancels between all techniques of one path). Roulette is not part of them. The film is sampled with
+ * density 1 / pixels (struct film_window).
  */
 #ifndef WORKER_PATH_PATH_H
 #define WORKER_PATH_PATH_H
@@ -26,16 +26,17 @@ enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINIT
 
 struct path_vertex {
 	enum vertex_kind kind;
-	bool delta;              /* its own sub-path left it by an exactly specular lobe */
-	unsigned mode;           /* of enum bsdf_mode: how its own sub-path left it */
-	int32_t emitter;         /* shines: index; -1 */
+	bool delta;		 /* its own sub-path left it by an exactly specular lobe */
+	unsigned mode;		 /* of enum bsdf_mode: how its own sub-path left it */
+	int32_t emitter;	 /* shines: index; -1 */
 	const struct bsdf *bsdf; /* VERTEX_SURFACE */
-	struct surface_point x;  /* VERTEX_INFINITE: p is the unit direction towards the emitter. A point light's ng is 0 */
-	vec3 to_prev;            /* unit; towards the vertex before it on its own sub-path */
-	spectrum beta;           /* carried to this vertex over the density of getting here */
-	double pdf;              /* of this vertex from its own sub-path, see above */
-	double pdf_rev;          /* of this vertex as generated from the next two of its own sub-path */
-	double next_event[3];    /* random numbers kept for next event estimation */
+	struct surface_point
+		x;	/* VERTEX_INFINITE: p is the unit direction towards the emitter. A point light's ng is 0 */
+	vec3 to_prev;	/* unit; towards the vertex before it on its own sub-path */
+	spectrum beta;	/* carried to this vertex over the density of getting here */
+	double pdf;	/* of this vertex from its own sub-path, see above */
+	double pdf_rev; /* of this vertex as generated from the next two of its own sub-path */
+	double next_event[3]; /* random numbers kept for next event estimation */
 };
 
 /* The film points that are sampled: the crop and its border, in pixels. */
@@ -55,8 +56,8 @@ struct path_context {
 	struct wavelengths wl;
 	uint32_t min_depth, max_depth; /* edges */
 	bool roulette;
-	bool unclassed; /* nobody asks for path_sample.classes */
-	bool one_way; /* nobody asks for pdf_rev: no technique has more than one light vertex */
+	bool unclassed;	    /* nobody asks for path_sample.classes */
+	bool one_way;	    /* nobody asks for pdf_rev: no technique has more than one light vertex */
 	uint64_t *counters; /* of enum batch_counter */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
 };
@@ -75,14 +76,15 @@ struct path_sample {
 
 struct film_window film_window_of(const struct plan *p);
 
-/* Camera sub-path: vertex 0 is the pinhole or a point of the aperture, whose density is 1 in every technique. Returns the
- * number of vertices; an escaped path may end in VERTEX_INFINITE. film: the film point that was drawn. */
+/* Camera sub-path: vertex 0 is the pinhole or a point of the aperture, whose density is 1 in every technique. Returns
+ * the number of vertices; an escaped path may end in VERTEX_INFINITE. film: the film point that was drawn. */
 unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned max_vertices, double film[2]);
 /* Light sub-path: vertex 0 lies on an emitter. 0: no emitter, or it could not be sampled. */
 unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max_vertices);
 
 /* Goes on from a sub-path of n >= 2 vertices, the last of them a surface. Returns the number of vertices. */
-unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_side side, unsigned n, unsigned max_vertices);
+unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_side side, unsigned n,
+		      unsigned max_vertices);
 
 /* Density with which `next` is generated from `at` having come from `prev` (unused for camera and emitters). */
 double path_pdf(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
@@ -104,17 +106,18 @@ spectrum path_scatter(const struct path_context *c, const struct path_vertex *v,
 /* |ng . w| of the geometry terms; 1 where a vertex has no surface: the camera, what lies at infinity, a point light. */
 double path_cosine(const struct path_vertex *v, vec3 w);
 
-/* Delta distributions are written in the direction towards the light, projected on the geometric normal: 1 in that measure is
- * the cosine per solid angle. Towards the camera 1 per solid angle there is worth the ratio of the two solid angles, the
- * squared indices and the cosines about which light is bent, those with the shading normal. eta_camera: the index on the
- * camera's side over that on the light's. */
+/* Delta distributions are written in the direction towards the light, projected on the geometric normal: 1 in that
+ * measure is the cosine per solid angle. Towards the camera 1 per solid angle there is worth the ratio of the two solid
+ * angles, the squared indices and the cosines about which light is bent, those with the shading normal. eta_camera: the
+ * index on the camera's side over that on the light's. */
 void path_delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera, double eta_camera, double *to_light,
 			  double *to_camera);
 
 /* Radiance that leaves an emitter's point in direction w. */
 spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl);
 
-/* The vertex where the ray from `from` along d ends: a surface, the emitter at infinity, or nothing (false). Counts a ray. */
+/* The vertex where the ray from `from` along d ends: a surface, the emitter at infinity, or nothing (false). Counts a
+ * ray. */
 bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d, double t_min, double t_max,
 		 struct path_vertex *to);
 

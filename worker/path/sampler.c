@@ -18,5 +18,6 @@ static const double *random_block(struct sampler *base, enum sampler_side side, 
 
 void sampler_random_init(struct sampler_random *s, uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step)
 {
-	*s = (struct sampler_random){.base = {random_block}, .seed = seed, .stream = stream, .index = index, .step = step};
+	*s = (struct sampler_random){
+		.base = {random_block}, .seed = seed, .stream = stream, .index = index, .step = step};
 }

@@ -9,9 +9,16 @@
 #include <string.h>
 
 static const struct render_setting list[] = {
-#define KNOB(field, name_, kind_, place_, standard_, least_, greatest_, choices_, summary_, ...)                               \
-	{.name = name_, .summary = summary_, .kind = kind_, .place = place_, .standard = standard_, .least = least_,            \
-	 .greatest = greatest_, .choices = choices_, .sweep = {__VA_ARGS__}},
+#define KNOB(field, name_, kind_, place_, standard_, least_, greatest_, choices_, summary_, ...) \
+	{.name = name_,                                                                          \
+	 .summary = summary_,                                                                    \
+	 .kind = kind_,                                                                          \
+	 .place = place_,                                                                        \
+	 .standard = standard_,                                                                  \
+	 .least = least_,                                                                        \
+	 .greatest = greatest_,                                                                  \
+	 .choices = choices_,                                                                    \
+	 .sweep = {__VA_ARGS__}},
 #include "worker/render/setting_list.h"
 #undef KNOB
 };
@@ -81,7 +88,11 @@ void render_setting_range(const struct render_setting *k, char *text, size_t siz
 		return;
 	}
 	for (int i = 0; choice_at(k->choices, i, 0, choice, sizeof choice); i++)
-		text_put(&t, "%s%s", i == 0 ? "" : choice_at(k->choices, i + 1, 0, next, sizeof next) ? ", " : " or ", choice);
+		text_put(&t, "%s%s",
+			 i == 0						      ? ""
+			 : choice_at(k->choices, i + 1, 0, next, sizeof next) ? ", "
+									      : " or ",
+			 choice);
 }
 
 static int name_error(const char *name, struct error *e)
@@ -92,7 +103,8 @@ static int name_error(const char *name, struct error *e)
 		spelling_offer(&s, list[i].name);
 		spelling_list(known, sizeof known, list[i].name);
 	}
-	return error_set(e, EINVAL, "no setting is called '%s'%s; there are %s", name, spelling_hint(&s, hint, sizeof hint), known);
+	return error_set(e, EINVAL, "no setting is called '%s'%s; there are %s", name,
+			 spelling_hint(&s, hint, sizeof hint), known);
 }
 
 static int find(const char *name, size_t *index, struct error *e)
@@ -143,8 +155,8 @@ static int read_entry(const char *text, size_t length, struct accuracy_settings 
 		return rc;
 	if (!parse_value(&list[index], equals + 1, &value)) {
 		render_setting_range(&list[index], range, sizeof range);
-		return error_set(e, EINVAL, "%s is%s %s, not '%s'", entry, list[index].kind == SETTING_WHOLE ? " a whole number from" : "",
-				 range, equals + 1);
+		return error_set(e, EINVAL, "%s is%s %s, not '%s'", entry,
+				 list[index].kind == SETTING_WHOLE ? " a whole number from" : "", range, equals + 1);
 	}
 	set(out, index, value);
 	return 0;

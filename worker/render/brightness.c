@@ -43,7 +43,8 @@ static uint32_t along(double position, double size, uint32_t cells)
 
 static size_t cell_at(const struct brightness *b, double x, double y)
 {
-	return (size_t)along(y - b->window.y, b->window.height, b->across) * b->across + along(x - b->window.x, b->window.width, b->across);
+	return (size_t)along(y - b->window.y, b->window.height, b->across) * b->across +
+	       along(x - b->window.x, b->window.width, b->across);
 }
 
 void brightness_add(struct brightness *b, const struct splat *s)

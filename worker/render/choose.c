@@ -11,25 +11,31 @@
 #include <string.h>
 
 enum {
-	SAMPLES_LEAST = 1 << 14, /* of 8,192 the tail says too little: 2.0 to 2.5 in cornell-box, 1.5 to 2.3 in three-spheres */
+	SAMPLES_LEAST =
+		1 << 14, /* of 8,192 the tail says too little: 2.0 to 2.5 in cornell-box, 1.5 to 2.3 in three-spheres */
 	SAMPLES_MOST = 1 << 18,
 	SAMPLES_SHARE = 128, /* one of so many samples of the render, of each kind */
-	SHORTER = 4,         /* of bdpt, where only its cost is asked for */
-	IN_PIXEL = 16,       /* samples of one pixel */
-	DROPPED = 3,         /* largest terms */
-	STREAM_MAP = 0, STREAM_PATH, STREAM_BDPT, STREAM_PIXEL, /* steps of RNG_CHOICE */
+	SHORTER = 4,	     /* of bdpt, where only its cost is asked for */
+	IN_PIXEL = 16,	     /* samples of one pixel */
+	DROPPED = 3,	     /* largest terms */
+	STREAM_MAP = 0,
+	STREAM_PATH,
+	STREAM_BDPT,
+	STREAM_PIXEL, /* steps of RNG_CHOICE */
 };
 
-/* Of the scenes of tests/bench/README.md: more in the four where chains win by factors (pane and frosted, eight seeds each: 15 of 16
- * pilots of 8,192 samples, 16 of 16 of 16,384), 0.16 or less in all others but veach-door, where it is 0.1 to 0.34. */
+/* Of the scenes of tests/bench/README.md: more in the four where chains win by factors (pane and frosted, eight seeds
+ * each: 15 of 16 pilots of 8,192 samples, 16 of 16 of 16,384), 0.16 or less in all others but veach-door, where it is
+ * 0.1 to 0.34. */
 static const double rare_share = 0.28;
-/* With 16,384 samples, five seeds each: the larger of both extremes is 0.67 to 0.79 in half-sunk, where chains are as good as the
- * others but for fireflies (four times better with them), and the smaller share of rare light 6 to 16 %. In all other scenes that do not
- * call for chains one of them is 1.03 or more but for one pilot of displaced: 0.82, with 3 % of the light rare. */
+/* With 16,384 samples, five seeds each: the larger of both extremes is 0.67 to 0.79 in half-sunk, where chains are as
+ * good as the others but for fireflies (four times better with them), and the smaller share of rare light 6 to 16 %. In
+ * all other scenes that do not call for chains one of them is 1.03 or more but for one pilot of displaced: 0.82, with 3
+ * % of the light rare. */
 static const double extreme_least = 0.85, extreme_share = 0.05;
-/* The same of path's tail: 2.1 to 2.8 in cornell-box and veach-mis and more in box, where path is the best by 1.2 to 1.4 x; 0.9 to 2.0 but
- * for one of rough-caustic (2.3) in that, three-spheres, demo, displaced and veach-door, where bdpt is, by up to 2.1 x (6 x with
- * fireflies). */
+/* The same of path's tail: 2.1 to 2.8 in cornell-box and veach-mis and more in box, where path is the best by 1.2
+ * to 1.4 x; 0.9 to 2.0 but for one of rough-caustic (2.3) in that, three-spheres, demo, displaced and veach-door, where
+ * bdpt is, by up to 2.1 x (6 x with fireflies). */
 static const double tail_least = 2.1;
 /* bdpt errs less than the pilot says: it has the shorter tails. */
 static const double path_cost = 0.75;
@@ -58,8 +64,8 @@ static void add_term(struct tally *t, double y)
 	tail_add(t->tail, y);
 }
 
-/* A pixel that is brighter than the map knows, a lamp's, is so in all its samples: each is held against what the others found,
- * where that is more. */
+/* A pixel that is brighter than the map knows, a lamp's, is so in all its samples: each is held against what the others
+ * found, where that is more. */
 static void add_pixel(struct tally *t, const struct parts *of)
 {
 	double all = 0;
@@ -111,7 +117,8 @@ const char *render_choice_of(const struct render_choice *c)
 		return "bdpt";
 	if (wants_chains(&c->bdpt) && (c->misses || wants_chains(&c->path)))
 		return "hslt";
-	bool path = !c->misses && c->path.cost > 0 && c->path.tail >= tail_least && c->path.cost < path_cost * c->bdpt.cost;
+	bool path =
+		!c->misses && c->path.cost > 0 && c->path.tail >= tail_least && c->path.cost < path_cost * c->bdpt.cost;
 	return path ? "path" : "bdpt";
 }
 
@@ -181,7 +188,7 @@ static void take_parts(const struct pilot *p, const struct film_window *pixel, s
 }
 
 static struct render_found look(struct pilot *p, uint64_t stream, uint64_t samples,
-				 void (*trace)(struct path_context *, struct sampler *, struct path_sample *))
+				void (*trace)(struct path_context *, struct sampler *, struct path_sample *))
 {
 	struct tally t = {.samples = (double)(samples / IN_PIXEL * IN_PIXEL), .tail = &p->tail};
 	const struct film_window *w = &p->context.window;
@@ -194,7 +201,8 @@ static struct render_found look(struct pilot *p, uint64_t stream, uint64_t sampl
 		double column = floor(u[0] * w->width), row = floor(u[1] * w->height);
 		struct film_window pixel = {w->x + column, w->y + row, 1, 1};
 		for (unsigned k = 0; k < IN_PIXEL; k++) {
-			struct pixel_sampler s = {.corner = {column / w->width, row / w->height}, .size = {1 / w->width, 1 / w->height}};
+			struct pixel_sampler s = {.corner = {column / w->width, row / w->height},
+						  .size = {1 / w->width, 1 / w->height}};
 			sampler_random_init(&s.random, p->seed, RNG_CHOICE, i * IN_PIXEL + k, stream);
 			s.random.base.block = pixel_block;
 			trace(&p->context, &s.random.base, &p->sample);
@@ -219,8 +227,8 @@ static uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels)
 	return n;
 }
 
-/* The film and the random numbers of the render, checked as it will be; then all of the film, so that a crop is rendered by what the
- * whole is rendered by and has its pixels. */
+/* The film and the random numbers of the render, checked as it will be; then all of the film, so that a crop is
+ * rendered by what the whole is rendered by and has its pixels. */
 static int film_of(const struct plan_request *r, struct plan *p, struct error *e)
 {
 	struct plan_request of = *r;
@@ -239,8 +247,13 @@ static int film_of(const struct plan_request *r, struct plan *p, struct error *e
 
 static int run(struct pilot *p, const struct plan *film, struct render_choice *out, struct error *e)
 {
-	p->context = (struct path_context){.w = p->w, .window = film_window_of(film), .min_depth = film->min_depth,
-					   .max_depth = film->max_depth, .roulette = true, .unclassed = true, .counters = p->counters};
+	p->context = (struct path_context){.w = p->w,
+					   .window = film_window_of(film),
+					   .min_depth = film->min_depth,
+					   .max_depth = film->max_depth,
+					   .roulette = true,
+					   .unclassed = true,
+					   .counters = p->counters};
 	int rc = tail_init(&p->tail, p->samples / RENDER_TAIL + 1);
 	rc = rc ? error_set(e, ENOMEM, "no memory for a pilot") : make_map(p, out->misses, e);
 	if (!rc) {
@@ -301,13 +314,16 @@ int render_choose(const struct world *w, struct plan_request *r, struct render_c
 void render_choice_text(const char *integrator, const struct render_choice *c, char *text, size_t size)
 {
 	const struct render_found *p = &c->path, *b = &c->bdpt;
-	int n = snprintf(text, size, "%s, by a pilot: path: %.3g %% of the light beyond %d times the brightness of its place, tail index %.2f, "
-				     "of the extreme %.2f, second moment times rays %.3g",
-			 integrator, 100 * p->rare, RENDER_RARE, p->tail, p->extreme, p->cost);
+	int n = snprintf(
+		text, size,
+		"%s, by a pilot: path: %.3g %% of the light beyond %d times the brightness of its place, tail index %.2f, "
+		"of the extreme %.2f, second moment times rays %.3g",
+		integrator, 100 * p->rare, RENDER_RARE, p->tail, p->extreme, p->cost);
 	if (n < 0 || (size_t)n >= size)
 		return;
 	if (c->settled)
 		snprintf(text + n, size - (size_t)n, "; so bdpt was not tried");
 	else
-		snprintf(text + n, size - (size_t)n, "; bdpt: %.3g %%, %.2f, %.2f, %.3g", 100 * b->rare, b->tail, b->extreme, b->cost);
+		snprintf(text + n, size - (size_t)n, "; bdpt: %.3g %%, %.2f, %.2f, %.3g", 100 * b->rare, b->tail,
+			 b->extreme, b->cost);
 }

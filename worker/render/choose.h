@@ -1,16 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which integrator a scene calls for: `path`, `bdpt`, or the chains of `hslt`. Decided once, before the plan is made, from a pilot
- * that counts rays instead of seconds and draws random numbers of its own: the same on every machine for the same request, and
- * the plan names what was chosen.
+ * Which integrator a scene calls for: `path`, `bdpt`, or the chains of `hslt`. Decided once, before the plan is made,
+ * from a pilot that counts rays instead of seconds and draws random numbers of its own: the same on every machine for
+ * the same request, and the plan names what was chosen.
  *
- * The pilot draws samples of `path`, and of `bdpt` where those leave the choice open, and looks at what each brings relative to the
- * brightness of its place: how much light comes in rare contributions of many times that brightness, and how fast the frequency of
- * the largest falls with their size (their tail index, by Hill's estimator). Chains are called for where both integrators find much
- * of the light in rare contributions (caustics through water, panes, frosted glass), or some of it while the largest fall off so
- * slowly that more samples keep on finding larger ones: below a tail index of 1 not even a mean exists. Else it is `path` where its tail is that of
- * a finite variance (2 or more) and its second moment times rays is the smaller one; `bdpt` in all other cases, because the fireflies
- * that a pilot does not see decide the error of a long render.
+ * The pilot draws samples of `path`, and of `bdpt` where those leave the choice open, and looks at what each brings
+ * relative to the brightness of its place: how much light comes in rare contributions of many times that brightness,
+ * and how fast the frequency of the largest falls with their size (their tail index, by Hill's estimator). Chains are
+ * called for where both integrators find much of the light in rare contributions (caustics through water, panes,
+ * frosted glass), or some of it while the largest fall off so slowly that more samples keep on finding larger ones:
+ * below a tail index of 1 not even a mean exists. Else it is `path` where its tail is that of a finite variance (2 or
+ * more) and its second moment times rays is the smaller one; `bdpt` in all other cases, because the fireflies that a
+ * pilot does not see decide the error of a long render.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
@@ -19,9 +20,10 @@
 
 /* What was found of one of them. */
 struct render_found {
-	double cost;    /* second moment of a sample's relative contribution, the few largest left out, times rays a sample; 0: no light */
-	double rare;    /* share of the energy beyond RENDER_RARE times the brightness there */
-	double tail;    /* tail index of the largest, one in RENDER_TAIL samples, */
+	double cost;	/* second moment of a sample's relative contribution, the few largest left out, times rays a
+			   sample; 0: no light */
+	double rare;	/* share of the energy beyond RENDER_RARE times the brightness there */
+	double tail;	/* tail index of the largest, one in RENDER_TAIL samples, */
 	double extreme; /* and one in RENDER_EXTREME; 1 where fewer carry light */
 };
 #define RENDER_RARE 32
@@ -29,9 +31,10 @@ enum { RENDER_TAIL = 128, RENDER_EXTREME = 512 };
 
 struct render_choice {
 	struct render_found path, bdpt;
-	bool misses;  /* path finds less than there is: light of a point or a direction through a specular lobe */
-	bool settled; /* path alone left no choice: nothing is known of bdpt */
-	uint64_t samples; /* of the pilot, all kinds; at most 1 in 30 of the render's, or 3 times 16,384 where that is more */
+	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe */
+	bool settled;	  /* path alone left no choice: nothing is known of bdpt */
+	uint64_t samples; /* of the pilot, all kinds; at most 1 in 30 of the render's, or 3 times 16,384 where that is
+			     more */
 };
 
 /* Sets integrator, kind and mixture of the request, all else of which stands. Ticks. -ENOMEM, -EINVAL */

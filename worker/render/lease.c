@@ -29,7 +29,7 @@ struct job {
 	uint64_t sequence, index; /* where it is: row and column, or chain and mutation; of a bootstrap the sample */
 };
 
-enum { STOP_INTERVAL = 256 }; /* samples between looks at the stop flag */
+enum { STOP_INTERVAL = 256 };  /* samples between looks at the stop flag */
 enum { BEYOND_INTERVAL = 16 }; /* one bootstrap sample in so many also estimates paths too long for a chain's state */
 
 const char *render_numeric_version(void)
@@ -80,7 +80,9 @@ static void sample_pixel(struct job *j, uint64_t column, uint64_t row)
 	const struct plan *p = j->plan;
 	const struct film_window *w = &j->context.window;
 	double area = w->width * w->height;
-	struct pixel_sampler s = {.x = (double)column / w->width, .y = (double)row / w->height, .width = 1 / w->width,
+	struct pixel_sampler s = {.x = (double)column / w->width,
+				  .y = (double)row / w->height,
+				  .width = 1 / w->width,
 				  .height = 1 / w->height};
 	for (uint64_t i = 0; i < p->epoch; i++) {
 		sampler_sobol_init(&s.sobol, p->seed, j->integrator->stream, pixel_index(w, column, row), j->key->group,
@@ -159,14 +161,20 @@ static int run_chain(struct job *j, const struct lease_input *in, uint32_t k, ui
 {
 	struct chain *c = j->chain;
 	const struct chain_ops *ops = j->integrator->chain;
-	*c = (struct chain){.integrator = j->integrator, .context = &j->context, .film = &j->film, .mixture = j->plan->mutations,
-			    .strategy = j->out->strategy, .seed = j->plan->seed, .id = id,
+	*c = (struct chain){.integrator = j->integrator,
+			    .context = &j->context,
+			    .film = &j->film,
+			    .mixture = j->plan->mutations,
+			    .strategy = j->out->strategy,
+			    .seed = j->plan->seed,
+			    .id = id,
 			    .step = j->key->epoch * j->plan->epoch};
 	j->sequence = id;
 	j->index = 0;
 	bool ok = in->states ? ops->resume(c, &in->states[k]) : ops->start(c, in->seeds[k]);
 	if (!ok && in->states)
-		return error_set(j->e, EILSEQ, "chain %llu of group %u does not resume: its state is not one of this plan",
+		return error_set(j->e, EILSEQ,
+				 "chain %llu of group %u does not resume: its state is not one of this plan",
 				 (unsigned long long)id, j->key->group);
 	if (!ok) { /* a seed that carries no light: the bootstrap's weights were not ours */
 		j->out->counters[COUNT_STATES_LOST]++;
@@ -217,13 +225,15 @@ static int check(const struct world *w, const struct plan *p, const struct integ
 	if (i->face.kind != p->kind)
 		return error_set(e, EINVAL, "integrator '%s' and the plan differ in kind", p->integrator);
 	if (p->width != w->settings.width || p->height != w->settings.height || p->border != w->settings.border)
-		return error_set(e, EINVAL, "the plan's film is %u x %u with a border of %u pixels, the scene's %u x %u with %u",
-				 p->width, p->height, p->border, w->settings.width, w->settings.height, w->settings.border);
+		return error_set(
+			e, EINVAL, "the plan's film is %u x %u with a border of %u pixels, the scene's %u x %u with %u",
+			p->width, p->height, p->border, w->settings.width, w->settings.height, w->settings.border);
 	struct mixture unused;
 	char accuracy[PLAN_ACCURACY_MAX];
 	accuracy_settings_print(&w->accuracy, accuracy);
 	if (strcmp(accuracy, p->accuracy) != 0)
-		return error_set(e, EINVAL, "the plan's settings are '%s', those of the world '%s'", p->accuracy, accuracy);
+		return error_set(e, EINVAL, "the plan's settings are '%s', those of the world '%s'", p->accuracy,
+				 accuracy);
 	if (i->face.has_mutations && mixture_parse(p->mutations, &unused, e))
 		return -EINVAL;
 	if (p->max_depth < 1 || p->max_depth > PATH_MAX_EDGES)
@@ -247,7 +257,9 @@ static int prepare(struct job *j, const struct world *w, struct error *e)
 		struct plan_range r = plan_bootstrap_range(p, j->key->group, j->key->part);
 		j->out->weight_count = r.end - r.begin;
 		j->out->weights = mem_alloc(j->out->weight_count, sizeof *j->out->weights);
-		return j->out->weights ? 0 : error_set(e, ENOMEM, "out of memory for %llu weights", (unsigned long long)(r.end - r.begin));
+		return j->out->weights ? 0
+				       : error_set(e, ENOMEM, "out of memory for %llu weights",
+						   (unsigned long long)(r.end - r.begin));
 	}
 	if (p->kind == PLAN_CHAINS) {
 		struct plan_range r = plan_chain_range(p, j->key->part);
@@ -285,10 +297,12 @@ static int invalid_operation(const struct job *j)
 	if (j->key->kind == LEASE_BOOTSTRAP)
 		snprintf(place, sizeof place, "bootstrap sample %llu of group %llu", index, group);
 	else if (j->plan->kind == PLAN_SAMPLES)
-		snprintf(place, sizeof place, "row %llu, column %llu of group %llu, epoch %llu", sequence, index, group, epoch);
+		snprintf(place, sizeof place, "row %llu, column %llu of group %llu, epoch %llu", sequence, index, group,
+			 epoch);
 	else
 		snprintf(place, sizeof place, "mutation %llu of chain %llu, epoch %llu", index, sequence, epoch);
-	return error_set(j->e, EDOM, "an invalid floating-point operation (SIGFPE) in %s by '%s'", place, j->plan->integrator);
+	return error_set(j->e, EDOM, "an invalid floating-point operation (SIGFPE) in %s by '%s'", place,
+			 j->plan->integrator);
 }
 
 /* All memory is the job's, so that nothing is lost when an invalid operation leaves in the middle. */

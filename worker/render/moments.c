@@ -31,7 +31,8 @@ void chain_moments_fini(struct chain_moments *m)
 	*m = (struct chain_moments){0};
 }
 
-void chain_moments_state(struct chain_moments *m, const struct splat *splats, uint32_t count, double intensity, double weight)
+void chain_moments_state(struct chain_moments *m, const struct splat *splats, uint32_t count, double intensity,
+			 double weight)
 {
 	uint32_t touched = 0;
 	if (m->tiles == 0)

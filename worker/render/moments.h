@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where the chains of one lease spend their time: within-chain moments by tile and the time of each path class (struct batch in
- * common/film/batch.h defines both). Filled when a state is splatted, with the weight that it has gathered.
+ * Where the chains of one lease spend their time: within-chain moments by tile and the time of each path class (struct
+ * batch in common/film/batch.h defines both). Filled when a state is splatted, with the weight that it has gathered.
  * One thread. Memory: 36 bytes a tile; nothing allocates after init.
  */
 #ifndef WORKER_RENDER_MOMENTS_H
@@ -13,9 +13,9 @@
 struct chain_moments {
 	uint32_t x, y, width, height; /* the crop */
 	uint32_t tiles_x, tiles;      /* 0 tiles: nobody asks, nothing is kept */
-	double *first, *second;       /* by tile; first: of the sequence that runs */
-	double *share;                /* by tile, of the state at hand; 0 in between */
-	uint32_t *touched;            /* tiles with a share */
+	double *first, *second;	      /* by tile; first: of the sequence that runs */
+	double *share;		      /* by tile, of the state at hand; 0 in between */
+	uint32_t *touched;	      /* tiles with a share */
 	double classes[PATH_CLASSES];
 };
 
@@ -24,7 +24,8 @@ void chain_moments_fini(struct chain_moments *m);
 
 /* A state's film points and colours, of intensity I = X+Y+Z in all, gets the weight. Its classes are added by
  * chain_moments_class: the state's share of I in each. */
-void chain_moments_state(struct chain_moments *m, const struct splat *splats, uint32_t count, double intensity, double weight);
+void chain_moments_state(struct chain_moments *m, const struct splat *splats, uint32_t count, double intensity,
+			 double weight);
 static inline void chain_moments_class(struct chain_moments *m, unsigned path_class, double weight)
 {
 	m->classes[path_class] += weight;

@@ -14,7 +14,8 @@ const char *render_mutation_at(size_t index, const char **summary)
 	return mutation_registry[index]->name;
 }
 
-int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX], struct error *e)
+int render_mutations(const char *text, const struct render_summary *summary, char canonical[PLAN_MUTATIONS_MAX],
+		     struct error *e)
 {
 	struct mixture m;
 	if (text && *text) {

@@ -24,8 +24,8 @@ static void add(struct plugin_decl d)
 static void gather(void)
 {
 	for (size_t i = 0; shape_registry[i]; i++)
-		add((struct plugin_decl){PLUGIN_SHAPE, shape_registry[i]->type, shape_registry[i]->params, shape_nested_classes,
-					 PARAM_UNDERSTOOD});
+		add((struct plugin_decl){PLUGIN_SHAPE, shape_registry[i]->type, shape_registry[i]->params,
+					 shape_nested_classes, PARAM_UNDERSTOOD});
 	for (const struct plugin_decl *d = setting_decls; d->type; d++)
 		add(*d);
 	for (size_t i = 0; bsdf_registry[i]; i++)
@@ -46,12 +46,14 @@ const struct plugin_decl *render_plugins(void)
 	return decls;
 }
 
-int render_scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct scene_define *defines,
-		      size_t define_count, const struct render_options *o, struct error *e)
+int render_scene_read(struct scene *s, const struct asset_source *assets, const char *name,
+		      const struct scene_define *defines, size_t define_count, const struct render_options *o,
+		      struct error *e)
 {
 	struct accuracy_settings k;
 	int code = accuracy_settings_read(o->accuracy, &k, e);
 	if (code)
 		return code;
-	return (k.lenient > 0 ? scene_read_lenient : scene_read)(s, assets, name, render_plugins(), defines, define_count, e);
+	return (k.lenient > 0 ? scene_read_lenient : scene_read)(s, assets, name, render_plugins(), defines,
+								 define_count, e);
 }

@@ -5,8 +5,12 @@
 
 int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene_settings *s, struct error *e)
 {
-	*f = (struct film_sums){.x = p->crop_x, .y = p->crop_y, .width = p->crop_width, .height = p->crop_height,
-				.filter = s->filter, .radius = s->filter_radius};
+	*f = (struct film_sums){.x = p->crop_x,
+				.y = p->crop_y,
+				.width = p->crop_width,
+				.height = p->crop_height,
+				.filter = s->filter,
+				.radius = s->filter_radius};
 	f->tiles_x = (f->width + TILE_SIZE - 1) / TILE_SIZE;
 	f->tiles_y = (f->height + TILE_SIZE - 1) / TILE_SIZE;
 	if (s->filter == FILTER_GAUSSIAN) {
@@ -16,7 +20,9 @@ int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene
 		f->floor = exp(-f->inverse * r * r);
 		f->scale = 1 / (sd * sqrt(2 * M_PI) * erf(r / (sd * M_SQRT2)) - 2 * r * f->floor);
 		if (!(f->scale > 0) || !isfinite(f->scale))
-			return error_set(e, EINVAL, "nothing is left of a gaussian filter of deviation %g, radius %g pixels", sd, r);
+			return error_set(e, EINVAL,
+					 "nothing is left of a gaussian filter of deviation %g, radius %g pixels", sd,
+					 r);
 	}
 	f->xyz = mem_alloc((size_t)f->width * f->height * 3, sizeof *f->xyz);
 	f->touched = mem_alloc((size_t)f->tiles_x * f->tiles_y, 1);
@@ -84,7 +90,8 @@ void film_sums_splat(struct film_sums *f, const struct splat *s, double weight)
 		return;
 	}
 	uint32_t i0, i1, j0, j1;
-	if (!reach(x, f->radius, f->width, &i0, &i1) || !reach(y, f->radius, f->height, &j0, &j1) || i1 - i0 >= KERNEL_MAX)
+	if (!reach(x, f->radius, f->width, &i0, &i1) || !reach(y, f->radius, f->height, &j0, &j1) ||
+	    i1 - i0 >= KERNEL_MAX)
 		return;
 	double kx[KERNEL_MAX];
 	for (uint32_t i = i0; i <= i1; i++)

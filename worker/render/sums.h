@@ -2,7 +2,8 @@
 /*
  * The film of one lease: per pixel of the crop a sum in double, rounded once when the tiles are taken. Every integrator
  * splats with the continuous filter kernel, normalised to integral 1 over the plane (docs/design.md, rules 3).
- * One thread. Memory: 24 bytes a pixel, of which only pages that are touched cost anything; splatting allocates nothing.
+ * One thread. Memory: 24 bytes a pixel, of which only pages that are touched cost anything; splatting allocates
+ * nothing.
  */
 #ifndef WORKER_RENDER_SUMS_H
 #define WORKER_RENDER_SUMS_H

@@ -41,7 +41,8 @@ static int open_step_by_step(int folder, const char *name)
 		if (n < sizeof part) {
 			memcpy(part, name, n);
 			part[n] = 0;
-			next = openat(at, part, O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW | (*rest ? O_DIRECTORY : 0));
+			next = openat(at, part,
+				      O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW | (*rest ? O_DIRECTORY : 0));
 		} else {
 			errno = ENAMETOOLONG;
 		}
@@ -61,7 +62,8 @@ static int open_below(const char *folder, const char *name)
 	int at = open(*folder ? folder : ".", O_PATH | O_DIRECTORY | O_CLOEXEC);
 	if (at < 0)
 		return -1;
-	struct open_how how = {.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK, .resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS};
+	struct open_how how = {.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK,
+			       .resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS};
 	int fd = (int)syscall(SYS_openat2, at, name, &how, sizeof how);
 	if (fd < 0 && (errno == ENOSYS || errno == EPERM || errno == EINVAL))
 		fd = open_step_by_step(at, name);
@@ -92,7 +94,8 @@ static int read_all(int fd, const char *name, struct asset *out, struct error *e
 		if (n <= 0) {
 			int code = n < 0 ? errno : EIO;
 			mem_free(bytes);
-			return error_set(e, code, "%s: %s", name, n < 0 ? strerror(code) : "became shorter while it was read");
+			return error_set(e, code, "%s: %s", name,
+					 n < 0 ? strerror(code) : "became shorter while it was read");
 		}
 		used += (size_t)n;
 	}
@@ -104,7 +107,8 @@ static int folder_open(void *user, const char *name, struct asset *out, struct e
 {
 	*out = (struct asset){0};
 	if (!is_below(name))
-		return error_set(e, EINVAL, "%.256s: files must lie below the scene's folder (no absolute names, no ..)", name);
+		return error_set(e, EINVAL,
+				 "%.256s: files must lie below the scene's folder (no absolute names, no ..)", name);
 	int fd = open_below(user, name);
 	if (fd < 0)
 		return error_set(e, errno, "%s: %s", name,

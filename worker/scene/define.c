@@ -22,7 +22,8 @@ static int check_name(const char *name, struct error *e)
 {
 	for (const char *p = name; *p; p++)
 		if (!is_name_character(*p))
-			return error_set(e, EINVAL, "`%.64s` is no name for a parameter: letters, digits and _ only", name);
+			return error_set(e, EINVAL, "`%.64s` is no name for a parameter: letters, digits and _ only",
+					 name);
 	if (!*name)
 		return error_set(e, EINVAL, "a parameter without a name");
 	return 0;
@@ -42,7 +43,8 @@ static int add(struct define_table *t, const char *name, const char *value, bool
 	return 0;
 }
 
-int define_init(struct define_table *t, const struct scene_define *given, size_t count, struct arena *arena, struct error *e)
+int define_init(struct define_table *t, const struct scene_define *given, size_t count, struct arena *arena,
+		struct error *e)
 {
 	*t = (struct define_table){.arena = arena, .entries = arena_alloc(arena, DEFINE_MAX, sizeof *t->entries)};
 	if (!t->entries)

@@ -19,7 +19,8 @@ struct define_table {
 	size_t count;
 };
 
-int define_init(struct define_table *t, const struct scene_define *given, size_t count, struct arena *arena, struct error *e);
+int define_init(struct define_table *t, const struct scene_define *given, size_t count, struct arena *arena,
+		struct error *e);
 int define_default(struct define_table *t, const char *name, const char *value, struct error *e);
 
 /* Replaces every $name in text, once: what is put in is not looked at again. The text itself where it has none.

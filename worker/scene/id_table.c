@@ -14,8 +14,8 @@ static int compare_ids(const void *a, const void *b)
 	return strcmp(x->id, y->id);
 }
 
-int id_table_find(const struct id_table *t, const struct xml_element *el, const char *attribute, struct xml_element **out,
-		  struct error *e)
+int id_table_find(const struct id_table *t, const struct xml_element *el, const char *attribute,
+		  struct xml_element **out, struct error *e)
 {
 	const char *id = xml_attribute(el, attribute);
 	if (!id)
@@ -30,7 +30,8 @@ int id_table_find(const struct id_table *t, const struct xml_element *el, const 
 	struct spelling s = {.wanted = id};
 	for (size_t i = 0; i < t->count; i++)
 		spelling_offer(&s, t->entries[i].id);
-	return xml_error(el, e, ENOENT, "there is no object with id \"%.64s\"%s", id, spelling_hint(&s, hint, sizeof hint));
+	return xml_error(el, e, ENOENT, "there is no object with id \"%.64s\"%s", id,
+			 spelling_hint(&s, hint, sizeof hint));
 }
 
 static struct xml_element *next_element(struct xml_element *el)

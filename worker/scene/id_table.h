@@ -15,12 +15,12 @@ struct id_table {
 	size_t count;
 };
 
-/* Objects may be referred to before they stand in the file, as 3.x allows and 0.6 does not. An id that is given twice, and an alias
- * of nothing, is an error. */
+/* Objects may be referred to before they stand in the file, as 3.x allows and 0.6 does not. An id that is given twice,
+ * and an alias of nothing, is an error. */
 int id_table_make(struct id_table *t, const struct xml_tree *tree, struct arena *arena, struct error *e);
 
 /* The object that the attribute of el names. -ENOENT with the nearest id. */
-int id_table_find(const struct id_table *t, const struct xml_element *el, const char *attribute, struct xml_element **out,
-		  struct error *e);
+int id_table_find(const struct id_table *t, const struct xml_element *el, const char *attribute,
+		  struct xml_element **out, struct error *e);
 
 #endif

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* The formats behind image_read: each decodes bytes in memory; whatever they hold, it answers with an image or an error. */
+/* The formats behind image_read: each decodes bytes in memory; whatever they hold, it answers with an image or an
+ * error. */
 #ifndef WORKER_SCENE_IMAGE_DECODE_H
 #define WORKER_SCENE_IMAGE_DECODE_H
 
 #include "worker/scene/image.h"
 
-/* Before anything is decoded: a small file may promise a large image. Of a mask 11,585 x 11,585 pixels, of colours 9,459 x 9,459. */
+/* Before anything is decoded: a small file may promise a large image. Of a mask 11,585 x 11,585 pixels, of colours
+ * 9,459 x 9,459. */
 enum { IMAGE_PIXELS_MAX = 1 << 27, IMAGE_BYTES_MAX = 1 << 30 };
 #define IMAGE_SCENE_BYTES_MAX ((size_t)4 << 30) /* of all that an arena holds */
 

@@ -21,14 +21,14 @@ static int copy_planes(const struct image_input *in, const struct exr_image *x, 
 	const float *planes[3] = {channels == 1 ? find_plane(x, "Y") : NULL};
 	for (uint32_t k = 0; channels == 3 && k < 3; k++)
 		if (!(planes[k] = find_plane(x, rgb[k])))
-			return error_set(in->error, EINVAL, "%s: OpenEXR without channel %s; needed are R, G, B or Y", in->name,
-					 rgb[k]);
+			return error_set(in->error, EINVAL, "%s: OpenEXR without channel %s; needed are R, G, B or Y",
+					 in->name, rgb[k]);
 	int r = image_allocate(in, out, x->width, x->height, channels, 0);
 	for (size_t i = 0; !r && i < (size_t)x->width * x->height; i++)
 		for (uint32_t k = 0; k < channels; k++) {
 			if (!isfinite(planes[k][i]))
-				return error_set(in->error, EBADMSG, "%s: OpenEXR: pixel (%zu, %zu) is not finite", in->name,
-						 i % x->width, i / x->width);
+				return error_set(in->error, EBADMSG, "%s: OpenEXR: pixel (%zu, %zu) is not finite",
+						 in->name, i % x->width, i / x->width);
 			out->pixels[channels * i + k] = planes[k][i];
 		}
 	return r;

@@ -55,8 +55,8 @@ static int read_header(struct cursor *c, int64_t *width, int64_t *height)
 			return broken(c, "only FORMAT=32-bit_rle_rgbe is supported");
 	} while (line[0]);
 	const char *rest;
-	if (!read_line(c, line) || !(rest = read_extent(line, "-Y ", height)) || !(rest = read_extent(rest, " +X ", width)) ||
-	    *rest || *width < 1 || *height < 1)
+	if (!read_line(c, line) || !(rest = read_extent(line, "-Y ", height)) ||
+	    !(rest = read_extent(rest, " +X ", width)) || *rest || *width < 1 || *height < 1)
 		return broken(c, "only the resolution line \"-Y height +X width\" is supported");
 	return 0;
 }
@@ -107,8 +107,8 @@ static int read_flat(struct cursor *c, float *out, size_t width)
 
 static int read_row(struct cursor *c, unsigned char *planes, float *out, size_t width)
 {
-	bool runs = width >= RLE_WIDTH_MIN && width <= RLE_WIDTH_MAX && c->end - c->p >= 4 && c->p[0] == 2 && c->p[1] == 2 &&
-		    c->p[2] < 128;
+	bool runs = width >= RLE_WIDTH_MIN && width <= RLE_WIDTH_MAX && c->end - c->p >= 4 && c->p[0] == 2 &&
+		    c->p[1] == 2 && c->p[2] < 128;
 	if (!runs)
 		return read_flat(c, out, width);
 	if (((size_t)c->p[2] << 8 | c->p[3]) != width)
@@ -130,7 +130,8 @@ int image_decode_hdr(const struct image_input *in, struct image *out)
 	/* The best case: two bytes for 127 values of a component. */
 	uint64_t w = r ? 0 : (uint64_t)width, h = r ? 0 : (uint64_t)height;
 	if (!r)
-		r = image_allocate(in, out, w, h, 3, w <= IMAGE_PIXELS_MAX && h <= IMAGE_PIXELS_MAX ? w * h / 127 * 8 : 0);
+		r = image_allocate(in, out, w, h, 3,
+				   w <= IMAGE_PIXELS_MAX && h <= IMAGE_PIXELS_MAX ? w * h / 127 * 8 : 0);
 	if (r)
 		return r;
 	unsigned char *planes = mem_alloc(4, w);

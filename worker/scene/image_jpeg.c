@@ -65,7 +65,8 @@ static int read_header(struct state *s)
 	jpeg_read_header(j, TRUE);
 	uint32_t channels = j->jpeg_color_space == JCS_GRAYSCALE ? 1 : 3;
 	if (j->num_components == 4 || j->jpeg_color_space == JCS_CMYK || j->jpeg_color_space == JCS_YCCK)
-		return error_set(s->in->error, EINVAL, "%s: a JPEG for printing (CMYK); supported: grey and RGB", s->in->name);
+		return error_set(s->in->error, EINVAL, "%s: a JPEG for printing (CMYK); supported: grey and RGB",
+				 s->in->name);
 	if (j->arith_code)
 		return error_set(s->in->error, EINVAL, "%s: JPEG with arithmetic coding is not supported", s->in->name);
 	j->out_color_space = channels == 1 ? JCS_GRAYSCALE : JCS_RGB;

@@ -70,7 +70,8 @@ static int read_header(struct state *s)
 	s->channels = png_get_channels(s->png, s->info);
 	s->depth = png_get_bit_depth(s->png, s->info);
 	if ((s->channels != 1 && s->channels != 3) || (s->depth != 8 && s->depth != 16))
-		return error_set(s->in->error, EINVAL, "%s: PNG with %u channels of %u bits", s->in->name, s->channels, s->depth);
+		return error_set(s->in->error, EINVAL, "%s: PNG with %u channels of %u bits", s->in->name, s->channels,
+				 s->depth);
 	/* deflate makes at most 1032 bytes of one; a pixel takes at least a bit. */
 	return image_allocate(s->in, s->out, width, height, s->channels, (uint64_t)width * height / (8 * 1032));
 }
@@ -119,7 +120,8 @@ static int convert(struct state *s)
 int image_decode_png(const struct image_input *in, struct image *out)
 {
 	struct state s = {.in = in, .out = out};
-	s.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &s, on_error, on_warning, NULL, png_allocate, png_release);
+	s.png = png_create_read_struct_2(PNG_LIBPNG_VER_STRING, &s, on_error, on_warning, NULL, png_allocate,
+					 png_release);
 	s.info = s.png ? png_create_info_struct(s.png) : NULL;
 	if (s.info)
 		read_guarded(&s);

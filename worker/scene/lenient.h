@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What stands in for what is not supported, where the user asked for leniency. Whatever is replaced or left out is noted by the
- * reader. Pure; any thread.
+ * What stands in for what is not supported, where the user asked for leniency. Whatever is replaced or left out is
+ * noted by the reader. Pure; any thread.
  */
 #ifndef WORKER_SCENE_LENIENT_H
 #define WORKER_SCENE_LENIENT_H
@@ -11,10 +11,10 @@
 #include <stdbool.h>
 
 enum lenient_way {
-	LENIENT_REFUSE,    /* nothing is like it: a sensor */
+	LENIENT_REFUSE,	   /* nothing is like it: a sensor */
 	LENIENT_LEAVE_OUT, /* a medium, a shape, an emitter, a texture (the parameter keeps its default) */
 	LENIENT_REPLACE,   /* by *stand_in of the same class */
-	LENIENT_INNER,     /* by the BSDF inside, where there is one; else as LENIENT_REPLACE */
+	LENIENT_INNER,	   /* by the BSDF inside, where there is one; else as LENIENT_REPLACE */
 };
 
 /* For a plug-in that no table has. */

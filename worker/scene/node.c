@@ -67,6 +67,6 @@ int node_error(const struct scene_node *n, struct error *e, int errno_value, con
 	va_start(ap, format);
 	vsnprintf(text, sizeof text, format, ap);
 	va_end(ap);
-	return error_set(e, errno_value, "%s:%d: <%s type=\"%.64s\">: %s", n->file, n->line, plugin_class_name(n->cls), n->type,
-			 text);
+	return error_set(e, errno_value, "%s:%d: <%s type=\"%.64s\">: %s", n->file, n->line, plugin_class_name(n->cls),
+			 n->type, text);
 }

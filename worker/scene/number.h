@@ -18,7 +18,8 @@ const char *number_scan_int(const char *p, const char *end, int64_t *out);
 bool number_parse(const char *text, double *out);
 bool number_parse_int(const char *text, int64_t *out);
 
-/* A list separated by blanks, commas or both. The count, or -1 when something else is in it or there are more than max. */
+/* A list separated by blanks, commas or both. The count, or -1 when something else is in it or there are more than max.
+ */
 int number_list(const char *text, double *out, size_t max);
 
 static inline bool number_is_blank(char c)

@@ -23,12 +23,12 @@ enum value_type {
 #define VALUE_COLOR (VALUE_FLOAT | VALUE_INT | VALUE_RGB | VALUE_SPECTRUM)
 #define VALUE_TEXTURE (VALUE_COLOR | VALUE_NODE)
 
-/* Ranges that many parameters have. Lengths and matrices: what squares of areas can hold; how far apart things may be, measured
- * by the scene's size, is checked when that is known (PARAM_REACH_MAX). */
+/* Ranges that many parameters have. Lengths and matrices: what squares of areas can hold; how far apart things may be,
+ * measured by the scene's size, is checked when that is known (PARAM_REACH_MAX). */
 #define PARAM_LENGTH_MAX 1e60
 #define PARAM_LIGHT_MAX 1e30 /* radiance, irradiance, intensity: a film of float has room for sums of it */
 #define PARAM_REACH_MAX 1e12 /* of cameras and lights from the middle of the scene, in its radii */
-#define PARAM_UV_MAX 1e6     /* factors and offsets of texture coordinates: what is left of their digits picks a pixel */
+#define PARAM_UV_MAX 1e6 /* factors and offsets of texture coordinates: what is left of their digits picks a pixel */
 #define PARAM_IOR_MIN 1e-3
 #define PARAM_IOR_MAX 1e3
 #define PARAM_METAL_MAX 1e9 /* eta and k of conductors */
@@ -43,8 +43,9 @@ struct param {
 	const char *name;
 	unsigned types; /* of enum value_type */
 	enum param_class status;
-	double min, max;    /* of every number in it, those of points, colours and spectra too: outside is an error. min < max
-			       wherever the types have numbers (a test walks over all tables); a texture says its own ranges */
+	double min,
+		max; /* of every number in it, those of points, colours and spectra too: outside is an error. min < max
+			wherever the types have numbers (a test walks over all tables); a texture says its own ranges */
 	const char *choices; /* for VALUE_STRING: "beckmann|ggx", NULL: any */
 };
 
@@ -65,11 +66,11 @@ enum plugin_class {
 /* Children that are not named (a BSDF in a shape, a film in a sensor) go by class; nested_classes lists which. */
 struct plugin_decl {
 	enum plugin_class cls;
-	const char *type;            /* as written in type="..." */
-	const struct param *params;  /* ends with a NULL name */
-	unsigned nested_classes;     /* bits 1 << enum plugin_class */
-	enum param_class status;     /* IGNORED: has no effect but for its understood parameters (samplers), all else in it is
-					skipped; REFUSED never listed: unknown is refused */
+	const char *type;	    /* as written in type="..." */
+	const struct param *params; /* ends with a NULL name */
+	unsigned nested_classes;    /* bits 1 << enum plugin_class */
+	enum param_class status; /* IGNORED: has no effect but for its understood parameters (samplers), all else in it
+				    is skipped; REFUSED never listed: unknown is refused */
 };
 
 #endif

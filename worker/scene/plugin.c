@@ -4,8 +4,8 @@
 #include <string.h>
 
 static const char *const class_names[PLUGIN_CLASSES] = {
-	[PLUGIN_SHAPE] = "shape",   [PLUGIN_BSDF] = "bsdf",	  [PLUGIN_TEXTURE] = "texture",
-	[PLUGIN_EMITTER] = "emitter", [PLUGIN_SENSOR] = "sensor", [PLUGIN_FILM] = "film",
+	[PLUGIN_SHAPE] = "shape",     [PLUGIN_BSDF] = "bsdf",	    [PLUGIN_TEXTURE] = "texture",
+	[PLUGIN_EMITTER] = "emitter", [PLUGIN_SENSOR] = "sensor",   [PLUGIN_FILM] = "film",
 	[PLUGIN_RFILTER] = "rfilter", [PLUGIN_SAMPLER] = "sampler", [PLUGIN_INTEGRATOR] = "integrator",
 	[PLUGIN_MEDIUM] = "medium",
 };

@@ -8,7 +8,7 @@
 
 #include <stdbool.h>
 
-const char *plugin_class_name(enum plugin_class cls); /* "bsdf" */
+const char *plugin_class_name(enum plugin_class cls);		     /* "bsdf" */
 bool plugin_class_find(const char *element, enum plugin_class *cls); /* also <camera>, the old name of <sensor> */
 void plugin_offer_classes(struct spelling *s);
 

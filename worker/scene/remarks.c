@@ -12,7 +12,8 @@ __attribute__((format(printf, 4, 5))) static int remark(struct report *r, const 
 {
 	char text[REPORT_TEXT_MAX];
 	va_list ap;
-	int used = snprintf(text, sizeof text, "%s:%d: <%s type=\"%.64s\">: ", n->file, n->line, plugin_class_name(n->cls), n->type);
+	int used = snprintf(text, sizeof text, "%s:%d: <%s type=\"%.64s\">: ", n->file, n->line,
+			    plugin_class_name(n->cls), n->type);
 	va_start(ap, format);
 	vsnprintf(text + used, sizeof text - (size_t)used, format, ap);
 	va_end(ap);
@@ -22,13 +23,15 @@ __attribute__((format(printf, 4, 5))) static int remark(struct report *r, const 
 /* Whoever asks for a part of the light, or for something else than light, gets another picture: that is said. */
 static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
 {
-	static const char *const others[] = {"direct", "volpath", "volpathmis", "prbvolpath", "volpath_simple", "aov", "stokes",
-					     "moment", "depth", "field", "ao", "vpl", "irrcache", "sppm", "ppm", "photonmapper"};
+	static const char *const others[] = {
+		"direct", "volpath", "volpathmis", "prbvolpath", "volpath_simple", "aov",  "stokes", "moment",
+		"depth",  "field",   "ao",	   "vpl",	 "irrcache",	   "sppm", "ppm",    "photonmapper"};
 	int rc = 0;
 	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
 		if (strcmp(n->type, others[i]) == 0)
-			rc = remark(r, n, e, "is not what is rendered: the picture is of all light on surfaces, without media%s",
-					strcmp(n->type, "direct") == 0 ? "; --max-depth 2 leaves out indirect light" : "");
+			rc = remark(r, n, e,
+				    "is not what is rendered: the picture is of all light on surfaces, without media%s",
+				    strcmp(n->type, "direct") == 0 ? "; --max-depth 2 leaves out indirect light" : "");
 	return rc;
 }
 

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What only the whole scene says: a camera too many, a picture that will not be what was asked for, no light. One thread. */
+/* What only the whole scene says: a camera too many, a picture that will not be what was asked for, no light. One
+ * thread. */
 #ifndef WORKER_SCENE_REMARKS_H
 #define WORKER_SCENE_REMARKS_H
 

@@ -16,7 +16,8 @@ int report_init(struct report *r, struct arena *arena, struct error *e)
 	return r->notes && r->note_keys && r->problems ? 0 : error_set(e, ENOMEM, "out of memory");
 }
 
-__attribute__((format(printf, 5, 0))) int report_note(struct report *r, const char *file, const char *key, struct error *e, const char *format, va_list ap)
+__attribute__((format(printf, 5, 0))) int report_note(struct report *r, const char *file, const char *key,
+						      struct error *e, const char *format, va_list ap)
 {
 	char text[REPORT_TEXT_MAX];
 	vsnprintf(text, sizeof text, format, ap);

@@ -41,7 +41,8 @@ struct draft {
 
 static int out_of_memory(struct maker *m)
 {
-	return error_set(m->error, ENOMEM, "out of memory, or the scene files take more than %d MB of it", XML_MEMORY_MAX >> 20);
+	return error_set(m->error, ENOMEM, "out of memory, or the scene files take more than %d MB of it",
+			 XML_MEMORY_MAX >> 20);
 }
 
 static void *allocate(struct maker *m, size_t count, size_t size)
@@ -62,11 +63,13 @@ __attribute__((format(printf, 5, 6))) static int note(struct maker *m, const str
 	return r;
 }
 
-static int note_property(struct maker *m, const struct xml_element *owner, const struct xml_element *el, const char *name)
+static int note_property(struct maker *m, const struct xml_element *owner, const struct xml_element *el,
+			 const char *name)
 {
 	const char *type = xml_attribute(owner, "type");
-	return note(m, owner, type, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` has no effect on light and is ignored", el->file,
-		    el->line, owner->name, type, name);
+	return note(m, owner, type, name,
+		    "%s:%d: <%.64s type=\"%.64s\">: `%.64s` has no effect on light and is ignored", el->file, el->line,
+		    owner->name, type, name);
 }
 
 static int note_foreign(struct maker *m, const struct xml_element *el)
@@ -75,10 +78,11 @@ static int note_foreign(struct maker *m, const struct xml_element *el)
 }
 
 /* What is not supported goes, and that is said. */
-static int leave_out(struct maker *m, const struct xml_element *el, const char *type, const char *property, const char *what)
+static int leave_out(struct maker *m, const struct xml_element *el, const char *type, const char *property,
+		     const char *what)
 {
-	return note(m, el, type, property, "%s:%d: <%.64s>: %s `%.64s` is not supported and left out (lenient)", el->file, el->line,
-		    el->name, what, *property ? property : type);
+	return note(m, el, type, property, "%s:%d: <%.64s>: %s `%.64s` is not supported and left out (lenient)",
+		    el->file, el->line, el->name, what, *property ? property : type);
 }
 
 static int add_asset(struct maker *m, const char *name)
@@ -113,12 +117,15 @@ static int refuse_property(const struct draft *d, const struct xml_element *el, 
 	char list[512], hint[128] = "";
 	plugin_list_params(d->decl, list, sizeof list);
 	if (p)
-		return xml_error(el, e, EINVAL, "`%.64s` of <%s type=\"%.64s\"> would change the image and is not supported; "
-				 "supported: %s", name, plugin_class_name(d->node->cls), d->node->type, list);
+		return xml_error(el, e, EINVAL,
+				 "`%.64s` of <%s type=\"%.64s\"> would change the image and is not supported; "
+				 "supported: %s",
+				 name, plugin_class_name(d->node->cls), d->node->type, list);
 	struct spelling s = {.wanted = name};
 	plugin_offer_params(d->decl, &s);
-	return xml_error(el, e, EINVAL, "<%s type=\"%.64s\"> has no `%.64s`%s (supported: %s)", plugin_class_name(d->node->cls),
-			 d->node->type, name, spelling_hint(&s, hint, sizeof hint), list);
+	return xml_error(el, e, EINVAL, "<%s type=\"%.64s\"> has no `%.64s`%s (supported: %s)",
+			 plugin_class_name(d->node->cls), d->node->type, name, spelling_hint(&s, hint, sizeof hint),
+			 list);
 }
 
 static int refuse_choice(const struct xml_element *el, const struct param *p, const char *given, struct error *e)
@@ -172,7 +179,8 @@ static int check_value(const struct xml_element *el, const struct param *p, stru
 	return 0;
 }
 
-static int add_property(struct draft *d, const struct xml_element *el, const struct param *p, struct value v, struct error *e)
+static int add_property(struct draft *d, const struct xml_element *el, const struct param *p, struct value v,
+			struct error *e)
 {
 	int r = check_value(el, p, &v, e);
 	if (r)
@@ -185,8 +193,8 @@ static int add_property(struct draft *d, const struct xml_element *el, const str
 }
 
 /* What the table says of a name: *p understood, or NULL with the matter settled (ignored, or an error). */
-static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner, const struct xml_element *el,
-		   const char *name, const struct param **p)
+static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner,
+		   const struct xml_element *el, const char *name, const struct param **p)
 {
 	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, name) : name);
 	*p = NULL;
@@ -204,7 +212,8 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 	return 0;
 }
 
-static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el)
+static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner,
+			 const struct xml_element *el)
 {
 	const char *written = xml_attribute(el, "name");
 	if (!written)
@@ -257,11 +266,12 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 			return 0;
 		if (m->lenient)
 			return leave_out(m, el, plugin_class_name(cls), d->node->type, "its use in");
-		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">", plugin_class_name(cls),
-				 written ? "" : " without a name", owner->name, d->node->type);
+		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">",
+				 plugin_class_name(cls), written ? "" : " without a name", owner->name, d->node->type);
 	}
 	if (p && (p->types & VALUE_COLOR) && cls != PLUGIN_TEXTURE)
-		return xml_error(el, m->error, EINVAL, "`%s` may be a texture, but not a %s", p->name, plugin_class_name(cls));
+		return xml_error(el, m->error, EINVAL, "`%s` may be a texture, but not a %s", p->name,
+				 plugin_class_name(cls));
 	const struct scene_node *child;
 	int r = make_node(m, target, &child);
 	if (r)
@@ -269,8 +279,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	if (p)
 		return add_property(d, el, p, (struct value){.type = VALUE_NODE, .as.node = child}, m->error);
 	if (!(d->node->cls == PLUGIN_BSDF && cls == PLUGIN_BSDF) && node_child(d->node, cls, 0))
-		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">", plugin_class_name(cls), owner->name,
-				 d->node->type);
+		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">", plugin_class_name(cls),
+				 owner->name, d->node->type);
 	d->children[d->node->child_count++] = child;
 	return 0;
 }
@@ -286,8 +296,8 @@ static int refuse_element(const struct xml_element *el, struct error *e)
 	spelling_offer(&s, "default");
 	spelling_offer(&s, "alias");
 	spelling_offer(&s, "path");
-	return xml_error(el, e, EINVAL, "has no place in <%.64s>, or is not supported%s", el->parent ? el->parent->name : "",
-			 spelling_hint(&s, hint, sizeof hint));
+	return xml_error(el, e, EINVAL, "has no place in <%.64s>, or is not supported%s",
+			 el->parent ? el->parent->name : "", spelling_hint(&s, hint, sizeof hint));
 }
 
 static int foreign_element(struct maker *m, const struct xml_element *el)
@@ -332,8 +342,8 @@ static int note_ignored_plugin(struct maker *m, const struct xml_element *el, co
 	char list[256];
 	const char *type = xml_attribute(el, "type");
 	plugin_list_params(decl, list, sizeof list);
-	return note(m, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored but for: %s", el->file, el->line, el->name, type,
-		    list);
+	return note(m, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored but for: %s", el->file, el->line,
+		    el->name, type, list);
 }
 
 static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
@@ -370,19 +380,22 @@ static struct xml_element *inner_bsdf(struct maker *m, const struct xml_element 
 	return NULL;
 }
 
-/* Of a plug-in that is not supported: refuses it, or finds the table and the type that stand in for it, or makes *out of what is
- * inside (*decl stays NULL). REPORT_TOLD: it is left out. */
-static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class cls, const char **type, const struct plugin_decl **decl,
-		    const struct scene_node **out)
+/* Of a plug-in that is not supported: refuses it, or finds the table and the type that stand in for it, or makes *out
+ * of what is inside (*decl stays NULL). REPORT_TOLD: it is left out. */
+static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class cls, const char **type,
+		    const struct plugin_decl **decl, const struct scene_node **out)
 {
 	const char *other;
 	enum lenient_way way = m->lenient ? lenient_plugin(cls, *type, &other) : LENIENT_REFUSE;
 	if (way == LENIENT_REFUSE)
 		return refuse_type(m, el, cls, *type);
 	struct xml_element *inner = way == LENIENT_INNER ? inner_bsdf(m, el) : NULL;
-	int r = way == LENIENT_LEAVE_OUT ? leave_out(m, el, *type, "", "the plug-in") :
-		note(m, el, *type, "", "%s:%d: <%.64s type=\"%.64s\"> is not supported; %s%s stands in for it (lenient)", el->file, el->line,
-		     el->name, *type, inner ? "the BSDF inside" : "a standard ", inner ? "" : other);
+	int r = way == LENIENT_LEAVE_OUT
+			? leave_out(m, el, *type, "", "the plug-in")
+			: note(m, el, *type, "",
+			       "%s:%d: <%.64s type=\"%.64s\"> is not supported; %s%s stands in for it (lenient)",
+			       el->file, el->line, el->name, *type, inner ? "the BSDF inside" : "a standard ",
+			       inner ? "" : other);
 	if (r || way == LENIENT_LEAVE_OUT)
 		return r ? r : REPORT_TOLD;
 	if (inner) {
@@ -398,8 +411,8 @@ static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class c
 	return *decl ? 0 : refuse_type(m, el, cls, *type);
 }
 
-/* An object with something wrong inside becomes a node all the same, so that all that is wrong is found; one that is no object of
- * any kind does not, and is complained of once. */
+/* An object with something wrong inside becomes a node all the same, so that all that is wrong is found; one that is no
+ * object of any kind does not, and is complained of once. */
 static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
 {
 	if (el->node) {
@@ -432,8 +445,12 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 	struct draft d = {.node = allocate(m, 1, sizeof *d.node), .decl = decl, .stands_in = stands_in};
 	if (!d.node)
 		return out_of_memory(m);
-	*d.node = (struct scene_node){.cls = cls, .type = type, .id = xml_attribute(el, "id"), .file = el->file,
-				      .line = el->line, .decl = decl};
+	*d.node = (struct scene_node){.cls = cls,
+				      .type = type,
+				      .id = xml_attribute(el, "id"),
+				      .file = el->file,
+				      .line = el->line,
+				      .decl = decl};
 	el->busy = true;
 	m->depth++;
 	r = fill_node(m, &d, el);
@@ -516,8 +533,9 @@ static int make_scene(struct maker *m)
 }
 
 /* All that can be said of the file; what is wrong with it ends in s->problems. */
-static int read_all(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
-		    const struct scene_define *defines, size_t define_count, bool lenient, struct maker *m)
+static int read_all(struct scene *s, const struct asset_source *assets, const char *name,
+		    const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+		    bool lenient, struct maker *m)
 {
 	*s = (struct scene){.arena.limit = XML_MEMORY_MAX};
 	*m = (struct maker){.scene = s, .assets_from = assets, .decls = decls, .error = m->error, .lenient = lenient};
@@ -537,8 +555,9 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 	return r;
 }
 
-int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
-		   const struct scene_define *defines, size_t define_count, bool lenient, struct error *e)
+int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name,
+		   const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+		   bool lenient, struct error *e)
 {
 	struct maker m = {.error = e};
 	int r = read_all(s, assets, name, decls, defines, define_count, lenient, &m);
@@ -547,8 +566,9 @@ int scene_read_all(struct scene *s, const struct asset_source *assets, const cha
 	return r;
 }
 
-static int read_whole(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
-		      const struct scene_define *defines, size_t define_count, bool lenient, struct error *e)
+static int read_whole(struct scene *s, const struct asset_source *assets, const char *name,
+		      const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+		      bool lenient, struct error *e)
 {
 	struct error unused;
 	struct maker m = {.error = e ? e : &unused};
@@ -557,7 +577,8 @@ static int read_whole(struct scene *s, const struct asset_source *assets, const 
 		r = m.report.code;
 		uint32_t more = s->problem_count - 1;
 		if (more)
-			error_set(e, -r, "%.900s (and %u more: hslt-scene check lists them)", m.report.first.text, more);
+			error_set(e, -r, "%.900s (and %u more: hslt-scene check lists them)", m.report.first.text,
+				  more);
 		else if (e)
 			*e = m.report.first;
 	}
@@ -572,8 +593,9 @@ int scene_read(struct scene *s, const struct asset_source *assets, const char *n
 	return read_whole(s, assets, name, decls, defines, define_count, false, e);
 }
 
-int scene_read_lenient(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
-		       const struct scene_define *defines, size_t define_count, struct error *e)
+int scene_read_lenient(struct scene *s, const struct asset_source *assets, const char *name,
+		       const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+		       struct error *e)
 {
 	return read_whole(s, assets, name, decls, defines, define_count, true, e);
 }

@@ -45,7 +45,7 @@ struct property {
 struct scene_node {
 	enum plugin_class cls;
 	const char *type; /* "roughconductor" */
-	const char *id;   /* NULL when it has none */
+	const char *id;	  /* NULL when it has none */
 	const char *file; /* as the user named it */
 	int line;
 	const struct plugin_decl *decl;
@@ -60,9 +60,11 @@ struct scene {
 	uint32_t object_count;
 	const struct scene_node *const *objects; /* top level, in file order */
 	uint32_t asset_count;
-	const char *const *assets; /* names of all files that the description refers to, without the scene file, each once */
+	const char *const
+		*assets; /* names of all files that the description refers to, without the scene file, each once */
 	uint32_t problem_count; /* 0 but after scene_read_all */
-	const char *const *problems; /* "scene.xml:12: <bsdf>: ..." all that is wrong or not supported, in the file's order */
+	const char *const
+		*problems; /* "scene.xml:12: <bsdf>: ..." all that is wrong or not supported, in the file's order */
 	uint32_t note_count;
 	const char *const *notes; /* "scene.xml:12: ignored ..." once each, for the log */
 };
@@ -78,13 +80,15 @@ int scene_read(struct scene *s, const struct asset_source *assets, const char *n
 void scene_fini(struct scene *s);
 
 /* The same, but what is not supported is left out or replaced by what is nearest (lenient.h), with a note each. */
-int scene_read_lenient(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
-		       const struct scene_define *defines, size_t define_count, struct error *e);
+int scene_read_lenient(struct scene *s, const struct asset_source *assets, const char *name,
+		       const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+		       struct error *e);
 
-/* The same, but a scene with something wrong in it is no failure: it is as far as it could be read, and s->problems says all that is
- * wrong. Not for rendering where there is any. -ENOMEM. */
-int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
-		   const struct scene_define *defines, size_t define_count, bool lenient, struct error *e);
+/* The same, but a scene with something wrong in it is no failure: it is as far as it could be read, and s->problems
+ * says all that is wrong. Not for rendering where there is any. -ENOMEM. */
+int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name,
+		   const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+		   bool lenient, struct error *e);
 
 /* Look-ups; defaults are the caller's. A property that is there has passed its table's type and range. */
 const struct property *node_find(const struct scene_node *n, const char *name);

@@ -18,13 +18,16 @@ enum { MAX_DEPTH = 128, FILM_PIXELS_MAX = 1 << 28, DEFAULT_WIDTH = 768, DEFAULT_
 #define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
 
 /* Of both cameras. Shutters: nothing moves. */
-#define CAMERA_PARAMS                                                                                                          \
-	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},                                    \
-		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},                              \
-		{"focal_length", UNDERSTOOD(VALUE_STRING)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},                         \
-		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, {"shutter_open", IGNORED}, {"shutter_close", IGNORED},               \
-		{"principal_point_offset_x", RANGE(VALUE_FLOAT, -10, 10)},                                                      \
-		{"principal_point_offset_y", RANGE(VALUE_FLOAT, -10, 10)}, {"srf", REFUSED}
+#define CAMERA_PARAMS                                                                                             \
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},                      \
+		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},                \
+		{"focal_length", UNDERSTOOD(VALUE_STRING)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},           \
+		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, {"shutter_open", IGNORED}, {"shutter_close", IGNORED}, \
+		{"principal_point_offset_x", RANGE(VALUE_FLOAT, -10, 10)},                                        \
+		{"principal_point_offset_y", RANGE(VALUE_FLOAT, -10, 10)},                                        \
+	{                                                                                                         \
+		"srf", REFUSED                                                                                    \
+	}
 
 static const struct param perspective_params[] = {
 	CAMERA_PARAMS,
@@ -65,7 +68,8 @@ static const struct param film_params[] = {
 	{NULL, 0, 0, 0, 0, NULL},
 };
 
-static const struct param radius_params[] = {{"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)}, {NULL, 0, 0, 0, 0, NULL}};
+static const struct param radius_params[] = {{"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)},
+					     {NULL, 0, 0, 0, 0, NULL}};
 static const struct param gaussian_params[] = {
 	{"stddev", RANGE(VALUE_FLOAT, 0.01, RADIUS_MAX / 4)},
 	{"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)},
@@ -86,7 +90,8 @@ static const struct param integrator_params[] = {
 #define HOLDS(cls) (1u << (cls))
 
 const struct plugin_decl setting_decls[] = {
-	{PLUGIN_SENSOR, "perspective", perspective_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER), PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "perspective", perspective_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER),
+	 PARAM_UNDERSTOOD},
 	{PLUGIN_SENSOR, "thinlens", thinlens_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "hdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "ldrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
@@ -115,11 +120,13 @@ static const struct scene_node *find_object(const struct scene *s, enum plugin_c
 static int read_crop(const struct scene_node *film, struct scene_settings *out, struct error *e)
 {
 	uint64_t x = (uint64_t)node_int(film, "crop_offset_x", 0), y = (uint64_t)node_int(film, "crop_offset_y", 0);
-	uint64_t w = (uint64_t)node_int(film, "crop_width", out->width), h = (uint64_t)node_int(film, "crop_height", out->height);
+	uint64_t w = (uint64_t)node_int(film, "crop_width", out->width),
+		 h = (uint64_t)node_int(film, "crop_height", out->height);
 	if (x + w > out->width || y + h > out->height)
-		return node_error(film, e, ERANGE, "the crop window of %llu x %llu pixels at %llu, %llu leaves the film of %u x %u",
-				  (unsigned long long)w, (unsigned long long)h, (unsigned long long)x, (unsigned long long)y,
-				  out->width, out->height);
+		return node_error(film, e, ERANGE,
+				  "the crop window of %llu x %llu pixels at %llu, %llu leaves the film of %u x %u",
+				  (unsigned long long)w, (unsigned long long)h, (unsigned long long)x,
+				  (unsigned long long)y, out->width, out->height);
 	if (w == out->width && h == out->height)
 		return 0;
 	out->crop_x = (uint32_t)x;
@@ -136,15 +143,17 @@ static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t h
 	out->width = film ? (uint32_t)node_int(film, "width", DEFAULT_WIDTH) : DEFAULT_WIDTH;
 	out->height = film ? (uint32_t)node_int(film, "height", DEFAULT_HEIGHT) : DEFAULT_HEIGHT;
 	if (width && !height) /* the film keeps its shape */
-		out->height = (uint32_t)fmin(fmax(floor((double)width * out->height / out->width + 0.5), 1), PLAN_MAX_SIZE + 1.0);
+		out->height = (uint32_t)fmin(fmax(floor((double)width * out->height / out->width + 0.5), 1),
+					     PLAN_MAX_SIZE + 1.0);
 	if (width)
 		out->width = width;
 	if (height)
 		out->height = height;
 	if (out->width > PLAN_MAX_SIZE || out->height > PLAN_MAX_SIZE ||
 	    (uint64_t)out->width * out->height > FILM_PIXELS_MAX)
-		return node_error(film ? film : sensor, e, ERANGE, "a film of %u x %u pixels; at most %d a side and %d in all",
-				  out->width, out->height, PLAN_MAX_SIZE, FILM_PIXELS_MAX);
+		return node_error(film ? film : sensor, e, ERANGE,
+				  "a film of %u x %u pixels; at most %d a side and %d in all", out->width, out->height,
+				  PLAN_MAX_SIZE, FILM_PIXELS_MAX);
 	return film && !width && !height ? read_crop(film, out, e) : 0;
 }
 
@@ -162,7 +171,8 @@ static int read_filter(const struct scene_node *sensor, struct scene_settings *o
 		out->filter_radius = node_float(filter, "radius", 1.0);
 	} else {
 		out->filter_stddev = filter ? node_float(filter, "stddev", 0.5) : 0.5;
-		out->filter_radius = filter ? node_float(filter, "radius", 4 * out->filter_stddev) : 4 * out->filter_stddev;
+		out->filter_radius =
+			filter ? node_float(filter, "radius", 4 * out->filter_stddev) : 4 * out->filter_stddev;
 		if (filter && !(out->filter_radius > out->filter_stddev))
 			return node_error(filter, e, ERANGE, "a radius of %g pixels cuts off a Gaussian of stddev %g",
 					  out->filter_radius, out->filter_stddev);
@@ -188,7 +198,8 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
 		out->hide_emitters |= node_bool(n, "hide_emitters", false);
 	if (depth == 0)
-		return node_error(integrator, e, ERANGE, "a depth of 0 shows nothing; 1 is emitters seen directly, -1 no limit");
+		return node_error(integrator, e, ERANGE,
+				  "a depth of 0 shows nothing; 1 is emitters seen directly, -1 no limit");
 	if (depth > 0 && depth < MAX_DEPTH)
 		out->max_depth = (uint32_t)depth;
 	return 0;
@@ -219,7 +230,8 @@ static int read_fov(const struct scene_node *sensor, struct scene_settings *out,
 static int read_camera(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
 	mat4 m = node_transform(sensor, "to_world");
-	vec3 x = {m.m[0][0], m.m[1][0], m.m[2][0]}, y = {m.m[0][1], m.m[1][1], m.m[2][1]}, z = {m.m[0][2], m.m[1][2], m.m[2][2]};
+	vec3 x = {m.m[0][0], m.m[1][0], m.m[2][0]}, y = {m.m[0][1], m.m[1][1], m.m[2][1]},
+	     z = {m.m[0][2], m.m[1][2], m.m[2][2]};
 	x = vec3_normalize(x);
 	y = vec3_normalize(y);
 	z = vec3_normalize(z);
@@ -229,13 +241,15 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	double hand = vec3_dot(vec3_cross(x, y), z) < 0 ? -1 : 1;
 	x = vec3_normalize(vec3_madd(x, -vec3_dot(x, z), z));
 	y = vec3_scale(hand, vec3_cross(z, x));
-	out->to_world = (mat4){{{x.x, y.x, z.x, m.m[0][3]}, {x.y, y.y, z.y, m.m[1][3]}, {x.z, y.z, z.z, m.m[2][3]}, {0, 0, 0, 1}}};
+	out->to_world = (mat4){
+		{{x.x, y.x, z.x, m.m[0][3]}, {x.y, y.y, z.y, m.m[1][3]}, {x.z, y.z, z.z, m.m[2][3]}, {0, 0, 0, 1}}};
 	out->principal_x = node_float(sensor, "principal_point_offset_x", 0);
 	out->principal_y = node_float(sensor, "principal_point_offset_y", 0);
 	out->near_clip = node_float(sensor, "near_clip", 1e-2);
 	out->far_clip = node_float(sensor, "far_clip", 1e4);
 	if (!(out->near_clip < out->far_clip))
-		return node_error(sensor, e, EINVAL, "near_clip=%g is not below far_clip=%g", out->near_clip, out->far_clip);
+		return node_error(sensor, e, EINVAL, "near_clip=%g is not below far_clip=%g", out->near_clip,
+				  out->far_clip);
 	if (strcmp(sensor->type, "thinlens") != 0)
 		return 0;
 	if (!node_find(sensor, "aperture_radius"))
@@ -245,7 +259,8 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	return 0;
 }
 
-int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, struct scene_settings *out, struct error *e)
+int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, struct scene_settings *out,
+			struct error *e)
 {
 	*out = (struct scene_settings){0};
 	uint32_t sensors;

@@ -13,7 +13,8 @@
 #define TEMPERATURE_MIN 100
 #define VALUE_LARGEST 1e30
 
-/* Luminance of the CIE's D65 table over that of a constant 1: dividing by it makes rgb 1 and this spectrum the same white. */
+/* Luminance of the CIE's D65 table over that of a constant 1: dividing by it makes rgb 1 and this spectrum the same
+ * white. */
 static double d65_normalization(void)
 {
 	double sum = 0, y = 0;
@@ -37,8 +38,8 @@ static int constant(const struct xml_element *el, double x, struct arena *arena,
 }
 
 /* A table with room for n points; NULL, with the error set: no memory. */
-static bool table(const struct xml_element *el, uint32_t n, struct arena *arena, struct value *out, double **nm, double **value,
-		  struct error *e)
+static bool table(const struct xml_element *el, uint32_t n, struct arena *arena, struct value *out, double **nm,
+		  double **value, struct error *e)
 {
 	*nm = arena_alloc(arena, n, sizeof **nm);
 	*value = arena_alloc(arena, n, sizeof **value);
@@ -56,10 +57,12 @@ static int check_table(const struct xml_element *el, const struct value *v, stru
 {
 	const double *nm = v->as.spectrum.nm;
 	if (v->as.spectrum.count < 2)
-		return xml_error(el, e, EINVAL, "one pair nm:value is no spectrum; give a single number for a constant");
+		return xml_error(el, e, EINVAL,
+				 "one pair nm:value is no spectrum; give a single number for a constant");
 	for (uint32_t i = 0; i < v->as.spectrum.count; i++)
 		if (!(nm[i] > 0) || (i && !(nm[i] > nm[i - 1])))
-			return xml_error(el, e, EINVAL, "wavelengths must be positive and ascend: %g nm does not", nm[i]);
+			return xml_error(el, e, EINVAL, "wavelengths must be positive and ascend: %g nm does not",
+					 nm[i]);
 	return 0;
 }
 
@@ -96,13 +99,15 @@ static uint32_t scan_pairs(const char *p, const char *end, char between, double 
 	return n;
 }
 
-static int read_pairs(const struct xml_element *el, const char *text, const char *end, char between, struct arena *arena,
-		      struct value *out, struct error *e)
+static int read_pairs(const struct xml_element *el, const char *text, const char *end, char between,
+		      struct arena *arena, struct value *out, struct error *e)
 {
 	uint32_t n = scan_pairs(text, end, between, NULL, NULL);
 	if (n == 0)
-		return between == ':' ? xml_error(el, e, EINVAL, "`%.64s` is neither a number nor a list nm:value, nm:value, ... of "
-						  "at most %d", text, SPECTRAL_POINTS_MAX)
+		return between == ':' ? xml_error(el, e, EINVAL,
+						  "`%.64s` is neither a number nor a list nm:value, nm:value, ... of "
+						  "at most %d",
+						  text, SPECTRAL_POINTS_MAX)
 				      : xml_error(el, e, EINVAL, "the file is no list of lines `nm value`, at most %d",
 						  SPECTRAL_POINTS_MAX);
 	double *nm, *value;
@@ -112,8 +117,8 @@ static int read_pairs(const struct xml_element *el, const char *text, const char
 	return check_table(el, out, e);
 }
 
-static int read_file(const struct xml_element *el, const char *name, const struct asset_source *assets, struct arena *arena,
-		     struct value *out, struct error *e)
+static int read_file(const struct xml_element *el, const char *name, const struct asset_source *assets,
+		     struct arena *arena, struct value *out, struct error *e)
 {
 	struct asset a;
 	struct error inner;
@@ -126,7 +131,8 @@ static int read_file(const struct xml_element *el, const char *name, const struc
 	return r;
 }
 
-static int read_value(const struct xml_element *el, const char *text, struct arena *arena, struct value *out, struct error *e)
+static int read_value(const struct xml_element *el, const char *text, struct arena *arena, struct value *out,
+		      struct error *e)
 {
 	double x[3];
 	if (strchr(text, ':'))
@@ -139,8 +145,10 @@ static int read_value(const struct xml_element *el, const char *text, struct are
 		memcpy(out->as.rgb, x, sizeof x);
 		return 0;
 	}
-	return xml_error(el, e, EINVAL, "`%.64s` is neither a number nor a list nm:value, nm:value, ...; three numbers "
-			 "belong into <rgb>", text);
+	return xml_error(el, e, EINVAL,
+			 "`%.64s` is neither a number nor a list nm:value, nm:value, ...; three numbers "
+			 "belong into <rgb>",
+			 text);
 }
 
 /* Planck's law; h, c and k by the SI's definition. */
@@ -156,8 +164,8 @@ static int blackbody(const struct xml_element *el, double kelvin, double scale, 
 {
 	enum { STEP = 5, POINTS = (CIE_LAST_NM - CIE_FIRST_NM) / STEP + 1 };
 	if (!(kelvin >= TEMPERATURE_MIN && kelvin <= TEMPERATURE_MAX))
-		return xml_error(el, e, ERANGE, "a temperature of %g K is outside [%g, %g]", kelvin, (double)TEMPERATURE_MIN,
-				 TEMPERATURE_MAX);
+		return xml_error(el, e, ERANGE, "a temperature of %g K is outside [%g, %g]", kelvin,
+				 (double)TEMPERATURE_MIN, TEMPERATURE_MAX);
 	double *nm, *value;
 	if (!table(el, POINTS, arena, out, &nm, &value, e))
 		return -ENOMEM;
@@ -168,13 +176,15 @@ static int blackbody(const struct xml_element *el, double kelvin, double scale, 
 	return 0;
 }
 
-static int number_of(const struct xml_element *el, const char *what, const char *text, double least, double *x, struct error *e)
+static int number_of(const struct xml_element *el, const char *what, const char *text, double least, double *x,
+		     struct error *e)
 {
 	const char *end = text + strlen(text), *rest = number_scan(text, end, x);
 	if (rest && rest < end && *rest == 'K' && strcmp(what, "temperature") == 0)
 		rest++;
 	if (!rest || rest != end || !(*x >= least && *x <= VALUE_LARGEST))
-		return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not a number from %g to %g", what, text, least, VALUE_LARGEST);
+		return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not a number from %g to %g", what, text, least,
+				 VALUE_LARGEST);
 	return 0;
 }
 
@@ -190,7 +200,8 @@ int spectral_read_blackbody(const struct xml_element *el, struct arena *arena, s
 	return r ? r : blackbody(el, kelvin, factor, arena, out, e);
 }
 
-/* What is written inside a <spectrum type="...">: the value of <float name="NAME" .../> or of any other element; NULL: none. */
+/* What is written inside a <spectrum type="...">: the value of <float name="NAME" .../> or of any other element; NULL:
+ * none. */
 static const char *inner_value(const struct xml_element *el, const char *name)
 {
 	for (const struct xml_element *c = el->first; c; c = c->next) {
@@ -201,7 +212,8 @@ static const char *inner_value(const struct xml_element *el, const char *name)
 	return NULL;
 }
 
-static int inner_number(const struct xml_element *el, const char *name, const char *older, double fallback, double *x, struct error *e)
+static int inner_number(const struct xml_element *el, const char *name, const char *older, double fallback, double *x,
+			struct error *e)
 {
 	const char *text = inner_value(el, name);
 	if (!text && older)
@@ -213,7 +225,8 @@ static int inner_number(const struct xml_element *el, const char *name, const ch
 }
 
 /* The numbers of `name`, 2 at least: their count, or negative with the error set. */
-static int inner_list(const struct xml_element *el, const char *name, struct arena *arena, double **out, struct error *e)
+static int inner_list(const struct xml_element *el, const char *name, struct arena *arena, double **out,
+		      struct error *e)
 {
 	const char *text = inner_value(el, name);
 	size_t room = text ? strlen(text) / 2 + 1 : 0;
@@ -226,7 +239,8 @@ static int inner_list(const struct xml_element *el, const char *name, struct are
 	return n >= 2 ? n : xml_error(el, e, EINVAL, "needs `%s`, 2 to %d numbers", name, SPECTRAL_POINTS_MAX);
 }
 
-static int pair_up(const struct xml_element *el, int n, const double *nm, const double *value, struct value *out, struct error *e)
+static int pair_up(const struct xml_element *el, int n, const double *nm, const double *value, struct value *out,
+		   struct error *e)
 {
 	*out = (struct value){.type = VALUE_SPECTRUM};
 	out->as.spectrum.count = (uint32_t)n;
@@ -255,7 +269,8 @@ static int read_regular(const struct xml_element *el, struct arena *arena, struc
 static int read_irregular(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
 {
 	double *nm, *value;
-	int n = inner_list(el, "wavelengths", arena, &nm, e), values = n < 0 ? n : inner_list(el, "values", arena, &value, e);
+	int n = inner_list(el, "wavelengths", arena, &nm, e),
+	    values = n < 0 ? n : inner_list(el, "values", arena, &value, e);
 	if (values < 0)
 		return values;
 	return n == values ? pair_up(el, n, nm, value, out, e)
@@ -327,7 +342,8 @@ static bool is_listed(const char *list, const char *wanted)
 	return false;
 }
 
-static int read_typed(const struct xml_element *el, const char *type, struct arena *arena, struct value *out, struct error *e)
+static int read_typed(const struct xml_element *el, const char *type, struct arena *arena, struct value *out,
+		      struct error *e)
 {
 	char hint[128], list[256] = "";
 	struct spelling s = {.wanted = type};
@@ -339,19 +355,21 @@ static int read_typed(const struct xml_element *el, const char *type, struct are
 		for (const struct xml_element *c = el->first; c; c = c->next) {
 			const char *name = xml_attribute(c, "name");
 			if (!name || !xml_attribute(c, "value") || !is_listed(types[i].names, name))
-				return xml_error(c, e, EINVAL, "has no place in a spectrum of type `%s` (it may hold: %s)", type,
+				return xml_error(c, e, EINVAL,
+						 "has no place in a spectrum of type `%s` (it may hold: %s)", type,
 						 types[i].names);
 		}
 		return types[i].read(el, arena, out, e);
 	}
-	return xml_error(el, e, EINVAL, "there is no spectrum of this type%s (supported: %s)", spelling_hint(&s, hint, sizeof hint),
-			 list);
+	return xml_error(el, e, EINVAL, "there is no spectrum of this type%s (supported: %s)",
+			 spelling_hint(&s, hint, sizeof hint), list);
 }
 
-int spectral_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena, struct value *out,
-		  struct error *e)
+int spectral_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena,
+		  struct value *out, struct error *e)
 {
-	const char *file = xml_attribute(el, "filename"), *text = xml_attribute(el, "value"), *type = xml_attribute(el, "type");
+	const char *file = xml_attribute(el, "filename"), *text = xml_attribute(el, "value"),
+		   *type = xml_attribute(el, "type");
 	if ((file != NULL) + (text != NULL) + (type != NULL) != 1)
 		return xml_error(el, e, EINVAL, "needs either value or filename or type");
 	if (type)

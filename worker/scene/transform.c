@@ -150,12 +150,9 @@ static const struct step {
 	const char *element, *attributes;
 	int (*read)(const struct xml_element *el, mat4 *m, struct error *e);
 } steps[] = {
-	{"translate", "x|y|z|value", read_translate},
-	{"rotate", "x|y|z|value|angle", read_rotate},
-	{"scale", "x|y|z|value", read_scale},
-	{"lookat", "origin|target|up", read_lookat},
-	{"lookAt", "origin|target|up", read_lookat},
-	{"matrix", "value", read_matrix},
+	{"translate", "x|y|z|value", read_translate}, {"rotate", "x|y|z|value|angle", read_rotate},
+	{"scale", "x|y|z|value", read_scale},	      {"lookat", "origin|target|up", read_lookat},
+	{"lookAt", "origin|target|up", read_lookat},  {"matrix", "value", read_matrix},
 };
 enum { STEPS = sizeof steps / sizeof *steps };
 
@@ -179,7 +176,8 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 		const struct step *step = find_step(c->name, &s);
 		char hint[128];
 		if (!step)
-			return xml_error(c, e, EINVAL, "is no transform%s (supported: translate, rotate, scale, lookat, matrix)",
+			return xml_error(c, e, EINVAL,
+					 "is no transform%s (supported: translate, rotate, scale, lookat, matrix)",
 					 spelling_hint(&s, hint, sizeof hint));
 		mat4 one;
 		int r = value_check_element(c, step->attributes, false, e);
@@ -189,7 +187,9 @@ int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
 			return r;
 		m = mat4_mul(one, m);
 		if (!is_in_range(&m))
-			return xml_error(c, e, ERANGE, "the transform leaves the range of numbers: an element is outside [%g, %g]", -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX);
+			return xml_error(c, e, ERANGE,
+					 "the transform leaves the range of numbers: an element is outside [%g, %g]",
+					 -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX);
 	}
 	*out = m;
 	return 0;

@@ -134,14 +134,17 @@ static int read_rgb(const struct xml_element *el, struct value *out, struct erro
 			rgb[1] = rgb[2] = rgb[0];
 		else if (n != 3)
 			return xml_error(el, e, EINVAL, "`%.64s` is neither three numbers nor one%s", text,
-					 srgb ? " nor #rrggbb" : text[0] == '#' ? "; #rrggbb belongs into <srgb>" : "");
+					 srgb		  ? " nor #rrggbb"
+					 : text[0] == '#' ? "; #rrggbb belongs into <srgb>"
+							  : "");
 	}
 	for (int i = 0; i < 3 && srgb; i++)
 		rgb[i] = srgb_to_linear(rgb[i]);
 	return 0;
 }
 
-/* Mitsuba 0.6 lets a value say whether it is a light's colour or a surface's; what differs from the place is refused. */
+/* Mitsuba 0.6 lets a value say whether it is a light's colour or a surface's; what differs from the place is refused.
+ */
 static int check_intent(const struct xml_element *el, struct error *e)
 {
 	const char *intent = xml_attribute(el, "intent");
@@ -199,7 +202,8 @@ int value_read(const struct xml_element *el, const struct asset_source *assets, 
 {
 	const struct kind *k = find_kind(el->name);
 	if (!k || !k->type)
-		return xml_error(el, e, EINVAL, "is not supported; supported: boolean, integer, float, string, point, vector, "
+		return xml_error(el, e, EINVAL,
+				 "is not supported; supported: boolean, integer, float, string, point, vector, "
 				 "rgb, srgb, spectrum, blackbody, transform");
 	int r = value_check_element(el, k->attributes, k->children, e);
 	if (!r)
@@ -208,16 +212,23 @@ int value_read(const struct xml_element *el, const struct asset_source *assets, 
 		return r;
 	*out = (struct value){.type = k->type};
 	switch (k->type) {
-	case VALUE_BOOL: return read_bool(el, out, e);
-	case VALUE_INT: return read_int(el, out, e);
-	case VALUE_FLOAT: return read_float(el, out, e);
-	case VALUE_STRING: return read_string(el, out, e);
-	case VALUE_POINT: return read_point(el, out, e);
-	case VALUE_RGB: return read_rgb(el, out, e);
+	case VALUE_BOOL:
+		return read_bool(el, out, e);
+	case VALUE_INT:
+		return read_int(el, out, e);
+	case VALUE_FLOAT:
+		return read_float(el, out, e);
+	case VALUE_STRING:
+		return read_string(el, out, e);
+	case VALUE_POINT:
+		return read_point(el, out, e);
+	case VALUE_RGB:
+		return read_rgb(el, out, e);
 	case VALUE_SPECTRUM:
 		return strcmp(el->name, "blackbody") == 0 ? spectral_read_blackbody(el, arena, out, e)
-							   : spectral_read(el, assets, arena, out, e);
-	default: return transform_read(el, &out->as.transform, e);
+							  : spectral_read(el, assets, arena, out, e);
+	default:
+		return transform_read(el, &out->as.transform, e);
 	}
 }
 
@@ -226,9 +237,9 @@ void value_type_names(unsigned types, char *text, size_t size)
 	static const struct {
 		unsigned type;
 		const char *name;
-	} names[] = {{VALUE_BOOL, "boolean"}, {VALUE_INT, "integer"}, {VALUE_FLOAT, "float"}, {VALUE_STRING, "string"},
-		     {VALUE_POINT, "point"}, {VALUE_RGB, "rgb"}, {VALUE_SPECTRUM, "spectrum"},
-		     {VALUE_TRANSFORM, "transform"}, {VALUE_NODE, "an object"}};
+	} names[] = {{VALUE_BOOL, "boolean"},	   {VALUE_INT, "integer"},	   {VALUE_FLOAT, "float"},
+		     {VALUE_STRING, "string"},	   {VALUE_POINT, "point"},	   {VALUE_RGB, "rgb"},
+		     {VALUE_SPECTRUM, "spectrum"}, {VALUE_TRANSFORM, "transform"}, {VALUE_NODE, "an object"}};
 	text[0] = 0;
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		if (types & names[i].type)

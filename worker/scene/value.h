@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Values of the scene language from their elements: <float>, <rgb>, <transform> ... One thread; allocates in the arena. */
+/* Values of the scene language from their elements: <float>, <rgb>, <transform> ... One thread; allocates in the arena.
+ */
 #ifndef WORKER_SCENE_VALUE_H
 #define WORKER_SCENE_VALUE_H
 
@@ -18,7 +19,8 @@ int value_read(const struct xml_element *el, const struct asset_source *assets, 
 /* "float", "rgb" ... for messages; types: any of the bits, as a list. */
 void value_type_names(unsigned types, char *text, size_t size);
 
-/* Refuses attributes that are not in `known` (a list with '|' between), text and, unless `children`, elements inside. */
+/* Refuses attributes that are not in `known` (a list with '|' between), text and, unless `children`, elements inside.
+ */
 int value_check_element(const struct xml_element *el, const char *known, bool children, struct error *e);
 const char *value_next_name(const char *list, char *name, size_t size); /* walks such a list; NULL at the end */
 

@@ -86,7 +86,8 @@ int xml_error(const struct xml_element *el, struct error *e, int errno_value, co
 	va_end(ap);
 	const char *type = xml_attribute(el, "type");
 	if (type)
-		return error_set(e, errno_value, "%s:%d: <%.64s type=\"%.64s\">: %s", el->file, el->line, el->name, type, text);
+		return error_set(e, errno_value, "%s:%d: <%.64s type=\"%.64s\">: %s", el->file, el->line, el->name,
+				 type, text);
 	return error_set(e, errno_value, "%s:%d: <%.64s>: %s", el->file, el->line, el->name, text);
 }
 
@@ -110,8 +111,8 @@ static int line_now(const struct reader *r)
 
 static int out_of_memory(struct reader *r)
 {
-	return error_set(r->error, ENOMEM, "%s:%d: out of memory, or the scene files take more than %d MB of it", r->file,
-			 line_now(r), XML_MEMORY_MAX >> 20);
+	return error_set(r->error, ENOMEM, "%s:%d: out of memory, or the scene files take more than %d MB of it",
+			 r->file, line_now(r), XML_MEMORY_MAX >> 20);
 }
 
 static int copy_attributes(struct reader *r, struct xml_element *el, const char **given)
@@ -137,8 +138,8 @@ static int copy_attributes(struct reader *r, struct xml_element *el, const char 
 		else
 			c = define_substitute(&r->defines, value, XML_VALUE_MAX, &a[i].value, r->error);
 		if (c)
-			return error_prefix(r->error, c, "%s:%d: <%.64s>: attribute `%.64s`", el->file, el->line, el->name,
-					    a[i].name);
+			return error_prefix(r->error, c, "%s:%d: <%.64s>: attribute `%.64s`", el->file, el->line,
+					    el->name, a[i].name);
 		if (!a[i].value)
 			return out_of_memory(r);
 		el->attributes = a;
@@ -159,8 +160,10 @@ static int begin_file(struct reader *r, struct xml_element *el)
 		return xml_error(el, r->error, EINVAL, "needs version=\"0.6.0\" or version=\"3.0.0\" and the like");
 	r->snake = major < 2;
 	if (r->dialect_known && r->tree->dialect_3 != (major >= 2))
-		return xml_error(el, r->error, EINVAL, "version %.32s: an included file must be of the same dialect "
-				 "(below 2, or 2 and above) as the scene", version);
+		return xml_error(el, r->error, EINVAL,
+				 "version %.32s: an included file must be of the same dialect "
+				 "(below 2, or 2 and above) as the scene",
+				 version);
 	r->dialect_known = true;
 	r->tree->dialect_3 = major >= 2;
 	return 0;
@@ -249,10 +252,11 @@ static int find_files(struct reader *r, struct xml_element *el)
 static int open_element(struct reader *r, const char *name, const char **attributes)
 {
 	if (r->depth >= XML_DEPTH_MAX)
-		return error_set(r->error, E2BIG, "%s:%d: <%.64s>: elements are nested more than %d deep", r->file, line_now(r),
-				 name, XML_DEPTH_MAX);
+		return error_set(r->error, E2BIG, "%s:%d: <%.64s>: elements are nested more than %d deep", r->file,
+				 line_now(r), name, XML_DEPTH_MAX);
 	if (r->tree->element_count >= XML_ELEMENTS_MAX)
-		return error_set(r->error, E2BIG, "%s:%d: more than %d elements", r->file, line_now(r), XML_ELEMENTS_MAX);
+		return error_set(r->error, E2BIG, "%s:%d: more than %d elements", r->file, line_now(r),
+				 XML_ELEMENTS_MAX);
 	struct xml_element *el = arena_alloc(r->arena, 1, sizeof *el);
 	if (!el)
 		return out_of_memory(r);
@@ -351,8 +355,9 @@ static void on_doctype(void *user, const char *name, const char *system, const c
 	(void)name, (void)system, (void)public_id, (void)has_subset;
 	struct reader *r = user;
 	if (!r->failed)
-		stop(r, error_set(r->error, EINVAL, "%s:%d: <!DOCTYPE>: scene files must not declare document types or entities",
-				  r->file, line_now(r)));
+		stop(r, error_set(r->error, EINVAL,
+				  "%s:%d: <!DOCTYPE>: scene files must not declare document types or entities", r->file,
+				  line_now(r)));
 }
 
 static int parse_bytes(struct reader *r, const struct asset *a)
@@ -373,9 +378,9 @@ static int parse_bytes(struct reader *r, const struct asset *a)
 	int c = r->failed;
 	if (!c && status != XML_STATUS_OK) {
 		enum XML_Error code = XML_GetErrorCode(parser);
-		c = error_set(r->error, code == XML_ERROR_NO_MEMORY ? ENOMEM : EINVAL, "%s:%d: %s%s%.64s%s", r->file, line_now(r),
-			      XML_ErrorString(code), r->current ? " in <" : "", r->current ? r->current->name : "",
-			      r->current ? ">" : "");
+		c = error_set(r->error, code == XML_ERROR_NO_MEMORY ? ENOMEM : EINVAL, "%s:%d: %s%s%.64s%s", r->file,
+			      line_now(r), XML_ErrorString(code), r->current ? " in <" : "",
+			      r->current ? r->current->name : "", r->current ? ">" : "");
 	}
 	XML_ParserFree(parser);
 	return c;
@@ -393,8 +398,8 @@ static int read_file(struct reader *r, const char *name)
 	return c;
 }
 
-int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name, const struct scene_define *defines,
-	     size_t define_count, struct arena *arena, struct error *e)
+int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name,
+	     const struct scene_define *defines, size_t define_count, struct arena *arena, struct error *e)
 {
 	*t = (struct xml_tree){0};
 	struct reader r = {.tree = t, .assets = assets, .arena = arena, .error = e};

@@ -11,15 +11,15 @@
 #include "worker/scene/scene.h"
 
 enum {
-	XML_DEPTH_MAX = 64,              /* elements inside elements, and objects that refer to objects */
-	XML_INCLUDE_MAX = 8,             /* files that include files */
-	XML_FILES_MAX = 1024,            /* files included in all */
-	XML_PATHS_MAX = 16,              /* folders that are searched for files */
+	XML_DEPTH_MAX = 64,   /* elements inside elements, and objects that refer to objects */
+	XML_INCLUDE_MAX = 8,  /* files that include files */
+	XML_FILES_MAX = 1024, /* files included in all */
+	XML_PATHS_MAX = 16,   /* folders that are searched for files */
 	XML_ELEMENTS_MAX = 1 << 20,
 	XML_ATTRIBUTES_MAX = 24,
-	XML_VALUE_MAX = 1 << 20,         /* bytes of an attribute's value */
-	XML_FILE_MAX = 64 << 20,         /* bytes of a scene file */
-	XML_MEMORY_MAX = 1 << 30,        /* bytes of the tree */
+	XML_VALUE_MAX = 1 << 20,  /* bytes of an attribute's value */
+	XML_FILE_MAX = 64 << 20,  /* bytes of a scene file */
+	XML_MEMORY_MAX = 1 << 30, /* bytes of the tree */
 };
 
 struct xml_attribute {
@@ -36,23 +36,23 @@ struct xml_element {
 	struct xml_attribute *attributes;
 	struct xml_element *parent, *first, *last, *next;
 	const struct scene_node *node; /* for the interpreter: what it became */
-	bool busy, told;               /* for the interpreter: being made into a node; cannot be, and that has been said */
+	bool busy, told; /* for the interpreter: being made into a node; cannot be, and that has been said */
 };
-
 
 struct xml_tree {
 	struct xml_element *root; /* <scene>; includes stand as <scene> elements in the place of <include> */
 	bool dialect_3;
 	uint32_t element_count, include_count, path_count;
 	const char *includes[XML_FILES_MAX]; /* names of included files; repeated where included more than once */
-	const char *paths[XML_PATHS_MAX];    /* of <path>, in their order; names of files after them are searched there, too */
+	const char *
+		paths[XML_PATHS_MAX]; /* of <path>, in their order; names of files after them are searched there, too */
 };
 
 /* Elements for which this holds, and all inside them, are marked ignored. */
 bool xml_is_foreign(const char *element);
 
-int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name, const struct scene_define *defines,
-	     size_t define_count, struct arena *arena, struct error *e);
+int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name,
+	     const struct scene_define *defines, size_t define_count, struct arena *arena, struct error *e);
 
 const char *xml_attribute(const struct xml_element *el, const char *name); /* NULL: none */
 

@@ -29,7 +29,8 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	vec3 p0 = point_of(n, "p0", (vec3){0, 0, 0}), p1 = point_of(n, "p1", (vec3){0, 0, 1}), axis = vec3_sub(p1, p0);
 	double length = vec3_length(axis), radius = node_float(n, "radius", 1) * round_radius();
 	if (!(length > 0) || !(length <= MESH_COORDINATE_MAX))
-		return node_error(n, e, EINVAL, "a cylinder from (%g, %g, %g) to (%g, %g, %g)", p0.x, p0.y, p0.z, p1.x, p1.y, p1.z);
+		return node_error(n, e, EINVAL, "a cylinder from (%g, %g, %g) to (%g, %g, %g)", p0.x, p0.y, p0.z, p1.x,
+				  p1.y, p1.z);
 	if (!mesh_alloc(m, 2 * (ROUND_SEGMENTS + 1), 2 * ROUND_SEGMENTS, true, true, arena))
 		return node_error(n, e, ENOMEM, "out of memory");
 	struct frame f = frame_around(vec3_scale(1 / length, axis));

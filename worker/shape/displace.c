@@ -7,8 +7,8 @@
 
 #include <string.h>
 
-/* Normals that differ by less than a thousandth of a radian (those that files round) and heights by less than this share of
- * the largest are no crease. */
+/* Normals that differ by less than a thousandth of a radian (those that files round) and heights by less than this
+ * share of the largest are no crease. */
 #define CREASE_COSINE (1 - 1e-6)
 #define SEAM_HEIGHT 1e-9
 
@@ -43,7 +43,8 @@ struct sample {
 
 static vec3 mix(const double (*a)[3], const uint32_t t[3], const double b[3])
 {
-	return vec3_madd(vec3_madd(vec3_scale(b[0], mesh_load(a[t[0]])), b[1], mesh_load(a[t[1]])), b[2], mesh_load(a[t[2]]));
+	return vec3_madd(vec3_madd(vec3_scale(b[0], mesh_load(a[t[0]])), b[1], mesh_load(a[t[1]])), b[2],
+			 mesh_load(a[t[2]]));
 }
 
 static vec3 axis(const struct sphere *s, int k)
@@ -117,7 +118,8 @@ static vec3 displaced_normal(const struct work *w, uint32_t triangle, double b1,
 static double corner_angle(const struct mesh *m, const uint32_t t[3], uint32_t k)
 {
 	vec3 p = mesh_load(m->position[t[k]]);
-	return mesh_angle(vec3_sub(mesh_load(m->position[t[(k + 1) % 3]]), p), vec3_sub(mesh_load(m->position[t[(k + 2) % 3]]), p));
+	return mesh_angle(vec3_sub(mesh_load(m->position[t[(k + 1) % 3]]), p),
+			  vec3_sub(mesh_load(m->position[t[(k + 2) % 3]]), p));
 }
 
 static void add_to_place(struct place *c, double weight, const struct sample *s, vec3 normal)
@@ -212,7 +214,8 @@ static void add_turns(struct work *w, uint32_t triangle, const uint32_t ij[3][2]
 	for (int k = 0; k < 3; k++) {
 		if (at[k].inside || !w->places[at[k].place].bent)
 			continue;
-		double angle = mesh_angle(vec3_sub(after[(k + 1) % 3], after[k]), vec3_sub(after[(k + 2) % 3], after[k]));
+		double angle =
+			mesh_angle(vec3_sub(after[(k + 1) % 3], after[k]), vec3_sub(after[(k + 2) % 3], after[k]));
 		struct turn *turn = &w->turns[at[k].vertex];
 		turn->sum = vec3_madd(turn->sum, angle, turned);
 		turn->weight += angle;
@@ -239,16 +242,19 @@ static void put_triangles(struct work *w)
 		for (uint32_t i = 0; i < n; i++) {
 			tick();
 			for (uint32_t j = 0; j < n - i; j++) {
-				put_triangle(w, t, (const uint32_t[3][2]){{i, j}, {i + 1, j}, {i, j + 1}}, w->out->index[count++]);
+				put_triangle(w, t, (const uint32_t[3][2]){{i, j}, {i + 1, j}, {i, j + 1}},
+					     w->out->index[count++]);
 				if (i + j + 1 < n)
-					put_triangle(w, t, (const uint32_t[3][2]){{i + 1, j}, {i + 1, j + 1}, {i, j + 1}},
+					put_triangle(w, t,
+						     (const uint32_t[3][2]){{i + 1, j}, {i + 1, j + 1}, {i, j + 1}},
 						     w->out->index[count++]);
 			}
 		}
 	for (uint64_t i = 0; i < w->grid.border; i++) {
 		vec3 n0 = mesh_load(w->out->normal[i]);
 		if (w->turns[i].weight > 0)
-			mesh_store(w->out->normal[i], normal_or(vec3_madd(n0, 1 / w->turns[i].weight, w->turns[i].sum), n0));
+			mesh_store(w->out->normal[i],
+				   normal_or(vec3_madd(n0, 1 / w->turns[i].weight, w->turns[i].sum), n0));
 	}
 }
 
@@ -273,7 +279,8 @@ static bool split_flat(struct mesh *m, const struct mesh *from, struct arena *ar
 	return true;
 }
 
-/* Normals hold the directions from the centre. Octants are numbered by quarter of longitude, the lower half from 4 on. */
+/* Normals hold the directions from the centre. Octants are numbered by quarter of longitude, the lower half from 4 on.
+ */
 static bool make_octahedron(struct mesh *m, const struct sphere *s, struct arena *arena)
 {
 	if (!mesh_alloc(m, 24, 8, true, true, arena))
@@ -307,7 +314,8 @@ static int settle(struct work *w, const struct scene_node *n, struct error *e)
 	for (uint32_t i = 0; i < w->out->vertex_count; i++)
 		for (int k = 0; k < 3; k++)
 			if (!(fabs(w->out->position[i][k]) <= MESH_COORDINATE_MAX))
-				return node_error(n, e, ERANGE, "displacement moves a vertex beyond %g", MESH_COORDINATE_MAX);
+				return node_error(n, e, ERANGE, "displacement moves a vertex beyond %g",
+						  MESH_COORDINATE_MAX);
 	put_triangles(w);
 	return 0;
 }
@@ -317,14 +325,14 @@ static uint32_t parts_of(const struct displacement *d)
 	return (uint32_t)fmin(fmax(round(ldexp(d->tessellation, (int)d->level)), 1), 1 << DISPLACE_LEVEL_MAX);
 }
 
-static int run(struct work *w, struct shape_geometry *g, struct arena *arena, struct arena *scratch, const struct scene_node *n,
-	       struct error *e)
+static int run(struct work *w, struct shape_geometry *g, struct arena *arena, struct arena *scratch,
+	       const struct scene_node *n, struct error *e)
 {
 	uint32_t parts = parts_of(w->d);
 	uint64_t triangles = (g->kind == SHAPE_SPHERE ? 8 : (uint64_t)g->mesh.triangle_count) * parts * parts;
 	if (triangles > MESH_TRIANGLES_MAX)
-		return node_error(n, e, E2BIG, "displacement_level %u makes %llu triangles; at most %d are possible", w->d->level,
-				  (unsigned long long)triangles, MESH_TRIANGLES_MAX);
+		return node_error(n, e, E2BIG, "displacement_level %u makes %llu triangles; at most %d are possible",
+				  w->d->level, (unsigned long long)triangles, MESH_TRIANGLES_MAX);
 	bool ok = true;
 	w->base = g->mesh;
 	if (g->kind == SHAPE_SPHERE)
@@ -350,7 +358,8 @@ int displace(struct shape_geometry *g, const struct displacement *d, struct aren
 	     struct error *e)
 {
 	if (g->kind == SHAPE_MESH && !g->mesh.uv && !d->is_constant)
-		return node_error(n, e, EINVAL, "displacement by a texture needs texture coordinates, and the mesh has none");
+		return node_error(n, e, EINVAL,
+				  "displacement by a texture needs texture coordinates, and the mesh has none");
 	struct work w = {.d = d};
 	struct arena scratch = {0};
 	int rc = run(&w, g, arena, &scratch, n, e);

@@ -81,14 +81,16 @@ static bool number_edges(struct displace_grid *g, const struct mesh *base, struc
 	for (size_t s = 0; s < n; s++) {
 		g->place_edges += s == 0 || compare_ends(&sorted[s - 1], &sorted[s], 2) != 0;
 		g->vertex_edges += s == 0 || compare_ends(&sorted[s - 1], &sorted[s], 4) != 0;
-		g->side[sorted[s].side] = (struct displace_side){g->vertex_edges - 1, g->place_edges - 1, sorted[s].backwards};
+		g->side[sorted[s].side] =
+			(struct displace_side){g->vertex_edges - 1, g->place_edges - 1, sorted[s].backwards};
 	}
 	return true;
 }
 
 bool displace_grid_init(struct displace_grid *g, const struct mesh *base, uint32_t parts, struct arena *arena)
 {
-	*g = (struct displace_grid){.parts = parts, .base_vertices = base->vertex_count, .index = (const uint32_t(*)[3])base->index};
+	*g = (struct displace_grid){
+		.parts = parts, .base_vertices = base->vertex_count, .index = (const uint32_t(*)[3])base->index};
 	if (!weld(g, base, arena) || (parts > 1 && !number_edges(g, base, arena)))
 		return false;
 	uint64_t inner = parts - 1, inside = parts > 2 ? inner * (parts - 2) / 2 : 0;
@@ -102,7 +104,8 @@ static struct displace_point on_side(const struct displace_grid *g, uint32_t tri
 {
 	const struct displace_side *s = &g->side[3 * (size_t)triangle + k];
 	uint32_t inner = g->parts - 1, at = (s->backwards ? g->parts - step : step) - 1;
-	return (struct displace_point){g->base_vertices + s->vertices * inner + at, g->base_places + s->places * inner + at, false};
+	return (struct displace_point){g->base_vertices + s->vertices * inner + at,
+				       g->base_places + s->places * inner + at, false};
 }
 
 struct displace_point displace_grid_at(const struct displace_grid *g, uint32_t triangle, uint32_t i, uint32_t j)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Where the points lie that cutting each edge of a mesh into `parts` makes, and who shares them. A vertex is shared by
- * triangles that share it in the base mesh (or its edge); a place is shared by all that lie there, whatever their normals.
- * Points inside a triangle are a vertex and have no place of their own. One thread.
+ * triangles that share it in the base mesh (or its edge); a place is shared by all that lie there, whatever their
+ * normals. Points inside a triangle are a vertex and have no place of their own. One thread.
  */
 #ifndef WORKER_SHAPE_DISPLACE_GRID_H
 #define WORKER_SHAPE_DISPLACE_GRID_H
@@ -12,16 +12,16 @@
 
 struct displace_side {
 	uint32_t vertices, places; /* the edge's number among those of vertices, and of places */
-	bool backwards;            /* the edge runs from the side's end to its start */
+	bool backwards;		   /* the edge runs from the side's end to its start */
 };
 
 struct displace_grid {
 	uint32_t parts, base_vertices, base_places;
 	uint32_t vertex_edges, place_edges;
-	uint32_t *place;            /* of each base vertex */
+	uint32_t *place;	    /* of each base vertex */
 	struct displace_side *side; /* 3 a triangle, from corner k to the next; NULL when parts is 1 */
 	const uint32_t (*index)[3]; /* of the base mesh */
-	uint64_t border;            /* vertices below this have a place */
+	uint64_t border;	    /* vertices below this have a place */
 	uint64_t vertices, places;
 };
 

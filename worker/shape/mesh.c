@@ -72,7 +72,8 @@ static int place_vertices(struct mesh *m, const struct mesh_finish *f, const str
 		/* Normals come as unit vectors or as nothing; scaling first keeps tiny and huge transforms in range. */
 		vec3 normal = mat4_normal(&inverse, mesh_load(m->normal[i]));
 		double largest = fmax(fabs(normal.x), fmax(fabs(normal.y), fabs(normal.z)));
-		normal = largest > 0 && isfinite(largest) ? vec3_normalize(vec3_scale(1 / largest, normal)) : (vec3){0, 0, 0};
+		normal = largest > 0 && isfinite(largest) ? vec3_normalize(vec3_scale(1 / largest, normal))
+							  : (vec3){0, 0, 0};
 		mesh_store(m->normal[i], vec3_is_finite(normal) ? normal : (vec3){0, 0, 0});
 	}
 	if (mat4_det3(f->to_world) < 0)
@@ -118,7 +119,7 @@ static void add_corner_normals(struct mesh *m, const uint32_t t[3], const double
 			continue;
 		vec3 p = mesh_load(m->position[v]);
 		double angle = mesh_angle(vec3_sub(mesh_load(m->position[t[(k + 1) % 3]]), p),
-					     vec3_sub(mesh_load(m->position[t[(k + 2) % 3]]), p));
+					  vec3_sub(mesh_load(m->position[t[(k + 2) % 3]]), p));
 		mesh_store(m->normal[v], vec3_madd(mesh_load(m->normal[v]), angle, g));
 	}
 }
@@ -159,8 +160,8 @@ static bool lacks_normals(const struct mesh *m)
 	return !m->normal;
 }
 
-int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped, const struct scene_node *n,
-		struct error *e)
+int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped,
+		const struct scene_node *n, struct error *e)
 {
 	int r = place_vertices(m, f, n, e);
 	if (!r)

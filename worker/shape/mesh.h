@@ -10,7 +10,9 @@
 
 enum { MESH_TRIANGLES_MAX = 1 << 27 };
 #define MESH_COORDINATE_MAX PARAM_LENGTH_MAX
-#define MESH_UV_MAX 1e12 /* a double has a ten-thousandth of a texture's width there, and tangents are no shorter than 1e-12 of an edge */
+#define MESH_UV_MAX                                                                                                    \
+	1e12 /* a double has a ten-thousandth of a texture's width there, and tangents are no shorter than 1e-12 of an \
+		edge */
 
 static inline vec3 mesh_load(const double v[3])
 {
@@ -47,12 +49,12 @@ struct mesh_finish {
 };
 
 /*
- * From object to world space. Drops triangles without area. Where normals are not unit vectors they count as missing and
- * are computed from the triangles around, weighted by their angles there; face_normals: there are none after all.
+ * From object to world space. Drops triangles without area. Where normals are not unit vectors they count as missing
+ * and are computed from the triangles around, weighted by their angles there; face_normals: there are none after all.
  * The outside stays the outside under mirrors. Triangles are wound counter-clockwise as seen from outside, which is
  * the side of their vertices' normals.
  */
-int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped, const struct scene_node *n,
-		struct error *e);
+int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped,
+		const struct scene_node *n, struct error *e);
 
 #endif

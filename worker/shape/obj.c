@@ -30,7 +30,7 @@ struct list {
 
 struct corner {
 	uint32_t v, vt, vn; /* from 1; 0: none */
-	uint32_t at;        /* place in the list of corners */
+	uint32_t at;	    /* place in the list of corners */
 };
 
 struct obj {
@@ -40,8 +40,8 @@ struct obj {
 	const char *p, *end;
 	int line;
 	struct list positions, uvs, normals; /* double[3], double[2], double[3] */
-	struct list corners;                 /* struct corner, one for each corner of each polygon */
-	struct list triangles;               /* uint32_t[3] into corners */
+	struct list corners;		     /* struct corner, one for each corner of each polygon */
+	struct list triangles;		     /* uint32_t[3] into corners */
 };
 
 static void *push(struct list *l)
@@ -100,8 +100,8 @@ static int read_numbers(struct obj *o, const char *what, struct list *l, size_t 
 		const char *rest = number_scan(o->p, o->end, &v[i]);
 		bool ends = rest && (rest == o->end || number_is_blank(*rest) || *rest == '\\' || *rest == '#');
 		if (!ends || !(fabs(v[i]) <= MESH_COORDINATE_MAX))
-			return node_error(o->node, o->error, EINVAL, "%s:%d: `%s` needs %zu finite numbers", o->name, o->line,
-					  what, least);
+			return node_error(o->node, o->error, EINVAL, "%s:%d: `%s` needs %zu finite numbers", o->name,
+					  o->line, what, least);
 		o->p = rest;
 	}
 	return 0;
@@ -123,12 +123,13 @@ static int read_index(struct obj *o, const char *what, size_t count, uint32_t *o
 	int64_t i;
 	const char *rest = number_scan_int(o->p, o->end, &i);
 	if (!rest)
-		return node_error(o->node, o->error, EINVAL, "%s:%d: a face's corners are v, v/vt, v//vn or v/vt/vn", o->name,
-				  o->line);
+		return node_error(o->node, o->error, EINVAL, "%s:%d: a face's corners are v, v/vt, v//vn or v/vt/vn",
+				  o->name, o->line);
 	int64_t k = i < 0 ? (int64_t)count + 1 + i : i;
 	if (k < 1 || k > (int64_t)count)
-		return node_error(o->node, o->error, EINVAL, "%s:%d: %s %lld is out of range; there are %zu before this line",
-				  o->name, o->line, what, (long long)i, count);
+		return node_error(o->node, o->error, EINVAL,
+				  "%s:%d: %s %lld is out of range; there are %zu before this line", o->name, o->line,
+				  what, (long long)i, count);
 	*out = (uint32_t)k;
 	o->p = rest;
 	return 0;
@@ -159,8 +160,8 @@ static int read_corner(struct obj *o)
 	if (r)
 		return r;
 	if (o->p < o->end && !number_is_blank(*o->p) && *o->p != '\\' && *o->p != '#')
-		return node_error(o->node, o->error, EINVAL, "%s:%d: a face's corners are v, v/vt, v//vn or v/vt/vn", o->name,
-				  o->line);
+		return node_error(o->node, o->error, EINVAL, "%s:%d: a face's corners are v, v/vt, v//vn or v/vt/vn",
+				  o->name, o->line);
 	struct corner *new = push(&o->corners);
 	if (!new)
 		return out_of_memory(o);

@@ -2,12 +2,12 @@
 /*
  * Stanford PLY: ascii and both byte orders, any order of elements and properties.
  *
- * The header says how the bytes behind it are laid out. A first pass over the faces counts triangles, so that memory is taken
- * once; a second pass reads. Of vertices x y z, nx ny nz and u v (or s t) count, of faces vertex_indices (or vertex_index);
- * polygons become fans of triangles; everything else is stepped over.
+ * The header says how the bytes behind it are laid out. A first pass over the faces counts triangles, so that memory is
+ * taken once; a second pass reads. Of vertices x y z, nx ny nz and u v (or s t) count, of faces vertex_indices (or
+ * vertex_index); polygons become fans of triangles; everything else is stepped over.
  *
- * Failures: a header that is none, a file that ends too early, indices out of range, numbers that are not finite. No count of
- * the header is believed before the file was seen to be long enough for it.
+ * Failures: a header that is none, a file that ends too early, indices out of range, numbers that are not finite. No
+ * count of the header is believed before the file was seen to be long enough for it.
  */
 #include "common/base/liveness.h"
 #include "worker/scene/number.h"
@@ -92,10 +92,10 @@ static enum scalar find_scalar(const char *name)
 	static const struct {
 		const char *name;
 		enum scalar type;
-	} names[] = {{"char", INT8},	 {"int8", INT8},       {"uchar", UINT8},   {"uint8", UINT8},	 {"short", INT16},
-		     {"int16", INT16},	 {"ushort", UINT16},   {"uint16", UINT16}, {"int", INT32},	 {"int32", INT32},
-		     {"uint", UINT32},	 {"uint32", UINT32},   {"float", FLOAT32}, {"float32", FLOAT32}, {"double", FLOAT64},
-		     {"float64", FLOAT64}};
+	} names[] = {{"char", INT8},	 {"int8", INT8},       {"uchar", UINT8},    {"uint8", UINT8},
+		     {"short", INT16},	 {"int16", INT16},     {"ushort", UINT16},  {"uint16", UINT16},
+		     {"int", INT32},	 {"int32", INT32},     {"uint", UINT32},    {"uint32", UINT32},
+		     {"float", FLOAT32}, {"float32", FLOAT32}, {"double", FLOAT64}, {"float64", FLOAT64}};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
 		if (strcmp(names[i].name, name) == 0)
 			return names[i].type;
@@ -107,8 +107,9 @@ static enum role find_role(enum element_kind kind, const char *name, bool list)
 	static const struct {
 		const char *name;
 		enum role role;
-	} names[] = {{"x", ROLE_X},   {"y", ROLE_Y}, {"z", ROLE_Z}, {"nx", ROLE_NX}, {"ny", ROLE_NY},	      {"nz", ROLE_NZ},
-		     {"u", ROLE_U},   {"v", ROLE_V}, {"s", ROLE_U}, {"t", ROLE_V},   {"texture_u", ROLE_U}, {"texture_v", ROLE_V}};
+	} names[] = {{"x", ROLE_X},   {"y", ROLE_Y},   {"z", ROLE_Z},	      {"nx", ROLE_NX},
+		     {"ny", ROLE_NY}, {"nz", ROLE_NZ}, {"u", ROLE_U},	      {"v", ROLE_V},
+		     {"s", ROLE_U},   {"t", ROLE_V},   {"texture_u", ROLE_U}, {"texture_v", ROLE_V}};
 	if (kind == ELEMENT_FACE && list && (strcmp(name, "vertex_indices") == 0 || strcmp(name, "vertex_index") == 0))
 		return ROLE_INDICES;
 	for (size_t i = 0; kind == ELEMENT_VERTEX && !list && i < sizeof names / sizeof *names; i++)
@@ -148,7 +149,9 @@ static int read_element(struct ply *f)
 	struct element *el = &f->elements[f->element_count++];
 	*el = (struct element){.count = (uint64_t)n};
 	memcpy(el->name, name, sizeof name);
-	el->kind = strcmp(name, "vertex") == 0 ? ELEMENT_VERTEX : strcmp(name, "face") == 0 ? ELEMENT_FACE : ELEMENT_OTHER;
+	el->kind = strcmp(name, "vertex") == 0 ? ELEMENT_VERTEX
+		   : strcmp(name, "face") == 0 ? ELEMENT_FACE
+					       : ELEMENT_OTHER;
 	for (uint32_t i = 0; i + 1 < f->element_count; i++)
 		if (strcmp(f->elements[i].name, name) == 0)
 			return header_error(f, "an element is given twice");
@@ -229,12 +232,21 @@ static double decode(const char *at, enum scalar type, bool big)
 	float f;
 	double d;
 	switch (type) {
-	case INT8: return (int8_t)bits;
-	case INT16: return (int16_t)bits;
-	case INT32: return (int32_t)bits;
-	case FLOAT32: low = (uint32_t)bits; memcpy(&f, &low, sizeof f); return (double)f;
-	case FLOAT64: memcpy(&d, &bits, sizeof d); return d;
-	default: return (double)bits;
+	case INT8:
+		return (int8_t)bits;
+	case INT16:
+		return (int16_t)bits;
+	case INT32:
+		return (int32_t)bits;
+	case FLOAT32:
+		low = (uint32_t)bits;
+		memcpy(&f, &low, sizeof f);
+		return (double)f;
+	case FLOAT64:
+		memcpy(&d, &bits, sizeof d);
+		return d;
+	default:
+		return (double)bits;
 	}
 }
 
@@ -262,7 +274,8 @@ static int item_error(const struct ply *f, const struct element *el, uint64_t i,
 	return node_error(f->node, f->error, EINVAL, "%s: %s %llu: %s", f->name, el->name, (unsigned long long)i, what);
 }
 
-static int read_list(struct ply *f, const struct element *el, uint64_t item, const struct ply_property *p, uint32_t first_triangle)
+static int read_list(struct ply *f, const struct element *el, uint64_t item, const struct ply_property *p,
+		     uint32_t first_triangle)
 {
 	double n, corner[3] = {0, 0, 0};
 	if (!next_number(f, p->count_type, &n) || !(n >= 0) || n != floor(n))
@@ -335,7 +348,8 @@ static uint64_t least_bytes(const struct ply *f, const struct element *el)
 	uint64_t n = 0;
 	for (uint32_t k = 0; k < el->property_count; k++) {
 		const struct ply_property *p = &el->properties[k];
-		n += f->format == FORMAT_ASCII ? 1 : scalar_size[p->count_type != SCALAR_NONE ? p->count_type : p->type];
+		n += f->format == FORMAT_ASCII ? 1
+					       : scalar_size[p->count_type != SCALAR_NONE ? p->count_type : p->type];
 	}
 	return n;
 }
@@ -410,8 +424,13 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	if (r)
 		return r;
 	const char *bytes = (const char *)a.bytes;
-	struct ply f = {.node = n, .name = node_string(n, "filename", ""), .error = e, .p = bytes, .end = bytes + a.size,
-			.mesh = &out->mesh, .flip = node_bool(n, "flip_tex_coords", false)};
+	struct ply f = {.node = n,
+			.name = node_string(n, "filename", ""),
+			.error = e,
+			.p = bytes,
+			.end = bytes + a.size,
+			.mesh = &out->mesh,
+			.flip = node_bool(n, "flip_tex_coords", false)};
 	r = read_file(&f, arena);
 	assets->close(assets->user, &a);
 	return r;

@@ -1,13 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Mitsuba's own binary meshes (.serialized, versions 3 and 4): any number of meshes in one file, each compressed by itself,
- * found through a table of offsets at the file's end; `shape_index` says which.
+ * Mitsuba's own binary meshes (.serialized, versions 3 and 4): any number of meshes in one file, each compressed by
+ * itself, found through a table of offsets at the file's end; `shape_index` says which.
  *
- * A mesh is a number of fixed meaning, a version, and behind these a zlib stream: flags, a name (version 4), counts, positions,
- * normals, texture coordinates and colours as the flags say, triangles. All is little endian.
+ * A mesh is a number of fixed meaning, a version, and behind these a zlib stream: flags, a name (version 4), counts,
+ * positions, normals, texture coordinates and colours as the flags say, triangles. All is little endian.
  *
- * Failures: a table that leads out of the file, a stream that is damaged or ends too early, indices out of range, numbers that
- * are not finite. Counts are believed only as far as the compressed bytes could hold them.
+ * Failures: a table that leads out of the file, a stream that is damaged or ends too early, indices out of range,
+ * numbers that are not finite. Counts are believed only as far as the compressed bytes could hold them.
  */
 #include "common/base/liveness.h"
 #include "worker/shape/declare.h"
@@ -190,15 +190,16 @@ static int find_mesh(const struct stream *s, const struct asset *a, uint64_t ind
 		return file_error(s, "this is no serialized mesh");
 	uint64_t version = little(a->bytes + 2, 2);
 	if (version != VERSION_3 && version != VERSION_4)
-		return node_error(s->node, s->error, ENOTSUP, "%s: version %llu is not supported (supported: 3, 4)", s->name,
-				  (unsigned long long)version);
+		return node_error(s->node, s->error, ENOTSUP, "%s: version %llu is not supported (supported: 3, 4)",
+				  s->name, (unsigned long long)version);
 	uint64_t count = little(a->bytes + a->size - 4, 4);
 	int width = version == VERSION_3 ? 4 : 8;
 	if (count == 0 || count > (a->size - 4) / (uint64_t)width)
 		return file_error(s, "the table of meshes at its end is damaged");
 	if (index >= count)
-		return node_error(s->node, s->error, ERANGE, "%s: shape_index=%llu, but it holds %llu meshes, counted from 0",
-				  s->name, (unsigned long long)index, (unsigned long long)count);
+		return node_error(s->node, s->error, ERANGE,
+				  "%s: shape_index=%llu, but it holds %llu meshes, counted from 0", s->name,
+				  (unsigned long long)index, (unsigned long long)count);
 	size_t table = a->size - 4 - (size_t)count * (size_t)width;
 	uint64_t from = little(a->bytes + table + index * (size_t)width, width);
 	uint64_t to = index + 1 < count ? little(a->bytes + table + (index + 1) * (size_t)width, width) : table;

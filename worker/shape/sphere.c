@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A true sphere. What to_world scales unevenly is an ellipsoid: a mesh of 8 * 4^ELLIPSOID_LEVEL triangles with the ellipsoid's
- * own normals.
+ * A true sphere. What to_world scales unevenly is an ellipsoid: a mesh of 8 * 4^ELLIPSOID_LEVEL triangles with the
+ * ellipsoid's own normals.
  */
 #include "worker/shape/declare.h"
 #include "worker/shape/mesh.h"
@@ -29,20 +29,22 @@ static int check_extent(const struct sphere *s, const struct scene_node *n, stru
 {
 	if (s->radius > 0 && s->radius <= MESH_COORDINATE_MAX && vec3_length(s->center) <= MESH_COORDINATE_MAX)
 		return 0;
-	return node_error(n, e, ERANGE, "a sphere of radius %g around (%g, %g, %g)", s->radius, s->center.x, s->center.y,
-			  s->center.z);
+	return node_error(n, e, ERANGE, "a sphere of radius %g around (%g, %g, %g)", s->radius, s->center.x,
+			  s->center.y, s->center.z);
 }
 
 /* In object space: shape_build places the mesh. */
 static int make_ellipsoid(const struct scene_node *n, struct arena *arena, struct shape_geometry *out, struct error *e)
 {
-	const struct displacement flat = {.height = no_height, .is_constant = true, .level = ELLIPSOID_LEVEL, .tessellation = 1};
+	const struct displacement flat = {
+		.height = no_height, .is_constant = true, .level = ELLIPSOID_LEVEL, .tessellation = 1};
 	out->sphere.to_world = mat4_identity();
 	int r = check_extent(&out->sphere, n, e);
 	return r ? r : displace(out, &flat, arena, n, e);
 }
 
-static int make_sphere(const struct scene_node *n, const mat4 *m, double scale, vec3 x, vec3 z, struct sphere *s, struct error *e)
+static int make_sphere(const struct scene_node *n, const mat4 *m, double scale, vec3 x, vec3 z, struct sphere *s,
+		       struct error *e)
 {
 	s->center = mat4_point(m, s->center);
 	s->radius *= scale;
@@ -60,7 +62,8 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 {
 	(void)assets;
 	mat4 m = node_transform(n, "to_world");
-	vec3 x = {m.m[0][0], m.m[1][0], m.m[2][0]}, y = {m.m[0][1], m.m[1][1], m.m[2][1]}, z = {m.m[0][2], m.m[1][2], m.m[2][2]};
+	vec3 x = {m.m[0][0], m.m[1][0], m.m[2][0]}, y = {m.m[0][1], m.m[1][1], m.m[2][1]},
+	     z = {m.m[0][2], m.m[1][2], m.m[2][2]};
 	double lx = vec3_length(x), ly = vec3_length(y), lz = vec3_length(z), scale = cbrt(fabs(mat4_det3(m)));
 	double uneven = fmax(fabs(lx - scale), fmax(fabs(ly - scale), fabs(lz - scale)));
 	const struct property *center = node_find(n, "center");

@@ -159,19 +159,24 @@ static int color_from_table(const struct value *v, enum color_role role, struct 
 		return error_set(e, ENOMEM, "out of memory for a spectrum of %u values", n);
 	memcpy(copy, v->as.spectrum.nm, n * sizeof *copy);
 	memcpy(copy + n, v->as.spectrum.value, n * sizeof *copy);
-	*out = (struct color){.shape = COLOR_SHAPE_OTHER, .scale = 1, .count = n, .nm = copy, .value = copy + n,
+	*out = (struct color){.shape = COLOR_SHAPE_OTHER,
+			      .scale = 1,
+			      .count = n,
+			      .nm = copy,
+			      .value = copy + n,
 			      .zero_outside = role == COLOR_ILLUMINANT};
 	return 0;
 }
 
-int color_from_value(const struct value *v, enum color_role role, struct arena *arena, struct color *out, struct error *e)
+int color_from_value(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
+		     struct error *e)
 {
 	double x;
 	switch (v->type) {
 	case VALUE_RGB:
 		if (color_from_rgb(v->as.rgb, role, out))
-			return error_set(e, EINVAL, "rgb %g %g %g: must be within [0, %g]", v->as.rgb[0], v->as.rgb[1], v->as.rgb[2],
-					 role_max(role));
+			return error_set(e, EINVAL, "rgb %g %g %g: must be within [0, %g]", v->as.rgb[0], v->as.rgb[1],
+					 v->as.rgb[2], role_max(role));
 		return 0;
 	case VALUE_SPECTRUM:
 		if (v->as.spectrum.count > 1)
@@ -231,7 +236,8 @@ static inline spectrum eval_lanes(const struct color *c, const struct wavelength
 	if (c->sigmoid)
 		for (int i = 0; i < lanes; i++) {
 			double nm = w->nm[i];
-			s.v[i] *= upsample_sigmoid((c->coefficient[0] * nm + c->coefficient[1]) * nm + c->coefficient[2]);
+			s.v[i] *=
+				upsample_sigmoid((c->coefficient[0] * nm + c->coefficient[1]) * nm + c->coefficient[2]);
 		}
 	if (c->count)
 		for (int i = 0; i < lanes; i++)

@@ -19,22 +19,23 @@ enum color_shape { COLOR_SHAPE_CONSTANT, COLOR_SHAPE_D65, COLOR_SHAPE_OTHER };
 
 struct color {
 	enum color_shape shape;
-	double scale;           /* multiplies everything */
-	bool d65;               /* times D65 / its normalisation */
-	bool sigmoid;           /* times S(c0 x^2 + c1 x + c2), x = nm */
+	double scale; /* multiplies everything */
+	bool d65;     /* times D65 / its normalisation */
+	bool sigmoid; /* times S(c0 x^2 + c1 x + c2), x = nm */
 	double coefficient[3];
-	uint32_t count;         /* > 0: piecewise linear table instead; constant extension outside is 0 for emitters
-				   and the end value for others */
+	uint32_t count;		  /* > 0: piecewise linear table instead; constant extension outside is 0 for emitters
+				     and the end value for others */
 	const double *nm, *value; /* in the arena */
 	bool zero_outside;
 };
 
 /* value: one of VALUE_COLOR. Reflectances outside [0,1] are an error; negative values always are. */
-int color_from_value(const struct value *v, enum color_role role, struct arena *arena, struct color *out, struct error *e);
+int color_from_value(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
+		     struct error *e);
 int color_from_rgb(const double rgb[3], enum color_role role, struct color *out);
 struct color color_constant(double x);
 spectrum color_eval(const struct color *c, const struct wavelengths *w);
-double color_max(const struct color *c); /* upper bound over wavelengths */
+double color_max(const struct color *c);  /* upper bound over wavelengths */
 double color_mean(const struct color *c); /* over wavelengths as they are drawn, to choose among emitters */
 
 /* Fast reflectance of many rgb values (textures): from a table of coefficients made at build time. rgb in [0,1]. */

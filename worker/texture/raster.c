@@ -9,7 +9,8 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 	if (!name)
 		return node_error(n, e, EINVAL, "\"%s\" needs a filename", n->type);
 	if (gamma != 0 && gamma != 1 && gamma != -1)
-		return node_error(n, e, ENOTSUP, "gamma = %g is not supported; it can be 1 (linear) or -1 (sRGB)", gamma);
+		return node_error(n, e, ENOTSUP, "gamma = %g is not supported; it can be 1 (linear) or -1 (sRGB)",
+				  gamma);
 	struct error reason;
 	bool raw = node_bool(n, "raw", range->raw && gamma != -1);
 	int code = image_read(assets, name, gamma == 1 || raw, arena, &r->image, &reason);
@@ -18,7 +19,9 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 	size_t count = (size_t)r->image.width * r->image.height * r->image.channels;
 	for (size_t i = 0; i < count; i++) {
 		float x = r->image.pixels[i];
-		r->image.pixels[i] = (double)x < range->least ? (float)range->least : (double)x > range->largest ? (float)range->largest : x;
+		r->image.pixels[i] = (double)x < range->least	  ? (float)range->least
+				     : (double)x > range->largest ? (float)range->largest
+								  : x;
 	}
 	return 0;
 }

@@ -19,15 +19,18 @@ struct raster {
 
 struct raster_range {
 	double least, largest; /* pixels beyond are clamped */
-	bool raw;              /* integers are no sRGB, where the parameters raw and gamma do not say */
+	bool raw;	       /* integers are no sRGB, where the parameters raw and gamma do not say */
 };
 
 /* Reads the property `filename` of n, and the parameters raw and gamma. */
 int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
 		const struct raster_range *range, struct arena *arena, struct error *e);
-#define RASTER_PARAMS                                                                                                  \
-	{.name = "filename", .types = VALUE_STRING}, {.name = "raw", .types = VALUE_BOOL},                             \
-	{.name = "gamma", .types = VALUE_FLOAT | VALUE_INT, .min = -1, .max = 100}, {.name = "cache", .types = VALUE_BOOL, .status = PARAM_IGNORED}
+#define RASTER_PARAMS                                                                       \
+	{.name = "filename", .types = VALUE_STRING}, {.name = "raw", .types = VALUE_BOOL},  \
+		{.name = "gamma", .types = VALUE_FLOAT | VALUE_INT, .min = -1, .max = 100}, \
+	{                                                                                   \
+		.name = "cache", .types = VALUE_BOOL, .status = PARAM_IGNORED               \
+	}
 
 void raster_eval(const struct raster *r, double u, double v, double rgb[3]);
 void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3]);

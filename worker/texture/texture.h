@@ -14,11 +14,11 @@ struct texture;
 struct texture_ops {
 	const char *type;
 	const struct param *params;
-	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role, const struct asset_source *assets,
-		      bool dialect_3, struct arena *arena, struct error *e);
+	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role,
+		      const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e);
 	spectrum (*eval)(const struct texture *t, double u, double v, const struct wavelengths *w);
 	double (*height)(const struct texture *t, double u, double v); /* one made as COLOR_HEIGHT has nothing else */
-	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
+	double (*max)(const struct texture *t);			       /* upper bound over (u,v) and wavelengths */
 	enum color_shape (*shape)(const struct texture *t);
 };
 

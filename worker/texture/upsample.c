@@ -107,9 +107,8 @@ static void to_lab(const struct upsample *s, const double xyz[3], double lab[3],
 	lab[0] = 116 * f[1] - 16;
 	lab[1] = 500 * (f[0] - f[1]);
 	lab[2] = 200 * (f[1] - f[2]);
-	const double rows[3][3] = {{0, 116 * slope[1], 0},
-				   {500 * slope[0], -500 * slope[1], 0},
-				   {0, 200 * slope[1], -200 * slope[2]}};
+	const double rows[3][3] = {
+		{0, 116 * slope[1], 0}, {500 * slope[0], -500 * slope[1], 0}, {0, 200 * slope[1], -200 * slope[2]}};
 	for (int r = 0; r < 3; r++)
 		for (int k = 0; k < 3; k++)
 			d[r][k] = rows[r][k];
@@ -130,7 +129,8 @@ static double residual_of(const struct upsample *s, const double target[3], cons
 	for (int r = 0; r < 3; r++) {
 		residual[r] = lab[r] - target[r];
 		for (int k = 0; k < 3; k++)
-			jacobian[r][k] = by_xyz[r][0] * by_c[0][k] + by_xyz[r][1] * by_c[1][k] + by_xyz[r][2] * by_c[2][k];
+			jacobian[r][k] =
+				by_xyz[r][0] * by_c[0][k] + by_xyz[r][1] * by_c[1][k] + by_xyz[r][2] * by_c[2][k];
 	}
 	return norm3(residual);
 }
@@ -147,7 +147,8 @@ double upsample_fit(const struct upsample *s, const double rgb[3], double tolera
 	enum { ITERATIONS = 60 };
 	double xyz[3], target[3], unused[3][3];
 	for (int k = 0; k < 3; k++)
-		xyz[k] = s->xyz_from_rgb[k][0] * rgb[0] + s->xyz_from_rgb[k][1] * rgb[1] + s->xyz_from_rgb[k][2] * rgb[2];
+		xyz[k] = s->xyz_from_rgb[k][0] * rgb[0] + s->xyz_from_rgb[k][1] * rgb[1] +
+			 s->xyz_from_rgb[k][2] * rgb[2];
 	to_lab(s, xyz, target, unused);
 
 	double r[3], j[3][3], error = residual_of(s, target, c, r, j), damping = 1e-6;

@@ -12,7 +12,8 @@ struct uv_map {
 static inline struct uv_map uv_map_read(const struct scene_node *n)
 {
 	mat4 t = node_transform(n, "to_uv");
-	double both = node_float(n, "uvscale", 1), s[2] = {node_float(n, "uscale", both), node_float(n, "vscale", both)};
+	double both = node_float(n, "uvscale", 1),
+	       s[2] = {node_float(n, "uscale", both), node_float(n, "vscale", both)};
 	double o[2] = {node_float(n, "uoffset", 0), node_float(n, "voffset", 0)};
 	struct uv_map map;
 	for (int r = 0; r < 2; r++) {
@@ -31,9 +32,12 @@ static inline void uv_map_apply(const struct uv_map *map, double *u, double *v)
 }
 
 /* Offsets and factors that are larger leave no digit of (u,v). */
-#define UV_NUMBER(name_) {.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX}
-#define UV_PARAMS                                                                                                      \
-	{.name = "to_uv", .types = VALUE_TRANSFORM}, UV_NUMBER("uvscale"), UV_NUMBER("uscale"), UV_NUMBER("vscale"),    \
-	UV_NUMBER("uoffset"), UV_NUMBER("voffset")
+#define UV_NUMBER(name_)                                                                                   \
+	{                                                                                                  \
+		.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX \
+	}
+#define UV_PARAMS                                                                                                    \
+	{.name = "to_uv", .types = VALUE_TRANSFORM}, UV_NUMBER("uvscale"), UV_NUMBER("uscale"), UV_NUMBER("vscale"), \
+		UV_NUMBER("uoffset"), UV_NUMBER("voffset")
 
 #endif

@@ -70,8 +70,8 @@ static int read_shapes(struct builder *b)
 		crash_place("building the scene", s->objects[i]->file, s->objects[i]->line);
 		int rc = shape_build(s->objects[i], b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
 		if (!rc && b->forced.of[EFFECT_DISPLACEMENT] >= 0)
-			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3, w->accuracy.tessellation,
-						&b->scratch, b->e);
+			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3,
+						w->accuracy.tessellation, &b->scratch, b->e);
 		if (rc)
 			return rc;
 		b->shape_nodes[k] = s->objects[i];
@@ -85,8 +85,8 @@ static int read_shapes(struct builder *b)
 	return 0;
 }
 
-/* Points of a shape as large as the scene are off by a few 2^-53 of that. Where the smallest shape is a few thousand times as large
- * as these roundings integrators agree; at 2^-44 of the scene path and bdpt differed by 2 %. */
+/* Points of a shape as large as the scene are off by a few 2^-53 of that. Where the smallest shape is a few thousand
+ * times as large as these roundings integrators agree; at 2^-44 of the scene path and bdpt differed by 2 %. */
 #define LEAST_SCALE 0x1p-42
 
 static void note_scales(struct builder *b)
@@ -99,10 +99,12 @@ static void note_scales(struct builder *b)
 			large = i;
 	}
 	if (b->w->shape_count > 0 && box_extent(&b->boxes[small]) < LEAST_SCALE * box_extent(&b->all))
-		snprintf(b->w->scales, sizeof b->w->scales,
-			 "the %.24s in line %d is so much smaller than the scene, with the %.24s in line %d, that numbers are too short for both: what is "
-			 "seen of it can be wrong",
-			 b->shape_nodes[small]->type, b->shape_nodes[small]->line, b->shape_nodes[large]->type, b->shape_nodes[large]->line);
+		snprintf(
+			b->w->scales, sizeof b->w->scales,
+			"the %.24s in line %d is so much smaller than the scene, with the %.24s in line %d, that numbers are too short for both: what is "
+			"seen of it can be wrong",
+			b->shape_nodes[small]->type, b->shape_nodes[small]->line, b->shape_nodes[large]->type,
+			b->shape_nodes[large]->line);
 }
 
 static int rescale(struct builder *b)
@@ -149,8 +151,8 @@ static void put_float3(float out[3], vec3 v)
 	out[2] = (float)v.z;
 }
 
-/* Keeps the triangles that still have an area in float, wound so that their normal agrees with the vertex normals. Those of a
- * displaced shape are left as they are: where one overhangs, its outside is still its neighbours'. */
+/* Keeps the triangles that still have an area in float, wound so that their normal agrees with the vertex normals.
+ * Those of a displaced shape are left as they are: where one overhangs, its outside is still its neighbours'. */
 static uint32_t take_triangles(struct geom_shape *g, const struct mesh *m, bool displaced)
 {
 	uint32_t kept = 0;
@@ -162,7 +164,8 @@ static uint32_t take_triangles(struct geom_shape *g, const struct mesh *m, bool 
 			continue;
 		bool turn = false;
 		if (g->normal && !displaced) {
-			vec3 sum = vec3_add(float3(g->normal[t[0]]), vec3_add(float3(g->normal[t[1]]), float3(g->normal[t[2]])));
+			vec3 sum = vec3_add(float3(g->normal[t[0]]),
+					    vec3_add(float3(g->normal[t[1]]), float3(g->normal[t[2]])));
 			turn = vec3_dot(sum, n) < 0;
 		}
 		g->index[kept][0] = t[0];
@@ -356,8 +359,8 @@ static int choose_emitters(struct builder *b)
 	return 0;
 }
 
-/* The colour that the grey value 1 stands for: the common illuminant's, as an emitter of rgb 1 or of a constant 1 has it.
- * By the midpoint rule; the density with which wavelengths are drawn cancels. */
+/* The colour that the grey value 1 stands for: the common illuminant's, as an emitter of rgb 1 or of a constant 1 has
+ * it. By the midpoint rule; the density with which wavelengths are drawn cancels. */
 static void set_grey(struct world *w)
 {
 	for (int i = 0; i < 3; i++)
@@ -454,8 +457,8 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 	return rc;
 }
 
-int world_new(struct world **out, const struct scene *s, const struct asset_source *assets, const struct render_options *o,
-	      struct error *e)
+int world_new(struct world **out, const struct scene *s, const struct asset_source *assets,
+	      const struct render_options *o, struct error *e)
 {
 	return new_world(out, true, s, assets, o, e);
 }

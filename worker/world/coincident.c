@@ -69,17 +69,22 @@ static void say(struct render_coincident *out, const struct coincide_shapes *c, 
 		return;
 	out->count++;
 	if (c->hidden == c->by) {
-		snprintf(text, sizeof out->text[0], "triangles of %s coincide: only the first of them is there", name_of(nodes[c->hidden], hidden));
+		snprintf(text, sizeof out->text[0], "triangles of %s coincide: only the first of them is there",
+			 name_of(nodes[c->hidden], hidden));
 	} else {
 		bool refract = s[c->hidden].rank == SURFACE_TRANSMITS && s[c->by].rank == SURFACE_TRANSMITS;
-		snprintf(text, sizeof out->text[0], "%s and %s coincide: where they overlap only the latter is there, because it %s%s",
-			 name_of(nodes[c->hidden], hidden), name_of(nodes[c->by], by), reason(s[c->hidden].rank, s[c->by].rank),
-			 refract ? "; where two media touch, one surface with the int_ior and ext_ior of both is meant" : "");
+		snprintf(text, sizeof out->text[0],
+			 "%s and %s coincide: where they overlap only the latter is there, because it %s%s",
+			 name_of(nodes[c->hidden], hidden), name_of(nodes[c->by], by),
+			 reason(s[c->hidden].rank, s[c->by].rank),
+			 refract ? "; where two media touch, one surface with the int_ior and ext_ior of both is meant"
+				 : "");
 	}
 	text_clean(text);
 }
 
-int coincident_find(struct world *w, const struct scene_node *const *nodes, const struct accel_shape *shapes, struct error *e)
+int coincident_find(struct world *w, const struct scene_node *const *nodes, const struct accel_shape *shapes,
+		    struct error *e)
 {
 	int rc = coincide_find(&w->coincidence, shapes, w->shape_count, e);
 	const struct coincidence *c = w->coincidence;

@@ -18,17 +18,25 @@ int displacement_apply(struct shape_geometry *g, const struct scene_node *shape,
 		       bool dialect_3, double tessellation, struct arena *arena, struct error *e)
 {
 	if (!displacement_of(shape)) {
-		const char *lonely = node_find(shape, "displacement_scale") ? "displacement_scale" : "displacement_level";
-		return node_find(shape, lonely) ? node_error(shape, e, EINVAL, "%s without a texture named displacement", lonely) : 0;
+		const char *lonely =
+			node_find(shape, "displacement_scale") ? "displacement_scale" : "displacement_level";
+		return node_find(shape, lonely)
+			       ? node_error(shape, e, EINVAL, "%s without a texture named displacement", lonely)
+			       : 0;
 	}
 	if (!node_find(shape, "displacement_level"))
-		return node_error(shape, e, EINVAL, "displacement needs displacement_level, 0 to %d: each triangle becomes 4^level",
+		return node_error(shape, e, EINVAL,
+				  "displacement needs displacement_level, 0 to %d: each triangle becomes 4^level",
 				  DISPLACE_LEVEL_MAX);
 	struct arena picture = {0};
 	struct texture t;
 	int rc = texture_from_node(&t, shape, "displacement", 0, COLOR_HEIGHT, assets, dialect_3, &picture, e);
-	struct displacement d = {height, &t, texture_is_constant(&t), node_float(shape, "displacement_scale", 1),
-				 (uint32_t)node_int(shape, "displacement_level", 0), tessellation};
+	struct displacement d = {height,
+				 &t,
+				 texture_is_constant(&t),
+				 node_float(shape, "displacement_scale", 1),
+				 (uint32_t)node_int(shape, "displacement_level", 0),
+				 tessellation};
 	if (!rc)
 		rc = displace(g, &d, arena, shape, e);
 	arena_fini(&picture);

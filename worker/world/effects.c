@@ -24,7 +24,8 @@ static void count(struct tally *t, const struct scene_node *n, const char *namel
 	else if (n->id)
 		snprintf(t->first, sizeof t->first, "`%.40s`", n->id);
 	else
-		snprintf(t->first, sizeof t->first, "the %.24s%s in line %d", n->type, n->cls == PLUGIN_EMITTER ? " emitter" : "", n->line);
+		snprintf(t->first, sizeof t->first, "the %.24s%s in line %d", n->type,
+			 n->cls == PLUGIN_EMITTER ? " emitter" : "", n->line);
 }
 
 /* "`glass1`", "`glass1` and 2 more" */
@@ -44,7 +45,8 @@ static const char *verb(const struct tally *t, const char *one, const char *many
 
 struct census {
 	struct tally specular, glossy, diffuse, transmission, textured, coloured, dispersive, constant_eta;
-	struct tally hidden_specular, hidden_dispersive, unused_dispersive; /* of those that no path meets; that no shape uses */
+	struct tally hidden_specular, hidden_dispersive,
+		unused_dispersive; /* of those that no path meets; that no shape uses */
 	struct tally environment, area, delta, textured_light, coloured_light;
 	enum visibility_bounds why_hidden;
 	size_t shape[3];
@@ -149,7 +151,8 @@ struct report {
 };
 
 /* The line of an effect that the scene calls for or not; returns whether it is on after all. */
-__attribute__((format(printf, 4, 5))) static bool line(struct report *r, enum effect which, bool called, const char *why, ...)
+__attribute__((format(printf, 4, 5))) static bool line(struct report *r, enum effect which, bool called,
+						       const char *why, ...)
 {
 	const struct effect_decl *d = &effect_table[which];
 	int force = r->forced->of[which];
@@ -184,17 +187,21 @@ static void colour(struct report *r, const struct census *c)
 {
 	struct effects *fx = r->fx;
 	char text[96];
-	bool one_shape = c->shape[COLOR_SHAPE_OTHER] == 0 && (!c->shape[COLOR_SHAPE_CONSTANT] || !c->shape[COLOR_SHAPE_D65]);
+	bool one_shape =
+		c->shape[COLOR_SHAPE_OTHER] == 0 && (!c->shape[COLOR_SHAPE_CONSTANT] || !c->shape[COLOR_SHAPE_D65]);
 	bool called = c->coloured.count > 0 || !one_shape;
 	fx->illuminant = c->shape[COLOR_SHAPE_CONSTANT] ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_D65;
 	if (c->coloured.count)
-		fx->colour = line(r, EFFECT_COLOUR, called, "%s var%s with wavelength", who(&c->coloured, text), verb(&c->coloured, "ies", "y"));
+		fx->colour = line(r, EFFECT_COLOUR, called, "%s var%s with wavelength", who(&c->coloured, text),
+				  verb(&c->coloured, "ies", "y"));
 	else if (c->coloured_light.count)
-		fx->colour = line(r, EFFECT_COLOUR, called, "the light of %s is coloured", who(&c->coloured_light, text));
+		fx->colour =
+			line(r, EFFECT_COLOUR, called, "the light of %s is coloured", who(&c->coloured_light, text));
 	else if (!one_shape)
 		fx->colour = line(r, EFFECT_COLOUR, called, "the emitters differ in spectrum");
 	else
-		fx->colour = line(r, EFFECT_COLOUR, called, "all materials are grey and all emitters have one spectrum");
+		fx->colour =
+			line(r, EFFECT_COLOUR, called, "all materials are grey and all emitters have one spectrum");
 }
 
 /* Needed by another effect that is forced on. */
@@ -211,15 +218,21 @@ static void dispersion(struct report *r, const struct census *c)
 {
 	char text[96];
 	bool called = c->dispersive.count > 0, on;
-	const struct tally *t = called ? &c->dispersive : c->hidden_dispersive.count ? &c->hidden_dispersive
-			      : c->unused_dispersive.count ? &c->unused_dispersive : &c->constant_eta;
+	const struct tally *t = called			     ? &c->dispersive
+				: c->hidden_dispersive.count ? &c->hidden_dispersive
+				: c->unused_dispersive.count ? &c->unused_dispersive
+							     : &c->constant_eta;
 	const char *name = t->count ? who(t, text) : "";
 	if (called)
-		on = line(r, EFFECT_DISPERSION, true, "the index of %s varies with wavelength: paths that meet %s carry one", name, verb(t, "it", "them"));
+		on = line(r, EFFECT_DISPERSION, true,
+			  "the index of %s varies with wavelength: paths that meet %s carry one", name,
+			  verb(t, "it", "them"));
 	else if (t == &c->hidden_dispersive)
-		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but %s", name, verb(t, "s", ""), hidden_because(c->why_hidden));
+		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but %s", name, verb(t, "s", ""),
+			  hidden_because(c->why_hidden));
 	else if (t == &c->unused_dispersive)
-		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but no shape uses %s", name, verb(t, "s", ""), verb(t, "it", "them"));
+		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but no shape uses %s", name, verb(t, "s", ""),
+			  verb(t, "it", "them"));
 	else if (t->count)
 		on = line(r, EFFECT_DISPERSION, false, "%s %s constant eta", name, verb(t, "has", "have"));
 	else
@@ -230,7 +243,8 @@ static void dispersion(struct report *r, const struct census *c)
 static void spectral(struct report *r, const struct census *c)
 {
 	colour(r, c);
-	bool wavelength = line(r, EFFECT_WAVELENGTH, r->fx->colour, r->fx->colour ? "paths carry wavelengths" : "paths carry no wavelength");
+	bool wavelength = line(r, EFFECT_WAVELENGTH, r->fx->colour,
+			       r->fx->colour ? "paths carry wavelengths" : "paths carry no wavelength");
 	dispersion(r, c);
 	if (wavelength)
 		force_colour(r, "wavelength");
@@ -239,7 +253,8 @@ static void spectral(struct report *r, const struct census *c)
 }
 
 /* The line of materials that have something, or "no material ...". */
-static bool materials(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many, const char *none)
+static bool materials(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
+		      const char *none)
 {
 	char text[96];
 	if (t->count)
@@ -256,20 +271,25 @@ static void lobes(struct report *r, const struct census *c)
 		fx->specular = line(r, EFFECT_SPECULAR, false, "%s %s specular, but %s", who(&c->hidden_specular, text),
 				    verb(&c->hidden_specular, "is", "are"), hidden_because(c->why_hidden));
 	} else {
-		fx->specular = materials(r, EFFECT_SPECULAR, &c->specular, "has exactly specular lobes", "have exactly specular lobes",
-					 "has exactly specular lobes");
+		fx->specular = materials(r, EFFECT_SPECULAR, &c->specular, "has exactly specular lobes",
+					 "have exactly specular lobes", "has exactly specular lobes");
 	}
-	fx->glossy = materials(r, EFFECT_GLOSSY, &c->glossy, "has rough lobes of finite width", "have rough lobes of finite width",
-			       "has rough lobes of finite width");
+	fx->glossy = materials(r, EFFECT_GLOSSY, &c->glossy, "has rough lobes of finite width",
+			       "have rough lobes of finite width", "has rough lobes of finite width");
 	size_t end = fx->line_count;
 	fx->line_count = (size_t)(at - fx->lines);
 	bool called = fx->specular || fx->glossy;
-	fx->half_vectors = line(r, EFFECT_HALF_VECTORS, called, called ? "lobes are narrow: %s" : "no lobe is narrow: %s",
-				fx->specular && fx->glossy ? "specular and glossy" : fx->specular ? "specular" : fx->glossy ? "glossy"
-				: "a path that is traced and joined is as likely to carry light");
+	fx->half_vectors =
+		line(r, EFFECT_HALF_VECTORS, called, called ? "lobes are narrow: %s" : "no lobe is narrow: %s",
+		     fx->specular && fx->glossy ? "specular and glossy"
+		     : fx->specular		? "specular"
+		     : fx->glossy		? "glossy"
+						: "a path that is traced and joined is as likely to carry light");
 	fx->line_count = end;
-	fx->diffuse = materials(r, EFFECT_DIFFUSE, &c->diffuse, "scatters diffusely only", "scatter diffusely only", "is diffuse only");
-	fx->transmission = materials(r, EFFECT_TRANSMISSION, &c->transmission, "lets light through", "let light through", "lets it through");
+	fx->diffuse = materials(r, EFFECT_DIFFUSE, &c->diffuse, "scatters diffusely only", "scatter diffusely only",
+				"is diffuse only");
+	fx->transmission = materials(r, EFFECT_TRANSMISSION, &c->transmission, "lets light through",
+				     "let light through", "lets it through");
 }
 
 static void surfaces(struct report *r, const struct census *c, const struct world *w, const struct effects_source *src)
@@ -277,10 +297,11 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 	char text[96], more[96];
 	struct effects *fx = r->fx;
 	if (c->textured.count && c->textured_light.count)
-		fx->textures = line(r, EFFECT_TEXTURES, true, "%s and, of emitters, %s are textured", who(&c->textured, text),
-				    who(&c->textured_light, more));
+		fx->textures = line(r, EFFECT_TEXTURES, true, "%s and, of emitters, %s are textured",
+				    who(&c->textured, text), who(&c->textured_light, more));
 	else if (c->textured.count + c->textured_light.count)
-		fx->textures = line(r, EFFECT_TEXTURES, true, "textured: %s", who(c->textured.count ? &c->textured : &c->textured_light, text));
+		fx->textures = line(r, EFFECT_TEXTURES, true, "textured: %s",
+				    who(c->textured.count ? &c->textured : &c->textured_light, text));
 	else
 		fx->textures = line(r, EFFECT_TEXTURES, false, "no material and no emitter has a texture");
 	struct tally t = {0};
@@ -309,10 +330,12 @@ static void surfaces(struct report *r, const struct census *c, const struct worl
 		line(r, EFFECT_COINCIDENCE, false, "no surfaces lie in one place");
 }
 
-static bool lights(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many, const char *none)
+static bool lights(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
+		   const char *none)
 {
 	char text[96];
-	return t->count ? line(r, which, true, "%s %s", who(t, text), verb(t, one, many)) : line(r, which, false, "%s", none);
+	return t->count ? line(r, which, true, "%s %s", who(t, text), verb(t, one, many))
+			: line(r, which, false, "%s", none);
 }
 
 static void emitter_moves(struct report *r, const struct census *c)
@@ -321,25 +344,31 @@ static void emitter_moves(struct report *r, const struct census *c)
 	bool called = c->area.count + c->environment.count > 0;
 	if (called)
 		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, true, "%s %s many points or directions",
-		     who(c->area.count ? &c->area : &c->environment, text), verb(c->area.count ? &c->area : &c->environment, "has", "have"));
+					   who(c->area.count ? &c->area : &c->environment, text),
+					   verb(c->area.count ? &c->area : &c->environment, "has", "have"));
 	else
-		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, false, c->delta.count ? "all emitters are single points or directions" : "nothing shines");
+		r->fx->emitter_move =
+			line(r, EFFECT_EMITTER_MOVE, false,
+			     c->delta.count ? "all emitters are single points or directions" : "nothing shines");
 }
 
-static void depth(struct report *r, const struct world *w, const struct effects_source *src, const enum visibility_bounds *shape)
+static void depth(struct report *r, const struct world *w, const struct effects_source *src,
+		  const enum visibility_bounds *shape)
 {
-	uint32_t asked = src->max_depth ? src->max_depth : w->settings.max_depth, bound = visibility_bounds_depth(w, shape);
+	uint32_t asked = src->max_depth ? src->max_depth : w->settings.max_depth,
+		 bound = visibility_bounds_depth(w, shape);
 	uint32_t useful = bound < asked ? bound : asked;
 	bool on;
 	if (useful < asked)
-		on = line(r, EFFECT_DEPTH, false, "of %u edges that paths may have %u can carry light: %s", asked, useful,
-			  useful == 1 ? "nothing scatters" : "all that scatters lies in one plane");
+		on = line(r, EFFECT_DEPTH, false, "of %u edges that paths may have %u can carry light: %s", asked,
+			  useful, useful == 1 ? "nothing scatters" : "all that scatters lies in one plane");
 	else
 		on = line(r, EFFECT_DEPTH, true, "paths of up to %u edges can carry light", asked);
 	r->fx->max_depth = on ? asked : useful;
 }
 
-void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced, enum visibility_bounds *shape)
+void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced,
+		     enum visibility_bounds *shape)
 {
 	struct effects *fx = &w->effects;
 	*fx = (struct effects){.line_count = 0};
@@ -348,17 +377,20 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 	struct report r = {fx, forced};
 	spectral(&r, &c);
 	if (w->settings.aperture_radius > 0)
-		fx->aperture = line(&r, EFFECT_APERTURE, true, "a lens of radius %g, focused at a distance of %g", w->settings.aperture_radius,
-				    w->settings.focus_distance);
+		fx->aperture = line(&r, EFFECT_APERTURE, true, "a lens of radius %g, focused at a distance of %g",
+				    w->settings.aperture_radius, w->settings.focus_distance);
 	else
 		fx->aperture = line(&r, EFFECT_APERTURE, false, "the sensor is a pinhole");
 	emitter_moves(&r, &c);
 	lobes(&r, &c);
 	surfaces(&r, &c, w, src);
-	fx->environment = lights(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on all that escapes", "", "rays that escape meet nothing");
-	fx->area_light = lights(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces", "no surface shines");
-	fx->delta_light = lights(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
-				 "are points or parallel light, which no path hits by chance",
-				 "no emitter is a point or parallel light");
+	fx->environment = lights(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on all that escapes", "",
+				 "rays that escape meet nothing");
+	fx->area_light = lights(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces",
+				"no surface shines");
+	fx->delta_light =
+		lights(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
+		       "are points or parallel light, which no path hits by chance",
+		       "no emitter is a point or parallel light");
 	depth(&r, w, src, shape);
 }

@@ -15,7 +15,7 @@
 
 enum effect {
 	EFFECT_COLOUR,
-	EFFECT_WAVELENGTH,   /* the mutation of that name */
+	EFFECT_WAVELENGTH, /* the mutation of that name */
 	EFFECT_DISPERSION,
 	EFFECT_APERTURE,
 	EFFECT_EMITTER_MOVE, /* x_0 moves on its emitter */
@@ -38,7 +38,11 @@ enum effect {
 };
 
 /* What may be forced of an effect. */
-enum { EFFECT_MAY_FORCE_ON = 1, EFFECT_MAY_FORCE_OFF = 2, EFFECT_OF_THE_SCENE = 4 /* forced off, the image is another one */ };
+enum {
+	EFFECT_MAY_FORCE_ON = 1,
+	EFFECT_MAY_FORCE_OFF = 2,
+	EFFECT_OF_THE_SCENE = 4 /* forced off, the image is another one */
+};
 
 struct effect_decl {
 	const char *name;
@@ -53,17 +57,19 @@ struct effects_choice {
 	signed char of[EFFECTS];
 	bool any_on;
 };
-/* "", "all", "-dispersion,+aperture", "all,-glossy". -EINVAL with a sentence, which names the nearest where a name is none. */
+/* "", "all", "-dispersion,+aperture", "all,-glossy". -EINVAL with a sentence, which names the nearest where a name is
+ * none. */
 int effects_parse(const char *text, struct effects_choice *out, struct error *e);
 /* The same choice always as the same text. */
 void effects_print(const struct effects_choice *c, char text[PLAN_EFFECTS_MAX]);
 
 struct effects {
-	bool colour;      /* off: no wavelengths are drawn, one grey value stands for the common illuminant's shape */
-	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light, delta_light;
+	bool colour; /* off: no wavelengths are drawn, one grey value stands for the common illuminant's shape */
+	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light,
+		delta_light;
 	bool displacement, half_vectors, emitter_move;
 	enum color_shape illuminant; /* of all emitters, when colour is off */
-	uint32_t max_depth; /* edges of the longest path that can carry light, at most the scene's */
+	uint32_t max_depth;	     /* edges of the longest path that can carry light, at most the scene's */
 	struct effect_line lines[RENDER_EFFECTS_MAX];
 	size_t line_count;
 };
@@ -74,8 +80,8 @@ struct world;
 struct effects_source {
 	const struct scene *scene;
 	const struct scene_node *const *shape, *const *bsdf; /* one a shape; one a BSDF, NULL: the default one */
-	const struct scene_node *const *emitter;              /* one an emitter */
-	uint32_t max_depth;                                   /* asked for; 0: the scene's */
+	const struct scene_node *const *emitter;	     /* one an emitter */
+	uint32_t max_depth;				     /* asked for; 0: the scene's */
 };
 
 /* Whether a path between camera and light can meet a shape; why not. */
@@ -87,8 +93,10 @@ enum visibility_bounds {
 };
 
 /* Fills w->effects from shapes, BSDFs and emitters, and shape[] (one a shape, see reach.h). */
-void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced, enum visibility_bounds *shape);
+void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced,
+		     enum visibility_bounds *shape);
 /* Leaves out of the world what no path meets and what was switched off. */
-int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape, struct error *e);
+int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape,
+		  struct error *e);
 
 #endif

@@ -18,7 +18,8 @@ static bool is_switched_off(const struct emitter *em, const struct effects_choic
 	return forced->of[which] < 0;
 }
 
-/* What no path meets, in the way of none: nothing of it is asked for. Not where something is forced on: that may be of it. */
+/* What no path meets, in the way of none: nothing of it is asked for. Not where something is forced on: that may be of
+ * it. */
 static void leave_out(struct world *w, const enum visibility_bounds *shape)
 {
 	uint32_t black = w->bsdf_count++; /* there is room for one more than shapes */
@@ -43,7 +44,8 @@ static unsigned lobes_without(const struct bsdf *b, const struct effects_choice 
 	return without;
 }
 
-int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape, struct error *e)
+int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape,
+		  struct error *e)
 {
 	if (!forced->any_on)
 		leave_out(w, shape);

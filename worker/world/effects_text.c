@@ -12,21 +12,31 @@ const struct effect_decl effect_table[EFFECTS] = {
 	[EFFECT_COLOUR] = {"colour", ON, "no wavelengths are drawn, carried or stored; colours are plain numbers",
 			   "a coloured scene has no grey values that would stand for its colours"},
 	[EFFECT_WAVELENGTH] = {"wavelength", ON | OFF, "no proposal is spent on the wavelength", NULL},
-	[EFFECT_DISPERSION] = {"dispersion", ON | SCENE,
-			       "four wavelengths travel together: 4x fewer paths for a colour; no walk and no derivatives when one changes", NULL},
-	[EFFECT_APERTURE] = {"aperture", ON | SCENE, "no lens mutation; no points on the aperture are drawn or moved", NULL},
+	[EFFECT_DISPERSION] =
+		{"dispersion", ON | SCENE,
+		 "four wavelengths travel together: 4x fewer paths for a colour; no walk and no derivatives when one changes",
+		 NULL},
+	[EFFECT_APERTURE] = {"aperture", ON | SCENE, "no lens mutation; no points on the aperture are drawn or moved",
+			     NULL},
 	[EFFECT_EMITTER_MOVE] = {"emitter-move", ON | OFF, "no mutation moves the point on the emitter", NULL},
-	[EFFECT_HALF_VECTORS] = {"half-vectors", ON | OFF, "no walks, no derivatives, no step sizes: paths are traced and joined", NULL},
-	[EFFECT_SPECULAR] = {"specular", ON | SCENE, "no exactly specular chains; without glossy lobes no half vectors either", NULL},
+	[EFFECT_HALF_VECTORS] = {"half-vectors", ON | OFF,
+				 "no walks, no derivatives, no step sizes: paths are traced and joined", NULL},
+	[EFFECT_SPECULAR] = {"specular", ON | SCENE,
+			     "no exactly specular chains; without glossy lobes no half vectors either", NULL},
 	[EFFECT_GLOSSY] = {"glossy", ON | SCENE, "no microfacets; without specular lobes no half vectors either", NULL},
 	[EFFECT_DIFFUSE] = {"diffuse", ON | SCENE, "nothing: only paths that meet such a surface pay", NULL},
 	[EFFECT_TRANSMISSION] = {"transmission", ON | SCENE, "nothing: only paths that meet such a surface pay", NULL},
-	[EFFECT_TEXTURES] = {"textures", ON, "colours are constants: no look-ups by (u,v)", "without its textures a scene has no colours"},
-	[EFFECT_DISPLACEMENT] = {"displacement", ON | SCENE, "no finer meshes are made: time and memory of building", NULL},
+	[EFFECT_TEXTURES] = {"textures", ON, "colours are constants: no look-ups by (u,v)",
+			     "without its textures a scene has no colours"},
+	[EFFECT_DISPLACEMENT] = {"displacement", ON | SCENE, "no finer meshes are made: time and memory of building",
+				 NULL},
 	[EFFECT_BUMP] = {"bump", 0, "normals are the mesh's", "the scene language here has no bump or normal maps"},
-	[EFFECT_ALPHA] = {"alpha", 0, "no ray asks for opacity: one filter less in Embree", "the scene language here has no masks"},
-	[EFFECT_COINCIDENCE] = {"coincidence", 0, "no ray asks which of two surfaces is there", "surfaces coincide or they do not"},
-	[EFFECT_INSTANCING] = {"instancing", 0, "no transforms between rays and meshes", "the scene language here has no instances"},
+	[EFFECT_ALPHA] = {"alpha", 0, "no ray asks for opacity: one filter less in Embree",
+			  "the scene language here has no masks"},
+	[EFFECT_COINCIDENCE] = {"coincidence", 0, "no ray asks which of two surfaces is there",
+				"surfaces coincide or they do not"},
+	[EFFECT_INSTANCING] = {"instancing", 0, "no transforms between rays and meshes",
+			       "the scene language here has no instances"},
 	[EFFECT_ENVIRONMENT] = {"environment", ON | SCENE, "rays that escape end there", NULL},
 	[EFFECT_AREA_LIGHT] = {"area-light", ON | SCENE, "nothing: only paths that end on one pay", NULL},
 	[EFFECT_DELTA_LIGHT] = {"delta-light", ON | SCENE, "nothing: only paths that end on one pay", NULL},
@@ -37,7 +47,8 @@ const struct effect_decl effect_table[EFFECTS] = {
 static enum effect find(const char *name, size_t length)
 {
 	int i = 0;
-	while (i < EFFECTS && (strlen(effect_table[i].name) != length || memcmp(effect_table[i].name, name, length) != 0))
+	while (i < EFFECTS &&
+	       (strlen(effect_table[i].name) != length || memcmp(effect_table[i].name, name, length) != 0))
 		i++;
 	return (enum effect)i;
 }
@@ -51,7 +62,8 @@ static int unknown(const char *name, size_t length, struct error *e)
 		spelling_offer(&s, effect_table[i].name);
 		spelling_list(list, sizeof list, effect_table[i].name);
 	}
-	return error_set(e, EINVAL, "no effect is called '%s'%s; there are %s", wanted, spelling_hint(&s, hint, sizeof hint), list);
+	return error_set(e, EINVAL, "no effect is called '%s'%s; there are %s", wanted,
+			 spelling_hint(&s, hint, sizeof hint), list);
 }
 
 static int take(const char *item, size_t length, struct effects_choice *out, struct error *e)
@@ -63,7 +75,8 @@ static int take(const char *item, size_t length, struct effects_choice *out, str
 		return 0;
 	}
 	if (length < 2 || (*item != '+' && *item != '-'))
-		return error_set(e, EINVAL, "'%.*s': effects are forced by all, +NAME or -NAME, with commas between", (int)length, item);
+		return error_set(e, EINVAL, "'%.*s': effects are forced by all, +NAME or -NAME, with commas between",
+				 (int)length, item);
 	enum effect which = find(item + 1, length - 1);
 	if (which == EFFECTS)
 		return unknown(item + 1, length - 1, e);
@@ -104,8 +117,8 @@ void effects_print(const struct effects_choice *c, char text[PLAN_EFFECTS_MAX])
 	size_t used = (size_t)snprintf(text, PLAN_EFFECTS_MAX, "%s", all ? "all" : "");
 	for (int i = 0; i < EFFECTS && used < PLAN_EFFECTS_MAX; i++)
 		if (c->of[i] < 0 || (c->of[i] > 0 && !all))
-			used += (size_t)snprintf(text + used, PLAN_EFFECTS_MAX - used, "%s%c%s", used ? "," : "", c->of[i] < 0 ? '-' : '+',
-						 effect_table[i].name);
+			used += (size_t)snprintf(text + used, PLAN_EFFECTS_MAX - used, "%s%c%s", used ? "," : "",
+						 c->of[i] < 0 ? '-' : '+', effect_table[i].name);
 }
 
 int render_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct error *e)
@@ -124,8 +137,8 @@ void render_effects_note(const struct render_summary *scene, char *text, size_t 
 	for (size_t i = 0; i < scene->line_count && used < size; i++) {
 		const struct effect_line *l = &scene->lines[i];
 		if (l->other_scene)
-			used += (size_t)snprintf(text + used, size - used, "%s%s", used ? ", " : "the image is of another scene: without ",
-						 l->name);
+			used += (size_t)snprintf(text + used, size - used, "%s%s",
+						 used ? ", " : "the image is of another scene: without ", l->name);
 	}
 }
 

@@ -54,14 +54,16 @@ static double farthest(const struct geom_shape *g, vec3 from)
 	return sqrt(far2);
 }
 
-/* Convex, closed, and light does not get through. An ellipsoid is, too, but its mesh is looked at triangle by triangle. */
+/* Convex, closed, and light does not get through. An ellipsoid is, too, but its mesh is looked at triangle by triangle.
+ */
 static bool is_container(const struct world *w, const struct scene_node *node, uint32_t shape)
 {
 	bool convex = strcmp(node->type, "cube") == 0 || w->shapes[shape].is_sphere;
 	return convex && !displacement_of(node) && !(w->bsdfs[w->parts[shape].bsdf].modes & BSDF_TRANSMIT);
 }
 
-/* No path from the camera begins within: all of it lies deeper than the near plane, or behind the camera and its aperture. */
+/* No path from the camera begins within: all of it lies deeper than the near plane, or behind the camera and its
+ * aperture. */
 static bool camera_is_outside(const struct world *w, const struct geom_shape *g)
 {
 	const struct camera *c = &w->camera;
@@ -106,7 +108,8 @@ bool visibility_bounds_emitter(const struct world *w, const enum visibility_boun
 	return w->emitters[emitter].power > 0 && (on == UINT32_MAX || shape[on] != VISIBILITY_ENCLOSED);
 }
 
-void visibility_bounds_shapes(const struct world *w, const struct scene_node *const *nodes, uint32_t max_depth, enum visibility_bounds *shape)
+void visibility_bounds_shapes(const struct world *w, const struct scene_node *const *nodes, uint32_t max_depth,
+			      enum visibility_bounds *shape)
 {
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		shape[i] = VISIBILITY_YES;

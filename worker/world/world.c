@@ -22,8 +22,12 @@ int32_t world_pick_emitter(const struct world *w, double u)
 
 void world_summary(const struct world *w, struct render_summary *out)
 {
-	*out = (struct render_summary){.settings = w->settings, .useful_depth = w->effects.max_depth, .line_count = w->effects.line_count, .shapes = w->shape_count,
-				       .brightest = world_brightest(w), .coincident = w->coincident};
+	*out = (struct render_summary){.settings = w->settings,
+				       .useful_depth = w->effects.max_depth,
+				       .line_count = w->effects.line_count,
+				       .shapes = w->shape_count,
+				       .brightest = world_brightest(w),
+				       .coincident = w->coincident};
 	memcpy(out->scales, w->scales, sizeof out->scales);
 	memcpy(out->lines, w->effects.lines, sizeof out->lines);
 	for (uint32_t i = 0; i < w->shape_count; i++)

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The world that all threads share: built once from a description, immutable then. Lengths are rescaled in double by a
- * power of two so that the scene's radius lies in (1/2, 1], and moved so that its box is centred, or what is small in a scene of
- * mixed scales (origin.h): floats begin after that.
+ * power of two so that the scene's radius lies in (1/2, 1], and moved so that its box is centred, or what is small in a
+ * scene of mixed scales (origin.h): floats begin after that.
  */
 #ifndef WORKER_WORLD_WORLD_H
 #define WORKER_WORLD_WORLD_H
@@ -30,18 +30,18 @@ struct world {
 	struct world_shape *parts; /* one a shape */
 	struct bsdf *bsdfs;
 	struct emitter *emitters;
-	uint32_t *emitter_shape; /* on which it lies; UINT32_MAX: on none */
-	double *emitter_pdf, *emitter_cdf; /* choice among emitters by power */
-	int32_t environment;               /* index of the emitter that escaping rays meet; -1: none */
-	double grey_xyz[3];                /* CIE XYZ of grey value 1 */
-	struct coincidence *coincidence; /* of surfaces; NULL: none */
+	uint32_t *emitter_shape;	     /* on which it lies; UINT32_MAX: on none */
+	double *emitter_pdf, *emitter_cdf;   /* choice among emitters by power */
+	int32_t environment;		     /* index of the emitter that escaping rays meet; -1: none */
+	double grey_xyz[3];		     /* CIE XYZ of grey value 1 */
+	struct coincidence *coincidence;     /* of surfaces; NULL: none */
 	struct render_coincident coincident; /* what there is to say of it */
-	char scales[256];                    /* of shapes that are too small beside others; "": nothing */
+	char scales[256];		     /* of shapes that are too small beside others; "": nothing */
 	struct accel *accel;
 };
 
-/* Asked while rendering. -DHSLT_PLAIN makes a renderer that knows nothing of colour, dispersion and apertures: what asking costs
- * where they are off is measured against it (tests/bench/effects.c). */
+/* Asked while rendering. -DHSLT_PLAIN makes a renderer that knows nothing of colour, dispersion and apertures: what
+ * asking costs where they are off is measured against it (tests/bench/effects.c). */
 #ifdef HSLT_PLAIN
 #define EFFECT_IS_ON(w, effect) ((void)(w), false)
 #else

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* CRC-32C by whatever way this processor has, against one bit after the other, at every length and alignment of a word. */
+/* CRC-32C by whatever way this processor has, against one bit after the other, at every length and alignment of a word.
+ */
 #include "common/base/crc.h"
 
 #include <setjmp.h>

@@ -50,6 +50,7 @@ static void time_that_stands_still(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(a_rush_is_cut), cmocka_unit_test(a_trickle_passes), cmocka_unit_test(time_that_stands_still)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(a_rush_is_cut), cmocka_unit_test(a_trickle_passes),
+					   cmocka_unit_test(time_that_stands_still)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

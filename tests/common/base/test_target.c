@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Where paths lead that a program writes to, and what is there afterwards: files are replaced, links and devices stay. */
+/* Where paths lead that a program writes to, and what is there afterwards: files are replaced, links and devices stay.
+ */
 #include "common/base/target.h"
 #include "common/film/image_file.h"
 

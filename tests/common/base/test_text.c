@@ -109,11 +109,12 @@ static void figures_read_well(void **state)
 	static const struct {
 		double x;
 		const char *text;
-	} numbers[] = {{0, "0"},	 {12.4, "12"},	    {999.4, "999"},	{999.6, "1.00 k"}, {1234, "1.23 k"},
+	} numbers[] = {{0, "0"},	  {12.4, "12"},	     {999.4, "999"},  {999.6, "1.00 k"}, {1234, "1.23 k"},
 		       {99900, "99.9 k"}, {123456, "123 k"}, {5e6, "5.00 M"}, {2e12, "2.00 T"}},
 	  times[] = {{0, "0 s"}, {0.2, "1 s"}, {59, "59 s"}, {61, "1:01"}, {3600, "1:00:00"}, {36061, "10:01:01"}},
-	  spans[] = {{0, "0.0 s"},     {4.46, "4.5 s"}, {31, "31 s"},	     {119, "119 s"}, {180, "3.0 min"},	{3600, "60 min"},
-		     {8000, "2.2 h"}, {2e6, "23 days"}, {1e8, "3.2 years"}, {1e15, "for ever"}, {HUGE_VAL, "for ever"}};
+	  spans[] = {{0, "0.0 s"},	 {4.46, "4.5 s"},    {31, "31 s"},	    {119, "119 s"},
+		     {180, "3.0 min"},	 {3600, "60 min"},   {8000, "2.2 h"},	    {2e6, "23 days"},
+		     {1e8, "3.2 years"}, {1e15, "for ever"}, {HUGE_VAL, "for ever"}};
 	char text[32];
 	for (size_t i = 0; i < sizeof numbers / sizeof *numbers; i++) {
 		progress_number(numbers[i].x, text, sizeof text);
@@ -135,10 +136,19 @@ static void test_counts_with_units(void **state)
 	static const struct {
 		const char *text;
 		uint64_t count;
-	} good[] = {{"0", 0}, {"17", 17}, {"1.5k", 1500}, {"2K", 2000}, {"0.25M", 250000}, {"3G", 3000000000u}, {".5k", 500},
-		    {"18446744073709551615", UINT64_MAX}, {"9007199254740993", 9007199254740993u}};
-	static const char *const bad[] = {"", "k", "1.5", "1.2345k", "-1", "+1", " 1", "1 ", "1kk", "1m", "1e400", "nan", "inf", "0x10k",
-					  "18446744073709551616", "1e30G"};
+	} good[] = {{"0", 0},
+		    {"17", 17},
+		    {"1.5k", 1500},
+		    {"2K", 2000},
+		    {"0.25M", 250000},
+		    {"3G", 3000000000u},
+		    {".5k", 500},
+		    {"18446744073709551615", UINT64_MAX},
+		    {"9007199254740993", 9007199254740993u}};
+	static const char *const bad[] = {"",	   "k",	  "1.5", "1.2345k", "-1",
+					  "+1",	   " 1",  "1 ",	 "1kk",	    "1m",
+					  "1e400", "nan", "inf", "0x10k",   "18446744073709551616",
+					  "1e30G"};
 	uint64_t n;
 	for (size_t i = 0; i < sizeof good / sizeof *good; i++)
 		if (!text_count(good[i].text, &n) || n != good[i].count)
@@ -168,12 +178,9 @@ static void test_times_with_units(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_counts_with_units),
-		cmocka_unit_test(test_times_with_units),
-		cmocka_unit_test(buffers_keep_their_limit),
-		cmocka_unit_test(texts_are_cut_between_characters),
-		cmocka_unit_test(texts_are_made_clean),
-		cmocka_unit_test(values_cannot_forge_a_line),
+		cmocka_unit_test(test_counts_with_units),   cmocka_unit_test(test_times_with_units),
+		cmocka_unit_test(buffers_keep_their_limit), cmocka_unit_test(texts_are_cut_between_characters),
+		cmocka_unit_test(texts_are_made_clean),	    cmocka_unit_test(values_cannot_forge_a_line),
 		cmocka_unit_test(figures_read_well),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

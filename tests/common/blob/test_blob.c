@@ -232,7 +232,8 @@ static void a_disk_that_fails(void **state)
 	assert_int_equal(rc, -EIO);
 }
 
-/* Any byte of it: it is noticed, kept beside, no more given out; writing it again mends it, and who held it holds it still. */
+/* Any byte of it: it is noticed, kept beside, no more given out; writing it again mends it, and who held it holds it
+ * still. */
 static void damaged_at_rest(void **state)
 {
 	(void)state;

@@ -2,13 +2,13 @@
 /*
  * b's standard error, on independent samples whose law is known: 100 bootstraps each of 16 groups of 4,096 samples.
  *
- *   finite    of a Pareto law of index 3 and an exponential one the error is stated in at least 95 of 100, and b +- 2.131 errors (Student's
- *             t, 15 degrees) holds the mean in at least 85 of 100. Level: a true coverage of 94 % gives less with a probability of
- *             6e-4. Power: of errors that are too small by 2 (coverage 68 %) more than 99.9 % are found.
- *   infinite  of indices 1.5 and 1.1 it is not stated, with the reason, in at least 95 of 100: the index by 128 samples has an error
- *             of 9 %, so that one of 1.5 is taken for 2 or more once in 400. What it would have stated is printed: it holds the mean in 82
- *             and 36 of 100.
- *   words     header and reason; where few samples carry light; after the films were saved and read again.
+ *   finite    of a Pareto law of index 3 and an exponential one the error is stated in at least 95 of 100, and b
+ * +- 2.131 errors (Student's t, 15 degrees) holds the mean in at least 85 of 100. Level: a true coverage of 94 % gives
+ * less with a probability of 6e-4. Power: of errors that are too small by 2 (coverage 68 %) more than 99.9 % are found.
+ *   infinite  of indices 1.5 and 1.1 it is not stated, with the reason, in at least 95 of 100: the index by 128 samples
+ * has an error of 9 %, so that one of 1.5 is taken for 2 or more once in 400. What it would have stated is printed: it
+ * holds the mean in 82 and 36 of 100. words     header and reason; where few samples carry light; after the films were
+ * saved and read again.
  */
 #include "common/base/mem.h"
 #include "common/film/canvas_save.h"
@@ -29,9 +29,20 @@
 
 enum { GROUPS = 16, SAMPLES = 4096, TIMES = 100 };
 
-static const struct plan plan = {.integrator = "hslt", .kind = PLAN_CHAINS, .width = 4, .height = 4, .crop_width = 4, .crop_height = 4,
-				 .groups = GROUPS, .parts = 1, .chains = GROUPS, .epoch = 1, .bootstrap = GROUPS * SAMPLES,
-				 .rounds = UINT64_MAX, .seconds = 1, .max_depth = 8};
+static const struct plan plan = {.integrator = "hslt",
+				 .kind = PLAN_CHAINS,
+				 .width = 4,
+				 .height = 4,
+				 .crop_width = 4,
+				 .crop_height = 4,
+				 .groups = GROUPS,
+				 .parts = 1,
+				 .chains = GROUPS,
+				 .epoch = 1,
+				 .bootstrap = GROUPS * SAMPLES,
+				 .rounds = UINT64_MAX,
+				 .seconds = 1,
+				 .max_depth = 8};
 
 typedef double law(struct dice *d, double index);
 
@@ -109,7 +120,8 @@ static struct found try_law(const char *name, law *of, double index, double mean
 static void a_finite_variance_has_an_error_that_holds(void **state)
 {
 	(void)state;
-	struct found f[] = {try_law("b error, pareto 3", pareto, 3, 1.5), try_law("b error, exponential", exponential, 0, 1)};
+	struct found f[] = {try_law("b error, pareto 3", pareto, 3, 1.5),
+			    try_law("b error, exponential", exponential, 0, 1)};
 	for (int i = 0; i < 2; i++) {
 		assert_in_range(f[i].stated, 95, TIMES);
 		assert_in_range(f[i].held, 85, TIMES);
@@ -119,7 +131,8 @@ static void a_finite_variance_has_an_error_that_holds(void **state)
 static void an_infinite_one_has_none(void **state)
 {
 	(void)state;
-	struct found f[] = {try_law("b error, pareto 1.5", pareto, 1.5, 3), try_law("b error, pareto 1.1", pareto, 1.1, 11)};
+	struct found f[] = {try_law("b error, pareto 1.5", pareto, 1.5, 3),
+			    try_law("b error, pareto 1.1", pareto, 1.1, 11)};
 	for (int i = 0; i < 2; i++)
 		assert_in_range(f[i].stated, 0, TIMES - 95);
 }

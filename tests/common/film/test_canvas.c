@@ -33,9 +33,20 @@ static double normal(void)
 
 static struct plan make_plan(enum plan_kind kind, uint32_t width, uint32_t height, uint32_t groups, uint32_t parts)
 {
-	struct plan p = {.integrator = "path", .kind = kind, .width = width + 3, .height = height + 2, .crop_x = 3, .crop_y = 2,
-			 .crop_width = width, .crop_height = height, .groups = groups, .parts = parts, .epoch = 4,
-			 .rounds = UINT64_MAX, .seconds = 1, .max_depth = 8};
+	struct plan p = {.integrator = "path",
+			 .kind = kind,
+			 .width = width + 3,
+			 .height = height + 2,
+			 .crop_x = 3,
+			 .crop_y = 2,
+			 .crop_width = width,
+			 .crop_height = height,
+			 .groups = groups,
+			 .parts = parts,
+			 .epoch = 4,
+			 .rounds = UINT64_MAX,
+			 .seconds = 1,
+			 .max_depth = 8};
 	p.bootstrap = (uint64_t)groups * parts * 8;
 	if (kind == PLAN_CHAINS)
 		p.chains = groups * parts * 2;
@@ -54,7 +65,8 @@ static struct batch make_batch(const struct plan *p, uint64_t epoch, uint32_t gr
 		uint32_t x = i % across * TILE_SIZE, y = i / across * TILE_SIZE;
 		uint32_t w = p->crop_width - x < TILE_SIZE ? p->crop_width - x : TILE_SIZE;
 		uint32_t h = p->crop_height - y < TILE_SIZE ? p->crop_height - y : TILE_SIZE;
-		b.tiles[i] = (struct tile){p->crop_x + x, p->crop_y + y, w, h, mem_alloc((size_t)w * h * 3, sizeof(float))};
+		b.tiles[i] =
+			(struct tile){p->crop_x + x, p->crop_y + y, w, h, mem_alloc((size_t)w * h * 3, sizeof(float))};
 		for (size_t k = 0; k < (size_t)w * h * 3; k++)
 			b.tiles[i].xyz[k] = value();
 	}
@@ -115,7 +127,8 @@ static void bits_do_not_depend_on_the_order(void **unused)
 			uint32_t order[2 * LEASES];
 			for (uint32_t i = 0; i < 2 * LEASES; i++) {
 				state = 1000003u * (uint32_t)(pair * 2 * LEASES + (int)i + 1);
-				batches[i] = make_batch(&p, (uint64_t)pair * 2 + i / LEASES, i % 16, i / 16 % 4, 1, wide_value);
+				batches[i] = make_batch(&p, (uint64_t)pair * 2 + i / LEASES, i % 16, i / 16 % 4, 1,
+							wide_value);
 				order[i] = i;
 			}
 			state = (uint64_t)(77 + live_job_seed * 1000 + pair);
@@ -177,7 +190,8 @@ static void a_sum_beyond_the_grid_adds_nothing(void **unused)
 	assert_int_equal(canvas_rounds(c), rounds);
 	assert_int_equal(canvas_image(c, false, &after, NULL), 0);
 	assert_memory_equal(before.rgb, after.rgb, 100 * 70 * 3 * sizeof(float));
-	/* The same lease with values that fit is still welcome, and so the bits are those of a run without the bad one. */
+	/* The same lease with values that fit is still welcome, and so the bits are those of a run without the bad one.
+	 */
 	b = make_batch(&p, rounds, 0, 0, 4, one);
 	assert_int_equal(canvas_add(c, &b, NULL), 0);
 	batch_fini(&b);
@@ -250,8 +264,8 @@ static void only_complete_rounds_are_published(void **unused)
 	canvas_free(c);
 }
 
-/* Chains: the group's image by the group's b, the published one by the pooled b, independent samples of the bootstrap and of
- * complete rounds only. */
+/* Chains: the group's image by the group's b, the published one by the pooled b, independent samples of the bootstrap
+ * and of complete rounds only. */
 static void chains_are_scaled_by_b(void **unused)
 {
 	(void)unused;
@@ -260,7 +274,8 @@ static void chains_are_scaled_by_b(void **unused)
 	struct canvas_image img;
 	assert_int_equal(canvas_new(&c, &p, canvas_grid_exponent(&p, 1, 1), NULL, NULL), 0);
 	for (uint32_t g = 0; g < 2; g++) {
-		struct batch boot = {.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .independent_sum = g ? 24 : 16, .beyond_sum = 8};
+		struct batch boot = {
+			.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .independent_sum = g ? 24 : 16, .beyond_sum = 8};
 		boot.counters[COUNT_INDEPENDENT] = 8;
 		boot.counters[COUNT_SAMPLES] = 8;
 		assert_int_equal(canvas_add(c, &boot, NULL), 0);
@@ -314,11 +329,11 @@ static float noisy(void)
 	return (float)(4 * (1 + group_offset + pixel_noise * normal()));
 }
 
-/* 400 images with known true relMSE, 16 groups: the upper end is to lie above the truth in 95 % of the runs, the estimate's
- * mean is to be the truth. Level: an interval that covers 92 % or more (the Satterthwaite approximation is allowed as much)
- * fails the limit of 85 % with a probability below 1e-6; the mean of 400 estimates has a standard error of at most 1.8 %, so
- * 10 % off has a probability below 1e-7. Power: a coverage of 78 % (an interval forgotten gives about 50 %) is found with more
- * than 99.9 %. Errors common to all pixels are the hard case. */
+/* 400 images with known true relMSE, 16 groups: the upper end is to lie above the truth in 95 % of the runs, the
+ * estimate's mean is to be the truth. Level: an interval that covers 92 % or more (the Satterthwaite approximation is
+ * allowed as much) fails the limit of 85 % with a probability below 1e-6; the mean of 400 estimates has a standard
+ * error of at most 1.8 %, so 10 % off has a probability below 1e-7. Power: a coverage of 78 % (an interval forgotten
+ * gives about 50 %) is found with more than 99.9 %. Errors common to all pixels are the hard case. */
 static void estimated_error_covers_the_truth(void **unused)
 {
 	(void)unused;
@@ -327,8 +342,8 @@ static void estimated_error_covers_the_truth(void **unused)
 		double each = 0.08, truth = 0, mean_estimate = 0;
 		int covered = 0;
 		enum { RUNS = 400 };
-		/* The mean of 16 groups has a variance of each^2/16 per pixel, relative to B = 1, in X, Y and Z alike when
-		 * correlated; the expected relMSE is compared with (rgb - truth)^2 realised over the runs. */
+		/* The mean of 16 groups has a variance of each^2/16 per pixel, relative to B = 1, in X, Y and Z alike
+		 * when correlated; the expected relMSE is compared with (rgb - truth)^2 realised over the runs. */
 		for (int run = 0; run < RUNS; run++) {
 			struct canvas *c;
 			struct canvas_image img;
@@ -360,8 +375,8 @@ static void estimated_error_covers_the_truth(void **unused)
 			canvas_image_fini(&img);
 			canvas_free(c);
 		}
-		print_message("correlated %d: covered %d of %d, mean estimate / truth %.4f\n", correlated, covered, RUNS,
-			      mean_estimate / truth);
+		print_message("correlated %d: covered %d of %d, mean estimate / truth %.4f\n", correlated, covered,
+			      RUNS, mean_estimate / truth);
 		assert_true(covered >= 340);
 		assert_true(fabs(mean_estimate / truth - 1) < 0.1);
 	}
@@ -417,11 +432,13 @@ static void values_are_rounded_to_the_grid(void **unused)
 	}
 }
 
-/* The mean over groups of the blocks is the image's, where the groups have as many samples; each group's b stands for its share. */
+/* The mean over groups of the blocks is the image's, where the groups have as many samples; each group's b stands for
+ * its share. */
 static void blocks_of_groups_make_the_image(void **unused)
 {
 	(void)unused;
-	static const double weight[3] = {0.644463186, 1.191920259, 1.202916555}; /* X+Y+Z of Rec. 709's red, green, blue */
+	static const double weight[3] = {0.644463186, 1.191920259,
+					 1.202916555}; /* X+Y+Z of Rec. 709's red, green, blue */
 	for (int kind = PLAN_SAMPLES; kind <= PLAN_CHAINS; kind++) {
 		struct plan p = make_plan((enum plan_kind)kind, 100, 70, 4, 1);
 		struct canvas *c;
@@ -453,7 +470,8 @@ static void blocks_of_groups_make_the_image(void **unused)
 			for (uint32_t y = y0; y < y1; y++)
 				for (uint32_t x = x0; x < x1; x++)
 					for (uint32_t i = 0; i < 3; i++)
-						mean += weight[i] * (double)img.rgb[(y * 100 + x) * 3 + i] / ((x1 - x0) * (y1 - y0));
+						mean += weight[i] * (double)img.rgb[(y * 100 + x) * 3 + i] /
+							((x1 - x0) * (y1 - y0));
 			if (!(fabs(sum[k] / mean - 1) < 1e-6))
 				fail_msg("kind %d, block %u: %.9g is not %.9g", kind, k, sum[k], mean);
 		}
@@ -468,7 +486,8 @@ static float nearly_one(void)
 	return (float)(1 + 0.02 * uniform());
 }
 
-/* A group's distance over any weights, from nothing but what was put into its film; their sum is that of the squared errors. */
+/* A group's distance over any weights, from nothing but what was put into its film; their sum is that of the squared
+ * errors. */
 static void distances_of_groups_are_the_errors(void **unused)
 {
 	(void)unused;
@@ -489,15 +508,20 @@ static void distances_of_groups_are_the_errors(void **unused)
 			b.independent_sum = (1 + 0.01 * g) * (double)p.epoch;
 			double scale = 1 / (double)p.epoch;
 			if (kind == PLAN_CHAINS) {
-				struct batch boot = {.key = {1, LEASE_BOOTSTRAP, g, 0, 0}, .independent_sum = 8 * (1 - 0.02 * g)};
+				struct batch boot = {.key = {1, LEASE_BOOTSTRAP, g, 0, 0},
+						     .independent_sum = 8 * (1 - 0.02 * g)};
 				boot.counters[COUNT_INDEPENDENT] = boot.counters[COUNT_SAMPLES] = 8;
 				assert_int_equal(canvas_add(c, &boot, NULL), 0);
-				scale = (b.independent_sum + boot.independent_sum) / (double)(8 + p.epoch) / (double)b.counters[COUNT_SAMPLES];
+				scale = (b.independent_sum + boot.independent_sum) / (double)(8 + p.epoch) /
+					(double)b.counters[COUNT_SAMPLES];
 			}
 			for (size_t t = 0; t < 4; t++)
 				for (size_t i = 0; i < (size_t)b.tiles[t].width * b.tiles[t].height * 9; i++) {
-					size_t pixel = i / 9, x = b.tiles[t].x - 3 + pixel % b.tiles[t].width, y = b.tiles[t].y - 2 + pixel / b.tiles[t].width;
-					rgb[g][(y * 100 + x) * 3 + i / 3 % 3] += scale * rgb_of_xyz[i / 3 % 3][i % 3] * (double)b.tiles[t].xyz[3 * pixel + i % 3];
+					size_t pixel = i / 9, x = b.tiles[t].x - 3 + pixel % b.tiles[t].width,
+					       y = b.tiles[t].y - 2 + pixel / b.tiles[t].width;
+					rgb[g][(y * 100 + x) * 3 + i / 3 % 3] +=
+						scale * rgb_of_xyz[i / 3 % 3][i % 3] *
+						(double)b.tiles[t].xyz[3 * pixel + i % 3];
 				}
 			assert_int_equal(canvas_add(c, &b, NULL), 0);
 			batch_fini(&b);
@@ -561,13 +585,27 @@ static void a_pixel_of_one_lease_is_bounded(void **unused)
 	const enum plan_kind kinds[] = {PLAN_CHAINS, PLAN_SAMPLES};
 	for (int i = 0; i < 2; i++) {
 		bool chains = kinds[i] == PLAN_CHAINS;
-		struct plan p = {.kind = kinds[i], .integrator = "hslt", .width = 64, .height = 64, .crop_width = 64, .crop_height = 64,
-				 .groups = 1, .parts = 1, .chains = chains ? 1 : 0, .bootstrap = 8, .epoch = 10, .rounds = 1000, .max_depth = 8};
+		struct plan p = {.kind = kinds[i],
+				 .integrator = "hslt",
+				 .width = 64,
+				 .height = 64,
+				 .crop_width = 64,
+				 .crop_height = 64,
+				 .groups = 1,
+				 .parts = 1,
+				 .chains = chains ? 1 : 0,
+				 .bootstrap = 8,
+				 .epoch = 10,
+				 .rounds = 1000,
+				 .max_depth = 8};
 		struct canvas *c;
 		struct error e;
 		float *xyz = mem_alloc(64 * 64 * TILE_CHANNELS, sizeof *xyz);
 		struct tile tile = {0, 0, 64, 64, xyz};
-		struct batch b = {.key = {1, LEASE_RENDER, 0, 0, 0}, .tile_count = 1, .tiles = &tile, .counters = {[COUNT_SAMPLES] = 10}};
+		struct batch b = {.key = {1, LEASE_RENDER, 0, 0, 0},
+				  .tile_count = 1,
+				  .tiles = &tile,
+				  .counters = {[COUNT_SAMPLES] = 10}};
 		assert_int_equal(canvas_new(&c, &p, -30, NULL, NULL), 0);
 		float most = chains ? 0x1p14f * 10 : 0x1p29f; /* quantum 2^-30, sums below 2^62 of them */
 		xyz[77] = most;

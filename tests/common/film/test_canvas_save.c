@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A canvas that was saved and loaded goes on with the same bits, wherever between two batches it was saved; so does one of which batches
- * are taken back and replaced. */
+/* A canvas that was saved and loaded goes on with the same bits, wherever between two batches it was saved; so does one
+ * of which batches are taken back and replaced. */
 #include "common/film/canvas_save.h"
 
 #include "common/base/mem.h"
@@ -37,8 +37,18 @@ static double uniform(void)
 
 static struct plan make_plan(enum plan_kind kind)
 {
-	struct plan p = {.integrator = "path", .kind = kind, .width = WIDTH, .height = HEIGHT, .crop_width = WIDTH, .crop_height = HEIGHT,
-			 .groups = GROUPS, .parts = PARTS, .epoch = 4, .rounds = UINT64_MAX, .seconds = 1, .max_depth = 8};
+	struct plan p = {.integrator = "path",
+			 .kind = kind,
+			 .width = WIDTH,
+			 .height = HEIGHT,
+			 .crop_width = WIDTH,
+			 .crop_height = HEIGHT,
+			 .groups = GROUPS,
+			 .parts = PARTS,
+			 .epoch = 4,
+			 .rounds = UINT64_MAX,
+			 .seconds = 1,
+			 .max_depth = 8};
 	p.bootstrap = GROUPS * PARTS * 8;
 	if (kind == PLAN_CHAINS)
 		p.chains = GROUPS * PARTS * 2;
@@ -46,7 +56,8 @@ static struct plan make_plan(enum plan_kind kind)
 }
 
 /* Every field that a canvas looks at; some tiles, and no more than the film has. */
-static struct batch make_batch(const struct plan *p, enum lease_kind kind, uint64_t epoch, uint32_t group, uint32_t part)
+static struct batch make_batch(const struct plan *p, enum lease_kind kind, uint64_t epoch, uint32_t group,
+			       uint32_t part)
 {
 	struct batch b = {.key = {1, kind, group, part, epoch}};
 	uint32_t across = (WIDTH + TILE_SIZE - 1) / TILE_SIZE, down = (HEIGHT + TILE_SIZE - 1) / TILE_SIZE;
@@ -54,7 +65,8 @@ static struct batch make_batch(const struct plan *p, enum lease_kind kind, uint6
 	b.tiles = mem_alloc((size_t)across * down, sizeof *b.tiles);
 	for (uint32_t i = 0; kind == LEASE_RENDER && i < across * down; i++) {
 		uint32_t x = i % across * TILE_SIZE, y = i / across * TILE_SIZE;
-		uint32_t w = WIDTH - x < TILE_SIZE ? WIDTH - x : TILE_SIZE, h = HEIGHT - y < TILE_SIZE ? HEIGHT - y : TILE_SIZE;
+		uint32_t w = WIDTH - x < TILE_SIZE ? WIDTH - x : TILE_SIZE,
+			 h = HEIGHT - y < TILE_SIZE ? HEIGHT - y : TILE_SIZE;
 		if (next() % 3 == 0 || i == 4) /* the fifth tile is never touched */
 			continue;
 		struct tile *t = &b.tiles[b.tile_count++];
@@ -76,7 +88,8 @@ static struct batch make_batch(const struct plan *p, enum lease_kind kind, uint6
 	return b;
 }
 
-static void add(struct canvas *c, const struct plan *p, enum lease_kind kind, uint64_t epoch, uint32_t group, uint32_t part)
+static void add(struct canvas *c, const struct plan *p, enum lease_kind kind, uint64_t epoch, uint32_t group,
+		uint32_t part)
 {
 	struct batch b = make_batch(p, kind, epoch, group, part);
 	struct error e;
@@ -229,8 +242,8 @@ static bool all_right(const struct canvas *c, const uint64_t *done, const uint64
 	return canvas_rounds(c) == ROUNDS && canvas_missing(c) == 0;
 }
 
-/* A batch is wrong in two of three cases at first; up to two of a lease are, one after the other, and noticed later, when their rounds
- * may be complete. */
+/* A batch is wrong in two of three cases at first; up to two of a lease are, one after the other, and noticed later,
+ * when their rounds may be complete. */
 static void what_is_taken_back_leaves_nothing(void **unused)
 {
 	(void)unused;

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What makes chains disagree, from synthetic images: each criterion alone, on both sides of its limit, and its words. */
+/* What makes chains disagree, from synthetic images: each criterion alone, on both sides of its limit, and its words.
+ */
 #include "common/film/convergence.h"
 
 #include "common/base/mem.h"
@@ -26,10 +27,27 @@ struct fixture {
 static void make(struct fixture *f)
 {
 	memset(f, 0, sizeof *f);
-	f->plan = (struct plan){.kind = PLAN_CHAINS, .width = 400, .height = 400, .crop_x = 7, .crop_y = 11, .crop_width = 256,
-				.crop_height = 320, .groups = 16, .parts = 1, .chains = 64, .epoch = 1000};
-	f->img = (struct canvas_image){.width = 256, .height = 320, .rounds = 20, .samples = 64 * 20 * 1000, .b = 2, .tiles_across = ACROSS,
-				       .tiles_down = DOWN, .r_hat = f->r_hat, .tile_error = f->tile_error, .tile_share = f->tile_share};
+	f->plan = (struct plan){.kind = PLAN_CHAINS,
+				.width = 400,
+				.height = 400,
+				.crop_x = 7,
+				.crop_y = 11,
+				.crop_width = 256,
+				.crop_height = 320,
+				.groups = 16,
+				.parts = 1,
+				.chains = 64,
+				.epoch = 1000};
+	f->img = (struct canvas_image){.width = 256,
+				       .height = 320,
+				       .rounds = 20,
+				       .samples = 64 * 20 * 1000,
+				       .b = 2,
+				       .tiles_across = ACROSS,
+				       .tiles_down = DOWN,
+				       .r_hat = f->r_hat,
+				       .tile_error = f->tile_error,
+				       .tile_share = f->tile_share};
 	for (int i = 0; i < TILES; i++) {
 		f->r_hat[i] = 1 + 0.002F * (float)i;
 		f->tile_error[i] = 0.02F;
@@ -148,7 +166,8 @@ static void classes_that_differ(void **state)
 	struct fixture f;
 	struct convergence a;
 	make(&f);
-	struct path_class_energy *rough = &f.img.classes[path_class(4, PATH_ROUGH)], *both = &f.img.classes[path_class(4, PATH_BOTH)];
+	struct path_class_energy *rough = &f.img.classes[path_class(4, PATH_ROUGH)],
+				 *both = &f.img.classes[path_class(4, PATH_BOTH)];
 	/* 5 % of b too little; t of 15 degrees at 5e-6, two-sided, is 6.91. */
 	*rough = (struct path_class_energy){1.5, 0.01, 1.4, 0.01, -6.8};
 	assert_int_equal(judge(&f, &a), CHAINS_AGREE);
@@ -238,7 +257,8 @@ static void words_fit(void **state)
 	for (int i = 0; i < TILES; i++)
 		f.r_hat[i] = f.tile_error[i] = 123.456F;
 	for (int k = 0; k < PATH_CLASSES; k++)
-		f.img.classes[k] = (struct path_class_energy){1.23456789, 0.000123, 0.987654321e-1, 0.123456, -1234.5678};
+		f.img.classes[k] =
+			(struct path_class_energy){1.23456789, 0.000123, 0.987654321e-1, 0.123456, -1234.5678};
 	f.img.counts.counters[COUNT_STUCK] = 1234;
 	assert_int_equal(judge(&f, &a), CHAINS_DISAGREE);
 	says(&a, "in 20 of 20 tiles");
@@ -288,7 +308,8 @@ static void image_says_it(void **state)
 	f.r_hat[5] = NAN;
 	f.img.rgb = mem_alloc((size_t)f.img.width * f.img.height * 3, sizeof *f.img.rgb);
 	assert_non_null(f.img.rgb);
-	assert_int_equal(image_file_encode(&f.img, &f.plan, &(struct header_extra){.scene = "a.xml"}, &bytes, &size, &e), 0);
+	assert_int_equal(
+		image_file_encode(&f.img, &f.plan, &(struct header_extra){.scene = "a.xml"}, &bytes, &size, &e), 0);
 	assert_int_equal(exr_read(bytes, size, &x, &e), 0);
 	assert_int_equal(x.channel_count, 4);
 	while (strcmp(x.names[plane], "rhat.Y") != 0)
@@ -307,7 +328,8 @@ static void image_says_it(void **state)
 	mem_free(bytes);
 	f.plan.kind = PLAN_SAMPLES;
 	f.img.r_hat = NULL;
-	assert_int_equal(image_file_encode(&f.img, &f.plan, &(struct header_extra){.scene = "a.xml"}, &bytes, &size, &e), 0);
+	assert_int_equal(
+		image_file_encode(&f.img, &f.plan, &(struct header_extra){.scene = "a.xml"}, &bytes, &size, &e), 0);
 	assert_int_equal(exr_read(bytes, size, &x, &e), 0);
 	assert_int_equal(x.channel_count, 3);
 	assert_null(attribute(&x, "hslt:agreement"));
@@ -319,10 +341,16 @@ static void image_says_it(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(tails_of_student),  cmocka_unit_test(all_is_well),
-		cmocka_unit_test(medians),           cmocka_unit_test(tiles_that_have_not_mixed),
-		cmocka_unit_test(classes_that_differ), cmocka_unit_test(groups_that_are_apart), cmocka_unit_test(chains_that_stand_still),
-		cmocka_unit_test(samples_agree),     cmocka_unit_test(words_fit),         cmocka_unit_test(image_says_it),
+		cmocka_unit_test(tails_of_student),
+		cmocka_unit_test(all_is_well),
+		cmocka_unit_test(medians),
+		cmocka_unit_test(tiles_that_have_not_mixed),
+		cmocka_unit_test(classes_that_differ),
+		cmocka_unit_test(groups_that_are_apart),
+		cmocka_unit_test(chains_that_stand_still),
+		cmocka_unit_test(samples_agree),
+		cmocka_unit_test(words_fit),
+		cmocka_unit_test(image_says_it),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -28,7 +28,8 @@ static double random_double(int lowest, int highest)
 static void sum_of_one_value_is_the_value(void **unused)
 {
 	(void)unused;
-	const double special[] = {0, 1, -1, DBL_MIN, -DBL_MIN, 0x1p-1074, -0x1p-1074, DBL_MAX, -DBL_MAX, 0x1.fffffffffffffp-1023};
+	const double special[] = {0,	     1,		 -1,	  DBL_MIN,  -DBL_MIN,
+				  0x1p-1074, -0x1p-1074, DBL_MAX, -DBL_MAX, 0x1.fffffffffffffp-1023};
 	for (size_t i = 0; i < sizeof special / sizeof *special; i++) {
 		struct exact_sum s = {0};
 		assert_true(exact_sum_add(&s, special[i]));
@@ -123,7 +124,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(sum_of_one_value_is_the_value),
-		cmocka_unit_test(large_values_cancel), cmocka_unit_test(carries_go_all_the_way),
+		cmocka_unit_test(large_values_cancel),
+		cmocka_unit_test(carries_go_all_the_way),
 		cmocka_unit_test(rounds_once_to_nearest_even),
 		cmocka_unit_test(small_sums_agree_with_long_integers),
 		cmocka_unit_test(order_and_grouping_do_not_matter),

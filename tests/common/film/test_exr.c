@@ -30,7 +30,8 @@ static struct tile make_tile(uint32_t x, uint32_t y, uint32_t w, uint32_t h)
 static void tiles_come_back_bit_for_bit(void **unused)
 {
 	(void)unused;
-	const uint32_t shapes[][4] = {{0, 0, 64, 64}, {64, 64, 64, 64}, {192, 128, 8, 22}, {199, 149, 1, 1}, {3, 7, 64, 1}};
+	const uint32_t shapes[][4] = {
+		{0, 0, 64, 64}, {64, 64, 64, 64}, {192, 128, 8, 22}, {199, 149, 1, 1}, {3, 7, 64, 1}};
 	for (size_t i = 0; i < sizeof shapes / sizeof *shapes; i++) {
 		struct tile t = make_tile(shapes[i][0], shapes[i][1], shapes[i][2], shapes[i][3]), u;
 		unsigned char *bytes;
@@ -123,8 +124,15 @@ static struct exr_image make_image(uint32_t w, uint32_t h)
 		{"hslt:b", EXR_ATTRIBUTE_DOUBLE, NULL, 0.1, 0},
 		{"hslt:groups", EXR_ATTRIBUTE_INT, NULL, 0, 16},
 	};
-	struct exr_image img = {.width = w, .height = h, .channel_count = 6, .full_width = w + 7, .full_height = h + 5, .x = 3,
-				.y = 2, .attribute_count = 3, .attributes = attributes};
+	struct exr_image img = {.width = w,
+				.height = h,
+				.channel_count = 6,
+				.full_width = w + 7,
+				.full_height = h + 5,
+				.x = 3,
+				.y = 2,
+				.attribute_count = 3,
+				.attributes = attributes};
 	const char *const names[] = {"R", "G", "B", "error.R", "error.G", "error.B"};
 	for (size_t c = 0; c < 6; c++) {
 		snprintf(img.names[c], sizeof img.names[c], "%s", names[c]);
@@ -185,7 +193,8 @@ static void chunks_that_deflate_to_their_own_size_come_back(void **unused)
 {
 	(void)unused;
 	float plane[64 * 3];
-	struct exr_image img = {.width = 4, .height = 2, .channel_count = 1, .full_width = 4, .full_height = 2, .names = {"R"}};
+	struct exr_image img = {
+		.width = 4, .height = 2, .channel_count = 1, .full_width = 4, .full_height = 2, .names = {"R"}};
 	img.planes[0] = plane;
 	for (size_t i = 0; i < 8; i++)
 		plane[i] = (float)(i + 1);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Forecasts against renders played with exact chi-square statistics: groups whose pixels' deviations are Brownian in work.
- * Level: each share of intervals that hold is a binomial of 300 renders whose expectation is 0.93 or more (the prior of the
- * trend makes intervals wider than the noise alone); below 0.86 with less than 1e-6. Power: intervals of half the width hold
- * in 0.67 or less of the renders, a wrong law of work in none.
+ * Forecasts against renders played with exact chi-square statistics: groups whose pixels' deviations are Brownian in
+ * work. Level: each share of intervals that hold is a binomial of 300 renders whose expectation is 0.93 or more (the
+ * prior of the trend makes intervals wider than the noise alone); below 0.86 with less than 1e-6. Power: intervals of
+ * half the width hold in 0.67 or less of the renders, a wrong law of work in none.
  */
 #include "common/film/forecast_json.h"
 #include "common/film/merge.h"
@@ -40,7 +40,8 @@ static struct forecast_look look_at(struct walk *w, double work, struct dice *d)
 	double step = work - w->work, z = normal(d);
 	w->square += 2 * sqrt(w->square * step) * z + step * (z * z + chi_square(d, w->degrees - 1));
 	w->work = work;
-	struct forecast_look l = {.work = work, .cpu_seconds = 2e-6 * work * (1 + 0.01 * normal(d)), .degrees = w->degrees};
+	struct forecast_look l = {
+		.work = work, .cpu_seconds = 2e-6 * work * (1 + 0.01 * normal(d)), .degrees = w->degrees};
 	l.seconds = l.cpu_seconds / 2;
 	l.rel_mse = w->scale / work * w->square / (w->degrees * work);
 	l.rel_mse_upper = l.rel_mse * w->degrees / chi_square_5(w->degrees);
@@ -95,8 +96,8 @@ static void intervals_hold(void **state)
 			wide += log(c.work.high / c.work.low) / (double)runs;
 			off += log(c.work.middle / work) / (double)runs;
 		}
-		printf("%4.0f degrees: %.3f of the intervals hold, high over low %.2f, predicted over real %.3f\n", degrees[k],
-		       (double)held / (double)runs, exp(wide), exp(off));
+		printf("%4.0f degrees: %.3f of the intervals hold, high over low %.2f, predicted over real %.3f\n",
+		       degrees[k], (double)held / (double)runs, exp(wide), exp(off));
 		if (runs >= 300) /* fewer show that nothing breaks */
 			assert_true((double)held >= 0.86 * (double)runs);
 		assert_true(exp(wide) < (degrees[k] < 100 ? 16 : 4));
@@ -158,7 +159,8 @@ static void halving_costs_three_times_what_was_paid(void **state)
 	struct plan p = plan_of(64);
 	struct forecast_history h = {0};
 	for (double work = 1e5; work < 1e7; work *= 1.3)
-		forecast_add_look(&h, &(struct forecast_look){work, 1e-6 * work, 2e-6 * work, 1000 / work, 1050 / work, 3000, 0});
+		forecast_add_look(
+			&h, &(struct forecast_look){work, 1e-6 * work, 2e-6 * work, 1000 / work, 1050 / work, 3000, 0});
 	struct forecast_cost c;
 	struct forecast_range error;
 	const struct forecast_look *end = &h.looks[h.count - 1];
@@ -182,7 +184,8 @@ static void a_trend_is_seen(void **state)
 		struct forecast_cost c;
 		double power = i ? -0.6 : -1;
 		for (double work = 1e5; work < 2e6; work *= 1.25)
-			forecast_add_look(&h, &(struct forecast_look){work, work, work, pow(work, power), 1.05 * pow(work, power), 3000, 0});
+			forecast_add_look(&h, &(struct forecast_look){work, work, work, pow(work, power),
+								      1.05 * pow(work, power), 3000, 0});
 		const struct forecast_look *end = &h.looks[h.count - 1];
 		assert_true(forecast_target(&h, &p, sqrt(end->rel_mse_upper / 6), FORECAST_NEW, &c));
 		middle[i] = c.work.middle / (6 * end->work);
@@ -199,10 +202,13 @@ static void what_is_no_look_is_passed_over(void **state)
 	struct forecast_range r;
 	struct forecast_cost c;
 	struct plan p = plan_of(64);
-	assert_false(forecast_error(&h, &r) || forecast_target(&h, &p, 0.1, FORECAST_NEW, &c) || forecast_halving(&h, &p, &c));
-	const struct forecast_look none[] = {{1, 1, 1, NAN, NAN, 15, 0}, {1, 1, 1, 0, 0, 15, 0}, {1, 1, 1, INFINITY, INFINITY, 15, 0},
-					     {1, 1, 1, 2, 1, 15, 0}, {0, 1, 1, 1, 2, 15, 0}, {9.9e228, 1, 1, 1, 2, 15, 0}, {NAN, 1, 1, 1, 2, 15, 0},
-					     {1, INFINITY, 1, 1, 2, 15, 0}, {1, 1, NAN, 1, 2, 15, 0}, {1, 1, 1, 1, 2, NAN, 0}};
+	assert_false(forecast_error(&h, &r) || forecast_target(&h, &p, 0.1, FORECAST_NEW, &c) ||
+		     forecast_halving(&h, &p, &c));
+	const struct forecast_look none[] = {
+		{1, 1, 1, NAN, NAN, 15, 0}, {1, 1, 1, 0, 0, 15, 0},	   {1, 1, 1, INFINITY, INFINITY, 15, 0},
+		{1, 1, 1, 2, 1, 15, 0},	    {0, 1, 1, 1, 2, 15, 0},	   {9.9e228, 1, 1, 1, 2, 15, 0},
+		{NAN, 1, 1, 1, 2, 15, 0},   {1, INFINITY, 1, 1, 2, 15, 0}, {1, 1, NAN, 1, 2, 15, 0},
+		{1, 1, 1, 1, 2, NAN, 0}};
 	for (size_t i = 0; i < sizeof none / sizeof *none; i++)
 		forecast_add_look(&h, &none[i]);
 	assert_int_equal(h.count, 0);
@@ -228,9 +234,12 @@ static void looks_travel_as_json(void **state)
 	json_decref(list);
 	assert_int_equal(back.count, h.count);
 	for (uint32_t i = 0; i < h.count; i++)
-		assert_true(back.looks[i].rel_mse == h.looks[i].rel_mse && back.looks[i].seconds == h.looks[i].seconds &&
-			    back.looks[i].cpu_seconds == h.looks[i].cpu_seconds && back.looks[i].degrees == h.looks[i].degrees && back.looks[i].doubtful == h.looks[i].doubtful &&
-			    back.looks[i].rel_mse_upper == h.looks[i].rel_mse_upper && back.looks[i].work == h.looks[i].work);
+		assert_true(
+			back.looks[i].rel_mse == h.looks[i].rel_mse && back.looks[i].seconds == h.looks[i].seconds &&
+			back.looks[i].cpu_seconds == h.looks[i].cpu_seconds &&
+			back.looks[i].degrees == h.looks[i].degrees && back.looks[i].doubtful == h.looks[i].doubtful &&
+			back.looks[i].rel_mse_upper == h.looks[i].rel_mse_upper &&
+			back.looks[i].work == h.looks[i].work);
 	forecast_looks_from_json(NULL, &back);
 	assert_int_equal(back.count, 0);
 }
@@ -238,12 +247,9 @@ static void looks_travel_as_json(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(intervals_hold),
-		cmocka_unit_test(own_looks_tell_more),
-		cmocka_unit_test(stops_are_on_the_ladder),
-		cmocka_unit_test(halving_costs_three_times_what_was_paid),
-		cmocka_unit_test(a_trend_is_seen),
-		cmocka_unit_test(what_is_no_look_is_passed_over),
+		cmocka_unit_test(intervals_hold),	   cmocka_unit_test(own_looks_tell_more),
+		cmocka_unit_test(stops_are_on_the_ladder), cmocka_unit_test(halving_costs_three_times_what_was_paid),
+		cmocka_unit_test(a_trend_is_seen),	   cmocka_unit_test(what_is_no_look_is_passed_over),
 		cmocka_unit_test(looks_travel_as_json),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What canvas_image says of chains: potential scale reduction of sequences whose answer is known, the error of a tile, energies
- * of path classes; and that the order of batches changes no bit.
+ * What canvas_image says of chains: potential scale reduction of sequences whose answer is known, the error of a tile,
+ * energies of path classes; and that the order of batches changes no bit.
  *
  * Level of the statistical test: 1e-6 a tile. Power: V follows chi-square with 1023 degrees, so that a scale reduction
  * whose V / W is off by 30 % is found with 95 % probability.
@@ -26,9 +26,22 @@ enum { TILES = 6 };
 /* Six tiles. */
 static struct plan make_plan(uint32_t chains, uint32_t groups, uint32_t parts, uint64_t epoch)
 {
-	struct plan p = {.integrator = "hslt", .kind = PLAN_CHAINS, .width = 200, .height = 100, .crop_x = 5, .crop_y = 7,
-			 .crop_width = 150, .crop_height = 90, .groups = groups, .parts = parts, .chains = chains,
-			 .bootstrap = (uint64_t)groups * parts * 8, .epoch = epoch, .rounds = UINT64_MAX, .seconds = 1, .max_depth = 8};
+	struct plan p = {.integrator = "hslt",
+			 .kind = PLAN_CHAINS,
+			 .width = 200,
+			 .height = 100,
+			 .crop_x = 5,
+			 .crop_y = 7,
+			 .crop_width = 150,
+			 .crop_height = 90,
+			 .groups = groups,
+			 .parts = parts,
+			 .chains = chains,
+			 .bootstrap = (uint64_t)groups * parts * 8,
+			 .epoch = epoch,
+			 .rounds = UINT64_MAX,
+			 .seconds = 1,
+			 .max_depth = 8};
 	return p;
 }
 
@@ -113,7 +126,8 @@ static void known_sequences(void **state)
 			double x = (r2 - (N - 1.0) / N) * w / v * degrees;
 			double p_high = stats_chi2_p(x, degrees);
 			if (!(p_high > LEVEL && p_high < 1 - LEVEL))
-				fail_msg("staying %u: tile %d has R^2 = %.6f, not %.6f", stays[k], t, r2, (N - 1.0) / N + v / w);
+				fail_msg("staying %u: tile %d has R^2 = %.6f, not %.6f", stays[k], t, r2,
+					 (N - 1.0) / N + v / w);
 			double error = sqrt((1 - chance[t]) / chance[t] / draws / CHAINS);
 			assert_true(fabs((double)img.tile_error[t] / error - 1) < 0.2);
 			assert_true(fabs((double)img.tile_share[t] / (chance[t] / 0.9) - 1) < 6 * error);
@@ -226,7 +240,8 @@ static void order_changes_no_bit(void **state)
 			dice_throw(&places);
 		/* Within two rounds that are open at the same time. */
 		for (uint32_t i = 0; i < ALL; i++) {
-			uint32_t from = i / (2 * LEASES) * 2 * LEASES, j = order ? from + dice_below(&places, 2 * LEASES) : i;
+			uint32_t from = i / (2 * LEASES) * 2 * LEASES,
+				 j = order ? from + dice_below(&places, 2 * LEASES) : i;
 			struct batch swap = b[i];
 			b[i] = b[j];
 			b[j] = swap;

@@ -60,7 +60,9 @@ static void test_joins(void **state)
 	for (unsigned n = 0; n <= 8; n++)
 		for (unsigned bits = 0; bits < 1u << n; bits++)
 			for (unsigned cut = 0; cut <= n; cut++)
-				assert_int_equal(path_class_kind_join(kind_of(bits, cut), kind_of(bits >> cut, n - cut)), kind_of(bits, n));
+				assert_int_equal(
+					path_class_kind_join(kind_of(bits, cut), kind_of(bits >> cut, n - cut)),
+					kind_of(bits, n));
 }
 
 static void test_lengths_and_names(void **state)

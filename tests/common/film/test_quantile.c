@@ -22,9 +22,10 @@ static void quantiles_are_those_of_the_tables(void **state)
 	static const struct {
 		double p, a, b, x, digits;
 	} rows[] = {
-		{0.975, 1, 1, 647.789, 1e-6}, {0.975, 1, 15, 6.1995, 1e-5}, {0.975, 2, 30, 4.1821, 2e-5}, {0.975, 5, 10, 4.2361, 2e-5},
-		{0.975, 10, 20, 2.7737, 2e-5}, {0.975, 15, 15, 2.8621, 2e-5}, {0.975, 30, 120, 1.6899, 4e-5}, {0.95, 4, 60, 2.5252, 3e-5},
-		{0.95, 1, 15, 4.5431, 2e-5}, {0.99, 3, 45, 4.2492, 3e-5}, {0.95, 120, 120, 1.3519, 4e-5},
+		{0.975, 1, 1, 647.789, 1e-6},	{0.975, 1, 15, 6.1995, 1e-5},	{0.975, 2, 30, 4.1821, 2e-5},
+		{0.975, 5, 10, 4.2361, 2e-5},	{0.975, 10, 20, 2.7737, 2e-5},	{0.975, 15, 15, 2.8621, 2e-5},
+		{0.975, 30, 120, 1.6899, 4e-5}, {0.95, 4, 60, 2.5252, 3e-5},	{0.95, 1, 15, 4.5431, 2e-5},
+		{0.99, 3, 45, 4.2492, 3e-5},	{0.95, 120, 120, 1.3519, 4e-5},
 	};
 	for (size_t i = 0; i < sizeof rows / sizeof *rows; i++) {
 		assert_near(f_quantile(rows[i].p, rows[i].a, rows[i].b), rows[i].x, rows[i].digits);
@@ -69,8 +70,10 @@ static void chi_square_is_that_of_the_table(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(quantiles_are_those_of_the_tables), cmocka_unit_test(closed_forms_hold),
-		cmocka_unit_test(quantiles_invert), cmocka_unit_test(chi_square_is_that_of_the_table),
+		cmocka_unit_test(quantiles_are_those_of_the_tables),
+		cmocka_unit_test(closed_forms_hold),
+		cmocka_unit_test(quantiles_invert),
+		cmocka_unit_test(chi_square_is_that_of_the_table),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

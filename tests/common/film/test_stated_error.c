@@ -1,16 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What an image says of its own error, on groups whose truth is known: 300 pictures each of grain, of hits that come by the clump,
- * and of light that seldom comes, in bright and dark surroundings.
+ * What an image says of its own error, on groups whose truth is known: 300 pictures each of grain, of hits that come by
+ * the clump, and of light that seldom comes, in bright and dark surroundings.
  *
- *   interval  holds the realised relMSE of at least 90 % of the pictures for which it is known. Level: at a true coverage of 95 % fewer
- *             than 90 % of 300 have a probability of 3e-4, at 97 % of 5e-8. Power: a coverage of 85 % is found with 99 %, of 80 %
- *             with more than 99.99 %. Seeds are fixed: a run that passes passes always.
- *   planted   the same interval with estimates that are too small by 2 (errors of pixels by 1.4) holds less.
- *   doubt     where one group in one pixel decides no interval is stated, and no target is met.
- *   floor     the estimate of a picture that is black but for one part is what the formula says, to 15 %; without the floor, or with
- *             one of 0.02 or 0.005 m, it is off by factors. 2048 pixels: its standard error is below 1 %.
- *   unvisited pixels to which no chain came are counted and have an error.
+ *   interval  holds the realised relMSE of at least 90 % of the pictures for which it is known. Level: at a true
+ * coverage of 95 % fewer than 90 % of 300 have a probability of 3e-4, at 97 % of 5e-8. Power: a coverage of 85 % is
+ * found with 99 %, of 80 % with more than 99.99 %. Seeds are fixed: a run that passes passes always. planted   the same
+ * interval with estimates that are too small by 2 (errors of pixels by 1.4) holds less. doubt     where one group in
+ * one pixel decides no interval is stated, and no target is met. floor     the estimate of a picture that is black but
+ * for one part is what the formula says, to 15 %; without the floor, or with one of 0.02 or 0.005 m, it is off by
+ * factors. 2048 pixels: its standard error is below 1 %. unvisited pixels to which no chain came are counted and have
+ * an error.
  */
 #include "common/base/mem.h"
 #include "common/film/header.h"
@@ -32,8 +32,19 @@ static const float white[3] = {0.95046F, 1, 1.08906F}; /* D65: red, green and bl
 
 static struct plan plan_of(enum plan_kind kind, uint32_t width, uint32_t height)
 {
-	struct plan p = {.integrator = "path", .kind = kind, .width = width, .height = height, .crop_width = width, .crop_height = height,
-			 .groups = GROUPS, .parts = 1, .epoch = 1, .bootstrap = GROUPS, .rounds = UINT64_MAX, .seconds = 1, .max_depth = 8};
+	struct plan p = {.integrator = "path",
+			 .kind = kind,
+			 .width = width,
+			 .height = height,
+			 .crop_width = width,
+			 .crop_height = height,
+			 .groups = GROUPS,
+			 .parts = 1,
+			 .epoch = 1,
+			 .bootstrap = GROUPS,
+			 .rounds = UINT64_MAX,
+			 .seconds = 1,
+			 .max_depth = 8};
 	if (kind == PLAN_CHAINS)
 		p.chains = GROUPS;
 	return p;
@@ -49,7 +60,8 @@ static void image_of(const struct plan *p, value_of *of, void *user, struct canv
 	for (uint32_t g = 0; g < GROUPS; g++) {
 		struct batch b = {.key = {1, LEASE_RENDER, g, 0, 0}, .tile_count = 1};
 		b.tiles = mem_alloc(1, sizeof *b.tiles);
-		b.tiles[0] = (struct tile){0, 0, p->width, p->height, mem_alloc((size_t)p->width * p->height * 3, sizeof(float))};
+		b.tiles[0] = (struct tile){0, 0, p->width, p->height,
+					   mem_alloc((size_t)p->width * p->height * 3, sizeof(float))};
 		for (uint32_t i = 0; i < p->width * p->height; i++) {
 			double v = of(user, g, i);
 			for (int k = 0; k < 3; k++)
@@ -139,7 +151,8 @@ static void check_interval(const char *name, value_of *of, int least_known)
 		struct canvas_image img;
 		image_of(&p, of, &d, &img);
 		double x = realised(&img);
-		assert_true((img.rel_mse_doubt == ERROR_KNOWN) == (isfinite(img.rel_mse_95[0]) && isfinite(img.rel_mse_95[1])));
+		assert_true((img.rel_mse_doubt == ERROR_KNOWN) ==
+			    (isfinite(img.rel_mse_95[0]) && isfinite(img.rel_mse_95[1])));
 		if (img.rel_mse_doubt == ERROR_KNOWN) {
 			known++;
 			held += img.rel_mse_95[0] <= x && x <= img.rel_mse_95[1];
@@ -149,8 +162,8 @@ static void check_interval(const char *name, value_of *of, int least_known)
 		}
 		canvas_image_fini(&img);
 	}
-	print_message("%s: %d of %d known, %d held, %d with the estimate halved; stated over true %.2f\n", name, known, PICTURES, held, planted,
-		      stated / own);
+	print_message("%s: %d of %d known, %d held, %d with the estimate halved; stated over true %.2f\n", name, known,
+		      PICTURES, held, planted, stated / own);
 	assert_true(known >= least_known);
 	assert_true(held >= 0.9 * known);
 	assert_true(planted < 0.8 * known);
@@ -196,7 +209,8 @@ static void one_sample_decides_nothing(void **state)
 static void words(void **state)
 {
 	(void)state;
-	struct canvas_image img = {.width = 10, .height = 10, .rel_mse = 0.01, .rel_mse_upper = 0.0121, .rel_mse_95 = {0.0081, 0.0144}};
+	struct canvas_image img = {
+		.width = 10, .height = 10, .rel_mse = 0.01, .rel_mse_upper = 0.0121, .rel_mse_95 = {0.0081, 0.0144}};
 	char text[STATED_ERROR_TEXT];
 	stated_error(&img, text, sizeof text);
 	assert_string_equal(text, "relative error 10.00 % (95 %: 9.00 to 12.00 %)");
@@ -205,8 +219,10 @@ static void words(void **state)
 	img.rel_mse_doubt = ERROR_DARK;
 	img.doubtful_share = 0.66;
 	stated_error(&img, text, sizeof text);
-	assert_string_equal(text, "relative error about 10 %, its interval is not known: 66 % of the estimate comes from pixels whose brightness is "
-				  "not known well enough to divide by; no chain came to 7 of 100 pixels");
+	assert_string_equal(
+		text,
+		"relative error about 10 %, its interval is not known: 66 % of the estimate comes from pixels whose brightness is "
+		"not known well enough to divide by; no chain came to 7 of 100 pixels");
 	assert_false(stated_error_meets(&img, 0.5));
 	img.rel_mse = NAN;
 	stated_error(&img, text, sizeof text);
@@ -262,7 +278,8 @@ static void unvisited_pixels_are_counted(void **state)
 	header_fill(&h, &img, &p, &(struct header_extra){.scene = "test.xml", .date = ""});
 	bool counted = false, defined = false;
 	for (size_t i = 0; i < h.count; i++) {
-		counted |= strcmp(h.attributes[i].name, "hslt:unvisitedPixels") == 0 && strcmp(h.attributes[i].string, "56") == 0;
+		counted |= strcmp(h.attributes[i].name, "hslt:unvisitedPixels") == 0 &&
+			   strcmp(h.attributes[i].string, "56") == 0;
 		defined |= strcmp(h.attributes[i].name, "hslt:relMSEDefinition") == 0;
 	}
 	assert_true(counted && defined);
@@ -272,8 +289,10 @@ static void unvisited_pixels_are_counted(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(intervals_hold),	  cmocka_unit_test(one_sample_decides_nothing),
-		cmocka_unit_test(words),		  cmocka_unit_test(black_is_divided_by_the_floor),
+		cmocka_unit_test(intervals_hold),
+		cmocka_unit_test(one_sample_decides_nothing),
+		cmocka_unit_test(words),
+		cmocka_unit_test(black_is_divided_by_the_floor),
 		cmocka_unit_test(unvisited_pixels_are_counted),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

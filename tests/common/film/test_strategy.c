@@ -17,8 +17,16 @@
 
 static struct plan make_plan(void)
 {
-	struct plan_request r = {.integrator = "hslt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .max_depth = 4, .chains = 4,
-				 .groups = 2, .bootstrap = 16, .epoch = 1000, .mutations = 8000,
+	struct plan_request r = {.integrator = "hslt",
+				 .kind = PLAN_CHAINS,
+				 .width = 20,
+				 .height = 10,
+				 .max_depth = 4,
+				 .chains = 4,
+				 .groups = 2,
+				 .bootstrap = 16,
+				 .epoch = 1000,
+				 .mutations = 8000,
 				 .mixture = "independent=0.1,hslt=0.9"};
 	struct plan p;
 	struct error e;
@@ -159,8 +167,8 @@ static void sums_are_of_samples_that_can_be(void **state)
 	(void)state;
 	expect_sums(0, 0, 0, 0);
 	expect_sums(0, 1, 1, -EBADMSG);
-	expect_sums(4, 8, 16, 0);  /* all alike */
-	expect_sums(4, 8, 64, 0);  /* one has it all */
+	expect_sums(4, 8, 16, 0);	   /* all alike */
+	expect_sums(4, 8, 64, 0);	   /* one has it all */
 	expect_sums(4, 8, 15.9, -EBADMSG); /* Cauchy and Schwarz */
 	expect_sums(4, 8, 64.1, -EBADMSG);
 	expect_sums(4, 8, 0, -EBADMSG);
@@ -201,19 +209,24 @@ static void tables_are_readable(void **state)
 	n.counters[COUNT_NAN] = n.counters[COUNT_NEGATIVE] = 1000;
 	n.counters[COUNT_SAMPLES] = 8000;
 	strategy_note(&p, &n, true, text, sizeof text);
-	assert_string_equal(text, "the image is black: no sample found light; 2,000 contributions were not numbers, infinite or negative, "
-				  "and left out; 1 of 8 times a chain accepted nothing during a whole epoch (4 chains); longest run: "
-				  "911 rejections");
+	assert_string_equal(
+		text,
+		"the image is black: no sample found light; 2,000 contributions were not numbers, infinite or negative, "
+		"and left out; 1 of 8 times a chain accepted nothing during a whole epoch (4 chains); longest run: "
+		"911 rejections");
 	strategy_add_beyond(0.0009, text, sizeof text); /* not worth a word */
 	assert_null(strstr(text, "missing"));
 	strategy_add_beyond(0.25, text, sizeof text);
-	assert_non_null(strstr(text, "911 rejections; 25 % of the light is missing: it comes by paths longer than the chains of this "
-				     "integrator hold (path has all of it)"));
+	assert_non_null(strstr(
+		text, "911 rejections; 25 % of the light is missing: it comes by paths longer than the chains of this "
+		      "integrator hold (path has all of it)"));
 	strategy_table(p.mutations, &n, small, sizeof small); /* cut, and ended */
 	assert_int_equal(strlen(small), sizeof small - 1);
 	strategy_lines(p.mutations, &n, text, sizeof text);
 	assert_non_null(strstr(text, "independent: proposed 1234567 accepted 7 "));
-	assert_non_null(strstr(text, "\nhslt: proposed 900 accepted 460 rays 1800 walks 800 iterations 2400 reverseWalks 500 outside 90 "));
+	assert_non_null(strstr(
+		text,
+		"\nhslt: proposed 900 accepted 460 rays 1800 walks 800 iterations 2400 reverseWalks 500 outside 90 "));
 	/* The widest that there can be. */
 	memset(n.strategy, 0xff, sizeof n.strategy);
 	memset(n.counters, 0xff, sizeof n.counters);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The tail index: of Pareto samples, whose index is known, and of the numbers that are kept.
- * Level and power: for each index the mean of 64 independent estimates of k = 128 has a relative standard error of 1.1 % (the law of
- * Hill's estimate there is k a / Gamma(k): mean k / (k - 1), coefficient of variation 1 / sqrt(k - 2)). The bound is 4.5 standard
- * errors, two-sided level 7e-6 each; a bias of 7 % is found with more than 95 %.
+ * Level and power: for each index the mean of 64 independent estimates of k = 128 has a relative standard error of 1.1
+ * % (the law of Hill's estimate there is k a / Gamma(k): mean k / (k - 1), coefficient of variation 1 / sqrt(k - 2)).
+ * The bound is 4.5 standard errors, two-sided level 7e-6 each; a bias of 7 % is found with more than 95 %.
  */
 #include "common/film/tail.h"
 #include "worker/math/rng.h"

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The client against a coordinator of a few lines that means it no good: names of files that lead elsewhere, and more than was asked
- * for.
+ * The client against a coordinator of a few lines that means it no good: names of files that lead elsewhere, and more
+ * than was asked for.
  */
 #include "common/base/mem.h"
 #include "common/net/client.h"
@@ -190,8 +190,8 @@ static void names_lead_nowhere(void **state)
 	/* what would be no file's name, or a file that others look for */
 	memset(longest, 'x', sizeof longest - 1);
 	longest[sizeof longest - 1] = 0;
-	const char *const bad[] = {"", ".", "..", "/", "a/", "../..", "/home/.profile", ".bashrc", "-rf", "a/-o", "a\nb", "a\x1b[2Jb",
-				   "\xff\xfe", longest};
+	const char *const bad[] = {"",	      ".",   "..",   "/",    "a/",	  "../..",    "/home/.profile",
+				   ".bashrc", "-rf", "a/-o", "a\nb", "a\x1b[2Jb", "\xff\xfe", longest};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
 		assert_int_equal(fetch_as(bad[i], taken), -EEXIST);
 	/* what is there stays: files, links that lead nowhere, links that lead to files */

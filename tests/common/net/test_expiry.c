@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Certificates that end soon are spoken of in time, again every day, and not when there is no need; clocks are arguments here. Those
- * that are new are taken up, if not at once, then later, and are for whom the old ones were.
+ * Certificates that end soon are spoken of in time, again every day, and not when there is no need; clocks are
+ * arguments here. Those that are new are taken up, if not at once, then later, and are for whom the old ones were.
  */
 #include "common/net/authority.h"
 
@@ -43,7 +43,8 @@ static struct tls *party(const char *name, double whole, double own)
 	struct tls *t = NULL;
 	snprintf(ca, sizeof ca, "%s/%s", root, name);
 	snprintf(folder, sizeof folder, "%s/node", ca);
-	if (authority_init(ca, "test", whole, &e) || authority_issue(ca, "node", TLS_WORKER, own, false, &e) || tls_open(&t, folder, &e))
+	if (authority_init(ca, "test", whole, &e) || authority_issue(ca, "node", TLS_WORKER, own, false, &e) ||
+	    tls_open(&t, folder, &e))
 		fail_msg("%s", e.text);
 	return t;
 }

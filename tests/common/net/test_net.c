@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Addresses are read strictly; connections carry frames both ways, tell once that they end, and never grow without bound: in
- * plaintext and through TLS. Where only one end speaks it, both are told at once.
+ * Addresses are read strictly; connections carry frames both ways, tell once that they end, and never grow without
+ * bound: in plaintext and through TLS. Where only one end speaks it, both are told at once.
  */
 #include "common/base/mem.h"
 #include "common/net/authority.h"
@@ -24,8 +24,9 @@ static void addresses(void **state)
 	(void)state;
 	struct net_addr a;
 	struct error e;
-	static const char *const bad[] = {"", "localhost", ":1", "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:65536", "::1:80",
-					  "127.0.0.1:-1", "127.0.0.1:1 ", "[]:1"};
+	static const char *const bad[] = {
+		"",	  "localhost",	  ":1",		  "127.0.0.1:", "127.0.0.1:x", "127.0.0.1:65536",
+		"::1:80", "127.0.0.1:-1", "127.0.0.1:1 ", "[]:1"};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++)
 		assert_int_equal(net_addr_resolve(&a, bad[i], &e), -EINVAL);
 	assert_int_equal(net_addr_resolve(&a, "127.3.2.1:80", &e), 0);
@@ -95,7 +96,8 @@ static void on_closed(void *user, const char *why)
 	snprintf(x->why, sizeof x->why, "%s", why);
 }
 
-static const struct conn_events events = {.message = on_message, .heard = on_heard, .drained = on_drained, .closed = on_closed};
+static const struct conn_events events = {
+	.message = on_message, .heard = on_heard, .drained = on_drained, .closed = on_closed};
 
 static void on_connection(uv_stream_t *l, int status)
 {
@@ -291,7 +293,8 @@ static void on_drip(uv_timer_t *t)
 		uv_timer_stop(t);
 }
 
-/* Its bytes are words, and after 0.8 s it is whole; its time is over after 16.5 s: half a second and one for each 64 KB. */
+/* Its bytes are words, and after 0.8 s it is whole; its time is over after 16.5 s: half a second and one for each 64
+ * KB. */
 static void a_slow_frame_is_heard(void **state)
 {
 	(void)state;
@@ -357,7 +360,8 @@ static int with_tls(void **state)
 	char path[128];
 	struct error e;
 	snprintf(folder, sizeof folder, "/tmp/hslt-net.XXXXXX");
-	if (!mkdtemp(folder) || authority_init(folder, "net", 2, &e) || authority_issue(folder, "farm", TLS_COORDINATOR, 1, false, &e) ||
+	if (!mkdtemp(folder) || authority_init(folder, "net", 2, &e) ||
+	    authority_issue(folder, "farm", TLS_COORDINATOR, 1, false, &e) ||
 	    authority_issue(folder, "node", TLS_WORKER, 1, false, &e))
 		return -1;
 	snprintf(path, sizeof path, "%s/node", folder);
@@ -401,8 +405,8 @@ static void only_one_speaks_it(void **state)
 	one_sided(false);
 }
 
-/* Whoever connects and says nothing, or a word now and then, has as long as the handshake may take; here the clock is the
- * peer's silence. */
+/* Whoever connects and says nothing, or a word now and then, has as long as the handshake may take; here the clock is
+ * the peer's silence. */
 static void silence_is_no_handshake(void **state)
 {
 	(void)state;
@@ -440,10 +444,11 @@ static void a_live_connection_is_checked_again(void **state)
 	assert_int_equal(remove(list), 0);
 }
 
-#define EITHER_WAY \
-	cmocka_unit_test(frames_go_both_ways), cmocka_unit_test(the_last_words_arrive), cmocka_unit_test(limits_close), \
-		cmocka_unit_test(who_does_not_read_is_cut_off), cmocka_unit_test(half_a_frame_is_not_waited_for), \
-		cmocka_unit_test(changed_bytes_close), cmocka_unit_test(silence_is_not_waited_for), cmocka_unit_test(a_slow_frame_is_heard), \
+#define EITHER_WAY                                                                                       \
+	cmocka_unit_test(frames_go_both_ways), cmocka_unit_test(the_last_words_arrive),                  \
+		cmocka_unit_test(limits_close), cmocka_unit_test(who_does_not_read_is_cut_off),          \
+		cmocka_unit_test(half_a_frame_is_not_waited_for), cmocka_unit_test(changed_bytes_close), \
+		cmocka_unit_test(silence_is_not_waited_for), cmocka_unit_test(a_slow_frame_is_heard),    \
 		cmocka_unit_test(a_late_reader_waits)
 
 int main(void)

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Service managers are told what they asked for, by path and by abstract name; their sockets are taken, others' are not. */
+/* Service managers are told what they asked for, by path and by abstract name; their sockets are taken, others' are
+ * not. */
 #include "common/net/notify.h"
 
 #include <stdarg.h>
@@ -25,7 +26,8 @@ static int bound(int type, char name[64], const char *what)
 	assert_true(fd >= 0);
 	int n = snprintf(name, 64, "@hslt-test-%ld-%s", (long)getpid(), what);
 	memcpy(a.sun_path + 1, name + 1, (size_t)n - 1);
-	assert_int_equal(bind(fd, (struct sockaddr *)&a, (socklen_t)(offsetof(struct sockaddr_un, sun_path) + (size_t)n)), 0);
+	assert_int_equal(
+		bind(fd, (struct sockaddr *)&a, (socklen_t)(offsetof(struct sockaddr_un, sun_path) + (size_t)n)), 0);
 	return fd;
 }
 
@@ -115,7 +117,8 @@ static int code_of(pid_t child)
 	return WEXITSTATUS(status);
 }
 
-/* In a child whose descriptors from 3 on are these: which one it takes (3...), 0 for none; 99: it leaks into programs. */
+/* In a child whose descriptors from 3 on are these: which one it takes (3...), 0 for none; 99: it leaks into programs.
+ */
 static int takes(const int *fds, int count, const char *announced, bool other_pid)
 {
 	pid_t child = fork();

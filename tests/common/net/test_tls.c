@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Handshakes in memory, between folders that an authority of the test has made: who is let in, who is not and why, and what
- * becomes of streams that are cut, changed, or no TLS at all.
+ * Handshakes in memory, between folders that an authority of the test has made: who is let in, who is not and why, and
+ * what becomes of streams that are cut, changed, or no TLS at all.
  */
 #include "common/base/mem.h"
 #include "common/net/authority.h"
@@ -179,15 +179,18 @@ static void refuses(const char *from, const char *to, const char *caller_says, c
 static void others_are_not(void **state)
 {
 	(void)state;
-	refuses(at(theirs, "node"), at(ours, "farm"), "certificate is not accepted", "does not accept this certificate");
-	refuses(at(ours, "node"), at(theirs, "farm"), "certificate is not accepted", "does not accept this certificate");
+	refuses(at(theirs, "node"), at(ours, "farm"), "certificate is not accepted",
+		"does not accept this certificate");
+	refuses(at(ours, "node"), at(theirs, "farm"), "certificate is not accepted",
+		"does not accept this certificate");
 	/* A worker that plays coordinator to another: the purpose is wrong already. */
 	refuses(at(ours, "node"), at(ours, "root"), "certificate is not accepted", "does not accept this certificate");
 	/* A coordinator does not call. */
 	refuses(at(ours, "farm"), at(ours, "farm"), "does not accept this certificate", "certificate is not accepted");
 }
 
-/* A folder made by hand: this caller trusts the farm but shows a certificate of somebody else, or the other way round. */
+/* A folder made by hand: this caller trusts the farm but shows a certificate of somebody else, or the other way round.
+ */
 static void copy(const char *from, const char *to)
 {
 	static char bytes[1 << 16];
@@ -253,7 +256,8 @@ static const char *forge(const char *name, const char *shown, const char *other_
 	X509_set_version(cert, 2);
 	ASN1_INTEGER_set(X509_get_serialNumber(cert), 77);
 	X509_set_issuer_name(cert, X509_get_subject_name(ca));
-	X509_NAME_add_entry_by_txt(X509_get_subject_name(cert), "CN", MBSTRING_UTF8, (const unsigned char *)shown, -1, -1, 0);
+	X509_NAME_add_entry_by_txt(X509_get_subject_name(cert), "CN", MBSTRING_UTF8, (const unsigned char *)shown, -1,
+				   -1, 0);
 	X509_gmtime_adj(X509_getm_notBefore(cert), -60);
 	X509_gmtime_adj(X509_getm_notAfter(cert), 3600);
 	X509_set_pubkey(cert, key);
@@ -332,8 +336,8 @@ static void certificates_need_one_role_and_a_name(void **state)
 	raw_caller(forge("name", "../name", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
 	raw_caller(forge("line", "a\nb", "URI:hslt:role:client"), TLS1_3_VERSION, "no name");
 	/* Whose purpose would do, but who is no coordinator, cannot play one. */
-	refuses(at(ours, "node"), forge("false", "farm", "URI:hslt:role:worker"), "certificate of a worker, not of a coordinator",
-		"does not accept this certificate");
+	refuses(at(ours, "node"), forge("false", "farm", "URI:hslt:role:worker"),
+		"certificate of a worker, not of a coordinator", "does not accept this certificate");
 }
 
 static void who_has_expired_is_not(void **state)
@@ -574,7 +578,7 @@ static void nonsense_ends_it(void **state)
 		unsigned char bytes[512];
 		for (size_t i = 0; i < sizeof bytes; i++)
 			bytes[i] = (unsigned char)((random = random * 1664525 + 1013904223) >> 24);
-		bytes[0] = 22; /* else it is known for plaintext at once */
+		bytes[0] = 22;	 /* else it is known for plaintext at once */
 		if (round % 2) { /* a record, well-formed on the outside */
 			bytes[1] = 3;
 			bytes[2] = 1;
@@ -597,7 +601,8 @@ static void a_handshake_does_not_grow(void **state)
 	size_t total = 0;
 	open_end(&listener, at(ours, "farm"), true);
 	while (!listener.rc && total < 1 << 20) {
-		listener.rc = tls_link_take(listener.link, total % (1 << 14) ? zeroes : header, total % (1 << 14) ? 1024 : 5, &listener.e);
+		listener.rc = tls_link_take(listener.link, total % (1 << 14) ? zeroes : header,
+					    total % (1 << 14) ? 1024 : 5, &listener.e);
 		total += 1024;
 		read_all(&listener);
 	}

@@ -12,7 +12,8 @@
 
 static struct plan_request request(enum plan_kind kind, const char *mixture)
 {
-	struct plan_request r = {.integrator = "hslt", .kind = kind, .width = 64, .height = 32, .max_depth = 8, .spp = 16};
+	struct plan_request r = {
+		.integrator = "hslt", .kind = kind, .width = 64, .height = 32, .max_depth = 8, .spp = 16};
 	strncpy(r.mixture, mixture, sizeof r.mixture - 1);
 	return r;
 }
@@ -62,8 +63,23 @@ static void settings_and_effects_are_kept_and_told(void **state)
 static void other_texts_are_none(void **state)
 {
 	(void)state;
-	static const char *const bad[] = {",", "a,", ",a", "a,,b", "a b", "a\n", "a\t=1", "a\x7f", "\xc3\xa4", "=1", "a;b", "$a", "a'",
-					  "1a", "@b", "a,@b", "a,b,c,d,e,f,g,h,i"};
+	static const char *const bad[] = {",",
+					  "a,",
+					  ",a",
+					  "a,,b",
+					  "a b",
+					  "a\n",
+					  "a\t=1",
+					  "a\x7f",
+					  "\xc3\xa4",
+					  "=1",
+					  "a;b",
+					  "$a",
+					  "a'",
+					  "1a",
+					  "@b",
+					  "a,@b",
+					  "a,b,c,d,e,f,g,h,i"};
 	struct plan p;
 	struct error e;
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
@@ -102,14 +118,16 @@ static void entries_are_counted_and_named(void **state)
 	assert_string_equal(name, "");
 }
 
-/* A round is 32 mutations a pixel of the crop, but no lease above 2^18 nor below 2^13; a bound on mutations has its own rule. */
+/* A round is 32 mutations a pixel of the crop, but no lease above 2^18 nor below 2^13; a bound on mutations has its own
+ * rule. */
 static void rounds_without_a_bound_follow_the_film(void **state)
 {
 	(void)state;
 	static const struct {
 		uint32_t width, height;
 		uint64_t lease;
-	} cases[] = {{8, 8, 1 << 13}, {128, 128, 1 << 13}, {256, 256, 1 << 15}, {512, 512, 1 << 17}, {1024, 512, 1 << 18}, {4096, 4096, 1 << 18}};
+	} cases[] = {{8, 8, 1 << 13},	  {128, 128, 1 << 13},	{256, 256, 1 << 15},
+		     {512, 512, 1 << 17}, {1024, 512, 1 << 18}, {4096, 4096, 1 << 18}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
 		for (int by_time = 0; by_time < 2; by_time++) {
 			struct plan_request r = request(PLAN_CHAINS, "");
@@ -125,7 +143,8 @@ static void rounds_without_a_bound_follow_the_film(void **state)
 			assert_true(p.rounds == UINT64_MAX);
 			r.spp = 16;
 			assert_int_equal(plan_make(&r, &p, &e), 0);
-			assert_true(p.rounds <= 64 && p.rounds * plan_round_mutations(&p) >= 16 * (uint64_t)r.width * r.height);
+			assert_true(p.rounds <= 64 &&
+				    p.rounds * plan_round_mutations(&p) >= 16 * (uint64_t)r.width * r.height);
 		}
 }
 
@@ -151,7 +170,8 @@ static uint64_t lease_work(const struct plan *p)
 	return plan_round_mutations(p) / (p->groups * p->parts);
 }
 
-/* More leases for more threads: the same chains, cut finer; what cannot be cut is refused, what is usual is not told. */
+/* More leases for more threads: the same chains, cut finer; what cannot be cut is refused, what is usual is not told.
+ */
 static void parts_are_asked_for(void **state)
 {
 	(void)state;
@@ -228,7 +248,8 @@ static void leases_take_twenty_seconds(void **state)
 	assert_true(differ > 0 && differ < 25); /* log2 1.1 = 0.14 of all */
 }
 
-/* What is short stays as it was: so hslt-render and the farm agree without a pilot. An epoch that was asked for stays, too. */
+/* What is short stays as it was: so hslt-render and the farm agree without a pilot. An epoch that was asked for stays,
+ * too. */
 static void short_jobs_ask_for_no_pilot(void **state)
 {
 	(void)state;
@@ -294,7 +315,8 @@ static void seeds_stand_at_even_marks(void **state)
 		const float *weight;
 		double u;
 		uint64_t index[4];
-	} cases[] = {{rare, 0.5, {5, 7, 7, 7}}, {rare, 0, {5, 7, 7, 7}}, {even, 0, {4, 5, 6, 7}}, {even, 0.9, {4, 5, 6, 7}}};
+	} cases[] = {
+		{rare, 0.5, {5, 7, 7, 7}}, {rare, 0, {5, 7, 7, 7}}, {even, 0, {4, 5, 6, 7}}, {even, 0.9, {4, 5, 6, 7}}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		uint64_t index[4];
 		assert_true(plan_resample(&p, 1, cases[i].weight, 4, cases[i].u, 4, index));
@@ -351,13 +373,18 @@ static void limits_are_held(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_mixture_is_kept_and_told), cmocka_unit_test(settings_and_effects_are_kept_and_told),
+		cmocka_unit_test(a_mixture_is_kept_and_told),
+		cmocka_unit_test(settings_and_effects_are_kept_and_told),
 		cmocka_unit_test(other_texts_are_none),
 		cmocka_unit_test(entries_are_counted_and_named),
-		cmocka_unit_test(rounds_without_a_bound_follow_the_film), cmocka_unit_test(parts_are_asked_for),
-		cmocka_unit_test(leases_take_twenty_seconds), cmocka_unit_test(short_jobs_ask_for_no_pilot),
-		cmocka_unit_test(a_bandwidth_makes_epochs_longer), cmocka_unit_test(seeds_stand_at_even_marks),
-		cmocka_unit_test(the_least_bound_counts_in_whole_rounds), cmocka_unit_test(limits_are_held),
+		cmocka_unit_test(rounds_without_a_bound_follow_the_film),
+		cmocka_unit_test(parts_are_asked_for),
+		cmocka_unit_test(leases_take_twenty_seconds),
+		cmocka_unit_test(short_jobs_ask_for_no_pilot),
+		cmocka_unit_test(a_bandwidth_makes_epochs_longer),
+		cmocka_unit_test(seeds_stand_at_even_marks),
+		cmocka_unit_test(the_least_bound_counts_in_whole_rounds),
+		cmocka_unit_test(limits_are_held),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

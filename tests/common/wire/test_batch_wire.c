@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Batches, grants and plans come out of the wire as they went in; what does not fit its plan or its payload is refused. */
+/* Batches, grants and plans come out of the wire as they went in; what does not fit its plan or its payload is refused.
+ */
 #include "common/wire/batch_wire.h"
 #include "common/base/mem.h"
 #include "common/wire/frame.h"
@@ -15,7 +16,8 @@
 
 static void assert_same_key(const struct lease_key *a, const struct lease_key *b)
 {
-	assert_true(a->job == b->job && a->kind == b->kind && a->group == b->group && a->part == b->part && a->epoch == b->epoch);
+	assert_true(a->job == b->job && a->kind == b->kind && a->group == b->group && a->part == b->part &&
+		    a->epoch == b->epoch);
 }
 
 static struct plan chain_plan(void)
@@ -51,8 +53,11 @@ static void fill_tile(struct tile *t, uint32_t x, uint32_t y, uint32_t width, ui
 /* The second and the last tile of the crop, states of several sizes, one of them dead. */
 static struct batch chain_batch(const struct plan *p)
 {
-	struct batch b = {.key = {7, LEASE_RENDER, 3, 0, 2}, .independent_sum = 1.0 / 3, .independent_square = 0.05,
-			  .beyond_sum = 0, .cpu_seconds = 0.25};
+	struct batch b = {.key = {7, LEASE_RENDER, 3, 0, 2},
+			  .independent_sum = 1.0 / 3,
+			  .independent_square = 0.05,
+			  .beyond_sum = 0,
+			  .cpu_seconds = 0.25};
 	uint32_t chains = p->chains / (p->groups * p->parts);
 	b.counters[COUNT_SAMPLES] = chains * p->epoch;
 	b.counters[COUNT_INDEPENDENT] = 3;
@@ -139,7 +144,8 @@ static void a_batch_travels(void **state)
 	for (size_t n = 0; n < r.payload.size; n += 97)
 		assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, n, &e), -EBADMSG);
 	env.message->lease_result->state_sizes[0] = UINT32_MAX;
-	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e),
+			 -EBADMSG);
 	envelope_fini(&env);
 	frame_reader_fini(&r);
 	batch_fini(&b);
@@ -294,10 +300,12 @@ static void weights_travel(void **state)
 	assert_memory_equal(back.classes, b.classes, sizeof b.classes);
 	batch_fini(&back);
 	env.message->lease_result->independent_sum *= 1.001; /* not that of the weights */
-	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e),
+			 -EBADMSG);
 	env.message->lease_result->independent_sum = b.independent_sum;
 	env.message->lease_result->weight_count = UINT64_MAX / 4 + 2; /* times 4 it is small again */
-	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e), -EBADMSG);
+	assert_int_equal(batch_unpack(&back, &p, env.message->lease_result, r.payload.bytes, r.payload.size, &e),
+			 -EBADMSG);
 	envelope_fini(&env);
 	frame_reader_fini(&r);
 	batch_fini(&b);
@@ -338,7 +346,8 @@ static void grants_travel(void **state)
 	assert_true(g.chain_count == 2 && g.seeds == NULL && g.states[0].size == 0 && g.states[1].size == 3);
 	assert_memory_equal(g.states[1].bytes, "abc", 3);
 	grant_fini(&g);
-	g = grant_travels(&k, NULL, (struct chain_state[2]){{NULL, 0}, {NULL, 0}}, 2); /* the first payload of a connection, and none */
+	g = grant_travels(&k, NULL, (struct chain_state[2]){{NULL, 0}, {NULL, 0}},
+			  2); /* the first payload of a connection, and none */
 	assert_true(g.chain_count == 2 && g.states[0].size == 0 && g.states[1].size == 0);
 	grant_fini(&g);
 	g = grant_travels(&k, NULL, NULL, 0);
@@ -367,8 +376,14 @@ static void plans_travel(void **state)
 	char longest[PLAN_MUTATIONS_MAX + 1] = "", control[] = "a\n";
 	memset(longest, 'a', PLAN_MUTATIONS_MAX);
 	char *mixtures[] = {longest, control};
-	struct plan_request request = {.integrator = "hslt", .kind = PLAN_CHAINS, .mixture = "hslt=1",
-				       .accuracy = "tolerance=1e-05", .effects = "all", .parts = 64, .speed = 31000.5}, again;
+	struct plan_request request = {.integrator = "hslt",
+				       .kind = PLAN_CHAINS,
+				       .mixture = "hslt=1",
+				       .accuracy = "tolerance=1e-05",
+				       .effects = "all",
+				       .parts = 64,
+				       .speed = 31000.5},
+			    again;
 	Farm__PlanRequest rm;
 	plan_request_to_wire(&request, &rm);
 	assert_int_equal(plan_request_from_wire(&rm, &again, &e), 0);
@@ -397,8 +412,9 @@ static void plans_travel(void **state)
 	assert_int_equal(plan_from_wire(&m, &back, &e), 0);
 }
 
-/* The most chains that a plan lets into a lease: the longest seeds, and the sizes of states, fit into a header of 1 MB, which is what a
- * coordinator takes. A worker takes four times as much, and 256 MB of states: 16 KB each, more than any has. */
+/* The most chains that a plan lets into a lease: the longest seeds, and the sizes of states, fit into a header of 1 MB,
+ * which is what a coordinator takes. A worker takes four times as much, and 256 MB of states: 16 KB each, more than any
+ * has. */
 static void the_largest_lease_travels(void **state)
 {
 	(void)state;
@@ -430,10 +446,10 @@ static void the_largest_lease_travels(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_batch_travels), cmocka_unit_test(memory_may_end_anywhere),
-		cmocka_unit_test(moments_are_the_plans), cmocka_unit_test(weights_travel),  cmocka_unit_test(grants_travel),
-		cmocka_unit_test(the_largest_lease_travels),
-		cmocka_unit_test(plans_travel),    cmocka_unit_test(strategies_are_the_plans),
+		cmocka_unit_test(a_batch_travels),	 cmocka_unit_test(memory_may_end_anywhere),
+		cmocka_unit_test(moments_are_the_plans), cmocka_unit_test(weights_travel),
+		cmocka_unit_test(grants_travel),	 cmocka_unit_test(the_largest_lease_travels),
+		cmocka_unit_test(plans_travel),		 cmocka_unit_test(strategies_are_the_plans),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,7 +46,8 @@ static void goes_out_and_comes_in(void **state)
 	assert_string_equal(env.message->hello->name, "w1");
 	assert_int_equal(env.message->hello->role, FARM__ROLE__ROLE_WORKER);
 	envelope_fini(&env);
-	for (size_t n = 0; n < size - FRAME_PREFIX - 4; n++) { /* cut anywhere: refused or another message, never a crash */
+	for (size_t n = 0; n < size - FRAME_PREFIX - 4;
+	     n++) { /* cut anywhere: refused or another message, never a crash */
 		if (envelope_unpack(&env, bytes + FRAME_PREFIX, n, &e) == 0)
 			envelope_fini(&env);
 		assert_null(env.blocks);
@@ -70,7 +71,8 @@ static void a_changed_hello_is_none(void **state)
 		int rc = envelope_unpack(&env, bytes + FRAME_PREFIX, header, &e);
 		noticed += rc == -EILSEQ;
 		if (!rc)
-			assert_true(env.message->body_case != FARM__ENVELOPE__BODY_HELLO || env.message->hello->version != FARM_VERSION);
+			assert_true(env.message->body_case != FARM__ENVELOPE__BODY_HELLO ||
+				    env.message->hello->version != FARM_VERSION);
 		envelope_fini(&env);
 		bytes[FRAME_PREFIX + bit / 8] ^= (unsigned char)(1u << bit % 8);
 	}
@@ -104,7 +106,7 @@ static void what_is_not_known_is_refused(void **state)
 {
 	(void)state;
 	assert_int_equal(answer("", 0), -EBADMSG);
-	assert_int_equal(answer("\x1a\x00", 2), 0);                    /* a heartbeat */
+	assert_int_equal(answer("\x1a\x00", 2), 0);		       /* a heartbeat */
 	assert_int_equal(answer("\x1a\x02\x78\x01", 4), -EBADMSG);     /* with an unknown field 15 inside */
 	assert_int_equal(answer("\x1a\x00\xf8\x3f\x01", 5), -EBADMSG); /* and beside it */
 	/* Submit{files{unknown}}: deep inside a repeated field (Submit is field 40, files is field 8) */
@@ -134,21 +136,18 @@ static void text_is_checked(void **state)
 	assert_true(envelope_text_ok("gr\xc3\xbcn \xf0\x9f\x98\x80", 20));
 	assert_false(envelope_text_ok("abc", 2));
 	assert_false(envelope_text_ok("a\nb", 9));
-	assert_false(envelope_text_ok("\xc0\xaf", 9));     /* overlong */
+	assert_false(envelope_text_ok("\xc0\xaf", 9));	   /* overlong */
 	assert_false(envelope_text_ok("\xed\xa0\x80", 9)); /* a surrogate */
-	assert_false(envelope_text_ok("\xe2\x82", 9));     /* cut */
+	assert_false(envelope_text_ok("\xe2\x82", 9));	   /* cut */
 	assert_false(envelope_text_ok("\xff", 9));
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(goes_out_and_comes_in),
-		cmocka_unit_test(a_changed_hello_is_none),
-		cmocka_unit_test(memory_is_out),
-		cmocka_unit_test(what_is_not_known_is_refused),
-		cmocka_unit_test(a_bomb_is_defused),
-		cmocka_unit_test(text_is_checked),
+		cmocka_unit_test(goes_out_and_comes_in), cmocka_unit_test(a_changed_hello_is_none),
+		cmocka_unit_test(memory_is_out),	 cmocka_unit_test(what_is_not_known_is_refused),
+		cmocka_unit_test(a_bomb_is_defused),	 cmocka_unit_test(text_is_checked),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

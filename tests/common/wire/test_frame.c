@@ -11,8 +11,9 @@
 #include <string.h>
 
 /* The second one is sealed, by checksums that were computed elsewhere (a bit at a time, Python). */
-static const unsigned char two_frames[] = {0, 0, 0, 2, 0, 0, 0, 3, 'h', 'i', 'a', 'b', 'c', /* */
-					   0, 0, 0, 1, 0, 0, 0, 1, 0xda, 0x06, 0xef, 0x2c, 0x9e, 0x67, 0x09, 0x20, 'x', 'y'};
+static const unsigned char two_frames[] = {0,	 0,    0,    2,	  0,  0, 0, 3, 'h',  'i',  'a',	 'b',  'c', /* */
+					   0,	 0,    0,    1,	  0,  0, 0, 1, 0xda, 0x06, 0xef, 0x2c, 0x9e,
+					   0x67, 0x09, 0x20, 'x', 'y'};
 enum { FIRST = 13 };
 
 static void any_cut_gives_the_same_frames(void **state)
@@ -115,10 +116,8 @@ static void the_prefix_is_what_is_read(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(any_cut_gives_the_same_frames),
-		cmocka_unit_test(any_changed_bit_is_noticed),
-		cmocka_unit_test(what_is_sealed_is_read),
-		cmocka_unit_test(lengths_are_held_against_limits),
+		cmocka_unit_test(any_cut_gives_the_same_frames), cmocka_unit_test(any_changed_bit_is_noticed),
+		cmocka_unit_test(what_is_sealed_is_read),	 cmocka_unit_test(lengths_are_held_against_limits),
 		cmocka_unit_test(the_prefix_is_what_is_read),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -10,11 +10,13 @@
 #include <cmocka.h>
 
 /* One worker, one slot: the leases follow each other. */
+/* clang-format off */
 #define START(options)                                                 \
 	"[0] submit groups=1 " options " -> j1 submitted, j1 is queued", \
 	"[0] w1 joins A threads=1 -> -",                               \
 	"[10] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",   \
 	"[11] w1 batch j1 g0 p0 boot -> merge, merged, j1 prepare"
+/* clang-format on */
 
 static void expect_end(struct farm *f, enum job_state state, enum job_end end, int code)
 {
@@ -32,14 +34,16 @@ static void by_time(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START("rounds=inf seconds=5"),
-		"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
-		"[14.9] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
-		/* the time is tested when a round is complete, and runs from the first bootstrap lease */
-		"[15.5] tick -> -",
-		"[16] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (time)",
-		NULL });
+	transcript_play(
+		f, (const char *const[]){
+			   START("rounds=inf seconds=5"),
+			   "[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+			   "[14.9] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
+			   /* the time is tested when a round is complete, and runs from the first bootstrap lease */
+			   "[15.5] tick -> -",
+			   "[16] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (time)",
+			   NULL,
+		   });
 	expect_end(f, JOB_DONE, END_TIME, 0);
 }
 
@@ -47,28 +51,31 @@ static void by_error(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START("rounds=inf target=0.1"),
-		"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
-		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
-		/* what would change the prefix in question waits; so does an answer about another prefix */
-		"[14] w1 batch j1 g0 p0 e1 -> refused: the job's error is being estimated, w1 gets j1 g0 p0 e1",
-		"[14] error j1 2 0.01 -> -",
-		"[14] error j1 1 nan -> -",
-		"[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
-		"[15] error j1 2 0.5 -> -",
-		"[16] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 evaluate 3, w1 gets j1 g0 p0 e3",
-		"[16] error j1 3 0.3 -> -",
-		"[17] w1 batch j1 g0 p0 e3 -> merge, merged, j1 round 4, j1 evaluate 4, w1 gets j1 g0 p0 e4",
-		"[17] error j1 4 0.2 -> -",
-		"[18] w1 batch j1 g0 p0 e4 -> merge, merged, j1 round 5, j1 evaluate 5, w1 gets j1 g0 p0 e5",
-		"[18] error j1 5 0.2 -> -",
-		"[19] w1 batch j1 g0 p0 e5 -> merge, merged, j1 round 6, j1 evaluate 6, w1 gets j1 g0 p0 e6",
-		"[19] error j1 6 0.2 -> -",
-		"[20] w1 batch j1 g0 p0 e6 -> merge, merged, j1 round 7, j1 evaluate 7, w1 gets j1 g0 p0 e7",
-		"[21] error j1 7 0.1 -> w1 loses j1 g0 p0 e7, j1 publish 7, j1 is done (error)",
-		"[22] w1 batch j1 g0 p0 e7 -> refused: the job is over",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			START("rounds=inf target=0.1"),
+			"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+			"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
+			/* what would change the prefix in question waits; so does an answer about another prefix */
+			"[14] w1 batch j1 g0 p0 e1 -> refused: the job's error is being estimated, w1 gets j1 g0 p0 e1",
+			"[14] error j1 2 0.01 -> -",
+			"[14] error j1 1 nan -> -",
+			"[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
+			"[15] error j1 2 0.5 -> -",
+			"[16] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 evaluate 3, w1 gets j1 g0 p0 e3",
+			"[16] error j1 3 0.3 -> -",
+			"[17] w1 batch j1 g0 p0 e3 -> merge, merged, j1 round 4, j1 evaluate 4, w1 gets j1 g0 p0 e4",
+			"[17] error j1 4 0.2 -> -",
+			"[18] w1 batch j1 g0 p0 e4 -> merge, merged, j1 round 5, j1 evaluate 5, w1 gets j1 g0 p0 e5",
+			"[18] error j1 5 0.2 -> -",
+			"[19] w1 batch j1 g0 p0 e5 -> merge, merged, j1 round 6, j1 evaluate 6, w1 gets j1 g0 p0 e6",
+			"[19] error j1 6 0.2 -> -",
+			"[20] w1 batch j1 g0 p0 e6 -> merge, merged, j1 round 7, j1 evaluate 7, w1 gets j1 g0 p0 e7",
+			"[21] error j1 7 0.1 -> w1 loses j1 g0 p0 e7, j1 publish 7, j1 is done (error)",
+			"[22] w1 batch j1 g0 p0 e7 -> refused: the job is over",
+			NULL,
+		});
 	expect_end(f, JOB_DONE, END_ERROR, 0);
 }
 
@@ -76,19 +83,22 @@ static void bound_before_error(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] submit groups=2 rounds=7 seconds=3 target=0.1 -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=2 -> -",
-		"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
-		"[1] w1 batch j1 g0 p0 boot -> merge, merged",
-		"[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
-		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0",
-		"[3] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
-		/* the end is decided: nothing more is handed out or merged while the error is evaluated once more */
-		"[4] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w1 loses j1 g0 p0 e1, j1 evaluate 1",
-		"[4] w1 batch j1 g0 p0 e1 -> refused: the job is ending",
-		"[4] error j1 1 0.4 -> j1 publish 1, j1 is done (time)",
-		NULL });
+	transcript_play(
+		f, (const char *const[]){
+			   "[0] submit groups=2 rounds=7 seconds=3 target=0.1 -> j1 submitted, j1 is queued",
+			   "[0] w1 joins A threads=2 -> -",
+			   "[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+			   "[1] w1 batch j1 g0 p0 boot -> merge, merged",
+			   "[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
+			   "[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0",
+			   "[3] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
+			   /* the end is decided: nothing more is handed out or merged while the error is evaluated once
+			      more */
+			   "[4] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w1 loses j1 g0 p0 e1, j1 evaluate 1",
+			   "[4] w1 batch j1 g0 p0 e1 -> refused: the job is ending",
+			   "[4] error j1 1 0.4 -> j1 publish 1, j1 is done (time)",
+			   NULL,
+		   });
 	expect_end(f, JOB_DONE, END_TIME, 4);
 }
 
@@ -98,21 +108,29 @@ static void chains_disagree(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		START("rounds=1 target=0.1"),
-		"[11] image j1 disagrees -> -",
-		"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
-		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1",
-		"[13] error j1 1 0.5 -> j1 publish 1, j1 is done (mutations)",
-		NULL });
+				   START("rounds=1 target=0.1"),
+				   "[11] image j1 disagrees -> -",
+				   "[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+				   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1",
+				   "[13] error j1 1 0.5 -> j1 publish 1, j1 is done (mutations)",
+				   NULL,
+			   });
 	struct job_status s;
 	assert_true(farm_job(f, 1, 1000, &s));
 	assert_int_equal(job_exit_code(&s), 4);
-	transcript_play(f, (const char *const[]){"[14] image j1 disagrees -> -", "[14] image j2 -> -", NULL});
+	transcript_play(f, (const char *const[]){
+				   "[14] image j1 disagrees -> -",
+				   "[14] image j2 -> -",
+				   NULL,
+			   });
 	expect_end(f, JOB_DONE, END_MUTATIONS, 5);
 	f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		START("rounds=1"), "[12] prepared j1 bad no space left -> j1 is failed (failed: no space left)",
-		"[13] image j1 disagrees -> -", NULL });
+				   START("rounds=1"),
+				   "[12] prepared j1 bad no space left -> j1 is failed (failed: no space left)",
+				   "[13] image j1 disagrees -> -",
+				   NULL,
+			   });
 	expect_end(f, JOB_FAILED, END_FAILED, 3);
 }
 
@@ -121,11 +139,12 @@ static void error_with_the_last_round(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		START("rounds=1 target=0.1"),
-		"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
-		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1",
-		"[13] error j1 1 0.05 -> j1 publish 1, j1 is done (error)",
-		NULL });
+				   START("rounds=1 target=0.1"),
+				   "[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+				   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1",
+				   "[13] error j1 1 0.05 -> j1 publish 1, j1 is done (error)",
+				   NULL,
+			   });
 	expect_end(f, JOB_DONE, END_ERROR, 0);
 }
 
@@ -133,10 +152,13 @@ static void black(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START("rounds=1"),
-		"[12] prepared j1 black -> j1 publish 0, j1 is done (black: no bootstrap sample carried light)",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			START("rounds=1"),
+			"[12] prepared j1 black -> j1 publish 0, j1 is done (black: no bootstrap sample carried light)",
+			NULL,
+		});
 	expect_end(f, JOB_DONE, END_BLACK, 0);
 }
 
@@ -145,7 +167,10 @@ static void cannot_be_prepared(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		START("rounds=1"), "[12] prepared j1 bad no space left -> j1 is failed (failed: no space left)", NULL });
+				   START("rounds=1"),
+				   "[12] prepared j1 bad no space left -> j1 is failed (failed: no space left)",
+				   NULL,
+			   });
 	expect_end(f, JOB_FAILED, END_FAILED, 3);
 }
 
@@ -153,11 +178,14 @@ static void broken(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START("rounds=1"),
-		"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
-		"[13] broken j1 a sum left the grid -> w1 loses j1 g0 p0 e0, j1 is failed (failed: a sum left the grid)",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			START("rounds=1"),
+			"[12] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+			"[13] broken j1 a sum left the grid -> w1 loses j1 g0 p0 e0, j1 is failed (failed: a sum left the grid)",
+			NULL,
+		});
 	expect_end(f, JOB_FAILED, END_FAILED, 3);
 }
 
@@ -180,13 +208,17 @@ static void progress_and_rate(void **state)
 	struct farm *f = transcript_farm();
 	/* 1000 bootstrap samples and 10 rounds of 400 mutations */
 	transcript_play(f, (const char *const[]){
-		START("rounds=10"), "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0", NULL });
+				   START("rounds=10"),
+				   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+				   NULL,
+			   });
 	near(ask(f, 11).progress, 1000.0 / 5000);
 	assert_true(isnan(ask(f, 11).eta));
 	transcript_play(f, (const char *const[]){
-		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
-		"[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
-		NULL });
+				   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
+				   "[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
+				   NULL,
+			   });
 	struct job_status s = ask(f, 15);
 	near(s.progress, 1800.0 / 5000);
 	near(s.rate, 200);
@@ -200,17 +232,23 @@ static void progress_of_errors(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START("rounds=inf target=0.1"),
-		"[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
-		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
-		"[13] error j1 1 0.2 -> -", NULL });
+	transcript_play(
+		f, (const char *const[]){
+			   START("rounds=inf target=0.1"),
+			   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+			   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
+			   "[13] error j1 1 0.2 -> -",
+			   NULL,
+		   });
 	/* twice the error: four rounds; and when that turns out to be too few, progress stays */
 	near(ask(f, 13).progress, 1400.0 / 2600);
 	near(ask(f, 13).eta, 1200 / 200.0);
-	transcript_play(f, (const char *const[]){
-		"[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
-		"[15] error j1 2 0.9 -> -", NULL });
+	transcript_play(
+		f, (const char *const[]){
+			   "[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
+			   "[15] error j1 2 0.9 -> -",
+			   NULL,
+		   });
 	near(ask(f, 15).progress, 1800.0 / 2600);
 	farm_free(f);
 }
@@ -220,12 +258,22 @@ static void doubtful_looks_end_nothing(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START("rounds=inf target=0.1"),
-		"[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
-		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1", NULL });
-	struct event ev = {.kind = EVENT_ERROR_KNOWN, .time = 13.5,
-			   .error_known = {.job = 1, .rounds = 1, .rel_error = 0.05, .rel_mse = 0.002, .degrees = 2000, .doubtful = true, .cpu_seconds = 5}};
+	transcript_play(
+		f, (const char *const[]){
+			   START("rounds=inf target=0.1"),
+			   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+			   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
+			   NULL,
+		   });
+	struct event ev = {.kind = EVENT_ERROR_KNOWN,
+			   .time = 13.5,
+			   .error_known = {.job = 1,
+					   .rounds = 1,
+					   .rel_error = 0.05,
+					   .rel_mse = 0.002,
+					   .degrees = 2000,
+					   .doubtful = true,
+					   .cpu_seconds = 5}};
 	struct update u;
 	farm_step(f, &ev, &u);
 	struct job_status s = ask(f, 13.5);
@@ -239,12 +287,18 @@ static void looks_give_a_forecast(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START("rounds=inf target=0.1"),
-		"[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
-		"[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1", NULL });
-	struct event ev = {.kind = EVENT_ERROR_KNOWN, .time = 13.5,
-			   .error_known = {.job = 1, .rounds = 1, .rel_error = 0.2, .rel_mse = 0.038, .degrees = 2000, .cpu_seconds = 5}};
+	transcript_play(
+		f, (const char *const[]){
+			   START("rounds=inf target=0.1"),
+			   "[11] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+			   "[13] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, j1 evaluate 1, w1 gets j1 g0 p0 e1",
+			   NULL,
+		   });
+	struct event ev = {
+		.kind = EVENT_ERROR_KNOWN,
+		.time = 13.5,
+		.error_known = {
+			.job = 1, .rounds = 1, .rel_error = 0.2, .rel_mse = 0.038, .degrees = 2000, .cpu_seconds = 5}};
 	struct update u;
 	farm_step(f, &ev, &u);
 	struct job_status s = ask(f, 13.5);
@@ -258,7 +312,8 @@ static void looks_give_a_forecast(void **state)
 	assert_true(fabs(s.halving_cpu.middle / 15 - 1) < 0.1);
 	assert_true(fabs(s.halving_seconds.middle / (1200 / s.rate) - 1) < 0.1);
 	/* Four rounds by the rule, three more to come; the interval says so. */
-	assert_true(s.eta_low <= s.eta && s.eta <= s.eta_high && s.eta_low >= 400 / s.rate && s.eta_high < 4000 / s.rate);
+	assert_true(s.eta_low <= s.eta && s.eta <= s.eta_high && s.eta_low >= 400 / s.rate &&
+		    s.eta_high < 4000 / s.rate);
 	assert_true(s.eta >= 800 / s.rate - 1e-9 && s.eta <= 1600 / s.rate + 1e-9);
 	farm_free(f);
 }
@@ -267,7 +322,7 @@ static void progress_of_time(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){ START("rounds=inf seconds=20"), NULL });
+	transcript_play(f, (const char *const[]){START("rounds=inf seconds=20"), NULL});
 	near(ask(f, 15).progress, 5.0 / 20);
 	near(ask(f, 15).eta, 15);
 	near(ask(f, 100).progress, 1);
@@ -279,14 +334,16 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(by_time),
 		cmocka_unit_test(by_error),
-		cmocka_unit_test(bound_before_error), cmocka_unit_test(chains_disagree),
+		cmocka_unit_test(bound_before_error),
+		cmocka_unit_test(chains_disagree),
 		cmocka_unit_test(error_with_the_last_round),
 		cmocka_unit_test(black),
 		cmocka_unit_test(cannot_be_prepared),
 		cmocka_unit_test(broken),
 		cmocka_unit_test(progress_and_rate),
 		cmocka_unit_test(progress_of_errors),
-		cmocka_unit_test(doubtful_looks_end_nothing), cmocka_unit_test(looks_give_a_forecast),
+		cmocka_unit_test(doubtful_looks_end_nothing),
+		cmocka_unit_test(looks_give_a_forecast),
 		cmocka_unit_test(progress_of_time),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -11,6 +11,7 @@
 #include <cmocka.h>
 
 /* One slot; the first worker has made the states after epoch 0 and leaves the next lease to others. */
+/* clang-format off */
 #define START                                                                       \
 	"[0] submit groups=1 rounds=4 -> j1 submitted, j1 is queued",               \
 	"[0] w1 joins A threads=1 name=a -> -",                                     \
@@ -18,6 +19,7 @@
 	"[1] w1 batch j1 g0 p0 boot -> merge, merged, j1 prepare",                  \
 	"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",                    \
 	"[2] w1 wants 0 -> -", "[2] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1"
+/* clang-format on */
 
 #define WORKER(N, NAME) "[3] w" #N " joins A threads=1 name=" NAME " -> -"
 
@@ -33,25 +35,36 @@ static void without_what_came_before_the_chains_begin_anew(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		START, WORKER(2, "b"), WORKER(3, "c"),
-		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-		"[4] w2 denies j1 g0 p0 e1 not mine -> -", /* neither it nor who made them, though that one would */
-		"[4] w1 wants 1 -> -",
-		NULL });
+				   START,
+				   WORKER(2, "b"),
+				   WORKER(3, "c"),
+				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+				   "[4] w2 denies j1 g0 p0 e1 not mine -> -", /* neither it nor who made them, though
+										 that one would */
+				   "[4] w1 wants 1 -> -",
+				   NULL,
+			   });
 	struct job_status j;
 	assert_true(farm_job(f, 1, 4, &j));
-	assert_non_null(strstr(j.waiting, "a third worker is to say whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b could"));
-	transcript_play(f, (const char *const[]){
-		"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
-		"[6] w3 denies j1 g0 p0 e1 not mine either -> anew, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
-		"[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2", /* from states again */
-		NULL });
+	assert_non_null(strstr(
+		j.waiting,
+		"a third worker is to say whether the chain states of group 0 part 0 epoch 1 are wrong: a made them, b could"));
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
+			"[6] w3 denies j1 g0 p0 e1 not mine either -> anew, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e1 anew",
+			"[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2", /* from states
+													 again */
+			NULL,
+		});
 	struct peer_status p;
 	assert_int_equal(wrong(f, 1), 1);
 	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
 	assert_true(farm_peer(f, 2, &p) && p.failures == 0 && p.faults == 0);
 	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 2}), "b");
-	/* Who made the states of other leases is not said: of an epoch before, of one that nobody has, of no states at all. */
+	/* Who made the states of other leases is not said: of an epoch before, of one that nobody has, of no states at
+	 * all. */
 	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 1}), "?");
 	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_RENDER, 0, 0, 3}), "?");
 	assert_string_equal(farm_maker(f, &(struct lease_key){1, LEASE_BOOTSTRAP, 0, 0, 0}), "?");
@@ -64,13 +77,18 @@ static void a_third_that_goes_on_is_right(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START, WORKER(2, "b"), WORKER(3, "c"),
-		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-		"[3] w3 wants 1 -> -",
-		"[4] w2 denies j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
-		"[5] w3 batch j1 g0 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 0 part 0 epoch 1, j1 round 2, w2 gets j1 g0 p0 e2",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			START,
+			WORKER(2, "b"),
+			WORKER(3, "c"),
+			"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+			"[3] w3 wants 1 -> -",
+			"[4] w2 denies j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
+			"[5] w3 batch j1 g0 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 0 part 0 epoch 1, j1 round 2, w2 gets j1 g0 p0 e2",
+			NULL,
+		});
 	assert_int_equal(wrong(f, 2), 1);
 	assert_int_equal(wrong(f, 1) + wrong(f, 3), 0);
 	farm_free(f);
@@ -82,14 +100,16 @@ static void without_a_third_the_chains_begin_anew(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		START, WORKER(2, "b"),
-		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-		"[4] w2 denies j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
-		"[5] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
-		"[6] w2 denies j1 g0 p0 e2 my own -> -", /* made by itself: the other is asked */
-		"[6] w1 wants 1 -> w1 gets j1 g0 p0 e2",
-		"[7] w1 denies j1 g0 p0 e2 no -> anew, w2 gets j1 g0 p0 e2 anew",
-		NULL });
+				   START,
+				   WORKER(2, "b"),
+				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+				   "[4] w2 denies j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
+				   "[5] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
+				   "[6] w2 denies j1 g0 p0 e2 my own -> -", /* made by itself: the other is asked */
+				   "[6] w1 wants 1 -> w1 gets j1 g0 p0 e2",
+				   "[7] w1 denies j1 g0 p0 e2 no -> anew, w2 gets j1 g0 p0 e2 anew",
+				   NULL,
+			   });
 	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
 	farm_free(f);
 }
@@ -100,12 +120,15 @@ static void a_third_that_leaves(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		START, WORKER(2, "b"), WORKER(3, "c"),
-		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-		"[4] w2 denies j1 g0 p0 e1 no -> -",
-		"[5] w3 leaves -> w2 gets j1 g0 p0 e1",
-		"[6] w2 denies j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
-		NULL });
+				   START,
+				   WORKER(2, "b"),
+				   WORKER(3, "c"),
+				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+				   "[4] w2 denies j1 g0 p0 e1 no -> -",
+				   "[5] w3 leaves -> w2 gets j1 g0 p0 e1",
+				   "[6] w2 denies j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
+				   NULL,
+			   });
 	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
 	farm_free(f);
 }
@@ -116,44 +139,57 @@ static void the_maker_goes_on(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		START, WORKER(2, "b"), WORKER(3, "c"),
-		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-		"[3] w2 wants 0 -> -",
-		"[4] w2 denies j1 g0 p0 e1 no -> -",
-		"[5] w3 leaves -> -",
-		"[5] w1 wants 1 -> w1 gets j1 g0 p0 e1",
-		"[6] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
-		NULL });
+				   START,
+				   WORKER(2, "b"),
+				   WORKER(3, "c"),
+				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+				   "[3] w2 wants 0 -> -",
+				   "[4] w2 denies j1 g0 p0 e1 no -> -",
+				   "[5] w3 leaves -> -",
+				   "[5] w1 wants 1 -> w1 gets j1 g0 p0 e1",
+				   "[6] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2",
+				   NULL,
+			   });
 	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
 	farm_free(f);
 }
 
-/* The epoch that the states are the end of is computed again, by somebody else; a round that it was in is open again. */
+/* The epoch that the states are the end of is computed again, by somebody else; a round that it was in is open again.
+ */
 static void a_second_refusal_takes_the_epoch_back(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START, WORKER(2, "b"), WORKER(3, "c"),
-		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-		"[4] w2 refuses j1 g0 p0 e1 no -> -",
-		"[5] w1 wants 1 -> -",
-		"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
-		"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			START,
+			WORKER(2, "b"),
+			WORKER(3, "c"),
+			"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+			"[4] w2 refuses j1 g0 p0 e1 no -> -",
+			"[5] w1 wants 1 -> -",
+			"[5] w3 wants 1 -> w3 gets j1 g0 p0 e1",
+			"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+			NULL,
+		});
 	struct job_status j;
 	assert_true(farm_job(f, 1, 6, &j));
 	assert_int_equal(j.rounds, 0);
 	assert_int_equal(j.leases_merged, 0);
 	assert_true(j.progress > 0);
 	transcript_play(f, (const char *const[]){
-		"[6] w1 batch j1 g0 p0 e1 -> refused: the epoch is not open",
-		"[7] w2 wants 0 -> -",
-		"[7] w2 returns j1 g0 p0 e0 -> w3 gets j1 g0 p0 e0", /* not who made them, while there is another */
-		"[7] w2 wants 1 -> -", "[7] w3 wants 0 -> -", "[7] w3 returns j1 g0 p0 e0 -> w2 gets j1 g0 p0 e0",
-		"[8] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
-		"[9] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
-		NULL });
+				   "[6] w1 batch j1 g0 p0 e1 -> refused: the epoch is not open",
+				   "[7] w2 wants 0 -> -",
+				   "[7] w2 returns j1 g0 p0 e0 -> w3 gets j1 g0 p0 e0", /* not who made them, while
+											   there is another */
+				   "[7] w2 wants 1 -> -",
+				   "[7] w3 wants 0 -> -",
+				   "[7] w3 returns j1 g0 p0 e0 -> w2 gets j1 g0 p0 e0",
+				   "[8] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1",
+				   "[9] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
+				   NULL,
+			   });
 	assert_int_equal(wrong(f, 1), 1);
 	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
 	farm_free(f);
@@ -164,37 +200,53 @@ static void a_late_refusal_is_of_no_consequence(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START, WORKER(2, "b"), WORKER(3, "c"),
-		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1", "[3] w3 wants 1 -> -",
-		"[4] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
-		"[5] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
-		"[6] w2 wants 0 -> -", "[6] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1",
-		"[7] w3 recalls j1 g0 p0 e1 no -> -",
-		"[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			START,
+			WORKER(2, "b"),
+			WORKER(3, "c"),
+			"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+			"[3] w3 wants 1 -> -",
+			"[4] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
+			"[5] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+			"[6] w2 wants 0 -> -",
+			"[6] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1",
+			"[7] w3 recalls j1 g0 p0 e1 no -> -",
+			"[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
+			NULL,
+		});
 	assert_int_equal(wrong(f, 1), 1);
 	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
 	farm_free(f);
 }
 
-/* A copy of the lease is out with the states that are given up: it is taken back, and what its worker says of them is late. */
+/* A copy of the lease is out with the states that are given up: it is taken back, and what its worker says of them is
+ * late. */
 static void who_has_states_that_are_given_up_loses_them(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START, WORKER(2, "b"), WORKER(3, "c"),
-		"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-		"[4] w3 wants 1 -> -", "[6] w2 heard -> w3 gets j1 g0 p0 e1",
-		"[6] w4 joins A threads=1 name=d -> -",
-		"[7] w2 wants 0 -> -", "[7] w2 refuses j1 g0 p0 e1 no -> -",
-		"[7] w4 wants 1 -> -", "[12] w3 heard -> w4 gets j1 g0 p0 e1",
-		"[13] w4 denies j1 g0 p0 e1 no -> w3 loses j1 g0 p0 e1, anew, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w4 gets j1 g0 p0 e1 anew",
-		"[13] w3 refuses j1 g0 p0 e1 no -> -", /* what it had before */
-		"[13] w4 refuses j1 g0 p0 e1 no -> -", /* the same */
-		"[14] w4 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			START,
+			WORKER(2, "b"),
+			WORKER(3, "c"),
+			"[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+			"[4] w3 wants 1 -> -",
+			"[6] w2 heard -> w3 gets j1 g0 p0 e1",
+			"[6] w4 joins A threads=1 name=d -> -",
+			"[7] w2 wants 0 -> -",
+			"[7] w2 refuses j1 g0 p0 e1 no -> -",
+			"[7] w4 wants 1 -> -",
+			"[12] w3 heard -> w4 gets j1 g0 p0 e1",
+			"[13] w4 denies j1 g0 p0 e1 no -> w3 loses j1 g0 p0 e1, anew, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w4 gets j1 g0 p0 e1 anew",
+			"[13] w3 refuses j1 g0 p0 e1 no -> -", /* what it had before */
+			"[13] w4 refuses j1 g0 p0 e1 no -> -", /* the same */
+			"[14] w4 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w3 gets j1 g0 p0 e2",
+			NULL,
+		});
 	farm_free(f);
 }
 
@@ -203,20 +255,34 @@ static void after_four_times_the_chains_begin_anew(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){ START, WORKER(2, "b"), "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1", NULL });
-	for (int i = 0; i < 4; i++)
-		transcript_play(f, (const char *const[]){
-			"[4] w2 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, w2 gets j1 g0 p0 e0", /* made by the other one */
-			"[4] w2 wants 0 -> -", "[4] w2 returns j1 g0 p0 e0 -> -",
-			"[4] w1 wants 1 -> -", /* whose epoch it is, while another is here */
-			"[4] w2 leaves -> w1 gets j1 g0 p0 e0",
-			"[5] w1 wants 0 -> -", "[5] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1",
-			"[5] w2 joins A threads=1 name=b -> -", "[5] w2 wants 1 -> w2 gets j1 g0 p0 e1",
-			NULL });
 	transcript_play(f, (const char *const[]){
-		"[6] w2 refuses j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
-		"[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
-		NULL });
+				   START,
+				   WORKER(2, "b"),
+				   "[3] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+				   NULL,
+			   });
+	for (int i = 0; i < 4; i++)
+		transcript_play(
+			f,
+			(const char *const[]){
+				"[4] w2 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, w2 gets j1 g0 p0 e0", /* made by the
+													     other one
+													   */
+				"[4] w2 wants 0 -> -",
+				"[4] w2 returns j1 g0 p0 e0 -> -",
+				"[4] w1 wants 1 -> -", /* whose epoch it is, while another is here */
+				"[4] w2 leaves -> w1 gets j1 g0 p0 e0",
+				"[5] w1 wants 0 -> -",
+				"[5] w1 batch j1 g0 p0 e0 -> merge, merged, j1 round 1",
+				"[5] w2 joins A threads=1 name=b -> -",
+				"[5] w2 wants 1 -> w2 gets j1 g0 p0 e1",
+				NULL,
+			});
+	transcript_play(f, (const char *const[]){
+				   "[6] w2 refuses j1 g0 p0 e1 no -> anew, w2 gets j1 g0 p0 e1 anew",
+				   "[7] w2 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2",
+				   NULL,
+			   });
 	assert_int_equal(wrong(f, 1) + wrong(f, 2), 0);
 	farm_free(f);
 }
@@ -226,33 +292,42 @@ static void one_epoch_after_the_other_is_taken_back(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] submit groups=2 rounds=4 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=2 name=a -> -",
-		"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
-		"[1] w1 batch j1 g0 p0 boot -> merge, merged", "[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
-		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0",
-		"[2] w2 joins A threads=2 name=b -> -", "[2] w3 joins A threads=2 name=c -> -",
-		"[2] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
-		"[2] w1 wants 1 -> -",
-		"[2] w1 batch j1 g0 p0 e1 -> merge, merged",
-		"[2] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g1 p0 e1",
-		"[2] w2 wants 1 -> w2 gets j1 g0 p0 e2",
-		"[2] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g1 p0 e2",
-		"[3] w2 refuses j1 g0 p0 e2 no -> -",
-		"[3] w3 wants 1 -> w3 gets j1 g0 p0 e2",
-		"[4] w3 refuses j1 g0 p0 e2 no -> back j1 g0 p0 e1, #1 wrong chain states: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e1",
-		NULL });
-	transcript_play(f, (const char *const[]){
-		"[5] w1 wants 0 -> -",
-		"[5] w1 batch j1 g1 p0 e2 -> merge, merged", /* one round ahead */
-		"[5] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
-		"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
-		"[7] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1",
-		"[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2, w3 gets j1 g1 p0 e3",
-		"[9] w2 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, w2 gets j1 g0 p0 e3",
-		"[9] w3 batch j1 g1 p0 e3 -> merge, merged",
-		"[9] w2 batch j1 g0 p0 e3 -> merge, merged, j1 round 4, j1 publish 4, j1 is done (mutations)",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[0] submit groups=2 rounds=4 -> j1 submitted, j1 is queued",
+			"[0] w1 joins A threads=2 name=a -> -",
+			"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+			"[1] w1 batch j1 g0 p0 boot -> merge, merged",
+			"[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
+			"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0",
+			"[2] w2 joins A threads=2 name=b -> -",
+			"[2] w3 joins A threads=2 name=c -> -",
+			"[2] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g0 p0 e1",
+			"[2] w1 wants 1 -> -",
+			"[2] w1 batch j1 g0 p0 e1 -> merge, merged",
+			"[2] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, w1 gets j1 g1 p0 e1",
+			"[2] w2 wants 1 -> w2 gets j1 g0 p0 e2",
+			"[2] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g1 p0 e2",
+			"[3] w2 refuses j1 g0 p0 e2 no -> -",
+			"[3] w3 wants 1 -> w3 gets j1 g0 p0 e2",
+			"[4] w3 refuses j1 g0 p0 e2 no -> back j1 g0 p0 e1, #1 wrong chain states: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e1",
+			NULL,
+		});
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[5] w1 wants 0 -> -",
+			"[5] w1 batch j1 g1 p0 e2 -> merge, merged", /* one round ahead */
+			"[5] w2 refuses j1 g0 p0 e1 no -> w3 gets j1 g0 p0 e1",
+			"[6] w3 refuses j1 g0 p0 e1 no -> back j1 g0 p0 e0, #1 wrong chain states: j1 render group 0 part 0 epoch 0, w2 gets j1 g0 p0 e0",
+			"[7] w2 batch j1 g0 p0 e0 -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1",
+			"[8] w3 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w2 gets j1 g0 p0 e2, w3 gets j1 g1 p0 e3",
+			"[9] w2 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, w2 gets j1 g0 p0 e3",
+			"[9] w3 batch j1 g1 p0 e3 -> merge, merged",
+			"[9] w2 batch j1 g0 p0 e3 -> merge, merged, j1 round 4, j1 publish 4, j1 is done (mutations)",
+			NULL,
+		});
 	assert_int_equal(wrong(f, 1), 2);
 	assert_int_equal(wrong(f, 2) + wrong(f, 3), 0);
 	farm_free(f);
@@ -263,26 +338,39 @@ static void a_liar_is_set_aside(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] submit groups=3 rounds=4 -> j1 submitted, j1 is queued", "[0] w1 joins A threads=3 name=a -> -",
-		"[0] w1 wants 3 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot",
-		"[1] w1 batch j1 g0 p0 boot -> merge, merged", "[1] w1 batch j1 g1 p0 boot -> merge, merged",
-		"[1] w1 batch j1 g2 p0 boot -> merge, merged, j1 prepare",
-		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0, w1 gets j1 g2 p0 e0",
-		"[2] w1 wants 0 -> -", "[2] w1 batch j1 g0 p0 e0 -> merge, merged", "[2] w1 batch j1 g1 p0 e0 -> merge, merged",
-		"[2] w1 batch j1 g2 p0 e0 -> merge, merged, j1 round 1",
-		"[3] w2 joins A threads=3 name=b -> -", "[3] w3 joins A threads=3 name=c -> -",
-		"[3] w2 wants 3 -> w2 gets j1 g0 p0 e1, w2 gets j1 g1 p0 e1, w2 gets j1 g2 p0 e1",
-		"[4] w2 denies j1 g0 p0 e1 no -> -", "[4] w2 denies j1 g1 p0 e1 no -> -", "[4] w2 denies j1 g2 p0 e1 no -> -",
-		"[5] w3 wants 3 -> w3 gets j1 g0 p0 e1, w3 gets j1 g1 p0 e1, w3 gets j1 g2 p0 e1",
-		"[6] w3 wants 0 -> -",
-		"[6] w3 batch j1 g0 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e2",
-		"[6] w3 batch j1 g1 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 1 part 0 epoch 1, w2 gets j1 g1 p0 e2",
-		NULL });
-	transcript_play(f, (const char *const[]){
-		"[6] w3 batch j1 g2 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 2 part 0 epoch 1, #2 aside, "
-		"w2 loses j1 g0 p0 e2, w2 loses j1 g1 p0 e2, j1 round 2",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[0] submit groups=3 rounds=4 -> j1 submitted, j1 is queued",
+			"[0] w1 joins A threads=3 name=a -> -",
+			"[0] w1 wants 3 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot",
+			"[1] w1 batch j1 g0 p0 boot -> merge, merged",
+			"[1] w1 batch j1 g1 p0 boot -> merge, merged",
+			"[1] w1 batch j1 g2 p0 boot -> merge, merged, j1 prepare",
+			"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0, w1 gets j1 g2 p0 e0",
+			"[2] w1 wants 0 -> -",
+			"[2] w1 batch j1 g0 p0 e0 -> merge, merged",
+			"[2] w1 batch j1 g1 p0 e0 -> merge, merged",
+			"[2] w1 batch j1 g2 p0 e0 -> merge, merged, j1 round 1",
+			"[3] w2 joins A threads=3 name=b -> -",
+			"[3] w3 joins A threads=3 name=c -> -",
+			"[3] w2 wants 3 -> w2 gets j1 g0 p0 e1, w2 gets j1 g1 p0 e1, w2 gets j1 g2 p0 e1",
+			"[4] w2 denies j1 g0 p0 e1 no -> -",
+			"[4] w2 denies j1 g1 p0 e1 no -> -",
+			"[4] w2 denies j1 g2 p0 e1 no -> -",
+			"[5] w3 wants 3 -> w3 gets j1 g0 p0 e1, w3 gets j1 g1 p0 e1, w3 gets j1 g2 p0 e1",
+			"[6] w3 wants 0 -> -",
+			"[6] w3 batch j1 g0 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 0 part 0 epoch 1, w2 gets j1 g0 p0 e2",
+			"[6] w3 batch j1 g1 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 1 part 0 epoch 1, w2 gets j1 g1 p0 e2",
+			NULL,
+		});
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[6] w3 batch j1 g2 p0 e1 -> merge, merged, #2 refused good chain states: j1 render group 2 part 0 epoch 1, #2 aside, "
+			"w2 loses j1 g0 p0 e2, w2 loses j1 g1 p0 e2, j1 round 2",
+			NULL,
+		});
 	assert_int_equal(wrong(f, 1) + wrong(f, 3), 0);
 	farm_free(f);
 }

@@ -7,8 +7,9 @@
 
 #include <cmocka.h>
 
-#define EIGHT "w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w1 gets j1 g3 p0 boot, " \
-	      "w1 gets j1 g4 p0 boot, w1 gets j1 g5 p0 boot, w1 gets j1 g6 p0 boot, w1 gets j1 g7 p0 boot"
+#define EIGHT                                                                                          \
+	"w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w1 gets j1 g3 p0 boot, " \
+	"w1 gets j1 g4 p0 boot, w1 gets j1 g5 p0 boot, w1 gets j1 g6 p0 boot, w1 gets j1 g7 p0 boot"
 
 /* Two copies after 30 s though nobody knows how long leases take, the next ones 1.5 medians after they were sent. */
 static void one_hoarder_stalls_nothing(void **state)
@@ -16,7 +17,8 @@ static void one_hoarder_stalls_nothing(void **state)
 	(void)state;
 	transcript((const char *const[]){
 		"[0] submit groups=10 -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=4096 -> -", "[0] w2 joins A threads=2 -> -",
+		"[0] w1 joins A threads=4096 -> -",
+		"[0] w2 joins A threads=2 -> -",
 		"[0] w1 wants 4097 -> j1 is bootstrap, " EIGHT,
 		"[1] w1 wants 4097 -> -",
 		"[20] w1 heard -> -",
@@ -27,7 +29,8 @@ static void one_hoarder_stalls_nothing(void **state)
 		"[31] w2 batch j1 g8 p0 boot -> merge, merged, w2 gets j1 g1 p0 boot",
 		"[32] w2 batch j1 g9 p0 boot -> merge, merged, w2 gets j1 g2 p0 boot",
 		"[33] w2 batch j1 g0 p0 boot -> merge, merged, w1 loses j1 g0 p0 boot, w2 gets j1 g3 p0 boot",
-		NULL });
+		NULL,
+	});
 }
 
 static void what_is_held_grows_with_what_is_given(void **state)
@@ -41,29 +44,39 @@ static void what_is_held_grows_with_what_is_given(void **state)
 		"w1 gets j1 g11 p0 boot, w1 gets j1 g12 p0 boot, w1 gets j1 g13 p0 boot, w1 gets j1 g14 p0 boot, w1 gets j1 g15 p0 boot, w1 gets j1 g16 p0 boot",
 		/* it comes again under its name, and has not lost it */
 		"[6] w1 leaves -> -",
-		NULL });
+		NULL,
+	});
 }
 
-/* Both copies are held by such: the older one is given up after two minutes, not after ten, and only for who has nothing to do. */
+/* Both copies are held by such: the older one is given up after two minutes, not after ten, and only for who has
+ * nothing to do. */
 static void two_hoarders_stall_it_for_minutes(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
 		"[0] submit -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=64 -> -", "[0] w2 joins A threads=64 -> -",
+		"[0] w1 joins A threads=64 -> -",
+		"[0] w2 joins A threads=64 -> -",
 		"[0] w1 wants 65 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
 		"[0] w2 wants 65 -> -",
-		"[25] w1 heard -> -", "[25] w2 heard -> -",
+		"[25] w1 heard -> -",
+		"[25] w2 heard -> -",
 		"[30] tick -> w2 gets j1 g0 p0 boot, w2 gets j1 g1 p0 boot",
-		"[50] w1 heard -> -", "[50] w2 heard -> -", "[75] w1 heard -> -", "[75] w2 heard -> -",
-		"[100] w1 heard -> -", "[100] w2 heard -> -",
+		"[50] w1 heard -> -",
+		"[50] w2 heard -> -",
+		"[75] w1 heard -> -",
+		"[75] w2 heard -> -",
+		"[100] w1 heard -> -",
+		"[100] w2 heard -> -",
 		"[110] w3 joins A threads=1 -> -",
 		"[115] w3 wants 2 -> -",
-		"[119] w1 heard -> -", "[119] w2 heard -> -",
+		"[119] w1 heard -> -",
+		"[119] w2 heard -> -",
 		"[125] tick -> w3 gets j1 g0 p0 boot, w3 gets j1 g1 p0 boot",
 		"[130] w3 batch j1 g0 p0 boot -> merge, merged, w2 loses j1 g0 p0 boot, w1 loses j1 g0 p0 boot",
 		"[131] w3 batch j1 g1 p0 boot -> merge, merged, w2 loses j1 g1 p0 boot, w1 loses j1 g1 p0 boot, j1 prepare",
-		NULL });
+		NULL,
+	});
 }
 
 /* Long leases of honest workers: where nobody is idle nothing is given up before ten minutes. */
@@ -72,15 +85,25 @@ static void long_leases_are_waited_for(void **state)
 	(void)state;
 	transcript((const char *const[]){
 		"[0] submit groups=2 -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=1 -> -", "[0] w2 joins A threads=1 -> -",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w2 joins A threads=1 -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 		"[0] w2 wants 1 -> w2 gets j1 g1 p0 boot",
-		"[25] w1 heard -> -", "[25] w2 heard -> -", "[50] w1 heard -> -", "[50] w2 heard -> -",
-		"[75] w1 heard -> -", "[75] w2 heard -> -", "[100] w1 heard -> -", "[100] w2 heard -> -",
+		"[25] w1 heard -> -",
+		"[25] w2 heard -> -",
+		"[50] w1 heard -> -",
+		"[50] w2 heard -> -",
+		"[75] w1 heard -> -",
+		"[75] w2 heard -> -",
+		"[100] w1 heard -> -",
+		"[100] w2 heard -> -",
 		"[125] tick -> -",
-		"[129] w1 heard -> -", "[129] w2 heard -> -", "[150] tick -> -",
+		"[129] w1 heard -> -",
+		"[129] w2 heard -> -",
+		"[150] tick -> -",
 		"[151] w1 batch j1 g0 p0 boot -> merge, merged",
-		NULL });
+		NULL,
+	});
 }
 
 /* It holds half as many after each that others had to answer, and twice as many again once it gives something. */
@@ -89,7 +112,8 @@ static void who_is_overtaken_holds_less(void **state)
 	(void)state;
 	transcript((const char *const[]){
 		"[0] submit groups=8 rounds=9 -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=64 -> -", "[0] w2 joins A threads=8 -> -",
+		"[0] w1 joins A threads=64 -> -",
+		"[0] w2 joins A threads=8 -> -",
 		"[0] w1 wants 65 -> j1 is bootstrap, " EIGHT,
 		"[20] w1 heard -> -",
 		"[20] w2 wants 4 -> -",
@@ -104,7 +128,8 @@ static void who_is_overtaken_holds_less(void **state)
 		"[32] w2 batch j1 g7 p0 boot -> merge, merged, w1 loses j1 g7 p0 boot, j1 prepare",
 		"[33] prepared j1 -> j1 is running, w2 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0, w2 gets j1 g2 p0 e0, w2 gets j1 g3 p0 e0, w2 gets j1 g4 p0 e0",
 		"[34] w1 batch j1 g1 p0 e0 -> merge, merged, w1 gets j1 g5 p0 e0, w1 gets j1 g6 p0 e0",
-		NULL });
+		NULL,
+	});
 }
 
 int main(void)

@@ -19,40 +19,45 @@ static enum job_state state_of(const struct farm *f, uint64_t job, double now, s
 
 static void play(struct farm *f, const char *line)
 {
-	transcript_play(f, (const char *const[]){ line, NULL });
+	transcript_play(f, (const char *const[]){line, NULL});
 }
 
-/* The process that renders ends, the worker calls again in its next life and says which lease it was: a failure, as if it had
- * held the lease still, once. Three workers, and the job is over; its owner's next job gets one lease at a time. */
+/* The process that renders ends, the worker calls again in its next life and says which lease it was: a failure, as if
+ * it had held the lease still, once. Three workers, and the job is over; its owner's next job gets one lease at a time.
+ */
 static void told_by_the_next_life(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] submit groups=1 owner=ann -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=1 home=a start=1 -> -", "[0] w2 joins A threads=1 home=b start=1 -> -",
-		"[0] w3 joins A threads=1 home=c start=1 -> -",
-		"[1] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		"[2] w1 leaves -> -",
-		"[2] w4 joins A threads=1 name=d home=a start=2 -> -",
-		"[2] w4 fails j1 g0 p0 boot SIGSEGV -> -",
-		"[2] w4 fails j1 g0 p0 boot SIGSEGV -> -", /* it is told once */
-		"[2] w4 wants 1 -> -", /* and pauses */
-		"[2] w2 wants 1 -> w2 gets j1 g0 p0 boot",
-		/* the new life calls before the old connection is known to be cut */
-		"[3] w5 joins A threads=1 home=b start=2 -> close w2",
-		"[3] w5 fails j1 g0 p0 boot SIGABRT -> -",
-		"[3] w3 wants 1 -> w3 gets j1 g0 p0 boot",
-		"[3] w3 leaves -> -",
-		"[3] w6 joins A threads=1 home=c start=2 -> -",
-		"[3] w6 fails j1 g0 p0 boot SIGFPE -> j1 is failed (failed: w6: SIGFPE)",
-		"[3] submit groups=2 parts=2 owner=ann -> j2 submitted, j2 is queued, j2 is bootstrap, w4 gets j2 g0 p0 boot",
-		"[3] w6 wants 1 -> -",
-		"[3] w5 wants 1 -> -",
-		/* whose jobs ended nobody has all */
-		"[3] submit groups=2 parts=1 owner=bob -> j3 submitted, j3 is queued, j3 is bootstrap, w6 gets j3 g0 p0 boot, w5 gets j3 g1 p0 boot",
-		"[4] w5 batch j3 g1 p0 boot -> merge, merged",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[0] submit groups=1 owner=ann -> j1 submitted, j1 is queued",
+			"[0] w1 joins A threads=1 home=a start=1 -> -",
+			"[0] w2 joins A threads=1 home=b start=1 -> -",
+			"[0] w3 joins A threads=1 home=c start=1 -> -",
+			"[1] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+			"[2] w1 leaves -> -",
+			"[2] w4 joins A threads=1 name=d home=a start=2 -> -",
+			"[2] w4 fails j1 g0 p0 boot SIGSEGV -> -",
+			"[2] w4 fails j1 g0 p0 boot SIGSEGV -> -", /* it is told once */
+			"[2] w4 wants 1 -> -",			   /* and pauses */
+			"[2] w2 wants 1 -> w2 gets j1 g0 p0 boot",
+			/* the new life calls before the old connection is known to be cut */
+			"[3] w5 joins A threads=1 home=b start=2 -> close w2",
+			"[3] w5 fails j1 g0 p0 boot SIGABRT -> -",
+			"[3] w3 wants 1 -> w3 gets j1 g0 p0 boot",
+			"[3] w3 leaves -> -",
+			"[3] w6 joins A threads=1 home=c start=2 -> -",
+			"[3] w6 fails j1 g0 p0 boot SIGFPE -> j1 is failed (failed: w6: SIGFPE)",
+			"[3] submit groups=2 parts=2 owner=ann -> j2 submitted, j2 is queued, j2 is bootstrap, w4 gets j2 g0 p0 boot",
+			"[3] w6 wants 1 -> -",
+			"[3] w5 wants 1 -> -",
+			/* whose jobs ended nobody has all */
+			"[3] submit groups=2 parts=1 owner=bob -> j3 submitted, j3 is queued, j3 is bootstrap, w6 gets j3 g0 p0 boot, w5 gets j3 g1 p0 boot",
+			"[4] w5 batch j3 g1 p0 boot -> merge, merged",
+			NULL,
+		});
 	struct job_status s;
 	assert_int_equal(state_of(f, 2, 4, &s), JOB_BOOTSTRAP);
 	assert_int_equal(s.leases_out, 1);
@@ -67,27 +72,36 @@ static void limit_ends(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] submit groups=1 owner=ann -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=1 home=a start=1 -> -", "[0] w2 joins A threads=1 home=b start=1 -> -",
-		"[0] w3 joins A threads=1 home=c start=1 -> -",
-		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		"[0] w4 joins A threads=1 home=a start=2 -> close w1", "[0] w4 fails j1 g0 p0 boot dead -> -",
-		"[0] w2 wants 1 -> w2 gets j1 g0 p0 boot",
-		"[0] w5 joins A threads=1 home=b start=2 -> close w2", "[0] w5 fails j1 g0 p0 boot dead -> -",
-		"[0] w3 wants 1 -> w3 gets j1 g0 p0 boot",
-		"[0] w6 joins A threads=1 home=c start=2 -> close w3",
-		"[0] w6 fails j1 g0 p0 boot dead -> j1 is failed (failed: w6: dead)",
-		"[1] submit groups=1 owner=ann -> j2 submitted, j2 is queued",
-		"[1] submit groups=1 owner=ann -> j3 submitted, j3 is queued",
-		"[1] w6 wants 1 -> j2 is bootstrap, w6 gets j2 g0 p0 boot",
-		"[1] w5 wants 1 -> -",
-		NULL });
+				   "[0] submit groups=1 owner=ann -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=1 home=a start=1 -> -",
+				   "[0] w2 joins A threads=1 home=b start=1 -> -",
+				   "[0] w3 joins A threads=1 home=c start=1 -> -",
+				   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+				   "[0] w4 joins A threads=1 home=a start=2 -> close w1",
+				   "[0] w4 fails j1 g0 p0 boot dead -> -",
+				   "[0] w2 wants 1 -> w2 gets j1 g0 p0 boot",
+				   "[0] w5 joins A threads=1 home=b start=2 -> close w2",
+				   "[0] w5 fails j1 g0 p0 boot dead -> -",
+				   "[0] w3 wants 1 -> w3 gets j1 g0 p0 boot",
+				   "[0] w6 joins A threads=1 home=c start=2 -> close w3",
+				   "[0] w6 fails j1 g0 p0 boot dead -> j1 is failed (failed: w6: dead)",
+				   "[1] submit groups=1 owner=ann -> j2 submitted, j2 is queued",
+				   "[1] submit groups=1 owner=ann -> j3 submitted, j3 is queued",
+				   "[1] w6 wants 1 -> j2 is bootstrap, w6 gets j2 g0 p0 boot",
+				   "[1] w5 wants 1 -> -",
+				   NULL,
+			   });
 	struct job_status s;
 	assert_int_equal(state_of(f, 3, 1, &s), JOB_QUEUED);
 	assert_non_null(strstr(s.waiting, "one lease at a time"));
 	transcript_play(f, (const char *const[]){
-		"[25] w6 heard -> -", "[25] w5 heard -> -", "[50] w6 heard -> -", "[50] w5 heard -> -",
-		"[61] w5 heard -> j3 is bootstrap, w5 gets j3 g0 p0 boot", NULL });
+				   "[25] w6 heard -> -",
+				   "[25] w5 heard -> -",
+				   "[50] w6 heard -> -",
+				   "[50] w5 heard -> -",
+				   "[61] w5 heard -> j3 is bootstrap, w5 gets j3 g0 p0 boot",
+				   NULL,
+			   });
 	farm_free(f);
 }
 
@@ -101,18 +115,21 @@ static void never_heard_again(void **state)
 	for (int i = 1; i <= 8; i++) {
 		snprintf(line, sizeof line, "[%d] w%d joins A threads=1 -> -", i, i);
 		play(f, line);
-		snprintf(line, sizeof line, "[%d] w%d wants 1 -> %sw%d gets j1 g0 p0 boot", i, i, i == 1 ? "j1 is bootstrap, " : "", i);
+		snprintf(line, sizeof line, "[%d] w%d wants 1 -> %sw%d gets j1 g0 p0 boot", i, i,
+			 i == 1 ? "j1 is bootstrap, " : "", i);
 		play(f, line);
-		snprintf(line, sizeof line, "[%d] w%d leaves -> %s", i, i,
-			 i < 8 ? "-"
-			       : "j1 is failed (failed: job: 8 of 8 workers that were lost in a row while they held bootstrap group 0 part 0 epoch 0; "
-				 "the last one: w8)");
+		snprintf(
+			line, sizeof line, "[%d] w%d leaves -> %s", i, i,
+			i < 8 ? "-"
+			      : "j1 is failed (failed: job: 8 of 8 workers that were lost in a row while they held bootstrap group 0 part 0 epoch 0; "
+				"the last one: w8)");
 		play(f, line);
 	}
 	farm_free(f);
 }
 
-/* The same worker over and over is one, and has come back each time: killed and started again, cut off and connected again. */
+/* The same worker over and over is one, and has come back each time: killed and started again, cut off and connected
+ * again. */
 static void back_again(void **state)
 {
 	(void)state;
@@ -123,7 +140,8 @@ static void back_again(void **state)
 	for (int i = 1; i <= 20; i++) {
 		snprintf(line, sizeof line, "[%d] w%d joins A threads=1 name=a home=a start=%d -> -", i, i, 1 + i / 2);
 		play(f, line);
-		snprintf(line, sizeof line, "[%d] w%d wants 1 -> %sw%d gets j1 g0 p0 boot", i, i, i == 1 ? "j1 is bootstrap, " : "", i);
+		snprintf(line, sizeof line, "[%d] w%d wants 1 -> %sw%d gets j1 g0 p0 boot", i, i,
+			 i == 1 ? "j1 is bootstrap, " : "", i);
 		play(f, line);
 		snprintf(line, sizeof line, "[%d] w%d leaves -> -", i, i);
 		play(f, line);
@@ -133,8 +151,8 @@ static void back_again(void **state)
 	farm_free(f);
 }
 
-/* Racks of four workers lose their power again and again in the middle of all leases; they come back, or others do. What is
- * merged in between begins the count anew. */
+/* Racks of four workers lose their power again and again in the middle of all leases; they come back, or others do.
+ * What is merged in between begins the count anew. */
 static void racks(void **state)
 {
 	(void)state;
@@ -150,17 +168,25 @@ static void racks(void **state)
 		}
 		struct update u;
 		for (int i = 1; i <= 4; i++)
-			farm_step(f, &(struct event){.kind = EVENT_REQUEST, .time = rack, .peer = (uint64_t)(peer + i), .want = 1}, &u);
+			farm_step(f,
+				  &(struct event){
+					  .kind = EVENT_REQUEST, .time = rack, .peer = (uint64_t)(peer + i), .want = 1},
+				  &u);
 		if (rack % 7 == 6) /* something of each is made */
 			for (uint32_t g = 0; g < 4; g++)
 				for (uint64_t i = 1; i <= 4; i++) {
 					struct lease_status l;
 					if (farm_lease(f, (uint64_t)peer + i, 0, &l) && l.key.group == g)
-						farm_step(f, &(struct event){.kind = EVENT_BATCH, .time = rack, .peer = (uint64_t)peer + i,
-									     .lease = {.key = l.key, .valid = true}}, &u);
+						farm_step(f,
+							  &(struct event){.kind = EVENT_BATCH,
+									  .time = rack,
+									  .peer = (uint64_t)peer + i,
+									  .lease = {.key = l.key, .valid = true}},
+							  &u);
 				}
 		for (int i = 1; i <= 4; i++)
-			farm_step(f, &(struct event){.kind = EVENT_LEFT, .time = rack, .peer = (uint64_t)(peer + i)}, &u);
+			farm_step(f, &(struct event){.kind = EVENT_LEFT, .time = rack, .peer = (uint64_t)(peer + i)},
+				  &u);
 		peer += 4;
 	}
 	assert_true(state_of(f, 1, 15, &s) != JOB_FAILED);
@@ -180,7 +206,8 @@ static void one_certificate(void **state)
 	for (int i = 1; i <= 12; i++) {
 		snprintf(line, sizeof line, "[%d] w%d joins A threads=1 certificate=a -> -", i, i);
 		play(f, line);
-		snprintf(line, sizeof line, "[%d] w%d wants 1 -> %sw%d gets j1 g0 p0 boot", i, i, i == 1 ? "j1 is bootstrap, " : "", i);
+		snprintf(line, sizeof line, "[%d] w%d wants 1 -> %sw%d gets j1 g0 p0 boot", i, i,
+			 i == 1 ? "j1 is bootstrap, " : "", i);
 		play(f, line);
 		snprintf(line, sizeof line, "[%d] w%d leaves -> -", i, i);
 		play(f, line);
@@ -192,8 +219,12 @@ static void one_certificate(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(told_by_the_next_life), cmocka_unit_test(limit_ends),	cmocka_unit_test(never_heard_again),
-		cmocka_unit_test(back_again),		 cmocka_unit_test(racks),	cmocka_unit_test(one_certificate),
+		cmocka_unit_test(told_by_the_next_life),
+		cmocka_unit_test(limit_ends),
+		cmocka_unit_test(never_heard_again),
+		cmocka_unit_test(back_again),
+		cmocka_unit_test(racks),
+		cmocka_unit_test(one_certificate),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

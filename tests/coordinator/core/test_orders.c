@@ -21,25 +21,29 @@ static void hold_and_release(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] submit groups=3 -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=2 -> -",
-		"[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
-		"[1] hold order j1 held by ann -> -",
-		"[1] hold order j1 held by bob -> -", /* whoever came last */
-		"[2] w1 batch j1 g0 p0 boot -> merge, merged",
-		NULL });
+				   "[0] submit groups=3 -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=2 -> -",
+				   "[0] w1 wants 2 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot",
+				   "[1] hold order j1 held by ann -> -",
+				   "[1] hold order j1 held by bob -> -", /* whoever came last */
+				   "[2] w1 batch j1 g0 p0 boot -> merge, merged",
+				   NULL,
+			   });
 	assert_int_equal(status(f, 1, 2).state, JOB_HELD);
 	assert_string_equal(status(f, 1, 2).waiting, "held by bob");
-	transcript_play(f, (const char *const[]){
-		"[2] submit groups=1 priority=-9 -> j2 submitted, j2 is queued, j2 is bootstrap, w1 gets j2 g0 p0 boot",
-		"[3] w1 batch j2 g0 p0 boot -> merge, merged, j2 prepare",
-		"[3] w1 batch j1 g1 p0 boot -> merge, merged",
-		"[4] release order j1 -> w1 gets j1 g2 p0 boot",
-		"[4] release order j1 -> -",
-		"[5] hold order j9 held by ann -> rejected: no such job",
-		"[5] cancel j1 -> j1 cancelled, w1 loses j1 g2 p0 boot, j1 is cancelled (cancelled: cancelled)",
-		"[5] hold order j1 held by ann -> rejected: the job is over",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[2] submit groups=1 priority=-9 -> j2 submitted, j2 is queued, j2 is bootstrap, w1 gets j2 g0 p0 boot",
+			"[3] w1 batch j2 g0 p0 boot -> merge, merged, j2 prepare",
+			"[3] w1 batch j1 g1 p0 boot -> merge, merged",
+			"[4] release order j1 -> w1 gets j1 g2 p0 boot",
+			"[4] release order j1 -> -",
+			"[5] hold order j9 held by ann -> rejected: no such job",
+			"[5] cancel j1 -> j1 cancelled, w1 loses j1 g2 p0 boot, j1 is cancelled (cancelled: cancelled)",
+			"[5] hold order j1 held by ann -> rejected: the job is over",
+			NULL,
+		});
 	assert_int_equal(status(f, 1, 5).state, JOB_CANCELLED);
 	farm_free(f);
 }
@@ -49,16 +53,30 @@ static void two_reasons(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] submit -> j1 submitted, j1 is queued",
-		"[0] hold order j1 held by ann -> -", "[0] hold j1 no room -> -",
-		"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> -", NULL });
+				   "[0] submit -> j1 submitted, j1 is queued",
+				   "[0] hold order j1 held by ann -> -",
+				   "[0] hold j1 no room -> -",
+				   "[0] w1 joins A threads=1 -> -",
+				   "[0] w1 wants 1 -> -",
+				   NULL,
+			   });
 	assert_string_equal(status(f, 1, 0).waiting, "held by ann; no room");
-	transcript_play(f, (const char *const[]){ "[1] release order j1 -> -", NULL });
+	transcript_play(f, (const char *const[]){
+				   "[1] release order j1 -> -",
+				   NULL,
+			   });
 	assert_string_equal(status(f, 1, 1).waiting, "no room");
-	transcript_play(f, (const char *const[]){ "[1] hold order j1 held by ann -> -", "[2] release j1 -> -", NULL });
+	transcript_play(f, (const char *const[]){
+				   "[1] hold order j1 held by ann -> -",
+				   "[2] release j1 -> -",
+				   NULL,
+			   });
 	assert_string_equal(status(f, 1, 2).waiting, "held by ann");
 	assert_int_equal(status(f, 1, 2).state, JOB_HELD);
-	transcript_play(f, (const char *const[]){ "[3] release order j1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot", NULL });
+	transcript_play(f, (const char *const[]){
+				   "[3] release order j1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+				   NULL,
+			   });
 	farm_free(f);
 }
 
@@ -67,20 +85,28 @@ static void the_clock_stands_still(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[100] restore j1 render 2,3 elapsed=3 completed=2 rounds=inf seconds=8 -> j1 is running",
-		"[100] w1 joins A threads=1 -> -",
-		"[100] hold order j1 held by ann -> -",
-		"[150] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3",
-		"[150] w1 batch j1 g0 p0 e3 -> merge, merged", NULL });
+	transcript_play(
+		f, (const char *const[]){
+			   "[100] restore j1 render 2,3 elapsed=3 completed=2 rounds=inf seconds=8 -> j1 is running",
+			   "[100] w1 joins A threads=1 -> -",
+			   "[100] hold order j1 held by ann -> -",
+			   "[150] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3",
+			   "[150] w1 batch j1 g0 p0 e3 -> merge, merged",
+			   NULL,
+		   });
 	assert_true(farm_elapsed(f, 1, 180) == 3);
 	transcript_play(f, (const char *const[]){
-		"[190] release order j1 -> -", NULL });
+				   "[190] release order j1 -> -",
+				   NULL,
+			   });
 	assert_true(farm_elapsed(f, 1, 194) == 7);
-	transcript_play(f, (const char *const[]){
-		"[194] w1 batch j1 g1 p0 e3 -> merge, merged, j1 round 4",
-		"[194] w1 batch j1 g0 p0 e4 -> merge, merged",
-		"[195] w1 batch j1 g1 p0 e4 -> merge, merged, j1 round 5, j1 publish 5, j1 is done (time)", NULL });
+	transcript_play(
+		f, (const char *const[]){
+			   "[194] w1 batch j1 g1 p0 e3 -> merge, merged, j1 round 4",
+			   "[194] w1 batch j1 g0 p0 e4 -> merge, merged",
+			   "[195] w1 batch j1 g1 p0 e4 -> merge, merged, j1 round 5, j1 publish 5, j1 is done (time)",
+			   NULL,
+		   });
 	farm_free(f);
 }
 
@@ -88,27 +114,33 @@ static void priority(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] submit groups=4 -> j1 submitted, j1 is queued",
-		"[0] submit groups=4 -> j2 submitted, j2 is queued",
-		"[0] submit groups=4 -> j3 submitted, j3 is queued",
-		"[0] w1 joins A threads=1 -> -",
-		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		"[1] priority j3 1 -> -", /* the lease that is out stays */
-		"[1] w1 batch j1 g0 p0 boot -> merge, merged, j3 is bootstrap, w1 gets j3 g0 p0 boot",
-		"[2] priority j2 1 -> -",
-		"[2] w1 batch j3 g0 p0 boot -> merge, merged, j2 is bootstrap, w1 gets j2 g0 p0 boot", /* the older one */
-		"[3] priority j2 -100 -> -",
-		"[3] priority j3 0 -> -",
-		"[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot", /* as if it had never been */
-		"[4] priority j3 100 -> -",
-		"[4] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j3 g1 p0 boot",
-		"[5] priority j3 101 -> rejected: a priority is from -100 to 100",
-		"[5] priority j4 1 -> rejected: no such job",
-		"[5] cancel j1 -> j1 cancelled, j1 is cancelled (cancelled: cancelled)",
-		"[5] priority j1 1 -> rejected: the job is over",
-		"[6] cancel j3 -> j3 cancelled, w1 loses j3 g1 p0 boot, j3 is cancelled (cancelled: cancelled), w1 gets j2 g1 p0 boot",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[0] submit groups=4 -> j1 submitted, j1 is queued",
+			"[0] submit groups=4 -> j2 submitted, j2 is queued",
+			"[0] submit groups=4 -> j3 submitted, j3 is queued",
+			"[0] w1 joins A threads=1 -> -",
+			"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+			"[1] priority j3 1 -> -", /* the lease that is out stays */
+			"[1] w1 batch j1 g0 p0 boot -> merge, merged, j3 is bootstrap, w1 gets j3 g0 p0 boot",
+			"[2] priority j2 1 -> -",
+			"[2] w1 batch j3 g0 p0 boot -> merge, merged, j2 is bootstrap, w1 gets j2 g0 p0 boot", /* the
+														  older
+														  one */
+			"[3] priority j2 -100 -> -",
+			"[3] priority j3 0 -> -",
+			"[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot", /* as if it had never been
+											       */
+			"[4] priority j3 100 -> -",
+			"[4] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j3 g1 p0 boot",
+			"[5] priority j3 101 -> rejected: a priority is from -100 to 100",
+			"[5] priority j4 1 -> rejected: no such job",
+			"[5] cancel j1 -> j1 cancelled, j1 is cancelled (cancelled: cancelled)",
+			"[5] priority j1 1 -> rejected: the job is over",
+			"[6] cancel j3 -> j3 cancelled, w1 loses j3 g1 p0 boot, j3 is cancelled (cancelled: cancelled), w1 gets j2 g1 p0 boot",
+			NULL,
+		});
 	assert_int_equal(status(f, 3, 5).priority, 100);
 	farm_free(f);
 }
@@ -118,27 +150,35 @@ static void extend_while_it_runs(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] restore j1 render 1,2 rounds=2 -> j1 is running",
-		"[0] w1 joins A threads=2 -> -", "[0] w1 wants 2 -> w1 gets j1 g0 p0 e1",
-		"[1] extend j1 rounds=4 -> w1 gets j1 g1 p0 e2",
-		"[1] extend j9 rounds=4 -> rejected: no such job",
-		"[2] w1 batch j1 g1 p0 e2 -> merge, merged",
-		"[3] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2, w1 gets j1 g1 p0 e3",
-		"[4] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, w1 gets j1 g0 p0 e3",
-		"[5] w1 batch j1 g0 p0 e3 -> merge, merged",
-		"[6] w1 batch j1 g1 p0 e3 -> merge, merged, j1 round 4, j1 publish 4, j1 is done (mutations)",
-		"[6] extend j1 rounds=5 -> rejected: the job is over", NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[0] restore j1 render 1,2 rounds=2 -> j1 is running",
+			"[0] w1 joins A threads=2 -> -",
+			"[0] w1 wants 2 -> w1 gets j1 g0 p0 e1",
+			"[1] extend j1 rounds=4 -> w1 gets j1 g1 p0 e2",
+			"[1] extend j9 rounds=4 -> rejected: no such job",
+			"[2] w1 batch j1 g1 p0 e2 -> merge, merged",
+			"[3] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2, w1 gets j1 g1 p0 e3",
+			"[4] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, w1 gets j1 g0 p0 e3",
+			"[5] w1 batch j1 g0 p0 e3 -> merge, merged",
+			"[6] w1 batch j1 g1 p0 e3 -> merge, merged, j1 round 4, j1 publish 4, j1 is done (mutations)",
+			"[6] extend j1 rounds=5 -> rejected: the job is over",
+			NULL,
+		});
 	farm_free(f);
 	/* in the bootstrap, too */
 	transcript((const char *const[]){
 		"[0] restore j1 boot 1,0 rounds=1 -> -",
-		"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g1 p0 boot",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g1 p0 boot",
 		"[1] extend j1 rounds=2 -> -",
 		"[1] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
 		"[1] extend j1 rounds=3 -> -",
 		"[1] w1 batch j1 g1 p0 e2 -> refused: the bootstrap is not complete",
-		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0", NULL });
+		"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+		NULL,
+	});
 }
 
 /* The error is estimated once more because a bound is met, and then it is not. */
@@ -147,24 +187,33 @@ static void extend_while_it_ends(void **state)
 	(void)state;
 	transcript((const char *const[]){
 		"[0] restore j1 render 2,2 elapsed=1 completed=1 rounds=2 target=0.1 -> j1 is running, j1 evaluate 2",
-		"[0] w1 joins A threads=1 -> -", "[0] w1 wants 1 -> -",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w1 wants 1 -> -",
 		"[1] extend j1 rounds=3 target=0.05 -> w1 gets j1 g0 p0 e2",
 		"[2] error j1 2 0.07 -> -",
 		"[3] w1 batch j1 g0 p0 e2 -> merge, merged, w1 gets j1 g1 p0 e2",
 		"[4] w1 batch j1 g1 p0 e2 -> merge, merged, j1 round 3, j1 evaluate 3",
 		/* another target alone: the rounds are over all the same */
 		"[5] extend j1 rounds=3 target=0.01 -> -",
-		"[6] error j1 3 0.05 -> j1 publish 3, j1 is done (mutations)", NULL });
+		"[6] error j1 3 0.05 -> j1 publish 3, j1 is done (mutations)",
+		NULL,
+	});
 	/* after nine rounds one long job would not have looked at all */
 	transcript((const char *const[]){
 		"[0] restore j1 render 9,9 elapsed=1 completed=1 rounds=9 target=0.1 -> j1 is running, j1 evaluate 9",
 		"[1] extend j1 rounds=12 target=0.1 -> -",
 		"[2] error j1 9 0.05 -> -",
-		"[3] w1 joins A threads=1 -> -", "[3] w1 wants 1 -> w1 gets j1 g0 p0 e9", NULL });
+		"[3] w1 joins A threads=1 -> -",
+		"[3] w1 wants 1 -> w1 gets j1 g0 p0 e9",
+		NULL,
+	});
 	transcript((const char *const[]){
 		"[10] restore j1 render 2,2 elapsed=9 completed=9 rounds=inf seconds=8 target=0.1 -> j1 is running, j1 evaluate 2",
 		"[10] extend j1 rounds=inf seconds=20 target=0.1 -> -",
-		"[11] w1 joins A threads=1 -> -", "[11] w1 wants 1 -> w1 gets j1 g0 p0 e2", NULL });
+		"[11] w1 joins A threads=1 -> -",
+		"[11] w1 wants 1 -> w1 gets j1 g0 p0 e2",
+		NULL,
+	});
 }
 
 /* A job that has ended comes to life again under its id; what it had counted is told by whoever remembers. */
@@ -172,38 +221,43 @@ static void extend_when_it_has_ended(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] submit rounds=1 -> j1 submitted, j1 is queued",
-		"[0] submit rounds=1 priority=1 -> j2 submitted, j2 is queued",
-		"[0] cancel j2 -> j2 cancelled, j2 is cancelled (cancelled: cancelled)",
-		"[0] w1 joins A threads=1 -> -",
-		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		"[1] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot",
-		"[2] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
-		"[2] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
-		"[3] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g1 p0 e0",
-		"[4] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, j1 publish 1, j1 is done (mutations)",
-		"[9] restore j1 render 1,1 fingerprint=A elapsed=4 completed=4 rounds=2 -> j1 is running, w1 gets j1 g0 p0 e1",
-		"[9] submit -> j3 submitted, j3 is queued", /* ids go on */
-		"[9] w1 batch j1 g1 p0 e0 -> repeat: merged already", NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[0] submit rounds=1 -> j1 submitted, j1 is queued",
+			"[0] submit rounds=1 priority=1 -> j2 submitted, j2 is queued",
+			"[0] cancel j2 -> j2 cancelled, j2 is cancelled (cancelled: cancelled)",
+			"[0] w1 joins A threads=1 -> -",
+			"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+			"[1] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot",
+			"[2] w1 batch j1 g1 p0 boot -> merge, merged, j1 prepare",
+			"[2] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0",
+			"[3] w1 batch j1 g0 p0 e0 -> merge, merged, w1 gets j1 g1 p0 e0",
+			"[4] w1 batch j1 g1 p0 e0 -> merge, merged, j1 round 1, j1 publish 1, j1 is done (mutations)",
+			"[9] restore j1 render 1,1 fingerprint=A elapsed=4 completed=4 rounds=2 -> j1 is running, w1 gets j1 g0 p0 e1",
+			"[9] submit -> j3 submitted, j3 is queued", /* ids go on */
+			"[9] w1 batch j1 g1 p0 e0 -> repeat: merged already",
+			NULL,
+		});
 	assert_true(farm_elapsed(f, 1, 10) == 5);
 	struct job_counts counts;
 	assert_true(farm_counts(f, 1, &counts) && farm_counts(f, 2, &counts));
-	transcript_play(f, (const char *const[]){
-		"[10] w1 batch j1 g0 p0 e1 -> merge, merged, w1 gets j1 g1 p0 e1", /* the older one */
-		"[11] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (mutations), j3 is bootstrap, w1 gets j3 g0 p0 boot", NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[10] w1 batch j1 g0 p0 e1 -> merge, merged, w1 gets j1 g1 p0 e1", /* the older one */
+			"[11] w1 batch j1 g1 p0 e1 -> merge, merged, j1 round 2, j1 publish 2, j1 is done (mutations), j3 is bootstrap, w1 gets j3 g0 p0 boot",
+			NULL,
+		});
 	farm_free(f);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(hold_and_release),
-		cmocka_unit_test(two_reasons),
-		cmocka_unit_test(the_clock_stands_still),
-		cmocka_unit_test(priority),
-		cmocka_unit_test(extend_while_it_runs),
-		cmocka_unit_test(extend_while_it_ends),
+		cmocka_unit_test(hold_and_release),	    cmocka_unit_test(two_reasons),
+		cmocka_unit_test(the_clock_stands_still),   cmocka_unit_test(priority),
+		cmocka_unit_test(extend_while_it_runs),	    cmocka_unit_test(extend_while_it_ends),
 		cmocka_unit_test(extend_when_it_has_ended),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -14,32 +14,38 @@ static void in_the_bootstrap(void **state)
 	(void)state;
 	transcript((const char *const[]){
 		"[0] restore j4 boot 1,0 fingerprint=A elapsed=3 -> -",
-		"[0] w1 joins B threads=1 -> -", "[0] w1 wants 1 -> -", /* it belongs to A */
-		"[0] w2 joins A threads=1 -> -", "[0] w2 wants 1 -> w2 gets j4 g1 p0 boot",
+		"[0] w1 joins B threads=1 -> -",
+		"[0] w1 wants 1 -> -", /* it belongs to A */
+		"[0] w2 joins A threads=1 -> -",
+		"[0] w2 wants 1 -> w2 gets j4 g1 p0 boot",
 		"[1] w2 batch j4 g0 p0 boot -> repeat: merged already",
 		"[1] w2 batch j4 g1 p0 boot -> merge, merged, j4 prepare",
 		"[1] prepared j4 -> j4 is running, w2 gets j4 g0 p0 e0",
-		NULL });
+		NULL,
+	});
 }
 
-/* Two rounds are open, as they were: what is merged is a repeat, what was out counts when it comes, asked for or not. */
+/* Two rounds are open, as they were: what is merged is a repeat, what was out counts when it comes, asked for or not.
+ */
 static void in_a_round(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] restore j7 render 4,3,5 fingerprint=A elapsed=10 groups=3 rounds=9 -> j7 is running",
-		"[0] w1 joins A threads=1 -> -",
-		"[0] w1 batch j7 g0 p0 e3 -> repeat: merged already",
-		"[0] w1 batch j7 g2 p0 e5 -> refused: the epoch is not open",
-		"[0] w1 wants 1 -> w1 gets j7 g1 p0 e3",
-		"[1] w1 batch j7 g0 p0 e4 -> merge, merged",
-		"[1] w1 batch j7 g0 p0 e5 -> refused: the epoch is not open",
-		"[2] w1 batch j7 g1 p0 e3 -> merge, merged, j7 round 4, w1 gets j7 g1 p0 e4",
-		"[3] w1 batch j7 g1 p0 e4 -> merge, merged, j7 round 5, w1 gets j7 g2 p0 e5",
-		/* ids go on */
-		"[3] submit -> j8 submitted, j8 is queued",
-		NULL });
+	transcript_play(
+		f, (const char *const[]){
+			   "[0] restore j7 render 4,3,5 fingerprint=A elapsed=10 groups=3 rounds=9 -> j7 is running",
+			   "[0] w1 joins A threads=1 -> -",
+			   "[0] w1 batch j7 g0 p0 e3 -> repeat: merged already",
+			   "[0] w1 batch j7 g2 p0 e5 -> refused: the epoch is not open",
+			   "[0] w1 wants 1 -> w1 gets j7 g1 p0 e3",
+			   "[1] w1 batch j7 g0 p0 e4 -> merge, merged",
+			   "[1] w1 batch j7 g0 p0 e5 -> refused: the epoch is not open",
+			   "[2] w1 batch j7 g1 p0 e3 -> merge, merged, j7 round 4, w1 gets j7 g1 p0 e4",
+			   "[3] w1 batch j7 g1 p0 e4 -> merge, merged, j7 round 5, w1 gets j7 g2 p0 e5",
+			   /* ids go on */
+			   "[3] submit -> j8 submitted, j8 is queued",
+			   NULL,
+		   });
 	struct job_status s;
 	assert_true(farm_job(f, 7, 3, &s));
 	assert_int_equal(s.leases_merged, 4 + 3 + 5 + 3);
@@ -49,14 +55,17 @@ static void in_a_round(void **state)
 	farm_free(f);
 }
 
-/* A result from an earlier life that waited for another one: it counts when it can, without a word to anybody but who has its lease. */
+/* A result from an earlier life that waited for another one: it counts when it can, without a word to anybody but who
+ * has its lease. */
 static void stored_results(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
 		"[0] restore j7 render 0,1,0 fingerprint=A elapsed=10 groups=3 rounds=9 -> j7 is running",
 		"[0] w1 joins A threads=2 -> -",
-		"[0] w1 stored j7 g0 p0 e1 -> -", "[0] w1 stored j7 g1 p0 e0 -> -", "[0] w1 stored j7 g1 p0 e2 -> -", /* not yet, merged, not open */
+		"[0] w1 stored j7 g0 p0 e1 -> -",
+		"[0] w1 stored j7 g1 p0 e0 -> -",
+		"[0] w1 stored j7 g1 p0 e2 -> -", /* not yet, merged, not open */
 		"[0] w1 wants 2 -> w1 gets j7 g0 p0 e0, w1 gets j7 g2 p0 e0",
 		"[1] w1 batch j7 g0 p0 e0 -> merge, merged, w1 gets j7 g1 p0 e1",
 		"[1] w1 stored j7 g0 p0 e1 -> merge",
@@ -65,7 +74,8 @@ static void stored_results(void **state)
 		"[2] w1 stored j7 g2 p0 e0 -> merge, w1 loses j7 g2 p0 e0, j7 round 1, w1 gets j7 g2 p0 e1, w1 gets j7 g0 p0 e2",
 		"[3] cancel j7 -> j7 cancelled, w1 loses j7 g0 p0 e2, w1 loses j7 g2 p0 e1, j7 is cancelled (cancelled: cancelled)",
 		"[3] w1 stored j7 g2 p0 e1 -> -",
-		NULL });
+		NULL,
+	});
 }
 
 static void before_anything(void **state)
@@ -73,33 +83,50 @@ static void before_anything(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] restore j1 boot 0,0 -> -", "[0] restore j3 boot 0,0 priority=5 -> -",
-		"[0] w1 joins B threads=1 -> -", "[0] w1 wants 1 -> j3 is bootstrap, w1 gets j3 g0 p0 boot",
-		NULL });
+				   "[0] restore j1 boot 0,0 -> -",
+				   "[0] restore j3 boot 0,0 priority=5 -> -",
+				   "[0] w1 joins B threads=1 -> -",
+				   "[0] w1 wants 1 -> j3 is bootstrap, w1 gets j3 g0 p0 boot",
+				   NULL,
+			   });
 	struct job_status s;
 	assert_true(farm_job(f, 1, 3, &s));
 	assert_int_equal(s.state, JOB_QUEUED);
 	farm_free(f);
 }
 
-/* What the last complete round had met is met: the end, a look at the error, the time that it took, not that in between. */
+/* What the last complete round had met is met: the end, a look at the error, the time that it took, not that in
+ * between. */
 static void bounds(void **state)
 {
 	(void)state;
-	transcript((const char *const[]){ "[0] restore j1 render 2,2 elapsed=3 completed=3 rounds=2 -> "
-					  "j1 is running, j1 publish 2, j1 is done (mutations)", NULL });
-	transcript((const char *const[]){ "[0] restore j1 render 2,3 elapsed=3 completed=3 rounds=9 target=0.1 -> j1 is running, j1 evaluate 2",
-					  "[1] w1 joins A threads=1 -> -",
-					  "[1] w1 wants 1 -> w1 gets j1 g0 p0 e2",
-					  "[2] w1 batch j1 g0 p0 e2 -> refused: the job's error is being estimated, w1 gets j1 g0 p0 e2",
-					  "[2] error j1 2 0.05 -> w1 loses j1 g0 p0 e2, j1 publish 2, j1 is done (error)", NULL });
-	transcript((const char *const[]){ "[100] restore j1 render 2,3 elapsed=9 completed=7 rounds=inf seconds=8 -> j1 is running",
-					  "[100] w1 joins A threads=1 -> -",
-					  "[100] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 publish 3, j1 is done (time)", NULL });
-	transcript((const char *const[]){ "[100] restore j1 render 2,3 elapsed=9 completed=8 rounds=inf seconds=8 -> "
-					  "j1 is running, j1 publish 2, j1 is done (time)", NULL });
-	transcript((const char *const[]){ "[0] restore j1 render 0,0 elapsed=3 black -> j1 publish 0, j1 is done (black: no bootstrap sample carried light)",
-					  NULL });
+	transcript((const char *const[]){
+		"[0] restore j1 render 2,2 elapsed=3 completed=3 rounds=2 -> "
+		"j1 is running, j1 publish 2, j1 is done (mutations)",
+		NULL,
+	});
+	transcript((const char *const[]){
+		"[0] restore j1 render 2,3 elapsed=3 completed=3 rounds=9 target=0.1 -> j1 is running, j1 evaluate 2",
+		"[1] w1 joins A threads=1 -> -",
+		"[1] w1 wants 1 -> w1 gets j1 g0 p0 e2",
+		"[2] w1 batch j1 g0 p0 e2 -> refused: the job's error is being estimated, w1 gets j1 g0 p0 e2",
+		"[2] error j1 2 0.05 -> w1 loses j1 g0 p0 e2, j1 publish 2, j1 is done (error)",
+		NULL,
+	});
+	transcript((const char *const[]){
+		"[100] restore j1 render 2,3 elapsed=9 completed=7 rounds=inf seconds=8 -> j1 is running",
+		"[100] w1 joins A threads=1 -> -",
+		"[100] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 publish 3, j1 is done (time)",
+		NULL,
+	});
+	transcript((const char *const[]){
+		"[100] restore j1 render 2,3 elapsed=9 completed=8 rounds=inf seconds=8 -> "
+		"j1 is running, j1 publish 2, j1 is done (time)",
+		NULL,
+	});
+	transcript((const char *const[]){
+		"[0] restore j1 render 0,0 elapsed=3 black -> j1 publish 0, j1 is done (black: no bootstrap sample carried light)",
+		NULL});
 }
 
 static void held(void **state)
@@ -107,19 +134,26 @@ static void held(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] submit -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=2 -> -",
-		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		"[1] hold j1 no room -> -",
-		"[1] w1 wants 2 -> -",
-		"[1] w1 batch j1 g0 p0 boot -> merge, merged",
-		NULL });
+				   "[0] submit -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=2 -> -",
+				   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+				   "[1] hold j1 no room -> -",
+				   "[1] w1 wants 2 -> -",
+				   "[1] w1 batch j1 g0 p0 boot -> merge, merged",
+				   NULL,
+			   });
 	struct job_status s;
 	assert_true(farm_job(f, 1, 1, &s));
 	assert_int_equal(s.state, JOB_HELD);
 	assert_string_equal(s.waiting, "no room");
-	transcript_play(f, (const char *const[]){ "[2] release j1 -> w1 gets j1 g1 p0 boot", "[3] hold j1 no room -> -",
-						  "[4] cancel j1 -> j1 cancelled, w1 loses j1 g1 p0 boot, j1 is cancelled (cancelled: cancelled)", NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[2] release j1 -> w1 gets j1 g1 p0 boot",
+			"[3] hold j1 no room -> -",
+			"[4] cancel j1 -> j1 cancelled, w1 loses j1 g1 p0 boot, j1 is cancelled (cancelled: cancelled)",
+			NULL,
+		});
 	assert_true(farm_job(f, 1, 5, &s));
 	assert_int_equal(s.state, JOB_CANCELLED);
 	farm_free(f);
@@ -141,7 +175,7 @@ static void more_than_are_taken(void **state)
 	for (int i = 1; i <= JOBS; i++) {
 		char line[64];
 		snprintf(line, sizeof line, "[0] restore j%d boot 0,0 -> -", i);
-		transcript_play(f, (const char *const[]){ line, NULL });
+		transcript_play(f, (const char *const[]){line, NULL});
 	}
 	for (int i = 1; i <= JOBS; i++)
 		assert_true(farm_job(f, (uint64_t)i, 0, &s) && s.state == JOB_QUEUED);
@@ -149,24 +183,29 @@ static void more_than_are_taken(void **state)
 		char line[128], forgotten[32] = "";
 		if (i > 1)
 			snprintf(forgotten, sizeof forgotten, ", j%d forgotten", i - 1);
-		snprintf(line, sizeof line, "[%d] cancel j%d -> j%d cancelled, j%d is cancelled (cancelled: cancelled)%s", i, i, i, i, forgotten);
-		transcript_play(f, (const char *const[]){ "[0] submit -> rejected: the coordinator has as many jobs as it takes",
-							  "[0] restore asked j99 boot 0,0 -> rejected: the coordinator has as many jobs as it takes", line, NULL });
+		snprintf(line, sizeof line,
+			 "[%d] cancel j%d -> j%d cancelled, j%d is cancelled (cancelled: cancelled)%s", i, i, i, i,
+			 forgotten);
+		transcript_play(
+			f,
+			(const char *const[]){
+				"[0] submit -> rejected: the coordinator has as many jobs as it takes",
+				"[0] restore asked j99 boot 0,0 -> rejected: the coordinator has as many jobs as it takes",
+				line, NULL});
 	}
-	transcript_play(f, (const char *const[]){ "[40] submit -> j31 submitted, j31 is queued",
-						  "[41] submit -> rejected: the coordinator has as many jobs as it takes", NULL });
+	transcript_play(f, (const char *const[]){
+				   "[40] submit -> j31 submitted, j31 is queued",
+				   "[41] submit -> rejected: the coordinator has as many jobs as it takes",
+				   NULL,
+			   });
 	farm_free(f);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(in_the_bootstrap),
-		cmocka_unit_test(in_a_round),
-		cmocka_unit_test(stored_results),
-		cmocka_unit_test(before_anything),
-		cmocka_unit_test(bounds),
-		cmocka_unit_test(held),
+		cmocka_unit_test(in_the_bootstrap),    cmocka_unit_test(in_a_round), cmocka_unit_test(stored_results),
+		cmocka_unit_test(before_anything),     cmocka_unit_test(bounds),     cmocka_unit_test(held),
 		cmocka_unit_test(more_than_are_taken),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -48,13 +48,15 @@ static void by_priority_and_owner(void **state)
 	(void)state;
 	struct farm *f = eight();
 	play(f, "[0] hold order j1 x -> rejected: no such job");
-	play(f, "[0] restore j1 boot 1,1,1,1,1,1,1,1,1,1,1,1,0,0,0,0 fingerprint=A groups=16 owner=ann -> j1 is bootstrap, w1 gets j1 g12 p0 boot, "
-		"w2 gets j1 g13 p0 boot, w3 gets j1 g14 p0 boot, w4 gets j1 g15 p0 boot");
+	play(f,
+	     "[0] restore j1 boot 1,1,1,1,1,1,1,1,1,1,1,1,0,0,0,0 fingerprint=A groups=16 owner=ann -> j1 is bootstrap, w1 gets j1 g12 p0 boot, "
+	     "w2 gets j1 g13 p0 boot, w3 gets j1 g14 p0 boot, w4 gets j1 g15 p0 boot");
 	has_share(f, 1, 2); /* it has a use for four leases */
 	assert_int_equal(status(f, 1).workers, 4);
 	assert_string_equal(status(f, 1).place, "4 of 8 machines");
-	play(f, "[0] cancel j1 -> j1 cancelled, w1 loses j1 g12 p0 boot, w2 loses j1 g13 p0 boot, w3 loses j1 g14 p0 boot, "
-		"w4 loses j1 g15 p0 boot, j1 is cancelled (cancelled: cancelled)");
+	play(f,
+	     "[0] cancel j1 -> j1 cancelled, w1 loses j1 g12 p0 boot, w2 loses j1 g13 p0 boot, w3 loses j1 g14 p0 boot, "
+	     "w4 loses j1 g15 p0 boot, j1 is cancelled (cancelled: cancelled)");
 	assert_string_equal(status(f, 1).place, "");
 	farm_free(f);
 
@@ -79,7 +81,8 @@ static void by_priority_and_owner(void **state)
 	has_share(f, 3, 1.5);
 	has_share(f, 4, 1);
 	assert_string_equal(status(f, 3).place, "0 of 8 machines; j2 comes first; by turns with j1 and j4");
-	assert_string_equal(status(f, 3).owners_place, "0 of 8 machines; 1 job of another owner comes first; by turns with j4 and 1 more");
+	assert_string_equal(status(f, 3).owners_place,
+			    "0 of 8 machines; 1 job of another owner comes first; by turns with j4 and 1 more");
 	play(f, "[0] submit groups=16 priority=-1 owner=eve -> j5 submitted, j5 is queued");
 	has_share(f, 5, 0);
 	assert_string_equal(status(f, 5).place, "0 of 8 machines; j2, j1, j3 and 1 more come first");
@@ -102,13 +105,20 @@ static void by_fingerprint(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] restore j1 boot 1,0,0,0 fingerprint=A groups=4 -> -",
-		"[0] restore j2 boot 1,0,0,0 fingerprint=B groups=4 priority=3 -> -",
-		"[0] w1 joins A threads=1 -> -", "[0] w2 joins A threads=1 -> -", "[0] w3 joins B threads=1 -> -", NULL });
+				   "[0] restore j1 boot 1,0,0,0 fingerprint=A groups=4 -> -",
+				   "[0] restore j2 boot 1,0,0,0 fingerprint=B groups=4 priority=3 -> -",
+				   "[0] w1 joins A threads=1 -> -",
+				   "[0] w2 joins A threads=1 -> -",
+				   "[0] w3 joins B threads=1 -> -",
+				   NULL,
+			   });
 	has_share(f, 1, 2);
 	has_share(f, 2, 1);
 	assert_string_equal(status(f, 1).place, "0 of 2 machines");
-	transcript_play(f, (const char *const[]){ "[30] tick -> -", NULL }); /* all are silent */
+	transcript_play(f, (const char *const[]){
+				   "[30] tick -> -",
+				   NULL,
+			   }); /* all are silent */
 	has_share(f, 1, 0);
 	assert_string_equal(status(f, 2).place, "0 of 0 machines");
 	farm_free(f);
@@ -119,13 +129,15 @@ static void who_comes_first(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] submit groups=4 -> j1 submitted, j1 is queued",
-		"[0] submit groups=4 priority=7 -> j2 submitted, j2 is queued",
-		"[0] w1 joins A threads=1 -> -",
-		"[0] w1 wants 2 -> j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j2 g1 p0 boot", NULL });
+				   "[0] submit groups=4 -> j1 submitted, j1 is queued",
+				   "[0] submit groups=4 priority=7 -> j2 submitted, j2 is queued",
+				   "[0] w1 joins A threads=1 -> -",
+				   "[0] w1 wants 2 -> j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j2 g1 p0 boot",
+				   NULL,
+			   });
 	assert_string_equal(status(f, 1).waiting, "waits for j2 of higher priority (7)");
 	assert_string_equal(status(f, 1).owners_waiting, status(f, 1).waiting); /* both are his own */
-	assert_int_equal(status(f, 2).workers, 1); /* one machine, two leases */
+	assert_int_equal(status(f, 2).workers, 1);				/* one machine, two leases */
 	assert_string_equal(status(f, 2).place, "1 of 1 machine");
 	play(f, "[0] submit groups=4 owner=ann -> j3 submitted, j3 is queued");
 	assert_string_equal(status(f, 3).waiting, "waits for j2 of higher priority (7)");

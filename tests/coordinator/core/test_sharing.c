@@ -21,24 +21,32 @@ static void priority(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] w1 joins A threads=1 -> -",
-		"[0] w1 wants 1 -> -",
-		"[0] submit priority=101 -> rejected: a priority is from -100 to 100",
-		"[0] submit priority=-1 groups=4 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		"[0] submit groups=4 -> j2 submitted, j2 is queued",
-		"[0] submit priority=5 groups=1 -> j3 submitted, j3 is queued",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[0] w1 joins A threads=1 -> -",
+			"[0] w1 wants 1 -> -",
+			"[0] submit priority=101 -> rejected: a priority is from -100 to 100",
+			"[0] submit priority=-1 groups=4 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot",
+			"[0] submit groups=4 -> j2 submitted, j2 is queued",
+			"[0] submit priority=5 groups=1 -> j3 submitted, j3 is queued",
+			NULL,
+		});
 	assert_string_equal(waiting(f, 3), "workers busy with j1 (priority -1)");
-	transcript_play(f, (const char *const[]){
-		"[1] w1 batch j1 g0 p0 boot -> merge, merged, j3 is bootstrap, w1 gets j3 g0 p0 boot",
-		"[2] w1 batch j3 g0 p0 boot -> merge, merged, j3 prepare, j2 is bootstrap, w1 gets j2 g0 p0 boot",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[1] w1 batch j1 g0 p0 boot -> merge, merged, j3 is bootstrap, w1 gets j3 g0 p0 boot",
+			"[2] w1 batch j3 g0 p0 boot -> merge, merged, j3 prepare, j2 is bootstrap, w1 gets j2 g0 p0 boot",
+			NULL,
+		});
 	assert_string_equal(waiting(f, 3), "the bootstrap is being evaluated");
 	assert_string_equal(waiting(f, 2), "");
 	transcript_play(f, (const char *const[]){
-		"[2] prepared j3 -> j3 is running",
-		"[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j3 g0 p0 e0", NULL });
+				   "[2] prepared j3 -> j3 is running",
+				   "[3] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j3 g0 p0 e0",
+				   NULL,
+			   });
 	farm_free(f);
 }
 
@@ -52,7 +60,8 @@ static void fair_sharing(void **state)
 		"[0] w1 wants 4 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j2 g1 p0 boot",
 		"[1] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j2 g2 p0 boot",
 		"[2] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g2 p0 boot",
-		NULL });
+		NULL,
+	});
 }
 
 /* A result that waits to be looked at keeps no worker waiting, as far as its table goes; the lease stays its own. */
@@ -76,7 +85,8 @@ static void delivered_is_not_held(void **state)
 		"[5] w1 batch j1 g3 p0 boot -> merge, merged, w1 gets j1 g6 p0 boot",
 		"[6] w1 leaves -> -",
 		"[7] w2 batch j1 g2 p0 boot -> merge, merged, w2 gets j1 g7 p0 boot",
-		NULL });
+		NULL,
+	});
 }
 
 /* By owner first: of nine leases bob's one job has half, ann's two share the other. */
@@ -84,23 +94,26 @@ static void owners_share_first(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] submit groups=9 owner=ann -> j1 submitted, j1 is queued",
-		"[0] submit groups=9 owner=ann -> j2 submitted, j2 is queued",
-		"[0] submit groups=9 owner=bob -> j3 submitted, j3 is queued",
-		"[0] w1 joins A threads=9 -> -",
-		"[0] w1 wants 9 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, j3 is bootstrap, w1 gets j3 g0 p0 boot, "
-		"j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j3 g1 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j3 g2 p0 boot, "
-		"w1 gets j2 g1 p0 boot, w1 gets j3 g3 p0 boot", /* more when it has given something */
-		/* whoever has fewest, not whose was done */
-		"[1] w1 batch j3 g0 p0 boot -> merge, merged, w1 gets j3 g4 p0 boot, w1 gets j1 g2 p0 boot",
-		"[1] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j2 g2 p0 boot",
-		/* what an owner has of another priority counts, too: one lease is bob's j4 */
-		"[2] submit groups=1 priority=1 owner=bob -> j4 submitted, j4 is queued",
-		"[2] w1 batch j1 g0 p0 boot -> merge, merged, j4 is bootstrap, w1 gets j4 g0 p0 boot",
-		"[3] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j1 g3 p0 boot",
-		"[3] w1 batch j3 g1 p0 boot -> merge, merged, w1 gets j1 g4 p0 boot",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[0] submit groups=9 owner=ann -> j1 submitted, j1 is queued",
+			"[0] submit groups=9 owner=ann -> j2 submitted, j2 is queued",
+			"[0] submit groups=9 owner=bob -> j3 submitted, j3 is queued",
+			"[0] w1 joins A threads=9 -> -",
+			"[0] w1 wants 9 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, j3 is bootstrap, w1 gets j3 g0 p0 boot, "
+			"j2 is bootstrap, w1 gets j2 g0 p0 boot, w1 gets j3 g1 p0 boot, w1 gets j1 g1 p0 boot, w1 gets j3 g2 p0 boot, "
+			"w1 gets j2 g1 p0 boot, w1 gets j3 g3 p0 boot", /* more when it has given something */
+			/* whoever has fewest, not whose was done */
+			"[1] w1 batch j3 g0 p0 boot -> merge, merged, w1 gets j3 g4 p0 boot, w1 gets j1 g2 p0 boot",
+			"[1] w1 batch j2 g0 p0 boot -> merge, merged, w1 gets j2 g2 p0 boot",
+			/* what an owner has of another priority counts, too: one lease is bob's j4 */
+			"[2] submit groups=1 priority=1 owner=bob -> j4 submitted, j4 is queued",
+			"[2] w1 batch j1 g0 p0 boot -> merge, merged, j4 is bootstrap, w1 gets j4 g0 p0 boot",
+			"[3] w1 batch j1 g1 p0 boot -> merge, merged, w1 gets j1 g3 p0 boot",
+			"[3] w1 batch j3 g1 p0 boot -> merge, merged, w1 gets j1 g4 p0 boot",
+			NULL,
+		});
 	struct job_status s;
 	assert_true(farm_job(f, 3, 3, &s));
 	assert_string_equal(s.owner, "bob");
@@ -120,17 +133,21 @@ static void the_nameless_and_the_restored(void **state)
 		"[0] w1 wants 6 -> j5 is bootstrap, w1 gets j5 g0 p0 boot, j6 is bootstrap, w1 gets j6 g0 p0 boot, "
 		"j8 is bootstrap, w1 gets j8 g0 p0 boot, j7 is bootstrap, w1 gets j7 g0 p0 boot, "
 		"w1 gets j5 g1 p0 boot, w1 gets j6 g1 p0 boot",
-		NULL });
+		NULL,
+	});
 }
 
 static void workers_take_turns(void **state)
 {
 	(void)state;
 	transcript((const char *const[]){
-		"[0] w1 joins A threads=2 -> -", "[0] w2 joins A threads=2 -> -",
-		"[0] w1 wants 2 -> -", "[0] w2 wants 2 -> -",
+		"[0] w1 joins A threads=2 -> -",
+		"[0] w2 joins A threads=2 -> -",
+		"[0] w1 wants 2 -> -",
+		"[0] w2 wants 2 -> -",
 		"[0] submit groups=4 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot, w2 gets j1 g1 p0 boot, w1 gets j1 g2 p0 boot, w2 gets j1 g3 p0 boot",
-		NULL });
+		NULL,
+	});
 }
 
 static void fingerprints(void **state)
@@ -138,28 +155,38 @@ static void fingerprints(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] submit groups=3 -> j1 submitted, j1 is queued", NULL });
+				   "[0] submit groups=3 -> j1 submitted, j1 is queued",
+				   NULL,
+			   });
 	assert_string_equal(waiting(f, 1), "no worker");
 	transcript_play(f, (const char *const[]){
-		"[0] w1 joins A threads=1 -> -",
-		"[0] w2 joins B threads=1 -> -", NULL });
+				   "[0] w1 joins A threads=1 -> -",
+				   "[0] w2 joins B threads=1 -> -",
+				   NULL,
+			   });
 	assert_string_equal(waiting(f, 1), "no worker asks for work");
-	transcript_play(f, (const char *const[]){
-		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		"[0] w2 wants 1 -> -",
-		"[1] w2 batch j1 g0 p0 boot -> refused: the job belongs to workers with another fingerprint",
-		"[1] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot",
-		"[1] w1 leaves -> -", NULL });
+	transcript_play(
+		f, (const char *const[]){
+			   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+			   "[0] w2 wants 1 -> -",
+			   "[1] w2 batch j1 g0 p0 boot -> refused: the job belongs to workers with another fingerprint",
+			   "[1] w1 batch j1 g0 p0 boot -> merge, merged, w1 gets j1 g1 p0 boot",
+			   "[1] w1 leaves -> -",
+			   NULL,
+		   });
 	assert_string_equal(waiting(f, 1), "no worker with fingerprint A (1 with others)");
-	transcript_play(f, (const char *const[]){
-		"[2] submit mixed groups=1 rounds=1 -> j2 submitted, j2 is queued, j2 is bootstrap, w2 gets j2 g0 p0 boot",
-		"[3] w3 joins A threads=1 -> -",
-		"[3] w3 wants 1 -> w3 gets j1 g2 p0 boot",
-		"[3] w2 batch j2 g0 p0 boot -> merge, merged, j2 prepare",
-		"[3] w3 batch j1 g2 p0 boot -> merge, merged, w3 gets j1 g1 p0 boot",
-		"[4] prepared j2 -> j2 is running, w2 gets j2 g0 p0 e0",
-		"[4] w3 batch j2 g0 p0 e0 -> merge, merged, w2 loses j2 g0 p0 e0, j2 round 1, j2 publish 1, j2 is done (mutations)",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[2] submit mixed groups=1 rounds=1 -> j2 submitted, j2 is queued, j2 is bootstrap, w2 gets j2 g0 p0 boot",
+			"[3] w3 joins A threads=1 -> -",
+			"[3] w3 wants 1 -> w3 gets j1 g2 p0 boot",
+			"[3] w2 batch j2 g0 p0 boot -> merge, merged, j2 prepare",
+			"[3] w3 batch j1 g2 p0 boot -> merge, merged, w3 gets j1 g1 p0 boot",
+			"[4] prepared j2 -> j2 is running, w2 gets j2 g0 p0 e0",
+			"[4] w3 batch j2 g0 p0 e0 -> merge, merged, w2 loses j2 g0 p0 e0, j2 round 1, j2 publish 1, j2 is done (mutations)",
+			NULL,
+		});
 	farm_free(f);
 }
 
@@ -168,11 +195,13 @@ static void free_again_while_untouched(void **state)
 	(void)state;
 	transcript((const char *const[]){
 		"[0] submit -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=1 -> -", "[0] w2 joins B threads=1 -> -",
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w2 joins B threads=1 -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 		"[0] w2 wants 1 -> -",
 		"[1] w1 leaves -> w2 gets j1 g1 p0 boot",
-		NULL });
+		NULL,
+	});
 }
 
 static void nobody_is_trusted(void **state)
@@ -180,11 +209,17 @@ static void nobody_is_trusted(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] submit -> j1 submitted, j1 is queued", "[0] w1 joins A threads=1 -> -", "[30] tick -> -", NULL });
+				   "[0] submit -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=1 -> -",
+				   "[30] tick -> -",
+				   NULL,
+			   });
 	assert_string_equal(waiting(f, 1), "no worker that answers and is trusted (1 are known)");
 	transcript_play(f, (const char *const[]){
-		"[30] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		"[31] w1 fails j1 g0 p0 boot no such file -> -", NULL });
+				   "[30] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+				   "[31] w1 fails j1 g0 p0 boot no such file -> -",
+				   NULL,
+			   });
 	assert_string_equal(waiting(f, 1), "no worker can compute it: w1: no such file");
 	farm_free(f);
 }
@@ -201,23 +236,29 @@ static void limits(void **state)
 	c.max_slots = 4;
 	c.first_job = 7;
 	assert_int_equal(farm_new(&f, &c, NULL), 0);
-	transcript_play(f, (const char *const[]){
-		"[0] w1 joins A threads=1 -> -",
-		"[0] w2 joins A threads=1 -> rejected: the farm has as many workers as it takes",
-		"[0] submit groups=5 -> rejected: the plan has more leases in a round than the coordinator takes",
-		"[0] submit -> j7 submitted, j7 is queued",
-		"[0] submit -> j8 submitted, j8 is queued",
-		"[0] submit -> rejected: the coordinator has as many jobs as it takes",
-		"[0] cancel j7 -> j7 cancelled, j7 is cancelled (cancelled: cancelled)",
-		"[1] submit -> j9 submitted, j9 is queued",
-		"[1] cancel j9 -> j9 cancelled, j9 is cancelled (cancelled: cancelled), j7 forgotten",
-		"[1] cancel j7 -> rejected: no such job",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[0] w1 joins A threads=1 -> -",
+			"[0] w2 joins A threads=1 -> rejected: the farm has as many workers as it takes",
+			"[0] submit groups=5 -> rejected: the plan has more leases in a round than the coordinator takes",
+			"[0] submit -> j7 submitted, j7 is queued",
+			"[0] submit -> j8 submitted, j8 is queued",
+			"[0] submit -> rejected: the coordinator has as many jobs as it takes",
+			"[0] cancel j7 -> j7 cancelled, j7 is cancelled (cancelled: cancelled)",
+			"[1] submit -> j9 submitted, j9 is queued",
+			"[1] cancel j9 -> j9 cancelled, j9 is cancelled (cancelled: cancelled), j7 forgotten",
+			"[1] cancel j7 -> rejected: no such job",
+			NULL,
+		});
 	struct job_counts counts;
 	assert_true(!farm_counts(f, 7, &counts) && farm_counts(f, 8, &counts) && farm_counts(f, 9, &counts));
 	/* both ended in the same moment: the one that ends now stays */
-	transcript_play(f, (const char *const[]){
-		"[1] cancel j8 -> j8 cancelled, j8 is cancelled (cancelled: cancelled), j9 forgotten", NULL });
+	transcript_play(f,
+			(const char *const[]){
+				"[1] cancel j8 -> j8 cancelled, j8 is cancelled (cancelled: cancelled), j9 forgotten",
+				NULL,
+			});
 	assert_int_equal(farm_next_peer(f, 0), 1);
 	assert_int_equal(farm_next_peer(f, 1), 0);
 	farm_free(f);
@@ -239,15 +280,22 @@ static void memory_runs_out(void **state)
 	f = transcript_farm();
 	mem_fail_after(1);
 	transcript_play(f, (const char *const[]){
-		"[0] submit -> rejected: the coordinator has no memory for another job", NULL });
+				   "[0] submit -> rejected: the coordinator has no memory for another job",
+				   NULL,
+			   });
 	mem_fail_after(1);
-	transcript_play(f, (const char *const[]){
-		"[0] w1 joins A threads=1 -> rejected: the coordinator has no memory for another worker", NULL });
+	transcript_play(
+		f, (const char *const[]){
+			   "[0] w1 joins A threads=1 -> rejected: the coordinator has no memory for another worker",
+			   NULL,
+		   });
 	mem_fail_after(-1);
 	transcript_play(f, (const char *const[]){
-		"[0] submit -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=1 -> -",
-		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot", NULL });
+				   "[0] submit -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=1 -> -",
+				   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+				   NULL,
+			   });
 	struct lease_status l;
 	assert_true(farm_lease(f, 1, 0, &l));
 	assert_int_equal(l.key.job, 1);
@@ -259,7 +307,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(priority),
-		cmocka_unit_test(delivered_is_not_held), cmocka_unit_test(fair_sharing),
+		cmocka_unit_test(delivered_is_not_held),
+		cmocka_unit_test(fair_sharing),
 		cmocka_unit_test(owners_share_first),
 		cmocka_unit_test(the_nameless_and_the_restored),
 		cmocka_unit_test(workers_take_turns),

@@ -11,28 +11,35 @@
 #include <cmocka.h>
 
 /* One chain, every lease verified, three workers. */
+/* clang-format off */
 #define START                                                                          \
 	"[0] submit groups=1 verify=1 -> j1 submitted, j1 is queued",                  \
 	"[0] w1 joins A threads=1 name=a -> -", "[0] w2 joins A threads=1 name=b -> -", \
 	"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",                    \
 	"[0] w2 wants 1 -> w2 gets j1 g0 p0 boot"
+/* clang-format on */
 
+/* clang-format off */
 #define START_ROUNDS                                                                   \
 	START, "[1] w1 batch j1 g0 p0 boot says x -> noted",                           \
 	"[1] w2 batch j1 g0 p0 boot says x -> merge, merged, j1 prepare",              \
 	"[1] prepared j1 -> j1 is running, w1 gets j1 g0 p0 e0, w2 gets j1 g0 p0 e0"
+/* clang-format on */
 
 static void agree(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START_ROUNDS,
-		"[2] w2 batch j1 g0 p0 e0 says x -> noted",
-		"[3] w1 batch j1 g0 p0 e0 says x -> merge, merged, j1 round 1, w2 gets j1 g0 p0 e1, w1 gets j1 g0 p0 e1",
-		"[4] w1 batch j1 g0 p0 e1 says y -> noted",
-		"[4] w2 batch j1 g0 p0 e1 says y -> merge, merged, j1 round 2, j1 publish 2, j1 is done (mutations)",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			START_ROUNDS,
+			"[2] w2 batch j1 g0 p0 e0 says x -> noted",
+			"[3] w1 batch j1 g0 p0 e0 says x -> merge, merged, j1 round 1, w2 gets j1 g0 p0 e1, w1 gets j1 g0 p0 e1",
+			"[4] w1 batch j1 g0 p0 e1 says y -> noted",
+			"[4] w2 batch j1 g0 p0 e1 says y -> merge, merged, j1 round 2, j1 publish 2, j1 is done (mutations)",
+			NULL,
+		});
 	struct job_status j;
 	assert_true(farm_job(f, 1, 4, &j));
 	assert_int_equal(j.verified, 3);
@@ -46,15 +53,18 @@ static void third_decides(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		START_ROUNDS,
-		"[2] w1 batch j1 g0 p0 e0 says x -> noted",
-		"[2] w2 batch j1 g0 p0 e0 says y -> noted: it differs from another worker's",
-		"[2] w3 joins A threads=1 name=c -> -",
-		"[2] w3 wants 1 -> w3 gets j1 g0 p0 e0",
-		"[3] w3 batch j1 g0 p0 e0 says y -> merge, merged, #1 wrong result: j1 render group 0 part 0 epoch 0, j1 round 1, "
-		"w1 gets j1 g0 p0 e1, w2 gets j1 g0 p0 e1",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			START_ROUNDS,
+			"[2] w1 batch j1 g0 p0 e0 says x -> noted",
+			"[2] w2 batch j1 g0 p0 e0 says y -> noted: it differs from another worker's",
+			"[2] w3 joins A threads=1 name=c -> -",
+			"[2] w3 wants 1 -> w3 gets j1 g0 p0 e0",
+			"[3] w3 batch j1 g0 p0 e0 says y -> merge, merged, #1 wrong result: j1 render group 0 part 0 epoch 0, j1 round 1, "
+			"w1 gets j1 g0 p0 e1, w2 gets j1 g0 p0 e1",
+			NULL,
+		});
 	struct job_status j;
 	struct peer_status p;
 	assert_true(farm_job(f, 1, 4, &j));
@@ -75,12 +85,15 @@ static void all_differ(void **state)
 		START,
 		"[1] w1 batch j1 g0 p0 boot says 1 -> noted",
 		"[1] w2 batch j1 g0 p0 boot says 2 -> noted: it differs from another worker's",
-		"[1] w3 joins A threads=1 name=c -> -", "[1] w3 wants 1 -> w3 gets j1 g0 p0 boot",
+		"[1] w3 joins A threads=1 name=c -> -",
+		"[1] w3 wants 1 -> w3 gets j1 g0 p0 boot",
 		"[1] w3 batch j1 g0 p0 boot says 3 -> noted: it differs from another worker's",
-		"[1] w4 joins A threads=1 name=d -> -", "[1] w4 wants 1 -> w4 gets j1 g0 p0 boot",
+		"[1] w4 joins A threads=1 name=d -> -",
+		"[1] w4 wants 1 -> w4 gets j1 g0 p0 boot",
 		"[1] w4 batch j1 g0 p0 boot says 4 -> noted: it differs from another worker's, "
 		"j1 is failed (failed: no two of 4 workers agree on group 0 part 0 epoch 0: a, b, c, d)",
-		NULL });
+		NULL,
+	});
 }
 
 static void one_worker_twice(void **state)
@@ -88,29 +101,36 @@ static void one_worker_twice(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] submit groups=2 verify=1 -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=1 name=a -> -",
-		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		/* other work goes on, and it does not get the same again */
-		"[1] w1 batch j1 g0 p0 boot says x -> noted, w1 gets j1 g1 p0 boot",
-		"[1] w1 batch j1 g0 p0 boot says x -> repeat: it waits for another worker's",
-		"[1] w1 batch j1 g1 p0 boot says x -> noted",
-		NULL });
+				   "[0] submit groups=2 verify=1 -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=1 name=a -> -",
+				   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+				   /* other work goes on, and it does not get the same again */
+				   "[1] w1 batch j1 g0 p0 boot says x -> noted, w1 gets j1 g1 p0 boot",
+				   "[1] w1 batch j1 g0 p0 boot says x -> repeat: it waits for another worker's",
+				   "[1] w1 batch j1 g1 p0 boot says x -> noted",
+				   NULL,
+			   });
 	struct job_status j;
 	assert_true(farm_job(f, 1, 1, &j));
 	assert_string_equal(j.waiting, "verification waits for a second worker (2 leases have one answer)");
-	transcript_play(f, (const char *const[]){
-		/* another connection of the same name is the same worker; and so is another name of the same home */
-		"[1] w2 joins A threads=1 name=a home=c start=1 -> -", "[1] w2 wants 1 -> -",
-		"[1] w3 joins A threads=1 name=b home=c start=1 -> close w2", "[1] w3 wants 1 -> -",
-		"[1] w3 batch j1 g0 p0 boot says x -> repeat: it waits for another worker's",
-		"[1] w3 batch j1 g0 p0 boot says y -> refused: it differs from what the same worker sent before",
-		/* of another certificate it is another one */
-		"[1] w4 joins A threads=1 certificate=d name=a -> -",
-		"[1] w4 wants 1 -> w4 gets j1 g0 p0 boot",
-		"[2] w4 batch j1 g0 p0 boot says x -> merge, merged, w4 gets j1 g1 p0 boot",
-		"[2] w4 batch j1 g1 p0 boot says x -> merge, merged, j1 prepare",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			/* another connection of the same name is the same worker; and so is another name of the same
+			   home */
+			"[1] w2 joins A threads=1 name=a home=c start=1 -> -",
+			"[1] w2 wants 1 -> -",
+			"[1] w3 joins A threads=1 name=b home=c start=1 -> close w2",
+			"[1] w3 wants 1 -> -",
+			"[1] w3 batch j1 g0 p0 boot says x -> repeat: it waits for another worker's",
+			"[1] w3 batch j1 g0 p0 boot says y -> refused: it differs from what the same worker sent before",
+			/* of another certificate it is another one */
+			"[1] w4 joins A threads=1 certificate=d name=a -> -",
+			"[1] w4 wants 1 -> w4 gets j1 g0 p0 boot",
+			"[2] w4 batch j1 g0 p0 boot says x -> merge, merged, w4 gets j1 g1 p0 boot",
+			"[2] w4 batch j1 g1 p0 boot says x -> merge, merged, j1 prepare",
+			NULL,
+		});
 	farm_free(f);
 }
 
@@ -127,7 +147,8 @@ static void leaves_between(void **state)
 		"[4] w4 joins A threads=1 name=c -> -",
 		"[4] w4 wants 1 -> w4 gets j1 g0 p0 e0",
 		"[5] w4 batch j1 g0 p0 e0 says x -> merge, merged, j1 round 1, w3 gets j1 g0 p0 e1, w4 gets j1 g0 p0 e1",
-		NULL });
+		NULL,
+	});
 }
 
 static void restart(void **state)
@@ -136,12 +157,14 @@ static void restart(void **state)
 	transcript((const char *const[]){
 		/* notes are gone: the lease is computed anew, by two */
 		"[0] restore j1 render 1 fingerprint=A elapsed=5 groups=1 rounds=9 verify=1 -> j1 is running",
-		"[0] w1 joins A threads=1 name=a -> -", "[0] w2 joins A threads=1 name=b -> -",
+		"[0] w1 joins A threads=1 name=a -> -",
+		"[0] w2 joins A threads=1 name=b -> -",
 		"[0] w1 batch j1 g0 p0 e1 says x -> noted",
 		"[0] w1 wants 1 -> -",
 		"[0] w2 wants 1 -> w2 gets j1 g0 p0 e1",
 		"[1] w2 batch j1 g0 p0 e1 says x -> merge, merged, j1 round 2, w1 gets j1 g0 p0 e2, w2 gets j1 g0 p0 e2",
-		NULL });
+		NULL,
+	});
 }
 
 /* A share: the same leases whoever computes them, about as many as were asked for. */
@@ -150,13 +173,14 @@ static void share(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] submit groups=2 verify=0.3 -> j1 submitted, j1 is queued",
-		"[0] submit groups=2 -> j2 submitted, j2 is queued",
-		"[0] submit groups=2 mixed verify=1 -> j3 submitted, j3 is queued",
-		NULL });
+				   "[0] submit groups=2 verify=0.3 -> j1 submitted, j1 is queued",
+				   "[0] submit groups=2 -> j2 submitted, j2 is queued",
+				   "[0] submit groups=2 mixed verify=1 -> j3 submitted, j3 is queued",
+				   NULL,
+			   });
 	int chosen = 0;
 	for (uint64_t e = 0; e < 10000; e++) {
-		struct lease_key k = { 1, LEASE_RENDER, (uint32_t)(e & 1), 0, e / 2 };
+		struct lease_key k = {1, LEASE_RENDER, (uint32_t)(e & 1), 0, e / 2};
 		chosen += farm_verifies(f, &k);
 		k.job = 2;
 		assert_false(farm_verifies(f, &k));
@@ -171,33 +195,38 @@ static void set_aside(void **state)
 {
 	(void)state;
 	struct farm *f = transcript_farm();
-	transcript_play(f, (const char *const[]){
-		"[0] submit groups=1 rounds=9 verify=1 -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=1 name=a -> -", "[0] w2 joins A threads=1 name=b -> -",
-		"[0] w3 joins A threads=1 name=c home=c start=4 -> -",
-		"[0] w3 wants 1 -> j1 is bootstrap, w3 gets j1 g0 p0 boot",
-		"[0] w1 wants 1 -> w1 gets j1 g0 p0 boot", "[0] w2 wants 1 -> -",
-		"[1] w3 batch j1 g0 p0 boot says 1 -> noted",
-		"[1] w1 batch j1 g0 p0 boot says x -> noted: it differs from another worker's, w2 gets j1 g0 p0 boot",
-		"[1] w2 batch j1 g0 p0 boot says x -> merge, merged, #3 wrong result: j1 bootstrap group 0 part 0 epoch 0, j1 prepare",
-		"[1] prepared j1 -> j1 is running, w3 gets j1 g0 p0 e0, w1 gets j1 g0 p0 e0",
-		"[2] w3 batch j1 g0 p0 e0 says 1 -> noted",
-		"[2] w1 batch j1 g0 p0 e0 says x -> noted: it differs from another worker's, w2 gets j1 g0 p0 e0",
-		"[2] w2 batch j1 g0 p0 e0 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 0, j1 round 1, "
-		"w3 gets j1 g0 p0 e1, w1 gets j1 g0 p0 e1",
-		"[3] w3 batch j1 g0 p0 e1 says 1 -> noted, w2 gets j1 g0 p0 e1", /* it straggles at w1 */
-		"[3] w1 batch j1 g0 p0 e1 says x -> noted: it differs from another worker's",
-		"[3] w2 batch j1 g0 p0 e1 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 1, #3 aside, j1 round 2, "
-		"w1 gets j1 g0 p0 e2, w2 gets j1 g0 p0 e2",
-		/* nothing of it counts, here or when it calls again, under whatever name */
-		"[4] w3 batch j1 g0 p0 e2 says x -> refused: the worker is set aside: its results do not count",
-		"[4] w3 leaves -> -",
-		"[4] w5 joins A threads=1 name=d home=c start=5 -> -",
-		"[4] w5 wants 1 -> -",
-		"[4] w5 batch j1 g0 p0 e2 says x -> refused: the worker is set aside: its results do not count",
-		"[5] w6 joins A threads=1 name=c home=b start=1 -> -",
-		"[5] w6 wants 1 -> -",
-		NULL });
+	transcript_play(
+		f,
+		(const char *const[]){
+			"[0] submit groups=1 rounds=9 verify=1 -> j1 submitted, j1 is queued",
+			"[0] w1 joins A threads=1 name=a -> -",
+			"[0] w2 joins A threads=1 name=b -> -",
+			"[0] w3 joins A threads=1 name=c home=c start=4 -> -",
+			"[0] w3 wants 1 -> j1 is bootstrap, w3 gets j1 g0 p0 boot",
+			"[0] w1 wants 1 -> w1 gets j1 g0 p0 boot",
+			"[0] w2 wants 1 -> -",
+			"[1] w3 batch j1 g0 p0 boot says 1 -> noted",
+			"[1] w1 batch j1 g0 p0 boot says x -> noted: it differs from another worker's, w2 gets j1 g0 p0 boot",
+			"[1] w2 batch j1 g0 p0 boot says x -> merge, merged, #3 wrong result: j1 bootstrap group 0 part 0 epoch 0, j1 prepare",
+			"[1] prepared j1 -> j1 is running, w3 gets j1 g0 p0 e0, w1 gets j1 g0 p0 e0",
+			"[2] w3 batch j1 g0 p0 e0 says 1 -> noted",
+			"[2] w1 batch j1 g0 p0 e0 says x -> noted: it differs from another worker's, w2 gets j1 g0 p0 e0",
+			"[2] w2 batch j1 g0 p0 e0 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 0, j1 round 1, "
+			"w3 gets j1 g0 p0 e1, w1 gets j1 g0 p0 e1",
+			"[3] w3 batch j1 g0 p0 e1 says 1 -> noted, w2 gets j1 g0 p0 e1", /* it straggles at w1 */
+			"[3] w1 batch j1 g0 p0 e1 says x -> noted: it differs from another worker's",
+			"[3] w2 batch j1 g0 p0 e1 says x -> merge, merged, #3 wrong result: j1 render group 0 part 0 epoch 1, #3 aside, j1 round 2, "
+			"w1 gets j1 g0 p0 e2, w2 gets j1 g0 p0 e2",
+			/* nothing of it counts, here or when it calls again, under whatever name */
+			"[4] w3 batch j1 g0 p0 e2 says x -> refused: the worker is set aside: its results do not count",
+			"[4] w3 leaves -> -",
+			"[4] w5 joins A threads=1 name=d home=c start=5 -> -",
+			"[4] w5 wants 1 -> -",
+			"[4] w5 batch j1 g0 p0 e2 says x -> refused: the worker is set aside: its results do not count",
+			"[5] w6 joins A threads=1 name=c home=b start=1 -> -",
+			"[5] w6 wants 1 -> -",
+			NULL,
+		});
 	struct peer_status p;
 	struct worker_status w;
 	struct job_status j;
@@ -214,8 +243,9 @@ static void set_aside(void **state)
 	assert_int_equal(j.failures, 0);
 	assert_int_equal(j.mismatched, 3);
 	transcript_play(f, (const char *const[]){
-		"[6] w1 batch j1 g0 p0 e2 says x -> noted",
-		NULL });
+				   "[6] w1 batch j1 g0 p0 e2 says x -> noted",
+				   NULL,
+			   });
 	farm_free(f);
 }
 
@@ -225,7 +255,8 @@ static void notes_of_a_liar(void **state)
 	(void)state;
 	transcript((const char *const[]){
 		"[0] submit groups=1 rounds=9 verify=1 -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=1 name=a -> -", "[0] w2 joins A threads=1 name=b -> -",
+		"[0] w1 joins A threads=1 name=a -> -",
+		"[0] w2 joins A threads=1 name=b -> -",
 		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
 		"[0] w1 batch j1 g0 p0 boot says x -> noted",
 		"[1] w1 batch j1 g7 p0 boot -> refused: not a lease of this job",
@@ -233,7 +264,8 @@ static void notes_of_a_liar(void **state)
 		"[1] w1 batch j1 g7 p0 boot -> refused: not a lease of this job, #1 aside",
 		"[2] w2 wants 1 -> w2 gets j1 g0 p0 boot",
 		"[2] w2 batch j1 g0 p0 boot says x -> noted",
-		NULL });
+		NULL,
+	});
 }
 
 static void remembered(void **state)
@@ -242,9 +274,12 @@ static void remembered(void **state)
 	transcript((const char *const[]){
 		"[0] aside certificate=a name=b home=c -> -",
 		"[0] submit groups=1 -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=1 certificate=a name=b -> -", "[0] w1 wants 1 -> -",
-		"[0] w2 joins A threads=1 name=b -> -", "[0] w2 wants 1 -> j1 is bootstrap, w2 gets j1 g0 p0 boot",
-		NULL });
+		"[0] w1 joins A threads=1 certificate=a name=b -> -",
+		"[0] w1 wants 1 -> -",
+		"[0] w2 joins A threads=1 name=b -> -",
+		"[0] w2 wants 1 -> j1 is bootstrap, w2 gets j1 g0 p0 boot",
+		NULL,
+	});
 }
 
 static void lives(void **state)
@@ -268,7 +303,8 @@ static void lives(void **state)
 		"[5] w7 joins A threads=1 name=a home=c start=1 -> -",
 		"[5] w8 joins A threads=1 certificate=d name=a home=c start=1 -> -",
 		"[5] w9 joins A threads=1 name=a -> -",
-		NULL });
+		NULL,
+	});
 }
 
 /* A job of which nothing is merged is not lost to the only worker of its kind. */
@@ -277,16 +313,19 @@ static void odd_one_out(void **state)
 	(void)state;
 	struct farm *f = transcript_farm();
 	transcript_play(f, (const char *const[]){
-		"[0] submit groups=1 verify=1 -> j1 submitted, j1 is queued",
-		"[0] w1 joins A threads=1 name=a -> -",
-		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
-		"[1] w1 batch j1 g0 p0 boot says x -> noted",
-		"[2] w2 joins B threads=1 name=b -> -", "[2] w2 wants 1 -> -",
-		"[2] w3 joins B threads=1 name=c -> w2 gets j1 g0 p0 boot", "[2] w3 wants 1 -> w3 gets j1 g0 p0 boot",
-		"[3] w2 batch j1 g0 p0 boot says y -> noted",
-		"[3] w3 leaves -> -",
-		"[3] w2 leaves -> w1 gets j1 g0 p0 boot",
-		NULL });
+				   "[0] submit groups=1 verify=1 -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=1 name=a -> -",
+				   "[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+				   "[1] w1 batch j1 g0 p0 boot says x -> noted",
+				   "[2] w2 joins B threads=1 name=b -> -",
+				   "[2] w2 wants 1 -> -",
+				   "[2] w3 joins B threads=1 name=c -> w2 gets j1 g0 p0 boot",
+				   "[2] w3 wants 1 -> w3 gets j1 g0 p0 boot",
+				   "[3] w2 batch j1 g0 p0 boot says y -> noted",
+				   "[3] w3 leaves -> -",
+				   "[3] w2 leaves -> w1 gets j1 g0 p0 boot",
+				   NULL,
+			   });
 	farm_free(f);
 }
 
@@ -298,23 +337,29 @@ static void straggler(void **state)
 		START_ROUNDS,
 		"[2] w1 batch j1 g0 p0 e0 says x -> noted",
 		"[2] w2 batch j1 g0 p0 e0 says x -> merge, merged, j1 round 1, w1 gets j1 g0 p0 e1, w2 gets j1 g0 p0 e1",
-		"[2] w3 joins A threads=1 name=c -> -", "[2] w3 wants 1 -> -",
+		"[2] w3 joins A threads=1 name=c -> -",
+		"[2] w3 wants 1 -> -",
 		"[3] w1 batch j1 g0 p0 e1 says x -> noted",
-		"[3.4] tick -> -", "[3.5] tick -> w3 gets j1 g0 p0 e1",
+		"[3.4] tick -> -",
+		"[3.5] tick -> w3 gets j1 g0 p0 e1",
 		"[4] w3 batch j1 g0 p0 e1 says x -> merge, merged, w2 loses j1 g0 p0 e1, j1 round 2, j1 publish 2, j1 is done (mutations)",
-		NULL });
+		NULL,
+	});
 }
 
 static void give_faults(struct farm *f, uint64_t peer, const char *certificate, const char *name)
 {
 	struct update u;
-	struct event ev = { .kind = EVENT_JOINED, .time = 10.0 + (double)peer,
-			    .join = { .peer = peer, .name = name, .certificate = certificate, .fingerprint = "A", .threads = 1 } };
+	struct event ev = {
+		.kind = EVENT_JOINED,
+		.time = 10.0 + (double)peer,
+		.join = {.peer = peer, .name = name, .certificate = certificate, .fingerprint = "A", .threads = 1}};
 	farm_step(f, &ev, &u);
-	ev = (struct event){ .kind = EVENT_BATCH, .time = ev.time, .peer = peer, .lease = { .key = { .job = 1, .kind = LEASE_RENDER } } };
+	ev = (struct event){
+		.kind = EVENT_BATCH, .time = ev.time, .peer = peer, .lease = {.key = {.job = 1, .kind = LEASE_RENDER}}};
 	for (int i = 0; i < 3; i++)
 		farm_step(f, &ev, &u);
-	ev = (struct event){ .kind = EVENT_LEFT, .time = ev.time, .peer = peer };
+	ev = (struct event){.kind = EVENT_LEFT, .time = ev.time, .peer = peer};
 	farm_step(f, &ev, &u);
 }
 
@@ -325,7 +370,10 @@ static void names_without_end(void **state)
 	struct farm *f = transcript_farm();
 	struct worker_status w;
 	char name[16];
-	transcript_play(f, (const char *const[]){ "[0] submit groups=1 -> j1 submitted, j1 is queued", NULL });
+	transcript_play(f, (const char *const[]){
+				   "[0] submit groups=1 -> j1 submitted, j1 is queued",
+				   NULL,
+			   });
 	give_faults(f, 1, "b", "honest once");
 	for (uint64_t i = 2; i < 500; i++) {
 		snprintf(name, sizeof name, "n%u", (unsigned)i);
@@ -346,20 +394,13 @@ static void names_without_end(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(agree),
-		cmocka_unit_test(third_decides),
-		cmocka_unit_test(all_differ),
-		cmocka_unit_test(one_worker_twice),
-		cmocka_unit_test(leaves_between),
-		cmocka_unit_test(restart),
-		cmocka_unit_test(share),
-		cmocka_unit_test(set_aside),
-		cmocka_unit_test(notes_of_a_liar),
-		cmocka_unit_test(remembered),
-		cmocka_unit_test(lives),
-		cmocka_unit_test(odd_one_out),
-		cmocka_unit_test(straggler),
-		cmocka_unit_test(names_without_end),
+		cmocka_unit_test(agree),	   cmocka_unit_test(third_decides),
+		cmocka_unit_test(all_differ),	   cmocka_unit_test(one_worker_twice),
+		cmocka_unit_test(leaves_between),  cmocka_unit_test(restart),
+		cmocka_unit_test(share),	   cmocka_unit_test(set_aside),
+		cmocka_unit_test(notes_of_a_liar), cmocka_unit_test(remembered),
+		cmocka_unit_test(lives),	   cmocka_unit_test(odd_one_out),
+		cmocka_unit_test(straggler),	   cmocka_unit_test(names_without_end),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The spool is damaged while no coordinator runs. What is not known is never deleted; what can be known again is; what was lost is said
- * and computed again, to the same bits, and nothing else is. Each run: the power goes in the middle of the work, something is damaged,
- * and the next life, which the power may end, too, goes on. Results that were acknowledged and are handed out again are counted.
+ * The spool is damaged while no coordinator runs. What is not known is never deleted; what can be known again is; what
+ * was lost is said and computed again, to the same bits, and nothing else is. Each run: the power goes in the middle of
+ * the work, something is damaged, and the next life, which the power may end, too, goes on. Results that were
+ * acknowledged and are handed out again are counted.
  */
 #include "tests/support/folder.h"
 #include "tests/support/outage.h"
@@ -129,12 +130,15 @@ static void a_bit_of_a_journal(void **state)
 		finish();
 		uint64_t n = lost();
 		if (n > 1)
-			fail_msg("seed %llu: %llu results are computed again", (unsigned long long)seed, (unsigned long long)n);
+			fail_msg("seed %llu: %llu results are computed again", (unsigned long long)seed,
+				 (unsigned long long)n);
 		all += n;
 	}
-	printf("   %llu bits: %llu results computed again, %llu behind them were not\n", (unsigned long long)runs, (unsigned long long)all, (unsigned long long)behind);
-	/* Bits of the torn tail, or of what a checkpoint already has, cost nothing: from half of them (10 of 21, alone on a machine) to
-	 * three quarters (15 of 20, sanitized on a busy one). Some must, or no bit was tried that matters. */
+	printf("   %llu bits: %llu results computed again, %llu behind them were not\n", (unsigned long long)runs,
+	       (unsigned long long)all, (unsigned long long)behind);
+	/* Bits of the torn tail, or of what a checkpoint already has, cost nothing: from half of them (10 of 21, alone
+	 * on a machine) to three quarters (15 of 20, sanitized on a busy one). Some must, or no bit was tried that
+	 * matters. */
 	assert_true(runs > RUNS / 3 && all > 0 && behind > 2 * runs);
 }
 
@@ -194,13 +198,15 @@ static void damaged_database(void **state)
 			in_root("echo no database, and none that anybody would take for one >jobs.db; rm jobs.db-wal");
 			break;
 		case 6: /* the wal goes into the database first */
-			change_rows("UPDATE jobs SET plan = CAST(substr(plan, 1, length(plan) - 1) || x'07' AS BLOB) WHERE ended IS NULL");
+			change_rows(
+				"UPDATE jobs SET plan = CAST(substr(plan, 1, length(plan) - 1) || x'07' AS BLOB) WHERE ended IS NULL");
 			break;
 		case 7:
 			change_rows("DELETE FROM jobs");
 			break;
 		case 8:
-			change_rows("UPDATE jobs SET ended = 5, state = 'done', submission = NULL, plan = NULL WHERE ended IS NULL");
+			change_rows(
+				"UPDATE jobs SET ended = 5, state = 'done', submission = NULL, plan = NULL WHERE ended IS NULL");
 			break;
 		case 9:
 			change_rows("UPDATE jobs SET owner = 'ann'");
@@ -209,14 +215,15 @@ static void damaged_database(void **state)
 		default:
 			flip_in("jobs.db-wal", seed);
 		}
-		snprintf(outage.running, sizeof outage.running, "seed %llu, kind %d", (unsigned long long)seed, (int)(seed % KINDS));
+		snprintf(outage.running, sizeof outage.running, "seed %llu, kind %d", (unsigned long long)seed,
+			 (int)(seed % KINDS));
 		finish();
 		assert_int_equal(lost(), 0);
 	}
 }
 
-/* Neither the database nor its folder knows what a job is: the start is refused, and nothing is touched; then it is put aside, and the others
- * go on. */
+/* Neither the database nor its folder knows what a job is: the start is refused, and nothing is touched; then it is put
+ * aside, and the others go on. */
 static void what_is_lost(void **state)
 {
 	(void)state;
@@ -228,7 +235,8 @@ static void what_is_lost(void **state)
 		if (largest("jobs/j*/order", path) == 0)
 			continue;
 		in_root("for o in jobs/*/order; do ! grep -q '\"done\"' ${o%order}job.json || continue; j=${o%/order}; break; done; echo $j >lost-job");
-		in_root(seed % 2 ? "rm $(cat lost-job)/order" : "printf x | dd of=$(cat lost-job)/order bs=1 seek=20 conv=notrunc status=none");
+		in_root(seed % 2 ? "rm $(cat lost-job)/order"
+				 : "printf x | dd of=$(cat lost-job)/order bs=1 seek=20 conv=notrunc status=none");
 		in_root("rm jobs.db jobs.db-wal; find $(cat lost-job) -type f | sort | xargs sha256sum >sums");
 		run.faulty = true;
 		assert_false(outage_start(&run));
@@ -251,7 +259,8 @@ int main(void)
 		cmocka_unit_test_setup_teardown(damaged_database, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_is_lost, folder_set_up, folder_tear_down),
 	};
-	outage.counts = mmap(NULL, FAULTY_DISK_COUNTS * sizeof *outage.counts, PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1, 0);
+	outage.counts = mmap(NULL, FAULTY_DISK_COUNTS * sizeof *outage.counts, PROT_READ | PROT_WRITE,
+			     MAP_SHARED | MAP_ANONYMOUS, -1, 0);
 	outage.found = &found;
 	outage.loud = getenv("HSLT_LOUD") != NULL;
 	return outage.counts == MAP_FAILED ? 1 : cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,18 +1,21 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The power goes at a random call of the disk, again and again, while a coordinator takes jobs, merges, writes checkpoints and
- * results; each life goes on with what the disk kept (tests/support/faulty_disk.h). Whatever was acknowledged is there: jobs, batches (a
- * lease whose result was acknowledged is not handed out again), results that were said to be there; and the image has the bits of
- * an undisturbed run, which it has not if a batch is missing or counted twice.
+ * The power goes at a random call of the disk, again and again, while a coordinator takes jobs, merges, writes
+ * checkpoints and results; each life goes on with what the disk kept (tests/support/faulty_disk.h). Whatever was
+ * acknowledged is there: jobs, batches (a lease whose result was acknowledged is not handed out again), results that
+ * were said to be there; and the image has the bits of an undisturbed run, which it has not if a batch is missing or
+ * counted twice.
  *
- * Then single calls fail, the n-th one of a run, in several ways: nothing crashes, what is refused is refused with a sentence and taken
- * later, what was acknowledged stays, and the images have the same bits. So do calls of a start that finds jobs half done.
+ * Then single calls fail, the n-th one of a run, in several ways: nothing crashes, what is refused is refused with a
+ * sentence and taken later, what was acknowledged stays, and the images have the same bits. So do calls of a start that
+ * finds jobs half done.
  *
- * What must not be is counted, and each of the two tests ends with a line of what it did and counted: tests/e2e/faults/disk.sh makes
- * rows of a table of them.
+ * What must not be is counted, and each of the two tests ends with a line of what it did and counted:
+ * tests/e2e/faults/disk.sh makes rows of a table of them.
  *
- * HSLT_POWER_SEEDS: so many runs (default 150; FULL=1: 4000). HSLT_POWER_SEED: this one alone, with the coordinator's log.
- * HSLT_FAULT, HSLT_FAULT_AT: this kind, at this call alone. HSLT_FAULT_STEP: every so many calls (default 72; FULL=1: each).
+ * HSLT_POWER_SEEDS: so many runs (default 150; FULL=1: 4000). HSLT_POWER_SEED: this one alone, with the coordinator's
+ * log. HSLT_FAULT, HSLT_FAULT_AT: this kind, at this call alone. HSLT_FAULT_STEP: every so many calls (default 72;
+ * FULL=1: each).
  */
 #include "common/base/checked_file.h"
 #include "common/base/version.h"
@@ -38,7 +41,7 @@ enum { LIVES_MAX = 12, KINDS = 4 /* of calls that fail */, TESTS = 4 /* that cou
 static struct sums { /* of all shares */
 	struct outage_found found;
 	_Atomic uint64_t losses, acks, taken, runs[KINDS], refused[KINDS], failed[KINDS];
-} *sums, *now; /* of the tests; of the one that runs */
+} * sums, *now; /* of the tests; of the one that runs */
 static unsigned share;
 
 /* ---- runs ---- */
@@ -54,7 +57,9 @@ static void run_seed(uint64_t seed, uint64_t *losses, uint64_t *acks)
 		atomic_store(&outage.counts[0], 0);
 		atomic_store(&outage.counts[4], 0);
 		f.disk.seed = seed * 100 + (uint64_t)life;
-		f.disk.lose_at = life < LIVES_MAX && !dark ? 1 + scripted_tag(&k) % (outage.quiet_calls + outage.quiet_calls / 4) : 0;
+		f.disk.lose_at = life < LIVES_MAX && !dark
+					 ? 1 + scripted_tag(&k) % (outage.quiet_calls + outage.quiet_calls / 4)
+					 : 0;
 		bool done = outage_start(&f) && outage_work(&f);
 		if (done && dark)
 			break;
@@ -105,8 +110,8 @@ static void run_faults(uint64_t from, uint64_t count, int with, bool writes_only
 	*failed += f.failed;
 }
 
-/* The power goes in the middle of the work; calls of the next start fail, from the n-th on. It starts or says why not; no job fails of
- * it, and all that was acknowledged is there, then or after another start. */
+/* The power goes in the middle of the work; calls of the next start fail, from the n-th on. It starts or says why not;
+ * no job fails of it, and all that was acknowledged is there, then or after another start. */
 static bool begin_restart(struct farm_run *f, uint64_t from)
 {
 	outage_begin(f, from);
@@ -172,8 +177,9 @@ static void assert_no_harm(void)
 static void say_harm(const char *what, uint64_t times)
 {
 	if (share == 0) /* the last to come here */
-		printf("   %s: times=%llu lost=%llu doubled=%llu images=%llu unequal=%llu\n", what, (unsigned long long)times,
-		       (unsigned long long)now->found.harm[LOST], (unsigned long long)now->found.harm[DOUBLED], (unsigned long long)now->found.images,
+		printf("   %s: times=%llu lost=%llu doubled=%llu images=%llu unequal=%llu\n", what,
+		       (unsigned long long)times, (unsigned long long)now->found.harm[LOST],
+		       (unsigned long long)now->found.harm[DOUBLED], (unsigned long long)now->found.images,
 		       (unsigned long long)now->found.harm[UNEQUAL]);
 	assert_true(share || (times && now->found.images));
 	assert_no_harm();
@@ -200,7 +206,8 @@ static void power_goes_at_any_time(void **state)
 	bool pass = share || one || shares_pass();
 	if (share == 0)
 		printf("   %llu runs of %llu calls: the power took %llu sectors and names; %llu batches were acknowledged\n",
-		       (unsigned long long)(one ? 1 : seeds), (unsigned long long)outage.quiet_calls, (unsigned long long)now->taken, (unsigned long long)now->acks);
+		       (unsigned long long)(one ? 1 : seeds), (unsigned long long)outage.quiet_calls,
+		       (unsigned long long)now->taken, (unsigned long long)now->acks);
 	say_harm("power", now->losses);
 	assert_true(pass);
 }
@@ -213,8 +220,13 @@ static void calls_fail_at_any_time(void **state)
 		int with;
 		uint64_t count;
 		bool writes_only;
-	} kinds[KINDS] = {{"EIO", EIO, 1, false}, {"ENOSPC", ENOSPC, 40, true}, {"EMFILE", EMFILE, 1, false}, {"EROFS", EROFS, 10, false}};
-	uint64_t one = number("HSLT_FAULT_AT", 0), step = number("FULL", 0) ? SHARES : number("HSLT_FAULT_STEP", 18 * SHARES * number("HSLT_TEST_SCALE", 1));
+	} kinds[KINDS] = {{"EIO", EIO, 1, false},
+			  {"ENOSPC", ENOSPC, 40, true},
+			  {"EMFILE", EMFILE, 1, false},
+			  {"EROFS", EROFS, 10, false}};
+	uint64_t one = number("HSLT_FAULT_AT", 0),
+		 step = number("FULL", 0) ? SHARES
+					  : number("HSLT_FAULT_STEP", 18 * SHARES * number("HSLT_TEST_SCALE", 1));
 	if (number("HSLT_POWER_SEED", 0))
 		skip();
 	begin_test(1);
@@ -225,8 +237,10 @@ static void calls_fail_at_any_time(void **state)
 		uint64_t refused = 0, failed = 0, runs = 0;
 		if (getenv("HSLT_FAULT") && strcmp(getenv("HSLT_FAULT"), kinds[k].name) != 0)
 			continue;
-		for (uint64_t from = one ? one : 1 + share + SHARES * k; from < (one ? one + 1 : calls); from += step, runs++) {
-			snprintf(outage.running, sizeof outage.running, "HSLT_FAULT=%s HSLT_FAULT_AT=%llu", kinds[k].name, (unsigned long long)from);
+		for (uint64_t from = one ? one : 1 + share + SHARES * k; from < (one ? one + 1 : calls);
+		     from += step, runs++) {
+			snprintf(outage.running, sizeof outage.running, "HSLT_FAULT=%s HSLT_FAULT_AT=%llu",
+				 kinds[k].name, (unsigned long long)from);
 			run_faults(from, kinds[k].count, kinds[k].with, kinds[k].writes_only, &refused, &failed);
 		}
 		outage.running[0] = 0;
@@ -234,8 +248,9 @@ static void calls_fail_at_any_time(void **state)
 		now->failed[k] += failed;
 		times += atomic_fetch_add(&now->runs[k], runs) + runs;
 		if (share == 0)
-			printf("   %s at %llu of %llu calls: %llu refusals, %llu jobs failed and said so\n", kinds[k].name, (unsigned long long)now->runs[k],
-			       (unsigned long long)calls, (unsigned long long)now->refused[k], (unsigned long long)now->failed[k]);
+			printf("   %s at %llu of %llu calls: %llu refusals, %llu jobs failed and said so\n",
+			       kinds[k].name, (unsigned long long)now->runs[k], (unsigned long long)calls,
+			       (unsigned long long)now->refused[k], (unsigned long long)now->failed[k]);
 	}
 	say_harm("failing calls", times);
 }
@@ -248,7 +263,9 @@ static void starts_fail_at_any_time(void **state)
 		int with;
 		uint64_t count;
 	} kinds[] = {{"EIO", EIO, 1}, {"EMFILE", EMFILE, 3}};
-	uint64_t one = number("HSLT_FAULT_AT", 0), step = number("FULL", 0) ? SHARES : number("HSLT_FAULT_STEP", 5 * SHARES * number("HSLT_TEST_SCALE", 1));
+	uint64_t one = number("HSLT_FAULT_AT", 0),
+		 step = number("FULL", 0) ? SHARES
+					  : number("HSLT_FAULT_STEP", 5 * SHARES * number("HSLT_TEST_SCALE", 1));
 	if (number("HSLT_POWER_SEED", 0))
 		skip();
 	begin_test(2);
@@ -259,16 +276,20 @@ static void starts_fail_at_any_time(void **state)
 		uint64_t refused = 0, runs = 0;
 		if (getenv("HSLT_FAULT") && strcmp(getenv("HSLT_FAULT"), kinds[k].name) != 0)
 			continue;
-		for (uint64_t from = one ? one : 1 + share + SHARES * k; from < (one ? one + 1 : calls); from += step, runs++) {
-			snprintf(outage.running, sizeof outage.running, "of a restart: HSLT_FAULT=%s HSLT_FAULT_AT=%llu", kinds[k].name, (unsigned long long)from);
+		for (uint64_t from = one ? one : 1 + share + SHARES * k; from < (one ? one + 1 : calls);
+		     from += step, runs++) {
+			snprintf(outage.running, sizeof outage.running,
+				 "of a restart: HSLT_FAULT=%s HSLT_FAULT_AT=%llu", kinds[k].name,
+				 (unsigned long long)from);
 			run_restart(from, kinds[k].count, kinds[k].with, &refused);
 		}
 		outage.running[0] = 0;
 		now->refused[k] += refused;
 		times += atomic_fetch_add(&now->runs[k], runs) + runs;
 		if (share == 0)
-			printf("   %s at %llu of %llu calls of a restart: %llu did not start, none failed\n", kinds[k].name,
-			       (unsigned long long)now->runs[k], (unsigned long long)calls, (unsigned long long)now->refused[k]);
+			printf("   %s at %llu of %llu calls of a restart: %llu did not start, none failed\n",
+			       kinds[k].name, (unsigned long long)now->runs[k], (unsigned long long)calls,
+			       (unsigned long long)now->refused[k]);
 	}
 	say_harm("failing starts", times);
 }

@@ -56,7 +56,12 @@ static void add(uint64_t id, double ended)
 {
 	struct error e;
 	struct job_record *r = calloc(1, sizeof *r);
-	*r = (struct job_record){.id = id, .state = "done", .ended = ended, .ended_seen = 100.0 * DAY - (double)time(NULL) + ended, .has_result = true, .rel_error = -1};
+	*r = (struct job_record){.id = id,
+				 .state = "done",
+				 .ended = ended,
+				 .ended_seen = 100.0 * DAY - (double)time(NULL) + ended,
+				 .has_result = true,
+				 .rel_error = -1};
 	if (id == LIVING)
 		strcpy(r->state, "running");
 	assert_int_equal(spool_take_job(server.spool, id, &e), 0);
@@ -71,10 +76,12 @@ static void add_rows(const char *path, double now)
 {
 	char sql[600];
 	sqlite3 *db;
-	snprintf(sql, sizeof sql, "WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < %d)"
-				  " INSERT INTO jobs (id, owner, name, version, priority, mixed, state, submitted, ended)"
-				  " SELECT i, '', 'n', '1', 0, 0, 'done', 1, CASE i WHEN %d THEN NULL WHEN %d THEN %.0f ELSE %.0f END FROM n",
-		 JOBS, LIVING, YOUNG, now - 2 * DAY, now - 20 * DAY);
+	snprintf(
+		sql, sizeof sql,
+		"WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < %d)"
+		" INSERT INTO jobs (id, owner, name, version, priority, mixed, state, submitted, ended)"
+		" SELECT i, '', 'n', '1', 0, 0, 'done', 1, CASE i WHEN %d THEN NULL WHEN %d THEN %.0f ELSE %.0f END FROM n",
+		JOBS, LIVING, YOUNG, now - 2 * DAY, now - 20 * DAY);
 	assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
 	assert_int_equal(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
 	assert_int_equal(sqlite3_close(db), SQLITE_OK);

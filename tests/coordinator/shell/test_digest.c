@@ -22,13 +22,21 @@ struct sample {
 static void begin(struct sample *s)
 {
 	memset(s, 0, sizeof *s);
-	s->batch = (struct batch){ .key = { 7, LEASE_RENDER, 1, 2, 3 }, .strategy_count = 2, .tile_count = TILES, .tiles = s->tiles,
-				   .state_count = STATES, .states = s->states, .weight_count = WEIGHTS, .weights = s->weights,
-				   .moment_count = MOMENTS, .moments = s->moments, .cpu_seconds = 1 };
+	s->batch = (struct batch){.key = {7, LEASE_RENDER, 1, 2, 3},
+				  .strategy_count = 2,
+				  .tile_count = TILES,
+				  .tiles = s->tiles,
+				  .state_count = STATES,
+				  .states = s->states,
+				  .weight_count = WEIGHTS,
+				  .weights = s->weights,
+				  .moment_count = MOMENTS,
+				  .moments = s->moments,
+				  .cpu_seconds = 1};
 	for (uint32_t i = 0; i < TILES; i++)
-		s->tiles[i] = (struct tile){ .x = 64 * i, .width = 2, .height = 2, .xyz = s->pixels[i] };
+		s->tiles[i] = (struct tile){.x = 64 * i, .width = 2, .height = 2, .xyz = s->pixels[i]};
 	for (int i = 0; i < STATES; i++)
-		s->states[i] = (struct chain_state){ s->bytes[i], 5 };
+		s->states[i] = (struct chain_state){s->bytes[i], 5};
 }
 
 static void check(const struct sample *s, bool same)
@@ -46,10 +54,10 @@ static void every_number_counts(void **state)
 {
 	(void)state;
 	static struct sample s;
-#define CHANGED(what)          \
-	do {                   \
-		begin(&s);     \
-		what;          \
+#define CHANGED(what)             \
+	do {                      \
+		begin(&s);        \
+		what;             \
 		check(&s, false); \
 	} while (0)
 	begin(&s);
@@ -89,6 +97,6 @@ static void every_number_counts(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(every_number_counts) };
+	const struct CMUnitTest tests[] = {cmocka_unit_test(every_number_counts)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What happens while the disk is asked: a checkpoint is held up in its last step, and meanwhile its job is cancelled or counts go on; a
- * record or a row that cannot be written is written later; a job goes on while an earlier flush lasts. And what happens without memory.
+ * What happens while the disk is asked: a checkpoint is held up in its last step, and meanwhile its job is cancelled or
+ * counts go on; a record or a row that cannot be written is written later; a job goes on while an earlier flush lasts.
+ * And what happens without memory.
  */
 #include "common/base/disk.h"
 #include "common/base/mem.h"
@@ -32,17 +33,25 @@ static const char scene[] = "<scene/>";
 /* Shared with the coordinator, which is another process. */
 static struct {
 	_Atomic bool hold_up, held_up, go_on; /* a checkpoint on its way to its name */
-	_Atomic bool fail_folder;             /* then the flush of that name fails */
+	_Atomic bool fail_folder;	      /* then the flush of that name fails */
 	_Atomic bool fail_records;
 	_Atomic bool hold_flush, held_flush, end_flush; /* the first one of a journal */
-	_Atomic bool fail_flush;                        /* which then fails */
-	_Atomic bool fail_memory;                       /* of one allocation, when room was made for a result: */
-	_Atomic unsigned allocations;                   /* of the one after so many */
-} *disk;
+	_Atomic bool fail_flush;			/* which then fails */
+	_Atomic bool fail_memory;			/* of one allocation, when room was made for a result: */
+	_Atomic unsigned allocations;			/* of the one after so many */
+} * disk;
 static _Thread_local bool fail_next_folder;
 static struct plan plan;
-static struct plan_request request = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .mutations = 3200,
-				      .max_depth = 5, .groups = 2, .chains = 8, .epoch = 100, .bootstrap = 64};
+static struct plan_request request = {.integrator = "pssmlt",
+				      .kind = PLAN_CHAINS,
+				      .width = 20,
+				      .height = 10,
+				      .mutations = 3200,
+				      .max_depth = 5,
+				      .groups = 2,
+				      .chains = 8,
+				      .epoch = 100,
+				      .bootstrap = 64};
 static uint64_t journal_most, keep_most;
 static pid_t pid;
 static char spool[100], port_file[100];
@@ -266,7 +275,9 @@ static void work(const _Atomic bool *until, struct lease_key *keep)
 			return;
 		if (m->body_case != FARM__ENVELOPE__BODY_LEASE_GRANT)
 			continue;
-		assert_int_equal(grant_unpack(&grant, m->lease_grant, worker->reader.payload.bytes, worker->reader.payload.size, &e), 0);
+		assert_int_equal(grant_unpack(&grant, m->lease_grant, worker->reader.payload.bytes,
+					      worker->reader.payload.size, &e),
+				 0);
 		if (keep && grant.key.kind == LEASE_RENDER && !keep->job)
 			*keep = grant.key;
 		else
@@ -316,7 +327,8 @@ static void cancelled_while_its_checkpoint_fails(void **state)
 	end(SIGTERM, true);
 }
 
-/* The failures that the job's record knows when the coordinator had its ticks after the failure, and after the checkpoint. */
+/* The failures that the job's record knows when the coordinator had its ticks after the failure, and after the
+ * checkpoint. */
 static uint64_t failures_after(useconds_t ticks_us)
 {
 	struct lease_key kept = {.job = 0};
@@ -361,7 +373,8 @@ static void *copy_of(const void *bytes, size_t size)
 	return memcpy(copy, bytes, size);
 }
 
-/* It went on after its end, without films, and is cancelled: its earlier result is there, and nothing to make another one of. */
+/* It went on after its end, without films, and is cancelled: its earlier result is there, and nothing to make another
+ * one of. */
 static void a_record_is_written_later(void **state)
 {
 	(void)state;
@@ -383,7 +396,12 @@ static void a_record_is_written_later(void **state)
 	await_state(job, "done");
 	end(SIGTERM, true);
 	assert_int_equal(ledger_open(&l, path, &e), 0);
-	j = (struct ledger_job){.id = job, .extended = 1, .submission = submission, .submission_size = j.submission_size, .plan = frame, .plan_size = j.plan_size};
+	j = (struct ledger_job){.id = job,
+				.extended = 1,
+				.submission = submission,
+				.submission_size = j.submission_size,
+				.plan = frame,
+				.plan_size = j.plan_size};
 	assert_int_equal(ledger_extend(l, &j, &e), 0);
 	ledger_close(l);
 	free(submission);
@@ -408,7 +426,8 @@ static int count_batch(void *user, const struct journal_item *item, struct error
 /* Results of the job wait for a slow flush when it ends; it is extended, and others come, while the flush goes on. */
 static void extended_during_a_flush(bool fails)
 {
-	unsigned first = plan.groups * plan.parts * (unsigned)(plan.rounds + 1), more = first + 6, after = more + 4, there = 0;
+	unsigned first = plan.groups * plan.parts * (unsigned)(plan.rounds + 1), more = first + 6, after = more + 4,
+		 there = 0;
 	char path[150];
 	struct journal_found found;
 	struct journal *j;
@@ -465,7 +484,8 @@ static bool work_on(void)
 	return false;
 }
 
-/* Whichever allocation it is that fails while a result is merged: the job goes on, at the latest when the coordinator starts again. */
+/* Whichever allocation it is that fails while a result is merged: the job goes on, at the latest when the coordinator
+ * starts again. */
 static void without_memory_for_a_result(void **state)
 {
 	(void)state;
@@ -498,8 +518,13 @@ static void refuse_ends(void)
 	end(SIGTERM, true);
 	snprintf(path, sizeof path, "%s/jobs.db", spool);
 	assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
-	assert_int_equal(sqlite3_exec(db, "CREATE TRIGGER refuse BEFORE UPDATE OF ended ON jobs WHEN NEW.ended IS NOT NULL AND NOT EXISTS"
-					  " (SELECT * FROM jobs WHERE id = 2) BEGIN SELECT RAISE(ABORT, 'no'); END", NULL, NULL, NULL), SQLITE_OK);
+	assert_int_equal(
+		sqlite3_exec(
+			db,
+			"CREATE TRIGGER refuse BEFORE UPDATE OF ended ON jobs WHEN NEW.ended IS NOT NULL AND NOT EXISTS"
+			" (SELECT * FROM jobs WHERE id = 2) BEGIN SELECT RAISE(ABORT, 'no'); END",
+			NULL, NULL, NULL),
+		SQLITE_OK);
 	assert_int_equal(sqlite3_close(db), SQLITE_OK);
 }
 

@@ -12,7 +12,8 @@
 
 static struct plan_request request(enum plan_kind kind)
 {
-	struct plan_request r = {.integrator = "hslt", .kind = kind, .width = 48, .height = 40, .border = 2, .seed = 5, .max_depth = 16};
+	struct plan_request r = {
+		.integrator = "hslt", .kind = kind, .width = 48, .height = 40, .border = 2, .seed = 5, .max_depth = 16};
 	if (kind == PLAN_CHAINS)
 		strcpy(r.mixture, "independent=0.1,hslt=0.9");
 	else
@@ -31,7 +32,8 @@ static void make(struct job *j, const struct plan_request *r, uint64_t rounds, b
 {
 	j->asked = *r;
 	assert_int_equal(plan_make(r, &j->plan, &j->e), 0);
-	j->from = (struct extension_from){.rounds = rounds ? rounds : j->plan.rounds, .seconds = 10, .error = NAN, .ended = ended};
+	j->from = (struct extension_from){
+		.rounds = rounds ? rounds : j->plan.rounds, .seconds = 10, .error = NAN, .ended = ended};
 }
 
 static int extend(struct job *j, struct extension x)

@@ -33,7 +33,8 @@ static void descriptors_bound_connections(void **state)
 	assert_int_equal(n, 100);
 	assert_true(now() >= 100 + 3 * 256 && now() < 2048); /* no more than it takes: a job has three */
 	assert_int_equal(limits_connections(2000, &n, &e), -EINVAL);
-	assert_non_null(strstr(e.text, "2000 connections, and 256 jobs, need 3024 file descriptors, and this process may have 2048"));
+	assert_non_null(strstr(
+		e.text, "2000 connections, and 256 jobs, need 3024 file descriptors, and this process may have 2048"));
 	assert_int_equal(limits_connections(0, &n, &e), 0);
 	assert_int_equal(n, 2048 - 1024);
 	assert_int_equal(now(), 2048);

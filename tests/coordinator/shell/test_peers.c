@@ -37,11 +37,11 @@ static void rubbish_is_hung_up_on(void **state)
 	} rubbish[] = {
 		{"GET / HTTP/1.1\r\n\r\n", 18},
 		{"\xff\xff\xff\xff\xff\xff\xff\xff", 8},
-		{"\0\0\0\0\0\0\0\0", 8},                 /* no header */
-		{"\0\0\0\x04\0\0\0\x01", 8},             /* a payload before hello */
-		{"\0\0\x10\x01\0\0\0\0", 8},             /* 4,097 bytes of hello */
-		{"\0\0\0\x03\0\0\0\0\xff\xff\xff", 11},  /* does not parse */
-		{"\0\0\0\x02\0\0\0\0\x1a\x00", 10},      /* a heartbeat before hello */
+		{"\0\0\0\0\0\0\0\0", 8},		      /* no header */
+		{"\0\0\0\x04\0\0\0\x01", 8},		      /* a payload before hello */
+		{"\0\0\x10\x01\0\0\0\0", 8},		      /* 4,097 bytes of hello */
+		{"\0\0\0\x03\0\0\0\0\xff\xff\xff", 11},	      /* does not parse */
+		{"\0\0\0\x02\0\0\0\0\x1a\x00", 10},	      /* a heartbeat before hello */
 		{"\0\0\0\x05\0\0\0\0\x0a\0\x98\x06\x01", 13}, /* an unknown field beside hello */
 	};
 	for (size_t i = 0; i < sizeof rubbish / sizeof *rubbish; i++) {
@@ -151,7 +151,8 @@ static void submissions_are_looked_at(void **state)
 	(void)state;
 	struct scripted *p = peer_call();
 	assert_true(peer_hello(p, FARM_VERSION, FARM__ROLE__ROLE_CLIENT)->accepted);
-	static const char *const names[] = {"../s.xml", "/s.xml", "a//s.xml", "", "a/./s.xml", "s.xml/", "a/..", "a\nb"};
+	static const char *const names[] = {"../s.xml",	 "/s.xml", "a//s.xml", "",
+					    "a/./s.xml", "s.xml/", "a/..",     "a\nb"};
 	for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
 		peer_submit(p, NULL, "<scene/>", names[i], names[i]);
 		const Farm__SubmitAnswer *a = peer_submit_answer(p);
@@ -187,8 +188,8 @@ static void say_piece_gets(const struct scripted *p, const struct blob_hash *h, 
 		peer_say(p, &m, NULL, 0);
 }
 
-/* A worker may ask for what all its jobs need at once, and gets it; what it does not read does not fill our memory, and when it goes
- * on asking it is hung up on. */
+/* A worker may ask for what all its jobs need at once, and gets it; what it does not read does not fill our memory, and
+ * when it goes on asking it is hung up on. */
 static void the_deaf_cost_little(void **state)
 {
 	(void)state;
@@ -219,7 +220,8 @@ static void the_deaf_cost_little(void **state)
 		say_piece_gets(deaf[i], &h, 500);
 	}
 	served_still_works();
-	assert_true(served_kilobytes() - before < 500 * 1024); /* of 2,000 MB that were asked for; a sanitizer keeps 256 MB that were freed */
+	assert_true(served_kilobytes() - before <
+		    500 * 1024); /* of 2,000 MB that were asked for; a sanitizer keeps 256 MB that were freed */
 	for (int i = 0; i < 4; i++) {
 		const Farm__Envelope *m;
 		say_piece_gets(deaf[i], &h, 50);

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Quotas at their edges: what is exactly allowed passes, one more does not, and what overflows is more than anything. */
+/* Quotas at their edges: what is exactly allowed passes, one more does not, and what overflows is more than anything.
+ */
 #include "common/film/canvas.h"
 #include "coordinator/shell/quota.h"
 
@@ -16,8 +17,15 @@ static struct plan plan;
 static int make_plan(void **state)
 {
 	(void)state;
-	plan = (struct plan){.kind = PLAN_SAMPLES, .width = 100, .height = 50, .crop_width = 100, .crop_height = 50, .groups = 16,
-			     .parts = 4, .epoch = 1, .rounds = 3};
+	plan = (struct plan){.kind = PLAN_SAMPLES,
+			     .width = 100,
+			     .height = 50,
+			     .crop_width = 100,
+			     .crop_height = 50,
+			     .groups = 16,
+			     .parts = 4,
+			     .epoch = 1,
+			     .rounds = 3};
 	return 0;
 }
 

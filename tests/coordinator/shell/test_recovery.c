@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A coordinator that reads the jobs of an earlier life from a disk that gives out one piece when the test says so: it lets peers in, says how
- * far it is, answers what it can, and the rest in its order when the jobs are there; no result that was acknowledged is asked for again.
+ * A coordinator that reads the jobs of an earlier life from a disk that gives out one piece when the test says so: it
+ * lets peers in, says how far it is, answers what it can, and the rest in its order when the jobs are there; no result
+ * that was acknowledged is asked for again.
  */
 #include "common/base/disk.h"
 #include "coordinator/shell/server.h"
@@ -23,18 +24,33 @@
 
 #include <cmocka.h>
 
-enum { STATE_BYTES = 3000, PATIENCE = 60000, FILES = 256, ALL = 1 << 30, RESULTS = 20, LEASES = 8 + 4 * 8 /* of the job */ };
+enum {
+	STATE_BYTES = 3000,
+	PATIENCE = 60000,
+	FILES = 256,
+	ALL = 1 << 30,
+	RESULTS = 20,
+	LEASES = 8 + 4 * 8 /* of the job */
+};
 static const char scene[] = "<scene/>";
 
 /* Shared with the coordinator, which is another process. */
 static struct {
 	_Atomic int allowed, asked; /* pieces of journals and checkpoints */
-} *disk;
+} * disk;
 static atomic_bool is_film[FILES]; /* by descriptor */
 
 static struct plan plan;
-static struct plan_request request = {.integrator = "pssmlt", .kind = PLAN_CHAINS, .width = 20, .height = 10, .mutations = 3200,
-				      .max_depth = 5, .groups = 2, .chains = 8, .epoch = 100, .bootstrap = 64};
+static struct plan_request request = {.integrator = "pssmlt",
+				      .kind = PLAN_CHAINS,
+				      .width = 20,
+				      .height = 10,
+				      .mutations = 3200,
+				      .max_depth = 5,
+				      .groups = 2,
+				      .chains = 8,
+				      .epoch = 100,
+				      .bootstrap = 64};
 static uint64_t journal_most;
 static pid_t pid;
 static uint16_t port;
@@ -122,7 +138,8 @@ static size_t done_count, sent;
 static bool is_done(const struct lease_key *k)
 {
 	for (size_t i = 0; i < done_count; i++)
-		if (done[i].kind == k->kind && done[i].group == k->group && done[i].part == k->part && done[i].epoch == k->epoch)
+		if (done[i].kind == k->kind && done[i].group == k->group && done[i].part == k->part &&
+		    done[i].epoch == k->epoch)
 			return true;
 	return false;
 }
@@ -258,7 +275,8 @@ static void answers_while_it_reads(uint64_t job)
 	assert_true(scripted_has(client, PATIENCE)); /* a heartbeat: it is here, and the answer comes later */
 	disk->allowed = ALL;
 	const Farm__Envelope *m = scripted_hear(client);
-	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_STATUS && strcmp(m->job_status->state, "reading") != 0);
+	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_STATUS &&
+		    strcmp(m->job_status->state, "reading") != 0);
 	assert_true(client->heartbeats > 0);
 	m = scripted_hear(worker);
 	assert_true(m && m->body_case == FARM__ENVELOPE__BODY_JOB_INFO);

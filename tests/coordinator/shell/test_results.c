@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator's shell and workers that answer every lease at once with what the test wants: results counted once, late, slow, useless,
- * failed; extensions of what is done.
+ * The coordinator's shell and workers that answer every lease at once with what the test wants: results counted once,
+ * late, slow, useless, failed; extensions of what is done.
  */
 #include "tests/support/served.h"
 
@@ -178,7 +178,8 @@ static struct batch counting_batch(const struct lease_key *k, const struct plan 
 static void send_with_huge_pixel(struct scripted *worker, struct batch *b, const struct plan *plan)
 {
 	size_t count = (size_t)plan->crop_width * plan->crop_height * TILE_CHANNELS;
-	struct tile tile = {plan->crop_x, plan->crop_y, plan->crop_width, plan->crop_height, mem_alloc(count, sizeof(float))};
+	struct tile tile = {plan->crop_x, plan->crop_y, plan->crop_width, plan->crop_height,
+			    mem_alloc(count, sizeof(float))};
 	struct batch with = *b;
 	tile.xyz[count / 2] = 1e30f;
 	with.tiles = &tile;
@@ -206,7 +207,8 @@ static void expect_counts_in_spool(const struct plan *plan)
 	assert_int_equal(r.strategy[0][STRATEGY_PROPOSED], 3 * leases);
 	assert_int_equal(r.strategy[1][STRATEGY_PROPOSED], plan->rounds * plan_round_mutations(plan) - 3 * leases);
 	assert_true(r.strategy[1][STRATEGY_RAYS] == leases << 40);
-	assert_int_equal(r.strategy[1][STRATEGY_FAIL_MODE], plan->rounds * plan->groups * (7 * plan->parts + plan->parts * (plan->parts - 1) / 2));
+	assert_int_equal(r.strategy[1][STRATEGY_FAIL_MODE],
+			 plan->rounds * plan->groups * (7 * plan->parts + plan->parts * (plan->parts - 1) / 2));
 	assert_int_equal(r.stuck, chains);
 	assert_int_equal(r.longest_stuck, 2);
 	assert_non_null(strstr(r.note, "the image is black: no sample found light; "));
@@ -338,7 +340,8 @@ static void what_is_useless_does_not_wait(void **state)
 /* ---- slow links ---- */
 
 /* A worker with a lease of a new job, and its result. The keys of what came stay in the lease queue. */
-static struct scripted *worker_with_result(struct scripted *client, struct lease_queue *d, unsigned char **frame, size_t *size)
+static struct scripted *worker_with_result(struct scripted *client, struct lease_queue *d, unsigned char **frame,
+					   size_t *size)
 {
 	struct scripted *worker = peer_call();
 	struct plan plan;
@@ -391,11 +394,13 @@ static bool sends_slowly(struct scripted *worker, const unsigned char *frame, si
 	struct lease_queue d = {.count = 0};
 	assert_true(sent);
 	assert_int_equal(peer_verdict(worker, &d), FARM__VERDICT__VERDICT_MERGED);
-	assert_true(worker->heartbeats >= (last - begun) / (QUICK + longest) / 2 && worker->heartbeats <= (now() - begun) / QUICK + 2);
+	assert_true(worker->heartbeats >= (last - begun) / (QUICK + longest) / 2 &&
+		    worker->heartbeats <= (now() - begun) / QUICK + 2);
 	return true;
 }
 
-/* It takes longer than anybody may be silent, and the worker can say nothing else meanwhile; it is told that it is heard. */
+/* It takes longer than anybody may be silent, and the worker can say nothing else meanwhile; it is told that it is
+ * heard. */
 static void a_slow_result_counts(void **state)
 {
 	(void)state;
@@ -525,7 +530,8 @@ static void a_failure_counts_whatever_its_text(void **state)
 		usleep(1000);
 	struct pollfd ready = {worker->fd, POLLIN, 0};
 	while (poll(&ready, 1, 200) == 1) /* neither a fault nor the end */
-		assert_true(peer_attend(worker, &d) == FARM__VERDICT__VERDICT_NONE && worker->env.message->body_case != FARM__ENVELOPE__BODY_FAULT);
+		assert_true(peer_attend(worker, &d) == FARM__VERDICT__VERDICT_NONE &&
+			    worker->env.message->body_case != FARM__ENVELOPE__BODY_FAULT);
 	scripted_hang_up(client);
 	scripted_hang_up(worker);
 }
@@ -567,14 +573,16 @@ static void extensions_are_served_as_they_came(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(a_black_job_ends), cmocka_unit_test(what_is_fetched_is_one_file), /* of that job */
+		cmocka_unit_test(a_black_job_ends),
+		cmocka_unit_test(what_is_fetched_is_one_file), /* of that job */
 		cmocka_unit_test(strategies_are_counted_once),
 		cmocka_unit_test(what_is_useless_does_not_wait),
 		cmocka_unit_test(extensions_wait_for_films), /* the job of strategies_are_counted_once lives again */
 		cmocka_unit_test(extensions_are_served_as_they_came),
 		cmocka_unit_test(a_failure_counts_whatever_its_text),
 	};
-	const struct CMUnitTest slow[] = {cmocka_unit_test(a_slow_result_counts), cmocka_unit_test(half_a_result_is_no_word)};
+	const struct CMUnitTest slow[] = {cmocka_unit_test(a_slow_result_counts),
+					  cmocka_unit_test(half_a_result_is_no_word)};
 	int failed = cmocka_run_group_tests(tests, set_up, served_stop);
 	return failed + cmocka_run_group_tests(slow, set_up_quick, served_stop);
 }

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The coordinator's shell and a worker that says by digest which chain states it made and which it refuses: a refusal counts against the
- * states that it names and no others; states that are not those of their digest are refused before they are stored.
+ * The coordinator's shell and a worker that says by digest which chain states it made and which it refuses: a refusal
+ * counts against the states that it names and no others; states that are not those of their digest are refused before
+ * they are stored.
  */
 #include "tests/support/served.h"
 
@@ -21,10 +22,10 @@ enum { STATE_BYTES = 16 };
 static struct fixture {
 	struct plan plan;
 	struct scripted *client, *worker;
-	struct grant grant; /* the last one */
-	bool granted;       /* it has come and was not looked at */
+	struct grant grant;    /* the last one */
+	bool granted;	       /* it has come and was not looked at */
 	Farm__Verdict verdict; /* the last one */
-	char text[256];        /* of it */
+	char text[256];	       /* of it */
 } t;
 
 static int set_up(void **state)
@@ -69,7 +70,9 @@ static void attend(void)
 		return;
 	assert_false(t.granted);
 	grant_fini(&t.grant);
-	assert_int_equal(grant_unpack(&t.grant, m->lease_grant, t.worker->reader.payload.bytes, t.worker->reader.payload.size, &e), 0);
+	assert_int_equal(grant_unpack(&t.grant, m->lease_grant, t.worker->reader.payload.bytes,
+				      t.worker->reader.payload.size, &e),
+			 0);
 	t.granted = true;
 }
 
@@ -137,8 +140,8 @@ static void refuse(const struct lease_key *k, const struct blob_hash *states)
 	peer_say(t.worker, &m, NULL, 0);
 }
 
-/* The worker refuses the states of a lease, the epoch that they are the end of is computed again, with other states, and the lease is
- * given with these: the same refusal, come again or late, says nothing about them. */
+/* The worker refuses the states of a lease, the epoch that they are the end of is computed again, with other states,
+ * and the lease is given with these: the same refusal, come again or late, says nothing about them. */
 static void a_refusal_is_of_the_states_that_it_names(void **state)
 {
 	(void)state;
@@ -211,7 +214,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test_setup_teardown(a_refusal_is_of_the_states_that_it_names, set_up, tear_down),
-		cmocka_unit_test_setup_teardown(states_that_are_not_those_of_their_digest_are_refused, set_up, tear_down),
+		cmocka_unit_test_setup_teardown(states_that_are_not_those_of_their_digest_are_refused, set_up,
+						tear_down),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

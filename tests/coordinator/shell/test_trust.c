@@ -52,15 +52,18 @@ static FILE *begin(void)
 	return f;
 }
 
-/* Far more than 64 KB, as an earlier version could leave it. Of one certificate the last 64 are remembered, and none of another is
- * forgotten for them. */
+/* Far more than 64 KB, as an earlier version could leave it. Of one certificate the last 64 are remembered, and none of
+ * another is forgotten for them. */
 static void a_long_list(void **state)
 {
 	(void)state;
 	FILE *f = begin();
-	fputs("{\"schema\":1,\"workers\":[{\"certificate\":\"b\",\"name\":\"first\",\"home\":\"h\",\"restarts\":2,\"why\":\"torn\"}", f);
+	fputs("{\"schema\":1,\"workers\":[{\"certificate\":\"b\",\"name\":\"first\",\"home\":\"h\",\"restarts\":2,\"why\":\"torn\"}",
+	      f);
 	for (int i = 0; i < 200; i++)
-		fprintf(f, ",{\"certificate\":\"a\",\"name\":\"%0100d\",\"home\":\"%d\",\"restarts\":1,\"why\":\"%0250d\"}", i, i, i);
+		fprintf(f,
+			",{\"certificate\":\"a\",\"name\":\"%0100d\",\"home\":\"%d\",\"restarts\":1,\"why\":\"%0250d\"}",
+			i, i, i);
 	fputs("]}", f);
 	assert_true(ftell(f) > 1 << 16);
 	assert_int_equal(fclose(f), 0);
@@ -70,7 +73,8 @@ static void a_long_list(void **state)
 	for (uint64_t who = 0; (who = farm_next_quarantined(s->farm, who)); count++) {
 		assert_true(farm_worker(s->farm, who, &w));
 		if (count == 0)
-			assert_true(strcmp(w.certificate, "b") == 0 && strcmp(w.name, "first") == 0 && strcmp(w.text, "torn") == 0);
+			assert_true(strcmp(w.certificate, "b") == 0 && strcmp(w.name, "first") == 0 &&
+				    strcmp(w.text, "torn") == 0);
 		else
 			assert_int_equal(sscanf(w.home, "%d", &last), 1);
 	}

@@ -50,9 +50,10 @@ static void json_shows_the_strategies(void **state)
 	assert_int_equal(whole(json_array_get(list, 0), "proposed"), 20000);
 	assert_int_equal(whole(counts, "stuck"), 3);
 	assert_int_equal(whole(counts, "longestStuck"), 5210);
-	static const char note[] = "3 of 2,048 times a chain accepted nothing during a whole epoch (1,024 chains); longest run: 5,210 rejections; "
-				   "25 % of the light is missing: it comes by paths longer than the chains of this integrator hold (path has "
-				   "all of it)";
+	static const char note[] =
+		"3 of 2,048 times a chain accepted nothing during a whole epoch (1,024 chains); longest run: 5,210 rejections; "
+		"25 % of the light is missing: it comes by paths longer than the chains of this integrator hold (path has "
+		"all of it)";
 	assert_string_equal(json_string_value(json_object_get(o, "note")), note);
 	assert_string_equal(json_string_value(json_object_get(o, "mixture")), "independent=0.1,hslt=0.9");
 	json_decref(o);
@@ -68,7 +69,8 @@ static void json_of_other_jobs_has_none(void **state)
 	struct job_view v;
 	view_of_record(&v, &r);
 	json_t *o = view_to_json(&v);
-	assert_true(json_is_array(json_object_get(o, "strategies")) && json_array_size(json_object_get(o, "strategies")) == 0);
+	assert_true(json_is_array(json_object_get(o, "strategies")) &&
+		    json_array_size(json_object_get(o, "strategies")) == 0);
 	assert_string_equal(json_string_value(json_object_get(o, "note")), "");
 	json_decref(o);
 }
@@ -87,7 +89,8 @@ static void json_says_why_no_error_is_stated(void **state)
 		json_t *o = view_to_json(&v);
 		const char *why = json_string_value(json_object_get(o, "errorDoubt"));
 		assert_string_equal(why, known ? "" : "the chains are too short to be judged");
-		assert_true(known ? fabs(json_number_value(json_object_get(o, "error")) - 0.3) < 1e-12 : json_is_null(json_object_get(o, "error")));
+		assert_true(known ? fabs(json_number_value(json_object_get(o, "error")) - 0.3) < 1e-12
+				  : json_is_null(json_object_get(o, "error")));
 		json_decref(o);
 	}
 }
@@ -99,7 +102,8 @@ static void json_shows_the_forecast(void **state)
 	struct job_view v;
 	r.target_error = 0.02;
 	for (int i = 1; i < 9; i++)
-		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200, 1});
+		forecast_add_look(&r.looks,
+				  &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200, 1});
 	view_of_record(&v, &r);
 	v.eta = 30;
 	v.eta_low = 20;
@@ -127,9 +131,14 @@ static void shows_the_share(void **state)
 {
 	(void)state;
 	struct job_record r = {.id = 1, .state = "running", .owner = "ann"};
-	struct job_status s = {.workers = 3, .machines = 8, .share = 2.5, .place = "3 of 8 machines; j4 comes first",
-			       .owners_place = "3 of 8 machines; 1 job of another owner comes first", .waiting = "waits for j4",
-			       .owners_waiting = "waits for a job of another owner", .looks = &r.looks,
+	struct job_status s = {.workers = 3,
+			       .machines = 8,
+			       .share = 2.5,
+			       .place = "3 of 8 machines; j4 comes first",
+			       .owners_place = "3 of 8 machines; 1 job of another owner comes first",
+			       .waiting = "waits for j4",
+			       .owners_waiting = "waits for a job of another owner",
+			       .looks = &r.looks,
 			       .state = JOB_RUNNING};
 	struct job_view v;
 	Farm__JobStatus wire;
@@ -164,15 +173,16 @@ static void looks_travel(void **state)
 	static struct view_looks looks;
 	Farm__JobStatus wire;
 	for (int i = 1; i < 9; i++)
-		forecast_add_look(&r.looks, &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200, 1});
+		forecast_add_look(&r.looks,
+				  &(struct forecast_look){1e5 * i, 0.1 * i, 0.05 * i, 0.04 / i, 0.05 / i, 200, 1});
 	view_of_record(&v, &r);
 	view_to_wire(&v, &wire);
 	assert_int_equal(wire.n_looks, 0);
 	view_looks_to_wire(&v, &looks, &wire);
 	assert_int_equal(wire.n_looks, 8);
 	const Farm__Look *l = wire.looks[7];
-	assert_true(l->work == 1e5 * 8 && l->cpu_seconds == 0.1 * 8 && l->seconds == 0.05 * 8 && l->rel_mse == 0.04 / 8 &&
-		    l->rel_mse_upper == 0.05 / 8 && l->degrees == 200 && l->doubtful);
+	assert_true(l->work == 1e5 * 8 && l->cpu_seconds == 0.1 * 8 && l->seconds == 0.05 * 8 &&
+		    l->rel_mse == 0.04 / 8 && l->rel_mse_upper == 0.05 / 8 && l->degrees == 200 && l->doubtful);
 }
 
 int main(void)

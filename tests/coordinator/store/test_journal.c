@@ -26,7 +26,7 @@ enum { RECORDS = 5, JOB = 12, GENERATION = 3 };
 static const size_t sizes[RECORDS] = {17, 0, 1, 64, 9};
 
 struct seen {
-	unsigned count; /* records, those that are missing included */
+	unsigned count;		 /* records, those that are missing included */
 	uint64_t missing, known; /* known: by their leases */
 	double elapsed;
 	bool wrong;
@@ -40,7 +40,8 @@ static unsigned char byte_of(unsigned record, size_t i)
 
 static struct lease_key lease_of(unsigned record)
 {
-	return (struct lease_key){.job = JOB, .kind = LEASE_RENDER, .group = record, .part = 7 * record, .epoch = 100 + record};
+	return (struct lease_key){
+		.job = JOB, .kind = LEASE_RENDER, .group = record, .part = 7 * record, .epoch = 100 + record};
 }
 
 static int see(void *user, const struct journal_item *i, struct error *e)
@@ -49,8 +50,8 @@ static int see(void *user, const struct journal_item *i, struct error *e)
 	struct lease_key k = lease_of(s->count);
 	(void)e;
 	if (i->kind) /* a record, or one of which the body alone is damaged */
-		s->wrong |= s->count >= RECORDS || i->kind != (enum journal_kind)(1 + s->count % 3) || i->size != sizes[s->count] ||
-			    i->elapsed <= s->elapsed || !lease_key_equal(&i->lease, &k);
+		s->wrong |= s->count >= RECORDS || i->kind != (enum journal_kind)(1 + s->count % 3) ||
+			    i->size != sizes[s->count] || i->elapsed <= s->elapsed || !lease_key_equal(&i->lease, &k);
 	for (size_t n = 0; !i->missing && n < i->size && !s->wrong; n++)
 		s->wrong |= i->body[n] != byte_of(s->count, n);
 	if (i->kind)
@@ -73,7 +74,8 @@ static void append(struct journal *j, unsigned record)
 	size_t first = sizes[record] / 3;
 	struct buf rest = {.limit = sizes[record]};
 	assert_true(buf_append(&rest, body + first, sizes[record] - first));
-	assert_int_equal(journal_append(j, (enum journal_kind)(1 + record % 3), &k, 0.5 + record, body, first, &rest, &e), 0);
+	assert_int_equal(
+		journal_append(j, (enum journal_kind)(1 + record % 3), &k, 0.5 + record, body, first, &rest, &e), 0);
 	assert_null(rest.bytes);
 }
 
@@ -120,7 +122,8 @@ static void all_comes_back(void **state)
 	journal_release(j);
 }
 
-/* Cut at every byte: the records before it are there, one more can be appended, and nothing of the torn one is seen again. */
+/* Cut at every byte: the records before it are there, one more can be appended, and nothing of the torn one is seen
+ * again. */
 static void torn_at_every_byte(void **state)
 {
 	(void)state;
@@ -180,8 +183,8 @@ static void flip(const char *path, uint64_t at, unsigned bit)
 	close(fd);
 }
 
-/* Any bit of any byte: the record that it belongs to is missing, and no other; when it is the last one, it may as well have been torn.
- * A damaged head of the file is made anew. Again, after all has been written into a new file. */
+/* Any bit of any byte: the record that it belongs to is missing, and no other; when it is the last one, it may as well
+ * have been torn. A damaged head of the file is made anew. Again, after all has been written into a new file. */
 static void one_bit_wrong(void **state)
 {
 	(void)state;
@@ -214,7 +217,8 @@ static void one_bit_wrong(void **state)
 			unsigned char *body;
 			size_t size;
 			for (unsigned i = 0; !head && i < RECORDS; i++)
-				if (i != damaged && journal_body(j, s.missing && i > damaged ? s.at[i] : ends[i], &body, &size, &e) == 0) {
+				if (i != damaged && journal_body(j, s.missing && i > damaged ? s.at[i] : ends[i], &body,
+								 &size, &e) == 0) {
 					assert_int_equal(size, sizes[i]);
 					free(body);
 				} else {
@@ -226,7 +230,8 @@ static void one_bit_wrong(void **state)
 	}
 }
 
-/* Bytes are wrong across the borders of records: those that they belong to are missing, all others are there, and more can be appended. */
+/* Bytes are wrong across the borders of records: those that they belong to are missing, all others are there, and more
+ * can be appended. */
 static void a_hole(void **state)
 {
 	(void)state;
@@ -392,8 +397,8 @@ static void others_are_cleared(void **state)
 	assert_int_equal(access(path, F_OK), -1);
 }
 
-/* A disk that takes no more: what was there stays, and what was appended comes when there is room, in a new file: the old one is
- * not believed again. */
+/* A disk that takes no more: what was there stays, and what was appended comes when there is room, in a new file: the
+ * old one is not believed again. */
 static void no_room(void **state)
 {
 	(void)state;
@@ -550,8 +555,8 @@ static void promised_room_is_kept(void **state)
 }
 
 /*
- * Power lost: of what was written after the last journal_sync any sectors may be missing, in any order, and the file may be as long as
- * it was at any time since. All that was synced is there, and of the rest some records, unchanged.
+ * Power lost: of what was written after the last journal_sync any sectors may be missing, in any order, and the file
+ * may be as long as it was at any time since. All that was synced is there, and of the rest some records, unchanged.
  */
 static void power_lost(void **state)
 {

@@ -30,8 +30,17 @@ static void add(struct ledger *l, uint64_t id)
 {
 	static const unsigned char submission[] = {0, 1, 0, 255}, plan[] = {9, 0};
 	struct error e;
-	struct ledger_job j = {.id = id, .owner = "7", .name = "a 'name'", .version = "0.1", .priority = -3, .mixed = true, .submitted = 12.5,
-			       .submission = submission, .submission_size = sizeof submission, .plan = plan, .plan_size = sizeof plan};
+	struct ledger_job j = {.id = id,
+			       .owner = "7",
+			       .name = "a 'name'",
+			       .version = "0.1",
+			       .priority = -3,
+			       .mixed = true,
+			       .submitted = 12.5,
+			       .submission = submission,
+			       .submission_size = sizeof submission,
+			       .plan = plan,
+			       .plan_size = sizeof plan};
 	assert_int_equal(ledger_add(l, &j, &e), 0);
 }
 
@@ -82,17 +91,23 @@ static void earlier_versions(void **state)
 	struct ledger_job j;
 	snprintf(path, sizeof path, "%s/jobs.db", folder);
 	assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
-	assert_int_equal(sqlite3_exec(db, "CREATE TABLE jobs (id INTEGER PRIMARY KEY, owner TEXT NOT NULL, name TEXT NOT NULL, version TEXT NOT NULL,"
-					  " priority INTEGER NOT NULL, mixed INTEGER NOT NULL, state TEXT NOT NULL, submitted REAL NOT NULL,"
-					  " ended REAL, submission BLOB, plan BLOB) STRICT;"
-					  "CREATE INDEX living ON jobs (id) WHERE ended IS NULL;"
-					  "INSERT INTO jobs VALUES (7, 'ann', 'old', '0.1', 2, 0, 'live', 5.5, NULL, x'0001', x'02');"
-					  "PRAGMA user_version = 1", NULL, NULL, NULL), SQLITE_OK);
+	assert_int_equal(
+		sqlite3_exec(
+			db,
+			"CREATE TABLE jobs (id INTEGER PRIMARY KEY, owner TEXT NOT NULL, name TEXT NOT NULL, version TEXT NOT NULL,"
+			" priority INTEGER NOT NULL, mixed INTEGER NOT NULL, state TEXT NOT NULL, submitted REAL NOT NULL,"
+			" ended REAL, submission BLOB, plan BLOB) STRICT;"
+			"CREATE INDEX living ON jobs (id) WHERE ended IS NULL;"
+			"INSERT INTO jobs VALUES (7, 'ann', 'old', '0.1', 2, 0, 'live', 5.5, NULL, x'0001', x'02');"
+			"PRAGMA user_version = 1",
+			NULL, NULL, NULL),
+		SQLITE_OK);
 	assert_int_equal(sqlite3_close(db), SQLITE_OK);
 	struct ledger *l = open_ledger(path);
 	for (int again = 0; again < 2; again++) {
 		assert_int_equal(ledger_next(l, 0, &j, &e), 1);
-		assert_true(j.id == 7 && j.priority == 2 && j.submitted == 5.5 && j.submission_size == 2 && j.plan_size == 1);
+		assert_true(j.id == 7 && j.priority == 2 && j.submitted == 5.5 && j.submission_size == 2 &&
+			    j.plan_size == 1);
 		assert_string_equal(j.owner, "ann");
 		assert_string_equal(j.held, again ? "bob" : "");
 		assert_int_equal(ledger_hold(l, 7, "bob", &e), 0);
@@ -130,14 +145,16 @@ static void orders(void **state)
 	ledger_close(l);
 }
 
-/* A job that ended lives again with another plan, whether the row knew of its end or not; and that end is not one of its next life. */
+/* A job that ended lives again with another plan, whether the row knew of its end or not; and that end is not one of
+ * its next life. */
 static void extended(void **state)
 {
 	(void)state;
 	static const unsigned char longer[] = {7, 7, 7};
 	char path[128];
 	struct error e;
-	struct ledger_job j, more = {.id = 1, .submission = longer, .submission_size = 3, .plan = longer, .plan_size = 2};
+	struct ledger_job j,
+		more = {.id = 1, .submission = longer, .submission_size = 3, .plan = longer, .plan_size = 2};
 	struct ledger *l = open_ledger(path);
 	add(l, 1);
 	assert_int_equal(ledger_hold(l, 1, "ann", &e), 0);
@@ -193,7 +210,11 @@ static void versions(void **state)
 	l = open_ledger(path);
 	ledger_close(l);
 	int fd = open(path, O_RDWR | O_TRUNC);
-	assert_int_equal(write(fd, "this is no database, but a text that is long enough to be looked at as one, if anybody looked; and so on", 100), 100);
+	assert_int_equal(
+		write(fd,
+		      "this is no database, but a text that is long enough to be looked at as one, if anybody looked; and so on",
+		      100),
+		100);
 	close(fd);
 	assert_int_equal(ledger_open(&l, path, &e), -EBADMSG);
 }
@@ -209,8 +230,14 @@ static void stays_small(void **state)
 	unsigned char big[20000];
 	memset(big, 1, sizeof big);
 	for (uint64_t id = 1; id <= 300; id++) {
-		struct ledger_job j = {.id = id, .owner = "", .name = "", .version = "", .submission = big, .submission_size = sizeof big,
-				       .plan = big, .plan_size = 10};
+		struct ledger_job j = {.id = id,
+				       .owner = "",
+				       .name = "",
+				       .version = "",
+				       .submission = big,
+				       .submission_size = sizeof big,
+				       .plan = big,
+				       .plan_size = 10};
 		assert_int_equal(ledger_add(l, &j, &e), 0);
 		assert_int_equal(ledger_end(l, id, 0, "done", &e), 0);
 	}

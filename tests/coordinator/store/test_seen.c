@@ -16,7 +16,8 @@
 
 static double after(const char *boot, double up, double wall)
 {
-	struct seen last = {.seconds = 1000, .up = 500, .wall = 100 * DAY, .boot = "first"}, now = {.up = up, .wall = wall};
+	struct seen last = {.seconds = 1000, .up = 500, .wall = 100 * DAY, .boot = "first"},
+		    now = {.up = up, .wall = wall};
 	snprintf(now.boot, sizeof now.boot, "%s", boot);
 	seen_go_on(&now, &last);
 	return now.seconds;
@@ -50,7 +51,8 @@ static void as_text(void **state)
 		for (int bit = 0; bit < 8; bit++) {
 			text[i] = (char)(text[i] ^ 1 << bit);
 			int rc = seen_from_text(text, size, &back);
-			assert_true(rc == -EBADMSG || (rc == 0 && back.seconds == s.seconds)); /* a hexadecimal digit of the other case */
+			assert_true(rc == -EBADMSG ||
+				    (rc == 0 && back.seconds == s.seconds)); /* a hexadecimal digit of the other case */
 			text[i] = (char)(text[i] ^ 1 << bit);
 		}
 	for (size_t n = 0; n + 1 < size; n++)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A wall clock that jumps, for LD_PRELOAD: so many seconds as the file HSLT_CLOCK says are added to it. The monotonic clock is
- * the kernel's. */
+/* A wall clock that jumps, for LD_PRELOAD: so many seconds as the file HSLT_CLOCK says are added to it. The monotonic
+ * clock is the kernel's. */
 #define _GNU_SOURCE
 #include <fcntl.h>
 #include <stdlib.h>

@@ -16,14 +16,16 @@ static vec3 direction(double z)
 	return (vec3){sqrt((1 - z) * (1 + z)), 0, z};
 }
 
-/* All that comes back of light from wo: the specular lobe, and by the midpoint rule the others (cosine^2 times azimuth). */
+/* All that comes back of light from wo: the specular lobe, and by the midpoint rule the others (cosine^2 times
+ * azimuth). */
 static double albedo(const struct bsdf *b, vec3 wo)
 {
 	enum { POLAR = 400, AZIMUTH = 200 };
 	vec3 wi;
 	double chance, sum = 0;
 	for (int i = 0; i < POLAR * AZIMUTH; i++) {
-		double c = sqrt((i / AZIMUTH + 0.5) / POLAR), s = sqrt((1 - c) * (1 + c)), phi = 2 * PI * (i % AZIMUTH + 0.5) / AZIMUTH;
+		double c = sqrt((i / AZIMUTH + 0.5) / POLAR), s = sqrt((1 - c) * (1 + c)),
+		       phi = 2 * PI * (i % AZIMUTH + 0.5) / AZIMUTH;
 		sum += b->ops->eval(b, &point, wo, (vec3){s * cos(phi), s * sin(phi), c}).v[0];
 	}
 	return sum * PI / (POLAR * AZIMUTH) + bsdf_eval_delta(b, &point, wo, BSDF_REFLECT, &wi, &chance).v[0];
@@ -33,7 +35,8 @@ static double albedo(const struct bsdf *b, vec3 wo)
 static void test_nothing_is_lost_under_a_smooth_coating(void **state)
 {
 	(void)state;
-	static const char *const cases[] = {"plastic diffuse_reflectance=1", "plastic diffuse_reflectance=1 nonlinear=true int_ior=2.4",
+	static const char *const cases[] = {"plastic diffuse_reflectance=1",
+					    "plastic diffuse_reflectance=1 nonlinear=true int_ior=2.4",
 					    "plastic diffuse_reflectance=1 int_ior=1.2 ext_ior=1"};
 	for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
 		struct arena a = {0};
@@ -41,13 +44,14 @@ static void test_nothing_is_lost_under_a_smooth_coating(void **state)
 		bsdf_make(&a, cases[k], &b);
 		for (double z = 0.1; z < 1; z += 0.2)
 			if (fabs(albedo(&b, direction(z)) - 1) > 1e-3)
-				fail_msg("%s: gives back %g of light from z = %g", cases[k], albedo(&b, direction(z)), z);
+				fail_msg("%s: gives back %g of light from z = %g", cases[k], albedo(&b, direction(z)),
+					 z);
 		arena_fini(&a);
 	}
 }
 
-/* Light that stays inside meets a base of reflectance 0.5 again and again: linear, as if that base gave all of it back from the second time
- * on; nonlinear, each time half of it. */
+/* Light that stays inside meets a base of reflectance 0.5 again and again: linear, as if that base gave all of it back
+ * from the second time on; nonlinear, each time half of it. */
 static void test_nonlinear_loses_light_at_each_bounce(void **state)
 {
 	(void)state;
@@ -56,7 +60,8 @@ static void test_nonlinear_loses_light_at_each_bounce(void **state)
 	bsdf_make(&a, "plastic diffuse_reflectance=0.5 int_ior=1.7 ext_ior=1", &linear);
 	bsdf_make(&a, "plastic diffuse_reflectance=0.5 int_ior=1.7 ext_ior=1 nonlinear=true", &nonlinear);
 	vec3 straight = {0, 0, 1};
-	double t = fresnel_dielectric(1, 1.7).transmitted, once = linear.ops->eval(&linear, &point, straight, straight).v[0];
+	double t = fresnel_dielectric(1, 1.7).transmitted,
+	       once = linear.ops->eval(&linear, &point, straight, straight).v[0];
 	double out = 0.5 * t * t / PI / once / (1.7 * 1.7); /* the part of diffuse light that leaves at a time */
 	double series = 0.5 * out / (1 - 0.5 * (1 - out));  /* 0.5 out + 0.5 (1 - out) 0.5 out + ... */
 	double want = once * series / 0.5;
@@ -98,7 +103,8 @@ static void test_rough_and_smooth_coatings_meet(void **state)
 	bsdf_make(&a, "plastic diffuse_reflectance=rgb(0.6,0.3,0.9) nonlinear=true", &smooth);
 	vec3 wo = direction(0.8), wi = {-0.3, 0.5, sqrt(1 - 0.09 - 0.25)}; /* far from the mirror's direction */
 	for (int l = 0; l < SPECTRUM_LANES; l++) {
-		double r = rough.ops->eval(&rough, &point, wo, wi).v[l], s = smooth.ops->eval(&smooth, &point, wo, wi).v[l];
+		double r = rough.ops->eval(&rough, &point, wo, wi).v[l],
+		       s = smooth.ops->eval(&smooth, &point, wo, wi).v[l];
 		assert_true(fabs(r / s - 1) < 2e-3);
 	}
 	arena_fini(&a);
@@ -110,11 +116,13 @@ static void test_the_coating_is_a_dielectric(void **state)
 	(void)state;
 	struct arena a = {0};
 	struct bsdf plastic, glass;
-	bsdf_make(&a, "roughplastic alpha=0.3 diffuse_reflectance=0 int_ior=1.7 ext_ior=1.1 distribution=ggx", &plastic);
+	bsdf_make(&a, "roughplastic alpha=0.3 diffuse_reflectance=0 int_ior=1.7 ext_ior=1.1 distribution=ggx",
+		  &plastic);
 	bsdf_make(&a, "roughdielectric alpha=0.3 int_ior=1.7 ext_ior=1.1 distribution=ggx", &glass);
 	for (double z = 0.05; z < 1; z += 0.1) {
 		vec3 wo = direction(z), wi = {-0.2, 0.4, sqrt(0.8)};
-		double p = plastic.ops->eval(&plastic, &point, wo, wi).v[1], g = glass.ops->eval(&glass, &point, wo, wi).v[1];
+		double p = plastic.ops->eval(&plastic, &point, wo, wi).v[1],
+		       g = glass.ops->eval(&glass, &point, wo, wi).v[1];
 		assert_true(fabs(p / g - 1) < 1e-12);
 	}
 	arena_fini(&a);

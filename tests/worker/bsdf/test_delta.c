@@ -25,7 +25,8 @@ static bool near(double a, double b)
 	return fabs(a - b) <= 8 * DBL_EPSILON * fabs(b);
 }
 
-static void check_lobe(const char *text, const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const struct bsdf_sample *s)
+static void check_lobe(const char *text, const struct bsdf *b, const struct bsdf_point *p, vec3 wo,
+		       const struct bsdf_sample *s)
 {
 	for (int with_bit = 0; with_bit < 2; with_bit++) {
 		vec3 wi = {NAN, NAN, NAN};
@@ -33,12 +34,12 @@ static void check_lobe(const char *text, const struct bsdf *b, const struct bsdf
 		unsigned mode = with_bit ? s->mode : s->mode & ~(unsigned)BSDF_DELTA;
 		spectrum weight = bsdf_eval_delta(b, p, wo, mode, &wi, &chance);
 		if (!near(wi.x, s->wi.x) || !near(wi.y, s->wi.y) || !near(wi.z, s->wi.z) || !near(chance, s->pdf))
-			fail_msg("%s: from z = %g lobe %x goes to z = %g with chance %g, sample to %g with %g", text, wo.z, mode, wi.z,
-				 chance, s->wi.z, s->pdf);
+			fail_msg("%s: from z = %g lobe %x goes to z = %g with chance %g, sample to %g with %g", text,
+				 wo.z, mode, wi.z, chance, s->wi.z, s->pdf);
 		for (int l = 0; l < SPECTRUM_LANES; l++)
 			if (!near(weight.v[l], s->f.v[l] * fabs(s->wi.z)))
-				fail_msg("%s: from z = %g lobe %x weighs %.17g, sample %.17g", text, wo.z, mode, weight.v[l],
-					 s->f.v[l] * fabs(s->wi.z));
+				fail_msg("%s: from z = %g lobe %x weighs %.17g, sample %.17g", text, wo.z, mode,
+					 weight.v[l], s->f.v[l] * fabs(s->wi.z));
 	}
 }
 
@@ -76,7 +77,10 @@ static void test_specular_lobes_are_those_of_sample(void **state)
 		bsdf_make(&a, case_text(k), &b);
 		for (int i = 0; i < 2000; i++) {
 			vec3 wo = any_direction(&d, i);
-			struct bsdf_point p = {.u = 0.3, .v = 0.7, .w = &wavelengths, .transport = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE};
+			struct bsdf_point p = {.u = 0.3,
+					       .v = 0.7,
+					       .w = &wavelengths,
+					       .transport = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE};
 			double u[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
 			struct bsdf_sample s;
 			bool there = b.ops->sample(&b, &p, wo, u, &s);
@@ -96,7 +100,8 @@ static void test_specular_lobes_are_those_of_sample(void **state)
 		}
 		/* Six standard deviations: level 2e-9 a case. */
 		if (fabs(excess) > 6 * sqrt(variance))
-			fail_msg("%s: %g specular samples more than their chances say, +- %g", case_text(k), excess, sqrt(variance));
+			fail_msg("%s: %g specular samples more than their chances say, +- %g", case_text(k), excess,
+				 sqrt(variance));
 		arena_fini(&a);
 	}
 	assert_true(lobes[0] > 2000 && lobes[1] > 1000 && mirrored > 1000);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Indices of refraction as functions of the wavelength: against the makers' catalogues and handbooks, through a prism against
- * Snell's law worked out here, and what a BSDF says of itself. Deterministic.
+ * Indices of refraction as functions of the wavelength: against the makers' catalogues and handbooks, through a prism
+ * against Snell's law worked out here, and what a BSDF says of itself. Deterministic.
  */
 #include "tests/support/dice.h"
 #include "tests/worker/bsdf/bsdf_cases.h"
@@ -40,14 +40,16 @@ static void test_glasses_have_their_catalogue_values(void **state)
 		{"dielectric ext_ior=1 dispersion=true int_ior=bk7", 1.52238, 1.51680, 1.51432, 6e-6},
 		{"dielectric ext_ior=1 dispersion=true int_ior=sf11", 1.80651, 1.78472, 1.77596, 6e-6},
 		{"dielectric ext_ior=1 dispersion=true int_ior=fused_quartz", 1.46313, 1.45846, 1.45637, 6e-6},
-		{"dielectric ext_ior=1 dispersion=true int_ior=water", 1.33712 * 1.00027, 1.33304 * 1.00027, 1.33115 * 1.00027, 5e-5},
+		{"dielectric ext_ior=1 dispersion=true int_ior=water", 1.33712 * 1.00027, 1.33304 * 1.00027,
+		 1.33115 * 1.00027, 5e-5},
 		{"dielectric ext_ior=1 dispersion=true int_ior=sapphire_(o)", 1.7756, 1.7682, 1.7649, 1e-4},
 		{"dielectric ext_ior=1 dispersion=true int_ior=diamond", 2.4354, 2.4175, 2.4099, 5e-4},
 		{"roughdielectric ext_ior=1 int_sellmeier=1.03961212,0.231792344,1.01046945,0.00600069867,0.0200179144,103.560653",
 		 1.52238, 1.51680, 1.51432, 6e-6},
 	};
 	for (size_t k = 0; k < sizeof glass / sizeof *glass; k++) {
-		double f = index_of(glass[k].text, line_f), d = index_of(glass[k].text, line_d), c = index_of(glass[k].text, line_c);
+		double f = index_of(glass[k].text, line_f), d = index_of(glass[k].text, line_d),
+		       c = index_of(glass[k].text, line_c);
 		double worst = fmax(fabs(f - glass[k].f), fmax(fabs(d - glass[k].d), fabs(c - glass[k].c)));
 		if (!(worst < glass[k].tolerance))
 			fail_msg("%s: F %.6f, d %.6f, C %.6f", glass[k].text, f, d, c);
@@ -90,7 +92,8 @@ static void test_what_is_dispersive_says_so(void **state)
 		{"dielectric int_ior=bk7 ext_ior=1 dispersion=false", 1.5168, false, false, COLOR_SHAPE_CONSTANT},
 		{"dielectric int_ior=bk7 ext_ior=bk7 dispersion=true", 1, false, false, COLOR_SHAPE_CONSTANT},
 		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0", 1.5, false, false, COLOR_SHAPE_CONSTANT},
-		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0 dispersion=true", 1.5, false, false, COLOR_SHAPE_CONSTANT},
+		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0 dispersion=true", 1.5, false, false,
+		 COLOR_SHAPE_CONSTANT},
 		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0.004", 1.5, true, false, COLOR_SHAPE_OTHER},
 		{"dielectric int_ior=3 ext_ior=2 ext_cauchy_b=0.01", 1.5, true, false, COLOR_SHAPE_OTHER},
 		{"roughdielectric int_ior=1.5 ext_ior=1.5", 1, false, false, COLOR_SHAPE_CONSTANT},
@@ -102,9 +105,10 @@ static void test_what_is_dispersive_says_so(void **state)
 		struct bsdf b;
 		bsdf_make(&a, expected[k].text, &b);
 		if (!(fabs(b.eta - expected[k].eta) < 1e-15 && b.dispersive == expected[k].dispersive &&
-		      b.has_smooth == expected[k].smooth && b.has_delta != b.has_smooth && b.shape == expected[k].shape))
-			fail_msg("%s: eta %.17g, dispersive %d, smooth %d, shape %d", expected[k].text, b.eta, b.dispersive, b.has_smooth,
-				 (int)b.shape);
+		      b.has_smooth == expected[k].smooth && b.has_delta != b.has_smooth &&
+		      b.shape == expected[k].shape))
+			fail_msg("%s: eta %.17g, dispersive %d, smooth %d, shape %d", expected[k].text, b.eta,
+				 b.dispersive, b.has_smooth, (int)b.shape);
 		arena_fini(&a);
 	}
 }
@@ -114,7 +118,8 @@ static void test_cauchy(void **state)
 	(void)state;
 	const char *text = "dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0.0042";
 	for (double nm = 360; nm <= 830; nm += 47)
-		assert_true(fabs(index_of(text, nm) - (1.5 + 0.0042 * (1e6 / (nm * nm) - 1 / (0.5876 * 0.5876)))) < 1e-15);
+		assert_true(fabs(index_of(text, nm) - (1.5 + 0.0042 * (1e6 / (nm * nm) - 1 / (0.5876 * 0.5876)))) <
+			    1e-15);
 }
 
 /* v in the frame whose z is at `angle` from the world's z, in the plane y = 0; and back with -angle. */
@@ -145,7 +150,8 @@ static void test_a_prism_spreads_light(void **state)
 			from = turned(vec3_neg(inside), -(PI - apex));
 		spectrum second = bsdf_eval_delta(&b, &p, from, BSDF_TRANSMIT, &out, &chance);
 		assert_true(first.v[0] > 0 && first.v[0] < 0.5 && second.v[0] > 0 && out.z > 0);
-		n = sqrt(1 + 1.73759695 * l2 / (l2 - 0.013188707) + 0.313747346 * l2 / (l2 - 0.0623068142) + 1.89878101 * l2 / (l2 - 155.23629));
+		n = sqrt(1 + 1.73759695 * l2 / (l2 - 0.013188707) + 0.313747346 * l2 / (l2 - 0.0623068142) +
+			 1.89878101 * l2 / (l2 - 155.23629));
 		double refracted = asin(sin(incidence) / n), exit = asin(n * sin(apex - refracted));
 		double told = acos(out.z);
 		if (!(fabs(told - exit) < 1e-12))
@@ -155,7 +161,8 @@ static void test_a_prism_spreads_light(void **state)
 		spread = nm == 365 ? deviation : spread;
 		before = deviation;
 		/* Fresnel's factor at both faces, from the angles. */
-		double rs = sin(incidence - refracted) / sin(incidence + refracted), rp = tan(incidence - refracted) / tan(incidence + refracted);
+		double rs = sin(incidence - refracted) / sin(incidence + refracted),
+		       rp = tan(incidence - refracted) / tan(incidence + refracted);
 		assert_true(fabs(first.v[0] * n * n - 0.5 * (1 - (rs * rs + rp * rp) / 2)) < 1e-13);
 	}
 	assert_true(spread - before > 0.1);
@@ -168,7 +175,8 @@ static void test_lanes_and_nothing_left(void **state)
 	(void)state;
 	static const char *const pairs[][2] = {
 		{"dielectric int_ior=1.6 ext_ior=1", "dielectric int_ior=1.6 ext_ior=1 int_cauchy_b=0 ext_cauchy_b=0"},
-		{"roughdielectric int_ior=1.6 ext_ior=1 alpha=0.2", "roughdielectric int_ior=1.6 ext_ior=1 alpha=0.2 int_cauchy_b=0"},
+		{"roughdielectric int_ior=1.6 ext_ior=1 alpha=0.2",
+		 "roughdielectric int_ior=1.6 ext_ior=1 alpha=0.2 int_cauchy_b=0"},
 	};
 	const struct wavelengths w = {.nm = {500, 600, 700, 800}}, hero = {.nm = {500, NAN, NAN, NAN}};
 	struct dice d = dice_of(__func__);
@@ -181,7 +189,10 @@ static void test_lanes_and_nothing_left(void **state)
 		double u[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
 		bsdf_make(&a, pairs[i % 2][0], &plain);
 		bsdf_make(&a, pairs[i % 2][1], &zero);
-		bsdf_make(&a, i % 2 ? "roughdielectric int_ior=bk7 dispersion=true" : "dielectric int_ior=bk7 dispersion=true", &bent);
+		bsdf_make(&a,
+			  i % 2 ? "roughdielectric int_ior=bk7 dispersion=true"
+				: "dielectric int_ior=bk7 dispersion=true",
+			  &bent);
 		bool there = plain.ops->sample(&plain, &p, wo, u, &s);
 		assert_int_equal(there, zero.ops->sample(&zero, &p, wo, u, &t));
 		assert_true(!there || (s.pdf == t.pdf && s.f.v[3] == t.f.v[3] && s.wi.x == t.wi.x && s.wi.z == t.wi.z));

@@ -37,7 +37,8 @@ static const double alphas[] = {0, 1e-5, 1e-3, 0.1, 1, 2};
 static vec3 corner(uint64_t i, const double u[4])
 {
 	static const double heights[] = {1, 0x1p-1074, 1e-300, 1e-160, 1e-16, 1e-8, 1e-3, 0.5, 1 - 0x1p-53, 0};
-	double z = heights[(uint64_t)(u[0] * 10) % 10], phi = i % 3 ? 6.3 * u[1] : 0, r = sqrt(fmax(0, (1 - z) * (1 + z)));
+	double z = heights[(uint64_t)(u[0] * 10) % 10], phi = i % 3 ? 6.3 * u[1] : 0,
+	       r = sqrt(fmax(0, (1 - z) * (1 + z)));
 	if (i % 4 == 0)
 		z = u[0], r = sqrt(fmax(0, (1 - z) * (1 + z)));
 	return (vec3){r * cos(phi), r * sin(phi), i & 1 ? -z : z};
@@ -91,7 +92,8 @@ static void test_everything_stays_finite(void **state)
 			struct bsdf b;
 			bsdf_make(&a, text, &b);
 			for (uint64_t i = 0; i < 10000; i++) {
-				const struct bsdf_point p = {.w = &w, .transport = i % 7 < 3 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE};
+				const struct bsdf_point p = {
+					.w = &w, .transport = i % 7 < 3 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE};
 				check(text, &b, &p, i);
 			}
 			arena_fini(&a);

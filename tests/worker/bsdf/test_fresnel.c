@@ -13,7 +13,8 @@
 static double by_complex_numbers(double c, double eta, double k)
 {
 	double complex n = eta - k * I, transmitted = csqrt(1 - (1 - c * c) / (n * n));
-	double complex s = (c - n * transmitted) / (c + n * transmitted), p = (n * c - transmitted) / (n * c + transmitted);
+	double complex s = (c - n * transmitted) / (c + n * transmitted),
+		       p = (n * c - transmitted) / (n * c + transmitted);
 	return 0.5 * (creal(s) * creal(s) + cimag(s) * cimag(s) + creal(p) * creal(p) + cimag(p) * cimag(p));
 }
 
@@ -35,7 +36,8 @@ static void test_dielectrics_are_conductors_that_absorb_nothing(void **state)
 {
 	(void)state;
 	for (int i = 1; i <= 200; i++)
-		assert_true(fabs(fresnel_dielectric(i / 200.0, 1.5).reflected - by_complex_numbers(i / 200.0, 1.5, 0)) < 1e-12);
+		assert_true(fabs(fresnel_dielectric(i / 200.0, 1.5).reflected - by_complex_numbers(i / 200.0, 1.5, 0)) <
+			    1e-12);
 }
 
 int main(void)

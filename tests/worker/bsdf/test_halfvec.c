@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * eval_halfvec: against the product of f, cosine and Jacobian (which bsdf.c forms where a BSDF has no eval_halfvec of its
- * own); that Jacobian against finite differences of the map from half vectors to directions; and microfacets against the
- * same product worked out here, in long double, in the textbook's form.
- * Deterministic. Where formulas are ill-conditioned the bound is in units of what rounding directions and index to double does.
+ * eval_halfvec: against the product of f, cosine and Jacobian (which bsdf.c forms where a BSDF has no eval_halfvec of
+ * its own); that Jacobian against finite differences of the map from half vectors to directions; and microfacets
+ * against the same product worked out here, in long double, in the textbook's form. Deterministic. Where formulas are
+ * ill-conditioned the bound is in units of what rounding directions and index to double does.
  */
 #include "tests/support/dice.h"
 #include "tests/worker/bsdf/bsdf_cases.h"
@@ -87,10 +87,13 @@ static void test_the_jacobian_is_the_derivative(void **state)
 		struct bsdf b = {.ops = &ops, .eta = indices[i % 8]};
 		bool reflect = i & 8;
 		wide wo = widen(dice_direction(&d)), wi, side[4];
-		long double eta = wo.z > 0 ? (long double)b.eta : 1 / (long double)b.eta, wideness = powl(10, dice_between(&d, -3, 1));
-		long double x = wideness * dice_between(&d, -1, 1), y = wideness * dice_between(&d, -1, 1), step = 1e-6L;
+		long double eta = wo.z > 0 ? (long double)b.eta : 1 / (long double)b.eta,
+			    wideness = powl(10, dice_between(&d, -3, 1));
+		long double x = wideness * dice_between(&d, -1, 1), y = wideness * dice_between(&d, -1, 1),
+			    step = 1e-6L;
 		wide h = slope_normal(x, y);
-		if (!follow(wo, h, reflect, eta, &wi) || fabsl(dot(wi, h)) < 0.05L || fabsl(dot(wo, h)) < 0.05L || fabsl(wi.z) < 1e-2L)
+		if (!follow(wo, h, reflect, eta, &wi) || fabsl(dot(wi, h)) < 0.05L || fabsl(dot(wo, h)) < 0.05L ||
+		    fabsl(wi.z) < 1e-2L)
 			continue;
 		bool ok = follow(wo, slope_normal(x + step, y), reflect, eta, &side[0]) &&
 			  follow(wo, slope_normal(x - step, y), reflect, eta, &side[1]) &&
@@ -152,12 +155,13 @@ static void test_every_bsdf_against_its_product(void **state)
 struct setting {
 	bool ggx, metal;
 	double alpha, eta; /* index below over above */
-	double ratio;      /* of the roughness along v to the one along u */
+	double ratio;	   /* of the roughness along v to the one along u */
 };
 
 static long double g1(const struct setting *s, wide v)
 {
-	long double along_v = v.y * (long double)s->ratio, tan2 = (v.x * v.x + along_v * along_v) / (v.z * v.z), at = s->alpha * sqrtl(tan2);
+	long double along_v = v.y * (long double)s->ratio, tan2 = (v.x * v.x + along_v * along_v) / (v.z * v.z),
+		    at = s->alpha * sqrtl(tan2);
 	if (s->ggx)
 		return 2 / (1 + sqrtl(1 + at * at));
 	if (!(at > 0))
@@ -185,7 +189,8 @@ static long double textbook(const struct setting *s, wide wo, wide wi)
 	if (!(l > 0) || co <= 0 || (reflect ? ci <= 0 : ci >= 0))
 		return 0;
 	long double t = reflect ? sqrtl(fmaxl(0, 1 - (1 - co * co) / (eta * eta))) : -ci;
-	long double rs = (co - eta * t) / (co + eta * t), rp = (eta * co - t) / (eta * co + t), f = (rs * rs + rp * rp) / 2;
+	long double rs = (co - eta * t) / (co + eta * t), rp = (eta * co - t) / (eta * co + t),
+		    f = (rs * rs + rp * rp) / 2;
 	if (s->metal)
 		f = 1;
 	long double common = distribution(s, h) * g1(s, wo) * g1(s, wi) / fabsl(wo.z * wi.z);
@@ -193,13 +198,14 @@ static long double textbook(const struct setting *s, wide wo, wide wi)
 	if (reflect)
 		return common * f / 4 * outer * 4 * ci;
 	/* Walter's eq. 21 for importance, over eta^2 for radiance; the (1 - F) from two cosines. */
-	long double transmitted = 2 * co * eta * t * (1 / ((co + eta * t) * (co + eta * t)) + 1 / ((eta * co + t) * (eta * co + t)));
+	long double transmitted =
+		2 * co * eta * t * (1 / ((co + eta * t) * (co + eta * t)) + 1 / ((eta * co + t) * (eta * co + t)));
 	long double btdf = common * transmitted * co * -ci * eta * eta / (root * root) / (eta * eta);
 	return btdf * outer * root * root / (eta * eta * -ci);
 }
 
-/* How much the value moves when each coordinate does by half a unit in its last place, both lengths with them, and the index:
- * the inverse of one that is next to 1 is not the one that was meant. */
+/* How much the value moves when each coordinate does by half a unit in its last place, both lengths with them, and the
+ * index: the inverse of one that is next to 1 is not the one that was meant. */
 static long double unrest(const struct setting *s, wide wo, wide wi)
 {
 	long double here = textbook(s, wo, wi), sum = 0;
@@ -249,7 +255,8 @@ static bool corner(struct dice *d, const struct setting *s, vec3 *from, vec3 *to
 }
 
 struct extreme {
-	double calm, unrest; /* largest error: relative, of well-conditioned pairs; in units of unrest + rounding, of all */
+	double calm,
+		unrest; /* largest error: relative, of well-conditioned pairs; in units of unrest + rounding, of all */
 	size_t calm_count, count;
 };
 
@@ -261,7 +268,8 @@ static void try_setting(const struct setting *s, struct dice *d, struct extreme 
 	if (s->metal)
 		snprintf(text, sizeof text, "roughconductor material=none %s distribution=%s", alpha, name);
 	else
-		snprintf(text, sizeof text, "roughdielectric int_ior=%.17g ext_ior=1 %s distribution=%s", s->eta, alpha, name);
+		snprintf(text, sizeof text, "roughdielectric int_ior=%.17g ext_ior=1 %s distribution=%s", s->eta, alpha,
+			 name);
 	struct arena a = {0};
 	struct bsdf b;
 	bsdf_make(&a, text, &b);
@@ -282,8 +290,8 @@ static void try_setting(const struct setting *s, struct dice *d, struct extreme 
 			out->calm_count++;
 		}
 		if (off > 4 * (noise + 0x1p-49L * expected))
-			fail_msg("%s: from (%g,%g,%g) to (%g,%g,%g): %.17g is not %.17Lg +- %.2Lg", text, wo.x, wo.y, wo.z, wi.x, wi.y, wi.z,
-				 told, expected, noise);
+			fail_msg("%s: from (%g,%g,%g) to (%g,%g,%g): %.17g is not %.17Lg +- %.2Lg", text, wo.x, wo.y,
+				 wo.z, wi.x, wi.y, wi.z, told, expected, noise);
 	}
 	arena_fini(&a);
 }
@@ -306,8 +314,9 @@ static void test_microfacets_against_the_textbook(void **state)
 				try_setting(&glass, &d, &e);
 			}
 		}
-	print_message("%zu pairs: error at most %.2f of what rounding directions and index does; %zu well-conditioned: %.1e relative\n",
-		      e.count, e.unrest, e.calm_count, e.calm);
+	print_message(
+		"%zu pairs: error at most %.2f of what rounding directions and index does; %zu well-conditioned: %.1e relative\n",
+		e.count, e.unrest, e.calm_count, e.calm);
 	assert_true(e.count > 50000 && e.calm_count > 10000 && e.calm < 1e-12);
 }
 

@@ -23,7 +23,8 @@ static void same(const char *a, const char *b, double below, double factor)
 	bsdf_make(&arena, b, &y);
 	size_t positive = 0;
 	for (int i = 0; i < 400; i++) {
-		vec3 wo = direction(0.03 + 0.96 * (i % 20) / 20, 0.4), wi = direction(0.02 + 0.97 * (i / 20) / 20, 0.3 * i);
+		vec3 wo = direction(0.03 + 0.96 * (i % 20) / 20, 0.4),
+		     wi = direction(0.02 + 0.97 * (i / 20) / 20, 0.3 * i);
 		if (below > 0 && i % 3)
 			wi.z = -wi.z;
 		if (below > 0 && i % 2)
@@ -55,18 +56,22 @@ static void test_metal_is_schlick_over_ggx(void **state)
 	bsdf_make(&a, "principled base_color=0.3 roughness=0.6 metallic=1 anisotropic=0.5", &metal);
 	double aspect = sqrt(1 - 0.9 * 0.5);
 	char text[128];
-	snprintf(text, sizeof text, "roughconductor material=none distribution=ggx alpha_u=%.17g alpha_v=%.17g", 0.36 / aspect, 0.36 * aspect);
+	snprintf(text, sizeof text, "roughconductor material=none distribution=ggx alpha_u=%.17g alpha_v=%.17g",
+		 0.36 / aspect, 0.36 * aspect);
 	bsdf_make(&a, text, &mirror);
 	for (int i = 0; i < 300; i++) {
-		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1), wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
+		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1),
+		     wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
 		double cos_d = sqrt((1 + vec3_dot(wo, wi)) / 2), f = 0.3 + 0.7 * pow(1 - cos_d, 5);
-		double expected = f * mirror.ops->eval(&mirror, &point, wo, wi).v[2], told = metal.ops->eval(&metal, &point, wo, wi).v[2];
+		double expected = f * mirror.ops->eval(&mirror, &point, wo, wi).v[2],
+		       told = metal.ops->eval(&metal, &point, wo, wi).v[2];
 		assert_true(fabs(told - expected) <= 1e-9 * expected);
 	}
 	arena_fini(&a);
 }
 
-/* Diffuse light at roughness r, from Burley's formula with F_D90 = 0.5 + 2 r cos^2: the lobe is what a black one lacks. */
+/* Diffuse light at roughness r, from Burley's formula with F_D90 = 0.5 + 2 r cos^2: the lobe is what a black one lacks.
+ */
 static void test_diffuse_is_burleys(void **state)
 {
 	(void)state;
@@ -75,7 +80,8 @@ static void test_diffuse_is_burleys(void **state)
 	bsdf_make(&a, "principled base_color=0.6 roughness=0.7", &full);
 	bsdf_make(&a, "principled base_color=0 roughness=0.7", &black);
 	for (int i = 0; i < 300; i++) {
-		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1), wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
+		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1),
+		     wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
 		double cos2 = (1 + vec3_dot(wo, wi)) / 2, f90 = 0.5 + 2 * 0.7 * cos2;
 		double expected = 0.6 / PI * (1 + (f90 - 1) * pow(1 - wo.z, 5)) * (1 + (f90 - 1) * pow(1 - wi.z, 5));
 		double told = full.ops->eval(&full, &point, wo, wi).v[1] - black.ops->eval(&black, &point, wo, wi).v[1];
@@ -84,8 +90,8 @@ static void test_diffuse_is_burleys(void **state)
 	arena_fini(&a);
 }
 
-/* The clear coat's half vectors are a distribution: the integral of D cos over the hemisphere is 1; what the coat adds at one pair
- * by hand. */
+/* The clear coat's half vectors are a distribution: the integral of D cos over the hemisphere is 1; what the coat adds
+ * at one pair by hand. */
 static void test_clearcoat(void **state)
 {
 	(void)state;
@@ -95,7 +101,8 @@ static void test_clearcoat(void **state)
 	bsdf_make(&a, "principled base_color=0.2 clearcoat=1 clearcoat_gloss=0.5", &coated);
 	bsdf_make(&a, "principled base_color=0.2", &bare);
 	double alpha = 0.5 * (0.1 + 0.001), sum = 0;
-	for (int i = 0; i < STEPS; i++) { /* mirrored pairs with half vector h at cosine c: f = F D G1 G1 / (16 c c') with wo = wi = h */
+	for (int i = 0; i < STEPS;
+	     i++) { /* mirrored pairs with half vector h at cosine c: f = F D G1 G1 / (16 c c') with wo = wi = h */
 		double c = (i + 0.5) / STEPS, a2 = alpha * alpha;
 		vec3 h = direction(c, 0.2);
 		double told = coated.ops->eval(&coated, &point, h, h).v[0] - bare.ops->eval(&bare, &point, h, h).v[0];
@@ -120,10 +127,8 @@ static void test_specular_is_an_index(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_glass_is_roughdielectric),
-		cmocka_unit_test(test_metal_is_schlick_over_ggx),
-		cmocka_unit_test(test_diffuse_is_burleys),
-		cmocka_unit_test(test_clearcoat),
+		cmocka_unit_test(test_glass_is_roughdielectric), cmocka_unit_test(test_metal_is_schlick_over_ggx),
+		cmocka_unit_test(test_diffuse_is_burleys),	 cmocka_unit_test(test_clearcoat),
 		cmocka_unit_test(test_specular_is_an_index),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -26,19 +26,20 @@ static vec3 direction(int i, bool two_sided)
 }
 
 /*
- * Each side of the surface is a disc (by the equal-area map: solid angle = 2 x area), cut into cells by polar coordinates
- * around the direction of the mirror image or of the refracted ray: radius = rho^2 x the distance to the rim, so that
- * cells are small where lobes are narrow and none crosses the horizon.
+ * Each side of the surface is a disc (by the equal-area map: solid angle = 2 x area), cut into cells by polar
+ * coordinates around the direction of the mirror image or of the refracted ray: radius = rho^2 x the distance to the
+ * rim, so that cells are small where lobes are narrow and none crosses the horizon.
  */
 struct chart {
 	double center[2][2]; /* on wo's side, on the other */
-	double side;         /* sign of wo.z */
+	double side;	     /* sign of wo.z */
 };
 
 static struct chart chart_of(const struct bsdf *b, vec3 wo)
 {
 	struct chart c = {.side = wo.z > 0 ? 1 : -1};
-	double below = bsdf_eta(b, &wavelengths), eta = wo.z > 0 ? below : 1 / below, s = sqrt(wo.x * wo.x + wo.y * wo.y);
+	double below = bsdf_eta(b, &wavelengths), eta = wo.z > 0 ? below : 1 / below,
+	       s = sqrt(wo.x * wo.x + wo.y * wo.y);
 	for (int other = 0; other < 2; other++) {
 		double sine = fmin(other ? s / eta : s, 1), radius = sqrt(1 - sqrt(1 - sine * sine));
 		c.center[other][0] = s > 0 ? -wo.x / s * radius : 0;
@@ -56,7 +57,8 @@ static double to_rim(const double center[2], double phi)
 static int cell_of(const struct chart *c, vec3 wi)
 {
 	int other = wi.z * c->side < 0;
-	double scale = 1 / sqrt(1 + fabs(wi.z)), x = wi.x * scale - c->center[other][0], y = wi.y * scale - c->center[other][1];
+	double scale = 1 / sqrt(1 + fabs(wi.z)), x = wi.x * scale - c->center[other][0],
+	       y = wi.y * scale - c->center[other][1];
 	double phi = atan2(y, x), rho = sqrt(hypot(x, y) / to_rim(c->center[other], phi));
 	int polar = (int)(POLAR * rho), azimuth = (int)(AZIMUTH * (phi / (2 * PI) + 0.5));
 	polar = polar >= POLAR ? POLAR - 1 : polar;
@@ -87,14 +89,16 @@ static double gauss9(const struct integrand *f, double r0, double r1, double p0,
 	double sum = 0;
 	for (int i = 0; i < 3; i++)
 		for (int j = 0; j < 3; j++)
-			sum += w[i] * w[j] * density(f, (r0 + r1 + x[i] * (r1 - r0)) / 2, (p0 + p1 + x[j] * (p1 - p0)) / 2);
+			sum += w[i] * w[j] *
+			       density(f, (r0 + r1 + x[i] * (r1 - r0)) / 2, (p0 + p1 + x[j] * (p1 - p0)) / 2);
 	return sum * (r1 - r0) * (p1 - p0);
 }
 
 static double adaptive(const struct integrand *f, double r0, double r1, double p0, double p1, double whole, int depth)
 {
 	double r = (r0 + r1) / 2, p = (p0 + p1) / 2;
-	double q[4] = {gauss9(f, r0, r, p0, p), gauss9(f, r, r1, p0, p), gauss9(f, r0, r, p, p1), gauss9(f, r, r1, p, p1)};
+	double q[4] = {gauss9(f, r0, r, p0, p), gauss9(f, r, r1, p0, p), gauss9(f, r0, r, p, p1),
+		       gauss9(f, r, r1, p, p1)};
 	double sum = q[0] + q[1] + q[2] + q[3];
 	if (depth == 0 || fabs(sum - whole) < 1e-6)
 		return sum;

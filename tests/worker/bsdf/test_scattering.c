@@ -243,19 +243,20 @@ static void test_flags(void **state)
 		enum color_shape shape;
 	} expected[] = {
 		{"diffuse", BSDF_REFLECT, INFINITY, 1, true, false, false, COLOR_SHAPE_CONSTANT},
-		{"diffuse reflectance=rgb(0.5,0.5,0.4)", BSDF_REFLECT, INFINITY, 1, true, false, false, COLOR_SHAPE_OTHER},
+		{"diffuse reflectance=rgb(0.5,0.5,0.4)", BSDF_REFLECT, INFINITY, 1, true, false, false,
+		 COLOR_SHAPE_OTHER},
 		{"conductor material=none", BSDF_REFLECT | BSDF_DELTA, 0, 1, false, true, false, COLOR_SHAPE_CONSTANT},
 		{"conductor material=Al", BSDF_REFLECT | BSDF_DELTA, 0, 1, false, true, false, COLOR_SHAPE_OTHER},
 		{"roughconductor eta=0.2 k=3", BSDF_REFLECT, 0.1, 1, true, false, false, COLOR_SHAPE_CONSTANT},
 		{"roughconductor eta=0.2 k=3 alpha=0", BSDF_REFLECT, 1e-6, 1, true, false, false, COLOR_SHAPE_CONSTANT},
-		{"dielectric int_ior=1.5 ext_ior=1.2", BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA, 0, 1.25, false, true, true,
-		 COLOR_SHAPE_CONSTANT},
-		{"dielectric int_ior=bk7 ext_ior=vacuum", BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA, 0, 1.5168, false, true, true,
-		 COLOR_SHAPE_CONSTANT},
+		{"dielectric int_ior=1.5 ext_ior=1.2", BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA, 0, 1.25, false, true,
+		 true, COLOR_SHAPE_CONSTANT},
+		{"dielectric int_ior=bk7 ext_ior=vacuum", BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA, 0, 1.5168, false,
+		 true, true, COLOR_SHAPE_CONSTANT},
 		{"dielectric ext_ior=1", BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA, 0, 1.5046, false, true, true,
 		 COLOR_SHAPE_CONSTANT},
-		{"roughdielectric int_ior=2 ext_ior=1 alpha=0.3", BSDF_REFLECT | BSDF_TRANSMIT, 0.3, 2, true, false, true,
-		 COLOR_SHAPE_CONSTANT},
+		{"roughdielectric int_ior=2 ext_ior=1 alpha=0.3", BSDF_REFLECT | BSDF_TRANSMIT, 0.3, 2, true, false,
+		 true, COLOR_SHAPE_CONSTANT},
 		{"phong exponent=6", BSDF_REFLECT, 0.5, 1, true, false, false, COLOR_SHAPE_CONSTANT},
 		{"twosided | diffuse | roughconductor alpha=0.2 material=none", BSDF_REFLECT, 0.2, 1, true, false, true,
 		 COLOR_SHAPE_CONSTANT},
@@ -270,7 +271,8 @@ static void test_flags(void **state)
 			    b.has_smooth == expected[k].smooth && b.has_delta == expected[k].delta &&
 			    b.two_sided == expected[k].two_sided && b.shape == expected[k].shape && !b.textured;
 		if (!same)
-			fail_msg("%s: modes %x alpha %g eta %g shape %d", expected[k].text, b.modes, b.alpha, b.eta, (int)b.shape);
+			fail_msg("%s: modes %x alpha %g eta %g shape %d", expected[k].text, b.modes, b.alpha, b.eta,
+				 (int)b.shape);
 		arena_fini(&a);
 	}
 }

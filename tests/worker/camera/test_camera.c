@@ -44,7 +44,8 @@ static void test_project_direction(void **state)
 static void test_principal_point(void **state)
 {
 	(void)state;
-	struct scene_settings s = {.width = 320, .height = 200, .fov = 50, .fov_axis = "x", .near_clip = 1e-3, .far_clip = 1e4};
+	struct scene_settings s = {
+		.width = 320, .height = 200, .fov = 50, .fov_axis = "x", .near_clip = 1e-3, .far_clip = 1e4};
 	s.to_world = mat4_identity();
 	struct camera plain, moved;
 	struct error e;
@@ -52,7 +53,8 @@ static void test_principal_point(void **state)
 	s.principal_x = 0.25;
 	s.principal_y = -0.5;
 	assert_int_equal(camera_init(&moved, &s, (vec3){0, 0, 0}, 1, &e), 0);
-	vec3 a = camera_direction(&moved, moved.position, 30, 170), b = camera_direction(&plain, plain.position, 30 + 80, 170 - 100);
+	vec3 a = camera_direction(&moved, moved.position, 30, 170),
+	     b = camera_direction(&plain, plain.position, 30 + 80, 170 - 100);
 	assert_true(vec3_length(vec3_sub(a, b)) < 1e-15);
 	double x, y;
 	assert_true(camera_project(&moved, moved.position, a, 1, &x, &y));
@@ -65,13 +67,18 @@ static void test_jacobian(void **state)
 	(void)state;
 	struct dice d = dice_of("camera jacobian");
 	for (int i = 0; i < 5000; i++) {
-		struct camera c = camera_of(64, 48, dice_between(&d, 5, 150), "smaller", vec3_scale(3, dice_direction(&d)), (vec3){0, 0, 0});
+		struct camera c = camera_of(64, 48, dice_between(&d, 5, 150), "smaller",
+					    vec3_scale(3, dice_direction(&d)), (vec3){0, 0, 0});
 		double x = dice_between(&d, 0, 64), y = dice_between(&d, 0, 48), h = 1e-4;
-		vec3 dx = vec3_sub(camera_direction(&c, c.position, x + h, y), camera_direction(&c, c.position, x - h, y));
-		vec3 dy = vec3_sub(camera_direction(&c, c.position, x, y + h), camera_direction(&c, c.position, x, y - h));
+		vec3 dx = vec3_sub(camera_direction(&c, c.position, x + h, y),
+				   camera_direction(&c, c.position, x - h, y));
+		vec3 dy = vec3_sub(camera_direction(&c, c.position, x, y + h),
+				   camera_direction(&c, c.position, x, y - h));
 		double solid_from_film = vec3_length(vec3_cross(dx, dy)) / (4 * h * h);
 		/* Central differences of step h: h^2 and eps / h. */
-		assert_true(fabs(camera_jac_film_from_solid(&c, camera_direction(&c, c.position, x, y)) * solid_from_film - 1) < 1e-6);
+		assert_true(
+			fabs(camera_jac_film_from_solid(&c, camera_direction(&c, c.position, x, y)) * solid_from_film -
+			     1) < 1e-6);
 	}
 }
 
@@ -84,14 +91,17 @@ static void test_fov_axes(void **state)
 		uint32_t width, height;
 		double x0, y0, x1, y1;
 	} cases[] = {
-		{"x", 300, 100, 0, 50, 300, 50},       {"y", 300, 100, 150, 0, 150, 100},       {"diagonal", 300, 100, 0, 0, 300, 100},
-		{"smaller", 300, 100, 150, 0, 150, 100}, {"smaller", 100, 300, 0, 150, 100, 150}, {"larger", 300, 100, 0, 50, 300, 50},
+		{"x", 300, 100, 0, 50, 300, 50},	 {"y", 300, 100, 150, 0, 150, 100},
+		{"diagonal", 300, 100, 0, 0, 300, 100},	 {"smaller", 300, 100, 150, 0, 150, 100},
+		{"smaller", 100, 300, 0, 150, 100, 150}, {"larger", 300, 100, 0, 50, 300, 50},
 		{"larger", 100, 300, 50, 0, 50, 300},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++)
 		for (double fov = 10; fov < 180; fov += 30) {
-			struct camera c = camera_of(cases[i].width, cases[i].height, fov, cases[i].axis, (vec3){1, 2, 3}, (vec3){0, 0, 0});
-			vec3 a = camera_direction(&c, c.position, cases[i].x0, cases[i].y0), b = camera_direction(&c, c.position, cases[i].x1, cases[i].y1);
+			struct camera c = camera_of(cases[i].width, cases[i].height, fov, cases[i].axis,
+						    (vec3){1, 2, 3}, (vec3){0, 0, 0});
+			vec3 a = camera_direction(&c, c.position, cases[i].x0, cases[i].y0),
+			     b = camera_direction(&c, c.position, cases[i].x1, cases[i].y1);
 			assert_true(fabs(acos(vec3_dot(a, b)) * 180 / M_PI - fov) < 1e-6);
 		}
 }
@@ -100,7 +110,12 @@ static void test_fov_axes(void **state)
 static void test_orientation(void **state)
 {
 	(void)state;
-	struct scene_settings s = {.width = 100, .height = 100, .fov = 90, .near_clip = 0.01, .far_clip = 100, .fov_axis = "x",
+	struct scene_settings s = {.width = 100,
+				   .height = 100,
+				   .fov = 90,
+				   .near_clip = 0.01,
+				   .far_clip = 100,
+				   .fov_axis = "x",
 				   .to_world = mat4_identity()};
 	struct camera c;
 	assert_int_equal(camera_init(&c, &s, (vec3){0, 0, 0}, 1, NULL), 0);
@@ -124,7 +139,12 @@ static void test_orientation(void **state)
 static void test_clip(void **state)
 {
 	(void)state;
-	struct scene_settings s = {.width = 100, .height = 100, .fov = 90, .near_clip = 2, .far_clip = 8, .fov_axis = "x",
+	struct scene_settings s = {.width = 100,
+				   .height = 100,
+				   .fov = 90,
+				   .near_clip = 2,
+				   .far_clip = 8,
+				   .fov_axis = "x",
 				   .to_world = mat4_identity()};
 	struct camera c;
 	assert_int_equal(camera_init(&c, &s, (vec3){1, 1, 1}, 0.25, NULL), 0);
@@ -133,15 +153,22 @@ static void test_clip(void **state)
 	double t0, t1, x, y;
 	camera_clip(&c, w, &t0, &t1);
 	assert_true(fabs(t0 * vec3_dot(w, c.axes.n) - 0.5) < 1e-15 && fabs(t1 * vec3_dot(w, c.axes.n) - 2) < 1e-15);
-	assert_true(camera_project(&c, c.position, w, t0 * (1 + 1e-12), &x, &y) && camera_project(&c, c.position, w, t1 * (1 - 1e-12), &x, &y));
-	assert_false(camera_project(&c, c.position, w, t0 * (1 - 1e-12), &x, &y) || camera_project(&c, c.position, w, t1 * (1 + 1e-12), &x, &y));
+	assert_true(camera_project(&c, c.position, w, t0 * (1 + 1e-12), &x, &y) &&
+		    camera_project(&c, c.position, w, t1 * (1 - 1e-12), &x, &y));
+	assert_false(camera_project(&c, c.position, w, t0 * (1 - 1e-12), &x, &y) ||
+		     camera_project(&c, c.position, w, t1 * (1 + 1e-12), &x, &y));
 }
 
 /* A lens of random radius and focus, and a point of its aperture. */
 static struct camera lens_of(struct dice *d, vec3 *x_k)
 {
-	struct scene_settings s = {.width = 64, .height = 48, .fov = dice_between(d, 5, 150), .fov_axis = "x", .near_clip = 1e-3,
-				   .far_clip = 1e4, .aperture_radius = pow(10, dice_between(d, -4, 0)),
+	struct scene_settings s = {.width = 64,
+				   .height = 48,
+				   .fov = dice_between(d, 5, 150),
+				   .fov_axis = "x",
+				   .near_clip = 1e-3,
+				   .far_clip = 1e4,
+				   .aperture_radius = pow(10, dice_between(d, -4, 0)),
 				   .focus_distance = pow(10, dice_between(d, -1, 2))};
 	s.to_world = mat4_look_at(vec3_scale(3, dice_direction(d)), dice_direction(d), (vec3){0, 1, 0});
 	struct camera c;
@@ -166,11 +193,15 @@ static void test_aperture(void **state)
 			continue;
 		p = camera_point(&c, u);
 		vec3 offset = vec3_sub(p, c.position);
-		assert_true(vec3_length(offset) <= c.aperture * (1 + 1e-11) && fabs(vec3_dot(offset, c.axes.n)) < 1e-14);
+		assert_true(vec3_length(offset) <= c.aperture * (1 + 1e-11) &&
+			    fabs(vec3_dot(offset, c.axes.n)) < 1e-14);
 		camera_point_inverse(&c, p, back);
-		assert_true(fabs(back[0] - u[0]) < 1e-15 / c.aperture + 1e-14 && fabs(back[1] - u[1]) < 1e-15 / c.aperture + 1e-14);
-		vec3 du = vec3_sub(camera_point(&c, (double[]){u[0] + h, u[1]}), camera_point(&c, (double[]){u[0] - h, u[1]}));
-		vec3 dv = vec3_sub(camera_point(&c, (double[]){u[0], u[1] + h}), camera_point(&c, (double[]){u[0], u[1] - h}));
+		assert_true(fabs(back[0] - u[0]) < 1e-15 / c.aperture + 1e-14 &&
+			    fabs(back[1] - u[1]) < 1e-15 / c.aperture + 1e-14);
+		vec3 du = vec3_sub(camera_point(&c, (double[]){u[0] + h, u[1]}),
+				   camera_point(&c, (double[]){u[0] - h, u[1]}));
+		vec3 dv = vec3_sub(camera_point(&c, (double[]){u[0], u[1] + h}),
+				   camera_point(&c, (double[]){u[0], u[1] - h}));
 		double area = vec3_length(vec3_cross(du, dv)) / (4 * h * h);
 		assert_true(fabs(area / (M_PI * c.aperture * c.aperture) - 1) < 1e-4);
 	}
@@ -186,7 +217,8 @@ static void test_aperture(void **state)
 	}
 }
 
-/* The plane of focus is where the rays of a film point meet, and a film point is where the rays of a point are projected. */
+/* The plane of focus is where the rays of a film point meet, and a film point is where the rays of a point are
+ * projected. */
 static void test_lens(void **state)
 {
 	(void)state;
@@ -199,7 +231,8 @@ static void test_lens(void **state)
 		assert_true(fabs(vec3_length(w) - 1) < 1e-15 && vec3_dot(w, c.axes.n) > 0);
 		vec3 a = vec3_madd(x_k, c.focus / vec3_dot(w, c.axes.n), w);
 		vec3 b = vec3_madd(c.position, c.focus / vec3_dot(through, c.axes.n), through);
-		assert_true(vec3_length(vec3_sub(a, b)) < 1e-12 * (c.focus + c.aperture) / fmin(vec3_dot(through, c.axes.n), vec3_dot(w, c.axes.n)));
+		assert_true(vec3_length(vec3_sub(a, b)) <
+			    1e-12 * (c.focus + c.aperture) / fmin(vec3_dot(through, c.axes.n), vec3_dot(w, c.axes.n)));
 		double slack = 1e-14 * (c.scale / pow(vec3_dot(c.axes.n, w), 2) + 400 + c.scale * c.aperture / c.focus);
 		assert_true(camera_project(&c, x_k, w, 1, &px, &py));
 		assert_true(fabs(px - x) < slack && fabs(py - y) < slack);
@@ -216,7 +249,8 @@ static void test_lens(void **state)
 static void test_closed_lens(void **state)
 {
 	(void)state;
-	struct scene_settings s = {.width = 64, .height = 48, .fov = 50, .fov_axis = "x", .near_clip = 1e-3, .far_clip = 1e4};
+	struct scene_settings s = {
+		.width = 64, .height = 48, .fov = 50, .fov_axis = "x", .near_clip = 1e-3, .far_clip = 1e4};
 	s.to_world = mat4_look_at((vec3){1, 2, 3}, (vec3){0, 0.5, 0}, (vec3){0, 1, 0});
 	struct camera pinhole, lens;
 	assert_int_equal(camera_init(&pinhole, &s, (vec3){0.3, 0, 0}, 0.5, NULL), 0);
@@ -225,11 +259,14 @@ static void test_closed_lens(void **state)
 	assert_false(camera_has_aperture(&lens));
 	struct dice d = dice_of("closed lens");
 	for (int i = 0; i < 1000; i++) {
-		double u[2] = {dice_throw(&d), dice_throw(&d)}, x = dice_between(&d, 0, 64), y = dice_between(&d, 0, 48), p[2], q[2];
-		vec3 x_k = camera_point(&lens, u), v = camera_direction(&pinhole, pinhole.position, x, y), w = camera_direction(&lens, x_k, x, y);
+		double u[2] = {dice_throw(&d), dice_throw(&d)}, x = dice_between(&d, 0, 64),
+		       y = dice_between(&d, 0, 48), p[2], q[2];
+		vec3 x_k = camera_point(&lens, u), v = camera_direction(&pinhole, pinhole.position, x, y),
+		     w = camera_direction(&lens, x_k, x, y);
 		assert_true(x_k.x == pinhole.position.x && x_k.y == pinhole.position.y && x_k.z == pinhole.position.z);
 		assert_true(v.x == w.x && v.y == w.y && v.z == w.z);
-		assert_true(camera_project(&pinhole, x_k, v, 1, &p[0], &p[1]) && camera_project(&lens, x_k, v, 1, &q[0], &q[1]));
+		assert_true(camera_project(&pinhole, x_k, v, 1, &p[0], &p[1]) &&
+			    camera_project(&lens, x_k, v, 1, &q[0], &q[1]));
 		assert_true(p[0] == q[0] && p[1] == q[1]);
 		camera_point_inverse(&lens, x_k, u);
 		assert_true(u[0] == 0.5 && u[1] == 0.5);
@@ -239,7 +276,8 @@ static void test_closed_lens(void **state)
 static void test_refused(void **state)
 {
 	(void)state;
-	struct scene_settings s = {.width = 8, .height = 8, .fov = 40, .fov_axis = "x", .to_world = mat4_scale((vec3){1, 0, 1})};
+	struct scene_settings s = {
+		.width = 8, .height = 8, .fov = 40, .fov_axis = "x", .to_world = mat4_scale((vec3){1, 0, 1})};
 	struct camera c;
 	struct error e;
 	assert_int_equal(camera_init(&c, &s, (vec3){0, 0, 0}, 1, &e), -EINVAL);
@@ -261,10 +299,16 @@ static void test_refused(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_project_direction), cmocka_unit_test(test_principal_point),
-		cmocka_unit_test(test_jacobian), cmocka_unit_test(test_fov_axes),
-		cmocka_unit_test(test_orientation),	  cmocka_unit_test(test_clip),	   cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_aperture),	  cmocka_unit_test(test_lens),	   cmocka_unit_test(test_closed_lens),
+		cmocka_unit_test(test_project_direction),
+		cmocka_unit_test(test_principal_point),
+		cmocka_unit_test(test_jacobian),
+		cmocka_unit_test(test_fov_axes),
+		cmocka_unit_test(test_orientation),
+		cmocka_unit_test(test_clip),
+		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_aperture),
+		cmocka_unit_test(test_lens),
+		cmocka_unit_test(test_closed_lens),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

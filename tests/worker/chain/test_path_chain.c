@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * States of chains of whole paths: what is saved comes back as the same path, two that resume from the same bytes go on bit by
- * bit alike, and bytes that somebody has changed are refused, or so little changed that the path is as good as the same.
- * Where things of size 1 stand in a scene of size 1e8, too.
+ * States of chains of whole paths: what is saved comes back as the same path, two that resume from the same bytes go on
+ * bit by bit alike, and bytes that somebody has changed are refused, or so little changed that the path is as good as
+ * the same. Where things of size 1 stand in a scene of size 1e8, too.
  */
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
@@ -28,7 +28,8 @@ static uint64_t counters[BATCH_COUNTERS], strategies[BATCH_STRATEGIES][STRATEGY_
 
 static void begin(struct chain *c, struct film_sums *film)
 {
-	*c = (struct chain){.context = &context, .film = film, .mixture = mixture, .strategy = strategies, .seed = 7, .id = 3};
+	*c = (struct chain){
+		.context = &context, .film = film, .mixture = mixture, .strategy = strategies, .seed = 7, .id = 3};
 }
 
 /* The first sample of the bootstrap that carries light. */
@@ -88,7 +89,22 @@ static void check_resume(struct chain *c, struct chain *d)
 /* What somebody might put into a number of a state. */
 static double bad_number(struct dice *dice)
 {
-	static const double bad[] = {__builtin_nans(""), NAN, INFINITY, -INFINITY, 1e308, -1e308, 1e154, 5e-324, -5e-324, 1e-310, -0.0, 0, 1, -1, 2, 1e-300};
+	static const double bad[] = {__builtin_nans(""),
+				     NAN,
+				     INFINITY,
+				     -INFINITY,
+				     1e308,
+				     -1e308,
+				     1e154,
+				     5e-324,
+				     -5e-324,
+				     1e-310,
+				     -0.0,
+				     0,
+				     1,
+				     -1,
+				     2,
+				     1e-300};
 	return bad[dice_below(dice, sizeof bad / sizeof *bad)];
 }
 
@@ -120,9 +136,11 @@ static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
 		d->step = c->step;
 		if (!chain_path.resume(d, &changed)) {
 			refused++;
-		} else if (path_read(&context, changed.bytes + CHAIN_STATE_HEAD, changed.size - CHAIN_STATE_HEAD, &x) && x.edges) {
+		} else if (path_read(&context, changed.bytes + CHAIN_STATE_HEAD, changed.size - CHAIN_STATE_HEAD, &x) &&
+			   x.edges) {
 			/* What it may break: occlusion and exactly specular directions are not asked again. */
-			if (!path_check(&context, &x, text, sizeof text) && !strstr(text, "occluded") && !strstr(text, "specular"))
+			if (!path_check(&context, &x, text, sizeof text) && !strstr(text, "occluded") &&
+			    !strstr(text, "specular"))
 				fail_msg("changed: %s", text);
 			steps(d, 3);
 		}
@@ -211,19 +229,20 @@ static void test_black(void **state)
 /* Glass of size 1 on a floor of half-size `floor`. */
 static struct world *on_floor(double floor)
 {
-	return world_of_text(SIDE, SIDE,
-			     SENSOR("0,3,8", "0,0.7,0")
-			     "<shape type='rectangle'><transform name='to_world'><scale value='%g'/><rotate x='1' angle='-90'/></transform>"
-			     "<bsdf type='diffuse'/></shape>"
-			     "<shape type='sphere'><point name='center' x='-1.2' y='0.8' z='0'/><float name='radius' value='0.8'/>"
-			     "<bsdf type='dielectric'/></shape>"
-			     "<shape type='sphere'><point name='center' x='1.2' y='0.8' z='0'/><float name='radius' value='0.8'/>"
-			     "<bsdf type='roughdielectric'><float name='alpha' value='0.02'/></bsdf></shape>"
-			     "<shape type='cube'><transform name='to_world'><scale value='0.4'/><rotate y='1' angle='30'/>"
-			     "<translate x='0' y='0.45' z='1.5'/></transform><bsdf type='dielectric'/></shape>"
-			     "<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' angle='90'/>"
-			     "<translate x='0' y='4' z='0'/></transform><emitter type='area'/></shape>",
-			     floor);
+	return world_of_text(
+		SIDE, SIDE,
+		SENSOR("0,3,8",
+		       "0,0.7,0") "<shape type='rectangle'><transform name='to_world'><scale value='%g'/><rotate x='1' angle='-90'/></transform>"
+				  "<bsdf type='diffuse'/></shape>"
+				  "<shape type='sphere'><point name='center' x='-1.2' y='0.8' z='0'/><float name='radius' value='0.8'/>"
+				  "<bsdf type='dielectric'/></shape>"
+				  "<shape type='sphere'><point name='center' x='1.2' y='0.8' z='0'/><float name='radius' value='0.8'/>"
+				  "<bsdf type='roughdielectric'><float name='alpha' value='0.02'/></bsdf></shape>"
+				  "<shape type='cube'><transform name='to_world'><scale value='0.4'/><rotate y='1' angle='30'/>"
+				  "<translate x='0' y='0.45' z='1.5'/></transform><bsdf type='dielectric'/></shape>"
+				  "<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' angle='90'/>"
+				  "<translate x='0' y='4' z='0'/></transform><emitter type='area'/></shape>",
+		floor);
 }
 
 /* Read back: the same path, point for point. */
@@ -273,8 +292,8 @@ static void check_scale(double floor)
 		assert_true(chain_path.resume(c, &s));
 		mem_free(s.bytes);
 	}
-	print_message("floor %g: %u of %u paths of the bootstrap, %u of 200 states cannot be read back\n", floor, unwritten, paths,
-		      (unsigned)counters[COUNT_STATES_LOST]);
+	print_message("floor %g: %u of %u paths of the bootstrap, %u of 200 states cannot be read back\n", floor,
+		      unwritten, paths, (unsigned)counters[COUNT_STATES_LOST]);
 	assert_true(paths > 100);
 	/* Now and then a path that was drawn lies outside the film when it is computed again. */
 	assert_true(unwritten * 500 <= paths && counters[COUNT_STATES_LOST] == 0);
@@ -293,6 +312,7 @@ static void test_scales(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_states), cmocka_unit_test(test_black), cmocka_unit_test(test_scales)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_states), cmocka_unit_test(test_black),
+					   cmocka_unit_test(test_scales)};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

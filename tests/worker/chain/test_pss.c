@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Primary sample space: small steps are symmetric, states survive bytes, and a chain does what Metropolis says: on targets
- * known in closed form the histogram of its splats is the target. Level 1e-6 each; seeds are the hash of the test's name.
+ * Primary sample space: small steps are symmetric, states survive bytes, and a chain does what Metropolis says: on
+ * targets known in closed form the histogram of its splats is the target. Level 1e-6 each; seeds are the hash of the
+ * test's name.
  */
 #include "tests/support/dice.h"
 #include "tests/support/stats.h"
@@ -142,8 +143,8 @@ static void test_bytes(void **state)
 	}
 }
 
-/* Targets on a film of 16 x 16. In the first the density is a function of two numbers; in the second the path's length is
- * drawn, too, and longer ones use more blocks; the third has two splats a point, one of them dark, and holes. */
+/* Targets on a film of 16 x 16. In the first the density is a function of two numbers; in the second the path's length
+ * is drawn, too, and longer ones use more blocks; the third has two splats a point, one of them dark, and holes. */
 enum { SIDE = 16 };
 
 static double profile(double x, double y)
@@ -201,9 +202,10 @@ static void evaluate_holes(struct path_context *c, struct sampler *s, struct pat
 	put(out, l[0], l[1], profile(l[0], l[1]) / 0.6);
 }
 
-/* Groups of chains; each its own b from its large steps, as a job's groups have. Mean of each cell's sum over the exact one is
- * tested by t between 16 groups; power: with 95 % a cell that is off by 12 % or a mean by 2 %, at most. */
-static void check_target(const char *name, void (*evaluate)(struct path_context *, struct sampler *, struct path_sample *), double times)
+/* Groups of chains; each its own b from its large steps, as a job's groups have. Mean of each cell's sum over the exact
+ * one is tested by t between 16 groups; power: with 95 % a cell that is off by 12 % or a mean by 2 %, at most. */
+static void check_target(const char *name,
+			 void (*evaluate)(struct path_context *, struct sampler *, struct path_sample *), double times)
 {
 	enum { GROUPS = 16, CELLS = 4 };
 	static double cell[CELLS * CELLS][GROUPS], exact[CELLS * CELLS], total[GROUPS];
@@ -219,7 +221,9 @@ static void check_target(const char *name, void (*evaluate)(struct path_context 
 		enum { SUB = 200 };
 		exact[k] = 0;
 		for (int i = 0; i < SUB * SUB; i++)
-			exact[k] += times * profile((k % CELLS + (i % SUB + 0.5) / SUB) / CELLS, (k / CELLS + (i / SUB + 0.5) / SUB) / CELLS) /
+			exact[k] += times *
+				    profile((k % CELLS + (i % SUB + 0.5) / SUB) / CELLS,
+					    (k / CELLS + (i / SUB + 0.5) / SUB) / CELLS) /
 				    (SUB * SUB) / (CELLS * CELLS);
 	}
 	for (int g = 0; g < GROUPS; g++) {
@@ -227,7 +231,11 @@ static void check_target(const char *name, void (*evaluate)(struct path_context 
 		struct chain_sums sums = {0, 0};
 		assert_int_equal(film_sums_init(&film, &plan, &settings, NULL), 0);
 		memset(counters, 0, sizeof counters);
-		*c = (struct chain){.integrator = &integrator, .context = &context, .film = &film, .seed = stats_seed(name), .id = (uint64_t)g};
+		*c = (struct chain){.integrator = &integrator,
+				    .context = &context,
+				    .film = &film,
+				    .seed = stats_seed(name),
+				    .id = (uint64_t)g};
 		/* Any start will do: chains this long forget it. */
 		assert_true(chain_pss.start(c, UINT64_MAX));
 		for (size_t i = 0; i < steps; i++)
@@ -252,10 +260,12 @@ static void check_target(const char *name, void (*evaluate)(struct path_context 
 		worst = fmax(worst, m.error / exact[k]);
 		whole += exact[k];
 		if (m.p < LEVEL)
-			fail_msg("%s: cell %d is %.6g +- %.1g, not %.6g (p = %g)", name, k, m.mean, m.error, exact[k], m.p);
+			fail_msg("%s: cell %d is %.6g +- %.1g, not %.6g (p = %g)", name, k, m.mean, m.error, exact[k],
+				 m.p);
 	}
 	struct stats_mean m = stats_mean_test(total, GROUPS, whole);
-	print_message("%s: mean %.5f +- %.5f of %.5f; worst cell +- %.2f %%\n", name, m.mean, m.error, whole, 100 * worst);
+	print_message("%s: mean %.5f +- %.5f of %.5f; worst cell +- %.2f %%\n", name, m.mean, m.error, whole,
+		      100 * worst);
 	assert_true(m.p > LEVEL);
 	/* t at 1e-6 and 15 degrees is 7.7: what is found with 95 %. */
 	if (steps >= 400000)
@@ -308,13 +318,15 @@ static void check_finite(const struct film_sums *film, double weight)
 static void test_extreme_intensities(void **state)
 {
 	(void)state;
-	const double pairs[][2] = {{0x1p-1074, 0x1p-1074}, {0x1p-1074, 1e-310}, {0x1p-1074, 0}, {1e-300, 0x1p-1070}, {0x1p-1074, 1e30}, {1e-310, 3e38}};
+	const double pairs[][2] = {{0x1p-1074, 0x1p-1074}, {0x1p-1074, 1e-310}, {0x1p-1074, 0},
+				   {1e-300, 0x1p-1070},	   {0x1p-1074, 1e30},	{1e-310, 3e38}};
 	struct chain *c = test_malloc(chain_pss.size);
 	static struct path_context context;
 	uint64_t counters[BATCH_COUNTERS];
 	context.counters = counters;
 	const struct integrator integrator = {.stream = RNG_BOOTSTRAP, .evaluate = evaluate_extremes};
-	struct plan plan = {.kind = PLAN_CHAINS, .width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
+	struct plan plan = {
+		.kind = PLAN_CHAINS, .width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
 	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
 	enum { STEPS = 2000 };
 	for (size_t k = 0; k < sizeof pairs / sizeof *pairs; k++) {
@@ -354,8 +366,10 @@ static void test_resume(void **state)
 		struct chain_sums sa = {0, 0}, sb = {0, 0};
 		assert_int_equal(film_sums_init(&a, &plan, &settings, NULL), 0);
 		assert_int_equal(film_sums_init(&b, &plan, &settings, NULL), 0);
-		*whole = (struct chain){.integrator = &integrator, .context = &context, .film = &a, .seed = 5, .id = 11};
-		*parts = (struct chain){.integrator = &integrator, .context = &context, .film = &b, .seed = 5, .id = 11};
+		*whole =
+			(struct chain){.integrator = &integrator, .context = &context, .film = &a, .seed = 5, .id = 11};
+		*parts =
+			(struct chain){.integrator = &integrator, .context = &context, .film = &b, .seed = 5, .id = 11};
 		uint64_t index = start ? start : UINT64_MAX;
 		assert_true(chain_pss.start(whole, index) && chain_pss.start(parts, index));
 		for (int epoch = 0; epoch < 20; epoch++) {
@@ -413,9 +427,9 @@ static void test_resume(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_small_step), cmocka_unit_test(test_both_ways), cmocka_unit_test(test_bytes),
-		cmocka_unit_test(test_targets),	   cmocka_unit_test(test_resume),
-		cmocka_unit_test(test_extreme_intensities),
+		cmocka_unit_test(test_small_step), cmocka_unit_test(test_both_ways),
+		cmocka_unit_test(test_bytes),	   cmocka_unit_test(test_targets),
+		cmocka_unit_test(test_resume),	   cmocka_unit_test(test_extreme_intensities),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -17,8 +17,12 @@
 
 static struct picture make(uint32_t width, uint32_t height, float value)
 {
-	struct picture p = {.image = {.width = width, .height = height, .channel_count = 3, .full_width = width,
-				      .full_height = height, .names = {"B", "G", "R"}}};
+	struct picture p = {.image = {.width = width,
+				      .height = height,
+				      .channel_count = 3,
+				      .full_width = width,
+				      .full_height = height,
+				      .names = {"B", "G", "R"}}};
 	for (int k = 0; k < 3; k++) {
 		float *plane = p.image.planes[k] = mem_alloc((size_t)width * height, sizeof *plane);
 		for (size_t i = 0; i < (size_t)width * height; i++)
@@ -48,8 +52,8 @@ static bool near(double a, double b)
 }
 
 /*
- * B is 1 everywhere but for a pixel of (2, 4, 6): over 4 pixels its mean is (9 + 12) / 12 = 1.75. A is wrong in two values:
- * 0.5 at one pixel's R, 3 where B has 4.
+ * B is 1 everywhere but for a pixel of (2, 4, 6): over 4 pixels its mean is (9 + 12) / 12 = 1.75. A is wrong in two
+ * values: 0.5 at one pixel's R, 3 where B has 4.
  */
 static void figures_are_those_made_by_hand(void **unused)
 {
@@ -67,7 +71,8 @@ static void figures_are_those_made_by_hand(void **unused)
 	assert_true(near(r.peak, 6)); /* rank ceil(0.995 * 12) = 12 of 12 */
 	assert_true(near(r.psnr, 10 * log10(36 / (1.25 / 12))));
 	assert_true(near(r.ratio[0], 4.5 / 5) && near(r.ratio[1], 6.0 / 7) && near(r.ratio[2], 1));
-	assert_true(near(r.luminance_ratio, (0.2126 * 4.5 + 0.7152 * 6 + 0.0722 * 9) / (0.2126 * 5 + 0.7152 * 7 + 0.0722 * 9)));
+	assert_true(near(r.luminance_ratio,
+			 (0.2126 * 4.5 + 0.7152 * 6 + 0.0722 * 9) / (0.2126 * 5 + 0.7152 * 7 + 0.0722 * 9)));
 	assert_true(r.pixels == 4 && r.left_out == 0 && r.not_finite == 0);
 	picture_fini(&a);
 	picture_fini(&b);
@@ -178,8 +183,8 @@ static struct picture through_file(struct exr_image *img)
 }
 
 static const struct exr_attribute attributes[] = {
-	{"hslt:seed", EXR_ATTRIBUTE_STRING, "7", 0, 0},	      {"hslt:b", EXR_ATTRIBUTE_DOUBLE, NULL, 0.1, 0},
-	{"hslt:groups", EXR_ATTRIBUTE_INT, NULL, 0, 16},      {"hslt:wallSeconds", EXR_ATTRIBUTE_DOUBLE, NULL, 3, 0},
+	{"hslt:seed", EXR_ATTRIBUTE_STRING, "7", 0, 0},	       {"hslt:b", EXR_ATTRIBUTE_DOUBLE, NULL, 0.1, 0},
+	{"hslt:groups", EXR_ATTRIBUTE_INT, NULL, 0, 16},       {"hslt:wallSeconds", EXR_ATTRIBUTE_DOUBLE, NULL, 3, 0},
 	{"hslt:cpuSeconds", EXR_ATTRIBUTE_DOUBLE, NULL, 3, 0}, {"hslt:workers", EXR_ATTRIBUTE_INT, NULL, 0, 2},
 	{"hslt:date", EXR_ATTRIBUTE_STRING, "today", 0, 0},
 };
@@ -225,7 +230,7 @@ static void exact_sees_attributes_but_the_excluded(void **unused)
 			assert_non_null(strstr(why, attributes[i].name));
 	}
 	assert_true(same_with(attributes, ATTRIBUTES, why));
-	assert_true(same_with(attributes, 3, why)); /* without the excluded */
+	assert_true(same_with(attributes, 3, why));  /* without the excluded */
 	assert_false(same_with(attributes, 2, why)); /* without a group count */
 	assert_non_null(strstr(why, "hslt:groups"));
 }

@@ -71,7 +71,6 @@ static void read_svg(const struct plot *p, struct content *c)
 	mem_free(svg);
 }
 
-
 static void points_are_where_their_values_say(void **unused)
 {
 	(void)unused;
@@ -99,11 +98,14 @@ static void texts_stay_texts(void **unused)
 	(void)unused;
 	char made[80], nasty[400];
 	snprintf(made, sizeof made, "%s/made", folder);
-	snprintf(nasty, sizeof nasty, "a'b\"c $d $HOME @e `touch %s` {f}_g^2 <h>&amp;</svg>\\n\n!touch %s\n\x01\xff\xed\xa0\x80 \xc3\xa9 %%s",
-		 made, made);
+	snprintf(
+		nasty, sizeof nasty,
+		"a'b\"c $d $HOME @e `touch %s` {f}_g^2 <h>&amp;</svg>\\n\n!touch %s\n\x01\xff\xed\xa0\x80 \xc3\xa9 %%s",
+		made, made);
 	const double x[] = {1, 2}, y[] = {1, 2};
 	const char *const labels[] = {nasty, ""};
-	struct plot_series s[] = {{nasty, PLOT_POINTS, 2, x, y, NULL, NULL, labels}, {nasty, PLOT_LINE, 2, x, y, x, y, NULL}};
+	struct plot_series s[] = {{nasty, PLOT_POINTS, 2, x, y, NULL, NULL, labels},
+				  {nasty, PLOT_LINE, 2, x, y, x, y, NULL}};
 	struct plot p = {nasty, nasty, nasty, false, false, 2, s, NULL, 0};
 	struct content c;
 	read_svg(&p, &c);
@@ -123,7 +125,8 @@ static void bars_and_bands_are_drawn(void **unused)
 {
 	(void)unused;
 	const double x[] = {1, 2, 3}, y[] = {5, 4, 3}, low[] = {4, -1, 2.5}, high[] = {6, 5, INFINITY};
-	struct plot_series s[] = {{"band", PLOT_BAND, 3, x, NULL, low, high, NULL}, {"line", PLOT_LINE, 3, x, y, low, high, NULL}};
+	struct plot_series s[] = {{"band", PLOT_BAND, 3, x, NULL, low, high, NULL},
+				  {"line", PLOT_LINE, 3, x, y, low, high, NULL}};
 	struct plot p = {"Bars", "x", "y", false, true, 2, s, NULL, 0};
 	struct plot_axis ax, ay;
 	struct content c;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What hslt-submit sends: the bytes that it read when it checked the scene, from below the scene's folder, or nothing. For which job it
- * waits: for that one. */
+/* What hslt-submit sends: the bytes that it read when it checked the scene, from below the scene's folder, or nothing.
+ * For which job it waits: for that one. */
 #include "coordinator/shell/server.h"
 #include "tests/support/folder.h"
 #include "worker/cli/reconnect.h"
@@ -210,6 +210,7 @@ static void one_job_is_waited_for(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(what_was_checked_is_sent), cmocka_unit_test(one_job_is_waited_for)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(what_was_checked_is_sent),
+					   cmocka_unit_test(one_job_is_waited_for)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -64,7 +64,8 @@ static void the_crew_works(void **state)
 	assert_int_equal(uv_loop_init(&loop), 0);
 	assert_int_equal(thread_pool_new(&c, &loop, 3, &e), 0);
 	for (int i = 0; i < JOBS; i++) {
-		jobs[i] = (struct job){.task = {.run = run, .done = done}, .running = &running, .most = &most, .gate = &gate};
+		jobs[i] = (struct job){
+			.task = {.run = run, .done = done}, .running = &running, .most = &most, .gate = &gate};
 		thread_pool_add(c, &jobs[i].task);
 	}
 	while (atomic_load(&running) < 3)

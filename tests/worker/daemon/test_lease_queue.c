@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A worker's lease queue with a coordinator that does as it is told: files that several jobs want come once, whatever happens to the job
- * that asked first, to the connection or to the disk. Both are in this thread, so nothing happens at once by chance.
+ * A worker's lease queue with a coordinator that does as it is told: files that several jobs want come once, whatever
+ * happens to the job that asked first, to the connection or to the disk. Both are in this thread, so nothing happens at
+ * once by chance.
  */
 #include "common/base/disk.h"
 #include "common/base/log.h"
@@ -231,7 +232,8 @@ static void start(uint64_t cache_bytes)
 	assert_int_equal(listen(t.listener, 4), 0);
 	getsockname(t.listener, (struct sockaddr *)&a, &length);
 	snprintf(t.address, sizeof t.address, "127.0.0.1:%d", ntohs(a.sin_port));
-	const struct agent_config c = {.coordinator = t.address, .name = "w", .cache = folder, .cache_bytes = cache_bytes, .threads = 1};
+	const struct agent_config c = {
+		.coordinator = t.address, .name = "w", .cache = folder, .cache_bytes = cache_bytes, .threads = 1};
 	for (size_t i = 0; i < MESH; i++)
 		t.mesh_bytes[i] = (unsigned char)(i * 7 + i / PIECE);
 	make_file(&t.mesh, t.mesh_bytes, MESH);
@@ -276,7 +278,8 @@ static void a_shared_file_comes_once(void **state)
 	finish();
 }
 
-/* The job that asked ends, then the others do; what was under way is nobody's, and is asked for anew by the next one. */
+/* The job that asked ends, then the others do; what was under way is nobody's, and is asked for anew by the next one.
+ */
 static void whoever_asked_may_go(void **state)
 {
 	(void)state;

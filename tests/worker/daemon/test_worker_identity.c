@@ -51,9 +51,14 @@ static void counts(void **state)
 static void damaged(void **state)
 {
 	(void)state;
-	static const char *const texts[] = { "", "\n", "7", "zz 3\n", "0123456789abcdef 3\n", "0123456789abcdef0123456789abcdef",
-					     "0123456789abcdef0123456789abcdef -1\n",
-					     "0123456789abcdef0123456789abcdef 18446744073709551615\n" };
+	static const char *const texts[] = {"",
+					    "\n",
+					    "7",
+					    "zz 3\n",
+					    "0123456789abcdef 3\n",
+					    "0123456789abcdef0123456789abcdef",
+					    "0123456789abcdef0123456789abcdef -1\n",
+					    "0123456789abcdef0123456789abcdef 18446744073709551615\n"};
 	struct worker_identity first = next("c");
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {
 		write_text("c", texts[i]);
@@ -106,6 +111,7 @@ static int end(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = { cmocka_unit_test(counts), cmocka_unit_test(damaged), cmocka_unit_test(disk_full) };
+	const struct CMUnitTest tests[] = {cmocka_unit_test(counts), cmocka_unit_test(damaged),
+					   cmocka_unit_test(disk_full)};
 	return cmocka_run_group_tests(tests, begin, end);
 }

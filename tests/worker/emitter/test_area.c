@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Area emitters: what is sampled is distributed as the pdf functions say, and these integrate to one. Chi-square at level
- * 1e-6 each, over cells of the (u,v) square of the emitter's surface; seeds are the hash of the test's name. A density wrong
- * by 3 % in a tenth of the cells makes chi-square 0.1 x 0.03^2 x 200000 = 18 above its 96 degrees: found in a few cells,
- * by its integral always.
+ * Area emitters: what is sampled is distributed as the pdf functions say, and these integrate to one. Chi-square at
+ * level 1e-6 each, over cells of the (u,v) square of the emitter's surface; seeds are the hash of the test's name. A
+ * density wrong by 3 % in a tenth of the cells makes chi-square 0.1 x 0.03^2 x 200000 = 18 above its 96 degrees: found
+ * in a few cells, by its integral always.
  */
 #include "tests/support/bodies.h"
 #include "tests/support/memory_assets.h"
@@ -21,20 +21,26 @@ enum { CELLS = 16 }; /* squared */
 
 static struct world *sphere_light(const char *flip)
 {
-	return world_of_text(8, 8, SENSOR("0,0,9", "0,0,0") "<shape type='sphere'><point name='center' x='.25' y='-.5' z='.125'/>"
-			     "<float name='radius' value='.5'/><boolean name='flip_normals' value='%s'/>"
-			     "<emitter type='area'/></shape><shape type='sphere'><float name='radius' value='4'/></shape>",
-			     flip);
+	return world_of_text(
+		8, 8,
+		SENSOR("0,0,9",
+		       "0,0,0") "<shape type='sphere'><point name='center' x='.25' y='-.5' z='.125'/>"
+				"<float name='radius' value='.5'/><boolean name='flip_normals' value='%s'/>"
+				"<emitter type='area'/></shape><shape type='sphere'><float name='radius' value='4'/></shape>",
+		flip);
 }
 
 /* Three triangles of areas of about 1 : 18 : 1300, one of them on end. */
 static struct world *mesh_light(void)
 {
-	static const char scene[] = "<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0")
-		"<shape type='obj'><string name='filename' value='three.obj'/><emitter type='area'/></shape></scene>";
-	static const char three[] = "v 0 0 0\nv .02 0 0\nv 0 .1 0\nv 1 1 0\nv 1.1 1 .01\nv 1 1.2 .3\nv -1 -1 0\nv 1 -1 .5\nv 0 -1.1 -1\n"
-				    "f 1 2 3\nf 4 5 6\nf 7 8 9\n";
-	const struct memory_file files[] = {{"three.xml", scene, sizeof scene - 1}, {"three.obj", three, sizeof three - 1}, {NULL, NULL, 0}};
+	static const char scene[] = "<scene version='3.0.0'>" SENSOR(
+		"0,0,9",
+		"0,0,0") "<shape type='obj'><string name='filename' value='three.obj'/><emitter type='area'/></shape></scene>";
+	static const char three[] =
+		"v 0 0 0\nv .02 0 0\nv 0 .1 0\nv 1 1 0\nv 1.1 1 .01\nv 1 1.2 .3\nv -1 -1 0\nv 1 -1 .5\nv 0 -1.1 -1\n"
+		"f 1 2 3\nf 4 5 6\nf 7 8 9\n";
+	const struct memory_file files[] = {
+		{"three.xml", scene, sizeof scene - 1}, {"three.obj", three, sizeof three - 1}, {NULL, NULL, 0}};
 	return world_of_files(8, 8, files);
 }
 
@@ -60,7 +66,8 @@ static vec3 cell_direction(double i, double j)
 	return (vec3){r * cos(phi), r * sin(phi), z};
 }
 
-/* Expected counts of a density over directions (per solid angle) by the midpoint rule, 16 x 16 points a cell; their sum. */
+/* Expected counts of a density over directions (per solid angle) by the midpoint rule, 16 x 16 points a cell; their
+ * sum. */
 static double expect(double (*density)(const void *, vec3), const void *arg, double n, double *expected)
 {
 	enum { SUB = 16 };
@@ -69,7 +76,8 @@ static double expect(double (*density)(const void *, vec3), const void *arg, dou
 		for (int j = 0; j < CELLS; j++) {
 			double cell = 0;
 			for (int k = 0; k < SUB * SUB; k++)
-				cell += density(arg, cell_direction(i + (k / SUB + 0.5) / SUB, j + (k % SUB + 0.5) / SUB));
+				cell += density(arg,
+						cell_direction(i + (k / SUB + 0.5) / SUB, j + (k % SUB + 0.5) / SUB));
 			expected[i * CELLS + j] = n * cell * 4 * M_PI / (CELLS * CELLS * SUB * SUB);
 			sum += expected[i * CELLS + j] / n;
 		}
@@ -84,7 +92,8 @@ struct seen {
 
 static struct emitter_point on_sphere(const struct seen *s, vec3 w)
 {
-	return (struct emitter_point){.p = vec3_madd(s->shape->center, s->shape->radius, w), .n = vec3_scale(s->shape->normal_sign, w)};
+	return (struct emitter_point){.p = vec3_madd(s->shape->center, s->shape->radius, w),
+				      .n = vec3_scale(s->shape->normal_sign, w)};
 }
 
 /* Per solid angle of directions from the centre. */
@@ -112,7 +121,8 @@ static void check_sphere(const char *what, const struct seen *s, bool toward, do
 	for (size_t i = 0; i < n; i++) {
 		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
 		struct emitter_point x = {0};
-		bool ok = toward ? s->em->ops->sample_toward(s->em, s->ref, u, &x, &pdf) : s->em->ops->sample_point(s->em, u, &x, &pdf);
+		bool ok = toward ? s->em->ops->sample_toward(s->em, s->ref, u, &x, &pdf)
+				 : s->em->ops->sample_point(s->em, u, &x, &pdf);
 		if (!ok)
 			continue;
 		taken++;
@@ -150,8 +160,8 @@ static void test_sphere(void **state)
 	}
 }
 
-/* Over the cap that is seen: cells of the sampled cone's own numbers must fill evenly. The cone's cosine is taken from the
- * point found, so that a wrong angle, a wrong side or a wrong density shows. */
+/* Over the cap that is seen: cells of the sampled cone's own numbers must fill evenly. The cone's cosine is taken from
+ * the point found, so that a wrong angle, a wrong side or a wrong density shows. */
 static void check_cone(const char *what, const struct seen *s)
 {
 	enum { RINGS = 64 };
@@ -184,7 +194,8 @@ static void check_cone(const char *what, const struct seen *s)
 		enum { SUB = 2000 };
 		double sum = 0;
 		for (int k = 0; k < SUB; k++) {
-			double h = (i + (k + 0.5) / SUB) / RINGS * (1 - r / distance), c = 1 - h, sine = sqrt(h * (2 - h));
+			double h = (i + (k + 0.5) / SUB) / RINGS * (1 - r / distance), c = 1 - h,
+			       sine = sqrt(h * (2 - h));
 			vec3 w = frame_to_world(&f, (vec3){sine, 0, c});
 			struct emitter_point x = on_sphere(s, w);
 			sum += s->em->ops->pdf_toward(s->em, s->ref, &x) / SUB;
@@ -208,8 +219,8 @@ static void test_cone(void **state)
 	struct world *w = sphere_light("false");
 	struct seen s = {&w->emitters[0], &w->shapes[0], {0, 0, 0}};
 	const double gaps[] = {1e-3, 0.1, 1, 10, 1e3, 1e6};
-	static const char *const names[] = {"cone, near the surface", "cone at 0.1 radii", "cone at 1 radius", "cone at 10 radii",
-					    "cone at 1e3 radii", "cone at 1e6 radii"};
+	static const char *const names[] = {"cone, near the surface", "cone at 0.1 radii", "cone at 1 radius",
+					    "cone at 10 radii",	      "cone at 1e3 radii", "cone at 1e6 radii"};
 	for (size_t i = 0; i < sizeof gaps / sizeof gaps[0]; i++) {
 		vec3 away = vec3_normalize((vec3){1, -2, 3});
 		s.ref = vec3_madd(s.shape->center, s.shape->radius * (1 + gaps[i]), away);
@@ -269,7 +280,8 @@ static void test_mesh(void **state)
 			const float *p = g->position[g->index[i][k]];
 			corner[i][k] = (vec3){(double)p[0], (double)p[1], (double)p[2]};
 		}
-		area[i] = 0.5 * vec3_length(vec3_cross(vec3_sub(corner[i][1], corner[i][0]), vec3_sub(corner[i][2], corner[i][0])));
+		area[i] = 0.5 * vec3_length(vec3_cross(vec3_sub(corner[i][1], corner[i][0]),
+						       vec3_sub(corner[i][2], corner[i][0])));
 		total += area[i];
 	}
 	assert_true(area[2] > 50 * area[1] && area[1] > 5 * area[0]);
@@ -278,7 +290,8 @@ static void test_mesh(void **state)
 	for (size_t i = 0; i < n; i++) {
 		double u[2] = {dice_throw(&d), dice_throw(&d)}, pdf;
 		struct emitter_point x;
-		assert_true((i % 2 ? em->ops->sample_point(em, u, &x, &pdf) : em->ops->sample_toward(em, (vec3){0, 0, 1}, u, &x, &pdf)));
+		assert_true((i % 2 ? em->ops->sample_point(em, u, &x, &pdf)
+				   : em->ops->sample_toward(em, (vec3){0, 0, 1}, u, &x, &pdf)));
 		assert_true(x.prim < 3);
 		assert_true(fabs(pdf * total - 1) < 1e-12 && fabs(em->ops->pdf_point(em, &x) * total - 1) < 1e-12);
 		assert_true(em->ops->pdf_toward(em, (vec3){0, 0, 1}, &x) == pdf);
@@ -287,7 +300,9 @@ static void test_mesh(void **state)
 		assert_true(fabs(vec3_dot(vec3_sub(x.p, c[0]), normal)) < 1e-12 * sqrt(l2));
 		assert_true(vec3_length(vec3_sub(x.n, vec3_scale(1 / sqrt(l2), normal))) < 1e-12);
 		for (int k = 0; k < 3; k++) {
-			b[k] = vec3_dot(vec3_cross(vec3_sub(c[(k + 1) % 3], x.p), vec3_sub(c[(k + 2) % 3], x.p)), normal) / l2;
+			b[k] = vec3_dot(vec3_cross(vec3_sub(c[(k + 1) % 3], x.p), vec3_sub(c[(k + 2) % 3], x.p)),
+					normal) /
+			       l2;
 			assert_true(b[k] > -1e-9);
 		}
 		counts[4 * x.prim + (b[0] > 0.5 ? 0 : b[1] > 0.5 ? 1 : b[2] > 0.5 ? 2 : 3)]++;
@@ -321,13 +336,17 @@ static void test_corners(void **state)
 	}
 }
 
-/* A texture on the light is the same however its points are found: drawn from it, drawn towards a point, or hit by a ray. */
+/* A texture on the light is the same however its points are found: drawn from it, drawn towards a point, or hit by a
+ * ray. */
 static void test_texture_coordinates(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(8, 8, SENSOR("0,0,9", "0,0,0") "<shape type='sphere'><transform name='to_world'>"
-					"<rotate x='1' y='2' z='.5' angle='70'/><translate x='.25' y='-.5'/></transform>"
-					"<emitter type='area'/></shape><shape type='sphere'><float name='radius' value='4'/></shape>");
+	struct world *w = world_of_text(
+		8, 8,
+		SENSOR("0,0,9",
+		       "0,0,0") "<shape type='sphere'><transform name='to_world'>"
+				"<rotate x='1' y='2' z='.5' angle='70'/><translate x='.25' y='-.5'/></transform>"
+				"<emitter type='area'/></shape><shape type='sphere'><float name='radius' value='4'/></shape>");
 	const struct emitter *em = &w->emitters[0];
 	const struct geom_shape *s = &w->shapes[w->emitter_shape[0]];
 	for (int i = 0; i < 64; i++) {
@@ -338,7 +357,8 @@ static void test_texture_coordinates(void **state)
 		assert_true(em->ops->sample_point(em, u, &x[0], &pdf));
 		assert_true(em->ops->sample_toward(em, (vec3){0.9, 0.3, -0.2}, u, &x[1], &pdf));
 		for (int k = 0; k < 2; k++) {
-			surface_on_sphere(s, (struct prim_ref){0, 0}, vec3_normalize(vec3_sub(x[k].p, s->center)), &there);
+			surface_on_sphere(s, (struct prim_ref){0, 0}, vec3_normalize(vec3_sub(x[k].p, s->center)),
+					  &there);
 			assert_true(fabs(there.u - x[k].u) < 1e-9 && fabs(there.v - x[k].v) < 1e-9);
 		}
 	}
@@ -348,9 +368,9 @@ static void test_texture_coordinates(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_sphere), cmocka_unit_test(test_cone),    cmocka_unit_test(test_direction),
-		cmocka_unit_test(test_mesh),   cmocka_unit_test(test_corners),
-		cmocka_unit_test(test_texture_coordinates),
+		cmocka_unit_test(test_sphere),	  cmocka_unit_test(test_cone),
+		cmocka_unit_test(test_direction), cmocka_unit_test(test_mesh),
+		cmocka_unit_test(test_corners),	  cmocka_unit_test(test_texture_coordinates),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Emitters that nothing hits: where they are, what they send out in which direction, and that directions are drawn as
- * densities say. Chi-square at level 1e-6; a density wrong by 3 % everywhere in a half of the cells is found with certainty.
- * The rest is exact but for rounding.
+ * densities say. Chi-square at level 1e-6; a density wrong by 3 % everywhere in a half of the cells is found with
+ * certainty. The rest is exact but for rounding.
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
@@ -26,8 +26,11 @@ static const struct color white = {.shape = COLOR_SHAPE_D65, .scale = 1, .d65 = 
 static struct world *world_of(const char *version, const char *emitters)
 {
 	static char text[4096];
-	snprintf(text, sizeof text, "<scene version='%s'>" SENSOR("0,0,9", "0,0,0") "%s<shape type='sphere'><point name='center' x='10' y='0' z='0'/>"
-		 "<float name='radius' value='4'/></shape></scene>", version, emitters);
+	snprintf(text, sizeof text,
+		 "<scene version='%s'>" SENSOR(
+			 "0,0,9", "0,0,0") "%s<shape type='sphere'><point name='center' x='10' y='0' z='0'/>"
+					   "<float name='radius' value='4'/></shape></scene>",
+		 version, emitters);
 	const struct memory_file files[] = {{"s.xml", text, strlen(text)}, {NULL, NULL, 0}};
 	return world_of_files(8, 8, files);
 }
@@ -39,7 +42,8 @@ static struct emitter_point only_point(const struct emitter *em)
 	assert_true(em->delta && !em->ops->point_inverse);
 	assert_true(em->ops->sample_point(em, (double[]){0.3, 0.9}, &x, &pdf));
 	assert_true(em->ops->sample_toward(em, (vec3){1, 2, 3}, (double[]){0.8, 0.1}, &y, &toward));
-	assert_true(pdf == 1 && toward == 1 && em->ops->pdf_point(em, &x) == 1 && em->ops->pdf_toward(em, (vec3){1, 2, 3}, &x) == 1);
+	assert_true(pdf == 1 && toward == 1 && em->ops->pdf_point(em, &x) == 1 &&
+		    em->ops->pdf_toward(em, (vec3){1, 2, 3}, &x) == 1);
 	assert_true(x.p.x == y.p.x && x.p.y == y.p.y && x.p.z == y.p.z && x.infinite == y.infinite);
 	assert_true(x.infinite == em->infinite);
 	return x;
@@ -50,7 +54,8 @@ static bool near(vec3 a, vec3 b)
 	return vec3_length(vec3_sub(a, b)) < 1e-12 * (1 + vec3_length(b));
 }
 
-/* Both dialects, both ways of saying where. Light falls off with the square of the distance in the scene's own units. */
+/* Both dialects, both ways of saying where. Light falls off with the square of the distance in the scene's own units.
+ */
 static void test_places(void **state)
 {
 	(void)state;
@@ -60,19 +65,21 @@ static void test_places(void **state)
 #define EMITTER(type, place, name) "<emitter type='" type "'>" place "<float name='" name "' value='6'/></emitter>"
 	static const struct {
 		const char *version, *emitter;
-	} points[] = {
-		{"3.0.0", EMITTER("point", "<point name='position' x='3' y='4' z='-5'/>", "intensity")},
-		{"0.5.0", EMITTER("point", "<point name='position' x='3' y='4' z='-5'/>", "intensity")},
-		{"3.0.0", EMITTER("point", AT("to_world"), "intensity")},
-		{"0.5.0", EMITTER("point", AT("toWorld"), "intensity")},
-		{"3.0.0", EMITTER("spot", LOOK("to_world"), "intensity")},
-		{"0.5.0", EMITTER("spot", LOOK("toWorld"), "intensity")},
-	}, parallel[] = {
-		{"3.0.0", EMITTER("directional", "<vector name='direction' x='0' y='-6' z='8'/>", "irradiance")},
-		{"0.5.0", EMITTER("directional", "<vector name='direction' x='0' y='-6' z='8'/>", "irradiance")},
-		{"3.0.0", EMITTER("directional", ALONG("to_world"), "irradiance")},
-		{"0.5.0", EMITTER("directional", ALONG("toWorld"), "irradiance")},
-	};
+	} points[] =
+		{
+			{"3.0.0", EMITTER("point", "<point name='position' x='3' y='4' z='-5'/>", "intensity")},
+			{"0.5.0", EMITTER("point", "<point name='position' x='3' y='4' z='-5'/>", "intensity")},
+			{"3.0.0", EMITTER("point", AT("to_world"), "intensity")},
+			{"0.5.0", EMITTER("point", AT("toWorld"), "intensity")},
+			{"3.0.0", EMITTER("spot", LOOK("to_world"), "intensity")},
+			{"0.5.0", EMITTER("spot", LOOK("toWorld"), "intensity")},
+		},
+	  parallel[] = {
+		  {"3.0.0", EMITTER("directional", "<vector name='direction' x='0' y='-6' z='8'/>", "irradiance")},
+		  {"0.5.0", EMITTER("directional", "<vector name='direction' x='0' y='-6' z='8'/>", "irradiance")},
+		  {"3.0.0", EMITTER("directional", ALONG("to_world"), "irradiance")},
+		  {"0.5.0", EMITTER("directional", ALONG("toWorld"), "irradiance")},
+	  };
 	for (size_t i = 0; i < sizeof points / sizeof *points; i++) {
 		struct world *w = world_of(points[i].version, points[i].emitter);
 		const struct emitter *em = &w->emitters[0];
@@ -116,14 +123,16 @@ static void check_directions(const char *name, const struct emitter *em, vec3 ax
 		assert_true(down < 1 + 1e-12);
 		/* At the cone's very edge rounding may say that nothing is sent. */
 		assert_true(em->ops->pdf_direction(em, &x, w) == pdf || down > 1 - 1e-12);
-		size_t row = (size_t)fmin(down * CELLS, CELLS - 1), column = (size_t)fmin((turn < 0 ? turn + 1 : turn) * CELLS, CELLS - 1);
+		size_t row = (size_t)fmin(down * CELLS, CELLS - 1),
+		       column = (size_t)fmin((turn < 0 ? turn + 1 : turn) * CELLS, CELLS - 1);
 		counts[row * CELLS + column]++;
 	}
 	for (int i = 0; i < CELLS * CELLS; i++) {
 		enum { SUB = 12 };
 		expected[i] = 0;
 		for (int k = 0; k < SUB * SUB; k++) {
-			double z = 1 - cap * (i / CELLS + (k / SUB + 0.5) / SUB) / CELLS, phi = 2 * M_PI * (i % CELLS + (k % SUB + 0.5) / SUB) / CELLS;
+			double z = 1 - cap * (i / CELLS + (k / SUB + 0.5) / SUB) / CELLS,
+			       phi = 2 * M_PI * (i % CELLS + (k % SUB + 0.5) / SUB) / CELLS;
 			double r = sqrt(1 - z * z), area = 2 * M_PI * cap / (CELLS * CELLS * SUB * SUB);
 			vec3 w = frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), z});
 			expected[i] += em->ops->pdf_direction(em, &x, w) * area * (double)n;
@@ -150,8 +159,10 @@ static void test_directions(void **state)
 	for (int i = 0; i < 15; i++) {
 		char text[256], name[64];
 		double cutoff = cutoffs[i / 3], beam = beams[i % 3] * cutoff;
-		snprintf(text, sizeof text, "<emitter type='spot'><float name='cutoffAngle' value='%g'/><float name='beamWidth' value='%g'/></emitter>",
-			 cutoff, beam);
+		snprintf(
+			text, sizeof text,
+			"<emitter type='spot'><float name='cutoffAngle' value='%g'/><float name='beamWidth' value='%g'/></emitter>",
+			cutoff, beam);
 		snprintf(name, sizeof name, "spot of %g degrees, %g of them full", cutoff, beam);
 		w = world_of("0.6.0", text);
 		const struct emitter *em = &w->emitters[0];
@@ -159,7 +170,10 @@ static void test_directions(void **state)
 		/* Linear in the angle between beam and cut-off. */
 		struct emitter_point x = only_point(em);
 		for (double t = 0.001; t < 180; t += 0.37) {
-			double expected = t <= beam ? 1 : t >= cutoff ? 0 : (cutoff - t) / (cutoff - beam), a = t * M_PI / 180;
+			double expected = t <= beam	? 1
+					  : t >= cutoff ? 0
+							: (cutoff - t) / (cutoff - beam),
+			       a = t * M_PI / 180;
 			double got = em->ops->radiance(em, &x, (vec3){sin(a), 0, cos(a)}, &grey).v[0] / unit;
 			assert_true(fabs(got - expected) < 1e-9 || fabs(t - cutoff) < 1e-9);
 		}
@@ -168,14 +182,18 @@ static void test_directions(void **state)
 	w = world_of("3.0.0", "<emitter type='spot'/>");
 	struct emitter_point x = only_point(&w->emitters[0]);
 	double a = 17.5 * M_PI / 180;
-	assert_true(fabs(w->emitters[0].ops->radiance(&w->emitters[0], &x, (vec3){sin(a), 0, cos(a)}, &grey).v[0] / unit - 0.5) < 1e-9);
+	assert_true(
+		fabs(w->emitters[0].ops->radiance(&w->emitters[0], &x, (vec3){sin(a), 0, cos(a)}, &grey).v[0] / unit -
+		     0.5) < 1e-9);
 	world_free(w);
 }
 
 static void test_world(void **state)
 {
 	(void)state;
-	struct world *w = world_of("3.0.0", "<emitter type='directional'/><emitter type='constant'/><emitter type='point'/><emitter type='directional'/>");
+	struct world *w = world_of(
+		"3.0.0",
+		"<emitter type='directional'/><emitter type='constant'/><emitter type='point'/><emitter type='directional'/>");
 	assert_int_equal(w->emitter_count, 4);
 	assert_int_equal(w->environment, 1);
 	assert_true(w->effects.delta_light && w->effects.environment && !w->effects.area_light && !w->effects.colour);
@@ -210,10 +228,12 @@ static void test_refusals(void **state)
 		"position and to_world say the same thing");
 	refuses("<emitter type='directional'><vector name='direction' x='1' y='0' z='0'/><transform name='to_world'/></emitter>",
 		"direction and to_world say the same thing");
-	refuses("<emitter type='directional'><vector name='direction' x='0' y='0' z='0'/></emitter>", "a direction of length 0");
+	refuses("<emitter type='directional'><vector name='direction' x='0' y='0' z='0'/></emitter>",
+		"a direction of length 0");
 	refuses("<emitter type='spot'><float name='beam_width' value='30'/></emitter>", "exceeds cutoff_angle=20");
 	refuses("<emitter type='spot'><texture type='checkerboard' name='texture'/></emitter>", "texture");
-	refuses("<emitter type='constant'/><emitter type='directional'/><emitter type='constant'/>", "a second environment");
+	refuses("<emitter type='constant'/><emitter type='directional'/><emitter type='constant'/>",
+		"a second environment");
 	refuses("<shape type='sphere'><emitter type='point'/></shape>", "cannot hang on a shape");
 	refuses("<emitter type='point'><float name='intensity' value='-1'/></emitter>", "intensity");
 }

@@ -27,12 +27,9 @@ enum { WIDTH = 8, HEIGHT = 6, ROWS = 2 * HEIGHT, COLUMNS = 2 * WIDTH, CELLS = RO
 
 static const struct wavelengths colour = {.nm = {450, 550, 600, 700}}, grey = {.grey = true};
 static const char *const cases[] = {
-	"constant",
-	"constant radiance=rgb(0.3,0.5,2)",
-	"envmap filename=p0",
-	"envmap filename=p1 scale=3",
-	"envmap filename=p2",
-	"envmap filename=p3",
+	"constant",	      "constant radiance=rgb(0.3,0.5,2)",
+	"envmap filename=p0", "envmap filename=p1 scale=3",
+	"envmap filename=p2", "envmap filename=p3",
 };
 enum { CASES = sizeof cases / sizeof *cases };
 
@@ -256,8 +253,10 @@ static void test_black_and_refusals(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_samples_follow_the_density), cmocka_unit_test(test_radiance_over_density),
-		cmocka_unit_test(test_orientation),		   cmocka_unit_test(test_poles_and_ends),
+		cmocka_unit_test(test_samples_follow_the_density),
+		cmocka_unit_test(test_radiance_over_density),
+		cmocka_unit_test(test_orientation),
+		cmocka_unit_test(test_poles_and_ends),
 		cmocka_unit_test(test_black_and_refusals),
 	};
 	return cmocka_run_group_tests(tests, setup, teardown);

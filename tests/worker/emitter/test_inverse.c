@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * point_inverse against sample_point: there and back, and the density as one over the area that a square of random numbers
- * covers, by central differences of step h (h^2 and eps / h). Deterministic.
+ * point_inverse against sample_point: there and back, and the density as one over the area that a square of random
+ * numbers covers, by central differences of step h (h^2 and eps / h). Deterministic.
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
@@ -25,7 +25,8 @@ static struct emitter_point draw(const struct emitter *em, double u0, double u1)
 
 static double slope(const struct emitter *em, const double u[2], double pdf, double h)
 {
-	struct emitter_point a[4] = {draw(em, u[0] - h, u[1]), draw(em, u[0] + h, u[1]), draw(em, u[0], u[1] - h), draw(em, u[0], u[1] + h)};
+	struct emitter_point a[4] = {draw(em, u[0] - h, u[1]), draw(em, u[0] + h, u[1]), draw(em, u[0], u[1] - h),
+				     draw(em, u[0], u[1] + h)};
 	/* Not across the borders of triangles or cells. */
 	for (int i = 0; i < 4; i++)
 		if (a[i].prim != a[0].prim || fabs(em->ops->pdf_point(em, &a[i]) / pdf - 1) > 1e-9)
@@ -58,7 +59,8 @@ static void check(const char *name, const struct emitter *em, double share)
 			slopes++;
 		}
 	}
-	print_message("%s: there and back to %.1e, density to %.1e (%zu of %zu)\n", name, worst, worst_slope, slopes, n);
+	print_message("%s: there and back to %.1e, density to %.1e (%zu of %zu)\n", name, worst, worst_slope, slopes,
+		      n);
 	assert_true(worst < 1e-9);
 	assert_true(worst_slope < 1e-4);
 	assert_true((double)slopes > share * (double)n);
@@ -79,19 +81,25 @@ static void check(const char *name, const struct emitter *em, double share)
 static void test_area(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(8, 8, SENSOR("0,0,9", "0,0,0") "<shape type='rectangle'><transform name='to_world'><scale x='3' y='.2'/>"
-					"<rotate x='1' y='1' angle='50'/><translate x='2'/></transform><emitter type='area'/></shape>"
-					"<shape type='sphere'><point name='center' x='.25' y='-.5' z='.125'/><float name='radius' value='.5'/>"
-					"<boolean name='flip_normals' value='true'/><emitter type='area'/></shape>");
+	struct world *w = world_of_text(
+		8, 8,
+		SENSOR("0,0,9",
+		       "0,0,0") "<shape type='rectangle'><transform name='to_world'><scale x='3' y='.2'/>"
+				"<rotate x='1' y='1' angle='50'/><translate x='2'/></transform><emitter type='area'/></shape>"
+				"<shape type='sphere'><point name='center' x='.25' y='-.5' z='.125'/><float name='radius' value='.5'/>"
+				"<boolean name='flip_normals' value='true'/><emitter type='area'/></shape>");
 	check("rectangle", &w->emitters[0], 0.99);
 	check("sphere", &w->emitters[1], 0.99);
 	world_free(w);
 	/* Areas of about 1 : 18 : 1300, one of them on end, and one a sliver. */
-	static const char scene[] = "<scene version='3.0.0'>" SENSOR("0,0,9", "0,0,0")
-		"<shape type='obj'><string name='filename' value='few.obj'/><emitter type='area'/></shape></scene>";
-	static const char few[] = "v 0 0 0\nv .02 0 0\nv 0 .1 0\nv 1 1 0\nv 1.1 1 .01\nv 1 1.2 .3\nv -1 -1 0\nv 1 -1 .5\nv 0 -1.1 -1\n"
-				  "v 0 2 0\nv 3 2 0\nv 1 2.0002 0\nf 1 2 3\nf 4 5 6\nf 7 8 9\nf 10 11 12\n";
-	const struct memory_file files[] = {{"few.xml", scene, sizeof scene - 1}, {"few.obj", few, sizeof few - 1}, {NULL, NULL, 0}};
+	static const char scene[] = "<scene version='3.0.0'>" SENSOR(
+		"0,0,9",
+		"0,0,0") "<shape type='obj'><string name='filename' value='few.obj'/><emitter type='area'/></shape></scene>";
+	static const char few[] =
+		"v 0 0 0\nv .02 0 0\nv 0 .1 0\nv 1 1 0\nv 1.1 1 .01\nv 1 1.2 .3\nv -1 -1 0\nv 1 -1 .5\nv 0 -1.1 -1\n"
+		"v 0 2 0\nv 3 2 0\nv 1 2.0002 0\nf 1 2 3\nf 4 5 6\nf 7 8 9\nf 10 11 12\n";
+	const struct memory_file files[] = {
+		{"few.xml", scene, sizeof scene - 1}, {"few.obj", few, sizeof few - 1}, {NULL, NULL, 0}};
 	w = world_of_files(8, 8, files);
 	check("mesh", &w->emitters[0], 0.99);
 	world_free(w);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Rays that begin and end on surfaces: none meets what it starts from, none slips through a closed body, segments see what
- * lies between and nothing else, but for those that pass an edge by less than floats can tell. Deterministic: every count below
- * is exact, no rate is estimated.
+ * Rays that begin and end on surfaces: none meets what it starts from, none slips through a closed body, segments see
+ * what lies between and nothing else, but for those that pass an edge by less than floats can tell. Deterministic:
+ * every count below is exact, no rate is estimated.
  */
 #include "common/base/liveness.h"
 #include "tests/support/bodies.h"
@@ -72,8 +72,9 @@ static void test_outside_of_mesh(void **state)
 		bool same = met ? hit.prim.prim == prim || fabs(nearest - hit.t) < 1e-5 : isinf(nearest);
 		wrong += !same;
 	}
-	print_message("%zu rays, %zu met the body again, %zu of them falsely; %zu of %zu differ from the search in double\n", n,
-		      hits, false_hits, wrong, compared);
+	print_message(
+		"%zu rays, %zu met the body again, %zu of them falsely; %zu of %zu differ from the search in double\n",
+		n, hits, false_hits, wrong, compared);
 	assert_int_equal(false_hits, 0);
 	assert_int_equal(wrong, 0);
 	accel_free(a);
@@ -88,7 +89,8 @@ static void check_closed(const char *name, const struct geom_shape *s, double wi
 	for (size_t i = 0; i < n; i++) {
 		struct surface_point x = body_point(s, 0, &d);
 		vec3 inwards = vec3_scale(-s->normal_sign, x.ng);
-		struct ray_end from = i % 2 ? body_end(&x) : free_end(vec3_scale(within * dice_throw(&d), dice_direction(&d)));
+		struct ray_end from =
+			i % 2 ? body_end(&x) : free_end(vec3_scale(within * dice_throw(&d), dice_direction(&d)));
 		vec3 w = i % 2 ? direction_beyond(&d, inwards) : dice_direction(&d);
 		if (i % 8 == 7)
 			w = grazing(&d, inwards, exp(dice_between(&d, log(1e-6), 0)));
@@ -169,7 +171,8 @@ static bool hidden_by_mesh(const struct geom_shape *s, vec3 a, vec3 b)
 static void check_segments(const char *name, const struct geom_shape *body)
 {
 	struct dice d = dice_of(name);
-	struct geom_shape both[2] = {*body, {.is_sphere = true, .center = {0.05, 0.02, -0.03}, .radius = 0.2, .normal_sign = 1}};
+	struct geom_shape both[2] = {
+		*body, {.is_sphere = true, .center = {0.05, 0.02, -0.03}, .radius = 0.2, .normal_sign = 1}};
 	struct accel *open = body_accel(both, 1), *blocked = body_accel(both, 2);
 	size_t n = dice_count(50000), unseen = 0, seen = 0, tried = 0;
 	for (size_t i = 0; i < n; i++) {
@@ -261,18 +264,22 @@ static void test_silhouettes(void **state)
 	struct dice d = dice_of("silhouettes");
 	for (double radius = 1; radius > 1e-7; radius /= 30) {
 		/* In company: Embree does not look at the box of a primitive that is alone. */
-		struct geom_shape all[12], s = {.is_sphere = true, .center = {0.4, -0.7, 0.3}, .radius = radius, .normal_sign = 1};
+		struct geom_shape all[12],
+			s = {.is_sphere = true, .center = {0.4, -0.7, 0.3}, .radius = radius, .normal_sign = 1};
 		for (int i = 0; i < 12; i++)
-			all[i] = (struct geom_shape){.is_sphere = true, .center = {40, 40, 40 + i}, .radius = 1e-3, .normal_sign = 1};
+			all[i] = (struct geom_shape){
+				.is_sphere = true, .center = {40, 40, 40 + i}, .radius = 1e-3, .normal_sign = 1};
 		all[5] = s;
 		struct accel *a = body_accel(all, 12);
 		const vec3 poles[6] = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {-1, 0, 0}, {0, -1, 0}, {0, 0, -1}};
 		for (size_t i = 0; i < dice_count(5000); i++) {
-			vec3 side = vec3_normalize(vec3_madd(poles[i % 6], dice_throw(&d) < 0.5 ? 0 : 0.01, dice_direction(&d)));
+			vec3 side = vec3_normalize(
+				vec3_madd(poles[i % 6], dice_throw(&d) < 0.5 ? 0 : 0.01, dice_direction(&d)));
 			vec3 w = vec3_normalize(vec3_cross(side, dice_direction(&d)));
 			for (int in = 0; in < 2; in++) {
 				vec3 touch = vec3_madd(s.center, radius * (in ? 1 - 1e-7 : 1 + 1e-7), side);
-				struct ray_end from = free_end(vec3_madd(touch, -3, w)), to = free_end(vec3_madd(touch, 3, w));
+				struct ray_end from = free_end(vec3_madd(touch, -3, w)),
+					       to = free_end(vec3_madd(touch, 3, w));
 				struct ray_hit hit;
 				assert_int_equal(accel_closest(a, &from, w, 0, INFINITY, &hit), in);
 				assert_int_equal(accel_occluded(a, &from, &to), in);
@@ -348,8 +355,9 @@ static void test_building_ticks(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_outside_of_mesh), cmocka_unit_test(test_closed),	 cmocka_unit_test(test_plane),
-		cmocka_unit_test(test_segments),	cmocka_unit_test(test_far_away), cmocka_unit_test(test_slivers),
+		cmocka_unit_test(test_outside_of_mesh), cmocka_unit_test(test_closed),
+		cmocka_unit_test(test_plane),		cmocka_unit_test(test_segments),
+		cmocka_unit_test(test_far_away),	cmocka_unit_test(test_slivers),
 		cmocka_unit_test(test_silhouettes),	cmocka_unit_test(test_building_ticks),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -34,13 +34,19 @@ static struct geom_shape triangle(struct dice *d, bool smooth, bool with_uv)
 		normal[m][1] += (float)ng.y;
 		normal[m][2] += (float)ng.z;
 	}
-	return (struct geom_shape){.vertex_count = 3, .triangle_count = 1, .position = position, .index = index_,
-				   .normal = smooth ? normal : NULL, .uv = with_uv ? uv : NULL};
+	return (struct geom_shape){.vertex_count = 3,
+				   .triangle_count = 1,
+				   .position = position,
+				   .index = index_,
+				   .normal = smooth ? normal : NULL,
+				   .uv = with_uv ? uv : NULL};
 }
 
 static struct geom_shape sphere(struct dice *d)
 {
-	struct geom_shape s = {.is_sphere = true, .center = dice_direction(d), .radius = dice_between(d, 0.1, 2),
+	struct geom_shape s = {.is_sphere = true,
+			       .center = dice_direction(d),
+			       .radius = dice_between(d, 0.1, 2),
 			       .normal_sign = dice_throw(d) < 0.5 ? -1 : 1};
 	s.sphere_axes = frame_around(dice_direction(d));
 	return s;
@@ -92,7 +98,8 @@ static double compare(const struct geom_shape *s, const struct surface_point *x)
 			dn[half] = vec3_scale(0.5 / h, vec3_sub(up.sh.n, down.sh.n));
 			ddu[half] = vec3_scale(0.5 / h, vec3_sub(unit_du(&up), unit_du(&down)));
 		}
-		vec3 n = vec3_madd(vec3_scale(4.0 / 3, dn[1]), -1.0 / 3, dn[0]), u = vec3_madd(vec3_scale(4.0 / 3, ddu[1]), -1.0 / 3, ddu[0]);
+		vec3 n = vec3_madd(vec3_scale(4.0 / 3, dn[1]), -1.0 / 3, dn[0]),
+		     u = vec3_madd(vec3_scale(4.0 / 3, ddu[1]), -1.0 / 3, ddu[0]);
 		worst = fmax(worst, fmax(off(n, c.dn[i], scale), off(u, c.ddu[i], scale)));
 	}
 	return worst;
@@ -110,7 +117,8 @@ static void test_differences(void **state)
 		if (s.is_sphere)
 			surface_on_sphere(&s, (struct prim_ref){0, 0}, dice_direction(&d), &x);
 		else
-			surface_on_triangle(&s, (struct prim_ref){0, 0}, dice_between(&d, 0.2, 0.4), dice_between(&d, 0.2, 0.4), &x);
+			surface_on_triangle(&s, (struct prim_ref){0, 0}, dice_between(&d, 0.2, 0.4),
+					    dice_between(&d, 0.2, 0.4), &x);
 		if (!s.is_sphere && vec3_dot(x.sh.n, x.ng) < 0.1)
 			continue;
 		/* Slivers: the points further on would lie outside. */
@@ -122,7 +130,8 @@ static void test_differences(void **state)
 			continue;
 		worst[kind] = fmax(worst[kind], compare(&s, &x));
 	}
-	print_message("flat %.1e %.1e, smooth %.1e %.1e, sphere %.1e\n", worst[0], worst[1], worst[2], worst[3], worst[4]);
+	print_message("flat %.1e %.1e, smooth %.1e %.1e, sphere %.1e\n", worst[0], worst[1], worst[2], worst[3],
+		      worst[4]);
 	for (int kind = 0; kind < 5; kind++)
 		assert_true(worst[kind] < 1e-7);
 }
@@ -157,7 +166,8 @@ static void test_degenerate(void **state)
 		/* Degenerate or huge uv, slivers down to floats' own limit, normals that turn away or vanish. */
 		for (int m = 0; m < 3; m++) {
 			uv[m][0] = i % 3 ? 1e30f * uv[m][0] : 0.25f;
-			position[m][1] = position[m][0] + (i % 5 ? 0 : position[m][1] * (float)exp(dice_between(&d, -70, 0)));
+			position[m][1] =
+				position[m][0] + (i % 5 ? 0 : position[m][1] * (float)exp(dice_between(&d, -70, 0)));
 			normal[m][2] = i % 7 ? normal[m][2] : 0;
 		}
 		if (i % 11 == 0)

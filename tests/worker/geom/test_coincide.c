@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Surfaces that coincide. Two triangles: against their separation along the edges of each (an axis on which they lie apart), in
- * planes of any direction, near the origin and far from it, with vertices rounded to float. The search: against all pairs. Rays and
- * segments: against the one rule that says which of two is there.
+ * Surfaces that coincide. Two triangles: against their separation along the edges of each (an axis on which they lie
+ * apart), in planes of any direction, near the origin and far from it, with vertices rounded to float. The search:
+ * against all pairs. Rays and segments: against the one rule that says which of two is there.
  */
 #include "tests/support/bodies.h"
 #include "worker/geom/coincide.h"
@@ -40,8 +40,11 @@ static void add(struct soup *s, vec3 a, vec3 b, vec3 c)
 
 static struct accel_shape shape_of(const struct soup *s, enum surface_rank rank)
 {
-	return (struct accel_shape){.vertex_count = 3 * s->count, .triangle_count = s->count, .position = (const float(*)[3])s->position,
-				    .index = (const uint32_t(*)[3])s->index, .rank = rank};
+	return (struct accel_shape){.vertex_count = 3 * s->count,
+				    .triangle_count = s->count,
+				    .position = (const float(*)[3])s->position,
+				    .index = (const uint32_t(*)[3])s->index,
+				    .rank = rank};
 }
 
 static struct triangle triangle_at(const struct soup *s, uint32_t i)
@@ -121,9 +124,11 @@ static void test_two(void **state)
 		put(&s, &f, off, size, b);
 		struct frame tilted = frame_around(vec3_normalize(vec3_madd(f.n, 0.02, f.s)));
 		put(&s, &tilted, at, fmax(size, 0x1p-10), b);
-		const struct triangle t[4] = {triangle_at(&s, 0), triangle_at(&s, 1), triangle_at(&s, 2), triangle_at(&s, 3)};
+		const struct triangle t[4] = {triangle_at(&s, 0), triangle_at(&s, 1), triangle_at(&s, 2),
+					      triangle_at(&s, 3)};
 		if (meet(&t[0], &t[1]) != (g < 0))
-			fail_msg("a gap of %g, in triangles of %g: %s", g, size, g < 0 ? "not seen to overlap" : "seen to overlap");
+			fail_msg("a gap of %g, in triangles of %g: %s", g, size,
+				 g < 0 ? "not seen to overlap" : "seen to overlap");
 		if (meet(&t[0], &t[2]))
 			fail_msg("triangles of %g apart by 2^-20 or more are taken for one", size);
 		if (size >= 0x1p-10 && meet(&t[0], &t[3]))
@@ -143,8 +148,10 @@ static void test_neighbours(void **state)
 	for (int k = 0; k < 2; k++) {
 		for (uint32_t i = 0; i < g[k].triangle_count; i++)
 			for (uint32_t j = 0; j < i; j++) {
-				const struct triangle a = triangle_from((const float(*)[3])g[k].position, g[k].index[i]);
-				const struct triangle b = triangle_from((const float(*)[3])g[k].position, g[k].index[j]);
+				const struct triangle a =
+					triangle_from((const float(*)[3])g[k].position, g[k].index[i]);
+				const struct triangle b =
+					triangle_from((const float(*)[3])g[k].position, g[k].index[j]);
 				assert_false(meet(&a, &b));
 			}
 		body_free(&g[k]);
@@ -153,7 +160,8 @@ static void test_neighbours(void **state)
 
 /* ---- the search ---- */
 
-/* What is there by the rule, of all primitives: the first as they rank that overlaps this one, or is hidden by what does. */
+/* What is there by the rule, of all primitives: the first as they rank that overlaps this one, or is hidden by what
+ * does. */
 static struct prim_ref rule(const struct accel_shape *s, uint32_t count, struct prim_ref at, vec3 p)
 {
 	const struct triangle t = triangle_from(s[at.shape].position, s[at.shape].index[at.prim]);
@@ -184,7 +192,8 @@ static vec3 point_on(const struct accel_shape *s, uint32_t prim, struct dice *d)
 static void fill_planes(struct soup *s, uint32_t count, struct dice *d)
 {
 	for (s->count = 0; s->count < count;) {
-		double c[3][2], plane = dice_below(d, 4) / 8.0, size = exp2(-1.0 - dice_below(d, 6)), x = dice_between(d, -1, 1), y = dice_between(d, -1, 1);
+		double c[3][2], plane = dice_below(d, 4) / 8.0, size = exp2(-1.0 - dice_below(d, 6)),
+				x = dice_between(d, -1, 1), y = dice_between(d, -1, 1);
 		vec3 v[3];
 		unsigned axis = dice_below(d, 3);
 		throw_corners(d, c);
@@ -200,7 +209,8 @@ static void test_search(void **state)
 {
 	(void)state;
 	static struct soup soup[5];
-	static const enum surface_rank rank[5] = {SURFACE_TRANSMITS, SURFACE_OPAQUE, SURFACE_SHINES, SURFACE_OPAQUE, SURFACE_PASSES};
+	static const enum surface_rank rank[5] = {SURFACE_TRANSMITS, SURFACE_OPAQUE, SURFACE_SHINES, SURFACE_OPAQUE,
+						  SURFACE_PASSES};
 	struct dice d = dice_of("search");
 	struct accel_shape shape[5];
 	struct coincidence *c;
@@ -218,16 +228,18 @@ static void test_search(void **state)
 		vec3 p = point_on(&shape[at.shape], at.prim, &d);
 		struct prim_ref there = coincide_there(c, shape, at, p), right = rule(shape, 5, at, p);
 		if (there.shape != right.shape || there.prim != right.prim)
-			fail_msg("on %u.%u it is %u.%u that is there, not %u.%u", at.shape, at.prim, right.shape, right.prim, there.shape, there.prim);
+			fail_msg("on %u.%u it is %u.%u that is there, not %u.%u", at.shape, at.prim, right.shape,
+				 right.prim, there.shape, there.prim);
 		hidden += there.shape != at.shape;
 	}
-	print_message("%zu pairs of primitives, %zu of shapes; %zu of the points hidden\n", c->pair_count, c->shapes_count, hidden);
+	print_message("%zu pairs of primitives, %zu of shapes; %zu of the points hidden\n", c->pair_count,
+		      c->shapes_count, hidden);
 	assert_true(hidden > 0 && c->shapes_count > 4);
 	coincide_free(c);
 }
 
-/* A stack of equal triangles is no square; a heap that is one ends with what the bounds allow. Where nothing coincides nothing is
- * kept, one sphere hides another, and without memory there is a sentence. */
+/* A stack of equal triangles is no square; a heap that is one ends with what the bounds allow. Where nothing coincides
+ * nothing is kept, one sphere hides another, and without memory there is a sentence. */
 static void test_bounds(void **state)
 {
 	(void)state;
@@ -245,7 +257,8 @@ static void test_bounds(void **state)
 	coincide_free(c);
 	for (s.count = 0; s.count < MOST;) {
 		double turn = dice_between(&d, 0, 6);
-		add(&s, (vec3){cos(turn), sin(turn), 0}, (vec3){cos(turn + 2), sin(turn + 2), 0}, (vec3){cos(turn + 4), sin(turn + 4), 0});
+		add(&s, (vec3){cos(turn), sin(turn), 0}, (vec3){cos(turn + 2), sin(turn + 2), 0},
+		    (vec3){cos(turn + 4), sin(turn + 4), 0});
 	}
 	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
 	assert_true(c->incomplete && c->pair_count > MOST && c->pair_count < 64 * MOST);
@@ -253,7 +266,8 @@ static void test_bounds(void **state)
 	shape[0] = shape_of(&s, SURFACE_OPAQUE);
 	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
 	assert_null(c);
-	struct accel_shape ball[3] = {{.is_sphere = true, .center = {0.1, 0.2, 0.3}, .radius = 0.5, .rank = SURFACE_TRANSMITS}};
+	struct accel_shape ball[3] = {
+		{.is_sphere = true, .center = {0.1, 0.2, 0.3}, .radius = 0.5, .rank = SURFACE_TRANSMITS}};
 	ball[1] = ball[2] = ball[0];
 	ball[1].radius *= 1 + 1e-9;
 	ball[2].radius *= 1 + 1e-5;
@@ -280,8 +294,8 @@ static void test_bounds(void **state)
 
 /* ---- rays ---- */
 
-/* A pane and a smaller lamp in its plane, turned: what is there from both sides; what leaves one does not meet the other; no segment
- * begins or ends on what is hidden. */
+/* A pane and a smaller lamp in its plane, turned: what is there from both sides; what leaves one does not meet the
+ * other; no segment begins or ends on what is hidden. */
 static void test_rays(void **state)
 {
 	(void)state;
@@ -296,36 +310,44 @@ static void test_rays(void **state)
 		struct error e;
 		for (int k = 0; k < 2; k++) {
 			double w = k ? 0.25 : 0.5, turn = k ? 0.3 : 0;
-			const double co = w * cos(turn), si = w * sin(turn), corner[2][3][2] = {{{co - si, si + co}, {-co - si, -si + co}, {-co + si, -si - co}},
-										{{co - si, si + co}, {-co + si, -si - co}, {co + si, si - co}}};
+			const double co = w * cos(turn), si = w * sin(turn),
+				     corner[2][3][2] = {
+					     {{co - si, si + co}, {-co - si, -si + co}, {-co + si, -si - co}},
+					     {{co - si, si + co}, {-co + si, -si - co}, {co + si, si - co}}};
 			s[k].count = 0;
 			for (int i = 0; i < 2; i++)
 				put(&s[k], &f, at, 1, corner[i]);
 		}
-		const struct accel_shape shape[2] = {shape_of(&s[0], SURFACE_TRANSMITS), shape_of(&s[1], SURFACE_SHINES)};
+		const struct accel_shape shape[2] = {shape_of(&s[0], SURFACE_TRANSMITS),
+						     shape_of(&s[1], SURFACE_SHINES)};
 		assert_int_equal(coincide_find(&c, shape, 2, &e), 0);
 		assert_non_null(c);
 		assert_int_equal(accel_new(&a, shape, 2, c, &e), 0);
 		for (int i = 0; i < 20; i++) {
 			double x = dice_between(&d, -0.48, 0.48), y = dice_between(&d, -0.48, 0.48);
-			double u = x * cos(0.3) + y * sin(0.3), v = y * cos(0.3) - x * sin(0.3), edge = fmax(fabs(u), fabs(v)) - 0.25;
+			double u = x * cos(0.3) + y * sin(0.3), v = y * cos(0.3) - x * sin(0.3),
+			       edge = fmax(fabs(u), fabs(v)) - 0.25;
 			if (fabs(edge) < 1e-5)
 				continue;
 			vec3 p = vec3_madd(vec3_madd(at, x, f.s), y, f.t), w = dice_direction(&d);
 			if (fabs(vec3_dot(w, f.n)) < 0.01)
 				continue;
-			struct ray_end eye = {vec3_madd(p, -1, w), {0, 0, 0}, PRIM_NONE}, far = {vec3_madd(p, 1, w), {0, 0, 0}, PRIM_NONE};
+			struct ray_end eye = {vec3_madd(p, -1, w), {0, 0, 0}, PRIM_NONE},
+				       far = {vec3_madd(p, 1, w), {0, 0, 0}, PRIM_NONE};
 			struct ray_hit hit;
 			uint32_t right = edge < 0;
 			if (!accel_closest(a, &eye, w, 0, INFINITY, &hit) || hit.prim.shape != right)
 				fail_msg("a ray meets %u where %u is there", hit.prim.shape, right);
 			assert_true(accel_occluded(a, &eye, &far));
-			const struct geom_shape g = {.vertex_count = 6, .triangle_count = 2, .position = s[right].position, .index = s[right].index};
+			const struct geom_shape g = {.vertex_count = 6,
+						     .triangle_count = 2,
+						     .position = s[right].position,
+						     .index = s[right].index};
 			struct surface_point q;
 			surface_from_hit(&g, eye.p, w, &hit, &q);
 			struct ray_end from = body_end(&q);
-			if (accel_closest(a, &from, w, 0, INFINITY, &hit) || accel_occluded(a, &from, &far) || accel_occluded(a, &eye, &from) ||
-			    accel_occluded_to_infinity(a, &from, w))
+			if (accel_closest(a, &from, w, 0, INFINITY, &hit) || accel_occluded(a, &from, &far) ||
+			    accel_occluded(a, &eye, &from) || accel_occluded_to_infinity(a, &from, w))
 				fail_msg("what leaves shape %u meets the one that it coincides with", right);
 			lamp += right;
 			pane += !right;
@@ -337,7 +359,8 @@ static void test_rays(void **state)
 			struct prim_ref prim = {0, triangle_meets(&t, p, f.n, &unused) ? 0 : 1};
 			struct ray_end hidden = {p, f.n, prim};
 			assert_false(accel_closest(a, &hidden, w, 0, INFINITY, &hit));
-			assert_true(accel_occluded(a, &hidden, &far) && accel_occluded(a, &eye, &hidden) && accel_occluded_to_infinity(a, &hidden, w));
+			assert_true(accel_occluded(a, &hidden, &far) && accel_occluded(a, &eye, &hidden) &&
+				    accel_occluded_to_infinity(a, &hidden, w));
 			on_hidden++;
 		}
 		accel_free(a);
@@ -349,7 +372,8 @@ static void test_rays(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_two), cmocka_unit_test(test_neighbours), cmocka_unit_test(test_search),
-					   cmocka_unit_test(test_bounds), cmocka_unit_test(test_rays)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_two), cmocka_unit_test(test_neighbours),
+					   cmocka_unit_test(test_search), cmocka_unit_test(test_bounds),
+					   cmocka_unit_test(test_rays)};
 	return cmocka_run_group_tests_name("coinciding surfaces", tests, NULL, NULL);
 }

@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Rays in a scene of mixed scales: a floor of two triangles, and on the middle of it a bumpy ball, half sunk, and a sphere, both a
- * millionth or less as large. From near and from far, with the far end first or last, every ray meets what a search in double meets,
- * at the same place; but for one in a thousand, which passes an edge of the small ball by less than floats can tell.
+ * Rays in a scene of mixed scales: a floor of two triangles, and on the middle of it a bumpy ball, half sunk, and a
+ * sphere, both a millionth or less as large. From near and from far, with the far end first or last, every ray meets
+ * what a search in double meets, at the same place; but for one in a thousand, which passes an edge of the small ball
+ * by less than floats can tell.
  */
 #include "tests/support/bodies.h"
 #include "worker/geom/accel.h"
@@ -25,7 +26,10 @@ static struct scene scene_of(double small)
 	struct scene s = {.small = small};
 	body_plane(&s.shape[0], 1, 0.5, 0.25);
 	body_ball(&s.shape[1], 6, small, 0.15);
-	s.shape[2] = (struct geom_shape){.is_sphere = true, .center = {2 * small, 0.6 * small, 2 * small}, .radius = 0.7 * small, .normal_sign = 1};
+	s.shape[2] = (struct geom_shape){.is_sphere = true,
+					 .center = {2 * small, 0.6 * small, 2 * small},
+					 .radius = 0.7 * small,
+					 .normal_sign = 1};
 	s.accel = body_accel(s.shape, SHAPES);
 	return s;
 }
@@ -52,7 +56,8 @@ static double nearest(const struct scene *s, vec3 o, vec3 d, uint32_t *shape)
 	double best = INFINITY;
 	for (uint32_t i = 0; i < SHAPES; i++) {
 		uint32_t prim;
-		double t = s->shape[i].is_sphere ? sphere_nearest(&s->shape[i], o, d) : body_nearest(&s->shape[i], o, d, 0, &prim);
+		double t = s->shape[i].is_sphere ? sphere_nearest(&s->shape[i], o, d)
+						 : body_nearest(&s->shape[i], o, d, 0, &prim);
 		if (t < best) {
 			best = t;
 			*shape = i;
@@ -65,9 +70,11 @@ static double nearest(const struct scene *s, vec3 o, vec3 d, uint32_t *shape)
 static vec3 near_point(const struct scene *s, struct dice *d)
 {
 	for (;;) {
-		vec3 p = vec3_scale(3 * s->small, (vec3){dice_between(d, -1, 1), dice_between(d, -1, 1), dice_between(d, -1, 1)});
+		vec3 p = vec3_scale(3 * s->small,
+				    (vec3){dice_between(d, -1, 1), dice_between(d, -1, 1), dice_between(d, -1, 1)});
 		double height = p.z - 0.5 * p.x - 0.25 * p.y;
-		if (height > 0 && vec3_length(p) > 1.2 * s->small && vec3_length(vec3_sub(p, s->shape[2].center)) > s->shape[2].radius)
+		if (height > 0 && vec3_length(p) > 1.2 * s->small &&
+		    vec3_length(vec3_sub(p, s->shape[2].center)) > s->shape[2].radius)
 			return p;
 	}
 }
@@ -109,13 +116,15 @@ static size_t check_segments(const struct scene *s, struct dice *d, size_t n, si
 {
 	size_t wrong = 0;
 	for (size_t i = 0; i < n; i++) {
-		struct ray_end a = {.p = near_point(s, d), .prim = PRIM_NONE}, b = {.p = i % 2 ? near_point(s, d) : far_point(d), .prim = PRIM_NONE};
+		struct ray_end a = {.p = near_point(s, d), .prim = PRIM_NONE},
+			       b = {.p = i % 2 ? near_point(s, d) : far_point(d), .prim = PRIM_NONE};
 		vec3 w = vec3_sub(b.p, a.p);
 		double length = vec3_length(w);
 		uint32_t shape;
 		bool is_blocked = nearest(s, a.p, vec3_scale(1 / length, w), &shape) < length;
 		*blocked += is_blocked;
-		wrong += accel_occluded(s->accel, &a, &b) != is_blocked || accel_occluded(s->accel, &b, &a) != is_blocked;
+		wrong += accel_occluded(s->accel, &a, &b) != is_blocked ||
+			 accel_occluded(s->accel, &b, &a) != is_blocked;
 	}
 	return wrong;
 }
@@ -138,7 +147,8 @@ static size_t check_from_the_floor(const struct scene *s, struct dice *d, size_t
 		double t = INFINITY;
 		for (uint32_t k = 1; k < SHAPES; k++) {
 			uint32_t prim;
-			double at = k == 2 ? sphere_nearest(&s->shape[k], x.p, w) : body_nearest(&s->shape[k], x.p, w, 0, &prim);
+			double at = k == 2 ? sphere_nearest(&s->shape[k], x.p, w)
+					   : body_nearest(&s->shape[k], x.p, w, 0, &prim);
 			if (at < t) {
 				t = at;
 				shape = k;
@@ -162,10 +172,12 @@ static void test_mixed(void **state)
 	for (size_t i = 0; i < sizeof sizes / sizeof *sizes; i++) {
 		struct dice d = dice_of("mixed scales");
 		struct scene s = scene_of(sizes[i].size);
-		size_t met[SHAPES] = {0}, blocked = 0, close = check_closest(&s, &d, false, n, met), far = check_closest(&s, &d, true, n, met);
+		size_t met[SHAPES] = {0}, blocked = 0, close = check_closest(&s, &d, false, n, met),
+		       far = check_closest(&s, &d, true, n, met);
 		size_t segments = check_segments(&s, &d, n, &blocked), floor = check_from_the_floor(&s, &d, n);
-		print_message("%.0e: of %zu each, %zu from near, %zu from far, %zu segments, %zu from the floor differ; met %zu %zu %zu, blocked %zu\n",
-			      sizes[i].size, n, close, far, segments, floor, met[0], met[1], met[2], blocked);
+		print_message(
+			"%.0e: of %zu each, %zu from near, %zu from far, %zu segments, %zu from the floor differ; met %zu %zu %zu, blocked %zu\n",
+			sizes[i].size, n, close, far, segments, floor, met[0], met[1], met[2], blocked);
 		double expected = (double)n * (double)sizes[i].wrong * 1e-6;
 		size_t most = (size_t)(expected + 4 * sqrt(expected) + 1); /* of a small sample, too */
 		assert_true(close <= most && far <= most && segments <= most && floor <= most);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Points put back onto one primitive along a ray through a point of it. Tolerances: a few roundings of the coordinates over
- * the cosine between ray and normal.
+ * Points put back onto one primitive along a ray through a point of it. Tolerances: a few roundings of the coordinates
+ * over the cosine between ray and normal.
  */
 #include "tests/support/bodies.h"
 
@@ -39,7 +39,8 @@ static void test_triangles(void **state)
 		assert_false(surface_reproject(&s, x.prim, x.prim, o, w, t, &y));
 		/* Beyond the side that joins vertices 1 and 2. */
 		struct surface_point beside;
-		surface_on_triangle(&s, x.prim, x.b1 + 0.6 * (1 - x.b1 - x.b2), x.b2 + 0.6 * (1 - x.b1 - x.b2), &beside);
+		surface_on_triangle(&s, x.prim, x.b1 + 0.6 * (1 - x.b1 - x.b2), x.b2 + 0.6 * (1 - x.b1 - x.b2),
+				    &beside);
 		vec3 past = vec3_sub(beside.p, o);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, o, vec3_normalize(past), t, &y));
 	}
@@ -50,7 +51,10 @@ static void test_spheres(void **state)
 {
 	(void)state;
 	struct dice d = dice_of("points put back on spheres");
-	struct geom_shape s = {.is_sphere = true, .center = {0.2, -0.1, 0.3}, .radius = 0.4, .normal_sign = 1,
+	struct geom_shape s = {.is_sphere = true,
+			       .center = {0.2, -0.1, 0.3},
+			       .radius = 0.4,
+			       .normal_sign = 1,
 			       .sphere_axes = frame_around((vec3){0, 0, 1})};
 	for (size_t i = 0; i < dice_count(50000); i++) {
 		struct surface_point x = body_point(&s, 0, &d), y, z;
@@ -71,14 +75,17 @@ static void test_spheres(void **state)
 		assert_true(vec3_length(vec3_sub(z.p, vec3_madd(x.p, chord, w))) < SAME);
 		/* From outside both crossings lie ahead: the one asked for. */
 		vec3 outside = vec3_madd(x.p, -3, w);
-		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, outside, w, 3 + 0.4 * chord, &y) && off(&x, &y) < SAME);
-		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, outside, w, 3 + 0.6 * chord, &y) && off(&z, &y) < SAME);
+		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, outside, w, 3 + 0.4 * chord, &y) &&
+			    off(&x, &y) < SAME);
+		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, outside, w, 3 + 0.6 * chord, &y) &&
+			    off(&z, &y) < SAME);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, outside, vec3_neg(w), 3, &y));
 		/* From the middle one of them does. */
 		vec3 middle = vec3_madd(x.p, 0.5 * chord, w);
 		assert_true(surface_reproject(&s, x.prim, PRIM_NONE, middle, w, 0, &y) && off(&z, &y) < SAME);
 		/* Past it. */
-		vec3 aside = vec3_normalize(vec3_cross(w, x.ng)), passing = vec3_madd(vec3_madd(s.center, 0.401, aside), -2, w);
+		vec3 aside = vec3_normalize(vec3_cross(w, x.ng)),
+		     passing = vec3_madd(vec3_madd(s.center, 0.401, aside), -2, w);
 		assert_false(surface_reproject(&s, x.prim, PRIM_NONE, passing, w, 2, &y));
 	}
 }

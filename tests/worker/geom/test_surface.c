@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Where rays meet primitives, refined in double: on the primitive, and on the ray. Tolerances are a few roundings of double
- * times the condition of the problem, said where they are used.
+ * Where rays meet primitives, refined in double: on the primitive, and on the ray. Tolerances are a few roundings of
+ * double times the condition of the problem, said where they are used.
  */
 #include "tests/support/bodies.h"
 
@@ -46,7 +46,8 @@ static void test_triangles(void **state)
 		vec3 e2 = vec3_sub(corner(&s, hit.prim.prim, 2), v0), n = vec3_normalize(vec3_cross(e1, e2));
 		worst_plane = fmax(worst_plane, fabs(vec3_dot(vec3_sub(x.p, v0), n)));
 		assert_true(vec3_length(vec3_sub(n, x.ng)) < 1e-15);
-		/* Beside an edge Embree's floats may choose the neighbour: then the nearest point of it, within float. */
+		/* Beside an edge Embree's floats may choose the neighbour: then the nearest point of it, within float.
+		 */
 		double line = off_line(x.p, o, w);
 		if (line > 1e-9) {
 			beside++;
@@ -55,8 +56,8 @@ static void test_triangles(void **state)
 		}
 		worst_line = fmax(worst_line, line * fabs(vec3_dot(n, w)));
 	}
-	print_message("%zu hits: off the plane %.1e, off the ray %.1e x cos; %zu beside an edge\n", met, worst_plane, worst_line,
-		      beside);
+	print_message("%zu hits: off the plane %.1e, off the ray %.1e x cos; %zu beside an edge\n", met, worst_plane,
+		      worst_line, beside);
 	assert_true(met > dice_count(100000) / 2);
 	assert_true(worst_plane < 1e-15);
 	assert_true(worst_line < 2e-15);
@@ -65,15 +66,18 @@ static void test_triangles(void **state)
 	body_free(&s);
 }
 
-/* Points are center + radius x unit vector: on the sphere to rounding. On the ray to 1e-15 over the cosine; from far away
- * to the rounding of the distance. */
+/* Points are center + radius x unit vector: on the sphere to rounding. On the ray to 1e-15 over the cosine; from far
+ * away to the rounding of the distance. */
 static void test_spheres(void **state)
 {
 	(void)state;
 	struct dice d = dice_of("surface of spheres");
 	for (double distance = 0.5; distance < 2e6; distance *= 10) {
 		for (double radius = 1e-6; radius < 1; radius *= 20) {
-			struct geom_shape s = {.is_sphere = true, .center = {0.2, -0.1, 0.05}, .radius = radius, .normal_sign = 1,
+			struct geom_shape s = {.is_sphere = true,
+					       .center = {0.2, -0.1, 0.05},
+					       .radius = radius,
+					       .normal_sign = 1,
 					       .sphere_axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 			struct accel *a = body_accel(&s, 1);
 			for (size_t i = 0; i < dice_count(500); i++) {
@@ -106,7 +110,10 @@ static void test_sphere_from_itself(void **state)
 {
 	(void)state;
 	struct dice d = dice_of("sphere from itself");
-	struct geom_shape s = {.is_sphere = true, .center = {0.3, -0.2, 0.1}, .radius = 0.6, .normal_sign = 1,
+	struct geom_shape s = {.is_sphere = true,
+			       .center = {0.3, -0.2, 0.1},
+			       .radius = 0.6,
+			       .normal_sign = 1,
 			       .sphere_axes = {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
 	struct accel *a = body_accel(&s, 1);
 	for (size_t i = 0; i < dice_count(50000); i++) {
@@ -152,7 +159,10 @@ static void test_parameters(void **state)
 {
 	(void)state;
 	struct dice d = dice_of("surface parameters");
-	struct geom_shape s = {.is_sphere = true, .center = {0.3, -0.2, 0.1}, .radius = 0.6, .normal_sign = 1,
+	struct geom_shape s = {.is_sphere = true,
+			       .center = {0.3, -0.2, 0.1},
+			       .radius = 0.6,
+			       .normal_sign = 1,
 			       .sphere_axes = {{0, 1, 0}, {0, 0, 1}, {1, 0, 0}}};
 	for (int i = 0; i < 1000; i++) {
 		double u = dice_throw(&d), v = dice_between(&d, 0.05, 0.95), h = 1e-5;
@@ -165,20 +175,30 @@ static void test_parameters(void **state)
 		assert_true(fabs(x[1].u - u) < 1e-12 && fabs(x[1].v - v) < 1e-12);
 		vec3 difference = vec3_scale(1 / (2 * h), vec3_sub(x[2].p, x[0].p));
 		assert_true(vec3_length(vec3_sub(difference, x[1].dpdu)) < 1e-7 * vec3_length(x[1].dpdu));
-		assert_true(fabs(vec3_dot(x[1].sh.s, x[1].sh.n)) < 1e-15 && fabs(vec3_dot(x[1].sh.t, x[1].sh.s)) < 1e-15);
+		assert_true(fabs(vec3_dot(x[1].sh.s, x[1].sh.n)) < 1e-15 &&
+			    fabs(vec3_dot(x[1].sh.t, x[1].sh.s)) < 1e-15);
 	}
-	float position[4][3] = {{0, 0, 0}, {2, 0, 0}, {0, 1, 0.5f}, {0, 0, 0}}, uv[3][2] = {{0.1f, 0.2f}, {0.6f, 0.3f}, {0.2f, 0.9f}};
+	float position[4][3] = {{0, 0, 0}, {2, 0, 0}, {0, 1, 0.5f}, {0, 0, 0}},
+	      uv[3][2] = {{0.1f, 0.2f}, {0.6f, 0.3f}, {0.2f, 0.9f}};
 	float normal[3][3] = {{0, -0.2f, 1}, {0.3f, -0.4f, 1}, {0, -0.5f, 1}};
 	uint32_t index[1][3] = {{0, 1, 2}};
-	struct geom_shape t = {.vertex_count = 3, .triangle_count = 1, .position = position, .index = index, .uv = uv, .normal = normal};
+	struct geom_shape t = {.vertex_count = 3,
+			       .triangle_count = 1,
+			       .position = position,
+			       .index = index,
+			       .uv = uv,
+			       .normal = normal};
 	struct surface_point a, b;
 	surface_on_triangle(&t, (struct prim_ref){0, 0}, 0.25, 0.25, &a);
 	surface_on_triangle(&t, (struct prim_ref){0, 0}, 0.35, 0.45, &b);
 	/* The position is linear in (u,v): along a line of constant v it moves by dpdu. */
-	double det = (double)(uv[1][0] - uv[0][0]) * (double)(uv[2][1] - uv[0][1]) - (double)(uv[1][1] - uv[0][1]) * (double)(uv[2][0] - uv[0][0]);
+	double det = (double)(uv[1][0] - uv[0][0]) * (double)(uv[2][1] - uv[0][1]) -
+		     (double)(uv[1][1] - uv[0][1]) * (double)(uv[2][0] - uv[0][0]);
 	vec3 e1 = corner(&t, 0, 1), e2 = corner(&t, 0, 2);
-	vec3 dpdu = vec3_scale(1 / det, vec3_sub(vec3_scale((double)(uv[2][1] - uv[0][1]), e1), vec3_scale((double)(uv[1][1] - uv[0][1]), e2)));
-	vec3 dpdv = vec3_scale(1 / det, vec3_sub(vec3_scale((double)(uv[1][0] - uv[0][0]), e2), vec3_scale((double)(uv[2][0] - uv[0][0]), e1)));
+	vec3 dpdu = vec3_scale(1 / det, vec3_sub(vec3_scale((double)(uv[2][1] - uv[0][1]), e1),
+						 vec3_scale((double)(uv[1][1] - uv[0][1]), e2)));
+	vec3 dpdv = vec3_scale(1 / det, vec3_sub(vec3_scale((double)(uv[1][0] - uv[0][0]), e2),
+						 vec3_scale((double)(uv[2][0] - uv[0][0]), e1)));
 	vec3 step = vec3_madd(vec3_scale(b.u - a.u, dpdu), b.v - a.v, dpdv);
 	assert_true(vec3_length(vec3_sub(step, vec3_sub(b.p, a.p))) < 1e-6);
 	assert_true(vec3_length(vec3_sub(a.dpdu, dpdu)) < 1e-6);
@@ -188,8 +208,9 @@ static void test_parameters(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_triangles),	cmocka_unit_test(test_spheres),	   cmocka_unit_test(test_sphere_from_itself),
-		cmocka_unit_test(test_beside_a_sliver), cmocka_unit_test(test_parameters),
+		cmocka_unit_test(test_triangles),	   cmocka_unit_test(test_spheres),
+		cmocka_unit_test(test_sphere_from_itself), cmocka_unit_test(test_beside_a_sliver),
+		cmocka_unit_test(test_parameters),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -13,8 +13,9 @@ struct dense {
 	unsigned n;
 	long double m[DENSE_MOST][DENSE_MOST], inverse[DENSE_MOST][DENSE_MOST];
 	long double log_det;
-	/* What an entry is measured by, 0 outside the blocks: the product of its row's and its column's scale, so that the largest
-	 * of each row and column is about that. Condition numbers refer to errors of this size: they do not depend on units. */
+	/* What an entry is measured by, 0 outside the blocks: the product of its row's and its column's scale, so that
+	 * the largest of each row and column is about that. Condition numbers refer to errors of this size: they do not
+	 * depend on units. */
 	long double size[DENSE_MOST][DENSE_MOST];
 };
 

@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Whole paths built by hand for tests of their derivatives: every vertex on a shape of its own (one triangle or a sphere),
- * with a made-up material that has an index of refraction and a roughness. One at a time, on the caller's stack or static.
+ * Whole paths built by hand for tests of their derivatives: every vertex on a shape of its own (one triangle or a
+ * sphere), with a made-up material that has an index of refraction and a roughness. One at a time, on the caller's
+ * stack or static.
  */
 #ifndef TESTS_WORKER_HALFVEC_HAND_H
 #define TESTS_WORKER_HALFVEC_HAND_H
@@ -19,7 +20,8 @@ struct hand {
 	struct full_path_path x;
 	struct geom_shape shape[FULL_PATH_MAX_VERTICES];
 	struct bsdf bsdf[FULL_PATH_MAX_VERTICES];
-	float position[FULL_PATH_MAX_VERTICES][3][3], normal[FULL_PATH_MAX_VERTICES][3][3], uv[FULL_PATH_MAX_VERTICES][3][2];
+	float position[FULL_PATH_MAX_VERTICES][3][3], normal[FULL_PATH_MAX_VERTICES][3][3],
+		uv[FULL_PATH_MAX_VERTICES][3][2];
 	uint32_t index[FULL_PATH_MAX_VERTICES][1][3];
 };
 
@@ -30,7 +32,10 @@ static inline void hand_begin(struct hand *h, unsigned edges)
 	h->w.accuracy = accuracy_settings_default;
 	h->w.shapes = h->shape;
 	h->w.shape_count = FULL_PATH_MAX_VERTICES;
-	h->w.camera = (struct camera){.axes = {{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}}, .width = 640, .height = 480, .scale = 700,
+	h->w.camera = (struct camera){.axes = {{-1, 0, 0}, {0, -1, 0}, {0, 0, 1}},
+				      .width = 640,
+				      .height = 480,
+				      .scale = 700,
 				      .far_clip = INFINITY};
 	for (unsigned j = 0; j < FULL_PATH_MAX_VERTICES; j++) {
 		h->bsdf[j] = (struct bsdf){.eta = 1, .alpha = 0.1, .alpha_mean = 0.1, .has_smooth = true};
@@ -48,19 +53,21 @@ static inline vec3 hand_across(struct dice *d, vec3 n)
 
 /* What to make of a triangle. */
 struct hand_triangle {
-	double size, aspect;  /* of its corners around p; aspect 1e-4: a sliver */
-	bool flat;            /* no normals */
-	double bend;          /* |d normal| per length, about */
+	double size, aspect; /* of its corners around p; aspect 1e-4: a sliver */
+	bool flat;	     /* no normals */
+	double bend;	     /* |d normal| per length, about */
 	enum hand_uv uv;
 };
 
 /* Around p, facing ng, with shading normal n there (about: floats). */
-static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, vec3 n, const struct hand_triangle *t, struct dice *d)
+static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, vec3 n, const struct hand_triangle *t,
+				 struct dice *d)
 {
 	struct geom_shape *s = &h->shape[j];
 	vec3 a = hand_across(d, ng), b = vec3_cross(ng, a), ga = vec3_scale(t->bend, dice_direction(d)),
 	     gb = vec3_scale(t->bend, dice_direction(d));
-	double w[3] = {dice_between(d, 0.1, 1), dice_between(d, 0.1, 1), dice_between(d, 0.1, 1)}, off[3][2], mean[2] = {0, 0};
+	double w[3] = {dice_between(d, 0.1, 1), dice_between(d, 0.1, 1), dice_between(d, 0.1, 1)}, off[3][2],
+	       mean[2] = {0, 0};
 	double sum = w[0] + w[1] + w[2], start = dice_between(d, 0, 6), gain = dice_between(d, 0.5, 2);
 	for (int m = 0; m < 3; m++) {
 		double phi = start + m * 2.094 + dice_between(d, -0.4, 0.4);
@@ -79,7 +86,8 @@ static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, ve
 		h->uv[j][m][1] = t->uv == HAND_UV ? (float)dice_throw(d) : 0.5f;
 		h->index[j][0][m] = (uint32_t)m;
 	}
-	*s = (struct geom_shape){.vertex_count = 3, .triangle_count = 1, .position = h->position[j], .index = h->index[j]};
+	*s = (struct geom_shape){
+		.vertex_count = 3, .triangle_count = 1, .position = h->position[j], .index = h->index[j]};
 	s->normal = t->flat ? NULL : h->normal[j];
 	s->uv = t->uv == HAND_UV_NONE ? NULL : h->uv[j];
 	surface_on_triangle(s, (struct prim_ref){j, 0}, w[1] / sum, w[2] / sum, &h->x.v[j].x);
@@ -87,11 +95,13 @@ static inline void hand_triangle(struct hand *h, unsigned j, vec3 p, vec3 ng, ve
 }
 
 /* A sphere through p where its normal is n; sign -1: the normal points inwards. The pole lies at `polar` from n. */
-static inline void hand_sphere(struct hand *h, unsigned j, vec3 p, vec3 n, double radius, double sign, double polar, struct dice *d)
+static inline void hand_sphere(struct hand *h, unsigned j, vec3 p, vec3 n, double radius, double sign, double polar,
+			       struct dice *d)
 {
 	struct geom_shape *s = &h->shape[j];
 	vec3 w = vec3_scale(sign, n), side = hand_across(d, w);
-	*s = (struct geom_shape){.is_sphere = true, .center = vec3_madd(p, -radius, w), .radius = radius, .normal_sign = sign};
+	*s = (struct geom_shape){
+		.is_sphere = true, .center = vec3_madd(p, -radius, w), .radius = radius, .normal_sign = sign};
 	s->sphere_axes = frame_around(vec3_normalize(vec3_madd(vec3_scale(cos(polar), w), sin(polar), side)));
 	surface_on_sphere(s, (struct prim_ref){j, 0}, w, &h->x.v[j].x);
 	h->x.v[j].kind = VERTEX_SURFACE;
@@ -134,7 +144,8 @@ static inline void hand_scatters(struct hand *h, unsigned j, double eta)
 	h->bsdf[j].eta = eta == 0 ? 1.5 : above ? 1 / eta : eta;
 }
 
-/* A random chain of `edges` edges on spheres, or on triangles with n != ng where `bent`. false: it came too close to grazing. */
+/* A random chain of `edges` edges on spheres, or on triangles with n != ng where `bent`. false: it came too close to
+ * grazing. */
 static inline bool hand_chain(struct hand *h, unsigned edges, double bent, struct dice *d)
 {
 	static const double etas[] = {1.5, 1 / 1.5, 1.33, 1.2};
@@ -160,7 +171,8 @@ static inline bool hand_chain(struct hand *h, unsigned edges, double bent, struc
 		if (bent > 0)
 			hand_triangle(h, j, p[j], ng, n, &t, d);
 		else
-			hand_sphere(h, j, p[j], n, dice_between(d, 0.2, 2), dice_throw(d) < 0.3 ? -1 : 1, dice_between(d, 0.3, 2.8), d);
+			hand_sphere(h, j, p[j], n, dice_between(d, 0.2, 2), dice_throw(d) < 0.3 ? -1 : 1,
+				    dice_between(d, 0.3, 2.8), d);
 	}
 	hand_join(h);
 	for (unsigned j = 1; j < edges; j++)

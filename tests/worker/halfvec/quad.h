@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The half vector as a function of where three vertices lie, in 113 bits of mantissa, and its derivatives by differences: an
- * implementation of its own, that shares no formula of a derivative with the program.
+ * The half vector as a function of where three vertices lie, in 113 bits of mantissa, and its derivatives by
+ * differences: an implementation of its own, that shares no formula of a derivative with the program.
  */
 #ifndef TESTS_WORKER_HALFVEC_QUAD_H
 #define TESTS_WORKER_HALFVEC_QUAD_H
@@ -95,7 +95,8 @@ struct quad_place {
 	qvec p, s, t, n;
 };
 
-/* dp/du of a triangle. Without uv: (3, -6, 2) / 7 carried along by the shortest rotation from (2, 3, 6) / 7 to the normal. */
+/* dp/du of a triangle. Without uv: (3, -6, 2) / 7 carried along by the shortest rotation from (2, 3, 6) / 7 to the
+ * normal. */
 static inline qvec quad_along(const struct quad_vertex *v)
 {
 	qvec from = {(quad)2 / 7, (quad)3 / 7, (quad)6 / 7}, axis = {(quad)3 / 7, (quad)-6 / 7, (quad)2 / 7};
@@ -134,7 +135,8 @@ static inline struct quad_place quad_at(const struct quad_vertex *v, quad a, qua
 		/* move = c1 e1 + c2 e2 */
 		qvec move = q_sub(r.p, v->p), area = q_cross(v->e1, v->e2);
 		quad inverse = 1 / q_dot(area, area);
-		quad b1 = v->b1 + inverse * q_dot(q_cross(move, v->e2), area), b2 = v->b2 + inverse * q_dot(q_cross(v->e1, move), area);
+		quad b1 = v->b1 + inverse * q_dot(q_cross(move, v->e2), area),
+		     b2 = v->b2 + inverse * q_dot(q_cross(v->e1, move), area);
 		r.n = q_unit(area);
 		if (v->smooth) {
 			qvec m = q_madd(q_madd(q_scale(1 - b1 - b2, v->normal[0]), b1, v->normal[1]), b2, v->normal[2]);
@@ -274,7 +276,8 @@ static inline struct quad_problem quad_problem_shaken(const struct quad_problem 
 	struct quad_problem r = *q;
 	for (int k = 0; k < 3; k++) {
 		struct quad_vertex *v = &r.v[k];
-		qvec *vectors[] = {&v->p, &v->e1, &v->e2, &v->normal[0], &v->normal[1], &v->normal[2], &v->center, &v->axis};
+		qvec *vectors[] = {&v->p,	  &v->e1,	 &v->e2,     &v->normal[0],
+				   &v->normal[1], &v->normal[2], &v->center, &v->axis};
 		for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
 			*vectors[i] = q_shaken(*vectors[i], d);
 		v->b1 = quad_shaken(v->b1, d);

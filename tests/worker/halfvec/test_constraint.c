@@ -1,10 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A, B, C and h against differences of the half vector in 113 bits (quad.h): error at most max(1e-12, 100 eps x condition),
- * the condition found by shaking every number of the problem by a rounding in extended precision; and at most 1e-9 wherever
- * the condition is below 1e4. Relative to the largest entry of each matrix. HSLT_TEST_ROWS=1 prints one row a case.
+ * A, B, C and h against differences of the half vector in 113 bits (quad.h): error at most max(1e-12, 100 eps x
+ * condition), the condition found by shaking every number of the problem by a rounding in extended precision; and at
+ * most 1e-9 wherever the condition is below 1e4. Relative to the largest entry of each matrix. HSLT_TEST_ROWS=1 prints
+ * one row a case.
  *
- * The chain identity ties all of them together: prod G / |det dh/dx| = G(x_0, x_1) |det dx_1/dx_k| prod |d omega_j / d h_j|.
+ * The chain identity ties all of them together: prod G / |det dh/dx| = G(x_0, x_1) |det dx_1/dx_k| prod |d omega_j / d
+ * h_j|.
  */
 #include "tests/worker/halfvec/quad.h"
 
@@ -22,13 +24,13 @@ enum { MATCHED = -1 }; /* as eta */
 struct corner {
 	const char *name;
 	enum inner inner;
-	double eta[2];       /* n_o / n_i, uniform between them; 0: reflection */
-	double slope[2];     /* of h, log-uniform between them */
-	double bent;         /* shading from geometric normal, about */
-	double bend;         /* |dn| per length */
+	double eta[2];	 /* n_o / n_i, uniform between them; 0: reflection */
+	double slope[2]; /* of h, log-uniform between them */
+	double bent;	 /* shading from geometric normal, about */
+	double bend;	 /* |dn| per length */
 	enum end light, camera;
 	enum hand_uv uv;
-	double critical;     /* 1 - sin(angle) / sin(critical angle) where not 0 */
+	double critical; /* 1 - sin(angle) / sin(critical angle) where not 0 */
 };
 
 static const struct corner corners[] = {
@@ -38,8 +40,26 @@ static const struct corner corners[] = {
 	{"reflection, degenerate uv", SMOOTH, {0}, {1e-3, 1}, 0.35, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV_DEGENERATE, 0},
 	{"reflection, spheres", BALL, {0}, {1e-3, 1}, 0, 0, ON_BALL, ON_BALL, HAND_UV, 0},
 	{"reflection, inside a sphere", BALL_INVERTED, {0}, {1e-3, 1}, 0, 0, ON_BALL, ON_TRIANGLE, HAND_UV, 0},
-	{"into glass, interpolated normals", SMOOTH, {1.5, 1.5}, {1e-3, 1}, 0.35, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
-	{"out of glass, interpolated normals", SMOOTH, {1 / 1.5, 1 / 1.5}, {1e-3, 1}, 0.35, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
+	{"into glass, interpolated normals",
+	 SMOOTH,
+	 {1.5, 1.5},
+	 {1e-3, 1},
+	 0.35,
+	 1,
+	 ON_TRIANGLE,
+	 ON_TRIANGLE,
+	 HAND_UV,
+	 0},
+	{"out of glass, interpolated normals",
+	 SMOOTH,
+	 {1 / 1.5, 1 / 1.5},
+	 {1e-3, 1},
+	 0.35,
+	 1,
+	 ON_TRIANGLE,
+	 ON_TRIANGLE,
+	 HAND_UV,
+	 0},
 	{"into a glass sphere", BALL, {1.5, 1.5}, {1e-3, 1}, 0, 0, ON_TRIANGLE, ON_BALL, HAND_UV, 0},
 	{"out of a glass sphere", BALL_INVERTED, {1 / 1.5, 1 / 1.5}, {1e-3, 1}, 0, 0, ON_BALL, ON_TRIANGLE, HAND_UV, 0},
 	{"matched, flat", FLAT, {MATCHED}, {1e-3, 1}, 0, 0, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
@@ -53,12 +73,39 @@ static const struct corner corners[] = {
 	{"grazing, |h| to 1e4", SMOOTH, {0}, {1e2, 1e4}, 0.2, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
 	{"grazing sphere, |h| to 1e4", BALL, {0}, {1e2, 1e4}, 0, 0, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
 	{"eta 1 + 1e-6", SMOOTH, {1 + 1e-6, 1 + 1e-6}, {1e-3, 1}, 0.2, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
-	{"eta 1 + 1e-6, |h| to 900", SMOOTH, {1 + 1e-6, 1 + 1e-6}, {10, 900}, 0.2, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
+	{"eta 1 + 1e-6, |h| to 900",
+	 SMOOTH,
+	 {1 + 1e-6, 1 + 1e-6},
+	 {10, 900},
+	 0.2,
+	 1,
+	 ON_TRIANGLE,
+	 ON_TRIANGLE,
+	 HAND_UV,
+	 0},
 	{"eta 1 - 1e-6", SMOOTH, {1 - 1e-6, 1 - 1e-6}, {1e-3, 1}, 0.2, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
 	{"eta 1 +- 1e-4", SMOOTH, {1 - 1e-4, 1 + 1e-4}, {1e-3, 10}, 0.2, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
 	{"eta 1 +- 1e-2", BALL, {1 - 1e-2, 1 + 1e-2}, {1e-3, 10}, 0, 0, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
-	{"near total reflection, 1e-3", SMOOTH, {1 / 1.5, 1 / 1.5}, {1e-3, 1}, 0.2, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 1e-3},
-	{"near total reflection, 1e-8", SMOOTH, {1 / 1.5, 1 / 1.5}, {1e-3, 1}, 0.2, 1, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 1e-8},
+	{"near total reflection, 1e-3",
+	 SMOOTH,
+	 {1 / 1.5, 1 / 1.5},
+	 {1e-3, 1},
+	 0.2,
+	 1,
+	 ON_TRIANGLE,
+	 ON_TRIANGLE,
+	 HAND_UV,
+	 1e-3},
+	{"near total reflection, 1e-8",
+	 SMOOTH,
+	 {1 / 1.5, 1 / 1.5},
+	 {1e-3, 1},
+	 0.2,
+	 1,
+	 ON_TRIANGLE,
+	 ON_TRIANGLE,
+	 HAND_UV,
+	 1e-8},
 	{"strongly curved, radius 1e-3 edge", CURVED, {0}, {1e-3, 1}, 0.2, 1e3, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
 	{"nearly flat, radius 1e6 edge", CURVED, {1.5, 1.5}, {1e-3, 1}, 0, 1e-6, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
 	{"pole of a sphere, 1e-3", POLE, {0}, {1e-3, 1}, 0, 1e-3, ON_TRIANGLE, ON_TRIANGLE, HAND_UV, 0},
@@ -218,7 +265,8 @@ static void compare(const struct hand *h, struct dice *d, struct worst *w)
 	const double *actual[4] = {&k[1].a.xx, &k[1].b.xx, &k[1].c.xx, &k[1].h.x};
 	const quad *expected[4] = {m[0], m[1], m[2], hv};
 	for (int v = 0; v < 4; v++) {
-		double error = difference(expected[v], actual[v], v == 3 ? 2 : 4), bound = fmax(1e-12, 100 * 0x1p-53 * condition[v]);
+		double error = difference(expected[v], actual[v], v == 3 ? 2 : 4),
+		       bound = fmax(1e-12, 100 * 0x1p-53 * condition[v]);
 		if (!(error / bound <= w->ratio))
 			*w = (struct worst){error / bound, error, bound, condition[v], w->plain};
 		if (condition[v] < 1e4 && !(error <= w->plain))
@@ -247,14 +295,15 @@ static void test_corners(void **state)
 		good = good && ok;
 		worst_ratio = fmax(worst_ratio, w.ratio);
 		if (rows || !ok)
-			printf("constraint\t%s\t%.2e\t%.2e\t%s\n", corners[i].name, w.error, w.bound, ok ? "ok" : "FAILED");
+			printf("constraint\t%s\t%.2e\t%.2e\t%s\n", corners[i].name, w.error, w.bound,
+			       ok ? "ok" : "FAILED");
 	}
 	print_message("largest error over its bound: %.2g, %zu cases\n", worst_ratio, sizeof corners / sizeof *corners);
 	assert_true(good);
 }
 
-/* |d omega_i / d h_par| |cosine at the shading normal| of the way light comes from (see the design of bsdf_eval_halfvec): the
- * solid angle of i per area of slopes. */
+/* |d omega_i / d h_par| |cosine at the shading normal| of the way light comes from (see the design of
+ * bsdf_eval_halfvec): the solid angle of i per area of slopes. */
 static double solid_per_slopes(const struct hand *h, unsigned j)
 {
 	vec3 i = vec3_neg(h->x.edge[j - 1].w), o = h->x.edge[j].w, n = h->x.v[j].x.sh.n;
@@ -271,8 +320,8 @@ static double geometry(const struct hand *h, unsigned e)
 	return fabs(vec3_dot(h->x.v[e].x.ng, w) * vec3_dot(h->x.v[e + 1].x.ng, w)) / h->x.edge[e].distance2;
 }
 
-/* log of both sides; 1e-9 is what remains of double in the worst of some thousand random chains. The chain is followed from the
- * camera's end: x_start = x_k, first inner vertex x_{k-1}, far end x_0. */
+/* log of both sides; 1e-9 is what remains of double in the worst of some thousand random chains. The chain is followed
+ * from the camera's end: x_start = x_k, first inner vertex x_{k-1}, far end x_0. */
 static void test_identity(void **state)
 {
 	(void)state;
@@ -295,7 +344,8 @@ static void test_identity(void **state)
 				left += log(geometry(&h, e));
 			/* Cosines of G and of the projected solid angle are those of the geometric normal. */
 			for (unsigned j = 1; j < edges; j++)
-				right += log(fabs(vec3_dot(h.x.v[j].x.ng, h.x.edge[j - 1].w)) * solid_per_slopes(&h, j));
+				right +=
+					log(fabs(vec3_dot(h.x.v[j].x.ng, h.x.edge[j - 1].w)) * solid_per_slopes(&h, j));
 			worst[bent] = fmax(worst[bent], fabs(left - right));
 		}
 	}

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Step sizes: the singular values against one-sided Jacobi rotations in long double, ray differentials against rays through
- * neighbouring film points, the density against samples, and that nothing makes them infinite or 0.
+ * Step sizes: the singular values against one-sided Jacobi rotations in long double, ray differentials against rays
+ * through neighbouring film points, the density against samples, and that nothing makes them infinite or 0.
  */
 #include "tests/support/stats.h"
 #include "tests/worker/halfvec/dense.h"
@@ -31,8 +31,9 @@ static void steps(unsigned b, double pixels)
 static bool is_good(const struct halfvec_step *s, double limit)
 {
 	double turn = s->u.xx * s->u.yy - s->u.xy * s->u.yx;
-	return s->sigma[0] > 0 && s->sigma[1] > 0 && s->sigma[0] <= limit && s->sigma[1] <= limit && fabs(turn - 1) < 1e-15 * 8 &&
-	       fabs(s->u.xx - s->u.yy) < 1e-300 && isfinite(halfvec_step_log_pdf(s, (vec2){0.1 * limit, -0.2 * limit}));
+	return s->sigma[0] > 0 && s->sigma[1] > 0 && s->sigma[0] <= limit && s->sigma[1] <= limit &&
+	       fabs(turn - 1) < 1e-15 * 8 && fabs(s->u.xx - s->u.yy) < 1e-300 &&
+	       isfinite(halfvec_step_log_pdf(s, (vec2){0.1 * limit, -0.2 * limit}));
 }
 
 /* Singular values and the left vector of the larger one: columns of e^T made orthogonal by one rotation. */
@@ -46,7 +47,8 @@ static void jacobi(mat2 e, long double s[2], long double left[2])
 		t = copysignl(1, zeta) / (fabsl(zeta) + sqrtl(1 + zeta * zeta));
 		c = 1 / sqrtl(1 + t * t);
 	}
-	long double n = c * t, p[2] = {c * a[0] - n * b[0], c * a[1] - n * b[1]}, q[2] = {n * a[0] + c * b[0], n * a[1] + c * b[1]};
+	long double n = c * t, p[2] = {c * a[0] - n * b[0], c * a[1] - n * b[1]},
+		    q[2] = {n * a[0] + c * b[0], n * a[1] + c * b[1]};
 	long double lp = sqrtl(p[0] * p[0] + p[1] * p[1]), lq = sqrtl(q[0] * q[0] + q[1] * q[1]);
 	bool first = lp >= lq;
 	s[0] = first ? lp : lq;
@@ -77,7 +79,8 @@ static void test_singular_values(void **state)
 		double across = (double)fabsl(u[0] * r.u.yx - u[1] * r.u.xx);
 		worst[2] = fmax(worst[2], across * (1 - ratio * ratio));
 	}
-	print_message("larger %.1e, smaller %.1e / (ratio), direction %.1e / (1 - ratio^2)\n", worst[0], worst[1], worst[2]);
+	print_message("larger %.1e, smaller %.1e / (ratio), direction %.1e / (1 - ratio^2)\n", worst[0], worst[1],
+		      worst[2]);
 	assert_true(worst[0] < 1e-15 && worst[1] < 2e-15 && worst[2] < 2e-15);
 	/* Clipped after that, each by itself, at both ends. */
 	struct halfvec_step r = halfvec_step_of((mat2){3, 0, 0, 0.25}, 2, 1);
@@ -125,7 +128,8 @@ static vec2 seen_half(double x, double y)
 	return halfvec_of(&moved.x, 1);
 }
 
-/* Central differences of a tenth of a pixel, extrapolated once: 1e-6 of the largest entry is far above what they leave. */
+/* Central differences of a tenth of a pixel, extrapolated once: 1e-6 of the largest entry is far above what they leave.
+ */
 static void test_differentials(void **state)
 {
 	(void)state;
@@ -152,7 +156,8 @@ static void test_differentials(void **state)
 		steps(2, pixels);
 		double s0 = step[1].sigma[0] / pixels, s1 = step[1].sigma[1] / pixels;
 		mat2 u = step[1].u, us = {u.xx * s0, u.xy * s1, u.yx * s0, u.yy * s1};
-		mat2 made_of = mat2_mul(us, (mat2){us.xx, us.yx, us.xy, us.yy}), expected = mat2_mul(e, (mat2){e.xx, e.yx, e.xy, e.yy});
+		mat2 made_of = mat2_mul(us, (mat2){us.xx, us.yx, us.xy, us.yy}),
+		     expected = mat2_mul(e, (mat2){e.xx, e.yx, e.xy, e.yy});
 		worst = fmax(worst, mat2_largest(mat2_sub(made_of, expected)) / mat2_largest(expected));
 	}
 	print_message("against neighbouring rays: %.1e\n", worst);
@@ -189,7 +194,8 @@ static void test_shares(void **state)
 		const double pixels = 1e-5;
 		steps(edges, pixels);
 		/* |det|: of J by the solid angle of a pixel, of D from the inverse. */
-		double j = h.x.edge[edges - 1].distance2 / fabs(vec3_dot(h.x.v[edges - 1].x.ng, h.x.edge[edges - 1].w)) /
+		double j = h.x.edge[edges - 1].distance2 /
+			   fabs(vec3_dot(h.x.v[edges - 1].x.ng, h.x.edge[edges - 1].w)) /
 			   camera_jac_film_from_solid(&h.w.camera, vec3_neg(h.x.edge[edges - 1].w));
 		for (unsigned v = 1; v < edges; v++) {
 			if (h.x.v[v].delta) {
@@ -197,7 +203,8 @@ static void test_shares(void **state)
 				continue;
 			}
 			unsigned r = 2 * (edges - 2), s = 2 * (v - 1);
-			double det = (double)(dense.inverse[r][s] * dense.inverse[r + 1][s + 1] - dense.inverse[r][s + 1] * dense.inverse[r + 1][s]);
+			double det = (double)(dense.inverse[r][s] * dense.inverse[r + 1][s + 1] -
+					      dense.inverse[r][s + 1] * dense.inverse[r + 1][s]);
 			double share = pixels * fmin(h.bsdf[v].alpha, 1) / sum;
 			double expected = share * share * j / fabs(det), limit = fmin(h.bsdf[v].alpha, 1) / sqrt(M_PI);
 			assert_true(is_good(&step[v], limit));
@@ -208,7 +215,8 @@ static void test_shares(void **state)
 		steps(edges - 1, pixels);
 		for (unsigned v = 1; v + 1 < edges; v++)
 			if (!h.x.v[v].delta)
-				assert_true(step[v].u.xx == 1 && step[v].u.xy == 0 && step[v].sigma[0] == fmin(h.bsdf[v].alpha, 1) / sqrt(M_PI) &&
+				assert_true(step[v].u.xx == 1 && step[v].u.xy == 0 &&
+					    step[v].sigma[0] == fmin(h.bsdf[v].alpha, 1) / sqrt(M_PI) &&
 					    step[v].sigma[1] == step[v].sigma[0]);
 	}
 	print_message("area of the step over its share: %.1e\n", worst);
@@ -254,8 +262,8 @@ static void test_extremes(void **state)
 	}
 }
 
-/* Pearson's test of where steps fall, 200,000 over 18 x 18 cells and what lies beyond; level 1e-6. A sigma that is off by 2 %
- * is found with a probability above 99.9 % (noncentrality 4 N 0.02^2 = 320 at 324 degrees). */
+/* Pearson's test of where steps fall, 200,000 over 18 x 18 cells and what lies beyond; level 1e-6. A sigma that is off
+ * by 2 % is found with a probability above 99.9 % (noncentrality 4 N 0.02^2 = 320 at 324 degrees). */
 static void test_density(void **state)
 {
 	(void)state;
@@ -292,7 +300,8 @@ static void test_density(void **state)
 			observed[inside ? (int)y * SIDE + (int)x : CELLS - 1]++;
 		}
 		double p = stats_counts_p(observed, expected, CELLS);
-		print_message("sigma %.4g %.4g: p = %.3g, %.0f expected beyond\n", s.sigma[0], s.sigma[1], p, expected[CELLS - 1]);
+		print_message("sigma %.4g %.4g: p = %.3g, %.0f expected beyond\n", s.sigma[0], s.sigma[1], p,
+			      expected[CELLS - 1]);
 		assert_true(p > 1e-6);
 	}
 }
@@ -300,10 +309,8 @@ static void test_density(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_singular_values),
-		cmocka_unit_test(test_differentials),
-		cmocka_unit_test(test_shares),
-		cmocka_unit_test(test_extremes),
+		cmocka_unit_test(test_singular_values), cmocka_unit_test(test_differentials),
+		cmocka_unit_test(test_shares),		cmocka_unit_test(test_extremes),
 		cmocka_unit_test(test_density),
 	};
 	return cmocka_run_group_tests_name("stepsize", tests, NULL, NULL);

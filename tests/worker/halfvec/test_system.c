@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The block tridiagonal system against dense elimination in long double, and against the paths themselves: ends and half
- * vectors moved by a little, the path solved again in 113 bits. Error at most max(1e-12, 100 eps x condition), each condition
- * in long double; in float 100 times its eps x condition, where that is below 0.1. HSLT_TEST_ROWS=1 prints one row a case.
+ * The block tridiagonal system against dense elimination in long double, and against the paths themselves: ends and
+ * half vectors moved by a little, the path solved again in 113 bits. Error at most max(1e-12, 100 eps x condition),
+ * each condition in long double; in float 100 times its eps x condition, where that is below 0.1. HSLT_TEST_ROWS=1
+ * prints one row a case.
  */
 #include "tests/worker/halfvec/dense.h"
 #include "tests/worker/halfvec/quad.h"
@@ -176,9 +177,11 @@ static void compare_differentials(const mat2 *dj, unsigned b, unsigned c, struct
 			long double bound = 0;
 			for (unsigned p = 0; p < dense.n; p++)
 				for (unsigned q = 0; q < dense.n; q++)
-					bound += fabsl(dense.inverse[r][p]) * dense.size[p][q] * fabsl(dense.inverse[q][s]);
+					bound += fabsl(dense.inverse[r][p]) * dense.size[p][q] *
+						 fabsl(dense.inverse[q][s]);
 			long double expected = dense.inverse[r][s];
-			note(w, (double)(fabsl(expected - (long double)actual[i]) / fabsl(expected)), (double)(bound / fabsl(expected)));
+			note(w, (double)(fabsl(expected - (long double)actual[i]) / fabsl(expected)),
+			     (double)(bound / fabsl(expected)));
 		}
 	}
 }
@@ -191,7 +194,9 @@ static double long_log_transfer(unsigned b, unsigned c, double *condition)
 		mat2 a = k[j].a;
 		long double det = (long double)a.xx * (long double)a.yy - (long double)a.xy * (long double)a.yx;
 		sum += logl(fabsl(det));
-		*condition += (double)((fabsl((long double)a.xx * (long double)a.yy) + fabsl((long double)a.xy * (long double)a.yx)) / fabsl(det));
+		*condition += (double)((fabsl((long double)a.xx * (long double)a.yy) +
+					fabsl((long double)a.xy * (long double)a.yx)) /
+				       fabsl(det));
 	}
 	return (double)sum;
 }
@@ -243,12 +248,14 @@ static void compare_all(void)
 		size_t pivoted = 0, refused = 0, count = dice_count(kinds[i].most > 12 ? 10 : 300);
 		for (size_t s = 0; s < count; s++) {
 			unsigned inside = kinds[i].least + dice_below(&d, kinds[i].most - kinds[i].least + 1);
-			unsigned c = dice_below(&d, (uint32_t)(FULL_PATH_MAX_VERTICES - 1 - inside)), b = c + inside + 1;
+			unsigned c = dice_below(&d, (uint32_t)(FULL_PATH_MAX_VERTICES - 1 - inside)),
+				 b = c + inside + 1;
 			make_system(&kinds[i], &d, b, c);
 			pivoted += compare_system(&d, b, c, &w, &refused);
 		}
 		good = row(kinds[i].name, &w) && good;
-		print_message("%s: %.2g of the bound, %zu of %zu with pivots, %zu refused\n", kinds[i].name, w.ratio, pivoted, count, refused);
+		print_message("%s: %.2g of the bound, %zu of %zu with pivots, %zu refused\n", kinds[i].name, w.ratio,
+			      pivoted, count, refused);
 		assert_true(refused <= count / 10 && w.ratio > 1e-4);
 		if (solver == &constraint_single)
 			continue;
@@ -291,8 +298,9 @@ static void test_singular(void **state)
 		assert_int_equal(constraint_double.differentials(k, b, c, dj), CONSTRAINT_SINGULAR);
 		/* A little off it is not. */
 		for (unsigned j = c + 1; j < b; j++)
-			k[j].b = (mat2){k[j].b.xx * (1 + 1e-6 * dice_throw(&d)), k[j].b.xy * (1 - 1e-6 * dice_throw(&d)), k[j].b.yx,
-					k[j].b.yy * (1 - 1e-6 * dice_throw(&d))};
+			k[j].b =
+				(mat2){k[j].b.xx * (1 + 1e-6 * dice_throw(&d)), k[j].b.xy * (1 - 1e-6 * dice_throw(&d)),
+				       k[j].b.yx, k[j].b.yy * (1 - 1e-6 * dice_throw(&d))};
 		assert_int_equal(constraint_double.factor(k, b, c, &system_), CONSTRAINT_OK);
 	}
 }
@@ -319,7 +327,8 @@ static void extremes_of(const struct constraint_solver *solver_, const double *v
 			solver_->solve(k, &system_, dh, dx);
 			assert_true(isfinite(system_.log_det) && !isnan(system_.log_transfer));
 			for (unsigned j = 1; j < b; j++)
-				assert_true(solver_ == &constraint_single ? !isnan(dx[j].x + fabs(dx[j].y)) : isfinite(dx[j].x) && isfinite(dx[j].y));
+				assert_true(solver_ == &constraint_single ? !isnan(dx[j].x + fabs(dx[j].y))
+									  : isfinite(dx[j].x) && isfinite(dx[j].y));
 		}
 		if (solver_->differentials(k, b, 0, dj) == CONSTRAINT_OK)
 			for (unsigned j = 1; j < b; j++)
@@ -365,8 +374,8 @@ static void test_units(void **state)
 }
 
 /* Half vectors of a chain of triangles whose vertices were moved by `offset`. */
-static void chain_halves(const struct quad_vertex *v, const struct quad_problem *q, const quad offset[][2], unsigned edges,
-			 quad h[][2])
+static void chain_halves(const struct quad_vertex *v, const struct quad_problem *q, const quad offset[][2],
+			 unsigned edges, quad h[][2])
 {
 	struct quad_place p[FULL_PATH_MAX_VERTICES];
 	for (unsigned j = 0; j <= edges; j++)
@@ -376,8 +385,8 @@ static void chain_halves(const struct quad_vertex *v, const struct quad_problem 
 }
 
 /* Newton's iteration with the matrix that stays: so little off it gains ten digits a turn. */
-static void solve_chain(const struct quad_vertex *v, const struct quad_problem *q, const quad target[][2], quad offset[][2],
-			unsigned edges)
+static void solve_chain(const struct quad_vertex *v, const struct quad_problem *q, const quad target[][2],
+			quad offset[][2], unsigned edges)
 {
 	quad h[FULL_PATH_MAX_VERTICES][2];
 	vec2 dh[FULL_PATH_MAX_VERTICES], dx[FULL_PATH_MAX_VERTICES];
@@ -390,7 +399,8 @@ static void solve_chain(const struct quad_vertex *v, const struct quad_problem *
 		if (scale == 0)
 			return;
 		for (unsigned j = 1; j < edges; j++)
-			dh[j] = (vec2){(double)((target[j][0] - h[j][0]) / (quad)scale), (double)((target[j][1] - h[j][1]) / (quad)scale)};
+			dh[j] = (vec2){(double)((target[j][0] - h[j][0]) / (quad)scale),
+				       (double)((target[j][1] - h[j][1]) / (quad)scale)};
 		constraint_double.solve(k, &system_, dh, dx);
 		for (unsigned j = 1; j < edges; j++) {
 			offset[j][0] += (quad)scale * (quad)dx[j].x;
@@ -414,7 +424,8 @@ static vec2 resolved(const struct hand *h, unsigned what, int i)
 		q[j] = quad_problem_of(h, j);
 	chain_halves(v, q, still, edges, base);
 	for (int side = 0; side < 2; side++) {
-		quad offset[FULL_PATH_MAX_VERTICES][2] = {{0, 0}}, target[FULL_PATH_MAX_VERTICES][2], move = side ? -step : step;
+		quad offset[FULL_PATH_MAX_VERTICES][2] = {{0, 0}}, target[FULL_PATH_MAX_VERTICES][2],
+		     move = side ? -step : step;
 		memcpy(target, base, sizeof target);
 		if (what == 0)
 			offset[0][i] = move;
@@ -424,7 +435,8 @@ static vec2 resolved(const struct hand *h, unsigned what, int i)
 		result[side][0] = offset[edges - 1][0];
 		result[side][1] = offset[edges - 1][1];
 	}
-	return (vec2){(double)((result[0][0] - result[1][0]) / (2 * (quad)step)), (double)((result[0][1] - result[1][1]) / (2 * (quad)step))};
+	return (vec2){(double)((result[0][0] - result[1][0]) / (2 * (quad)step)),
+		      (double)((result[0][1] - result[1][1]) / (2 * (quad)step))};
 }
 
 /* The differences are exact to 1e-20 and the paths' condition is below 1e4: 100 eps x that. */
@@ -454,22 +466,21 @@ static void test_solved_again(void **state)
 		assert_int_equal(constraint_double.differentials(k, edges, 0, dj), CONSTRAINT_OK);
 		for (unsigned j = 1; j < edges; j++) {
 			mat2 e = mat2_of_columns(resolved(&h, j, 0), resolved(&h, j, 1));
-			worst_differential = fmax(worst_differential, mat2_largest(mat2_sub(e, dj[j])) / mat2_largest(e));
+			worst_differential =
+				fmax(worst_differential, mat2_largest(mat2_sub(e, dj[j])) / mat2_largest(e));
 		}
 	}
-	print_message("solved again: log T %.1e, D %.1e; %zu with pivots\n", worst_transfer, worst_differential, pivoted);
+	print_message("solved again: log T %.1e, D %.1e; %zu with pivots\n", worst_transfer, worst_differential,
+		      pivoted);
 	assert_true(worst_transfer < 1e-10 && worst_differential < 1e-10);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_dense),
-		cmocka_unit_test(test_dense_in_float),
-		cmocka_unit_test(test_singular),
-		cmocka_unit_test(test_extremes),
-		cmocka_unit_test(test_units),
-		cmocka_unit_test(test_solved_again),
+		cmocka_unit_test(test_dense),	 cmocka_unit_test(test_dense_in_float),
+		cmocka_unit_test(test_singular), cmocka_unit_test(test_extremes),
+		cmocka_unit_test(test_units),	 cmocka_unit_test(test_solved_again),
 	};
 	return cmocka_run_group_tests_name("system", tests, NULL, NULL);
 }

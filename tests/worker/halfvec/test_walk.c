@@ -1,11 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Walks to random half vectors in worlds that are hard in different ways. Where a walk says that it arrived, that is checked
- * from the outside: half vectors are worked out here in long double from the shapes' own vertices, positions must lie on the
- * primitives they name, no edge may be occluded, both ends must be as they were bit by bit. From there a second walk to the
- * old half vectors must find the old vertices, a walk to where the path already is must stay there, and half the tolerance
- * must lead to the same place.
- * Deterministic: seeds are the names of the cases. HSLT_TEST_ROWS=1 prints the rates.
+ * Walks to random half vectors in worlds that are hard in different ways. Where a walk says that it arrived, that is
+ * checked from the outside: half vectors are worked out here in long double from the shapes' own vertices, positions
+ * must lie on the primitives they name, no edge may be occluded, both ends must be as they were bit by bit. From there
+ * a second walk to the old half vectors must find the old vertices, a walk to where the path already is must stay
+ * there, and half the tolerance must lead to the same place. Deterministic: seeds are the names of the cases.
+ * HSLT_TEST_ROWS=1 prints the rates.
  */
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
@@ -64,7 +64,8 @@ static void shape_says(const struct world *w, const struct path_vertex *v, wide 
 		*n = wide_add((wide){0, 0, 0}, (long double)g->normal_sign, out);
 	} else {
 		const uint32_t *i = g->index[v->x.prim.prim];
-		long double b[3] = {1 - (long double)v->x.b1 - (long double)v->x.b2, (long double)v->x.b1, (long double)v->x.b2};
+		long double b[3] = {1 - (long double)v->x.b1 - (long double)v->x.b2, (long double)v->x.b1,
+				    (long double)v->x.b2};
 		assert_true(v->x.b1 >= 0 && v->x.b2 >= 0 && v->x.b1 + v->x.b2 <= 1 + 1e-15);
 		wide q[3], m = {0, 0, 0};
 		*p = m;
@@ -133,14 +134,17 @@ struct tally {
 	size_t walks, arrived, strict, returned, ends[WALK_ITERATIONS + 1], back_ends[WALK_ITERATIONS + 1];
 	size_t stays, left, again, elsewhere; /* walks to where the path is; walks repeated with half the tolerance */
 	uint64_t iterations, rays, occluded, seams;
-	double worst;      /* residual over tolerance */
+	double worst;	   /* residual over tolerance */
 	double worst_stay; /* how far a walk to where the path is went */
 };
 
 static struct path_context context_of(const struct world *w, uint64_t *counters)
 {
-	return (struct path_context){.w = w, .window = {-1, -1, w->settings.width + 2.0, w->settings.height + 2.0}, .min_depth = 1,
-				     .max_depth = DEPTH, .counters = counters};
+	return (struct path_context){.w = w,
+				     .window = {-1, -1, w->settings.width + 2.0, w->settings.height + 2.0},
+				     .min_depth = 1,
+				     .max_depth = DEPTH,
+				     .counters = counters};
 }
 
 /* The camera's sub-path as a whole path. false: too short to have inner vertices. */
@@ -210,8 +214,8 @@ static void check_residuals(const struct world *w, const struct full_path_path *
 	}
 }
 
-static void check_arrival(struct path_context *c, const struct full_path_path *x, const struct full_path_path *y, unsigned b, unsigned end,
-			  const struct walk_target *target, double scale, struct tally *t)
+static void check_arrival(struct path_context *c, const struct full_path_path *x, const struct full_path_path *y,
+			  unsigned b, unsigned end, const struct walk_target *target, double scale, struct tally *t)
 {
 	check_residuals(c->w, y, b, end, target, scale, t);
 	for (unsigned j = end + 1; j < b; j++) {
@@ -233,8 +237,8 @@ static struct walk_scratch s;
 static struct accuracy_settings accuracy;
 
 /* Back from y to x: x_b and the half vectors of x. */
-static void walk_back(struct path_context *c, const struct full_path_path *x, struct full_path_path *y, unsigned b, unsigned end,
-		      struct walk_target *target, const struct constraint *k, struct tally *t)
+static void walk_back(struct path_context *c, const struct full_path_path *x, struct full_path_path *y, unsigned b,
+		      unsigned end, struct walk_target *target, const struct constraint *k, struct tally *t)
 {
 	static struct full_path_path z;
 	z = *y;
@@ -250,7 +254,8 @@ static void walk_back(struct path_context *c, const struct full_path_path *x, st
 	double moved = 0, off = 0;
 	bool each = true;
 	for (unsigned j = end + 1; j < b; j++) {
-		double m = vec3_length(vec3_sub(y->v[j].x.p, x->v[j].x.p)), o = vec3_length(vec3_sub(z.v[j].x.p, x->v[j].x.p));
+		double m = vec3_length(vec3_sub(y->v[j].x.p, x->v[j].x.p)),
+		       o = vec3_length(vec3_sub(z.v[j].x.p, x->v[j].x.p));
 		moved = fmax(moved, m);
 		off = fmax(off, o);
 		each = each && o <= 1e-3 * m;
@@ -269,8 +274,8 @@ static double apart(const struct full_path_path *x, const struct full_path_path 
 }
 
 /* To where it is: one iteration, which moves it by rounding alone. */
-static void walk_nowhere(struct path_context *c, const struct full_path_path *x, unsigned b, unsigned end, struct walk_target *target,
-			 const struct constraint *k, struct tally *t)
+static void walk_nowhere(struct path_context *c, const struct full_path_path *x, unsigned b, unsigned end,
+			 struct walk_target *target, const struct constraint *k, struct tally *t)
 {
 	static struct full_path_path y;
 	y = *x;
@@ -284,16 +289,18 @@ static void walk_nowhere(struct path_context *c, const struct full_path_path *x,
 		t->worst_stay = fmax(t->worst_stay, apart(x, &y, b, end));
 }
 
-/* From the same start with half the tolerance: to the same place y, as far as the whole tolerance says where that is. */
-static void walk_again(struct path_context *c, const struct full_path_path *start, const struct full_path_path *y, unsigned b, unsigned end,
-		       const struct walk_target *target, struct tally *t)
+/* From the same start with half the tolerance: to the same place y, as far as the whole tolerance says where that is.
+ */
+static void walk_again(struct path_context *c, const struct full_path_path *start, const struct full_path_path *y,
+		       unsigned b, unsigned end, const struct walk_target *target, struct tally *t)
 {
 	static struct full_path_path z;
 	z = *start;
 	struct walk_limits limits = walk_limits_of(&accuracy);
 	limits.scale = 0.5;
 	t->again++;
-	if (halfvec_walk(c, &z, b, end, target, false, &limits, &s) != WALK_OK || apart(&z, y, b, end) > 0.01 * apart(start, y, b, end))
+	if (halfvec_walk(c, &z, b, end, target, false, &limits, &s) != WALK_OK ||
+	    apart(&z, y, b, end) > 0.01 * apart(start, y, b, end))
 		t->elsewhere++;
 	else
 		check_residuals(c->w, &z, b, end, target, limits.scale, t);
@@ -311,7 +318,8 @@ static void walk_once(struct path_context *c, struct dice *d, const struct full_
 	for (unsigned j = end + 1; j < b; j++) {
 		double step = step_of(x, k, j);
 		all += step;
-		target[j].h = x->v[j].delta ? (vec2){0, 0} : (vec2){k[j].h.x + step * gauss(d), k[j].h.y + step * gauss(d)};
+		target[j].h =
+			x->v[j].delta ? (vec2){0, 0} : (vec2){k[j].h.x + step * gauss(d), k[j].h.y + step * gauss(d)};
 		target[j].tolerance = x->v[j].delta ? 1e-9 : 1e-3 * fmin(step, x->v[j].bsdf->alpha);
 	}
 	if (b < x->edges)
@@ -353,15 +361,16 @@ static void print_row(const char *name, const struct tally *t, double arrive, do
 	       "%.3f tolerances; from where it is %zu of %zu leave, by %.1e at most; by half the tolerance %zu of %zu come elsewhere; missed %zu, "
 	       "blocked %zu, mode %zu, singular %zu, diverged %zu, iterations %zu; back: %zu %zu %zu %zu %zu %zu; seams %llu\t"
 	       "%.1f %%, %.1f %%, 1.01\tok\n",
-	       name, t->walks, 100 * ok / n, 100 * (double)t->returned / ok, 100 * (double)t->strict / ok, (double)t->iterations / n,
-	       (double)t->rays / n, t->worst, t->left, t->stays, t->worst_stay, t->elsewhere, t->again, t->ends[1], t->ends[2], t->ends[3],
-	       t->ends[4], t->ends[5], t->ends[6], t->back_ends[1], t->back_ends[2], t->back_ends[3], t->back_ends[4], t->back_ends[5],
-	       t->back_ends[6], (unsigned long long)t->seams, 100 * arrive, 100 * come_back);
+	       name, t->walks, 100 * ok / n, 100 * (double)t->returned / ok, 100 * (double)t->strict / ok,
+	       (double)t->iterations / n, (double)t->rays / n, t->worst, t->left, t->stays, t->worst_stay, t->elsewhere,
+	       t->again, t->ends[1], t->ends[2], t->ends[3], t->ends[4], t->ends[5], t->ends[6], t->back_ends[1],
+	       t->back_ends[2], t->back_ends[3], t->back_ends[4], t->back_ends[5], t->back_ends[6],
+	       (unsigned long long)t->seams, 100 * arrive, 100 * come_back);
 	fflush(stdout);
 }
 
-/* Not below what was measured when this was written by more than five standard errors and 0.3 %. A walk that goes on from a
- * refused trial's residual loses 0.4 to 2 % of its arrivals, and up to 3 % of its ways back. */
+/* Not below what was measured when this was written by more than five standard errors and 0.3 %. A walk that goes on
+ * from a refused trial's residual loses 0.4 to 2 % of its arrivals, and up to 3 % of its ways back. */
 static void check_rate(size_t hits, size_t of, double expected)
 {
 	double n = (double)of;
@@ -392,6 +401,7 @@ static struct tally walk_in(const char *name, struct world *w, double arrive, do
 	return t;
 }
 
+/* clang-format off */
 #define ROOM                                                                                                                    \
 	"<shape type='cube'><transform name='to_world'><scale value='3'/></transform><bsdf type='diffuse'>"                       \
 	"<float name='reflectance' value='.7'/></bsdf></shape>"
@@ -401,67 +411,89 @@ static struct tally walk_in(const char *name, struct world *w, double arrive, do
 #define FLOOR(bsdf)                                                                                                             \
 	"<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>"                        \
 	"<translate y='-1.1'/></transform>" bsdf "</shape>"
-#define BALL(x, y, z, bsdf)                                                                                                     \
-	"<shape type='sphere'><point name='center' x='" x "' y='" y "' z='" z "'/><float name='radius' value='.6'/>" bsdf "</shape>"
-#define METAL(alpha)                                                                                                            \
-	"<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='" alpha "'/></bsdf>"
+/* clang-format on */
+#define BALL(x, y, z, bsdf)                                                   \
+	"<shape type='sphere'><point name='center' x='" x "' y='" y "' z='" z \
+	"'/><float name='radius' value='.6'/>" bsdf "</shape>"
+#define METAL(alpha)                                                                                          \
+	"<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='" alpha \
+	"'/></bsdf>"
 #define GLASS(alpha) "<bsdf type='roughdielectric'><float name='alpha' value='" alpha "'/></bsdf>"
 #define SKY "<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
 
 static void test_spheres(void **state)
 {
 	(void)state;
-	walk_in("spheres", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.7", "-.5", "0", METAL(".1"))
-							BALL(".8", "-.5", "0", METAL(".02")) FLOOR(METAL(".2"))), 0.908, 0.999);
+	walk_in("spheres",
+		world_of_text(32, 32,
+			      SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.7", "-.5", "0", METAL(".1"))
+				      BALL(".8", "-.5", "0", METAL(".02")) FLOOR(METAL(".2"))),
+		0.908, 0.999);
 }
 
 static void test_rough_glass(void **state)
 {
 	(void)state;
-	walk_in("rough glass", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", GLASS(".1"))
-							BALL(".9", "-.5", "0", GLASS(".01")) FLOOR("<bsdf type='diffuse'/>")), 0.891, 0.996);
+	walk_in("rough glass",
+		world_of_text(32, 32,
+			      SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", GLASS(".1"))
+				      BALL(".9", "-.5", "0", GLASS(".01")) FLOOR("<bsdf type='diffuse'/>")),
+		0.891, 0.996);
 }
 
 static void test_smooth_glass(void **state)
 {
 	(void)state;
-	walk_in("smooth glass", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP
-							BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
-							BALL(".9", "-.5", "0", "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")
-							FLOOR(METAL(".1"))), 0.907, 0.998);
+	walk_in("smooth glass",
+		world_of_text(32, 32,
+			      SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
+				      BALL(".9", "-.5", "0",
+					   "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")
+					      FLOOR(METAL(".1"))),
+		0.907, 0.998);
 }
 
 static void test_sky(void **state)
 {
 	(void)state;
-	walk_in("sky", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") SKY BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
-						BALL(".9", "-.5", "0", METAL(".05")) FLOOR(METAL(".1"))), 0.909, 0.993);
+	walk_in("sky",
+		world_of_text(32, 32,
+			      SENSOR("0,0,2.9", "0,0,0") SKY BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'/>")
+				      BALL(".9", "-.5", "0", METAL(".05")) FLOOR(METAL(".1"))),
+		0.909, 0.993);
 }
 
 /* Half vectors of smooth glass of nearly the index around it carry the rounding of directions a million times. */
 static void test_nearly_matched(void **state)
 {
 	(void)state;
-	walk_in("nearly matched", world_of_text(32, 32, SENSOR("0,0,2.9", "0,0,0") ROOM LAMP
-						BALL("-.3", "-.2", ".3", "<bsdf type='dielectric'><float name='int_ior' value='1.000001'/>"
-									 "<float name='ext_ior' value='1'/></bsdf>")
-						BALL(".9", "-.5", "0", "<bsdf type='dielectric'><float name='int_ior' value='1.0001'/>"
-									"<float name='ext_ior' value='1'/></bsdf>")
-						BALL("0", "-.5", "-1", "<bsdf type='dielectric'><float name='int_ior' value='1.00000001'/>"
-									"<float name='ext_ior' value='1'/></bsdf>")
-						FLOOR(METAL(".1"))), 0.65, 0.983);
+	walk_in("nearly matched",
+		world_of_text(32, 32,
+			      SENSOR("0,0,2.9", "0,0,0") ROOM LAMP BALL(
+				      "-.3", "-.2", ".3",
+				      "<bsdf type='dielectric'><float name='int_ior' value='1.000001'/>"
+				      "<float name='ext_ior' value='1'/></bsdf>")
+				      BALL(".9", "-.5", "0",
+					   "<bsdf type='dielectric'><float name='int_ior' value='1.0001'/>"
+					   "<float name='ext_ior' value='1'/></bsdf>")
+					      BALL("0", "-.5", "-1",
+						   "<bsdf type='dielectric'><float name='int_ior' value='1.00000001'/>"
+						   "<float name='ext_ior' value='1'/></bsdf>") FLOOR(METAL(".1"))),
+		0.65, 0.983);
 }
 
 /* A pole of each sphere faces the camera, which sees little else. */
 static void test_poles(void **state)
 {
 	(void)state;
-	walk_in("poles", world_of_text(32, 32,
-						"<sensor type='perspective'><float name='fov' value='3'/><transform name='to_world'>"
-						"<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
-						"<integer name='width' value='32'/><integer name='height' value='32'/>"
-						"<rfilter type='box'/></film></sensor>" SKY BALL("0", "0", "0", GLASS(".05"))
-						BALL("0", "0", "-2", METAL(".05"))), 0.839, 0.989);
+	walk_in("poles",
+		world_of_text(32, 32,
+			      "<sensor type='perspective'><float name='fov' value='3'/><transform name='to_world'>"
+			      "<lookat origin='0,0,4' target='0,0,0' up='0,1,0'/></transform><film type='hdrfilm'>"
+			      "<integer name='width' value='32'/><integer name='height' value='32'/>"
+			      "<rfilter type='box'/></film></sensor>" SKY BALL("0", "0", "0", GLASS(".05"))
+				      BALL("0", "0", "-2", METAL(".05"))),
+		0.839, 0.989);
 }
 
 /* Bumps with interpolated normals, n x n squares, over [-2,2]^2. */
@@ -471,19 +503,24 @@ static struct world *bumpy_world(int n, const char *bsdf)
 	size_t at = 0;
 	for (int j = 0; j <= n; j++)
 		for (int i = 0; i <= n; i++) {
-			double x = 4.0 * i / n - 2, z = 4.0 * j / n - 2, nx = -0.2 * cos(4 * x) * cos(3 * z), nz = 0.15 * sin(4 * x) * sin(3 * z);
+			double x = 4.0 * i / n - 2, z = 4.0 * j / n - 2, nx = -0.2 * cos(4 * x) * cos(3 * z),
+			       nz = 0.15 * sin(4 * x) * sin(3 * z);
 			at += (size_t)snprintf(obj + at, sizeof obj - at, "v %.9g %.9g %.9g\nvn %.9g 1 %.9g\n", x,
 					       -1 + 0.05 * sin(4 * x) * cos(3 * z), z, nx, nz);
 		}
 	for (int j = 0; j < n; j++)
 		for (int i = 0; i < n; i++) {
 			int a = j * (n + 1) + i + 1, b = a + n + 1;
-			at += (size_t)snprintf(obj + at, sizeof obj - at, "f %d//%d %d//%d %d//%d\nf %d//%d %d//%d %d//%d\n", a, a, b, b, a + 1,
+			at += (size_t)snprintf(obj + at, sizeof obj - at,
+					       "f %d//%d %d//%d %d//%d\nf %d//%d %d//%d %d//%d\n", a, a, b, b, a + 1,
 					       a + 1, a + 1, a + 1, b, b, b + 1, b + 1);
 		}
 	assert_true(at + 1 < sizeof obj);
-	int m = snprintf(scene, sizeof scene, "<scene version='3.0.0'>" SENSOR("0,1,2.9", "0,-1,0") SKY LAMP
-			 "<shape type='obj'><string name='filename' value='bumps.obj'/>%s</shape>" BALL("0", "-.2", "0", METAL(".1")) "</scene>", bsdf);
+	int m = snprintf(scene, sizeof scene,
+			 "<scene version='3.0.0'>" SENSOR("0,1,2.9", "0,-1,0") SKY LAMP
+			 "<shape type='obj'><string name='filename' value='bumps.obj'/>%s</shape>" BALL(
+				 "0", "-.2", "0", METAL(".1")) "</scene>",
+			 bsdf);
 	assert_true(m > 0 && (size_t)m < sizeof scene);
 	const struct memory_file files[] = {{"bumps.xml", scene, (size_t)m}, {"bumps.obj", obj, at}, {NULL, NULL, 0}};
 	return world_of_files(32, 32, files);
@@ -520,8 +557,9 @@ int main(void)
 {
 	as_measured();
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_spheres),	     cmocka_unit_test(test_rough_glass), cmocka_unit_test(test_smooth_glass),
-		cmocka_unit_test(test_sky),	     cmocka_unit_test(test_poles),	 cmocka_unit_test(test_meshes),
+		cmocka_unit_test(test_spheres),	       cmocka_unit_test(test_rough_glass),
+		cmocka_unit_test(test_smooth_glass),   cmocka_unit_test(test_sky),
+		cmocka_unit_test(test_poles),	       cmocka_unit_test(test_meshes),
 		cmocka_unit_test(test_nearly_matched), cmocka_unit_test(test_in_float),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

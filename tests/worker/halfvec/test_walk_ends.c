@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Walks whose end is known beforehand: every failure by its name, an occluder of the same material that a walk which looked
- * only where its last ray ends would mistake for the light, foci where a pivot block or the whole matrix is singular.
- * Paths are laid by rays through given points of the scene. Deterministic.
+ * Walks whose end is known beforehand: every failure by its name, an occluder of the same material that a walk which
+ * looked only where its last ray ends would mistake for the light, foci where a pivot block or the whole matrix is
+ * singular. Paths are laid by rays through given points of the scene. Deterministic.
  */
 #include "tests/support/dice.h"
 #include "tests/support/worlds.h"
@@ -34,13 +34,16 @@ static void lay_path(const struct world *w, const vec3 *p, unsigned n)
 	memset(&x, 0, sizeof x);
 	x.edges = n - 1;
 	x.wl.grey = true;
-	x.v[n - 1] = (struct path_vertex){.kind = VERTEX_CAMERA, .emitter = -1, .x = {.p = in_world(w, p[0]), .prim = PRIM_NONE}};
+	x.v[n - 1] = (struct path_vertex){
+		.kind = VERTEX_CAMERA, .emitter = -1, .x = {.p = in_world(w, p[0]), .prim = PRIM_NONE}};
 	for (unsigned j = n - 1; j-- > 0;) {
 		struct path_vertex *from = &x.v[j + 1], *to = &x.v[j];
 		vec3 target = in_world(w, p[n - 1 - j]);
-		*to = (struct path_vertex){.kind = VERTEX_EMITTER, .x = {.p = target, .prim = PRIM_NONE}, .mode = BSDF_REFLECT};
+		*to = (struct path_vertex){
+			.kind = VERTEX_EMITTER, .x = {.p = target, .prim = PRIM_NONE}, .mode = BSDF_REFLECT};
 		if (j > 0)
-			assert_true(path_extend(&c, from, vec3_normalize(vec3_sub(target, from->x.p)), 0, INFINITY, to));
+			assert_true(
+				path_extend(&c, from, vec3_normalize(vec3_sub(target, from->x.p)), 0, INFINITY, to));
 		assert_true(full_path_join(&x, j));
 	}
 	for (unsigned j = 1; j + 1 < n; j++) {
@@ -73,13 +76,17 @@ static void ask_move(const struct world *w, vec3 d, vec2 *h)
 		h[j] = j == 2 ? mat2_apply(k[2].a, dx) : (vec2){0, 0};
 }
 
-#define MATERIAL(id) "<bsdf type='roughconductor' id='" id "'><string name='material' value='none'/><float name='alpha' value='.1'/></bsdf>"
+#define MATERIAL(id)                          \
+	"<bsdf type='roughconductor' id='" id \
+	"'><string name='material' value='none'/><float name='alpha' value='.1'/></bsdf>"
+/* clang-format off */
 #define FLOOR                                                                                                                  \
 	"<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/></transform>"              \
 	"<ref id='metal'/></shape>"
 #define BLOCK(x, y, z, r, material)                                                                                            \
 	"<shape type='sphere'><point name='center' x='" x "' y='" y "' z='" z "'/><float name='radius' value='" r "'/>"           \
 	"<ref id='" material "'/></shape>"
+/* clang-format on */
 
 static struct walk_limits normal;
 
@@ -88,9 +95,12 @@ static void test_occluder(void **state)
 {
 	(void)state;
 	for (int same = 0; same < 2; same++) {
-		struct world *w = same ? world_of_text(32, 32, SENSOR("0,1,3", "0,0,0") MATERIAL("metal") FLOOR BLOCK("0.1", "0.5", "-0.5", ".1", "metal"))
-				       : world_of_text(32, 32, SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other") FLOOR
-								       BLOCK("0.1", "0.5", "-0.5", ".1", "other"));
+		struct world *w = same ? world_of_text(32, 32,
+						       SENSOR("0,1,3", "0,0,0") MATERIAL("metal")
+							       FLOOR BLOCK("0.1", "0.5", "-0.5", ".1", "metal"))
+				       : world_of_text(32, 32,
+						       SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other")
+							       FLOOR BLOCK("0.1", "0.5", "-0.5", ".1", "other"));
 		lay_path(w, (vec3[]){{0, 1, 1}, {0.5, 0, 0}, {0, 1, -1}}, 3);
 		vec2 h[3];
 		/* To (0.2, 0, 0): the middle of the way to the light lies at the ball's centre. */
@@ -111,7 +121,9 @@ static void test_occluder(void **state)
 static void test_names(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(32, 32, SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other") FLOOR BLOCK("0", "-3", "0", "2.5", "other"));
+	struct world *w = world_of_text(32, 32,
+					SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other")
+						FLOOR BLOCK("0", "-3", "0", "2.5", "other"));
 	lay_path(w, (vec3[]){{0, 1, 1}, {0, 0, 0}, {0, 1, -1}}, 3);
 	vec2 h[3];
 	struct walk_limits once = normal;
@@ -147,9 +159,12 @@ static void test_names(void **state)
 static void test_other_material(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(32, 32, SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other") BLOCK("0", "0", "0", ".5", "metal")
-						"<shape type='rectangle'><transform name='to_world'><scale value='9'/><translate z='-2'/></transform>"
-						"<ref id='other'/></shape><emitter type='constant'/>"); /* in the dark all are black */
+	struct world *w = world_of_text(
+		32, 32,
+		SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other") BLOCK(
+			"0", "0", "0", ".5",
+			"metal") "<shape type='rectangle'><transform name='to_world'><scale value='9'/><translate z='-2'/></transform>"
+				 "<ref id='other'/></shape><emitter type='constant'/>"); /* in the dark all are black */
 	lay_path(w, (vec3[]){{0.2, 0, 3}, {0.2, 0, 0}, {2, 0, 3}}, 3);
 	vec2 h[3];
 	struct walk_limits once = normal;
@@ -162,8 +177,9 @@ static void test_other_material(void **state)
 	world_free(w);
 }
 
-/* A concave mirror of radius 1 around the origin, met at (0,-1,0) (far from its poles, where frames spin) under angle `a`, from the camera at distance `away`: in the
- * plane of incidence it makes an image at 1 / (2 / cos a - 1 / away). There, a small mirror leads on. */
+/* A concave mirror of radius 1 around the origin, met at (0,-1,0) (far from its poles, where frames spin) under angle
+ * `a`, from the camera at distance `away`: in the plane of incidence it makes an image at 1 / (2 / cos a - 1 / away).
+ * There, a small mirror leads on. */
 static vec3 image_point(double a, double away, double *distance)
 {
 	*distance = 1 / (2 / cos(a) - 1 / away);
@@ -172,17 +188,20 @@ static vec3 image_point(double a, double away, double *distance)
 
 #define BOWL "<shape type='sphere'><float name='radius' value='1'/><ref id='metal'/></shape>"
 
-/* Half vector of the first mirror does not change as the vertex there moves: its block is singular, the matrix is not. */
+/* Half vector of the first mirror does not change as the vertex there moves: its block is singular, the matrix is not.
+ */
 static void test_focus(void **state)
 {
 	(void)state;
 	const double a = 0.4, away = 1.2;
 	double at;
 	vec3 camera = {away * sin(a), -1 + away * cos(a), 0}, image = image_point(a, away, &at);
-	struct world *w = world_of_text(32, 32, SENSOR("0.4,.1,0", "0,0,0") MATERIAL("metal") BOWL
-					"<shape type='rectangle'><transform name='to_world'><scale value='.1'/>"
-					"<lookat origin='%.17g,%.17g,%.17g' target='0,-0.7,0.4' up='0,1,0'/></transform><ref id='metal'/></shape>",
-					image.x, image.y, image.z);
+	struct world *w = world_of_text(
+		32, 32,
+		SENSOR("0.4,.1,0", "0,0,0") MATERIAL("metal") BOWL
+		"<shape type='rectangle'><transform name='to_world'><scale value='.1'/>"
+		"<lookat origin='%.17g,%.17g,%.17g' target='0,-0.7,0.4' up='0,1,0'/></transform><ref id='metal'/></shape>",
+		image.x, image.y, image.z);
 	lay_path(w, (vec3[]){camera, {0, -1, 0}, image, {-0.1, -0.5, 0.6}}, 4);
 	constraints_of(w, &x, 3, 0, k);
 	double det = fabs(mat2_det(k[2].b)) / mat2_norm2(k[2].b);
@@ -204,7 +223,8 @@ static void test_focus(void **state)
 			assert_true(vec2_dot(off, off) <= 1.01e-18);
 		}
 	}
-	print_message("focus: %zu of %zu arrive in %.2f iterations, %zu singular\n", ends[WALK_OK], n, iterations / (double)n, ends[WALK_SINGULAR]);
+	print_message("focus: %zu of %zu arrive in %.2f iterations, %zu singular\n", ends[WALK_OK], n,
+		      iterations / (double)n, ends[WALK_SINGULAR]);
 	assert_true(ends[WALK_OK] > n * 9 / 10);
 	assert_int_equal(ends[WALK_SINGULAR], 0);
 	world_free(w);

@@ -30,7 +30,8 @@ static void test_published_sums(void **state)
 	assert_true(cie_d65[560 - CIE_FIRST_NM] == 100);
 }
 
-/* The density's shape at a tabulated wavelength: the sum of the magnitudes of the matching functions of linear Rec. 709. */
+/* The density's shape at a tabulated wavelength: the sum of the magnitudes of the matching functions of linear Rec.
+ * 709. */
 static double curve(int i)
 {
 	double rgb[3];
@@ -86,8 +87,8 @@ static void test_density_of_wavelengths(void **state)
 	assert_true(wavelength_pdf(WAVELENGTH_MAX) > 0.05 / (CIE_COUNT - 1));
 }
 
-/* What the density is for: the relative variance of the three channels of one white splat. Uniform wavelengths would have
- * 0.61, 0.17, 0.67. */
+/* What the density is for: the relative variance of the three channels of one white splat. Uniform wavelengths would
+ * have 0.61, 0.17, 0.67. */
 static void test_white_has_little_colour_noise(void **state)
 {
 	(void)state;
@@ -172,12 +173,9 @@ static void test_xyz_is_unbiased(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_published_sums),
-		cmocka_unit_test(test_wavelengths_in_range_and_apart),
-		cmocka_unit_test(test_density_of_wavelengths),
-		cmocka_unit_test(test_white_has_little_colour_noise),
-		cmocka_unit_test(test_few_wavelengths),
-		cmocka_unit_test(test_xyz_is_unbiased),
+		cmocka_unit_test(test_published_sums),	       cmocka_unit_test(test_wavelengths_in_range_and_apart),
+		cmocka_unit_test(test_density_of_wavelengths), cmocka_unit_test(test_white_has_little_colour_noise),
+		cmocka_unit_test(test_few_wavelengths),	       cmocka_unit_test(test_xyz_is_unbiased),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * log T(x -> y) of breakups, multiplied out per area of every vertex that moves, by section 5 and 4 of the paper and nothing
- * of worker/mutation: to hold against the products that leave out what cancels. In the measure of path.h; delta distributions
- * are dropped from both f and T.
+ * log T(x -> y) of breakups, multiplied out per area of every vertex that moves, by section 5 and 4 of the paper and
+ * nothing of worker/mutation: to hold against the products that leave out what cancels. In the measure of path.h; delta
+ * distributions are dropped from both f and T.
  */
 #ifndef TESTS_WORKER_MUTATION_EXPLICIT_H
 #define TESTS_WORKER_MUTATION_EXPLICIT_H
@@ -22,7 +22,8 @@ static inline double explicit_log_turn(const struct full_path_path *x, unsigned 
 	vec2 h = halfvec_of(x, j);
 	double length2 = 1 + vec2_dot(h, h), eta = full_path_eta(x, j);
 	vec3 n = vec3_scale(1 / sqrt(length2), (vec3){h.x, h.y, 1});
-	vec3 o = frame_to_local(&x->v[j].x.sh, x->edge[j].w), i = frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w));
+	vec3 o = frame_to_local(&x->v[j].x.sh, x->edge[j].w),
+	     i = frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w));
 	double ih = vec3_dot(i, n), sum = ih + eta * vec3_dot(o, n);
 	return log(fabs(n_i) * sum * sum / fabs(ih)) - 1.5 * log(length2);
 }
@@ -52,16 +53,18 @@ static inline double explicit_log_arrive(const struct full_path_path *y, unsigne
 }
 
 /* log_choices: of all symmetric choices, those of the film and the traced half vectors. */
-static inline double explicit_log_traced(const struct path_context *c, const struct full_path_path *x, const struct full_path_path *y,
-					 unsigned b, double *log_choices)
+static inline double explicit_log_traced(const struct path_context *c, const struct full_path_path *x,
+					 const struct full_path_path *y, unsigned b, double *log_choices)
 {
 	unsigned k = y->edges;
 	const struct camera *camera = &c->w->camera;
 	*log_choices = 0;
 	if (b == k)
 		return 0;
-	*log_choices = explicit_log_gauss(y->film[0] - x->film[0], y->film[1] - x->film[1], EXPLICIT_FILM * fmin(camera->width, camera->height));
-	double sum = log(camera_jac_film_from_solid(camera, vec3_neg(y->edge[k - 1].w))) + explicit_log_arrive(y, k - 1);
+	*log_choices = explicit_log_gauss(y->film[0] - x->film[0], y->film[1] - x->film[1],
+					  EXPLICIT_FILM * fmin(camera->width, camera->height));
+	double sum =
+		log(camera_jac_film_from_solid(camera, vec3_neg(y->edge[k - 1].w))) + explicit_log_arrive(y, k - 1);
 	for (unsigned j = k - 1; j > b; j--) {
 		const struct path_vertex *v = &y->v[j];
 		if (v->delta) {
@@ -69,7 +72,8 @@ static inline double explicit_log_traced(const struct path_context *c, const str
 			sum += log(fabs(vec3_dot(v->x.ng, y->edge[j - 1].w)));
 		} else {
 			vec2 h = halfvec_of(y, j), from = explicit_turned(x, y, j);
-			double sigma = EXPLICIT_HALFVEC * 0.5 * (fmin(x->v[j].bsdf->alpha, 1) + fmin(v->bsdf->alpha, 1));
+			double sigma =
+				EXPLICIT_HALFVEC * 0.5 * (fmin(x->v[j].bsdf->alpha, 1) + fmin(v->bsdf->alpha, 1));
 			*log_choices += explicit_log_gauss(h.x - from.x, h.y - from.y, sigma);
 			sum -= explicit_log_turn(y, j, 1);
 		}
@@ -79,8 +83,9 @@ static inline double explicit_log_traced(const struct path_context *c, const str
 }
 
 /* Between the ends, at y; steps drawn at x, dh from x to y, or none. */
-static inline double explicit_log_between(const struct path_context *c, const struct full_path_path *x, const struct full_path_path *y,
-					  unsigned b, unsigned c_end, const vec2 *dh, double sign)
+static inline double explicit_log_between(const struct path_context *c, const struct full_path_path *x,
+					  const struct full_path_path *y, unsigned b, unsigned c_end, const vec2 *dh,
+					  double sign)
 {
 	static struct constraint at_x[FULL_PATH_MAX_VERTICES], at_y[FULL_PATH_MAX_VERTICES];
 	static struct constraint_system system;
@@ -104,8 +109,9 @@ static inline double explicit_log_between(const struct path_context *c, const st
 }
 
 /* Choice of b and c, where the strategy draws them by the heuristic. */
-static inline double explicit_log_choice(const struct path_context *c, const char *strategy, const struct mutation_setting *how,
-					 const struct full_path_path *x, unsigned b, unsigned c_end)
+static inline double explicit_log_choice(const struct path_context *c, const char *strategy,
+					 const struct mutation_setting *how, const struct full_path_path *x, unsigned b,
+					 unsigned c_end)
 {
 	double weight[FULL_PATH_MAX_VERTICES], p = 1;
 	bool hslt = strcmp(strategy, "hslt") == 0 && how->b < 0, light = strcmp(strategy, "light") == 0;
@@ -121,7 +127,8 @@ static inline double explicit_log_choice(const struct path_context *c, const cha
 		p *= heuristic_probability(weight, b, c_end);
 	}
 	if (strcmp(strategy, "rejoin") == 0) {
-		/* 1 for each inner vertex that can be joined to the one before it, 0.1 for an emitter that can be hit. */
+		/* 1 for each inner vertex that can be joined to the one before it, 0.1 for an emitter that can be hit.
+		 */
 		double found = c->w->emitters[x->v[0].emitter].delta ? 0 : 0.1, all = found;
 		for (unsigned i = 1; i < x->edges; i++)
 			all += !x->v[i].delta && (i == 1 || !x->v[i - 1].delta);

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Detailed balance of every strategy of the registry, and of the breakup with each b and c forced, in worlds that between them
- * have what paths can meet. How it is tested, level and power: tests/support/balance.h. A fault of 2 % in the ratio of a strategy that
- * is used by default is found by all rooms together; with FULL=1 by each room.
+ * Detailed balance of every strategy of the registry, and of the breakup with each b and c forced, in worlds that
+ * between them have what paths can meet. How it is tested, level and power: tests/support/balance.h. A fault of 2 % in
+ * the ratio of a strategy that is used by default is found by all rooms together; with FULL=1 by each room.
  */
 #include "tests/support/balance.h"
 #include "tests/support/dice.h"
@@ -18,8 +18,8 @@
 
 enum { TRIALS = 64 };
 
-/* Proposals from a start. Strategies that choose for themselves get more than forced ones; those that the room has by default so many
- * that all rooms together find a fault of 2 %. */
+/* Proposals from a start. Strategies that choose for themselves get more than forced ones; those that the room has by
+ * default so many that all rooms together find a fault of 2 %. */
 enum { REPEAT = 2, REPEAT_DEFAULT = 9, REPEAT_MORE = 14, REPEAT_RARE = 25, STARTS_RARE = 5 };
 #define MUST_FIND 0.02
 
@@ -43,7 +43,8 @@ static unsigned repeats(const struct world *w, const struct mutation_ops *ops)
 {
 	if (!is_default(w, ops))
 		return REPEAT;
-	bool noisy = ops->independent || strcmp(ops->name, "light") == 0; /* fewer rooms have a lamp that can be moved on */
+	bool noisy =
+		ops->independent || strcmp(ops->name, "light") == 0; /* fewer rooms have a lamp that can be moved on */
 	return noisy ? REPEAT_MORE : REPEAT_DEFAULT;
 }
 
@@ -62,7 +63,8 @@ static void check_alone(const struct world *w, const struct room *room, const st
 }
 
 /* One room has an aperture: it must find alone what the others find together. */
-static void pool_rare(const struct world *w, const struct room *room, const struct mutation_ops *ops, struct balance_pool *p)
+static void pool_rare(const struct world *w, const struct room *room, const struct mutation_ops *ops,
+		      struct balance_pool *p)
 {
 	static struct balance_trial t;
 	t = (struct balance_trial){.ops = ops, .how = {-1, -1}, .repeat = REPEAT_RARE};
@@ -74,14 +76,18 @@ static size_t all_trials(const struct world *w, struct balance_trial *t)
 {
 	size_t n = 0;
 	for (size_t i = 0; mutation_registry[i]; i++)
-		t[n++] = (struct balance_trial){.ops = mutation_registry[i], .how = {-1, -1}, .repeat = repeats(w, mutation_registry[i])};
+		t[n++] = (struct balance_trial){
+			.ops = mutation_registry[i], .how = {-1, -1}, .repeat = repeats(w, mutation_registry[i])};
 	const struct mutation_ops *hslt = mutation_find("hslt", 4);
 	t[n++] = (struct balance_trial){.ops = hslt, .how = {0, 0}, .repeat = 1};
 	for (int b = 1; b <= BALANCE_EDGES; b++)
 		for (int c = 0; c < b; c++)
 			for (int side = BALANCE_CAMERA; side <= BALANCE_TRACED; side++)
 				if (side == BALANCE_CAMERA || b < BALANCE_EDGES)
-					t[n++] = (struct balance_trial){.ops = hslt, .how = {b, c}, .side = (enum balance_side)side, .repeat = 1};
+					t[n++] = (struct balance_trial){.ops = hslt,
+									.how = {b, c},
+									.side = (enum balance_side)side,
+									.repeat = 1};
 	return n;
 }
 
@@ -127,8 +133,8 @@ static void test_all_rooms(void **state)
 		struct balance_verdict v = balance_pool_judge(&pool[i]);
 		if (!(v.power < INFINITY))
 			continue;
-		printf("all rooms      %-22s worst t %+6.2f (%s), finds %5.2f %%%s\n", mutation_registry[i]->name, v.t, v.function, 100 * v.power,
-		       v.balanced ? "" : " NOT BALANCED");
+		printf("all rooms      %-22s worst t %+6.2f (%s), finds %5.2f %%%s\n", mutation_registry[i]->name, v.t,
+		       v.function, 100 * v.power, v.balanced ? "" : " NOT BALANCED");
 		faults += !v.balanced;
 		weak += !(v.power <= MUST_FIND) && dice_count(48) >= 48 && !getenv("ROOM");
 	}

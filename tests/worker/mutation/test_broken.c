@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Strategies broken on purpose, made of the real ones: the test of detailed balance must catch each, and must pass the real
- * one from the same starts. Level and power: tests/support/balance.h.
+ * Strategies broken on purpose, made of the real ones: the test of detailed balance must catch each, and must pass the
+ * real one from the same starts. Level and power: tests/support/balance.h.
  */
 #include "tests/support/balance.h"
 #include "tests/support/dice.h"
@@ -19,14 +19,15 @@
 static const struct mutation_ops *real;
 static struct full_path_path *from; /* x of the proposal at hand */
 
-static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
-				     struct full_path_path *y, struct move *move)
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
+				     struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	from = x;
 	return real->propose(m, how, x, y, move);
 }
 
-static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			 enum mutation_direction direction)
 {
 	return real->log_weight(m, into, move, direction);
 }
@@ -45,22 +46,26 @@ static double log_selection(struct mutation_ctx *m, const struct full_path_path 
 }
 
 /* The choice of b and c left out: into y it is x's, and the other way round. */
-static double no_selection(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double no_selection(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			   enum mutation_direction direction)
 {
 	static struct full_path_path *y;
 	if (direction == X_TO_Y)
 		y = into;
-	return log_weight(m, into, move, direction) + log_selection(m, direction == X_TO_Y ? from : y, move->b, move->c);
+	return log_weight(m, into, move, direction) +
+	       log_selection(m, direction == X_TO_Y ? from : y, move->b, move->c);
 }
 
-static double denser_upwards(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double denser_upwards(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			     enum mutation_direction direction)
 {
 	bool up = direction == X_TO_Y && sin(2 * M_PI * (into->wavelength - from->wavelength)) > 0;
 	return log_weight(m, into, move, direction) - (up ? log(1.03) : 0);
 }
 
 /* As a function of the state: 10 % where the wavelength lies in the upper half. */
-static double denser_above(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double denser_above(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			   enum mutation_direction direction)
 {
 	return log_weight(m, into, move, direction) - (into->wavelength > 0.5 ? log(1.1) : 0);
 }
@@ -81,35 +86,39 @@ static void keep_f(struct path_context *c, struct full_path_path *y, unsigned j)
 	vertex_set_add(&y->known_f, j);
 }
 
-static double stale_fixed(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double stale_fixed(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			  enum mutation_direction direction)
 {
 	for (unsigned j = 0; direction == X_TO_Y && j < move->c; j++)
 		keep_f(m->path, into, j);
 	return log_weight(m, into, move, direction);
 }
 
-static double stale_c(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double stale_c(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+		      enum mutation_direction direction)
 {
 	if (direction == X_TO_Y)
 		keep_f(m->path, into, move->c);
 	return log_weight(m, into, move, direction);
 }
 
-static double stale_b(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double stale_b(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+		      enum mutation_direction direction)
 {
 	if (direction == X_TO_Y && move->b < into->edges)
 		keep_f(m->path, into, move->b);
 	return log_weight(m, into, move, direction);
 }
 
-static double no_transfer(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double no_transfer(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			  enum mutation_direction direction)
 {
 	return log_weight(m, into, move, direction) - move->log_transfer[direction];
 }
 
 /* Steps of x back from y, too. */
-static enum strategy_counter one_sigma(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
-				       struct full_path_path *y, struct move *move)
+static enum strategy_counter one_sigma(struct mutation_ctx *m, const struct mutation_setting *how,
+				       struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	enum strategy_counter end = propose(m, how, x, y, move);
 	for (unsigned j = move->c + 1; !end && j < move->b; j++) {
@@ -122,8 +131,8 @@ static enum strategy_counter one_sigma(struct mutation_ctx *m, const struct muta
 }
 
 /* What the way back refused is proposed all the same; forced b and c only, whose choice has no density. */
-static enum strategy_counter no_way_back(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
-					 struct full_path_path *y, struct move *move)
+static enum strategy_counter no_way_back(struct mutation_ctx *m, const struct mutation_setting *how,
+					 struct full_path_path *x, struct full_path_path *y, struct move *move)
 {
 	enum strategy_counter end = propose(m, how, x, y, move);
 	if (end != STRATEGY_FAIL_REVERSE)
@@ -141,7 +150,8 @@ static enum strategy_counter no_way_back(struct mutation_ctx *m, const struct mu
 }
 
 /* The emitter's point as if all points were as likely. */
-static double flat_emitter(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction)
+static double flat_emitter(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			   enum mutation_direction direction)
 {
 	const struct path_vertex *v = &into->v[0];
 	const struct emitter *em = &m->path->w->emitters[v->emitter];
@@ -156,9 +166,10 @@ struct fault {
 	struct mutation_setting how;
 	enum balance_side side;
 	unsigned starts, repeat;
-	enum strategy_counter (*propose)(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
-					 struct full_path_path *y, struct move *move);
-	double (*log_weight)(struct mutation_ctx *m, struct full_path_path *into, const struct move *move, enum mutation_direction direction);
+	enum strategy_counter (*propose)(struct mutation_ctx *m, const struct mutation_setting *how,
+					 struct full_path_path *x, struct full_path_path *y, struct move *move);
+	double (*log_weight)(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			     enum mutation_direction direction);
 };
 
 static const struct fault faults[] = {

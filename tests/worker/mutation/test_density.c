@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The ratio of f and T that mutations say, against both multiplied out per area (tests/worker/mutation/explicit.h): to rounding.
+ * The ratio of f and T that mutations say, against both multiplied out per area (tests/worker/mutation/explicit.h): to
+ * rounding.
  */
 #include "tests/support/dice.h"
 #include "tests/support/rooms.h"
@@ -45,8 +46,8 @@ static size_t all_trials(struct trial *t)
 	return n;
 }
 
-static double log_t(const struct trial *t, const struct move *move, const struct full_path_path *x, const struct full_path_path *y,
-		    double sign, double *log_choices)
+static double log_t(const struct trial *t, const struct move *move, const struct full_path_path *x,
+		    const struct full_path_path *y, double sign, double *log_choices)
 {
 	unsigned b = move->b, end = move->c;
 	*log_choices = 0;
@@ -89,8 +90,8 @@ static void print(const char *room, const struct trial *t)
 	char forced[16] = "";
 	if (t->how.b >= 0)
 		snprintf(forced, sizeof forced, "@b%dc%d", t->how.b % 100, t->how.c % 100);
-	printf("%-14s %10s%-6s %7lu ratios, largest difference %.2g (%lu beyond), of symmetric choices %.2g\n", room, t->ops->name, forced,
-	       t->compared, t->worst, t->beyond, t->worst_choice);
+	printf("%-14s %10s%-6s %7lu ratios, largest difference %.2g (%lu beyond), of symmetric choices %.2g\n", room,
+	       t->ops->name, forced, t->compared, t->worst, t->beyond, t->worst_choice);
 }
 
 static void test_ratio(void **state)
@@ -102,7 +103,8 @@ static void test_ratio(void **state)
 	struct starts s;
 	size_t count = all_trials(trials), n = dice_count(400), bad = 0;
 	starts_context(&c, w, 1, EDGES, counters);
-	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&accuracy_settings_default)};
+	m = (struct mutation_ctx){
+		.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&accuracy_settings_default)};
 	starts_init(&s, &c, m.seed, 0, 2000);
 	for (unsigned k = 1; k <= EDGES; k++)
 		for (size_t i = 0; i < n; i++) {

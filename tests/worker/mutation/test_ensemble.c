@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What bidirectional proposals are made of, each against what it must be, number by number: a candidate's contribution does not
- * depend on whether its pair was drawn afresh or around the path itself, lengths and the chance of them belong together, the two
- * pairs of a proposal have random numbers of their own, and a point that leaves the aperture is refused.
+ * What bidirectional proposals are made of, each against what it must be, number by number: a candidate's contribution
+ * does not depend on whether its pair was drawn afresh or around the path itself, lengths and the chance of them belong
+ * together, the two pairs of a proposal have random numbers of their own, and a point that leaves the aperture is
+ * refused.
  */
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"
@@ -63,7 +64,8 @@ static bool has(const struct ensemble *e, unsigned edges, double intensity, bool
 	return false;
 }
 
-/* The path's own candidate, in a pair around it, contributes what it did where it was found, over the chance of the lengths. */
+/* The path's own candidate, in a pair around it, contributes what it did where it was found, over the chance of the
+ * lengths. */
 static void check_own_candidate(const char *name)
 {
 	struct world *w = room_of(name);
@@ -148,11 +150,13 @@ static void test_chance_of_lengths(void **state)
 		}
 		for (unsigned side = 0; side < 2; side++)
 			for (unsigned k = sure; k <= EDGES + 1 - side; k++)
-				assert_true(fabs(count[side][k] / (double)N - (double)(sure * sure) / (k * k)) < 2.0 / N);
+				assert_true(fabs(count[side][k] / (double)N - (double)(sure * sure) / (k * k)) <
+					    2.0 / N);
 	}
 }
 
-/* Totals of both pairs as the proposal at hand must have drawn them, and of the one around x with the other one's numbers. */
+/* Totals of both pairs as the proposal at hand must have drawn them, and of the one around x with the other one's
+ * numbers. */
 static void test_streams_of_a_proposal(void **state)
 {
 	(void)state;
@@ -164,7 +168,11 @@ static void test_streams_of_a_proposal(void **state)
 	unsigned proposed = 0, same = 0;
 	begin(w);
 	const struct ensemble_lengths all = ensemble_all_lengths(&c);
-	m = (struct mutation_ctx){.path = &c, .seed = seed, .chain = 5, .count = count, .limits = walk_limits_of(&accuracy_settings_default)};
+	m = (struct mutation_ctx){.path = &c,
+				  .seed = seed,
+				  .chain = 5,
+				  .count = count,
+				  .limits = walk_limits_of(&accuracy_settings_default)};
 	for (uint64_t i = 0; i < TRIALS / 4; i++) {
 		draw(seed, i, &all, &drawn);
 		if (drawn.count == 0 || !choose(0))
@@ -196,8 +204,8 @@ static void test_streams_of_a_proposal(void **state)
 	world_free(w);
 }
 
-/* From a point next to the aperture's rim half of the steps lead out, and these are refused: clamped to the rim they would gather
- * there. 1,000 steps; outside 0.42 to 0.58 with probability below 1e-6. */
+/* From a point next to the aperture's rim half of the steps lead out, and these are refused: clamped to the rim they
+ * would gather there. 1,000 steps; outside 0.42 to 0.58 with probability below 1e-6. */
 static void test_aperture_is_left(void **state)
 {
 	(void)state;
@@ -225,8 +233,9 @@ static void test_aperture_is_left(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_own_candidate), cmocka_unit_test(test_drawn_lengths), cmocka_unit_test(test_chance_of_lengths),
-		cmocka_unit_test(test_streams_of_a_proposal), cmocka_unit_test(test_aperture_is_left),
+		cmocka_unit_test(test_own_candidate),	  cmocka_unit_test(test_drawn_lengths),
+		cmocka_unit_test(test_chance_of_lengths), cmocka_unit_test(test_streams_of_a_proposal),
+		cmocka_unit_test(test_aperture_is_left),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

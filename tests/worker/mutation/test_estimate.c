@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Independent proposals estimate what all light is that reaches the film: E[f / T] over them is the integral of f that bdpt
- * finds, for each number of edges and for all. What chains are scaled by hangs on this.
+ * Independent proposals estimate what all light is that reaches the film: E[f / T] over them is the integral of f that
+ * bdpt finds, for each number of edges and for all. What chains are scaled by hangs on this.
  *
- * Level: 1e-6 for all comparisons, t between 32 groups of each; power, with 95 %: printed, and of what chains use by default no more than
- * 2 % over all rooms.
+ * Level: 1e-6 for all comparisons, t between 32 groups of each; power, with 95 %: printed, and of what chains use by
+ * default no more than 2 % over all rooms.
  */
 #include "tests/support/dice.h"
 #include "tests/support/rooms.h"
@@ -48,7 +48,8 @@ static struct pooled {
 static size_t rooms_pooled;
 
 /* Of each number of edges, and of all together. */
-static unsigned compare(const char *room, const char *strategy, double a[GROUPS][EDGES + 1], double b[GROUPS][EDGES + 1])
+static unsigned compare(const char *room, const char *strategy, double a[GROUPS][EDGES + 1],
+			double b[GROUPS][EDGES + 1])
 {
 	unsigned faults = 0;
 	double worst = 0;
@@ -68,8 +69,8 @@ static unsigned compare(const char *room, const char *strategy, double a[GROUPS]
 		faults += s.p < LEVEL;
 		worst = fmax(worst, fabs(s.mean / s.error));
 	}
-	printf("%-14s %-14s all light %+6.2f %% +- %.2f %%, finds %.1f %%; largest t of a length %.2f\n", room, strategy, 100 * s.mean / sum,
-	       100 * s.error / sum, 100 * FINDS * s.error / sum, worst);
+	printf("%-14s %-14s all light %+6.2f %% +- %.2f %%, finds %.1f %%; largest t of a length %.2f\n", room,
+	       strategy, 100 * s.mean / sum, 100 * s.error / sum, 100 * FINDS * s.error / sum, worst);
 	if (strcmp(strategy, "bidirectional") == 0) {
 		double error = s.error / sum;
 		pool.certainty += 1 / (error * error);
@@ -83,7 +84,8 @@ static void test_all_rooms(void **state)
 {
 	(void)state;
 	double error = 1 / sqrt(pool.certainty), t = pool.weighted / pool.certainty / error;
-	printf("all rooms      bidirectional  all light %+6.2f %% +- %.2f %%, finds %.2f %%\n", 100 * t * error, 100 * error, 100 * FINDS * error);
+	printf("all rooms      bidirectional  all light %+6.2f %% +- %.2f %%, finds %.2f %%\n", 100 * t * error,
+	       100 * error, 100 * FINDS * error);
 	assert_true(rooms_pooled >= 10);
 	assert_true(stats_student_t_p(t, GROUPS - 1) >= LEVEL);
 	assert_true(FINDS * error <= 0.02 || dice_count(1000) < 1000);
@@ -100,7 +102,8 @@ static void test_integral(void **state)
 	size_t n = dice_count(1000);
 	unsigned faults = 0;
 	starts_context(&c, w, 1, EDGES, counters);
-	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&accuracy_settings_default)};
+	m = (struct mutation_ctx){
+		.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&accuracy_settings_default)};
 	for (unsigned g = 0; g < GROUPS; g++) {
 		struct starts s;
 		starts_init(&s, &c, m.seed, g, n);

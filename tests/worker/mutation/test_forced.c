@@ -3,12 +3,13 @@
  * Each mutation alone and each forced (b, c) leaves bdpt's distribution of paths as it is, on paths of exactly k edges
  * (tests/support/stationary.h: what is compared, and why it is so much sharper than two images).
  *
- * Level: 1e-6 a case. Power: the smallest bias of a soft quarter of the image that is found with 95 % probability is printed and
- * is 2 % at most; colours and what is looked at besides images have theirs printed. Of the whole image's mean there is nothing
- * to find: a mutation keeps the number of edges, and how much all paths of that length bring is b, which independent proposals
- * alone estimate (tests/worker/path/test_full_path.c compares their densities path by path, test_integrators.c images of
- * mixtures). They go anywhere on the film, so that nothing cancels: 2 % by FULL=1 only, with k = 3, 10 % else.
- * Of the accepted moves at least 10 % are the forced choice's, the starts counting as accepted independent proposals.
+ * Level: 1e-6 a case. Power: the smallest bias of a soft quarter of the image that is found with 95 % probability is
+ * printed and is 2 % at most; colours and what is looked at besides images have theirs printed. Of the whole image's
+ * mean there is nothing to find: a mutation keeps the number of edges, and how much all paths of that length bring is
+ * b, which independent proposals alone estimate (tests/worker/path/test_full_path.c compares their densities path by
+ * path, test_integrators.c images of mixtures). They go anywhere on the film, so that nothing cancels: 2 % by FULL=1
+ * only, with k = 3, 10 % else. Of the accepted moves at least 10 % are the forced choice's, the starts counting as
+ * accepted independent proposals.
  *
  * About 100 s of CPU time; FULL=1: every (b, c) and every mutation, k = 2..4 and 6 on every scene, k = 8 on two.
  * SCENE="rough glass" runs one alone; HSLT_TEST_ROWS=1 prints reasons of failure as well.
@@ -39,16 +40,23 @@ struct scene_cases {
 static const struct scene_cases shorter[] = {
 	{"diffuse", {{3, "*"}, {2, "hslt@b2c0 rejoin"}}},
 	{"glossy", {{2, "hslt@b2c0"}, {3, "*"}, {4, "hslt@b4c0 hslt@b4c1 hslt@b3c1"}}},
-	{"rough glass", {{4, "*"}, {6, "hslt@b0 hslt@b6c0 hslt@b6c2 hslt@b5c2 hslt@b2c1 hslt"}, {8, "hslt@b0 hslt@b8c4 hslt@b6c3 hslt"}}},
+	{"rough glass",
+	 {{4, "*"},
+	  {6, "hslt@b0 hslt@b6c0 hslt@b6c2 hslt@b5c2 hslt@b2c1 hslt"},
+	  {8, "hslt@b0 hslt@b8c4 hslt@b6c3 hslt"}}},
 	{"smooth glass", {{4, "hslt@b0 hslt@b4c0 hslt@b4c1 hslt halfvec light"}, {5, "hslt@b5c0 hslt@b5c1"}}},
 	{"specular chain", {{5, "hslt@b0 hslt@b5c0 hslt@b5c1 hslt@b5c2 hslt"}, {7, "hslt@b7c1"}}},
 	{"bent normals", {{3, "hslt@b3c0 hslt@b2c0"}, {4, "hslt@b0 hslt@b4c0 hslt@b4c1 hslt@b3c1 hslt@b2c1 hslt"}}},
-	{"environment", {{2, "hslt@b1c0"}, {3, "hslt@b0 hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt@b3c1 light"}, {4, "hslt@b4c0 hslt@b4c1 hslt"}}},
+	{"environment",
+	 {{2, "hslt@b1c0"},
+	  {3, "hslt@b0 hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt@b3c1 light"},
+	  {4, "hslt@b4c0 hslt@b4c1 hslt"}}},
 	{"delta emitters", {{3, "hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt@b3c1"}, {4, "hslt@b4c0 hslt@b3c1 hslt"}}},
 	{"sun", {{2, "hslt@b2c0"}, {3, "hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt"}}},
 	{"dispersion", {{4, "hslt@b0 hslt@b4c0 hslt@b4c1 hslt@b3c1 wavelength hslt"}}},
 	{"dispersion, smooth", {{4, "hslt@b0 hslt@b4c0 hslt@b1c0 wavelength light hslt"}}},
-	{"aperture", {{3, "hslt@b0 hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt@b3c1 lens rejoin"}, {4, "hslt@b4c0 hslt@b4c1 lens hslt"}}},
+	{"aperture",
+	 {{3, "hslt@b0 hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt@b3c1 lens rejoin"}, {4, "hslt@b4c0 hslt@b4c1 lens hslt"}}},
 };
 enum { SCENES = sizeof shorter / sizeof *shorter };
 
@@ -64,12 +72,13 @@ static bool scaled(void)
 	return text && atoi(text) > 1;
 }
 
-static void print(const char *scene, const struct stationary_how *how, const struct stationary_result *r, const char *verdict)
+static void print(const char *scene, const struct stationary_how *how, const struct stationary_result *r,
+		  const char *verdict)
 {
 	char worst[96] = "nothing differs";
 	if (r->worst >= 0)
-		snprintf(worst, sizeof worst, "%s %+.2f %% +- %.2f %%", stationary_function(r->worst), 100 * r->bias[r->worst],
-			 100 * r->error[r->worst]);
+		snprintf(worst, sizeof worst, "%s %+.2f %% +- %.2f %%", stationary_function(r->worst),
+			 100 * r->bias[r->worst], 100 * r->error[r->worst]);
 	printf("%-18s k%u %-11s accepts %4.1f %%, %4.1f %% of all; finds %.2f %% on a quarter, %.1f %% of colours, %.1f %% of vertices; %s (p %.1g); %s\n",
 	       scene, how->max_edges, how->mutation, 100 * (double)r->accepted / (double)r->proposals, 100 * r->share,
 	       100 * r->least_block, 100 * r->least_colour, 100 * r->least_other, worst, r->p, verdict);
@@ -86,7 +95,8 @@ struct tally {
 	uint64_t mutations;
 };
 
-static void check(const struct world *w, const char *scene, unsigned edges, const char *mutation, bool chosen, struct tally *t)
+static void check(const struct world *w, const char *scene, unsigned edges, const char *mutation, bool chosen,
+		  struct tally *t)
 {
 	static struct stationary_result r;
 	/* Fresh paths lie anywhere on the film: far less of the noise cancels. */
@@ -155,8 +165,8 @@ static void test_scene(void **state)
 		for (const struct forced *f = s->of; f->mutations; f++)
 			check_list(w, s->scene, f, &t);
 	}
-	printf("%s: %u cases, %u failed, %llu mutations, finds %.2f %% on a quarter of the film, %.0f s of CPU time\n", s->scene, t.cases, t.failed,
-	       (unsigned long long)t.mutations, 100 * t.worst_block, t.seconds);
+	printf("%s: %u cases, %u failed, %llu mutations, finds %.2f %% on a quarter of the film, %.0f s of CPU time\n",
+	       s->scene, t.cases, t.failed, (unsigned long long)t.mutations, 100 * t.worst_block, t.seconds);
 	fflush(stdout);
 	world_free(w);
 	assert_int_equal(t.failed, 0);

@@ -1,9 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * T(x -> y) against sampling. From one x, whose proposals all arrive, the positions of all vertices that move are whitened by
- * a pilot; inside an ellipsoid of known volume E[1{y in bin} / T(x -> y)] is the bin's volume, whatever T's shape: of the eight
- * parts that the signs of three coordinates make, and of the whole. T is multiplied out (tests/worker/mutation/explicit.h),
- * film, steps, choice of b and c, aperture and emitter included, constants too. Failures are counted as mass of their own.
+ * T(x -> y) against sampling. From one x, whose proposals all arrive, the positions of all vertices that move are
+ * whitened by a pilot; inside an ellipsoid of known volume E[1{y in bin} / T(x -> y)] is the bin's volume, whatever T's
+ * shape: of the eight parts that the signs of three coordinates make, and of the whole. T is multiplied out
+ * (tests/worker/mutation/explicit.h), film, steps, choice of b and c, aperture and emitter included, constants too.
+ * Failures are counted as mass of their own.
  *
  * Level: 1e-6 for all bins of all cases. Power, with 95 %: printed, 2 to 4 % on the whole.
  */
@@ -65,7 +66,7 @@ struct sampling {
 	const struct mutation_ops *ops;
 	struct full_path_path *x, *y;
 	unsigned vertex[FULL_PATH_MAX_VERTICES], count, ends; /* that move; of these ends of the path */
-	double mean[MOST], factor[MOST][MOST];      /* Cholesky's of the covariance */
+	double mean[MOST], factor[MOST][MOST];		      /* Cholesky's of the covariance */
 	unsigned long failures;
 };
 
@@ -114,7 +115,8 @@ static bool coordinates(const struct sampling *s, double *z, double *log_plane)
 		vec3 d = frame_to_local(&f, vec3_sub(y->p, x->p));
 		double cosine = vec3_dot(x->ng, y->ng);
 		bool sphere = c.w->shapes[x->prim.shape].is_sphere;
-		if (x->prim.shape != y->prim.shape || cosine < 0.3 || (!sphere && (cosine < 1 - 1e-9 || fabs(d.z) > 1e-9)))
+		if (x->prim.shape != y->prim.shape || cosine < 0.3 ||
+		    (!sphere && (cosine < 1 - 1e-9 || fabs(d.z) > 1e-9)))
 			return false;
 		z[2 * i] = d.x;
 		z[2 * i + 1] = d.y;
@@ -137,7 +139,8 @@ static enum outcome propose(struct sampling *s, double *z, double *log_density)
 		bool steps = strcmp(e->strategy, "hslt") == 0 || strcmp(e->strategy, "halfvec") == 0;
 		*log_density = explicit_log_choice(&c, e->strategy, &e->how, s->x, e->b, e->c) +
 			       explicit_log_traced(&c, s->x, s->y, e->b, &unused) +
-			       explicit_log_between(&c, s->x, s->y, e->b, e->c, steps ? m.scratch.dh : NULL, 1) - log_plane;
+			       explicit_log_between(&c, s->x, s->y, e->b, e->c, steps ? m.scratch.dh : NULL, 1) -
+			       log_plane;
 		if (explicit_moves_emitter(e->strategy, e->b, e->c)) {
 			const struct path_vertex *v = &s->y->v[0];
 			const struct emitter *em = &c.w->emitters[v->emitter];
@@ -146,7 +149,8 @@ static enum outcome propose(struct sampling *s, double *z, double *log_density)
 		}
 		*log_density -= 2 * s->ends * log(2 * END_STEP);
 	}
-	full_path_copy(s->y, s->x, move.b > s->x->edges ? 0 : move.first, move.b > s->x->edges ? s->x->edges : move.last);
+	full_path_copy(s->y, s->x, move.b > s->x->edges ? 0 : move.first,
+		       move.b > s->x->edges ? s->x->edges : move.last);
 	return out;
 }
 
@@ -159,8 +163,8 @@ static double radius_of(const struct sampling *s)
 	return s->ends ? 1.5 : radii[s->count];
 }
 
-/* A start from which proposals fill the ellipsoid as a normal distribution does, each part of it: not one whose cloud is bent, as at
- * a sphere's limb. Asked of places alone, not of densities. */
+/* A start from which proposals fill the ellipsoid as a normal distribution does, each part of it: not one whose cloud
+ * is bent, as at a sphere's limb. Asked of places alone, not of densities. */
 static bool fills(const struct sampling *s, const double z[][MOST], unsigned n)
 {
 	unsigned d = 2 * s->count, bins = d < BITS ? 1u << d : BINS, in[BINS] = {0}, all = 0;
@@ -270,7 +274,8 @@ static void sample(struct sampling *s, const char *name)
 	for (size_t b = 0; b <= BINS; b++) {
 		if (b >= bins && b < BINS)
 			continue;
-		double mean = sum[b] / (double)n, sigma = sqrt((square[b] / (double)n - mean * mean) / (double)n), t = (mean - 1) / sigma;
+		double mean = sum[b] / (double)n, sigma = sqrt((square[b] / (double)n - mean * mean) / (double)n),
+		       t = (mean - 1) / sigma;
 		right = right && stats_student_t_p(t, (double)n - 1) >= LEVEL;
 		worst = fabs(t) > fabs(worst) ? t : worst;
 		error = b < BINS ? fmax(error, sigma) : error;
@@ -278,8 +283,8 @@ static void sample(struct sampling *s, const char *name)
 		full_path_error = sigma;
 	}
 	/* 6.8 standard errors for the level, 1.645 for 95 % to find. */
-	printf("%-42s %u vertices, whole %.4f, worst t %+.2f, finds %.1f %% on it and %.1f %% on a bin, failed %.2g\n", name, s->count, whole,
-	       worst, 845 * full_path_error, 845 * error, (double)failures / (double)n);
+	printf("%-42s %u vertices, whole %.4f, worst t %+.2f, finds %.1f %% on it and %.1f %% on a bin, failed %.2g\n",
+	       name, s->count, whole, worst, 845 * full_path_error, 845 * error, (double)failures / (double)n);
 	assert_true(right);
 	assert_true((double)failures < 0.002 * (double)n + 3);
 }
@@ -294,7 +299,8 @@ static void test_example(void **state)
 	struct world *w = room_of(e->room);
 	struct starts starts;
 	starts_context(&c, w, 1, e->edges, counters);
-	m = (struct mutation_ctx){.path = &c, .seed = stats_seed(name), .limits = walk_limits_of(&accuracy_settings_default)};
+	m = (struct mutation_ctx){
+		.path = &c, .seed = stats_seed(name), .limits = walk_limits_of(&accuracy_settings_default)};
 	starts_init(&starts, &c, m.seed, 0, 12000);
 	s = (struct sampling){.example = e, .ops = mutation_find(e->strategy, strlen(e->strategy)), .x = &x, .y = &y};
 	list_vertices(&s);
@@ -318,6 +324,7 @@ int main(void)
 	enum { EXAMPLES = sizeof examples / sizeof *examples };
 	struct CMUnitTest tests[EXAMPLES];
 	for (size_t i = 0; i < EXAMPLES; i++)
-		tests[i] = (struct CMUnitTest){examples[i].strategy, test_example, NULL, NULL, (void *)(uintptr_t)&examples[i]};
+		tests[i] = (struct CMUnitTest){examples[i].strategy, test_example, NULL, NULL,
+					       (void *)(uintptr_t)&examples[i]};
 	return _cmocka_run_group_tests("sampled", tests, EXAMPLES, NULL, NULL);
 }

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Halving the tolerances of the walks, there and back, changes no image: the same states, the same random numbers, one
- * proposal each with the tolerances as they are and with half of them. What the chain would put on the film, expected values
- * and all, is compared block by block; differences of pairs leave hardly any noise, so that with
- * 95 % probability 0.4 % on a block is found. t between 16 groups, level 1e-6 a comparison. Where both arrive, the film points
- * are the same to a fiftieth of a pixel.
+ * proposal each with the tolerances as they are and with half of them. What the chain would put on the film, expected
+ * values and all, is compared block by block; differences of pairs leave hardly any noise, so that with 95 %
+ * probability 0.4 % on a block is found. t between 16 groups, level 1e-6 a comparison. Where both arrive, the film
+ * points are the same to a fiftieth of a pixel.
  */
 #include "tests/support/dice.h"
 #include "tests/support/rooms.h"
@@ -115,10 +115,11 @@ static void check(const struct room *room, const struct mutation_ops *ops)
 		worst = fmax(worst, fabs(m.mean));
 		error = fmax(error, m.error);
 	}
-	print_message("%-32s %6llu pairs, %5.2f %% arrive with one tolerance only; film points differ by up to %.1e pixels; blocks by up to "
-		      "%.3f %%, finds %.3f %%\n",
-		      test, (unsigned long long)t.proposals, 100 * (double)t.one_only / (double)t.proposals, t.farthest, 100 * worst,
-		      100 * 9.4 * error);
+	print_message(
+		"%-32s %6llu pairs, %5.2f %% arrive with one tolerance only; film points differ by up to %.1e pixels; blocks by up to "
+		"%.3f %%, finds %.3f %%\n",
+		test, (unsigned long long)t.proposals, 100 * (double)t.one_only / (double)t.proposals, t.farthest,
+		100 * worst, 100 * 9.4 * error);
 	assert_true(t.both * 5 > t.proposals && t.farthest < 0.02);
 	assert_true(dice_count(STARTS) < STARTS || 9.4 * error < 0.004);
 	world_free(w);

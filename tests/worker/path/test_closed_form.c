@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Images that are known without rendering: furnaces, directly lit planes, two plates; and scenes at the edge of what numbers
- * can hold. Statistics as in tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
+ * Images that are known without rendering: furnaces, directly lit planes, two plates; and scenes at the edge of what
+ * numbers can hold. Statistics as in tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
  */
 #include "tests/support/agree.h"
 #include "tests/support/dice.h"
@@ -25,8 +25,8 @@ struct effort {
 	uint64_t path, bdpt, pssmlt;
 };
 
-/* Where every sample is the same the groups are, too, but for the rounding of tiles to float and what a hair of roughness
- * loses: no statistics of that. */
+/* Where every sample is the same the groups are, too, but for the rounding of tiles to float and what a hair of
+ * roughness loses: no statistics of that. */
 static void forgive_rounding(struct agree_image *image, double expected)
 {
 	for (uint32_t g = 0; g < image->groups; g++)
@@ -63,11 +63,15 @@ static void check_constant(const char *name, struct world *w, double radiance, s
 static void test_furnace(void **state)
 {
 	(void)state;
-	check_constant("furnace",
-		       world_of_text(16, 16, DEPTH("5") SENSOR("0.2,0.1,0.3", "0.5,1,0")
-				     "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'>"
-				     "<float name='reflectance' value='.5'/></bsdf><emitter type='area'/></shape>"),
-		       1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct effort){64, 256, 0});
+	check_constant(
+		"furnace",
+		world_of_text(
+			16, 16,
+			DEPTH("5") SENSOR(
+				"0.2,0.1,0.3",
+				"0.5,1,0") "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'>"
+					   "<float name='reflectance' value='.5'/></bsdf><emitter type='area'/></shape>"),
+		1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct effort){64, 256, 0});
 }
 
 #define SKY "<emitter type='constant'><float name='radiance' value='.7'/></emitter>"
@@ -77,36 +81,47 @@ static void test_furnace(void **state)
 static void test_invisible(void **state)
 {
 	(void)state;
-	check_constant("invisible glass", world_of_text(16, 16, DEPTH("128") SENSOR("0,0,4", "0,0,0") SKY BALL("<bsdf type='dielectric'/>")),
-		       0.7, (struct effort){128, 64, 0});
+	check_constant(
+		"invisible glass",
+		world_of_text(16, 16, DEPTH("128") SENSOR("0,0,4", "0,0,0") SKY BALL("<bsdf type='dielectric'/>")), 0.7,
+		(struct effort){128, 64, 0});
 	check_constant("invisible mirror",
-		       world_of_text(16, 16, DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY
-				     BALL("<bsdf type='conductor'><string name='material' value='none'/></bsdf>")),
+		       world_of_text(16, 16,
+				     DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
+					     "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")),
 		       0.7, (struct effort){64, 64, 16384});
-	check_constant("invisible glass in glass",
-		       world_of_text(16, 16, DEPTH("128") SENSOR("0,0,4", "0,0,0") SKY BALL("<bsdf type='dielectric'/>")
-				     "<shape type='sphere'><float name='radius' value='.5'/><bsdf type='dielectric'><float name='int_ior' value='1'/>"
-				     "<float name='ext_ior' value='1.5046'/></bsdf></shape>"),
-		       0.7, (struct effort){256, 0, 0});
-	/* Rough, but so little that what a model of single scattering loses (0.065 % +- 0.007 % of this image at alpha 0.01, and
-	 * with its square) is far below what is found. */
+	check_constant(
+		"invisible glass in glass",
+		world_of_text(
+			16, 16,
+			DEPTH("128") SENSOR("0,0,4", "0,0,0") SKY BALL(
+				"<bsdf type='dielectric'/>") "<shape type='sphere'><float name='radius' value='.5'/><bsdf type='dielectric'><float name='int_ior' value='1'/>"
+							     "<float name='ext_ior' value='1.5046'/></bsdf></shape>"),
+		0.7, (struct effort){256, 0, 0});
+	/* Rough, but so little that what a model of single scattering loses (0.065 % +- 0.007 % of this image at alpha
+	 * 0.01, and with its square) is far below what is found. */
 	check_constant("invisible rough glass",
-		       world_of_text(16, 16, DEPTH("64") SENSOR("0,0,4", "0,0,0") SKY
-				     BALL("<bsdf type='roughdielectric'><float name='alpha' value='.001'/></bsdf>")),
+		       world_of_text(16, 16,
+				     DEPTH("64") SENSOR("0,0,4", "0,0,0") SKY BALL(
+					     "<bsdf type='roughdielectric'><float name='alpha' value='.001'/></bsdf>")),
 		       0.7, (struct effort){256, 256, 0});
-	check_constant("invisible rough metal",
-		       world_of_text(16, 16, DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY
-				     BALL("<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.001'/></bsdf>")),
-		       0.7, (struct effort){128, 64, 0});
+	check_constant(
+		"invisible rough metal",
+		world_of_text(
+			16, 16,
+			DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
+				"<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.001'/></bsdf>")),
+		0.7, (struct effort){128, 64, 0});
 	/* White diffuse: every path ends in the sky. */
 	check_constant("invisible white ball",
-		       world_of_text(16, 16, DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY
-				     BALL("<bsdf type='diffuse'><float name='reflectance' value='1'/></bsdf>")),
+		       world_of_text(16, 16,
+				     DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
+					     "<bsdf type='diffuse'><float name='reflectance' value='1'/></bsdf>")),
 		       0.7, (struct effort){1536, 1024, 0});
 }
 
-/* A lamp at height h over the floor: a square of side a that looks down, by the midpoint rule, or a sphere of radius r, all of
- * it above the horizon: pi r^2 / d^2 times the cosine. Irradiance at (x, z) from its foot, radiance 1. */
+/* A lamp at height h over the floor: a square of side a that looks down, by the midpoint rule, or a sphere of radius r,
+ * all of it above the horizon: pi r^2 / d^2 times the cosine. Irradiance at (x, z) from its foot, radiance 1. */
 struct lamp {
 	double a, r, h;
 };
@@ -118,16 +133,17 @@ static double irradiance(const struct lamp *l, double x, double z)
 	if (l->r > 0)
 		return M_PI * l->r * l->r * h / pow(x * x + z * z + h * h, 1.5);
 	for (int i = 0; i < N * N; i++) {
-		double dx = a * ((i % N + 0.5) / N - 0.5) - x, dz = a * ((i / N + 0.5) / N - 0.5) - z, d2 = dx * dx + dz * dz + h * h;
+		double dx = a * ((i % N + 0.5) / N - 0.5) - x, dz = a * ((i / N + 0.5) / N - 0.5) - z,
+		       d2 = dx * dx + dz * dz + h * h;
 		sum += h * h / (d2 * d2);
 	}
 	return sum * a * a / (N * N);
 }
 
-/* Mean over the block of a film of n x n pixels, seen straight from above: block b of AGREE_BLOCKS squared. The camera of 40
- * degrees at height `up` sees the floor's square of side 2 up tan 20. Film x is +x, film y is +z. */
-static void expect_floor(const char *test, const struct agree_image *image, double up, const struct lamp *lamp, double x, double z,
-			 double scale)
+/* Mean over the block of a film of n x n pixels, seen straight from above: block b of AGREE_BLOCKS squared. The camera
+ * of 40 degrees at height `up` sees the floor's square of side 2 up tan 20. Film x is +x, film y is +z. */
+static void expect_floor(const char *test, const struct agree_image *image, double up, const struct lamp *lamp,
+			 double x, double z, double scale)
 {
 	enum { N = 24 };
 	static struct agree_image part;
@@ -135,7 +151,8 @@ static void expect_floor(const char *test, const struct agree_image *image, doub
 	for (int c = 0; c <= AGREE_CELLS; c++) {
 		double sum = 0;
 		for (int i = 0; c < AGREE_CELLS && i < N * N; i++) {
-			double u = (c % AGREE_BLOCKS + (i % N + 0.5) / N) / AGREE_BLOCKS, v = (c / AGREE_BLOCKS + (i / N + 0.5) / N) / AGREE_BLOCKS;
+			double u = (c % AGREE_BLOCKS + (i % N + 0.5) / N) / AGREE_BLOCKS,
+			       v = (c / AGREE_BLOCKS + (i / N + 0.5) / N) / AGREE_BLOCKS;
 			sum += scale * irradiance(lamp, half * (2 * u - 1) - x, half * (2 * v - 1) - z) / (N * N);
 		}
 		whole += c < AGREE_CELLS ? sum / AGREE_CELLS : 0;
@@ -157,7 +174,8 @@ static void check_lit_floor(const char *name, struct lamp lamp, const char *xml,
 		uint64_t spp;
 	} runs[] = {{"path", e.path}, {"bdpt", e.bdpt}, {"pssmlt", e.pssmlt}};
 	struct world *w = world_of_text(
-		16, 16, "%s<shape type='rectangle'><transform name='to_world'><scale value='20'/><rotate x='1' angle='-90'/></transform>"
+		16, 16,
+		"%s<shape type='rectangle'><transform name='to_world'><scale value='20'/><rotate x='1' angle='-90'/></transform>"
 		"<bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf></shape>"
 		"<sensor type='perspective'><float name='fov' value='40'/><transform name='to_world'><lookat origin='0,4,0' target='0,0,0' up='0,0,-1'/>"
 		"</transform><film type='hdrfilm'><rfilter type='box'/></film></sensor>%s",
@@ -177,20 +195,24 @@ static void check_lit_floor(const char *name, struct lamp lamp, const char *xml,
 static void test_lit_floor(void **state)
 {
 	(void)state;
-	check_lit_floor("floor under a square", (struct lamp){1, 0, 2},
-			"<shape type='rectangle'><transform name='to_world'><scale value='.5'/><rotate x='1' angle='90'/>"
-			"<translate x='3' y='2' z='1'/></transform><emitter type='area'/></shape>",
-			(struct effort){3072, 6144, 32768});
-	check_lit_floor("floor under a sphere", (struct lamp){0, 0.4, 2},
-			"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='.4'/><emitter type='area'/></shape>",
-			(struct effort){1024, 2048, 0});
-	check_lit_floor("floor under a tiny sphere", (struct lamp){0, 1e-5, 2},
-			"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='1e-5'/><emitter type='area'/></shape>",
-			(struct effort){512, 0, 0});
+	check_lit_floor(
+		"floor under a square", (struct lamp){1, 0, 2},
+		"<shape type='rectangle'><transform name='to_world'><scale value='.5'/><rotate x='1' angle='90'/>"
+		"<translate x='3' y='2' z='1'/></transform><emitter type='area'/></shape>",
+		(struct effort){3072, 6144, 32768});
+	check_lit_floor(
+		"floor under a sphere", (struct lamp){0, 0.4, 2},
+		"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='.4'/><emitter type='area'/></shape>",
+		(struct effort){1024, 2048, 0});
+	check_lit_floor(
+		"floor under a tiny sphere", (struct lamp){0, 1e-5, 2},
+		"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='1e-5'/><emitter type='area'/></shape>",
+		(struct effort){512, 0, 0});
 }
 
-/* Two plates of reflectance rho, the lower shines with 1. Between infinite plates every ray from one meets the other. Radiance of the lower: 1 + rho^2 + rho^4 ..., of the upper rho + rho^3 ... The plates are 4000
- * gaps wide, which leaves out some 1e-6 of the light that the camera in the middle sees. */
+/* Two plates of reflectance rho, the lower shines with 1. Between infinite plates every ray from one meets the other.
+ * Radiance of the lower: 1 + rho^2 + rho^4 ..., of the upper rho + rho^3 ... The plates are 4000 gaps wide, which
+ * leaves out some 1e-6 of the light that the camera in the middle sees. */
 static void test_plates(void **state)
 {
 	(void)state;
@@ -222,44 +244,60 @@ static void run_all(const char *name, struct world *w, double mean[4])
 	world_free(w);
 }
 
-#define FLOOR "<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='-90'/></transform>" \
-	      "<bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf></shape>"
+#define FLOOR                                                                                                          \
+	"<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='-90'/></transform>" \
+	"<bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf></shape>"
 
 static void test_hard(void **state)
 {
 	(void)state;
 	double mean[4];
 	/* A sun: half a degree, radiance 1e9, 100 units away. */
-	run_all("sun", world_of_text(16, 16, DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
-				     "<shape type='sphere'><point name='center' x='60' y='80' z='0'/><float name='radius' value='.5'/>"
-				     "<emitter type='area'><float name='radiance' value='1e9'/></emitter></shape>"),
+	run_all("sun",
+		world_of_text(
+			16, 16,
+			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
+			"<shape type='sphere'><point name='center' x='60' y='80' z='0'/><float name='radius' value='.5'/>"
+			"<emitter type='area'><float name='radiance' value='1e9'/></emitter></shape>"),
 		mean);
 	assert_true(mean[0] > 0 && mean[1] > 0);
 	/* A light of 1e-6 of the scene's size. */
-	run_all("tiny light", world_of_text(16, 16, DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
-					    "<shape type='sphere'><point name='center' x='0' y='1' z='0'/><float name='radius' value='2e-6'/>"
-					    "<emitter type='area'><float name='radiance' value='1e12'/></emitter></shape>"),
+	run_all("tiny light",
+		world_of_text(
+			16, 16,
+			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
+			"<shape type='sphere'><point name='center' x='0' y='1' z='0'/><float name='radius' value='2e-6'/>"
+			"<emitter type='area'><float name='radiance' value='1e12'/></emitter></shape>"),
 		mean);
 	assert_true(mean[0] > 0 && mean[1] > 0);
 	/* Grazing: the camera lies almost in the floor. */
-	run_all("grazing", world_of_text(16, 16, DEPTH("6") SENSOR("0,1e-6,1.9", "0,0,-3") FLOOR SKY
-					 "<shape type='sphere'><point name='center' x='0' y='.3' z='0'/><float name='radius' value='.3'/>"
-					 "<bsdf type='roughdielectric'><float name='alpha' value='.01'/></bsdf></shape>"),
+	run_all("grazing",
+		world_of_text(
+			16, 16,
+			DEPTH("6") SENSOR("0,1e-6,1.9", "0,0,-3") FLOOR SKY
+			"<shape type='sphere'><point name='center' x='0' y='.3' z='0'/><float name='radius' value='.3'/>"
+			"<bsdf type='roughdielectric'><float name='alpha' value='.01'/></bsdf></shape>"),
 		mean);
 	assert_true(mean[0] > 0);
 	/* Lights so different that the fainter is never chosen. */
-	run_all("faint light", world_of_text(16, 16, DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
-					     "<shape type='sphere'><point name='center' x='0' y='.5' z='0'/><float name='radius' value='.5'/>"
-					     "<emitter type='area'><float name='radiance' value='1e-300'/></emitter></shape>"
-					     "<shape type='sphere'><point name='center' x='3' y='3' z='0'/><float name='radius' value='.5'/>"
-					     "<emitter type='area'><float name='radiance' value='1e30'/></emitter></shape>"),
+	run_all("faint light",
+		world_of_text(
+			16, 16,
+			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
+			"<shape type='sphere'><point name='center' x='0' y='.5' z='0'/><float name='radius' value='.5'/>"
+			"<emitter type='area'><float name='radiance' value='1e-300'/></emitter></shape>"
+			"<shape type='sphere'><point name='center' x='3' y='3' z='0'/><float name='radius' value='.5'/>"
+			"<emitter type='area'><float name='radiance' value='1e30'/></emitter></shape>"),
 		mean);
 	/* A sliver of a mirror, a sliver of a lamp. */
-	run_all("slivers", world_of_text(16, 16, DEPTH("6") SENSOR("0,2,4", "0,0,0") FLOOR
-					 "<shape type='rectangle'><transform name='to_world'><scale x='1' y='1e-6' z='1'/><rotate x='1' angle='90'/>"
-					 "<translate y='1'/></transform><emitter type='area'><float name='radiance' value='1e6'/></emitter></shape>"
-					 "<shape type='rectangle'><transform name='to_world'><scale x='1e-6' y='1' z='1'/><translate y='.5'/></transform>"
-					 "<bsdf type='conductor'/></shape>"),
+	run_all("slivers",
+		world_of_text(
+			16, 16,
+			DEPTH("6") SENSOR("0,2,4", "0,0,0") FLOOR
+			"<shape type='rectangle'><transform name='to_world'><scale x='1' y='1e-6' z='1'/><rotate x='1' angle='90'/>"
+			"<translate y='1'/></transform><emitter type='area'><float name='radiance' value='1e6'/></emitter></shape>"
+			"<shape type='rectangle'><transform name='to_world'><scale x='1e-6' y='1' z='1'/><translate y='.5'/></transform>"
+			"<bsdf type='conductor'/></shape>"),
 		mean);
 	assert_true(mean[0] > 0);
 }
@@ -270,8 +308,19 @@ static void black(const char *text)
 	struct world *w = world_of_text(16, 16, "%s%s", SENSOR("0,2,4", "0,0,0"), text);
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		const struct render_integrator *r = render_integrator_at(i);
-		struct plan p = {.kind = r->kind, .width = 16, .height = 16, .crop_width = 16, .crop_height = 16, .groups = 2, .parts = 1,
-				 .chains = r->kind == PLAN_CHAINS ? 4 : 0, .bootstrap = 64, .epoch = 16, .rounds = 1, .min_depth = 1, .max_depth = 50};
+		struct plan p = {.kind = r->kind,
+				 .width = 16,
+				 .height = 16,
+				 .crop_width = 16,
+				 .crop_height = 16,
+				 .groups = 2,
+				 .parts = 1,
+				 .chains = r->kind == PLAN_CHAINS ? 4 : 0,
+				 .bootstrap = 64,
+				 .epoch = 16,
+				 .rounds = 1,
+				 .min_depth = 1,
+				 .max_depth = 50};
 		struct render_summary summary;
 		struct error e = {""};
 		snprintf(p.integrator, sizeof p.integrator, "%s", r->name);

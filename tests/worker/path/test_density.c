@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The density of every technique for a given path, whichever technique made it (the balance heuristic stands and falls with
- * that). Sub-paths are walked at random and joined in all ways; the densities of all their vertices, in both directions, are
- * worked out here from positions, normals and the BSDFs' own pdfs alone. Then
+ * The density of every technique for a given path, whichever technique made it (the balance heuristic stands and falls
+ * with that). Sub-paths are walked at random and joined in all ways; the densities of all their vertices, in both
+ * directions, are worked out here from positions, normals and the BSDFs' own pdfs alone. Then
  *   - the walk's own pdf and pdf_rev must be these,
  *   - beta times all densities must be the integrand, written down here once more,
  *   - path_technique_ratios must give their quotients, for the path relabelled as if each technique had made it.
@@ -22,7 +22,8 @@
 
 enum { DEPTH = 7 };
 
-/* x[0] on the emitter .. x[k] at the camera; from_light[i], from_camera[i]: density of x[i] as generated from that side. */
+/* x[0] on the emitter .. x[k] at the camera; from_light[i], from_camera[i]: density of x[i] as generated from that
+ * side. */
 struct route {
 	unsigned k;
 	struct path_vertex x[DEPTH + 2];
@@ -70,8 +71,9 @@ static struct emitter_point emitter_point_of(const struct path_vertex *v)
 }
 
 /* The specular lobe that leads from `from` over `at` to `to`. */
-static struct bsdf_sample specular_lobe(const struct path_context *c, const struct path_vertex *from, const struct path_vertex *at,
-					const struct path_vertex *to, enum transport transport)
+static struct bsdf_sample specular_lobe(const struct path_context *c, const struct path_vertex *from,
+					const struct path_vertex *at, const struct path_vertex *to,
+					enum transport transport)
 {
 	struct bsdf_point p = {at->x.u, at->x.v, &c->wl, transport};
 	vec3 wo = frame_to_local(&at->x.sh, towards(at, from)), wi = frame_to_local(&at->x.sh, towards(at, to));
@@ -86,11 +88,11 @@ static struct bsdf_sample specular_lobe(const struct path_context *c, const stru
 	return (struct bsdf_sample){.pdf = 0};
 }
 
-/* Density of `to`, generated from `at`, come from `from`. Specular lobes: a distribution in the direction towards the light,
- * projected on the geometric normal. Towards the camera the two solid angles are to each other as the squared indices and
- * the cosines with the shading normal, about which light is refracted (etendue). */
-static double scattered(const struct path_context *c, const struct path_vertex *from, const struct path_vertex *at, bool delta,
-			const struct path_vertex *to, enum transport transport)
+/* Density of `to`, generated from `at`, come from `from`. Specular lobes: a distribution in the direction towards the
+ * light, projected on the geometric normal. Towards the camera the two solid angles are to each other as the squared
+ * indices and the cosines with the shading normal, about which light is refracted (etendue). */
+static double scattered(const struct path_context *c, const struct path_vertex *from, const struct path_vertex *at,
+			bool delta, const struct path_vertex *to, enum transport transport)
 {
 	vec3 wo = frame_to_local(&at->x.sh, towards(at, from)), wi = frame_to_local(&at->x.sh, towards(at, to));
 	if (!delta) {
@@ -158,7 +160,8 @@ static double relative(double a, double b)
 }
 
 /* The path that technique s made. */
-static void take_route(const struct path_context *c, unsigned s, unsigned t, const struct path_vertex *light, struct route *r)
+static void take_route(const struct path_context *c, unsigned s, unsigned t, const struct path_vertex *light,
+		       struct route *r)
 {
 	*r = (struct route){.k = s + t - 1};
 	for (unsigned i = 0; i < s; i++)
@@ -177,8 +180,9 @@ static void fill_densities(const struct path_context *c, struct route *r)
 	}
 }
 
-/* Directions between points are 1e-13 off at the distances and cosines allowed; lobes as narrow as alpha 0.1 take that times
- * 1e3. A hit that Embree's floats put just beside its triangle is moved by up to 1e-7 off the ray: rare, and counted. */
+/* Directions between points are 1e-13 off at the distances and cosines allowed; lobes as narrow as alpha 0.1 take that
+ * times 1e3. A hit that Embree's floats put just beside its triangle is moved by up to 1e-7 off the ray: rare, and
+ * counted. */
 static void compare(struct tally *tally, double a, double b)
 {
 	if (relative(a, b) < 1e-9)
@@ -193,7 +197,8 @@ static void check_walk(const struct route *r, unsigned s, struct tally *tally)
 {
 	for (unsigned i = 0; i <= r->k; i++) {
 		bool light = i < s;
-		double own = light ? r->from_light[i] : r->from_camera[i], other = light ? r->from_camera[i] : r->from_light[i];
+		double own = light ? r->from_light[i] : r->from_camera[i],
+		       other = light ? r->from_camera[i] : r->from_light[i];
 		compare(tally, r->x[i].pdf, own);
 		/* Two more vertices of the same sub-path have made the reverse density. */
 		if (light ? i + 3 <= s : i >= s + 2 && i < r->k)
@@ -296,19 +301,22 @@ static void check_ratios(const struct path_context *c, struct route *r, struct t
 		if (!exists(c, r, s) || most - p[s] > 230)
 			continue;
 		relabel(r, s, &joined);
-		for (unsigned max_s = s > 1 ? PATH_MAX_EDGES : 1; max_s <= PATH_MAX_EDGES; max_s += PATH_MAX_EDGES - 1) {
+		for (unsigned max_s = s > 1 ? PATH_MAX_EDGES : 1; max_s <= PATH_MAX_EDGES;
+		     max_s += PATH_MAX_EDGES - 1) {
 			path_technique_ratios(c, &joined, max_s, ratio);
 			double sum = 0;
 			for (unsigned j = 0; j <= r->k; j++) {
 				double expected = j <= max_s ? exp(p[j] - p[s]) : 0;
 				sum += expected;
 				if (!(relative(ratio[j], expected) < 1e-9))
-					fail_msg("technique %u of %u edges, made by %u: %.12g instead of %.12g", j, r->k, s, ratio[j], expected);
+					fail_msg("technique %u of %u edges, made by %u: %.12g instead of %.12g", j,
+						 r->k, s, ratio[j], expected);
 				tally->worst_ratio = fmax(tally->worst_ratio, relative(ratio[j], expected));
 			}
 			double weight = path_balance_weight(c, &joined, max_s);
 			if (!(relative(weight, 1 / sum) < 1e-9))
-				fail_msg("made by %u of %u, up to %u: weight %.12g, not %.12g", s, r->k, max_s, weight, 1 / sum);
+				fail_msg("made by %u of %u, up to %u: weight %.12g, not %.12g", s, r->k, max_s, weight,
+					 1 / sum);
 		}
 		tally->relabelled++;
 	}
@@ -369,8 +377,11 @@ static struct tally check_world(const char *name, struct world *w, size_t walks)
 	static struct path_context c;
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	struct tally tally = {0};
-	c = (struct path_context){.w = w, .window = {-1, -1, w->settings.width + 2.0, w->settings.height + 2.0}, .min_depth = 1,
-				  .max_depth = DEPTH, .counters = counters};
+	c = (struct path_context){.w = w,
+				  .window = {-1, -1, w->settings.width + 2.0, w->settings.height + 2.0},
+				  .min_depth = 1,
+				  .max_depth = DEPTH,
+				  .counters = counters};
 	for (uint64_t i = 0; i < dice_count(walks); i++) {
 		struct sampler_random s;
 		double film[2];
@@ -395,16 +406,18 @@ static struct tally check_world(const char *name, struct world *w, size_t walks)
 				if (t + j >= 2 && joins(&c, j, t))
 					check_route(&c, j, t, &tally);
 	}
-	print_message("%s: %zu paths (%zu with specular vertices, %zu from infinity, %zu too flat to tell), %zu relabelled\n", name,
-		      tally.routes, tally.with_delta, tally.infinite, tally.skipped, tally.relabelled);
-	print_message("  worst: pdf and beta (of %zu vertices) %.1e, ratio %.1e; %zu off the ray\n", tally.betas, tally.worst,
-		      tally.worst_ratio, tally.off);
+	print_message(
+		"%s: %zu paths (%zu with specular vertices, %zu from infinity, %zu too flat to tell), %zu relabelled\n",
+		name, tally.routes, tally.with_delta, tally.infinite, tally.skipped, tally.relabelled);
+	print_message("  worst: pdf and beta (of %zu vertices) %.1e, ratio %.1e; %zu off the ray\n", tally.betas,
+		      tally.worst, tally.worst_ratio, tally.off);
 	assert_true(tally.off <= tally.routes / 200 + 10);
 	assert_true(tally.routes > dice_count(walks) && tally.relabelled > 2 * tally.routes);
 	world_free(w);
 	return tally;
 }
 
+/* clang-format off */
 #define BOX                                                                                                                    \
 	"<shape type='cube'><transform name='to_world'><scale value='3'/></transform><bsdf type='diffuse'>"                       \
 	"<float name='reflectance' value='.7'/></bsdf></shape>"
@@ -413,18 +426,26 @@ static struct tally check_world(const char *name, struct world *w, size_t walks)
 	"<emitter type='area'><float name='radiance' value='5'/></emitter></shape>"                                               \
 	"<shape type='rectangle'><transform name='to_world'><rotate x='1' angle='90'/><translate y='2.5'/></transform>"           \
 	"<bsdf type='diffuse'/><emitter type='area'><float name='radiance' value='3'/></emitter></shape>"
-#define BALL(x, y, z, bsdf)                                                                                                    \
-	"<shape type='sphere'><point name='center' x='" x "' y='" y "' z='" z "'/><float name='radius' value='.6'/>" bsdf "</shape>"
+/* clang-format on */
+#define BALL(x, y, z, bsdf)                                                   \
+	"<shape type='sphere'><point name='center' x='" x "' y='" y "' z='" z \
+	"'/><float name='radius' value='.6'/>" bsdf "</shape>"
 
 static void test_diffuse_and_rough(void **state)
 {
 	(void)state;
-	check_world("diffuse and rough",
-		    world_of_text(32, 24, SENSOR("0,0,2.9", "0,0,0") BOX LAMPS
-				  BALL("0", "0", "0", "<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.3'/></bsdf>")
-				  BALL("1.4", "-.5", "0", "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>")
-				  BALL("-1.4", "-.7", "0", "<bsdf type='phong'><float name='exponent' value='12'/></bsdf>")),
-		    12000);
+	check_world(
+		"diffuse and rough",
+		world_of_text(
+			32, 24,
+			SENSOR("0,0,2.9", "0,0,0") BOX LAMPS BALL(
+				"0", "0", "0",
+				"<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.3'/></bsdf>")
+				BALL("1.4", "-.5", "0",
+				     "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>")
+					BALL("-1.4", "-.7", "0",
+					     "<bsdf type='phong'><float name='exponent' value='12'/></bsdf>")),
+		12000);
 }
 
 static void test_specular(void **state)
@@ -432,15 +453,21 @@ static void test_specular(void **state)
 	(void)state;
 	struct tally t = check_world(
 		"specular",
-		world_of_text(32, 24, SENSOR("0,0,2.9", "0,0,0") BOX LAMPS
-			      BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
-			      BALL("1.2", "-.5", "0", "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")
-			      BALL("-1.3", "-.7", "0", "<bsdf type='dielectric'><float name='int_ior' value='1'/>"
-						      "<float name='ext_ior' value='1.4'/></bsdf>")
-			      BALL("1.3", "-1.2", "1", "<bsdf type='dielectric'><string name='int_ior' value='sf11'/>"
-						       "<boolean name='dispersion' value='true'/></bsdf>")
-			      BALL("-.2", "-1.2", "1", "<bsdf type='roughdielectric'><float name='alpha' value='.1'/>"
-						       "<float name='int_cauchy_b' value='.02'/></bsdf>")),
+		world_of_text(
+			32, 24,
+			SENSOR("0,0,2.9", "0,0,0") BOX LAMPS BALL(
+				"0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
+				BALL("1.2", "-.5", "0",
+				     "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")
+					BALL("-1.3", "-.7", "0",
+					     "<bsdf type='dielectric'><float name='int_ior' value='1'/>"
+					     "<float name='ext_ior' value='1.4'/></bsdf>")
+						BALL("1.3", "-1.2", "1",
+						     "<bsdf type='dielectric'><string name='int_ior' value='sf11'/>"
+						     "<boolean name='dispersion' value='true'/></bsdf>")
+							BALL("-.2", "-1.2", "1",
+							     "<bsdf type='roughdielectric'><float name='alpha' value='.1'/>"
+							     "<float name='int_cauchy_b' value='.02'/></bsdf>")),
 		20000);
 	assert_true(t.with_delta > t.routes / 20);
 }
@@ -450,43 +477,57 @@ static void test_infinity(void **state)
 	(void)state;
 	struct tally t = check_world(
 		"infinity",
-		world_of_text(32, 24, SENSOR("0,1,4.9", "0,0,0") LAMPS "<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
-			      BALL("0", "0", "0", "<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.3'/></bsdf>")
-			      BALL("1.2", "-.5", "0", "<bsdf type='dielectric'/>") BALL("-1.3", "-.7", "0", "<bsdf type='diffuse'/>")
-			      "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>"
-			      "<translate y='-1.5'/></transform><bsdf type='phong'/></shape>"),
+		world_of_text(
+			32, 24,
+			SENSOR("0,1,4.9", "0,0,0") LAMPS
+			"<emitter type='constant'><float name='radiance' value='.4'/></emitter>" BALL(
+				"0", "0", "0",
+				"<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.3'/></bsdf>")
+				BALL("1.2", "-.5", "0", "<bsdf type='dielectric'/>") BALL(
+					"-1.3", "-.7", "0",
+					"<bsdf type='diffuse'/>") "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>"
+								  "<translate y='-1.5'/></transform><bsdf type='phong'/></shape>"),
 		20000);
 	assert_true(t.infinite > t.routes / 10);
 }
 
+/* clang-format off */
 #define DELTA_LIGHTS                                                                                                                   \
 	"<emitter type='point'><point name='position' x='.5' y='2' z='1'/><float name='intensity' value='40'/></emitter>"         \
 	"<emitter type='directional'><vector name='direction' x='.3' y='-1' z='-.2'/><float name='irradiance' value='2'/></emitter>" \
 	"<emitter type='spot'><float name='cutoff_angle' value='50'/><float name='intensity' value='100'/>"                       \
 	"<transform name='to_world'><lookat origin='-1,2,1.5' target='0,0,0' up='1,0,0'/></transform></emitter>"
+/* clang-format on */
 
 /* Lights that no path hits by chance, beside some that can be hit. */
 static void test_delta_lights(void **state)
 {
 	(void)state;
 	struct world *w = world_of_text(
-		32, 24, SENSOR("0,1,4.9", "0,0,0") DELTA_LIGHTS "%s<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
+		32, 24,
+		SENSOR("0,1,4.9", "0,0,0") DELTA_LIGHTS
+		"%s<emitter type='constant'><float name='radiance' value='.4'/></emitter>"
 		"<shape type='sphere'><point name='center' x='-1' y='1.5' z='.5'/><float name='radius' value='.4'/>"
 		"<emitter type='area'><float name='radiance' value='5'/></emitter></shape>",
-		BALL("0", "0", "0", "<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.3'/></bsdf>")
-		BALL("1.2", "-.5", "0", "<bsdf type='dielectric'/>") BALL("-1.3", "-.7", "0", "<bsdf type='diffuse'/>")
-		"<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>"
-		"<translate y='-1.5'/></transform><bsdf type='phong'/></shape>");
+		BALL("0", "0", "0",
+		     "<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.3'/></bsdf>")
+			BALL("1.2", "-.5", "0", "<bsdf type='dielectric'/>") BALL(
+				"-1.3", "-.7", "0",
+				"<bsdf type='diffuse'/>") "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/>"
+							  "<translate y='-1.5'/></transform><bsdf type='phong'/></shape>");
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		assert_true(w->emitter_pdf[i] > 0.01);
 	struct tally t = check_world("delta lights", w, 30000);
 	assert_true(t.with_delta > t.routes / 100);
 	/* Nothing but such lights. */
-	t = check_world("delta lights in a box",
-			world_of_text(32, 24, SENSOR("0,0,2.9", "0,0,0") BOX DELTA_LIGHTS "%s",
-				      BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
-				      BALL("1.2", "-.5", "0", "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")),
-			6000);
+	t = check_world(
+		"delta lights in a box",
+		world_of_text(
+			32, 24, SENSOR("0,0,2.9", "0,0,0") BOX DELTA_LIGHTS "%s",
+			BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
+				BALL("1.2", "-.5", "0",
+				     "<bsdf type='conductor'><string name='material' value='Au'/></bsdf>")),
+		6000);
 	assert_true(t.with_delta > t.routes / 20);
 }
 
@@ -498,9 +539,11 @@ static void test_lens(void **state)
 		"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='.7'/>"
 		"<float name='focus_distance' value='1.5'/><transform name='to_world'><lookat origin='0,0,2.9' target='0,0,0' up='0,1,0'/>"
 		"</transform></sensor>";
-	struct world *w = world_of_text(32, 24, "%s%s", lens,
-					BOX LAMPS BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
-					BALL("1.4", "-.5", "0", "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>"));
+	struct world *w = world_of_text(
+		32, 24, "%s%s", lens,
+		BOX LAMPS BALL("0", "0", "0.5", "<bsdf type='dielectric'><float name='int_ior' value='1.5'/></bsdf>")
+			BALL("1.4", "-.5", "0",
+			     "<bsdf type='roughdielectric'><float name='alpha' value='.2'/></bsdf>"));
 	assert_true(w->effects.aperture);
 	check_world("lens", w, 8000);
 }
@@ -509,8 +552,7 @@ static void test_lens(void **state)
 static void test_bent_normals(void **state)
 {
 	(void)state;
-	static const char scene[] =
-		"<scene version='3.0.0'>" SENSOR("0,1,2.9", "0,-1,0") LAMPS
+	static const char scene[] = "<scene version='3.0.0'>" SENSOR("0,1,2.9", "0,-1,0") LAMPS
 		"<shape type='obj'><string name='filename' value='bent.obj'/><bsdf type='diffuse'/></shape>"
 		"<shape type='obj'><string name='filename' value='bent.obj'/><transform name='to_world'><scale value='.4'/><rotate x='1' angle='80'/>"
 		"<translate y='-.5'/></transform><bsdf type='roughdielectric'><float name='alpha' value='.4'/></bsdf></shape>"
@@ -522,19 +564,17 @@ static void test_bent_normals(void **state)
 	static const char bent[] = "v -3 -1 -3\nv 3 -1.2 -3\nv 3 -1 3\nv -3 -1.1 3\nv 0 -.7 0\n"
 				   "vn -.5 1 .3\nvn .4 1 -.4\nvn .6 1 .2\nvn -.2 1 .7\nvn .3 1 -.5\n"
 				   "f 1//1 5//5 2//2\nf 2//2 5//5 3//3\nf 3//3 5//5 4//4\nf 4//4 5//5 1//1\n";
-	const struct memory_file files[] = {{"bent.xml", scene, sizeof scene - 1}, {"bent.obj", bent, sizeof bent - 1}, {NULL, NULL, 0}};
+	const struct memory_file files[] = {
+		{"bent.xml", scene, sizeof scene - 1}, {"bent.obj", bent, sizeof bent - 1}, {NULL, NULL, 0}};
 	check_world("bent normals", world_of_files(32, 24, files), 20000);
 }
 
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_diffuse_and_rough),
-		cmocka_unit_test(test_specular),
-		cmocka_unit_test(test_infinity),
-		cmocka_unit_test(test_lens),
-		cmocka_unit_test(test_delta_lights),
-		cmocka_unit_test(test_bent_normals),
+		cmocka_unit_test(test_diffuse_and_rough), cmocka_unit_test(test_specular),
+		cmocka_unit_test(test_infinity),	  cmocka_unit_test(test_lens),
+		cmocka_unit_test(test_delta_lights),	  cmocka_unit_test(test_bent_normals),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

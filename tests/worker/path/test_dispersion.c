@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Paths through glass that disperses: bidirectional against plain path tracing, smooth and rough; and glass whose index hardly
- * varies, where paths carry one wavelength, against the plain glass, where they carry four. Levels and power: agree.h.
+ * Paths through glass that disperses: bidirectional against plain path tracing, smooth and rough; and glass whose index
+ * hardly varies, where paths carry one wavelength, against the plain glass, where they carry four. Levels and power:
+ * agree.h.
  */
 #include "tests/support/agree.h"
 #include "tests/support/stats.h"
@@ -18,13 +19,15 @@
 /* A ball on a floor under a sky: little noise but that of drawing one wavelength. */
 static struct world *sky_over(const char *bsdf)
 {
-	return world_of_text(32, 32,
-			     "<integrator type='path'><integer name='max_depth' value='4'/></integrator>" SENSOR("0,1,5", "0,-0.2,0")
-			     "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/>"
-			     "<translate y='-1'/></transform><bsdf type='diffuse'><rgb name='reflectance' value='0.4,0.6,0.7'/></bsdf></shape>"
-			     "<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>"
-			     "<shape type='sphere'><point name='center' value='0,-0.2,0'/><float name='radius' value='0.8'/>%s</shape>",
-			     bsdf);
+	return world_of_text(
+		32, 32,
+		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>" SENSOR(
+			"0,1,5",
+			"0,-0.2,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/>"
+				    "<translate y='-1'/></transform><bsdf type='diffuse'><rgb name='reflectance' value='0.4,0.6,0.7'/></bsdf></shape>"
+				    "<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>"
+				    "<shape type='sphere'><point name='center' value='0,-0.2,0'/><float name='radius' value='0.8'/>%s</shape>",
+		bsdf);
 }
 
 #define SMOOTH(inner) "<bsdf type='dielectric'>" inner "</bsdf>"
@@ -129,7 +132,8 @@ static void test_every_technique_collapses(void **state)
 	uint64_t counters[BATCH_COUNTERS] = {0};
 	size_t one[DEPTH + 1] = {0}, four[DEPTH + 1] = {0};
 	struct world *w = sky_over(ROUGH(STRONG));
-	c = (struct path_context){.w = w, .window = {0, 0, 32, 32}, .min_depth = 1, .max_depth = DEPTH, .counters = counters};
+	c = (struct path_context){
+		.w = w, .window = {0, 0, 32, 32}, .min_depth = 1, .max_depth = DEPTH, .counters = counters};
 	for (uint64_t i = 0; i < 20000; i++) {
 		struct sampler_random random;
 		double film[2];

@@ -25,7 +25,8 @@ struct effort {
 static void check_convergence(const char *name, struct world *w, struct effort e)
 {
 	static struct agree_image image[2];
-	const struct agree_side sides[] = {{"path", e.path, 32, 0, 0}, {"bdpt", e.bdpt, 32, 0, 0}, {"pssmlt", e.pssmlt, 32, 0, 0}};
+	const struct agree_side sides[] = {
+		{"path", e.path, 32, 0, 0}, {"bdpt", e.bdpt, 32, 0, 0}, {"pssmlt", e.pssmlt, 32, 0, 0}};
 	const struct agree_image *reference = NULL;
 	for (size_t i = 0; i < 3; i++) {
 		char test[64];
@@ -43,26 +44,31 @@ static void check_convergence(const char *name, struct world *w, struct effort e
 #define DEPTH(k) "<integrator type='path'><integer name='max_depth' value='" k "'/></integrator>"
 #define DIFFUSE(x) "<bsdf type='diffuse'><float name='reflectance' value='" x "'/></bsdf>"
 #define AT(inner) "<transform name='to_world'>" inner "</transform>"
-#define BALL(center, radius, bsdf)                                                                                             \
-	"<shape type='sphere'><point name='center' value='" center "'/><float name='radius' value='" radius "'/>" bsdf "</shape>"
+#define BALL(center, radius, bsdf)                                                                                     \
+	"<shape type='sphere'><point name='center' value='" center "'/><float name='radius' value='" radius "'/>" bsdf \
+	"</shape>"
+/* clang-format off */
 #define LENS(radius, focus, filter, o, t)                                                                                      \
 	"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='" radius                      \
 	"'/><float name='focus_distance' value='" focus "'/><transform name='to_world'><lookat origin='" o "' target='" t         \
 	"' up='0,1,0'/></transform><film type='hdrfilm'><rfilter type='" filter "'/></film></sensor>"
+/* clang-format on */
 
 /* Everything out of focus by up to a third of the picture's width; a border of two pixels. */
 static void test_defocus(void **state)
 {
 	(void)state;
-	check_convergence("defocus",
-			world_of_text(16, 16, "%s%s", DEPTH("3") LENS("0.3", "1.5", "gaussian", "0,0.6,1.9", "0,-0.2,-1"),
-				      "<shape type='rectangle'>" AT("<scale value='5'/><rotate x='1' angle='-90'/><translate y='-1'/>")
-				      DIFFUSE("0.5") "</shape><emitter type='constant'><float name='radiance' value='.5'/></emitter>"
-				      "<shape type='rectangle'>" AT("<scale value='.8'/><translate z='-2'/>")
-				      "<emitter type='area'><float name='radiance' value='1'/></emitter></shape>"
-				      BALL("0.5,-0.8,-0.2", "0.5", "<bsdf type='roughconductor'><float name='alpha' value='.2'/></bsdf>")
-				      BALL("-0.5,0.1,0.9", "0.3", DIFFUSE("0.9"))),
-			(struct effort){8192, 6144, 65536});
+	check_convergence(
+		"defocus",
+		world_of_text(
+			16, 16, "%s%s", DEPTH("3") LENS("0.3", "1.5", "gaussian", "0,0.6,1.9", "0,-0.2,-1"),
+			"<shape type='rectangle'>" AT("<scale value='5'/><rotate x='1' angle='-90'/><translate y='-1'/>") DIFFUSE(
+				"0.5") "</shape><emitter type='constant'><float name='radiance' value='.5'/></emitter>"
+				       "<shape type='rectangle'>" AT("<scale value='.8'/><translate z='-2'/>") "<emitter type='area'><float name='radiance' value='1'/></emitter></shape>" BALL(
+					       "0.5,-0.8,-0.2", "0.5",
+					       "<bsdf type='roughconductor'><float name='alpha' value='.2'/></bsdf>")
+					       BALL("-0.5,0.1,0.9", "0.3", DIFFUSE("0.9"))),
+		(struct effort){8192, 6144, 65536});
 }
 
 struct span {
@@ -74,8 +80,8 @@ static double overlap(struct span a, struct span b)
 	return fmax(fmin(a.high, b.high) - fmax(a.low, b.low), 0);
 }
 
-/* A shining rectangle across the axis at depth z, seen through a lens. For one point a of the aperture the picture is the
- * pinhole's, moved by a (1/z - 1/focus) in slope; the mean over the aperture by quadrature. */
+/* A shining rectangle across the axis at depth z, seen through a lens. For one point a of the aperture the picture is
+ * the pinhole's, moved by a (1/z - 1/focus) in slope; the mean over the aperture by quadrature. */
 static void test_blurred_rectangle(void **state)
 {
 	(void)state;
@@ -83,9 +89,10 @@ static void test_blurred_rectangle(void **state)
 	const double focus = 2, z = 5, radius = 0.5, half = tan(20 * M_PI / 180);
 	const struct span x = {-0.3 / z, 3 / z}, y = {-1.5 / z, 1 / z};
 	static struct agree_image image;
-	struct world *w = world_of_text(16, 16, "%s%s", DEPTH("1") LENS("0.5", "2", "box", "0,0,5", "0,0,0"),
-					"<shape type='rectangle'>" AT("<scale x='1.65' y='1.25'/><translate x='1.35' y='-.25'/>")
-					"<emitter type='area'/></shape>");
+	struct world *w = world_of_text(
+		16, 16, "%s%s", DEPTH("1") LENS("0.5", "2", "box", "0,0,5", "0,0,0"),
+		"<shape type='rectangle'>" AT(
+			"<scale x='1.65' y='1.25'/><translate x='1.35' y='-.25'/>") "<emitter type='area'/></shape>");
 	const struct agree_side side = {"path", 32768, 32, 0, 0};
 	agree_render(w, __func__, "path", &side, &image);
 	double expected[AGREE_CELLS + 1] = {0};
@@ -95,7 +102,8 @@ static void test_blurred_rectangle(void **state)
 		for (int i = 0; i < RADII * TURNS; i++) {
 			double r = radius * sqrt((i / TURNS + 0.5) / RADII), phi = 2 * M_PI * (i % TURNS + 0.5) / TURNS;
 			double move = 1 / focus - 1 / z, mx = r * cos(phi) * move, my = r * sin(phi) * move;
-			expected[c] += overlap((struct span){x.low + mx, x.high + mx}, bx) * overlap((struct span){y.low + my, y.high + my}, by) /
+			expected[c] += overlap((struct span){x.low + mx, x.high + mx}, bx) *
+				       overlap((struct span){y.low + my, y.high + my}, by) /
 				       (half * half * RADII * TURNS);
 		}
 		expected[AGREE_CELLS] += expected[c] / AGREE_CELLS;
@@ -111,10 +119,10 @@ static void test_blurred_rectangle(void **state)
 	world_free(w);
 }
 
-
 /* A floor at y = 0 seen straight from above, and what lights it. mirror: a mirror stands on it at x = -1.5. */
 struct lamps {
-	vec3 point, spot, aim, direction; /* the spot's 40 degrees, 25 of them full; direction in which the parallel light travels */
+	vec3 point, spot, aim,
+		direction; /* the spot's 40 degrees, 25 of them full; direction in which the parallel light travels */
 	double intensity, spot_intensity, irradiance, sky;
 	bool mirror;
 };
@@ -144,22 +152,30 @@ static void check_floor(const char *name, const struct lamps *l, struct effort e
 {
 	enum { N = 480 }; /* the midpoint rule errs by 1e-6; with 48 by 7e-5, which samples of low discrepancy see */
 	static struct agree_image image;
-	const struct agree_side sides[] = {{"path", e.path, 32, 0, 0}, {"bdpt", e.bdpt, 32, 0, 0}, {"pssmlt", e.pssmlt, 32, 0, 0}};
-	const char *mirror = l->mirror ? "<shape type='rectangle'>" AT("<scale value='1.6'/><rotate y='1' angle='90'/><translate x='-1.5'/>")
-					 "<bsdf type='conductor'><string name='material' value='none'/></bsdf></shape>" : "";
+	const struct agree_side sides[] = {
+		{"path", e.path, 32, 0, 0}, {"bdpt", e.bdpt, 32, 0, 0}, {"pssmlt", e.pssmlt, 32, 0, 0}};
+	const char *mirror =
+		l->mirror
+			? "<shape type='rectangle'>" AT(
+				  "<scale value='1.6'/><rotate y='1' angle='90'/><translate x='-1.5'/>") "<bsdf type='conductor'><string name='material' value='none'/></bsdf></shape>"
+			: "";
 	struct world *w = world_of_text(
-		16, 16, "<integrator type='path'><integer name='max_depth' value='%d'/></integrator><sensor type='perspective'><float name='fov' value='40'/>" AT("<lookat origin='0,4,0' target='0,0,0' up='0,0,-1'/>")
-		"<film type='hdrfilm'><rfilter type='box'/></film></sensor>%s<shape type='rectangle'>" AT(
-			"<scale value='1.5'/><rotate x='1' angle='-90'/>") DIFFUSE("0.5") "</shape>"
-		"<emitter type='point'><point name='position' x='%g' y='%g' z='%g'/><float name='intensity' value='%g'/></emitter>"
-		"<emitter type='directional'><vector name='direction' x='%g' y='%g' z='%g'/><float name='irradiance' value='%g'/></emitter>"
-		"<emitter type='spot'><float name='cutoff_angle' value='40'/><float name='beam_width' value='25'/>"
-		"<float name='intensity' value='%g'/>" AT("<lookat origin='%g,%g,%g' target='%g,%g,%g' up='0,0,1'/>") "</emitter>"
-		"<emitter type='constant'><float name='radiance' value='%g'/></emitter>",
-		l->mirror ? 3 : 2, mirror, l->point.x, l->point.y, l->point.z, l->intensity, l->direction.x, l->direction.y, l->direction.z, l->irradiance,
-		l->spot_intensity, l->spot.x, l->spot.y, l->spot.z, l->aim.x, l->aim.y, l->aim.z, l->sky);
+		16, 16,
+		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator><sensor type='perspective'><float name='fov' value='40'/>" AT(
+			"<lookat origin='0,4,0' target='0,0,0' up='0,0,-1'/>") "<film type='hdrfilm'><rfilter type='box'/></film></sensor>%s<shape type='rectangle'>" AT("<scale value='1.5'/><rotate x='1' angle='-90'/>")
+			DIFFUSE("0.5") "</shape>"
+				       "<emitter type='point'><point name='position' x='%g' y='%g' z='%g'/><float name='intensity' value='%g'/></emitter>"
+				       "<emitter type='directional'><vector name='direction' x='%g' y='%g' z='%g'/><float name='irradiance' value='%g'/></emitter>"
+				       "<emitter type='spot'><float name='cutoff_angle' value='40'/><float name='beam_width' value='25'/>"
+				       "<float name='intensity' value='%g'/>" AT(
+					       "<lookat origin='%g,%g,%g' target='%g,%g,%g' up='0,0,1'/>") "</emitter>"
+													   "<emitter type='constant'><float name='radiance' value='%g'/></emitter>",
+		l->mirror ? 3 : 2, mirror, l->point.x, l->point.y, l->point.z, l->intensity, l->direction.x,
+		l->direction.y, l->direction.z, l->irradiance, l->spot_intensity, l->spot.x, l->spot.y, l->spot.z,
+		l->aim.x, l->aim.y, l->aim.z, l->sky);
 	assert_true(w->effects.delta_light && !w->effects.colour && (w->environment >= 0) == (l->sky > 0));
-	double half = 4 * tan(20 * M_PI / 180), sum = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2], expected[AGREE_CELLS + 1] = {0};
+	double half = 4 * tan(20 * M_PI / 180), sum = w->grey_xyz[0] + w->grey_xyz[1] + w->grey_xyz[2],
+	       expected[AGREE_CELLS + 1] = {0};
 	for (int c = 0; c < AGREE_CELLS; c++) {
 		for (int i = 0; i < N * N; i++) {
 			double x = half * (c % 2 - 1 + (i % N + 0.5) / N), z = half * (c / 2 - 1 + (i / N + 0.5) / N);
@@ -189,7 +205,12 @@ static void test_lit_floor(void **state)
 	l = (struct lamps){.spot = {-0.5, 2, 0}, .aim = {0.2, 0, 0.3}, .direction = {0, -1, 0}, .spot_intensity = 3};
 	check_floor("spot", &l, (struct effort){1024, 2048, 0});
 	/* Two of them, and the sky that escaping rays meet. */
-	l = (struct lamps){.point = {0.6, 2, -0.4}, .intensity = 1, .direction = {0.5, -1, 0.2}, .irradiance = 0.2, .aim = {0, -1, 0}, .sky = 0.02};
+	l = (struct lamps){.point = {0.6, 2, -0.4},
+			   .intensity = 1,
+			   .direction = {0.5, -1, 0.2},
+			   .irradiance = 0.2,
+			   .aim = {0, -1, 0},
+			   .sky = 0.02};
 	check_floor("point, parallel light and sky", &l, (struct effort){12288, 10240, 0});
 }
 
@@ -197,7 +218,11 @@ static void test_lit_floor(void **state)
 static void test_lit_by_a_mirror(void **state)
 {
 	(void)state;
-	struct lamps l = {.point = {-0.2, 2, -0.2}, .intensity = 2, .direction = {-1, -0.5, 0.03}, .aim = {0, -1, 0}, .mirror = true};
+	struct lamps l = {.point = {-0.2, 2, -0.2},
+			  .intensity = 2,
+			  .direction = {-1, -0.5, 0.03},
+			  .aim = {0, -1, 0},
+			  .mirror = true};
 	check_floor("mirrored point", &l, (struct effort){0, 18432, 77824});
 	l.intensity = 0;
 	l.irradiance = 1;
@@ -208,14 +233,19 @@ static void test_lit_by_a_mirror(void **state)
 static void test_rough_in_delta_light(void **state)
 {
 	(void)state;
-	check_convergence("rough bodies in delta light",
-			world_of_text(16, 16, "%s%s", DEPTH("4") SENSOR("0,2.4,1.8", "0,-1,-0.1"),
-				      "<shape type='rectangle'>" AT("<scale value='2.4'/><rotate x='1' angle='-90'/><translate y='-1'/>") DIFFUSE("0.5") "</shape>"
-				      "<emitter type='point'><point name='position' x='1' y='2' z='1'/><float name='intensity' value='3'/></emitter>"
-				      "<emitter type='directional'><vector name='direction' x='.4' y='-1' z='-.3'/></emitter>"
-				      BALL("-0.5,-0.4,0", "0.6", "<bsdf type='roughdielectric'><float name='alpha' value='.5'/></bsdf>")
-				      BALL("0.7,-0.6,-0.3", "0.4", "<bsdf type='roughconductor'><float name='alpha' value='.4'/></bsdf>")),
-			(struct effort){14336, 12288, 0});
+	check_convergence(
+		"rough bodies in delta light",
+		world_of_text(
+			16, 16, "%s%s", DEPTH("4") SENSOR("0,2.4,1.8", "0,-1,-0.1"),
+			"<shape type='rectangle'>" AT("<scale value='2.4'/><rotate x='1' angle='-90'/><translate y='-1'/>") DIFFUSE(
+				"0.5") "</shape>"
+				       "<emitter type='point'><point name='position' x='1' y='2' z='1'/><float name='intensity' value='3'/></emitter>"
+				       "<emitter type='directional'><vector name='direction' x='.4' y='-1' z='-.3'/></emitter>" BALL(
+					       "-0.5,-0.4,0", "0.6",
+					       "<bsdf type='roughdielectric'><float name='alpha' value='.5'/></bsdf>")
+					       BALL("0.7,-0.6,-0.3", "0.4",
+						    "<bsdf type='roughconductor'><float name='alpha' value='.4'/></bsdf>")),
+		(struct effort){14336, 12288, 0});
 }
 
 int main(void)

@@ -14,6 +14,7 @@
 #include <cmocka.h>
 
 #define AT(inner) "<transform name='to_world'>" inner "</transform>"
+/* clang-format off */
 #define ROOM                                                                                                                    \
 	SENSOR("0,0.2,1.9", "0,-0.3,-1")                                                                                        \
 	"<shape type='cube'>" AT("<scale value='2'/>") "<bsdf type='diffuse'><rgb name='reflectance' value='0.5,0.45,0.35'/>"     \
@@ -21,8 +22,10 @@
 #define LAMP                                                                                                                    \
 	"<shape type='rectangle'>" AT("<scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/>")                       \
 	"<emitter type='area'><rgb name='radiance' value='3,2.5,2'/></emitter></shape>"
-#define BALL(bsdf)                                                                                                              \
-	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf "</shape>"
+/* clang-format on */
+#define BALL(bsdf)                                                                                               \
+	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf \
+	"</shape>"
 
 enum { EDGES = 8 };
 
@@ -73,13 +76,15 @@ static void check(const char *name, struct world *w, unsigned long samples)
 {
 	static struct path_context c;
 	uint64_t counters[BATCH_COUNTERS] = {0};
-	c = (struct path_context){.w = w, .window = {0, 0, 32, 32}, .min_depth = 1, .max_depth = EDGES, .counters = counters};
+	c = (struct path_context){
+		.w = w, .window = {0, 0, 32, 32}, .min_depth = 1, .max_depth = EDGES, .counters = counters};
 	struct tally t = {0};
 	for (unsigned long i = 0; i < samples; i++) {
 		struct sampler_random s;
 		double film[2];
 		sampler_random_init(&s, 0x77686f6c65, RNG_TEST, i, 0);
-		unsigned camera = path_walk_camera(&c, &s.base, EDGES + 1, film), light = path_walk_light(&c, &s.base, EDGES);
+		unsigned camera = path_walk_camera(&c, &s.base, EDGES + 1, film),
+			 light = path_walk_light(&c, &s.base, EDGES);
 		for (unsigned edges = 1; edges <= EDGES; edges++)
 			for (unsigned k = 0; k <= edges; k++) {
 				unsigned tail = edges + 1 - k;
@@ -88,7 +93,8 @@ static void check(const char *name, struct world *w, unsigned long samples)
 				compare(&c, k, edges, &t);
 			}
 	}
-	printf("%s: %lu paths, largest difference %.3g, %lu black, %lu in doubt\n", name, t.compared, t.worst, t.black, t.disagree);
+	printf("%s: %lu paths, largest difference %.3g, %lu black, %lu in doubt\n", name, t.compared, t.worst, t.black,
+	       t.disagree);
 	assert_true(t.compared > samples);
 	assert_true(t.worst < 1e-7);
 	assert_true(t.disagree * 10000 <= t.compared);
@@ -98,9 +104,15 @@ static void check(const char *name, struct world *w, unsigned long samples)
 static void test_surfaces(void **state)
 {
 	(void)state;
-	check("rough glass", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>")), 1500);
+	check("rough glass",
+	      world_of_text(32, 32,
+			    ROOM LAMP BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>")),
+	      1500);
 	check("glass", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='dielectric'/>")), 3000);
-	check("gold", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.1'/></bsdf>")), 1500);
+	check("gold",
+	      world_of_text(32, 32,
+			    ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.1'/></bsdf>")),
+	      1500);
 	check("mirror", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='conductor'/>")), 1500);
 	check("phong", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
 }
@@ -109,10 +121,10 @@ static void test_environment(void **state)
 {
 	(void)state;
 	check("environment",
-	      world_of_text(32, 32, SENSOR("0,1,5", "0,0,0")
-			    "<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1'/>") "</shape>"
-			    BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>")
-			    "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
+	      world_of_text(
+		      32, 32,
+		      SENSOR("0,1,5", "0,0,0") "<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1'/>") "</shape>" BALL(
+			      "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
 	      3000);
 }
 
@@ -122,21 +134,28 @@ static void test_ends(void **state)
 	(void)state;
 	static const char lens[] =
 		"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='.4'/>"
-		"<float name='focus_distance' value='3'/>" AT("<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>") "</sensor>";
+		"<float name='focus_distance' value='3'/>" AT(
+			"<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>") "</sensor>";
 	static const char lights[] =
 		"<emitter type='point'><point name='position' x='1.5' y='2' z='1'/><float name='intensity' value='3'/></emitter>"
-		"<emitter type='spot'><float name='cutoff_angle' value='40'/>" AT("<lookat origin='-1,3,1' target='0,0,0' up='1,0,0'/>") "</emitter>"
-		"<emitter type='directional'><vector name='direction' x='.3' y='-1' z='-.2'/></emitter>";
-	static const char floor[] = "<shape type='rectangle'>" AT("<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/>") "</shape>"
-				    "<shape type='rectangle'>" AT("<scale value='3'/><translate z='-2'/>") "</shape>";
-	check("lens and lamps, rough", world_of_text(32, 32, "%s%s%s%s", lens, lights, floor,
-						     BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>")
-						     "<emitter type='constant'><float name='radiance' value='.2'/></emitter>"), 3000);
-	check("lens and lamps, glass", world_of_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
+		"<emitter type='spot'><float name='cutoff_angle' value='40'/>" AT(
+			"<lookat origin='-1,3,1' target='0,0,0' up='1,0,0'/>") "</emitter>"
+									       "<emitter type='directional'><vector name='direction' x='.3' y='-1' z='-.2'/></emitter>";
+	static const char floor[] = "<shape type='rectangle'>" AT(
+		"<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/>") "</shape>"
+										    "<shape type='rectangle'>" AT(
+											    "<scale value='3'/><translate z='-2'/>") "</shape>";
+	check("lens and lamps, rough",
+	      world_of_text(
+		      32, 32, "%s%s%s%s", lens, lights, floor,
+		      BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><float name='radiance' value='.2'/></emitter>"),
+	      3000);
+	check("lens and lamps, glass",
+	      world_of_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
 }
 
-/* Both directions lie on the same side of the shading and of the geometric normal, each, or nothing scatters: the eight cases of
- * a normal that is bent by 60 degrees. */
+/* Both directions lie on the same side of the shading and of the geometric normal, each, or nothing scatters: the eight
+ * cases of a normal that is bent by 60 degrees. */
 static void test_sides(void **state)
 {
 	(void)state;
@@ -153,7 +172,9 @@ static void test_sides(void **state)
 			bool agree = up_i == (cos(a - bend) > 0) && up_o == (cos(b - bend) > 0);
 			x.edge[0].w = vec3_neg(wi);
 			x.edge[1].w = wo;
-			assert_int_equal(full_path_mode(&x, 1), !agree ? 0 : up_i == up_o ? BSDF_REFLECT : BSDF_TRANSMIT);
+			assert_int_equal(full_path_mode(&x, 1), !agree	       ? 0
+								: up_i == up_o ? BSDF_REFLECT
+									       : BSDF_TRANSMIT);
 		}
 }
 

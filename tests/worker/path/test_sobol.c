@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Low-discrepancy samples: the generator matrices are those of the named polynomials, every elementary interval holds its share,
- * each number alone is uniform, halves of a block, pixels and replicates are independent, and means are those of independent
- * samples with less variance. Level 1e-6 each; seeds are the hash of the test's name.
+ * Low-discrepancy samples: the generator matrices are those of the named polynomials, every elementary interval holds
+ * its share, each number alone is uniform, halves of a block, pixels and replicates are independent, and means are
+ * those of independent samples with less variance. Level 1e-6 each; seeds are the hash of the test's name.
  */
 #include "tests/support/stats.h"
 #include "worker/path/sobol.h"
@@ -17,8 +17,8 @@
 
 #define LEVEL 1e-6
 
-static void draw(uint64_t seed, uint64_t index, uint64_t replicate, uint64_t sample, enum sampler_side side, unsigned vertex,
-		 double out[SAMPLER_BLOCK])
+static void draw(uint64_t seed, uint64_t index, uint64_t replicate, uint64_t sample, enum sampler_side side,
+		 unsigned vertex, double out[SAMPLER_BLOCK])
 {
 	struct sampler_sobol s;
 	sampler_sobol_init(&s, seed, RNG_TEST, index, replicate, sample);
@@ -43,8 +43,8 @@ static void check_boxes(const double (*u)[4], unsigned m, unsigned t, const unsi
 		assert_int_equal(count[b], 1u << t);
 }
 
-/* All elementary intervals of volume 2^(t - m), for the first two, three and four numbers of a half: 2^t of 2^m points lie in
- * each, whichever aligned range of samples is taken. */
+/* All elementary intervals of volume 2^(t - m), for the first two, three and four numbers of a half: 2^t of 2^m points
+ * lie in each, whichever aligned range of samples is taken. */
 static void check_net(const double (*u)[4], unsigned m)
 {
 	const unsigned quality[5] = {0, 0, 0, 1, 3};
@@ -67,20 +67,22 @@ static void test_elementary_intervals(void **state)
 	(void)state;
 	enum { M = 7 };
 	uint64_t seed = stats_seed("test_elementary_intervals");
-	const uint64_t first[] = {0, 1 << M, 5 << M, UINT64_C(1) << 31, (UINT64_C(1) << 32) - (1 << M), UINT64_C(3) << 32};
+	const uint64_t first[] = {
+		0, 1 << M, 5 << M, UINT64_C(1) << 31, (UINT64_C(1) << 32) - (1 << M), UINT64_C(3) << 32};
 	for (uint64_t n = 0; n < 12; n++)
 		for (int half = 0; half < 2; half++) {
 			double u[1 << M][4], block[SAMPLER_BLOCK];
 			for (unsigned i = 0; i < 1 << M; i++) {
-				draw(seed, n, n % 3, first[n % 6] + i, n % 2 ? SIDE_LIGHT : SIDE_CAMERA, (unsigned)n % 5, block);
+				draw(seed, n, n % 3, first[n % 6] + i, n % 2 ? SIDE_LIGHT : SIDE_CAMERA,
+				     (unsigned)n % 5, block);
 				memcpy(u[i], block + 4 * half, sizeof u[i]);
 			}
-			check_net((const double (*)[4])u, M);
+			check_net((const double(*)[4])u, M);
 		}
 }
 
-/* Points without scrambling by the recurrence of Bratley and Fox 1988 from the polynomials x + 1, x^2 + x + 1, x^3 + x + 1:
- * a scramble keeps how many leading bits two points share, in every dimension. */
+/* Points without scrambling by the recurrence of Bratley and Fox 1988 from the polynomials x + 1, x^2 + x + 1, x^3 + x
+ * + 1: a scramble keeps how many leading bits two points share, in every dimension. */
 static void directions(unsigned degree, unsigned inner, const uint32_t *initial, uint32_t v[32])
 {
 	uint32_t m[32];
@@ -105,9 +107,9 @@ static uint32_t plain(const uint32_t v[32], uint32_t i)
 	return x;
 }
 
-/* A prefix of 2^11 samples is, shuffled, an aligned range of Sobol' points, and what two of these share depends on the exclusive
- * or of their numbers only: so the multiset, over all pairs, of the bits shared in dimension 0 and in another is that of the
- * plain points. */
+/* A prefix of 2^11 samples is, shuffled, an aligned range of Sobol' points, and what two of these share depends on the
+ * exclusive or of their numbers only: so the multiset, over all pairs, of the bits shared in dimension 0 and in another
+ * is that of the plain points. */
 static void test_directions(void **state)
 {
 	(void)state;
@@ -132,7 +134,8 @@ static void test_directions(void **state)
 	}
 	for (uint32_t i = 0; i < N; i++)
 		for (uint32_t j = 0; j < i; j++) {
-			unsigned here = shared_bits(u[i][0], u[j][0]), there = shared_bits(plain(v[0], i), plain(v[0], j));
+			unsigned here = shared_bits(u[i][0], u[j][0]),
+				 there = shared_bits(plain(v[0], i), plain(v[0], j));
 			assert_true(here < 13 && there < 13);
 			for (int d = 1; d < 4; d++) {
 				seen[d][here][shared_bits(u[i][d], u[j][d])]++;
@@ -198,7 +201,8 @@ static void test_long_sequences(void **state)
 }
 
 /* The same sample of two sequences, or of two blocks: pairs of numbers fill the square evenly. */
-static void check_pairs(const char *what, const uint64_t a[2], const uint64_t b[2], unsigned vertex, enum sampler_side side)
+static void check_pairs(const char *what, const uint64_t a[2], const uint64_t b[2], unsigned vertex,
+			enum sampler_side side)
 {
 	uint64_t seed = stats_seed(what);
 	static uint64_t count[SAMPLER_BLOCK][CELLS * CELLS];
@@ -219,7 +223,8 @@ static void test_independence(void **state)
 	(void)state;
 	check_pairs("replicates", (const uint64_t[]){7, 0}, (const uint64_t[]){7, 1}, 1, SIDE_CAMERA);
 	check_pairs("pixels", (const uint64_t[]){7, 0}, (const uint64_t[]){8, 0}, 1, SIDE_CAMERA);
-	check_pairs("index and replicate exchanged", (const uint64_t[]){1, 0}, (const uint64_t[]){0, 1}, 1, SIDE_CAMERA);
+	check_pairs("index and replicate exchanged", (const uint64_t[]){1, 0}, (const uint64_t[]){0, 1}, 1,
+		    SIDE_CAMERA);
 	check_pairs("vertices", (const uint64_t[]){7, 0}, (const uint64_t[]){7, 0}, 2, SIDE_CAMERA);
 	check_pairs("sides", (const uint64_t[]){7, 0}, (const uint64_t[]){7, 0}, 1, SIDE_LIGHT);
 	uint64_t seed = stats_seed("halves"), count[CELLS * CELLS] = {0};
@@ -238,8 +243,8 @@ static double integrand(const double u[SAMPLER_BLOCK])
 	return smooth + corner + (u[0] - 0.5) * (u[4] - 0.5);
 }
 
-/* Means of 64 samples over many replicates; power: a bias of 1 % or less is found with 95 %, one of 2 % here. The variance between
- * replicates is at most a third of that of independent samples. */
+/* Means of 64 samples over many replicates; power: a bias of 1 % or less is found with 95 %, one of 2 % here. The
+ * variance between replicates is at most a third of that of independent samples. */
 static void test_means(void **state)
 {
 	(void)state;
@@ -261,7 +266,8 @@ static void test_means(void **state)
 	}
 	struct stats_mean m = stats_mean_test(mean, GROUPS, exact);
 	double gain = single / SAMPLES / square;
-	print_message("mean %.5f +- %.5f of %.5f; variance %.1f times less than of independent samples\n", m.mean, m.error, exact, gain);
+	print_message("mean %.5f +- %.5f of %.5f; variance %.1f times less than of independent samples\n", m.mean,
+		      m.error, exact, gain);
 	assert_true(m.p > LEVEL);
 	assert_true(9.4 * m.error < 0.01 * exact);
 	assert_true(stats_mean_test(mean, GROUPS, 1.02 * exact).p < LEVEL);
@@ -271,8 +277,12 @@ static void test_means(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_elementary_intervals), cmocka_unit_test(test_directions), cmocka_unit_test(test_marginals),
-		cmocka_unit_test(test_long_sequences), cmocka_unit_test(test_independence), cmocka_unit_test(test_means),
+		cmocka_unit_test(test_elementary_intervals),
+		cmocka_unit_test(test_directions),
+		cmocka_unit_test(test_marginals),
+		cmocka_unit_test(test_long_sequences),
+		cmocka_unit_test(test_independence),
+		cmocka_unit_test(test_means),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

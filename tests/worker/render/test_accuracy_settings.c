@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Settings that trade accuracy for time: the spelling that a plan holds comes back as it is, everything else is refused, and each
- * reaches what works by it. */
+/* Settings that trade accuracy for time: the spelling that a plan holds comes back as it is, everything else is
+ * refused, and each reaches what works by it. */
 #include "tests/support/worlds.h"
 #include "worker/halfvec/walk.h"
 #include "worker/render/accuracy_settings.h"
@@ -24,10 +24,15 @@ static void test_canonical(void **state)
 {
 	(void)state;
 	static const char *const cases[][2] = {
-		{NULL, ""}, {"", ""}, {"tolerance=1e-3", ""}, {"tolerance=0.00001", "tolerance=1e-05"},
+		{NULL, ""},
+		{"", ""},
+		{"tolerance=1e-3", ""},
+		{"tolerance=0.00001", "tolerance=1e-05"},
 		{"iterations=30,tolerance=1e-4", "tolerance=0.0001,iterations=30"}, /* in the order of the list */
-		{"tolerance=1e-5,tolerance=1e-4", "tolerance=0.0001"}, {"tolerance=1e-5,tolerance=.001", ""},
-		{"step-scale=0.33333333", "step-scale=0.333333"}, {"iterations=3e1", "iterations=30"},
+		{"tolerance=1e-5,tolerance=1e-4", "tolerance=0.0001"},
+		{"tolerance=1e-5,tolerance=.001", ""},
+		{"step-scale=0.33333333", "step-scale=0.333333"},
+		{"iterations=3e1", "iterations=30"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
 		assert_string_equal(canonical(cases[i][0]), cases[i][1]);
@@ -44,9 +49,11 @@ static void test_all_at_once(void **state)
 	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
 		double value = k->least + (k->greatest - k->least) * 1.23456789e-5;
 		if (k->kind == SETTING_REAL)
-			used += (size_t)snprintf(all + used, sizeof all - used, "%s%s=%.17g", i ? "," : "", k->name, value);
+			used += (size_t)snprintf(all + used, sizeof all - used, "%s%s=%.17g", i ? "," : "", k->name,
+						 value);
 		else
-			used += (size_t)snprintf(all + used, sizeof all - used, "%s%s=%s", i ? "," : "", k->name, k->sweep[0] ? k->sweep[1] : "yes");
+			used += (size_t)snprintf(all + used, sizeof all - used, "%s%s=%s", i ? "," : "", k->name,
+						 k->sweep[0] ? k->sweep[1] : "yes");
 	}
 	assert_int_equal(accuracy_settings_read(all, &a, NULL), 0);
 	assert_int_equal(render_settings_canonical(all, once, NULL), 0);
@@ -98,9 +105,22 @@ static void refused(const char *text, const char *reason)
 static void test_refusals(void **state)
 {
 	(void)state;
-	static const char *const texts[] = {",", "tolerance", "tolerance=", "=1", "tolerance=1e-3,", ",tolerance=1e-3", "tolerance=nan",
-					    "tolerance=inf", "tolerance=-1", "tolerance=1x", "tolerance= 1", "tolerance=1=1", "Tolerance=1",
-					    "iterations=1.5", "iterations=0", "iterations=1e300"};
+	static const char *const texts[] = {",",
+					    "tolerance",
+					    "tolerance=",
+					    "=1",
+					    "tolerance=1e-3,",
+					    ",tolerance=1e-3",
+					    "tolerance=nan",
+					    "tolerance=inf",
+					    "tolerance=-1",
+					    "tolerance=1x",
+					    "tolerance= 1",
+					    "tolerance=1=1",
+					    "Tolerance=1",
+					    "iterations=1.5",
+					    "iterations=0",
+					    "iterations=1e300"};
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++)
 		refused(texts[i], "");
 	refused("tolerence=1e-3", "did you mean `tolerance`?");
@@ -117,7 +137,8 @@ static void test_walk_limits(void **state)
 {
 	(void)state;
 	struct accuracy_settings k;
-	assert_int_equal(accuracy_settings_read("tolerance=1e-5,iterations=7,least-step=.5,reverse-tolerance=.25", &k, NULL), 0);
+	assert_int_equal(
+		accuracy_settings_read("tolerance=1e-5,iterations=7,least-step=.5,reverse-tolerance=.25", &k, NULL), 0);
 	struct walk_limits l = walk_limits_of(&k);
 	assert_int_equal(l.iterations, 7);
 	assert_true(l.tolerance == 1e-5 && l.least_step == 0.5 && l.back == 0.25 && l.scale == 1);
@@ -127,7 +148,8 @@ static void test_walk_limits(void **state)
 static const struct bsdf *material(const char *accuracy, const char *bsdf, struct world **w)
 {
 	worlds_accuracy = accuracy;
-	*w = world_of_text(8, 8, SENSOR("0,0,3", "0,0,0") "<emitter type='constant'/><shape type='sphere'>%s</shape>", bsdf);
+	*w = world_of_text(8, 8, SENSOR("0,0,3", "0,0,0") "<emitter type='constant'/><shape type='sphere'>%s</shape>",
+			   bsdf);
 	worlds_accuracy = NULL;
 	return &(*w)->bsdfs[(*w)->parts[0].bsdf];
 }
@@ -165,13 +187,19 @@ static void test_tessellation(void **state)
 	static const struct {
 		const char *accuracy;
 		uint64_t triangles;
-	} cases[] = {{"", 8 * 64}, {"tessellation=0.5", 8 * 16}, {"tessellation=2", 8 * 256}, {"tessellation=0.375", 8 * 9}, {"tessellation=0.001", 8}};
+	} cases[] = {{"", 8 * 64},
+		     {"tessellation=0.5", 8 * 16},
+		     {"tessellation=2", 8 * 256},
+		     {"tessellation=0.375", 8 * 9},
+		     {"tessellation=0.001", 8}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct render_summary summary;
 		worlds_accuracy = cases[i].accuracy;
-		struct world *w = world_of_text(8, 8, SENSOR("0,0,3", "0,0,0")
-						"<shape type='sphere'><texture type='checkerboard' name='displacement'/><integer name='displacement_level' "
-						"value='3'/><float name='displacement_scale' value='0.01'/></shape>");
+		struct world *w = world_of_text(
+			8, 8,
+			SENSOR("0,0,3",
+			       "0,0,0") "<shape type='sphere'><texture type='checkerboard' name='displacement'/><integer name='displacement_level' "
+					"value='3'/><float name='displacement_scale' value='0.01'/></shape>");
 		worlds_accuracy = NULL;
 		world_summary(w, &summary);
 		assert_int_equal(summary.triangles, cases[i].triangles);
@@ -186,8 +214,15 @@ static void test_lease_and_world(void **state)
 	worlds_accuracy = "tolerance=1e-05";
 	struct world *w = world_of_text(8, 8, SENSOR("0,0,3", "0,0,0") "<shape type='sphere'/>");
 	worlds_accuracy = NULL;
-	struct plan_request r = {.integrator = "path", .kind = PLAN_SAMPLES, .width = 8, .height = 8, .border = w->settings.border, .spp = 16,
-				 .min_depth = 1, .max_depth = 2, .groups = 16};
+	struct plan_request r = {.integrator = "path",
+				 .kind = PLAN_SAMPLES,
+				 .width = 8,
+				 .height = 8,
+				 .border = w->settings.border,
+				 .spp = 16,
+				 .min_depth = 1,
+				 .max_depth = 2,
+				 .groups = 16};
 	for (int same = 0; same < 2; same++) {
 		struct plan p;
 		struct error e = {""};
@@ -209,9 +244,10 @@ static void test_lease_and_world(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_canonical), cmocka_unit_test(test_all_at_once), cmocka_unit_test(test_list),
-		cmocka_unit_test(test_refusals),  cmocka_unit_test(test_walk_limits),
-		cmocka_unit_test(test_roughness), cmocka_unit_test(test_tessellation), cmocka_unit_test(test_lease_and_world),
+		cmocka_unit_test(test_canonical),    cmocka_unit_test(test_all_at_once),
+		cmocka_unit_test(test_list),	     cmocka_unit_test(test_refusals),
+		cmocka_unit_test(test_walk_limits),  cmocka_unit_test(test_roughness),
+		cmocka_unit_test(test_tessellation), cmocka_unit_test(test_lease_and_world),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -58,7 +58,8 @@ static void a_firefly_does_not_show(void **state)
 	struct brightness b;
 	fill(&b, firefly);
 	double there = relative(&b, 40.25, 20.5);
-	assert_true(there == relative(&b, 3, 3) && there == relative(&b, 60, 60)); /* the whole film: no quarter of it is known */
+	assert_true(there == relative(&b, 3, 3) &&
+		    there == relative(&b, 60, 60)); /* the whole film: no quarter of it is known */
 	assert_true(there > 0 && there < 0.01);
 	brightness_fini(&b);
 }

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Which integrator a scene calls for: scenes whose light is easy and hard to find, the rule itself, and the same choice twice. */
+/* Which integrator a scene calls for: scenes whose light is easy and hard to find, the rule itself, and the same choice
+ * twice. */
 #include "tests/support/worlds.h"
 #include "worker/render/choose.h"
 
@@ -15,8 +16,14 @@
 static void choose(const struct world *w, uint64_t seed, uint64_t spp, struct plan_request *r, struct render_choice *c)
 {
 	struct error e = {""};
-	*r = (struct plan_request){.integrator = RENDER_INTEGRATOR_DEFAULT, .kind = PLAN_CHAINS, .width = w->settings.width,
-				   .height = w->settings.height, .border = w->settings.border, .seed = seed, .spp = spp, .min_depth = 1,
+	*r = (struct plan_request){.integrator = RENDER_INTEGRATOR_DEFAULT,
+				   .kind = PLAN_CHAINS,
+				   .width = w->settings.width,
+				   .height = w->settings.height,
+				   .border = w->settings.border,
+				   .seed = seed,
+				   .spp = spp,
+				   .min_depth = 1,
 				   .max_depth = w->settings.max_depth};
 	snprintf(r->mixture, sizeof r->mixture, "hslt=1");
 	if (render_choose(w, r, c, &e))
@@ -53,12 +60,15 @@ static void an_open_room_needs_no_chains(void **state)
 static void a_lamp_in_view_is_not_rare_light(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(48, 48,
-		"<integrator type='path'><integer name='max_depth' value='5'/></integrator>" SENSOR("0,0,4", "0,0,0")
-		"<shape type='cube'><transform name='to_world'><scale value='5'/></transform>"
-		"<bsdf type='diffuse'><rgb name='reflectance' value='0.3,0.3,0.3'/></bsdf></shape>"
-		"<shape type='sphere'><point name='center' x='0.3' y='0.2' z='0'/><float name='radius' value='0.08'/>"
-		"<emitter type='area'><rgb name='radiance' value='%d,%d,%d'/></emitter></shape>", 5000, 5000, 5000);
+	struct world *w = world_of_text(
+		48, 48,
+		"<integrator type='path'><integer name='max_depth' value='5'/></integrator>" SENSOR(
+			"0,0,4",
+			"0,0,0") "<shape type='cube'><transform name='to_world'><scale value='5'/></transform>"
+				 "<bsdf type='diffuse'><rgb name='reflectance' value='0.3,0.3,0.3'/></bsdf></shape>"
+				 "<shape type='sphere'><point name='center' x='0.3' y='0.2' z='0'/><float name='radius' value='0.08'/>"
+				 "<emitter type='area'><rgb name='radiance' value='%d,%d,%d'/></emitter></shape>",
+		5000, 5000, 5000);
 	for (uint64_t seed = 0; seed < SEEDS; seed++)
 		assert_false(chooses_chains(w, seed));
 	world_free(w);
@@ -68,12 +78,15 @@ static void a_lamp_in_view_is_not_rare_light(void **state)
 static void path_is_not_chosen_where_it_misses_light(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(48, 48,
-		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR("0,2,6", "0,0,0")
-		"<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/></transform>"
-		"<bsdf type='diffuse'/></shape>"
-		"<shape type='sphere'><float name='radius' value='0.4'/><bsdf type='dielectric'/></shape>"
-		"<emitter type='point'><point name='position' x='1' y='6' z='0'/><rgb name='intensity' value='30,30,30'/></emitter>", 6);
+	struct world *w = world_of_text(
+		48, 48,
+		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR(
+			"0,2,6",
+			"0,0,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/></transform>"
+				 "<bsdf type='diffuse'/></shape>"
+				 "<shape type='sphere'><float name='radius' value='0.4'/><bsdf type='dielectric'/></shape>"
+				 "<emitter type='point'><point name='position' x='1' y='6' z='0'/><rgb name='intensity' value='30,30,30'/></emitter>",
+		6);
 	int would = 0;
 	for (uint64_t seed = 0; seed < SEEDS; seed++) {
 		struct plan_request r;
@@ -99,9 +112,11 @@ static void light_through_water_needs_chains(void **state)
 static void where_no_light_is_found_the_longest_search_goes_on(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(16, 16,
-		"<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR("0,0,4", "0,0,0")
-		"<shape type='sphere'><bsdf type='diffuse'/></shape>", 5);
+	struct world *w =
+		world_of_text(16, 16,
+			      "<integrator type='path'><integer name='max_depth' value='%d'/></integrator>" SENSOR(
+				      "0,0,4", "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape>",
+			      5);
 	assert_true(chooses_chains(w, 0));
 	world_free(w);
 }
@@ -126,8 +141,13 @@ static void a_crop_is_rendered_as_the_whole_is(void **state)
 {
 	(void)state;
 	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
-	struct plan_request whole = {.integrator = RENDER_INTEGRATOR_DEFAULT, .width = 60, .height = 50, .spp = 16, .min_depth = 1,
-				     .max_depth = 8, .seed = 7},
+	struct plan_request whole = {.integrator = RENDER_INTEGRATOR_DEFAULT,
+				     .width = 60,
+				     .height = 50,
+				     .spp = 16,
+				     .min_depth = 1,
+				     .max_depth = 8,
+				     .seed = 7},
 			    crop = whole;
 	struct render_choice c[2];
 	struct error e = {""};
@@ -150,19 +170,29 @@ static void the_rule(void **state)
 		bool settled;
 	} cases[] = {
 		{{{1, 0, 3, 3}, {2, 0, 3, 3}, false, false, 0}, "path", false},
-		{{{1.9, 0, 3, 3}, {2, 0, 3, 3}, false, false, 0}, "bdpt", false}, /* not much better, and less sure */
+		{{{1.9, 0, 3, 3}, {2, 0, 3, 3}, false, false, 0}, "bdpt", false},  /* not much better, and less sure */
 		{{{1, 0, 1.9, 1.5}, {0, 0, 1, 1}, false, false, 0}, "bdpt", true}, /* better but for its tail */
 		{{{1, 0, 3, 3}, {2, 0, 1.5, 1.5}, false, false, 0}, "path", false},
-		{{{1, 0.9, 0.5, 0.5}, {2, 0, 3, 3}, false, false, 0}, "bdpt", false}, /* bdpt finds what path does not */
+		{{{1, 0.9, 0.5, 0.5}, {2, 0, 3, 3}, false, false, 0},
+		 "bdpt",
+		 false}, /* bdpt finds what path does not */
 		{{{1, 0, 3, 3}, {2, 0.9, 0.5, 0.5}, false, false, 0}, "path", false},
 		{{{1, 0.5, 0.5, 3}, {2, 0.5, 0.5, 3}, false, false, 0}, "hslt", false},
 		{{{1, 0.1, 1.5, 0.7}, {2, 0.1, 1.5, 0.7}, false, false, 0}, "hslt", false}, /* no mean exists */
-		{{{1, 0.1, 1.5, 0.7}, {2, 0.1, 1.5, 1.2}, false, false, 0}, "bdpt", false}, /* for one of them it does */
-		{{{1, 0.1, 1.5, 0.7}, {2, 0.01, 1.5, 0.7}, false, false, 0}, "bdpt", false}, /* and it is nearly all there */
+		{{{1, 0.1, 1.5, 0.7}, {2, 0.1, 1.5, 1.2}, false, false, 0},
+		 "bdpt",
+		 false}, /* for one of them it does */
+		{{{1, 0.1, 1.5, 0.7}, {2, 0.01, 1.5, 0.7}, false, false, 0},
+		 "bdpt",
+		 false}, /* and it is nearly all there */
 		{{{0, 0, 1, 1}, {0, 0, 1, 1}, false, false, 0}, "hslt", false},
 		{{{1, 0, 3, 3}, {2, 0, 3, 3}, true, false, 0}, "bdpt", false},
-		{{{1, 0, 3, 3}, {2, 0.9, 0.5, 3}, true, false, 0}, "hslt", false}, /* what path does not find says nothing */
-		{{{0, 0, 1, 1}, {1, 0, 3, 3}, false, false, 0}, "bdpt", false}, /* no path from the camera found light */
+		{{{1, 0, 3, 3}, {2, 0.9, 0.5, 3}, true, false, 0},
+		 "hslt",
+		 false}, /* what path does not find says nothing */
+		{{{0, 0, 1, 1}, {1, 0, 3, 3}, false, false, 0},
+		 "bdpt",
+		 false}, /* no path from the camera found light */
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		assert_string_equal(render_choice_of(&cases[i].c), cases[i].name);
@@ -176,7 +206,8 @@ static void what_is_settled_is_the_same_with_bdpt(void **state)
 	(void)state;
 	static const double costs[] = {0, 1, 1000}, shares[] = {0, 0.1, 0.9}, tails[] = {0.3, 1.5, 4};
 	for (int i = 0; i < 81; i++) {
-		struct render_choice c = {.path = {1, 0.1, 1.9, 0.9}, .bdpt = {costs[i % 3], shares[i / 3 % 3], tails[i / 9 % 3], tails[i / 27]}};
+		struct render_choice c = {.path = {1, 0.1, 1.9, 0.9},
+					  .bdpt = {costs[i % 3], shares[i / 3 % 3], tails[i / 9 % 3], tails[i / 27]}};
 		assert_true(render_choice_is_settled(&c));
 		assert_string_equal(render_choice_of(&c), "bdpt");
 	}
@@ -204,8 +235,15 @@ static void what_cannot_be_rendered_is_said(void **state)
 {
 	(void)state;
 	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
-	struct plan_request r = {.integrator = RENDER_INTEGRATOR_DEFAULT, .width = 60, .height = 50, .spp = 1, .min_depth = 1, .max_depth = 4,
-				 .crop_x = 50, .crop_width = 20, .crop_height = 20};
+	struct plan_request r = {.integrator = RENDER_INTEGRATOR_DEFAULT,
+				 .width = 60,
+				 .height = 50,
+				 .spp = 1,
+				 .min_depth = 1,
+				 .max_depth = 4,
+				 .crop_x = 50,
+				 .crop_width = 20,
+				 .crop_height = 20};
 	struct render_choice c;
 	struct error e = {""};
 	assert_int_equal(render_choose(w, &r, &c, &e), -EINVAL);

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Groups are independent replicates, or the error that their spread tells is none (docs/design.md, rules 2). The linker puts a wrapper
- * around the random number generator (Makefile), which notes all numbers that a lease asks for: no two groups ask for the same
- * one, each starts its chains from its own part of the bootstrap, and independent proposals that carry no light are counted.
- * Nothing here is left to chance but the number of pssmlt's independent proposals.
+ * Groups are independent replicates, or the error that their spread tells is none (docs/design.md, rules 2). The linker
+ * puts a wrapper around the random number generator (Makefile), which notes all numbers that a lease asks for: no two
+ * groups ask for the same one, each starts its chains from its own part of the bootstrap, and independent proposals
+ * that carry no light are counted. Nothing here is left to chance but the number of pssmlt's independent proposals.
  */
 #include "common/film/merge.h"
 #include "tests/support/worlds.h"
@@ -47,18 +47,24 @@ static void note(enum rng_stream stream, uint64_t index, uint64_t step, uint64_t
 	noted.all[noted.count++] = (struct number){stream, index, step, block, noted.owner};
 }
 
-void __real_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4]);
-void __wrap_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4]);
-void __real_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, uint64_t out[4]);
-void __wrap_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, uint64_t out[4]);
+void __real_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block,
+			 double out[4]);
+void __wrap_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block,
+			 double out[4]);
+void __real_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block,
+		      uint64_t out[4]);
+void __wrap_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block,
+		      uint64_t out[4]);
 
-void __wrap_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4])
+void __wrap_rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block,
+			 double out[4])
 {
 	note(stream, index, step, block);
 	__real_rng_uniform4(seed, stream, index, step, block, out);
 }
 
-void __wrap_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, uint64_t out[4])
+void __wrap_rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block,
+		      uint64_t out[4])
 {
 	note(stream, index, step, block);
 	__real_rng_bits4(seed, stream, index, step, block, out);
@@ -86,19 +92,31 @@ static struct world *lit_world(void)
 {
 	return world_of_text(
 		24, 24,
-		SENSOR("0,1,5", "0,0.5,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform></shape>"
-		"<shape type='sphere'><point name='center' x='0' y='.6' z='0'/><float name='radius' value='.6'/>"
-		"<bsdf type='roughdielectric'/></shape><shape type='sphere'><point name='center' x='1' y='2' z='1'/><float name='radius' value='.3'/>"
-		"<emitter type='area'/></shape>");
+		SENSOR("0,1,5",
+		       "0,0.5,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/></transform></shape>"
+				  "<shape type='sphere'><point name='center' x='0' y='.6' z='0'/><float name='radius' value='.6'/>"
+				  "<bsdf type='roughdielectric'/></shape><shape type='sphere'><point name='center' x='1' y='2' z='1'/><float name='radius' value='.3'/>"
+				  "<emitter type='area'/></shape>");
 }
 
 static struct plan plan_of(const struct world *w, const struct render_integrator *i)
 {
 	bool chains = i->kind == PLAN_CHAINS;
-	struct plan p = {.kind = i->kind, .width = w->settings.width, .height = w->settings.height, .crop_width = w->settings.width,
-			 .crop_height = w->settings.height, .border = w->settings.border, .seed = 3, .groups = GROUPS, .parts = PARTS,
-			 .chains = chains ? CHAINS : 0, .bootstrap = BOOTSTRAP, .epoch = chains ? EPOCH : SPP_EPOCH, .rounds = ROUNDS,
-			 .min_depth = 1, .max_depth = 6};
+	struct plan p = {.kind = i->kind,
+			 .width = w->settings.width,
+			 .height = w->settings.height,
+			 .crop_width = w->settings.width,
+			 .crop_height = w->settings.height,
+			 .border = w->settings.border,
+			 .seed = 3,
+			 .groups = GROUPS,
+			 .parts = PARTS,
+			 .chains = chains ? CHAINS : 0,
+			 .bootstrap = BOOTSTRAP,
+			 .epoch = chains ? EPOCH : SPP_EPOCH,
+			 .rounds = ROUNDS,
+			 .min_depth = 1,
+			 .max_depth = 6};
 	struct render_summary summary;
 	struct error e = {""};
 	snprintf(p.integrator, sizeof p.integrator, "%s", i->name);
@@ -122,7 +140,8 @@ static struct batch run(const struct world *w, const struct plan *p, struct leas
 }
 
 /* All leases of a job, what they ask for noted by group; `look` sees each batch. */
-static void run_all(const struct world *w, const struct plan *p, void (*look)(void *user, const struct batch *b), void *user)
+static void run_all(const struct world *w, const struct plan *p, void (*look)(void *user, const struct batch *b),
+		    void *user)
 {
 	struct bootstrap *s;
 	struct batch before[GROUPS * PARTS] = {{.key = {0}}};
@@ -139,11 +158,14 @@ static void run_all(const struct world *w, const struct plan *p, void (*look)(vo
 		bootstrap_seeds(s, g, seeds[g]);
 	for (uint32_t i = 0; i < ROUNDS * GROUPS * PARTS; i++) {
 		uint32_t lease = i % (GROUPS * PARTS), group = lease / PARTS, part = lease % PARTS;
-		struct lease_input in = {CHAINS / GROUPS / PARTS, seeds[group] + plan_chain_range(p, part).begin * (p->kind == PLAN_CHAINS), NULL};
+		struct lease_input in = {CHAINS / GROUPS / PARTS,
+					 seeds[group] + plan_chain_range(p, part).begin * (p->kind == PLAN_CHAINS),
+					 NULL};
 		if (before[lease].states)
 			in = (struct lease_input){before[lease].state_count, NULL, before[lease].states};
 		noted.owner = group;
-		struct batch b = run(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)}, p->kind == PLAN_CHAINS ? &in : NULL);
+		struct batch b = run(w, p, (struct lease_key){1, LEASE_RENDER, group, part, i / (GROUPS * PARTS)},
+				     p->kind == PLAN_CHAINS ? &in : NULL);
 		look(user, &b);
 		batch_fini(&before[lease]);
 		before[lease] = b;
@@ -172,10 +194,13 @@ static void groups_share_no_random_number(void **state)
 		for (size_t n = 0; n < noted.count; n++) {
 			const struct number *a = &noted.all[n], *b = a + 1;
 			own[a->owner]++;
-			if (n + 1 < noted.count && memcmp(a, b, offsetof(struct number, owner)) == 0 && a->owner != b->owner)
-				fail_msg("%s: groups %u and %u ask for the same number: stream %u, index %llu, step %llu, block %llu", p.integrator,
-					 (unsigned)a->owner, (unsigned)b->owner, (unsigned)a->stream, (unsigned long long)a->index,
-					 (unsigned long long)a->step, (unsigned long long)a->block);
+			if (n + 1 < noted.count && memcmp(a, b, offsetof(struct number, owner)) == 0 &&
+			    a->owner != b->owner)
+				fail_msg(
+					"%s: groups %u and %u ask for the same number: stream %u, index %llu, step %llu, block %llu",
+					p.integrator, (unsigned)a->owner, (unsigned)b->owner, (unsigned)a->stream,
+					(unsigned long long)a->index, (unsigned long long)a->step,
+					(unsigned long long)a->block);
 		}
 		for (uint32_t g = 0; g < GROUPS; g++)
 			assert_true(own[g] > BOOTSTRAP / GROUPS + ROUNDS * EPOCH);
@@ -184,8 +209,8 @@ static void groups_share_no_random_number(void **state)
 	world_free(w);
 }
 
-/* A render as hslt-render makes it: what begins a chain is a path of the bootstrap that is looked at again, one of its own group's
- * range; each group has some. */
+/* A render as hslt-render makes it: what begins a chain is a path of the bootstrap that is looked at again, one of its
+ * own group's range; each group has some. */
 static void chains_start_from_their_groups_bootstrap(void **state)
 {
 	(void)state;
@@ -238,7 +263,8 @@ static void chains_start_from_the_samples_that_were_chosen(void **state)
 		batch_fini(&boot);
 		const uint64_t seeds[CHAINS / GROUPS / PARTS] = {first + n, first + n};
 		listen(true);
-		boot = run(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0}, &(struct lease_input){CHAINS / GROUPS / PARTS, seeds, NULL});
+		boot = run(w, &p, (struct lease_key){1, LEASE_RENDER, 1, 0, 0},
+			   &(struct lease_input){CHAINS / GROUPS / PARTS, seeds, NULL});
 		batch_fini(&boot);
 		for (size_t k = 0; k < noted.count; k++) {
 			looks += noted.all[k].stream == RNG_BOOTSTRAP;
@@ -276,7 +302,8 @@ static void count(void *user, const struct batch *b)
 		return;
 	}
 	if (b->state_count) /* of two chains no run of rejections is half of all */
-		assert_true(2 * b->counters[COUNT_LONGEST_STUCK] < b->counters[COUNT_SAMPLES] - b->counters[COUNT_ACCEPTED]);
+		assert_true(2 * b->counters[COUNT_LONGEST_STUCK] <
+			    b->counters[COUNT_SAMPLES] - b->counters[COUNT_ACCEPTED]);
 	c->samples += b->counters[COUNT_SAMPLES];
 	c->independent += b->counters[COUNT_INDEPENDENT];
 	if (b->strategy_count)
@@ -284,7 +311,8 @@ static void count(void *user, const struct batch *b)
 }
 
 /* Half of what is sampled is dark, and counted: by the bootstrap and by samples all of it, by strategies all that they
- * propose, by pssmlt 0.3 of the steps within five standard errors (without the dark ones it would be 20 of them less). */
+ * propose, by pssmlt 0.3 of the steps within five standard errors (without the dark ones it would be 20 of them less).
+ */
 static void zeros_are_counted(void **state)
 {
 	(void)state;
@@ -299,12 +327,14 @@ static void zeros_are_counted(void **state)
 		}
 		run_all(w, &p, count, &c);
 		double share = (double)c.independent / (double)c.samples;
-		print_message("%s: %llu of %llu bootstrap samples dark, %.3f of %llu samples independent\n", p.integrator,
-			      (unsigned long long)c.dark, (unsigned long long)c.weights, share, (unsigned long long)c.samples);
+		print_message("%s: %llu of %llu bootstrap samples dark, %.3f of %llu samples independent\n",
+			      p.integrator, (unsigned long long)c.dark, (unsigned long long)c.weights, share,
+			      (unsigned long long)c.samples);
 		assert_true(c.weights == BOOTSTRAP && c.dark > BOOTSTRAP / 3 && c.dark < BOOTSTRAP);
 		assert_true(c.bootstrap == c.weights);
 		if (p.kind == PLAN_SAMPLES)
-			assert_true(c.independent == c.samples && c.samples == ROUNDS * GROUPS * SPP_EPOCH * plan_extended_pixels(&p));
+			assert_true(c.independent == c.samples &&
+				    c.samples == ROUNDS * GROUPS * SPP_EPOCH * plan_extended_pixels(&p));
 		else if (p.mutations[0])
 			assert_true(c.independent == c.proposed && c.independent > 0);
 		else
@@ -317,14 +347,26 @@ static void zeros_are_counted(void **state)
 static void each_group_has_its_own_b(void **state)
 {
 	(void)state;
-	struct plan p = {.kind = PLAN_CHAINS, .width = 1, .height = 1, .crop_width = 1, .crop_height = 1, .groups = GROUPS, .parts = PARTS,
-			 .chains = CHAINS, .bootstrap = 8 * GROUPS * PARTS, .epoch = 1, .rounds = 1, .min_depth = 1, .max_depth = 4};
+	struct plan p = {.kind = PLAN_CHAINS,
+			 .width = 1,
+			 .height = 1,
+			 .crop_width = 1,
+			 .crop_height = 1,
+			 .groups = GROUPS,
+			 .parts = PARTS,
+			 .chains = CHAINS,
+			 .bootstrap = 8 * GROUPS * PARTS,
+			 .epoch = 1,
+			 .rounds = 1,
+			 .min_depth = 1,
+			 .max_depth = 4};
 	struct bootstrap *s;
 	struct bootstrap_result r;
 	assert_int_equal(bootstrap_new(&s, &p, NULL), 0);
 	for (uint32_t i = 0; i < GROUPS * PARTS; i++) {
 		float weights[8] = {0};
-		struct batch b = {.key = {1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, .weights = weights, .weight_count = 8};
+		struct batch b = {
+			.key = {1, LEASE_BOOTSTRAP, i / PARTS, i % PARTS, 0}, .weights = weights, .weight_count = 8};
 		b.counters[COUNT_INDEPENDENT] = b.counters[COUNT_SAMPLES] = 8;
 		weights[i / PARTS] = i % PARTS ? 0 : (float)(1 << i / PARTS); /* the second part found nothing */
 		b.independent_sum = (double)weights[i / PARTS];
@@ -345,8 +387,11 @@ static void each_group_has_its_own_b(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(groups_share_no_random_number), cmocka_unit_test(chains_start_from_their_groups_bootstrap),
-		cmocka_unit_test(chains_start_from_the_samples_that_were_chosen), cmocka_unit_test(groups_resample_by_themselves), cmocka_unit_test(zeros_are_counted),
+		cmocka_unit_test(groups_share_no_random_number),
+		cmocka_unit_test(chains_start_from_their_groups_bootstrap),
+		cmocka_unit_test(chains_start_from_the_samples_that_were_chosen),
+		cmocka_unit_test(groups_resample_by_themselves),
+		cmocka_unit_test(zeros_are_counted),
 		cmocka_unit_test(each_group_has_its_own_b),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Settings that must not bias, one at a time: mutations leave bdpt's distribution of paths as it is (tests/support/stationary.h),
- * and images by fewer wavelengths are those by four (tests/support/agree.h).
+ * Settings that must not bias, one at a time: mutations leave bdpt's distribution of paths as it is
+ * (tests/support/stationary.h), and images by fewer wavelengths are those by four (tests/support/agree.h).
  *
- * Level: 1e-6 a case; power: the smallest bias of a soft quarter of the image that is found with 95 % probability is printed and 2 %
- * at most. A tolerance as wide as the lobes is found to bias. About 25 s of CPU time.
+ * Level: 1e-6 a case; power: the smallest bias of a soft quarter of the image that is found with 95 % probability is
+ * printed and 2 % at most. A tolerance as wide as the lobes is found to bias. About 25 s of CPU time.
  */
 #include "tests/support/agree.h"
 #include "tests/support/stationary.h"
@@ -60,9 +60,11 @@ static void run(const struct setting_case *c, struct stationary_result *r)
 	assert_non_null(w);
 	stationary_run(w, name, &how, r);
 	world_free(w);
-	print_message("%-24s %-15s k%u %-10s accepts %4.1f %%; finds %.2f %% on a quarter, %.1f %% of vertices; p %.1g %s; %.2f s %s\n", c->accuracy,
-		      c->scene, c->edges, c->mutation, 100 * (double)r->accepted / (double)r->proposals, 100 * r->least_block,
-		      100 * r->least_other, r->p, r->worst >= 0 ? stationary_function(r->worst) : "", r->seconds, r->failure);
+	print_message(
+		"%-24s %-15s k%u %-10s accepts %4.1f %%; finds %.2f %% on a quarter, %.1f %% of vertices; p %.1g %s; %.2f s %s\n",
+		c->accuracy, c->scene, c->edges, c->mutation, 100 * (double)r->accepted / (double)r->proposals,
+		100 * r->least_block, 100 * r->least_other, r->p, r->worst >= 0 ? stationary_function(r->worst) : "",
+		r->seconds, r->failure);
 }
 
 static void test_stationary(void **state)
@@ -93,10 +95,12 @@ static void test_wavelengths(void **state)
 	static const char *const accuracy[] = {"", "wavelengths=1", "wavelengths=2"};
 	for (int i = 0; i < 3; i++) {
 		worlds_accuracy = accuracy[i];
-		struct world *w = world_of_text(8, 8,
-						"<integrator type='path'><integer name='max_depth' value='3'/></integrator>" SENSOR("0,1,5", "0,-0.2,0")
-						PLATE("-1", DIFFUSE("0.4,0.6,0.7")) BALL("0,-0.2,0", "0.8", METAL("0.4"))
-						"<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>");
+		struct world *w = world_of_text(
+			8, 8,
+			"<integrator type='path'><integer name='max_depth' value='3'/></integrator>" SENSOR(
+				"0,1,5", "0,-0.2,0") PLATE("-1", DIFFUSE("0.4,0.6,0.7"))
+				BALL("0,-0.2,0", "0.8",
+				     METAL("0.4")) "<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>");
 		worlds_accuracy = NULL;
 		struct agree_side how = {"path", 5 << 14, 64, 0, 0};
 		agree_render(w, "wavelengths", *accuracy[i] ? accuracy[i] : "four", &how, &image[i]);
@@ -109,7 +113,9 @@ static void test_wavelengths(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_stationary), cmocka_unit_test(test_bias_is_found), cmocka_unit_test(test_wavelengths),
+		cmocka_unit_test(test_stationary),
+		cmocka_unit_test(test_bias_is_found),
+		cmocka_unit_test(test_wavelengths),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

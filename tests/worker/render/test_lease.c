@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Leases: results that depend on plan and key alone, in any order; stopping; what comes from outside refused; a crop's pixels;
- * memory that runs out; and the film of one lease.
+ * Leases: results that depend on plan and key alone, in any order; stopping; what comes from outside refused; a crop's
+ * pixels; memory that runs out; and the film of one lease.
  */
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
@@ -35,10 +35,21 @@ static struct world *small_world(const char *filter)
 static struct plan plan_of(const struct world *w, const char *integrator)
 {
 	const struct render_integrator *i = render_integrator_find(integrator);
-	struct plan p = {.kind = i->kind, .width = w->settings.width, .height = w->settings.height, .crop_width = w->settings.width,
-			 .crop_height = w->settings.height, .border = w->settings.border, .seed = 3, .groups = GROUPS, .parts = PARTS,
-			 .chains = i->kind == PLAN_CHAINS ? CHAINS : 0, .bootstrap = 512, .epoch = i->kind == PLAN_CHAINS ? 300 : 1,
-			 .rounds = 3, .min_depth = 1, .max_depth = 6};
+	struct plan p = {.kind = i->kind,
+			 .width = w->settings.width,
+			 .height = w->settings.height,
+			 .crop_width = w->settings.width,
+			 .crop_height = w->settings.height,
+			 .border = w->settings.border,
+			 .seed = 3,
+			 .groups = GROUPS,
+			 .parts = PARTS,
+			 .chains = i->kind == PLAN_CHAINS ? CHAINS : 0,
+			 .bootstrap = 512,
+			 .epoch = i->kind == PLAN_CHAINS ? 300 : 1,
+			 .rounds = 3,
+			 .min_depth = 1,
+			 .max_depth = 6};
 	snprintf(p.integrator, sizeof p.integrator, "%s", integrator);
 	struct render_summary summary;
 	struct error e = {""};
@@ -136,11 +147,13 @@ static void test_chains(void **state)
 		uint64_t seeds[2];
 		find_seeds(w, &p, 1, seeds, 2);
 		struct lease_input in = {2, seeds, NULL};
-		struct batch a = run(w, &p, key(LEASE_RENDER, 1, 1, 0), &in), b = run(w, &p, key(LEASE_RENDER, 1, 1, 0), &in);
+		struct batch a = run(w, &p, key(LEASE_RENDER, 1, 1, 0), &in),
+			     b = run(w, &p, key(LEASE_RENDER, 1, 1, 0), &in);
 		assert_same(&a, &b);
 		assert_true(a.counters[COUNT_SAMPLES] == 2 * p.epoch && a.tile_count > 0);
 		struct lease_input next = {2, NULL, a.states}, copy = {2, NULL, b.states};
-		struct batch c = run(w, &p, key(LEASE_RENDER, 1, 1, 1), &next), d = run(w, &p, key(LEASE_RENDER, 1, 1, 1), &copy);
+		struct batch c = run(w, &p, key(LEASE_RENDER, 1, 1, 1), &next),
+			     d = run(w, &p, key(LEASE_RENDER, 1, 1, 1), &copy);
 		assert_same(&c, &d);
 		batch_fini(&a);
 		batch_fini(&b);
@@ -150,8 +163,8 @@ static void test_chains(void **state)
 	world_free(w);
 }
 
-/* Light so weak that contributions are denormal or zero, and as strong as a scene may have: every lease is a batch that passes
- * its checks (run asks), whatever the integrator. */
+/* Light so weak that contributions are denormal or zero, and as strong as a scene may have: every lease is a batch that
+ * passes its checks (run asks), whatever the integrator. */
 static void test_extreme_light(void **state)
 {
 	(void)state;
@@ -159,10 +172,11 @@ static void test_extreme_light(void **state)
 	for (size_t n = 0; n < sizeof radiance / sizeof *radiance; n++) {
 		struct world *w = world_of_text(
 			16, 16,
-			SENSOR("0,0,5", "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape><shape type='cube'><transform name='to_world'>"
-			"<scale value='7'/></transform><bsdf type='twosided'><bsdf type='diffuse'/></bsdf></shape>"
-			"<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='180'/><translate z='6'/></transform>"
-			"<emitter type='area'><rgb name='radiance' value='%s'/></emitter></shape>",
+			SENSOR("0,0,5",
+			       "0,0,0") "<shape type='sphere'><bsdf type='diffuse'/></shape><shape type='cube'><transform name='to_world'>"
+					"<scale value='7'/></transform><bsdf type='twosided'><bsdf type='diffuse'/></bsdf></shape>"
+					"<shape type='rectangle'><transform name='to_world'><rotate y='1' angle='180'/><translate z='6'/></transform>"
+					"<emitter type='area'><rgb name='radiance' value='%s'/></emitter></shape>",
 			radiance[n]);
 		for (size_t i = 0; render_integrator_at(i); i++) {
 			struct plan p = plan_of(w, render_integrator_at(i)->name);
@@ -238,7 +252,8 @@ static void test_refused(void **state)
 	struct batch boot = run(w, &p, key(LEASE_BOOTSTRAP, 0, 0, 0), NULL);
 	for (uint64_t i = 0; i < boot.weight_count; i++)
 		if (!(boot.weights[i] > 0)) {
-			assert_int_equal(end_of(w, &p, k0, &(struct lease_input){2, (uint64_t[]){seeds[0], i}, NULL}), 0);
+			assert_int_equal(end_of(w, &p, k0, &(struct lease_input){2, (uint64_t[]){seeds[0], i}, NULL}),
+					 0);
 			break;
 		}
 	batch_fini(&boot);
@@ -264,8 +279,8 @@ static void test_refused(void **state)
 	world_free(w);
 }
 
-/* A camera that looks nowhere makes 0/0 in the first path of every kind of lease: an error that says where, and nothing of it is
- * left in the thread or the world. */
+/* A camera that looks nowhere makes 0/0 in the first path of every kind of lease: an error that says where, and nothing
+ * of it is left in the thread or the world. */
 static void test_invalid_operation(void **state)
 {
 	(void)state;
@@ -284,8 +299,11 @@ static void test_invalid_operation(void **state)
 			enum lease_end end;
 			w->camera.center_x = INFINITY;
 			assert_int_equal(render_lease(w, &p, &k, &in, NULL, &end, &b, &e), -EDOM);
-			assert_true(strstr(e.text, "invalid floating-point operation (SIGFPE)") && strstr(e.text, p.integrator));
-			assert_true(strstr(e.text, kind == LEASE_BOOTSTRAP ? "bootstrap sample" : p.kind == PLAN_SAMPLES ? "row 0, column 0" : "mutation"));
+			assert_true(strstr(e.text, "invalid floating-point operation (SIGFPE)") &&
+				    strstr(e.text, p.integrator));
+			assert_true(strstr(e.text, kind == LEASE_BOOTSTRAP  ? "bootstrap sample"
+						   : p.kind == PLAN_SAMPLES ? "row 0, column 0"
+									    : "mutation"));
 			assert_true(!b.tiles && !b.states && !b.weights && !b.moments);
 			w->camera.center_x = center;
 			struct batch again = run(w, &p, k, &in);
@@ -313,12 +331,15 @@ static void test_stop(void **state)
 			enum lease_end end = LEASE_DONE;
 			struct batch b;
 			struct lease_key k = key((enum lease_kind)kind, 0, 0, 0);
-			assert_int_equal(render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, &stop, &end, &b, NULL), 0);
+			assert_int_equal(
+				render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, &stop, &end, &b, NULL), 0);
 			assert_int_equal(end, LEASE_STOPPED);
-			assert_true(!b.tiles && !b.states && !b.weights && b.tile_count == 0 && b.state_count == 0 && b.weight_count == 0);
+			assert_true(!b.tiles && !b.states && !b.weights && b.tile_count == 0 && b.state_count == 0 &&
+				    b.weight_count == 0);
 			batch_fini(&b);
 			atomic_store(&stop, false);
-			assert_int_equal(render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, &stop, &end, &b, NULL), 0);
+			assert_int_equal(
+				render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, &stop, &end, &b, NULL), 0);
 			assert_int_equal(end, LEASE_DONE);
 			batch_fini(&b);
 		}
@@ -335,7 +356,8 @@ static float *film_of(const struct world *w, const struct plan *p)
 			struct batch b = run(w, p, key(LEASE_RENDER, g, part, 0), NULL);
 			for (uint32_t t = 0; t < b.tile_count; t++)
 				for (uint32_t i = 0; i < b.tiles[t].width * b.tiles[t].height * 3; i++) {
-					uint32_t x = b.tiles[t].x + i / 3 % b.tiles[t].width, y = b.tiles[t].y + i / 3 / b.tiles[t].width;
+					uint32_t x = b.tiles[t].x + i / 3 % b.tiles[t].width,
+						 y = b.tiles[t].y + i / 3 / b.tiles[t].width;
 					sum[((size_t)y * p->width + x) * 3 + i % 3] += (double)b.tiles[t].xyz[i];
 				}
 			batch_fini(&b);
@@ -346,8 +368,8 @@ static float *film_of(const struct world *w, const struct plan *p)
 	return film;
 }
 
-/* The crop draws the full render's samples. Film points are put together from the crop's own corner: they differ by roundings
- * of double, which a path through glass can make larger, and sums are rounded to float in other strips. */
+/* The crop draws the full render's samples. Film points are put together from the crop's own corner: they differ by
+ * roundings of double, which a path through glass can make larger, and sums are rounded to float in other strips. */
 static void test_crop(void **state)
 {
 	(void)state;
@@ -365,12 +387,15 @@ static void test_crop(void **state)
 		for (uint32_t y = 0; y < p.height; y++)
 			for (uint32_t x = 0; x < p.width; x++)
 				for (int k = 0; k < 3; k++) {
-					bool inside = x - crop.crop_x < crop.crop_width && y - crop.crop_y < crop.crop_height;
-					double a = (double)whole[(y * p.width + x) * 3 + (uint32_t)k], b = (double)part[(y * p.width + x) * 3 + (uint32_t)k];
+					bool inside =
+						x - crop.crop_x < crop.crop_width && y - crop.crop_y < crop.crop_height;
+					double a = (double)whole[(y * p.width + x) * 3 + (uint32_t)k],
+					       b = (double)part[(y * p.width + x) * 3 + (uint32_t)k];
 					light += inside ? a : 0;
 					differ += inside ? !(fabs(a - b) <= 1e-6 * (a + b)) : b != 0;
 				}
-		print_message("%s: %zu of %u values differ\n", filters[f], differ, crop.crop_width * crop.crop_height * 3);
+		print_message("%s: %zu of %u values differ\n", filters[f], differ,
+			      crop.crop_width * crop.crop_height * 3);
 		assert_true(light > 0);
 		assert_true(differ <= 12); /* an edge that a rounding crosses, once */
 		free(whole);
@@ -379,15 +404,19 @@ static void test_crop(void **state)
 	}
 }
 
-/* Constant light stays constant to the border, whatever the filter: sampling extends beyond the film. Each pixel's mean is
- * within what so many samples allow: the kernel's weights vary, a border that lost energy would be darker by 10 % and more. */
+/* Constant light stays constant to the border, whatever the filter: sampling extends beyond the film. Each pixel's mean
+ * is within what so many samples allow: the kernel's weights vary, a border that lost energy would be darker by 10 %
+ * and more. */
 static void test_borders(void **state)
 {
 	(void)state;
 	const char *filters[] = {"box", "tent", "gaussian"};
 	for (int f = 0; f < 3; f++) {
-		struct world *w = world_of_text(24, 20, "<sensor type='perspective'><film type='hdrfilm'><rfilter type='%s'/></film></sensor>"
-						"<emitter type='constant'><float name='radiance' value='2'/></emitter>", filters[f]);
+		struct world *w = world_of_text(
+			24, 20,
+			"<sensor type='perspective'><film type='hdrfilm'><rfilter type='%s'/></film></sensor>"
+			"<emitter type='constant'><float name='radiance' value='2'/></emitter>",
+			filters[f]);
 		struct plan p = plan_of(w, "path");
 		p.epoch = 512;
 		float *film = film_of(w, &p);
@@ -402,7 +431,8 @@ static void test_borders(void **state)
 				/* Weights k / mean k of 1024 stratified samples: deviation below 3 %; seven of them. */
 				assert_true(fabs(v - 1) < 0.2);
 			}
-		print_message("%s: border %.5f, inside %.5f\n", filters[f], border / (double)borders, inner / (double)inners);
+		print_message("%s: border %.5f, inside %.5f\n", filters[f], border / (double)borders,
+			      inner / (double)inners);
 		assert_true(fabs(border / (double)borders - 1) < 0.01);
 		assert_true(fabs(inner / (double)inners - 1) < 0.005);
 		free(film);
@@ -415,14 +445,18 @@ static void test_kernels(void **state)
 {
 	(void)state;
 	static const struct scene_settings cases[] = {
-		{.filter = FILTER_BOX, .filter_radius = 0.5},  {.filter = FILTER_BOX, .filter_radius = 2},
-		{.filter = FILTER_BOX, .filter_radius = 64},   {.filter = FILTER_TENT, .filter_radius = 1},
-		{.filter = FILTER_TENT, .filter_radius = 0.25}, {.filter = FILTER_TENT, .filter_radius = 40},
+		{.filter = FILTER_BOX, .filter_radius = 0.5},
+		{.filter = FILTER_BOX, .filter_radius = 2},
+		{.filter = FILTER_BOX, .filter_radius = 64},
+		{.filter = FILTER_TENT, .filter_radius = 1},
+		{.filter = FILTER_TENT, .filter_radius = 0.25},
+		{.filter = FILTER_TENT, .filter_radius = 40},
 		{.filter = FILTER_GAUSSIAN, .filter_radius = 2, .filter_stddev = 0.5},
 		{.filter = FILTER_GAUSSIAN, .filter_radius = 1, .filter_stddev = 2},
 		{.filter = FILTER_GAUSSIAN, .filter_radius = 64, .filter_stddev = 16},
 	};
-	struct plan p = {.width = 300, .height = 300, .crop_x = 20, .crop_y = 10, .crop_width = 260, .crop_height = 270};
+	struct plan p = {
+		.width = 300, .height = 300, .crop_x = 20, .crop_y = 10, .crop_width = 260, .crop_height = 270};
 	for (size_t k = 0; k < sizeof cases / sizeof cases[0]; k++) {
 		struct film_sums f;
 		assert_int_equal(film_sums_init(&f, &p, &cases[k], NULL), 0);
@@ -436,7 +470,9 @@ static void test_kernels(void **state)
 		double energy = 0, value[3] = {1, 2, 3};
 		enum { PLACES = 40 };
 		for (int i = 0; i < PLACES * PLACES; i++) {
-			struct splat s = {150 + (i % PLACES + 0.5) / PLACES, 145 + (i / PLACES + 0.5) / PLACES, {value[0], value[1], value[2]}};
+			struct splat s = {150 + (i % PLACES + 0.5) / PLACES,
+					  145 + (i / PLACES + 0.5) / PLACES,
+					  {value[0], value[1], value[2]}};
 			film_sums_splat(&f, &s, 1.0 / (PLACES * PLACES));
 		}
 		for (size_t i = 0; i < (size_t)f.width * f.height; i++)
@@ -467,7 +503,8 @@ static void test_no_memory(void **state)
 				enum lease_end end;
 				struct lease_key k = key((enum lease_kind)kind, 0, 0, 0);
 				mem_fail_after(i);
-				int rc = render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, NULL, &end, &b, &e);
+				int rc =
+					render_lease(w, &p, &k, p.kind == PLAN_CHAINS ? &in : NULL, NULL, &end, &b, &e);
 				mem_fail_after(-1);
 				assert_true(rc == 0 || (rc == -ENOMEM && e.text[0]));
 				if (rc)
@@ -486,10 +523,11 @@ static void test_no_memory(void **state)
 static void test_no_memory_for_a_world(void **state)
 {
 	(void)state;
-	static const char text[] = "<scene version='3.0.0'>" SENSOR("0,0,5", "0,0,0")
-		"<shape type='cube'><bsdf type='twosided'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'/></bsdf></bsdf></shape>"
-		"<shape type='sphere'><bsdf type='roughdielectric'/></shape><shape type='rectangle'><emitter type='area'/></shape>"
-		"<emitter type='constant'/></scene>";
+	static const char text[] = "<scene version='3.0.0'>" SENSOR(
+		"0,0,5",
+		"0,0,0") "<shape type='cube'><bsdf type='twosided'><bsdf type='diffuse'><texture name='reflectance' type='checkerboard'/></bsdf></bsdf></shape>"
+			 "<shape type='sphere'><bsdf type='roughdielectric'/></shape><shape type='rectangle'><emitter type='area'/></shape>"
+			 "<emitter type='constant'/></scene>";
 	const struct memory_file files[] = {{"a.xml", text, sizeof text - 1}, {NULL, NULL, 0}};
 	struct asset_source assets = memory_assets(files);
 	struct error e = {""};
@@ -516,11 +554,16 @@ static void test_no_memory_for_a_world(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_any_order), cmocka_unit_test(test_chains), cmocka_unit_test(test_extreme_light),
+		cmocka_unit_test(test_any_order),
+		cmocka_unit_test(test_chains),
+		cmocka_unit_test(test_extreme_light),
 		cmocka_unit_test(test_refused),
 		cmocka_unit_test(test_invalid_operation),
-		cmocka_unit_test(test_stop),	  cmocka_unit_test(test_crop),	  cmocka_unit_test(test_borders),
-		cmocka_unit_test(test_kernels),	  cmocka_unit_test(test_no_memory),
+		cmocka_unit_test(test_stop),
+		cmocka_unit_test(test_crop),
+		cmocka_unit_test(test_borders),
+		cmocka_unit_test(test_kernels),
+		cmocka_unit_test(test_no_memory),
 		cmocka_unit_test(test_no_memory_for_a_world),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);

@@ -1,11 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What leases say besides pixels. Classes of paths: every technique that makes a path gives it the same class; path, bdpt, and the
- * chains of pssmlt and hslt find the same energy in each class. Moments: what they say of a tile is what the film says of it.
+ * What leases say besides pixels. Classes of paths: every technique that makes a path gives it the same class; path,
+ * bdpt, and the chains of pssmlt and hslt find the same energy in each class. Moments: what they say of a tile is what
+ * the film says of it.
  *
- * Level of the comparisons: 1e-6 a class that holds 1 % of the energy or more, by Student's t between 16 groups. Power: the
- * smallest difference of the classes that hold 10 % or more, found with 95 % probability, is printed; 15 % at most between path
- * and bdpt, 25 % for chains. HSLT_TEST_SCALE: smaller samples, no demand on the power. About 30 s of CPU time.
+ * Level of the comparisons: 1e-6 a class that holds 1 % of the energy or more, by Student's t between 16 groups. Power:
+ * the smallest difference of the classes that hold 10 % or more, found with 95 % probability, is printed; 15 % at most
+ * between path and bdpt, 25 % for chains. HSLT_TEST_SCALE: smaller samples, no demand on the power. About 30 s of CPU
+ * time.
  */
 #include "common/film/merge.h"
 #include "tests/support/dice.h"
@@ -56,7 +58,8 @@ struct seen {
 };
 
 /* x was made by technique `from`; a pair of sub-paths around it is drawn that another technique may have made. */
-static void check_around(struct path_context *c, struct full_path_path *x, unsigned from, uint64_t index, struct dice *d, struct seen *seen)
+static void check_around(struct path_context *c, struct full_path_path *x, unsigned from, uint64_t index,
+			 struct dice *d, struct seen *seen)
 {
 	static struct ensemble around;
 	struct sampler_random s;
@@ -120,15 +123,16 @@ static void check_techniques(const struct world *w, const char *name)
 			seen.classes |= 1u << class;
 		}
 		for (unsigned k = 0; k < PATH_CLASSES; k++)
-			assert_true(fabs(by_class[k] - (sample.classes >> k & 1 ? sample.of_class[k] : 0)) <= 1e-12 * sum);
+			assert_true(fabs(by_class[k] - (sample.classes >> k & 1 ? sample.of_class[k] : 0)) <=
+				    1e-12 * sum);
 		if (e.count > 0) {
 			const struct candidate *a = &e.of[dice_below(&d, e.count)];
 			if (full_path_from_subpaths(&c, a->s, a->edges, &x))
 				check_around(&c, &x, a->s, index, &d, &seen);
 		}
 	}
-	print_message("%s: %llu paths, %llu by another technique, techniques %#x, classes %#x\n", name, (unsigned long long)seen.paths,
-		      (unsigned long long)seen.again, seen.techniques, seen.classes);
+	print_message("%s: %llu paths, %llu by another technique, techniques %#x, classes %#x\n", name,
+		      (unsigned long long)seen.paths, (unsigned long long)seen.again, seen.techniques, seen.classes);
 	assert_true(seen.again > dice_count(100));
 }
 
@@ -148,9 +152,19 @@ static struct plan make_plan(const struct world *w, const char *integrator, cons
 {
 	const struct scene_settings *s = &w->settings;
 	struct render_summary summary;
-	struct plan p = {.width = s->width, .height = s->height, .crop_width = s->width, .crop_height = s->height, .border = s->border,
-			 .seed = stats_seed(test), .groups = GROUPS, .parts = 1, .bootstrap = GROUPS * dice_count(12288), .epoch = 1,
-			 .rounds = 1, .min_depth = 1, .max_depth = 10};
+	struct plan p = {.width = s->width,
+			 .height = s->height,
+			 .crop_width = s->width,
+			 .crop_height = s->height,
+			 .border = s->border,
+			 .seed = stats_seed(test),
+			 .groups = GROUPS,
+			 .parts = 1,
+			 .bootstrap = GROUPS * dice_count(12288),
+			 .epoch = 1,
+			 .rounds = 1,
+			 .min_depth = 1,
+			 .max_depth = 10};
 	snprintf(p.integrator, sizeof p.integrator, "%s", integrator);
 	p.kind = render_integrator_find(integrator)->kind;
 	world_summary(w, &summary);
@@ -159,7 +173,8 @@ static struct plan make_plan(const struct world *w, const char *integrator, cons
 	return p;
 }
 
-static void lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in, struct batch *b)
+static void lease(const struct world *w, const struct plan *p, const struct lease_key *k, const struct lease_input *in,
+		  struct batch *b)
 {
 	struct error e = {""};
 	enum lease_end end;
@@ -168,7 +183,8 @@ static void lease(const struct world *w, const struct plan *p, const struct leas
 }
 
 /* Each class's means by group, of independent samples. */
-static void sample_classes(const struct world *w, const char *integrator, const char *test, double mean[PATH_CLASSES][GROUPS])
+static void sample_classes(const struct world *w, const char *integrator, const char *test,
+			   double mean[PATH_CLASSES][GROUPS])
 {
 	struct plan p = make_plan(w, integrator, test);
 	for (uint32_t g = 0; g < GROUPS; g++) {
@@ -188,7 +204,8 @@ static void judge(const char *test, unsigned class, double share, double differe
 {
 	/* Of what independent samples hardly find, their means are far from normal. */
 	if (share >= 0.01 && p < LEVEL)
-		fail_msg("%s: the energies of class '%s', share %.3g, differ (p = %g)", test, path_class_name(class), share, p);
+		fail_msg("%s: the energies of class '%s', share %.3g, differ (p = %g)", test, path_class_name(class),
+			 share, p);
 	if (share >= 0.1)
 		*least = fmax(*least, FOUND * difference_error);
 }
@@ -227,7 +244,8 @@ static void samples_agree(void **state)
 }
 
 /* All leases of a plan of chains into a canvas. seen: called with each batch of chains. */
-static struct canvas *run_chains(const struct world *w, const struct plan *p, void (*seen)(const struct plan *, const struct batch *))
+static struct canvas *run_chains(const struct world *w, const struct plan *p,
+				 void (*seen)(const struct plan *, const struct batch *))
 {
 	struct bootstrap *s;
 	struct canvas *c;
@@ -276,7 +294,8 @@ static void check_chains(const char *room, const char *integrator, uint64_t step
 		const struct path_class_energy *of = &img.classes[k];
 		double t = of->difference_t, p_value = isnan(t) ? 1 : stats_student_t_p(t, GROUPS - 1);
 		if (of->bootstrap > 0)
-			judge(test, k, of->bootstrap / all, hypot(of->bootstrap_error, of->chains_error) / of->bootstrap, p_value, &least);
+			judge(test, k, of->bootstrap / all,
+			      hypot(of->bootstrap_error, of->chains_error) / of->bootstrap, p_value, &least);
 	}
 	end_judging(test, least, 0.25);
 	canvas_image_fini(&img);
@@ -296,10 +315,12 @@ static void chains_agree(void **state)
 
 /* ---- moments against the film ---- */
 
-/* Films with a box filter of one pixel: a splat's light is all in its own pixel, so a tile's sum is its first moments'. */
+/* Films with a box filter of one pixel: a splat's light is all in its own pixel, so a tile's sum is its first moments'.
+ */
 static void film_agrees(const struct plan *p, const struct batch *b)
 {
-	uint32_t tiles = batch_film_tiles(p), sequences = batch_sequences(p), across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE, next = 0;
+	uint32_t tiles = batch_film_tiles(p), sequences = batch_sequences(p),
+		 across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE, next = 0;
 	double time = 0, classes = 0;
 	for (uint32_t t = 0; t < tiles; t++) {
 		double first = 0, film = 0, second = (double)b->moments[sequences * tiles + t];
@@ -329,11 +350,12 @@ static void moments_are_the_films(void **state)
 	(void)state;
 	static const char *const integrators[] = {"pssmlt", "hslt"};
 	struct world *w = world_of_text(
-		200, 150, SENSOR("0,0.2,1.9", "0,-0.3,-1")
-		"<shape type='cube'><transform name='to_world'><scale value='2'/></transform></shape>"
-		"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/><bsdf type='dielectric'/></shape>"
-		"<shape type='rectangle'><transform name='to_world'><scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/></transform>"
-		"<emitter type='area'/></shape>");
+		200, 150,
+		SENSOR("0,0.2,1.9",
+		       "0,-0.3,-1") "<shape type='cube'><transform name='to_world'><scale value='2'/></transform></shape>"
+				    "<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/><bsdf type='dielectric'/></shape>"
+				    "<shape type='rectangle'><transform name='to_world'><scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/></transform>"
+				    "<emitter type='area'/></shape>");
 	for (size_t i = 0; i < 2; i++) {
 		struct canvas_image img;
 		struct plan p = make_plan(w, integrators[i], "moments and film");
@@ -352,9 +374,10 @@ static void moments_are_the_films(void **state)
 		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
 		float sum = 0;
 		for (uint32_t t = 0; t < batch_film_tiles(&p); t++) {
-			print_message("%s: tile %u: R %.3f error %.3f share %.3f\n", integrators[i], t, (double)img.r_hat[t],
-				      (double)img.tile_error[t], (double)img.tile_share[t]);
-			assert_true(img.r_hat[t] > 0.99f && img.r_hat[t] < (p.epoch < 2000 ? 2 : 1.2f)); /* short chains have mixed less */
+			print_message("%s: tile %u: R %.3f error %.3f share %.3f\n", integrators[i], t,
+				      (double)img.r_hat[t], (double)img.tile_error[t], (double)img.tile_share[t]);
+			assert_true(img.r_hat[t] > 0.99f &&
+				    img.r_hat[t] < (p.epoch < 2000 ? 2 : 1.2f)); /* short chains have mixed less */
 			sum += img.tile_share[t];
 		}
 		assert_true(fabsf(sum - 1) < 1e-5f);

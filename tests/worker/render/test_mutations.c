@@ -27,8 +27,24 @@ static void the_canonical_spelling_stays(void **state)
 static void other_texts_are_refused(void **state)
 {
 	(void)state;
-	static const char *const texts[] = {",", "hslt,", ",hslt", "hslt,,independent", "hslt=", "hslt=0", "hslt=-1", "hslt=nan", "hslt=inf",
-					    "hslt=1x", "hslt=1=1", "hslt@", "hslt@=1", "=1", "1", "hslt =1", "Hslt", "hslt\n",
+	static const char *const texts[] = {",",
+					    "hslt,",
+					    ",hslt",
+					    "hslt,,independent",
+					    "hslt=",
+					    "hslt=0",
+					    "hslt=-1",
+					    "hslt=nan",
+					    "hslt=inf",
+					    "hslt=1x",
+					    "hslt=1=1",
+					    "hslt@",
+					    "hslt@=1",
+					    "=1",
+					    "1",
+					    "hslt =1",
+					    "Hslt",
+					    "hslt\n",
 					    "hslt=1,hslt=1,hslt=1,hslt=1,hslt=1,hslt=1,hslt=1,hslt=1,hslt=1"};
 	struct render_summary summary = {.brightest = 1};
 	for (size_t i = 0; i < sizeof texts / sizeof *texts; i++) {

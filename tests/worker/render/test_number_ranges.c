@@ -1,8 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Every number of every table of plug-ins has a range. What is beyond is refused with file, line, value and range; its ends
- * and what lies between render without an invalid operation, or are refused with a place by a rule of their own (two numbers that
- * contradict each other, a scene that is too large). Each trial is a whole scene in a process of its own.
+ * Every number of every table of plug-ins has a range. What is beyond is refused with file, line, value and range; its
+ * ends and what lies between render without an invalid operation, or are refused with a place by a rule of their own
+ * (two numbers that contradict each other, a scene that is too large). Each trial is a whole scene in a process of its
+ * own.
  */
 #include "tests/support/scene_trial.h"
 #include "worker/render/render.h"
@@ -21,15 +22,18 @@ static const unsigned numeric = VALUE_INT | VALUE_FLOAT | VALUE_POINT | VALUE_RG
 
 static const unsigned char sky[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n\x80\x80\x80\x80\x80\x90\x70\x80";
 static const char obj[] = "v -1 0 -1\nv 1 0 -1\nv 0 0 1\nv 0 1 0\nf 1 2 3\nf 1 4 2\n";
-static const char ply[] = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
-			  "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
+static const char ply[] =
+	"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+	"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n";
 
 /* The property as XML; 0: the parameter takes no value of that type. */
 static int print_value(char *out, size_t size, const struct param *p, enum value_type type, double x)
 {
 	switch (type) {
 	case VALUE_INT:
-		return x == nearbyint(x) && fabs(x) < 1e15 ? snprintf(out, size, "<integer name='%s' value='%.0f'/>", p->name, x) : 0;
+		return x == nearbyint(x) && fabs(x) < 1e15
+			       ? snprintf(out, size, "<integer name='%s' value='%.0f'/>", p->name, x)
+			       : 0;
 	case VALUE_FLOAT:
 		return snprintf(out, size, "<float name='%s' value='%.17g'/>", p->name, x);
 	case VALUE_POINT:
@@ -37,7 +41,8 @@ static int print_value(char *out, size_t size, const struct param *p, enum value
 	case VALUE_RGB:
 		return snprintf(out, size, "<rgb name='%s' value='%.17g %.17g %.17g'/>", p->name, x, 0.5 * x, x);
 	default:
-		return snprintf(out, size, "<spectrum name='%s' value='400:%.17g, 500:%.17g, 600:%.17g'/>", p->name, x, 0.5 * x, x);
+		return snprintf(out, size, "<spectrum name='%s' value='400:%.17g, 500:%.17g, 600:%.17g'/>", p->name, x,
+				0.5 * x, x);
 	}
 }
 
@@ -57,34 +62,41 @@ static const char *companions(const struct plugin_decl *d, const struct param *p
 
 static const char *file_of(const struct plugin_decl *d)
 {
-	return strcmp(d->type, "obj") == 0 ? "<string name='filename' value='m.obj'/>"
+	return strcmp(d->type, "obj") == 0   ? "<string name='filename' value='m.obj'/>"
 	       : strcmp(d->type, "ply") == 0 ? "<string name='filename' value='m.ply'/>"
-	       : strcmp(d->type, "bitmap") == 0 || strcmp(d->type, "envmap") == 0 ? "<string name='filename' value='sky.hdr'/>"
-										   : "";
+	       : strcmp(d->type, "bitmap") == 0 || strcmp(d->type, "envmap") == 0
+		       ? "<string name='filename' value='sky.hdr'/>"
+		       : "";
 }
 
 #define PROPERTY "%s%s%s" /* file, companions, the property itself */
 #define LOOK "<transform name='to_world'><lookat origin='0.1,1,4' target='0,0.3,0' up='0,1,0'/></transform>"
-#define FLOOR "<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='-90'/></transform>%s</shape>"
-#define BALL "<shape type='sphere'><point name='center' x='0' y='0.5' z='0'/><float name='radius' value='0.4'/>%s</shape>"
+#define FLOOR \
+	"<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='-90'/></transform>%s</shape>"
+#define BALL \
+	"<shape type='sphere'><point name='center' x='0' y='0.5' z='0'/><float name='radius' value='0.4'/>%s</shape>"
 
 /* A scene in which the plug-in matters. */
 static void print_scene(char *text, const struct plugin_decl *d, const char *companion, const char *property)
 {
 	char own[2048], sensor[2600], ball[2600] = "", light[2600] = "";
-	snprintf(own, sizeof own, "\n<%s type='%s'>" PROPERTY "</%s>\n", plugin_class_name(d->cls), d->type, file_of(d), companion, property,
-		 plugin_class_name(d->cls));
+	snprintf(own, sizeof own, "\n<%s type='%s'>" PROPERTY "</%s>\n", plugin_class_name(d->cls), d->type, file_of(d),
+		 companion, property, plugin_class_name(d->cls));
 	bool nested = d->cls == PLUGIN_FILM || d->cls == PLUGIN_RFILTER || d->cls == PLUGIN_SAMPLER;
 	if (d->cls == PLUGIN_SENSOR)
-		snprintf(sensor, sizeof sensor, "\n<sensor type='%s'>" LOOK "%s%s</sensor>", d->type, companion, property);
+		snprintf(sensor, sizeof sensor, "\n<sensor type='%s'>" LOOK "%s%s</sensor>", d->type, companion,
+			 property);
 	else
-		snprintf(sensor, sizeof sensor, "<sensor type='perspective'>" LOOK "%s%s%s</sensor>", d->cls == PLUGIN_RFILTER ? "<film type='hdrfilm'>" : "",
-			 nested ? own : "", d->cls == PLUGIN_RFILTER ? "</film>" : "");
+		snprintf(sensor, sizeof sensor, "<sensor type='perspective'>" LOOK "%s%s%s</sensor>",
+			 d->cls == PLUGIN_RFILTER ? "<film type='hdrfilm'>" : "", nested ? own : "",
+			 d->cls == PLUGIN_RFILTER ? "</film>" : "");
 	if (d->cls == PLUGIN_BSDF)
 		snprintf(ball, sizeof ball, BALL, own);
 	else if (d->cls == PLUGIN_TEXTURE)
-		snprintf(ball, sizeof ball, "<shape type='cube'><bsdf type='diffuse'>\n<texture name='reflectance' type='%s'>" PROPERTY
-			 "</texture></bsdf></shape>", d->type, file_of(d), companion, property);
+		snprintf(ball, sizeof ball,
+			 "<shape type='cube'><bsdf type='diffuse'>\n<texture name='reflectance' type='%s'>" PROPERTY
+			 "</texture></bsdf></shape>",
+			 d->type, file_of(d), companion, property);
 	else if (d->cls == PLUGIN_EMITTER && strcmp(d->type, "area") == 0)
 		snprintf(light, sizeof light, BALL, own);
 	else if (d->cls == PLUGIN_EMITTER || d->cls == PLUGIN_SHAPE || d->cls == PLUGIN_INTEGRATOR)
@@ -97,18 +109,23 @@ struct counts {
 	size_t params, trials, rendered, refused, bad;
 };
 
-static int try_value(const struct plugin_decl *d, const struct param *p, enum value_type type, double x, char *said, size_t size, char *text)
+static int try_value(const struct plugin_decl *d, const struct param *p, enum value_type type, double x, char *said,
+		     size_t size, char *text)
 {
 	char property[512];
 	if (!print_value(property, sizeof property, p, type, x))
 		return 0;
 	print_scene(text, d, companions(d, p), property);
-	const struct memory_file files[] = {{"s.xml", text, strlen(text)}, {"sky.hdr", sky, sizeof sky - 1}, {"m.obj", obj, sizeof obj - 1},
-					    {"m.ply", ply, sizeof ply - 1}, {NULL, NULL, 0}};
+	const struct memory_file files[] = {{"s.xml", text, strlen(text)},
+					    {"sky.hdr", sky, sizeof sky - 1},
+					    {"m.obj", obj, sizeof obj - 1},
+					    {"m.ply", ply, sizeof ply - 1},
+					    {NULL, NULL, 0}};
 	return scene_trial(files, said, size);
 }
 
-static void check_inside(const struct plugin_decl *d, const struct param *p, enum value_type type, double x, struct counts *c)
+static void check_inside(const struct plugin_decl *d, const struct param *p, enum value_type type, double x,
+			 struct counts *c)
 {
 	char said[1024], text[TEXT], own[120];
 	int end = try_value(d, p, type, x, said, sizeof said, text);
@@ -124,7 +141,8 @@ static void check_inside(const struct plugin_decl *d, const struct param *p, enu
 	print_message("%s, %s = %g: ends with %d: %s\n", d->type, p->name, x, end, said);
 }
 
-static void check_beyond(const struct plugin_decl *d, const struct param *p, enum value_type type, double x, struct counts *c)
+static void check_beyond(const struct plugin_decl *d, const struct param *p, enum value_type type, double x,
+			 struct counts *c)
 {
 	char said[1024], text[TEXT];
 	int end = try_value(d, p, type, x, said, sizeof said, text);
@@ -134,7 +152,8 @@ static void check_beyond(const struct plugin_decl *d, const struct param *p, enu
 	if (end == TRIAL_REFUSED && strstr(said, "s.xml:2: ") && strstr(said, "is outside ["))
 		return;
 	c->bad++;
-	print_message("%s, %s = %g, beyond its range [%g, %g]: ends with %d: %s\n", d->type, p->name, x, p->min, p->max, end, said);
+	print_message("%s, %s = %g, beyond its range [%g, %g]: ends with %d: %s\n", d->type, p->name, x, p->min, p->max,
+		      end, said);
 }
 
 /* Integers reach from one whole number to the next. */
@@ -181,7 +200,8 @@ static void test_ranges(void **state)
 			if (p->status == PARAM_UNDERSTOOD && (p->types & numeric))
 				check_param(d, p, &c);
 	}
-	print_message("%zu numbers, %zu trials: %zu rendered, %zu refused by another rule, %zu bad\n", c.params, c.trials, c.rendered, c.refused, c.bad);
+	print_message("%zu numbers, %zu trials: %zu rendered, %zu refused by another rule, %zu bad\n", c.params,
+		      c.trials, c.rendered, c.refused, c.bad);
 	assert_int_equal(c.bad, 0);
 	assert_true(c.params > 60 && c.rendered > c.params);
 }

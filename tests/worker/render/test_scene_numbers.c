@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Whole scenes with one to three of their numbers made extreme (tests/support/scene_numbers.h): each is refused with its place,
- * file and line, or rendered by every integrator without an invalid operation. Each in a process of its own, which no signal
- * ends. The seed is the test's name; FULL=1 takes 8 times as many. With arguments it is the source of tests/fuzz/numbers.sh:
- *   test_scene_numbers --write FOLDER FIRST COUNT
- * writes the scenes FIRST ... FIRST + COUNT - 1 as FOLDER/N/scene.xml with their files, and what was changed on stdout.
+ * Whole scenes with one to three of their numbers made extreme (tests/support/scene_numbers.h): each is refused with
+ * its place, file and line, or rendered by every integrator without an invalid operation. Each in a process of its own,
+ * which no signal ends. The seed is the test's name; FULL=1 takes 8 times as many. With arguments it is the source of
+ * tests/fuzz/numbers.sh: test_scene_numbers --write FOLDER FIRST COUNT writes the scenes FIRST ... FIRST + COUNT - 1 as
+ * FOLDER/N/scene.xml with their files, and what was changed on stdout.
  */
 #include "tests/support/scene_numbers.h"
 #include "tests/support/scene_trial.h"
@@ -77,8 +77,8 @@ static void try_mutant(uint64_t index, struct counts *c)
 	c->rendered += end == TRIAL_RENDERED;
 	if (end != TRIAL_REFUSED && end != TRIAL_RENDERED) {
 		c->bad++;
-		print_message("%llu, %s: %s: %s %d: %s\n", (unsigned long long)index, m.files[0].name, m.what, end < 0 ? "signal" : "end",
-			      end < 0 ? -end : end, text);
+		print_message("%llu, %s: %s: %s %d: %s\n", (unsigned long long)index, m.files[0].name, m.what,
+			      end < 0 ? "signal" : "end", end < 0 ? -end : end, text);
 	}
 	free_mutant(&m);
 }
@@ -91,13 +91,16 @@ static void test_numbers(void **state)
 	size_t count = many ? strtoul(many, NULL, 10) : dice_count(COUNT), begin = first ? strtoul(first, NULL, 10) : 0;
 	for (size_t i = begin; i < begin + count; i++)
 		try_mutant(i, &c);
-	print_message("%zu scenes: %zu refused with their place, %zu rendered, %zu neither\n", count, c.refused, c.rendered, c.bad);
+	print_message("%zu scenes: %zu refused with their place, %zu rendered, %zu neither\n", count, c.refused,
+		      c.rendered, c.bad);
 	assert_int_equal(c.bad, 0);
-	assert_true(count < 20 || (c.refused > count / 10 && c.rendered > count / 10)); /* the numbers are neither all harmless nor all hopeless */
+	assert_true(count < 20 ||
+		    (c.refused > count / 10 &&
+		     c.rendered > count / 10)); /* the numbers are neither all harmless nor all hopeless */
 }
 
-/* By long runs: rays beyond Embree's range from segments that floats cannot tell from points, lights that are points by rounding,
- * texture coordinates of 1e45. */
+/* By long runs: rays beyond Embree's range from segments that floats cannot tell from points, lights that are points by
+ * rounding, texture coordinates of 1e45. */
 static void test_found(void **state)
 {
 	(void)state;

@@ -66,7 +66,8 @@ static void test_entity_bomb(void **state)
 {
 	(void)state;
 	refuses("<?xml version='1.0'?>\n<!DOCTYPE scene [<!ENTITY a 'aaaaaaaaaaaaaaaa'><!ENTITY b '&a;&a;&a;&a;&a;&a;&a;&a;'>"
-		"<!ENTITY c '&b;&b;&b;&b;&b;&b;&b;&b;'>]><scene version='3.0.0'>&c;</scene>", "s.xml:2: <!DOCTYPE>");
+		"<!ENTITY c '&b;&b;&b;&b;&b;&b;&b;&b;'>]><scene version='3.0.0'>&c;</scene>",
+		"s.xml:2: <!DOCTYPE>");
 	refuses("<!DOCTYPE scene SYSTEM 'file:///etc/passwd'><scene version='3.0.0'/>", "<!DOCTYPE>");
 }
 
@@ -77,7 +78,8 @@ static void test_parameter_bomb(void **state)
 	static char xml[1 << 16];
 	size_t n = (size_t)snprintf(xml, sizeof xml, S "<default name='a0' value='0123456789012345'/>");
 	for (int i = 1; i < 40; i++)
-		n += (size_t)snprintf(xml + n, sizeof xml - n, "<default name='a%d' value='$a%d$a%d'/>", i, i - 1, i - 1);
+		n += (size_t)snprintf(xml + n, sizeof xml - n, "<default name='a%d' value='$a%d$a%d'/>", i, i - 1,
+				      i - 1);
 	snprintf(xml + n, sizeof xml - n, END);
 	refuses(xml, "a value of more than");
 }
@@ -121,8 +123,9 @@ static void test_too_many_elements(void **state)
 static void test_unknown_names(void **state)
 {
 	(void)state;
-	refuses(S "\n<bsdf type='difuse'/>" END, "s.xml:2: <bsdf type=\"difuse\">: there is no bsdf of this type; did you mean "
-						"`diffuse`? (supported: diffuse, ");
+	refuses(S "\n<bsdf type='difuse'/>" END,
+		"s.xml:2: <bsdf type=\"difuse\">: there is no bsdf of this type; did you mean "
+		"`diffuse`? (supported: diffuse, ");
 	refuses(S "<bsdf type='hair'/>" END, "supported: diffuse, roughconductor");
 	refuses(S "<medium type='homogeneous'/>" END, "supported: none");
 	refuses(S "<bdsf type='diffuse'/>" END, "did you mean `bsdf`?");
@@ -132,10 +135,13 @@ static void test_unknown_names(void **state)
 	refuses(S "<sensor type='spherical'/>" END, "supported: perspective, thinlens");
 	refuses(S "<sensor type='perspective'><film type='hdrfilm'><rfilter type='mitchell'/></film></sensor>" END,
 		"supported: box, tent, gaussian");
-	refuses(BSDF("\n<float name='alhpa' value='1'/>"), "s.xml:2: <float>: <bsdf type=\"roughconductor\"> has no `alhpa`; "
-							  "did you mean `alpha`? (supported: alpha, ");
-	refuses(BSDF("<boolean name='nonlinear' value='true'/>"), "would change the image and is not supported; supported: alpha");
-	refuses(BSDF("<string name='distribution' value='beckman'/>"), "did you mean `beckmann`? (supported: beckmann, ggx)");
+	refuses(BSDF("\n<float name='alhpa' value='1'/>"),
+		"s.xml:2: <float>: <bsdf type=\"roughconductor\"> has no `alhpa`; "
+		"did you mean `alpha`? (supported: alpha, ");
+	refuses(BSDF("<boolean name='nonlinear' value='true'/>"),
+		"would change the image and is not supported; supported: alpha");
+	refuses(BSDF("<string name='distribution' value='beckman'/>"),
+		"did you mean `beckmann`? (supported: beckmann, ggx)");
 	refuses(BSDF("<flaot name='alpha' value='1'/>"), "did you mean `float`?");
 	/* what is quoted and cut stays UTF-8: 63 letters and half of one */
 	refuses(S "<bsdf type='" SIXTY "xxx\xc3\xa4'/>" END, "<bsdf type=\"" SIXTY "xxx?\">: there is no bsdf");
@@ -167,20 +173,26 @@ static void test_bad_values(void **state)
 	refuses(BSDF("<spectrum name='eta'/>"), "needs either value or filename or type");
 	refuses(BSDF("<spectrum name='eta' value='1' type='d65'/>"), "needs either value or filename or type");
 	refuses(BSDF("<spectrum name='eta' type='d56'/>"), "there is no spectrum of this type; did you mean `d65`?");
-	refuses(BSDF("<spectrum name='eta' type='d65'><float name='gain' value='2'/></spectrum>"), "has no place in a spectrum of type `d65`");
-	refuses(BSDF("<spectrum name='eta' type='d65'><float name='scale' value='-1'/></spectrum>"), "scale=\"-1\" is not a number from 0");
-	refuses(BSDF("<spectrum name='eta' type='regular'><string name='values' value='1,2'/></spectrum>"), "needs `wavelength_min`");
+	refuses(BSDF("<spectrum name='eta' type='d65'><float name='gain' value='2'/></spectrum>"),
+		"has no place in a spectrum of type `d65`");
+	refuses(BSDF("<spectrum name='eta' type='d65'><float name='scale' value='-1'/></spectrum>"),
+		"scale=\"-1\" is not a number from 0");
+	refuses(BSDF("<spectrum name='eta' type='regular'><string name='values' value='1,2'/></spectrum>"),
+		"needs `wavelength_min`");
 	refuses(BSDF("<spectrum name='eta' type='irregular'><string name='wavelengths' value='1,2'/>"
-		     "<string name='values' value='1,2,3'/></spectrum>"), "2 wavelengths, but 3 values");
+		     "<string name='values' value='1,2,3'/></spectrum>"),
+		"2 wavelengths, but 3 values");
 	refuses(BSDF("<spectrum name='eta' type='irregular'><string name='wavelengths' value='2,1'/>"
-		     "<string name='values' value='1,2'/></spectrum>"), "wavelengths must be positive and ascend");
+		     "<string name='values' value='1,2'/></spectrum>"),
+		"wavelengths must be positive and ascend");
 	refuses(BSDF("<spectrum name='eta' type='srgb'/>"), "needs `color`");
 	refuses(BSDF("<blackbody name='eta'/>"), "needs a temperature");
 	refuses(BSDF("<blackbody name='eta' temperature='hot'/>"), "temperature=\"hot\" is not a number");
 	refuses(BSDF("<blackbody name='eta' temperature='1'/>"), "a temperature of 1 K is outside [100, 1e+06]");
 	refuses(BSDF("<animation name='eta'/>"), "is not supported; supported: boolean");
 	refuses("<scene version='0.6.0'><path/></scene>", "s.xml:1: <path>: needs a value, a folder");
-	refuses(S "<shape type='sphere'><boolean name='flip_normals' value='yes'/></shape>" END, "neither true nor false");
+	refuses(S "<shape type='sphere'><boolean name='flip_normals' value='yes'/></shape>" END,
+		"neither true nor false");
 	refuses(S "<shape type='sphere'><float name='radius' value='0'/></shape>" END, "outside");
 	refuses(S "<shape type='sphere'><float name='radius' value='-1'/></shape>" END, "outside");
 	refuses(S "<shape type='obj'><string name='filename' value=''/></shape>" END, "an empty file name");
@@ -211,13 +223,15 @@ static void test_bad_references(void **state)
 		"s.xml:2: <ref>: there is no object with id \"wal\"; did you mean `wall`?");
 	refuses(S "<shape type='cube'><ref/></shape>" END, "needs an attribute `id`");
 	refuses(S "<bsdf type='twosided' id='a'><ref id='a'/></bsdf>" END, "refers to itself");
-	refuses(S "<bsdf type='twosided' id='a'><ref id='b'/></bsdf><bsdf type='twosided' id='b'><ref id='a'/></bsdf>" END,
+	refuses(S
+		"<bsdf type='twosided' id='a'><ref id='b'/></bsdf><bsdf type='twosided' id='b'><ref id='a'/></bsdf>" END,
 		"refers to itself");
 	refuses(S "<bsdf type='diffuse' id='a'/>\n<bsdf type='diffuse' id='a'/>" END,
 		"s.xml:2: <bsdf type=\"diffuse\">: the id \"a\" is given twice");
 	refuses(S "<alias id='a' as='b'/>" END, "there is no object with id \"a\"");
 	refuses(S "<bsdf type='diffuse' id='a'/><alias id='a' as='a'/>" END, "given twice");
-	refuses(S "<shape type='cube'><film type='hdrfilm'/></shape>" END, "a film without a name has no place in <shape");
+	refuses(S "<shape type='cube'><film type='hdrfilm'/></shape>" END,
+		"a film without a name has no place in <shape");
 	refuses(S "<shape type='cube'><bsdf type='diffuse'/><bsdf type='diffuse'/></shape>" END, "a second bsdf");
 	refuses(S "<bsdf type='diffuse' id='a'/><bsdf type='diffuse'><ref name='reflectance' id='a'/></bsdf>" END,
 		"`reflectance` may be a texture, but not a bsdf");
@@ -232,7 +246,8 @@ static void test_bad_includes(void **state)
 	refuses(S "<bsdf type='diffuse'><include filename='s.xml'/></bsdf>" END, "directly in <scene> only");
 	refuses(S "<include filename='s.xml'/>" END, "files include each other more than 8 deep");
 	static const char main_file[] = S "<include filename='i.xml'/>" END, old[] = "<scene version='0.6.0'/>",
-			  broken[] = S "\n\n<bsdf type='difuse'/>" END, doctype[] = "<!DOCTYPE scene><scene version='3.0.0'/>";
+			  broken[] = S "\n\n<bsdf type='difuse'/>" END,
+			  doctype[] = "<!DOCTYPE scene><scene version='3.0.0'/>";
 	static const struct {
 		const char *bytes, *text;
 	} cases[] = {{old, "i.xml:1: <scene>: version 0.6.0: an included file must be of the same dialect"},
@@ -240,7 +255,8 @@ static void test_bad_includes(void **state)
 		     {doctype, "i.xml:1: <!DOCTYPE>"}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		const struct memory_file files[] = {{"s.xml", main_file, sizeof main_file - 1},
-						    {"i.xml", cases[i].bytes, strlen(cases[i].bytes)}, {0}};
+						    {"i.xml", cases[i].bytes, strlen(cases[i].bytes)},
+						    {0}};
 		struct error e = {""};
 		assert_true(read_files(files, &e) < 0);
 		if (!strstr(e.text, cases[i].text))
@@ -265,13 +281,15 @@ static void test_bad_films(void **state)
 static void test_memory_runs_out(void **state)
 {
 	(void)state;
-	static const char xml[] = "<scene version='0.6.0'><default name='d' value='diffuse'/><include filename='i.xml'/>"
-				  "<texture type='bitmap' id='t'><string name='filename' value='a.png'/></texture>"
-				  "<bsdf type='$d' id='m'><ref name='reflectance' id='t'/></bsdf><alias id='m' as='k'/>"
-				  "<shape type='sphere'><ref id='k'/><transform name='toWorld'><scale value='2'/></transform>"
-				  "</shape></scene>";
-	static const char good[] = "<scene version='0.6.0'><bsdf type='roughconductor'><spectrum name='eta' value='1:2,3:4'/>"
-				   "</bsdf></scene>";
+	static const char xml[] =
+		"<scene version='0.6.0'><default name='d' value='diffuse'/><include filename='i.xml'/>"
+		"<texture type='bitmap' id='t'><string name='filename' value='a.png'/></texture>"
+		"<bsdf type='$d' id='m'><ref name='reflectance' id='t'/></bsdf><alias id='m' as='k'/>"
+		"<shape type='sphere'><ref id='k'/><transform name='toWorld'><scale value='2'/></transform>"
+		"</shape></scene>";
+	static const char good[] =
+		"<scene version='0.6.0'><bsdf type='roughconductor'><spectrum name='eta' value='1:2,3:4'/>"
+		"</bsdf></scene>";
 	const struct memory_file files[] = {{"s.xml", xml, sizeof xml - 1}, {"i.xml", good, sizeof good - 1}, {0}};
 	long n = 0;
 	struct error e = {""};
@@ -289,18 +307,12 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_broken_xml),
-		cmocka_unit_test(test_entity_bomb),
-		cmocka_unit_test(test_parameter_bomb),
-		cmocka_unit_test(test_deep_nesting),
-		cmocka_unit_test(test_too_many_elements),
-		cmocka_unit_test(test_unknown_names),
-		cmocka_unit_test(test_bad_values),
-		cmocka_unit_test(test_bad_transforms),
-		cmocka_unit_test(test_bad_references),
-		cmocka_unit_test(test_bad_includes),
-		cmocka_unit_test(test_bad_films),
-		cmocka_unit_test(test_memory_runs_out),
+		cmocka_unit_test(test_broken_xml),	  cmocka_unit_test(test_entity_bomb),
+		cmocka_unit_test(test_parameter_bomb),	  cmocka_unit_test(test_deep_nesting),
+		cmocka_unit_test(test_too_many_elements), cmocka_unit_test(test_unknown_names),
+		cmocka_unit_test(test_bad_values),	  cmocka_unit_test(test_bad_transforms),
+		cmocka_unit_test(test_bad_references),	  cmocka_unit_test(test_bad_includes),
+		cmocka_unit_test(test_bad_films),	  cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -109,8 +109,10 @@ static void test_bad_png(void **state)
 /* A PNG of one pixel whose header says that it has side x side. */
 static unsigned char *promising_png(unsigned side, int color, size_t *size)
 {
-	unsigned char *small = sample_png(1, 1, SAMPLE_RGB, 8, 0, size), high = (unsigned char)(side >> 8), low = (unsigned char)side;
-	const unsigned char ihdr[] = {0, 0, 0, 13, 'I', 'H', 'D', 'R', 0, 0, high, low, 0, 0, high, low, 8, (unsigned char)color, 0, 0, 0};
+	unsigned char *small = sample_png(1, 1, SAMPLE_RGB, 8, 0, size), high = (unsigned char)(side >> 8),
+		      low = (unsigned char)side;
+	const unsigned char ihdr[] = {
+		0, 0, 0, 13, 'I', 'H', 'D', 'R', 0, 0, high, low, 0, 0, high, low, 8, (unsigned char)color, 0, 0, 0};
 	memcpy(small + 8, ihdr, sizeof ihdr);
 	uint32_t crc = 0xffffffff;
 	for (size_t i = 12; i < 29; i++) {
@@ -132,7 +134,8 @@ static void refuses_png(unsigned side, int color, const char *text)
 	free(png);
 }
 
-/* A header that promises pixels and nothing behind it must not cost a gigabyte first; nor one with much behind it, more than that. */
+/* A header that promises pixels and nothing behind it must not cost a gigabyte first; nor one with much behind it, more
+ * than that. */
 static void test_png_bomb(void **state)
 {
 	(void)state;
@@ -168,7 +171,8 @@ static void test_scene_limit(void **state)
 	struct error e;
 	assert_int_equal(decode(png, size, false, &arena, &img, &e), 0);
 	assert_int_equal(decode(png, size, false, &arena, &img, &e), -EFBIG);
-	assert_string_equal(e.text, "i: 13 x 9 pixels take 0 MB decoded, the scene before it 4096 MB; at most 4096 MB together");
+	assert_string_equal(
+		e.text, "i: 13 x 9 pixels take 0 MB decoded, the scene before it 4096 MB; at most 4096 MB together");
 	arena_fini(&arena);
 	free(png);
 }
@@ -247,7 +251,8 @@ static void test_bad_hdr(void **state)
 	refuses(file, make_hdr(file, "-Y 99999999999999999999 +X 1", pixels, 12), "only the resolution line");
 	refuses(file, make_hdr(file, "-Y 100000 +X 100000", pixels, 12), "pixels; at most");
 	refuses(file, make_hdr(file, "-Y 5000 +X 5000", pixels, 12), "too short for");
-	refuses(file, make_hdr(file, "-Y 10000 +X 10000", pixels, 12), "i: 10000 x 10000 pixels take 1144 MB decoded; at most 1024 MB");
+	refuses(file, make_hdr(file, "-Y 10000 +X 10000", pixels, 12),
+		"i: 10000 x 10000 pixels take 1144 MB decoded; at most 1024 MB");
 	refuses(file, make_hdr(file, "-Y 9223372036854775000 +X 9223372036854775000", pixels, 12), "pixels; at most");
 	refuses(file, make_hdr(file, "-Y 1 +X 8", pixels, 64), "run lengths that do not fill");
 	refuses(file, make_hdr(file, "-Y 1 +X 9", pixels, 64), "another width");
@@ -261,9 +266,11 @@ enum { EXR_WIDTH = 16, EXR_HEIGHT = 8, EXR_PIXELS = EXR_WIDTH * EXR_HEIGHT };
 
 static unsigned char *make_exr(const char *const *names, uint32_t channels, const float *value, size_t *size)
 {
-	struct exr_image x = {
-			      .width = EXR_WIDTH, .height = EXR_HEIGHT, .channel_count = channels,
-			      .full_width = EXR_WIDTH, .full_height = EXR_HEIGHT};
+	struct exr_image x = {.width = EXR_WIDTH,
+			      .height = EXR_HEIGHT,
+			      .channel_count = channels,
+			      .full_width = EXR_WIDTH,
+			      .full_height = EXR_HEIGHT};
 	float planes[3][EXR_PIXELS];
 	for (uint32_t k = 0; k < channels; k++) {
 		snprintf(x.names[k], sizeof x.names[k], "%s", names[k]);
@@ -348,10 +355,11 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_png),  cmocka_unit_test(test_bad_png), cmocka_unit_test(test_png_bomb),
-		cmocka_unit_test(test_jpeg), cmocka_unit_test(test_hdr),     cmocka_unit_test(test_bad_hdr),
+		cmocka_unit_test(test_png),	  cmocka_unit_test(test_bad_png),
+		cmocka_unit_test(test_png_bomb),  cmocka_unit_test(test_jpeg),
+		cmocka_unit_test(test_hdr),	  cmocka_unit_test(test_bad_hdr),
 		cmocka_unit_test(test_jpeg_bomb), cmocka_unit_test(test_scene_limit),
-		cmocka_unit_test(test_exr),  cmocka_unit_test(test_memory_runs_out),
+		cmocka_unit_test(test_exr),	  cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -46,7 +46,8 @@ static void test_stand_ins(void **state)
 		const struct plugin_decl *d = plugin_find(render_plugins(), expected[i].cls, stand_in);
 		assert_non_null(d);
 		assert_string_equal(d->type, stand_in);
-		assert_null(plugin_find(render_plugins(), expected[i].cls, expected[i].type)); /* or no stand-in is needed */
+		assert_null(plugin_find(render_plugins(), expected[i].cls,
+					expected[i].type)); /* or no stand-in is needed */
 	}
 }
 

@@ -35,8 +35,12 @@ static size_t damage(unsigned char *out, const unsigned char *in, size_t size, u
 		rng_uniform4(0x6d757461, RNG_TEST, index, 1 + s, 0, u);
 		size_t at = below(u[1], size), n = 1 + below(u[2] * u[2], size - at);
 		switch (below(u[0], 5)) {
-		case 0: out[at] ^= (unsigned char)(1 << below(u[3], 8)); break;
-		case 1: out[at] = (unsigned char)below(u[3], 256); break;
+		case 0:
+			out[at] ^= (unsigned char)(1 << below(u[3], 8));
+			break;
+		case 1:
+			out[at] = (unsigned char)below(u[3], 256);
+			break;
 		case 2:
 			memmove(out + at, out + at + n, size - at - n);
 			size -= n;
@@ -47,7 +51,9 @@ static size_t damage(unsigned char *out, const unsigned char *in, size_t size, u
 			memmove(out + at + n, out + at, size - at);
 			size += n;
 			break;
-		default: size = u[3] < 0.2 ? at : size; break;
+		default:
+			size = u[3] < 0.2 ? at : size;
+			break;
 		}
 	}
 	return size;
@@ -106,8 +112,9 @@ static const char xml[] =
 	"<shape type='sphere'><point name='center' x='1' y='0' z='0'/><emitter type='area'><rgb name='radiance' value='1 2 3'/>"
 	"</emitter></shape></scene>";
 
-static const char obj[] = "# cube\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1e0\nvt 0 0\nvt 1 0\nvt 1 1 0\nvn 0 0 1\nvn 0 3 4\n"
-			  "g one\nusemtl two\nf 1/1/1 2/2/1 3/3/1 4/1/1\nf -1//2 1//1 \\\n2//2\nf 1 5 4\n";
+static const char obj[] =
+	"# cube\nv 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1e0\nvt 0 0\nvt 1 0\nvt 1 1 0\nvn 0 0 1\nvn 0 3 4\n"
+	"g one\nusemtl two\nf 1/1/1 2/2/1 3/3/1 4/1/1\nf -1//2 1//1 \\\n2//2\nf 1 5 4\n";
 
 static void test_scenes(void **state)
 {
@@ -159,8 +166,9 @@ static void test_images(void **state)
 {
 	(void)state;
 	static const unsigned char orange[] = {220, 130, 40};
-	static const unsigned char hdr[] = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n\2\2\0\10\210\200\203\1\5\2\3\4\5\6\210"
-					   "\7\210\210\2\2\0\10\210\200\203\1\5\2\3\4\5\6\210\7\210\210";
+	static const unsigned char hdr[] =
+		"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 8\n\2\2\0\10\210\200\203\1\5\2\3\4\5\6\210"
+		"\7\210\210\2\2\0\10\210\200\203\1\5\2\3\4\5\6\210\7\210\210";
 	size_t size;
 	unsigned char *file = sample_png(5, 4, SAMPLE_RGBA, 8, 1, &size);
 	damage_image(file, size);

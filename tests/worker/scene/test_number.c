@@ -17,9 +17,18 @@ static void test_accepted(void **state)
 	static const struct {
 		const char *text;
 		double value;
-	} good[] = {{"1", 1}, {" -2.5 ", -2.5}, {".73", .73}, {"5.", 5}, {"+1e3", 1000}, {"-4.37114e-008", -4.37114e-8},
-		    {"1e-320", 1e-320}, {"123456789012345678901234567890", 123456789012345678901234567890.0},
-		    {"0.1", 0.1}, {"1.7976931348623157e308", 1.7976931348623157e308}, {"1e-999", 0}, {"0e99999999", 0},
+	} good[] = {{"1", 1},
+		    {" -2.5 ", -2.5},
+		    {".73", .73},
+		    {"5.", 5},
+		    {"+1e3", 1000},
+		    {"-4.37114e-008", -4.37114e-8},
+		    {"1e-320", 1e-320},
+		    {"123456789012345678901234567890", 123456789012345678901234567890.0},
+		    {"0.1", 0.1},
+		    {"1.7976931348623157e308", 1.7976931348623157e308},
+		    {"1e-999", 0},
+		    {"0e99999999", 0},
 		    {"9007199254740993", 9007199254740993.0}};
 	for (size_t i = 0; i < sizeof good / sizeof *good; i++) {
 		double x = -1;
@@ -31,7 +40,8 @@ static void test_accepted(void **state)
 static void test_refused(void **state)
 {
 	(void)state;
-	static const char *const bad[] = {"", " ", "nan", "inf", "-inf", "0x10", "1,5", "1e", "1e400", "--1", "1 2", ".", "-", "e5", "1f"};
+	static const char *const bad[] = {"",	   " ",	  "nan", "inf", "-inf", "0x10", "1,5", "1e",
+					  "1e400", "--1", "1 2", ".",	"-",	"e5",	"1f"};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		double x;
 		if (number_parse(bad[i], &x))
@@ -118,9 +128,12 @@ static void test_nearest(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_accepted), cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_rounding_agrees_with_the_library), cmocka_unit_test(test_lists),
-		cmocka_unit_test(test_snake), cmocka_unit_test(test_nearest),
+		cmocka_unit_test(test_accepted),
+		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_rounding_agrees_with_the_library),
+		cmocka_unit_test(test_lists),
+		cmocka_unit_test(test_snake),
+		cmocka_unit_test(test_nearest),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -93,7 +93,8 @@ static void test_plain_values(void **state)
 	(void)state;
 	struct scene s = read_inside("0.6.0", "<shape type='sphere'>",
 				     "<point name='center' x='1' z='-3'/><float name='radius' value='2'/>"
-				     "<boolean name='flipNormals' value='true'/>", "</shape>");
+				     "<boolean name='flipNormals' value='true'/>",
+				     "</shape>");
 	const struct scene_node *n = s.objects[0];
 	vec3 c = node_find(n, "center")->value.as.point;
 	assert_true(c.x == 1 && c.y == 0 && c.z == -3);
@@ -102,8 +103,8 @@ static void test_plain_values(void **state)
 	assert_int_equal(node_int(n, "absent", 7), 7);
 	assert_string_equal(node_string(n, "absent", "fallback"), "fallback");
 	scene_fini(&s);
-	s = read_inside("3.0.0", "<shape type='sphere'>", "<point name='center' value='1, 2, 3'/><integer name='radius' value='2'/>",
-			"</shape>");
+	s = read_inside("3.0.0", "<shape type='sphere'>",
+			"<point name='center' value='1, 2, 3'/><integer name='radius' value='2'/>", "</shape>");
 	assert_true(node_find(s.objects[0], "center")->value.as.point.z == 3);
 	assert_int_equal(node_find(s.objects[0], "radius")->value.type, VALUE_FLOAT);
 	scene_fini(&s);
@@ -156,22 +157,26 @@ static void test_dialects(void **state)
 	scene_fini(&s);
 	/* 3.x does not know the old names. */
 	struct error e;
-	assert_int_equal(read_with(&s, "<scene version='3.0.0'><bsdf type='roughconductor'><float name='extEta' value='1'/>"
-				       "</bsdf></scene>", NULL, 0, &e), -EINVAL);
+	assert_int_equal(read_with(&s,
+				   "<scene version='3.0.0'><bsdf type='roughconductor'><float name='extEta' value='1'/>"
+				   "</bsdf></scene>",
+				   NULL, 0, &e),
+			 -EINVAL);
 	assert_non_null(strstr(e.text, "did you mean `ext_eta`?"));
 }
 
 static void test_nesting_and_references(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("<scene version='3.0.0'>"
-				 "<texture type='bitmap' id='t'><string name='filename' value='a/b.png'/></texture>"
-				 "<bsdf type='twosided' id='m'><bsdf type='diffuse'><ref name='reflectance' id='t'/></bsdf></bsdf>"
-				 "<shape type='cube'><ref id='m'/><emitter type='area'><rgb name='radiance' value='1'/></emitter></shape>"
-				 "<shape type='rectangle'><ref id='m'/></shape>"
-				 "<shape type='rectangle'><bsdf type='diffuse'><texture type='checkerboard' name='reflectance'>"
-				 "<rgb name='color0' value='1'/><ref id='t' name='color1'/></texture></bsdf></shape>"
-				 "</scene>");
+	struct scene s = read_ok(
+		"<scene version='3.0.0'>"
+		"<texture type='bitmap' id='t'><string name='filename' value='a/b.png'/></texture>"
+		"<bsdf type='twosided' id='m'><bsdf type='diffuse'><ref name='reflectance' id='t'/></bsdf></bsdf>"
+		"<shape type='cube'><ref id='m'/><emitter type='area'><rgb name='radiance' value='1'/></emitter></shape>"
+		"<shape type='rectangle'><ref id='m'/></shape>"
+		"<shape type='rectangle'><bsdf type='diffuse'><texture type='checkerboard' name='reflectance'>"
+		"<rgb name='color0' value='1'/><ref id='t' name='color1'/></texture></bsdf></shape>"
+		"</scene>");
 	assert_int_equal(s.object_count, 5);
 	const struct scene_node *t = s.objects[0], *m = s.objects[1], *cube = s.objects[2];
 	assert_string_equal(m->id, "m");
@@ -242,15 +247,17 @@ static void test_include(void **state)
 static void test_ignored_is_noted_once(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("<scene version='0.5.0'>\n<mode type='x'><junk/>words</mode><mode/>\n"
-				 "<integrator type='unheard'><float name='q' value='nan'/><integer name='maxDepth' value='7'/>"
-				 "<junk/></integrator>\n"
-				 "<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
-				 "<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
-				 "<dpt/></scene>");
+	struct scene s =
+		read_ok("<scene version='0.5.0'>\n<mode type='x'><junk/>words</mode><mode/>\n"
+			"<integrator type='unheard'><float name='q' value='nan'/><integer name='maxDepth' value='7'/>"
+			"<junk/></integrator>\n"
+			"<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
+			"<bsdf type='roughdielectric'><boolean name='sampleVisible' value='?'/></bsdf>\n"
+			"<dpt/></scene>");
 	assert_int_equal(s.note_count, 4);
 	assert_string_equal(s.notes[0], "s.xml:2: <mode> and all inside it is ignored");
-	assert_string_equal(s.notes[1], "s.xml:3: <integrator type=\"unheard\"> is ignored but for: max_depth, hide_emitters");
+	assert_string_equal(s.notes[1],
+			    "s.xml:3: <integrator type=\"unheard\"> is ignored but for: max_depth, hide_emitters");
 	assert_non_null(strstr(s.notes[2], "s.xml:4: <bsdf type=\"roughdielectric\">: `sample_visible`"));
 	assert_non_null(strstr(s.notes[3], "s.xml:6: <dpt>"));
 	assert_int_equal(node_int(s.objects[0], "max_depth", 0), 7);
@@ -261,12 +268,13 @@ static void test_ignored_is_noted_once(void **state)
 static void test_assets_are_sorted_and_unique(void **state)
 {
 	(void)state;
-	struct scene s = read_ok("<scene version='3.0.0'>"
-				 "<shape type='obj'><string name='filename' value='b.obj'/></shape>"
-				 "<shape type='obj'><string name='filename' value='a.obj'/></shape>"
-				 "<shape type='obj'><string name='filename' value='b.obj'/></shape>"
-				 "<sensor type='perspective'><film type='hdrfilm'><string name='filename' value='out.exr'/></film></sensor>"
-				 "</scene>");
+	struct scene s = read_ok(
+		"<scene version='3.0.0'>"
+		"<shape type='obj'><string name='filename' value='b.obj'/></shape>"
+		"<shape type='obj'><string name='filename' value='a.obj'/></shape>"
+		"<shape type='obj'><string name='filename' value='b.obj'/></shape>"
+		"<sensor type='perspective'><film type='hdrfilm'><string name='filename' value='out.exr'/></film></sensor>"
+		"</scene>");
 	assert_int_equal(s.asset_count, 2);
 	assert_string_equal(s.assets[0], "a.obj");
 	assert_string_equal(s.assets[1], "b.obj");
@@ -277,9 +285,11 @@ static void test_assets_are_sorted_and_unique(void **state)
 static void test_every_problem_is_told(void **state)
 {
 	(void)state;
-	const char *xml = "<scene version='3.0.0'>\n<bsdf type='hair' id='fur'/>\n<shape type='cube'><ref id='fur'/>\n"
-			  "<float name='radius' value='1'/></shape>\n<shape type='cube'><ref id='fur'/></shape>\n<shape type='cone'/>\n</scene>";
-	static const char *const want[] = {"s.xml:2: <bsdf type=\"hair\">", "s.xml:4: <float>", "s.xml:6: <shape type=\"cone\">"};
+	const char *xml =
+		"<scene version='3.0.0'>\n<bsdf type='hair' id='fur'/>\n<shape type='cube'><ref id='fur'/>\n"
+		"<float name='radius' value='1'/></shape>\n<shape type='cube'><ref id='fur'/></shape>\n<shape type='cone'/>\n</scene>";
+	static const char *const want[] = {"s.xml:2: <bsdf type=\"hair\">", "s.xml:4: <float>",
+					   "s.xml:6: <shape type=\"cone\">"};
 	const struct memory_file memory[] = {{"s.xml", xml, strlen(xml)}, {0}};
 	struct asset_source assets = memory_assets(memory);
 	struct scene s;

@@ -29,7 +29,8 @@ static struct scene_settings read_ok(const char *before, const char *content)
 	char xml[2048];
 	struct scene_settings set;
 	struct error e;
-	snprintf(xml, sizeof xml, "<scene version='0.6.0'>%s<sensor type='perspective'>%s</sensor></scene>", before, content);
+	snprintf(xml, sizeof xml, "<scene version='0.6.0'>%s<sensor type='perspective'>%s</sensor></scene>", before,
+		 content);
 	if (read_scene(xml, 0, 0, &set, &e))
 		fail_msg("%s", e.text);
 	return set;
@@ -92,24 +93,30 @@ static void test_filters(void **state)
 static void test_sampler_and_integrator(void **state)
 {
 	(void)state;
-	struct scene_settings s = read_ok("<integrator type='bdpt'><integer name='maxDepth' value='9'/><integer name='rrDepth' "
-					  "value='3'/></integrator>",
-					  "<sampler type='sobol'><integer name='sampleCount' value='17'/>"
-					  "<integer name='scramble' value='4'/></sampler>");
+	struct scene_settings s =
+		read_ok("<integrator type='bdpt'><integer name='maxDepth' value='9'/><integer name='rrDepth' "
+			"value='3'/></integrator>",
+			"<sampler type='sobol'><integer name='sampleCount' value='17'/>"
+			"<integer name='scramble' value='4'/></sampler>");
 	assert_int_equal(s.max_depth, 9);
 	assert_string_equal(s.integrator, "bdpt");
 	assert_int_equal(s.spp, 17);
 	assert_false(s.hide_emitters);
-	assert_true(read_ok("<integrator type='aov'><integrator type='path'><boolean name='hideEmitters' value='true'/></integrator>"
-			    "</integrator>", "").hide_emitters);
+	assert_true(
+		read_ok("<integrator type='aov'><integrator type='path'><boolean name='hideEmitters' value='true'/></integrator>"
+			"</integrator>",
+			"")
+			.hide_emitters);
 	static const struct {
 		const char *depth;
 		uint32_t want;
 	} depths[] = {{"-1", 128}, {"500", 128}, {"128", 128}, {"127", 127}, {"1", 1}};
 	for (size_t i = 0; i < sizeof depths / sizeof *depths; i++) {
 		char before[256];
-		snprintf(before, sizeof before, "<integrator type='irrcache'><integrator type='path'><integer name='maxDepth' "
-			 "value='%s'/></integrator></integrator>", depths[i].depth);
+		snprintf(before, sizeof before,
+			 "<integrator type='irrcache'><integrator type='path'><integer name='maxDepth' "
+			 "value='%s'/></integrator></integrator>",
+			 depths[i].depth);
 		assert_int_equal(read_ok(before, "").max_depth, depths[i].want);
 	}
 }
@@ -137,8 +144,9 @@ static void test_camera(void **state)
 static void test_several_sensors(void **state)
 {
 	(void)state;
-	const char *xml = "<scene version='3.0.0'><emitter type='area' id='lamp'/>\n<sensor type='perspective'><float name='fov' "
-			  "value='20'/></sensor>\n<sensor type='perspective'><float name='fov' value='30'/></sensor></scene>";
+	const char *xml =
+		"<scene version='3.0.0'><emitter type='area' id='lamp'/>\n<sensor type='perspective'><float name='fov' "
+		"value='20'/></sensor>\n<sensor type='perspective'><float name='fov' value='30'/></sensor></scene>";
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
 	struct asset_source assets = memory_assets(files);
 	struct scene s;
@@ -148,7 +156,8 @@ static void test_several_sensors(void **state)
 	assert_int_equal(scene_settings_read(&s, 0, 0, &set, &e), 0);
 	assert_true(set.fov == 20);
 	assert_int_equal(s.note_count, 1);
-	assert_string_equal(s.notes[0], "s.xml:3: <sensor type=\"perspective\">: only the first sensor, in line 2, is rendered");
+	assert_string_equal(s.notes[0],
+			    "s.xml:3: <sensor type=\"perspective\">: only the first sensor, in line 2, is rendered");
 	scene_fini(&s);
 }
 
@@ -159,9 +168,11 @@ static void test_notes_on_the_whole(void **state)
 	static const struct {
 		const char *xml, *note;
 	} cases[] = {
-		{"<sensor type='perspective'/>", "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the picture is black"},
-		{"<integrator type='direct'/>", "s.xml:1: <integrator type=\"direct\">: is not what is rendered: the picture is of all light on "
-						"surfaces, without media; --max-depth 2 leaves out indirect light"},
+		{"<sensor type='perspective'/>",
+		 "s.xml:1: <sensor type=\"perspective\">: the scene has no emitter: the picture is black"},
+		{"<integrator type='direct'/>",
+		 "s.xml:1: <integrator type=\"direct\">: is not what is rendered: the picture is of all light on "
+		 "surfaces, without media; --max-depth 2 leaves out indirect light"},
 		{"<integrator type='volpath'/>", "without media"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
@@ -184,8 +195,10 @@ static void test_notes_on_the_whole(void **state)
 static void test_crop(void **state)
 {
 	(void)state;
-#define FILM "<film type='hdrfilm'><integer name='width' value='100'/><integer name='height' value='60'/>" CROP "</film>"
-#define CROP "<integer name='cropOffsetX' value='10'/><integer name='cropWidth' value='30'/><integer name='cropHeight' value='60'/>"
+#define FILM \
+	"<film type='hdrfilm'><integer name='width' value='100'/><integer name='height' value='60'/>" CROP "</film>"
+#define CROP \
+	"<integer name='cropOffsetX' value='10'/><integer name='cropWidth' value='30'/><integer name='cropHeight' value='60'/>"
 	struct scene_settings s = read_ok("", FILM);
 	assert_true(s.width == 100 && s.height == 60);
 	assert_true(s.crop_x == 10 && s.crop_y == 0 && s.crop_width == 30 && s.crop_height == 60);
@@ -194,7 +207,9 @@ static void test_crop(void **state)
 	assert_int_equal(read_ok("", FILM).crop_width, 0); /* all of it is none */
 #undef CROP
 #undef FILM
-	s = read_ok("", "<float name='principalPointOffsetX' value='0.25'/><integer name='principalPointOffsetY' value='0'/>");
+	s = read_ok(
+		"",
+		"<float name='principalPointOffsetX' value='0.25'/><integer name='principalPointOffsetY' value='0'/>");
 	assert_true(s.principal_x == 0.25 && s.principal_y == 0);
 }
 
@@ -203,8 +218,9 @@ static void test_size_is_overridden(void **state)
 	(void)state;
 	struct scene_settings s;
 	struct error e;
-	const char *xml = "<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'><integer name='width' "
-			  "value='100'/><integer name='height' value='50'/></film></sensor></scene>";
+	const char *xml =
+		"<scene version='3.0.0'><sensor type='perspective'><film type='hdrfilm'><integer name='width' "
+		"value='100'/><integer name='height' value='50'/></film></sensor></scene>";
 	assert_int_equal(read_scene(xml, 0, 0, &s, &e), 0);
 	assert_true(s.width == 100 && s.height == 50);
 	assert_int_equal(read_scene(xml, 7, 8, &s, &e), 0);
@@ -223,13 +239,16 @@ static void test_refused(void **state)
 		"the crop window of 10 x 576 pixels at 1, 0 leaves");
 	refuses(SENSOR("<film type='hdrfilm'><integer name='width' value='32000'/><integer name='height' value='32000'/></film>"),
 		"a film of 32000 x 32000 pixels");
-	refuses(SENSOR("") "<integrator type='path'><integer name='max_depth' value='0'/></integrator>", "a depth of 0");
+	refuses(SENSOR("") "<integrator type='path'><integer name='max_depth' value='0'/></integrator>",
+		"a depth of 0");
 	refuses(SENSOR("") "<integrator type='path'/><integrator type='path'/>", "a second integrator");
 	refuses(SENSOR("<float name='fov' value='40'/><string name='focal_length' value='50mm'/>"), "give one");
 	refuses(SENSOR("<string name='focal_length' value='50'/>"), "is not a length");
 	refuses(SENSOR("<string name='focal_length' value='-1mm'/>"), "is not a length");
-	refuses(SENSOR("<float name='near_clip' value='5'/><float name='far_clip' value='5'/>"), "is not below far_clip");
-	refuses(SENSOR("<transform name='to_world'><matrix value='1 0.5 0 0 1 0 0 0 1'/></transform>"), "must only turn");
+	refuses(SENSOR("<float name='near_clip' value='5'/><float name='far_clip' value='5'/>"),
+		"is not below far_clip");
+	refuses(SENSOR("<transform name='to_world'><matrix value='1 0.5 0 0 1 0 0 0 1'/></transform>"),
+		"must only turn");
 	refuses(SENSOR("<transform name='to_world'><scale z='0'/></transform>"), "must only turn");
 }
 
@@ -239,13 +258,17 @@ static void test_thin_lens(void **state)
 	(void)state;
 	struct scene_settings s;
 	struct error e;
-	if (read_scene("<scene version='0.5.0'><sensor type='thinlens'><float name='fov' value='30'/><float name='apertureRadius' value='.25'/>"
-		       "<float name='focusDistance' value='7'/></sensor></scene>", 0, 0, &s, &e))
+	if (read_scene(
+		    "<scene version='0.5.0'><sensor type='thinlens'><float name='fov' value='30'/><float name='apertureRadius' value='.25'/>"
+		    "<float name='focusDistance' value='7'/></sensor></scene>",
+		    0, 0, &s, &e))
 		fail_msg("%s", e.text);
 	assert_true(s.aperture_radius == 0.25 && s.focus_distance == 7 && s.fov == 30);
 	/* Focused at the far plane, where nothing is said. */
-	if (read_scene("<scene version='3.0.0'><sensor type='thinlens'><float name='fov' value='30'/><float name='aperture_radius' value='2'/>"
-		       "<float name='far_clip' value='50'/></sensor></scene>", 0, 0, &s, &e))
+	if (read_scene(
+		    "<scene version='3.0.0'><sensor type='thinlens'><float name='fov' value='30'/><float name='aperture_radius' value='2'/>"
+		    "<float name='far_clip' value='50'/></sensor></scene>",
+		    0, 0, &s, &e))
 		fail_msg("%s", e.text);
 	assert_true(s.aperture_radius == 2 && s.focus_distance == 50);
 	s = read_ok("", "<float name='focusDistance' value='7'/>");
@@ -256,7 +279,8 @@ static void test_thin_lens(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_thin_lens), cmocka_unit_test(test_defaults),
+		cmocka_unit_test(test_thin_lens),
+		cmocka_unit_test(test_defaults),
 		cmocka_unit_test(test_filters),
 		cmocka_unit_test(test_sampler_and_integrator),
 		cmocka_unit_test(test_camera),

@@ -20,10 +20,14 @@ static const struct value *eta_of(const char *version, const char *content)
 {
 	static char xml[2048];
 	struct error e;
-	snprintf(xml, sizeof xml, "<scene version='%s'><path value='lib/'/><path value='spectra'/>"
-		 "<bsdf type='roughconductor'>%s</bsdf></scene>", version, content);
-	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"a.spd", lines, sizeof lines - 1},
-					    {"spectra/b.spd", lines, sizeof lines - 1}, {0}};
+	snprintf(xml, sizeof xml,
+		 "<scene version='%s'><path value='lib/'/><path value='spectra'/>"
+		 "<bsdf type='roughconductor'>%s</bsdf></scene>",
+		 version, content);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)},
+					    {"a.spd", lines, sizeof lines - 1},
+					    {"spectra/b.spd", lines, sizeof lines - 1},
+					    {0}};
 	struct asset_source assets = memory_assets(files);
 	if (scene_read(&scene, &assets, "s.xml", scene_tables(), NULL, 0, &e))
 		fail_msg("%s", e.text);
@@ -67,11 +71,13 @@ static void test_three_numbers(void **state)
 static void test_types(void **state)
 {
 	(void)state;
-	const struct value *v = eta_of("3.0.0", "<spectrum name='eta' type='uniform'><float name='value' value='2.5'/></spectrum>");
+	const struct value *v =
+		eta_of("3.0.0", "<spectrum name='eta' type='uniform'><float name='value' value='2.5'/></spectrum>");
 	assert_true(v->as.spectrum.count == 1 && v->as.spectrum.value[0] == 2.5);
 	scene_fini(&scene);
-	v = eta_of("3.0.0", "<spectrum name='eta' type='regular'><float name='wavelength_min' value='400'/>"
-			    "<float name='wavelength_max' value='600'/><string name='values' value='1, 2, 4'/></spectrum>");
+	v = eta_of("3.0.0",
+		   "<spectrum name='eta' type='regular'><float name='wavelength_min' value='400'/>"
+		   "<float name='wavelength_max' value='600'/><string name='values' value='1, 2, 4'/></spectrum>");
 	assert_true(v->as.spectrum.count == 3 && at(v, 400) == 1 && at(v, 500) == 2 && at(v, 600) == 4);
 	scene_fini(&scene);
 	v = eta_of("3.0.0", "<spectrum name='eta' type='irregular'><string name='wavelengths' value='400 450 600'/>"
@@ -91,9 +97,9 @@ static void test_types(void **state)
 	scene_fini(&scene);
 }
 
-/* Against CIE illuminant A, which is Planck's law at 2848 K with c2 = 1.435e-2 m K: with today's c2 at 2855.5 K; relative to
- * 560 nm its table says 14.708 at 400 nm and 198.261 at 700 nm. And against Stefan and Boltzmann's law in order of magnitude:
- * 5000 K radiate 1.29e4 W / (m^2 sr nm) at 550 nm. */
+/* Against CIE illuminant A, which is Planck's law at 2848 K with c2 = 1.435e-2 m K: with today's c2 at 2855.5 K;
+ * relative to 560 nm its table says 14.708 at 400 nm and 198.261 at 700 nm. And against Stefan and Boltzmann's law in
+ * order of magnitude: 5000 K radiate 1.29e4 W / (m^2 sr nm) at 550 nm. */
 static void test_blackbody(void **state)
 {
 	(void)state;
@@ -101,7 +107,8 @@ static void test_blackbody(void **state)
 	assert_true(fabs(100 * at(v, 400) / at(v, 560) / 14.708 - 1) < 2e-4);
 	assert_true(fabs(100 * at(v, 700) / at(v, 560) / 198.261 - 1) < 2e-4);
 	scene_fini(&scene);
-	v = eta_of("3.0.0", "<spectrum name='eta' type='blackbody'><float name='temperature' value='5000'/></spectrum>");
+	v = eta_of("3.0.0",
+		   "<spectrum name='eta' type='blackbody'><float name='temperature' value='5000'/></spectrum>");
 	double full = at(v, 550);
 	assert_true(fabs(full / 1.2703e4 - 1) < 2e-2);
 	scene_fini(&scene);
@@ -120,8 +127,10 @@ static void test_booleans(void **state)
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		char xml[256];
 		struct error e;
-		snprintf(xml, sizeof xml, "<scene version='3.0.0'><shape type='cube'><boolean name='flip_normals' value='%s'/></shape></scene>",
-			 cases[i].written);
+		snprintf(
+			xml, sizeof xml,
+			"<scene version='3.0.0'><shape type='cube'><boolean name='flip_normals' value='%s'/></shape></scene>",
+			cases[i].written);
 		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
 		struct asset_source assets = memory_assets(files);
 		if (scene_read(&scene, &assets, "s.xml", scene_tables(), NULL, 0, &e))
@@ -134,11 +143,8 @@ static void test_booleans(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_files),
-		cmocka_unit_test(test_three_numbers),
-		cmocka_unit_test(test_types),
-		cmocka_unit_test(test_blackbody),
-		cmocka_unit_test(test_booleans),
+		cmocka_unit_test(test_files),	  cmocka_unit_test(test_three_numbers), cmocka_unit_test(test_types),
+		cmocka_unit_test(test_blackbody), cmocka_unit_test(test_booleans),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

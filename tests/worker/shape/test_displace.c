@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Displaced meshes against what they stand for: no cracks whatever the base, the base itself at height 0, and positions,
- * normals and derivatives of normals that approach the analytic surface's at the expected order.
+ * Displaced meshes against what they stand for: no cracks whatever the base, the base itself at height 0, and
+ * positions, normals and derivatives of normals that approach the analytic surface's at the expected order.
  */
 #include "common/base/mem.h"
 #include "tests/support/memory_assets.h"
@@ -31,7 +31,8 @@ static struct built build(const char *type, const char *content, const char *obj
 	char xml[2048];
 	snprintf(xml, sizeof xml, "<scene version='3.0.0'>\n<shape type='%s'>%s%s</shape></scene>", type,
 		 obj ? "<string name='filename' value='m.obj'/>" : "", content);
-	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {obj ? "m.obj" : NULL, obj, obj ? strlen(obj) : 0}, {0}};
+	const struct memory_file files[] = {
+		{"s.xml", xml, strlen(xml)}, {obj ? "m.obj" : NULL, obj, obj ? strlen(obj) : 0}, {0}};
 	struct asset_source assets = memory_assets(files);
 	struct built b = {0};
 	uint64_t dropped;
@@ -125,18 +126,23 @@ static double volume(const struct mesh *m)
 {
 	double sum = 0;
 	for (uint32_t i = 0; i < m->triangle_count; i++)
-		sum += vec3_dot(mesh_load(m->position[m->index[i][0]]),
-				vec3_cross(mesh_load(m->position[m->index[i][1]]), mesh_load(m->position[m->index[i][2]])));
+		sum += vec3_dot(
+			mesh_load(m->position[m->index[i][0]]),
+			vec3_cross(mesh_load(m->position[m->index[i][1]]), mesh_load(m->position[m->index[i][2]])));
 	return sum / 6;
 }
 
+/* clang-format off */
 #define TETRAHEDRON                                                                                                            \
 	"v 1 1 1\nv -1 -1 1\nv -1 1 -1\nv 1 -1 -1\nvt 0 0\nvt 1 0\nvt 0 1\nvt 0.7 0.9\nvt 0.3 0.1\n"                        \
 	"f 1/1 3/2 2/3\nf 1/4 2/2 4/5\nf 1/3 4/1 3/5\nf 2/2 3/4 4/3\n"
+/* clang-format on */
 /* The same, each triangle with vertices of its own. */
+/* clang-format off */
 #define LOOSE                                                                                                                  \
 	"v 1 1 1\nv -1 1 -1\nv -1 -1 1\nv 1 1 1\nv -1 -1 1\nv 1 -1 -1\nv 1 1 1\nv 1 -1 -1\nv -1 1 -1\nv -1 -1 1\n"          \
 	"v -1 1 -1\nv 1 -1 -1\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\nf 4/1 5/2 6/3\nf 7/1 8/2 9/3\nf 10/1 11/2 12/3\n"
+/* clang-format on */
 
 static void test_no_cracks(void **state)
 {
@@ -147,10 +153,13 @@ static void test_no_cracks(void **state)
 		double sign;
 	} cases[] = {
 		{"cube", "", NULL, 12, 1},
-		{"cube", "<transform name='to_world'><scale x='-2' y='0.3'/><rotate x='1' y='2' angle='33'/></transform>", NULL, 12, 1},
+		{"cube",
+		 "<transform name='to_world'><scale x='-2' y='0.3'/><rotate x='1' y='2' angle='33'/></transform>", NULL,
+		 12, 1},
 		{"sphere", "", NULL, 8, 1},
 		{"sphere", "<boolean name='flip_normals' value='true'/>", NULL, 8, -1},
-		{"sphere", "<transform name='to_world'><scale x='-1'/><rotate z='1' x='1' angle='70'/></transform>", NULL, 8, 1},
+		{"sphere", "<transform name='to_world'><scale x='-1'/><rotate z='1' x='1' angle='70'/></transform>",
+		 NULL, 8, 1},
 		{"obj", "", TETRAHEDRON, 4, 1},
 		{"obj", "<boolean name='face_normals' value='true'/>", TETRAHEDRON, 4, 1},
 		{"obj", "", LOOSE, 4, 1},
@@ -174,7 +183,8 @@ static void test_unused_vertices_stay(void **state)
 {
 	(void)state;
 	struct displacement d = {one, NULL, true, 3, 2, 1};
-	struct built b = build_ok("obj", "", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 9 9 9\nv 9 9 9\nv 9 8 9\nf 1 2 3\nf 4 5 6\n", &d);
+	struct built b =
+		build_ok("obj", "", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 9 9 9\nv 9 9 9\nv 9 8 9\nf 1 2 3\nf 4 5 6\n", &d);
 	assert_int_equal(b.g.mesh.triangle_count, 16);
 	for (uint32_t i = 0; i < b.g.mesh.vertex_count; i++) {
 		const double *p = b.g.mesh.position[i];
@@ -242,7 +252,8 @@ static void test_constant_on_a_cube(void **state)
 		if (face)
 			assert_true(fmax(fabs(n.x), fmax(fabs(n.y), fabs(n.z))) > 1 - 1e-14);
 		else /* turned outwards, less than half way to the neighbour's */
-			assert_true(vec3_dot(n, vec3_normalize(p)) > 0.5 && fmax(fabs(n.x), fmax(fabs(n.y), fabs(n.z))) < 0.999);
+			assert_true(vec3_dot(n, vec3_normalize(p)) > 0.5 &&
+				    fmax(fabs(n.x), fmax(fabs(n.y), fabs(n.z))) < 0.999);
 	}
 	assert_int_equal(corners, 24);
 	assert_int_equal(edges, 24 * 7);
@@ -261,14 +272,16 @@ typedef void surface(double u, double v, vec3 *p, vec3 *n);
 static double derivative_off(const struct mesh *m, const uint32_t t[3], surface *of)
 {
 	const double *c0 = m->uv[t[0]], *c1 = m->uv[t[1]], *c2 = m->uv[t[2]];
-	double du1 = c1[0] - c0[0], dv1 = c1[1] - c0[1], du2 = c2[0] - c0[0], dv2 = c2[1] - c0[1], det = du1 * dv2 - dv1 * du2;
+	double du1 = c1[0] - c0[0], dv1 = c1[1] - c0[1], du2 = c2[0] - c0[0], dv2 = c2[1] - c0[1],
+	       det = du1 * dv2 - dv1 * du2;
 	vec3 n0 = mesh_load(m->normal[t[0]]), d1 = vec3_sub(mesh_load(m->normal[t[1]]), n0),
 	     d2 = vec3_sub(mesh_load(m->normal[t[2]]), n0);
 	vec3 mean = vec3_madd(vec3_madd(n0, 1.0 / 3, d1), 1.0 / 3, d2);
 	double length = vec3_length(mean), worst = 0;
 	vec3 n = vec3_scale(1 / length, mean);
 	for (int k = 0; k < 2; k++) {
-		vec3 change = k ? vec3_sub(vec3_scale(du1, d2), vec3_scale(du2, d1)) : vec3_sub(vec3_scale(dv2, d1), vec3_scale(dv1, d2));
+		vec3 change = k ? vec3_sub(vec3_scale(du1, d2), vec3_scale(du2, d1))
+				: vec3_sub(vec3_scale(dv2, d1), vec3_scale(dv1, d2));
 		change = vec3_scale(1 / (det * length), change);
 		change = vec3_madd(change, -vec3_dot(change, n), n);
 		vec3 p, a, b;
@@ -310,7 +323,8 @@ static vec3 normal_of(vec3 (*at)(double, double), double u, double v, double sig
 	vec3 d[2];
 	for (int k = 0; k < 2; k++) {
 		double x = k ? 0 : h, y = k ? h : 0;
-		d[k] = vec3_sub(vec3_scale(8, vec3_sub(at(u + x, v + y), at(u - x, v - y))), vec3_sub(at(u + 2 * x, v + 2 * y), at(u - 2 * x, v - 2 * y)));
+		d[k] = vec3_sub(vec3_scale(8, vec3_sub(at(u + x, v + y), at(u - x, v - y))),
+				vec3_sub(at(u + 2 * x, v + 2 * y), at(u - 2 * x, v - 2 * y)));
 	}
 	return vec3_scale(sign, vec3_normalize(vec3_cross(d[0], d[1])));
 }
@@ -348,15 +362,16 @@ static void ball(double u, double v, vec3 *p, vec3 *n)
 
 /* Positions lie on the surface; normals are off by the square of the step (a quarter at the next level), what is
  * interpolated from them has derivatives off by the step (a half). */
-static void approaches(const char *type, double (*height)(const void *, double, double), double scale, surface *of, double margin)
+static void approaches(const char *type, double (*height)(const void *, double, double), double scale, surface *of,
+		       double margin)
 {
 	struct misses last = {0, 0, 0};
 	for (uint32_t level = 5; level <= 7; level++) {
 		struct displacement d = {height, NULL, false, scale, level, 1};
 		struct built b = build_ok(type, "", NULL, &d);
 		struct misses r = measure(&b.g.mesh, of, margin);
-		print_message("%s, level %u: positions off by %.1e, normals by %.2e, their derivatives by %.3f\n", type, level,
-			      r.position, r.normal, r.derivative);
+		print_message("%s, level %u: positions off by %.1e, normals by %.2e, their derivatives by %.3f\n", type,
+			      level, r.position, r.normal, r.derivative);
 		assert_true(r.position < 1e-14);
 		if (level > 5) {
 			assert_true(r.normal < last.normal / 3.6 && r.normal > last.normal / 4.4);
@@ -408,7 +423,9 @@ static void test_refused(void **state)
 	struct displacement d = {waves, NULL, false, 1, 13, 1};
 	struct built b = build("cube", "", NULL, &d);
 	assert_int_equal(b.result, -E2BIG);
-	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"cube\">: displacement_level 13 makes 805306368 triangles; at most 134217728"));
+	assert_non_null(strstr(
+		b.error.text,
+		"s.xml:2: <shape type=\"cube\">: displacement_level 13 makes 805306368 triangles; at most 134217728"));
 	release(&b);
 	d.level = 2;
 	b = build("obj", "", "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n", &d);

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * PLY and serialized meshes: every layout of the same solid gives the same mesh; no prefix and no damaged byte of a file does
- * anything but give a mesh or a sentence.
+ * PLY and serialized meshes: every layout of the same solid gives the same mesh; no prefix and no damaged byte of a
+ * file does anything but give a mesh or a sentence.
  */
 #include "common/base/mem.h"
 #include "tests/support/dice.h"
@@ -29,7 +29,8 @@ struct built {
 static struct built build(const char *type, const char *content, const void *bytes, size_t size)
 {
 	char xml[1024];
-	snprintf(xml, sizeof xml, "<scene version='3.0.0'>\n<shape type='%s'><string name='filename' value='m'/>%s</shape></scene>",
+	snprintf(xml, sizeof xml,
+		 "<scene version='3.0.0'>\n<shape type='%s'><string name='filename' value='m'/>%s</shape></scene>",
 		 type, content);
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"m", bytes, size}, {0}};
 	struct asset_source assets = memory_assets(files);
@@ -47,7 +48,8 @@ static void release(struct built *b)
 }
 
 /* Every vertex where it belongs, in the file's order; values are exact in float. */
-static void assert_solid(const char *type, const char *content, const struct mesh_file *f, double scale, bool normals, bool uv, bool flip)
+static void assert_solid(const char *type, const char *content, const struct mesh_file *f, double scale, bool normals,
+			 bool uv, bool flip)
 {
 	struct built b = build(type, content, f->bytes, f->size);
 	if (b.result)
@@ -64,7 +66,8 @@ static void assert_solid(const char *type, const char *content, const struct mes
 			assert_true(!normals || fabs(m->normal[i][k] - solid_position[i][k]) < 1e-15);
 		}
 		if (uv)
-			assert_true(m->uv[i][0] == solid_uv[i][0] && m->uv[i][1] == (flip ? 1 - solid_uv[i][1] : solid_uv[i][1]));
+			assert_true(m->uv[i][0] == solid_uv[i][0] &&
+				    m->uv[i][1] == (flip ? 1 - solid_uv[i][1] : solid_uv[i][1]));
 	}
 	release(&b);
 }
@@ -88,9 +91,10 @@ static void test_ply_polygons(void **state)
 {
 	(void)state;
 	/* Faces before vertices, carriage returns, a polygon of four, no normals. */
-	const char *text = "ply\r\nformat ascii 1.0\r\nelement face 1\r\nproperty list uchar int vertex_index\r\nelement vertex 4\r\n"
-			   "property float x\r\nproperty float y\r\nproperty float z\r\nend_header\r\n4 0 1 2 3\r\n"
-			   "0 0 0\r\n1 0 0\r\n1 1 0\r\n0 1 0";
+	const char *text =
+		"ply\r\nformat ascii 1.0\r\nelement face 1\r\nproperty list uchar int vertex_index\r\nelement vertex 4\r\n"
+		"property float x\r\nproperty float y\r\nproperty float z\r\nend_header\r\n4 0 1 2 3\r\n"
+		"0 0 0\r\n1 0 0\r\n1 1 0\r\n0 1 0";
 	struct built b = build("ply", "", text, strlen(text));
 	if (b.result)
 		fail_msg("%s", b.error.text);
@@ -112,9 +116,11 @@ static void test_serialized(void **state)
 				if (flags & 4)
 					continue; /* tangents were never written */
 				mesh_file_serialized(&f, version, doubles, flags, 3);
-				/* Where there are none they follow from the triangles: by symmetry a corner's is its place. */
+				/* Where there are none they follow from the triangles: by symmetry a corner's is its
+				 * place. */
 				assert_solid("serialized", "", &f, 1, true, flags & 2, false);
-				assert_solid("serialized", "<integer name='shape_index' value='2'/>", &f, 3, true, flags & 2, false);
+				assert_solid("serialized", "<integer name='shape_index' value='2'/>", &f, 3, true,
+					     flags & 2, false);
 			}
 	mesh_file_serialized(&f, 4, 0, 1 | 16, 1);
 	assert_solid("serialized", "", &f, 1, false, false, false);
@@ -148,23 +154,40 @@ static void test_bad_ply(void **state)
 		{"ply\nelement vertex 1\nproperty float x\nend_header\n1", "names no format"},
 		{HEAD "end_header\n", "m: has no vertices with x, y and z"},
 		{QUAD "end_header\n0 0 0 1 0 0 1 1 0 0 1 0", "has no faces"},
-		{QUAD "element face 1\nproperty list uchar float vertex_indices\nend_header\n", "indices must be whole numbers"},
-		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 4",
+		{QUAD "element face 1\nproperty list uchar float vertex_indices\nend_header\n",
+		 "indices must be whole numbers"},
+		{QUAD
+		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 4",
 		 "m: face 0: an index that is none of a vertex"},
-		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 -1", "an index"},
-		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 0.5", "an index"},
-		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 2 0 1",
+		{QUAD
+		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 -1",
+		 "an index"},
+		{QUAD
+		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1 0.5",
+		 "an index"},
+		{QUAD
+		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 2 0 1",
 		 "a face needs three corners"},
-		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 -3 0 1 2", "without a length"},
-		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1", "ends here"},
-		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 nan 1 0 0 1 1 0 0 1 0 3 0 1 2",
+		{QUAD
+		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 -3 0 1 2",
+		 "without a length"},
+		{QUAD
+		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 1 1 0 0 1 0 3 0 1",
+		 "ends here"},
+		{QUAD
+		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 nan 1 0 0 1 1 0 0 1 0 3 0 1 2",
 		 "m: vertex 0: not a number"},
-		{QUAD "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 1e99 1 0 0 1 1 0 0 1 0 3 0 1 2",
+		{QUAD
+		 "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 1e99 1 0 0 1 1 0 0 1 0 3 0 1 2",
 		 "m: vertex 0: a number that is not finite, or beyond 1e60"},
-		{HEAD "element vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
-		      "property list uchar int vertex_indices\nend_header\n0 0 0", "too short for 4000000000 vertices"},
-		{HEAD "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 99999999999\n"
-		      "property list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 0 1 0 3 0 1 2", "too short for 99999999999"},
+		{HEAD
+		 "element vertex 4000000000\nproperty float x\nproperty float y\nproperty float z\nelement face 1\n"
+		 "property list uchar int vertex_indices\nend_header\n0 0 0",
+		 "too short for 4000000000 vertices"},
+		{HEAD
+		 "element vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 99999999999\n"
+		 "property list uchar int vertex_indices\nend_header\n0 0 0 1 0 0 0 1 0 3 0 1 2",
+		 "too short for 99999999999"},
 	};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++)
 		refuses("ply", "", cases[i].text, strlen(cases[i].text), cases[i].error);
@@ -196,7 +219,8 @@ static void test_bad_serialized(void **state)
 	refuses("serialized", "", g.bytes, g.size, "the table of meshes at its end is damaged");
 	g = f;
 	g.bytes[g.size - 12] ^= 1; /* the second offset */
-	refuses("serialized", "<integer name='shape_index' value='1'/>", g.bytes, g.size, "the table of meshes at its end is damaged");
+	refuses("serialized", "<integer name='shape_index' value='1'/>", g.bytes, g.size,
+		"the table of meshes at its end is damaged");
 	g = f;
 	g.bytes[40] ^= 0x10;
 	refuses("serialized", "", g.bytes, g.size, "m: the compressed mesh is damaged");

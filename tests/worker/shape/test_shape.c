@@ -26,7 +26,8 @@ static struct built build(const char *type, const char *content, const char *obj
 	char xml[2048];
 	snprintf(xml, sizeof xml, "<scene version='3.0.0'>\n<shape type='%s'>%s%s</shape></scene>", type,
 		 obj ? "<string name='filename' value='m.obj'/>" : "", content);
-	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {obj ? "m.obj" : NULL, obj, obj ? strlen(obj) : 0}, {0}};
+	const struct memory_file files[] = {
+		{"s.xml", xml, strlen(xml)}, {obj ? "m.obj" : NULL, obj, obj ? strlen(obj) : 0}, {0}};
 	struct asset_source assets = memory_assets(files);
 	struct built b = {0};
 	if (scene_read(&b.scene, &assets, "s.xml", scene_tables(), NULL, 0, &b.error))
@@ -56,7 +57,8 @@ static vec3 at(const double v[3])
 
 static vec3 triangle_normal(const struct mesh *m, uint32_t i)
 {
-	vec3 a = at(m->position[m->index[i][0]]), b = at(m->position[m->index[i][1]]), c = at(m->position[m->index[i][2]]);
+	vec3 a = at(m->position[m->index[i][0]]), b = at(m->position[m->index[i][1]]),
+	     c = at(m->position[m->index[i][2]]);
 	return vec3_normalize(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)));
 }
 
@@ -108,12 +110,14 @@ static void test_cube(void **state)
 	static const struct {
 		const char *content;
 		double sign;
-	} cases[] = {{"", 1},
-		     {"<boolean name='flip_normals' value='true'/>", -1},
-		     {"<transform name='to_world'><scale x='-2' y='1' z='3'/></transform>", 1},
-		     {"<transform name='to_world'><matrix value='0 1 0 1 0 0 0 0 1'/></transform>", 1},
-		     {"<transform name='to_world'><scale value='1e-60'/></transform>", 1},
-		     {"<transform name='to_world'><scale x='-1'/></transform><boolean name='flip_normals' value='true'/>", -1}};
+	} cases[] = {
+		{"", 1},
+		{"<boolean name='flip_normals' value='true'/>", -1},
+		{"<transform name='to_world'><scale x='-2' y='1' z='3'/></transform>", 1},
+		{"<transform name='to_world'><matrix value='0 1 0 1 0 0 0 0 1'/></transform>", 1},
+		{"<transform name='to_world'><scale value='1e-60'/></transform>", 1},
+		{"<transform name='to_world'><scale x='-1'/></transform><boolean name='flip_normals' value='true'/>",
+		 -1}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		struct built b = build_ok("cube", cases[i].content, NULL);
 		assert_int_equal(b.g.mesh.triangle_count, 12);
@@ -141,9 +145,11 @@ static void test_cube_uv(void **state)
 static void test_sphere(void **state)
 {
 	(void)state;
-	struct built b = build_ok("sphere", "<point name='center' x='1' y='2' z='3'/><float name='radius' value='0.5'/>"
-					    "<transform name='to_world'><rotate z='1' angle='90'/><scale value='2'/>"
-					    "<translate x='10'/></transform>", NULL);
+	struct built b = build_ok("sphere",
+				  "<point name='center' x='1' y='2' z='3'/><float name='radius' value='0.5'/>"
+				  "<transform name='to_world'><rotate z='1' angle='90'/><scale value='2'/>"
+				  "<translate x='10'/></transform>",
+				  NULL);
 	assert_int_equal(b.g.kind, SHAPE_SPHERE);
 	assert_vec3(b.g.sphere.center, 6, 2, 6);
 	assert_true(fabs(b.g.sphere.radius - 1) < 1e-15);
@@ -154,7 +160,8 @@ static void test_sphere(void **state)
 	assert_int_equal(b.result, -EINVAL);
 	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"sphere\">: to_world flattens the shape"));
 	release(&b);
-	b = build("sphere", "<float name='radius' value='1e50'/><transform name='to_world'><scale x='1e50'/></transform>", NULL);
+	b = build("sphere",
+		  "<float name='radius' value='1e50'/><transform name='to_world'><scale x='1e50'/></transform>", NULL);
 	assert_int_equal(b.result, -ERANGE);
 	release(&b);
 }
@@ -163,7 +170,8 @@ static double area(const struct mesh *m)
 {
 	double sum = 0;
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
-		vec3 a = at(m->position[m->index[i][0]]), b = at(m->position[m->index[i][1]]), c = at(m->position[m->index[i][2]]);
+		vec3 a = at(m->position[m->index[i][0]]), b = at(m->position[m->index[i][1]]),
+		     c = at(m->position[m->index[i][2]]);
 		sum += 0.5 * vec3_length(vec3_cross(vec3_sub(b, a), vec3_sub(c, a)));
 	}
 	return sum;
@@ -173,8 +181,10 @@ static double area(const struct mesh *m)
 static void test_ellipsoid(void **state)
 {
 	(void)state;
-	struct built b = build_ok("sphere", "<float name='radius' value='2'/><transform name='to_world'>"
-					    "<matrix value='-2 0 0 0.5 1 0 0 0 3'/></transform>", NULL);
+	struct built b = build_ok("sphere",
+				  "<float name='radius' value='2'/><transform name='to_world'>"
+				  "<matrix value='-2 0 0 0.5 1 0 0 0 3'/></transform>",
+				  NULL);
 	const struct mesh *m = &b.g.mesh;
 	assert_int_equal(b.g.kind, SHAPE_MESH);
 	assert_non_null(m->uv);
@@ -188,7 +198,9 @@ static void test_ellipsoid(void **state)
 	}
 	assert_facing(m, 1);
 	release(&b);
-	b = build_ok("sphere", "<boolean name='flip_normals' value='true'/><transform name='to_world'><scale x='2'/></transform>", NULL);
+	b = build_ok("sphere",
+		     "<boolean name='flip_normals' value='true'/><transform name='to_world'><scale x='2'/></transform>",
+		     NULL);
 	assert_facing(&b.g.mesh, -1);
 	/* A prolate spheroid's area: 2 pi (1 + c / e asin e), c = 2, e^2 = 3/4. */
 	double e = sqrt(0.75);
@@ -199,7 +211,8 @@ static void test_ellipsoid(void **state)
 static void test_disk(void **state)
 {
 	(void)state;
-	struct built b = build_ok("disk", "<transform name='to_world'><scale value='3'/><translate z='1'/></transform>", NULL);
+	struct built b =
+		build_ok("disk", "<transform name='to_world'><scale value='3'/><translate z='1'/></transform>", NULL);
 	const struct mesh *m = &b.g.mesh;
 	assert_true(fabs(area(m) / (9 * M_PI) - 1) < 1e-12);
 	for (uint32_t i = 0; i < m->triangle_count; i++)
@@ -216,8 +229,10 @@ static void test_disk(void **state)
 static void test_cylinder(void **state)
 {
 	(void)state;
-	struct built b = build_ok("cylinder", "<point name='p0' x='1' y='0' z='0'/><point name='p1' x='1' y='4' z='0'/>"
-					      "<float name='radius' value='0.5'/>", NULL);
+	struct built b = build_ok("cylinder",
+				  "<point name='p0' x='1' y='0' z='0'/><point name='p1' x='1' y='4' z='0'/>"
+				  "<float name='radius' value='0.5'/>",
+				  NULL);
 	const struct mesh *m = &b.g.mesh;
 	assert_true(fabs(area(m) / (2 * M_PI * 0.5 * 4) - 1) < 1e-4);
 	for (uint32_t i = 0; i < m->vertex_count; i++) {
@@ -258,7 +273,8 @@ static void test_obj_polygons(void **state)
 static void test_obj_attributes(void **state)
 {
 	(void)state;
-	const char *obj = SQUARE "vt 0 0.25\nvt 1 0\nvt 1 1 0\nvn 0 0 2\nvn 0 3 4\nf 1/1/1 2/2/1 3/3/1\nf 1/1/2 3/3/1 4//1\n";
+	const char *obj =
+		SQUARE "vt 0 0.25\nvt 1 0\nvt 1 1 0\nvn 0 0 2\nvn 0 3 4\nf 1/1/1 2/2/1 3/3/1\nf 1/1/2 3/3/1 4//1\n";
 	struct built b = build_ok("obj", "", obj);
 	const struct mesh *m = &b.g.mesh;
 	assert_int_equal(m->vertex_count, 5); /* 1 appears with two normals */
@@ -278,9 +294,11 @@ static void test_obj_attributes(void **state)
 	release(&b);
 }
 
+/* clang-format off */
 #define OCTAHEDRON                                                                                                             \
 	"v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n"                                                           \
 	"f 1 3 5\nf 3 2 5\nf 2 4 5\nf 4 1 5\nf 3 1 6\nf 2 3 6\nf 4 2 6\nf 1 4 6\n"
+/* clang-format on */
 
 static void test_smooth_normals(void **state)
 {
@@ -288,7 +306,8 @@ static void test_smooth_normals(void **state)
 	struct built b = build_ok("obj", "", OCTAHEDRON);
 	assert_facing(&b.g.mesh, 1);
 	for (uint32_t i = 0; i < 6; i++) /* by symmetry the normal of a corner is its place */
-		assert_vec3(at(b.g.mesh.normal[i]), b.g.mesh.position[i][0], b.g.mesh.position[i][1], b.g.mesh.position[i][2]);
+		assert_vec3(at(b.g.mesh.normal[i]), b.g.mesh.position[i][0], b.g.mesh.position[i][1],
+			    b.g.mesh.position[i][2]);
 	release(&b);
 	b = build_ok("obj", "<transform name='to_world'><scale x='-1' y='2' z='3'/></transform>", OCTAHEDRON);
 	assert_facing(&b.g.mesh, 1);
@@ -302,7 +321,8 @@ static void test_smooth_normals(void **state)
 static void test_normals_are_weighted_by_angle(void **state)
 {
 	(void)state;
-	struct built b = build_ok("obj", "", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 9\nv 0.5 0.5 0\nf 1 2 5\nf 1 5 3\nf 1 3 4\n");
+	struct built b =
+		build_ok("obj", "", "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 9\nv 0.5 0.5 0\nf 1 2 5\nf 1 5 3\nf 1 3 4\n");
 	vec3 n = at(b.g.mesh.normal[b.g.mesh.index[0][0]]);
 	assert_vec3(n, sqrt(0.5), 0, sqrt(0.5));
 	release(&b);
@@ -314,7 +334,8 @@ static void test_normals_decide_the_outside(void **state)
 	struct built b = build_ok("obj", "", SQUARE "vn 0 0 -1\nf 1//1 2//1 3//1\n");
 	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, -1);
 	release(&b);
-	b = build_ok("obj", "<transform name='to_world'><scale z='-1'/></transform>", SQUARE "vn 0 0 -1\nf 1//1 2//1 3//1\n");
+	b = build_ok("obj", "<transform name='to_world'><scale z='-1'/></transform>",
+		     SQUARE "vn 0 0 -1\nf 1//1 2//1 3//1\n");
 	assert_vec3(triangle_normal(&b.g.mesh, 0), 0, 0, 1);
 	assert_vec3(at(b.g.mesh.normal[0]), 0, 0, 1);
 	release(&b);
@@ -361,8 +382,10 @@ static void test_bad_objs(void **state)
 	refuses("", SQUARE "f 1/x 2 3\n", "a face's corners are");
 	refuses("", SQUARE "f 1.5 2 3\n", "a face's corners are");
 	refuses("", SQUARE "f 1 1 1\n", "has no triangle with an area");
-	refuses("<transform name='to_world'><scale z='0'/></transform>", SQUARE "f 1 2 3\n", "to_world flattens the shape");
-	refuses("<transform name='to_world'><scale value='1e60'/></transform>", "v -2 -2 0\nv 2 -2 0\nv 2 2 0\nf 1 2 3\n", "a vertex lies beyond");
+	refuses("<transform name='to_world'><scale z='0'/></transform>", SQUARE "f 1 2 3\n",
+		"to_world flattens the shape");
+	refuses("<transform name='to_world'><scale value='1e60'/></transform>",
+		"v -2 -2 0\nv 2 -2 0\nv 2 2 0\nf 1 2 3\n", "a vertex lies beyond");
 	struct built b = build("obj", "<string name='filename' value='none.obj'/>", NULL);
 	assert_int_equal(b.result, -ENOENT);
 	assert_non_null(strstr(b.error.text, "s.xml:2: <shape type=\"obj\">: none.obj: no such file"));

@@ -33,7 +33,8 @@ static void rgb_of(spectrum_at f, const void *user, bool under_d65, double rgb[3
 		spectrum s = f(user, &w);
 		for (int k = 0; k < SPECTRUM_LANES && i + k < CIE_COUNT; k++)
 			for (int c = 0; c < 3; c++)
-				xyz[c] += s.v[k] * cie_observer[i + k][c] / CIE_Y_SUM * (under_d65 ? color_d65(w.nm[k]) : 1);
+				xyz[c] += s.v[k] * cie_observer[i + k][c] / CIE_Y_SUM *
+					  (under_d65 ? color_d65(w.nm[k]) : 1);
 	}
 	/* The published matrix, not the one that the fit uses. */
 	const double rec709[3][3] = {{3.2404542, -1.5371385, -0.4985314},
@@ -84,8 +85,17 @@ static void test_round_trip(void **state)
 static void test_dark_and_saturated_colours(void **state)
 {
 	(void)state;
-	const double colours[][3] = {{1e-9, 0, 0}, {0, 1e-4, 1e-5}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {1, 1, 0},
-				     {0, 1, 1}, {1, 0, 1}, {1, 0.999999, 1}, {1e-300, 0, 1e-301}, {0.5, 0.5, 0.5 + 1e-12}};
+	const double colours[][3] = {{1e-9, 0, 0},
+				     {0, 1e-4, 1e-5},
+				     {1, 0, 0},
+				     {0, 1, 0},
+				     {0, 0, 1},
+				     {1, 1, 0},
+				     {0, 1, 1},
+				     {1, 0, 1},
+				     {1, 0.999999, 1},
+				     {1e-300, 0, 1e-301},
+				     {0.5, 0.5, 0.5 + 1e-12}};
 	for (size_t i = 0; i < sizeof colours / sizeof *colours; i++)
 		for (int t = 0; t < 2; t++)
 			assert_true(fit_error(colours[i], t) < 0.005);
@@ -224,11 +234,16 @@ static void test_bad_values_are_refused(void **state)
 	struct color c;
 	const double backwards[] = {500, 400}, negative[] = {0.1, -0.1}, bright[] = {0.5, 1.5}, nm[] = {400, 500};
 	const struct value reflectances[] = {
-		{.type = VALUE_RGB, .as.rgb = {0.5, -0.1, 0.5}}, {.type = VALUE_RGB, .as.rgb = {0.5, 1.1, 0.5}},
-		{.type = VALUE_RGB, .as.rgb = {0.5, NAN, 0.5}},  {.type = VALUE_FLOAT, .as.number = 1.5},
-		{.type = VALUE_INT, .as.integer = -1},		 {.type = VALUE_STRING, .as.string = "red"},
-		table_of(backwards, nm, 2),			 table_of(nm, negative, 2),
-		table_of(nm, bright, 2),			 table_of(NULL, NULL, 0),
+		{.type = VALUE_RGB, .as.rgb = {0.5, -0.1, 0.5}},
+		{.type = VALUE_RGB, .as.rgb = {0.5, 1.1, 0.5}},
+		{.type = VALUE_RGB, .as.rgb = {0.5, NAN, 0.5}},
+		{.type = VALUE_FLOAT, .as.number = 1.5},
+		{.type = VALUE_INT, .as.integer = -1},
+		{.type = VALUE_STRING, .as.string = "red"},
+		table_of(backwards, nm, 2),
+		table_of(nm, negative, 2),
+		table_of(nm, bright, 2),
+		table_of(NULL, NULL, 0),
 	};
 	for (size_t i = 0; i < sizeof reflectances / sizeof *reflectances; i++)
 		assert_int_equal(color_from_value(&reflectances[i], COLOR_REFLECTANCE, &arena, &c, &e), -EINVAL);

@@ -126,7 +126,8 @@ static void test_uv_maps(void **state)
 	struct error e;
 	node_add_transform(&f->arena, n, "to_uv", quarter);
 	node_add_ref(&f->arena, owner, "reflectance", n);
-	assert_int_equal(texture_from_node(&t, owner, "reflectance", 0, COLOR_REFLECTANCE, &f->source, true, &f->arena, &e), 0);
+	assert_int_equal(
+		texture_from_node(&t, owner, "reflectance", 0, COLOR_REFLECTANCE, &f->source, true, &f->arena, &e), 0);
 	assert_value(&t, 0, 1.5 / 3, 0.25);
 }
 

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What is said of shapes that coincide: which of two is there and why, by name; nothing where nobody can see it. And of shapes that
- * are too small beside others. */
+/* What is said of shapes that coincide: which of two is there and why, by name; nothing where nobody can see it. And of
+ * shapes that are too small beside others. */
 #include "tests/support/worlds.h"
 
 #include <setjmp.h>
@@ -15,9 +15,12 @@
 #define RED "<bsdf type='diffuse'><rgb name='reflectance' value='0.5,0.1,0.1'/></bsdf>"
 #define GREY "<bsdf type='diffuse'><rgb name='reflectance' value='0.5'/></bsdf>"
 #define GLASS "<bsdf type='dielectric'/>"
-#define FLOOR(inside) "<shape type='rectangle' id='floor'>" AT("<rotate x='1' angle='-90'/><scale value='4'/>") inside "</shape>\n"
-#define CUBE(id, x, y, inside) "<shape type='cube' id='" id "'>" AT("<scale value='0.5'/><translate x='" x "' y='" y "'/>") inside "</shape>\n"
-#define LAMP "<shape type='rectangle' id='lamp'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>") SHINES "</shape>\n"
+#define FLOOR(inside) \
+	"<shape type='rectangle' id='floor'>" AT("<rotate x='1' angle='-90'/><scale value='4'/>") inside "</shape>\n"
+#define CUBE(id, x, y, inside) \
+	"<shape type='cube' id='" id "'>" AT("<scale value='0.5'/><translate x='" x "' y='" y "'/>") inside "</shape>\n"
+#define LAMP \
+	"<shape type='rectangle' id='lamp'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>") SHINES "</shape>\n"
 #define VIEW SENSOR("0,3,8", "0,0,0") "\n"
 
 /* NULL: nothing is said. on: whether rays have to ask. */
@@ -45,13 +48,17 @@ static void test_notes(void **state)
 	(void)state;
 	expect(VIEW FLOOR(GREY) CUBE("block", "2", "0.6", GREY) LAMP, NULL, NULL, false);
 	expect(VIEW CUBE("glass", "0", "0.5", GLASS) LAMP,
-	       "`glass` (line 2) and `lamp` (line 3) coincide: where they overlap only the latter is there, because it shines", NULL, true);
+	       "`glass` (line 2) and `lamp` (line 3) coincide: where they overlap only the latter is there, because it shines",
+	       NULL, true);
 	expect(VIEW CUBE("glass", "0", "0.5", GLASS) FLOOR(GREY),
-	       "`glass` (line 2) and `floor` (line 3) coincide: where they overlap only the latter is there, because it is opaque", NULL, true);
-	expect(VIEW CUBE("glass", "0", "0.5", GLASS) CUBE("ice", "1", "0.5", GLASS) CUBE("hole", "-1", "0.5", "<bsdf type='null'/>"),
+	       "`glass` (line 2) and `floor` (line 3) coincide: where they overlap only the latter is there, because it is opaque",
+	       NULL, true);
+	expect(VIEW CUBE("glass", "0", "0.5", GLASS) CUBE("ice", "1", "0.5", GLASS)
+		       CUBE("hole", "-1", "0.5", "<bsdf type='null'/>"),
 	       "`ice` (line 3) and `glass` (line 2) coincide: where they overlap only the latter is there, because it comes first in the file"
 	       "; where two media touch, one surface with the int_ior and ext_ior of both is meant",
-	       "`hole` (line 4) and `glass` (line 2) coincide: where they overlap only the latter is there, because it refracts or scatters", true);
+	       "`hole` (line 4) and `glass` (line 2) coincide: where they overlap only the latter is there, because it refracts or scatters",
+	       true);
 	/* A block on a floor shows nothing of it; a picture on the wall that is the wall does. */
 	expect(VIEW FLOOR(GREY) CUBE("block", "0", "0.5", RED), NULL, NULL, true);
 	expect(VIEW FLOOR(GREY) "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>") RED "</shape>",
@@ -64,15 +71,19 @@ static void test_scales(void **state)
 {
 	(void)state;
 	for (int far = 0; far < 2; far++) {
-		struct world *w = world_of_text(8, 8, VIEW CUBE("block", "0", "0.6", GREY) "<shape type='rectangle'>"
-						AT("<rotate x='1' angle='-90'/><scale value='%s'/>") "</shape>", far ? "1e13" : "1e12");
+		struct world *w = world_of_text(8, 8,
+						VIEW CUBE("block", "0", "0.6", GREY) "<shape type='rectangle'>" AT(
+							"<rotate x='1' angle='-90'/><scale value='%s'/>") "</shape>",
+						far ? "1e13" : "1e12");
 		struct render_summary s;
 		char note[512];
 		world_summary(w, &s);
 		assert_int_equal(render_scene_note(&s, 0, note, sizeof note), far);
 		if (far)
-			assert_string_equal(note, "the cube in line 2 is so much smaller than the scene, with the rectangle in line 3, that numbers are "
-						  "too short for both: what is seen of it can be wrong");
+			assert_string_equal(
+				note,
+				"the cube in line 2 is so much smaller than the scene, with the rectangle in line 3, that numbers are "
+				"too short for both: what is seen of it can be wrong");
 		world_free(w);
 	}
 }
@@ -84,12 +95,15 @@ static void test_many(void **state)
 	char text[8192] = VIEW FLOOR(GREY), note[512];
 	for (int i = 0; i < 20; i++) {
 		size_t used = strlen(text);
-		snprintf(text + used, sizeof text - used, "<shape type='cube'>" AT("<scale value='0.1'/><translate x='%d' y='0.1'/>") GLASS "</shape>\n",
+		snprintf(text + used, sizeof text - used,
+			 "<shape type='cube'>" AT("<scale value='0.1'/><translate x='%d' y='0.1'/>") GLASS "</shape>\n",
 			 i - 30);
 		if (i >= 10)
 			continue;
 		used = strlen(text);
-		snprintf(text + used, sizeof text - used, "<shape type='cube'>" AT("<scale value='0.1'/><translate x='%g' z='2' y='0.1'/>") GLASS "</shape>\n",
+		snprintf(text + used, sizeof text - used,
+			 "<shape type='cube'>" AT("<scale value='0.1'/><translate x='%g' z='2' y='0.1'/>") GLASS
+			 "</shape>\n",
 			 0.3 * i);
 	}
 	struct world *w = world_of_text(8, 8, "%s", text);
@@ -106,6 +120,7 @@ static void test_many(void **state)
 
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_notes), cmocka_unit_test(test_scales), cmocka_unit_test(test_many)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_notes), cmocka_unit_test(test_scales),
+					   cmocka_unit_test(test_many)};
 	return cmocka_run_group_tests_name("what is said of coinciding surfaces", tests, NULL, NULL);
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Displacement in scenes: what the reader takes and refuses, heights as bitmaps have them, the effect that is reported, the
- * same image at height zero, and that the integrators agree on displaced matter and displaced light.
+ * Displacement in scenes: what the reader takes and refuses, heights as bitmaps have them, the effect that is reported,
+ * the same image at height zero, and that the integrators agree on displaced matter and displaced light.
  */
 #include "tests/support/agree.h"
 #include "tests/support/memory_assets.h"
@@ -18,8 +18,10 @@
 
 #define LEVEL(l) "<integer name='displacement_level' value='" l "'/>"
 #define SCALE(s) "<float name='displacement_scale' value='" s "'/>"
-#define CHECKERS "<texture name='displacement' type='checkerboard'><float name='color0' value='0.25'/><float name='color1' value='-1'/></texture>"
-#define BITMAP(inner) "<texture name='displacement' type='bitmap'><string name='filename' value='h.png'/>" inner "</texture>"
+#define CHECKERS \
+	"<texture name='displacement' type='checkerboard'><float name='color0' value='0.25'/><float name='color1' value='-1'/></texture>"
+#define BITMAP(inner) \
+	"<texture name='displacement' type='bitmap'><string name='filename' value='h.png'/>" inner "</texture>"
 #define RECTANGLE(inner) SENSOR("0,0,5", "0,0,0") "<shape type='rectangle'>" inner "</shape>"
 
 static const struct effect_line *effect(const struct world *w)
@@ -38,7 +40,10 @@ static void test_effect(void **state)
 	assert_false(effect(w)->on);
 	assert_string_equal(effect(w)->why, "no shape is displaced");
 	world_free(w);
-	w = world_of_text(8, 8, RECTANGLE(CHECKERS SCALE("0.1") LEVEL("6")) "<shape type='sphere'>" CHECKERS SCALE("0.1") LEVEL("3") "</shape>%s", "");
+	w = world_of_text(8, 8,
+			  RECTANGLE(CHECKERS SCALE("0.1") LEVEL("6")) "<shape type='sphere'>" CHECKERS SCALE("0.1")
+				  LEVEL("3") "</shape>%s",
+			  "");
 	assert_true(effect(w)->on && w->effects.displacement);
 	assert_string_equal(effect(w)->why, "the rectangle in line 1 and 1 more are displaced: 8704 triangles");
 	assert_false(w->shapes[1].is_sphere);
@@ -90,7 +95,8 @@ static void test_heights_of_a_bitmap(void **state)
 static void test_numbers_and_checkers(void **state)
 {
 	(void)state;
-	struct world *w = world_of_text(8, 8, RECTANGLE("<float name='displacement' value='-0.5'/>" SCALE("3") LEVEL("0")) "%s", "");
+	struct world *w = world_of_text(
+		8, 8, RECTANGLE("<float name='displacement' value='-0.5'/>" SCALE("3") LEVEL("0")) "%s", "");
 	for (uint32_t i = 0; i < 4; i++)
 		assert_true(vertex(w, 0, i).z == -1.5);
 	world_free(w);
@@ -136,9 +142,11 @@ static void test_refused(void **state)
 	refuses(SCALE("1"), "displacement_scale without a texture named displacement");
 	refuses(LEVEL("1"), "displacement_level without a texture named displacement");
 	refuses(BITMAP("") LEVEL("1"), "h.png: no such file");
-	refuses("<bsdf name='displacement' type='diffuse'/>" LEVEL("1"), "`displacement` may be a texture, but not a bsdf");
+	refuses("<bsdf name='displacement' type='diffuse'/>" LEVEL("1"),
+		"`displacement` may be a texture, but not a bsdf");
 	refuses("<rgb name='displacement' value='1,1,1'/>" LEVEL("1"), "`displacement` cannot be given like this");
-	refuses("<texture name='displacement' type='checkerboard'><rgb name='color0' value='1,0,0'/></texture>" LEVEL("1"),
+	refuses("<texture name='displacement' type='checkerboard'><rgb name='color0' value='1,0,0'/></texture>" LEVEL(
+			"1"),
 		"color0: a height is a number, not a colour");
 }
 
@@ -146,8 +154,19 @@ enum { SIDE = 32 };
 
 static float *image_of(struct world *w)
 {
-	struct plan p = {.kind = PLAN_SAMPLES, .integrator = "path", .width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE,
-			 .groups = 1, .parts = 1, .bootstrap = 1, .epoch = 16, .rounds = 1, .min_depth = 1, .max_depth = 4};
+	struct plan p = {.kind = PLAN_SAMPLES,
+			 .integrator = "path",
+			 .width = SIDE,
+			 .height = SIDE,
+			 .crop_width = SIDE,
+			 .crop_height = SIDE,
+			 .groups = 1,
+			 .parts = 1,
+			 .bootstrap = 1,
+			 .epoch = 16,
+			 .rounds = 1,
+			 .min_depth = 1,
+			 .max_depth = 4};
 	float *image = calloc((size_t)SIDE * SIDE, 3 * sizeof *image);
 	struct lease_key k = {1, LEASE_RENDER, 0, 0, 0};
 	struct batch b;
@@ -164,15 +183,21 @@ static float *image_of(struct world *w)
 
 #define GLOSSY "<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf>"
 #define GROUND "<transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/></transform>"
+/* clang-format off */
 #define LAMP                                                                                                                    \
 	"<shape type='sphere'><point name='center' x='1' y='4' z='1'/><float name='radius' value='0.7'/>"                       \
 	"<emitter type='area'><float name='radiance' value='9'/></emitter></shape>"
+/* clang-format on */
 
 static struct world *flat_world(const char *displacement)
 {
-	return world_of_text(SIDE, SIDE, SENSOR("0,3,6", "0,0.5,0") LAMP "<shape type='rectangle'>" GROUND "%s</shape><shape type='cube'>"
-			     "<transform name='to_world'><rotate y='1' angle='30'/><translate y='1'/></transform>" GLOSSY "%s</shape>",
-			     displacement, displacement);
+	return world_of_text(
+		SIDE, SIDE,
+		SENSOR("0,3,6", "0,0.5,0") LAMP
+		"<shape type='rectangle'>" GROUND "%s</shape><shape type='cube'>"
+		"<transform name='to_world'><rotate y='1' angle='30'/><translate y='1'/></transform>" GLOSSY
+		"%s</shape>",
+		displacement, displacement);
 }
 
 /* Floats round differently on finer triangles: a path near an edge may change as a whole, the others by rounding. */
@@ -204,14 +229,19 @@ static void test_integrators_agree(void **state)
 	char xml[4096];
 	size_t size;
 	unsigned char *png = sample_png(8, 8, SAMPLE_GREY, 8, 0, &size);
-	snprintf(xml, sizeof xml, "<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='3'/></integrator>"
-		 SENSOR("0,4.5,3", "0,0.5,0")
-		 "<shape type='rectangle'>" GROUND BITMAP("") SCALE("0.2") LEVEL("4") "</shape>"
-		 "<shape type='sphere'><point name='center' x='0' y='1.2' z='0'/>" BITMAP("") SCALE("0.1") LEVEL("4") GLOSSY "</shape>"
-		 "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='90'/><translate y='5'/></transform>"
-		 BITMAP("") SCALE("0.2") LEVEL("3") "<emitter type='area'><texture name='radiance' type='bitmap'><string name='filename' "
-		 "value='h.png'/></texture></emitter></shape>"
-		 "<emitter type='constant'><float name='radiance' value='0.5'/></emitter></scene>");
+	snprintf(
+		xml, sizeof xml,
+		"<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='3'/></integrator>" SENSOR(
+			"0,4.5,3", "0,0.5,0") "<shape type='rectangle'>" GROUND BITMAP("") SCALE("0.2")
+			LEVEL("4") "</shape>"
+				   "<shape type='sphere'><point name='center' x='0' y='1.2' z='0'/>" BITMAP("")
+					   SCALE("0.1") LEVEL("4") GLOSSY
+		"</shape>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='90'/><translate y='5'/></transform>" BITMAP(
+			"") SCALE("0.2")
+			LEVEL("3") "<emitter type='area'><texture name='radiance' type='bitmap'><string name='filename' "
+				   "value='h.png'/></texture></emitter></shape>"
+				   "<emitter type='constant'><float name='radiance' value='0.5'/></emitter></scene>");
 	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"h.png", png, size}, {NULL, NULL, 0}};
 	struct world *w = world_of_files(32, 32, files);
 	static struct agree_image path, bdpt;

@@ -11,15 +11,21 @@
 #include <cmocka.h>
 
 #define VIEW SENSOR("0,0,9", "0,0,0")
+/* clang-format off */
 #define LAMP                                                                                                                    \
 	"<shape type='rectangle' id='lamp'><transform name='to_world'><rotate x='1' angle='90'/><translate y='4'/></transform>"  \
 	"<emitter type='area' id='tube'><float name='radiance' value='3'/></emitter></shape>"
-#define FLOOR "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/><translate y='-3'/></transform></shape>"
-#define SF11(id) "<bsdf type='dielectric' id='" id "'><string name='int_ior' value='sf11'/><boolean name='dispersion' value='true'/></bsdf>"
+/* clang-format on */
+#define FLOOR \
+	"<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/><translate y='-3'/></transform></shape>"
+#define SF11(id)                          \
+	"<bsdf type='dielectric' id='" id \
+	"'><string name='int_ior' value='sf11'/><boolean name='dispersion' value='true'/></bsdf>"
 #define BALL(radius, inner) "<shape type='sphere'><float name='radius' value='" radius "'/>" inner "</shape>"
 #define USES(id) "<ref id='" id "'/>"
 #define GREY "<bsdf type='diffuse' id='grey'/>"
-#define BOX(size, inner) "<shape type='cube'><transform name='to_world'><scale value='" size "'/></transform>" inner "</shape>"
+#define BOX(size, inner) \
+	"<shape type='cube'><transform name='to_world'><scale value='" size "'/></transform>" inner "</shape>"
 
 static struct world *forced(const char *effects, const char *scene)
 {
@@ -54,15 +60,18 @@ static void test_dispersion_that_no_path_meets(void **state)
 	expect(VIEW LAMP SF11("sf") BALL("1", USES("sf")), "dispersion", true,
 	       "the index of `sf` varies with wavelength: paths that meet it carry one");
 	expect(VIEW LAMP SF11("sf") BALL("1", ""), "dispersion", false, "`sf` disperses, but no shape uses it");
-	expect(VIEW LAMP SF11("a") SF11("b") BALL("1", ""), "dispersion", false, "`a` and 1 more disperse, but no shape uses them");
+	expect(VIEW LAMP SF11("a") SF11("b") BALL("1", ""), "dispersion", false,
+	       "`a` and 1 more disperse, but no shape uses them");
 	expect(VIEW LAMP SF11("sf") BALL("1", USES("sf")) BOX("1.5", ""), "dispersion", false,
 	       "`sf` disperses, but a closed opaque shape is around it");
 	expect(VIEW LAMP SF11("sf") BALL("1", USES("sf")) BALL("1.5", ""), "dispersion", false,
 	       "`sf` disperses, but a closed opaque shape is around it");
 	expect(VIEW SF11("sf") BALL("1", USES("sf")), "dispersion", false, "`sf` disperses, but nothing shines");
-	expect("<integrator type='path'><integer name='max_depth' value='1'/></integrator>" VIEW LAMP SF11("sf") BALL("1", USES("sf")),
+	expect("<integrator type='path'><integer name='max_depth' value='1'/></integrator>" VIEW LAMP SF11("sf")
+		       BALL("1", USES("sf")),
 	       "dispersion", false, "`sf` disperses, but paths of one edge do not scatter");
-	expect(VIEW LAMP "<bsdf type='dielectric' id='glass1'/>" BALL("1", USES("glass1")), "dispersion", false, "`glass1` has constant eta");
+	expect(VIEW LAMP "<bsdf type='dielectric' id='glass1'/>" BALL("1", USES("glass1")), "dispersion", false,
+	       "`glass1` has constant eta");
 	expect(VIEW LAMP BALL("1", ""), "dispersion", false, "no material refracts");
 }
 
@@ -76,9 +85,10 @@ static void test_what_does_not_enclose(void **state)
 		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BOX("20", ""),
 		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BALL("1", ""),
 		VIEW LAMP SF11("sf") BALL("1", USES("sf")) BALL("8.999", ""), /* the near plane lies within */
-		VIEW LAMP SF11("sf") BALL("1", USES("sf"))
-			"<shape type='cube'><transform name='to_world'><scale value='1.5'/></transform><float name='displacement' value='0.1'/>"
-			"<integer name='displacement_level' value='2'/></shape>",
+		VIEW LAMP SF11("sf") BALL(
+			"1",
+			USES("sf")) "<shape type='cube'><transform name='to_world'><scale value='1.5'/></transform><float name='displacement' value='0.1'/>"
+				    "<integer name='displacement_level' value='2'/></shape>",
 	};
 	for (size_t i = 0; i < sizeof scenes / sizeof *scenes; i++) {
 		struct world *w = forced(NULL, scenes[i]);
@@ -91,16 +101,21 @@ static void test_what_does_not_enclose(void **state)
 static void test_colour(void **state)
 {
 	(void)state;
-	expect(VIEW LAMP GREY BALL("1", USES("grey")), "colour", false, "all materials are grey and all emitters have one spectrum");
-	expect(VIEW LAMP BALL("1", "<bsdf type='diffuse' id='red'><rgb name='reflectance' value='0.8,0.1,0.1'/></bsdf>"), "colour", true,
-	       "`red` varies with wavelength");
+	expect(VIEW LAMP GREY BALL("1", USES("grey")), "colour", false,
+	       "all materials are grey and all emitters have one spectrum");
+	expect(VIEW LAMP BALL("1",
+			      "<bsdf type='diffuse' id='red'><rgb name='reflectance' value='0.8,0.1,0.1'/></bsdf>"),
+	       "colour", true, "`red` varies with wavelength");
 	/* Within a box, on a lamp of no power. */
-	expect(VIEW LAMP BALL("1", "<bsdf type='diffuse'><rgb name='reflectance' value='0.8,0.1,0.1'/></bsdf>") BOX("1.5", ""), "colour", false,
-	       "all materials are grey and all emitters have one spectrum");
-	expect(VIEW LAMP BALL("1", "") "<emitter type='constant'><rgb name='radiance' value='0,0,0'/></emitter>", "colour", false,
-	       "all materials are grey and all emitters have one spectrum");
-	expect(VIEW LAMP BALL("1", "") "<emitter type='constant' id='sky'><rgb name='radiance' value='0.1,0.2,0.5'/></emitter>", "colour", true,
-	       "the light of `sky` is coloured");
+	expect(VIEW LAMP BALL("1", "<bsdf type='diffuse'><rgb name='reflectance' value='0.8,0.1,0.1'/></bsdf>")
+		       BOX("1.5", ""),
+	       "colour", false, "all materials are grey and all emitters have one spectrum");
+	expect(VIEW LAMP BALL("1", "") "<emitter type='constant'><rgb name='radiance' value='0,0,0'/></emitter>",
+	       "colour", false, "all materials are grey and all emitters have one spectrum");
+	expect(VIEW LAMP BALL(
+		       "1",
+		       "") "<emitter type='constant' id='sky'><rgb name='radiance' value='0.1,0.2,0.5'/></emitter>",
+	       "colour", true, "the light of `sky` is coloured");
 	expect(VIEW LAMP GREY BALL("1", USES("grey")), "wavelength", false, "paths carry no wavelength");
 }
 
@@ -108,11 +123,13 @@ static void test_lights_and_depth(void **state)
 {
 	(void)state;
 	expect(VIEW LAMP BALL("1", ""), "emitter-move", true, "`tube` has many points or directions");
-	expect(VIEW "<emitter type='point'/>" BALL("1", ""), "emitter-move", false, "all emitters are single points or directions");
+	expect(VIEW "<emitter type='point'/>" BALL("1", ""), "emitter-move", false,
+	       "all emitters are single points or directions");
 	expect(VIEW "<emitter type='point'/>" BALL("1", ""), "area-light", false, "no surface shines");
 	expect(VIEW LAMP BALL("1", ""), "delta-light", false, "no emitter is a point or parallel light");
 	expect(VIEW LAMP BALL("1", ""), "environment", false, "rays that escape meet nothing");
-	expect(VIEW LAMP FLOOR, "depth", false, "of 128 edges that paths may have 2 can carry light: all that scatters lies in one plane");
+	expect(VIEW LAMP FLOOR, "depth", false,
+	       "of 128 edges that paths may have 2 can carry light: all that scatters lies in one plane");
 	expect(VIEW LAMP BALL("1", "<bsdf type='diffuse'><float name='reflectance' value='0'/></bsdf>"), "depth", false,
 	       "of 128 edges that paths may have 1 can carry light: nothing scatters");
 	expect(VIEW LAMP FLOOR BALL("1", ""), "depth", true, "paths of up to 128 edges can carry light");
@@ -123,12 +140,15 @@ static void test_surfaces(void **state)
 	(void)state;
 	expect(VIEW LAMP BALL("1", ""), "half-vectors", false,
 	       "no lobe is narrow: a path that is traced and joined is as likely to carry light");
-	expect(VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"), "half-vectors", true, "lobes are narrow: specular");
-	expect(VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"), "specular", true, "`g` has exactly specular lobes");
+	expect(VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"), "half-vectors", true,
+	       "lobes are narrow: specular");
+	expect(VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"), "specular", true,
+	       "`g` has exactly specular lobes");
 	expect(VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>") BOX("1.5", ""), "specular", false,
 	       "`g` is specular, but a closed opaque shape is around it");
 	expect(VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"), "transmission", true, "`g` lets light through");
-	expect(VIEW LAMP BALL("1", "<bsdf type='roughconductor' id='m'/>"), "glossy", true, "`m` has rough lobes of finite width");
+	expect(VIEW LAMP BALL("1", "<bsdf type='roughconductor' id='m'/>"), "glossy", true,
+	       "`m` has rough lobes of finite width");
 	expect(VIEW LAMP BALL("1", ""), "aperture", false, "the sensor is a pinhole");
 	expect(VIEW LAMP BALL("1", ""), "textures", false, "no material and no emitter has a texture");
 	expect(VIEW LAMP BALL("1", ""), "displacement", false, "no shape is displaced");
@@ -141,12 +161,14 @@ static void test_forced(void **state)
 {
 	(void)state;
 	struct world *w = forced("+dispersion", VIEW LAMP BALL("1", "<bsdf type='dielectric' id='g'/>"));
-	assert_true(w->effects.dispersion && w->effects.colour && line_of(w, "dispersion")->forced && line_of(w, "colour")->forced);
+	assert_true(w->effects.dispersion && w->effects.colour && line_of(w, "dispersion")->forced &&
+		    line_of(w, "colour")->forced);
 	assert_non_null(strstr(line_of(w, "colour")->why, "dispersion needs it"));
 	assert_true(w->bsdfs[w->parts[1].bsdf].dispersive);
 	world_free(w);
 	w = forced("-dispersion", VIEW LAMP SF11("sf") BALL("1", USES("sf")));
-	assert_true(!w->effects.dispersion && line_of(w, "dispersion")->forced && line_of(w, "dispersion")->other_scene);
+	assert_true(!w->effects.dispersion && line_of(w, "dispersion")->forced &&
+		    line_of(w, "dispersion")->other_scene);
 	struct render_summary s;
 	char note[256];
 	world_summary(w, &s);
@@ -160,7 +182,8 @@ static void test_forced(void **state)
 	assert_true(w->emitter_cdf[w->emitter_count] == 0);
 	world_free(w);
 	w = forced("all", VIEW LAMP BALL("1", ""));
-	assert_true(w->effects.aperture && camera_has_aperture(&w->camera) && w->effects.half_vectors && w->effects.max_depth == 128);
+	assert_true(w->effects.aperture && camera_has_aperture(&w->camera) && w->effects.half_vectors &&
+		    w->effects.max_depth == 128);
 	world_free(w);
 }
 

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The same scene in other units and at other places. Factors of a power of two and moves that double can hold exactly give the
- * same rescaled world, so the same bits; others differ by roundings of the coordinates, 1e-16 of the distance from the origin
- * (1e-11 of the scene's size where it stands 1e5 sizes away), which a path near an edge can make as large as itself: most
- * pixels agree to 1e-5, and the mean to what few paths can change.
+ * The same scene in other units and at other places. Factors of a power of two and moves that double can hold exactly
+ * give the same rescaled world, so the same bits; others differ by roundings of the coordinates, 1e-16 of the distance
+ * from the origin (1e-11 of the scene's size where it stands 1e5 sizes away), which a path near an edge can make as
+ * large as itself: most pixels agree to 1e-5, and the mean to what few paths can change.
  */
 #include "tests/support/worlds.h"
 
@@ -32,15 +32,26 @@ static struct world *world_at(double s, double m)
 		"<shape type='cube'><transform name='to_world'><scale value='%.17g'/><translate x='%.17g' y='%.17g' z='%.17g'/></transform></shape>"
 		"<shape type='sphere'><point name='center' x='%.17g' y='%.17g' z='%.17g'/><float name='radius' value='%.17g'/>"
 		"<emitter type='area'><float name='radiance' value='5'/></emitter></shape>",
-		s * 0x1p-7, s * 1000, P(0), P(2), P(5), P(0), P(0.5), P(0), 4 * s, P(0), P(0), P(0), P(-0.75), P(0.75), P(0.5), 0.75 * s, 0.5 * s,
-		P(1), P(0.5), P(-0.25), P(1), P(3), P(1), 0.5 * s);
+		s * 0x1p-7, s * 1000, P(0), P(2), P(5), P(0), P(0.5), P(0), 4 * s, P(0), P(0), P(0), P(-0.75), P(0.75),
+		P(0.5), 0.75 * s, 0.5 * s, P(1), P(0.5), P(-0.25), P(1), P(3), P(1), 0.5 * s);
 #undef P
 }
 
 static float *image_of(struct world *w)
 {
-	struct plan p = {.kind = PLAN_SAMPLES, .integrator = "path", .width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE,
-			 .groups = 1, .parts = 1, .bootstrap = 1, .epoch = 32, .rounds = 1, .min_depth = 1, .max_depth = 6};
+	struct plan p = {.kind = PLAN_SAMPLES,
+			 .integrator = "path",
+			 .width = SIDE,
+			 .height = SIDE,
+			 .crop_width = SIDE,
+			 .crop_height = SIDE,
+			 .groups = 1,
+			 .parts = 1,
+			 .bootstrap = 1,
+			 .epoch = 32,
+			 .rounds = 1,
+			 .min_depth = 1,
+			 .max_depth = 6};
 	float *image = calloc((size_t)SIDE * SIDE, 3 * sizeof *image);
 	struct lease_key k = {1, LEASE_RENDER, 0, 0, 0};
 	struct batch b;
@@ -63,8 +74,9 @@ static void test_same(void **state)
 		double scale, move;
 		bool exact;
 	} cases[] = {
-		{0x1p-13, 0, true},  {0x1p13, 0, true}, {1, 0x1p17, true}, {0x1p-13, 0x1p4, true}, {0x1p13, -0x1p30, true},
-		{1e-4, 0, false},    {1e4, 0, false},   {1, 1e5, false},   {3, 1e5 / 7, false},    {1e-4, 10.0 / 3, false},
+		{0x1p-13, 0, true},	 {0x1p13, 0, true},	  {1, 0x1p17, true}, {0x1p-13, 0x1p4, true},
+		{0x1p13, -0x1p30, true}, {1e-4, 0, false},	  {1e4, 0, false},   {1, 1e5, false},
+		{3, 1e5 / 7, false},	 {1e-4, 10.0 / 3, false},
 	};
 	float *reference = image_of(world_at(1, 0));
 	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
@@ -77,8 +89,8 @@ static void test_same(void **state)
 			b += y;
 			differ += cases[i].exact ? x != y : !(fabs(x - y) <= 1e-5 * (x + y));
 		}
-		print_message("x %g + %g: %zu of %d values differ, the mean by %.1e\n", cases[i].scale, cases[i].move, differ, SIDE * SIDE * 3,
-			      b / a - 1);
+		print_message("x %g + %g: %zu of %d values differ, the mean by %.1e\n", cases[i].scale, cases[i].move,
+			      differ, SIDE * SIDE * 3, b / a - 1);
 		assert_true(a > 0);
 		if (cases[i].exact)
 			assert_int_equal(differ, 0);
