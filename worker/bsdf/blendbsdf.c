@@ -106,6 +106,8 @@ static int blend_create(struct bsdf *b, const struct scene_node *n, const struct
 			code = node_error(n, e, ENOTSUP,
 					  "a blend with \"%s\", which lets light through, is not supported",
 					  inner->type);
+		if (!code)
+			code = bsdf_take_relief(b, part, k == 0, n, e);
 		if (code)
 			return code;
 		b->two_sided |= part->two_sided;

@@ -46,6 +46,16 @@ void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops)
 	b->alpha = b->alpha_mean = 0;
 }
 
+int bsdf_take_relief(struct bsdf *b, const struct bsdf *part, bool first, const struct scene_node *n, struct error *e)
+{
+	if (!first && part->relief != b->relief)
+		return node_error(
+			n, e, ENOTSUP,
+			"its two BSDFs bend the surface differently; one bump or normal map around both is supported");
+	b->relief = part->relief;
+	return 0;
+}
+
 void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
 {
 	if (shape != COLOR_SHAPE_CONSTANT)

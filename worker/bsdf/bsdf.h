@@ -13,7 +13,7 @@
 #ifndef WORKER_BSDF_BSDF_H
 #define WORKER_BSDF_BSDF_H
 
-#include "worker/math/vec3.h"
+#include "worker/math/relief.h"
 #include "worker/texture/texture.h"
 
 enum bsdf_mode {
@@ -83,8 +83,9 @@ struct bsdf {
 			    */
 	bool two_sided;	   /* scatters light that arrives from below the normal */
 	bool textured;
-	bool black;		/* neither reflects nor lets through */
-	enum color_shape shape; /* CONSTANT: carries no colour */
+	bool black;		     /* neither reflects nor lets through */
+	enum color_shape shape;	     /* CONSTANT: carries no colour */
+	const struct relief *relief; /* bends the shading normals of the surface that it lies on; NULL: nothing does */
 	void *data;
 };
 

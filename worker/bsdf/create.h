@@ -16,6 +16,10 @@ int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, 
 /* b, whose data begins as that of `ops` does, has no lobes but exactly specular ones. */
 void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops);
 
+/* b takes the relief of its part: a surface has one normal. -ENOTSUP where b has another already. first: no part came
+ * before. */
+int bsdf_take_relief(struct bsdf *b, const struct bsdf *part, bool first, const struct scene_node *n, struct error *e);
+
 /* Enters that a part of b has this colour. */
 void bsdf_add_shape(struct bsdf *b, enum color_shape shape);
 

@@ -95,6 +95,7 @@ static int mask_create(struct bsdf *b, const struct scene_node *n, const struct 
 		code = bsdf_texture(b, &m->opacity, n, "opacity", 0.5, build, e);
 	if (code)
 		return code;
+	b->relief = m->inner.relief;
 	b->modes = m->inner.modes | BSDF_TRANSMIT | BSDF_DELTA;
 	b->has_smooth = m->inner.has_smooth;
 	b->has_delta = true;

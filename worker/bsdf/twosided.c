@@ -95,6 +95,11 @@ static int twosided_create(struct bsdf *b, const struct scene_node *n, const str
 			return node_error(inner, e, EINVAL,
 					  "\"%s\" has two sides already; twosided takes only opaque ones", inner->type);
 	}
+	for (int i = 0; i < 2; i++) {
+		int code = bsdf_take_relief(b, &t->side[i], i == 0, n, e);
+		if (code)
+			return code;
+	}
 	b->two_sided = true;
 	b->black = t->side[0].black && t->side[1].black;
 	b->alpha = fmin(t->side[0].has_smooth ? t->side[0].alpha : INFINITY,

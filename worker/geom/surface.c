@@ -56,20 +56,21 @@ static vec3 carried_axis(vec3 n)
 	return k > 0x1p-20 ? vec3_madd(a, -vec3_dot(a, n) / k, vec3_add(r, n)) : a;
 }
 
-/* dp/du from the texture coordinates; an axis of our own where there are none or they are degenerate. */
-static vec3 tangent(const struct geom_shape *s, const uint32_t i[3], vec3 ng, vec3 e1, vec3 e2)
+/* dp/du and dp/dv from the texture coordinates. false: there are none, or they are degenerate. */
+static bool uv_tangents(const struct geom_shape *s, const uint32_t i[3], vec3 e1, vec3 e2, vec3 *tu, vec3 *tv)
 {
 	if (!s->uv)
-		return carried_axis(ng);
+		return false;
 	double du1 = (double)s->uv[i[1]][0] - (double)s->uv[i[0]][0],
 	       dv1 = (double)s->uv[i[1]][1] - (double)s->uv[i[0]][1];
 	double du2 = (double)s->uv[i[2]][0] - (double)s->uv[i[0]][0],
 	       dv2 = (double)s->uv[i[2]][1] - (double)s->uv[i[0]][1];
 	double det = du1 * dv2 - dv1 * du2;
 	if (det == 0)
-		return carried_axis(ng);
-	vec3 t = vec3_scale(1 / det, vec3_sub(vec3_scale(dv2, e1), vec3_scale(dv1, e2)));
-	return vec3_is_finite(t) && vec3_dot(t, t) > 0 ? t : carried_axis(ng);
+		return false;
+	*tu = vec3_scale(1 / det, vec3_sub(vec3_scale(dv2, e1), vec3_scale(dv1, e2)));
+	*tv = vec3_scale(1 / det, vec3_sub(vec3_scale(du1, e2), vec3_scale(du2, e1)));
+	return vec3_is_finite(*tu) && vec3_dot(*tu, *tu) > 0;
 }
 
 /* A triangle's first vertex and the edges from there. */
@@ -90,15 +91,28 @@ static vec3 interpolated_normal(const struct geom_shape *s, const uint32_t i[3],
 	return vec3_madd(vec3_madd(m, b1, at(s->normal, i[1])), b2, at(s->normal, i[2]));
 }
 
+/* A triangle's point before relief bends it. Where there are no texture coordinates barycentrics stand in. */
+static struct relief_site site_on_triangle(const struct geom_shape *s, const uint32_t i[3], const struct corner *c,
+					   vec3 n, const struct surface_point *x)
+{
+	struct relief_site r = {
+		.ng = x->ng, .n = n, .axis = x->dpdu, .tu = c->e1, .tv = c->e2, .u = x->u, .v = x->v, .unit = s->unit};
+	if (s->uv && (!uv_tangents(s, i, c->e1, c->e2, &r.tu, &r.tv) || !vec3_is_finite(r.tv)))
+		r.tu = r.tv = (vec3){0, 0, 0};
+	return r;
+}
+
 static void fill(const struct geom_shape *s, const uint32_t i[3], const struct corner *c, double b1, double b2,
 		 struct surface_point *x)
 {
 	double b0 = 1 - b1 - b2;
+	vec3 unused;
 	x->b1 = b1;
 	x->b2 = b2;
 	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
 	x->ng = vec3_normalize(vec3_cross(c->e1, c->e2));
-	x->dpdu = tangent(s, i, x->ng, c->e1, c->e2);
+	if (!uv_tangents(s, i, c->e1, c->e2, &x->dpdu, &unused))
+		x->dpdu = carried_axis(x->ng);
 	vec3 n = x->ng;
 	if (s->normal) {
 		vec3 m = interpolated_normal(s, i, b1, b2);
@@ -107,13 +121,17 @@ static void fill(const struct geom_shape *s, const uint32_t i[3], const struct c
 		if (vec3_dot(m, x->ng) > 0)
 			n = vec3_normalize(m);
 	}
-	x->sh = frame_along(n, x->dpdu);
 	x->u = b1;
 	x->v = b2;
 	if (s->uv) {
 		x->u = b0 * (double)s->uv[i[0]][0] + b1 * (double)s->uv[i[1]][0] + b2 * (double)s->uv[i[2]][0];
 		x->v = b0 * (double)s->uv[i[0]][1] + b1 * (double)s->uv[i[1]][1] + b2 * (double)s->uv[i[2]][1];
 	}
+	if (s->relief) {
+		struct relief_site site = site_on_triangle(s, i, c, n, x);
+		n = relief_normal(s->relief, &site);
+	}
+	x->sh = frame_along(n, x->dpdu);
 }
 
 void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2,
@@ -125,7 +143,26 @@ void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, doubl
 	fill(s, i, &c, b1, b2, x);
 }
 
-/* All but u and v. */
+void surface_uv(const struct geom_shape *s, struct surface_point *x)
+{
+	if (s->is_sphere)
+		sphere_uv(&s->sphere_axes, vec3_scale(s->normal_sign, x->ng), &x->u, &x->v);
+}
+
+/* A sphere's point before relief bends it. At the poles dp/du is 0. */
+static struct relief_site site_on_sphere(const struct geom_shape *s, const struct surface_point *x)
+{
+	struct relief_site r = {.ng = x->ng, .n = x->ng, .axis = x->dpdu, .u = x->u, .v = x->v, .unit = s->unit};
+	const struct frame *f = &s->sphere_axes;
+	double length = vec3_length(x->dpdu);
+	if (!(length > 0))
+		return r;
+	r.tu = vec3_scale(vec3_dot(vec3_cross(f->s, f->t), f->n) < 0 ? -1 : 1, x->dpdu);
+	r.tv = vec3_scale(M_PI * s->radius * s->normal_sign / length, vec3_cross(x->dpdu, x->ng));
+	return r;
+}
+
+/* All but u and v, unless there is relief. */
 static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
 {
 	x->prim = prim;
@@ -134,13 +171,13 @@ static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, 
 	x->ng = vec3_scale(s->normal_sign, w);
 	/* du of the longitude: axis x normal; undefined at the poles, where frame_along picks a frame of its own. */
 	x->dpdu = vec3_scale(2 * M_PI * s->radius, vec3_cross(s->sphere_axes.n, w));
-	x->sh = frame_along(x->ng, x->dpdu);
-}
-
-void surface_uv(const struct geom_shape *s, struct surface_point *x)
-{
-	if (s->is_sphere)
-		sphere_uv(&s->sphere_axes, vec3_scale(s->normal_sign, x->ng), &x->u, &x->v);
+	vec3 n = x->ng;
+	if (s->relief) {
+		surface_uv(s, x);
+		struct relief_site site = site_on_sphere(s, x);
+		n = relief_normal(s->relief, &site);
+	}
+	x->sh = frame_along(n, x->dpdu);
 }
 
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
@@ -204,25 +241,79 @@ static void change_on_sphere(const struct geom_shape *s, const struct surface_po
 	c->ddu[0] = vec3_is_finite(turn) ? turn : vec3_scale(-bend, w);
 }
 
-static void change_on_triangle(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+static void bend_on_sphere(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+{
+	struct relief_site site = site_on_sphere(s, x);
+	double tu2 = vec3_dot(site.tu, site.tu), tv2 = vec3_dot(site.tv, site.tv),
+	       hand = vec3_dot(site.tu, x->dpdu) < 0 ? -1 : 1;
+	if (!(tu2 > 0) || !(tv2 > 0))
+		return;
+	vec3 w = vec3_scale(s->normal_sign, x->ng);
+	site.axis = c->du;
+	for (int k = 0; k < 2; k++) {
+		vec3 along = k ? c->dv : c->du;
+		struct relief_step d = {.dn = c->dn[k],
+					.daxis = c->ddu[k],
+					.du = vec3_dot(along, site.tu) / tu2,
+					.dv = vec3_dot(along, site.tv) / tv2};
+		d.dtu = vec3_scale(2 * M_PI * hand, vec3_cross(s->sphere_axes.n, along));
+		d.dtv = vec3_scale(M_PI, vec3_madd(vec3_cross(c->du, along), s->radius, vec3_cross(c->ddu[k], w)));
+		c->dn[k] = relief_turn(s->relief, &site, &d);
+	}
+}
+
+/* Gradients of the second and third barycentric. */
+static void barycentric_gradients(const struct corner *k, vec3 *g1, vec3 *g2)
+{
+	vec3 area = vec3_cross(k->e1, k->e2);
+	double inverse = 1 / vec3_dot(area, area);
+	*g1 = vec3_scale(inverse, vec3_cross(k->e2, area));
+	*g2 = vec3_scale(inverse, vec3_cross(area, k->e1));
+}
+
+/* The normal without relief, and in c->dn how it changes. */
+static vec3 change_on_triangle(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
 {
 	const uint32_t *i = s->index[x->prim.prim];
-	vec3 m = interpolated_normal(s, i, x->b1, x->b2);
+	if (!s->normal)
+		return x->ng;
+	vec3 m = interpolated_normal(s, i, x->b1, x->b2), n0 = at(s->normal, i[0]), g1, g2;
 	if (!(vec3_dot(m, x->ng) > 0))
-		return;
+		return x->ng;
 	struct corner k = corner_of(s, i);
-	vec3 area = vec3_cross(k.e1, k.e2), n0 = at(s->normal, i[0]);
-	double inverse = 1 / vec3_dot(area, area);
-	/* Gradients of the barycentrics. */
-	vec3 g1 = vec3_scale(inverse, vec3_cross(k.e2, area)), g2 = vec3_scale(inverse, vec3_cross(area, k.e1));
-	vec3 m1 = vec3_sub(at(s->normal, i[1]), n0), m2 = vec3_sub(at(s->normal, i[2]), n0);
+	barycentric_gradients(&k, &g1, &g2);
+	vec3 m1 = vec3_sub(at(s->normal, i[1]), n0), m2 = vec3_sub(at(s->normal, i[2]), n0),
+	     n = s->relief ? vec3_normalize(m) : x->sh.n;
 	double length = vec3_length(m);
 	for (int d = 0; d < 2; d++) {
 		vec3 along = d ? c->dv : c->du;
 		vec3 dm = vec3_madd(vec3_scale(vec3_dot(along, g1), m1), vec3_dot(along, g2), m2);
-		vec3 dn = vec3_scale(1 / length, vec3_madd(dm, -vec3_dot(x->sh.n, dm), x->sh.n));
+		vec3 dn = vec3_scale(1 / length, vec3_madd(dm, -vec3_dot(n, dm), n));
 		if (vec3_is_finite(dn))
 			c->dn[d] = dn;
+	}
+	return n;
+}
+
+static void bend_on_triangle(const struct geom_shape *s, const struct surface_point *x, vec3 n,
+			     struct surface_change *c)
+{
+	const uint32_t *i = s->index[x->prim.prim];
+	struct corner k = corner_of(s, i);
+	struct relief_site site = site_on_triangle(s, i, &k, n, x);
+	double t1[2] = {1, 0}, t2[2] = {0, 1}; /* how (u,v) changes with the barycentrics */
+	for (int a = 0; s->uv && a < 2; a++) {
+		t1[a] = (double)s->uv[i[1]][a] - (double)s->uv[i[0]][a];
+		t2[a] = (double)s->uv[i[2]][a] - (double)s->uv[i[0]][a];
+	}
+	vec3 g1, g2;
+	barycentric_gradients(&k, &g1, &g2);
+	site.axis = c->du;
+	for (int a = 0; a < 2; a++) {
+		vec3 along = a ? c->dv : c->du;
+		double b1 = vec3_dot(along, g1), b2 = vec3_dot(along, g2);
+		struct relief_step d = {.dn = c->dn[a], .du = b1 * t1[0] + b2 * t2[0], .dv = b1 * t1[1] + b2 * t2[1]};
+		c->dn[a] = relief_turn(s->relief, &site, &d);
 	}
 }
 
@@ -230,10 +321,15 @@ void surface_change_of(const struct geom_shape *s, const struct surface_point *x
 {
 	*c = (struct surface_change){.dn = {{0, 0, 0}}};
 	surface_tangents(x, &c->du, &c->dv);
-	if (s->is_sphere)
+	if (s->is_sphere) {
 		change_on_sphere(s, x, c);
-	else if (s->normal)
-		change_on_triangle(s, x, c);
+		if (s->relief)
+			bend_on_sphere(s, x, c);
+	} else if (s->normal || s->relief) {
+		vec3 n = change_on_triangle(s, x, c);
+		if (s->relief)
+			bend_on_triangle(s, x, n, c);
+	}
 }
 
 static bool reproject_triangle(const struct geom_shape *s, struct prim_ref prim, vec3 o, vec3 d,

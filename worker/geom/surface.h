@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A point on a primitive, in double: positions solved from the primitive itself (triangles in the plane of their float
- * vertices, spheres analytically), geometric normal, interpolated shading frame, texture coordinates.
+ * vertices, spheres analytically), geometric normal, interpolated shading frame (bent by relief), texture coordinates.
  * The geometric normal is by winding; the world winds triangles so that it agrees with the vertex normals.
  * Pure; any thread.
  */
@@ -9,7 +9,7 @@
 #define WORKER_GEOM_SURFACE_H
 
 #include "worker/geom/accel.h"
-#include "worker/math/frame.h"
+#include "worker/geom/relief.h"
 
 /* A shape in the rescaled world. Floats are what rays meet; everything else derives from them. */
 struct geom_shape {
@@ -20,13 +20,15 @@ struct geom_shape {
 	uint32_t vertex_count, triangle_count;
 	float (*position)[3];
 	uint32_t (*index)[3];
-	float (*normal)[3]; /* NULL: flat */
-	float (*uv)[2];	    /* NULL: barycentrics stand in */
+	float (*normal)[3];	     /* NULL: flat */
+	float (*uv)[2];		     /* NULL: barycentrics stand in */
+	const struct relief *relief; /* bends shading normals; NULL: nothing does */
+	double unit;		     /* of the scene's length, in the world's: for relief */
 };
 
 struct surface_point {
 	vec3 p, ng;
-	struct frame sh; /* sh.n is the shading normal */
+	struct frame sh; /* sh.n is the shading normal, as relief bends it */
 	double u, v;
 	double b1, b2; /* barycentrics on a triangle; 0 on a sphere */
 	vec3 dpdu;
@@ -52,8 +54,8 @@ void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, doubl
 			 struct surface_point *x);
 void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x);
 /* Where the ray from o (which lies on the primitive `from`) along the unit direction d meets this one primitive,
- * whatever lies between; of a sphere's two crossings the one nearest to t_near. false: it passes by. A sphere's u and
- * v, which cost as much as all the rest, are left for surface_uv. */
+ * whatever lies between; of a sphere's two crossings the one nearest to t_near. false: it passes by. The u and v of a
+ * sphere without relief, which cost as much as all the rest, are left for surface_uv. */
 bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d,
 		       double t_near, struct surface_point *x);
 

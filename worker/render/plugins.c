@@ -32,8 +32,8 @@ static void gather(void)
 		add((struct plugin_decl){PLUGIN_BSDF, bsdf_registry[i]->type, bsdf_registry[i]->params,
 					 bsdf_registry[i]->nested_classes, PARAM_UNDERSTOOD});
 	for (size_t i = 0; texture_registry[i]; i++)
-		add((struct plugin_decl){PLUGIN_TEXTURE, texture_registry[i]->type, texture_registry[i]->params, 0,
-					 PARAM_UNDERSTOOD});
+		add((struct plugin_decl){PLUGIN_TEXTURE, texture_registry[i]->type, texture_registry[i]->params,
+					 texture_registry[i]->nested_classes, PARAM_UNDERSTOOD});
 	for (size_t i = 0; emitter_registry[i]; i++)
 		add((struct plugin_decl){PLUGIN_EMITTER, emitter_registry[i]->type, emitter_registry[i]->params,
 					 emitter_registry[i]->nested_classes, PARAM_UNDERSTOOD});

@@ -55,8 +55,8 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 	t->data = b;
 	if (role == COLOR_UNBOUNDED)
 		return node_error(n, e, ENOTSUP, "a bitmap cannot stand for this quantity");
-	const struct raster_range range = {role == COLOR_HEIGHT ? -DBL_MAX : 0, role == COLOR_REFLECTANCE ? 1 : DBL_MAX,
-					   role == COLOR_HEIGHT};
+	const struct raster_range range = {color_role_is_number(role) ? -DBL_MAX : 0,
+					   role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT};
 	int code = raster_read(&b->raster, n, assets, &range, arena, e);
 	if (code)
 		return code;
@@ -66,7 +66,7 @@ static int bitmap_create(struct texture *t, const struct scene_node *n, enum col
 	b->raster.nearest = strcmp(node_string(n, "filter_type", "bilinear"), "nearest") == 0;
 	b->map = uv_map_read(n);
 	b->role = role;
-	if (role == COLOR_HEIGHT)
+	if (color_role_is_number(role))
 		return 0;
 	b->shape = !raster_is_grey(&b->raster) ? COLOR_SHAPE_OTHER
 		   : role == COLOR_ILLUMINANT  ? COLOR_SHAPE_D65
@@ -92,6 +92,24 @@ static double bitmap_height(const struct texture *t, double u, double v)
 	uv_map_apply(&b->map, &u, &v);
 	raster_eval(&b->raster, u, v, rgb);
 	return b->raster.image.channels == 1 ? rgb[0] : 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+}
+
+static void bitmap_jet(const struct texture *t, double u, double v, struct texture_jet *j)
+{
+	const struct bitmap *b = t->data;
+	const double(*m)[3] = b->map.m;
+	struct raster_patch p;
+	uv_map_apply(&b->map, &u, &v);
+	raster_patch(&b->raster, u, v, &p);
+	j->grey = b->raster.image.channels == 1;
+	for (int k = 0; k < 3; k++) {
+		j->x[k] = p.x[k];
+		j->du[k] = m[0][0] * p.du[k] + m[1][0] * p.dv[k];
+		j->dv[k] = m[0][1] * p.du[k] + m[1][1] * p.dv[k];
+		j->duu[k] = 2 * m[0][0] * m[1][0] * p.duv[k];
+		j->duv[k] = (m[0][0] * m[1][1] + m[0][1] * m[1][0]) * p.duv[k];
+		j->dvv[k] = 2 * m[0][1] * m[1][1] * p.duv[k];
+	}
 }
 
 static double bitmap_max(const struct texture *t)
@@ -124,6 +142,7 @@ const struct texture_ops texture_ops_bitmap = {
 	.create = bitmap_create,
 	.eval = bitmap_eval,
 	.height = bitmap_height,
+	.jet = bitmap_jet,
 	.max = bitmap_max,
 	.shape = bitmap_shape,
 };

@@ -37,6 +37,12 @@ static double checkerboard_height(const struct texture *t, double u, double v)
 	return texture_height(square_at(t->data, u, v), u, v);
 }
 
+/* Squares have no slope between them. */
+static void checkerboard_jet(const struct texture *t, double u, double v, struct texture_jet *j)
+{
+	texture_jet(square_at(t->data, u, v), u, v, j);
+}
+
 static double checkerboard_max(const struct texture *t)
 {
 	const struct checkerboard *c = t->data;
@@ -63,6 +69,7 @@ const struct texture_ops texture_ops_checkerboard = {
 	.create = checkerboard_create,
 	.eval = checkerboard_eval,
 	.height = checkerboard_height,
+	.jet = checkerboard_jet,
 	.max = checkerboard_max,
 	.shape = checkerboard_shape,
 };

@@ -11,8 +11,14 @@
 #include "worker/math/spectrum.h"
 #include "worker/scene/scene.h"
 
-/* COLOR_HEIGHT is of textures only: plain numbers of either sign, no spectrum. */
-enum color_role { COLOR_REFLECTANCE, COLOR_ILLUMINANT, COLOR_UNBOUNDED, COLOR_HEIGHT };
+/* The last two are of textures only, plain numbers of either sign and no spectrum: a height that displaces, whose
+ * pictures are taken as they are stored, and what bends normals, whose pictures are decoded as those of colours are. */
+enum color_role { COLOR_REFLECTANCE, COLOR_ILLUMINANT, COLOR_UNBOUNDED, COLOR_HEIGHT, COLOR_RELIEF };
+
+static inline bool color_role_is_number(enum color_role r)
+{
+	return r == COLOR_HEIGHT || r == COLOR_RELIEF;
+}
 
 /* How a colour varies with wavelength. Grey scenes need all reflectances CONSTANT and all emitters of one kind. */
 enum color_shape { COLOR_SHAPE_CONSTANT, COLOR_SHAPE_D65, COLOR_SHAPE_OTHER };

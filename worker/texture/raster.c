@@ -56,23 +56,73 @@ static uint32_t neighbour(int64_t i, uint32_t n, enum raster_wrap mode)
 	return (uint32_t)i;
 }
 
-void raster_eval(const struct raster *r, double u, double v, double rgb[3])
+/* The four pixels around a place, and how far it is from the first towards the others. */
+struct corners {
+	double c[4][3], fx, fy;
+};
+
+static void find_corners(const struct raster *r, double u, double v, struct corners *k)
 {
 	uint32_t w = r->image.width, h = r->image.height;
 	double x = wrap(u, r->wrap_u) * w, y = wrap(v, r->wrap_v) * h;
-	if (r->nearest) {
-		raster_pixel(r, x >= w ? w - 1 : (uint32_t)x, y >= h ? h - 1 : (uint32_t)y, rgb);
-		return;
-	}
 	int64_t i = (int64_t)floor(x - 0.5), j = (int64_t)floor(y - 0.5);
-	double fx = x - 0.5 - (double)i, fy = y - 0.5 - (double)j;
+	k->fx = x - 0.5 - (double)i;
+	k->fy = y - 0.5 - (double)j;
 	uint32_t xs[2] = {neighbour(i, w, r->wrap_u), neighbour(i + 1, w, r->wrap_u)};
 	uint32_t ys[2] = {neighbour(j, h, r->wrap_v), neighbour(j + 1, h, r->wrap_v)};
-	double c[4][3];
-	for (int k = 0; k < 4; k++)
-		raster_pixel(r, xs[k & 1], ys[k >> 1], c[k]);
+	for (int n = 0; n < 4; n++)
+		raster_pixel(r, xs[n & 1], ys[n >> 1], k->c[n]);
+}
+
+static void eval_nearest(const struct raster *r, double u, double v, double rgb[3])
+{
+	uint32_t w = r->image.width, h = r->image.height;
+	double x = wrap(u, r->wrap_u) * w, y = wrap(v, r->wrap_v) * h;
+	raster_pixel(r, x >= w ? w - 1 : (uint32_t)x, y >= h ? h - 1 : (uint32_t)y, rgb);
+}
+
+static double between(const struct corners *q, int k)
+{
+	return (1 - q->fy) * ((1 - q->fx) * q->c[0][k] + q->fx * q->c[1][k]) +
+	       q->fy * ((1 - q->fx) * q->c[2][k] + q->fx * q->c[3][k]);
+}
+
+void raster_eval(const struct raster *r, double u, double v, double rgb[3])
+{
+	struct corners q;
+	if (r->nearest) {
+		eval_nearest(r, u, v, rgb);
+		return;
+	}
+	find_corners(r, u, v, &q);
 	for (int k = 0; k < 3; k++)
-		rgb[k] = (1 - fy) * ((1 - fx) * c[0][k] + fx * c[1][k]) + fy * ((1 - fx) * c[2][k] + fx * c[3][k]);
+		rgb[k] = between(&q, k);
+}
+
+/* Pixels a unit of u; below 0 where the picture runs backwards. */
+static double pixels_per_unit(double x, uint32_t pixels, enum raster_wrap mode)
+{
+	bool backwards = mode == RASTER_MIRROR && isfinite(x) && x - 2 * floor(0.5 * x) > 1;
+	return backwards ? -(double)pixels : (double)pixels;
+}
+
+void raster_patch(const struct raster *r, double u, double v, struct raster_patch *out)
+{
+	struct corners q;
+	*out = (struct raster_patch){.x = {0}};
+	if (r->nearest) {
+		eval_nearest(r, u, v, out->x);
+		return;
+	}
+	find_corners(r, u, v, &q);
+	double su = pixels_per_unit(u, r->image.width, r->wrap_u), sv = pixels_per_unit(v, r->image.height, r->wrap_v);
+	for (int k = 0; k < 3; k++) {
+		double top = q.c[1][k] - q.c[0][k], bottom = q.c[3][k] - q.c[2][k];
+		out->x[k] = between(&q, k);
+		out->du[k] = su * ((1 - q.fy) * top + q.fy * bottom);
+		out->dv[k] = sv * ((1 - q.fx) * (q.c[2][k] - q.c[0][k]) + q.fx * (q.c[3][k] - q.c[1][k]));
+		out->duv[k] = su * sv * (bottom - top);
+	}
 }
 
 bool raster_is_grey(const struct raster *r)

@@ -33,6 +33,11 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 	}
 
 void raster_eval(const struct raster *r, double u, double v, double rgb[3]);
+/* The same with its derivatives by u and v, and the mixed one: the two others are 0 between pixel centres. */
+struct raster_patch {
+	double x[3], du[3], dv[3], duv[3];
+};
+void raster_patch(const struct raster *r, double u, double v, struct raster_patch *out);
 void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3]);
 bool raster_is_grey(const struct raster *r);
 double raster_max(const struct raster *r);

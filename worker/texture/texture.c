@@ -14,8 +14,8 @@ const struct texture_ops *const texture_registry[] = {
 	NULL,
 };
 
-static int create_nested(struct texture *t, const struct scene_node *n, enum color_role role,
-			 const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e)
+int texture_create(struct texture *t, const struct scene_node *n, enum color_role role,
+		   const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e)
 {
 	for (const struct texture_ops *const *ops = texture_registry; *ops; ops++)
 		if (n->cls == PLUGIN_TEXTURE && strcmp((*ops)->type, n->type) == 0) {
@@ -46,8 +46,8 @@ int texture_from_node(struct texture *t, const struct scene_node *n, const char 
 	const struct value *v = p ? &p->value : &absent;
 	*t = (struct texture){.ops = NULL};
 	if (v->type == VALUE_NODE)
-		return create_nested(t, v->as.node, role, assets, dialect_3, arena, e);
-	if (role == COLOR_HEIGHT)
+		return texture_create(t, v->as.node, role, assets, dialect_3, arena, e);
+	if (color_role_is_number(role))
 		return height_from_value(t, n, name, v, e);
 	struct error reason;
 	int code = color_from_value(v, role, arena, &t->color, &reason);

@@ -2,3 +2,4 @@
 /* One line a texture: its const struct texture_ops is texture_ops_NAME. */
 TEXTURE(bitmap)
 TEXTURE(checkerboard)
+TEXTURE(scale)

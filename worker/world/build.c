@@ -213,6 +213,7 @@ static int place_shapes(struct builder *b)
 		const struct shape_geometry *from = &b->geometry[i];
 		struct geom_shape *g = &w->shapes[i];
 		tick();
+		g->unit = w->scale;
 		if (from->kind == SHAPE_SPHERE) {
 			const struct sphere *s = &from->sphere;
 			g->is_sphere = true;
@@ -248,8 +249,10 @@ static int create_bsdfs(struct builder *b)
 		while (k < w->bsdf_count && b->bsdf_nodes[k] != key)
 			k++;
 		w->parts[i].bsdf = k;
-		if (k < w->bsdf_count)
+		if (k < w->bsdf_count) {
+			w->shapes[i].relief = w->bsdfs[k].relief;
 			continue;
+		}
 		b->bsdf_nodes[k] = key;
 		w->bsdf_count++;
 		int rc = 0;
@@ -263,6 +266,7 @@ static int create_bsdfs(struct builder *b)
 			rc = bsdf_mirror_back(&w->bsdfs[k], &w->arena, b->e);
 		if (rc)
 			return rc;
+		w->shapes[i].relief = w->bsdfs[k].relief;
 	}
 	return 0;
 }

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The BSDFs that the generic tests run over: several parameter sets each, as text (see tests/support/nodes.h), nested
- * ones after '|'. A BSDF of the registry without a set here fails the tests.
+ * ones after '|', textures after the word "texture". A BSDF of the registry without a set here fails the tests.
  */
 #ifndef TESTS_WORKER_BSDF_BSDF_CASES_H
 #define TESTS_WORKER_BSDF_BSDF_CASES_H
@@ -77,8 +77,24 @@ static const char *const bsdf_cases[] = {
 	"twosided | diffuse reflectance=0.9",
 	"twosided | roughconductor alpha=0.2 material=Cu | phong exponent=10",
 	"twosided | diffuse | conductor material=Cr",
+	"bumpmap scale=0.1 | roughconductor alpha=0.2 | texture checkerboard",
+	"normalmap | texture scale scale=0.5 texture checkerboard | roughdielectric alpha=0.3",
 };
 enum { BSDF_CASES = sizeof bsdf_cases / sizeof *bsdf_cases };
+
+/* " diffuse", or " texture checkerboard", or " texture scale texture checkerboard". */
+static inline struct scene_node *bsdf_child(struct arena *a, char *text)
+{
+	char *first = strstr(text, "texture "), *second = first ? strstr(first + 1, " texture ") : NULL;
+	if (!first)
+		return node_make(a, PLUGIN_BSDF, text);
+	if (second)
+		*second = 0;
+	struct scene_node *n = node_make(a, PLUGIN_TEXTURE, first + strlen("texture "));
+	if (second)
+		node_add_child(a, n, node_make(a, PLUGIN_TEXTURE, second + strlen(" texture ")));
+	return n;
+}
 
 static inline struct scene_node *bsdf_node(struct arena *a, const char *text)
 {
@@ -86,7 +102,7 @@ static inline struct scene_node *bsdf_node(struct arena *a, const char *text)
 	snprintf(copy, sizeof copy, "%s", text);
 	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(copy, "|", &rest));
 	for (char *child; (child = strtok_r(NULL, "|", &rest));)
-		node_add_child(a, n, node_make(a, PLUGIN_BSDF, child));
+		node_add_child(a, n, bsdf_child(a, child));
 	return n;
 }
 

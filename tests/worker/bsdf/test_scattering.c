@@ -334,6 +334,10 @@ static void test_refusals_say_why(void **state)
 		{"mask | dielectric", "lets light through"},
 		{"blendbsdf | diffuse", "exactly two"},
 		{"blendbsdf | diffuse | thindielectric", "lets light through"},
+		{"bumpmap | diffuse", "needs a texture"},
+		{"bumpmap | texture checkerboard", "exactly one BSDF"},
+		{"normalmap | diffuse | phong | texture checkerboard", "exactly one BSDF"},
+		{"normalmap | diffuse | texture scale", "needs a texture inside"},
 	};
 	for (size_t k = 0; k < sizeof bad / sizeof *bad; k++) {
 		struct arena a = {0};

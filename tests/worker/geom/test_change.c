@@ -42,6 +42,39 @@ static struct geom_shape triangle(struct dice *d, bool smooth, bool with_uv)
 				   .uv = with_uv ? uv : NULL};
 }
 
+/* Waves: a height's gradient and second derivatives, or a normal. */
+static void wave_height(const void *data, double u, double v, struct relief_value *out)
+{
+	const double *a = data;
+	double s = a[0] * sin(a[1] * u + a[2] * v), c = a[0] * cos(a[1] * u + a[2] * v);
+	out->x = (vec3){a[1] * c, a[2] * c, 0};
+	out->du = (vec3){-a[1] * a[1] * s, -a[1] * a[2] * s, 0};
+	out->dv = (vec3){-a[1] * a[2] * s, -a[2] * a[2] * s, 0};
+}
+
+static void wave_normal(const void *data, double u, double v, struct relief_value *out)
+{
+	const double *a = data;
+	double x = a[1] * u + a[2] * v;
+	out->x = (vec3){a[0] * sin(x), a[0] * cos(2 * x), 1 + a[0] * sin(3 * x)};
+	vec3 d = {a[0] * cos(x), -2 * a[0] * sin(2 * x), 3 * a[0] * cos(3 * x)};
+	out->du = vec3_scale(a[1], d);
+	out->dv = vec3_scale(a[2], d);
+}
+
+static double wave[3];
+static const struct relief reliefs[2] = {{RELIEF_HEIGHT, wave_height, wave}, {RELIEF_NORMAL, wave_normal, wave}};
+
+static struct geom_shape bent(struct geom_shape s, struct dice *d, int kind)
+{
+	wave[0] = dice_between(d, 0.02, 0.2);
+	wave[1] = dice_between(d, -3, 3);
+	wave[2] = dice_between(d, -3, 3);
+	s.relief = &reliefs[kind];
+	s.unit = dice_between(d, 0.5, 1);
+	return s;
+}
+
 static struct geom_shape sphere(struct dice *d)
 {
 	struct geom_shape s = {.is_sphere = true,
@@ -109,10 +142,13 @@ static void test_differences(void **state)
 {
 	(void)state;
 	struct dice d = dice_of("changes of surface points");
-	double worst[5] = {0};
-	for (size_t i = 0; i < dice_count(5000); i++) {
-		int kind = (int)(i % 5); /* flat, with and without uv; smooth, with and without uv; sphere */
+	double worst[3][5] = {{0}};
+	for (size_t i = 0; i < dice_count(15000); i++) {
+		int kind = (int)(i % 5),
+		    relief = (int)(i / 5 % 3); /* flat, with and without uv; smooth, with and without uv; sphere */
 		struct geom_shape s = kind == 4 ? sphere(&d) : triangle(&d, kind >= 2, kind % 2);
+		if (relief)
+			s = bent(s, &d, relief - 1);
 		struct surface_point x;
 		if (s.is_sphere)
 			surface_on_sphere(&s, (struct prim_ref){0, 0}, dice_direction(&d), &x);
@@ -128,12 +164,64 @@ static void test_differences(void **state)
 			   (double)(position[2][2] - position[0][2])};
 		if (!s.is_sphere && vec3_length(vec3_cross(e1, e2)) < 0.05)
 			continue;
-		worst[kind] = fmax(worst[kind], compare(&s, &x));
+		worst[relief][kind] = fmax(worst[relief][kind], compare(&s, &x));
 	}
-	print_message("flat %.1e %.1e, smooth %.1e %.1e, sphere %.1e\n", worst[0], worst[1], worst[2], worst[3],
-		      worst[4]);
-	for (int kind = 0; kind < 5; kind++)
-		assert_true(worst[kind] < 1e-7);
+	for (int relief = 0; relief < 3; relief++) {
+		const double *at = worst[relief];
+		print_message("%s: flat %.1e %.1e, smooth %.1e %.1e, sphere %.1e\n",
+			      relief == 0   ? "plain"
+			      : relief == 1 ? "bump"
+					    : "normals",
+			      at[0], at[1], at[2], at[3], at[4]);
+		for (int kind = 0; kind < 5; kind++)
+			assert_true(at[kind] < 1e-7);
+	}
+}
+
+/* The normal of p + h n itself, by differences of its points: to first order in the height where n turns, else exactly.
+ */
+static void test_bent_normal_is_that_of_the_surface(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("normals of bumps");
+	double worst[2] = {0};
+	for (size_t i = 0; i < dice_count(2000); i++) {
+		bool round = i & 1;
+		struct geom_shape s = bent(round ? sphere(&d) : triangle(&d, false, true), &d, 0);
+		struct surface_point x;
+		if (round) {
+			wave[0] *= 1e-5;
+			surface_on_sphere(&s, (struct prim_ref){0, 0}, dice_direction(&d), &x);
+		} else {
+			surface_on_triangle(&s, (struct prim_ref){0, 0}, dice_between(&d, 0.2, 0.4),
+					    dice_between(&d, 0.2, 0.4), &x);
+		}
+		struct geom_shape flat = s;
+		flat.relief = NULL;
+		vec3 du, dv, point[2][2], t[2];
+		surface_tangents(&x, &du, &dv);
+		double bend = vec3_length(vec3_cross(vec3_normalize(x.dpdu), vec3_scale(1, du)));
+		assert_true(bend < 1e-9);
+		for (int k = 0; k < 2; k++) {
+			for (int side = 0; side < 2; side++) {
+				double h = side ? 1e-5 : -1e-5;
+				struct surface_point y = moved(&flat, &x, k ? dv : du, h);
+				point[k][side] =
+					vec3_madd(y.p, s.unit * wave[0] * sin(wave[1] * y.u + wave[2] * y.v), y.ng);
+			}
+			t[k] = vec3_sub(point[k][1], point[k][0]);
+		}
+		double jump = round ? vec3_length(t[0]) + vec3_length(t[1]) : 0;
+		if (jump > 1e-4)
+			continue; /* across the seam of u */
+		vec3 n = vec3_normalize(vec3_cross(t[0], t[1]));
+		double most = vec3_length(vec3_sub(x.sh.n, x.ng));
+		if (vec3_dot(n, x.ng) < 0.2 || (round && vec3_length(vec3_cross(x.ng, s.sphere_axes.n)) < 0.1))
+			continue;
+		worst[round] = fmax(worst[round], vec3_length(vec3_sub(n, x.sh.n)) / (round ? fmax(most, 1e-6) : 1));
+	}
+	print_message("flat %.1e, sphere %.1e of the turn\n", worst[0], worst[1]);
+	assert_true(worst[0] < 1e-7 && worst[1] < 1e-3);
 }
 
 static void assert_finite(const struct geom_shape *s, const struct surface_point *x)
@@ -157,6 +245,8 @@ static void test_degenerate(void **state)
 	for (int i = 0; i < 400; i++) {
 		struct geom_shape s = sphere(&d);
 		s.sphere_axes = frame_around((vec3){0, 0, i & 1 ? 1 : -1});
+		if (i % 3)
+			s = bent(s, &d, i % 3 - 1);
 		double off_axis = i < 4 ? 0 : exp(dice_between(&d, -740, 0));
 		surface_on_sphere(&s, (struct prim_ref){0, 0}, vec3_normalize((vec3){off_axis, 0, i & 2 ? 1 : -1}), &x);
 		assert_finite(&s, &x);
@@ -172,6 +262,8 @@ static void test_degenerate(void **state)
 		}
 		if (i % 11 == 0)
 			memset(normal, 0, sizeof normal);
+		if (i % 2)
+			s = bent(s, &d, i / 2 % 2);
 		surface_on_triangle(&s, (struct prim_ref){0, 0}, 0.3, 0.3, &x);
 		if (!vec3_is_finite(x.ng))
 			continue; /* no area: no such triangle is kept */
@@ -191,6 +283,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_differences),
+		cmocka_unit_test(test_bent_normal_is_that_of_the_surface),
 		cmocka_unit_test(test_degenerate),
 	};
 	return cmocka_run_group_tests_name("change", tests, NULL, NULL);

@@ -203,6 +203,72 @@ static void test_refusals_say_why(void **state)
 	assert_true(try(*state, "bitmap filename=p0", COLOR_UNBOUNDED, &t, &e) < 0);
 }
 
+/* Derivatives against differences: exact up to rounding where the texture is a polynomial, which it is between pixel
+ * centres. */
+static void assert_jet(const struct texture *t, double u, double v, double h)
+{
+	struct texture_jet j, n[4];
+	texture_jet(t, u, v, &j);
+	for (int k = 0; k < 4; k++)
+		texture_jet(t, u + (k == 0 ? h : k == 1 ? -h : 0), v + (k == 2 ? h : k == 3 ? -h : 0), &n[k]);
+	for (int c = 0; c < 3; c++) {
+		const double given[5] = {j.du[c], j.dv[c], j.duu[c], j.duv[c], j.dvv[c]};
+		const double found[5] = {(n[0].x[c] - n[1].x[c]) / (2 * h), (n[2].x[c] - n[3].x[c]) / (2 * h),
+					 (n[0].du[c] - n[1].du[c]) / (2 * h), (n[0].dv[c] - n[1].dv[c]) / (2 * h),
+					 (n[2].dv[c] - n[3].dv[c]) / (2 * h)};
+		for (int k = 0; k < 5; k++)
+			if (fabs(given[k] - found[k]) > 1e-9 / h * 1e-4)
+				fail_msg("(%g, %g) derivative %d: %g is not %g", u, v, k, given[k], found[k]);
+	}
+}
+
+static void test_derivatives(void **state)
+{
+	struct fixture *f = *state;
+	const char *const texts[] = {"bitmap filename=p0 raw=true",
+				     "bitmap filename=p0 raw=true uscale=2 vscale=-3 uoffset=0.1",
+				     "bitmap filename=p0 raw=true wrap_mode=mirror",
+				     "bitmap filename=p0 raw=true wrap_mode=clamp",
+				     "bitmap filename=p1 raw=true filter_type=nearest",
+				     "checkerboard color0=1 color1=-3"};
+	for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
+		struct texture t = make(f, texts[k], COLOR_RELIEF);
+		/* Nowhere near a line between pixel centres or squares. */
+		for (int i = 0; i < 60; i++)
+			assert_jet(&t, -2.03 + 0.0711 * i, 1.07 + 0.0577 * i, 1e-7);
+	}
+	struct texture t = make(f, "bitmap filename=p0 raw=true wrap_mode=mirror", COLOR_RELIEF);
+	struct texture_jet j;
+	texture_jet(&t, 1.0 / 3, 0.25, &j);
+	assert_true(fabs(j.x[0] - 0.125) < 1e-12 && fabs(j.du[0] - 0.75) < 1e-12 && fabs(j.dv[0] - 1.5) < 1e-12);
+	texture_jet(&t, 2 - 1.0 / 3, 0.25, &j);
+	assert_true(fabs(j.x[0] - 0.125) < 1e-12 && fabs(j.du[0] + 0.75) < 1e-12);
+}
+
+/* A map over a surface made darker, or brighter up to white, and one of heights of either sign. */
+static void test_scale(void **state)
+{
+	struct fixture *f = *state;
+	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=2");
+	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
+	struct texture t;
+	struct error e = {""};
+	assert_int_equal(texture_create(&t, n, COLOR_REFLECTANCE, &f->source, true, &f->arena, &e), 0);
+	assert_value(&t, 1.5 / 3, 0.25, 0.5);
+	assert_value(&t, 0.5 / 3, 0.75, 1);
+	assert_true(texture_max(&t) == 1 && texture_shape(&t) == COLOR_SHAPE_CONSTANT);
+	n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=-2");
+	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
+	assert_true(texture_create(&t, n, COLOR_ILLUMINANT, &f->source, true, &f->arena, &e) < 0 &&
+		    strstr(e.text, "negative colours"));
+	assert_int_equal(texture_create(&t, n, COLOR_HEIGHT, &f->source, true, &f->arena, &e), 0);
+	assert_true(fabs(texture_height(&t, 1.5 / 3, 0.25) + 0.5) < 1e-12);
+	struct texture_jet j;
+	assert_int_equal(texture_create(&t, n, COLOR_RELIEF, &f->source, true, &f->arena, &e), 0);
+	texture_jet(&t, 1.0 / 3, 0.25, &j);
+	assert_true(fabs(j.du[0] + 1.5) < 1e-12 && fabs(j.x[0] + 0.25) < 1e-12);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -210,6 +276,8 @@ int main(void)
 		cmocka_unit_test(test_wrapping),
 		cmocka_unit_test(test_nearest),
 		cmocka_unit_test(test_uv_maps),
+		cmocka_unit_test(test_derivatives),
+		cmocka_unit_test(test_scale),
 		cmocka_unit_test(test_colours),
 		cmocka_unit_test(test_checkerboard),
 		cmocka_unit_test(test_plain_values_and_fallback),
