@@ -69,7 +69,7 @@ int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 	if (scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e))
 		return 0;
 	struct scene_settings set;
-	scene_settings_read(&s, 0, 0, &set, &e);
+	scene_settings_read(&s, 0, 0, 1, &set, &e);
 	build_shapes(&s, &assets);
 	struct render_options options = {.width = SIDE, .height = SIDE, .max_depth = 8};
 	struct render_summary summary;

@@ -65,7 +65,9 @@ const struct plugin_decl *scene_tables(void)
 		all[n++] = own[i];
 	for (size_t i = 0; shape_registry[i]; i++)
 		all[n++] = (struct plugin_decl){PLUGIN_SHAPE, shape_registry[i]->type, shape_registry[i]->params,
-						shape_nested_classes, PARAM_UNDERSTOOD};
+						shape_registry[i]->nested_classes ? shape_registry[i]->nested_classes
+										  : shape_nested_classes,
+						PARAM_UNDERSTOOD};
 	for (const struct plugin_decl *d = setting_decls; d->type; d++)
 		all[n++] = *d;
 	assert(n < sizeof all / sizeof *all);

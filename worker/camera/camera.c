@@ -19,10 +19,21 @@ static double pixels_per_slope(const struct scene_settings *s)
 	return side / (2 * tan(s->fov * (M_PI / 360)));
 }
 
+/* An orthographic camera is a pinhole so far behind that what is twice as far away looks smaller by a part in 2^20
+ * only: a thousandth of a pixel in a film of 1,000. */
+static void step_back(struct camera *c, double half_width)
+{
+	double distance = 0x1p20 * fmax(1, half_width);
+	c->position = vec3_madd(c->position, -distance, c->axes.n);
+	c->near_clip += distance;
+	c->far_clip += distance;
+	c->scale = 0.5 * c->width * distance / half_width;
+}
+
 int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_center, double world_scale,
 		struct error *e)
 {
-	if (!(s->fov > 0 && s->fov < 180))
+	if (!(s->half_width > 0) && !(s->fov > 0 && s->fov < 180))
 		return error_set(e, EINVAL, "the sensor's field of view of %g degrees is not between 0 and 180",
 				 s->fov);
 	vec3 forward = mat4_vector(&s->to_world, (vec3){0, 0, 1});
@@ -40,12 +51,14 @@ int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_cen
 	c->height = s->height;
 	c->center_x = s->width * (0.5 - s->principal_x);
 	c->center_y = s->height * (0.5 - s->principal_y);
-	c->scale = pixels_per_slope(s);
+	c->scale = s->half_width > 0 ? 0 : pixels_per_slope(s);
 	c->near_clip = s->near_clip * world_scale;
 	c->far_clip = s->far_clip * world_scale;
 	c->aperture = s->aperture_radius * world_scale;
 	c->focus = s->focus_distance * world_scale;
 	c->lens = c->aperture > 0;
+	if (s->half_width > 0)
+		step_back(c, s->half_width * world_scale);
 	double away = vec3_length(c->position) + c->aperture;
 	if (!(away <= PARAM_REACH_MAX))
 		return error_set(e, ERANGE, "the camera stands %g times the scene's radius away from it, beyond %g",

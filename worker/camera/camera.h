@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The camera: a pinhole (Mitsuba's `perspective`) or an ideal thin lens (`thinlens`). Film coordinates are pixels of
- * the full film, x to the right, y down.
+ * The camera: a pinhole (Mitsuba's `perspective`; far away, `orthographic`) or an ideal thin lens (`thinlens`). Film
+ * coordinates are pixels of the full film, x to the right, y down.
  *
  * A path's camera end x_k is the pinhole, or a point of the aperture, a disk around the camera's position across its
  * axis (Kolb, Mitchell, Hanrahan 1995, sec. 3). A film point and x_k give the ray: from x_k to where the pinhole's ray

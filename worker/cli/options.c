@@ -30,6 +30,7 @@ enum {
 	OPTION_EFFECTS,
 	OPTION_PARTS,
 	OPTION_LENIENT,
+	OPTION_SENSOR,
 };
 
 static const struct argp_option options[] = {
@@ -50,6 +51,7 @@ static const struct argp_option options[] = {
 	 "(hslt-render --explain lists them)",
 	 1},
 	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 1},
+	{"sensor", OPTION_SENSOR, "N", 0, "Which of the scene's sensors, from 1 on (1): --set sensor=N", 1},
 	{"lenient", OPTION_LENIENT, NULL, 0,
 	 "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted: --set lenient=yes",
 	 1},
@@ -204,6 +206,13 @@ static void take_set(struct render_arguments *a, const char *arg, const struct a
 		argp_error(state, "--set: %s", e.text);
 }
 
+static void take_sensor(struct render_arguments *a, const char *arg, const struct argp_state *state)
+{
+	char set[32];
+	snprintf(set, sizeof set, "sensor=%u", whole32(state, "--sensor", arg));
+	take_set(a, set, state);
+}
+
 static void take_effects(struct render_arguments *a, const char *arg, const struct argp_state *state)
 {
 	struct error e;
@@ -296,6 +305,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_MAX_DEPTH:
 		p->max_depth = a->render.max_depth = whole32(state, "--max-depth", arg);
+		return 0;
+	case OPTION_SENSOR:
+		take_sensor(a, arg, state);
 		return 0;
 	case OPTION_LENIENT:
 		take_set(a, RENDER_LENIENT, state);

@@ -193,7 +193,10 @@ static int check_plan(const struct job_cache *b, const struct scene *s, const st
 {
 	struct scene_settings set;
 	const struct plan *p = &b->plan;
-	int rc = scene_settings_read(s, o->width, o->height, &set, e);
+	struct accuracy_settings accuracy;
+	int rc = accuracy_settings_read(o->accuracy, &accuracy, e);
+	if (!rc)
+		rc = scene_settings_read(s, o->width, o->height, (uint32_t)accuracy.sensor, &set, e);
 	if (rc)
 		return rc;
 	if (set.width != p->width || set.height != p->height || set.border != p->border)

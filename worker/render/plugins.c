@@ -25,7 +25,9 @@ static void gather(void)
 {
 	for (size_t i = 0; shape_registry[i]; i++)
 		add((struct plugin_decl){PLUGIN_SHAPE, shape_registry[i]->type, shape_registry[i]->params,
-					 shape_nested_classes, PARAM_UNDERSTOOD});
+					 shape_registry[i]->nested_classes ? shape_registry[i]->nested_classes
+									   : shape_nested_classes,
+					 PARAM_UNDERSTOOD});
 	for (const struct plugin_decl *d = setting_decls; d->type; d++)
 		add(*d);
 	for (size_t i = 0; bsdf_registry[i]; i++)

@@ -26,3 +26,5 @@ KNOB(tessellation, "tessellation", SETTING_REAL, SETTING_WORLD, 1, 1e-3, 64, NUL
      "Factor of the parts into which displacement cuts an edge", "0.125", "0.25", "0.5", "1", "2")
 KNOB(lenient, "lenient", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "no yes",
      "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted", NULL)
+KNOB(sensor, "sensor", SETTING_WHOLE, SETTING_WORLD, 1, 1, 1000000, NULL,
+     "Which of the scene's sensors is rendered, from 1 on", NULL)

@@ -3,6 +3,36 @@
 
 #include "common/base/mem.h"
 
+/* Mitchell and Netravali 1988, eq. 8: integral 1 whatever B and C are. */
+static double cubic(double b, double c, double d)
+{
+	if (d >= 2)
+		return 0;
+	if (d >= 1)
+		return ((((-b - 6 * c) * d + 6 * b + 30 * c) * d - 12 * b - 48 * c) * d + 8 * b + 24 * c) / 6;
+	return (((12 - 9 * b - 6 * c) * d - 18 + 12 * b + 6 * c) * d * d + 6 - 2 * b) / 6;
+}
+
+static double sinc(double x)
+{
+	return x > 0 ? sin(M_PI * x) / (M_PI * x) : 1;
+}
+
+static double windowed_sinc(double radius, double d)
+{
+	return d < radius ? sinc(d) * sinc(d / radius) : 0;
+}
+
+/* By Simpson's rule: smooth but for the ends, where it is 0. */
+static double windowed_sinc_integral(double radius)
+{
+	enum { STEPS = 4096 };
+	double sum = 0;
+	for (int i = 0; i <= STEPS; i++)
+		sum += (i == 0 || i == STEPS ? 1 : i % 2 ? 4 : 2) * windowed_sinc(radius, radius * i / STEPS);
+	return 2 * sum * radius / (3.0 * STEPS);
+}
+
 int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene_settings *s, struct error *e)
 {
 	*f = (struct film_sums){.x = p->crop_x,
@@ -24,6 +54,10 @@ int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene
 					 "nothing is left of a gaussian filter of deviation %g, radius %g pixels", sd,
 					 r);
 	}
+	f->b = s->filter_b;
+	f->c = s->filter_c;
+	if (s->filter == FILTER_LANCZOS)
+		f->scale = 1 / windowed_sinc_integral(f->radius);
 	f->xyz = mem_alloc((size_t)f->width * f->height * 3, sizeof *f->xyz);
 	f->touched = mem_alloc((size_t)f->tiles_x * f->tiles_y, 1);
 	if (!f->xyz || !f->touched) {
@@ -55,6 +89,10 @@ double film_kernel(const struct film_sums *f, double distance)
 		return d < f->radius ? (1 - d / f->radius) / f->radius : 0;
 	case FILTER_GAUSSIAN:
 		return d < f->radius ? f->scale * (exp(-f->inverse * d * d) - f->floor) : 0;
+	case FILTER_CUBIC:
+		return cubic(f->b, f->c, d);
+	case FILTER_LANCZOS:
+		return f->scale * windowed_sinc(f->radius, d);
 	}
 	return 0;
 }

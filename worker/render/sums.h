@@ -18,6 +18,7 @@ struct film_sums {
 	enum filter_kind filter;
 	double radius;
 	double inverse, floor, scale; /* gaussian: scale (exp(-inverse d^2) - floor) */
+	double b, c;		      /* cubic; scale: of lanczos, too */
 	double *xyz;
 	uint8_t *touched; /* one a tile */
 	struct chain_moments moments;

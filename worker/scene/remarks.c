@@ -37,13 +37,19 @@ static int on_integrator(struct report *r, const struct scene_node *n, struct er
 
 static bool shines(const struct scene_node *n)
 {
-	return n->cls == PLUGIN_EMITTER || (n->cls == PLUGIN_SHAPE && node_child(n, PLUGIN_EMITTER, 0));
+	if (n->cls == PLUGIN_EMITTER)
+		return true;
+	for (uint32_t i = 0; n->cls == PLUGIN_SHAPE && i < n->child_count; i++)
+		if (shines(n->children[i]))
+			return true;
+	return false;
 }
 
 int remarks_on(const struct scene *s, struct report *r, struct error *e)
 {
 	const struct scene_node *camera = NULL;
 	bool light = false;
+	uint32_t sensors = 0;
 	int rc = 0;
 	for (uint32_t i = 0; i < s->object_count && !rc; i++) {
 		const struct scene_node *n = s->objects[i];
@@ -51,9 +57,12 @@ int remarks_on(const struct scene *s, struct report *r, struct error *e)
 		if (n->cls == PLUGIN_INTEGRATOR)
 			rc = on_integrator(r, n, e);
 		else if (n->cls == PLUGIN_SENSOR && camera)
-			rc = remark(r, n, e, "only the first sensor, in line %d, is rendered", camera->line);
-		else if (n->cls == PLUGIN_SENSOR)
+			rc = remark(r, n, e, "sensor %u; without --sensor the first, in line %d, is rendered",
+				    ++sensors, camera->line);
+		else if (n->cls == PLUGIN_SENSOR) {
 			camera = n;
+			sensors = 1;
+		}
 	}
 	if (!rc && !light && camera && r->problem_count == 0)
 		rc = remark(r, camera, e, "the scene has no emitter: the picture is black");

@@ -278,7 +278,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 		return r;
 	if (p)
 		return add_property(d, el, p, (struct value){.type = VALUE_NODE, .as.node = child}, m->error);
-	if (!(d->node->cls == PLUGIN_BSDF && cls == PLUGIN_BSDF) && node_child(d->node, cls, 0))
+	bool many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE);
+	if (!many && node_child(d->node, cls, 0))
 		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">", plugin_class_name(cls),
 				 owner->name, d->node->type);
 	d->children[d->node->child_count++] = child;

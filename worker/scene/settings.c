@@ -42,6 +42,17 @@ static const struct param thinlens_params[] = {
 	{NULL, 0, 0, 0, 0, NULL},
 };
 
+static const struct param orthographic_params[] = {
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
+	{"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},
+	{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)},
+	{"shutter_open", IGNORED},
+	{"shutter_close", IGNORED},
+	{"focus_distance", IGNORED},
+	{"srf", REFUSED},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
 static const struct param film_params[] = {
 	{"width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
 	{"height", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
@@ -75,6 +86,12 @@ static const struct param gaussian_params[] = {
 	{"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)},
 	{NULL, 0, 0, 0, 0, NULL},
 };
+static const struct param cubic_params[] = {
+	{"b", RANGE(VALUE_FLOAT, -1, 1)}, {"B", RANGE(VALUE_FLOAT, -1, 1)}, {"c", RANGE(VALUE_FLOAT, -1, 1)},
+	{"C", RANGE(VALUE_FLOAT, -1, 1)}, {NULL, 0, 0, 0, 0, NULL},
+};
+static const struct param no_params[] = {{NULL, 0, 0, 0, 0, NULL}};
+static const struct param lanczos_params[] = {{"lobes", RANGE(VALUE_INT, 1, 16)}, {NULL, 0, 0, 0, 0, NULL}};
 static const struct param sampler_params[] = {
 	{"sample_count", RANGE(VALUE_INT, 1, 1 << 30)},
 	{"*", IGNORED},
@@ -93,26 +110,30 @@ const struct plugin_decl setting_decls[] = {
 	{PLUGIN_SENSOR, "perspective", perspective_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER),
 	 PARAM_UNDERSTOOD},
 	{PLUGIN_SENSOR, "thinlens", thinlens_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER), PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "orthographic", orthographic_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER),
+	 PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "hdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_FILM, "ldrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
 	{PLUGIN_RFILTER, "box", radius_params, 0, PARAM_UNDERSTOOD},
 	{PLUGIN_RFILTER, "tent", radius_params, 0, PARAM_UNDERSTOOD},
 	{PLUGIN_RFILTER, "gaussian", gaussian_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "mitchell", cubic_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "catmullrom", no_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "lanczos", lanczos_params, 0, PARAM_UNDERSTOOD},
 	{PLUGIN_SAMPLER, "*", sampler_params, 0, PARAM_IGNORED},
 	/* irrcache, adaptive, aov and others hold the integrator that says the depth. */
 	{PLUGIN_INTEGRATOR, "*", integrator_params, HOLDS(PLUGIN_INTEGRATOR), PARAM_IGNORED},
 	{0, NULL, NULL, 0, 0},
 };
 
-static const struct scene_node *find_object(const struct scene *s, enum plugin_class cls, uint32_t *count)
+/* The n-th of its class, from 1 on; count: of all. */
+static const struct scene_node *find_object(const struct scene *s, enum plugin_class cls, uint32_t n, uint32_t *count)
 {
 	const struct scene_node *found = NULL;
 	*count = 0;
 	for (uint32_t i = 0; i < s->object_count; i++)
-		if (s->objects[i]->cls == cls) {
-			if (++*count == 1)
-				found = s->objects[i];
-		}
+		if (s->objects[i]->cls == cls && ++*count == n)
+			found = s->objects[i];
 	return found;
 }
 
@@ -169,6 +190,15 @@ static int read_filter(const struct scene_node *sensor, struct scene_settings *o
 	} else if (filter && strcmp(filter->type, "tent") == 0) {
 		out->filter = FILTER_TENT;
 		out->filter_radius = node_float(filter, "radius", 1.0);
+	} else if (filter && (strcmp(filter->type, "mitchell") == 0 || strcmp(filter->type, "catmullrom") == 0)) {
+		bool mitchell = strcmp(filter->type, "mitchell") == 0;
+		out->filter = FILTER_CUBIC;
+		out->filter_radius = 2;
+		out->filter_b = mitchell ? node_float(filter, "B", node_float(filter, "b", 1.0 / 3)) : 0;
+		out->filter_c = mitchell ? node_float(filter, "C", node_float(filter, "c", 1.0 / 3)) : 0.5;
+	} else if (filter && strcmp(filter->type, "lanczos") == 0) {
+		out->filter = FILTER_LANCZOS;
+		out->filter_radius = (double)node_int(filter, "lobes", 3);
 	} else {
 		out->filter_stddev = filter ? node_float(filter, "stddev", 0.5) : 0.5;
 		out->filter_radius =
@@ -185,7 +215,7 @@ static int read_filter(const struct scene_node *sensor, struct scene_settings *o
 static int read_depth(const struct scene *s, struct scene_settings *out, struct error *e)
 {
 	uint32_t count;
-	const struct scene_node *integrator = find_object(s, PLUGIN_INTEGRATOR, &count);
+	const struct scene_node *integrator = find_object(s, PLUGIN_INTEGRATOR, 1, &count);
 	out->max_depth = MAX_DEPTH;
 	if (!integrator)
 		return 0;
@@ -205,8 +235,25 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	return 0;
 }
 
+/* What the film shows is as wide as to_world makes the line from -1 to 1. */
+static int read_scale(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+{
+	mat4 m = node_transform(sensor, "to_world");
+	double x = vec3_length((vec3){m.m[0][0], m.m[1][0], m.m[2][0]}),
+	       y = vec3_length((vec3){m.m[0][1], m.m[1][1], m.m[2][1]});
+	if (!(fabs(x - y) <= 1e-3 * x) || !(x > 0) || !isfinite(x))
+		return node_error(sensor, e, ENOTSUP,
+				  "to_world scales the film by %g and %g: only square pixels are supported", x, y);
+	out->half_width = x;
+	return 0;
+}
+
 static int read_fov(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
 {
+	if (strcmp(sensor->type, "orthographic") == 0) {
+		snprintf(out->fov_axis, sizeof out->fov_axis, "x");
+		return read_scale(sensor, out, e);
+	}
 	const struct property *fov = node_find(sensor, "fov");
 	const char *focal_length = node_string(sensor, "focal_length", NULL);
 	if (fov && focal_length)
@@ -259,12 +306,14 @@ static int read_camera(const struct scene_node *sensor, struct scene_settings *o
 	return 0;
 }
 
-int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, struct scene_settings *out,
-			struct error *e)
+int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t which,
+			struct scene_settings *out, struct error *e)
 {
 	*out = (struct scene_settings){0};
 	uint32_t sensors;
-	const struct scene_node *sensor = find_object(s, PLUGIN_SENSOR, &sensors);
+	const struct scene_node *sensor = find_object(s, PLUGIN_SENSOR, which, &sensors);
+	if (!sensor && sensors)
+		return error_set(e, EINVAL, "there is no sensor %u: the scene has %u", which, sensors);
 	if (!sensor)
 		return error_set(e, EINVAL, "the scene has no <sensor>");
 	const struct scene_node *sampler = node_child(sensor, PLUGIN_SAMPLER, 0);

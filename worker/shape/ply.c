@@ -436,4 +436,4 @@ static int build(const struct scene_node *n, const struct asset_source *assets, 
 	return r;
 }
 
-const struct shape_ops shape_ops_ply = {"ply", params, build};
+const struct shape_ops shape_ops_ply = {.type = "ply", .params = params, .build = build};

@@ -39,9 +39,11 @@ struct shape_geometry {
 struct shape_ops {
 	const char *type;
 	const struct param *params;
+	/* NULL: it holds others (group.h), and is not built itself. */
 	/* Fills *out: the sphere in world space, or the mesh in object space (shape_build places and checks it). */
 	int (*build)(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		     struct shape_geometry *out, struct error *e);
+	unsigned nested_classes; /* of objects that it may hold without a name; 0: shape_nested_classes */
 };
 
 extern const struct shape_ops *const shape_registry[]; /* ends with NULL */

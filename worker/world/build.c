@@ -4,7 +4,7 @@
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
-#include "worker/shape/shape.h"
+#include "worker/shape/group.h"
 #include "worker/world/coincident.h"
 #include "worker/world/displacement.h"
 #include "worker/world/origin.h"
@@ -13,6 +13,9 @@
 #include <stdio.h>
 #include <string.h>
 
+/* Of all shapes together: Embree takes about 150 bytes for each. */
+enum { TRIANGLES_MAX = 1 << 28 };
+
 /* What building needs and the world does not. */
 struct builder {
 	struct world *w;
@@ -20,7 +23,8 @@ struct builder {
 	const struct asset_source *assets;
 	struct arena scratch;
 	struct shape_geometry *geometry;
-	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
+	const struct scene_node *const *shape_nodes;
+	const struct scene_node **bsdf_nodes, **emitter_nodes;
 	struct effects_choice forced;
 	struct emitter_surface *surfaces;
 	struct box all, *boxes; /* boxes: one a shape */
@@ -54,30 +58,33 @@ static int read_shapes(struct builder *b)
 {
 	const struct scene *s = b->scene;
 	struct world *w = b->w;
-	for (uint32_t i = 0; i < s->object_count; i++)
-		w->shape_count += s->objects[i]->cls == PLUGIN_SHAPE;
+	int rc = shape_list(s, &b->scratch, &b->shape_nodes, &w->shape_count, b->e);
+	if (rc)
+		return rc;
 	b->geometry = arena_alloc(&b->scratch, w->shape_count, sizeof *b->geometry);
-	b->shape_nodes = arena_alloc(&b->scratch, w->shape_count, sizeof(void *));
 	b->boxes = arena_alloc(&b->scratch, w->shape_count, sizeof *b->boxes);
-	if (!b->geometry || !b->shape_nodes || !b->boxes)
+	if (!b->geometry || !b->boxes)
 		return out_of_memory(b->e);
 	b->all = (struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
-	for (uint32_t i = 0, k = 0; i < s->object_count; i++) {
-		if (s->objects[i]->cls != PLUGIN_SHAPE)
-			continue;
+	uint64_t triangles = 0;
+	for (uint32_t k = 0; k < w->shape_count; k++) {
+		const struct scene_node *n = b->shape_nodes[k];
 		uint64_t dropped = 0;
 		tick();
-		crash_place("building the scene", s->objects[i]->file, s->objects[i]->line);
-		int rc = shape_build(s->objects[i], b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
+		crash_place("building the scene", n->file, n->line);
+		rc = shape_build(n, b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
 		if (!rc && b->forced.of[EFFECT_DISPLACEMENT] >= 0)
-			rc = displacement_apply(&b->geometry[k], s->objects[i], b->assets, s->dialect_3,
-						w->accuracy.tessellation, &b->scratch, b->e);
+			rc = displacement_apply(&b->geometry[k], n, b->assets, s->dialect_3, w->accuracy.tessellation,
+						&b->scratch, b->e);
 		if (rc)
 			return rc;
-		b->shape_nodes[k] = s->objects[i];
+		triangles += b->geometry[k].mesh.triangle_count;
+		if (triangles > TRIANGLES_MAX)
+			return node_error(n, b->e, E2BIG, "the scene has more than %d triangles with it",
+					  TRIANGLES_MAX);
 		b->boxes[k] = box_of(&b->geometry[k]);
 		box_grow(&b->all, b->boxes[k].low);
-		box_grow(&b->all, b->boxes[k++].high);
+		box_grow(&b->all, b->boxes[k].high);
 	}
 	crash_place("building the scene", NULL, 0);
 	if (w->shape_count == 0)
@@ -416,9 +423,10 @@ static int prepare(struct builder *b, const struct render_options *o)
 {
 	int rc = effects_parse(o ? o->effects : "", &b->forced, b->e);
 	if (!rc)
-		rc = scene_settings_read(b->scene, o ? o->width : 0, o ? o->height : 0, &b->w->settings, b->e);
-	if (!rc)
 		rc = accuracy_settings_read(o ? o->accuracy : NULL, &b->w->accuracy, b->e);
+	if (!rc)
+		rc = scene_settings_read(b->scene, o ? o->width : 0, o ? o->height : 0, (uint32_t)b->w->accuracy.sensor,
+					 &b->w->settings, b->e);
 	if (!rc)
 		rc = read_shapes(b);
 	if (!rc)

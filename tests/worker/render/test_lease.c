@@ -454,6 +454,10 @@ static void test_kernels(void **state)
 		{.filter = FILTER_GAUSSIAN, .filter_radius = 2, .filter_stddev = 0.5},
 		{.filter = FILTER_GAUSSIAN, .filter_radius = 1, .filter_stddev = 2},
 		{.filter = FILTER_GAUSSIAN, .filter_radius = 64, .filter_stddev = 16},
+		{.filter = FILTER_CUBIC, .filter_radius = 2, .filter_b = 1.0 / 3, .filter_c = 1.0 / 3},
+		{.filter = FILTER_CUBIC, .filter_radius = 2, .filter_b = 0, .filter_c = 0.5},
+		{.filter = FILTER_LANCZOS, .filter_radius = 3},
+		{.filter = FILTER_LANCZOS, .filter_radius = 1},
 	};
 	struct plan p = {
 		.width = 300, .height = 300, .crop_x = 20, .crop_y = 10, .crop_width = 260, .crop_height = 270};

@@ -132,9 +132,9 @@ static void test_unknown_names(void **state)
 	refuses(S "<luminaire type='area'/>" END, "<luminaire");
 	refuses(S "<float name='a' value='1'/>" END, "has no place in <scene>");
 	refuses(S "<bsdf/>" END, "needs an attribute `type`");
-	refuses(S "<sensor type='spherical'/>" END, "supported: perspective, thinlens");
-	refuses(S "<sensor type='perspective'><film type='hdrfilm'><rfilter type='mitchell'/></film></sensor>" END,
-		"supported: box, tent, gaussian");
+	refuses(S "<sensor type='spherical'/>" END, "supported: perspective, thinlens, orthographic");
+	refuses(S "<sensor type='perspective'><film type='hdrfilm'><rfilter type='wiener'/></film></sensor>" END,
+		"supported: box, tent, gaussian, mitchell, catmullrom, lanczos");
 	refuses(BSDF("\n<float name='alhpa' value='1'/>"),
 		"s.xml:2: <float>: <bsdf type=\"roughconductor\"> has no `alhpa`; "
 		"did you mean `alpha`? (supported: alpha, ");

@@ -83,7 +83,7 @@ static int read_scene(const struct memory_file *files)
 		return 0;
 	}
 	struct scene_settings set;
-	int good = scene_settings_read(&s, 0, 0, &set, &e) == 0;
+	int good = scene_settings_read(&s, 0, 0, 1, &set, &e) == 0;
 	for (uint32_t i = 0; i < s.object_count; i++) {
 		struct shape_geometry g;
 		uint64_t dropped;

@@ -74,7 +74,7 @@ static void check(const char *root, const struct expected *x)
 	assert_true(s.note_count >= x->notes_least);
 	check_shapes(&s, &assets, x);
 	struct scene_settings set;
-	if (scene_settings_read(&s, 0, 0, &set, &e))
+	if (scene_settings_read(&s, 0, 0, 1, &set, &e))
 		fail_msg("%s", e.text);
 	assert_int_equal(set.width, x->width);
 	assert_int_equal(set.height, x->height);

@@ -18,7 +18,7 @@ static int read_scene(const char *xml, uint32_t width, uint32_t height, struct s
 	int r = scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, e);
 	if (r)
 		fail_msg("%s", e->text);
-	r = scene_settings_read(&s, width, height, set, e);
+	r = scene_settings_read(&s, width, height, 1, set, e);
 	scene_fini(&s);
 	return r;
 }
@@ -153,11 +153,12 @@ static void test_several_sensors(void **state)
 	struct scene_settings set;
 	struct error e;
 	assert_int_equal(scene_read(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
-	assert_int_equal(scene_settings_read(&s, 0, 0, &set, &e), 0);
+	assert_int_equal(scene_settings_read(&s, 0, 0, 1, &set, &e), 0);
 	assert_true(set.fov == 20);
 	assert_int_equal(s.note_count, 1);
-	assert_string_equal(s.notes[0],
-			    "s.xml:3: <sensor type=\"perspective\">: only the first sensor, in line 2, is rendered");
+	assert_string_equal(
+		s.notes[0],
+		"s.xml:3: <sensor type=\"perspective\">: sensor 2; without --sensor the first, in line 2, is rendered");
 	scene_fini(&s);
 }
 
