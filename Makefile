@@ -7,6 +7,7 @@
 # make test-faults   what happens to machines, one fault after the other; writes the tables of tests/e2e/README.md
 # make test-states   chain states that one worker spoils, with 50 seeds
 # make fuzz-numbers   scenes with extreme numbers against a farm of sanitized workers, FUZZ_SECONDS (60) long
+# make corpus DIR=...   tries every scene file under a folder: loaded, or refused for what
 # make demo bench fuzz install clean
 
 CC       ?= gcc
@@ -167,6 +168,11 @@ test-states: programs
 fuzz-numbers: $(BUILD)/tests/worker/render/test_scene_numbers
 	$(MAKE) SAN=address,undefined programs
 	sh tests/fuzz/numbers.sh $(BUILD)/san $${FUZZ_SECONDS:-60}
+
+# The exit code says whether any scene crashed or hung, not whether all load.
+.PHONY: corpus
+corpus: programs
+	@sh tests/corpus/corpus.sh $(BUILD)/bin/hslt-scene "$(DIR)"
 
 # Benchmarks: one program from tests/bench/*.c; a table on stdout and $(BUILD)/bench.json. BENCH="path tiles" runs only these.
 BENCH_SRC := $(wildcard tests/bench/*.c)

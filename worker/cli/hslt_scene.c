@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/compatibility.h"
 #include "worker/cli/scene_report.h"
 
 #include "common/base/output.h"
@@ -15,6 +16,7 @@ static const char doc[] =
 	"\v"
 	"check: everything that is wrong or not supported, a line each with file, line and element, and as `note:` what is ignored.\n"
 	"show: film, camera, counts, the effects that the scene calls for, and its files with the beginning of their SHA-256.\n"
+	"compatibility: what is read of Mitsuba's scenes, all plug-ins and parameters, as docs/compatibility.md has it.\n"
 	"\n"
 	"Examples:\n"
 	"  hslt-scene check room.xml\n"
@@ -68,6 +70,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		*(a->verb ? &a->request.path : &a->verb) = arg;
 		return 0;
 	case ARGP_KEY_END:
+		if (a->verb && strcmp(a->verb, "compatibility") == 0 && !a->request.path)
+			return 0;
 		if (!a->request.path)
 			argp_error(state, "`check SCENE.xml` or `show SCENE.xml` is needed");
 		if (strcmp(a->verb, "check") != 0 && strcmp(a->verb, "show") != 0)
@@ -87,8 +91,12 @@ int main(int argc, char **argv)
 	bool bad = false;
 	output_check_at_exit();
 	argp_err_exit_status = 2;
-	argp_parse(&(struct argp){options, parse, "check|show SCENE.xml", doc, NULL, NULL, NULL}, argc, argv, 0, NULL,
-		   &a);
+	argp_parse(&(struct argp){options, parse, "check|show SCENE.xml\ncompatibility", doc, NULL, NULL, NULL}, argc,
+		   argv, 0, NULL, &a);
+	if (!a.request.path) {
+		compatibility_print(stdout);
+		return 0;
+	}
 	int rc = strcmp(a.verb, "check") == 0 ? scene_report_check(&a.request, &bad, &e)
 					      : scene_report_show(&a.request, a.json, &e);
 	if (rc)

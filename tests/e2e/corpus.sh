@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: Apache-2.0
+# What `make corpus` says of a folder of scenes: how many load, why the others do not, and which crash.
+. "$(dirname "$0")/lib.sh"
+need hslt-scene
+
+mkdir -p "$DIR/corpus/deep"
+echo "<scene version='3.0.0'><sensor type='perspective'/><emitter type='constant'/><shape type='sphere'/></scene>" >"$DIR/corpus/deep/good.xml"
+for i in 1 2 3; do
+	echo "<scene version='3.0.0'><sensor type='perspective'/><bsdf type='hair'/><shape type='cube$i'/></scene>" >"$DIR/corpus/hair$i.xml"
+done
+echo "<scene version='3.0.0'><sensor type='spherical'/></scene>" >"$DIR/corpus/round.xml"
+echo "<scene version='3.0.0'><bsdf type='hair' id='a'/></scene>" >"$DIR/corpus/part.xml"
+code 0 sh tests/corpus/corpus.sh "$BIN/hslt-scene" "$DIR/corpus"
+grep -q "^1 of 5 scenes load" "$DIR/out" || fail "it counts: $(cat "$DIR/out")"
+grep -q '^ *3 <bsdf type="hair">: there is no bsdf of this type' "$DIR/out" || fail "it groups: $(cat "$DIR/out")"
+code 0 sh tests/corpus/corpus.sh "$BIN/hslt-scene" "$DIR/corpus" --lenient
+grep -q "^4 of 5 scenes load" "$DIR/out" || fail "with --lenient it counts: $(cat "$DIR/out")"
+code 2 sh tests/corpus/corpus.sh "$BIN/hslt-scene" "$DIR/none"
+printf '#!/bin/sh\nexit 134\n' >"$DIR/crash" && chmod +x "$DIR/crash"
+code 1 sh tests/corpus/corpus.sh "$DIR/crash" "$DIR/corpus"
+grep -q "hair1.xml: exit code 134" "$DIR/out" || fail "of a crash it says: $(cat "$DIR/out")"
