@@ -38,7 +38,7 @@ struct client {
 	size_t waiting_bytes;
 	struct tls *tls; /* NULL: plaintext */
 	bool opened, timed_out, distrust;
-	char why[256], warning[384];
+	char why[256], warning[384], note[256];
 };
 
 static void on_opened(void *user)
@@ -201,9 +201,9 @@ static int say_hello(struct client *cl, const char *host_port, const char *name,
 		rc = error_set(e, EPROTO, "the coordinator at %s refuses: %s", host_port, a->hello_ack->text);
 	else if (a->hello_ack->heartbeat_ms >= 10)
 		uv_timer_start(&cl->heartbeat, on_heartbeat, a->hello_ack->heartbeat_ms, a->hello_ack->heartbeat_ms);
-	if (!rc && *a->hello_ack->text && !*cl->warning) {
-		text_copy(cl->warning, sizeof cl->warning, a->hello_ack->text);
-		text_clean(cl->warning);
+	if (!rc) {
+		text_copy(cl->note, sizeof cl->note, a->hello_ack->text);
+		text_clean(cl->note);
 	}
 	client_message_fini(&answer);
 	return rc;
@@ -259,9 +259,12 @@ int client_open(struct client **out, const char *host_port, const char *tls, boo
 	return rc;
 }
 
-const char *client_warning(const struct client *cl)
+void client_print_notes(const struct client *cl, const char *program)
 {
-	return cl->warning;
+	if (*cl->warning)
+		fprintf(stderr, "%s: warning: %s\n", program, cl->warning);
+	if (*cl->note)
+		fprintf(stderr, "%s: %s\n", program, cl->note);
 }
 
 void client_close(struct client *cl)
@@ -383,15 +386,32 @@ static int give_name(const char *temporary, const char *path, bool replace, stru
 	return 0;
 }
 
+static int copy(int from, int to, struct error *e)
+{
+	unsigned char piece[1 << 16];
+	ssize_t n = lseek(from, 0, SEEK_SET);
+	int rc = 0;
+	while (!rc && n >= 0 && (n = read(from, piece, sizeof piece)) > 0)
+		rc = write_all(to, piece, (size_t)n, e);
+	return n < 0 ? error_set(e, EIO, "a temporary file: %s", strerror(errno)) : rc;
+}
+
+/* All of it is here before a byte is written: what a pipe has taken cannot be taken back when the connection breaks. */
 static int fetch_through(struct client *cl, struct client_message *first, uint64_t job, Farm__What what,
 			 const struct target *t, struct error *e)
 {
-	int fd = target_open(t, e);
-	if (fd < 0)
-		return client_local(fd);
-	int rc = fetch_rest(cl, first, job, what, fd, e);
-	if (close(fd) && !rc)
+	FILE *whole = tmpfile();
+	if (!whole)
+		return error_set(e, EIO, "cannot make a temporary file: %s", strerror(errno));
+	int rc = fetch_rest(cl, first, job, what, fileno(whole), e);
+	int fd = rc ? -1 : target_open(t, e);
+	if (!rc && fd < 0)
+		rc = client_local(fd);
+	if (!rc)
+		rc = copy(fileno(whole), fd, e);
+	if (fd >= 0 && close(fd) && !rc)
 		rc = error_set(e, EIO, "%s: %s", t->path, strerror(errno));
+	fclose(whole);
 	return rc;
 }
 

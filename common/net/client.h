@@ -24,8 +24,9 @@ struct client_message { /* fini with client_message_fini */
 int client_open(struct client **cl, const char *host_port, const char *tls, bool insecure, const char *name,
 		struct error *e);
 void client_close(struct client *cl);
-/* What its user should know: that certificates expire soon, or what the coordinator says of itself; "": nothing. */
-const char *client_warning(const struct client *cl);
+/* Tells the user on stderr that certificates expire soon, and what the coordinator says of itself, if there is anything
+ * to tell. */
+void client_print_notes(const struct client *cl, const char *program);
 
 /* Sends and waits until it is with the kernel. */
 int client_send(struct client *cl, const Farm__Envelope *m, const void *payload, size_t size, struct error *e);

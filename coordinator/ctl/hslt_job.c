@@ -14,8 +14,7 @@ int main(int argc, char **argv)
 	job_options_parse(&o, argc, argv);
 	int rc = client_open(&cl, o.coordinator, o.tls, o.insecure, "hslt-job", &e);
 	if (!rc) {
-		if (*client_warning(cl))
-			fprintf(stderr, "hslt-job: warning: %s\n", client_warning(cl));
+		client_print_notes(cl, "hslt-job");
 		rc = job_verb(cl, &o, &e);
 		client_close(cl);
 	}

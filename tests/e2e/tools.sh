@@ -23,8 +23,10 @@ render other 2 32x32
 render large 1 64x64
 mkdir "$DIR/folder" && echo old >"$DIR/folder/real.exr" && ln -s folder/real.exr "$DIR/link.exr"
 render link 1 32x32
+"$BIN/hslt-render" "$BOX" -o - --integrator path --spp 4 --seed 1 --size 32x32 --threads 1 >"$DIR/stdout.exr" 2>"$DIR/err.log" || fail "-o -: $(cat "$DIR/err.log")"
 cd "$DIR"
 code 0 "$BIN/hslt-compare" --exact a.exr again.exr
+code 0 "$BIN/hslt-compare" --exact a.exr stdout.exr
 code 1 "$BIN/hslt-compare" --exact a.exr other.exr
 grep -q "^different: channel" out || fail "--exact says: $(cat out)"
 code 1 "$BIN/hslt-compare" --exact --json a.exr other.exr

@@ -52,7 +52,7 @@ enum {
 };
 
 static const struct argp_option options[] = {
-	{"output", 'o', "FILE", 0, "The image (OpenEXR)", 0},
+	{"output", 'o', "FILE", 0, "The image (OpenEXR); -: stdout", 0},
 	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors); does not change the bits", 0},
 	{"stats", OPTION_STATS, "FILE", 0,
 	 "Write plan, times, counters, strategies and effects as JSON, and show tables of the strategies and of the classes of paths",

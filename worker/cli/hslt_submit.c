@@ -55,7 +55,7 @@ enum {
 
 static const struct argp_option options[] = {
 	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
-	{"output", 'o', "FILE", 0, "The image", 0},
+	{"output", 'o', "FILE", 0, "The image; -: stdout, and the job's id goes to stderr", 0},
 	{"priority", OPTION_PRIORITY, "P", 0, "-100 to 100, higher first (0)", 0},
 	{"name", OPTION_NAME, "NAME", 0, "How the job is shown (the scene's file name)", 0},
 	{"wait", OPTION_WAIT, NULL, 0, "Show progress and fetch the image", 0},
@@ -84,6 +84,11 @@ struct arguments {
 	double patience; /* s */
 	bool wait, json, insecure, estimate;
 };
+
+static bool to_stdout(const struct arguments *a)
+{
+	return a->output && strcmp(a->output, "/dev/stdout") == 0;
+}
 
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
@@ -152,6 +157,8 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 			argp_error(state, "--estimate makes no image: no -o, no --wait");
 		if (!a->estimate && (a->pilot > 0 || a->plot))
 			argp_error(state, "--pilot and --plot go with --estimate");
+		if (to_stdout(a) && (!a->wait || a->json))
+			argp_error(state, "-o - writes the image to stdout: it goes with --wait, and without --json");
 		if (!a->coordinator)
 			argp_error(state, "--coordinator HOST:PORT is needed (or $HSLT_COORDINATOR)");
 		return 0;
@@ -177,6 +184,8 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 		json_dumpf(o, stdout, JSON_COMPACT);
 		putchar('\n');
 		json_decref(o);
+	} else if (to_stdout(a)) {
+		fprintf(stderr, "%s\n", id);
 	} else {
 		puts(id);
 	}
@@ -297,8 +306,7 @@ int main(int argc, char **argv)
 	measure(&a, &b);
 	rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
 	if (!rc) {
-		if (*client_warning(cl))
-			fprintf(stderr, "hslt-submit: warning: %s\n", client_warning(cl));
+		client_print_notes(cl, "hslt-submit");
 		rc = a.estimate ? estimate(&a, cl, &b, &e) : run(&a, &cl, &b, &code, &e);
 		client_close(cl);
 	}

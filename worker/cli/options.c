@@ -117,6 +117,8 @@ const char *option_image(const struct argp_state *state, const char *arg)
 {
 	static const char *const others[] = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".hdr", ".bmp", ".ppm", ".pfm"};
 	size_t n = strlen(arg);
+	if (strcmp(arg, "-") == 0)
+		return "/dev/stdout";
 	for (size_t i = 0; i < sizeof others / sizeof *others; i++) {
 		size_t k = strlen(others[i]);
 		if (n > k && strcasecmp(arg + n - k, others[i]) == 0)

@@ -36,7 +36,8 @@ unsigned option_threads(const struct argp_state *state, const char *arg);
 unsigned option_threads_default(void); /* as many as processors */
 double option_seconds(const struct argp_state *state, const char *option, const char *arg);
 
-/* The file of an image, which is OpenEXR: the usage error where its name says that it is something else. */
+/* The file of an image, which is OpenEXR: the usage error where its name says that it is something else. "-" is
+ * /dev/stdout. */
 const char *option_image(const struct argp_state *state, const char *arg);
 
 /* "a/b/room.xml" -> "a/b" and "room.xml"; both to be mem_free'd. */
