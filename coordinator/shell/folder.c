@@ -60,13 +60,13 @@ static void go_on(struct server *s, struct live_job *o)
 	durable_hold(s, o, "its results cannot be stored", "its folder was removed, and is made anew");
 }
 
-/* A journal that is bad already has no file to look for: then the folder itself, which may go while it is being made
- * anew. */
+/* A journal that is bad already has no file to look for, and who has ended needs none: then the folder itself, which
+ * may go while it is being made anew. */
 static bool is_gone(const struct server *s, const struct live_job *o)
 {
 	char folder[SPOOL_PATH_MAX];
 	struct stat st;
-	if (!journal_is_bad(o->journal))
+	if (!journal_is_bad(o->journal) && !o->ended)
 		return journal_is_gone(o->journal);
 	spool_job_path(s->spool, o->id, NULL, folder);
 	return disk_stat(folder, &st) && (errno == ENOENT || errno == ENOTDIR);
