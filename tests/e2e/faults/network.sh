@@ -141,3 +141,44 @@ nobody_reads() {
 	after=$(awk '/^VmRSS/ { print $2 }' "/proc/$COORDINATOR_PID/status")
 	[ $((after - before)) -lt 65536 ] || fail "$NAME: the coordinator grew from $before to $after KB"
 }
+
+fault crowd 2 1 "2,000 connections say nothing, and 2,000 more a hello that is refused, or rubbish: few lines of the log, and the job goes on"
+crowd() {
+	start_coordinator --heartbeat 0.2
+	worker w0
+	worker w1
+	i=0
+	while [ $i -lt "$TIMES" ]; do
+		i=$((i + 1))
+		crowd_comes
+	done
+	again # which tells what it finds
+	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	finish_job
+	blameless
+}
+# The job goes on meanwhile; then it is held, lest it end before the coordinator is started again.
+crowd_comes() {
+	lines=$(grep -c . "$DIR/coordinator.log")
+	before=$(date +%s)
+	"$PYTHON" "$HERE/faults/crowd.py" "${COORDINATOR#*:}" >"$DIR/crowd.log" 2>&1 &
+	PIDS="$PIDS $!"
+	says crowd idle
+	[ "$i" -gt 1 ] && "$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || job
+	until_true 60 is_beyond "$ID" "$(awk -v i="$i" -v n="$TIMES" 'BEGIN { print i / (n + 2) }')" || fail "$NAME: $ID is at $(value "$ID" progress)"
+	"$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
+	says crowd done 60
+	until_true 30 all_told || fail "$NAME: of 1,000 connections that were refused $(told) are told of"
+	said=$(($(grep -c . "$DIR/coordinator.log") - lines))
+	most=$((2 * (100 + 5 * ($(date +%s) - before + 1)) + 50)) # of two kinds
+	[ $said -le $most ] || fail "$NAME: $said lines, at most $most"
+	[ "$i" -lt "$TIMES" ] || kill -9 "$COORDINATOR_PID"
+}
+# how many refusals the log tells of since then, and how many it counts
+told() {
+	tail -n +$((lines + 1)) "$DIR/coordinator.log" |
+		awk '/ event=peer_(garbled|refused) / { n++ } / event=log_withheld of=peer_(garbled|refused) / { sub(/.* more=/, ""); n += $0 } END { print n + 0 }'
+}
+all_told() {
+	[ "$(told)" -ge 1000 ]
+}

@@ -112,3 +112,102 @@ large_pixel() {
 	blameless
 	unset HSLT_TEST
 }
+
+fault targets 4 4 "an image is fetched into a FIFO, a device, a symbolic link, an open descriptor: these stay what they are"
+targets() {
+	[ -n "${HSLT_OWN_MOUNTS:-}" ] || { cannot "no name spaces for mounts here" && return 0; }
+	farm
+	worker w0
+	worker w1
+	job
+	each_time fetches_into fetch --preview "$ID"
+	finish_job
+	for i in 1 2 3 4; do
+		fetches_into fetch "$ID"
+		[ $i -eq 2 ] || same "$QUIET" "$DIR/real.exr"
+	done
+}
+# fetches_into ARGUMENT...: of hslt-job; what it writes is in real.exr but for the device, which is a mount: nobody could replace it
+fetches_into() {
+	rm -f "$DIR/target.exr" "$DIR/real.exr"
+	case $i in
+	1)
+		mkfifo "$DIR/target.exr"
+		cat "$DIR/target.exr" >"$DIR/real.exr" &
+		code 0 timeout 100 "$BIN/hslt-job" "$@" -o "$DIR/target.exr"
+		[ -p "$DIR/target.exr" ] || fail "$NAME: the FIFO is replaced"
+		wait $!
+		;;
+	2)
+		: >"$DIR/target.exr"
+		mount --bind /dev/null "$DIR/target.exr"
+		got=0
+		timeout 100 "$BIN/hslt-job" "$@" -o "$DIR/target.exr" 2>"$DIR/err.log" || got=$?
+		umount "$DIR/target.exr"
+		[ $got -eq 0 ] && [ ! -s "$DIR/target.exr" ] || fail "$NAME: a device: $got, $(cat "$DIR/err.log")"
+		return 0
+		;;
+	3)
+		: >"$DIR/real.exr"
+		ln -s real.exr "$DIR/target.exr"
+		code 0 timeout 100 "$BIN/hslt-job" "$@" -o "$DIR/target.exr"
+		[ -L "$DIR/target.exr" ] || fail "$NAME: the link is replaced"
+		;;
+	4)
+		ln -s /dev/stdout "$DIR/target.exr"
+		code 0 timeout 100 "$BIN/hslt-job" "$@" -o "$DIR/target.exr"
+		[ -L "$DIR/target.exr" ] && [ -L /dev/stdout ] || fail "$NAME: the link is replaced"
+		mv "$DIR/out" "$DIR/real.exr"
+		;;
+	esac
+	[ "$(od -An -tx1 -N4 "$DIR/real.exr" | tr -d ' ')" = 762f3101 ] || fail "$NAME: no image comes out of kind $i"
+}
+
+fault other_role 3 1 "a worker calls with a client's certificate: it is told why, and ends"
+other_role() {
+	export HSLT_CA="$DIR/ca"
+	for who in init "worker node" "client ann"; do
+		# shellcheck disable=SC2086
+		"$BIN/hslt-ca" $who >>"$DIR/ca.log" 2>&1 || fail "$NAME: $(tail -n 1 "$DIR/ca.log")"
+	done
+	farm --tls "$DIR/ca/coordinator"
+	worker w0 --tls "$DIR/ca/node"
+	worker w1 --tls "$DIR/ca/node"
+	export HSLT_TLS="$DIR/ca/ann"
+	job
+	each_time a_client_leases
+	finish_job
+	blameless
+	unset HSLT_TLS HSLT_CA
+}
+a_client_leases() {
+	code 6 timeout 100 "$BIN/hslt-worker" --threads 1 --name "client$i" --cache "$DIR/cache"
+	grep -q 'cannot lease' "$DIR/err.log" || fail "$NAME: it says $(cat "$DIR/err.log")"
+}
+
+fault large_picture 3 1 "a scene with a PNG of 140 KB that would be 16,000 x 16,000 pixels is submitted, and sent past hslt-submit"
+large_picture() {
+	cp -r "$HERE/../scenes/box" "$DIR/large"
+	sed '/id="white"/s|<rgb.*/>|<texture name="reflectance" type="bitmap"><string name="filename" value="large.png"/></texture>|' "$BOX" >"$DIR/large/box.xml"
+	farm
+	worker w0
+	worker w1
+	job
+	each_time somebody_sends_it
+	finish_job
+	blameless
+	! grep -q event=process_lost "$DIR"/w?.log || fail "$NAME: a process was lost"
+	[ "$(peak)" -lt 262144 ] || fail "$NAME: a worker took $(peak) KB"
+}
+somebody_sends_it() {
+	"$PYTHON" "$HERE/faults/picture.py" "${COORDINATOR#*:}" "$DIR/large" >"$DIR/picture.log" 2>&1 || fail "$NAME: $(cat "$DIR/picture.log")"
+	code 1 timeout 100 "$BIN/hslt-submit" "$DIR/large/box.xml" -o "$DIR/no.exr" --spp 1
+	grep -q 'box.xml:[0-9]*: .*large.png: 16000 x 16000 pixels; at most' "$DIR/err.log" || fail "$NAME: hslt-submit says $(cat "$DIR/err.log")"
+	other=j$((${ID#j} + i))
+	until_true 60 is_state "$other" failed || fail "$NAME: $other is $(value "$other" state)"
+	"$BIN/hslt-job" log "$other" 2>&1 | grep -q 'large.png: 16000 x 16000 pixels; at most' || fail "$NAME: $("$BIN/hslt-job" log "$other" 2>&1)"
+}
+# The most memory that the process of a worker had, in KB.
+peak() {
+	awk '/^VmHWM/ { print $2 }' "/proc/$(renders "$WORKER")/status"
+}
