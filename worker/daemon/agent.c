@@ -91,7 +91,7 @@ static void on_heartbeat(uv_timer_t *t)
 static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
 {
 	if (!ack->accepted) {
-		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(ack->text).text);
+		log_event(LOG_PEER_REFUSED, "coordinator=%s text=%s", a->config.coordinator, log_quote(ack->text).text);
 		a->refused = ack->final || ack->version != FARM_VERSION;
 		text_copy(a->why, sizeof a->why, ack->text);
 		conn_close(a->conn, ack->text);
@@ -103,7 +103,7 @@ static void take_hello_ack(struct agent *a, const Farm__HelloAck *ack)
 	log_event(LOG_CONNECT, "coordinator=%s start=%llu", a->config.coordinator,
 		  (unsigned long long)a->cache.life.restarts);
 	if (*ack->text)
-		log_event(LOG_PEER_FAULT, "text=%s", log_quote(ack->text).text);
+		log_event(LOG_PEER_FAULT, "coordinator=%s text=%s", a->config.coordinator, log_quote(ack->text).text);
 	uv_timer_start(&a->heartbeat, on_heartbeat, ms, ms);
 	conn_set_quiet(a->conn, 6e-3 * (double)ms + 1);
 	lease_queue_welcome(a);
@@ -114,7 +114,8 @@ static void on_message(void *user, struct envelope *env, const unsigned char *pa
 	struct agent *a = user;
 	const Farm__Envelope *m = env->message;
 	if (m->body_case == FARM__ENVELOPE__BODY_FAULT) {
-		log_event(LOG_PEER_FAULT, "text=%s", log_quote(m->fault->text).text);
+		log_event(LOG_PEER_FAULT, "coordinator=%s text=%s", a->config.coordinator,
+			  log_quote(m->fault->text).text);
 		conn_close(a->conn, m->fault->text);
 	} else if (a->welcome) {
 		lease_queue_message(a, env, payload, size);

@@ -301,8 +301,8 @@ static void take_ack(struct agent *a, const Farm__LeaseAck *m)
 	}
 	struct lease_task *l = find_lease(a, &k);
 	if (m->verdict == FARM__VERDICT__VERDICT_REFUSED)
-		log_event(LOG_BATCH_REFUSED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k.job), k.group,
-			  k.part, number(k.epoch), log_quote(m->text).text);
+		log_event(LOG_BATCH_REFUSED, "job=j%llu kind=%d group=%u part=%u epoch=%llu text=%s", number(k.job),
+			  (int)k.kind, k.group, k.part, number(k.epoch), log_quote(m->text).text);
 	else if (m->verdict != FARM__VERDICT__VERDICT_NOTED)
 		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu kind=%d group=%u part=%u epoch=%llu repeat=%d",
 			  number(k.job), (int)k.kind, k.group, k.part, number(k.epoch),

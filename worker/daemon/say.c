@@ -61,8 +61,8 @@ static void say(struct agent *a, const struct lease_key *k, const char *text, bo
 	m.lease_failed = &failed;
 	agent_send(a, &m);
 	if (*text)
-		log_event(LOG_LEASE_FAILED, "job=j%llu group=%u part=%u epoch=%llu text=%s", number(k->job), k->group,
-			  k->part, number(k->epoch), log_quote(text).text);
+		log_event(LOG_LEASE_FAILED, "job=j%llu kind=%d group=%u part=%u epoch=%llu text=%s", number(k->job),
+			  (int)k->kind, k->group, k->part, number(k->epoch), log_quote(text).text);
 }
 
 void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
