@@ -17,7 +17,7 @@ static const struct {
 	 "circular|coating|difftrans|hair|hk|irawan|measured|measured_polarized|mixturebsdf|polarizer|pplastic|"
 	 "principledthin|retarder|roughcoating|roughdiffuse|ward"},
 	{PLUGIN_TEXTURE, "curvature|gridtexture|mesh_attribute|vertexcolors|volume|wireframe"},
-	{PLUGIN_EMITTER, "collimated|directionalarea|projector|sky|sun|sunsky|timed_sunsky"},
+	{PLUGIN_EMITTER, "collimated|directionalarea|projector|timed_sunsky"},
 	{PLUGIN_SENSOR,
 	 "batch|distant|fluxmeter|irradiancemeter|perspective_rdist|radiancemeter|spherical|telecentric"},
 	{PLUGIN_FILM, "mfilm|specfilm|tiledhdrfilm"},

@@ -11,8 +11,7 @@
  * multiples of 2^-31, at least one where there is light, kept as running sums: sampling and density use the same
  * numbers.
  */
-#include "worker/emitter/emitter.h"
-#include "worker/texture/raster.h"
+#include "worker/emitter/envmap.h"
 
 #include <string.h>
 
@@ -41,8 +40,7 @@ static void coordinates(const struct envmap *m, vec3 direction, double *u, doubl
 	*v = atan2(hypot(d.x, d.z), d.y) / PI;
 }
 
-static spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w,
-				const struct wavelengths *wl)
+spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
 {
 	(void)w;
 	const struct envmap *m = em->data;
@@ -80,7 +78,7 @@ static void find_place(const struct envmap *m, vec3 d, uint32_t *row, uint32_t *
 	*across = (c < 0 ? c + m->columns : c) - *column;
 }
 
-static double envmap_pdf_point(const struct emitter *em, const struct emitter_point *x)
+double envmap_pdf_point(const struct emitter *em, const struct emitter_point *x)
 {
 	const struct envmap *m = em->data;
 	uint32_t row, column;
@@ -94,7 +92,7 @@ static double envmap_pdf_point(const struct emitter *em, const struct emitter_po
 	return chance / (row_height(m, row) * 2 * PI / m->columns);
 }
 
-static void envmap_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
+void envmap_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
 {
 	const struct envmap *m = em->data;
 	uint32_t row, column;
@@ -112,7 +110,7 @@ static void envmap_point_inverse(const struct emitter *em, const struct emitter_
 		u[i] = fmin(fmax(u[i], 0), 1 - 0x1p-53);
 }
 
-static double envmap_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
+double envmap_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
 {
 	(void)ref;
 	return envmap_pdf_point(em, x);
@@ -145,7 +143,7 @@ static uint32_t find_cell(const uint32_t *cdf, uint32_t n, double x)
 	return low;
 }
 
-static bool envmap_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point)
+bool envmap_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point)
 {
 	const struct envmap *m = em->data;
 	if (!(em->power > 0))
@@ -168,8 +166,8 @@ static bool envmap_sample_point(const struct emitter *em, const double u[2], str
 	return *pdf_point > 0;
 }
 
-static bool envmap_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
-				 double *pdf_toward)
+bool envmap_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
+			  double *pdf_toward)
 {
 	(void)ref;
 	return envmap_sample_point(em, u, x, pdf_toward);
@@ -214,41 +212,37 @@ static double build_density(struct envmap *m)
 }
 
 /* The local axes, without their scale; only rotations, reflections and one scale keep angles. */
-static int read_axes(struct envmap *m, const struct scene_node *n, struct error *e)
+int envmap_axes(const struct scene_node *n, vec3 axis[3], struct error *e)
 {
 	mat4 t = node_transform(n, "to_world");
 	for (int c = 0; c < 3; c++) {
-		m->axis[c] = (vec3){t.m[0][c], t.m[1][c], t.m[2][c]};
-		double length = vec3_length(m->axis[c]), first = vec3_length((vec3){t.m[0][0], t.m[1][0], t.m[2][0]});
+		axis[c] = (vec3){t.m[0][c], t.m[1][c], t.m[2][c]};
+		double length = vec3_length(axis[c]), first = vec3_length((vec3){t.m[0][0], t.m[1][0], t.m[2][0]});
 		if (!(length > 0) || !(fabs(length - first) <= 1e-4 * first))
 			return node_error(n, e, ENOTSUP, "to_world of an environment can only rotate");
-		m->axis[c] = vec3_scale(1 / length, m->axis[c]);
+		axis[c] = vec3_scale(1 / length, axis[c]);
 		for (int k = 0; k < c; k++)
-			if (fabs(vec3_dot(m->axis[k], m->axis[c])) > 1e-4)
+			if (fabs(vec3_dot(axis[k], axis[c])) > 1e-4)
 				return node_error(n, e, ENOTSUP, "to_world of an environment can only rotate");
 	}
 	/* Files give few digits: made orthonormal. */
-	double sign = vec3_dot(vec3_cross(m->axis[0], m->axis[1]), m->axis[2]) < 0 ? -1 : 1;
-	m->axis[1] = vec3_normalize(vec3_madd(m->axis[1], -vec3_dot(m->axis[0], m->axis[1]), m->axis[0]));
-	m->axis[2] = vec3_scale(sign, vec3_cross(m->axis[0], m->axis[1]));
+	double sign = vec3_dot(vec3_cross(axis[0], axis[1]), axis[2]) < 0 ? -1 : 1;
+	axis[1] = vec3_normalize(vec3_madd(axis[1], -vec3_dot(axis[0], axis[1]), axis[0]));
+	axis[2] = vec3_scale(sign, vec3_cross(axis[0], axis[1]));
 	return 0;
 }
 
-static int envmap_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
-			 struct error *e)
+int envmap_make(struct emitter *em, const struct raster *picture, double scale, const vec3 axis[3],
+		const struct scene_node *n, const struct emitter_build *build, struct error *e)
 {
 	struct envmap *m = arena_alloc(build->arena, 1, sizeof *m);
 	if (!m)
 		return node_error(n, e, ENOMEM, "out of memory");
-	int code = read_axes(m, n, e);
-	if (!code)
-		code = raster_read(&m->raster, n, build->assets, &(struct raster_range){0, HUGE_VAL, false},
-				   build->arena, e);
-	if (code)
-		return code;
+	m->raster = *picture;
+	memcpy(m->axis, axis, sizeof m->axis);
 	m->raster.wrap_u = RASTER_REPEAT;
 	m->raster.wrap_v = RASTER_CLAMP;
-	m->scale = node_float(n, "scale", 1);
+	m->scale = scale;
 	m->columns = m->raster.image.width;
 	m->rows = m->raster.image.height + 1;
 	m->row_cdf = arena_alloc(build->arena, (size_t)m->rows + 1, sizeof *m->row_cdf);
@@ -265,6 +259,18 @@ static int envmap_create(struct emitter *em, const struct scene_node *n, const s
 	return 0;
 }
 
+static int envmap_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+			 struct error *e)
+{
+	struct raster picture = {.nearest = false};
+	vec3 axis[3];
+	int code = envmap_axes(n, axis, e);
+	if (!code)
+		code = raster_read(&picture, n, build->assets, &(struct raster_range){0, HUGE_VAL, false}, build->arena,
+				   e);
+	return code ? code : envmap_make(em, &picture, node_float(n, "scale", 1), axis, n, build, e);
+}
+
 static const struct param envmap_params[] = {
 	RASTER_PARAMS,
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = PARAM_LIGHT_MAX},
@@ -278,10 +284,5 @@ const struct emitter_ops emitter_ops_envmap = {
 	.type = "envmap",
 	.params = envmap_params,
 	.create = envmap_create,
-	.radiance = envmap_radiance,
-	.sample_point = envmap_sample_point,
-	.pdf_point = envmap_pdf_point,
-	.point_inverse = envmap_point_inverse,
-	.sample_toward = envmap_sample_toward,
-	.pdf_toward = envmap_pdf_toward,
+	ENVMAP_OPS,
 };

@@ -45,6 +45,13 @@ static bool shines(const struct scene_node *n)
 	return false;
 }
 
+static int on_emitter(struct report *r, const struct scene_node *n, struct error *e)
+{
+	if (strcmp(n->type, "sky") != 0 && strcmp(n->type, "sun") != 0 && strcmp(n->type, "sunsky") != 0)
+		return 0;
+	return remark(r, n, e, "daylight after Preetham (1999), a little other than Mitsuba's after Hosek and Wilkie");
+}
+
 int remarks_on(const struct scene *s, struct report *r, struct error *e)
 {
 	const struct scene_node *camera = NULL;
@@ -56,6 +63,8 @@ int remarks_on(const struct scene *s, struct report *r, struct error *e)
 		light |= shines(n);
 		if (n->cls == PLUGIN_INTEGRATOR)
 			rc = on_integrator(r, n, e);
+		else if (n->cls == PLUGIN_EMITTER)
+			rc = on_emitter(r, n, e);
 		else if (n->cls == PLUGIN_SENSOR && camera)
 			rc = remark(r, n, e, "sensor %u; without --sensor the first, in line %d, is rendered",
 				    ++sensors, camera->line);

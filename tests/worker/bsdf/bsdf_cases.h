@@ -46,6 +46,9 @@ static const char *const bsdf_cases[] = {
 	"roughdielectric int_ior=diamond ext_ior=water dispersion=true alpha=0.3",
 	"roughdielectric int_ior=1 ext_sellmeier=1.0396,0.2318,1.0105,0.006,0.02,103.56 alpha=0.2 distribution=ggx",
 	"roughdielectric int_ior=1.5 ext_ior=1.5 int_cauchy_b=0.02 alpha=0.4", /* eta is 1 at IOR_NM alone */
+	"roughdiffuse reflectance=0.9",
+	"roughdiffuse alpha=1 reflectance=rgb(1,0.3,0.1)",
+	"roughdiffuse alpha=0.7 use_fast_approx=true",
 	"phong",
 	"phong exponent=0 specular_reflectance=0.9 diffuse_reflectance=0.4",
 	"phong exponent=300 diffuse_reflectance=0 specular_reflectance=1",

@@ -246,7 +246,7 @@ static void test_black_and_refusals(void **state)
 	const mat4 shear = {{{1, 0.5, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
 	assert_true(try(*state, "envmap filename=p0", &shear, &em, &e) < 0 && strstr(e.text, "rotate"));
 	assert_true(try(*state, "envmap", NULL, &em, &e) < 0 && strstr(e.text, "filename"));
-	assert_true(try(*state, "sun", NULL, &em, &e) < 0 && strstr(e.text, "sun"));
+	assert_true(try(*state, "moon", NULL, &em, &e) < 0 && strstr(e.text, "moon"));
 	assert_true(try(*state, "area", NULL, &em, &e) < 0 && strstr(e.text, "shape"));
 }
 
