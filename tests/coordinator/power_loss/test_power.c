@@ -35,6 +35,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <sys/stat.h>
 
 enum { LIVES_MAX = 12, KINDS = 4 /* of calls that fail */, TESTS = 4 /* that count */ };
 
@@ -355,13 +356,16 @@ static size_t last_file(uint64_t job, const char *name, char path[256])
 	return count;
 }
 
-/* The first job that the next start goes on with, from a checkpoint and a journal. 0: none. */
+/* The first job that the next start goes on with, from a checkpoint and a journal. A second journal would be that of a
+ * checkpoint that did not get its name: it is removed unread. 0: none. */
 static uint64_t living_job(void)
 {
 	static unsigned char record[FILE_MOST];
 	char path[256];
 	for (uint64_t id = 1; id < IDS_MAX; id++) {
-		if (!last_file(id, "checkpoint", path) || !last_file(id, "journal.*", path))
+		struct stat journal;
+		if (!last_file(id, "checkpoint", path) || last_file(id, "journal.*", path) != 1 ||
+		    stat(path, &journal) || !journal.st_size)
 			continue;
 		size_t size = last_file(id, "job.json", path) ? load(path, record) : 0;
 		if (!size || !memmem(record, size, "\"done\"", 6))
