@@ -129,6 +129,11 @@ test: programs tests $(BUILD)/load/load
 test-sim: $(BUILD)/tests/sim/test_farm
 	FULL=1 $(BUILD)/tests/sim/test_farm
 
+# Lays the sources out as .clang-format says (by clang-format 14); tests/lint/format.sh checks it.
+.PHONY: format
+format:
+	git ls-files '*.[ch]' '*.inc' | grep -v /data/ | xargs clang-format -i --style=file
+
 # Faults of one line each, planted in a copy of HEAD: which test notices (tests/mutants/README.md).
 .PHONY: test-mutants
 test-mutants:

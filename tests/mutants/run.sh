@@ -4,10 +4,11 @@
 #
 #     sh tests/mutants/run.sh [LIST]        LIST: tests/mutants/list.txt
 #
-# A line of the list: FILE, what stands there (once in the file), what is put in its place, the tests to run (TEST@ROOM: in one of
-# their rooms); tabs between, # begins a comment. The commit at HEAD is copied to build/mutants and built there once, by ccache where
-# it is installed. A fault is caught when a test of its line fails; one that does not compile is a fault of the list. One line for
-# each, with the seconds that it took, then a table by folder. Ends with 1 when less than 95 % are caught or a line is faulty.
+# A line of the list: FILE, what stands there (once in the file; white space does not count), what is put in its place, the tests to
+# run (TEST@ROOM: in one of their rooms); tabs between, # begins a comment. The commit at HEAD is copied to build/mutants and built
+# there once, by ccache where it is installed. A fault is caught when a test of its line fails; one that does not compile is a fault
+# of the list. One line for each, with the seconds that it took, then a table by folder. Ends with 1 when less than 95 % are caught or
+# a line is faulty.
 list=${1:-tests/mutants/list.txt}
 list=$(cd "$(dirname "$list")" && pwd)/$(basename "$list")
 tree=build/mutants
@@ -37,9 +38,7 @@ while IFS=$tab read -r file old new tests; do
 	case $file in '#'* | '') continue ;; esac
 	begin=$(date +%s)
 	cp "$file" "$file.sound"
-	if ! OLD=$old NEW=$new awk 'BEGIN { old = ENVIRON["OLD"]; new = ENVIRON["NEW"] }
-		{ at = index($0, old); if (at) { n++; $0 = substr($0, 1, at - 1) new substr($0, at + length(old)) } print }
-		END { exit n != 1 }' "$file.sound" > "$file"; then
+	if ! python3 tests/mutants/plant.py "$file.sound" "$old" "$new" > "$file"; then
 		echo "faulty    $file: '$old' does not stand there once"
 		faulty=$((faulty + 1))
 	elif ! make -s ${CC:+CC="$CC"} $(echo "$tests" | binaries) > make.log 2>&1; then
