@@ -20,7 +20,7 @@ static const struct {
 	{PLUGIN_EMITTER, "collimated|directionalarea|projector|timed_sunsky"},
 	{PLUGIN_SENSOR,
 	 "batch|distant|fluxmeter|irradiancemeter|perspective_rdist|radiancemeter|spherical|telecentric"},
-	{PLUGIN_FILM, "mfilm|specfilm|tiledhdrfilm"},
+	{PLUGIN_FILM, "specfilm"},
 	{PLUGIN_MEDIUM, "heterogeneous|homogeneous"},
 };
 

@@ -3,7 +3,7 @@
 #include "worker/shape/declare.h"
 #include "worker/shape/quad.h"
 
-static const struct param params[] = {SHAPE_PARAMS_END};
+static const struct param params[] = {{"face_normals", IGNORED}, SHAPE_PARAMS_END};
 
 /* Each face with its normal and the directions in which u and v grow, as on Mitsuba's cube. Some are left-handed:
  * mesh_finish winds the triangles by their normals. */

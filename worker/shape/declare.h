@@ -10,10 +10,11 @@
 #define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
 #define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
 /* What every shape knows, and the end of its table. */
-#define SHAPE_PARAMS_END                                                                                      \
-	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"flip_normals", UNDERSTOOD(VALUE_BOOL)}, DISPLACE_PARAMS, \
-	{                                                                                                     \
-		NULL, 0, 0, 0, 0, NULL                                                                        \
+#define SHAPE_PARAMS_END                                                                     \
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"flip_normals", UNDERSTOOD(VALUE_BOOL)}, \
+		{"silhouette_sampling_weight", IGNORED}, DISPLACE_PARAMS,                    \
+	{                                                                                    \
+		NULL, 0, 0, 0, 0, NULL                                                       \
 	}
 
 #endif

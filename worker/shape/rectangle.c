@@ -3,7 +3,7 @@
 #include "worker/shape/declare.h"
 #include "worker/shape/quad.h"
 
-static const struct param params[] = {SHAPE_PARAMS_END};
+static const struct param params[] = {{"face_normals", IGNORED}, SHAPE_PARAMS_END};
 
 static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		 struct shape_geometry *out, struct error *e)

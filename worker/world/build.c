@@ -411,9 +411,11 @@ static int find_effects(struct builder *b, uint32_t max_depth)
 {
 	struct world *w = b->w;
 	enum visibility_bounds *reached = arena_alloc(&b->scratch, w->shape_count, sizeof *reached);
-	if (!reached)
+	struct weighed *room = arena_alloc(&b->scratch, w->shape_count, sizeof *room);
+	if (!reached || !room)
 		return out_of_memory(b->e);
-	const struct effects_source src = {b->scene, b->shape_nodes, b->bsdf_nodes, b->emitter_nodes, max_depth};
+	const struct effects_source src = {b->scene,  b->shape_nodes, b->bsdf_nodes, b->emitter_nodes,
+					   max_depth, b->boxes,	      room};
 	effects_analyse(w, &src, &b->forced, reached);
 	return effects_apply(w, &b->forced, reached, b->e);
 }

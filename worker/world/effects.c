@@ -372,7 +372,7 @@ void effects_analyse(struct world *w, const struct effects_source *src, const st
 {
 	struct effects *fx = &w->effects;
 	*fx = (struct effects){.line_count = 0};
-	visibility_bounds_shapes(w, src->shape, src->max_depth ? src->max_depth : w->settings.max_depth, shape);
+	visibility_bounds_shapes(w, src, src->max_depth ? src->max_depth : w->settings.max_depth, shape);
 	struct census c = take(w, src, shape);
 	struct report r = {fx, forced};
 	spectral(&r, &c);

@@ -75,6 +75,8 @@ struct effects {
 };
 
 struct world;
+struct box;
+struct weighed;
 
 /* The nodes that the world's parts were made of. */
 struct effects_source {
@@ -82,6 +84,8 @@ struct effects_source {
 	const struct scene_node *const *shape, *const *bsdf; /* one a shape; one a BSDF, NULL: the default one */
 	const struct scene_node *const *emitter;	     /* one an emitter */
 	uint32_t max_depth;				     /* asked for; 0: the scene's */
+	const struct box *box;				     /* one a shape, in any units */
+	struct weighed *room;				     /* for one a shape */
 };
 
 /* Whether a path between camera and light can meet a shape; why not. */

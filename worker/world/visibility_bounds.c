@@ -3,7 +3,9 @@
 
 #include "worker/geom/triangle.h"
 #include "worker/world/displacement.h"
+#include "worker/world/origin.h"
 
+#include <stdlib.h>
 #include <string.h>
 
 /* Shapes count as apart when this far from each other, in radii of the scene: floats are 2^-24. */
@@ -91,14 +93,51 @@ static bool contains(const struct geom_shape *outer, const struct geom_shape *in
 	return true;
 }
 
-static void find_enclosed(const struct world *w, const struct scene_node *const *nodes, enum visibility_bounds *shape)
+static bool box_holds(const struct box *outer, const struct box *inner)
 {
-	for (uint32_t o = 0; o < w->shape_count; o++) {
-		if (!is_container(w, nodes[o], o) || !camera_is_outside(w, &w->shapes[o]))
+	return inner->low.x >= outer->low.x && inner->high.x <= outer->high.x && inner->low.y >= outer->low.y &&
+	       inner->high.y <= outer->high.y && inner->low.z >= outer->low.z && inner->high.z <= outer->high.z;
+}
+
+static int compare_places(const void *a, const void *b)
+{
+	const struct weighed *x = a, *y = b;
+	return (x->at > y->at) - (x->at < y->at);
+}
+
+/* The first of n, sorted, that is not below x. */
+static uint32_t first_from(const struct weighed *sorted, uint32_t n, double x)
+{
+	uint32_t low = 0, high = n;
+	while (low < high) {
+		uint32_t middle = low + (high - low) / 2;
+		if (sorted[middle].at < x)
+			low = middle + 1;
+		else
+			high = middle;
+	}
+	return low;
+}
+
+/* Only what begins between a container's ends along x, and whose box lies in its box, is looked at closely. */
+static void find_enclosed(const struct world *w, const struct effects_source *src, enum visibility_bounds *shape)
+{
+	struct weighed *by_x = src->room;
+	uint32_t n = w->shape_count;
+	for (uint32_t i = 0; i < n; i++)
+		by_x[i] = (struct weighed){src->box[i].low.x, i};
+	if (n > 0)
+		qsort(by_x, n, sizeof *by_x, compare_places);
+	for (uint32_t o = 0; o < n; o++) {
+		const struct box *outer = &src->box[o];
+		if (!is_container(w, src->shape[o], o) || !camera_is_outside(w, &w->shapes[o]))
 			continue;
-		for (uint32_t i = 0; i < w->shape_count; i++)
-			if (i != o && shape[i] == VISIBILITY_YES && contains(&w->shapes[o], &w->shapes[i]))
+		for (uint32_t k = first_from(by_x, n, outer->low.x); k < n && by_x[k].at <= outer->high.x; k++) {
+			uint32_t i = (uint32_t)by_x[k].weight;
+			if (i != o && shape[i] == VISIBILITY_YES && box_holds(outer, &src->box[i]) &&
+			    contains(&w->shapes[o], &w->shapes[i]))
 				shape[i] = VISIBILITY_ENCLOSED;
+		}
 	}
 }
 
@@ -108,12 +147,12 @@ bool visibility_bounds_emitter(const struct world *w, const enum visibility_boun
 	return w->emitters[emitter].power > 0 && (on == UINT32_MAX || shape[on] != VISIBILITY_ENCLOSED);
 }
 
-void visibility_bounds_shapes(const struct world *w, const struct scene_node *const *nodes, uint32_t max_depth,
+void visibility_bounds_shapes(const struct world *w, const struct effects_source *src, uint32_t max_depth,
 			      enum visibility_bounds *shape)
 {
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		shape[i] = VISIBILITY_YES;
-	find_enclosed(w, nodes, shape);
+	find_enclosed(w, src, shape);
 	bool dark = true;
 	for (uint32_t i = 0; i < w->emitter_count; i++)
 		dark &= !visibility_bounds_emitter(w, shape, i);

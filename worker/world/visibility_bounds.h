@@ -11,8 +11,8 @@
 
 /* An emitter that shines and is not enclosed. */
 bool visibility_bounds_emitter(const struct world *w, const enum visibility_bounds *shape, uint32_t emitter);
-/* shape[]: one a shape of w. nodes: what they were made of. */
-void visibility_bounds_shapes(const struct world *w, const struct scene_node *const *nodes, uint32_t max_depth,
+/* shape[]: one a shape of w. max_depth: edges. */
+void visibility_bounds_shapes(const struct world *w, const struct effects_source *src, uint32_t max_depth,
 			      enum visibility_bounds *shape);
 /* Edges of the longest path that can carry light: 1 where nothing scatters, 2 where all that does lies in one plane,
  * whose points do not see each other; else UINT32_MAX. */
