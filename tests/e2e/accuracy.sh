@@ -20,8 +20,8 @@ grep -qi example "$DIR/out" || fail "--help has no examples"
 code 2 "$A" "$BOX"
 code 2 "$A" "$BOX" -o "$DIR/a.html" --spp 4
 code 2 "$A" "$BOX" -o "$DIR/a.html" --budget soon
-code 2 "$A" "$BOX" -o "$DIR/a.html" --knobs depth --quiet
-grep -q "max-depth, independent" "$DIR/run.log" || fail "it does not say which knobs there are: $(cat "$DIR/run.log")"
+code 2 "$A" "$BOX" -o "$DIR/a.html" --parameters depth --quiet
+grep -q "max-depth, independent" "$DIR/run.log" || fail "it does not say which parameters there are: $(cat "$DIR/run.log")"
 code 1 "$A" "$DIR/none.xml" -o "$DIR/a.html"
 code 1 "$A" "$BOX" -o "$DIR/none/a.html"
 [ ! -e "$DIR/a.html" ] || fail "a report of nothing"
@@ -31,18 +31,18 @@ COUNT="--chains 64 --epoch 512 --bootstrap 32768"
 
 # A room without its indirect light, against the whole: two edges are emitters and what they shine on.
 code 0 "$A" "$BOX" -o "$DIR/a.html" --csv "$DIR/a.csv" --size 32x24 $COUNT --rounds 8 --threads 1 \
-	--knobs max-depth,tolerance,roughness --quiet
+	--parameters max-depth,tolerance,roughness --quiet
 # No picture of it needs gnuplot: without it the report says so and is as valid.
 mkdir "$DIR/bin"
 code 0 env PATH="$DIR/bin" "$A" "$BOX" -o "$DIR/plain.html" --size 16x12 --chains 64 --seconds 0.02 --threads 1 \
-	--bootstrap 4096 --knobs preset --quiet
+	--bootstrap 4096 --parameters preset --quiet
 grep -q gnuplot-nox "$DIR/plain.html" || fail "nothing is said of missing plots"
 
 # Against an image of another integrator.
 "$BIN/hslt-render" "$BOX" -o "$DIR/path.exr" --integrator path --size 32x24 --spp 256 --threads 1 --quiet || fail "no reference"
 code 2 "$A" "$BOX" -o "$DIR/b.html" --size 16x12 --reference "$DIR/path.exr" --quiet
 grep -q 32x24 "$DIR/run.log" || fail "it does not say which size: $(cat "$DIR/run.log")"
-code 0 "$A" "$BOX" -o "$DIR/b.html" --csv "$DIR/b.csv" --size 32x24 $COUNT --rounds 8 --threads 1 --knobs preset \
+code 0 "$A" "$BOX" -o "$DIR/b.html" --csv "$DIR/b.csv" --size 32x24 $COUNT --rounds 8 --threads 1 --parameters preset \
 	--reference "$DIR/path.exr" --quiet
 
 cat >"$DIR/check.py" <<'END'
@@ -57,7 +57,7 @@ for name in "a", "b", "plain":
     assert not page.getElementsByTagName("script")
     plots = len(page.getElementsByTagName("svg"))
     if name == "a":
-        assert plots == 5, plots  # the front, and two of each knob
+        assert plots == 5, plots  # the front, and two of each parameter
         text = " ".join(n.data for e in page.getElementsByTagName("td") for n in e.childNodes if n.nodeType == n.TEXT_NODE)
         assert "roughness" in text and "no material has a rough lobe" in text
 rows = {r["setting"]: r for r in csv.DictReader(open(f"{folder}/a.csv"))}
@@ -84,7 +84,7 @@ for name, r in {r["setting"]: r for r in csv.DictReader(open(f"{folder}/b.csv"))
 END
 "$PYTHON" "$DIR/check.py" "$DIR" || fail "the report or its figures"
 
-"$A" "$BOX" -o "$DIR/stopped.html" --size 32x24 --budget 0.4 --chains 64 --threads 1 --bootstrap 4096 --knobs preset 2>"$DIR/stopped.log" &
+"$A" "$BOX" -o "$DIR/stopped.html" --size 32x24 --budget 0.4 --chains 64 --threads 1 --bootstrap 4096 --parameters preset 2>"$DIR/stopped.log" &
 job=$!
 PIDS="$PIDS $job"
 until_true 60 grep -qs 'rendering [1-9]' "$DIR/stopped.log" || fail "it does not come to render"

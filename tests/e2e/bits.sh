@@ -9,7 +9,7 @@ options_of() {
 	bdpt) echo "--integrator bdpt --spp 4" ;;
 	pssmlt) echo "--integrator pssmlt --bootstrap 20000 --mutations 60000" ;;
 	hslt) echo "--integrator hslt --mutations hslt=0.9,independent=0.1 --bootstrap 20000 --mutations 60000" ;;
-	knobs) echo "--integrator hslt --bootstrap 5000 --mutations 20000 --set roughness=0.1,wavelengths=2 --set precision=single,tolerance=0.0001" ;;
+	settings) echo "--integrator hslt --bootstrap 5000 --mutations 20000 --set roughness=0.1,wavelengths=2 --set precision=single,tolerance=0.0001" ;;
 	auto) echo "--spp 8 --seed 3" ;;
 	error) echo "--integrator path --crop 8,8,24,16 --target-error 4% --epoch 1 --spp 4096 --seed 7" ;;
 	esac
@@ -17,7 +17,7 @@ options_of() {
 
 KINDS="path bdpt pssmlt auto"
 if "$BIN/hslt-render" --help | grep -q 'integrator=NAME.* hslt'; then
-	KINDS="$KINDS hslt knobs"
+	KINDS="$KINDS hslt settings"
 fi
 KINDS="$KINDS error"
 for kind in $KINDS; do

@@ -5,12 +5,12 @@
 
 const struct accuracy_column accuracy_columns[] = {
 	{"setting", "parameter and value"},
-	{"knob", "what differs from the default"},
+	{"parameter", "what differs from the default"},
 	{"value", "of that parameter"},
 	{"role", "default, reference or sweep"},
 	{"max_depth", "longest paths, in edges"},
 	{"mixture", "strategies and their weights, as --mutations takes them"},
-	{"knobs", "settings that differ from the renderer's defaults, as --set takes them"},
+	{"settings", "settings that differ from the renderer's defaults, as --set takes them"},
 	{"mutations", "made in all"},
 	{"rounds", "in which they were made"},
 	{"cpu_seconds", "of the rounds, the bootstrap apart"},

@@ -24,7 +24,7 @@ static const struct {
 	const char *name, *accuracy;
 } presets[] = {{"fast", "tolerance=0.01,iterations=6,reverse-tolerance=0.01"}};
 
-/* Knobs that are not of the list of worker/render/accuracy_settings.h. */
+/* Parameters that are not of the list of worker/render/accuracy_settings.h. */
 #define DEPTH "max-depth"
 #define SHARE "independent"
 #define MIXTURE "mixture"
@@ -318,7 +318,7 @@ static void sweep_mixture(struct planner *p)
 
 static void sweep_presets(struct planner *p)
 {
-	struct accuracy_sweep *s = new_sweep(p, PRESET, "Several knobs at once");
+	struct accuracy_sweep *s = new_sweep(p, PRESET, "Several settings at once");
 	for (size_t i = 0; s && i < sizeof presets / sizeof *presets; i++) {
 		char text[2 * PLAN_ACCURACY_MAX], accuracy[PLAN_ACCURACY_MAX];
 		snprintf(text, sizeof text, "%s%s%s", p->base->accuracy, *p->base->accuracy ? "," : "",
@@ -364,7 +364,7 @@ static int check_only(struct planner *p)
 		for (size_t i = 0; i < sizeof own / sizeof *own; i++)
 			found |= strcmp(name, own[i]) == 0;
 		if (!found && !setting_find(name))
-			return error_set(p->e, EINVAL, "there is no knob '%s'; there are %s", name, known);
+			return error_set(p->e, EINVAL, "there is no parameter '%s'; there are %s", name, known);
 		at += n + (at[n] == ',');
 	}
 	return 0;

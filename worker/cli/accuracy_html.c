@@ -64,7 +64,7 @@ static void put_answer(struct text_file *p, const struct accuracy_context *x)
 			p,
 			"<p><b>Too little was rendered for this scene and size</b>: errors above 50 %%, or fewer than four rounds of a setting. "
 			"Groups of chains that missed the rare light then look exact, and what follows may be chance. Give it more minutes "
-			"(--budget), a smaller film (--size) or fewer knobs (--knobs).</p>");
+			"(--budget), a smaller film (--size) or fewer parameters (--parameters).</p>");
 	text_file_put(p, "<p>");
 	if (d->beaten_by == ACCURACY_DEFAULT) {
 		text_file_put(
@@ -343,7 +343,7 @@ static int put_all(struct text_file *p, const struct accuracy_context *x, struct
 	text_file_put(p, "<h2>All settings</h2>\n");
 	accuracy_plot_front(p, x);
 	put_summary(p, x);
-	text_file_put(p, "<h2>Knob by parameter</h2>\n");
+	text_file_put(p, "<h2>Parameter by parameter</h2>\n");
 	for (size_t i = 0; i < x->design->sweep_count; i++)
 		put_sweep(p, x, &x->design->sweeps[i]);
 	put_mutations(p, x);

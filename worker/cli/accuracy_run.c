@@ -49,7 +49,7 @@ static int check_memory(const struct accuracy_run *r, const struct plan *p, stru
 	return error_set(
 		e, ENOMEM,
 		"%zu settings of %ux%u pixels take %.1f GB of memory, of which %.1f are there: choose a smaller --size, "
-		"or fewer --knobs",
+		"or fewer --parameters",
 		r->design->count, p->crop_width, p->crop_height, wanted / 1e9, there / 1e9);
 }
 

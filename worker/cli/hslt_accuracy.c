@@ -21,7 +21,7 @@ static const char doc[] =
 	"Examples:\n"
 	"  hslt-accuracy room.xml -o room.html --size 160x90\n"
 	"  hslt-accuracy room.xml -o room.html --csv room.csv --size 160x90 --budget 60 --threads 8\n"
-	"  hslt-accuracy room.xml -o depth.html --knobs max-depth,tolerance --seconds 30\n"
+	"  hslt-accuracy room.xml -o depth.html --parameters max-depth,tolerance --seconds 30\n"
 	"\n"
 	"The report is one HTML file: error at equal time and at equal mutations, time a mutation, failed walks and bias of every "
 	"setting, and which of them lie on the Pareto front. Small films say as much as large ones and take less memory.\n"
@@ -49,9 +49,10 @@ static const struct argp_option options[] = {
 	 "Rounds of each setting, in place of a budget: with --epoch, --chains and --bootstrap all but the times repeats",
 	 0},
 	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors)", 0},
-	{"knobs", OPTION_SETTINGS, "LIST", 0,
+	{"parameters", OPTION_SETTINGS, "LIST", 0,
 	 "Only these: settings of --set (its help names them), max-depth, independent, mixture, preset; with commas between",
 	 0},
+	{"knobs", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 0},
 	{"reference", OPTION_REFERENCE, "FILE", 0,
 	 "An image (OpenEXR) to measure the bias against, in place of a careful render", 0},
 	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
@@ -198,7 +199,7 @@ static int design(struct session *s, struct error *e)
 	s->usage = rc == -EINVAL;
 	if (rc || s->a->quiet)
 		return rc;
-	fprintf(stderr, "%zu settings: the default, a reference and %zu knobs\n", s->design.count,
+	fprintf(stderr, "%zu settings: the default, a reference and %zu parameters\n", s->design.count,
 		s->design.sweep_count);
 	for (size_t i = 0; i < s->design.left_out_count; i++)
 		fprintf(stderr, "left out: %s (%s)\n", s->design.left_out[i].parameter, s->design.left_out[i].why);
@@ -250,7 +251,7 @@ static void say(const struct session *s)
 	char name[96];
 	if (s->judgement.thin)
 		fprintf(stderr,
-			"too little was rendered: the figures may be chance (more --budget, smaller --size or fewer --knobs)\n");
+			"too little was rendered: the figures may be chance (more --budget, smaller --size or fewer --parameters)\n");
 	fprintf(stderr, "default: relative error %.2f %% in %.3g s of CPU, bias at most %.2g %%",
 		100 * d->equal_time.value, s->judgement.at_cpu_seconds, 100 * d->bias_bound);
 	if (d->beaten_by == ACCURACY_DEFAULT) {

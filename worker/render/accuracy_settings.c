@@ -9,37 +9,37 @@
 #include <string.h>
 
 static const struct render_setting list[] = {
-#define KNOB(field, name_, kind_, place_, standard_, least_, greatest_, choices_, summary_, ...) \
-	{.name = name_,                                                                          \
-	 .summary = summary_,                                                                    \
-	 .kind = kind_,                                                                          \
-	 .place = place_,                                                                        \
-	 .standard = standard_,                                                                  \
-	 .least = least_,                                                                        \
-	 .greatest = greatest_,                                                                  \
-	 .choices = choices_,                                                                    \
+#define SETTING(field, name_, kind_, place_, standard_, least_, greatest_, choices_, summary_, ...) \
+	{.name = name_,                                                                             \
+	 .summary = summary_,                                                                       \
+	 .kind = kind_,                                                                             \
+	 .place = place_,                                                                           \
+	 .standard = standard_,                                                                     \
+	 .least = least_,                                                                           \
+	 .greatest = greatest_,                                                                     \
+	 .choices = choices_,                                                                       \
 	 .sweep = {__VA_ARGS__}},
 #include "worker/render/setting_list.h"
-#undef KNOB
+#undef SETTING
 };
 
-enum { KNOBS = sizeof list / sizeof *list, VALUE_BYTES = 24 };
+enum { SETTING_COUNT = sizeof list / sizeof *list, VALUE_BYTES = 24 };
 
-static const size_t offset[KNOBS] = {
-#define KNOB(field, ...) offsetof(struct accuracy_settings, field),
+static const size_t offset[SETTING_COUNT] = {
+#define SETTING(field, ...) offsetof(struct accuracy_settings, field),
 #include "worker/render/setting_list.h"
-#undef KNOB
+#undef SETTING
 };
 
 const struct accuracy_settings accuracy_settings_default = {
-#define KNOB(field, name, kind, place, standard, ...) .field = standard,
+#define SETTING(field, name, kind, place, standard, ...) .field = standard,
 #include "worker/render/setting_list.h"
-#undef KNOB
+#undef SETTING
 };
 
 const struct render_setting *render_setting_at(size_t index)
 {
-	return index < KNOBS ? &list[index] : NULL;
+	return index < SETTING_COUNT ? &list[index] : NULL;
 }
 
 static double get(const struct accuracy_settings *k, size_t index)
@@ -99,7 +99,7 @@ static int name_error(const char *name, struct error *e)
 {
 	struct spelling s = {.wanted = name};
 	char hint[80], known[256] = "";
-	for (size_t i = 0; i < KNOBS; i++) {
+	for (size_t i = 0; i < SETTING_COUNT; i++) {
 		spelling_offer(&s, list[i].name);
 		spelling_list(known, sizeof known, list[i].name);
 	}
@@ -109,7 +109,7 @@ static int name_error(const char *name, struct error *e)
 
 static int find(const char *name, size_t *index, struct error *e)
 {
-	for (*index = 0; *index < KNOBS; ++*index)
+	for (*index = 0; *index < SETTING_COUNT; ++*index)
 		if (strcmp(list[*index].name, name) == 0)
 			return 0;
 	return name_error(name, e);
@@ -182,7 +182,7 @@ void accuracy_settings_print(const struct accuracy_settings *k, char text[PLAN_A
 {
 	struct text t = {text, PLAN_ACCURACY_MAX};
 	memset(text, 0, PLAN_ACCURACY_MAX);
-	for (size_t i = 0; i < KNOBS; i++) {
+	for (size_t i = 0; i < SETTING_COUNT; i++) {
 		char value[VALUE_BYTES];
 		if (get(k, i) == list[i].standard)
 			continue;

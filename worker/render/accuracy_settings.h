@@ -38,9 +38,9 @@ const struct render_setting *render_setting_at(size_t index);
 enum { SETTING_DOUBLE, SETTING_SINGLE }; /* precision */
 
 struct accuracy_settings {
-#define KNOB(field, ...) double field;
+#define SETTING(field, ...) double field;
 #include "worker/render/setting_list.h"
-#undef KNOB
+#undef SETTING
 };
 extern const struct accuracy_settings accuracy_settings_default;
 

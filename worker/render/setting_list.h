@@ -2,29 +2,30 @@
 /* One line a setting: field of struct accuracy_settings, name, kind, where it acts; the default, the least and the
  * greatest value; choices, the first of them worth 0 unless they are numbers; what it does, in one sentence; values
  * worth a sweep. */
-KNOB(tolerance, "tolerance", SETTING_REAL, SETTING_CHAINS, 1e-3, 1e-9, 1, NULL,
-     "How near its target a walk brings each half vector, of the smaller of lobe and step", "0.1", "0.01", "0.001",
-     "0.0001", "1e-05", "1e-06", "1e-08")
-KNOB(iterations, "iterations", SETTING_WHOLE, SETTING_CHAINS, 15, 1, 1000, NULL,
-     "Steps of Newton after which a walk is given up", "2", "3", "4", "6", "10", "15", "30")
-KNOB(least_step, "least-step", SETTING_REAL, SETTING_CHAINS, 0.3, 1e-9, 1, NULL,
-     "Share of a step of Newton below which a walk that goes wrong is given up", "1", "0.3", "0.1", "0.03", "0.001",
-     "1e-05")
-KNOB(reverse_tolerance, "reverse-tolerance", SETTING_REAL, SETTING_CHAINS, 1e-3, 1e-9, 0.5, NULL,
-     "How near to where it began the way back of a walk must end, of the largest step that a vertex made", "0.1",
-     "0.01", "0.001", "0.0001", "1e-06")
-KNOB(precision, "precision", SETTING_CHOICE, SETTING_CHAINS, SETTING_DOUBLE, SETTING_DOUBLE, SETTING_SINGLE,
-     "double single", "Of the matrices that walks and densities of half vectors solve; positions are double", "double",
-     "single")
-KNOB(step_scale, "step-scale", SETTING_REAL, SETTING_CHAINS, 1, 1e-3, 1000, NULL,
-     "Factor of the largest step of a half vector, which is a lobe's mean slope", "0.1", "0.25", "0.5", "1", "2", "4")
-KNOB(wavelengths, "wavelengths", SETTING_CHOICE, SETTING_PATHS, 4, 1, 4, "1 2 4",
-     "Wavelengths that travel together along a path where nothing disperses", "1", "2", "4")
-KNOB(roughness, "roughness", SETTING_REAL, SETTING_WORLD, 0, 0, 1, NULL,
-     "Rough metal and glass of less roughness is taken for smooth", "0", "0.001", "0.003", "0.01", "0.03", "0.1")
-KNOB(tessellation, "tessellation", SETTING_REAL, SETTING_WORLD, 1, 1e-3, 64, NULL,
-     "Factor of the parts into which displacement cuts an edge", "0.125", "0.25", "0.5", "1", "2")
-KNOB(lenient, "lenient", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "no yes",
-     "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted", NULL)
-KNOB(sensor, "sensor", SETTING_WHOLE, SETTING_WORLD, 1, 1, 1000000, NULL,
-     "Which of the scene's sensors is rendered, from 1 on", NULL)
+SETTING(tolerance, "tolerance", SETTING_REAL, SETTING_CHAINS, 1e-3, 1e-9, 1, NULL,
+	"How near its target a walk brings each half vector, of the smaller of lobe and step", "0.1", "0.01", "0.001",
+	"0.0001", "1e-05", "1e-06", "1e-08")
+SETTING(iterations, "iterations", SETTING_WHOLE, SETTING_CHAINS, 15, 1, 1000, NULL,
+	"Steps of Newton after which a walk is given up", "2", "3", "4", "6", "10", "15", "30")
+SETTING(least_step, "least-step", SETTING_REAL, SETTING_CHAINS, 0.3, 1e-9, 1, NULL,
+	"Share of a step of Newton below which a walk that goes wrong is given up", "1", "0.3", "0.1", "0.03", "0.001",
+	"1e-05")
+SETTING(reverse_tolerance, "reverse-tolerance", SETTING_REAL, SETTING_CHAINS, 1e-3, 1e-9, 0.5, NULL,
+	"How near to where it began the way back of a walk must end, of the largest step that a vertex made", "0.1",
+	"0.01", "0.001", "0.0001", "1e-06")
+SETTING(precision, "precision", SETTING_CHOICE, SETTING_CHAINS, SETTING_DOUBLE, SETTING_DOUBLE, SETTING_SINGLE,
+	"double single", "Of the matrices that walks and densities of half vectors solve; positions are double",
+	"double", "single")
+SETTING(step_scale, "step-scale", SETTING_REAL, SETTING_CHAINS, 1, 1e-3, 1000, NULL,
+	"Factor of the largest step of a half vector, which is a lobe's mean slope", "0.1", "0.25", "0.5", "1", "2",
+	"4")
+SETTING(wavelengths, "wavelengths", SETTING_CHOICE, SETTING_PATHS, 4, 1, 4, "1 2 4",
+	"Wavelengths that travel together along a path where nothing disperses", "1", "2", "4")
+SETTING(roughness, "roughness", SETTING_REAL, SETTING_WORLD, 0, 0, 1, NULL,
+	"Rough metal and glass of less roughness is taken for smooth", "0", "0.001", "0.003", "0.01", "0.03", "0.1")
+SETTING(tessellation, "tessellation", SETTING_REAL, SETTING_WORLD, 1, 1e-3, 64, NULL,
+	"Factor of the parts into which displacement cuts an edge", "0.125", "0.25", "0.5", "1", "2")
+SETTING(lenient, "lenient", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "no yes",
+	"What the scene asks for and is not supported is left out or replaced by what is nearest, and noted", NULL)
+SETTING(sensor, "sensor", SETTING_WHOLE, SETTING_WORLD, 1, 1, 1000000, NULL,
+	"Which of the scene's sensors is rendered, from 1 on", NULL)
