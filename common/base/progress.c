@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/progress.h"
 
+#include "common/base/terminal.h"
 #include "common/base/text.h"
 
 #include <math.h>
@@ -16,7 +17,7 @@ static const double line_seconds = 10, line_fraction = 0.1;
 void progress_start(struct progress *p)
 {
 	memset(p, 0, sizeof *p);
-	p->terminal = isatty(STDERR_FILENO);
+	p->terminal = terminal_moves_cursor(STDERR_FILENO);
 	p->shown = -1;
 }
 

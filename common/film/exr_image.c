@@ -2,6 +2,7 @@
 #include "common/film/exr.h"
 
 #include "common/base/mem.h"
+#include "common/base/version.h"
 #include "common/film/exr_private.h"
 
 #include <stdio.h>
@@ -56,6 +57,24 @@ static exr_result_t write_attributes(exr_context_t x, const struct exr_image *im
 	return rc;
 }
 
+static const float *plane_of(const struct exr_image *img, const char *name)
+{
+	for (uint32_t c = 0; c < img->channel_count; c++)
+		if (strcmp(img->names[c], name) == 0)
+			return img->planes[c];
+	return NULL;
+}
+
+/* What any viewer may know: who wrote it, and that the colours are those of ITU-R BT.709, linear, white D65 (color.h).
+ */
+static exr_result_t write_origin(exr_context_t x, const struct exr_image *img)
+{
+	static const exr_attr_chromaticities_t bt709 = {0.64f, 0.33f, 0.30f, 0.60f, 0.15f, 0.06f, 0.3127f, 0.3290f};
+	exr_result_t rc = exr_attr_set_string(x, 0, "software", "HSLT Farm " HSLT_VERSION);
+	return rc == EXR_ERR_SUCCESS && plane_of(img, "R") ? exr_attr_set_chromaticities(x, 0, "chromaticities", &bt709)
+							   : rc;
+}
+
 static exr_result_t write_header(exr_context_t x, const struct exr_image *img)
 {
 	exr_attr_box2i_t data = box(img->x, img->y, img->width, img->height);
@@ -69,16 +88,10 @@ static exr_result_t write_header(exr_context_t x, const struct exr_image *img)
 	for (uint32_t c = 0; c < img->channel_count && rc == EXR_ERR_SUCCESS; c++)
 		rc = exr_add_channel(x, part, img->names[c], EXR_PIXEL_FLOAT, EXR_PERCEPTUALLY_LOGARITHMIC, 1, 1);
 	if (rc == EXR_ERR_SUCCESS)
+		rc = write_origin(x, img);
+	if (rc == EXR_ERR_SUCCESS)
 		rc = write_attributes(x, img);
 	return rc == EXR_ERR_SUCCESS ? exr_write_header(x) : rc;
-}
-
-static const float *plane_of(const struct exr_image *img, const char *name)
-{
-	for (uint32_t c = 0; c < img->channel_count; c++)
-		if (strcmp(img->names[c], name) == 0)
-			return img->planes[c];
-	return NULL;
 }
 
 struct compressor {

@@ -114,6 +114,8 @@ static int lock_folder(struct authority *a, const char *folder, struct error *e)
 {
 	*a = (struct authority){.folder = folder};
 	a->lock = open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+	if (a->lock < 0 && errno == ENOENT)
+		return error_set(e, ENOENT, "%s: there is no authority here (hslt-ca init makes one)", folder);
 	if (a->lock < 0 || flock(a->lock, LOCK_EX))
 		return error_set(e, errno, "%s: %s", folder, strerror(errno));
 	return 0;

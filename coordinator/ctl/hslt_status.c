@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "common/base/progress.h"
+#include "common/base/terminal.h"
 #include "common/base/version.h"
 #include "common/base/error.h"
 #include "common/base/output.h"
@@ -309,7 +310,7 @@ static void print_leases(const json_t *snapshot, const char *id)
 
 static void print_snapshot(const json_t *snapshot, const char *only)
 {
-	bool colors = isatty(STDOUT_FILENO);
+	bool colors = terminal_shows_colors(STDOUT_FILENO);
 	size_t i;
 	const json_t *job;
 	printf("%-6s %-10s %7s %9s %9s %8s %7s %6s  %s\n", "JOB", "STATE", "DONE", "RATE/s", "ETA", "ERROR", "ROUNDS",
@@ -363,7 +364,7 @@ static bool show(const struct arguments *a, const json_t *snapshot, bool first, 
 		json_dumpf(job ? job : snapshot, stdout, JSON_COMPACT);
 		putchar('\n');
 	} else {
-		if (isatty(STDOUT_FILENO) && a->watch)
+		if (terminal_moves_cursor(STDOUT_FILENO) && a->watch)
 			fputs("\033[H\033[J", stdout);
 		else if (!first)
 			putchar('\n');

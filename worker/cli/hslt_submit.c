@@ -4,6 +4,7 @@
 #include "common/base/text.h"
 #include "common/base/version.h"
 #include "common/film/image_file.h"
+#include "worker/cli/interrupt.h"
 #include "worker/cli/choice.h"
 #include "worker/cli/estimate.h"
 #include "worker/cli/farm_pilot.h"
@@ -193,6 +194,20 @@ static void print_id(const struct arguments *a, uint64_t job, const char *plan, 
 		fprintf(stderr, "hslt-submit: the job's id is %s\n", id);
 }
 
+/* Whoever stops waiting for a job has not stopped the job. */
+static void say_at_the_end(const struct arguments *a, uint64_t job)
+{
+	static char text[512];
+	unsigned long long id = job;
+	snprintf(text, sizeof text,
+		 "\nhslt-submit: the job goes on without this program.\n"
+		 "  hslt-job fetch j%llu -o %.200s    fetches its image when it is done, --preview the one so far\n"
+		 "  hslt-job list                 shows how far it is\n"
+		 "  hslt-job cancel j%llu         ends it\n",
+		 id, to_stdout(a) ? "-" : a->output, id);
+	interrupt_say(text);
+}
+
 static int run(struct arguments *a, struct client **cl, const struct scene_bundle *b, int *code, struct error *e)
 {
 	struct submitted job;
@@ -203,6 +218,8 @@ static int run(struct arguments *a, struct client **cl, const struct scene_bundl
 	if (rc)
 		return rc;
 	fprintf(stderr, "%s\n", plan);
+	if (a->wait)
+		say_at_the_end(a, job.job);
 	if (!a->wait || !a->json)
 		print_id(a, job.job, plan, "queued");
 	if (!a->wait)

@@ -4,6 +4,8 @@
 #include <signal.h>
 #include <stdbool.h>
 #include <stddef.h>
+#include <string.h>
+#include <unistd.h>
 
 atomic_bool interrupted;
 
@@ -16,6 +18,25 @@ static void interrupt(int signal_number)
 void interrupt_watch(void)
 {
 	struct sigaction act = {.sa_handler = interrupt, .sa_flags = (int)SA_RESETHAND};
+	sigaction(SIGINT, &act, NULL);
+	sigaction(SIGTERM, &act, NULL);
+}
+
+static const char *_Atomic last_words;
+
+static void say_and_end(int signal_number)
+{
+	const char *text = atomic_load(&last_words);
+	/* The handler is gone already (SA_RESETHAND); the signal comes when this one returns. */
+	if (write(STDERR_FILENO, text, strlen(text)) < 0)
+		_exit(128 + signal_number);
+	raise(signal_number);
+}
+
+void interrupt_say(const char *text)
+{
+	struct sigaction act = {.sa_handler = say_and_end, .sa_flags = (int)SA_RESETHAND};
+	atomic_store(&last_words, text);
 	sigaction(SIGINT, &act, NULL);
 	sigaction(SIGTERM, &act, NULL);
 }

@@ -11,4 +11,8 @@
 extern atomic_bool interrupted;
 void interrupt_watch(void);
 
+/* From now on such a signal writes the text (kept by the caller) to stderr and ends the process as it would have
+ * without it. */
+void interrupt_say(const char *text);
+
 #endif

@@ -170,6 +170,7 @@ static void images_and_their_headers_come_back(void **unused)
 	assert_true(back.attributes[0].number == 0.1);
 	assert_int_equal(back.attributes[1].integer, 16);
 	assert_string_equal(back.attributes[2].string, "path");
+	assert_true(memmem(bytes, size, "software\0string", 16) && memmem(bytes, size, "HSLT Farm ", 10));
 	exr_image_fini(&back);
 	free_planes(&img);
 	mem_free(bytes);
