@@ -62,6 +62,7 @@ static void by_error(void **state)
 			"[14] error j1 2 0.01 -> -",
 			"[14] error j1 1 nan -> -",
 			"[15] w1 batch j1 g0 p0 e1 -> merge, merged, j1 round 2, j1 evaluate 2, w1 gets j1 g0 p0 e2",
+			"[15] error j1 1 0.01 -> -", /* the same about an earlier one, however small */
 			"[15] error j1 2 0.5 -> -",
 			"[16] w1 batch j1 g0 p0 e2 -> merge, merged, j1 round 3, j1 evaluate 3, w1 gets j1 g0 p0 e3",
 			"[16] error j1 3 0.3 -> -",

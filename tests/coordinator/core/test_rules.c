@@ -240,6 +240,41 @@ static void straggler(void **state)
 	farm_free(f);
 }
 
+/* Who was overtaken by a copy may hold half as many leases, not who had the copy. */
+static void overtaken(void **state)
+{
+	(void)state;
+	static const char *const before[] = {
+		"[0] restore j1 render 0,0,0,0,0,0,0,0 groups=8 rounds=9 -> j1 is running",
+		"[0] w1 joins A threads=8 -> -",
+		"[0] w1 wants 9 -> w1 gets j1 g0 p0 e0, w1 gets j1 g1 p0 e0, w1 gets j1 g2 p0 e0, w1 gets j1 g3 p0 e0, "
+		"w1 gets j1 g4 p0 e0, w1 gets j1 g5 p0 e0, w1 gets j1 g6 p0 e0, w1 gets j1 g7 p0 e0",
+		"[1] w2 joins A threads=1 -> -",
+		"[1] w2 wants 1 -> -",
+		"[25] w1 heard -> -",
+		"[29] w2 heard -> -",
+		"[30] tick -> w2 gets j1 g0 p0 e0",
+		"[30] w2 wants 0 -> -",
+		NULL};
+	struct farm *f = transcript_farm();
+	transcript_play(f, before);
+	/* with seven leases it has more than half of eight */
+	transcript_play(f, (const char *const[]){
+				   "[31] w2 batch j1 g0 p0 e0 -> merge, merged, w1 loses j1 g0 p0 e0",
+				   NULL,
+			   });
+	farm_free(f);
+	f = transcript_farm();
+	transcript_play(f, before);
+	/* the first comes first all the same: nobody was late */
+	transcript_play(f,
+			(const char *const[]){
+				"[31] w1 batch j1 g0 p0 e0 -> merge, merged, w2 loses j1 g0 p0 e0, w1 gets j1 g0 p0 e1",
+				NULL,
+			});
+	farm_free(f);
+}
+
 static void failed_lease(void **state)
 {
 	(void)state;
@@ -552,6 +587,7 @@ int main(void)
 		cmocka_unit_test(timeout),
 		cmocka_unit_test(timeout_after_median),
 		cmocka_unit_test(straggler),
+		cmocka_unit_test(overtaken),
 		cmocka_unit_test(failed_lease),
 		cmocka_unit_test(three_full_disks),
 		cmocka_unit_test(full_disks_and_a_bad_scene),

@@ -50,6 +50,44 @@ static void priority(void **state)
 	farm_free(f);
 }
 
+/* Owner and leases decide among jobs of one priority only. */
+static void priority_before_shares(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w2 joins A threads=1 -> -",
+		"[0] submit priority=5 groups=3 owner=ann -> j1 submitted, j1 is queued",
+		"[0] submit priority=0 groups=3 owner=bob -> j2 submitted, j2 is queued",
+		"[0] w1 wants 1 -> j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		"[0] w2 wants 1 -> w2 gets j1 g1 p0 boot", /* ann holds one lease, bob none */
+		NULL,
+	});
+}
+
+/* Of two fingerprints that may begin a job the worker that has waited longest does, whichever of them is known longer.
+ */
+static void first_to_wait(void **state)
+{
+	(void)state;
+	transcript((const char *const[]){
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w2 joins B threads=1 -> -",
+		"[1] w1 wants 1 -> -",
+		"[2] w2 wants 1 -> -",
+		"[3] submit groups=1 -> j1 submitted, j1 is queued, j1 is bootstrap, w1 gets j1 g0 p0 boot",
+		NULL,
+	});
+	transcript((const char *const[]){
+		"[0] w1 joins A threads=1 -> -",
+		"[0] w2 joins B threads=1 -> -",
+		"[1] w2 wants 1 -> -",
+		"[2] w1 wants 1 -> -",
+		"[3] submit groups=1 -> j1 submitted, j1 is queued, j1 is bootstrap, w2 gets j1 g0 p0 boot",
+		NULL,
+	});
+}
+
 static void fair_sharing(void **state)
 {
 	(void)state;
@@ -307,6 +345,8 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(priority),
+		cmocka_unit_test(priority_before_shares),
+		cmocka_unit_test(first_to_wait),
 		cmocka_unit_test(delivered_is_not_held),
 		cmocka_unit_test(fair_sharing),
 		cmocka_unit_test(owners_share_first),
