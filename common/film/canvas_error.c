@@ -7,6 +7,7 @@
  */
 #include "common/film/canvas_private.h"
 #include "common/film/color.h"
+#include "common/film/tail.h"
 
 #include "common/base/mem.h"
 
@@ -23,6 +24,11 @@ static const double believed = 0.08;
  * nearly 1. */
 static const double one_group = 0.6;
 
+/* The tail index of errors is taken from one in 128 of them and from one in 512, as that of samples where an integrator
+ * is chosen (worker/render/choose.h), and from 32 and 8 at least. Of fewer than ERRORS_LEAST it would be that of the
+ * bulk. */
+enum { TAIL = 128, TAIL_LEAST = 32, TAIL_MOST = 1 << 16, EXTREME = 4, ERRORS_LEAST = 2048 };
+
 /* A tile at work. Rows of `apart` hold three channels of `groups` values. */
 struct tile_error {
 	const struct canvas *c;
@@ -38,6 +44,7 @@ struct tile_error {
 	double kurtosis[TILE_SIZE * TILE_SIZE][3];     /* of the groups' values */
 	bool settled[TILE_SIZE * TILE_SIZE][3];
 	struct error_sums sum;
+	struct tail tail; /* of the groups' errors that are too bright */
 };
 
 /* ---- standard errors */
@@ -426,6 +433,28 @@ static void fold(struct tile_error *t, uint32_t first, const float *apart, float
 		t->sum.distance[first + g] += (double)v[g] * (double)v[g];
 }
 
+static void add_to_tail(struct tile_error *t, const float *apart)
+{
+	for (size_t g = 0; g < t->groups; g++)
+		tail_add(&t->tail, (double)apart[g] + (double)apart[t->groups + g] + (double)apart[2 * t->groups + g]);
+}
+
+static size_t tail_size(size_t errors)
+{
+	size_t size = errors / TAIL;
+	return size < TAIL_LEAST ? TAIL_LEAST : size > TAIL_MOST ? TAIL_MOST : size;
+}
+
+/* INFINITY: too few to tell. */
+static double find_tail(struct tail *t, size_t errors)
+{
+	size_t size = tail_size(errors);
+	tail_settle(t);
+	if (errors < ERRORS_LEAST || t->held <= size)
+		return INFINITY;
+	return fmin(tail_index(t, size), tail_index(t, size / EXTREME));
+}
+
 /* Products of the groups' weighted errors. More than FOLDED groups are folded onto so many: errors that add up are
  * alike. A lane is a pair of groups, so that the order within a sum is the pixels'. */
 static void add_row(struct tile_error *t, size_t first)
@@ -434,6 +463,7 @@ static void add_row(struct tile_error *t, size_t first)
 	for (size_t pixel = first; pixel < first + t->width; pixel++) {
 		const float *apart = apart_at(t, pixel);
 		float folded[3][FOLDED] = {{0}};
+		add_to_tail(t, apart);
 		for (size_t k = 0; k < 3; k++) {
 			for (uint32_t g = 0; g < t->groups; g += FOLDED)
 				fold(t, g, apart + k * t->groups + g, folded[k]);
@@ -482,15 +512,24 @@ static void write_unvisited(struct canvas_image *img)
 	}
 }
 
+static void free_tile(struct tile_error *t)
+{
+	if (t) {
+		tail_fini(&t->tail);
+		mem_free(t->apart);
+	}
+	mem_free(t);
+}
+
 int canvas_error(struct making *m, struct error *e)
 {
 	assert(m->c->plan.groups > 1 && !m->open_rounds);
 	struct tile_error *t = mem_alloc(1, sizeof *t);
-	size_t values = (size_t)m->img->width * m->img->height * 3;
+	size_t values = (size_t)m->img->width * m->img->height * 3, errors = values / 3 * m->c->plan.groups;
 	if (t)
 		t->apart = mem_alloc((size_t)TILE_SIZE * TILE_SIZE * 3 * m->c->plan.groups, sizeof *t->apart);
-	if (!t || !t->apart) {
-		mem_free(t);
+	if (!t || !t->apart || tail_init(&t->tail, tail_size(errors) + 1)) {
+		free_tile(t);
 		return error_set(e, ENOMEM, "no memory for the error of an image of %ux%u", m->img->width,
 				 m->img->height);
 	}
@@ -506,9 +545,9 @@ int canvas_error(struct making *m, struct error *e)
 	if (m->img->unvisited)
 		write_unvisited(m->img);
 	t->sum.groups = t->groups;
+	t->sum.tail = find_tail(&t->tail, errors);
 	if (mean != 0) /* a black image has no relative error */
 		canvas_interval(&t->sum, m->img);
-	mem_free(t->apart);
-	mem_free(t);
+	free_tile(t);
 	return 0;
 }

@@ -13,7 +13,8 @@
  * tails: the variance of a variance is (kurtosis - 1) / 2 times the normal's. The kurtosis of a few groups is too small
  *   where tails are heavy, hence the power of 1.5, which is of calibration (tests/image/README.md).
  * The interval begins at the lower bound of the sums and ends at the upper one. It is not known where too much of the
- * estimate comes from pixels of which too little is known; limits are of calibration, too.
+ * estimate comes from pixels of which too little is known (limits are of calibration, too), and where errors are so
+ * unequal that those which count most have probably not come.
  */
 #include "common/film/canvas_private.h"
 #include "common/film/quantile.h"
@@ -70,6 +71,10 @@ static double heavier_than_normal(const struct error_sums *s)
 	return kurtosis > 3 ? pow((kurtosis - 1) / 2, tail_power) : 1;
 }
 
+/* The relMSE is the mean of squared errors: a tail index below this and it has no expectation, as far as the largest of
+ * them tell. */
+static const double finite_variance = 2;
+
 /* known: upper over lower end as they would be if only the degrees of freedom were in doubt. */
 static void find_doubt(const struct error_sums *s, double known, struct canvas_image *img)
 {
@@ -82,6 +87,8 @@ static void find_doubt(const struct error_sums *s, double known, struct canvas_i
 		img->doubtful_share = dark;
 	} else if (!(img->rel_mse_95[1] <= fmax(widest, widest_of_known * known) * img->rel_mse_95[0])) {
 		img->rel_mse_doubt = ERROR_WIDE;
+	} else if (s->tail < finite_variance) {
+		img->rel_mse_doubt = ERROR_TAIL;
 	}
 	if (img->rel_mse_doubt)
 		img->rel_mse_95[0] = img->rel_mse_95[1] = NAN;
@@ -90,6 +97,7 @@ static void find_doubt(const struct error_sums *s, double known, struct canvas_i
 void canvas_interval(struct error_sums *s, struct canvas_image *img)
 {
 	double groups = s->groups, mean = 0;
+	img->error_tail = s->tail;
 	for (uint32_t g = 0; g < s->groups && s->groups <= ERROR_FOLDED; g++)
 		s->distance[g] = s->gram[g][g];
 	for (uint32_t g = 0; g < s->groups; g++)

@@ -68,6 +68,7 @@ struct error_sums {
 	double dark, one_group; /* parts where brightness is a block's mean, not the pixel's; where one group has most
 				   of the variance */
 	double kurtosis;	/* of the groups' values, parts as weights */
+	double tail;		/* index of the groups' relative errors that are too bright; INFINITY: not known */
 	double gram[ERROR_FOLDED][ERROR_FOLDED]; /* products of groups' errors; more groups are folded onto so many */
 	double distance[PLAN_MAX_GROUPS];	 /* a group's error, squared */
 };

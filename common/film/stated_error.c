@@ -28,6 +28,13 @@ void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
 	case ERROR_WIDE:
 		text_put(&t, "it would span more than a factor of ten");
 		break;
+	case ERROR_TAIL:
+		text_put(
+			&t,
+			"too few pixels have met the light that decides: the tail index of their errors is %.2f, and below 2 their variance is "
+			"infinite",
+			img->error_tail);
+		break;
 	case ERROR_SHORT:
 		text_put(&t, "the chains are too short to be judged");
 		break;

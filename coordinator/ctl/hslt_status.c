@@ -173,7 +173,7 @@ static void print_job(const json_t *job, bool colors)
 
 static void print_doubt(const json_t *job)
 {
-	if (*text_of(job, "errorDoubt"))
+	if (*text_of(job, "errorDoubt") && !is_ended(job)) /* then it is in the note */
 		printf("       the error's interval is not known: %s\n", text_of(job, "errorDoubt"));
 }
 

@@ -186,6 +186,8 @@ static void view_order(struct server *s, const struct live_job *o, struct job_vi
 		record_take_counted(&v->record, &o->plan, &counted, o->black, o->lit.beyond_share);
 		record_add_note(&v->record, o->doubts);
 	}
+	if (o->ended)
+		record_add_doubt(&v->record);
 	if (!farm_job(s->farm, o->id, server_now(s), &status))
 		return;
 	view_add_status(v, &status);

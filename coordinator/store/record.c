@@ -50,6 +50,14 @@ void record_add_note(struct job_record *r, const char *text)
 		text_print(r->note + used, sizeof r->note - used, "%s%s", used ? "; " : "", text);
 }
 
+void record_add_doubt(struct job_record *r)
+{
+	char text[sizeof r->rel_error_doubt + 64];
+	snprintf(text, sizeof text, "the error's interval is not known: %s", r->rel_error_doubt);
+	if (*r->rel_error_doubt && !strstr(r->note, text))
+		record_add_note(r, text);
+}
+
 void record_begin_convergence(struct job_record *r)
 {
 	convergence_from_json(NULL, &r->agreement);

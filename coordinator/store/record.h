@@ -61,6 +61,7 @@ struct job_record {
 void record_take_counted(struct job_record *r, const struct plan *p, const struct canvas_counts *n, bool black,
 			 double beyond_share);
 void record_add_note(struct job_record *r, const char *text); /* "": nothing to say */
+void record_add_doubt(struct job_record *r); /* once: why the interval of the error is not known, if so */
 void record_take_convergence(struct job_record *r, const struct canvas_image *img, const struct convergence *a);
 void record_begin_convergence(struct job_record *r);			      /* nothing is known */
 void record_take_error(struct job_record *r, const struct canvas_image *img); /* of one that has an estimate */

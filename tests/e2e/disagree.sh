@@ -68,10 +68,16 @@ look
 SHORT="$SMALL $CHAINS --integrator hslt --mutations 256000"
 ends 0 "$DIR/short.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $SHORT --stats "$DIR/short.json"
 has "$DIR/short.log" 'note: chains are too short to be judged, 4000 mutations each: '
+# A warning is the last line, and all that --quiet leaves.
+tail -n 1 "$DIR/short.log" | grep -q '^hslt-render: warning: relative error about .*, its interval is not known: ' ||
+	fail "the last line does not warn: $(tail -n 1 "$DIR/short.log")"
+ends 0 "$DIR/quiet.log" "$BIN/hslt-render" "$SCENE" -o "$DIR/b.exr" $SHORT --quiet
+[ "$(cat "$DIR/quiet.log")" = "$(tail -n 1 "$DIR/short.log")" ] || fail "--quiet says: $(cat "$DIR/quiet.log")"
 # The farm says so, too, and why it states no error.
 doubt=$(sed -n 's/.*"relMSEDoubt": "\(.*\)".*/\1/p' "$DIR/short.json")
 [ "$doubt" ] || fail "the statistics do not say why no error is stated"
 ends 0 "$DIR/submit.log" "$BIN/hslt-submit" "$SCENE" -o "$DIR/farm.exr" $SHORT --wait
+has "$DIR/submit.log" "the error's interval is not known: $doubt"
 id=$(cat "$DIR/out")
 "$BIN/hslt-status" --json "$id" >"$DIR/shown"
 has "$DIR/shown" "\"errorDoubt\":\"$doubt\""

@@ -94,7 +94,7 @@ static void run_case(const struct calibration_scene *s, const struct world *w, c
 		     int length, uint32_t renders, struct figures *all)
 {
 	char test[96];
-	snprintf(test, sizeof test, "%s, length %d", s->name, length + 1);
+	snprintf(test, sizeof test, "calibration of %s, length %d", s->name, length + 1);
 	struct repeats_how how = {.integrator = integrators[k].name,
 				  .test = test,
 				  .count = renders,

@@ -308,7 +308,7 @@ static void say(const struct session *s)
 	char text[STRATEGY_TABLE];
 	fprintf(stderr, "; ended by %s\n", merge_end_name(s->run.end, s->run.lit.black));
 	stated_error(i, text, sizeof text);
-	if (*text)
+	if (*text && !i->rel_mse_doubt)
 		fprintf(stderr, "%s\n", text);
 	strategy_table(p->mutations, &i->counts, text, sizeof text);
 	if (s->a->stats)
@@ -323,7 +323,7 @@ static void say(const struct session *s)
 		fprintf(stderr, "hslt-render: note: %s\n", text);
 }
 
-/* What even --quiet says: how wrong the image is, nobody knows. */
+/* The last line, and what even --quiet says: how wrong the image is, nobody knows. */
 static void warn(const struct session *s)
 {
 	char text[STATED_ERROR_TEXT];
@@ -401,7 +401,7 @@ static int run(struct session *s, struct error *e)
 				 e);
 	if (!rc && !s->a->quiet)
 		say(s);
-	else if (!rc && s->image.rel_mse_doubt)
+	if (!rc && s->image.rel_mse_doubt)
 		warn(s);
 	if (!rc && s->run.end == MERGE_GOES_ON)
 		rc = error_set(e, EINTR, "interrupted: %s holds the %llu complete rounds", s->a->output,

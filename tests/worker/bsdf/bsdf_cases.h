@@ -75,6 +75,7 @@ static const char *const bsdf_cases[] = {
 	"mask opacity=1 | conductor material=none",
 	"blendbsdf weight=0.3 | diffuse reflectance=0.8 | roughconductor alpha=0.2 material=Au",
 	"blendbsdf weight=0.6 | plastic | conductor material=Ag",
+	"blendbsdf weight=0.4 | diffuse | roughplastic alpha=0.3", /* chooses with what is left of the same number */
 	"blendbsdf weight=0 | phong | diffuse",
 	"twosided | plastic | roughplastic alpha=0.2",
 	"twosided | diffuse reflectance=0.9",
