@@ -102,6 +102,7 @@ static void test_own_candidate(void **state)
 	(void)state;
 	check_own_candidate("gold");
 	check_own_candidate("rough glass");
+	check_own_candidate("bent normals");
 }
 
 /* Where lengths are drawn, each candidate weighs one over the chance that both sub-paths are as long as it needs. */
