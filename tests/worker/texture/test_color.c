@@ -147,6 +147,82 @@ static void test_emitters_give_their_rgb(void **state)
 	assert_true(fabs(rgb[0] - 1.205) < 1e-3 && fabs(rgb[1] - 0.948) < 1e-3 && fabs(rgb[2] - 0.909) < 1e-3);
 }
 
+struct bounces {
+	struct color color;
+	int count;
+};
+
+static spectrum at_bounces(const void *user, const struct wavelengths *w)
+{
+	const struct bounces *b = user;
+	spectrum s = spectrum_of(1);
+	for (int i = 0; i < b->count; i++)
+		s = spectrum_mul(s, color_eval(&b->color, w));
+	return s;
+}
+
+/* As paths estimate it: by wavelengths that are drawn, from their four lanes. */
+static void drawn_rgb(const struct bounces *b, double rgb[3])
+{
+	enum { DRAWN = 1 << 14 };
+	double xyz[3] = {0};
+	for (int i = 0; i < DRAWN; i++) {
+		const struct wavelengths w = wavelengths_sample((i + 0.5) / DRAWN);
+		double one[3];
+		spectrum s = at_bounces(b, &w);
+		for (int k = 0; k < SPECTRUM_LANES; k++)
+			s.v[k] *= color_d65(w.nm[k]);
+		spectrum_to_xyz(s, &w, one);
+		for (int k = 0; k < 3; k++)
+			xyz[k] += one[k] / DRAWN;
+	}
+	const double rec709[3][3] = {{3.2404542, -1.5371385, -0.4985314},
+				     {-0.9692660, 1.8760108, 0.0415560},
+				     {0.0556434, -0.2040259, 1.0572252}};
+	for (int r = 0; r < 3; r++)
+		rgb[r] = rec709[r][0] * xyz[0] + rec709[r][1] * xyz[1] + rec709[r][2] * xyz[2];
+}
+
+/*
+ * Saturated reflectances under an emitter of rgb 1: what is drawn is what the integral is, to 0.1 %, and one bounce
+ * gives the colour of the scene. Of n bounces the spectra are multiplied, not the colours: that is what light does, and
+ * a renderer that multiplies R, G and B has something else (docs/method.md).
+ */
+static void test_bounces_multiply_spectra(void **state)
+{
+	(void)state;
+	const double colours[][3] = {
+		{0.1, 0.5, 0.1}, {0.05, 0.8, 0.05}, {0.63, 0.065, 0.05}, {0.14, 0.45, 0.091}, {0.1, 0.1, 0.6}};
+	for (size_t i = 0; i < sizeof colours / sizeof *colours; i++) {
+		int main_channel = colours[i][1] > colours[i][0] ? 1 : 0;
+		main_channel = colours[i][2] > colours[i][main_channel] ? 2 : main_channel;
+		double own = colours[i][main_channel], ratio[3];
+		for (int n = 1; n <= 3; n++) {
+			struct bounces b = {.count = n};
+			double sum[3], drawn[3];
+			assert_int_equal(color_from_rgb(colours[i], COLOR_REFLECTANCE, &b.color), 0);
+			rgb_of(at_bounces, &b, true, sum);
+			drawn_rgb(&b, drawn);
+			for (int k = 0; k < 3; k++)
+				assert_true(fabs(drawn[k] - sum[k]) < 1e-3 * sum[main_channel]);
+			ratio[n - 1] = sum[main_channel] / pow(own, n);
+		}
+		print_message("(%g %g %g): after one, two, three bounces %.4f %.4f %.4f times the product of colours\n",
+			      colours[i][0], colours[i][1], colours[i][2], ratio[0], ratio[1], ratio[2]);
+		assert_true(fabs(ratio[0] - 1) < 1e-3);
+		/* Under a constant spectrum, which is reddish: again the spectra's product. */
+		struct bounces once = {.count = 1};
+		double flat[3], under[3];
+		struct color even = color_constant(1);
+		assert_int_equal(color_from_rgb(colours[i], COLOR_REFLECTANCE, &once.color), 0);
+		rgb_of(at_color, &even, false, flat);
+		rgb_of(at_bounces, &once, false, under);
+		double reddish = under[main_channel] / (flat[main_channel] * own);
+		print_message("  under a constant spectrum %.4f times\n", reddish);
+		assert_true(fabs(reddish - 1) < 0.05);
+	}
+}
+
 static void test_unbounded_keeps_its_rgb(void **state)
 {
 	(void)state;
@@ -259,6 +335,7 @@ int main(void)
 		cmocka_unit_test(test_dark_and_saturated_colours),
 		cmocka_unit_test(test_grey_is_constant),
 		cmocka_unit_test(test_emitters_give_their_rgb),
+		cmocka_unit_test(test_bounces_multiply_spectra),
 		cmocka_unit_test(test_unbounded_keeps_its_rgb),
 		cmocka_unit_test(test_bounds_hold),
 		cmocka_unit_test(test_few_wavelengths),
