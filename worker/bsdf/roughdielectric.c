@@ -5,12 +5,12 @@
  */
 #include "worker/bsdf/fresnel.h"
 #include "worker/bsdf/glass.h"
-#include "worker/bsdf/microfacet.h"
+#include "worker/bsdf/rough_map.h"
 
 struct roughdielectric {
 	struct glass glass; /* first: so it is asked for its index, and with equal indices the data is a smooth
 			       dielectric's */
-	struct microfacet facets;
+	struct rough_map roughness;
 };
 
 /* A pair of directions as the facets see it. */
@@ -25,7 +25,7 @@ struct facet {
 
 /* wo.z > 0. false: no facet connects the two. Fresnel's factors come from both cosines: next to the critical angle one
  * alone says little about the other. */
-static bool facet_of(const struct roughdielectric *r, double eta, vec3 wo, vec3 wi, struct facet *f)
+static bool facet_of(const struct microfacet *m, double eta, vec3 wo, vec3 wi, struct facet *f)
 {
 	bool reflect = wi.z > 0;
 	if (wi.z == 0 || (!reflect && eta == 1) || !microfacet_half(wo, reflect ? 1 : eta, wi, &f->h, &f->length))
@@ -44,7 +44,7 @@ static bool facet_of(const struct roughdielectric *r, double eta, vec3 wo, vec3 
 			return false;
 		f->fresnel = fresnel_between(fmin(f->cos_o, 1), fmin(-f->cos_i, 1), eta);
 	}
-	f->d = microfacet_d(&r->facets, f->h) * microfacet_g1_over_cos(&r->facets, wo);
+	f->d = microfacet_d(m, f->h) * microfacet_g1_over_cos(m, wo);
 	return f->d > 0;
 }
 
@@ -73,15 +73,15 @@ static spectrum share(const struct roughdielectric *r, const struct bsdf_point *
 }
 
 /* G1(wi) / |wi.z| on whichever side. */
-static double g1_over_cos(const struct roughdielectric *r, vec3 wi)
+static double g1_over_cos(const struct microfacet *m, vec3 wi)
 {
-	return microfacet_g1_over_cos(&r->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
+	return microfacet_g1_over_cos(m, (vec3){wi.x, wi.y, fabs(wi.z)});
 }
 
-static spectrum facet_f(const struct bsdf *b, const struct bsdf_point *p, const struct facet *f, vec3 wi)
+static spectrum facet_f(const struct roughdielectric *r, const struct microfacet *m, const struct bsdf_point *p,
+			const struct facet *f, vec3 wi)
 {
-	const struct roughdielectric *r = b->data;
-	double common = f->d * g1_over_cos(r, wi) * facet_spread(f, wi.z > 0);
+	double common = f->d * g1_over_cos(m, wi) * facet_spread(f, wi.z > 0);
 	return spectrum_scale(common, share(r, p, f, wi.z > 0, p->transport));
 }
 
@@ -91,35 +91,41 @@ static double facet_pdf(const struct facet *f, vec3 wi)
 }
 
 /* Seen with wo on the side of the normal. */
-static bool facet_between(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 *wi, struct facet *f)
+static bool facet_between(const struct bsdf *b, const struct microfacet *m, const struct bsdf_point *p, vec3 wo,
+			  vec3 *wi, struct facet *f)
 {
 	bool below = wo.z < 0;
 	double eta = bsdf_eta(b, p->w);
 	*wi = mirror(*wi, below);
-	return wo.z != 0 && facet_of(b->data, below ? 1 / eta : eta, mirror(wo, below), *wi, f);
+	return wo.z != 0 && facet_of(m, below ? 1 / eta : eta, mirror(wo, below), *wi, f);
 }
 
 static spectrum roughdielectric_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
+	const struct roughdielectric *r = b->data;
+	struct microfacet m = rough_map_at(&r->roughness, p);
 	struct facet f;
-	return facet_between(b, p, wo, &wi, &f) ? facet_f(b, p, &f, wi) : spectrum_of(0);
+	return facet_between(b, &m, p, wo, &wi, &f) ? facet_f(r, &m, p, &f, wi) : spectrum_of(0);
 }
 
 /* Neither the solid angle of h over that of wi nor its inverse: both go to extremes as eta goes to 1. */
 static spectrum roughdielectric_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
 	const struct roughdielectric *r = b->data;
+	struct microfacet m = rough_map_at(&r->roughness, p);
 	struct facet f;
-	if (!facet_between(b, p, wo, &wi, &f))
+	if (!facet_between(b, &m, p, wo, &wi, &f))
 		return spectrum_of(0);
-	double common = f.d * f.h.z * f.h.z * f.h.z * f.cos_o * g1_over_cos(r, wi) * fabs(wi.z);
+	double common = f.d * f.h.z * f.h.z * f.h.z * f.cos_o * g1_over_cos(&m, wi) * fabs(wi.z);
 	return spectrum_scale(common, share(r, p, &f, wi.z > 0, TRANSPORT_RADIANCE));
 }
 
 static double roughdielectric_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
+	const struct roughdielectric *r = b->data;
+	struct microfacet m = rough_map_at(&r->roughness, p);
 	struct facet f;
-	return facet_between(b, p, wo, &wi, &f) ? facet_pdf(&f, wi) : 0;
+	return facet_between(b, &m, p, wo, &wi, &f) ? facet_pdf(&f, wi) : 0;
 }
 
 static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
@@ -131,7 +137,8 @@ static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point
 		return false;
 	wo = mirror(wo, below);
 	double ratio = bsdf_eta(b, p->w), eta = below ? 1 / ratio : ratio;
-	vec3 h = microfacet_sample_visible(&r->facets, wo, u[0], u[1]), wi;
+	struct microfacet m = rough_map_at(&r->roughness, p);
+	vec3 h = microfacet_sample_visible(&m, wo, u[0], u[1]), wi;
 	double c = fmin(vec3_dot(wo, h), 1);
 	if (!(c > 0))
 		return false;
@@ -143,7 +150,7 @@ static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point
 		wi = vec3_madd(vec3_scale(-1 / eta, wo), c / eta - at_h.cos_t, h);
 	wi = vec3_normalize(wi);
 	struct facet f;
-	if (reflect != (wi.z > 0) || !facet_of(r, eta, wo, wi, &f))
+	if (reflect != (wi.z > 0) || !facet_of(&m, eta, wo, wi, &f))
 		return false;
 	double pdf = facet_pdf(&f, wi);
 	if (!(pdf > 0))
@@ -151,7 +158,7 @@ static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point
 	*out = (struct bsdf_sample){.wi = mirror(wi, below),
 				    .mode = reflect ? BSDF_REFLECT : BSDF_TRANSMIT,
 				    .pdf = pdf,
-				    .f = facet_f(b, p, &f, wi),
+				    .f = facet_f(r, &m, p, &f, wi),
 				    .eta = reflect ? 1 : eta};
 	return true;
 }
@@ -162,24 +169,22 @@ static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, co
 	struct roughdielectric *r = bsdf_data(b, n, build, sizeof *r, e);
 	if (!r)
 		return -ENOMEM;
-	int code = microfacet_read(&r->facets, n, e);
+	int code = rough_map_read(&r->roughness, b, n, build, e);
 	if (!code)
 		code = glass_read(&r->glass, b, n, build, e);
 	if (code)
 		return code;
 	b->modes = BSDF_REFLECT | BSDF_TRANSMIT;
 	b->has_smooth = true;
-	b->alpha = microfacet_least(&r->facets);
-	b->alpha_mean = microfacet_mean(&r->facets);
 	/* With equal indices no facet bends light: all of it goes straight on. */
-	if ((b->eta == 1 && !b->dispersive) || b->alpha < build->least_roughness) {
+	if ((b->eta == 1 && !b->dispersive) || (!r->roughness.varies && b->alpha < build->least_roughness)) {
 		extern const struct bsdf_ops bsdf_ops_dielectric;
 		bsdf_make_smooth(b, &bsdf_ops_dielectric);
 	}
 	return 0;
 }
 
-static const struct param roughdielectric_params[] = {GLASS_PARAMS, MICROFACET_PARAMS, {.name = NULL}};
+static const struct param roughdielectric_params[] = {GLASS_PARAMS, ROUGH_MAP_PARAMS, {.name = NULL}};
 
 const struct bsdf_ops bsdf_ops_roughdielectric = {
 	.type = "roughdielectric",

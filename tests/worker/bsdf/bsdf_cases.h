@@ -1,7 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * The BSDFs that the generic tests run over: several parameter sets each, as text (see tests/support/nodes.h), nested
- * ones after '|', textures after the word "texture". A BSDF of the registry without a set here fails the tests.
+ * ones after '|', textures after the word "texture" or, with a name, "@NAME". A BSDF of the registry without a set here
+ * fails the tests.
  */
 #ifndef TESTS_WORKER_BSDF_BSDF_CASES_H
 #define TESTS_WORKER_BSDF_BSDF_CASES_H
@@ -31,6 +32,9 @@ static const char *const bsdf_cases[] = {
 	"roughconductor alpha=1 eta=0.2 k=3 distribution=ggx",
 	"roughconductor material=none alpha_u=0.1 alpha_v=0.4",
 	"roughconductor material=Au alpha_u=0.6 alpha_v=0.05 distribution=ggx",
+	"roughconductor material=Au | @alpha checkerboard color0=0.3 color1=0.3",
+	"roughconductor material=none alpha_u=0.2 distribution=ggx | @alpha_v checkerboard color0=0.4 color1=0.4",
+	"roughdielectric int_ior=1.5 ext_ior=1 | @alpha checkerboard color0=0.25 color1=0.25",
 	"roughdielectric int_ior=1.5 ext_ior=1 alpha_u=0.1 alpha_v=0.5",
 	"roughdielectric int_ior=1 ext_ior=1.5 alpha_u=0.4 alpha_v=0.15 distribution=ggx",
 	"dielectric",
@@ -100,13 +104,27 @@ static inline struct scene_node *bsdf_child(struct arena *a, char *text)
 	return n;
 }
 
+/* " @alpha checkerboard": a texture of that name. Any other is a child without one. */
+static inline void bsdf_add_child(struct arena *a, struct scene_node *n, char *text)
+{
+	char *at = strchr(text, '@'), *space = at ? strchr(at, ' ') : NULL;
+	if (!space) {
+		node_add_child(a, n, bsdf_child(a, text));
+		return;
+	}
+	*space = 0;
+	char *name = arena_alloc(a, strlen(at), 1);
+	memcpy(name, at + 1, strlen(at));
+	node_add_ref(a, n, name, node_make(a, PLUGIN_TEXTURE, space + 1));
+}
+
 static inline struct scene_node *bsdf_node(struct arena *a, const char *text)
 {
 	char copy[256], *rest = copy;
 	snprintf(copy, sizeof copy, "%s", text);
 	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(copy, "|", &rest));
 	for (char *child; (child = strtok_r(NULL, "|", &rest));)
-		node_add_child(a, n, bsdf_child(a, child));
+		bsdf_add_child(a, n, child);
 	return n;
 }
 

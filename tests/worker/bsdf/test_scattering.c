@@ -349,6 +349,40 @@ static void test_refusals_say_why(void **state)
 	}
 }
 
+/* A texture that says the same everywhere is the number; one that does not is the number of the place. */
+static void test_textured_roughness(void **state)
+{
+	(void)state;
+	static const char *const same[][2] = {
+		{"roughconductor material=Au alpha=0.3",
+		 "roughconductor material=Au | @alpha checkerboard color0=0.3 color1=0.3"},
+		{"roughdielectric alpha_u=0.2 alpha_v=0.4",
+		 "roughdielectric alpha_u=0.2 | @alpha_v checkerboard color0=0.9 color1=0.4"},
+	};
+	const vec3 wo = vec3_normalize((vec3){0.3, 0.2, 0.8}), wi = vec3_normalize((vec3){-0.1, -0.3, 0.7});
+	for (size_t k = 0; k < sizeof same / sizeof *same; k++) {
+		struct arena a = {0};
+		struct bsdf number, map;
+		bsdf_make(&a, same[k][0], &number);
+		bsdf_make(&a, same[k][1], &map);
+		struct bsdf_point p = point_of(TRANSPORT_RADIANCE);
+		p.u = 0.75;
+		p.v = 0.25;
+		assert_true(map.textured && !number.textured);
+		assert_near(map.ops->eval(&map, &p, wo, wi).v[0], number.ops->eval(&number, &p, wo, wi).v[0], 1e-12,
+			    same[k][0]);
+		assert_near(map.ops->pdf_solid(&map, &p, wo, wi), number.ops->pdf_solid(&number, &p, wo, wi), 1e-12,
+			    same[k][0]);
+		if (k == 1) {
+			p.u = 0.25;
+			assert_true(
+				fabs(map.ops->pdf_solid(&map, &p, wo, wi) / number.ops->pdf_solid(&number, &p, wo, wi) -
+				     1) > 0.1);
+		}
+		arena_fini(&a);
+	}
+}
+
 static void test_out_of_memory_is_an_answer(void **state)
 {
 	(void)state;
@@ -396,6 +430,7 @@ int main(void)
 		cmocka_unit_test(test_flags),
 		cmocka_unit_test(test_grey_is_the_same_without_wavelengths),
 		cmocka_unit_test(test_refusals_say_why),
+		cmocka_unit_test(test_textured_roughness),
 		cmocka_unit_test(test_out_of_memory_is_an_answer),
 		cmocka_unit_test(test_black_and_default),
 	};
