@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A client's side of a session: submit, list, watch; fetch.c and control.c have the rest. */
+#include "coordinator/shell/incoming.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/trust.h"
 #include "coordinator/shell/upload.h"
@@ -113,9 +114,7 @@ static void submit(struct session *p)
 				      .verify = trust_share(p->server, m)}};
 	p->rejected[0] = 0;
 	p->answered_job = 0;
-	p->server->submitter = p;
-	server_step(p->server, &ev);
-	p->server->submitter = NULL;
+	server_step_with(p->server, &ev, &(struct incoming){.submitter = p});
 	answer_submit(p, *p->rejected ? 0 : p->answered_job, p->rejected, *p->rejected ? NULL : p->upload);
 	session_upload_abort(p);
 }

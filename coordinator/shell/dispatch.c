@@ -9,6 +9,7 @@
 #include "coordinator/shell/back.h"
 #include "coordinator/shell/clear.h"
 #include "coordinator/shell/durable.h"
+#include "coordinator/shell/incoming.h"
 #include "coordinator/shell/keep.h"
 #include "coordinator/shell/late.h"
 #include "coordinator/shell/publish.h"
@@ -28,9 +29,9 @@ static unsigned long long number(uint64_t n)
 
 /* ---- jobs ---- */
 
-static void submitted(struct server *s, const struct action *a)
+static void submitted(struct server *s, const struct action *a, const struct incoming *in)
 {
-	struct session *p = s->submitter;
+	struct session *p = in->submitter;
 	struct live_job *o;
 	struct error e;
 	assert(p && p->upload && p->id == a->tag);
@@ -109,15 +110,15 @@ void dispatch_prepare(struct server *s, struct live_job *o)
 
 /* ---- batches ---- */
 
-static void keep_partials(const struct server *s, const struct lease_key *k)
+static void keep_partials(const struct server *s, const struct lease_key *k, const struct incoming *in)
 {
-	for (size_t i = 0; i < s->result->n_tile_sizes; i++) {
+	for (size_t i = 0; i < in->result->n_tile_sizes; i++) {
 		char path[SPOOL_PATH_MAX];
 		size_t size;
-		const unsigned char *bytes = batch_tile_bytes(s->result, s->payload->bytes, i, &size);
+		const unsigned char *bytes = batch_tile_bytes(in->result, in->payload->bytes, i, &size);
 		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", s->config.keep_partials,
-			 number(k->job), number(k->epoch), k->group, k->part, s->batch->tiles[i].x,
-			 s->batch->tiles[i].y);
+			 number(k->job), number(k->epoch), k->group, k->part, in->batch->tiles[i].x,
+			 in->batch->tiles[i].y);
 		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
 		if (fd < 0 || disk_write_all(fd, bytes, size))
 			log_event(LOG_SPOOL_FAULT, "path=%s text=%s", log_quote(path).text,
@@ -127,20 +128,20 @@ static void keep_partials(const struct server *s, const struct lease_key *k)
 	}
 }
 
-static void merge(struct server *s, const struct action *a)
+static void merge(struct server *s, const struct action *a, const struct incoming *in)
 {
 	struct live_job *o = server_live_job(s, a->job);
 	struct error e;
-	assert(o && s->batch && !o->busy);
+	assert(o && in->batch && !o->busy);
 	if (s->config.keep_partials)
-		keep_partials(s, &a->key);
+		keep_partials(s, &a->key, in);
 	uint64_t rounds = live_job_rounds(o);
-	uint64_t at = s->stored_at;
-	int rc = s->stored ? 0 : durable_merged(s, o, &at, &e);
+	uint64_t at = in->stored_at;
+	int rc = in->stored ? 0 : durable_merged(s, o, in, &at, &e);
 	if (!rc)
-		rc = live_job_merge(o, s->batch, &e);
+		rc = live_job_merge(o, in->batch, &e);
 	if (!rc)
-		back_note(o, &a->key, at, s->result->maker);
+		back_note(o, &a->key, at, in->result->maker);
 	if (rc == -ENOMEM) { /* half merged; nobody was told that it is stored */
 		log_event(LOG_STOP,
 			  "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
@@ -153,14 +154,14 @@ static void merge(struct server *s, const struct action *a)
 	live_job_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", number(a->job),
 		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch),
-		  s->stored ? " late=1" : "");
+		  in->stored ? " late=1" : "");
 }
 
-static void take_back(struct server *s, const struct action *a)
+static void take_back(struct server *s, const struct action *a, const struct incoming *in)
 {
 	struct live_job *o = server_live_job(s, a->job);
-	assert(o && !o->busy && s->back);
-	back_take(o, s->back);
+	assert(o && !o->busy && in->back);
+	back_take(o, in->back);
 	trust_taken_back(o, a->who);
 	live_job_log(o, LOG_BATCH_TAKEN_BACK, "kind=%d group=%u part=%u epoch=%llu text=%s", (int)a->key.kind,
 		     a->key.group, a->key.part, number(a->key.epoch), log_quote(a->text).text);
@@ -216,13 +217,13 @@ static void close_peer(struct server *s, const struct action *a)
 	session_fault(p, "%s", a->text);
 }
 
-void dispatch_update(struct server *s, const struct update *u)
+void dispatch_update(struct server *s, const struct update *u, const struct incoming *in)
 {
 	for (size_t i = 0; i < u->count; i++) {
 		const struct action *a = &u->actions[i];
 		switch (a->kind) {
 		case ACTION_SUBMITTED:
-			submitted(s, a);
+			submitted(s, a, in);
 			break;
 		case ACTION_CANCELLED:
 			break;
@@ -236,7 +237,7 @@ void dispatch_update(struct server *s, const struct update *u)
 			revoke_lease(s, a);
 			break;
 		case ACTION_MERGE:
-			merge(s, a);
+			merge(s, a, in);
 			break;
 		case ACTION_ACK:
 			acknowledge(s, a);
@@ -258,7 +259,7 @@ void dispatch_update(struct server *s, const struct update *u)
 		case ACTION_JOB_FORGOTTEN:
 			break;
 		case ACTION_TAKE_BACK:
-			take_back(s, a);
+			take_back(s, a, in);
 			break;
 		case ACTION_CHAINS_ANEW:
 			trust_anew(s, a);

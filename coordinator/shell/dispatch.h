@@ -5,7 +5,10 @@
 
 #include "coordinator/shell/server.h"
 
-void dispatch_update(struct server *s, const struct update *u);
+struct incoming;
+
+/* in: what the event brought that the update answers. */
+void dispatch_update(struct server *s, const struct update *u, const struct incoming *in);
 void dispatch_remember(struct server *s, const struct job_record *r); /* it has ended */
 /* Orders that the core has ended and whose canvas is free: written down, told to the workers, let go. */
 void dispatch_finish_orders(struct server *s);

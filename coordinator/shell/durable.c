@@ -7,6 +7,7 @@
 #include "common/base/version.h"
 #include "common/wire/frame.h"
 #include "coordinator/shell/dispatch.h"
+#include "coordinator/shell/incoming.h"
 #include "coordinator/shell/keep.h"
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/session.h"
@@ -199,28 +200,28 @@ void durable_hold(struct server *s, struct live_job *o, const char *what, const 
 	hold(s, o, text);
 }
 
-int durable_reserve(struct server *s, struct live_job *o, struct error *e)
+int durable_reserve(struct server *s, struct live_job *o, struct incoming *in, struct error *e)
 {
 	union {
 		const Farm__LeaseResult *from;
 		Farm__LeaseResult *to;
-	} result = {s->result}; /* generated structures have no const */
+	} result = {in->result}; /* generated structures have no const */
 	Farm__Envelope m;
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
 	m.lease_result = result.to;
 	if (o->unsure)
 		return error_set(e, EIO, "the job's files cannot be written");
-	int rc = envelope_pack(&m, NULL, 0, &s->frame, &s->frame_size, e);
+	int rc = envelope_pack(&m, NULL, 0, &in->frame, &in->frame_size, e);
 	if (rc)
 		return rc;
-	size_t size = s->frame_size + s->payload->size;
-	frame_prefix_write(s->frame, (uint32_t)(s->frame_size - FRAME_PREFIX), (uint32_t)s->payload->size);
+	size_t size = in->frame_size + in->payload->size;
+	frame_prefix_write(in->frame, (uint32_t)(in->frame_size - FRAME_PREFIX), (uint32_t)in->payload->size);
 	rc = journal_reserve(o->journal, size + PINNED_ROOM, e);
 	if (rc == -ENOSPC && keep_drop_all(s))
 		rc = journal_reserve(o->journal, size + PINNED_ROOM, e);
-	if (!rc && o->canvas && s->batch->key.kind == LEASE_RENDER)
-		rc = canvas_reserve(o->canvas, s->batch, e);
+	if (!rc && o->canvas && in->batch->key.kind == LEASE_RENDER)
+		rc = canvas_reserve(o->canvas, in->batch, e);
 	if (!rc)
 		return 0;
 	o->held_bytes = size;
@@ -239,17 +240,17 @@ static int write_pinned(struct server *s, struct live_job *o, double elapsed, st
 			      NULL, e);
 }
 
-int durable_merged(struct server *s, struct live_job *o, uint64_t *at, struct error *e)
+int durable_merged(struct server *s, struct live_job *o, const struct incoming *in, uint64_t *at, struct error *e)
 {
-	const struct lease_key *k = &s->batch->key;
+	const struct lease_key *k = &in->batch->key;
 	bool again = k->kind == LEASE_RENDER && o->again[(size_t)k->group * o->plan.parts + k->part];
 	double elapsed = farm_elapsed(s->farm, o->id, server_now(s));
-	assert(s->frame);
+	assert(in->frame);
 	int rc = write_pinned(s, o, elapsed, e);
 	*at = journal_bytes(o->journal);
 	return rc ? rc
-		  : journal_append(o->journal, again ? JOURNAL_AGAIN : JOURNAL_BATCH, k, elapsed, s->frame,
-				   s->frame_size, s->payload, e);
+		  : journal_append(o->journal, again ? JOURNAL_AGAIN : JOURNAL_BATCH, k, elapsed, in->frame,
+				   in->frame_size, in->payload, e);
 }
 
 /* ---- group commit ---- */

@@ -22,11 +22,11 @@ int durable_end(struct server *s, struct live_job *o);
 /* A job's record says that it has ended: so does the ledger then, or when it can be written again. */
 void durable_end_row(struct server *s, const struct job_record *r);
 
-/* Before the core sees the batch of this event: the frame for the journal, and room on the disk for it. -ENOSPC,
+/* Before the core sees the batch: the frame for the journal, into `in`, and room on the disk for it. -ENOSPC,
  * -EFBIG: the disk is full: the job is held until there is room. */
-int durable_reserve(struct server *s, struct live_job *o, struct error *e);
-/* The core merges the batch of this event. -ENOMEM: the journal has it not, and it must not be acknowledged. */
-int durable_merged(struct server *s, struct live_job *o, uint64_t *at, struct error *e);
+int durable_reserve(struct server *s, struct live_job *o, struct incoming *in, struct error *e);
+/* The core merges the batch. -ENOMEM: the journal has it not, and it must not be acknowledged. */
+int durable_merged(struct server *s, struct live_job *o, const struct incoming *in, uint64_t *at, struct error *e);
 /* The answer to a batch that is merged, by now or before, when what the order's journal holds is safe. */
 void durable_ack(struct server *s, const struct live_job *o, uint64_t peer, const struct lease_key *k, enum ack ack);
 /* The last look at the job's error, if it is new. */

@@ -3,6 +3,7 @@
 
 #include "common/base/mem.h"
 #include "coordinator/shell/digest.h"
+#include "coordinator/shell/incoming.h"
 #include "coordinator/shell/replay.h"
 #include "coordinator/shell/server.h"
 
@@ -97,13 +98,12 @@ static int offer(struct server *s, const struct live_job *o, const struct late_r
 	if (!rc && !buf_append(&copy, payload, payload_size))
 		rc = error_set(e, ENOMEM, "no memory for a result");
 	if (!rc) {
-		s->batch = &batch;
-		s->result = env.message->lease_result;
-		s->payload = &copy;
-		s->stored = true;
-		s->stored_at = l->at;
-		server_step(s, &ev);
-		s->stored = false;
+		const struct incoming in = {.batch = &batch,
+					    .result = env.message->lease_result,
+					    .payload = &copy,
+					    .stored = true,
+					    .stored_at = l->at};
+		server_step_with(s, &ev, &in);
 	}
 	buf_fini(&copy);
 	batch_fini(&batch);

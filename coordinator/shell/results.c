@@ -2,6 +2,7 @@
 /* Results of leases on their way to the core: now, or when nobody reads their film any more. */
 #include "coordinator/shell/digest.h"
 #include "coordinator/shell/durable.h"
+#include "coordinator/shell/incoming.h"
 #include "coordinator/shell/session.h"
 
 #include "common/base/mem.h"
@@ -69,17 +70,14 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	stored.maker = known ? &maker : NULL;
 	ev.lease.valid = rc == 0;
 	ev.text = e.text;
-	s->batch = &batch;
-	s->result = &stored;
-	s->payload = payload;
+	struct incoming in = {.batch = &batch, .result = &stored, .payload = payload};
 	if (rc == -ENOMEM ||
-	    (o && ev.lease.valid && durable_reserve(s, o, &e))) /* no room for it, here or on the disk */
+	    (o && ev.lease.valid && durable_reserve(s, o, &in, &e))) /* no room for it, here or on the disk */
 		refuse(s, peer, &ev.lease.key, e.text);
 	else
-		server_step(s, &ev);
+		server_step_with(s, &ev, &in);
 	batch_fini(&batch);
-	mem_free(s->frame);
-	s->frame = NULL;
+	mem_free(in.frame);
 }
 
 static bool has_room(const struct server *s, const struct buf *payload)

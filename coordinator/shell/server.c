@@ -13,6 +13,7 @@
 #include "coordinator/shell/files.h"
 #include "coordinator/shell/folder.h"
 #include "coordinator/shell/held.h"
+#include "coordinator/shell/incoming.h"
 #include "coordinator/shell/late.h"
 #include "coordinator/shell/limits.h"
 #include "coordinator/shell/recovery.h"
@@ -82,7 +83,7 @@ void server_job_broken(struct server *s, uint64_t job, const char *text)
 
 static void on_wake(uv_timer_t *t);
 
-static void one_step(struct server *s, struct event *ev)
+static void one_step(struct server *s, struct event *ev, const struct incoming *in)
 {
 	struct update u;
 	ev->time = server_now(s);
@@ -91,7 +92,7 @@ static void one_step(struct server *s, struct event *ev)
 		ev->unread = 0;
 	farm_step(s->farm, ev, &u);
 	s->changes++;
-	dispatch_update(s, &u);
+	dispatch_update(s, &u, in);
 	if (isfinite(u.wake) && !s->stopping) {
 		double ms = ceil(1000 * (u.wake - server_now(s)));
 		uv_timer_start(&s->wake, on_wake, ms > 1 ? (uint64_t)ms : 1, 0);
@@ -102,21 +103,25 @@ static void one_step(struct server *s, struct event *ev)
 
 void server_step(struct server *s, struct event *ev)
 {
-	if (s->stepping) { /* what sessions say while an update is carried out */
+	static const struct incoming nothing = {0};
+	if (s->stepping) /* what sessions say while an update is carried out */
 		server_defer(s, ev);
-		return;
-	}
+	else
+		server_step_with(s, ev, &nothing);
+}
+
+void server_step_with(struct server *s, struct event *ev, const struct incoming *in)
+{
+	static const struct incoming nothing = {0};
+	assert(!s->stepping);
 	s->stepping = true;
-	one_step(s, ev);
-	s->batch = NULL;
-	s->result = NULL;
-	s->payload = NULL;
+	one_step(s, ev, in);
 	while (s->deferred) {
 		struct deferred *d = s->deferred;
 		s->deferred = d->next;
 		if (!s->deferred)
 			s->deferred_last = &s->deferred;
-		one_step(s, &d->event);
+		one_step(s, &d->event, &nothing);
 		mem_free(d);
 	}
 	s->stepping = false;

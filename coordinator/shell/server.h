@@ -57,6 +57,7 @@ int server_open(struct server **s, const struct server_config *c, struct error *
 int server_await_jobs(struct server *s, struct error *e); /* turns the loop until they are */
 void server_close(struct server *s);			  /* stops it, if no signal has */
 
+struct incoming;
 struct session;
 struct status_socket;
 struct clearing;
@@ -123,16 +124,6 @@ struct server {
 	double watchdog,
 		watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */
 	uint64_t changes;      /* grows with whatever the status shows */
-	/* What the current event brought; NULL when it did not. */
-	struct batch *batch;
-	const Farm__LeaseResult *result;
-	struct buf *payload;
-	bool stored;	      /* the journal has it already, */
-	uint64_t stored_at;   /* there */
-	struct back *back;    /* what may be taken back in this step; NULL: nothing */
-	unsigned char *frame; /* the result as the journal takes it, but for the payload */
-	size_t frame_size;
-	struct session *submitter;
 };
 
 /* No more is begun; the loop ends when what is under way has ended. */
@@ -140,6 +131,8 @@ void server_stop(struct server *s);
 double server_now(const struct server *s);
 /* Gives the event to the core and carries out the update and all that follows from it. */
 void server_step(struct server *s, struct event *ev);
+/* The same, of an event that brought more (incoming.h). Not while an update is carried out. */
+void server_step_with(struct server *s, struct event *ev, const struct incoming *in);
 /* Later, when the current update is carried out. Copies the text. */
 void server_defer(struct server *s, const struct event *ev);
 void server_job_broken(struct server *s, uint64_t job, const char *text);

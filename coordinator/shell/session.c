@@ -7,6 +7,7 @@
 #include "coordinator/shell/back.h"
 #include "coordinator/shell/files.h"
 #include "coordinator/shell/held.h"
+#include "coordinator/shell/incoming.h"
 #include "coordinator/shell/recovery.h"
 
 #include <stdarg.h>
@@ -292,9 +293,10 @@ void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 	if (o && *text && f->bad_states && holds && !o->busy && !p->server->stepping &&
 	    journal_write(o->journal, &e) == 0)
 		ev.lease.can_take_back = back_read(o, o->journal, &ev.lease.key, &back, &e) == 0;
-	p->server->back = &back;
-	server_step(p->server, &ev);
-	p->server->back = NULL;
+	if (ev.lease.can_take_back)
+		server_step_with(p->server, &ev, &(struct incoming){.back = &back});
+	else
+		server_step(p->server, &ev);
 	back_fini(&back);
 }
 
