@@ -71,6 +71,39 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 	return rc;
 }
 
+/* ---- the record of an ended job ---- */
+
+/* What its row still knows: it is listed, and its image can be fetched. What the image's header says is not read. */
+static int make_record(struct looking *l, const struct ledger_job *j, struct error *e)
+{
+	const struct spool *spool = l->server->spool;
+	struct job_record *r = l->record;
+	char path[SPOOL_PATH_MAX], kept[SPOOL_PATH_MAX];
+	struct stat st;
+	memset(r, 0, sizeof *r);
+	record_begin_convergence(r);
+	r->id = j->id;
+	text_copy(r->name, sizeof r->name, j->name);
+	text_copy(r->owner, sizeof r->owner, j->owner);
+	text_copy(r->state, sizeof r->state, j->state);
+	r->priority = j->priority;
+	r->extended = j->extended;
+	r->submitted = j->submitted;
+	r->ended = j->ended;
+	r->ended_seen = r->rel_error = -1;
+	spool_job_path(spool, j->id, "result.exr", path);
+	r->has_result = disk_stat(path, &st) == 0;
+	r->exit_code = r->has_result ? 0 : 3;
+	r->progress = r->has_result;
+	record_add_note(r, "its record (job.json) was damaged: what it counted and estimated is lost");
+	spool_job_path(spool, j->id, "job.json", path);
+	spool_job_path(spool, j->id, "job.json.damaged", kept);
+	if (disk_rename(path, kept) && errno != ENOENT)
+		return error_set(e, errno, "%s: %s", kept, strerror(errno));
+	say(j->id, "its record (job.json) was damaged: made anew from jobs.db, and kept as job.json.damaged");
+	return spool_write_record(spool, r, e);
+}
+
 /* ---- one job ---- */
 
 /* Something was merged or begun of it, which nobody would do for a job that was not accepted. */
@@ -151,7 +184,7 @@ static int look_at(struct looking *l, uint64_t id, struct error *e)
 	struct row_file f;
 	struct server *s = l->server;
 	int rc = spool_read_record(s->spool, id, l->record, e);
-	bool ended = rc == 0 && record_is_ended(l->record);
+	bool ended = rc == 0 && record_is_ended(l->record), bad_record = rc == -EBADMSG;
 	if (rc && rc != -ENOENT && rc != -EBADMSG)
 		return rc;
 	int file = row_file_read(s->spool, id, &f, e);
@@ -161,6 +194,8 @@ static int look_at(struct looking *l, uint64_t id, struct error *e)
 	if (rc >= 0)
 		rc = rc > 0 && !j.damaged ? with_row(l, &j, &f, file, ended, e)
 					  : without_row(l, id, rc > 0, &f, file, ended, e);
+	if (rc == 0 && bad_record && (rc = ledger_get(s->ledger, id, &j, e)) > 0)
+		rc = !j.damaged && j.ended > 0 ? make_record(l, &j, e) : 0;
 	row_file_free(&f);
 	return rc;
 }

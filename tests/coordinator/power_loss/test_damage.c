@@ -20,6 +20,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/mman.h>
+#include <unistd.h>
 
 enum { FILE_MOST = 1 << 22, BATCH_LEAST = 3000 /* bytes of a result's record: its chain states */ };
 static unsigned char bytes[FILE_MOST];
@@ -252,9 +253,28 @@ static void what_is_lost(void **state)
 	assert_true(put_aside > 3);
 }
 
+/* The record of a job that has ended: the job is listed as before, and its image is the one that it was. */
+static void a_damaged_record(void **state)
+{
+	(void)state;
+	before(0);
+	for (uint64_t seed = 301; seed <= 304; seed++) {
+		begin(seed);
+		finish();
+		assert_int_equal(lost(), 0);
+		in_root("grep -ls '\"done\"' jobs/*/job.json >ended");
+		in_root(seed % 2 ? "for o in $(cat ended); do : >$o; done"
+				 : "for o in $(cat ended); do printf x | dd of=$o bs=1 conv=notrunc status=none; done");
+		finish();
+		assert_int_equal(lost(), 0);
+		in_root("for o in $(cat ended); do test -e $o.damaged && grep -q 'was damaged' $o || exit 1; done");
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(a_damaged_record, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(a_bit_of_a_journal, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(damaged_database, folder_set_up, folder_tear_down),
 		cmocka_unit_test_setup_teardown(what_is_lost, folder_set_up, folder_tear_down),
