@@ -57,12 +57,12 @@ bool __wrap_accel_occluded_to_infinity(const struct accel *a, const struct ray_e
 struct recorded_walks record_walks;
 static bool walking;
 
-bool __real_whole_visible(struct path_context *c, const struct full_path_path *x, unsigned e);
-bool __wrap_whole_visible(struct path_context *c, const struct full_path_path *x, unsigned e);
+bool __real_full_path_visible(struct path_context *c, const struct full_path_path *x, unsigned e);
+bool __wrap_full_path_visible(struct path_context *c, const struct full_path_path *x, unsigned e);
 
-bool __wrap_whole_visible(struct path_context *c, const struct full_path_path *x, unsigned e)
+bool __wrap_full_path_visible(struct path_context *c, const struct full_path_path *x, unsigned e)
 {
-	bool visible = __real_whole_visible(c, x, e);
+	bool visible = __real_full_path_visible(c, x, e);
 	record_walks.occluded += walking && !visible;
 	return visible;
 }
