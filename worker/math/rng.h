@@ -21,6 +21,7 @@ enum rng_stream {
 	RNG_AROUND = 8,
 	RNG_TEST = 9,
 	RNG_CHOICE = 10,
+	RNG_BDPT8 = 11,
 };
 
 /* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */

@@ -95,7 +95,7 @@ double path_balance_weight(const struct path_context *c, const struct joined_pat
 	double ratio[PATH_MAX_EDGES + 2], sum = 0;
 	path_technique_ratios(c, p, max_s, ratio);
 	for (unsigned j = 0; j <= p->edges; j++)
-		sum += ratio[j];
+		sum += j >= 2 && c->light_every > 1 ? ratio[j] / c->light_every : ratio[j];
 	return 1 / sum;
 }
 

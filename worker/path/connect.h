@@ -20,7 +20,8 @@ struct joined_path {
 /* Density of technique j for this path over the density of the technique s that made it: 0 where j cannot make it.
  * Fills ratio[0..edges]; techniques with more than max_s light vertices are left out (0). */
 void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio);
-/* Weight of the balance heuristic: 1 / sum of the ratios. */
+/* Weight of the balance heuristic over the share of the samples that tries the technique: 1 / sum of the ratios, those
+ * of techniques with two light vertices or more divided by light_every. */
 double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s);
 
 /* Density of an emitter's point (and of the choice of the emitter): as light sub-paths draw it, and as drawn towards

@@ -2,5 +2,6 @@
 /* One line an integrator: INTEGRATOR(name) stands for `const struct integrator integrator_<name>`. */
 INTEGRATOR(path)
 INTEGRATOR(bdpt)
+INTEGRATOR(bdpt8)
 INTEGRATOR(pssmlt)
 INTEGRATOR(hslt)

@@ -56,9 +56,11 @@ struct path_context {
 	struct wavelengths wl;
 	uint32_t min_depth, max_depth; /* edges */
 	bool roulette;
-	bool unclassed;	    /* nobody asks for path_sample.classes */
-	bool one_way;	    /* nobody asks for pdf_rev: no technique has more than one light vertex */
-	uint64_t *counters; /* of enum batch_counter */
+	bool unclassed;	      /* nobody asks for path_sample.classes */
+	bool one_way;	      /* nobody asks for pdf_rev: no technique has more than one light vertex */
+	uint32_t light_every; /* one in so many samples has a light sub-path, for which it counts so many times; 0 or 1:
+				 all have */
+	uint64_t *counters;   /* of enum batch_counter */
 	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
 };
 

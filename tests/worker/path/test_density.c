@@ -286,7 +286,21 @@ static void relabel(struct route *r, unsigned s, struct joined_path *p)
 		r->x[0].kind = s ? VERTEX_EMITTER : VERTEX_SURFACE;
 }
 
-static void check_ratios(const struct path_context *c, struct route *r, struct tally *tally)
+/* Where only one in eight samples has a light sub-path, techniques with two light vertices or more count an eighth. */
+static void check_rare_light(struct path_context *c, const struct joined_path *p, const double *ratio)
+{
+	double sum = 0;
+	for (unsigned j = 0; j <= p->edges; j++)
+		sum += j < 2 ? ratio[j] : 0.125 * ratio[j];
+	c->light_every = 8;
+	double weight = path_balance_weight(c, p, PATH_MAX_EDGES);
+	c->light_every = 1;
+	if (!(relative(weight, 1 / sum) < 1e-12))
+		fail_msg("made by %u of %u, light in one of eight: weight %.12g, not %.12g", p->s, p->edges, weight,
+			 1 / sum);
+}
+
+static void check_ratios(struct path_context *c, struct route *r, struct tally *tally)
 {
 	double p[DEPTH + 2], ratio[DEPTH + 2], most = -INFINITY;
 	for (unsigned j = 0; j <= r->k; j++) {
@@ -318,6 +332,7 @@ static void check_ratios(const struct path_context *c, struct route *r, struct t
 				fail_msg("made by %u of %u, up to %u: weight %.12g, not %.12g", s, r->k, max_s, weight,
 					 1 / sum);
 		}
+		check_rare_light(c, &joined, ratio); /* of all techniques */
 		tally->relabelled++;
 	}
 }
@@ -342,7 +357,7 @@ static bool joins(struct path_context *c, unsigned s, unsigned t)
 	return !spectrum_is_zero(em->ops->radiance(em, &p, vec3_neg(w), &c->wl));
 }
 
-static void check_route(const struct path_context *c, unsigned s, unsigned t, struct tally *tally)
+static void check_route(struct path_context *c, unsigned s, unsigned t, struct tally *tally)
 {
 	struct route r;
 	take_route(c, s, t, c->light, &r);

@@ -15,9 +15,9 @@
 #include <cmocka.h>
 
 /* Samples a pixel are what the power asks for; 0: the scene says nothing new about chains (single_spp: of single paths,
- * whose states say less a mutation than those of all techniques). */
-static void check_all(const char *name, struct world *w, uint64_t path_spp, uint64_t bdpt_spp, uint64_t chain_spp,
-		      uint64_t single_spp)
+ * whose states say less a mutation than those of all techniques) or about bdpt8 (rare_spp). */
+static void check_all(const char *name, struct world *w, uint64_t path_spp, uint64_t bdpt_spp, uint64_t rare_spp,
+		      uint64_t chain_spp, uint64_t single_spp)
 {
 	static struct agree_image reference, other;
 	struct agree_side path = {"path", path_spp, 32, 0, 0};
@@ -25,6 +25,8 @@ static void check_all(const char *name, struct world *w, uint64_t path_spp, uint
 	for (size_t i = 0; render_integrator_at(i); i++) {
 		const struct render_integrator *r = render_integrator_at(i);
 		uint64_t spp = r->kind == PLAN_SAMPLES ? bdpt_spp : r->has_mutations ? single_spp : chain_spp;
+		if (strcmp(r->name, "bdpt8") == 0)
+			spp = rare_spp;
 		if (strcmp(r->name, "path") == 0 || spp == 0)
 			continue;
 		char test[64];
@@ -64,7 +66,7 @@ static void test_diffuse(void **state)
 				DEPTH("3") ROOM LAMP "<shape type='cube'>" AT(
 					"<scale value='0.5'/><rotate y='1' angle='25'/><translate y='-1.5' z='-0.5'/>")
 					DIFFUSE("0.7,0.2,0.1") "</shape>"),
-		  4096, 4096, 6656, 0);
+		  4096, 4096, 1024, 6656, 0);
 }
 
 static void test_glossy(void **state)
@@ -86,7 +88,7 @@ static void test_glossy(void **state)
 															BALL("-0.5,0.6,-0.9", "0.4", "<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>") "<shape type='rectangle'>" AT(
 																"<scale value='0.5'/><translate x='0.9' y='0.5' z='-0.3'/>") "<bsdf type='mask'><float name='opacity' value='0.4'/><bsdf type='blendbsdf'><bsdf type='diffuse'/>"
 																							     "<bsdf type='conductor'><string name='material' value='Ag'/></bsdf></bsdf></bsdf></shape>"),
-		6144, 6144, 0, 0);
+		6144, 6144, 1536, 0, 0);
 }
 
 static void test_glass(void **state)
@@ -97,7 +99,7 @@ static void test_glass(void **state)
 				DEPTH("6") ROOM LAMP BALL("0,-0.6,-0.3", "0.8",
 							  "<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
 							  "<float name='ext_ior' value='1'/></bsdf>")),
-		  8192, 8192, 0, 0);
+		  8192, 8192, 3072, 0, 0);
 }
 
 static void test_rough_glass(void **state)
@@ -109,7 +111,7 @@ static void test_rough_glass(void **state)
 					"0,-0.6,-0.3", "0.8",
 					"<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/>"
 					"<float name='ext_ior' value='1'/><float name='alpha' value='0.25'/></bsdf>")),
-		  6144, 6144, 9728, 45056);
+		  6144, 6144, 0, 9728, 45056);
 }
 
 static void test_environment(void **state)
@@ -124,7 +126,7 @@ static void test_environment(void **state)
 				DIFFUSE("0.5,0.5,0.6") "</shape>" BALL(
 					"0,0,0", "1",
 					"<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
-		4096, 4096, 6144, 0);
+		4096, 4096, 0, 6144, 0);
 }
 
 int main(void)

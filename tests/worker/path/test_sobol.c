@@ -81,6 +81,24 @@ static void test_elementary_intervals(void **state)
 		}
 }
 
+/* bdpt8 has a light sub-path where this number is below 1/8: in one of any eight samples that begin at a multiple of 8.
+ */
+static void test_one_of_eight(void **state)
+{
+	(void)state;
+	uint64_t seed = stats_seed("test_one_of_eight");
+	for (uint64_t n = 0; n < 64; n++)
+		for (uint64_t first = 0; first < 128; first += 8) {
+			unsigned count = 0;
+			for (uint64_t i = 0; i < 8; i++) {
+				double u[SAMPLER_BLOCK];
+				draw(seed, n, n % 3, first + i, SIDE_CAMERA, 0, u);
+				count += u[DIM_HAS_LIGHT] * 8 < 1;
+			}
+			assert_int_equal(count, 1);
+		}
+}
+
 /* Points without scrambling by the recurrence of Bratley and Fox 1988 from the polynomials x + 1, x^2 + x + 1, x^3 + x
  * + 1: a scramble keeps how many leading bits two points share, in every dimension. */
 static void directions(unsigned degree, unsigned inner, const uint32_t *initial, uint32_t v[32])
@@ -278,6 +296,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_elementary_intervals),
+		cmocka_unit_test(test_one_of_eight),
 		cmocka_unit_test(test_directions),
 		cmocka_unit_test(test_marginals),
 		cmocka_unit_test(test_long_sequences),

@@ -118,8 +118,8 @@ static void test_any_order(void **state)
 {
 	(void)state;
 	struct world *w = small_world("gaussian");
-	const char *names[] = {"path", "bdpt", "pssmlt"};
-	for (int n = 0; n < 3; n++) {
+	const char *names[] = {"path", "bdpt", "bdpt8", "pssmlt"};
+	for (int n = 0; n < 4; n++) {
 		struct plan p = plan_of(w, names[n]);
 		enum lease_kind kind = p.kind == PLAN_CHAINS ? LEASE_BOOTSTRAP : LEASE_RENDER;
 		struct batch b[GROUPS * PARTS];
