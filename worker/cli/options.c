@@ -36,7 +36,7 @@ enum {
 static const struct argp_option options[] = {
 	{NULL, 0, NULL, 0, "What to render:", 1},
 	{"integrator", 'i', "NAME", 0,
-	 "(" RENDER_INTEGRATOR_DEFAULT ": path, bdpt or hslt, by a short pilot); the scene's own is ignored",
+	 "(" RENDER_INTEGRATOR_DEFAULT ": path, bdpt8, bdpt or hslt, by a short pilot); the scene's own is ignored",
 	 1}, /* see help */
 	{"size", OPTION_SIZE, "W[xH]", 0,
 	 "Size of the film; keeps the angle of view. Without H the film keeps its shape", 1},

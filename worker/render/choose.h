@@ -1,17 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Which integrator a scene calls for: `path`, `bdpt`, or the chains of `hslt`. Decided once, before the plan is made,
- * from a pilot that counts rays instead of seconds and draws random numbers of its own: the same on every machine for
- * the same request, and the plan names what was chosen.
+ * Which integrator a scene calls for: `path`, `bdpt`, `bdpt8`, or the chains of `hslt`. Decided once, before the plan
+ * is made, from a pilot that counts rays instead of seconds and draws random numbers of its own: the same on every
+ * machine for the same request, and the plan names what was chosen.
  *
  * The pilot draws samples of `path`, and of `bdpt` where those leave the choice open, and looks at what each brings
  * relative to the brightness of its place: how much light comes in rare contributions of many times that brightness,
  * and how fast the frequency of the largest falls with their size (their tail index, by Hill's estimator). Chains are
  * called for where both integrators find much of the light in rare contributions (caustics through water, panes,
  * frosted glass), or some of it while the largest fall off so slowly that more samples keep on finding larger ones:
- * below a tail index of 1 not even a mean exists. Else it is `path` where its tail is that of a finite variance (2 or
- * more) and its second moment times rays is the smaller one; `bdpt` in all other cases, because the fireflies that a
- * pilot does not see decide the error of a long render.
+ * below a tail index of 1 not even a mean exists. Else it is `path` or `bdpt8` where path's tail is that of a finite
+ * variance (2 or more) and its second moment times rays is the smaller one: `path` where the tail is so short that it
+ * has no fireflies, else `bdpt8`, whose light sub-paths, one in eight samples, bound them. `bdpt` in all other cases,
+ * because the fireflies that a pilot does not see decide the error of a long render.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
