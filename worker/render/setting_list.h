@@ -27,5 +27,5 @@ SETTING(tessellation, "tessellation", SETTING_REAL, SETTING_WORLD, 1, 1e-3, 64, 
 	"Factor of the parts into which displacement cuts an edge", "0.125", "0.25", "0.5", "1", "2")
 SETTING(lenient, "lenient", SETTING_CHOICE, SETTING_WORLD, 0, 0, 1, "no yes",
 	"What the scene asks for and is not supported is left out or replaced by what is nearest, and noted", NULL)
-SETTING(sensor, "sensor", SETTING_WHOLE, SETTING_WORLD, 1, 1, 1000000, NULL,
+SETTING(sensor, "sensor", SETTING_WHOLE, SETTING_WORLD, 1, 1, 1000, NULL,
 	"Which of the scene's sensors is rendered, from 1 on", NULL)

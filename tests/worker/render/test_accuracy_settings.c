@@ -53,7 +53,9 @@ static void test_all_at_once(void **state)
 						 value);
 		else
 			used += (size_t)snprintf(all + used, sizeof all - used, "%s%s=%s", i ? "," : "", k->name,
-						 k->sweep[0] ? k->sweep[1] : "yes");
+						 k->sweep[0]		     ? k->sweep[1]
+						 : k->kind == SETTING_CHOICE ? "yes"
+									     : "1000");
 	}
 	assert_int_equal(accuracy_settings_read(all, &a, NULL), 0);
 	assert_int_equal(render_settings_canonical(all, once, NULL), 0);
