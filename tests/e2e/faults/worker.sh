@@ -18,7 +18,8 @@ one_worker_dies() {
 	worker "w$((i + 1))"
 }
 blameless() {
-	[ "$(value "$ID" failures)" = 0 ] || fail "$NAME: counted as $(value "$ID" failures) failures"
+	[ "$(value "$ID" failures)" = 0 ] ||
+		fail "$NAME: counted as $(value "$ID" failures) failures: $(grep event=lease_failed "$DIR/coordinator.log" | head -n 3)"
 }
 
 fault hoard_leases 1 1 "a worker claims 4,096 threads, takes leases, says its heartbeats and answers nothing"
