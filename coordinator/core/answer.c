@@ -256,6 +256,13 @@ static bool is_late_refusal(const struct slot *s, const struct event *ev)
 	return ev->lease.bad_states && (ev->lease.other_states || s->doubt.anew);
 }
 
+/* Granted before the job's files were right again: what failed is likely to be what its worker was given of them, and
+ * when that is heard it may be mended already. */
+static bool is_files_fault(const struct lease *l, const struct event *ev)
+{
+	return l && !ev->lease.own && !ev->lease.bad_states && l->sent < l->job->files_changed;
+}
+
 void answer_failed(struct farm *f, const struct event *ev)
 {
 	struct slot *s = next_slot(f, ev);
@@ -267,6 +274,10 @@ void answer_failed(struct farm *f, const struct event *ev)
 	bool was_lost = s && lost_take(&s->lost, p->who);
 	if (!l && !was_lost)
 		return;
+	if (is_files_fault(l, ev)) {
+		lease_drop(f, l);
+		return;
+	}
 	struct job *j = farm_find_job(f, ev->lease.key.job);
 	if (l)
 		lease_drop(f, l);

@@ -119,6 +119,8 @@ void job_hold(struct job *j, enum job_hold which, const char *why, double now)
 {
 	bool was = job_is_held(j);
 	text_copy(j->held[which], sizeof j->held[which], why);
+	if (which == HOLD_FILES)
+		j->files_changed = now;
 	if (!was && job_is_held(j))
 		j->held_since = now;
 	if (!was || job_is_held(j))

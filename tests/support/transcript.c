@@ -347,7 +347,7 @@ static void take_job(const char **at, struct event *ev)
 	} else if (take(at, "hold") || take(at, "release")) {
 		ev->kind = EVENT_HOLD;
 		ev->tag = 7;
-		ev->hold = take(at, "order") ? HOLD_ORDERED : HOLD_STORAGE;
+		ev->hold = take(at, "order") ? HOLD_ORDERED : take(at, "files") ? HOLD_FILES : HOLD_STORAGE;
 		ev->job = take_id(at, "j");
 	} else if (take(at, "priority")) {
 		ev->kind = EVENT_PRIORITY;

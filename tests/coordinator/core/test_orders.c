@@ -48,6 +48,32 @@ static void hold_and_release(void **state)
 	farm_free(f);
 }
 
+/* Leases from before the files were right again fail for want of them, whenever that is heard; later ones count. */
+static void damaged_files_are_nobodys_fault(void **state)
+{
+	(void)state;
+	struct farm *f = transcript_farm();
+	transcript_play(f, (const char *const[]){
+				   "[0] submit groups=3 -> j1 submitted, j1 is queued",
+				   "[0] w1 joins A threads=3 -> -",
+				   "[0] w1 wants 3 -> j1 is bootstrap, w1 gets j1 g0 p0 boot, w1 gets j1 g1 p0 boot, "
+				   "w1 gets j1 g2 p0 boot",
+				   "[1] hold files j1 a file is damaged -> -",
+				   "[2] w1 fails j1 g0 p0 boot it has the file no more -> -",
+				   "[3] release files j1 -> w1 gets j1 g0 p0 boot",
+				   "[4] w1 fails j1 g1 p0 boot it has the file no more -> w1 gets j1 g1 p0 boot",
+				   NULL,
+			   });
+	assert_int_equal(status(f, 1, 4).failures, 0);
+	transcript_play(f, (const char *const[]){
+				   "[5] w1 lacks j1 g2 p0 boot no memory -> -",
+				   "[6] w1 fails j1 g0 p0 boot it has the file no more -> -",
+				   NULL,
+			   });
+	assert_int_equal(status(f, 1, 6).failures, 2);
+	farm_free(f);
+}
+
 static void two_reasons(void **state)
 {
 	(void)state;
@@ -255,9 +281,13 @@ static void extend_when_it_has_ended(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(hold_and_release),	    cmocka_unit_test(two_reasons),
-		cmocka_unit_test(the_clock_stands_still),   cmocka_unit_test(priority),
-		cmocka_unit_test(extend_while_it_runs),	    cmocka_unit_test(extend_while_it_ends),
+		cmocka_unit_test(damaged_files_are_nobodys_fault),
+		cmocka_unit_test(hold_and_release),
+		cmocka_unit_test(two_reasons),
+		cmocka_unit_test(the_clock_stands_still),
+		cmocka_unit_test(priority),
+		cmocka_unit_test(extend_while_it_runs),
+		cmocka_unit_test(extend_while_it_ends),
 		cmocka_unit_test(extend_when_it_has_ended),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
