@@ -20,6 +20,7 @@ struct entry {
 	unsigned holds;
 	double checked; /* when its bytes were last found to be right, s on a clock that never goes back; 0: not in this
 			   life */
+	bool given;	/* opened since then */
 	bool gone;	/* or damaged: it is as if it were not there, but for its holds */
 };
 
@@ -323,6 +324,7 @@ int blob_open(struct blob_store *s, const struct blob_hash *h, uint64_t *size, s
 	if (fd < 0)
 		return error_set(e, ENOENT, "there is no blob %s", hex);
 	*size = n->size;
+	n->given = true;
 	return fd;
 }
 
@@ -366,7 +368,7 @@ int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, 
 	blob_hex(h, hex);
 	if (!n)
 		return error_set(e, ENOENT, "there is no blob %s", hex);
-	if (n->checked > 0 && now() - n->checked <= seconds)
+	if (n->checked > 0 && (seconds == BLOB_SINCE_GIVEN ? !n->given : now() - n->checked <= seconds))
 		return 0;
 	blob_path(s, h, path, sizeof path);
 	int rc = hash_file(path, &got, e);
@@ -374,6 +376,7 @@ int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, 
 		return rc;
 	if (!rc && blob_hash_equal(&got, h)) {
 		n->checked = now();
+		n->given = false;
 		return 0;
 	}
 	snprintf(aside, sizeof aside, "%s/damaged.%s", s->folder, hex);
@@ -479,8 +482,11 @@ static int finish(struct blob_writer *w, struct error *e)
 	}
 	if (!rc && !n)
 		rc = add_entry(s, &w->hash, w->size, 1, e);
-	if (!rc)
-		find(s, &w->hash)->checked = now();
+	if (!rc) {
+		n = find(s, &w->hash);
+		n->checked = now();
+		n->given = false;
+	}
 	return rc;
 }
 

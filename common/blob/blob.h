@@ -38,10 +38,11 @@ bool blob_has(struct blob_store *s, const struct blob_hash *h, uint64_t *size); 
 bool blob_hold(struct blob_store *s, const struct blob_hash *h);
 void blob_release(struct blob_store *s, const struct blob_hash *h);
 
-/* Whether the file's bytes are still those of its name, read anew unless that was done in the last so many seconds: a
- * second a gigabyte. -EBADMSG: they are not, or the file is gone: it is kept as damaged.NAME, and the store has the
- * blob no more until it is written again; holds stay. -ENOENT: the store has it not. Else the file cannot be read just
- * now. */
+/* Whether the file's bytes are still those of its name, read anew unless that was done in the last so many seconds, or
+ * (BLOB_SINCE_GIVEN) since it was opened last: a second a gigabyte. -EBADMSG: they are not, or the file is gone: it is
+ * kept as damaged.NAME, and the store has the blob no more until it is written again; holds stay. -ENOENT: the store
+ * has it not. Else the file cannot be read just now. */
+enum { BLOB_SINCE_GIVEN = -1 };
 int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, struct error *e);
 /* Holds a blob that is there or is not: when it is written again it is held. -ENOMEM */
 int blob_expect(struct blob_store *s, const struct blob_hash *h, struct error *e);

@@ -79,7 +79,7 @@ struct job {
 	char text[256];
 	char held[JOB_HOLDS][256]; /* why no lease of it goes out; "" each when they do */
 	double held_since;	   /* NAN: it is not */
-	double files_changed;	   /* when a file of its scene was found gone or damaged, or was right again; 0: never */
+	double files_changed; /* when a file of its scene was found gone or damaged, or was right again; 0: never */
 };
 
 /* NULL with a sentence when it is refused. */

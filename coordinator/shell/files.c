@@ -55,14 +55,14 @@ int files_check(struct server *s, const struct blob_hash *h, double seconds, str
 	return rc;
 }
 
-bool files_are_right(struct server *s, struct live_job *o, double seconds)
+bool files_are_right(struct server *s, struct live_job *o)
 {
 	const Farm__Submit *m = live_job_submit(o);
 	struct error e;
 	bool right = true;
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = live_job_file_hash(m->files[i]);
-		right = files_check(s, &h, seconds, &e) == 0 && right;
+		right = files_check(s, &h, BLOB_SINCE_GIVEN, &e) == 0 && right;
 	}
 	return right;
 }

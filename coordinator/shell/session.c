@@ -280,8 +280,7 @@ void session_lease_failed(struct session *p, const Farm__LeaseFailed *f)
 	ev.lease.bad_states = f->bad_states;
 	ev.lease.other_states = f->bad_states && !(o && live_job_gives_states(o, &ev.lease.key, &states));
 	bool blamed = f->own || f->bad_states;
-	if (o && *f->text && !blamed &&
-	    !files_are_right(p->server, o, FILES_DOUBTED)) { /* the spool's fault, not the worker's */
+	if (o && *f->text && !blamed && !files_are_right(p->server, o)) { /* the spool's fault, not the worker's */
 		ev.kind = EVENT_LEASE_RETURNED;
 		text[0] = 0;
 	}
