@@ -68,6 +68,7 @@ struct render_summary {
 	double brightest; /* see world_brightest */
 	struct render_coincident coincident;
 	char scales[256]; /* a shape that is too small beside another, by name; "": none is */
+	char flat[256];	  /* how many triangles without an area were left out; "": none */
 };
 
 /* Reads every mesh, texture and material and says what the scene calls for; all but Embree's own building. What passes

@@ -82,7 +82,7 @@ static int place_vertices(struct mesh *m, const struct mesh_finish *f, const str
 	return 0;
 }
 
-static int drop_flat(struct mesh *m, uint64_t *dropped, const struct scene_node *n, struct error *e)
+static uint64_t drop_flat(struct mesh *m)
 {
 	uint32_t kept = 0;
 	for (uint32_t i = 0; i < m->triangle_count; i++) {
@@ -91,9 +91,9 @@ static int drop_flat(struct mesh *m, uint64_t *dropped, const struct scene_node 
 			memcpy(m->index[kept++], t, sizeof t);
 		}
 	}
-	*dropped = m->triangle_count - kept;
+	uint64_t dropped = m->triangle_count - kept;
 	m->triangle_count = kept;
-	return kept ? 0 : node_error(n, e, EINVAL, "has no triangle with an area");
+	return dropped;
 }
 
 /* Where a file's normals and winding contradict each other, the normals are believed, as Mitsuba's emitters and
@@ -164,10 +164,9 @@ int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena
 		const struct scene_node *n, struct error *e)
 {
 	int r = place_vertices(m, f, n, e);
-	if (!r)
-		r = drop_flat(m, dropped, n, e);
 	if (r)
 		return r;
+	*dropped = drop_flat(m);
 	if (m->normal)
 		wind_by_normals(m);
 	if (f->face_normals)

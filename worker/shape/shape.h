@@ -50,8 +50,8 @@ extern const struct shape_ops *const shape_registry[]; /* ends with NULL */
 /* Classes of objects that a shape may hold without a name: struct plugin_decl. */
 extern const unsigned shape_nested_classes;
 
-/* Builds the geometry of a PLUGIN_SHAPE node. Checked: finite, indices in range, at least one triangle of area > 0
- * (others are dropped and counted in *dropped). One thread; allocates in the arena. */
+/* Builds the geometry of a PLUGIN_SHAPE node. Checked: finite, indices in range. Triangles without an area are
+ * dropped and counted in *dropped; a mesh may have none left. One thread; allocates in the arena. */
 int shape_build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
 		struct shape_geometry *out, uint64_t *dropped, struct error *e);
 

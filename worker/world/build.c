@@ -53,7 +53,33 @@ static bool is_displaced(const struct builder *b, const struct scene_node *shape
 	return b->forced.of[EFFECT_DISPLACEMENT] >= 0 && displacement_of(shape);
 }
 
-/* Shapes of the scene, their geometry in double, and the box around them. */
+/* Triangles without an area: nothing meets them, and they are left out. */
+struct flat {
+	uint64_t triangles;
+	uint32_t shapes, empty; /* that have some; that have nothing else */
+	const struct scene_node *first;
+};
+
+static void count_flat(struct flat *f, const struct scene_node *n, uint64_t triangles, bool empty)
+{
+	if (triangles && !f->first)
+		f->first = n;
+	f->triangles += triangles;
+	f->shapes += triangles > 0;
+	f->empty += empty;
+}
+
+static void note_flat(struct world *w, const struct flat *f)
+{
+	if (f->first)
+		snprintf(
+			w->flat, sizeof w->flat,
+			"%llu triangles without an area are left out, in %u shapes (first: the %.24s in line %d); %u of these "
+			"shapes have no others",
+			(unsigned long long)f->triangles, f->shapes, f->first->type, f->first->line, f->empty);
+}
+
+/* Shapes of the scene, their geometry in double, and the box around them. A shape with nothing to meet is none. */
 static int read_shapes(struct builder *b)
 {
 	const struct scene *s = b->scene;
@@ -61,31 +87,47 @@ static int read_shapes(struct builder *b)
 	int rc = shape_list(s, &b->scratch, &b->shape_nodes, &w->shape_count, b->e);
 	if (rc)
 		return rc;
+	const struct scene_node *const *list = b->shape_nodes;
+	const struct scene_node **nodes = arena_alloc(&b->scratch, w->shape_count, sizeof *nodes);
+	b->shape_nodes = nodes;
 	b->geometry = arena_alloc(&b->scratch, w->shape_count, sizeof *b->geometry);
 	b->boxes = arena_alloc(&b->scratch, w->shape_count, sizeof *b->boxes);
-	if (!b->geometry || !b->boxes)
+	if (!nodes || !b->geometry || !b->boxes)
 		return out_of_memory(b->e);
 	b->all = (struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 	uint64_t triangles = 0;
-	for (uint32_t k = 0; k < w->shape_count; k++) {
-		const struct scene_node *n = b->shape_nodes[k];
+	uint32_t listed = w->shape_count;
+	struct flat flat = {0};
+	w->shape_count = 0;
+	for (uint32_t i = 0; i < listed; i++) {
+		const struct scene_node *n = list[i];
+		struct shape_geometry *g = &b->geometry[w->shape_count];
 		uint64_t dropped = 0;
 		tick();
 		crash_place("building the scene", n->file, n->line);
-		rc = shape_build(n, b->assets, &b->scratch, &b->geometry[k], &dropped, b->e);
-		if (!rc && b->forced.of[EFFECT_DISPLACEMENT] >= 0)
-			rc = displacement_apply(&b->geometry[k], n, b->assets, s->dialect_3, w->accuracy.tessellation,
-						&b->scratch, b->e);
+		rc = shape_build(n, b->assets, &b->scratch, g, &dropped, b->e);
 		if (rc)
 			return rc;
-		triangles += b->geometry[k].mesh.triangle_count;
+		bool empty = g->kind == SHAPE_MESH && g->mesh.triangle_count == 0;
+		count_flat(&flat, n, dropped, empty);
+		if (empty)
+			continue;
+		if (b->forced.of[EFFECT_DISPLACEMENT] >= 0)
+			rc = displacement_apply(g, n, b->assets, s->dialect_3, w->accuracy.tessellation, &b->scratch,
+						b->e);
+		if (rc)
+			return rc;
+		triangles += g->mesh.triangle_count;
 		if (triangles > TRIANGLES_MAX)
 			return node_error(n, b->e, E2BIG, "the scene has more than %d triangles with it",
 					  TRIANGLES_MAX);
-		b->boxes[k] = box_of(&b->geometry[k]);
-		box_grow(&b->all, b->boxes[k].low);
-		box_grow(&b->all, b->boxes[k].high);
+		nodes[w->shape_count] = n;
+		b->boxes[w->shape_count] = box_of(g);
+		box_grow(&b->all, b->boxes[w->shape_count].low);
+		box_grow(&b->all, b->boxes[w->shape_count].high);
+		w->shape_count++;
 	}
+	note_flat(w, &flat);
 	crash_place("building the scene", NULL, 0);
 	if (w->shape_count == 0)
 		b->all.low = b->all.high = (vec3){0, 0, 0};

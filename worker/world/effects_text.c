@@ -153,6 +153,10 @@ bool render_scene_note(const struct render_summary *scene, size_t i, char *text,
 		snprintf(text, size, "%s", scene->scales);
 		return true;
 	}
+	if (*scene->flat && i-- == 0) {
+		snprintf(text, size, "%s", scene->flat);
+		return true;
+	}
 	if (i < c->count) {
 		snprintf(text, size, "%s", c->text[i]);
 		return true;

@@ -29,6 +29,7 @@ void world_summary(const struct world *w, struct render_summary *out)
 				       .brightest = world_brightest(w),
 				       .coincident = w->coincident};
 	memcpy(out->scales, w->scales, sizeof out->scales);
+	memcpy(out->flat, w->flat, sizeof out->flat);
 	memcpy(out->lines, w->effects.lines, sizeof out->lines);
 	for (uint32_t i = 0; i < w->shape_count; i++)
 		out->triangles += w->shapes[i].triangle_count;

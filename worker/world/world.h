@@ -37,6 +37,7 @@ struct world {
 	struct coincidence *coincidence;     /* of surfaces; NULL: none */
 	struct render_coincident coincident; /* what there is to say of it */
 	char scales[256];		     /* of shapes that are too small beside others; "": nothing */
+	char flat[256];			     /* of triangles without an area; "": nothing */
 	struct accel *accel;
 };
 

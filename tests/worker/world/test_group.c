@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * Shapes in merges and instances against the same shapes written out; which sensor; orthographic cameras.
+ * Shapes in merges and instances against the same shapes written out; shapes without an area; which sensor;
+ * orthographic cameras.
  */
 #include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
@@ -99,6 +100,34 @@ static void refuses(const char *inside, const char *accuracy, const char *text)
 		fail_msg("%s\n gave: %s\n not: %s", inside, e.text, text);
 }
 
+/* Such a mesh is left out with its material and its light; of another its triangles with an area stay. All is counted.
+ */
+static void test_flat(void **state)
+{
+	(void)state;
+	static const char *const meshes[] = {"v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 1 2\nf 1 2 1\n",
+					     "v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\nf 3 3 3\n"};
+	static const char scene[] =
+		"<scene version='3.0.0'>" VIEW SKY RED "<shape type='cube'/>"
+		"<shape type='obj'><string name='filename' value='flat.obj'/>" LAMP "</shape>"
+		"<shape type='obj'><string name='filename' value='half.obj'/><ref id='red'/></shape>"
+		"<shape type='sphere'>" LAMP "</shape></scene>";
+	const struct memory_file files[] = {{"scene.xml", scene, strlen(scene)},
+					    {"flat.obj", meshes[0], strlen(meshes[0])},
+					    {"half.obj", meshes[1], strlen(meshes[1])},
+					    {NULL, NULL, 0}};
+	struct world *w = world_of_files(8, 8, files);
+	assert_int_equal(w->shape_count, 3);
+	assert_int_equal(w->shapes[1].triangle_count, 1);
+	assert_true(w->shapes[2].is_sphere && w->parts[2].emitter >= 0 && w->parts[1].emitter < 0);
+	assert_true(w->parts[0].bsdf != w->parts[1].bsdf);
+	assert_int_equal(w->emitter_count, 2); /* the sphere and the sky */
+	assert_non_null(
+		strstr(w->flat, "3 triangles without an area are left out, in 2 shapes (first: the obj in line 1)"));
+	assert_non_null(strstr(w->flat, "1 of these shapes have no others"));
+	world_free(w);
+}
+
 static void test_refused(void **state)
 {
 	(void)state;
@@ -173,10 +202,8 @@ static void test_orthographic(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_copies),
-		cmocka_unit_test(test_refused),
-		cmocka_unit_test(test_sensors),
-		cmocka_unit_test(test_orthographic),
+		cmocka_unit_test(test_copies),	cmocka_unit_test(test_flat),	     cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_sensors), cmocka_unit_test(test_orthographic),
 	};
 	return cmocka_run_group_tests_name("group", tests, NULL, NULL);
 }
