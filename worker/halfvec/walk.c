@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Finds vertices x_{b-1} .. x_{c+1} with given half vectors h*, by Newton's method (see walk.h).
+ *
+ * Each iteration solves M dx = h* - h, M = dh/dx block tridiagonal, moves every vertex by step * dx in its tangent
+ * plane and puts it back onto the surface along the ray from the vertex before it. If the largest residual,
+ * |h* - h|^2 / (1 + |h|^2), has shrunk, the trial is kept and the step doubled, up to 1; otherwise the vertices stay
+ * and the step is halved. It ends well when each |h* - h| is within its vertex's tolerance and, unless the caller
+ * knows it, every edge is unoccluded. At least one trial is made, as the path it starts with was never traced.
+ * It fails when the step becomes too short (the reason is that of the last trial: missed, blocked, another mode,
+ * residuals grew), when M is singular, or when the iterations run out.
+ */
 #include "worker/halfvec/walk.h"
 
 #include <assert.h>

@@ -1,4 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Proposes a path y from x for a given b and c, and weighs it (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4 and 5).
+ *
+ * x_{k-1} .. x_b are traced. Between x_b and x_c each half vector that is not exactly specular takes a Gaussian step,
+ * h' = h + dh, and the walk finds vertices that have the new half vectors; a second walk must lead from y back to x.
+ * With c = b - 1 there is nothing to walk: x_b and x_c are joined. The logarithm of the weight is that of
+ *
+ *   prod_{j <= c, j = b} f_j  prod_{other j < k} f_j |d i_j^perp / d h_j|  G_b |det d x_{b-1} / d x_c|  /  q
+ *
+ * with f_0 = L_e, i_j the direction from x_j towards the light, h in slopes, G_b the cosines, the distance and the
+ * camera's Jacobian at the edge x_b x_{b-1}, and q the densities of the choice of b and c, of the steps and of the
+ * point on the emitter; factors common to f and q are never computed. A proposal fails, with the reason counted, where
+ * a ray misses, an edge is occluded, a vertex would scatter in another mode, the matrix is singular, the walk does not
+ * converge or does not lead back, or the path leaves the film.
+ */
 #include "worker/mutation/breakup.h"
 
 #include "worker/mutation/trace.h"

@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The paths that a pair of sub-paths makes, as candidates with their contributions (see ensemble.h).
+ *
+ * ensemble_draw draws the two sub-paths and connects them by every technique (s, t), s vertices from the light and t
+ * from the camera; a candidate's intensity is that of the contribution weighted by multiple importance sampling (Veach
+ * 1997). Where lengths are limited by chance it is divided by survival(s) survival(t), survival(n) = min(1, (5/n)^2).
+ * ensemble_choose takes candidate i with probability intensity_i / total. ensemble_around draws a technique of the
+ * given path x with probability p_s(x) / sum_j p_j(x), splits x there and continues both parts at random; x itself
+ * contributes f(x) / sum_j p_j(x). Nothing is reported as an error: paths without a contribution are left out, and
+ * ensemble_choose returns false where no candidate is left.
+ */
 #include "worker/path/ensemble.h"
 
 #include "worker/math/logsum.h"

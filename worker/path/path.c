@@ -1,4 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Sub-paths from the camera and from the emitters, the densities with which they are made, and the film's splats.
+ *
+ * path_walk_camera and path_walk_light draw the first vertex and its direction, then scatter_on draws one direction
+ * after another from the BSDFs, with Russian roulette where it is allowed. Each vertex keeps its throughput (beta) and
+ * its densities per area from both sides, pdf and pdf_rev, from which multiple importance sampling takes its weights
+ * (Veach 1997). A vertex at infinity stands for a direction; its density is per solid angle. A sub-path ends early
+ * where a ray finds nothing, a density is zero, or shading and geometric normal disagree about a direction's side. A
+ * contribution that is NaN, infinite or negative is counted and left out.
+ */
 #include "worker/path/path.h"
 
 #include "worker/path/measure.h"
