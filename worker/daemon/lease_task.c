@@ -60,14 +60,15 @@ static uint64_t next(uint64_t *state)
 }
 
 /* Behind its id, so that it looks like the chain's: flipped bits, numbers that are none or huge or tiny, noise here and
- * there, the end cut off, noise throughout. */
-static void spoil_state(struct chain_state *s, uint64_t *dice)
+ * there, the end cut off, noise throughout. The last two are no states of any plan (plainly); after the others one may
+ * be, only not the chain's: in primary sample space most bits of a random number make another random number. */
+static void spoil_state(struct chain_state *s, bool plainly, uint64_t *dice)
 {
 	enum { ID = 8, MUTATIONS = 8 };
 	static const double numbers[] = {NAN, INFINITY, -INFINITY, 1e308, -1e308, 5e-324, 1e-310, -0.0};
 	if (s->size <= ID + sizeof *numbers)
 		return;
-	uint64_t kind = next(dice) % 5, left = s->size - ID;
+	uint64_t kind = plainly ? 3 + next(dice) % 2 : next(dice) % 5, left = s->size - ID;
 	for (int i = 0; i < MUTATIONS; i++) {
 		uint8_t *at = s->bytes + ID + next(dice) % left;
 		if (kind == 0)
@@ -83,10 +84,11 @@ static void spoil_state(struct chain_state *s, uint64_t *dice)
 		s->size -= (uint32_t)(1 + next(dice) % (left - 1));
 }
 
+/* The first one plainly, or nobody could notice. */
 static void spoil(const struct batch *b, uint64_t dice)
 {
 	for (uint32_t i = 0; i < b->state_count; i++)
-		spoil_state(&b->states[i], &dice);
+		spoil_state(&b->states[i], i == 0, &dice);
 }
 
 /* Packed here, so that the loop's thread never encodes a film. */
