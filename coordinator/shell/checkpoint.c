@@ -1,4 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Checkpoints: the films, seeds, chain states and counters of a job in one file, so that its journal can begin anew.
+ *
+ * checkpoint_where_due starts one when a job's journal has grown beyond the last checkpoint or a minimum, one job at a
+ * time. The thread pool writes the next journal (with the last results of each group and part, which may still be taken
+ * back), then checkpoint.tmp, syncs it, renames it to checkpoint and syncs the folder. Results that arrive meanwhile
+ * wait in memory. Then the new journal takes over and older ones are deleted.
+ *
+ * If writing fails, the old checkpoint and journal go on, and another attempt follows after a pause. If only the sync
+ * of the folder fails it is unknown which of the two pairs a crash would leave; both hold everything acknowledged, and
+ * the job is held until a checkpoint succeeds. A checkpoint that is damaged when it is read makes its job begin anew.
+ */
 #include "coordinator/shell/checkpoint.h"
 
 #include "common/base/disk.h"

@@ -17,7 +17,8 @@
 void checkpoint_where_due(struct server *s);
 
 /* Into a new order without merged batches, by any thread. -ENOENT: there is none; -EBADMSG: it is damaged; -EPROTO: of
- * another version; the order is of no use then. generation: of the journal that follows. heard: as in sealed.h. */
+ * another version; the order is of no use then. generation: of the journal that follows. heard: as in checked_file.h.
+ */
 int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation, checked_file_heard *heard,
 		    void *user, struct error *e);
 

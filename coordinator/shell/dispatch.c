@@ -1,4 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Carries out what the core answers to an event, action by action: sends leases, revocations and acknowledgements,
+ * merges results, prepares jobs after their bootstrap, starts publishing, records changes of state.
+ *
+ * A result that the core wants merged is first appended to the job's journal (durable_merged), then added to its films;
+ * its acknowledgement waits for the flush (durable_ack). A job that the core has ended is finished as soon as no thread
+ * reads its films: record, ledger, JobEnd to all workers, memory.
+ *
+ * If a result cannot be merged for want of memory the process exits: the films may hold half of it, nobody was told
+ * that it is stored, and the next start has it from the journal or computes it again. Any other failure of a merge ends
+ * the job. A job that cannot be prepared, because the disk is full, is tried again.
+ */
 #include "coordinator/shell/dispatch.h"
 
 #include "common/base/disk.h"

@@ -1,4 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What must be on disk before it is acknowledged: submissions, results, the ends of jobs.
+ *
+ * Results: durable_reserve makes room in the journal and the films before the core sees a result, so that merging it
+ * cannot fail for want of space. durable_merged appends it. durable_ack queues its acknowledgement; flush_next syncs
+ * the journals of all queued ones in the thread pool (group commit), and done() sends them.
+ *
+ * A full or failing disk never loses an acknowledged result: the job is held with the reason, its acknowledgements are
+ * parked, and durable_tick tries again every retry_seconds, with a new journal if the old one cannot be trusted. A job
+ * whose end cannot be recorded stays in a list of endings until it can. Only running out of memory for these lists
+ * (some 200 bytes) ends the process.
+ */
 #include "coordinator/shell/durable.h"
 
 #include "common/base/disk.h"

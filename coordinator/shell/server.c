@@ -1,4 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The coordinator's event loop, and how an event runs through it.
+ *
+ * server_open opens the spool, the ledger and the core, starts to read the jobs of the last run (recovery.h), and
+ * listens. From then on whatever happens becomes an event: server_step gives it to the core (core/farm.h), which
+ * changes its state and answers with a list of actions, and dispatch.c carries these out. Events that come up meanwhile
+ * are queued and follow before server_step returns. Five times a second a timer drives what has to happen by itself:
+ * status, retries, checkpoints, retention, the service manager's watchdog.
+ *
+ * SIGTERM and SIGINT stop the loop when the work in the thread pool has ended; nothing needs to be written then, for
+ * everything acknowledged is on disk. Errors of one job hold or end that job. A fault that makes the spool unreadable
+ * stops the coordinator with a message (server_run returns it).
+ */
 #include "coordinator/shell/server.h"
 
 #include "common/base/disk.h"
