@@ -198,7 +198,12 @@ file_damaged() {
 	finish_job
 	blameless
 }
+# Held meanwhile, lest the worker ends the job before it stops; of another job where this one is done already.
 file_is_damaged() {
+	until "$BIN/hslt-job" hold "$ID" 2>>"$DIR/hold.log"; do
+		job
+		until_true 60 is_merged 3 || fail "$NAME: nothing is merged"
+	done
 	for f in "$DIR/spool/blobs"/[0-9a-f]*; do
 		flip "$f" 0.5
 	done
@@ -209,6 +214,7 @@ file_is_damaged() {
 	[ $((i % 2)) -eq 0 ] || { kill -9 "$COORDINATOR_PID" && again; }
 	sleep 0.1
 	start_worker "w$i" -v --cache "$DIR/own"
+	"$BIN/hslt-job" release "$ID" 2>>"$DIR/hold.log" || fail "$NAME: $(tail -n 1 "$DIR/hold.log")"
 	until_true 60 waits_for_file || fail "$NAME: it does not wait: $(value "$ID" waiting)"
 	# shellcheck disable=SC2086
 	again_id=$("$BIN/hslt-submit" "$BOX" -o "$DIR/again.exr" $JOB 2>>"$DIR/submit.log") || fail "$NAME: $(tail -n 1 "$DIR/submit.log")"
