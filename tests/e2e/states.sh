@@ -30,7 +30,7 @@ done
 again=0
 for seed in ${SEEDS:-1}; do
 	for integrator in hslt pssmlt; do
-		start_worker liar-$seed-$integrator --test-spoil-states 1
+		start_worker liar-$seed-$integrator --cache "$DIR/liar-$seed-$integrator" --test-spoil-states 1
 		liar=$WORKER
 		id=$(submit "$BOX" -o "$DIR/all.exr" $JOB --integrator $integrator --seed $seed)
 		"$BIN/hslt-render" "$BOX" -o "$DIR/alone.exr" $JOB --integrator $integrator --seed $seed 2>"$DIR/render.log"
