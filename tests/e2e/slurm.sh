@@ -142,6 +142,7 @@ pause() {
 # requeued JOB: is pending for its next life, which begins now instead of two minutes later
 requeued() {
 	until_true 60 is_job "$1" PENDING || return 1
+	sleep 2 # a slurmd kills a job that begins anew in the second in which it was told to end it
 	scontrol update JobId="$1" StartTime=now
 	until_true 60 is_job "$1" RUNNING
 }
