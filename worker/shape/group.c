@@ -97,7 +97,7 @@ static int list(struct listing *l, const struct scene_node *n, const mat4 *place
 	return it ? append(l, it) : out_of_memory(l);
 }
 
-int shape_list(const struct scene *s, struct arena *arena, const struct scene_node *const **nodes, uint32_t *count,
+int shape_list(const struct scene *s, struct arena *arena, const struct scene_node ***nodes, uint32_t *count,
 	       struct error *e)
 {
 	struct listing l = {.arena = arena, .e = e};

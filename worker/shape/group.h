@@ -13,7 +13,7 @@ enum { SHAPES_MAX = 1 << 20 };
 
 /* Nodes of the scene, or copies in the arena, in the file's order. -EINVAL, -ENOTSUP, -E2BIG with a sentence, -ENOMEM.
  */
-int shape_list(const struct scene *s, struct arena *arena, const struct scene_node *const **nodes, uint32_t *count,
+int shape_list(const struct scene *s, struct arena *arena, const struct scene_node ***nodes, uint32_t *count,
 	       struct error *e);
 
 #endif

@@ -23,8 +23,7 @@ struct builder {
 	const struct asset_source *assets;
 	struct arena scratch;
 	struct shape_geometry *geometry;
-	const struct scene_node *const *shape_nodes;
-	const struct scene_node **bsdf_nodes, **emitter_nodes;
+	const struct scene_node **shape_nodes, **bsdf_nodes, **emitter_nodes;
 	struct effects_choice forced;
 	struct emitter_surface *surfaces;
 	struct box all, *boxes; /* boxes: one a shape */
@@ -87,12 +86,9 @@ static int read_shapes(struct builder *b)
 	int rc = shape_list(s, &b->scratch, &b->shape_nodes, &w->shape_count, b->e);
 	if (rc)
 		return rc;
-	const struct scene_node *const *list = b->shape_nodes;
-	const struct scene_node **nodes = arena_alloc(&b->scratch, w->shape_count, sizeof *nodes);
-	b->shape_nodes = nodes;
 	b->geometry = arena_alloc(&b->scratch, w->shape_count, sizeof *b->geometry);
 	b->boxes = arena_alloc(&b->scratch, w->shape_count, sizeof *b->boxes);
-	if (!nodes || !b->geometry || !b->boxes)
+	if (!b->geometry || !b->boxes)
 		return out_of_memory(b->e);
 	b->all = (struct box){{INFINITY, INFINITY, INFINITY}, {-INFINITY, -INFINITY, -INFINITY}};
 	uint64_t triangles = 0;
@@ -100,7 +96,7 @@ static int read_shapes(struct builder *b)
 	struct flat flat = {0};
 	w->shape_count = 0;
 	for (uint32_t i = 0; i < listed; i++) {
-		const struct scene_node *n = list[i];
+		const struct scene_node *n = b->shape_nodes[i];
 		struct shape_geometry *g = &b->geometry[w->shape_count];
 		uint64_t dropped = 0;
 		tick();
@@ -121,7 +117,7 @@ static int read_shapes(struct builder *b)
 		if (triangles > TRIANGLES_MAX)
 			return node_error(n, b->e, E2BIG, "the scene has more than %d triangles with it",
 					  TRIANGLES_MAX);
-		nodes[w->shape_count] = n;
+		b->shape_nodes[w->shape_count] = n;
 		b->boxes[w->shape_count] = box_of(g);
 		box_grow(&b->all, b->boxes[w->shape_count].low);
 		box_grow(&b->all, b->boxes[w->shape_count].high);
