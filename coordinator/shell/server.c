@@ -96,6 +96,8 @@ void server_job_broken(struct server *s, uint64_t job, const char *text)
 
 static void on_wake(uv_timer_t *t);
 
+static const struct incoming nothing;
+
 static void one_step(struct server *s, struct event *ev, const struct incoming *in)
 {
 	struct update u;
@@ -116,7 +118,6 @@ static void one_step(struct server *s, struct event *ev, const struct incoming *
 
 void server_step(struct server *s, struct event *ev)
 {
-	static const struct incoming nothing = {0};
 	if (s->stepping) /* what sessions say while an update is carried out */
 		server_defer(s, ev);
 	else
@@ -125,7 +126,6 @@ void server_step(struct server *s, struct event *ev)
 
 void server_step_with(struct server *s, struct event *ev, const struct incoming *in)
 {
-	static const struct incoming nothing = {0};
 	assert(!s->stepping);
 	s->stepping = true;
 	one_step(s, ev, in);

@@ -15,11 +15,16 @@ static void interrupt(int signal_number)
 	atomic_store(&interrupted, true);
 }
 
-void interrupt_watch(void)
+static void handle_first(void (*handler)(int))
 {
-	struct sigaction act = {.sa_handler = interrupt, .sa_flags = (int)SA_RESETHAND};
+	struct sigaction act = {.sa_handler = handler, .sa_flags = (int)SA_RESETHAND};
 	sigaction(SIGINT, &act, NULL);
 	sigaction(SIGTERM, &act, NULL);
+}
+
+void interrupt_watch(void)
+{
+	handle_first(interrupt);
 }
 
 static const char *_Atomic last_words;
@@ -35,8 +40,6 @@ static void say_and_end(int signal_number)
 
 void interrupt_say(const char *text)
 {
-	struct sigaction act = {.sa_handler = say_and_end, .sa_flags = (int)SA_RESETHAND};
 	atomic_store(&last_words, text);
-	sigaction(SIGINT, &act, NULL);
-	sigaction(SIGTERM, &act, NULL);
+	handle_first(say_and_end);
 }
