@@ -8,6 +8,7 @@
 #define COMMON_BASE_LOG_H
 
 #include <stddef.h>
+#include <stdint.h>
 
 #define LOG_EVENTS(X)                                      \
 	X(START, "start", INFO)                            \
@@ -74,6 +75,11 @@ struct log_value {
 };
 /* "text" with quotes, and without control characters, cut to fit. */
 struct log_value log_quote(const char *text);
+/* For %llu, whatever uint64_t is here. */
+static inline unsigned long long log_u64(uint64_t n)
+{
+	return n;
+}
 
 /* Lines about connections come in rushes: of each such kind 100 at once and 5 a second are said, the others counted
  * (log_limit.h; not with LOG_LEVEL_DEBUG, where all are said). Called now and then it says how many of which kind that

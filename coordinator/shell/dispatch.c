@@ -34,11 +34,6 @@
 #include <time.h>
 #include <unistd.h>
 
-static unsigned long long number(uint64_t n)
-{
-	return n;
-}
-
 /* ---- jobs ---- */
 
 static void submitted(struct server *s, const struct action *a, const struct incoming *in)
@@ -93,7 +88,7 @@ static void job_changed(struct server *s, const struct action *a)
 		     : a->state == JOB_DONE ? LOG_JOB_DONE
 					    : LOG_JOB_STATE,
 		     "state=%s reason=%s rounds=%llu text=%s", job_state_name(a->state),
-		     a->end == END_NONE ? "none" : job_end_name(a->end), number(a->rounds), log_quote(a->text).text);
+		     a->end == END_NONE ? "none" : job_end_name(a->end), log_u64(a->rounds), log_quote(a->text).text);
 	o->ended = job_state_is_end(a->state);
 }
 
@@ -129,7 +124,7 @@ static void keep_partials(const struct server *s, const struct lease_key *k, con
 		size_t size;
 		const unsigned char *bytes = batch_tile_bytes(in->result, in->payload->bytes, i, &size);
 		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", s->config.keep_partials,
-			 number(k->job), number(k->epoch), k->group, k->part, in->batch->tiles[i].x,
+			 log_u64(k->job), log_u64(k->epoch), k->group, k->part, in->batch->tiles[i].x,
 			 in->batch->tiles[i].y);
 		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
 		if (fd < 0 || disk_write_all(fd, bytes, size))
@@ -164,8 +159,8 @@ static void merge(struct server *s, const struct action *a, const struct incomin
 		server_job_broken(s, a->job, e.text);
 	trust_merged(o, a);
 	live_job_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);
-	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", number(a->job),
-		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch),
+	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", log_u64(a->job),
+		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch),
 		  in->stored ? " late=1" : "");
 }
 
@@ -176,7 +171,7 @@ static void take_back(struct server *s, const struct action *a, const struct inc
 	back_take(o, in->back);
 	trust_taken_back(o, a->who);
 	live_job_log(o, LOG_BATCH_TAKEN_BACK, "kind=%d group=%u part=%u epoch=%llu text=%s", (int)a->key.kind,
-		     a->key.group, a->key.part, number(a->key.epoch), log_quote(a->text).text);
+		     a->key.group, a->key.part, log_u64(a->key.epoch), log_quote(a->text).text);
 }
 
 static void acknowledge(struct server *s, const struct action *a)
@@ -191,9 +186,9 @@ static void acknowledge(struct server *s, const struct action *a)
 		log_event(a->ack == ACK_REPEAT	? LOG_BATCH_REPEATED
 			  : a->ack == ACK_NOTED ? LOG_BATCH_NOTED
 						: LOG_BATCH_REFUSED,
-			  "job=j%llu peer=%llu worker=%s kind=%d group=%u part=%u epoch=%llu text=%s", number(a->job),
-			  number(a->peer), log_quote(p ? p->name : "?").text, (int)a->key.kind, a->key.group,
-			  a->key.part, number(a->key.epoch), log_quote(a->text).text);
+			  "job=j%llu peer=%llu worker=%s kind=%d group=%u part=%u epoch=%llu text=%s", log_u64(a->job),
+			  log_u64(a->peer), log_quote(p ? p->name : "?").text, (int)a->key.kind, a->key.group,
+			  a->key.part, log_u64(a->key.epoch), log_quote(a->text).text);
 }
 
 /* ---- leases and peers ---- */
@@ -206,8 +201,8 @@ static void send_lease(struct server *s, const struct action *a)
 		return;
 	live_job_count_worker(o, a->peer);
 	session_send_lease(p, o, &a->key, a->anew);
-	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
-		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
+	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", log_u64(a->job),
+		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch));
 }
 
 static void revoke_lease(struct server *s, const struct action *a)
@@ -215,8 +210,8 @@ static void revoke_lease(struct server *s, const struct action *a)
 	struct session *p = session_find(s, a->peer);
 	if (p)
 		session_send_revoke(p, &a->key);
-	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", number(a->job),
-		  number(a->peer), (int)a->key.kind, a->key.group, a->key.part, number(a->key.epoch));
+	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", log_u64(a->job),
+		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch));
 }
 
 static void close_peer(struct server *s, const struct action *a)

@@ -9,11 +9,6 @@
 
 #include <stdio.h>
 
-static unsigned long long number(uint64_t n)
-{
-	return n;
-}
-
 /* ---- bundles ---- */
 
 static struct job_cache *find_job_cache(const struct agent *a, uint64_t job)
@@ -88,7 +83,7 @@ static void drop_lease(struct agent *a, struct lease_task *l)
 
 static void fail_leases_of(struct agent *a, struct job_cache *b, const struct error *e)
 {
-	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", number(b->job), log_quote(e->text).text);
+	log_event(LOG_WORLD_FAILED, "job=j%llu text=%s", log_u64(b->job), log_quote(e->text).text);
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->bundle != b || l->state != LEASE_WAITING)
@@ -124,7 +119,7 @@ static void on_built(struct job_cache *b)
 	if (b->state == JOB_CACHE_FAILED) {
 		fail_job_cache(a, b, &b->error);
 	} else {
-		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", number(b->job), b->build_seconds,
+		log_event(LOG_WORLD_BUILT, "job=j%llu seconds=%.3f embree_bytes=%zu", log_u64(b->job), b->build_seconds,
 			  world_embree_bytes(b->world));
 		for (struct lease_task *l = a->leases; l; l = l->next)
 			if (l->bundle == b && l->state == LEASE_WAITING)
@@ -301,11 +296,11 @@ static void take_ack(struct agent *a, const Farm__LeaseAck *m)
 	}
 	struct lease_task *l = find_lease(a, &k);
 	if (m->verdict == FARM__VERDICT__VERDICT_REFUSED)
-		log_event(LOG_BATCH_REFUSED, "job=j%llu kind=%d group=%u part=%u epoch=%llu text=%s", number(k.job),
-			  (int)k.kind, k.group, k.part, number(k.epoch), log_quote(m->text).text);
+		log_event(LOG_BATCH_REFUSED, "job=j%llu kind=%d group=%u part=%u epoch=%llu text=%s", log_u64(k.job),
+			  (int)k.kind, k.group, k.part, log_u64(k.epoch), log_quote(m->text).text);
 	else if (m->verdict != FARM__VERDICT__VERDICT_NOTED)
 		log_event(LOG_BATCH_ACKNOWLEDGED, "job=j%llu kind=%d group=%u part=%u epoch=%llu repeat=%d",
-			  number(k.job), (int)k.kind, k.group, k.part, number(k.epoch),
+			  log_u64(k.job), (int)k.kind, k.group, k.part, log_u64(k.epoch),
 			  m->verdict == FARM__VERDICT__VERDICT_REPEATED);
 	if (l && l->state == LEASE_RENDERED) {
 		drop_lease(a, l);
@@ -343,7 +338,7 @@ static void take_job_end(struct agent *a, uint64_t job)
  */
 static void disown(struct agent *a, struct job_cache *b)
 {
-	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job of this number\"", number(b->job));
+	log_event(LOG_JOB_NOTE, "job=j%llu text=\"the coordinator has another job of this number\"", log_u64(b->job));
 	for (struct lease_task *l = a->leases, *next; l; l = next) {
 		next = l->next;
 		if (l->bundle == b && !l->unwanted)

@@ -7,11 +7,6 @@
 
 #include <string.h>
 
-static unsigned long long number(uint64_t n)
-{
-	return n;
-}
-
 void say_request(struct agent *a)
 {
 	Farm__LeaseRequest request;
@@ -61,8 +56,8 @@ static void say(struct agent *a, const struct lease_key *k, const char *text, bo
 	m.lease_failed = &failed;
 	agent_send(a, &m);
 	if (*text)
-		log_event(LOG_LEASE_FAILED, "job=j%llu kind=%d group=%u part=%u epoch=%llu text=%s", number(k->job),
-			  (int)k->kind, k->group, k->part, number(k->epoch), log_quote(text).text);
+		log_event(LOG_LEASE_FAILED, "job=j%llu kind=%d group=%u part=%u epoch=%llu text=%s", log_u64(k->job),
+			  (int)k->kind, k->group, k->part, log_u64(k->epoch), log_quote(text).text);
 }
 
 void say_failed(struct agent *a, const struct lease_key *k, const char *text, bool own)
