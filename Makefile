@@ -32,8 +32,7 @@ LIBS_COMMON := -lOpenEXRCore -lprotobuf-c -luv -lssl -lcrypto -ljansson -lsqlite
 LIBS_RENDER := $(EMBREE) -lexpat -lpng -ljpeg -lz
 
 COMMON_SRC := $(wildcard common/*/*.c)
-RENDER_SRC := $(filter-out %_gen.c,$(wildcard worker/math/*.c worker/scene/*.c worker/shape/*.c worker/geom/*.c worker/texture/*.c worker/bsdf/*.c \
-              worker/emitter/*.c worker/camera/*.c worker/world/*.c worker/path/*.c worker/halfvec/*.c worker/mutation/*.c worker/chain/*.c worker/render/*.c))
+RENDER_SRC := $(filter-out %_gen.c,$(wildcard worker/render/*.c worker/render/*/*.c))
 CTL_SRC    := $(filter-out coordinator/ctl/hslt_%.c,$(wildcard coordinator/ctl/*.c))
 COORD_SRC  := $(wildcard coordinator/core/*.c coordinator/store/*.c coordinator/shell/*.c)
 LIB_CTL    := $(BUILD)/lib/libhslt-ctl.a
@@ -81,7 +80,7 @@ generated: $(BUILD)/gen/.made
 $(BUILD)/gen/.made:
 	@mkdir -p $(@D) && touch $@
 
--include worker/texture/generate.mk
+-include worker/render/texture/generate.mk
 
 $(LIB_COMMON): $(call obj,$(COMMON_SRC)) $(PROTO_OBJ)
 $(LIB_RENDER): $(call obj,$(RENDER_SRC))
@@ -140,7 +139,7 @@ test-mutants:
 	CC="$(CC)" sh tests/mutants/run.sh
 
 # What is hard on the numbers, one row a case; the same programs are part of the tests.
-NUMERICS_BIN := $(filter $(BUILD)/tests/worker/halfvec/% $(BUILD)/tests/numerics/% $(BUILD)/tests/worker/render/test_%_numbers \
+NUMERICS_BIN := $(filter $(BUILD)/tests/worker/render/halfvec/% $(BUILD)/tests/numerics/% $(BUILD)/tests/worker/render/test_%_numbers \
 	$(BUILD)/tests/worker/render/test_number_%,$(TEST_BIN))
 .PHONY: test-numerics
 test-numerics: programs $(NUMERICS_BIN)

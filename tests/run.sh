@@ -85,7 +85,7 @@ END
 took=$build/tests/took # seconds and file of the last run
 touch "$took"
 # Of a first run: what takes minutes of a core begins first.
-longest="worker/path/test_integrators worker/mutation/test_forced worker/path/test_ends worker/render/test_moments worker/mutation/test_balance"
+longest="worker/render/path/test_integrators worker/render/mutation/test_forced worker/render/path/test_ends worker/render/test_moments worker/render/mutation/test_balance"
 
 # The tests of a kind, one a line; programs that took long the last time first, new ones before them.
 list() {

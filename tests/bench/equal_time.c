@@ -12,6 +12,7 @@
 #include "tests/bench/scenes.h"
 #include "tests/support/stats.h"
 #include "worker/cli/local.h"
+#include "worker/render/render.h"
 #include "worker/render/choose.h"
 
 #include <math.h>

@@ -4,7 +4,7 @@
 #include "tests/bench/bench.h"
 #include "tests/bench/process.h"
 #include "tests/bench/scenes.h"
-#include "worker/world/world.h"
+#include "worker/render/world/world.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -6,7 +6,7 @@
 #include "tests/bench/bench.h"
 #include "tests/bench/scenes.h"
 #include "tests/bench/subject.h"
-#include "worker/world/world.h"
+#include "worker/render/world/world.h"
 
 #include <stdio.h>
 

@@ -3,9 +3,9 @@
 #include "common/base/arena.h"
 #include "tests/bench/bench.h"
 #include "tests/support/nodes.h"
-#include "worker/bsdf/bsdf.h"
-#include "worker/chain/pss.h"
-#include "worker/render/sums.h"
+#include "worker/render/bsdf/bsdf.h"
+#include "worker/render/chain/pss.h"
+#include "worker/render/film/sums.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The rays that the renderer sends through the door (worker/geom/accel.h), kept to be sent again, and how its walks in
- * half vector space end. The bench is linked with --wrap for these functions, so that the renderer itself knows nothing
- * of it. One thread.
+ * The rays that the renderer sends through the door (worker/render/geom/accel.h), kept to be sent again, and how its
+ * walks in half vector space end. The bench is linked with --wrap for these functions, so that the renderer itself
+ * knows nothing of it. One thread.
  */
 #ifndef TESTS_BENCH_RECORD_H
 #define TESTS_BENCH_RECORD_H
 
-#include "worker/geom/accel.h"
-#include "worker/halfvec/walk.h"
+#include "worker/render/geom/accel.h"
+#include "worker/render/halfvec/walk.h"
 
 enum ray_kind { RAY_CLOSEST, RAY_SEGMENT, RAY_INFINITE };
 

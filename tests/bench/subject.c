@@ -3,10 +3,11 @@
 
 #include "common/base/mem.h"
 #include "tests/bench/bench.h"
-#include "worker/geom/embree.h"
-#include "worker/math/fptrap.h"
-#include "worker/math/rng.h"
-#include "worker/world/world.h"
+#include "worker/render/render.h"
+#include "worker/render/geom/embree.h"
+#include "worker/render/math/fptrap.h"
+#include "worker/render/math/rng.h"
+#include "worker/render/world/world.h"
 
 #include <float.h>
 #include <stdio.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A lease of an integrator that can be run again and again, the rays that it sends through the door
- * (worker/geom/accel.h), and the same rays for Embree alone: a scene of its own (robust, no filters, the same
+ * (worker/render/geom/accel.h), and the same rays for Embree alone: a scene of its own (robust, no filters, the same
  * triangles, Embree's spheres). One thread.
  */
 #ifndef TESTS_BENCH_SUBJECT_H

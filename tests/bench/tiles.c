@@ -5,7 +5,7 @@
 #include "common/film/canvas.h"
 #include "common/film/exr.h"
 #include "tests/bench/bench.h"
-#include "worker/math/rng.h"
+#include "worker/render/math/rng.h"
 
 #include <string.h>
 

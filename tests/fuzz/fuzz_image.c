@@ -4,7 +4,7 @@
  */
 #include "tests/fuzz/messages.h"
 #include "tests/support/memory_assets.h"
-#include "worker/scene/image.h"
+#include "worker/render/scene/image.h"
 
 int LLVMFuzzerTestOneInput(const uint8_t *bytes, size_t size)
 {

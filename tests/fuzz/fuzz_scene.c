@@ -7,7 +7,7 @@
 #include "tests/fuzz/messages.h"
 #include "tests/support/memory_assets.h"
 #include "worker/render/render.h"
-#include "worker/shape/shape.h"
+#include "worker/render/shape/shape.h"
 
 #include <string.h>
 

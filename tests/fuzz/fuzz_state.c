@@ -3,16 +3,16 @@
  * States of chains as a worker gets them, in real worlds: the first byte says in which, the others are the state. Id
  * and step are put right, and for every other input the contribution, too: as somebody would who wants to be believed.
  * What resumes must go on for some mutations, and what it saves then must resume again. Invalid operations are not
- * watched: clang makes some of its own. (tests/worker/chain/test_path_chain.c watches them.)
+ * watched: clang makes some of its own. (tests/worker/render/chain/test_path_chain.c watches them.)
  */
 #include "common/base/mem.h"
 #include "tests/fuzz/seeds.h"
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"
-#include "worker/chain/bytes.h"
-#include "worker/chain/path_chain.h"
-#include "worker/chain/pss_chain.h"
-#include "worker/path/integrator.h"
+#include "worker/render/chain/bytes.h"
+#include "worker/render/chain/path_chain.h"
+#include "worker/render/chain/pss_chain.h"
+#include "worker/render/path/integrator.h"
 
 #include <string.h>
 

@@ -6,7 +6,7 @@
 #ifndef TESTS_IMAGE_CALIBRATION_SCENES_H
 #define TESTS_IMAGE_CALIBRATION_SCENES_H
 
-#include "worker/world/world.h"
+#include "worker/render/world/world.h"
 
 struct calibration_scene {
 	const char *kind, *name;   /* kind: tree, public, made */

@@ -5,6 +5,7 @@
  * groups, level 1e-6 a comparison, and find 2 % on a block and 0.5 % on the mean (agree.h prints both). Some 70 seconds
  * on one core.
  */
+#include "worker/render/render.h"
 #include "tests/support/agree.h"
 #include "tests/support/worlds.h"
 

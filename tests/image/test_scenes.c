@@ -4,6 +4,7 @@
  * names their folder. Within the errors of both, at the level of all comparisons; how small a bias would have been
  * found is printed.
  */
+#include "worker/render/render.h"
 #include "tests/support/agree.h"
 #include "tests/support/worlds.h"
 

@@ -14,7 +14,7 @@ passed=0 failed=0
 tab=$(printf '\t')
 
 # A program that fails without a row that does is a row itself.
-for t in "$build"/tests/worker/halfvec/test_* "$build"/tests/numerics/test_* \
+for t in "$build"/tests/worker/render/halfvec/test_* "$build"/tests/numerics/test_* \
 	"$build"/tests/worker/render/test_number_ranges "$build"/tests/worker/render/test_scene_numbers; do
 	[ -x "$t" ] && [ -f "$t" ] || continue
 	"$t" >"$log" 2>&1

@@ -6,6 +6,7 @@
  * 5 % of the mean for the table (HSLT_TEST_ROWS=1) where the case does not say otherwise, a third of that with FULL=1,
  * which takes 16 times the samples; a plain run, with a sixteenth, is there for what breaks altogether.
  */
+#include "worker/render/render.h"
 #include "tests/numerics/rows.h"
 #include "tests/support/agree.h"
 #include "tests/support/agree_scenes.h"

@@ -4,6 +4,7 @@
  * distributed as they are (tests/support/stationary.h: level 1e-6; every 16th of its last paths passes path_check), and
  * chains of the whole mixture bring no NaN, infinity or negative value to their film. FULL=1: ten times the mutations.
  */
+#include "worker/render/render.h"
 #include "tests/numerics/rows.h"
 #include "tests/support/chains.h"
 #include "tests/support/hard_scenes.h"

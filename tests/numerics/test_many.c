@@ -5,11 +5,12 @@
  * proposal that failed by name. Invalid operations stop the program. 3 10^5 mutations; FULL=1: 10^8 by make
  * test-numerics, 10^7 in make test.
  */
+#include "worker/render/render.h"
 #include "tests/numerics/rows.h"
 #include "tests/support/chains.h"
 #include "tests/support/hard_scenes.h"
 #include "tests/support/stats.h"
-#include "tests/worker/mutation/scenes.h"
+#include "tests/worker/render/mutation/scenes.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -7,10 +7,10 @@
 #include "tests/numerics/rows.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
-#include "worker/chain/path_chain.h"
-#include "worker/math/fptrap.h"
-#include "worker/mutation/mutation.h"
-#include "worker/path/integrator.h"
+#include "worker/render/chain/path_chain.h"
+#include "worker/render/math/fptrap.h"
+#include "worker/render/mutation/mutation.h"
+#include "worker/render/path/integrator.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

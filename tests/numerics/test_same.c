@@ -5,6 +5,7 @@
  * own way until the next independent proposal that is accepted: that changes less of a film than 1 %, where another
  * seed changes 19 %.
  */
+#include "worker/render/render.h"
 #include "tests/numerics/rows.h"
 #include "tests/support/chains.h"
 #include "tests/support/stats.h"

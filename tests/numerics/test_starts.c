@@ -4,6 +4,7 @@
  * outweighs all others. The last: 16 films of chains that all start from that sample against 16 of resampled ones,
  * quarter by quarter; level 1e-6 each.
  */
+#include "worker/render/render.h"
 #include "tests/numerics/rows.h"
 #include "tests/support/chains.h"
 #include "tests/support/stats.h"

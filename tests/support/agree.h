@@ -10,7 +10,8 @@
 #ifndef TESTS_SUPPORT_AGREE_H
 #define TESTS_SUPPORT_AGREE_H
 
-#include "worker/world/world.h"
+#include "worker/render/render.h"
+#include "worker/render/world/world.h"
 
 enum { AGREE_BLOCKS = 2, AGREE_CELLS = AGREE_BLOCKS * AGREE_BLOCKS, AGREE_MAX_GROUPS = 64 };
 

@@ -3,7 +3,7 @@
 #ifndef TESTS_SUPPORT_AGREE_SCENES_H
 #define TESTS_SUPPORT_AGREE_SCENES_H
 
-#include "worker/world/world.h"
+#include "worker/render/world/world.h"
 
 struct agree_case {
 	const char *topic, *name;

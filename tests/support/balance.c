@@ -2,7 +2,7 @@
 #include "tests/support/balance.h"
 
 #include "tests/support/stats.h"
-#include "worker/mutation/heuristic.h"
+#include "worker/render/mutation/heuristic.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -14,7 +14,7 @@
 #define TESTS_SUPPORT_BALANCE_H
 
 #include "tests/support/starts.h"
-#include "worker/mutation/mutation.h"
+#include "worker/render/mutation/mutation.h"
 
 enum { BALANCE_GROUPS = 64, BALANCE_FUNCTIONS = 28, BALANCE_EDGES = 5 };
 

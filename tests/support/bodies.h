@@ -6,7 +6,7 @@
 #define TESTS_SUPPORT_BODIES_H
 
 #include "tests/support/dice.h"
-#include "worker/geom/surface.h"
+#include "worker/render/geom/surface.h"
 
 /* A sphere of the given radius around the origin from a cube of n x n squares a face; `bump` moves vertices along the
  * radius by that share, up and down. Normals point outwards. */

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/render.h"
 #include "tests/support/chains.h"
 
 #include <setjmp.h>

@@ -3,7 +3,8 @@
 #ifndef TESTS_SUPPORT_CHAINS_H
 #define TESTS_SUPPORT_CHAINS_H
 
-#include "worker/world/world.h"
+#include "worker/render/render.h"
+#include "worker/render/world/world.h"
 
 struct chains_how {
 	const char *mutations; /* NULL: what suits the scene */

@@ -2,7 +2,7 @@
 #include "tests/support/dice.h"
 
 #include "tests/support/stats.h"
-#include "worker/math/rng.h"
+#include "worker/render/math/rng.h"
 
 #include <stdlib.h>
 

@@ -6,7 +6,7 @@
 #ifndef TESTS_SUPPORT_DICE_H
 #define TESTS_SUPPORT_DICE_H
 
-#include "worker/math/vec3.h"
+#include "worker/render/math/vec3.h"
 
 #include <stddef.h>
 #include <stdint.h>

@@ -6,7 +6,7 @@
 #ifndef TESTS_SUPPORT_HARD_SCENES_H
 #define TESTS_SUPPORT_HARD_SCENES_H
 
-#include "worker/world/world.h"
+#include "worker/render/world/world.h"
 
 struct hard_case {
 	const char *topic, *name;

@@ -3,7 +3,7 @@
 #ifndef TESTS_SUPPORT_MEMORY_ASSETS_H
 #define TESTS_SUPPORT_MEMORY_ASSETS_H
 
-#include "worker/scene/asset.h"
+#include "worker/render/scene/asset.h"
 
 struct memory_file {
 	const char *name;

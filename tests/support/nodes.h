@@ -7,7 +7,7 @@
 #ifndef TESTS_SUPPORT_NODES_H
 #define TESTS_SUPPORT_NODES_H
 
-#include "worker/scene/scene.h"
+#include "worker/render/scene/scene.h"
 
 struct scene_node *node_make(struct arena *a, enum plugin_class cls, const char *text);
 void node_add_child(struct arena *a, struct scene_node *n, const struct scene_node *child); /* without a name */

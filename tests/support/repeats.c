@@ -3,7 +3,8 @@
 
 #include "tests/support/stats.h"
 #include "worker/cli/local.h"
-#include "worker/world/effects.h"
+#include "worker/render/render.h"
+#include "worker/render/world/effects.h"
 
 #include <pthread.h>
 #include <stdatomic.h>

@@ -7,7 +7,7 @@
 #define TESTS_SUPPORT_REPEATS_H
 
 #include "common/film/canvas.h"
-#include "worker/world/world.h"
+#include "worker/render/world/world.h"
 
 struct repeats_how {
 	const char *integrator, *test;

@@ -6,7 +6,7 @@
 #ifndef TESTS_SUPPORT_ROOMS_H
 #define TESTS_SUPPORT_ROOMS_H
 
-#include "worker/world/world.h"
+#include "worker/render/world/world.h"
 
 struct room {
 	const char *name;

@@ -3,8 +3,8 @@
 #ifndef TESTS_SUPPORT_SCENE_TABLES_H
 #define TESTS_SUPPORT_SCENE_TABLES_H
 
-#include "worker/shape/shape.h"
-#include "worker/scene/settings.h"
+#include "worker/render/shape/shape.h"
+#include "worker/render/scene/settings.h"
 
 /* Shapes and settings of the program, materials, textures and emitters of the test. Ends with a NULL type. */
 const struct plugin_decl *scene_tables(void);

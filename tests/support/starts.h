@@ -7,7 +7,7 @@
 #ifndef TESTS_SUPPORT_STARTS_H
 #define TESTS_SUPPORT_STARTS_H
 
-#include "worker/path/full_path.h"
+#include "worker/render/path/full_path.h"
 
 enum { STARTS_MAX_EDGES = 8 };
 

@@ -2,10 +2,11 @@
 #include "tests/support/stationary.h"
 
 #include "tests/support/stats.h"
-#include "worker/chain/path_chain.h"
-#include "worker/math/fptrap.h"
-#include "worker/mutation/mixture.h"
-#include "worker/path/integrator.h"
+#include "worker/render/render.h"
+#include "worker/render/chain/path_chain.h"
+#include "worker/render/math/fptrap.h"
+#include "worker/render/mutation/mixture.h"
+#include "worker/render/path/integrator.h"
 
 #include <pthread.h>
 #include <stdatomic.h>

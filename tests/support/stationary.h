@@ -17,7 +17,8 @@
 #ifndef TESTS_SUPPORT_STATIONARY_H
 #define TESTS_SUPPORT_STATIONARY_H
 
-#include "worker/world/world.h"
+#include "worker/render/render.h"
+#include "worker/render/world/world.h"
 
 enum {
 	STATIONARY_STEPS = 20,

@@ -3,7 +3,8 @@
 #ifndef TESTS_SUPPORT_WORLDS_H
 #define TESTS_SUPPORT_WORLDS_H
 
-#include "worker/world/world.h"
+#include "worker/render/render.h"
+#include "worker/render/world/world.h"
 
 /* The text between <scene> and </scene>, Mitsuba 3 dialect, formatted; width x height override the film's. Fails the
  * test with the reader's sentence when it does not build. */

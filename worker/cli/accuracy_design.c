@@ -2,7 +2,7 @@
 #include "worker/cli/accuracy.h"
 
 #include "common/base/text.h"
-#include "worker/render/accuracy_settings.h"
+#include "worker/render/settings/accuracy_settings.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -24,7 +24,7 @@ static const struct {
 	const char *name, *accuracy;
 } presets[] = {{"fast", "tolerance=0.01,iterations=6,reverse-tolerance=0.01"}};
 
-/* Parameters that are not of the list of worker/render/accuracy_settings.h. */
+/* Parameters that are not of the list of worker/render/settings/accuracy_settings.h. */
 #define DEPTH "max-depth"
 #define SHARE "independent"
 #define MIXTURE "mixture"

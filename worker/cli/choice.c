@@ -2,7 +2,7 @@
 #include "worker/cli/choice.h"
 
 #include "common/film/forecast_json.h"
-#include "worker/scene/scene.h"
+#include "worker/render/scene/scene.h"
 
 #include <time.h>
 

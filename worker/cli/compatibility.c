@@ -2,8 +2,8 @@
 #include "worker/cli/compatibility.h"
 
 #include "worker/render/render.h"
-#include "worker/scene/lenient.h"
-#include "worker/scene/plugin.h"
+#include "worker/render/scene/lenient.h"
+#include "worker/render/scene/plugin.h"
 
 #include <string.h>
 
@@ -111,7 +111,7 @@ void compatibility_print(FILE *out)
 		"Made by `hslt-scene compatibility` of the tables that the reader works by. Names are those of 3.x; in 0.5/0.6 the same "
 		"in camelCase.\n"
 		"*Ignored*: has no effect on light, and is said once. *Refused*: would change the image. "
-		"[worker/scene/README.md](../worker/scene/README.md)\nsays what the plug-ins do, and where they differ.\n");
+		"[worker/render/scene/README.md](../worker/render/scene/README.md)\nsays what the plug-ins do, and where they differ.\n");
 	for (int cls = 0; cls < PLUGIN_CLASSES; cls++)
 		print_class(out, (enum plugin_class)cls);
 	print_unsupported(out);

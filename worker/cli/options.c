@@ -3,8 +3,8 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "worker/render/accuracy_settings.h"
-#include "worker/scene/spelling.h"
+#include "worker/render/settings/accuracy_settings.h"
+#include "worker/render/scene/spelling.h"
 
 #include <stdio.h>
 #include <stdlib.h>

@@ -2,7 +2,7 @@
 #include "worker/cli/speed.h"
 
 #include "worker/cli/local.h"
-#include "worker/scene/scene.h"
+#include "worker/render/scene/scene.h"
 
 #include <math.h>
 

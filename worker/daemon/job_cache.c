@@ -4,7 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
 #include "worker/daemon/work.h"
-#include "worker/render/accuracy_settings.h"
+#include "worker/render/settings/accuracy_settings.h"
 
 #include <assert.h>
 #include <fcntl.h>

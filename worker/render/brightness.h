@@ -11,7 +11,7 @@
 #ifndef WORKER_RENDER_BRIGHTNESS_H
 #define WORKER_RENDER_BRIGHTNESS_H
 
-#include "worker/path/path.h"
+#include "worker/render/path/path.h"
 
 struct brightness {
 	struct film_window window;

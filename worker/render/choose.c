@@ -4,7 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
 #include "common/film/tail.h"
-#include "worker/path/integrator.h"
+#include "worker/render/path/integrator.h"
 #include "worker/render/brightness.h"
 
 #include <stdio.h>

@@ -4,11 +4,11 @@
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
-#include "worker/chain/chain.h"
-#include "worker/math/fptrap.h"
-#include "worker/mutation/mixture.h"
-#include "worker/path/sobol.h"
-#include "worker/render/sums.h"
+#include "worker/render/chain/chain.h"
+#include "worker/render/math/fptrap.h"
+#include "worker/render/mutation/mixture.h"
+#include "worker/render/path/sobol.h"
+#include "worker/render/film/sums.h"
 
 #include <stdio.h>
 #include <string.h>

@@ -1,9 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/render.h"
 
-#include "worker/mutation/mixture.h"
-
-#include <string.h>
+#include "worker/render/mutation/mixture.h"
 
 const char *render_mutation_at(size_t index, const char **summary)
 {
@@ -27,12 +25,4 @@ int render_mutations(const char *text, const struct render_summary *summary, cha
 	}
 	mixture_print(&m, canonical);
 	return 0;
-}
-
-bool render_effect_on(const struct render_summary *scene, const char *name)
-{
-	for (size_t i = 0; i < scene->line_count; i++)
-		if (strcmp(scene->lines[i].name, name) == 0)
-			return scene->lines[i].on;
-	return false;
 }

@@ -2,10 +2,10 @@
 /* Every plug-in that a scene may name, gathered from the registries: the one list for the scene reader. */
 #include "worker/render/render.h"
 
-#include "worker/bsdf/bsdf.h"
-#include "worker/emitter/emitter.h"
-#include "worker/render/accuracy_settings.h"
-#include "worker/shape/shape.h"
+#include "worker/render/bsdf/bsdf.h"
+#include "worker/render/emitter/emitter.h"
+#include "worker/render/settings/accuracy_settings.h"
+#include "worker/render/shape/shape.h"
 
 #include <assert.h>
 #include <pthread.h>

@@ -6,7 +6,7 @@
  * The bound is 4.5 standard errors, two-sided level 7e-6 each; a bias of 7 % is found with more than 95 %.
  */
 #include "common/film/tail.h"
-#include "worker/math/rng.h"
+#include "worker/render/math/rng.h"
 
 #include <errno.h>
 #include <math.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/tonemap.h"
 
-#include "worker/scene/srgb.h"
+#include "worker/render/scene/srgb.h"
 
 #include <float.h>
 #include <math.h>

@@ -2,8 +2,9 @@
 /* Settings that trade accuracy for time: the spelling that a plan holds comes back as it is, everything else is
  * refused, and each reaches what works by it. */
 #include "tests/support/worlds.h"
-#include "worker/halfvec/walk.h"
-#include "worker/render/accuracy_settings.h"
+#include "worker/render/render.h"
+#include "worker/render/halfvec/walk.h"
+#include "worker/render/settings/accuracy_settings.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

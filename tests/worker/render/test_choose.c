@@ -2,6 +2,7 @@
 /* Which integrator a scene calls for: scenes whose light is easy and hard to find, the rule itself, and the same choice
  * twice. */
 #include "tests/support/worlds.h"
+#include "worker/render/render.h"
 #include "worker/render/choose.h"
 
 #include <math.h>

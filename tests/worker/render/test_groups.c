@@ -8,8 +8,9 @@
 #include "common/film/merge.h"
 #include "tests/support/worlds.h"
 #include "worker/cli/local.h"
-#include "worker/math/rng.h"
-#include "worker/mutation/mixture.h"
+#include "worker/render/render.h"
+#include "worker/render/math/rng.h"
+#include "worker/render/mutation/mixture.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -7,7 +7,8 @@
 #include "tests/support/dice.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/worlds.h"
-#include "worker/render/sums.h"
+#include "worker/render/render.h"
+#include "worker/render/film/sums.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

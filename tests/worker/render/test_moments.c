@@ -15,9 +15,10 @@
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
-#include "worker/path/classes.h"
-#include "worker/path/ensemble.h"
-#include "worker/path/integrator.h"
+#include "worker/render/render.h"
+#include "worker/render/path/classes.h"
+#include "worker/render/path/ensemble.h"
+#include "worker/render/path/integrator.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

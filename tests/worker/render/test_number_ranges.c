@@ -7,7 +7,7 @@
  */
 #include "tests/support/scene_trial.h"
 #include "worker/render/render.h"
-#include "worker/scene/plugin.h"
+#include "worker/render/scene/plugin.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -6,9 +6,10 @@
  * Level: 1e-6 a case; power: the smallest bias of a soft quarter of the image that is found with 95 % probability is
  * printed and 2 % at most. A tolerance as wide as the lobes is found to bias. About 25 s of CPU time.
  */
+#include "worker/render/render.h"
 #include "tests/support/agree.h"
 #include "tests/support/stationary.h"
-#include "tests/worker/mutation/scenes.h"
+#include "tests/worker/render/mutation/scenes.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

@@ -1,0 +1,144 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The BSDFs that the generic tests run over: several parameter sets each, as text (see tests/support/nodes.h), nested
+ * ones after '|', textures after the word "texture" or, with a name, "@NAME". A BSDF of the registry without a set here
+ * fails the tests.
+ */
+#ifndef TESTS_WORKER_BSDF_BSDF_CASES_H
+#define TESTS_WORKER_BSDF_BSDF_CASES_H
+
+#include "tests/support/nodes.h"
+#include "worker/render/bsdf/bsdf.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const char *const bsdf_cases[] = {
+	"diffuse",
+	"diffuse reflectance=rgb(0.8,0.2,0.1)",
+	"conductor material=none",
+	"conductor material=Au specular_reflectance=0.7",
+	"roughconductor material=none alpha=0.3",
+	"roughconductor material=none alpha=0.3 distribution=ggx",
+	"roughconductor material=Au alpha=0.05",
+	"roughconductor material=Ag alpha=0.05 distribution=ggx specular_reflectance=rgb(0.5,0.6,0.7)",
+	"roughconductor alpha=1 eta=rgb(0.2,0.9,1.1) k=rgb(3.9,2.4,2.1)",
+	"roughconductor alpha=1 eta=0.2 k=3 distribution=ggx",
+	"roughconductor material=none alpha_u=0.1 alpha_v=0.4",
+	"roughconductor material=Au alpha_u=0.6 alpha_v=0.05 distribution=ggx",
+	"roughconductor material=Au | @alpha checkerboard color0=0.3 color1=0.3",
+	"roughconductor material=none alpha_u=0.2 distribution=ggx | @alpha_v checkerboard color0=0.4 color1=0.4",
+	"roughdielectric int_ior=1.5 ext_ior=1 | @alpha checkerboard color0=0.25 color1=0.25",
+	"roughdielectric int_ior=1.5 ext_ior=1 alpha_u=0.1 alpha_v=0.5",
+	"roughdielectric int_ior=1 ext_ior=1.5 alpha_u=0.4 alpha_v=0.15 distribution=ggx",
+	"dielectric",
+	"dielectric int_ior=water ext_ior=diamond specular_transmittance=rgb(0.9,0.8,0.7)",
+	"roughdielectric int_ior=1.5 ext_ior=1 alpha=0.3",
+	"roughdielectric int_ior=1.5 ext_ior=1 alpha=0.3 distribution=ggx",
+	"roughdielectric int_ior=1 ext_ior=1.5 alpha=0.1 distribution=ggx",
+	"roughdielectric int_ior=2.4 ext_ior=1 alpha=1",
+	"roughdielectric int_ior=2.4 ext_ior=1 alpha=1 distribution=ggx specular_transmittance=rgb(0.9,0.8,0.7)",
+	"roughdielectric int_ior=1.1 ext_ior=1 alpha=0.5",
+	"dielectric int_ior=sf11 dispersion=true",
+	"dielectric int_cauchy_b=0.01 ext_cauchy_b=-0.002 ext_ior=1.2 specular_reflectance=0.9",
+	"roughdielectric int_ior=diamond ext_ior=water dispersion=true alpha=0.3",
+	"roughdielectric int_ior=1 ext_sellmeier=1.0396,0.2318,1.0105,0.006,0.02,103.56 alpha=0.2 distribution=ggx",
+	"roughdielectric int_ior=1.5 ext_ior=1.5 int_cauchy_b=0.02 alpha=0.4", /* eta is 1 at IOR_NM alone */
+	"roughdiffuse reflectance=0.9",
+	"roughdiffuse alpha=1 reflectance=rgb(1,0.3,0.1)",
+	"roughdiffuse alpha=0.7 use_fast_approx=true",
+	"phong",
+	"phong exponent=0 specular_reflectance=0.9 diffuse_reflectance=0.4",
+	"phong exponent=300 diffuse_reflectance=0 specular_reflectance=1",
+	"phong exponent=5 diffuse_reflectance=rgb(0.1,0.3,0.2)",
+	"thindielectric",
+	"thindielectric int_ior=2.4 specular_transmittance=rgb(0.9,0.8,0.7) specular_reflectance=0.9",
+	"plastic",
+	"plastic int_ior=1.9 diffuse_reflectance=rgb(0.9,0.2,0.5) nonlinear=true",
+	"plastic diffuse_reflectance=1 specular_reflectance=rgb(0.5,0.4,0.3)",
+	"roughplastic",
+	"roughplastic alpha=0.3 distribution=ggx diffuse_reflectance=rgb(0.9,0.2,0.5) nonlinear=true",
+	"roughplastic alpha=1 int_ior=2.4 diffuse_reflectance=1",
+	"roughplastic alpha=0.02 diffuse_reflectance=0 specular_reflectance=0.7",
+	"principled",
+	"principled base_color=rgb(0.8,0.3,0.1) roughness=0.2 metallic=0.7 anisotropic=0.6",
+	"principled base_color=rgb(0.8,0.3,0.1) roughness=0.3 spec_tint=0.8 sheen=0.5 sheen_tint=0.7 flatness=0.5 specular=0.9",
+	"principled base_color=0.4 roughness=0.6 clearcoat=1 clearcoat_gloss=0.1",
+	"principled base_color=rgb(0.9,0.8,0.7) roughness=0.4 spec_trans=1 eta=1.6",
+	"principled base_color=rgb(0.2,0.8,0.7) roughness=0.5 spec_trans=0.6 metallic=0.2 clearcoat=0.5 anisotropic=0.4",
+	"null",
+	"mask | diffuse reflectance=0.9",
+	"mask opacity=0.3 | plastic",
+	"mask opacity=0.8 | roughconductor alpha=0.2",
+	"mask opacity=1 | conductor material=none",
+	"blendbsdf weight=0.3 | diffuse reflectance=0.8 | roughconductor alpha=0.2 material=Au",
+	"blendbsdf weight=0.6 | plastic | conductor material=Ag",
+	"blendbsdf weight=0.4 | diffuse | roughplastic alpha=0.3", /* chooses with what is left of the same number */
+	"blendbsdf weight=0 | phong | diffuse",
+	"twosided | plastic | roughplastic alpha=0.2",
+	"twosided | diffuse reflectance=0.9",
+	"twosided | roughconductor alpha=0.2 material=Cu | phong exponent=10",
+	"twosided | diffuse | conductor material=Cr",
+	"bumpmap scale=0.1 | roughconductor alpha=0.2 | texture checkerboard",
+	"normalmap | texture scale scale=0.5 texture checkerboard | roughdielectric alpha=0.3",
+};
+enum { BSDF_CASES = sizeof bsdf_cases / sizeof *bsdf_cases };
+
+/* " diffuse", or " texture checkerboard", or " texture scale texture checkerboard". */
+static inline struct scene_node *bsdf_child(struct arena *a, char *text)
+{
+	char *first = strstr(text, "texture "), *second = first ? strstr(first + 1, " texture ") : NULL;
+	if (!first)
+		return node_make(a, PLUGIN_BSDF, text);
+	if (second)
+		*second = 0;
+	struct scene_node *n = node_make(a, PLUGIN_TEXTURE, first + strlen("texture "));
+	if (second)
+		node_add_child(a, n, node_make(a, PLUGIN_TEXTURE, second + strlen(" texture ")));
+	return n;
+}
+
+/* " @alpha checkerboard": a texture of that name. Any other is a child without one. */
+static inline void bsdf_add_child(struct arena *a, struct scene_node *n, char *text)
+{
+	char *at = strchr(text, '@'), *space = at ? strchr(at, ' ') : NULL;
+	if (!space) {
+		node_add_child(a, n, bsdf_child(a, text));
+		return;
+	}
+	*space = 0;
+	char *name = arena_alloc(a, strlen(at), 1);
+	memcpy(name, at + 1, strlen(at));
+	node_add_ref(a, n, name, node_make(a, PLUGIN_TEXTURE, space + 1));
+}
+
+static inline struct scene_node *bsdf_node(struct arena *a, const char *text)
+{
+	char copy[256], *rest = copy;
+	snprintf(copy, sizeof copy, "%s", text);
+	struct scene_node *n = node_make(a, PLUGIN_BSDF, strtok_r(copy, "|", &rest));
+	for (char *child; (child = strtok_r(NULL, "|", &rest));)
+		bsdf_add_child(a, n, child);
+	return n;
+}
+
+static inline int bsdf_try(struct arena *a, const char *text, bool dialect_3, struct bsdf *b, struct error *e)
+{
+	const struct bsdf_build build = {.arena = a, .dialect_3 = dialect_3};
+	return bsdf_create(b, bsdf_node(a, text), &build, e);
+}
+
+static inline void bsdf_make(struct arena *a, const char *text, struct bsdf *b)
+{
+	struct error e;
+	if (bsdf_try(a, text, true, b, &e))
+		fail_msg("%s: %s", text, e.text);
+}
+
+#endif

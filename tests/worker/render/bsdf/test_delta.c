@@ -1,0 +1,191 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Exactly specular lobes asked for by name, against the ones that sample() finds; and the mean roughness. */
+#include "tests/support/dice.h"
+#include "tests/worker/render/bsdf/bsdf_cases.h"
+
+#include <float.h>
+
+static const struct wavelengths wavelengths = {.nm = {550, 500, 600, 700}};
+
+/* Cases of their own for what twosided makes of mirrors. */
+static const char *const mirrors[] = {
+	"twosided | conductor material=Au | conductor material=Ag specular_reflectance=0.5",
+	"twosided | conductor material=Cr | diffuse",
+	"twosided | conductor material=Al",
+};
+enum { MIRRORS = sizeof mirrors / sizeof *mirrors };
+
+static const char *case_text(int k)
+{
+	return k < BSDF_CASES ? bsdf_cases[k] : mirrors[k - BSDF_CASES];
+}
+
+static bool near(double a, double b)
+{
+	return fabs(a - b) <= 8 * DBL_EPSILON * fabs(b);
+}
+
+static void check_lobe(const char *text, const struct bsdf *b, const struct bsdf_point *p, vec3 wo,
+		       const struct bsdf_sample *s)
+{
+	for (int with_bit = 0; with_bit < 2; with_bit++) {
+		vec3 wi = {NAN, NAN, NAN};
+		double chance = NAN;
+		unsigned mode = with_bit ? s->mode : s->mode & ~(unsigned)BSDF_DELTA;
+		spectrum weight = bsdf_eval_delta(b, p, wo, mode, &wi, &chance);
+		if (!near(wi.x, s->wi.x) || !near(wi.y, s->wi.y) || !near(wi.z, s->wi.z) || !near(chance, s->pdf))
+			fail_msg("%s: from z = %g lobe %x goes to z = %g with chance %g, sample to %g with %g", text,
+				 wo.z, mode, wi.z, chance, s->wi.z, s->pdf);
+		for (int l = 0; l < SPECTRUM_LANES; l++)
+			if (!near(weight.v[l], s->f.v[l] * fabs(s->wi.z)))
+				fail_msg("%s: from z = %g lobe %x weighs %.17g, sample %.17g", text, wo.z, mode,
+					 weight.v[l], s->f.v[l] * fabs(s->wi.z));
+	}
+}
+
+/* The probabilities of the specular lobes that there are. */
+static double chances(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
+{
+	double sum = 0;
+	for (unsigned mode = BSDF_REFLECT; mode <= BSDF_TRANSMIT; mode++) {
+		vec3 wi;
+		double chance;
+		if (!spectrum_is_zero(bsdf_eval_delta(b, p, wo, mode, &wi, &chance)))
+			sum += chance;
+	}
+	return sum;
+}
+
+static vec3 any_direction(struct dice *d, int i)
+{
+	vec3 w = dice_direction(d);
+	if (i % 4)
+		return w;
+	double z = copysign(pow(10, -dice_between(d, 0, 12)), w.z), r = sqrt((1 - z) * (1 + z)) / hypot(w.x, w.y);
+	return (vec3){r * w.x, r * w.y, z};
+}
+
+static void test_specular_lobes_are_those_of_sample(void **state)
+{
+	(void)state;
+	size_t lobes[2] = {0, 0}, mirrored = 0;
+	for (int k = 0; k < BSDF_CASES + MIRRORS; k++) {
+		struct dice d = dice_of(case_text(k));
+		struct arena a = {0};
+		struct bsdf b;
+		double excess = 0, variance = 0;
+		bsdf_make(&a, case_text(k), &b);
+		for (int i = 0; i < 2000; i++) {
+			vec3 wo = any_direction(&d, i);
+			struct bsdf_point p = {.u = 0.3,
+					       .v = 0.7,
+					       .w = &wavelengths,
+					       .transport = i % 2 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE};
+			double u[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
+			struct bsdf_sample s;
+			bool there = b.ops->sample(&b, &p, wo, u, &s);
+			bool specular = there && (s.mode & BSDF_DELTA);
+			if (specular) {
+				check_lobe(case_text(k), &b, &p, wo, &s);
+				lobes[(s.mode & BSDF_TRANSMIT) != 0]++;
+				mirrored += wo.z < 0 && b.ops->type[0] == 't';
+			}
+			/* Where specular and other lobes lie on one side, only frequencies can be compared. */
+			double chance = chances(&b, &p, wo);
+			bool mixed = b.has_smooth && chance > 0 && chance < 1;
+			if (!mixed && !(fabs(chance - specular) < 1e-12))
+				fail_msg("%s: from z = %g specular chances add up to %g", case_text(k), wo.z, chance);
+			excess += mixed ? specular - chance : 0;
+			variance += mixed ? chance * (1 - chance) : 0;
+		}
+		/* Six standard deviations: level 2e-9 a case. */
+		if (fabs(excess) > 6 * sqrt(variance))
+			fail_msg("%s: %g specular samples more than their chances say, +- %g", case_text(k), excess,
+				 sqrt(variance));
+		arena_fini(&a);
+	}
+	assert_true(lobes[0] > 2000 && lobes[1] > 1000 && mirrored > 1000);
+}
+
+static void test_a_mirrored_back_is_a_mirror(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf b;
+	struct error e;
+	vec3 wi, wo = {0.6, 0, -0.8};
+	double chance;
+	const struct bsdf_point p = {.w = &wavelengths};
+	bsdf_make(&a, "conductor material=none specular_reflectance=0.5", &b);
+	assert_true(spectrum_is_zero(bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT, &wi, &chance)));
+	assert_int_equal(bsdf_mirror_back(&b, &a, &e), 0);
+	assert_true(bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT | BSDF_DELTA, &wi, &chance).v[2] == 0.5);
+	assert_true(wi.x == -0.6 && wi.z == -0.8 && chance == 1 && b.alpha_mean == 0);
+	assert_true(spectrum_is_zero(bsdf_eval_delta(&b, &p, wo, BSDF_TRANSMIT, &wi, &chance)));
+	arena_fini(&a);
+}
+
+static void test_nothing_passes_beyond_the_critical_angle(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf b;
+	vec3 wi;
+	double chance, critical = sqrt(1 - 1 / 2.25);
+	const struct bsdf_point p = {.w = &wavelengths};
+	bsdf_make(&a, "dielectric int_ior=1.5 ext_ior=1", &b);
+	for (int i = -100; i <= 100; i++) {
+		double z = critical + 1e-4 * i + 1e-9;
+		vec3 wo = {sqrt(1 - z * z), 0, -z};
+		bool passes = !spectrum_is_zero(bsdf_eval_delta(&b, &p, wo, BSDF_TRANSMIT, &wi, &chance));
+		assert_int_equal(passes, i >= 0);
+		double reflected = bsdf_eval_delta(&b, &p, wo, BSDF_REFLECT, &wi, &chance).v[0];
+		assert_true(i >= 0 ? reflected < 1 : reflected == 1 && chance == 1);
+	}
+	arena_fini(&a);
+}
+
+static void test_mean_roughness(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		double mean;
+	} expected[] = {
+		{"diffuse", 1},
+		{"conductor", 0},
+		{"dielectric", 0},
+		{"roughconductor alpha=0.2", 0.2},
+		{"roughdielectric alpha=0.3 distribution=ggx", 0.3},
+		{"roughdielectric alpha=0.3 int_ior=1.2 ext_ior=1.2", 0},
+		{"phong exponent=6 diffuse_reflectance=0.6 specular_reflectance=0.2", 0.25 * 0.5 + 0.75},
+		{"phong exponent=6 diffuse_reflectance=0 specular_reflectance=0.2", 0.5},
+		{"phong diffuse_reflectance=0 specular_reflectance=0", 1},
+		{"twosided | roughconductor alpha=0.2 | diffuse", 0.6},
+		{"twosided | conductor | roughconductor alpha=0.2", 0.2},
+		{"twosided | conductor", 0},
+	};
+	struct arena a = {0};
+	struct bsdf b;
+	for (size_t k = 0; k < sizeof expected / sizeof *expected; k++) {
+		bsdf_make(&a, expected[k].text, &b);
+		if (!(fabs(b.alpha_mean - expected[k].mean) < 1e-15))
+			fail_msg("%s: %.17g", expected[k].text, b.alpha_mean);
+	}
+	bsdf_default(&b);
+	assert_true(b.alpha_mean == 1);
+	bsdf_black(&b);
+	assert_true(b.alpha_mean == 0);
+	arena_fini(&a);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_specular_lobes_are_those_of_sample),
+		cmocka_unit_test(test_a_mirrored_back_is_a_mirror),
+		cmocka_unit_test(test_nothing_passes_beyond_the_critical_angle),
+		cmocka_unit_test(test_mean_roughness),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

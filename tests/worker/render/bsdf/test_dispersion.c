@@ -1,0 +1,217 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Indices of refraction as functions of the wavelength: against the makers' catalogues and handbooks, through a prism
+ * against Snell's law worked out here, and what a BSDF says of itself. Deterministic.
+ */
+#include "tests/support/dice.h"
+#include "tests/worker/render/bsdf/bsdf_cases.h"
+
+#define PI 3.14159265358979323846
+
+static const double line_f = 486.1327, line_d = 587.5618, line_c = 656.2725;
+
+static struct wavelengths at(double nm)
+{
+	/* The others are not to be looked at. */
+	return (struct wavelengths){.nm = {nm, NAN, NAN, NAN}};
+}
+
+static double index_of(const char *text, double nm)
+{
+	struct arena a = {0};
+	struct bsdf b;
+	struct wavelengths w = at(nm);
+	bsdf_make(&a, text, &b);
+	double eta = bsdf_eta(&b, &w);
+	arena_fini(&a);
+	return eta;
+}
+
+/* Catalogues (Schott N-BK7, N-SF11) and handbooks print five or six digits; those of water are
+ * against air. Diamond: Peter's 2.4175 at d, and its dispersion
+ * n(430.8) - n(686.7) = 0.044 as gemmology tables have it. */
+static void test_glasses_have_their_catalogue_values(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		double f, d, c, tolerance;
+	} glass[] = {
+		{"dielectric ext_ior=1 dispersion=true int_ior=bk7", 1.52238, 1.51680, 1.51432, 6e-6},
+		{"dielectric ext_ior=1 dispersion=true int_ior=sf11", 1.80651, 1.78472, 1.77596, 6e-6},
+		{"dielectric ext_ior=1 dispersion=true int_ior=fused_quartz", 1.46313, 1.45846, 1.45637, 6e-6},
+		{"dielectric ext_ior=1 dispersion=true int_ior=water", 1.33712 * 1.00027, 1.33304 * 1.00027,
+		 1.33115 * 1.00027, 5e-5},
+		{"dielectric ext_ior=1 dispersion=true int_ior=sapphire_(o)", 1.7756, 1.7682, 1.7649, 1e-4},
+		{"dielectric ext_ior=1 dispersion=true int_ior=diamond", 2.4354, 2.4175, 2.4099, 5e-4},
+		{"roughdielectric ext_ior=1 int_sellmeier=1.03961212,0.231792344,1.01046945,0.00600069867,0.0200179144,103.560653",
+		 1.52238, 1.51680, 1.51432, 6e-6},
+	};
+	for (size_t k = 0; k < sizeof glass / sizeof *glass; k++) {
+		double f = index_of(glass[k].text, line_f), d = index_of(glass[k].text, line_d),
+		       c = index_of(glass[k].text, line_c);
+		double worst = fmax(fabs(f - glass[k].f), fmax(fabs(d - glass[k].d), fabs(c - glass[k].c)));
+		if (!(worst < glass[k].tolerance))
+			fail_msg("%s: F %.6f, d %.6f, C %.6f", glass[k].text, f, d, c);
+	}
+	const char *bk7 = glass[0].text, *diamond = glass[5].text;
+	double abbe = (index_of(bk7, line_d) - 1) / (index_of(bk7, line_f) - index_of(bk7, line_c));
+	assert_true(fabs(abbe - 64.17) < 0.02);
+	assert_true(fabs(index_of(diamond, 430.8) - index_of(diamond, 686.7) - 0.044) < 0.001);
+}
+
+/* What a plain name means is what its law says at 587.6 nm. */
+static void test_names_and_laws_agree(void **state)
+{
+	(void)state;
+	static const char *const names[] = {"bk7", "sf11", "fused_quartz", "diamond", "water", "sapphire_(o)"};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++) {
+		char plain[96], law[128];
+		struct arena a = {0};
+		struct bsdf b, c;
+		snprintf(plain, sizeof plain, "dielectric ext_ior=1 int_ior=%s", names[i]);
+		snprintf(law, sizeof law, "%s dispersion=true", plain);
+		bsdf_make(&a, plain, &b);
+		bsdf_make(&a, law, &c);
+		assert_true(fabs(b.eta - c.eta) < 1e-5 && !b.dispersive && c.dispersive);
+		arena_fini(&a);
+	}
+}
+
+static void test_what_is_dispersive_says_so(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *text;
+		double eta;
+		bool dispersive, smooth;
+		enum color_shape shape;
+	} expected[] = {
+		{"dielectric", 1.5046 / 1.000277, false, false, COLOR_SHAPE_CONSTANT},
+		{"dielectric int_ior=bk7 ext_ior=air", 1.5168 / 1.000277, false, false, COLOR_SHAPE_CONSTANT},
+		{"dielectric int_ior=bk7 ext_ior=1 dispersion=false", 1.5168, false, false, COLOR_SHAPE_CONSTANT},
+		{"dielectric int_ior=bk7 ext_ior=bk7 dispersion=true", 1, false, false, COLOR_SHAPE_CONSTANT},
+		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0", 1.5, false, false, COLOR_SHAPE_CONSTANT},
+		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0 dispersion=true", 1.5, false, false,
+		 COLOR_SHAPE_CONSTANT},
+		{"dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0.004", 1.5, true, false, COLOR_SHAPE_OTHER},
+		{"dielectric int_ior=3 ext_ior=2 ext_cauchy_b=0.01", 1.5, true, false, COLOR_SHAPE_OTHER},
+		{"roughdielectric int_ior=1.5 ext_ior=1.5", 1, false, false, COLOR_SHAPE_CONSTANT},
+		{"roughdielectric int_ior=1.5 ext_ior=1.5 int_cauchy_b=0.01", 1, true, true, COLOR_SHAPE_OTHER},
+		{"roughdielectric int_ior=bk7 ext_ior=bk7 dispersion=true", 1, false, false, COLOR_SHAPE_CONSTANT},
+	};
+	for (size_t k = 0; k < sizeof expected / sizeof *expected; k++) {
+		struct arena a = {0};
+		struct bsdf b;
+		bsdf_make(&a, expected[k].text, &b);
+		if (!(fabs(b.eta - expected[k].eta) < 1e-15 && b.dispersive == expected[k].dispersive &&
+		      b.has_smooth == expected[k].smooth && b.has_delta != b.has_smooth &&
+		      b.shape == expected[k].shape))
+			fail_msg("%s: eta %.17g, dispersive %d, smooth %d, shape %d", expected[k].text, b.eta,
+				 b.dispersive, b.has_smooth, (int)b.shape);
+		arena_fini(&a);
+	}
+}
+
+static void test_cauchy(void **state)
+{
+	(void)state;
+	const char *text = "dielectric int_ior=1.5 ext_ior=1 int_cauchy_b=0.0042";
+	for (double nm = 360; nm <= 830; nm += 47)
+		assert_true(fabs(index_of(text, nm) - (1.5 + 0.0042 * (1e6 / (nm * nm) - 1 / (0.5876 * 0.5876)))) <
+			    1e-15);
+}
+
+/* v in the frame whose z is at `angle` from the world's z, in the plane y = 0; and back with -angle. */
+static vec3 turned(vec3 v, double angle)
+{
+	return (vec3){cos(angle) * v.x - sin(angle) * v.z, v.y, sin(angle) * v.x + cos(angle) * v.z};
+}
+
+/* Light through a prism of 60 degrees in its plane, by two specular refractions; deviation against the closed form
+ * delta = i + asin(n sin(A - asin(sin i / n))) - A. */
+static void test_a_prism_spreads_light(void **state)
+{
+	(void)state;
+	const double apex = PI / 3, incidence = 1.1;
+	struct arena a = {0};
+	struct bsdf b;
+	bsdf_make(&a, "dielectric int_ior=sf11 ext_ior=1 dispersion=true specular_transmittance=0.5", &b);
+	double before = INFINITY, spread = 0;
+	for (double nm = 365; nm < 830; nm += 25) {
+		struct wavelengths w = at(nm);
+		struct bsdf_point p = {.w = &w};
+		vec3 in = {-sin(incidence), 0, cos(incidence)}, inside, out;
+		double chance, n = 0, l2 = nm * nm * 1e-6;
+		spectrum first = bsdf_eval_delta(&b, &p, in, BSDF_TRANSMIT, &inside, &chance);
+		/* The second face's outward normal is turned by pi - apex; light comes to it from inside. */
+		vec3 from = turned(vec3_neg(inside), PI - apex);
+		if (from.z > 0)
+			from = turned(vec3_neg(inside), -(PI - apex));
+		spectrum second = bsdf_eval_delta(&b, &p, from, BSDF_TRANSMIT, &out, &chance);
+		assert_true(first.v[0] > 0 && first.v[0] < 0.5 && second.v[0] > 0 && out.z > 0);
+		n = sqrt(1 + 1.73759695 * l2 / (l2 - 0.013188707) + 0.313747346 * l2 / (l2 - 0.0623068142) +
+			 1.89878101 * l2 / (l2 - 155.23629));
+		double refracted = asin(sin(incidence) / n), exit = asin(n * sin(apex - refracted));
+		double told = acos(out.z);
+		if (!(fabs(told - exit) < 1e-12))
+			fail_msg("%g nm leaves at %.15g, not %.15g", nm, told, exit);
+		double deviation = incidence + told - apex;
+		assert_true(deviation < before);
+		spread = nm == 365 ? deviation : spread;
+		before = deviation;
+		/* Fresnel's factor at both faces, from the angles. */
+		double rs = sin(incidence - refracted) / sin(incidence + refracted),
+		       rp = tan(incidence - refracted) / tan(incidence + refracted);
+		assert_true(fabs(first.v[0] * n * n - 0.5 * (1 - (rs * rs + rp * rp) / 2)) < 1e-13);
+	}
+	assert_true(spread - before > 0.1);
+	arena_fini(&a);
+}
+
+/* With no coefficient left every bit is that of the plain glass; and only nm[0] says anything. */
+static void test_lanes_and_nothing_left(void **state)
+{
+	(void)state;
+	static const char *const pairs[][2] = {
+		{"dielectric int_ior=1.6 ext_ior=1", "dielectric int_ior=1.6 ext_ior=1 int_cauchy_b=0 ext_cauchy_b=0"},
+		{"roughdielectric int_ior=1.6 ext_ior=1 alpha=0.2",
+		 "roughdielectric int_ior=1.6 ext_ior=1 alpha=0.2 int_cauchy_b=0"},
+	};
+	const struct wavelengths w = {.nm = {500, 600, 700, 800}}, hero = {.nm = {500, NAN, NAN, NAN}};
+	struct dice d = dice_of(__func__);
+	struct arena a = {0};
+	for (int i = 0; i < 4000; i++) {
+		struct bsdf plain, zero, bent;
+		struct bsdf_sample s, t;
+		struct bsdf_point p = {.w = &w}, q = {.w = &hero};
+		vec3 wo = dice_direction(&d);
+		double u[3] = {dice_throw(&d), dice_throw(&d), dice_throw(&d)};
+		bsdf_make(&a, pairs[i % 2][0], &plain);
+		bsdf_make(&a, pairs[i % 2][1], &zero);
+		bsdf_make(&a,
+			  i % 2 ? "roughdielectric int_ior=bk7 dispersion=true"
+				: "dielectric int_ior=bk7 dispersion=true",
+			  &bent);
+		bool there = plain.ops->sample(&plain, &p, wo, u, &s);
+		assert_int_equal(there, zero.ops->sample(&zero, &p, wo, u, &t));
+		assert_true(!there || (s.pdf == t.pdf && s.f.v[3] == t.f.v[3] && s.wi.x == t.wi.x && s.wi.z == t.wi.z));
+		there = bent.ops->sample(&bent, &p, wo, u, &s);
+		assert_int_equal(there, bent.ops->sample(&bent, &q, wo, u, &t));
+		assert_true(!there || (s.pdf == t.pdf && s.f.v[0] == t.f.v[0] && s.wi.x == t.wi.x && s.eta == t.eta));
+		arena_fini(&a);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_glasses_have_their_catalogue_values),
+		cmocka_unit_test(test_names_and_laws_agree),
+		cmocka_unit_test(test_what_is_dispersive_says_so),
+		cmocka_unit_test(test_cauchy),
+		cmocka_unit_test(test_a_prism_spreads_light),
+		cmocka_unit_test(test_lanes_and_nothing_left),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,110 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Nothing but finite numbers, at grazing angles, with roughness from 1e-6 to 2, indices next to 1 and far from it, and
+ * random numbers at the ends of their range. Invalid operations trap.
+ */
+#include "tests/support/stats.h"
+#include "tests/worker/render/bsdf/bsdf_cases.h"
+#include "worker/render/math/rng.h"
+
+#include <fenv.h>
+
+static const char *const extremes[] = {
+	"diffuse reflectance=1",
+	"conductor material=K",
+	"conductor eta=0 k=0",
+	"roughconductor material=Al distribution=beckmann alpha=",
+	"roughconductor material=none distribution=ggx alpha=",
+	"roughconductor eta=1e-9 k=1e9 distribution=ggx alpha=",
+	"dielectric int_ior=1.000000001 ext_ior=1",
+	"dielectric int_ior=1000 ext_ior=1",
+	"roughdielectric int_ior=1.000000001 ext_ior=1 distribution=beckmann alpha=",
+	"roughdielectric int_ior=1.0001 ext_ior=1 distribution=ggx alpha=",
+	"roughdielectric int_ior=1.5 ext_ior=1 distribution=beckmann alpha=",
+	"roughdielectric int_ior=1.5 ext_ior=1 distribution=ggx alpha=",
+	"roughdielectric int_ior=1 ext_ior=100 distribution=beckmann alpha=",
+	"roughdielectric int_ior=1 ext_ior=100 distribution=ggx alpha=",
+	"dielectric int_ior=1 ext_ior=1 int_cauchy_b=1e-9",
+	"roughdielectric int_ior=1 ext_ior=1 int_cauchy_b=1e-9 distribution=ggx alpha=",
+	"roughdielectric int_sellmeier=9,0.05,0.12,0.7 distribution=beckmann alpha=",
+	"phong exponent=0",
+	"phong exponent=1e9 diffuse_reflectance=0 specular_reflectance=1",
+	"twosided | roughconductor material=Al alpha=",
+};
+/* Where a text ends in "=", each of these follows. */
+static const double alphas[] = {0, 1e-5, 1e-3, 0.1, 1, 2};
+
+static vec3 corner(uint64_t i, const double u[4])
+{
+	static const double heights[] = {1, 0x1p-1074, 1e-300, 1e-160, 1e-16, 1e-8, 1e-3, 0.5, 1 - 0x1p-53, 0};
+	double z = heights[(uint64_t)(u[0] * 10) % 10], phi = i % 3 ? 6.3 * u[1] : 0,
+	       r = sqrt(fmax(0, (1 - z) * (1 + z)));
+	if (i % 4 == 0)
+		z = u[0], r = sqrt(fmax(0, (1 - z) * (1 + z)));
+	return (vec3){r * cos(phi), r * sin(phi), i & 1 ? -z : z};
+}
+
+static double end_of_range(double u, double x)
+{
+	return x < 0.2 ? 0 : x < 0.4 ? 1 - 0x1p-53 : x < 0.5 ? 0x1p-53 : u;
+}
+
+static void check(const char *text, const struct bsdf *b, const struct bsdf_point *p, uint64_t i)
+{
+	double u[4], v[4], x[4];
+	rng_uniform4(7, RNG_TEST, i, 0, 0, u);
+	rng_uniform4(7, RNG_TEST, i, 1, 0, v);
+	rng_uniform4(7, RNG_TEST, i, 2, 0, x);
+	vec3 wo = corner(i, u), wi = i % 5 == 0 ? (vec3){-wo.x, -wo.y, wo.z} : corner(i / 2, v);
+	spectrum f = b->ops->eval(b, p, wo, wi);
+	double pdf = b->ops->pdf_solid(b, p, wo, wi);
+	if (!spectrum_is_valid(bsdf_eval_halfvec(b, p, wo, wi)))
+		fail_msg("%s: half vector form from z = %g to %g", text, wo.z, wi.z);
+	if (!spectrum_is_valid(f) || !(pdf >= 0) || !isfinite(pdf))
+		fail_msg("%s: f %g, pdf %g from z = %g to %g", text, f.v[0], pdf, wo.z, wi.z);
+	const double numbers[3] = {end_of_range(u[2], x[0]), end_of_range(u[3], x[1]), end_of_range(v[2], x[2])};
+	struct bsdf_sample s;
+	if (!b->ops->sample(b, p, wo, numbers, &s))
+		return;
+	if (!spectrum_is_valid(s.f) || !(s.pdf > 0) || !isfinite(s.pdf) || !(fabs(vec3_length(s.wi) - 1) < 1e-12) ||
+	    !isfinite(spectrum_max(s.f) * fabs(s.wi.z) / s.pdf))
+		fail_msg("%s: sample f %g, pdf %g from z = %g to %g", text, s.f.v[0], s.pdf, wo.z, s.wi.z);
+	if (!(s.mode & BSDF_DELTA) && s.pdf != b->ops->pdf_solid(b, p, wo, s.wi))
+		fail_msg("%s: sample's density %g is not pdf's", text, s.pdf);
+}
+
+static void test_everything_stays_finite(void **state)
+{
+	(void)state;
+	const struct wavelengths w = {.nm = {360, 477.5, 595, 830}};
+	feenableexcept(FE_INVALID);
+	for (size_t k = 0; k < sizeof extremes / sizeof *extremes; k++)
+		for (size_t n = 0; n < sizeof alphas / sizeof *alphas; n++) {
+			char text[256];
+			bool rough = extremes[k][strlen(extremes[k]) - 1] == '=';
+			if (!rough && n > 0)
+				break;
+			if (rough)
+				snprintf(text, sizeof text, "%s%g", extremes[k], alphas[n]);
+			else
+				snprintf(text, sizeof text, "%s", extremes[k]);
+			struct arena a = {0};
+			struct bsdf b;
+			bsdf_make(&a, text, &b);
+			for (uint64_t i = 0; i < 10000; i++) {
+				const struct bsdf_point p = {
+					.w = &w, .transport = i % 7 < 3 ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE};
+				check(text, &b, &p, i);
+			}
+			arena_fini(&a);
+		}
+	fedisableexcept(FE_INVALID);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_everything_stays_finite),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

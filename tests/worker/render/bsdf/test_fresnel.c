@@ -1,0 +1,50 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Fresnel's equations with a complex index, in complex arithmetic, at all angles of incidence. */
+#include "worker/render/bsdf/fresnel.h"
+
+#include <complex.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include <cmocka.h>
+
+static double by_complex_numbers(double c, double eta, double k)
+{
+	double complex n = eta - k * I, transmitted = csqrt(1 - (1 - c * c) / (n * n));
+	double complex s = (c - n * transmitted) / (c + n * transmitted),
+		       p = (n * c - transmitted) / (n * c + transmitted);
+	return 0.5 * (creal(s) * creal(s) + cimag(s) * cimag(s) + creal(p) * creal(p) + cimag(p) * cimag(p));
+}
+
+/* Aluminium, gold, copper in green; silver in blue; a weak absorber; next to glass. */
+static void test_conductors(void **state)
+{
+	(void)state;
+	const double metals[][2] = {{0.96, 6.7}, {0.36, 2.5}, {1.03, 2.59}, {0.15, 2.4}, {2.5, 0.3}, {1.5, 1e-4}};
+	for (size_t m = 0; m < sizeof metals / sizeof *metals; m++)
+		for (int i = 1; i <= 200; i++) {
+			double c = i / 200.0, r = fresnel_conductor(c, metals[m][0], metals[m][1]);
+			assert_true(fabs(r - by_complex_numbers(c, metals[m][0], metals[m][1])) < 1e-12);
+		}
+	/* Off normal incidence it is not the value there. */
+	assert_true(fabs(fresnel_conductor(0.3, 0.36, 2.5) - fresnel_conductor(1, 0.36, 2.5)) > 0.005);
+}
+
+static void test_dielectrics_are_conductors_that_absorb_nothing(void **state)
+{
+	(void)state;
+	for (int i = 1; i <= 200; i++)
+		assert_true(fabs(fresnel_dielectric(i / 200.0, 1.5).reflected - by_complex_numbers(i / 200.0, 1.5, 0)) <
+			    1e-12);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_conductors),
+		cmocka_unit_test(test_dielectrics_are_conductors_that_absorb_nothing),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

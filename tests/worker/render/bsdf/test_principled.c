@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The principled BSDF where it is another plug-in, and its lobes where only one is there, against their formulas. */
+#include "tests/worker/render/bsdf/bsdf_cases.h"
+
+#include <math.h>
+
+#define PI 3.14159265358979323846
+
+static const struct wavelengths wavelengths = {.nm = {430, 500, 570, 640}};
+static const struct bsdf_point point = {.u = 0.3, .v = 0.7, .w = &wavelengths, .transport = TRANSPORT_RADIANCE};
+
+static vec3 direction(double z, double phi)
+{
+	double s = sqrt((1 - z) * (1 + z));
+	return (vec3){s * cos(phi), s * sin(phi), z};
+}
+
+static void same(const char *a, const char *b, double below, double factor)
+{
+	struct arena arena = {0};
+	struct bsdf x, y;
+	bsdf_make(&arena, a, &x);
+	bsdf_make(&arena, b, &y);
+	size_t positive = 0;
+	for (int i = 0; i < 400; i++) {
+		vec3 wo = direction(0.03 + 0.96 * (i % 20) / 20, 0.4),
+		     wi = direction(0.02 + 0.97 * (i / 20) / 20, 0.3 * i);
+		if (below > 0 && i % 3)
+			wi.z = -wi.z;
+		if (below > 0 && i % 2)
+			wo.z = -wo.z;
+		spectrum p = x.ops->eval(&x, &point, wo, wi), q = y.ops->eval(&y, &point, wo, wi);
+		for (int l = 0; l < SPECTRUM_LANES; l++)
+			if (fabs(p.v[l] - factor * q.v[l]) > 1e-9 * (p.v[l] + q.v[l]))
+				fail_msg("%s is %g, %s %g, from z = %g to %g", a, p.v[l], b, q.v[l], wo.z, wi.z);
+		positive += p.v[0] > 0;
+	}
+	assert_true(positive > 100);
+	arena_fini(&arena);
+}
+
+/* Glass of the same roughness: alpha is its square. */
+static void test_glass_is_roughdielectric(void **state)
+{
+	(void)state;
+	same("principled base_color=1 roughness=0.5 spec_trans=1 eta=1.6",
+	     "roughdielectric alpha=0.25 distribution=ggx int_ior=1.6 ext_ior=1", 1, 1);
+}
+
+/* With index 1 the boundary is gone but for the least that there is; a black metal has only Schlick's rim left. */
+static void test_metal_is_schlick_over_ggx(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf metal, mirror;
+	bsdf_make(&a, "principled base_color=0.3 roughness=0.6 metallic=1 anisotropic=0.5", &metal);
+	double aspect = sqrt(1 - 0.9 * 0.5);
+	char text[128];
+	snprintf(text, sizeof text, "roughconductor material=none distribution=ggx alpha_u=%.17g alpha_v=%.17g",
+		 0.36 / aspect, 0.36 * aspect);
+	bsdf_make(&a, text, &mirror);
+	for (int i = 0; i < 300; i++) {
+		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1),
+		     wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
+		double cos_d = sqrt((1 + vec3_dot(wo, wi)) / 2), f = 0.3 + 0.7 * pow(1 - cos_d, 5);
+		double expected = f * mirror.ops->eval(&mirror, &point, wo, wi).v[2],
+		       told = metal.ops->eval(&metal, &point, wo, wi).v[2];
+		assert_true(fabs(told - expected) <= 1e-9 * expected);
+	}
+	arena_fini(&a);
+}
+
+/* Diffuse light at roughness r, from Burley's formula with F_D90 = 0.5 + 2 r cos^2: the lobe is what a black one lacks.
+ */
+static void test_diffuse_is_burleys(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf full, black;
+	bsdf_make(&a, "principled base_color=0.6 roughness=0.7", &full);
+	bsdf_make(&a, "principled base_color=0 roughness=0.7", &black);
+	for (int i = 0; i < 300; i++) {
+		vec3 wo = direction(0.05 + 0.9 * (i % 15) / 15, 1),
+		     wi = direction(0.05 + 0.9 * (i / 15) / 20, 0.37 * i);
+		double cos2 = (1 + vec3_dot(wo, wi)) / 2, f90 = 0.5 + 2 * 0.7 * cos2;
+		double expected = 0.6 / PI * (1 + (f90 - 1) * pow(1 - wo.z, 5)) * (1 + (f90 - 1) * pow(1 - wi.z, 5));
+		double told = full.ops->eval(&full, &point, wo, wi).v[1] - black.ops->eval(&black, &point, wo, wi).v[1];
+		assert_true(fabs(told - expected) <= 1e-9 * expected);
+	}
+	arena_fini(&a);
+}
+
+/* The clear coat's half vectors are a distribution: the integral of D cos over the hemisphere is 1; what the coat adds
+ * at one pair by hand. */
+static void test_clearcoat(void **state)
+{
+	(void)state;
+	enum { STEPS = 200000 };
+	struct arena a = {0};
+	struct bsdf coated, bare;
+	bsdf_make(&a, "principled base_color=0.2 clearcoat=1 clearcoat_gloss=0.5", &coated);
+	bsdf_make(&a, "principled base_color=0.2", &bare);
+	double alpha = 0.5 * (0.1 + 0.001), sum = 0;
+	for (int i = 0; i < STEPS;
+	     i++) { /* mirrored pairs with half vector h at cosine c: f = F D G1 G1 / (16 c c') with wo = wi = h */
+		double c = (i + 0.5) / STEPS, a2 = alpha * alpha;
+		vec3 h = direction(c, 0.2);
+		double told = coated.ops->eval(&coated, &point, h, h).v[0] - bare.ops->eval(&bare, &point, h, h).v[0];
+		double tan2 = (1 - c * c) / (c * c), g1 = 2 / (1 + sqrt(1 + 0.0625 * tan2));
+		double d = told * 16 * c * c / (0.04 * g1 * g1);
+		double gtr1 = (a2 - 1) / (PI * log(a2)) / (1 + (a2 - 1) * c * c);
+		if (d > 1e-6 && fabs(d / gtr1 - 1) > 1e-4)
+			fail_msg("at cosine %g: D = %g, GTR1 %g", c, d, gtr1);
+		sum += gtr1 * c * 2 * PI / STEPS;
+	}
+	assert_true(fabs(sum - 1) < 1e-3);
+	arena_fini(&a);
+}
+
+static void test_specular_is_an_index(void **state)
+{
+	(void)state;
+	/* 0.08 x 0.5 at normal incidence is an index of 1.5. */
+	same("principled base_color=0 specular=0.5", "principled base_color=0 eta=1.5", 0, 1);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_glass_is_roughdielectric), cmocka_unit_test(test_metal_is_schlick_over_ggx),
+		cmocka_unit_test(test_diffuse_is_burleys),	 cmocka_unit_test(test_clearcoat),
+		cmocka_unit_test(test_specular_is_an_index),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,318 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * States of chains of whole paths: what is saved comes back as the same path, two that resume from the same bytes go on
+ * bit by bit alike, and bytes that somebody has changed are refused, or so little changed that the path is as good as
+ * the same. Where things of size 1 stand in a scene of size 1e8, too.
+ */
+#include "common/base/mem.h"
+#include "tests/support/dice.h"
+#include "tests/support/rooms.h"
+#include "tests/support/starts.h"
+#include "tests/support/worlds.h"
+#include "worker/render/chain/bytes.h"
+#include "worker/render/chain/path_chain.h"
+#include "worker/render/math/fptrap.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 32, EDGES = 8 };
+static const char mixture[] = "bidirectional=0.2,hslt=0.6,wavelength=0.1,lens=0.05,light=0.05";
+
+static struct path_context context;
+static uint64_t counters[BATCH_COUNTERS], strategies[BATCH_STRATEGIES][STRATEGY_COUNTERS];
+
+static void begin(struct chain *c, struct film_sums *film)
+{
+	*c = (struct chain){
+		.context = &context, .film = film, .mixture = mixture, .strategy = strategies, .seed = 7, .id = 3};
+}
+
+/* The first sample of the bootstrap that carries light. */
+static void start(struct chain *c)
+{
+	uint64_t index = 0;
+	while (!chain_path.start(c, index))
+		assert_true(++index < 100000);
+}
+
+static void steps(struct chain *c, int n)
+{
+	struct chain_sums sums = {0, 0};
+	for (int i = 0; i < n; i++)
+		chain_path.step(c, &sums);
+	chain_path.flush(c);
+}
+
+static bool same_state(struct chain *a, struct chain *b)
+{
+	struct chain_state s, t;
+	assert_int_equal(chain_path.save(a, &s), 0);
+	assert_int_equal(chain_path.save(b, &t), 0);
+	bool same = s.size == t.size && memcmp(s.bytes, t.bytes, s.size) == 0;
+	mem_free(s.bytes);
+	mem_free(t.bytes);
+	return same;
+}
+
+static void check_resume(struct chain *c, struct chain *d)
+{
+	static struct full_path_path x;
+	struct chain_state s;
+	char text[200];
+	assert_int_equal(chain_path.save(c, &s), 0);
+	assert_true(s.size <= CHAIN_STATE_MAX);
+	memset(d + 1, 0xa5, chain_path.size - sizeof *d);
+	d->rejected_run = 99;
+	d->step = c->step + 1; /* of another epoch */
+	assert_false(chain_path.resume(d, &s));
+	d->step = c->step;
+	assert_true(chain_path.resume(d, &s) && chain_path.resume(c, &s));
+	put64(s.bytes + 16, c->step + 1); /* more rejections than steps */
+	assert_false(chain_path.resume(d, &s));
+	put64(s.bytes + 16, c->rejected_run);
+	assert_int_equal(c->step, d->step);
+	assert_true(path_read(&context, s.bytes + CHAIN_STATE_HEAD, s.size - CHAIN_STATE_HEAD, &x));
+	if (!path_check(&context, &x, text, sizeof text) && !strstr(text, "occluded"))
+		fail_msg("resumed: %s", text);
+	d->id++;
+	assert_false(chain_path.resume(d, &s));
+	d->id--;
+	assert_true(chain_path.resume(d, &s));
+	mem_free(s.bytes);
+}
+
+/* What somebody might put into a number of a state. */
+static double bad_number(struct dice *dice)
+{
+	static const double bad[] = {__builtin_nans(""),
+				     NAN,
+				     INFINITY,
+				     -INFINITY,
+				     1e308,
+				     -1e308,
+				     1e154,
+				     5e-324,
+				     -5e-324,
+				     1e-310,
+				     -0.0,
+				     0,
+				     1,
+				     -1,
+				     2,
+				     1e-300};
+	return bad[dice_below(dice, sizeof bad / sizeof *bad)];
+}
+
+static void change(struct chain_state *s, struct dice *dice, int i)
+{
+	uint32_t head = CHAIN_STATE_HEAD, left = s->size - head;
+	if (i % 7 == 0)
+		s->size -= 1 + (uint32_t)dice_below(dice, 40);
+	else if (i % 3 == 0)
+		put_double(s->bytes + head + 8 * dice_below(dice, left / 8), bad_number(dice));
+	else
+		for (int k = 0; k <= i % 3; k++)
+			s->bytes[head + dice_below(dice, left)] ^= (uint8_t)(1u << dice_below(dice, 8));
+}
+
+/* Every byte may be anything: refused, unless it is the last bits of a number that moved. */
+static size_t check_changed(struct chain *c, struct chain *d, struct dice *dice)
+{
+	static struct full_path_path x;
+	struct chain_state s;
+	size_t refused = 0;
+	char text[200];
+	bool watched = fptrap_watch();
+	assert_int_equal(chain_path.save(c, &s), 0);
+	for (int i = 0; i < 200; i++) {
+		struct chain_state changed = {mem_alloc(s.size, 1), s.size};
+		memcpy(changed.bytes, s.bytes, s.size);
+		change(&changed, dice, i);
+		d->step = c->step;
+		if (!chain_path.resume(d, &changed)) {
+			refused++;
+		} else if (path_read(&context, changed.bytes + CHAIN_STATE_HEAD, changed.size - CHAIN_STATE_HEAD, &x) &&
+			   x.edges) {
+			/* What it may break: occlusion and exactly specular directions are not asked again. */
+			if (!path_check(&context, &x, text, sizeof text) && !strstr(text, "occluded") &&
+			    !strstr(text, "specular"))
+				fail_msg("changed: %s", text);
+			steps(d, 3);
+		}
+		mem_free(changed.bytes);
+	}
+	fptrap_unwatch(watched);
+	mem_free(s.bytes);
+	return refused;
+}
+
+static void check_room(const struct room *room)
+{
+	struct chain *c = test_malloc(chain_path.size), *d = test_malloc(chain_path.size);
+	struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
+	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
+	struct film_sums a, b, waste;
+	struct world *w = room->build();
+	struct dice dice = dice_of(room->name);
+	starts_context(&context, w, 1, EDGES, counters);
+	assert_int_equal(film_sums_init(&a, &plan, &settings, NULL), 0);
+	assert_int_equal(film_sums_init(&b, &plan, &settings, NULL), 0);
+	assert_int_equal(film_sums_init(&waste, &plan, &settings, NULL), 0);
+	begin(c, &a);
+	begin(d, &b);
+	start(c);
+	steps(c, 50);
+	counters[COUNT_STATES_LOST] = 0;
+	memset(a.xyz, 0, (size_t)SIDE * SIDE * 3 * sizeof *a.xyz);
+	size_t refused = 0;
+	for (int epoch = 0; epoch < 20; epoch++) {
+		check_resume(c, d);
+		steps(c, 40);
+		steps(d, 40);
+		assert_true(same_state(c, d));
+		d->film = &waste;
+		refused += check_changed(c, d, &dice);
+		d->film = &b;
+	}
+	assert_memory_equal(a.xyz, b.xyz, (size_t)SIDE * SIDE * 3 * sizeof *a.xyz);
+	assert_true(refused > 20 * 200 * 3 / 4);
+	assert_int_equal(counters[COUNT_STATES_LOST], 0);
+	film_sums_fini(&a);
+	film_sums_fini(&b);
+	film_sums_fini(&waste);
+	test_free(c);
+	test_free(d);
+	world_free(w);
+}
+
+static void test_states(void **state)
+{
+	(void)state;
+	for (const struct room *r = rooms; r->name; r++)
+		check_room(r);
+}
+
+/* Nothing to start from: the chain looks for light, and its state is as small as can be. */
+static void test_black(void **state)
+{
+	(void)state;
+	struct chain *c = test_malloc(chain_path.size);
+	struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
+	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
+	struct film_sums film;
+	struct chain_state s;
+	struct world *w = rooms[0].build();
+	starts_context(&context, w, 1, EDGES, counters);
+	assert_int_equal(film_sums_init(&film, &plan, &settings, NULL), 0);
+	begin(c, &film);
+	assert_true(chain_path.start(c, UINT64_MAX));
+	assert_int_equal(chain_path.save(c, &s), 0);
+	assert_int_equal(s.size, CHAIN_STATE_HEAD + 8);
+	assert_true(chain_path.resume(c, &s));
+	mem_free(s.bytes);
+	steps(c, 200);
+	assert_int_equal(chain_path.save(c, &s), 0);
+	/* A wavelength and a point of the aperture only where the scene has them. */
+	uint32_t without = CHAIN_STATE_HEAD + 16 + (w->effects.colour ? 8u : 0) + (w->effects.aperture ? 40u : 0);
+	assert_true(s.size > without && (s.size - without) % 40 == 0);
+	mem_free(s.bytes);
+	film_sums_fini(&film);
+	test_free(c);
+	world_free(w);
+}
+
+/* Glass of size 1 on a floor of half-size `floor`. */
+static struct world *on_floor(double floor)
+{
+	return world_of_text(
+		SIDE, SIDE,
+		SENSOR("0,3,8",
+		       "0,0.7,0") "<shape type='rectangle'><transform name='to_world'><scale value='%g'/><rotate x='1' angle='-90'/></transform>"
+				  "<bsdf type='diffuse'/></shape>"
+				  "<shape type='sphere'><point name='center' x='-1.2' y='0.8' z='0'/><float name='radius' value='0.8'/>"
+				  "<bsdf type='dielectric'/></shape>"
+				  "<shape type='sphere'><point name='center' x='1.2' y='0.8' z='0'/><float name='radius' value='0.8'/>"
+				  "<bsdf type='roughdielectric'><float name='alpha' value='0.02'/></bsdf></shape>"
+				  "<shape type='cube'><transform name='to_world'><scale value='0.4'/><rotate y='1' angle='30'/>"
+				  "<translate x='0' y='0.45' z='1.5'/></transform><bsdf type='dielectric'/></shape>"
+				  "<shape type='rectangle'><transform name='to_world'><scale value='0.5'/><rotate x='1' angle='90'/>"
+				  "<translate x='0' y='4' z='0'/></transform><emitter type='area'/></shape>",
+		floor);
+}
+
+/* Read back: the same path, point for point. */
+static void check_same_path(const struct full_path_path *x, const struct full_path_path *y)
+{
+	assert_int_equal(x->edges, y->edges);
+	for (unsigned j = 1; j < x->edges; j++) {
+		const struct path_vertex *v = &x->v[j], *w = &y->v[j];
+		assert_true(v->mode == w->mode && v->delta == w->delta && v->bsdf == w->bsdf);
+		assert_memory_equal(&v->x.p, &w->x.p, sizeof v->x.p);
+		assert_memory_equal(&v->x.ng, &w->x.ng, sizeof v->x.ng);
+		assert_memory_equal(&v->x.sh, &w->x.sh, sizeof v->x.sh);
+	}
+}
+
+/* Wherever a path of the bootstrap can be written it is read back as it was, and a chain that goes on epoch after epoch
+ * resumes from what it saved. */
+static void check_scale(double floor)
+{
+	static struct full_path_path x, y;
+	struct chain *c = test_malloc(chain_path.size);
+	struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
+	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
+	struct film_sums film;
+	struct world *w = on_floor(floor);
+	uint8_t bytes[WHOLE_BYTES];
+	unsigned paths = 0, unwritten = 0;
+	starts_context(&context, w, 1, EDGES, counters);
+	for (uint64_t i = 0; i < 2000; i++) {
+		if (!path_start(&context, 7, i, &x) || x.edges == 0)
+			continue;
+		size_t size = path_write(&context, &x, &y, bytes);
+		paths++;
+		unwritten += size == 0;
+		if (size)
+			check_same_path(&x, &y);
+		assert_true(size == 0 || path_read(&context, bytes, size, &y));
+	}
+	assert_int_equal(film_sums_init(&film, &plan, &settings, NULL), 0);
+	begin(c, &film);
+	start(c);
+	counters[COUNT_STATES_LOST] = 0;
+	for (int epoch = 0; epoch < 200; epoch++) {
+		struct chain_state s;
+		steps(c, 10);
+		assert_int_equal(chain_path.save(c, &s), 0);
+		assert_true(chain_path.resume(c, &s));
+		mem_free(s.bytes);
+	}
+	print_message("floor %g: %u of %u paths of the bootstrap, %u of 200 states cannot be read back\n", floor,
+		      unwritten, paths, (unsigned)counters[COUNT_STATES_LOST]);
+	assert_true(paths > 100);
+	/* Now and then a path that was drawn lies outside the film when it is computed again. */
+	assert_true(unwritten * 500 <= paths && counters[COUNT_STATES_LOST] == 0);
+	film_sums_fini(&film);
+	test_free(c);
+	world_free(w);
+}
+
+static void test_scales(void **state)
+{
+	const double floors[] = {10, 1e2, 1e4, 1e6, 1e8};
+	(void)state;
+	for (size_t i = 0; i < sizeof floors / sizeof *floors; i++)
+		check_scale(floors[i]);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_states), cmocka_unit_test(test_black),
+					   cmocka_unit_test(test_scales)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,435 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Primary sample space: small steps are symmetric, states survive bytes, and a chain does what Metropolis says: on
+ * targets known in closed form the histogram of its splats is the target. Level 1e-6 each; seeds are the hash of the
+ * test's name.
+ */
+#include "tests/support/dice.h"
+#include "tests/support/stats.h"
+#include "worker/render/chain/pss.h"
+#include "worker/render/chain/pss_chain.h"
+#include "worker/render/math/fptrap.h"
+
+#include "common/base/mem.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define LEVEL 1e-6
+
+/* From u to u +- s, s between 1/1024 and 1/64 with density 1/s: the same on both sides, wrapped round. */
+static void test_small_step(void **state)
+{
+	(void)state;
+	enum { CELLS = 32 };
+	const double from[] = {0, 0x1p-53, 1e-9, 0.001, 0.3, 0.5, 0.999, 1 - 0x1p-53};
+	struct dice d = dice_of("small step");
+	for (size_t k = 0; k < sizeof from / sizeof from[0]; k++) {
+		uint64_t counts[2 * CELLS] = {0};
+		double expected[2 * CELLS];
+		size_t n = dice_count(100000);
+		for (size_t i = 0; i < n; i++) {
+			double to = pss_small_step(from[k], dice_throw(&d));
+			assert_true(to >= 0 && to < 1);
+			double step = to - from[k];
+			step -= rint(step);
+			double place = log(fabs(step) * 1024) / log(16);
+			assert_true(place > -1e-9 && place < 1 + 1e-9);
+			counts[(step < 0 ? CELLS : 0) + (int)fmin(fmax(place, 0) * CELLS, CELLS - 1)]++;
+		}
+		for (int i = 0; i < 2 * CELLS; i++)
+			expected[i] = (double)n / (2 * CELLS);
+		assert_true(stats_counts_p(counts, expected, 2 * CELLS) > LEVEL);
+	}
+	const double ends[] = {0, 0x1p-53, 0.5 - 0x1p-54, 0.5, 1 - 0x1p-53};
+	for (int i = 0; i < 25; i++) {
+		double to = pss_small_step(ends[i / 5], ends[i % 5]);
+		assert_true(to >= 0 && to < 1);
+	}
+}
+
+/* There and back: as many go from one cell to another as return, from uniform points. */
+static void test_both_ways(void **state)
+{
+	(void)state;
+	enum { CELLS = 64 };
+	static uint64_t moves[CELLS][CELLS];
+	struct dice d = dice_of("both ways");
+	size_t n = dice_count(2000000);
+	for (size_t i = 0; i < n; i++) {
+		double u = dice_throw(&d), v = pss_small_step(u, dice_throw(&d));
+		moves[(int)(u * CELLS)][(int)(v * CELLS)]++;
+	}
+	double chi2 = 0, degrees = 0;
+	for (int i = 0; i < CELLS; i++)
+		for (int j = 0; j < i; j++) {
+			double there = (double)moves[i][j], back = (double)moves[j][i];
+			if (there + back < 10)
+				continue;
+			chi2 += (there - back) * (there - back) / (there + back);
+			degrees++;
+		}
+	assert_true(degrees >= CELLS - 1);
+	assert_true(stats_chi2_p(chi2, degrees) > LEVEL);
+}
+
+static void fill(struct pss_point *p, unsigned camera, unsigned light, struct dice *d)
+{
+	memset(p, 0, sizeof *p);
+	p->used[0] = camera;
+	p->used[1] = light;
+	for (int s = 0; s < SAMPLER_SIDES; s++)
+		for (unsigned v = 0; v < p->used[s]; v++)
+			for (int i = 0; i < SAMPLER_BLOCK; i++)
+				p->u[s][v][i] = dice_throw(d);
+}
+
+static void test_bytes(void **state)
+{
+	(void)state;
+	static uint8_t bytes[CHAIN_STATE_MAX];
+	static struct pss_point p, q;
+	struct dice d = dice_of("bytes");
+	for (unsigned i = 0; i < 200; i++) {
+		unsigned camera = i == 0 ? 0 : i == 1 ? PSS_MAX_VERTICES : dice_below(&d, PSS_MAX_VERTICES + 1);
+		fill(&p, camera, i == 1 ? PSS_MAX_VERTICES : dice_below(&d, PSS_MAX_VERTICES + 1), &d);
+		size_t n = pss_write(&p, bytes, sizeof bytes);
+		assert_int_equal(n, 8 + 64 * (p.used[0] + p.used[1]));
+		assert_int_equal(pss_write(&p, bytes, n), n);
+		assert_int_equal(pss_write(&p, bytes, n - 1), 0);
+		memset(&q, 0, sizeof q);
+		assert_int_equal(pss_read(&q, bytes, n), n);
+		assert_memory_equal(&p, &q, sizeof p);
+		/* Cut anywhere, it is refused. */
+		uint8_t *cut = malloc(n);
+		size_t keep = dice_below(&d, (uint32_t)n);
+		memcpy(cut, bytes, keep);
+		assert_int_equal(pss_read(&q, cut, keep), 0);
+		free(cut);
+	}
+	const double bad[] = {-0x1p-60, 1, 1.5, -1, NAN, INFINITY, -INFINITY, 1e300};
+	for (size_t i = 0; i < sizeof bad / sizeof bad[0]; i++) {
+		fill(&p, 3, 2, &d);
+		p.u[i % 2][1][i] = bad[i];
+		size_t n = pss_write(&p, bytes, sizeof bytes);
+		assert_int_equal(pss_read(&q, bytes, n), 0);
+	}
+	/* Counts beyond the arrays, and those that overflow when multiplied. */
+	const uint32_t counts[] = {PSS_MAX_VERTICES + 1, 1000, 1u << 26, 1u << 31, UINT32_MAX};
+	for (size_t i = 0; i < sizeof counts / sizeof counts[0]; i++)
+		for (int side = 0; side < 2; side++) {
+			fill(&p, 3, 2, &d);
+			pss_write(&p, bytes, sizeof bytes);
+			for (int k = 0; k < 4; k++)
+				bytes[4 * side + k] = (uint8_t)(counts[i] >> (8 * k));
+			assert_int_equal(pss_read(&q, bytes, sizeof bytes), 0);
+		}
+	for (size_t i = 0; i < dice_count(20000); i++) {
+		size_t n = dice_below(&d, 400);
+		for (size_t k = 0; k < n; k++)
+			bytes[k] = k % 4 && k < 8 ? 0 : (uint8_t)dice_below(&d, 256);
+		size_t used = pss_read(&q, bytes, n);
+		assert_true(used <= n);
+		if (!used)
+			continue;
+		for (int s = 0; s < SAMPLER_SIDES; s++)
+			for (unsigned v = 0; v < q.used[s]; v++)
+				for (int k = 0; k < SAMPLER_BLOCK; k++)
+					assert_true(q.u[s][v][k] >= 0 && q.u[s][v][k] < 1);
+	}
+}
+
+/* Targets on a film of 16 x 16. In the first the density is a function of two numbers; in the second the path's length
+ * is drawn, too, and longer ones use more blocks; the third has two splats a point, one of them dark, and holes. */
+enum { SIDE = 16 };
+
+static double profile(double x, double y)
+{
+	return 0.2 + pow(x, 3) + 2 * exp(-60 * ((x - 0.25) * (x - 0.25) + (y - 0.7) * (y - 0.7)));
+}
+
+static void put(struct path_sample *out, double x, double y, double value)
+{
+	struct splat *s = &out->splats[out->count++];
+	*s = (struct splat){x * SIDE, y * SIDE, {value / 2, value / 3, value / 6}};
+	out->intensity += s->xyz[0] + s->xyz[1] + s->xyz[2];
+}
+
+static void evaluate_plain(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	(void)c;
+	out->count = 0;
+	out->intensity = 0;
+	out->classes = 0;
+	const double *u = s->block(s, SIDE_CAMERA, 0);
+	put(out, u[0], u[1], profile(u[0], u[1]));
+}
+
+static void evaluate_lengths(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	(void)c;
+	out->count = 0;
+	out->intensity = 0;
+	out->classes = 0;
+	const double *u = s->block(s, SIDE_CAMERA, 0);
+	double x = u[0], y = u[1], value = profile(x, y);
+	for (unsigned v = 1; v < 12; v++) {
+		u = s->block(s, v % 3 ? SIDE_CAMERA : SIDE_LIGHT, v % 3 ? v : v / 3 - 1);
+		if (u[2] < 0.3)
+			break;
+		/* On average 1. */
+		value *= 0.5 + u[3];
+	}
+	put(out, x, y, value);
+}
+
+static void evaluate_holes(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	(void)c;
+	out->count = 0;
+	out->intensity = 0;
+	out->classes = 0;
+	const double *u = s->block(s, SIDE_CAMERA, 0);
+	double x = u[0], y = u[1], w = u[5];
+	if (w < 0.4)
+		return;
+	put(out, x, y, profile(x, y) * (w < 0.7 ? 1 / 0.3 : 0));
+	const double *l = s->block(s, SIDE_LIGHT, 0);
+	put(out, l[0], l[1], profile(l[0], l[1]) / 0.6);
+}
+
+/* Groups of chains; each its own b from its large steps, as a job's groups have. Mean of each cell's sum over the exact
+ * one is tested by t between 16 groups; power: with 95 % a cell that is off by 12 % or a mean by 2 %, at most. */
+static void check_target(const char *name,
+			 void (*evaluate)(struct path_context *, struct sampler *, struct path_sample *), double times)
+{
+	enum { GROUPS = 16, CELLS = 4 };
+	static double cell[CELLS * CELLS][GROUPS], exact[CELLS * CELLS], total[GROUPS];
+	struct chain *c = test_malloc(chain_pss.size);
+	static struct path_context context;
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	context.counters = counters;
+	const struct integrator integrator = {.stream = RNG_BOOTSTRAP, .evaluate = evaluate};
+	struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
+	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
+	size_t steps = dice_count(400000);
+	for (int k = 0; k < CELLS * CELLS; k++) {
+		enum { SUB = 200 };
+		exact[k] = 0;
+		for (int i = 0; i < SUB * SUB; i++)
+			exact[k] += times *
+				    profile((k % CELLS + (i % SUB + 0.5) / SUB) / CELLS,
+					    (k / CELLS + (i / SUB + 0.5) / SUB) / CELLS) /
+				    (SUB * SUB) / (CELLS * CELLS);
+	}
+	for (int g = 0; g < GROUPS; g++) {
+		struct film_sums film;
+		struct chain_sums sums = {0, 0};
+		assert_int_equal(film_sums_init(&film, &plan, &settings, NULL), 0);
+		memset(counters, 0, sizeof counters);
+		*c = (struct chain){.integrator = &integrator,
+				    .context = &context,
+				    .film = &film,
+				    .seed = stats_seed(name),
+				    .id = (uint64_t)g};
+		/* Any start will do: chains this long forget it. */
+		assert_true(chain_pss.start(c, UINT64_MAX));
+		for (size_t i = 0; i < steps; i++)
+			chain_pss.step(c, &sums);
+		chain_pss.flush(c);
+		assert_int_equal(counters[COUNT_SAMPLES], steps);
+		assert_true(counters[COUNT_ACCEPTED] > steps / 4 && counters[COUNT_ACCEPTED] < steps);
+		double b = sums.sum / (double)counters[COUNT_INDEPENDENT], sum = 0;
+		for (int k = 0; k < CELLS * CELLS; k++)
+			cell[k][g] = 0;
+		for (int i = 0; i < SIDE * SIDE; i++) {
+			double v = (film.xyz[3 * i] + film.xyz[3 * i + 1] + film.xyz[3 * i + 2]) * b / (double)steps;
+			cell[(i / SIDE) / (SIDE / CELLS) * CELLS + (i % SIDE) / (SIDE / CELLS)][g] += v;
+			sum += v;
+		}
+		total[g] = sum;
+		film_sums_fini(&film);
+	}
+	double worst = 0, whole = 0;
+	for (int k = 0; k < CELLS * CELLS; k++) {
+		struct stats_mean m = stats_mean_test(cell[k], GROUPS, exact[k]);
+		worst = fmax(worst, m.error / exact[k]);
+		whole += exact[k];
+		if (m.p < LEVEL)
+			fail_msg("%s: cell %d is %.6g +- %.1g, not %.6g (p = %g)", name, k, m.mean, m.error, exact[k],
+				 m.p);
+	}
+	struct stats_mean m = stats_mean_test(total, GROUPS, whole);
+	print_message("%s: mean %.5f +- %.5f of %.5f; worst cell +- %.2f %%\n", name, m.mean, m.error, whole,
+		      100 * worst);
+	assert_true(m.p > LEVEL);
+	/* t at 1e-6 and 15 degrees is 7.7: what is found with 95 %. */
+	if (steps >= 400000)
+		assert_true(9.4 * worst < 0.12 && 9.4 * m.error / whole < 0.02);
+	test_free(c);
+}
+
+static void test_targets(void **state)
+{
+	(void)state;
+	check_target("plain target", evaluate_plain, 1);
+	check_target("target of many lengths", evaluate_lengths, 1);
+	check_target("target with holes", evaluate_holes, 2);
+}
+
+/* Intensities where doubles end: most points are of one of two magnitudes, so that a chain stays there for a while. */
+static double magnitudes[2];
+
+static void evaluate_extremes(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	(void)c;
+	out->count = 0;
+	out->intensity = 0;
+	out->classes = 1;
+	const double *u = s->block(s, SIDE_CAMERA, 0);
+	put(out, u[0], u[1], 6 * magnitudes[u[5] < 0.5]);
+	put(out, u[0], u[1], 0);
+	out->of_class[0] = out->intensity;
+}
+
+static void check_finite(const struct film_sums *film, double weight)
+{
+	double sum = 0;
+	float first, second;
+	struct chain_moments m = film->moments;
+	for (int i = 0; i < SIDE * SIDE * 3; i++) {
+		assert_true(isfinite(film->xyz[i]));
+		sum += film->xyz[i];
+	}
+	double classes[PATH_CLASSES];
+	chain_moments_end(&m, &second, classes);
+	chain_moments_end_sequence(&m, &first);
+	assert_true(fabs(sum / weight - 1) < 1e-9);
+	assert_true(fabs((double)first / weight - 1) < 1e-6 && fabs((double)second / weight - 1) < 1e-6);
+	assert_true(fabs(classes[0] / weight - 1) < 1e-9);
+}
+
+/* No intensity makes a film, a moment or a sum infinite. Each mutation gives the film a weight of 1, whatever the
+ * intensity. */
+static void test_extreme_intensities(void **state)
+{
+	(void)state;
+	const double pairs[][2] = {{0x1p-1074, 0x1p-1074}, {0x1p-1074, 1e-310}, {0x1p-1074, 0},
+				   {1e-300, 0x1p-1070},	   {0x1p-1074, 1e30},	{1e-310, 3e38}};
+	struct chain *c = test_malloc(chain_pss.size);
+	static struct path_context context;
+	uint64_t counters[BATCH_COUNTERS];
+	context.counters = counters;
+	const struct integrator integrator = {.stream = RNG_BOOTSTRAP, .evaluate = evaluate_extremes};
+	struct plan plan = {
+		.kind = PLAN_CHAINS, .width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
+	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_BOX, .filter_radius = 0.5};
+	enum { STEPS = 2000 };
+	for (size_t k = 0; k < sizeof pairs / sizeof *pairs; k++) {
+		struct film_sums film;
+		struct chain_sums sums = {0, 0};
+		uint64_t blind = 0;
+		memcpy(magnitudes, pairs[k], sizeof magnitudes);
+		memset(counters, 0, sizeof counters);
+		assert_int_equal(film_sums_init(&film, &plan, &settings, NULL), 0);
+		*c = (struct chain){.integrator = &integrator, .context = &context, .film = &film, .seed = 3, .id = 1};
+		assert_true(chain_pss.start(c, UINT64_MAX));
+		for (int i = 0; i < STEPS; i++) {
+			chain_pss.step(c, &sums);
+			blind += counters[COUNT_ACCEPTED] == 0;
+		}
+		chain_pss.flush(c);
+		assert_true(isfinite(sums.sum) && isfinite(sums.square) && sums.sum > 0);
+		check_finite(&film, (double)(STEPS - blind));
+		film_sums_fini(&film);
+	}
+	test_free(c);
+}
+
+/* Saved and resumed between epochs, a chain goes on bit for bit. */
+static void test_resume(void **state)
+{
+	(void)state;
+	struct chain *whole = test_malloc(chain_pss.size), *parts = test_malloc(chain_pss.size);
+	static struct path_context context;
+	static uint64_t counters[BATCH_COUNTERS] = {0};
+	context.counters = counters;
+	const struct integrator integrator = {.stream = RNG_BOOTSTRAP, .evaluate = evaluate_lengths};
+	struct plan plan = {.width = SIDE, .height = SIDE, .crop_width = SIDE, .crop_height = SIDE};
+	struct scene_settings settings = {.width = SIDE, .height = SIDE, .filter = FILTER_TENT, .filter_radius = 1};
+	for (uint64_t start = 0; start < 4; start++) {
+		struct film_sums a, b;
+		struct chain_sums sa = {0, 0}, sb = {0, 0};
+		assert_int_equal(film_sums_init(&a, &plan, &settings, NULL), 0);
+		assert_int_equal(film_sums_init(&b, &plan, &settings, NULL), 0);
+		*whole =
+			(struct chain){.integrator = &integrator, .context = &context, .film = &a, .seed = 5, .id = 11};
+		*parts =
+			(struct chain){.integrator = &integrator, .context = &context, .film = &b, .seed = 5, .id = 11};
+		uint64_t index = start ? start : UINT64_MAX;
+		assert_true(chain_pss.start(whole, index) && chain_pss.start(parts, index));
+		for (int epoch = 0; epoch < 20; epoch++) {
+			struct chain_state s, t;
+			for (int i = 0; i < 37; i++) {
+				chain_pss.step(whole, &sa);
+				chain_pss.step(parts, &sb);
+			}
+			chain_pss.flush(whole);
+			chain_pss.flush(parts);
+			assert_int_equal(chain_pss.save(parts, &s), 0);
+			memset(parts + 1, 0xa5, chain_pss.size - sizeof *parts);
+			parts->rejected_run = 99;
+			parts->step = whole->step + 1; /* of another epoch */
+			assert_false(chain_pss.resume(parts, &s));
+			parts->step = whole->step;
+			assert_true(chain_pss.resume(parts, &s));
+			assert_int_equal(chain_pss.save(parts, &t), 0);
+			assert_int_equal(s.size, t.size);
+			assert_memory_equal(s.bytes, t.bytes, s.size);
+			assert_true(s.size <= CHAIN_STATE_MAX);
+			/* Another chain's, or a piece of it, is refused. */
+			struct chain_state piece = {s.bytes, s.size - 1};
+			assert_false(chain_pss.resume(parts, &piece));
+			piece.size = 10;
+			assert_false(chain_pss.resume(parts, &piece));
+			parts->id++;
+			assert_false(chain_pss.resume(parts, &s));
+			parts->id--;
+			if (s.size > CHAIN_STATE_HEAD + 8) { /* a signalling NaN: refused, and nobody's fault */
+				const uint64_t nan = UINT64_C(0x7ff4000000000000);
+				struct chain_state bad = {mem_alloc(s.size, 1), s.size};
+				memcpy(bad.bytes, s.bytes, s.size);
+				memcpy(bad.bytes + CHAIN_STATE_HEAD + 8, &nan, sizeof nan);
+				bool watched = fptrap_watch();
+				assert_false(chain_pss.resume(parts, &bad));
+				fptrap_unwatch(watched);
+				mem_free(bad.bytes);
+			}
+			assert_true(chain_pss.resume(parts, &s));
+			mem_free(s.bytes);
+			mem_free(t.bytes);
+		}
+		assert_memory_equal(a.xyz, b.xyz, (size_t)SIDE * SIDE * 3 * sizeof *a.xyz);
+		assert_memory_equal(&sa, &sb, sizeof sa);
+		assert_int_equal(whole->step, parts->step);
+		assert_int_equal(whole->rejected_run, parts->rejected_run);
+		film_sums_fini(&a);
+		film_sums_fini(&b);
+	}
+	test_free(whole);
+	test_free(parts);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_small_step), cmocka_unit_test(test_both_ways),
+		cmocka_unit_test(test_bytes),	   cmocka_unit_test(test_targets),
+		cmocka_unit_test(test_resume),	   cmocka_unit_test(test_extreme_intensities),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,263 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Emitters at infinity: sampling against density, density against radiance, orientation.
+ *
+ * Level: 1e-7 a test, about 20 tests. Power: an exchange of the density's cells, or half a cell's shift, is found with
+ * certainty (a test of its own shifts them).
+ */
+#include "tests/support/nodes.h"
+#include "tests/support/pictures.h"
+#include "tests/support/stats.h"
+#include "worker/render/emitter/emitter.h"
+#include "worker/render/math/rng.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define PI 3.14159265358979323846
+#define LEVEL 1e-7
+
+enum { WIDTH = 8, HEIGHT = 6, ROWS = 2 * HEIGHT, COLUMNS = 2 * WIDTH, CELLS = ROWS * COLUMNS, SAMPLES = 100000 };
+
+static const struct wavelengths colour = {.nm = {450, 550, 600, 700}}, grey = {.grey = true};
+static const char *const cases[] = {
+	"constant",	      "constant radiance=rgb(0.3,0.5,2)",
+	"envmap filename=p0", "envmap filename=p1 scale=3",
+	"envmap filename=p2", "envmap filename=p3",
+};
+enum { CASES = sizeof cases / sizeof *cases };
+
+struct fixture {
+	struct arena arena;
+	struct pictures pictures;
+	struct asset_source source;
+};
+
+/* p0: many levels in colour; p1: black but for one pixel; p2: one pixel; p3: a sun on the upper row; p4: black. */
+static int setup(void **state)
+{
+	static struct fixture f;
+	double rgb[WIDTH * HEIGHT * 3], dark[WIDTH * HEIGHT * 3] = {0};
+	const double white[3] = {2, 2, 2};
+	for (int i = 0; i < WIDTH * HEIGHT; i++) {
+		double level = ldexp(1, i * 7 % 11 - 5);
+		memcpy(rgb + 3 * i, (double[]){level, level * 0.5, level * (i % 2 ? 0.25 : 1)}, 3 * sizeof *rgb);
+	}
+	f = (struct fixture){.arena = {0}};
+	pictures_add(&f.pictures, WIDTH, HEIGHT, rgb);
+	memcpy(dark + 3 * (3 * WIDTH + 2), white, sizeof white);
+	pictures_add(&f.pictures, WIDTH, HEIGHT, dark);
+	pictures_add(&f.pictures, 1, 1, white);
+	memcpy(rgb + 3 * 5, (double[]){0x1p20, 0x1p20, 0x1p20}, 3 * sizeof *rgb);
+	pictures_add(&f.pictures, WIDTH, HEIGHT, rgb);
+	memset(dark, 0, sizeof dark);
+	pictures_add(&f.pictures, WIDTH, HEIGHT, dark);
+	f.source = pictures_source(&f.pictures);
+	*state = &f;
+	return 0;
+}
+
+static int teardown(void **state)
+{
+	struct fixture *f = *state;
+	pictures_fini(&f->pictures);
+	arena_fini(&f->arena);
+	return 0;
+}
+
+static int try(struct fixture *f, const char *text, const mat4 *to_world, struct emitter *em, struct error *e)
+{
+	struct scene_node *n = node_make(&f->arena, PLUGIN_EMITTER, text);
+	const struct emitter_build build = {.assets = &f->source, .arena = &f->arena, .dialect_3 = true};
+	if (to_world)
+		node_add_transform(&f->arena, n, "to_world", *to_world);
+	return emitter_create(em, n, &build, e);
+}
+
+static struct emitter make(struct fixture *f, const char *text, const mat4 *to_world)
+{
+	struct emitter em;
+	struct error e;
+	if (try(f, text, to_world, &em, &e))
+		fail_msg("%s: %s", text, e.text);
+	return em;
+}
+
+static vec3 direction(double u, double v)
+{
+	double phi = 2 * PI * u, theta = PI * v;
+	return (vec3){sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi)};
+}
+
+static double pdf_at(const struct emitter *em, vec3 d)
+{
+	const struct emitter_point x = {.p = d, .infinite = true};
+	return em->ops->pdf_point(em, &x);
+}
+
+static spectrum radiance_at(const struct emitter *em, vec3 d, const struct wavelengths *w)
+{
+	const struct emitter_point x = {.p = d, .infinite = true};
+	return em->ops->radiance(em, &x, vec3_neg(d), w);
+}
+
+/* Half pixels both ways: densities that are constant between pixel centres are constant here. shift: in columns. */
+static double expected_counts(const struct emitter *em, double shift, double *cells)
+{
+	double total = 0;
+	for (int i = 0; i < CELLS; i++) {
+		int row = i / COLUMNS, column = i % COLUMNS;
+		double angle = 2 * PI / COLUMNS * (cos(PI * row / ROWS) - cos(PI * (row + 1) / ROWS));
+		double p = angle * pdf_at(em, direction((column + 0.5 + shift) / COLUMNS, (row + 0.5) / ROWS));
+		cells[i] = p * SAMPLES;
+		total += p;
+	}
+	return total;
+}
+
+static void check_sample(const struct emitter *em, const double u[2], const struct emitter_point *x, double pdf)
+{
+	const vec3 ref = {1, 2, 3};
+	struct emitter_point y;
+	double pdf_toward;
+	assert_true(x->infinite && fabs(vec3_length(x->p) - 1) < 1e-14 && pdf > 0 && isfinite(pdf));
+	assert_true(em->ops->pdf_point(em, x) == pdf && em->ops->pdf_toward(em, ref, x) == pdf);
+	assert_true(em->ops->sample_toward(em, ref, u, &y, &pdf_toward));
+	assert_true(y.p.x == x->p.x && y.p.y == x->p.y && y.p.z == x->p.z && pdf_toward == pdf);
+}
+
+static double chi_square(const struct emitter *em, double shift, uint64_t seed)
+{
+	static double expected[CELLS];
+	static uint64_t observed[CELLS];
+	memset(observed, 0, sizeof observed);
+	assert_true(fabs(expected_counts(em, shift, expected) - 1) < 1e-9);
+	for (uint64_t i = 0; i < SAMPLES; i++) {
+		double u[4], pdf;
+		struct emitter_point x;
+		rng_uniform4(seed, RNG_TEST, i, 0, 0, u);
+		assert_true(em->ops->sample_point(em, u, &x, &pdf));
+		check_sample(em, u, &x, pdf);
+		double turn = atan2(x.p.x, -x.p.z) / (2 * PI);
+		int column = (int)(COLUMNS * (turn - floor(turn))), row = (int)(ROWS * acos(x.p.y) / PI);
+		column = column == COLUMNS ? 0 : column;
+		observed[(row == ROWS ? ROWS - 1 : row) * COLUMNS + column]++;
+	}
+	return stats_counts_p(observed, expected, CELLS);
+}
+
+static void test_samples_follow_the_density(void **state)
+{
+	for (int k = 0; k < CASES; k++) {
+		struct emitter em = make(*state, cases[k], NULL);
+		assert_true(em.infinite && em.power > 0 && isfinite(em.power));
+		double p = chi_square(&em, 0, stats_seed(cases[k]));
+		print_message("%s: p = %.2e\n", cases[k], p);
+		assert_true(p > LEVEL);
+	}
+	struct emitter em = make(*state, cases[2], NULL);
+	assert_true(chi_square(&em, 1, stats_seed(__func__)) < LEVEL);
+}
+
+/* The integral of the radiance two ways; the density is positive wherever there is light. */
+static void test_radiance_over_density(void **state)
+{
+	enum { GROUPS = 16, STEPS = 400 };
+	for (int k = 0; k < CASES; k++) {
+		struct emitter em = make(*state, cases[k], NULL);
+		double sum = 0, means[GROUPS] = {0};
+		for (int i = 0; i < STEPS * 2 * STEPS; i++) {
+			double v = (i / (2 * STEPS) + 0.5) / STEPS, u = (i % (2 * STEPS) + 0.5) / (2 * STEPS);
+			vec3 d = direction(u, v);
+			double l = radiance_at(&em, d, &colour).v[1];
+			sum += l * sin(PI * v) * PI * PI / (STEPS * STEPS);
+			assert_true(l == 0 || pdf_at(&em, d) > 0);
+		}
+		for (uint64_t i = 0; i < SAMPLES; i++) {
+			double u[4], pdf;
+			struct emitter_point x;
+			rng_uniform4(stats_seed(cases[k]), RNG_TEST, i, 1, 0, u);
+			if (em.ops->sample_point(&em, u, &x, &pdf))
+				means[i % GROUPS] += radiance_at(&em, x.p, &colour).v[1] / pdf / (SAMPLES / GROUPS);
+		}
+		struct stats_mean m = stats_mean_test(means, GROUPS, sum);
+		print_message("%s: %.6g +- %.2g, by quadrature %.6g\n", cases[k], m.mean, m.error, sum);
+		assert_true(fabs(m.mean - sum) < 8 * m.error + 1e-4 * sum && m.error < 0.005 * sum);
+	}
+}
+
+static void test_orientation(void **state)
+{
+	struct emitter em = make(*state, "envmap filename=p1 scale=3", NULL);
+	/* The pixel (2, 3) of 8 x 6. */
+	vec3 d = direction(2.5 / 8, 3.5 / 6);
+	assert_true(d.x > 0 && d.y < 0 && d.z > 0);
+	assert_true(fabs(radiance_at(&em, d, &grey).v[0] - 6) < 1e-9);
+	assert_true(fabs(radiance_at(&em, d, &colour).v[1] - 6 * color_d65(550)) < 1e-9);
+	assert_true(radiance_at(&em, vec3_neg(d), &grey).v[0] == 0);
+	assert_int_equal(em.shape, COLOR_SHAPE_D65);
+
+	/* A quarter turn about y takes +z to +x; a scale changes nothing; the density turns along. */
+	const mat4 turn = {{{0, 0, 2, 0}, {0, 2, 0, 0}, {-2, 0, 0, 0}, {0, 0, 0, 1}}};
+	struct emitter turned = make(*state, "envmap filename=p1 scale=3", &turn);
+	vec3 e = {d.z, d.y, -d.x};
+	assert_true(fabs(radiance_at(&turned, e, &grey).v[0] - 6) < 1e-9);
+	assert_true(fabs(pdf_at(&turned, e) / pdf_at(&em, d) - 1) < 1e-9);
+	double u[2] = {0.3, 0.6}, pdf, pdf_turned;
+	struct emitter_point x, y;
+	assert_true(em.ops->sample_point(&em, u, &x, &pdf) && turned.ops->sample_point(&turned, u, &y, &pdf_turned));
+	assert_true(fabs(y.p.x - x.p.z) < 1e-14 && fabs(y.p.z + x.p.x) < 1e-14 && fabs(pdf / pdf_turned - 1) < 1e-9);
+}
+
+static void test_poles_and_ends(void **state)
+{
+	for (int k = 0; k < CASES; k++) {
+		struct emitter em = make(*state, cases[k], NULL);
+		const vec3 poles[] = {{0, 1, 0}, {0, -1, 0}, {0, 0, -1}, {-0.0, 0, -1}, {1e-300, 1, 0}};
+		for (int i = 0; i < 5; i++) {
+			assert_true(isfinite(pdf_at(&em, poles[i])));
+			assert_true(spectrum_is_valid(radiance_at(&em, poles[i], &colour)));
+		}
+		const double ends[] = {0, 0x1p-53, 0.5, 1 - 0x1p-53};
+		for (int i = 0; i < 16; i++) {
+			double u[2] = {ends[i % 4], ends[i / 4]}, pdf;
+			struct emitter_point x;
+			if (em.ops->sample_point(&em, u, &x, &pdf))
+				check_sample(&em, u, &x, pdf);
+		}
+	}
+}
+
+static void test_black_and_refusals(void **state)
+{
+	struct emitter em = make(*state, "envmap filename=p4", NULL);
+	struct emitter_point x;
+	struct error e = {{0}};
+	double pdf;
+	assert_true(em.power == 0 && !em.ops->sample_point(&em, (double[]){0.5, 0.5}, &x, &pdf));
+	assert_true(pdf_at(&em, (vec3){0, 0, 1}) == 0);
+
+	const mat4 shear = {{{1, 0.5, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
+	assert_true(try(*state, "envmap filename=p0", &shear, &em, &e) < 0 && strstr(e.text, "rotate"));
+	assert_true(try(*state, "envmap", NULL, &em, &e) < 0 && strstr(e.text, "filename"));
+	assert_true(try(*state, "moon", NULL, &em, &e) < 0 && strstr(e.text, "moon"));
+	assert_true(try(*state, "area", NULL, &em, &e) < 0 && strstr(e.text, "shape"));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_samples_follow_the_density),
+		cmocka_unit_test(test_radiance_over_density),
+		cmocka_unit_test(test_orientation),
+		cmocka_unit_test(test_poles_and_ends),
+		cmocka_unit_test(test_black_and_refusals),
+	};
+	return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,379 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Surfaces that coincide. Two triangles: against their separation along the edges of each (an axis on which they lie
+ * apart), in planes of any direction, near the origin and far from it, with vertices rounded to float. The search:
+ * against all pairs. Rays and segments: against the one rule that says which of two is there.
+ */
+#include "tests/support/bodies.h"
+#include "worker/render/geom/coincide.h"
+
+#include "common/base/mem.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+enum { MOST = 4096 };
+
+/* Triangles without shared vertices. */
+struct soup {
+	float position[3 * MOST + 2][3];
+	uint32_t index[MOST][3];
+	uint32_t count;
+};
+
+static void add(struct soup *s, vec3 a, vec3 b, vec3 c)
+{
+	const vec3 v[3] = {a, b, c};
+	assert_true(s->count < MOST);
+	for (int k = 0; k < 3; k++) {
+		uint32_t i = 3 * s->count + (uint32_t)k;
+		s->position[i][0] = (float)v[k].x;
+		s->position[i][1] = (float)v[k].y;
+		s->position[i][2] = (float)v[k].z;
+		s->index[s->count][k] = i;
+	}
+	s->count++;
+}
+
+static struct accel_shape shape_of(const struct soup *s, enum surface_rank rank)
+{
+	return (struct accel_shape){.vertex_count = 3 * s->count,
+				    .triangle_count = s->count,
+				    .position = (const float(*)[3])s->position,
+				    .index = (const uint32_t(*)[3])s->index,
+				    .rank = rank};
+}
+
+static struct triangle triangle_at(const struct soup *s, uint32_t i)
+{
+	return triangle_from((const float(*)[3])s->position, s->index[i]);
+}
+
+/* ---- two triangles ---- */
+
+/* Corners within the square [-1,1]^2 of the plane through `at`, `size` large; a sliver is thrown again. */
+static void throw_corners(struct dice *d, double c[3][2])
+{
+	double area;
+	do {
+		for (int i = 0; i < 3; i++)
+			for (int k = 0; k < 2; k++)
+				c[i][k] = dice_between(d, -1, 1);
+		area = (c[1][0] - c[0][0]) * (c[2][1] - c[0][1]) - (c[1][1] - c[0][1]) * (c[2][0] - c[0][0]);
+	} while (fabs(area) < 0.1);
+}
+
+/* The widest gap (above 0) or, where there is none, the least overlap (below 0) along the normals of all edges. */
+static double gap(const double a[3][2], const double b[3][2])
+{
+	double widest = -INFINITY;
+	for (int side = 0; side < 6; side++) {
+		const double(*t)[2] = side < 3 ? a : b;
+		const double *p = t[side % 3], *q = t[(side + 1) % 3];
+		double x = q[1] - p[1], y = p[0] - q[0], l = hypot(x, y);
+		double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+		for (int i = 0; i < 3; i++) {
+			double u = (x * a[i][0] + y * a[i][1]) / l, v = (x * b[i][0] + y * b[i][1]) / l;
+			low[0] = fmin(low[0], u), high[0] = fmax(high[0], u);
+			low[1] = fmin(low[1], v), high[1] = fmax(high[1], v);
+		}
+		widest = fmax(widest, fmax(low[0] - high[1], low[1] - high[0]));
+	}
+	return widest;
+}
+
+static void put(struct soup *s, const struct frame *f, vec3 at, double size, const double c[3][2])
+{
+	vec3 v[3];
+	for (int i = 0; i < 3; i++)
+		v[i] = vec3_madd(vec3_madd(at, size * c[i][0], f->s), size * c[i][1], f->t);
+	add(s, v[0], v[1], v[2]);
+}
+
+static bool meet(const struct triangle *a, const struct triangle *b)
+{
+	bool unused, one = coincide_triangles(a, b, &unused), other = coincide_triangles(b, a, &unused);
+	if (one != other)
+		fail_msg("one coincides with the other, which does not with the one");
+	return one;
+}
+
+static void test_two(void **state)
+{
+	(void)state;
+	static struct soup s;
+	struct dice d = dice_of("two triangles");
+	size_t seen[2] = {0, 0};
+	for (size_t n = dice_count(100000); n > 0; n--) {
+		double a[3][2], b[3][2], size = exp2(dice_between(&d, -12, -1));
+		struct frame f = frame_around(dice_direction(&d));
+		vec3 at = vec3_scale(dice_throw(&d) < 0.5 ? 0.5 : 0, dice_direction(&d));
+		throw_corners(&d, a);
+		throw_corners(&d, b);
+		double g = gap(a, b);
+		if (fabs(g) < 0x1p-6)
+			continue;
+		s.count = 0;
+		put(&s, &f, at, size, a);
+		put(&s, &f, at, size, b);
+		/* Apart by so much more than vertices are rounded (coordinates are below 2); and tilted. */
+		vec3 off = vec3_madd(at, dice_throw(&d) < 0.5 ? 0x1p-20 : -0x1p-18, f.n);
+		put(&s, &f, off, size, b);
+		struct frame tilted = frame_around(vec3_normalize(vec3_madd(f.n, 0.02, f.s)));
+		put(&s, &tilted, at, fmax(size, 0x1p-10), b);
+		const struct triangle t[4] = {triangle_at(&s, 0), triangle_at(&s, 1), triangle_at(&s, 2),
+					      triangle_at(&s, 3)};
+		if (meet(&t[0], &t[1]) != (g < 0))
+			fail_msg("a gap of %g, in triangles of %g: %s", g, size,
+				 g < 0 ? "not seen to overlap" : "seen to overlap");
+		if (meet(&t[0], &t[2]))
+			fail_msg("triangles of %g apart by 2^-20 or more are taken for one", size);
+		if (size >= 0x1p-10 && meet(&t[0], &t[3]))
+			fail_msg("triangles of %g at an angle of 0.02 are taken for one", size);
+		seen[g < 0]++;
+	}
+	assert_true(seen[0] > 0 && seen[1] > 0);
+}
+
+/* Neighbours that share an edge or a corner, in one plane or not, never coincide: a plane and a ball. */
+static void test_neighbours(void **state)
+{
+	(void)state;
+	struct geom_shape g[2];
+	body_plane(&g[0], 8, 0.3, 0.7);
+	body_ball(&g[1], 8, 0.7, 0.1);
+	for (int k = 0; k < 2; k++) {
+		for (uint32_t i = 0; i < g[k].triangle_count; i++)
+			for (uint32_t j = 0; j < i; j++) {
+				const struct triangle a =
+					triangle_from((const float(*)[3])g[k].position, g[k].index[i]);
+				const struct triangle b =
+					triangle_from((const float(*)[3])g[k].position, g[k].index[j]);
+				assert_false(meet(&a, &b));
+			}
+		body_free(&g[k]);
+	}
+}
+
+/* ---- the search ---- */
+
+/* What is there by the rule, of all primitives: the first as they rank that overlaps this one, or is hidden by what
+ * does. */
+static struct prim_ref rule(const struct accel_shape *s, uint32_t count, struct prim_ref at, vec3 p)
+{
+	const struct triangle t = triangle_from(s[at.shape].position, s[at.shape].index[at.prim]);
+	for (unsigned rank = 0; rank <= s[at.shape].rank; rank++)
+		for (uint32_t i = 0; i < count; i++)
+			for (uint32_t k = 0; s[i].rank == rank && k < s[i].triangle_count; k++) {
+				if (i == at.shape && (k >= at.prim || rank != SURFACE_SHINES))
+					return at;
+				if (rank == s[at.shape].rank && i > at.shape)
+					return at;
+				const struct triangle u = triangle_from(s[i].position, s[i].index[k]);
+				double unused;
+				bool wholly;
+				if (triangle_meets(&u, p, t.n, &unused) && coincide_triangles(&t, &u, &wholly))
+					return (struct prim_ref){i, k};
+			}
+	return at;
+}
+
+static vec3 point_on(const struct accel_shape *s, uint32_t prim, struct dice *d)
+{
+	const struct triangle t = triangle_from(s->position, s->index[prim]);
+	double root = sqrt(dice_throw(d)), u = 1 - root, v = root * dice_throw(d);
+	return vec3_madd(vec3_madd(t.v[0], u, vec3_sub(t.v[1], t.v[0])), v, vec3_sub(t.v[2], t.v[0]));
+}
+
+/* Triangles of all sizes in a few planes that cross; exact in float, so that all of a plane coincide. */
+static void fill_planes(struct soup *s, uint32_t count, struct dice *d)
+{
+	for (s->count = 0; s->count < count;) {
+		double c[3][2], plane = dice_below(d, 4) / 8.0, size = exp2(-1.0 - dice_below(d, 6)),
+				x = dice_between(d, -1, 1), y = dice_between(d, -1, 1);
+		vec3 v[3];
+		unsigned axis = dice_below(d, 3);
+		throw_corners(d, c);
+		for (int i = 0; i < 3; i++) {
+			double u = x + size * c[i][0], w = y + size * c[i][1];
+			v[i] = axis == 0 ? (vec3){plane, u, w} : axis == 1 ? (vec3){u, plane, w} : (vec3){u, w, plane};
+		}
+		add(s, v[0], v[1], v[2]);
+	}
+}
+
+static void test_search(void **state)
+{
+	(void)state;
+	static struct soup soup[5];
+	static const enum surface_rank rank[5] = {SURFACE_TRANSMITS, SURFACE_OPAQUE, SURFACE_SHINES, SURFACE_OPAQUE,
+						  SURFACE_PASSES};
+	struct dice d = dice_of("search");
+	struct accel_shape shape[5];
+	struct coincidence *c;
+	struct error e;
+	size_t hidden = 0;
+	for (int i = 0; i < 5; i++) {
+		fill_planes(&soup[i], 150, &d);
+		shape[i] = shape_of(&soup[i], rank[i]);
+	}
+	assert_int_equal(coincide_find(&c, shape, 5, &e), 0);
+	assert_non_null(c);
+	assert_false(c->incomplete);
+	for (size_t n = dice_count(20000); n > 0; n--) {
+		struct prim_ref at = {dice_below(&d, 5), dice_below(&d, 150)};
+		vec3 p = point_on(&shape[at.shape], at.prim, &d);
+		struct prim_ref there = coincide_there(c, shape, at, p), right = rule(shape, 5, at, p);
+		if (there.shape != right.shape || there.prim != right.prim)
+			fail_msg("on %u.%u it is %u.%u that is there, not %u.%u", at.shape, at.prim, right.shape,
+				 right.prim, there.shape, there.prim);
+		hidden += there.shape != at.shape;
+	}
+	print_message("%zu pairs of primitives, %zu of shapes; %zu of the points hidden\n", c->pair_count,
+		      c->shapes_count, hidden);
+	assert_true(hidden > 0 && c->shapes_count > 4);
+	coincide_free(c);
+}
+
+/* A stack of equal triangles is no square; a heap that is one ends with what the bounds allow. Where nothing coincides
+ * nothing is kept, one sphere hides another, and without memory there is a sentence. */
+static void test_bounds(void **state)
+{
+	(void)state;
+	static struct soup s, other;
+	struct dice d = dice_of("bounds");
+	struct coincidence *c;
+	struct error e;
+	s.count = 0;
+	for (int i = 0; i < MOST; i++)
+		add(&s, (vec3){0, 0, 0}, (vec3){1, 0, 0}, (vec3){0, 1, 0});
+	struct accel_shape shape[2] = {shape_of(&s, SURFACE_SHINES)};
+	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
+	assert_int_equal(c->pair_count, MOST - 1);
+	assert_false(c->incomplete);
+	coincide_free(c);
+	for (s.count = 0; s.count < MOST;) {
+		double turn = dice_between(&d, 0, 6);
+		add(&s, (vec3){cos(turn), sin(turn), 0}, (vec3){cos(turn + 2), sin(turn + 2), 0},
+		    (vec3){cos(turn + 4), sin(turn + 4), 0});
+	}
+	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
+	assert_true(c->incomplete && c->pair_count > MOST && c->pair_count < 64 * MOST);
+	coincide_free(c);
+	shape[0] = shape_of(&s, SURFACE_OPAQUE);
+	assert_int_equal(coincide_find(&c, shape, 1, &e), 0);
+	assert_null(c);
+	struct accel_shape ball[3] = {
+		{.is_sphere = true, .center = {0.1, 0.2, 0.3}, .radius = 0.5, .rank = SURFACE_TRANSMITS}};
+	ball[1] = ball[2] = ball[0];
+	ball[1].radius *= 1 + 1e-9;
+	ball[2].radius *= 1 + 1e-5;
+	assert_int_equal(coincide_find(&c, ball, 3, &e), 0);
+	assert_int_equal(c->pair_count, 1);
+	assert_int_equal(coincide_there(c, ball, (struct prim_ref){1, 0}, ball[1].center).shape, 0);
+	assert_int_equal(coincide_there(c, ball, (struct prim_ref){2, 0}, ball[2].center).shape, 2);
+	coincide_free(c);
+	s.count = other.count = 0;
+	add(&s, (vec3){0, 0, 0}, (vec3){1, 0, 0}, (vec3){0, 1, 0});
+	add(&other, (vec3){0, 0, 0}, (vec3){1, 1, 0}, (vec3){0, 1, 0});
+	shape[0] = shape_of(&s, SURFACE_OPAQUE);
+	shape[1] = shape_of(&other, SURFACE_SHINES);
+	int rc = -ENOMEM;
+	for (long n = 0; n < 20 && rc; n++) {
+		mem_fail_after(n);
+		rc = coincide_find(&c, shape, 2, &e);
+		mem_fail_after(-1);
+		assert_true(rc == 0 || (rc == -ENOMEM && c == NULL && e.text[0]));
+	}
+	assert_int_equal(rc, 0);
+	coincide_free(c);
+}
+
+/* ---- rays ---- */
+
+/* A pane and a smaller lamp in its plane, turned: what is there from both sides; what leaves one does not meet the
+ * other; no segment begins or ends on what is hidden. */
+static void test_rays(void **state)
+{
+	(void)state;
+	static struct soup s[2];
+	struct dice d = dice_of("rays");
+	size_t lamp = 0, pane = 0, on_hidden = 0;
+	for (size_t n = dice_count(2000); n > 0; n--) {
+		struct frame f = frame_around(dice_direction(&d));
+		vec3 at = vec3_scale(0.4, dice_direction(&d));
+		struct coincidence *c;
+		struct accel *a;
+		struct error e;
+		for (int k = 0; k < 2; k++) {
+			double w = k ? 0.25 : 0.5, turn = k ? 0.3 : 0;
+			const double co = w * cos(turn), si = w * sin(turn),
+				     corner[2][3][2] = {
+					     {{co - si, si + co}, {-co - si, -si + co}, {-co + si, -si - co}},
+					     {{co - si, si + co}, {-co + si, -si - co}, {co + si, si - co}}};
+			s[k].count = 0;
+			for (int i = 0; i < 2; i++)
+				put(&s[k], &f, at, 1, corner[i]);
+		}
+		const struct accel_shape shape[2] = {shape_of(&s[0], SURFACE_TRANSMITS),
+						     shape_of(&s[1], SURFACE_SHINES)};
+		assert_int_equal(coincide_find(&c, shape, 2, &e), 0);
+		assert_non_null(c);
+		assert_int_equal(accel_new(&a, shape, 2, c, &e), 0);
+		for (int i = 0; i < 20; i++) {
+			double x = dice_between(&d, -0.48, 0.48), y = dice_between(&d, -0.48, 0.48);
+			double u = x * cos(0.3) + y * sin(0.3), v = y * cos(0.3) - x * sin(0.3),
+			       edge = fmax(fabs(u), fabs(v)) - 0.25;
+			if (fabs(edge) < 1e-5)
+				continue;
+			vec3 p = vec3_madd(vec3_madd(at, x, f.s), y, f.t), w = dice_direction(&d);
+			if (fabs(vec3_dot(w, f.n)) < 0.01)
+				continue;
+			struct ray_end eye = {vec3_madd(p, -1, w), {0, 0, 0}, PRIM_NONE},
+				       far = {vec3_madd(p, 1, w), {0, 0, 0}, PRIM_NONE};
+			struct ray_hit hit;
+			uint32_t right = edge < 0;
+			if (!accel_closest(a, &eye, w, 0, INFINITY, &hit) || hit.prim.shape != right)
+				fail_msg("a ray meets %u where %u is there", hit.prim.shape, right);
+			assert_true(accel_occluded(a, &eye, &far));
+			const struct geom_shape g = {.vertex_count = 6,
+						     .triangle_count = 2,
+						     .position = s[right].position,
+						     .index = s[right].index};
+			struct surface_point q;
+			surface_from_hit(&g, eye.p, w, &hit, &q);
+			struct ray_end from = body_end(&q);
+			if (accel_closest(a, &from, w, 0, INFINITY, &hit) || accel_occluded(a, &from, &far) ||
+			    accel_occluded(a, &eye, &from) || accel_occluded_to_infinity(a, &from, w))
+				fail_msg("what leaves shape %u meets the one that it coincides with", right);
+			lamp += right;
+			pane += !right;
+			if (!right)
+				continue;
+			/* The pane's own point there. */
+			struct triangle t = triangle_from(shape[0].position, shape[0].index[0]);
+			double unused;
+			struct prim_ref prim = {0, triangle_meets(&t, p, f.n, &unused) ? 0 : 1};
+			struct ray_end hidden = {p, f.n, prim};
+			assert_false(accel_closest(a, &hidden, w, 0, INFINITY, &hit));
+			assert_true(accel_occluded(a, &hidden, &far) && accel_occluded(a, &eye, &hidden) &&
+				    accel_occluded_to_infinity(a, &hidden, w));
+			on_hidden++;
+		}
+		accel_free(a);
+		coincide_free(c);
+	}
+	print_message("%zu rays on the lamp, %zu on the pane, %zu ends on what is hidden\n", lamp, pane, on_hidden);
+	assert_true(lamp > 0 && pane > 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_two), cmocka_unit_test(test_neighbours),
+					   cmocka_unit_test(test_search), cmocka_unit_test(test_bounds),
+					   cmocka_unit_test(test_rays)};
+	return cmocka_run_group_tests_name("coinciding surfaces", tests, NULL, NULL);
+}

@@ -1,0 +1,292 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The half vector as a function of where three vertices lie, in 113 bits of mantissa, and its derivatives by
+ * differences: an implementation of its own, that shares no formula of a derivative with the program.
+ */
+#ifndef TESTS_WORKER_HALFVEC_QUAD_H
+#define TESTS_WORKER_HALFVEC_QUAD_H
+
+#include "tests/worker/render/halfvec/hand.h"
+
+typedef __float128 quad;
+typedef struct {
+	quad x, y, z;
+} qvec;
+
+static inline quad qabs(quad a)
+{
+	return a < 0 ? -a : a;
+}
+
+static inline quad qroot(quad a)
+{
+	if (!(a > 0))
+		return 0;
+	quad r = (quad)sqrt((double)a);
+	for (int i = 0; i < 3; i++)
+		r = (r + a / r) / 2;
+	return r;
+}
+
+static inline qvec q_of(vec3 a)
+{
+	return (qvec){a.x, a.y, a.z};
+}
+
+static inline qvec q_of_float(const float a[3])
+{
+	return (qvec){(quad)a[0], (quad)a[1], (quad)a[2]};
+}
+
+static inline qvec q_madd(qvec a, quad s, qvec b)
+{
+	return (qvec){a.x + s * b.x, a.y + s * b.y, a.z + s * b.z};
+}
+
+static inline qvec q_sub(qvec a, qvec b)
+{
+	return q_madd(a, -1, b);
+}
+
+static inline qvec q_scale(quad s, qvec a)
+{
+	return (qvec){s * a.x, s * a.y, s * a.z};
+}
+
+static inline quad q_dot(qvec a, qvec b)
+{
+	return a.x * b.x + a.y * b.y + a.z * b.z;
+}
+
+static inline qvec q_cross(qvec a, qvec b)
+{
+	return (qvec){a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+
+static inline qvec q_unit(qvec a)
+{
+	return q_scale(1 / qroot(q_dot(a, a)), a);
+}
+
+/* The part of a across the unit vector n, made unit. */
+static inline qvec q_across(qvec a, qvec n)
+{
+	return q_unit(q_madd(a, -q_dot(a, n), n));
+}
+
+enum quad_kind { QUAD_TRIANGLE, QUAD_SPHERE, QUAD_POINT, QUAD_DIRECTION };
+
+/* What a vertex is made of. */
+struct quad_vertex {
+	enum quad_kind kind;
+	qvec p;
+	bool smooth;
+	qvec e1, e2, normal[3]; /* triangle */
+	quad b1, b2;
+	quad of_e1, of_e2; /* dp/du = of_e1 e1 + of_e2 e2, or carried by the normal */
+	bool carried;
+	qvec center, axis; /* sphere */
+	quad radius, sign;
+	qvec du, dv; /* of points and directions */
+};
+
+/* Where it is after moving by (a, b) in its tangent plane, and its frame there. */
+struct quad_place {
+	qvec p, s, t, n;
+};
+
+/* dp/du of a triangle. Without uv: (3, -6, 2) / 7 carried along by the shortest rotation from (2, 3, 6) / 7 to the
+ * normal. */
+static inline qvec quad_along(const struct quad_vertex *v)
+{
+	qvec from = {(quad)2 / 7, (quad)3 / 7, (quad)6 / 7}, axis = {(quad)3 / 7, (quad)-6 / 7, (quad)2 / 7};
+	qvec ng = q_unit(q_cross(v->e1, v->e2));
+	if (v->carried)
+		return q_madd(axis, -q_dot(axis, ng) / (1 + q_dot(from, ng)), q_madd(from, 1, ng));
+	return q_madd(q_scale(v->of_e1, v->e1), v->of_e2, v->e2);
+}
+
+static inline void quad_tangents(const struct quad_vertex *v, qvec *du, qvec *dv)
+{
+	if (v->kind == QUAD_TRIANGLE) {
+		qvec ng = q_unit(q_cross(v->e1, v->e2));
+		*du = q_across(quad_along(v), ng);
+		*dv = q_cross(ng, *du);
+	} else if (v->kind == QUAD_SPHERE) {
+		qvec w = q_unit(q_sub(v->p, v->center));
+		*du = q_unit(q_cross(v->axis, w));
+		*dv = q_scale(v->sign, q_cross(w, *du));
+	} else {
+		*du = v->du;
+		*dv = v->dv;
+	}
+}
+
+static inline struct quad_place quad_at(const struct quad_vertex *v, quad a, quad b)
+{
+	struct quad_place r = {.p = v->p};
+	qvec du, dv, along = {0, 0, 0};
+	quad_tangents(v, &du, &dv);
+	r.p = q_madd(q_madd(v->p, a, du), b, dv);
+	if (v->kind == QUAD_DIRECTION)
+		r.p = q_unit(r.p);
+	if (v->kind == QUAD_TRIANGLE) {
+		along = quad_along(v);
+		/* move = c1 e1 + c2 e2 */
+		qvec move = q_sub(r.p, v->p), area = q_cross(v->e1, v->e2);
+		quad inverse = 1 / q_dot(area, area);
+		quad b1 = v->b1 + inverse * q_dot(q_cross(move, v->e2), area),
+		     b2 = v->b2 + inverse * q_dot(q_cross(v->e1, move), area);
+		r.n = q_unit(area);
+		if (v->smooth) {
+			qvec m = q_madd(q_madd(q_scale(1 - b1 - b2, v->normal[0]), b1, v->normal[1]), b2, v->normal[2]);
+			if (q_dot(m, r.n) > 0)
+				r.n = q_unit(m);
+		}
+	}
+	if (v->kind == QUAD_SPHERE) {
+		qvec w = q_unit(q_sub(r.p, v->center));
+		r.p = q_madd(v->center, v->radius, w);
+		r.n = q_scale(v->sign, w);
+		along = q_unit(q_cross(v->axis, w));
+	}
+	if (v->kind == QUAD_TRIANGLE || v->kind == QUAD_SPHERE) {
+		r.s = q_across(along, r.n);
+		r.t = q_cross(r.n, r.s);
+	}
+	return r;
+}
+
+struct quad_problem {
+	struct quad_vertex v[3]; /* towards the light, itself, towards the camera */
+	quad eta;
+	bool matched;
+};
+
+static inline void quad_half(const struct quad_problem *q, const struct quad_place *p, quad h[2])
+{
+	qvec i = q->v[0].kind == QUAD_DIRECTION ? p[0].p : q_unit(q_sub(p[0].p, p[1].p));
+	qvec sum = q_madd(i, q->eta, q_unit(q_sub(p[2].p, p[1].p)));
+	quad along = q->matched ? 1 : q_dot(sum, p[1].n);
+	h[0] = q_dot(sum, p[1].s) / along;
+	h[1] = q_dot(sum, p[1].t) / along;
+}
+
+/* m[vertex][2 row + column], by central differences of steps s and s/2, extrapolated. */
+static inline void quad_derivatives(const struct quad_problem *q, quad step, quad h[2], quad m[3][4])
+{
+	struct quad_place here[3];
+	for (int k = 0; k < 3; k++)
+		here[k] = quad_at(&q->v[k], 0, 0);
+	quad_half(q, here, h);
+	for (int k = 0; k < 3; k++) {
+		struct quad_place p[3] = {here[0], here[1], here[2]};
+		for (int column = 0; column < 2; column++) {
+			quad d[2][2];
+			for (int half = 0; half < 2; half++) {
+				quad s = half ? step / 2 : step, up[2], down[2];
+				p[k] = quad_at(&q->v[k], column ? 0 : s, column ? s : 0);
+				quad_half(q, p, up);
+				p[k] = quad_at(&q->v[k], column ? 0 : -s, column ? -s : 0);
+				quad_half(q, p, down);
+				for (int row = 0; row < 2; row++)
+					d[half][row] = (up[row] - down[row]) / (2 * s);
+			}
+			for (int row = 0; row < 2; row++)
+				m[k][2 * row + column] = (4 * d[1][row] - d[0][row]) / 3;
+		}
+	}
+}
+
+static inline struct quad_vertex quad_of_surface(const struct hand *h, unsigned j)
+{
+	const struct surface_point *x = &h->x.v[j].x;
+	const struct geom_shape *s = &h->shape[j];
+	struct quad_vertex v = {.kind = QUAD_SPHERE, .p = q_of(x->p)};
+	if (s->is_sphere) {
+		v.center = q_of(s->center);
+		v.axis = q_of(s->sphere_axes.n);
+		v.radius = s->radius;
+		v.sign = s->normal_sign;
+		return v;
+	}
+	v.kind = QUAD_TRIANGLE;
+	v.e1 = q_sub(q_of_float(s->position[1]), q_of_float(s->position[0]));
+	v.e2 = q_sub(q_of_float(s->position[2]), q_of_float(s->position[0]));
+	v.b1 = x->b1;
+	v.b2 = x->b2;
+	v.smooth = s->normal != NULL;
+	for (int m = 0; m < 3 && v.smooth; m++)
+		v.normal[m] = q_of_float(s->normal[m]);
+	v.carried = true;
+	if (s->uv) {
+		quad u1 = (quad)s->uv[1][0] - (quad)s->uv[0][0], v1 = (quad)s->uv[1][1] - (quad)s->uv[0][1];
+		quad u2 = (quad)s->uv[2][0] - (quad)s->uv[0][0], v2 = (quad)s->uv[2][1] - (quad)s->uv[0][1];
+		quad det = u1 * v2 - v1 * u2;
+		v.carried = det == 0;
+		v.of_e1 = v.carried ? 0 : v2 / det;
+		v.of_e2 = v.carried ? 0 : -v1 / det;
+	}
+	return v;
+}
+
+static inline struct quad_vertex quad_of_end(const struct hand *h, unsigned j)
+{
+	const struct path_vertex *v = &h->x.v[j];
+	if (v->kind == VERTEX_SURFACE)
+		return quad_of_surface(h, j);
+	struct quad_vertex r = {.kind = v->kind == VERTEX_INFINITE ? QUAD_DIRECTION : QUAD_POINT, .p = q_of(v->x.p)};
+	struct frame f;
+	if (v->kind == VERTEX_CAMERA)
+		f = h->w.camera.axes;
+	else if (v->kind == VERTEX_EMITTER && vec3_dot(v->x.ng, v->x.ng) > 0)
+		f = frame_around(v->x.ng);
+	else
+		f = frame_around(vec3_neg(h->x.edge[0].w));
+	r.du = q_of(f.s);
+	r.dv = q_of(f.t);
+	return r;
+}
+
+static inline struct quad_problem quad_problem_of(const struct hand *h, unsigned j)
+{
+	struct quad_problem q = {.v = {quad_of_end(h, j - 1), quad_of_surface(h, j), quad_of_end(h, j + 1)}, .eta = 1};
+	const struct path_vertex *v = &h->x.v[j];
+	if (v->mode & BSDF_TRANSMIT) {
+		quad eta = h->bsdf[j].eta;
+		q.eta = vec3_dot(v->x.sh.n, h->x.edge[j].w) > 0 ? 1 / eta : eta;
+		q.matched = eta == 1;
+	}
+	return q;
+}
+
+/* Shakes every number of the problem by a rounding of double, up or down. */
+static inline quad quad_shaken(quad a, struct dice *d)
+{
+	return a * (1 + (dice_throw(d) < 0.5 ? -1 : 1) * (quad)0x1p-53);
+}
+
+static inline qvec q_shaken(qvec a, struct dice *d)
+{
+	return (qvec){quad_shaken(a.x, d), quad_shaken(a.y, d), quad_shaken(a.z, d)};
+}
+
+static inline struct quad_problem quad_problem_shaken(const struct quad_problem *q, struct dice *d)
+{
+	struct quad_problem r = *q;
+	for (int k = 0; k < 3; k++) {
+		struct quad_vertex *v = &r.v[k];
+		qvec *vectors[] = {&v->p,	  &v->e1,	 &v->e2,     &v->normal[0],
+				   &v->normal[1], &v->normal[2], &v->center, &v->axis};
+		for (size_t i = 0; i < sizeof vectors / sizeof *vectors; i++)
+			*vectors[i] = q_shaken(*vectors[i], d);
+		v->b1 = quad_shaken(v->b1, d);
+		v->b2 = quad_shaken(v->b2, d);
+		v->radius = quad_shaken(v->radius, d);
+	}
+	if (!q->matched)
+		r.eta = quad_shaken(q->eta, d);
+	return r;
+}
+
+#endif

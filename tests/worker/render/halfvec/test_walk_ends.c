@@ -1,0 +1,259 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Walks whose end is known beforehand: every failure by its name, an occluder of the same material that a walk which
+ * looked only where its last ray ends would mistake for the light, foci where a pivot block or the whole matrix is
+ * singular. Paths are laid by rays through given points of the scene. Deterministic.
+ */
+#include "tests/support/dice.h"
+#include "tests/support/worlds.h"
+#include "worker/render/halfvec/walk.h"
+#include "worker/render/render.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static struct path_context c;
+static uint64_t counters[BATCH_COUNTERS];
+static struct full_path_path x, y;
+static struct walk_scratch s;
+static struct constraint k[FULL_PATH_MAX_VERTICES];
+
+static vec3 in_world(const struct world *w, vec3 p)
+{
+	return vec3_scale(w->scale, vec3_sub(p, w->center));
+}
+
+/* x: from p[0] (the camera) by rays towards p[1], p[2] .. each reflected; the last is a free point that shines. */
+static void lay_path(const struct world *w, const vec3 *p, unsigned n)
+{
+	memset(counters, 0, sizeof counters);
+	c = (struct path_context){.w = w, .window = {-100, -100, 300, 300}, .counters = counters};
+	memset(&x, 0, sizeof x);
+	x.edges = n - 1;
+	x.wl.grey = true;
+	x.v[n - 1] = (struct path_vertex){
+		.kind = VERTEX_CAMERA, .emitter = -1, .x = {.p = in_world(w, p[0]), .prim = PRIM_NONE}};
+	for (unsigned j = n - 1; j-- > 0;) {
+		struct path_vertex *from = &x.v[j + 1], *to = &x.v[j];
+		vec3 target = in_world(w, p[n - 1 - j]);
+		*to = (struct path_vertex){
+			.kind = VERTEX_EMITTER, .x = {.p = target, .prim = PRIM_NONE}, .mode = BSDF_REFLECT};
+		if (j > 0)
+			assert_true(
+				path_extend(&c, from, vec3_normalize(vec3_sub(target, from->x.p)), 0, INFINITY, to));
+		assert_true(full_path_join(&x, j));
+	}
+	for (unsigned j = 1; j + 1 < n; j++) {
+		assert_int_equal(x.v[j].kind, VERTEX_SURFACE);
+		assert_int_equal(full_path_mode(&x, j), BSDF_REFLECT);
+	}
+	memset(counters, 0, sizeof counters);
+}
+
+/* Walks x to half vectors h from its own, to 1e-9. */
+static enum walk_end walk_by(const vec2 *h, bool visible, struct walk_limits limits)
+{
+	struct walk_target target[FULL_PATH_MAX_VERTICES];
+	constraints_of(c.w, &x, x.edges, 0, k);
+	for (unsigned j = 1; j < x.edges; j++)
+		target[j] = (struct walk_target){vec2_add(k[j].h, h[j]), 1e-9};
+	y = x;
+	return halfvec_walk(&c, &y, y.edges, 0, target, visible, &limits, &s);
+}
+
+/* What to ask for so that vertex 1 moves by about d (scene's units) and no other. */
+static void ask_move(const struct world *w, vec3 d, vec2 *h)
+{
+	constraints_of(w, &x, x.edges, 0, k);
+	vec3 du, dv, m = vec3_scale(w->scale, d);
+	surface_tangents(&x.v[1].x, &du, &dv);
+	vec2 dx = {vec3_dot(m, du), vec3_dot(m, dv)};
+	h[1] = mat2_apply(k[1].b, dx);
+	for (unsigned j = 2; j < x.edges; j++)
+		h[j] = j == 2 ? mat2_apply(k[2].a, dx) : (vec2){0, 0};
+}
+
+#define MATERIAL(id)                          \
+	"<bsdf type='roughconductor' id='" id \
+	"'><string name='material' value='none'/><float name='alpha' value='.1'/></bsdf>"
+/* clang-format off */
+#define FLOOR                                                                                                                  \
+	"<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/></transform>"              \
+	"<ref id='metal'/></shape>"
+#define BLOCK(x, y, z, r, material)                                                                                            \
+	"<shape type='sphere'><point name='center' x='" x "' y='" y "' z='" z "'/><float name='radius' value='" r "'/>"           \
+	"<ref id='" material "'/></shape>"
+/* clang-format on */
+
+static struct walk_limits normal;
+
+/* From the vertex where the walk ends the light is hidden by a ball: of the floor's own material or not. */
+static void test_occluder(void **state)
+{
+	(void)state;
+	for (int same = 0; same < 2; same++) {
+		struct world *w = same ? world_of_text(32, 32,
+						       SENSOR("0,1,3", "0,0,0") MATERIAL("metal")
+							       FLOOR BLOCK("0.1", "0.5", "-0.5", ".1", "metal"))
+				       : world_of_text(32, 32,
+						       SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other")
+							       FLOOR BLOCK("0.1", "0.5", "-0.5", ".1", "other"));
+		lay_path(w, (vec3[]){{0, 1, 1}, {0.5, 0, 0}, {0, 1, -1}}, 3);
+		vec2 h[3];
+		/* To (0.2, 0, 0): the middle of the way to the light lies at the ball's centre. */
+		ask_move(w, (vec3){-0.3, 0, 0}, h);
+		struct path_vertex light = x.v[0];
+		assert_int_equal(walk_by(h, true, normal), WALK_OK);
+		assert_int_equal(counters[COUNT_RAYS_SHADOW] + counters[COUNT_RAYS_CLOSEST], 0);
+		struct ray_end a = {y.v[1].x.p, y.v[1].x.ng, y.v[1].x.prim}, b = {y.v[0].x.p, {0, 0, 0}, PRIM_NONE};
+		assert_true(accel_occluded(w->accel, &a, &b));
+		assert_int_equal(walk_by(h, false, normal), WALK_BLOCKED);
+		assert_memory_equal(&light.x, &y.v[0].x, sizeof light.x);
+		ask_move(w, (vec3){0.3, 0, 0}, h);
+		assert_int_equal(walk_by(h, false, normal), WALK_OK);
+		world_free(w);
+	}
+}
+
+static void test_names(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(32, 32,
+					SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other")
+						FLOOR BLOCK("0", "-3", "0", "2.5", "other"));
+	lay_path(w, (vec3[]){{0, 1, 1}, {0, 0, 0}, {0, 1, -1}}, 3);
+	vec2 h[3];
+	struct walk_limits once = normal;
+	once.iterations = 1;
+	/* Off the floor's border, into the void; and where its own rays cannot get to. */
+	ask_move(w, (vec3){40, 0, 0}, h);
+	assert_int_equal(walk_by(h, false, once), WALK_MISSED);
+	assert_int_equal(counters[COUNT_RAYS_CLOSEST], 1);
+	/* Far, but on the floor: one iteration is not enough. */
+	ask_move(w, (vec3){0.3, 0, 0.4}, h);
+	assert_int_equal(walk_by(h, false, once), WALK_ITERATIONS);
+	assert_int_equal(s.iterations, 1);
+	assert_int_equal(walk_by(h, false, normal), WALK_OK);
+	assert_in_range(s.iterations, 2, 8);
+	/* The camera went below the floor: what was a reflection would be none. */
+	struct path_vertex camera = x.v[2];
+	vec3 mirrored = in_world(w, (vec3){0, -1, 1});
+	ask_move(w, (vec3){0, 0, 0}, h);
+	constraints_of(w, &x, 2, 0, k);
+	struct walk_target target[3] = {{{0, 0}, 0}, {k[1].h, 1e-9}, {{0, 0}, 0}};
+	y = x;
+	y.v[2].x.p = mirrored;
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, &s), WALK_MODE);
+	y.v[2] = camera;
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, &s), WALK_OK);
+	/* A vertex at the end that stays. */
+	y.v[2].x.p = y.v[1].x.p;
+	assert_int_equal(halfvec_walk(&c, &y, 2, 0, target, false, &normal, &s), WALK_SINGULAR);
+	world_free(w);
+}
+
+/* Beyond the silhouette of a ball there is another material. */
+static void test_other_material(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(
+		32, 32,
+		SENSOR("0,1,3", "0,0,0") MATERIAL("metal") MATERIAL("other") BLOCK(
+			"0", "0", "0", ".5",
+			"metal") "<shape type='rectangle'><transform name='to_world'><scale value='9'/><translate z='-2'/></transform>"
+				 "<ref id='other'/></shape><emitter type='constant'/>"); /* in the dark all are black */
+	lay_path(w, (vec3[]){{0.2, 0, 3}, {0.2, 0, 0}, {2, 0, 3}}, 3);
+	vec2 h[3];
+	struct walk_limits once = normal;
+	once.iterations = 1;
+	ask_move(w, (vec3){-2, 0, 0}, h);
+	assert_int_equal(walk_by(h, false, once), WALK_BLOCKED);
+	/* No point of the ball has such a half vector: the residual stops shrinking before the silhouette. */
+	h[1] = (vec2){50, 30};
+	assert_int_not_equal(walk_by(h, false, normal), WALK_OK);
+	world_free(w);
+}
+
+/* A concave mirror of radius 1 around the origin, met at (0,-1,0) (far from its poles, where frames spin) under angle
+ * `a`, from the camera at distance `away`: in the plane of incidence it makes an image at 1 / (2 / cos a - 1 / away).
+ * There, a small mirror leads on. */
+static vec3 image_point(double a, double away, double *distance)
+{
+	*distance = 1 / (2 / cos(a) - 1 / away);
+	return (vec3){-*distance * sin(a), -1 + *distance * cos(a), 0};
+}
+
+#define BOWL "<shape type='sphere'><float name='radius' value='1'/><ref id='metal'/></shape>"
+
+/* Half vector of the first mirror does not change as the vertex there moves: its block is singular, the matrix is not.
+ */
+static void test_focus(void **state)
+{
+	(void)state;
+	const double a = 0.4, away = 1.2;
+	double at;
+	vec3 camera = {away * sin(a), -1 + away * cos(a), 0}, image = image_point(a, away, &at);
+	struct world *w = world_of_text(
+		32, 32,
+		SENSOR("0.4,.1,0", "0,0,0") MATERIAL("metal") BOWL
+		"<shape type='rectangle'><transform name='to_world'><scale value='.1'/>"
+		"<lookat origin='%.17g,%.17g,%.17g' target='0,-0.7,0.4' up='0,1,0'/></transform><ref id='metal'/></shape>",
+		image.x, image.y, image.z);
+	lay_path(w, (vec3[]){camera, {0, -1, 0}, image, {-0.1, -0.5, 0.6}}, 4);
+	constraints_of(w, &x, 3, 0, k);
+	double det = fabs(mat2_det(k[2].b)) / mat2_norm2(k[2].b);
+	assert_true(det < 1e-6);
+	assert_int_equal(constraint_double.factor(k, 3, 0, &s.system), CONSTRAINT_OK);
+	assert_true(s.system.pivoted);
+	struct dice d = dice_of("walks at a focus");
+	size_t ends[WALK_ITERATIONS + 1] = {0}, n = dice_count(2000);
+	double iterations = 0;
+	for (size_t i = 0; i < n; i++) {
+		vec2 h[4];
+		for (unsigned j = 1; j < 3; j++)
+			h[j] = (vec2){dice_between(&d, -0.01, 0.01), dice_between(&d, -0.01, 0.01)};
+		enum walk_end e = walk_by(h, false, normal);
+		ends[e]++;
+		iterations += s.iterations;
+		for (unsigned j = 1; j < 3 && e == WALK_OK; j++) {
+			vec2 off = vec2_sub(halfvec_of(&y, j), vec2_add(k[j].h, h[j]));
+			assert_true(vec2_dot(off, off) <= 1.01e-18);
+		}
+	}
+	print_message("focus: %zu of %zu arrive in %.2f iterations, %zu singular\n", ends[WALK_OK], n,
+		      iterations / (double)n, ends[WALK_SINGULAR]);
+	assert_true(ends[WALK_OK] > n * 9 / 10);
+	assert_int_equal(ends[WALK_SINGULAR], 0);
+	world_free(w);
+}
+
+/* The camera's image falls on the light: nothing moves the half vector within the plane, and no step is to be had. */
+static void test_singular(void **state)
+{
+	(void)state;
+	const double a = 0.4, away = 1.2;
+	double at;
+	vec3 camera = {away * sin(a), -1 + away * cos(a), 0}, image = image_point(a, away, &at);
+	struct world *w = world_of_text(32, 32, SENSOR("0.4,.1,0", "0,0,0") MATERIAL("metal") BOWL);
+	lay_path(w, (vec3[]){camera, {0, -1, 0}, image}, 3);
+	constraints_of(w, &x, 2, 0, k);
+	assert_true(fabs(mat2_det(k[1].b)) < 1e-12 * mat2_norm2(k[1].b));
+	vec2 h[3] = {{0, 0}, {0.01, 0.01}, {0, 0}};
+	/* Rounding may leave a pivot, and then a step beyond all bounds that leads nowhere. */
+	enum walk_end e = walk_by(h, false, normal);
+	assert_true(e == WALK_SINGULAR || e == WALK_DIVERGED);
+	world_free(w);
+}
+
+int main(void)
+{
+	normal = walk_limits_of(&accuracy_settings_default);
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_occluder), cmocka_unit_test(test_names),	  cmocka_unit_test(test_other_material),
+		cmocka_unit_test(test_focus),	 cmocka_unit_test(test_singular),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

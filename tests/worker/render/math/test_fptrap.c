@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* An invalid operation of ours ends the program, or goes to where it is caught; one of a library's does neither. */
+#include "worker/render/math/fptrap.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <signal.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static volatile double zero, result;
+
+static void invalid(void)
+{
+	result = zero / zero;
+}
+
+static void ours_seen_at_the_door(void)
+{
+	fptrap_watch();
+	invalid();
+	fptrap_return(fptrap_leave());
+	_exit(0);
+}
+
+static void ours_seen_at_the_end(void)
+{
+	bool before = fptrap_watch();
+	fptrap_return(fptrap_leave());
+	invalid();
+	fptrap_unwatch(before);
+}
+
+static void a_librarys(void)
+{
+	bool before = fptrap_watch();
+	unsigned left = fptrap_leave();
+	invalid();
+	fptrap_return(left);
+	fptrap_return(fptrap_leave());
+	fptrap_unwatch(before);
+}
+
+static void not_watched(void)
+{
+	invalid();
+	fptrap_return(fptrap_leave());
+	fptrap_unwatch(fptrap_watch());
+}
+
+/* The signal that ends a child running f; 0: none. */
+static int signal_of(void (*f)(void))
+{
+	pid_t child = fork();
+	assert_true(child >= 0);
+	if (child == 0) {
+		signal(SIGFPE, SIG_DFL);
+		f();
+		_exit(0);
+	}
+	int status;
+	assert_int_equal(waitpid(child, &status, 0), child);
+	return WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+}
+
+static void test_signals(void **state)
+{
+	(void)state;
+#if defined(__x86_64__)
+	assert_int_equal(signal_of(ours_seen_at_the_door), SIGFPE);
+	assert_int_equal(signal_of(ours_seen_at_the_end), SIGFPE);
+#endif
+	assert_int_equal(signal_of(a_librarys), 0);
+	assert_int_equal(signal_of(not_watched), 0);
+}
+
+/* Whether f comes back by the catch. */
+static bool is_caught(void (*f)(void))
+{
+	jmp_buf back;
+	if (setjmp(back))
+		return true;
+	jmp_buf *before = fptrap_catch(&back);
+	assert_null(before);
+	f();
+	fptrap_catch(NULL);
+	return false;
+}
+
+static void ours_within_the_watch(void)
+{
+	bool before = fptrap_watch();
+	invalid();
+	fptrap_unwatch(before);
+}
+
+static void test_caught(void **state)
+{
+	(void)state;
+#if defined(__x86_64__)
+	assert_true(is_caught(ours_within_the_watch));
+	assert_true(is_caught(ours_seen_at_the_end));
+	assert_null(fptrap_catch(NULL)); /* once: the next one is a signal again */
+	assert_int_equal(signal_of(ours_within_the_watch), SIGFPE);
+#endif
+	assert_false(is_caught(a_librarys));
+	assert_false(is_caught(not_watched));
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_signals), cmocka_unit_test(test_caught)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

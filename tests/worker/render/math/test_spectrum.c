@@ -1,0 +1,181 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/film/color.h"
+#include "worker/render/math/cie.h"
+#include "worker/render/math/spectrum.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+/* The sums that the publishers give for checking. */
+static void test_published_sums(void **state)
+{
+	(void)state;
+	double sum[3] = {0}, white[3] = {0};
+	for (int i = 0; i < CIE_COUNT; i++)
+		for (int k = 0; k < 3; k++) {
+			sum[k] += cie_observer[i][k];
+			white[k] += cie_observer[i][k] * cie_d65[i];
+		}
+	const double published[3] = {106.865, 106.857, 106.892};
+	for (int k = 0; k < 3; k++)
+		assert_true(fabs(sum[k] - published[k]) < 1e-3);
+	double total = white[0] + white[1] + white[2];
+	assert_true(fabs(white[0] / total - 0.3127) < 5e-5);
+	assert_true(fabs(white[1] / total - 0.3290) < 5e-5);
+	assert_true(cie_d65[560 - CIE_FIRST_NM] == 100);
+}
+
+/* The density's shape at a tabulated wavelength: the sum of the magnitudes of the matching functions of linear Rec.
+ * 709. */
+static double curve(int i)
+{
+	double rgb[3];
+	rec709_from_xyz(cie_observer[i], rgb);
+	return fabs(rgb[0]) + fabs(rgb[1]) + fabs(rgb[2]);
+}
+
+/* What share of wavelengths lies below nm: the density over whole cells of 1 nm, each by the trapezoid rule. */
+static double share_below(double nm)
+{
+	double total = 0, below = 0;
+	for (int i = 0; i + 1 < CIE_COUNT; i++) {
+		double area = 0.5 * (curve(i) + curve(i + 1));
+		total += area;
+		below += area * fmin(1, fmax(0, nm - CIE_FIRST_NM - i));
+	}
+	return 0.95 * below / total + 0.05 * (nm - WAVELENGTH_MIN) / (WAVELENGTH_MAX - WAVELENGTH_MIN);
+}
+
+static const double hard_us[] = {0, 0x1p-53, 1e-4, 0.1, 0.25, 0.5 - 0x1p-54, 0.5, 0.75, 0.9, 1 - 0x1p-53};
+enum { HARD_US = sizeof hard_us / sizeof *hard_us };
+
+/* Each lane lies where the shares below are a quarter apart, and the hero where the share is u. */
+static void test_wavelengths_in_range_and_apart(void **state)
+{
+	(void)state;
+	for (size_t n = 0; n < HARD_US; n++) {
+		struct wavelengths w = wavelengths_sample(hard_us[n]);
+		assert_false(w.grey);
+		assert_true(w.u == hard_us[n]);
+		for (int i = 0; i < SPECTRUM_LANES; i++) {
+			double want = hard_us[n] + 0.25 * i;
+			assert_true(w.nm[i] >= WAVELENGTH_MIN && w.nm[i] <= WAVELENGTH_MAX);
+			assert_true(fabs(share_below(w.nm[i]) - (want - floor(want))) < 1e-12);
+		}
+	}
+}
+
+static void test_density_of_wavelengths(void **state)
+{
+	(void)state;
+	double sum = 0, total = 0;
+	for (int i = 0; i + 1 < CIE_COUNT; i++)
+		total += 0.5 * (curve(i) + curve(i + 1));
+	for (int i = 0; i + 1 < CIE_COUNT; i++) {
+		double nm = CIE_FIRST_NM + i, pdf = wavelength_pdf(nm + 0.5);
+		double want = 0.95 * 0.5 * (curve(i) + curve(i + 1)) / total + 0.05 / (CIE_COUNT - 1);
+		assert_true(wavelength_pdf(nm) == pdf && wavelength_pdf(nm + 0.999) == pdf);
+		assert_true(fabs(pdf / want - 1) < 1e-9);
+		sum += pdf;
+	}
+	assert_true(fabs(sum - 1) < 1e-12);
+	assert_true(wavelength_pdf(WAVELENGTH_MAX) > 0.05 / (CIE_COUNT - 1));
+}
+
+/* What the density is for: the relative variance of the three channels of one white splat. Uniform wavelengths would
+ * have 0.61, 0.17, 0.67. */
+static void test_white_has_little_colour_noise(void **state)
+{
+	(void)state;
+	enum { N = 2000 };
+	double sum[3] = {0}, square[3] = {0};
+	for (int n = 0; n < N; n++) {
+		struct wavelengths w = wavelengths_sample((n + 0.5) / (SPECTRUM_LANES * N));
+		double xyz[3], rgb[3];
+		spectrum l;
+		for (int i = 0; i < SPECTRUM_LANES; i++)
+			l.v[i] = cie_d65[(int)(w.nm[i] - CIE_FIRST_NM)];
+		spectrum_to_xyz(l, &w, xyz);
+		rec709_from_xyz(xyz, rgb);
+		for (int k = 0; k < 3; k++) {
+			sum[k] += rgb[k] / N;
+			square[k] += rgb[k] * rgb[k] / N;
+		}
+	}
+	const double most[3] = {0.07, 0.03, 0.02};
+	for (int k = 0; k < 3; k++) {
+		double variance = square[k] / (sum[k] * sum[k]) - 1;
+		print_message("channel %d: relative variance %.4f\n", k, variance);
+		assert_true(variance < most[k]);
+	}
+}
+
+/* A smooth spectrum far from flat, and its colour by the trapezoid rule at 1 nm. */
+static double bump(double nm)
+{
+	return 0.2 + 3 * exp(-(nm - 610) * (nm - 610) / 1800);
+}
+
+static void test_few_wavelengths(void **state)
+{
+	(void)state;
+	for (size_t n = 0; n < HARD_US; n++) {
+		double u = hard_us[n];
+		struct wavelengths all = wavelengths_sample_few(u, 4), old = wavelengths_sample(u);
+		struct wavelengths one = wavelengths_sample_few(u, 1), two = wavelengths_sample_few(u, 2);
+		assert_memory_equal(all.nm, old.nm, sizeof all.nm);
+		assert_true(all.few == 0 && old.few == 0 && one.few == 1 && two.few == 2);
+		for (int i = 0; i < SPECTRUM_LANES; i++) {
+			assert_true(one.nm[i] == old.nm[0]);
+			assert_true(two.nm[i] == two.nm[i % 2]);
+		}
+		assert_true(two.nm[0] == old.nm[0] && two.nm[1] == old.nm[2]);
+	}
+}
+
+/* The mean over u by the midpoint rule. */
+static void unbiased_of(unsigned count)
+{
+	enum { N = 40000 };
+	double exact[3] = {0}, mean[3] = {0};
+	for (int i = 0; i < CIE_COUNT; i++)
+		for (int k = 0; k < 3; k++)
+			exact[k] += cie_observer[i][k] * bump(CIE_FIRST_NM + i) / CIE_Y_SUM;
+	for (int n = 0; n < N; n++) {
+		double xyz[3];
+		struct wavelengths w = wavelengths_sample_few((n + 0.5) / N, count);
+		spectrum s;
+		for (int k = 0; k < SPECTRUM_LANES; k++)
+			s.v[k] = bump(w.nm[k]);
+		spectrum_to_xyz(s, &w, xyz);
+		for (int k = 0; k < 3; k++)
+			mean[k] += xyz[k] / N;
+	}
+	for (int k = 0; k < 3; k++) {
+		print_message("%u wavelengths, channel %d: %.7f, exact %.7f\n", count, k, mean[k], exact[k]);
+		assert_true(fabs(mean[k] / exact[k] - 1) < 5e-5);
+	}
+}
+
+static void test_xyz_is_unbiased(void **state)
+{
+	(void)state;
+	unbiased_of(4);
+	unbiased_of(2);
+	unbiased_of(1);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_published_sums),	       cmocka_unit_test(test_wavelengths_in_range_and_apart),
+		cmocka_unit_test(test_density_of_wavelengths), cmocka_unit_test(test_white_has_little_colour_noise),
+		cmocka_unit_test(test_few_wavelengths),	       cmocka_unit_test(test_xyz_is_unbiased),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

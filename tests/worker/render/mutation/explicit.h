@@ -1,0 +1,146 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * log T(x -> y) of breakups, multiplied out per area of every vertex that moves, by section 5 and 4 of the paper and
+ * nothing of worker/render/mutation: to hold against the products that leave out what cancels. In the measure of
+ * path.h; delta distributions are dropped from both f and T.
+ */
+#ifndef TESTS_WORKER_MUTATION_EXPLICIT_H
+#define TESTS_WORKER_MUTATION_EXPLICIT_H
+
+#include "worker/render/mutation/heuristic.h"
+#include "worker/render/mutation/mutation.h"
+
+#include <string.h>
+
+/* As published: sec. 4; deviations of the film step in parts of its smaller side, of half vectors in lobe widths. */
+#define EXPLICIT_FILM 0.02
+#define EXPLICIT_HALFVEC 0.01
+
+/* log |n.i| |d omega_i / d h_par| at vertex j by the cosine `n_i`. */
+static inline double explicit_log_turn(const struct full_path_path *x, unsigned j, double n_i)
+{
+	vec2 h = halfvec_of(x, j);
+	double length2 = 1 + vec2_dot(h, h), eta = full_path_eta(x, j);
+	vec3 n = vec3_scale(1 / sqrt(length2), (vec3){h.x, h.y, 1});
+	vec3 o = frame_to_local(&x->v[j].x.sh, x->edge[j].w),
+	     i = frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w));
+	double ih = vec3_dot(i, n), sum = ih + eta * vec3_dot(o, n);
+	return log(fabs(n_i) * sum * sum / fabs(ih)) - 1.5 * log(length2);
+}
+
+static inline double explicit_log_gauss(double dx, double dy, double sigma)
+{
+	return -0.5 * (dx * dx + dy * dy) / (sigma * sigma) - log(2 * M_PI * sigma * sigma);
+}
+
+/* The half vector of x_j as it is in the frame of y_j (sec. 4), by angles. */
+static inline vec2 explicit_turned(const struct full_path_path *x, const struct full_path_path *y, unsigned j)
+{
+	vec2 h = halfvec_of(x, j);
+	vec3 d = vec3_sub(y->v[j].x.p, x->v[j].x.p);
+	vec3 a = frame_to_local(&x->v[j].x.sh, d), b = frame_to_local(&y->v[j].x.sh, d);
+	double least = 1e-3 * vec3_length(d);
+	if (!(hypot(a.x, a.y) > least && hypot(b.x, b.y) > least))
+		return h;
+	double turn = atan2(b.y, b.x) - atan2(a.y, a.x);
+	return (vec2){cos(turn) * h.x - sin(turn) * h.y, sin(turn) * h.x + cos(turn) * h.y};
+}
+
+/* Arriving at y_j from y_{j+1}: per solid angle to per area. */
+static inline double explicit_log_arrive(const struct full_path_path *y, unsigned j)
+{
+	return log(path_cosine(&y->v[j], y->edge[j].w) / y->edge[j].distance2);
+}
+
+/* log_choices: of all symmetric choices, those of the film and the traced half vectors. */
+static inline double explicit_log_traced(const struct path_context *c, const struct full_path_path *x,
+					 const struct full_path_path *y, unsigned b, double *log_choices)
+{
+	unsigned k = y->edges;
+	const struct camera *camera = &c->w->camera;
+	*log_choices = 0;
+	if (b == k)
+		return 0;
+	*log_choices = explicit_log_gauss(y->film[0] - x->film[0], y->film[1] - x->film[1],
+					  EXPLICIT_FILM * fmin(camera->width, camera->height));
+	double sum =
+		log(camera_jac_film_from_solid(camera, vec3_neg(y->edge[k - 1].w))) + explicit_log_arrive(y, k - 1);
+	for (unsigned j = k - 1; j > b; j--) {
+		const struct path_vertex *v = &y->v[j];
+		if (v->delta) {
+			/* 1 per solid angle projected on the geometric normal. */
+			sum += log(fabs(vec3_dot(v->x.ng, y->edge[j - 1].w)));
+		} else {
+			vec2 h = halfvec_of(y, j), from = explicit_turned(x, y, j);
+			double sigma =
+				EXPLICIT_HALFVEC * 0.5 * (fmin(x->v[j].bsdf->alpha, 1) + fmin(v->bsdf->alpha, 1));
+			*log_choices += explicit_log_gauss(h.x - from.x, h.y - from.y, sigma);
+			sum -= explicit_log_turn(y, j, 1);
+		}
+		sum += explicit_log_arrive(y, j - 1);
+	}
+	return sum + *log_choices;
+}
+
+/* Between the ends, at y; steps drawn at x, dh from x to y, or none. */
+static inline double explicit_log_between(const struct path_context *c, const struct full_path_path *x,
+					  const struct full_path_path *y, unsigned b, unsigned c_end, const vec2 *dh,
+					  double sign)
+{
+	static struct constraint at_x[FULL_PATH_MAX_VERTICES], at_y[FULL_PATH_MAX_VERTICES];
+	static struct constraint_system system;
+	static struct halfvec_step step[FULL_PATH_MAX_VERTICES];
+	if (b < c_end + 2)
+		return 0;
+	constraints_of(c->w, y, b, c_end, at_y);
+	constraint_double.factor(at_y, b, c_end, &system);
+	double sum = system.log_det;
+	if (dh) {
+		constraints_of(c->w, x, b, c_end, at_x);
+		halfvec_steps(c, x, at_x, b, c_end, step);
+	}
+	for (unsigned j = c_end + 1; j < b; j++) {
+		if (y->v[j].delta)
+			sum += explicit_log_turn(y, j, vec3_dot(y->v[j].x.ng, y->edge[j - 1].w));
+		else if (dh)
+			sum += halfvec_step_log_pdf(&step[j], vec2_scale(sign, dh[j]));
+	}
+	return sum;
+}
+
+/* Choice of b and c, where the strategy draws them by the heuristic. */
+static inline double explicit_log_choice(const struct path_context *c, const char *strategy,
+					 const struct mutation_setting *how, const struct full_path_path *x, unsigned b,
+					 unsigned c_end)
+{
+	double weight[FULL_PATH_MAX_VERTICES], p = 1;
+	bool hslt = strcmp(strategy, "hslt") == 0 && how->b < 0, light = strcmp(strategy, "light") == 0;
+	if (hslt || light) {
+		heuristic_roughness.weigh_b(c, x, weight);
+		/* With c = 0 forced b is above it. */
+		if (light)
+			weight[0] = 0;
+		p *= heuristic_probability(weight, x->edges + 1, b);
+	}
+	if (hslt && b > 0) {
+		heuristic_roughness.weigh_c(c, x, b, weight);
+		p *= heuristic_probability(weight, b, c_end);
+	}
+	if (strcmp(strategy, "rejoin") == 0) {
+		/* 1 for each inner vertex that can be joined to the one before it, 0.1 for an emitter that can be hit.
+		 */
+		double found = c->w->emitters[x->v[0].emitter].delta ? 0 : 0.1, all = found;
+		for (unsigned i = 1; i < x->edges; i++)
+			all += !x->v[i].delta && (i == 1 || !x->v[i - 1].delta);
+		p = (b == 0 ? found : 1) / all;
+	}
+	return log(p);
+}
+
+/* The strategy also moves x_0 by the numbers that make it. */
+static inline bool explicit_moves_emitter(const char *strategy, unsigned b, unsigned c_end)
+{
+	return strcmp(strategy, "light") == 0 || (strcmp(strategy, "rejoin") == 0 && b > 0 && c_end == 0);
+}
+
+#endif

@@ -1,0 +1,219 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Strategies broken on purpose, made of the real ones: the test of detailed balance must catch each, and must pass the
+ * real one from the same starts. Level and power: tests/support/balance.h.
+ */
+#include "tests/support/balance.h"
+#include "tests/support/dice.h"
+#include "tests/support/rooms.h"
+#include "worker/render/mutation/heuristic.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const struct mutation_ops *real;
+static struct full_path_path *from; /* x of the proposal at hand */
+
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
+				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+{
+	from = x;
+	return real->propose(m, how, x, y, move);
+}
+
+static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			 enum mutation_direction direction)
+{
+	return real->log_weight(m, into, move, direction);
+}
+
+/* log P(b) P(c | b) by the heuristic. */
+static double log_selection(struct mutation_ctx *m, const struct full_path_path *x, unsigned b, unsigned c)
+{
+	double weight[FULL_PATH_MAX_VERTICES], p;
+	heuristic_roughness.weigh_b(m->path, x, weight);
+	p = heuristic_probability(weight, x->edges + 1, b);
+	if (b > 0) {
+		heuristic_roughness.weigh_c(m->path, x, b, weight);
+		p *= heuristic_probability(weight, b, c);
+	}
+	return log(p);
+}
+
+/* The choice of b and c left out: into y it is x's, and the other way round. */
+static double no_selection(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			   enum mutation_direction direction)
+{
+	static struct full_path_path *y;
+	if (direction == X_TO_Y)
+		y = into;
+	return log_weight(m, into, move, direction) +
+	       log_selection(m, direction == X_TO_Y ? from : y, move->b, move->c);
+}
+
+static double denser_upwards(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			     enum mutation_direction direction)
+{
+	bool up = direction == X_TO_Y && sin(2 * M_PI * (into->wavelength - from->wavelength)) > 0;
+	return log_weight(m, into, move, direction) - (up ? log(1.03) : 0);
+}
+
+/* As a function of the state: 10 % where the wavelength lies in the upper half. */
+static double denser_above(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			   enum mutation_direction direction)
+{
+	return log_weight(m, into, move, direction) - (into->wavelength > 0.5 ? log(1.1) : 0);
+}
+
+static enum strategy_counter drift(struct mutation_ctx *m, const struct mutation_setting *how, struct full_path_path *x,
+				   struct full_path_path *y, struct move *move)
+{
+	const double mean = 0.1; /* pixels; the deviation is 0.64 */
+	x->film[0] += mean;
+	enum strategy_counter end = propose(m, how, x, y, move);
+	x->film[0] -= mean;
+	return end;
+}
+
+static void keep_f(struct path_context *c, struct full_path_path *y, unsigned j)
+{
+	y->f[j] = full_path_f(c, from, j);
+	vertex_set_add(&y->known_f, j);
+}
+
+static double stale_fixed(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			  enum mutation_direction direction)
+{
+	for (unsigned j = 0; direction == X_TO_Y && j < move->c; j++)
+		keep_f(m->path, into, j);
+	return log_weight(m, into, move, direction);
+}
+
+static double stale_c(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+		      enum mutation_direction direction)
+{
+	if (direction == X_TO_Y)
+		keep_f(m->path, into, move->c);
+	return log_weight(m, into, move, direction);
+}
+
+static double stale_b(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+		      enum mutation_direction direction)
+{
+	if (direction == X_TO_Y && move->b < into->edges)
+		keep_f(m->path, into, move->b);
+	return log_weight(m, into, move, direction);
+}
+
+static double no_transfer(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			  enum mutation_direction direction)
+{
+	return log_weight(m, into, move, direction) - move->log_transfer[direction];
+}
+
+/* Steps of x back from y, too. */
+static enum strategy_counter one_sigma(struct mutation_ctx *m, const struct mutation_setting *how,
+				       struct full_path_path *x, struct full_path_path *y, struct move *move)
+{
+	enum strategy_counter end = propose(m, how, x, y, move);
+	for (unsigned j = move->c + 1; !end && j < move->b; j++) {
+		vec2 back = vec2_scale(-1, m->scratch.dh[j]);
+		if (!x->v[j].delta)
+			move->log_density[Y_TO_X] += halfvec_step_log_pdf(&m->scratch.step[X_TO_Y][j], back) -
+						     halfvec_step_log_pdf(&m->scratch.step[Y_TO_X][j], back);
+	}
+	return end;
+}
+
+/* What the way back refused is proposed all the same; forced b and c only, whose choice has no density. */
+static enum strategy_counter no_way_back(struct mutation_ctx *m, const struct mutation_setting *how,
+					 struct full_path_path *x, struct full_path_path *y, struct move *move)
+{
+	enum strategy_counter end = propose(m, how, x, y, move);
+	if (end != STRATEGY_FAIL_REVERSE)
+		return end;
+	unsigned ends[2] = {move->b, move->c};
+	full_path_forget(y, move->c + 1, y->edges);
+	for (int i = 0; i < 2; i++) {
+		if (ends[i] == 0 || ends[i] == y->edges)
+			continue;
+		y->v[ends[i]].mode = full_path_mode(y, ends[i]);
+		if (!y->v[ends[i]].mode)
+			return STRATEGY_FAIL_MODE;
+	}
+	return move->b < y->edges || whole_film(m->path, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_OUTSIDE;
+}
+
+/* The emitter's point as if all points were as likely. */
+static double flat_emitter(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			   enum mutation_direction direction)
+{
+	const struct path_vertex *v = &into->v[0];
+	const struct emitter *em = &m->path->w->emitters[v->emitter];
+	struct emitter_point p = world_emitter_point(&v->x);
+	p.infinite = v->kind == VERTEX_INFINITE;
+	bool moves = move->b > 0 && move->c == 0 && em->ops->point_inverse;
+	return log_weight(m, into, move, direction) + (moves ? log(em->ops->pdf_point(em, &p)) : 0);
+}
+
+struct fault {
+	const char *name, *room, *strategy;
+	struct mutation_setting how;
+	enum balance_side side;
+	unsigned starts, repeat;
+	enum strategy_counter (*propose)(struct mutation_ctx *m, const struct mutation_setting *how,
+					 struct full_path_path *x, struct full_path_path *y, struct move *move);
+	double (*log_weight)(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			     enum mutation_direction direction);
+};
+
+static const struct fault faults[] = {
+	{"no P(b) P(c)", "gold", "hslt", {-1, -1}, BALANCE_ANY, 64, 2, propose, no_selection},
+	{"3 % one way", "gold", "wavelength", {-1, -1}, BALANCE_ANY, 64, 64, propose, denser_upwards},
+	{"10 % in half of the states", "gold", "wavelength", {-1, -1}, BALANCE_ANY, 256, 8, propose, denser_above},
+	{"film step with a mean", "mirror", "multichain", {-1, -1}, BALANCE_ANY, 64, 2, drift, log_weight},
+	{"fixed part not evaluated again", "gold", "hslt", {-1, -1}, BALANCE_ANY, 256, 8, propose, stale_fixed},
+	{"f_c not evaluated again", "bent normals", "hslt", {-1, -1}, BALANCE_ANY, 128, 8, propose, stale_c},
+	{"f_b not evaluated again", "bent normals", "hslt", {-1, -1}, BALANCE_ANY, 64, 2, propose, stale_b},
+	{"no transfer determinant", "rough glass", "halfvec", {-1, -1}, BALANCE_ANY, 64, 2, propose, no_transfer},
+	{"steps of x both ways", "rough glass", "halfvec", {-1, -1}, BALANCE_ANY, 64, 2, one_sigma, log_weight},
+	{"no way back", "sky", "hslt", {4, 2}, BALANCE_TRACED, 64, 32, no_way_back, log_weight},
+	{"emitter's density", "picture", "light", {-1, -1}, BALANCE_ANY, 64, 2, propose, flat_emitter},
+};
+
+static void check_fault(void **state)
+{
+	const struct fault *f = *state;
+	static struct balance_trial t[2];
+	struct mutation_ops broken = {.name = f->name, .propose = f->propose, .log_weight = f->log_weight};
+	real = mutation_find(f->strategy, strlen(f->strategy));
+	t[0] = (struct balance_trial){.ops = real, .how = f->how, .side = f->side, .repeat = f->repeat};
+	t[1] = t[0];
+	t[1].ops = &broken;
+	t[1].broken = true;
+	struct world *w = room_of(f->room);
+	balance_run(w, f->name, t, 2, dice_count(f->starts), 1000);
+	world_free(w);
+	struct balance_verdict v[2];
+	for (int i = 0; i < 2; i++) {
+		v[i] = balance_judge(&t[i]);
+		balance_print(f->room, &t[i], &v[i]);
+	}
+	assert_true(v[0].balanced);
+	if (dice_count(16) >= 16)
+		assert_false(v[1].balanced);
+}
+
+int main(void)
+{
+	enum { FAULTS = sizeof faults / sizeof *faults };
+	struct CMUnitTest tests[FAULTS];
+	for (size_t i = 0; i < FAULTS; i++)
+		tests[i] = (struct CMUnitTest){faults[i].name, check_fault, NULL, NULL, (void *)(uintptr_t)&faults[i]};
+	return _cmocka_run_group_tests("broken", tests, FAULTS, NULL, NULL);
+}

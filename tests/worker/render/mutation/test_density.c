@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The ratio of f and T that mutations say, against both multiplied out per area
+ * (tests/worker/render/mutation/explicit.h): to rounding.
+ */
+#include "tests/support/dice.h"
+#include "tests/support/rooms.h"
+#include "tests/support/starts.h"
+#include "tests/support/stats.h"
+#include "tests/worker/render/mutation/explicit.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+enum { EDGES = 8, TRIALS = 48 };
+
+/* Of logarithms, relative where they are large. Seen: 2e-11. */
+#define TOLERANCE 1e-9
+/* Steps found again from the half vectors of y: worse where those are long. Seen: 7e-7 once, else 3e-10. */
+#define STEP_TOLERANCE 1e-4
+
+struct trial {
+	const struct mutation_ops *ops;
+	struct mutation_setting how;
+	unsigned long compared, beyond;
+	double worst, worst_choice;
+};
+
+static struct mutation_ctx m;
+static struct path_context c;
+static uint64_t counters[BATCH_COUNTERS], strategy_counters[STRATEGY_COUNTERS];
+
+static size_t all_trials(struct trial *t)
+{
+	size_t n = 0;
+	for (size_t i = 0; mutation_registry[i]; i++)
+		if (!mutation_registry[i]->independent)
+			t[n++] = (struct trial){.ops = mutation_registry[i], .how = {-1, -1}};
+	for (int b = 1; b <= EDGES; b++)
+		for (int end = 0; end < b; end++)
+			t[n++] = (struct trial){.ops = mutation_find("hslt", 4), .how = {b, end}};
+	return n;
+}
+
+static double log_t(const struct trial *t, const struct move *move, const struct full_path_path *x,
+		    const struct full_path_path *y, double sign, double *log_choices)
+{
+	unsigned b = move->b, end = move->c;
+	*log_choices = 0;
+	if (b > 0 && b == end)
+		return 0;
+	bool steps = strcmp(t->ops->name, "hslt") == 0 || strcmp(t->ops->name, "halfvec") == 0;
+	double sum = explicit_log_choice(&c, t->ops->name, &t->how, x, b, end);
+	sum += explicit_log_traced(&c, x, y, b, log_choices);
+	sum += explicit_log_between(&c, x, y, b, end, steps ? m.scratch.dh : NULL, sign);
+	const struct emitter *em = &c.w->emitters[y->v[0].emitter];
+	if (explicit_moves_emitter(t->ops->name, b, end) && em->ops->point_inverse)
+		sum += log(path_pdf_emitter(&c, &y->v[0]));
+	return sum;
+}
+
+static void compare(struct trial *t, struct full_path_path *x, struct full_path_path *y)
+{
+	struct move move = {0};
+	m.step++;
+	m.count = strategy_counters;
+	enum strategy_counter end = t->ops->propose(&m, &t->how, x, y, &move);
+	double to_y = end ? -INFINITY : t->ops->log_weight(&m, y, &move, X_TO_Y);
+	if (to_y > -INFINITY) {
+		double to_x = t->ops->log_weight(&m, x, &move, Y_TO_X), choices, back;
+		double there = log_t(t, &move, x, y, 1, &choices), here = log_t(t, &move, y, x, -1, &back);
+		double want = full_path_log_f(&c, y) - full_path_log_f(&c, x) + here - there;
+		double off = fabs(to_y - to_x - want) / fmax(1, fabs(want));
+		t->compared++;
+		t->beyond += !(off <= TOLERANCE);
+		t->worst = fmax(t->worst, isnan(off) ? INFINITY : off);
+		double symmetric = fmax(fabs(choices - back), fabs(choices - move.log_symmetric));
+		t->worst_choice = fmax(t->worst_choice, symmetric / fmax(1, fabs(choices)));
+	}
+	bool all = y->edges != x->edges;
+	full_path_copy(y, x, all ? 0 : move.first, all ? x->edges : move.last);
+}
+
+static void print(const char *room, const struct trial *t)
+{
+	char forced[16] = "";
+	if (t->how.b >= 0)
+		snprintf(forced, sizeof forced, "@b%dc%d", t->how.b % 100, t->how.c % 100);
+	printf("%-14s %10s%-6s %7lu ratios, largest difference %.2g (%lu beyond), of symmetric choices %.2g\n", room,
+	       t->ops->name, forced, t->compared, t->worst, t->beyond, t->worst_choice);
+}
+
+static void test_ratio(void **state)
+{
+	const struct room *room = *state;
+	static struct trial trials[TRIALS];
+	static struct full_path_path x, y;
+	struct world *w = room->build();
+	struct starts s;
+	size_t count = all_trials(trials), n = dice_count(400), bad = 0;
+	starts_context(&c, w, 1, EDGES, counters);
+	m = (struct mutation_ctx){
+		.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&accuracy_settings_default)};
+	starts_init(&s, &c, m.seed, 0, 2000);
+	for (unsigned k = 1; k <= EDGES; k++)
+		for (size_t i = 0; i < n; i++) {
+			if (!starts_path(&s, k, ((double)i + 0.5) / (double)n, &x))
+				continue;
+			full_path_copy(&y, &x, 0, k);
+			for (size_t j = 0; j < count; j++)
+				if (trials[j].how.b <= (int)k)
+					compare(&trials[j], &x, &y);
+		}
+	for (size_t i = 0; i < count; i++) {
+		print(room->name, &trials[i]);
+		bad += trials[i].beyond + (trials[i].worst_choice > STEP_TOLERANCE);
+	}
+	starts_fini(&s);
+	world_free(w);
+	assert_true(bad == 0);
+}
+
+int main(void)
+{
+	struct CMUnitTest tests[16] = {0};
+	size_t n = 0;
+	for (const struct room *r = rooms; r->name; r++)
+		tests[n++] = (struct CMUnitTest){r->name, test_ratio, NULL, NULL, (void *)(uintptr_t)r};
+	return _cmocka_run_group_tests("density", tests, n, NULL, NULL);
+}

@@ -1,0 +1,242 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What bidirectional proposals are made of, each against what it must be, number by number: a candidate's contribution
+ * does not depend on whether its pair was drawn afresh or around the path itself, lengths and the chance of them belong
+ * together, the two pairs of a proposal have random numbers of their own, and a point that leaves the aperture is
+ * refused.
+ */
+#include "tests/support/rooms.h"
+#include "tests/support/starts.h"
+#include "tests/support/stats.h"
+#include "worker/render/mutation/mutation.h"
+#include "worker/render/mutation/trace.h"
+#include "worker/render/path/ensemble.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { TRIALS = 3000, EDGES = 12 };
+
+static struct path_context c;
+static uint64_t counters[BATCH_COUNTERS];
+static struct ensemble drawn, around, capped;
+static struct full_path_path x, y;
+
+static void begin(const struct world *w)
+{
+	starts_context(&c, w, 1, STARTS_MAX_EDGES, counters);
+	c.max_depth = EDGES;
+}
+
+/* A sub-path may have n > 5 vertices or more with probability (5/n)^2. */
+static double chance(unsigned vertices)
+{
+	return vertices > 5 ? 25.0 / (vertices * vertices) : 1;
+}
+
+/* The path of candidate k of the pair at hand is in x. false: it lies just outside the film. */
+static bool choose(unsigned k)
+{
+	double before = 0;
+	for (unsigned j = 0; j < k; j++)
+		before += drawn.of[j].intensity;
+	return ensemble_choose(&c, &drawn, (before + 0.5 * drawn.of[k].intensity) / drawn.total, &x);
+}
+
+static void draw(uint64_t seed, uint64_t i, const struct ensemble_lengths *n, struct ensemble *out)
+{
+	struct sampler_random s;
+	sampler_random_init(&s, seed, RNG_TEST, i, 0);
+	ensemble_draw(&c, &s.base, n, out);
+}
+
+static bool has(const struct ensemble *e, unsigned edges, double intensity, bool whole)
+{
+	for (unsigned i = 0; i < e->count; i++) {
+		const struct candidate *a = &e->of[i];
+		double want = whole ? intensity : intensity / (chance(edges + 1 - a->s) * chance(a->s));
+		if (a->edges == edges && fabs(a->intensity / want - 1) < 1e-6)
+			return true;
+	}
+	return false;
+}
+
+/* The path's own candidate, in a pair around it, contributes what it did where it was found, over the chance of the
+ * lengths. */
+static void check_own_candidate(const char *name)
+{
+	struct world *w = room_of(name);
+	uint64_t seed = stats_seed(name);
+	unsigned checked = 0, longest = 0;
+	begin(w);
+	const struct ensemble_lengths all = ensemble_all_lengths(&c);
+	for (uint64_t i = 0; i < TRIALS; i++) {
+		draw(seed, i, &all, &drawn);
+		if (drawn.count == 0)
+			continue;
+		unsigned k = (unsigned)(i % drawn.count);
+		const struct candidate own = drawn.of[k];
+		const double u[3] = {(double)i / TRIALS, 0.5, 0.5};
+		struct sampler_random s;
+		/* Far out in a lobe's tail its two evaluations share no digits. */
+		if (own.intensity < 1e-6 * drawn.total || !choose(k))
+			continue;
+		sampler_random_init(&s, seed, RNG_TEST, i, 1);
+		ensemble_around(&c, &s.base, &x, u, &around);
+		if (!has(&around, own.edges, own.intensity, false))
+			fail_msg("%s: pair %llu: a path of %u edges found by technique %u with %.9g is not there", name,
+				 (unsigned long long)i, own.edges, own.s, own.intensity);
+		checked++;
+		longest += own.edges > 5;
+	}
+	print_message("%s: %u paths, %u of more than 5 edges\n", name, checked, longest);
+	assert_true(checked > TRIALS / 4 && longest > 20);
+	world_free(w);
+}
+
+static void test_own_candidate(void **state)
+{
+	(void)state;
+	check_own_candidate("gold");
+	check_own_candidate("rough glass");
+	check_own_candidate("bent normals");
+}
+
+/* Where lengths are drawn, each candidate weighs one over the chance that both sub-paths are as long as it needs. */
+static void test_drawn_lengths(void **state)
+{
+	(void)state;
+	struct world *w = room_of("gold");
+	uint64_t seed = stats_seed("drawn lengths");
+	unsigned checked = 0;
+	begin(w);
+	const struct ensemble_lengths all = ensemble_all_lengths(&c);
+	for (uint64_t i = 0; i < TRIALS; i++) {
+		const double u[2] = {(double)i / TRIALS, (double)(i * 7 % TRIALS) / TRIALS};
+		const struct ensemble_lengths some = ensemble_lengths_of(&c, u, 1, 1);
+		draw(seed, i, &some, &capped);
+		draw(seed, i, &all, &drawn);
+		for (unsigned k = 0; k < capped.count; k++) {
+			const struct candidate *a = &capped.of[k];
+			unsigned t = a->edges + 1 - a->s;
+			assert_true(t <= some.camera && a->s <= some.light);
+			assert_true(has(&drawn, a->edges, a->intensity * chance(t) * chance(a->s), true));
+			checked += chance(t) * chance(a->s) < 1;
+		}
+	}
+	assert_true(checked > 100);
+	world_free(w);
+}
+
+static void test_chance_of_lengths(void **state)
+{
+	(void)state;
+	enum { N = 100000 };
+	static unsigned count[2][EDGES + 3];
+	c.max_depth = EDGES;
+	for (unsigned least = 1; least <= 8; least += 7) {
+		unsigned sure = least > 5 ? least : 5;
+		memset(count, 0, sizeof count);
+		for (int i = 0; i < N; i++) {
+			const double u[2] = {(i + 0.5) / N, 1 - (i + 0.5) / N};
+			struct ensemble_lengths n = ensemble_lengths_of(&c, u, least, least);
+			assert_true(n.camera >= sure && n.camera <= EDGES + 1 && n.light >= sure && n.light <= EDGES);
+			for (unsigned k = 0; k <= n.camera; k++)
+				count[0][k]++;
+			for (unsigned k = 0; k <= n.light; k++)
+				count[1][k]++;
+		}
+		for (unsigned side = 0; side < 2; side++)
+			for (unsigned k = sure; k <= EDGES + 1 - side; k++)
+				assert_true(fabs(count[side][k] / (double)N - (double)(sure * sure) / (k * k)) <
+					    2.0 / N);
+	}
+}
+
+/* Totals of both pairs as the proposal at hand must have drawn them, and of the one around x with the other one's
+ * numbers. */
+static void test_streams_of_a_proposal(void **state)
+{
+	(void)state;
+	struct world *w = room_of("gold");
+	const struct mutation_ops *ops = mutation_find("bidirectional", strlen("bidirectional"));
+	static struct mutation_ctx m;
+	static uint64_t count[STRATEGY_COUNTERS];
+	uint64_t seed = stats_seed("streams");
+	unsigned proposed = 0, same = 0;
+	begin(w);
+	const struct ensemble_lengths all = ensemble_all_lengths(&c);
+	m = (struct mutation_ctx){.path = &c,
+				  .seed = seed,
+				  .chain = 5,
+				  .count = count,
+				  .limits = walk_limits_of(&accuracy_settings_default)};
+	for (uint64_t i = 0; i < TRIALS / 4; i++) {
+		draw(seed, i, &all, &drawn);
+		if (drawn.count == 0 || !choose(0))
+			continue;
+		struct move move = {0};
+		m.step = i;
+		if (ops->propose(&m, &(struct mutation_setting){-1, -1}, &x, &y, &move) != STRATEGY_PROPOSED)
+			continue;
+		double total[2], v[4], r[4];
+		const enum rng_stream stream[2] = {RNG_AROUND, RNG_CHAIN};
+		struct sampler_random s;
+		mutation_random(&m, BLOCK_VERTEX + 1, v);
+		for (int k = 0; k < 2; k++) {
+			sampler_random_init(&s, seed, stream[k], m.chain, m.step);
+			ensemble_around(&c, &s.base, &x, v, &around);
+			total[k] = around.total;
+		}
+		assert_true(move.log_density[Y_TO_X] == -log(total[0]));
+		same += total[0] == total[1];
+		mutation_random(&m, BLOCK_VERTEX, r);
+		const struct ensemble_lengths n = ensemble_lengths_of(&c, r, 1, 1);
+		sampler_random_init(&s, seed, RNG_CHAIN, m.chain, m.step);
+		ensemble_draw(&c, &s.base, &n, &drawn);
+		assert_true(move.log_density[X_TO_Y] == -log(drawn.total));
+		proposed++;
+	}
+	print_message("%u proposals, in %u the pair around the state does not depend on its numbers\n", proposed, same);
+	assert_true(proposed > 50 && same < proposed / 2);
+	world_free(w);
+}
+
+/* From a point next to the aperture's rim half of the steps lead out, and these are refused: clamped to the rim they
+ * would gather there. 1,000 steps; outside 0.42 to 0.58 with probability below 1e-6. */
+static void test_aperture_is_left(void **state)
+{
+	(void)state;
+	struct world *w = room_of("lens");
+	static struct mutation_ctx m;
+	const double rim[2] = {0.999999, 0.5};
+	unsigned refused = 0;
+	begin(w);
+	m = (struct mutation_ctx){.path = &c, .seed = stats_seed("aperture"), .chain = 1};
+	x.edges = y.edges = 2;
+	x.v[2].x.p = camera_point(&w->camera, rim);
+	for (m.step = 0; m.step < 1000; m.step++) {
+		double u[2];
+		if (!trace_move_aperture(&m, &x, &y)) {
+			refused++;
+			continue;
+		}
+		camera_point_inverse(&w->camera, y.v[2].x.p, u);
+		assert_true(u[0] < rim[0] + 1e-9);
+	}
+	assert_true(refused > 420 && refused < 580);
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_own_candidate),	  cmocka_unit_test(test_drawn_lengths),
+		cmocka_unit_test(test_chance_of_lengths), cmocka_unit_test(test_streams_of_a_proposal),
+		cmocka_unit_test(test_aperture_is_left),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

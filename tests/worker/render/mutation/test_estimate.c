@@ -1,0 +1,133 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Independent proposals estimate what all light is that reaches the film: E[f / T] over them is the integral of f that
+ * bdpt finds, for each number of edges and for all. What chains are scaled by hangs on this.
+ *
+ * Level: 1e-6 for all comparisons, t between 32 groups of each; power, with 95 %: printed, and of what chains use by
+ * default no more than 2 % over all rooms.
+ */
+#include "tests/support/dice.h"
+#include "tests/support/rooms.h"
+#include "tests/support/starts.h"
+#include "tests/support/stats.h"
+#include "worker/render/mutation/mutation.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { GROUPS = 32, EDGES = 5 };
+#define COMPARISONS 256
+#define LEVEL (1e-6 / COMPARISONS)
+/* |t| of that level with 31 degrees of freedom, and what makes it 95 % likely. */
+#define FINDS (8.5 + 1.7)
+
+/* Means of f / T by number of edges. */
+static void estimate(struct mutation_ctx *m, const struct mutation_ops *ops, size_t n, double *mean)
+{
+	static struct full_path_path x, y;
+	static uint64_t count[STRATEGY_COUNTERS];
+	m->count = count;
+	for (size_t i = 0; i < n; i++) {
+		struct move move = {0};
+		x.edges = 0;
+		m->step++;
+		if (ops->propose(m, &(struct mutation_setting){-1, -1}, &x, &y, &move) == STRATEGY_PROPOSED)
+			mean[y.edges] += exp(ops->log_weight(m, &y, &move, X_TO_Y)) / (double)n;
+	}
+}
+
+/* Relative differences of all light, over rooms, weighted by their certainty: 1 / error^2. */
+static struct pooled {
+	double certainty, weighted;
+} pool;
+static size_t rooms_pooled;
+
+/* Of each number of edges, and of all together. */
+static unsigned compare(const char *room, const char *strategy, double a[GROUPS][EDGES + 1],
+			double b[GROUPS][EDGES + 1])
+{
+	unsigned faults = 0;
+	double worst = 0;
+	struct stats_mean s = {0, 0, 1};
+	double sum = 0;
+	for (unsigned k = EDGES + 1; k-- > 0;) {
+		double d[GROUPS] = {0};
+		sum = 0;
+		for (unsigned g = 0; g < GROUPS; g++)
+			for (unsigned j = k ? k : 1; j <= (k ? k : EDGES); j++) {
+				d[g] += a[g][j] - b[g][j];
+				sum += b[g][j] / GROUPS;
+			}
+		s = stats_mean_test(d, GROUPS, 0);
+		if (!(sum > 0))
+			continue;
+		faults += s.p < LEVEL;
+		worst = fmax(worst, fabs(s.mean / s.error));
+	}
+	printf("%-14s %-14s all light %+6.2f %% +- %.2f %%, finds %.1f %%; largest t of a length %.2f\n", room,
+	       strategy, 100 * s.mean / sum, 100 * s.error / sum, 100 * FINDS * s.error / sum, worst);
+	if (strcmp(strategy, "bidirectional") == 0) {
+		double error = s.error / sum;
+		pool.certainty += 1 / (error * error);
+		pool.weighted += s.mean / sum / (error * error);
+		rooms_pooled++;
+	}
+	return faults;
+}
+
+static void test_all_rooms(void **state)
+{
+	(void)state;
+	double error = 1 / sqrt(pool.certainty), t = pool.weighted / pool.certainty / error;
+	printf("all rooms      bidirectional  all light %+6.2f %% +- %.2f %%, finds %.2f %%\n", 100 * t * error,
+	       100 * error, 100 * FINDS * error);
+	assert_true(rooms_pooled >= 10);
+	assert_true(stats_student_t_p(t, GROUPS - 1) >= LEVEL);
+	assert_true(FINDS * error <= 0.02 || dice_count(1000) < 1000);
+}
+
+static void test_integral(void **state)
+{
+	const struct room *room = *state;
+	static struct path_context c;
+	static struct mutation_ctx m;
+	static uint64_t counters[BATCH_COUNTERS];
+	static double want[GROUPS][EDGES + 1];
+	struct world *w = room->build();
+	size_t n = dice_count(1000);
+	unsigned faults = 0;
+	starts_context(&c, w, 1, EDGES, counters);
+	m = (struct mutation_ctx){
+		.path = &c, .seed = stats_seed(room->name), .limits = walk_limits_of(&accuracy_settings_default)};
+	for (unsigned g = 0; g < GROUPS; g++) {
+		struct starts s;
+		starts_init(&s, &c, m.seed, g, n);
+		for (unsigned k = 1; k <= EDGES; k++)
+			want[g][k] = starts_weight(&s, k);
+		starts_fini(&s);
+	}
+	for (size_t i = 0; mutation_registry[i]; i++) {
+		double mean[GROUPS][EDGES + 1] = {{0}};
+		for (m.chain = 0; mutation_registry[i]->independent && m.chain < GROUPS; m.chain++)
+			estimate(&m, mutation_registry[i], 2 * n, mean[m.chain]);
+		if (mutation_registry[i]->independent)
+			faults += compare(room->name, mutation_registry[i]->name, mean, want);
+	}
+	world_free(w);
+	assert_true(faults == 0);
+}
+
+int main(void)
+{
+	struct CMUnitTest tests[16] = {0};
+	size_t n = 0;
+	for (const struct room *r = rooms; r->name; r++)
+		tests[n++] = (struct CMUnitTest){r->name, test_integral, NULL, NULL, (void *)(uintptr_t)r};
+	tests[n++] = (struct CMUnitTest){"all rooms", test_all_rooms, NULL, NULL, NULL};
+	return _cmocka_run_group_tests("estimate", tests, n, NULL, NULL);
+}

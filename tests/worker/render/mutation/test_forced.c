@@ -1,0 +1,212 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Each mutation alone and each forced (b, c) leaves bdpt's distribution of paths as it is, on paths of exactly k edges
+ * (tests/support/stationary.h: what is compared, and why it is so much sharper than two images).
+ *
+ * Level: 1e-6 a case. Power: the smallest bias of a soft quarter of the image that is found with 95 % probability is
+ * printed and is 2 % at most; colours and what is looked at besides images have theirs printed. Of the whole image's
+ * mean there is nothing to find: a mutation keeps the number of edges, and how much all paths of that length bring is
+ * b, which independent proposals alone estimate (tests/worker/render/path/test_full_path.c compares their densities
+ * path by path, test_integrators.c images of mixtures). They go anywhere on the film, so that nothing cancels: 2 % by
+ * FULL=1 only, with k = 3, 10 % else. Of the accepted moves at least 10 % are the forced choice's, the starts counting
+ * as accepted independent proposals.
+ *
+ * About 100 s of CPU time; FULL=1: every (b, c) and every mutation, k = 2..4 and 6 on every scene, k = 8 on two.
+ * SCENE="rough glass" runs one alone; HSLT_TEST_ROWS=1 prints reasons of failure as well.
+ */
+#include "tests/support/stationary.h"
+#include "tests/worker/render/mutation/scenes.h"
+#include "worker/render/render.h"
+#include "worker/render/mutation/mutation.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+enum { STARTS = 120, BOOTSTRAP = 1024 };
+
+/* A list of mutations for paths of that many edges; "*": all forced choices and all mutations. */
+struct forced {
+	unsigned edges;
+	const char *mutations;
+};
+
+struct scene_cases {
+	const char *scene;
+	struct forced of[8];
+};
+
+static const struct scene_cases shorter[] = {
+	{"diffuse", {{3, "*"}, {2, "hslt@b2c0 rejoin"}}},
+	{"glossy", {{2, "hslt@b2c0"}, {3, "*"}, {4, "hslt@b4c0 hslt@b4c1 hslt@b3c1"}}},
+	{"rough glass",
+	 {{4, "*"},
+	  {6, "hslt@b0 hslt@b6c0 hslt@b6c2 hslt@b5c2 hslt@b2c1 hslt"},
+	  {8, "hslt@b0 hslt@b8c4 hslt@b6c3 hslt"}}},
+	{"smooth glass", {{4, "hslt@b0 hslt@b4c0 hslt@b4c1 hslt halfvec light"}, {5, "hslt@b5c0 hslt@b5c1"}}},
+	{"specular chain", {{5, "hslt@b0 hslt@b5c0 hslt@b5c1 hslt@b5c2 hslt"}, {7, "hslt@b7c1"}}},
+	{"bent normals", {{3, "hslt@b3c0 hslt@b2c0"}, {4, "hslt@b0 hslt@b4c0 hslt@b4c1 hslt@b3c1 hslt@b2c1 hslt"}}},
+	{"environment",
+	 {{2, "hslt@b1c0"},
+	  {3, "hslt@b0 hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt@b3c1 light"},
+	  {4, "hslt@b4c0 hslt@b4c1 hslt"}}},
+	{"delta emitters", {{3, "hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt@b3c1"}, {4, "hslt@b4c0 hslt@b3c1 hslt"}}},
+	{"sun", {{2, "hslt@b2c0"}, {3, "hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt"}}},
+	{"dispersion", {{4, "hslt@b0 hslt@b4c0 hslt@b4c1 hslt@b3c1 wavelength hslt"}}},
+	{"dispersion, smooth", {{4, "hslt@b0 hslt@b4c0 hslt@b1c0 wavelength light hslt"}}},
+	{"aperture",
+	 {{3, "hslt@b0 hslt@b1c0 hslt@b2c0 hslt@b3c0 hslt@b3c1 lens rejoin"}, {4, "hslt@b4c0 hslt@b4c1 lens hslt"}}},
+};
+enum { SCENES = sizeof shorter / sizeof *shorter };
+
+static bool full(void)
+{
+	const char *text = getenv("FULL");
+	return text && atoi(text) > 0;
+}
+
+static bool scaled(void)
+{
+	const char *text = getenv("HSLT_TEST_SCALE");
+	return text && atoi(text) > 1;
+}
+
+static void print(const char *scene, const struct stationary_how *how, const struct stationary_result *r,
+		  const char *verdict)
+{
+	char worst[96] = "nothing differs";
+	if (r->worst >= 0)
+		snprintf(worst, sizeof worst, "%s %+.2f %% +- %.2f %%", stationary_function(r->worst),
+			 100 * r->bias[r->worst], 100 * r->error[r->worst]);
+	printf("%-18s k%u %-11s accepts %4.1f %%, %4.1f %% of all; finds %.2f %% on a quarter, %.1f %% of colours, %.1f %% of vertices; %s (p %.1g); %s\n",
+	       scene, how->max_edges, how->mutation, 100 * (double)r->accepted / (double)r->proposals, 100 * r->share,
+	       100 * r->least_block, 100 * r->least_colour, 100 * r->least_other, worst, r->p, verdict);
+	if (!getenv("HSLT_TEST_ROWS"))
+		return;
+	for (int i = 0; i < STRATEGY_COUNTERS; i++)
+		printf(" %.3f", (double)r->strategy[i] / (double)r->proposals);
+	printf(" %.2f s %s\n", r->seconds, r->failure);
+}
+
+struct tally {
+	unsigned cases, failed;
+	double worst_block, seconds;
+	uint64_t mutations;
+};
+
+static void check(const struct world *w, const char *scene, unsigned edges, const char *mutation, bool chosen,
+		  struct tally *t)
+{
+	static struct stationary_result r;
+	/* Fresh paths lie anywhere on the film: far less of the noise cancels. */
+	const struct mutation_ops *ops = mutation_find(mutation, strcspn(mutation, "@"));
+	bool fresh = ops && ops->independent, weak;
+	uint32_t more = fresh && full() && edges == 3 ? 16 : edges == 2 ? 2 : 1;
+	struct stationary_how how = {mutation, edges, edges, more * STARTS, more * BOOTSTRAP, STATIONARY_SOUND};
+	stationary_run(w, scene, &how, &r);
+	for (; (weak = !scaled() && r.least_block > 0.02 && !fresh) && full() && more < 16; more *= 2) {
+		how.starts *= 2;
+		how.bootstrap *= 2;
+		stationary_run(w, scene, &how, &r);
+	}
+	/* What the scene has not got cannot be moved: only what was chosen for a scene must be. */
+	bool idle = chosen && !scaled() && r.share < 0.1;
+	const char *verdict = !stationary_holds(&r) ? "FAILED" : weak ? "TOO WEAK" : idle ? "HARDLY MOVES" : "ok";
+	print(scene, &how, &r, verdict);
+	t->cases++;
+	t->failed += strcmp(verdict, "ok") != 0;
+	t->worst_block = fmax(t->worst_block, fresh ? 0 : r.least_block);
+	t->seconds += r.seconds;
+	t->mutations += r.proposals;
+}
+
+static void check_all(const struct world *w, const char *scene, unsigned k, struct tally *t)
+{
+	char text[32];
+	check(w, scene, k, "hslt@b0", false, t);
+	for (unsigned b = 1; b <= k; b++)
+		for (unsigned c = 0; c < b; c++) {
+			if (b == k && c + 1 == k)
+				continue;
+			snprintf(text, sizeof text, "hslt@b%uc%u", b, c);
+			check(w, scene, k, text, false, t);
+		}
+	for (size_t i = 0; mutation_registry[i]; i++)
+		check(w, scene, k, mutation_registry[i]->name, false, t);
+}
+
+static void check_list(const struct world *w, const char *scene, const struct forced *f, struct tally *t)
+{
+	char list[256], *rest = list, *one;
+	snprintf(list, sizeof list, "%s", f->mutations);
+	while ((one = strtok_r(rest, " ", &rest)))
+		if (strcmp(one, "*") == 0)
+			check_all(w, scene, f->edges, t);
+		else
+			check(w, scene, f->edges, one, true, t);
+}
+
+static void test_scene(void **state)
+{
+	const struct scene_cases *s = *state;
+	const char *only = getenv("SCENE");
+	if (only && strcmp(only, s->scene) != 0)
+		skip();
+	struct world *w = test_world(s->scene);
+	struct tally t = {0};
+	assert_non_null(w);
+	if (full()) {
+		for (unsigned k = 2; k <= 6; k += k < 4 ? 1 : 2)
+			check_all(w, s->scene, k, &t);
+		if (strcmp(s->scene, "rough glass") == 0 || strcmp(s->scene, "specular chain") == 0)
+			check_all(w, s->scene, 8, &t);
+	} else {
+		for (const struct forced *f = s->of; f->mutations; f++)
+			check_list(w, s->scene, f, &t);
+	}
+	printf("%s: %u cases, %u failed, %llu mutations, finds %.2f %% on a quarter of the film, %.0f s of CPU time\n",
+	       s->scene, t.cases, t.failed, (unsigned long long)t.mutations, 100 * t.worst_block, t.seconds);
+	fflush(stdout);
+	world_free(w);
+	assert_int_equal(t.failed, 0);
+}
+
+/* Faults in the acceptance must show. */
+static void test_planted(void **state)
+{
+	(void)state;
+	static const struct {
+		enum stationary_fault fault;
+		const char *mutation, *what;
+	} planted[] = {
+		{STATIONARY_NO_TRANSFER, "hslt@b4c0", "the transfer matrix left out"},
+		{STATIONARY_NO_TRANSFER, "hslt@b3c1", "the transfer matrix left out"},
+		{STATIONARY_NO_DENSITY, "hslt@b4c0", "densities of steps left out"},
+		{STATIONARY_NO_DENSITY, "hslt@b4c2", "densities of steps left out"},
+		{STATIONARY_NO_GEOMETRY, "hslt@b1c0", "the geometry term at x_b left out"},
+		{STATIONARY_NO_GEOMETRY, "hslt@b2c1", "the geometry term at x_b left out"},
+	};
+	static struct stationary_result r;
+	struct world *w = test_world("rough glass");
+	for (size_t i = 0; i < sizeof planted / sizeof *planted; i++) {
+		struct stationary_how how = {planted[i].mutation, 4, 4, STARTS, BOOTSTRAP, planted[i].fault};
+		stationary_run(w, "planted", &how, &r);
+		printf("%s, %s: p %.1g by the %s\n", planted[i].what, how.mutation, r.p, stationary_function(r.worst));
+		assert_true(scaled() || !stationary_holds(&r));
+	}
+	world_free(w);
+}
+
+int main(void)
+{
+	struct CMUnitTest tests[SCENES + 1];
+	static struct scene_cases at[SCENES];
+	for (int i = 0; i < SCENES; i++) {
+		at[i] = shorter[i];
+		tests[i] = (struct CMUnitTest){at[i].scene, test_scene, NULL, NULL, &at[i]};
+	}
+	tests[SCENES] = (struct CMUnitTest)cmocka_unit_test(test_planted);
+	return cmocka_run_group_tests_name("forced", tests, NULL, NULL);
+}

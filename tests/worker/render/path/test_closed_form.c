@@ -1,0 +1,368 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Images that are known without rendering: furnaces, directly lit planes, two plates; and scenes at the edge of what
+ * numbers can hold. Statistics as in tests/support/agree.h (level 1e-4 over the suite, power printed and bounded).
+ */
+#include "worker/render/render.h"
+#include "tests/support/agree.h"
+#include "tests/support/dice.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static double sum3(const double v[3])
+{
+	return v[0] + v[1] + v[2];
+}
+
+/* Integrators at their least samples that tell half a percent of the mean; 0: not run on this scene. */
+struct effort {
+	uint64_t path, bdpt, pssmlt;
+};
+
+/* Where every sample is the same the groups are, too, but for the rounding of tiles to float and what a hair of
+ * roughness loses: no statistics of that. */
+static void forgive_rounding(struct agree_image *image, double expected)
+{
+	for (uint32_t g = 0; g < image->groups; g++)
+		for (int c = 0; c <= AGREE_CELLS; c++)
+			if (fabs(image->mean[g][c] / expected - 1) < 1e-5)
+				image->mean[g][c] = expected;
+}
+
+/* Each cell of the image has the radiance L of a grey scene. Takes the world. */
+static void check_constant(const char *name, struct world *w, double radiance, struct effort e)
+{
+	static struct agree_image image;
+	const struct {
+		const char *integrator;
+		uint64_t spp;
+	} runs[] = {{"path", e.path}, {"bdpt", e.bdpt}, {"pssmlt", e.pssmlt}};
+	assert_false(w->effects.colour);
+	for (size_t i = 0; i < 3; i++) {
+		if (!runs[i].spp)
+			continue;
+		char test[64];
+		snprintf(test, sizeof test, "%s, %s", name, runs[i].integrator);
+		struct agree_side side = {runs[i].integrator, runs[i].spp, 32, 0, 0};
+		agree_render(w, test, runs[i].integrator, &side, &image);
+		forgive_rounding(&image, radiance * sum3(w->grey_xyz));
+		agree_expect(test, &image, radiance * sum3(w->grey_xyz));
+	}
+	world_free(w);
+}
+
+#define DEPTH(k) "<integrator type='path'><integer name='max_depth' value='" k "'/></integrator>"
+
+/* Inside a sphere that shines with L = 1 and reflects rho = 0.5: 1 + 1/2 + 1/4 + ... up to the depth. */
+static void test_furnace(void **state)
+{
+	(void)state;
+	check_constant(
+		"furnace",
+		world_of_text(
+			16, 16,
+			DEPTH("5") SENSOR(
+				"0.2,0.1,0.3",
+				"0.5,1,0") "<shape type='sphere'><boolean name='flip_normals' value='true'/><bsdf type='diffuse'>"
+					   "<float name='reflectance' value='.5'/></bsdf><emitter type='area'/></shape>"),
+		1 + 0.5 + 0.25 + 0.125 + 0.0625, (struct effort){64, 256, 0});
+}
+
+#define SKY "<emitter type='constant'><float name='radiance' value='.7'/></emitter>"
+#define BALL(bsdf) "<shape type='sphere'>" bsdf "</shape>"
+
+/* In constant light lossless things cannot be seen. */
+static void test_invisible(void **state)
+{
+	(void)state;
+	check_constant(
+		"invisible glass",
+		world_of_text(16, 16, DEPTH("128") SENSOR("0,0,4", "0,0,0") SKY BALL("<bsdf type='dielectric'/>")), 0.7,
+		(struct effort){128, 64, 0});
+	check_constant("invisible mirror",
+		       world_of_text(16, 16,
+				     DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
+					     "<bsdf type='conductor'><string name='material' value='none'/></bsdf>")),
+		       0.7, (struct effort){64, 64, 16384});
+	check_constant(
+		"invisible glass in glass",
+		world_of_text(
+			16, 16,
+			DEPTH("128") SENSOR("0,0,4", "0,0,0") SKY BALL(
+				"<bsdf type='dielectric'/>") "<shape type='sphere'><float name='radius' value='.5'/><bsdf type='dielectric'><float name='int_ior' value='1'/>"
+							     "<float name='ext_ior' value='1.5046'/></bsdf></shape>"),
+		0.7, (struct effort){256, 0, 0});
+	/* Rough, but so little that what a model of single scattering loses (0.065 % +- 0.007 % of this image at alpha
+	 * 0.01, and with its square) is far below what is found. */
+	check_constant("invisible rough glass",
+		       world_of_text(16, 16,
+				     DEPTH("64") SENSOR("0,0,4", "0,0,0") SKY BALL(
+					     "<bsdf type='roughdielectric'><float name='alpha' value='.001'/></bsdf>")),
+		       0.7, (struct effort){256, 256, 0});
+	check_constant(
+		"invisible rough metal",
+		world_of_text(
+			16, 16,
+			DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
+				"<bsdf type='roughconductor'><string name='material' value='none'/><float name='alpha' value='.001'/></bsdf>")),
+		0.7, (struct effort){128, 64, 0});
+	/* White diffuse: every path ends in the sky. */
+	check_constant("invisible white ball",
+		       world_of_text(16, 16,
+				     DEPTH("8") SENSOR("0,0,4", "0,0,0") SKY BALL(
+					     "<bsdf type='diffuse'><float name='reflectance' value='1'/></bsdf>")),
+		       0.7, (struct effort){1536, 1024, 0});
+}
+
+/* A lamp at height h over the floor: a square of side a that looks down, by the midpoint rule, or a sphere of radius r,
+ * all of it above the horizon: pi r^2 / d^2 times the cosine. Irradiance at (x, z) from its foot, radiance 1. */
+struct lamp {
+	double a, r, h;
+};
+
+static double irradiance(const struct lamp *l, double x, double z)
+{
+	enum { N = 32 };
+	double sum = 0, h = l->h, a = l->a;
+	if (l->r > 0)
+		return M_PI * l->r * l->r * h / pow(x * x + z * z + h * h, 1.5);
+	for (int i = 0; i < N * N; i++) {
+		double dx = a * ((i % N + 0.5) / N - 0.5) - x, dz = a * ((i / N + 0.5) / N - 0.5) - z,
+		       d2 = dx * dx + dz * dz + h * h;
+		sum += h * h / (d2 * d2);
+	}
+	return sum * a * a / (N * N);
+}
+
+/* Mean over the block of a film of n x n pixels, seen straight from above: block b of AGREE_BLOCKS squared. The camera
+ * of 40 degrees at height `up` sees the floor's square of side 2 up tan 20. Film x is +x, film y is +z. */
+static void expect_floor(const char *test, const struct agree_image *image, double up, const struct lamp *lamp,
+			 double x, double z, double scale)
+{
+	enum { N = 24 };
+	static struct agree_image part;
+	double half = up * tan(20 * M_PI / 180), whole = 0;
+	for (int c = 0; c <= AGREE_CELLS; c++) {
+		double sum = 0;
+		for (int i = 0; c < AGREE_CELLS && i < N * N; i++) {
+			double u = (c % AGREE_BLOCKS + (i % N + 0.5) / N) / AGREE_BLOCKS,
+			       v = (c / AGREE_BLOCKS + (i / N + 0.5) / N) / AGREE_BLOCKS;
+			sum += scale * irradiance(lamp, half * (2 * u - 1) - x, half * (2 * v - 1) - z) / (N * N);
+		}
+		whole += c < AGREE_CELLS ? sum / AGREE_CELLS : 0;
+		double expected = c < AGREE_CELLS ? sum : whole;
+		/* All cells against 1. */
+		for (uint32_t g = 0; g < image->groups; g++)
+			part.mean[g][c] = image->mean[g][c] / expected;
+	}
+	part.groups = image->groups;
+	agree_expect(test, &part, 1);
+}
+
+/* A camera above the floor, looking down, a lamp over (3, 1) that it does not see. */
+static void check_lit_floor(const char *name, struct lamp lamp, const char *xml, struct effort e)
+{
+	static struct agree_image image;
+	const struct {
+		const char *integrator;
+		uint64_t spp;
+	} runs[] = {{"path", e.path}, {"bdpt", e.bdpt}, {"pssmlt", e.pssmlt}};
+	struct world *w = world_of_text(
+		16, 16,
+		"%s<shape type='rectangle'><transform name='to_world'><scale value='20'/><rotate x='1' angle='-90'/></transform>"
+		"<bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf></shape>"
+		"<sensor type='perspective'><float name='fov' value='40'/><transform name='to_world'><lookat origin='0,4,0' target='0,0,0' up='0,0,-1'/>"
+		"</transform><film type='hdrfilm'><rfilter type='box'/></film></sensor>%s",
+		DEPTH("2"), xml);
+	for (size_t i = 0; i < 3; i++) {
+		if (!runs[i].spp)
+			continue;
+		char test[64];
+		snprintf(test, sizeof test, "%s, %s", name, runs[i].integrator);
+		struct agree_side side = {runs[i].integrator, runs[i].spp, 32, 0, 0};
+		agree_render(w, test, runs[i].integrator, &side, &image);
+		expect_floor(test, &image, 4, &lamp, 3, 1, 0.5 / M_PI * sum3(w->grey_xyz));
+	}
+	world_free(w);
+}
+
+static void test_lit_floor(void **state)
+{
+	(void)state;
+	check_lit_floor(
+		"floor under a square", (struct lamp){1, 0, 2},
+		"<shape type='rectangle'><transform name='to_world'><scale value='.5'/><rotate x='1' angle='90'/>"
+		"<translate x='3' y='2' z='1'/></transform><emitter type='area'/></shape>",
+		(struct effort){3072, 6144, 32768});
+	check_lit_floor(
+		"floor under a sphere", (struct lamp){0, 0.4, 2},
+		"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='.4'/><emitter type='area'/></shape>",
+		(struct effort){1024, 2048, 0});
+	check_lit_floor(
+		"floor under a tiny sphere", (struct lamp){0, 1e-5, 2},
+		"<shape type='sphere'><point name='center' x='3' y='2' z='1'/><float name='radius' value='1e-5'/><emitter type='area'/></shape>",
+		(struct effort){512, 0, 0});
+}
+
+/* Two plates of reflectance rho, the lower shines with 1. Between infinite plates every ray from one meets the other.
+ * Radiance of the lower: 1 + rho^2 + rho^4 ..., of the upper rho + rho^3 ... The plates are 4000 gaps wide, which
+ * leaves out some 1e-6 of the light that the camera in the middle sees. */
+static void test_plates(void **state)
+{
+	(void)state;
+	const double rho = 0.6;
+	static const char plates[] =
+		"<shape type='rectangle'><transform name='to_world'><scale value='4000'/><rotate x='1' angle='-90'/></transform>"
+		"<bsdf type='diffuse'><float name='reflectance' value='.6'/></bsdf><emitter type='area'/></shape>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='4000'/><rotate x='1' angle='90'/><translate y='1'/></transform>"
+		"<bsdf type='diffuse'><float name='reflectance' value='.6'/></bsdf></shape>";
+	check_constant("lower plate", world_of_text(16, 16, DEPTH("6") SENSOR("0,0.5,0", "0.2,0,0.1") "%s", plates),
+		       1 + pow(rho, 2) + pow(rho, 4), (struct effort){512, 0, 0});
+	check_constant("upper plate", world_of_text(16, 16, DEPTH("6") SENSOR("0,0.5,0", "0.2,1,0.1") "%s", plates),
+		       rho + pow(rho, 3) + pow(rho, 5), (struct effort){1024, 0, 0});
+}
+
+enum { INTEGRATORS_MOST = 8 };
+
+/* Runs every integrator for a little: nothing invalid (agree_render asserts that), and the mean of what comes out. */
+static void run_all(const char *name, struct world *w, double mean[INTEGRATORS_MOST])
+{
+	static struct agree_image image;
+	for (size_t i = 0; render_integrator_at(i); i++) {
+		const struct render_integrator *r = render_integrator_at(i);
+		struct agree_side side = {r->name, 32, 16, 0, 0};
+		assert_true(i < INTEGRATORS_MOST);
+		agree_render(w, name, r->name, &side, &image);
+		mean[i] = 0;
+		for (uint32_t g = 0; g < image.groups; g++)
+			mean[i] += image.mean[g][AGREE_CELLS] / image.groups;
+		assert_true(isfinite(mean[i]) && mean[i] >= 0);
+	}
+	world_free(w);
+}
+
+#define FLOOR                                                                                                          \
+	"<shape type='rectangle'><transform name='to_world'><scale value='2'/><rotate x='1' angle='-90'/></transform>" \
+	"<bsdf type='diffuse'><float name='reflectance' value='.5'/></bsdf></shape>"
+
+static void test_hard(void **state)
+{
+	(void)state;
+	double mean[INTEGRATORS_MOST];
+	/* A sun: half a degree, radiance 1e9, 100 units away. */
+	run_all("sun",
+		world_of_text(
+			16, 16,
+			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
+			"<shape type='sphere'><point name='center' x='60' y='80' z='0'/><float name='radius' value='.5'/>"
+			"<emitter type='area'><float name='radiance' value='1e9'/></emitter></shape>"),
+		mean);
+	assert_true(mean[0] > 0 && mean[1] > 0);
+	/* A light of 1e-6 of the scene's size. */
+	run_all("tiny light",
+		world_of_text(
+			16, 16,
+			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
+			"<shape type='sphere'><point name='center' x='0' y='1' z='0'/><float name='radius' value='2e-6'/>"
+			"<emitter type='area'><float name='radiance' value='1e12'/></emitter></shape>"),
+		mean);
+	assert_true(mean[0] > 0 && mean[1] > 0);
+	/* Grazing: the camera lies almost in the floor. */
+	run_all("grazing",
+		world_of_text(
+			16, 16,
+			DEPTH("6") SENSOR("0,1e-6,1.9", "0,0,-3") FLOOR SKY
+			"<shape type='sphere'><point name='center' x='0' y='.3' z='0'/><float name='radius' value='.3'/>"
+			"<bsdf type='roughdielectric'><float name='alpha' value='.01'/></bsdf></shape>"),
+		mean);
+	assert_true(mean[0] > 0);
+	/* Lights so different that the fainter is never chosen. */
+	run_all("faint light",
+		world_of_text(
+			16, 16,
+			DEPTH("4") SENSOR("0,2,4", "0,0,0") FLOOR
+			"<shape type='sphere'><point name='center' x='0' y='.5' z='0'/><float name='radius' value='.5'/>"
+			"<emitter type='area'><float name='radiance' value='1e-300'/></emitter></shape>"
+			"<shape type='sphere'><point name='center' x='3' y='3' z='0'/><float name='radius' value='.5'/>"
+			"<emitter type='area'><float name='radiance' value='1e30'/></emitter></shape>"),
+		mean);
+	/* A sliver of a mirror, a sliver of a lamp. */
+	run_all("slivers",
+		world_of_text(
+			16, 16,
+			DEPTH("6") SENSOR("0,2,4", "0,0,0") FLOOR
+			"<shape type='rectangle'><transform name='to_world'><scale x='1' y='1e-6' z='1'/><rotate x='1' angle='90'/>"
+			"<translate y='1'/></transform><emitter type='area'><float name='radiance' value='1e6'/></emitter></shape>"
+			"<shape type='rectangle'><transform name='to_world'><scale x='1e-6' y='1' z='1'/><translate y='.5'/></transform>"
+			"<bsdf type='conductor'/></shape>"),
+		mean);
+	assert_true(mean[0] > 0);
+}
+
+/* No light at all: leases give black, the bootstrap no seeds, chains without a seed stay black. */
+static void black(const char *text)
+{
+	struct world *w = world_of_text(16, 16, "%s%s", SENSOR("0,2,4", "0,0,0"), text);
+	for (size_t i = 0; render_integrator_at(i); i++) {
+		const struct render_integrator *r = render_integrator_at(i);
+		struct plan p = {.kind = r->kind,
+				 .width = 16,
+				 .height = 16,
+				 .crop_width = 16,
+				 .crop_height = 16,
+				 .groups = 2,
+				 .parts = 1,
+				 .chains = r->kind == PLAN_CHAINS ? 4 : 0,
+				 .bootstrap = 64,
+				 .epoch = 16,
+				 .rounds = 1,
+				 .min_depth = 1,
+				 .max_depth = 50};
+		struct render_summary summary;
+		struct error e = {""};
+		snprintf(p.integrator, sizeof p.integrator, "%s", r->name);
+		world_summary(w, &summary);
+		if (r->has_mutations && render_mutations(NULL, &summary, p.mutations, &e))
+			fail_msg("%s", e.text);
+		for (int boot = 0; boot < 2; boot++) {
+			const uint64_t seeds[] = {UINT64_MAX, UINT64_MAX};
+			struct lease_key k = {1, boot ? LEASE_BOOTSTRAP : LEASE_RENDER, 1, 0, 0};
+			struct lease_input in = {2, seeds, NULL};
+			enum lease_end end;
+			struct batch b;
+			if (render_lease(w, &p, &k, boot || r->kind == PLAN_SAMPLES ? NULL : &in, NULL, &end, &b, &e))
+				fail_msg("%s", e.text);
+			assert_int_equal(end, LEASE_DONE);
+			assert_true(b.independent_sum == 0 && b.tile_count == 0);
+			if (batch_check(&b, &p, &e))
+				fail_msg("%s", e.text);
+			batch_fini(&b);
+		}
+	}
+	world_free(w);
+}
+
+static void test_black(void **state)
+{
+	(void)state;
+	black(FLOOR);
+	black("");
+	black(FLOOR "<shape type='sphere'><emitter type='area'><float name='radiance' value='0'/></emitter></shape>");
+	black("<emitter type='constant'><float name='radiance' value='0'/></emitter>");
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_furnace), cmocka_unit_test(test_invisible), cmocka_unit_test(test_lit_floor),
+		cmocka_unit_test(test_plates),	cmocka_unit_test(test_hard),	  cmocka_unit_test(test_black),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,183 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Paths through glass that disperses: bidirectional against plain path tracing, smooth and rough; and glass whose index
+ * hardly varies, where paths carry one wavelength, against the plain glass, where they carry four. Levels and power:
+ * agree.h.
+ */
+#include "tests/support/agree.h"
+#include "tests/support/stats.h"
+#include "tests/support/worlds.h"
+#include "worker/render/render.h"
+#include "worker/render/path/connect.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* A ball on a floor under a sky: little noise but that of drawing one wavelength. */
+static struct world *sky_over(const char *bsdf)
+{
+	return world_of_text(
+		32, 32,
+		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>" SENSOR(
+			"0,1,5",
+			"0,-0.2,0") "<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='-90'/>"
+				    "<translate y='-1'/></transform><bsdf type='diffuse'><rgb name='reflectance' value='0.4,0.6,0.7'/></bsdf></shape>"
+				    "<emitter type='constant'><rgb name='radiance' value='1,0.9,0.8'/></emitter>"
+				    "<shape type='sphere'><point name='center' value='0,-0.2,0'/><float name='radius' value='0.8'/>%s</shape>",
+		bsdf);
+}
+
+#define SMOOTH(inner) "<bsdf type='dielectric'>" inner "</bsdf>"
+#define ROUGH(inner) "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/>" inner "</bsdf>"
+#define STRONG "<float name='int_ior' value='1.6'/><float name='int_cauchy_b' value='0.06'/>"
+#define PLAIN "<float name='int_ior' value='1.5'/>"
+#define HARDLY PLAIN "<float name='int_cauchy_b' value='1e-9'/>"
+#define NOTHING PLAIN "<float name='int_cauchy_b' value='0'/>"
+
+static void render(struct world *w, const char *test, const char *side, const char *integrator, uint64_t spp,
+		   struct agree_image *out)
+{
+	struct agree_side how = {integrator, spp, 32, 0, 0};
+	agree_render(w, test, side, &how, out);
+}
+
+static const struct effect_line *effect(const struct world *w, const char *name)
+{
+	for (size_t i = 0; i < w->effects.line_count; i++)
+		if (strcmp(w->effects.lines[i].name, name) == 0)
+			return &w->effects.lines[i];
+	fail_msg("no line %s", name);
+	return NULL;
+}
+
+static void check_both_ways(const char *name, const char *bsdf, uint64_t spp)
+{
+	static struct agree_image path, bdpt;
+	struct world *w = sky_over(bsdf);
+	assert_true(w->effects.dispersion && w->effects.colour && effect(w, "dispersion")->on);
+	assert_non_null(strstr(effect(w, "dispersion")->why, "varies with wavelength"));
+	render(w, name, "path", "path", spp, &path);
+	render(w, name, "bdpt", "bdpt", spp, &bdpt);
+	agree_check(name, &bdpt, &path);
+	world_free(w);
+}
+
+static void test_smooth_glass(void **state)
+{
+	(void)state;
+	check_both_ways("smooth glass that disperses", SMOOTH(STRONG), 2560);
+}
+
+static void test_rough_glass(void **state)
+{
+	(void)state;
+	check_both_ways("rough glass that disperses", ROUGH(STRONG), 2560);
+}
+
+static void check_one_against_four(const char *name, const char *hardly, const char *plain, uint64_t spp)
+{
+	static struct agree_image one, four;
+	struct world *w = sky_over(hardly);
+	assert_true(w->effects.dispersion);
+	render(w, name, "one", "path", spp, &one);
+	world_free(w);
+	w = sky_over(plain);
+	assert_true(!w->effects.dispersion && !effect(w, "dispersion")->on);
+	render(w, name, "four", "path", spp, &four);
+	world_free(w);
+	agree_check(name, &one, &four);
+}
+
+static void test_one_wavelength_stands_for_four(void **state)
+{
+	(void)state;
+	check_one_against_four("one wavelength, smooth", SMOOTH(HARDLY), SMOOTH(PLAIN), 2560);
+	check_one_against_four("one wavelength, rough", ROUGH(HARDLY), ROUGH(PLAIN), 2560);
+}
+
+static void test_no_coefficient_is_the_plain_scene(void **state)
+{
+	(void)state;
+	static struct agree_image zero, plain;
+	struct world *w = sky_over(ROUGH(NOTHING));
+	render(w, "nothing", "path", "path", 32, &zero);
+	world_free(w);
+	w = sky_over(ROUGH(PLAIN));
+	render(w, "nothing", "path", "path", 32, &plain);
+	world_free(w);
+	assert_memory_equal(zero.mean, plain.mean, sizeof plain.mean);
+}
+
+/* Of the path that path_connect puts together: whether it scatters where wavelengths part. */
+static bool meets_glass(const struct path_context *c, unsigned s, unsigned t)
+{
+	for (unsigned i = 1; i < s; i++)
+		if (c->light[i].bsdf->dispersive)
+			return true;
+	for (unsigned i = 1; i < t; i++)
+		if (c->camera[i].bsdf && c->camera[i].bsdf->dispersive && !(s == 0 && i + 1 == t))
+			return true;
+	return false;
+}
+
+/* Every technique leaves one lane of such a path, and four of all others. */
+static void test_every_technique_collapses(void **state)
+{
+	(void)state;
+	enum { DEPTH = 6 };
+	static struct path_context c;
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	size_t one[DEPTH + 1] = {0}, four[DEPTH + 1] = {0};
+	struct world *w = sky_over(ROUGH(STRONG));
+	c = (struct path_context){
+		.w = w, .window = {0, 0, 32, 32}, .min_depth = 1, .max_depth = DEPTH, .counters = counters};
+	for (uint64_t i = 0; i < 20000; i++) {
+		struct sampler_random random;
+		double film[2];
+		sampler_random_init(&random, stats_seed(__func__), RNG_TEST, i, 0);
+		unsigned camera = path_walk_camera(&c, &random.base, DEPTH + 1, film);
+		unsigned light = path_walk_light(&c, &random.base, DEPTH);
+		for (unsigned t = 1; t <= camera; t++)
+			for (unsigned s = t == 1 ? 2 : 0; s <= light && s + t - 1 <= DEPTH; s++) {
+				spectrum l = s + t < 2 ? spectrum_of(0) : path_connect(&c, s, t, PATH_MAX_EDGES, film);
+				if (!(l.v[0] > 0))
+					continue;
+				bool alone = l.v[1] == 0 && l.v[2] == 0 && l.v[3] == 0;
+				if (alone != meets_glass(&c, s, t))
+					fail_msg("s = %u, t = %u: %g %g %g %g", s, t, l.v[0], l.v[1], l.v[2], l.v[3]);
+				(alone ? one : four)[s]++;
+			}
+	}
+	for (unsigned s = 0; s <= 3; s++) {
+		print_message("s = %u: %zu paths with one wavelength, %zu with four\n", s, one[s], four[s]);
+		/* Behind the first vertex of light there is only the ball. */
+		assert_true(one[s] > 50 && (s == 3) == (four[s] == 0));
+	}
+	world_free(w);
+}
+
+static void test_collapse(void **state)
+{
+	(void)state;
+	const spectrum l = {{1, 2, 3, 4}};
+	spectrum one = path_collapse(l, true), four = path_collapse(l, false);
+	assert_true(one.v[0] == 4 && one.v[1] == 0 && one.v[2] == 0 && one.v[3] == 0);
+	assert_memory_equal(&four, &l, sizeof l);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_smooth_glass),
+		cmocka_unit_test(test_rough_glass),
+		cmocka_unit_test(test_one_wavelength_stands_for_four),
+		cmocka_unit_test(test_no_coefficient_is_the_plain_scene),
+		cmocka_unit_test(test_every_technique_collapses),
+		cmocka_unit_test(test_collapse),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,190 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Whole paths against the sub-paths that they are made of: contribution and densities, multiplied out one way by the
+ * connections of bdpt and the other way vertex by vertex, and every cached quantity.
+ */
+#include "tests/support/worlds.h"
+#include "worker/render/path/full_path.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+
+#include <cmocka.h>
+
+#define AT(inner) "<transform name='to_world'>" inner "</transform>"
+/* clang-format off */
+#define ROOM                                                                                                                    \
+	SENSOR("0,0.2,1.9", "0,-0.3,-1")                                                                                        \
+	"<shape type='cube'>" AT("<scale value='2'/>") "<bsdf type='diffuse'><rgb name='reflectance' value='0.5,0.45,0.35'/>"     \
+	"</bsdf></shape>"
+#define LAMP                                                                                                                    \
+	"<shape type='rectangle'>" AT("<scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/>")                       \
+	"<emitter type='area'><rgb name='radiance' value='3,2.5,2'/></emitter></shape>"
+/* clang-format on */
+#define BALL(bsdf)                                                                                               \
+	"<shape type='sphere'><point name='center' value='0,-0.6,-0.3'/><float name='radius' value='0.8'/>" bsdf \
+	"</shape>"
+
+enum { EDGES = 8 };
+
+static double intensity_of(struct path_context *c, spectrum l)
+{
+	struct path_sample s = {.count = 0, .intensity = 0};
+	path_splat(c, &s, 0, 0, l);
+	return s.intensity;
+}
+
+/* The balance heuristic over all techniques makes of f / p_s the value f / sum p. */
+static double f_over_p(struct path_context *c, struct full_path_path *x)
+{
+	double log_pdf[FULL_PATH_MAX_VERTICES], log_f = full_path_log_f(c, x), sum = 0;
+	full_path_log_techniques(c, x, log_pdf);
+	for (unsigned s = 0; s <= x->edges; s++)
+		sum += exp(log_pdf[s] - log_f);
+	return 1 / sum;
+}
+
+struct tally {
+	unsigned long compared, disagree, black;
+	double worst;
+};
+
+static void compare(struct path_context *c, unsigned s, unsigned edges, struct tally *t)
+{
+	static struct full_path_path x;
+	double film[2];
+	double want = intensity_of(c, path_connect(c, s, edges + 1 - s, PATH_MAX_EDGES, film));
+	bool there = full_path_from_subpaths(c, s, edges, &x);
+	if (!there || want == 0) {
+		/* A film point that is drawn on the border may be computed on its other side. */
+		t->black++;
+		t->disagree += there != (want > 0);
+		return;
+	}
+	char text[200];
+	if (!path_check(c, &x, text, sizeof text))
+		fail_msg("technique %u of %u edges: %s", s, edges, text);
+	double got = f_over_p(c, &x), off = fabs(got - want) / want;
+	t->compared++;
+	if (off > t->worst)
+		t->worst = off;
+}
+
+static void check(const char *name, struct world *w, unsigned long samples)
+{
+	static struct path_context c;
+	uint64_t counters[BATCH_COUNTERS] = {0};
+	c = (struct path_context){
+		.w = w, .window = {0, 0, 32, 32}, .min_depth = 1, .max_depth = EDGES, .counters = counters};
+	struct tally t = {0};
+	for (unsigned long i = 0; i < samples; i++) {
+		struct sampler_random s;
+		double film[2];
+		sampler_random_init(&s, 0x77686f6c65, RNG_TEST, i, 0);
+		unsigned camera = path_walk_camera(&c, &s.base, EDGES + 1, film),
+			 light = path_walk_light(&c, &s.base, EDGES);
+		for (unsigned edges = 1; edges <= EDGES; edges++)
+			for (unsigned k = 0; k <= edges; k++) {
+				unsigned tail = edges + 1 - k;
+				if (tail > camera || (k > 1 && k > light) || (k == 1 && (edges < 2 || tail < 2)))
+					continue;
+				compare(&c, k, edges, &t);
+			}
+	}
+	printf("%s: %lu paths, largest difference %.3g, %lu black, %lu in doubt\n", name, t.compared, t.worst, t.black,
+	       t.disagree);
+	assert_true(t.compared > samples);
+	assert_true(t.worst < 1e-7);
+	assert_true(t.disagree * 10000 <= t.compared);
+	world_free(w);
+}
+
+static void test_surfaces(void **state)
+{
+	(void)state;
+	check("rough glass",
+	      world_of_text(32, 32,
+			    ROOM LAMP BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.2'/></bsdf>")),
+	      1500);
+	check("glass", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='dielectric'/>")), 3000);
+	check("gold",
+	      world_of_text(32, 32,
+			    ROOM LAMP BALL("<bsdf type='roughconductor'><float name='alpha' value='0.1'/></bsdf>")),
+	      1500);
+	check("mirror", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='conductor'/>")), 1500);
+	check("phong", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
+}
+
+static void test_environment(void **state)
+{
+	(void)state;
+	check("environment",
+	      world_of_text(
+		      32, 32,
+		      SENSOR("0,1,5", "0,0,0") "<shape type='rectangle'>" AT("<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1'/>") "</shape>" BALL(
+			      "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
+	      3000);
+}
+
+/* A lens, and lights that no path hits beside one environment. */
+static void test_ends(void **state)
+{
+	(void)state;
+	static const char lens[] =
+		"<sensor type='thinlens'><float name='fov' value='40'/><float name='aperture_radius' value='.4'/>"
+		"<float name='focus_distance' value='3'/>" AT(
+			"<lookat origin='0,1,5' target='0,0,0' up='0,1,0'/>") "</sensor>";
+	static const char lights[] =
+		"<emitter type='point'><point name='position' x='1.5' y='2' z='1'/><float name='intensity' value='3'/></emitter>"
+		"<emitter type='spot'><float name='cutoff_angle' value='40'/>" AT(
+			"<lookat origin='-1,3,1' target='0,0,0' up='1,0,0'/>") "</emitter>"
+									       "<emitter type='directional'><vector name='direction' x='.3' y='-1' z='-.2'/></emitter>";
+	static const char floor[] = "<shape type='rectangle'>" AT(
+		"<scale value='3'/><rotate x='1' angle='-90'/><translate y='-1'/>") "</shape>"
+										    "<shape type='rectangle'>" AT(
+											    "<scale value='3'/><translate z='-2'/>") "</shape>";
+	check("lens and lamps, rough",
+	      world_of_text(
+		      32, 32, "%s%s%s%s", lens, lights, floor,
+		      BALL("<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><float name='radiance' value='.2'/></emitter>"),
+	      3000);
+	check("lens and lamps, glass",
+	      world_of_text(32, 32, "%s%s%s%s", lens, lights, floor, BALL("<bsdf type='dielectric'/>")), 6000);
+}
+
+/* Both directions lie on the same side of the shading and of the geometric normal, each, or nothing scatters: the eight
+ * cases of a normal that is bent by 60 degrees. */
+static void test_sides(void **state)
+{
+	(void)state;
+	static struct full_path_path x;
+	const double bend = M_PI / 3;
+	x.edges = 2;
+	x.v[1].x.sh = frame_around((vec3){0, 0, 1});
+	x.v[1].x.ng = (vec3){sin(bend), 0, cos(bend)};
+	for (int i = 0; i < 36; i++)
+		for (int o = 0; o < 36; o++) {
+			double a = (i + 0.5) * M_PI / 18, b = (o + 0.5) * M_PI / 18;
+			vec3 wi = {sin(a), 0, cos(a)}, wo = {sin(b), 0, cos(b)};
+			bool up_i = cos(a) > 0, up_o = cos(b) > 0;
+			bool agree = up_i == (cos(a - bend) > 0) && up_o == (cos(b - bend) > 0);
+			x.edge[0].w = vec3_neg(wi);
+			x.edge[1].w = wo;
+			assert_int_equal(full_path_mode(&x, 1), !agree	       ? 0
+								: up_i == up_o ? BSDF_REFLECT
+									       : BSDF_TRANSMIT);
+		}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_surfaces),
+		cmocka_unit_test(test_environment),
+		cmocka_unit_test(test_ends),
+		cmocka_unit_test(test_sides),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Every integrator of the registry against the path tracer, on small scenes that each exercise something of their own:
+ * diffuse light and textures, glossy metal, smooth glass, rough glass, shading normals, light from infinity.
+ */
+#include "worker/render/render.h"
+#include "tests/support/agree.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* Samples a pixel are what the power asks for; 0: the scene says nothing new about chains (single_spp: of single paths,
+ * whose states say less a mutation than those of all techniques) or about bdpt8 (rare_spp). */
+static void check_all(const char *name, struct world *w, uint64_t path_spp, uint64_t bdpt_spp, uint64_t rare_spp,
+		      uint64_t chain_spp, uint64_t single_spp)
+{
+	static struct agree_image reference, other;
+	struct agree_side path = {"path", path_spp, 32, 0, 0};
+	agree_render(w, name, "path", &path, &reference);
+	for (size_t i = 0; render_integrator_at(i); i++) {
+		const struct render_integrator *r = render_integrator_at(i);
+		uint64_t spp = r->kind == PLAN_SAMPLES ? bdpt_spp : r->has_mutations ? single_spp : chain_spp;
+		if (strcmp(r->name, "bdpt8") == 0)
+			spp = rare_spp;
+		if (strcmp(r->name, "path") == 0 || spp == 0)
+			continue;
+		char test[64];
+		snprintf(test, sizeof test, "%s %s", name, r->name);
+		struct agree_side side = {r->name, spp, 32, 0, 0};
+		agree_render(w, test, r->name, &side, &other);
+		agree_check(test, &other, &reference);
+	}
+	world_free(w);
+}
+
+#define DEPTH(k) "<integrator type='path'><integer name='max_depth' value='" k "'/></integrator>"
+#define DIFFUSE(rgb) "<bsdf type='diffuse'><rgb name='reflectance' value='" rgb "'/></bsdf>"
+#define AT(inner) "<transform name='to_world'>" inner "</transform>"
+
+/* A closed room of side 4 around the origin; the camera looks from the front wall to the back. */
+/* clang-format off */
+#define ROOM                                                                                                                    \
+	SENSOR("0,0.2,1.9", "0,-0.3,-1")                                                                                        \
+	"<shape type='cube'>" AT("<scale value='2'/>") DIFFUSE("0.5,0.45,0.35") "</shape>"
+/* clang-format on */
+/* Light from a large square below the ceiling. */
+/* clang-format off */
+#define LAMP                                                                                                                    \
+	"<shape type='rectangle'>" AT("<scale value='1.6'/><rotate x='1' angle='90'/><translate y='1.9'/>")                       \
+	"<emitter type='area'><rgb name='radiance' value='3,2.5,2'/></emitter></shape>"
+/* clang-format on */
+#define BALL(center, radius, bsdf)                                                                                     \
+	"<shape type='sphere'><point name='center' value='" center "'/><float name='radius' value='" radius "'/>" bsdf \
+	"</shape>"
+
+static void test_diffuse(void **state)
+{
+	(void)state;
+	check_all("diffuse",
+		  world_of_text(32, 32,
+				DEPTH("3") ROOM LAMP "<shape type='cube'>" AT(
+					"<scale value='0.5'/><rotate y='1' angle='25'/><translate y='-1.5' z='-0.5'/>")
+					DIFFUSE("0.7,0.2,0.1") "</shape>"),
+		  4096, 4096, 1024, 6656, 0);
+}
+
+static void test_glossy(void **state)
+{
+	(void)state;
+	check_all(
+		"glossy",
+		world_of_text(
+			32, 32,
+			DEPTH("3") ROOM LAMP "<shape type='rectangle'>" AT(
+				"<scale value='1.9'/><rotate x='1' angle='-90'/><translate y='-1.2'/>") "<bsdf type='roughconductor'><string name='material' value='Au'/><float name='alpha' value='0.15'/>"
+													"<string name='distribution' value='ggx'/></bsdf></shape>" BALL(
+														"0.4,-0.5,-0.6",
+														"0.6",
+														"<bsdf type='phong'><float name='exponent' value='30'/></bsdf>")
+														BALL("-0.9,-0.7,-0.4",
+														     "0.4",
+														     "<bsdf type='plastic'/>")
+															BALL("-0.5,0.6,-0.9", "0.4", "<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>") "<shape type='rectangle'>" AT(
+																"<scale value='0.5'/><translate x='0.9' y='0.5' z='-0.3'/>") "<bsdf type='mask'><float name='opacity' value='0.4'/><bsdf type='blendbsdf'><bsdf type='diffuse'/>"
+																							     "<bsdf type='conductor'><string name='material' value='Ag'/></bsdf></bsdf></bsdf></shape>"),
+		6144, 6144, 1536, 0, 0);
+}
+
+static void test_glass(void **state)
+{
+	(void)state;
+	check_all("glass",
+		  world_of_text(32, 32,
+				DEPTH("6") ROOM LAMP BALL("0,-0.6,-0.3", "0.8",
+							  "<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
+							  "<float name='ext_ior' value='1'/></bsdf>")),
+		  8192, 8192, 3072, 0, 0);
+}
+
+static void test_rough_glass(void **state)
+{
+	(void)state;
+	check_all("rough glass",
+		  world_of_text(32, 32,
+				DEPTH("5") ROOM LAMP BALL(
+					"0,-0.6,-0.3", "0.8",
+					"<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/>"
+					"<float name='ext_ior' value='1'/><float name='alpha' value='0.25'/></bsdf>")),
+		  6144, 6144, 0, 9728, 45056);
+}
+
+static void test_environment(void **state)
+{
+	(void)state;
+	check_all(
+		"environment",
+		world_of_text(
+			32, 32,
+			DEPTH("4") SENSOR("0,1,5", "0,0,0") "<shape type='rectangle'>" AT(
+				"<scale value='6'/><rotate x='1' angle='-90'/><translate y='-1'/>")
+				DIFFUSE("0.5,0.5,0.6") "</shape>" BALL(
+					"0,0,0", "1",
+					"<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
+		4096, 4096, 0, 6144, 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_diffuse),	    cmocka_unit_test(test_glossy),	cmocka_unit_test(test_glass),
+		cmocka_unit_test(test_rough_glass), cmocka_unit_test(test_environment),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What leniency puts in the place of what is not supported: every stand-in is a plug-in of its class that there is. */
+#include "worker/render/render.h"
+#include "worker/render/scene/lenient.h"
+#include "worker/render/scene/plugin.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static void test_stand_ins(void **state)
+{
+	(void)state;
+	static const struct {
+		enum plugin_class cls;
+		const char *type;
+		enum lenient_way way;
+		const char *stand_in;
+	} expected[] = {
+		{PLUGIN_BSDF, "hair", LENIENT_INNER, "diffuse"},
+		{PLUGIN_BSDF, "ward", LENIENT_REPLACE, "roughplastic"},
+		{PLUGIN_BSDF, "principledthin", LENIENT_REPLACE, "principled"},
+		{PLUGIN_BSDF, "polarizer", LENIENT_REPLACE, "null"},
+		{PLUGIN_EMITTER, "timed_sunsky", LENIENT_REPLACE, "constant"},
+		{PLUGIN_EMITTER, "directionalarea", LENIENT_REPLACE, "area"},
+		{PLUGIN_EMITTER, "collimated", LENIENT_LEAVE_OUT, NULL},
+		{PLUGIN_RFILTER, "windowed", LENIENT_REPLACE, "gaussian"},
+		{PLUGIN_TEXTURE, "mesh_attribute", LENIENT_LEAVE_OUT, NULL},
+		{PLUGIN_SHAPE, "sdfgrid", LENIENT_LEAVE_OUT, NULL},
+		{PLUGIN_MEDIUM, "homogeneous", LENIENT_LEAVE_OUT, NULL},
+		{PLUGIN_SENSOR, "fisheye", LENIENT_REFUSE, NULL},
+		{PLUGIN_FILM, "specfilm", LENIENT_REFUSE, NULL},
+	};
+	for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) {
+		const char *stand_in;
+		assert_int_equal(lenient_plugin(expected[i].cls, expected[i].type, &stand_in), expected[i].way);
+		if (!expected[i].stand_in) {
+			assert_null(stand_in);
+			continue;
+		}
+		assert_string_equal(stand_in, expected[i].stand_in);
+		const struct plugin_decl *d = plugin_find(render_plugins(), expected[i].cls, stand_in);
+		assert_non_null(d);
+		assert_string_equal(d->type, stand_in);
+		assert_null(plugin_find(render_plugins(), expected[i].cls,
+					expected[i].type)); /* or no stand-in is needed */
+	}
+}
+
+static void test_colours_are_kept(void **state)
+{
+	(void)state;
+	assert_string_equal(lenient_param("diffuse", "base_color"), "reflectance");
+	assert_string_equal(lenient_param("diffuse", "diffuse_reflectance"), "reflectance");
+	assert_string_equal(lenient_param("diffuse", "alpha"), "alpha");
+	assert_string_equal(lenient_param("roughplastic", "diffuse_reflectance"), "diffuse_reflectance");
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_stand_ins),
+		cmocka_unit_test(test_colours_are_kept),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,150 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Spectra in all spellings, search paths, and booleans as Python writes them. */
+#include "tests/support/memory_assets.h"
+#include "tests/support/scene_tables.h"
+#include "worker/render/math/cie.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const char lines[] = "# measured\r\n400 0.5\r\n500\t0.25\n  600 1e-1 \n";
+static struct scene scene;
+
+/* The value of `eta` in a scene with this content; -D and files as below. */
+static const struct value *eta_of(const char *version, const char *content)
+{
+	static char xml[2048];
+	struct error e;
+	snprintf(xml, sizeof xml,
+		 "<scene version='%s'><path value='lib/'/><path value='spectra'/>"
+		 "<bsdf type='roughconductor'>%s</bsdf></scene>",
+		 version, content);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)},
+					    {"a.spd", lines, sizeof lines - 1},
+					    {"spectra/b.spd", lines, sizeof lines - 1},
+					    {0}};
+	struct asset_source assets = memory_assets(files);
+	if (scene_read(&scene, &assets, "s.xml", scene_tables(), NULL, 0, &e))
+		fail_msg("%s", e.text);
+	return &node_find(scene.objects[0], "eta")->value;
+}
+
+static double at(const struct value *v, double nm)
+{
+	assert_int_equal(v->type, VALUE_SPECTRUM);
+	for (uint32_t i = 0; i < v->as.spectrum.count; i++)
+		if (v->as.spectrum.nm[i] == nm)
+			return v->as.spectrum.value[i];
+	fail_msg("there is no value at %g nm", nm);
+	return NAN;
+}
+
+static void test_files(void **state)
+{
+	(void)state;
+	const struct value *v = eta_of("3.0.0", "<spectrum name='eta' filename='a.spd'/>");
+	assert_int_equal(v->as.spectrum.count, 3);
+	assert_true(at(v, 400) == 0.5 && at(v, 500) == 0.25 && at(v, 600) == 0.1);
+	assert_int_equal(scene.asset_count, 1);
+	assert_string_equal(scene.assets[0], "a.spd");
+	scene_fini(&scene);
+	/* Found in the second folder, and known by that name from then on. */
+	v = eta_of("0.6.0", "<spectrum name='eta' filename='b.spd'/>");
+	assert_true(at(v, 500) == 0.25);
+	assert_string_equal(scene.assets[0], "spectra/b.spd");
+	scene_fini(&scene);
+}
+
+static void test_three_numbers(void **state)
+{
+	(void)state;
+	const struct value *v = eta_of("0.6.0", "<spectrum name='eta' value='0.1, 0.2 0.3'/>");
+	assert_true(v->type == VALUE_RGB && v->as.rgb[0] == 0.1 && v->as.rgb[1] == 0.2 && v->as.rgb[2] == 0.3);
+	scene_fini(&scene);
+}
+
+static void test_types(void **state)
+{
+	(void)state;
+	const struct value *v =
+		eta_of("3.0.0", "<spectrum name='eta' type='uniform'><float name='value' value='2.5'/></spectrum>");
+	assert_true(v->as.spectrum.count == 1 && v->as.spectrum.value[0] == 2.5);
+	scene_fini(&scene);
+	v = eta_of("3.0.0",
+		   "<spectrum name='eta' type='regular'><float name='wavelength_min' value='400'/>"
+		   "<float name='wavelength_max' value='600'/><string name='values' value='1, 2, 4'/></spectrum>");
+	assert_true(v->as.spectrum.count == 3 && at(v, 400) == 1 && at(v, 500) == 2 && at(v, 600) == 4);
+	scene_fini(&scene);
+	v = eta_of("3.0.0", "<spectrum name='eta' type='irregular'><string name='wavelengths' value='400 450 600'/>"
+			    "<string name='values' value='1 2 4'/></spectrum>");
+	assert_true(v->as.spectrum.count == 3 && at(v, 450) == 2);
+	scene_fini(&scene);
+	v = eta_of("3.0.0", "<spectrum name='eta' type='srgb'><rgb name='color' value='0.5 0.25 1'/></spectrum>");
+	assert_true(v->type == VALUE_RGB && v->as.rgb[1] == 0.25);
+	scene_fini(&scene);
+	v = eta_of("3.0.0", "<spectrum name='eta' type='d65'><float name='scale' value='3'/></spectrum>");
+	double y = 0, one = 0; /* luminance 3, as an rgb colour of 3 has it */
+	for (int i = 0; i < CIE_COUNT; i++) {
+		y += at(v, CIE_FIRST_NM + i) * cie_observer[i][1];
+		one += cie_observer[i][1];
+	}
+	assert_true(fabs(y / one - 3) < 1e-12);
+	scene_fini(&scene);
+}
+
+/* Against CIE illuminant A, which is Planck's law at 2848 K with c2 = 1.435e-2 m K: with today's c2 at 2855.5 K;
+ * relative to 560 nm its table says 14.708 at 400 nm and 198.261 at 700 nm. And against Stefan and Boltzmann's law in
+ * order of magnitude: 5000 K radiate 1.29e4 W / (m^2 sr nm) at 550 nm. */
+static void test_blackbody(void **state)
+{
+	(void)state;
+	const struct value *v = eta_of("0.6.0", "<blackbody name='eta' temperature='2855.5K'/>");
+	assert_true(fabs(100 * at(v, 400) / at(v, 560) / 14.708 - 1) < 2e-4);
+	assert_true(fabs(100 * at(v, 700) / at(v, 560) / 198.261 - 1) < 2e-4);
+	scene_fini(&scene);
+	v = eta_of("3.0.0",
+		   "<spectrum name='eta' type='blackbody'><float name='temperature' value='5000'/></spectrum>");
+	double full = at(v, 550);
+	assert_true(fabs(full / 1.2703e4 - 1) < 2e-2);
+	scene_fini(&scene);
+	v = eta_of("0.6.0", "<blackbody name='eta' temperature='5000' scale='0.5'/>");
+	assert_true(fabs(at(v, 550) / full - 0.5) < 1e-15);
+	scene_fini(&scene);
+}
+
+static void test_booleans(void **state)
+{
+	(void)state;
+	static const struct {
+		const char *written;
+		bool value;
+	} cases[] = {{"true", true}, {"True", true}, {"false", false}, {"False", false}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		char xml[256];
+		struct error e;
+		snprintf(
+			xml, sizeof xml,
+			"<scene version='3.0.0'><shape type='cube'><boolean name='flip_normals' value='%s'/></shape></scene>",
+			cases[i].written);
+		const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {0}};
+		struct asset_source assets = memory_assets(files);
+		if (scene_read(&scene, &assets, "s.xml", scene_tables(), NULL, 0, &e))
+			fail_msg("%s", e.text);
+		assert_true(node_bool(scene.objects[0], "flip_normals", !cases[i].value) == cases[i].value);
+		scene_fini(&scene);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_files),	  cmocka_unit_test(test_three_numbers), cmocka_unit_test(test_types),
+		cmocka_unit_test(test_blackbody), cmocka_unit_test(test_booleans),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "tests/support/nodes.h"
+#include "tests/support/pictures.h"
+#include "worker/render/texture/texture.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static const struct wavelengths grey = {.grey = true};
+static const struct wavelengths colour = {.nm = {450, 550, 600, 700}};
+
+struct fixture {
+	struct arena arena;
+	struct pictures pictures;
+	struct asset_source source;
+};
+
+/* Picture 0 is 3 x 2, grey: 0 .25 .5 / .75 1 .125. Picture 1 is 2 x 1: red, white. Picture 2 is bright grey. */
+static int setup(void **state)
+{
+	static struct fixture f;
+	const double levels[6] = {0, 0.25, 0.5, 0.75, 1, 0.125}, bright[3] = {4, 4, 4};
+	double rgb[18];
+	for (int i = 0; i < 18; i++)
+		rgb[i] = levels[i / 3];
+	f = (struct fixture){.arena = {0}};
+	pictures_add(&f.pictures, 3, 2, rgb);
+	pictures_add(&f.pictures, 2, 1, (double[]){0.5, 0.125, 0.0625, 0.5, 0.5, 0.5});
+	pictures_add(&f.pictures, 1, 1, bright);
+	f.source = pictures_source(&f.pictures);
+	*state = &f;
+	return 0;
+}
+
+static int teardown(void **state)
+{
+	struct fixture *f = *state;
+	pictures_fini(&f->pictures);
+	arena_fini(&f->arena);
+	return 0;
+}
+
+static int try(struct fixture *f, const char *text, enum color_role role, struct texture *t, struct error *e)
+{
+	struct scene_node *owner = node_make(&f->arena, PLUGIN_BSDF, "owner");
+	node_add_ref(&f->arena, owner, "reflectance", node_make(&f->arena, PLUGIN_TEXTURE, text));
+	return texture_from_node(t, owner, "reflectance", 0.5, role, &f->source, true, &f->arena, e);
+}
+
+static struct texture make(struct fixture *f, const char *text, enum color_role role)
+{
+	struct texture t;
+	struct error e;
+	if (try(f, text, role, &t, &e))
+		fail_msg("%s: %s", text, e.text);
+	return t;
+}
+
+static void assert_value(const struct texture *t, double u, double v, double expected)
+{
+	double x = texture_eval(t, u, v, &grey).v[0];
+	if (fabs(x - expected) > 1e-12)
+		fail_msg("(%g, %g): %.15g is not %g", u, v, x, expected);
+}
+
+static void test_orientation_and_pixel_centres(void **state)
+{
+	struct texture t = make(*state, "bitmap filename=p0", COLOR_REFLECTANCE);
+	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
+	assert_false(texture_is_constant(&t));
+	assert_true(texture_max(&t) == 1);
+	/* The upper left pixel is at small u and small v. */
+	assert_value(&t, 0.5 / 3, 0.25, 0);
+	assert_value(&t, 1.5 / 3, 0.25, 0.25);
+	assert_value(&t, 0.5 / 3, 0.75, 0.75);
+	assert_value(&t, 2.5 / 3, 0.75, 0.125);
+	/* Half-way between neighbours, and across the borders. */
+	assert_value(&t, 1.0 / 3, 0.25, 0.125);
+	assert_value(&t, 0.5 / 3, 0.5, 0.375);
+	assert_value(&t, 0, 0.25, 0.25);
+	assert_value(&t, 0.5 / 3, 0, 0.375);
+	assert_value(&t, 7 + 1.5 / 3, -4.75, 0.25);
+	assert_value(&t, 1e300, 0.25, texture_eval(&t, 0, 0.25, &grey).v[0]);
+}
+
+static void test_wrapping(void **state)
+{
+	struct texture clamp = make(*state, "bitmap filename=p0 wrap_mode=clamp", COLOR_REFLECTANCE);
+	assert_value(&clamp, -3, 0.25, 0);
+	assert_value(&clamp, 9, 9, 0.125);
+	assert_value(&clamp, 0, 0, 0);
+	struct texture mirror = make(*state, "bitmap filename=p0 wrap_mode=mirror", COLOR_REFLECTANCE);
+	assert_value(&mirror, -1.5 / 3, 0.25, 0.25);
+	assert_value(&mirror, 1 + 0.5 / 3, 0.25, 0.5);
+	assert_value(&mirror, 1 + 1.0 / 3, 0.25, 0.375);
+	assert_value(&mirror, 2 + 0.5 / 3, 0.25, 0);
+	struct texture mixed = make(*state, "bitmap filename=p0 wrap_mode_u=clamp", COLOR_REFLECTANCE);
+	assert_value(&mixed, -1, 1.25, 0);
+}
+
+static void test_nearest(void **state)
+{
+	struct texture t = make(*state, "bitmap filename=p0 filter_type=nearest", COLOR_REFLECTANCE);
+	assert_value(&t, 0.01, 0.01, 0);
+	assert_value(&t, 0.34, 0.49, 0.25);
+	assert_value(&t, 0.99, 0.99, 0.125);
+	assert_value(&t, -0x1p-60, 0.25, 0.5);
+}
+
+static void test_uv_maps(void **state)
+{
+	struct fixture *f = *state;
+	struct texture t = make(f, "bitmap filename=p0 uvscale=2 voffset=0.5", COLOR_REFLECTANCE);
+	assert_value(&t, 0.75 / 3, 0.125, 1);
+	t = make(f, "bitmap filename=p0 uscale=3 uoffset=0.5", COLOR_REFLECTANCE);
+	assert_value(&t, 0, 0.25, 0.25);
+	struct scene_node *owner = node_make(&f->arena, PLUGIN_BSDF, "owner");
+	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0");
+	const mat4 quarter = {{{0, 1, 0, 0}, {1, 0, 0, 0.25}, {0, 0, 1, 0}, {0, 0, 0, 1}}};
+	struct error e;
+	node_add_transform(&f->arena, n, "to_uv", quarter);
+	node_add_ref(&f->arena, owner, "reflectance", n);
+	assert_int_equal(
+		texture_from_node(&t, owner, "reflectance", 0, COLOR_REFLECTANCE, &f->source, true, &f->arena, &e), 0);
+	assert_value(&t, 0, 1.5 / 3, 0.25);
+}
+
+static void test_colours(void **state)
+{
+	struct texture t = make(*state, "bitmap filename=p1", COLOR_REFLECTANCE);
+	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
+	const double red[3] = {0.5, 0.125, 0.0625};
+	spectrum s = texture_eval(&t, 0.25, 0.5, &colour), expected = color_eval_rgb_reflectance(red, &colour);
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		assert_true(s.v[i] == expected.v[i]);
+		assert_true(s.v[i] <= texture_max(&t));
+	}
+	assert_true(texture_max(&t) <= 1);
+
+	t = make(*state, "bitmap filename=p2", COLOR_REFLECTANCE);
+	assert_value(&t, 0.5, 0.5, 1);
+	t = make(*state, "bitmap filename=p2", COLOR_ILLUMINANT);
+	assert_int_equal(texture_shape(&t), COLOR_SHAPE_D65);
+	s = texture_eval(&t, 0.5, 0.5, &colour);
+	assert_true(fabs(s.v[1] - 4 * color_d65(550)) < 1e-12);
+	assert_value(&t, 0.5, 0.5, 4);
+	assert_true(texture_max(&t) >= spectrum_max(s));
+}
+
+static void test_checkerboard(void **state)
+{
+	struct texture t = make(*state, "checkerboard", COLOR_REFLECTANCE);
+	assert_value(&t, 0.25, 0.25, 0.4);
+	assert_value(&t, 0.75, 0.25, 0.2);
+	assert_value(&t, 0.25, 0.75, 0.2);
+	assert_value(&t, -0.25, -0.25, 0.4);
+	assert_true(texture_max(&t) == 0.4);
+	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
+	t = make(*state, "checkerboard color0=1 color1=0 uscale=4", COLOR_REFLECTANCE);
+	assert_value(&t, 0.25 / 4, 0.25, 1);
+	assert_value(&t, 0.75 / 4, 0.25, 0);
+	t = make(*state, "checkerboard color0=rgb(1,0.5,0.2)", COLOR_REFLECTANCE);
+	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
+}
+
+static void test_plain_values_and_fallback(void **state)
+{
+	struct fixture *f = *state;
+	struct scene_node *n = node_make(&f->arena, PLUGIN_BSDF, "owner reflectance=0.25");
+	struct texture t;
+	struct error e;
+	assert_int_equal(texture_from_node(&t, n, "reflectance", 0.5, COLOR_REFLECTANCE, NULL, true, &f->arena, &e), 0);
+	assert_true(texture_is_constant(&t) && texture_max(&t) == 0.25);
+	assert_int_equal(texture_from_node(&t, n, "absent", 0.5, COLOR_REFLECTANCE, NULL, true, &f->arena, &e), 0);
+	assert_value(&t, 0, 0, 0.5);
+	assert_int_equal(texture_from_node(&t, n, "absent", 2, COLOR_ILLUMINANT, NULL, true, &f->arena, &e), 0);
+	assert_int_equal(texture_shape(&t), COLOR_SHAPE_D65);
+}
+
+static void test_refusals_say_why(void **state)
+{
+	static const struct {
+		const char *text, *word;
+	} bad[] = {{"wood", "wood"},
+		   {"bitmap", "filename"},
+		   {"bitmap filename=nowhere", "nowhere"},
+		   {"bitmap filename=p0 gamma=2.2", "gamma"},
+		   {"checkerboard color0=3", "color0"}};
+	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
+		struct texture t;
+		struct error e = {{0}};
+		if (try(*state, bad[i].text, COLOR_REFLECTANCE, &t, &e) >= 0 || !strstr(e.text, bad[i].word))
+			fail_msg("%s: \"%s\" does not say \"%s\"", bad[i].text, e.text, bad[i].word);
+	}
+	struct texture t;
+	struct error e;
+	assert_true(try(*state, "bitmap filename=p0", COLOR_UNBOUNDED, &t, &e) < 0);
+}
+
+/* Derivatives against differences: exact up to rounding where the texture is a polynomial, which it is between pixel
+ * centres. */
+static void assert_jet(const struct texture *t, double u, double v, double h)
+{
+	struct texture_jet j, n[4];
+	texture_jet(t, u, v, &j);
+	for (int k = 0; k < 4; k++)
+		texture_jet(t, u + (k == 0 ? h : k == 1 ? -h : 0), v + (k == 2 ? h : k == 3 ? -h : 0), &n[k]);
+	for (int c = 0; c < 3; c++) {
+		const double given[5] = {j.du[c], j.dv[c], j.duu[c], j.duv[c], j.dvv[c]};
+		const double found[5] = {(n[0].x[c] - n[1].x[c]) / (2 * h), (n[2].x[c] - n[3].x[c]) / (2 * h),
+					 (n[0].du[c] - n[1].du[c]) / (2 * h), (n[0].dv[c] - n[1].dv[c]) / (2 * h),
+					 (n[2].dv[c] - n[3].dv[c]) / (2 * h)};
+		for (int k = 0; k < 5; k++)
+			if (fabs(given[k] - found[k]) > 1e-9 / h * 1e-4)
+				fail_msg("(%g, %g) derivative %d: %g is not %g", u, v, k, given[k], found[k]);
+	}
+}
+
+static void test_derivatives(void **state)
+{
+	struct fixture *f = *state;
+	const char *const texts[] = {"bitmap filename=p0 raw=true",
+				     "bitmap filename=p0 raw=true uscale=2 vscale=-3 uoffset=0.1",
+				     "bitmap filename=p0 raw=true wrap_mode=mirror",
+				     "bitmap filename=p0 raw=true wrap_mode=clamp",
+				     "bitmap filename=p1 raw=true filter_type=nearest",
+				     "checkerboard color0=1 color1=-3"};
+	for (size_t k = 0; k < sizeof texts / sizeof *texts; k++) {
+		struct texture t = make(f, texts[k], COLOR_RELIEF);
+		/* Nowhere near a line between pixel centres or squares. */
+		for (int i = 0; i < 60; i++)
+			assert_jet(&t, -2.03 + 0.0711 * i, 1.07 + 0.0577 * i, 1e-7);
+	}
+	struct texture t = make(f, "bitmap filename=p0 raw=true wrap_mode=mirror", COLOR_RELIEF);
+	struct texture_jet j;
+	texture_jet(&t, 1.0 / 3, 0.25, &j);
+	assert_true(fabs(j.x[0] - 0.125) < 1e-12 && fabs(j.du[0] - 0.75) < 1e-12 && fabs(j.dv[0] - 1.5) < 1e-12);
+	texture_jet(&t, 2 - 1.0 / 3, 0.25, &j);
+	assert_true(fabs(j.x[0] - 0.125) < 1e-12 && fabs(j.du[0] + 0.75) < 1e-12);
+}
+
+/* A map over a surface made darker, or brighter up to white, and one of heights of either sign. */
+static void test_scale(void **state)
+{
+	struct fixture *f = *state;
+	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=2");
+	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
+	struct texture t;
+	struct error e = {""};
+	assert_int_equal(texture_create(&t, n, COLOR_REFLECTANCE, &f->source, true, &f->arena, &e), 0);
+	assert_value(&t, 1.5 / 3, 0.25, 0.5);
+	assert_value(&t, 0.5 / 3, 0.75, 1);
+	assert_true(texture_max(&t) == 1 && texture_shape(&t) == COLOR_SHAPE_CONSTANT);
+	n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=-2");
+	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
+	assert_true(texture_create(&t, n, COLOR_ILLUMINANT, &f->source, true, &f->arena, &e) < 0 &&
+		    strstr(e.text, "negative colours"));
+	assert_int_equal(texture_create(&t, n, COLOR_HEIGHT, &f->source, true, &f->arena, &e), 0);
+	assert_true(fabs(texture_height(&t, 1.5 / 3, 0.25) + 0.5) < 1e-12);
+	struct texture_jet j;
+	assert_int_equal(texture_create(&t, n, COLOR_RELIEF, &f->source, true, &f->arena, &e), 0);
+	texture_jet(&t, 1.0 / 3, 0.25, &j);
+	assert_true(fabs(j.du[0] + 1.5) < 1e-12 && fabs(j.x[0] + 0.25) < 1e-12);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_orientation_and_pixel_centres),
+		cmocka_unit_test(test_wrapping),
+		cmocka_unit_test(test_nearest),
+		cmocka_unit_test(test_uv_maps),
+		cmocka_unit_test(test_derivatives),
+		cmocka_unit_test(test_scale),
+		cmocka_unit_test(test_colours),
+		cmocka_unit_test(test_checkerboard),
+		cmocka_unit_test(test_plain_values_and_fallback),
+		cmocka_unit_test(test_refusals_say_why),
+	};
+	return cmocka_run_group_tests(tests, setup, teardown);
+}

@@ -1,0 +1,267 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Displacement in scenes: what the reader takes and refuses, heights as bitmaps have them, the effect that is reported,
+ * the same image at height zero, and that the integrators agree on displaced matter and displaced light.
+ */
+#include "worker/render/render.h"
+#include "tests/support/agree.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/sample_images.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define LEVEL(l) "<integer name='displacement_level' value='" l "'/>"
+#define SCALE(s) "<float name='displacement_scale' value='" s "'/>"
+#define CHECKERS \
+	"<texture name='displacement' type='checkerboard'><float name='color0' value='0.25'/><float name='color1' value='-1'/></texture>"
+#define BITMAP(inner) \
+	"<texture name='displacement' type='bitmap'><string name='filename' value='h.png'/>" inner "</texture>"
+#define RECTANGLE(inner) SENSOR("0,0,5", "0,0,0") "<shape type='rectangle'>" inner "</shape>"
+
+static const struct effect_line *effect(const struct world *w)
+{
+	for (size_t i = 0; i < w->effects.line_count; i++)
+		if (strcmp(w->effects.lines[i].name, "displacement") == 0)
+			return &w->effects.lines[i];
+	fail_msg("no line about displacement");
+	return NULL;
+}
+
+static void test_effect(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(8, 8, RECTANGLE("") "%s", "");
+	assert_false(effect(w)->on);
+	assert_string_equal(effect(w)->why, "no shape is displaced");
+	world_free(w);
+	w = world_of_text(8, 8,
+			  RECTANGLE(CHECKERS SCALE("0.1") LEVEL("6")) "<shape type='sphere'>" CHECKERS SCALE("0.1")
+				  LEVEL("3") "</shape>%s",
+			  "");
+	assert_true(effect(w)->on && w->effects.displacement);
+	assert_string_equal(effect(w)->why, "the rectangle in line 1 and 1 more are displaced: 8704 triangles");
+	assert_false(w->shapes[1].is_sphere);
+	world_free(w);
+}
+
+/* In units of the scene. */
+static vec3 vertex(const struct world *w, uint32_t shape, uint32_t i)
+{
+	const float *p = w->shapes[shape].position[i];
+	return vec3_madd(w->center, 1 / w->scale, (vec3){(double)p[0], (double)p[1], (double)p[2]});
+}
+
+static struct world *world_with_picture(const char *inner)
+{
+	char xml[2048];
+	size_t size;
+	unsigned char *png = sample_png(16, 16, SAMPLE_GREY, 8, 0, &size);
+	snprintf(xml, sizeof xml, "<scene version='3.0.0'>" RECTANGLE("%s") "</scene>", inner);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"h.png", png, size}, {NULL, NULL, 0}};
+	struct world *w = world_of_files(8, 8, files);
+	free(png);
+	return w;
+}
+
+/* At pixel centres the stored value over 255 itself, unless the scene says that it is sRGB. */
+static void test_heights_of_a_bitmap(void **state)
+{
+	(void)state;
+	struct world *w = world_with_picture(BITMAP("") SCALE("2") LEVEL("5"));
+	struct world *decoded = world_with_picture(BITMAP("<boolean name='raw' value='false'/>") SCALE("2") LEVEL("5"));
+	uint32_t centres = 0;
+	for (uint32_t i = 0; i < w->shapes[0].vertex_count; i++) {
+		vec3 p = vertex(w, 0, i);
+		double x = 16 * (double)w->shapes[0].uv[i][0], y = 16 * (double)w->shapes[0].uv[i][1];
+		if (x - floor(x) != 0.5 || y - floor(y) != 0.5)
+			continue;
+		centres++;
+		double stored = sample_value((size_t)x, (size_t)y, 0) / 255.0;
+		double linear = stored <= 0.04045 ? stored / 12.92 : pow((stored + 0.055) / 1.055, 2.4);
+		assert_true(fabs(p.z - 2 * stored) < 1e-6);
+		assert_true(fabs(vertex(decoded, 0, i).z - 2 * linear) < 1e-6);
+	}
+	assert_int_equal(centres, 256);
+	world_free(w);
+	world_free(decoded);
+}
+
+static void test_numbers_and_checkers(void **state)
+{
+	(void)state;
+	struct world *w = world_of_text(
+		8, 8, RECTANGLE("<float name='displacement' value='-0.5'/>" SCALE("3") LEVEL("0")) "%s", "");
+	for (uint32_t i = 0; i < 4; i++)
+		assert_true(vertex(w, 0, i).z == -1.5);
+	world_free(w);
+	w = world_of_text(8, 8, RECTANGLE(CHECKERS LEVEL("2")) "%s", "");
+	bool low = false, high = false;
+	for (uint32_t i = 0; i < w->shapes[0].vertex_count; i++) {
+		low |= vertex(w, 0, i).z == -1;
+		high |= vertex(w, 0, i).z == 0.25;
+	}
+	assert_true(low && high);
+	world_free(w);
+}
+
+static void refuses(const char *inner, const char *text)
+{
+	char xml[2048];
+	snprintf(xml, sizeof xml, "<scene version='3.0.0'>" RECTANGLE("%s") "</scene>", inner);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {NULL, NULL, 0}};
+	struct asset_source assets = memory_assets(files);
+	struct scene s;
+	struct render_summary summary;
+	struct error e = {""};
+	int rc = scene_read(&s, &assets, "s.xml", render_plugins(), NULL, 0, &e);
+	if (!rc) {
+		rc = render_check(&s, &assets, NULL, &summary, &e);
+		scene_fini(&s);
+	}
+	if (rc >= 0 || !strstr(e.text, text))
+		fail_msg("%s\n gave %d: %s\n not: %s", inner, rc, e.text, text);
+}
+
+static void test_refused(void **state)
+{
+	(void)state;
+	refuses(CHECKERS LEVEL("-1"), "displacement_level=-1 is outside [0, 13]");
+	refuses(CHECKERS LEVEL("14"), "displacement_level=14 is outside [0, 13]");
+	refuses(CHECKERS LEVEL("99999999999999999999"), "is not a whole number");
+	refuses(CHECKERS LEVEL("2.5"), "is not a whole number");
+	refuses(CHECKERS, "displacement needs displacement_level, 0 to 13");
+	refuses(CHECKERS SCALE("nan") LEVEL("1"), "`nan` is not");
+	refuses(CHECKERS SCALE("inf") LEVEL("1"), "`inf` is not");
+	refuses(CHECKERS SCALE("1e61") LEVEL("1"), "displacement_scale=1e+61 is outside");
+	refuses(SCALE("1"), "displacement_scale without a texture named displacement");
+	refuses(LEVEL("1"), "displacement_level without a texture named displacement");
+	refuses(BITMAP("") LEVEL("1"), "h.png: no such file");
+	refuses("<bsdf name='displacement' type='diffuse'/>" LEVEL("1"),
+		"`displacement` may be a texture, but not a bsdf");
+	refuses("<rgb name='displacement' value='1,1,1'/>" LEVEL("1"), "`displacement` cannot be given like this");
+	refuses("<texture name='displacement' type='checkerboard'><rgb name='color0' value='1,0,0'/></texture>" LEVEL(
+			"1"),
+		"color0: a height is a number, not a colour");
+}
+
+enum { SIDE = 32 };
+
+static float *image_of(struct world *w)
+{
+	struct plan p = {.kind = PLAN_SAMPLES,
+			 .integrator = "path",
+			 .width = SIDE,
+			 .height = SIDE,
+			 .crop_width = SIDE,
+			 .crop_height = SIDE,
+			 .groups = 1,
+			 .parts = 1,
+			 .bootstrap = 1,
+			 .epoch = 16,
+			 .rounds = 1,
+			 .min_depth = 1,
+			 .max_depth = 4};
+	float *image = calloc((size_t)SIDE * SIDE, 3 * sizeof *image);
+	struct lease_key k = {1, LEASE_RENDER, 0, 0, 0};
+	struct batch b;
+	struct error e = {""};
+	enum lease_end end;
+	if (render_lease(w, &p, &k, NULL, NULL, &end, &b, &e))
+		fail_msg("%s", e.text);
+	assert_int_equal(b.tile_count, 1);
+	memcpy(image, b.tiles[0].xyz, (size_t)SIDE * SIDE * 3 * sizeof *image);
+	batch_fini(&b);
+	world_free(w);
+	return image;
+}
+
+#define GLOSSY "<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf>"
+#define GROUND "<transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/></transform>"
+/* clang-format off */
+#define LAMP                                                                                                                    \
+	"<shape type='sphere'><point name='center' x='1' y='4' z='1'/><float name='radius' value='0.7'/>"                       \
+	"<emitter type='area'><float name='radiance' value='9'/></emitter></shape>"
+/* clang-format on */
+
+static struct world *flat_world(const char *displacement)
+{
+	return world_of_text(
+		SIDE, SIDE,
+		SENSOR("0,3,6", "0,0.5,0") LAMP
+		"<shape type='rectangle'>" GROUND "%s</shape><shape type='cube'>"
+		"<transform name='to_world'><rotate y='1' angle='30'/><translate y='1'/></transform>" GLOSSY
+		"%s</shape>",
+		displacement, displacement);
+}
+
+/* Floats round differently on finer triangles: a path near an edge may change as a whole, the others by rounding. */
+static void test_height_zero_is_the_same_image(void **state)
+{
+	(void)state;
+	float *plain = image_of(flat_world("")), *zero = image_of(flat_world(CHECKERS SCALE("0") LEVEL("4")));
+	size_t differ = 0;
+	double a = 0, b = 0;
+	for (size_t i = 0; i < (size_t)SIDE * SIDE * 3; i++) {
+		double x = (double)plain[i], y = (double)zero[i];
+		a += x;
+		b += y;
+		differ += !(fabs(x - y) <= 1e-4 * (x + y));
+	}
+	print_message("%zu of %d values differ, the mean by %.1e\n", differ, SIDE * SIDE * 3, b / a - 1);
+	assert_true(a > 0);
+	assert_true(differ < SIDE * SIDE * 3 / 20);
+	assert_true(fabs(b / a - 1) < 1e-3);
+	free(plain);
+	free(zero);
+}
+
+/* A rough ground, a glossy displaced ball, and a displaced lamp whose light has a texture; a sky
+ * against noise. */
+static void test_integrators_agree(void **state)
+{
+	(void)state;
+	char xml[4096];
+	size_t size;
+	unsigned char *png = sample_png(8, 8, SAMPLE_GREY, 8, 0, &size);
+	snprintf(
+		xml, sizeof xml,
+		"<scene version='3.0.0'><integrator type='path'><integer name='max_depth' value='3'/></integrator>" SENSOR(
+			"0,4.5,3", "0,0.5,0") "<shape type='rectangle'>" GROUND BITMAP("") SCALE("0.2")
+			LEVEL("4") "</shape>"
+				   "<shape type='sphere'><point name='center' x='0' y='1.2' z='0'/>" BITMAP("")
+					   SCALE("0.1") LEVEL("4") GLOSSY
+		"</shape>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='90'/><translate y='5'/></transform>" BITMAP(
+			"") SCALE("0.2")
+			LEVEL("3") "<emitter type='area'><texture name='radiance' type='bitmap'><string name='filename' "
+				   "value='h.png'/></texture></emitter></shape>"
+				   "<emitter type='constant'><float name='radiance' value='0.5'/></emitter></scene>");
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"h.png", png, size}, {NULL, NULL, 0}};
+	struct world *w = world_of_files(32, 32, files);
+	static struct agree_image path, bdpt;
+	agree_render(w, __func__, "path", &(struct agree_side){"path", 1280, 32, 0, 0}, &path);
+	agree_render(w, __func__, "bdpt", &(struct agree_side){"bdpt", 1280, 32, 0, 0}, &bdpt);
+	agree_check(__func__, &bdpt, &path);
+	world_free(w);
+	free(png);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_effect),
+		cmocka_unit_test(test_heights_of_a_bitmap),
+		cmocka_unit_test(test_numbers_and_checkers),
+		cmocka_unit_test(test_refused),
+		cmocka_unit_test(test_height_zero_is_the_same_image),
+		cmocka_unit_test(test_integrators_agree),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Bump and normal maps in scenes: against the same height as real geometry, and the integrators among each other.
+ */
+#include "worker/render/render.h"
+#include "tests/support/agree.h"
+#include "tests/support/memory_assets.h"
+#include "tests/support/sample_images.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 32 };
+
+#define PICTURE "<string name='filename' value='h.png'/><boolean name='raw' value='true'/>"
+#define SUN "<emitter type='directional'><vector name='direction' x='-1' y='-1' z='-1.5'/></emitter>"
+/* Nothing of the outline is seen: that moves with real geometry. */
+#define VIEW SENSOR("0.1,0.1,1.9", "0,0,0")
+
+static struct world *world_with_picture(const char *inside)
+{
+	static char xml[8192];
+	size_t size;
+	unsigned char *png = sample_png(8, 8, SAMPLE_GREY, 8, 0, &size);
+	snprintf(xml, sizeof xml, "<scene version='3.0.0'>%s</scene>", inside);
+	const struct memory_file files[] = {{"s.xml", xml, strlen(xml)}, {"h.png", png, size}, {NULL, NULL, 0}};
+	struct world *w = world_of_files(SIDE, SIDE, files);
+	free(png);
+	return w;
+}
+
+static void image_of(struct world *w, double mean[SIDE * SIDE])
+{
+	struct plan p = {.kind = PLAN_SAMPLES,
+			 .integrator = "path",
+			 .width = SIDE,
+			 .height = SIDE,
+			 .crop_width = SIDE,
+			 .crop_height = SIDE,
+			 .groups = 1,
+			 .parts = 1,
+			 .bootstrap = 1,
+			 .epoch = 64,
+			 .rounds = 1,
+			 .min_depth = 1,
+			 .max_depth = 2};
+	struct lease_key k = {1, LEASE_RENDER, 0, 0, 0};
+	struct batch b;
+	struct error e = {""};
+	enum lease_end end;
+	if (render_lease(w, &p, &k, NULL, NULL, &end, &b, &e))
+		fail_msg("%s", e.text);
+	for (int i = 0; i < SIDE * SIDE; i++)
+		mean[i] = (double)b.tiles[0].xyz[3 * i + 1];
+	batch_fini(&b);
+	world_free(w);
+}
+
+/* Root of the mean square of the difference, over the root of the mean square of b. */
+static double apart(const double *a, const double *b)
+{
+	double d = 0, m = 0;
+	for (int i = 0; i < SIDE * SIDE; i++) {
+		d += (a[i] - b[i]) * (a[i] - b[i]);
+		m += b[i] * b[i];
+	}
+	return sqrt(d / m);
+}
+
+/* 256 x 256 cells of height 0.02 at most, under a sun: no shadow is long, and slopes are up to about 0.1. */
+static void test_bump_against_geometry(void **state)
+{
+	(void)state;
+	static double flat[SIDE * SIDE], bump[SIDE * SIDE], real[SIDE * SIDE], back[SIDE * SIDE];
+	image_of(world_with_picture(VIEW SUN "<shape type='rectangle'/>"), flat);
+	image_of(world_with_picture(VIEW SUN
+				    "<shape type='rectangle'><bsdf type='bumpmap'><float name='scale' value='0.02'/>"
+				    "<texture type='bitmap' name='any'>" PICTURE
+				    "</texture><bsdf type='diffuse'/></bsdf></shape>"),
+		 bump);
+	image_of(world_with_picture(VIEW SUN
+				    "<shape type='rectangle'><bsdf type='bumpmap'><float name='scale' value='-0.02'/>"
+				    "<texture type='bitmap' name='any'>" PICTURE
+				    "</texture><bsdf type='diffuse'/></bsdf></shape>"),
+		 back);
+	image_of(
+		world_with_picture(
+			VIEW SUN
+			"<shape type='rectangle'><texture name='displacement' type='bitmap'>" PICTURE "</texture>"
+			"<float name='displacement_scale' value='0.02'/><integer name='displacement_level' value='8'/></shape>"),
+		real);
+	print_message("apart from displaced geometry: flat %.3g, bump %.3g, dents %.3g\n", apart(flat, real),
+		      apart(bump, real), apart(back, real));
+	assert_true(apart(flat, real) > 0.01);
+	assert_true(apart(bump, real) < 0.15 * apart(flat, real));
+	assert_true(apart(back, real) > apart(flat, real));
+}
+
+/* Glass, metal and a matt ground, all bent, in the light of a lamp and a sky. */
+static void test_integrators_agree(void **state)
+{
+	(void)state;
+#define BUMP(scale, inner)                                                                            \
+	"<bsdf type='bumpmap'><float name='scale' value='" scale "'/><texture type='bitmap'>" PICTURE \
+	"</texture>" inner "</bsdf>"
+	struct world *w = world_with_picture(
+		"<integrator type='path'><integer name='max_depth' value='4'/></integrator>" SENSOR("0,3.5,4", "0,0.5,0") "<shape type='rectangle'><transform name='to_world'><scale value='4'/><rotate x='1' angle='-90'/></transform>" BUMP("0.2", "<bsdf type='diffuse'/>") "</shape><shape type='sphere'><point name='center' x='-0.9' y='0.9' z='0'/><float name='radius' value='0.8'/>" BUMP(
+			"0.05",
+			"<bsdf type='roughconductor'><float name='alpha' value='0.2'/></bsdf>") "</shape><shape type='sphere'><point name='center' x='0.9' y='0.9' z='0'/><float name='radius' value='0.8'/>" BUMP("0.02",
+																										   "<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "</shape><shape type='rectangle'><transform name='to_world'><scale value='3'/><rotate x='1' angle='90'/><translate y='5'/></transform>"
+																																			    "<emitter type='area'><float name='radiance' value='2'/></emitter></shape>"
+																																			    "<emitter type='constant'><float name='radiance' value='0.5'/></emitter>");
+	static struct agree_image path, other;
+	agree_render(w, __func__, "path", &(struct agree_side){"path", 1280, 32, 0, 0}, &path);
+	agree_render(w, __func__, "bdpt", &(struct agree_side){"bdpt", 1280, 32, 0, 0}, &other);
+	agree_check(__func__, &other, &path);
+	agree_render(w, __func__, "hslt", &(struct agree_side){"hslt", 320, 32, 0, 0}, &other);
+	agree_within_errors(__func__, &other, &path);
+	world_free(w);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_bump_against_geometry),
+		cmocka_unit_test(test_integrators_agree),
+	};
+	return cmocka_run_group_tests_name("relief", tests, NULL, NULL);
+}

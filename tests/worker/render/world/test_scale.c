@@ -1,0 +1,109 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The same scene in other units and at other places. Factors of a power of two and moves that double can hold exactly
+ * give the same rescaled world, so the same bits; others differ by roundings of the coordinates, 1e-16 of the distance
+ * from the origin (1e-11 of the scene's size where it stands 1e5 sizes away), which a path near an edge can make as
+ * large as itself: most pixels agree to 1e-5, and the mean to what few paths can change.
+ */
+#include "worker/render/render.h"
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 32 };
+
+/* Scaled by s, then moved by m along all axes. */
+static struct world *world_at(double s, double m)
+{
+#define P(x) (s * (x) + m)
+	return world_of_text(
+		SIDE, SIDE,
+		"<sensor type='perspective'><float name='fov' value='45'/><float name='near_clip' value='%.17g'/><float name='far_clip' value='%.17g'/>"
+		"<transform name='to_world'><lookat origin='%.17g,%.17g,%.17g' target='%.17g,%.17g,%.17g' up='0,1,0'/></transform>"
+		"<film type='hdrfilm'><rfilter type='box'/></film></sensor>"
+		"<shape type='rectangle'><transform name='to_world'><scale value='%.17g'/><rotate x='1' angle='-90'/>"
+		"<translate x='%.17g' y='%.17g' z='%.17g'/></transform></shape>"
+		"<shape type='sphere'><point name='center' x='%.17g' y='%.17g' z='%.17g'/><float name='radius' value='%.17g'/><bsdf type='dielectric'/></shape>"
+		"<shape type='cube'><transform name='to_world'><scale value='%.17g'/><translate x='%.17g' y='%.17g' z='%.17g'/></transform></shape>"
+		"<shape type='sphere'><point name='center' x='%.17g' y='%.17g' z='%.17g'/><float name='radius' value='%.17g'/>"
+		"<emitter type='area'><float name='radiance' value='5'/></emitter></shape>",
+		s * 0x1p-7, s * 1000, P(0), P(2), P(5), P(0), P(0.5), P(0), 4 * s, P(0), P(0), P(0), P(-0.75), P(0.75),
+		P(0.5), 0.75 * s, 0.5 * s, P(1), P(0.5), P(-0.25), P(1), P(3), P(1), 0.5 * s);
+#undef P
+}
+
+static float *image_of(struct world *w)
+{
+	struct plan p = {.kind = PLAN_SAMPLES,
+			 .integrator = "path",
+			 .width = SIDE,
+			 .height = SIDE,
+			 .crop_width = SIDE,
+			 .crop_height = SIDE,
+			 .groups = 1,
+			 .parts = 1,
+			 .bootstrap = 1,
+			 .epoch = 32,
+			 .rounds = 1,
+			 .min_depth = 1,
+			 .max_depth = 6};
+	float *image = calloc((size_t)SIDE * SIDE, 3 * sizeof *image);
+	struct lease_key k = {1, LEASE_RENDER, 0, 0, 0};
+	struct batch b;
+	struct error e = {""};
+	enum lease_end end;
+	if (render_lease(w, &p, &k, NULL, NULL, &end, &b, &e))
+		fail_msg("%s", e.text);
+	assert_int_equal(b.tile_count, 1);
+	assert_int_equal(b.tiles[0].width * b.tiles[0].height, SIDE * SIDE);
+	memcpy(image, b.tiles[0].xyz, (size_t)SIDE * SIDE * 3 * sizeof *image);
+	batch_fini(&b);
+	world_free(w);
+	return image;
+}
+
+static void test_same(void **state)
+{
+	(void)state;
+	static const struct {
+		double scale, move;
+		bool exact;
+	} cases[] = {
+		{0x1p-13, 0, true},	 {0x1p13, 0, true},	  {1, 0x1p17, true}, {0x1p-13, 0x1p4, true},
+		{0x1p13, -0x1p30, true}, {1e-4, 0, false},	  {1e4, 0, false},   {1, 1e5, false},
+		{3, 1e5 / 7, false},	 {1e-4, 10.0 / 3, false},
+	};
+	float *reference = image_of(world_at(1, 0));
+	for (size_t i = 0; i < sizeof cases / sizeof cases[0]; i++) {
+		float *image = image_of(world_at(cases[i].scale, cases[i].move));
+		size_t differ = 0;
+		double a = 0, b = 0;
+		for (size_t k = 0; k < (size_t)SIDE * SIDE * 3; k++) {
+			double x = (double)reference[k], y = (double)image[k];
+			a += x;
+			b += y;
+			differ += cases[i].exact ? x != y : !(fabs(x - y) <= 1e-5 * (x + y));
+		}
+		print_message("x %g + %g: %zu of %d values differ, the mean by %.1e\n", cases[i].scale, cases[i].move,
+			      differ, SIDE * SIDE * 3, b / a - 1);
+		assert_true(a > 0);
+		if (cases[i].exact)
+			assert_int_equal(differ, 0);
+		assert_true(differ < SIDE * SIDE * 3 / 20);
+		assert_true(fabs(b / a - 1) < 1e-3);
+		free(image);
+	}
+	free(reference);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_same)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

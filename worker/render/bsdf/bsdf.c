@@ -1,0 +1,132 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/bsdf/bsdf.h"
+
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/glass.h"
+#include "worker/render/bsdf/microfacet.h"
+
+#include <string.h>
+
+#define BSDF(name) extern const struct bsdf_ops bsdf_ops_##name;
+#include "worker/render/bsdf/bsdf_list.h"
+#undef BSDF
+
+const struct bsdf_ops *const bsdf_registry[] = {
+#define BSDF(name) &bsdf_ops_##name,
+#include "worker/render/bsdf/bsdf_list.h"
+#undef BSDF
+	NULL,
+};
+
+int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	for (const struct bsdf_ops *const *ops = bsdf_registry; *ops; ops++)
+		if (strcmp((*ops)->type, n->type) == 0) {
+			*b = (struct bsdf){.ops = *ops, .alpha = INFINITY, .eta = 1, .shape = COLOR_SHAPE_CONSTANT};
+			return (*ops)->create(b, n, build, e);
+		}
+	return node_error(n, e, ENOTSUP, "\"%s\" is no BSDF that is supported", n->type);
+}
+
+void *bsdf_data(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, size_t size,
+		struct error *e)
+{
+	b->data = arena_alloc(build->arena, 1, size);
+	if (!b->data)
+		node_error(n, e, ENOMEM, "out of memory");
+	return b->data;
+}
+
+void bsdf_make_smooth(struct bsdf *b, const struct bsdf_ops *ops)
+{
+	b->ops = ops;
+	b->modes |= BSDF_DELTA;
+	b->has_smooth = false;
+	b->has_delta = true;
+	b->alpha = b->alpha_mean = 0;
+}
+
+int bsdf_take_relief(struct bsdf *b, const struct bsdf *part, bool first, const struct scene_node *n, struct error *e)
+{
+	if (!first && part->relief != b->relief)
+		return node_error(
+			n, e, ENOTSUP,
+			"its two BSDFs bend the surface differently; one bump or normal map around both is supported");
+	b->relief = part->relief;
+	return 0;
+}
+
+void bsdf_add_shape(struct bsdf *b, enum color_shape shape)
+{
+	if (shape != COLOR_SHAPE_CONSTANT)
+		b->shape = COLOR_SHAPE_OTHER;
+}
+
+int bsdf_texture(struct bsdf *b, struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		 const struct bsdf_build *build, struct error *e)
+{
+	int code = texture_from_node(t, n, name, fallback, COLOR_REFLECTANCE, build->assets, build->dialect_3,
+				     build->arena, e);
+	if (code)
+		return code;
+	bsdf_add_shape(b, texture_shape(t));
+	b->textured |= !texture_is_constant(t);
+	return 0;
+}
+
+double bsdf_eta(const struct bsdf *b, const struct wavelengths *w)
+{
+	return b->dispersive ? glass_eta(b->data, w->nm[0]) : b->eta;
+}
+
+/* What a plug-in that cancels nothing by hand is worth. */
+static spectrum halfvec_product(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	struct bsdf_point radiance = *p;
+	radiance.transport = TRANSPORT_RADIANCE;
+	spectrum f = b->ops->eval(b, &radiance, wo, wi);
+	bool reflect = wo.z * wi.z > 0;
+	double eta = reflect ? 1 : wo.z > 0 ? bsdf_eta(b, p->w) : 1 / bsdf_eta(b, p->w), length;
+	vec3 h;
+	if (spectrum_is_zero(f) || !microfacet_half(wo, eta, wi, &h, &length))
+		return spectrum_of(0);
+	double ih = vec3_dot(wi, h), solid = reflect ? 2 * length : length * length / (eta * eta * fabs(ih));
+	return spectrum_scale(fabs(wi.z * h.z * h.z * h.z) * solid, f);
+}
+
+spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	return b->ops->eval_halfvec ? b->ops->eval_halfvec(b, p, wo, wi) : halfvec_product(b, p, wo, wi);
+}
+
+spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+			 double *chance)
+{
+	return b->ops->eval_delta ? b->ops->eval_delta(b, p, wo, mode, wi, chance) : spectrum_of(0);
+}
+
+static spectrum black_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return spectrum_of(0);
+}
+
+static double black_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return 0;
+}
+
+static bool black_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			 struct bsdf_sample *out)
+{
+	(void)b, (void)p, (void)wo, (void)u, (void)out;
+	return false;
+}
+
+void bsdf_black(struct bsdf *b)
+{
+	static const struct bsdf_ops ops = {
+		.type = "black", .eval = black_eval, .pdf_solid = black_pdf, .sample = black_sample};
+	*b = (struct bsdf){.ops = &ops, .alpha = INFINITY, .eta = 1, .black = true, .shape = COLOR_SHAPE_CONSTANT};
+}

@@ -1,0 +1,120 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Bidirectional scattering. One file per plug-in and one line in bsdf_list.h; the generic tests pick it up.
+ *
+ * Directions are unit vectors in the local shading frame (z = shading normal), both pointing AWAY from the surface.
+ * wo is where the path came from when sampling, wi where it goes; eval and pdf take any pair.
+ * `eval` is f (1/sr), without a cosine; delta lobes contribute nothing to eval and pdf.
+ * Transport: radiance travelling along wi -> wo is scaled by (n_wo/n_wi)^2 when refracted (n_x: index on the side of
+ * x; Walter 2007 eq. 21 with Veach 1997 sec. 5.2), importance is not: f_radiance(wo,wi) / f_importance(wo,wi) is that.
+ * Measure of densities: solid angle; for delta lobes the probability of choosing the lobe.
+ * Immutable after creation; any thread; nothing here allocates after create.
+ */
+#ifndef WORKER_RENDER_BSDF_BSDF_H
+#define WORKER_RENDER_BSDF_BSDF_H
+
+#include "worker/render/math/relief.h"
+#include "worker/render/texture/texture.h"
+
+enum bsdf_mode {
+	BSDF_REFLECT = 1,
+	BSDF_TRANSMIT = 2,
+	BSDF_DELTA = 4, /* with one of the two above */
+};
+
+/* Which quantity the path carries while it is being followed: a camera sub-path carries importance backwards and so
+ * gathers radiance; bsdf values for it are those of TRANSPORT_RADIANCE. */
+enum transport { TRANSPORT_RADIANCE, TRANSPORT_IMPORTANCE };
+
+struct bsdf_point {
+	double u, v;
+	const struct wavelengths *w;
+	enum transport transport;
+};
+
+struct bsdf_sample {
+	vec3 wi;
+	unsigned mode; /* of enum bsdf_mode */
+	double pdf;    /* solid angle of all non-delta lobes together, or the probability of the delta lobe */
+	spectrum f;    /* eval(wo, wi), or for a delta lobe f such that f / pdf is the weight of the path:
+			  the cosine |wi.z| is already divided out: weight = f |wi.z| / pdf in both cases */
+	double eta;    /* index on wi's side over the one on wo's side; 1 when reflected */
+};
+
+struct bsdf;
+
+struct bsdf_build {
+	const struct asset_source *assets;
+	struct arena *arena;
+	bool dialect_3;
+	double least_roughness; /* rough metal and glass below this is made smooth */
+};
+
+struct bsdf_ops {
+	const char *type;
+	const struct param *params;
+	unsigned nested_classes; /* of struct plugin_decl */
+	int (*create)(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
+	spectrum (*eval)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+	double (*pdf_solid)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+	/* f |wi.z| |d wi / d h_par| with the factors that explode and vanish together cancelled by hand; see
+	 * bsdf_eval_halfvec. NULL: nothing cancels, the product of its factors will do. */
+	spectrum (*eval_halfvec)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+	/* See bsdf_eval_delta. NULL: has no exactly specular lobe. */
+	spectrum (*eval_delta)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+			       double *chance);
+	/* u[0], u[1]: direction; u[2]: lobe. false: absorbed. */
+	bool (*sample)(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+		       struct bsdf_sample *out);
+};
+
+struct bsdf {
+	const struct bsdf_ops *ops;
+	unsigned modes;	 /* union of all modes it can have (REFLECT|DELTA and REFLECT may both be there: then both bits)
+			  */
+	bool has_smooth; /* some lobe is not delta: eval is not identically 0 */
+	bool has_delta;
+	double alpha;	   /* least roughness of its non-delta lobes; INFINITY for diffuse only; 0 for delta only */
+	double alpha_mean; /* albedo-weighted mean roughness of its non-delta lobes, diffuse counting 1; 0 for delta
+			      only */
+	double eta;	   /* index below the surface (against the normal) over the one above, at 587.6 nm where it
+			      depends on the wavelength; 1: opaque or none */
+	bool dispersive;   /* the index depends on the wavelength: only bsdf_eta says it, and paths carry one wavelength
+			    */
+	bool two_sided;	   /* scatters light that arrives from below the normal */
+	bool textured;
+	bool black;		     /* neither reflects nor lets through */
+	enum color_shape shape;	     /* CONSTANT: carries no colour */
+	const struct relief *relief; /* bends the shading normals of the surface that it lies on; NULL: nothing does */
+	void *data;
+};
+
+/* Index below the surface over the one above, at the hero wavelength nm[0] where dispersive. */
+double bsdf_eta(const struct bsdf *b, const struct wavelengths *w);
+
+/* For non-delta lobes, wo towards the camera, wi towards the light: f_radiance(wo, wi) |wi.z| times the solid angle of
+ * directions wi per area of plane-plane half vectors h_par = h_xy / h_z, h along wo + eta wi, eta = n_wi / n_wo (1 when
+ * reflected), with wo held: the way a chain is followed from the camera. For microfacets this is
+ * W G2 P22(h) |wo.h| / (|wo.z| |h.z|), W = F or (1-F) (n_wo/n_wi)^2, P22 the density of slopes; for others
+ * f |wi.z| |h.z|^3 4 |wi.h| where reflected and f |wi.z| |h.z|^3 (wo.h + eta wi.h)^2 / (eta^2 |wi.h|) where refracted.
+ */
+spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
+
+/* The exactly specular lobe `mode` (REFLECT or TRANSMIT, with or without the DELTA bit) seen from wo: its direction wi,
+ * the probability with which `sample` chooses it, and its weight f |wi.z| (f as in struct bsdf_sample). Zero: there is
+ * none, or light is totally reflected; wi and chance are then not to be read. */
+spectrum bsdf_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+			 double *chance);
+
+int bsdf_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e);
+void bsdf_black(struct bsdf *b);   /* absorbs everything; for emitters without a BSDF */
+void bsdf_default(struct bsdf *b); /* diffuse 0.5, what Mitsuba gives a shape without a BSDF */
+
+/* Makes an opaque BSDF scatter on its back as on its front. Mitsuba leaves backs black; public scenes of this language
+ * are written for renderers that do not (the walls of `cornell-box` face outwards), and no scene gains from black
+ * backs. */
+int bsdf_mirror_back(struct bsdf *b, struct arena *arena, struct error *e);
+
+extern const struct bsdf_ops *const bsdf_registry[]; /* ends with NULL */
+
+#endif

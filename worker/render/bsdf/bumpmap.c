@@ -1,0 +1,91 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Another BSDF on a surface whose shading normals are bent by a height (`bumpmap`) or given by a picture (`normalmap`).
+ * The BSDF itself is the inner one: geometry does the bending (worker/render/geom/relief.h), so that half vectors and
+ * their derivatives know of it.
+ */
+#include "worker/render/bsdf/create.h"
+
+struct bend {
+	struct relief relief;
+	struct texture texture;
+	double scale;
+};
+
+static double height_of(const double x[3], bool grey)
+{
+	return grey ? x[0] : 0.2126 * x[0] + 0.7152 * x[1] + 0.0722 * x[2];
+}
+
+static void height_at(const void *data, double u, double v, struct relief_value *out)
+{
+	const struct bend *b = data;
+	struct texture_jet j;
+	texture_jet(&b->texture, u, v, &j);
+	double mixed = b->scale * height_of(j.duv, j.grey);
+	out->x = (vec3){b->scale * height_of(j.du, j.grey), b->scale * height_of(j.dv, j.grey), 0};
+	out->du = (vec3){b->scale * height_of(j.duu, j.grey), mixed, 0};
+	out->dv = (vec3){mixed, b->scale * height_of(j.dvv, j.grey), 0};
+}
+
+/* Components from 0 to 1 stand for -1 to 1. */
+static void normal_at(const void *data, double u, double v, struct relief_value *out)
+{
+	const struct bend *b = data;
+	struct texture_jet j;
+	texture_jet(&b->texture, u, v, &j);
+	out->x = (vec3){2 * j.x[0] - 1, 2 * j.x[1] - 1, 2 * j.x[2] - 1};
+	out->du = (vec3){2 * j.du[0], 2 * j.du[1], 2 * j.du[2]};
+	out->dv = (vec3){2 * j.dv[0], 2 * j.dv[1], 2 * j.dv[2]};
+}
+
+static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, enum relief_kind kind,
+		  struct error *e)
+{
+	const struct scene_node *inner = node_child(n, PLUGIN_BSDF, 0), *texture = node_child(n, PLUGIN_TEXTURE, 0);
+	if (!inner || !texture || node_child(n, PLUGIN_BSDF, 1))
+		return node_error(n, e, EINVAL, "needs a texture and exactly one BSDF inside");
+	struct bend *bend = arena_alloc(build->arena, 1, sizeof *bend);
+	if (!bend)
+		return node_error(n, e, ENOMEM, "out of memory");
+	bend->scale = node_float(n, "scale", 1);
+	bend->relief = (struct relief){kind, kind == RELIEF_HEIGHT ? height_at : normal_at, bend};
+	int code =
+		texture_create(&bend->texture, texture, COLOR_RELIEF, build->assets, build->dialect_3, build->arena, e);
+	if (!code)
+		code = bsdf_create(b, inner, build, e);
+	if (!code && b->relief)
+		code = node_error(n, e, ENOTSUP, "one bump or normal map in another is not supported");
+	b->relief = &bend->relief;
+	b->textured = true;
+	return code;
+}
+
+static int bumpmap_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	return create(b, n, build, RELIEF_HEIGHT, e);
+}
+
+static int normalmap_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	return create(b, n, build, RELIEF_NORMAL, e);
+}
+
+static const struct param bumpmap_params[] = {
+	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
+	{.name = NULL},
+};
+static const struct param normalmap_params[] = {{.name = NULL}};
+
+const struct bsdf_ops bsdf_ops_bumpmap = {
+	.type = "bumpmap",
+	.params = bumpmap_params,
+	.nested_classes = 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE,
+	.create = bumpmap_create,
+};
+const struct bsdf_ops bsdf_ops_normalmap = {
+	.type = "normalmap",
+	.params = normalmap_params,
+	.nested_classes = 1u << PLUGIN_BSDF | 1u << PLUGIN_TEXTURE,
+	.create = normalmap_create,
+};

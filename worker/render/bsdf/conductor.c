@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A smooth metal on the side of the normal. */
+#include "worker/render/bsdf/metal.h"
+#include "worker/render/bsdf/microfacet.h"
+
+#include <float.h>
+
+static spectrum conductor_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return spectrum_of(0);
+}
+
+static double conductor_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return 0;
+}
+
+static spectrum conductor_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				     double *chance)
+{
+	if (!(mode & BSDF_REFLECT) || !(wo.z >= DBL_MIN)) /* 1 / wo.z must be finite */
+		return spectrum_of(0);
+	*wi = (vec3){-wo.x, -wo.y, wo.z};
+	*chance = 1;
+	return metal_fresnel(b->data, p, wo.z);
+}
+
+static bool conductor_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			     struct bsdf_sample *out)
+{
+	(void)u;
+	*out = (struct bsdf_sample){.mode = BSDF_REFLECT | BSDF_DELTA, .eta = 1};
+	spectrum weight = conductor_eval_delta(b, p, wo, BSDF_REFLECT, &out->wi, &out->pdf);
+	if (!(out->pdf > 0))
+		return false;
+	out->f = spectrum_scale(1 / wo.z, weight);
+	return true;
+}
+
+static int conductor_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct metal *m = bsdf_data(b, n, build, sizeof *m, e);
+	if (!m)
+		return -ENOMEM;
+	b->modes = BSDF_REFLECT | BSDF_DELTA;
+	b->has_delta = true;
+	b->alpha = 0;
+	return metal_read(m, b, n, build, e);
+}
+
+static const struct param conductor_params[] = {METAL_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
+
+const struct bsdf_ops bsdf_ops_conductor = {
+	.type = "conductor",
+	.params = conductor_params,
+	.create = conductor_create,
+	.eval = conductor_eval,
+	.pdf_solid = conductor_pdf,
+	.eval_delta = conductor_eval_delta,
+	.sample = conductor_sample,
+};

@@ -1,0 +1,93 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A smooth boundary between two transparent media: Fresnel's reflection and Snell's refraction. */
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/glass.h"
+#include "worker/render/bsdf/microfacet.h"
+
+#include <float.h>
+
+static spectrum dielectric_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return spectrum_of(0);
+}
+
+static double dielectric_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return 0;
+}
+
+/* f |wi.z| of one lobe for light that f is the Fresnel share of; eta: index beyond over index on wo's side. Chance 0:
+ * none. */
+static spectrum lobe(const struct glass *g, const struct bsdf_point *p, vec3 wo, unsigned mode, double eta,
+		     const struct fresnel *f, vec3 *wi, double *chance)
+{
+	*chance = 0;
+	if (mode & BSDF_REFLECT) {
+		if (!(fabs(wo.z) >= DBL_MIN && f->reflected > 0)) /* 1 / wo.z must be finite */
+			return spectrum_of(0);
+		*wi = (vec3){-wo.x, -wo.y, wo.z};
+		*chance = f->reflected;
+		return spectrum_scale(f->reflected, texture_eval(&g->reflectance, p->u, p->v, p->w));
+	}
+	if (!(f->cos_t >= DBL_MIN && f->transmitted > 0))
+		return spectrum_of(0);
+	double scale = p->transport == TRANSPORT_RADIANCE ? 1 / (eta * eta) : 1;
+	*wi = (vec3){-wo.x / eta, -wo.y / eta, -copysign(f->cos_t, wo.z)};
+	*chance = f->transmitted;
+	return spectrum_scale(f->transmitted * scale, texture_eval(&g->transmittance, p->u, p->v, p->w));
+}
+
+static double eta_beyond(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
+{
+	double eta = bsdf_eta(b, p->w);
+	return wo.z > 0 ? eta : 1 / eta;
+}
+
+static spectrum dielectric_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode,
+				      vec3 *wi, double *chance)
+{
+	double eta = eta_beyond(b, p, wo);
+	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), eta);
+	return lobe(b->data, p, wo, mode, eta, &f, wi, chance);
+}
+
+static bool dielectric_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			      struct bsdf_sample *out)
+{
+	double eta = eta_beyond(b, p, wo);
+	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), eta);
+	bool reflect = u[2] < f.reflected;
+	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT) | BSDF_DELTA,
+				    .eta = reflect ? 1 : eta};
+	spectrum weight = lobe(b->data, p, wo, out->mode, eta, &f, &out->wi, &out->pdf);
+	if (!(out->pdf > 0))
+		return false;
+	out->f = spectrum_scale(1 / fabs(out->wi.z), weight);
+	return true;
+}
+
+static int dielectric_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			     struct error *e)
+{
+	struct glass *g = bsdf_data(b, n, build, sizeof *g, e);
+	if (!g)
+		return -ENOMEM;
+	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA;
+	b->has_delta = true;
+	b->alpha = 0;
+	return glass_read(g, b, n, build, e);
+}
+
+static const struct param dielectric_params[] = {GLASS_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
+
+const struct bsdf_ops bsdf_ops_dielectric = {
+	.type = "dielectric",
+	.params = dielectric_params,
+	.create = dielectric_create,
+	.eval = dielectric_eval,
+	.pdf_solid = dielectric_pdf,
+	.eval_delta = dielectric_eval_delta,
+	.sample = dielectric_sample,
+};

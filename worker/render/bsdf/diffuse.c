@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Lambert's reflectance on the side of the normal. */
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/warp.h"
+
+static spectrum diffuse_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	if (!(wo.z > 0 && wi.z > 0))
+		return spectrum_of(0);
+	return spectrum_scale(1 / WARP_PI, texture_eval(b->data, p->u, p->v, p->w));
+}
+
+static double diffuse_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p;
+	return wo.z > 0 && wi.z > 0 ? wi.z / WARP_PI : 0;
+}
+
+static bool diffuse_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			   struct bsdf_sample *out)
+{
+	if (!(wo.z > 0))
+		return false;
+	vec3 wi = warp_cosine_hemisphere(u[0], u[1]);
+	if (!(wi.z > 0))
+		return false;
+	*out = (struct bsdf_sample){.wi = wi,
+				    .mode = BSDF_REFLECT,
+				    .pdf = diffuse_pdf(b, p, wo, wi),
+				    .f = diffuse_eval(b, p, wo, wi),
+				    .eta = 1};
+	return true;
+}
+
+static int diffuse_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct texture *t = bsdf_data(b, n, build, sizeof *t, e);
+	if (!t)
+		return -ENOMEM;
+	b->modes = BSDF_REFLECT;
+	b->has_smooth = true;
+	b->alpha_mean = 1;
+	int code = bsdf_texture(b, t, n, "reflectance", 0.5, build, e);
+	b->black = !code && texture_max(t) == 0;
+	return code;
+}
+
+static const struct param diffuse_params[] = {
+	{.name = "reflectance", .types = VALUE_TEXTURE, .max = 1},
+	{.name = NULL},
+};
+
+const struct bsdf_ops bsdf_ops_diffuse = {
+	.type = "diffuse",
+	.params = diffuse_params,
+	.create = diffuse_create,
+	.eval = diffuse_eval,
+	.pdf_solid = diffuse_pdf,
+	.sample = diffuse_sample,
+};
+
+void bsdf_default(struct bsdf *b)
+{
+	static struct texture half = {.color = {.shape = COLOR_SHAPE_CONSTANT, .scale = 0.5}};
+	*b = (struct bsdf){.ops = &bsdf_ops_diffuse,
+			   .modes = BSDF_REFLECT,
+			   .has_smooth = true,
+			   .alpha = INFINITY,
+			   .alpha_mean = 1,
+			   .eta = 1,
+			   .shape = COLOR_SHAPE_CONSTANT,
+			   .data = &half};
+}

@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Reflection at a smooth boundary, unpolarised. Cosines on the side that the light is on, in [0,1]. */
+#ifndef WORKER_RENDER_BSDF_FRESNEL_H
+#define WORKER_RENDER_BSDF_FRESNEL_H
+
+#include <math.h>
+
+/* Shares of light; both keep their digits where they are small. */
+struct fresnel {
+	double reflected, transmitted;
+	double cos_t; /* cosine beyond, 0 at total reflection */
+};
+
+/* Cosines on both sides, of directions that Snell's law joins; eta: index beyond over index here. The differences of
+ * the amplitudes are written as what is left of them, so that no digit goes where eta is next to 1. */
+static inline struct fresnel fresnel_between(double c, double t, double eta)
+{
+	double s = 1 / (c + eta * t), p = 1 / (eta * c + t), e = (eta - 1) * (eta + 1);
+	double rs = e * s * s, rp = e * p * ((c * c * (eta * eta + 1) - 1) * p) / (eta * eta);
+	double ts = 2 * c * s * (eta * t * s), tp = 2 * c * p * (eta * t * p);
+	return (struct fresnel){fmin(0.5 * (rs * rs + rp * rp), 1), fmin(ts + tp, 1), t};
+}
+
+static inline struct fresnel fresnel_dielectric(double c, double eta)
+{
+	/* (eta cos_t)^2; each form keeps its digits where it is used, next to eta = 1 and to the normal. */
+	double t2 = c * c < 0.5 ? (eta - 1) * (eta + 1) + c * c : eta * eta - (1 - c) * (1 + c);
+	if (!(t2 > 0))
+		return (struct fresnel){1, 0, 0};
+	return fresnel_between(c, sqrt(t2) / eta, eta);
+}
+
+/* Index eta - i k beyond, over the index here. eta = 0, k = 1 is a perfect mirror. */
+static inline double fresnel_conductor(double c, double eta, double k)
+{
+	double c2 = c * c, s2 = (1 - c) * (1 + c);
+	double t0 = (eta - k) * (eta + k) - s2, n2 = hypot(t0, 2 * eta * k);
+	double t1 = n2 + c2, t2 = 2 * c * sqrt(fmax(0, 0.5 * (n2 + t0)));
+	double t3 = c2 * n2 + s2 * s2, t4 = t2 * s2;
+	double rs = t1 + t2 > 0 ? (t1 - t2) / (t1 + t2) : 1;
+	double rp = t3 + t4 > 0 ? rs * (t3 - t4) / (t3 + t4) : rs;
+	return 0.5 * (rs + rp);
+}
+
+#endif

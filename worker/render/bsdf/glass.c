@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/bsdf/glass.h"
+
+double glass_eta(const struct glass *g, double nm)
+{
+	return ior_at(&g->side[IOR_INT], nm) / ior_at(&g->side[IOR_EXT], nm);
+}
+
+/* Equal laws on both sides, or coefficients of zero, bend all wavelengths alike. */
+static bool varies(const struct glass *g, double eta)
+{
+	for (double nm = WAVELENGTH_MIN; nm <= WAVELENGTH_MAX; nm++)
+		if (glass_eta(g, nm) != eta)
+			return true;
+	return false;
+}
+
+static bool has_coefficients(const struct scene_node *n)
+{
+	static const char *const names[] = {"int_cauchy_b", "ext_cauchy_b", "int_sellmeier", "ext_sellmeier"};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (node_find(n, names[i]))
+			return true;
+	return false;
+}
+
+static int read_index(struct glass *g, struct bsdf *b, const struct scene_node *n, struct error *e)
+{
+	int code = ior_read_law(n, IOR_INT, &g->side[IOR_INT], e);
+	if (!code)
+		code = ior_read_law(n, IOR_EXT, &g->side[IOR_EXT], e);
+	if (code)
+		return code;
+	if (node_bool(n, "dispersion", false) && !has_coefficients(n) && !g->side[IOR_INT].terms &&
+	    !g->side[IOR_EXT].terms) {
+		char known[128];
+		return node_error(n, e, EINVAL,
+				  "dispersion: a number does not say how it depends on the wavelength; name one of %s "
+				  "or give coefficients",
+				  ior_dispersive_names(known, sizeof known));
+	}
+	b->eta = glass_eta(g, IOR_NM);
+	b->dispersive = varies(g, b->eta);
+	if (b->dispersive)
+		bsdf_add_shape(b, COLOR_SHAPE_OTHER);
+	return 0;
+}
+
+int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+	       struct error *e)
+{
+	int code = read_index(g, b, n, e);
+	if (!code)
+		code = bsdf_texture(b, &g->reflectance, n, "specular_reflectance", 1, build, e);
+	if (!code)
+		code = bsdf_texture(b, &g->transmittance, n, "specular_transmittance", 1, build, e);
+	b->two_sided = true;
+	b->black = !code && texture_max(&g->reflectance) == 0 && texture_max(&g->transmittance) == 0;
+	return code;
+}

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What dielectric and roughdielectric share: the index and the factors of the two modes. */
+#ifndef WORKER_RENDER_BSDF_GLASS_H
+#define WORKER_RENDER_BSDF_GLASS_H
+
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/ior.h"
+
+struct glass {
+	struct texture reflectance, transmittance; /* multiply */
+	struct ior side[2];			   /* of enum ior_side */
+};
+
+/* Parameters of the index, specular_reflectance, specular_transmittance. Sets b->eta and b->dispersive and enters the
+ * colours. Where dispersive, b->data begins with the struct glass. */
+int glass_read(struct glass *g, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+	       struct error *e);
+#define GLASS_PARAMS                                                                    \
+	IOR_PARAMS, {.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1}, \
+	{                                                                               \
+		.name = "specular_transmittance", .types = VALUE_TEXTURE, .max = 1      \
+	}
+
+/* Index below the surface over the one above. */
+double glass_eta(const struct glass *g, double nm);
+
+#endif

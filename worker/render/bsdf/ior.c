@@ -1,0 +1,162 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/bsdf/ior.h"
+
+#include "worker/render/math/spectrum.h"
+#include "worker/render/scene/number.h"
+
+#include <stdio.h>
+#include <strings.h>
+
+/* Glasses and crystals: value at 587.6 nm of the Sellmeier equations that their makers and Malitson, Peter, Daimon
+ * published; liquids and gases: handbook values at room temperature. */
+static const struct {
+	const char *name;
+	double n;
+} named[] = {
+	{"vacuum", 1.0},	   {"helium", 1.000036},	{"hydrogen", 1.000132},
+	{"air", 1.000277},	   {"carbon dioxide", 1.00045}, {"water", 1.33340},
+	{"acetone", 1.36},	   {"ethanol", 1.361},		{"carbon tetrachloride", 1.461},
+	{"glycerol", 1.4729},	   {"benzene", 1.501},		{"silicone oil", 1.52045},
+	{"bromine", 1.661},	   {"water ice", 1.31},		{"fused quartz", 1.45846},
+	{"pyrex", 1.470},	   {"acrylic glass", 1.49},	{"polypropylene", 1.49},
+	{"bk7", 1.51680},	   {"sodium chloride", 1.544},	{"amber", 1.55},
+	{"pet", 1.5750},	   {"diamond", 2.41748},	{"sf11", 1.78471},
+	{"sapphire (o)", 1.76817},
+};
+
+/* Schott (N-BK7, N-SF11), Malitson 1965 (fused quartz), Peter 1923 (diamond), Daimon and Masumura 2007 at 20 C (water),
+ * Malitson and Dodge 1972 (sapphire, ordinary ray). */
+static const struct {
+	const char *name;
+	int terms;
+	double b[IOR_TERMS], c[IOR_TERMS];
+} laws[] = {
+	{"bk7", 3, {1.03961212, 0.231792344, 1.01046945}, {0.00600069867, 0.0200179144, 103.560653}},
+	{"sf11", 3, {1.73759695, 0.313747346, 1.89878101}, {0.013188707, 0.0623068142, 155.23629}},
+	{"fused quartz", 3, {0.6961663, 0.4079426, 0.8974794}, {0.004679148258, 0.01351206307, 97.93400254}},
+	{"diamond", 2, {0.3306, 4.3356}, {0.030625, 0.011236}},
+	{"water",
+	 4,
+	 {0.5684027565, 0.1726177391, 0.02086189578, 0.1130748688},
+	 {0.005101829712, 0.01821153936, 0.02620722293, 10.69792721}},
+	{"sapphire (o)", 3, {1.4313493, 0.65054713, 5.3414021}, {0.005279926102, 0.01423826471, 325.0178341}},
+};
+
+/* Gases bend light so little that one number will do even where dispersion is asked for. */
+#define NEARLY_VACUUM 1.001
+
+int ior_read(const struct scene_node *n, const char *name, double fallback, double *out, struct error *e)
+{
+	const struct property *p = node_find(n, name);
+	if (p && p->value.type == VALUE_STRING) {
+		for (size_t i = 0; i < sizeof named / sizeof *named; i++)
+			if (strcasecmp(named[i].name, p->value.as.string) == 0) {
+				*out = named[i].n;
+				return 0;
+			}
+		return node_error(n, e, ENOTSUP, "%s: no material \"%s\" is known; a number will do", name,
+				  p->value.as.string);
+	}
+	*out = node_float(n, name, fallback);
+	return 0;
+}
+
+double ior_at(const struct ior *i, double nm)
+{
+	if (i->terms == 0) {
+		double k = 1e6 / (nm * nm), d = 1e6 / (IOR_NM * IOR_NM);
+		return i->n + i->cauchy * (k - d);
+	}
+	double l2 = nm * nm * 1e-6, n2 = 1;
+	for (int t = 0; t < i->terms; t++)
+		n2 += i->b[t] * l2 / (l2 - i->c[t]);
+	return sqrt(fmax(n2, 0));
+}
+
+const char *ior_dispersive_names(char *text, size_t size)
+{
+	size_t used = 0;
+	for (size_t i = 0; i < sizeof laws / sizeof *laws && used < size; i++)
+		used += (size_t)snprintf(text + used, size - used, "%s%s", i ? ", " : "", laws[i].name);
+	return text;
+}
+
+struct names {
+	const char *ior, *cauchy, *sellmeier;
+};
+static const struct names side_names[] = {
+	[IOR_INT] = {"int_ior", "int_cauchy_b", "int_sellmeier"},
+	[IOR_EXT] = {"ext_ior", "ext_cauchy_b", "ext_sellmeier"},
+};
+
+/* "B1,..,Bm,C1,..,Cm". With no negative numbers among them and no C among the squares of wavelengths, n falls from the
+ * shortest to the longest wavelength: its two ends say whether it is an index everywhere. */
+static int parse_sellmeier(struct ior *out, const struct scene_node *n, const char *name, const char *text,
+			   struct error *e)
+{
+	double list[2 * IOR_TERMS], shortest = WAVELENGTH_MIN * WAVELENGTH_MIN * 1e-6,
+				    longest = WAVELENGTH_MAX * WAVELENGTH_MAX * 1e-6;
+	int count = number_list(text, list, 2 * IOR_TERMS);
+	if (count < 2 || count % 2)
+		return node_error(n, e, EINVAL,
+				  "%s takes 1 to %d numbers B and as many C (micrometres squared) after them", name,
+				  IOR_TERMS);
+	out->terms = count / 2;
+	for (int t = 0; t < out->terms; t++) {
+		out->b[t] = list[t];
+		out->c[t] = list[out->terms + t];
+		if (!(out->b[t] >= 0 && out->c[t] >= 0))
+			return node_error(n, e, EINVAL, "%s: no coefficient may be negative", name);
+		if (out->c[t] >= shortest && out->c[t] <= longest)
+			return node_error(n, e, EINVAL,
+					  "%s: C = %g is a resonance at %g nm, among the wavelengths of light", name,
+					  out->c[t], 1000 * sqrt(out->c[t]));
+	}
+	return 0;
+}
+
+static int look_up_law(struct ior *out, const struct scene_node *n, const char *property, const char *material,
+		       struct error *e)
+{
+	for (size_t i = 0; i < sizeof laws / sizeof *laws; i++) {
+		if (strcasecmp(laws[i].name, material) != 0)
+			continue;
+		out->terms = laws[i].terms;
+		for (int t = 0; t < out->terms; t++) {
+			out->b[t] = laws[i].b[t];
+			out->c[t] = laws[i].c[t];
+		}
+		return 0;
+	}
+	char known[128];
+	if (out->n < NEARLY_VACUUM)
+		return 0;
+	return node_error(n, e, ENOTSUP, "%s: the dispersion of \"%s\" is not known, only of %s; coefficients will do",
+			  property, material, ior_dispersive_names(known, sizeof known));
+}
+
+int ior_read_law(const struct scene_node *n, enum ior_side side, struct ior *out, struct error *e)
+{
+	const struct names *name = &side_names[side];
+	const struct property *ior = node_find(n, name->ior), *cauchy = node_find(n, name->cauchy);
+	const char *sellmeier = node_string(n, name->sellmeier, NULL);
+	*out = (struct ior){.cauchy = node_float(n, name->cauchy, 0)};
+	if (sellmeier && (ior || cauchy))
+		return node_error(n, e, EINVAL, "%s stands beside %s: one of them will do", name->sellmeier,
+				  (ior ? ior : cauchy)->name);
+	int code = ior_read(n, name->ior, side == IOR_INT ? IOR_BK7_DEFAULT : IOR_AIR_DEFAULT, &out->n, e);
+	if (!code && sellmeier)
+		code = parse_sellmeier(out, n, name->sellmeier, sellmeier, e);
+	else if (!code && !cauchy && ior && ior->value.type == VALUE_STRING && node_bool(n, "dispersion", false))
+		code = look_up_law(out, n, name->ior, ior->value.as.string, e);
+	if (code)
+		return code;
+	double most = ior_at(out, WAVELENGTH_MIN), least = ior_at(out, WAVELENGTH_MAX);
+	if (!(fmax(most, least) <= PARAM_IOR_MAX && fmin(most, least) >= PARAM_IOR_MIN))
+		return node_error(n, e, ERANGE,
+				  "%s: the index of refraction is %g at %g nm and %g at %g nm, outside [%g, %g]",
+				  sellmeier ? name->sellmeier : name->cauchy, most, WAVELENGTH_MIN, least,
+				  WAVELENGTH_MAX, PARAM_IOR_MIN, PARAM_IOR_MAX);
+	out->n = ior_at(out, IOR_NM);
+	return 0;
+}

@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/bsdf/lobe_filter.h"
+
+#include "worker/render/bsdf/glass.h"
+
+struct without {
+	struct glass glass; /* first, as wherever indices vary */
+	struct bsdf inside;
+	unsigned lobes;
+};
+
+static bool is_gone(const struct without *x, bool transmit, bool delta)
+{
+	return (transmit && (x->lobes & BSDF_WITHOUT_TRANSMISSION)) ||
+	       (x->lobes & (delta ? BSDF_WITHOUT_DELTA : BSDF_WITHOUT_SMOOTH));
+}
+
+static spectrum lobe_filter_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct without *x = b->data;
+	return is_gone(x, wo.z * wi.z < 0, false) ? spectrum_of(0) : x->inside.ops->eval(&x->inside, p, wo, wi);
+}
+
+static double lobe_filter_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct without *x = b->data;
+	return is_gone(x, wo.z * wi.z < 0, false) ? 0 : x->inside.ops->pdf_solid(&x->inside, p, wo, wi);
+}
+
+static spectrum lobe_filter_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct without *x = b->data;
+	return is_gone(x, wo.z * wi.z < 0, false) ? spectrum_of(0) : bsdf_eval_halfvec(&x->inside, p, wo, wi);
+}
+
+static spectrum lobe_filter_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode,
+				       vec3 *wi, double *chance)
+{
+	const struct without *x = b->data;
+	return is_gone(x, mode & BSDF_TRANSMIT, true) ? spectrum_of(0)
+						      : bsdf_eval_delta(&x->inside, p, wo, mode, wi, chance);
+}
+
+static bool lobe_filter_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			       struct bsdf_sample *out)
+{
+	const struct without *x = b->data;
+	return x->inside.ops->sample(&x->inside, p, wo, u, out) &&
+	       !is_gone(x, out->mode & BSDF_TRANSMIT, out->mode & BSDF_DELTA);
+}
+
+int bsdf_filter_lobes(struct bsdf *b, unsigned lobes, struct arena *arena, struct error *e)
+{
+	static const struct bsdf_ops ops = {
+		.type = "without",
+		.eval = lobe_filter_eval,
+		.pdf_solid = lobe_filter_pdf,
+		.eval_halfvec = lobe_filter_eval_halfvec,
+		.eval_delta = lobe_filter_eval_delta,
+		.sample = lobe_filter_sample,
+	};
+	struct without *x = arena_alloc(arena, 1, sizeof *x);
+	if (!x)
+		return error_set(e, ENOMEM, "out of memory");
+	*x = (struct without){.inside = *b, .lobes = lobes};
+	if (b->dispersive)
+		x->glass = *(const struct glass *)b->data;
+	b->ops = &ops;
+	b->data = x;
+	if (lobes & BSDF_WITHOUT_TRANSMISSION)
+		b->modes &= ~(unsigned)BSDF_TRANSMIT;
+	if (lobes & BSDF_WITHOUT_DELTA) {
+		b->modes &= ~(unsigned)BSDF_DELTA;
+		b->has_delta = false;
+	}
+	if (lobes & BSDF_WITHOUT_SMOOTH)
+		b->has_smooth = false;
+	if (!b->has_smooth)
+		b->alpha = b->alpha_mean = 0;
+	if (!b->has_smooth && !b->has_delta) {
+		bsdf_black(b);
+		b->alpha = INFINITY;
+	}
+	return 0;
+}

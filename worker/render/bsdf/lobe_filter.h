@@ -1,0 +1,13 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A BSDF without some of its lobes, which then absorb. */
+#ifndef WORKER_RENDER_BSDF_LOBE_FILTER_H
+#define WORKER_RENDER_BSDF_LOBE_FILTER_H
+
+#include "worker/render/bsdf/bsdf.h"
+
+enum { BSDF_WITHOUT_TRANSMISSION = 1, BSDF_WITHOUT_DELTA = 2, BSDF_WITHOUT_SMOOTH = 4 };
+
+/* Takes the lobes out of b; allocates in the arena. */
+int bsdf_filter_lobes(struct bsdf *b, unsigned lobes, struct arena *arena, struct error *e);
+
+#endif

@@ -1,0 +1,101 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/bsdf/metal.h"
+
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/ior.h"
+
+#include <string.h>
+#include <strings.h>
+
+enum { METAL_ROWS = 95 };
+
+static const struct {
+	const char *name;
+	double row[METAL_ROWS][3]; /* nm, n, k */
+} metals[] = {
+#include "conductors.inc"
+};
+
+static int named(struct metal *m, const char *name, const struct scene_node *n, struct arena *arena, struct error *e)
+{
+	if (strcasecmp(name, "none") == 0) {
+		m->eta = color_constant(0);
+		m->k = color_constant(1);
+		return 0;
+	}
+	for (size_t i = 0; i < sizeof metals / sizeof *metals; i++) {
+		if (strcmp(metals[i].name, name) != 0)
+			continue;
+		double *room = arena_alloc(arena, 3 * METAL_ROWS, sizeof *room);
+		if (!room)
+			return node_error(n, e, ENOMEM, "out of memory");
+		for (size_t c = 0; c < 3; c++)
+			for (size_t r = 0; r < METAL_ROWS; r++)
+				room[c * METAL_ROWS + r] = metals[i].row[r][c];
+		m->eta = (struct color){.shape = COLOR_SHAPE_OTHER,
+					.scale = 1,
+					.count = METAL_ROWS,
+					.nm = room,
+					.value = room + METAL_ROWS};
+		m->k = m->eta;
+		m->k.value = room + 2 * METAL_ROWS;
+		return 0;
+	}
+	return node_error(n, e, ENOTSUP, "no conductor \"%s\" is known; eta and k will do", name);
+}
+
+static int given(struct color *c, const struct scene_node *n, const char *name, struct arena *arena, struct error *e)
+{
+	const struct property *p = node_find(n, name);
+	if (!p)
+		return 0;
+	struct error reason;
+	int code = color_from_value(&p->value, COLOR_UNBOUNDED, arena, c, &reason);
+	return code ? node_error(n, e, -code, "%s: %s", name, reason.text) : 0;
+}
+
+int metal_read(struct metal *m, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+	       struct error *e)
+{
+	double outside;
+	int code = named(m, node_string(n, "material", build->dialect_3 ? "none" : "Cu"), n, build->arena, e);
+	if (!code)
+		code = given(&m->eta, n, "eta", build->arena, e);
+	if (!code)
+		code = given(&m->k, n, "k", build->arena, e);
+	if (!code)
+		code = ior_read(n, "ext_eta", build->dialect_3 ? 1 : IOR_AIR_DEFAULT, &outside, e);
+	if (!code)
+		code = bsdf_texture(b, &m->reflectance, n, "specular_reflectance", 1, build, e);
+	if (code)
+		return code;
+	b->black = texture_max(&m->reflectance) == 0;
+	m->eta.scale /= outside;
+	m->k.scale /= outside;
+	m->perfect = color_max(&m->eta) == 0 && color_max(&m->k) > 0;
+	if (!m->perfect) {
+		bsdf_add_shape(b, m->eta.shape);
+		bsdf_add_shape(b, m->k.shape);
+	}
+	return 0;
+}
+
+static inline spectrum fresnel_lanes(double cosine, spectrum eta, spectrum k, int lanes)
+{
+	spectrum f = spectrum_of(0);
+	for (int i = 0; i < lanes; i++)
+		f.v[i] = fresnel_conductor(cosine, eta.v[i], k.v[i]);
+	return f;
+}
+
+spectrum metal_fresnel(const struct metal *m, const struct bsdf_point *p, double cosine)
+{
+	spectrum r = texture_eval(&m->reflectance, p->u, p->v, p->w);
+	if (m->perfect)
+		return r;
+	spectrum eta = color_eval(&m->eta, p->w), k = color_eval(&m->k, p->w);
+	double c = fmin(fmax(cosine, 0), 1);
+	if (p->w->few)
+		return spectrum_mul(r, spectrum_repeat(fresnel_lanes(c, eta, k, (int)p->w->few), (int)p->w->few));
+	return spectrum_mul(r, fresnel_lanes(c, eta, k, SPECTRUM_LANES));
+}

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Microfacet distributions, Beckmann and GGX (Walter et al. 2007, Microfacet Models for Refraction), with Smith's
+ * masking; the roughness along u and v may differ (Heitz 2014, section 5.3: the isotropic one, stretched). Shadowing
+ * and masking are taken as independent, G2 = G1 G1, as Mitsuba does. Everything stays finite at grazing angles because
+ * G1 is only ever wanted over the cosine. Roughness from MICROFACET_ALPHA_MIN up.
+ */
+#ifndef WORKER_RENDER_BSDF_MICROFACET_H
+#define WORKER_RENDER_BSDF_MICROFACET_H
+
+#include "worker/render/math/vec3.h"
+#include "worker/render/scene/scene.h"
+
+#include <stdbool.h>
+
+#define MICROFACET_ALPHA_MIN 1e-6
+#define MICROFACET_RATIO_MAX 1e4
+
+struct microfacet {
+	bool ggx;
+	double alpha; /* along u */
+	double ratio; /* of the roughness along v to it */
+};
+
+void microfacet_set(struct microfacet *m, bool ggx, double alpha_u, double alpha_v);
+double microfacet_least(const struct microfacet *m); /* the smaller roughness of the two */
+double microfacet_mean(const struct microfacet *m);  /* their geometric mean */
+
+/* Density of microfacet normals: the integral of D(h) h.z over the hemisphere is 1. h unit. */
+double microfacet_d(const struct microfacet *m, vec3 h);
+
+/* Smith's G1(v) / v.z for v.z > 0, unit. */
+double microfacet_g1_over_cos(const struct microfacet *m, vec3 v);
+
+/* A normal with density G1(v) max(0, v.h) D(h) / v.z: those seen from v (v.z > 0). GGX: Dupuy and Benyoub 2023;
+ * Beckmann: Heitz and d'Eon 2014, inverted to double precision. */
+vec3 microfacet_sample_visible(const struct microfacet *m, vec3 v, double u0, double u1);
+
+/* The half vector wo + eta wi: direction and length. false: too short to have one. */
+static inline bool microfacet_half(vec3 wo, double eta, vec3 wi, vec3 *h, double *length)
+{
+	vec3 sum = vec3_madd(wo, eta, wi);
+	double largest = fmax(fabs(sum.x), fmax(fabs(sum.y), fabs(sum.z)));
+	if (!(largest > 1e-300))
+		return false;
+	sum = vec3_scale(1 / largest, sum);
+	double l = vec3_length(sum);
+	*h = vec3_scale(1 / l, sum);
+	*length = l * largest;
+	return true;
+}
+
+/* Parameters alpha, alpha_u, alpha_v, distribution. */
+int microfacet_read(struct microfacet *m, const struct scene_node *n, struct error *e);
+#define MICROFACET_PARAMS                                                                   \
+	{.name = "alpha", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10},           \
+		{.name = "alpha_u", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10}, \
+		{.name = "alpha_v", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 10}, \
+		{.name = "distribution", .types = VALUE_STRING, .choices = "beckmann|ggx"}, \
+	{                                                                                   \
+		.name = "sample_visible", .types = VALUE_BOOL, .status = PARAM_IGNORED      \
+	}
+
+/* Of smooth materials: what editors leave there when a rough one was made smooth. */
+#define MICROFACET_PARAMS_IGNORED                                                                                \
+	{.name = "alpha", .status = PARAM_IGNORED}, {.name = "alpha_u", .status = PARAM_IGNORED},                \
+		{.name = "alpha_v", .status = PARAM_IGNORED}, {.name = "distribution", .status = PARAM_IGNORED}, \
+	{                                                                                                        \
+		.name = "sample_visible", .status = PARAM_IGNORED                                                \
+	}
+
+#endif

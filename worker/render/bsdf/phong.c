@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Phong's lobe, modified to be reciprocal and normalised (Lafortune and Willems 1994), over a diffuse base. As in
+ * Mitsuba 0.6, where the two reflectances can add up to more than 1 both are scaled by 0.99 over their sum.
+ */
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/warp.h"
+#include "worker/render/math/frame.h"
+
+struct phong {
+	struct texture diffuse, specular;
+	double exponent;
+	double scale;		/* of both reflectances */
+	double specular_chance; /* of sampling the specular lobe */
+};
+
+/* The lobe without its norm: nothing comes from behind the plane across the mirror direction. */
+static double lobe_of(const struct phong *ph, vec3 wo, vec3 wi)
+{
+	double c = wo.z * wi.z - wo.x * wi.x - wo.y * wi.y;
+	return c > 0 ? pow(c, ph->exponent) : 0;
+}
+
+static spectrum phong_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct phong *ph = b->data;
+	if (!(wo.z > 0 && wi.z > 0))
+		return spectrum_of(0);
+	double lobe = (ph->exponent + 2) / (2 * WARP_PI) * lobe_of(ph, wo, wi);
+	spectrum d = texture_eval(&ph->diffuse, p->u, p->v, p->w), s = texture_eval(&ph->specular, p->u, p->v, p->w);
+	return spectrum_scale(ph->scale, spectrum_add(spectrum_scale(1 / WARP_PI, d), spectrum_scale(lobe, s)));
+}
+
+static double phong_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)p;
+	const struct phong *ph = b->data;
+	if (!(wo.z > 0 && wi.z > 0))
+		return 0;
+	double lobe = (ph->exponent + 1) / (2 * WARP_PI) * lobe_of(ph, wo, wi);
+	return ph->specular_chance * lobe + (1 - ph->specular_chance) * wi.z / WARP_PI;
+}
+
+/* Around the mirror direction of wo. */
+static vec3 sample_lobe(double exponent, vec3 wo, double u0, double u1)
+{
+	double l = log1p(-u0) / (exponent + 1), c = exp(l), s = sqrt(-expm1(2 * l)), phi = 2 * WARP_PI * u1;
+	struct frame f = frame_around((vec3){-wo.x, -wo.y, wo.z});
+	return vec3_normalize(frame_to_world(&f, (vec3){s * cos(phi), s * sin(phi), c}));
+}
+
+static bool phong_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			 struct bsdf_sample *out)
+{
+	const struct phong *ph = b->data;
+	if (!(wo.z > 0))
+		return false;
+	vec3 wi = u[2] < ph->specular_chance ? sample_lobe(ph->exponent, wo, u[0], u[1])
+					     : warp_cosine_hemisphere(u[0], u[1]);
+	double pdf = phong_pdf(b, p, wo, wi);
+	if (!(pdf > 0))
+		return false;
+	*out = (struct bsdf_sample){
+		.wi = wi, .mode = BSDF_REFLECT, .pdf = pdf, .f = phong_eval(b, p, wo, wi), .eta = 1};
+	return true;
+}
+
+static int phong_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct phong *ph = bsdf_data(b, n, build, sizeof *ph, e);
+	if (!ph)
+		return -ENOMEM;
+	int code = bsdf_texture(b, &ph->diffuse, n, "diffuse_reflectance", 0.5, build, e);
+	if (!code)
+		code = bsdf_texture(b, &ph->specular, n, "specular_reflectance", 0.2, build, e);
+	if (code)
+		return code;
+	double d = texture_max(&ph->diffuse), s = texture_max(&ph->specular);
+	b->black = d + s == 0;
+	ph->exponent = node_float(n, "exponent", 30);
+	ph->scale = d + s > 1 ? 0.99 / (d + s) : 1;
+	ph->specular_chance = d + s > 0 ? s / (d + s) : 0;
+	b->modes = BSDF_REFLECT;
+	b->has_smooth = true;
+	double alpha = sqrt(2 / (ph->exponent + 2));
+	b->alpha = s > 0 ? alpha : INFINITY;
+	b->alpha_mean = ph->specular_chance * alpha + (1 - ph->specular_chance);
+	return 0;
+}
+
+static const struct param phong_params[] = {
+	{.name = "diffuse_reflectance", .types = VALUE_TEXTURE, .max = 1},
+	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .max = 1},
+	{.name = "exponent", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1e9},
+	{.name = NULL},
+};
+
+const struct bsdf_ops bsdf_ops_phong = {
+	.type = "phong",
+	.params = phong_params,
+	.create = phong_create,
+	.eval = phong_eval,
+	.pdf_solid = phong_pdf,
+	.sample = phong_sample,
+};

@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A diffuse base under a smooth clear coating, on the side of the normal: coating.h. */
+#include "worker/render/bsdf/coating.h"
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/microfacet.h"
+#include "worker/render/bsdf/warp.h"
+
+#include <float.h>
+
+static struct fresnel fresnel_at(const struct coating *c, vec3 w)
+{
+	return fresnel_dielectric(fmin(w.z, 1), c->eta);
+}
+
+static spectrum plastic_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct coating *c = b->data;
+	if (!(wo.z > 0 && wi.z > 0))
+		return spectrum_of(0);
+	return coating_diffuse(c, p, fresnel_at(c, wo).transmitted, fresnel_at(c, wi).transmitted);
+}
+
+static double plastic_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)p;
+	const struct coating *c = b->data;
+	if (!(wo.z > 0 && wi.z > 0))
+		return 0;
+	return (1 - coating_specular_chance(c, fresnel_at(c, wo).reflected)) * wi.z / WARP_PI;
+}
+
+static spectrum plastic_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				   double *chance)
+{
+	const struct coating *c = b->data;
+	if (!(mode & BSDF_REFLECT) || !(wo.z >= DBL_MIN)) /* 1 / wo.z must be finite */
+		return spectrum_of(0);
+	double reflected = fresnel_at(c, wo).reflected;
+	*wi = (vec3){-wo.x, -wo.y, wo.z};
+	*chance = coating_specular_chance(c, reflected);
+	return spectrum_scale(reflected, texture_eval(&c->specular, p->u, p->v, p->w));
+}
+
+static bool plastic_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			   struct bsdf_sample *out)
+{
+	const struct coating *c = b->data;
+	if (!(wo.z > 0))
+		return false;
+	*out = (struct bsdf_sample){.mode = BSDF_REFLECT, .eta = 1};
+	if (u[2] < coating_specular_chance(c, fresnel_at(c, wo).reflected)) {
+		spectrum weight = plastic_eval_delta(b, p, wo, BSDF_REFLECT, &out->wi, &out->pdf);
+		out->mode |= BSDF_DELTA;
+		out->f = spectrum_scale(out->pdf > 0 ? 1 / wo.z : 0, weight);
+		return out->pdf > 0;
+	}
+	out->wi = warp_cosine_hemisphere(u[0], u[1]);
+	out->pdf = plastic_pdf(b, p, wo, out->wi);
+	out->f = plastic_eval(b, p, wo, out->wi);
+	return out->pdf > 0;
+}
+
+/* What the boundary lets in of diffuse light: the integral of T over the sine's square, up to total reflection, by the
+ * midpoint rule. */
+static double let_in(double eta)
+{
+	enum { STEPS = 4096 };
+	double sum = 0, most = fmin(eta * eta, 1);
+	for (int i = 0; i < STEPS; i++)
+		sum += fresnel_dielectric(sqrt(1 - most * (i + 0.5) / STEPS), eta).transmitted;
+	return most * sum / STEPS;
+}
+
+static int plastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct coating *c = bsdf_data(b, n, build, sizeof *c, e);
+	if (!c)
+		return -ENOMEM;
+	int code = coating_read(c, b, n, build, e);
+	if (code)
+		return code;
+	c->escape = let_in(c->eta);
+	b->modes |= BSDF_DELTA;
+	b->has_delta = true;
+	b->alpha_mean = 1;
+	return 0;
+}
+
+static const struct param plastic_params[] = {COATING_PARAMS, MICROFACET_PARAMS_IGNORED, {.name = NULL}};
+
+const struct bsdf_ops bsdf_ops_plastic = {
+	.type = "plastic",
+	.params = plastic_params,
+	.create = plastic_create,
+	.eval = plastic_eval,
+	.pdf_solid = plastic_pdf,
+	.eval_delta = plastic_eval_delta,
+	.sample = plastic_sample,
+};

@@ -1,0 +1,389 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The "principled" BSDF of artists' tools: Burley 2012, Physically Based Shading at Disney, and 2015, Extending the
+ * Disney BRDF to a BSDF; parameters and defaults are those of Mitsuba 3's plug-in. With m = metallic, t = spec_trans, c
+ * = base_color, and a rough GGX boundary of index eta,
+ *
+ *   f = D G1 G1 F / 4 + (1 - m) (1 - t) diffuse + (1 - m) sheen + clearcoat / 4 + (1 - m) t sqrt(c) refracted
+ *
+ * where F mixes Fresnel's factor of the boundary (what is not metal) with Schlick's of colour c (metal). Below the
+ * surface there is only the boundary, (1 - m) t of it. Tints divide c by its luminance. As in the originals the lobes
+ * are added, not layered: at grazing angles, and with sheen above all, more may come back than arrives, up to 1.5
+ * times.
+ */
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/microfacet.h"
+#include "worker/render/bsdf/warp.h"
+
+#define PRINCIPLED_ALPHA_MIN 1e-3
+#define CLEARCOAT_REFLECTANCE 0.04 /* of an index of 1.5 */
+
+enum { LOBE_DIFFUSE, LOBE_SPECULAR, LOBE_CLEARCOAT, LOBE_TRANSMIT, LOBES };
+
+struct principled {
+	struct texture base, roughness;
+	double metallic, transmission, spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_alpha, aspect, eta;
+	double base_max;
+};
+
+/* What a point of the surface is made of. */
+struct stuff {
+	const struct principled *p;
+	spectrum base, tint;
+	double roughness;
+	struct microfacet facets;
+};
+
+/* base_color over its luminance, by eight wavelengths weighted with the eye's sensitivity. */
+static spectrum tint_of(const struct principled *p, const struct bsdf_point *at, spectrum base)
+{
+	static const struct wavelengths seen[2] = {{.nm = {440, 520, 560, 620}}, {.nm = {480, 540, 580, 660}}};
+	static const double weight[2][SPECTRUM_LANES] = {{0.023, 0.710, 0.995, 0.381}, {0.139, 0.954, 0.870, 0.061}};
+	double sum = 0, all = 0;
+	if (WAVELENGTHS_GREY(at->w))
+		return spectrum_of(1);
+	for (int k = 0; k < 2; k++) {
+		spectrum c = texture_eval(&p->base, at->u, at->v, &seen[k]);
+		for (int l = 0; l < SPECTRUM_LANES; l++) {
+			sum += weight[k][l] * c.v[l];
+			all += weight[k][l];
+		}
+	}
+	return sum > 0 ? spectrum_scale(all / sum, base) : spectrum_of(1);
+}
+
+static struct microfacet facets_of(const struct principled *p, double roughness)
+{
+	struct microfacet m;
+	double a = roughness * roughness;
+	microfacet_set(&m, true, fmax(PRINCIPLED_ALPHA_MIN, a / p->aspect), fmax(PRINCIPLED_ALPHA_MIN, a * p->aspect));
+	return m;
+}
+
+/* A texture of roughness is grey: its mean over the lanes. */
+static double roughness_at(const struct principled *p, const struct bsdf_point *at)
+{
+	return fmin(fmax(spectrum_mean(texture_eval(&p->roughness, at->u, at->v, at->w)), 0), 1);
+}
+
+static struct stuff stuff_at(const struct bsdf *b, const struct bsdf_point *at)
+{
+	const struct principled *p = b->data;
+	struct stuff s = {
+		.p = p, .base = texture_eval(&p->base, at->u, at->v, at->w), .roughness = roughness_at(p, at)};
+	s.facets = facets_of(p, s.roughness);
+	s.tint = p->spec_tint > 0 || p->sheen_tint > 0 ? tint_of(p, at, s.base) : spectrum_of(1);
+	return s;
+}
+
+static double schlick(double cosine)
+{
+	double x = fmin(fmax(1 - cosine, 0), 1);
+	return x * x * x * x * x;
+}
+
+/* F of the header comment, for light from above. */
+static spectrum fresnel_of(const struct stuff *s, double cosine)
+{
+	const struct principled *p = s->p;
+	double rest = schlick(cosine), clear = 1 - p->metallic, root = (p->eta - 1) / (p->eta + 1);
+	double boundary = clear * (1 - p->spec_tint) * fresnel_dielectric(fmin(cosine, 1), p->eta).reflected;
+	spectrum f;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double tinted = fmin(s->tint.v[i] * root * root, 1);
+		f.v[i] = boundary + p->metallic * (s->base.v[i] + (1 - s->base.v[i]) * rest) +
+			 clear * p->spec_tint * (tinted + (1 - tinted) * rest);
+	}
+	return f;
+}
+
+/* Burley 2012, section 5.3, with his approximation of subsurface scattering (flatness), and sheen, section 5.6. wi is
+ * refused below the surface by the caller. */
+static spectrum diffuse_of(const struct stuff *s, vec3 wo, vec3 wi, double cos_d)
+{
+	const struct principled *p = s->p;
+	double fo = schlick(wo.z), fi = schlick(wi.z), retro = 2 * s->roughness * cos_d * cos_d;
+	double base = (1 - 0.5 * fo) * (1 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1));
+	double ss = (1 + (0.5 * retro - 1) * fo) * (1 + (0.5 * retro - 1) * fi);
+	double flat = 1.25 * (ss * (1 / fmax(wo.z + wi.z, 1e-300) - 0.5) + 0.5);
+	double diffuse = (1 - p->metallic) * (1 - p->transmission) * (base + p->flatness * (flat - base)) / WARP_PI;
+	double sheen = (1 - p->metallic) * p->sheen * schlick(cos_d);
+	spectrum f;
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		f.v[i] = diffuse * s->base.v[i] + sheen * (1 + p->sheen_tint * (s->tint.v[i] - 1));
+	return f;
+}
+
+/* GTR1: Burley 2012, appendix B.2. */
+static double clearcoat_d(const struct principled *p, double cos_h)
+{
+	double a2 = p->clearcoat_alpha * p->clearcoat_alpha;
+	return (a2 - 1) / (WARP_PI * log(a2) * (a2 * cos_h * cos_h + (1 - cos_h) * (1 + cos_h)));
+}
+
+static double clearcoat_of(const struct principled *p, vec3 wo, vec3 wi, vec3 h, double cos_d)
+{
+	struct microfacet shadow;
+	microfacet_set(&shadow, true, 0.25, 0.25);
+	double f = CLEARCOAT_REFLECTANCE + (1 - CLEARCOAT_REFLECTANCE) * schlick(cos_d);
+	return 0.25 * p->clearcoat * f * clearcoat_d(p, h.z) * 0.25 * microfacet_g1_over_cos(&shadow, wo) *
+	       microfacet_g1_over_cos(&shadow, wi);
+}
+
+/* Probabilities of the lobes for light from wo. */
+static void chances(const struct stuff *s, vec3 wo, double chance[LOBES])
+{
+	const struct principled *p = s->p;
+	bool below = wo.z < 0;
+	double clear = 1 - p->metallic, glass = clear * p->transmission;
+	double reflected = fresnel_dielectric(fmin(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflected, sum = 0;
+	/* Where the surface reflects totally, some facets do not. */
+	chance[LOBE_TRANSMIT] = glass * fmax(1 - reflected, 0.05);
+	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + p->metallic * fmax(p->base_max, 0.04);
+	chance[LOBE_DIFFUSE] = below ? 0 : clear * fmax((1 - p->transmission) * p->base_max, fmin(p->sheen, 1) * 0.2);
+	chance[LOBE_CLEARCOAT] = below ? 0 : 0.25 * p->clearcoat * (CLEARCOAT_REFLECTANCE + schlick(wo.z));
+	for (int i = 0; i < LOBES; i++)
+		sum += chance[i];
+	for (int i = 0; i < LOBES; i++)
+		chance[i] = sum > 0 ? chance[i] / sum : 0;
+}
+
+static vec3 mirror(vec3 v, bool below)
+{
+	return below ? (vec3){v.x, v.y, -v.z} : v;
+}
+
+/* The value and the density of one pair, side by side: they share most of their terms. wo.z is not 0. */
+struct pair {
+	spectrum f;
+	double pdf;
+};
+
+/* Refracted light: Walter et al. 2007, eq. 21, as in roughdielectric; wo above, eta: index beyond over index here. */
+static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, double chance, enum transport transport,
+			  struct pair *out)
+{
+	vec3 h;
+	double length;
+	if (!microfacet_half(wo, eta, wi, &h, &length))
+		return;
+	if (h.z < 0)
+		h = vec3_neg(h);
+	double co = vec3_dot(wo, h), ci = vec3_dot(wi, h);
+	if (!(co > 0 && ci < 0))
+		return;
+	double spread = co * -ci * (eta / length) * (eta / length);
+	double seen = microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo) * spread;
+	double passes =
+		(1 - s->p->metallic) * s->p->transmission * fresnel_between(fmin(co, 1), fmin(-ci, 1), eta).transmitted;
+	double f = seen * passes * microfacet_g1_over_cos(&s->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
+	if (transport == TRANSPORT_RADIANCE)
+		f /= eta * eta;
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		out->f.v[i] += f * sqrt(s->base.v[i]);
+	out->pdf += chance * seen;
+}
+
+static void add_reflected(const struct stuff *s, vec3 wo, vec3 wi, bool below, double eta, const double chance[LOBES],
+			  struct pair *out)
+{
+	const struct principled *p = s->p;
+	vec3 h;
+	double length;
+	if (!microfacet_half(wo, 1, wi, &h, &length))
+		return;
+	double cos_d = fmin(0.5 * length, 1),
+	       seen = 0.25 * microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo);
+	double both = seen * microfacet_g1_over_cos(&s->facets, wi);
+	out->pdf = chance[LOBE_SPECULAR] * seen;
+	if (below) {
+		out->f = spectrum_of(both * (1 - p->metallic) * p->transmission *
+				     fresnel_dielectric(cos_d, eta).reflected);
+		return;
+	}
+	out->f = spectrum_add(spectrum_scale(both, fresnel_of(s, cos_d)), diffuse_of(s, wo, wi, cos_d));
+	out->pdf += chance[LOBE_DIFFUSE] * wi.z / WARP_PI;
+	if (p->clearcoat > 0) {
+		out->f = spectrum_add(out->f, spectrum_of(clearcoat_of(p, wo, wi, h, cos_d)));
+		out->pdf += chance[LOBE_CLEARCOAT] * clearcoat_d(p, h.z) * h.z / (4 * cos_d);
+	}
+}
+
+static struct pair pair_of(const struct stuff *s, vec3 wo, vec3 wi, enum transport transport)
+{
+	struct pair out = {spectrum_of(0), 0};
+	bool below = wo.z < 0;
+	double chance[LOBES], eta = below ? 1 / s->p->eta : s->p->eta;
+	if (wo.z == 0 || wi.z == 0 || (below && !(s->p->transmission > 0 && s->p->metallic < 1)))
+		return out;
+	chances(s, wo, chance);
+	wo = mirror(wo, below);
+	wi = mirror(wi, below);
+	if (wi.z > 0)
+		add_reflected(s, wo, wi, below, eta, chance, &out);
+	else if (chance[LOBE_TRANSMIT] > 0)
+		add_refracted(s, wo, wi, eta, chance[LOBE_TRANSMIT], transport, &out);
+	return out;
+}
+
+static spectrum principled_eval(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, vec3 wi)
+{
+	struct stuff s = stuff_at(b, at);
+	return pair_of(&s, wo, wi, at->transport).f;
+}
+
+static double principled_pdf(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, vec3 wi)
+{
+	struct stuff s = stuff_at(b, at);
+	return pair_of(&s, wo, wi, at->transport).pdf;
+}
+
+/* A half vector of GTR1, exactly: the inverse of its cumulative density. */
+static vec3 clearcoat_normal(const struct principled *p, double u0, double u1)
+{
+	double a2 = p->clearcoat_alpha * p->clearcoat_alpha;
+	double cos2 = fmin(fmax((1 - pow(a2, 1 - u0)) / (1 - a2), 0), 1), sine = sqrt(1 - cos2), phi = 2 * WARP_PI * u1;
+	return (vec3){sine * cos(phi), sine * sin(phi), sqrt(cos2)};
+}
+
+/* From above. false: this facet sends nothing on. */
+static bool follow(const struct stuff *s, int lobe, vec3 wo, double eta, const double u[3], vec3 *wi)
+{
+	if (lobe == LOBE_DIFFUSE) {
+		*wi = warp_cosine_hemisphere(u[0], u[1]);
+		return wi->z > 0;
+	}
+	vec3 h = lobe == LOBE_CLEARCOAT ? clearcoat_normal(s->p, u[0], u[1])
+					: microfacet_sample_visible(&s->facets, wo, u[0], u[1]);
+	double c = fmin(vec3_dot(wo, h), 1);
+	if (!(c > 0))
+		return false;
+	if (lobe != LOBE_TRANSMIT) {
+		*wi = vec3_normalize(vec3_sub(vec3_scale(2 * c, h), wo));
+		return wi->z > 0;
+	}
+	struct fresnel at_h = fresnel_dielectric(c, eta);
+	*wi = vec3_normalize(vec3_madd(vec3_scale(-1 / eta, wo), c / eta - at_h.cos_t, h));
+	return at_h.transmitted > 0 && wi->z < 0;
+}
+
+static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, const double u[3],
+			      struct bsdf_sample *out)
+{
+	struct stuff s = stuff_at(b, at);
+	bool below = wo.z < 0;
+	double chance[LOBES], rest = u[2], eta = below ? 1 / s.p->eta : s.p->eta;
+	vec3 wi;
+	if (wo.z == 0)
+		return false;
+	chances(&s, wo, chance);
+	int lobe = 0;
+	while (lobe < LOBES - 1 && rest >= chance[lobe])
+		rest -= chance[lobe++];
+	if (!(chance[lobe] > 0) || !follow(&s, lobe, mirror(wo, below), eta, u, &wi))
+		return false;
+	wi = mirror(wi, below);
+	struct pair pair = pair_of(&s, wo, wi, at->transport);
+	if (!(pair.pdf > 0))
+		return false;
+	bool reflect = wo.z * wi.z > 0;
+	*out = (struct bsdf_sample){.wi = wi,
+				    .mode = reflect ? BSDF_REFLECT : BSDF_TRANSMIT,
+				    .pdf = pair.pdf,
+				    .f = pair.f,
+				    .eta = reflect ? 1 : eta};
+	return true;
+}
+
+/* The least roughness, of a texture on a grid: what step sizes go by. */
+static double least_roughness(const struct principled *p)
+{
+	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
+	enum { SIDE = 64 };
+	double least = 1;
+	for (int i = 0; i < SIDE * SIDE; i++) {
+		const struct bsdf_point at = {.u = (i / SIDE + 0.5) / SIDE, .v = (i % SIDE + 0.5) / SIDE, .w = &w};
+		least = fmin(least, roughness_at(p, &at));
+	}
+	return least;
+}
+
+static int read_index(struct principled *p, const struct scene_node *n, struct error *e)
+{
+	double specular = node_float(n, "specular", 0.5);
+	if (node_find(n, "eta") && node_find(n, "specular"))
+		return node_error(n, e, EINVAL, "eta and specular say the same: one of them");
+	/* Burley 2012, section 5.5: 0.08 times `specular` is reflected at normal incidence. */
+	p->eta = node_find(n, "eta") ? node_float(n, "eta", 1.5) : 2 / (1 - sqrt(0.08 * specular)) - 1;
+	p->eta = fmax(p->eta, 1 + 1e-3); /* Mitsuba's least, too: a boundary that is none refracts nothing */
+	return 0;
+}
+
+static int principled_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			     struct error *e)
+{
+	struct principled *p = bsdf_data(b, n, build, sizeof *p, e);
+	if (!p)
+		return -ENOMEM;
+	int code = bsdf_texture(b, &p->base, n, "base_color", 0.5, build, e);
+	if (!code)
+		code = bsdf_texture(b, &p->roughness, n, "roughness", 0.5, build, e);
+	if (!code)
+		code = read_index(p, n, e);
+	if (code)
+		return code;
+	p->metallic = node_float(n, "metallic", 0);
+	p->transmission = node_float(n, "spec_trans", 0);
+	p->spec_tint = node_float(n, "spec_tint", 0);
+	p->sheen = node_float(n, "sheen", 0);
+	p->sheen_tint = node_float(n, "sheen_tint", 0);
+	p->flatness = node_float(n, "flatness", 0);
+	p->clearcoat = node_float(n, "clearcoat", 0);
+	p->clearcoat_alpha = 0.1 + (0.001 - 0.1) * node_float(n, "clearcoat_gloss", 0);
+	p->aspect = sqrt(1 - 0.9 * node_float(n, "anisotropic", 0));
+	p->base_max = texture_max(&p->base);
+	struct microfacet least = facets_of(p, least_roughness(p));
+	bool glass = p->transmission > 0 && p->metallic < 1;
+	b->modes = BSDF_REFLECT | (glass ? BSDF_TRANSMIT : 0);
+	b->has_smooth = true;
+	b->two_sided = glass;
+	b->eta = glass ? p->eta : 1;
+	b->alpha = fmin(microfacet_least(&least), p->clearcoat > 0 ? p->clearcoat_alpha : INFINITY);
+	double diffuse = (1 - p->metallic) * (1 - p->transmission);
+	b->alpha_mean = diffuse + (1 - diffuse) * microfacet_mean(&least);
+	return 0;
+}
+
+#define SHARE(name_)                                                                \
+	{                                                                           \
+		.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1 \
+	}
+static const struct param principled_params[] = {
+	{.name = "base_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	{.name = "roughness", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	SHARE("metallic"),
+	SHARE("spec_trans"),
+	SHARE("spec_tint"),
+	SHARE("sheen"),
+	SHARE("sheen_tint"),
+	SHARE("flatness"),
+	SHARE("clearcoat"),
+	SHARE("clearcoat_gloss"),
+	SHARE("anisotropic"),
+	SHARE("specular"),
+	{.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
+	{.name = "diffuse_reflectance_sampling_rate", .status = PARAM_IGNORED},
+	{.name = "main_specular_sampling_rate", .status = PARAM_IGNORED},
+	{.name = "clearcoat_sampling_rate", .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+const struct bsdf_ops bsdf_ops_principled = {
+	.type = "principled",
+	.params = principled_params,
+	.create = principled_create,
+	.eval = principled_eval,
+	.pdf_solid = principled_pdf,
+	.sample = principled_sample,
+};

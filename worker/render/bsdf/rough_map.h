@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Microfacets whose roughness may come from textures. Private to worker/render/bsdf. */
+#ifndef WORKER_RENDER_BSDF_ROUGH_MAP_H
+#define WORKER_RENDER_BSDF_ROUGH_MAP_H
+
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/microfacet.h"
+
+struct rough_map {
+	struct microfacet fixed; /* where it varies: of the least roughness, found on a grid; step sizes go by it */
+	bool varies;
+	struct texture u, v; /* where it varies */
+};
+
+/* Parameters alpha, alpha_u, alpha_v, distribution. Enters texture and roughness into b. */
+int rough_map_read(struct rough_map *r, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+		   struct error *e);
+#define ROUGH_MAP_NUMBER(name_)                                                                   \
+	{                                                                                         \
+		.name = name_, .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = 10 \
+	}
+#define ROUGH_MAP_PARAMS                                                                     \
+	ROUGH_MAP_NUMBER("alpha"), ROUGH_MAP_NUMBER("alpha_u"), ROUGH_MAP_NUMBER("alpha_v"), \
+		{.name = "distribution", .types = VALUE_STRING, .choices = "beckmann|ggx"},  \
+	{                                                                                    \
+		.name = "sample_visible", .types = VALUE_BOOL, .status = PARAM_IGNORED       \
+	}
+
+struct microfacet rough_map_look_up(const struct rough_map *r, const struct bsdf_point *p);
+
+static inline struct microfacet rough_map_at(const struct rough_map *r, const struct bsdf_point *p)
+{
+	return r->varies ? rough_map_look_up(r, p) : r->fixed;
+}
+
+#endif

@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A rough metal on the side of the normal: Walter et al. 2007, eq. 20, visible normals sampled. */
+#include "worker/render/bsdf/metal.h"
+#include "worker/render/bsdf/rough_map.h"
+
+struct roughconductor {
+	struct metal metal; /* first: taken for smooth, the data is a conductor's */
+	struct rough_map roughness;
+};
+
+/* The facet between two directions. */
+struct facet {
+	vec3 h;
+	double cosine; /* against both */
+	double pdf;    /* D G1(wo) / 4 wo.z, the density of wi */
+};
+
+static bool facet_of(const struct microfacet *m, vec3 wo, vec3 wi, struct facet *f)
+{
+	double length;
+	if (!(wo.z > 0 && wi.z > 0) || !microfacet_half(wo, 1, wi, &f->h, &length))
+		return false;
+	f->cosine = 0.5 * length;
+	f->pdf = 0.25 * microfacet_d(m, f->h) * microfacet_g1_over_cos(m, wo);
+	return f->pdf > 0;
+}
+
+static spectrum facet_f(const struct roughconductor *r, const struct microfacet *m, const struct bsdf_point *p, vec3 wi,
+			const struct facet *f)
+{
+	return spectrum_scale(f->pdf * microfacet_g1_over_cos(m, wi), metal_fresnel(&r->metal, p, f->cosine));
+}
+
+static spectrum roughconductor_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct roughconductor *r = b->data;
+	struct microfacet m = rough_map_at(&r->roughness, p);
+	struct facet f;
+	return facet_of(&m, wo, wi, &f) ? facet_f(r, &m, p, wi, &f) : spectrum_of(0);
+}
+
+static spectrum roughconductor_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct roughconductor *r = b->data;
+	struct microfacet m = rough_map_at(&r->roughness, p);
+	struct facet f;
+	if (!facet_of(&m, wo, wi, &f))
+		return spectrum_of(0);
+	return spectrum_scale(4 * f.cosine * f.h.z * f.h.z * f.h.z * wi.z, facet_f(r, &m, p, wi, &f));
+}
+
+static double roughconductor_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct roughconductor *r = b->data;
+	struct microfacet m = rough_map_at(&r->roughness, p);
+	struct facet f;
+	return facet_of(&m, wo, wi, &f) ? f.pdf : 0;
+}
+
+static bool roughconductor_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+				  struct bsdf_sample *out)
+{
+	const struct roughconductor *r = b->data;
+	if (!(wo.z > 0))
+		return false;
+	struct microfacet m = rough_map_at(&r->roughness, p);
+	vec3 h = microfacet_sample_visible(&m, wo, u[0], u[1]);
+	vec3 wi = vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(wo, h), h), wo));
+	struct facet f;
+	if (!facet_of(&m, wo, wi, &f))
+		return false;
+	*out = (struct bsdf_sample){
+		.wi = wi, .mode = BSDF_REFLECT, .pdf = f.pdf, .f = facet_f(r, &m, p, wi, &f), .eta = 1};
+	return true;
+}
+
+static int roughconductor_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+				 struct error *e)
+{
+	struct roughconductor *r = bsdf_data(b, n, build, sizeof *r, e);
+	if (!r)
+		return -ENOMEM;
+	int code = rough_map_read(&r->roughness, b, n, build, e);
+	if (code)
+		return code;
+	b->modes = BSDF_REFLECT;
+	b->has_smooth = true;
+	if (!r->roughness.varies && b->alpha < build->least_roughness) {
+		extern const struct bsdf_ops bsdf_ops_conductor;
+		bsdf_make_smooth(b, &bsdf_ops_conductor);
+	}
+	return metal_read(&r->metal, b, n, build, e);
+}
+
+static const struct param roughconductor_params[] = {METAL_PARAMS, ROUGH_MAP_PARAMS, {.name = NULL}};
+
+const struct bsdf_ops bsdf_ops_roughconductor = {
+	.type = "roughconductor",
+	.params = roughconductor_params,
+	.create = roughconductor_create,
+	.eval = roughconductor_eval,
+	.pdf_solid = roughconductor_pdf,
+	.eval_halfvec = roughconductor_eval_halfvec,
+	.sample = roughconductor_sample,
+};

@@ -1,0 +1,197 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A rough boundary between two transparent media: Walter et al. 2007, eqs. 19-21, visible normals sampled, the mode
+ * chosen by Fresnel's factor at the microfacet. Everything is mirrored so that wo is on the side of the normal.
+ */
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/glass.h"
+#include "worker/render/bsdf/rough_map.h"
+
+struct roughdielectric {
+	struct glass glass; /* first: so it is asked for its index, and with equal indices the data is a smooth
+			       dielectric's */
+	struct rough_map roughness;
+};
+
+/* A pair of directions as the facets see it. */
+struct facet {
+	vec3 h;	    /* on wo's side */
+	double d;   /* distribution x G1(wo) / |wo.z| */
+	double eta; /* index beyond over index on wo's side */
+	struct fresnel fresnel;
+	double cos_o, cos_i; /* against h; cos_i < 0 when refracted */
+	double length;	     /* of wo + wi or wo + eta wi */
+};
+
+/* wo.z > 0. false: no facet connects the two. Fresnel's factors come from both cosines: next to the critical angle one
+ * alone says little about the other. */
+static bool facet_of(const struct microfacet *m, double eta, vec3 wo, vec3 wi, struct facet *f)
+{
+	bool reflect = wi.z > 0;
+	if (wi.z == 0 || (!reflect && eta == 1) || !microfacet_half(wo, reflect ? 1 : eta, wi, &f->h, &f->length))
+		return false;
+	if (f->h.z < 0)
+		f->h = vec3_neg(f->h);
+	f->eta = eta;
+	if (reflect) {
+		f->cos_o = f->cos_i = 0.5 * f->length;
+		f->fresnel = fresnel_dielectric(fmin(f->cos_o, 1), eta);
+	} else {
+		f->cos_o = vec3_dot(wo, f->h);
+		f->cos_i = vec3_dot(wi, f->h);
+		/* Facets are seen from the side that the surface is seen from. */
+		if (!(f->cos_o > 0 && f->cos_i < 0))
+			return false;
+		f->fresnel = fresnel_between(fmin(f->cos_o, 1), fmin(-f->cos_i, 1), eta);
+	}
+	f->d = microfacet_d(m, f->h) * microfacet_g1_over_cos(m, wo);
+	return f->d > 0;
+}
+
+/* Cosine against h times the solid angle of h over that of wi. */
+static double facet_spread(const struct facet *f, bool reflect)
+{
+	if (reflect)
+		return 0.25;
+	double root = f->eta / f->length;
+	return f->cos_o * -f->cos_i * root * root;
+}
+
+static vec3 mirror(vec3 v, bool below)
+{
+	return below ? (vec3){v.x, v.y, -v.z} : v;
+}
+
+/* What Fresnel and the transport leave of light. */
+static spectrum share(const struct roughdielectric *r, const struct bsdf_point *p, const struct facet *f, bool reflect,
+		      enum transport transport)
+{
+	if (reflect)
+		return spectrum_scale(f->fresnel.reflected, texture_eval(&r->glass.reflectance, p->u, p->v, p->w));
+	double scale = transport == TRANSPORT_RADIANCE ? 1 / (f->eta * f->eta) : 1;
+	return spectrum_scale(f->fresnel.transmitted * scale, texture_eval(&r->glass.transmittance, p->u, p->v, p->w));
+}
+
+/* G1(wi) / |wi.z| on whichever side. */
+static double g1_over_cos(const struct microfacet *m, vec3 wi)
+{
+	return microfacet_g1_over_cos(m, (vec3){wi.x, wi.y, fabs(wi.z)});
+}
+
+static spectrum facet_f(const struct roughdielectric *r, const struct microfacet *m, const struct bsdf_point *p,
+			const struct facet *f, vec3 wi)
+{
+	double common = f->d * g1_over_cos(m, wi) * facet_spread(f, wi.z > 0);
+	return spectrum_scale(common, share(r, p, f, wi.z > 0, p->transport));
+}
+
+static double facet_pdf(const struct facet *f, vec3 wi)
+{
+	return f->d * facet_spread(f, wi.z > 0) * (wi.z > 0 ? f->fresnel.reflected : f->fresnel.transmitted);
+}
+
+/* Seen with wo on the side of the normal. */
+static bool facet_between(const struct bsdf *b, const struct microfacet *m, const struct bsdf_point *p, vec3 wo,
+			  vec3 *wi, struct facet *f)
+{
+	bool below = wo.z < 0;
+	double eta = bsdf_eta(b, p->w);
+	*wi = mirror(*wi, below);
+	return wo.z != 0 && facet_of(m, below ? 1 / eta : eta, mirror(wo, below), *wi, f);
+}
+
+static spectrum roughdielectric_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct roughdielectric *r = b->data;
+	struct microfacet m = rough_map_at(&r->roughness, p);
+	struct facet f;
+	return facet_between(b, &m, p, wo, &wi, &f) ? facet_f(r, &m, p, &f, wi) : spectrum_of(0);
+}
+
+/* Neither the solid angle of h over that of wi nor its inverse: both go to extremes as eta goes to 1. */
+static spectrum roughdielectric_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct roughdielectric *r = b->data;
+	struct microfacet m = rough_map_at(&r->roughness, p);
+	struct facet f;
+	if (!facet_between(b, &m, p, wo, &wi, &f))
+		return spectrum_of(0);
+	double common = f.d * f.h.z * f.h.z * f.h.z * f.cos_o * g1_over_cos(&m, wi) * fabs(wi.z);
+	return spectrum_scale(common, share(r, p, &f, wi.z > 0, TRANSPORT_RADIANCE));
+}
+
+static double roughdielectric_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct roughdielectric *r = b->data;
+	struct microfacet m = rough_map_at(&r->roughness, p);
+	struct facet f;
+	return facet_between(b, &m, p, wo, &wi, &f) ? facet_pdf(&f, wi) : 0;
+}
+
+static bool roughdielectric_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+				   struct bsdf_sample *out)
+{
+	const struct roughdielectric *r = b->data;
+	bool below = wo.z < 0;
+	if (wo.z == 0)
+		return false;
+	wo = mirror(wo, below);
+	double ratio = bsdf_eta(b, p->w), eta = below ? 1 / ratio : ratio;
+	struct microfacet m = rough_map_at(&r->roughness, p);
+	vec3 h = microfacet_sample_visible(&m, wo, u[0], u[1]), wi;
+	double c = fmin(vec3_dot(wo, h), 1);
+	if (!(c > 0))
+		return false;
+	struct fresnel at_h = fresnel_dielectric(c, eta);
+	bool reflect = u[2] < at_h.reflected;
+	if (reflect)
+		wi = vec3_sub(vec3_scale(2 * c, h), wo);
+	else
+		wi = vec3_madd(vec3_scale(-1 / eta, wo), c / eta - at_h.cos_t, h);
+	wi = vec3_normalize(wi);
+	struct facet f;
+	if (reflect != (wi.z > 0) || !facet_of(&m, eta, wo, wi, &f))
+		return false;
+	double pdf = facet_pdf(&f, wi);
+	if (!(pdf > 0))
+		return false;
+	*out = (struct bsdf_sample){.wi = mirror(wi, below),
+				    .mode = reflect ? BSDF_REFLECT : BSDF_TRANSMIT,
+				    .pdf = pdf,
+				    .f = facet_f(r, &m, p, &f, wi),
+				    .eta = reflect ? 1 : eta};
+	return true;
+}
+
+static int roughdielectric_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+				  struct error *e)
+{
+	struct roughdielectric *r = bsdf_data(b, n, build, sizeof *r, e);
+	if (!r)
+		return -ENOMEM;
+	int code = rough_map_read(&r->roughness, b, n, build, e);
+	if (!code)
+		code = glass_read(&r->glass, b, n, build, e);
+	if (code)
+		return code;
+	b->modes = BSDF_REFLECT | BSDF_TRANSMIT;
+	b->has_smooth = true;
+	/* With equal indices no facet bends light: all of it goes straight on. */
+	if ((b->eta == 1 && !b->dispersive) || (!r->roughness.varies && b->alpha < build->least_roughness)) {
+		extern const struct bsdf_ops bsdf_ops_dielectric;
+		bsdf_make_smooth(b, &bsdf_ops_dielectric);
+	}
+	return 0;
+}
+
+static const struct param roughdielectric_params[] = {GLASS_PARAMS, ROUGH_MAP_PARAMS, {.name = NULL}};
+
+const struct bsdf_ops bsdf_ops_roughdielectric = {
+	.type = "roughdielectric",
+	.params = roughdielectric_params,
+	.create = roughdielectric_create,
+	.eval = roughdielectric_eval,
+	.pdf_solid = roughdielectric_pdf,
+	.eval_halfvec = roughdielectric_eval_halfvec,
+	.sample = roughdielectric_sample,
+};

@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A matt surface of grooves, on the side of the normal: Oren and Nayar 1994, eq. 30 and 31, or with use_fast_approx the
+ * first two terms (their sec. 4.4). sigma, the slopes' deviation, is alpha over the root of two, so that alpha means
+ * what it does for Beckmann's facets.
+ */
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/warp.h"
+
+struct roughdiffuse {
+	struct texture reflectance;
+	double a, b, c, d; /* C1, C2, C3 and the factor of the light that bounces twice */
+};
+
+static double cube(double x)
+{
+	return x * x * x;
+}
+
+/* Factors of the reflectance and of its square, times pi. */
+static void factors(const struct roughdiffuse *r, vec3 wo, vec3 wi, double *once, double *twice)
+{
+	double so = sqrt(fmax(1 - wo.z * wo.z, 0)), si = sqrt(fmax(1 - wi.z * wi.z, 0)), s = so * si;
+	double across =
+		s > 0 ? fmin(fmax((wo.x * wi.x + wo.y * wi.y) / s, -1), 1) : 0; /* cosine of the azimuths' difference */
+	bool lower = wo.z < wi.z;						/* wo has the larger angle */
+	double sine = lower ? so : si, tangent = lower ? si / wi.z : so / wo.z;
+	if (r->c == 0) {
+		*once = r->a + r->b * fmax(across, 0) * sine * tangent;
+		*twice = 0;
+		return;
+	}
+	double alpha = acos(fmin(lower ? wo.z : wi.z, 1)), beta = acos(fmin(lower ? wi.z : wo.z, 1));
+	double b = r->b * (across > 0 ? sine : sine - cube(2 * beta / WARP_PI));
+	double q = 4 * alpha * beta / (WARP_PI * WARP_PI),
+	       half = (so + si) / (wo.z + wi.z); /* tan((alpha + beta) / 2) */
+	*once = r->a + across * b * tangent + (1 - fabs(across)) * r->c * q * q * half;
+	*twice = r->d * (1 - across * (2 * beta / WARP_PI) * (2 * beta / WARP_PI));
+}
+
+static spectrum roughdiffuse_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct roughdiffuse *r = b->data;
+	double once, twice;
+	if (!(wo.z > 0 && wi.z > 0))
+		return spectrum_of(0);
+	factors(r, wo, wi, &once, &twice);
+	spectrum rho = texture_eval(&r->reflectance, p->u, p->v, p->w);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		rho.v[i] = fmax(rho.v[i] * (once + twice * rho.v[i]), 0) / WARP_PI;
+	return rho;
+}
+
+static double roughdiffuse_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p;
+	return wo.z > 0 && wi.z > 0 ? wi.z / WARP_PI : 0;
+}
+
+static bool roughdiffuse_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+				struct bsdf_sample *out)
+{
+	vec3 wi = warp_cosine_hemisphere(u[0], u[1]);
+	if (!(wo.z > 0 && wi.z > 0))
+		return false;
+	*out = (struct bsdf_sample){.wi = wi,
+				    .mode = BSDF_REFLECT,
+				    .pdf = roughdiffuse_pdf(b, p, wo, wi),
+				    .f = roughdiffuse_eval(b, p, wo, wi),
+				    .eta = 1};
+	return true;
+}
+
+static int roughdiffuse_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+			       struct error *e)
+{
+	struct roughdiffuse *r = bsdf_data(b, n, build, sizeof *r, e);
+	if (!r)
+		return -ENOMEM;
+	double alpha = node_float(n, "alpha", 0.2), s2 = 0.5 * alpha * alpha;
+	bool fast = node_bool(n, "use_fast_approx", false);
+	r->a = 1 - 0.5 * s2 / (s2 + 0.33);
+	r->b = 0.45 * s2 / (s2 + 0.09);
+	r->c = fast ? 0 : 0.125 * s2 / (s2 + 0.09);
+	r->d = fast ? 0 : 0.17 * s2 / (s2 + 0.13);
+	b->modes = BSDF_REFLECT;
+	b->has_smooth = true;
+	b->alpha_mean = 1;
+	int code = bsdf_texture(b, &r->reflectance, n, "reflectance", 0.5, build, e);
+	b->black = !code && texture_max(&r->reflectance) == 0;
+	return code;
+}
+
+static const struct param roughdiffuse_params[] = {
+	{.name = "reflectance", .types = VALUE_TEXTURE, .max = 1},
+	{.name = "alpha", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
+	{.name = "use_fast_approx", .types = VALUE_BOOL},
+	{.name = NULL},
+};
+
+const struct bsdf_ops bsdf_ops_roughdiffuse = {
+	.type = "roughdiffuse",
+	.params = roughdiffuse_params,
+	.create = roughdiffuse_create,
+	.eval = roughdiffuse_eval,
+	.pdf_solid = roughdiffuse_pdf,
+	.sample = roughdiffuse_sample,
+};

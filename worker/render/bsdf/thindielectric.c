@@ -1,0 +1,105 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A sheet of glass without thickness: light that is let in goes straight on, reflections between its two sides included
+ * (R' = 2 R / (1 + R) where R is Fresnel's share at one side, as in Mitsuba). The way through is not bent: eta is 1.
+ */
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/ior.h"
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/microfacet.h"
+
+#include <float.h>
+
+struct thin {
+	struct texture reflectance, transmittance;
+	double eta; /* of the glass over what is around it */
+};
+
+static spectrum thin_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return spectrum_of(0);
+}
+
+static double thin_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p, (void)wo, (void)wi;
+	return 0;
+}
+
+/* 2 R / (1 + R) and (1 - R) / (1 + R); neither loses digits where it is small. */
+static struct fresnel sheet(const struct thin *t, vec3 wo)
+{
+	struct fresnel f = fresnel_dielectric(fmin(fabs(wo.z), 1), t->eta);
+	double both = 1 / (1 + f.reflected);
+	return (struct fresnel){2 * f.reflected * both, f.transmitted * both, 0};
+}
+
+static spectrum thin_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				double *chance)
+{
+	const struct thin *t = b->data;
+	struct fresnel f = sheet(t, wo);
+	bool reflect = mode & BSDF_REFLECT;
+	double share = reflect ? f.reflected : f.transmitted;
+	if (!(fabs(wo.z) >= DBL_MIN && share > 0)) /* 1 / wo.z must be finite */
+		return spectrum_of(0);
+	*wi = (vec3){-wo.x, -wo.y, reflect ? wo.z : -wo.z};
+	*chance = share;
+	return spectrum_scale(share, texture_eval(reflect ? &t->reflectance : &t->transmittance, p->u, p->v, p->w));
+}
+
+static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			struct bsdf_sample *out)
+{
+	bool reflect = u[2] < sheet(b->data, wo).reflected;
+	*out = (struct bsdf_sample){.mode = (reflect ? BSDF_REFLECT : BSDF_TRANSMIT) | BSDF_DELTA, .eta = 1};
+	spectrum weight = thin_eval_delta(b, p, wo, out->mode, &out->wi, &out->pdf);
+	if (!(out->pdf > 0))
+		return false;
+	out->f = spectrum_scale(1 / fabs(wo.z), weight);
+	return true;
+}
+
+static int thin_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct thin *t = bsdf_data(b, n, build, sizeof *t, e);
+	double inside, outside;
+	if (!t)
+		return -ENOMEM;
+	int code = ior_read(n, "int_ior", IOR_BK7_DEFAULT, &inside, e);
+	if (!code)
+		code = ior_read(n, "ext_ior", IOR_AIR_DEFAULT, &outside, e);
+	if (!code)
+		code = bsdf_texture(b, &t->reflectance, n, "specular_reflectance", 1, build, e);
+	if (!code)
+		code = bsdf_texture(b, &t->transmittance, n, "specular_transmittance", 1, build, e);
+	if (code)
+		return code;
+	t->eta = inside / outside;
+	b->modes = BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA;
+	b->has_delta = true;
+	b->two_sided = true;
+	b->alpha = b->alpha_mean = 0;
+	b->black = texture_max(&t->reflectance) == 0 && texture_max(&t->transmittance) == 0;
+	return 0;
+}
+
+static const struct param thin_params[] = {
+	IOR_NUMBER("int_ior"),
+	IOR_NUMBER("ext_ior"),
+	{.name = "specular_reflectance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	{.name = "specular_transmittance", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	MICROFACET_PARAMS_IGNORED,
+	{.name = NULL},
+};
+
+const struct bsdf_ops bsdf_ops_thindielectric = {
+	.type = "thindielectric",
+	.params = thin_params,
+	.create = thin_create,
+	.eval = thin_eval,
+	.pdf_solid = thin_pdf,
+	.eval_delta = thin_eval_delta,
+	.sample = thin_sample,
+};

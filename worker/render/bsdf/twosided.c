@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* One or two opaque BSDFs: the first on the side of the normal, the second (or the first again) on the other. */
+#include "worker/render/bsdf/create.h"
+
+extern const struct bsdf_ops bsdf_ops_twosided;
+
+struct twosided {
+	struct bsdf side[2]; /* front, back */
+};
+
+static vec3 mirror(vec3 v)
+{
+	return (vec3){v.x, v.y, -v.z};
+}
+
+static spectrum twosided_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct twosided *t = b->data;
+	if (wo.z > 0)
+		return t->side[0].ops->eval(&t->side[0], p, wo, wi);
+	return t->side[1].ops->eval(&t->side[1], p, mirror(wo), mirror(wi));
+}
+
+static double twosided_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct twosided *t = b->data;
+	if (wo.z > 0)
+		return t->side[0].ops->pdf_solid(&t->side[0], p, wo, wi);
+	return t->side[1].ops->pdf_solid(&t->side[1], p, mirror(wo), mirror(wi));
+}
+
+static spectrum twosided_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct twosided *t = b->data;
+	if (wo.z > 0)
+		return bsdf_eval_halfvec(&t->side[0], p, wo, wi);
+	return bsdf_eval_halfvec(&t->side[1], p, mirror(wo), mirror(wi));
+}
+
+static spectrum twosided_eval_delta(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, unsigned mode, vec3 *wi,
+				    double *chance)
+{
+	const struct twosided *t = b->data;
+	if (wo.z > 0)
+		return bsdf_eval_delta(&t->side[0], p, wo, mode, wi, chance);
+	spectrum weight = bsdf_eval_delta(&t->side[1], p, mirror(wo), mode, wi, chance);
+	if (!spectrum_is_zero(weight))
+		*wi = mirror(*wi);
+	return weight;
+}
+
+static bool twosided_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			    struct bsdf_sample *out)
+{
+	const struct twosided *t = b->data;
+	if (wo.z > 0)
+		return t->side[0].ops->sample(&t->side[0], p, wo, u, out);
+	if (!t->side[1].ops->sample(&t->side[1], p, mirror(wo), u, out))
+		return false;
+	out->wi = mirror(out->wi);
+	return true;
+}
+
+int bsdf_mirror_back(struct bsdf *b, struct arena *arena, struct error *e)
+{
+	if (b->two_sided || (b->modes & BSDF_TRANSMIT) || !b->modes)
+		return 0;
+	struct twosided *t = arena_alloc(arena, 1, sizeof *t);
+	if (!t)
+		return error_set(e, ENOMEM, "out of memory");
+	t->side[0] = t->side[1] = *b;
+	b->data = t;
+	b->ops = &bsdf_ops_twosided;
+	b->two_sided = true;
+	return 0;
+}
+
+static int twosided_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct twosided *t = bsdf_data(b, n, build, sizeof *t, e);
+	if (!t)
+		return -ENOMEM;
+	if (!node_child(n, PLUGIN_BSDF, 0) || node_child(n, PLUGIN_BSDF, 2))
+		return node_error(n, e, EINVAL, "twosided takes one or two nested BSDFs");
+	for (uint32_t i = 0; i < 2; i++) {
+		const struct scene_node *inner = node_child(n, PLUGIN_BSDF, i);
+		if (!inner) {
+			t->side[i] = t->side[0];
+			continue;
+		}
+		int code = bsdf_create(&t->side[i], inner, build, e);
+		if (code)
+			return code;
+		if (t->side[i].two_sided)
+			return node_error(inner, e, EINVAL,
+					  "\"%s\" has two sides already; twosided takes only opaque ones", inner->type);
+	}
+	for (int i = 0; i < 2; i++) {
+		int code = bsdf_take_relief(b, &t->side[i], i == 0, n, e);
+		if (code)
+			return code;
+	}
+	b->two_sided = true;
+	b->black = t->side[0].black && t->side[1].black;
+	b->alpha = fmin(t->side[0].has_smooth ? t->side[0].alpha : INFINITY,
+			t->side[1].has_smooth ? t->side[1].alpha : INFINITY);
+	for (int i = 0; i < 2; i++) {
+		b->modes |= t->side[i].modes;
+		b->has_smooth |= t->side[i].has_smooth;
+		b->has_delta |= t->side[i].has_delta;
+		b->textured |= t->side[i].textured;
+		bsdf_add_shape(b, t->side[i].shape);
+	}
+	if (!b->has_smooth)
+		b->alpha = 0;
+	/* Nothing says from which side light comes: both count the same. */
+	int smooth = t->side[0].has_smooth + t->side[1].has_smooth;
+	b->alpha_mean = smooth ? (t->side[0].alpha_mean + t->side[1].alpha_mean) / smooth : 0;
+	return 0;
+}
+
+static const struct param twosided_params[] = {{.name = NULL}};
+
+const struct bsdf_ops bsdf_ops_twosided = {
+	.type = "twosided",
+	.params = twosided_params,
+	.nested_classes = 1u << PLUGIN_BSDF,
+	.create = twosided_create,
+	.eval = twosided_eval,
+	.pdf_solid = twosided_pdf,
+	.eval_halfvec = twosided_eval_halfvec,
+	.eval_delta = twosided_eval_delta,
+	.sample = twosided_sample,
+};

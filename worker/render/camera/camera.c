@@ -1,0 +1,181 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/camera/camera.h"
+
+#include <string.h>
+
+/* Pixels per unit of slope: the same for both axes, so `smaller` and the like only choose which side the angle spans.
+ */
+static double pixels_per_slope(const struct scene_settings *s)
+{
+	double w = s->width, h = s->height, side = w;
+	if (strcmp(s->fov_axis, "y") == 0)
+		side = h;
+	else if (strcmp(s->fov_axis, "diagonal") == 0)
+		side = hypot(w, h);
+	else if (strcmp(s->fov_axis, "smaller") == 0)
+		side = fmin(w, h);
+	else if (strcmp(s->fov_axis, "larger") == 0)
+		side = fmax(w, h);
+	return side / (2 * tan(s->fov * (M_PI / 360)));
+}
+
+/* An orthographic camera is a pinhole so far behind that what is twice as far away looks smaller by a part in 2^20
+ * only: a thousandth of a pixel in a film of 1,000. */
+static void step_back(struct camera *c, double half_width)
+{
+	double distance = 0x1p20 * fmax(1, half_width);
+	c->position = vec3_madd(c->position, -distance, c->axes.n);
+	c->near_clip += distance;
+	c->far_clip += distance;
+	c->scale = 0.5 * c->width * distance / half_width;
+}
+
+int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_center, double world_scale,
+		struct error *e)
+{
+	if (!(s->half_width > 0) && !(s->fov > 0 && s->fov < 180))
+		return error_set(e, EINVAL, "the sensor's field of view of %g degrees is not between 0 and 180",
+				 s->fov);
+	vec3 forward = mat4_vector(&s->to_world, (vec3){0, 0, 1});
+	vec3 up = mat4_vector(&s->to_world, (vec3){0, 1, 0});
+	vec3 left = mat4_vector(&s->to_world, (vec3){1, 0, 0});
+	double volume = fabs(vec3_dot(left, vec3_cross(up, forward)));
+	if (!(volume > 0) || !isfinite(volume))
+		return error_set(e, EINVAL, "the sensor's to_world transform is singular");
+	/* A mirrored transform gives a mirrored image, as in Mitsuba: the axes are taken as they come. */
+	c->axes.n = vec3_normalize(forward);
+	c->axes.s = vec3_neg(vec3_normalize(left));
+	c->axes.t = vec3_neg(vec3_normalize(up));
+	c->position = vec3_scale(world_scale, vec3_sub(mat4_point(&s->to_world, (vec3){0, 0, 0}), world_center));
+	c->width = s->width;
+	c->height = s->height;
+	c->center_x = s->width * (0.5 - s->principal_x);
+	c->center_y = s->height * (0.5 - s->principal_y);
+	c->scale = s->half_width > 0 ? 0 : pixels_per_slope(s);
+	c->near_clip = s->near_clip * world_scale;
+	c->far_clip = s->far_clip * world_scale;
+	c->aperture = s->aperture_radius * world_scale;
+	c->focus = s->focus_distance * world_scale;
+	c->lens = c->aperture > 0;
+	if (s->half_width > 0)
+		step_back(c, s->half_width * world_scale);
+	double away = vec3_length(c->position) + c->aperture;
+	if (!(away <= PARAM_REACH_MAX))
+		return error_set(e, ERANGE, "the camera stands %g times the scene's radius away from it, beyond %g",
+				 away, PARAM_REACH_MAX);
+	if (!(c->aperture >= 0) || (c->aperture > 0 && !(c->focus > 0)))
+		return error_set(e, EINVAL, "an aperture of radius %g, focused at a distance of %g", s->aperture_radius,
+				 s->focus_distance);
+	return 0;
+}
+
+bool camera_has_aperture(const struct camera *c)
+{
+#ifdef HSLT_PLAIN
+	(void)c;
+	return false;
+#else
+	return c->lens;
+#endif
+}
+
+void camera_force_aperture(struct camera *c, bool on)
+{
+	c->lens = on;
+	if (!on)
+		c->aperture = 0;
+	else if (!(c->focus > 0))
+		c->focus = 1; /* any: nothing lies off the centre */
+}
+
+/* The unit square onto the unit disk: concentric squares become circles, areas keep their ratios. */
+static void disk_from_square(const double u[2], double *x, double *y)
+{
+	double a = 2 * u[0] - 1, b = 2 * u[1] - 1;
+	bool wide = fabs(a) > fabs(b);
+	double r = wide ? a : b, angle = r == 0 ? 0 : M_PI / 4 * (wide ? b : a) / r;
+	*x = r * (wide ? cos(angle) : sin(angle));
+	*y = r * (wide ? sin(angle) : cos(angle));
+}
+
+static void square_from_disk(double x, double y, double u[2])
+{
+	bool wide = fabs(x) > fabs(y);
+	double r = copysign(hypot(x, y), wide ? x : y), other = r * (4 / M_PI) *
+								(wide	  ? atan(y / x)
+								 : y == 0 ? 0
+									  : atan(x / y));
+	double a[2] = {wide ? r : other, wide ? other : r};
+	for (int i = 0; i < 2; i++)
+		u[i] = fmin(fmax(0.5 * (a[i] + 1), 0), 1 - 0x1p-53);
+}
+
+/* On the aperture: x_k less the centre, along the image's axes. */
+static void aperture_offset(const struct camera *c, vec3 x_k, double *x, double *y)
+{
+	vec3 offset = vec3_sub(x_k, c->position);
+	*x = vec3_dot(c->axes.s, offset);
+	*y = vec3_dot(c->axes.t, offset);
+}
+
+vec3 camera_point(const struct camera *c, const double u[2])
+{
+	double x, y;
+	if (!camera_has_aperture(c))
+		return c->position;
+	disk_from_square(u, &x, &y);
+	return vec3_madd(vec3_madd(c->position, c->aperture * x, c->axes.s), c->aperture * y, c->axes.t);
+}
+
+void camera_point_inverse(const struct camera *c, vec3 p, double u[2])
+{
+	double x, y;
+	u[0] = u[1] = 0.5;
+	if (!(c->aperture > 0))
+		return;
+	aperture_offset(c, p, &x, &y);
+	square_from_disk(x / c->aperture, y / c->aperture, u);
+}
+
+vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double film_y)
+{
+	vec3 l = {(film_x - c->center_x) / c->scale, (film_y - c->center_y) / c->scale, 1};
+	if (camera_has_aperture(c)) {
+		double x, y;
+		aperture_offset(c, x_k, &x, &y);
+		l.x -= x / c->focus;
+		l.y -= y / c->focus;
+	}
+	return vec3_normalize(frame_to_world(&c->axes, l));
+}
+
+bool camera_project(const struct camera *c, vec3 x_k, vec3 d, double distance, double *film_x, double *film_y)
+{
+	vec3 l = frame_to_local(&c->axes, d);
+	double depth = l.z * distance;
+	if (!(l.z > 0) || depth < c->near_clip || depth > c->far_clip)
+		return false;
+	double slope_x = l.x / l.z, slope_y = l.y / l.z;
+	if (camera_has_aperture(c)) {
+		double x, y;
+		aperture_offset(c, x_k, &x, &y);
+		slope_x += x / c->focus;
+		slope_y += y / c->focus;
+	}
+	*film_x = c->center_x + c->scale * slope_x;
+	*film_y = c->center_y + c->scale * slope_y;
+	return isfinite(*film_x) && isfinite(*film_y);
+}
+
+double camera_jac_film_from_solid(const struct camera *c, vec3 d)
+{
+	double cosine = vec3_dot(c->axes.n, d);
+	return c->scale * c->scale / (cosine * cosine * cosine);
+}
+
+void camera_clip(const struct camera *c, vec3 d, double *t_min, double *t_max)
+{
+	double cosine = vec3_dot(c->axes.n, d);
+	*t_min = c->near_clip / cosine;
+	*t_max = c->far_clip / cosine;
+}

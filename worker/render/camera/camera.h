@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The camera: a pinhole (Mitsuba's `perspective`; far away, `orthographic`) or an ideal thin lens (`thinlens`). Film
+ * coordinates are pixels of the full film, x to the right, y down.
+ *
+ * A path's camera end x_k is the pinhole, or a point of the aperture, a disk around the camera's position across its
+ * axis (Kolb, Mitchell, Hanrahan 1995, sec. 3). A film point and x_k give the ray: from x_k to where the pinhole's ray
+ * through the film point meets the plane of focus, `focus` along the axis. A plane across the axis is thus imaged
+ * sharp, and the slope of the ray is that of the pinhole's less the offset of x_k over `focus`: pixels per solid angle
+ * do not depend on x_k.
+ *
+ * Measures: area on the aperture counts in units of the aperture's area, so that x_k, uniform, has density 1;
+ * `jac_film_from_solid` is pixel area per solid angle of directions leaving x_k; importance is measured per pixel area,
+ * so that a path tracer's sample of one film point carries plain radiance. Lengths: the rescaled world. Immutable; any
+ * thread; allocates nothing.
+ */
+#ifndef WORKER_RENDER_CAMERA_CAMERA_H
+#define WORKER_RENDER_CAMERA_CAMERA_H
+
+#include "worker/render/math/frame.h"
+#include "worker/render/scene/settings.h"
+
+struct camera {
+	vec3 position;		     /* the pinhole, or the centre of the aperture */
+	struct frame axes;	     /* s: right on the image, t: down, n: forward */
+	double width, height, scale; /* pixels; scale: pixels per unit of slope */
+	double center_x,
+		center_y; /* the film point on the axis: the film's middle but for the principal point's offset */
+	double near_clip, far_clip; /* along the axis, in the rescaled world */
+	bool lens;		    /* x_k is drawn and moved: the radius is above 0, or that was forced */
+	double aperture, focus;	    /* radius; distance of the plane of focus along the axis */
+};
+
+/* -EINVAL with a sentence when the field of view is not within (0,180) degrees, the transform is singular, or a lens is
+ * focused on nothing in front of it. */
+int camera_init(struct camera *c, const struct scene_settings *s, vec3 world_center, double world_scale,
+		struct error *e);
+
+bool camera_has_aperture(const struct camera *c);
+/* x_k is drawn and moved even where the radius is 0; or any camera becomes a pinhole. */
+void camera_force_aperture(struct camera *c, bool on);
+/* x_k from two numbers in [0,1), uniform on the aperture (Shirley and Chiu 1997); the pinhole's position without one.
+ */
+vec3 camera_point(const struct camera *c, const double u[2]);
+/* The numbers in [0,1) that give p, a point of the aperture; 1/2, 1/2 without one. */
+void camera_point_inverse(const struct camera *c, vec3 p, double u[2]);
+
+/* The unit direction in which light of a film point leaves x_k. */
+vec3 camera_direction(const struct camera *c, vec3 x_k, double film_x, double film_y);
+/* The film point that sees, through x_k, along the unit direction d. false: behind the camera or outside near and far.
+ * distance: from x_k to the point seen. */
+bool camera_project(const struct camera *c, vec3 x_k, vec3 d, double distance, double *film_x, double *film_y);
+/* The same for all x_k. */
+double camera_jac_film_from_solid(const struct camera *c, vec3 d);
+/* Along d from x_k, where the near and far planes are. */
+void camera_clip(const struct camera *c, vec3 d, double *t_min, double *t_max);
+
+#endif

@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/chain/chain.h"
+
+#include "common/base/mem.h"
+#include "worker/render/chain/bytes.h"
+
+#include <string.h>
+
+void chain_count(struct chain *c, bool accepted)
+{
+	uint64_t *counters = c->context->counters;
+	if (accepted) {
+		counters[COUNT_ACCEPTED]++;
+		c->rejected_run = 0;
+		return;
+	}
+	c->rejected_run++;
+	if (c->rejected_run > counters[COUNT_LONGEST_STUCK])
+		counters[COUNT_LONGEST_STUCK] = c->rejected_run;
+}
+
+void chain_put_head(const struct chain *c, uint8_t *bytes)
+{
+	put64(bytes, c->id);
+	put64(bytes + 8, c->step);
+	put64(bytes + 16, c->rejected_run);
+}
+
+bool chain_get_head(struct chain *c, const uint8_t *bytes, size_t size)
+{
+	if (size < CHAIN_STATE_HEAD || get64(bytes) != c->id || get64(bytes + 8) != c->step ||
+	    get64(bytes + 16) > c->step)
+		return false;
+	c->rejected_run = get64(bytes + 16);
+	return true;
+}
+
+int chain_give(const uint8_t *bytes, size_t size, struct chain_state *out)
+{
+	out->size = (uint32_t)size;
+	out->bytes = mem_alloc(size, 1);
+	if (!out->bytes)
+		return -ENOMEM;
+	memcpy(out->bytes, bytes, size);
+	return 0;
+}

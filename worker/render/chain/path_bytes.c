@@ -1,0 +1,243 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Paths as bytes. A vertex on a surface is written as what its point was made of (the primitive, and barycentrics or
+ * the direction from a sphere's centre), so that reading makes the same point bit by bit, however small the primitive
+ * is next to the scene, and bytes from elsewhere cannot name a point that does not lie on its primitive. With the path
+ * goes log f as reading it gives: a path that somebody changed has another one.
+ *
+ * What is refused: numbers that are not finite, indices of what the scene does not have, points outside their
+ * primitives, vertices that do not scatter as they say, paths that leave the window or carry no light, another
+ * contribution than stated. Nothing is allocated and no ray is cast: whether anything lies between two vertices is not
+ * asked.
+ */
+#include "worker/render/chain/path_chain.h"
+
+#include "worker/render/chain/bytes.h"
+#include "worker/render/math/fptrap.h"
+
+enum { PATH_EDGES = 8, PATH_HEAD = PATH_EDGES + 8, VERTEX_BYTES = 40 };
+
+/* What a scene does not call for is not there: the wavelength's number without colour, the camera's vertex without
+ * aperture. */
+static size_t head_bytes(const struct world *w)
+{
+	return PATH_HEAD + (EFFECT_IS_ON(w, colour) ? 8 : 0);
+}
+
+static unsigned vertex_count(const struct world *w, unsigned edges)
+{
+	return EFFECT_IS_ON(w, aperture) ? edges + 1 : edges;
+}
+
+/* How far a point of the aperture may lie from it, in units of the world's radius, and the square of a direction
+ * from 1. */
+#define BELONGS 1e-9
+/* Roundings of a sum of barycentrics, or of a unit vector's square, that were made by a few operations. */
+#define ROUNDING 0x1p-48
+/* Walks meet specular directions far more exactly. */
+#define SPECULAR 1e-3
+/* Of the contribution: workers of other numeric fingerprints round otherwise. */
+#define CONTRIBUTION 1e-6
+
+/* ---- writing */
+
+/* What surface_at makes the point of again. An emitter's point that was drawn knows its position alone. */
+static vec3 place_of(const struct world *w, const struct path_vertex *v)
+{
+	const struct geom_shape *s = &w->shapes[v->x.prim.shape];
+	struct surface_point x = v->x;
+	if (s->is_sphere)
+		return vec3_scale(s->normal_sign, x.ng);
+	if (v->kind == VERTEX_EMITTER)
+		surface_near(s, x.prim, x.p, &x);
+	return (vec3){x.b1, x.b2, 0};
+}
+
+static void write_vertex(const struct world *w, const struct path_vertex *v, uint8_t *at)
+{
+	bool on_surface = v->x.prim.shape < w->shape_count && v->kind != VERTEX_CAMERA && v->kind != VERTEX_INFINITE;
+	vec3 place = on_surface ? place_of(w, v) : v->x.p;
+	at[0] = (uint8_t)v->kind;
+	at[1] = (uint8_t)v->mode;
+	at[2] = v->delta;
+	at[3] = 0;
+	put32(at + 4, (uint32_t)v->emitter);
+	put32(at + 8, v->x.prim.shape);
+	put32(at + 12, v->x.prim.prim);
+	put_double(at + 16, place.x);
+	put_double(at + 24, place.y);
+	put_double(at + 32, place.z);
+}
+
+/* ---- reading */
+
+static bool near(const struct world *w, vec3 a, vec3 b)
+{
+	vec3 d = vec3_sub(a, b);
+	return vec3_dot(d, d) <= BELONGS * BELONGS * w->radius * w->radius;
+}
+
+static bool read_surface(const struct world *w, struct prim_ref prim, vec3 place, struct surface_point *x)
+{
+	if (prim.shape >= w->shape_count)
+		return false;
+	const struct geom_shape *s = &w->shapes[prim.shape];
+	if (s->is_sphere) {
+		if (prim.prim != 0 || !(fabs(vec3_dot(place, place) - 1) <= ROUNDING))
+			return false;
+		surface_on_sphere(s, prim, place, x);
+		return true;
+	}
+	if (prim.prim >= s->triangle_count || !(place.x >= 0) || !(place.y >= 0) ||
+	    !(place.x + place.y <= 1 + ROUNDING))
+		return false;
+	surface_on_triangle(s, prim, place.x, place.y, x);
+	return vec3_is_finite(x->ng);
+}
+
+/* An emitter that has no surface. */
+static bool read_far_emitter(const struct world *w, int32_t emitter, vec3 p, struct path_vertex *v)
+{
+	const struct emitter *em = &w->emitters[emitter];
+	const double half[2] = {0.5, 0.5};
+	struct emitter_point point = {.infinite = em->infinite};
+	double pdf;
+	if (em->delta) {
+		if (!em->ops->sample_point(em, half, &point, &pdf) || !near(w, point.p, p))
+			return false;
+	} else {
+		if (!em->infinite || !(fabs(vec3_dot(p, p) - 1) <= BELONGS))
+			return false;
+		point.p = vec3_normalize(p);
+	}
+	*v = path_emitter_vertex(w, emitter, &point);
+	return true;
+}
+
+static struct path_vertex pinhole(const struct world *w)
+{
+	const double middle[2] = {0.5, 0.5};
+	struct path_vertex v = {.kind = VERTEX_CAMERA, .emitter = -1};
+	v.x.prim = PRIM_NONE;
+	v.x.p = camera_point(&w->camera, middle);
+	return v;
+}
+
+/* Far beyond anything that belongs to the scene: squares of such numbers would overflow. */
+static bool is_huge(const struct world *w, vec3 p)
+{
+	double most = 4 * (w->radius + 1) + vec3_length(pinhole(w).x.p);
+	return !(fabs(p.x) <= most && fabs(p.y) <= most && fabs(p.z) <= most);
+}
+
+static bool read_vertex(const struct world *w, const uint8_t *at, unsigned i, unsigned edges, struct path_vertex *v)
+{
+	int32_t emitter = (int32_t)get32(at + 4);
+	struct prim_ref prim = {get32(at + 8), get32(at + 12)};
+	vec3 place = {get_double(at + 16), get_double(at + 24), get_double(at + 32)};
+	*v = (struct path_vertex){.kind = at[0], .mode = at[1], .delta = at[2] != 0, .emitter = emitter};
+	if (is_huge(w, place) || at[0] > VERTEX_INFINITE || at[2] > 1 || at[3] != 0 ||
+	    (v->kind == VERTEX_CAMERA) != (i == edges) || (v->kind == VERTEX_SURFACE) != (i > 0 && i < edges) ||
+	    (v->mode & ~(unsigned)(BSDF_REFLECT | BSDF_TRANSMIT | BSDF_DELTA)))
+		return false;
+	if (v->kind == VERTEX_CAMERA) {
+		double u[2];
+		v->x.prim = PRIM_NONE;
+		camera_point_inverse(&w->camera, place, u);
+		v->x.p = camera_point(&w->camera, u);
+		return near(w, v->x.p, place);
+	}
+	if (i == 0 && (emitter < 0 || (uint32_t)emitter >= w->emitter_count))
+		return false;
+	if (i == 0 && w->emitter_shape[emitter] == UINT32_MAX)
+		return read_far_emitter(w, emitter, place, v) && v->kind == (enum vertex_kind)at[0];
+	if (!read_surface(w, prim, place, &v->x))
+		return false;
+	v->bsdf = &w->bsdfs[w->parts[prim.shape].bsdf];
+	v->emitter = w->parts[prim.shape].emitter;
+	return i > 0 || (v->emitter == emitter && v->kind == VERTEX_EMITTER);
+}
+
+/* Without its contribution. */
+static bool read_path(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x)
+{
+	if (size < PATH_EDGES)
+		return false;
+	uint64_t edges = get64(bytes);
+	x->edges = 0;
+	if (edges == 0)
+		return size == PATH_EDGES;
+	size_t head = head_bytes(c->w);
+	if (edges > c->max_depth || edges > FULL_PATH_MAX_EDGES)
+		return false;
+	x->edges = (unsigned)edges;
+	unsigned vertices = vertex_count(c->w, x->edges);
+	if (size != head + (size_t)vertices * VERTEX_BYTES)
+		return false;
+	double u = EFFECT_IS_ON(c->w, colour) ? get_double(bytes + PATH_HEAD) : 0;
+	if (!(u >= 0 && u < 1))
+		return false;
+	for (unsigned i = 0; i < vertices; i++)
+		if (!read_vertex(c->w, bytes + head + i * VERTEX_BYTES, i, x->edges, &x->v[i]))
+			return false;
+	if (vertices == x->edges)
+		x->v[x->edges] = pinhole(c->w);
+	full_path_set_wavelength(c, x, u);
+	if (!full_path_finish(c, x))
+		return false;
+	for (unsigned j = 1; j < x->edges; j++)
+		if (x->v[j].delta && !(full_path_specular_miss(x, j) <= SPECULAR))
+			return false;
+	return true;
+}
+
+/* Our code, but the bytes may be anybody's: what they make invalid (a signalling NaN, infinity less infinity) is
+ * refused and no fault. A call, so that nothing of it is computed before or after the flags are looked at. stated: as
+ * the bytes say. */
+__attribute__((noinline)) static bool contribution_of(struct path_context *c, const uint8_t *bytes, size_t size,
+						      bool stated, struct full_path_path *x, double *contribution)
+{
+	bool ok = read_path(c, bytes, size, x);
+	*contribution = ok && x->edges ? full_path_log_f(c, x) : 0;
+	if (ok && stated && x->edges)
+		ok = fabs(*contribution - get_double(bytes + PATH_EDGES)) <= CONTRIBUTION;
+	return ok && isfinite(*contribution);
+}
+
+static bool read_guarded(struct path_context *c, const uint8_t *bytes, size_t size, bool stated,
+			 struct full_path_path *x, double *contribution)
+{
+	unsigned flags = fptrap_leave();
+	bool ok = contribution_of(c, bytes, size, stated, x, contribution);
+	fptrap_return(flags);
+	return ok;
+}
+
+bool path_contribution(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x,
+		       double *contribution)
+{
+	return read_guarded(c, bytes, size, false, x, contribution);
+}
+
+bool path_read(struct path_context *c, const uint8_t *bytes, size_t size, struct full_path_path *x)
+{
+	double contribution;
+	return read_guarded(c, bytes, size, true, x, &contribution);
+}
+
+size_t path_write(struct path_context *c, const struct full_path_path *x, struct full_path_path *again, uint8_t *bytes)
+{
+	put64(bytes, x->edges);
+	if (x->edges == 0)
+		return PATH_EDGES;
+	if (EFFECT_IS_ON(c->w, colour))
+		put_double(bytes + PATH_HEAD, x->wavelength);
+	uint8_t *at = bytes + head_bytes(c->w);
+	for (unsigned i = 0; i < vertex_count(c->w, x->edges); i++, at += VERTEX_BYTES)
+		write_vertex(c->w, &x->v[i], at);
+	double contribution;
+	if (!path_contribution(c, bytes, (size_t)(at - bytes), again, &contribution))
+		return 0;
+	put_double(bytes + PATH_EDGES, contribution);
+	return (size_t)(at - bytes);
+}

@@ -1,0 +1,213 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/chain/path_chain.h"
+
+#include "worker/render/mutation/mixture.h"
+#include "worker/render/path/classes.h"
+
+#include <float.h>
+#include <string.h>
+
+#define LOG_FLT_MAX (FLT_MAX_EXP * M_LN2)
+
+/* A state with what it has gathered and not splatted yet. */
+struct path_place {
+	struct full_path_path path; /* 0 edges: black, looking for light */
+	double weight;
+};
+
+struct path_chain {
+	struct chain base;
+	struct mixture mixture;
+	struct mutation_ctx mutation;
+	struct path_place place[2];
+	struct path_place *current, *proposal; /* the proposal's path equals the current one between steps */
+	size_t began_size;		       /* the path with which the epoch began, as bytes */
+	uint8_t began[WHOLE_BYTES];
+};
+
+static struct path_chain *path_of(struct chain *c)
+{
+	return (struct path_chain *)(void *)c;
+}
+
+static void set_up(struct path_chain *c)
+{
+	struct error ignored;
+	/* The plan was checked when the lease came. */
+	mixture_parse(c->base.mixture, &c->mixture, &ignored);
+	c->current = &c->place[0];
+	c->proposal = &c->place[1];
+	c->current->weight = c->proposal->weight = 0;
+	c->mutation.path = c->base.context;
+	c->mutation.seed = c->base.seed;
+	c->mutation.chain = c->base.id;
+	c->mutation.limits = walk_limits_of(&c->base.context->w->accuracy);
+}
+
+static void copy_whole(struct full_path_path *to, const struct full_path_path *from)
+{
+	if (from->edges)
+		full_path_copy(to, from, 0, from->edges);
+	to->edges = from->edges;
+}
+
+/* The epoch begins with this path, which has been read or is black. */
+static void begin(struct path_chain *c, const uint8_t *bytes, size_t size)
+{
+	memcpy(c->began, bytes, size);
+	c->began_size = size;
+	copy_whole(&c->proposal->path, &c->current->path);
+}
+
+static bool start(struct chain *base, uint64_t bootstrap_index)
+{
+	static const struct full_path_path black = {0};
+	struct path_chain *c = path_of(base);
+	uint8_t bytes[WHOLE_BYTES];
+	set_up(c);
+	c->current->path.edges = 0;
+	bool ok = bootstrap_index == UINT64_MAX ||
+		  path_start(base->context, base->seed, bootstrap_index, &c->current->path);
+	size_t size = path_write(base->context, &c->current->path, &c->proposal->path, bytes);
+	if (size == 0)
+		size = path_write(base->context, &black, &c->proposal->path, bytes);
+	begin(c, bytes, size);
+	return ok;
+}
+
+static bool resume(struct chain *base, const struct chain_state *state)
+{
+	struct path_chain *c = path_of(base);
+	set_up(c);
+	if (!chain_get_head(base, state->bytes, state->size))
+		return false;
+	const uint8_t *bytes = state->bytes + CHAIN_STATE_HEAD;
+	size_t size = state->size - CHAIN_STATE_HEAD;
+	if (!path_read(base->context, bytes, size, &c->current->path))
+		return false;
+	begin(c, bytes, size);
+	return true;
+}
+
+static int save(struct chain *base, struct chain_state *out)
+{
+	struct path_chain *c = path_of(base);
+	uint8_t bytes[CHAIN_STATE_HEAD + WHOLE_BYTES];
+	size_t size = path_write(base->context, &c->current->path, &c->proposal->path, bytes + CHAIN_STATE_HEAD);
+	if (size == 0) {
+		base->context->counters[COUNT_STATES_LOST]++;
+		size = c->began_size;
+		memcpy(bytes + CHAIN_STATE_HEAD, c->began, size);
+	}
+	copy_whole(&c->proposal->path, &c->current->path);
+	chain_put_head(base, bytes);
+	return chain_give(bytes, CHAIN_STATE_HEAD + size, out);
+}
+
+static void splat(struct path_chain *c, struct path_place *at)
+{
+	if (at->weight == 0)
+		return;
+	struct splat s = {.x = at->path.film[0], .y = at->path.film[1]};
+	full_path_colour(c->base.context, &at->path, s.xyz);
+	film_sums_splat(c->base.film, &s, at->weight);
+	chain_moments_state(&c->base.film->moments, &s, 1, 1, at->weight);
+	chain_moments_class(&c->base.film->moments, path_class_whole(&at->path), at->weight);
+	at->weight = 0;
+}
+
+static void flush(struct chain *base)
+{
+	splat(path_of(base), path_of(base)->current);
+}
+
+static uint64_t rays(const uint64_t *counters)
+{
+	return counters[COUNT_RAYS_CLOSEST] + counters[COUNT_RAYS_SHADOW];
+}
+
+/* What the film may not have: counted, and no proposal. What an independent proposal adds to b is within a float, as
+ * all that path_splat takes. */
+static bool is_sound(struct path_chain *c, double log_weight, bool independent)
+{
+	if (isnan(log_weight))
+		c->base.context->counters[COUNT_NAN]++;
+	else if (log_weight == INFINITY || (independent && log_weight > LOG_FLT_MAX))
+		c->base.context->counters[COUNT_INFINITE]++;
+	else
+		return true;
+	return false;
+}
+
+/* The probability of acceptance; 0 where there is no proposal, for a reason that is counted. */
+static double propose(struct path_chain *c, const struct mixture_entry *entry, struct move *move,
+		      struct chain_sums *sums)
+{
+	struct mutation_ctx *m = &c->mutation;
+	struct full_path_path *x = &c->current->path, *y = &c->proposal->path;
+	enum strategy_counter end = entry->ops->propose(m, &entry->how, x, y, move);
+	double to_y = end ? -INFINITY : entry->ops->log_weight(m, y, move, X_TO_Y);
+	if (!end && !(to_y > -INFINITY && is_sound(c, to_y, entry->ops->independent)))
+		end = STRATEGY_FAIL_DARK;
+	if (end) {
+		m->count[end]++;
+		return 0;
+	}
+	if (entry->ops->independent) {
+		double f_over_p = exp(to_y);
+		sums->sum += f_over_p;
+		sums->square += f_over_p * f_over_p;
+	}
+	if (x->edges == 0)
+		return 1;
+	double to_x = entry->ops->log_weight(m, x, move, Y_TO_X);
+	return is_sound(c, to_x, false) ? exp(fmin(to_y - to_x, 0)) : 0;
+}
+
+static void step(struct chain *base, struct chain_sums *sums)
+{
+	struct path_chain *c = path_of(base);
+	struct mutation_ctx *m = &c->mutation;
+	uint64_t *counters = base->context->counters;
+	double r[4];
+	m->step = ++base->step;
+	mutation_random(m, BLOCK_STRATEGY, r);
+	bool black = c->current->path.edges == 0;
+	unsigned chosen = black ? c->mixture.independent : mixture_choose(&c->mixture, r[0]);
+	const struct mixture_entry *entry = &c->mixture.entry[chosen];
+	m->count = base->strategy[chosen];
+	m->count[STRATEGY_PROPOSED]++;
+	counters[COUNT_SAMPLES]++;
+	counters[COUNT_INDEPENDENT] += entry->ops->independent;
+	struct move move = {0};
+	uint64_t before = rays(counters);
+	double a = propose(c, entry, &move, sums);
+	m->count[STRATEGY_RAYS] += rays(counters) - before;
+	bool accepted = r[1] < a;
+	chain_count(base, accepted);
+	if (!black)
+		c->current->weight += 1 - a;
+	c->proposal->weight = a;
+	if (accepted) {
+		m->count[STRATEGY_ACCEPTED]++;
+		splat(c, c->current);
+		struct path_place *swap = c->current;
+		c->current = c->proposal;
+		c->proposal = swap;
+	} else {
+		splat(c, c->proposal);
+	}
+	if (c->proposal->path.edges != c->current->path.edges || entry->ops->independent)
+		copy_whole(&c->proposal->path, &c->current->path);
+	else
+		full_path_copy(&c->proposal->path, &c->current->path, move.first, move.last);
+}
+
+const struct chain_ops chain_path = {
+	.size = sizeof(struct path_chain),
+	.start = start,
+	.resume = resume,
+	.step = step,
+	.flush = flush,
+	.save = save,
+};

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The same radiance from everywhere. */
+#include "worker/render/emitter/emitter.h"
+#include "worker/render/emitter/uniform.h"
+
+#define PI 3.14159265358979323846
+#define UNIFORM (1 / (4 * PI))
+
+static spectrum constant_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w,
+				  const struct wavelengths *wl)
+{
+	(void)x, (void)w;
+	return color_eval(em->data, wl);
+}
+
+static bool constant_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x,
+				  double *pdf_point)
+{
+	(void)em;
+	*x = (struct emitter_point){.p = vec3_normalize(direction_of_square(u)), .infinite = true};
+	*pdf_point = UNIFORM;
+	return true;
+}
+
+static double constant_pdf_point(const struct emitter *em, const struct emitter_point *x)
+{
+	(void)em, (void)x;
+	return UNIFORM;
+}
+
+static void constant_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
+{
+	(void)em;
+	square_of_direction(x->p, u);
+}
+
+static bool constant_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
+				   double *pdf_toward)
+{
+	(void)ref;
+	return constant_sample_point(em, u, x, pdf_toward);
+}
+
+static double constant_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
+{
+	(void)em, (void)ref, (void)x;
+	return UNIFORM;
+}
+
+static int constant_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+			   struct error *e)
+{
+	struct texture radiance;
+	int code = texture_from_node(&radiance, n, "radiance", 1, COLOR_ILLUMINANT, build->assets, build->dialect_3,
+				     build->arena, e);
+	if (code)
+		return code;
+	struct color *c = arena_alloc(build->arena, 1, sizeof *c);
+	if (!c)
+		return node_error(n, e, ENOMEM, "out of memory");
+	*c = radiance.color;
+	em->data = c;
+	em->infinite = true;
+	em->shape = c->shape;
+	em->power = 4 * PI * color_mean(c);
+	em->brightest = color_max(c);
+	return 0;
+}
+
+static const struct param constant_params[] = {
+	{.name = "radiance", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+const struct emitter_ops emitter_ops_constant = {
+	.type = "constant",
+	.params = constant_params,
+	.create = constant_create,
+	.radiance = constant_radiance,
+	.sample_point = constant_sample_point,
+	.pdf_point = constant_pdf_point,
+	.point_inverse = constant_point_inverse,
+	.sample_toward = constant_sample_toward,
+	.pdf_toward = constant_pdf_toward,
+};

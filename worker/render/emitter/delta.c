@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/emitter/delta.h"
+
+int delta_create(struct emitter *em, struct delta_light *l, const struct scene_node *n, const char *name, double factor,
+		 const struct emitter_build *build, struct error *e)
+{
+	struct texture t;
+	int code =
+		texture_from_node(&t, n, name, 1, COLOR_ILLUMINANT, build->assets, build->dialect_3, build->arena, e);
+	if (code)
+		return code;
+	double away = vec3_length(l->x.p);
+	if (!(away <= PARAM_REACH_MAX))
+		return node_error(n, e, ERANGE, "stands %g times the scene's radius away from it, beyond %g", away,
+				  PARAM_REACH_MAX);
+	if (!(factor > 0) || !isfinite(factor))
+		return node_error(n, e, EINVAL, "the scene's size leaves no number for this light's strength");
+	l->color = t.color;
+	l->factor = factor;
+	em->data = l;
+	em->delta = true;
+	em->infinite = l->x.infinite;
+	em->shape = l->color.shape;
+	em->brightest = DELTA_HEADROOM * factor * color_max(&l->color);
+	return 0;
+}
+
+double delta_strength(const struct delta_light *l)
+{
+	return l->factor * color_mean(&l->color);
+}
+
+int delta_either(const struct scene_node *n, const char *name, const char *other, struct error *e)
+{
+	if (node_find(n, name) && node_find(n, other))
+		return node_error(n, e, EINVAL, "%s and %s say the same thing; give one", name, other);
+	return 0;
+}
+
+bool delta_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point)
+{
+	(void)u;
+	*x = ((const struct delta_light *)em->data)->x;
+	*pdf_point = 1;
+	return true;
+}
+
+double delta_pdf_point(const struct emitter *em, const struct emitter_point *x)
+{
+	(void)em, (void)x;
+	return 1;
+}
+
+bool delta_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
+			 double *pdf_toward)
+{
+	(void)ref;
+	return delta_sample_point(em, u, x, pdf_toward);
+}
+
+double delta_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
+{
+	(void)em, (void)ref, (void)x;
+	return 1;
+}

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Parallel light from infinity: irradiance across the direction in which it travels, `direction` or to_world's +z. */
+#include "worker/render/emitter/delta.h"
+
+static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
+{
+	(void)x, (void)w;
+	const struct delta_light *l = em->data;
+	return color_eval(&l->color, wl);
+}
+
+static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
+{
+	struct delta_light *l = arena_alloc(build->arena, 1, sizeof *l);
+	if (!l)
+		return node_error(n, e, ENOMEM, "out of memory");
+	int code = delta_either(n, "direction", "to_world", e);
+	if (code)
+		return code;
+	mat4 to_world = node_transform(n, "to_world");
+	const struct property *direction = node_find(n, "direction");
+	vec3 d = direction ? direction->value.as.point : mat4_vector(&to_world, (vec3){0, 0, 1});
+	double length = hypot(hypot(d.x, d.y), d.z);
+	if (!(length > 0) || !isfinite(length))
+		return node_error(n, e, EINVAL, "a direction of length %g", length);
+	d = (vec3){d.x / length, d.y / length, d.z / length};
+	l->x = (struct emitter_point){.p = vec3_neg(vec3_normalize(d)), .infinite = true};
+	code = delta_create(em, l, n, "irradiance", 1, build, e);
+	if (!code)
+		em->power = delta_strength(l);
+	return code;
+}
+
+static const struct param params[] = {
+	{.name = "irradiance", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+	{.name = "direction", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
+	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+const struct emitter_ops emitter_ops_directional = {
+	.type = "directional",
+	.params = params,
+	.create = create,
+	.radiance = radiance,
+	.sample_point = delta_sample_point,
+	.pdf_point = delta_pdf_point,
+	.sample_toward = delta_sample_toward,
+	.pdf_toward = delta_pdf_toward,
+};

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/emitter/emitter.h"
+
+#include <string.h>
+
+#define EMITTER(name) extern const struct emitter_ops emitter_ops_##name;
+#include "worker/render/emitter/emitter_list.h"
+#undef EMITTER
+
+const struct emitter_ops *const emitter_registry[] = {
+#define EMITTER(name) &emitter_ops_##name,
+#include "worker/render/emitter/emitter_list.h"
+#undef EMITTER
+	NULL,
+};
+
+static const struct emitter_ops *find_ops(const struct scene_node *n)
+{
+	for (const struct emitter_ops *const *ops = emitter_registry; *ops; ops++)
+		if (strcmp((*ops)->type, n->type) == 0)
+			return *ops;
+	return NULL;
+}
+
+bool emitter_needs_surface(const struct scene_node *n)
+{
+	const struct emitter_ops *ops = find_ops(n);
+	return ops && ops->needs_surface;
+}
+
+int emitter_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
+{
+	const struct emitter_ops *ops = find_ops(n);
+	if (!ops)
+		return node_error(n, e, ENOTSUP, "\"%s\" is no emitter that is supported", n->type);
+	if (ops->needs_surface && !build->surface)
+		return node_error(n, e, EINVAL, "\"%s\" belongs into a shape", n->type);
+	if (!ops->needs_surface && build->surface)
+		return node_error(n, e, EINVAL, "\"%s\" cannot hang on a shape", n->type);
+	*em = (struct emitter){.ops = ops};
+	return ops->create(em, n, build, e);
+}

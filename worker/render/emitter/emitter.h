@@ -1,0 +1,92 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Emitters. One file per plug-in and one line in emitter_list.h; the generic tests pick it up.
+ * A point on an emitter is a position with a normal, or for emitters at infinity the unit direction from the scene
+ * towards it. Measures: `pdf_point` and `pdf_toward` are per area (world units of the rescaled scene), per solid angle
+ * at infinity. Immutable after creation; any thread; nothing allocates after create.
+ *
+ * Delta emitters are one point (or one direction): nothing hits them by chance, the measure of x_0 counts and both
+ * densities are 1. What `radiance` gives is intensity per solid angle at a point (no cosine there, n is 0), irradiance
+ * across the direction at infinity.
+ */
+#ifndef WORKER_RENDER_EMITTER_EMITTER_H
+#define WORKER_RENDER_EMITTER_EMITTER_H
+
+#include "worker/render/math/frame.h"
+#include "worker/render/texture/texture.h"
+
+struct emitter_point {
+	vec3 p;	       /* position, or direction towards the emitter when infinite */
+	vec3 n;	       /* unit normal on the emitting side; 0 at a delta emitter; unused when infinite */
+	double u, v;   /* texture coordinates */
+	uint32_t prim; /* triangle of the surface; 0 on a sphere; unused when infinite */
+	bool infinite;
+};
+
+/* The surface of an area emitter in the rescaled world. Triangles are those that rays meet. */
+struct emitter_surface {
+	bool is_sphere;
+	vec3 center;
+	double radius, normal_sign; /* -1: normals point inwards */
+	struct frame sphere_axes;   /* of the (u,v) parametrisation */
+	uint32_t triangle_count;
+	const float (*position)[3];
+	const uint32_t (*index)[3];
+	const float (*uv)[2]; /* NULL: none */
+};
+
+struct emitter_build {
+	const struct asset_source *assets;
+	struct arena *arena;
+	bool dialect_3;
+	const struct emitter_surface *surface; /* NULL where it hangs on no shape */
+	vec3 center; /* a point p of the scene lies at scale (p - center) in the rescaled world */
+	double scale;
+};
+
+struct emitter;
+
+struct emitter_ops {
+	const char *type;
+	const struct param *params;
+	unsigned nested_classes;
+	bool needs_surface; /* area: belongs into a shape */
+	int (*create)(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+		      struct error *e);
+	/* Radiance leaving x in direction w (unit, away from the emitter, into the scene). */
+	spectrum (*radiance)(const struct emitter *em, const struct emitter_point *x, vec3 w,
+			     const struct wavelengths *wl);
+	/* Where light sub-paths begin. */
+	bool (*sample_point)(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);
+	double (*pdf_point)(const struct emitter *em, const struct emitter_point *x);
+	/* The numbers in [0,1) for which sample_point gives x; NULL for delta emitters. */
+	void (*point_inverse)(const struct emitter *em, const struct emitter_point *x, double u[2]);
+	/* In which direction they leave; not called for infinite ones. */
+	bool (*sample_direction)(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
+				 double *pdf_solid);
+	double (*pdf_direction)(const struct emitter *em, const struct emitter_point *x, vec3 w);
+	/* Next event estimation as seen from ref. */
+	bool (*sample_toward)(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
+			      double *pdf_toward);
+	double (*pdf_toward)(const struct emitter *em, vec3 ref, const struct emitter_point *x);
+};
+
+struct emitter {
+	const struct emitter_ops *ops;
+	bool infinite, textured, delta;
+	enum color_shape shape; /* CONSTANT, D65: the same spectrum everywhere but for a factor */
+	double power;	  /* for choosing among emitters: area x pi x mean radiance; infinite: mean radiance x 4 pi,
+			     or irradiance, multiplied by the scene's cross section pi R^2 by the caller */
+	double brightest; /* upper bound of the radiance, over places, directions and wavelengths; of delta emitters
+			     what pixels may be expected to stay below, see delta.h */
+	void *data;
+};
+
+/* Is it one that lies on a shape? */
+bool emitter_needs_surface(const struct scene_node *n);
+
+int emitter_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e);
+
+extern const struct emitter_ops *const emitter_registry[]; /* ends with NULL */
+
+#endif

@@ -1,0 +1,288 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * An equirectangular picture of the surroundings. Local +y is up (the top row), the middle column looks along +z
+ * and the one a quarter from the left along +x: u = atan2(x, -z) / 2 pi, v = acos(y) / pi, in both dialects. Pixel
+ * centres lie at half-integers, also vertically, where Mitsuba 3 puts the first and last rows onto the poles: a shift
+ * of up to half a pixel.
+ *
+ * Sampling: the radiance is bilinear between pixel centres, so the cells of the density lie between pixel centres too
+ * (and from the outer rows to the poles). Within a cell the density is constant in solid angle and in proportion to the
+ * mean luminance of its four corners: it is positive wherever there is light. A row's cells have probabilities in
+ * multiples of 2^-31, at least one where there is light, kept as running sums: sampling and density use the same
+ * numbers.
+ */
+#include "worker/render/emitter/envmap.h"
+
+#include <string.h>
+
+#define PI 3.14159265358979323846
+
+struct envmap {
+	struct raster raster;
+	double scale;
+	vec3 axis[3];	    /* the local axes in the world */
+	uint32_t rows;	    /* height + 1 */
+	uint32_t columns;   /* width */
+	double *row_cdf;    /* rows + 1; the last is 1; all 0 when black */
+	uint32_t *cell_cdf; /* [rows][columns + 1] */
+};
+
+static vec3 to_local(const struct envmap *m, vec3 d)
+{
+	return (vec3){vec3_dot(m->axis[0], d), vec3_dot(m->axis[1], d), vec3_dot(m->axis[2], d)};
+}
+
+static void coordinates(const struct envmap *m, vec3 direction, double *u, double *v)
+{
+	vec3 d = to_local(m, direction);
+	double turn = atan2(d.x, -d.z) / (2 * PI);
+	*u = turn < 0 ? turn + 1 : turn;
+	*v = atan2(hypot(d.x, d.z), d.y) / PI;
+}
+
+spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
+{
+	(void)w;
+	const struct envmap *m = em->data;
+	double u, v, rgb[3];
+	coordinates(m, x->p, &u, &v);
+	raster_eval(&m->raster, u, v, rgb);
+	return spectrum_scale(m->scale, color_eval_rgb_illuminant(rgb, wl));
+}
+
+static double row_edge(const struct envmap *m, uint32_t row) /* angle from the pole above row */
+{
+	return row == 0 ? 0 : row == m->rows ? PI : PI * (row - 0.5) / (m->rows - 1);
+}
+
+static double row_height(const struct envmap *m, uint32_t row) /* in the cosine: no cancellation at the poles */
+{
+	double a = row_edge(m, row), b = row_edge(m, row + 1);
+	return 2 * sin(0.5 * (a + b)) * sin(0.5 * (b - a));
+}
+
+static const uint32_t *row_cells(const struct envmap *m, uint32_t row)
+{
+	return m->cell_cdf + (size_t)row * (m->columns + 1);
+}
+
+/* Where the density's cells are; across: how far into its cell the column is. */
+static void find_place(const struct envmap *m, vec3 d, uint32_t *row, uint32_t *column, double *across)
+{
+	double u, v;
+	coordinates(m, d, &u, &v);
+	/* Cell 0 of a row begins at the centre of pixel 0; the half pixel before belongs to the last one. */
+	double c = u * m->columns - 0.5, r = v * (m->rows - 1) + 0.5;
+	*column = c < 0 || c >= m->columns ? m->columns - 1 : (uint32_t)c;
+	*row = r >= m->rows ? m->rows - 1 : (uint32_t)r;
+	*across = (c < 0 ? c + m->columns : c) - *column;
+}
+
+double envmap_pdf_point(const struct emitter *em, const struct emitter_point *x)
+{
+	const struct envmap *m = em->data;
+	uint32_t row, column;
+	double across;
+	find_place(m, x->p, &row, &column, &across);
+	const uint32_t *cells = row_cells(m, row);
+	if (cells[m->columns] == 0)
+		return 0;
+	double chance =
+		(m->row_cdf[row + 1] - m->row_cdf[row]) * (cells[column + 1] - cells[column]) / cells[m->columns];
+	return chance / (row_height(m, row) * 2 * PI / m->columns);
+}
+
+void envmap_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2])
+{
+	const struct envmap *m = em->data;
+	uint32_t row, column;
+	double across;
+	find_place(m, x->p, &row, &column, &across);
+	const uint32_t *cells = row_cells(m, row);
+	vec3 d = to_local(m, x->p);
+	/* Heights in the cosine, as differences of angles. */
+	double angle = atan2(hypot(d.x, d.z), d.y), edge = row_edge(m, row);
+	double down = 2 * sin(0.5 * (angle + edge)) * sin(0.5 * (angle - edge)) / row_height(m, row);
+	u[0] = cells[m->columns] ? (cells[column] + across * (cells[column + 1] - cells[column])) / cells[m->columns]
+				 : 0;
+	u[1] = m->row_cdf[row] + down * (m->row_cdf[row + 1] - m->row_cdf[row]);
+	for (int i = 0; i < 2; i++)
+		u[i] = fmin(fmax(u[i], 0), 1 - 0x1p-53);
+}
+
+double envmap_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x)
+{
+	(void)ref;
+	return envmap_pdf_point(em, x);
+}
+
+/* The last index i < n with cdf[i] <= x; cdf[0] = 0. */
+static uint32_t find_row(const double *cdf, uint32_t n, double x)
+{
+	uint32_t low = 0, high = n;
+	while (high - low > 1) {
+		uint32_t middle = low + (high - low) / 2;
+		if (cdf[middle] <= x)
+			low = middle;
+		else
+			high = middle;
+	}
+	return low;
+}
+
+static uint32_t find_cell(const uint32_t *cdf, uint32_t n, double x)
+{
+	uint32_t low = 0, high = n;
+	while (high - low > 1) {
+		uint32_t middle = low + (high - low) / 2;
+		if (cdf[middle] <= x)
+			low = middle;
+		else
+			high = middle;
+	}
+	return low;
+}
+
+bool envmap_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point)
+{
+	const struct envmap *m = em->data;
+	if (!(em->power > 0))
+		return false;
+	uint32_t row = find_row(m->row_cdf, m->rows, u[1]);
+	const uint32_t *cells = row_cells(m, row);
+	double target = u[0] * cells[m->columns];
+	uint32_t column = find_cell(cells, m->columns, target);
+	double width = cells[column + 1] - cells[column], height = m->row_cdf[row + 1] - m->row_cdf[row];
+	if (!(width > 0 && height > 0))
+		return false;
+	double across = (target - cells[column]) / width, down = (u[1] - m->row_cdf[row]) / height;
+	double phi = 2 * PI * ((column + 0.5 + across) / m->columns);
+	double from_pole = 2 * pow(sin(0.5 * row_edge(m, row)), 2) + down * row_height(m, row); /* 1 - cosine */
+	double sine = sqrt(fmax(0, from_pole * (2 - from_pole)));
+	vec3 d = vec3_scale(sine * sin(phi), m->axis[0]);
+	d = vec3_madd(vec3_madd(d, 1 - from_pole, m->axis[1]), -sine * cos(phi), m->axis[2]);
+	*x = (struct emitter_point){.p = vec3_normalize(d), .infinite = true};
+	*pdf_point = envmap_pdf_point(em, x);
+	return *pdf_point > 0;
+}
+
+bool envmap_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
+			  double *pdf_toward)
+{
+	(void)ref;
+	return envmap_sample_point(em, u, x, pdf_toward);
+}
+
+static double luminance(const struct envmap *m, uint32_t row, uint32_t column)
+{
+	double rgb[3];
+	raster_pixel(&m->raster, column, row, rgb);
+	return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+}
+
+/* Mean luminance of the cell's corners. */
+static double cell_weight(const struct envmap *m, uint32_t row, uint32_t column)
+{
+	uint32_t above = row == 0 ? 0 : row - 1, below = row == m->rows - 1 ? row - 1 : row;
+	uint32_t next = column + 1 == m->columns ? 0 : column + 1;
+	return 0.25 * (luminance(m, above, column) + luminance(m, above, next) + luminance(m, below, column) +
+		       luminance(m, below, next));
+}
+
+/* Returns the integral of the luminance over the sphere. */
+static double build_density(struct envmap *m)
+{
+	double total = 0;
+	for (uint32_t row = 0; row < m->rows; row++) {
+		uint32_t *cells = m->cell_cdf + (size_t)row * (m->columns + 1);
+		double sum = 0, unit = 0x1p31;
+		for (uint32_t c = 0; c < m->columns; c++)
+			sum += cell_weight(m, row, c);
+		for (uint32_t c = 0; c < m->columns; c++) {
+			double w = cell_weight(m, row, c);
+			cells[c + 1] = cells[c] + (w > 0 ? (uint32_t)fmax(1, floor(w / sum * unit)) : 0);
+		}
+		m->row_cdf[row] = total;
+		total += sum * row_height(m, row) * 2 * PI / m->columns;
+	}
+	m->row_cdf[m->rows] = total;
+	for (uint32_t row = 0; row <= m->rows && total > 0; row++)
+		m->row_cdf[row] /= total;
+	return total;
+}
+
+/* The local axes, without their scale; only rotations, reflections and one scale keep angles. */
+int envmap_axes(const struct scene_node *n, vec3 axis[3], struct error *e)
+{
+	mat4 t = node_transform(n, "to_world");
+	for (int c = 0; c < 3; c++) {
+		axis[c] = (vec3){t.m[0][c], t.m[1][c], t.m[2][c]};
+		double length = vec3_length(axis[c]), first = vec3_length((vec3){t.m[0][0], t.m[1][0], t.m[2][0]});
+		if (!(length > 0) || !(fabs(length - first) <= 1e-4 * first))
+			return node_error(n, e, ENOTSUP, "to_world of an environment can only rotate");
+		axis[c] = vec3_scale(1 / length, axis[c]);
+		for (int k = 0; k < c; k++)
+			if (fabs(vec3_dot(axis[k], axis[c])) > 1e-4)
+				return node_error(n, e, ENOTSUP, "to_world of an environment can only rotate");
+	}
+	/* Files give few digits: made orthonormal. */
+	double sign = vec3_dot(vec3_cross(axis[0], axis[1]), axis[2]) < 0 ? -1 : 1;
+	axis[1] = vec3_normalize(vec3_madd(axis[1], -vec3_dot(axis[0], axis[1]), axis[0]));
+	axis[2] = vec3_scale(sign, vec3_cross(axis[0], axis[1]));
+	return 0;
+}
+
+int envmap_make(struct emitter *em, const struct raster *picture, double scale, const vec3 axis[3],
+		const struct scene_node *n, const struct emitter_build *build, struct error *e)
+{
+	struct envmap *m = arena_alloc(build->arena, 1, sizeof *m);
+	if (!m)
+		return node_error(n, e, ENOMEM, "out of memory");
+	m->raster = *picture;
+	memcpy(m->axis, axis, sizeof m->axis);
+	m->raster.wrap_u = RASTER_REPEAT;
+	m->raster.wrap_v = RASTER_CLAMP;
+	m->scale = scale;
+	m->columns = m->raster.image.width;
+	m->rows = m->raster.image.height + 1;
+	m->row_cdf = arena_alloc(build->arena, (size_t)m->rows + 1, sizeof *m->row_cdf);
+	m->cell_cdf = arena_alloc(build->arena, (size_t)m->rows * ((size_t)m->columns + 1), sizeof *m->cell_cdf);
+	if (!m->row_cdf || !m->cell_cdf)
+		return node_error(n, e, ENOMEM, "out of memory for the density of %u x %u cells", m->columns, m->rows);
+	const struct color white = {.shape = COLOR_SHAPE_D65, .scale = m->scale, .d65 = true};
+	em->data = m;
+	em->infinite = true;
+	em->textured = true;
+	em->shape = raster_is_grey(&m->raster) ? COLOR_SHAPE_D65 : COLOR_SHAPE_OTHER;
+	em->power = build_density(m) * color_mean(&white);
+	em->brightest = raster_max(&m->raster) * color_max(&white);
+	return 0;
+}
+
+static int envmap_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+			 struct error *e)
+{
+	struct raster picture = {.nearest = false};
+	vec3 axis[3];
+	int code = envmap_axes(n, axis, e);
+	if (!code)
+		code = raster_read(&picture, n, build->assets, &(struct raster_range){0, HUGE_VAL, false}, build->arena,
+				   e);
+	return code ? code : envmap_make(em, &picture, node_float(n, "scale", 1), axis, n, build, e);
+}
+
+static const struct param envmap_params[] = {
+	RASTER_PARAMS,
+	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = PARAM_LIGHT_MAX},
+	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = "mis_compensation", .types = VALUE_BOOL, .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+const struct emitter_ops emitter_ops_envmap = {
+	.type = "envmap",
+	.params = envmap_params,
+	.create = envmap_create,
+	ENVMAP_OPS,
+};

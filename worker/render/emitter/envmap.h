@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What emitters share that are an equirectangular picture of the surroundings. Private to worker/render/emitter. */
+#ifndef WORKER_RENDER_EMITTER_ENVMAP_H
+#define WORKER_RENDER_EMITTER_ENVMAP_H
+
+#include "worker/render/emitter/emitter.h"
+#include "worker/render/texture/raster.h"
+
+/* The local axes x, y (up) and z in the world. -ENOTSUP: to_world does more than rotate. */
+int envmap_axes(const struct scene_node *n, vec3 axis[3], struct error *e);
+/* Makes em of the picture, times scale. The picture is kept. */
+int envmap_make(struct emitter *em, const struct raster *picture, double scale, const vec3 axis[3],
+		const struct scene_node *n, const struct emitter_build *build, struct error *e);
+
+spectrum envmap_radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl);
+bool envmap_sample_point(const struct emitter *em, const double u[2], struct emitter_point *x, double *pdf_point);
+double envmap_pdf_point(const struct emitter *em, const struct emitter_point *x);
+void envmap_point_inverse(const struct emitter *em, const struct emitter_point *x, double u[2]);
+bool envmap_sample_toward(const struct emitter *em, vec3 ref, const double u[2], struct emitter_point *x,
+			  double *pdf_toward);
+double envmap_pdf_toward(const struct emitter *em, vec3 ref, const struct emitter_point *x);
+
+#define ENVMAP_OPS                                                                                       \
+	.radiance = envmap_radiance, .sample_point = envmap_sample_point, .pdf_point = envmap_pdf_point, \
+	.point_inverse = envmap_point_inverse, .sample_toward = envmap_sample_toward, .pdf_toward = envmap_pdf_toward
+
+#endif

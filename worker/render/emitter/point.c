@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A point that shines alike in all directions: intensity, at a position or at the origin of to_world. */
+#include "worker/render/emitter/delta.h"
+#include "worker/render/emitter/uniform.h"
+
+static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
+{
+	(void)x, (void)w;
+	const struct delta_light *l = em->data;
+	return spectrum_scale(l->factor, color_eval(&l->color, wl));
+}
+
+static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
+			     double *pdf_solid)
+{
+	(void)em, (void)x;
+	*w = vec3_normalize(direction_of_square(u));
+	*pdf_solid = 1 / (4 * M_PI);
+	return true;
+}
+
+static double pdf_direction(const struct emitter *em, const struct emitter_point *x, vec3 w)
+{
+	(void)em, (void)x, (void)w;
+	return 1 / (4 * M_PI);
+}
+
+static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
+{
+	struct delta_light *l = arena_alloc(build->arena, 1, sizeof *l);
+	if (!l)
+		return node_error(n, e, ENOMEM, "out of memory");
+	int code = delta_either(n, "position", "to_world", e);
+	if (code)
+		return code;
+	mat4 to_world = node_transform(n, "to_world");
+	const struct property *position = node_find(n, "position");
+	vec3 p = position ? position->value.as.point : mat4_point(&to_world, (vec3){0, 0, 0});
+	l->x.p = vec3_scale(build->scale, vec3_sub(p, build->center));
+	code = delta_create(em, l, n, "intensity", build->scale * build->scale, build, e);
+	if (!code)
+		em->power = 4 * M_PI * delta_strength(l);
+	return code;
+}
+
+static const struct param params[] = {
+	{.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+	{.name = "position", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
+	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+const struct emitter_ops emitter_ops_point = {
+	.type = "point",
+	.params = params,
+	.create = create,
+	.radiance = radiance,
+	.sample_point = delta_sample_point,
+	.pdf_point = delta_pdf_point,
+	.sample_direction = sample_direction,
+	.pdf_direction = pdf_direction,
+	.sample_toward = delta_sample_toward,
+	.pdf_toward = delta_pdf_toward,
+};

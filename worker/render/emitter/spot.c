@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A point that shines into a cone around to_world's +z: `intensity` up to the angle `beam_width` from the axis, from
+ * there linear in the angle to 0 at `cutoff_angle` (degrees; 20, and 3/4 of the cut-off, where nothing is said). Light
+ * paths leave it uniformly over the cone.
+ */
+#include "worker/render/emitter/delta.h"
+#include "worker/render/math/frame.h"
+
+struct spot {
+	struct delta_light light;
+	struct frame axes;
+	double cutoff, beam; /* radians */
+	double height;	     /* of the cone's cap: 1 - cos(cutoff) */
+};
+
+static double falloff(const struct spot *s, vec3 w)
+{
+	double angle = atan2(vec3_length(vec3_cross(s->axes.n, w)), vec3_dot(s->axes.n, w));
+	if (angle >= s->cutoff)
+		return 0;
+	return angle <= s->beam ? 1 : (s->cutoff - angle) / (s->cutoff - s->beam);
+}
+
+static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
+{
+	(void)x;
+	const struct spot *s = em->data;
+	return spectrum_scale(s->light.factor * falloff(s, w), color_eval(&s->light.color, wl));
+}
+
+static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
+			     double *pdf_solid)
+{
+	(void)x;
+	const struct spot *s = em->data;
+	double down = u[0] * s->height, r = sqrt(down * (2 - down)), phi = 2 * M_PI * u[1];
+	*w = vec3_normalize(frame_to_world(&s->axes, (vec3){r * cos(phi), r * sin(phi), 1 - down}));
+	*pdf_solid = 1 / (2 * M_PI * s->height);
+	return true;
+}
+
+static double pdf_direction(const struct emitter *em, const struct emitter_point *x, vec3 w)
+{
+	(void)x;
+	const struct spot *s = em->data;
+	return falloff(s, w) > 0 ? 1 / (2 * M_PI * s->height) : 0;
+}
+
+static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
+{
+	struct spot *s = arena_alloc(build->arena, 1, sizeof *s);
+	if (!s)
+		return node_error(n, e, ENOMEM, "out of memory");
+	mat4 to_world = node_transform(n, "to_world");
+	vec3 axis = vec3_normalize(mat4_vector(&to_world, (vec3){0, 0, 1}));
+	if (!vec3_is_finite(axis))
+		return node_error(n, e, EINVAL, "to_world leaves the spot no direction");
+	double cutoff = node_float(n, "cutoff_angle", 20), beam = node_float(n, "beam_width", 0.75 * cutoff);
+	if (beam > cutoff)
+		return node_error(n, e, EINVAL, "beam_width=%g exceeds cutoff_angle=%g", beam, cutoff);
+	s->axes = frame_around(axis);
+	s->cutoff = cutoff * (M_PI / 180);
+	s->beam = beam * (M_PI / 180);
+	s->height = 2 * pow(sin(0.5 * s->cutoff), 2);
+	s->light.x.p = vec3_scale(build->scale, vec3_sub(mat4_point(&to_world, (vec3){0, 0, 0}), build->center));
+	int code = delta_create(em, &s->light, n, "intensity", build->scale * build->scale, build, e);
+	if (code)
+		return code;
+	/* Integral of the fall-off over the cone. */
+	double slope = s->cutoff > s->beam ? (sin(s->cutoff) - sin(s->beam)) / (s->cutoff - s->beam) : cos(s->cutoff);
+	em->power = 2 * M_PI * (1 - slope) * delta_strength(&s->light);
+	return 0;
+}
+
+static const struct param params[] = {
+	{.name = "intensity", .types = VALUE_COLOR, .max = PARAM_LIGHT_MAX},
+	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "cutoff_angle", .types = VALUE_FLOAT | VALUE_INT, .min = 0.01, .max = 180},
+	{.name = "beam_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 180},
+	{.name = "texture", .status = PARAM_REFUSED},
+	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+const struct emitter_ops emitter_ops_spot = {
+	.type = "spot",
+	.params = params,
+	.create = create,
+	.radiance = radiance,
+	.sample_point = delta_sample_point,
+	.pdf_point = delta_pdf_point,
+	.sample_direction = sample_direction,
+	.pdf_direction = pdf_direction,
+	.sample_toward = delta_sample_toward,
+	.pdf_toward = delta_pdf_toward,
+};

@@ -1,0 +1,218 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Daylight (daylight.h) as a picture of the surroundings: `sky`, `sun`, `sunsky`. The sky takes 512 x 256 pixels, one
+ * with a sun 2048 x 1024: its disk is three pixels wide, and what the whole of it sends is kept. Below the horizon it
+ * is black. Up is +y in 0.5/0.6 and +z in 3.x; where time and place say where the sun is, north is -z and +y.
+ */
+#include "worker/render/emitter/daylight.h"
+#include "worker/render/emitter/envmap.h"
+
+#define PI 3.14159265358979323846
+#define RADIANS (PI / 180)
+
+struct parts {
+	bool sky, sun;
+};
+
+struct baking {
+	struct daylight sky;
+	struct image image;
+	vec3 towards;  /* the sun, local */
+	double radius; /* of its disk, an angle */
+};
+
+static vec3 direction(const struct image *m, double column, double row)
+{
+	double phi = 2 * PI * column / m->width, theta = PI * row / m->height;
+	return (vec3){sin(theta) * sin(phi), cos(theta), -sin(theta) * cos(phi)};
+}
+
+static float *pixel(const struct image *m, uint32_t x, uint32_t y)
+{
+	return m->pixels + 3 * ((size_t)y * m->width + x);
+}
+
+static double angle_between(vec3 a, vec3 b)
+{
+	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
+}
+
+static void bake_sky(const struct baking *b, double scale)
+{
+	const struct image *m = &b->image;
+	for (uint32_t y = 0; y < m->height / 2; y++)
+		for (uint32_t x = 0; x < m->width; x++) {
+			vec3 d = direction(m, x + 0.5, y + 0.5);
+			double rgb[3];
+			daylight_sky(&b->sky, PI * (y + 0.5) / m->height, angle_between(d, b->towards), rgb);
+			for (int k = 0; k < 3; k++)
+				pixel(m, x, y)[k] = (float)(scale * rgb[k]);
+		}
+}
+
+/* Share of a pixel that the disk covers. */
+static double covered(const struct baking *b, uint32_t x, uint32_t y)
+{
+	enum { PARTS = 8 };
+	double reach = b->radius + 2 * PI / b->image.height;
+	if (angle_between(direction(&b->image, x + 0.5, y + 0.5), b->towards) > reach)
+		return 0;
+	int inside = 0;
+	for (int i = 0; i < PARTS * PARTS; i++) {
+		vec3 d = direction(&b->image, x + (i % PARTS + 0.5) / PARTS, y + (i / PARTS + 0.5) / PARTS);
+		inside += angle_between(d, b->towards) <= b->radius;
+	}
+	return (double)inside / (PARTS * PARTS);
+}
+
+/* rgb: of the disk as large as it is; a larger one is dimmer. */
+static void bake_sun(const struct baking *b, const double rgb[3])
+{
+	const struct image *m = &b->image;
+	double solid = 0, pixel_row = 2 * PI / m->width * PI / m->height;
+	double row = angle_between(b->towards, (vec3){0, 1, 0}) * m->height / PI,
+	       reach = b->radius * m->height / PI + 2;
+	uint32_t first = (uint32_t)fmax(row - reach, 0), last = (uint32_t)fmin(row + reach, m->height - 1.0);
+	for (uint32_t y = first; y <= last; y++)
+		for (uint32_t x = 0; x < m->width; x++)
+			solid += covered(b, x, y) * pixel_row * sin(PI * (y + 0.5) / m->height);
+	/* Solid angles of the true disk, without cancellation. */
+	double whole = 4 * PI * pow(sin(0.5 * DAYLIGHT_SUN_RADIUS), 2), factor = solid > 0 ? whole / solid : 0;
+	for (uint32_t y = first; y <= last; y++)
+		for (uint32_t x = 0; x < m->width; x++)
+			for (int k = 0; k < 3; k++)
+				pixel(m, x, y)[k] += (float)(covered(b, x, y) * factor * rgb[k]);
+}
+
+static int days_of(int month, int year)
+{
+	static const int days[12] = {31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31};
+	return days[month - 1] + (month == 2 && year % 4 == 0 && (year % 100 != 0 || year % 400 == 0));
+}
+
+/* In the world. */
+static int read_sun(const struct scene_node *n, const vec3 axis[3], vec3 *towards, struct error *e)
+{
+	static const char *const clock[] = {"latitude", "longitude", "timezone", "year",  "month",
+					    "day",	"hour",	     "minute",	 "second"};
+	const struct property *p = node_find(n, "sun_direction");
+	if (p) {
+		double length = vec3_length(p->value.as.point);
+		for (size_t i = 0; i < sizeof clock / sizeof *clock; i++)
+			if (node_find(n, clock[i]))
+				return node_error(n, e, EINVAL, "sun_direction and %s say the same thing; give one",
+						  clock[i]);
+		if (!(length > 0) || !isfinite(length))
+			return node_error(n, e, EINVAL, "a sun_direction of length %g", length);
+		*towards = vec3_scale(1 / length, p->value.as.point);
+		return 0;
+	}
+	/* Mitsuba's default: a summer's afternoon in Tokyo. */
+	struct daylight_time t = {.latitude = node_float(n, "latitude", 35.6894),
+				  .longitude = node_float(n, "longitude", 139.6917),
+				  .zone = node_float(n, "timezone", 9),
+				  .year = (int)node_float(n, "year", 2010),
+				  .month = (int)node_float(n, "month", 7),
+				  .day = (int)node_float(n, "day", 10)};
+	t.hour = node_float(n, "hour", 15) + node_float(n, "minute", 0) / 60 + node_float(n, "second", 0) / 3600;
+	if (t.day > days_of(t.month, t.year))
+		return node_error(n, e, ERANGE, "month %d of %d has no day %d", t.month, t.year, t.day);
+	vec3 d = daylight_position(&t);
+	*towards = vec3_madd(vec3_madd(vec3_scale(d.x, axis[0]), d.y, axis[1]), d.z, axis[2]);
+	return 0;
+}
+
+static int make(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct parts parts,
+		struct error *e)
+{
+	struct baking b = {.image = {.width = parts.sun ? 2048 : 512, .height = parts.sun ? 1024 : 256, .channels = 3}};
+	double turbidity = node_float(n, "turbidity", 3), scale = node_float(n, "scale", 1);
+	vec3 axis[3], towards = {0, 1, 0};
+	int code = envmap_axes(n, axis, e);
+	if (code)
+		return code;
+	if (build->dialect_3) {
+		vec3 y = axis[1];
+		axis[1] = axis[2];
+		axis[2] = vec3_neg(y);
+	}
+	if ((code = read_sun(n, axis, &towards, e)))
+		return code;
+	b.towards = (vec3){vec3_dot(axis[0], towards), vec3_dot(axis[1], towards), vec3_dot(axis[2], towards)};
+	double sun = angle_between(b.towards, (vec3){0, 1, 0});
+	if (!(sun < 0.5 * PI - 1e-3))
+		return node_error(n, e, EINVAL, "the sun is not above the horizon (%.1f degrees)", 90 - sun / RADIANS);
+	b.sky = daylight_of(turbidity, sun);
+	b.radius = DAYLIGHT_SUN_RADIUS * node_float(n, "sun_radius_scale", 1);
+	b.radius = node_float(n, "sun_aperture", 2 * b.radius / RADIANS) * RADIANS / 2;
+	b.image.pixels = arena_alloc(build->arena, (size_t)b.image.width * b.image.height, 3 * sizeof *b.image.pixels);
+	if (!b.image.pixels)
+		return node_error(n, e, ENOMEM, "out of memory");
+	double rgb[3];
+	if (parts.sky)
+		bake_sky(&b, node_float(n, "sky_scale", 1));
+	daylight_sun(turbidity, sun, rgb);
+	for (int k = 0; k < 3; k++)
+		rgb[k] *= node_float(n, "sun_scale", 1);
+	if (parts.sun)
+		bake_sun(&b, rgb);
+	return envmap_make(em, &(struct raster){.image = b.image}, scale, axis, n, build, e);
+}
+
+static int sky_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+		      struct error *e)
+{
+	return make(em, n, build, (struct parts){.sky = true}, e);
+}
+
+static int sun_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+		      struct error *e)
+{
+	return make(em, n, build, (struct parts){.sun = true}, e);
+}
+
+static int sunsky_create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build,
+			 struct error *e)
+{
+	return make(em, n, build, (struct parts){.sky = true, .sun = true}, e);
+}
+
+#define NUMBER(name_, min_, max_)                                                         \
+	{                                                                                 \
+		.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = min_, .max = max_ \
+	}
+#define WHOLE(name_, min_, max_)                                            \
+	{                                                                   \
+		.name = name_, .types = VALUE_INT, .min = min_, .max = max_ \
+	}
+
+static const struct param params[] = {
+	NUMBER("turbidity", 1.7, 10),
+	NUMBER("scale", 0, PARAM_LIGHT_MAX),
+	NUMBER("sky_scale", 0, 1e9),
+	NUMBER("sun_scale", 0, 1e9),
+	{.name = "sun_direction", .types = VALUE_POINT, .min = -PARAM_LENGTH_MAX, .max = PARAM_LENGTH_MAX},
+	NUMBER("sun_radius_scale", 0.1, 50),
+	NUMBER("sun_aperture", 0.05, 30),
+	NUMBER("latitude", -90, 90),
+	NUMBER("longitude", -180, 180),
+	NUMBER("timezone", -14, 14),
+	WHOLE("year", 1900, 2200),
+	WHOLE("month", 1, 12),
+	WHOLE("day", 1, 31),
+	NUMBER("hour", 0, 24),
+	NUMBER("minute", 0, 60),
+	NUMBER("second", 0, 60),
+	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "albedo", .types = VALUE_TEXTURE, .status = PARAM_IGNORED},
+	{.name = "resolution", .types = VALUE_INT, .status = PARAM_IGNORED},
+	{.name = "complex_sun", .types = VALUE_BOOL, .status = PARAM_IGNORED},
+	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = "stretch", .types = VALUE_FLOAT, .status = PARAM_REFUSED},
+	{.name = "extend", .types = VALUE_BOOL, .status = PARAM_REFUSED},
+	{.name = NULL},
+};
+
+const struct emitter_ops emitter_ops_sky = {.type = "sky", .params = params, .create = sky_create, ENVMAP_OPS};
+const struct emitter_ops emitter_ops_sun = {.type = "sun", .params = params, .create = sun_create, ENVMAP_OPS};
+const struct emitter_ops emitter_ops_sunsky = {.type = "sunsky", .params = params, .create = sunsky_create, ENVMAP_OPS};

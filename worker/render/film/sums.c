@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/film/sums.h"
+
+#include "common/base/mem.h"
+
+/* Mitchell and Netravali 1988, eq. 8: integral 1 whatever B and C are. */
+static double cubic(double b, double c, double d)
+{
+	if (d >= 2)
+		return 0;
+	if (d >= 1)
+		return ((((-b - 6 * c) * d + 6 * b + 30 * c) * d - 12 * b - 48 * c) * d + 8 * b + 24 * c) / 6;
+	return (((12 - 9 * b - 6 * c) * d - 18 + 12 * b + 6 * c) * d * d + 6 - 2 * b) / 6;
+}
+
+static double sinc(double x)
+{
+	return x > 0 ? sin(M_PI * x) / (M_PI * x) : 1;
+}
+
+static double windowed_sinc(double radius, double d)
+{
+	return d < radius ? sinc(d) * sinc(d / radius) : 0;
+}
+
+/* By Simpson's rule: smooth but for the ends, where it is 0. */
+static double windowed_sinc_integral(double radius)
+{
+	enum { STEPS = 4096 };
+	double sum = 0;
+	for (int i = 0; i <= STEPS; i++)
+		sum += (i == 0 || i == STEPS ? 1 : i % 2 ? 4 : 2) * windowed_sinc(radius, radius * i / STEPS);
+	return 2 * sum * radius / (3.0 * STEPS);
+}
+
+int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene_settings *s, struct error *e)
+{
+	*f = (struct film_sums){.x = p->crop_x,
+				.y = p->crop_y,
+				.width = p->crop_width,
+				.height = p->crop_height,
+				.filter = s->filter,
+				.radius = s->filter_radius};
+	f->tiles_x = (f->width + TILE_SIZE - 1) / TILE_SIZE;
+	f->tiles_y = (f->height + TILE_SIZE - 1) / TILE_SIZE;
+	if (s->filter == FILTER_GAUSSIAN) {
+		/* Mitsuba's gaussian is lowered so that it ends at zero; its integral in closed form. */
+		double sd = s->filter_stddev, r = s->filter_radius;
+		f->inverse = 1 / (2 * sd * sd);
+		f->floor = exp(-f->inverse * r * r);
+		f->scale = 1 / (sd * sqrt(2 * M_PI) * erf(r / (sd * M_SQRT2)) - 2 * r * f->floor);
+		if (!(f->scale > 0) || !isfinite(f->scale))
+			return error_set(e, EINVAL,
+					 "nothing is left of a gaussian filter of deviation %g, radius %g pixels", sd,
+					 r);
+	}
+	f->b = s->filter_b;
+	f->c = s->filter_c;
+	if (s->filter == FILTER_LANCZOS)
+		f->scale = 1 / windowed_sinc_integral(f->radius);
+	f->xyz = mem_alloc((size_t)f->width * f->height * 3, sizeof *f->xyz);
+	f->touched = mem_alloc((size_t)f->tiles_x * f->tiles_y, 1);
+	if (!f->xyz || !f->touched) {
+		film_sums_fini(f);
+		return error_set(e, ENOMEM, "out of memory for a film of %u x %u pixels", f->width, f->height);
+	}
+	int rc = chain_moments_init(&f->moments, p, e);
+	if (rc)
+		film_sums_fini(f);
+	return rc;
+}
+
+void film_sums_fini(struct film_sums *f)
+{
+	mem_free(f->xyz);
+	mem_free(f->touched);
+	chain_moments_fini(&f->moments);
+	f->xyz = NULL;
+	f->touched = NULL;
+}
+
+double film_kernel(const struct film_sums *f, double distance)
+{
+	double d = fabs(distance);
+	switch (f->filter) {
+	case FILTER_BOX:
+		return d <= f->radius ? 0.5 / f->radius : 0;
+	case FILTER_TENT:
+		return d < f->radius ? (1 - d / f->radius) / f->radius : 0;
+	case FILTER_GAUSSIAN:
+		return d < f->radius ? f->scale * (exp(-f->inverse * d * d) - f->floor) : 0;
+	case FILTER_CUBIC:
+		return cubic(f->b, f->c, d);
+	case FILTER_LANCZOS:
+		return f->scale * windowed_sinc(f->radius, d);
+	}
+	return 0;
+}
+
+static void add(struct film_sums *f, uint32_t i, uint32_t j, const double xyz[3], double weight)
+{
+	double *p = f->xyz + ((size_t)j * f->width + i) * 3;
+	for (int k = 0; k < 3; k++)
+		p[k] += weight * xyz[k];
+	f->touched[(size_t)(j / TILE_SIZE) * f->tiles_x + i / TILE_SIZE] = 1;
+}
+
+/* First and last pixel (relative to the crop) whose centre lies within the radius; false: none inside the crop. */
+static bool reach(double position, double radius, uint32_t size, uint32_t *first, uint32_t *last)
+{
+	double lo = fmax(ceil(position - radius - 0.5), 0), hi = fmin(floor(position + radius - 0.5), (double)size - 1);
+	if (!(lo <= hi))
+		return false;
+	*first = (uint32_t)lo;
+	*last = (uint32_t)hi;
+	return true;
+}
+
+enum { KERNEL_MAX = 130 }; /* pixels that a kernel may span: settings limit its radius to 64 */
+
+void film_sums_splat(struct film_sums *f, const struct splat *s, double weight)
+{
+	double x = s->x - f->x, y = s->y - f->y;
+	if (f->filter == FILTER_BOX && f->radius == 0.5) {
+		/* A point on the border of two pixels belongs to one. */
+		if (x >= 0 && y >= 0 && x < f->width && y < f->height)
+			add(f, (uint32_t)x, (uint32_t)y, s->xyz, weight);
+		return;
+	}
+	uint32_t i0, i1, j0, j1;
+	if (!reach(x, f->radius, f->width, &i0, &i1) || !reach(y, f->radius, f->height, &j0, &j1) ||
+	    i1 - i0 >= KERNEL_MAX)
+		return;
+	double kx[KERNEL_MAX];
+	for (uint32_t i = i0; i <= i1; i++)
+		kx[i - i0] = film_kernel(f, x - (i + 0.5));
+	for (uint32_t j = j0; j <= j1; j++) {
+		double ky = film_kernel(f, y - (j + 0.5)) * weight;
+		for (uint32_t i = i0; i <= i1; i++)
+			if (kx[i - i0] * ky != 0)
+				add(f, i, j, s->xyz, kx[i - i0] * ky);
+	}
+}
+
+static int take_tile(const struct film_sums *f, uint32_t tx, uint32_t ty, struct tile *t)
+{
+	uint32_t x0 = tx * TILE_SIZE, y0 = ty * TILE_SIZE;
+	t->x = f->x + x0;
+	t->y = f->y + y0;
+	t->width = f->width - x0 < TILE_SIZE ? f->width - x0 : TILE_SIZE;
+	t->height = f->height - y0 < TILE_SIZE ? f->height - y0 : TILE_SIZE;
+	t->xyz = mem_alloc((size_t)t->width * t->height * 3, sizeof *t->xyz);
+	if (!t->xyz)
+		return -ENOMEM;
+	float *out = t->xyz;
+	for (uint32_t j = 0; j < t->height; j++) {
+		const double *in = f->xyz + ((size_t)(y0 + j) * f->width + x0) * 3;
+		for (uint32_t i = 0; i < t->width * 3; i++)
+			*out++ = (float)in[i];
+	}
+	return 0;
+}
+
+int film_sums_take(const struct film_sums *f, struct batch *out, struct error *e)
+{
+	uint32_t count = 0;
+	for (uint32_t i = 0; i < f->tiles_x * f->tiles_y; i++)
+		count += f->touched[i];
+	out->tiles = mem_alloc(count, sizeof *out->tiles);
+	if (!out->tiles)
+		return error_set(e, ENOMEM, "out of memory for tiles");
+	for (uint32_t i = 0; i < f->tiles_x * f->tiles_y; i++) {
+		if (!f->touched[i])
+			continue;
+		if (take_tile(f, i % f->tiles_x, i / f->tiles_x, &out->tiles[out->tile_count]))
+			return error_set(e, ENOMEM, "out of memory for tiles");
+		out->tile_count++;
+	}
+	return 0;
+}

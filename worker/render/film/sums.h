@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The film of one lease: per pixel of the crop a sum in double, rounded once when the tiles are taken. Every integrator
+ * splats with the continuous filter kernel, normalised to integral 1 over the plane (docs/design.md, rules 3).
+ * One thread. Memory: 24 bytes a pixel, of which only pages that are touched cost anything; splatting allocates
+ * nothing.
+ */
+#ifndef WORKER_RENDER_FILM_SUMS_H
+#define WORKER_RENDER_FILM_SUMS_H
+
+#include "common/film/batch.h"
+#include "worker/render/path/path.h"
+#include "worker/render/film/moments.h"
+
+struct film_sums {
+	uint32_t x, y, width, height; /* the crop */
+	uint32_t tiles_x, tiles_y;
+	enum filter_kind filter;
+	double radius;
+	double inverse, floor, scale; /* gaussian: scale (exp(-inverse d^2) - floor) */
+	double b, c;		      /* cubic; scale: of lanczos, too */
+	double *xyz;
+	uint8_t *touched; /* one a tile */
+	struct chain_moments moments;
+};
+
+int film_sums_init(struct film_sums *f, const struct plan *p, const struct scene_settings *s, struct error *e);
+void film_sums_fini(struct film_sums *f);
+void film_sums_splat(struct film_sums *f, const struct splat *s, double weight);
+/* The touched tiles in row-major order, rounded to float. */
+int film_sums_take(const struct film_sums *f, struct batch *out, struct error *e);
+
+/* The kernel's value at a distance from the pixel's centre, in one dimension. */
+double film_kernel(const struct film_sums *f, double distance);
+
+#endif

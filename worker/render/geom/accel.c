@@ -1,0 +1,516 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/geom/accel.h"
+
+#include "common/base/mem.h"
+#include "common/base/liveness.h"
+#include "worker/render/geom/solved.h"
+#include "worker/render/geom/triangle.h"
+#include "worker/render/math/fptrap.h"
+
+#include <float.h>
+#include <stdatomic.h>
+#include <stdio.h>
+#include <sys/types.h>
+
+struct accel {
+	RTCDevice device;
+	RTCScene scene;
+	uint32_t count, sphere_count;
+	struct sphere_prim *spheres;
+	struct accel_shape *shapes;
+	const struct coincidence *coincidence;
+	struct wide_prims *wide; /* one a shape */
+	atomic_size_t bytes, peak;
+	vec3 low, high;
+	double size;   /* sum of the sides */
+	double reach;  /* how far Embree's floats can be off, see below */
+	double detail; /* of a scene of mixed scales: the extent of its smallest shape; else 0 */
+};
+
+static bool memory_monitor(void *user, ssize_t bytes, bool post)
+{
+	(void)post;
+	struct accel *a = user;
+	size_t now = atomic_fetch_add(&a->bytes, (size_t)bytes) + (size_t)bytes;
+	if (now > atomic_load(&a->peak))
+		atomic_store(&a->peak, now); /* one thread builds */
+	return true;
+}
+
+/* Once in about a thousand primitives, on whatever thread Embree likes. */
+static bool progress_monitor(void *counter, double done)
+{
+	(void)done;
+	tick_on(counter);
+	return true;
+}
+
+/* So high over the triangle's plane at both ends that not even the normal that Embree makes of tiny triangles far away
+ * can be wrong about the side: spares most hits the way to their vertices. */
+static bool clearly_crosses(const struct query *q, const struct RTCHit *hit, const struct RTCRay *ray)
+{
+	vec3 n = {(double)hit->Ng_x, (double)hit->Ng_y, (double)hit->Ng_z};
+	double t = (double)ray->tfar - q->back, nearer = q->segment ? fmin(t, 1 - t) : t;
+	return fabs(vec3_dot(n, q->d)) * nearer > 0x1p10 * q->reach * triangle_norm1(n);
+}
+
+/* Solved in double, as a primitive of its own (wide_root). */
+static bool is_wide(const struct query *q, const struct accel_shape *s, uint32_t prim)
+{
+	return isfinite(q->wide_from) && (double)triangle_extent(s->position, s->index[prim]) >= q->wide_from;
+}
+
+static void filter_triangle(const struct RTCFilterFunctionNArguments *args)
+{
+	const struct query *q = (const struct query *)(const void *)args->context;
+	/* Single rays only (N = 1): the accessors of packets exist in C++ alone. */
+	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
+	if ((hit->geomID == q->from.shape && hit->primID == q->from.prim) ||
+	    (hit->geomID == q->to.shape && hit->primID == q->to.prim))
+		args->valid[0] = 0;
+	else if (is_wide(q, args->geometryUserPtr, hit->primID))
+		args->valid[0] = 0;
+	else if (query_hides(q, hit->geomID)) {
+		if (!query_crosses_there(q, (struct prim_ref){hit->geomID, hit->primID}))
+			args->valid[0] = 0;
+	} else if (!clearly_crosses(q, hit, (const struct RTCRay *)(const void *)args->ray) &&
+		   !query_crosses(q, args->geometryUserPtr, hit->primID))
+		args->valid[0] = 0;
+}
+
+/* The final hit is among those that pass here: its vertices, far apart in memory, come while Embree goes on searching.
+ */
+static void filter_closest(const struct RTCFilterFunctionNArguments *args)
+{
+	const struct RTCHit *hit = (const struct RTCHit *)(const void *)args->hit;
+	const struct accel_shape *s = args->geometryUserPtr;
+	const uint32_t *i = s->index[hit->primID];
+	for (int k = 0; k < 3; k++)
+		__builtin_prefetch(s->position[i[k]]);
+	filter_triangle(args);
+}
+
+static void attach(struct accel *a, RTCGeometry g, uint32_t id)
+{
+	rtcSetGeometryMask(g, 0xFFFFFFFFu);
+	rtcCommitGeometry(g);
+	rtcAttachGeometryByID(a->scene, g, id);
+	rtcReleaseGeometry(g);
+}
+
+static int attach_triangles(struct accel *a, struct accel_shape *s, uint32_t id)
+{
+	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_TRIANGLE);
+	if (!g)
+		return -ENOMEM;
+	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, s->position, 0,
+				   sizeof s->position[0], s->vertex_count);
+	rtcSetSharedGeometryBuffer(g, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, s->index, 0, sizeof s->index[0],
+				   s->triangle_count);
+	rtcSetGeometryUserData(g, s);
+	rtcSetGeometryIntersectFilterFunction(g, filter_closest);
+	rtcSetGeometryOccludedFilterFunction(g, filter_triangle);
+	attach(a, g, id);
+	return 0;
+}
+
+static int attach_sphere(struct accel *a, const struct accel_shape *s, uint32_t id)
+{
+	struct sphere_prim *prim = &a->spheres[a->sphere_count++];
+	*prim = (struct sphere_prim){s->center, s->radius, id};
+	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
+	if (!g)
+		return -ENOMEM;
+	solved_sphere(g, prim);
+	attach(a, g, id);
+	return 0;
+}
+
+/* The triangles of a shape that are `least` large, as a geometry of their own, of a number beyond those of the shapes.
+ */
+static int attach_wide(struct accel *a, uint32_t shape_count, uint32_t id, double least)
+{
+	struct wide_prims *w = &a->wide[id];
+	*w = (struct wide_prims){&a->shapes[id], id, 0, NULL};
+	if (a->shapes[id].is_sphere)
+		return 0;
+	for (int pass = 0; pass < 2; pass++) {
+		w->count = 0;
+		for (uint32_t i = 0; i < w->shape->triangle_count; i++) {
+			if (triangle_extent(w->shape->position, w->shape->index[i]) < least)
+				continue;
+			if (pass)
+				w->prim[w->count] = i;
+			w->count++;
+		}
+		if (w->count == 0)
+			return 0;
+		if (!pass && !(w->prim = mem_alloc(w->count, sizeof *w->prim)))
+			return -ENOMEM;
+	}
+	RTCGeometry g = rtcNewGeometry(a->device, RTC_GEOMETRY_TYPE_USER);
+	if (!g)
+		return -ENOMEM;
+	solved_triangles(g, w);
+	attach(a, g, shape_count + id);
+	return 0;
+}
+
+/* One instruction set for all machines that have it, so that farms of mixed processors agree on bits. */
+static bool has_avx2(void)
+{
+#if defined(__x86_64__)
+	return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma");
+#else
+	return false;
+#endif
+}
+
+const char *accel_version(void)
+{
+#define TEXT_(x) #x
+#define TEXT(x) TEXT_(x)
+#define EMBREE_TEXT "embree " TEXT(RTC_VERSION_MAJOR) "." TEXT(RTC_VERSION_MINOR) "." TEXT(RTC_VERSION_PATCH)
+	return has_avx2() ? EMBREE_TEXT " avx2" : EMBREE_TEXT " native";
+}
+
+static int embree_failure(RTCDevice device, struct error *e)
+{
+	enum RTCError code = rtcGetDeviceError(device);
+	if (code == RTC_ERROR_NONE)
+		return 0;
+	return error_set(e, code == RTC_ERROR_OUT_OF_MEMORY ? ENOMEM : EIO, "Embree reports error %d while building",
+			 (int)code);
+}
+
+/* How far a point in float, and what Embree's robust test makes of it with vertices anywhere in the scene, can be off:
+ * half a unit in the last place of each coordinate for the point, as much again for the differences, times four. */
+static double rounding_reach(vec3 low, vec3 high)
+{
+	vec3 m = {fmax(fabs(low.x), fabs(high.x)), fmax(fabs(low.y), fabs(high.y)), fmax(fabs(low.z), fabs(high.z))};
+	return 0x1p-21 * fmax(m.x, fmax(m.y, m.z));
+}
+
+/* A scene has mixed scales where its smallest shape is so much smaller than the scene: what floats are off in all of it
+ * is then more than a thousandth of that shape. Triangles that are so much larger than that shape are solved in double.
+ */
+#define MIXED 0x1p11
+
+static double extent_of(const struct accel_shape *s)
+{
+	if (s->is_sphere)
+		return 2 * s->radius;
+	float low[3] = {INFINITY, INFINITY, INFINITY}, high[3] = {-INFINITY, -INFINITY, -INFINITY}, most = 0;
+	for (uint32_t i = 0; i < s->triangle_count; i++)
+		for (int j = 0; j < 3; j++)
+			for (int k = 0; k < 3; k++) {
+				low[k] = fminf(low[k], s->position[s->index[i][j]][k]);
+				high[k] = fmaxf(high[k], s->position[s->index[i][j]][k]);
+			}
+	for (int k = 0; k < 3; k++)
+		most = fmaxf(most, high[k] - low[k]);
+	return (double)most;
+}
+
+static void find_detail(struct accel *a, const struct accel_shape *shapes, uint32_t count)
+{
+	double least = INFINITY, reach = 0;
+	for (uint32_t i = 0; i < count; i++) {
+		const struct accel_shape *s = &shapes[i];
+		vec3 r = {s->radius, s->radius, s->radius};
+		least = fmin(least, extent_of(s));
+		if (s->is_sphere)
+			reach = fmax(reach, rounding_reach(vec3_sub(s->center, r), vec3_add(s->center, r)));
+		for (uint32_t k = 0; !s->is_sphere && k < s->vertex_count; k++) {
+			vec3 p = triangle_vertex(s->position, k);
+			reach = fmax(reach, rounding_reach(p, p));
+		}
+	}
+	a->detail = MIXED * least < 0x1p21 * reach ? least : 0;
+}
+
+/* A sphere is hidden wholly or not at all. */
+static int attach_shape(struct accel *a, uint32_t count, uint32_t id)
+{
+	if (a->shapes[id].is_sphere &&
+	    coincide_there(a->coincidence, a->shapes, (struct prim_ref){id, 0}, a->shapes[id].center).shape != id)
+		return 0;
+	int rc = a->shapes[id].is_sphere ? attach_sphere(a, &a->shapes[id], id)
+					 : attach_triangles(a, &a->shapes[id], id);
+	return rc || a->detail == 0 ? rc : attach_wide(a, count, id, MIXED * a->detail);
+}
+
+static int build(struct accel *a, const struct accel_shape *shapes, uint32_t count, struct error *e)
+{
+	a->device = rtcNewDevice(has_avx2() ? "threads=1,isa=avx2" : "threads=1");
+	if (!a->device)
+		return error_set(e, EIO, "Embree's device cannot be created");
+	rtcSetDeviceMemoryMonitorFunction(a->device, memory_monitor, a);
+	a->scene = rtcNewScene(a->device);
+	if (!a->scene)
+		return error_set(e, ENOMEM, "Embree's scene cannot be created");
+	rtcSetSceneFlags(a->scene, RTC_SCENE_FLAG_ROBUST);
+	rtcSetSceneBuildQuality(a->scene, RTC_BUILD_QUALITY_MEDIUM);
+	find_detail(a, shapes, count);
+	for (uint32_t i = 0; i < count; i++)
+		a->shapes[i] = shapes[i];
+	for (uint32_t i = 0; i < count; i++) {
+		int rc = attach_shape(a, count, i);
+		if (rc)
+			return error_set(e, -rc, "Embree's geometry cannot be created");
+	}
+	rtcSetSceneProgressMonitorFunction(a->scene, progress_monitor, tick_counter);
+	rtcCommitScene(a->scene);
+	int rc = embree_failure(a->device, e);
+	if (rc || count == 0)
+		return rc;
+	struct RTCBounds b;
+	rtcGetSceneBounds(a->scene, &b);
+	a->low = (vec3){(double)b.lower_x, (double)b.lower_y, (double)b.lower_z};
+	a->high = (vec3){(double)b.upper_x, (double)b.upper_y, (double)b.upper_z};
+	a->size = a->high.x - a->low.x + a->high.y - a->low.y + a->high.z - a->low.z;
+	a->reach = rounding_reach(a->low, a->high);
+	return 0;
+}
+
+int accel_new(struct accel **out, const struct accel_shape *shapes, uint32_t count, const struct coincidence *c,
+	      struct error *e)
+{
+	*out = NULL;
+	struct accel *a = mem_alloc(1, sizeof *a);
+	if (!a)
+		return error_set(e, ENOMEM, "out of memory");
+	a->spheres = mem_alloc(count, sizeof *a->spheres);
+	a->shapes = mem_alloc(count, sizeof *a->shapes);
+	a->wide = mem_alloc(count, sizeof *a->wide);
+	a->count = count;
+	a->coincidence = c;
+	unsigned trap = fptrap_leave();
+	int rc =
+		a->spheres && a->shapes && a->wide ? build(a, shapes, count, e) : error_set(e, ENOMEM, "out of memory");
+	fptrap_return(trap);
+	if (rc)
+		accel_free(a);
+	else
+		*out = a;
+	return rc;
+}
+
+void accel_free(struct accel *a)
+{
+	if (!a)
+		return;
+	unsigned trap = fptrap_leave();
+	if (a->scene)
+		rtcReleaseScene(a->scene);
+	if (a->device)
+		rtcReleaseDevice(a->device);
+	fptrap_return(trap);
+	for (uint32_t i = 0; a->wide && i < a->count; i++)
+		mem_free(a->wide[i].prim);
+	mem_free(a->wide);
+	mem_free(a->spheres);
+	mem_free(a->shapes);
+	mem_free(a);
+}
+
+size_t accel_bytes(const struct accel *a)
+{
+	return atomic_load(&a->bytes);
+}
+
+size_t accel_peak_bytes(const struct accel *a)
+{
+	return atomic_load(&a->peak);
+}
+
+/* Rays from far outside enter the scene's box in double: Embree's floats never see the distance. In units of |d|. */
+static double entry_distance(const struct accel *a, vec3 o, vec3 d)
+{
+	double size = a->size;
+	if (o.x >= a->low.x - size && o.y >= a->low.y - size && o.z >= a->low.z - size && o.x <= a->high.x + size &&
+	    o.y <= a->high.y + size && o.z <= a->high.z + size)
+		return 0;
+	const double lo[3] = {a->low.x, a->low.y, a->low.z}, hi[3] = {a->high.x, a->high.y, a->high.z};
+	const double p[3] = {o.x, o.y, o.z}, w[3] = {d.x, d.y, d.z};
+	double enter = 0;
+	for (int i = 0; i < 3; i++) {
+		double outside = w[i] > 0 ? lo[i] - size - p[i] : p[i] - hi[i] - size;
+		if (outside > 0 && fabs(w[i]) * 0x1p60 > outside)
+			enter = fmax(enter, outside / fabs(w[i]));
+	}
+	return enter;
+}
+
+static double norm_max(vec3 v)
+{
+	return fmax(fabs(v.x), fmax(fabs(v.y), fabs(v.z)));
+}
+
+/* rounding_reach of a ray at p. Of mixed scales: by what is there, not by the scene: the triangles that Embree solves,
+ * and the doubles of p itself on a triangle as large as the scene. */
+static double reach_at(const struct accel *a, vec3 p)
+{
+	if (a->detail == 0)
+		return a->reach;
+	return 0x1p-21 * (norm_max(p) + MIXED * a->detail) + 0x1p-50 * a->size;
+}
+
+/* A ray in float from o + t0 d on is off by parts of its distance from the origin, which is too much for what it meets
+ * far nearer to it: there another begins. In units of d. */
+static double part_end(const struct accel *a, vec3 o, vec3 d, double t0, double t_max)
+{
+	if (a->detail == 0)
+		return t_max;
+	vec3 p = vec3_madd(o, t0, d);
+	double from2 = vec3_dot(p, p), d2 = vec3_dot(d, d), to_nearest = -vec3_dot(p, d) / d2;
+	double next2 = from2 * 0x1p-8, left2 = next2 - (from2 - to_nearest * to_nearest * d2);
+	if (from2 <= 0x1p16 * a->detail * a->detail || to_nearest <= 0 || left2 <= 0)
+		return t_max;
+	return fmin(t0 + to_nearest - sqrt(left2 / d2), t_max);
+}
+
+/* To the side that d leaves for. */
+static vec3 lifted(const struct accel *a, vec3 p, vec3 ng, vec3 d)
+{
+	return vec3_madd(p, copysign(reach_at(a, p), vec3_dot(ng, d)), ng);
+}
+
+/* Embree ends the program on rays beyond about 1.8e18 (FLT_LARGE). A number that is none fails, too. */
+static void check_ray(const struct RTCRay *r)
+{
+	float sum = fabsf(r->org_x) + fabsf(r->org_y) + fabsf(r->org_z) + fabsf(r->dir_x) + fabsf(r->dir_y) +
+		    fabsf(r->dir_z);
+	if (!(sum < 1e18f))
+		fptrap_fault();
+}
+
+static struct query query_of(const struct accel *a, vec3 o, vec3 d)
+{
+	return (struct query){.o = o,
+			      .d = d,
+			      .from = PRIM_NONE,
+			      .to = PRIM_NONE,
+			      .wide_from = a->detail == 0 ? INFINITY : MIXED * a->detail,
+			      .coincidence = a->coincidence,
+			      .shapes = a->shapes};
+}
+
+/* It lies on a surface where another is. */
+static bool is_hidden(const struct accel *a, const struct ray_end *end)
+{
+	if (!a->coincidence || end->prim.shape == PRIM_NONE.shape)
+		return false;
+	struct prim_ref there = coincide_there(a->coincidence, a->shapes, end->prim, end->p);
+	return there.shape != end->prim.shape || there.prim != end->prim.prim;
+}
+
+/* Embree's ray for the part from t0 to t1 runs from o along d, beside the true one, and begins before it, by as much as
+ * floats may be off: beside, so that a low ray does not slip out along the edge of the triangle that it leaves and that
+ * is filtered; before, and beyond the end, so that nothing near them is lost. What it does not meet in double between
+ * the ends is turned down by the callbacks. */
+static void fill_ray(const struct accel *a, struct RTCRay *ray, struct query *q, double t_min, vec3 o, vec3 d,
+		     double t0, double t1)
+{
+	q->reach = reach_at(a, vec3_madd(q->o, t0, q->d));
+	/* A segment that is shorter leaves Embree's floats no ray. */
+	q->before = q->segment ? q->reach / fmax(vec3_length(q->d), q->reach * 0x1p-20) : q->reach;
+	q->back = q->before - t0;
+	q->t_min = t0 > 0 ? fmax(t_min, -q->back) : t_min;
+	o = vec3_madd(o, -q->back, d);
+	*ray = (struct RTCRay){.org_x = (float)o.x,
+			       .org_y = (float)o.y,
+			       .org_z = (float)o.z,
+			       .tnear = q->t_min > 0 ? (float)(q->t_min + q->back) : 0,
+			       .dir_x = (float)d.x,
+			       .dir_y = (float)d.y,
+			       .dir_z = (float)d.z,
+			       .tfar = (float)fmin(t1 + 2 * q->before - t0, (double)FLT_MAX),
+			       .mask = 0xFFFFFFFFu};
+	check_ray(ray);
+}
+
+static bool closest(const struct accel *a, struct query *q, struct RTCRayHit *rh, vec3 o, double t_min, double t_max)
+{
+	double t0 = 0, t1 = 0;
+	do {
+		t0 = t1;
+		t1 = part_end(a, q->o, q->d, t0, t_max);
+		fill_ray(a, &rh->ray, q, t_min, o, q->d, t0, t1);
+		rh->hit.geomID = rh->hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+		unsigned trap = fptrap_leave();
+		EMBREE_INIT_CONTEXT(&q->context);
+		embree_intersect(a->scene, &q->context, rh);
+		fptrap_return(trap);
+	} while (t1 < t_max && rh->hit.geomID == RTC_INVALID_GEOMETRY_ID);
+	return rh->hit.geomID != RTC_INVALID_GEOMETRY_ID;
+}
+
+bool accel_closest(const struct accel *a, const struct ray_end *from, vec3 d, double t_min, double t_max,
+		   struct ray_hit *hit)
+{
+	double enter = entry_distance(a, from->p, d);
+	if (enter >= t_max || is_hidden(a, from))
+		return false;
+	struct query q = query_of(a, vec3_madd(from->p, enter, d), d);
+	q.from = from->prim;
+	struct RTCRayHit rh;
+	if (!closest(a, &q, &rh, lifted(a, q.o, from->ng, d), fmax(t_min - enter, 0), t_max - enter))
+		return false;
+	double t = enter + fmax((double)rh.ray.tfar - q.back, 0);
+	*hit = (struct ray_hit){query_there(&q, (struct prim_ref){rh.hit.geomID, rh.hit.primID}), t, (double)rh.hit.u,
+				(double)rh.hit.v};
+	return true;
+}
+
+static bool occluded(const struct accel *a, struct query *q, vec3 o, vec3 d, double t_max)
+{
+	bool met = false;
+	double t0 = 0, t1 = 0;
+	do {
+		struct RTCRay ray;
+		t0 = t1;
+		t1 = part_end(a, q->o, q->d, t0, t_max);
+		fill_ray(a, &ray, q, 0, o, d, t0, t1);
+		unsigned trap = fptrap_leave();
+		EMBREE_INIT_CONTEXT(&q->context);
+		embree_occluded(a->scene, &q->context, &ray);
+		fptrap_return(trap);
+		met = ray.tfar < 0;
+	} while (t1 < t_max && !met);
+	return met;
+}
+
+bool accel_occluded(const struct accel *a, const struct ray_end *from, const struct ray_end *to)
+{
+	/* Floats are the better the nearer to the origin a ray begins. */
+	if (a->detail > 0 && norm_max(to->p) < norm_max(from->p)) {
+		const struct ray_end *other = from;
+		from = to;
+		to = other;
+	}
+	vec3 d = vec3_sub(to->p, from->p);
+	double enter = entry_distance(a, from->p, d);
+	if (is_hidden(a, from) || is_hidden(a, to))
+		return true;
+	if (enter >= 1)
+		return false;
+	struct query q = query_of(a, vec3_madd(from->p, enter, d), vec3_scale(1 - enter, d));
+	q.from = from->prim;
+	q.to = to->prim;
+	q.end = to->p;
+	q.segment = true;
+	if (!(vec3_length(q.d) > 0))
+		return false;
+	vec3 o = lifted(a, q.o, from->ng, d), end = lifted(a, to->p, to->ng, vec3_neg(d));
+	return occluded(a, &q, o, vec3_sub(end, o), 1);
+}
+
+bool accel_occluded_to_infinity(const struct accel *a, const struct ray_end *from, vec3 d)
+{
+	if (is_hidden(a, from))
+		return true;
+	struct query q = query_of(a, from->p, d);
+	q.from = from->prim;
+	return occluded(a, &q, lifted(a, from->p, from->ng, d), d, INFINITY);
+}

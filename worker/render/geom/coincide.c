@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Asking which of coinciding primitives is there, and whether two coincide. The latter is decided on the polygon in
+ * which the one projects onto the other: its corners lie no farther from the other's plane than the vertices of both
+ * are rounded, 2^-24 of each coordinate, and it is wider than a few such roundings. The corners decide for all of it:
+ * both are planes.
+ */
+#include "worker/render/geom/coincide.h"
+
+#include "common/base/mem.h"
+
+enum { CORNERS = 9 }; /* three, and one more a cut */
+
+struct polygon {
+	vec3 p[CORNERS];
+	unsigned n;
+};
+
+/* What is left where side.(p - at) >= 0. */
+static void cut(struct polygon *a, vec3 at, vec3 side)
+{
+	struct polygon out = {.n = 0};
+	for (unsigned i = 0; i < a->n; i++) {
+		vec3 p = a->p[i], q = a->p[(i + 1) % a->n];
+		double u = vec3_dot(side, vec3_sub(p, at)), v = vec3_dot(side, vec3_sub(q, at));
+		if (u >= 0)
+			out.p[out.n++] = p;
+		if ((u > 0 && v < 0) || (u < 0 && v > 0))
+			out.p[out.n++] = vec3_madd(p, u / (u - v), vec3_sub(q, p));
+	}
+	*a = out;
+}
+
+static double largest(double a, double b, double c)
+{
+	return fmax(fabs(a), fmax(fabs(b), fabs(c)));
+}
+
+/* What rounding of its vertices can move a triangle by, along n. */
+static double rounded_along(const struct triangle *t, vec3 n)
+{
+	return 0x1p-24 * (fabs(n.x) * largest(t->v[0].x, t->v[1].x, t->v[2].x) +
+			  fabs(n.y) * largest(t->v[0].y, t->v[1].y, t->v[2].y) +
+			  fabs(n.z) * largest(t->v[0].z, t->v[1].z, t->v[2].z));
+}
+
+/* Wider than about eight roundings of its coordinates. */
+static bool has_width(const struct polygon *a, vec3 n)
+{
+	double area2 = 0, around = 0, far = 0;
+	for (unsigned i = 0; i < a->n; i++) {
+		vec3 from = vec3_sub(a->p[i], a->p[0]), to = vec3_sub(a->p[(i + 1) % a->n], a->p[0]);
+		area2 += vec3_dot(n, vec3_cross(from, to));
+		around += vec3_length(vec3_sub(to, from));
+		far = fmax(far, largest(a->p[i].x, a->p[i].y, a->p[i].z));
+	}
+	return fabs(area2) > 0x1p-21 * far * around;
+}
+
+bool coincide_triangles(const struct triangle *a, const struct triangle *b, bool *wholly)
+{
+	vec3 n = vec3_normalize(b->n);
+	struct polygon over = {{a->v[0], a->v[1], a->v[2]}, 3};
+	for (int i = 0; i < 3 && over.n > 0; i++) {
+		vec3 from = b->v[i], to = b->v[(i + 1) % 3];
+		cut(&over, from, vec3_cross(n, vec3_sub(to, from)));
+	}
+	/* Twice as much as the roundings can do, for those before them in double and for the sums here. */
+	double within = 2 * (rounded_along(a, n) + rounded_along(b, n));
+	for (unsigned i = 0; i < over.n; i++)
+		if (!(fabs(vec3_dot(n, vec3_sub(over.p[i], b->v[0]))) <= within))
+			return false;
+	*wholly = over.n == 3 && vec3_length(vec3_sub(over.p[0], a->v[0])) == 0 &&
+		  vec3_length(vec3_sub(over.p[1], a->v[1])) == 0 && vec3_length(vec3_sub(over.p[2], a->v[2])) == 0;
+	return over.n >= 3 && has_width(&over, n);
+}
+
+/* Seen along n. */
+static bool covers(const struct accel_shape *s, uint32_t prim, vec3 p, vec3 n)
+{
+	const struct triangle t = triangle_from(s->position, s->index[prim]);
+	double unused;
+	return triangle_meets(&t, p, n, &unused);
+}
+
+static const struct coincide_pair *find_first(const struct coincidence *c, struct prim_ref prim,
+					      const struct coincide_pair *end)
+{
+	const struct coincide_pair *low = c->pairs + c->first[prim.shape];
+	while (low < end) {
+		const struct coincide_pair *middle = low + (end - low) / 2;
+		if (middle->hidden.prim < prim.prim)
+			low = middle + 1;
+		else
+			end = middle;
+	}
+	return low;
+}
+
+/* One that hides it there; false: none does. */
+static bool hides(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim, vec3 p,
+		  struct prim_ref *by)
+{
+	const struct coincide_pair *end = c->pairs + c->first[prim.shape + 1], *at = find_first(c, prim, end);
+	if (at == end || at->hidden.prim != prim.prim)
+		return false;
+	const struct accel_shape *s = &shapes[prim.shape];
+	vec3 n = s->is_sphere ? (vec3){0, 0, 0} : triangle_from(s->position, s->index[prim.prim]).n;
+	for (; at < end && at->hidden.prim == prim.prim; at++)
+		if (at->wholly || covers(&shapes[at->by.shape], at->by.prim, p, n)) {
+			*by = at->by;
+			return true;
+		}
+	return false;
+}
+
+struct prim_ref coincide_there(const struct coincidence *c, const struct accel_shape *shapes, struct prim_ref prim,
+			       vec3 p)
+{
+	/* What hides it may be hidden itself; ranks end this. */
+	while (c && prim.shape != PRIM_NONE.shape && c->first[prim.shape] < c->first[prim.shape + 1] &&
+	       hides(c, shapes, prim, p, &prim))
+		;
+	return prim;
+}
+
+void coincide_free(struct coincidence *c)
+{
+	if (!c)
+		return;
+	mem_free(c->pairs);
+	mem_free(c->shapes);
+	mem_free(c->first);
+	mem_free(c);
+}

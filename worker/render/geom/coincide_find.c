@@ -1,0 +1,366 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The search of coincide.h. Primitives go into halves of a box, those across the middle into both, until a part holds
+ * one shape that does not shine (nothing to find), a few primitives, or cannot be told apart by place; what is left is
+ * compared two by two, in the order of their ranks. A triangle that is wholly hidden hides nothing itself, so a stack
+ * of equal ones costs no square.
+ */
+#include "worker/render/geom/coincide.h"
+
+#include "common/base/mem.h"
+#include "common/base/liveness.h"
+
+#include <stdlib.h>
+
+enum { FEW = 12, MOST_CUTS = 64, SAMPLE = 129, OTHERS = 32, MANY = 16 * OTHERS };
+
+struct search {
+	const struct accel_shape *shapes;
+	struct coincide_pair *pairs;
+	size_t pair_count, pair_room, pair_limit;
+	uint64_t work, limit; /* primitives put into parts, and twos compared */
+	bool incomplete;
+};
+
+struct member {
+	struct prim_ref prim;
+	double low[3], high[3];
+};
+
+/* Of its box along an axis, a little wider than it is, so that rounded coordinates meet. */
+static void extent(const struct search *f, struct prim_ref p, int axis, double *low, double *high)
+{
+	const struct accel_shape *s = &f->shapes[p.shape];
+	if (s->is_sphere) {
+		double c = axis == 0 ? s->center.x : axis == 1 ? s->center.y : s->center.z;
+		*low = c - s->radius;
+		*high = c + s->radius;
+	} else {
+		const uint32_t *i = s->index[p.prim];
+		float u = s->position[i[0]][axis], v = s->position[i[1]][axis], w = s->position[i[2]][axis];
+		float least = u < v ? u : v, most = u < v ? v : u;
+		*low = (double)(w < least ? w : least);
+		*high = (double)(w > most ? w : most);
+	}
+	double margin = 0x1p-21 * fmax(fabs(*low), fabs(*high));
+	*low -= margin;
+	*high += margin;
+}
+
+static struct member member_of(const struct search *f, struct prim_ref p)
+{
+	struct member m = {.prim = p};
+	for (int k = 0; k < 3; k++)
+		extent(f, p, k, &m.low[k], &m.high[k]);
+	return m;
+}
+
+static int compare_numbers(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+	return x < y ? -1 : x > y;
+}
+
+/* Where to cut so that the halves are smallest, judged by some of them; false: halves would be hardly smaller than the
+ * whole. */
+static bool choose_cut(const struct search *f, const struct prim_ref *items, size_t n, int *axis, double *at)
+{
+	struct member m[SAMPLE];
+	double middle[SAMPLE];
+	size_t count = n < SAMPLE ? n : SAMPLE, least = SIZE_MAX;
+	for (size_t i = 0; i < count; i++)
+		m[i] = member_of(f, items[(size_t)((double)n * (double)i / (double)count)]);
+	for (int k = 0; k < 3; k++) {
+		size_t both = 0;
+		for (size_t i = 0; i < count; i++)
+			middle[i] = m[i].low[k] + (m[i].high[k] - m[i].low[k]) / 2;
+		qsort(middle, count, sizeof *middle, compare_numbers);
+		double cut = middle[count / 2];
+		for (size_t i = 0; i < count; i++)
+			both += (size_t)(m[i].low[k] <= cut) + (size_t)(m[i].high[k] >= cut);
+		if (both < least) {
+			least = both;
+			*axis = k;
+			*at = cut;
+		}
+	}
+	return least * 3 <= count * 5;
+}
+
+static bool shines(const struct search *f, struct prim_ref p)
+{
+	return f->shapes[p.shape].rank == SURFACE_SHINES;
+}
+
+/* All of one shape that does not shine. */
+static bool nothing_to_find(const struct search *f, const struct prim_ref *items, size_t n)
+{
+	for (size_t i = 1; i < n; i++)
+		if (items[i].shape != items[0].shape)
+			return false;
+	return n < 2 || !shines(f, items[0]);
+}
+
+static double farthest(const struct accel_shape *s)
+{
+	return fmax(fabs(s->center.x), fmax(fabs(s->center.y), fabs(s->center.z))) + s->radius;
+}
+
+static bool spheres_coincide(const struct accel_shape *a, const struct accel_shape *b)
+{
+	vec3 between = vec3_sub(a->center, b->center);
+	double within = 0x1p-23 * fmax(farthest(a), farthest(b));
+	return triangle_norm1(between) + fabs(a->radius - b->radius) <= within;
+}
+
+static bool coincide(const struct search *f, struct coincide_pair *p)
+{
+	const struct accel_shape *a = &f->shapes[p->hidden.shape], *b = &f->shapes[p->by.shape];
+	p->wholly = p->same_side = true;
+	if (a->is_sphere || b->is_sphere)
+		return a->is_sphere && b->is_sphere && spheres_coincide(a, b);
+	const struct triangle t = triangle_from(a->position, a->index[p->hidden.prim]),
+			      u = triangle_from(b->position, b->index[p->by.prim]);
+	p->same_side = vec3_dot(t.n, u.n) > 0;
+	return coincide_triangles(&t, &u, &p->wholly);
+}
+
+static int keep(struct search *f, const struct coincide_pair *p)
+{
+	if (f->pair_count == f->pair_limit) {
+		f->incomplete = true;
+		return 0;
+	}
+	if (f->pair_count == f->pair_room) {
+		size_t room = f->pair_room ? 2 * f->pair_room : 64;
+		struct coincide_pair *more = mem_grow(f->pairs, f->pair_room * sizeof *more, room * sizeof *more);
+		if (!more)
+			return -ENOMEM;
+		f->pairs = more;
+		f->pair_room = room;
+	}
+	f->pairs[f->pair_count++] = *p;
+	return 0;
+}
+
+static bool may_meet(const struct search *f, const struct member *a, const struct member *b)
+{
+	if (a->prim.shape == b->prim.shape && !shines(f, a->prim))
+		return false;
+	for (int k = 0; k < 3; k++)
+		if (a->high[k] < b->low[k] || b->high[k] < a->low[k])
+			return false;
+	return true;
+}
+
+/* Each with those before it, which rank before it, that are not wholly hidden. */
+static int compare_all(struct search *f, struct member *m, size_t n)
+{
+	size_t kept = 0;
+	for (size_t i = 0; i < n && !f->incomplete; i++) {
+		bool gone = false;
+		for (size_t j = 0; j < kept && !gone; j++) {
+			struct coincide_pair p = {
+				.hidden = m[i].prim, .by = m[j].prim, .rank = f->shapes[m[j].prim.shape].rank};
+			f->work++;
+			if (!may_meet(f, &m[i], &m[j]) || !coincide(f, &p))
+				continue;
+			int rc = keep(f, &p);
+			if (rc)
+				return rc;
+			gone = p.wholly;
+		}
+		if (!gone)
+			m[kept++] = m[i];
+		f->incomplete |= f->work > f->limit;
+		tick();
+	}
+	return 0;
+}
+
+static int compare_part(struct search *f, const struct prim_ref *items, size_t n)
+{
+	struct member few[FEW], *m = n <= FEW ? few : mem_alloc(n, sizeof *m);
+	if (!m)
+		return -ENOMEM;
+	for (size_t i = 0; i < n; i++)
+		m[i] = member_of(f, items[i]);
+	int rc = compare_all(f, m, n);
+	if (m != few)
+		mem_free(m);
+	return rc;
+}
+
+/* The shape that most of them are of, if more than half are: by votes for and against. */
+static uint32_t commonest(const struct prim_ref *items, size_t n)
+{
+	uint32_t shape = items[0].shape;
+	size_t votes = 0;
+	for (size_t i = 0; i < n; i++) {
+		if (votes == 0)
+			shape = items[i].shape;
+		votes = items[i].shape == shape ? votes + 1 : votes - 1;
+	}
+	return shape;
+}
+
+/* Of a large mesh and few others only what meets the box of one of those: most of a statue does not touch the room that
+ * it stands in. Returns how many are left, at the beginning. */
+static size_t leave_out(const struct search *f, struct prim_ref *items, size_t n)
+{
+	struct member others[OTHERS];
+	size_t count = 0, kept = 0;
+	uint32_t shape = commonest(items, n);
+	for (size_t i = 0; i < n; i++)
+		if (items[i].shape != shape) {
+			if (count == OTHERS)
+				return n;
+			others[count++] = member_of(f, items[i]);
+		}
+	for (size_t i = 0; i < n; i++) {
+		bool near = items[i].shape != shape;
+		const struct member m = member_of(f, items[i]);
+		for (size_t k = 0; k < count && !near; k++)
+			near = may_meet(f, &m, &others[k]);
+		if (near)
+			items[kept++] = items[i];
+		if (i % 4096 == 0)
+			tick();
+	}
+	return kept;
+}
+
+/* items: as they rank; they are written over. */
+static int look_into(struct search *f, struct prim_ref *items, size_t n, unsigned cuts)
+{
+	int axis;
+	double at;
+	f->work += n;
+	f->incomplete |= f->work > f->limit;
+	if (f->incomplete || nothing_to_find(f, items, n))
+		return 0;
+	if (n > MANY && f->shapes[commonest(items, n)].rank != SURFACE_SHINES)
+		n = leave_out(f, items, n);
+	if (n <= FEW || cuts == 0 || !choose_cut(f, items, n, &axis, &at))
+		return compare_part(f, items, n);
+	struct prim_ref *half = mem_alloc(n, sizeof *half);
+	int rc = half ? 0 : -ENOMEM;
+	for (int upper = 0; upper < 2 && !rc; upper++) {
+		size_t count = 0;
+		for (size_t i = 0; i < n; i++) {
+			double low, high;
+			extent(f, items[i], axis, &low, &high);
+			if (upper ? high >= at : low <= at)
+				half[count++] = items[i];
+			if (i % 4096 == 0)
+				tick();
+		}
+		rc = look_into(f, half, count, cuts - 1);
+	}
+	mem_free(half);
+	return rc;
+}
+
+static int compare_pairs(const void *x, const void *y)
+{
+	const struct coincide_pair *a = x, *b = y;
+	const uint32_t u[] = {a->hidden.shape, a->hidden.prim, (uint32_t)a->rank, a->by.shape, a->by.prim};
+	const uint32_t v[] = {b->hidden.shape, b->hidden.prim, (uint32_t)b->rank, b->by.shape, b->by.prim};
+	for (int i = 0; i < 5; i++)
+		if (u[i] != v[i])
+			return u[i] < v[i] ? -1 : 1;
+	return 0;
+}
+
+static int compare_shapes(const void *x, const void *y)
+{
+	const struct coincide_shapes *a = x, *b = y;
+	if (a->hidden != b->hidden)
+		return a->hidden < b->hidden ? -1 : 1;
+	return a->by < b->by ? -1 : a->by > b->by;
+}
+
+/* What lies across a cut was found more than once. */
+static size_t unique_pairs(struct coincide_pair *p, size_t n)
+{
+	size_t kept = 0;
+	if (n == 0) /* p may be NULL then, which qsort may not be given */
+		return 0;
+	qsort(p, n, sizeof *p, compare_pairs);
+	for (size_t i = 0; i < n; i++)
+		if (kept == 0 || compare_pairs(&p[kept - 1], &p[i]) != 0)
+			p[kept++] = p[i];
+	return kept;
+}
+
+static void list_shapes(struct coincidence *c)
+{
+	struct coincide_shapes *s = c->shapes;
+	for (size_t i = 0; i < c->pair_count; i++)
+		s[i] = (struct coincide_shapes){c->pairs[i].hidden.shape, c->pairs[i].by.shape, c->pairs[i].same_side};
+	if (c->pair_count > 1)
+		qsort(s, c->pair_count, sizeof *s, compare_shapes);
+	for (size_t i = 0; i < c->pair_count; i++) {
+		if (c->shapes_count == 0 || compare_shapes(&s[c->shapes_count - 1], &s[i]) != 0)
+			s[c->shapes_count++] = s[i];
+		else
+			s[c->shapes_count - 1].same_side |= s[i].same_side;
+	}
+}
+
+static int make(struct search *f, uint32_t count, struct coincidence **out)
+{
+	struct coincidence *c = mem_alloc(1, sizeof *c);
+	if (!c)
+		return -ENOMEM;
+	*c = (struct coincidence){
+		.pairs = f->pairs, .pair_count = unique_pairs(f->pairs, f->pair_count), .incomplete = f->incomplete};
+	f->pairs = NULL;
+	c->shapes = mem_alloc(c->pair_count, sizeof *c->shapes);
+	c->first = mem_alloc((size_t)count + 1, sizeof *c->first);
+	if (!c->shapes || !c->first) {
+		coincide_free(c);
+		return -ENOMEM;
+	}
+	list_shapes(c);
+	for (size_t i = 0; i < c->pair_count; i++)
+		c->first[c->pairs[i].hidden.shape + 1] = i + 1;
+	for (uint32_t i = 0; i < count; i++)
+		if (c->first[i + 1] < c->first[i])
+			c->first[i + 1] = c->first[i];
+	*out = c;
+	return 0;
+}
+
+/* All primitives, as they rank. */
+static size_t list_primitives(const struct accel_shape *shapes, uint32_t count, struct prim_ref *items)
+{
+	size_t n = 0;
+	for (unsigned rank = 0; rank < SURFACE_RANKS; rank++)
+		for (uint32_t i = 0; i < count; i++) {
+			uint32_t prims = shapes[i].is_sphere ? 1 : shapes[i].triangle_count;
+			for (uint32_t k = 0; shapes[i].rank == rank && k < prims; k++, n++)
+				if (items)
+					items[n] = (struct prim_ref){i, k};
+		}
+	return n;
+}
+
+int coincide_find(struct coincidence **out, const struct accel_shape *shapes, uint32_t count, struct error *e)
+{
+	*out = NULL;
+	size_t n = list_primitives(shapes, count, NULL);
+	/* Enough for sorting to the last and for each primitive to meet dozens. */
+	struct search f = {.shapes = shapes, .limit = 128 * (uint64_t)n + (1u << 22), .pair_limit = 4 * n + (1u << 16)};
+	struct prim_ref *items = mem_alloc(n, sizeof *items);
+	int rc = items ? 0 : -ENOMEM;
+	if (!rc) {
+		list_primitives(shapes, count, items);
+		rc = look_into(&f, items, n, MOST_CUTS);
+	}
+	mem_free(items);
+	if (!rc && (f.pair_count > 0 || f.incomplete))
+		rc = make(&f, count, out);
+	mem_free(f.pairs);
+	return rc ? error_set(e, ENOMEM, "out of memory") : 0;
+}

@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/geom/relief.h"
+
+#include <stdbool.h>
+#include <stddef.h>
+
+/* The bent normal before it is normalised, and how it changes. */
+struct bent {
+	vec3 m, dm;
+};
+
+/* The tangent t made orthogonal to n, lifted by the slope; and its change. */
+static void lift(const struct relief_site *s, const struct relief_step *d, vec3 t, vec3 dt, double slope, double dslope,
+		 struct bent *out)
+{
+	double rise = slope - vec3_dot(s->n, t);
+	out->m = vec3_madd(t, rise, s->n);
+	if (!d)
+		return;
+	double drise = dslope - vec3_dot(d->dn, t) - vec3_dot(s->n, dt);
+	out->dm = vec3_madd(vec3_madd(dt, rise, d->dn), drise, s->n);
+}
+
+static void bend_height(const struct relief_site *s, const struct relief_step *d, const struct relief_value *h,
+			struct bent *out)
+{
+	struct bent a = {.dm = {0, 0, 0}}, b = {.dm = {0, 0, 0}};
+	vec3 change = d ? vec3_scale(s->unit, vec3_madd(vec3_scale(d->du, h->du), d->dv, h->dv)) : (vec3){0, 0, 0},
+	     none = {0, 0, 0};
+	lift(s, d, s->tu, d ? d->dtu : none, s->unit * h->x.x, change.x, &a);
+	lift(s, d, s->tv, d ? d->dtv : none, s->unit * h->x.y, change.y, &b);
+	/* Texture coordinates may be mirrored. */
+	double hand = vec3_dot(vec3_cross(s->tu, s->tv), s->n) < 0 ? -1 : 1;
+	out->m = vec3_scale(hand, vec3_cross(a.m, b.m));
+	if (d)
+		out->dm = vec3_scale(hand, vec3_add(vec3_cross(a.dm, b.m), vec3_cross(a.m, b.dm)));
+}
+
+/* The frame turns with n, and about it with the axis: as in worker/render/halfvec/constraint.c. */
+static void bend_normal(const struct relief_site *s, const struct relief_step *d, const struct relief_value *l,
+			struct bent *out)
+{
+	struct frame f = frame_along(s->n, s->axis);
+	out->m = frame_to_world(&f, l->x);
+	if (!d)
+		return;
+	double dns = vec3_dot(f.s, d->dn), dnt = vec3_dot(f.t, d->dn), across = vec3_dot(f.s, s->axis);
+	double twist = across > 0 ? (vec3_dot(f.t, d->daxis) - dnt * vec3_dot(f.n, s->axis)) / across : 0;
+	vec3 ds = vec3_madd(vec3_scale(-dns, f.n), twist, f.t), dt = vec3_madd(vec3_scale(-dnt, f.n), -twist, f.s);
+	vec3 change = vec3_madd(vec3_scale(d->du, l->du), d->dv, l->dv);
+	out->dm = vec3_add(frame_to_world(&f, change),
+			   vec3_madd(vec3_madd(vec3_scale(l->x.x, ds), l->x.y, dt), l->x.z, d->dn));
+}
+
+/* false: the surface keeps its normal. */
+static bool bend(const struct relief *r, const struct relief_site *s, const struct relief_step *d, struct bent *out)
+{
+	struct relief_value x;
+	if (!(vec3_dot(s->tu, s->tu) > 0) || !(vec3_dot(s->tv, s->tv) > 0))
+		return false;
+	r->at(r->data, s->u, s->v, &x);
+	(r->kind == RELIEF_HEIGHT ? bend_height : bend_normal)(s, d, &x, out);
+	double square = vec3_dot(out->m, out->m);
+	return vec3_dot(out->m, s->ng) > 0 && square > 0x1p-900 && isfinite(square);
+}
+
+vec3 relief_normal(const struct relief *r, const struct relief_site *s)
+{
+	struct bent b;
+	vec3 n = bend(r, s, NULL, &b) ? vec3_normalize(b.m) : s->n;
+	return vec3_is_finite(n) ? n : s->n;
+}
+
+vec3 relief_turn(const struct relief *r, const struct relief_site *s, const struct relief_step *d)
+{
+	struct bent b;
+	if (!bend(r, s, d, &b))
+		return d->dn;
+	vec3 n = vec3_normalize(b.m);
+	vec3 turn = vec3_scale(1 / vec3_length(b.m), vec3_madd(b.dm, -vec3_dot(n, b.dm), n));
+	return vec3_is_finite(turn) ? turn : d->dn;
+}

@@ -1,0 +1,182 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/geom/solved.h"
+
+#include "worker/render/geom/triangle.h"
+
+static struct triangle triangle_of(const struct accel_shape *s, uint32_t prim)
+{
+	return triangle_from(s->position, s->index[prim]);
+}
+
+bool query_crosses(const struct query *q, const struct accel_shape *s, uint32_t prim)
+{
+	const struct triangle t = triangle_of(s, prim);
+	double start = triangle_height(&t, q->o);
+	double beyond = q->segment ? -triangle_height(&t, q->end) : vec3_dot(t.n, q->d);
+	return (start > 0 && beyond > 0) || (start < 0 && beyond < 0);
+}
+
+struct prim_ref query_there(const struct query *q, struct prim_ref prim)
+{
+	if (!query_hides(q, prim.shape))
+		return prim;
+	const struct triangle t = triangle_of(&q->shapes[prim.shape], prim.prim);
+	double slope = vec3_dot(t.n, q->d);
+	if (slope == 0)
+		return prim;
+	return coincide_there(q->coincidence, q->shapes, prim,
+			      vec3_madd(q->o, vec3_dot(t.n, vec3_sub(t.v[0], q->o)) / slope, q->d));
+}
+
+static bool is_end(const struct query *q, struct prim_ref p)
+{
+	return (p.shape == q->from.shape && p.prim == q->from.prim) || (p.shape == q->to.shape && p.prim == q->to.prim);
+}
+
+bool query_crosses_there(const struct query *q, struct prim_ref prim)
+{
+	struct prim_ref there = query_there(q, prim);
+	return !is_end(q, there) && query_crosses(q, &q->shapes[there.shape], there.prim);
+}
+
+static void sphere_bounds(const struct RTCBoundsFunctionArguments *args)
+{
+	const struct sphere_prim *s = args->geometryUserPtr;
+	/* One part in 2^20 outwards: more than float rounding of the box and of Embree's slab test can take away. */
+	double r = s->radius * (1 + 0x1p-20) + 0x1p-20 * (fabs(s->center.x) + fabs(s->center.y) + fabs(s->center.z));
+	struct RTCBounds *b = args->bounds_o;
+	b->lower_x = (float)(s->center.x - r);
+	b->lower_y = (float)(s->center.y - r);
+	b->lower_z = (float)(s->center.z - r);
+	b->upper_x = (float)(s->center.x + r);
+	b->upper_y = (float)(s->center.y + r);
+	b->upper_z = (float)(s->center.z + r);
+}
+
+/* The nearest admissible root of |o + t d - c|^2 = r^2 in (t_min, t_max). Where the ray starts on the sphere one root
+ * is 0, where a segment ends on it one root is 1: the other follows from Vieta without cancellation. Else the
+ * discriminant comes from the distance of the line to the centre (Haines et al. 2019, Ray Tracing Gems ch. 7). */
+static bool sphere_root(const struct sphere_prim *s, const struct query *q, double t_max, double *t)
+{
+	vec3 oc = vec3_sub(q->o, s->center);
+	double a = vec3_dot(q->d, q->d), b = vec3_dot(oc, q->d);
+	double length = vec3_length(oc), c = (length - s->radius) * (length + s->radius);
+	bool starts = q->from.shape == s->shape, ends = q->to.shape == s->shape;
+	if (starts && ends)
+		return false;
+	if (starts || ends) {
+		*t = starts ? -2 * b / a : c / a;
+		return *t > q->t_min && *t < t_max;
+	}
+	vec3 nearest = vec3_madd(oc, -b / a, q->d);
+	double disc = s->radius * s->radius - vec3_dot(nearest, nearest);
+	if (!(disc >= 0))
+		return false;
+	double k = -b - copysign(sqrt(disc * a), b);
+	double t0 = k / a, t1 = k != 0 ? c / k : t0;
+	double first = fmin(t0, t1), second = fmax(t0, t1);
+	*t = first > q->t_min ? first : second;
+	return *t > q->t_min && *t < t_max;
+}
+
+static void sphere_intersect(const struct RTCIntersectFunctionNArguments *args)
+{
+	if (!args->valid[0])
+		return;
+	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct sphere_prim *s = args->geometryUserPtr;
+	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit;
+	double t;
+	if (!sphere_root(s, q, (double)rh->ray.tfar - q->back, &t))
+		return;
+	rh->ray.tfar = (float)(t + q->back);
+	rh->hit.geomID = s->shape;
+	rh->hit.primID = 0;
+	rh->hit.u = rh->hit.v = 0;
+}
+
+static void sphere_occluded(const struct RTCOccludedFunctionNArguments *args)
+{
+	if (!args->valid[0])
+		return;
+	const struct query *q = (const struct query *)(const void *)args->context;
+	struct RTCRay *ray = (struct RTCRay *)(void *)args->ray;
+	double t;
+	if (sphere_root(args->geometryUserPtr, q, q->segment ? 1 : INFINITY, &t))
+		ray->tfar = -INFINITY;
+}
+
+static void wide_bounds(const struct RTCBoundsFunctionArguments *args)
+{
+	const struct wide_prims *w = args->geometryUserPtr;
+	const uint32_t *i = w->shape->index[w->prim[args->primID]];
+	const float(*p)[3] = w->shape->position;
+	float low[3], high[3];
+	for (int k = 0; k < 3; k++) {
+		float margin = 0x1p-20f * (fabsf(p[i[0]][k]) + fabsf(p[i[1]][k]) + fabsf(p[i[2]][k]));
+		low[k] = fminf(p[i[0]][k], fminf(p[i[1]][k], p[i[2]][k])) - margin;
+		high[k] = fmaxf(p[i[0]][k], fmaxf(p[i[1]][k], p[i[2]][k])) + margin;
+	}
+	*args->bounds_o = (struct RTCBounds){.lower_x = low[0],
+					     .lower_y = low[1],
+					     .lower_z = low[2],
+					     .upper_x = high[0],
+					     .upper_y = high[1],
+					     .upper_z = high[2]};
+}
+
+/* As the filter has it for triangles that Embree solves; those are never PRIM_NONE. */
+static bool wide_root(const struct wide_prims *w, uint32_t prim, const struct query *q, double t_max, double *t)
+{
+	const struct prim_ref ref = {w->id, prim};
+	if (is_end(q, ref) || !(query_hides(q, w->id) ? query_crosses_there(q, ref) : query_crosses(q, w->shape, prim)))
+		return false;
+	const struct triangle k = triangle_of(w->shape, prim);
+	return triangle_meets(&k, q->o, q->d, t) && *t > q->t_min && *t < t_max;
+}
+
+static void wide_intersect(const struct RTCIntersectFunctionNArguments *args)
+{
+	if (!args->valid[0])
+		return;
+	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct wide_prims *w = args->geometryUserPtr;
+	uint32_t prim = w->prim[args->primID];
+	struct RTCRayHit *rh = (struct RTCRayHit *)(void *)args->rayhit;
+	double t;
+	if (!wide_root(w, prim, q, (double)rh->ray.tfar - q->back, &t))
+		return;
+	rh->ray.tfar = (float)(t + q->back);
+	rh->hit.geomID = w->id;
+	rh->hit.primID = prim;
+	rh->hit.u = rh->hit.v = 0;
+}
+
+static void wide_occluded(const struct RTCOccludedFunctionNArguments *args)
+{
+	if (!args->valid[0])
+		return;
+	const struct query *q = (const struct query *)(const void *)args->context;
+	const struct wide_prims *w = args->geometryUserPtr;
+	double t;
+	if (wide_root(w, w->prim[args->primID], q, q->segment ? 1 : INFINITY, &t))
+		((struct RTCRay *)(void *)args->ray)->tfar = -INFINITY;
+}
+
+void solved_sphere(RTCGeometry g, struct sphere_prim *s)
+{
+	rtcSetGeometryUserPrimitiveCount(g, 1);
+	rtcSetGeometryUserData(g, s);
+	rtcSetGeometryBoundsFunction(g, sphere_bounds, NULL);
+	rtcSetGeometryIntersectFunction(g, sphere_intersect);
+	rtcSetGeometryOccludedFunction(g, sphere_occluded);
+}
+
+void solved_triangles(RTCGeometry g, struct wide_prims *w)
+{
+	rtcSetGeometryUserPrimitiveCount(g, w->count);
+	rtcSetGeometryUserData(g, w);
+	rtcSetGeometryBoundsFunction(g, wide_bounds, NULL);
+	rtcSetGeometryIntersectFunction(g, wide_intersect);
+	rtcSetGeometryOccludedFunction(g, wide_occluded);
+}

@@ -1,0 +1,406 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/geom/surface.h"
+
+#include "worker/render/math/sphere.h"
+
+static vec3 at(const float (*a)[3], uint32_t i)
+{
+	return (vec3){(double)a[i][0], (double)a[i][1], (double)a[i][2]};
+}
+
+/* Moves a point of the triangle's plane that lies outside to the nearest one inside. Barycentrics clamped one by one
+ * would travel along a sliver by as many of its widths as they are off. */
+static void move_inside(vec3 e1, vec3 e2, double *b1, double *b2)
+{
+	const double start[3][2] = {{0, 0}, {0, 0}, {1, 0}}, step[3][2] = {{1, 0}, {0, 1}, {-1, 1}};
+	vec3 q = vec3_madd(vec3_scale(*b1, e1), *b2, e2);
+	double best = INFINITY;
+	for (int i = 0; i < 3; i++) {
+		vec3 a = vec3_scale(start[i][0], e1), g = vec3_madd(vec3_scale(step[i][0], e1), step[i][1], e2);
+		vec3 aq = vec3_sub(q, a);
+		double s = fmin(fmax(vec3_dot(aq, g) / vec3_dot(g, g), 0), 1);
+		vec3 miss = vec3_madd(aq, -s, g);
+		if (vec3_dot(miss, miss) >= best)
+			continue;
+		best = vec3_dot(miss, miss);
+		*b1 = start[i][0] + s * step[i][0];
+		*b2 = start[i][1] + s * step[i][1];
+	}
+}
+
+/* Barycentrics of the ray's crossing with the triangle's plane, kept inside the triangle: Embree said that it was met.
+ * false: the ray lies in the plane. */
+static bool solve_triangle(vec3 o, vec3 d, vec3 v0, vec3 e1, vec3 e2, double *b1, double *b2)
+{
+	vec3 h = vec3_cross(d, e2), s = vec3_sub(o, v0), q = vec3_cross(s, e1);
+	double det = vec3_dot(e1, h);
+	if (det == 0)
+		return false;
+	double u = vec3_dot(s, h) / det, v = vec3_dot(d, q) / det;
+	if (!isfinite(u) || !isfinite(v))
+		return false;
+	*b1 = u;
+	*b2 = v;
+	if (u < 0 || v < 0 || u + v > 1)
+		move_inside(e1, e2, b1, b2);
+	return true;
+}
+
+/* A tangent that turns as little as it can from one triangle to the next: what the shortest rotation from r to n makes
+ * of a. Half vectors are numbers in frames, and frames along edges would turn at random. No such field is without a
+ * flaw; this one's is at n = -r, where few surfaces face. */
+static vec3 carried_axis(vec3 n)
+{
+	const vec3 r = {2.0 / 7, 3.0 / 7, 6.0 / 7}, a = {3.0 / 7, -6.0 / 7, 2.0 / 7};
+	double k = 1 + vec3_dot(r, n);
+	return k > 0x1p-20 ? vec3_madd(a, -vec3_dot(a, n) / k, vec3_add(r, n)) : a;
+}
+
+/* dp/du and dp/dv from the texture coordinates. false: there are none, or they are degenerate. */
+static bool uv_tangents(const struct geom_shape *s, const uint32_t i[3], vec3 e1, vec3 e2, vec3 *tu, vec3 *tv)
+{
+	if (!s->uv)
+		return false;
+	double du1 = (double)s->uv[i[1]][0] - (double)s->uv[i[0]][0],
+	       dv1 = (double)s->uv[i[1]][1] - (double)s->uv[i[0]][1];
+	double du2 = (double)s->uv[i[2]][0] - (double)s->uv[i[0]][0],
+	       dv2 = (double)s->uv[i[2]][1] - (double)s->uv[i[0]][1];
+	double det = du1 * dv2 - dv1 * du2;
+	if (det == 0)
+		return false;
+	*tu = vec3_scale(1 / det, vec3_sub(vec3_scale(dv2, e1), vec3_scale(dv1, e2)));
+	*tv = vec3_scale(1 / det, vec3_sub(vec3_scale(du1, e2), vec3_scale(du2, e1)));
+	return vec3_is_finite(*tu) && vec3_dot(*tu, *tu) > 0;
+}
+
+/* A triangle's first vertex and the edges from there. */
+struct corner {
+	vec3 v0, e1, e2;
+};
+
+static struct corner corner_of(const struct geom_shape *s, const uint32_t i[3])
+{
+	vec3 v0 = at(s->position, i[0]);
+	return (struct corner){v0, vec3_sub(at(s->position, i[1]), v0), vec3_sub(at(s->position, i[2]), v0)};
+}
+
+/* Not normalised. */
+static vec3 interpolated_normal(const struct geom_shape *s, const uint32_t i[3], double b1, double b2)
+{
+	vec3 m = vec3_scale(1 - b1 - b2, at(s->normal, i[0]));
+	return vec3_madd(vec3_madd(m, b1, at(s->normal, i[1])), b2, at(s->normal, i[2]));
+}
+
+/* A triangle's point before relief bends it. Where there are no texture coordinates barycentrics stand in. */
+static struct relief_site site_on_triangle(const struct geom_shape *s, const uint32_t i[3], const struct corner *c,
+					   vec3 n, const struct surface_point *x)
+{
+	struct relief_site r = {
+		.ng = x->ng, .n = n, .axis = x->dpdu, .tu = c->e1, .tv = c->e2, .u = x->u, .v = x->v, .unit = s->unit};
+	if (s->uv && (!uv_tangents(s, i, c->e1, c->e2, &r.tu, &r.tv) || !vec3_is_finite(r.tv)))
+		r.tu = r.tv = (vec3){0, 0, 0};
+	return r;
+}
+
+static void fill(const struct geom_shape *s, const uint32_t i[3], const struct corner *c, double b1, double b2,
+		 struct surface_point *x)
+{
+	double b0 = 1 - b1 - b2;
+	vec3 unused;
+	x->b1 = b1;
+	x->b2 = b2;
+	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
+	x->ng = vec3_normalize(vec3_cross(c->e1, c->e2));
+	if (!uv_tangents(s, i, c->e1, c->e2, &x->dpdu, &unused))
+		x->dpdu = carried_axis(x->ng);
+	vec3 n = x->ng;
+	if (s->normal) {
+		vec3 m = interpolated_normal(s, i, b1, b2);
+		/* Normals that turn to the back somewhere inside the triangle say nothing about this side: shade flat.
+		 */
+		if (vec3_dot(m, x->ng) > 0)
+			n = vec3_normalize(m);
+	}
+	x->u = b1;
+	x->v = b2;
+	if (s->uv) {
+		x->u = b0 * (double)s->uv[i[0]][0] + b1 * (double)s->uv[i[1]][0] + b2 * (double)s->uv[i[2]][0];
+		x->v = b0 * (double)s->uv[i[0]][1] + b1 * (double)s->uv[i[1]][1] + b2 * (double)s->uv[i[2]][1];
+	}
+	if (s->relief) {
+		struct relief_site site = site_on_triangle(s, i, c, n, x);
+		n = relief_normal(s->relief, &site);
+	}
+	x->sh = frame_along(n, x->dpdu);
+}
+
+void surface_on_triangle(const struct geom_shape *s, struct prim_ref prim, double b1, double b2,
+			 struct surface_point *x)
+{
+	const uint32_t *i = s->index[prim.prim];
+	struct corner c = corner_of(s, i);
+	x->prim = prim;
+	fill(s, i, &c, b1, b2, x);
+}
+
+void surface_uv(const struct geom_shape *s, struct surface_point *x)
+{
+	if (s->is_sphere)
+		sphere_uv(&s->sphere_axes, vec3_scale(s->normal_sign, x->ng), &x->u, &x->v);
+}
+
+/* A sphere's point before relief bends it. At the poles dp/du is 0. */
+static struct relief_site site_on_sphere(const struct geom_shape *s, const struct surface_point *x)
+{
+	struct relief_site r = {.ng = x->ng, .n = x->ng, .axis = x->dpdu, .u = x->u, .v = x->v, .unit = s->unit};
+	const struct frame *f = &s->sphere_axes;
+	double length = vec3_length(x->dpdu);
+	if (!(length > 0))
+		return r;
+	r.tu = vec3_scale(vec3_dot(vec3_cross(f->s, f->t), f->n) < 0 ? -1 : 1, x->dpdu);
+	r.tv = vec3_scale(M_PI * s->radius * s->normal_sign / length, vec3_cross(x->dpdu, x->ng));
+	return r;
+}
+
+/* All but u and v, unless there is relief. */
+static void on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
+{
+	x->prim = prim;
+	x->p = vec3_madd(s->center, s->radius, w);
+	x->b1 = x->b2 = 0;
+	x->ng = vec3_scale(s->normal_sign, w);
+	/* du of the longitude: axis x normal; undefined at the poles, where frame_along picks a frame of its own. */
+	x->dpdu = vec3_scale(2 * M_PI * s->radius, vec3_cross(s->sphere_axes.n, w));
+	vec3 n = x->ng;
+	if (s->relief) {
+		surface_uv(s, x);
+		struct relief_site site = site_on_sphere(s, x);
+		n = relief_normal(s->relief, &site);
+	}
+	x->sh = frame_along(n, x->dpdu);
+}
+
+void surface_on_sphere(const struct geom_shape *s, struct prim_ref prim, vec3 w, struct surface_point *x)
+{
+	on_sphere(s, prim, w, x);
+	surface_uv(s, x);
+}
+
+/* The hit in double: the root nearest to the one that Embree's search settled on. */
+static vec3 sphere_direction(const struct geom_shape *s, vec3 o, vec3 d, double t)
+{
+	vec3 oc = vec3_sub(o, s->center);
+	double b = vec3_dot(oc, d), l = vec3_length(oc), c = (l - s->radius) * (l + s->radius);
+	vec3 nearest = vec3_madd(oc, -b, d);
+	double disc = fmax(s->radius * s->radius - vec3_dot(nearest, nearest), 0);
+	double k = -b - copysign(sqrt(disc), b);
+	double other = k != 0 ? c / k : k;
+	double root = fabs(k - t) < fabs(other - t) ? k : other;
+	return vec3_normalize(vec3_madd(oc, root, d));
+}
+
+void surface_from_hit(const struct geom_shape *s, vec3 o, vec3 d, const struct ray_hit *hit, struct surface_point *x)
+{
+	if (s->is_sphere) {
+		surface_on_sphere(s, hit->prim, sphere_direction(s, o, d, hit->t), x);
+		return;
+	}
+	const uint32_t *i = s->index[hit->prim.prim];
+	struct corner c = corner_of(s, i);
+	double b1 = fmin(fmax(hit->u, 0), 1), b2 = fmin(fmax(hit->v, 0), 1 - b1);
+	solve_triangle(o, d, c.v0, c.e1, c.e2, &b1, &b2);
+	x->prim = hit->prim;
+	fill(s, i, &c, b1, b2, x);
+}
+
+void surface_tangents(const struct surface_point *x, vec3 *du, vec3 *dv)
+{
+	/* Where both normals are one the shading frame is this one already. */
+	if (x->sh.n.x == x->ng.x && x->sh.n.y == x->ng.y && x->sh.n.z == x->ng.z) {
+		*du = x->sh.s;
+		*dv = x->sh.t;
+		return;
+	}
+	struct frame f = frame_along(x->ng, x->dpdu);
+	*du = f.s;
+	*dv = f.t;
+}
+
+static void change_on_sphere(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+{
+	double bend = 1 / s->radius;
+	c->dn[0] = vec3_scale(s->normal_sign * bend, c->du);
+	c->dn[1] = vec3_scale(s->normal_sign * bend, c->dv);
+	/* du is axis x w over its length. Along the circle of latitude it turns by bend about the outward direction w's
+	 * own circle and by bend cot(theta) towards the pole; along the meridian it is carried in parallel. */
+	vec3 w = vec3_scale(s->normal_sign, x->ng);
+	double cosine = vec3_dot(s->sphere_axes.n, w), sine = vec3_length(vec3_cross(s->sphere_axes.n, w));
+	vec3 turn = vec3_scale(-bend, w);
+	if (sine > 0)
+		turn = vec3_madd(turn, bend * cosine / sine, vec3_cross(w, c->du));
+	c->ddu[0] = vec3_is_finite(turn) ? turn : vec3_scale(-bend, w);
+}
+
+static void bend_on_sphere(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+{
+	struct relief_site site = site_on_sphere(s, x);
+	double tu2 = vec3_dot(site.tu, site.tu), tv2 = vec3_dot(site.tv, site.tv),
+	       hand = vec3_dot(site.tu, x->dpdu) < 0 ? -1 : 1;
+	if (!(tu2 > 0) || !(tv2 > 0))
+		return;
+	vec3 w = vec3_scale(s->normal_sign, x->ng);
+	site.axis = c->du;
+	for (int k = 0; k < 2; k++) {
+		vec3 along = k ? c->dv : c->du;
+		struct relief_step d = {.dn = c->dn[k],
+					.daxis = c->ddu[k],
+					.du = vec3_dot(along, site.tu) / tu2,
+					.dv = vec3_dot(along, site.tv) / tv2};
+		d.dtu = vec3_scale(2 * M_PI * hand, vec3_cross(s->sphere_axes.n, along));
+		d.dtv = vec3_scale(M_PI, vec3_madd(vec3_cross(c->du, along), s->radius, vec3_cross(c->ddu[k], w)));
+		c->dn[k] = relief_turn(s->relief, &site, &d);
+	}
+}
+
+/* Gradients of the second and third barycentric. */
+static void barycentric_gradients(const struct corner *k, vec3 *g1, vec3 *g2)
+{
+	vec3 area = vec3_cross(k->e1, k->e2);
+	double inverse = 1 / vec3_dot(area, area);
+	*g1 = vec3_scale(inverse, vec3_cross(k->e2, area));
+	*g2 = vec3_scale(inverse, vec3_cross(area, k->e1));
+}
+
+/* The normal without relief, and in c->dn how it changes. */
+static vec3 change_on_triangle(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+{
+	const uint32_t *i = s->index[x->prim.prim];
+	if (!s->normal)
+		return x->ng;
+	vec3 m = interpolated_normal(s, i, x->b1, x->b2), n0 = at(s->normal, i[0]), g1, g2;
+	if (!(vec3_dot(m, x->ng) > 0))
+		return x->ng;
+	struct corner k = corner_of(s, i);
+	barycentric_gradients(&k, &g1, &g2);
+	vec3 m1 = vec3_sub(at(s->normal, i[1]), n0), m2 = vec3_sub(at(s->normal, i[2]), n0),
+	     n = s->relief ? vec3_normalize(m) : x->sh.n;
+	double length = vec3_length(m);
+	for (int d = 0; d < 2; d++) {
+		vec3 along = d ? c->dv : c->du;
+		vec3 dm = vec3_madd(vec3_scale(vec3_dot(along, g1), m1), vec3_dot(along, g2), m2);
+		vec3 dn = vec3_scale(1 / length, vec3_madd(dm, -vec3_dot(n, dm), n));
+		if (vec3_is_finite(dn))
+			c->dn[d] = dn;
+	}
+	return n;
+}
+
+static void bend_on_triangle(const struct geom_shape *s, const struct surface_point *x, vec3 n,
+			     struct surface_change *c)
+{
+	const uint32_t *i = s->index[x->prim.prim];
+	struct corner k = corner_of(s, i);
+	struct relief_site site = site_on_triangle(s, i, &k, n, x);
+	double t1[2] = {1, 0}, t2[2] = {0, 1}; /* how (u,v) changes with the barycentrics */
+	for (int a = 0; s->uv && a < 2; a++) {
+		t1[a] = (double)s->uv[i[1]][a] - (double)s->uv[i[0]][a];
+		t2[a] = (double)s->uv[i[2]][a] - (double)s->uv[i[0]][a];
+	}
+	vec3 g1, g2;
+	barycentric_gradients(&k, &g1, &g2);
+	site.axis = c->du;
+	for (int a = 0; a < 2; a++) {
+		vec3 along = a ? c->dv : c->du;
+		double b1 = vec3_dot(along, g1), b2 = vec3_dot(along, g2);
+		struct relief_step d = {.dn = c->dn[a], .du = b1 * t1[0] + b2 * t2[0], .dv = b1 * t1[1] + b2 * t2[1]};
+		c->dn[a] = relief_turn(s->relief, &site, &d);
+	}
+}
+
+void surface_change_of(const struct geom_shape *s, const struct surface_point *x, struct surface_change *c)
+{
+	*c = (struct surface_change){.dn = {{0, 0, 0}}};
+	surface_tangents(x, &c->du, &c->dv);
+	if (s->is_sphere) {
+		change_on_sphere(s, x, c);
+		if (s->relief)
+			bend_on_sphere(s, x, c);
+	} else if (s->normal || s->relief) {
+		vec3 n = change_on_triangle(s, x, c);
+		if (s->relief)
+			bend_on_triangle(s, x, n, c);
+	}
+}
+
+static bool reproject_triangle(const struct geom_shape *s, struct prim_ref prim, vec3 o, vec3 d,
+			       struct surface_point *x)
+{
+	const uint32_t *i = s->index[prim.prim];
+	struct corner c = corner_of(s, i);
+	vec3 h = vec3_cross(d, c.e2), to = vec3_sub(o, c.v0), q = vec3_cross(to, c.e1);
+	double det = vec3_dot(c.e1, h), side = copysign(1, det);
+	double b1 = side * vec3_dot(to, h), b2 = side * vec3_dot(d, q), most = fabs(det);
+	if (!(b1 >= 0) || !(b2 >= 0) || !(b1 + b2 <= most) || !(side * vec3_dot(c.e2, q) > 0) || !(most > 0))
+		return false;
+	x->prim = prim;
+	fill(s, i, &c, b1 / most, b2 / most, x);
+	return true;
+}
+
+static bool reproject_sphere(const struct geom_shape *s, struct prim_ref prim, bool starts_on_it, vec3 o, vec3 d,
+			     double t_near, struct surface_point *x)
+{
+	vec3 oc = vec3_sub(o, s->center);
+	double b = vec3_dot(oc, d), root;
+	if (starts_on_it) {
+		root = -2 * b; /* the other root is the start */
+	} else {
+		double miss = vec3_length(vec3_madd(oc, -b, d)), l = vec3_length(oc);
+		double disc = (s->radius - miss) * (s->radius + miss), c = (l - s->radius) * (l + s->radius);
+		if (!(disc >= 0))
+			return false;
+		double k = -b - copysign(sqrt(disc), b), other = k != 0 ? c / k : k;
+		double near = fmin(k, other), far = fmax(k, other);
+		root = near > 0 && fabs(near - t_near) <= fabs(far - t_near) ? near : far;
+	}
+	if (!(root > 0) || !isfinite(root))
+		return false;
+	on_sphere(s, prim, vec3_normalize(vec3_madd(oc, root, d)), x);
+	return true;
+}
+
+bool surface_reproject(const struct geom_shape *s, struct prim_ref prim, struct prim_ref from, vec3 o, vec3 d,
+		       double t_near, struct surface_point *x)
+{
+	bool same = prim.shape == from.shape && prim.prim == from.prim;
+	if (s->is_sphere)
+		return reproject_sphere(s, prim, same, o, d, t_near, x);
+	return !same && reproject_triangle(s, prim, o, d, x);
+}
+
+bool surface_near(const struct geom_shape *s, struct prim_ref prim, vec3 p, struct surface_point *x)
+{
+	if (s->is_sphere) {
+		vec3 d = vec3_sub(p, s->center);
+		if (!(vec3_dot(d, d) > 0))
+			return false;
+		surface_on_sphere(s, prim, vec3_normalize(d), x);
+		return true;
+	}
+	if (prim.prim >= s->triangle_count)
+		return false;
+	const uint32_t *i = s->index[prim.prim];
+	struct corner c = corner_of(s, i);
+	vec3 area = vec3_cross(c.e1, c.e2), d = vec3_sub(p, c.v0);
+	double square = vec3_dot(area, area);
+	if (!(square > 0))
+		return false;
+	double b1 = vec3_dot(vec3_cross(d, c.e2), area) / square, b2 = vec3_dot(vec3_cross(c.e1, d), area) / square;
+	if (!isfinite(b1) || !isfinite(b2))
+		return false;
+	if (b1 < 0 || b2 < 0 || b1 + b2 > 1)
+		move_inside(c.e1, c.e2, &b1, &b2);
+	x->prim = prim;
+	fill(s, i, &c, b1, b2, x);
+	return true;
+}

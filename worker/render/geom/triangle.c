@@ -1,0 +1,38 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/geom/triangle.h"
+
+float triangle_extent(const float (*position)[3], const uint32_t i[3])
+{
+	float most = 0;
+	for (int k = 0; k < 3; k++) {
+		float a = position[i[0]][k], b = position[i[1]][k], c = position[i[2]][k];
+		most = fmaxf(most, fmaxf(a, fmaxf(b, c)) - fminf(a, fminf(b, c)));
+	}
+	return most;
+}
+
+static bool comes_first(vec3 a, vec3 b)
+{
+	return a.x != b.x ? a.x < b.x : a.y != b.y ? a.y < b.y : a.z < b.z;
+}
+
+/* On which side of the line through a and b the ray passes: the volume of d, a - o, b - o; exactly the opposite for b
+ * and a. */
+static double side_of(vec3 o, vec3 d, vec3 a, vec3 b)
+{
+	bool turned = comes_first(b, a);
+	vec3 p = vec3_sub(turned ? b : a, o), q = vec3_sub(turned ? a : b, o);
+	double volume = vec3_dot(d, vec3_cross(p, q));
+	return turned ? -volume : volume;
+}
+
+bool triangle_meets(const struct triangle *k, vec3 o, vec3 d, double *t)
+{
+	double u = side_of(o, d, k->v[1], k->v[2]), v = side_of(o, d, k->v[2], k->v[0]),
+	       w = side_of(o, d, k->v[0], k->v[1]);
+	if ((u < 0 || v < 0 || w < 0) && (u > 0 || v > 0 || w > 0))
+		return false;
+	double slope = vec3_dot(k->n, d);
+	*t = vec3_dot(k->n, vec3_sub(k->v[0], o)) / slope;
+	return slope != 0;
+}

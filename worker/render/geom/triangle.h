@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* One triangle with float vertices, in double: its plane, and where a line meets it. Pure; any thread. */
+#ifndef WORKER_RENDER_GEOM_TRIANGLE_H
+#define WORKER_RENDER_GEOM_TRIANGLE_H
+
+#include "worker/render/math/vec3.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct triangle {
+	vec3 v[3], n; /* n: not normalised */
+	double edges; /* bounds the terms of n */
+};
+
+static inline vec3 triangle_vertex(const float (*position)[3], uint32_t i)
+{
+	return (vec3){(double)position[i][0], (double)position[i][1], (double)position[i][2]};
+}
+
+static inline double triangle_norm1(vec3 v)
+{
+	return fabs(v.x) + fabs(v.y) + fabs(v.z);
+}
+
+static inline struct triangle triangle_from(const float (*position)[3], const uint32_t i[3])
+{
+	struct triangle t = {
+		{triangle_vertex(position, i[0]), triangle_vertex(position, i[1]), triangle_vertex(position, i[2])},
+		{0, 0, 0},
+		0};
+	vec3 e1 = vec3_sub(t.v[1], t.v[0]), e2 = vec3_sub(t.v[2], t.v[0]);
+	t.n = vec3_cross(e1, e2);
+	t.edges = triangle_norm1(e1) * triangle_norm1(e2);
+	return t;
+}
+
+/* Of the plane over p, times |n|; 0 when p lies in the plane as far as double can tell: p and n carry the rounding of a
+ * few operations, of which `edges` bounds the terms. */
+static inline double triangle_height(const struct triangle *t, vec3 p)
+{
+	vec3 to = vec3_sub(t->v[0], p);
+	double h = vec3_dot(t->n, to);
+	return fabs(h) <= 0x1p-49 * t->edges * (triangle_norm1(p) + triangle_norm1(to)) ? 0 : h;
+}
+
+/* Largest side of its box. */
+float triangle_extent(const float (*position)[3], const uint32_t i[3]);
+
+/* Where o + t d meets the plane, if that is within the triangle. Two triangles that share an edge leave no gap there:
+ * both ask about it by the same operations. */
+bool triangle_meets(const struct triangle *k, vec3 o, vec3 d, double *t);
+
+#endif

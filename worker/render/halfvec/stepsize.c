@@ -1,0 +1,121 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/halfvec/stepsize.h"
+
+#include <assert.h>
+
+/* Standard deviation on the film, of its smaller side. */
+#define FILM_STEP 0.02
+/* Least sigma over the limit: a pixel that sees less than this of a lobe leaves no room for a walk in double. */
+#define SIGMA_LEAST 1e-6
+/* Cosines and determinants below this are none: what is divided by them would overflow. */
+#define RATIO_LEAST 0x1p-500
+
+double halfvec_film_step(const struct camera *camera)
+{
+	return FILM_STEP * fmin(camera->width, camera->height);
+}
+
+double halfvec_lobe_width(const struct path_vertex *v)
+{
+	assert(v->bsdf->alpha > 0);
+	return fmin(v->bsdf->alpha, 1);
+}
+
+static double bsdf_limit(const struct path_context *c, const struct path_vertex *v)
+{
+	return c->w->accuracy.step_scale * halfvec_lobe_width(v) / sqrt(M_PI);
+}
+
+/* d x_{k-1} / d pixel: rays through x_k, whose slopes change by 1 / scale a pixel, meet the plane of the geometric
+ * normal. */
+static bool pixel_footprint(const struct camera *camera, const struct full_path_path *x, mat2 *j)
+{
+	const struct full_path_edge *e = &x->edge[x->edges - 1];
+	const struct surface_point *at = &x->v[x->edges - 1].x;
+	vec3 w = vec3_neg(e->w), du, dv, d[2];
+	double depth = sqrt(e->distance2) * vec3_dot(camera->axes.n, w), cosine = vec3_dot(at->ng, w);
+	if (!(depth > 0) || !(fabs(cosine) > RATIO_LEAST))
+		return false;
+	for (int i = 0; i < 2; i++) {
+		vec3 axis = i ? camera->axes.t : camera->axes.s;
+		d[i] = vec3_scale(depth / camera->scale, vec3_madd(axis, -vec3_dot(at->ng, axis) / cosine, w));
+	}
+	surface_tangents(at, &du, &dv);
+	*j = (mat2){vec3_dot(du, d[0]), vec3_dot(du, d[1]), vec3_dot(dv, d[0]), vec3_dot(dv, d[1])};
+	return true;
+}
+
+/* d^-1 j, both brought to entries of at most 1 first. */
+static bool solve(mat2 d, mat2 j, mat2 *e)
+{
+	double size_d = mat2_largest(d), size_j = mat2_largest(j);
+	if (!(size_d > 0) || !(size_j > 0) || !isfinite(size_d) || !isfinite(size_j))
+		return false;
+	d = mat2_scale(1 / size_d, d);
+	j = mat2_scale(1 / size_j, j);
+	double det = mat2_det(d);
+	if (!(fabs(det) > RATIO_LEAST))
+		return false;
+	double factor = size_j / size_d / det;
+	if (!isfinite(factor))
+		return false;
+	*e = mat2_scale(factor, mat2_mul(mat2_adjugate(d), j));
+	return true;
+}
+
+static double clip(double sigma, double limit)
+{
+	return fmin(fmax(sigma, SIGMA_LEAST * limit), limit);
+}
+
+struct halfvec_step halfvec_step_of(mat2 e, double scale, double limit)
+{
+	struct halfvec_step s = {{1, 0, 0, 1}, {limit, limit}};
+	double size = mat2_largest(e);
+	if (!isfinite(size) || !(size > 0) || !isfinite(size * scale))
+		return s;
+	e = (mat2){e.xx / size, e.xy / size, e.yx / size, e.yy / size};
+	/* e e^T = U diag(s^2) U^T; the smaller one from the determinant, which keeps its digits. */
+	double s00 = e.xx * e.xx + e.xy * e.xy, s11 = e.yx * e.yx + e.yy * e.yy, s01 = e.xx * e.yx + e.xy * e.yy;
+	double difference = s00 - s11, root = sqrt(difference * difference + 4 * s01 * s01);
+	double larger = sqrt(0.5 * (s00 + s11 + root)), smaller = fabs(mat2_det(e)) / larger;
+	double angle = 0.5 * atan2(2 * s01, difference), cosine = cos(angle), sine = sin(angle);
+	s.u = (mat2){cosine, -sine, sine, cosine};
+	s.sigma[0] = clip(size * scale * larger, limit);
+	s.sigma[1] = clip(size * scale * smaller, limit);
+	return s;
+}
+
+void halfvec_steps(const struct path_context *c, const struct full_path_path *x, const struct constraint *k, unsigned b,
+		   unsigned c_end, struct halfvec_step *step)
+{
+	const struct camera *camera = &c->w->camera;
+	double sum = 0, pixels = halfvec_film_step(camera);
+	mat2 d[FULL_PATH_MAX_VERTICES], footprint = {0, 0, 0, 0};
+	for (unsigned j = c_end + 1; j < b; j++)
+		if (!x->v[j].delta)
+			sum += bsdf_limit(c, &x->v[j]);
+	bool differentials = b == x->edges && pixel_footprint(camera, x, &footprint) &&
+			     constraint_solver_of(&c->w->accuracy)->differentials(k, b, c_end, d) == CONSTRAINT_OK;
+	for (unsigned j = c_end + 1; j < b; j++) {
+		if (x->v[j].delta)
+			continue;
+		double limit = bsdf_limit(c, &x->v[j]);
+		mat2 e;
+		step[j] = (struct halfvec_step){{1, 0, 0, 1}, {limit, limit}};
+		/* Each vertex takes its share of the pixels. */
+		if (differentials && solve(d[j], footprint, &e))
+			step[j] = halfvec_step_of(e, pixels * limit / sum, limit);
+	}
+}
+
+vec2 halfvec_step_take(const struct halfvec_step *s, double g0, double g1)
+{
+	return mat2_apply(s->u, (vec2){s->sigma[0] * g0, s->sigma[1] * g1});
+}
+
+double halfvec_step_log_pdf(const struct halfvec_step *s, vec2 dh)
+{
+	double x = (s->u.xx * dh.x + s->u.yx * dh.y) / s->sigma[0], y = (s->u.xy * dh.x + s->u.yy * dh.y) / s->sigma[1];
+	return -0.5 * (x * x + y * y) - log(2 * M_PI * s->sigma[0] * s->sigma[1]);
+}

@@ -1,0 +1,267 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Finds vertices x_{b-1} .. x_{c+1} with given half vectors h*, by Newton's method (see walk.h).
+ *
+ * Each iteration solves M dx = h* - h, M = dh/dx block tridiagonal, moves every vertex by step * dx in its tangent
+ * plane and puts it back onto the surface along the ray from the vertex before it. If the largest residual,
+ * |h* - h|^2 / (1 + |h|^2), has shrunk, the trial is kept and the step doubled, up to 1; otherwise the vertices stay
+ * and the step is halved. It ends well when each |h* - h| is within its vertex's tolerance and, unless the caller
+ * knows it, every edge is unoccluded. At least one trial is made, as the path it starts with was never traced.
+ * It fails when the step becomes too short (the reason is that of the last trial: missed, blocked, another mode,
+ * residuals grew), when M is singular, or when the iterations run out.
+ */
+#include "worker/render/halfvec/walk.h"
+
+#include <assert.h>
+
+struct walk_limits walk_limits_of(const struct accuracy_settings *k)
+{
+	return (struct walk_limits){(unsigned)k->iterations, k->least_step,	     1, k->tolerance,
+				    k->reverse_tolerance,    constraint_solver_of(k)};
+}
+
+/* One walk while it goes on. Predictions start at the kept state alone, so that a refused trial leaves nothing to undo.
+ */
+struct walk {
+	struct path_context *c;
+	struct full_path_path *y; /* the trial */
+	unsigned b, end;
+	const struct walk_target *target;
+	const struct constraint_solver *solver;
+	double scale;
+	struct walk_scratch *s;
+	uint64_t above;			   /* by vertex: where light leaves on the side of the geometric normal */
+	uint64_t seen;			   /* by edge: a ray of this trial has met the next vertex along it */
+	vec3 move[FULL_PATH_MAX_VERTICES]; /* a full step of Newton from the kept state */
+};
+
+static uint64_t bit(unsigned i)
+{
+	return (uint64_t)1 << i;
+}
+
+static bool light_above(const struct full_path_path *y, unsigned j)
+{
+	return vec3_dot(y->v[j].x.ng, y->edge[j - 1].w) < 0;
+}
+
+static bool mode_holds(const struct full_path_path *y, unsigned j)
+{
+	return full_path_mode(y, j) == (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT));
+}
+
+/* By a ray: onto another primitive of the same material. */
+static enum walk_end cast(struct walk *m, unsigned j, vec3 d)
+{
+	const struct world *w = m->c->w;
+	const struct path_vertex *from = &m->y->v[j + 1];
+	struct path_vertex *to = &m->y->v[j];
+	bool camera = from->kind == VERTEX_CAMERA;
+	struct ray_end start = {from->x.p, camera ? (vec3){0, 0, 0} : from->x.ng, from->x.prim};
+	double t_min = 0, t_max = INFINITY;
+	if (camera)
+		camera_clip(&w->camera, d, &t_min, &t_max);
+	struct ray_hit hit;
+	m->c->counters[COUNT_RAYS_CLOSEST]++;
+	if (!accel_closest(w->accel, &start, d, t_min, t_max, &hit))
+		return WALK_MISSED;
+	const struct world_shape *part = &w->parts[hit.prim.shape];
+	if (&w->bsdfs[part->bsdf] != to->bsdf)
+		return WALK_BLOCKED;
+	surface_from_hit(&w->shapes[hit.prim.shape], from->x.p, d, &hit, &to->x);
+	to->emitter = part->emitter;
+	m->seen |= bit(j);
+	return WALK_OK;
+}
+
+/* Vertex j of the trial: along the ray from the one before it towards the prediction. */
+static enum walk_end put_back(struct walk *m, unsigned j, double step)
+{
+	const struct path_vertex *from = &m->y->v[j + 1], *kept = &m->s->kept[j];
+	struct path_vertex *to = &m->y->v[j];
+	vec3 d = vec3_sub(vec3_madd(kept->x.p, step, m->move[j]), from->x.p);
+	double t = vec3_length(d);
+	if (!(t > 0) || !isfinite(t))
+		return WALK_MISSED;
+	d = vec3_scale(1 / t, d);
+	struct prim_ref prim = kept->x.prim;
+	if (!surface_reproject(&m->c->w->shapes[prim.shape], prim, from->x.prim, from->x.p, d, t, &to->x))
+		return cast(m, j, d);
+	to->emitter = kept->emitter;
+	return WALK_OK;
+}
+
+static enum walk_end trial(struct walk *m, double step)
+{
+	struct full_path_path *y = m->y;
+	m->seen = 0;
+	for (unsigned j = m->b - 1;; j--) {
+		if (j > m->end) {
+			enum walk_end put = put_back(m, j, step);
+			if (put != WALK_OK)
+				return put;
+		}
+		if (!full_path_join(y, j))
+			return WALK_SINGULAR;
+		if (j + 1 < m->b && (!mode_holds(y, j + 1) || light_above(y, j + 1) != ((m->above >> (j + 1)) & 1)))
+			return WALK_MODE;
+		if (j == m->end)
+			return WALK_OK;
+	}
+}
+
+/* How far the half vectors s->k[].h are from the targets, a measure for step control alone. within: all as near as
+ * asked. */
+static double residuals(struct walk *m, bool *within)
+{
+	double error = 0;
+	*within = true;
+	for (unsigned j = m->end + 1; j < m->b; j++) {
+		vec2 h = m->s->k[j].h, r = vec2_sub(m->target[j].h, h);
+		double tolerance = m->scale * m->target[j].tolerance, r2 = vec2_dot(r, r);
+		m->s->residual[j] = r;
+		*within = *within && r2 <= tolerance * tolerance;
+		if (!isfinite(r2))
+			return INFINITY;
+		error = fmax(error, r2 / (1 + vec2_dot(h, h)));
+	}
+	return error;
+}
+
+/* The trial becomes the kept state: Newton's step from there, by the system of s->k. */
+static enum walk_end keep(struct walk *m, bool factored)
+{
+	struct walk_scratch *s = m->s;
+	if (!factored && m->solver->factor_to_solve(s->k, m->b, m->end, &s->system) != CONSTRAINT_OK)
+		return WALK_SINGULAR;
+	m->solver->solve(s->k, &s->system, s->residual, s->dx);
+	for (unsigned j = m->end + 1; j < m->b; j++) {
+		s->kept[j].x = m->y->v[j].x;
+		s->kept[j].emitter = m->y->v[j].emitter;
+		if (!isfinite(s->dx[j].x) || !isfinite(s->dx[j].y))
+			return WALK_SINGULAR;
+		vec3 du, dv;
+		surface_tangents(&s->kept[j].x, &du, &dv);
+		m->move[j] = vec3_madd(vec3_scale(s->dx[j].x, du), s->dx[j].y, dv);
+	}
+	return WALK_OK;
+}
+
+static enum walk_end start(struct walk *m)
+{
+	struct full_path_path *y = m->y;
+	for (unsigned e = m->end; e < m->b; e++)
+		if (!full_path_join(y, e))
+			return WALK_SINGULAR;
+	for (unsigned j = m->end + 1; j < m->b; j++) {
+		if (!mode_holds(y, j))
+			return WALK_MODE;
+		if (light_above(y, j))
+			m->above |= bit(j);
+	}
+	return WALK_OK;
+}
+
+static bool all_visible(const struct walk *m)
+{
+	for (unsigned e = m->b; e-- > m->end;)
+		if (!(m->seen & bit(e)) && !full_path_visible(m->c, m->y, e))
+			return false;
+	return true;
+}
+
+static void constrain(struct walk *m, unsigned b, unsigned end)
+{
+	constraints_of(m->c->w, m->y, b, end, m->s->k);
+}
+
+static void refresh(struct walk *m, unsigned stale)
+{
+	if (stale & WALK_STALE) {
+		constrain(m, m->b, m->end);
+		return;
+	}
+	if (stale & WALK_STALE_B)
+		constrain(m, m->b, m->b - 2);
+	if (stale & WALK_STALE_C)
+		constrain(m, m->end + 2, m->end);
+}
+
+/* Of the trial: half vectors alone are cheap, derivatives only pay where the walk goes on or the caller asks for them.
+ */
+static double look(struct walk *m, bool *within)
+{
+	for (unsigned j = m->end + 1; j < m->b; j++)
+		m->s->k[j].h = halfvec_of(m->y, j);
+	return residuals(m, within);
+}
+
+/* Until the residuals are as small as asked, or a reason why they cannot be. */
+static enum walk_end iterate(struct walk *m, const struct walk_limits *limits, unsigned stale, bool back)
+{
+	struct walk_scratch *s = m->s;
+	bool within;
+	refresh(m, stale);
+	double error = residuals(m, &within), step = 1;
+	enum walk_end last = isfinite(error) ? keep(m, !stale) : WALK_SINGULAR;
+	if (last != WALK_OK)
+		return last;
+	while (s->iterations < limits->iterations) {
+		s->iterations++;
+		last = trial(m, step);
+		if (last == WALK_OK) {
+			double now = look(m, &within);
+			if (within ? !back : now < error)
+				constrain(m, m->b, m->end);
+			if (within)
+				return WALK_OK;
+			if (now < error) {
+				error = now;
+				last = keep(m, false);
+				if (last != WALK_OK)
+					return last;
+				step = fmin(1, 2 * step);
+				continue;
+			}
+			last = WALK_DIVERGED;
+		}
+		step /= 2;
+		if (step < limits->least_step)
+			return last;
+	}
+	return last == WALK_OK ? WALK_ITERATIONS : last;
+}
+
+enum walk_end halfvec_walk_from(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
+				const struct walk_target *target, bool visible, const struct walk_limits *limits,
+				unsigned stale, struct walk_scratch *s)
+{
+	assert(c_end + 1 < b && b <= y->edges);
+	struct walk m = {.c = c,
+			 .y = y,
+			 .b = b,
+			 .end = c_end,
+			 .target = target,
+			 .solver = limits->solver,
+			 .scale = limits->scale,
+			 .s = s};
+	s->iterations = 0;
+	full_path_forget(y, c_end + 1, b - 1);
+	enum walk_end end = start(&m);
+	if (end == WALK_OK)
+		end = iterate(&m, limits, stale, visible);
+	if (end != WALK_OK || visible)
+		return end;
+	if (!all_visible(&m))
+		return WALK_BLOCKED;
+	for (unsigned j = c_end + 1; j < b; j++)
+		surface_uv(&c->w->shapes[y->v[j].x.prim.shape], &y->v[j].x);
+	return WALK_OK;
+}
+
+enum walk_end halfvec_walk(struct path_context *c, struct full_path_path *y, unsigned b, unsigned c_end,
+			   const struct walk_target *target, bool visible, const struct walk_limits *limits,
+			   struct walk_scratch *s)
+{
+	return halfvec_walk_from(c, y, b, c_end, target, visible, limits, WALK_STALE, s);
+}

@@ -1,0 +1,24 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The CIE's published tables at 1 nm, 360-830 nm: 1931 2-degree observer and illuminant D65 (100 at 560 nm).
+ * Generated from worker/render/math/data at build time. Constants; any thread.
+ */
+#ifndef WORKER_RENDER_MATH_CIE_H
+#define WORKER_RENDER_MATH_CIE_H
+
+enum { CIE_FIRST_NM = 360, CIE_LAST_NM = 830, CIE_COUNT = CIE_LAST_NM - CIE_FIRST_NM + 1 };
+#define CIE_Y_SUM 106.857 /* nm: the integral of y_bar */
+
+extern const double cie_observer[CIE_COUNT][3];
+extern const double cie_d65[CIE_COUNT];
+
+/* The 1 nm from CIE_FIRST_NM + i on: what share of all wavelengths is drawn below it, and in it (so per nm, too). */
+struct wavelength_cell {
+	double below, share;
+};
+extern const struct wavelength_cell wavelength_cells[CIE_COUNT - 1];
+/* The cell in which the share k / WAVELENGTH_GUIDE lies. */
+enum { WAVELENGTH_GUIDE = 512 };
+extern const unsigned short wavelength_guide[WAVELENGTH_GUIDE];
+
+#endif

@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Sums of numbers that are given by their logarithms. */
+#ifndef WORKER_RENDER_MATH_LOGSUM_H
+#define WORKER_RENDER_MATH_LOGSUM_H
+
+#include <math.h>
+
+/* log of the sum of exp(v[i]); -INFINITY for none or only zeros. */
+static inline double log_sum_exp(const double *v, unsigned n)
+{
+	double most = -INFINITY, sum = 0;
+	for (unsigned i = 0; i < n; i++)
+		most = fmax(most, v[i]);
+	if (!(most > -INFINITY))
+		return -INFINITY;
+	for (unsigned i = 0; i < n; i++)
+		sum += exp(v[i] - most);
+	return most + log(sum);
+}
+
+#endif

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Affine transforms, row major: p' = M p. */
+#ifndef WORKER_RENDER_MATH_MAT4_H
+#define WORKER_RENDER_MATH_MAT4_H
+
+#include "worker/render/math/vec3.h"
+
+#include <stdbool.h>
+
+typedef struct {
+	double m[4][4];
+} mat4;
+
+mat4 mat4_identity(void);
+mat4 mat4_mul(mat4 a, mat4 b);		 /* first b, then a */
+bool mat4_invert(mat4 a, mat4 *inverse); /* false when singular or not finite */
+mat4 mat4_translate(vec3 t);
+mat4 mat4_scale(vec3 s);
+mat4 mat4_rotate(vec3 axis, double degrees);
+mat4 mat4_look_at(vec3 origin, vec3 target,
+		  vec3 up); /* camera to world: +z to the target, +x to the LEFT, as Mitsuba */
+double mat4_det3(mat4 a);   /* of the upper left 3x3 block */
+
+vec3 mat4_point(const mat4 *a, vec3 p);
+vec3 mat4_vector(const mat4 *a, vec3 v);
+vec3 mat4_normal(const mat4 *inverse, vec3 n); /* by the transpose of the INVERSE; not normalised */
+
+#endif

@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What a bump map or a normal map says of a surface at (u,v): made by a material, applied by
+ * worker/render/geom/relief.h. Immutable; any thread; allocates nothing.
+ */
+#ifndef WORKER_RENDER_MATH_RELIEF_H
+#define WORKER_RENDER_MATH_RELIEF_H
+
+#include "worker/render/math/vec3.h"
+
+enum relief_kind {
+	RELIEF_HEIGHT, /* a height along the normal: x is its gradient (dh/du, dh/dv, 0), in the scene's units of length
+			*/
+	RELIEF_NORMAL, /* x is the normal in the shading frame, of any length above 0 */
+};
+
+struct relief_value {
+	vec3 x, du, dv; /* and its derivatives by u and v */
+};
+
+struct relief {
+	enum relief_kind kind;
+	void (*at)(const void *data, double u, double v, struct relief_value *out);
+	const void *data;
+};
+
+#endif

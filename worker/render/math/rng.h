@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Counter-based random numbers: (seed, stream, index, step, dimension) -> value, by Threefry-4x64-20 (Salmon et al.
+ * 2011, through Random123). One stream constant a use, so that no two uses share numbers. Values are multiples of
+ * 2^-53 in [0,1). Any thread; no state.
+ */
+#ifndef WORKER_RENDER_MATH_RNG_H
+#define WORKER_RENDER_MATH_RNG_H
+
+#include <stdint.h>
+
+/* Numbers are never used again for something else, or jobs that go on would not: add new ones at the end. */
+enum rng_stream {
+	RNG_PATH = 1,
+	RNG_BDPT = 2,
+	RNG_BOOTSTRAP = 3,
+	RNG_CHAIN = 4,
+	RNG_RESAMPLING = 5,
+	RNG_BEYOND = 6,
+	RNG_MUTATION = 7,
+	RNG_AROUND = 8,
+	RNG_TEST = 9,
+	RNG_CHOICE = 10,
+	RNG_BDPT8 = 11,
+};
+
+/* Four values: dimensions 4*block .. 4*block+3 of one (stream, index, step). */
+void rng_uniform4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, double out[4]);
+/* The 256 random bits that they are made of. */
+void rng_bits4(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, uint64_t block, uint64_t out[4]);
+
+#endif

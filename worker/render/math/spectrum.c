@@ -1,0 +1,73 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/math/spectrum.h"
+
+#include "worker/render/math/cie.h"
+
+static int cell_of(double nm)
+{
+	int cell = (int)(nm - CIE_FIRST_NM);
+	return cell < 0 ? 0 : cell > CIE_COUNT - 2 ? CIE_COUNT - 2 : cell;
+}
+
+/* The wavelength below which the share u of all lies. */
+static double wavelength_at(double u)
+{
+	int part = (int)(u * WAVELENGTH_GUIDE); /* u may be 1 by rounding */
+	int low = wavelength_guide[part < WAVELENGTH_GUIDE ? part : WAVELENGTH_GUIDE - 1];
+	while (low + 1 < CIE_COUNT - 1 && wavelength_cells[low + 1].below <= u)
+		low++;
+	double inside = (u - wavelength_cells[low].below) / wavelength_cells[low].share;
+	return CIE_FIRST_NM + low + fmin(inside, 1);
+}
+
+double wavelength_pdf(double nm)
+{
+	return wavelength_cells[cell_of(nm)].share;
+}
+
+struct wavelengths wavelengths_sample(double u)
+{
+	return wavelengths_sample_few(u, SPECTRUM_LANES);
+}
+
+struct wavelengths wavelengths_sample_few(double u, unsigned count)
+{
+	struct wavelengths w = {.grey = false, .few = count >= SPECTRUM_LANES ? 0 : count, .u = u};
+	for (unsigned i = 0; i < SPECTRUM_LANES; i++) {
+		double x = u + (double)(i % count) / count;
+		w.nm[i] = i < count ? wavelength_at(x - floor(x)) : w.nm[i - count];
+	}
+	return w;
+}
+
+/* Lane i's part of the three integrals where it carries 1. */
+static void lane_weights(const struct wavelengths *w, int i, double xyz[3])
+{
+	int cell = cell_of(w->nm[i]);
+	double b = w->nm[i] - CIE_FIRST_NM - cell, a = 1 - b;
+	double factor = 1 / (wavelength_cells[cell].share * (CIE_Y_SUM * SPECTRUM_LANES));
+	for (int k = 0; k < 3; k++)
+		xyz[k] = factor * (a * cie_observer[cell][k] + b * cie_observer[cell + 1][k]);
+}
+
+void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3])
+{
+	xyz[0] = xyz[1] = xyz[2] = 0;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double lane[3];
+		lane_weights(w, i, lane);
+		for (int k = 0; k < 3; k++)
+			xyz[k] += l.v[i] * lane[k];
+	}
+}
+
+spectrum spectrum_intensity_weights(const struct wavelengths *w)
+{
+	spectrum sum;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double lane[3];
+		lane_weights(w, i, lane);
+		sum.v[i] = lane[0] + lane[1] + lane[2];
+	}
+	return sum;
+}

@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Radiance, reflectance or importance at the wavelengths a path carries: four lanes that travel together where
+ * nothing disperses (hero wavelength, Wilkie et al. 2014).
+ *
+ * A path's wavelengths are made of one number u in [0,1), and all of a path's densities are taken with respect to u.
+ * Lane i has the wavelength at which the cumulative distribution is u + i/4 (mod 1): each lane alone has density
+ * wavelength_pdf, any lane as the hero gives the same four, and equal weights are those of the balance heuristic. The
+ * density follows |r| + |g| + |b|, the matching functions of linear Rec. 709, plus a uniform share of 5 %, so that no
+ * wavelength has density 0. The relative variance of R, G, B for white (D65) is then 0.07, 0.03, 0.02; with uniform
+ * wavelengths it is 0.61, 0.17, 0.67. Times D65 it would be 0.10, 0.03, 0.04.
+ *
+ * In a grey scene (struct wavelengths.grey) all lanes are equal and stand for the common illuminant's shape.
+ */
+#ifndef WORKER_RENDER_MATH_SPECTRUM_H
+#define WORKER_RENDER_MATH_SPECTRUM_H
+
+#include <math.h>
+#include <stdbool.h>
+
+enum { SPECTRUM_LANES = 4 };
+#define WAVELENGTH_MIN 360.0 /* nm */
+#define WAVELENGTH_MAX 830.0
+
+typedef struct {
+	double v[SPECTRUM_LANES];
+} spectrum;
+
+struct wavelengths {
+	double nm[SPECTRUM_LANES];
+	bool grey;    /* the scene carries no colour: nm is not to be read */
+	double u;     /* what nm was made of; 0 where grey */
+	unsigned few; /* 0: all differ; 1 or 2: nm repeats after so many, for the same mean from fewer wavelengths */
+};
+
+/* See EFFECT_IS_ON in worker/render/world/world.h. */
+#ifdef HSLT_PLAIN
+#define WAVELENGTHS_GREY(w) ((void)(w), true)
+#else
+#define WAVELENGTHS_GREY(w) ((w)->grey)
+#endif
+
+static inline spectrum spectrum_of(double x)
+{
+	return (spectrum){{x, x, x, x}};
+}
+
+static inline spectrum spectrum_add(spectrum a, spectrum b)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		a.v[i] += b.v[i];
+	return a;
+}
+
+static inline spectrum spectrum_mul(spectrum a, spectrum b)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		a.v[i] *= b.v[i];
+	return a;
+}
+
+static inline spectrum spectrum_scale(double s, spectrum a)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		a.v[i] *= s;
+	return a;
+}
+
+static inline bool spectrum_is_zero(spectrum a)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		if (a.v[i] != 0)
+			return false;
+	return true;
+}
+
+static inline double spectrum_max(spectrum a)
+{
+	double m = a.v[0];
+	for (int i = 1; i < SPECTRUM_LANES; i++)
+		m = a.v[i] > m ? a.v[i] : m;
+	return m;
+}
+
+static inline double spectrum_mean(spectrum a)
+{
+	double m = 0;
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		m += a.v[i];
+	return m / SPECTRUM_LANES;
+}
+
+static inline bool spectrum_is_valid(spectrum a) /* finite and nowhere negative */
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		if (!(a.v[i] >= 0) || !isfinite(a.v[i]))
+			return false;
+	return true;
+}
+
+/* Of one lane's wavelength, per nm; positive from WAVELENGTH_MIN to WAVELENGTH_MAX. */
+double wavelength_pdf(double nm);
+/* u in [0,1) -> the four wavelengths of the head comment. */
+struct wavelengths wavelengths_sample(double u);
+/* Of 1, 2 or 4 wavelengths, evenly rotated in the cumulative distribution. */
+struct wavelengths wavelengths_sample_few(double u, unsigned count);
+
+/* The first `lanes` again and again. */
+static inline spectrum spectrum_repeat(spectrum s, int lanes)
+{
+	for (int i = lanes; i < SPECTRUM_LANES; i++)
+		s.v[i] = s.v[i - lanes];
+	return s;
+}
+
+/* The CIE 1931 colour of a spectrum estimated from its four lanes (one-sample estimate of the integral of
+ * L x_bar / 106.857 nm, each lane over its density, so that an emitter of rgb 1 has Y = 1). Not for grey: the film has
+ * its own factor. */
+void spectrum_to_xyz(spectrum l, const struct wavelengths *w, double xyz[3]);
+/* X + Y + Z of that is the sum of l times these, lane by lane. */
+spectrum spectrum_intensity_weights(const struct wavelengths *w);
+
+#endif

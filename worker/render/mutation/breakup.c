@@ -1,0 +1,287 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Proposes a path y from x for a given b and c, and weighs it (Hanika, Kaplanyan, Dachsbacher 2015, sec. 4 and 5).
+ *
+ * x_{k-1} .. x_b are traced. Between x_b and x_c each half vector that is not exactly specular takes a Gaussian step,
+ * h' = h + dh, and the walk finds vertices that have the new half vectors; a second walk must lead from y back to x.
+ * With c = b - 1 there is nothing to walk: x_b and x_c are joined. The logarithm of the weight is that of
+ *
+ *   prod_{j <= c, j = b} f_j  prod_{other j < k} f_j |d i_j^perp / d h_j|  G_b |det d x_{b-1} / d x_c|  /  q
+ *
+ * with f_0 = L_e, i_j the direction from x_j towards the light, h in slopes, G_b the cosines, the distance and the
+ * camera's Jacobian at the edge x_b x_{b-1}, and q the densities of the choice of b and c, of the steps and of the
+ * point on the emitter; factors common to f and q are never computed. A proposal fails, with the reason counted, where
+ * a ray misses, an edge is occluded, a vertex would scatter in another mode, the matrix is singular, the walk does not
+ * converge or does not lead back, or the path leaves the film.
+ */
+#include "worker/render/mutation/breakup.h"
+
+#include "worker/render/mutation/trace.h"
+
+#include <string.h>
+
+/* At the end of a walk, of a half vector that is to be 0. */
+#define SPECULAR_TOLERANCE 1e-9
+/* The way back aims that much closer than the way there: at the same tolerance 2 to 11 % of the returns fail by it
+ * alone. */
+#define BACK_SCALE 0.1
+/* Positions are rounded in that many parts of the edges they hang on. */
+#define ROUNDING 0x1p-40
+/* Steps of x_0, in the numbers that make it. */
+#define EMITTER_STEP 0.1
+/* By how much the number that makes the wavelengths moves at most where something disperses (sec. 6: 50 nm of 470);
+ * else all are as good. */
+#define WAVELENGTH_STEP (50.0 / 470)
+
+bool breakup_allows(const struct full_path_path *x, unsigned b, unsigned c)
+{
+	unsigned k = x->edges;
+	if (b > k || (b > 0 && b < k && x->v[b].delta))
+		return false;
+	return b == 0 || (c < b && !(c > 0 && x->v[c].delta));
+}
+
+/* A symmetric step, mirrored at the ends of the range. */
+static double move_wavelength(const struct path_context *c, double u, double r)
+{
+	if (!EFFECT_IS_ON(c->w, dispersion))
+		return r;
+	double v = u + (2 * r - 1) * WAVELENGTH_STEP;
+	v = v < 0 ? -v : v >= 1 ? 2 - v : v;
+	return v < 1 ? v : u;
+}
+
+/* Some vertex that stays where it is would have to move for another wavelength. */
+static bool holds_wavelength(const struct path_context *c, const struct full_path_path *x, unsigned b, unsigned c_end)
+{
+	if (!EFFECT_IS_ON(c->w, dispersion) || b == 0)
+		return false;
+	for (unsigned j = 1; j < c_end; j++)
+		if (x->v[j].delta && x->v[j].bsdf->dispersive)
+			return true;
+	return false;
+}
+
+static bool move_emitter(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y,
+			 struct move *move)
+{
+	const struct path_context *c = m->path;
+	const struct path_vertex *v = &x->v[0];
+	const struct emitter *em = &c->w->emitters[v->emitter];
+	struct emitter_point p = world_emitter_point(&v->x);
+	double u[2], r[4], pdf;
+	p.infinite = v->kind == VERTEX_INFINITE;
+	move->log_density[Y_TO_X] += log(em->ops->pdf_point(em, &p));
+	em->ops->point_inverse(em, &p, u);
+	mutation_random(m, BLOCK_VERTEX, r);
+	if (!mutation_step_square(u, r, EMITTER_STEP))
+		return false;
+	if (!em->ops->sample_point(em, u, &p, &pdf) || !(pdf > 0))
+		return false;
+	y->v[0] = path_emitter_vertex(c->w, v->emitter, &p);
+	move->log_density[X_TO_Y] += log(pdf);
+	return true;
+}
+
+static enum strategy_counter reason_of(enum walk_end end)
+{
+	switch (end) {
+	case WALK_OK:
+		return STRATEGY_PROPOSED;
+	case WALK_MISSED:
+		return STRATEGY_FAIL_MISSED;
+	case WALK_BLOCKED:
+		return STRATEGY_FAIL_BLOCKED;
+	case WALK_MODE:
+		return STRATEGY_FAIL_MODE;
+	case WALK_SINGULAR:
+		return STRATEGY_FAIL_SINGULAR;
+	case WALK_DIVERGED:
+		return STRATEGY_FAIL_DIVERGED;
+	case WALK_ITERATIONS:
+		break;
+	}
+	return STRATEGY_FAIL_ITERATIONS;
+}
+
+static double tolerance_of(const struct mutation_ctx *m, const struct path_vertex *v, const struct halfvec_step *s)
+{
+	if (v->delta)
+		return SPECULAR_TOLERANCE;
+	return m->limits.tolerance * fmin(halfvec_lobe_width(v), fmin(s->sigma[0], s->sigma[1]));
+}
+
+/* Steps of the half vectors, and what they aim at. */
+static void aim(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x)
+{
+	struct mutation_scratch *s = &m->scratch;
+	for (unsigned j = how->c + 1; j < how->b; j++) {
+		struct walk_target *t = &s->target[j];
+		s->dh[j] = (vec2){0, 0};
+		t->tolerance = tolerance_of(m, &x->v[j], &s->step[X_TO_Y][j]);
+		t->h = x->v[j].delta ? (vec2){0, 0} : s->k[j].h;
+		if (x->v[j].delta || !how->halfvecs)
+			continue;
+		double r[4], g[2];
+		mutation_random(m, BLOCK_VERTEX + j, r);
+		mutation_normals(r, g);
+		s->dh[j] = halfvec_step_take(&s->step[X_TO_Y][j], g[0], g[1]);
+		t->h = vec2_add(t->h, s->dh[j]);
+	}
+}
+
+static void add_step_densities(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
+			       struct move *move)
+{
+	const struct mutation_scratch *s = &m->scratch;
+	for (unsigned j = how->c + 1; how->halfvecs && j < how->b; j++) {
+		if (x->v[j].delta)
+			continue;
+		move->log_density[X_TO_Y] += halfvec_step_log_pdf(&s->step[X_TO_Y][j], s->dh[j]);
+		move->log_density[Y_TO_X] += halfvec_step_log_pdf(&s->step[Y_TO_X][j], vec2_scale(-1, s->dh[j]));
+	}
+}
+
+/* What of the constraints of one path does not hold when the walk to the other starts from it. */
+static unsigned stale_of(const struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
+			 const struct full_path_path *y)
+{
+	if (EFFECT_IS_ON(m->path->w, dispersion) && x->wavelength != y->wavelength)
+		return WALK_STALE;
+	bool aperture = how->aperture && EFFECT_IS_ON(m->path->w, aperture);
+	bool b_moved = how->b < x->edges || aperture, c_moved = how->c == 0 && how->emitter;
+	return (b_moved ? WALK_STALE_B : 0) | (c_moved ? WALK_STALE_C : 0);
+}
+
+/* The walk from y leads back to x: else the proposal has no way back, and detailed balance wants it refused. */
+static bool leads_back(struct mutation_ctx *m, const struct breakup *how, const struct full_path_path *x,
+		       const struct full_path_path *y)
+{
+	struct mutation_scratch *s = &m->scratch;
+	unsigned b = how->b, c = how->c;
+	struct full_path_path *back = &s->back;
+	full_path_copy(back, y, c, b);
+	back->v[b] = x->v[b];
+	back->v[c] = x->v[c];
+	back->wl = x->wl;
+	double farthest = 0;
+	for (unsigned j = c + 1; j < b; j++) {
+		vec3 d = vec3_sub(y->v[j].x.p, x->v[j].x.p);
+		farthest = fmax(farthest, vec3_dot(d, d));
+		s->target[j].h = x->v[j].delta ? (vec2){0, 0} : s->k[j].h;
+		s->target[j].tolerance = tolerance_of(m, &x->v[j], &s->step[X_TO_Y][j]);
+	}
+	struct walk_limits limits = m->limits;
+	limits.scale *= BACK_SCALE;
+	m->count[STRATEGY_REVERSE_WALKS]++;
+	enum walk_end end =
+		halfvec_walk_from(m->path, back, b, c, s->target, true, &limits, stale_of(m, how, x, y), &s->walk);
+	m->count[STRATEGY_WALKS]++;
+	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
+	if (end != WALK_OK)
+		return false;
+	double near = m->limits.back * m->limits.scale;
+	for (unsigned j = c + 1; j < b; j++) {
+		vec3 d = vec3_sub(back->v[j].x.p, x->v[j].x.p);
+		double rounding = ROUNDING * ROUNDING * (x->edge[j].distance2 + x->edge[j - 1].distance2);
+		if (vec3_dot(d, d) > fmax(near * near * farthest, rounding))
+			return false;
+	}
+	return true;
+}
+
+/* Between x_b and x_c by half vectors. */
+static enum strategy_counter walk(struct mutation_ctx *m, const struct breakup *how, struct full_path_path *x,
+				  struct full_path_path *y, struct move *move)
+{
+	struct mutation_scratch *s = &m->scratch;
+	struct path_context *c = m->path;
+	constraints_of(c->w, x, how->b, how->c, s->k);
+	if (m->limits.solver->factor(s->k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
+		return STRATEGY_FAIL_SINGULAR;
+	move->log_transfer[Y_TO_X] = s->walk.system.log_transfer;
+	halfvec_steps(c, x, s->k, how->b, how->c, s->step[X_TO_Y]);
+	aim(m, how, x);
+	memcpy(&s->walk.k[how->c + 1], &s->k[how->c + 1], (how->b - how->c - 1) * sizeof s->k[0]);
+	enum walk_end end =
+		halfvec_walk_from(c, y, how->b, how->c, s->target, false, &m->limits, stale_of(m, how, x, y), &s->walk);
+	m->count[STRATEGY_WALKS]++;
+	m->count[STRATEGY_ITERATIONS] += s->walk.iterations;
+	if (end != WALK_OK)
+		return reason_of(end);
+	if (m->limits.solver->factor(s->walk.k, how->b, how->c, &s->walk.system) != CONSTRAINT_OK)
+		return STRATEGY_FAIL_SINGULAR;
+	move->log_transfer[X_TO_Y] = s->walk.system.log_transfer;
+	halfvec_steps(c, y, s->walk.k, how->b, how->c, s->step[Y_TO_X]);
+	add_step_densities(m, how, x, move);
+	return leads_back(m, how, x, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_REVERSE;
+}
+
+static enum strategy_counter join(struct mutation_ctx *m, unsigned e, struct full_path_path *y)
+{
+	return full_path_join(y, e) && full_path_visible(m->path, y, e) ? STRATEGY_PROPOSED : STRATEGY_FAIL_BLOCKED;
+}
+
+/* How x_j scatters now that its neighbours have moved. */
+static bool set_mode(struct full_path_path *y, unsigned j)
+{
+	if (j == 0 || j == y->edges)
+		return true;
+	y->v[j].mode = full_path_mode(y, j);
+	return y->v[j].mode != 0;
+}
+
+enum strategy_counter breakup_propose(struct mutation_ctx *m, const struct breakup *how, struct full_path_path *x,
+				      struct full_path_path *y, struct move *move)
+{
+	struct path_context *c = m->path;
+	unsigned k = x->edges, b = how->b, c_end = b > 0 ? how->c : 0;
+	*move = (struct move){.first = c_end, .last = k, .b = b, .c = c_end, .log_density = {how->log_choice, 0}};
+	if (how->wavelength && EFFECT_IS_ON(c->w, colour) && !holds_wavelength(c, x, b, c_end)) {
+		double r[4];
+		mutation_random(m, BLOCK_ENDS, r);
+		full_path_set_wavelength(c, y, move_wavelength(c, x->wavelength, r[0]));
+	}
+	bool aperture = how->aperture && EFFECT_IS_ON(c->w, aperture);
+	enum strategy_counter end = STRATEGY_PROPOSED;
+	if (b == c_end && b > 0)
+		return STRATEGY_PROPOSED;
+	if (b < k)
+		end = trace_chain(m, b, aperture, x, y, move);
+	else if (aperture && !trace_move_aperture(m, x, y))
+		end = STRATEGY_FAIL_OUTSIDE;
+	if (!end && how->emitter && !move_emitter(m, x, y, move))
+		end = STRATEGY_FAIL_OUTSIDE;
+	if (!end && b > 0)
+		end = b - c_end >= 2 ? walk(m, how, x, y, move) : join(m, c_end, y);
+	move->first = c_end;
+	if (end)
+		return end;
+	full_path_forget(y, c_end + 1, k);
+	if (!set_mode(y, b) || !set_mode(y, c_end))
+		return STRATEGY_FAIL_MODE;
+	return b < k || whole_film(c, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_OUTSIDE;
+}
+
+/* Cosines, distances and Jacobians that do not cancel between f and T, by sec. 5: one geometric normal, at x_{b-1}. */
+static double log_geometry(const struct path_context *c, const struct full_path_path *x, unsigned b, unsigned c_end)
+{
+	if (b == 0 || b == c_end)
+		return 0;
+	const struct full_path_edge *e = &x->edge[b - 1];
+	double log_g = log(path_cosine(&x->v[b - 1], e->w) / e->distance2);
+	if (b == x->edges)
+		return log_g + log(camera_jac_film_from_solid(&c->w->camera, vec3_neg(e->w)));
+	return log_g + log(fabs(vec3_dot(x->v[b].x.sh.n, e->w)));
+}
+
+double breakup_log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			  enum mutation_direction direction)
+{
+	const struct path_context *c = m->path;
+	struct product p = PRODUCT_ONE;
+	for (unsigned j = 0; j < into->edges; j++)
+		product_mul(&p, j <= move->c || j == move->b ? full_path_f(c, into, j) : full_path_fh(c, into, j));
+	return product_log_intensity(c, into, &p) + log_geometry(c, into, move->b, move->c) +
+	       move->log_transfer[direction] - move->log_density[direction];
+}

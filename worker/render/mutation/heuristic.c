@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/mutation/heuristic.h"
+
+/* Of the two ends: nothing but half vectors (b = k), nothing but tracing (b = 0). */
+#define END_WEIGHT 0.1
+
+static double roughness(const struct path_vertex *v)
+{
+	return v->delta ? 0 : fmin(v->bsdf->alpha_mean, 1);
+}
+
+/* P(b = i) ~ a_i, 0.1 for both ends. Where all inner vertices are specular, or there is only the emitter beside x_k,
+ * half vectors have nothing to move; an emitter that cannot be hit is not found by tracing. */
+static void weigh_b(const struct path_context *c, const struct full_path_path *x, double *weight)
+{
+	unsigned k = x->edges;
+	bool any = false;
+	weight[0] = path_can_be_hit(c, &x->v[0]) ? END_WEIGHT : 0;
+	for (unsigned i = 1; i < k; i++) {
+		weight[i] = roughness(&x->v[i]);
+		any |= weight[i] > 0;
+	}
+	weight[k] = any ? END_WEIGHT : 0;
+}
+
+/* P(c = i | b) ~ a_i |x_i - x_{i+1}|^2; a of the emitter is 1, the scene's diameter stands for infinity. */
+static void weigh_c(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight)
+{
+	/* Below b = k nothing moves before a vertex with a half vector does: c = k - 1 would be the identity on a
+	 * pinhole. */
+	bool moves = b < x->edges;
+	for (unsigned i = b; i-- > 0;) {
+		double distance2 =
+			x->v[i].kind == VERTEX_INFINITE ? 4 * c->w->radius * c->w->radius : x->edge[i].distance2;
+		weight[i] = moves ? (i == 0 ? 1 : roughness(&x->v[i])) * distance2 : 0;
+		moves |= i > 0 && !x->v[i].delta;
+	}
+}
+
+const struct heuristic heuristic_roughness = {"roughness", weigh_b, weigh_c};
+
+static double sum_of(const double *weight, unsigned n)
+{
+	double sum = 0;
+	for (unsigned i = 0; i < n; i++)
+		sum += weight[i];
+	return sum;
+}
+
+double heuristic_probability(const double *weight, unsigned n, unsigned i)
+{
+	return weight[i] > 0 ? weight[i] / sum_of(weight, n) : 0;
+}
+
+unsigned heuristic_choose(const double *weight, unsigned n, double u)
+{
+	double rest = u * sum_of(weight, n);
+	unsigned chosen = n;
+	for (unsigned i = 0; i < n; i++) {
+		if (!(weight[i] > 0))
+			continue;
+		chosen = i;
+		if (rest < weight[i])
+			return i;
+		rest -= weight[i];
+	}
+	return chosen;
+}

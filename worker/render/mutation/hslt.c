@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Improved half vector space light transport: the breakup by roughness (Hanika, Kaplanyan, Dachsbacher 2015, sec. 5).
+ */
+#include "worker/render/mutation/strategy.h"
+
+static const struct strategy strategy = {&heuristic_roughness, STRATEGY_DRAWN,	   STRATEGY_DRAWN,
+					 .halfvecs = true,     .wavelength = true, .aperture = true};
+
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
+				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+{
+	return strategy_propose(&strategy, m, how, x, y, move);
+}
+
+static double useful(const struct render_summary *scene)
+{
+	return render_effect_on(scene, "half-vectors") ? 0.8 : 0;
+}
+
+const struct mutation_ops mutation_hslt = {
+	.name = "hslt",
+	.summary = "traced to x_b, half vectors to x_c, both drawn by roughness",
+	.useful = useful,
+	.propose = propose,
+	.log_weight = breakup_log_weight,
+};

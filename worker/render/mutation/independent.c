@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Independent proposals: a number of edges, then a bidirectional technique, and a path made by it from fresh random
+ * numbers. The density is summed over all techniques that could have made the path (Veach 1997, sec. 10.2), so that
+ * chains change length and class, and f over that density estimates b.
+ */
+#include "worker/render/math/logsum.h"
+#include "worker/render/mutation/mutation.h"
+
+/* A path of n + 1 edges is proposed that much as often as one of n. */
+#define EDGE_RATIO 0.7
+
+/* Densities of length and technique. */
+static double log_edges(const struct path_context *c, unsigned edges)
+{
+	unsigned n = c->max_depth - c->min_depth + 1, i = edges - c->min_depth;
+	return log((1 - EDGE_RATIO) / (1 - pow(EDGE_RATIO, n))) + i * log(EDGE_RATIO);
+}
+
+static unsigned choose_edges(const struct path_context *c, double u)
+{
+	unsigned n = c->max_depth - c->min_depth + 1;
+	double i = floor(log1p(-u * (1 - pow(EDGE_RATIO, n))) / log(EDGE_RATIO));
+	return c->min_depth + (unsigned)fmin(fmax(i, 0), n - 1);
+}
+
+/* Directly seen emitters are only met by chance (s = 0). */
+static unsigned technique_count(unsigned edges)
+{
+	return edges == 1 ? 1 : edges + 1;
+}
+
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
+				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+{
+	(void)how, (void)x;
+	struct path_context *c = m->path;
+	double r[4], film[2];
+	mutation_random(m, BLOCK_BREAKUP, r);
+	unsigned k = choose_edges(c, r[0]), n = technique_count(k);
+	unsigned s = (unsigned)fmin(floor(r[1] * n), n - 1), t = k + 1 - s;
+	*move = (struct move){.first = 0, .last = k};
+	struct sampler_random sampler;
+	sampler_random_init(&sampler, m->seed, RNG_CHAIN, m->chain, m->step);
+	c->one_way = true;
+	if (path_walk_camera(c, &sampler.base, t, film) < t || (s >= 2 && path_walk_light(c, &sampler.base, s) < s))
+		return STRATEGY_FAIL_MISSED;
+	return full_path_from_subpaths(c, s, k, y) ? STRATEGY_PROPOSED : STRATEGY_FAIL_DARK;
+}
+
+static double log_weight(struct mutation_ctx *m, struct full_path_path *into, const struct move *move,
+			 enum mutation_direction direction)
+{
+	(void)move, (void)direction;
+	unsigned k = into->edges;
+	double log_pdf[FULL_PATH_MAX_VERTICES];
+	full_path_log_techniques(m->path, into, log_pdf);
+	double log_t = log_edges(m->path, k) - log(technique_count(k)) + log_sum_exp(log_pdf, k + 1);
+	return full_path_log_f(m->path, into) - log_t;
+}
+
+static double useful(const struct render_summary *scene)
+{
+	(void)scene;
+	return 0; /* `bidirectional` estimates b with less variance */
+}
+
+const struct mutation_ops mutation_independent = {
+	.name = "independent",
+	.summary = "a fresh path by a bidirectional technique",
+	.independent = true,
+	.useful = useful,
+	.propose = propose,
+	.log_weight = log_weight,
+};

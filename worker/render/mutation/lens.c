@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The point on the aperture moves; half vectors up to x_c stay as they are. */
+#include "worker/render/mutation/strategy.h"
+
+/* Any vertex that is not exactly specular will do: even x_{k-1}, which another x_k sees at another film point. */
+static void weigh_c(const struct path_context *c, const struct full_path_path *x, unsigned b, double *weight)
+{
+	(void)c;
+	for (unsigned i = 0; i < b; i++)
+		weight[i] = i > 0 && x->v[i].delta ? 0 : 1;
+}
+
+static const struct heuristic any_end = {"any", NULL, weigh_c};
+static const struct strategy strategy = {&any_end, STRATEGY_CAMERA, STRATEGY_DRAWN, .aperture = true};
+
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
+				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+{
+	if (!EFFECT_IS_ON(m->path->w, aperture))
+		return STRATEGY_FAIL_INAPPLICABLE;
+	return strategy_propose(&strategy, m, how, x, y, move);
+}
+
+static double useful(const struct render_summary *scene)
+{
+	return render_effect_on(scene, "aperture") && render_effect_on(scene, "half-vectors") ? 0.1 : 0;
+}
+
+const struct mutation_ops mutation_lens = {
+	.name = "lens",
+	.summary = "moves the point on the aperture",
+	.useful = useful,
+	.propose = propose,
+	.log_weight = breakup_log_weight,
+};

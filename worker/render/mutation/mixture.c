@@ -1,0 +1,141 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/mutation/mixture.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Added to a list that names no independent proposals, without which chains never change the length of their paths. */
+#define INDEPENDENT_SHARE 0.05
+
+/* "b3c1", "b3" or "c1". */
+static bool parse_forced(const char *text, size_t length, struct mutation_setting *how)
+{
+	char copy[32];
+	if (length == 0 || length >= sizeof copy)
+		return false;
+	memcpy(copy, text, length);
+	copy[length] = 0;
+	for (char *at = copy; *at;) {
+		int *choice = *at == 'b' ? &how->b : *at == 'c' ? &how->c : NULL;
+		if (!choice || *choice >= 0 || at[1] < '0' || at[1] > '9')
+			return false;
+		long v = strtol(at + 1, &at, 10);
+		if (v > FULL_PATH_MAX_EDGES)
+			return false;
+		*choice = (int)v;
+	}
+	return true;
+}
+
+static int name_error(const char *text, size_t length, struct error *e)
+{
+	char known[256] = "";
+	size_t used = 0;
+	for (size_t i = 0; mutation_registry[i] && used < sizeof known; i++)
+		used += (size_t)snprintf(known + used, sizeof known - used, "%s%s", i ? ", " : "",
+					 mutation_registry[i]->name);
+	return error_set(e, EINVAL, "no mutation is called '%.*s'; there are %s", (int)length, text, known);
+}
+
+static int parse_entry(const char *text, size_t length, struct mixture_entry *out, struct error *e)
+{
+	const char *equals = memchr(text, '=', length);
+	size_t left = equals ? (size_t)(equals - text) : length;
+	const char *at = memchr(text, '@', left);
+	size_t name = at ? (size_t)(at - text) : left;
+	*out = (struct mixture_entry){mutation_find(text, name), {-1, -1}, 1};
+	if (!out->ops)
+		return name_error(text, name, e);
+	if (at && !parse_forced(at + 1, left - name - 1, &out->how))
+		return error_set(e, EINVAL, "'%.*s': a forced choice is written like %s@b3c1", (int)left, text,
+				 out->ops->name);
+	if (equals) {
+		char number[32], *end;
+		size_t digits = length - left - 1;
+		snprintf(number, sizeof number, "%.*s", (int)digits, equals + 1);
+		out->weight = strtod(number, &end);
+		if (digits >= sizeof number || end == number || *end || !(out->weight > 0) || !(out->weight <= 1e9))
+			return error_set(e, EINVAL, "'%.*s': a weight is a number above 0", (int)length, text);
+	}
+	return 0;
+}
+
+static void finish(struct mixture *m)
+{
+	m->total = 0;
+	m->independent = m->count;
+	for (unsigned i = m->count; i-- > 0;) {
+		m->total += m->entry[i].weight;
+		if (m->entry[i].ops->independent)
+			m->independent = i;
+	}
+}
+
+int mixture_parse(const char *text, struct mixture *out, struct error *e)
+{
+	*out = (struct mixture){.count = 0};
+	for (const char *at = text;; at++) {
+		size_t n = strcspn(at, ",");
+		if (out->count == BATCH_STRATEGIES)
+			return error_set(e, EINVAL, "'%s': more than %d mutations", text, BATCH_STRATEGIES);
+		int rc = parse_entry(at, n, &out->entry[out->count], e);
+		if (rc)
+			return rc;
+		out->count++;
+		at += n;
+		if (!*at)
+			break;
+	}
+	finish(out);
+	if (out->independent < out->count)
+		return 0;
+	if (out->count == BATCH_STRATEGIES)
+		return error_set(e, EINVAL, "'%s': no room for independent proposals among %d mutations", text,
+				 BATCH_STRATEGIES);
+	out->entry[out->count++] =
+		(struct mixture_entry){mutation_find("bidirectional", 13), {-1, -1}, INDEPENDENT_SHARE * out->total};
+	finish(out);
+	return 0;
+}
+
+void mixture_print(const struct mixture *m, char text[PLAN_MUTATIONS_MAX])
+{
+	size_t used = 0;
+	memset(text, 0, PLAN_MUTATIONS_MAX);
+	for (unsigned i = 0; i < m->count && used < PLAN_MUTATIONS_MAX; i++) {
+		const struct mixture_entry *entry = &m->entry[i];
+		char forced[16] = "";
+		int n = 0;
+		if (entry->how.b >= 0 || entry->how.c >= 0)
+			n = snprintf(forced, sizeof forced, "@");
+		if (entry->how.b >= 0)
+			n += snprintf(forced + n, sizeof forced - (size_t)n, "b%d", entry->how.b);
+		if (entry->how.c >= 0)
+			snprintf(forced + n, sizeof forced - (size_t)n, "c%d", entry->how.c);
+		used += (size_t)snprintf(text + used, PLAN_MUTATIONS_MAX - used, "%s%s%s=%.6g", i ? "," : "",
+					 entry->ops->name, forced, entry->weight);
+	}
+}
+
+void mixture_default(const struct render_summary *scene, struct mixture *out)
+{
+	*out = (struct mixture){.count = 0};
+	for (size_t i = 0; mutation_registry[i]; i++) {
+		double weight = mutation_registry[i]->useful(scene);
+		if (weight > 0 && out->count < BATCH_STRATEGIES)
+			out->entry[out->count++] = (struct mixture_entry){mutation_registry[i], {-1, -1}, weight};
+	}
+	finish(out);
+}
+
+unsigned mixture_choose(const struct mixture *m, double u)
+{
+	double rest = u * m->total;
+	for (unsigned i = 0; i + 1 < m->count; i++) {
+		if (rest < m->entry[i].weight)
+			return i;
+		rest -= m->entry[i].weight;
+	}
+	return m->count - 1;
+}

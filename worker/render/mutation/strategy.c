@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/mutation/strategy.h"
+
+/* Forced and drawn choices of one proposal. */
+struct choice {
+	int b, c;
+};
+
+static unsigned fixed_b(int b, unsigned k)
+{
+	return b == STRATEGY_CAMERA ? k : (unsigned)b;
+}
+
+/* Which b: weights of the heuristic, without what the strategy cannot use. */
+static void weigh_b(const struct strategy *s, const struct choice *forced, const struct mutation_ctx *m,
+		    const struct full_path_path *x, double *weight)
+{
+	s->heuristic->weigh_b(m->path, x, weight);
+	if (forced->c >= 0)
+		for (unsigned i = 0; i <= x->edges && i <= (unsigned)forced->c; i++)
+			weight[i] = 0;
+}
+
+/* log P(b) P(c | b) of x by the heuristic; what is forced has probability 1. -INFINITY: never chosen. */
+static double log_choice(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
+			 const struct full_path_path *x, unsigned b, unsigned c)
+{
+	double *weight = m->scratch.weight, p = 1;
+	if (forced->b == STRATEGY_DRAWN) {
+		weigh_b(s, forced, m, x, weight);
+		p *= heuristic_probability(weight, x->edges + 1, b);
+	}
+	if (forced->c == STRATEGY_DRAWN && b > 0) {
+		s->heuristic->weigh_c(m->path, x, b, weight);
+		p *= heuristic_probability(weight, b, c);
+	}
+	return log(p);
+}
+
+static bool choose(const struct strategy *s, const struct choice *forced, struct mutation_ctx *m,
+		   const struct full_path_path *x, struct breakup *out)
+{
+	double *weight = m->scratch.weight, r[4];
+	unsigned k = x->edges;
+	mutation_random(m, BLOCK_BREAKUP, r);
+	if (forced->b == STRATEGY_DRAWN) {
+		weigh_b(s, forced, m, x, weight);
+		out->b = heuristic_choose(weight, k + 1, r[0]);
+	} else {
+		out->b = fixed_b(forced->b, k);
+	}
+	if (out->b > k)
+		return false;
+	out->c = 0;
+	if (out->b > 0 && forced->c == STRATEGY_DRAWN) {
+		s->heuristic->weigh_c(m->path, x, out->b, weight);
+		out->c = heuristic_choose(weight, out->b, r[1]);
+	} else if (out->b > 0) {
+		out->c = (unsigned)forced->c;
+	}
+	if (!breakup_allows(x, out->b, out->c))
+		return false;
+	if (out->b == 0 && !path_can_be_hit(m->path, &x->v[0]))
+		return false;
+	out->log_choice = log_choice(s, forced, m, x, out->b, out->c);
+	return out->log_choice > -INFINITY;
+}
+
+enum strategy_counter strategy_propose(const struct strategy *s, struct mutation_ctx *m,
+				       const struct mutation_setting *how, struct full_path_path *x,
+				       struct full_path_path *y, struct move *move)
+{
+	struct choice forced = {how->b >= 0 ? how->b : s->b, how->c >= 0 ? how->c : s->c};
+	struct breakup br = {.halfvecs = s->halfvecs, .wavelength = s->wavelength, .aperture = s->aperture};
+	if (!choose(s, &forced, m, x, &br))
+		return STRATEGY_FAIL_INAPPLICABLE;
+	const struct world *w = m->path->w;
+	br.emitter = s->emitter && w->effects.emitter_move && br.b > 0 && br.c == 0 &&
+		     w->emitters[x->v[0].emitter].ops->point_inverse;
+	enum strategy_counter end = breakup_propose(m, &br, x, y, move);
+	if (end)
+		return end;
+	double back = log_choice(s, &forced, m, y, br.b, br.c);
+	move->log_density[Y_TO_X] += back;
+	return back > -INFINITY ? STRATEGY_PROPOSED : STRATEGY_FAIL_MODE;
+}

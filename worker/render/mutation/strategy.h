@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Strategies that are breakups: which b and c they allow, and what moves. */
+#ifndef WORKER_RENDER_MUTATION_STRATEGY_H
+#define WORKER_RENDER_MUTATION_STRATEGY_H
+
+#include "worker/render/mutation/breakup.h"
+
+enum { STRATEGY_DRAWN = -1, STRATEGY_CAMERA = -2 }; /* b or c by the heuristic; b = k */
+
+struct strategy {
+	const struct heuristic *heuristic;
+	int b, c;				      /* a number, or one of the above */
+	bool halfvecs, wavelength, aperture, emitter; /* see struct breakup */
+};
+
+/* A breakup by this strategy; what `how` forces goes first. */
+enum strategy_counter strategy_propose(const struct strategy *s, struct mutation_ctx *m,
+				       const struct mutation_setting *how, struct full_path_path *x,
+				       struct full_path_path *y, struct move *move);
+
+#endif

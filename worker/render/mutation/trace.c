@@ -1,0 +1,138 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/mutation/trace.h"
+
+/* Half vectors take steps of so many lobe widths. */
+#define HALFVEC_STEP 0.01
+/* Steps of x_k, in the numbers that make it. */
+#define APERTURE_STEP 0.1
+/* The line between the two vertices must show that much of itself in both tangent planes to turn frames by. */
+#define LEAST_PROJECTION 1e-3
+
+bool trace_move_aperture(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y)
+{
+	const struct camera *camera = &m->path->w->camera;
+	double u[2], r[4];
+	mutation_random(m, BLOCK_ENDS, r);
+	camera_point_inverse(camera, x->v[x->edges].x.p, u);
+	if (!mutation_step_square(u, r + 1, APERTURE_STEP))
+		return false;
+	y->v[y->edges].x.p = camera_point(camera, u);
+	return true;
+}
+
+static bool move_film(struct mutation_ctx *m, const struct full_path_path *x, struct full_path_path *y,
+		      struct move *move)
+{
+	double r[4], g[2], sigma = halfvec_film_step(&m->path->w->camera);
+	mutation_random(m, BLOCK_FILM, r);
+	mutation_normals(r, g);
+	for (int i = 0; i < 2; i++)
+		y->film[i] = x->film[i] + sigma * g[i];
+	move->log_symmetric -= 0.5 * (g[0] * g[0] + g[1] * g[1]) + log(2 * M_PI * sigma * sigma);
+	return film_window_holds(&m->path->window, y->film);
+}
+
+/* Rotation that takes half vectors of x_j's frame into y_j's, by the line between the two as both frames see it (sec.
+ * 4). It is its own way back: from y to x both angles gain pi. */
+static void turn(const struct path_vertex *from, const struct path_vertex *to, vec2 *h)
+{
+	vec3 d = vec3_sub(to->x.p, from->x.p);
+	vec3 a = frame_to_local(&from->x.sh, d), b = frame_to_local(&to->x.sh, d);
+	double la = hypot(a.x, a.y), lb = hypot(b.x, b.y), least = LEAST_PROJECTION * vec3_length(d);
+	if (!(la > least && lb > least))
+		return;
+	double c = (a.x * b.x + a.y * b.y) / (la * lb), s = (a.x * b.y - a.y * b.x) / (la * lb);
+	*h = (vec2){c * h->x - s * h->y, s * h->x + c * h->y};
+}
+
+/* Where light from o goes by the half vector h; eta = n_o / n_i. false: total reflection. */
+static bool follow(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
+{
+	vec3 n = vec3_scale(1 / sqrt(1 + vec2_dot(h, h)), (vec3){h.x, h.y, 1});
+	double c = vec3_dot(o, n);
+	if (!transmit) {
+		*i = vec3_sub(vec3_scale(2 * c, n), o);
+		return o.z * i->z > 0;
+	}
+	if (c < 0) {
+		n = vec3_neg(n);
+		c = -c;
+	}
+	double k2 = 1 - eta * eta * (1 - c) * (1 + c);
+	if (!(k2 > 0) || eta == 1)
+		return false;
+	*i = vec3_madd(vec3_scale(-eta, o), eta * c - sqrt(k2), n);
+	return o.z * i->z < 0;
+}
+
+/* The direction in which the path goes on from y_j. */
+static bool scatter_on(struct mutation_ctx *m, unsigned j, const struct full_path_path *x, struct full_path_path *y,
+		       struct move *move, vec3 *d)
+{
+	const struct path_vertex *from = &x->v[j];
+	struct path_vertex *v = &y->v[j];
+	vec3 o = frame_to_local(&v->x.sh, y->edge[j].w), i;
+	v->mode = from->mode;
+	v->delta = from->delta;
+	if (from->delta) {
+		double chance;
+		if (!v->bsdf->has_delta || spectrum_is_zero(full_path_specular(y, j, &i, &chance)))
+			return false;
+	} else {
+		if (!v->bsdf->has_smooth || !(v->bsdf->modes & v->mode))
+			return false;
+		double r[4], g[2], sigma = HALFVEC_STEP * 0.5 * (halfvec_lobe_width(from) + halfvec_lobe_width(v));
+		mutation_random(m, BLOCK_VERTEX + j, r);
+		mutation_normals(r, g);
+		vec2 h = halfvec_of(x, j);
+		turn(from, v, &h);
+		h = vec2_add(h, (vec2){sigma * g[0], sigma * g[1]});
+		move->log_symmetric -= 0.5 * (g[0] * g[0] + g[1] * g[1]) + log(2 * M_PI * sigma * sigma);
+		if (!follow(o, h, v->mode & BSDF_TRANSMIT, full_path_eta(y, j), &i))
+			return false;
+	}
+	*d = vec3_normalize(frame_to_world(&v->x.sh, i));
+	return true;
+}
+
+/* y_b as the end of what is traced. */
+static enum strategy_counter arrive(struct path_context *c, unsigned b, struct path_vertex *v)
+{
+	v->delta = false;
+	v->mode = 0;
+	if (b > 0)
+		return v->kind == VERTEX_SURFACE && v->bsdf->has_smooth ? STRATEGY_PROPOSED : STRATEGY_FAIL_MODE;
+	if (v->emitter < 0)
+		return STRATEGY_FAIL_EMITTER;
+	if (v->kind == VERTEX_SURFACE)
+		v->kind = VERTEX_EMITTER;
+	return path_can_be_hit(c, v) ? STRATEGY_PROPOSED : STRATEGY_FAIL_EMITTER;
+}
+
+enum strategy_counter trace_chain(struct mutation_ctx *m, unsigned b, bool aperture, struct full_path_path *x,
+				  struct full_path_path *y, struct move *move)
+{
+	struct path_context *c = m->path;
+	unsigned k = x->edges;
+	if (aperture && !trace_move_aperture(m, x, y))
+		return STRATEGY_FAIL_OUTSIDE;
+	if (!move_film(m, x, y, move))
+		return STRATEGY_FAIL_OUTSIDE;
+	vec3 d = camera_direction(&c->w->camera, y->v[k].x.p, y->film[0], y->film[1]);
+	double t_min, t_max;
+	camera_clip(&c->w->camera, d, &t_min, &t_max);
+	for (unsigned j = k; j > b; j--) {
+		if (j < k && !scatter_on(m, j, x, y, move, &d))
+			return STRATEGY_FAIL_MODE;
+		move->first = j - 1;
+		if (!path_extend(c, &y->v[j], d, j == k ? t_min : 0, j == k ? t_max : INFINITY, &y->v[j - 1]))
+			return STRATEGY_FAIL_MISSED;
+		if (j - 1 > b && y->v[j - 1].kind != VERTEX_SURFACE)
+			return STRATEGY_FAIL_MISSED;
+		if (!full_path_join(y, j - 1))
+			return STRATEGY_FAIL_MISSED;
+		if (j < k && full_path_mode(y, j) != (y->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
+			return STRATEGY_FAIL_MODE;
+	}
+	return arrive(c, b, &y->v[b]);
+}

@@ -1,0 +1,42 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Another wavelength for the same path (sec. 6). Where exactly specular vertices disperse, the path has to move for it:
+ * all half vectors are kept and the walk finds the path that has them at the new wavelength.
+ */
+#include "worker/render/mutation/strategy.h"
+
+static const struct strategy strategy = {&heuristic_roughness, STRATEGY_CAMERA, 0, .wavelength = true};
+
+static bool must_move(const struct full_path_path *x)
+{
+	for (unsigned j = 1; j < x->edges; j++)
+		if (x->v[j].delta && x->v[j].bsdf->dispersive)
+			return true;
+	return false;
+}
+
+static enum strategy_counter propose(struct mutation_ctx *m, const struct mutation_setting *how,
+				     struct full_path_path *x, struct full_path_path *y, struct move *move)
+{
+	if (!EFFECT_IS_ON(m->path->w, colour))
+		return STRATEGY_FAIL_INAPPLICABLE;
+	if (must_move(x)) {
+		const struct mutation_setting all = {(int)x->edges, 0};
+		return strategy_propose(&strategy, m, how->b >= 0 || how->c >= 0 ? how : &all, x, y, move);
+	}
+	const struct breakup stay = {.b = x->edges, .c = x->edges, .wavelength = true};
+	return breakup_propose(m, &stay, x, y, move);
+}
+
+static double useful(const struct render_summary *scene)
+{
+	return render_effect_on(scene, "wavelength") ? 0.05 : 0;
+}
+
+const struct mutation_ops mutation_wavelength = {
+	.name = "wavelength",
+	.summary = "another wavelength; the path moves where it must",
+	.useful = useful,
+	.propose = propose,
+	.log_weight = breakup_log_weight,
+};

@@ -1,0 +1,54 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The class of a path (common/film/path_class.h), the same whichever technique makes it: an inner vertex is smooth
+ * where it scatters by a delta lobe, or by a BSDF whose mean roughness is below PATH_CLASS_ALPHA. Nothing allocates.
+ */
+#ifndef WORKER_RENDER_PATH_CLASSES_H
+#define WORKER_RENDER_PATH_CLASSES_H
+
+#include "worker/render/path/full_path.h"
+
+#include <string.h>
+
+unsigned path_class_whole(const struct full_path_path *x);
+
+/* Classes of all paths that one pair of sub-paths makes, and what these carry. */
+struct classes {
+	/* Kinds of the parts that meet in a connection, the two that it joins included: the camera's first t vertices,
+	 * the light's first s. Joined ends scatter there by what is not delta. emitter: the camera's, where the last of
+	 * the t is an emitter that was hit and does not scatter. */
+	unsigned char camera[PATH_MAX_EDGES + 3], emitter[PATH_MAX_EDGES + 3], light[PATH_MAX_EDGES + 3];
+	spectrum weights; /* X + Y + Z of a contribution */
+	struct path_sample *out;
+};
+
+/* Of c's sub-paths of so many vertices. Empties out's classes. */
+void classes_begin(struct classes *k, const struct path_context *c, unsigned camera, unsigned light,
+		   struct path_sample *out);
+
+/* Of what path_connect makes of s vertices of c->light and t of c->camera. */
+static inline unsigned classes_joined(const struct classes *k, unsigned s, unsigned t)
+{
+	enum path_class_kind camera = (enum path_class_kind)(s > 0 ? k->camera[t] : k->emitter[t]);
+	return path_class(s + t - 1, path_class_kind_join(camera, (enum path_class_kind)k->light[s]));
+}
+
+/* What was added until now did not reach the film. */
+static inline void classes_clear(struct path_sample *out)
+{
+	out->classes = 0;
+	memset(out->of_class, 0, sizeof out->of_class);
+}
+
+/* Technique s contributes l. */
+static inline void classes_add(struct classes *k, unsigned s, unsigned t, spectrum l)
+{
+	unsigned class = classes_joined(k, s, t);
+	double sum = 0;
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		sum += l.v[i] * k->weights.v[i];
+	k->out->classes |= UINT32_C(1) << class;
+	k->out->of_class[class] += sum;
+}
+
+#endif

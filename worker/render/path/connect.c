@@ -1,0 +1,238 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/path/connect.h"
+
+#include "worker/render/path/measure.h"
+
+/* Beyond this a weight is zero in double anyway; infinities would breed NaN. */
+#define RATIO_LIMIT 1e200
+
+double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v)
+{
+	const struct emitter *em = &c->w->emitters[v->emitter];
+	struct emitter_point p = world_emitter_point(&v->x);
+	p.infinite = v->kind == VERTEX_INFINITE;
+	return c->w->emitter_pdf[v->emitter] * em->ops->pdf_point(em, &p);
+}
+
+double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref)
+{
+	const struct emitter *em = &c->w->emitters[v->emitter];
+	struct emitter_point p = world_emitter_point(&v->x);
+	p.infinite = v->kind == VERTEX_INFINITE;
+	return c->w->emitter_pdf[v->emitter] * em->ops->pdf_toward(em, ref, &p);
+}
+
+/* The ends that a technique joins scatter there by connection: their sub-path's delta flag says nothing. */
+static bool is_delta(const struct joined_path *p, unsigned i)
+{
+	if (i + 1 == p->s || i == p->s || i == 0 || i == p->edges)
+		return false;
+	return p->v[i]->delta;
+}
+
+static bool technique_exists(const struct joined_path *p, unsigned j)
+{
+	if (j == 0)
+		return true;
+	return p->edges >= 2 && j <= p->edges && !is_delta(p, j - 1) && !is_delta(p, j);
+}
+
+/* Density of x_i as generated from the light, for i >= s. */
+static double light_pdf(const struct path_context *c, const struct joined_path *p, unsigned i)
+{
+	unsigned s = p->s;
+	if (i == 0)
+		return path_pdf_emitter(c, p->v[0]);
+	if (i >= s + 2)
+		return p->v[i]->pdf_rev;
+	const struct path_vertex *prev = i >= 2 ? p->v[i - 2] : NULL;
+	return path_pdf(c, prev, p->v[i - 1], p->v[i], TRANSPORT_IMPORTANCE);
+}
+
+/* Density of x_i as generated from the camera, for i < s. */
+static double camera_pdf(const struct path_context *c, const struct joined_path *p, unsigned i)
+{
+	unsigned s = p->s, k = p->edges;
+	if (i + 3 <= s)
+		return p->v[i]->pdf_rev;
+	const struct path_vertex *prev = i + 2 <= k ? p->v[i + 2] : NULL;
+	return path_pdf(c, prev, p->v[i + 1], p->v[i], TRANSPORT_RADIANCE);
+}
+
+void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio)
+{
+	unsigned s = p->s, k = p->edges, last = max_s < k ? max_s : k;
+	for (unsigned j = 0; j <= k; j++)
+		ratio[j] = 0;
+	/* Technique 1 draws x_0 as seen from x_1, the longer ones as light sub-paths do. */
+	double toward = 1, point = 1;
+	if (k >= 2 && (s <= 1 || technique_exists(p, 1))) {
+		toward = path_pdf_toward(c, p->v[0], p->v[1]->x.p);
+		point = s >= 1 ? p->v[0]->pdf : path_pdf_emitter(c, p->v[0]);
+	}
+	double first = s == 1 ? point / toward : 1, r = first;
+	for (unsigned j = s; j < last && r > 0 && r < RATIO_LIMIT; j++) {
+		if (j == 0 && technique_exists(p, 1))
+			ratio[1] = r * toward / p->v[0]->pdf;
+		r *= (j == 0 ? point : light_pdf(c, p, j)) / p->v[j]->pdf;
+		if (j > 0 && technique_exists(p, j + 1))
+			ratio[j + 1] = r;
+	}
+	bool beyond = r >= RATIO_LIMIT;
+	r = first;
+	for (unsigned j = s; j > 0 && r > 0 && r < RATIO_LIMIT; j--) {
+		r *= camera_pdf(c, p, j - 1) / p->v[j - 1]->pdf;
+		if (technique_exists(p, j - 1))
+			ratio[j - 1] = j - 1 == 1 ? r * toward / point : r;
+	}
+	ratio[s] = 1;
+	if (beyond || r >= RATIO_LIMIT)
+		ratio[s == 0 ? k : 0] = RATIO_LIMIT;
+}
+
+double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s)
+{
+	double ratio[PATH_MAX_EDGES + 2], sum = 0;
+	path_technique_ratios(c, p, max_s, ratio);
+	for (unsigned j = 0; j <= p->edges; j++)
+		sum += j >= 2 && c->light_every > 1 ? ratio[j] / c->light_every : ratio[j];
+	return 1 / sum;
+}
+
+static void join(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
+		 struct joined_path *p)
+{
+	p->s = s;
+	p->edges = s + t - 1;
+	for (unsigned i = 0; i < s; i++)
+		p->v[i] = &light[i];
+	for (unsigned i = 0; i < t; i++)
+		p->v[p->edges - i] = &c->camera[i];
+}
+
+static struct ray_end end_of(const struct path_vertex *v)
+{
+	return (struct ray_end){v->x.p, v->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : v->x.ng, v->x.prim};
+}
+
+bool path_visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b)
+{
+	c->counters[COUNT_RAYS_SHADOW]++;
+	struct ray_end from = end_of(a);
+	if (b->kind == VERTEX_INFINITE)
+		return !accel_occluded_to_infinity(c->w->accel, &from, b->x.p);
+	struct ray_end to = end_of(b);
+	return !accel_occluded(c->w->accel, &from, &to);
+}
+
+spectrum path_collapse(spectrum l, bool dispersive)
+{
+	return dispersive ? (spectrum){{SPECTRUM_LANES * l.v[0]}} : l;
+}
+
+static bool disperses(const struct path_context *c, const struct joined_path *p)
+{
+	if (!EFFECT_IS_ON(c->w, dispersion))
+		return false;
+	for (unsigned i = 1; i < p->edges; i++)
+		if (p->v[i]->bsdf->dispersive)
+			return true;
+	return false;
+}
+
+/* The end of every contribution. */
+static spectrum weighted(const struct path_context *c, const struct path_vertex *light, unsigned s, unsigned t,
+			 unsigned max_s, spectrum l)
+{
+	struct joined_path p;
+	join(c, light, s, t, &p);
+	return path_collapse(spectrum_scale(path_balance_weight(c, &p, max_s), l), disperses(c, &p));
+}
+
+static spectrum hit_emitter(struct path_context *c, unsigned t, unsigned max_s)
+{
+	const struct path_vertex *z = &c->camera[t - 1];
+	if (z->emitter < 0)
+		return spectrum_of(0);
+	spectrum l = spectrum_mul(z->beta, path_emitted(c, z, z->to_prev, &c->wl));
+	return spectrum_is_zero(l) ? l : weighted(c, NULL, 0, t, max_s, l);
+}
+
+bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf)
+{
+	const struct world *w = c->w;
+	int32_t chosen = world_pick_emitter(w, z->next_event[2]);
+	if (chosen < 0)
+		return false;
+	const struct emitter *em = &w->emitters[chosen];
+	struct emitter_point p;
+	if (!em->ops->sample_toward(em, z->x.p, z->next_event, &p, pdf) || !(*pdf > 0))
+		return false;
+	*pdf *= w->emitter_pdf[chosen];
+	*y = path_emitter_vertex(w, chosen, &p);
+	y->pdf = w->emitter_pdf[chosen] * em->ops->pdf_point(em, &p);
+	return true;
+}
+
+static spectrum join_emitter(struct path_context *c, unsigned t, unsigned max_s)
+{
+	const struct path_vertex *z = &c->camera[t - 1];
+	struct path_vertex y;
+	double pdf, distance2;
+	if (!z->bsdf->has_smooth || !path_next_event(c, z, &y, &pdf))
+		return spectrum_of(0);
+	vec3 to_light = path_direction(z, &y, &distance2);
+	if (!(distance2 > 0))
+		return spectrum_of(0);
+	spectrum f = path_scatter(c, z, z->to_prev, to_light);
+	spectrum l = spectrum_mul(spectrum_mul(z->beta, f), path_emitted(c, &y, vec3_neg(to_light), &c->wl));
+	l = spectrum_scale(path_cosine(z, to_light) * path_cosine(&y, to_light) / distance2 / pdf, l);
+	if (spectrum_is_zero(l) || !path_visible(c, z, &y))
+		return spectrum_of(0);
+	return weighted(c, &y, 1, t, max_s, l);
+}
+
+static spectrum join_camera(struct path_context *c, unsigned s, unsigned max_s, double film[2])
+{
+	const struct path_vertex *y = &c->light[s - 1], *eye = &c->camera[0];
+	double distance2, x[2];
+	vec3 d = path_direction(eye, y, &distance2); /* camera to y */
+	if (!(distance2 > 0) || !camera_project(&c->w->camera, eye->x.p, d, sqrt(distance2), &x[0], &x[1]))
+		return spectrum_of(0);
+	if (!film_window_holds(&c->window, x))
+		return spectrum_of(0);
+	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(d), y->to_prev));
+	l = spectrum_scale(camera_jac_film_from_solid(&c->w->camera, d) * jac_solid_from_area(y->x.ng, d, distance2),
+			   l);
+	if (spectrum_is_zero(l) || !path_visible(c, y, eye))
+		return spectrum_of(0);
+	film[0] = x[0];
+	film[1] = x[1];
+	return weighted(c, c->light, s, 1, max_s, l);
+}
+
+static spectrum join_surfaces(struct path_context *c, unsigned s, unsigned t, unsigned max_s)
+{
+	const struct path_vertex *y = &c->light[s - 1], *z = &c->camera[t - 1];
+	double distance2;
+	vec3 to_light = path_direction(z, y, &distance2);
+	if (!(distance2 > 0))
+		return spectrum_of(0);
+	spectrum l = spectrum_mul(y->beta, path_scatter(c, y, vec3_neg(to_light), y->to_prev));
+	l = spectrum_mul(l, spectrum_mul(z->beta, path_scatter(c, z, z->to_prev, to_light)));
+	l = spectrum_scale(geometry_term(z->x.ng, y->x.ng, to_light, distance2), l);
+	if (spectrum_is_zero(l) || !path_visible(c, z, y))
+		return spectrum_of(0);
+	return weighted(c, c->light, s, t, max_s, l);
+}
+
+spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned max_s, double film[2])
+{
+	if (s == 0)
+		return hit_emitter(c, t, max_s);
+	if (t > 1 && c->camera[t - 1].kind == VERTEX_INFINITE)
+		return spectrum_of(0);
+	if (t == 1)
+		return join_camera(c, s, max_s, film);
+	return s == 1 ? join_emitter(c, t, max_s) : join_surfaces(c, s, t, max_s);
+}

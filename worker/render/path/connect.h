@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Techniques: a path of k edges can be made from s vertices of a light sub-path and t = k + 1 - s of a camera sub-path.
+ * x_0 lies on the emitter, x_k is the pinhole or a point of the aperture, the same for all techniques of one
+ * evaluation. Densities multiply (Veach 1997, sec. 10.2); the balance heuristic compares them for one given path. s =
+ * 0: the camera sub-path found the emitter; s = 1: the emitter's point was drawn as seen from x_1 (next event
+ * estimation); t = 1: the light sub-path is connected to x_k; t = 0 cannot happen.
+ */
+#ifndef WORKER_RENDER_PATH_CONNECT_H
+#define WORKER_RENDER_PATH_CONNECT_H
+
+#include "worker/render/path/path.h"
+
+/* A path put together from sub-paths, light to camera. */
+struct joined_path {
+	unsigned edges, s;
+	const struct path_vertex *v[PATH_MAX_EDGES + 2];
+};
+
+/* Density of technique j for this path over the density of the technique s that made it: 0 where j cannot make it.
+ * Fills ratio[0..edges]; techniques with more than max_s light vertices are left out (0). */
+void path_technique_ratios(const struct path_context *c, const struct joined_path *p, unsigned max_s, double *ratio);
+/* Weight of the balance heuristic over the share of the samples that tries the technique: 1 / sum of the ratios, those
+ * of techniques with two light vertices or more divided by light_every. */
+double path_balance_weight(const struct path_context *c, const struct joined_path *p, unsigned max_s);
+
+/* Density of an emitter's point (and of the choice of the emitter): as light sub-paths draw it, and as drawn towards
+ * ref. */
+double path_pdf_emitter(const struct path_context *c, const struct path_vertex *v);
+double path_pdf_toward(const struct path_context *c, const struct path_vertex *v, vec3 ref);
+/* A fresh point on an emitter, drawn as seen from z with z's own numbers. */
+bool path_next_event(const struct path_context *c, const struct path_vertex *z, struct path_vertex *y, double *pdf);
+/* Nothing lies between a (not at infinity) and b. Counts a ray. */
+bool path_visible(struct path_context *c, const struct path_vertex *a, const struct path_vertex *b);
+
+/* What a whole path brings, whose contribution is l. Where it scatters at a dispersive BSDF, however it does so there,
+ * its directions and densities are those of nm[0], and only that one travels on: four times its share, unbiased because
+ * nm[0] is uniform. A property of the path, so that all techniques that make it agree. */
+spectrum path_collapse(spectrum l, bool dispersive);
+
+/* Contribution f / p of joining the first s vertices of c->light with the first t of c->camera, already weighted among
+ * the techniques up to max_s. s <= 1 needs no light sub-path. film: where it lands when t = 1 (else unchanged). */
+spectrum path_connect(struct path_context *c, unsigned s, unsigned t, unsigned max_s, double film[2]);
+
+#endif

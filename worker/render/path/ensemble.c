@@ -1,0 +1,243 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The paths that a pair of sub-paths makes, as candidates with their contributions (see ensemble.h).
+ *
+ * ensemble_draw draws the two sub-paths and connects them by every technique (s, t), s vertices from the light and t
+ * from the camera; a candidate's intensity is that of the contribution weighted by multiple importance sampling (Veach
+ * 1997). Where lengths are limited by chance it is divided by survival(s) survival(t), survival(n) = min(1, (5/n)^2).
+ * ensemble_choose takes candidate i with probability intensity_i / total. ensemble_around draws a technique of the
+ * given path x with probability p_s(x) / sum_j p_j(x), splits x there and continues both parts at random; x itself
+ * contributes f(x) / sum_j p_j(x). Nothing is reported as an error: paths without a contribution are left out, and
+ * ensemble_choose returns false where no candidate is left.
+ */
+#include "worker/render/path/ensemble.h"
+
+#include "worker/render/math/logsum.h"
+
+/* A sub-path has these vertices for sure, and n > 5 or more with probability (5/n)^2: 10 on average where nothing ends
+ * it. A fixed probability of going on would make the weights of long paths grow as fast as light dies away, or faster
+ * between mirrors and in fibres, where it hardly does: rare samples would hold most of the light. */
+enum { SURE_VERTICES = 5 };
+
+/* Of at least `least` vertices how many, up to `most`: n or more with probability survival(n) / survival(least). */
+static unsigned longer(double u, unsigned least, unsigned most)
+{
+	unsigned from = least > SURE_VERTICES ? least : SURE_VERTICES;
+	if (most <= from)
+		return from;
+	return (unsigned)fmin(floor(from / sqrt(1 - u)), most);
+}
+
+struct ensemble_lengths ensemble_lengths_of(const struct path_context *c, const double u[2], unsigned camera,
+					    unsigned light)
+{
+	return (struct ensemble_lengths){longer(u[0], camera, c->max_depth + 1), longer(u[1], light, c->max_depth),
+					 true};
+}
+
+struct ensemble_lengths ensemble_all_lengths(const struct path_context *c)
+{
+	return (struct ensemble_lengths){c->max_depth + 1, c->max_depth, false};
+}
+
+/* Probability that a sub-path may have n vertices. */
+static double survival(unsigned n)
+{
+	return n > SURE_VERTICES ? (double)(SURE_VERTICES * SURE_VERTICES) / ((double)n * n) : 1;
+}
+
+/* What technique s contributes to paths of that many edges. */
+static double contribution(struct path_context *c, unsigned s, unsigned edges)
+{
+	double film[2];
+	struct path_sample one; /* its many splats are not read: nothing sets them */
+	one.count = 0;
+	one.intensity = 0;
+	spectrum l = path_connect(c, s, edges + 1 - s, PATH_MAX_EDGES, film);
+	if (!spectrum_is_zero(l))
+		path_splat(c, &one, 0, 0, l);
+	return one.intensity;
+}
+
+/* known: a candidate whose contribution is known already, NULL: none. */
+static void gather(struct path_context *c, unsigned camera, unsigned light, bool capped, const struct candidate *known,
+		   struct ensemble *out)
+{
+	out->total = 0;
+	out->count = 0;
+	unsigned most_light = light > 1 ? light : 1, most = camera + most_light - 1;
+	for (unsigned edges = c->min_depth; edges <= c->max_depth && edges <= most; edges++)
+		for (unsigned s = edges + 1 > camera ? edges + 1 - camera : 0; s <= edges && s <= most_light; s++) {
+			unsigned t = edges + 1 - s;
+			if (t == 1 && s < 2)
+				continue;
+			bool is_known = known && known->s == s && known->edges == edges;
+			double i = is_known ? known->intensity : contribution(c, s, edges);
+			if (capped)
+				i /= survival(t) * survival(s);
+			if (!(i > 0))
+				continue;
+			out->of[out->count++] = (struct candidate){i, s, edges};
+			out->total += i;
+		}
+}
+
+void ensemble_draw(struct path_context *c, struct sampler *s, const struct ensemble_lengths *n, struct ensemble *out)
+{
+	double film[2];
+	c->one_way = false;
+	unsigned camera = path_walk_camera(c, s, n->camera, film), light = path_walk_light(c, s, n->light);
+	gather(c, camera, light, n->capped, NULL, out);
+}
+
+bool ensemble_choose(struct path_context *c, const struct ensemble *e, double u, struct full_path_path *x)
+{
+	if (e->count == 0)
+		return false;
+	double rest = u * e->total;
+	unsigned i = 0;
+	while (i + 1 < e->count && rest >= e->of[i].intensity)
+		rest -= e->of[i++].intensity;
+	return full_path_from_subpaths(c, e->of[i].s, e->of[i].edges, x);
+}
+
+/* Contribution over density of going on from beta across edge e to a vertex of density pdf, by scattering f at `at`. */
+static spectrum carry(const struct full_path_path *x, spectrum beta, spectrum f, unsigned at, unsigned e, double pdf)
+{
+	const struct path_vertex *v = &x->v[at];
+	const struct full_path_edge *g = &x->edge[e];
+	double geometry = path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2;
+	if (at > 0 && !v->delta)
+		geometry *= fabs(vec3_dot(v->x.sh.n, x->edge[at - 1].w) / vec3_dot(v->x.ng, x->edge[at - 1].w));
+	return spectrum_scale(geometry / pdf, spectrum_mul(beta, f));
+}
+
+static void keep_numbers(struct sampler *s, enum sampler_side side, unsigned vertex, struct path_vertex *v)
+{
+	const double *u = s->block(s, side, vertex);
+	for (int i = 0; i < 3; i++)
+		v->next_event[i] = u[DIM_NEXT_EVENT + i];
+}
+
+/* x_k .. x_{k-t+1} as the camera's sub-path; t >= 2. */
+static void put_camera(struct path_context *c, struct sampler *s, struct full_path_path *x, unsigned t)
+{
+	unsigned k = x->edges;
+	struct path_vertex *v = c->camera;
+	for (unsigned i = 0; i < t; i++) {
+		v[i] = x->v[k - i];
+		keep_numbers(s, SIDE_CAMERA, i, &v[i]);
+		if (v[i].kind == VERTEX_EMITTER)
+			v[i].kind = VERTEX_SURFACE;
+	}
+	v[0].beta = spectrum_of(1);
+	v[1].beta = spectrum_of(c->window.width * c->window.height);
+	for (unsigned i = 2; i < t; i++)
+		v[i].beta = carry(x, v[i - 1].beta, full_path_f(c, x, k - i + 1), k - i + 1, k - i, v[i].pdf);
+	v[t - 1].delta = false;
+}
+
+/* x_0 .. x_{s-1} as the light's sub-path; s >= 2. */
+static void put_light(struct path_context *c, struct sampler *s_numbers, struct full_path_path *x, unsigned s)
+{
+	struct path_vertex *v = c->light;
+	for (unsigned i = 0; i < s; i++) {
+		v[i] = x->v[i];
+		v[i].pdf = x->v[i].pdf_rev;
+		v[i].pdf_rev = x->v[i].pdf;
+		if (i > 0)
+			v[i].to_prev = vec3_neg(x->edge[i - 1].w);
+		keep_numbers(s_numbers, SIDE_LIGHT, i, &v[i]);
+	}
+	v[0].beta = spectrum_of(1 / v[0].pdf);
+	for (unsigned i = 1; i < s; i++)
+		v[i].beta = carry(x, v[i - 1].beta, full_path_f(c, x, i - 1), i - 1, i - 1, v[i].pdf);
+	v[s - 1].delta = false;
+}
+
+/* Block 0 of the camera with x's wavelength and point of the aperture. */
+struct pinned_sampler {
+	struct sampler base;
+	struct sampler *under;
+	double block[SAMPLER_BLOCK], wavelength, aperture[2];
+};
+
+static const double *pinned_block(struct sampler *base, enum sampler_side side, unsigned vertex)
+{
+	struct pinned_sampler *p = (struct pinned_sampler *)(void *)base;
+	const double *u = p->under->block(p->under, side, vertex);
+	if (side != SIDE_CAMERA || vertex != 0)
+		return u;
+	for (int i = 0; i < SAMPLER_BLOCK; i++)
+		p->block[i] = u[i];
+	p->block[DIM_WAVELENGTH] = p->wavelength;
+	p->block[DIM_APERTURE_U] = p->aperture[0];
+	p->block[DIM_APERTURE_V] = p->aperture[1];
+	return p->block;
+}
+
+static unsigned walk_camera(struct path_context *c, struct sampler *s, const struct full_path_path *x, unsigned most)
+{
+	struct pinned_sampler pinned = {.base = {pinned_block}, .under = s, .wavelength = x->wavelength};
+	double film[2];
+	camera_point_inverse(&c->w->camera, x->v[x->edges].x.p, pinned.aperture);
+	return path_walk_camera(c, &pinned.base, most, film);
+}
+
+/* x_0 was drawn as an emitter's point; a sub-path that met it stands on the surface. */
+static bool stands_on_surface(const struct path_context *c, struct path_vertex *v)
+{
+	if (v->kind == VERTEX_INFINITE)
+		return false;
+	if (!v->bsdf) {
+		if (!surface_near(&c->w->shapes[v->x.prim.shape], v->x.prim, v->x.p, &v->x))
+			return false;
+		v->bsdf = &c->w->bsdfs[c->w->parts[v->x.prim.shape].bsdf];
+	}
+	return true;
+}
+
+static unsigned choose_technique(const double *log_pdf, unsigned k, double log_sum, double u)
+{
+	unsigned s = k;
+	for (unsigned j = 0; j <= k; j++) {
+		double p = exp(log_pdf[j] - log_sum);
+		if (!(p > 0))
+			continue;
+		s = j;
+		if (u < p)
+			break;
+		u -= p;
+	}
+	return s;
+}
+
+void ensemble_around(struct path_context *c, struct sampler *sampler, struct full_path_path *x, const double u[3],
+		     struct ensemble *out)
+{
+	unsigned k = x->edges;
+	double log_pdf[FULL_PATH_MAX_VERTICES];
+	full_path_log_techniques(c, x, log_pdf);
+	double log_sum = log_sum_exp(log_pdf, k + 1);
+	unsigned s = choose_technique(log_pdf, k, log_sum, u[0]), t = k + 1 - s;
+	const struct candidate known = {exp(full_path_log_f(c, x) - log_sum), s, k};
+	struct ensemble_lengths n = ensemble_lengths_of(c, u + 1, t, s);
+	c->one_way = false;
+	c->wl = x->wl;
+	unsigned camera = t, light = s;
+	if (t >= 2) {
+		put_camera(c, sampler, x, t);
+		if (s > 0 || stands_on_surface(c, &c->camera[t - 1]))
+			camera = path_walk_on(c, sampler, SIDE_CAMERA, t, n.camera);
+	} else {
+		camera = walk_camera(c, sampler, x, n.camera);
+		c->wl = x->wl;
+	}
+	if (s >= 2) {
+		put_light(c, sampler, x, s);
+		light = path_walk_on(c, sampler, SIDE_LIGHT, s, n.light);
+	} else {
+		light = path_walk_light(c, sampler, n.light);
+	}
+	gather(c, camera, light, true, &known, out);
+}

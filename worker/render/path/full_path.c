@@ -1,0 +1,301 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/path/full_path.h"
+
+#include "worker/render/path/connect.h"
+#include "worker/render/path/measure.h"
+
+#include <assert.h>
+#include <string.h>
+
+/* Products are brought back to a largest factor near 1 when they leave this range. */
+#define PRODUCT_HIGH 0x1p256
+#define PRODUCT_LOW 0x1p-256
+
+/* Lobes go down to where doubles end: both factors have to be near 1 for their product to be one. */
+static int bring_near_one(spectrum *s)
+{
+	double m = spectrum_max(*s);
+	if ((m < PRODUCT_HIGH && m > PRODUCT_LOW) || !(m > 0) || !isfinite(m))
+		return 0;
+	int e;
+	frexp(m, &e);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		s->v[i] = ldexp(s->v[i], -e);
+	return e;
+}
+
+void product_mul(struct product *p, spectrum f)
+{
+	p->exponent += bring_near_one(&f);
+	p->v = spectrum_mul(p->v, f);
+	p->exponent += bring_near_one(&p->v);
+}
+
+static void to_xyz(const struct path_context *c, const struct full_path_path *x, spectrum l, double xyz[3])
+{
+	l = path_collapse(l, full_path_is_dispersed(c, x));
+	if (!EFFECT_IS_ON(c->w, colour))
+		for (int i = 0; i < 3; i++)
+			xyz[i] = l.v[0] * c->w->grey_xyz[i];
+	else
+		spectrum_to_xyz(l, &x->wl, xyz);
+}
+
+double product_log_intensity(const struct path_context *c, const struct full_path_path *x, const struct product *p)
+{
+	double xyz[3];
+	to_xyz(c, x, p->v, xyz);
+	return log(xyz[0] + xyz[1] + xyz[2]) + M_LN2 * p->exponent;
+}
+
+bool full_path_join(struct full_path_path *x, unsigned e)
+{
+	struct path_vertex *light = &x->v[e];
+	x->edge[e].w = path_direction(light, &x->v[e + 1], &x->edge[e].distance2);
+	light->to_prev = x->edge[e].w;
+	return x->edge[e].distance2 > 0;
+}
+
+unsigned full_path_mode(const struct full_path_path *x, unsigned j)
+{
+	const struct surface_point *s = &x->v[j].x;
+	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w);
+	double no = vec3_dot(s->sh.n, o), ni = vec3_dot(s->sh.n, i);
+	if (!(no * vec3_dot(s->ng, o) > 0 && ni * vec3_dot(s->ng, i) > 0))
+		return 0;
+	return no * ni > 0 ? BSDF_REFLECT : BSDF_TRANSMIT;
+}
+
+double full_path_eta(const struct full_path_path *x, unsigned j)
+{
+	const struct path_vertex *v = &x->v[j];
+	if (!(v->mode & BSDF_TRANSMIT))
+		return 1;
+	double eta = bsdf_eta(v->bsdf, &x->wl);
+	return vec3_dot(v->x.sh.n, x->edge[j].w) > 0 ? 1 / eta : eta;
+}
+
+spectrum full_path_specular(const struct full_path_path *x, unsigned j, vec3 *wi, double *chance)
+{
+	const struct path_vertex *v = &x->v[j];
+	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
+	return bsdf_eval_delta(v->bsdf, &p, frame_to_local(&v->x.sh, x->edge[j].w), v->mode, wi, chance);
+}
+
+static spectrum scatter(const struct full_path_path *x, unsigned j, bool halfvec)
+{
+	const struct path_vertex *v = &x->v[j];
+	if (!full_path_mode(x, j))
+		return spectrum_of(0);
+	vec3 wi;
+	if (v->delta) {
+		double chance;
+		return full_path_specular(x, j, &wi, &chance);
+	}
+	struct bsdf_point p = {v->x.u, v->x.v, &x->wl, TRANSPORT_RADIANCE};
+	vec3 wo = frame_to_local(&v->x.sh, x->edge[j].w);
+	wi = frame_to_local(&v->x.sh, vec3_neg(x->edge[j - 1].w));
+	return halfvec ? bsdf_eval_halfvec(v->bsdf, &p, wo, wi) : v->bsdf->ops->eval(v->bsdf, &p, wo, wi);
+}
+
+spectrum full_path_f(const struct path_context *c, struct full_path_path *x, unsigned j)
+{
+	if (!vertex_set_has(&x->known_f, j)) {
+		x->f[j] = j > 0 ? scatter(x, j, false) : path_emitted(c, &x->v[0], x->edge[0].w, &x->wl);
+		vertex_set_add(&x->known_f, j);
+	}
+	return x->f[j];
+}
+
+spectrum full_path_fh(const struct path_context *c, struct full_path_path *x, unsigned j)
+{
+	(void)c;
+	if (!vertex_set_has(&x->known_fh, j)) {
+		x->fh[j] = scatter(x, j, true);
+		vertex_set_add(&x->known_fh, j);
+	}
+	return x->fh[j];
+}
+
+double full_path_specular_miss(const struct full_path_path *x, unsigned j)
+{
+	vec3 wi;
+	double chance;
+	if (spectrum_is_zero(full_path_specular(x, j, &wi, &chance)))
+		return INFINITY;
+	return vec3_length(vec3_sub(wi, frame_to_local(&x->v[j].x.sh, vec3_neg(x->edge[j - 1].w))));
+}
+
+/* Those of first..last that lie in word i of a set. */
+static uint64_t bits(unsigned i, unsigned first, unsigned last)
+{
+	unsigned begin = 64 * i, end = begin + 63;
+	if (last < begin || first > end)
+		return 0;
+	return (~(uint64_t)0 >> (last < end ? end - last : 0)) & (~(uint64_t)0 << (first > begin ? first - begin : 0));
+}
+
+/* first..last of `to` as in `from`. */
+static void take_range(struct vertex_set *to, const struct vertex_set *from, unsigned first, unsigned last)
+{
+	for (unsigned i = first / 64; i <= last / 64; i++) {
+		uint64_t range = bits(i, first, last);
+		to->word[i] = (to->word[i] & ~range) | (from->word[i] & range);
+	}
+}
+
+static const struct vertex_set NONE = {{0}};
+
+void full_path_forget(struct full_path_path *x, unsigned first, unsigned last)
+{
+	unsigned from = first > 0 ? first - 1 : 0, to = last < FULL_PATH_MAX_EDGES ? last + 1 : last;
+	take_range(&x->known_f, &NONE, from, to);
+	take_range(&x->known_fh, &NONE, from, to);
+}
+
+void full_path_set_wavelength(const struct path_context *c, struct full_path_path *x, double u)
+{
+	x->wavelength = u;
+	x->known_f = x->known_fh = NONE;
+	if (EFFECT_IS_ON(c->w, colour))
+		x->wl = wavelengths_sample_few(u, (unsigned)c->w->accuracy.wavelengths);
+	else
+		x->wl.grey = true;
+}
+
+bool full_path_is_dispersed(const struct path_context *c, const struct full_path_path *x)
+{
+	if (!EFFECT_IS_ON(c->w, dispersion))
+		return false;
+	for (unsigned j = 1; j < x->edges; j++)
+		if (x->v[j].bsdf->dispersive)
+			return true;
+	return false;
+}
+
+void full_path_copy(struct full_path_path *to, const struct full_path_path *from, unsigned first, unsigned last)
+{
+	unsigned n = last - first + 1, edge = first > 0 ? first - 1 : 0,
+		 edge_end = last < from->edges ? last + 1 : from->edges;
+	if (to->wavelength != from->wavelength)
+		to->known_f = to->known_fh = NONE;
+	to->edges = from->edges;
+	to->wl = from->wl;
+	to->wavelength = from->wavelength;
+	to->film[0] = from->film[0];
+	to->film[1] = from->film[1];
+	memcpy(&to->v[first], &from->v[first], n * sizeof to->v[0]);
+	if (edge < first)
+		to->v[edge].to_prev = from->v[edge].to_prev;
+	memcpy(&to->edge[edge], &from->edge[edge], (edge_end - edge) * sizeof to->edge[0]);
+	/* Neighbours scatter along the edges that came with the vertices. */
+	unsigned last_cached = last < from->edges ? last + 1 : last;
+	n = last_cached - edge + 1;
+	memcpy(&to->f[edge], &from->f[edge], n * sizeof to->f[0]);
+	memcpy(&to->fh[edge], &from->fh[edge], n * sizeof to->fh[0]);
+	take_range(&to->known_f, &from->known_f, edge, last_cached);
+	take_range(&to->known_fh, &from->known_fh, edge, last_cached);
+}
+
+bool full_path_visible(struct path_context *c, const struct full_path_path *x, unsigned e)
+{
+	return path_visible(c, &x->v[e + 1], &x->v[e]);
+}
+
+bool whole_film(const struct path_context *c, struct full_path_path *x)
+{
+	const struct full_path_edge *e = &x->edge[x->edges - 1];
+	vec3 d = vec3_neg(e->w);
+	double distance = sqrt(e->distance2);
+	if (x->v[x->edges - 1].kind == VERTEX_INFINITE) {
+		/* What lies at infinity is seen between the clipping planes. */
+		double t_min, t_max;
+		camera_clip(&c->w->camera, d, &t_min, &t_max);
+		distance = 0.5 * (t_min + t_max);
+	}
+	if (!camera_project(&c->w->camera, x->v[x->edges].x.p, d, distance, &x->film[0], &x->film[1]))
+		return false;
+	return film_window_holds(&c->window, x->film);
+}
+
+/* Vertex i of the path from vertex `from` of a sub-path; its scattering there still holds when `left` says so. */
+static void take_vertex(struct full_path_path *x, unsigned i, const struct path_vertex *from, bool left)
+{
+	x->v[i] = *from;
+	if (!left) {
+		x->v[i].delta = false;
+		x->v[i].mode = 0;
+	}
+}
+
+/* The emitter's point, drawn or hit, as the path's first vertex. */
+static void take_emitter(struct full_path_path *x, const struct path_vertex *from)
+{
+	take_vertex(x, 0, from, false);
+	if (x->v[0].kind == VERTEX_SURFACE)
+		x->v[0].kind = VERTEX_EMITTER;
+}
+
+bool full_path_finish(const struct path_context *c, struct full_path_path *x)
+{
+	x->known_f = x->known_fh = NONE;
+	for (unsigned e = 0; e < x->edges; e++)
+		if (!full_path_join(x, e))
+			return false;
+	for (unsigned j = 1; j < x->edges; j++) {
+		unsigned mode = full_path_mode(x, j);
+		if (!x->v[j].delta)
+			x->v[j].mode = mode;
+		if (!mode || mode != (x->v[j].mode & (BSDF_REFLECT | BSDF_TRANSMIT)))
+			return false;
+	}
+	if (!whole_film(c, x))
+		return false;
+	for (unsigned j = 0; j < x->edges; j++)
+		if (spectrum_is_zero(full_path_f(c, x, j)))
+			return false;
+	return true;
+}
+
+bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path_path *x)
+{
+	unsigned t = edges + 1 - s;
+	assert(edges <= FULL_PATH_MAX_EDGES && t >= 1);
+	const struct path_vertex *z = &c->camera[t - 1];
+	struct path_vertex drawn;
+	double pdf;
+	x->edges = edges;
+	x->wl = c->wl;
+	x->wavelength = EFFECT_IS_ON(c->w, colour) ? c->wl.u : 0;
+	if (s > 0 && t > 1 && (z->kind != VERTEX_SURFACE || !z->bsdf->has_smooth))
+		return false;
+	if (s == 0) {
+		if (z->emitter < 0)
+			return false;
+		take_emitter(x, z);
+	} else if (s == 1) {
+		if (!path_next_event(c, z, &drawn, &pdf))
+			return false;
+		take_emitter(x, &drawn);
+	} else {
+		if (!c->light[s - 1].bsdf->has_smooth)
+			return false;
+		take_emitter(x, &c->light[0]);
+		for (unsigned i = 1; i < s; i++)
+			take_vertex(x, i, &c->light[i], i + 1 < s);
+	}
+	for (unsigned i = s > 0 ? s : 1; i <= edges; i++)
+		take_vertex(x, i, &c->camera[edges - i], s == 0 || i > s);
+	return full_path_finish(c, x) && (s == 0 || full_path_visible(c, x, s - 1));
+}
+
+void full_path_colour(const struct path_context *c, struct full_path_path *x, double xyz[3])
+{
+	struct product p = PRODUCT_ONE;
+	for (unsigned j = 0; j < x->edges; j++)
+		product_mul(&p, vertex_set_has(&x->known_fh, j) ? x->fh[j] : full_path_f(c, x, j));
+	to_xyz(c, x, p.v, xyz);
+	double sum = xyz[0] + xyz[1] + xyz[2];
+	for (int i = 0; i < 3; i++)
+		xyz[i] /= sum;
+}

@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A whole path from an emitter to the camera: the state of chains in path space.
+ *
+ * v[0] is x_0 on the emitter (or the direction towards it, at infinity), v[edges] is x_k on the camera's aperture. Of
+ * struct path_vertex a whole path uses kind, mode (inner vertices: how they scatter), delta, emitter, bsdf, x, to_prev
+ * (the unit direction towards v[i + 1]: the camera's side) and as caches pdf and pdf_rev (density of the vertex as
+ * generated from the camera's side and from the light's side).
+ *
+ * i_j is the unit direction from v[j] to v[j - 1], o_j the one to v[j + 1]. The contribution is measured as in path.h:
+ * per area, per solid angle at infinity, delta distributions dropped (they are the same for all paths that share the
+ * modes). One thread; nothing allocates.
+ */
+#ifndef WORKER_RENDER_PATH_FULL_PATH_H
+#define WORKER_RENDER_PATH_FULL_PATH_H
+
+#include "worker/render/path/connect.h"
+
+enum {
+	FULL_PATH_MAX_EDGES = PATH_MAX_EDGES,
+	FULL_PATH_MAX_VERTICES = FULL_PATH_MAX_EDGES + 1,
+};
+
+struct vertex_set {
+	uint64_t word[FULL_PATH_MAX_VERTICES / 64 + 1];
+};
+
+static inline bool vertex_set_has(const struct vertex_set *s, unsigned j)
+{
+	return s->word[j / 64] >> (j % 64) & 1;
+}
+
+static inline void vertex_set_add(struct vertex_set *s, unsigned j)
+{
+	s->word[j / 64] |= (uint64_t)1 << (j % 64);
+}
+
+struct full_path_edge {	  /* v[e] - v[e + 1] */
+	vec3 w;		  /* unit, from v[e] to v[e + 1] */
+	double distance2; /* 1 where v[0] lies at infinity */
+};
+
+struct full_path_path {
+	unsigned edges; /* k; 0: no path */
+	struct wavelengths wl;
+	double wavelength; /* the number in [0,1) that wl was made of */
+	double film[2];
+	struct path_vertex v[FULL_PATH_MAX_VERTICES];
+	struct full_path_edge edge[FULL_PATH_MAX_EDGES];
+	/* Caches, by vertex: read them through full_path_f and full_path_fh. */
+	struct vertex_set known_f, known_fh;
+	spectrum f[FULL_PATH_MAX_VERTICES], fh[FULL_PATH_MAX_VERTICES];
+};
+
+/* A product that neither over- nor underflows: v 2^exponent. */
+struct product {
+	spectrum v;
+	int exponent;
+};
+#define PRODUCT_ONE ((struct product){{{1, 1, 1, 1}}, 0})
+void product_mul(struct product *p, spectrum f);
+/* log(X + Y + Z) of what the film gets of it; -INFINITY for black. */
+double product_log_intensity(const struct path_context *c, const struct full_path_path *x, const struct product *p);
+
+/* Edge e from the positions of its ends, and to_prev of v[e]. false: the ends coincide. */
+bool full_path_join(struct full_path_path *x, unsigned e);
+
+/* What kind of scattering the directions o_j, i_j mean: BSDF_REFLECT or BSDF_TRANSMIT by the sides of both normals; 0:
+ * the two normals disagree about a side, nothing scatters. */
+unsigned full_path_mode(const struct full_path_path *x, unsigned j);
+
+/* n_o / n_i at v[j]: index on the camera's side over that on the light's; 1 where it reflects. */
+double full_path_eta(const struct full_path_path *x, unsigned j);
+
+/* v[0]: L_e towards v[1]. Inner vertices: f_radiance(o, i) without cosine, or the weight of the lobe where specular.
+ * Computed when asked for the first time. */
+spectrum full_path_f(const struct path_context *c, struct full_path_path *x, unsigned j);
+/* Inner vertices: f |n.i| |d i / d h_par| (bsdf_eval_halfvec), or the weight of the lobe where specular. */
+spectrum full_path_fh(const struct path_context *c, struct full_path_path *x, unsigned j);
+/* The vertices first..last are about to change: what was known of them and of their neighbours no longer holds. */
+void full_path_forget(struct full_path_path *x, unsigned first, unsigned last);
+/* The exactly specular lobe of v[j]'s mode seen along o_j, as bsdf_eval_delta has it: its weight, its direction in the
+ * shading frame, the probability with which it is chosen. */
+spectrum full_path_specular(const struct full_path_path *x, unsigned j, vec3 *wi, double *chance);
+/* By how far i_j is from where the exactly specular lobe of v[j]'s mode sends o_j; INFINITY: there is no such lobe. */
+double full_path_specular_miss(const struct full_path_path *x, unsigned j);
+void full_path_set_wavelength(const struct path_context *c, struct full_path_path *x, double u);
+/* Some vertex disperses: the path carries its hero wavelength alone. */
+bool full_path_is_dispersed(const struct path_context *c, const struct full_path_path *x);
+
+/* Vertices first..last with their edges and caches, and what belongs to the path as a whole. */
+void full_path_copy(struct full_path_path *to, const struct full_path_path *from, unsigned first, unsigned last);
+
+/* Nothing lies between v[e] and v[e + 1]. Counts a ray. */
+bool full_path_visible(struct path_context *c, const struct full_path_path *x, unsigned e);
+
+/* Where v[edges - 1] lies on the film as seen from v[edges]; false: outside the window that is sampled. */
+bool whole_film(const struct path_context *c, struct full_path_path *x);
+
+/* Everything that follows from the vertices: edges, modes (those of specular vertices are given), film point,
+ * scattering. false: ends coincide, it leaves the window, directions are not of a mode, or it is black. Casts no ray.
+ */
+bool full_path_finish(const struct path_context *c, struct full_path_path *x);
+
+/* The path that technique s makes of the sub-paths in c (s vertices of c->light, the others of c->camera), with
+ * everything cached. Casts the connecting ray. false: there is none, or it is black. */
+bool full_path_from_subpaths(struct path_context *c, unsigned s, unsigned edges, struct full_path_path *x);
+
+/* log f of the path in the measure of path.h, from the products of its geometry terms; -INFINITY: black. */
+double full_path_log_f(const struct path_context *c, struct full_path_path *x);
+
+/* Fills pdf and pdf_rev of all vertices, then log of the density with which technique s makes this path, s = 0..edges;
+ * -INFINITY where it cannot. */
+void full_path_log_techniques(struct path_context *c, struct full_path_path *x, double *log_pdf);
+
+/* CIE XYZ of the path's colour, scaled so that X + Y + Z = 1. */
+void full_path_colour(const struct path_context *c, struct full_path_path *x, double xyz[3]);
+
+/* Recomputes everything that is cached and asks every ray again; the first disagreement in words. For tests and for
+ * states that come from outside. */
+bool path_check(struct path_context *c, const struct full_path_path *x, char *text, size_t size);
+
+#endif

@@ -1,0 +1,102 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/path/full_path.h"
+
+#include <stdio.h>
+
+/* Cached and fresh values may differ by rounding, amplified where a lobe is narrow. */
+#define CHECK_TOLERANCE 1e-6
+
+static bool close_to(double a, double b)
+{
+	return fabs(a - b) <= CHECK_TOLERANCE * fmax(fabs(a), fabs(b));
+}
+
+static bool same_spectrum(spectrum a, spectrum b)
+{
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		if (!close_to(a.v[i], b.v[i]))
+			return false;
+	return true;
+}
+
+static bool same_vector(vec3 a, vec3 b)
+{
+	vec3 d = vec3_sub(a, b);
+	return vec3_dot(d, d) <= CHECK_TOLERANCE * CHECK_TOLERANCE * fmax(vec3_dot(b, b), 1);
+}
+
+static bool check_edges(struct path_context *c, const struct full_path_path *x, char *text, size_t size)
+{
+	for (unsigned e = 0; e < x->edges; e++) {
+		double distance2;
+		vec3 w = path_direction(&x->v[e], &x->v[e + 1], &distance2);
+		if (!(distance2 > 0) || !same_vector(w, x->edge[e].w) || !close_to(distance2, x->edge[e].distance2) ||
+		    !same_vector(w, x->v[e].to_prev)) {
+			snprintf(text, size, "edge %u of %u is not the one between its ends", e, x->edges);
+			return false;
+		}
+		if (!path_visible(c, &x->v[e + 1], &x->v[e])) {
+			snprintf(text, size, "edge %u of %u is occluded", e, x->edges);
+			return false;
+		}
+	}
+	return true;
+}
+
+/* The specular direction is met as exactly as walks do. */
+#define SPECULAR_TOLERANCE 1e-6
+
+static bool check_specular(const struct full_path_path *x, unsigned j, char *text, size_t size)
+{
+	double miss = full_path_specular_miss(x, j);
+	if (miss > SPECULAR_TOLERANCE)
+		snprintf(text, size, "vertex %u of %u misses its specular direction by %g", j, x->edges, miss);
+	return miss <= SPECULAR_TOLERANCE;
+}
+
+static bool check_vertices(const struct path_context *c, const struct full_path_path *x, char *text, size_t size)
+{
+	struct full_path_path fresh = *x;
+	fresh.known_f = fresh.known_fh = (struct vertex_set){{0}};
+	for (unsigned j = 0; j < x->edges; j++) {
+		const struct path_vertex *v = &x->v[j];
+		if (j > 0 && (v->mode & (BSDF_REFLECT | BSDF_TRANSMIT)) != full_path_mode(x, j)) {
+			snprintf(text, size, "vertex %u of %u does not scatter in its mode", j, x->edges);
+			return false;
+		}
+		if (j > 0 && v->delta && !check_specular(x, j, text, size))
+			return false;
+		spectrum f = full_path_f(c, &fresh, j);
+		if (spectrum_is_zero(f) || !spectrum_is_valid(f) ||
+		    (vertex_set_has(&x->known_f, j) && !same_spectrum(f, x->f[j]))) {
+			snprintf(text, size, "f at vertex %u of %u is %g, cached %g", j, x->edges, f.v[0],
+				 x->f[j].v[0]);
+			return false;
+		}
+		if (j > 0 && vertex_set_has(&x->known_fh, j) && !same_spectrum(full_path_fh(c, &fresh, j), x->fh[j])) {
+			snprintf(text, size, "fh at vertex %u of %u is %g, cached %g", j, x->edges, fresh.fh[j].v[0],
+				 x->fh[j].v[0]);
+			return false;
+		}
+	}
+	return true;
+}
+
+/* Seen from the camera: a ray that meets a triangle in float and just misses it in double ends on its edge. */
+#define FILM_TOLERANCE 0x1p-22
+
+bool path_check(struct path_context *c, const struct full_path_path *x, char *text, size_t size)
+{
+	if (x->edges < 1 || x->edges > FULL_PATH_MAX_EDGES) {
+		snprintf(text, size, "%u edges", x->edges);
+		return false;
+	}
+	struct full_path_path film = *x;
+	double off = fmax(1e-6, FILM_TOLERANCE * c->w->camera.scale);
+	if (!whole_film(c, &film) || hypot(film.film[0] - x->film[0], film.film[1] - x->film[1]) > off) {
+		snprintf(text, size, "the film point (%g, %g) is (%g, %g)", x->film[0], x->film[1], film.film[0],
+			 film.film[1]);
+		return false;
+	}
+	return check_edges(c, x, text, size) && check_vertices(c, x, text, size);
+}

@@ -1,0 +1,86 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The contribution of a whole path and the densities of all techniques that could have made it: the explicit products,
+ * in logarithms, that proposals in half vector space never multiply out. */
+#include "worker/render/path/measure.h"
+#include "worker/render/path/full_path.h"
+
+double full_path_log_f(const struct path_context *c, struct full_path_path *x)
+{
+	unsigned k = x->edges;
+	struct product p = PRODUCT_ONE;
+	double log_geometry = 0;
+	product_mul(&p, full_path_f(c, x, 0));
+	for (unsigned j = 1; j < k; j++) {
+		product_mul(&p, full_path_f(c, x, j));
+		const struct path_vertex *v = &x->v[j];
+		/* Measured in the direction towards the light, projected on the geometric normal. */
+		if (!v->delta)
+			log_geometry +=
+				log(fabs(vec3_dot(v->x.sh.n, x->edge[j - 1].w) / vec3_dot(v->x.ng, x->edge[j - 1].w)));
+	}
+	for (unsigned e = 0; e < k; e++) {
+		const struct full_path_edge *g = &x->edge[e];
+		log_geometry += log(path_cosine(&x->v[e], g->w) * path_cosine(&x->v[e + 1], g->w) / g->distance2);
+	}
+	log_geometry += log(camera_jac_film_from_solid(&c->w->camera, vec3_neg(x->edge[k - 1].w)));
+	return product_log_intensity(c, x, &p) + log_geometry;
+}
+
+/* Densities around a specular vertex: of v[j - 1] from the camera's side and v[j + 1] from the light's. */
+static void delta_densities(const struct full_path_path *x, unsigned j, double *to_light, double *to_camera)
+{
+	const struct path_vertex *v = &x->v[j];
+	vec3 o = x->edge[j].w, i = vec3_neg(x->edge[j - 1].w), wi;
+	double chance = 0, light, camera;
+	if (spectrum_is_zero(full_path_specular(x, j, &wi, &chance)))
+		chance = 0;
+	path_delta_per_solid(&v->x, i, o, full_path_eta(x, j), &light, &camera);
+	*to_light = chance * light * path_cosine(&x->v[j - 1], i) / x->edge[j - 1].distance2;
+	*to_camera = chance * camera * path_cosine(&x->v[j + 1], o) / x->edge[j].distance2;
+}
+
+static void fill_densities(struct path_context *c, struct full_path_path *x)
+{
+	unsigned k = x->edges;
+	struct path_vertex *v = x->v;
+	c->wl = x->wl;
+	v[k].pdf = v[k].pdf_rev = 1;
+	v[k - 1].pdf = path_pdf(c, NULL, &v[k], &v[k - 1], TRANSPORT_RADIANCE);
+	v[0].pdf_rev = path_pdf_emitter(c, &v[0]);
+	if (k >= 2)
+		v[1].pdf_rev = path_pdf(c, NULL, &v[0], &v[1], TRANSPORT_IMPORTANCE);
+	for (unsigned j = 1; j < k; j++) {
+		double to_light, to_camera;
+		if (v[j].delta) {
+			delta_densities(x, j, &to_light, &to_camera);
+		} else {
+			to_light = path_pdf(c, &v[j + 1], &v[j], &v[j - 1], TRANSPORT_RADIANCE);
+			to_camera = j + 1 < k ? path_pdf(c, &v[j - 1], &v[j], &v[j + 1], TRANSPORT_IMPORTANCE) : 1;
+		}
+		v[j - 1].pdf = to_light;
+		if (j + 1 < k)
+			v[j + 1].pdf_rev = to_camera;
+	}
+	if (!path_can_be_hit(c, &v[0]))
+		v[0].pdf = 0;
+}
+
+void full_path_log_techniques(struct path_context *c, struct full_path_path *x, double *log_pdf)
+{
+	unsigned k = x->edges;
+	const struct path_vertex *v = x->v;
+	fill_densities(c, x);
+	double camera = 0; /* of v[s .. k] from the camera's side */
+	for (unsigned s = k; s > 0; s--) {
+		log_pdf[s] = camera;
+		camera += log(v[s - 1].pdf);
+	}
+	log_pdf[0] = camera;
+	double light = 0; /* of v[0 .. s - 1] from the light's */
+	for (unsigned s = 1; s <= k; s++) {
+		light += log(v[s - 1].pdf_rev);
+		bool exists = k >= 2 && !(s > 1 && v[s - 1].delta) && !(s < k && v[s].delta);
+		double from_light = s == 1 && exists ? log(path_pdf_toward(c, &v[0], v[1].x.p)) : light;
+		log_pdf[s] = exists ? log_pdf[s] + from_light : -INFINITY;
+	}
+}

@@ -1,0 +1,46 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The path tracer: a camera sub-path, at each vertex next event estimation and the emitter met by chance, weighted
+ * against each other by the balance heuristic (Veach 1997, sec. 9.2.4). The reference for all other integrators.
+ */
+#include "worker/render/path/classes.h"
+#include "worker/render/path/connect.h"
+#include "worker/render/path/integrator.h"
+
+void path_trace(struct path_context *c, struct sampler *s, struct path_sample *out)
+{
+	double film[2];
+	struct classes classes;
+	out->count = 0;
+	out->classes = 0;
+	out->intensity = 0;
+	c->one_way = true;
+	unsigned n = path_walk_camera(c, s, c->max_depth + 1, film);
+	spectrum sum = spectrum_of(0);
+	if (!c->unclassed)
+		classes_begin(&classes, c, n, 0, out);
+	for (unsigned t = 2; t <= n; t++) {
+		for (unsigned j = 0; j <= 1; j++) {
+			unsigned edges = t + j - 1;
+			if (edges < c->min_depth || edges > c->max_depth)
+				continue;
+			spectrum l = path_connect(c, j, t, 1, film);
+			if (!path_accept(c, l))
+				continue;
+			sum = spectrum_add(sum, l);
+			if (!c->unclassed)
+				classes_add(&classes, j, t, l);
+		}
+	}
+	if (!path_splat(c, out, film[0], film[1], sum) && out->classes)
+		classes_clear(out);
+}
+
+const struct integrator integrator_path = {
+	.face = {.name = "path",
+		 .summary = "path tracing with next event estimation and multiple importance sampling",
+		 .kind = PLAN_SAMPLES,
+		 .max_depth = PATH_MAX_EDGES},
+	.stream = RNG_PATH,
+	.evaluate = path_trace,
+};

@@ -1,0 +1,37 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/path/integrator.h"
+
+#include <string.h>
+
+#define INTEGRATOR(name) extern const struct integrator integrator_##name;
+#include "worker/render/path/integrator_list.h"
+#undef INTEGRATOR
+
+const struct integrator *const integrator_registry[] = {
+#define INTEGRATOR(name) &integrator_##name,
+#include "worker/render/path/integrator_list.h"
+#undef INTEGRATOR
+	NULL,
+};
+
+const struct integrator *integrator_find(const char *name)
+{
+	for (size_t i = 0; integrator_registry[i]; i++)
+		if (strcmp(integrator_registry[i]->face.name, name) == 0)
+			return integrator_registry[i];
+	return NULL;
+}
+
+const struct render_integrator *render_integrator_find(const char *name)
+{
+	const struct integrator *i = integrator_find(name);
+	return i ? &i->face : NULL;
+}
+
+const struct render_integrator *render_integrator_at(size_t index)
+{
+	for (size_t i = 0; i <= index; i++)
+		if (!integrator_registry[i])
+			return NULL;
+	return &integrator_registry[index]->face;
+}

@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Integrators as table entries: one file and one line in integrator_list.h each. An integrator turns one point of the
+ * space of random numbers into a contribution f / p over the whole film window (docs/design.md, rules 2); whether
+ * independent points are averaged or a Markov chain walks among them is the caller's.
+ */
+#ifndef WORKER_RENDER_PATH_INTEGRATOR_H
+#define WORKER_RENDER_PATH_INTEGRATOR_H
+
+#include "worker/render/path/integrator_face.h"
+#include "worker/render/path/path.h"
+
+struct integrator {
+	struct render_integrator face; /* name, summary, kind, depth that its state holds */
+	enum rng_stream stream;	       /* of its own samples */
+	void (*evaluate)(struct path_context *c, struct sampler *s, struct path_sample *out);
+	const struct chain_ops *chain; /* worker/render/chain/chain.h; NULL: averages independent points */
+};
+
+extern const struct integrator *const integrator_registry[]; /* ends with NULL */
+const struct integrator *integrator_find(const char *name);  /* NULL: none */
+
+/* The evaluations that others build on. */
+void path_trace(struct path_context *c, struct sampler *s, struct path_sample *out);
+void path_trace_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out);
+void path_trace_rarely_both_ways(struct path_context *c, struct sampler *s, struct path_sample *out);
+
+#endif

@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What is known of an integrator outside of the renderer. Pure; any thread. */
+#ifndef WORKER_RENDER_PATH_INTEGRATOR_FACE_H
+#define WORKER_RENDER_PATH_INTEGRATOR_FACE_H
+
+#include "common/plan/plan.h"
+
+struct render_integrator {
+	const char *name, *summary;
+	enum plan_kind kind;
+	uint32_t max_depth; /* edges its state holds */
+	bool has_mutations; /* its chains draw proposals from a mixture of strategies */
+};
+/* NULL when there is none of that name; index from 0, NULL at the end. */
+const struct render_integrator *render_integrator_find(const char *name);
+const struct render_integrator *render_integrator_at(size_t index);
+
+#endif

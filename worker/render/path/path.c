@@ -1,0 +1,420 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Sub-paths from the camera and from the emitters, the densities with which they are made, and the film's splats.
+ *
+ * path_walk_camera and path_walk_light draw the first vertex and its direction, then scatter_on draws one direction
+ * after another from the BSDFs, with Russian roulette where it is allowed. Each vertex keeps its throughput (beta) and
+ * its densities per area from both sides, pdf and pdf_rev, from which multiple importance sampling takes its weights
+ * (Veach 1997). A vertex at infinity stands for a direction; its density is per solid angle. A sub-path ends early
+ * where a ray finds nothing, a density is zero, or shading and geometric normal disagree about a direction's side. A
+ * contribution that is NaN, infinite or negative is counted and left out.
+ */
+#include "worker/render/path/path.h"
+
+#include "worker/render/path/measure.h"
+
+#include <float.h>
+#include <string.h>
+
+/* Russian roulette begins after this many scattering events, where it is allowed. */
+enum { ROULETTE_FROM = 5 };
+/* Fainter contributions are black: their parts, such as those of path classes, could be denormal and would not add up.
+ */
+#define FAINTEST (DBL_MIN / DBL_EPSILON)
+
+struct film_window film_window_of(const struct plan *p)
+{
+	return (struct film_window){(double)p->crop_x - p->border, (double)p->crop_y - p->border,
+				    (double)p->crop_width + 2.0 * p->border, (double)p->crop_height + 2.0 * p->border};
+}
+
+vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2)
+{
+	*distance2 = 1;
+	if (b->kind == VERTEX_INFINITE)
+		return b->x.p;
+	if (a->kind == VERTEX_INFINITE)
+		return vec3_neg(a->x.p);
+	vec3 d = vec3_sub(b->x.p, a->x.p);
+	*distance2 = vec3_dot(d, d);
+	return *distance2 > 0 ? vec3_scale(1 / sqrt(*distance2), d) : (vec3){0, 0, 0};
+}
+
+double path_cosine(const struct path_vertex *v, vec3 w)
+{
+	vec3 n = v->x.ng;
+	if (v->kind == VERTEX_CAMERA || v->kind == VERTEX_INFINITE || (n.x == 0 && n.y == 0 && n.z == 0))
+		return 1;
+	return fabs(vec3_dot(n, w));
+}
+
+spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl)
+{
+	const struct emitter *em = &c->w->emitters[v->emitter];
+	struct emitter_point p = world_emitter_point(&v->x);
+	p.infinite = v->kind == VERTEX_INFINITE;
+	return em->ops->radiance(em, &p, w, wl);
+}
+
+/* Both normals see w from the same side. */
+static bool same_side(const struct surface_point *x, vec3 w)
+{
+	return vec3_dot(x->ng, w) * vec3_dot(x->sh.n, w) > 0;
+}
+
+static struct bsdf_point bsdf_point_of(const struct path_context *c, const struct path_vertex *v,
+				       enum transport transport)
+{
+	return (struct bsdf_point){v->x.u, v->x.v, &c->wl, transport};
+}
+
+spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light)
+{
+	if (!v->bsdf->has_smooth || !same_side(&v->x, to_camera) || !same_side(&v->x, to_light))
+		return spectrum_of(0);
+	struct bsdf_point p = bsdf_point_of(c, v, TRANSPORT_RADIANCE);
+	vec3 wo = frame_to_local(&v->x.sh, to_camera), wi = frame_to_local(&v->x.sh, to_light);
+	spectrum f = v->bsdf->ops->eval(v->bsdf, &p, wo, wi);
+	return spectrum_scale(fabs(wi.z) / fabs(vec3_dot(v->x.ng, to_light)), f);
+}
+
+static double surface_pdf(const struct path_context *c, const struct path_vertex *v, vec3 wo, vec3 wi,
+			  enum transport transport)
+{
+	if (!v->bsdf->has_smooth || !same_side(&v->x, wo) || !same_side(&v->x, wi))
+		return 0;
+	struct bsdf_point p = bsdf_point_of(c, v, transport);
+	return v->bsdf->ops->pdf_solid(v->bsdf, &p, frame_to_local(&v->x.sh, wo), frame_to_local(&v->x.sh, wi));
+}
+
+static double disk_pdf(const struct world *w)
+{
+	return 1 / (M_PI * w->radius * w->radius);
+}
+
+struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p)
+{
+	struct path_vertex v = {.kind = p->infinite ? VERTEX_INFINITE : VERTEX_EMITTER, .emitter = emitter};
+	uint32_t shape = w->emitter_shape[emitter];
+	v.x.p = p->p;
+	v.x.ng = v.x.sh.n = p->n;
+	v.x.u = p->u;
+	v.x.v = p->v;
+	v.x.prim = shape == UINT32_MAX ? PRIM_NONE : (struct prim_ref){shape, p->prim};
+	return v;
+}
+
+double path_pdf(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
+		const struct path_vertex *next, enum transport transport)
+{
+	double distance2, solid = 0;
+	vec3 omega = path_direction(at, next, &distance2);
+	if (!(distance2 > 0) || !path_can_be_hit(c, next))
+		return 0;
+	if (at->kind == VERTEX_INFINITE)
+		return disk_pdf(c->w) * jac_disk_from_area(next->x.ng, omega);
+	if (at->kind == VERTEX_CAMERA) {
+		solid = camera_jac_film_from_solid(&c->w->camera, omega) / (c->window.width * c->window.height);
+	} else if (at->kind == VERTEX_EMITTER || !prev) {
+		struct emitter_point p = world_emitter_point(&at->x);
+		const struct emitter *em = &c->w->emitters[at->emitter];
+		solid = em->ops->pdf_direction(em, &p, omega);
+	} else {
+		double unused;
+		solid = surface_pdf(c, at, path_direction(at, prev, &unused), omega, transport);
+	}
+	return next->kind == VERTEX_INFINITE ? solid : solid * jac_solid_from_area(next->x.ng, omega, distance2);
+}
+
+bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d, double t_min, double t_max,
+		 struct path_vertex *to)
+{
+	struct ray_end start = {from->x.p, from->kind == VERTEX_CAMERA ? (vec3){0, 0, 0} : from->x.ng, from->x.prim};
+	struct ray_hit hit;
+	c->counters[COUNT_RAYS_CLOSEST]++;
+	to->to_prev = vec3_neg(d);
+	to->delta = false;
+	to->pdf_rev = 0;
+	if (accel_closest(c->w->accel, &start, d, t_min, t_max, &hit)) {
+		const struct world_shape *part = &c->w->parts[hit.prim.shape];
+		surface_from_hit(&c->w->shapes[hit.prim.shape], from->x.p, d, &hit, &to->x);
+		to->kind = VERTEX_SURFACE;
+		to->bsdf = &c->w->bsdfs[part->bsdf];
+		to->emitter = part->emitter;
+		return true;
+	}
+	to->kind = VERTEX_INFINITE;
+	to->x.p = d;
+	to->x.prim = PRIM_NONE;
+	to->emitter = c->w->environment;
+	to->bsdf = NULL;
+	return to->emitter >= 0;
+}
+
+/* How a sub-path leaves a vertex by its BSDF. */
+struct departure {
+	vec3 wi;
+	spectrum beta;
+	double pdf, pdf_rev; /* solid angle; the probability of the lobe where delta */
+	double eta;	     /* index on wi's side over the one on the side the path came from */
+	unsigned mode;
+	bool delta;
+};
+
+static bool depart(const struct path_context *c, const struct path_vertex *v, const double u[3],
+		   enum transport transport, struct departure *out)
+{
+	struct bsdf_point p = bsdf_point_of(c, v, transport);
+	struct bsdf_sample s;
+	vec3 wo = frame_to_local(&v->x.sh, v->to_prev);
+	if (!same_side(&v->x, v->to_prev) || !v->bsdf->ops->sample(v->bsdf, &p, wo, u, &s) || !(s.pdf > 0))
+		return false;
+	out->wi = frame_to_world(&v->x.sh, s.wi);
+	if (!same_side(&v->x, out->wi))
+		return false;
+	out->mode = s.mode;
+	out->delta = (s.mode & BSDF_DELTA) != 0;
+	double factor = fabs(s.wi.z);
+	if (transport == TRANSPORT_IMPORTANCE)
+		factor = fabs(wo.z) / fabs(vec3_dot(v->x.ng, v->to_prev)) * fabs(vec3_dot(v->x.ng, out->wi));
+	out->beta = spectrum_scale(factor / s.pdf, spectrum_mul(v->beta, s.f));
+	out->pdf = s.pdf;
+	out->eta = s.eta;
+	out->pdf_rev = 0;
+	if (c->one_way)
+		return true;
+	struct bsdf_point back =
+		bsdf_point_of(c, v, transport == TRANSPORT_RADIANCE ? TRANSPORT_IMPORTANCE : TRANSPORT_RADIANCE);
+	out->pdf_rev = out->delta ? s.pdf : v->bsdf->ops->pdf_solid(v->bsdf, &back, s.wi, wo);
+	return true;
+}
+
+/* Density per area of `to`, reached from `at`; solid as chosen there. For a delta lobe `solid` is a probability, and
+ * per_solid what makes it a density: see path_delta_per_solid. */
+static double reach_pdf(const struct path_context *c, const struct path_vertex *at, const struct path_vertex *to,
+			double solid, double per_solid)
+{
+	double distance2;
+	vec3 omega = path_direction(at, to, &distance2);
+	if (!(distance2 > 0) || !path_can_be_hit(c, to))
+		return 0;
+	double lobe = solid * per_solid;
+	return to->kind == VERTEX_INFINITE ? lobe : lobe * jac_solid_from_area(to->x.ng, omega, distance2);
+}
+
+void path_delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera, double eta_camera, double *to_light,
+			  double *to_camera)
+{
+	*to_light = fabs(vec3_dot(x->ng, light));
+	*to_camera = *to_light * eta_camera * eta_camera * fabs(vec3_dot(x->sh.n, camera) / vec3_dot(x->sh.n, light));
+}
+
+static bool survives(const struct path_context *c, unsigned scatterings, double start, double u, spectrum *beta)
+{
+	if (!c->roulette || scatterings < ROULETTE_FROM)
+		return true;
+	double q = fmin(spectrum_max(*beta) / start, 0.95);
+	if (!(u < q))
+		return false;
+	*beta = spectrum_scale(1 / q, *beta);
+	return true;
+}
+
+/* Extends v[0..n) up to `max` vertices by scattering; v[n-1] is a surface. start: beta to which roulette compares. */
+static unsigned scatter_on(struct path_context *c, struct sampler *s, enum sampler_side side, struct path_vertex *v,
+			   unsigned n, unsigned max, double start)
+{
+	enum transport transport = side == SIDE_CAMERA ? TRANSPORT_RADIANCE : TRANSPORT_IMPORTANCE;
+	for (;;) {
+		struct path_vertex *at = &v[n - 1], *to = &v[n];
+		const double *u = s->block(s, side, n - 1);
+		struct departure out;
+		for (int i = 0; i < 3; i++)
+			at->next_event[i] = u[DIM_NEXT_EVENT + i];
+		if (n >= max || !depart(c, at, u + DIM_BSDF, transport, &out))
+			return n;
+		if (!survives(c, n - 1, start, u[DIM_ROULETTE], &out.beta) || spectrum_is_zero(out.beta))
+			return n;
+		if (!path_extend(c, at, out.wi, 0, INFINITY, to) || (to->kind == VERTEX_INFINITE && side == SIDE_LIGHT))
+			return n;
+		double ahead = 1, back = 1;
+		if (out.delta && side == SIDE_CAMERA)
+			path_delta_per_solid(&at->x, out.wi, at->to_prev, 1 / out.eta, &ahead, &back);
+		else if (out.delta)
+			path_delta_per_solid(&at->x, at->to_prev, out.wi, out.eta, &back, &ahead);
+		at->delta = out.delta;
+		at->mode = out.mode;
+		to->beta = out.beta;
+		to->pdf = reach_pdf(c, at, to, out.pdf, ahead);
+		if (!c->one_way)
+			v[n - 2].pdf_rev = reach_pdf(c, at, &v[n - 2], out.pdf_rev, back);
+		if (!(to->pdf > 0))
+			return n;
+		n++;
+		if (to->kind == VERTEX_INFINITE)
+			return n;
+	}
+}
+
+unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned max_vertices, double film[2])
+{
+	const struct world *w = c->w;
+	struct path_vertex *v = c->camera;
+	const double *u = s->block(s, SIDE_CAMERA, 0);
+	film[0] = c->window.x + u[DIM_FILM_X] * c->window.width;
+	film[1] = c->window.y + u[DIM_FILM_Y] * c->window.height;
+	if (EFFECT_IS_ON(w, colour))
+		c->wl = wavelengths_sample_few(u[DIM_WAVELENGTH], (unsigned)w->accuracy.wavelengths);
+	else
+		c->wl.grey = true;
+	v[0] = (struct path_vertex){.kind = VERTEX_CAMERA, .emitter = -1, .pdf = 1, .beta = spectrum_of(1)};
+	v[0].x.p = camera_point(&w->camera, u + DIM_APERTURE_U);
+	v[0].x.prim = PRIM_NONE;
+	if (max_vertices < 2)
+		return 1;
+	vec3 d = camera_direction(&w->camera, v[0].x.p, film[0], film[1]);
+	double t_min, t_max, area = c->window.width * c->window.height;
+	camera_clip(&w->camera, d, &t_min, &t_max);
+	if (!path_extend(c, &v[0], d, t_min, t_max, &v[1]))
+		return 1;
+	v[1].beta = spectrum_of(area);
+	v[1].pdf = path_pdf(c, NULL, &v[0], &v[1], TRANSPORT_RADIANCE);
+	if (v[1].kind == VERTEX_INFINITE)
+		return 2;
+	if (!(v[1].pdf > 0))
+		return 1;
+	return scatter_on(c, s, SIDE_CAMERA, v, 2, max_vertices, area);
+}
+
+/* The first step of light from infinity: through a disk as wide as the world, across the direction. */
+static bool leave_infinity(struct path_context *c, struct path_vertex *v, const double u[2])
+{
+	const struct world *w = c->w;
+	vec3 d = vec3_neg(v[0].x.p);
+	struct frame f = frame_around(d);
+	double r = w->radius * sqrt(u[0]), phi = 2 * M_PI * u[1];
+	struct path_vertex start = {.kind = VERTEX_CAMERA};
+	start.x.p = frame_to_world(&f, (vec3){r * cos(phi), r * sin(phi), -2 * w->radius});
+	start.x.prim = PRIM_NONE;
+	const struct emitter *em = &w->emitters[v[0].emitter];
+	struct emitter_point p = {.p = v[0].x.p, .infinite = true};
+	spectrum l = em->ops->radiance(em, &p, d, &c->wl);
+	if (!path_extend(c, &start, d, 0, INFINITY, &v[1]) || v[1].kind != VERTEX_SURFACE)
+		return false;
+	v[1].beta = spectrum_scale(1 / disk_pdf(w), spectrum_mul(v[0].beta, l));
+	return true;
+}
+
+static bool leave_surface(struct path_context *c, struct path_vertex *v, const double u[2])
+{
+	const struct emitter *em = &c->w->emitters[v[0].emitter];
+	struct emitter_point p = world_emitter_point(&v[0].x);
+	vec3 d;
+	double solid;
+	if (!em->ops->sample_direction(em, &p, u, &d, &solid) || !(solid > 0))
+		return false;
+	spectrum l = em->ops->radiance(em, &p, d, &c->wl);
+	if (!path_extend(c, &v[0], d, 0, INFINITY, &v[1]) || v[1].kind != VERTEX_SURFACE)
+		return false;
+	v[1].beta = spectrum_scale(path_cosine(&v[0], d) / solid, spectrum_mul(v[0].beta, l));
+	return true;
+}
+
+unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max_vertices)
+{
+	const struct world *w = c->w;
+	struct path_vertex *v = c->light;
+	const double *u = s->block(s, SIDE_LIGHT, 0);
+	int32_t chosen = world_pick_emitter(w, u[DIM_EMITTER_CHOICE]);
+	if (chosen < 0 || max_vertices == 0)
+		return 0;
+	const struct emitter *em = &w->emitters[chosen];
+	struct emitter_point p;
+	double pdf;
+	if (!em->ops->sample_point(em, u + DIM_EMITTER_POINT, &p, &pdf) || !(pdf > 0))
+		return 0;
+	pdf *= w->emitter_pdf[chosen];
+	v[0] = path_emitter_vertex(w, chosen, &p);
+	v[0].pdf = pdf;
+	v[0].beta = spectrum_of(1 / pdf);
+	if (max_vertices < 2)
+		return 1;
+	bool left = p.infinite ? leave_infinity(c, v, u + DIM_EMITTER_DIRECTION)
+			       : leave_surface(c, v, u + DIM_EMITTER_DIRECTION);
+	if (!left || spectrum_is_zero(v[1].beta))
+		return 1;
+	v[1].pdf = path_pdf(c, NULL, &v[0], &v[1], TRANSPORT_IMPORTANCE);
+	if (!(v[1].pdf > 0))
+		return 1;
+	return scatter_on(c, s, SIDE_LIGHT, v, 2, max_vertices, spectrum_max(v[1].beta));
+}
+
+unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_side side, unsigned n,
+		      unsigned max_vertices)
+{
+	struct path_vertex *v = side == SIDE_CAMERA ? c->camera : c->light;
+	return scatter_on(c, s, side, v, n, max_vertices, spectrum_max(v[1].beta));
+}
+
+/* All lanes are +0 or positive and finite, without a comparison that a NaN would trap. */
+static bool is_plain(const spectrum *l, bool *zero)
+{
+	const uint64_t exponent_one = UINT64_C(1) << 52;
+	uint64_t any = 0, sign = 0;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		uint64_t bits;
+		memcpy(&bits, &l->v[i], sizeof bits);
+		any |= bits;
+		sign |= bits | (bits + exponent_one);
+	}
+	*zero = any == 0;
+	return sign >> 63 == 0;
+}
+
+bool path_accept(const struct path_context *c, spectrum l)
+{
+	bool zero;
+	if (is_plain(&l, &zero))
+		return !zero;
+	zero = true;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		if (isnan(l.v[i])) {
+			c->counters[COUNT_NAN]++;
+			return false;
+		}
+		if (isinf(l.v[i])) {
+			c->counters[COUNT_INFINITE]++;
+			return false;
+		}
+		if (l.v[i] < 0) {
+			c->counters[COUNT_NEGATIVE]++;
+			return false;
+		}
+		zero = zero && l.v[i] == 0;
+	}
+	return !zero;
+}
+
+bool path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l)
+{
+	if (!path_accept(c, l) || out->count == PATH_MAX_SPLATS)
+		return false;
+	struct splat *s = &out->splats[out->count];
+	s->x = x;
+	s->y = y;
+	if (!EFFECT_IS_ON(c->w, colour))
+		for (int i = 0; i < 3; i++)
+			s->xyz[i] = l.v[0] * c->w->grey_xyz[i];
+	else
+		spectrum_to_xyz(l, &c->wl, s->xyz);
+	double sum = s->xyz[0] + s->xyz[1] + s->xyz[2];
+	if (out->intensity + sum > (double)FLT_MAX) {
+		c->counters[COUNT_INFINITE]++;
+		return false;
+	}
+	if (sum < FAINTEST)
+		return false;
+	out->intensity += sum;
+	out->count++;
+	return true;
+}

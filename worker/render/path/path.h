@@ -1,0 +1,135 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Paths as vertices with explicit densities (Veach 1997, ch. 8 and 10).
+ *
+ * The integrand over area measure: L_e prod G prod F W_e, all G with geometric normals, and at each inner vertex
+ * F = f_radiance(to camera, to light) |ns . to light| / |ng . to light|: what a path tracer that starts at the camera
+ * realises with shading normals, whichever way the path was sampled.
+ * Directions on different sides of the shading and the geometric normal are refused (as Mitsuba's strictNormals).
+ *
+ * Densities of vertices: per area of the rescaled world; per solid angle for a vertex at infinity; x_0 on a delta
+ * emitter counts: 1 times the choice of the emitter, and 0 as found by a path from the camera; times a delta
+ * distribution in the direction towards the light, projected on the geometric normal, where scattering is exactly
+ * specular (it cancels between all techniques of one path). Roulette is not part of them. The film is sampled with
+ * density 1 / pixels (struct film_window).
+ */
+#ifndef WORKER_RENDER_PATH_PATH_H
+#define WORKER_RENDER_PATH_PATH_H
+
+#include "common/film/batch.h"
+#include "worker/render/path/sampler.h"
+#include "worker/render/world/world.h"
+
+enum { PATH_MAX_EDGES = 128, PATH_MAX_SPLATS = PATH_MAX_EDGES + 2 };
+
+enum vertex_kind { VERTEX_CAMERA, VERTEX_SURFACE, VERTEX_EMITTER, VERTEX_INFINITE };
+
+struct path_vertex {
+	enum vertex_kind kind;
+	bool delta;		 /* its own sub-path left it by an exactly specular lobe */
+	unsigned mode;		 /* of enum bsdf_mode: how its own sub-path left it */
+	int32_t emitter;	 /* shines: index; -1 */
+	const struct bsdf *bsdf; /* VERTEX_SURFACE */
+	struct surface_point
+		x;	/* VERTEX_INFINITE: p is the unit direction towards the emitter. A point light's ng is 0 */
+	vec3 to_prev;	/* unit; towards the vertex before it on its own sub-path */
+	spectrum beta;	/* carried to this vertex over the density of getting here */
+	double pdf;	/* of this vertex from its own sub-path, see above */
+	double pdf_rev; /* of this vertex as generated from the next two of its own sub-path */
+	double next_event[3]; /* random numbers kept for next event estimation */
+};
+
+/* The film points that are sampled: the crop and its border, in pixels. */
+struct film_window {
+	double x, y, width, height;
+};
+
+static inline bool film_window_holds(const struct film_window *w, const double film[2])
+{
+	return film[0] >= w->x && film[0] < w->x + w->width && film[1] >= w->y && film[1] < w->y + w->height;
+}
+
+/* One evaluation's surroundings; one a thread. */
+struct path_context {
+	const struct world *w;
+	struct film_window window;
+	struct wavelengths wl;
+	uint32_t min_depth, max_depth; /* edges */
+	bool roulette;
+	bool unclassed;	      /* nobody asks for path_sample.classes */
+	bool one_way;	      /* nobody asks for pdf_rev: no technique has more than one light vertex */
+	uint32_t light_every; /* one in so many samples has a light sub-path, for which it counts so many times; 0 or 1:
+				 all have */
+	uint64_t *counters;   /* of enum batch_counter */
+	struct path_vertex camera[PATH_MAX_EDGES + 2], light[PATH_MAX_EDGES + 2];
+};
+
+/* What one evaluation brings to the film: f / p over the whole window, as CIE XYZ. */
+struct splat {
+	double x, y, xyz[3];
+};
+struct path_sample {
+	uint32_t count;
+	double intensity; /* I: sum of X + Y + Z */
+	uint32_t classes; /* bit a path class: it carries light, the others of of_class are 0; 0 where nobody asks */
+	double of_class[PATH_CLASSES]; /* its part of the intensity */
+	struct splat splats[PATH_MAX_SPLATS];
+};
+
+struct film_window film_window_of(const struct plan *p);
+
+/* Camera sub-path: vertex 0 is the pinhole or a point of the aperture, whose density is 1 in every technique. Returns
+ * the number of vertices; an escaped path may end in VERTEX_INFINITE. film: the film point that was drawn. */
+unsigned path_walk_camera(struct path_context *c, struct sampler *s, unsigned max_vertices, double film[2]);
+/* Light sub-path: vertex 0 lies on an emitter. 0: no emitter, or it could not be sampled. */
+unsigned path_walk_light(struct path_context *c, struct sampler *s, unsigned max_vertices);
+
+/* Goes on from a sub-path of n >= 2 vertices, the last of them a surface. Returns the number of vertices. */
+unsigned path_walk_on(struct path_context *c, struct sampler *s, enum sampler_side side, unsigned n,
+		      unsigned max_vertices);
+
+/* Density with which `next` is generated from `at` having come from `prev` (unused for camera and emitters). */
+double path_pdf(const struct path_context *c, const struct path_vertex *prev, const struct path_vertex *at,
+		const struct path_vertex *next, enum transport transport);
+
+/* false: x_0 on a delta emitter, which no path from the camera finds. */
+static inline bool path_can_be_hit(const struct path_context *c, const struct path_vertex *v)
+{
+	bool end = v->kind == VERTEX_EMITTER || v->kind == VERTEX_INFINITE;
+	return !end || v->emitter < 0 || !c->w->emitters[v->emitter].delta;
+}
+
+/* Kind, emitter and place of a point drawn on an emitter; the rest is 0. */
+struct path_vertex path_emitter_vertex(const struct world *w, int32_t emitter, const struct emitter_point *p);
+
+/* F of the head comment at a surface vertex for unit directions towards camera and light. */
+spectrum path_scatter(const struct path_context *c, const struct path_vertex *v, vec3 to_camera, vec3 to_light);
+
+/* |ng . w| of the geometry terms; 1 where a vertex has no surface: the camera, what lies at infinity, a point light. */
+double path_cosine(const struct path_vertex *v, vec3 w);
+
+/* Delta distributions are written in the direction towards the light, projected on the geometric normal: 1 in that
+ * measure is the cosine per solid angle. Towards the camera 1 per solid angle there is worth the ratio of the two solid
+ * angles, the squared indices and the cosines about which light is bent, those with the shading normal. eta_camera: the
+ * index on the camera's side over that on the light's. */
+void path_delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera, double eta_camera, double *to_light,
+			  double *to_camera);
+
+/* Radiance that leaves an emitter's point in direction w. */
+spectrum path_emitted(const struct path_context *c, const struct path_vertex *v, vec3 w, const struct wavelengths *wl);
+
+/* The vertex where the ray from `from` along d ends: a surface, the emitter at infinity, or nothing (false). Counts a
+ * ray. */
+bool path_extend(struct path_context *c, const struct path_vertex *from, vec3 d, double t_min, double t_max,
+		 struct path_vertex *to);
+
+/* Unit direction and squared distance from a to b; b may lie at infinity (distance 1). */
+vec3 path_direction(const struct path_vertex *a, const struct path_vertex *b, double *distance2);
+
+/* Adds L (f / p) at a film point; NaN, infinite (beyond a float in sum) and negative ones are counted and left
+ * out, as black ones are: false. */
+bool path_splat(struct path_context *c, struct path_sample *out, double x, double y, spectrum l);
+/* false: L is zero, or was counted as invalid. */
+bool path_accept(const struct path_context *c, spectrum l);
+
+#endif

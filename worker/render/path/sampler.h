@@ -1,0 +1,47 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Where a path's random choices come from. Each vertex of each sub-path owns a block of eight numbers in [0,1), so that
+ * a choice keeps its number when an earlier vertex changes (Kelemen et al. 2002 mutate exactly these numbers). Asking
+ * twice for the same block gives the same numbers. A pointer stays valid until the next call for the same side.
+ */
+#ifndef WORKER_RENDER_PATH_SAMPLER_H
+#define WORKER_RENDER_PATH_SAMPLER_H
+
+#include "worker/render/math/rng.h"
+
+enum sampler_side { SIDE_CAMERA, SIDE_LIGHT, SAMPLER_SIDES };
+enum { SAMPLER_BLOCK = 8 };
+
+/* What the numbers of a block are for. Block 0 of the camera: film x, y, wavelength, point of the aperture, whether
+ * there is a light sub-path (path_context.light_every). Block 0 of the light: point, direction and choice of the
+ * emitter. All others: a vertex. What is used together lies in one half of the block: low-discrepancy samplers
+ * (sobol.h) stratify the four numbers of a half together. */
+enum { DIM_FILM_X = 0, DIM_FILM_Y = 1, DIM_WAVELENGTH = 2, DIM_APERTURE_U = 4, DIM_APERTURE_V = 5, DIM_HAS_LIGHT = 6 };
+enum { DIM_EMITTER_POINT = 0, DIM_EMITTER_DIRECTION = 2, DIM_EMITTER_CHOICE = 4 };
+enum { DIM_BSDF = 0, DIM_ROULETTE = 3, DIM_NEXT_EVENT = 4 };
+
+struct sampler {
+	const double *(*block)(struct sampler *s, enum sampler_side side, unsigned vertex);
+};
+
+struct sampler_random {
+	struct sampler base;
+	uint64_t seed, index, step;
+	enum rng_stream stream;
+	double value[SAMPLER_SIDES][SAMPLER_BLOCK];
+};
+
+void sampler_random_init(struct sampler_random *s, uint64_t seed, enum rng_stream stream, uint64_t index,
+			 uint64_t step);
+
+/* The number of a block's first half among all halves of a sample; the second half's is one more. */
+static inline uint64_t sampler_half(enum sampler_side side, unsigned vertex)
+{
+	return ((uint64_t)vertex * SAMPLER_SIDES + (uint64_t)side) * 2;
+}
+
+/* The eight numbers of one block from the counter-based generator. */
+void sampler_fill(uint64_t seed, enum rng_stream stream, uint64_t index, uint64_t step, enum sampler_side side,
+		  unsigned vertex, double out[SAMPLER_BLOCK]);
+
+#endif

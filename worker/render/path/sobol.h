@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Low-discrepancy samples: Owen-scrambled Sobol' points (Owen 1995; scrambled by hashing as in Burley 2020), a sequence
+ * for each (seed, stream, index, replicate), of which `sample` is one point. Any prefix of 2^m points is stratified in
+ * all elementary intervals of each half of a block: one point in each interval of the first two numbers, 2 of the first
+ * three, 8 of all four (a (t,m,4)-net, t = 0, 1, 3). So are the points k 2^m .. (k+1) 2^m - 1.
+ *
+ * A half of a block takes the first four Sobol' dimensions, with a scramble and a shuffle of the samples' order of its
+ * own (padding): halves are independent of each other, and a path of any length needs no more dimensions. Replicates,
+ * indices, streams and seeds are independent, too: a sequence's 256-bit key comes from the counter-based generator, and
+ * the seeds of a half are hashes of key and half. Each number alone is uniform in [0,1), a multiple of 2^-48; means are
+ * those of independent samples.
+ *
+ * Fixed size, one thread, nothing allocates. Samples are numbered from 0; after 2^32 of them a new scramble begins.
+ */
+#ifndef WORKER_RENDER_PATH_SOBOL_H
+#define WORKER_RENDER_PATH_SOBOL_H
+
+#include "worker/render/path/sampler.h"
+
+struct sampler_sobol {
+	struct sampler base;
+	uint64_t sample, key[4];
+	uint32_t reversed; /* the bits of sample */
+	double value[SAMPLER_SIDES][SAMPLER_BLOCK];
+};
+
+/* index: a pixel, say; replicate: a group. */
+void sampler_sobol_init(struct sampler_sobol *s, uint64_t seed, enum rng_stream stream, uint64_t index,
+			uint64_t replicate, uint64_t sample);
+
+/* The numbers of one block, in s->value[side]: for samplers that are built on this one. */
+double *sampler_sobol_fill(struct sampler_sobol *s, enum sampler_side side, unsigned vertex);
+
+#endif

@@ -1,0 +1,131 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/asset.h"
+
+#include "common/base/mem.h"
+
+#include <fcntl.h>
+#include <linux/openat2.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+enum { NAME_MAX_BYTES = 4096 };
+#define ASSET_SIZE_MAX ((off_t)1 << 32)
+
+static bool is_below(const char *name)
+{
+	if (!*name || *name == '/' || strlen(name) >= NAME_MAX_BYTES)
+		return false;
+	for (const char *part = name; *part; part += strspn(part, "/")) {
+		size_t n = strcspn(part, "/");
+		if (n == 2 && part[0] == '.' && part[1] == '.')
+			return false;
+		part += n;
+	}
+	return true;
+}
+
+/* Where the kernel cannot keep the look-up below the folder, symbolic links are not followed at all. */
+static int open_step_by_step(int folder, const char *name)
+{
+	int at = dup(folder);
+	while (at >= 0) {
+		char part[256];
+		name += strspn(name, "/");
+		size_t n = strcspn(name, "/");
+		const char *rest = name + n + strspn(name + n, "/");
+		int next = -1;
+		if (n < sizeof part) {
+			memcpy(part, name, n);
+			part[n] = 0;
+			next = openat(at, part,
+				      O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOFOLLOW | (*rest ? O_DIRECTORY : 0));
+		} else {
+			errno = ENAMETOOLONG;
+		}
+		int saved = errno;
+		close(at);
+		errno = saved;
+		if (next < 0 || !*rest)
+			return next;
+		at = next;
+		name = rest;
+	}
+	return -1;
+}
+
+static int open_below(const char *folder, const char *name)
+{
+	int at = open(*folder ? folder : ".", O_PATH | O_DIRECTORY | O_CLOEXEC);
+	if (at < 0)
+		return -1;
+	struct open_how how = {.flags = O_RDONLY | O_CLOEXEC | O_NONBLOCK,
+			       .resolve = RESOLVE_BENEATH | RESOLVE_NO_MAGICLINKS};
+	int fd = (int)syscall(SYS_openat2, at, name, &how, sizeof how);
+	if (fd < 0 && (errno == ENOSYS || errno == EPERM || errno == EINVAL))
+		fd = open_step_by_step(at, name);
+	int saved = errno;
+	close(at);
+	errno = saved;
+	return fd;
+}
+
+/* Read, not mapped: a file that another process shortens must not kill this one. */
+static int read_all(int fd, const char *name, struct asset *out, struct error *e)
+{
+	struct stat st;
+	if (fstat(fd, &st) != 0)
+		return error_set(e, errno, "%s: %s", name, strerror(errno));
+	if (!S_ISREG(st.st_mode))
+		return error_set(e, EINVAL, "%s: not a regular file", name);
+	if (st.st_size > ASSET_SIZE_MAX)
+		return error_set(e, EFBIG, "%s: larger than %lld MB", name, (long long)(ASSET_SIZE_MAX >> 20));
+	size_t size = (size_t)st.st_size, used = 0;
+	unsigned char *bytes = mem_alloc(size, 1);
+	if (!bytes)
+		return error_set(e, ENOMEM, "%s: out of memory", name);
+	while (used < size) {
+		ssize_t n = read(fd, bytes + used, size - used);
+		if (n < 0 && errno == EINTR)
+			continue;
+		if (n <= 0) {
+			int code = n < 0 ? errno : EIO;
+			mem_free(bytes);
+			return error_set(e, code, "%s: %s", name,
+					 n < 0 ? strerror(code) : "became shorter while it was read");
+		}
+		used += (size_t)n;
+	}
+	*out = (struct asset){.bytes = bytes, .size = size, .handle = bytes};
+	return 0;
+}
+
+static int folder_open(void *user, const char *name, struct asset *out, struct error *e)
+{
+	*out = (struct asset){0};
+	if (!is_below(name))
+		return error_set(e, EINVAL,
+				 "%.256s: files must lie below the scene's folder (no absolute names, no ..)", name);
+	int fd = open_below(user, name);
+	if (fd < 0)
+		return error_set(e, errno, "%s: %s", name,
+				 errno == EXDEV ? "leads out of the scene's folder" : strerror(errno));
+	int r = read_all(fd, name, out, e);
+	close(fd);
+	return r;
+}
+
+static void folder_close(void *user, struct asset *a)
+{
+	(void)user;
+	mem_free(a->handle);
+	*a = (struct asset){0};
+}
+
+struct asset_source asset_folder(const char *folder)
+{
+	return (struct asset_source){.user = (void *)(uintptr_t)folder, .open = folder_open, .close = folder_close};
+}

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Where a scene's files come from: a folder (hslt-render, hslt-submit) or a content-addressed store (workers).
+ * Names are those in the scene file, with '/' between parts.
+ */
+#ifndef WORKER_RENDER_SCENE_ASSET_H
+#define WORKER_RENDER_SCENE_ASSET_H
+
+#include "common/base/error.h"
+
+#include <stddef.h>
+
+struct asset {
+	const unsigned char *bytes;
+	size_t size;
+	void *handle;
+};
+
+struct asset_source {
+	void *user;
+	/* The whole file, in memory. 0 or negative errno with a sentence. Any thread. */
+	int (*open)(void *user, const char *name, struct asset *out, struct error *e);
+	void (*close)(void *user, struct asset *a);
+};
+
+/* A folder: names must stay below it (no absolute paths, no "..", no symbolic links that
+ * lead out of it, regular files only, at most 4 GB). `folder` must outlive it. */
+struct asset_source asset_folder(const char *folder);
+
+#endif

@@ -1,0 +1,33 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The values of $name: from the command line, and from <default> where the command line says nothing. One thread. */
+#ifndef WORKER_RENDER_SCENE_DEFINE_H
+#define WORKER_RENDER_SCENE_DEFINE_H
+
+#include "common/base/arena.h"
+#include "worker/render/scene/scene.h"
+
+enum { DEFINE_MAX = 1024 };
+
+struct define_entry {
+	const char *name, *value;
+	bool given, used; /* given on the command line */
+};
+
+struct define_table {
+	struct arena *arena;
+	struct define_entry *entries; /* DEFINE_MAX */
+	size_t count;
+};
+
+int define_init(struct define_table *t, const struct scene_define *given, size_t count, struct arena *arena,
+		struct error *e);
+int define_default(struct define_table *t, const char *name, const char *value, struct error *e);
+
+/* Replaces every $name in text, once: what is put in is not looked at again. The text itself where it has none.
+ * The longest run of letters, digits and '_' after '$' must be a name. */
+int define_substitute(struct define_table *t, const char *text, size_t size_max, const char **out, struct error *e);
+
+/* A name of the command line that no file had a use for is a mistake. */
+int define_check_used(const struct define_table *t, struct error *e);
+
+#endif

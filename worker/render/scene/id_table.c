@@ -1,0 +1,108 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/id_table.h"
+
+#include "worker/render/scene/plugin.h"
+#include "worker/render/scene/spelling.h"
+#include "worker/render/scene/value.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static int compare_ids(const void *a, const void *b)
+{
+	const struct id_entry *x = a, *y = b;
+	return strcmp(x->id, y->id);
+}
+
+int id_table_find(const struct id_table *t, const struct xml_element *el, const char *attribute,
+		  struct xml_element **out, struct error *e)
+{
+	const char *id = xml_attribute(el, attribute);
+	if (!id)
+		return xml_error(el, e, EINVAL, "needs an attribute `%s`", attribute);
+	struct id_entry key = {id, NULL};
+	const struct id_entry *found = bsearch(&key, t->entries, t->count, sizeof key, compare_ids);
+	if (found) {
+		*out = found->element;
+		return 0;
+	}
+	char hint[128];
+	struct spelling s = {.wanted = id};
+	for (size_t i = 0; i < t->count; i++)
+		spelling_offer(&s, t->entries[i].id);
+	return xml_error(el, e, ENOENT, "there is no object with id \"%.64s\"%s", id,
+			 spelling_hint(&s, hint, sizeof hint));
+}
+
+static struct xml_element *next_element(struct xml_element *el)
+{
+	if (el->first)
+		return el->first;
+	while (el && !el->next)
+		el = el->parent;
+	return el ? el->next : NULL;
+}
+
+static int check_unique(const struct id_table *t, struct error *e)
+{
+	qsort(t->entries, t->count, sizeof *t->entries, compare_ids);
+	for (size_t i = 1; i < t->count; i++) {
+		const struct xml_element *a = t->entries[i - 1].element, *b = t->entries[i].element;
+		if (strcmp(t->entries[i - 1].id, t->entries[i].id) == 0) {
+			bool b_later = b->line > a->line;
+			return xml_error(b_later ? b : a, e, EINVAL, "the id \"%.64s\" is given twice (also in %s:%d)",
+					 t->entries[i].id, a->file, b_later ? a->line : b->line);
+		}
+	}
+	return 0;
+}
+
+/* An alias may name an alias that stands before it. */
+static int read_alias(struct id_table *t, const struct xml_element *el, struct error *e)
+{
+	const char *as = xml_attribute(el, "as");
+	struct xml_element *target;
+	if (!as)
+		return xml_error(el, e, EINVAL, "needs an attribute `as`");
+	int r = value_check_element(el, "id|as", false, e);
+	if (!r)
+		r = id_table_find(t, el, "id", &target, e);
+	if (r)
+		return r;
+	size_t at = t->count;
+	while (at > 0 && strcmp(t->entries[at - 1].id, as) > 0)
+		at--;
+	if (at > 0 && strcmp(t->entries[at - 1].id, as) == 0)
+		return xml_error(el, e, EINVAL, "the id \"%.64s\" is given twice (also in %s:%d)", as,
+				 t->entries[at - 1].element->file, t->entries[at - 1].element->line);
+	memmove(t->entries + at + 1, t->entries + at, (t->count - at) * sizeof *t->entries);
+	t->entries[at] = (struct id_entry){as, target};
+	t->count++;
+	return 0;
+}
+
+int id_table_make(struct id_table *t, const struct xml_tree *tree, struct arena *arena, struct error *e)
+{
+	enum { ALIASES_MAX = 256 };
+	enum plugin_class cls;
+	size_t n = 0, aliases = 0;
+	for (struct xml_element *el = tree->root; el; el = next_element(el))
+		n += xml_attribute(el, "id") != NULL;
+	t->entries = arena_alloc(arena, n, sizeof *t->entries);
+	if (!t->entries)
+		return error_set(e, ENOMEM, "out of memory, or the scene files take too much of it");
+	for (struct xml_element *el = tree->root; el; el = next_element(el)) {
+		const char *id = xml_attribute(el, "id");
+		if (id && !el->ignored && plugin_class_find(el->name, &cls))
+			t->entries[t->count++] = (struct id_entry){id, el};
+	}
+	int r = check_unique(t, e);
+	for (struct xml_element *el = tree->root; el && !r; el = next_element(el)) {
+		if (el->ignored || strcmp(el->name, "alias") != 0)
+			continue;
+		if (++aliases > ALIASES_MAX)
+			return xml_error(el, e, E2BIG, "more than %d aliases", ALIASES_MAX);
+		r = read_alias(t, el, e);
+	}
+	return r;
+}

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/image_decode.h"
+#include "worker/render/scene/srgb.h"
+
+#include <string.h>
+
+int image_allocate(const struct image_input *in, struct image *out, uint64_t width, uint64_t height, uint32_t channels,
+		   uint64_t bytes_least)
+{
+	if (width == 0 || height == 0 || width > IMAGE_PIXELS_MAX || height > IMAGE_PIXELS_MAX ||
+	    width * height > IMAGE_PIXELS_MAX)
+		return error_set(in->error, EFBIG, "%s: %llu x %llu pixels; at most %d in all, and at least one",
+				 in->name, (unsigned long long)width, (unsigned long long)height, IMAGE_PIXELS_MAX);
+	uint64_t need = width * height * channels * sizeof *out->pixels;
+	if (need > IMAGE_BYTES_MAX)
+		return error_set(in->error, EFBIG, "%s: %llu x %llu pixels take %llu MB decoded; at most %d MB",
+				 in->name, (unsigned long long)width, (unsigned long long)height,
+				 (unsigned long long)need >> 20, IMAGE_BYTES_MAX >> 20);
+	if (need + in->arena->used > IMAGE_SCENE_BYTES_MAX)
+		return error_set(
+			in->error, EFBIG,
+			"%s: %llu x %llu pixels take %llu MB decoded, the scene before it %zu MB; at most %zu MB together",
+			in->name, (unsigned long long)width, (unsigned long long)height, (unsigned long long)need >> 20,
+			in->arena->used >> 20, IMAGE_SCENE_BYTES_MAX >> 20);
+	if (in->size < bytes_least)
+		return error_set(in->error, EBADMSG, "%s: too short for %llu x %llu pixels", in->name,
+				 (unsigned long long)width, (unsigned long long)height);
+	*out = (struct image){.width = (uint32_t)width, .height = (uint32_t)height, .channels = channels};
+	out->pixels = arena_alloc(in->arena, width * height, channels * sizeof *out->pixels);
+	return out->pixels ? 0 : error_set(in->error, ENOMEM, "%s: out of memory", in->name);
+}
+
+void image_table(float *value, uint32_t max, bool raw)
+{
+	for (uint32_t i = 0; i <= max; i++) {
+		double x = (double)i / max;
+		value[i] = (float)(raw ? x : srgb_to_linear(x));
+	}
+}
+
+static const struct format {
+	const char *magic;
+	size_t size;
+	int (*decode)(const struct image_input *in, struct image *out);
+} formats[] = {
+	{"\x89PNG\r\n\x1a\n", 8, image_decode_png},
+	{"\xff\xd8\xff", 3, image_decode_jpeg},
+	{"\x76\x2f\x31\x01", 4, image_decode_exr},
+	{"#?RADIANCE", 10, image_decode_hdr},
+	{"#?RGBE", 6, image_decode_hdr},
+};
+
+static int decode(const struct image_input *in, struct image *out)
+{
+	for (size_t i = 0; i < sizeof formats / sizeof *formats; i++)
+		if (in->size >= formats[i].size && memcmp(in->bytes, formats[i].magic, formats[i].size) == 0)
+			return formats[i].decode(in, out);
+	return error_set(in->error, EINVAL,
+			 "%s: no image that is understood (supported: PNG, JPEG, OpenEXR, Radiance HDR)", in->name);
+}
+
+int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
+	       struct error *e)
+{
+	*out = (struct image){0};
+	struct asset a;
+	int r = assets->open(assets->user, name, &a, e);
+	if (r)
+		return r;
+	struct image_input in = {name, a.bytes, a.size, raw, arena, e};
+	r = decode(&in, out);
+	assets->close(assets->user, &a);
+	if (r)
+		*out = (struct image){0};
+	return r;
+}

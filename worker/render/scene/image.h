@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, EXR, Radiance HDR by content. PNG (8 and
+ * 16 bits) and JPEG are sRGB, whatever gamma they claim. Damaged files are an error, never half an image. Any thread,
+ * each with its own arena.
+ */
+#ifndef WORKER_RENDER_SCENE_IMAGE_H
+#define WORKER_RENDER_SCENE_IMAGE_H
+
+#include "common/base/arena.h"
+#include "worker/render/scene/asset.h"
+
+#include <stdbool.h>
+#include <stdint.h>
+
+struct image {
+	uint32_t width, height, channels; /* channels: 1 or 3 (alpha is dropped) */
+	float *pixels;			  /* [height][width][channels], finite, in the arena */
+};
+
+/* raw: no sRGB decoding of integer data. At most 2^27 pixels and 1 GiB of floats, and 4 GiB together with what the
+ * arena holds: -EFBIG names the file and its size before it is decoded. */
+int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
+	       struct error *e);
+
+#endif

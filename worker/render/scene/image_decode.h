@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The formats behind image_read: each decodes bytes in memory; whatever they hold, it answers with an image or an
+ * error. */
+#ifndef WORKER_RENDER_SCENE_IMAGE_DECODE_H
+#define WORKER_RENDER_SCENE_IMAGE_DECODE_H
+
+#include "worker/render/scene/image.h"
+
+/* Before anything is decoded: a small file may promise a large image. Of a mask 11,585 x 11,585 pixels, of colours
+ * 9,459 x 9,459. */
+enum { IMAGE_PIXELS_MAX = 1 << 27, IMAGE_BYTES_MAX = 1 << 30 };
+#define IMAGE_SCENE_BYTES_MAX ((size_t)4 << 30) /* of all that an arena holds */
+
+struct image_input {
+	const char *name;
+	const unsigned char *bytes;
+	size_t size;
+	bool raw;
+	struct arena *arena;
+	struct error *error;
+};
+
+int image_decode_png(const struct image_input *in, struct image *out);
+int image_decode_jpeg(const struct image_input *in, struct image *out);
+int image_decode_hdr(const struct image_input *in, struct image *out);
+int image_decode_exr(const struct image_input *in, struct image *out);
+
+/* Checks the size, also against the least number of bytes that such an image takes (bytes_least of any format's best
+ * compression), before anything is allocated; then allocates the pixels. */
+int image_allocate(const struct image_input *in, struct image *out, uint64_t width, uint64_t height, uint32_t channels,
+		   uint64_t bytes_least);
+
+/* Values of integer samples: value[i] for i of 0..max. */
+void image_table(float *value, uint32_t max, bool raw);
+
+#endif

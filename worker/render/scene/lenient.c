@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/lenient.h"
+
+#include <string.h>
+
+static bool is_one_of(const char *name, const char *const *list)
+{
+	for (; *list; list++)
+		if (strcmp(name, *list) == 0)
+			return true;
+	return false;
+}
+
+/* What is like it, by class. */
+static const struct {
+	enum plugin_class cls;
+	const char *type, *stand_in;
+} likes[] = {
+	{PLUGIN_BSDF, "pplastic", "roughplastic"},   {PLUGIN_BSDF, "ward", "roughplastic"},
+	{PLUGIN_BSDF, "measured", "roughplastic"},   {PLUGIN_BSDF, "principledthin", "principled"},
+	{PLUGIN_BSDF, "polarizer", "null"},	     {PLUGIN_BSDF, "retarder", "null"},
+	{PLUGIN_BSDF, "circular", "null"},	     {PLUGIN_EMITTER, "timed_sunsky", "constant"},
+	{PLUGIN_EMITTER, "directionalarea", "area"},
+};
+
+enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const char **stand_in)
+{
+	*stand_in = NULL;
+	for (size_t i = 0; i < sizeof likes / sizeof *likes; i++)
+		if (likes[i].cls == cls && strcmp(likes[i].type, type) == 0) {
+			*stand_in = likes[i].stand_in;
+			return LENIENT_REPLACE;
+		}
+	switch (cls) {
+	case PLUGIN_BSDF:
+		*stand_in = "diffuse";
+		return LENIENT_INNER;
+	case PLUGIN_RFILTER:
+		*stand_in = "gaussian"; /* filters with negative lobes are sharper */
+		return LENIENT_REPLACE;
+	case PLUGIN_SHAPE:
+	case PLUGIN_EMITTER:
+	case PLUGIN_TEXTURE:
+	case PLUGIN_MEDIUM:
+		return LENIENT_LEAVE_OUT;
+	default:
+		return LENIENT_REFUSE;
+	}
+}
+
+const char *lenient_param(const char *stand_in, const char *name)
+{
+	static const char *const colors[] = {"base_color", "diffuse_reflectance", "color", "diffuse", "albedo", NULL};
+	if (strcmp(stand_in, "diffuse") == 0 && is_one_of(name, colors))
+		return "reflectance";
+	return name;
+}

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/scene.h"
+#include "worker/render/scene/plugin.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+const struct property *node_find(const struct scene_node *n, const char *name)
+{
+	for (uint32_t i = 0; i < n->property_count; i++)
+		if (strcmp(n->properties[i].name, name) == 0)
+			return &n->properties[i];
+	return NULL;
+}
+
+double node_float(const struct scene_node *n, const char *name, double fallback)
+{
+	const struct property *p = node_find(n, name);
+	if (p && p->value.type == VALUE_FLOAT)
+		return p->value.as.number;
+	return p && p->value.type == VALUE_INT ? (double)p->value.as.integer : fallback;
+}
+
+int64_t node_int(const struct scene_node *n, const char *name, int64_t fallback)
+{
+	const struct property *p = node_find(n, name);
+	return p && p->value.type == VALUE_INT ? p->value.as.integer : fallback;
+}
+
+bool node_bool(const struct scene_node *n, const char *name, bool fallback)
+{
+	const struct property *p = node_find(n, name);
+	return p && p->value.type == VALUE_BOOL ? p->value.as.boolean : fallback;
+}
+
+const char *node_string(const struct scene_node *n, const char *name, const char *fallback)
+{
+	const struct property *p = node_find(n, name);
+	return p && p->value.type == VALUE_STRING ? p->value.as.string : fallback;
+}
+
+mat4 node_transform(const struct scene_node *n, const char *name)
+{
+	const struct property *p = node_find(n, name);
+	return p && p->value.type == VALUE_TRANSFORM ? p->value.as.transform : mat4_identity();
+}
+
+const struct scene_node *node_child(const struct scene_node *n, enum plugin_class cls, uint32_t index)
+{
+	for (uint32_t i = 0; i < n->child_count; i++)
+		if (n->children[i]->cls == cls && index-- == 0)
+			return n->children[i];
+	return NULL;
+}
+
+const struct scene_node *node_ref(const struct scene_node *n, const char *name)
+{
+	const struct property *p = node_find(n, name);
+	return p && p->value.type == VALUE_NODE ? p->value.as.node : NULL;
+}
+
+int node_error(const struct scene_node *n, struct error *e, int errno_value, const char *format, ...)
+{
+	char text[768];
+	va_list ap;
+	va_start(ap, format);
+	vsnprintf(text, sizeof text, format, ap);
+	va_end(ap);
+	return error_set(e, errno_value, "%s:%d: <%s type=\"%.64s\">: %s", n->file, n->line, plugin_class_name(n->cls),
+			 n->type, text);
+}

@@ -1,0 +1,159 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/number.h"
+
+#include <locale.h>
+#include <math.h>
+#include <pthread.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Powers of ten that a double holds exactly: with a mantissa below 2^53 one operation rounds correctly. */
+static const double power_of_ten[] = {1e0,  1e1,  1e2,	1e3,  1e4,  1e5,  1e6,	1e7,  1e8,  1e9,  1e10, 1e11,
+				      1e12, 1e13, 1e14, 1e15, 1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
+
+enum { NUMBER_TEXT_MAX = 512 };
+
+static locale_t c_locale;
+static void make_locale(void)
+{
+	c_locale = newlocale(LC_ALL_MASK, "C", (locale_t)0);
+}
+
+static bool is_digit(char c)
+{
+	return c >= '0' && c <= '9';
+}
+
+/* [first, last) is digits, a point, an exponent and nothing else by now. */
+static bool convert_slowly(const char *first, const char *last, double *out)
+{
+	static pthread_once_t once = PTHREAD_ONCE_INIT;
+	pthread_once(&once, make_locale);
+	size_t n = (size_t)(last - first);
+	if (n >= NUMBER_TEXT_MAX || !c_locale)
+		return false;
+	char text[NUMBER_TEXT_MAX];
+	memcpy(text, first, n);
+	text[n] = 0;
+	*out = strtod_l(text, NULL, c_locale);
+	return isfinite(*out);
+}
+
+struct digits {
+	uint64_t mantissa;
+	int exponent; /* of ten */
+	bool exact;   /* the mantissa holds all digits */
+	bool any;
+};
+
+static const char *scan_digits(const char *p, const char *end, struct digits *d, bool fraction)
+{
+	for (; p < end && is_digit(*p); p++) {
+		d->any = true;
+		if (d->mantissa < (UINT64_C(1) << 53) / 10 - 1) {
+			d->mantissa = d->mantissa * 10 + (uint64_t)(*p - '0');
+			d->exponent -= fraction;
+		} else {
+			d->exact = false;
+		}
+	}
+	return p;
+}
+
+const char *number_scan(const char *p, const char *end, double *out)
+{
+	const char *first = p;
+	bool negative = false;
+	if (p < end && (*p == '+' || *p == '-'))
+		negative = *p++ == '-';
+	struct digits d = {.exact = true};
+	p = scan_digits(p, end, &d, false);
+	if (p < end && *p == '.')
+		p = scan_digits(p + 1, end, &d, true);
+	if (!d.any)
+		return NULL;
+	if (p < end && (*p == 'e' || *p == 'E')) {
+		const char *q = p + 1;
+		bool down = false;
+		if (q < end && (*q == '+' || *q == '-'))
+			down = *q++ == '-';
+		if (q < end && is_digit(*q)) {
+			int e = 0;
+			for (; q < end && is_digit(*q); q++)
+				if (e < 100000)
+					e = e * 10 + (*q - '0');
+			d.exponent += down ? -e : e;
+			p = q;
+		}
+	}
+	if (!d.exact || d.exponent < -22 || d.exponent > 22) {
+		if (!convert_slowly(first, p, out))
+			return NULL;
+		return p;
+	}
+	double m = (double)d.mantissa;
+	m = d.exponent < 0 ? m / power_of_ten[-d.exponent] : m * power_of_ten[d.exponent];
+	*out = negative ? -m : m;
+	return p;
+}
+
+const char *number_scan_int(const char *p, const char *end, int64_t *out)
+{
+	bool negative = false;
+	if (p < end && (*p == '+' || *p == '-'))
+		negative = *p++ == '-';
+	if (p >= end || !is_digit(*p))
+		return NULL;
+	int64_t n = 0;
+	for (; p < end && is_digit(*p); p++) {
+		if (n > (INT64_MAX - 9) / 10)
+			return NULL;
+		n = n * 10 + (*p - '0');
+	}
+	*out = negative ? -n : n;
+	return p;
+}
+
+static const char *skip_blanks(const char *p)
+{
+	while (number_is_blank(*p))
+		p++;
+	return p;
+}
+
+bool number_parse(const char *text, double *out)
+{
+	text = skip_blanks(text);
+	const char *rest = number_scan(text, text + strlen(text), out);
+	return rest && *skip_blanks(rest) == 0;
+}
+
+bool number_parse_int(const char *text, int64_t *out)
+{
+	text = skip_blanks(text);
+	const char *rest = number_scan_int(text, text + strlen(text), out);
+	return rest && *skip_blanks(rest) == 0;
+}
+
+int number_list(const char *text, double *out, size_t max)
+{
+	const char *end = text + strlen(text), *p = skip_blanks(text);
+	size_t n = 0;
+	while (p < end) {
+		if (n == max)
+			return -1;
+		const char *rest = number_scan(p, end, &out[n]);
+		if (!rest)
+			return -1;
+		n++;
+		p = skip_blanks(rest);
+		if (*p == ',') {
+			p = skip_blanks(p + 1);
+			if (p == end)
+				return -1;
+		} else if (p == rest && p < end) {
+			return -1;
+		}
+	}
+	return (int)n;
+}

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Numbers as text, always with a point, whatever the process's locale. NaN, infinity, hexadecimal and values that
+ * overflow are no numbers. Any thread; allocates nothing (but the locale, once).
+ */
+#ifndef WORKER_RENDER_SCENE_NUMBER_H
+#define WORKER_RENDER_SCENE_NUMBER_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+/* Reads a number at the start of [p, end) and returns what follows it; NULL when there is none. Correctly rounded. */
+const char *number_scan(const char *p, const char *end, double *out);
+const char *number_scan_int(const char *p, const char *end, int64_t *out);
+
+/* The whole text, blanks around it allowed. */
+bool number_parse(const char *text, double *out);
+bool number_parse_int(const char *text, int64_t *out);
+
+/* A list separated by blanks, commas or both. The count, or -1 when something else is in it or there are more than max.
+ */
+int number_list(const char *text, double *out, size_t max);
+
+static inline bool number_is_blank(char c)
+{
+	return c == ' ' || c == '\t' || c == '\r' || c == '\n';
+}
+
+#endif

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Parameter tables: what a plug-in understands, declared where it is implemented, read by the scene reader.
+ * Names are those of Mitsuba 3 (to_world, int_ior, max_depth); 0.5/0.6 names are the same in camelCase and are
+ * converted on reading (toWorld, intIOR, maxDepth).
+ * The name or type "*" stands for all that the table does not list.
+ */
+#ifndef WORKER_RENDER_SCENE_PARAM_H
+#define WORKER_RENDER_SCENE_PARAM_H
+
+enum value_type {
+	VALUE_BOOL = 1 << 0,
+	VALUE_INT = 1 << 1,
+	VALUE_FLOAT = 1 << 2,
+	VALUE_STRING = 1 << 3,
+	VALUE_POINT = 1 << 4, /* point and vector */
+	VALUE_RGB = 1 << 5,   /* also sRGB "#rrggbb" of 0.6, made linear on reading */
+	VALUE_SPECTRUM = 1 << 6,
+	VALUE_TRANSFORM = 1 << 7,
+	VALUE_NODE = 1 << 8, /* a nested or referenced object, by name: a texture, a BSDF */
+};
+/* What a colour may be given as: a number, rgb, a spectrum, a texture. */
+#define VALUE_COLOR (VALUE_FLOAT | VALUE_INT | VALUE_RGB | VALUE_SPECTRUM)
+#define VALUE_TEXTURE (VALUE_COLOR | VALUE_NODE)
+
+/* Ranges that many parameters have. Lengths and matrices: what squares of areas can hold; how far apart things may be,
+ * measured by the scene's size, is checked when that is known (PARAM_REACH_MAX). */
+#define PARAM_LENGTH_MAX 1e60
+#define PARAM_LIGHT_MAX 1e30 /* radiance, irradiance, intensity: a film of float has room for sums of it */
+#define PARAM_REACH_MAX 1e12 /* of cameras and lights from the middle of the scene, in its radii */
+#define PARAM_UV_MAX 1e6 /* factors and offsets of texture coordinates: what is left of their digits picks a pixel */
+#define PARAM_IOR_MIN 1e-3
+#define PARAM_IOR_MAX 1e3
+#define PARAM_METAL_MAX 1e9 /* eta and k of conductors */
+
+enum param_class {
+	PARAM_UNDERSTOOD,
+	PARAM_IGNORED, /* has no effect on light: reported once, with file and line */
+	PARAM_REFUSED, /* would change light: the scene is refused, with what is supported */
+};
+
+struct param {
+	const char *name;
+	unsigned types; /* of enum value_type */
+	enum param_class status;
+	double min,
+		max; /* of every number in it, those of points, colours and spectra too: outside is an error. min < max
+			wherever the types have numbers (a test walks over all tables); a texture says its own ranges */
+	const char *choices; /* for VALUE_STRING: "beckmann|ggx", NULL: any */
+};
+
+enum plugin_class {
+	PLUGIN_SHAPE,
+	PLUGIN_BSDF,
+	PLUGIN_TEXTURE,
+	PLUGIN_EMITTER,
+	PLUGIN_SENSOR,
+	PLUGIN_FILM,
+	PLUGIN_RFILTER,
+	PLUGIN_SAMPLER,
+	PLUGIN_INTEGRATOR,
+	PLUGIN_MEDIUM,
+	PLUGIN_CLASSES,
+};
+
+/* Children that are not named (a BSDF in a shape, a film in a sensor) go by class; nested_classes lists which. */
+struct plugin_decl {
+	enum plugin_class cls;
+	const char *type;	    /* as written in type="..." */
+	const struct param *params; /* ends with a NULL name */
+	unsigned nested_classes;    /* bits 1 << enum plugin_class */
+	enum param_class status; /* IGNORED: has no effect but for its understood parameters (samplers), all else in it
+				    is skipped; REFUSED never listed: unknown is refused */
+};
+
+#endif

@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/remarks.h"
+
+#include "worker/render/scene/plugin.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+__attribute__((format(printf, 4, 5))) static int remark(struct report *r, const struct scene_node *n, struct error *e,
+							const char *format, ...)
+{
+	char text[REPORT_TEXT_MAX];
+	va_list ap;
+	int used = snprintf(text, sizeof text, "%s:%d: <%s type=\"%.64s\">: ", n->file, n->line,
+			    plugin_class_name(n->cls), n->type);
+	va_start(ap, format);
+	vsnprintf(text + used, sizeof text - (size_t)used, format, ap);
+	va_end(ap);
+	return report_text(r, n->file, text, text, e);
+}
+
+/* Whoever asks for a part of the light, or for something else than light, gets another picture: that is said. */
+static int on_integrator(struct report *r, const struct scene_node *n, struct error *e)
+{
+	static const char *const others[] = {
+		"direct", "volpath", "volpathmis", "prbvolpath", "volpath_simple", "aov",  "stokes", "moment",
+		"depth",  "field",   "ao",	   "vpl",	 "irrcache",	   "sppm", "ppm",    "photonmapper"};
+	int rc = 0;
+	for (size_t i = 0; i < sizeof others / sizeof *others && !rc; i++)
+		if (strcmp(n->type, others[i]) == 0)
+			rc = remark(r, n, e,
+				    "is not what is rendered: the picture is of all light on surfaces, without media%s",
+				    strcmp(n->type, "direct") == 0 ? "; --max-depth 2 leaves out indirect light" : "");
+	return rc;
+}
+
+static bool shines(const struct scene_node *n)
+{
+	if (n->cls == PLUGIN_EMITTER)
+		return true;
+	for (uint32_t i = 0; n->cls == PLUGIN_SHAPE && i < n->child_count; i++)
+		if (shines(n->children[i]))
+			return true;
+	return false;
+}
+
+static int on_emitter(struct report *r, const struct scene_node *n, struct error *e)
+{
+	if (strcmp(n->type, "sky") != 0 && strcmp(n->type, "sun") != 0 && strcmp(n->type, "sunsky") != 0)
+		return 0;
+	return remark(r, n, e, "daylight after Preetham (1999), a little other than Mitsuba's after Hosek and Wilkie");
+}
+
+int remarks_on(const struct scene *s, struct report *r, struct error *e)
+{
+	const struct scene_node *camera = NULL;
+	bool light = false;
+	uint32_t sensors = 0;
+	int rc = 0;
+	for (uint32_t i = 0; i < s->object_count && !rc; i++) {
+		const struct scene_node *n = s->objects[i];
+		light |= shines(n);
+		if (n->cls == PLUGIN_INTEGRATOR)
+			rc = on_integrator(r, n, e);
+		else if (n->cls == PLUGIN_EMITTER)
+			rc = on_emitter(r, n, e);
+		else if (n->cls == PLUGIN_SENSOR && camera)
+			rc = remark(r, n, e, "sensor %u; without --sensor the first, in line %d, is rendered",
+				    ++sensors, camera->line);
+		else if (n->cls == PLUGIN_SENSOR) {
+			camera = n;
+			sensors = 1;
+		}
+	}
+	if (!rc && !light && camera && r->problem_count == 0)
+		rc = remark(r, camera, e, "the scene has no emitter: the picture is black");
+	return rc;
+}

@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/report.h"
+
+#include "common/base/text.h"
+
+#include <errno.h>
+#include <stdio.h>
+#include <string.h>
+
+int report_init(struct report *r, struct arena *arena, struct error *e)
+{
+	*r = (struct report){.arena = arena};
+	r->notes = arena_alloc(arena, REPORT_NOTES_MAX, sizeof *r->notes);
+	r->note_keys = arena_alloc(arena, REPORT_NOTES_MAX, sizeof *r->note_keys);
+	r->problems = arena_alloc(arena, REPORT_PROBLEMS_MAX, sizeof *r->problems);
+	return r->notes && r->note_keys && r->problems ? 0 : error_set(e, ENOMEM, "out of memory");
+}
+
+__attribute__((format(printf, 5, 0))) int report_note(struct report *r, const char *file, const char *key,
+						      struct error *e, const char *format, va_list ap)
+{
+	char text[REPORT_TEXT_MAX];
+	vsnprintf(text, sizeof text, format, ap);
+	return report_text(r, file, key, text, e);
+}
+
+int report_text(struct report *r, const char *file, const char *key, const char *said, struct error *e)
+{
+	char text[REPORT_TEXT_MAX];
+	for (uint32_t i = 0; i < r->note_count; i++)
+		if (strcmp(r->note_keys[i], key) == 0)
+			return 0;
+	if (r->note_count == REPORT_NOTES_MAX)
+		return 0;
+	snprintf(text, sizeof text, "%s", said);
+	text_clean(text);
+	if (r->note_count == REPORT_NOTES_MAX - 1)
+		snprintf(text, sizeof text, "%s: more is ignored than is listed here", file);
+	const char *note = arena_strdup(r->arena, text), *copy = arena_strdup(r->arena, key);
+	if (!note || !copy)
+		return error_set(e, ENOMEM, "out of memory");
+	r->notes[r->note_count] = note;
+	r->note_keys[r->note_count++] = copy;
+	return 0;
+}
+
+int report_problem(struct report *r, int code, struct error *e)
+{
+	if (code == 0 || code == REPORT_TOLD || code == -ENOMEM)
+		return code == -ENOMEM ? code : 0;
+	if (r->problem_count == REPORT_PROBLEMS_MAX)
+		return 0;
+	const char *text = arena_strdup(r->arena, e->text);
+	if (!text)
+		return error_set(e, ENOMEM, "out of memory");
+	if (!r->code) {
+		r->code = code;
+		r->first = *e;
+	}
+	r->problems[r->problem_count++] = text;
+	return 0;
+}

@@ -1,0 +1,608 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/scene.h"
+
+#include "worker/render/scene/id_table.h"
+#include "worker/render/scene/lenient.h"
+#include "worker/render/scene/plugin.h"
+#include "worker/render/scene/remarks.h"
+#include "worker/render/scene/report.h"
+#include "worker/render/scene/value.h"
+#include "worker/render/scene/xml.h"
+
+#include <assert.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* Reads one scene; all pointers lead into the scene's arena. */
+struct maker {
+	struct scene *scene;
+	const struct asset_source *assets_from;
+	const struct plugin_decl *decls;
+	struct error *error;
+	struct xml_tree *tree;
+	struct id_table ids;
+	struct report report;
+	const char **assets;
+	size_t asset_count, asset_room;
+	int depth;
+	bool lenient;
+};
+
+/* A node while it grows. */
+struct draft {
+	struct scene_node *node;
+	const struct plugin_decl *decl;
+	bool stands_in; /* for a plug-in that is not supported */
+	struct property *properties;
+	const struct scene_node **children;
+};
+
+static int out_of_memory(struct maker *m)
+{
+	return error_set(m->error, ENOMEM, "out of memory, or the scene files take more than %d MB of it",
+			 XML_MEMORY_MAX >> 20);
+}
+
+static void *allocate(struct maker *m, size_t count, size_t size)
+{
+	return arena_alloc(&m->scene->arena, count, size);
+}
+
+/* One note for each kind of thing, where it is met first. */
+__attribute__((format(printf, 5, 6))) static int note(struct maker *m, const struct xml_element *el, const char *type,
+						      const char *property, const char *format, ...)
+{
+	char key[REPORT_TEXT_MAX];
+	snprintf(key, sizeof key, "%.64s/%.64s/%.64s", el->name, type, property);
+	va_list ap;
+	va_start(ap, format);
+	int r = report_note(&m->report, el->file, key, m->error, format, ap);
+	va_end(ap);
+	return r;
+}
+
+static int note_property(struct maker *m, const struct xml_element *owner, const struct xml_element *el,
+			 const char *name)
+{
+	const char *type = xml_attribute(owner, "type");
+	return note(m, owner, type, name,
+		    "%s:%d: <%.64s type=\"%.64s\">: `%.64s` has no effect on light and is ignored", el->file, el->line,
+		    owner->name, type, name);
+}
+
+static int note_foreign(struct maker *m, const struct xml_element *el)
+{
+	return note(m, el, "", "", "%s:%d: <%.64s> and all inside it is ignored", el->file, el->line, el->name);
+}
+
+/* What is not supported goes, and that is said. */
+static int leave_out(struct maker *m, const struct xml_element *el, const char *type, const char *property,
+		     const char *what)
+{
+	return note(m, el, type, property, "%s:%d: <%.64s>: %s `%.64s` is not supported and left out (lenient)",
+		    el->file, el->line, el->name, what, *property ? property : type);
+}
+
+static int add_asset(struct maker *m, const char *name)
+{
+	if (m->asset_count == m->asset_room) {
+		size_t room = m->asset_room ? 2 * m->asset_room : 64;
+		const char **more = allocate(m, room, sizeof *more);
+		if (!more)
+			return out_of_memory(m);
+		if (m->asset_count)
+			memcpy(more, m->assets, m->asset_count * sizeof *more);
+		m->assets = more;
+		m->asset_room = room;
+	}
+	m->assets[m->asset_count++] = name;
+	return 0;
+}
+
+static const char *property_name(struct maker *m, const struct xml_element *el, const char *name)
+{
+	if (!el->snake)
+		return name;
+	char *snake = allocate(m, 2 * strlen(name) + 1, 1);
+	if (snake)
+		spelling_snake(name, snake);
+	return snake;
+}
+
+static int refuse_property(const struct draft *d, const struct xml_element *el, const char *name, const struct param *p,
+			   struct error *e)
+{
+	char list[512], hint[128] = "";
+	plugin_list_params(d->decl, list, sizeof list);
+	if (p)
+		return xml_error(el, e, EINVAL,
+				 "`%.64s` of <%s type=\"%.64s\"> would change the image and is not supported; "
+				 "supported: %s",
+				 name, plugin_class_name(d->node->cls), d->node->type, list);
+	struct spelling s = {.wanted = name};
+	plugin_offer_params(d->decl, &s);
+	return xml_error(el, e, EINVAL, "<%s type=\"%.64s\"> has no `%.64s`%s (supported: %s)",
+			 plugin_class_name(d->node->cls), d->node->type, name, spelling_hint(&s, hint, sizeof hint),
+			 list);
+}
+
+static int refuse_choice(const struct xml_element *el, const struct param *p, const char *given, struct error *e)
+{
+	char one[64], names[16][64], hint[128], list[512] = "";
+	struct spelling s = {.wanted = given};
+	size_t n = 0;
+	for (const char *rest = p->choices; n < 16 && (rest = value_next_name(rest, one, sizeof one)); n++) {
+		memcpy(names[n], one, sizeof one);
+		spelling_offer(&s, names[n]);
+	}
+	for (const char *rest = p->choices; (rest = value_next_name(rest, one, sizeof one));)
+		spelling_list(list, sizeof list, one);
+	return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not supported%s (supported: %s)", p->name, given,
+			 spelling_hint(&s, hint, sizeof hint), list);
+}
+
+static int check_range(const struct xml_element *el, const struct param *p, const struct value *v, struct error *e)
+{
+	double scratch[3];
+	uint32_t count;
+	const double *x = value_numbers(v, scratch, &count);
+	for (uint32_t i = 0; i < count; i++)
+		if (!(x[i] >= p->min && x[i] <= p->max))
+			return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", p->name, x[i], p->min, p->max);
+	return 0;
+}
+
+static int check_value(const struct xml_element *el, const struct param *p, struct value *v, struct error *e)
+{
+	int r;
+	if (v->type == VALUE_INT && !(p->types & VALUE_INT) && (p->types & VALUE_FLOAT)) {
+		double x = (double)v->as.integer;
+		v->type = VALUE_FLOAT;
+		v->as.number = x;
+	}
+	if (!(v->type & p->types)) {
+		char list[256];
+		value_type_names(p->types, list, sizeof list);
+		return xml_error(el, e, EINVAL, "`%s` cannot be given like this (supported: %s)", p->name, list);
+	}
+	if (p->min < p->max && (r = check_range(el, p, v, e)))
+		return r;
+	if (v->type == VALUE_STRING && p->choices) {
+		char one[64];
+		for (const char *rest = p->choices; (rest = value_next_name(rest, one, sizeof one));)
+			if (strcmp(one, v->as.string) == 0)
+				return 0;
+		return refuse_choice(el, p, v->as.string, e);
+	}
+	return 0;
+}
+
+static int add_property(struct draft *d, const struct xml_element *el, const struct param *p, struct value v,
+			struct error *e)
+{
+	int r = check_value(el, p, &v, e);
+	if (r)
+		return r;
+	const struct property *before = node_find(d->node, p->name);
+	if (before)
+		return xml_error(el, e, EINVAL, "`%s` is given twice (first in line %d)", p->name, before->line);
+	d->properties[d->node->property_count++] = (struct property){p->name, el->line, v};
+	return 0;
+}
+
+/* What the table says of a name: *p understood, or NULL with the matter settled (ignored, or an error). */
+static int look_up(struct maker *m, const struct draft *d, const struct xml_element *owner,
+		   const struct xml_element *el, const char *name, const struct param **p)
+{
+	const struct param *found = plugin_param(d->decl, d->stands_in ? lenient_param(d->decl->type, name) : name);
+	*p = NULL;
+	if (d->decl->status == PARAM_IGNORED) {
+		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
+		return 0;
+	}
+	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
+		return leave_out(m, el, xml_attribute(owner, "type"), name, "the parameter");
+	if (!found || found->status == PARAM_REFUSED)
+		return refuse_property(d, el, name, found, m->error);
+	if (found->status == PARAM_IGNORED)
+		return note_property(m, owner, el, name);
+	*p = found;
+	return 0;
+}
+
+static int read_property(struct maker *m, struct draft *d, const struct xml_element *owner,
+			 const struct xml_element *el)
+{
+	const char *written = xml_attribute(el, "name");
+	if (!written)
+		return xml_error(el, m->error, EINVAL, "needs an attribute `name`");
+	const char *name = property_name(m, el, written);
+	if (!name)
+		return out_of_memory(m);
+	const struct param *p;
+	int r = look_up(m, d, owner, el, name, &p);
+	if (r || !p)
+		return r;
+	struct value v;
+	r = value_read(el, m->assets_from, &m->scene->arena, &v, m->error);
+	if (!r)
+		r = add_property(d, el, p, v, m->error);
+	if (r == -EINVAL && m->lenient && p->choices)
+		return leave_out(m, el, written, xml_attribute(el, "value"), "the value");
+	if (!r && v.type == VALUE_STRING && strcmp(p->name, "filename") == 0)
+		r = *v.as.string ? add_asset(m, v.as.string) : xml_error(el, m->error, EINVAL, "an empty file name");
+	const char *file = v.type == VALUE_SPECTRUM ? xml_attribute(el, "filename") : NULL;
+	return r || !file ? r : add_asset(m, file);
+}
+
+static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out);
+
+/* An object inside another or referred to there: by its name where the table has it, by its class else. */
+static int read_object(struct maker *m, struct draft *d, const struct xml_element *owner, const struct xml_element *el,
+		       struct xml_element *target)
+{
+	enum plugin_class cls;
+	bool is_class = plugin_class_find(target->name, &cls);
+	assert(is_class);
+	const char *written = xml_attribute(el, "name");
+	const struct param *p = NULL;
+	bool nested = d->decl->nested_classes >> cls & 1;
+	if (written) {
+		const char *name = property_name(m, el, written);
+		if (!name)
+			return out_of_memory(m);
+		const struct param *found = plugin_param(d->decl, name);
+		if (found || !nested) {
+			int r = look_up(m, d, owner, el, name, &p);
+			if (r || !p)
+				return r;
+			nested = false;
+		}
+	}
+	if (!p && !nested) {
+		if (d->decl->status == PARAM_IGNORED)
+			return 0;
+		if (m->lenient)
+			return leave_out(m, el, plugin_class_name(cls), d->node->type, "its use in");
+		return xml_error(el, m->error, EINVAL, "a %s%s has no place in <%s type=\"%.64s\">",
+				 plugin_class_name(cls), written ? "" : " without a name", owner->name, d->node->type);
+	}
+	if (p && (p->types & VALUE_COLOR) && cls != PLUGIN_TEXTURE)
+		return xml_error(el, m->error, EINVAL, "`%s` may be a texture, but not a %s", p->name,
+				 plugin_class_name(cls));
+	const struct scene_node *child;
+	int r = make_node(m, target, &child);
+	if (r)
+		return r;
+	if (p)
+		return add_property(d, el, p, (struct value){.type = VALUE_NODE, .as.node = child}, m->error);
+	bool many = d->node->cls == cls && (cls == PLUGIN_BSDF || cls == PLUGIN_SHAPE);
+	if (!many && node_child(d->node, cls, 0))
+		return xml_error(el, m->error, EINVAL, "a second %s in <%s type=\"%.64s\">", plugin_class_name(cls),
+				 owner->name, d->node->type);
+	d->children[d->node->child_count++] = child;
+	return 0;
+}
+
+static int refuse_element(const struct xml_element *el, struct error *e)
+{
+	char hint[128];
+	struct spelling s = {.wanted = el->name};
+	plugin_offer_classes(&s);
+	value_offer_elements(&s);
+	spelling_offer(&s, "ref");
+	spelling_offer(&s, "include");
+	spelling_offer(&s, "default");
+	spelling_offer(&s, "alias");
+	spelling_offer(&s, "path");
+	return xml_error(el, e, EINVAL, "has no place in <%.64s>, or is not supported%s",
+			 el->parent ? el->parent->name : "", spelling_hint(&s, hint, sizeof hint));
+}
+
+static int foreign_element(struct maker *m, const struct xml_element *el)
+{
+	return m->lenient ? leave_out(m, el, el->name, "", "the element") : refuse_element(el, m->error);
+}
+
+static int read_content(struct maker *m, struct draft *d, const struct xml_element *owner, struct xml_element *el)
+{
+	enum plugin_class cls;
+	if (el->ignored)
+		return note_foreign(m, el);
+	if (value_is_element(el->name))
+		return read_property(m, d, owner, el);
+	if (plugin_class_find(el->name, &cls))
+		return read_object(m, d, owner, el, el);
+	if (strcmp(el->name, "default") == 0)
+		return 0;
+	if (strcmp(el->name, "ref") != 0)
+		return d->decl->status == PARAM_IGNORED ? 0 : foreign_element(m, el);
+	if (d->decl->status == PARAM_IGNORED && !d->decl->nested_classes)
+		return 0;
+	struct xml_element *target;
+	int r = value_check_element(el, "id|name", false, m->error);
+	if (!r)
+		r = id_table_find(&m->ids, el, "id", &target, m->error);
+	return r ? r : read_object(m, d, owner, el, target);
+}
+
+static int refuse_type(struct maker *m, const struct xml_element *el, enum plugin_class cls, const char *type)
+{
+	char hint[128], list[512];
+	struct spelling s = {.wanted = type};
+	plugin_offer_types(m->decls, cls, &s);
+	plugin_list_types(m->decls, cls, list, sizeof list);
+	return xml_error(el, m->error, EINVAL, "there is no %s of this type%s (supported: %s)", plugin_class_name(cls),
+			 spelling_hint(&s, hint, sizeof hint), list);
+}
+
+static int note_ignored_plugin(struct maker *m, const struct xml_element *el, const struct plugin_decl *decl)
+{
+	char list[256];
+	const char *type = xml_attribute(el, "type");
+	plugin_list_params(decl, list, sizeof list);
+	return note(m, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored but for: %s", el->file, el->line,
+		    el->name, type, list);
+}
+
+static int fill_node(struct maker *m, struct draft *d, struct xml_element *el)
+{
+	size_t n = 0;
+	for (const struct xml_element *c = el->first; c; c = c->next)
+		n++;
+	d->properties = allocate(m, n, sizeof *d->properties);
+	d->children = allocate(m, n, sizeof *d->children);
+	if (!d->properties || !d->children)
+		return out_of_memory(m);
+	d->node->properties = d->properties;
+	d->node->children = d->children;
+	for (struct xml_element *c = el->first; c; c = c->next) {
+		int r = report_problem(&m->report, read_content(m, d, el, c), m->error);
+		if (r)
+			return r;
+	}
+	return 0;
+}
+
+/* The BSDF inside one that is not supported; NULL: none. */
+static struct xml_element *inner_bsdf(struct maker *m, const struct xml_element *el)
+{
+	struct error unused;
+	enum plugin_class cls;
+	for (struct xml_element *c = el->first; c; c = c->next) {
+		struct xml_element *target = c;
+		if (strcmp(c->name, "ref") == 0 && id_table_find(&m->ids, c, "id", &target, &unused))
+			continue;
+		if (plugin_class_find(target->name, &cls) && cls == PLUGIN_BSDF)
+			return target;
+	}
+	return NULL;
+}
+
+/* Of a plug-in that is not supported: refuses it, or finds the table and the type that stand in for it, or makes *out
+ * of what is inside (*decl stays NULL). REPORT_TOLD: it is left out. */
+static int stand_in(struct maker *m, struct xml_element *el, enum plugin_class cls, const char **type,
+		    const struct plugin_decl **decl, const struct scene_node **out)
+{
+	const char *other;
+	enum lenient_way way = m->lenient ? lenient_plugin(cls, *type, &other) : LENIENT_REFUSE;
+	if (way == LENIENT_REFUSE)
+		return refuse_type(m, el, cls, *type);
+	struct xml_element *inner = way == LENIENT_INNER ? inner_bsdf(m, el) : NULL;
+	int r = way == LENIENT_LEAVE_OUT
+			? leave_out(m, el, *type, "", "the plug-in")
+			: note(m, el, *type, "",
+			       "%s:%d: <%.64s type=\"%.64s\"> is not supported; %s%s stands in for it (lenient)",
+			       el->file, el->line, el->name, *type, inner ? "the BSDF inside" : "a standard ",
+			       inner ? "" : other);
+	if (r || way == LENIENT_LEAVE_OUT)
+		return r ? r : REPORT_TOLD;
+	if (inner) {
+		el->busy = true;
+		m->depth++;
+		r = make_node(m, inner, out);
+		m->depth--;
+		el->busy = false;
+		return r;
+	}
+	*type = other;
+	*decl = plugin_find(m->decls, cls, other);
+	return *decl ? 0 : refuse_type(m, el, cls, *type);
+}
+
+/* An object with something wrong inside becomes a node all the same, so that all that is wrong is found; one that is no
+ * object of any kind does not, and is complained of once. */
+static int make_node(struct maker *m, struct xml_element *el, const struct scene_node **out)
+{
+	if (el->node) {
+		*out = el->node;
+		return 0;
+	}
+	if (el->busy)
+		return xml_error(el, m->error, ELOOP, "refers to itself");
+	if (el->told)
+		return REPORT_TOLD;
+	if (m->depth >= XML_DEPTH_MAX)
+		return xml_error(el, m->error, ELOOP, "objects refer to each other more than %d deep", XML_DEPTH_MAX);
+	el->told = true; /* unless it succeeds */
+	enum plugin_class cls;
+	plugin_class_find(el->name, &cls);
+	int r = value_check_element(el, "type|id|name", true, m->error);
+	if (r)
+		return r;
+	const char *type = xml_attribute(el, "type");
+	if (!type)
+		return xml_error(el, m->error, EINVAL, "needs an attribute `type`");
+	const struct plugin_decl *decl = plugin_find(m->decls, cls, type);
+	bool stands_in = !decl;
+	if (!decl && (r = stand_in(m, el, cls, &type, &decl, out)))
+		return r;
+	if (!decl) /* *out does */
+		return el->node = *out, 0;
+	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(m, el, decl)))
+		return r;
+	struct draft d = {.node = allocate(m, 1, sizeof *d.node), .decl = decl, .stands_in = stands_in};
+	if (!d.node)
+		return out_of_memory(m);
+	*d.node = (struct scene_node){.cls = cls,
+				      .type = type,
+				      .id = xml_attribute(el, "id"),
+				      .file = el->file,
+				      .line = el->line,
+				      .decl = decl};
+	el->busy = true;
+	m->depth++;
+	r = fill_node(m, &d, el);
+	m->depth--;
+	el->busy = false;
+	el->node = *out = d.node;
+	return r;
+}
+
+static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects);
+
+static int read_include(struct maker *m, const struct xml_element *el, const struct scene_node **objects)
+{
+	int r = value_check_element(el, "filename", true, m->error);
+	return r ? r : read_top(m, el->first, objects);
+}
+
+static int read_top(struct maker *m, const struct xml_element *scene, const struct scene_node **objects)
+{
+	int r = value_check_element(scene, "version", true, m->error);
+	r = report_problem(&m->report, r, m->error);
+	for (struct xml_element *el = scene->first; el && !r; el = el->next) {
+		enum plugin_class cls;
+		const struct scene_node **next = &objects[m->scene->object_count];
+		if (el->ignored)
+			r = note_foreign(m, el);
+		else if (plugin_class_find(el->name, &cls))
+			m->scene->object_count += (r = make_node(m, el, next)) == 0;
+		else if (strcmp(el->name, "include") == 0)
+			r = read_include(m, el, objects);
+		else if (strcmp(el->name, "default") == 0)
+			r = value_check_element(el, "name|value", false, m->error);
+		else if (strcmp(el->name, "path") == 0)
+			r = value_check_element(el, "value", false, m->error);
+		else if (strcmp(el->name, "alias") != 0)
+			r = foreign_element(m, el);
+		r = report_problem(&m->report, r, m->error);
+	}
+	return r;
+}
+
+static int compare_names(const void *a, const void *b)
+{
+	const char *const *x = a, *const *y = b;
+	return strcmp(*x, *y);
+}
+
+static int list_assets(struct maker *m)
+{
+	for (uint32_t i = 0; i < m->tree->include_count; i++) {
+		int r = add_asset(m, m->tree->includes[i]);
+		if (r)
+			return r;
+	}
+	uint32_t n = 0;
+	if (m->asset_count)
+		qsort(m->assets, m->asset_count, sizeof *m->assets, compare_names);
+	for (size_t i = 0; i < m->asset_count; i++)
+		if (n == 0 || strcmp(m->assets[n - 1], m->assets[i]) != 0)
+			m->assets[n++] = m->assets[i];
+	m->scene->assets = m->assets;
+	m->scene->asset_count = n;
+	return 0;
+}
+
+static int make_scene(struct maker *m)
+{
+	struct scene *s = m->scene;
+	const struct scene_node **objects = allocate(m, m->tree->element_count, sizeof *objects);
+	if (!objects)
+		return out_of_memory(m);
+	s->dialect_3 = m->tree->dialect_3;
+	s->objects = objects;
+	int r = report_problem(&m->report, id_table_make(&m->ids, m->tree, &m->scene->arena, m->error), m->error);
+	if (!r)
+		r = read_top(m, m->tree->root, objects);
+	if (!r)
+		r = remarks_on(m->scene, &m->report, m->error);
+	return r ? r : list_assets(m);
+}
+
+/* All that can be said of the file; what is wrong with it ends in s->problems. */
+static int read_all(struct scene *s, const struct asset_source *assets, const char *name,
+		    const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+		    bool lenient, struct maker *m)
+{
+	*s = (struct scene){.arena.limit = XML_MEMORY_MAX};
+	*m = (struct maker){.scene = s, .assets_from = assets, .decls = decls, .error = m->error, .lenient = lenient};
+	m->tree = allocate(m, 1, sizeof *m->tree);
+	int r = m->tree ? report_init(&m->report, &s->arena, m->error) : out_of_memory(m);
+	if (r)
+		return r;
+	r = xml_read(m->tree, assets, name, defines, define_count, &s->arena, m->error);
+	if (r)
+		r = report_problem(&m->report, r, m->error);
+	else
+		r = make_scene(m);
+	s->notes = m->report.notes;
+	s->note_count = m->report.note_count;
+	s->problems = m->report.problems;
+	s->problem_count = m->report.problem_count;
+	return r;
+}
+
+int scene_read_all(struct scene *s, const struct asset_source *assets, const char *name,
+		   const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+		   bool lenient, struct error *e)
+{
+	struct maker m = {.error = e};
+	int r = read_all(s, assets, name, decls, defines, define_count, lenient, &m);
+	if (r)
+		scene_fini(s);
+	return r;
+}
+
+static int read_whole(struct scene *s, const struct asset_source *assets, const char *name,
+		      const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+		      bool lenient, struct error *e)
+{
+	struct error unused;
+	struct maker m = {.error = e ? e : &unused};
+	int r = read_all(s, assets, name, decls, defines, define_count, lenient, &m);
+	if (!r && s->problem_count > 0) {
+		r = m.report.code;
+		uint32_t more = s->problem_count - 1;
+		if (more)
+			error_set(e, -r, "%.900s (and %u more: hslt-scene check lists them)", m.report.first.text,
+				  more);
+		else if (e)
+			*e = m.report.first;
+	}
+	if (r)
+		scene_fini(s);
+	return r;
+}
+
+int scene_read(struct scene *s, const struct asset_source *assets, const char *name, const struct plugin_decl *decls,
+	       const struct scene_define *defines, size_t define_count, struct error *e)
+{
+	return read_whole(s, assets, name, decls, defines, define_count, false, e);
+}
+
+int scene_read_lenient(struct scene *s, const struct asset_source *assets, const char *name,
+		       const struct plugin_decl *decls, const struct scene_define *defines, size_t define_count,
+		       struct error *e)
+{
+	return read_whole(s, assets, name, decls, defines, define_count, true, e);
+}
+
+void scene_fini(struct scene *s)
+{
+	arena_fini(&s->arena);
+	*s = (struct scene){0};
+}

@@ -1,0 +1,333 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/settings.h"
+
+#include "common/plan/plan.h"
+#include "worker/render/scene/number.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { MAX_DEPTH = 128, FILM_PIXELS_MAX = 1 << 28, DEFAULT_WIDTH = 768, DEFAULT_HEIGHT = 576, RADIUS_MAX = 64 };
+
+#define DIAGONAL_35MM 43.266615305567875 /* of 36 mm x 24 mm */
+
+#define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
+#define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
+#define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
+#define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
+
+/* Of both cameras. Shutters: nothing moves. */
+#define CAMERA_PARAMS                                                                                             \
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"fov", RANGE(VALUE_FLOAT, 1e-4, 179.9)},                      \
+		{"fov_axis", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "x|y|diagonal|smaller|larger"},                \
+		{"focal_length", UNDERSTOOD(VALUE_STRING)}, {"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},           \
+		{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)}, {"shutter_open", IGNORED}, {"shutter_close", IGNORED}, \
+		{"principal_point_offset_x", RANGE(VALUE_FLOAT, -10, 10)},                                        \
+		{"principal_point_offset_y", RANGE(VALUE_FLOAT, -10, 10)},                                        \
+	{                                                                                                         \
+		"srf", REFUSED                                                                                    \
+	}
+
+static const struct param perspective_params[] = {
+	CAMERA_PARAMS,
+	{"focus_distance", IGNORED},  /* a pinhole has none; exporters write it all the same */
+	{"aperture_radius", REFUSED}, /* thinlens has one */
+	{NULL, 0, 0, 0, 0, NULL},
+};
+static const struct param thinlens_params[] = {
+	CAMERA_PARAMS,
+	{"focus_distance", RANGE(VALUE_FLOAT, 1e-30, 1e30)},
+	{"aperture_radius", RANGE(VALUE_FLOAT, 0, 1e30)},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+static const struct param orthographic_params[] = {
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)},
+	{"near_clip", RANGE(VALUE_FLOAT, 0, 1e30)},
+	{"far_clip", RANGE(VALUE_FLOAT, 0, 1e30)},
+	{"shutter_open", IGNORED},
+	{"shutter_close", IGNORED},
+	{"focus_distance", IGNORED},
+	{"srf", REFUSED},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+static const struct param film_params[] = {
+	{"width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
+	{"height", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
+	{"crop_offset_x", RANGE(VALUE_INT, 0, PLAN_MAX_SIZE)},
+	{"crop_offset_y", RANGE(VALUE_INT, 0, PLAN_MAX_SIZE)},
+	{"crop_width", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
+	{"crop_height", RANGE(VALUE_INT, 1, PLAN_MAX_SIZE)},
+	{"size", REFUSED},
+	{"filename", IGNORED},
+	{"file_format", IGNORED},
+	{"pixel_format", IGNORED},
+	{"component_format", IGNORED},
+	{"channel_names", IGNORED},
+	{"banner", IGNORED},
+	{"gamma", IGNORED},
+	{"exposure", IGNORED},
+	{"tonemap_method", IGNORED},
+	{"key", IGNORED},
+	{"burn", IGNORED},
+	{"attach_log", IGNORED},
+	{"variable", IGNORED},
+	{"digits", IGNORED},
+	{"high_quality_edges", IGNORED},
+	{"sample_border", IGNORED},
+	{"compensate", IGNORED},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+static const struct param radius_params[] = {{"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)},
+					     {NULL, 0, 0, 0, 0, NULL}};
+static const struct param gaussian_params[] = {
+	{"stddev", RANGE(VALUE_FLOAT, 0.01, RADIUS_MAX / 4)},
+	{"radius", RANGE(VALUE_FLOAT, 0.25, RADIUS_MAX)},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+static const struct param cubic_params[] = {
+	{"b", RANGE(VALUE_FLOAT, -1, 1)}, {"B", RANGE(VALUE_FLOAT, -1, 1)}, {"c", RANGE(VALUE_FLOAT, -1, 1)},
+	{"C", RANGE(VALUE_FLOAT, -1, 1)}, {NULL, 0, 0, 0, 0, NULL},
+};
+static const struct param no_params[] = {{NULL, 0, 0, 0, 0, NULL}};
+static const struct param lanczos_params[] = {{"lobes", RANGE(VALUE_INT, 1, 16)}, {NULL, 0, 0, 0, 0, NULL}};
+static const struct param sampler_params[] = {
+	{"sample_count", RANGE(VALUE_INT, 1, 1 << 30)},
+	{"*", IGNORED},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+static const struct param integrator_params[] = {
+	{"max_depth", RANGE(VALUE_INT, -1, 1 << 30)},
+	{"hide_emitters", UNDERSTOOD(VALUE_BOOL)},
+	{"*", IGNORED},
+	{NULL, 0, 0, 0, 0, NULL},
+};
+
+#define HOLDS(cls) (1u << (cls))
+
+const struct plugin_decl setting_decls[] = {
+	{PLUGIN_SENSOR, "perspective", perspective_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER),
+	 PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "thinlens", thinlens_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER), PARAM_UNDERSTOOD},
+	{PLUGIN_SENSOR, "orthographic", orthographic_params, HOLDS(PLUGIN_FILM) | HOLDS(PLUGIN_SAMPLER),
+	 PARAM_UNDERSTOOD},
+	{PLUGIN_FILM, "hdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
+	{PLUGIN_FILM, "mfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
+	{PLUGIN_FILM, "tiledhdrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
+	{PLUGIN_FILM, "ldrfilm", film_params, HOLDS(PLUGIN_RFILTER), PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "box", radius_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "tent", radius_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "gaussian", gaussian_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "mitchell", cubic_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "catmullrom", no_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_RFILTER, "lanczos", lanczos_params, 0, PARAM_UNDERSTOOD},
+	{PLUGIN_SAMPLER, "*", sampler_params, 0, PARAM_IGNORED},
+	/* irrcache, adaptive, aov and others hold the integrator that says the depth. */
+	{PLUGIN_INTEGRATOR, "*", integrator_params, HOLDS(PLUGIN_INTEGRATOR), PARAM_IGNORED},
+	{0, NULL, NULL, 0, 0},
+};
+
+/* The n-th of its class, from 1 on; count: of all. */
+static const struct scene_node *find_object(const struct scene *s, enum plugin_class cls, uint32_t n, uint32_t *count)
+{
+	const struct scene_node *found = NULL;
+	*count = 0;
+	for (uint32_t i = 0; i < s->object_count; i++)
+		if (s->objects[i]->cls == cls && ++*count == n)
+			found = s->objects[i];
+	return found;
+}
+
+/* A window of the whole film is none. */
+static int read_crop(const struct scene_node *film, struct scene_settings *out, struct error *e)
+{
+	uint64_t x = (uint64_t)node_int(film, "crop_offset_x", 0), y = (uint64_t)node_int(film, "crop_offset_y", 0);
+	uint64_t w = (uint64_t)node_int(film, "crop_width", out->width),
+		 h = (uint64_t)node_int(film, "crop_height", out->height);
+	if (x + w > out->width || y + h > out->height)
+		return node_error(film, e, ERANGE,
+				  "the crop window of %llu x %llu pixels at %llu, %llu leaves the film of %u x %u",
+				  (unsigned long long)w, (unsigned long long)h, (unsigned long long)x,
+				  (unsigned long long)y, out->width, out->height);
+	if (w == out->width && h == out->height)
+		return 0;
+	out->crop_x = (uint32_t)x;
+	out->crop_y = (uint32_t)y;
+	out->crop_width = (uint32_t)w;
+	out->crop_height = (uint32_t)h;
+	return 0;
+}
+
+static int read_film(const struct scene_node *sensor, uint32_t width, uint32_t height, struct scene_settings *out,
+		     struct error *e)
+{
+	const struct scene_node *film = node_child(sensor, PLUGIN_FILM, 0);
+	out->width = film ? (uint32_t)node_int(film, "width", DEFAULT_WIDTH) : DEFAULT_WIDTH;
+	out->height = film ? (uint32_t)node_int(film, "height", DEFAULT_HEIGHT) : DEFAULT_HEIGHT;
+	if (width && !height) /* the film keeps its shape */
+		out->height = (uint32_t)fmin(fmax(floor((double)width * out->height / out->width + 0.5), 1),
+					     PLAN_MAX_SIZE + 1.0);
+	if (width)
+		out->width = width;
+	if (height)
+		out->height = height;
+	if (out->width > PLAN_MAX_SIZE || out->height > PLAN_MAX_SIZE ||
+	    (uint64_t)out->width * out->height > FILM_PIXELS_MAX)
+		return node_error(film ? film : sensor, e, ERANGE,
+				  "a film of %u x %u pixels; at most %d a side and %d in all", out->width, out->height,
+				  PLAN_MAX_SIZE, FILM_PIXELS_MAX);
+	return film && !width && !height ? read_crop(film, out, e) : 0;
+}
+
+static int read_filter(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+{
+	const struct scene_node *film = node_child(sensor, PLUGIN_FILM, 0);
+	const struct scene_node *filter = film ? node_child(film, PLUGIN_RFILTER, 0) : NULL;
+	out->filter = FILTER_GAUSSIAN;
+	out->filter_stddev = 0.5;
+	if (filter && strcmp(filter->type, "box") == 0) {
+		out->filter = FILTER_BOX;
+		out->filter_radius = node_float(filter, "radius", 0.5);
+	} else if (filter && strcmp(filter->type, "tent") == 0) {
+		out->filter = FILTER_TENT;
+		out->filter_radius = node_float(filter, "radius", 1.0);
+	} else if (filter && (strcmp(filter->type, "mitchell") == 0 || strcmp(filter->type, "catmullrom") == 0)) {
+		bool mitchell = strcmp(filter->type, "mitchell") == 0;
+		out->filter = FILTER_CUBIC;
+		out->filter_radius = 2;
+		out->filter_b = mitchell ? node_float(filter, "B", node_float(filter, "b", 1.0 / 3)) : 0;
+		out->filter_c = mitchell ? node_float(filter, "C", node_float(filter, "c", 1.0 / 3)) : 0.5;
+	} else if (filter && strcmp(filter->type, "lanczos") == 0) {
+		out->filter = FILTER_LANCZOS;
+		out->filter_radius = (double)node_int(filter, "lobes", 3);
+	} else {
+		out->filter_stddev = filter ? node_float(filter, "stddev", 0.5) : 0.5;
+		out->filter_radius =
+			filter ? node_float(filter, "radius", 4 * out->filter_stddev) : 4 * out->filter_stddev;
+		if (filter && !(out->filter_radius > out->filter_stddev))
+			return node_error(filter, e, ERANGE, "a radius of %g pixels cuts off a Gaussian of stddev %g",
+					  out->filter_radius, out->filter_stddev);
+	}
+	out->border = out->filter_radius > 0.5 ? (uint32_t)ceil(out->filter_radius - 0.5) : 0;
+	return 0;
+}
+
+/* The innermost one says it, as in Mitsuba. */
+static int read_depth(const struct scene *s, struct scene_settings *out, struct error *e)
+{
+	uint32_t count;
+	const struct scene_node *integrator = find_object(s, PLUGIN_INTEGRATOR, 1, &count);
+	out->max_depth = MAX_DEPTH;
+	if (!integrator)
+		return 0;
+	if (count > 1)
+		return node_error(integrator, e, EINVAL, "a second integrator in the scene");
+	snprintf(out->integrator, sizeof out->integrator, "%s", integrator->type);
+	int64_t depth = -1;
+	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
+		depth = node_int(n, "max_depth", depth);
+	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
+		out->hide_emitters |= node_bool(n, "hide_emitters", false);
+	if (depth == 0)
+		return node_error(integrator, e, ERANGE,
+				  "a depth of 0 shows nothing; 1 is emitters seen directly, -1 no limit");
+	if (depth > 0 && depth < MAX_DEPTH)
+		out->max_depth = (uint32_t)depth;
+	return 0;
+}
+
+/* What the film shows is as wide as to_world makes the line from -1 to 1. */
+static int read_scale(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+{
+	mat4 m = node_transform(sensor, "to_world");
+	double x = vec3_length((vec3){m.m[0][0], m.m[1][0], m.m[2][0]}),
+	       y = vec3_length((vec3){m.m[0][1], m.m[1][1], m.m[2][1]});
+	if (!(fabs(x - y) <= 1e-3 * x) || !(x > 0) || !isfinite(x))
+		return node_error(sensor, e, ENOTSUP,
+				  "to_world scales the film by %g and %g: only square pixels are supported", x, y);
+	out->half_width = x;
+	return 0;
+}
+
+static int read_fov(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+{
+	if (strcmp(sensor->type, "orthographic") == 0) {
+		snprintf(out->fov_axis, sizeof out->fov_axis, "x");
+		return read_scale(sensor, out, e);
+	}
+	const struct property *fov = node_find(sensor, "fov");
+	const char *focal_length = node_string(sensor, "focal_length", NULL);
+	if (fov && focal_length)
+		return node_error(sensor, e, EINVAL, "fov and focal_length say the same thing; give one");
+	if (fov) {
+		out->fov = node_float(sensor, "fov", 0);
+		snprintf(out->fov_axis, sizeof out->fov_axis, "%s", node_string(sensor, "fov_axis", "x"));
+		return 0;
+	}
+	const char *text = focal_length ? focal_length : "50mm";
+	double mm;
+	const char *rest = number_scan(text, text + strlen(text), &mm);
+	if (!rest || strcmp(rest, "mm") != 0 || !(mm >= 0.1) || !(mm <= 1e6))
+		return node_error(sensor, e, EINVAL, "focal_length=\"%.64s\" is not a length like \"50mm\"", text);
+	out->fov = 2 * atan(0.5 * DIAGONAL_35MM / mm) * 57.295779513082320877;
+	snprintf(out->fov_axis, sizeof out->fov_axis, "diagonal");
+	return 0;
+}
+
+/* Columns made orthonormal around the view, mirrored ones stay mirrored. */
+static int read_camera(const struct scene_node *sensor, struct scene_settings *out, struct error *e)
+{
+	mat4 m = node_transform(sensor, "to_world");
+	vec3 x = {m.m[0][0], m.m[1][0], m.m[2][0]}, y = {m.m[0][1], m.m[1][1], m.m[2][1]},
+	     z = {m.m[0][2], m.m[1][2], m.m[2][2]};
+	x = vec3_normalize(x);
+	y = vec3_normalize(y);
+	z = vec3_normalize(z);
+	double skew = fmax(fabs(vec3_dot(x, y)), fmax(fabs(vec3_dot(y, z)), fabs(vec3_dot(z, x))));
+	if (!vec3_is_finite(x) || !vec3_is_finite(y) || !vec3_is_finite(z) || !(skew < 1e-3))
+		return node_error(sensor, e, EINVAL, "to_world must only turn, move, mirror and scale a camera");
+	double hand = vec3_dot(vec3_cross(x, y), z) < 0 ? -1 : 1;
+	x = vec3_normalize(vec3_madd(x, -vec3_dot(x, z), z));
+	y = vec3_scale(hand, vec3_cross(z, x));
+	out->to_world = (mat4){
+		{{x.x, y.x, z.x, m.m[0][3]}, {x.y, y.y, z.y, m.m[1][3]}, {x.z, y.z, z.z, m.m[2][3]}, {0, 0, 0, 1}}};
+	out->principal_x = node_float(sensor, "principal_point_offset_x", 0);
+	out->principal_y = node_float(sensor, "principal_point_offset_y", 0);
+	out->near_clip = node_float(sensor, "near_clip", 1e-2);
+	out->far_clip = node_float(sensor, "far_clip", 1e4);
+	if (!(out->near_clip < out->far_clip))
+		return node_error(sensor, e, EINVAL, "near_clip=%g is not below far_clip=%g", out->near_clip,
+				  out->far_clip);
+	if (strcmp(sensor->type, "thinlens") != 0)
+		return 0;
+	if (!node_find(sensor, "aperture_radius"))
+		return node_error(sensor, e, EINVAL, "a thinlens needs an aperture_radius");
+	out->aperture_radius = node_float(sensor, "aperture_radius", 0);
+	out->focus_distance = node_float(sensor, "focus_distance", out->far_clip);
+	return 0;
+}
+
+int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t which,
+			struct scene_settings *out, struct error *e)
+{
+	*out = (struct scene_settings){0};
+	uint32_t sensors;
+	const struct scene_node *sensor = find_object(s, PLUGIN_SENSOR, which, &sensors);
+	if (!sensor && sensors)
+		return error_set(e, EINVAL, "there is no sensor %u: the scene has %u", which, sensors);
+	if (!sensor)
+		return error_set(e, EINVAL, "the scene has no <sensor>");
+	const struct scene_node *sampler = node_child(sensor, PLUGIN_SAMPLER, 0);
+	out->spp = sampler ? (uint64_t)node_int(sampler, "sample_count", 0) : 0;
+	int r = read_film(sensor, width, height, out, e);
+	if (!r)
+		r = read_filter(sensor, out, e);
+	if (!r)
+		r = read_depth(s, out, e);
+	if (!r)
+		r = read_fov(sensor, out, e);
+	return r ? r : read_camera(sensor, out, e);
+}

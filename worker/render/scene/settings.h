@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What sensor, film, filter, sampler and integrator of a scene say, as plain numbers: for hslt-submit, hslt-render and
+ * the world. Needs no Embree and opens no asset.
+ */
+#ifndef WORKER_RENDER_SCENE_SETTINGS_H
+#define WORKER_RENDER_SCENE_SETTINGS_H
+
+#include "worker/render/scene/scene.h"
+
+enum filter_kind { FILTER_BOX, FILTER_TENT, FILTER_GAUSSIAN, FILTER_CUBIC, FILTER_LANCZOS };
+
+struct scene_settings {
+	uint32_t width, height; /* film, 1..PLAN_MAX_SIZE each */
+	enum filter_kind filter;
+	double filter_radius,
+		filter_stddev;	   /* pixels; Mitsuba's defaults: box 0.5, tent 1, gaussian 0.5 and 4 x that */
+	double filter_b, filter_c; /* of FILTER_CUBIC: Mitchell and Netravali's B and C */
+	uint32_t border;	   /* whole pixels by which the kernel reaches beyond a pixel: ceil(radius - 0.5) */
+	uint32_t crop_x, crop_y, crop_width, crop_height; /* what the scene's film wants rendered; width 0: all of it */
+	uint64_t spp;					  /* sampleCount; 0: none given */
+	uint32_t max_depth;  /* edges, 1..128 (-1 and more become 128); 128 when none is given */
+	bool hide_emitters;  /* paths of one edge, emitters seen directly, are not wanted */
+	char integrator[32]; /* the scene's own ("" none): ignored but for its depth */
+	/* perspective, thinlens */
+	mat4 to_world;	   /* camera: +z forward, +x LEFT on the image, +y up; any scale is removed */
+	double half_width; /* above 0: orthographic, half of what the film's width shows, in units of the scene */
+	double fov;	   /* degrees, along fov_axis */
+	char fov_axis[16]; /* x, y, diagonal, smaller, larger: resolved against the film size by the camera */
+	double principal_x,
+		principal_y; /* offset of the principal point from the middle, of the film's size, as in Mitsuba 3 */
+	double near_clip, far_clip;
+	double aperture_radius, focus_distance; /* thinlens; radius 0: a pinhole, whatever the distance */
+};
+
+/* width, height: override the film's (0: keep) and its crop window. sensor: which of several, from 1 on. */
+int scene_settings_read(const struct scene *s, uint32_t width, uint32_t height, uint32_t sensor,
+			struct scene_settings *out, struct error *e);
+
+/* Declarations of perspective, thinlens, hdrfilm, ldrfilm, box, tent, gaussian, all samplers, all integrators; NULL
+ * type ends. */
+extern const struct plugin_decl setting_decls[];
+
+#endif

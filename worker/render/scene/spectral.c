@@ -1,0 +1,380 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/spectral.h"
+
+#include "worker/render/math/cie.h"
+#include "worker/render/scene/number.h"
+#include "worker/render/scene/spelling.h"
+#include "worker/render/scene/value.h"
+
+#include <math.h>
+#include <string.h>
+
+#define TEMPERATURE_MAX 1e6 /* kelvin; below 100 no visible light is left in a double's range that matters */
+#define TEMPERATURE_MIN 100
+#define VALUE_LARGEST 1e30
+
+/* Luminance of the CIE's D65 table over that of a constant 1: dividing by it makes rgb 1 and this spectrum the same
+ * white. */
+static double d65_normalization(void)
+{
+	double sum = 0, y = 0;
+	for (int i = 0; i < CIE_COUNT; i++) {
+		sum += cie_d65[i] * cie_observer[i][1];
+		y += cie_observer[i][1];
+	}
+	return sum / y;
+}
+
+static int constant(const struct xml_element *el, double x, struct arena *arena, struct value *out, struct error *e)
+{
+	double *one = arena_alloc(arena, 1, sizeof *one);
+	if (!one)
+		return xml_error(el, e, ENOMEM, "out of memory");
+	*one = x;
+	*out = (struct value){.type = VALUE_SPECTRUM};
+	out->as.spectrum.count = 1;
+	out->as.spectrum.value = one;
+	return 0;
+}
+
+/* A table with room for n points; NULL, with the error set: no memory. */
+static bool table(const struct xml_element *el, uint32_t n, struct arena *arena, struct value *out, double **nm,
+		  double **value, struct error *e)
+{
+	*nm = arena_alloc(arena, n, sizeof **nm);
+	*value = arena_alloc(arena, n, sizeof **value);
+	*out = (struct value){.type = VALUE_SPECTRUM};
+	out->as.spectrum.count = n;
+	out->as.spectrum.nm = *nm;
+	out->as.spectrum.value = *value;
+	if (*nm && *value)
+		return true;
+	xml_error(el, e, ENOMEM, "out of memory");
+	return false;
+}
+
+static int check_table(const struct xml_element *el, const struct value *v, struct error *e)
+{
+	const double *nm = v->as.spectrum.nm;
+	if (v->as.spectrum.count < 2)
+		return xml_error(el, e, EINVAL,
+				 "one pair nm:value is no spectrum; give a single number for a constant");
+	for (uint32_t i = 0; i < v->as.spectrum.count; i++)
+		if (!(nm[i] > 0) || (i && !(nm[i] > nm[i - 1])))
+			return xml_error(el, e, EINVAL, "wavelengths must be positive and ascend: %g nm does not",
+					 nm[i]);
+	return 0;
+}
+
+/* "400:0.1, 500:0.2", or lines "400 0.1" of a file: how many, 0 when it is none of that. */
+static uint32_t scan_pairs(const char *p, const char *end, char between, double *nm, double *value)
+{
+	uint32_t n = 0;
+	while (p < end) {
+		while (p < end && (number_is_blank(*p) || *p == ','))
+			p++;
+		if (p < end && *p == '#' && between == ' ') {
+			while (p < end && *p != '\n')
+				p++;
+			continue;
+		}
+		if (p == end)
+			break;
+		double x, y;
+		p = number_scan(p, end, &x);
+		if (!p || p == end || n == SPECTRAL_POINTS_MAX || (between == ':' ? *p != ':' : !number_is_blank(*p)))
+			return 0;
+		p++;
+		while (between == ' ' && p < end && (*p == ' ' || *p == '\t'))
+			p++;
+		p = number_scan(p, end, &y);
+		if (!p || (p < end && !number_is_blank(*p) && *p != ','))
+			return 0;
+		if (nm) {
+			nm[n] = x;
+			value[n] = y;
+		}
+		n++;
+	}
+	return n;
+}
+
+static int read_pairs(const struct xml_element *el, const char *text, const char *end, char between,
+		      struct arena *arena, struct value *out, struct error *e)
+{
+	uint32_t n = scan_pairs(text, end, between, NULL, NULL);
+	if (n == 0)
+		return between == ':' ? xml_error(el, e, EINVAL,
+						  "`%.64s` is neither a number nor a list nm:value, nm:value, ... of "
+						  "at most %d",
+						  text, SPECTRAL_POINTS_MAX)
+				      : xml_error(el, e, EINVAL, "the file is no list of lines `nm value`, at most %d",
+						  SPECTRAL_POINTS_MAX);
+	double *nm, *value;
+	if (!table(el, n, arena, out, &nm, &value, e))
+		return -ENOMEM;
+	scan_pairs(text, end, between, nm, value);
+	return check_table(el, out, e);
+}
+
+static int read_file(const struct xml_element *el, const char *name, const struct asset_source *assets,
+		     struct arena *arena, struct value *out, struct error *e)
+{
+	struct asset a;
+	struct error inner;
+	int r = assets->open(assets->user, name, &a, &inner);
+	if (r)
+		return xml_error(el, e, -r, "%s", inner.text);
+	const char *text = (const char *)a.bytes;
+	r = read_pairs(el, a.size ? text : "", a.size ? text + a.size : "", ' ', arena, out, e);
+	assets->close(assets->user, &a);
+	return r;
+}
+
+static int read_value(const struct xml_element *el, const char *text, struct arena *arena, struct value *out,
+		      struct error *e)
+{
+	double x[3];
+	if (strchr(text, ':'))
+		return read_pairs(el, text, text + strlen(text), ':', arena, out, e);
+	if (number_parse(text, x))
+		return constant(el, x[0], arena, out, e);
+	/* 0.6 built with three lanes takes r, g, b here; with more it would take as many numbers. */
+	if (el->snake && number_list(text, x, 3) == 3) {
+		*out = (struct value){.type = VALUE_RGB};
+		memcpy(out->as.rgb, x, sizeof x);
+		return 0;
+	}
+	return xml_error(el, e, EINVAL,
+			 "`%.64s` is neither a number nor a list nm:value, nm:value, ...; three numbers "
+			 "belong into <rgb>",
+			 text);
+}
+
+/* Planck's law; h, c and k by the SI's definition. */
+static double planck(double nm, double kelvin)
+{
+	const double h = 6.62607015e-34, c = 299792458, k = 1.380649e-23;
+	double m = nm * 1e-9;
+	return 2 * h * c * c / pow(m, 5) / expm1(h * c / (m * k * kelvin)) * 1e-9;
+}
+
+static int blackbody(const struct xml_element *el, double kelvin, double scale, struct arena *arena, struct value *out,
+		     struct error *e)
+{
+	enum { STEP = 5, POINTS = (CIE_LAST_NM - CIE_FIRST_NM) / STEP + 1 };
+	if (!(kelvin >= TEMPERATURE_MIN && kelvin <= TEMPERATURE_MAX))
+		return xml_error(el, e, ERANGE, "a temperature of %g K is outside [%g, %g]", kelvin,
+				 (double)TEMPERATURE_MIN, TEMPERATURE_MAX);
+	double *nm, *value;
+	if (!table(el, POINTS, arena, out, &nm, &value, e))
+		return -ENOMEM;
+	for (uint32_t i = 0; i < POINTS; i++) {
+		nm[i] = CIE_FIRST_NM + STEP * (double)i;
+		value[i] = planck(nm[i], kelvin) * scale;
+	}
+	return 0;
+}
+
+static int number_of(const struct xml_element *el, const char *what, const char *text, double least, double *x,
+		     struct error *e)
+{
+	const char *end = text + strlen(text), *rest = number_scan(text, end, x);
+	if (rest && rest < end && *rest == 'K' && strcmp(what, "temperature") == 0)
+		rest++;
+	if (!rest || rest != end || !(*x >= least && *x <= VALUE_LARGEST))
+		return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not a number from %g to %g", what, text, least,
+				 VALUE_LARGEST);
+	return 0;
+}
+
+int spectral_read_blackbody(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
+{
+	const char *temperature = xml_attribute(el, "temperature"), *scale = xml_attribute(el, "scale");
+	double kelvin, factor = 1;
+	if (!temperature)
+		return xml_error(el, e, EINVAL, "needs a temperature in kelvin");
+	int r = number_of(el, "temperature", temperature, 0, &kelvin, e);
+	if (!r && scale)
+		r = number_of(el, "scale", scale, 0, &factor, e);
+	return r ? r : blackbody(el, kelvin, factor, arena, out, e);
+}
+
+/* What is written inside a <spectrum type="...">: the value of <float name="NAME" .../> or of any other element; NULL:
+ * none. */
+static const char *inner_value(const struct xml_element *el, const char *name)
+{
+	for (const struct xml_element *c = el->first; c; c = c->next) {
+		const char *given = xml_attribute(c, "name");
+		if (given && strcmp(given, name) == 0)
+			return xml_attribute(c, "value");
+	}
+	return NULL;
+}
+
+static int inner_number(const struct xml_element *el, const char *name, const char *older, double fallback, double *x,
+			struct error *e)
+{
+	const char *text = inner_value(el, name);
+	if (!text && older)
+		text = inner_value(el, older);
+	*x = fallback;
+	if (!text && isnan(fallback))
+		return xml_error(el, e, EINVAL, "needs `%s`", name);
+	return text ? number_of(el, name, text, 0, x, e) : 0;
+}
+
+/* The numbers of `name`, 2 at least: their count, or negative with the error set. */
+static int inner_list(const struct xml_element *el, const char *name, struct arena *arena, double **out,
+		      struct error *e)
+{
+	const char *text = inner_value(el, name);
+	size_t room = text ? strlen(text) / 2 + 1 : 0;
+	if (room > SPECTRAL_POINTS_MAX)
+		room = SPECTRAL_POINTS_MAX;
+	*out = arena_alloc(arena, room, sizeof **out);
+	if (!*out)
+		return xml_error(el, e, ENOMEM, "out of memory");
+	int n = text ? number_list(text, *out, room) : 0;
+	return n >= 2 ? n : xml_error(el, e, EINVAL, "needs `%s`, 2 to %d numbers", name, SPECTRAL_POINTS_MAX);
+}
+
+static int pair_up(const struct xml_element *el, int n, const double *nm, const double *value, struct value *out,
+		   struct error *e)
+{
+	*out = (struct value){.type = VALUE_SPECTRUM};
+	out->as.spectrum.count = (uint32_t)n;
+	out->as.spectrum.nm = nm;
+	out->as.spectrum.value = value;
+	return check_table(el, out, e);
+}
+
+static int read_regular(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
+{
+	double low, high, *value;
+	int r = inner_number(el, "wavelength_min", "lambda_min", NAN, &low, e);
+	if (!r)
+		r = inner_number(el, "wavelength_max", "lambda_max", NAN, &high, e);
+	int n = r ? r : inner_list(el, "values", arena, &value, e);
+	if (n < 0)
+		return n;
+	double *nm = arena_alloc(arena, (size_t)n, sizeof *nm);
+	if (!nm)
+		return xml_error(el, e, ENOMEM, "out of memory");
+	for (int i = 0; i < n; i++)
+		nm[i] = low + (high - low) * i / (n - 1);
+	return pair_up(el, n, nm, value, out, e);
+}
+
+static int read_irregular(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
+{
+	double *nm, *value;
+	int n = inner_list(el, "wavelengths", arena, &nm, e),
+	    values = n < 0 ? n : inner_list(el, "values", arena, &value, e);
+	if (values < 0)
+		return values;
+	return n == values ? pair_up(el, n, nm, value, out, e)
+			   : xml_error(el, e, EINVAL, "%d wavelengths, but %d values", n, values);
+}
+
+static int read_d65(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
+{
+	double scale, *nm, *value;
+	int r = inner_number(el, "scale", NULL, 1, &scale, e);
+	if (r)
+		return r;
+	if (!table(el, CIE_COUNT, arena, out, &nm, &value, e))
+		return -ENOMEM;
+	double unit = scale / d65_normalization();
+	for (uint32_t i = 0; i < CIE_COUNT; i++) {
+		nm[i] = CIE_FIRST_NM + (double)i;
+		value[i] = cie_d65[i] * unit;
+	}
+	return 0;
+}
+
+static int read_uniform(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
+{
+	double x;
+	int r = inner_number(el, "value", NULL, 1, &x, e);
+	return r ? r : constant(el, x, arena, out, e);
+}
+
+static int read_inner_blackbody(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
+{
+	double kelvin, scale;
+	int r = inner_number(el, "temperature", NULL, NAN, &kelvin, e);
+	if (!r)
+		r = inner_number(el, "scale", NULL, 1, &scale, e);
+	return r ? r : blackbody(el, kelvin, scale, arena, out, e);
+}
+
+static int read_srgb(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e)
+{
+	(void)arena;
+	const char *text = inner_value(el, "color");
+	*out = (struct value){.type = VALUE_RGB};
+	if (!text || number_list(text, out->as.rgb, 3) != 3)
+		return xml_error(el, e, EINVAL, "needs `color`, three numbers");
+	return 0;
+}
+
+static const struct {
+	const char *type, *names; /* of what may stand inside */
+	int (*read)(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e);
+} types[] = {
+	{"uniform", "value|wavelength_min|wavelength_max|lambda_min|lambda_max", read_uniform},
+	{"regular", "wavelength_min|wavelength_max|lambda_min|lambda_max|values", read_regular},
+	{"irregular", "wavelengths|values", read_irregular},
+	{"d65", "scale", read_d65},
+	{"blackbody", "temperature|scale|wavelength_min|wavelength_max|lambda_min|lambda_max", read_inner_blackbody},
+	{"srgb", "color", read_srgb},
+	{"rgb", "color", read_srgb},
+};
+enum { TYPES = sizeof types / sizeof *types };
+
+static bool is_listed(const char *list, const char *wanted)
+{
+	char name[64];
+	while ((list = value_next_name(list, name, sizeof name)))
+		if (strcmp(name, wanted) == 0)
+			return true;
+	return false;
+}
+
+static int read_typed(const struct xml_element *el, const char *type, struct arena *arena, struct value *out,
+		      struct error *e)
+{
+	char hint[128], list[256] = "";
+	struct spelling s = {.wanted = type};
+	for (int i = 0; i < TYPES; i++) {
+		spelling_offer(&s, types[i].type);
+		spelling_list(list, sizeof list, types[i].type);
+		if (strcmp(types[i].type, type) != 0)
+			continue;
+		for (const struct xml_element *c = el->first; c; c = c->next) {
+			const char *name = xml_attribute(c, "name");
+			if (!name || !xml_attribute(c, "value") || !is_listed(types[i].names, name))
+				return xml_error(c, e, EINVAL,
+						 "has no place in a spectrum of type `%s` (it may hold: %s)", type,
+						 types[i].names);
+		}
+		return types[i].read(el, arena, out, e);
+	}
+	return xml_error(el, e, EINVAL, "there is no spectrum of this type%s (supported: %s)",
+			 spelling_hint(&s, hint, sizeof hint), list);
+}
+
+int spectral_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena,
+		  struct value *out, struct error *e)
+{
+	const char *file = xml_attribute(el, "filename"), *text = xml_attribute(el, "value"),
+		   *type = xml_attribute(el, "type");
+	if ((file != NULL) + (text != NULL) + (type != NULL) != 1)
+		return xml_error(el, e, EINVAL, "needs either value or filename or type");
+	if (type)
+		return read_typed(el, type, arena, out, e);
+	if (el->first)
+		return xml_error(el->first, e, EINVAL, "has no place in <spectrum>");
+	return file ? read_file(el, file, assets, arena, out, e) : read_value(el, text, arena, out, e);
+}

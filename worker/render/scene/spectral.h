@@ -1,0 +1,21 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Spectra of scene files: <spectrum value="..."/> and filename="....spd", <spectrum type="..."> of 3.x, <blackbody> of
+ * 0.6. All become a constant or a table of wavelengths and values (struct value), for light and surfaces alike. One
+ * thread; allocates in the arena.
+ */
+#ifndef WORKER_RENDER_SCENE_SPECTRAL_H
+#define WORKER_RENDER_SCENE_SPECTRAL_H
+
+#include "worker/render/scene/asset.h"
+#include "worker/render/scene/xml.h"
+
+enum { SPECTRAL_POINTS_MAX = 65536 };
+
+/* A <spectrum>; *out may also become an rgb colour (three numbers in 0.6, type="srgb" and "rgb"). */
+int spectral_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena,
+		  struct value *out, struct error *e);
+/* A <blackbody temperature="5000" scale="1"/>: Planck's law in W / (m^2 sr nm), times the scale. */
+int spectral_read_blackbody(const struct xml_element *el, struct arena *arena, struct value *out, struct error *e);
+
+#endif

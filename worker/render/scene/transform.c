@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/transform.h"
+
+#include "worker/render/scene/number.h"
+#include "worker/render/scene/param.h"
+#include "worker/render/scene/spelling.h"
+#include "worker/render/scene/value.h"
+
+#include <string.h>
+
+/* Any number of a transform: what squares of areas can hold. */
+static int check_number(const struct xml_element *el, const char *attribute, double x, struct error *e)
+{
+	if (fabs(x) <= PARAM_LENGTH_MAX)
+		return 0;
+	return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", attribute, x, -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX);
+}
+
+static int read_triple(const struct xml_element *el, const char *attribute, vec3 *out, struct error *e)
+{
+	const char *text = xml_attribute(el, attribute);
+	double v[3];
+	if (!text)
+		return xml_error(el, e, EINVAL, "needs an attribute `%s`", attribute);
+	if (number_list(text, v, 3) != 3)
+		return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not three numbers", attribute, text);
+	for (int i = 0; i < 3; i++) {
+		int r = check_number(el, attribute, v[i], e);
+		if (r)
+			return r;
+	}
+	*out = (vec3){v[0], v[1], v[2]};
+	return 0;
+}
+
+int transform_read_vec3(const struct xml_element *el, double missing, bool one_for_all, vec3 *out, struct error *e)
+{
+	static const char *const axes[3] = {"x", "y", "z"};
+	double v[3];
+	const char *text = xml_attribute(el, "value");
+	bool any = false;
+	for (int i = 0; i < 3; i++) {
+		const char *component = xml_attribute(el, axes[i]);
+		v[i] = missing;
+		any |= component != NULL;
+		if (component && !number_parse(component, &v[i]))
+			return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not a (finite) number", axes[i], component);
+	}
+	if (any == (text != NULL))
+		return xml_error(el, e, EINVAL, "needs either x, y, z or value");
+	if (text) {
+		int n = number_list(text, v, 3);
+		if (n == 1 && one_for_all)
+			v[1] = v[2] = v[0];
+		else if (n != 3)
+			return xml_error(el, e, EINVAL, "value=\"%.64s\" is not three numbers%s", text,
+					 one_for_all ? " or one" : "");
+	}
+	for (int i = 0; i < 3; i++) {
+		int r = check_number(el, text ? "value" : axes[i], v[i], e);
+		if (r)
+			return r;
+	}
+	*out = (vec3){v[0], v[1], v[2]};
+	return 0;
+}
+
+static int read_translate(const struct xml_element *el, mat4 *m, struct error *e)
+{
+	vec3 v;
+	int r = transform_read_vec3(el, 0, false, &v, e);
+	*m = r ? *m : mat4_translate(v);
+	return r;
+}
+
+static int read_scale(const struct xml_element *el, mat4 *m, struct error *e)
+{
+	vec3 v;
+	int r = transform_read_vec3(el, 1, true, &v, e);
+	*m = r ? *m : mat4_scale(v);
+	return r;
+}
+
+static int read_rotate(const struct xml_element *el, mat4 *m, struct error *e)
+{
+	vec3 axis;
+	double degrees;
+	int r = transform_read_vec3(el, 0, false, &axis, e);
+	if (r)
+		return r;
+	const char *angle = xml_attribute(el, "angle");
+	if (!angle || !number_parse(angle, &degrees))
+		return xml_error(el, e, EINVAL, "needs an angle in degrees");
+	r = check_number(el, "angle", degrees, e);
+	if (r)
+		return r;
+	double length = vec3_length(axis);
+	if (!(length > 0) || !isfinite(length))
+		return xml_error(el, e, EINVAL, "has no axis: x, y, z are (%g, %g, %g)", axis.x, axis.y, axis.z);
+	*m = mat4_rotate(axis, degrees);
+	return 0;
+}
+
+static bool is_in_range(const mat4 *m)
+{
+	for (int i = 0; i < 4; i++)
+		for (int j = 0; j < 4; j++)
+			if (!(fabs(m->m[i][j]) <= PARAM_LENGTH_MAX))
+				return false;
+	return true;
+}
+
+static int read_lookat(const struct xml_element *el, mat4 *m, struct error *e)
+{
+	vec3 origin, target, up;
+	int r = read_triple(el, "origin", &origin, e);
+	if (!r)
+		r = read_triple(el, "target", &target, e);
+	if (!r)
+		r = read_triple(el, "up", &up, e);
+	if (r)
+		return r;
+	*m = mat4_look_at(origin, target, up);
+	if (!is_in_range(m))
+		return xml_error(el, e, EINVAL, "origin and target are one point, or up points along the view");
+	return 0;
+}
+
+static int read_matrix(const struct xml_element *el, mat4 *m, struct error *e)
+{
+	const char *text = xml_attribute(el, "value");
+	double v[16];
+	int n = text ? number_list(text, v, 16) : -1;
+	if (n != 16 && n != 9)
+		return xml_error(el, e, EINVAL, "needs value=\"...\" with 16 or 9 numbers, row by row");
+	*m = mat4_identity();
+	int side = n == 16 ? 4 : 3;
+	for (int i = 0; i < n; i++) {
+		int r = check_number(el, "value", v[i], e);
+		if (r)
+			return r;
+		m->m[i / side][i % side] = v[i];
+	}
+	if (m->m[3][0] != 0 || m->m[3][1] != 0 || m->m[3][2] != 0 || m->m[3][3] != 1)
+		return xml_error(el, e, EINVAL, "the last row must be 0 0 0 1: only affine transforms are supported");
+	return 0;
+}
+
+static const struct step {
+	const char *element, *attributes;
+	int (*read)(const struct xml_element *el, mat4 *m, struct error *e);
+} steps[] = {
+	{"translate", "x|y|z|value", read_translate}, {"rotate", "x|y|z|value|angle", read_rotate},
+	{"scale", "x|y|z|value", read_scale},	      {"lookat", "origin|target|up", read_lookat},
+	{"lookAt", "origin|target|up", read_lookat},  {"matrix", "value", read_matrix},
+};
+enum { STEPS = sizeof steps / sizeof *steps };
+
+static const struct step *find_step(const char *name, struct spelling *s)
+{
+	for (int i = 0; i < STEPS; i++) {
+		if (strcmp(steps[i].element, name) == 0)
+			return &steps[i];
+		spelling_offer(s, steps[i].element);
+	}
+	return NULL;
+}
+
+int transform_read(const struct xml_element *el, mat4 *out, struct error *e)
+{
+	mat4 m = mat4_identity();
+	for (const struct xml_element *c = el->first; c; c = c->next) {
+		if (c->ignored)
+			continue;
+		struct spelling s = {.wanted = c->name};
+		const struct step *step = find_step(c->name, &s);
+		char hint[128];
+		if (!step)
+			return xml_error(c, e, EINVAL,
+					 "is no transform%s (supported: translate, rotate, scale, lookat, matrix)",
+					 spelling_hint(&s, hint, sizeof hint));
+		mat4 one;
+		int r = value_check_element(c, step->attributes, false, e);
+		if (!r)
+			r = step->read(c, &one, e);
+		if (r)
+			return r;
+		m = mat4_mul(one, m);
+		if (!is_in_range(&m))
+			return xml_error(c, e, ERANGE,
+					 "the transform leaves the range of numbers: an element is outside [%g, %g]",
+					 -PARAM_LENGTH_MAX, PARAM_LENGTH_MAX);
+	}
+	*out = m;
+	return 0;
+}

@@ -1,0 +1,273 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/value.h"
+
+#include "worker/render/scene/number.h"
+#include "worker/render/scene/spectral.h"
+#include "worker/render/scene/spelling.h"
+#include "worker/render/scene/transform.h"
+#include "worker/render/scene/srgb.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+const char *value_next_name(const char *list, char *name, size_t size)
+{
+	if (!*list)
+		return NULL;
+	size_t n = strcspn(list, "|"), k = n < size - 1 ? n : size - 1;
+	memcpy(name, list, k);
+	name[k] = 0;
+	return list[n] ? list + n + 1 : list + n;
+}
+
+static bool is_listed(const char *list, const char *wanted, struct spelling *s)
+{
+	char name[64];
+	while ((list = value_next_name(list, name, sizeof name))) {
+		if (strcmp(name, wanted) == 0)
+			return true;
+		if (s)
+			spelling_offer(s, name);
+	}
+	return false;
+}
+
+/* spelling_offer keeps the pointer: the names of attributes must outlive the search, those in a list do not. */
+static int refuse_attribute(const struct xml_element *el, const char *known, const char *wanted, struct error *e)
+{
+	char name[64], best[64] = "", hint[128];
+	struct spelling s = {.wanted = wanted};
+	for (const char *list = known; (list = value_next_name(list, name, sizeof name));) {
+		const char *before = s.best;
+		size_t distance = s.distance;
+		spelling_offer(&s, name);
+		if (s.best && (s.best != before || s.distance != distance)) {
+			memcpy(best, name, sizeof best);
+			s.best = best;
+		}
+	}
+	return xml_error(el, e, EINVAL, "has no attribute `%.64s`%s (it may have: %s)", wanted,
+			 spelling_hint(&s, hint, sizeof hint), known);
+}
+
+int value_check_element(const struct xml_element *el, const char *known, bool children, struct error *e)
+{
+	for (uint32_t i = 0; i < el->attribute_count; i++)
+		if (!is_listed(known, el->attributes[i].name, NULL))
+			return refuse_attribute(el, known, el->attributes[i].name, e);
+	if (el->text)
+		return xml_error(el, e, EINVAL, "text has no meaning here; values are given by attributes");
+	if (el->first && !children)
+		return xml_error(el->first, e, EINVAL, "has no place in <%.64s>", el->name);
+	return 0;
+}
+
+static int need_value(const struct xml_element *el, const char **text, struct error *e)
+{
+	*text = xml_attribute(el, "value");
+	return *text ? 0 : xml_error(el, e, EINVAL, "needs an attribute `value`");
+}
+
+static int read_bool(const struct xml_element *el, struct value *out, struct error *e)
+{
+	const char *text;
+	int r = need_value(el, &text, e);
+	if (r)
+		return r;
+	/* Python's exporters write True. */
+	out->as.boolean = strcmp(text, "true") == 0 || strcmp(text, "True") == 0;
+	if (!out->as.boolean && strcmp(text, "false") != 0 && strcmp(text, "False") != 0)
+		return xml_error(el, e, EINVAL, "`%.64s` is neither true nor false", text);
+	return 0;
+}
+
+static int read_int(const struct xml_element *el, struct value *out, struct error *e)
+{
+	const char *text;
+	int r = need_value(el, &text, e);
+	if (!r && !number_parse_int(text, &out->as.integer))
+		return xml_error(el, e, EINVAL, "`%.64s` is not a whole number", text);
+	return r;
+}
+
+static int read_float(const struct xml_element *el, struct value *out, struct error *e)
+{
+	const char *text;
+	int r = need_value(el, &text, e);
+	if (!r && !number_parse(text, &out->as.number))
+		return xml_error(el, e, EINVAL, "`%.64s` is not a (finite) number", text);
+	return r;
+}
+
+static int read_string(const struct xml_element *el, struct value *out, struct error *e)
+{
+	return need_value(el, &out->as.string, e);
+}
+
+static int read_point(const struct xml_element *el, struct value *out, struct error *e)
+{
+	return transform_read_vec3(el, 0, false, &out->as.point, e);
+}
+
+static bool parse_hex(const char *text, double rgb[3])
+{
+	if (strlen(text) != 7 || text[0] != '#' || strspn(text + 1, "0123456789abcdefABCDEF") != 6)
+		return false;
+	unsigned long bits = strtoul(text + 1, NULL, 16);
+	for (int i = 0; i < 3; i++)
+		rgb[i] = (double)(bits >> (16 - 8 * i) & 0xff) / 255.0;
+	return true;
+}
+
+static int read_rgb(const struct xml_element *el, struct value *out, struct error *e)
+{
+	const char *text;
+	int r = need_value(el, &text, e);
+	if (r)
+		return r;
+	double *rgb = out->as.rgb;
+	bool srgb = strcmp(el->name, "srgb") == 0;
+	/* 0.6 reads #rrggbb in <rgb> too, and there as linear; 3.x does not know it. */
+	if (!(text[0] == '#' && (srgb || el->snake) && parse_hex(text, rgb))) {
+		int n = number_list(text, rgb, 3);
+		if (n == 1)
+			rgb[1] = rgb[2] = rgb[0];
+		else if (n != 3)
+			return xml_error(el, e, EINVAL, "`%.64s` is neither three numbers nor one%s", text,
+					 srgb		  ? " nor #rrggbb"
+					 : text[0] == '#' ? "; #rrggbb belongs into <srgb>"
+							  : "");
+	}
+	for (int i = 0; i < 3 && srgb; i++)
+		rgb[i] = srgb_to_linear(rgb[i]);
+	return 0;
+}
+
+/* Mitsuba 0.6 lets a value say whether it is a light's colour or a surface's; what differs from the place is refused.
+ */
+static int check_intent(const struct xml_element *el, struct error *e)
+{
+	const char *intent = xml_attribute(el, "intent");
+	bool light = el->parent && strcmp(el->parent->name, "emitter") == 0;
+	if (intent && strcmp(intent, light ? "illuminant" : "reflectance") != 0)
+		return xml_error(el, e, EINVAL, "intent=\"%.64s\" is not supported; here it is \"%s\"", intent,
+				 light ? "illuminant" : "reflectance");
+	return 0;
+}
+
+static const struct kind {
+	const char *element;
+	enum value_type type;
+	const char *attributes;
+	bool children;
+} kinds[] = {
+	{"boolean", VALUE_BOOL, "name|value", false},
+	{"integer", VALUE_INT, "name|value", false},
+	{"float", VALUE_FLOAT, "name|value", false},
+	{"string", VALUE_STRING, "name|value", false},
+	{"point", VALUE_POINT, "name|value|x|y|z", false},
+	{"vector", VALUE_POINT, "name|value|x|y|z", false},
+	{"rgb", VALUE_RGB, "name|value|intent", false},
+	{"srgb", VALUE_RGB, "name|value", false},
+	{"spectrum", VALUE_SPECTRUM, "name|value|intent|filename|type|id", true},
+	{"transform", VALUE_TRANSFORM, "name", true},
+	{"blackbody", VALUE_SPECTRUM, "name|temperature|scale", false},
+	{"animation", 0, NULL, false},
+	{"color", 0, NULL, false},
+};
+enum { KINDS = sizeof kinds / sizeof *kinds };
+
+static const struct kind *find_kind(const char *name)
+{
+	for (int i = 0; i < KINDS; i++)
+		if (strcmp(kinds[i].element, name) == 0)
+			return &kinds[i];
+	return NULL;
+}
+
+bool value_is_element(const char *name)
+{
+	return find_kind(name) != NULL;
+}
+
+void value_offer_elements(struct spelling *s)
+{
+	for (int i = 0; i < KINDS; i++)
+		if (kinds[i].type)
+			spelling_offer(s, kinds[i].element);
+}
+
+int value_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena, struct value *out,
+	       struct error *e)
+{
+	const struct kind *k = find_kind(el->name);
+	if (!k || !k->type)
+		return xml_error(el, e, EINVAL,
+				 "is not supported; supported: boolean, integer, float, string, point, vector, "
+				 "rgb, srgb, spectrum, blackbody, transform");
+	int r = value_check_element(el, k->attributes, k->children, e);
+	if (!r)
+		r = check_intent(el, e);
+	if (r)
+		return r;
+	*out = (struct value){.type = k->type};
+	switch (k->type) {
+	case VALUE_BOOL:
+		return read_bool(el, out, e);
+	case VALUE_INT:
+		return read_int(el, out, e);
+	case VALUE_FLOAT:
+		return read_float(el, out, e);
+	case VALUE_STRING:
+		return read_string(el, out, e);
+	case VALUE_POINT:
+		return read_point(el, out, e);
+	case VALUE_RGB:
+		return read_rgb(el, out, e);
+	case VALUE_SPECTRUM:
+		return strcmp(el->name, "blackbody") == 0 ? spectral_read_blackbody(el, arena, out, e)
+							  : spectral_read(el, assets, arena, out, e);
+	default:
+		return transform_read(el, &out->as.transform, e);
+	}
+}
+
+void value_type_names(unsigned types, char *text, size_t size)
+{
+	static const struct {
+		unsigned type;
+		const char *name;
+	} names[] = {{VALUE_BOOL, "boolean"},	   {VALUE_INT, "integer"},	   {VALUE_FLOAT, "float"},
+		     {VALUE_STRING, "string"},	   {VALUE_POINT, "point"},	   {VALUE_RGB, "rgb"},
+		     {VALUE_SPECTRUM, "spectrum"}, {VALUE_TRANSFORM, "transform"}, {VALUE_NODE, "an object"}};
+	text[0] = 0;
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (types & names[i].type)
+			spelling_list(text, size, names[i].name);
+}
+
+const double *value_numbers(const struct value *v, double scratch[3], uint32_t *count)
+{
+	const vec3 *p = &v->as.point;
+	*count = 1;
+	switch (v->type) {
+	case VALUE_INT:
+		scratch[0] = (double)v->as.integer;
+		return scratch;
+	case VALUE_FLOAT:
+		return &v->as.number;
+	case VALUE_POINT:
+		*count = 3;
+		memcpy(scratch, (double[3]){p->x, p->y, p->z}, 3 * sizeof *scratch);
+		return scratch;
+	case VALUE_RGB:
+		*count = 3;
+		return v->as.rgb;
+	case VALUE_SPECTRUM:
+		*count = v->as.spectrum.count;
+		return v->as.spectrum.value;
+	default:
+		*count = 0;
+		return NULL;
+	}
+}

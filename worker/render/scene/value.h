@@ -1,0 +1,31 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Values of the scene language from their elements: <float>, <rgb>, <transform> ... One thread; allocates in the arena.
+ */
+#ifndef WORKER_RENDER_SCENE_VALUE_H
+#define WORKER_RENDER_SCENE_VALUE_H
+
+#include "worker/render/scene/xml.h"
+
+/* Is it the name of a value's element (float, rgb, ... also those that are refused, like animation)? */
+bool value_is_element(const char *name);
+/* Hands all these names to a suggestion. */
+struct spelling;
+void value_offer_elements(struct spelling *s);
+
+/* assets: for spectra from files. */
+int value_read(const struct xml_element *el, const struct asset_source *assets, struct arena *arena, struct value *out,
+	       struct error *e);
+
+/* "float", "rgb" ... for messages; types: any of the bits, as a list. */
+void value_type_names(unsigned types, char *text, size_t size);
+
+/* Refuses attributes that are not in `known` (a list with '|' between), text and, unless `children`, elements inside.
+ */
+int value_check_element(const struct xml_element *el, const char *known, bool children, struct error *e);
+const char *value_next_name(const char *list, char *name, size_t size); /* walks such a list; NULL at the end */
+
+/* All numbers of a value, three of a point or rgb; none of what has none (transforms check theirs: transform.h). The
+ * result is in *v or in scratch. */
+const double *value_numbers(const struct value *v, double scratch[3], uint32_t *count);
+
+#endif

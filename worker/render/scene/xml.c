@@ -1,0 +1,414 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/scene/xml.h"
+
+#include "common/base/mem.h"
+#include "worker/render/scene/define.h"
+#include "worker/render/scene/number.h"
+
+#include <expat.h>
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+struct reader {
+	struct xml_tree *tree;
+	const struct asset_source *assets;
+	struct arena *arena;
+	struct define_table defines;
+	struct error *error;
+	int failed;   /* the first error's negative errno */
+	int includes; /* files around the current one */
+	bool dialect_known;
+	/* the current file */
+	XML_Parser parser;
+	const char *file;
+	struct xml_element *top;     /* the file's <scene> */
+	struct xml_element *current; /* innermost open element */
+	struct xml_element *hook;    /* the <include> element that the file stands for, NULL for the main file */
+	int depth;
+	bool snake;
+};
+
+/* expat wants realloc without the old size; it is kept in front of each piece. */
+union header {
+	size_t size;
+	max_align_t align;
+};
+
+static void *expat_alloc(size_t size)
+{
+	if (size > SIZE_MAX - sizeof(union header))
+		return NULL;
+	union header *h = mem_alloc(1, sizeof *h + size);
+	if (!h)
+		return NULL;
+	h->size = size;
+	return h + 1;
+}
+
+static void expat_free(void *p)
+{
+	if (p)
+		mem_free((union header *)p - 1);
+}
+
+static void *expat_realloc(void *p, size_t size)
+{
+	if (!p)
+		return expat_alloc(size);
+	if (size > SIZE_MAX - sizeof(union header))
+		return NULL;
+	union header *h = (union header *)p - 1;
+	h = mem_grow(h, sizeof *h + h->size, sizeof *h + size);
+	if (!h)
+		return NULL;
+	h->size = size;
+	return h + 1;
+}
+
+static const XML_Memory_Handling_Suite expat_memory = {expat_alloc, expat_realloc, expat_free};
+
+const char *xml_attribute(const struct xml_element *el, const char *name)
+{
+	for (uint32_t i = 0; i < el->attribute_count; i++)
+		if (strcmp(el->attributes[i].name, name) == 0)
+			return el->attributes[i].value;
+	return NULL;
+}
+
+int xml_error(const struct xml_element *el, struct error *e, int errno_value, const char *format, ...)
+{
+	char text[768];
+	va_list ap;
+	va_start(ap, format);
+	vsnprintf(text, sizeof text, format, ap);
+	va_end(ap);
+	const char *type = xml_attribute(el, "type");
+	if (type)
+		return error_set(e, errno_value, "%s:%d: <%.64s type=\"%.64s\">: %s", el->file, el->line, el->name,
+				 type, text);
+	return error_set(e, errno_value, "%s:%d: <%.64s>: %s", el->file, el->line, el->name, text);
+}
+
+bool xml_is_foreign(const char *element)
+{
+	/* Final or preview mode, objects hidden by an editor, the settings of another renderer. */
+	return !strcmp(element, "mode") || !strcmp(element, "hide") || !strcmp(element, "dpt");
+}
+
+static void stop(struct reader *r, int code)
+{
+	if (!r->failed)
+		r->failed = code;
+	XML_StopParser(r->parser, XML_FALSE);
+}
+
+static int line_now(const struct reader *r)
+{
+	return (int)XML_GetCurrentLineNumber(r->parser);
+}
+
+static int out_of_memory(struct reader *r)
+{
+	return error_set(r->error, ENOMEM, "%s:%d: out of memory, or the scene files take more than %d MB of it",
+			 r->file, line_now(r), XML_MEMORY_MAX >> 20);
+}
+
+static int copy_attributes(struct reader *r, struct xml_element *el, const char **given)
+{
+	size_t n = 0;
+	while (given[2 * n])
+		n++;
+	if (n > XML_ATTRIBUTES_MAX)
+		return xml_error(el, r->error, E2BIG, "more than %d attributes", XML_ATTRIBUTES_MAX);
+	struct xml_attribute *a = arena_alloc(r->arena, n, sizeof *a);
+	if (!a)
+		return out_of_memory(r);
+	for (size_t i = 0; i < n; i++) {
+		const char *value = given[2 * i + 1];
+		a[i].name = arena_strdup(r->arena, given[2 * i]);
+		if (!a[i].name)
+			return out_of_memory(r);
+		if (strlen(value) > XML_VALUE_MAX)
+			return xml_error(el, r->error, E2BIG, "a value of more than %d bytes", XML_VALUE_MAX);
+		int c = 0;
+		if (el->ignored || !strchr(value, '$'))
+			a[i].value = arena_strdup(r->arena, value);
+		else
+			c = define_substitute(&r->defines, value, XML_VALUE_MAX, &a[i].value, r->error);
+		if (c)
+			return error_prefix(r->error, c, "%s:%d: <%.64s>: attribute `%.64s`", el->file, el->line,
+					    el->name, a[i].name);
+		if (!a[i].value)
+			return out_of_memory(r);
+		el->attributes = a;
+		el->attribute_count = (uint32_t)i + 1;
+	}
+	return 0;
+}
+
+/* The version decides which dialect's names and rules hold. */
+static int begin_file(struct reader *r, struct xml_element *el)
+{
+	if (strcmp(el->name, "scene") != 0)
+		return xml_error(el, r->error, EINVAL, "a scene file begins with <scene version=\"...\">");
+	const char *version = xml_attribute(el, "version");
+	int64_t major;
+	const char *rest = version ? number_scan_int(version, version + strlen(version), &major) : NULL;
+	if (!rest || (*rest != 0 && *rest != '.') || major < 0)
+		return xml_error(el, r->error, EINVAL, "needs version=\"0.6.0\" or version=\"3.0.0\" and the like");
+	r->snake = major < 2;
+	if (r->dialect_known && r->tree->dialect_3 != (major >= 2))
+		return xml_error(el, r->error, EINVAL,
+				 "version %.32s: an included file must be of the same dialect "
+				 "(below 2, or 2 and above) as the scene",
+				 version);
+	r->dialect_known = true;
+	r->tree->dialect_3 = major >= 2;
+	return 0;
+}
+
+static int append_element(struct reader *r, struct xml_element *el)
+{
+	struct xml_element *parent = el->parent;
+	if (!parent) {
+		r->tree->root = el;
+		return 0;
+	}
+	if (parent->last)
+		parent->last->next = el;
+	else
+		parent->first = el;
+	parent->last = el;
+	return 0;
+}
+
+static int read_default(struct reader *r, const struct xml_element *el)
+{
+	const char *name = xml_attribute(el, "name"), *value = xml_attribute(el, "value");
+	if (!name || !value)
+		return xml_error(el, r->error, EINVAL, "needs name and value");
+	int c = define_default(&r->defines, name, value, r->error);
+	return c ? error_prefix(r->error, c, "%s:%d: <default>", el->file, el->line) : 0;
+}
+
+/* A folder in which the files that are named from here on are searched, after the scene's own. */
+static int read_path(struct reader *r, const struct xml_element *el)
+{
+	const char *value = xml_attribute(el, "value");
+	if (!value)
+		return xml_error(el, r->error, EINVAL, "needs a value, a folder");
+	if (r->tree->path_count == XML_PATHS_MAX)
+		return xml_error(el, r->error, E2BIG, "more than %d search paths", XML_PATHS_MAX);
+	r->tree->paths[r->tree->path_count++] = value;
+	return 0;
+}
+
+static bool is_there(const struct reader *r, const char *name)
+{
+	struct asset a;
+	struct error ignored;
+	if (r->assets->open(r->assets->user, name, &a, &ignored))
+		return false;
+	r->assets->close(r->assets->user, &a);
+	return true;
+}
+
+/* The first of the folders that has the file. A name that none has stays as it is, for whoever opens it to complain. */
+static int find_file(struct reader *r, const char **name)
+{
+	if (r->tree->path_count == 0 || is_there(r, *name))
+		return 0;
+	for (uint32_t i = 0; i < r->tree->path_count; i++) {
+		const char *folder = r->tree->paths[i];
+		size_t size = strlen(folder) + strlen(*name) + 2, length = strlen(folder);
+		char *joined = arena_alloc(r->arena, size, 1);
+		if (!joined)
+			return out_of_memory(r);
+		snprintf(joined, size, "%s%s%s", folder, length && folder[length - 1] == '/' ? "" : "/", *name);
+		if (is_there(r, joined)) {
+			*name = joined;
+			return 0;
+		}
+	}
+	return 0;
+}
+
+/* <include filename>, <spectrum filename> and <string name="filename" value>. */
+static int find_files(struct reader *r, struct xml_element *el)
+{
+	const char *named = xml_attribute(el, "name");
+	bool string = strcmp(el->name, "string") == 0 && named && strcmp(named, "filename") == 0;
+	for (uint32_t i = 0; i < el->attribute_count; i++)
+		if (strcmp(el->attributes[i].name, string ? "value" : "filename") == 0) {
+			int c = find_file(r, &el->attributes[i].value);
+			if (c)
+				return c;
+		}
+	return 0;
+}
+
+static int open_element(struct reader *r, const char *name, const char **attributes)
+{
+	if (r->depth >= XML_DEPTH_MAX)
+		return error_set(r->error, E2BIG, "%s:%d: <%.64s>: elements are nested more than %d deep", r->file,
+				 line_now(r), name, XML_DEPTH_MAX);
+	if (r->tree->element_count >= XML_ELEMENTS_MAX)
+		return error_set(r->error, E2BIG, "%s:%d: more than %d elements", r->file, line_now(r),
+				 XML_ELEMENTS_MAX);
+	struct xml_element *el = arena_alloc(r->arena, 1, sizeof *el);
+	if (!el)
+		return out_of_memory(r);
+	r->tree->element_count++;
+	el->name = arena_strdup(r->arena, name);
+	if (!el->name)
+		return out_of_memory(r);
+	el->file = r->file;
+	el->line = line_now(r);
+	el->parent = r->current ? r->current : r->hook;
+	el->ignored = xml_is_foreign(name) || (el->parent && el->parent->ignored);
+	int c = copy_attributes(r, el, attributes);
+	if (!c && !r->current) {
+		r->top = el;
+		c = begin_file(r, el);
+	}
+	el->snake = r->snake;
+	if (!c)
+		c = append_element(r, el);
+	if (!c && !el->ignored)
+		c = find_files(r, el);
+	if (!c && !el->ignored && strcmp(name, "default") == 0)
+		c = read_default(r, el);
+	if (!c && !el->ignored && strcmp(name, "path") == 0)
+		c = read_path(r, el);
+	r->current = el;
+	r->depth++;
+	return c;
+}
+
+static int read_file(struct reader *r, const char *name);
+
+static int read_include(struct reader *r, struct xml_element *el)
+{
+	const char *name = xml_attribute(el, "filename");
+	if (!name)
+		return xml_error(el, r->error, EINVAL, "needs filename");
+	if (el->parent != r->top)
+		return xml_error(el, r->error, EINVAL, "may stand directly in <scene> only");
+	if (r->includes >= XML_INCLUDE_MAX)
+		return xml_error(el, r->error, ELOOP, "files include each other more than %d deep", XML_INCLUDE_MAX);
+	if (r->tree->include_count >= XML_FILES_MAX)
+		return xml_error(el, r->error, E2BIG, "more than %d files are included", XML_FILES_MAX);
+	r->tree->includes[r->tree->include_count++] = name;
+	struct reader outer = *r;
+	r->parser = NULL;
+	r->top = r->current = NULL;
+	r->hook = el;
+	r->depth = 0;
+	r->includes++;
+	int c = read_file(r, name);
+	if (c && r->file == outer.file)
+		c = error_prefix(r->error, c, "%s:%d: <include>", el->file, el->line);
+	outer.failed = r->failed;
+	outer.dialect_known = r->dialect_known;
+	outer.defines = r->defines;
+	*r = outer;
+	return c;
+}
+
+static void on_start(void *user, const char *name, const char **attributes)
+{
+	struct reader *r = user;
+	if (r->failed)
+		return;
+	int c = open_element(r, name, attributes);
+	if (c)
+		stop(r, c);
+}
+
+static void on_end(void *user, const char *name)
+{
+	struct reader *r = user;
+	if (r->failed)
+		return;
+	struct xml_element *el = r->current;
+	int c = 0;
+	if (!el->ignored && strcmp(name, "include") == 0)
+		c = el->first ? xml_error(el, r->error, EINVAL, "must be empty") : read_include(r, el);
+	r->depth--;
+	r->current = el == r->top ? NULL : el->parent;
+	if (c)
+		stop(r, c);
+}
+
+static void on_text(void *user, const char *text, int length)
+{
+	struct reader *r = user;
+	for (int i = 0; i < length && r->current; i++)
+		if (!number_is_blank(text[i]))
+			r->current->text = true;
+}
+
+static void on_doctype(void *user, const char *name, const char *system, const char *public_id, int has_subset)
+{
+	(void)name, (void)system, (void)public_id, (void)has_subset;
+	struct reader *r = user;
+	if (!r->failed)
+		stop(r, error_set(r->error, EINVAL,
+				  "%s:%d: <!DOCTYPE>: scene files must not declare document types or entities", r->file,
+				  line_now(r)));
+}
+
+static int parse_bytes(struct reader *r, const struct asset *a)
+{
+	if (a->size > XML_FILE_MAX)
+		return error_set(r->error, EFBIG, "%s: a scene file of more than %d MB", r->file, XML_FILE_MAX >> 20);
+	r->parser = XML_ParserCreate_MM(NULL, &expat_memory, NULL);
+	if (!r->parser)
+		return error_set(r->error, ENOMEM, "%s: out of memory", r->file);
+	/* A fixed salt: runs repeat exactly; the element and attribute limits bound what collisions can cost. */
+	XML_SetHashSalt(r->parser, 0x9e3779b9u);
+	XML_SetUserData(r->parser, r);
+	XML_SetElementHandler(r->parser, on_start, on_end);
+	XML_SetCharacterDataHandler(r->parser, on_text);
+	XML_SetStartDoctypeDeclHandler(r->parser, on_doctype);
+	XML_Parser parser = r->parser;
+	enum XML_Status status = XML_Parse(parser, a->size ? (const char *)a->bytes : "", (int)a->size, XML_TRUE);
+	int c = r->failed;
+	if (!c && status != XML_STATUS_OK) {
+		enum XML_Error code = XML_GetErrorCode(parser);
+		c = error_set(r->error, code == XML_ERROR_NO_MEMORY ? ENOMEM : EINVAL, "%s:%d: %s%s%.64s%s", r->file,
+			      line_now(r), XML_ErrorString(code), r->current ? " in <" : "",
+			      r->current ? r->current->name : "", r->current ? ">" : "");
+	}
+	XML_ParserFree(parser);
+	return c;
+}
+
+static int read_file(struct reader *r, const char *name)
+{
+	struct asset a;
+	int c = r->assets->open(r->assets->user, name, &a, r->error);
+	if (c)
+		return c;
+	r->file = name;
+	c = parse_bytes(r, &a);
+	r->assets->close(r->assets->user, &a);
+	return c;
+}
+
+int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name,
+	     const struct scene_define *defines, size_t define_count, struct arena *arena, struct error *e)
+{
+	*t = (struct xml_tree){0};
+	struct reader r = {.tree = t, .assets = assets, .arena = arena, .error = e};
+	int c = define_init(&r.defines, defines, define_count, arena, e);
+	if (c)
+		return c;
+	const char *file = arena_strdup(arena, name);
+	if (!file)
+		return error_set(e, ENOMEM, "out of memory");
+	c = read_file(&r, file);
+	return c ? c : define_check_used(&r.defines, e);
+}

@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A scene file as a tree of elements, through expat: includes opened, defaults substituted, nothing interpreted.
+ * Any DOCTYPE is refused, and with it every entity; depth, sizes and counts are bounded. One thread; the tree lives in
+ * the arena given.
+ */
+#ifndef WORKER_RENDER_SCENE_XML_H
+#define WORKER_RENDER_SCENE_XML_H
+
+#include "common/base/arena.h"
+#include "worker/render/scene/scene.h"
+
+enum {
+	XML_DEPTH_MAX = 64,   /* elements inside elements, and objects that refer to objects */
+	XML_INCLUDE_MAX = 8,  /* files that include files */
+	XML_FILES_MAX = 1024, /* files included in all */
+	XML_PATHS_MAX = 16,   /* folders that are searched for files */
+	XML_ELEMENTS_MAX = 1 << 20,
+	XML_ATTRIBUTES_MAX = 24,
+	XML_VALUE_MAX = 1 << 20,  /* bytes of an attribute's value */
+	XML_FILE_MAX = 64 << 20,  /* bytes of a scene file */
+	XML_MEMORY_MAX = 1 << 30, /* bytes of the tree */
+};
+
+struct xml_attribute {
+	const char *name, *value;
+};
+
+struct xml_element {
+	const char *name, *file;
+	int line;
+	bool snake;   /* names are to be converted from camelCase (a file of version < 2) */
+	bool ignored; /* it or one of those around it has no meaning here */
+	bool text;    /* holds text other than blanks */
+	uint32_t attribute_count;
+	struct xml_attribute *attributes;
+	struct xml_element *parent, *first, *last, *next;
+	const struct scene_node *node; /* for the interpreter: what it became */
+	bool busy, told; /* for the interpreter: being made into a node; cannot be, and that has been said */
+};
+
+struct xml_tree {
+	struct xml_element *root; /* <scene>; includes stand as <scene> elements in the place of <include> */
+	bool dialect_3;
+	uint32_t element_count, include_count, path_count;
+	const char *includes[XML_FILES_MAX]; /* names of included files; repeated where included more than once */
+	const char *
+		paths[XML_PATHS_MAX]; /* of <path>, in their order; names of files after them are searched there, too */
+};
+
+/* Elements for which this holds, and all inside them, are marked ignored. */
+bool xml_is_foreign(const char *element);
+
+int xml_read(struct xml_tree *t, const struct asset_source *assets, const char *name,
+	     const struct scene_define *defines, size_t define_count, struct arena *arena, struct error *e);
+
+const char *xml_attribute(const struct xml_element *el, const char *name); /* NULL: none */
+
+/* error_set with "file:line: <element>: " before the text. */
+__attribute__((format(printf, 4, 5))) int xml_error(const struct xml_element *el, struct error *e, int errno_value,
+						    const char *format, ...);
+
+#endif

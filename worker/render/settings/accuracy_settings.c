@@ -1,0 +1,201 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/settings/accuracy_settings.h"
+
+#include "common/base/text.h"
+#include "worker/render/scene/spelling.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const struct render_setting list[] = {
+#define SETTING(field, name_, kind_, place_, standard_, least_, greatest_, choices_, summary_, ...) \
+	{.name = name_,                                                                             \
+	 .summary = summary_,                                                                       \
+	 .kind = kind_,                                                                             \
+	 .place = place_,                                                                           \
+	 .standard = standard_,                                                                     \
+	 .least = least_,                                                                           \
+	 .greatest = greatest_,                                                                     \
+	 .choices = choices_,                                                                       \
+	 .sweep = {__VA_ARGS__}},
+#include "worker/render/settings/setting_list.h"
+#undef SETTING
+};
+
+enum { SETTING_COUNT = sizeof list / sizeof *list, VALUE_BYTES = 24 };
+
+static const size_t offset[SETTING_COUNT] = {
+#define SETTING(field, ...) offsetof(struct accuracy_settings, field),
+#include "worker/render/settings/setting_list.h"
+#undef SETTING
+};
+
+const struct accuracy_settings accuracy_settings_default = {
+#define SETTING(field, name, kind, place, standard, ...) .field = standard,
+#include "worker/render/settings/setting_list.h"
+#undef SETTING
+};
+
+const struct render_setting *render_setting_at(size_t index)
+{
+	return index < SETTING_COUNT ? &list[index] : NULL;
+}
+
+static double get(const struct accuracy_settings *k, size_t index)
+{
+	double value;
+	memcpy(&value, (const char *)k + offset[index], sizeof value);
+	return value;
+}
+
+static void set(struct accuracy_settings *k, size_t index, double value)
+{
+	memcpy((char *)k + offset[index], &value, sizeof value);
+}
+
+/* The choice at the place, or worth the value when place is -1; false: there are not so many. */
+static bool choice_at(const char *choices, int place, double value, char *text, size_t size)
+{
+	const char *at = choices;
+	for (int i = 0; *at; i++) {
+		size_t n = strcspn(at, " ");
+		double worth = *at >= '0' && *at <= '9' ? strtod(at, NULL) : i;
+		if (place == i || (place < 0 && worth == value)) {
+			text_copy(text, n + 1 < size ? n + 1 : size, at);
+			return true;
+		}
+		at += n;
+		at += *at == ' ';
+	}
+	return false;
+}
+
+void accuracy_settings_value(const struct accuracy_settings *k, size_t index, char *text, size_t size)
+{
+	struct text t = {text, size};
+	double value = get(k, index);
+	if (list[index].kind != SETTING_CHOICE || !choice_at(list[index].choices, -1, value, text, size))
+		text_put(&t, "%.6g", value);
+}
+
+void render_setting_range(const struct render_setting *k, char *text, size_t size)
+{
+	struct text t = {text, size};
+	char choice[VALUE_BYTES], next[VALUE_BYTES];
+	if (k->kind != SETTING_CHOICE) {
+		text_put(&t, "%g to %g", k->least, k->greatest);
+		return;
+	}
+	for (int i = 0; choice_at(k->choices, i, 0, choice, sizeof choice); i++)
+		text_put(&t, "%s%s",
+			 i == 0						      ? ""
+			 : choice_at(k->choices, i + 1, 0, next, sizeof next) ? ", "
+									      : " or ",
+			 choice);
+}
+
+static int name_error(const char *name, struct error *e)
+{
+	struct spelling s = {.wanted = name};
+	char hint[80], known[256] = "";
+	for (size_t i = 0; i < SETTING_COUNT; i++) {
+		spelling_offer(&s, list[i].name);
+		spelling_list(known, sizeof known, list[i].name);
+	}
+	return error_set(e, EINVAL, "no setting is called '%s'%s; there are %s", name,
+			 spelling_hint(&s, hint, sizeof hint), known);
+}
+
+static int find(const char *name, size_t *index, struct error *e)
+{
+	for (*index = 0; *index < SETTING_COUNT; ++*index)
+		if (strcmp(list[*index].name, name) == 0)
+			return 0;
+	return name_error(name, e);
+}
+
+/* Numbers are rounded to what a plan's text holds of them, so that a text and its canonical form mean the same. */
+static bool parse_value(const struct render_setting *k, const char *text, double *value)
+{
+	char *end, choice[VALUE_BYTES], digits[VALUE_BYTES];
+	if (k->kind == SETTING_CHOICE) {
+		for (int i = 0; choice_at(k->choices, i, 0, choice, sizeof choice); i++)
+			if (strcmp(choice, text) == 0) {
+				*value = choice[0] >= '0' && choice[0] <= '9' ? strtod(choice, NULL) : i;
+				return true;
+			}
+		return false;
+	}
+	double x = strtod(text, &end);
+	if (!((*text >= '0' && *text <= '9') || *text == '.') || *end || !(x >= k->least && x <= k->greatest))
+		return false;
+	if (k->kind == SETTING_WHOLE && x != floor(x))
+		return false;
+	struct text t = {digits, sizeof digits};
+	text_put(&t, "%.6g", x);
+	*value = strtod(digits, NULL);
+	return true;
+}
+
+static int read_entry(const char *text, size_t length, struct accuracy_settings *out, struct error *e)
+{
+	char entry[80], range[80];
+	if (length >= sizeof entry)
+		return error_set(e, EINVAL, "'%.60s...': a setting is written NAME=VALUE", text);
+	text_copy(entry, length + 1, text);
+	char *equals = strchr(entry, '=');
+	if (!equals || equals == entry)
+		return error_set(e, EINVAL, "'%s': a setting is written NAME=VALUE", entry);
+	*equals = 0;
+	size_t index;
+	double value;
+	int rc = find(entry, &index, e);
+	if (rc)
+		return rc;
+	if (!parse_value(&list[index], equals + 1, &value)) {
+		render_setting_range(&list[index], range, sizeof range);
+		return error_set(e, EINVAL, "%s is%s %s, not '%s'", entry,
+				 list[index].kind == SETTING_WHOLE ? " a whole number from" : "", range, equals + 1);
+	}
+	set(out, index, value);
+	return 0;
+}
+
+int accuracy_settings_read(const char *text, struct accuracy_settings *out, struct error *e)
+{
+	*out = accuracy_settings_default;
+	if (!text || !*text)
+		return 0;
+	for (const char *at = text;; at++) {
+		size_t n = strcspn(at, ",");
+		int rc = read_entry(at, n, out, e);
+		if (rc)
+			return rc;
+		at += n;
+		if (!*at)
+			return 0;
+	}
+}
+
+void accuracy_settings_print(const struct accuracy_settings *k, char text[PLAN_ACCURACY_MAX])
+{
+	struct text t = {text, PLAN_ACCURACY_MAX};
+	memset(text, 0, PLAN_ACCURACY_MAX);
+	for (size_t i = 0; i < SETTING_COUNT; i++) {
+		char value[VALUE_BYTES];
+		if (get(k, i) == list[i].standard)
+			continue;
+		accuracy_settings_value(k, i, value, sizeof value);
+		text_put(&t, "%s%s=%s", *text ? "," : "", list[i].name, value);
+	}
+}
+
+int render_settings_canonical(const char *text, char canonical[PLAN_ACCURACY_MAX], struct error *e)
+{
+	struct accuracy_settings k;
+	int rc = accuracy_settings_read(text, &k, e);
+	if (!rc)
+		accuracy_settings_print(&k, canonical);
+	return rc;
+}

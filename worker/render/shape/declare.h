@@ -1,0 +1,20 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* For the parameter tables of shapes. */
+#ifndef WORKER_RENDER_SHAPE_DECLARE_H
+#define WORKER_RENDER_SHAPE_DECLARE_H
+
+#include "worker/render/scene/param.h"
+#include "worker/render/shape/displace.h"
+
+#define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
+#define IGNORED 0, PARAM_IGNORED, 0, 0, NULL
+#define REFUSED 0, PARAM_REFUSED, 0, 0, NULL
+/* What every shape knows, and the end of its table. */
+#define SHAPE_PARAMS_END                                                                     \
+	{"to_world", UNDERSTOOD(VALUE_TRANSFORM)}, {"flip_normals", UNDERSTOOD(VALUE_BOOL)}, \
+		{"silhouette_sampling_weight", IGNORED}, DISPLACE_PARAMS,                    \
+	{                                                                                    \
+		NULL, 0, 0, 0, 0, NULL                                                       \
+	}
+
+#endif

@@ -1,0 +1,60 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Meshes while they are built: object space, normals perhaps missing. One thread; arrays in the arena given.
+ */
+#ifndef WORKER_RENDER_SHAPE_MESH_H
+#define WORKER_RENDER_SHAPE_MESH_H
+
+#include "common/base/arena.h"
+#include "worker/render/shape/shape.h"
+
+enum { MESH_TRIANGLES_MAX = 1 << 27 };
+#define MESH_COORDINATE_MAX PARAM_LENGTH_MAX
+#define MESH_UV_MAX                                                                                                    \
+	1e12 /* a double has a ten-thousandth of a texture's width there, and tangents are no shorter than 1e-12 of an \
+		edge */
+
+static inline vec3 mesh_load(const double v[3])
+{
+	return (vec3){v[0], v[1], v[2]};
+}
+
+static inline void mesh_store(double out[3], vec3 v)
+{
+	out[0] = v.x;
+	out[1] = v.y;
+	out[2] = v.z;
+}
+
+static inline double mesh_angle(vec3 a, vec3 b)
+{
+	return atan2(vec3_length(vec3_cross(a, b)), vec3_dot(a, b));
+}
+
+/* v without its length, however long it is; 0 where it has none. */
+vec3 mesh_unit(vec3 v);
+
+/* The file that a shape names; the caller closes it. */
+int mesh_open(const struct scene_node *n, const struct asset_source *assets, struct asset *a, struct error *e);
+
+/* Allocates the arrays; false: out of memory. */
+bool mesh_alloc(struct mesh *m, uint32_t vertices, uint32_t triangles, bool normals, bool uv, struct arena *arena);
+
+/* Vertex i; n: a unit vector. */
+void mesh_set_vertex(struct mesh *m, uint32_t i, vec3 p, vec3 n, double u, double v);
+
+struct mesh_finish {
+	mat4 to_world;
+	bool flip_normals, face_normals;
+};
+
+/*
+ * From object to world space. Drops triangles without area. Where normals are not unit vectors they count as missing
+ * and are computed from the triangles around, weighted by their angles there; face_normals: there are none after all.
+ * The outside stays the outside under mirrors. Triangles are wound counter-clockwise as seen from outside, which is
+ * the side of their vertices' normals.
+ */
+int mesh_finish(struct mesh *m, const struct mesh_finish *f, struct arena *arena, uint64_t *dropped,
+		const struct scene_node *n, struct error *e);
+
+#endif

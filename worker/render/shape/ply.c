@@ -1,0 +1,439 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Stanford PLY: ascii and both byte orders, any order of elements and properties.
+ *
+ * The header says how the bytes behind it are laid out. A first pass over the faces counts triangles, so that memory is
+ * taken once; a second pass reads. Of vertices x y z, nx ny nz and u v (or s t) count, of faces vertex_indices (or
+ * vertex_index); polygons become fans of triangles; everything else is stepped over.
+ *
+ * Failures: a header that is none, a file that ends too early, indices out of range, numbers that are not finite. No
+ * count of the header is believed before the file was seen to be long enough for it.
+ */
+#include "common/base/liveness.h"
+#include "worker/render/scene/number.h"
+#include "worker/render/shape/declare.h"
+#include "worker/render/shape/mesh.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { PROPERTIES_MAX = 64, ELEMENTS_MAX = 16, WORD_MAX = 64, TICK_INTERVAL = 4096 };
+
+enum scalar { SCALAR_NONE, INT8, UINT8, INT16, UINT16, INT32, UINT32, FLOAT32, FLOAT64 };
+static const uint8_t scalar_size[] = {0, 1, 1, 2, 2, 4, 4, 4, 8};
+
+enum format { FORMAT_ASCII, FORMAT_LITTLE, FORMAT_BIG };
+
+/* What a number is for. */
+enum role { ROLE_NONE = -1, ROLE_X, ROLE_Y, ROLE_Z, ROLE_NX, ROLE_NY, ROLE_NZ, ROLE_U, ROLE_V, ROLES, ROLE_INDICES };
+
+struct ply_property {
+	enum scalar type, count_type; /* of a list's length; SCALAR_NONE: it is no list */
+	enum role role;
+};
+
+enum element_kind { ELEMENT_OTHER, ELEMENT_VERTEX, ELEMENT_FACE };
+
+struct element {
+	enum element_kind kind;
+	char name[WORD_MAX];
+	uint64_t count;
+	uint32_t property_count;
+	struct ply_property properties[PROPERTIES_MAX];
+};
+
+struct ply {
+	const struct scene_node *node;
+	const char *name;
+	struct error *error;
+	const char *p, *end;
+	int line; /* of the header */
+	enum format format;
+	uint32_t element_count;
+	struct element elements[ELEMENTS_MAX];
+	bool has[ROLES];
+	uint64_t triangles;
+	struct mesh *mesh;
+	bool flip;
+};
+
+static const struct param params[] = {
+	{"filename", UNDERSTOOD(VALUE_STRING)},
+	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
+	{"flip_tex_coords", UNDERSTOOD(VALUE_BOOL)},
+	{"collapse", IGNORED},
+	{"srgb", IGNORED}, /* of colours at vertices */
+	{"max_smooth_angle", REFUSED},
+	SHAPE_PARAMS_END,
+};
+
+/* A word of the header's line; false: the line ends. */
+static bool next_word(struct ply *f, char word[WORD_MAX])
+{
+	while (f->p < f->end && (*f->p == ' ' || *f->p == '\t' || *f->p == '\r'))
+		f->p++;
+	size_t n = 0;
+	for (; f->p < f->end && !number_is_blank(*f->p); f->p++)
+		if (n + 1 < WORD_MAX)
+			word[n++] = *f->p;
+	word[n] = 0;
+	return n > 0;
+}
+
+static void end_line(struct ply *f)
+{
+	const char *newline = memchr(f->p, '\n', (size_t)(f->end - f->p));
+	f->p = newline ? newline + 1 : f->end;
+	f->line++;
+}
+
+static enum scalar find_scalar(const char *name)
+{
+	static const struct {
+		const char *name;
+		enum scalar type;
+	} names[] = {{"char", INT8},	 {"int8", INT8},       {"uchar", UINT8},    {"uint8", UINT8},
+		     {"short", INT16},	 {"int16", INT16},     {"ushort", UINT16},  {"uint16", UINT16},
+		     {"int", INT32},	 {"int32", INT32},     {"uint", UINT32},    {"uint32", UINT32},
+		     {"float", FLOAT32}, {"float32", FLOAT32}, {"double", FLOAT64}, {"float64", FLOAT64}};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (strcmp(names[i].name, name) == 0)
+			return names[i].type;
+	return SCALAR_NONE;
+}
+
+static enum role find_role(enum element_kind kind, const char *name, bool list)
+{
+	static const struct {
+		const char *name;
+		enum role role;
+	} names[] = {{"x", ROLE_X},   {"y", ROLE_Y},   {"z", ROLE_Z},	      {"nx", ROLE_NX},
+		     {"ny", ROLE_NY}, {"nz", ROLE_NZ}, {"u", ROLE_U},	      {"v", ROLE_V},
+		     {"s", ROLE_U},   {"t", ROLE_V},   {"texture_u", ROLE_U}, {"texture_v", ROLE_V}};
+	if (kind == ELEMENT_FACE && list && (strcmp(name, "vertex_indices") == 0 || strcmp(name, "vertex_index") == 0))
+		return ROLE_INDICES;
+	for (size_t i = 0; kind == ELEMENT_VERTEX && !list && i < sizeof names / sizeof *names; i++)
+		if (strcmp(names[i].name, name) == 0)
+			return names[i].role;
+	return ROLE_NONE;
+}
+
+static int header_error(const struct ply *f, const char *what)
+{
+	return node_error(f->node, f->error, EINVAL, "%s:%d: %s", f->name, f->line, what);
+}
+
+static int read_format(struct ply *f)
+{
+	char word[WORD_MAX];
+	next_word(f, word);
+	if (strcmp(word, "ascii") == 0)
+		f->format = FORMAT_ASCII;
+	else if (strcmp(word, "binary_little_endian") == 0)
+		f->format = FORMAT_LITTLE;
+	else if (strcmp(word, "binary_big_endian") == 0)
+		f->format = FORMAT_BIG;
+	else
+		return header_error(f, "the format is neither ascii nor binary_little_endian nor binary_big_endian");
+	return 0;
+}
+
+static int read_element(struct ply *f)
+{
+	char name[WORD_MAX], count[WORD_MAX];
+	int64_t n = -1;
+	if (f->element_count == ELEMENTS_MAX)
+		return header_error(f, "more than 16 elements");
+	if (!next_word(f, name) || !next_word(f, count) || !number_parse_int(count, &n) || n < 0)
+		return header_error(f, "an element needs a name and a count");
+	struct element *el = &f->elements[f->element_count++];
+	*el = (struct element){.count = (uint64_t)n};
+	memcpy(el->name, name, sizeof name);
+	el->kind = strcmp(name, "vertex") == 0 ? ELEMENT_VERTEX
+		   : strcmp(name, "face") == 0 ? ELEMENT_FACE
+					       : ELEMENT_OTHER;
+	for (uint32_t i = 0; i + 1 < f->element_count; i++)
+		if (strcmp(f->elements[i].name, name) == 0)
+			return header_error(f, "an element is given twice");
+	return 0;
+}
+
+static int read_property(struct ply *f)
+{
+	char word[WORD_MAX], name[WORD_MAX];
+	if (f->element_count == 0)
+		return header_error(f, "a property before any element");
+	struct element *el = &f->elements[f->element_count - 1];
+	if (el->property_count == PROPERTIES_MAX)
+		return header_error(f, "an element with more than 64 properties");
+	struct ply_property p = {0};
+	next_word(f, word);
+	bool list = strcmp(word, "list") == 0;
+	if (list) {
+		next_word(f, word);
+		p.count_type = find_scalar(word);
+		next_word(f, word);
+	}
+	p.type = find_scalar(word);
+	if (p.type == SCALAR_NONE || (list && (p.count_type == SCALAR_NONE || p.count_type >= FLOAT32)))
+		return header_error(f, "a property of no known type");
+	if (!next_word(f, name))
+		return header_error(f, "a property without a name");
+	p.role = find_role(el->kind, name, list);
+	if (p.role == ROLE_INDICES && p.type >= FLOAT32)
+		return header_error(f, "indices must be whole numbers");
+	for (uint32_t i = 0; i < el->property_count && p.role != ROLE_NONE; i++)
+		if (el->properties[i].role == p.role)
+			p.role = ROLE_NONE; /* u and s may both be there */
+	if (p.role >= 0 && p.role < ROLES)
+		f->has[p.role] = true;
+	el->properties[el->property_count++] = p;
+	return 0;
+}
+
+static int read_header(struct ply *f)
+{
+	char word[WORD_MAX];
+	bool formatted = false;
+	f->line = 1;
+	if (!next_word(f, word) || strcmp(word, "ply") != 0)
+		return header_error(f, "this is no PLY file");
+	for (;;) {
+		end_line(f);
+		if (f->p >= f->end)
+			return header_error(f, "the header does not end");
+		int r = 0;
+		if (!next_word(f, word) || strcmp(word, "comment") == 0 || strcmp(word, "obj_info") == 0)
+			continue;
+		if (strcmp(word, "format") == 0) {
+			r = read_format(f);
+			formatted = true;
+		} else if (strcmp(word, "element") == 0) {
+			r = read_element(f);
+		} else if (strcmp(word, "property") == 0) {
+			r = read_property(f);
+		} else if (strcmp(word, "end_header") == 0) {
+			end_line(f);
+			return formatted ? 0 : header_error(f, "the header names no format");
+		} else {
+			return header_error(f, "neither comment, format, element, property nor end_header");
+		}
+		if (r)
+			return r;
+	}
+}
+
+static double decode(const char *at, enum scalar type, bool big)
+{
+	uint64_t bits = 0;
+	uint32_t size = scalar_size[type], low;
+	for (uint32_t i = 0; i < size; i++)
+		bits |= (uint64_t)(unsigned char)at[big ? size - 1 - i : i] << 8 * i;
+	float f;
+	double d;
+	switch (type) {
+	case INT8:
+		return (int8_t)bits;
+	case INT16:
+		return (int16_t)bits;
+	case INT32:
+		return (int32_t)bits;
+	case FLOAT32:
+		low = (uint32_t)bits;
+		memcpy(&f, &low, sizeof f);
+		return (double)f;
+	case FLOAT64:
+		memcpy(&d, &bits, sizeof d);
+		return d;
+	default:
+		return (double)bits;
+	}
+}
+
+/* The next number; false: there is none. */
+static bool next_number(struct ply *f, enum scalar type, double *x)
+{
+	if (f->format != FORMAT_ASCII) {
+		if ((size_t)(f->end - f->p) < scalar_size[type])
+			return false;
+		*x = decode(f->p, type, f->format == FORMAT_BIG);
+		f->p += scalar_size[type];
+		return true;
+	}
+	while (f->p < f->end && number_is_blank(*f->p))
+		f->p++;
+	const char *rest = number_scan(f->p, f->end, x);
+	if (!rest || (rest < f->end && !number_is_blank(*rest)))
+		return false;
+	f->p = rest;
+	return true;
+}
+
+static int item_error(const struct ply *f, const struct element *el, uint64_t i, const char *what)
+{
+	return node_error(f->node, f->error, EINVAL, "%s: %s %llu: %s", f->name, el->name, (unsigned long long)i, what);
+}
+
+static int read_list(struct ply *f, const struct element *el, uint64_t item, const struct ply_property *p,
+		     uint32_t first_triangle)
+{
+	double n, corner[3] = {0, 0, 0};
+	if (!next_number(f, p->count_type, &n) || !(n >= 0) || n != floor(n))
+		return item_error(f, el, item, "a list without a length, or the file ends here");
+	for (double k = 0; k < n; k++) {
+		double x;
+		if (!next_number(f, p->type, &x))
+			return item_error(f, el, item, "not a number, or the file ends here");
+		if (p->role != ROLE_INDICES)
+			continue;
+		if (!(x >= 0 && x < (double)f->mesh->vertex_count) || x != floor(x))
+			return item_error(f, el, item, "an index that is none of a vertex");
+		corner[k < 2 ? (int)k : 2] = x;
+		if (k < 2)
+			continue;
+		if (f->mesh->index)
+			for (int i = 0; i < 3; i++)
+				f->mesh->index[first_triangle][i] = (uint32_t)corner[i];
+		first_triangle++;
+		corner[1] = x;
+	}
+	if (p->role == ROLE_INDICES) {
+		if (n < 3)
+			return item_error(f, el, item, "a face needs three corners");
+		f->triangles += (uint64_t)n - 2;
+		if (f->triangles > MESH_TRIANGLES_MAX)
+			return item_error(f, el, item, "more triangles than 2^27");
+	}
+	return 0;
+}
+
+static int store_vertex(struct ply *f, const struct element *el, uint64_t i, const double v[ROLES])
+{
+	struct mesh *m = f->mesh;
+	for (int k = 0; k < ROLES; k++)
+		if (!(fabs(v[k]) <= MESH_COORDINATE_MAX))
+			return item_error(f, el, i, "a number that is not finite, or beyond 1e60");
+	memcpy(m->position[i], v, sizeof m->position[i]);
+	if (m->normal)
+		mesh_store(m->normal[i], mesh_unit((vec3){v[ROLE_NX], v[ROLE_NY], v[ROLE_NZ]}));
+	if (m->uv) {
+		m->uv[i][0] = v[ROLE_U];
+		m->uv[i][1] = f->flip ? 1 - v[ROLE_V] : v[ROLE_V];
+	}
+	return 0;
+}
+
+static int read_item(struct ply *f, const struct element *el, uint64_t i)
+{
+	double v[ROLES] = {0};
+	for (uint32_t k = 0; k < el->property_count; k++) {
+		const struct ply_property *p = &el->properties[k];
+		int r = 0;
+		double x;
+		if (p->count_type != SCALAR_NONE)
+			r = read_list(f, el, i, p, (uint32_t)f->triangles);
+		else if (!next_number(f, p->type, &x))
+			r = item_error(f, el, i, "not a number, or the file ends here");
+		else if (p->role >= 0)
+			v[p->role] = x;
+		if (r)
+			return r;
+	}
+	return el->kind == ELEMENT_VERTEX && f->mesh->position ? store_vertex(f, el, i, v) : 0;
+}
+
+/* The least that one item takes: a digit and a blank each in ascii. */
+static uint64_t least_bytes(const struct ply *f, const struct element *el)
+{
+	uint64_t n = 0;
+	for (uint32_t k = 0; k < el->property_count; k++) {
+		const struct ply_property *p = &el->properties[k];
+		n += f->format == FORMAT_ASCII ? 1
+					       : scalar_size[p->count_type != SCALAR_NONE ? p->count_type : p->type];
+	}
+	return n;
+}
+
+/* All behind the header: once without arrays, to count and to check, once with. */
+static int read_body(struct ply *f)
+{
+	f->triangles = 0;
+	for (uint32_t k = 0; k < f->element_count; k++) {
+		const struct element *el = &f->elements[k];
+		uint64_t least = least_bytes(f, el);
+		if (least == 0)
+			continue;
+		if (el->count > (uint64_t)(f->end - f->p) / least)
+			return node_error(f->node, f->error, EINVAL, "%s: too short for %llu of element `%s`", f->name,
+					  (unsigned long long)el->count, el->name);
+		for (uint64_t i = 0; i < el->count; i++) {
+			if (i % TICK_INTERVAL == 0)
+				tick();
+			int r = read_item(f, el, i);
+			if (r)
+				return r;
+		}
+	}
+	return 0;
+}
+
+static int check_header(struct ply *f)
+{
+	uint64_t vertices = 0;
+	bool faces = false;
+	for (uint32_t i = 0; i < f->element_count; i++) {
+		const struct element *el = &f->elements[i];
+		if (el->kind == ELEMENT_VERTEX)
+			vertices = el->count;
+		for (uint32_t k = 0; k < el->property_count; k++)
+			faces |= el->properties[k].role == ROLE_INDICES && el->count > 0;
+	}
+	if (vertices == 0 || !f->has[ROLE_X] || !f->has[ROLE_Y] || !f->has[ROLE_Z])
+		return node_error(f->node, f->error, EINVAL, "%s: has no vertices with x, y and z", f->name);
+	if (!faces)
+		return node_error(f->node, f->error, EINVAL, "%s: has no faces with vertex_indices", f->name);
+	if (vertices >= UINT32_MAX || vertices > (uint64_t)(f->end - f->p))
+		return node_error(f->node, f->error, EINVAL, "%s: too short for %llu vertices", f->name,
+				  (unsigned long long)vertices);
+	f->mesh->vertex_count = (uint32_t)vertices;
+	return 0;
+}
+
+static int read_file(struct ply *f, struct arena *arena)
+{
+	int r = read_header(f);
+	if (!r)
+		r = check_header(f);
+	const char *body = f->p;
+	if (!r)
+		r = read_body(f);
+	if (r)
+		return r;
+	bool normals = f->has[ROLE_NX] && f->has[ROLE_NY] && f->has[ROLE_NZ], uv = f->has[ROLE_U] && f->has[ROLE_V];
+	if (!mesh_alloc(f->mesh, f->mesh->vertex_count, (uint32_t)f->triangles, normals, uv, arena))
+		return node_error(f->node, f->error, ENOMEM, "%s: out of memory", f->name);
+	f->p = body;
+	return read_body(f);
+}
+
+static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		 struct shape_geometry *out, struct error *e)
+{
+	struct asset a;
+	int r = mesh_open(n, assets, &a, e);
+	if (r)
+		return r;
+	const char *bytes = (const char *)a.bytes;
+	struct ply f = {.node = n,
+			.name = node_string(n, "filename", ""),
+			.error = e,
+			.p = bytes,
+			.end = bytes + a.size,
+			.mesh = &out->mesh,
+			.flip = node_bool(n, "flip_tex_coords", false)};
+	r = read_file(&f, arena);
+	assets->close(assets->user, &a);
+	return r;
+}
+
+const struct shape_ops shape_ops_ply = {.type = "ply", .params = params, .build = build};

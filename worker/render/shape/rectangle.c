@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A square from -1 to 1 in x and y, facing z. */
+#include "worker/render/shape/declare.h"
+#include "worker/render/shape/quad.h"
+
+static const struct param params[] = {{"face_normals", IGNORED}, SHAPE_PARAMS_END};
+
+static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		 struct shape_geometry *out, struct error *e)
+{
+	(void)assets;
+	struct mesh *m = &out->mesh;
+	if (!mesh_alloc(m, 4, 2, true, true, arena))
+		return node_error(n, e, ENOMEM, "out of memory");
+	for (uint32_t i = 0; i < 4; i++) {
+		double u = quad_corner[i][0], v = quad_corner[i][1];
+		mesh_set_vertex(m, i, (vec3){2 * u - 1, 2 * v - 1, 0}, (vec3){0, 0, 1}, u, v);
+	}
+	quad_set(m, 0, 0);
+	return 0;
+}
+
+const struct shape_ops shape_ops_rectangle = {.type = "rectangle", .params = params, .build = build};

@@ -1,0 +1,240 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Mitsuba's own binary meshes (.serialized, versions 3 and 4): any number of meshes in one file, each compressed by
+ * itself, found through a table of offsets at the file's end; `shape_index` says which.
+ *
+ * A mesh is a number of fixed meaning, a version, and behind these a zlib stream: flags, a name (version 4), counts,
+ * positions, normals, texture coordinates and colours as the flags say, triangles. All is little endian.
+ *
+ * Failures: a table that leads out of the file, a stream that is damaged or ends too early, indices out of range,
+ * numbers that are not finite. Counts are believed only as far as the compressed bytes could hold them.
+ */
+#include "common/base/liveness.h"
+#include "worker/render/shape/declare.h"
+#include "worker/render/shape/mesh.h"
+
+#include <string.h>
+
+#define ZLIB_CONST
+#include <zlib.h>
+
+enum { MAGIC = 0x041c, VERSION_3 = 3, VERSION_4 = 4, NAME_MAX_BYTES = 1 << 16, CHUNK_ITEMS = 1024 };
+enum { ZLIB_RATIO = 1032 /* a byte of deflate stands for at most so many */ };
+enum { HAS_NORMALS = 1, HAS_UV = 2, HAS_COLOURS = 8, HAS_FACE_NORMALS = 16, DOUBLES = 0x2000 };
+
+struct stream {
+	const struct scene_node *node;
+	const char *name;
+	struct error *error;
+	z_stream z;
+	uint64_t most; /* bytes that it can hold */
+};
+
+static const struct param params[] = {
+	{"filename", UNDERSTOOD(VALUE_STRING)},
+	{"shape_index", VALUE_INT, PARAM_UNDERSTOOD, 0, 1 << 24, NULL},
+	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
+	{"collapse", IGNORED},
+	{"max_smooth_angle", REFUSED},
+	SHAPE_PARAMS_END,
+};
+
+static uint64_t little(const unsigned char *p, int bytes)
+{
+	uint64_t x = 0;
+	for (int i = 0; i < bytes; i++)
+		x |= (uint64_t)p[i] << 8 * i;
+	return x;
+}
+
+static int file_error(const struct stream *s, const char *what)
+{
+	return node_error(s->node, s->error, EINVAL, "%s: %s", s->name, what);
+}
+
+static int take(struct stream *s, void *out, size_t size)
+{
+	s->z.next_out = out;
+	while (size > 0) {
+		uInt piece = size < 1u << 20 ? (uInt)size : 1u << 20;
+		s->z.avail_out = piece;
+		tick();
+		int code = inflate(&s->z, Z_SYNC_FLUSH);
+		size -= piece - s->z.avail_out;
+		if (s->z.avail_out > 0 && code != Z_OK)
+			return code == Z_MEM_ERROR ? node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name)
+						   : file_error(s, "the compressed mesh is damaged or ends too early");
+	}
+	return 0;
+}
+
+static int take_number(struct stream *s, int bytes, uint64_t *x)
+{
+	unsigned char raw[8];
+	int r = take(s, raw, (size_t)bytes);
+	*x = r ? 0 : little(raw, bytes);
+	return r;
+}
+
+static int skip_name(struct stream *s)
+{
+	char c;
+	for (int i = 0; i < NAME_MAX_BYTES; i++) {
+		int r = take(s, &c, 1);
+		if (r || c == 0)
+			return r;
+	}
+	return file_error(s, "the mesh's name does not end");
+}
+
+/* count x width numbers; out NULL: stepped over. */
+static int take_reals(struct stream *s, bool doubles, uint32_t count, int width, double *out)
+{
+	unsigned char raw[CHUNK_ITEMS * 8];
+	int size = doubles ? 8 : 4;
+	uint64_t left = (uint64_t)count * (uint64_t)width;
+	while (left > 0) {
+		size_t n = left < CHUNK_ITEMS ? (size_t)left : CHUNK_ITEMS;
+		int r = take(s, raw, n * (size_t)size);
+		if (r)
+			return r;
+		for (size_t i = 0; out && i < n; i++) {
+			uint64_t bits = little(raw + i * (size_t)size, size);
+			uint32_t low = (uint32_t)bits;
+			float f;
+			memcpy(&f, &low, sizeof f);
+			if (doubles)
+				memcpy(out, &bits, sizeof *out);
+			else
+				*out = (double)f;
+			if (!(fabs(*out) <= MESH_COORDINATE_MAX))
+				return file_error(s, "a number that is not finite, or beyond 1e60");
+			out++;
+		}
+		left -= n;
+	}
+	return 0;
+}
+
+static int take_triangles(struct stream *s, struct mesh *m)
+{
+	unsigned char raw[CHUNK_ITEMS * 12];
+	for (uint32_t done = 0; done < m->triangle_count;) {
+		uint32_t n = m->triangle_count - done < CHUNK_ITEMS ? m->triangle_count - done : CHUNK_ITEMS;
+		int r = take(s, raw, (size_t)n * 12);
+		if (r)
+			return r;
+		for (uint32_t i = 0; i < 3 * n; i++) {
+			uint32_t v = (uint32_t)little(raw + 4 * (size_t)i, 4);
+			if (v >= m->vertex_count)
+				return file_error(s, "a triangle's index is none of a vertex");
+			m->index[done + i / 3][i % 3] = v;
+		}
+		done += n;
+	}
+	return 0;
+}
+
+/* The stream's checksum stands at its end. What follows the triangles without being damaged is nobody's. */
+static int check_end(struct stream *s)
+{
+	unsigned char beyond;
+	s->z.next_out = &beyond;
+	s->z.avail_out = 1;
+	return inflate(&s->z, Z_SYNC_FLUSH) == Z_DATA_ERROR ? file_error(s, "the compressed mesh is damaged") : 0;
+}
+
+static int take_mesh(struct stream *s, int version, struct arena *arena, struct shape_geometry *out)
+{
+	struct mesh *m = &out->mesh;
+	uint64_t flags, vertices, triangles;
+	int r = take_number(s, 4, &flags);
+	if (!r && version == VERSION_4)
+		r = skip_name(s);
+	if (!r)
+		r = take_number(s, 8, &vertices);
+	if (!r)
+		r = take_number(s, 8, &triangles);
+	if (r)
+		return r;
+	bool doubles = flags & DOUBLES, normals = flags & HAS_NORMALS, uv = flags & HAS_UV;
+	if (vertices == 0 || triangles == 0)
+		return file_error(s, "the mesh has no triangles");
+	if (triangles > MESH_TRIANGLES_MAX || vertices >= UINT32_MAX || vertices > s->most / (doubles ? 24 : 12) ||
+	    triangles > s->most / 12)
+		return file_error(s, "more vertices or triangles than there can be");
+	if (!mesh_alloc(m, (uint32_t)vertices, (uint32_t)triangles, normals, uv, arena))
+		return node_error(s->node, s->error, ENOMEM, "%s: out of memory", s->name);
+	r = take_reals(s, doubles, m->vertex_count, 3, m->position[0]);
+	if (!r && normals)
+		r = take_reals(s, doubles, m->vertex_count, 3, m->normal[0]);
+	if (!r && uv)
+		r = take_reals(s, doubles, m->vertex_count, 2, m->uv[0]);
+	if (!r && (flags & HAS_COLOURS))
+		r = take_reals(s, doubles, m->vertex_count, 3, NULL);
+	if (!r)
+		r = take_triangles(s, m);
+	if (!r)
+		r = check_end(s);
+	for (uint32_t i = 0; !r && normals && i < m->vertex_count; i++)
+		mesh_store(m->normal[i], mesh_unit(mesh_load(m->normal[i])));
+	out->face_normals = flags & HAS_FACE_NORMALS;
+	return r;
+}
+
+/* Where mesh `index` begins and ends. The last four bytes count the meshes; before them stand their offsets. */
+static int find_mesh(const struct stream *s, const struct asset *a, uint64_t index, size_t *begin, size_t *end)
+{
+	enum { HEAD = 4 };
+	if (a->size < HEAD + 4 || little(a->bytes, 2) != MAGIC)
+		return file_error(s, "this is no serialized mesh");
+	uint64_t version = little(a->bytes + 2, 2);
+	if (version != VERSION_3 && version != VERSION_4)
+		return node_error(s->node, s->error, ENOTSUP, "%s: version %llu is not supported (supported: 3, 4)",
+				  s->name, (unsigned long long)version);
+	uint64_t count = little(a->bytes + a->size - 4, 4);
+	int width = version == VERSION_3 ? 4 : 8;
+	if (count == 0 || count > (a->size - 4) / (uint64_t)width)
+		return file_error(s, "the table of meshes at its end is damaged");
+	if (index >= count)
+		return node_error(s->node, s->error, ERANGE,
+				  "%s: shape_index=%llu, but it holds %llu meshes, counted from 0", s->name,
+				  (unsigned long long)index, (unsigned long long)count);
+	size_t table = a->size - 4 - (size_t)count * (size_t)width;
+	uint64_t from = little(a->bytes + table + index * (size_t)width, width);
+	uint64_t to = index + 1 < count ? little(a->bytes + table + (index + 1) * (size_t)width, width) : table;
+	if (from > table || to > table || to < from + HEAD || little(a->bytes + from, 2) != MAGIC ||
+	    little(a->bytes + from + 2, 2) != version)
+		return file_error(s, "the table of meshes at its end is damaged");
+	*begin = (size_t)from;
+	*end = (size_t)to;
+	return 0;
+}
+
+static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		 struct shape_geometry *out, struct error *e)
+{
+	struct asset a;
+	int r = mesh_open(n, assets, &a, e);
+	if (r)
+		return r;
+	struct stream s = {.node = n, .name = node_string(n, "filename", ""), .error = e};
+	size_t begin = 0, end = 0;
+	r = find_mesh(&s, &a, (uint64_t)node_int(n, "shape_index", 0), &begin, &end);
+	if (!r && end - begin > UINT_MAX)
+		r = node_error(n, e, EFBIG, "%s: a mesh of more than 4 GB", s.name);
+	if (!r && inflateInit(&s.z) != Z_OK)
+		r = node_error(n, e, ENOMEM, "%s: out of memory", s.name);
+	if (!r) {
+		size_t size = end - begin - 4;
+		s.z.next_in = a.bytes + begin + 4;
+		s.z.avail_in = (uInt)size;
+		s.most = (uint64_t)size * ZLIB_RATIO;
+		r = take_mesh(&s, (int)little(a.bytes + begin + 2, 2), arena, out);
+		inflateEnd(&s.z);
+	}
+	assets->close(assets->user, &a);
+	return r;
+}
+
+const struct shape_ops shape_ops_serialized = {.type = "serialized", .params = params, .build = build};

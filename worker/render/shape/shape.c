@@ -1,0 +1,35 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/shape/mesh.h"
+
+#include <string.h>
+
+#define SHAPE(name) extern const struct shape_ops shape_ops_##name;
+#include "worker/render/shape/shape_list.h"
+#undef SHAPE
+
+const struct shape_ops *const shape_registry[] = {
+#define SHAPE(name) &shape_ops_##name,
+#include "worker/render/shape/shape_list.h"
+#undef SHAPE
+	NULL,
+};
+
+const unsigned shape_nested_classes = 1 << PLUGIN_BSDF | 1 << PLUGIN_EMITTER;
+
+int shape_build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		struct shape_geometry *out, uint64_t *dropped, struct error *e)
+{
+	*out = (struct shape_geometry){.kind = SHAPE_MESH};
+	*dropped = 0;
+	const struct shape_ops *const *ops = shape_registry;
+	while (*ops && strcmp((*ops)->type, n->type) != 0)
+		ops++;
+	if (!*ops || !(*ops)->build)
+		return node_error(n, e, ENOTSUP, "\"%s\" is no shape that is supported", n->type);
+	int r = (*ops)->build(n, assets, arena, out, e);
+	if (r || out->kind != SHAPE_MESH)
+		return r;
+	struct mesh_finish f = {node_transform(n, "to_world"), node_bool(n, "flip_normals", false),
+				out->face_normals || node_bool(n, "face_normals", false)};
+	return mesh_finish(&out->mesh, &f, arena, dropped, n, e);
+}

@@ -1,0 +1,58 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Shapes. One file per plug-in and one line in shape_list.h: the scene reader knows it, and the generic tests pick it
+ * up.
+ *
+ * What a shape becomes: triangles or a sphere in world space (to_world applied, not yet rescaled), in double. Triangles
+ * are wound counter-clockwise as seen from outside. v = 0 is the top row of a picture, as in both Mitsubas (obj files
+ * count from the bottom and are turned round unless flip_tex_coords is false).
+ */
+#ifndef WORKER_RENDER_SHAPE_SHAPE_H
+#define WORKER_RENDER_SHAPE_SHAPE_H
+
+#include "worker/render/scene/scene.h"
+
+struct mesh {
+	uint32_t vertex_count, triangle_count;
+	double (*position)[3];
+	double (*normal)[3]; /* NULL: none, shade flat; unit length; facing the outside */
+	double (*uv)[2];     /* NULL: none */
+	uint32_t (*index)[3];
+};
+
+struct sphere {
+	vec3 center;
+	double radius;
+	bool flip_normals; /* normals point inwards */
+	mat4 to_world;	   /* rotation of the parametrisation only (uv), orthonormal */
+};
+
+enum shape_kind { SHAPE_MESH, SHAPE_SPHERE };
+
+struct shape_geometry {
+	enum shape_kind kind;
+	struct mesh mesh;  /* arrays owned by the arena given */
+	bool face_normals; /* its file wants each triangle flat */
+	struct sphere sphere;
+};
+
+struct shape_ops {
+	const char *type;
+	const struct param *params;
+	/* NULL: it holds others (group.h), and is not built itself. */
+	/* Fills *out: the sphere in world space, or the mesh in object space (shape_build places and checks it). */
+	int (*build)(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		     struct shape_geometry *out, struct error *e);
+	unsigned nested_classes; /* of objects that it may hold without a name; 0: shape_nested_classes */
+};
+
+extern const struct shape_ops *const shape_registry[]; /* ends with NULL */
+/* Classes of objects that a shape may hold without a name: struct plugin_decl. */
+extern const unsigned shape_nested_classes;
+
+/* Builds the geometry of a PLUGIN_SHAPE node. Checked: finite, indices in range. Triangles without an area are
+ * dropped and counted in *dropped; a mesh may have none left. One thread; allocates in the arena. */
+int shape_build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		struct shape_geometry *out, uint64_t *dropped, struct error *e);
+
+#endif

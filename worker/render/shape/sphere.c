@@ -1,0 +1,80 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A true sphere. What to_world scales unevenly is an ellipsoid: a mesh of 8 * 4^ELLIPSOID_LEVEL triangles with the
+ * ellipsoid's own normals.
+ */
+#include "worker/render/shape/declare.h"
+#include "worker/render/shape/mesh.h"
+
+#include <float.h>
+
+static const struct param params[] = {
+	{"center", VALUE_POINT, PARAM_UNDERSTOOD, -MESH_COORDINATE_MAX, MESH_COORDINATE_MAX, NULL},
+	{"radius", VALUE_FLOAT, PARAM_UNDERSTOOD, DBL_MIN, MESH_COORDINATE_MAX, NULL},
+	SHAPE_PARAMS_END,
+};
+
+/* Written matrices have six digits: that much unevenness passes for a similarity. */
+#define SIMILARITY_TOLERANCE 1e-4
+
+enum { ELLIPSOID_LEVEL = 6 };
+
+static double no_height(const void *user, double u, double v)
+{
+	(void)user, (void)u, (void)v;
+	return 0;
+}
+
+static int check_extent(const struct sphere *s, const struct scene_node *n, struct error *e)
+{
+	if (s->radius > 0 && s->radius <= MESH_COORDINATE_MAX && vec3_length(s->center) <= MESH_COORDINATE_MAX)
+		return 0;
+	return node_error(n, e, ERANGE, "a sphere of radius %g around (%g, %g, %g)", s->radius, s->center.x,
+			  s->center.y, s->center.z);
+}
+
+/* In object space: shape_build places the mesh. */
+static int make_ellipsoid(const struct scene_node *n, struct arena *arena, struct shape_geometry *out, struct error *e)
+{
+	const struct displacement flat = {
+		.height = no_height, .is_constant = true, .level = ELLIPSOID_LEVEL, .tessellation = 1};
+	out->sphere.to_world = mat4_identity();
+	int r = check_extent(&out->sphere, n, e);
+	return r ? r : displace(out, &flat, arena, n, e);
+}
+
+static int make_sphere(const struct scene_node *n, const mat4 *m, double scale, vec3 x, vec3 z, struct sphere *s,
+		       struct error *e)
+{
+	s->center = mat4_point(m, s->center);
+	s->radius *= scale;
+	s->flip_normals = node_bool(n, "flip_normals", false);
+	double hand = mat4_det3(*m) < 0 ? -1 : 1;
+	z = vec3_normalize(z);
+	x = vec3_normalize(vec3_madd(x, -vec3_dot(x, z), z));
+	vec3 y = vec3_scale(hand, vec3_cross(z, x));
+	s->to_world = (mat4){{{x.x, y.x, z.x, 0}, {x.y, y.y, z.y, 0}, {x.z, y.z, z.z, 0}, {0, 0, 0, 1}}};
+	return check_extent(s, n, e);
+}
+
+static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		 struct shape_geometry *out, struct error *e)
+{
+	(void)assets;
+	mat4 m = node_transform(n, "to_world");
+	vec3 x = {m.m[0][0], m.m[1][0], m.m[2][0]}, y = {m.m[0][1], m.m[1][1], m.m[2][1]},
+	     z = {m.m[0][2], m.m[1][2], m.m[2][2]};
+	double lx = vec3_length(x), ly = vec3_length(y), lz = vec3_length(z), scale = cbrt(fabs(mat4_det3(m)));
+	double uneven = fmax(fabs(lx - scale), fmax(fabs(ly - scale), fabs(lz - scale)));
+	const struct property *center = node_find(n, "center");
+	out->kind = SHAPE_SPHERE;
+	out->sphere.center = center ? center->value.as.point : (vec3){0, 0, 0};
+	out->sphere.radius = node_float(n, "radius", 1);
+	if (!(scale > 0))
+		return node_error(n, e, EINVAL, "to_world flattens the shape (it has no inverse)");
+	if (!(uneven <= SIMILARITY_TOLERANCE * scale))
+		return make_ellipsoid(n, arena, out, e);
+	return make_sphere(n, &m, scale, x, z, &out->sphere, e);
+}
+
+const struct shape_ops shape_ops_sphere = {.type = "sphere", .params = params, .build = build};

@@ -1,0 +1,148 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * An image file. (u,v) = (0,0) is the upper left corner of the picture in both dialects: Mitsuba's loaders of OBJ files
+ * turn v over (flip_tex_coords), and its bitmaps do not. Reflectances are clamped to [0,1]. Interpolation is of linear
+ * rgb; trilinear and ewa, which 0.5/0.6 offer, become bilinear: there are no footprints here, samples do the filtering.
+ */
+#include "worker/render/texture/raster.h"
+#include "worker/render/texture/texture.h"
+#include "worker/render/texture/uv.h"
+
+#include <float.h>
+#include <string.h>
+
+enum { BOUND_PIXELS_MAX = 1 << 22 }; /* beyond that many the upper bound is not sought pixel by pixel */
+
+struct bitmap {
+	struct raster raster;
+	struct uv_map map;
+	enum color_role role;
+	enum color_shape shape;
+	double max;
+};
+
+static enum raster_wrap wrap_of(const char *mode)
+{
+	return strcmp(mode, "mirror") == 0 ? RASTER_MIRROR : strcmp(mode, "clamp") == 0 ? RASTER_CLAMP : RASTER_REPEAT;
+}
+
+static double upper_bound(const struct bitmap *b)
+{
+	if (b->role == COLOR_ILLUMINANT)
+		return raster_max(&b->raster) * color_max_d65();
+	if (b->shape == COLOR_SHAPE_CONSTANT)
+		return raster_max(&b->raster);
+	uint32_t w = b->raster.image.width, h = b->raster.image.height;
+	double m = 0;
+	for (uint32_t y = 0; y < h; y++)
+		for (uint32_t x = 0; x < w; x++) {
+			double rgb[3];
+			if ((uint64_t)w * h > BOUND_PIXELS_MAX)
+				return 1;
+			raster_pixel(&b->raster, x, y, rgb);
+			m = fmax(m, color_max_rgb_reflectance(rgb));
+		}
+	return m;
+}
+
+static int bitmap_create(struct texture *t, const struct scene_node *n, enum color_role role,
+			 const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e)
+{
+	(void)dialect_3;
+	struct bitmap *b = arena_alloc(arena, 1, sizeof *b);
+	if (!b)
+		return node_error(n, e, ENOMEM, "out of memory");
+	t->data = b;
+	if (role == COLOR_UNBOUNDED)
+		return node_error(n, e, ENOTSUP, "a bitmap cannot stand for this quantity");
+	const struct raster_range range = {color_role_is_number(role) ? -DBL_MAX : 0,
+					   role == COLOR_REFLECTANCE ? 1 : DBL_MAX, role == COLOR_HEIGHT};
+	int code = raster_read(&b->raster, n, assets, &range, arena, e);
+	if (code)
+		return code;
+	const char *both = node_string(n, "wrap_mode", "repeat");
+	b->raster.wrap_u = wrap_of(node_string(n, "wrap_mode_u", both));
+	b->raster.wrap_v = wrap_of(node_string(n, "wrap_mode_v", both));
+	b->raster.nearest = strcmp(node_string(n, "filter_type", "bilinear"), "nearest") == 0;
+	b->map = uv_map_read(n);
+	b->role = role;
+	if (color_role_is_number(role))
+		return 0;
+	b->shape = !raster_is_grey(&b->raster) ? COLOR_SHAPE_OTHER
+		   : role == COLOR_ILLUMINANT  ? COLOR_SHAPE_D65
+					       : COLOR_SHAPE_CONSTANT;
+	b->max = upper_bound(b);
+	return 0;
+}
+
+static spectrum bitmap_eval(const struct texture *t, double u, double v, const struct wavelengths *w)
+{
+	const struct bitmap *b = t->data;
+	double rgb[3];
+	uv_map_apply(&b->map, &u, &v);
+	raster_eval(&b->raster, u, v, rgb);
+	return b->role == COLOR_ILLUMINANT ? color_eval_rgb_illuminant(rgb, w) : color_eval_rgb_reflectance(rgb, w);
+}
+
+/* Of a coloured picture the luminance. */
+static double bitmap_height(const struct texture *t, double u, double v)
+{
+	const struct bitmap *b = t->data;
+	double rgb[3];
+	uv_map_apply(&b->map, &u, &v);
+	raster_eval(&b->raster, u, v, rgb);
+	return b->raster.image.channels == 1 ? rgb[0] : 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+}
+
+static void bitmap_jet(const struct texture *t, double u, double v, struct texture_jet *j)
+{
+	const struct bitmap *b = t->data;
+	const double(*m)[3] = b->map.m;
+	struct raster_patch p;
+	uv_map_apply(&b->map, &u, &v);
+	raster_patch(&b->raster, u, v, &p);
+	j->grey = b->raster.image.channels == 1;
+	for (int k = 0; k < 3; k++) {
+		j->x[k] = p.x[k];
+		j->du[k] = m[0][0] * p.du[k] + m[1][0] * p.dv[k];
+		j->dv[k] = m[0][1] * p.du[k] + m[1][1] * p.dv[k];
+		j->duu[k] = 2 * m[0][0] * m[1][0] * p.duv[k];
+		j->duv[k] = (m[0][0] * m[1][1] + m[0][1] * m[1][0]) * p.duv[k];
+		j->dvv[k] = 2 * m[0][1] * m[1][1] * p.duv[k];
+	}
+}
+
+static double bitmap_max(const struct texture *t)
+{
+	return ((const struct bitmap *)t->data)->max;
+}
+
+static enum color_shape bitmap_shape(const struct texture *t)
+{
+	return ((const struct bitmap *)t->data)->shape;
+}
+
+#define WRAP_MODES "repeat|mirror|clamp"
+static const struct param bitmap_params[] = {
+	RASTER_PARAMS,
+	UV_PARAMS,
+	{.name = "filter_type", .types = VALUE_STRING, .choices = "bilinear|nearest|trilinear|ewa"},
+	{.name = "wrap_mode", .types = VALUE_STRING, .choices = WRAP_MODES},
+	{.name = "wrap_mode_u", .types = VALUE_STRING, .choices = WRAP_MODES},
+	{.name = "wrap_mode_v", .types = VALUE_STRING, .choices = WRAP_MODES},
+	{.name = "max_anisotropy", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = "format", .types = VALUE_STRING, .status = PARAM_IGNORED},
+	{.name = "accel", .types = VALUE_BOOL, .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+const struct texture_ops texture_ops_bitmap = {
+	.type = "bitmap",
+	.params = bitmap_params,
+	.create = bitmap_create,
+	.eval = bitmap_eval,
+	.height = bitmap_height,
+	.jet = bitmap_jet,
+	.max = bitmap_max,
+	.shape = bitmap_shape,
+};

@@ -1,0 +1,318 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/texture/color.h"
+
+#include "worker/render/math/cie.h"
+#include "worker/render/texture/upsample.h"
+
+#include <assert.h>
+#include <string.h>
+
+static const float table[3 * UPSAMPLE_TABLE_SIZE * UPSAMPLE_TABLE_SIZE * UPSAMPLE_TABLE_SIZE * 3] = {
+#include "upsample_table.inc"
+};
+
+/* Luminance of D65 at its tabulated scale: the integral of d65 y_bar, both linear between their
+ * values, over 106.857 nm. A test computes it again. */
+#define D65_LUMINANCE 98.889832367126914
+
+double color_d65(double nm)
+{
+	double position = nm - CIE_FIRST_NM;
+	if (!(position >= 0 && position <= CIE_COUNT - 1))
+		return 0;
+	int cell = (int)position;
+	cell = cell > CIE_COUNT - 2 ? CIE_COUNT - 2 : cell;
+	double b = position - cell;
+	return ((1 - b) * cie_d65[cell] + b * cie_d65[cell + 1]) * (1 / D65_LUMINANCE);
+}
+
+static int table_cell(double value)
+{
+	int low = 0, high = UPSAMPLE_TABLE_SIZE - 1;
+	while (high - low > 1) {
+		int middle = (low + high) / 2;
+		if (value < upsample_table_value(middle))
+			high = middle;
+		else
+			low = middle;
+	}
+	return low;
+}
+
+/* Coefficients by trilinear interpolation; the largest component is > 0. */
+static void table_lookup(const double rgb[3], double c[3])
+{
+	const int n = UPSAMPLE_TABLE_SIZE;
+	int l = rgb[0] >= rgb[1] ? (rgb[0] >= rgb[2] ? 0 : 2) : (rgb[1] >= rgb[2] ? 1 : 2);
+	double z = rgb[l], x = rgb[(l + 1) % 3] * (n - 1) / z, y = rgb[(l + 2) % 3] * (n - 1) / z;
+	int xi = (int)x, yi = (int)y, zi = table_cell(z);
+	xi = xi > n - 2 ? n - 2 : xi;
+	yi = yi > n - 2 ? n - 2 : yi;
+	double z0 = upsample_table_value(zi), z1 = upsample_table_value(zi + 1);
+	double fx = x - xi, fy = y - yi, fz = (z - z0) / (z1 - z0);
+	for (int k = 0; k < 3; k++)
+		c[k] = 0;
+	for (int corner = 0; corner < 8; corner++) {
+		int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
+		double w = (dx ? fx : 1 - fx) * (dy ? fy : 1 - fy) * (dz ? fz : 1 - fz);
+		const float *p = table + 3 * (((l * n + zi + dz) * n + yi + dy) * n + xi + dx);
+		for (int k = 0; k < 3; k++)
+			c[k] += w * (double)p[k];
+	}
+}
+
+spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelengths *w)
+{
+	if (WAVELENGTHS_GREY(w) || (rgb[0] == rgb[1] && rgb[1] == rgb[2]))
+		return spectrum_of(rgb[0]);
+	double c[3];
+	table_lookup(rgb, c);
+	spectrum s;
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		double t = (w->nm[i] - UPSAMPLE_CENTER_NM) * (1 / UPSAMPLE_HALF_NM);
+		s.v[i] = upsample_sigmoid((c[0] * t + c[1]) * t + c[2]);
+	}
+	return s;
+}
+
+spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths *w)
+{
+	double largest = fmax(rgb[0], fmax(rgb[1], rgb[2]));
+	if (largest == 0 || WAVELENGTHS_GREY(w))
+		return spectrum_of(largest);
+	const double unit[3] = {rgb[0] / largest, rgb[1] / largest, rgb[2] / largest};
+	spectrum s = color_eval_rgb_reflectance(unit, w);
+	for (int i = 0; i < SPECTRUM_LANES; i++)
+		s.v[i] *= largest * color_d65(w->nm[i]);
+	return s;
+}
+
+struct color color_constant(double x)
+{
+	return (struct color){.shape = COLOR_SHAPE_CONSTANT, .scale = x};
+}
+
+/* The same number at all wavelengths, or the white of the role. */
+static struct color color_white(double x, enum color_role role)
+{
+	struct color c = color_constant(x);
+	if (role == COLOR_ILLUMINANT) {
+		c.shape = COLOR_SHAPE_D65;
+		c.d65 = true;
+	}
+	return c;
+}
+
+/* From the polynomial in t to the one in nm. */
+static void coefficients_in_nm(const double t[3], double nm[3])
+{
+	const double center = UPSAMPLE_CENTER_NM, r = 1 / UPSAMPLE_HALF_NM;
+	nm[0] = t[0] * r * r;
+	nm[1] = t[1] * r - 2 * t[0] * r * r * center;
+	nm[2] = t[0] * r * r * center * center - t[1] * r * center + t[2];
+}
+
+/* The largest number that a colour of the role may have: of textures, which cannot know it from their tables. */
+static double role_max(enum color_role role)
+{
+	return role == COLOR_REFLECTANCE ? 1 : role == COLOR_ILLUMINANT ? PARAM_LIGHT_MAX : PARAM_METAL_MAX;
+}
+
+int color_from_rgb(const double rgb[3], enum color_role role, struct color *out)
+{
+	double largest = 0;
+	for (int k = 0; k < 3; k++) {
+		if (!(rgb[k] >= 0) || !(rgb[k] <= role_max(role)))
+			return -EINVAL;
+		largest = rgb[k] > largest ? rgb[k] : largest;
+	}
+	*out = color_white(largest, role);
+	if (rgb[0] == rgb[1] && rgb[1] == rgb[2])
+		return 0;
+	out->shape = COLOR_SHAPE_OTHER;
+	out->sigmoid = true;
+	out->scale = role == COLOR_REFLECTANCE ? 1 : role == COLOR_ILLUMINANT ? largest : 2 * largest;
+	double unit[3], c[3];
+	for (int k = 0; k < 3; k++)
+		unit[k] = rgb[k] / out->scale;
+	table_lookup(unit, c);
+	struct upsample s;
+	upsample_init(&s, 1);
+	upsample_fit(&s, unit, 1e-9, c);
+	coefficients_in_nm(c, out->coefficient);
+	return 0;
+}
+
+static int color_from_table(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
+			    struct error *e)
+{
+	uint32_t n = v->as.spectrum.count;
+	for (uint32_t i = 0; i < n; i++) {
+		double x = v->as.spectrum.value[i], nm = v->as.spectrum.nm[i];
+		if (!(x >= 0) || !(x <= role_max(role)) || !isfinite(nm))
+			return error_set(e, EINVAL, "%g at %g nm is outside [0, %g]", x, nm, role_max(role));
+		if (i && !(nm > v->as.spectrum.nm[i - 1]))
+			return error_set(e, EINVAL, "the wavelengths of a spectrum must increase");
+	}
+	double *copy = arena_alloc(arena, (size_t)n * 2, sizeof *copy);
+	if (!copy)
+		return error_set(e, ENOMEM, "out of memory for a spectrum of %u values", n);
+	memcpy(copy, v->as.spectrum.nm, n * sizeof *copy);
+	memcpy(copy + n, v->as.spectrum.value, n * sizeof *copy);
+	*out = (struct color){.shape = COLOR_SHAPE_OTHER,
+			      .scale = 1,
+			      .count = n,
+			      .nm = copy,
+			      .value = copy + n,
+			      .zero_outside = role == COLOR_ILLUMINANT};
+	return 0;
+}
+
+int color_from_value(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
+		     struct error *e)
+{
+	double x;
+	switch (v->type) {
+	case VALUE_RGB:
+		if (color_from_rgb(v->as.rgb, role, out))
+			return error_set(e, EINVAL, "rgb %g %g %g: must be within [0, %g]", v->as.rgb[0], v->as.rgb[1],
+					 v->as.rgb[2], role_max(role));
+		return 0;
+	case VALUE_SPECTRUM:
+		if (v->as.spectrum.count > 1)
+			return color_from_table(v, role, arena, out, e);
+		if (v->as.spectrum.count == 0)
+			return error_set(e, EINVAL, "a spectrum without values");
+		x = v->as.spectrum.value[0];
+		break;
+	case VALUE_FLOAT:
+		x = v->as.number;
+		break;
+	case VALUE_INT:
+		x = (double)v->as.integer;
+		break;
+	default:
+		return error_set(e, EINVAL, "not a colour");
+	}
+	if (!(x >= 0) || !(x <= role_max(role)))
+		return error_set(e, EINVAL, "%g: must be within [0, %g]", x, role_max(role));
+	*out = color_white(x, role);
+	return 0;
+}
+
+/* The cell of nm in the table. Most tables are even: the first guess is then right. */
+static uint32_t piece_of(const struct color *c, double nm)
+{
+	uint32_t last = c->count - 2, low = 0, high = c->count - 1;
+	double guess = (nm - c->nm[0]) / (c->nm[high] - c->nm[0]) * (double)high;
+	uint32_t g = guess >= (double)last ? last : (uint32_t)guess;
+	if (c->nm[g] <= nm && nm <= c->nm[g + 1])
+		return g;
+	while (high - low > 1) {
+		uint32_t middle = low + (high - low) / 2;
+		if (nm < c->nm[middle])
+			high = middle;
+		else
+			low = middle;
+	}
+	return low;
+}
+
+static double table_value(const struct color *c, double nm)
+{
+	uint32_t last = c->count - 1;
+	if (nm < c->nm[0])
+		return c->zero_outside ? 0 : c->value[0];
+	if (nm > c->nm[last])
+		return c->zero_outside ? 0 : c->value[last];
+	uint32_t i = piece_of(c, nm);
+	double b = (nm - c->nm[i]) / (c->nm[i + 1] - c->nm[i]);
+	return (1 - b) * c->value[i] + b * c->value[i + 1];
+}
+
+static inline spectrum eval_lanes(const struct color *c, const struct wavelengths *w, int lanes)
+{
+	spectrum s = spectrum_of(c->scale);
+	if (c->sigmoid)
+		for (int i = 0; i < lanes; i++) {
+			double nm = w->nm[i];
+			s.v[i] *=
+				upsample_sigmoid((c->coefficient[0] * nm + c->coefficient[1]) * nm + c->coefficient[2]);
+		}
+	if (c->count)
+		for (int i = 0; i < lanes; i++)
+			s.v[i] *= table_value(c, w->nm[i]);
+	if (c->d65)
+		for (int i = 0; i < lanes; i++)
+			s.v[i] *= color_d65(w->nm[i]);
+	return s;
+}
+
+spectrum color_eval(const struct color *c, const struct wavelengths *w)
+{
+	if (WAVELENGTHS_GREY(w) || c->shape == COLOR_SHAPE_CONSTANT) {
+		assert(c->shape != COLOR_SHAPE_OTHER);
+		return spectrum_of(c->scale);
+	}
+	if (w->few)
+		return spectrum_repeat(eval_lanes(c, w, (int)w->few), (int)w->few);
+	return eval_lanes(c, w, SPECTRUM_LANES);
+}
+
+/* The polynomial's greatest value: at an end of the range, or at its vertex. */
+static double sigmoid_max(const double c[3])
+{
+	double nm[3] = {WAVELENGTH_MIN, WAVELENGTH_MAX, WAVELENGTH_MIN};
+	double vertex = -c[1] / (2 * c[0]);
+	if (c[0] != 0 && vertex > WAVELENGTH_MIN && vertex < WAVELENGTH_MAX)
+		nm[2] = vertex;
+	double m = 0;
+	for (int i = 0; i < 3; i++)
+		m = fmax(m, upsample_sigmoid((c[0] * nm[i] + c[1]) * nm[i] + c[2]));
+	return m;
+}
+
+double color_max_rgb_reflectance(const double rgb[3])
+{
+	if (rgb[0] == rgb[1] && rgb[1] == rgb[2])
+		return rgb[0];
+	double t[3], c[3];
+	table_lookup(rgb, t);
+	coefficients_in_nm(t, c);
+	return sigmoid_max(c);
+}
+
+double color_max_d65(void)
+{
+	double largest = 0;
+	for (int nm = CIE_FIRST_NM; nm <= CIE_LAST_NM; nm++)
+		largest = fmax(largest, color_d65(nm));
+	return largest;
+}
+
+double color_max(const struct color *c)
+{
+	double m = c->scale;
+	if (c->sigmoid)
+		m *= sigmoid_max(c->coefficient);
+	if (c->count) {
+		double largest = 0;
+		for (uint32_t i = 0; i < c->count; i++)
+			largest = fmax(largest, c->value[i]);
+		m *= largest;
+	}
+	if (c->d65)
+		m *= color_max_d65();
+	return m;
+}
+
+double color_mean(const struct color *c)
+{
+	enum { STEPS = 32 };
+	double sum = 0;
+	for (int i = 0; i < STEPS; i++) {
+		struct wavelengths w = wavelengths_sample((i + 0.5) / (SPECTRUM_LANES * STEPS));
+		sum += spectrum_mean(color_eval(c, &w));
+	}
+	return sum / STEPS;
+}

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Colour values as functions of wavelength (docs/design.md, rules 3).
+ * Reflectances: Jakob and Hanika 2019 sigmoid polynomials, round trip under D65. Illuminants: largest component x
+ * upsampled colour x D65 normalised to give Rec. 709 (1,1,1) for rgb 1. Unbounded (eta, k): scaled into [0,1] by
+ * twice the maximum and back. Immutable after creation; any thread; evaluation allocates nothing.
+ */
+#ifndef WORKER_RENDER_TEXTURE_COLOR_H
+#define WORKER_RENDER_TEXTURE_COLOR_H
+
+#include "worker/render/math/spectrum.h"
+#include "worker/render/scene/scene.h"
+
+/* The last two are of textures only, plain numbers of either sign and no spectrum: a height that displaces, whose
+ * pictures are taken as they are stored, and what bends normals, whose pictures are decoded as those of colours are. */
+enum color_role { COLOR_REFLECTANCE, COLOR_ILLUMINANT, COLOR_UNBOUNDED, COLOR_HEIGHT, COLOR_RELIEF };
+
+static inline bool color_role_is_number(enum color_role r)
+{
+	return r == COLOR_HEIGHT || r == COLOR_RELIEF;
+}
+
+/* How a colour varies with wavelength. Grey scenes need all reflectances CONSTANT and all emitters of one kind. */
+enum color_shape { COLOR_SHAPE_CONSTANT, COLOR_SHAPE_D65, COLOR_SHAPE_OTHER };
+
+struct color {
+	enum color_shape shape;
+	double scale; /* multiplies everything */
+	bool d65;     /* times D65 / its normalisation */
+	bool sigmoid; /* times S(c0 x^2 + c1 x + c2), x = nm */
+	double coefficient[3];
+	uint32_t count;		  /* > 0: piecewise linear table instead; constant extension outside is 0 for emitters
+				     and the end value for others */
+	const double *nm, *value; /* in the arena */
+	bool zero_outside;
+};
+
+/* value: one of VALUE_COLOR. Reflectances outside [0,1] are an error; negative values always are. */
+int color_from_value(const struct value *v, enum color_role role, struct arena *arena, struct color *out,
+		     struct error *e);
+int color_from_rgb(const double rgb[3], enum color_role role, struct color *out);
+struct color color_constant(double x);
+spectrum color_eval(const struct color *c, const struct wavelengths *w);
+double color_max(const struct color *c);  /* upper bound over wavelengths */
+double color_mean(const struct color *c); /* over wavelengths as they are drawn, to choose among emitters */
+
+/* Fast reflectance of many rgb values (textures): from a table of coefficients made at build time. rgb in [0,1]. */
+spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelengths *w);
+double color_max_rgb_reflectance(const double rgb[3]); /* of that spectrum */
+/* The same for emitters: largest component x reflectance x D65. rgb >= 0. */
+spectrum color_eval_rgb_illuminant(const double rgb[3], const struct wavelengths *w);
+double color_max_d65(void);
+
+/* D65 normalised so that an emitter of this spectrum has Rec. 709 (1,1,1); by linear interpolation. */
+double color_d65(double nm);
+
+#endif

@@ -1,0 +1,145 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/texture/raster.h"
+
+int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
+		const struct raster_range *range, struct arena *arena, struct error *e)
+{
+	const char *name = node_string(n, "filename", NULL);
+	double gamma = node_float(n, "gamma", 0);
+	if (!name)
+		return node_error(n, e, EINVAL, "\"%s\" needs a filename", n->type);
+	if (gamma != 0 && gamma != 1 && gamma != -1)
+		return node_error(n, e, ENOTSUP, "gamma = %g is not supported; it can be 1 (linear) or -1 (sRGB)",
+				  gamma);
+	struct error reason;
+	bool raw = node_bool(n, "raw", range->raw && gamma != -1);
+	int code = image_read(assets, name, gamma == 1 || raw, arena, &r->image, &reason);
+	if (code)
+		return node_error(n, e, -code, "%s", reason.text);
+	size_t count = (size_t)r->image.width * r->image.height * r->image.channels;
+	for (size_t i = 0; i < count; i++) {
+		float x = r->image.pixels[i];
+		r->image.pixels[i] = (double)x < range->least	  ? (float)range->least
+				     : (double)x > range->largest ? (float)range->largest
+								  : x;
+	}
+	return 0;
+}
+
+void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3])
+{
+	const float *p = r->image.pixels + ((size_t)y * r->image.width + x) * r->image.channels;
+	for (int k = 0; k < 3; k++)
+		rgb[k] = (double)p[r->image.channels == 3 ? k : 0];
+}
+
+/* Into the unit interval. */
+static double wrap(double x, enum raster_wrap mode)
+{
+	if (!isfinite(x))
+		return 0;
+	if (mode == RASTER_CLAMP)
+		return fmin(fmax(x, 0), 1);
+	if (mode == RASTER_REPEAT)
+		return x - floor(x);
+	double y = x - 2 * floor(0.5 * x);
+	return y > 1 ? 2 - y : y;
+}
+
+/* A pixel's neighbour beyond the border: on the other side when repeated, itself when mirrored or clamped. */
+static uint32_t neighbour(int64_t i, uint32_t n, enum raster_wrap mode)
+{
+	if (i < 0)
+		return mode == RASTER_REPEAT ? n - 1 : 0;
+	if (i >= (int64_t)n)
+		return mode == RASTER_REPEAT ? 0 : n - 1;
+	return (uint32_t)i;
+}
+
+/* The four pixels around a place, and how far it is from the first towards the others. */
+struct corners {
+	double c[4][3], fx, fy;
+};
+
+static void find_corners(const struct raster *r, double u, double v, struct corners *k)
+{
+	uint32_t w = r->image.width, h = r->image.height;
+	double x = wrap(u, r->wrap_u) * w, y = wrap(v, r->wrap_v) * h;
+	int64_t i = (int64_t)floor(x - 0.5), j = (int64_t)floor(y - 0.5);
+	k->fx = x - 0.5 - (double)i;
+	k->fy = y - 0.5 - (double)j;
+	uint32_t xs[2] = {neighbour(i, w, r->wrap_u), neighbour(i + 1, w, r->wrap_u)};
+	uint32_t ys[2] = {neighbour(j, h, r->wrap_v), neighbour(j + 1, h, r->wrap_v)};
+	for (int n = 0; n < 4; n++)
+		raster_pixel(r, xs[n & 1], ys[n >> 1], k->c[n]);
+}
+
+static void eval_nearest(const struct raster *r, double u, double v, double rgb[3])
+{
+	uint32_t w = r->image.width, h = r->image.height;
+	double x = wrap(u, r->wrap_u) * w, y = wrap(v, r->wrap_v) * h;
+	raster_pixel(r, x >= w ? w - 1 : (uint32_t)x, y >= h ? h - 1 : (uint32_t)y, rgb);
+}
+
+static double between(const struct corners *q, int k)
+{
+	return (1 - q->fy) * ((1 - q->fx) * q->c[0][k] + q->fx * q->c[1][k]) +
+	       q->fy * ((1 - q->fx) * q->c[2][k] + q->fx * q->c[3][k]);
+}
+
+void raster_eval(const struct raster *r, double u, double v, double rgb[3])
+{
+	struct corners q;
+	if (r->nearest) {
+		eval_nearest(r, u, v, rgb);
+		return;
+	}
+	find_corners(r, u, v, &q);
+	for (int k = 0; k < 3; k++)
+		rgb[k] = between(&q, k);
+}
+
+/* Pixels a unit of u; below 0 where the picture runs backwards. */
+static double pixels_per_unit(double x, uint32_t pixels, enum raster_wrap mode)
+{
+	bool backwards = mode == RASTER_MIRROR && isfinite(x) && x - 2 * floor(0.5 * x) > 1;
+	return backwards ? -(double)pixels : (double)pixels;
+}
+
+void raster_patch(const struct raster *r, double u, double v, struct raster_patch *out)
+{
+	struct corners q;
+	*out = (struct raster_patch){.x = {0}};
+	if (r->nearest) {
+		eval_nearest(r, u, v, out->x);
+		return;
+	}
+	find_corners(r, u, v, &q);
+	double su = pixels_per_unit(u, r->image.width, r->wrap_u), sv = pixels_per_unit(v, r->image.height, r->wrap_v);
+	for (int k = 0; k < 3; k++) {
+		double top = q.c[1][k] - q.c[0][k], bottom = q.c[3][k] - q.c[2][k];
+		out->x[k] = between(&q, k);
+		out->du[k] = su * ((1 - q.fy) * top + q.fy * bottom);
+		out->dv[k] = sv * ((1 - q.fx) * (q.c[2][k] - q.c[0][k]) + q.fx * (q.c[3][k] - q.c[1][k]));
+		out->duv[k] = su * sv * (bottom - top);
+	}
+}
+
+bool raster_is_grey(const struct raster *r)
+{
+	size_t count = (size_t)r->image.width * r->image.height;
+	const float *p = r->image.pixels;
+	for (size_t i = 0; r->image.channels == 3 && i < count; i++)
+		if (p[3 * i] != p[3 * i + 1] || p[3 * i] != p[3 * i + 2])
+			return false;
+	return true;
+}
+
+double raster_max(const struct raster *r)
+{
+	size_t count = (size_t)r->image.width * r->image.height * r->image.channels;
+	float m = 0;
+	for (size_t i = 0; i < count; i++)
+		m = r->image.pixels[i] > m ? r->image.pixels[i] : m;
+	return (double)m;
+}

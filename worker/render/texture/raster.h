@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * An image as a function on the plane: u to the right, v DOWN, the unit square is the image once. Pixel centres lie at
+ * ((i + 1/2) / width, (j + 1/2) / height). Immutable; any thread.
+ */
+#ifndef WORKER_RENDER_TEXTURE_RASTER_H
+#define WORKER_RENDER_TEXTURE_RASTER_H
+
+#include "worker/render/scene/image.h"
+#include "worker/render/scene/scene.h"
+
+enum raster_wrap { RASTER_REPEAT, RASTER_MIRROR, RASTER_CLAMP };
+
+struct raster {
+	struct image image;
+	enum raster_wrap wrap_u, wrap_v;
+	bool nearest; /* else bilinear */
+};
+
+struct raster_range {
+	double least, largest; /* pixels beyond are clamped */
+	bool raw;	       /* integers are no sRGB, where the parameters raw and gamma do not say */
+};
+
+/* Reads the property `filename` of n, and the parameters raw and gamma. */
+int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
+		const struct raster_range *range, struct arena *arena, struct error *e);
+#define RASTER_PARAMS                                                                       \
+	{.name = "filename", .types = VALUE_STRING}, {.name = "raw", .types = VALUE_BOOL},  \
+		{.name = "gamma", .types = VALUE_FLOAT | VALUE_INT, .min = -1, .max = 100}, \
+	{                                                                                   \
+		.name = "cache", .types = VALUE_BOOL, .status = PARAM_IGNORED               \
+	}
+
+void raster_eval(const struct raster *r, double u, double v, double rgb[3]);
+/* The same with its derivatives by u and v, and the mixed one: the two others are 0 between pixel centres. */
+struct raster_patch {
+	double x[3], du[3], dv[3], duv[3];
+};
+void raster_patch(const struct raster *r, double u, double v, struct raster_patch *out);
+void raster_pixel(const struct raster *r, uint32_t x, uint32_t y, double rgb[3]);
+bool raster_is_grey(const struct raster *r);
+double raster_max(const struct raster *r);
+
+#endif

@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/texture/texture.h"
+
+#include <string.h>
+
+#define TEXTURE(name) extern const struct texture_ops texture_ops_##name;
+#include "worker/render/texture/texture_list.h"
+#undef TEXTURE
+
+const struct texture_ops *const texture_registry[] = {
+#define TEXTURE(name) &texture_ops_##name,
+#include "worker/render/texture/texture_list.h"
+#undef TEXTURE
+	NULL,
+};
+
+int texture_create(struct texture *t, const struct scene_node *n, enum color_role role,
+		   const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e)
+{
+	for (const struct texture_ops *const *ops = texture_registry; *ops; ops++)
+		if (n->cls == PLUGIN_TEXTURE && strcmp((*ops)->type, n->type) == 0) {
+			*t = (struct texture){.ops = *ops};
+			return (*ops)->create(t, n, role, assets, dialect_3, arena, e);
+		}
+	return node_error(n, e, ENOTSUP, "\"%s\" is no texture that is supported", n->type);
+}
+
+static int height_from_value(struct texture *t, const struct scene_node *n, const char *name, const struct value *v,
+			     struct error *e)
+{
+	if (v->type != VALUE_FLOAT && v->type != VALUE_INT)
+		return node_error(n, e, EINVAL, "%s: a height is a number, not a colour", name);
+	double x = v->type == VALUE_INT ? (double)v->as.integer : v->as.number;
+	if (!isfinite(x))
+		return node_error(n, e, EINVAL, "%s: a height must be finite", name);
+	t->color = color_constant(x);
+	return 0;
+}
+
+int texture_from_node(struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		      enum color_role role, const struct asset_source *assets, bool dialect_3, struct arena *arena,
+		      struct error *e)
+{
+	const struct value absent = {.type = VALUE_FLOAT, .as.number = fallback};
+	const struct property *p = node_find(n, name);
+	const struct value *v = p ? &p->value : &absent;
+	*t = (struct texture){.ops = NULL};
+	if (v->type == VALUE_NODE)
+		return texture_create(t, v->as.node, role, assets, dialect_3, arena, e);
+	if (color_role_is_number(role))
+		return height_from_value(t, n, name, v, e);
+	struct error reason;
+	int code = color_from_value(v, role, arena, &t->color, &reason);
+	return code ? node_error(n, e, -code, "%s: %s", name, reason.text) : 0;
+}
+
+double texture_max(const struct texture *t)
+{
+	return t->ops ? t->ops->max(t) : color_max(&t->color);
+}
+
+enum color_shape texture_shape(const struct texture *t)
+{
+	return t->ops ? t->ops->shape(t) : t->color.shape;
+}

@@ -1,0 +1,75 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Textures: a colour, or a height, that may depend on (u,v). One file per plug-in and one line in texture_list.h.
+ * Immutable after creation; any thread.
+ */
+#ifndef WORKER_RENDER_TEXTURE_TEXTURE_H
+#define WORKER_RENDER_TEXTURE_TEXTURE_H
+
+#include "worker/render/texture/color.h"
+#include "worker/render/scene/image.h"
+
+struct texture;
+
+/* Three numbers as a function of (u,v), with their first and second derivatives. */
+struct texture_jet {
+	double x[3], du[3], dv[3], duu[3], duv[3], dvv[3];
+	bool grey; /* all three are one */
+};
+
+struct texture_ops {
+	const char *type;
+	const struct param *params;
+	unsigned nested_classes;
+	int (*create)(struct texture *t, const struct scene_node *n, enum color_role role,
+		      const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e);
+	spectrum (*eval)(const struct texture *t, double u, double v, const struct wavelengths *w);
+	double (*height)(const struct texture *t, double u, double v); /* one made as COLOR_HEIGHT has nothing else */
+	void (*jet)(const struct texture *t, double u, double v, struct texture_jet *j); /* the same of COLOR_RELIEF */
+	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
+	enum color_shape (*shape)(const struct texture *t);
+};
+
+struct texture {
+	const struct texture_ops *ops; /* NULL: constant, `color` below */
+	struct color color;
+	void *data;
+};
+
+/* Property `name` of node n: a colour or a nested texture; `fallback` where it is absent. */
+int texture_from_node(struct texture *t, const struct scene_node *n, const char *name, double fallback,
+		      enum color_role role, const struct asset_source *assets, bool dialect_3, struct arena *arena,
+		      struct error *e);
+
+/* The texture that node n itself is. */
+int texture_create(struct texture *t, const struct scene_node *n, enum color_role role,
+		   const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e);
+
+static inline spectrum texture_eval(const struct texture *t, double u, double v, const struct wavelengths *w)
+{
+	return t->ops ? t->ops->eval(t, u, v, w) : color_eval(&t->color, w);
+}
+
+static inline double texture_height(const struct texture *t, double u, double v)
+{
+	return t->ops ? t->ops->height(t, u, v) : t->color.scale;
+}
+
+static inline void texture_jet(const struct texture *t, double u, double v, struct texture_jet *j)
+{
+	if (t->ops)
+		t->ops->jet(t, u, v, j);
+	else
+		*j = (struct texture_jet){.x = {t->color.scale, t->color.scale, t->color.scale}, .grey = true};
+}
+
+double texture_max(const struct texture *t);
+enum color_shape texture_shape(const struct texture *t);
+static inline bool texture_is_constant(const struct texture *t)
+{
+	return !t->ops;
+}
+
+extern const struct texture_ops *const texture_registry[]; /* ends with NULL */
+
+#endif

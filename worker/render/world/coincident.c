@@ -1,0 +1,96 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/world/coincident.h"
+
+#include "common/base/text.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static enum surface_rank rank_of(const struct world *w, const struct world_shape *part)
+{
+	const struct bsdf *b = &w->bsdfs[part->bsdf];
+	if (part->emitter >= 0)
+		return SURFACE_SHINES;
+	if (!(b->modes & BSDF_TRANSMIT))
+		return SURFACE_OPAQUE;
+	bool passes = b->ops && (strcmp(b->ops->type, "null") == 0 || strcmp(b->ops->type, "mask") == 0);
+	return passes ? SURFACE_PASSES : SURFACE_TRANSMITS;
+}
+
+struct accel_shape *coincident_shapes(const struct world *w, struct arena *arena)
+{
+	struct accel_shape *s = arena_alloc(arena, w->shape_count, sizeof *s);
+	for (uint32_t i = 0; s && i < w->shape_count; i++) {
+		const struct geom_shape *g = &w->shapes[i];
+		s[i] = (struct accel_shape){
+			.is_sphere = g->is_sphere,
+			.center = g->center,
+			.radius = g->radius,
+			.vertex_count = g->vertex_count,
+			.triangle_count = g->triangle_count,
+			.position = (const float(*)[3])g->position,
+			.index = (const uint32_t(*)[3])g->index,
+			.rank = rank_of(w, &w->parts[i]),
+		};
+	}
+	return s;
+}
+
+static const char *name_of(const struct scene_node *n, char text[80])
+{
+	if (n->id)
+		snprintf(text, 80, "`%.40s` (line %d)", n->id, n->line);
+	else
+		snprintf(text, 80, "the %.24s in line %d", n->type, n->line);
+	return text;
+}
+
+static const char *reason(enum surface_rank hidden, enum surface_rank by)
+{
+	if (hidden == by)
+		return "comes first in the file";
+	return by == SURFACE_SHINES ? "shines" : by == SURFACE_OPAQUE ? "is opaque" : "refracts or scatters";
+}
+
+/* Else nobody can see which of them is there. */
+static bool is_news(const struct world *w, const struct accel_shape *s, const struct coincide_shapes *c)
+{
+	if (c->hidden == c->by)
+		return true;
+	return s[c->hidden].rank != SURFACE_OPAQUE || s[c->by].rank != SURFACE_OPAQUE ||
+	       (c->same_side && w->parts[c->hidden].bsdf != w->parts[c->by].bsdf);
+}
+
+static void say(struct render_coincident *out, const struct coincide_shapes *c, const struct accel_shape *s,
+		const struct scene_node *const *nodes)
+{
+	char hidden[80], by[80], *text = out->text[out->count];
+	if (out->total++ >= RENDER_COINCIDENT_MAX)
+		return;
+	out->count++;
+	if (c->hidden == c->by) {
+		snprintf(text, sizeof out->text[0], "triangles of %s coincide: only the first of them is there",
+			 name_of(nodes[c->hidden], hidden));
+	} else {
+		bool refract = s[c->hidden].rank == SURFACE_TRANSMITS && s[c->by].rank == SURFACE_TRANSMITS;
+		snprintf(text, sizeof out->text[0],
+			 "%s and %s coincide: where they overlap only the latter is there, because it %s%s",
+			 name_of(nodes[c->hidden], hidden), name_of(nodes[c->by], by),
+			 reason(s[c->hidden].rank, s[c->by].rank),
+			 refract ? "; where two media touch, one surface with the int_ior and ext_ior of both is meant"
+				 : "");
+	}
+	text_clean(text);
+}
+
+int coincident_find(struct world *w, const struct scene_node *const *nodes, const struct accel_shape *shapes,
+		    struct error *e)
+{
+	int rc = coincide_find(&w->coincidence, shapes, w->shape_count, e);
+	const struct coincidence *c = w->coincidence;
+	for (size_t i = 0; c && i < c->shapes_count; i++)
+		if (is_news(w, shapes, &c->shapes[i]))
+			say(&w->coincident, &c->shapes[i], shapes, nodes);
+	w->coincident.incomplete = c && c->incomplete;
+	return rc;
+}

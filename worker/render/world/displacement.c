@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/world/displacement.h"
+
+#include "worker/render/shape/displace.h"
+#include "worker/render/texture/texture.h"
+
+const struct property *displacement_of(const struct scene_node *shape)
+{
+	return node_find(shape, "displacement");
+}
+
+static double height(const void *user, double u, double v)
+{
+	return texture_height(user, u, v);
+}
+
+int displacement_apply(struct shape_geometry *g, const struct scene_node *shape, const struct asset_source *assets,
+		       bool dialect_3, double tessellation, struct arena *arena, struct error *e)
+{
+	if (!displacement_of(shape)) {
+		const char *lonely =
+			node_find(shape, "displacement_scale") ? "displacement_scale" : "displacement_level";
+		return node_find(shape, lonely)
+			       ? node_error(shape, e, EINVAL, "%s without a texture named displacement", lonely)
+			       : 0;
+	}
+	if (!node_find(shape, "displacement_level"))
+		return node_error(shape, e, EINVAL,
+				  "displacement needs displacement_level, 0 to %d: each triangle becomes 4^level",
+				  DISPLACE_LEVEL_MAX);
+	struct arena picture = {0};
+	struct texture t;
+	int rc = texture_from_node(&t, shape, "displacement", 0, COLOR_HEIGHT, assets, dialect_3, &picture, e);
+	struct displacement d = {height,
+				 &t,
+				 texture_is_constant(&t),
+				 node_float(shape, "displacement_scale", 1),
+				 (uint32_t)node_int(shape, "displacement_level", 0),
+				 tessellation};
+	if (!rc)
+		rc = displace(g, &d, arena, shape, e);
+	arena_fini(&picture);
+	return rc;
+}

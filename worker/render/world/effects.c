@@ -1,0 +1,396 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/world/effects.h"
+
+#include "common/base/text.h"
+#include "worker/render/world/displacement.h"
+#include "worker/render/world/visibility_bounds.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+/* What is counted: how many, and the first by name. */
+struct tally {
+	size_t count;
+	char first[64];
+};
+
+static void count(struct tally *t, const struct scene_node *n, const char *nameless)
+{
+	if (t->count++)
+		return;
+	if (!n)
+		snprintf(t->first, sizeof t->first, "%s", nameless);
+	else if (n->id)
+		snprintf(t->first, sizeof t->first, "`%.40s`", n->id);
+	else
+		snprintf(t->first, sizeof t->first, "the %.24s%s in line %d", n->type,
+			 n->cls == PLUGIN_EMITTER ? " emitter" : "", n->line);
+}
+
+/* "`glass1`", "`glass1` and 2 more" */
+static const char *who(const struct tally *t, char text[96])
+{
+	if (t->count > 1)
+		snprintf(text, 96, "%s and %zu more", t->first, t->count - 1);
+	else
+		snprintf(text, 96, "%s", t->first);
+	return text;
+}
+
+static const char *verb(const struct tally *t, const char *one, const char *many)
+{
+	return t->count == 1 ? one : many;
+}
+
+struct census {
+	struct tally specular, glossy, diffuse, transmission, textured, coloured, dispersive, constant_eta;
+	struct tally hidden_specular, hidden_dispersive,
+		unused_dispersive; /* of those that no path meets; that no shape uses */
+	struct tally environment, area, delta, textured_light, coloured_light;
+	enum visibility_bounds why_hidden;
+	size_t shape[3];
+};
+
+static void add_material(struct census *c, const struct bsdf *b, const struct scene_node *n)
+{
+	static const char nameless[] = "the default material";
+	bool smooth = b->has_smooth;
+	if (b->black)
+		return;
+	if (b->has_delta)
+		count(&c->specular, n, nameless);
+	if (smooth)
+		count(isfinite(b->alpha) ? &c->glossy : &c->diffuse, n, nameless);
+	if (b->modes & BSDF_TRANSMIT)
+		count(&c->transmission, n, nameless);
+	if (b->textured)
+		count(&c->textured, n, nameless);
+	if (b->shape != COLOR_SHAPE_CONSTANT)
+		count(&c->coloured, n, nameless);
+	if (b->dispersive)
+		count(&c->dispersive, n, nameless);
+	else if (b->eta != 1)
+		count(&c->constant_eta, n, nameless);
+}
+
+static void add_hidden(struct census *c, const struct bsdf *b, const struct scene_node *n, enum visibility_bounds why)
+{
+	c->why_hidden = why;
+	if (b->has_delta)
+		count(&c->hidden_specular, n, "");
+	if (b->dispersive)
+		count(&c->hidden_dispersive, n, "");
+}
+
+static enum visibility_bounds reach_of_bsdf(const struct world *w, const enum visibility_bounds *shape, uint32_t bsdf)
+{
+	enum visibility_bounds r = VISIBILITY_YES;
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (w->parts[i].bsdf == bsdf) {
+			if (shape[i] == VISIBILITY_YES)
+				return VISIBILITY_YES;
+			r = shape[i];
+		}
+	return r;
+}
+
+static bool asks_for_dispersion(const struct scene_node *n)
+{
+	static const char *const names[] = {"int_cauchy_b", "ext_cauchy_b", "int_sellmeier", "ext_sellmeier"};
+	for (size_t i = 0; i < sizeof names / sizeof *names; i++)
+		if (node_find(n, names[i]))
+			return true;
+	return node_bool(n, "dispersion", false);
+}
+
+static void add_unused(struct census *c, const struct world *w, const struct effects_source *src)
+{
+	for (uint32_t i = 0; i < src->scene->object_count; i++) {
+		const struct scene_node *n = src->scene->objects[i];
+		uint32_t k = 0;
+		while (k < w->bsdf_count && src->bsdf[k] != n)
+			k++;
+		if (n->cls == PLUGIN_BSDF && k == w->bsdf_count && asks_for_dispersion(n))
+			count(&c->unused_dispersive, n, "");
+	}
+}
+
+static void add_emitter(struct census *c, const struct emitter *em, const struct scene_node *n)
+{
+	count(em->delta ? &c->delta : em->infinite ? &c->environment : &c->area, n, "");
+	if (em->textured)
+		count(&c->textured_light, n, "");
+	if (em->shape == COLOR_SHAPE_OTHER)
+		count(&c->coloured_light, n, "");
+	c->shape[em->shape]++;
+}
+
+static struct census take(const struct world *w, const struct effects_source *src, const enum visibility_bounds *shape)
+{
+	struct census c = {.why_hidden = VISIBILITY_YES};
+	for (uint32_t i = 0; i < w->bsdf_count; i++) {
+		enum visibility_bounds r = reach_of_bsdf(w, shape, i);
+		if (r == VISIBILITY_YES)
+			add_material(&c, &w->bsdfs[i], src->bsdf[i]);
+		else
+			add_hidden(&c, &w->bsdfs[i], src->bsdf[i], r);
+	}
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		if (visibility_bounds_emitter(w, shape, i))
+			add_emitter(&c, &w->emitters[i], src->emitter[i]);
+	add_unused(&c, w, src);
+	return c;
+}
+
+/* ---- lines ---- */
+
+struct report {
+	struct effects *fx;
+	const struct effects_choice *forced;
+};
+
+/* The line of an effect that the scene calls for or not; returns whether it is on after all. */
+__attribute__((format(printf, 4, 5))) static bool line(struct report *r, enum effect which, bool called,
+						       const char *why, ...)
+{
+	const struct effect_decl *d = &effect_table[which];
+	int force = r->forced->of[which];
+	struct effect_line *l = &r->fx->lines[r->fx->line_count++];
+	*l = (struct effect_line){.name = d->name, .on = force ? force > 0 : called, .saves = d->saves};
+	l->forced = force && l->on != called;
+	l->other_scene = l->forced && called && (d->may & EFFECT_OF_THE_SCENE);
+	va_list ap;
+	va_start(ap, why);
+	vsnprintf(l->why, sizeof l->why, why, ap);
+	va_end(ap);
+	text_clean(l->why);
+	return l->on;
+}
+
+static const char *hidden_because(enum visibility_bounds r)
+{
+	switch (r) {
+	case VISIBILITY_ENCLOSED:
+		return "a closed opaque shape is around it";
+	case VISIBILITY_DARK:
+		return "nothing shines";
+	case VISIBILITY_DEPTH:
+		return "paths of one edge do not scatter";
+	case VISIBILITY_YES:
+		break;
+	}
+	return "";
+}
+
+static void colour(struct report *r, const struct census *c)
+{
+	struct effects *fx = r->fx;
+	char text[96];
+	bool one_shape =
+		c->shape[COLOR_SHAPE_OTHER] == 0 && (!c->shape[COLOR_SHAPE_CONSTANT] || !c->shape[COLOR_SHAPE_D65]);
+	bool called = c->coloured.count > 0 || !one_shape;
+	fx->illuminant = c->shape[COLOR_SHAPE_CONSTANT] ? COLOR_SHAPE_CONSTANT : COLOR_SHAPE_D65;
+	if (c->coloured.count)
+		fx->colour = line(r, EFFECT_COLOUR, called, "%s var%s with wavelength", who(&c->coloured, text),
+				  verb(&c->coloured, "ies", "y"));
+	else if (c->coloured_light.count)
+		fx->colour =
+			line(r, EFFECT_COLOUR, called, "the light of %s is coloured", who(&c->coloured_light, text));
+	else if (!one_shape)
+		fx->colour = line(r, EFFECT_COLOUR, called, "the emitters differ in spectrum");
+	else
+		fx->colour =
+			line(r, EFFECT_COLOUR, called, "all materials are grey and all emitters have one spectrum");
+}
+
+/* Needed by another effect that is forced on. */
+static void force_colour(struct report *r, const char *by)
+{
+	struct effect_line *l = &r->fx->lines[0];
+	if (r->fx->colour)
+		return;
+	r->fx->colour = l->on = l->forced = true;
+	snprintf(l->why + strlen(l->why), sizeof l->why - strlen(l->why), "; %s needs it", by);
+}
+
+static void dispersion(struct report *r, const struct census *c)
+{
+	char text[96];
+	bool called = c->dispersive.count > 0, on;
+	const struct tally *t = called			     ? &c->dispersive
+				: c->hidden_dispersive.count ? &c->hidden_dispersive
+				: c->unused_dispersive.count ? &c->unused_dispersive
+							     : &c->constant_eta;
+	const char *name = t->count ? who(t, text) : "";
+	if (called)
+		on = line(r, EFFECT_DISPERSION, true,
+			  "the index of %s varies with wavelength: paths that meet %s carry one", name,
+			  verb(t, "it", "them"));
+	else if (t == &c->hidden_dispersive)
+		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but %s", name, verb(t, "s", ""),
+			  hidden_because(c->why_hidden));
+	else if (t == &c->unused_dispersive)
+		on = line(r, EFFECT_DISPERSION, false, "%s disperse%s, but no shape uses %s", name, verb(t, "s", ""),
+			  verb(t, "it", "them"));
+	else if (t->count)
+		on = line(r, EFFECT_DISPERSION, false, "%s %s constant eta", name, verb(t, "has", "have"));
+	else
+		on = line(r, EFFECT_DISPERSION, false, "no material refracts");
+	r->fx->dispersion = on;
+}
+
+static void spectral(struct report *r, const struct census *c)
+{
+	colour(r, c);
+	bool wavelength = line(r, EFFECT_WAVELENGTH, r->fx->colour,
+			       r->fx->colour ? "paths carry wavelengths" : "paths carry no wavelength");
+	dispersion(r, c);
+	if (wavelength)
+		force_colour(r, "wavelength");
+	if (r->fx->dispersion)
+		force_colour(r, "dispersion");
+}
+
+/* The line of materials that have something, or "no material ...". */
+static bool materials(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
+		      const char *none)
+{
+	char text[96];
+	if (t->count)
+		return line(r, which, true, "%s %s", who(t, text), verb(t, one, many));
+	return line(r, which, false, "no material that light meets %s", none);
+}
+
+static void lobes(struct report *r, const struct census *c)
+{
+	struct effects *fx = r->fx;
+	struct effect_line *at = &fx->lines[fx->line_count++]; /* half vectors: known after the two */
+	if (!c->specular.count && c->hidden_specular.count) {
+		char text[96];
+		fx->specular = line(r, EFFECT_SPECULAR, false, "%s %s specular, but %s", who(&c->hidden_specular, text),
+				    verb(&c->hidden_specular, "is", "are"), hidden_because(c->why_hidden));
+	} else {
+		fx->specular = materials(r, EFFECT_SPECULAR, &c->specular, "has exactly specular lobes",
+					 "have exactly specular lobes", "has exactly specular lobes");
+	}
+	fx->glossy = materials(r, EFFECT_GLOSSY, &c->glossy, "has rough lobes of finite width",
+			       "have rough lobes of finite width", "has rough lobes of finite width");
+	size_t end = fx->line_count;
+	fx->line_count = (size_t)(at - fx->lines);
+	bool called = fx->specular || fx->glossy;
+	fx->half_vectors =
+		line(r, EFFECT_HALF_VECTORS, called, called ? "lobes are narrow: %s" : "no lobe is narrow: %s",
+		     fx->specular && fx->glossy ? "specular and glossy"
+		     : fx->specular		? "specular"
+		     : fx->glossy		? "glossy"
+						: "a path that is traced and joined is as likely to carry light");
+	fx->line_count = end;
+	fx->diffuse = materials(r, EFFECT_DIFFUSE, &c->diffuse, "scatters diffusely only", "scatter diffusely only",
+				"is diffuse only");
+	fx->transmission = materials(r, EFFECT_TRANSMISSION, &c->transmission, "lets light through",
+				     "let light through", "lets it through");
+}
+
+static void surfaces(struct report *r, const struct census *c, const struct world *w, const struct effects_source *src)
+{
+	char text[96], more[96];
+	struct effects *fx = r->fx;
+	if (c->textured.count && c->textured_light.count)
+		fx->textures = line(r, EFFECT_TEXTURES, true, "%s and, of emitters, %s are textured",
+				    who(&c->textured, text), who(&c->textured_light, more));
+	else if (c->textured.count + c->textured_light.count)
+		fx->textures = line(r, EFFECT_TEXTURES, true, "textured: %s",
+				    who(c->textured.count ? &c->textured : &c->textured_light, text));
+	else
+		fx->textures = line(r, EFFECT_TEXTURES, false, "no material and no emitter has a texture");
+	struct tally t = {0};
+	uint64_t triangles = 0;
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (displacement_of(src->shape[i])) {
+			count(&t, src->shape[i], "");
+			triangles += w->shapes[i].triangle_count;
+		}
+	if (t.count)
+		fx->displacement = line(r, EFFECT_DISPLACEMENT, true, "%s %s displaced: %llu triangles", who(&t, text),
+					verb(&t, "is", "are"), (unsigned long long)triangles);
+	else
+		fx->displacement = line(r, EFFECT_DISPLACEMENT, false, "no shape is displaced");
+	static const enum effect absent[] = {EFFECT_BUMP, EFFECT_ALPHA, EFFECT_INSTANCING};
+	for (size_t i = 0; i < sizeof absent / sizeof *absent; i++)
+		line(r, absent[i], false, "%s", effect_table[absent[i]].refuse);
+	const struct render_coincident *k = &w->coincident;
+	if (k->total > 1)
+		line(r, EFFECT_COINCIDENCE, true, "%zu pairs of shapes coincide, of which one sees", k->total);
+	else if (k->total == 1)
+		line(r, EFFECT_COINCIDENCE, true, "%s", k->text[0]);
+	else if (w->coincidence)
+		line(r, EFFECT_COINCIDENCE, true, "opaque bodies touch");
+	else
+		line(r, EFFECT_COINCIDENCE, false, "no surfaces lie in one place");
+}
+
+static bool lights(struct report *r, enum effect which, const struct tally *t, const char *one, const char *many,
+		   const char *none)
+{
+	char text[96];
+	return t->count ? line(r, which, true, "%s %s", who(t, text), verb(t, one, many))
+			: line(r, which, false, "%s", none);
+}
+
+static void emitter_moves(struct report *r, const struct census *c)
+{
+	char text[96];
+	bool called = c->area.count + c->environment.count > 0;
+	if (called)
+		r->fx->emitter_move = line(r, EFFECT_EMITTER_MOVE, true, "%s %s many points or directions",
+					   who(c->area.count ? &c->area : &c->environment, text),
+					   verb(c->area.count ? &c->area : &c->environment, "has", "have"));
+	else
+		r->fx->emitter_move =
+			line(r, EFFECT_EMITTER_MOVE, false,
+			     c->delta.count ? "all emitters are single points or directions" : "nothing shines");
+}
+
+static void depth(struct report *r, const struct world *w, const struct effects_source *src,
+		  const enum visibility_bounds *shape)
+{
+	uint32_t asked = src->max_depth ? src->max_depth : w->settings.max_depth,
+		 bound = visibility_bounds_depth(w, shape);
+	uint32_t useful = bound < asked ? bound : asked;
+	bool on;
+	if (useful < asked)
+		on = line(r, EFFECT_DEPTH, false, "of %u edges that paths may have %u can carry light: %s", asked,
+			  useful, useful == 1 ? "nothing scatters" : "all that scatters lies in one plane");
+	else
+		on = line(r, EFFECT_DEPTH, true, "paths of up to %u edges can carry light", asked);
+	r->fx->max_depth = on ? asked : useful;
+}
+
+void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced,
+		     enum visibility_bounds *shape)
+{
+	struct effects *fx = &w->effects;
+	*fx = (struct effects){.line_count = 0};
+	visibility_bounds_shapes(w, src, src->max_depth ? src->max_depth : w->settings.max_depth, shape);
+	struct census c = take(w, src, shape);
+	struct report r = {fx, forced};
+	spectral(&r, &c);
+	if (w->settings.aperture_radius > 0)
+		fx->aperture = line(&r, EFFECT_APERTURE, true, "a lens of radius %g, focused at a distance of %g",
+				    w->settings.aperture_radius, w->settings.focus_distance);
+	else
+		fx->aperture = line(&r, EFFECT_APERTURE, false, "the sensor is a pinhole");
+	emitter_moves(&r, &c);
+	lobes(&r, &c);
+	surfaces(&r, &c, w, src);
+	fx->environment = lights(&r, EFFECT_ENVIRONMENT, &c.environment, "shines on all that escapes", "",
+				 "rays that escape meet nothing");
+	fx->area_light = lights(&r, EFFECT_AREA_LIGHT, &c.area, "shines from its surface", "shine from their surfaces",
+				"no surface shines");
+	fx->delta_light =
+		lights(&r, EFFECT_DELTA_LIGHT, &c.delta, "is a point or parallel light, which no path hits by chance",
+		       "are points or parallel light, which no path hits by chance",
+		       "no emitter is a point or parallel light");
+	depth(&r, w, src, shape);
+}

@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What can happen at all in a scene, read off its description before Embree is built. Each effect decides what is built
+ * and run; each is reported on or off, why, and what leaving it out saves. What the user forces goes first.
+ *
+ * Adding one: a name and its two texts in effects_text.c, its rule in effects.c.
+ * One thread; nothing here allocates but effects_apply (in the world's arena).
+ */
+#ifndef WORKER_RENDER_WORLD_EFFECTS_H
+#define WORKER_RENDER_WORLD_EFFECTS_H
+
+#include "worker/render/bsdf/bsdf.h"
+#include "worker/render/emitter/emitter.h"
+#include "worker/render/world/summary.h"
+
+enum effect {
+	EFFECT_COLOUR,
+	EFFECT_WAVELENGTH, /* the mutation of that name */
+	EFFECT_DISPERSION,
+	EFFECT_APERTURE,
+	EFFECT_EMITTER_MOVE, /* x_0 moves on its emitter */
+	EFFECT_HALF_VECTORS, /* walks, with the derivatives of half vectors */
+	EFFECT_SPECULAR,
+	EFFECT_GLOSSY,
+	EFFECT_DIFFUSE,
+	EFFECT_TRANSMISSION,
+	EFFECT_TEXTURES,
+	EFFECT_DISPLACEMENT,
+	EFFECT_BUMP,
+	EFFECT_ALPHA,
+	EFFECT_INSTANCING,
+	EFFECT_COINCIDENCE,
+	EFFECT_ENVIRONMENT,
+	EFFECT_AREA_LIGHT,
+	EFFECT_DELTA_LIGHT,
+	EFFECT_DEPTH,
+	EFFECTS
+};
+
+/* What may be forced of an effect. */
+enum {
+	EFFECT_MAY_FORCE_ON = 1,
+	EFFECT_MAY_FORCE_OFF = 2,
+	EFFECT_OF_THE_SCENE = 4 /* forced off, the image is another one */
+};
+
+struct effect_decl {
+	const char *name;
+	unsigned may;
+	const char *saves;  /* what leaving it out saves */
+	const char *refuse; /* why it cannot be forced, where it cannot */
+};
+extern const struct effect_decl effect_table[EFFECTS];
+
+/* 1: forced on, -1: off, 0: as the scene says. */
+struct effects_choice {
+	signed char of[EFFECTS];
+	bool any_on;
+};
+/* "", "all", "-dispersion,+aperture", "all,-glossy". -EINVAL with a sentence, which names the nearest where a name is
+ * none. */
+int effects_parse(const char *text, struct effects_choice *out, struct error *e);
+/* The same choice always as the same text. */
+void effects_print(const struct effects_choice *c, char text[PLAN_EFFECTS_MAX]);
+
+struct effects {
+	bool colour; /* off: no wavelengths are drawn, one grey value stands for the common illuminant's shape */
+	bool dispersion, aperture, specular, glossy, diffuse, transmission, textures, environment, area_light,
+		delta_light;
+	bool displacement, half_vectors, emitter_move;
+	enum color_shape illuminant; /* of all emitters, when colour is off */
+	uint32_t max_depth;	     /* edges of the longest path that can carry light, at most the scene's */
+	struct effect_line lines[RENDER_EFFECTS_MAX];
+	size_t line_count;
+};
+
+struct world;
+struct box;
+struct weighed;
+
+/* The nodes that the world's parts were made of. */
+struct effects_source {
+	const struct scene *scene;
+	const struct scene_node *const *shape, *const *bsdf; /* one a shape; one a BSDF, NULL: the default one */
+	const struct scene_node *const *emitter;	     /* one an emitter */
+	uint32_t max_depth;				     /* asked for; 0: the scene's */
+	const struct box *box;				     /* one a shape, in any units */
+	struct weighed *room;				     /* for one a shape */
+};
+
+/* Whether a path between camera and light can meet a shape; why not. */
+enum visibility_bounds {
+	VISIBILITY_YES,
+	VISIBILITY_ENCLOSED, /* within a closed opaque shape that the camera is outside of */
+	VISIBILITY_DARK,     /* nothing shines in the scene, or what does is enclosed */
+	VISIBILITY_DEPTH,    /* paths are too short to scatter */
+};
+
+/* Fills w->effects from shapes, BSDFs and emitters, and shape[] (one a shape, see reach.h). */
+void effects_analyse(struct world *w, const struct effects_source *src, const struct effects_choice *forced,
+		     enum visibility_bounds *shape);
+/* Leaves out of the world what no path meets and what was switched off. */
+int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape,
+		  struct error *e);
+
+#endif

@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What effects change in a world: shapes that no path meets turn black, what was switched off goes. */
+#include "worker/render/bsdf/lobe_filter.h"
+#include "worker/render/world/visibility_bounds.h"
+
+static void remove_emitter(struct world *w, uint32_t i)
+{
+	w->emitters[i].power = 0;
+	if (w->emitter_shape[i] != UINT32_MAX)
+		w->parts[w->emitter_shape[i]].emitter = -1;
+	if (w->environment == (int32_t)i)
+		w->environment = -1;
+}
+
+static bool is_switched_off(const struct emitter *em, const struct effects_choice *forced)
+{
+	enum effect which = em->delta ? EFFECT_DELTA_LIGHT : em->infinite ? EFFECT_ENVIRONMENT : EFFECT_AREA_LIGHT;
+	return forced->of[which] < 0;
+}
+
+/* What no path meets, in the way of none: nothing of it is asked for. Not where something is forced on: that may be of
+ * it. */
+static void leave_out(struct world *w, const enum visibility_bounds *shape)
+{
+	uint32_t black = w->bsdf_count++; /* there is room for one more than shapes */
+	bsdf_black(&w->bsdfs[black]);
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->parts[i].bsdf].black)
+			w->parts[i].bsdf = black;
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		if (!visibility_bounds_emitter(w, shape, i))
+			remove_emitter(w, i);
+}
+
+static unsigned lobes_without(const struct bsdf *b, const struct effects_choice *forced)
+{
+	unsigned without = 0;
+	if (forced->of[EFFECT_TRANSMISSION] < 0 && (b->modes & BSDF_TRANSMIT))
+		without |= BSDF_WITHOUT_TRANSMISSION;
+	if (forced->of[EFFECT_SPECULAR] < 0 && b->has_delta)
+		without |= BSDF_WITHOUT_DELTA;
+	if (forced->of[isfinite(b->alpha) ? EFFECT_GLOSSY : EFFECT_DIFFUSE] < 0 && b->has_smooth)
+		without |= BSDF_WITHOUT_SMOOTH;
+	return without;
+}
+
+int effects_apply(struct world *w, const struct effects_choice *forced, const enum visibility_bounds *shape,
+		  struct error *e)
+{
+	if (!forced->any_on)
+		leave_out(w, shape);
+	for (uint32_t i = 0; i < w->bsdf_count; i++) {
+		struct bsdf *b = &w->bsdfs[i];
+		/* Forced on: as if the index varied, though by nothing. */
+		if (!w->effects.dispersion)
+			b->dispersive = false;
+		else if (forced->of[EFFECT_DISPERSION] > 0 && b->eta != 1)
+			b->dispersive = true;
+		unsigned without = lobes_without(b, forced);
+		int rc = without ? bsdf_filter_lobes(b, without, &w->arena, e) : 0;
+		if (rc)
+			return rc;
+	}
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		if (is_switched_off(&w->emitters[i], forced))
+			remove_emitter(w, i);
+	if (forced->of[EFFECT_APERTURE])
+		camera_force_aperture(&w->camera, w->effects.aperture);
+	return 0;
+}

@@ -1,0 +1,64 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/world/origin.h"
+
+#include <stdlib.h>
+
+#define MIXED 0x1p-12
+
+void box_grow(struct box *b, vec3 p)
+{
+	b->low = (vec3){fmin(b->low.x, p.x), fmin(b->low.y, p.y), fmin(b->low.z, p.z)};
+	b->high = (vec3){fmax(b->high.x, p.x), fmax(b->high.y, p.y), fmax(b->high.z, p.z)};
+}
+
+double box_extent(const struct box *b)
+{
+	return fmax(b->high.x - b->low.x, fmax(b->high.y - b->low.y, b->high.z - b->low.z));
+}
+
+static double along(vec3 v, int axis)
+{
+	return axis == 0 ? v.x : axis == 1 ? v.y : v.z;
+}
+
+static double middle(const struct box *b, int axis)
+{
+	return 0.5 * (along(b->low, axis) + along(b->high, axis));
+}
+
+static int by_place(const void *a, const void *b)
+{
+	const struct weighed *x = a, *y = b;
+	return (x->at > y->at) - (x->at < y->at);
+}
+
+static double median(struct weighed *w, uint32_t count)
+{
+	double total = 0, passed = 0;
+	qsort(w, count, sizeof *w, by_place);
+	for (uint32_t i = 0; i < count; i++)
+		total += w[i].weight;
+	for (uint32_t i = 0; i < count; i++) {
+		passed += w[i].weight;
+		if (passed >= 0.5 * total)
+			return w[i].at;
+	}
+	return w[count - 1].at;
+}
+
+vec3 origin_choose(const struct box *all, const struct box *shapes, uint32_t count, struct weighed *room)
+{
+	double least = INFINITY;
+	for (uint32_t i = 0; i < count; i++)
+		least = fmin(least, box_extent(&shapes[i]));
+	double at[3];
+	for (int axis = 0; axis < 3; axis++) {
+		at[axis] = middle(all, axis);
+		if (!(least > 0 && least < MIXED * box_extent(all)))
+			continue;
+		for (uint32_t i = 0; i < count; i++)
+			room[i] = (struct weighed){middle(&shapes[i], axis), least / box_extent(&shapes[i])};
+		at[axis] = median(room, count);
+	}
+	return (vec3){at[0], at[1], at[2]};
+}

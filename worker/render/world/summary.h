@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What a scene calls for, and what a user may override of it, as the programs say it. Filled by render_check and
+ * world_summary (build.h). Pure; any thread; nothing allocates.
+ */
+#ifndef WORKER_RENDER_WORLD_SUMMARY_H
+#define WORKER_RENDER_WORLD_SUMMARY_H
+
+#include "common/plan/plan.h"
+#include "worker/render/scene/settings.h"
+
+/* One effect, on or off, and why: "dispersion", false, "no dielectric has an index that varies with wavelength". */
+struct effect_line {
+	const char *name;
+	bool on;
+	bool forced;	  /* the user wants it other than the scene calls for */
+	bool other_scene; /* forced off: the image is another one */
+	char why[160];
+	const char *saves; /* what leaving it out saves */
+};
+enum { RENDER_EFFECTS_MAX = 24 };
+
+/* What hslt-submit and hslt-render let the user override; all zero: as the scene says. The texts are those of a plan.
+ */
+struct render_options {
+	uint32_t width, height;
+	char accuracy[PLAN_ACCURACY_MAX], effects[PLAN_EFFECTS_MAX];
+	uint32_t max_depth;
+};
+
+/* Shapes of which surfaces coincide, a sentence each with the names of two. */
+enum { RENDER_COINCIDENT_MAX = 8 };
+struct render_coincident {
+	char text[RENDER_COINCIDENT_MAX][400];
+	size_t count, total; /* sentences; of how many */
+	bool incomplete;     /* there are more than were looked for */
+};
+
+struct render_summary {
+	struct scene_settings settings; /* with the overrides of the options */
+	uint32_t useful_depth;		/* edges of the longest path that can carry light, at most what was asked for */
+	struct effect_line lines[RENDER_EFFECTS_MAX];
+	size_t line_count;
+	uint64_t shapes, triangles;
+	double brightest; /* see world_brightest */
+	struct render_coincident coincident;
+	char scales[256]; /* a shape that is too small beside another, by name; "": none is */
+	char flat[256];	  /* how many triangles without an area were left out; "": none */
+};
+
+/* The overrides of effects, in the spelling that a plan holds: "all", "-dispersion,+aperture". -EINVAL with a sentence:
+ * no such effect, or it cannot be forced. */
+int render_effects(const char *text, char canonical[PLAN_EFFECTS_MAX], struct error *e);
+/* "the image is of another scene: without dispersion" where an effect that the scene calls for was switched off; else
+ * "". */
+void render_effects_note(const struct render_summary *scene, char *text, size_t size);
+
+/* The i-th of the sentences about the scene as a whole: the note on effects, scales, surfaces that coincide;
+ * false: there are no more. */
+bool render_scene_note(const struct render_summary *scene, size_t i, char *text, size_t size);
+
+/* false also where there is no effect of that name. */
+bool render_effect_on(const struct render_summary *scene, const char *name);
+
+#endif

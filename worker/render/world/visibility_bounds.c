@@ -1,0 +1,190 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/world/visibility_bounds.h"
+
+#include "worker/render/geom/triangle.h"
+#include "worker/render/world/displacement.h"
+#include "worker/render/world/origin.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+/* Shapes count as apart when this far from each other, in radii of the scene: floats are 2^-24. */
+#define MARGIN 0x1p-16
+static vec3 vertex_of(const struct geom_shape *g, uint32_t i)
+{
+	return (vec3){(double)g->position[i][0], (double)g->position[i][1], (double)g->position[i][2]};
+}
+
+/* Plane of a triangle: unit normal, and its height over the origin. */
+static vec3 plane_of(const struct geom_shape *g, uint32_t triangle, double *height)
+{
+	const uint32_t *t = g->index[triangle];
+	vec3 v0 = vertex_of(g, t[0]);
+	vec3 n = vec3_normalize(vec3_cross(vec3_sub(vertex_of(g, t[1]), v0), vec3_sub(vertex_of(g, t[2]), v0)));
+	*height = vec3_dot(n, v0);
+	return n;
+}
+
+/* Least and largest of n.p over a shape. */
+static void extent(const struct geom_shape *g, vec3 n, double *low, double *high)
+{
+	if (g->is_sphere) {
+		*low = vec3_dot(n, g->center) - g->radius;
+		*high = vec3_dot(n, g->center) + g->radius;
+		return;
+	}
+	*low = INFINITY;
+	*high = -INFINITY;
+	for (uint32_t i = 0; i < g->triangle_count; i++)
+		for (int k = 0; k < 3; k++) {
+			double h = vec3_dot(n, vertex_of(g, g->index[i][k]));
+			*low = fmin(*low, h);
+			*high = fmax(*high, h);
+		}
+}
+
+static double farthest(const struct geom_shape *g, vec3 from)
+{
+	if (g->is_sphere)
+		return vec3_length(vec3_sub(g->center, from)) + g->radius;
+	double far2 = 0;
+	for (uint32_t i = 0; i < g->triangle_count; i++)
+		for (int k = 0; k < 3; k++) {
+			vec3 d = vec3_sub(vertex_of(g, g->index[i][k]), from);
+			far2 = fmax(far2, vec3_dot(d, d));
+		}
+	return sqrt(far2);
+}
+
+/* Convex, closed, and light does not get through. An ellipsoid is, too, but its mesh is looked at triangle by triangle.
+ */
+static bool is_container(const struct world *w, const struct scene_node *node, uint32_t shape)
+{
+	bool convex = strcmp(node->type, "cube") == 0 || w->shapes[shape].is_sphere;
+	return convex && !displacement_of(node) && !(w->bsdfs[w->parts[shape].bsdf].modes & BSDF_TRANSMIT);
+}
+
+/* No path from the camera begins within: all of it lies deeper than the near plane, or behind the camera and its
+ * aperture. */
+static bool camera_is_outside(const struct world *w, const struct geom_shape *g)
+{
+	const struct camera *c = &w->camera;
+	double low, high, at = vec3_dot(c->axes.n, c->position);
+	extent(g, c->axes.n, &low, &high);
+	return low > at + c->near_clip + MARGIN || high < at - MARGIN;
+}
+
+static bool contains(const struct geom_shape *outer, const struct geom_shape *inner)
+{
+	if (outer->is_sphere)
+		return farthest(inner, outer->center) < outer->radius - MARGIN;
+	for (uint32_t i = 0; i < outer->triangle_count; i++) {
+		double height, unused, low, high, least, most;
+		vec3 n = plane_of(outer, i, &height);
+		extent(outer, n, &low, &high);
+		/* All of a convex shape lies on one side of each of its triangles. */
+		if (high > height + MARGIN)
+			n = vec3_neg(n), height = -height;
+		extent(inner, n, &least, &most);
+		extent(outer, n, &unused, &high);
+		if (high > height + MARGIN || most > height - MARGIN)
+			return false;
+	}
+	return true;
+}
+
+static bool box_holds(const struct box *outer, const struct box *inner)
+{
+	return inner->low.x >= outer->low.x && inner->high.x <= outer->high.x && inner->low.y >= outer->low.y &&
+	       inner->high.y <= outer->high.y && inner->low.z >= outer->low.z && inner->high.z <= outer->high.z;
+}
+
+static int compare_places(const void *a, const void *b)
+{
+	const struct weighed *x = a, *y = b;
+	return (x->at > y->at) - (x->at < y->at);
+}
+
+/* The first of n, sorted, that is not below x. */
+static uint32_t first_from(const struct weighed *sorted, uint32_t n, double x)
+{
+	uint32_t low = 0, high = n;
+	while (low < high) {
+		uint32_t middle = low + (high - low) / 2;
+		if (sorted[middle].at < x)
+			low = middle + 1;
+		else
+			high = middle;
+	}
+	return low;
+}
+
+/* Only what begins between a container's ends along x, and whose box lies in its box, is looked at closely. */
+static void find_enclosed(const struct world *w, const struct effects_source *src, enum visibility_bounds *shape)
+{
+	struct weighed *by_x = src->room;
+	uint32_t n = w->shape_count;
+	for (uint32_t i = 0; i < n; i++)
+		by_x[i] = (struct weighed){src->box[i].low.x, i};
+	if (n > 0)
+		qsort(by_x, n, sizeof *by_x, compare_places);
+	for (uint32_t o = 0; o < n; o++) {
+		const struct box *outer = &src->box[o];
+		if (!is_container(w, src->shape[o], o) || !camera_is_outside(w, &w->shapes[o]))
+			continue;
+		for (uint32_t k = first_from(by_x, n, outer->low.x); k < n && by_x[k].at <= outer->high.x; k++) {
+			uint32_t i = (uint32_t)by_x[k].weight;
+			if (i != o && shape[i] == VISIBILITY_YES && box_holds(outer, &src->box[i]) &&
+			    contains(&w->shapes[o], &w->shapes[i]))
+				shape[i] = VISIBILITY_ENCLOSED;
+		}
+	}
+}
+
+bool visibility_bounds_emitter(const struct world *w, const enum visibility_bounds *shape, uint32_t emitter)
+{
+	uint32_t on = w->emitter_shape[emitter];
+	return w->emitters[emitter].power > 0 && (on == UINT32_MAX || shape[on] != VISIBILITY_ENCLOSED);
+}
+
+void visibility_bounds_shapes(const struct world *w, const struct effects_source *src, uint32_t max_depth,
+			      enum visibility_bounds *shape)
+{
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		shape[i] = VISIBILITY_YES;
+	find_enclosed(w, src, shape);
+	bool dark = true;
+	for (uint32_t i = 0; i < w->emitter_count; i++)
+		dark &= !visibility_bounds_emitter(w, shape, i);
+	for (uint32_t i = 0; i < w->shape_count; i++)
+		if (shape[i] == VISIBILITY_YES && (dark || max_depth <= 1))
+			shape[i] = dark ? VISIBILITY_DARK : VISIBILITY_DEPTH;
+}
+
+static bool lies_in(const struct triangle *plane, const struct geom_shape *g)
+{
+	for (uint32_t i = 0; i < g->triangle_count; i++)
+		for (int k = 0; k < 3; k++)
+			if (triangle_height(plane, vertex_of(g, g->index[i][k])) != 0)
+				return false;
+	return true;
+}
+
+uint32_t visibility_bounds_depth(const struct world *w, const enum visibility_bounds *shape)
+{
+	bool any = false;
+	struct triangle plane;
+	for (uint32_t i = 0; i < w->shape_count; i++) {
+		const struct geom_shape *g = &w->shapes[i];
+		if (shape[i] != VISIBILITY_YES || w->bsdfs[w->parts[i].bsdf].black)
+			continue;
+		if (g->is_sphere)
+			return UINT32_MAX;
+		if (!any)
+			plane = triangle_from((const float(*)[3])g->position, g->index[0]);
+		any = true;
+		if (!lies_in(&plane, g))
+			return UINT32_MAX;
+	}
+	return any ? 2 : 1;
+}

@@ -1,0 +1,62 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The world that all threads share: built once from a description, immutable then. Lengths are rescaled in double by a
+ * power of two so that the scene's radius lies in (1/2, 1], and moved so that its box is centred, or what is small in a
+ * scene of mixed scales (origin.h): floats begin after that.
+ */
+#ifndef WORKER_RENDER_WORLD_WORLD_H
+#define WORKER_RENDER_WORLD_WORLD_H
+
+#include "worker/render/camera/camera.h"
+#include "worker/render/geom/surface.h"
+#include "worker/render/settings/accuracy_settings.h"
+#include "worker/render/world/build.h"
+#include "worker/render/world/effects.h"
+
+struct world_shape {
+	uint32_t bsdf;
+	int32_t emitter; /* -1: does not shine */
+};
+
+struct world {
+	struct arena arena;
+	struct scene_settings settings;
+	struct effects effects;
+	struct accuracy_settings accuracy;
+	struct camera camera;
+	vec3 center;
+	double scale, radius; /* of the rescaled bounding sphere around the origin */
+	uint32_t shape_count, bsdf_count, emitter_count;
+	struct geom_shape *shapes;
+	struct world_shape *parts; /* one a shape */
+	struct bsdf *bsdfs;
+	struct emitter *emitters;
+	uint32_t *emitter_shape;	     /* on which it lies; UINT32_MAX: on none */
+	double *emitter_pdf, *emitter_cdf;   /* choice among emitters by power */
+	int32_t environment;		     /* index of the emitter that escaping rays meet; -1: none */
+	double grey_xyz[3];		     /* CIE XYZ of grey value 1 */
+	struct coincidence *coincidence;     /* of surfaces; NULL: none */
+	struct render_coincident coincident; /* what there is to say of it */
+	char scales[256];		     /* of shapes that are too small beside others; "": nothing */
+	char flat[256];			     /* of triangles without an area; "": nothing */
+	struct accel *accel;
+};
+
+/* Asked while rendering. -DHSLT_PLAIN makes a renderer that knows nothing of colour, dispersion and apertures: what
+ * asking costs where they are off is measured against it (tests/bench/effects.c). */
+#ifdef HSLT_PLAIN
+#define EFFECT_IS_ON(w, effect) ((void)(w), false)
+#else
+#define EFFECT_IS_ON(w, effect) ((w)->effects.effect)
+#endif
+
+/* Which emitter a number in [0,1) chooses; -1 when there is none. */
+int32_t world_pick_emitter(const struct world *w, double u);
+
+/* A hit on a shape as a point of its emitter. */
+static inline struct emitter_point world_emitter_point(const struct surface_point *x)
+{
+	return (struct emitter_point){x->p, x->ng, x->u, x->v, x->prim.prim, false};
+}
+
+#endif
