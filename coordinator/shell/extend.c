@@ -141,6 +141,19 @@ static int read_job(const struct server *s, uint64_t job, struct row_file *f, st
 	return rc ? error_prefix(e, rc, "what was kept of it") : 0;
 }
 
+/* The journal has them from a while before the end: what the record of the end says is more. */
+static void take_counts(struct job_counts *c, const struct job_record *r)
+{
+	const struct {
+		uint64_t *have, known;
+	} pair[] = {{&c->repeats, r->repeats},	    {&c->refused, r->refused},	     {&c->failures, r->failures},
+		    {&c->timeouts, r->timeouts},    {&c->duplicates, r->duplicates}, {&c->verified, r->verified},
+		    {&c->mismatched, r->mismatched}};
+	for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
+		if (*pair[i].have < pair[i].known)
+			*pair[i].have = pair[i].known;
+}
+
 /* r: as it was remembered. */
 static int begin_again(struct session *p, struct live_job *o, const struct job_record *r, struct error *e)
 {
@@ -150,6 +163,7 @@ static int begin_again(struct session *p, struct live_job *o, const struct job_r
 	if (rc)
 		return rc;
 	o->record.has_result = r->has_result;
+	take_counts(&o->counts, r);
 	o->next = s->orders;
 	s->orders = o;
 	forget_end(s, o->id);
