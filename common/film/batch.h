@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * A batch: the result of one lease. Its content depends on (plan, kind, group, part, epoch) only.
- * In memory here; on the wire a message header followed by one EXR per tile (common/film/exr.h).
+ * In memory here; on the wire a message header followed by one EXR per tile (common/exr/exr.h).
  */
 #ifndef COMMON_FILM_BATCH_H
 #define COMMON_FILM_BATCH_H
@@ -50,7 +50,7 @@ enum batch_counter {
 			      this one */
 };
 
-/* What the chains of a lease count of each strategy of the plan's mixture; names in common/film/strategy.h. From
+/* What the chains of a lease count of each strategy of the plan's mixture; names in common/estimate/strategy.h. From
  * STRATEGY_FAIL_FIRST on: why a proposal could not be made or carried nothing, one reason a proposal. */
 enum { BATCH_STRATEGIES = PLAN_MAX_STRATEGIES };
 enum strategy_counter {

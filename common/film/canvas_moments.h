@@ -27,13 +27,4 @@ void moments_close_round(struct moments *m, uint64_t round);
 int moments_save(const struct moments *m, struct checked_file *out, struct error *e);
 int moments_load(struct moments *m, struct checked_file *in, struct error *e); /* into new ones of the same plan */
 
-/* What moments_image needs of a group: independent samples of its bootstrap, mutations that are merged, b. */
-struct moments_group {
-	uint64_t bootstrap, mutations;
-	double b;
-};
-/* Fills img->classes and, where there are complete rounds of chains and this is no preview, the arrays by tile. */
-int moments_image(const struct moments *m, const struct moments_group *groups, uint64_t rounds, bool open_rounds,
-		  struct canvas_image *img, struct error *e);
-
 #endif

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The inside of struct canvas, for canvas.c (adding), canvas_image.c (making images) and canvas_error.c (their errors).
+ * The inside of struct canvas and of its moments, for those who add to them here and those who make images of them
+ * (common/estimate).
  * A film holds one slot of TILE_SIZE x TILE_SIZE x 3 integers per tile of the crop, so that a tile that nothing touched
  * is a run of pages that nothing touched. Film `group * FILMS + which`; which: the prefix, or the open round's parity.
  */
@@ -47,37 +48,23 @@ struct canvas {
 	struct moments *moments;
 };
 
-/* An image on its way. */
-struct making {
-	const struct canvas *c;
-	struct canvas_image *img;
-	bool open_rounds;
-	struct tally *all;		/* prefix, bootstrap and, for a preview, the open rounds */
-	double factor[PLAN_MAX_GROUPS]; /* grid units to the group's image; 0: the group has nothing */
-	double pooled_factor;
-	double b[PLAN_MAX_GROUPS];
+enum { MOMENTS_PREFIX, MOMENTS_OPEN, MOMENTS_SETS = 3 };
+
+/* First moments are times, at most the mutations made: 2^42 of them in one lease's chains fit. */
+#define MOMENTS_GRID 0x1p20
+struct moments {
+	struct plan plan;
+	uint32_t per_lease, leases, tiles; /* sequences of a lease; leases of a round */
+	int64_t *first;			   /* [set][lease][sequence][tile] */
+	int64_t *second;		   /* [set][lease][tile] */
+	struct exact_sum *time;		   /* [set][group][class] */
+	struct exact_sum *bootstrap;	   /* [group][class] */
 };
 
-enum { ERROR_FOLDED = 16 };
-
-/* Of the groups' weighted errors, over an image. Parts of the relMSE are sums over pixels and channels, not means. */
-struct error_sums {
-	uint32_t groups;
-	double share, doubt; /* parts; their squares times the variances of their weights */
-	double low, high;    /* bounds of the same: over brightness with all fireflies, over what other groups found */
-	double dark, one_group; /* parts where brightness is a block's mean, not the pixel's; where one group has most
-				   of the variance */
-	double kurtosis;	/* of the groups' values, parts as weights */
-	double tail;		/* index of the groups' relative errors that are too bright; INFINITY: not known */
-	double gram[ERROR_FOLDED][ERROR_FOLDED]; /* products of groups' errors; more groups are folded onto so many */
-	double distance[PLAN_MAX_GROUPS];	 /* a group's error, squared */
-};
-
-/* Fills the relMSE, its intervals, and what is doubtful of it. */
-void canvas_interval(struct error_sums *s, struct canvas_image *img);
-
-/* Fills error and the relMSE of an image whose rgb is there; two or more groups, no open rounds. -ENOMEM */
-int canvas_error(struct making *m, struct error *e);
+static inline size_t moments_classes(const struct moments *m)
+{
+	return (size_t)m->plan.groups * PATH_CLASSES;
+}
 
 /* Reserves its place on the disk, before it is touched. */
 int canvas_back_tile(struct canvas *c, size_t film, size_t tile, struct error *e);

@@ -2,7 +2,7 @@
 #include "common/wire/batch_wire.h"
 
 #include "common/base/mem.h"
-#include "common/film/exr.h"
+#include "common/exr/exr.h"
 
 #include <string.h>
 

@@ -7,7 +7,7 @@
 #define COORDINATOR_CORE_EVENT_H
 
 #include "common/film/batch.h"
-#include "common/film/forecast.h"
+#include "common/estimate/forecast.h"
 #include "common/plan/plan.h"
 
 enum event_kind {
@@ -143,7 +143,7 @@ struct event {
 		} error_known;
 		struct {
 			uint64_t job;
-			bool disagrees; /* its chains do: common/film/convergence.h */
+			bool disagrees; /* its chains do: common/estimate/convergence.h */
 		} image_known;
 	};
 };

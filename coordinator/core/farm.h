@@ -54,7 +54,7 @@
 #ifndef COORDINATOR_CORE_FARM_H
 #define COORDINATOR_CORE_FARM_H
 
-#include "common/film/forecast.h"
+#include "common/estimate/forecast.h"
 #include "coordinator/core/event.h"
 #include "coordinator/core/update.h"
 

@@ -3,7 +3,7 @@
 #ifndef COORDINATOR_CORE_JOB_H
 #define COORDINATOR_CORE_JOB_H
 
-#include "common/film/forecast.h"
+#include "common/estimate/forecast.h"
 #include "coordinator/core/doubt.h"
 #include "coordinator/core/failure_quorum.h"
 #include "coordinator/core/farm.h"

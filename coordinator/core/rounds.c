@@ -4,7 +4,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/film/merge.h"
+#include "common/estimate/merge.h"
 
 #include <assert.h>
 #include <math.h>

@@ -4,9 +4,9 @@
 #include "common/base/version.h"
 #include "common/base/error.h"
 #include "common/base/output.h"
-#include "common/film/convergence_json.h"
-#include "common/film/strategy.h"
-#include "common/film/strategy_json.h"
+#include "common/json/convergence_json.h"
+#include "common/estimate/strategy.h"
+#include "common/json/strategy_json.h"
 
 #include <argp.h>
 #include <jansson.h>

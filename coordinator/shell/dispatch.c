@@ -16,7 +16,7 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/film/exr.h"
+#include "common/exr/exr.h"
 #include "coordinator/shell/ages.h"
 #include "coordinator/shell/back.h"
 #include "coordinator/shell/clear.h"

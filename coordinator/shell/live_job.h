@@ -9,7 +9,7 @@
 
 #include "common/base/log.h"
 #include "common/blob/blob.h"
-#include "common/film/merge.h"
+#include "common/estimate/merge.h"
 #include "common/wire/batch_wire.h"
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/view.h"

@@ -5,7 +5,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/film/image_file.h"
+#include "common/exr/image_file.h"
 
 #include <assert.h>
 #include <math.h>

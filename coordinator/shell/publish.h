@@ -7,8 +7,8 @@
 #ifndef COORDINATOR_SHELL_PUBLISH_H
 #define COORDINATOR_SHELL_PUBLISH_H
 
-#include "common/film/convergence.h"
-#include "common/film/canvas.h"
+#include "common/estimate/convergence.h"
+#include "common/estimate/canvas_image.h"
 #include "coordinator/core/farm.h"
 
 #include <uv.h>

@@ -2,8 +2,8 @@
 #include "coordinator/shell/view.h"
 
 #include "common/base/text.h"
-#include "common/film/convergence_json.h"
-#include "common/film/forecast_json.h"
+#include "common/json/convergence_json.h"
+#include "common/json/forecast_json.h"
 
 #include <math.h>
 #include <stdio.h>

@@ -4,9 +4,9 @@
 #include "common/base/crc.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/film/convergence_json.h"
-#include "common/film/forecast_json.h"
-#include "common/film/strategy_json.h"
+#include "common/json/convergence_json.h"
+#include "common/json/forecast_json.h"
+#include "common/json/strategy_json.h"
 
 #include <math.h>
 #include <stdlib.h>

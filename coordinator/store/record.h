@@ -7,10 +7,10 @@
 #define COORDINATOR_STORE_RECORD_H
 
 #include "common/base/error.h"
-#include "common/film/convergence.h"
-#include "common/film/forecast.h"
-#include "common/film/stated_error.h"
-#include "common/film/strategy.h"
+#include "common/estimate/convergence.h"
+#include "common/estimate/forecast.h"
+#include "common/estimate/stated_error.h"
+#include "common/estimate/strategy.h"
 
 #include <jansson.h>
 #include <stdbool.h>

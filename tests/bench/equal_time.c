@@ -7,7 +7,7 @@
  * ten times that. HSLT_BENCH_SEEDS: other than 5. HSLT_BENCH_METHODS: only the first so many.
  */
 #include "common/base/mem.h"
-#include "common/film/image_file.h"
+#include "common/exr/image_file.h"
 #include "tests/bench/bench.h"
 #include "tests/bench/scenes.h"
 #include "tests/support/stats.h"

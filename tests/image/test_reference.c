@@ -13,7 +13,7 @@
  * fewer, and figures are only printed: at 256 samples most of what is left is noise, four times the samples give a
  * quarter of it.
  */
-#include "common/film/color.h"
+#include "common/base/color.h"
 #include "tests/support/memory_assets.h"
 #include "tests/support/render_picture.h"
 #include "tests/support/worlds.h"

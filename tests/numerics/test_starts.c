@@ -10,7 +10,7 @@
 #include "tests/support/stats.h"
 #include "tests/support/worlds.h"
 
-#include "common/film/strategy.h"
+#include "common/estimate/strategy.h"
 
 #include <setjmp.h>
 #include <stdarg.h>

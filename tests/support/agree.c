@@ -2,7 +2,7 @@
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
 
-#include "common/film/merge.h"
+#include "common/estimate/merge.h"
 #include "tests/support/stats.h"
 
 #include <pthread.h>

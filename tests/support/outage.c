@@ -3,7 +3,7 @@
 
 #include "common/base/log.h"
 #include "common/base/mem.h"
-#include "common/film/exr.h"
+#include "common/exr/exr.h"
 #include "coordinator/shell/server.h"
 #include "tests/support/folder.h"
 

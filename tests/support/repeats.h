@@ -6,7 +6,7 @@
 #ifndef TESTS_SUPPORT_REPEATS_H
 #define TESTS_SUPPORT_REPEATS_H
 
-#include "common/film/canvas.h"
+#include "common/estimate/canvas_image.h"
 #include "worker/render/world/world.h"
 
 struct repeats_how {

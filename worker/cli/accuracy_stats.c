@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/accuracy_stats.h"
 
-#include "common/film/quantile.h"
+#include "common/estimate/quantile.h"
 
 #include <math.h>
 #include <stdlib.h>

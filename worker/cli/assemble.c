@@ -2,8 +2,8 @@
 #include "worker/cli/assemble.h"
 
 #include "common/base/mem.h"
-#include "common/film/header.h"
-#include "common/film/image_file.h"
+#include "common/exr/header.h"
+#include "common/exr/image_file.h"
 
 #include <inttypes.h>
 #include <math.h>

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/choice.h"
 
-#include "common/film/forecast_json.h"
+#include "common/json/forecast_json.h"
 #include "worker/render/scene/scene.h"
 
 #include <time.h>

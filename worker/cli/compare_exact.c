@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "common/film/header.h"
+#include "common/exr/header.h"
 #include "worker/cli/compare.h"
 
 #include <stdarg.h>

@@ -2,7 +2,7 @@
 #include "worker/cli/estimate.h"
 
 #include "common/base/progress.h"
-#include "common/film/forecast_json.h"
+#include "common/json/forecast_json.h"
 #include "worker/cli/plot.h"
 
 #include <errno.h>

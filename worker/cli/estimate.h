@@ -6,7 +6,7 @@
 #ifndef WORKER_CLI_ESTIMATE_H
 #define WORKER_CLI_ESTIMATE_H
 
-#include "common/film/forecast.h"
+#include "common/estimate/forecast.h"
 
 struct estimate {
 	const char *scene, *where; /* "this machine, 2 threads" */

@@ -3,7 +3,7 @@
 #include "common/base/output.h"
 #include "common/base/progress.h"
 #include "common/base/version.h"
-#include "common/film/image_file.h"
+#include "common/exr/image_file.h"
 #include "worker/cli/accuracy.h"
 #include "worker/cli/interrupt.h"
 #include "worker/cli/options.h"

@@ -2,7 +2,7 @@
 #include "common/base/mem.h"
 #include "common/base/output.h"
 #include "common/base/version.h"
-#include "common/film/image_file.h"
+#include "common/exr/image_file.h"
 #include "worker/cli/assemble.h"
 
 #include <argp.h>

@@ -2,7 +2,7 @@
 #include "common/base/mem.h"
 #include "common/base/output.h"
 #include "common/base/version.h"
-#include "common/film/stated_error.h"
+#include "common/estimate/stated_error.h"
 #include "worker/cli/compare.h"
 
 #include <argp.h>

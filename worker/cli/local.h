@@ -6,7 +6,7 @@
 #ifndef WORKER_CLI_LOCAL_H
 #define WORKER_CLI_LOCAL_H
 
-#include "common/film/merge.h"
+#include "common/estimate/merge.h"
 #include "worker/render/render.h"
 
 struct local_progress {	      /* between leases, from the calling thread's point of view */

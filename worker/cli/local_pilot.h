@@ -3,7 +3,7 @@
 #ifndef WORKER_CLI_LOCAL_PILOT_H
 #define WORKER_CLI_LOCAL_PILOT_H
 
-#include "common/film/forecast.h"
+#include "common/estimate/forecast.h"
 #include "worker/cli/local.h"
 
 struct local_pilot {

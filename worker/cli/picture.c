@@ -2,7 +2,7 @@
 #include "worker/cli/picture.h"
 
 #include "common/base/mem.h"
-#include "common/film/image_file.h"
+#include "common/exr/image_file.h"
 
 #include <png.h>
 #include <stdio.h>

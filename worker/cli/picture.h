@@ -7,7 +7,7 @@
 #define WORKER_CLI_PICTURE_H
 
 #include "common/base/error.h"
-#include "common/film/exr.h"
+#include "common/exr/exr.h"
 
 struct picture {
 	struct exr_image image; /* all channels, as read */

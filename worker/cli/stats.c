@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/stats.h"
 
-#include "common/film/convergence_json.h"
-#include "common/film/forecast_json.h"
-#include "common/film/image_file.h"
-#include "common/film/stated_error.h"
-#include "common/film/strategy.h"
-#include "common/film/strategy_json.h"
+#include "common/json/convergence_json.h"
+#include "common/json/forecast_json.h"
+#include "common/exr/image_file.h"
+#include "common/estimate/stated_error.h"
+#include "common/estimate/strategy.h"
+#include "common/json/strategy_json.h"
 
 #include <jansson.h>
 #include <math.h>

@@ -6,8 +6,8 @@
 #ifndef WORKER_CLI_STATS_H
 #define WORKER_CLI_STATS_H
 
-#include "common/film/convergence.h"
-#include "common/film/forecast.h"
+#include "common/estimate/convergence.h"
+#include "common/estimate/forecast.h"
 #include "worker/cli/choice.h"
 #include "worker/cli/local.h"
 

@@ -6,7 +6,7 @@
 #ifndef WORKER_CLI_SUBMIT_H
 #define WORKER_CLI_SUBMIT_H
 
-#include "common/film/forecast.h"
+#include "common/estimate/forecast.h"
 #include "common/blob/blob.h"
 #include "common/net/client.h"
 #include "common/plan/plan.h"

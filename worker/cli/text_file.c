@@ -2,7 +2,7 @@
 #include "worker/cli/text_file.h"
 
 #include "common/base/mem.h"
-#include "common/film/image_file.h"
+#include "common/exr/image_file.h"
 
 #include <stdarg.h>
 #include <stdio.h>

@@ -3,7 +3,7 @@
 
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
-#include "common/film/tail.h"
+#include "common/estimate/tail.h"
 #include "worker/render/path/integrator.h"
 #include "worker/render/brightness.h"
 

@@ -2,7 +2,7 @@
 /* Where paths lead that a program writes to, and what is there afterwards: files are replaced, links and devices stay.
  */
 #include "common/base/target.h"
-#include "common/film/image_file.h"
+#include "common/exr/image_file.h"
 
 #include <stdarg.h>
 #include <stddef.h>

@@ -12,9 +12,9 @@
  */
 #include "common/base/mem.h"
 #include "common/film/canvas_save.h"
-#include "common/film/header.h"
-#include "common/film/merge.h"
-#include "common/film/stated_error.h"
+#include "common/exr/header.h"
+#include "common/estimate/merge.h"
+#include "common/estimate/stated_error.h"
 #include "tests/support/dice.h"
 
 #include <math.h>

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "common/film/canvas.h"
+#include "common/estimate/canvas_image.h"
 
 #include "common/base/mem.h"
-#include "common/film/merge.h"
+#include "common/estimate/merge.h"
 
 #include <math.h>
 #include <stdarg.h>

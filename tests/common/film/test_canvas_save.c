@@ -3,6 +3,8 @@
  * of which batches are taken back and replaced. */
 #include "common/film/canvas_save.h"
 
+#include "common/estimate/canvas_image.h"
+
 #include "common/base/mem.h"
 #include "tests/support/folder.h"
 

@@ -6,7 +6,7 @@
  * Level of the statistical test: 1e-6 a tile. Power: V follows chi-square with 1023 degrees, so that a scale reduction
  * whose V / W is off by 30 % is found with 95 % probability.
  */
-#include "common/film/canvas.h"
+#include "common/estimate/canvas_image.h"
 
 #include "common/base/mem.h"
 #include "tests/support/dice.h"

@@ -5,7 +5,7 @@
  * groups ask for the same one, each starts its chains from its own part of the bootstrap, and independent proposals
  * that carry no light are counted. Nothing here is left to chance but the number of pssmlt's independent proposals.
  */
-#include "common/film/merge.h"
+#include "common/estimate/merge.h"
 #include "tests/support/worlds.h"
 #include "worker/cli/local.h"
 #include "worker/render/render.h"

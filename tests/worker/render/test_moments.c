@@ -9,7 +9,7 @@
  * between path and bdpt, 25 % for chains. HSLT_TEST_SCALE: smaller samples, no demand on the power. About 30 s of CPU
  * time.
  */
-#include "common/film/merge.h"
+#include "common/estimate/merge.h"
 #include "tests/support/dice.h"
 #include "tests/support/rooms.h"
 #include "tests/support/starts.h"

@@ -11,7 +11,7 @@ $(BUILD)/gen/cie_d65.inc: worker/render/math/data/cie_d65_1nm.csv
 	awk -F, '!/^#/ { printf "%s,\n", $$2 }' $< > $@.part && mv $@.part $@
 
 # Cell by cell of 1 nm: the share of wavelengths drawn below it and in it, a mixture of 95 % |r| + |g| + |b| and 5 % uniform
-# (worker/render/math/spectrum.h). r, g, b are the matching functions of linear Rec. 709, by the matrix of common/film/color.h.
+# (worker/render/math/spectrum.h). r, g, b are the matching functions of linear Rec. 709, by the matrix of common/base/color.h.
 $(BUILD)/gen/wavelength_cells.inc: worker/render/math/data/cie1931_2deg_1nm.csv
 	@mkdir -p $(@D)
 	awk -F, 'function abs(v) { return v < 0 ? -v : v } \

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "common/film/color.h"
+#include "common/base/color.h"
 #include "worker/render/math/cie.h"
 #include "worker/render/math/spectrum.h"
 

@@ -1,0 +1,553 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The error of an image and what its relMSE is summed from, by the spread between groups: standard errors of pixels;
+ * weights, 1 / (B^2 + (0.01 m)^2), with brightnesses B that are no noisier than need be; sums of weighted errors, with
+ * bounds. What is made of the sums is canvas_interval.c's. All loops run in a fixed order over exact inputs, so that
+ * equal films give equal bits.
+ */
+#include "common/estimate/making.h"
+#include "common/base/color.h"
+#include "common/estimate/tail.h"
+
+#include "common/base/mem.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+enum { FOLDED = ERROR_FOLDED, VALUES = 3 * PLAN_MAX_GROUPS, BASE_GROUPS = 8 };
+
+/* Squared relative standard error below which a brightness is believed. */
+static const double believed = 0.08;
+
+/* A kurtosis above this share of the groups: one of them has most of the pixel's variance. One alone would have
+ * nearly 1. */
+static const double one_group = 0.6;
+
+/* The tail index of errors is taken from one in 128 of them and from one in 512, as that of samples where an integrator
+ * is chosen (worker/render/choose.h), and from 32 and 8 at least. Of fewer than ERRORS_LEAST it would be that of the
+ * bulk. */
+enum { TAIL = 128, TAIL_LEAST = 32, TAIL_MOST = 1 << 16, EXTREME = 4, ERRORS_LEAST = 2048 };
+
+/* A tile at work. Rows of `apart` hold three channels of `groups` values. */
+struct tile_error {
+	const struct canvas *c;
+	uint32_t groups, x, y, width, height; /* the tile's place and size in the crop */
+	double floor_square;
+	bool lit;	       /* chains, and some came to the tile */
+	double mean_square[3]; /* over the tile's pixels */
+	float *apart;	       /* [height][width][3][groups]: a group's image less the groups' mean */
+	double brightness[TILE_SIZE * TILE_SIZE][3],
+		square[TILE_SIZE * TILE_SIZE][3]; /* of the mean: value, variance */
+	double base[TILE_SIZE * TILE_SIZE][3],
+		base_square[TILE_SIZE * TILE_SIZE][3]; /* trimmed mean: value, variance */
+	double kurtosis[TILE_SIZE * TILE_SIZE][3];     /* of the groups' values */
+	bool settled[TILE_SIZE * TILE_SIZE][3];
+	struct error_sums sum;
+	struct tail tail; /* of the groups' errors that are too bright */
+};
+
+/* ---- standard errors */
+
+static float *apart_at(const struct tile_error *t, size_t pixel)
+{
+	return t->apart + pixel * 3 * t->groups;
+}
+
+/* Loops over groups inside, none of which depends on another's: the compiler makes vectors of them. */
+static void pixel_error(struct making *m, struct tile_error *t, const int64_t *const *slot, size_t at, size_t pixel)
+{
+	uint32_t groups = t->groups;
+	double rgb[3][PLAN_MAX_GROUPS];
+	for (uint32_t g = 0; g < groups; g++) {
+		const int64_t *s = slot[g] + at;
+		double xyz[3] = {(double)s[0] * m->factor[g], (double)s[1] * m->factor[g], (double)s[2] * m->factor[g]},
+		       out[3];
+		rec709_from_xyz(xyz, out);
+		for (int k = 0; k < 3; k++)
+			rgb[k][g] = out[k];
+	}
+	float *apart = apart_at(t, pixel);
+	for (size_t k = 0; k < 3; k++) {
+		double mean = 0, square = 0;
+		for (uint32_t g = 0; g < groups; g++)
+			mean += rgb[k][g];
+		mean /= groups;
+		for (uint32_t g = 0; g < groups; g++) {
+			rgb[k][g] -= mean;
+			apart[k * groups + g] = (float)rgb[k][g];
+		}
+		double fourth = 0;
+		for (uint32_t g = 0; g < groups; g++) {
+			double q = rgb[k][g] * rgb[k][g];
+			square += q;
+			fourth += q * q;
+		}
+		t->square[pixel][k] = square / groups / (groups - 1);
+		t->kurtosis[pixel][k] = square > 0 ? fourth / (square * square) * groups : 0;
+	}
+}
+
+static bool is_dark(const struct tile_error *t, size_t pixel)
+{
+	return t->square[pixel][0] + t->square[pixel][1] + t->square[pixel][2] == 0;
+}
+
+static void tile_errors(struct making *m, struct tile_error *t)
+{
+	bool chains = m->c->plan.kind == PLAN_CHAINS;
+	t->lit = false;
+	memset(t->mean_square, 0, sizeof t->mean_square);
+	static const int64_t nothing[SLOT];
+	const int64_t *slot[PLAN_MAX_GROUPS];
+	size_t tile = (size_t)(t->y / TILE_SIZE) * m->c->tiles_across + t->x / TILE_SIZE;
+	for (uint32_t g = 0; g < t->groups; g++) {
+		size_t film = canvas_film(g, FILM_PREFIX);
+		slot[g] = *canvas_flags(m->c, film, tile) & TILE_USED ? canvas_slot(m->c, film, tile) : nothing;
+	}
+	for (uint32_t y = 0; y < t->height; y++)
+		for (uint32_t x = 0; x < t->width; x++) {
+			size_t pixel = (size_t)y * t->width + x,
+			       out = ((size_t)(t->y + y) * m->img->width + t->x + x) * 3;
+			pixel_error(m, t, slot, (size_t)y * SLOT_ROW + (size_t)x * TILE_CHANNELS, pixel);
+			for (size_t k = 0; k < 3; k++) {
+				t->brightness[pixel][k] = (double)m->img->rgb[out + k];
+				t->mean_square[k] += t->square[pixel][k] / t->width / t->height;
+			}
+			bool dark = is_dark(t, pixel);
+			m->img->unvisited += chains && dark;
+			t->lit |= chains && !dark;
+		}
+}
+
+/* ---- weights: 1 / (B^2 + floor) with a B that is no noisier than need be */
+
+/* A square of pixels: sums over all of them, and over those that wait for a weight. */
+struct block {
+	uint32_t pixels, waiting[3];
+	double all[3], open[3];			      /* of the mean */
+	double rare[3], open_rare[3];		      /* of the mean less the base */
+	double all_apart[VALUES], open_apart[VALUES]; /* [3][groups] */
+};
+
+/* What the errors are divided by, squared. B's own noise makes 1 / B^2 too large by three of its variances, less two
+ * because errors are largest where B came out too bright, if brightness comes in hits: `variances` are 1, or 3 where
+ * they are apart. */
+static double divisor_square(const struct tile_error *t, double brightness, double square, double variances)
+{
+	return brightness * brightness + t->floor_square + variances * square;
+}
+
+static bool believe(double brightness, double square, double floor_square)
+{
+	return square <= believed * (brightness * brightness + floor_square);
+}
+
+/* A part of the relMSE whose pixels share one brightness, and how sure that is. */
+static void add_share(struct tile_error *t, double part, double brightness, double square, double divisor)
+{
+	double slope = 2 * brightness * part / divisor;
+	t->sum.share += part;
+	t->sum.doubt += slope * slope * square;
+}
+
+/* The pixel's part of the relMSE with each group's deviation over the brightness that the other groups found: no sample
+ * is divided by the brightness that it makes itself. As large as the part can reasonably be, since light that came to
+ * one group only is missing in all its divisors. */
+static double by_others(const struct tile_error *t, size_t pixel, size_t k)
+{
+	const float *apart = apart_at(t, pixel) + k * t->groups;
+	double n = t->groups, sum = 0, all = t->square[pixel][k] * n * (n - 1);
+	for (uint32_t g = 0; g < t->groups; g++) {
+		double d = (double)apart[g], others = t->brightness[pixel][k] - d / (n - 1);
+		double square = n > 2 ? fmax(0, all - d * d * n / (n - 1)) / (n - 1) / (n - 2) : all;
+		sum += d * d / divisor_square(t, others, square, 3);
+	}
+	return sum / n / (n - 1);
+}
+
+/* Bounds of a part of the relMSE, and what makes it doubtful. The lower bound: over the brightness that the pixel has,
+ * all fireflies in it. */
+static void add_bounds(struct tile_error *t, size_t pixel, size_t k, double part, double high)
+{
+	double square = t->square[pixel][k];
+	t->sum.low += square / divisor_square(t, t->brightness[pixel][k], square, 1);
+	t->sum.high += high;
+	t->sum.kurtosis += part * t->kurtosis[pixel][k];
+	if (t->kurtosis[pixel][k] > one_group * t->groups)
+		t->sum.one_group += part;
+}
+
+/* By the pixel's own brightness. Where it is believed, a group's errors are divided by the brightness that the other
+ * groups found, to second order: what errors and brightness have in common is taken out, however clumped they come. */
+static void settle_pixel(struct tile_error *t, size_t pixel, size_t k, bool believed_in)
+{
+	double brightness = t->brightness[pixel][k], square = t->square[pixel][k];
+	double divisor = divisor_square(t, brightness, square, believed_in ? 3 : 1);
+	float root = (float)(1 / sqrt(divisor)),
+	      slope = believed_in ? (float)(brightness / divisor / (t->groups - 1)) : 0;
+	float *apart = apart_at(t, pixel) + k * t->groups;
+	add_bounds(t, pixel, k, square / divisor, believed_in ? by_others(t, pixel, k) : square / divisor);
+	for (uint32_t g = 0; g < t->groups; g++) {
+		float x = slope * apart[g];
+		apart[g] *= root * (1 + x + x * x);
+	}
+	add_share(t, square / divisor, brightness, square, divisor);
+}
+
+static void settle_pixels(struct tile_error *t, size_t first, size_t count)
+{
+	for (size_t pixel = first; pixel < first + count; pixel++)
+		for (size_t k = 0; k < 3; k++)
+			if (t->settled[pixel][k])
+				settle_pixel(t, pixel, k, true);
+}
+
+/* Squared relative standard error of the mean pixel of the 2 x 2 that this one lies in, each no more than 1. */
+static double noise_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
+{
+	double sum = 0, n = 0;
+	for (uint32_t j = y & ~1u; j < t->height && j <= (y | 1); j++)
+		for (uint32_t i = x & ~1u; i < t->width && i <= (x | 1); i++, n++) {
+			size_t p = (size_t)j * t->width + i;
+			double below = t->brightness[p][k] * t->brightness[p][k] + t->floor_square;
+			sum += t->square[p][k] < below ? t->square[p][k] / below : 1;
+		}
+	return sum / n;
+}
+
+/* A pixel keeps its own brightness where its neighbourhood is believed: by itself alone, those that came out bright
+ * would keep it and those that came out dark would not. Or where it is out of doubt, whatever is beside it. */
+static uint32_t find_settled(struct tile_error *t)
+{
+	uint32_t waiting = 0;
+	for (uint32_t y = 0; y < t->height; y++)
+		for (uint32_t x = 0; x < t->width; x++)
+			for (size_t k = 0; k < 3; k++) {
+				size_t p = (size_t)y * t->width + x;
+				t->settled[p][k] = believe(t->brightness[p][k], 8 * t->square[p][k], t->floor_square) ||
+						   noise_around(t, x, y, k) <= believed;
+				waiting += !t->settled[p][k];
+			}
+	return waiting;
+}
+
+/* Mean variance of the 3 x 3 pixels around one, as far as they lie in the tile. */
+static double square_around(const struct tile_error *t, uint32_t x, uint32_t y, size_t k)
+{
+	double sum = 0, n = 0;
+	for (uint32_t j = y > 0 ? y - 1 : 0; j < t->height && j <= y + 1; j++)
+		for (uint32_t i = x > 0 ? x - 1 : 0; i < t->width && i <= x + 1; i++, n++)
+			sum += t->square[(size_t)j * t->width + i][k];
+	return sum / n;
+}
+
+/*
+ * Standard errors of the tile's pixels. Where the brightness is not believed a variance from few groups is mostly too
+ * small, since what comes in bursts has not come yet: it is averaged with its neighbours'. A pixel that chains never
+ * visited has a variance of 0, which would be a claim; it gets that of its neighbours, of its tile, or
+ * (write_unvisited) of the image.
+ */
+static void write_errors(struct making *m, const struct tile_error *t)
+{
+	for (uint32_t y = 0; y < t->height; y++)
+		for (uint32_t x = 0; x < t->width; x++)
+			for (size_t k = 0; k < 3; k++) {
+				size_t pixel = (size_t)y * t->width + x;
+				double own = t->square[pixel][k], around = own;
+				if (!t->settled[pixel][k] || own == 0)
+					around = (own + square_around(t, x, y, k)) / 2;
+				if (around == 0 && t->lit)
+					around = t->mean_square[k];
+				m->img->error[((size_t)(t->y + y) * m->img->width + t->x + x) * 3 + k] =
+					(float)sqrt(around);
+			}
+}
+
+static double spread_square(const double *apart, uint32_t groups, double pixels)
+{
+	double square = 0;
+	for (uint32_t g = 0; g < groups; g++)
+		square += apart[g] * apart[g];
+	return square / (pixels * pixels) / groups / (groups - 1);
+}
+
+/* Where the groups agree about a pixel but for a few, its brightness is theirs, and what the few found is spread over
+ * the block: `rare` a pixel, with the variance `square`. A wall beside a lamp keeps its darkness so. */
+static bool settle_by_base(struct tile_error *t, size_t pixel, size_t k, double rare, double square)
+{
+	double base = t->base[pixel][k] + rare, doubt = t->base_square[pixel][k] + square;
+	if (t->groups < BASE_GROUPS || !believe(base, doubt, t->floor_square))
+		return false;
+	double divisor = divisor_square(t, base, doubt, 1), part = t->square[pixel][k] / divisor;
+	float *apart = apart_at(t, pixel) + k * t->groups, root = (float)(1 / sqrt(divisor));
+	add_bounds(t, pixel, k, part, by_others(t, pixel, k));
+	for (uint32_t g = 0; g < t->groups; g++)
+		apart[g] *= root;
+	add_share(t, part, base, doubt, divisor);
+	return true;
+}
+
+/*
+ * The block's weight for what waits in it. Its brightness is the mean of all its pixels: those without a firefly count
+ * as those with one. But pixels that were believed and are more than twice as bright as what waits, a lamp beside a
+ * wall, are something else and are left out. And a pixel that is brighter than the block by 1.5 of its standard errors
+ * has met its light in three groups or more: that is no firefly (which is one standard error high) but a glint, and
+ * keeps its own brightness.
+ */
+static void settle_block(struct tile_error *t, struct block *b, size_t k, uint32_t x, uint32_t y, uint32_t size)
+{
+	double n = b->pixels, waiting = b->waiting[k], part = 0;
+	bool other = b->all[k] / n > 2 * b->open[k] / waiting;
+	n = other ? waiting : n;
+	double rare = (other ? b->open_rare[k] : b->rare[k]) / n;
+	double brightness = (other ? b->open[k] : b->all[k]) / n;
+	const double *apart = (other ? b->open_apart : b->all_apart) + k * t->groups;
+	double square = spread_square(apart, t->groups, n);
+	if (!believe(brightness, square, t->floor_square) && size < TILE_SIZE)
+		return;
+	double divisor = divisor_square(t, brightness, square, 1);
+	float root = (float)(1 / sqrt(divisor));
+	for (uint32_t j = y; j < y + size && j < t->height; j++)
+		for (uint32_t i = x; i < x + size && i < t->width; i++) {
+			size_t pixel = (size_t)j * t->width + i;
+			if (t->settled[pixel][k])
+				continue;
+			t->settled[pixel][k] = true;
+			if (t->brightness[pixel][k] - brightness > 1.5 * sqrt(t->square[pixel][k])) {
+				settle_pixel(t, pixel, k, false);
+				continue;
+			}
+			float *own = apart_at(t, pixel) + k * t->groups;
+			if (settle_by_base(t, pixel, k, rare, square))
+				continue;
+			double own_part = t->square[pixel][k] / divisor;
+			add_bounds(t, pixel, k, own_part, own_part);
+			t->sum.dark += own_part;
+			for (uint32_t g = 0; g < t->groups; g++)
+				own[g] *= root;
+			part += t->square[pixel][k];
+		}
+	add_share(t, part / divisor, brightness, square, divisor);
+	b->waiting[k] = 0;
+	b->open[k] = b->open_rare[k] = 0;
+	memset(b->open_apart + k * t->groups, 0, t->groups * sizeof *b->open_apart);
+}
+
+/* Mean and its variance without the eighth of the groups that lie farthest from the others: the brightness without
+ * fireflies. */
+static void find_base(struct tile_error *t, size_t pixel, size_t k)
+{
+	double d[PLAN_MAX_GROUPS], mean = 0, square = 0;
+	const float *apart = apart_at(t, pixel) + k * t->groups;
+	uint32_t n = t->groups, drop = t->groups / 8;
+	for (uint32_t g = 0; g < n; g++)
+		d[g] = (double)apart[g];
+	for (; drop > 0; drop--) {
+		uint32_t far = 0;
+		for (uint32_t g = 1; g < n; g++)
+			far = fabs(d[g] - mean) > fabs(d[far] - mean) ? g : far;
+		mean = (mean * n - d[far]) / (n - 1);
+		d[far] = d[--n];
+	}
+	for (uint32_t g = 0; g < n; g++)
+		square += (d[g] - mean) * (d[g] - mean);
+	t->base[pixel][k] = t->brightness[pixel][k] + mean;
+	t->base_square[pixel][k] = square / n / (n - 1);
+}
+
+static void add_pixel(struct tile_error *t, struct block *b, size_t pixel)
+{
+	const float *apart = apart_at(t, pixel);
+	size_t groups = t->groups;
+	b->pixels++;
+	for (size_t i = 0; i < 3 * groups; i++)
+		b->all_apart[i] += (double)apart[i];
+	for (size_t k = 0; k < 3; k++) {
+		if (groups >= BASE_GROUPS)
+			find_base(t, pixel, k);
+		double rare = t->brightness[pixel][k] - t->base[pixel][k];
+		b->rare[k] += rare;
+		b->all[k] += t->brightness[pixel][k];
+		if (t->settled[pixel][k])
+			continue;
+		b->open_rare[k] += rare;
+		b->waiting[k]++;
+		b->open[k] += t->brightness[pixel][k];
+		for (size_t i = k * groups; i < (k + 1) * groups; i++)
+			b->open_apart[i] += (double)apart[i];
+	}
+}
+
+static void add_block(struct block *b, const struct block *part, uint32_t groups)
+{
+	b->pixels += part->pixels;
+	for (int k = 0; k < 3; k++) {
+		b->waiting[k] += part->waiting[k];
+		b->all[k] += part->all[k];
+		b->rare[k] += part->rare[k];
+		b->open_rare[k] += part->open_rare[k];
+		b->open[k] += part->open[k];
+	}
+	for (size_t i = 0; i < 3 * (size_t)groups; i++)
+		b->all_apart[i] += part->all_apart[i];
+	if (part->waiting[0] + part->waiting[1] + part->waiting[2])
+		for (size_t i = 0; i < 3 * (size_t)groups; i++)
+			b->open_apart[i] += part->open_apart[i];
+}
+
+/* The square of `size` pixels at (x, y) of the tile, from its quarters; at most six levels deep. */
+static void settle_square(struct tile_error *t, uint32_t x, uint32_t y, uint32_t size, struct block *b)
+{
+	*b = (struct block){0};
+	for (uint32_t i = 0; i < 4; i++) {
+		uint32_t half = size / 2, px = x + i % 2 * half, py = y + i / 2 * half;
+		struct block part;
+		if (px >= t->width || py >= t->height)
+			continue;
+		if (half == 1) {
+			add_pixel(t, b, (size_t)py * t->width + px);
+			settle_pixels(t, (size_t)py * t->width + px, 1);
+			continue;
+		}
+		settle_square(t, px, py, half, &part);
+		add_block(b, &part, t->groups);
+	}
+	for (size_t k = 0; k < 3; k++)
+		if (b->waiting[k])
+			settle_block(t, b, k, x, y, size);
+}
+
+/* ---- sums over the image */
+
+/* FOLDED groups from `first` on, or as many as there are. */
+static void fold(struct tile_error *t, uint32_t first, const float *apart, float *folded)
+{
+	uint32_t count = t->groups - first < FOLDED ? t->groups - first : FOLDED;
+	float v[FOLDED] = {0};
+	for (uint32_t g = 0; g < count; g++)
+		v[g] = apart[g];
+	for (uint32_t g = 0; g < FOLDED; g++)
+		folded[g] += v[g];
+	for (uint32_t g = 0; g < FOLDED && t->groups > FOLDED; g++)
+		t->sum.distance[first + g] += (double)v[g] * (double)v[g];
+}
+
+static void add_to_tail(struct tile_error *t, const float *apart)
+{
+	for (size_t g = 0; g < t->groups; g++)
+		tail_add(&t->tail, (double)apart[g] + (double)apart[t->groups + g] + (double)apart[2 * t->groups + g]);
+}
+
+static size_t tail_size(size_t errors)
+{
+	size_t size = errors / TAIL;
+	return size < TAIL_LEAST ? TAIL_LEAST : size > TAIL_MOST ? TAIL_MOST : size;
+}
+
+/* INFINITY: too few to tell. */
+static double find_tail(struct tail *t, size_t errors)
+{
+	size_t size = tail_size(errors);
+	tail_settle(t);
+	if (errors < ERRORS_LEAST || t->held <= size)
+		return INFINITY;
+	return fmin(tail_index(t, size), tail_index(t, size / EXTREME));
+}
+
+/* Products of the groups' weighted errors. More than FOLDED groups are folded onto so many: errors that add up are
+ * alike. A lane is a pair of groups, so that the order within a sum is the pixels'. */
+static void add_row(struct tile_error *t, size_t first)
+{
+	float gram[FOLDED][FOLDED] = {{0}};
+	for (size_t pixel = first; pixel < first + t->width; pixel++) {
+		const float *apart = apart_at(t, pixel);
+		float folded[3][FOLDED] = {{0}};
+		add_to_tail(t, apart);
+		for (size_t k = 0; k < 3; k++) {
+			for (uint32_t g = 0; g < t->groups; g += FOLDED)
+				fold(t, g, apart + k * t->groups + g, folded[k]);
+		}
+		for (size_t i = 0; i < FOLDED; i++)
+			for (size_t j = i / 4 * 4; j < FOLDED; j++)
+				gram[i][j] += folded[0][i] * folded[0][j] + folded[1][i] * folded[1][j] +
+					      folded[2][i] * folded[2][j];
+	}
+	for (size_t i = 0; i < FOLDED; i++)
+		for (size_t j = i; j < FOLDED; j++)
+			t->sum.gram[i][j] += (double)gram[i][j];
+}
+
+static void error_tile(struct making *m, struct tile_error *t, uint32_t x, uint32_t y)
+{
+	t->x = x;
+	t->y = y;
+	t->width = m->img->width - x < TILE_SIZE ? m->img->width - x : TILE_SIZE;
+	t->height = m->img->height - y < TILE_SIZE ? m->img->height - y : TILE_SIZE;
+	tile_errors(m, t);
+	bool all_settled = find_settled(t) == 0;
+	write_errors(m, t);
+	if (!all_settled) {
+		struct block whole;
+		settle_square(t, 0, 0, TILE_SIZE, &whole);
+	} else {
+		settle_pixels(t, 0, (size_t)t->width * t->height);
+	}
+	for (uint32_t row = 0; row < t->height; row++)
+		add_row(t, (size_t)row * t->width);
+}
+
+/* Tiles to which no chain came have no variance of their own: they get the image's mean one. */
+static void write_unvisited(struct canvas_image *img)
+{
+	size_t values = (size_t)img->width * img->height * 3;
+	double mean[3] = {0};
+	for (size_t i = 0; i < values; i++)
+		mean[i % 3] += (double)img->error[i] * (double)img->error[i] * 3 / (double)values;
+	for (size_t i = 0; i < values; i += 3) {
+		if (img->error[i] + img->error[i + 1] + img->error[i + 2] > 0)
+			continue;
+		for (size_t k = 0; k < 3; k++)
+			img->error[i + k] = (float)sqrt(mean[k]);
+	}
+}
+
+static void free_tile(struct tile_error *t)
+{
+	if (t) {
+		tail_fini(&t->tail);
+		mem_free(t->apart);
+	}
+	mem_free(t);
+}
+
+int canvas_error(struct making *m, struct error *e)
+{
+	assert(m->c->plan.groups > 1 && !m->open_rounds);
+	struct tile_error *t = mem_alloc(1, sizeof *t);
+	size_t values = (size_t)m->img->width * m->img->height * 3, errors = values / 3 * m->c->plan.groups;
+	if (t)
+		t->apart = mem_alloc((size_t)TILE_SIZE * TILE_SIZE * 3 * m->c->plan.groups, sizeof *t->apart);
+	if (!t || !t->apart || tail_init(&t->tail, tail_size(errors) + 1)) {
+		free_tile(t);
+		return error_set(e, ENOMEM, "no memory for the error of an image of %ux%u", m->img->width,
+				 m->img->height);
+	}
+	double mean = 0;
+	for (size_t i = 0; i < values; i++)
+		mean += (double)m->img->rgb[i];
+	mean /= (double)values;
+	t->groups = m->c->plan.groups;
+	t->floor_square = 1e-4 * mean * mean;
+	for (uint32_t y = 0; y < m->img->height; y += TILE_SIZE)
+		for (uint32_t x = 0; x < m->img->width; x += TILE_SIZE)
+			error_tile(m, t, x, y);
+	if (m->img->unvisited)
+		write_unvisited(m->img);
+	t->sum.groups = t->groups;
+	t->sum.tail = find_tail(&t->tail, errors);
+	if (mean != 0) /* a black image has no relative error */
+		canvas_interval(&t->sum, m->img);
+	free_tile(t);
+	return 0;
+}

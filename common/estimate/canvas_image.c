@@ -1,0 +1,201 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* From integer sums to an image. All loops run in a fixed order over exact inputs, so that equal films give equal bits.
+ */
+#include "common/estimate/convergence.h"
+#include "common/estimate/making.h"
+#include "common/base/color.h"
+
+#include "common/base/mem.h"
+
+#include <math.h>
+#include <string.h>
+
+static void add_tally(struct tally *to, const struct tally *from, uint32_t groups, bool all)
+{
+	for (uint32_t g = 0; g < groups; g++) {
+		if (all)
+			to->group[g].samples += from->group[g].samples;
+		to->group[g].independent += from->group[g].independent;
+		exact_sum_merge(&to->group[g].sum, &from->group[g].sum);
+		exact_sum_merge(&to->group[g].beyond, &from->group[g].beyond);
+	}
+	struct canvas_counts refused = {{0}, {{0}}};
+	for (int i = COUNT_NAN; i <= COUNT_NEGATIVE; i++)
+		refused.counters[i] = from->counts.counters[i];
+	canvas_add_counts(&to->counts, all ? &from->counts : &refused);
+}
+
+static double ratio(double a, double b)
+{
+	return b > 0 ? a / b : 0;
+}
+
+/* b of each group and of all, and from the spread of the groups its standard error. */
+static void find_b(struct making *m)
+{
+	uint32_t groups = m->c->plan.groups;
+	struct exact_sum sum = {0}, beyond = {0}, bootstrap = {0};
+	uint64_t independent = 0;
+	double mean = 0, square = 0;
+	for (uint32_t g = 0; g < groups; g++) {
+		m->b[g] = ratio(exact_sum_value(&m->all->group[g].sum), (double)m->all->group[g].independent);
+		exact_sum_merge(&sum, &m->all->group[g].sum);
+		exact_sum_merge(&beyond, &m->c->bootstrap.group[g].beyond);
+		exact_sum_merge(&bootstrap, &m->c->bootstrap.group[g].sum);
+		independent += m->all->group[g].independent;
+		mean += m->b[g] / groups;
+	}
+	for (uint32_t g = 0; g < groups; g++)
+		square += (m->b[g] - mean) * (m->b[g] - mean);
+	m->img->b = ratio(exact_sum_value(&sum), (double)independent);
+	m->img->b_error = groups > 1 ? sqrt(square / groups / (groups - 1)) : NAN;
+	m->img->b_tail = m->c->plan.kind == PLAN_CHAINS ? m->c->b_tail : 0;
+	double outside = exact_sum_value(&beyond);
+	m->img->beyond_share = ratio(outside, outside + exact_sum_value(&bootstrap));
+}
+
+static void find_factors(struct making *m)
+{
+	const struct plan *p = &m->c->plan;
+	uint64_t samples = 0;
+	for (uint32_t g = 0; g < p->groups; g++)
+		samples += m->all->group[g].samples;
+	m->img->samples = samples;
+	for (uint32_t g = 0; g < p->groups; g++) {
+		double n = p->kind == PLAN_CHAINS ? (double)m->all->group[g].samples
+						  : (double)p->epoch * (double)m->c->rounds;
+		m->factor[g] = (p->kind == PLAN_CHAINS ? m->b[g] : 1) * ratio(m->c->quantum, n);
+	}
+	double n =
+		p->kind == PLAN_CHAINS ? (double)samples : (double)p->groups * (double)p->epoch * (double)m->c->rounds;
+	m->pooled_factor = (p->kind == PLAN_CHAINS ? m->img->b : 1) * ratio(m->c->quantum, n);
+}
+
+/* A preview of samples: parts of the picture have come more often than others. Leases merged of the strip that holds a
+ * row of the crop, by group; the rows that the filter shares between strips are slightly off. */
+static double preview_leases(const struct canvas *c, uint32_t row)
+{
+	uint32_t part = 0;
+	while (plan_row_range(&c->plan, part).end <= row + c->plan.border)
+		part++;
+	uint64_t n = c->rounds * c->plan.groups;
+	for (uint32_t set = 1; set <= OPEN_ROUNDS; set++)
+		for (uint32_t g = 0; g < c->plan.groups; g++)
+			n += canvas_lease_merged(c, set, g, part);
+	return (double)n;
+}
+
+/* The used slots of a tile, of all groups: the prefix's, and of a preview the open rounds'. */
+static uint32_t tile_slots(const struct making *m, size_t tile, const int64_t *slots[PLAN_MAX_GROUPS * FILMS])
+{
+	uint32_t n = 0;
+	for (uint32_t g = 0; g < m->c->plan.groups; g++)
+		for (uint32_t which = 0; which < (m->open_rounds ? FILMS : 1); which++)
+			if (*canvas_flags(m->c, canvas_film(g, which), tile) & TILE_USED)
+				slots[n++] = canvas_slot(m->c, canvas_film(g, which), tile);
+	return n;
+}
+
+/* Integers, so that their order is free; added as doubles, since together they may be more than 64 bits hold. */
+static void pool_row(const int64_t *const *slots, uint32_t count, size_t at, size_t values, double *sums)
+{
+	memset(sums, 0, values * sizeof *sums);
+	for (uint32_t i = 0; i < count; i++)
+		for (size_t k = 0; k < values; k++)
+			sums[k] += (double)slots[i][at + k];
+}
+
+static void pool_tile(struct making *m, uint32_t tx, uint32_t ty)
+{
+	const struct plan *p = &m->c->plan;
+	const int64_t *slots[PLAN_MAX_GROUPS * FILMS];
+	uint32_t count = tile_slots(m, (size_t)ty * m->c->tiles_across + tx, slots), x = tx * TILE_SIZE;
+	uint32_t width = p->crop_width - x < TILE_SIZE ? p->crop_width - x : TILE_SIZE;
+	for (uint32_t y = ty * TILE_SIZE; y < p->crop_height && y < (ty + 1) * TILE_SIZE; y++) {
+		double factor = m->pooled_factor, sums[SLOT_ROW], rgb[3];
+		if (m->open_rounds && p->kind == PLAN_SAMPLES)
+			factor = ratio(m->c->quantum, preview_leases(m->c, y) * (double)p->epoch);
+		pool_row(slots, count, (size_t)(y % TILE_SIZE) * SLOT_ROW, (size_t)width * TILE_CHANNELS, sums);
+		float *out = m->img->rgb + ((size_t)y * p->crop_width + x) * 3;
+		for (size_t i = 0; i < width; i++) {
+			const double *s = sums + i * TILE_CHANNELS,
+				     xyz[3] = {s[0] * factor, s[1] * factor, s[2] * factor};
+			rec709_from_xyz(xyz, rgb);
+			for (size_t k = 0; k < 3; k++)
+				out[i * 3 + k] = (float)rgb[k];
+		}
+	}
+}
+
+static int find_moments(const struct making *m, struct error *e)
+{
+	struct moments_group groups[PLAN_MAX_GROUPS];
+	for (uint32_t g = 0; g < m->c->plan.groups; g++)
+		groups[g] =
+			(struct moments_group){m->c->bootstrap.group[g].independent, m->all->group[g].samples, m->b[g]};
+	return moments_image(m->c->moments, groups, m->c->rounds, m->open_rounds, m->img, e);
+}
+
+/* Chains that are flagged and too short to be blamed for it: how far their errors reach is not known. */
+static void doubt_short_chains(struct making *m)
+{
+	struct convergence a;
+	convergence_judge(&m->c->plan, m->img, &a);
+	if (a.verdict != CHAINS_TOO_SHORT || m->img->rel_mse_doubt)
+		return;
+	m->img->rel_mse_doubt = ERROR_SHORT;
+	m->img->rel_mse_95[0] = m->img->rel_mse_95[1] = NAN;
+}
+
+int canvas_image(const struct canvas *c, bool open_rounds, struct canvas_image *img, struct error *e)
+{
+	const struct plan *p = &c->plan;
+	*img = (struct canvas_image){.width = p->crop_width,
+				     .height = p->crop_height,
+				     .rel_mse = NAN,
+				     .rel_mse_upper = NAN,
+				     .rel_mse_degrees = NAN,
+				     .rel_mse_95 = {NAN, NAN},
+				     .rounds = c->rounds};
+	struct making m = {.c = c, .img = img, .open_rounds = open_rounds, .all = mem_alloc(1, sizeof *m.all)};
+	bool errors = p->groups > 1 && !open_rounds;
+	img->rgb = mem_alloc((size_t)img->width * img->height * 3, sizeof *img->rgb);
+	img->error = errors ? mem_alloc((size_t)img->width * img->height * 3, sizeof *img->error) : NULL;
+	if (!m.all || !img->rgb || (errors && !img->error)) {
+		canvas_image_fini(img);
+		mem_free(m.all);
+		return error_set(e, ENOMEM, "no memory for an image of %ux%u", p->crop_width, p->crop_height);
+	}
+	add_tally(m.all, &c->bootstrap, p->groups, false);
+	add_tally(m.all, &c->prefix, p->groups, true);
+	for (uint32_t i = 0; open_rounds && i < OPEN_ROUNDS; i++)
+		add_tally(m.all, &c->open[i], p->groups, true);
+	find_b(&m);
+	find_factors(&m);
+	img->counts = m.all->counts;
+	for (uint32_t ty = 0; ty < c->tiles_down; ty++)
+		for (uint32_t tx = 0; tx < c->tiles_across; tx++)
+			pool_tile(&m, tx, ty);
+	img->black = true;
+	for (size_t i = 0; i < (size_t)img->width * img->height * 3 && img->black; i++)
+		img->black = img->rgb[i] == 0;
+	int rc = errors ? canvas_error(&m, e) : 0;
+	if (rc == 0)
+		rc = find_moments(&m, e);
+	if (rc == 0 && errors)
+		doubt_short_chains(&m);
+	if (rc)
+		canvas_image_fini(img);
+	mem_free(m.all);
+	return rc;
+}
+
+void canvas_image_fini(struct canvas_image *img)
+{
+	mem_free(img->rgb);
+	mem_free(img->error);
+	mem_free(img->r_hat);
+	mem_free(img->tile_error);
+	mem_free(img->tile_share);
+	img->rgb = img->error = img->r_hat = img->tile_error = img->tile_share = NULL;
+}

@@ -1,0 +1,268 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/estimate/convergence.h"
+
+#include "common/base/text.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+/* Tiles. Below 1.1 chains count as mixed (Gelman and Rubin 1992); the mean's own error must be large too, or a scene of
+ * many small lights, which chains visit in turns, would be blamed for what 1,000 chains average out. */
+#define R_HAT_MIXED 1.1
+#define TILE_ERROR_MOST 0.1
+#define TILE_SHARE_LEAST 1e-3
+#define FLAGGED_SHARE_MOST 0.01
+
+/* Classes: significant, over all of them, and large enough to be seen. */
+#define CLASS_LEVEL 1e-4
+#define CLASS_OF_B 0.02
+#define CLASS_OF_ITSELF 0.2
+#define CLASS_LEAST 0.005
+/* Standard error from the groups of a class's energy in the chains: when half of the groups have found it and share it
+ * evenly it is a quarter of it (sqrt((16 / 8 - 1) / 15) of 16 groups); of fewer groups it is itself too uncertain. */
+#define APART_OF_ITSELF 0.25
+#define APART_OF_B 0.03
+enum { APART_GROUPS = 8 };
+/* Standard error of a class's energy in the bootstrap above which the bootstrap is no witness against more of it: see
+ * excess. */
+#define CLASS_KNOWN 0.1
+
+/* Chain epochs. */
+#define STUCK_MOST 0.01
+enum { STUCK_EPOCH = 1000 };
+
+const char *convergence_name(enum convergence_verdict v)
+{
+	static const char *const names[] = {"agree", "too short", "disagree"};
+	assert((unsigned)v < sizeof names / sizeof *names);
+	return names[v];
+}
+
+/* Finite sums for whole degrees (Abramowitz and Stegun 1964, 26.7.3 and 26.7.4). */
+double convergence_student_tail(double t, uint32_t degrees)
+{
+	double angle = atan(fabs(t) / sqrt(degrees)), c = cos(angle), square = c * c;
+	double sum = 0, term = 1;
+	assert(degrees > 0);
+	if (degrees % 2 == 0) {
+		for (uint32_t k = 0; k < degrees; k += 2) {
+			sum += term;
+			term *= square * (k + 1) / (k + 2);
+		}
+		return fmax(1 - sin(angle) * sum, 0);
+	}
+	term = c;
+	for (uint32_t k = 1; k < degrees; k += 2) {
+		sum += term;
+		term *= square * (k + 1) / (k + 2);
+	}
+	return fmax(1 - (angle + sin(angle) * sum) * M_2_PI, 0);
+}
+
+/* ---- tiles */
+
+static bool tile_flagged(const struct canvas_image *img, size_t i)
+{
+	return img->r_hat[i] > (float)R_HAT_MIXED && img->tile_error[i] > (float)TILE_ERROR_MOST &&
+	       img->tile_share[i] >= (float)TILE_SHARE_LEAST;
+}
+
+/* The k-th smallest R-hat by bisection over its values: quadratic, but without memory, and tiles are few. */
+static double median(const struct canvas_image *img, uint32_t known)
+{
+	size_t tiles = (size_t)img->tiles_across * img->tiles_down;
+	float low = -INFINITY, high = INFINITY;
+	for (size_t i = 0; i < tiles; i++) {
+		float x = img->r_hat[i];
+		uint32_t below = 0, equal = 0;
+		if (isnan(x) || !(x > low && x < high))
+			continue;
+		for (size_t k = 0; k < tiles; k++) {
+			below += img->r_hat[k] < x;
+			equal += img->r_hat[k] == x;
+		}
+		if (below > known / 2)
+			high = x;
+		else if (below + equal <= known / 2)
+			low = x;
+		else
+			return (double)x;
+	}
+	return NAN;
+}
+
+static void judge_tiles(const struct plan *p, const struct canvas_image *img, struct convergence *a)
+{
+	uint32_t known = 0;
+	if (!img->r_hat)
+		return;
+	for (size_t i = 0; i < (size_t)img->tiles_across * img->tiles_down; i++) {
+		double r_hat = (double)img->r_hat[i];
+		a->tiles++;
+		if (isnan(r_hat))
+			continue;
+		known++;
+		if (!(r_hat <= a->r_hat_worst)) {
+			a->r_hat_worst = r_hat;
+			a->worst_x = p->crop_x + (uint32_t)(i % img->tiles_across) * TILE_SIZE;
+			a->worst_y = p->crop_y + (uint32_t)(i / img->tiles_across) * TILE_SIZE;
+		}
+		if (tile_flagged(img, i)) {
+			a->tiles_flagged++;
+			a->energy_flagged += (double)img->tile_share[i];
+		}
+	}
+	a->r_hat_median = median(img, known);
+}
+
+/* ---- classes */
+
+/*
+ * Whether more of a class in the chains than in the bootstrap says anything. Energies of independent samples have heavy
+ * tails: while the rare bright ones have not come, the mean is too small and so is its spread, and t is far too large.
+ * So an excess counts only where the bootstrap knows the class well. Nothing is lost by that: chains share out b, and b
+ * comes from independent samples, so a class that these miss is missing in all others of the chains; and with too
+ * little in the chains the tails err to the safe side, since samples that raise the mean raise its spread too.
+ */
+static bool excess_counts(const struct path_class_energy *c)
+{
+	return c->bootstrap_error < CLASS_KNOWN * c->bootstrap;
+}
+
+static bool class_flagged(const struct path_class_energy *c, double b, uint32_t groups)
+{
+	double d = c->chains - c->bootstrap, class = fmax(c->chains, c->bootstrap);
+	bool large = fabs(d) > CLASS_OF_B * b || (fabs(d) > CLASS_OF_ITSELF * class && class > CLASS_LEAST * b);
+	if (!(b > 0) || !large || groups < 2 || isnan(c->difference_t) || (d > 0 && !excess_counts(c)))
+		return false;
+	return convergence_student_tail(c->difference_t, groups - 1) < CLASS_LEVEL / PATH_CLASSES;
+}
+
+static bool class_apart(const struct path_class_energy *c, double b, uint32_t groups)
+{
+	return groups >= APART_GROUPS && c->chains_error > APART_OF_ITSELF * c->chains &&
+	       c->chains_error > APART_OF_B * b;
+}
+
+static void judge_classes(const struct plan *p, const struct canvas_image *img, struct convergence *a)
+{
+	for (unsigned k = 0; k < PATH_CLASSES; k++) {
+		a->classes_flagged |= (uint32_t)class_flagged(&img->classes[k], img->b, p->groups) << k;
+		a->classes_apart |= (uint32_t)class_apart(&img->classes[k], img->b, p->groups) << k;
+	}
+}
+
+/* ---- words */
+
+static void put_tiles(struct text *t, const struct convergence *a)
+{
+	text_put(t, "in %u of %u tiles with %.3g %% of the energy they have not mixed (R-hat %.3g at %u,%u)",
+		 a->tiles_flagged, a->tiles, 100 * a->energy_flagged, a->r_hat_worst, a->worst_x, a->worst_y);
+}
+
+static void put_classes(struct text *t, const struct canvas_image *img, uint32_t which, bool apart, const char *then)
+{
+	enum { SHOWN = 2 };
+	unsigned shown = 0, more = 0;
+	for (unsigned k = 0; k < PATH_CLASSES; k++) {
+		const struct path_class_energy *c = &img->classes[k];
+		if (!(which >> k & 1))
+			continue;
+		if (shown == SHOWN) {
+			more++;
+			continue;
+		}
+		double chains = 100 * c->chains / img->b;
+		if (apart)
+			text_put(t, "%sgroups of them differ in paths (%s): %.3g +- %.2g %% of b", then,
+				 path_class_name(k), chains, 100 * c->chains_error / img->b);
+		else
+			text_put(t, "%sto paths (%s) they give %.3g %% of b, the bootstrap %.3g %%", then,
+				 path_class_name(k), chains, 100 * c->bootstrap / img->b);
+		shown++;
+		then = ", ";
+	}
+	if (more)
+		text_put(t, ", and %u classes more", more);
+}
+
+static void put_words(const struct plan *p, const struct canvas_image *img, struct convergence *a, bool tiles,
+		      bool stuck)
+{
+	struct text t = {a->text, sizeof a->text};
+	const char *then = "";
+	if (a->verdict == CHAINS_TOO_SHORT)
+		text_put(&t, "chains are too short to be judged, %llu mutations each: ",
+			 (unsigned long long)(img->rounds * p->epoch));
+	else
+		text_put(&t, "chains disagree: ");
+	if (tiles) {
+		put_tiles(&t, a);
+		then = "; ";
+	}
+	if (a->classes_flagged) {
+		put_classes(&t, img, a->classes_flagged, false, then);
+		then = "; ";
+	}
+	if (a->classes_apart) {
+		put_classes(&t, img, a->classes_apart, true, then);
+		then = "; ";
+	}
+	if (stuck)
+		text_put(&t, "%sin %.3g %% of their epochs of %llu mutations they accepted nothing", then,
+			 100 * a->stuck_share, (unsigned long long)p->epoch);
+}
+
+void convergence_judge(const struct plan *p, const struct canvas_image *img, struct convergence *a)
+{
+	*a = (struct convergence){.r_hat_median = NAN, .r_hat_worst = NAN};
+	if (p->kind != PLAN_CHAINS)
+		return;
+	uint64_t epochs = img->samples / p->epoch;
+	judge_tiles(p, img, a);
+	judge_classes(p, img, a);
+	if (epochs)
+		a->stuck_share = (double)img->counts.counters[COUNT_STUCK] / (double)epochs;
+	bool tiles = a->energy_flagged > FLAGGED_SHARE_MOST,
+	     stuck = p->epoch >= STUCK_EPOCH && a->stuck_share > STUCK_MOST;
+	if (!tiles && !a->classes_flagged && !a->classes_apart && !stuck)
+		return;
+	/* The product of two counts of a plan that was checked fits 64 bits: COUNT_SAMPLES holds it. */
+	a->verdict = img->rounds * p->epoch < CONVERGENCE_MUTATIONS ? CHAINS_TOO_SHORT : CHAINS_DISAGREE;
+	put_words(p, img, a, tiles, stuck);
+}
+
+void convergence_add_note(const struct convergence *a, char *note, size_t size)
+{
+	size_t used = strnlen(note, size);
+	if (!*a->text || used >= size)
+		return;
+	struct text t = {note + used, size - used};
+	text_put(&t, "%s%s", used ? "; " : "", a->text);
+}
+
+void convergence_table(const struct path_class_energy classes[PATH_CLASSES], double b, const struct convergence *a,
+		       char *text, size_t size)
+{
+	struct text t = {text, size};
+	if (size)
+		text[0] = 0;
+	bool any = false;
+	for (unsigned k = 0; k < PATH_CLASSES && b > 0; k++) {
+		const struct path_class_energy *c = &classes[k];
+		if (!(c->chains > 0) && !(c->bootstrap > 0))
+			continue;
+		if (!any)
+			text_put(&t, "%-36s %21s %21s %9s\n", "paths, % of b", "bootstrap", "chains", "t");
+		any = true;
+		text_put(&t, "%-36s %10.3f +-%8.3f %10.3f +-%8.3f", path_class_name(k), 100 * c->bootstrap / b,
+			 100 * c->bootstrap_error / b, 100 * c->chains / b, 100 * c->chains_error / b);
+		if (isnan(c->difference_t))
+			text_put(&t, " %9s", "-");
+		else
+			text_put(&t, " %9.2f", c->difference_t);
+		text_put(&t, "%s%s\n", a->classes_flagged >> k & 1 ? "  differs" : "",
+			 a->classes_apart >> k & 1 ? "  groups apart" : "");
+	}
+}

@@ -1,0 +1,368 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/estimate/forecast.h"
+
+#include "common/estimate/merge.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum {
+	PLAYS = 1024,
+	PRIOR_WEIGHT = 6, /* of the degrees of freedom that looks report, against their scatter, in looks */
+	STEPS_MOST = 256, /* of the ladder; more than 2^60 rounds have */
+};
+static const double used_share =
+	1.0 / 16;		       /* looks at less than this share of the work say little about what is to come */
+static const double burst = 0.15;      /* spread of a look beyond chi-square: light that comes in rare bursts */
+static const double trend_prior = 0.2; /* standard deviation of the trend: light that comes in rare bursts, chains that
+					* have not forgotten their seeds yet */
+static const double memory = 2,
+		    memory_sd = 0.8;	/* e-folds of work over which a trend dies down; its logarithm's spread */
+static const double drift = 0.08;	/* what else may change in an e-fold of work that nobody has seen */
+static const double price_floor = 0.03; /* relative spread of a sample's price from one stretch of time to another */
+static const double log_four = 1.3862943611198906;
+
+/* ---- looks */
+
+#define WORK_MOST 0x1p63 /* plans count it in 64 bits */
+
+void forecast_add_look(struct forecast_history *h, const struct forecast_look *l)
+{
+	bool sound =
+		isfinite(l->rel_mse) && l->rel_mse > 0 && isfinite(l->rel_mse_upper) && l->rel_mse_upper >= l->rel_mse;
+	bool counted = l->work < WORK_MOST && isfinite(l->cpu_seconds) && isfinite(l->seconds) && isfinite(l->degrees);
+	if (!sound || !counted || !(l->work > (h->count ? h->looks[h->count - 1].work : 0)))
+		return;
+	if (h->count == FORECAST_LOOKS)
+		memmove(h->looks, h->looks + 1, --h->count * sizeof *h->looks);
+	h->looks[h->count++] = *l;
+}
+
+void forecast_add(struct forecast_history *h, const struct plan *p, const struct canvas_image *img, double cpu_seconds,
+		  double seconds)
+{
+	struct forecast_look l = {.work = (double)img->rounds * (double)plan_round_mutations(p),
+				  .cpu_seconds = cpu_seconds,
+				  .seconds = seconds,
+				  .rel_mse = img->rel_mse,
+				  .rel_mse_upper = img->rel_mse_upper,
+				  .degrees = img->rel_mse_degrees > 0 ? img->rel_mse_degrees : p->groups - 1.0,
+				  .doubtful = img->rel_mse_doubt != ERROR_KNOWN};
+	forecast_add_look(h, &l);
+}
+
+static const struct forecast_look *last(const struct forecast_history *h)
+{
+	return h->count ? &h->looks[h->count - 1] : NULL;
+}
+
+const struct forecast_look *forecast_reached(const struct forecast_history *h, double target)
+{
+	for (uint32_t i = 0; i < h->count; i++)
+		if (!h->looks[i].doubtful && sqrt(h->looks[i].rel_mse_upper) <= target)
+			return &h->looks[i];
+	return NULL;
+}
+
+/* Quantile of chi-square over its degrees (Wilson and Hilferty 1931) for the normal's quantile z. */
+static double chi_square_share(double degrees, double z)
+{
+	double s = 2 / (9 * degrees), root = 1 - s + z * sqrt(s);
+	return root > 0 ? root * root * root : 0;
+}
+
+bool forecast_error(const struct forecast_history *h, struct forecast_range *error)
+{
+	const struct forecast_look *l = last(h);
+	if (!l)
+		return false;
+	*error = (struct forecast_range){sqrt(l->rel_mse / chi_square_share(l->degrees, 1.6448536269514722)),
+					 sqrt(l->rel_mse), sqrt(l->rel_mse_upper)};
+	return true;
+}
+
+/* ---- the fit */
+
+struct fit {
+	double work;	     /* of the last look; times are logarithms of work over it */
+	double level, trend; /* log(relMSE x work) now, and its growth per e-fold of work */
+	double level_sd, trend_sd, correlation;
+	double spread, shift;		   /* of one look's logarithm around them: standard deviation, mean */
+	double seen;			   /* e-folds of work that the looks cover: as far as the trend is drawn */
+	double now;			   /* the last look's deviation in spreads */
+	double margin, margin_sd;	   /* log of upper end over estimate */
+	double cpu, cpu_sd, wall, wall_sd; /* seconds a sample; relative spread */
+};
+
+struct normal_equations { /* of level and trend */
+	double ll, lt, tt, l, t;
+};
+
+static void observe(struct normal_equations *q, double weight, double al, double at, double value)
+{
+	q->ll += weight * al * al;
+	q->lt += weight * al * at;
+	q->tt += weight * at * at;
+	q->l += weight * al * value;
+	q->t += weight * at * value;
+}
+
+struct innovation { /* what a look adds to the one before it: value = al level + at trend + noise of variance share x
+		       spread^2 */
+	double al, at, value, share;
+};
+
+static struct innovation innovation_of(const struct forecast_look *l, const struct forecast_look *before,
+				       const struct fit *f)
+{
+	double t = log(l->work / f->work), x = log(l->rel_mse * l->work) - f->shift;
+	if (!before)
+		return (struct innovation){1, t, x, 1};
+	double r = before->work / l->work;
+	double t0 = log(before->work / f->work), x0 = log(before->rel_mse * before->work) - f->shift;
+	return (struct innovation){1 - r, t - r * t0, x - r * x0, 1 - r * r};
+}
+
+/* Looks `first` .. of h. */
+static void fit_level(struct fit *f, const struct forecast_history *h, uint32_t first)
+{
+	struct normal_equations q = {0};
+	double variance = f->spread * f->spread;
+	observe(&q, variance / (trend_prior * trend_prior), 0, 1, 0);
+	for (uint32_t i = first; i < h->count; i++) {
+		struct innovation v = innovation_of(&h->looks[i], i > first ? &h->looks[i - 1] : NULL, f);
+		observe(&q, 1 / v.share, v.al, v.at, v.value);
+	}
+	double det = q.ll * q.tt - q.lt * q.lt; /* > 0: the prior and the first look see to it */
+	f->level = (q.l * q.tt - q.t * q.lt) / det;
+	f->trend = (q.ll * q.t - q.lt * q.l) / det;
+	double square = 0;
+	for (uint32_t i = first; i < h->count; i++) {
+		struct innovation v = innovation_of(&h->looks[i], i > first ? &h->looks[i - 1] : NULL, f);
+		double d = v.value - v.al * f->level - v.at * f->trend;
+		square += d * d / v.share;
+	}
+	/* The scatter of the looks tells more than chi-square where light comes in rare bursts. */
+	variance = (PRIOR_WEIGHT * variance + square) / (PRIOR_WEIGHT + (double)(h->count - first) - 1);
+	f->spread = sqrt(variance);
+	f->level_sd = sqrt(variance * q.tt / det);
+	f->trend_sd = sqrt(variance * q.ll / det);
+	f->correlation = -q.lt / sqrt(q.ll * q.tt);
+}
+
+static void fit_margin(struct fit *f, const struct forecast_history *h, uint32_t first)
+{
+	double sum = 0, square = 0, n = (double)(h->count - first);
+	for (uint32_t i = first; i < h->count; i++)
+		sum += log(h->looks[i].rel_mse_upper / h->looks[i].rel_mse);
+	f->margin = sum / n;
+	for (uint32_t i = first; i < h->count; i++) {
+		double d = log(h->looks[i].rel_mse_upper / h->looks[i].rel_mse) - f->margin;
+		square += d * d;
+	}
+	f->margin_sd = n > 1 ? sqrt(square / (n - 1)) : f->margin / 2;
+}
+
+static double spent(const struct forecast_look *l, bool wall)
+{
+	return wall ? l->seconds : l->cpu_seconds;
+}
+
+/* Seconds a sample, and how much that differs from stretch to stretch: machines are shared. */
+static void fit_price(const struct forecast_history *h, bool wall, double *price, double *sd)
+{
+	const struct forecast_look *end = last(h);
+	double square = 0, before = 0, work = 0;
+	*price = spent(end, wall) / end->work;
+	for (uint32_t i = 0; i < h->count; i++) {
+		const struct forecast_look *l = &h->looks[i];
+		double d = (spent(l, wall) - before) / (l->work - work) / *price - 1;
+		square += (l->work - work) / end->work * d * d;
+		before = spent(l, wall);
+		work = l->work;
+	}
+	*sd = *price > 0 ? sqrt(square + price_floor * price_floor) : 0;
+}
+
+static struct fit fit(const struct forecast_history *h)
+{
+	const struct forecast_look *end = last(h);
+	uint32_t first = 0;
+	while (h->looks[first].work < used_share * end->work)
+		first++;
+	double d = fmax(end->degrees, 1);
+	/* Mean and variance of the logarithm of chi-square over its degrees, and what bursts add. */
+	struct fit f = {.work = end->work,
+			.spread = sqrt(2 / d + 2 / (d * d) + burst * burst),
+			.shift = -1 / d - 1 / (3 * d * d)};
+	f.seen = log(end->work / h->looks[first].work);
+	fit_level(&f, h, first);
+	f.now = (log(end->rel_mse * end->work) - f.shift - f.level) / f.spread;
+	fit_margin(&f, h, first);
+	fit_price(h, false, &f.cpu, &f.cpu_sd);
+	fit_price(h, true, &f.wall, &f.wall_sd);
+	return f;
+}
+
+/* ---- playing renders */
+
+struct dice {
+	uint64_t state;
+};
+
+static double uniform(struct dice *d) /* splitmix64 (Steele, Lea, Flood 2014) */
+{
+	uint64_t z = d->state += UINT64_C(0x9e3779b97f4a7c15);
+	z = (z ^ (z >> 30)) * UINT64_C(0xbf58476d1ce4e5b9);
+	z = (z ^ (z >> 27)) * UINT64_C(0x94d049bb133111eb);
+	return ((double)((z ^ (z >> 31)) >> 11) + 0.5) * 0x1p-53;
+}
+
+static double normal(struct dice *d)
+{
+	double r = sqrt(-2 * log(uniform(d)));
+	return r * cos(6.283185307179586 * uniform(d));
+}
+
+struct play { /* one way in which things may be */
+	double level, trend, memory, drift, margin, now, cpu, wall;
+};
+
+static struct play play_of(const struct fit *f, struct dice *d)
+{
+	double a = normal(d), b = normal(d);
+	double trend = f->trend + f->trend_sd * a;
+	double level =
+		f->level + f->level_sd * (f->correlation * a + sqrt(fmax(0, 1 - f->correlation * f->correlation)) * b);
+	double now = f->now + (f->level - level) / f->spread;
+	double margin = fmax(0, f->margin + f->margin_sd * normal(d));
+	return (struct play){level,  trend, memory * exp(memory_sd * normal(d)), drift * normal(d),
+			     margin, now,   f->cpu * exp(f->cpu_sd * normal(d)), f->wall * exp(f->wall_sd * normal(d))};
+}
+
+/* How log(relMSE x work) will have changed after t e-folds of work. */
+static double change(const struct fit *f, const struct play *y, double t)
+{
+	if (t < 0)
+		return y->trend * fmax(-f->seen, t);
+	return y->trend * y->memory * (1 - exp(-t / y->memory)) + y->drift * t;
+}
+
+/* log(relMSE) expected at a work. */
+static double expected(const struct fit *f, const struct play *y, double work)
+{
+	return y->level + change(f, y, log(work / f->work)) - log(work);
+}
+
+/* Rounds at which it stops. */
+static double play_target(const struct fit *f, const struct play *y, const struct plan *p, double target,
+			  enum forecast_run run, struct dice *d)
+{
+	double round = (double)plan_round_mutations(p);
+	double before = run == FORECAST_SAME ? f->work : 0, deviation = run == FORECAST_SAME ? y->now : 0;
+	uint64_t rounds = (uint64_t)fmin(before / round + 0.5, 0x1p62);
+	for (int i = 0; i < STEPS_MOST; i++) {
+		rounds = merge_error_next(p, rounds);
+		double work = (double)rounds * round, r = before / work;
+		deviation = r * deviation + sqrt(fmax(0, 1 - r * r)) * normal(d);
+		before = work;
+		double seen = expected(f, y, work) + f->shift + f->spread * deviation + y->margin;
+		if (seen <= 2 * log(target))
+			return (double)rounds;
+		if (rounds >= UINT64_MAX / 4)
+			break;
+	}
+	return INFINITY;
+}
+
+static int by_size(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+	return (x > y) - (x < y);
+}
+
+static struct forecast_range range_of(double *x)
+{
+	qsort(x, PLAYS, sizeof *x, by_size);
+	return (struct forecast_range){x[PLAYS / 20], x[PLAYS / 2], x[PLAYS - 1 - PLAYS / 20]};
+}
+
+bool forecast_error_at(const struct forecast_history *h, double work, struct forecast_range *error)
+{
+	if (!h->count)
+		return false;
+	struct fit f = fit(h);
+	struct dice d = {3};
+	double x[PLAYS];
+	for (int i = 0; i < PLAYS; i++) {
+		struct play y = play_of(&f, &d);
+		x[i] = exp(0.5 * expected(&f, &y, work));
+	}
+	*error = range_of(x);
+	return true;
+}
+
+struct plays {
+	double rounds[PLAYS], work[PLAYS], cpu[PLAYS], wall[PLAYS];
+};
+
+static void costs(struct plays *s, struct forecast_cost *c)
+{
+	c->rounds = range_of(s->rounds);
+	c->work = range_of(s->work);
+	c->cpu_seconds = range_of(s->cpu);
+	c->seconds = range_of(s->wall);
+}
+
+bool forecast_target(const struct forecast_history *h, const struct plan *p, double target, enum forecast_run run,
+		     struct forecast_cost *c)
+{
+	const struct forecast_look *end = last(h);
+	if (!end)
+		return false;
+	struct fit f = fit(h);
+	struct dice d = {1};
+	struct plays s;
+	double round = (double)plan_round_mutations(p);
+	bool same = run == FORECAST_SAME;
+	for (int i = 0; i < PLAYS; i++) {
+		struct play y = play_of(&f, &d);
+		s.rounds[i] = play_target(&f, &y, p, target, run, &d);
+		s.work[i] = s.rounds[i] * round;
+		double more = s.work[i] - (same ? end->work : 0);
+		s.cpu[i] = (same ? end->cpu_seconds : 0) + more * y.cpu;
+		s.wall[i] = (same ? end->seconds : 0) + more * y.wall;
+	}
+	costs(&s, c);
+	return true;
+}
+
+/* e-folds of work that quarter relMSE. */
+static double quartering(const struct fit *f, const struct play *y)
+{
+	double low = 0, high = 16;
+	for (int i = 0; i < 40; i++) {
+		double t = 0.5 * (low + high);
+		*(t - change(f, y, t) < log_four ? &low : &high) = t;
+	}
+	return high < 15 ? high : INFINITY;
+}
+
+bool forecast_halving(const struct forecast_history *h, const struct plan *p, struct forecast_cost *c)
+{
+	if (!h->count)
+		return false;
+	struct fit f = fit(h);
+	struct dice d = {2};
+	struct plays s;
+	for (int i = 0; i < PLAYS; i++) {
+		struct play y = play_of(&f, &d);
+		s.work[i] = f.work * (exp(quartering(&f, &y)) - 1);
+		s.rounds[i] = s.work[i] / (double)plan_round_mutations(p);
+		s.cpu[i] = s.work[i] * y.cpu;
+		s.wall[i] = s.work[i] * y.wall;
+	}
+	costs(&s, c);
+	return true;
+}

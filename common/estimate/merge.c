@@ -1,0 +1,182 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/estimate/merge.h"
+
+#include "common/base/mem.h"
+#include "common/estimate/stated_error.h"
+#include "common/estimate/tail.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+struct bootstrap {
+	struct plan plan;
+	float *weights;	       /* [bootstrap], in index order */
+	struct batch *batches; /* [group][part]: key, counters and sums only */
+	uint32_t missing;
+	struct tail tail; /* of all weights */
+};
+
+/* Of so many samples the largest that their tail is judged by: one in 512, but no less than give it a standard error of
+ * a quarter. */
+static size_t tail_count(const struct plan *p)
+{
+	uint64_t n = p->bootstrap / 512;
+	return n > 16 ? (size_t)n : 16;
+}
+
+int bootstrap_new(struct bootstrap **out, const struct plan *p, struct error *e)
+{
+	*out = NULL;
+	struct bootstrap *s = mem_alloc(1, sizeof *s);
+	if (s) {
+		s->plan = *p;
+		s->missing = p->groups * p->parts;
+		s->weights = mem_alloc(p->bootstrap, sizeof *s->weights);
+		s->batches = mem_alloc(s->missing, sizeof *s->batches);
+	}
+	if (!s || !s->weights || !s->batches || tail_init(&s->tail, tail_count(p) + 1)) {
+		bootstrap_free(s);
+		return error_set(e, ENOMEM, "no memory for %llu bootstrap weights", (unsigned long long)p->bootstrap);
+	}
+	*out = s;
+	return 0;
+}
+
+void bootstrap_free(struct bootstrap *s)
+{
+	if (!s)
+		return;
+	mem_free(s->weights);
+	mem_free(s->batches);
+	tail_fini(&s->tail);
+	mem_free(s);
+}
+
+static struct batch *batch_of(const struct bootstrap *s, uint32_t group, uint32_t part)
+{
+	return s->batches + (size_t)group * s->plan.parts + part;
+}
+
+bool bootstrap_has(const struct bootstrap *s, uint32_t group, uint32_t part)
+{
+	return batch_of(s, group, part)->key.kind == LEASE_BOOTSTRAP;
+}
+
+uint32_t bootstrap_missing(const struct bootstrap *s)
+{
+	return s->missing;
+}
+
+int bootstrap_add(struct bootstrap *s, const struct batch *b, struct error *e)
+{
+	const struct lease_key *k = &b->key;
+	struct plan_range r = plan_bootstrap_range(&s->plan, k->group, k->part);
+	assert(k->kind == LEASE_BOOTSTRAP && b->weight_count == r.end - r.begin);
+	if (bootstrap_has(s, k->group, k->part))
+		return error_set(e, EEXIST, "the bootstrap lease is merged already");
+	memcpy(s->weights + r.begin, b->weights, b->weight_count * sizeof *b->weights);
+	for (size_t i = 0; i < b->weight_count; i++)
+		tail_add(&s->tail, (double)b->weights[i]);
+	struct batch *kept = batch_of(s, k->group, k->part);
+	kept->key = *k;
+	memcpy(kept->counters, b->counters, sizeof kept->counters);
+	kept->independent_sum = b->independent_sum;
+	kept->independent_square = b->independent_square;
+	kept->beyond_sum = b->beyond_sum;
+	memcpy(kept->classes, b->classes, sizeof kept->classes);
+	s->missing--;
+	return 0;
+}
+
+void bootstrap_merge(const struct bootstrap *s, struct bootstrap_result *r)
+{
+	assert(s->missing == 0);
+	*r = (struct bootstrap_result){0};
+	struct exact_sum all = {0}, beyond = {0};
+	uint64_t all_count = 0;
+	for (uint32_t g = 0; g < s->plan.groups; g++) {
+		struct exact_sum sum = {0};
+		uint64_t count = 0;
+		for (uint32_t part = 0; part < s->plan.parts; part++) {
+			const struct batch *b = batch_of(s, g, part);
+			exact_sum_add(&sum, b->independent_sum);
+			exact_sum_add(&beyond, b->beyond_sum);
+			count += b->counters[COUNT_INDEPENDENT];
+		}
+		r->b[g] = exact_sum_value(&sum) / (double)count;
+		exact_sum_merge(&all, &sum);
+		all_count += count;
+	}
+	double inside = exact_sum_value(&all), outside = exact_sum_value(&beyond);
+	r->b_pooled = inside / (double)all_count;
+	r->beyond_share = outside > 0 ? outside / (inside + outside) : 0;
+	r->black = s->plan.kind == PLAN_CHAINS && !(inside > 0);
+}
+
+void bootstrap_seeds(const struct bootstrap *s, uint32_t group, uint64_t *index)
+{
+	assert(s->missing == 0 && s->plan.kind == PLAN_CHAINS);
+	uint64_t first = plan_bootstrap_range(&s->plan, group, 0).begin, count = s->plan.bootstrap / s->plan.groups;
+	if (plan_resample(&s->plan, group, s->weights + first, count, plan_resample_u(&s->plan, group),
+			  s->plan.chains / s->plan.groups, index))
+		return;
+	for (uint32_t k = 0; k < s->plan.chains / s->plan.groups; k++)
+		index[k] = UINT64_MAX;
+}
+
+void bootstrap_to_canvas(struct bootstrap *s, struct canvas *c)
+{
+	assert(s->missing == 0);
+	tail_settle(&s->tail);
+	canvas_set_tail(c, tail_index(&s->tail, tail_count(&s->plan)));
+	for (uint32_t i = 0; i < s->plan.groups * s->plan.parts; i++) {
+		int rc = canvas_add(c, s->batches + i, NULL);
+		assert(rc == 0 || rc == -EEXIST);
+		(void)rc;
+	}
+}
+
+/* Rounds between two looks at least. A look costs 15 to 17 ns a pixel and group, a mutation or a sample 2 us or more:
+ * of the work since the last one a look is less than 1 % after 0.9 of them a pixel for each group. */
+static uint64_t look_rounds(const struct plan *p)
+{
+	uint64_t work = (uint64_t)p->crop_width * p->crop_height * p->groups / 10 * 9, round = plan_round_mutations(p);
+	return work / round + (work % round != 0);
+}
+
+uint64_t merge_error_next(const struct plan *p, uint64_t rounds)
+{
+	uint64_t step = look_rounds(p), due = 1;
+	step = step > 0 ? step : 1;
+	if (rounds >= UINT64_MAX / 2)
+		return UINT64_MAX;
+	while (due <= rounds / step)
+		due += due < 4 ? 1 : due / 4;
+	return due > UINT64_MAX / step ? UINT64_MAX : due * step;
+}
+
+bool merge_error_due(const struct plan *p, uint64_t rounds)
+{
+	return p->target_error > 0 && rounds > 0 && merge_error_next(p, rounds - 1) == rounds;
+}
+
+enum merge_end merge_end_of(const struct plan *p, uint64_t rounds, double seconds, const struct canvas_image *img)
+{
+	if (img && p->target_error > 0 && stated_error_meets(img, p->target_error))
+		return MERGE_ERROR;
+	if (rounds >= p->rounds)
+		return MERGE_ROUNDS;
+	if (p->seconds > 0 && rounds > 0 && seconds >= p->seconds)
+		return MERGE_TIME;
+	return MERGE_GOES_ON;
+}
+
+const char *merge_end_name(enum merge_end end, bool black)
+{
+	static const char *const names[] = {[MERGE_GOES_ON] = "interrupted",
+					    [MERGE_ROUNDS] = "mutations",
+					    [MERGE_TIME] = "time",
+					    [MERGE_ERROR] = "target-error"};
+	return black ? "black" : names[end];
+}

@@ -1,0 +1,126 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Potential scale reduction (Gelman and Rubin 1992) by tile and energies of path classes, from the moments that a
+ * canvas keeps. Fails for want of memory alone.
+ */
+#include "common/base/mem.h"
+#include "common/estimate/making.h"
+
+#include <math.h>
+
+/* Moments are rounded to float once an epoch and then to the grid. What is smaller than this next to the mean is not
+ * told from no spread at all: a film of one tile has every chain in it all the time. */
+#define ROUNDING 0x1p-20
+
+/* Over sequences of one tile: mean and variance of their means, and the mean variance of a mutation within one. */
+struct spread {
+	double mean, between, within;
+};
+
+static double r_hat(const struct spread *s, double n)
+{
+	if (!(s->mean > 0) || isnan(s->between) || n < 2)
+		return NAN;
+	bool same = s->between <= (ROUNDING * s->mean) * (ROUNDING * s->mean);
+	if (s->within <= ROUNDING * s->mean)
+		return same ? 1 : INFINITY;
+	return sqrt((n - 1) / n + s->between / s->within);
+}
+
+static void find_spread(const struct moments *m, uint32_t tile, double n, struct spread *s)
+{
+	size_t sequences = (size_t)m->leases * m->per_lease;
+	double count = (double)sequences, square = 0, second = 0;
+	*s = (struct spread){0, 0, 0};
+	for (size_t i = 0; i < sequences; i++)
+		s->mean += (double)m->first[i * m->tiles + tile];
+	s->mean /= MOMENTS_GRID * n * count;
+	for (size_t i = 0; i < sequences; i++) {
+		double p = (double)m->first[i * m->tiles + tile] / (MOMENTS_GRID * n), d = p - s->mean;
+		s->between += d * d;
+		square += p * p;
+	}
+	for (size_t i = 0; i < m->leases; i++)
+		second += (double)m->second[i * m->tiles + tile];
+	s->between = sequences > 1 ? s->between / (count - 1) : NAN;
+	s->within = n > 1 ? (second / (MOMENTS_GRID * n * count) - square / count) * n / (n - 1) : NAN;
+}
+
+static int make_tiles(const struct moments *m, double n, struct canvas_image *img, struct error *e)
+{
+	img->r_hat = mem_alloc(m->tiles, sizeof *img->r_hat);
+	img->tile_error = mem_alloc(m->tiles, sizeof *img->tile_error);
+	img->tile_share = mem_alloc(m->tiles, sizeof *img->tile_share);
+	double *mean = mem_alloc(m->tiles, sizeof *mean), all = 0;
+	int rc = img->r_hat && img->tile_error && img->tile_share && mean ? 0
+									  : error_set(e, ENOMEM, "no memory for tiles");
+	for (uint32_t t = 0; t < m->tiles && rc == 0; t++) {
+		struct spread s;
+		find_spread(m, t, n, &s);
+		img->r_hat[t] = (float)r_hat(&s, n);
+		img->tile_error[t] =
+			(float)(s.mean > 0 ? sqrt(s.between / ((double)m->leases * m->per_lease)) / s.mean : NAN);
+		mean[t] = s.mean;
+		all += s.mean;
+	}
+	for (uint32_t t = 0; t < m->tiles && rc == 0; t++)
+		img->tile_share[t] = (float)(all > 0 ? mean[t] / all : 0);
+	mem_free(mean);
+	return rc;
+}
+
+/* ---- classes */
+
+/* Mean of the groups' values and its standard error. */
+static double mean_of(const double *x, uint32_t groups, double *error)
+{
+	double mean = 0, square = 0;
+	for (uint32_t g = 0; g < groups; g++)
+		mean += x[g] / groups;
+	for (uint32_t g = 0; g < groups; g++)
+		square += (x[g] - mean) * (x[g] - mean);
+	*error = groups > 1 ? sqrt(square / groups / (groups - 1)) : NAN;
+	return mean;
+}
+
+static double chains_time(const struct moments *m, uint32_t group, size_t class, bool open_rounds)
+{
+	struct exact_sum sum = {0};
+	for (size_t set = 0; set < (open_rounds ? MOMENTS_SETS : MOMENTS_OPEN); set++)
+		exact_sum_merge(&sum, &m->time[set * moments_classes(m) + (size_t)group * PATH_CLASSES + class]);
+	return exact_sum_value(&sum);
+}
+
+static void make_class(const struct moments *m, const struct moments_group *groups, size_t class, bool open_rounds,
+		       struct path_class_energy *out)
+{
+	uint32_t count = m->plan.groups;
+	double bootstrap[PLAN_MAX_GROUPS], chains[PLAN_MAX_GROUPS], difference[PLAN_MAX_GROUPS], error;
+	for (uint32_t g = 0; g < count; g++) {
+		const struct moments_group *of = &groups[g];
+		double sum = exact_sum_value(&m->bootstrap[(size_t)g * PATH_CLASSES + class]);
+		double time = of->mutations ? chains_time(m, g, class, open_rounds) : 0;
+		bootstrap[g] = of->bootstrap ? sum / (double)of->bootstrap : 0;
+		chains[g] = of->mutations ? of->b * time / (double)of->mutations : 0;
+		difference[g] = chains[g] - bootstrap[g];
+	}
+	out->bootstrap = mean_of(bootstrap, count, &out->bootstrap_error);
+	out->chains = mean_of(chains, count, &out->chains_error);
+	double mean = mean_of(difference, count, &error);
+	bool compared = m->per_lease && (out->bootstrap > 0 || out->chains > 0);
+	out->difference_t = compared && !(mean == 0 && error == 0) ? mean / error : NAN;
+}
+
+int moments_image(const struct moments *m, const struct moments_group *groups, uint64_t rounds, bool open_rounds,
+		  struct canvas_image *img, struct error *e)
+{
+	const struct plan *p = &m->plan;
+	img->tiles_across = (p->crop_width + TILE_SIZE - 1) / TILE_SIZE;
+	img->tiles_down = (p->crop_height + TILE_SIZE - 1) / TILE_SIZE;
+	for (size_t k = 0; k < PATH_CLASSES; k++)
+		make_class(m, groups, k, open_rounds, &img->classes[k]);
+	if (m->per_lease == 0 || open_rounds || rounds == 0)
+		return 0;
+	double chains = (double)(p->chains / m->leases / m->per_lease);
+	return make_tiles(m, chains * (double)p->epoch * (double)rounds, img, e);
+}

@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/estimate/stated_error.h"
+
+#include "common/base/text.h"
+
+#include <math.h>
+
+void stated_error_doubt(const struct canvas_image *img, char *text, size_t size)
+{
+	struct text t = {text, size};
+	if (size)
+		text[0] = 0;
+	double share = 100 * img->doubtful_share;
+	switch (img->rel_mse_doubt) {
+	case ERROR_KNOWN:
+		break;
+	case ERROR_ONE_GROUP:
+		text_put(&t,
+			 "%.0f %% of the estimate comes from pixels where one group of samples outweighs all others",
+			 share);
+		break;
+	case ERROR_DARK:
+		text_put(
+			&t,
+			"%.0f %% of the estimate comes from pixels whose brightness is not known well enough to divide by",
+			share);
+		break;
+	case ERROR_WIDE:
+		text_put(&t, "it would span more than a factor of ten");
+		break;
+	case ERROR_TAIL:
+		text_put(
+			&t,
+			"too few pixels have met the light that decides: the tail index of their errors is %.2f, and below 2 their variance is "
+			"infinite",
+			img->error_tail);
+		break;
+	case ERROR_SHORT:
+		text_put(&t, "the chains are too short to be judged");
+		break;
+	}
+}
+
+/* The variance is finite above 2. Of 95 % intervals from 16 groups of 1,000 samples of a Pareto law 95 % hold at an
+ * index of 3, 93 % at 2.2, 91 % at 1.8, 80 % at 1.5, 28 % at 1.1 (3,000 trials each). The groups' own means do not
+ * tell: those that look regular are wrong more often. */
+static const double finite_variance = 2;
+
+void stated_b_doubt(const struct canvas_image *img, char *text, size_t size)
+{
+	struct text t = {text, size};
+	if (size)
+		text[0] = 0;
+	if (img->b_tail > 0 && img->b_tail < finite_variance)
+		text_put(
+			&t,
+			"independent samples that find light are too few or too unequal: their tail index is %.2f, and below %g their variance is "
+			"infinite",
+			img->b_tail, finite_variance);
+}
+
+void stated_error(const struct canvas_image *img, char *text, size_t size)
+{
+	struct text t = {text, size};
+	char why[STATED_ERROR_TEXT];
+	if (size)
+		text[0] = 0;
+	if (!isfinite(img->rel_mse))
+		return;
+	stated_error_doubt(img, why, sizeof why);
+	if (*why)
+		text_put(&t, "relative error about %.3g %%, its interval is not known: %s", 100 * sqrt(img->rel_mse),
+			 why);
+	else
+		text_put(&t, "relative error %.2f %% (95 %%: %.2f to %.2f %%)", 100 * sqrt(img->rel_mse),
+			 100 * sqrt(img->rel_mse_95[0]), 100 * sqrt(img->rel_mse_95[1]));
+	if (img->unvisited)
+		text_put(&t, "; no chain came to %llu of %llu pixels", (unsigned long long)img->unvisited,
+			 (unsigned long long)img->width * img->height);
+}
+
+bool stated_error_meets(const struct canvas_image *img, double target)
+{
+	return img->rel_mse_doubt == ERROR_KNOWN && sqrt(img->rel_mse_upper) <= target; /* false for NAN */
+}

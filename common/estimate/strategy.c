@@ -1,0 +1,176 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/estimate/strategy.h"
+
+#include "common/base/text.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { NAME = 24, NUMBER = 32 };
+
+static const char *const names[STRATEGY_COUNTERS] = {
+	[STRATEGY_PROPOSED] = "proposed",
+	[STRATEGY_ACCEPTED] = "accepted",
+	[STRATEGY_RAYS] = "rays",
+	[STRATEGY_WALKS] = "walks",
+	[STRATEGY_ITERATIONS] = "iterations",
+	[STRATEGY_REVERSE_WALKS] = "reverseWalks",
+	[STRATEGY_FAIL_OUTSIDE] = "outside",
+	[STRATEGY_FAIL_MISSED] = "missed",
+	[STRATEGY_FAIL_BLOCKED] = "blocked",
+	[STRATEGY_FAIL_MODE] = "mode",
+	[STRATEGY_FAIL_SINGULAR] = "singular",
+	[STRATEGY_FAIL_DIVERGED] = "diverged",
+	[STRATEGY_FAIL_ITERATIONS] = "exhausted",
+	[STRATEGY_FAIL_REVERSE] = "reverse",
+	[STRATEGY_FAIL_SPECULAR] = "specular",
+	[STRATEGY_FAIL_EMITTER] = "emitter",
+	[STRATEGY_FAIL_DARK] = "dark",
+	[STRATEGY_FAIL_INAPPLICABLE] = "inapplicable",
+};
+
+const char *strategy_counter_name(enum strategy_counter c)
+{
+	assert((unsigned)c < STRATEGY_COUNTERS);
+	return names[c];
+}
+
+/* 5210 -> "5,210". */
+static const char *thousands(uint64_t n, char out[NUMBER])
+{
+	char digits[NUMBER];
+	int length = snprintf(digits, sizeof digits, "%llu", (unsigned long long)n), at = 0;
+	for (int i = 0; i < length; i++) {
+		if (i > 0 && (length - i) % 3 == 0)
+			out[at++] = ',';
+		out[at++] = digits[i];
+	}
+	out[at] = 0;
+	return out;
+}
+
+/* A cell of the given width: a / b with a suffix, or '-' where there is no b. */
+static void put_ratio(struct text *t, int width, int decimals, double factor, uint64_t a, uint64_t b)
+{
+	if (b)
+		text_put(t, " %*.*f", width, decimals, factor * (double)a / (double)b);
+	else
+		text_put(t, " %*s", width, "-");
+}
+
+static uint64_t failures(const uint64_t c[STRATEGY_COUNTERS])
+{
+	uint64_t n = 0;
+	for (int k = STRATEGY_FAIL_FIRST; k < STRATEGY_COUNTERS; k++)
+		n += c[k];
+	return n;
+}
+
+/* Reasons that nobody met are left out, or the lines would be too long to read. */
+static void put_failures(struct text *t, const uint64_t c[STRATEGY_COUNTERS])
+{
+	text_put(t, " ");
+	if (failures(c) == 0)
+		text_put(t, " -");
+	for (int k = STRATEGY_FAIL_FIRST; k < STRATEGY_COUNTERS; k++)
+		if (c[k])
+			text_put(t, " %s %.3g", names[k], 100 * (double)c[k] / (double)c[STRATEGY_PROPOSED]);
+	text_put(t, "\n");
+}
+
+void strategy_table(const char *mixture, const struct canvas_counts *n, char *text, size_t size)
+{
+	struct text t = {text, size};
+	int count = plan_strategy_count(mixture);
+	uint64_t proposed = 0;
+	if (size)
+		text[0] = 0;
+	for (int i = 0; i < count; i++)
+		proposed += n->strategy[i][STRATEGY_PROPOSED];
+	if (!proposed)
+		return;
+	text_put(&t, "%-*s %14s %9s %9s %14s %9s %14s %8s  %s\n", NAME, "strategy", "proposals", "accepted%",
+		 "rays/prop", "walks", "iter/walk", "reverse walks", "failed%", "failures in % of proposals");
+	for (int i = 0; i < count; i++) {
+		const uint64_t *c = n->strategy[i];
+		char name[NAME + 1], number[3][NUMBER];
+		plan_strategy_name(mixture, (uint32_t)i, name, sizeof name);
+		text_put(&t, "%-*s %14s", NAME, name, thousands(c[STRATEGY_PROPOSED], number[0]));
+		put_ratio(&t, 9, 2, 100, c[STRATEGY_ACCEPTED], c[STRATEGY_PROPOSED]);
+		put_ratio(&t, 9, 2, 1, c[STRATEGY_RAYS], c[STRATEGY_PROPOSED]);
+		text_put(&t, " %14s", thousands(c[STRATEGY_WALKS], number[1]));
+		put_ratio(&t, 9, 2, 1, c[STRATEGY_ITERATIONS], c[STRATEGY_WALKS]);
+		text_put(&t, " %14s", thousands(c[STRATEGY_REVERSE_WALKS], number[2]));
+		put_ratio(&t, 8, 2, 100, failures(c), c[STRATEGY_PROPOSED]);
+		put_failures(&t, c);
+	}
+}
+
+void strategy_lines(const char *mixture, const struct canvas_counts *n, char *text, size_t size)
+{
+	struct text t = {text, size};
+	int count = plan_strategy_count(mixture);
+	if (size)
+		text[0] = 0;
+	for (int i = 0; i < count; i++) {
+		char name[PLAN_MUTATIONS_MAX];
+		plan_strategy_name(mixture, (uint32_t)i, name, sizeof name);
+		text_put(&t, "%s%s:", i ? "\n" : "", name);
+		for (int k = 0; k < STRATEGY_COUNTERS; k++)
+			text_put(&t, " %s %llu", names[k], (unsigned long long)n->strategy[i][k]);
+	}
+}
+
+/* Epochs that chains went through: a chain without a state makes no mutations. */
+static uint64_t chain_epochs(const struct plan *p, const struct canvas_counts *n)
+{
+	return n->counters[COUNT_SAMPLES] / p->epoch;
+}
+
+void strategy_note(const struct plan *p, const struct canvas_counts *n, bool black, char *text, size_t size)
+{
+	struct text t = {text, size};
+	char number[4][NUMBER];
+	uint64_t stuck = p->kind == PLAN_CHAINS ? n->counters[COUNT_STUCK] : 0;
+	uint64_t bad = n->counters[COUNT_NAN] + n->counters[COUNT_INFINITE] + n->counters[COUNT_NEGATIVE];
+	const char *then = "";
+	if (size)
+		text[0] = 0;
+	if (black && p->kind == PLAN_CHAINS && n->counters[COUNT_SAMPLES] == 0)
+		text_put(&t, "the image is black: none of the %s bootstrap samples found light",
+			 thousands(p->bootstrap, number[0]));
+	else if (black)
+		text_put(&t, "the image is black: no sample found light");
+	if (black)
+		then = "; ";
+	if (bad) {
+		text_put(&t, "%s%s contributions were not numbers, infinite or negative, and left out", then,
+			 thousands(bad, number[0]));
+		then = "; ";
+	}
+	uint64_t lost = n->counters[COUNT_STATES_LOST];
+	if (lost) {
+		text_put(
+			&t,
+			"%s%s of %s times a chain's state could not be read back, and the chain returned to where it began the epoch",
+			then, thousands(lost, number[0]), thousands(chain_epochs(p, n), number[1]));
+		then = "; ";
+	}
+	if (stuck)
+		text_put(
+			&t,
+			"%s%s of %s times a chain accepted nothing during a whole epoch (%s chains); longest run: %s rejections",
+			then, thousands(stuck, number[0]), thousands(chain_epochs(p, n), number[1]),
+			thousands(p->chains, number[2]), thousands(n->counters[COUNT_LONGEST_STUCK], number[3]));
+}
+
+void strategy_add_beyond(double share, char *note, size_t size)
+{
+	size_t used = strnlen(note, size);
+	if (share > 0.001)
+		text_print(
+			note + used, size - used,
+			"%s%.2g %% of the light is missing: it comes by paths longer than the chains of this integrator hold (path has all of it)",
+			used ? "; " : "", 100 * share);
+}

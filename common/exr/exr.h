@@ -1,0 +1,48 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The one door to OpenEXR (Core, C). Images: R G B float (and error.R,G,B), ZIP, scan lines. Tiles: one-part, tiled, X
+ * Y Z float, uncompressed, data window at their place. All in memory; any thread; foreign bytes are checked before
+ * decoding.
+ */
+#ifndef COMMON_EXR_EXR_H
+#define COMMON_EXR_EXR_H
+
+#include "common/base/error.h"
+#include "common/film/batch.h"
+
+#include <stddef.h>
+
+struct exr_attribute { /* header attributes "hslt:..."; see header.h for the table of names and types */
+	const char *name;
+	enum { EXR_ATTRIBUTE_STRING, EXR_ATTRIBUTE_DOUBLE, EXR_ATTRIBUTE_INT } type;
+	const char *string;
+	double number;
+	int integer;
+};
+
+struct exr_image {
+	uint32_t width, height, channel_count;	/* at most 16 channels */
+	uint32_t full_width, full_height, x, y; /* display window and the data window's corner */
+	char names[16][32];			/* "R", "error.G", sorted by the library */
+	float *planes[16];			/* [height][width] each */
+	size_t attribute_count;
+	struct exr_attribute *attributes; /* read: all hslt:* of these types; owned */
+};
+
+/* bytes: mem_alloc'd, to be mem_free'd. */
+int exr_write(const struct exr_image *img, unsigned char **bytes, size_t *size, struct error *e);
+int exr_read(const unsigned char *bytes, size_t size, struct exr_image *img,
+	     struct error *e); /* half, float, uint channels */
+/* The same; -EFBIG, before anything is decoded, when its planes would take more bytes than that. */
+int exr_read_within(const unsigned char *bytes, size_t size, int64_t bytes_most, struct exr_image *img,
+		    struct error *e);
+void exr_image_fini(struct exr_image *img);
+
+/* Tiles of a batch. exr_tile_read: display window = the full film; refuses anything but what exr_tile_write makes. */
+size_t exr_tile_size_max(uint32_t width, uint32_t height);
+int exr_tile_write(const struct tile *t, uint32_t full_width, uint32_t full_height, unsigned char **bytes, size_t *size,
+		   struct error *e);
+int exr_tile_read(const unsigned char *bytes, size_t size, uint32_t full_width, uint32_t full_height, struct tile *t,
+		  struct error *e);
+
+#endif

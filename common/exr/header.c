@@ -1,0 +1,342 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/exr/header.h"
+
+#include "common/base/version.h"
+#include "common/estimate/convergence.h"
+#include "common/estimate/stated_error.h"
+#include "common/estimate/strategy.h"
+
+#include <assert.h>
+#include <inttypes.h>
+#include <math.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+enum header_name {
+	H_VERSION,
+	H_SCENE,
+	H_INTEGRATOR,
+	H_MIXTURE,
+	H_OPTIONS,
+	H_SEED,
+	H_MIN_DEPTH,
+	H_MAX_DEPTH,
+	H_GROUPS,
+	H_CHAINS,
+	H_BOOTSTRAP,
+	H_EPOCH,
+	H_ROUNDS,
+	H_MUTATIONS,
+	H_SAMPLES,
+	H_B,
+	H_B_ERROR,
+	H_BEYOND,
+	H_REL_MSE,
+	H_REL_MSE_UPPER,
+	H_REL_MSE_LOW_95,
+	H_REL_MSE_HIGH_95,
+	H_REL_MSE_DEFINITION,
+	H_REL_MSE_DOUBT,
+	H_B_ERROR_DOUBT,
+	H_UNVISITED,
+	H_ACCEPTED,
+	H_INDEPENDENT,
+	H_NAN,
+	H_INFINITE,
+	H_NEGATIVE,
+	H_RAYS_CLOSEST,
+	H_RAYS_SHADOW,
+	H_STUCK,
+	H_LONGEST_STUCK,
+	H_STRATEGIES,
+	H_NOTE,
+	H_AGREEMENT,
+	H_DISAGREEMENT,
+	H_R_HAT_MEDIAN,
+	H_R_HAT_WORST,
+	H_CLASSES,
+	H_EFFECTS,
+	H_MIXED,
+	H_WALL,
+	H_CPU,
+	H_WORKERS,
+	H_DATE,
+	H_END,
+	H_CROPS,
+};
+
+enum { HEADER_STRATEGIES = 5120 };
+
+#define STRING EXR_ATTRIBUTE_STRING
+#define DOUBLE EXR_ATTRIBUTE_DOUBLE
+#define INT EXR_ATTRIBUTE_INT
+
+const struct header_row header_rows[] = {
+	[H_VERSION] = {"hslt:version", STRING, false, "version of the programs"},
+	[H_SCENE] = {"hslt:scene", STRING, false, "name of the scene file"},
+	[H_INTEGRATOR] = {"hslt:integrator", STRING, false, "path, bdpt, pssmlt, hslt, ..."},
+	[H_MIXTURE] = {"hslt:mixture", STRING, false,
+		       "strategies that propose mutations, with their shares (Metropolis with several)"},
+	[H_OPTIONS] = {"hslt:options", STRING, false,
+		       "options of hslt-render and hslt-submit that make the same bits again"},
+	[H_SEED] = {"hslt:seed", STRING, false, "seed of all random numbers"},
+	[H_MIN_DEPTH] = {"hslt:minDepth", INT, false, "shortest paths, in edges"},
+	[H_MAX_DEPTH] = {"hslt:maxDepth", INT, false, "longest paths, in edges"},
+	[H_GROUPS] = {"hslt:groups", INT, false, "independent replicates"},
+	[H_CHAINS] = {"hslt:chains", INT, false, "Markov chains of all groups (Metropolis only)"},
+	[H_BOOTSTRAP] = {"hslt:bootstrap", STRING, false, "bootstrap samples of all groups"},
+	[H_EPOCH] = {"hslt:epoch", STRING, false, "mutations a chain, or samples a pixel and group, in one round"},
+	[H_ROUNDS] = {"hslt:rounds", STRING, false, "complete rounds that the image holds"},
+	[H_MUTATIONS] = {"hslt:mutations", STRING, false, "mutations that the image holds (Metropolis only)"},
+	[H_SAMPLES] = {"hslt:samples", STRING, false, "samples a pixel that the image holds (others)"},
+	[H_B] = {"hslt:b", DOUBLE, false, "integral of X+Y+Z over the image, pooled over groups (Metropolis only)"},
+	[H_B_ERROR] = {"hslt:bError", DOUBLE, false,
+		       "its standard error, from the groups; absent where it is not known"},
+	[H_B_ERROR_DOUBT] = {"hslt:bErrorDoubt", STRING, false, "why it is not known"},
+	[H_BEYOND] = {"hslt:beyondShare", DOUBLE, false, "share of the energy in paths too long for the chains"},
+	[H_REL_MSE] = {"hslt:relMSE", DOUBLE, false, "estimated relMSE, from the variance between groups"},
+	[H_REL_MSE_UPPER] = {"hslt:relMSEUpper", DOUBLE, false,
+			     "upper end of its 90 % interval; absent where it is not known"},
+	[H_REL_MSE_LOW_95] =
+		{"hslt:relMSELow95", DOUBLE, false,
+		 "lower end of the interval that holds this image's own relMSE in 95 % of all cases; absent where it is not known"},
+	[H_REL_MSE_HIGH_95] = {"hslt:relMSEHigh95", DOUBLE, false, "its upper end; absent where it is not known"},
+	[H_REL_MSE_DEFINITION] = {"hslt:relMSEDefinition", STRING, false, "what relMSE is"},
+	[H_REL_MSE_DOUBT] = {"hslt:relMSEDoubt", STRING, false, "why the interval of relMSE is not known"},
+	[H_UNVISITED] = {"hslt:unvisitedPixels", STRING, false,
+			 "pixels to which no chain came: their error is their neighbours' (Metropolis only)"},
+	[H_ACCEPTED] = {"hslt:accepted", STRING, false, "accepted mutations"},
+	[H_INDEPENDENT] = {"hslt:independent", STRING, false, "independent proposals of the chains"},
+	[H_NAN] = {"hslt:nan", STRING, false, "path contributions refused: not a number"},
+	[H_INFINITE] = {"hslt:infinite", STRING, false, "path contributions refused: infinite"},
+	[H_NEGATIVE] = {"hslt:negative", STRING, false, "path contributions refused: negative"},
+	[H_RAYS_CLOSEST] = {"hslt:raysClosest", STRING, false, "rays traced to the closest hit"},
+	[H_RAYS_SHADOW] = {"hslt:raysShadow", STRING, false, "rays traced between two points"},
+	[H_STUCK] = {"hslt:stuck", STRING, false, "times that a chain accepted nothing during a whole epoch"},
+	[H_LONGEST_STUCK] = {"hslt:longestStuck", STRING, false, "most rejections in a row"},
+	[H_STRATEGIES] = {"hslt:strategies", STRING, false, "what each strategy of the mixture did; one a line"},
+	[H_NOTE] = {"hslt:note", STRING, false, "what whoever looks at the image should know"},
+	[H_AGREEMENT] = {"hslt:agreement", STRING, false,
+			 "whether the chains agree: agree, too short, disagree (Metropolis only)"},
+	[H_DISAGREEMENT] = {"hslt:disagreement", STRING, false, "what disagrees, where, by how much"},
+	[H_R_HAT_MEDIAN] =
+		{"hslt:rHatMedian", DOUBLE, false,
+		 "potential scale reduction of chains, median over tiles with light; the layer rhat has it by tile"},
+	[H_R_HAT_WORST] = {"hslt:rHatWorst", DOUBLE, false, "its largest"},
+	[H_CLASSES] = {"hslt:classes", STRING, false,
+		       "energy of each class of paths in % of b, in the bootstrap and in the chains"},
+	[H_EFFECTS] = {"hslt:effects", STRING, false, "each effect, on or off, and why; one a line"},
+	[H_MIXED] = {"hslt:mixed", INT, false,
+		     "1: workers with different arithmetic took part, the bits cannot be made again"},
+	[H_WALL] = {"hslt:wallSeconds", DOUBLE, true, "from the first bootstrap sample to the last merge"},
+	[H_CPU] = {"hslt:cpuSeconds", DOUBLE, true, "of the leases, all threads"},
+	[H_WORKERS] = {"hslt:workers", INT, true, "workers that took part (hslt-render: threads)"},
+	[H_DATE] = {"hslt:date", STRING, true, "when the image was written, UTC"},
+	/* Not compared: --mutations of as many rounds makes the same bits as the error or the time that ended them. */
+	[H_END] = {"hslt:end", STRING, true,
+		   "which bound ended the render: mutations, time, target-error, black, interrupted"},
+	[H_CROPS] = {"hslt:crops", INT, false, "number of crops that hslt-assemble made the image of"},
+	{NULL, 0, false, NULL},
+};
+
+bool header_excluded(const char *name)
+{
+	for (const struct header_row *r = header_rows; r->name; r++)
+		if (strcmp(r->name, name) == 0)
+			return r->excluded;
+	return false;
+}
+
+static struct exr_attribute *add(struct header *h, enum header_name name, int type)
+{
+	assert(h->count < HEADER_ATTRIBUTES && header_rows[name].type == type);
+	(void)type;
+	struct exr_attribute *a = &h->attributes[h->count++];
+	*a = (struct exr_attribute){.name = header_rows[name].name};
+	return a;
+}
+
+static void add_int(struct header *h, enum header_name name, uint32_t value)
+{
+	struct exr_attribute *a = add(h, name, INT);
+	a->type = EXR_ATTRIBUTE_INT;
+	a->integer = (int)value;
+}
+
+static void add_double(struct header *h, enum header_name name, double value)
+{
+	struct exr_attribute *a = add(h, name, DOUBLE);
+	a->type = EXR_ATTRIBUTE_DOUBLE;
+	a->number = value;
+}
+
+/* Appends to the text that is being written. */
+__attribute__((format(printf, 2, 3))) static void append(struct header *h, const char *format, ...)
+{
+	va_list ap;
+	va_start(ap, format);
+	int n = vsnprintf(h->text + h->used, HEADER_TEXT - h->used, format, ap);
+	va_end(ap);
+	size_t room = HEADER_TEXT - h->used - 1;
+	h->used += n < 0 ? 0 : (size_t)n < room ? (size_t)n : room;
+}
+
+static void begin_string(struct header *h, enum header_name name)
+{
+	struct exr_attribute *a = add(h, name, STRING);
+	a->type = EXR_ATTRIBUTE_STRING;
+	a->string = h->text + h->used;
+	h->text[h->used] = 0;
+}
+
+static void end_string(struct header *h)
+{
+	if (h->used < HEADER_TEXT - 1)
+		h->used++;
+	h->text[h->used] = 0;
+}
+
+static void add_string(struct header *h, enum header_name name, const char *value)
+{
+	begin_string(h, name);
+	append(h, "%s", value);
+	end_string(h);
+}
+
+static void add_count(struct header *h, enum header_name name, uint64_t value)
+{
+	begin_string(h, name);
+	append(h, "%" PRIu64, value);
+	end_string(h);
+}
+
+static void add_plan(struct header *h, const struct plan *p, uint64_t rounds)
+{
+	char options[PLAN_TEXT];
+	plan_options(p, rounds, options, sizeof options);
+	add_string(h, H_INTEGRATOR, p->integrator);
+	if (*p->mutations)
+		add_string(h, H_MIXTURE, p->mutations);
+	add_string(h, H_OPTIONS, options);
+	add_count(h, H_SEED, p->seed);
+	add_int(h, H_MIN_DEPTH, p->min_depth);
+	add_int(h, H_MAX_DEPTH, p->max_depth);
+	add_int(h, H_GROUPS, p->groups);
+	add_count(h, H_BOOTSTRAP, p->bootstrap);
+	add_count(h, H_EPOCH, p->epoch);
+	add_count(h, H_ROUNDS, rounds);
+}
+
+static void add_convergence(struct header *h, const struct canvas_image *img, const struct plan *p,
+			    const struct convergence *a)
+{
+	if (p->kind != PLAN_CHAINS)
+		return;
+	char table[CONVERGENCE_TABLE];
+	add_string(h, H_AGREEMENT, convergence_name(a->verdict));
+	if (*a->text)
+		add_string(h, H_DISAGREEMENT, a->text);
+	if (!isnan(a->r_hat_worst)) {
+		add_double(h, H_R_HAT_MEDIAN, a->r_hat_median);
+		add_double(h, H_R_HAT_WORST, a->r_hat_worst);
+	}
+	convergence_table(img->classes, img->b, a, table, sizeof table);
+	if (*table)
+		add_string(h, H_CLASSES, table);
+}
+
+static void add_error(struct header *h, const struct canvas_image *img)
+{
+	char why[STATED_ERROR_TEXT];
+	stated_error_doubt(img, why, sizeof why);
+	if (*why) {
+		add_string(h, H_REL_MSE_DOUBT, why);
+	} else {
+		add_double(h, H_REL_MSE_UPPER, img->rel_mse_upper);
+		add_double(h, H_REL_MSE_LOW_95, img->rel_mse_95[0]);
+		add_double(h, H_REL_MSE_HIGH_95, img->rel_mse_95[1]);
+	}
+	add_string(h, H_REL_MSE_DEFINITION, REL_MSE_DEFINITION);
+	if (img->unvisited)
+		add_count(h, H_UNVISITED, img->unvisited);
+}
+
+static void add_b_error(struct header *h, const struct canvas_image *img)
+{
+	char why[STATED_ERROR_TEXT];
+	stated_b_doubt(img, why, sizeof why);
+	if (*why)
+		add_string(h, H_B_ERROR_DOUBT, why);
+	else
+		add_double(h, H_B_ERROR, img->b_error);
+}
+
+static void add_result(struct header *h, const struct canvas_image *img, const struct plan *p)
+{
+	if (p->kind == PLAN_CHAINS) {
+		add_int(h, H_CHAINS, p->chains);
+		add_count(h, H_MUTATIONS, img->samples);
+		add_double(h, H_B, img->b);
+		add_b_error(h, img);
+		add_double(h, H_BEYOND, img->beyond_share);
+		add_count(h, H_ACCEPTED, img->counts.counters[COUNT_ACCEPTED]);
+		add_count(h, H_INDEPENDENT, img->counts.counters[COUNT_INDEPENDENT]);
+		add_count(h, H_STUCK, img->counts.counters[COUNT_STUCK]);
+		add_count(h, H_LONGEST_STUCK, img->counts.counters[COUNT_LONGEST_STUCK]);
+	} else {
+		add_count(h, H_SAMPLES, img->rounds * p->groups * p->epoch);
+	}
+	add_double(h, H_REL_MSE, img->rel_mse);
+	add_error(h, img);
+	add_count(h, H_NAN, img->counts.counters[COUNT_NAN]);
+	add_count(h, H_INFINITE, img->counts.counters[COUNT_INFINITE]);
+	add_count(h, H_NEGATIVE, img->counts.counters[COUNT_NEGATIVE]);
+	add_count(h, H_RAYS_CLOSEST, img->counts.counters[COUNT_RAYS_CLOSEST]);
+	add_count(h, H_RAYS_SHADOW, img->counts.counters[COUNT_RAYS_SHADOW]);
+	char text[HEADER_STRATEGIES];
+	strategy_lines(p->mutations, &img->counts, text, sizeof text);
+	if (*text)
+		add_string(h, H_STRATEGIES, text);
+	struct convergence a;
+	convergence_judge(p, img, &a);
+	strategy_note(p, &img->counts, img->black, text, sizeof text);
+	strategy_add_beyond(img->beyond_share, text, sizeof text);
+	convergence_add_note(&a, text, sizeof text);
+	if (*text)
+		add_string(h, H_NOTE, text);
+	add_convergence(h, img, p, &a);
+}
+
+static void add_extra(struct header *h, const struct header_extra *x)
+{
+	add_string(h, H_SCENE, x->scene ? x->scene : "");
+	add_int(h, H_MIXED, x->mixed);
+	begin_string(h, H_EFFECTS);
+	for (size_t i = 0; i < x->effect_count; i++)
+		append(h, "%s%s: %s%s (%s; %s: %s)", i ? "\n" : "", x->effects[i].name, x->effects[i].on ? "on" : "off",
+		       x->effects[i].forced ? " (forced)" : "", x->effects[i].why,
+		       x->effects[i].on ? "without it" : "saves", x->effects[i].saves);
+	end_string(h);
+	add_double(h, H_WALL, x->wall_seconds);
+	add_double(h, H_CPU, x->cpu_seconds);
+	add_int(h, H_WORKERS, x->workers);
+	char date[32] = "";
+	time_t now = time(NULL);
+	struct tm utc;
+	if (!x->date && gmtime_r(&now, &utc))
+		strftime(date, sizeof date, "%Y-%m-%dT%H:%M:%SZ", &utc);
+	add_string(h, H_DATE, x->date ? x->date : date);
+	if (x->end)
+		add_string(h, H_END, x->end);
+}
+
+void header_fill(struct header *h, const struct canvas_image *img, const struct plan *p, const struct header_extra *x)
+{
+	h->count = h->used = 0;
+	add_string(h, H_VERSION, HSLT_VERSION);
+	add_plan(h, p, img->rounds);
+	add_result(h, img, p);
+	add_extra(h, x);
+}

@@ -1,0 +1,51 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The image's header attributes "hslt:...", in one table: what each is called, its type, what it means. EXR has no
+ * 64-bit integer, so counts are strings of decimal digits. The coordinator and hslt-render fill them in by the same
+ * function, so that equal bits of the image come with an equal header; the attributes marked `excluded` say how it was
+ * made and differ.
+ */
+#ifndef COMMON_EXR_HEADER_H
+#define COMMON_EXR_HEADER_H
+
+#include "common/estimate/canvas_image.h"
+#include "common/exr/exr.h"
+
+struct header_row {
+	const char *name;
+	int type; /* of enum in struct exr_attribute */
+	bool excluded;
+	const char *meaning;
+};
+extern const struct header_row header_rows[]; /* ends with a NULL name */
+
+bool header_excluded(const char *name); /* one of those that hslt-compare --exact leaves out */
+
+struct header_effect { /* see render_effects */
+	const char *name;
+	bool on, forced;
+	const char *why, *saves;
+};
+
+struct header_extra {
+	const char *scene; /* the scene file's name, without folders */
+	size_t effect_count;
+	const struct header_effect *effects;
+	bool mixed; /* workers of different numeric fingerprints took part: the bits are not reproducible */
+	double wall_seconds, cpu_seconds;
+	uint32_t workers;
+	const char *date; /* NULL: now, UTC */
+	const char *end;  /* merge_end_name; NULL: a preview */
+};
+
+enum { HEADER_ATTRIBUTES = 64, HEADER_TEXT = 32768 };
+struct header {
+	size_t count;
+	struct exr_attribute attributes[HEADER_ATTRIBUTES]; /* strings in `text` */
+	char text[HEADER_TEXT];
+	size_t used;
+};
+/* Never fails: a text that does not fit is cut. Allocates nothing; h must not move afterwards. */
+void header_fill(struct header *h, const struct canvas_image *img, const struct plan *p, const struct header_extra *x);
+
+#endif

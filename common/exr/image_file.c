@@ -1,0 +1,210 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/exr/image_file.h"
+
+#include "common/base/mem.h"
+#include "common/base/target.h"
+
+#include <fcntl.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+enum { PATH_ROOM = 4096 };
+#define FILE_MOST (INT64_C(1) << 32)
+
+static int add_planes(struct exr_image *out, const float *rgb, const char *prefix)
+{
+	size_t pixels = (size_t)out->width * out->height;
+	for (size_t c = 0; c < 3; c++) {
+		float *plane = mem_alloc(pixels, sizeof *plane);
+		if (!plane)
+			return -ENOMEM;
+		for (size_t i = 0; i < pixels; i++)
+			plane[i] = rgb[i * 3 + c];
+		snprintf(out->names[out->channel_count], sizeof out->names[0], "%s%c", prefix, "RGB"[c]);
+		out->planes[out->channel_count++] = plane;
+	}
+	return 0;
+}
+
+static int add_r_hat(struct exr_image *out, const struct canvas_image *img)
+{
+	float *plane = mem_alloc((size_t)out->width * out->height, sizeof *plane);
+	if (!plane)
+		return -ENOMEM;
+	for (size_t y = 0; y < out->height; y++)
+		for (size_t x = 0; x < out->width; x++) {
+			float r_hat = img->r_hat[y / TILE_SIZE * img->tiles_across + x / TILE_SIZE];
+			plane[y * out->width + x] = isnan(r_hat) ? 0 : r_hat;
+		}
+	snprintf(out->names[out->channel_count], sizeof out->names[0], "rhat.Y");
+	out->planes[out->channel_count++] = plane;
+	return 0;
+}
+
+int image_file_encode(const struct canvas_image *img, const struct plan *p, const struct header_extra *x,
+		      unsigned char **bytes, size_t *size, struct error *e)
+{
+	struct exr_image out = {.width = img->width,
+				.height = img->height,
+				.full_width = p->width,
+				.full_height = p->height,
+				.x = p->crop_x,
+				.y = p->crop_y};
+	struct header *h = mem_alloc(1, sizeof *h);
+	int rc = h ? add_planes(&out, img->rgb, "") : -ENOMEM;
+	if (rc == 0 && img->error)
+		rc = add_planes(&out, img->error, "error.");
+	if (rc == 0 && img->r_hat)
+		rc = add_r_hat(&out, img);
+	if (rc) {
+		error_set(e, ENOMEM, "no memory for the image's file");
+	} else {
+		header_fill(h, img, p, x);
+		out.attributes = h->attributes;
+		out.attribute_count = h->count;
+		rc = exr_write(&out, bytes, size, e);
+	}
+	out.attributes = NULL; /* not mem_alloc'd one by one */
+	exr_image_fini(&out);
+	mem_free(h);
+	return rc;
+}
+
+static int failed(struct error *e, const char *path, const char *what)
+{
+	int code = errno;
+	return error_set(e, code, "%s: cannot %s: %s", path, what, strerror(code));
+}
+
+static int write_all(int fd, const unsigned char *bytes, size_t size)
+{
+	while (size) {
+		ssize_t n = write(fd, bytes, size);
+		if (n < 0 && errno != EINTR)
+			return -1;
+		bytes += n < 0 ? 0 : n;
+		size -= n < 0 ? 0 : (size_t)n;
+	}
+	return 0;
+}
+
+/* So that the new name survives a crash too; a folder that cannot be opened for it is not worth failing for. */
+static void sync_folder(const char *path)
+{
+	char folder[PATH_ROOM];
+	const char *slash = strrchr(path, '/');
+	int n = slash ? snprintf(folder, sizeof folder, "%.*s/", (int)(slash - path), path)
+		      : snprintf(folder, sizeof folder, ".");
+	int fd = n > 0 ? open(folder, O_RDONLY | O_DIRECTORY | O_CLOEXEC) : -1;
+	if (fd < 0)
+		return;
+	fsync(fd);
+	close(fd);
+}
+
+/* A temporary file beside `path`; its descriptor or a negative errno. */
+static int open_beside(const char *path, char temporary[PATH_ROOM], struct error *e)
+{
+	int n = snprintf(temporary, PATH_ROOM, "%s.XXXXXX", path);
+	if (n < 0 || n >= PATH_ROOM)
+		return error_set(e, ENAMETOOLONG, "%s: the name is too long", path);
+	int fd = mkostemp(temporary, O_CLOEXEC);
+	return fd < 0 ? failed(e, path, "write there") : fd;
+}
+
+int image_file_probe(const char *path, struct error *e)
+{
+	char temporary[PATH_ROOM];
+	struct target t;
+	int rc = target_find(&t, path, e);
+	if (rc)
+		return rc;
+	if (t.through)
+		return t.descriptor < 0 && access(t.path, W_OK) ? failed(e, path, "write there") : 0;
+	int fd = open_beside(t.path, temporary, e);
+	if (fd < 0)
+		return fd;
+	close(fd);
+	unlink(temporary);
+	return 0;
+}
+
+static int write_through(const struct target *t, const char *path, const unsigned char *bytes, size_t size,
+			 struct error *e)
+{
+	int fd = target_open(t, e);
+	if (fd < 0)
+		return fd;
+	int rc = write_all(fd, bytes, size) ? failed(e, path, "write") : 0;
+	if (close(fd) && !rc)
+		rc = failed(e, path, "write");
+	return rc;
+}
+
+static int replace(const char *path, const unsigned char *bytes, size_t size, struct error *e)
+{
+	char temporary[PATH_ROOM];
+	int fd = open_beside(path, temporary, e);
+	if (fd < 0)
+		return fd;
+	mode_t mask = umask(0);
+	umask(mask);
+	int rc = write_all(fd, bytes, size) != 0 || fsync(fd) != 0 || fchmod(fd, 0666 & ~mask) != 0
+			 ? failed(e, path, "write")
+			 : 0;
+	if (close(fd) != 0 && rc == 0)
+		rc = failed(e, path, "write");
+	if (rc == 0 && rename(temporary, path) != 0)
+		rc = failed(e, path, "put the file in place");
+	if (rc)
+		unlink(temporary);
+	else
+		sync_folder(path);
+	return rc;
+}
+
+int image_file_write(const char *path, const unsigned char *bytes, size_t size, struct error *e)
+{
+	struct target t;
+	int rc = target_find(&t, path, e);
+	if (rc)
+		return rc;
+	return t.through ? write_through(&t, path, bytes, size, e) : replace(t.path, bytes, size, e);
+}
+
+int image_file_read(const char *path, unsigned char **bytes, size_t *size, struct error *e)
+{
+	struct stat st;
+	int fd = open(path, O_RDONLY | O_CLOEXEC);
+	if (fd < 0)
+		return failed(e, path, "open");
+	int rc = 0;
+	unsigned char *all = NULL;
+	size_t got = 0;
+	if (fstat(fd, &st) != 0)
+		rc = failed(e, path, "read");
+	else if (!S_ISREG(st.st_mode) || st.st_size > FILE_MOST)
+		rc = error_set(e, EINVAL, "%s: not a regular file of at most 4 GiB", path);
+	else if (!(all = mem_alloc((size_t)st.st_size, 1)))
+		rc = error_set(e, ENOMEM, "%s: no memory for it", path);
+	while (rc == 0 && got < (size_t)st.st_size) {
+		ssize_t n = read(fd, all + got, (size_t)st.st_size - got);
+		if (n < 0 && errno != EINTR)
+			rc = failed(e, path, "read");
+		if (n == 0)
+			break;
+		got += n < 0 ? 0 : (size_t)n;
+	}
+	close(fd);
+	if (rc) {
+		mem_free(all);
+		return rc;
+	}
+	*bytes = all;
+	*size = got;
+	return 0;
+}

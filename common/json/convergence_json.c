@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/json/convergence_json.h"
+
+#include "common/base/text.h"
+
+#include <math.h>
+#include <string.h>
+
+static json_t *real_or_null(double x)
+{
+	return isfinite(x) ? json_real(x) : json_null();
+}
+
+static double real_or_nan(const json_t *o, const char *key)
+{
+	const json_t *x = json_object_get(o, key);
+	return json_is_number(x) ? json_number_value(x) : NAN;
+}
+
+static uint32_t whole(const json_t *x)
+{
+	json_int_t n = json_integer_value(x);
+	return n < 0 ? 0 : n > UINT32_MAX ? UINT32_MAX : (uint32_t)n;
+}
+
+static json_t *names_of(uint32_t classes)
+{
+	json_t *list = json_array();
+	for (unsigned k = 0; k < PATH_CLASSES; k++)
+		if (classes >> k & 1)
+			json_array_append_new(list, json_string(path_class_name(k)));
+	return list;
+}
+
+json_t *convergence_to_json(const struct convergence *a)
+{
+	return json_pack(
+		"{s:s s:s s:o s:o s:[I,I] s:I s:I s:o s:o s:o s:o}", "verdict", convergence_name(a->verdict), "text",
+		a->text,											/* */
+		"rHatMedian", real_or_null(a->r_hat_median), "rHatWorst", real_or_null(a->r_hat_worst),		/* */
+		"worst", (json_int_t)a->worst_x, (json_int_t)a->worst_y, "tiles", (json_int_t)a->tiles,		/* */
+		"tilesFlagged", (json_int_t)a->tiles_flagged, "energyFlagged", real_or_null(a->energy_flagged), /* */
+		"stuckShare", real_or_null(a->stuck_share), "classesFlagged", names_of(a->classes_flagged),	/* */
+		"classesApart", names_of(a->classes_apart));
+}
+
+static unsigned class_named(const json_t *name)
+{
+	unsigned k = 0;
+	while (k < PATH_CLASSES && (!json_is_string(name) || strcmp(json_string_value(name), path_class_name(k)) != 0))
+		k++;
+	return k;
+}
+
+static uint32_t classes_named(const json_t *list)
+{
+	uint32_t classes = 0;
+	for (size_t i = 0; i < json_array_size(list); i++) {
+		unsigned k = class_named(json_array_get(list, i));
+		if (k < PATH_CLASSES)
+			classes |= UINT32_C(1) << k;
+	}
+	return classes;
+}
+
+void convergence_from_json(const json_t *o, struct convergence *a)
+{
+	const char *verdict = json_string_value(json_object_get(o, "verdict")),
+		   *text = json_string_value(json_object_get(o, "text"));
+	const json_t *worst = json_object_get(o, "worst");
+	*a = (struct convergence){.r_hat_median = real_or_nan(o, "rHatMedian"),
+				  .r_hat_worst = real_or_nan(o, "rHatWorst")};
+	for (int v = CHAINS_AGREE; verdict && v <= CHAINS_DISAGREE; v++)
+		if (strcmp(verdict, convergence_name((enum convergence_verdict)v)) == 0)
+			a->verdict = (enum convergence_verdict)v;
+	text_copy(a->text, sizeof a->text, text ? text : "");
+	a->worst_x = whole(json_array_get(worst, 0));
+	a->worst_y = whole(json_array_get(worst, 1));
+	a->tiles = whole(json_object_get(o, "tiles"));
+	a->tiles_flagged = whole(json_object_get(o, "tilesFlagged"));
+	a->energy_flagged = json_number_value(json_object_get(o, "energyFlagged"));
+	a->stuck_share = json_number_value(json_object_get(o, "stuckShare"));
+	a->classes_flagged = classes_named(json_object_get(o, "classesFlagged"));
+	a->classes_apart = classes_named(json_object_get(o, "classesApart"));
+}
+
+json_t *classes_to_json(const struct path_class_energy classes[PATH_CLASSES])
+{
+	json_t *list = json_array();
+	for (unsigned k = 0; k < PATH_CLASSES; k++) {
+		const struct path_class_energy *c = &classes[k];
+		if (!(c->bootstrap > 0) && !(c->chains > 0))
+			continue;
+		json_array_append_new(
+			list, json_pack("{s:s s:o s:o s:o s:o s:o}", "class", path_class_name(k), "bootstrap",
+					real_or_null(c->bootstrap), "bootstrapError", real_or_null(c->bootstrap_error),
+					"chains", real_or_null(c->chains), "chainsError", real_or_null(c->chains_error),
+					"t", real_or_null(c->difference_t)));
+	}
+	return list;
+}
+
+void classes_from_json(const json_t *list, struct path_class_energy classes[PATH_CLASSES])
+{
+	for (unsigned k = 0; k < PATH_CLASSES; k++)
+		classes[k] = (struct path_class_energy){.difference_t = NAN};
+	for (size_t i = 0; i < json_array_size(list); i++) {
+		const json_t *o = json_array_get(list, i);
+		unsigned k = class_named(json_object_get(o, "class"));
+		if (k == PATH_CLASSES)
+			continue;
+		classes[k] = (struct path_class_energy){json_number_value(json_object_get(o, "bootstrap")),
+							real_or_nan(o, "bootstrapError"),
+							json_number_value(json_object_get(o, "chains")),
+							real_or_nan(o, "chainsError"), real_or_nan(o, "t")};
+	}
+}

@@ -1,0 +1,256 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Forecasts against renders played with exact chi-square statistics: groups whose pixels' deviations are Brownian in
+ * work. Level: each share of intervals that hold is a binomial of 300 renders whose expectation is 0.93 or more (the
+ * prior of the trend makes intervals wider than the noise alone); below 0.86 with less than 1e-6. Power: intervals of
+ * half the width hold in 0.67 or less of the renders, a wrong law of work in none.
+ */
+#include "common/json/forecast_json.h"
+#include "common/estimate/merge.h"
+#include "common/estimate/quantile.h"
+#include "tests/support/dice.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <cmocka.h>
+
+static double normal(struct dice *d)
+{
+	return sqrt(-2 * log(1 - dice_throw(d))) * cos(6.283185307179586 * dice_throw(d));
+}
+
+/* Wilson and Hilferty 1931; 14 degrees and more. */
+static double chi_square(struct dice *d, double degrees)
+{
+	double s = 2 / (9 * degrees), root = 1 - s + sqrt(s) * normal(d);
+	return degrees * root * root * root;
+}
+
+/* A render: sum of squares over `degrees` dimensions of a Brownian motion whose variance grows by 1 a unit of work. */
+struct walk {
+	double degrees, square, work, scale; /* relMSE = scale / work */
+};
+
+static struct forecast_look look_at(struct walk *w, double work, struct dice *d)
+{
+	double step = work - w->work, z = normal(d);
+	w->square += 2 * sqrt(w->square * step) * z + step * (z * z + chi_square(d, w->degrees - 1));
+	w->work = work;
+	struct forecast_look l = {
+		.work = work, .cpu_seconds = 2e-6 * work * (1 + 0.01 * normal(d)), .degrees = w->degrees};
+	l.seconds = l.cpu_seconds / 2;
+	l.rel_mse = w->scale / work * w->square / (w->degrees * work);
+	l.rel_mse_upper = l.rel_mse * w->degrees / chi_square_5(w->degrees);
+	return l;
+}
+
+static struct plan plan_of(uint64_t epoch)
+{
+	return (struct plan){.kind = PLAN_CHAINS, .groups = 16, .chains = 1024, .epoch = epoch, .target_error = 1e-3};
+}
+
+static struct forecast_history pilot_of(double degrees, double scale, uint64_t rounds, struct dice *d)
+{
+	struct plan p = plan_of(64);
+	struct forecast_history h = {0};
+	struct walk w = {.degrees = degrees, .scale = scale};
+	for (uint64_t r = 1; r <= rounds; r = merge_error_next(&p, r)) {
+		struct forecast_look l = look_at(&w, (double)r * (double)plan_round_mutations(&p), d);
+		forecast_add_look(&h, &l);
+	}
+	return h;
+}
+
+static double stop_of(double degrees, double scale, const struct plan *p, double target, struct dice *d)
+{
+	struct walk w = {.degrees = degrees, .scale = scale};
+	for (uint64_t r = 1;; r = merge_error_next(p, r)) {
+		struct forecast_look l = look_at(&w, (double)r * (double)plan_round_mutations(p), d);
+		if (sqrt(l.rel_mse_upper) <= target)
+			return l.work;
+	}
+}
+
+static void intervals_hold(void **state)
+{
+	(void)state;
+	static const double degrees[] = {15, 150, 3000};
+	struct dice d = dice_of("forecast intervals_hold");
+	size_t runs = dice_count(300);
+	struct plan p = plan_of(48);
+	for (size_t k = 0; k < sizeof degrees / sizeof *degrees; k++) {
+		size_t held = 0;
+		double wide = 0, off = 0;
+		for (size_t i = 0; i < runs; i++) {
+			double scale = exp(dice_between(&d, 5, 9));
+			struct forecast_history h = pilot_of(degrees[k], scale, 22, &d);
+			struct forecast_cost c;
+			double target = sqrt(h.looks[h.count - 1].rel_mse / dice_between(&d, 2, 9));
+			assert_true(forecast_target(&h, &p, target, FORECAST_NEW, &c));
+			double work = stop_of(degrees[k], scale, &p, target, &d);
+			held += c.work.low <= work && work <= c.work.high;
+			wide += log(c.work.high / c.work.low) / (double)runs;
+			off += log(c.work.middle / work) / (double)runs;
+		}
+		printf("%4.0f degrees: %.3f of the intervals hold, high over low %.2f, predicted over real %.3f\n",
+		       degrees[k], (double)held / (double)runs, exp(wide), exp(off));
+		if (runs >= 300) /* fewer show that nothing breaks */
+			assert_true((double)held >= 0.86 * (double)runs);
+		assert_true(exp(wide) < (degrees[k] < 100 ? 16 : 4));
+		if (runs >= 300)
+			assert_true(fabs(off) < 0.12);
+	}
+}
+
+/* The forecast of a render by its own looks knows what has come already. */
+static void own_looks_tell_more(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("forecast own_looks_tell_more");
+	struct plan p = plan_of(64);
+	size_t runs = dice_count(100), held = 0;
+	for (size_t i = 0; i < runs; i++) {
+		struct walk w = {.degrees = 400, .scale = 1000};
+		struct forecast_history h = {0};
+		struct forecast_cost c = {.work = {.low = 0}};
+		double target = sqrt(1000 / (400.0 * (double)plan_round_mutations(&p)));
+		for (uint64_t r = 1;; r = merge_error_next(&p, r)) {
+			struct forecast_look l = look_at(&w, (double)r * (double)plan_round_mutations(&p), &d);
+			if (sqrt(l.rel_mse_upper) <= target) {
+				held += c.work.low <= l.work && l.work <= c.work.high;
+				break;
+			}
+			forecast_add_look(&h, &l);
+			if (r > 150)
+				continue;
+			assert_true(forecast_target(&h, &p, target, FORECAST_SAME, &c));
+			assert_true(c.work.low > l.work && c.work.low <= c.work.middle && c.work.middle <= c.work.high);
+			assert_true(c.cpu_seconds.low > l.cpu_seconds);
+		}
+	}
+	printf("own looks: %.3f hold\n", (double)held / (double)runs);
+	if (runs >= 100)
+		assert_true((double)held >= 0.8 * (double)runs);
+}
+
+static void stops_are_on_the_ladder(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("forecast stops_are_on_the_ladder");
+	struct plan p = plan_of(1000);
+	struct forecast_history h = pilot_of(100, 3000, 30, &d);
+	for (double target = 0.5; target > 1e-4; target /= 1.7) {
+		struct forecast_cost c;
+		assert_true(forecast_target(&h, &p, target, FORECAST_NEW, &c));
+		const double ends[] = {c.rounds.low, c.rounds.middle, c.rounds.high};
+		for (int i = 0; i < 3; i++)
+			assert_true(merge_error_due(&p, (uint64_t)ends[i]));
+		assert_true(c.work.middle == c.rounds.middle * (double)plan_round_mutations(&p));
+	}
+}
+
+static void halving_costs_three_times_what_was_paid(void **state)
+{
+	(void)state;
+	struct plan p = plan_of(64);
+	struct forecast_history h = {0};
+	for (double work = 1e5; work < 1e7; work *= 1.3)
+		forecast_add_look(
+			&h, &(struct forecast_look){work, 1e-6 * work, 2e-6 * work, 1000 / work, 1050 / work, 3000, 0});
+	struct forecast_cost c;
+	struct forecast_range error;
+	const struct forecast_look *end = &h.looks[h.count - 1];
+	assert_true(forecast_halving(&h, &p, &c));
+	assert_true(fabs(c.work.middle / (3 * end->work) - 1) < 0.05);
+	assert_true(fabs(c.cpu_seconds.middle / (3 * end->cpu_seconds) - 1) < 0.07);
+	assert_true(fabs(c.seconds.middle / (3 * end->seconds) - 1) < 0.07);
+	assert_true(c.work.low < 3 * end->work && c.work.high > 3 * end->work);
+	assert_true(forecast_error_at(&h, 4 * end->work, &error));
+	assert_true(fabs(error.middle / (0.5 * sqrt(end->rel_mse)) - 1) < 0.05);
+}
+
+/* Light that comes in bursts: the error falls more slowly than the rule says, and the forecast sees it coming. */
+static void a_trend_is_seen(void **state)
+{
+	(void)state;
+	struct plan p = plan_of(64);
+	double middle[2];
+	for (int i = 0; i < 2; i++) {
+		struct forecast_history h = {0};
+		struct forecast_cost c;
+		double power = i ? -0.6 : -1;
+		for (double work = 1e5; work < 2e6; work *= 1.25)
+			forecast_add_look(&h, &(struct forecast_look){work, work, work, pow(work, power),
+								      1.05 * pow(work, power), 3000, 0});
+		const struct forecast_look *end = &h.looks[h.count - 1];
+		assert_true(forecast_target(&h, &p, sqrt(end->rel_mse_upper / 6), FORECAST_NEW, &c));
+		middle[i] = c.work.middle / (6 * end->work);
+	}
+	printf("work over that of the rule: %.2f, with a trend of 0.4 %.2f\n", middle[0], middle[1]);
+	assert_true(middle[0] > 0.85 && middle[0] < 1.25);
+	assert_true(middle[1] > 1.2 * middle[0] && middle[1] < 2.5);
+}
+
+static void what_is_no_look_is_passed_over(void **state)
+{
+	(void)state;
+	struct forecast_history h = {0};
+	struct forecast_range r;
+	struct forecast_cost c;
+	struct plan p = plan_of(64);
+	assert_false(forecast_error(&h, &r) || forecast_target(&h, &p, 0.1, FORECAST_NEW, &c) ||
+		     forecast_halving(&h, &p, &c));
+	const struct forecast_look none[] = {
+		{1, 1, 1, NAN, NAN, 15, 0}, {1, 1, 1, 0, 0, 15, 0},	   {1, 1, 1, INFINITY, INFINITY, 15, 0},
+		{1, 1, 1, 2, 1, 15, 0},	    {0, 1, 1, 1, 2, 15, 0},	   {9.9e228, 1, 1, 1, 2, 15, 0},
+		{NAN, 1, 1, 1, 2, 15, 0},   {1, INFINITY, 1, 1, 2, 15, 0}, {1, 1, NAN, 1, 2, 15, 0},
+		{1, 1, 1, 1, 2, NAN, 0}};
+	for (size_t i = 0; i < sizeof none / sizeof *none; i++)
+		forecast_add_look(&h, &none[i]);
+	assert_int_equal(h.count, 0);
+	for (int i = 1; i <= 3 * FORECAST_LOOKS; i++)
+		forecast_add_look(&h, &(struct forecast_look){i, i, i, 1.0 / i, 1.1 / i, 100, 0});
+	assert_int_equal(h.count, FORECAST_LOOKS);
+	assert_true(h.looks[FORECAST_LOOKS - 1].work == 3 * FORECAST_LOOKS);
+	assert_null(forecast_reached(&h, 1e-9));
+	assert_ptr_equal(forecast_reached(&h, 10), &h.looks[0]);
+	h.looks[0].doubtful = 1; /* no render would have ended by it */
+	assert_ptr_equal(forecast_reached(&h, 10), &h.looks[1]);
+	/* Out of reach is said, not computed with. */
+	assert_true(forecast_target(&h, &p, 1e-200, FORECAST_SAME, &c) && isinf(c.work.low));
+}
+
+static void looks_travel_as_json(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("forecast looks_travel_as_json");
+	struct forecast_history h = pilot_of(77, 3000, 30, &d), back;
+	json_t *list = forecast_looks_to_json(&h);
+	forecast_looks_from_json(list, &back);
+	json_decref(list);
+	assert_int_equal(back.count, h.count);
+	for (uint32_t i = 0; i < h.count; i++)
+		assert_true(
+			back.looks[i].rel_mse == h.looks[i].rel_mse && back.looks[i].seconds == h.looks[i].seconds &&
+			back.looks[i].cpu_seconds == h.looks[i].cpu_seconds &&
+			back.looks[i].degrees == h.looks[i].degrees && back.looks[i].doubtful == h.looks[i].doubtful &&
+			back.looks[i].rel_mse_upper == h.looks[i].rel_mse_upper &&
+			back.looks[i].work == h.looks[i].work);
+	forecast_looks_from_json(NULL, &back);
+	assert_int_equal(back.count, 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(intervals_hold),	   cmocka_unit_test(own_looks_tell_more),
+		cmocka_unit_test(stops_are_on_the_ladder), cmocka_unit_test(halving_costs_three_times_what_was_paid),
+		cmocka_unit_test(a_trend_is_seen),	   cmocka_unit_test(what_is_no_look_is_passed_over),
+		cmocka_unit_test(looks_travel_as_json),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

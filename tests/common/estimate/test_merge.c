@@ -1,0 +1,206 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* When the error is looked at, and what stopping by it does: the ladder, and renders that are stopped by their targets.
+ */
+#include "common/base/mem.h"
+#include "common/estimate/merge.h"
+#include "tests/support/dice.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdlib.h>
+#include <string.h>
+#include <cmocka.h>
+
+static struct plan plan_of(uint32_t width, uint32_t height, uint64_t epoch)
+{
+	return (struct plan){.integrator = "path",
+			     .kind = PLAN_SAMPLES,
+			     .width = width,
+			     .height = height,
+			     .crop_width = width,
+			     .crop_height = height,
+			     .groups = 16,
+			     .parts = 1,
+			     .epoch = epoch,
+			     .bootstrap = 16,
+			     .rounds = UINT64_MAX,
+			     .target_error = 0.1,
+			     .max_depth = 8};
+}
+
+static void looks_are_geometric(void **state)
+{
+	(void)state;
+	static const uint64_t ladder[] = {1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 15, 18, 22, 27, 33, 41};
+	struct plan p = plan_of(30, 20, 4); /* 64 samples a pixel and round */
+	uint64_t r = 0;
+	for (size_t i = 0; i < sizeof ladder / sizeof *ladder; i++) {
+		r = merge_error_next(&p, r);
+		assert_int_equal(r, ladder[i]);
+	}
+	for (uint64_t k = 1; k <= 40; k++) {
+		bool on = false;
+		for (size_t i = 0; i < sizeof ladder / sizeof *ladder; i++)
+			on |= ladder[i] == k;
+		assert_int_equal(merge_error_due(&p, k), on);
+	}
+	assert_false(merge_error_due(&p, 0));
+	p.target_error = 0;
+	assert_false(merge_error_due(&p, 1));
+}
+
+/* At least 0.9 mutations a pixel and group between looks, whatever the plan's rounds are; and steps of a quarter or
+ * less, once there are four. */
+static void looks_are_worth_their_cost(void **state)
+{
+	(void)state;
+	for (uint32_t groups = 2; groups <= 64; groups *= 2)
+		for (uint64_t epoch = 1; epoch < 1000; epoch = epoch * 5 / 2 + 1) {
+			struct plan p = plan_of(100, 50, 1);
+			p.kind = PLAN_CHAINS;
+			p.groups = groups;
+			p.chains = groups * 8;
+			p.epoch = epoch;
+			uint64_t before = 0, round = plan_round_mutations(&p);
+			for (int i = 0; i < 60; i++) {
+				uint64_t r = merge_error_next(&p, before);
+				assert_true(r > before && (double)((r - before) * round) >= 0.9 * groups * 5000);
+				assert_true(i < 4 || (double)r <= 1.25 * (double)before);
+				assert_true(r - before <= (groups * 4500 + round - 1) / round ||
+					    (double)(r - before) >= 0.15 * (double)before);
+				before = r;
+			}
+		}
+	struct plan p = plan_of(100, 50, 1);
+	assert_true(merge_error_next(&p, UINT64_MAX - 1) == UINT64_MAX &&
+		    merge_error_next(&p, UINT64_MAX / 4) > UINT64_MAX / 4);
+}
+
+/* A render whose pixels err by themselves and all together: sums of a group and round of `epoch` samples. */
+struct render {
+	double each, common;
+	struct dice dice;
+};
+
+static double normal(struct dice *d)
+{
+	double radius = sqrt(-2 * log(1 - dice_throw(d)));
+	return radius * cos(6.283185307179586 * dice_throw(d));
+}
+
+static struct batch round_of(struct render *r, const struct plan *p, uint64_t round, uint32_t group)
+{
+	struct batch b = {
+		.key = {1, LEASE_RENDER, group, 0, round}, .tile_count = 1, .tiles = mem_alloc(1, sizeof *b.tiles)};
+	double n = (double)p->epoch, together = r->common * normal(&r->dice);
+	b.tiles[0] =
+		(struct tile){0, 0, p->width, p->height, mem_alloc((size_t)p->width * p->height * 3, sizeof(float))};
+	for (size_t i = 0; i < (size_t)p->width * p->height; i++) {
+		float v = (float)(n + sqrt(n) * (together + r->each * normal(&r->dice)));
+		for (size_t k = 0; k < 3; k++)
+			b.tiles[0].xyz[3 * i + k] = v;
+	}
+	b.counters[COUNT_SAMPLES] = p->epoch * p->width * p->height;
+	return b;
+}
+
+static double realised(const struct canvas_image *img)
+{
+	static const double white[3] = {3.2404541621141054 - 1.5371385127977166 - 0.4985314095560162,
+					-0.9692660305051868 + 1.8760108454466942 + 0.0415560175303498,
+					0.0556434309591147 - 0.2040259135167538 + 1.0572251882231791};
+	double sum = 0;
+	size_t pixels = (size_t)img->width * img->height;
+	for (size_t i = 0; i < pixels * 3; i++)
+		sum += pow((double)img->rgb[i] / white[i % 3] - 1, 2);
+	return sum / (double)pixels / 3;
+}
+
+struct stop {
+	uint64_t rounds;
+	double error;
+};
+
+static struct stop stop_of(const struct plan *p, struct render *r)
+{
+	struct canvas *c;
+	struct stop s = {0};
+	assert_int_equal(canvas_new(&c, p, -20, NULL, NULL), 0);
+	for (uint64_t round = 0; !s.rounds; round++) {
+		for (uint32_t g = 0; g < p->groups; g++) {
+			struct batch b = round_of(r, p, round, g);
+			assert_int_equal(canvas_add(c, &b, NULL), 0);
+			batch_fini(&b);
+		}
+		if (!merge_error_due(p, round + 1))
+			continue;
+		struct canvas_image img;
+		assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+		if (merge_end_of(p, round + 1, 0, &img) == MERGE_ERROR)
+			s = (struct stop){round + 1, sqrt(realised(&img)) / p->target_error};
+		canvas_image_fini(&img);
+	}
+	canvas_free(c);
+	return s;
+}
+
+static int by_size(const void *a, const void *b)
+{
+	double x = *(const double *)a, y = *(const double *)b;
+	return (x > y) - (x < y);
+}
+
+/*
+ * 300 renders each, stopped at a target that needs 7 rounds and more. Published: the share whose error is above the
+ * target at the stop, its median over the target, and the rounds. It is 15 to 20 % in all cases, near what a single
+ * look has when one error is common to all pixels (the error at hand is a normal's magnitude, and no rule can know it);
+ * with errors of many pixels the 15 % are above by 2 % or so, because the upper end is at the estimate then. So a
+ * second look that confirms would buy nothing. Level: binomial; a share of 20 % fails the limit of 33 % of 300 with
+ * 1e-7. Power: without the interval (the estimate against the target) it is above 40 % in all cases, found with more
+ * than 99 %.
+ */
+static void stops_are_not_lucky_dips(void **state)
+{
+	(void)state;
+	enum { RUNS = 300 };
+	static const struct {
+		const char *name;
+		uint32_t side;
+		double each, common, target;
+	} cases[] = {{"pixels by themselves", 16, 1, 0, 0.03},
+		     {"a few of them", 3, 1, 0, 0.03},
+		     {"half in common", 8, 0.7, 0.7, 0.03},
+		     {"all in common", 2, 0, 1, 0.03}};
+	struct render r = {.dice = dice_of("stops_are_not_lucky_dips")};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct plan p = plan_of(cases[i].side, cases[i].side, 10);
+		p.target_error = cases[i].target;
+		r.each = cases[i].each;
+		r.common = cases[i].common;
+		double error[RUNS], above = 0, rounds = 0;
+		for (int k = 0; k < RUNS; k++) {
+			struct stop s = stop_of(&p, &r);
+			error[k] = s.error;
+			above += s.error > 1;
+			rounds += (double)s.rounds / RUNS;
+		}
+		qsort(error, RUNS, sizeof *error, by_size);
+		print_message(
+			"%s: %.1f %% above the target, error over target: median %.3f, 95 %% below %.3f; %.1f rounds\n",
+			cases[i].name, 100 * above / RUNS, error[RUNS / 2], error[RUNS - RUNS / 20], rounds);
+		assert_true(above <= 0.33 * RUNS);
+		assert_true(error[RUNS / 2] < 1.0);
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(looks_are_geometric),
+		cmocka_unit_test(looks_are_worth_their_cost),
+		cmocka_unit_test(stops_are_not_lucky_dips),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,330 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Counters of strategies: exact sums over rounds, what a batch may say, and the table that people see. */
+#include "common/estimate/strategy.h"
+
+#include "common/base/mem.h"
+#include "common/exr/header.h"
+#include "common/json/strategy_json.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <string.h>
+#include <cmocka.h>
+
+static struct plan make_plan(void)
+{
+	struct plan_request r = {.integrator = "hslt",
+				 .kind = PLAN_CHAINS,
+				 .width = 20,
+				 .height = 10,
+				 .max_depth = 4,
+				 .chains = 4,
+				 .groups = 2,
+				 .bootstrap = 16,
+				 .epoch = 1000,
+				 .mutations = 8000,
+				 .mixture = "independent=0.1,hslt=0.9"};
+	struct plan p;
+	struct error e;
+	assert_int_equal(plan_make(&r, &p, &e), 0);
+	assert_true(p.parts == 2 && p.rounds == 2);
+	return p;
+}
+
+/* A lease of one chain without tiles; nothing of it lands in the crop. */
+static struct batch make_batch(uint64_t epoch, uint32_t group, uint32_t part)
+{
+	const struct plan p = make_plan();
+	struct batch b = {.key = {1, LEASE_RENDER, group, part, epoch}, .strategy_count = 2, .state_count = 1};
+	b.states = mem_alloc(1, sizeof *b.states);
+	b.states[0] = (struct chain_state){mem_alloc(4, 1), 4};
+	b.moment_count = batch_moment_count(&p, LEASE_RENDER);
+	b.moments = mem_alloc(b.moment_count, sizeof *b.moments);
+	b.counters[COUNT_SAMPLES] = 1000;
+	b.counters[COUNT_ACCEPTED] = 480;
+	b.counters[COUNT_STUCK] = group == 1;
+	b.counters[COUNT_LONGEST_STUCK] = 910 + group;
+	b.strategy[0][STRATEGY_PROPOSED] = 100;
+	b.strategy[0][STRATEGY_ACCEPTED] = 7;
+	b.strategy[0][STRATEGY_FAIL_DARK] = 91;
+	b.strategy[1][STRATEGY_PROPOSED] = 900;
+	b.strategy[1][STRATEGY_ACCEPTED] = 450 + 10 * group + part;
+	b.strategy[1][STRATEGY_RAYS] = UINT64_C(1) << 50;
+	b.strategy[1][STRATEGY_WALKS] = 800;
+	b.strategy[1][STRATEGY_ITERATIONS] = 2400;
+	b.strategy[1][STRATEGY_REVERSE_WALKS] = 500;
+	b.strategy[1][STRATEGY_FAIL_OUTSIDE] = 90;
+	b.strategy[1][STRATEGY_FAIL_INAPPLICABLE] = 9;
+	return b;
+}
+
+static void sums_are_of_each_batch_once(void **state)
+{
+	(void)state;
+	struct plan p = make_plan();
+	struct canvas *c;
+	struct canvas_counts n;
+	struct canvas_image img;
+	assert_int_equal(canvas_new(&c, &p, -30, NULL, NULL), 0);
+	for (uint64_t epoch = 0; epoch < 2; epoch++)
+		for (uint32_t i = 0; i < 4 - epoch; i++) { /* the second round stays open */
+			struct batch b = make_batch(epoch, i / 2, i % 2);
+			struct error e;
+			assert_int_equal(batch_check(&b, &p, &e), 0);
+			assert_int_equal(canvas_add(c, &b, NULL), 0);
+			assert_int_equal(canvas_add(c, &b, NULL), -EEXIST);
+			batch_fini(&b);
+		}
+	canvas_counts(c, false, &n);
+	assert_int_equal(n.strategy[0][STRATEGY_PROPOSED], 400);
+	assert_int_equal(n.strategy[1][STRATEGY_ACCEPTED], 4 * 450 + 22);
+	assert_true(n.strategy[1][STRATEGY_RAYS] == UINT64_C(1) << 52);
+	assert_int_equal(n.strategy[2][STRATEGY_PROPOSED], 0);
+	assert_int_equal(n.counters[COUNT_STUCK], 2);
+	assert_int_equal(n.counters[COUNT_LONGEST_STUCK], 911);
+	assert_int_equal(canvas_image(c, false, &img, NULL), 0);
+	assert_memory_equal(&img.counts, &n, sizeof n);
+	canvas_image_fini(&img);
+	canvas_counts(c, true, &n);
+	assert_int_equal(n.strategy[0][STRATEGY_FAIL_DARK], 7 * 91);
+	assert_int_equal(n.strategy[1][STRATEGY_ACCEPTED], 7 * 450 + 22 + 11);
+	assert_int_equal(n.counters[COUNT_LONGEST_STUCK], 911);
+	canvas_free(c);
+}
+
+static void expect(const struct plan *p, struct batch *b, int rc)
+{
+	struct error e = {""};
+	assert_int_equal(batch_check(b, p, &e), rc);
+	batch_fini(b);
+}
+
+static void a_batch_counts_within_bounds(void **state)
+{
+	(void)state;
+	struct plan p = make_plan(), without = p;
+	struct batch b = make_batch(0, 0, 0);
+	memset(without.mutations, 0, sizeof without.mutations);
+	expect(&without, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy_count = 0;
+	expect(&p, &b, 0);
+	b = make_batch(0, 0, 0);
+	b.strategy_count = 1;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy_count = UINT32_MAX;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy[1][STRATEGY_PROPOSED]++;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy[0][STRATEGY_ACCEPTED] = 101;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy[0][STRATEGY_FAIL_INAPPLICABLE] = 101;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy[1][STRATEGY_RAYS] = UINT64_C(1) << 56;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.strategy[0][STRATEGY_FAIL_OUTSIDE] = 3; /* with those that were accepted or failed otherwise one too many */
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.counters[COUNT_ACCEPTED] = 456;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.counters[COUNT_LONGEST_STUCK] = 1001;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(1, 0, 0);
+	b.counters[COUNT_LONGEST_STUCK] = 1001;
+	expect(&p, &b, 0);
+	b = make_batch(0, 0, 0);
+	b.counters[COUNT_STATES_LOST] = 2;
+	expect(&p, &b, -EBADMSG);
+	b = make_batch(0, 0, 0);
+	b.counters[COUNT_RAYS_SHADOW] = UINT64_C(1) << 40;
+	expect(&p, &b, -EBADMSG);
+}
+
+/* n samples with this sum and this sum of squares. */
+static void expect_sums(uint64_t n, double sum, double square, int rc)
+{
+	struct plan p = make_plan();
+	struct batch b = make_batch(0, 0, 0);
+	b.counters[COUNT_INDEPENDENT] = n;
+	b.independent_sum = sum;
+	b.independent_square = square;
+	expect(&p, &b, rc);
+}
+
+static void sums_are_of_samples_that_can_be(void **state)
+{
+	(void)state;
+	expect_sums(0, 0, 0, 0);
+	expect_sums(0, 1, 1, -EBADMSG);
+	expect_sums(4, 8, 16, 0);	   /* all alike */
+	expect_sums(4, 8, 64, 0);	   /* one has it all */
+	expect_sums(4, 8, 15.9, -EBADMSG); /* Cauchy and Schwarz */
+	expect_sums(4, 8, 64.1, -EBADMSG);
+	expect_sums(4, 8, 0, -EBADMSG);
+	expect_sums(4, 1e-200, 0, 0); /* the squares are below what there is */
+	expect_sums(1, 1.7e308, 1.7e308, -EBADMSG);
+	expect_sums(1, 1e100, 1e200, -EBADMSG); /* no float is as large */
+	expect_sums(4, -8, 64, -EBADMSG);
+	expect_sums(4, (double)INFINITY, (double)INFINITY, -EBADMSG);
+	expect_sums(4, (double)NAN, 1, -EBADMSG);
+}
+
+static void tables_are_readable(void **state)
+{
+	(void)state;
+	struct plan p = make_plan();
+	struct canvas_counts n = {{0}, {{0}}};
+	char text[STRATEGY_TABLE], small[40];
+	struct batch b = make_batch(0, 1, 0);
+	strategy_table(p.mutations, &n, text, sizeof text);
+	assert_string_equal(text, "");
+	strategy_note(&p, &n, false, text, sizeof text);
+	assert_string_equal(text, "");
+	strategy_note(&p, &n, true, text, sizeof text);
+	assert_string_equal(text, "the image is black: none of the 16 bootstrap samples found light");
+	memcpy(n.strategy, b.strategy, sizeof n.strategy);
+	memcpy(n.counters, b.counters, sizeof n.counters);
+	n.strategy[1][STRATEGY_RAYS] = 1800;
+	n.strategy[0][STRATEGY_PROPOSED] = 1234567;
+	strategy_table(p.mutations, &n, text, sizeof text);
+	static const char expected[] =
+		"strategy                      proposals accepted% rays/prop          walks iter/walk  reverse walks  failed%"
+		"  failures in % of proposals\n"
+		"independent                   1,234,567      0.00      0.00              0         -              0     0.01"
+		"  dark 0.00737\n"
+		"hslt                                900     51.11      2.00            800      3.00            500    11.00"
+		"  outside 10 inapplicable 1\n";
+	assert_string_equal(text, expected);
+	n.counters[COUNT_NAN] = n.counters[COUNT_NEGATIVE] = 1000;
+	n.counters[COUNT_SAMPLES] = 8000;
+	strategy_note(&p, &n, true, text, sizeof text);
+	assert_string_equal(
+		text,
+		"the image is black: no sample found light; 2,000 contributions were not numbers, infinite or negative, "
+		"and left out; 1 of 8 times a chain accepted nothing during a whole epoch (4 chains); longest run: "
+		"911 rejections");
+	strategy_add_beyond(0.0009, text, sizeof text); /* not worth a word */
+	assert_null(strstr(text, "missing"));
+	strategy_add_beyond(0.25, text, sizeof text);
+	assert_non_null(strstr(
+		text, "911 rejections; 25 % of the light is missing: it comes by paths longer than the chains of this "
+		      "integrator hold (path has all of it)"));
+	strategy_table(p.mutations, &n, small, sizeof small); /* cut, and ended */
+	assert_int_equal(strlen(small), sizeof small - 1);
+	strategy_lines(p.mutations, &n, text, sizeof text);
+	assert_non_null(strstr(text, "independent: proposed 1234567 accepted 7 "));
+	assert_non_null(strstr(
+		text,
+		"\nhslt: proposed 900 accepted 460 rays 1800 walks 800 iterations 2400 reverseWalks 500 outside 90 "));
+	/* The widest that there can be. */
+	memset(n.strategy, 0xff, sizeof n.strategy);
+	memset(n.counters, 0xff, sizeof n.counters);
+	p.chains = UINT32_MAX;
+	p.epoch = 1;
+	strategy_note(&p, &n, true, text, sizeof text);
+	strategy_add_beyond(0.00123456, text, sizeof text);
+	assert_true(strlen(text) < STRATEGY_NOTE);
+	char lines[5120]; /* what the header keeps for them */
+	strategy_lines("aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa,b,c,d,e,f,g,h", &n, lines, sizeof lines);
+	assert_true(strlen(lines) < sizeof lines - 1);
+	strategy_table("aaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaaa,b,c,d,e,f,g,h", &n, text, sizeof text);
+	assert_true(strlen(text) < sizeof text - 1 && text[strlen(text) - 1] == '\n');
+	batch_fini(&b);
+}
+
+static void json_comes_back(void **state)
+{
+	(void)state;
+	struct plan p = make_plan();
+	struct canvas_counts n = {{0}, {{0}}}, back = {{0}, {{0}}};
+	struct batch b = make_batch(0, 1, 0);
+	memcpy(n.strategy, b.strategy, sizeof n.strategy);
+	json_t *list = strategy_to_json(p.mutations, &n);
+	assert_int_equal(json_array_size(list), 2);
+	assert_string_equal(json_string_value(json_object_get(json_array_get(list, 1), "name")), "hslt");
+	strategy_from_json(list, &back);
+	assert_memory_equal(back.strategy, n.strategy, sizeof n.strategy);
+	json_object_set_new(json_array_get(list, 0), "proposed", json_integer(-1));
+	json_object_set_new(json_array_get(list, 0), "accepted", json_string("7"));
+	json_object_del(json_array_get(list, 1), "failures");
+	strategy_from_json(list, &back);
+	assert_true(back.strategy[0][STRATEGY_PROPOSED] == 0 && back.strategy[0][STRATEGY_ACCEPTED] == 0);
+	assert_true(back.strategy[1][STRATEGY_FAIL_OUTSIDE] == 0 && back.strategy[1][STRATEGY_PROPOSED] == 900);
+	json_decref(list);
+	strategy_from_json(NULL, &back);
+	assert_true(back.strategy[1][STRATEGY_PROPOSED] == 0);
+	batch_fini(&b);
+}
+
+static const char *attribute(const struct header *h, const char *name)
+{
+	for (size_t i = 0; i < h->count; i++)
+		if (strcmp(h->attributes[i].name, name) == 0)
+			return h->attributes[i].string;
+	return NULL;
+}
+
+static void headers_say_it(void **state)
+{
+	(void)state;
+	static struct header h;
+	struct plan p = make_plan();
+	struct canvas_image img = {.width = 20, .height = 10, .rounds = 2};
+	struct header_extra x = {.date = ""};
+	struct batch b = make_batch(0, 1, 0);
+	memcpy(img.counts.strategy, b.strategy, sizeof b.strategy);
+	memcpy(img.counts.counters, b.counters, sizeof b.counters);
+	header_fill(&h, &img, &p, &x);
+	assert_string_equal(attribute(&h, "hslt:mixture"), "independent=0.1,hslt=0.9");
+	assert_non_null(strstr(attribute(&h, "hslt:options"), "--mutations independent=0.1,hslt=0.9 "));
+	assert_non_null(strstr(attribute(&h, "hslt:strategies"), "hslt: proposed 900 accepted 460 "));
+	assert_string_equal(attribute(&h, "hslt:stuck"), "1");
+	assert_string_equal(attribute(&h, "hslt:longestStuck"), "911");
+	assert_non_null(strstr(attribute(&h, "hslt:note"), "1 of 1 times a chain accepted nothing"));
+	img.counts.counters[COUNT_STATES_LOST] = 3;
+	header_fill(&h, &img, &p, &x);
+	assert_non_null(strstr(attribute(&h, "hslt:note"), "3 of 1 times a chain's state could not be read back"));
+	img.counts.counters[COUNT_STUCK] = img.counts.counters[COUNT_STATES_LOST] = 0;
+	memset(p.mutations, 0, sizeof p.mutations);
+	header_fill(&h, &img, &p, &x);
+	assert_null(attribute(&h, "hslt:mixture"));
+	assert_null(attribute(&h, "hslt:strategies"));
+	assert_null(attribute(&h, "hslt:note"));
+	batch_fini(&b);
+}
+
+static void counters_have_names(void **state)
+{
+	(void)state;
+	for (int i = 0; i < STRATEGY_COUNTERS; i++) {
+		assert_true(*strategy_counter_name((enum strategy_counter)i) != 0);
+		for (int k = 0; k < i; k++)
+			assert_string_not_equal(strategy_counter_name((enum strategy_counter)i),
+						strategy_counter_name((enum strategy_counter)k));
+	}
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(sums_are_of_each_batch_once),
+		cmocka_unit_test(a_batch_counts_within_bounds),
+		cmocka_unit_test(sums_are_of_samples_that_can_be),
+		cmocka_unit_test(tables_are_readable),
+		cmocka_unit_test(json_comes_back),
+		cmocka_unit_test(headers_say_it),
+		cmocka_unit_test(counters_have_names),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
