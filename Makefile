@@ -37,7 +37,8 @@ CTL_SRC    := $(filter-out coordinator/ctl/hslt_%.c,$(wildcard coordinator/ctl/*
 COORD_SRC  := $(wildcard coordinator/core/*.c coordinator/store/*.c coordinator/shell/*.c)
 LIB_CTL    := $(BUILD)/lib/libhslt-ctl.a
 DAEMON_SRC := $(filter-out worker/daemon/main.c,$(wildcard worker/daemon/*.c))
-CLI_SRC    := $(filter-out worker/cli/hslt_%.c,$(wildcard worker/cli/*.c))
+CLI_MAIN   := $(wildcard worker/cli/*/hslt_*.c)
+CLI_SRC    := $(filter-out $(CLI_MAIN),$(wildcard worker/cli/*/*.c))
 PROTO      := $(wildcard proto/*.proto)
 # protobuf-c 1.5 deprecates its own protoc-c: it is a plug-in of protoc.
 PROTOC     := $(if $(shell command -v protoc 2>/dev/null),protoc,protoc-c)
@@ -52,8 +53,8 @@ LIB_COORD  := $(BUILD)/lib/libhslt-coordinator.a
 LIB_DAEMON := $(BUILD)/lib/libhslt-daemon.a
 LIB_CLI    := $(BUILD)/lib/libhslt-cli.a
 
-# A program is one file with a main: coordinator/main.c, worker/daemon/main.c, worker/cli/hslt_*.c, coordinator/ctl/hslt_*.c
-WORKER_CLI := $(patsubst worker/cli/hslt_%.c,hslt-%,$(wildcard worker/cli/hslt_*.c))
+# A program is one file with a main: coordinator/main.c, worker/daemon/main.c, worker/cli/*/hslt_*.c, coordinator/ctl/hslt_*.c
+WORKER_CLI := $(patsubst hslt_%.c,hslt-%,$(notdir $(CLI_MAIN)))
 CTL_CLI    := $(patsubst coordinator/ctl/hslt_%.c,hslt-%,$(wildcard coordinator/ctl/hslt_*.c))
 PROGRAMS   := $(if $(wildcard coordinator/main.c),hslt-coordinator) $(if $(wildcard worker/daemon/main.c),hslt-worker) \
               $(WORKER_CLI) $(CTL_CLI)
@@ -97,8 +98,11 @@ $(BUILD)/bin/hslt-coordinator: $(BUILD)/obj/coordinator/main.o $(LIB_COORD) $(LI
 	$(link) $(LIBS_COMMON)
 $(BUILD)/bin/hslt-worker: $(BUILD)/obj/worker/daemon/main.o $(LIB_DAEMON) $(LIB_RENDER) $(LIB_COMMON)
 	$(link) $(LIBS_RENDER) $(LIBS_COMMON)
-$(addprefix $(BUILD)/bin/,$(WORKER_CLI)): $(BUILD)/bin/hslt-%: $(BUILD)/obj/worker/cli/hslt_%.o $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
-	$(link) $(LIBS_RENDER) $(LIBS_COMMON)
+define cli_program
+$(patsubst hslt_%.c,$(BUILD)/bin/hslt-%,$(notdir $(1))): $(call obj,$(1)) $(LIB_CLI) $(LIB_RENDER) $(LIB_COMMON)
+	$$(link) $$(LIBS_RENDER) $$(LIBS_COMMON)
+endef
+$(foreach main,$(CLI_MAIN),$(eval $(call cli_program,$(main))))
 $(addprefix $(BUILD)/bin/,$(CTL_CLI)): $(BUILD)/bin/hslt-%: $(BUILD)/obj/coordinator/ctl/hslt_%.o $(LIB_CTL) $(LIB_COORD) $(LIB_COMMON)
 	$(link) $(LIBS_COMMON)
 

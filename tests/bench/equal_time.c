@@ -11,7 +11,7 @@
 #include "tests/bench/bench.h"
 #include "tests/bench/scenes.h"
 #include "tests/support/stats.h"
-#include "worker/cli/local.h"
+#include "worker/cli/render/local.h"
 #include "worker/render/render.h"
 #include "worker/render/choose.h"
 
@@ -175,9 +175,9 @@ static double *doubles(size_t n)
 	return p;
 }
 
-/* What squared errors are measured by, as in worker/cli/compare.h, but for the mean of the reference around each pixel
- * instead of the pixel itself: hard scenes leave a reference noisy, and where it happens to be dark all would look
- * wrong. */
+/* What squared errors are measured by, as in worker/cli/image/compare.h, but for the mean of the reference around each
+ * pixel instead of the pixel itself: hard scenes leave a reference noisy, and where it happens to be dark all would
+ * look wrong. */
 static double *scales_of(const struct canvas_image *r)
 {
 	int width = (int)r->width, height = (int)r->height;

@@ -9,7 +9,7 @@
 #include "tests/fuzz/folders.h"
 #include "tests/fuzz/seeds.h"
 #include "tests/support/checksummed_frame.h"
-#include "worker/cli/submit.h"
+#include "worker/cli/submit/submit.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>

@@ -17,7 +17,7 @@
 #include "tests/support/memory_assets.h"
 #include "tests/support/render_picture.h"
 #include "tests/support/worlds.h"
-#include "worker/cli/compare.h"
+#include "worker/cli/image/compare.h"
 
 #include <math.h>
 #include <setjmp.h>

@@ -3,7 +3,7 @@
 #include "tests/load/load.h"
 
 #include "common/base/mem.h"
-#include "worker/cli/submit.h"
+#include "worker/cli/submit/submit.h"
 
 #include <jansson.h>
 #include <math.h>

@@ -6,7 +6,7 @@
 #ifndef TESTS_SUPPORT_RENDER_PICTURE_H
 #define TESTS_SUPPORT_RENDER_PICTURE_H
 
-#include "worker/cli/picture.h"
+#include "worker/cli/image/picture.h"
 #include "worker/render/render.h"
 
 #include <stdint.h>

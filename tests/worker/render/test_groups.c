@@ -7,7 +7,7 @@
  */
 #include "common/estimate/merge.h"
 #include "tests/support/worlds.h"
-#include "worker/cli/local.h"
+#include "worker/cli/render/local.h"
 #include "worker/render/render.h"
 #include "worker/render/math/rng.h"
 #include "worker/render/mutation/mixture.h"

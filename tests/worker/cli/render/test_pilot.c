@@ -1,0 +1,70 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* How a pilot is cut: like the render but for its epoch, with enough rounds in its time, its bootstrap bounded. */
+#include "worker/cli/render/pilot.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <string.h>
+#include <cmocka.h>
+
+static struct plan_request request_of(enum plan_kind kind, uint32_t size)
+{
+	struct plan_request r = {
+		.kind = kind, .width = size, .height = size, .border = 1, .seed = 5, .min_depth = 1, .max_depth = 9};
+	strcpy(r.integrator, kind == PLAN_CHAINS ? "pssmlt" : "path");
+	return r;
+}
+
+static void pilots_of_chains(void **state)
+{
+	(void)state;
+	struct plan_request request = request_of(PLAN_CHAINS, 100), probe, pilot;
+	struct plan render, plan;
+	struct error e;
+	for (double sample = 1e-7; sample < 1e-3; sample *= 7) {
+		request.target_error = 0.02;
+		assert_int_equal(pilot_render_plan(&request, &render, &e), 0);
+		assert_true(pilot_probe(&request, &render, &probe));
+		assert_int_equal(plan_make(&probe, &plan, &e), 0);
+		assert_true(plan.rounds == 1 && plan.chains == render.chains && plan.groups == render.groups);
+		struct pilot_cost cost = {sample * (double)plan.bootstrap,
+					  sample * (double)plan_round_mutations(&plan)};
+		pilot_request(&request, &render, &probe, &cost, 60, &pilot);
+		assert_int_equal(plan_make(&pilot, &plan, &e), 0);
+		assert_true(plan.chains == render.chains && plan.groups == render.groups && plan.seed == 5);
+		double bootstrap = sample * (double)plan.bootstrap,
+		       rounds = sample * (double)plan_round_mutations(&plan);
+		assert_true(bootstrap <= 60 * 0.26 && plan.bootstrap <= render.bootstrap);
+		assert_true((60 - bootstrap) / rounds >= PILOT_ROUNDS - 1 || plan.epoch == 1);
+		assert_true(plan.epoch <= render.epoch);
+	}
+}
+
+static void pilots_of_samples(void **state)
+{
+	(void)state;
+	struct plan_request request = request_of(PLAN_SAMPLES, 4000), probe, pilot;
+	struct plan render, plan;
+	struct error e;
+	assert_int_equal(pilot_render_plan(&request, &render, &e), 0);
+	assert_true(render.target_error > 0);
+	assert_false(
+		pilot_probe(&request, &render, &probe)); /* one sample a pixel and group is a round, and long enough */
+	pilot_request(&request, &render, &probe, NULL, 60, &pilot);
+	assert_int_equal(plan_make(&pilot, &plan, &e), 0);
+	assert_true(plan.epoch == 1 && plan.groups == render.groups && plan.seconds == 60 && plan.rounds == UINT64_MAX);
+	request.groups = 1;
+	assert_int_equal(pilot_render_plan(&request, &render, &e), -EINVAL);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(pilots_of_chains),
+		cmocka_unit_test(pilots_of_samples),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,44 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* docs/compatibility.md is what the registries say today. The working folder is the tree's root. */
+#include "worker/cli/scene/compatibility.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static void test_page(void **state)
+{
+	(void)state;
+	char *text = NULL, line[8192];
+	size_t size = 0;
+	FILE *out = open_memstream(&text, &size), *page = fopen("docs/compatibility.md", "r");
+	assert_true(out && page);
+	compatibility_print(out);
+	assert_int_equal(fclose(out), 0);
+	const char *at = text;
+	for (int n = 1; fgets(line, sizeof line, page); n++) {
+		size_t length = strlen(line);
+		if (strncmp(at, line, length) != 0)
+			fail_msg("line %d is stale (hslt-scene compatibility >docs/compatibility.md): %s", n, line);
+		at += length;
+	}
+	assert_string_equal(at, "");
+	/* Of each kind a row that must be there. */
+	assert_non_null(strstr(text, "\n| `roughconductor` | `material`"));
+	assert_non_null(strstr(text, "\n| bsdf | `ward` | `roughplastic` |"));
+	assert_non_null(strstr(text, "\n| any | `max_depth`"));
+	assert_null(strstr(text, "| bsdf | `diffuse` |"));
+	fclose(page);
+	free(text);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_page)};
+	return cmocka_run_group_tests_name("compatibility", tests, NULL, NULL);
+}

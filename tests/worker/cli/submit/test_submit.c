@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What hslt-submit sends: the bytes that it read when it checked the scene, from below the scene's folder, or nothing.
+ * For which job it waits: for that one. */
+#include "coordinator/shell/server.h"
+#include "tests/support/folder.h"
+#include "worker/cli/submit/reconnect.h"
+
+#include "common/base/log.h"
+
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <setjmp.h>
+#include <cmocka.h>
+
+#include <signal.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+static char scene[96], mesh[128], secret[96], kept[96], address[32];
+static pid_t pid;
+
+static void serve(const char *listen, const char *spool, const char *port_file)
+{
+	struct server_config c;
+	struct error e;
+	prctl(PR_SET_PDEATHSIG, SIGKILL);
+	server_config_init(&c);
+	c.listen = listen;
+	c.spool = spool;
+	c.port_file = port_file;
+	log_set_level(LOG_LEVEL_ERROR);
+	_exit(server_run(&c, &e) ? 1 : 0);
+}
+
+/* Until it listens. */
+static int start(const char *listen, const char *spool_name)
+{
+	char spool[96], port_file[96];
+	unsigned port = 0;
+	snprintf(spool, sizeof spool, "%s/%s", folder, spool_name);
+	snprintf(port_file, sizeof port_file, "%s/port", folder);
+	remove(port_file);
+	fflush(NULL);
+	pid = fork();
+	if (pid == 0)
+		serve(listen, spool, port_file);
+	for (int i = 0; i < 60000 && !port; i++) {
+		FILE *f = fopen(port_file, "r");
+		if (f && fscanf(f, "%u", &port) != 1)
+			port = 0;
+		if (f)
+			fclose(f);
+		usleep(1000);
+	}
+	snprintf(address, sizeof address, "127.0.0.1:%u", port);
+	return port ? 0 : -1;
+}
+
+static int stop(void)
+{
+	int status = -1;
+	kill(pid, SIGTERM);
+	waitpid(pid, &status, 0);
+	return !WIFEXITED(status) || WEXITSTATUS(status);
+}
+
+static int set_up(void **state)
+{
+	char command[512];
+	if (folder_set_up(state))
+		return -1;
+	snprintf(scene, sizeof scene, "%s/box/box.xml", folder);
+	snprintf(mesh, sizeof mesh, "%s/box/meshes/wedge.obj", folder);
+	snprintf(secret, sizeof secret, "%s/secret", folder);
+	snprintf(kept, sizeof kept, "%s/kept", folder);
+	snprintf(command, sizeof command, "cp -r tests/scenes/box '%s' && sed s/1/2/ '%s' >'%s'", folder, mesh, secret);
+	return start("127.0.0.1:0", "spool") || system(command);
+}
+
+static int tear_down(void **state)
+{
+	return stop() | folder_tear_down(state);
+}
+
+static struct client *call(void)
+{
+	struct client *cl;
+	struct error e;
+	assert_int_equal(client_open(&cl, address, NULL, false, "test", &e), 0);
+	return cl;
+}
+
+static int send_to(struct client *cl, const struct scene_bundle *b, struct submitted *job, struct error *e)
+{
+	static struct render_arguments args;
+	char text[PLAN_TEXT];
+	struct submit_request r = {.name = "box", .output = "", .args = &args};
+	args.plan = (struct plan_request){.integrator = "path", .width = 48, .height = 40, .spp = 1, .max_depth = 4};
+	return submit_send(cl, &r, b, job, text, sizeof text, e);
+}
+
+/* The error, "" when it was taken. */
+static const char *sent(const struct scene_bundle *b)
+{
+	static struct error e;
+	struct submitted job = {0};
+	struct client *cl = call();
+	int rc = send_to(cl, b, &job, &e);
+	client_close(cl);
+	if (!rc)
+		e.text[0] = 0;
+	assert_true((rc == 0) == (job.job != 0));
+	return e.text;
+}
+
+static void says(const struct scene_bundle *b, const char *text)
+{
+	const char *said = sent(b);
+	if (!strstr(said, text))
+		fail_msg("'%s' is not in '%s'", text, said);
+}
+
+static void what_was_checked_is_sent(void **state)
+{
+	(void)state;
+	struct scene_bundle b;
+	struct render_options o = {.max_depth = 4};
+	struct error e;
+	assert_int_equal(scene_bundle_read(&b, scene, NULL, 0, &o, &e), 0);
+	assert_int_equal(b.count, 2);
+	assert_string_equal(b.files[0].name, "box.xml");
+	assert_string_equal(b.files[1].name, "meshes/wedge.obj");
+	assert_int_equal(rename(mesh, kept), 0);
+	assert_int_equal(symlink(secret, mesh), 0);
+	says(&b, "meshes/wedge.obj: leads out of the scene's folder");
+	assert_int_equal(unlink(mesh), 0);
+	assert_int_equal(rename(secret, mesh), 0);
+	says(&b, "meshes/wedge.obj: it has changed meanwhile");
+	assert_int_equal(rename(kept, mesh), 0);
+	assert_string_equal(sent(&b), "");
+	scene_bundle_fini(&b);
+}
+
+static void cancel(uint64_t job)
+{
+	Farm__Cancel question;
+	Farm__Envelope m;
+	struct client_message answer;
+	struct client *cl = call();
+	struct error e;
+	farm__cancel__init(&question);
+	farm__envelope__init(&m);
+	question.job = job;
+	m.body_case = FARM__ENVELOPE__BODY_CANCEL;
+	m.cancel = &question;
+	assert_int_equal(client_call(cl, &m, FARM__ENVELOPE__BODY_DONE, &answer, &e), 0);
+	assert_true(answer.envelope.message->done->ok);
+	client_message_fini(&answer);
+	client_close(cl);
+}
+
+static int wait_for(struct client **cl, const struct submitted *job, struct submit_end *end, struct error *e)
+{
+	char output[96];
+	snprintf(output, sizeof output, "%s/image.exr", folder);
+	return reconnect_job(cl, &(struct reconnect){.coordinator = address, .patience = 60}, job, output, end, e);
+}
+
+/* The coordinator comes back, with its spool or with another one in which our number is somebody else's. */
+static void one_job_is_waited_for(void **state)
+{
+	(void)state;
+	struct scene_bundle b;
+	struct render_options o = {.max_depth = 4};
+	struct submit_end end;
+	struct submitted job, other;
+	struct error e;
+	char same[32];
+	assert_int_equal(scene_bundle_read(&b, scene, NULL, 0, &o, &e), 0);
+	struct client *cl = call(), *later = call();
+	assert_int_equal(send_to(cl, &b, &job, &e), 0);
+	snprintf(same, sizeof same, "%s", address);
+	assert_int_equal(stop(), 0);
+	assert_int_equal(start(same, "spool"), 0);
+	cancel(job.job);
+	assert_int_equal(wait_for(&cl, &job, &end, &e), 0);
+	assert_int_equal(end.exit_code, 3);
+	assert_string_equal(end.state, "cancelled");
+	assert_int_equal(stop(), 0);
+	assert_int_equal(start(same, "other"), 0);
+	do {
+		struct client *guest = call();
+		assert_int_equal(send_to(guest, &b, &other, &e), 0);
+		client_close(guest);
+		cancel(other.job);
+	} while (other.job < job.job);
+	assert_int_equal(other.job, job.job);
+	assert_int_equal(wait_for(&later, &job, &end, &e), -ESTALE);
+	assert_non_null(strstr(e.text, "is another job now"));
+	assert_int_equal(client_exit_code(-ESTALE), 1);
+	client_close(cl);
+	client_close(later);
+	scene_bundle_fini(&b);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(what_was_checked_is_sent),
+					   cmocka_unit_test(one_job_is_waited_for)};
+	return cmocka_run_group_tests(tests, set_up, tear_down);
+}

@@ -1,0 +1,112 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/accuracy/accuracy_columns.h"
+
+#include <math.h>
+
+const struct accuracy_column accuracy_columns[] = {
+	{"setting", "parameter and value"},
+	{"parameter", "what differs from the default"},
+	{"value", "of that parameter"},
+	{"role", "default, reference or sweep"},
+	{"max_depth", "longest paths, in edges"},
+	{"mixture", "strategies and their weights, as --mutations takes them"},
+	{"settings", "settings that differ from the renderer's defaults, as --set takes them"},
+	{"mutations", "made in all"},
+	{"rounds", "in which they were made"},
+	{"cpu_seconds", "of the rounds, the bootstrap apart"},
+	{"us", "microseconds of CPU a mutation: median over the rounds"},
+	{"us_low", "95 % interval of that"},
+	{"us_high", ""},
+	{"acceptance", "accepted mutations, of all"},
+	{"failed_walks", "walks that did not converge or did not lead back, of all walks; empty: none was made"},
+	{"rays", "a mutation"},
+	{"error_mutations", "relative error at as many mutations as the default made"},
+	{"error_mutations_low", "95 % interval of that"},
+	{"error_mutations_high", ""},
+	{"error_time", "relative error in as much CPU time as the default had"},
+	{"error_time_low", "95 % interval of that"},
+	{"error_time_high", ""},
+	{"bias_mean", "the image's mean less the reference's, relative"},
+	{"bias_mean_low", "95 % interval of that"},
+	{"bias_mean_high", ""},
+	{"bias_block", "the same of the block that differs most surely"},
+	{"bias_block_low", "interval of that, 95 % for all blocks together"},
+	{"bias_block_high", ""},
+	{"block_x", "which block, counted from the left"},
+	{"block_y", "and from the top"},
+	{"bias_seen", "the least that the bias is when all settings and blocks are asked at once; 0: none was seen"},
+	{"bias_bound", "the most that it may be, of the mean or of any block"},
+	{"front", "1: on the Pareto front; empty: the reference, which takes no part"},
+	{"beaten_by", "the setting that beats it; empty: it is on the front"},
+	{0},
+};
+
+static void put_number(struct text_file *p, double x)
+{
+	if (isfinite(x))
+		text_file_put(p, ",%.6g", x);
+	else
+		text_file_put(p, ",");
+}
+
+static void put_interval(struct text_file *p, struct interval x)
+{
+	put_number(p, x.value);
+	put_number(p, x.low);
+	put_number(p, x.high);
+}
+
+static void put_row(struct text_file *p, const struct accuracy_context *x, size_t i)
+{
+	const struct accuracy_judgement *j = x->judgement;
+	const struct accuracy_setting *s = &x->design->settings[i];
+	const struct accuracy_figures *f = &j->figures[i];
+	char name[96];
+	bool reference = i == ACCURACY_REFERENCE, front = f->beaten_by == i;
+	accuracy_name(s, name, sizeof name);
+	text_file_field(p, name);
+	text_file_put(p, ",");
+	text_file_field(p, s->parameter);
+	text_file_put(p, ",");
+	text_file_field(p, s->value);
+	text_file_put(p, ",%s,%u,",
+		      i == ACCURACY_DEFAULT ? "default"
+		      : reference	    ? "reference"
+					    : "sweep",
+		      s->max_depth);
+	text_file_field(p, s->mixture);
+	text_file_put(p, ",");
+	text_file_field(p, s->accuracy);
+	text_file_put(p, ",%llu,%llu", (unsigned long long)f->mutations, (unsigned long long)f->rounds);
+	put_number(p, f->cpu_seconds);
+	put_interval(p, f->cost);
+	put_number(p, f->acceptance);
+	put_number(p, f->failed_walks);
+	put_number(p, f->rays);
+	put_interval(p, f->equal_mutations);
+	put_interval(p, f->equal_time);
+	put_interval(p, f->bias_mean);
+	put_interval(p, f->bias_block);
+	text_file_put(p, ",%u,%u", f->block % j->across, f->block / j->across);
+	put_number(p, f->bias_seen);
+	put_number(p, f->bias_bound);
+	text_file_put(p, reference ? ",," : ",%d,", front);
+	if (!front) {
+		accuracy_name(&x->design->settings[f->beaten_by], name, sizeof name);
+		text_file_field(p, name);
+	}
+	text_file_put(p, "\n");
+}
+
+int accuracy_csv(const struct accuracy_context *x, const char *path, struct error *e)
+{
+	struct text_file p = {.full = false};
+	for (size_t i = 0; accuracy_columns[i].name; i++)
+		text_file_put(&p, "%s%s", i ? "," : "", accuracy_columns[i].name);
+	text_file_put(&p, "\n");
+	for (size_t i = 0; i < x->design->count; i++)
+		put_row(&p, x, i);
+	int rc = text_file_write(&p, path, e);
+	text_file_fini(&p);
+	return rc;
+}

@@ -1,0 +1,413 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/accuracy/accuracy.h"
+
+#include "common/base/text.h"
+#include "worker/render/settings/accuracy_settings.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* The reference: values at which what a parameter may bias is far below what can be measured. Those of the roughness
+ * and the tessellation are the finest that are worth a sweep. */
+static const struct {
+	const char *parameter, *value;
+} careful[] = {{"tolerance", "1e-06"},
+	       {"iterations", "30"},
+	       {"reverse-tolerance", "1e-05"},
+	       {"roughness", "0"},
+	       {"tessellation", "2"}};
+
+/* What one would try who is in a hurry. */
+static const struct {
+	const char *name, *accuracy;
+} presets[] = {{"fast", "tolerance=0.01,iterations=6,reverse-tolerance=0.01"}};
+
+/* Parameters that are not of the list of worker/render/settings/accuracy_settings.h. */
+#define DEPTH "max-depth"
+#define SHARE "independent"
+#define MIXTURE "mixture"
+#define PRESET "preset"
+
+struct planner {
+	struct accuracy_design *d;
+	const struct plan_request *base;
+	const struct render_summary *scene;
+	const struct render_integrator *integrator;
+	const char *only;
+	struct error *e;
+};
+
+static bool listed(const char *list, const char *name)
+{
+	size_t n = strlen(name);
+	for (const char *at = list; at; at = strchr(at, ',') ? strchr(at, ',') + 1 : NULL)
+		if (strncmp(at, name, n) == 0 && (at[n] == ',' || at[n] == 0))
+			return true;
+	return list == NULL;
+}
+
+static const struct render_setting *setting_find(const char *name)
+{
+	const struct render_setting *k;
+	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++)
+		if (strcmp(k->name, name) == 0)
+			return k;
+	return NULL;
+}
+
+static void leave_out(struct planner *p, const char *parameter, const char *why)
+{
+	if (p->d->left_out_count == ACCURACY_SWEEPS)
+		return;
+	struct accuracy_left_out *l = &p->d->left_out[p->d->left_out_count++];
+	text_copy(l->parameter, sizeof l->parameter, parameter);
+	text_copy(l->why, sizeof l->why, why);
+}
+
+static struct accuracy_sweep *new_sweep(struct planner *p, const char *parameter, const char *summary)
+{
+	if (p->d->sweep_count == ACCURACY_SWEEPS)
+		return NULL;
+	struct accuracy_sweep *s = &p->d->sweeps[p->d->sweep_count++];
+	*s = (struct accuracy_sweep){.summary = summary};
+	text_copy(s->parameter, sizeof s->parameter, parameter);
+	return s;
+}
+
+/* Another setting that is the default but for what the caller changes; NULL: the table is full. */
+static struct accuracy_setting *new_setting(struct planner *p, const char *parameter, const char *value)
+{
+	struct accuracy_design *d = p->d;
+	if (d->count == ACCURACY_SETTINGS)
+		return NULL;
+	struct accuracy_setting *s = &d->settings[d->count++];
+	*s = (struct accuracy_setting){.share = 1, .max_depth = p->base->max_depth};
+	text_copy(s->parameter, sizeof s->parameter, parameter);
+	text_copy(s->value, sizeof s->value, value);
+	text_copy(s->accuracy, sizeof s->accuracy, p->base->accuracy);
+	text_copy(s->mixture, sizeof s->mixture, p->base->mixture);
+	return s;
+}
+
+/* The sweep's next value; setting 0 where it is the default's. */
+static bool add_value(struct accuracy_sweep *s, const char *value, size_t setting)
+{
+	if (s->count == ACCURACY_VALUES)
+		return false;
+	text_copy(s->value[s->count], sizeof s->value[0], value);
+	s->setting[s->count++] = setting;
+	return true;
+}
+
+static struct accuracy_setting *swept(struct planner *p, struct accuracy_sweep *s, const char *value)
+{
+	if (!add_value(s, value, p->d->count))
+		return NULL;
+	struct accuracy_setting *setting = new_setting(p, s->parameter, value);
+	if (!setting)
+		s->count--;
+	return setting;
+}
+
+/* The base's settings with one more; false: it is the base's value already, or no value. */
+static bool with_setting(const char *base, const char *name, const char *value, char out[PLAN_ACCURACY_MAX])
+{
+	char text[2 * PLAN_ACCURACY_MAX];
+	struct error e;
+	snprintf(text, sizeof text, "%s%s%s=%s", base, *base ? "," : "", name, value);
+	return render_settings_canonical(text, out, &e) == 0 && strcmp(out, base) != 0;
+}
+
+/* Why a parameter of the renderer does nothing here; NULL: it does. */
+static const char *idle(const struct planner *p, const struct render_setting *k)
+{
+	if (!k->sweep[0])
+		return "it decides what is rendered, not how accurately";
+	if (k->place == SETTING_CHAINS && !p->integrator->has_mutations)
+		return "the integrator has no strategies that walk";
+	if (strcmp(k->name, "tessellation") == 0 && !render_effect_on(p->scene, "displacement"))
+		return "no shape is displaced";
+	if (strcmp(k->name, "roughness") == 0 && !render_effect_on(p->scene, "glossy"))
+		return "no material has a rough lobe of finite width";
+	if (strcmp(k->name, "wavelengths") == 0 && !render_effect_on(p->scene, "colour"))
+		return "nothing varies with wavelength";
+	return NULL;
+}
+
+static void sweep_setting(struct planner *p, const struct render_setting *k)
+{
+	struct accuracy_settings now;
+	char standard[32];
+	size_t index = 0;
+	while (render_setting_at(index) != k)
+		index++;
+	if (accuracy_settings_read(p->base->accuracy, &now, NULL))
+		return;
+	accuracy_settings_value(&now, index, standard, sizeof standard);
+	struct accuracy_sweep *s = new_sweep(p, k->name, k->summary);
+	bool placed = false;
+	for (size_t i = 0; s && k->sweep[i]; i++) {
+		char accuracy[PLAN_ACCURACY_MAX];
+		if (!with_setting(p->base->accuracy, k->name, k->sweep[i], accuracy)) {
+			placed |= add_value(s, standard, ACCURACY_DEFAULT);
+			continue;
+		}
+		struct accuracy_setting *setting = swept(p, s, k->sweep[i]);
+		if (!setting)
+			continue;
+		memcpy(setting->accuracy, accuracy, sizeof accuracy);
+		setting->other_image = k->place == SETTING_WORLD;
+	}
+	if (s && !placed)
+		add_value(s, standard, ACCURACY_DEFAULT);
+}
+
+static void sweep_depth(struct planner *p)
+{
+	static const uint32_t depths[] = {2, 3, 5, 8, 12, 20, 32};
+	char value[32];
+	struct accuracy_sweep *s =
+		new_sweep(p, DEPTH, "Longest paths, in edges; what is longer is missing in the image");
+	for (size_t i = 0; s && i < sizeof depths / sizeof *depths && depths[i] < p->base->max_depth; i++) {
+		snprintf(value, sizeof value, "%u", depths[i]);
+		struct accuracy_setting *setting = swept(p, s, value);
+		if (!setting)
+			continue;
+		setting->max_depth = depths[i];
+		setting->other_image = true;
+	}
+	snprintf(value, sizeof value, "%u", p->base->max_depth);
+	if (s)
+		add_value(s, value, ACCURACY_DEFAULT);
+}
+
+struct entry {
+	char name[32];
+	double weight;
+	bool independent;
+};
+
+/* A canonical mixture: NAME=WEIGHT each. */
+static int entries_of(const char *mixture, struct entry entry[PLAN_MAX_STRATEGIES])
+{
+	int n = plan_strategy_count(mixture);
+	const char *at = mixture;
+	for (int i = 0; i < n; i++) {
+		plan_strategy_name(mixture, (uint32_t)i, entry[i].name, sizeof entry[i].name);
+		const char *equals = strchr(at, '=');
+		entry[i].weight = equals ? strtod(equals + 1, NULL) : 1;
+		entry[i].independent =
+			strcmp(entry[i].name, "bidirectional") == 0 || strcmp(entry[i].name, "independent") == 0;
+		at = strchr(at, ',') ? strchr(at, ',') + 1 : at;
+	}
+	return n;
+}
+
+static bool print_entries(struct planner *p, const struct entry *entry, int n, char out[PLAN_MUTATIONS_MAX])
+{
+	char text[PLAN_MUTATIONS_MAX];
+	struct text t = {text, sizeof text};
+	struct error e;
+	for (int i = 0, k = 0; i < n; i++)
+		if (entry[i].weight > 0)
+			text_put(&t, "%s%s=%.4g", k++ ? "," : "", entry[i].name, entry[i].weight);
+	return t.left > 1 && render_mutations(text, p->scene, out, &e) == 0;
+}
+
+static double independent_share(const struct entry *entry, int n)
+{
+	double all = 0, independent = 0;
+	for (int i = 0; i < n; i++) {
+		all += entry[i].weight;
+		independent += entry[i].independent ? entry[i].weight : 0;
+	}
+	return all > 0 ? independent / all : 0;
+}
+
+static void sweep_share(struct planner *p)
+{
+	static const double shares[] = {0.01, 0.03, 0.06, 0.2, 0.4, 0.7};
+	struct entry base[PLAN_MAX_STRATEGIES];
+	int n = entries_of(p->base->mixture, base);
+	double now = independent_share(base, n);
+	char value[48];
+	if (!(now > 0 && now < 1)) {
+		leave_out(p, SHARE, "the mixture has no other proposals, or none that are independent");
+		return;
+	}
+	struct accuracy_sweep *s =
+		new_sweep(p, SHARE,
+			  "Share of independent proposals, which find new light and estimate the brightness, "
+			  "among all");
+	bool placed = false;
+	for (size_t k = 0; s && k < sizeof shares / sizeof *shares; k++) {
+		struct entry changed[PLAN_MAX_STRATEGIES];
+		char mixture[PLAN_MUTATIONS_MAX];
+		if (fabs(log(shares[k] / now)) < 0.2)
+			continue;
+		if (!placed && now < shares[k]) {
+			snprintf(value, sizeof value, "%.2g", now);
+			placed = add_value(s, value, ACCURACY_DEFAULT);
+		}
+		for (int i = 0; i < n; i++) {
+			changed[i] = base[i];
+			changed[i].weight *= base[i].independent ? shares[k] / now : (1 - shares[k]) / (1 - now);
+		}
+		snprintf(value, sizeof value, "%.2g", shares[k]);
+		struct accuracy_setting *setting = print_entries(p, changed, n, mixture) ? swept(p, s, value) : NULL;
+		if (setting)
+			memcpy(setting->mixture, mixture, sizeof mixture);
+	}
+	snprintf(value, sizeof value, "%.2g", now);
+	if (s && !placed)
+		add_value(s, value, ACCURACY_DEFAULT);
+}
+
+static void try_mixture(struct planner *p, struct accuracy_sweep *s, const struct entry *entry, int n,
+			const char *value)
+{
+	char mixture[PLAN_MUTATIONS_MAX];
+	if (n > PLAN_MAX_STRATEGIES || !print_entries(p, entry, n, mixture) || strcmp(mixture, p->base->mixture) == 0)
+		return;
+	struct accuracy_setting *setting = swept(p, s, value);
+	if (setting)
+		memcpy(setting->mixture, mixture, sizeof mixture);
+}
+
+/* Each strategy left out, and each that is not there taken in. */
+static void sweep_mixture(struct planner *p)
+{
+	struct entry base[PLAN_MAX_STRATEGIES], changed[PLAN_MAX_STRATEGIES + 1];
+	int n = entries_of(p->base->mixture, base);
+	const char *name, *summary;
+	char value[48];
+	struct accuracy_sweep *s =
+		new_sweep(p, MIXTURE,
+			  "Strategies that propose mutations: one left out, or one taken in (a fifth of the "
+			  "others' weight)");
+	if (!s)
+		return;
+	add_value(s, "default", ACCURACY_DEFAULT);
+	double total = 0;
+	for (int i = 0; i < n; i++)
+		total += base[i].weight;
+	for (int i = 0; i < n; i++) {
+		memcpy(changed, base, sizeof base);
+		changed[i].weight = 0;
+		snprintf(value, sizeof value, "without %.31s", base[i].name);
+		if (!base[i].independent && base[i].weight < 0.5 * total)
+			try_mixture(p, s, changed, n, value);
+	}
+	for (size_t k = 0; (name = render_mutation_at(k, &summary)) != NULL; k++) {
+		bool here = strcmp(name, "independent") == 0 ||
+			    (strcmp(name, "wavelength") == 0 && !render_effect_on(p->scene, "colour")) ||
+			    (strcmp(name, "lens") == 0 && !render_effect_on(p->scene, "aperture"));
+		for (int i = 0; i < n; i++)
+			here |= strcmp(base[i].name, name) == 0;
+		if (here)
+			continue;
+		memcpy(changed, base, sizeof base);
+		changed[n] = (struct entry){.weight = 0.2 * total};
+		text_copy(changed[n].name, sizeof changed[n].name, name);
+		snprintf(value, sizeof value, "with %.31s", name);
+		try_mixture(p, s, changed, n + 1, value);
+	}
+}
+
+static void sweep_presets(struct planner *p)
+{
+	struct accuracy_sweep *s = new_sweep(p, PRESET, "Several settings at once");
+	for (size_t i = 0; s && i < sizeof presets / sizeof *presets; i++) {
+		char text[2 * PLAN_ACCURACY_MAX], accuracy[PLAN_ACCURACY_MAX];
+		snprintf(text, sizeof text, "%s%s%s", p->base->accuracy, *p->base->accuracy ? "," : "",
+			 presets[i].accuracy);
+		struct accuracy_setting *setting =
+			render_settings_canonical(text, accuracy, p->e) == 0 ? swept(p, s, presets[i].name) : NULL;
+		if (setting)
+			memcpy(setting->accuracy, accuracy, sizeof accuracy);
+	}
+	if (s) {
+		add_value(s, "default", ACCURACY_DEFAULT);
+		struct accuracy_setting *same = swept(p, s, "careful");
+		if (same)
+			memcpy(same->accuracy, p->d->settings[ACCURACY_REFERENCE].accuracy, sizeof same->accuracy);
+	}
+}
+
+static void add_reference(struct planner *p)
+{
+	struct accuracy_setting *s = new_setting(p, "reference", "");
+	s->share = ACCURACY_REFERENCE_SHARE;
+	for (size_t i = 0; i < sizeof careful / sizeof *careful; i++) {
+		const struct render_setting *k = setting_find(careful[i].parameter);
+		char accuracy[PLAN_ACCURACY_MAX];
+		if (k && !idle(p, k) && with_setting(s->accuracy, careful[i].parameter, careful[i].value, accuracy))
+			memcpy(s->accuracy, accuracy, sizeof accuracy);
+	}
+}
+
+static int check_only(struct planner *p)
+{
+	static const char *const own[] = {DEPTH, SHARE, MIXTURE, PRESET};
+	char name[32], known[300] = "";
+	struct text t = {known, sizeof known};
+	for (size_t i = 0; i < sizeof own / sizeof *own; i++)
+		text_put(&t, "%s%s", i ? ", " : "", own[i]);
+	for (size_t i = 0; render_setting_at(i); i++)
+		text_put(&t, ", %s", render_setting_at(i)->name);
+	for (const char *at = p->only; at && *at;) {
+		size_t n = strcspn(at, ",");
+		bool found = false;
+		snprintf(name, sizeof name, "%.*s", (int)(n < sizeof name ? n : sizeof name - 1), at);
+		for (size_t i = 0; i < sizeof own / sizeof *own; i++)
+			found |= strcmp(name, own[i]) == 0;
+		if (!found && !setting_find(name))
+			return error_set(p->e, EINVAL, "there is no parameter '%s'; there are %s", name, known);
+		at += n + (at[n] == ',');
+	}
+	return 0;
+}
+
+int accuracy_design(struct accuracy_design *d, const struct plan_request *base, const struct render_summary *scene,
+		    const char *only, struct error *e)
+{
+	struct planner p = {d, base, scene, render_integrator_find(base->integrator), only, e};
+	int rc = check_only(&p);
+	if (rc)
+		return rc;
+	*d = (struct accuracy_design){.count = 0};
+	new_setting(&p, "default", "");
+	add_reference(&p);
+	const struct render_setting *k;
+	for (size_t i = 0; (k = render_setting_at(i)) != NULL; i++) {
+		const char *why = idle(&p, k);
+		if (!listed(only, k->name))
+			continue;
+		if (why)
+			leave_out(&p, k->name, why);
+		else
+			sweep_setting(&p, k);
+	}
+	if (listed(only, DEPTH))
+		sweep_depth(&p);
+	if (!p.integrator->has_mutations) {
+		leave_out(&p, SHARE, "the integrator has no mixture of strategies");
+		leave_out(&p, MIXTURE, "the integrator has no mixture of strategies");
+		return 0;
+	}
+	if (listed(only, SHARE))
+		sweep_share(&p);
+	if (listed(only, MIXTURE))
+		sweep_mixture(&p);
+	if (listed(only, PRESET))
+		sweep_presets(&p);
+	return 0;
+}
+
+void accuracy_name(const struct accuracy_setting *s, char *text, size_t size)
+{
+	struct text t = {text, size};
+	text_put(&t, "%s%s%s", s->parameter, *s->value ? " " : "", s->value);
+}

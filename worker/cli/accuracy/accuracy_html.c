@@ -1,0 +1,363 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/base/mem.h"
+#include "common/base/version.h"
+#include "worker/cli/accuracy/accuracy_columns.h"
+#include "worker/cli/accuracy/accuracy_plots.h"
+#include "worker/cli/image/tonemap.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+static const char style[] =
+	"body{font:16px/1.5 system-ui,'DejaVu Sans',Helvetica,Arial,sans-serif;color:#222;background:#fff;max-width:62em;margin:2em auto;"
+	"padding:0 1em}h1,h2,h3{line-height:1.2;font-weight:600}h2{margin-top:2.2em;border-bottom:1px solid #ccc}"
+	"table{border-collapse:collapse;margin:1em 0;font-size:14px}th,td{padding:.25em .7em;text-align:right;border-bottom:1px solid #e4e4e4}"
+	"th{background:#f4f4f4;vertical-align:bottom}td.t,th.t{text-align:left}tr.front{background:#e8f3fa}tr.default td.t{font-weight:600}"
+	"td.seen{color:#b04a00}.note{color:#555}.plots svg{max-width:49%;height:auto}.wide svg{max-width:100%;height:auto}"
+	"img{image-rendering:auto;max-width:100%;border:1px solid #ccc}.answer{background:#f4f4f4;padding:.6em 1em;border-left:4px solid #0072b2}"
+	"code{font-size:13px;overflow-wrap:anywhere}";
+
+static void paragraph(struct text_file *p, const char *text)
+{
+	text_file_put(p, "<p>");
+	text_file_escaped(p, text);
+	text_file_put(p, "</p>\n");
+}
+
+/* "12.3 (11.9 to 12.8)", in percent. */
+static void cell(struct text_file *p, struct interval x, bool sign, bool seen)
+{
+	if (!isfinite(x.value))
+		text_file_put(p, "<td>&#8211;</td>");
+	else
+		text_file_put(p,
+			      sign ? "<td%s>%+.3g <span class=\"note\">(%+.3g to %+.3g)</span></td>"
+				   : "<td%s>%.3g <span class=\"note\">(%.3g to %.3g)</span></td>",
+			      seen ? " class=\"seen\"" : "", 100 * x.value, 100 * x.low, 100 * x.high);
+}
+
+static void name_cell(struct text_file *p, const struct accuracy_context *x, size_t i)
+{
+	char name[96];
+	accuracy_name(&x->design->settings[i], name, sizeof name);
+	text_file_put(p, "<td class=\"t\">");
+	text_file_escaped(p, name);
+	text_file_put(p, "</td>");
+}
+
+static void row_begin(struct text_file *p, const struct accuracy_context *x, size_t i)
+{
+	bool front = x->judgement->figures[i].beaten_by == i && i != ACCURACY_REFERENCE;
+	text_file_put(p, "<tr class=\"%s%s\">", front ? "front " : "", i == ACCURACY_DEFAULT ? "default" : "");
+}
+
+/* The default against the others, in one paragraph: what most readers came for. */
+static void put_answer(struct text_file *p, const struct accuracy_context *x)
+{
+	const struct accuracy_figures *f = x->judgement->figures, *d = &f[ACCURACY_DEFAULT];
+	char name[96];
+	text_file_put(p, "<div class=\"answer\">");
+	if (x->judgement->thin)
+		text_file_put(
+			p,
+			"<p><b>Too little was rendered for this scene and size</b>: errors above 50 %%, or fewer than four rounds of a setting. "
+			"Groups of chains that missed the rare light then look exact, and what follows may be chance. Give it more minutes "
+			"(--budget), a smaller film (--size) or fewer parameters (--parameters).</p>");
+	text_file_put(p, "<p>");
+	if (d->beaten_by == ACCURACY_DEFAULT) {
+		text_file_put(
+			p,
+			"<b>The default lies on the front</b>: no other setting has surely less error at equal time without a sign of more bias, or "
+			"surely less bias without surely more error.");
+	} else {
+		const struct accuracy_figures *b = &f[d->beaten_by];
+		accuracy_name(&x->design->settings[d->beaten_by], name, sizeof name);
+		text_file_put(p, "<b>The default does not lie on the front</b>: <b>");
+		text_file_escaped(p, name);
+		text_file_put(
+			p,
+			"</b> has a relative error of %.3g %% (%.3g to %.3g) in the time in which the default has %.3g %% (%.3g to %.3g), "
+			"that is %.2f times the speed; its bias is at most %.2g %%%s.",
+			100 * b->equal_time.value, 100 * b->equal_time.low, 100 * b->equal_time.high,
+			100 * d->equal_time.value, 100 * d->equal_time.low, 100 * d->equal_time.high,
+			d->equal_time.value * d->equal_time.value / (b->equal_time.value * b->equal_time.value),
+			100 * b->bias_bound, b->bias_seen > 0 ? "" : ", none was seen");
+	}
+	text_file_put(p, "</p>");
+	size_t biased = 0;
+	for (size_t i = 0; i < x->design->count; i++) {
+		if (!(f[i].bias_seen > 0) || i == ACCURACY_REFERENCE)
+			continue;
+		accuracy_name(&x->design->settings[i], name, sizeof name);
+		text_file_put(p, biased++ ? ", " : "<p>Settings whose bias was seen: ");
+		text_file_escaped(p, name);
+		text_file_put(p, " (at least %.2g %%)", 100 * f[i].bias_seen);
+	}
+	text_file_put(p, biased ? ".</p>" : "<p>No bias was seen in any setting.</p>");
+	if (isfinite(d->bias_mean.value))
+		text_file_put(
+			p,
+			"<p>Against the reference the default's mean differs by %+.2g %% (%+.2g to %+.2g); its bias, of the mean or of any "
+			"block, is at most %.2g %%.</p>",
+			100 * d->bias_mean.value, 100 * d->bias_mean.low, 100 * d->bias_mean.high, 100 * d->bias_bound);
+	text_file_put(p, "</div>\n");
+}
+
+static int put_picture(struct text_file *p, const struct accuracy_context *x, struct error *e)
+{
+	const struct accuracy_judgement *j = x->judgement;
+	size_t pixels = (size_t)j->width * j->height, size;
+	const float *const planes[3] = {j->rgb, j->rgb + pixels, j->rgb + 2 * pixels};
+	unsigned char *bytes = mem_alloc(pixels, 3), *png = NULL;
+	if (!bytes)
+		return error_set(e, ENOMEM, "no memory for the picture");
+	tonemap(planes, pixels, 0, bytes);
+	int rc = picture_encode_png(bytes, j->width, j->height, &png, &size, e);
+	mem_free(bytes);
+	if (rc)
+		return rc;
+	text_file_put(p, "<p><img alt=\"the scene, as the reference has it\" width=\"%u\" src=\"data:image/png;base64,",
+		      j->width < 480 ? j->width * (480 / j->width) : j->width);
+	text_file_base64(p, png, size);
+	text_file_put(p, "\"/><br/><span class=\"note\">The scene, as the reference has it.</span></p>\n");
+	mem_free(png);
+	return 0;
+}
+
+static void fact(struct text_file *p, const char *name, const char *text)
+{
+	text_file_put(p, "<tr><td class=\"t\">%s</td><td class=\"t\">", name);
+	text_file_escaped(p, text);
+	text_file_put(p, "</td></tr>\n");
+}
+
+static void machine(char *text, size_t size, unsigned threads)
+{
+	char line[256], model[160] = "unknown processor";
+	FILE *f = fopen("/proc/cpuinfo", "re");
+	while (f && fgets(line, sizeof line, f))
+		if (sscanf(line, "model name : %159[^\n]", model) == 1)
+			break;
+	if (f)
+		fclose(f);
+	snprintf(text, size, "%s, %u thread%s; %s", model, threads, threads == 1 ? "" : "s", render_numeric_version());
+}
+
+static void put_facts(struct text_file *p, const struct accuracy_context *x)
+{
+	const struct accuracy_run *r = x->run;
+	const struct plan *plan = &r->jobs[ACCURACY_DEFAULT].plan;
+	char text[PLAN_TEXT];
+	time_t now = time(NULL);
+	struct tm utc;
+	text_file_put(p, "<table>\n");
+	fact(p, "Scene", x->scene);
+	snprintf(text, sizeof text, "%s, %u x %u pixels, paths of at most %u edges", plan->integrator, plan->crop_width,
+		 plan->crop_height, plan->max_depth);
+	fact(p, "Rendered by", text);
+	fact(p, "Mixture", *plan->mutations ? plan->mutations : "none");
+	fact(p, "Settings changed", *plan->accuracy ? plan->accuracy : "none: the renderer's defaults");
+	plan_describe(plan, text, sizeof text);
+	fact(p, "Plan of the default", text);
+	snprintf(text, sizeof text,
+		 "%zu settings in turns, %.0f s in all%s; each %.3g s of CPU, the reference %g times that",
+		 x->design->count, r->wall_seconds, r->interrupted ? " (interrupted: what was there by then)" : "",
+		 x->judgement->figures[ACCURACY_DEFAULT].cpu_seconds, ACCURACY_REFERENCE_SHARE);
+	fact(p, "Run", text);
+	snprintf(text, sizeof text, "rendered carefully: %s",
+		 *x->design->settings[ACCURACY_REFERENCE].accuracy ? x->design->settings[ACCURACY_REFERENCE].accuracy
+								   : "as the default, but longer");
+	fact(p, "Reference for the bias", x->reference ? x->reference : text);
+	machine(text, sizeof text, r->threads);
+	fact(p, "Machine", text);
+	if (gmtime_r(&now, &utc) &&
+	    strftime(text, sizeof text, "%Y-%m-%d %H:%M UTC, hslt-accuracy " HSLT_VERSION, &utc))
+		fact(p, "Made", text);
+	text_file_put(p, "</table>\n");
+}
+
+static void put_guide(struct text_file *p, const struct accuracy_context *x)
+{
+	text_file_put(p, "<h2>How to read this</h2>\n");
+	paragraph(
+		p,
+		"Each setting differs from the default in one parameter (presets: in several). All were rendered in turns, a round of each after "
+		"the other, so that whatever else the machine did meets all of them alike.");
+	text_file_put(
+		p,
+		"<p><b>Error at equal time</b> is the relative error that the setting reaches in the CPU time that the default had (%.3g s), and "
+		"<b>error at equal mutations</b> that after as many mutations (%llu). Both are noise: the square root of the mean, over pixels and "
+		"colours, of the squared standard error over the squared brightness, from the spread between independent groups of chains; the "
+		"%g %% of the pixels with the greatest errors are left out, because a single one can be most of the whole and say nothing about "
+		"the setting. Half the error takes four times the time.</p>\n",
+		x->judgement->at_cpu_seconds, (unsigned long long)x->judgement->at_mutations, 100 * ACCURACY_TRIM);
+	text_file_put(
+		p,
+		"<p><b>Bias</b> is what no amount of time removes: the mean of the image against that of the reference, and the block of the image "
+		"(of %u x %u) that differs most surely. Figures in parentheses are 95 %% intervals. A bias is called seen when it is beyond "
+		"chance even though all blocks of all settings were asked.</p>\n",
+		x->judgement->across, x->judgement->down);
+	paragraph(
+		p,
+		"A setting lies on the front (shaded) when no other one beats it: none has surely less error at equal time without a sign of more "
+		"bias, and none is free of a bias that was seen in it without surely more error. \"Surely\" is beyond the intervals, shared among all "
+		"settings; a setting whose bias is known much less well, or whose own interval of the bias leaves out 0, beats nobody by speed. max-depth, roughness and tessellation make "
+		"another image by what they are: they beat nobody, and may lie on the front as trades.");
+	if (!x->judgement->file)
+		paragraph(
+			p,
+			"The reference is the careful preset, rendered longer, so that a bias which it has too cannot be seen here; --reference FILE takes an "
+			"image of another integrator instead.");
+}
+
+static void put_summary(struct text_file *p, const struct accuracy_context *x)
+{
+	const struct accuracy_judgement *j = x->judgement;
+	char name[96];
+	text_file_put(
+		p,
+		"<table>\n<tr><th class=\"t\">setting</th><th>error at equal time, %%</th><th>time for equal error</th><th>bias of the mean, %%</th>"
+		"<th>bias of the worst block, %%</th><th class=\"t\">verdict</th></tr>\n");
+	for (size_t i = 0; i < x->design->count; i++) {
+		const struct accuracy_figures *f = &j->figures[i];
+		double times = f->equal_time.value / j->figures[ACCURACY_DEFAULT].equal_time.value;
+		if (i == ACCURACY_REFERENCE)
+			continue;
+		row_begin(p, x, i);
+		name_cell(p, x, i);
+		cell(p, f->equal_time, false, false);
+		text_file_put(p, "<td>x %.2f</td>", times * times);
+		struct interval none = {NAN, NAN, NAN};
+		cell(p, f->bias_mean, true, f->bias_seen > 0);
+		cell(p, j->across * j->down == 1 ? none : f->bias_block, true, f->bias_seen > 0);
+		if (f->beaten_by == i) {
+			text_file_put(p, "<td class=\"t\">on the front%s</td></tr>\n",
+				      f->bias_seen > 0 ? ", biased" : "");
+			continue;
+		}
+		accuracy_name(&x->design->settings[f->beaten_by], name, sizeof name);
+		text_file_put(p, "<td class=\"t\">beaten by ");
+		text_file_escaped(p, name);
+		text_file_put(p, "</td></tr>\n");
+	}
+	text_file_put(p, "</table>\n");
+}
+
+static void put_mutations(struct text_file *p, const struct accuracy_context *x)
+{
+	text_file_put(
+		p,
+		"<h2>At equal mutations, and what a mutation costs</h2>\n<table>\n<tr><th class=\"t\">setting</th><th>mutations</th>"
+		"<th>&#181;s CPU a mutation</th><th>accepted, %%</th><th>failed walks, %%</th><th>rays a mutation</th>"
+		"<th>error at equal mutations, %%</th></tr>\n");
+	for (size_t i = 0; i < x->design->count; i++) {
+		const struct accuracy_figures *f = &x->judgement->figures[i];
+		row_begin(p, x, i);
+		name_cell(p, x, i);
+		text_file_put(p, "<td>%llu</td><td>%.3g <span class=\"note\">(%.3g to %.3g)</span></td><td>%.3g</td>",
+			      (unsigned long long)f->mutations, f->cost.value, f->cost.low, f->cost.high,
+			      100 * f->acceptance);
+		if (isfinite(f->failed_walks))
+			text_file_put(p, "<td>%.3g</td>", 100 * f->failed_walks);
+		else
+			text_file_put(p, "<td>&#8211;</td>");
+		text_file_put(p, "<td>%.3g</td>", f->rays);
+		struct interval none = {NAN, NAN, NAN};
+		cell(p, i == ACCURACY_REFERENCE ? none : f->equal_mutations, false, false);
+		text_file_put(p, "</tr>\n");
+	}
+	text_file_put(
+		p,
+		"</table>\n<p class=\"note\">Failed walks: those that did not converge or whose way back did not lead to where they began, of all "
+		"walks on the manifold.</p>\n");
+}
+
+static void put_sweep(struct text_file *p, const struct accuracy_context *x, const struct accuracy_sweep *s)
+{
+	text_file_put(p, "<h3>");
+	text_file_escaped(p, s->parameter);
+	text_file_put(p, "</h3>\n");
+	char text[300];
+	snprintf(text, sizeof text, "%s.", s->summary);
+	paragraph(p, text);
+	accuracy_plot_sweep(p, x, s);
+	text_file_put(
+		p,
+		"<table>\n<tr><th class=\"t\">value</th><th>&#181;s a mutation</th><th>accepted, %%</th><th>failed walks, %%</th>"
+		"<th>error at equal time, %%</th><th>bias of the mean, %%</th><th>of the worst block, %%</th></tr>\n");
+	for (size_t k = 0; k < s->count; k++) {
+		size_t i = s->setting[k];
+		const struct accuracy_figures *f = &x->judgement->figures[i];
+		struct interval none = {NAN, NAN, NAN};
+		row_begin(p, x, i);
+		text_file_put(p, "<td class=\"t\">");
+		text_file_escaped(p, s->value[k]);
+		text_file_put(p, "%s</td><td>%.3g</td><td>%.3g</td>",
+			      i == ACCURACY_DEFAULT && strcmp(s->value[k], "default") != 0 ? " (default)" : "",
+			      f->cost.value, 100 * f->acceptance);
+		if (isfinite(f->failed_walks))
+			text_file_put(p, "<td>%.3g</td>", 100 * f->failed_walks);
+		else
+			text_file_put(p, "<td>&#8211;</td>");
+		cell(p, f->equal_time, false, false);
+		cell(p, f->bias_mean, true, f->bias_seen > 0);
+		cell(p, x->judgement->across == 1 ? none : f->bias_block, true, f->bias_seen > 0);
+		text_file_put(p, "</tr>\n");
+	}
+	text_file_put(p, "</table>\n");
+}
+
+static void put_rest(struct text_file *p, const struct accuracy_context *x)
+{
+	const struct accuracy_design *d = x->design;
+	if (d->left_out_count)
+		text_file_put(
+			p,
+			"<h2>Left out</h2>\n<table>\n<tr><th class=\"t\">parameter</th><th class=\"t\">why it does nothing here</th></tr>\n");
+	for (size_t i = 0; i < d->left_out_count; i++)
+		fact(p, d->left_out[i].parameter, d->left_out[i].why);
+	text_file_put(p, "%s<h2>The CSV's columns</h2>\n<table>\n", d->left_out_count ? "</table>\n" : "");
+	for (size_t i = 0; accuracy_columns[i].name; i++)
+		fact(p, accuracy_columns[i].name,
+		     *accuracy_columns[i].meaning ? accuracy_columns[i].meaning : "the other end of it");
+	text_file_put(p, "</table>\n");
+}
+
+static int put_all(struct text_file *p, const struct accuracy_context *x, struct error *e)
+{
+	text_file_put(
+		p,
+		"<!DOCTYPE html>\n<html xmlns=\"http://www.w3.org/1999/xhtml\" lang=\"en\"><head><meta charset=\"utf-8\"/><title>What accuracy costs: ");
+	text_file_escaped(p, x->scene);
+	text_file_put(p, "</title><style>%s</style></head>\n<body>\n<h1>What accuracy costs in time: ", style);
+	text_file_escaped(p, x->scene);
+	text_file_put(p, "</h1>\n");
+	put_answer(p, x);
+	int rc = put_picture(p, x, e);
+	if (rc)
+		return rc;
+	put_facts(p, x);
+	put_guide(p, x);
+	text_file_put(p, "<h2>All settings</h2>\n");
+	accuracy_plot_front(p, x);
+	put_summary(p, x);
+	text_file_put(p, "<h2>Parameter by parameter</h2>\n");
+	for (size_t i = 0; i < x->design->sweep_count; i++)
+		put_sweep(p, x, &x->design->sweeps[i]);
+	put_mutations(p, x);
+	put_rest(p, x);
+	text_file_put(p, "</body></html>\n");
+	return 0;
+}
+
+int accuracy_html(const struct accuracy_context *x, const char *path, struct error *e)
+{
+	struct text_file p = {.full = false};
+	int rc = put_all(&p, x, e);
+	if (!rc)
+		rc = text_file_write(&p, path, e);
+	text_file_fini(&p);
+	return rc;
+}

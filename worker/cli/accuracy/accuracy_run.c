@@ -1,0 +1,265 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/accuracy/accuracy.h"
+
+#include "common/base/mem.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+static double now(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+enum { PILOT_BOOTSTRAP = 16384, PILOT_EPOCH = 16 };
+
+struct pilot {				   /* of the default, for the sizes of rounds and nothing else */
+	double bootstrap_sample, mutation; /* CPU seconds */
+	double rate;			   /* CPU seconds a second: what other programs leave of the processors */
+};
+
+static double shares(const struct accuracy_design *d)
+{
+	double sum = 0;
+	for (size_t i = 0; i < d->count; i++)
+		sum += d->settings[i].share;
+	return sum;
+}
+
+/* CPU seconds that a setting of share 1 will have, before it is known how much the bootstrap and the worlds take. */
+static double expected_seconds(const struct accuracy_run *r, const struct pilot *pilot)
+{
+	return r->setting_seconds > 0 ? r->setting_seconds : 0.85 * r->seconds * pilot->rate / shares(r->design);
+}
+
+/* All films stay in memory until the end, because the settings take turns. */
+static int check_memory(const struct accuracy_run *r, const struct plan *p, struct error *e)
+{
+	double tiles = ceil(p->crop_width / (double)TILE_SIZE) * ceil(p->crop_height / (double)TILE_SIZE);
+	double wanted = (double)r->design->count * p->groups * 3 * tiles * TILE_SIZE * TILE_SIZE * TILE_CHANNELS *
+			sizeof(int64_t);
+	double there = (double)sysconf(_SC_AVPHYS_PAGES) * (double)sysconf(_SC_PAGESIZE);
+	if (wanted < 0.75 * there)
+		return 0;
+	return error_set(
+		e, ENOMEM,
+		"%zu settings of %ux%u pixels take %.1f GB of memory, of which %.1f are there: choose a smaller --size, "
+		"or fewer --parameters",
+		r->design->count, p->crop_width, p->crop_height, wanted / 1e9, there / 1e9);
+}
+
+/* Rounds are short, so that the settings change often; the bootstrap takes a tenth of the time or so. */
+static int make_plan(struct accuracy_run *r, size_t i, const struct pilot *pilot, struct error *e)
+{
+	enum { ROUNDS = 25 };
+	const struct accuracy_setting *s = &r->design->settings[i];
+	struct plan_request q = r->request;
+	struct plan *p = &r->jobs[i].plan;
+	double each = expected_seconds(r, pilot);
+	q.max_depth = s->max_depth;
+	memcpy(q.accuracy, s->accuracy, sizeof q.accuracy);
+	memcpy(q.mixture, s->mixture, sizeof q.mixture);
+	q.seed += i; /* what is compared shares no random numbers */
+	q.seconds = 1e8;
+	q.spp = q.mutations = 0;
+	q.target_error = 0;
+	bool chains = q.kind == PLAN_CHAINS;
+	if (chains && !q.bootstrap)
+		q.bootstrap = (uint64_t)fmin(fmax(0.1 * each / pilot->bootstrap_sample, PILOT_BOOTSTRAP), 1e6);
+	/* As many chains as a render of that length has: where they are short, many of them err in ways that groups do
+	 * not show. */
+	q.mutations = chains && !q.chains ? (uint64_t)fmin(fmax(each / pilot->mutation, 1), 1e15) : 0;
+	int rc = plan_make(&q, p, e);
+	q.chains = p->chains;
+	q.mutations = 0;
+	if (!rc)
+		rc = plan_make(&q, p, e);
+	if (!rc && !r->request.epoch) {
+		double step = chains ? (double)p->chains : (double)p->groups * (double)plan_extended_pixels(p);
+		q.epoch = (uint64_t)fmin(fmax(each / ROUNDS / pilot->mutation / step, chains ? PILOT_EPOCH : 1), 8192);
+		rc = plan_make(&q, p, e);
+	}
+	if (!rc && p->groups < 4)
+		rc = error_set(e, EINVAL, "%u groups are too few to tell errors from: at least 4 are needed",
+			       p->groups);
+	return rc;
+}
+
+/* A world that is there already and needs no building for these settings, or a new one. */
+static int find_world(struct accuracy_run *r, struct accuracy_job *j, struct error *e)
+{
+	struct render_options options = *r->render;
+	for (size_t k = 0; k < r->world_count; k++) {
+		bool fits;
+		int rc = world_set_accuracy(r->worlds[k], j->plan.accuracy, &fits, e);
+		if (rc)
+			return rc;
+		if (fits) {
+			j->world = r->worlds[k];
+			return 0;
+		}
+	}
+	memcpy(options.accuracy, j->plan.accuracy, sizeof options.accuracy);
+	int rc = world_new(&j->world, r->scene, r->assets, &options, e);
+	if (!rc)
+		r->worlds[r->world_count++] = j->world;
+	return rc;
+}
+
+static bool stopped(const struct accuracy_run *r)
+{
+	return r->stop && atomic_load(r->stop);
+}
+
+static int start(struct accuracy_run *r, size_t i, struct error *e)
+{
+	struct accuracy_job *j = &r->jobs[i];
+	int rc = find_world(r, j, e);
+	if (rc)
+		return rc;
+	j->run = (struct local_run){.world = j->world, .plan = &j->plan, .threads = r->threads, .stop = r->stop};
+	rc = local_start(&j->run, &j->job, e);
+	if (!rc && j->run.lit.black && j->run.canvas)
+		rc = error_set(e, EINVAL, "no light arrives in the bootstrap: there is nothing to compare");
+	return rc;
+}
+
+/* A round of job i. Its cost is what its leases took of the processors. */
+static int step(struct accuracy_run *r, size_t i, struct error *e)
+{
+	struct accuracy_job *j = &r->jobs[i];
+	bool fits;
+	int rc = world_set_accuracy(j->world, j->plan.accuracy, &fits, e);
+	double before = j->run.cpu_seconds;
+	uint64_t rounds = canvas_rounds(j->run.canvas);
+	if (!rc)
+		rc = local_step(j->job, e);
+	if (rc || canvas_rounds(j->run.canvas) == rounds)
+		return rc;
+	double cpu = j->run.cpu_seconds - before;
+	j->cpu += cpu;
+	if (j->cost_count < ACCURACY_COSTS)
+		j->cost[j->cost_count++] = cpu / (double)plan_round_mutations(&j->plan);
+	return 0;
+}
+
+/* What setting i had of its share: CPU seconds or rounds. */
+static double had(const struct accuracy_run *r, size_t i)
+{
+	const struct accuracy_job *j = &r->jobs[i];
+	return (r->setting_rounds ? (double)canvas_rounds(j->run.canvas) : j->cpu) / r->design->settings[i].share;
+}
+
+/* Who had least. */
+static size_t next(const struct accuracy_run *r)
+{
+	size_t best = 0;
+	for (size_t i = 1; i < r->design->count; i++)
+		if (had(r, i) < had(r, best))
+			best = i;
+	return best;
+}
+
+static void show(const struct accuracy_run *r, double fraction, const char *state)
+{
+	if (r->progress)
+		r->progress(r->user, fraction, state);
+}
+
+static int rounds(struct accuracy_run *r, double begin, struct error *e)
+{
+	double first = now(), wanted = r->setting_rounds ? (double)r->setting_rounds : r->setting_seconds;
+	for (;;) {
+		size_t i = next(r);
+		double wall = now();
+		bool enough = wanted > 0 ? had(r, i) >= wanted : wall >= begin + r->seconds;
+		/* Two rounds at least, however short the time. */
+		if ((enough && canvas_rounds(r->jobs[i].run.canvas) >= 2) || stopped(r))
+			return 0;
+		show(r, fmin(wanted > 0 ? had(r, i) / wanted : (wall - first) / fmax(begin + r->seconds - first, 1), 1),
+		     "rendering");
+		int rc = step(r, i, e);
+		if (rc)
+			return rc;
+	}
+}
+
+static void end(struct accuracy_job *j)
+{
+	if (j->job)
+		local_end(j->job);
+	canvas_free(j->run.canvas);
+	*j = (struct accuracy_job){.cost_count = 0};
+}
+
+/* The default for a moment, thrown away again. */
+static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
+{
+	struct accuracy_job *j = &r->jobs[ACCURACY_DEFAULT];
+	*pilot = (struct pilot){1, 1, 1}; /* so slow that all sizes are the least */
+	int rc = make_plan(r, ACCURACY_DEFAULT, pilot, e);
+	if (!rc)
+		rc = check_memory(r, &j->plan, e);
+	if (!rc)
+		rc = find_world(r, j, e);
+	double begin = now();
+	if (!rc)
+		rc = start(r, ACCURACY_DEFAULT, e);
+	if (!rc && !stopped(r))
+		rc = step(r, ACCURACY_DEFAULT, e);
+	if (!rc && j->cost_count > 0) {
+		pilot->bootstrap_sample = fmax(j->run.bootstrap_cpu_seconds / (double)j->plan.bootstrap, 1e-9);
+		pilot->mutation = fmax(j->cost[0], 1e-9);
+		pilot->rate = fmax(j->run.cpu_seconds / fmax(now() - begin, 1e-9), 0.05);
+	}
+	end(j);
+	return rc;
+}
+
+int accuracy_render(struct accuracy_run *r, struct error *e)
+{
+	const struct accuracy_design *d = r->design;
+	double begin = now();
+	int rc;
+	r->jobs = mem_alloc(d->count, sizeof *r->jobs);
+	if (!r->jobs)
+		return error_set(e, ENOMEM, "no memory for %zu settings", d->count);
+	struct pilot pilot;
+	show(r, 0, "pilot");
+	rc = fly(r, &pilot, e);
+	for (size_t i = 0; !rc && i < d->count; i++)
+		rc = make_plan(r, i, &pilot, e);
+	for (size_t i = 0; !rc && !stopped(r) && i < d->count; i++) {
+		show(r, (double)i / (double)d->count, "bootstrap");
+		rc = start(r, i, e);
+		if (rc) {
+			char name[96];
+			accuracy_name(&d->settings[i], name, sizeof name);
+			error_prefix(e, rc, "%s", name);
+		}
+	}
+	if (!rc && !stopped(r))
+		rc = rounds(r, begin, e);
+	r->wall_seconds = now() - begin;
+	r->interrupted = stopped(r);
+	for (size_t i = 0; !rc && i < d->count; i++)
+		if (!r->jobs[i].run.canvas || canvas_rounds(r->jobs[i].run.canvas) < 1)
+			rc = error_set(e, EINTR, "interrupted before each setting had a round: no report");
+	return rc;
+}
+
+void accuracy_run_fini(struct accuracy_run *r)
+{
+	for (size_t i = 0; r->jobs && i < r->design->count; i++)
+		end(&r->jobs[i]);
+	mem_free(r->jobs);
+	for (size_t k = 0; k < r->world_count; k++)
+		world_free(r->worlds[k]);
+	r->jobs = NULL;
+	r->world_count = 0;
+}

@@ -1,0 +1,310 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/base/mem.h"
+#include "common/base/output.h"
+#include "common/base/progress.h"
+#include "common/base/version.h"
+#include "common/exr/image_file.h"
+#include "worker/cli/accuracy/accuracy.h"
+#include "worker/cli/base/interrupt.h"
+#include "worker/cli/base/options.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *argp_program_version = "hslt-accuracy " HSLT_VERSION;
+
+static const char doc[] =
+	"Shows what accuracy costs in time: renders a scene with one setting changed at a time, and writes what each buys and costs."
+	"\v"
+	"Examples:\n"
+	"  hslt-accuracy room.xml -o room.html --size 160x90\n"
+	"  hslt-accuracy room.xml -o room.html --csv room.csv --size 160x90 --budget 60 --threads 8\n"
+	"  hslt-accuracy room.xml -o depth.html --parameters max-depth,tolerance --seconds 30\n"
+	"\n"
+	"The report is one HTML file: error at equal time and at equal mutations, time a mutation, failed walks and bias of every "
+	"setting, and which of them lie on the Pareto front. Small films say as much as large ones and take less memory.\n"
+	"Interrupted, it reports what there is once each setting had a round, and ends with 1.\n"
+	"Exit codes: 0 done, 1 failed, 2 usage.";
+
+enum {
+	OPTION_THREADS = 256,
+	OPTION_QUIET,
+	OPTION_CSV,
+	OPTION_BUDGET,
+	OPTION_SECONDS,
+	OPTION_ROUNDS,
+	OPTION_SETTINGS,
+	OPTION_REFERENCE
+};
+
+static const struct argp_option options[] = {
+	{"output", 'o', "FILE", 0, "The report (HTML)", 0},
+	{"csv", OPTION_CSV, "FILE", 0, "The figures as comma-separated values too", 0},
+	{"budget", OPTION_BUDGET, "MINUTES", 0,
+	 "How long it may take in all (10), shared equally; more makes the intervals narrower", 0},
+	{"seconds", OPTION_SECONDS, "S", 0, "CPU seconds of each setting, in place of a budget", 0},
+	{"rounds", OPTION_ROUNDS, "N", 0,
+	 "Rounds of each setting, in place of a budget: with --epoch, --chains and --bootstrap all but the times repeats",
+	 0},
+	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors)", 0},
+	{"parameters", OPTION_SETTINGS, "LIST", 0,
+	 "Only these: settings of --set (its help names them), max-depth, independent, mixture, preset; with commas between",
+	 0},
+	{"knobs", 0, NULL, OPTION_ALIAS | OPTION_HIDDEN, NULL, 0},
+	{"reference", OPTION_REFERENCE, "FILE", 0,
+	 "An image (OpenEXR) to measure the bias against, in place of a careful render", 0},
+	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
+	{0},
+};
+static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
+
+struct arguments {
+	const char *scene, *output, *csv, *accuracy, *reference;
+	unsigned threads;
+	double budget, seconds;
+	uint64_t rounds;
+	bool quiet;
+	struct render_arguments render;
+};
+
+static double minutes(const struct argp_state *state, const char *arg)
+{
+	char *end;
+	double x = strtod(arg, &end);
+	if (end == arg || *end || !(x > 0 && x < 1e6))
+		argp_error(state, "--budget takes minutes, not '%s'", arg);
+	return x;
+}
+
+static void check(const struct arguments *a, struct argp_state *state)
+{
+	const struct plan_request *p = &a->render.plan;
+	if (!a->scene || !a->output)
+		argp_error(state, "a scene and -o FILE are needed");
+	if (p->spp || p->mutations || p->seconds > 0 || p->target_error > 0)
+		argp_error(state,
+			   "--budget or --seconds say how long, not --spp, --mutations N, --time or --target-error");
+}
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+	struct arguments *a = state->input;
+	switch (key) {
+	case ARGP_KEY_INIT:
+		state->child_inputs[0] = &a->render;
+		return 0;
+	case 'o':
+		a->output = arg;
+		return 0;
+	case OPTION_CSV:
+		a->csv = arg;
+		return 0;
+	case OPTION_BUDGET:
+		a->budget = minutes(state, arg);
+		return 0;
+	case OPTION_SECONDS:
+		a->seconds = option_seconds(state, "--seconds", arg);
+		return 0;
+	case OPTION_ROUNDS:
+		a->rounds = option_whole(state, "--rounds", arg);
+		if (a->rounds < 2 || a->rounds > ACCURACY_COSTS)
+			argp_error(state, "--rounds takes 2 to %d, not '%s'", ACCURACY_COSTS, arg);
+		return 0;
+	case OPTION_THREADS:
+		a->threads = option_threads(state, arg);
+		return 0;
+	case OPTION_SETTINGS:
+		a->accuracy = arg;
+		return 0;
+	case OPTION_REFERENCE:
+		a->reference = arg;
+		return 0;
+	case OPTION_QUIET:
+		a->quiet = true;
+		return 0;
+	case ARGP_KEY_ARG:
+		if (a->scene)
+			argp_error(state, "one scene at a time");
+		a->scene = arg;
+		return 0;
+	case ARGP_KEY_END:
+		check(a, state);
+		return 0;
+	default:
+		return ARGP_ERR_UNKNOWN;
+	}
+}
+
+struct session {
+	struct arguments *a;
+	char *folder, *name;
+	struct scene scene;
+	bool scene_read, usage; /* usage: what went wrong was asked for */
+	struct asset_source assets;
+	struct render_summary summary;
+	struct accuracy_design design;
+	struct accuracy_run run;
+	struct accuracy_judgement judgement;
+	struct picture reference;
+	struct progress progress;
+};
+
+static void show(void *user, double fraction, const char *state)
+{
+	struct session *s = user;
+	char detail[64];
+	snprintf(detail, sizeof detail, "%zu settings", s->design.count);
+	progress_show(&s->progress, fraction, state, detail);
+}
+
+static int load(struct session *s, struct error *e)
+{
+	struct render_arguments *r = &s->a->render;
+	int rc = scene_path_split(s->a->scene, &s->folder, &s->name, e);
+	if (rc)
+		return rc;
+	s->assets = asset_folder(s->folder);
+	rc = render_scene_read(&s->scene, &s->assets, s->name, r->defines, r->define_count, &r->render, e);
+	if (rc)
+		return rc;
+	s->scene_read = true;
+	for (uint32_t i = 0; !s->a->quiet && i < s->scene.note_count; i++)
+		fprintf(stderr, "%s\n", s->scene.notes[i]);
+	return render_check(&s->scene, &s->assets, &r->render, &s->summary, e);
+}
+
+/* Before hours are spent. */
+static int check_reference(const struct session *s, struct error *e)
+{
+	const struct plan_request *p = &s->a->render.plan;
+	uint32_t width = p->crop_width ? p->crop_width : p->width, height = p->crop_width ? p->crop_height : p->height;
+	if (!s->a->reference || (s->reference.image.width == width && s->reference.image.height == height))
+		return 0;
+	return error_set(e, EINVAL, "%s: %ux%u pixels, and the settings are rendered with %ux%u", s->a->reference,
+			 s->reference.image.width, s->reference.image.height, width, height);
+}
+
+static int design(struct session *s, struct error *e)
+{
+	struct render_arguments *r = &s->a->render;
+	if (integrator_is_open(&r->plan)) /* most settings are those of chains */
+		snprintf(r->plan.integrator, sizeof r->plan.integrator, RENDER_INTEGRATOR_CHAINS);
+	int rc = render_plan_from_scene(r, &s->summary, e);
+	if (!rc)
+		rc = accuracy_design(&s->design, &r->plan, &s->summary, s->a->accuracy, e);
+	if (!rc)
+		rc = check_reference(s, e);
+	s->usage = rc == -EINVAL;
+	if (rc || s->a->quiet)
+		return rc;
+	fprintf(stderr, "%zu settings: the default, a reference and %zu parameters\n", s->design.count,
+		s->design.sweep_count);
+	for (size_t i = 0; i < s->design.left_out_count; i++)
+		fprintf(stderr, "left out: %s (%s)\n", s->design.left_out[i].parameter, s->design.left_out[i].why);
+	return 0;
+}
+
+static int render(struct session *s, struct error *e)
+{
+	const struct arguments *a = s->a;
+	s->run = (struct accuracy_run){.design = &s->design,
+				       .request = a->render.plan,
+				       .scene = &s->scene,
+				       .assets = &s->assets,
+				       .render = &a->render.render,
+				       .threads = a->threads,
+				       .seconds = 60 * a->budget,
+				       .setting_seconds = a->seconds,
+				       .setting_rounds = a->rounds,
+				       .stop = &interrupted,
+				       .progress = a->quiet ? NULL : show,
+				       .user = s};
+	if (!a->quiet)
+		progress_start(&s->progress);
+	int rc = accuracy_render(&s->run, e);
+	if (!a->quiet)
+		progress_end(&s->progress);
+	return rc;
+}
+
+static int report(struct session *s, struct error *e)
+{
+	struct accuracy_context x = {.scene = s->name,
+				     .reference = s->a->reference,
+				     .summary = &s->summary,
+				     .design = &s->design,
+				     .run = &s->run,
+				     .judgement = &s->judgement};
+	int rc = accuracy_judge(&s->run, s->a->reference ? &s->reference : NULL, &s->judgement, e);
+	if (!rc && s->a->csv)
+		rc = accuracy_csv(&x, s->a->csv, e);
+	if (!rc)
+		rc = accuracy_html(&x, s->a->output, e);
+	return rc;
+}
+
+static void say(const struct session *s)
+{
+	const struct accuracy_figures *f = s->judgement.figures, *d = &f[ACCURACY_DEFAULT];
+	char name[96];
+	if (s->judgement.thin)
+		fprintf(stderr,
+			"too little was rendered: the figures may be chance (more --budget, smaller --size or fewer --parameters)\n");
+	fprintf(stderr, "default: relative error %.2f %% in %.3g s of CPU, bias at most %.2g %%",
+		100 * d->equal_time.value, s->judgement.at_cpu_seconds, 100 * d->bias_bound);
+	if (d->beaten_by == ACCURACY_DEFAULT) {
+		fprintf(stderr, "; on the front\n");
+		return;
+	}
+	accuracy_name(&s->design.settings[d->beaten_by], name, sizeof name);
+	fprintf(stderr, "; beaten by %s: %.2f %%\n", name, 100 * f[d->beaten_by].equal_time.value);
+}
+
+static int run(struct session *s, struct error *e)
+{
+	int rc = image_file_probe(s->a->output, e);
+	if (!rc && s->a->csv)
+		rc = image_file_probe(s->a->csv, e);
+	if (!rc && s->a->reference)
+		rc = picture_read(&s->reference, s->a->reference, e);
+	if (!rc)
+		rc = load(s, e);
+	if (!rc)
+		rc = design(s, e);
+	if (!rc)
+		rc = render(s, e);
+	if (!rc)
+		rc = report(s, e);
+	if (!rc && !s->a->quiet)
+		say(s);
+	if (!rc && s->run.interrupted)
+		rc = error_set(e, EINTR, "interrupted: %s holds what there was by then", s->a->output);
+	return rc;
+}
+
+int main(int argc, char **argv)
+{
+	static struct arguments a = {.budget = 10};
+	static struct session s;
+	struct error e = {""};
+	mem_keep(1 << 20);
+	a.threads = option_threads_default();
+	output_check_at_exit();
+	argp_err_exit_status = 2;
+	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
+	interrupt_watch();
+	s.a = &a;
+	int rc = run(&s, &e);
+	accuracy_run_fini(&s.run);
+	accuracy_judgement_fini(&s.judgement);
+	picture_fini(&s.reference);
+	if (s.scene_read)
+		scene_fini(&s.scene);
+	mem_free(s.folder);
+	mem_free(s.name);
+	if (rc)
+		fprintf(stderr, "hslt-accuracy: %s\n", e.text);
+	return rc ? s.usage ? 2 : 1 : 0;
+}

@@ -1,0 +1,45 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/base/interrupt.h"
+
+#include <signal.h>
+#include <stdbool.h>
+#include <stddef.h>
+#include <string.h>
+#include <unistd.h>
+
+atomic_bool interrupted;
+
+static void interrupt(int signal_number)
+{
+	(void)signal_number;
+	atomic_store(&interrupted, true);
+}
+
+static void handle_first(void (*handler)(int))
+{
+	struct sigaction act = {.sa_handler = handler, .sa_flags = (int)SA_RESETHAND};
+	sigaction(SIGINT, &act, NULL);
+	sigaction(SIGTERM, &act, NULL);
+}
+
+void interrupt_watch(void)
+{
+	handle_first(interrupt);
+}
+
+static const char *_Atomic last_words;
+
+static void say_and_end(int signal_number)
+{
+	const char *text = atomic_load(&last_words);
+	/* The handler is gone already (SA_RESETHAND); the signal comes when this one returns. */
+	if (write(STDERR_FILENO, text, strlen(text)) < 0)
+		_exit(128 + signal_number);
+	raise(signal_number);
+}
+
+void interrupt_say(const char *text)
+{
+	atomic_store(&last_words, text);
+	handle_first(say_and_end);
+}

@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/base/text_file.h"
+
+#include "common/base/mem.h"
+#include "common/exr/image_file.h"
+
+#include <stdarg.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { PAGE_MAX = 1 << 28 };
+
+void text_file_bytes(struct text_file *p, const void *bytes, size_t count)
+{
+	p->text.limit = PAGE_MAX;
+	p->full = p->full || !buf_append(&p->text, bytes, count);
+}
+
+void text_file_put(struct text_file *p, const char *format, ...)
+{
+	char line[2048];
+	va_list args;
+	va_start(args, format);
+	int n = vsnprintf(line, sizeof line, format, args);
+	va_end(args);
+	if (n < 0 || (size_t)n >= sizeof line)
+		p->full = true;
+	else
+		text_file_bytes(p, line, (size_t)n);
+}
+
+size_t text_file_character(const char *at)
+{
+	const unsigned char *c = (const unsigned char *)at;
+	size_t n = *c < 0x80		     ? 1
+		   : *c >= 0xc2 && *c < 0xe0 ? 2
+		   : *c >= 0xe0 && *c < 0xf0 ? 3
+		   : *c >= 0xf0 && *c < 0xf5 ? 4
+					     : 0;
+	for (size_t i = 1; i < n; i++)
+		if ((c[i] & 0xc0) != 0x80)
+			return 0;
+	bool surrogate = n == 3 && c[0] == 0xed && c[1] >= 0xa0, overlong = n == 3 && c[0] == 0xe0 && c[1] < 0xa0;
+	bool none = n == 3 && c[0] == 0xef && c[1] == 0xbf && c[2] >= 0xbe;
+	bool range = n == 4 && ((c[0] == 0xf0 && c[1] < 0x90) || (c[0] == 0xf4 && c[1] >= 0x90));
+	bool control = n == 1 && (*c == 0x7f || (*c < 0x20 && *c != '\t' && *c != '\n'));
+	return surrogate || overlong || none || range || control ? 0 : n;
+}
+
+void text_file_escaped(struct text_file *p, const char *text)
+{
+	while (*text) {
+		size_t n = text_file_character(text);
+		const char *as = *text == '&'	? "&amp;"
+				 : *text == '<' ? "&lt;"
+				 : *text == '>' ? "&gt;"
+				 : *text == '"' ? "&quot;"
+				 : n		? NULL
+						: "?";
+		if (as)
+			text_file_bytes(p, as, strlen(as));
+		else
+			text_file_bytes(p, text, n);
+		text += n ? n : 1;
+	}
+}
+
+void text_file_field(struct text_file *p, const char *text)
+{
+	if (!strpbrk(text, ",\"\n\r")) {
+		text_file_put(p, "%s", text);
+		return;
+	}
+	text_file_put(p, "\"");
+	for (; *text; text++) {
+		text_file_bytes(p, text, 1);
+		if (*text == '"')
+			text_file_bytes(p, text, 1);
+	}
+	text_file_put(p, "\"");
+}
+
+void text_file_base64(struct text_file *p, const unsigned char *bytes, size_t count)
+{
+	static const char digits[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+	for (size_t i = 0; i < count; i += 3) {
+		size_t left = count - i;
+		unsigned v = (unsigned)bytes[i] << 16 | (left > 1 ? (unsigned)bytes[i + 1] << 8 : 0) |
+			     (left > 2 ? bytes[i + 2] : 0u);
+		char four[4] = {digits[v >> 18], digits[v >> 12 & 63], left > 1 ? digits[v >> 6 & 63] : '=',
+				left > 2 ? digits[v & 63] : '='};
+		text_file_bytes(p, four, 4);
+	}
+}
+
+int text_file_write(const struct text_file *p, const char *path, struct error *e)
+{
+	if (p->full)
+		return error_set(e, ENOMEM, "%s: no memory for the text", path);
+	return image_file_write(path, p->text.bytes, p->text.size, e);
+}
+
+void text_file_fini(struct text_file *p)
+{
+	buf_fini(&p->text);
+	p->full = false;
+}

@@ -1,0 +1,334 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/image/assemble.h"
+
+#include "common/base/mem.h"
+#include "common/exr/header.h"
+#include "common/exr/image_file.h"
+
+#include <inttypes.h>
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+/* What must be alike, what is added up, what has a meaning of its own; the rest of the header is kept where all crops
+ * say the same. */
+static const char *const alike[] = {"hslt:version",  "hslt:scene",    "hslt:integrator",
+				    "hslt:minDepth", "hslt:maxDepth", "hslt:effects"};
+static const char *const added[] = {"hslt:mutations",	"hslt:accepted",   "hslt:independent",
+				    "hslt:nan",		"hslt:infinite",   "hslt:negative",
+				    "hslt:raysClosest", "hslt:raysShadow", "hslt:stuck"};
+static const char *const own[] = {"hslt:relMSE",    "hslt:relMSELow95",	 "hslt:relMSEHigh95", "hslt:relMSEUpper",
+				  "hslt:agreement", "hslt:disagreement", "hslt:cpuSeconds",   "hslt:wallSeconds",
+				  "hslt:mixed",	    "hslt:date",	 "hslt:workers"};
+enum { ALIKE = sizeof alike / sizeof *alike, ADDED = sizeof added / sizeof *added, OWN = sizeof own / sizeof *own };
+static const char *const options_alike[] = {"--set ", "--effects "};
+enum { TEXT = 8192 };
+
+struct sums {
+	uint64_t added[ADDED];
+	bool in_all[ADDED]; /* every crop has it */
+	double mse, below, above,
+		pixels; /* relMSE times pixels; squares of its distances from the ends of its interval */
+	bool has_mse;
+	double cpu, wall;
+	int mixed;
+	bool too_short, disagree, agree;
+	char disagreement[TEXT];
+};
+
+struct assembly {
+	struct exr_image film;
+	unsigned char *covered;
+	bool *kept;		/* of the attributes of the first crop */
+	struct exr_image first; /* its header alone */
+	struct sums sums;
+};
+
+static const struct exr_attribute *attribute(const struct exr_image *img, const char *name)
+{
+	for (size_t i = 0; i < img->attribute_count; i++)
+		if (strcmp(img->attributes[i].name, name) == 0)
+			return &img->attributes[i];
+	return NULL;
+}
+
+static bool equal(const struct exr_attribute *a, const struct exr_attribute *b)
+{
+	if (!a || !b || a->type != b->type)
+		return !a && !b;
+	return a->type == EXR_ATTRIBUTE_STRING ? strcmp(a->string, b->string) == 0
+	       : a->type == EXR_ATTRIBUTE_INT  ? a->integer == b->integer
+					       : memcmp(&a->number, &b->number, sizeof a->number) == 0;
+}
+
+static const char *string_of(const struct exr_image *img, const char *name)
+{
+	const struct exr_attribute *a = attribute(img, name);
+	return a && a->type == EXR_ATTRIBUTE_STRING ? a->string : "";
+}
+
+static double number_of(const struct exr_image *img, const char *name)
+{
+	const struct exr_attribute *a = attribute(img, name);
+	return a && a->type == EXR_ATTRIBUTE_DOUBLE ? a->number : NAN;
+}
+
+/* "--set A=1 ..." of hslt:options: what stands behind the option, up to a space. */
+static bool same_option(const char *a, const char *b, const char *option)
+{
+	const char *x = strstr(a, option), *y = strstr(b, option);
+	if (!x || !y)
+		return !x && !y;
+	size_t n = strcspn(x + strlen(option), " "), m = strcspn(y + strlen(option), " ");
+	return n == m && memcmp(x, y, strlen(option) + n) == 0;
+}
+
+static int check_render(const struct exr_image *first, const struct exr_image *img, struct error *e)
+{
+	if (img->full_width != first->full_width || img->full_height != first->full_height)
+		return error_set(e, EINVAL, "a crop of a film of %ux%u, the first one's has %ux%u", img->full_width,
+				 img->full_height, first->full_width, first->full_height);
+	if ((uint64_t)img->x + img->width > img->full_width || (uint64_t)img->y + img->height > img->full_height)
+		return error_set(e, EINVAL, "its pixels lie outside its film of %ux%u", img->full_width,
+				 img->full_height);
+	bool layers = img->channel_count == first->channel_count;
+	for (uint32_t c = 0; layers && c < img->channel_count; c++)
+		layers = strcmp(img->names[c], first->names[c]) == 0;
+	if (!layers)
+		return error_set(e, EINVAL, "it has other layers than the first crop");
+	for (size_t i = 0; i < ALIKE; i++)
+		if (!equal(attribute(first, alike[i]), attribute(img, alike[i])))
+			return error_set(e, EINVAL, "it is not of the same render as the first crop: %s differs",
+					 alike[i]);
+	for (size_t i = 0; i < sizeof options_alike / sizeof *options_alike; i++)
+		if (!same_option(string_of(first, "hslt:options"), string_of(img, "hslt:options"), options_alike[i]))
+			return error_set(e, EINVAL, "it is not of the same render as the first crop: %.*s differs",
+					 (int)strlen(options_alike[i]) - 1, options_alike[i]);
+	return 0;
+}
+
+static int begin(struct assembly *a, const struct exr_image *img, struct error *e)
+{
+	struct exr_image *f = &a->film;
+	size_t pixels = (size_t)img->full_width * img->full_height;
+	*f = (struct exr_image){.full_width = img->full_width,
+				.full_height = img->full_height,
+				.width = img->full_width,
+				.height = img->full_height,
+				.channel_count = img->channel_count};
+	memcpy(f->names, img->names, sizeof f->names);
+	a->covered = mem_alloc(pixels, 1);
+	a->kept = mem_alloc(img->attribute_count, sizeof *a->kept);
+	bool ok = a->covered && a->kept;
+	for (uint32_t c = 0; ok && c < f->channel_count; c++)
+		ok = (f->planes[c] = mem_alloc(pixels, sizeof(float))) != NULL;
+	if (!ok)
+		return error_set(e, ENOMEM, "no memory for a film of %ux%u", f->width, f->height);
+	for (size_t i = 0; i < img->attribute_count; i++)
+		a->kept[i] = true;
+	for (size_t i = 0; i < ADDED; i++)
+		a->sums.in_all[i] = true;
+	a->sums.has_mse = true;
+	return 0;
+}
+
+static int paste(struct assembly *a, const struct exr_image *img, struct error *e)
+{
+	struct exr_image *f = &a->film;
+	for (uint32_t y = 0; y < img->height; y++) {
+		size_t to = (size_t)(img->y + y) * f->width + img->x;
+		for (uint32_t x = 0; x < img->width; x++)
+			if (a->covered[to + x])
+				return error_set(e, EINVAL, "another crop has its pixel %u,%u, too", img->x + x,
+						 img->y + y);
+		memset(a->covered + to, 1, img->width);
+		for (uint32_t c = 0; c < f->channel_count; c++)
+			memcpy(f->planes[c] + to, img->planes[c] + (size_t)y * img->width, img->width * sizeof(float));
+	}
+	return 0;
+}
+
+static void add_convergence(struct sums *s, const struct exr_image *img)
+{
+	const char *agreement = string_of(img, "hslt:agreement"), *text = string_of(img, "hslt:disagreement");
+	s->agree |= strcmp(agreement, "agree") == 0;
+	s->too_short |= strcmp(agreement, "too short") == 0;
+	s->disagree |= strcmp(agreement, "disagree") == 0;
+	size_t used = strlen(s->disagreement);
+	if (*text)
+		snprintf(s->disagreement + used, sizeof s->disagreement - used, "%scrop %u,%u,%u,%u: %s",
+			 used ? "; " : "", img->x, img->y, img->width, img->height, text);
+}
+
+static void add_header(struct assembly *a, const struct exr_image *img)
+{
+	struct sums *s = &a->sums;
+	double pixels = (double)img->width * img->height;
+	for (size_t i = 0; i < ADDED; i++) {
+		const char *digits = string_of(img, added[i]);
+		s->in_all[i] &= *digits != 0;
+		s->added[i] += strtoull(digits, NULL, 10);
+	}
+	double mse = number_of(img, "hslt:relMSE"), low = number_of(img, "hslt:relMSELow95"),
+	       high = number_of(img, "hslt:relMSEHigh95");
+	s->has_mse &= isfinite(mse) && isfinite(low) && isfinite(high);
+	s->mse += mse * pixels;
+	s->below += (mse - low) * pixels * (mse - low) * pixels;
+	s->above += (high - mse) * pixels * (high - mse) * pixels;
+	s->pixels += pixels;
+	s->cpu += number_of(img, "hslt:cpuSeconds");
+	s->wall = fmax(s->wall, number_of(img, "hslt:wallSeconds"));
+	const struct exr_attribute *mixed = attribute(img, "hslt:mixed");
+	s->mixed |= mixed && mixed->type == EXR_ATTRIBUTE_INT && mixed->integer;
+	add_convergence(s, img);
+	for (size_t i = 0; i < a->first.attribute_count; i++)
+		a->kept[i] &= equal(&a->first.attributes[i], attribute(img, a->first.attributes[i].name));
+}
+
+static int add_crop(struct assembly *a, const char *path, struct error *e)
+{
+	unsigned char *bytes = NULL;
+	struct exr_image img = {0};
+	size_t size;
+	int rc = image_file_read(path, &bytes, &size, e);
+	if (rc)
+		return rc;
+	rc = exr_read(bytes, size, &img, e);
+	mem_free(bytes);
+	bool first = !rc && !a->film.channel_count;
+	if (!rc)
+		rc = check_render(first ? &img : &a->first, &img, e);
+	if (!rc && first)
+		rc = begin(a, &img, e);
+	if (!rc)
+		rc = paste(a, &img, e);
+	if (first) {
+		a->first = img;
+		for (uint32_t c = 0; c < img.channel_count; c++) {
+			mem_free(img.planes[c]);
+			a->first.planes[c] = NULL;
+		}
+	}
+	if (!rc)
+		add_header(a, &img);
+	if (!first)
+		exr_image_fini(&img);
+	return rc ? error_prefix(e, rc, "%s", path) : 0;
+}
+
+/* The rectangle that is covered becomes the image; moves rows to the front. */
+static int close_up(struct assembly *a, struct error *e)
+{
+	struct exr_image *f = &a->film;
+	uint32_t x0 = f->width, y0 = f->height, x1 = 0, y1 = 0, width = f->width;
+	for (uint32_t y = 0; y < f->height; y++)
+		for (uint32_t x = 0; x < f->width; x++)
+			if (a->covered[(size_t)y * f->width + x]) {
+				x0 = x < x0 ? x : x0;
+				x1 = x > x1 ? x : x1;
+				y0 = y < y0 ? y : y0;
+				y1 = y;
+			}
+	for (uint32_t y = y0; y <= y1; y++) {
+		const unsigned char *row = a->covered + (size_t)y * width, *hole = memchr(row + x0, 0, x1 - x0 + 1);
+		if (hole)
+			return error_set(e, EINVAL, "no crop has pixel %u,%u", (uint32_t)(hole - row), y);
+	}
+	f->x = x0;
+	f->y = y0;
+	f->width = x1 - x0 + 1;
+	f->height = y1 - y0 + 1;
+	for (uint32_t c = 0; c < f->channel_count; c++)
+		for (uint32_t y = 0; y < f->height; y++)
+			memmove(f->planes[c] + (size_t)y * f->width, f->planes[c] + (size_t)(y0 + y) * width + x0,
+				f->width * sizeof(float));
+	return 0;
+}
+
+static bool among(const char *name, const char *const *list, size_t count)
+{
+	for (size_t i = 0; i < count; i++)
+		if (strcmp(name, list[i]) == 0)
+			return true;
+	return false;
+}
+
+static void put_number(struct exr_image *f, const char *name, double x)
+{
+	f->attributes[f->attribute_count++] =
+		(struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_DOUBLE, .number = x};
+}
+
+static void put_int(struct exr_image *f, const char *name, int x)
+{
+	f->attributes[f->attribute_count++] =
+		(struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_INT, .integer = x};
+}
+
+static void put_string(struct exr_image *f, const char *name, const char *text)
+{
+	f->attributes[f->attribute_count++] =
+		(struct exr_attribute){.name = name, .type = EXR_ATTRIBUTE_STRING, .string = text};
+}
+
+/* Names and texts are borrowed: of the table, of the first crop, of the sums. */
+static int write(struct assembly *a, size_t count, unsigned char **bytes, size_t *size, struct error *e)
+{
+	struct exr_image *f = &a->film;
+	const struct sums *s = &a->sums;
+	char digits[ADDED][24];
+	struct exr_attribute *list = mem_alloc(a->first.attribute_count + ADDED + OWN + 1, sizeof *list);
+	if (!list)
+		return error_set(e, ENOMEM, "no memory for a header");
+	f->attributes = list;
+	for (size_t i = 0; i < a->first.attribute_count; i++) {
+		const struct exr_attribute *from = &a->first.attributes[i];
+		if (a->kept[i] && !among(from->name, added, ADDED) && !among(from->name, own, OWN))
+			list[f->attribute_count++] = *from;
+	}
+	for (size_t i = 0; i < ADDED; i++)
+		if (s->in_all[i]) {
+			snprintf(digits[i], sizeof digits[i], "%" PRIu64, s->added[i]);
+			put_string(f, added[i], digits[i]);
+		}
+	if (s->has_mse) {
+		double mse = s->mse / s->pixels;
+		put_number(f, "hslt:relMSE", mse);
+		put_number(f, "hslt:relMSELow95", fmax(0, mse - sqrt(s->below) / s->pixels));
+		put_number(f, "hslt:relMSEHigh95", mse + sqrt(s->above) / s->pixels);
+	}
+	if (s->agree || s->too_short || s->disagree)
+		put_string(f, "hslt:agreement", s->disagree ? "disagree" : s->too_short ? "too short" : "agree");
+	if (*s->disagreement)
+		put_string(f, "hslt:disagreement", s->disagreement);
+	if (isfinite(s->cpu))
+		put_number(f, "hslt:cpuSeconds", s->cpu);
+	put_number(f, "hslt:wallSeconds", s->wall);
+	put_int(f, "hslt:mixed", s->mixed);
+	put_int(f, "hslt:crops", (int)count);
+	int rc = exr_write(f, bytes, size, e);
+	f->attributes = NULL;
+	f->attribute_count = 0;
+	mem_free(list);
+	return rc;
+}
+
+int assemble(const char *const *paths, size_t count, unsigned char **bytes, size_t *size, bool *disagree,
+	     struct error *e)
+{
+	struct assembly a = {0};
+	int rc = 0;
+	for (size_t i = 0; !rc && i < count; i++)
+		rc = add_crop(&a, paths[i], e);
+	if (!rc)
+		rc = close_up(&a, e);
+	if (!rc)
+		rc = write(&a, count, bytes, size, e);
+	*disagree = a.sums.disagree;
+	exr_image_fini(&a.film);
+	exr_image_fini(&a.first);
+	mem_free(a.covered);
+	mem_free(a.kept);
+	return rc;
+}

@@ -1,0 +1,175 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/image/compare.h"
+
+#include "common/base/mem.h"
+
+#include <float.h>
+#include <math.h>
+#include <stdlib.h>
+
+struct pixel_error {
+	double relative, squared; /* means over the channels */
+};
+
+static size_t pixels_of(const struct picture *p)
+{
+	return (size_t)p->image.width * p->image.height;
+}
+
+static int check(const struct picture *a, const struct picture *b, struct error *e)
+{
+	const struct exr_image *i = &a->image, *j = &b->image;
+	if (i->width != j->width || i->height != j->height)
+		return error_set(e, EINVAL,
+				 "the pictures have %ux%u and %ux%u pixels; --size WxH averages both to one size",
+				 i->width, i->height, j->width, j->height);
+	for (int k = 0; k < 3; k++)
+		for (size_t p = 0; p < pixels_of(b); p++)
+			if (!isfinite(b->rgb[k][p]))
+				return error_set(e, EINVAL, "the reference is not finite at pixel %zu,%zu",
+						 p % j->width, p / j->width);
+	return 0;
+}
+
+static double mean(const float *plane, size_t n)
+{
+	double sum = 0;
+	for (size_t i = 0; i < n; i++)
+		sum += (double)plane[i];
+	return sum / (double)n;
+}
+
+/* What keeps relative errors of black pixels finite: (0.01 m)^2. */
+static double floor_of(const struct picture *b)
+{
+	double sum = 0;
+	for (int k = 0; k < 3; k++)
+		sum += mean(b->rgb[k], pixels_of(b));
+	return sum / 300 * (sum / 300);
+}
+
+static struct pixel_error error_at(const struct picture *a, const struct picture *b, size_t i, double least)
+{
+	struct pixel_error r = {0, 0};
+	for (int k = 0; k < 3; k++) {
+		double reference = (double)b->rgb[k][i], d = (double)a->rgb[k][i] - reference;
+		r.squared += d * d / 3;
+		r.relative +=
+			d == 0 ? 0
+			       : d * d / (reference * reference + least) / 3; /* least is 0 under a black reference */
+	}
+	if (!isfinite(r.squared))
+		r = (struct pixel_error){INFINITY, INFINITY};
+	return r;
+}
+
+static int worst_first(const void *p, const void *q)
+{
+	const struct pixel_error *a = p, *b = q;
+	if (a->relative != b->relative)
+		return a->relative > b->relative ? -1 : 1;
+	return a->squared == b->squared ? 0 : a->squared > b->squared ? -1 : 1;
+}
+
+static int ascending(const void *p, const void *q)
+{
+	float a = *(const float *)p, b = *(const float *)q;
+	return a < b ? -1 : a > b;
+}
+
+/* Of all values of the three channels, by nearest rank. */
+static int percentile(const struct picture *b, double share, double *value, struct error *e)
+{
+	size_t n = pixels_of(b);
+	float *all = mem_alloc(n, 3 * sizeof *all);
+	if (!all)
+		return error_set(e, ENOMEM, "no memory to sort %zu pixels", n);
+	for (size_t k = 0; k < 3; k++)
+		for (size_t i = 0; i < n; i++)
+			all[k * n + i] = b->rgb[k][i];
+	qsort(all, n * 3, sizeof *all, ascending);
+	*value = (double)all[(size_t)ceil(share * (double)(n * 3)) - 1];
+	mem_free(all);
+	return 0;
+}
+
+static int errors(const struct picture *a, const struct picture *b, double trim, struct compare_result *r,
+		  struct error *e)
+{
+	size_t n = pixels_of(a);
+	double least = floor_of(b), relative = 0, squared = 0;
+	struct pixel_error *pixel = mem_alloc(n, sizeof *pixel);
+	if (!pixel)
+		return error_set(e, ENOMEM, "no memory for the errors of %zu pixels", n);
+	for (size_t i = 0; i < n; i++) {
+		pixel[i] = error_at(a, b, i, least);
+		r->not_finite += isinf(pixel[i].squared) != 0;
+	}
+	r->pixels = n;
+	r->left_out = (size_t)(trim * (double)n * (1 + 4 * DBL_EPSILON));
+	if (r->left_out)
+		qsort(pixel, n, sizeof *pixel, worst_first);
+	for (size_t i = r->left_out; i < n; i++) {
+		relative += pixel[i].relative;
+		squared += pixel[i].squared;
+	}
+	mem_free(pixel);
+	double kept = (double)(n - r->left_out);
+	r->rel_mse = relative / kept;
+	r->relative_error = sqrt(r->rel_mse);
+	r->rmse = sqrt(squared / kept);
+	return 0;
+}
+
+static double luminance(const double rgb[3])
+{
+	return 0.2126 * rgb[0] + 0.7152 * rgb[1] + 0.0722 * rgb[2];
+}
+
+int compare(const struct picture *a, const struct picture *b, double trim, struct compare_result *r, struct error *e)
+{
+	*r = (struct compare_result){0};
+	int rc = check(a, b, e);
+	if (rc == 0)
+		rc = errors(a, b, trim, r, e);
+	if (rc == 0)
+		rc = percentile(b, 0.995, &r->peak, e);
+	if (rc)
+		return rc;
+	r->psnr = 20 * log10(r->peak / r->rmse);
+	if (r->rmse == 0)
+		r->psnr = INFINITY;
+	for (int k = 0; k < 3; k++) {
+		r->mean_a[k] = mean(a->rgb[k], r->pixels);
+		r->mean_b[k] = mean(b->rgb[k], r->pixels);
+		r->ratio[k] = r->mean_a[k] / r->mean_b[k];
+	}
+	r->luminance_ratio = luminance(r->mean_a) / luminance(r->mean_b);
+	return 0;
+}
+
+static void heat(double t, unsigned char rgb[3])
+{
+	static const double stops[6][3] = {{0, 0, 0},	   {70, 0, 110},   {190, 20, 60},
+					   {245, 110, 10}, {255, 215, 70}, {255, 255, 255}};
+	double at = t < 0 ? 0 : t > 1 ? 5 : t * 5;
+	size_t i = at < 4 ? (size_t)at : 4;
+	for (int k = 0; k < 3; k++)
+		rgb[k] = (unsigned char)(stops[i][k] + (stops[i + 1][k] - stops[i][k]) * (at - (double)i) + 0.5);
+}
+
+int compare_heatmap(const struct picture *a, const struct picture *b, unsigned char *rgb, struct error *e)
+{
+	int rc = check(a, b, e);
+	if (rc)
+		return rc;
+	double least = floor_of(b);
+	for (size_t i = 0; i < pixels_of(a); i++) {
+		struct pixel_error p = error_at(a, b, i, least);
+		if (isinf(p.squared))
+			rgb[i * 3] = 0, rgb[i * 3 + 1] = rgb[i * 3 + 2] = 255;
+		else
+			heat((log10(sqrt(p.relative)) + 3) / 3, rgb + i * 3);
+	}
+	return 0;
+}

@@ -1,0 +1,36 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * How far picture A is from reference B: the figures of docs/design.md, rules 4, and whether two images are the same
+ * bits. One thread.
+ */
+#ifndef WORKER_CLI_IMAGE_COMPARE_H
+#define WORKER_CLI_IMAGE_COMPARE_H
+
+#include "worker/cli/image/picture.h"
+
+#include <stdbool.h>
+
+/*
+ * relMSE = mean over pixels and channels of (A-B)^2 / (B^2 + (0.01 m)^2), m the mean of B over pixels and channels.
+ * Errors leave out the worst pixels by relMSE; means, m and the peak are over all of them. Values of A that are not
+ * finite make their pixel infinitely wrong.
+ */
+struct compare_result {
+	double rel_mse, relative_error, rmse; /* relative_error: square root of rel_mse */
+	double psnr, peak; /* dB; peak: 99.5th percentile of B's values. Infinite for equal pictures */
+	double mean_a[3], mean_b[3], ratio[3], luminance_ratio; /* A's by B's */
+	size_t pixels, left_out, not_finite;			/* not_finite: pixels of A */
+};
+
+/* trim: the share of pixels to leave out, in [0,1). -EINVAL: other sizes, or B is not finite everywhere. */
+int compare(const struct picture *a, const struct picture *b, double trim, struct compare_result *r, struct error *e);
+
+/* Colours of relative errors, 0.1 % black, by way of violet, red, orange to 100 % white; not finite: cyan. Sizes as
+ * above. */
+int compare_heatmap(const struct picture *a, const struct picture *b, unsigned char *rgb, struct error *e);
+
+/* Every channel of every pixel, windows, and the header but for header_excluded. false: `why` says what differs first.
+ */
+bool compare_exact(const struct exr_image *a, const struct exr_image *b, char *why, size_t why_size);
+
+#endif

@@ -1,0 +1,97 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/plot/plot_axis.h"
+
+#include <math.h>
+
+static bool fits(double value, bool log_axis)
+{
+	return isfinite(value) && (!log_axis || value > 0);
+}
+
+bool plot_point_shown(const struct plot *p, const struct plot_series *s, size_t i)
+{
+	if (!fits(s->x[i], p->log_x))
+		return false;
+	if (s->style == PLOT_BAND)
+		return s->low && s->high && isfinite(s->low[i]) && fits(s->high[i], p->log_y);
+	return fits(s->y[i], p->log_y);
+}
+
+static void extend(struct plot_axis *a, const double *value, size_t i)
+{
+	if (!value || !fits(value[i], a->log))
+		return;
+	a->low = fmin(a->low, value[i]);
+	a->high = fmax(a->high, value[i]);
+}
+
+static void add_tic(struct plot_axis *a, double value)
+{
+	if (value >= a->low * (1 - 1e-9) && value <= a->high * (1 + 1e-9) && a->tic_count < PLOT_TICS)
+		a->tic[a->tic_count++] = value;
+}
+
+/* 1, 2 or 5 times a power of 10, so that some five of them fill the range. */
+static double round_step(double range)
+{
+	double step = pow(10, floor(log10(range / 5)));
+	return range / step > 20 ? 5 * step : range / step > 8 ? 2 * step : step;
+}
+
+static void mark(struct plot_axis *a)
+{
+	static const double few[] = {1}, some[] = {1, 2, 5}, many[] = {1, 1.5, 2, 3, 4, 5, 7};
+	double decades = log10(a->high / a->low);
+	if (decades < 0.35) {
+		double step = round_step(a->high - a->low);
+		for (double k = ceil(a->low / step); k * step <= a->high && a->tic_count < PLOT_TICS; k++)
+			add_tic(a, k * step);
+		return;
+	}
+	const double *set = decades > 3 ? few : decades > 1 ? some : many;
+	int count = decades > 3 ? 1 : decades > 1 ? 3 : 7, stride = 1 + (int)(decades / 10);
+	for (int k = (int)floor(log10(a->low)); k <= (int)ceil(log10(a->high)); k++)
+		for (int i = 0; i < count && k % stride == 0; i++)
+			add_tic(a, set[i] * pow(10, k));
+}
+
+/* Room around the points; a range of amounts begins at 0 when that costs little, so that lengths can be compared. */
+static void widen(struct plot_axis *a, bool amounts)
+{
+	if (a->log) {
+		double factor = pow(a->high / a->low, 0.06);
+		factor = factor > 1.02 ? factor : 1.3;
+		a->low /= factor;
+		a->high *= factor;
+		mark(a);
+		return;
+	}
+	double room = 0.06 * (a->high - a->low);
+	if (!(room > 0))
+		room = a->high != 0 ? 0.3 * fabs(a->high) : 1;
+	bool from_zero = a->low >= 0 && (amounts ? a->low < 0.6 * a->high : a->low < room);
+	a->low = from_zero ? 0 : a->low - room;
+	a->high += room;
+}
+
+bool plot_axes(const struct plot *p, struct plot_axis *x, struct plot_axis *y)
+{
+	*x = (struct plot_axis){.low = INFINITY, .high = -INFINITY, .log = p->log_x};
+	*y = (struct plot_axis){.low = INFINITY, .high = -INFINITY, .log = p->log_y};
+	for (size_t k = 0; k < p->series_count; k++) {
+		const struct plot_series *s = &p->series[k];
+		for (size_t i = 0; i < s->count; i++) {
+			if (!plot_point_shown(p, s, i))
+				continue;
+			extend(x, s->x, i);
+			extend(y, s->style == PLOT_BAND ? NULL : s->y, i);
+			extend(y, s->low, i);
+			extend(y, s->high, i);
+		}
+	}
+	if (!(x->low <= x->high && y->low <= y->high))
+		return false;
+	widen(x, false);
+	widen(y, true);
+	return true;
+}

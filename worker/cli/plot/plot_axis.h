@@ -1,0 +1,22 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Ranges of a plot's axes and, where they are logarithmic, marks at round numbers. Pure. */
+#ifndef WORKER_CLI_PLOT_AXIS_H
+#define WORKER_CLI_PLOT_AXIS_H
+
+#include "worker/cli/plot/plot.h"
+
+enum { PLOT_TICS = 32 };
+
+struct plot_axis {
+	double low, high; /* low < high */
+	bool log;
+	size_t tic_count; /* of a logarithmic axis */
+	double tic[PLOT_TICS];
+};
+
+/* Finite and, where an axis is logarithmic, above 0. */
+bool plot_point_shown(const struct plot *p, const struct plot_series *s, size_t i);
+/* false: no point is shown. */
+bool plot_axes(const struct plot *p, struct plot_axis *x, struct plot_axis *y);
+
+#endif

@@ -1,0 +1,65 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/render/choice.h"
+
+#include "common/json/forecast_json.h"
+#include "worker/render/scene/scene.h"
+
+#include <time.h>
+
+static double now(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
+{
+	*out = (struct choice){.made = integrator_is_open(&a->plan)};
+	if (!out->made)
+		return 0;
+	double begin = now();
+	int rc = render_choose(w, &a->plan, &out->found, e);
+	out->seconds = now() - begin;
+	if (!rc)
+		render_choice_text(a->plan.integrator, &out->found, out->text, sizeof out->text);
+	return rc;
+}
+
+int choice_make(struct render_arguments *a, const char *folder, const char *name, struct choice *out, struct error *e)
+{
+	struct scene scene;
+	struct world *w;
+	*out = (struct choice){.made = false};
+	if (!integrator_is_open(&a->plan))
+		return 0;
+	struct asset_source assets = asset_folder(folder);
+	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &a->render, e);
+	if (rc)
+		return rc;
+	rc = world_new(&w, &scene, &assets, &a->render, e);
+	scene_fini(&scene);
+	if (!rc) {
+		rc = choice_in_world(w, a, out, e);
+		world_free(w);
+	}
+	return rc;
+}
+
+static json_t *found_to_json(const struct render_found *f)
+{
+	return json_pack("{s:o s:o s:o s:o}", "rareShare", forecast_real(f->rare), "tailIndex", forecast_real(f->tail),
+			 "extremeTailIndex", forecast_real(f->extreme), "secondMomentTimesRays",
+			 forecast_real(f->cost));
+}
+
+json_t *choice_to_json(const struct choice *c)
+{
+	if (!c->made)
+		return json_null();
+	const struct render_choice *f = &c->found;
+	return json_pack("{s:s s:[ssss] s:I s:f s:b s:o s:o}", "why", c->text, "considered", "path", "bdpt8", "bdpt",
+			 RENDER_INTEGRATOR_CHAINS, "pilotSamples", (json_int_t)f->samples, "pilotSeconds", c->seconds,
+			 "pathMissesLight", (int)f->misses, "path", found_to_json(&f->path), "bdpt",
+			 f->settled ? json_null() : found_to_json(&f->bdpt));
+}

@@ -1,0 +1,26 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The choice of the integrator (worker/render/choose.h) where it is left to the scene. */
+#ifndef WORKER_CLI_RENDER_CHOICE_H
+#define WORKER_CLI_RENDER_CHOICE_H
+
+#include "worker/cli/base/options.h"
+#include "worker/render/choose.h"
+
+#include <jansson.h>
+
+struct choice {
+	bool made; /* false: one was asked for, and the rest is empty */
+	struct render_choice found;
+	double seconds; /* wall clock */
+	char text[512]; /* one line, for people */
+};
+
+/* a: complete but for what is chosen. Where nothing is to be chosen no world is built for it. */
+int choice_make(struct render_arguments *a, const char *folder, const char *name, struct choice *out, struct error *e);
+/* The same in a world that is there. */
+int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e);
+
+/* null: none was made. NULL: no memory */
+json_t *choice_to_json(const struct choice *c);
+
+#endif

@@ -1,0 +1,258 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/render/estimate.h"
+
+#include "common/base/progress.h"
+#include "common/json/forecast_json.h"
+#include "worker/cli/plot/plot.h"
+
+#include <errno.h>
+#include <jansson.h>
+#include <math.h>
+#include <stdio.h>
+
+enum { TARGETS_MOST = 5, LOOKS_LEAST = 2 };
+static const double usual[] = {0.1, 0.05, 0.02, 0.01};
+
+struct row {
+	double target;
+	const struct forecast_look *reached; /* by the pilot; NULL: not */
+	struct forecast_cost cost;	     /* of the render, with its bootstrap */
+};
+
+static double bootstrap_ratio(const struct estimate *s)
+{
+	return (double)s->plan->bootstrap / (double)s->pilot->bootstrap;
+}
+
+static void raise(struct forecast_range *r, double more)
+{
+	r->low += more;
+	r->middle += more;
+	r->high += more;
+}
+
+static size_t rows_of(const struct estimate *s, struct row row[TARGETS_MOST])
+{
+	size_t count = 0;
+	bool given = s->target > 0;
+	for (size_t i = 0; i < sizeof usual / sizeof *usual; i++) {
+		if (given && s->target > usual[i])
+			row[count++].target = s->target;
+		given = given && s->target < usual[i];
+		row[count++].target = usual[i];
+	}
+	if (given)
+		row[count++].target = s->target;
+	for (size_t i = 0; i < count; i++) {
+		struct row *r = &row[i];
+		r->reached = forecast_reached(s->looks, r->target);
+		forecast_target(s->looks, s->plan, r->target, FORECAST_NEW, &r->cost);
+		raise(&r->cost.cpu_seconds, s->bootstrap_cpu * bootstrap_ratio(s));
+		raise(&r->cost.seconds, s->bootstrap_seconds * bootstrap_ratio(s));
+	}
+	return count;
+}
+
+static int check(const struct estimate *s, struct error *e)
+{
+	if (s->looks->count >= LOOKS_LEAST)
+		return 0;
+	return error_set(
+		e, EAGAIN,
+		"the pilot has seen its error %u times only, %d are needed: give it more time (--pilot SECONDS)",
+		s->looks->count, LOOKS_LEAST);
+}
+
+/* ---- the table */
+
+static void print_range(FILE *f, const struct forecast_range *r)
+{
+	char low[32], middle[32], high[32], between[80];
+	progress_duration(r->low, low, sizeof low);
+	progress_duration(r->middle, middle, sizeof middle);
+	progress_duration(r->high, high, sizeof high);
+	snprintf(between, sizeof between, "%s - %s", low, high);
+	fprintf(f, "  %9s  %-20s", middle, between);
+}
+
+static void print_table(const struct estimate *s, FILE *f)
+{
+	struct row row[TARGETS_MOST];
+	size_t count = rows_of(s, row);
+	char text[64], cpu[64];
+	struct forecast_range now;
+	forecast_error(s->looks, &now);
+	progress_duration(s->seconds, text, sizeof text);
+	progress_duration(s->cpu_seconds, cpu, sizeof cpu);
+	fprintf(f, "%s: a pilot of %s (%s of processors) came to an error of %.3g %% (%.3g - %.3g %%)\n", s->scene,
+		text, cpu, 100 * now.middle, 100 * now.low, 100 * now.high);
+	fprintf(f, "each with its 90 %% interval; wall clock on %s\n", s->where);
+	fprintf(f, "%-8s  %-31s  %-31s\n", "error", "time of processors", "wall clock");
+	for (size_t i = 0; i < count; i++) {
+		snprintf(text, sizeof text, "%.3g %%", 100 * row[i].target);
+		fprintf(f, "%-8s", text);
+		print_range(f, &row[i].cost.cpu_seconds);
+		print_range(f, &row[i].cost.seconds);
+		if (row[i].reached) {
+			progress_duration(row[i].reached->seconds + s->bootstrap_seconds, text, sizeof text);
+			fprintf(f, "  reached after %s by the pilot", text);
+		}
+		fprintf(f, "\n");
+	}
+}
+
+/* ---- JSON */
+
+static json_t *reached_json(const struct estimate *s, const struct forecast_look *l)
+{
+	if (!l)
+		return json_null();
+	return json_pack("{s:f s:f s:f}", "mutations", l->work, "cpuSeconds", l->cpu_seconds + s->bootstrap_cpu,
+			 "wallSeconds", l->seconds + s->bootstrap_seconds);
+}
+
+static json_t *targets_json(const struct estimate *s)
+{
+	struct row row[TARGETS_MOST];
+	size_t count = rows_of(s, row);
+	json_t *list = json_array();
+	for (size_t i = 0; i < count; i++)
+		json_array_append_new(list, json_pack("{s:f s:o s:o s:o s:o}", "error", row[i].target, "mutations",
+						      forecast_range_to_json(&row[i].cost.work), "cpuSeconds",
+						      forecast_range_to_json(&row[i].cost.cpu_seconds), "wallSeconds",
+						      forecast_range_to_json(&row[i].cost.seconds), "reached",
+						      reached_json(s, row[i].reached)));
+	return list;
+}
+
+static int print_json(const struct estimate *s, FILE *f, struct error *e)
+{
+	char plan[PLAN_TEXT];
+	struct forecast_range now;
+	plan_describe(s->plan, plan, sizeof plan);
+	forecast_error(s->looks, &now);
+	json_t *o =
+		json_pack("{s:i s:s s:s s:s s:s s:o s:{s:f s:f s:f s:f s:o} s:o}", "schema", 1, "type", "estimate",
+			  "scene", s->scene, "plan", plan, "where", s->where, "errorNow", forecast_range_to_json(&now),
+			  "pilot", "wallSeconds", s->seconds, "cpuSeconds", s->cpu_seconds, "bootstrapCpuSeconds",
+			  s->bootstrap_cpu, "bootstrapWallSeconds", s->bootstrap_seconds, "looks",
+			  forecast_looks_to_json(s->looks), "targets", targets_json(s));
+	if (!o)
+		return error_set(e, ENOMEM, "no memory for the estimate");
+	json_dumpf(o, f, JSON_COMPACT);
+	fputc('\n', f);
+	json_decref(o);
+	return 0;
+}
+
+/* ---- the plot */
+
+enum { BAND_POINTS = 40 };
+
+struct drawing {
+	double x[FORECAST_LOOKS], y[FORECAST_LOOKS], low[FORECAST_LOOKS], high[FORECAST_LOOKS];
+	double band_x[BAND_POINTS], band_y[BAND_POINTS], band_low[BAND_POINTS], band_high[BAND_POINTS];
+	double goal_x[TARGETS_MOST][3], goal_y[TARGETS_MOST][3];
+	char labels[TARGETS_MOST][96];
+	const char *label_at[TARGETS_MOST][3];
+};
+
+static void draw_looks(const struct estimate *s, struct drawing *d)
+{
+	struct forecast_history one = *s->looks;
+	for (uint32_t i = 0; i < s->looks->count; i++) {
+		struct forecast_range r = {0};
+		one.count = i + 1;
+		forecast_error(&one, &r);
+		d->x[i] = s->looks->looks[i].cpu_seconds + s->bootstrap_cpu;
+		d->y[i] = 100 * r.middle;
+		d->low[i] = 100 * r.low;
+		d->high[i] = 100 * r.high;
+	}
+}
+
+/* From the pilot's last look to where the last target that can be paid for is met. */
+static void draw_band(const struct estimate *s, struct drawing *d, double most)
+{
+	const struct forecast_look *l = &s->looks->looks[s->looks->count - 1];
+	double growth = log(fmax(most / l->work, 2)), bootstrap = s->bootstrap_cpu * bootstrap_ratio(s);
+	for (int i = 0; i < BAND_POINTS; i++) {
+		struct forecast_range r = {0};
+		double work = l->work * exp(growth * i / (BAND_POINTS - 1));
+		forecast_error_at(s->looks, work, &r);
+		d->band_x[i] = work / l->work * l->cpu_seconds + bootstrap;
+		d->band_y[i] = 100 * r.middle;
+		d->band_low[i] = 100 * r.low;
+		d->band_high[i] = 100 * r.high;
+	}
+}
+
+static void draw_goal(const struct row *r, struct drawing *d, size_t i)
+{
+	char text[32];
+	const struct forecast_range *c = &r->cost.cpu_seconds;
+	progress_duration(c->middle, text, sizeof text);
+	snprintf(d->labels[i], sizeof d->labels[i], "%.3g %%: %s", 100 * r->target, text);
+	double x[3] = {c->low, c->middle, c->high};
+	for (int k = 0; k < 3; k++) {
+		d->goal_x[i][k] = x[k];
+		d->goal_y[i][k] = 100 * r->target;
+		d->label_at[i][k] = k == 0 ? d->labels[i] : "";
+	}
+}
+
+static int draw(const struct estimate *s, const char *path, struct error *e)
+{
+	static struct drawing d;
+	struct row row[TARGETS_MOST];
+	size_t count = rows_of(s, row), series = 3;
+	double most = 0;
+	struct plot_series list[3 + TARGETS_MOST] = {
+		{.name = "expected (90 %)",
+		 .style = PLOT_BAND,
+		 .count = BAND_POINTS,
+		 .x = d.band_x,
+		 .low = d.band_low,
+		 .high = d.band_high},
+		{.name = "", .style = PLOT_LINE, .count = BAND_POINTS, .x = d.band_x, .y = d.band_y},
+		{.name = "pilot",
+		 .style = PLOT_POINTS,
+		 .count = s->looks->count,
+		 .x = d.x,
+		 .y = d.y,
+		 .low = d.low,
+		 .high = d.high},
+	};
+	for (size_t i = 0; i < count; i++) {
+		if (!isfinite(row[i].cost.cpu_seconds.high))
+			continue;
+		most = fmax(most, row[i].cost.work.high);
+		draw_goal(&row[i], &d, i);
+		list[series++] = (struct plot_series){.name = i == 0 ? "stops at its target (90 %)" : "",
+						      .style = PLOT_LINE,
+						      .count = 3,
+						      .x = d.goal_x[i],
+						      .y = d.goal_y[i],
+						      .labels = d.label_at[i]};
+	}
+	draw_looks(s, &d);
+	draw_band(s, &d, most);
+	struct plot p = {.title = s->scene,
+			 .x_label = "seconds of processors",
+			 .y_label = "relative error, %",
+			 .log_x = true,
+			 .log_y = true,
+			 .series_count = series,
+			 .series = list};
+	return plot_write(&p, path, e);
+}
+
+int estimate_report(const struct estimate *s, bool json, const char *plot, struct error *e)
+{
+	int rc = check(s, e);
+	if (!rc && json)
+		rc = print_json(s, stdout, e);
+	else if (!rc)
+		print_table(s, stdout);
+	return !rc && plot ? draw(s, plot, e) : rc;
+}

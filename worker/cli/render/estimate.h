@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What an estimate says: a table of errors and what they cost, the same as JSON, and a plot of error against time. One
+ * thread.
+ */
+#ifndef WORKER_CLI_RENDER_ESTIMATE_H
+#define WORKER_CLI_RENDER_ESTIMATE_H
+
+#include "common/estimate/forecast.h"
+
+struct estimate {
+	const char *scene, *where; /* "this machine, 2 threads" */
+	const struct plan *plan;   /* of the render that is spoken of */
+	const struct plan *pilot;
+	const struct forecast_history *looks; /* of the pilot */
+	double cpu_seconds, seconds;	      /* of the pilot, bootstrap and all */
+	double bootstrap_cpu,
+		bootstrap_seconds; /* of the pilot's bootstrap; the render's is longer by the ratio of samples */
+	double target;		   /* asked for beside the usual ones; 0: none */
+};
+
+/* Table or JSON to stdout, and a plot where a path is given. -EAGAIN: the pilot has not seen enough to say anything. */
+int estimate_report(const struct estimate *s, bool json, const char *plot, struct error *e);
+
+#endif

@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/render/explain.h"
+
+#include "common/base/mem.h"
+#include "worker/cli/render/choice.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <string.h>
+
+static const char *state_of(const struct effect_line *l)
+{
+	if (l->forced)
+		return l->on ? "on (forced)" : "off (forced)";
+	return l->on ? "on" : "off";
+}
+
+/* Edges of the longest path that the image has. */
+static uint32_t held_depth(const struct plan_request *p)
+{
+	const struct render_integrator *integrator = render_integrator_find(p->integrator);
+	return integrator && integrator->max_depth < p->max_depth ? integrator->max_depth : p->max_depth;
+}
+
+static void print_lines(const char *name, const struct render_summary *m, const struct plan_request *p,
+			const struct choice *c)
+{
+	char note[512];
+	printf("%s: %llu shapes, %llu triangles\n\n", name, (unsigned long long)m->shapes,
+	       (unsigned long long)m->triangles);
+	for (size_t i = 0; i < m->line_count; i++) {
+		const struct effect_line *l = &m->lines[i];
+		printf("%-13s %-12s  %s\n%27s %s: %s\n", l->name, state_of(l), l->why, "",
+		       l->on ? "without it" : "saves", l->saves);
+	}
+	printf("\n%s, paths of at most %u edges", p->integrator, p->max_depth);
+	if (held_depth(p) < p->max_depth)
+		printf(" asked for, of at most %u held (what is longer is missing in the image: its note says how much)",
+		       held_depth(p));
+	if (*p->mixture)
+		printf(", mutations %s", p->mixture);
+	printf("\n%s\n",
+	       c->made ? c->text
+		       : "asked for; else a pilot would choose among path, bdpt8, bdpt and " RENDER_INTEGRATOR_CHAINS);
+	for (size_t i = 0; render_scene_note(m, i, note, sizeof note); i++)
+		printf("note: %s\n", note);
+}
+
+static int print_json(const char *name, const struct render_summary *m, const struct plan_request *p,
+		      const struct choice *c, struct error *e)
+{
+	char note[512];
+	render_effects_note(m, note, sizeof note);
+	json_t *effects = json_array();
+	for (size_t i = 0; i < m->line_count; i++) {
+		const struct effect_line *l = &m->lines[i];
+		json_array_append_new(effects, json_pack("{s:s s:b s:b s:s s:s}", "name", l->name, "on", (int)l->on,
+							 "forced", (int)l->forced, "why", l->why, "saves", l->saves));
+	}
+	json_t *o = json_pack("{s:i s:s s:s s:s s:i s:i s:o s:o s:s}", "schema", 1, "scene", name, "integrator",
+			      p->integrator, "mixture", p->mixture, "maxDepth", (int)p->max_depth, "heldDepth",
+			      (int)held_depth(p), "choice", choice_to_json(c), "effects", effects, "note", note);
+	if (!o)
+		return error_set(e, ENOMEM, "no memory for the list of effects");
+	json_dumpf(o, stdout, JSON_COMPACT);
+	putchar('\n');
+	json_decref(o);
+	return 0;
+}
+
+static int summarise(const char *folder, const char *name, struct render_arguments *a, struct render_summary *m,
+		     struct error *e)
+{
+	struct scene scene;
+	struct asset_source assets = asset_folder(folder);
+	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &a->render, e);
+	if (rc)
+		return rc;
+	rc = render_check(&scene, &assets, &a->render, m, e);
+	scene_fini(&scene);
+	return rc;
+}
+
+int explain(const char *path, struct render_arguments *a, bool json, bool *usage, struct error *e)
+{
+	char *folder, *name;
+	static struct render_summary m; /* large */
+	*usage = false;
+	int rc = scene_path_split(path, &folder, &name, e);
+	if (rc)
+		return rc;
+	rc = summarise(folder, name, a, &m, e);
+	if (!rc) {
+		rc = render_plan_from_scene(a, &m, e);
+		*usage = rc == -EINVAL;
+	}
+	struct choice choice;
+	if (!rc)
+		rc = choice_make(a, folder, name, &choice, e);
+	if (!rc && json)
+		rc = print_json(name, &m, &a->plan, &choice, e);
+	else if (!rc)
+		print_lines(name, &m, &a->plan, &choice);
+	mem_free(folder);
+	mem_free(name);
+	return rc;
+}

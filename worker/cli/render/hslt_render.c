@@ -1,0 +1,439 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/base/crash.h"
+#include "common/base/mem.h"
+#include "common/base/output.h"
+#include "common/base/progress.h"
+#include "common/base/version.h"
+#include "common/exr/image_file.h"
+#include "common/estimate/stated_error.h"
+#include "common/estimate/strategy.h"
+#include "worker/cli/render/choice.h"
+#include "worker/cli/render/estimate.h"
+#include "worker/cli/render/explain.h"
+#include "worker/cli/render/local_pilot.h"
+#include "worker/cli/base/interrupt.h"
+#include "worker/cli/base/options.h"
+#include "worker/cli/render/pilot.h"
+#include "worker/cli/render/stats.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+#include <time.h>
+
+const char *argp_program_version = "hslt-render " HSLT_VERSION;
+
+static const char doc[] =
+	"Renders a scene on this machine, without a farm: the same plan gives the same bits as the farm's."
+	"\v"
+	"Examples:\n"
+	"  hslt-render room.xml -o room.exr --spp 64\n"
+	"  hslt-render room.xml -o room.exr --integrator path --size 320x180 --threads 8 --stats room.json\n"
+	"  hslt-render room.xml -o room.exr --target-error 2% --time 3600\n"
+	"  hslt-render --estimate room.xml --plot room.svg\n"
+	"  hslt-render --explain room.xml\n"
+	"  hslt-render room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --mutations 10000000\n"
+	"\n"
+	"--estimate makes no image: a pilot of a minute tells what errors of 10, 5, 2 and 1 % (and --target-error) will cost.\n"
+	"The image holds linear Rec. 709 (R G B), one standard error of each (error.R error.G error.B), and for chains the potential "
+	"scale reduction of each pixel's tile (rhat.Y).\n"
+	"Exit codes: 0 done, 1 failed, 2 usage, 4 a bound came before the target error, 5 chains disagree (the image is there, and its "
+	"note says where).";
+
+enum {
+	OPTION_THREADS = 256,
+	OPTION_STATS,
+	OPTION_QUIET,
+	OPTION_ESTIMATE,
+	OPTION_PILOT,
+	OPTION_PLOT,
+	OPTION_JSON,
+	OPTION_EXPLAIN
+};
+
+static const struct argp_option options[] = {
+	{"output", 'o', "FILE", 0, "The image (OpenEXR); -: stdout", 0},
+	{"threads", OPTION_THREADS, "N", 0, "Threads (as many as processors); does not change the bits", 0},
+	{"stats", OPTION_STATS, "FILE", 0,
+	 "Write plan, times, counters, strategies and effects as JSON, and show tables of the strategies and of the classes of paths",
+	 0},
+	{"quiet", OPTION_QUIET, NULL, 0, "Print errors only", 0},
+	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
+	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
+	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
+	{"explain", OPTION_EXPLAIN, NULL, 0,
+	 "Only say what the scene calls for, why, and what leaving the rest out saves", 0},
+	{"json", OPTION_JSON, NULL, 0, "Print the estimate, or what --explain says, as one JSON object", 0},
+	{0},
+};
+static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
+
+struct arguments {
+	const char *scene, *output, *stats, *plot;
+	unsigned threads;
+	double pilot; /* s; 0: not given */
+	bool quiet, estimate, explain, json;
+	struct render_arguments render;
+};
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+	struct arguments *a = state->input;
+	switch (key) {
+	case ARGP_KEY_INIT:
+		state->child_inputs[0] = &a->render;
+		return 0;
+	case 'o':
+		a->output = option_image(state, arg);
+		return 0;
+	case OPTION_THREADS:
+		a->threads = option_threads(state, arg);
+		return 0;
+	case OPTION_STATS:
+		a->stats = arg;
+		return 0;
+	case OPTION_QUIET:
+		a->quiet = true;
+		return 0;
+	case OPTION_ESTIMATE:
+		a->estimate = true;
+		return 0;
+	case OPTION_PILOT:
+		a->pilot = option_seconds(state, "--pilot", arg);
+		return 0;
+	case OPTION_PLOT:
+		a->plot = arg;
+		return 0;
+	case OPTION_JSON:
+		a->json = true;
+		return 0;
+	case OPTION_EXPLAIN:
+		a->explain = true;
+		return 0;
+	case ARGP_KEY_ARG:
+		if (a->scene)
+			argp_error(state, "one scene at a time");
+		a->scene = arg;
+		return 0;
+	case ARGP_KEY_END:
+		if (!a->scene || (!a->output && !a->estimate && !a->explain))
+			argp_error(state, "a scene and -o FILE are needed");
+		if (a->estimate && (a->output || a->stats))
+			argp_error(state, "--estimate makes no image: no -o, no --stats");
+		if (a->explain && (a->output || a->stats || a->estimate))
+			argp_error(state, "--explain renders nothing: no -o, no --stats, no --estimate");
+		if (!a->estimate && (a->pilot > 0 || a->plot || (a->json && !a->explain)))
+			argp_error(state, "--pilot, --plot and --json go with --estimate");
+		return 0;
+	default:
+		return ARGP_ERR_UNKNOWN;
+	}
+}
+
+struct session {
+	struct arguments *a;
+	char *folder, *name;
+	struct world *world;
+	struct render_summary summary;
+	struct plan plan;
+	struct local_run run;
+	struct canvas_image image;
+	struct forecast_history looks;
+	struct convergence agreement;
+	double forecast_seconds; /* from the first bootstrap sample to the target; 0: unknown */
+	char forecast[160];
+	double build_seconds;
+	struct choice choice;
+	struct progress progress;
+	bool usage; /* what went wrong was asked for */
+};
+
+static double now(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static int load(struct session *s, struct error *e)
+{
+	struct scene scene;
+	double begin = now();
+	int rc = scene_path_split(s->a->scene, &s->folder, &s->name, e);
+	if (rc)
+		return rc;
+	struct asset_source assets = asset_folder(s->folder);
+	rc = render_scene_read(&scene, &assets, s->name, s->a->render.defines, s->a->render.define_count,
+			       &s->a->render.render, e);
+	if (rc)
+		return rc;
+	for (uint32_t i = 0; !s->a->quiet && i < scene.note_count; i++)
+		fprintf(stderr, "%s\n", scene.notes[i]);
+	rc = world_new(&s->world, &scene, &assets, &s->a->render.render, e);
+	scene_fini(&scene);
+	if (rc)
+		return rc;
+	world_summary(s->world, &s->summary);
+	s->build_seconds = now() - begin;
+	return 0;
+}
+
+static int choose(struct session *s, struct error *e)
+{
+	int rc = choice_in_world(s->world, &s->a->render, &s->choice, e);
+	if (!rc && s->choice.made && !s->a->quiet)
+		fprintf(stderr, "%s (%.2f s)\n", s->choice.text, s->choice.seconds);
+	return rc;
+}
+
+static int make_plan(struct session *s, struct error *e)
+{
+	struct plan_request *p = &s->a->render.plan;
+	char text[PLAN_TEXT];
+	int rc = render_plan_from_scene(&s->a->render, &s->summary, e);
+	s->usage = rc == -EINVAL;
+	if (!rc)
+		rc = choose(s, e);
+	if (!rc)
+		rc = plan_make(p, &s->plan, e);
+	if (rc || s->a->quiet)
+		return rc;
+	plan_describe(&s->plan, text, sizeof text);
+	fprintf(stderr, "%s\n", text);
+	plan_describe_changes(p, &s->plan, text, sizeof text);
+	if (*text)
+		fprintf(stderr, "%s\n", text);
+	for (size_t i = 0; render_scene_note(&s->summary, i, text, sizeof text); i++)
+		fprintf(stderr, "hslt-render: note: %s\n", text);
+	fprintf(stderr, "scene built in %.2f s: %llu triangles, %zu MB of Embree's\n", s->build_seconds,
+		(unsigned long long)s->summary.triangles, world_embree_bytes(s->world) >> 20);
+	return 0;
+}
+
+static void show(void *user, const struct local_progress *p)
+{
+	struct session *s = user;
+	char detail[224], eta[32];
+	double fraction = 0;
+	if (p->total != UINT64_MAX)
+		fraction = (double)p->done / (double)p->total;
+	if (s->forecast_seconds > 0)
+		fraction = fmax(fraction, fmin(p->seconds / s->forecast_seconds, 0.99));
+	if (s->plan.seconds > 0)
+		fraction = fmax(fraction, fmin(p->seconds / s->plan.seconds, 0.99));
+	progress_time(fraction > 0 ? p->seconds * (1 / fraction - 1) : 0, eta, sizeof eta);
+	snprintf(detail, sizeof detail, "%s left%s", eta, s->forecast);
+	progress_show(&s->progress, fraction, p->state, detail);
+}
+
+/* After a look: when it will stop by its target, and what the next halving would cost, for the progress line. */
+static void expect(struct session *s, const struct local_round *r)
+{
+	struct forecast_cost stop, half;
+	struct forecast_range error;
+	char low[32], high[32], more[32];
+	forecast_add(&s->looks, &s->plan, r->image, r->cpu_seconds, r->seconds);
+	if (!forecast_error(&s->looks, &error) || !forecast_halving(&s->looks, &s->plan, &half) ||
+	    !forecast_target(&s->looks, &s->plan, s->plan.target_error, FORECAST_SAME, &stop))
+		return;
+	s->forecast_seconds = stop.seconds.middle + r->bootstrap_seconds;
+	progress_duration(stop.seconds.low - r->seconds, low, sizeof low);
+	progress_duration(stop.seconds.high - r->seconds, high, sizeof high);
+	progress_duration(half.seconds.middle, more, sizeof more);
+	snprintf(s->forecast, sizeof s->forecast, " (%s - %s to the target), error %.3g %%, half of it in %s", low,
+		 high, 100 * error.middle, more);
+}
+
+static void look(void *user, const struct local_round *r)
+{
+	struct session *s = user;
+	if (r->image)
+		expect(s, r);
+}
+
+static int render(struct session *s, struct error *e)
+{
+	s->run = (struct local_run){.world = s->world,
+				    .plan = &s->plan,
+				    .threads = s->a->threads,
+				    .stop = &interrupted,
+				    .progress = s->a->quiet ? NULL : show,
+				    .round = look,
+				    .user = s};
+	if (!s->a->quiet)
+		progress_start(&s->progress);
+	int rc = local_run(&s->run, e);
+	if (!s->a->quiet)
+		progress_end(&s->progress);
+	if (rc)
+		return rc;
+	if (!s->run.canvas || (canvas_rounds(s->run.canvas) == 0 && !s->run.lit.black))
+		return error_set(e, EINTR, "interrupted before the first round was complete: nothing to write");
+	rc = canvas_image(s->run.canvas, false, &s->image, e);
+	if (!rc)
+		convergence_judge(&s->plan, &s->image, &s->agreement);
+	return rc;
+}
+
+static int write_image(const struct session *s, struct error *e)
+{
+	struct header_effect effects[RENDER_EFFECTS_MAX];
+	for (size_t i = 0; i < s->summary.line_count; i++)
+		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].on,
+						    s->summary.lines[i].forced, s->summary.lines[i].why,
+						    s->summary.lines[i].saves};
+	struct header_extra x = {.scene = s->name,
+				 .effect_count = s->summary.line_count,
+				 .effects = effects,
+				 .wall_seconds = s->run.seconds,
+				 .cpu_seconds = s->run.cpu_seconds,
+				 .workers = s->a->threads,
+				 .end = merge_end_name(s->run.end, s->run.lit.black)};
+	unsigned char *bytes;
+	size_t size;
+	int rc = image_file_encode(&s->image, &s->plan, &x, &bytes, &size, e);
+	if (rc)
+		return rc;
+	rc = image_file_write(s->a->output, bytes, size, e);
+	mem_free(bytes);
+	return rc;
+}
+
+static void say(const struct session *s)
+{
+	const struct canvas_image *i = &s->image;
+	const struct plan *p = &s->plan;
+	fprintf(stderr, "%llu rounds in %.1f s (%.1f s of processors)", (unsigned long long)i->rounds, s->run.seconds,
+		s->run.cpu_seconds);
+	char text[STRATEGY_TABLE];
+	fprintf(stderr, "; ended by %s\n", merge_end_name(s->run.end, s->run.lit.black));
+	stated_error(i, text, sizeof text);
+	if (*text && !i->rel_mse_doubt)
+		fprintf(stderr, "%s\n", text);
+	strategy_table(p->mutations, &i->counts, text, sizeof text);
+	if (s->a->stats)
+		fputs(text, stderr);
+	convergence_table(i->classes, i->b, &s->agreement, text, sizeof text);
+	if (s->a->stats)
+		fputs(text, stderr);
+	strategy_note(p, &i->counts, i->black, text, sizeof text);
+	strategy_add_beyond(i->beyond_share, text, sizeof text);
+	convergence_add_note(&s->agreement, text, sizeof text);
+	if (*text)
+		fprintf(stderr, "hslt-render: note: %s\n", text);
+}
+
+/* The last line, and what even --quiet says: how wrong the image is, nobody knows. */
+static void warn(const struct session *s)
+{
+	char text[STATED_ERROR_TEXT];
+	stated_error(&s->image, text, sizeof text);
+	fprintf(stderr, "hslt-render: warning: %s\n", text);
+}
+
+static int report(const struct session *s, const struct local_pilot *p, struct error *e)
+{
+	char where[64];
+	snprintf(where, sizeof where, "this machine, %u thread%s", s->a->threads, s->a->threads == 1 ? "" : "s");
+	struct estimate m = {.scene = s->name,
+			     .where = where,
+			     .plan = &p->render,
+			     .pilot = &p->plan,
+			     .looks = &p->looks,
+			     .cpu_seconds = p->cpu_seconds,
+			     .seconds = p->wall_seconds,
+			     .bootstrap_cpu = p->bootstrap_cpu,
+			     .bootstrap_seconds = p->bootstrap_seconds,
+			     .target = s->a->render.plan.target_error};
+	return estimate_report(&m, s->a->json, s->a->plot, e);
+}
+
+static int estimate(struct session *s, struct error *e)
+{
+	int rc = s->a->plot ? image_file_probe(s->a->plot, e) : 0;
+	if (!rc)
+		rc = load(s, e);
+	if (!rc) {
+		rc = pilot_plan_from_scene(&s->a->render, &s->summary, e);
+		s->usage = rc == -EINVAL;
+	}
+	if (!rc)
+		rc = choose(s, e);
+	if (rc)
+		return rc;
+	struct local_pilot p = {.world = s->world,
+				.request = &s->a->render.plan,
+				.seconds = s->a->pilot > 0 ? s->a->pilot : PILOT_SECONDS,
+				.threads = s->a->threads,
+				.stop = &interrupted,
+				.progress = s->a->quiet ? NULL : show,
+				.user = s};
+	s->plan.seconds = p.seconds;
+	if (!s->a->quiet)
+		progress_start(&s->progress);
+	rc = local_pilot(&p, e);
+	if (!s->a->quiet)
+		progress_end(&s->progress);
+	return rc ? rc : report(s, &p, e);
+}
+
+static int run(struct session *s, struct error *e)
+{
+	if (s->a->estimate)
+		return estimate(s, e);
+	if (s->a->explain)
+		return explain(s->a->scene, &s->a->render, s->a->json, &s->usage, e);
+	int rc = image_file_probe(s->a->output, e);
+	if (!rc && s->a->stats)
+		rc = image_file_probe(s->a->stats, e);
+	if (!rc)
+		rc = load(s, e);
+	if (!rc)
+		rc = make_plan(s, e);
+	if (!rc)
+		rc = render(s, e);
+	if (!rc)
+		rc = write_image(s, e);
+	if (!rc && s->a->stats)
+		rc = stats_write(s->a->stats,
+				 &(struct stats){s->name, &s->summary, &s->run, &s->image, &s->agreement,
+						 s->build_seconds, &s->looks, &s->choice},
+				 e);
+	if (!rc && !s->a->quiet)
+		say(s);
+	if (!rc && s->image.rel_mse_doubt)
+		warn(s);
+	if (!rc && s->run.end == MERGE_GOES_ON)
+		rc = error_set(e, EINTR, "interrupted: %s holds the %llu complete rounds", s->a->output,
+			       (unsigned long long)s->image.rounds);
+	return rc;
+}
+
+int main(int argc, char **argv)
+{
+	static struct arguments a;
+	static struct session s;
+	struct error e = {""};
+	mem_keep(1 << 20);
+	a.threads = option_threads_default();
+	output_check_at_exit();
+	crash_exit("hslt-render");
+	argp_err_exit_status = 2;
+	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
+	interrupt_watch();
+	s.a = &a;
+	int rc = run(&s, &e);
+	canvas_image_fini(&s.image);
+	canvas_free(s.run.canvas);
+	world_free(s.world);
+	mem_free(s.folder);
+	mem_free(s.name);
+	if (rc) {
+		fprintf(stderr, "hslt-render: %s\n", e.text);
+		return s.usage ? 2 : 1;
+	}
+	if (s.agreement.verdict == CHAINS_DISAGREE)
+		return 5;
+	bool missed = s.plan.target_error > 0 && s.run.end != MERGE_ERROR && !s.run.lit.black;
+	return missed ? 4 : 0;
+}

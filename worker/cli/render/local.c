@@ -1,0 +1,292 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/render/local.h"
+
+#include "common/base/crash.h"
+#include "common/base/mem.h"
+
+#include <pthread.h>
+#include <string.h>
+#include <time.h>
+
+struct thread_pool {
+	struct local_run *run;
+	struct bootstrap *bootstrap;
+	uint64_t *seeds;	     /* [groups][chains / groups] */
+	struct chain_state **states; /* [groups x parts][chains of a lease] after the epoch before */
+	enum lease_kind kind;
+	uint64_t epoch;
+	uint32_t next, leases; /* of the phase */
+	uint64_t finished;     /* of the whole job, for progress */
+	struct timespec begin;
+	pthread_mutex_t lock;
+	int rc;
+	struct error error;
+};
+
+struct local_job {
+	struct thread_pool thread_pool;
+};
+
+static double since(const struct timespec *begin)
+{
+	struct timespec now;
+	clock_gettime(CLOCK_MONOTONIC, &now);
+	return (double)(now.tv_sec - begin->tv_sec) + 1e-9 * (double)(now.tv_nsec - begin->tv_nsec);
+}
+
+static bool stopped(const struct thread_pool *c)
+{
+	return c->run->stop && atomic_load(c->run->stop);
+}
+
+static uint32_t chains_of(const struct plan *p, uint32_t part)
+{
+	if (p->kind != PLAN_CHAINS)
+		return 0;
+	struct plan_range r = plan_chain_range(p, part);
+	return (uint32_t)(r.end - r.begin);
+}
+
+static void free_states(struct chain_state *s, uint32_t count)
+{
+	for (uint32_t i = 0; s && i < count; i++)
+		mem_free(s[i].bytes);
+	mem_free(s);
+}
+
+static void show(struct thread_pool *c)
+{
+	struct local_run *r = c->run;
+	if (!r->progress)
+		return;
+	uint64_t per_round = (uint64_t)r->plan->groups * r->plan->parts;
+	struct local_progress p = {.state = c->kind == LEASE_BOOTSTRAP ? "bootstrap" : "running",
+				   .done = c->finished,
+				   .seconds = since(&c->begin)};
+	p.total = r->plan->rounds == UINT64_MAX ? UINT64_MAX : (r->plan->rounds + 1) * per_round;
+	r->progress(r->user, &p);
+}
+
+/* Under the lock: the batch's content goes where the farm's goes. */
+static int merge(struct thread_pool *c, struct batch *b)
+{
+	const struct plan *p = c->run->plan;
+	c->run->cpu_seconds += b->cpu_seconds;
+	if (b->key.kind == LEASE_BOOTSTRAP)
+		return bootstrap_add(c->bootstrap, b, &c->error);
+	int rc = canvas_add(c->run->canvas, b, &c->error);
+	if (rc || p->kind != PLAN_CHAINS)
+		return rc;
+	struct chain_state **at = &c->states[b->key.group * p->parts + b->key.part];
+	free_states(*at, b->state_count);
+	*at = b->states;
+	b->states = NULL;
+	b->state_count = 0;
+	return 0;
+}
+
+static int lease(struct thread_pool *c, uint32_t index)
+{
+	const struct plan *p = c->run->plan;
+	struct lease_key k = {.kind = c->kind, .group = index / p->parts, .part = index % p->parts, .epoch = c->epoch};
+	struct lease_input in = {.chain_count = chains_of(p, k.part)};
+	if (p->kind == PLAN_CHAINS && c->kind == LEASE_RENDER) {
+		if (c->epoch == 0)
+			in.seeds = c->seeds + (size_t)k.group * (p->chains / p->groups) +
+				   plan_chain_range(p, k.part).begin;
+		else
+			in.states = c->states[index];
+	}
+	struct batch b;
+	struct error e;
+	enum lease_end end;
+	int rc = render_lease(c->run->world, p, &k, &in, c->run->stop, &end, &b, &e);
+	pthread_mutex_lock(&c->lock);
+	if (!rc && end == LEASE_DONE && !c->rc) {
+		rc = batch_check(&b, p, &e);
+		if (!rc) {
+			rc = merge(c, &b);
+			e = c->error;
+		}
+		c->finished++;
+		show(c);
+	}
+	if (rc && !c->rc) {
+		c->rc = rc;
+		c->error = e;
+	}
+	pthread_mutex_unlock(&c->lock);
+	if (end == LEASE_DONE)
+		batch_fini(&b);
+	return rc;
+}
+
+static void *work(void *arg)
+{
+	struct thread_pool *c = arg;
+	crash_thread();
+	for (;;) {
+		pthread_mutex_lock(&c->lock);
+		uint32_t i = c->rc || stopped(c) ? c->leases : c->next;
+		c->next += i < c->leases;
+		pthread_mutex_unlock(&c->lock);
+		if (i == c->leases || lease(c, i))
+			return NULL;
+	}
+}
+
+/* All leases of one phase on all threads. */
+static int phase(struct thread_pool *c, enum lease_kind kind, uint64_t epoch)
+{
+	enum { THREADS_MAX = 1024 };
+	pthread_t threads[THREADS_MAX];
+	unsigned started = 0, wanted = c->run->threads < THREADS_MAX ? c->run->threads : THREADS_MAX;
+	c->kind = kind;
+	c->epoch = epoch;
+	c->next = 0;
+	c->leases = c->run->plan->groups * c->run->plan->parts;
+	/* This thread is one of the thread pool, so that the phase ends even where no other can be made. */
+	while (started + 1 < wanted && pthread_create(&threads[started], NULL, work, c) == 0)
+		started++;
+	work(c);
+	for (unsigned i = 0; i < started; i++)
+		pthread_join(threads[i], NULL);
+	return c->rc;
+}
+
+static int begin_rounds(struct thread_pool *c)
+{
+	struct local_run *r = c->run;
+	const struct plan *p = r->plan;
+	bootstrap_merge(c->bootstrap, &r->lit);
+	int rc = canvas_new(&r->canvas, p, canvas_grid_exponent(p, r->lit.b_pooled, world_brightest(r->world)), NULL,
+			    &c->error);
+	if (rc)
+		return rc;
+	bootstrap_to_canvas(c->bootstrap, r->canvas);
+	if (p->kind != PLAN_CHAINS)
+		return 0;
+	for (uint32_t g = 0; g < p->groups; g++)
+		bootstrap_seeds(c->bootstrap, g, c->seeds + (size_t)g * (p->chains / p->groups));
+	return 0;
+}
+
+static int look(struct thread_pool *c, uint64_t rounds, enum merge_end *end)
+{
+	struct local_run *r = c->run;
+	struct canvas_image img;
+	double seconds = since(&c->begin);
+	/* Where another bound ends it, the target may be met all the same. */
+	bool ends = merge_end_of(r->plan, rounds, seconds, NULL) != MERGE_GOES_ON && r->plan->target_error > 0;
+	bool due = ends || merge_error_due(r->plan, rounds);
+	if (due && canvas_image(r->canvas, false, &img, &c->error))
+		return -ENOMEM;
+	*end = merge_end_of(r->plan, rounds, seconds, due ? &img : NULL);
+	if (r->round)
+		r->round(r->user, &(struct local_round){.rounds = rounds,
+							.mutations = rounds * plan_round_mutations(r->plan),
+							.cpu_seconds = r->cpu_seconds - r->bootstrap_cpu_seconds,
+							.seconds = seconds - r->bootstrap_seconds,
+							.bootstrap_cpu_seconds = r->bootstrap_cpu_seconds,
+							.bootstrap_seconds = r->bootstrap_seconds,
+							.canvas = r->canvas,
+							.image = due ? &img : NULL});
+	if (due)
+		canvas_image_fini(&img);
+	return 0;
+}
+
+/* The bootstrap, and what the rounds begin with. */
+static int run_bootstrap(struct thread_pool *c)
+{
+	struct local_run *r = c->run;
+	int rc = phase(c, LEASE_BOOTSTRAP, 0);
+	if (rc || stopped(c))
+		return rc;
+	r->bootstrap_cpu_seconds = r->cpu_seconds;
+	r->bootstrap_seconds = since(&c->begin);
+	rc = begin_rounds(c);
+	if (r->lit.black)
+		r->end = MERGE_ROUNDS;
+	return rc;
+}
+
+/* On errors the canvas goes: what it holds cannot be trusted. */
+static int fail(struct local_job *j, int rc, struct error *e)
+{
+	*e = j->thread_pool.error;
+	canvas_free(j->thread_pool.run->canvas);
+	j->thread_pool.run->canvas = NULL;
+	return rc;
+}
+
+int local_start(struct local_run *r, struct local_job **out, struct error *e)
+{
+	const struct plan *p = r->plan;
+	struct local_job *j = *out = mem_alloc(1, sizeof *j);
+	if (!j)
+		return error_set(e, ENOMEM, "no memory for a job");
+	struct thread_pool *c = &j->thread_pool;
+	c->run = r;
+	pthread_mutex_init(&c->lock, NULL);
+	r->canvas = NULL;
+	r->end = MERGE_GOES_ON;
+	r->seconds = r->cpu_seconds = r->bootstrap_seconds = r->bootstrap_cpu_seconds = 0;
+	clock_gettime(CLOCK_MONOTONIC, &c->begin);
+	c->seeds = mem_alloc(p->chains, sizeof *c->seeds);
+	c->states = mem_alloc((size_t)p->groups * p->parts, sizeof *c->states);
+	int rc = !c->seeds || !c->states ? error_set(&c->error, ENOMEM, "no memory for the chains")
+					 : bootstrap_new(&c->bootstrap, p, &c->error);
+	if (!rc)
+		rc = run_bootstrap(c);
+	r->seconds = since(&c->begin);
+	if (rc) {
+		fail(j, rc, e);
+		local_end(j);
+		*out = NULL;
+	}
+	return rc;
+}
+
+int local_step(struct local_job *j, struct error *e)
+{
+	struct thread_pool *c = &j->thread_pool;
+	if (!c->run->canvas || c->run->lit.black || stopped(c))
+		return 0;
+	int rc = phase(c, LEASE_RENDER, canvas_rounds(c->run->canvas));
+	c->run->seconds = since(&c->begin);
+	return rc ? fail(j, rc, e) : 0;
+}
+
+void local_end(struct local_job *j)
+{
+	struct thread_pool *c = &j->thread_pool;
+	const struct plan *p = c->run->plan;
+	for (uint32_t i = 0; c->states && i < p->groups * p->parts; i++)
+		free_states(c->states[i], chains_of(p, i % p->parts));
+	mem_free(c->states);
+	mem_free(c->seeds);
+	bootstrap_free(c->bootstrap);
+	pthread_mutex_destroy(&c->lock);
+	mem_free(j);
+}
+
+int local_run(struct local_run *r, struct error *e)
+{
+	struct local_job *j;
+	int rc = local_start(r, &j, e);
+	if (rc)
+		return rc;
+	while (!rc && r->canvas && r->end == MERGE_GOES_ON && !stopped(&j->thread_pool)) {
+		uint64_t before = canvas_rounds(r->canvas);
+		rc = local_step(j, e);
+		if (rc || canvas_rounds(r->canvas) == before)
+			break;
+		rc = look(&j->thread_pool, before + 1, &r->end);
+		if (rc)
+			fail(j, rc, e);
+	}
+	r->seconds = since(&j->thread_pool.begin);
+	local_end(j);
+	return rc;
+}

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/render/local_pilot.h"
+
+#include "worker/cli/render/pilot.h"
+
+static void look(void *user, const struct local_round *r)
+{
+	struct local_pilot *p = user;
+	if (r->image)
+		forecast_add(&p->looks, &p->plan, r->image, r->cpu_seconds, r->seconds);
+	/* On a busy machine a little longer than asked for, rather than nothing to show. */
+	double seconds = r->bootstrap_seconds + r->seconds;
+	p->over = p->timed && seconds >= (p->looks.count < PILOT_LOOKS ? 4 : 1) * p->seconds;
+	if (p->over)
+		atomic_store(p->stop, true);
+}
+
+static void pass_on(void *user, const struct local_progress *r)
+{
+	struct local_pilot *p = user;
+	if (p->progress)
+		p->progress(p->user, r);
+}
+
+/* Runs it for its looks and its times. */
+static int run(struct local_pilot *p, const struct plan_request *request, struct local_run *r, struct error *e)
+{
+	int rc = plan_make(request, &p->plan, e);
+	if (rc)
+		return rc;
+	p->looks.count = 0;
+	*r = (struct local_run){.world = p->world,
+				.plan = &p->plan,
+				.threads = p->threads,
+				.stop = p->stop,
+				.progress = pass_on,
+				.round = look,
+				.user = p};
+	rc = local_run(r, e);
+	bool none = !r->canvas, black = r->lit.black;
+	canvas_free(r->canvas);
+	if (!rc && none)
+		rc = error_set(e, EINTR, "interrupted before the first round of the pilot was complete");
+	if (!rc && black)
+		rc = error_set(e, ENODATA, "no bootstrap sample carried light: the image would be black");
+	return rc;
+}
+
+int local_pilot(struct local_pilot *p, struct error *e)
+{
+	struct plan_request probe, pilot;
+	struct local_run r;
+	struct pilot_cost cost = {0};
+	bool probed = false;
+	int rc = pilot_render_plan(p->request, &p->render, e);
+	if (!rc && pilot_probe(p->request, &p->render, &probe)) {
+		probed = true;
+		rc = run(p, &probe, &r, e);
+		cost = (struct pilot_cost){r.bootstrap_seconds, r.seconds - r.bootstrap_seconds};
+	}
+	if (rc)
+		return rc;
+	pilot_request(p->request, &p->render, &probe, probed ? &cost : NULL, p->seconds, &pilot);
+	pilot.seconds = 0;
+	p->timed = true;
+	rc = run(p, &pilot, &r, e);
+	p->cpu_seconds = r.cpu_seconds;
+	p->wall_seconds = r.seconds;
+	p->bootstrap_cpu = r.bootstrap_cpu_seconds;
+	p->bootstrap_seconds = r.bootstrap_seconds;
+	return rc;
+}

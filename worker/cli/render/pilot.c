@@ -1,0 +1,79 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/render/pilot.h"
+
+#include "worker/cli/base/options.h"
+
+#include <errno.h>
+#include <math.h>
+
+enum {
+	PROBE_BOOTSTRAP = 16384,
+	PROBE_EPOCH = 16,	      /* mutations a chain; a chain's start costs about one */
+	PROBE_SAMPLES_MOST = 1 << 21, /* samples of the shortest round that is worth a probe */
+};
+static const double out_of_reach = 1e-9;
+static const double bootstrap_share = 0.25; /* of a pilot, at most */
+
+int pilot_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e)
+{
+	double target = a->plan.target_error;
+	a->plan.target_error = target > 0 ? target : 1; /* a wish, so that the scene's is not taken for one */
+	int rc = render_plan_from_scene(a, summary, e);
+	a->plan.target_error = target;
+	return rc;
+}
+
+static struct plan_request open_ended(const struct plan_request *request, const struct plan *render)
+{
+	struct plan_request r = *request;
+	r.spp = r.mutations = 0;
+	r.seconds = 0;
+	r.target_error = out_of_reach;
+	r.groups = render->groups;
+	r.chains = render->chains;
+	r.bootstrap = render->bootstrap;
+	return r;
+}
+
+int pilot_render_plan(const struct plan_request *request, struct plan *render, struct error *e)
+{
+	struct plan_request r = *request;
+	if (!(r.target_error > 0))
+		r.target_error = 0.01; /* the least of those that are spoken of */
+	int rc = plan_make(&r, render, e);
+	if (!rc && render->groups < 2)
+		rc = error_set(e, EINVAL, "one group has no error: give --groups 2 or more");
+	return rc;
+}
+
+bool pilot_probe(const struct plan_request *request, const struct plan *render, struct plan_request *probe)
+{
+	*probe = open_ended(request, render);
+	probe->bootstrap = render->bootstrap < PROBE_BOOTSTRAP ? render->bootstrap : PROBE_BOOTSTRAP;
+	probe->epoch = 1;
+	if (render->kind == PLAN_CHAINS) {
+		probe->epoch = PROBE_EPOCH;
+		probe->mutations = (uint64_t)render->chains * PROBE_EPOCH;
+		return true;
+	}
+	uint64_t round = plan_extended_pixels(render) * render->groups;
+	probe->spp = render->groups;
+	return round <= PROBE_SAMPLES_MOST;
+}
+
+void pilot_request(const struct plan_request *request, const struct plan *render, const struct plan_request *probe,
+		   const struct pilot_cost *cost, double seconds, struct plan_request *pilot)
+{
+	*pilot = open_ended(request, render);
+	pilot->seconds = seconds;
+	pilot->epoch = 1;
+	if (!cost)
+		return;
+	double sample = cost->bootstrap / (double)probe->bootstrap, most = bootstrap_share * seconds / sample;
+	if (most < (double)pilot->bootstrap)
+		pilot->bootstrap = (uint64_t)fmax(PROBE_BOOTSTRAP, most);
+	double left = fmax(seconds - sample * (double)pilot->bootstrap, seconds / 4);
+	double epochs = left / PILOT_ROUNDS / cost->rounds;
+	double longest = (double)render->epoch / (double)probe->epoch; /* not longer than the render's own */
+	pilot->epoch = (uint64_t)fmax(1, (double)probe->epoch * fmin(epochs, longest));
+}

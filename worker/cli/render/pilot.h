@@ -1,0 +1,32 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * How a pilot is cut: a short render with the plan of the one to come, but for the length of an epoch, so that there
+ * are enough looks at its error. What an epoch costs is found by a probe, one short round. Pure; any thread.
+ */
+#ifndef WORKER_CLI_RENDER_PILOT_H
+#define WORKER_CLI_RENDER_PILOT_H
+
+#include "common/plan/plan.h"
+
+enum { PILOT_SECONDS = 60, PILOT_ROUNDS = 16 /* aimed at: a dozen looks */, PILOT_LOOKS = 4 /* at least */ };
+
+struct render_arguments;
+struct render_summary;
+
+/* render_plan_from_scene, but without the scene's sampleCount: an estimate is about errors. */
+int pilot_plan_from_scene(struct render_arguments *a, const struct render_summary *summary, struct error *e);
+
+/* request: of the render, complete; where it has no target error the plan gets one, so that an end is in sight. */
+int pilot_render_plan(const struct plan_request *request, struct plan *render, struct error *e);
+
+struct pilot_cost { /* wall seconds of a probe */
+	double bootstrap, rounds;
+};
+
+/* false: none is needed, an epoch cannot be shorter than one sample and that is as long as a pilot's. */
+bool pilot_probe(const struct plan_request *request, const struct plan *render, struct plan_request *probe);
+/* cost: of the probe, NULL: there was none. */
+void pilot_request(const struct plan_request *request, const struct plan *render, const struct plan_request *probe,
+		   const struct pilot_cost *cost, double seconds, struct plan_request *pilot);
+
+#endif

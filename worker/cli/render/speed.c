@@ -1,0 +1,85 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/render/speed.h"
+
+#include "worker/cli/render/local.h"
+#include "worker/render/scene/scene.h"
+
+#include <math.h>
+
+enum {
+	CHAINS = 16,
+	BOOTSTRAP = 4096,
+	FIRST_EPOCH = 32, /* then eight times as long, and so on */
+	LONGEST_EPOCH = 1 << 20,
+	SMALL_FILM = 1 << 13, /* pixels: a round of samples cannot be shorter than its film */
+};
+static const double enough_seconds = 0.25;
+
+/* Samples are taken of a smaller film of the same view. */
+static void shrink(struct render_options *o, struct plan_request *r)
+{
+	double scale = sqrt(SMALL_FILM / ((double)r->width * r->height));
+	r->crop_x = r->crop_y = r->crop_width = r->crop_height = 0;
+	if (scale >= 1)
+		return;
+	r->width = o->width = (uint32_t)fmax(1, round(scale * r->width));
+	r->height = o->height = (uint32_t)fmax(1, round(scale * r->height));
+}
+
+static struct plan_request pilot_of(const struct render_arguments *a)
+{
+	struct plan_request r = a->plan;
+	r.spp = r.mutations = 0;
+	r.seconds = r.target_error = r.bandwidth = 0;
+	r.groups = r.parts = 1;
+	r.bootstrap = BOOTSTRAP;
+	r.chains = r.kind == PLAN_CHAINS ? CHAINS : 0;
+	return r;
+}
+
+/* Longer and longer until it is long enough to be measured. */
+static int run(const struct world *w, struct plan_request *r, double *speed, struct error *e)
+{
+	static const atomic_bool never;
+	for (r->epoch = r->kind == PLAN_CHAINS ? FIRST_EPOCH : 1;; r->epoch *= 8) {
+		struct plan p;
+		r->mutations = r->kind == PLAN_CHAINS ? CHAINS * r->epoch : r->epoch * r->width * r->height;
+		int rc = plan_make(r, &p, e);
+		struct local_run l = {.world = w, .plan = &p, .threads = 1, .stop = &never};
+		if (!rc)
+			rc = local_run(&l, e);
+		if (rc)
+			return rc;
+		double seconds = l.cpu_seconds - l.bootstrap_cpu_seconds;
+		canvas_free(l.canvas);
+		if (l.lit.black && r->kind == PLAN_CHAINS)
+			return 0;
+		if (seconds >= enough_seconds || r->epoch >= LONGEST_EPOCH) {
+			*speed = (double)plan_round_mutations(&p) / fmax(seconds, 1e-6);
+			return 0;
+		}
+	}
+}
+
+int speed_measure(const struct render_arguments *a, const char *folder, const char *name, double *speed,
+		  struct error *e)
+{
+	struct plan_request r = pilot_of(a);
+	struct render_options o = a->render;
+	struct scene scene;
+	struct world *w;
+	*speed = 0;
+	if (r.kind == PLAN_SAMPLES)
+		shrink(&o, &r);
+	struct asset_source assets = asset_folder(folder);
+	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &o, e);
+	if (rc)
+		return rc;
+	rc = world_new(&w, &scene, &assets, &o, e);
+	scene_fini(&scene);
+	if (rc)
+		return rc;
+	rc = run(w, &r, speed, e);
+	world_free(w);
+	return rc;
+}

@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/render/stats.h"
+
+#include "common/json/convergence_json.h"
+#include "common/json/forecast_json.h"
+#include "common/exr/image_file.h"
+#include "common/estimate/stated_error.h"
+#include "common/estimate/strategy.h"
+#include "common/json/strategy_json.h"
+
+#include <jansson.h>
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+static const char *const counter_names[BATCH_COUNTERS] = {
+	[COUNT_SAMPLES] = "samples",
+	[COUNT_ACCEPTED] = "accepted",
+	[COUNT_INDEPENDENT] = "independent",
+	[COUNT_NAN] = "nan",
+	[COUNT_INFINITE] = "infinite",
+	[COUNT_NEGATIVE] = "negative",
+	[COUNT_RAYS_CLOSEST] = "raysClosest",
+	[COUNT_RAYS_SHADOW] = "raysShadow",
+	[COUNT_STUCK] = "stuck",
+	[COUNT_LONGEST_STUCK] = "longestStuck",
+	[COUNT_STATES_LOST] = "statesLost",
+};
+
+static json_t *plan_json(const struct stats *s)
+{
+	const struct plan *p = s->run->plan;
+	char plan[PLAN_TEXT], again[PLAN_TEXT];
+	plan_describe(p, plan, sizeof plan);
+	plan_options(p, s->image->rounds, again, sizeof again);
+	return json_pack(
+		"{s:i s:s s:s s:s s:s s:I s:I s:f s:f s:f s:f s:I s:I}", "schema", 1, "scene", s->scene, "integrator",
+		p->integrator, "plan", plan, "options", again, "rounds", (json_int_t)s->image->rounds, "threads",
+		(json_int_t)s->run->threads, "buildSeconds", s->build_seconds, "wallSeconds", s->run->seconds,
+		"cpuSeconds", s->run->cpu_seconds, "bootstrapCpuSeconds", s->run->bootstrap_cpu_seconds, "triangles",
+		(json_int_t)s->summary->triangles, "embreeBytes", (json_int_t)world_embree_bytes(s->run->world));
+}
+
+static json_t *image_json(const struct canvas_image *i)
+{
+	json_t *counters = json_object();
+	for (int k = 0; k < BATCH_COUNTERS; k++)
+		if (counter_names[k])
+			json_object_set_new(counters, counter_names[k],
+					    json_integer((json_int_t)i->counts.counters[k]));
+	char doubt[STATED_ERROR_TEXT], b_doubt[STATED_ERROR_TEXT];
+	stated_error_doubt(i, doubt, sizeof doubt);
+	stated_b_doubt(i, b_doubt, sizeof b_doubt);
+	return json_pack("{s:o s:o s:s s:o s:o s:[oo] s:s s:s s:I s:o s:o}", "b", forecast_real(i->b), "bError",
+			 *b_doubt ? json_null() : forecast_real(i->b_error), "bErrorDoubt", b_doubt, "relMSE",
+			 forecast_real(i->rel_mse), "relMSEUpper",
+			 *doubt ? json_null() : forecast_real(i->rel_mse_upper), "relMSE95",
+			 forecast_real(i->rel_mse_95[0]), forecast_real(i->rel_mse_95[1]), "relMSEDefinition",
+			 REL_MSE_DEFINITION, "relMSEDoubt", doubt, "unvisitedPixels", (json_int_t)i->unvisited,
+			 "beyondShare", forecast_real(i->beyond_share), "counters", counters);
+}
+
+static json_t *effects_json(const struct render_summary *m)
+{
+	json_t *effects = json_array();
+	for (size_t i = 0; i < m->line_count; i++)
+		json_array_append_new(effects, json_pack("{s:s s:b s:b s:s s:s}", "name", m->lines[i].name, "on",
+							 (int)m->lines[i].on, "forced", (int)m->lines[i].forced, "why",
+							 m->lines[i].why, "saves", m->lines[i].saves));
+	return effects;
+}
+
+static json_t *end_json(const struct stats *s)
+{
+	const struct plan *p = s->run->plan;
+	char note[STRATEGY_NOTE];
+	strategy_note(p, &s->image->counts, s->image->black, note, sizeof note);
+	strategy_add_beyond(s->image->beyond_share, note, sizeof note);
+	convergence_add_note(s->agreement, note, sizeof note);
+	return json_pack("{s:s s:s s:o s:s s:o s:o}", "end", merge_end_name(s->run->end, s->run->lit.black), "mixture",
+			 p->mutations, "strategies", strategy_to_json(p->mutations, &s->image->counts), "note", note,
+			 "agreement", convergence_to_json(s->agreement), "classes", classes_to_json(s->image->classes));
+}
+
+int stats_write(const char *path, const struct stats *s, struct error *e)
+{
+	json_t *o = plan_json(s);
+	bool whole = json_object_update_new(o, image_json(s->image)) == 0 &&
+		     json_object_set_new(o, "choice", choice_to_json(s->choice)) == 0 &&
+		     json_object_set_new(o, "effects", effects_json(s->summary)) == 0 &&
+		     json_object_set_new(o, "looks", forecast_looks_to_json(s->looks)) == 0 &&
+		     json_object_update_new(o, end_json(s)) == 0;
+	char *text = whole ? json_dumps(o, JSON_INDENT(2)) : NULL;
+	json_decref(o);
+	if (!text)
+		return error_set(e, ENOMEM, "no memory for the statistics");
+	int rc = image_file_write(path, (const unsigned char *)text, strlen(text), e);
+	free(text);
+	return rc;
+}

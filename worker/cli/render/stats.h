@@ -1,0 +1,27 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What --stats FILE holds, as JSON: plan, why its integrator was chosen, times, counters, strategies, effects, which
+ * bound ended the render. One thread.
+ */
+#ifndef WORKER_CLI_RENDER_STATS_H
+#define WORKER_CLI_RENDER_STATS_H
+
+#include "common/estimate/convergence.h"
+#include "common/estimate/forecast.h"
+#include "worker/cli/render/choice.h"
+#include "worker/cli/render/local.h"
+
+struct stats {
+	const char *scene; /* file name */
+	const struct render_summary *summary;
+	const struct local_run *run; /* has ended */
+	const struct canvas_image *image;
+	const struct convergence *agreement; /* of the image */
+	double build_seconds;		     /* of the world */
+	const struct forecast_history *looks;
+	const struct choice *choice; /* of the integrator */
+};
+
+int stats_write(const char *path, const struct stats *s, struct error *e);
+
+#endif

@@ -1,0 +1,118 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/scene/compatibility.h"
+
+#include "worker/render/render.h"
+#include "worker/render/scene/lenient.h"
+#include "worker/render/scene/plugin.h"
+
+#include <string.h>
+
+/* Mitsuba's own plug-ins of both dialects; those that a registry has are left out of the list of what is refused. */
+static const struct {
+	enum plugin_class cls;
+	const char *types;
+} mitsuba[] = {
+	{PLUGIN_SHAPE, "bsplinecurve|deformable|ellipsoids|ellipsoidsmesh|hair|heightfield|linearcurve|sdfgrid"},
+	{PLUGIN_BSDF,
+	 "circular|coating|difftrans|hair|hk|irawan|measured|measured_polarized|mixturebsdf|polarizer|pplastic|"
+	 "principledthin|retarder|roughcoating|roughdiffuse|ward"},
+	{PLUGIN_TEXTURE, "curvature|gridtexture|mesh_attribute|vertexcolors|volume|wireframe"},
+	{PLUGIN_EMITTER, "collimated|directionalarea|projector|timed_sunsky"},
+	{PLUGIN_SENSOR,
+	 "batch|distant|fluxmeter|irradiancemeter|perspective_rdist|radiancemeter|spherical|telecentric"},
+	{PLUGIN_FILM, "specfilm"},
+	{PLUGIN_MEDIUM, "heterogeneous|homogeneous"},
+};
+
+static const char *const headings[PLUGIN_CLASSES] = {
+	[PLUGIN_SHAPE] = "Shapes",     [PLUGIN_BSDF] = "Materials",   [PLUGIN_TEXTURE] = "Textures",
+	[PLUGIN_EMITTER] = "Emitters", [PLUGIN_SENSOR] = "Sensors",   [PLUGIN_FILM] = "Films",
+	[PLUGIN_RFILTER] = "Filters",  [PLUGIN_SAMPLER] = "Samplers", [PLUGIN_INTEGRATOR] = "Integrators",
+	[PLUGIN_MEDIUM] = "Media",
+};
+
+static void print_params(FILE *out, const struct plugin_decl *d, enum param_class status)
+{
+	const char *before = "";
+	for (const struct param *p = d->params; p && p->name; p++)
+		if (p->status == status) {
+			fprintf(out, strcmp(p->name, "*") == 0 ? "%sall others" : "%s`%s`", before, p->name);
+			before = ", ";
+		}
+}
+
+static void print_supported(FILE *out, const struct plugin_decl *d)
+{
+	fprintf(out, strcmp(d->type, "*") == 0 ? "| any | " : "| `%s` | ", d->type);
+	print_params(out, d, PARAM_UNDERSTOOD);
+	fprintf(out, " | ");
+	print_params(out, d, PARAM_IGNORED);
+	fprintf(out, " | ");
+	print_params(out, d, PARAM_REFUSED);
+	fprintf(out, " |\n");
+}
+
+static void print_class(FILE *out, enum plugin_class cls)
+{
+	bool any = false;
+	for (const struct plugin_decl *d = render_plugins(); d->type; d++) {
+		if (d->cls != cls)
+			continue;
+		if (!any)
+			fprintf(out, "\n## %s\n\n| type | understood | ignored | refused |\n|---|---|---|---|\n",
+				headings[cls]);
+		any = true;
+		print_supported(out, d);
+	}
+}
+
+static void print_stand_in(FILE *out, enum plugin_class cls, const char *type)
+{
+	const char *stand_in;
+	fprintf(out, "| %s | `%s` | ", plugin_class_name(cls), type);
+	switch (lenient_plugin(cls, type, &stand_in)) {
+	case LENIENT_REFUSE:
+		fprintf(out, "refused |\n");
+		break;
+	case LENIENT_LEAVE_OUT:
+		fprintf(out, "nothing: it is left out |\n");
+		break;
+	case LENIENT_REPLACE:
+		fprintf(out, "`%s` |\n", stand_in);
+		break;
+	case LENIENT_INNER:
+		fprintf(out, "the BSDF inside, else `%s` |\n", stand_in);
+		break;
+	}
+}
+
+static void print_unsupported(FILE *out)
+{
+	fprintf(out, "\n## Mitsuba's plug-ins that are not supported\n\n"
+		     "Refused, with file, line and the nearest name; with `--lenient` replaced.\n\n"
+		     "| class | type | with `--lenient` |\n|---|---|---|\n");
+	for (size_t i = 0; i < sizeof mitsuba / sizeof *mitsuba; i++) {
+		char type[64];
+		for (const char *rest = mitsuba[i].types; *rest;) {
+			size_t n = strcspn(rest, "|");
+			snprintf(type, sizeof type, "%.*s", (int)n, rest);
+			rest += n + (rest[n] == '|');
+			const struct plugin_decl *d = plugin_find(render_plugins(), mitsuba[i].cls, type);
+			if (!d || strcmp(d->type, "*") == 0)
+				print_stand_in(out, mitsuba[i].cls, type);
+		}
+	}
+}
+
+void compatibility_print(FILE *out)
+{
+	fprintf(out,
+		"# What is read of Mitsuba's scenes\n\n"
+		"Made by `hslt-scene compatibility` of the tables that the reader works by. Names are those of 3.x; in 0.5/0.6 the same "
+		"in camelCase.\n"
+		"*Ignored*: has no effect on light, and is said once. *Refused*: would change the image. "
+		"[worker/render/scene/README.md](../worker/render/scene/README.md)\nsays what the plug-ins do, and where they differ.\n");
+	for (int cls = 0; cls < PLUGIN_CLASSES; cls++)
+		print_class(out, (enum plugin_class)cls);
+	print_unsupported(out);
+}

@@ -1,0 +1,202 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/scene/scene_report.h"
+
+#include "common/base/mem.h"
+#include "common/blob/blob.h"
+#include "worker/cli/base/options.h"
+
+#include <jansson.h>
+#include <stdio.h>
+#include <string.h>
+
+/* A scene file opened: its folder, its name there, and what the folder has. */
+struct opened {
+	char *folder, *name;
+	struct asset_source assets;
+};
+
+static int open_scene(const struct scene_request *r, struct opened *o, struct error *e)
+{
+	int rc = scene_path_split(r->path, &o->folder, &o->name, e);
+	if (!rc)
+		o->assets = asset_folder(o->folder);
+	return rc;
+}
+
+static void close_scene(struct opened *o)
+{
+	mem_free(o->folder);
+	mem_free(o->name);
+}
+
+static const char *plural(uint32_t n)
+{
+	return n == 1 ? "" : "s";
+}
+
+/* What the reader cannot see, meshes, pictures and values that do not go together, is looked at when all else is right;
+ * that ends with the first thing that is wrong. */
+static int print_check(const struct scene *s, const struct asset_source *assets, const char *name, bool *bad)
+{
+	static struct render_summary m; /* large */
+	struct error deeper;
+	uint32_t problems = s->problem_count, notes = s->note_count;
+	for (uint32_t i = 0; i < s->problem_count; i++)
+		printf("%s\n", s->problems[i]);
+	const struct render_options as_it_is = {0};
+	if (!problems && render_check(s, assets, &as_it_is, &m, &deeper)) {
+		printf("%s\n", deeper.text);
+		problems = 1;
+	}
+	for (uint32_t i = 0; i < s->note_count; i++)
+		printf("note: %s\n", s->notes[i]);
+	char text[512];
+	for (size_t i = 0; !problems && render_scene_note(&m, i, text, sizeof text); i++, notes++)
+		printf("note: %s\n", text);
+	*bad = problems > 0;
+	if (*bad)
+		printf("%s: %u problem%s, %u note%s\n", name, problems, plural(problems), notes, plural(notes));
+	else
+		printf("%s: can be rendered: %llu shapes, %llu triangles, %u files, %u note%s\n", name,
+		       (unsigned long long)m.shapes, (unsigned long long)m.triangles, s->asset_count + 1, notes,
+		       plural(notes));
+	return 0;
+}
+
+int scene_report_check(const struct scene_request *r, bool *bad, struct error *e)
+{
+	struct opened o;
+	struct scene s;
+	int rc = open_scene(r, &o, e);
+	if (rc)
+		return rc;
+	rc = scene_read_all(&s, &o.assets, o.name, render_plugins(), r->defines, r->define_count, r->lenient, e);
+	if (!rc) {
+		rc = print_check(&s, &o.assets, o.name, bad);
+		scene_fini(&s);
+	}
+	close_scene(&o);
+	return rc;
+}
+
+/* {"name", "bytes", "sha256"} of one file. */
+static json_t *file_of(const struct asset_source *assets, const char *name, struct error *e)
+{
+	struct asset a;
+	struct blob_hash h;
+	char hex[BLOB_HEX_SIZE];
+	if (assets->open(assets->user, name, &a, e))
+		return NULL;
+	int rc = blob_hash_bytes(a.bytes, a.size, &h, e);
+	json_t *o = NULL;
+	if (!rc) {
+		blob_hex(&h, hex);
+		o = json_pack("{s:s s:I s:s}", "name", name, "bytes", (json_int_t)a.size, "sha256", hex);
+		if (!o)
+			error_set(e, ENOMEM, "no memory for the list of files");
+	}
+	assets->close(assets->user, &a);
+	return o;
+}
+
+static json_t *files_of(const struct scene *s, const struct opened *o, struct error *e)
+{
+	json_t *files = json_array();
+	for (uint32_t i = 0; files && i <= s->asset_count; i++) {
+		json_t *one = file_of(&o->assets, i ? s->assets[i - 1] : o->name, e);
+		if (!one || json_array_append_new(files, one)) {
+			json_decref(files);
+			return NULL;
+		}
+	}
+	return files;
+}
+
+static json_t *effects_of(const struct render_summary *m)
+{
+	json_t *on = json_array();
+	for (size_t i = 0; i < m->line_count; i++)
+		if (m->lines[i].on)
+			json_array_append_new(on, json_string(m->lines[i].name));
+	return on;
+}
+
+/* All that `show` knows, as JSON; the text is made of it. */
+static json_t *describe(const struct scene *s, const struct opened *o, struct error *e)
+{
+	static struct render_summary m; /* large */
+	const struct render_options as_it_is = {0};
+	if (render_check(s, &o->assets, &as_it_is, &m, e))
+		return NULL;
+	json_t *files = files_of(s, o, e), *notes = json_array();
+	if (!files)
+		return NULL;
+	for (uint32_t i = 0; i < s->note_count; i++)
+		json_array_append_new(notes, json_string(s->notes[i]));
+	char text[512];
+	for (size_t i = 0; render_scene_note(&m, i, text, sizeof text); i++)
+		json_array_append_new(notes, json_string(text));
+	const struct scene_settings *f = &m.settings;
+	json_t *all = json_pack("{s:i s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I s:o s:o s:o}", "schema", 1, "scene",
+				o->name, "dialect", s->dialect_3 ? "3.x" : "0.6", "width", (int)f->width, "height",
+				(int)f->height, "sampleCount", (json_int_t)f->spp, "fov", f->fov, "fovAxis",
+				f->fov_axis, "maxDepth", (int)f->max_depth, "shapes", (json_int_t)m.shapes, "triangles",
+				(json_int_t)m.triangles, "effects", effects_of(&m), "notes", notes, "files", files);
+	if (!all)
+		error_set(e, ENOMEM, "no memory for the description");
+	return all;
+}
+
+static void print_text(json_t *all)
+{
+	size_t i;
+	json_t *one;
+	const char *text;
+	long long shapes, triangles, spp;
+	int width, height, depth;
+	double fov;
+	const char *name, *dialect, *axis;
+	json_unpack(all, "{s:s s:s s:i s:i s:I s:f s:s s:i s:I s:I}", "scene", &name, "dialect", &dialect, "width",
+		    &width, "height", &height, "sampleCount", &spp, "fov", &fov, "fovAxis", &axis, "maxDepth", &depth,
+		    "shapes", &shapes, "triangles", &triangles);
+	printf("%s: Mitsuba %s, film %d x %d, field of view %.4g degrees (%s), %lld samples a pixel, paths of at most %d edges\n",
+	       name, dialect, width, height, fov, axis, spp, depth);
+	printf("%lld shapes, %lld triangles; calls for", shapes, triangles);
+	json_array_foreach(json_object_get(all, "effects"), i, one)
+		printf("%s %s", i ? "," : "", json_string_value(one));
+	printf("\n");
+	json_array_foreach(json_object_get(all, "files"), i, one)
+	{
+		json_int_t bytes = json_integer_value(json_object_get(one, "bytes"));
+		text = json_string_value(json_object_get(one, "sha256"));
+		printf("%.16s %12lld bytes  %s\n", text, (long long)bytes,
+		       json_string_value(json_object_get(one, "name")));
+	}
+	json_array_foreach(json_object_get(all, "notes"), i, one) printf("note: %s\n", json_string_value(one));
+}
+
+int scene_report_show(const struct scene_request *r, bool json, struct error *e)
+{
+	struct opened o;
+	struct scene s;
+	int rc = open_scene(r, &o, e);
+	if (rc)
+		return rc;
+	rc = (r->lenient ? scene_read_lenient : scene_read)(&s, &o.assets, o.name, render_plugins(), r->defines,
+							    r->define_count, e);
+	if (!rc) {
+		json_t *all = describe(&s, &o, e);
+		if (all && json)
+			rc = json_dumpf(all, stdout, JSON_COMPACT) || putchar('\n') == EOF
+				     ? error_set(e, EIO, "stdout took not all")
+				     : 0;
+		else if (all)
+			print_text(all);
+		else
+			rc = -EINVAL;
+		json_decref(all);
+		scene_fini(&s);
+	}
+	close_scene(&o);
+	return rc;
+}

@@ -1,0 +1,334 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "common/base/crash.h"
+#include "common/base/output.h"
+#include "common/base/text.h"
+#include "common/base/version.h"
+#include "common/exr/image_file.h"
+#include "worker/cli/base/interrupt.h"
+#include "worker/cli/render/choice.h"
+#include "worker/cli/render/estimate.h"
+#include "worker/cli/submit/farm_pilot.h"
+#include "worker/cli/base/options.h"
+#include "worker/cli/submit/reconnect.h"
+#include "worker/cli/render/pilot.h"
+#include "worker/cli/render/speed.h"
+
+#include <argp.h>
+#include <jansson.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+const char *argp_program_version = "hslt-submit " HSLT_VERSION;
+
+static const char doc[] =
+	"Checks a scene, sends it to a coordinator as a job, and waits for the image if it is told to."
+	"\v"
+	"Examples:\n"
+	"  hslt-submit --coordinator 127.0.0.1:7700 room.xml -o room.exr --spp 64 --wait\n"
+	"  hslt-submit room.xml -o room.exr --target-error 2% --time 3600\n"
+	"  hslt-submit room.xml -o room.exr --integrator hslt --mutations hslt=0.9,bidirectional=0.1 --spp 256\n"
+	"  hslt-submit --estimate room.xml --plot room.svg\n"
+	"  hslt-submit room.xml -o left.exr --crop 0,0,960,1080 --priority 10 -D light=sun\n"
+	"\n"
+	"The job's id goes to stdout, everything else to stderr. Without --wait, the last part of -o is what hslt-job fetch calls the image. "
+	"--estimate makes no image: a pilot of a minute on the farm tells what errors of 10, 5, 2 and 1 % (and --target-error) will "
+	"cost there. For long jobs without --epoch a pilot of a second here says how many mutations a thread makes in the 20 s that a "
+	"lease should take; --epoch pins it. --wait outlasts restarts of the coordinator. HSLT_COORDINATOR stands in for --coordinator, HSLT_TLS for --tls.\n"
+	"Exit codes: 0 done, 1 failed, 2 usage, 3 job failed, 4 a bound came before the target error, 5 chains disagree (the image is "
+	"there, and its note says where), 6 refused, 75 "
+	"coordinator not reachable.";
+
+enum {
+	OPTION_PRIORITY = 256,
+	OPTION_NAME,
+	OPTION_WAIT,
+	OPTION_JSON,
+	OPTION_INSECURE,
+	OPTION_MIXED,
+	OPTION_VERIFY,
+	OPTION_ESTIMATE,
+	OPTION_PILOT,
+	OPTION_PLOT,
+	OPTION_TLS,
+	OPTION_PATIENCE
+};
+
+static const struct argp_option options[] = {
+	{"coordinator", 'c', "HOST:PORT", 0, "The coordinator", 0},
+	{"output", 'o', "FILE", 0, "The image; -: stdout, and the job's id goes to stderr", 0},
+	{"priority", OPTION_PRIORITY, "P", 0, "-100 to 100, higher first (0)", 0},
+	{"name", OPTION_NAME, "NAME", 0, "How the job is shown (the scene's file name)", 0},
+	{"wait", OPTION_WAIT, NULL, 0, "Show progress and fetch the image", 0},
+	{"patience", OPTION_PATIENCE, "SECONDS", 0, "With --wait: how long to call a coordinator that is gone (600)",
+	 0},
+	{"json", OPTION_JSON, NULL, 0, "Print one JSON object instead of the id, or of the estimate's table", 0},
+	{"estimate", OPTION_ESTIMATE, NULL, 0, "Render a pilot only and print what smaller errors will cost", 0},
+	{"pilot", OPTION_PILOT, "SECONDS", 0, "Length of the pilot (60)", 0},
+	{"plot", OPTION_PLOT, "FILE", 0, "Plot the estimate into an .svg or .png", 0},
+	{"mixed", OPTION_MIXED, NULL, 0, "Allow workers of any numeric fingerprint: gives up equal bits", 0},
+	{"verify", OPTION_VERIFY, "P", 0,
+	 "Share of the epochs, or percent, that two workers must compute alike before they count (0)", 0},
+	{"tls", OPTION_TLS, "DIR", 0, "ca.pem, cert.pem, key.pem: encrypt, and say who we are (hslt-ca makes them)", 0},
+	{"insecure", OPTION_INSECURE, NULL, 0, "Connect to other than loopback addresses without encryption", 0},
+	{0},
+};
+
+static const struct argp_child children[] = {{&render_argp, 0, "", 1}, {0}};
+
+struct arguments {
+	const char *coordinator, *tls, *scene, *output, *name;
+	struct submit_request request;
+	struct render_arguments render;
+	const char *plot;
+	double pilot;	 /* s; 0: not given */
+	double patience; /* s */
+	bool wait, json, insecure, estimate;
+};
+
+static bool to_stdout(const struct arguments *a)
+{
+	return a->output && strcmp(a->output, "/dev/stdout") == 0;
+}
+
+static error_t parse(int key, char *arg, struct argp_state *state)
+{
+	struct arguments *a = state->input;
+	char *end;
+	switch (key) {
+	case ARGP_KEY_INIT:
+		state->child_inputs[0] = &a->render;
+		return 0;
+	case 'c':
+		a->coordinator = arg;
+		return 0;
+	case 'o':
+		a->output = option_image(state, arg);
+		return 0;
+	case OPTION_PRIORITY:
+		a->request.priority = (int)strtol(arg, &end, 10);
+		if (end == arg || *end || a->request.priority < -100 || a->request.priority > 100)
+			argp_error(state, "--priority takes -100 to 100, not '%s'", arg);
+		return 0;
+	case OPTION_NAME:
+		a->name = arg;
+		return 0;
+	case OPTION_WAIT:
+		a->wait = true;
+		return 0;
+	case OPTION_JSON:
+		a->json = true;
+		return 0;
+	case OPTION_MIXED:
+		a->request.mixed = true;
+		return 0;
+	case OPTION_VERIFY:
+		if (!text_share(arg, &a->request.verify))
+			argp_error(state, "--verify takes a share from 0 to 1 or percent, not '%s'", arg);
+		return 0;
+	case OPTION_TLS:
+		a->tls = arg;
+		return 0;
+	case OPTION_INSECURE:
+		a->insecure = true;
+		return 0;
+	case OPTION_ESTIMATE:
+		a->estimate = true;
+		return 0;
+	case OPTION_PILOT:
+		a->pilot = option_seconds(state, "--pilot", arg);
+		return 0;
+	case OPTION_PATIENCE:
+		a->patience = option_seconds(state, "--patience", arg);
+		return 0;
+	case OPTION_PLOT:
+		a->plot = arg;
+		return 0;
+	case ARGP_KEY_ARG:
+		if (a->scene)
+			argp_error(state, "one scene at a time");
+		a->scene = arg;
+		return 0;
+	case ARGP_KEY_END:
+		if (!a->scene || (!a->output && !a->estimate))
+			argp_error(state, "a scene and -o FILE are needed");
+		if (a->request.verify > 0 && a->request.mixed)
+			argp_error(state, "--mixed workers cannot be held against each other: no --verify");
+		if (a->estimate && (a->output || a->wait))
+			argp_error(state, "--estimate makes no image: no -o, no --wait");
+		if (!a->estimate && (a->pilot > 0 || a->plot))
+			argp_error(state, "--pilot and --plot go with --estimate");
+		if (to_stdout(a) && (!a->wait || a->json))
+			argp_error(state, "-o - writes the image to stdout: it goes with --wait, and without --json");
+		if (!a->coordinator)
+			argp_error(state, "--coordinator HOST:PORT is needed (or $HSLT_COORDINATOR)");
+		return 0;
+	default:
+		return ARGP_ERR_UNKNOWN;
+	}
+}
+
+/* What a later fetch calls it. The folder is no business of the farm's. */
+static const char *last_part(const char *path)
+{
+	const char *slash = strrchr(path, '/');
+	return slash ? slash + 1 : path;
+}
+
+static void print_id(const struct arguments *a, uint64_t job, const char *plan, const char *state)
+{
+	char id[32];
+	snprintf(id, sizeof id, "j%llu", (unsigned long long)job);
+	if (a->json) {
+		json_t *o = json_pack("{s:i s:s s:s s:s s:s s:s}", "schema", 1, "id", id, "name", a->request.name,
+				      "output", a->output, "plan", plan, "state", state);
+		json_dumpf(o, stdout, JSON_COMPACT);
+		putchar('\n');
+		json_decref(o);
+	} else if (to_stdout(a)) {
+		fprintf(stderr, "%s\n", id);
+	} else {
+		puts(id);
+	}
+	if (fflush(stdout) || ferror(stdout)) /* it is a job all the same */
+		fprintf(stderr, "hslt-submit: the job's id is %s\n", id);
+}
+
+/* Whoever stops waiting for a job has not stopped the job. */
+static void say_at_the_end(const struct arguments *a, uint64_t job)
+{
+	static char text[512];
+	unsigned long long id = job;
+	snprintf(text, sizeof text,
+		 "\nhslt-submit: the job goes on without this program.\n"
+		 "  hslt-job fetch j%llu -o %.200s    fetches its image when it is done, --preview the one so far\n"
+		 "  hslt-job list                 shows how far it is\n"
+		 "  hslt-job cancel j%llu         ends it\n",
+		 id, to_stdout(a) ? "-" : a->output, id);
+	interrupt_say(text);
+}
+
+static int run(struct arguments *a, struct client **cl, const struct scene_bundle *b, int *code, struct error *e)
+{
+	struct submitted job;
+	struct submit_end end = {0};
+	char plan[PLAN_TEXT] = "";
+	struct reconnect o = {a->coordinator, a->tls, a->insecure, a->patience};
+	int rc = submit_send(*cl, &a->request, b, &job, plan, sizeof plan, e);
+	if (rc)
+		return rc;
+	fprintf(stderr, "%s\n", plan);
+	if (a->wait)
+		say_at_the_end(a, job.job);
+	if (!a->wait || !a->json)
+		print_id(a, job.job, plan, "queued");
+	if (!a->wait)
+		return 0;
+	rc = reconnect_job(cl, &o, &job, a->output, &end, e);
+	if (!rc && !end.has_result)
+		fprintf(stderr, "hslt-submit: job j%llu ended without an image: %s\n", (unsigned long long)job.job,
+			end.why);
+	if (!rc && *end.note)
+		fprintf(stderr, "hslt-submit: note: %s\n", end.note);
+	if (!rc && a->json)
+		print_id(a, job.job, plan, end.state);
+	*code = (int)end.exit_code;
+	return rc;
+}
+
+static int estimate(const struct arguments *a, struct client *cl, const struct scene_bundle *b, struct error *e)
+{
+	struct farm_pilot p = {
+		.client = cl, .request = &a->request, .bundle = b, .seconds = a->pilot > 0 ? a->pilot : PILOT_SECONDS};
+	int rc = farm_pilot(&p, e);
+	if (rc)
+		return rc;
+	const struct forecast_history *looks = &p.end.looks;
+	struct estimate m = {.scene = a->request.name,
+			     .where = "the farm as it is",
+			     .plan = &p.render,
+			     .pilot = &p.plan,
+			     .looks = looks,
+			     .cpu_seconds = p.end.cpu_seconds,
+			     .seconds = p.end.bootstrap_seconds +
+					(looks->count ? looks->looks[looks->count - 1].seconds : 0),
+			     .bootstrap_cpu = p.end.bootstrap_cpu_seconds,
+			     .bootstrap_seconds = p.end.bootstrap_seconds,
+			     .target = a->render.plan.target_error};
+	return client_local(estimate_report(&m, a->json, a->plot, e));
+}
+
+/* How long leases take is asked only where it matters; who gives --epoch knows it. */
+static void measure(struct arguments *a, const struct scene_bundle *b)
+{
+	struct plan plan;
+	struct error e;
+	double speed;
+	if (a->estimate || plan_make(&a->render.plan, &plan, &e) || !plan_wants_speed(&a->render.plan, &plan))
+		return;
+	if (speed_measure(&a->render, b->folder, b->scene, &speed, &e)) {
+		fprintf(stderr, "hslt-submit: note: no pilot for the length of epochs: %s\n", e.text);
+		return;
+	}
+	a->render.plan.speed = speed;
+	fprintf(stderr, "pilot: %.3g %s a second of one thread here\n", speed,
+		plan.kind == PLAN_CHAINS ? "mutations" : "samples");
+}
+
+int main(int argc, char **argv)
+{
+	static struct arguments a; /* large */
+	struct scene_bundle b;
+	struct client *cl;
+	struct error e;
+	int code = 0;
+	a.coordinator = getenv("HSLT_COORDINATOR");
+	a.tls = getenv("HSLT_TLS");
+	a.request.args = &a.render;
+	a.patience = 600;
+	output_check_at_exit();
+	crash_exit("hslt-submit");
+	argp_err_exit_status = 2;
+	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
+	int rc = a.wait ? image_file_probe(a.output, &e) : a.plot ? image_file_probe(a.plot, &e) : 0;
+	if (!rc)
+		rc = scene_bundle_read(&b, a.scene, a.render.defines, a.render.define_count, &a.render.render, &e);
+	if (rc) {
+		fprintf(stderr, "hslt-submit: %s\n", e.text);
+		return 1;
+	}
+	for (size_t i = 0; i < b.note_count; i++)
+		fprintf(stderr, "%s\n", b.notes[i]);
+	rc = a.estimate ? pilot_plan_from_scene(&a.render, &b.summary, &e)
+			: render_plan_from_scene(&a.render, &b.summary, &e);
+	if (rc) {
+		fprintf(stderr, "hslt-submit: %s\n", e.text);
+		scene_bundle_fini(&b);
+		return rc == -EINVAL ? 2 : 1;
+	}
+	char note[512];
+	for (size_t i = 0; render_scene_note(&b.summary, i, note, sizeof note); i++)
+		fprintf(stderr, "hslt-submit: note: %s\n", note);
+	a.request.output = a.estimate ? "" : last_part(a.output);
+	a.request.name = a.name ? a.name : b.scene;
+	struct choice choice;
+	rc = choice_make(&a.render, b.folder, b.scene, &choice, &e);
+	if (rc) {
+		fprintf(stderr, "hslt-submit: %s\n", e.text);
+		scene_bundle_fini(&b);
+		return 1;
+	}
+	if (choice.made)
+		fprintf(stderr, "%s\n", choice.text);
+	measure(&a, &b);
+	rc = client_open(&cl, a.coordinator, a.tls, a.insecure, "hslt-submit", &e);
+	if (!rc) {
+		client_print_notes(cl, "hslt-submit");
+		rc = a.estimate ? estimate(&a, cl, &b, &e) : run(&a, &cl, &b, &code, &e);
+		client_close(cl);
+	}
+	scene_bundle_fini(&b);
+	if (rc)
+		fprintf(stderr, "hslt-submit: %s\n", e.text);
+	return rc ? client_exit_code(rc) : code;
+}

@@ -1,0 +1,69 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/submit/reconnect.h"
+
+#include <stdio.h>
+#include <time.h>
+
+static const double first_pause = 0.25, longest_pause = 10;
+
+static double now(void)
+{
+	struct timespec t;
+	clock_gettime(CLOCK_MONOTONIC, &t);
+	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
+}
+
+static void rest(double seconds)
+{
+	struct timespec t = {(time_t)seconds, (long)(1e9 * (seconds - (double)(time_t)seconds))};
+	nanosleep(&t, NULL);
+}
+
+static bool is_gone(int rc)
+{
+	return rc == -ECONNRESET || rc == -ECONNREFUSED || rc == -ETIMEDOUT || rc == -EHOSTUNREACH;
+}
+
+static int try_once(struct client *cl, const struct submitted *job, const char *output, struct submit_end *end,
+		    struct error *e)
+{
+	int rc = submit_wait(cl, job, end, e);
+	if (!rc && end->has_result)
+		rc = client_fetch(cl, job->job, FARM__WHAT__WHAT_RESULT, output, e);
+	return rc;
+}
+
+/* Calls until somebody answers. */
+static int call_again(struct client **cl, const struct reconnect *o, struct error *e)
+{
+	double gone = now(), pause = first_pause;
+	int rc;
+	do {
+		double left = gone + o->patience - now();
+		rest(pause < left ? pause : left > 0 ? left : 0);
+		pause = 2 * pause < longest_pause ? 2 * pause : longest_pause;
+		rc = client_open(cl, o->coordinator, o->tls, o->insecure, "hslt-submit", e);
+	} while (is_gone(rc) && now() - gone < o->patience);
+	return rc;
+}
+
+int reconnect_job(struct client **cl, const struct reconnect *o, const struct submitted *job, const char *output,
+		  struct submit_end *end, struct error *e)
+{
+	int rc;
+	while (is_gone(rc = try_once(*cl, job, output, end, e))) {
+		client_close(*cl);
+		*cl = NULL;
+		fprintf(stderr, "hslt-submit: %s; trying again for %g s\n", e->text, o->patience);
+		rc = call_again(cl, o, e);
+		if (is_gone(rc))
+			return error_set(
+				e, ECONNREFUSED,
+				"no coordinator at %s for %g s. The job is in its spool and goes on when it is back: "
+				"hslt-job fetch j%llu -o %s",
+				o->coordinator, o->patience, (unsigned long long)job->job, output);
+		if (rc)
+			break;
+	}
+	return rc;
+}

@@ -1,0 +1,385 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/cli/submit/submit.h"
+
+#include "common/base/mem.h"
+#include "common/base/progress.h"
+#include "common/base/text.h"
+#include "common/wire/plan_wire.h"
+#include "worker/cli/base/options.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+enum { CHUNK = 1 << 20 };
+
+/* ---- the bundle ---- */
+
+/* A folder that remembers what was opened, and the hash of what was read: the world is built here as workers will build
+ * it, so they need just that. One thread. */
+struct opened {
+	struct asset_source folder;
+	struct scene_bundle *bundle;
+};
+
+static int remember(struct scene_bundle *b, const char *name, const struct asset *a, struct error *e)
+{
+	for (size_t i = 0; i < b->count; i++)
+		if (strcmp(b->files[i].name, name) == 0)
+			return 0;
+	struct scene_bundle_file *more = mem_grow(b->files, b->count * sizeof *more, (b->count + 1) * sizeof *more);
+	char *copy = mem_strdup(name);
+	b->files = more ? more : b->files;
+	if (!more || !copy) {
+		mem_free(copy);
+		return error_set(e, ENOMEM, "no memory for the list of files");
+	}
+	struct scene_bundle_file *f = &b->files[b->count++];
+	f->name = copy;
+	f->size = a->size;
+	return blob_hash_bytes(a->bytes, a->size, &f->hash, e);
+}
+
+static int open_remembered(void *user, const char *name, struct asset *out, struct error *e)
+{
+	struct opened *o = user;
+	int rc = o->folder.open(o->folder.user, name, out, e);
+	if (!rc && (rc = remember(o->bundle, name, out, e)))
+		o->folder.close(o->folder.user, out);
+	return rc;
+}
+
+static void close_remembered(void *user, struct asset *a)
+{
+	struct opened *o = user;
+	o->folder.close(o->folder.user, a);
+}
+
+static int copy_notes(struct scene_bundle *b, const struct scene *s, struct error *e)
+{
+	b->notes = mem_alloc(s->note_count, sizeof *b->notes);
+	for (uint32_t i = 0; b->notes && i < s->note_count; i++) {
+		b->notes[i] = mem_strdup(s->notes[i]);
+		if (!b->notes[i])
+			break;
+		b->note_count++;
+	}
+	return b->note_count == s->note_count && b->notes ? 0 : error_set(e, ENOMEM, "no memory for the scene's notes");
+}
+
+int scene_bundle_read(struct scene_bundle *b, const char *path, const struct scene_define *defines, size_t define_count,
+		      const struct render_options *o, struct error *e)
+{
+	struct scene scene;
+	memset(b, 0, sizeof *b);
+	int rc = scene_path_split(path, &b->folder, &b->scene, e);
+	if (rc)
+		return rc;
+	struct opened opened = {asset_folder(b->folder), b};
+	struct asset_source assets = {&opened, open_remembered, close_remembered};
+	rc = render_scene_read(&scene, &assets, b->scene, defines, define_count, o, e);
+	if (!rc) {
+		rc = render_check(&scene, &assets, o, &b->summary, e);
+		if (!rc)
+			rc = copy_notes(b, &scene, e);
+		scene_fini(&scene);
+	}
+	if (rc)
+		scene_bundle_fini(b);
+	return rc;
+}
+
+void scene_bundle_fini(struct scene_bundle *b)
+{
+	for (size_t i = 0; i < b->count; i++)
+		mem_free(b->files[i].name);
+	for (size_t i = 0; i < b->note_count; i++)
+		mem_free(b->notes[i]);
+	mem_free(b->files);
+	mem_free(b->notes);
+	mem_free(b->folder);
+	mem_free(b->scene);
+	memset(b, 0, sizeof *b);
+}
+
+/* ---- sending ---- */
+
+/* The message's lists; their texts are borrowed. */
+struct lists {
+	Farm__File *files, **file_at;
+	Farm__Define *defines, **define_at;
+	Farm__Effect *effects, **effect_at;
+};
+
+static void lists_fini(struct lists *l)
+{
+	mem_free(l->files);
+	mem_free(l->file_at);
+	mem_free(l->defines);
+	mem_free(l->define_at);
+	mem_free(l->effects);
+	mem_free(l->effect_at);
+}
+
+static int lists_init(struct lists *l, const struct submit_request *r, struct scene_bundle *b, struct error *e)
+{
+	size_t lines = b->summary.line_count;
+	*l = (struct lists){mem_alloc(b->count, sizeof *l->files),
+			    mem_alloc(b->count, sizeof *l->file_at),
+			    mem_alloc(r->args->define_count, sizeof *l->defines),
+			    mem_alloc(r->args->define_count, sizeof *l->define_at),
+			    mem_alloc(lines, sizeof *l->effects),
+			    mem_alloc(lines, sizeof *l->effect_at)};
+	if (!l->files || !l->file_at || !l->defines || !l->define_at || !l->effects || !l->effect_at) {
+		lists_fini(l);
+		return error_set(e, ENOMEM, "no memory for the submission");
+	}
+	for (size_t i = 0; i < b->count; i++) {
+		Farm__File *f = l->file_at[i] = &l->files[i];
+		farm__file__init(f);
+		f->name = b->files[i].name;
+		f->hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, b->files[i].hash.bytes};
+		f->size = b->files[i].size;
+	}
+	for (size_t i = 0; i < r->args->define_count; i++) {
+		Farm__Define *d = l->define_at[i] = &l->defines[i];
+		farm__define__init(d);
+		d->name = text_borrow(r->args->defines[i].name);
+		d->value = text_borrow(r->args->defines[i].value);
+	}
+	for (size_t i = 0; i < lines; i++) {
+		Farm__Effect *f = l->effect_at[i] = &l->effects[i];
+		farm__effect__init(f);
+		f->name = text_borrow(b->summary.lines[i].name);
+		f->on = b->summary.lines[i].on;
+		f->why = b->summary.lines[i].why;
+		f->forced = b->summary.lines[i].forced;
+		f->saves = text_borrow(b->summary.lines[i].saves);
+	}
+	return 0;
+}
+
+static int wait_answer(struct client *cl, struct client_message *answer, struct error *e)
+{
+	int rc = client_wait(cl, 300, answer, e);
+	if (!rc && answer->envelope.message->body_case != FARM__ENVELOPE__BODY_SUBMIT_ANSWER) {
+		client_message_fini(answer);
+		rc = error_set(e, EPROTO, "the coordinator's answer is not to the submission");
+	}
+	return rc;
+}
+
+static int send_submit(struct client *cl, const struct submit_request *r, struct scene_bundle *b, struct error *e)
+{
+	struct lists l;
+	Farm__Submit s;
+	Farm__PlanRequest plan;
+	Farm__Envelope m;
+	int rc = lists_init(&l, r, b, e);
+	if (rc)
+		return rc;
+	farm__submit__init(&s);
+	farm__envelope__init(&m);
+	plan_request_to_wire(&r->args->plan, &plan);
+	s.name = text_borrow(r->name);
+	s.scene = b->scene;
+	s.n_defines = r->args->define_count;
+	s.defines = l.define_at;
+	s.render_width = r->args->render.width;
+	s.render_height = r->args->render.height;
+	s.plan = &plan;
+	s.priority = r->priority;
+	s.brightest = b->summary.brightest;
+	s.n_files = b->count;
+	s.files = l.file_at;
+	s.n_effects = b->summary.line_count;
+	s.effects = l.effect_at;
+	s.n_notes = b->note_count;
+	s.notes = b->notes;
+	s.output = text_borrow(r->output);
+	s.mixed = r->mixed;
+	s.verify = r->verify;
+	m.body_case = FARM__ENVELOPE__BODY_SUBMIT;
+	m.submit = &s;
+	rc = client_send(cl, &m, NULL, 0, e);
+	lists_fini(&l);
+	return rc;
+}
+
+static const struct scene_bundle_file *file_of_hash(const struct scene_bundle *b, const ProtobufCBinaryData *hash)
+{
+	for (size_t i = 0; i < b->count; i++)
+		if (hash->len == BLOB_HASH_SIZE && memcmp(hash->data, b->files[i].hash.bytes, BLOB_HASH_SIZE) == 0)
+			return &b->files[i];
+	return NULL;
+}
+
+static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint64_t offset, const void *bytes,
+		      size_t size, struct error *e)
+{
+	struct blob_hash hash = f->hash;
+	Farm__BlobChunk chunk;
+	Farm__Envelope m;
+	farm__blob_chunk__init(&chunk);
+	farm__envelope__init(&m);
+	chunk.hash = (ProtobufCBinaryData){BLOB_HASH_SIZE, hash.bytes};
+	chunk.offset = offset;
+	chunk.size = f->size;
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+	m.blob_chunk = &chunk;
+	return client_send(cl, &m, bytes, size, e);
+}
+
+/* Opened as it was before, below the scene's folder, and no other bytes than those that were read then leave this
+ * machine. */
+static int send_file(struct client *cl, const struct scene_bundle *b, const struct scene_bundle_file *f,
+		     struct error *e)
+{
+	struct asset_source folder = asset_folder(b->folder);
+	struct asset a;
+	struct blob_hash hash;
+	int rc = folder.open(folder.user, f->name, &a, e);
+	if (rc)
+		return client_local(rc);
+	rc = blob_hash_bytes(a.bytes, a.size, &hash, e);
+	if (!rc && !blob_hash_equal(&hash, &f->hash))
+		rc = error_set(e, EIO, "%s: it has changed meanwhile", f->name);
+	size_t at = 0;
+	do {
+		size_t n = a.size - at < CHUNK ? a.size - at : CHUNK;
+		if (!rc)
+			rc = send_chunk(cl, f, at, a.bytes + at, n, e);
+		at += n;
+	} while (!rc && at < a.size);
+	folder.close(folder.user, &a);
+	return rc;
+}
+
+static int send_missing(struct client *cl, const struct scene_bundle *b, const Farm__SubmitAnswer *a, struct error *e)
+{
+	int rc = 0;
+	for (size_t i = 0; !rc && i < a->n_missing; i++) {
+		const struct scene_bundle_file *f = file_of_hash(b, &a->missing[i]);
+		rc = f ? send_file(cl, b, f, e)
+		       : error_set(e, EPROTO, "the coordinator asks for a file that is not ours");
+	}
+	return rc;
+}
+
+int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *bundle,
+		struct submitted *job, char *plan_text, size_t plan_size, struct error *e)
+{
+	struct scene_bundle b = *bundle; /* messages borrow texts that are not const */
+	struct client_message answer = {0};
+	int rc = send_submit(cl, r, &b, e);
+	if (!rc)
+		rc = wait_answer(cl, &answer, e);
+	if (!rc && answer.envelope.message->submit_answer->n_missing) {
+		rc = send_missing(cl, &b, answer.envelope.message->submit_answer, e);
+		client_message_fini(&answer);
+		if (!rc)
+			rc = wait_answer(cl, &answer, e);
+	}
+	if (rc)
+		return rc;
+	const Farm__SubmitAnswer *a = answer.envelope.message->submit_answer;
+	if (a->job == 0)
+		rc = error_set(e, EACCES, "the coordinator refuses the job: %s", a->refusal);
+	*job = (struct submitted){a->job, a->submitted};
+	text_copy(plan_text, plan_size, a->plan);
+	client_message_fini(&answer);
+	return rc;
+}
+
+/* ---- waiting ---- */
+
+/* "120 k/s, 31 min left (25 min - 40 min), error 3.2 %, half costs 12 min" */
+static void describe(const Farm__JobStatus *s, const char *rate, char *text, size_t size)
+{
+	char eta[32], low[32], high[32] = "?", range[80] = "", error[80] = "";
+	progress_duration(s->eta, eta, sizeof eta);
+	if (s->eta_low >= 0 && (s->eta_low < s->eta || s->eta_high != s->eta)) {
+		progress_duration(s->eta_low, low, sizeof low);
+		if (s->eta_high >= 0)
+			progress_duration(s->eta_high, high, sizeof high);
+		snprintf(range, sizeof range, " (%s - %s)", low, high);
+	}
+	if (s->n_looks && s->halving_seconds > 0) {
+		progress_duration(s->halving_seconds, low, sizeof low);
+		snprintf(error, sizeof error, ", error %.3g %%, half of it in %s",
+			 100 * sqrt(s->looks[s->n_looks - 1]->rel_mse), low);
+	}
+	snprintf(text, size, "%s/s, %s left%s%s", rate, eta, range, error);
+}
+
+static void show(struct progress *p, const Farm__JobStatus *s)
+{
+	char rate[32], detail[512];
+	progress_number(s->rate, rate, sizeof rate);
+	if (*s->why)
+		snprintf(detail, sizeof detail, "%s", s->why);
+	else if (s->ended || s->eta < 0)
+		snprintf(detail, sizeof detail, "round %llu", (unsigned long long)s->rounds);
+	else
+		describe(s, rate, detail, sizeof detail);
+	progress_show(p, s->progress, s->state, detail);
+}
+
+static void take_looks(const Farm__JobStatus *s, struct submit_end *end)
+{
+	end->cpu_seconds = s->cpu_seconds;
+	end->bootstrap_cpu_seconds = s->bootstrap_cpu_seconds;
+	end->bootstrap_seconds = s->bootstrap_seconds;
+	end->looks.count = 0;
+	for (size_t i = 0; i < s->n_looks; i++) {
+		const Farm__Look *l = s->looks[i];
+		forecast_add_look(&end->looks, &(struct forecast_look){l->work, l->cpu_seconds, l->seconds, l->rel_mse,
+								       l->rel_mse_upper, l->degrees, l->doubtful != 0});
+	}
+}
+
+/* ended: it has. */
+static int take_status(struct progress *p, const Farm__JobStatus *s, const struct submitted *job,
+		       struct submit_end *end, bool *ended, struct error *e)
+{
+	if (s->submitted != job->at)
+		return error_set(e, ESTALE,
+				 "j%llu is another job now, '%s': the coordinator goes on with another spool",
+				 (unsigned long long)job->job, s->name);
+	show(p, s);
+	*ended = s->ended;
+	take_looks(s, end);
+	end->exit_code = s->exit_code;
+	end->has_result = s->fetchable;
+	text_copy(end->state, sizeof end->state, s->state);
+	text_copy(end->why, sizeof end->why, s->why);
+	text_copy(end->note, sizeof end->note, s->note);
+	return 0;
+}
+
+int submit_wait(struct client *cl, const struct submitted *job, struct submit_end *end, struct error *e)
+{
+	struct progress p;
+	Farm__Watch watch;
+	Farm__Envelope m;
+	farm__watch__init(&watch);
+	farm__envelope__init(&m);
+	watch.job = job->job;
+	m.body_case = FARM__ENVELOPE__BODY_WATCH;
+	m.watch = &watch;
+	int rc = client_send(cl, &m, NULL, 0, e);
+	bool ended = false;
+	progress_start(&p);
+	while (!rc && !ended) {
+		struct client_message message;
+		rc = client_wait(cl, -1, &message, e);
+		if (rc)
+			break;
+		const Farm__Envelope *got = message.envelope.message;
+		if (got->body_case == FARM__ENVELOPE__BODY_JOB_STATUS)
+			rc = take_status(&p, got->job_status, job, end, &ended, e);
+		client_message_fini(&message);
+	}
+	progress_end(&p);
+	return rc;
+}

@@ -1,0 +1,66 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What hslt-submit does: collects a scene's files by their hashes, sends the job and what the coordinator misses of it,
+ * waits for it and fetches its result. One thread.
+ */
+#ifndef WORKER_CLI_SUBMIT_H
+#define WORKER_CLI_SUBMIT_H
+
+#include "common/estimate/forecast.h"
+#include "common/blob/blob.h"
+#include "common/net/client.h"
+#include "common/plan/plan.h"
+#include "worker/cli/base/options.h"
+
+/* A scene and its files, as read here. */
+struct scene_bundle {
+	char *folder; /* of the scene file; asset names are relative to it */
+	char *scene;  /* the scene file's name in it */
+	size_t count;
+	struct scene_bundle_file {
+		char *name;
+		struct blob_hash hash;
+		uint64_t size;
+	} * files;
+	struct render_summary summary;
+	size_t note_count;
+	char **notes;
+};
+
+/* Reads and checks the scene with everything that it calls for; files that its world was built without are not of the
+ * bundle. The error names file, line and element. */
+int scene_bundle_read(struct scene_bundle *b, const char *path, const struct scene_define *defines, size_t define_count,
+		      const struct render_options *o, struct error *e);
+void scene_bundle_fini(struct scene_bundle *b);
+
+struct submit_request {
+	const char *name, *output; /* output: a file's name for a later fetch, or "" */
+	int priority;
+	bool mixed;
+	double verify; /* share of the epochs that two workers compute */
+	const struct render_arguments *args;
+};
+
+/* A job of a coordinator. Another spool counts from 1 again: the number alone could be another job's. */
+struct submitted {
+	uint64_t job;
+	double at; /* s since 1970, as the coordinator has it */
+};
+
+/* -EACCES: the coordinator refuses; the sentence is its own. plan_text: what was chosen and by which rule. */
+int submit_send(struct client *cl, const struct submit_request *r, const struct scene_bundle *b, struct submitted *job,
+		char *plan_text, size_t plan_size, struct error *e);
+
+struct submit_end {
+	uint32_t exit_code; /* of a program that waited */
+	bool has_result;
+	char state[16];		       /* done, failed, cancelled */
+	struct forecast_history looks; /* at the error; seconds from the first round on */
+	double cpu_seconds, bootstrap_cpu_seconds, bootstrap_seconds;
+	char why[256], note[1024]; /* why there is no result; what whoever looks at it should know */
+};
+
+/* Shows progress on stderr until the job has ended. -ESTALE: another job has its number. */
+int submit_wait(struct client *cl, const struct submitted *job, struct submit_end *end, struct error *e);
+
+#endif
