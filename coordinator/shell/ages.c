@@ -29,7 +29,7 @@ static struct seen clocks(void)
 	return now;
 }
 
-void ages_open(struct server *s)
+void ages_open(struct jobs *s)
 {
 	struct seen last;
 	struct error e = {""};
@@ -51,13 +51,13 @@ void ages_open(struct server *s)
 	ages_keep(s);
 }
 
-double ages_now(const struct server *s)
+double ages_now(const struct jobs *s)
 {
 	double since = seconds_of(CLOCK_BOOTTIME) - s->seen.up;
 	return s->seen.seconds + (since > 0 ? since : 0);
 }
 
-void ages_keep(const struct server *s)
+void ages_keep(const struct jobs *s)
 {
 	char text[SEEN_TEXT];
 	struct error e;

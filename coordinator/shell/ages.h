@@ -6,11 +6,11 @@
 #ifndef COORDINATOR_SHELL_AGES_H
 #define COORDINATOR_SHELL_AGES_H
 
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/jobs.h"
 
 /* A file that is gone or damaged begins anew: what has ended is then as young as it can be. Never fails. */
-void ages_open(struct server *s);
-double ages_now(const struct server *s); /* s */
-void ages_keep(const struct server *s);	 /* writes it down; a disk that does not take it is tried again next time */
+void ages_open(struct jobs *s);
+double ages_now(const struct jobs *s); /* s */
+void ages_keep(const struct jobs *s);  /* writes it down; a disk that does not take it is tried again next time */
 
 #endif

@@ -18,7 +18,7 @@
 #include "common/film/canvas_save.h"
 #include "coordinator/shell/back.h"
 #include "coordinator/shell/durable.h"
-#include "coordinator/shell/session.h"
+#include "coordinator/shell/jobs.h"
 
 #include <assert.h>
 #include <stdio.h>
@@ -44,7 +44,7 @@ _Static_assert(sizeof(struct head) == 4528, "another layout is another version")
 
 struct writing {
 	uv_work_t work;
-	struct server *server;
+	struct jobs *jobs;
 	struct live_job *order;
 	struct journal *journal; /* the one that follows */
 	struct head head;
@@ -125,7 +125,7 @@ static void run(uv_work_t *work)
 /* Closing and unlinking a journal of hundreds of megabytes takes as many milliseconds: the pool does it, too. */
 struct tidying {
 	uv_work_t work;
-	struct server *server;
+	struct jobs *jobs;
 	struct journal *old;
 	uint64_t keep;
 	char folder[SPOOL_PATH_MAX];
@@ -142,12 +142,12 @@ static void tidied(uv_work_t *work, int status)
 {
 	struct tidying *t = work->data;
 	(void)status;
-	t->server->checkpointing = false; /* until now, so that no younger journal is in the way */
+	t->jobs->checkpointing = false; /* until now, so that no younger journal is in the way */
 	mem_free(t);
 }
 
 /* The journals before `keep` go. */
-static void tidy(struct server *s, struct journal *old, const char *folder, uint64_t keep)
+static void tidy(struct jobs *s, struct journal *old, const char *folder, uint64_t keep)
 {
 	struct tidying *t = mem_alloc(1, sizeof *t);
 	if (!t) {
@@ -156,10 +156,10 @@ static void tidy(struct server *s, struct journal *old, const char *folder, uint
 		s->checkpointing = false;
 		return;
 	}
-	*t = (struct tidying){.server = s, .old = old, .keep = keep};
+	*t = (struct tidying){.jobs = s, .old = old, .keep = keep};
 	snprintf(t->folder, sizeof t->folder, "%s", folder);
 	t->work.data = t;
-	int rc = uv_queue_work(&s->loop, &t->work, run_tidy, tidied);
+	int rc = uv_queue_work(s->loop, &t->work, run_tidy, tidied);
 	assert(rc == 0);
 	(void)rc;
 }
@@ -167,7 +167,7 @@ static void tidy(struct server *s, struct journal *old, const char *folder, uint
 static void done(uv_work_t *work, int status)
 {
 	struct writing *w = work->data;
-	struct server *s = w->server;
+	struct jobs *s = w->jobs;
 	struct live_job *o = w->order;
 	uint64_t id = o->id;
 	assert(status == 0);
@@ -176,10 +176,10 @@ static void done(uv_work_t *work, int status)
 		      o->unsure)) { /* this one and its journal, or the old ones: both hold all that was acknowledged */
 		o->unsure = true;
 		o->generation_least = w->head.generation + 1;
-		o->checkpoint_after = server_now(s) + s->config.retry_seconds;
+		o->checkpoint_after = jobs_now(s) + s->config.retry_seconds;
 	} else if (w->rc) { /* the old ones go on */
 		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
-		o->checkpoint_after = server_now(s) + pause_seconds;
+		o->checkpoint_after = jobs_now(s) + pause_seconds;
 		journal_clear(w->folder, journal_generation(o->journal));
 	} else {
 		o->unsure = false;
@@ -204,28 +204,28 @@ static void done(uv_work_t *work, int status)
 		durable_hold(s, o, "its results cannot be stored",
 			     w->error.text); /* which is the end of it, if it was cancelled */
 	if (!s->stopping) {
-		server_order_free_again(s);
-		session_previews(s, id);
+		jobs_films_free(s);
+		s->peers.films_free(s->peers.user, id);
 	}
 	mem_free(w);
 }
 
 /* Of a journal. */
-static uint64_t limit_of(const struct server *s, const struct live_job *o)
+static uint64_t limit_of(const struct jobs *s, const struct live_job *o)
 {
 	return o->checkpoint_bytes > s->config.journal_bytes ? o->checkpoint_bytes : s->config.journal_bytes;
 }
 
-static void start(struct server *s, struct live_job *o)
+static void start(struct jobs *s, struct live_job *o)
 {
 	struct job_status status;
 	struct writing *w = mem_alloc(1, sizeof *w);
-	if (!w || !farm_job(s->farm, o->id, server_now(s), &status)) {
+	if (!w || !farm_job(s->farm, o->id, jobs_now(s), &status)) {
 		mem_free(w);
-		o->checkpoint_after = server_now(s) + pause_seconds;
+		o->checkpoint_after = jobs_now(s) + pause_seconds;
 		return;
 	}
-	w->server = s;
+	w->jobs = s;
 	w->order = o;
 	w->work.data = w;
 	w->kept_most = limit_of(s, o);
@@ -246,12 +246,12 @@ static void start(struct server *s, struct live_job *o)
 	memcpy(w->head.magic, magic, sizeof magic);
 	snprintf(w->head.fingerprint, sizeof w->head.fingerprint, "%s", status.fingerprint);
 	o->busy = s->checkpointing = true;
-	int rc = uv_queue_work(&s->loop, &w->work, run, done);
+	int rc = uv_queue_work(s->loop, &w->work, run, done);
 	assert(rc == 0);
 	(void)rc;
 }
 
-void checkpoint_where_due(struct server *s)
+void checkpoint_where_due(struct jobs *s)
 {
 	if (s->stepping || s->stopping ||
 	    s->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
@@ -263,7 +263,7 @@ void checkpoint_where_due(struct server *s)
 			continue;
 		uint64_t limit = limit_of(s, o);
 		if ((journal_bytes(o->journal) - o->kept_bytes > limit || o->unsure) &&
-		    server_now(s) >= o->checkpoint_after)
+		    jobs_now(s) >= o->checkpoint_after)
 			start(s, o);
 		if (s->checkpointing)
 			return;

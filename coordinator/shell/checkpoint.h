@@ -11,10 +11,10 @@
 #define COORDINATOR_SHELL_CHECKPOINT_H
 
 #include "common/base/checked_file.h"
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/jobs.h"
 
 /* Starts one for each order whose journal is long enough. Not while an update is carried out. */
-void checkpoint_where_due(struct server *s);
+void checkpoint_where_due(struct jobs *s);
 
 /* Into a new order without merged batches, by any thread. -ENOENT: there is none; -EBADMSG: it is damaged; -EPROTO: of
  * another version; the order is of no use then. generation: of the journal that follows. heard: as in checked_file.h.

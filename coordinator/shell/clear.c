@@ -6,14 +6,13 @@
 #include "coordinator/shell/ages.h"
 #include "coordinator/shell/keep.h"
 #include "coordinator/shell/recovery.h"
-#include "coordinator/shell/session.h"
 #include "coordinator/store/age.h"
 
 #include <math.h>
 #include <string.h>
 #include <time.h>
 
-static const double every_seconds = 3600, soon_seconds = 2, fetching_seconds = 60, tick_seconds = 0.005;
+static const double every_seconds = 3600, soon_seconds = 2, tick_seconds = 0.005;
 static const char *const results[] = {"result.exr", "preview.exr", "log"};
 enum { RESULTS = sizeof results / sizeof *results };
 
@@ -28,22 +27,13 @@ struct clearing {
 	struct job_record record; /* the one at hand */
 };
 
-static bool is_fetched(const struct server *s, uint64_t job)
-{
-	for (const struct session *p = s->sessions; p; p = p->next)
-		if (p->watched == job ||
-		    (p->fetch.job == job && server_now(s) - p->fetch.at < fetching_seconds)) /* or waits for it */
-			return true;
-	return false;
-}
-
 /* Or comes to life: its films are being read, so that it goes on. */
-static bool lives(const struct server *s, uint64_t job)
+static bool lives(const struct jobs *s, uint64_t job)
 {
-	return server_live_job(s, job) || recovery_has(s, job) || (s->reading && s->reading->id == job);
+	return jobs_find(s, job) || recovery_has(s, job) || (s->reading && s->reading->id == job);
 }
 
-static uint64_t result_bytes(const struct server *s, uint64_t job)
+static uint64_t result_bytes(const struct jobs *s, uint64_t job)
 {
 	uint64_t sum = 0;
 	for (int i = 0; i < RESULTS; i++) {
@@ -55,7 +45,7 @@ static uint64_t result_bytes(const struct server *s, uint64_t job)
 	return sum;
 }
 
-static void look(const struct server *s, struct clearing *c, uint64_t id)
+static void look(const struct jobs *s, struct clearing *c, uint64_t id)
 {
 	if (lives(s, id))
 		return;
@@ -78,10 +68,10 @@ static void look(const struct server *s, struct clearing *c, uint64_t id)
 						   .ended = c->record.ended_seen,
 						   .films = keep_bytes(s, id),
 						   .result = result_bytes(s, id),
-						   .busy = is_fetched(s, id)};
+						   .busy = s->peers.uses_result(s->peers.user, id)};
 }
 
-static struct job_record *listed(struct server *s, uint64_t job)
+static struct job_record *listed(struct jobs *s, uint64_t job)
 {
 	for (size_t i = 0; i < s->ended_count; i++)
 		if (s->ended[i].id == job)
@@ -89,7 +79,7 @@ static struct job_record *listed(struct server *s, uint64_t job)
 	return NULL;
 }
 
-static void drop_result(struct server *s, const struct age_job *j, struct job_record *r, double now)
+static void drop_result(struct jobs *s, const struct age_job *j, struct job_record *r, double now)
 {
 	struct error e;
 	struct job_record *known = listed(s, j->id);
@@ -114,7 +104,7 @@ static void drop_result(struct server *s, const struct age_job *j, struct job_re
 		  (unsigned long long)j->result, r->ended);
 }
 
-static void drop_record(struct server *s, const struct age_job *j)
+static void drop_record(struct jobs *s, const struct age_job *j)
 {
 	struct job_record *known = listed(s, j->id);
 	spool_drop_job(s->spool, j->id);
@@ -127,12 +117,12 @@ static void drop_record(struct server *s, const struct age_job *j)
 }
 
 /* What was chosen, unless something has come of the job since. */
-static void clear_job(struct server *s, struct clearing *c, const struct age_job *j)
+static void clear_job(struct jobs *s, struct clearing *c, const struct age_job *j)
 {
 	if ((!j->no_films || !j->films) && (!j->no_result || !j->result) && !j->no_record)
 		return;
-	if (lives(s, j->id) || is_fetched(s, j->id) || spool_read_record(s->spool, j->id, &c->record, NULL) ||
-	    c->record.ended_seen != j->ended)
+	if (lives(s, j->id) || s->peers.uses_result(s->peers.user, j->id) ||
+	    spool_read_record(s->spool, j->id, &c->record, NULL) || c->record.ended_seen != j->ended)
 		return;
 	if (j->no_films && j->films) {
 		keep_drop(s, j->id);
@@ -148,7 +138,7 @@ static void clear_job(struct server *s, struct clearing *c, const struct age_job
 	s->changes++;
 }
 
-static void choose(const struct server *s, struct clearing *c)
+static void choose(const struct jobs *s, struct clearing *c)
 {
 	struct age_limits limits = {s->config.clear_seconds, s->config.clear_bytes};
 	struct timespec now;
@@ -158,7 +148,7 @@ static void choose(const struct server *s, struct clearing *c)
 }
 
 /* false: that was all. */
-static bool step(struct server *s, struct clearing *c)
+static bool step(struct jobs *s, struct clearing *c)
 {
 	if (c->looked < c->id_count)
 		look(s, c, c->ids[c->looked++]);
@@ -172,14 +162,14 @@ static bool step(struct server *s, struct clearing *c)
 }
 
 /* At once, for each change of the database is flushed. */
-static void drop_rows(struct server *s, const struct clearing *c)
+static void drop_rows(struct jobs *s, const struct clearing *c)
 {
 	struct error e;
 	if (c->records && ledger_drop(s->ledger, c->ids, c->records, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
 }
 
-void clear_close(struct server *s)
+void clear_close(struct jobs *s)
 {
 	struct clearing *c = s->clearing;
 	if (!c)
@@ -190,7 +180,7 @@ void clear_close(struct server *s)
 	s->clearing = NULL;
 }
 
-static bool begin(struct server *s)
+static bool begin(struct jobs *s)
 {
 	struct error e;
 	struct clearing *c = s->clearing = mem_alloc(1, sizeof *c);
@@ -204,14 +194,14 @@ static bool begin(struct server *s)
 	return s->clearing != NULL;
 }
 
-void clear_soon(struct server *s)
+void clear_soon(struct jobs *s)
 {
-	s->clear_next = fmin(s->clear_next, server_now(s) + soon_seconds);
+	s->clear_next = fmin(s->clear_next, jobs_now(s) + soon_seconds);
 }
 
-void clear_tick(struct server *s)
+void clear_tick(struct jobs *s)
 {
-	double now = server_now(s);
+	double now = jobs_now(s);
 	if (!s->clearing) {
 		if (now < s->clear_next)
 			return;
@@ -221,7 +211,7 @@ void clear_tick(struct server *s)
 			return;
 	}
 	while (step(s, s->clearing))
-		if (server_now(s) - now > tick_seconds)
+		if (jobs_now(s) - now > tick_seconds)
 			return;
 	drop_rows(s, s->clearing);
 	clear_close(s);

@@ -9,10 +9,10 @@
 #ifndef COORDINATOR_SHELL_CLEAR_H
 #define COORDINATOR_SHELL_CLEAR_H
 
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/jobs.h"
 
-void clear_tick(struct server *s);
-void clear_soon(struct server *s);  /* a job has ended */
-void clear_close(struct server *s); /* after the loop */
+void clear_tick(struct jobs *s);
+void clear_soon(struct jobs *s);  /* a job has ended */
+void clear_close(struct jobs *s); /* after the loop */
 
 #endif

@@ -1,5 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* A client's side of a session: submit, list, watch; fetch.c and control.c have the rest. */
+/*
+ * A client's side of a session: submit, list, watch; fetch.c and control.c have the rest.
+ *
+ * A submission waits in the session until its files are there (upload.h), and then goes to the core, whose answer is
+ * the client's. A client sees its own jobs alone, by the name in its certificate; an operator sees all, and so does
+ * everybody without TLS. Whoever watches a job gets its status when that has changed and the one before has been read.
+ *
+ * A submission that is refused, or beyond its owner's quota, is answered with a sentence, and the client may submit
+ * another. A message that no client sends is answered by Fault, and the connection ends.
+ */
+#include "coordinator/shell/client.h"
+
+#include "coordinator/shell/control.h"
+#include "coordinator/shell/fetch.h"
 #include "coordinator/shell/incoming.h"
 #include "coordinator/shell/session.h"
 #include "coordinator/shell/trust.h"
@@ -11,9 +24,18 @@
 #include <stdio.h>
 #include <string.h>
 
-enum { CHUNK = 1 << 20, HEADER_LIMIT = 1 << 20 };
+enum { CHUNK = 1 << 20 };
 
 /* ---- submit ---- */
+
+uint64_t client_uploading(const struct session *p)
+{
+	uint64_t bytes = 0;
+	for (const struct session *other = p->peers->sessions; other; other = other->next)
+		if (other != p && other->upload && strcmp(other->who.name, p->who.name) == 0)
+			bytes += live_job_asset_bytes(other->upload->submit.message->submit);
+	return bytes;
+}
 
 static void answer_submit(struct session *p, uint64_t job, const char *refusal, const struct upload *u)
 {
@@ -42,7 +64,7 @@ static void answer_submit(struct session *p, uint64_t job, const char *refusal, 
 		answer.missing = list;
 	}
 	answer.job = job;
-	answer.submitted = job && server_view(p->server, job, &v) ? v.record.submitted : 0;
+	answer.submitted = job && jobs_view(p->jobs, job, &v) ? v.record.submitted : 0;
 	answer.refusal = text;
 	answer.plan = plan;
 	m.body_case = FARM__ENVELOPE__BODY_SUBMIT_ANSWER;
@@ -52,44 +74,20 @@ static void answer_submit(struct session *p, uint64_t job, const char *refusal, 
 	mem_free(list);
 }
 
-void session_upload_abort(struct session *p)
+void client_upload_abort(struct session *p)
 {
 	if (p->upload)
 		upload_free(p->upload);
 	p->upload = NULL;
-	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, 0});
-}
-
-static uint64_t bytes_of(const Farm__Submit *m)
-{
-	uint64_t sum = 0;
-	for (size_t i = 0; i < m->n_files; i++)
-		if (__builtin_add_overflow(sum, m->files[i]->size, &sum))
-			return UINT64_MAX;
-	return sum;
-}
-
-int session_within_quota(const struct session *p, uint64_t job, const struct plan *plan, const Farm__Submit *m,
-			 struct error *e)
-{
-	struct quota_use has = {0};
-	if (p->who.role == TLS_OPERATOR)
-		return 0;
-	for (const struct live_job *o = p->server->orders; o; o = o->next) {
-		if (o->ended || o->id == job || strcmp(o->record.owner, p->who.name) != 0)
-			continue;
-		has.jobs++;
-		has.asset_bytes += bytes_of(live_job_submit(o));
-	}
-	for (const struct session *other = p->server->sessions; other; other = other->next)
-		if (other != p && other->upload && strcmp(other->who.name, p->who.name) == 0)
-			has.asset_bytes += bytes_of(other->upload->submit.message->submit);
-	return quota_check(&p->server->config.quota, &has, plan, bytes_of(m), e);
+	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, 0});
 }
 
 static int within_quota(const struct session *p, struct error *e)
 {
-	return session_within_quota(p, 0, &p->upload->plan, p->upload->submit.message->submit, e);
+	if (p->who.role == TLS_OPERATOR)
+		return 0;
+	return jobs_within_quota(p->jobs, p->who.name, 0, client_uploading(p), &p->upload->plan,
+				 p->upload->submit.message->submit, e);
 }
 
 /* Every blob is there: the core decides. */
@@ -100,7 +98,7 @@ static void submit(struct session *p)
 	struct error e;
 	if (within_quota(p, &e)) { /* again: other jobs may have come while its files did */
 		answer_submit(p, 0, e.text, NULL);
-		session_upload_abort(p);
+		client_upload_abort(p);
 		return;
 	}
 	text_copy(name, sizeof name, m->name);
@@ -111,12 +109,18 @@ static void submit(struct session *p)
 				      .priority = m->priority,
 				      .owner = p->who.name,
 				      .mixed = m->mixed,
-				      .verify = trust_share(p->server, m)}};
+				      .verify = trust_share(p->jobs, m)}};
+	struct submission from = {.submit = &p->upload->submit,
+				  .plan = &p->upload->plan,
+				  .rule = p->upload->rule,
+				  .owner = p->who.name,
+				  .address = p->address};
 	p->rejected[0] = 0;
-	p->answered_job = 0;
-	server_step_with(p->server, &ev, &(struct incoming){.submitter = p});
-	answer_submit(p, *p->rejected ? 0 : p->answered_job, p->rejected, *p->rejected ? NULL : p->upload);
-	session_upload_abort(p);
+	jobs_step_with(p->jobs, &ev, &(struct incoming){.submission = &from});
+	if (*from.refusal)
+		text_copy(p->rejected, sizeof p->rejected, from.refusal);
+	answer_submit(p, *p->rejected ? 0 : from.job, p->rejected, *p->rejected ? NULL : p->upload);
+	client_upload_abort(p);
 }
 
 static void take_submit(struct session *p, struct envelope *env)
@@ -126,7 +130,7 @@ static void take_submit(struct session *p, struct envelope *env)
 		session_fault(p, "one submission at a time");
 		return;
 	}
-	if (upload_new(&p->upload, env, p->server->blobs, p->server->config.worker_bandwidth, &e)) {
+	if (upload_new(&p->upload, env, p->jobs->blobs, p->jobs->config.worker_bandwidth, &e)) {
 		p->upload = NULL;
 		answer_submit(p, 0, e.text, NULL);
 		return;
@@ -137,10 +141,10 @@ static void take_submit(struct session *p, struct envelope *env)
 	}
 	if (within_quota(p, &e)) {
 		answer_submit(p, 0, e.text, NULL);
-		session_upload_abort(p);
+		client_upload_abort(p);
 		return;
 	}
-	conn_set_limits(p->conn, (struct frame_limits){HEADER_LIMIT, CHUNK});
+	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, CHUNK});
 	answer_submit(p, 0, "", p->upload);
 }
 
@@ -154,7 +158,7 @@ static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigne
 	int rc = upload_add(p->upload, c, payload, size, &e);
 	if (rc < 0) {
 		answer_submit(p, 0, e.text, NULL);
-		session_upload_abort(p);
+		client_upload_abort(p);
 	} else if (rc) {
 		log_event(LOG_BLOB_STORED, "peer=%llu bytes=%llu", (unsigned long long)p->id,
 			  (unsigned long long)c->size);
@@ -175,15 +179,15 @@ static bool may_see(const struct session *p, struct job_view *v)
 	return *p->who.name && strcmp(p->who.name, v->record.owner) == 0;
 }
 
-bool session_finds_job(const struct session *p, uint64_t job, struct job_view *v)
+bool client_finds_job(const struct session *p, uint64_t job, struct job_view *v)
 {
-	return server_view(p->server, job, v) && may_see(p, v);
+	return jobs_view(p->jobs, job, v) && may_see(p, v);
 }
 
 static void take_list(struct session *p)
 {
 	struct job_view *views;
-	size_t count = server_views(p->server, &views);
+	size_t count = jobs_views(p->jobs, &views);
 	Farm__JobStatus *status = mem_alloc(count, sizeof *status), **list = mem_alloc(count, sizeof *list);
 	Farm__JobListAnswer answer;
 	Farm__Envelope m;
@@ -204,7 +208,7 @@ static void take_list(struct session *p)
 	mem_free(views);
 }
 
-void session_send_done(struct session *p, const char *text)
+void client_send_done(struct session *p, const char *text)
 {
 	char said[256];
 	Farm__Done done;
@@ -222,17 +226,44 @@ void session_send_done(struct session *p, const char *text)
 static void take_watch(struct session *p, uint64_t job)
 {
 	struct job_view v;
-	if (!session_finds_job(p, job, &v)) {
+	if (!client_finds_job(p, job, &v)) {
 		session_fault(p, "there is no job j%llu", (unsigned long long)job);
 		return;
 	}
 	p->watched = job;
 	mem_free(p->shown);
 	p->shown = NULL;
-	session_tick(p);
+	client_tick(p);
 }
 
-void session_client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
+void client_tick(struct session *p)
+{
+	struct job_view v;
+	struct view_looks looks;
+	Farm__JobStatus status;
+	Farm__Envelope m;
+	if (!p->watched || p->state != SESSION_CLIENT || conn_unsent(p->conn))
+		return;
+	if (!client_finds_job(p, p->watched, &v)) {
+		session_fault(p, "the job is no longer known");
+		return;
+	}
+	if (p->shown && memcmp(p->shown, &v, sizeof v) == 0)
+		return;
+	if (!p->shown && !(p->shown = mem_alloc(1, sizeof v)))
+		return;
+	*p->shown = v;
+	farm__envelope__init(&m);
+	view_to_wire(&v, &status);
+	view_looks_to_wire(&v, &looks, &status);
+	m.body_case = FARM__ENVELOPE__BODY_JOB_STATUS;
+	m.job_status = &status;
+	session_send(p, &m, NULL, 0);
+	if (record_is_ended(&v.record))
+		p->watched = 0;
+}
+
+void client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
 {
 	const Farm__Envelope *m = env->message;
 	switch (m->body_case) {
@@ -248,16 +279,16 @@ void session_client_message(struct session *p, struct envelope *env, const unsig
 		take_list(p);
 		break;
 	case FARM__ENVELOPE__BODY_CANCEL:
-		session_cancel(p, m->cancel->job);
+		control_cancel(p, m->cancel->job);
 		break;
 	case FARM__ENVELOPE__BODY_CONTROL:
-		session_control(p, m->control);
+		control_job(p, m->control);
 		break;
 	case FARM__ENVELOPE__BODY_WATCH:
 		take_watch(p, m->watch->job);
 		break;
 	case FARM__ENVELOPE__BODY_FETCH:
-		session_fetch(p, m->fetch);
+		fetch_begin(p, m->fetch);
 		break;
 	case FARM__ENVELOPE__BODY_BYE:
 		conn_close(p->conn, "the client said goodbye");

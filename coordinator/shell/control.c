@@ -3,13 +3,9 @@
 
 #include "common/base/text.h"
 #include "coordinator/shell/reconcile.h"
-#include "coordinator/shell/session.h"
-
-const char *control_held_by(const char *who, char text[256])
-{
-	text_print(text, 256, "held by %s", who);
-	return text;
-}
+#include "coordinator/shell/restore.h"
+#include "coordinator/shell/client.h"
+#include "coordinator/shell/extend.h"
 
 /* Without a certificate anybody may call himself anything. */
 static const char *name_of(const struct session *p)
@@ -20,7 +16,7 @@ static const char *name_of(const struct session *p)
 static int tell(struct session *p, struct event *ev)
 {
 	ev->tag = p->id;
-	server_step(p->server, ev);
+	jobs_step(p->jobs, ev);
 	return *p->rejected ? -1 : 0;
 }
 
@@ -33,11 +29,11 @@ static void not_for_long(struct session *p, const struct error *e)
 
 static void hold(struct session *p, uint64_t job, const char *who)
 {
-	struct server *s = p->server;
+	struct jobs *s = p->jobs;
 	struct error e;
 	char text[256];
 	struct event ev = {
-		.kind = EVENT_HOLD, .job = job, .hold = HOLD_ORDERED, .text = *who ? control_held_by(who, text) : ""};
+		.kind = EVENT_HOLD, .job = job, .hold = HOLD_ORDERED, .text = *who ? restore_held_by(who, text) : ""};
 	if (tell(p, &ev))
 		return;
 	if (ledger_hold(s->ledger, job, who, &e)) {
@@ -45,7 +41,7 @@ static void hold(struct session *p, uint64_t job, const char *who)
 		return;
 	}
 	reconcile_row(s, job);
-	struct live_job *o = server_live_job(s, job);
+	struct live_job *o = jobs_find(s, job);
 	if (o)
 		live_job_log(o, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released",
 			     log_quote(name_of(p)).text);
@@ -53,7 +49,7 @@ static void hold(struct session *p, uint64_t job, const char *who)
 
 static void set_priority(struct session *p, uint64_t job, int priority)
 {
-	struct server *s = p->server;
+	struct jobs *s = p->jobs;
 	struct error e;
 	struct event ev = {.kind = EVENT_PRIORITY, .job = job, .priority = priority};
 	if (tell(p, &ev))
@@ -63,7 +59,7 @@ static void set_priority(struct session *p, uint64_t job, int priority)
 		return;
 	}
 	reconcile_row(s, job);
-	struct live_job *o = server_live_job(s, job);
+	struct live_job *o = jobs_find(s, job);
 	if (o)
 		live_job_log(o, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);
 }
@@ -72,25 +68,27 @@ static void set_priority(struct session *p, uint64_t job, int priority)
 static bool finds(struct session *p, uint64_t job, bool over_too)
 {
 	struct job_view v;
-	bool there = session_finds_job(p, job, &v);
+	bool there = client_finds_job(p, job, &v);
 	text_copy(p->rejected, sizeof p->rejected,
-		  !there					? "no such job"
-		  : over_too || server_live_job(p->server, job) ? ""
-								: "the job is over");
+		  !there				? "no such job"
+		  : over_too || jobs_find(p->jobs, job) ? ""
+							: "the job is over");
 	return !*p->rejected;
 }
 
-void session_cancel(struct session *p, uint64_t job)
+void control_cancel(struct session *p, uint64_t job)
 {
 	struct event ev = {.kind = EVENT_CANCEL, .job = job};
 	if (finds(p, job, false))
 		tell(p, &ev);
-	session_send_done(p, "");
+	client_send_done(p, "");
 }
 
-void session_control(struct session *p, const Farm__Control *c)
+void control_job(struct session *p, const Farm__Control *c)
 {
 	bool extends = c->verb == FARM__VERB__VERB_EXTEND;
+	struct requester by = {.peer = p->id, .unbounded = p->who.role == TLS_OPERATOR};
+	text_copy(by.owner, sizeof by.owner, p->who.name);
 	if (finds(p, c->job, extends)) {
 		switch (c->verb) {
 		case FARM__VERB__VERB_HOLD:
@@ -103,15 +101,16 @@ void session_control(struct session *p, const Farm__Control *c)
 			set_priority(p, c->job, c->priority);
 			break;
 		case FARM__VERB__VERB_EXTEND:
-			extend_job(p, &(struct extension){.job = c->job,
-							  .spp = c->more_spp,
-							  .mutations = c->more_mutations,
-							  .seconds = c->more_seconds,
-							  .target_error = c->target_error});
+			extend_job(p->jobs, &by,
+				   &(struct extension){.job = c->job,
+						       .spp = c->more_spp,
+						       .mutations = c->more_mutations,
+						       .seconds = c->more_seconds,
+						       .target_error = c->target_error});
 			return; /* with an answer, or there will be one */
 		default:	/* a number from outside */
 			text_copy(p->rejected, sizeof p->rejected, "nothing that can be done with a job");
 		}
 	}
-	session_send_done(p, "");
+	client_send_done(p, "");
 }

@@ -1,9 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* What clients want of jobs that are there: cancel, hold, release, priority. The loop's thread. */
+/* What clients want of jobs that are there: cancel, hold, release, priority, extend. The loop's thread. */
 #ifndef COORDINATOR_SHELL_CONTROL_H
 #define COORDINATOR_SHELL_CONTROL_H
 
-/* The sentence for the status. */
-const char *control_held_by(const char *who, char text[256]);
+#include "coordinator/shell/session.h"
+
+/* Each is answered by Done, an extension perhaps later. */
+void control_cancel(struct session *p, uint64_t job);
+void control_job(struct session *p, const Farm__Control *c);
 
 #endif

@@ -24,9 +24,10 @@
 #include "coordinator/shell/incoming.h"
 #include "coordinator/shell/keep.h"
 #include "coordinator/shell/late.h"
+#include "coordinator/shell/extend.h"
 #include "coordinator/shell/publish.h"
+#include "coordinator/shell/results.h"
 #include "coordinator/shell/trust.h"
-#include "coordinator/shell/upload.h"
 
 #include <assert.h>
 #include <fcntl.h>
@@ -36,25 +37,23 @@
 
 /* ---- jobs ---- */
 
-static void submitted(struct server *s, const struct action *a, const struct incoming *in)
+static void submitted(struct jobs *s, const struct action *a, struct submission *from)
 {
-	struct session *p = in->submitter;
 	struct live_job *o;
 	struct error e;
-	assert(p && p->upload && p->id == a->tag);
-	const Farm__Submit *m = p->upload->submit.message->submit;
-	p->answered_job = a->job;
+	const Farm__Submit *m = from->submit->message->submit;
+	from->job = a->job;
 	int rc = spool_take_job(s->spool, a->job, &e);
 	if (!rc)
-		rc = live_job_new(&o, a->job, &p->upload->submit, &p->upload->plan, p->who.name, 0, s->spool, &e);
+		rc = live_job_new(&o, a->job, from->submit, from->plan, from->owner, 0, s->spool, &e);
 	if (!rc && (rc = durable_begin(s, o, &e))) {
-		p->upload->submit = o->submit;
+		*from->submit = o->submit;
 		memset(&o->submit, 0, sizeof o->submit);
 		live_job_free(o);
 	}
 	if (rc) {
-		text_copy(p->rejected, sizeof p->rejected, e.text);
-		server_job_broken(s, a->job, e.text);
+		text_copy(from->refusal, sizeof from->refusal, e.text);
+		jobs_break(s, a->job, e.text);
 		return;
 	}
 	o->next = s->orders;
@@ -62,8 +61,7 @@ static void submitted(struct server *s, const struct action *a, const struct inc
 	char plan[PLAN_TEXT];
 	plan_describe(&o->plan, plan, sizeof plan);
 	live_job_log(o, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s", log_quote(o->record.name).text,
-		     p->address, *p->who.name ? p->who.name : "-", log_quote(plan).text,
-		     log_quote(p->upload->rule).text);
+		     from->address, *from->owner ? from->owner : "-", log_quote(plan).text, log_quote(from->rule).text);
 	for (size_t i = 0; i < m->n_notes; i++)
 		live_job_log(o, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
 	for (size_t i = 0; i < m->n_effects; i++)
@@ -71,16 +69,15 @@ static void submitted(struct server *s, const struct action *a, const struct inc
 			     (int)m->effects[i]->on, log_quote(m->effects[i]->why).text);
 }
 
-static void rejected(struct server *s, const struct action *a)
+static void rejected(struct jobs *s, const struct action *a)
 {
-	struct session *p = session_find(s, a->tag ? a->tag : a->peer);
-	if (p)
-		text_copy(p->rejected, sizeof p->rejected, *a->text ? a->text : "refused");
+	text_copy(s->refusal, sizeof s->refusal, *a->text ? a->text : "refused");
+	s->peers.refused(s->peers.user, a->tag ? a->tag : a->peer, s->refusal);
 }
 
-static void job_changed(struct server *s, const struct action *a)
+static void job_changed(struct jobs *s, const struct action *a)
 {
-	struct live_job *o = server_live_job(s, a->job);
+	struct live_job *o = jobs_find(s, a->job);
 	if (!o)
 		return;
 	live_job_log(o,
@@ -92,16 +89,16 @@ static void job_changed(struct server *s, const struct action *a)
 	o->ended = job_state_is_end(a->state);
 }
 
-void dispatch_prepare(struct server *s, struct live_job *o)
+void dispatch_prepare(struct jobs *s, struct live_job *o)
 {
 	struct error e = {""};
-	int rc = live_job_prepare(o, server_film_folder(s, &o->plan), &e);
+	int rc = live_job_prepare(o, jobs_film_folder(s, &o->plan), &e);
 	if (rc && rc != -ENOMEM) {
 		if (!o->unprepared)
 			live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"",
 				     log_quote(e.text).text);
 		o->unprepared = true;
-		o->try_again = server_now(s) + s->config.retry_seconds;
+		o->try_again = jobs_now(s) + s->config.retry_seconds;
 		return;
 	}
 	o->unprepared = false;
@@ -112,12 +109,12 @@ void dispatch_prepare(struct server *s, struct live_job *o)
 			   .job = o->id,
 			   .text = e.text,
 			   .prepared = {.job = o->id, .ok = rc == 0, .black = o->lit.black}};
-	server_defer(s, &ev);
+	jobs_defer(s, &ev);
 }
 
 /* ---- batches ---- */
 
-static void keep_partials(const struct server *s, const struct lease_key *k, const struct incoming *in)
+static void keep_partials(const struct jobs *s, const struct lease_key *k, const struct incoming *in)
 {
 	for (size_t i = 0; i < in->result->n_tile_sizes; i++) {
 		char path[SPOOL_PATH_MAX];
@@ -135,9 +132,9 @@ static void keep_partials(const struct server *s, const struct lease_key *k, con
 	}
 }
 
-static void merge(struct server *s, const struct action *a, const struct incoming *in)
+static void merge(struct jobs *s, const struct action *a, const struct incoming *in)
 {
-	struct live_job *o = server_live_job(s, a->job);
+	struct live_job *o = jobs_find(s, a->job);
 	struct error e;
 	assert(o && in->batch && !o->busy);
 	if (s->config.keep_partials)
@@ -156,17 +153,17 @@ static void merge(struct server *s, const struct action *a, const struct incomin
 	}
 	o->overflowed = o->overflowed || rc == -ERANGE;
 	if (rc)
-		server_job_broken(s, a->job, e.text);
+		jobs_break(s, a->job, e.text);
 	trust_merged(o, a);
-	live_job_note_times(o, farm_elapsed(s->farm, a->job, server_now(s)), rounds);
+	live_job_note_times(o, farm_elapsed(s->farm, a->job, jobs_now(s)), rounds);
 	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", log_u64(a->job),
 		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch),
 		  in->stored ? " late=1" : "");
 }
 
-static void take_back(struct server *s, const struct action *a, const struct incoming *in)
+static void take_back(struct jobs *s, const struct action *a, const struct incoming *in)
 {
-	struct live_job *o = server_live_job(s, a->job);
+	struct live_job *o = jobs_find(s, a->job);
 	assert(o && !o->busy && in->back);
 	back_take(o, in->back);
 	trust_taken_back(o, a->who);
@@ -174,63 +171,56 @@ static void take_back(struct server *s, const struct action *a, const struct inc
 		     a->key.group, a->key.part, log_u64(a->key.epoch), log_quote(a->text).text);
 }
 
-static void acknowledge(struct server *s, const struct action *a)
+static void acknowledge(struct jobs *s, const struct action *a)
 {
-	struct session *p = session_find(s, a->peer);
-	const struct live_job *o = server_live_job(s, a->job);
+	const struct live_job *o = jobs_find(s, a->job);
+	const char *name = s->peers.name(s->peers.user, a->peer);
 	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && o)) /* what it repeats may not be on the disk yet */
 		durable_ack(s, o, a->peer, &a->key, a->ack);
-	else if (p)
-		session_send_ack(p, &a->key, a->ack, a->text);
+	else
+		s->peers.acknowledge(s->peers.user, a->peer, &a->key, a->ack, a->text);
 	if (a->ack != ACK_MERGED)
 		log_event(a->ack == ACK_REPEAT	? LOG_BATCH_REPEATED
 			  : a->ack == ACK_NOTED ? LOG_BATCH_NOTED
 						: LOG_BATCH_REFUSED,
 			  "job=j%llu peer=%llu worker=%s kind=%d group=%u part=%u epoch=%llu text=%s", log_u64(a->job),
-			  log_u64(a->peer), log_quote(p ? p->name : "?").text, (int)a->key.kind, a->key.group,
+			  log_u64(a->peer), log_quote(name ? name : "?").text, (int)a->key.kind, a->key.group,
 			  a->key.part, log_u64(a->key.epoch), log_quote(a->text).text);
 }
 
 /* ---- leases and peers ---- */
 
-static void send_lease(struct server *s, const struct action *a)
+static void send_lease(struct jobs *s, const struct action *a)
 {
-	struct session *p = session_find(s, a->peer);
-	struct live_job *o = server_live_job(s, a->job);
-	if (!p || !o || late_withholds(o, &a->key, a->peer))
+	struct live_job *o = jobs_find(s, a->job);
+	if (!s->peers.name(s->peers.user, a->peer) || !o || late_withholds(o, &a->key, a->peer))
 		return;
 	live_job_count_worker(o, a->peer);
-	session_send_lease(p, o, &a->key, a->anew);
+	s->peers.send_lease(s->peers.user, a->peer, o, &a->key, a->anew);
 	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", log_u64(a->job),
 		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch));
 }
 
-static void revoke_lease(struct server *s, const struct action *a)
+static void revoke_lease(struct jobs *s, const struct action *a)
 {
-	struct session *p = session_find(s, a->peer);
-	if (p)
-		session_send_revoke(p, &a->key);
+	s->peers.revoke(s->peers.user, a->peer, &a->key);
 	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", log_u64(a->job),
 		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch));
 }
 
-static void close_peer(struct server *s, const struct action *a)
+static void close_peer(struct jobs *s, const struct action *a)
 {
-	struct session *p = session_find(s, a->peer);
 	orders_drop_waiting(s->orders, a->peer); /* it may come back, with the same */
-	if (!p)
-		return;
-	p->joined = false;
-	session_fault(p, "%s", a->text);
+	s->peers.dismiss(s->peers.user, a->peer, a->text);
 }
 
-void dispatch_update(struct server *s, const struct update *u, const struct incoming *in)
+void dispatch_update(struct jobs *s, const struct update *u, const struct incoming *in)
 {
 	for (size_t i = 0; i < u->count; i++) {
 		const struct action *a = &u->actions[i];
 		switch (a->kind) {
 		case ACTION_SUBMITTED:
-			submitted(s, a, in);
+			submitted(s, a, in->submission);
 			break;
 		case ACTION_CANCELLED:
 			break;
@@ -250,15 +240,15 @@ void dispatch_update(struct server *s, const struct update *u, const struct inco
 			acknowledge(s, a);
 			break;
 		case ACTION_BOOTSTRAP_DONE:
-			dispatch_prepare(s, server_live_job(s, a->job));
+			dispatch_prepare(s, jobs_find(s, a->job));
 			break;
 		case ACTION_ROUND_DONE:
 			break;
 		case ACTION_EVALUATE_ERROR:
-			publish_start(s, server_live_job(s, a->job), PUBLISH_ERROR_ONLY, a->rounds);
+			publish_start(s, jobs_find(s, a->job), PUBLISH_ERROR_ONLY, a->rounds);
 			break;
 		case ACTION_PUBLISH:
-			publish_start(s, server_live_job(s, a->job), PUBLISH_RESULT, a->rounds);
+			publish_start(s, jobs_find(s, a->job), PUBLISH_RESULT, a->rounds);
 			break;
 		case ACTION_JOB_CHANGED:
 			job_changed(s, a);
@@ -286,33 +276,22 @@ void dispatch_update(struct server *s, const struct update *u, const struct inco
 
 /* ---- the end of an order ---- */
 
-void dispatch_remember(struct server *s, const struct job_record *r)
-{
-	if (s->ended_count == ENDED_MAX) {
-		keep_drop(s, s->ended[0].id); /* nobody would count its films any more */
-		memmove(s->ended, s->ended + 1, --s->ended_count * sizeof *s->ended);
-	}
-	s->ended[s->ended_count++] = *r;
-}
-
-static void finish(struct server *s, struct live_job *o)
+static void finish(struct jobs *s, struct live_job *o)
 {
 	struct job_view v;
 	struct timespec now;
 	clock_gettime(CLOCK_REALTIME, &now);
-	server_view(s, o->id, &v);
+	jobs_view(s, o->id, &v);
 	v.record.ended_seen = ages_now(s);
 	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
 	o->record = v.record;
 	if (durable_end(s, o)) { /* again, later */
 		o->unrecorded = true;
-		o->try_again = server_now(s) + s->config.retry_seconds;
+		o->try_again = jobs_now(s) + s->config.retry_seconds;
 		return;
 	}
-	dispatch_remember(s, &v.record);
-	for (struct session *p = s->sessions; p; p = p->next)
-		if (p->state == SESSION_WORKER)
-			session_send_job_end(p, o->id);
+	jobs_remember(s, &v.record);
+	s->peers.job_ended(s->peers.user, o->id);
 	keep_trim(s);
 	clear_soon(s);
 	live_job_release_blobs(live_job_submit(o), s->blobs);
@@ -326,13 +305,13 @@ static void finish(struct server *s, struct live_job *o)
 	live_job_free(o);
 	while (late) { /* the core says that the job is over */
 		struct waiting_batch *next = late->next;
-		server_result(s, late->peer, &late->envelope, &late->payload);
+		results_take(s, late->peer, &late->envelope, &late->payload);
 		waiting_batch_free(late);
 		late = next;
 	}
 }
 
-void dispatch_finish_orders(struct server *s)
+void dispatch_finish_orders(struct jobs *s)
 {
 	bool finished = false;
 	for (struct live_job *o = s->orders, *next; o; o = next) {
@@ -343,8 +322,7 @@ void dispatch_finish_orders(struct server *s)
 			next = s->orders; /* late batches may have ended others */
 		}
 	}
-	for (struct session *p = finished ? s->sessions : NULL; p; p = p->next)
-		if (p->watched && p->shown && !server_live_job(s, p->watched))
-			session_tick(p);
+	if (finished)
+		s->peers.jobs_let_go(s->peers.user);
 	extend_waiting(s);
 }

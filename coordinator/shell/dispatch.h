@@ -3,17 +3,16 @@
 #ifndef COORDINATOR_SHELL_DISPATCH_H
 #define COORDINATOR_SHELL_DISPATCH_H
 
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/jobs.h"
 
 struct incoming;
 
 /* in: what the event brought that the update answers. */
-void dispatch_update(struct server *s, const struct update *u, const struct incoming *in);
-void dispatch_remember(struct server *s, const struct job_record *r); /* it has ended */
+void dispatch_update(struct jobs *s, const struct update *u, const struct incoming *in);
 /* Orders that the core has ended and whose canvas is free: written down, told to the workers, let go. */
-void dispatch_finish_orders(struct server *s);
+void dispatch_finish_orders(struct jobs *s);
 
 /* All of its bootstrap is merged: its films, or another try later, when the disk has no room for them. */
-void dispatch_prepare(struct server *s, struct live_job *o);
+void dispatch_prepare(struct jobs *s, struct live_job *o);
 
 #endif

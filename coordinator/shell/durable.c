@@ -22,7 +22,6 @@
 #include "coordinator/shell/incoming.h"
 #include "coordinator/shell/keep.h"
 #include "coordinator/shell/publish.h"
-#include "coordinator/shell/session.h"
 #include "coordinator/store/row_file.h"
 
 #include <assert.h>
@@ -51,7 +50,7 @@ struct durable_ack {
 /* One flush for all that has come so far. */
 struct flush {
 	uv_work_t work;
-	struct server *server;
+	struct jobs *jobs;
 	struct durable_ack *acks;
 };
 
@@ -84,7 +83,7 @@ int durable_pack(const struct live_job *o, struct ledger_job *j, unsigned char *
 	return rc;
 }
 
-int durable_begin(struct server *s, struct live_job *o, struct error *e)
+int durable_begin(struct jobs *s, struct live_job *o, struct error *e)
 {
 	char folder[SPOOL_PATH_MAX];
 	unsigned char *submission, *plan;
@@ -119,7 +118,7 @@ int durable_begin(struct server *s, struct live_job *o, struct error *e)
 }
 
 /* Its journal goes only when the record says for good that it has ended. kept: the films stay (keep.h). */
-static int write_end(struct server *s, const struct job_record *r, bool kept, struct error *e)
+static int write_end(struct jobs *s, const struct job_record *r, bool kept, struct error *e)
 {
 	int rc = spool_write_record(s->spool, r, e);
 	if (rc && !r->has_result) /* what it has merged is for nobody, and may be what fills the disk */
@@ -133,17 +132,17 @@ static int write_end(struct server *s, const struct job_record *r, bool kept, st
 	return rc;
 }
 
-static void end_later(struct server *s, const struct job_record *r, bool written)
+static void end_later(struct jobs *s, const struct job_record *r, bool written)
 {
 	struct ending *n = mem_alloc(1, sizeof *n);
 	if (!n)
 		return;
 	*n = (struct ending){s->endings, *r, written};
 	s->endings = n;
-	s->endings_again = server_now(s) + s->config.retry_seconds;
+	s->endings_again = jobs_now(s) + s->config.retry_seconds;
 }
 
-void durable_end_row(struct server *s, const struct job_record *r)
+void durable_end_row(struct jobs *s, const struct job_record *r)
 {
 	struct error e;
 	if (ledger_end(s->ledger, r->id, r->extended, r->state, &e) == 0)
@@ -153,7 +152,7 @@ void durable_end_row(struct server *s, const struct job_record *r)
 	end_later(s, r, true);
 }
 
-int durable_end(struct server *s, struct live_job *o)
+int durable_end(struct jobs *s, struct live_job *o)
 {
 	struct error e;
 	if (journal_write(o->journal, &e)) /* for whoever extends it; what is not stored is computed again */
@@ -176,12 +175,12 @@ int durable_end(struct server *s, struct live_job *o)
 	return 0;
 }
 
-static void end_again(struct server *s)
+static void end_again(struct jobs *s)
 {
 	struct error e;
-	if (!s->endings || server_now(s) < s->endings_again)
+	if (!s->endings || jobs_now(s) < s->endings_again)
 		return;
-	s->endings_again = server_now(s) + s->config.retry_seconds;
+	s->endings_again = jobs_now(s) + s->config.retry_seconds;
 	for (struct ending *n; (n = s->endings);) {
 		const struct job_record *r = &n->record;
 		n->written = n->written || write_end(s, r, false, &e) == 0;
@@ -194,25 +193,25 @@ static void end_again(struct server *s)
 
 /* ---- batches ---- */
 
-static void hold(struct server *s, struct live_job *o, const char *text)
+static void hold(struct jobs *s, struct live_job *o, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = o->id, .text = text};
 	if (!*text != !o->held) {
 		live_job_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
 		o->held = *text != 0;
 	}
-	o->try_again = server_now(s) + s->config.retry_seconds;
-	server_step(s, &ev);
+	o->try_again = jobs_now(s) + s->config.retry_seconds;
+	jobs_step(s, &ev);
 }
 
-void durable_hold(struct server *s, struct live_job *o, const char *what, const char *why)
+void durable_hold(struct jobs *s, struct live_job *o, const char *what, const char *why)
 {
 	char text[256];
 	text_print(text, sizeof text, "%s: %s", what, why);
 	hold(s, o, text);
 }
 
-int durable_reserve(struct server *s, struct live_job *o, struct incoming *in, struct error *e)
+int durable_reserve(struct jobs *s, struct live_job *o, struct incoming *in, struct error *e)
 {
 	union {
 		const Farm__LeaseResult *from;
@@ -242,21 +241,21 @@ int durable_reserve(struct server *s, struct live_job *o, struct incoming *in, s
 }
 
 /* Whose it is, once, before its first batch. */
-static int write_pinned(struct server *s, struct live_job *o, double elapsed, struct error *e)
+static int write_pinned(struct jobs *s, struct live_job *o, double elapsed, struct error *e)
 {
 	struct job_status status;
-	if (o->pinned || !farm_job(s->farm, o->id, server_now(s), &status) || !*status.fingerprint)
+	if (o->pinned || !farm_job(s->farm, o->id, jobs_now(s), &status) || !*status.fingerprint)
 		return 0;
 	o->pinned = true;
 	return journal_append(o->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint, strlen(status.fingerprint),
 			      NULL, e);
 }
 
-int durable_merged(struct server *s, struct live_job *o, const struct incoming *in, uint64_t *at, struct error *e)
+int durable_merged(struct jobs *s, struct live_job *o, const struct incoming *in, uint64_t *at, struct error *e)
 {
 	const struct lease_key *k = &in->batch->key;
 	bool again = k->kind == LEASE_RENDER && o->again[(size_t)k->group * o->plan.parts + k->part];
-	double elapsed = farm_elapsed(s->farm, o->id, server_now(s));
+	double elapsed = farm_elapsed(s->farm, o->id, jobs_now(s));
 	assert(in->frame);
 	int rc = write_pinned(s, o, elapsed, e);
 	*at = journal_bytes(o->journal);
@@ -267,7 +266,7 @@ int durable_merged(struct server *s, struct live_job *o, const struct incoming *
 
 /* ---- group commit ---- */
 
-static void flush_next(struct server *s);
+static void flush_next(struct jobs *s);
 
 static void run(uv_work_t *work)
 {
@@ -286,7 +285,7 @@ static void drop_ack(struct durable_ack *a)
 	mem_free(a);
 }
 
-static void queue(struct server *s, struct durable_ack *a)
+static void queue(struct jobs *s, struct durable_ack *a)
 {
 	a->next = NULL;
 	*s->acks_last = a;
@@ -294,9 +293,9 @@ static void queue(struct server *s, struct durable_ack *a)
 }
 
 /* It waits until the journal is a good one again. */
-static void park(struct server *s, struct durable_ack *a)
+static void park(struct jobs *s, struct durable_ack *a)
 {
-	struct live_job *o = s->stopping ? NULL : server_live_job(s, a->key.job);
+	struct live_job *o = s->stopping ? NULL : jobs_find(s, a->key.job);
 	if (!o) {
 		drop_ack(a);
 		return;
@@ -311,9 +310,8 @@ static void park(struct server *s, struct durable_ack *a)
 		durable_hold(s, o, "its results cannot be stored", "its journal failed to be written");
 }
 
-static void answer(struct server *s, struct durable_ack *a)
+static void answer(struct jobs *s, struct durable_ack *a)
 {
-	struct session *p = s->stopping ? NULL : session_find(s, a->peer);
 	if (a->failed) {
 		park(s, a);
 		return;
@@ -322,15 +320,15 @@ static void answer(struct server *s, struct durable_ack *a)
 		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu",
 			  (unsigned long long)a->key.job, (unsigned long long)a->peer, (int)a->key.kind, a->key.group,
 			  a->key.part, (unsigned long long)a->key.epoch);
-	if (p)
-		session_send_ack(p, &a->key, a->ack, "");
+	if (!s->stopping && a->peer != NOBODY)
+		s->peers.acknowledge(s->peers.user, a->peer, &a->key, a->ack, "");
 	drop_ack(a);
 }
 
 static void done(uv_work_t *work, int status)
 {
 	struct flush *w = work->data;
-	struct server *s = w->server;
+	struct jobs *s = w->jobs;
 	assert(status == 0);
 	(void)status;
 	s->flushing = false;
@@ -343,25 +341,25 @@ static void done(uv_work_t *work, int status)
 	flush_next(s);
 }
 
-static void flush_next(struct server *s)
+static void flush_next(struct jobs *s)
 {
 	if (s->flushing || !s->acks)
 		return;
 	struct flush *w = mem_alloc(1, sizeof *w);
 	if (!w) /* as for an event: without 200 bytes nothing goes on */
 		abort();
-	w->server = s;
+	w->jobs = s;
 	w->acks = s->acks;
 	w->work.data = w;
 	s->acks = NULL;
 	s->acks_last = &s->acks;
 	s->flushing = true;
-	int rc = uv_queue_work(&s->loop, &w->work, run, done);
+	int rc = uv_queue_work(s->loop, &w->work, run, done);
 	assert(rc == 0);
 	(void)rc;
 }
 
-void durable_ack(struct server *s, const struct live_job *o, uint64_t peer, const struct lease_key *k, enum ack ack)
+void durable_ack(struct jobs *s, const struct live_job *o, uint64_t peer, const struct lease_key *k, enum ack ack)
 {
 	struct durable_ack *a = mem_alloc(1, sizeof *a);
 	if (!a) /* not answered: the worker offers it again, and it is a repeat */
@@ -375,7 +373,7 @@ void durable_ack(struct server *s, const struct live_job *o, uint64_t peer, cons
 /* ---- the rest ---- */
 
 /* What nobody waits for: it need not be safe at once, but soon. */
-static int append_note(struct server *s, const struct live_job *o, enum journal_kind kind, double elapsed,
+static int append_note(struct jobs *s, const struct live_job *o, enum journal_kind kind, double elapsed,
 		       const void *bytes, size_t size, struct error *e)
 {
 	int rc = journal_append(o->journal, kind, NULL, elapsed, bytes, size, NULL, e);
@@ -384,25 +382,25 @@ static int append_note(struct server *s, const struct live_job *o, enum journal_
 	return rc;
 }
 
-void durable_look(struct server *s, uint64_t job)
+void durable_look(struct jobs *s, uint64_t job)
 {
-	struct live_job *o = server_live_job(s, job);
+	struct live_job *o = jobs_find(s, job);
 	struct job_status status;
 	struct error e;
-	if (!o || !farm_job(s->farm, job, server_now(s), &status) || status.looks->count == 0)
+	if (!o || !farm_job(s->farm, job, jobs_now(s), &status) || status.looks->count == 0)
 		return;
 	const struct forecast_look *l = &status.looks->looks[status.looks->count - 1];
 	if (l->work <= o->look_written)
 		return;
 	o->look_written = l->work;
 	/* Only forecasts are made of it: the look itself is taken again. */
-	if (append_note(s, o, JOURNAL_LOOK, farm_elapsed(s->farm, job, server_now(s)), l, sizeof *l, &e))
+	if (append_note(s, o, JOURNAL_LOOK, farm_elapsed(s->farm, job, jobs_now(s)), l, sizeof *l, &e))
 		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
 }
 
 /* Not before each answer: it is for the record alone. Nor while a checkpoint is written, which has the last ones and
  * takes the journal's place. */
-static void write_counts(struct server *s, struct live_job *o)
+static void write_counts(struct jobs *s, struct live_job *o)
 {
 	struct job_counts now;
 	struct error e;
@@ -413,12 +411,12 @@ static void write_counts(struct server *s, struct live_job *o)
 }
 
 /* The answers that waited for the journals of jobs that are no longer bad. */
-static void unpark(struct server *s)
+static void unpark(struct jobs *s)
 {
 	struct durable_ack *list = s->parked;
 	s->parked = NULL;
 	for (struct durable_ack *a, *next = list; (a = next);) {
-		struct live_job *o = server_live_job(s, a->key.job);
+		struct live_job *o = jobs_find(s, a->key.job);
 		next = a->next;
 		if (!o) {
 			drop_ack(a);
@@ -443,7 +441,7 @@ static int mend(struct live_job *o, struct error *e)
 	return rc ? rc : journal_reserve(o->journal, 2 * o->held_bytes, e);
 }
 
-void durable_tick(struct server *s)
+void durable_tick(struct jobs *s)
 {
 	for (struct live_job *o = s->orders; o; o = o->next)
 		write_counts(s, o);
@@ -452,7 +450,7 @@ void durable_tick(struct server *s)
 	end_again(s);
 	for (struct live_job *o = s->orders; o; o = o->next) {
 		struct error e;
-		if (server_now(s) < o->try_again || o->busy)
+		if (jobs_now(s) < o->try_again || o->busy)
 			continue;
 		if (o->unpublished) {
 			o->unpublished = false;
@@ -466,12 +464,12 @@ void durable_tick(struct server *s)
 		if (o->unprepared && !o->ended) {
 			struct event ev = {.kind = EVENT_TICK};
 			dispatch_prepare(s, o);
-			server_step(s, &ev);
+			jobs_step(s, &ev);
 			return;
 		}
 		if (!o->held || o->ended)
 			continue;
-		o->try_again = server_now(s) + s->config.retry_seconds;
+		o->try_again = jobs_now(s) + s->config.retry_seconds;
 		if (mend(o, &e) == 0) {
 			hold(s, o, "");
 			return; /* the list may have changed; the others next time */
@@ -479,7 +477,7 @@ void durable_tick(struct server *s)
 	}
 }
 
-void durable_close(struct server *s)
+void durable_close(struct jobs *s)
 {
 	assert(!s->flushing && !s->acks);
 	for (struct durable_ack *a; (a = s->parked);) {

@@ -1,15 +1,22 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Extensions of jobs: what is asked for, until it is answered.
+ *
+ * extend_job puts a request at the end of a list; extend_waiting takes those out whose jobs nobody is at work on. A job
+ * that runs gets its new plan in the ledger and then in the core. One that is done is read from what was kept of it
+ * (keep.h) by a thread of the pool, one at a time, and goes on as after a restart.
+ *
+ * Each request is answered once, unless its peer has gone: then a job that was read for it is dropped again. What
+ * cannot be done is answered with a sentence, and the job stays as it was.
+ */
 #include "coordinator/shell/extend.h"
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/durable.h"
-#include "coordinator/shell/keep.h"
 #include "coordinator/shell/reconcile.h"
 #include "coordinator/shell/replay.h"
 #include "coordinator/shell/restore.h"
-#include "coordinator/shell/session.h"
 #include "coordinator/store/row_file.h"
 
 #include <assert.h>
@@ -31,13 +38,17 @@ static struct extension_from where(const struct live_job *o, double seconds, boo
 		.rounds = live_job_rounds(o), .seconds = seconds, .error = error_of(&o->record.looks), .ended = ended};
 }
 
-static int plan_of(const struct session *p, const struct live_job *o, const struct extension *x,
-		   const struct extension_from *from, struct plan_request *asked, struct plan *plan, struct error *e)
+static int plan_of(const struct jobs *s, const struct requester *by, const struct live_job *o,
+		   const struct extension *x, const struct extension_from *from, struct plan_request *asked,
+		   struct plan *plan, struct error *e)
 {
 	int rc = plan_request_from_wire(live_job_submit(o)->plan, asked, e);
 	if (!rc)
 		rc = extend_plan(&o->plan, x, from, asked, plan, e);
-	return rc ? rc : session_within_quota(p, o->id, plan, live_job_submit(o), e);
+	if (rc || by->unbounded)
+		return rc;
+	return jobs_within_quota(s, by->owner, o->id, s->peers.uploading(s->peers.user, by->peer), plan,
+				 live_job_submit(o), e);
 }
 
 static void set_bounds(struct live_job *o, const struct plan_request *asked, const struct plan *plan)
@@ -53,7 +64,7 @@ static void set_bounds(struct live_job *o, const struct plan_request *asked, con
 		canvas_set_rounds(o->canvas, plan->rounds);
 }
 
-static int store(struct server *s, const struct live_job *o, struct error *e)
+static int store(struct jobs *s, const struct live_job *o, struct error *e)
 {
 	struct ledger_job j = {.id = o->id, .extended = o->record.extended};
 	unsigned char *submission, *plan;
@@ -85,26 +96,25 @@ static void describe(const struct live_job *o, char *text, size_t size)
 		text_put(&t, "%s its error is %.3g %%", comma, 100 * o->plan.target_error);
 }
 
-static void note(const struct session *p, struct live_job *o, char *text, size_t size)
+static void note(const struct requester *by, struct live_job *o, char *text, size_t size)
 {
 	describe(o, text, size);
-	live_job_log(o, LOG_JOB_STATE, "state=extended by=%s text=%s", *p->who.name ? p->who.name : "-",
+	live_job_log(o, LOG_JOB_STATE, "state=extended by=%s text=%s", *by->owner ? by->owner : "-",
 		     log_quote(text).text);
 }
 
 /* ---- a job that runs ---- */
 
-static int extend_live(struct session *p, struct live_job *o, const struct extension *x, char *text, size_t size,
-		       struct error *e)
+static int extend_live(struct jobs *s, const struct requester *by, struct live_job *o, const struct extension *x,
+		       char *text, size_t size, struct error *e)
 {
-	struct server *s = p->server;
 	struct plan_request asked, old_asked;
 	struct plan plan, old = o->plan;
-	double seconds = farm_elapsed(s->farm, o->id, server_now(s));
+	double seconds = farm_elapsed(s->farm, o->id, jobs_now(s));
 	struct extension_from from = where(o, isnan(seconds) ? 0 : seconds, false);
 	int rc = plan_request_from_wire(live_job_submit(o)->plan, &old_asked, e);
 	if (!rc)
-		rc = plan_of(p, o, x, &from, &asked, &plan, e);
+		rc = plan_of(s, by, o, x, &from, &asked, &plan, e);
 	if (rc)
 		return rc;
 	set_bounds(o, &asked, &plan);
@@ -113,15 +123,15 @@ static int extend_live(struct session *p, struct live_job *o, const struct exten
 		set_bounds(o, &old_asked, &old);
 		return rc;
 	}
-	note(p, o, text, size);
-	struct event ev = {.kind = EVENT_EXTEND, .tag = p->id, .job = o->id, .plan = &o->plan};
-	server_step(s, &ev);
+	note(by, o, text, size);
+	struct event ev = {.kind = EVENT_EXTEND, .tag = by->peer, .job = o->id, .plan = &o->plan};
+	jobs_step(s, &ev);
 	return 0;
 }
 
 /* ---- a job that is done ---- */
 
-static void forget_end(struct server *s, uint64_t job)
+static void forget_end(struct jobs *s, uint64_t job)
 {
 	for (size_t i = 0; i < s->ended_count; i++)
 		if (s->ended[i].id == job) {
@@ -131,7 +141,7 @@ static void forget_end(struct server *s, uint64_t job)
 }
 
 /* What is kept of it beside its row. */
-static int read_job(const struct server *s, uint64_t job, struct row_file *f, struct error *e)
+static int read_job(const struct jobs *s, uint64_t job, struct row_file *f, struct error *e)
 {
 	struct ledger_job j;
 	int rc = ledger_get(s->ledger, job, &j, e);
@@ -155,9 +165,9 @@ static void take_counts(struct job_counts *c, const struct job_record *r)
 }
 
 /* r: as it was remembered. */
-static int begin_again(struct session *p, struct live_job *o, const struct job_record *r, struct error *e)
+static int begin_again(struct jobs *s, const struct requester *by, struct live_job *o, const struct job_record *r,
+		       struct error *e)
 {
-	struct server *s = p->server;
 	o->record.extended++;
 	int rc = store(s, o, e);
 	if (rc)
@@ -167,40 +177,52 @@ static int begin_again(struct session *p, struct live_job *o, const struct job_r
 	o->next = s->orders;
 	s->orders = o;
 	forget_end(s, o->id);
-	rc = restore_tell(s, o, "", p->id, e);
-	if (!rc && !*p->rejected)
+	s->refusal[0] = 0;
+	rc = restore_tell(s, o, "", by->peer, e);
+	if (!rc && !*s->refusal)
 		return 0;
 	if (!rc)
-		rc = error_set(e, EAGAIN, "%s", p->rejected);
+		rc = error_set(e, EAGAIN, "%s", s->refusal);
 	s->orders = o->next;
-	dispatch_remember(s, r);
+	jobs_remember(s, r);
 	struct job_record over = *r;
 	over.extended = o->record.extended;
 	durable_end_row(s, &over);
 	return rc;
 }
 
-static int extend_read(struct session *p, struct live_job *o, const struct extension *x, const struct job_record *r,
-		       char *text, size_t size, struct error *e)
+static int extend_read(struct jobs *s, const struct requester *by, struct live_job *o, const struct extension *x,
+		       const struct job_record *r, char *text, size_t size, struct error *e)
 {
 	struct plan_request asked;
 	struct plan plan;
 	if (live_job_rounds(o) == 0)
 		return error_set(e, ENOENT, "its films have been cleared: %s", again);
 	struct extension_from from = where(o, isnan(o->times.completed) ? 0 : o->times.completed, true);
-	int rc = plan_of(p, o, x, &from, &asked, &plan, e);
+	int rc = plan_of(s, by, o, x, &from, &asked, &plan, e);
 	if (rc)
 		return rc;
 	set_bounds(o, &asked, &plan);
-	note(p, o, text, size);
-	return begin_again(p, o, r, e);
+	note(by, o, text, size);
+	return begin_again(s, by, o, r, e);
+}
+
+struct extension_request {
+	struct extension_request *next;
+	struct requester by;
+	struct extension what;
+};
+
+static void answer(struct jobs *s, uint64_t peer, int rc, const struct error *e, const char *text)
+{
+	s->peers.extended(s->peers.user, peer, rc ? e->text : NULL, text);
 }
 
 /* Films of hundreds of megabytes, which the pool reads, those of one job at a time. */
 struct reading {
 	uv_work_t work;
-	struct server *server;
-	uint64_t peer; /* who asked for it, and may have gone meanwhile */
+	struct jobs *jobs;
+	struct requester by; /* who may have gone meanwhile */
 	struct extension what;
 	struct job_record record; /* of its end */
 	struct live_job *order;
@@ -211,57 +233,47 @@ struct reading {
 static void run(uv_work_t *work)
 {
 	struct reading *w = work->data;
-	w->rc = replay_films(w->server->spool, w->order, NULL, &w->error);
+	w->rc = replay_films(w->jobs->spool, w->order, NULL, &w->error);
 	if (!w->rc) /* results from before its end may still wait for a flush of the old file */
 		w->rc = journal_renew(w->order->journal, &w->error);
-}
-
-static void answer(struct session *p, int rc, const struct error *e, const char *text)
-{
-	text_copy(p->rejected, sizeof p->rejected, rc ? e->text : "");
-	session_send_done(p, text);
 }
 
 static void done(uv_work_t *work, int status)
 {
 	struct reading *w = work->data;
-	struct server *s = w->server;
-	struct session *p = s->stopping ? NULL : session_find(s, w->peer);
+	struct jobs *s = w->jobs;
+	bool here = !s->stopping && s->peers.name(s->peers.user, w->by.peer);
 	char text[256] = "";
 	assert(status == 0);
 	(void)status;
 	s->reading = NULL;
+	s->reading_for = 0;
 	if (w->rc)
 		live_job_log(w->order, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
-	int rc = w->rc ? error_prefix(&w->error, w->rc, "it cannot go on, %s", again) : p ? 0 : -ECANCELED;
-	if (p) {
-		p->wants.job = 0;
-		p->rejected[0] = 0;
-	}
+	int rc = w->rc ? error_prefix(&w->error, w->rc, "it cannot go on, %s", again) : here ? 0 : -ECANCELED;
 	if (!rc)
-		rc = extend_read(p, w->order, &w->what, &w->record, text, sizeof text, &w->error);
+		rc = extend_read(s, &w->by, w->order, &w->what, &w->record, text, sizeof text, &w->error);
 	if (rc)
 		restore_drop(s, w->order);
-	if (p)
-		answer(p, rc, &w->error, text);
+	if (here)
+		answer(s, w->by.peer, rc, &w->error, text);
 	mem_free(w);
 	if (!s->stopping)
 		extend_waiting(s);
 }
 
 /* All that can be said without its films: of less than was done, so that nothing is refused which they would allow. */
-static int ask_beforehand(const struct session *p, const struct live_job *o, const struct extension *x,
-			  const struct job_record *r, struct error *e)
+static int ask_beforehand(const struct jobs *s, const struct requester *by, const struct live_job *o,
+			  const struct extension *x, const struct job_record *r, struct error *e)
 {
 	struct plan_request asked;
 	struct plan plan;
-	return plan_of(p, o, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked, &plan,
-		       e);
+	return plan_of(s, by, o, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked,
+		       &plan, e);
 }
 
-static int start_reading(struct session *p, const struct extension *x, const struct job_record *r, struct error *e)
+static int start_reading(struct jobs *s, const struct extension_request *q, const struct job_record *r, struct error *e)
 {
-	struct server *s = p->server;
 	struct row_file f;
 	int rc = read_job(s, r->id, &f, e);
 	if (rc)
@@ -273,101 +285,111 @@ static int start_reading(struct session *p, const struct extension *x, const str
 		mem_free(w);
 		return error_prefix(e, rc, "it cannot go on, %s", again);
 	}
-	rc = ask_beforehand(p, w->order, x, r, e);
+	rc = ask_beforehand(s, &q->by, w->order, &q->what, r, e);
 	if (rc) {
 		restore_drop(s, w->order);
 		mem_free(w);
 		return rc;
 	}
 	w->work.data = w;
-	w->server = s;
-	w->peer = p->id;
-	w->what = *x;
+	w->jobs = s;
+	w->by = q->by;
+	w->what = q->what;
 	w->record = *r;
 	s->reading = w->order;
-	rc = uv_queue_work(&s->loop, &w->work, run, done);
+	s->reading_for = q->by.peer;
+	rc = uv_queue_work(s->loop, &w->work, run, done);
 	assert(rc == 0);
 	return rc;
 }
 
-static int extend_ended(struct session *p, const struct extension *x, const struct job_record *r, struct error *e)
+static int extend_ended(struct jobs *s, const struct extension_request *q, const struct job_record *r, struct error *e)
 {
 	if (strcmp(r->state, job_state_name(JOB_DONE)) != 0)
 		return error_set(e, EINVAL, "it has %s, and nothing of it was kept: %s",
 				 strcmp(r->state, "failed") == 0 ? "failed" : "been cancelled", again);
 	if (strcmp(r->reason, job_end_name(END_BLACK)) == 0)
 		return error_set(e, EINVAL, "it is black: chains have nowhere to begin");
-	return start_reading(p, x, r, e);
+	return start_reading(s, q, r, e);
 }
 
 /* ---- both ---- */
 
 /* Its films are in use, or those of another job are being read. */
-static bool must_wait(const struct server *s, uint64_t job)
+static bool must_wait(const struct jobs *s, uint64_t job)
 {
-	const struct live_job *o = server_live_job(s, job);
+	const struct live_job *o = jobs_find(s, job);
 	return o ? o->busy || o->ended : s->reading != NULL;
 }
 
-static void go_on(struct session *p)
+static void go_on(struct jobs *s, const struct extension_request *q)
 {
-	struct server *s = p->server;
-	const struct extension x = p->wants;
-	struct live_job *o = server_live_job(s, x.job);
+	struct live_job *o = jobs_find(s, q->what.job);
 	struct job_view v;
 	struct error e = {""};
 	char text[256] = "";
 	int rc;
-	p->wants.job = 0;
-	p->rejected[0] = 0;
 	if (o)
-		rc = extend_live(p, o, &x, text, sizeof text, &e);
-	else if (!server_view(s, x.job, &v))
+		rc = extend_live(s, &q->by, o, &q->what, text, sizeof text, &e);
+	else if (!jobs_view(s, q->what.job, &v))
 		rc = error_set(&e, ENOENT, "no such job");
 	else
-		rc = extend_ended(p, &x, &v.record, &e);
-	if (!rc && !o)
-		p->wants = x; /* until it is read */
-	else
-		answer(p, rc, &e, text);
+		rc = extend_ended(s, q, &v.record, &e);
+	if (rc || o) /* else when it is read */
+		answer(s, q->by.peer, rc, &e, text);
 }
 
-void extend_job(struct session *p, const struct extension *x)
+/* One that is not answered yet. */
+static bool has_asked(const struct jobs *s, uint64_t peer)
 {
-	struct session **at = &p->server->extending;
+	const struct extension_request *q = s->extending;
+	while (q && q->by.peer != peer)
+		q = q->next;
+	return q || s->reading_for == peer;
+}
+
+void extend_job(struct jobs *s, const struct requester *by, const struct extension *x)
+{
+	struct extension_request *q = NULL, **at = &s->extending;
 	struct error e;
-	int rc = p->wants.job ? error_set(&e, EBUSY, "one extension at a time: the one before is not answered yet")
-			      : extend_check(x, &e);
+	int rc = has_asked(s, by->peer)
+			 ? error_set(&e, EBUSY, "one extension at a time: the one before is not answered yet")
+			 : extend_check(x, &e);
+	if (!rc && !(q = mem_alloc(1, sizeof *q)))
+		rc = error_set(&e, ENOMEM, "no memory for an extension");
 	if (rc) {
-		answer(p, rc, &e, "");
+		answer(s, by->peer, rc, &e, "");
 		return;
 	}
+	*q = (struct extension_request){.by = *by, .what = *x};
 	while (*at)
-		at = &(*at)->behind;
-	*at = p;
-	p->wants = *x;
-	extend_waiting(p->server);
+		at = &(*at)->next;
+	*at = q;
+	extend_waiting(s);
 }
 
-void extend_waiting(struct server *s)
+void extend_waiting(struct jobs *s)
 {
-	for (struct session **at = &s->extending, *p; (p = *at);) {
-		if (must_wait(s, p->wants.job)) {
-			at = &p->behind;
+	for (struct extension_request **at = &s->extending, *q; (q = *at);) {
+		if (must_wait(s, q->what.job)) {
+			at = &q->next;
 			continue;
 		}
-		*at = p->behind;
-		p->behind = NULL;
-		go_on(p);
+		*at = q->next;
+		go_on(s, q);
+		mem_free(q);
 		at = &s->extending; /* others may have been served meanwhile */
 	}
 }
 
-void extend_forget(struct session *p)
+void extend_forget(struct jobs *s, uint64_t peer)
 {
-	struct session **at = &p->server->extending;
-	while (*at && *at != p)
-		at = &(*at)->behind;
-	if (*at)
-		*at = p->behind;
+	for (struct extension_request **at = &s->extending, *q; (q = *at);) {
+		if (q->by.peer != peer) {
+			at = &q->next;
+			continue;
+		}
+		*at = q->next;
+		mem_free(q);
+	}
 }

@@ -7,16 +7,23 @@
 #ifndef COORDINATOR_SHELL_EXTEND_H
 #define COORDINATOR_SHELL_EXTEND_H
 
+#include "common/net/tls.h"
 #include "common/plan/plan.h"
 
-struct server;
-struct session;
+struct jobs;
 
 struct extension { /* 0: not named, all but job */
 	uint64_t job;
 	uint64_t spp, mutations; /* more */
 	double seconds;		 /* more */
 	double target_error;
+};
+
+/* Who wants it. */
+struct requester {
+	uint64_t peer;
+	char owner[TLS_NAME_MAX + 1]; /* by its certificate; "": none */
+	bool unbounded;		      /* quotas do not hold for it */
 };
 
 /* Where a job is. */
@@ -36,11 +43,11 @@ int extend_check(const struct extension *x, struct error *e);
 int extend_plan(const struct plan *p, const struct extension *x, const struct extension_from *from,
 		struct plan_request *asked, struct plan *out, struct error *e);
 
-/* Does it, or puts it off until the job's films are free or read; the session gets its Done. One at a time of a
- * session: another one meanwhile is refused. */
-void extend_job(struct session *p, const struct extension *x);
+/* Does it, or puts it off until the job's films are free or read; the peer gets its answer (peer_calls.h). One at a
+ * time of a peer: another one meanwhile is refused. */
+void extend_job(struct jobs *s, const struct requester *by, const struct extension *x);
 /* Films are free or read, or a job has ended: those that were put off, in the order in which they came. */
-void extend_waiting(struct server *s);
-void extend_forget(struct session *p); /* it goes */
+void extend_waiting(struct jobs *s);
+void extend_forget(struct jobs *s, uint64_t peer); /* it has gone */
 
 #endif

@@ -3,8 +3,10 @@
  * What a client fetches, piece by piece, is one file from its first piece to its last: it is opened once, however often
  * another one gets its name meanwhile.
  */
+#include "coordinator/shell/fetch.h"
+
+#include "coordinator/shell/client.h"
 #include "coordinator/shell/publish.h"
-#include "coordinator/shell/session.h"
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
@@ -41,32 +43,32 @@ static int cleared(const struct job_record *r, struct error *e)
 			 (unsigned long long)r->id, day);
 }
 
-void session_fetch_end(struct session *p)
+void fetch_end(struct session *p)
 {
 	if (!p->fetch.job)
 		return;
 	disk_close(p->fetch.fd);
 	p->fetch = (struct fetch){0};
-	p->server->fetches--;
+	p->peers->fetches--;
 }
 
 /* Who has asked for nothing for longest gives way: clients that begin and stop must not keep out those who go on. */
-static void make_room(struct server *s)
+static void make_room(struct peers *s)
 {
 	struct session *silent = NULL;
-	if (s->fetches < s->config.max_fetches)
+	if (s->fetches < s->jobs->config.max_fetches)
 		return;
 	for (struct session *p = s->sessions; p; p = p->next)
 		if (p->fetch.job && (!silent || p->fetch.at < silent->fetch.at))
 			silent = p;
-	session_fetch_end(silent);
+	fetch_end(silent);
 }
 
 static int open_file(struct session *p, const Farm__Fetch *f, const char *file, struct error *e)
 {
 	char path[SPOOL_PATH_MAX];
 	struct stat st;
-	spool_job_path(p->server->spool, f->job, file, path);
+	spool_job_path(p->jobs->spool, f->job, file, path);
 	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
 	if (fd < 0 && errno == ENOENT)
 		return error_set(e, ENOENT, "job j%llu has no %s yet", (unsigned long long)f->job, file);
@@ -77,17 +79,17 @@ static int open_file(struct session *p, const Farm__Fetch *f, const char *file, 
 		return rc;
 	}
 	if (st.st_size > CHUNK) /* else this is its only piece */
-		make_room(p->server);
+		make_room(p->peers);
 	p->fetch = (struct fetch){.job = f->job, .what = f->what, .fd = fd, .size = (uint64_t)st.st_size};
-	p->server->fetches++;
+	p->peers->fetches++;
 	return 0;
 }
 
 static int begin(struct session *p, const Farm__Fetch *f, struct job_view *v, struct error *e)
 {
 	const char *file = file_of(f->what);
-	session_fetch_end(p);
-	if (!session_finds_job(p, f->job, v))
+	fetch_end(p);
+	if (!client_finds_job(p, f->job, v))
 		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)f->job);
 	if (!file)
 		return error_set(e, EINVAL, "there is nothing of that kind to fetch");
@@ -138,9 +140,9 @@ static void answer(struct session *p, const Farm__Fetch *f)
 		rc = read_piece(&p->fetch, f, bytes, &count, &e);
 	if (!rc)
 		chunk.size = p->fetch.size;
-	p->fetch.at = server_now(p->server);
+	p->fetch.at = jobs_now(p->jobs);
 	if (rc || f->offset + count == chunk.size)
-		session_fetch_end(p);
+		fetch_end(p);
 	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
 	m.fetch_chunk = &chunk;
 	session_send(p, &m, bytes, count);
@@ -148,20 +150,19 @@ static void answer(struct session *p, const Farm__Fetch *f)
 }
 
 /* Made when somebody asks: it holds up the job's results for as long as an image takes. */
-static bool is_preview_old(const struct server *s, const struct live_job *o)
+static bool is_preview_old(const struct jobs *s, const struct live_job *o)
 {
-	return o && o->canvas && !o->ended &&
-	       (o->preview_made <= 0 || server_now(s) - o->preview_made > preview_seconds);
+	return o && o->canvas && !o->ended && (o->preview_made <= 0 || jobs_now(s) - o->preview_made > preview_seconds);
 }
 
-void session_previews(struct server *s, uint64_t job)
+void fetch_previews(struct peers *s, uint64_t job)
 {
 	for (struct session *p = s->sessions; p; p = p->next) {
-		struct live_job *o = server_live_job(s, job);
+		struct live_job *o = jobs_find(s->jobs, job);
 		if (p->wants_preview != job || (o && o->busy))
 			continue;
-		if (is_preview_old(s, o)) {
-			publish_start(s, o, PUBLISH_PREVIEW, 0);
+		if (is_preview_old(s->jobs, o)) {
+			publish_start(s->jobs, o, PUBLISH_PREVIEW, 0);
 			continue;
 		}
 		Farm__Fetch f;
@@ -173,13 +174,22 @@ void session_previews(struct server *s, uint64_t job)
 	}
 }
 
-void session_fetch(struct session *p, const Farm__Fetch *f)
+void fetch_begin(struct session *p, const Farm__Fetch *f)
 {
 	struct job_view v;
-	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset || !session_finds_job(p, f->job, &v)) {
+	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset || !client_finds_job(p, f->job, &v)) {
 		answer(p, f);
 		return;
 	}
 	p->wants_preview = f->job;
-	session_previews(p->server, f->job);
+	fetch_previews(p->peers, f->job);
+}
+
+bool fetch_uses(const struct peers *s, uint64_t job)
+{
+	static const double fetching_seconds = 60;
+	for (const struct session *p = s->sessions; p; p = p->next)
+		if (p->watched == job || (p->fetch.job == job && jobs_now(s->jobs) - p->fetch.at < fetching_seconds))
+			return true;
+	return false;
 }

@@ -5,16 +5,16 @@
 
 #include <string.h>
 
-static void hold(struct server *s, struct live_job *o, const char *text)
+static void hold(struct jobs *s, struct live_job *o, const char *text)
 {
 	struct event ev = {.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_FILES, .text = text};
 	o->lacks_file = *text != 0;
 	live_job_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
-	server_step(s, &ev);
+	jobs_step(s, &ev);
 }
 
 /* The first one that is not there; NULL: all are. */
-static const Farm__File *lacking(const struct server *s, const struct live_job *o)
+static const Farm__File *lacking(const struct jobs *s, const struct live_job *o)
 {
 	const Farm__Submit *m = live_job_submit(o);
 	for (size_t i = 0; i < m->n_files; i++) {
@@ -25,7 +25,7 @@ static const Farm__File *lacking(const struct server *s, const struct live_job *
 	return NULL;
 }
 
-bool files_look(struct server *s, struct live_job *o)
+bool files_look(struct jobs *s, struct live_job *o)
 {
 	char text[256];
 	const Farm__File *f = o->ended ? NULL : lacking(s, o);
@@ -41,7 +41,7 @@ bool files_look(struct server *s, struct live_job *o)
 	return f == NULL;
 }
 
-int files_check(struct server *s, const struct blob_hash *h, double seconds, struct error *e)
+int files_check(struct jobs *s, const struct blob_hash *h, double seconds, struct error *e)
 {
 	int rc = blob_check(s->blobs, h, seconds, e);
 	if (rc != -EBADMSG && rc != -ENOENT)
@@ -55,7 +55,7 @@ int files_check(struct server *s, const struct blob_hash *h, double seconds, str
 	return rc;
 }
 
-bool files_are_right(struct server *s, struct live_job *o)
+bool files_are_right(struct jobs *s, struct live_job *o)
 {
 	const Farm__Submit *m = live_job_submit(o);
 	struct error e;
@@ -67,7 +67,7 @@ bool files_are_right(struct server *s, struct live_job *o)
 	return right;
 }
 
-void files_tick(struct server *s)
+void files_tick(struct jobs *s)
 {
 	for (struct live_job *o = s->orders; o; o = o->next)
 		if (o->lacks_file && files_look(s, o))

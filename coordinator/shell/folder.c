@@ -11,7 +11,7 @@
 
 static const double every_seconds = 1;
 
-static int make_anew(struct server *s, struct live_job *o, struct error *e)
+static int make_anew(struct jobs *s, struct live_job *o, struct error *e)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_path(s->spool, "jobs", path);
@@ -34,7 +34,7 @@ static int make_anew(struct server *s, struct live_job *o, struct error *e)
 
 /* What was merged is in memory or in the old journal, whose file is open: the one goes into a checkpoint, the other
  * into a new file. */
-static void go_on(struct server *s, struct live_job *o)
+static void go_on(struct jobs *s, struct live_job *o)
 {
 	char folder[SPOOL_PATH_MAX];
 	struct error e;
@@ -62,7 +62,7 @@ static void go_on(struct server *s, struct live_job *o)
 
 /* A journal that is bad already has no file to look for, and who has ended needs none: then the folder itself, which
  * may go while it is being made anew. */
-static bool is_gone(const struct server *s, const struct live_job *o)
+static bool is_gone(const struct jobs *s, const struct live_job *o)
 {
 	char folder[SPOOL_PATH_MAX];
 	struct stat st;
@@ -72,11 +72,11 @@ static bool is_gone(const struct server *s, const struct live_job *o)
 	return disk_stat(folder, &st) && (errno == ENOENT || errno == ENOTDIR);
 }
 
-void folder_tick(struct server *s)
+void folder_tick(struct jobs *s)
 {
-	if (server_now(s) < s->folders_next)
+	if (jobs_now(s) < s->folders_next)
 		return;
-	s->folders_next = server_now(s) + every_seconds;
+	s->folders_next = jobs_now(s) + every_seconds;
 	for (struct live_job *o = s->orders; o; o = o->next)
 		if (!o->busy && o->journal && is_gone(s, o)) {
 			go_on(s, o);

@@ -6,8 +6,8 @@
 #ifndef COORDINATOR_SHELL_FOLDER_H
 #define COORDINATOR_SHELL_FOLDER_H
 
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/jobs.h"
 
-void folder_tick(struct server *s); /* looks every second */
+void folder_tick(struct jobs *s); /* looks every second */
 
 #endif

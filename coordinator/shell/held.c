@@ -28,8 +28,8 @@ static bool is_answered_at_once(Farm__Envelope__BodyCase what, bool first)
 
 bool held_take(struct session *p, struct envelope *env)
 {
-	struct server *s = p->server;
-	if (!recovery_is_on(s) || is_answered_at_once(env->message->body_case, !p->held))
+	struct peers *s = p->peers;
+	if (!recovery_is_on(p->jobs) || is_answered_at_once(env->message->body_case, !p->held))
 		return false;
 	size_t cost = cost_of(env);
 	struct held *h =
@@ -42,7 +42,7 @@ bool held_take(struct session *p, struct envelope *env)
 	}
 	if (!p->held) {
 		p->held_last = &p->held;
-		p->told = server_now(s);
+		p->told = jobs_now(p->jobs);
 	}
 	h->envelope = *env;
 	memset(env, 0, sizeof *env);
@@ -57,10 +57,9 @@ void held_tick(struct session *p)
 {
 	Farm__Heartbeat beat;
 	Farm__Envelope m;
-	if (!p->held || p->state == SESSION_LEAVING ||
-	    server_now(p->server) < p->told + p->server->config.heartbeat_seconds)
+	if (!p->held || p->state == SESSION_LEAVING || jobs_now(p->jobs) < p->told + p->jobs->config.heartbeat_seconds)
 		return;
-	p->told = server_now(p->server);
+	p->told = jobs_now(p->jobs);
 	farm__heartbeat__init(&beat);
 	farm__envelope__init(&m);
 	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
@@ -73,7 +72,7 @@ static struct held *take_first(struct session *p)
 	struct held *h = p->held;
 	p->held = h->next;
 	p->held_bytes -= cost_of(&h->envelope);
-	p->server->held_bytes -= cost_of(&h->envelope);
+	p->peers->held_bytes -= cost_of(&h->envelope);
 	return h;
 }
 
@@ -89,7 +88,7 @@ void held_drop(struct session *p)
 		free_held(take_first(p));
 }
 
-void held_deliver(struct server *s)
+void held_deliver(struct peers *s)
 {
 	for (struct session *p = s->sessions; p; p = p->next)
 		while (p->held) {

@@ -6,7 +6,7 @@
 
 #include <string.h>
 
-bool keep_order(struct server *s, const struct live_job *o)
+bool keep_order(struct jobs *s, const struct live_job *o)
 {
 	char path[SPOOL_PATH_MAX];
 	struct stat st;
@@ -17,7 +17,7 @@ bool keep_order(struct server *s, const struct live_job *o)
 	return disk_stat(path, &st) == 0;
 }
 
-void keep_drop(const struct server *s, uint64_t job)
+void keep_drop(const struct jobs *s, uint64_t job)
 {
 	char path[SPOOL_PATH_MAX];
 	if (recovery_has(s, job) || (s->reading && s->reading->id == job))
@@ -30,7 +30,7 @@ void keep_drop(const struct server *s, uint64_t job)
 	disk_unlink(path);
 }
 
-uint64_t keep_bytes(const struct server *s, uint64_t job)
+uint64_t keep_bytes(const struct jobs *s, uint64_t job)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
 	uint64_t sum = 0;
@@ -49,7 +49,7 @@ uint64_t keep_bytes(const struct server *s, uint64_t job)
 	return sum;
 }
 
-bool keep_drop_all(const struct server *s)
+bool keep_drop_all(const struct jobs *s)
 {
 	bool any = false;
 	for (size_t i = 0; i < s->ended_count; i++)
@@ -60,7 +60,7 @@ bool keep_drop_all(const struct server *s)
 	return any;
 }
 
-void keep_trim(const struct server *s)
+void keep_trim(const struct jobs *s)
 {
 	uint64_t left = s->config.keep_bytes;
 	for (size_t i = s->ended_count; i-- > 0;) { /* the latest ones first */

@@ -7,13 +7,13 @@
 #ifndef COORDINATOR_SHELL_KEEP_H
 #define COORDINATOR_SHELL_KEEP_H
 
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/jobs.h"
 
 /* Of a job that has just ended. false: it cannot go on, and nothing is to be kept. */
-bool keep_order(struct server *s, const struct live_job *o);
-void keep_drop(const struct server *s, uint64_t job);
-uint64_t keep_bytes(const struct server *s, uint64_t job); /* on the disk */
-bool keep_drop_all(const struct server *s);		   /* of listed jobs; true: there was something */
-void keep_trim(const struct server *s);			   /* after jobs have ended, and at the start */
+bool keep_order(struct jobs *s, const struct live_job *o);
+void keep_drop(const struct jobs *s, uint64_t job);
+uint64_t keep_bytes(const struct jobs *s, uint64_t job); /* on the disk */
+bool keep_drop_all(const struct jobs *s);		 /* of listed jobs; true: there was something */
+void keep_trim(const struct jobs *s);			 /* after jobs have ended, and at the start */
 
 #endif

@@ -5,7 +5,7 @@
 #include "coordinator/shell/digest.h"
 #include "coordinator/shell/incoming.h"
 #include "coordinator/shell/replay.h"
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/jobs.h"
 
 #include <stdlib.h>
 #include <string.h>
@@ -65,16 +65,16 @@ bool late_withholds(struct live_job *o, const struct lease_key *k, uint64_t peer
 }
 
 /* It is damaged by now, too: its lease is open. */
-static void give_up(struct server *s, struct live_job *o, const struct late_result *l, const char *why)
+static void give_up(struct jobs *s, struct live_job *o, const struct late_result *l, const char *why)
 {
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = l->peer, .job = o->id, .lease = {.key = l->key}};
 	live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(why).text);
 	if (l->peer)
-		server_step(s, &ev);
+		jobs_step(s, &ev);
 }
 
 /* To the core, which says whether it counts. */
-static int offer(struct server *s, const struct live_job *o, const struct late_result *l, struct error *e)
+static int offer(struct jobs *s, const struct live_job *o, const struct late_result *l, struct error *e)
 {
 	struct event ev = {.kind = EVENT_STORED, .job = o->id, .lease = {.key = l->key, .valid = true}};
 	struct envelope env;
@@ -103,7 +103,7 @@ static int offer(struct server *s, const struct live_job *o, const struct late_r
 					    .payload = &copy,
 					    .stored = true,
 					    .stored_at = l->at};
-		server_step_with(s, &ev, &in);
+		jobs_step_with(s, &ev, &in);
 	}
 	buf_fini(&copy);
 	batch_fini(&batch);
@@ -112,7 +112,7 @@ static int offer(struct server *s, const struct live_job *o, const struct late_r
 	return rc;
 }
 
-void late_drop(struct server *s, struct live_job *o)
+void late_drop(struct jobs *s, struct live_job *o)
 {
 	while (o->late_count) {
 		struct late_result l = o->late[--o->late_count];
@@ -121,7 +121,7 @@ void late_drop(struct server *s, struct live_job *o)
 }
 
 /* true: one more counts, and others may now. */
-static bool feed_one(struct server *s, struct live_job *o)
+static bool feed_one(struct jobs *s, struct live_job *o)
 {
 	for (size_t i = 0; i < o->late_count; i++) {
 		struct late_result l = o->late[i];
@@ -144,7 +144,7 @@ static bool feed_one(struct server *s, struct live_job *o)
 	return false;
 }
 
-void late_feed(struct server *s)
+void late_feed(struct jobs *s)
 {
 	if (s->feeding || s->stepping || s->stopping)
 		return;

@@ -9,7 +9,7 @@
 
 #include "coordinator/shell/live_job.h"
 
-struct server;
+struct jobs;
 
 int late_add(struct live_job *o, const struct lease_key *k, uint64_t at, struct error *e); /* -ENOMEM */
 /* Those of that (group, part) from this epoch on do not count any more. */
@@ -19,8 +19,8 @@ void late_sort(struct live_job *o); /* as they can count */
  */
 bool late_withholds(struct live_job *o, const struct lease_key *k, uint64_t peer);
 /* They are computed again, after all. */
-void late_drop(struct server *s, struct live_job *o);
+void late_drop(struct jobs *s, struct live_job *o);
 /* All that can count now do. After every step of the core, and when films are free again. */
-void late_feed(struct server *s);
+void late_feed(struct jobs *s);
 
 #endif

@@ -321,3 +321,12 @@ void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s)
 		blob_release(s, &h);
 	}
 }
+
+uint64_t live_job_asset_bytes(const Farm__Submit *m)
+{
+	uint64_t sum = 0;
+	for (size_t i = 0; i < m->n_files; i++)
+		if (__builtin_add_overflow(sum, m->files[i]->size, &sum))
+			return UINT64_MAX;
+	return sum;
+}

@@ -148,6 +148,7 @@ void waiting_batch_free(struct waiting_batch *w);
 
 /* Lets go of the bundle's blobs. */
 void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s);
+uint64_t live_job_asset_bytes(const Farm__Submit *m); /* of its files, as it says */
 /* A file's hash in a message of which the length was checked. */
 struct blob_hash live_job_file_hash(const Farm__File *f);
 

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/shell/publish.h"
 #include "coordinator/shell/durable.h"
-#include "coordinator/shell/session.h"
+#include "coordinator/shell/jobs.h"
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
@@ -44,7 +44,7 @@ static int write_image(struct publishing *w)
 	size_t size = 0;
 	int rc = image_file_encode(&w->image, &o->plan, &x, &bytes, &size, &w->error);
 	if (!rc)
-		rc = spool_write(w->server->spool, o->id, files[w->what], bytes, size, &w->error);
+		rc = spool_write(w->jobs->spool, o->id, files[w->what], bytes, size, &w->error);
 	mem_free(bytes);
 	return rc;
 }
@@ -62,7 +62,7 @@ static void run(uv_work_t *work)
 /* The two that tell the core: it may want the next image at once, or end the order, and w is not ours any more. */
 static void tell_error(const struct publishing *w)
 {
-	struct server *s = w->server;
+	struct jobs *s = w->jobs;
 	struct event ev = {
 		.kind = EVENT_ERROR_KNOWN,
 		.job = w->order->id,
@@ -73,7 +73,7 @@ static void tell_error(const struct publishing *w)
 				.degrees = w->rc ? NAN : w->image.rel_mse_degrees,
 				.doubtful = !w->rc && w->image.rel_mse_doubt != ERROR_KNOWN,
 				.cpu_seconds = w->order->cpu_seconds - w->order->record.bootstrap_cpu_seconds}};
-	server_step(s, &ev);
+	jobs_step(s, &ev);
 	durable_look(s, ev.job);
 }
 
@@ -85,7 +85,7 @@ static void tell_image(const struct publishing *w)
 	struct event ev = {.kind = EVENT_IMAGE_KNOWN,
 			   .job = job,
 			   .image_known = {.job = job, .disagrees = w->agreement.verdict == CHAINS_DISAGREE}};
-	server_step(w->server, &ev);
+	jobs_step(w->jobs, &ev);
 }
 
 /* The core's job is done; all that it is made of stays until the disk takes the image. */
@@ -94,7 +94,7 @@ static void cannot_write(struct publishing *w)
 	struct live_job *o = w->order;
 	o->unpublished = true;
 	o->unpublished_rounds = w->rounds;
-	o->try_again = server_now(w->server) + w->server->config.retry_seconds;
+	o->try_again = jobs_now(w->jobs) + w->jobs->config.retry_seconds;
 	if (strcmp(o->record.why, w->error.text) != 0)
 		live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(w->error.text).text);
 	text_copy(o->record.why, sizeof o->record.why, w->error.text);
@@ -125,14 +125,14 @@ static void take(struct publishing *w)
 	else if (w->rc)
 		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
 	if (w->what == PUBLISH_PREVIEW)
-		o->preview_made = server_now(w->server);
+		o->preview_made = jobs_now(w->jobs);
 	canvas_image_fini(&w->image);
 }
 
 static void done(uv_work_t *work, int status)
 {
 	struct publishing *w = work->data;
-	struct server *s = w->server;
+	struct jobs *s = w->jobs;
 	uint64_t id = w->order->id;
 	assert(status == 0);
 	(void)status;
@@ -144,24 +144,24 @@ static void done(uv_work_t *work, int status)
 		tell_error(w);
 	else if (w->what == PUBLISH_RESULT && !w->rc)
 		tell_image(w);
-	server_order_free_again(s);
-	session_previews(s, id);
+	jobs_films_free(s);
+	s->peers.films_free(s->peers.user, id);
 	s->changes++;
 }
 
-void publish_start(struct server *s, struct live_job *o, enum publish_what what, uint64_t rounds)
+void publish_start(struct jobs *s, struct live_job *o, enum publish_what what, uint64_t rounds)
 {
 	assert(o && o->canvas);
 	assert(!o->busy);
 	struct publishing *w = &o->publishing;
-	*w = (struct publishing){.work.data = w, .server = s, .order = o, .what = what, .rounds = rounds};
+	*w = (struct publishing){.work.data = w, .jobs = s, .order = o, .what = what, .rounds = rounds};
 	struct job_status status; /* from the first lease to now */
-	if (farm_job(s->farm, o->id, server_now(s), &status)) {
+	if (farm_job(s->farm, o->id, jobs_now(s), &status)) {
 		w->end = status.end;
-		w->wall_seconds = (isnan(status.ended) ? server_now(s) : status.ended) - status.started;
+		w->wall_seconds = (isnan(status.ended) ? jobs_now(s) : status.ended) - status.started;
 	}
 	o->busy = true;
-	int rc = uv_queue_work(&s->loop, &w->work, run, done);
+	int rc = uv_queue_work(s->loop, &w->work, run, done);
 	assert(rc == 0);
 	(void)rc;
 }

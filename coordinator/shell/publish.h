@@ -13,7 +13,7 @@
 
 #include <uv.h>
 
-struct server;
+struct jobs;
 struct live_job;
 
 enum publish_what {
@@ -24,7 +24,7 @@ enum publish_what {
 
 struct publishing { /* one of an order at a time */
 	uv_work_t work;
-	struct server *server;
+	struct jobs *jobs;
 	struct live_job *order;
 	enum publish_what what;
 	uint64_t rounds;
@@ -36,6 +36,6 @@ struct publishing { /* one of an order at a time */
 	struct error error;
 };
 
-void publish_start(struct server *s, struct live_job *o, enum publish_what what, uint64_t rounds);
+void publish_start(struct jobs *s, struct live_job *o, enum publish_what what, uint64_t rounds);
 
 #endif

@@ -14,7 +14,7 @@
 enum { NAMED_MOST = 8 /* of what is lost, in the sentence of the refusal */ };
 
 struct looking {
-	struct server *server;
+	struct jobs *jobs;
 	struct job_record *record; /* of the job at hand */
 	uint64_t lost, last;	   /* jobs; the highest id of a row */
 	char text[600];		   /* which */
@@ -31,13 +31,13 @@ static void say(uint64_t id, const char *what)
 /* Its folder stays, for whoever knows more than we do. */
 static int put_aside(struct looking *l, uint64_t id, const char *why, struct error *e)
 {
-	const struct spool *spool = l->server->spool;
+	const struct spool *spool = l->jobs->spool;
 	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], lost[SPOOL_PATH_MAX], jobs[SPOOL_PATH_MAX], name[64];
 	struct stat st;
 	spool_job_path(spool, id, NULL, from);
 	spool_path(spool, "jobs", jobs);
 	spool_path(spool, "lost", lost);
-	int rc = ledger_forget(l->server->ledger, id, e);
+	int rc = ledger_forget(l->jobs->ledger, id, e);
 	if (rc || disk_stat(from, &st))
 		return rc;
 	rc = disk_make_folder(lost, e);
@@ -61,7 +61,7 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 	text_print(text, sizeof text, "j%llu (%s)", (unsigned long long)id, why);
 	if (l->lost++ < NAMED_MOST)
 		text_put(&l->names, "%s%s", l->lost > 1 ? ", " : "", text);
-	if (!l->server->config.accept_loss) {
+	if (!l->jobs->config.accept_loss) {
 		say(id, why);
 		return 0;
 	}
@@ -76,7 +76,7 @@ static int is_lost(struct looking *l, uint64_t id, const char *why, struct error
 /* What its row still knows: it is listed, and its image can be fetched. What the image's header says is not read. */
 static int make_record(struct looking *l, const struct ledger_job *j, struct error *e)
 {
-	const struct spool *spool = l->server->spool;
+	const struct spool *spool = l->jobs->spool;
 	struct job_record *r = l->record;
 	char path[SPOOL_PATH_MAX], kept[SPOOL_PATH_MAX];
 	struct stat st;
@@ -136,7 +136,7 @@ static int make_row(struct looking *l, struct row_file *f, bool ended, const cha
 		f->job.submission_size = f->job.plan_size = 0;
 	}
 	say(f->job.id, why);
-	return ledger_put(l->server->ledger, &f->job, e);
+	return ledger_put(l->jobs->ledger, &f->job, e);
 }
 
 /* There is a row, and it is whole. */
@@ -150,7 +150,7 @@ static int with_row(struct looking *l, const struct ledger_job *j, struct row_fi
 		return 0;
 	if (file == -EBADMSG)
 		say(j->id, "the copy of its row in its folder (order) is damaged: made anew from jobs.db");
-	if (row_file_write(l->server->spool, j, e))
+	if (row_file_write(l->jobs->spool, j, e))
 		say(j->id, e->text); /* a full disk keeps no job from going on */
 	return 0;
 }
@@ -164,14 +164,14 @@ static int without_row(struct looking *l, uint64_t id, bool damaged, struct row_
 					: "jobs.db had lost its row: made anew from its folder",
 				e);
 	if (ended)
-		return damaged ? ledger_forget(l->server->ledger, id, e) : 0; /* its record says all */
+		return damaged ? ledger_forget(l->jobs->ledger, id, e) : 0; /* its record says all */
 	if (damaged)
 		return is_lost(l, id,
 			       "its row in jobs.db is damaged, and so is the copy in its folder (order), or it is gone",
 			       e);
 	if (file == -EBADMSG)
 		return is_lost(l, id, "jobs.db has no row of it, and the copy in its folder (order) is damaged", e);
-	return has_results(l->server->spool, id)
+	return has_results(l->jobs->spool, id)
 		       ? is_lost(l, id,
 				 "jobs.db has no row of it, and its folder has results, but no copy of the row (order)",
 				 e)
@@ -182,7 +182,7 @@ static int look_at(struct looking *l, uint64_t id, struct error *e)
 {
 	struct ledger_job j;
 	struct row_file f;
-	struct server *s = l->server;
+	struct jobs *s = l->jobs;
 	int rc = spool_read_record(s->spool, id, l->record, e);
 	bool ended = rc == 0 && record_is_ended(l->record), bad_record = rc == -EBADMSG;
 	if (rc && rc != -ENOENT && rc != -EBADMSG)
@@ -204,7 +204,7 @@ static int look_at_folders(struct looking *l, struct error *e)
 {
 	uint64_t *ids;
 	size_t count;
-	int rc = spool_jobs(l->server->spool, &ids, &count, e);
+	int rc = spool_jobs(l->jobs->spool, &ids, &count, e);
 	for (size_t i = 0; i < count && !rc; i++)
 		rc = look_at(l, ids[i], e);
 	mem_free(ids);
@@ -219,9 +219,9 @@ static int look_at_rows(struct looking *l, struct error *e)
 	struct stat st;
 	uint64_t id = 0;
 	int rc;
-	while ((rc = ledger_after(l->server->ledger, id, &j, e)) > 0) {
+	while ((rc = ledger_after(l->jobs->ledger, id, &j, e)) > 0) {
 		l->last = id = j.id;
-		spool_job_path(l->server->spool, id, NULL, path);
+		spool_job_path(l->jobs->spool, id, NULL, path);
 		if (j.damaged && disk_stat(path, &st) &&
 		    (rc = is_lost(l, id, "its row in jobs.db is damaged, and it has no folder", e)))
 			return rc;
@@ -231,7 +231,7 @@ static int look_at_rows(struct looking *l, struct error *e)
 
 /* ---- the database ---- */
 
-static int put_database_aside(struct server *s, struct error *e)
+static int put_database_aside(struct jobs *s, struct error *e)
 {
 	static const char *const ends[] = {"", "-wal", "-shm"};
 	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
@@ -248,7 +248,7 @@ static int put_database_aside(struct server *s, struct error *e)
 	return disk_sync_folder(folder, e);
 }
 
-static int open_database(struct server *s, struct error *e)
+static int open_database(struct jobs *s, struct error *e)
 {
 	char path[SPOOL_PATH_MAX];
 	spool_path(s->spool, "jobs.db", path);
@@ -262,9 +262,9 @@ static int open_database(struct server *s, struct error *e)
 	return rc ? rc : ledger_open(&s->ledger, path, e);
 }
 
-int reconcile(struct server *s, struct error *e)
+int reconcile(struct jobs *s, struct error *e)
 {
-	struct looking l = {.server = s};
+	struct looking l = {.jobs = s};
 	l.names = (struct text){l.text, sizeof l.text};
 	int rc = open_database(s, e);
 	if (!rc && !(l.record = mem_alloc(1, sizeof *l.record)))
@@ -286,7 +286,7 @@ int reconcile(struct server *s, struct error *e)
 		l.lost > NAMED_MOST ? ", ..." : "");
 }
 
-void reconcile_row(struct server *s, uint64_t job)
+void reconcile_row(struct jobs *s, uint64_t job)
 {
 	struct ledger_job j;
 	struct error e;

@@ -9,11 +9,11 @@
 #ifndef COORDINATOR_SHELL_RECONCILE_H
 #define COORDINATOR_SHELL_RECONCILE_H
 
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/jobs.h"
 
 /* Opens the ledger. -EBADMSG: something is lost. */
-int reconcile(struct server *s, struct error *e);
+int reconcile(struct jobs *s, struct error *e);
 /* The row has been written: so is its copy. What the disk does not take is said, and written at the next start. */
-void reconcile_row(struct server *s, uint64_t job);
+void reconcile_row(struct jobs *s, uint64_t job);
 
 #endif

@@ -7,7 +7,6 @@
 #include "coordinator/shell/ages.h"
 #include "coordinator/shell/dispatch.h"
 #include "coordinator/shell/files.h"
-#include "coordinator/shell/held.h"
 #include "coordinator/shell/keep.h"
 #include "coordinator/shell/replay.h"
 #include "coordinator/shell/restore.h"
@@ -27,7 +26,7 @@ struct found { /* a job */
 
 struct recovery {
 	uv_work_t work;
-	struct server *server;
+	struct jobs *jobs;
 	struct found *first, **last, *at; /* at: the one that is read; NULL: none is */
 	uint64_t bytes, read;		  /* of all; of those that are done with */
 	bool under_way;
@@ -37,12 +36,12 @@ struct recovery {
 
 /* ---- how far it is */
 
-bool recovery_is_on(const struct server *s)
+bool recovery_is_on(const struct jobs *s)
 {
 	return s->recovery != NULL;
 }
 
-double recovery_share(const struct server *s)
+double recovery_share(const struct jobs *s)
 {
 	const struct recovery *r = s->recovery;
 	uint64_t read = r->read + (r->at ? atomic_load(&r->at->progress.read) : 0);
@@ -65,7 +64,7 @@ static void view(const struct found *f, struct job_view *v)
 	memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);
 }
 
-static const struct found *find(const struct server *s, uint64_t job)
+static const struct found *find(const struct jobs *s, uint64_t job)
 {
 	const struct found *f = s->recovery ? s->recovery->first : NULL;
 	while (f && f->record.id != job)
@@ -73,12 +72,12 @@ static const struct found *find(const struct server *s, uint64_t job)
 	return f;
 }
 
-bool recovery_has(const struct server *s, uint64_t job)
+bool recovery_has(const struct jobs *s, uint64_t job)
 {
 	return find(s, job) != NULL;
 }
 
-bool recovery_view(const struct server *s, uint64_t job, struct job_view *v)
+bool recovery_view(const struct jobs *s, uint64_t job, struct job_view *v)
 {
 	const struct found *f = find(s, job);
 	if (f)
@@ -86,7 +85,7 @@ bool recovery_view(const struct server *s, uint64_t job, struct job_view *v)
 	return f != NULL;
 }
 
-size_t recovery_views(const struct server *s, struct job_view *v)
+size_t recovery_views(const struct jobs *s, struct job_view *v)
 {
 	size_t n = 0;
 	for (const struct found *f = s->recovery ? s->recovery->first : NULL; f; f = f->next, n++)
@@ -95,7 +94,7 @@ size_t recovery_views(const struct server *s, struct job_view *v)
 	return n;
 }
 
-uint64_t recovery_film_bytes(const struct server *s)
+uint64_t recovery_film_bytes(const struct jobs *s)
 {
 	uint64_t sum = 0;
 	for (const struct found *f = s->recovery ? s->recovery->first : NULL; f; f = f->next)
@@ -108,7 +107,7 @@ uint64_t recovery_film_bytes(const struct server *s)
 
 /* What is stored is damaged: the job's batches can be made again, with the same bits. Nothing is deleted: somebody may
  * want to look at it. */
-static void put_aside(struct server *s, struct live_job *o)
+static void put_aside(struct jobs *s, struct live_job *o)
 {
 	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
 	spool_job_path(s->spool, o->id, NULL, folder);
@@ -127,7 +126,7 @@ static bool is_lasting(int rc)
 	return rc == -EBADMSG || rc == -ERANGE || rc == -ENOENT;
 }
 
-static void write_end(struct server *s, struct job_record *r, const char *why)
+static void write_end(struct jobs *s, struct job_record *r, const char *why)
 {
 	struct timespec now;
 	struct error e;
@@ -142,11 +141,11 @@ static void write_end(struct server *s, struct job_record *r, const char *why)
 	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) ||
 	    ledger_end(s->ledger, r->id, r->extended, r->state, &e))
 		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
-	dispatch_remember(s, r);
+	jobs_remember(s, r);
 }
 
 /* The job has failed, if that is how it would be at every start; else an error of the machine. */
-static int give_up(struct server *s, uint64_t id, uint64_t extended, int rc, struct error *e)
+static int give_up(struct jobs *s, uint64_t id, uint64_t extended, int rc, struct error *e)
 {
 	struct error why = *e;
 	bool there;
@@ -166,15 +165,15 @@ static int give_up(struct server *s, uint64_t id, uint64_t extended, int rc, str
 
 /* ---- one job after the other */
 
-static void fail(struct server *s, int rc, const struct error *e)
+static void fail(struct jobs *s, int rc, const struct error *e)
 {
 	s->fault = rc;
 	s->fault_error = *e;
-	server_stop(s);
+	s->stop(s->stop_user);
 }
 
 /* All have been read, and the core hears of them. */
-static int finish(struct server *s, struct error *e)
+static int finish(struct jobs *s, struct error *e)
 {
 	struct recovery *r = s->recovery;
 	int rc = 0;
@@ -202,27 +201,27 @@ static int finish(struct server *s, struct error *e)
 	s->changes++;
 	blob_store_trim(s->blobs); /* the files of living jobs are held by now */
 	keep_trim(s);
-	held_deliver(s);
+	s->peers.jobs_read(s->peers.user);
 	return 0;
 }
 
 static void run(uv_work_t *work)
 {
 	struct recovery *r = work->data;
-	r->rc = replay_films(r->server->spool, r->at->order, &r->at->progress, &r->error);
+	r->rc = replay_films(r->jobs->spool, r->at->order, &r->at->progress, &r->error);
 }
 
 static void done(uv_work_t *work, int status);
 
 /* The one at hand, or the end. */
-static int go_on(struct server *s, struct error *e)
+static int go_on(struct jobs *s, struct error *e)
 {
 	struct recovery *r = s->recovery;
 	if (!r->at)
 		return finish(s, e);
-	r->at->order->film_folder = server_film_folder(s, &r->at->order->plan);
+	r->at->order->film_folder = jobs_film_folder(s, &r->at->order->plan);
 	r->under_way = true;
-	int rc = uv_queue_work(&s->loop, &r->work, run, done);
+	int rc = uv_queue_work(s->loop, &r->work, run, done);
 	assert(rc == 0);
 	return rc;
 }
@@ -237,7 +236,7 @@ static void remove_found(struct recovery *r, struct found *f)
 }
 
 /* It cannot be read. 0: it is read again, or has failed for good. */
-static int take_failure(struct server *s, struct error *e)
+static int take_failure(struct jobs *s, struct error *e)
 {
 	struct recovery *r = s->recovery;
 	struct found *f = r->at;
@@ -269,7 +268,7 @@ static int take_failure(struct server *s, struct error *e)
 static void done(uv_work_t *work, int status)
 {
 	struct recovery *r = work->data;
-	struct server *s = r->server;
+	struct jobs *s = r->jobs;
 	struct error e;
 	int rc = 0;
 	assert(status == 0);
@@ -291,7 +290,7 @@ static void done(uv_work_t *work, int status)
 
 /* ---- life */
 
-static int add(struct server *s, const struct ledger_job *j, struct error *e)
+static int add(struct jobs *s, const struct ledger_job *j, struct error *e)
 {
 	struct recovery *r = s->recovery;
 	struct found *f = mem_alloc(1, sizeof *f);
@@ -311,7 +310,7 @@ static int add(struct server *s, const struct ledger_job *j, struct error *e)
 	return 0;
 }
 
-int recovery_begin(struct server *s, struct error *e)
+int recovery_begin(struct jobs *s, struct error *e)
 {
 	struct ledger_job j;
 	uint64_t id = 0;
@@ -319,7 +318,7 @@ int recovery_begin(struct server *s, struct error *e)
 	struct recovery *r = s->recovery = mem_alloc(1, sizeof *r);
 	if (!r)
 		return error_set(e, ENOMEM, "no memory for the jobs");
-	r->server = s;
+	r->jobs = s;
 	r->work.data = r;
 	r->last = &r->first;
 	while ((rc = ledger_next(s->ledger, id, &j, e)) > 0) {
@@ -334,13 +333,13 @@ int recovery_begin(struct server *s, struct error *e)
 	return go_on(s, e);
 }
 
-void recovery_stop(struct server *s)
+void recovery_stop(struct jobs *s)
 {
 	for (struct found *f = s->recovery ? s->recovery->first : NULL; f; f = f->next)
 		atomic_store(&f->progress.stop, true);
 }
 
-void recovery_close(struct server *s)
+void recovery_close(struct jobs *s)
 {
 	struct recovery *r = s->recovery;
 	if (!r)

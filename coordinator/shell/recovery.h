@@ -13,18 +13,18 @@
 #ifndef COORDINATOR_SHELL_RECOVERY_H
 #define COORDINATOR_SHELL_RECOVERY_H
 
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/jobs.h"
 
-int recovery_begin(struct server *s, struct error *e); /* where there are no such jobs it is over at once */
-bool recovery_is_on(const struct server *s);
-double recovery_share(const struct server *s); /* of all bytes: 0 to 1 */
-void recovery_stop(struct server *s);	       /* soon, with the loop */
-void recovery_close(struct server *s);	       /* the loop has ended */
+int recovery_begin(struct jobs *s, struct error *e); /* where there are no such jobs it is over at once */
+bool recovery_is_on(const struct jobs *s);
+double recovery_share(const struct jobs *s); /* of all bytes: 0 to 1 */
+void recovery_stop(struct jobs *s);	     /* soon, with the loop */
+void recovery_close(struct jobs *s);	     /* the loop has ended */
 
 /* While it is on. */
-bool recovery_has(const struct server *s, uint64_t job);
-bool recovery_view(const struct server *s, uint64_t job, struct job_view *v); /* false: not one of them */
-size_t recovery_views(const struct server *s, struct job_view *v); /* ascending by id. v: NULL: how many they are */
-uint64_t recovery_film_bytes(const struct server *s);		   /* in memory; not while one is being read */
+bool recovery_has(const struct jobs *s, uint64_t job);
+bool recovery_view(const struct jobs *s, uint64_t job, struct job_view *v); /* false: not one of them */
+size_t recovery_views(const struct jobs *s, struct job_view *v); /* ascending by id. v: NULL: how many they are */
+uint64_t recovery_film_bytes(const struct jobs *s);		 /* in memory; not while one is being read */
 
 #endif

@@ -4,7 +4,6 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
-#include "coordinator/shell/control.h"
 #include "coordinator/shell/reconcile.h"
 #include "coordinator/shell/replay.h"
 #include "coordinator/shell/trust.h"
@@ -29,7 +28,13 @@ static uint64_t next_epoch(const struct live_job *o, uint32_t group, uint32_t pa
 	return k.epoch;
 }
 
-int restore_tell(struct server *s, const struct live_job *o, const char *held, uint64_t tag, struct error *e)
+const char *restore_held_by(const char *who, char text[256])
+{
+	text_print(text, 256, "held by %s", who);
+	return text;
+}
+
+int restore_tell(struct jobs *s, const struct live_job *o, const char *held, uint64_t tag, struct error *e)
 {
 	uint32_t slots = o->plan.groups * o->plan.parts;
 	uint64_t *next = mem_alloc(slots, sizeof *next);
@@ -70,20 +75,20 @@ int restore_tell(struct server *s, const struct live_job *o, const char *held, u
 				       .completed = o->times.completed,
 				       .looks = &o->record.looks,
 				       .counts = o->counts}};
-	server_step(s, &ev);
+	jobs_step(s, &ev);
 	mem_free(next);
 	mem_free(makers);
 	if (*held) {
 		ev = (struct event){
-			.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_ORDERED, .text = control_held_by(held, text)};
-		server_step(s, &ev);
+			.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_ORDERED, .text = restore_held_by(held, text)};
+		jobs_step(s, &ev);
 	}
 	return 0;
 }
 
 /* ---- one job */
 
-static int hold_blobs(struct server *s, const Farm__Submit *m, struct error *e)
+static int hold_blobs(struct jobs *s, const Farm__Submit *m, struct error *e)
 {
 	for (size_t i = 0; i < m->n_files; i++) {
 		struct blob_hash h = live_job_file_hash(m->files[i]);
@@ -99,7 +104,7 @@ static int hold_blobs(struct server *s, const Farm__Submit *m, struct error *e)
 	return 0;
 }
 
-int restore_record(const struct server *s, uint64_t id, struct job_record *r, bool *there, struct error *e)
+int restore_record(const struct jobs *s, uint64_t id, struct job_record *r, bool *there, struct error *e)
 {
 	int rc = spool_read_record(s->spool, id, r, e);
 	*there = rc == 0;
@@ -107,7 +112,7 @@ int restore_record(const struct server *s, uint64_t id, struct job_record *r, bo
 }
 
 /* What the submission does not say, but its earlier end: its image is there until the next one is. */
-static int take_record_of(const struct server *s, const struct ledger_job *j, struct live_job *o, struct error *e)
+static int take_record_of(const struct jobs *s, const struct ledger_job *j, struct live_job *o, struct error *e)
 {
 	o->record.priority = j->priority;
 	o->record.extended = j->extended;
@@ -131,7 +136,7 @@ static int not_known(const struct ledger_job *j, int rc, struct error *e)
 			    HSLT_VERSION);
 }
 
-static int make_order(struct server *s, const struct ledger_job *j, struct live_job **o, struct error *e)
+static int make_order(struct jobs *s, const struct ledger_job *j, struct live_job **o, struct error *e)
 {
 	struct envelope submit, info;
 	struct plan plan;
@@ -155,13 +160,13 @@ static int make_order(struct server *s, const struct ledger_job *j, struct live_
 	return rc;
 }
 
-void restore_drop(struct server *s, struct live_job *o)
+void restore_drop(struct jobs *s, struct live_job *o)
 {
 	live_job_release_blobs(live_job_submit(o), s->blobs);
 	live_job_free(o);
 }
 
-int restore_live_job(struct server *s, const struct ledger_job *j, struct live_job **o, struct error *e)
+int restore_live_job(struct jobs *s, const struct ledger_job *j, struct live_job **o, struct error *e)
 {
 	int rc = make_order(s, j, o, e);
 	if (rc)
@@ -170,11 +175,11 @@ int restore_live_job(struct server *s, const struct ledger_job *j, struct live_j
 	if (rc)
 		restore_drop(s, *o);
 	else
-		(*o)->film_folder = server_film_folder(s, &(*o)->plan);
+		(*o)->film_folder = jobs_film_folder(s, &(*o)->plan);
 	return rc;
 }
 
-int restore_open(struct server *s, struct error *e)
+int restore_open(struct jobs *s, struct error *e)
 {
 	struct ledger_job j;
 	struct job_record *r = mem_alloc(1, sizeof *r);
@@ -202,7 +207,7 @@ int restore_open(struct server *s, struct error *e)
 	return rc;
 }
 
-bool restore_lives(const struct server *s, uint64_t job)
+bool restore_lives(const struct jobs *s, uint64_t job)
 {
 	for (size_t i = 0; i < s->restored_count; i++)
 		if (s->restored[i] == job)

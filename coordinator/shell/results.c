@@ -1,48 +1,46 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Results of leases on their way to the core: now, or when nobody reads their film any more. */
+#include "coordinator/shell/results.h"
+
+#include "coordinator/shell/back.h"
 #include "coordinator/shell/digest.h"
 #include "coordinator/shell/durable.h"
+#include "coordinator/shell/files.h"
 #include "coordinator/shell/incoming.h"
-#include "coordinator/shell/session.h"
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
 
 /* It can be made again. */
-static void refuse(struct server *s, uint64_t peer, const struct lease_key *k, const char *why)
+static void refuse(struct jobs *s, uint64_t peer, const struct lease_key *k, const char *why)
 {
-	struct session *p = session_find(s, peer);
 	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = peer, .job = k->job, .lease = {.key = *k}};
-	if (p)
-		session_send_ack(p, k, ACK_REFUSED, why);
-	server_step(s, &ev);
+	s->peers.acknowledge(s->peers.user, peer, k, ACK_REFUSED, why);
+	jobs_step(s, &ev);
 }
 
-static void fail(struct server *s, struct live_job *o, uint64_t peer, const struct lease_key *k, const char *why)
+static void fail(struct jobs *s, struct live_job *o, uint64_t peer, const struct lease_key *k, const char *why)
 {
-	struct session *p = session_find(s, peer);
+	const char *name = s->peers.name(s->peers.user, peer);
 	struct event ev = {.kind = EVENT_LEASE_FAILED, .peer = peer, .job = k->job, .text = why, .lease = {.key = *k}};
 	live_job_log(o, LOG_LEASE_FAILED, "worker=%s own=0 text=%s kind=%d group=%u part=%u epoch=%llu",
-		     log_quote(p ? p->name : "?").text, log_quote(why).text, (int)k->kind, k->group, k->part,
+		     log_quote(name ? name : "?").text, log_quote(why).text, (int)k->kind, k->group, k->part,
 		     (unsigned long long)k->epoch);
-	if (p)
-		session_send_ack(p, k, ACK_REFUSED, why);
-	server_step(s, &ev);
+	s->peers.acknowledge(s->peers.user, peer, k, ACK_REFUSED, why);
+	jobs_step(s, &ev);
 }
 
-static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
+static void take_result(struct jobs *s, uint64_t peer, const Farm__LeaseResult *m, struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_BATCH, .peer = peer, .lease = {.valid = true}};
 	struct error e = {""};
 	struct batch batch = {0};
 	if (lease_key_from_wire(m->key, &ev.lease.key, &e)) {
-		struct session *p = session_find(s, peer);
-		if (p)
-			session_fault(p, "%s", e.text);
+		s->peers.fault(s->peers.user, peer, e.text);
 		return;
 	}
 	ev.job = ev.lease.key.job;
-	struct live_job *o = server_live_job(s, ev.job);
+	struct live_job *o = jobs_find(s, ev.job);
 	int rc = o ? batch_unpack(&batch, &o->plan, m, payload->bytes, payload->size, &e) : 0;
 	if (o && !rc && batch.state_count && !m->states_digest.len)
 		rc = error_set(&e, EBADMSG, "chain states without a digest");
@@ -75,12 +73,12 @@ static void take_result(struct server *s, uint64_t peer, const Farm__LeaseResult
 	    (o && ev.lease.valid && durable_reserve(s, o, &in, &e))) /* no room for it, here or on the disk */
 		refuse(s, peer, &ev.lease.key, e.text);
 	else
-		server_step_with(s, &ev, &in);
+		jobs_step_with(s, &ev, &in);
 	batch_fini(&batch);
 	mem_free(in.frame);
 }
 
-static bool has_room(const struct server *s, const struct buf *payload)
+static bool has_room(const struct jobs *s, const struct buf *payload)
 {
 	uint64_t bytes = payload->capacity;
 	for (const struct live_job *o = s->orders; o; o = o->next)
@@ -90,8 +88,8 @@ static bool has_room(const struct server *s, const struct buf *payload)
 
 /* Nobody may look at the film now. What the core would merge waits, one result of each lease that its worker holds, and
  * one of those that nobody's waits for. */
-static void put_off(struct server *s, struct live_job *o, uint64_t peer, const struct lease_key *k,
-		    struct envelope *env, struct buf *payload)
+static void put_off(struct jobs *s, struct live_job *o, uint64_t peer, const struct lease_key *k, struct envelope *env,
+		    struct buf *payload)
 {
 	struct event ev = {.kind = EVENT_DELIVERED, .peer = peer, .job = k->job, .lease = {.key = *k, .valid = true}};
 	enum farm_delivery awaited = farm_awaits(s->farm, peer, k);
@@ -104,33 +102,86 @@ static void put_off(struct server *s, struct live_job *o, uint64_t peer, const s
 		refuse(s, peer, k, w ? "another worker's result of this lease waits" : "no room for results that wait");
 		return;
 	}
-	server_step(s, &ev);
+	jobs_step(s, &ev);
+}
+
+/* Who does not hold the lease, or refuses states that it had before, refuses nothing that is there: nobody made it. */
+static void log_failure(const struct jobs *s, const char *from, struct live_job *o, const Farm__LeaseFailed *f,
+			const struct lease_key *k, const char *text, bool holds)
+{
+	struct log_value name = log_quote(from ? from : "?"), said = log_quote(text);
+	unsigned long long epoch = k->epoch;
+	if (f->bad_states)
+		live_job_log(o, LOG_LEASE_FAILED,
+			     "states_of=%s refused_by=%s text=%s kind=%d group=%u part=%u epoch=%llu",
+			     log_quote(holds ? farm_maker(s->farm, k) : "?").text, name.text, said.text, (int)k->kind,
+			     k->group, k->part, epoch);
+	else
+		live_job_log(o, LOG_LEASE_FAILED, "worker=%s own=%d text=%s kind=%d group=%u part=%u epoch=%llu",
+			     name.text, f->own, said.text, (int)k->kind, k->group, k->part, epoch);
+}
+
+void results_take_failure(struct jobs *s, uint64_t peer, const Farm__LeaseFailed *f)
+{
+	struct error e;
+	char text[1024];
+	struct blob_hash states = {{0}};
+	struct event ev = {.kind = *f->text ? EVENT_LEASE_FAILED : EVENT_LEASE_RETURNED, .peer = peer, .text = text};
+	/* Whatever it says, it failed: many texts of a scene's author are in it. */
+	text_copy(text, sizeof text, f->text);
+	text_clean(text);
+	if (lease_key_from_wire(f->key, &ev.lease.key, &e) ||
+	    (f->bad_states && states_digest_from_wire(&f->states_digest, &states, &e))) {
+		s->peers.fault(s->peers.user, peer, "a lease cannot fail like this");
+		return;
+	}
+	ev.job = ev.lease.key.job;
+	struct live_job *o = jobs_find(s, ev.job);
+	ev.lease.own = f->own;
+	ev.lease.bad_states = f->bad_states;
+	ev.lease.other_states = f->bad_states && !(o && live_job_gives_states(o, &ev.lease.key, &states));
+	bool blamed = f->own || f->bad_states;
+	if (o && *f->text && !blamed && !files_are_right(s, o)) { /* the spool's fault, not the worker's */
+		ev.kind = EVENT_LEASE_RETURNED;
+		text[0] = 0;
+	}
+	struct back back = {0};
+	bool holds = farm_awaits(s->farm, peer, &ev.lease.key) == DELIVERY_AWAITED &&
+		     !ev.lease.other_states; /* else nothing is read for it */
+	if (o && *text)
+		log_failure(s, s->peers.name(s->peers.user, peer), o, f, &ev.lease.key, text, holds);
+	if (o && *text && f->bad_states && holds && !o->busy && !s->stepping && journal_write(o->journal, &e) == 0)
+		ev.lease.can_take_back = back_read(o, o->journal, &ev.lease.key, &back, &e) == 0;
+	if (ev.lease.can_take_back)
+		jobs_step_with(s, &ev, &(struct incoming){.back = &back});
+	else
+		jobs_step(s, &ev);
+	back_fini(&back);
 }
 
 /* Its states are refused: looked at when nobody reads the film. */
-static void take_refusal(struct server *s, uint64_t peer, struct envelope *env, struct buf *payload)
+static void take_refusal(struct jobs *s, uint64_t peer, struct envelope *env, struct buf *payload)
 {
 	const Farm__LeaseFailed *m = env->message->lease_failed;
-	struct session *p = session_find(s, peer);
-	struct live_job *o = m->key ? server_live_job(s, m->key->job) : NULL;
+	struct live_job *o = m->key ? jobs_find(s, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
 	if (!o || !o->busy || lease_key_from_wire(m->key, &k, &e)) {
-		if (p)
-			session_lease_failed(p, m);
+		if (s->peers.name(s->peers.user, peer))
+			results_take_failure(s, peer, m);
 	} else if (!has_room(s, payload) || !live_job_put_off(o, peer, &k, env, payload)) {
 		refuse(s, peer, &k, "no room for results that wait");
 	}
 }
 
-void server_result(struct server *s, uint64_t peer, struct envelope *env, struct buf *payload)
+void results_take(struct jobs *s, uint64_t peer, struct envelope *env, struct buf *payload)
 {
 	if (env->message->body_case == FARM__ENVELOPE__BODY_LEASE_FAILED) {
 		take_refusal(s, peer, env, payload);
 		return;
 	}
 	const Farm__LeaseResult *m = env->message->lease_result;
-	struct live_job *o = m->key ? server_live_job(s, m->key->job) : NULL;
+	struct live_job *o = m->key ? jobs_find(s, m->key->job) : NULL;
 	struct lease_key k;
 	struct error e;
 	if (o && o->busy && lease_key_from_wire(m->key, &k, &e) == 0)

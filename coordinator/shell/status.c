@@ -32,14 +32,15 @@ struct reader {
 };
 
 struct status_socket {
-	struct server *server;
+	const struct peers *peers;
+	struct jobs *jobs;
 	uv_pipe_t listener;
 	struct reader *readers;
 	unsigned reader_count;
 	bool caller_waits;
 	struct job_view *shown; /* as the subscribers saw the jobs last */
 	size_t shown_count;
-	uint64_t shown_changes; /* of the server, at the last tick */
+	uint64_t shown_changes; /* of the jobs, at the last tick */
 	char *path;		/* NULL: inherited */
 	dev_t device;		/* the file that was made there; inode 0: none */
 	ino_t inode;
@@ -64,10 +65,10 @@ static json_t *jobs_json(const struct job_view *views, size_t count)
 }
 
 /* What a worker's certificate is, and whether it must be renewed. */
-static void add_certificate(const struct server *s, uint64_t peer, json_t *worker)
+static void add_certificate(const struct peers *s, uint64_t peer, json_t *worker)
 {
 	char text[192];
-	const struct session *p = s->tls ? session_find(s, peer) : NULL;
+	const struct session *p = s->tls ? peers_find(s, peer) : NULL;
 	if (!p || !*p->who.name)
 		return;
 	json_object_set_new(worker, "certificate", json_string(p->who.name));
@@ -76,7 +77,7 @@ static void add_certificate(const struct server *s, uint64_t peer, json_t *worke
 		json_object_set_new(worker, "warning", json_string(text));
 }
 
-static void add_tls(const struct server *s, json_t *o)
+static void add_tls(const struct peers *s, json_t *o)
 {
 	char text[384];
 	if (!s->tls)
@@ -90,28 +91,29 @@ static void add_tls(const struct server *s, json_t *o)
 }
 
 /* Here or not. */
-static json_t *quarantined_json(const struct server *s)
+static json_t *quarantined_json(const struct peers *s)
 {
 	json_t *list = json_array();
 	struct worker_status w;
-	for (uint64_t who = 0; (who = farm_next_quarantined(s->farm, who)) && farm_worker(s->farm, who, &w);)
+	for (uint64_t who = 0;
+	     (who = farm_next_quarantined(s->jobs->farm, who)) && farm_worker(s->jobs->farm, who, &w);)
 		json_array_append_new(list, view_aside_to_json(&w));
 	return list;
 }
 
-static void add_workers(struct server *s, json_t *o)
+static void add_workers(const struct peers *s, json_t *o)
 {
 	json_t *workers = json_array(), *leases = json_array();
 	struct peer_status p;
 	struct lease_status l;
-	double now = server_now(s);
-	for (uint64_t id = 0; (id = farm_next_peer(s->farm, id));) {
-		if (!farm_peer(s->farm, id, &p))
+	double now = jobs_now(s->jobs);
+	for (uint64_t id = 0; (id = farm_next_peer(s->jobs->farm, id));) {
+		if (!farm_peer(s->jobs->farm, id, &p))
 			continue;
 		json_t *worker = view_peer_to_json(&p, now);
 		add_certificate(s, id, worker);
 		json_array_append_new(workers, worker);
-		for (uint32_t i = 0; farm_lease(s->farm, id, i, &l); i++)
+		for (uint32_t i = 0; farm_lease(s->jobs->farm, id, i, &l); i++)
 			json_array_append_new(leases, view_lease_to_json(&l, p.name, now));
 	}
 	json_object_set_new(o, "workers", workers);
@@ -119,17 +121,17 @@ static void add_workers(struct server *s, json_t *o)
 	json_object_set_new(o, "leases", leases);
 }
 
-static json_t *snapshot(struct server *s)
+static json_t *snapshot(const struct peers *s)
 {
 	struct job_view *views;
-	size_t count = server_views(s, &views);
+	size_t count = jobs_views(s->jobs, &views);
 	json_t *o = object("snapshot");
 	json_object_set_new(o, "jobs", jobs_json(views, count));
 	add_workers(s, o);
 	add_tls(s, o);
 	json_object_set_new(o, "garbledConnections", json_integer((json_int_t)s->garbled));
-	if (recovery_is_on(s))
-		json_object_set_new(o, "reading", json_real(recovery_share(s)));
+	if (recovery_is_on(s->jobs))
+		json_object_set_new(o, "reading", json_real(recovery_share(s->jobs)));
 	mem_free(views);
 	return o;
 }
@@ -274,7 +276,7 @@ static void on_connection(uv_stream_t *listener, int status)
 		drop(r);
 		return;
 	}
-	say(r, snapshot(t->server));
+	say(r, snapshot(t->peers));
 }
 
 /* ---- changes ---- */
@@ -306,11 +308,11 @@ void status_tick(struct status_socket *t)
 		on_connection((uv_stream_t *)&t->listener, 0);
 	for (struct reader *r = t->readers; r; r = r->next)
 		topics |= r->topics;
-	if (!topics || t->shown_changes == t->server->changes)
+	if (!topics || t->shown_changes == t->jobs->changes)
 		return;
-	t->shown_changes = t->server->changes;
+	t->shown_changes = t->jobs->changes;
 	struct job_view *views;
-	size_t count = server_views(t->server, &views);
+	size_t count = jobs_views(t->jobs, &views);
 	for (size_t i = 0; i < count && (topics & TOPIC_JOBS); i++) {
 		const struct job_view *before = shown_before(t, views[i].record.id);
 		if (before && memcmp(before, &views[i], sizeof *before) == 0)
@@ -324,11 +326,11 @@ void status_tick(struct status_socket *t)
 	t->shown_count = count;
 	if (topics & TOPIC_WORKERS) {
 		json_t *o = object("workers");
-		add_workers(t->server, o);
+		add_workers(t->peers, o);
 		tell(t, TOPIC_WORKERS, o);
 	}
 	if (topics & TOPIC_SNAPSHOT)
-		tell(t, TOPIC_SNAPSHOT, snapshot(t->server));
+		tell(t, TOPIC_SNAPSHOT, snapshot(t->peers));
 }
 
 /* ---- life ---- */
@@ -419,7 +421,7 @@ static int make(struct status_socket *t, const char *group, struct error *e)
 	return rc;
 }
 
-int status_open(struct status_socket **out, struct server *s, int inherited, const char *path, const char *group,
+int status_open(struct status_socket **out, const struct peers *s, int inherited, const char *path, const char *group,
 		struct error *e)
 {
 	if (inherited >= 0 && group)
@@ -430,8 +432,9 @@ int status_open(struct status_socket **out, struct server *s, int inherited, con
 		mem_free(t);
 		return error_set(e, ENOMEM, "no memory for the status socket");
 	}
-	t->server = s;
-	uv_pipe_init(&s->loop, &t->listener, 0);
+	t->peers = s;
+	t->jobs = s->jobs;
+	uv_pipe_init(s->jobs->loop, &t->listener, 0);
 	t->listener.data = t;
 	*out = t;
 	int fault = 0, rc = 0;

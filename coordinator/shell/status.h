@@ -8,14 +8,16 @@
 #ifndef COORDINATOR_SHELL_STATUS_H
 #define COORDINATOR_SHELL_STATUS_H
 
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/peers.h"
+
+struct status_socket;
 
 /*
  * inherited: a listening socket that the service manager made, whose file stays when we go; -1: one is made at path.
  * group: who may connect besides us; NULL: nobody. -EADDRINUSE when somebody answers there already, -EEXIST when
  * something else is there (a link, too, wherever it leads), -EINVAL when there is no such group.
  */
-int status_open(struct status_socket **out, struct server *s, int inherited, const char *path, const char *group,
+int status_open(struct status_socket **out, const struct peers *s, int inherited, const char *path, const char *group,
 		struct error *e);
 void status_close(struct status_socket *t); /* NULL: nothing; asynchronous */
 void status_tick(struct status_socket *t);  /* NULL: nothing */

@@ -23,7 +23,7 @@ static int add_worker(json_t *list, const struct worker_status *w, struct error 
 		       : 0;
 }
 
-static void write_quarantined(struct server *s)
+static void write_quarantined(struct jobs *s)
 {
 	struct worker_status w;
 	struct error e;
@@ -48,7 +48,7 @@ static const char *text_of(const json_t *o, const char *key)
 	return text ? text : "";
 }
 
-static void tell_core(struct server *s, const json_t *w)
+static void tell_core(struct jobs *s, const json_t *w)
 {
 	struct event ev = {.kind = EVENT_ASIDE,
 			   .text = text_of(w, "why"),
@@ -62,11 +62,11 @@ static void tell_core(struct server *s, const json_t *w)
 		return;
 	}
 	log_event(LOG_WORKER_ASIDE, "name=%s why=%s", log_quote(ev.join.name).text, log_quote(ev.text).text);
-	server_step(s, &ev);
+	jobs_step(s, &ev);
 }
 
 /* The farm does not stand still for it: whoever gives wrong results will do so again, and is found again. */
-static int put_by(struct server *s, struct error *e)
+static int put_by(struct jobs *s, struct error *e)
 {
 	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
 	spool_path(s->spool, file, from);
@@ -78,7 +78,7 @@ static int put_by(struct server *s, struct error *e)
 	return spool_rename(from, to, folder, e);
 }
 
-int trust_open(struct server *s, struct error *e)
+int trust_open(struct jobs *s, struct error *e)
 {
 	char *text;
 	size_t size;
@@ -103,7 +103,7 @@ int trust_open(struct server *s, struct error *e)
 
 /* ---- what they did */
 
-double trust_share(const struct server *s, const Farm__Submit *m)
+double trust_share(const struct jobs *s, const Farm__Submit *m)
 {
 	return m->mixed ? 0 : m->verify > s->config.verify ? m->verify : s->config.verify;
 }
@@ -134,17 +134,17 @@ void trust_taken_back(struct live_job *o, uint64_t who)
 			o->credits[i].leases--;
 }
 
-static const char *name_of(const struct server *s, uint64_t who, char name[JOIN_NAME])
+static const char *name_of(const struct jobs *s, uint64_t who, char name[JOIN_NAME])
 {
 	struct worker_status w;
 	text_copy(name, JOIN_NAME, farm_worker(s->farm, who, &w) ? w.name : "?");
 	return name;
 }
 
-void trust_wrong(struct server *s, const struct action *a)
+void trust_wrong(struct jobs *s, const struct action *a)
 {
 	char name[JOIN_NAME];
-	struct live_job *o = server_live_job(s, a->job);
+	struct live_job *o = jobs_find(s, a->job);
 	if (o)
 		live_job_log(o, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text,
 			     log_quote(a->text).text);
@@ -165,14 +165,14 @@ static void note_credit(struct live_job *o, const char *name, const char *why, u
 	note(o, text);
 }
 
-void trust_anew(struct server *s, const struct action *a)
+void trust_anew(struct jobs *s, const struct action *a)
 {
-	struct live_job *o = server_live_job(s, a->job);
+	struct live_job *o = jobs_find(s, a->job);
 	if (o)
 		note(o, a->text);
 }
 
-void trust_quarantined(struct server *s, const struct action *a)
+void trust_quarantined(struct jobs *s, const struct action *a)
 {
 	char name[JOIN_NAME];
 	name_of(s, a->who, name);

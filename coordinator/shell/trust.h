@@ -8,20 +8,20 @@
 #ifndef COORDINATOR_SHELL_TRUST_H
 #define COORDINATOR_SHELL_TRUST_H
 
-#include "coordinator/shell/server.h"
+#include "coordinator/shell/jobs.h"
 
 /* Tells the core who is set aside, but for those that the configuration forgives. A file that
  * is damaged is put by as aside.damaged, and the log says so. */
-int trust_open(struct server *s, struct error *e);
+int trust_open(struct jobs *s, struct error *e);
 
 /* Of the job's leases that two workers compute: as it asks for, and no less than is asked of all; none of a mixed one.
  */
-double trust_share(const struct server *s, const Farm__Submit *m);
+double trust_share(const struct jobs *s, const Farm__Submit *m);
 
 void trust_merged(struct live_job *o, const struct action *a);
 void trust_taken_back(struct live_job *o, uint64_t who); /* one of its results counts no more */
-void trust_wrong(struct server *s, const struct action *a);
-void trust_anew(struct server *s, const struct action *a); /* chains that lost their states */
-void trust_quarantined(struct server *s, const struct action *a);
+void trust_wrong(struct jobs *s, const struct action *a);
+void trust_anew(struct jobs *s, const struct action *a); /* chains that lost their states */
+void trust_quarantined(struct jobs *s, const struct action *a);
 
 #endif

@@ -4,7 +4,7 @@
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "coordinator/shell/files.h"
-#include "coordinator/shell/session.h"
+#include "coordinator/shell/worker.h"
 
 enum {
 	BLOB_CHUNK = 1 << 20,
@@ -14,12 +14,12 @@ enum {
 
 static void send_job_info(struct session *p, uint64_t job)
 {
-	const struct live_job *o = server_live_job(p->server, job);
+	const struct live_job *o = jobs_find(p->jobs, job);
 	if (!o) {
-		session_send_job_end(p, job);
+		worker_send_job_end(p, job);
 		return;
 	}
-	session_allow_results(p, o);
+	worker_allow_results(p, o);
 	const Farm__Submit *from = live_job_submit(o);
 	Farm__JobInfo info;
 	Farm__Plan plan;
@@ -53,9 +53,9 @@ static void send_piece(struct session *p, const struct worker_request *a)
 	farm__envelope__init(&m);
 	unsigned char *bytes = mem_alloc(BLOB_CHUNK, 1);
 	ssize_t n = 0;
-	int fd = a->number == 0 && files_check(p->server, &h, FILES_CHECKED, &e)
+	int fd = a->number == 0 && files_check(p->jobs, &h, FILES_CHECKED, &e)
 			 ? -1
-			 : blob_open(p->server->blobs, &h, &size, &e);
+			 : blob_open(p->jobs->blobs, &h, &size, &e);
 	if (fd >= 0 && bytes)
 		n = disk_pread(fd, bytes, BLOB_CHUNK, a->number <= size ? (off_t)a->number : 0);
 	if (fd >= 0 && (!bytes || n < 0 || a->number > size))

@@ -37,10 +37,10 @@ void farm_turn(struct farm_world *w)
 
 static bool is_at_work(const struct server *s)
 {
-	for (const struct live_job *o = s->orders; o; o = o->next)
+	for (const struct live_job *o = s->jobs.orders; o; o = o->next)
 		if (o->busy)
 			return true;
-	return s->flushing || s->session_count;
+	return s->jobs.flushing || s->peers.session_count;
 }
 
 void farm_settle(struct farm_world *w)
@@ -142,7 +142,7 @@ static uint16_t port_of(const struct server *s)
 {
 	struct sockaddr_in a;
 	int size = sizeof a;
-	uv_tcp_getsockname(&s->listener, (struct sockaddr *)&a, &size);
+	uv_tcp_getsockname(&s->peers.listener, (struct sockaddr *)&a, &size);
 	return a.sin_port;
 }
 

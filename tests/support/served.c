@@ -41,10 +41,10 @@ static void on_look(uv_timer_t *t)
 		return;
 	held = wanted;
 	snprintf(path, sizeof path, "%s/held", folder);
-	for (struct live_job *o = s->orders; o; o = o->next)
+	for (struct live_job *o = s->jobs.orders; o; o = o->next)
 		o->busy = wanted;
 	if (!wanted)
-		server_order_free_again(s);
+		jobs_films_free(&s->jobs);
 	if (wanted && fclose(fopen(path, "w")))
 		abort();
 	if (!wanted && remove(path))

@@ -20,13 +20,20 @@
 
 enum { JOBS = 120, LIVING = 7, YOUNG = 9, DAY = 86400 };
 
-static struct server server;
+static struct jobs jobs;
 
 /* Each look at a file takes 0.2 ms: 120 jobs are more than 20 ms. */
 static int slow_open(const char *path, int flags, mode_t mode)
 {
 	usleep(200);
 	return disk_system.open(path, flags, mode);
+}
+
+static bool nobody_fetches(void *user, uint64_t job)
+{
+	(void)user;
+	(void)job;
+	return false;
 }
 
 static int no_flush(int fd)
@@ -38,14 +45,14 @@ static int no_flush(int fd)
 static bool has(uint64_t job, const char *file)
 {
 	char path[SPOOL_PATH_MAX];
-	spool_job_path(server.spool, job, file, path);
+	spool_job_path(jobs.spool, job, file, path);
 	return access(path, F_OK) == 0;
 }
 
 static void put(uint64_t job, const char *file)
 {
 	char path[SPOOL_PATH_MAX];
-	spool_job_path(server.spool, job, file, path);
+	spool_job_path(jobs.spool, job, file, path);
 	int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
 	assert_true(fd >= 0);
 	assert_int_equal(write(fd, "bytes", 5), 5);
@@ -64,8 +71,8 @@ static void add(uint64_t id, double ended)
 				 .rel_error = -1};
 	if (id == LIVING)
 		strcpy(r->state, "running");
-	assert_int_equal(spool_take_job(server.spool, id, &e), 0);
-	assert_int_equal(spool_write_record(server.spool, r, &e), 0);
+	assert_int_equal(spool_take_job(jobs.spool, id, &e), 0);
+	assert_int_equal(spool_write_record(jobs.spool, r, &e), 0);
 	put(id, "result.exr");
 	put(id, "checkpoint.tmp"); /* of a life that was cut short */
 	free(r);
@@ -87,22 +94,23 @@ static void add_rows(const char *path, double now)
 	assert_int_equal(sqlite3_close(db), SQLITE_OK);
 }
 
-static void open_server(void)
+static void open_jobs(void)
 {
 	struct error e;
 	char path[SPOOL_PATH_MAX];
-	memset(&server, 0, sizeof server);
+	memset(&jobs, 0, sizeof jobs);
+	jobs.peers.uses_result = nobody_fetches;
 	snprintf(path, sizeof path, "%s/spool", folder);
-	assert_int_equal(spool_open(&server.spool, path, &e), 0);
-	spool_path(server.spool, "jobs.db", path);
-	assert_int_equal(ledger_open(&server.ledger, path, &e), 0);
-	ledger_close(server.ledger);
+	assert_int_equal(spool_open(&jobs.spool, path, &e), 0);
+	spool_path(jobs.spool, "jobs.db", path);
+	assert_int_equal(ledger_open(&jobs.ledger, path, &e), 0);
+	ledger_close(jobs.ledger);
 	add_rows(path, (double)time(NULL));
-	assert_int_equal(ledger_open(&server.ledger, path, &e), 0);
-	server.config.clear_seconds = DAY;
+	assert_int_equal(ledger_open(&jobs.ledger, path, &e), 0);
+	jobs.config.clear_seconds = DAY;
 	struct timespec up;
 	clock_gettime(CLOCK_BOOTTIME, &up);
-	server.seen = (struct seen){.seconds = 100.0 * DAY, .up = (double)up.tv_sec};
+	jobs.seen = (struct seen){.seconds = 100.0 * DAY, .up = (double)up.tv_sec};
 }
 
 static void old_jobs_go_bit_by_bit(void **state)
@@ -115,29 +123,29 @@ static void old_jobs_go_bit_by_bit(void **state)
 	unsigned ticks = 0;
 	slow.fsync = no_flush;
 	disk_use(&slow);
-	open_server();
+	open_jobs();
 	for (uint64_t id = 1; id <= JOBS; id++)
 		add(id, now - (id == YOUNG ? 2 : 20) * DAY);
-	assert_int_equal(spool_take_job(server.spool, JOBS + 1, &e), 0); /* it never came to a record */
+	assert_int_equal(spool_take_job(jobs.spool, JOBS + 1, &e), 0); /* it never came to a record */
 	slow.open = slow_open;
 	do {
-		double begin = server_now(&server);
-		clear_tick(&server);
-		double took = server_now(&server) - begin;
+		double begin = jobs_now(&jobs);
+		clear_tick(&jobs);
+		double took = jobs_now(&jobs) - begin;
 		longest = took > longest ? took : longest;
 		ticks++;
-	} while (server.clearing);
+	} while (jobs.clearing);
 	disk_use(NULL);
 	print_message("   %d jobs in %u ticks, the longest %.1f ms\n", JOBS, ticks, 1e3 * longest);
 	assert_true(ticks >= 5);
 	for (uint64_t id = 1; id <= JOBS + 1; id++) {
 		bool stays = id == LIVING || id == YOUNG;
 		assert_true(has(id, NULL) == stays);
-		assert_int_equal(ledger_get(server.ledger, id, &j, &e), stays);
+		assert_int_equal(ledger_get(jobs.ledger, id, &j, &e), stays);
 	}
 	assert_true(has(YOUNG, "job.json") && !has(YOUNG, "result.exr") && has(LIVING, "result.exr"));
-	ledger_close(server.ledger);
-	spool_close(server.spool);
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
 }
 
 /* Records of an earlier version, and of a life whose clock went ahead: they are as young as they can be. */
@@ -149,27 +157,27 @@ static void of_unknown_age(void **state)
 	struct job_record *r = calloc(1, sizeof *r);
 	quick.fsync = no_flush;
 	disk_use(&quick);
-	open_server();
+	open_jobs();
 	for (uint64_t id = 1; id <= 2; id++) {
 		add(id, (double)time(NULL) - 20 * DAY);
-		assert_int_equal(spool_read_record(server.spool, id, r, &e), 0);
+		assert_int_equal(spool_read_record(jobs.spool, id, r, &e), 0);
 		r->ended_seen = id == 1 ? -1 : 1000.0 * DAY;
-		assert_int_equal(spool_write_record(server.spool, r, &e), 0);
+		assert_int_equal(spool_write_record(jobs.spool, r, &e), 0);
 	}
-	for (int day = 0; day < 3; day++, server.seen.seconds += 0.7 * DAY, server.clear_next = 0) {
+	for (int day = 0; day < 3; day++, jobs.seen.seconds += 0.7 * DAY, jobs.clear_next = 0) {
 		do
-			clear_tick(&server);
-		while (server.clearing);
+			clear_tick(&jobs);
+		while (jobs.clearing);
 		for (uint64_t id = 1; id <= 2; id++) {
 			assert_true(has(id, "result.exr") == (day < 2));
-			assert_int_equal(spool_read_record(server.spool, id, r, &e), 0);
+			assert_int_equal(spool_read_record(jobs.spool, id, r, &e), 0);
 			assert_true(r->ended_seen >= 100.0 * DAY && r->ended_seen < 100.0 * DAY + 100);
 		}
 	}
 	disk_use(NULL);
 	free(r);
-	ledger_close(server.ledger);
-	spool_close(server.spool);
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
 }
 
 /* What ended once more between the look and the end of it. */
@@ -181,24 +189,24 @@ static void what_has_changed_stays(void **state)
 	slow.fsync = no_flush;
 	slow.open = slow_open;
 	disk_use(&slow);
-	open_server();
+	open_jobs();
 	for (uint64_t id = 1; id <= JOBS; id++)
 		add(id, now - 20 * DAY);
-	clear_tick(&server);
-	assert_non_null(server.clearing);
+	clear_tick(&jobs);
+	assert_non_null(jobs.clearing);
 	struct error e;
 	struct job_record *r = calloc(1, sizeof *r);
-	assert_int_equal(spool_read_record(server.spool, 1, r, &e), 0);
+	assert_int_equal(spool_read_record(jobs.spool, 1, r, &e), 0);
 	r->ended_seen += 20 * DAY;
-	assert_int_equal(spool_write_record(server.spool, r, &e), 0);
+	assert_int_equal(spool_write_record(jobs.spool, r, &e), 0);
 	free(r);
-	while (server.clearing)
-		clear_tick(&server);
+	while (jobs.clearing)
+		clear_tick(&jobs);
 	disk_use(NULL);
 	assert_true(has(1, "result.exr") && !has(2, NULL));
-	clear_close(&server);
-	ledger_close(server.ledger);
-	spool_close(server.spool);
+	clear_close(&jobs);
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
 }
 
 /* Films are read while it is looked, and others while what was chosen goes. */
@@ -210,19 +218,19 @@ static void what_is_read_stays(void **state)
 	slow.fsync = no_flush;
 	slow.open = slow_open;
 	disk_use(&slow);
-	open_server();
+	open_jobs();
 	for (uint64_t id = 1; id <= JOBS; id++)
 		add(id, (double)time(NULL) - 20 * DAY);
-	server.reading = &first;
+	jobs.reading = &first;
 	do { /* the last job goes in a later tick than the first: 120 looks are more than one */
-		clear_tick(&server);
+		clear_tick(&jobs);
 		if (!has(1, "result.exr"))
-			server.reading = &second;
-	} while (server.clearing);
+			jobs.reading = &second;
+	} while (jobs.clearing);
 	disk_use(NULL);
 	assert_true(has(3, "result.exr") && has(JOBS, "result.exr") && !has(1, NULL) && !has(2, NULL) && !has(4, NULL));
-	ledger_close(server.ledger);
-	spool_close(server.spool);
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
 }
 
 int main(void)

@@ -572,12 +572,12 @@ static void a_row_ends_later(void **state)
 	end(SIGKILL, false);
 	struct server *s = open_here();
 	assert_non_null(s);
-	server_step(s, &(struct event){.kind = EVENT_CANCEL, .job = job});
-	assert_true(s->endings && !s->orders);
-	assert_int_equal(ledger_add(s->ledger, &j, &e), 0);
-	while (s->endings)
+	jobs_step(&s->jobs, &(struct event){.kind = EVENT_CANCEL, .job = job});
+	assert_true(s->jobs.endings && !s->jobs.orders);
+	assert_int_equal(ledger_add(s->jobs.ledger, &j, &e), 0);
+	while (s->jobs.endings)
 		uv_run(&s->loop, UV_RUN_ONCE);
-	assert_int_equal(ledger_next(s->ledger, 0, &j, &e), 1);
+	assert_int_equal(ledger_next(s->jobs.ledger, 0, &j, &e), 1);
 	assert_int_equal(j.id, 2);
 	server_close(s);
 }
@@ -604,17 +604,17 @@ static void no_memory_for_an_image(void **state)
 	uint64_t job = begin_a_job();
 	struct server *s = open_here();
 	assert_non_null(s);
-	struct live_job *o = server_live_job(s, job);
+	struct live_job *o = jobs_find(&s->jobs, job);
 	assert_true(o && o->canvas);
 	for (enum publish_what what = PUBLISH_ERROR_ONLY; what <= PUBLISH_RESULT; what++) {
 		mem_fail_after(0);
-		publish_start(s, o, what, live_job_rounds(o));
+		publish_start(&s->jobs, o, what, live_job_rounds(o));
 		mem_fail_after(-1);
-		assert_true(o->busy && !s->deferred);
+		assert_true(o->busy && !s->jobs.deferred);
 		while (o->busy || (what == PUBLISH_RESULT && !o->record.has_result))
 			uv_run(&s->loop, UV_RUN_ONCE);
 		struct job_status status;
-		assert_true(farm_job(s->farm, job, server_now(s), &status) && status.state == JOB_RUNNING);
+		assert_true(farm_job(s->jobs.farm, job, jobs_now(&s->jobs), &status) && status.state == JOB_RUNNING);
 	}
 	server_close(s);
 }
@@ -638,7 +638,8 @@ static bool opens_without(long allocation)
 	bool failed = has_failed();
 	assert_true(s || failed);
 	if (s) {
-		assert_true(s->orders && s->orders->canvas && farm_counts(s->farm, s->orders->id, &counts));
+		assert_true(s->jobs.orders && s->jobs.orders->canvas &&
+			    farm_counts(s->jobs.farm, s->jobs.orders->id, &counts));
 		server_close(s);
 	}
 	return failed;

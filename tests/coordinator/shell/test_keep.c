@@ -13,13 +13,13 @@
 
 #include <cmocka.h>
 
-static struct server server;
+static struct jobs jobs;
 static struct job_record ended[3];
 
 static void put(uint64_t job, const char *file, off_t size)
 {
 	char path[SPOOL_PATH_MAX];
-	spool_job_path(server.spool, job, file, path);
+	spool_job_path(jobs.spool, job, file, path);
 	int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
 	assert_true(fd >= 0);
 	assert_int_equal(ftruncate(fd, size), 0);
@@ -29,7 +29,7 @@ static void put(uint64_t job, const char *file, off_t size)
 static bool has(uint64_t job, const char *file)
 {
 	char path[SPOOL_PATH_MAX];
-	spool_job_path(server.spool, job, file, path);
+	spool_job_path(jobs.spool, job, file, path);
 	return access(path, F_OK) == 0;
 }
 
@@ -44,8 +44,8 @@ static void fill(void)
 		put(ids[i], "journal.2", 500);
 		put(ids[i], "result.exr", 9000);
 	}
-	server.ended = ended;
-	server.ended_count = 3;
+	jobs.ended = ended;
+	jobs.ended_count = 3;
 }
 
 static void the_first_go_first(void **state)
@@ -54,23 +54,23 @@ static void the_first_go_first(void **state)
 	struct error e;
 	char path[128];
 	snprintf(path, sizeof path, "%s/spool", folder);
-	assert_int_equal(spool_open(&server.spool, path, &e), 0);
+	assert_int_equal(spool_open(&jobs.spool, path, &e), 0);
 	for (uint64_t id = 1; id <= 3; id++)
-		assert_int_equal(spool_take_job(server.spool, id, &e), 0);
+		assert_int_equal(spool_take_job(jobs.spool, id, &e), 0);
 	fill();
-	server.config.keep_bytes = 3000;
-	keep_trim(&server);
+	jobs.config.keep_bytes = 3000;
+	keep_trim(&jobs);
 	assert_true(has(3, "order") && has(1, "checkpoint") && has(2, "journal.2"));
-	server.config.keep_bytes = 2999;
-	keep_trim(&server);
+	jobs.config.keep_bytes = 2999;
+	keep_trim(&jobs);
 	assert_false(has(3, "order") || has(3, "checkpoint") || has(3, "journal.2"));
 	assert_true(has(1, "order") && has(2, "order"));
-	assert_true(keep_drop_all(&server));
+	assert_true(keep_drop_all(&jobs));
 	assert_false(has(1, "order") || has(2, "checkpoint"));
-	assert_false(keep_drop_all(&server)); /* there is nothing more to be had */
+	assert_false(keep_drop_all(&jobs)); /* there is nothing more to be had */
 	for (uint64_t id = 1; id <= 3; id++)
 		assert_true(has(id, "result.exr"));
-	spool_close(server.spool);
+	spool_close(jobs.spool);
 }
 
 int main(void)

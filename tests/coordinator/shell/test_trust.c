@@ -70,8 +70,8 @@ static void a_long_list(void **state)
 	struct server *s = start();
 	struct worker_status w;
 	int count = 0, last = 0;
-	for (uint64_t who = 0; (who = farm_next_quarantined(s->farm, who)); count++) {
-		assert_true(farm_worker(s->farm, who, &w));
+	for (uint64_t who = 0; (who = farm_next_quarantined(s->jobs.farm, who)); count++) {
+		assert_true(farm_worker(s->jobs.farm, who, &w));
 		if (count == 0)
 			assert_true(strcmp(w.certificate, "b") == 0 && strcmp(w.name, "first") == 0 &&
 				    strcmp(w.text, "torn") == 0);
@@ -90,7 +90,7 @@ static void a_damaged_list(void **state)
 	fputs("{\"schema\":1,\"workers\":[{\"cert", f);
 	assert_int_equal(fclose(f), 0);
 	struct server *s = start();
-	assert_int_equal(farm_next_quarantined(s->farm, 0), 0);
+	assert_int_equal(farm_next_quarantined(s->jobs.farm, 0), 0);
 	server_close(s);
 	assert_int_equal(access(path("aside"), F_OK), -1);
 	assert_int_equal(access(path("aside.damaged"), F_OK), 0);
