@@ -4,8 +4,8 @@
 #include "common/base/output.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
-#include "coordinator/shell/limits.h"
-#include "coordinator/shell/server.h"
+#include "coordinator/server/limits.h"
+#include "coordinator/server/server.h"
 
 #include <argp.h>
 #include <stdio.h>

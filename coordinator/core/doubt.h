@@ -8,7 +8,7 @@
  * end of is taken back, sums and all, and computed again from the states before it, not by who made them while there is
  * another: the job has the bits that it would have had.
  *  - There is no third: the same, and nobody is to blame.
- * Where the shell no longer has what came before, or an epoch was computed again AGAIN_MOST times and its states are
+ * Where the caller no longer has what came before, or an epoch was computed again AGAIN_MOST times and its states are
  * refused still, the chains begin anew from their seeds: an epoch that depends on the plan alone, and what came before
  * it stays in the films. A job does not fail by it. Memory of a slot; but for who made its states nothing survives a
  * restart of the coordinator, which asks again.
@@ -38,7 +38,7 @@ struct doubt {
 };
 enum { AGAIN_MOST = 4 };
 
-/* The lease of this worker is dropped already. can: the shell has what it takes to compute the epoch before again. */
+/* The lease of this worker is dropped already. can: the caller has what it takes to compute the epoch before again. */
 void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can, const char *text);
 /* Somebody else is asked about the states. */
 bool doubt_waits(const struct slot *s);

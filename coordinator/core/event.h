@@ -35,7 +35,7 @@ enum event_kind {
 	EVENT_EXTEND,	/* tag, job, plan: its own, but for the bounds; not fewer rounds */
 	EVENT_ASIDE, /* join (but for peer, fingerprint, threads), text: a worker that was set aside in an earlier life
 		      */
-	EVENT_JOB_BROKEN, /* job, text: the shell cannot go on with it (a sum left the grid, the disk is full) */
+	EVENT_JOB_BROKEN, /* job, text: the caller cannot go on with it (a sum left the grid, the disk is full) */
 };
 
 /* A job may be held for each of these at once; its leases go out when it is held for none. */
@@ -54,7 +54,7 @@ struct batch_digest {
 enum { JOIN_HOME = 40, JOIN_NAME = 128 /* bytes of a home's name and of a worker's, their ends included */ };
 
 struct event_join {
-	uint64_t peer;		 /* chosen by the shell, not 0, never used twice while the farm lives */
+	uint64_t peer;		 /* chosen by the caller, not 0, never used twice while the farm lives */
 	const char *name;	 /* not empty */
 	const char *fingerprint; /* compared as a whole */
 	uint32_t threads;

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What the shell has to do after a step of the core (farm.h): a list of actions, to be carried out in their order.
+ * What the caller has to do after a step of the core (farm.h): a list of actions, to be carried out in their order.
  * The list and its texts belong to the core and are valid until the next farm_step.
  */
 #ifndef COORDINATOR_CORE_UPDATE_H
@@ -48,7 +48,7 @@ enum action_kind {
 	ACTION_JOB_FORGOTTEN, /* job: too many ended jobs; the core answers no more questions about it */
 	/* who, job, key, text: the batch of this lease, the last of its (group, part), is taken out of the films, and
 	 * the states before it are the last ones again; its lease goes out once more. Only where the event says that
-	 * the shell can. */
+	 * the caller can. */
 	ACTION_TAKE_BACK,
 	ACTION_CHAINS_ANEW, /* job, key, text: the chains of this lease begin from their seeds (doubt.h) */
 	ACTION_WRONG,	    /* who, job, key, text: a worker's answer, noted before, is not what two others say */

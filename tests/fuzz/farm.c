@@ -4,7 +4,7 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "common/wire/batch_wire.h"
-#include "coordinator/shell/session.h"
+#include "coordinator/peers/session.h"
 #include "tests/fuzz/folders.h"
 #include "tests/support/black_results.h"
 #include "tests/support/checksummed_frame.h"

@@ -10,7 +10,7 @@
 
 #include "common/film/batch.h"
 #include "common/wire/frame.h"
-#include "coordinator/shell/server.h"
+#include "coordinator/server/server.h"
 #include "tests/fuzz/messages.h"
 
 enum { FARM_DONE = 1, FARM_CHAINS = 2, FARM_BOOTSTRAP = 3, FARM_SAMPLES = 4, FARM_ENDED = 5 };

@@ -91,6 +91,38 @@ circles() {
 	}'
 }
 
+# An include that crosses a folder and whose header, by way of other files, comes back to the one that has it; a source and
+# its header are one file here. The list cannot say this of the single headers that it allows.
+returns() {
+	awk '
+	function file(name) { sub(/\.[ch](:.*)?$/, "", name); return name }
+	function folder(name) { sub(/\/[^\/]*$/, "", name); return name }
+	function reaches(from, to,   i, next_, count) {
+		if (from == to)
+			return 1
+		if (from in seen)
+			return 0
+		seen[from] = 1
+		count = split(out[from], next_, " ")
+		for (i = 1; i <= count; i++)
+			if (reaches(next_[i], to))
+				return 1
+		return 0
+	}
+	$1 == "--" { reading = 1; next }
+	!reading || substr($3, 1, 1) != "\"" { next }
+	{ a = file($1); b = file(substr($3, 2)) }
+	a == b || index(out[a] " ", " " b " ") { next }
+	{ out[a] = out[a] " " b; if (folder(a) != folder(b)) { n++; from[n] = a; to[n] = b; where[n] = $1 } }
+	END {
+		for (k = 1; k <= n; k++) {
+			split("", seen)
+			if (reaches(to[k], from[k]))
+				print where[k] ": " to[k] " comes back to " from[k]
+		}
+	}' "${TMPDIR:-/tmp}/includes.$$"
+}
+
 doors() {
 	awk '
 	$1 == "--" { reading = 1; next }
@@ -129,6 +161,7 @@ overlong() {
 check "every include between folders is in $LIST" edges
 check "coordinator and worker do not include each other, common includes neither, nobody tests" borders
 check "no folders in a circle" circles
+check "no files of different folders in a circle" returns
 check "each library is included only at its door" doors
 check "no unfinished marks" marks
 check "no source of more than $MOST_LINES lines" overlong $MOST_LINES $SOURCES

@@ -4,7 +4,7 @@
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "common/exr/exr.h"
-#include "coordinator/shell/server.h"
+#include "coordinator/server/server.h"
 #include "tests/support/folder.h"
 
 #include <setjmp.h>

@@ -2,7 +2,8 @@
 #include "tests/support/served.h"
 
 #include "common/base/mem.h"
-#include "coordinator/shell/server.h"
+#include "coordinator/jobs/step.h"
+#include "coordinator/server/server.h"
 #include "tests/support/checksummed_frame.h"
 
 #include <stdarg.h>

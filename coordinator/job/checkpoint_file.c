@@ -1,0 +1,163 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The file of a checkpoint: a head, then the seeds, chain states and films of the job, under a checksum
+ * (common/base/checked_file.h).
+ *
+ * A file that is damaged is -EBADMSG, one of another version or of a machine with another layout -EPROTO: the sizes are
+ * looked at before anything is allocated by them.
+ */
+#include "coordinator/job/checkpoint_file.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "common/film/canvas_save.h"
+
+#include <stdio.h>
+#include <string.h>
+
+static const char magic[8] = "hsltC004";
+_Static_assert(sizeof(struct checkpoint_head) == 4528, "another layout is another version");
+
+static uint32_t slots_of(const struct live_job *o)
+{
+	return o->plan.groups * o->plan.parts;
+}
+
+void checkpoint_head_of(struct checkpoint_head *h, const struct live_job *o, const struct job_status *status)
+{
+	uint64_t generation = journal_generation(o->journal) + 1;
+	*h = (struct checkpoint_head){.bytes = sizeof *h,
+				      .worker_count = o->worker_count,
+				      .job = o->id,
+				      .generation = generation < o->generation_least ? o->generation_least : generation,
+				      .cpu_seconds = o->cpu_seconds,
+				      .bootstrap_cpu_seconds = o->record.bootstrap_cpu_seconds,
+				      .look_written = o->look_written,
+				      .times = o->times,
+				      .lit = o->lit,
+				      .counts = o->counts,
+				      .looks = *status->looks};
+	memcpy(h->magic, magic, sizeof magic);
+	snprintf(h->fingerprint, sizeof h->fingerprint, "%s", status->fingerprint);
+}
+
+static int write_states(const struct live_job *o, struct checked_file *out, struct error *e)
+{
+	int rc = 0;
+	for (uint32_t i = 0; i < slots_of(o) && !rc; i++) {
+		uint32_t there = o->states[i] != NULL;
+		rc = checked_file_write(out, &there, sizeof there, e);
+		for (uint32_t k = 0; there && k < o->chains_per_lease && !rc; k++) {
+			rc = checked_file_write(out, &o->states[i][k].size, sizeof o->states[i][k].size, e);
+			if (!rc)
+				rc = checked_file_write(out, o->states[i][k].bytes, o->states[i][k].size, e);
+		}
+	}
+	return rc;
+}
+
+int checkpoint_write(const struct live_job *o, const struct checkpoint_head *h, struct checked_file *out,
+		     struct error *e)
+{
+	int rc = checked_file_write(out, h, sizeof *h, e);
+	if (!rc && o->seeds)
+		rc = checked_file_write(out, o->seeds, o->plan.chains * sizeof *o->seeds, e);
+	if (!rc)
+		rc = write_states(o, out, e);
+	return rc ? rc : canvas_save(o->canvas, out, e);
+}
+
+static int read_states(struct live_job *o, struct checked_file *in, struct error *e)
+{
+	int rc = 0;
+	for (uint32_t i = 0; i < slots_of(o) && !rc; i++) {
+		uint32_t there;
+		rc = checked_file_read(in, &there, sizeof there, e);
+		if (rc || !there)
+			continue;
+		o->states[i] = mem_alloc(o->chains_per_lease, sizeof *o->states[i]);
+		if (!o->states[i])
+			return error_set(e, ENOMEM, "no memory for chains");
+		for (uint32_t k = 0; k < o->chains_per_lease && !rc; k++) {
+			struct chain_state *c = &o->states[i][k];
+			uint32_t size;
+			rc = checked_file_read(in, &size, sizeof size, e);
+			if (!rc && (size == 0 || size > CHAIN_STATE_MAX))
+				rc = error_set(e, EBADMSG, "the state of a chain has %u bytes", size);
+			if (!rc && !(c->bytes = mem_alloc(size, 1)))
+				rc = error_set(e, ENOMEM, "no memory for chains");
+			if (!rc) {
+				c->size = size;
+				rc = checked_file_read(in, c->bytes, size, e);
+			}
+		}
+	}
+	return rc;
+}
+
+static void take_head(struct live_job *o, const struct checkpoint_head *h)
+{
+	o->worker_count = h->worker_count;
+	o->cpu_seconds = o->record.cpu_seconds = h->cpu_seconds;
+	o->record.bootstrap_cpu_seconds = h->bootstrap_cpu_seconds;
+	o->look_written = h->look_written;
+	o->times = h->times;
+	o->lit = h->lit;
+	o->record.looks.count = 0;
+	for (uint32_t i = 0; i < h->looks.count && i < FORECAST_LOOKS; i++)
+		forecast_add_look(&o->record.looks, &h->looks.looks[i]);
+	o->counts = h->counts;
+	snprintf(o->fingerprint, sizeof o->fingerprint, "%s", h->fingerprint);
+}
+
+static int read_all(struct live_job *o, struct checked_file *in, uint64_t *generation, struct error *e)
+{
+	struct checkpoint_head h;
+	int rc = checked_file_read(in, &h, offsetof(struct checkpoint_head, worker_count),
+				   e); /* another version's may be shorter */
+	if (!rc)
+		rc = spool_check_version(h.magic, magic, in->path, e);
+	if (!rc && h.bytes != sizeof h)
+		rc = error_set(e, EPROTO,
+			       "%s: its head has %u bytes instead of %zu: a coordinator for another machine wrote it",
+			       in->path, h.bytes, sizeof h);
+	if (!rc)
+		rc = checked_file_read(in, &h.worker_count, sizeof h - offsetof(struct checkpoint_head, worker_count),
+				       e);
+	if (!rc && h.job != o->id)
+		rc = error_set(e, EBADMSG, "%s: of j%llu", in->path, (unsigned long long)h.job);
+	if (rc)
+		return rc;
+	h.fingerprint[sizeof h.fingerprint - 1] = 0;
+	take_head(o, &h);
+	*generation = h.generation;
+	int exponent = canvas_grid_exponent(&o->plan, o->lit.b_pooled, live_job_submit(o)->brightest);
+	rc = canvas_new(&o->canvas, &o->plan, exponent, o->film_folder, e);
+	if (!rc && o->seeds)
+		rc = checked_file_read(in, o->seeds, o->plan.chains * sizeof *o->seeds, e);
+	if (!rc)
+		rc = read_states(o, in, e);
+	if (!rc)
+		rc = canvas_load(o->canvas, in, e);
+	bootstrap_free(o->bootstrap);
+	o->bootstrap = NULL;
+	o->checkpoint_bytes = in->bytes;
+	return rc;
+}
+
+int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation, checked_file_heard *heard,
+		    void *user, struct error *e)
+{
+	char name[SPOOL_PATH_MAX];
+	struct checked_file in;
+	spool_job_path(spool, o->id, "checkpoint.tmp", name);
+	disk_unlink(name); /* of a life that ended before it was whole */
+	spool_job_path(spool, o->id, "checkpoint", name);
+	int rc = checked_file_open_heard(&in, name, heard, user, e);
+	if (rc)
+		return rc;
+	in.bytes = in.left;
+	rc = read_all(o, &in, generation, e);
+	checked_file_close(&in);
+	return rc;
+}

@@ -1,0 +1,107 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/job/extend_plan.h"
+
+#include <math.h>
+#include <string.h>
+
+/* Samples or mutations that were asked for, as plan_make counts them; if nothing was, those that are done. */
+static uint64_t total_of(const struct plan *p, const struct plan_request *asked, uint64_t rounds)
+{
+	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, total = 0;
+	if (p->rounds == UINT64_MAX)
+		return p->kind == PLAN_CHAINS ? rounds * plan_round_mutations(p)
+					      : rounds * p->groups * p->epoch * pixels;
+	if (asked->spp)
+		total = asked->spp * pixels;
+	return asked->mutations && (!total || asked->mutations < total) ? asked->mutations : total;
+}
+
+static int more_rounds(const struct plan *p, const struct extension *x, const struct extension_from *from,
+		       struct plan_request *asked, struct error *e)
+{
+	uint64_t pixels = (uint64_t)p->crop_width * p->crop_height, more, total;
+	if (p->rounds == UINT64_MAX && !from->ended)
+		return error_set(e, EINVAL, "it runs without a bound of samples: name a time or an error");
+	if (__builtin_mul_overflow(x->spp, pixels, &more) || __builtin_add_overflow(more, x->mutations, &more) ||
+	    __builtin_add_overflow(more, total_of(p, asked, from->rounds), &total))
+		return error_set(e, EINVAL, "more samples than can be counted");
+	asked->mutations = total;
+	return 0;
+}
+
+/* The counts that a plan was cut by are not chosen anew. */
+static void keep_cut(const struct plan *p, struct plan_request *asked)
+{
+	asked->chains = p->chains;
+	asked->groups = p->groups;
+	asked->parts = p->parts;
+	asked->bootstrap = p->bootstrap;
+	asked->epoch = p->epoch;
+}
+
+static bool same_bits(const struct plan *a, const struct plan *b)
+{
+	struct plan c = *b;
+	c.rounds = a->rounds;
+	c.seconds = a->seconds;
+	c.target_error = a->target_error;
+	return a->kind == c.kind && a->width == c.width && a->height == c.height && a->crop_x == c.crop_x &&
+	       a->crop_y == c.crop_y && a->crop_width == c.crop_width && a->crop_height == c.crop_height &&
+	       a->border == c.border && a->seed == c.seed && a->groups == c.groups && a->parts == c.parts &&
+	       a->chains == c.chains && a->bootstrap == c.bootstrap && a->epoch == c.epoch &&
+	       a->min_depth == c.min_depth && a->max_depth == c.max_depth &&
+	       memcmp(a->integrator, c.integrator, sizeof a->integrator) == 0 &&
+	       memcmp(a->mutations, c.mutations, sizeof a->mutations) == 0 &&
+	       memcmp(a->accuracy, c.accuracy, sizeof a->accuracy) == 0 &&
+	       memcmp(a->effects, c.effects, sizeof a->effects) == 0;
+}
+
+int extend_check(const struct extension *x, struct error *e)
+{
+	if (!isfinite(x->seconds) || !isfinite(x->target_error) || x->seconds < 0 || x->target_error < 0)
+		return error_set(e, EINVAL, "a time or an error that is none");
+	if (!x->spp && !x->mutations && !(x->seconds > 0) && !(x->target_error > 0))
+		return error_set(e, EINVAL, "by what? --spp, --mutations, --time or --target-error");
+	return 0;
+}
+
+int extend_plan(const struct plan *p, const struct extension *x, const struct extension_from *from,
+		struct plan_request *asked, struct plan *out, struct error *e)
+{
+	bool samples = x->spp || x->mutations, time = x->seconds > 0, error = x->target_error > 0;
+	int rc = extend_check(x, e);
+	if (rc)
+		return rc;
+	if (error && from->ended && from->error <= x->target_error)
+		return error_set(e, EINVAL, "its error is %.3g %% already", 100 * from->error);
+	uint64_t total = total_of(p, asked, from->rounds);
+	bool bounded = p->rounds != UINT64_MAX;
+	asked->spp = 0;
+	asked->mutations = bounded ? total : 0;
+	rc = samples ? more_rounds(p, x, from, asked, e) : 0;
+	if (rc)
+		return rc;
+	if (!samples && from->ended && bounded && from->rounds >= p->rounds)
+		asked->mutations = 0; /* met */
+	asked->seconds = p->seconds;
+	if (time)
+		asked->seconds = (p->seconds > 0 ? p->seconds : from->seconds) + x->seconds;
+	else if (from->ended && p->seconds > 0 && from->seconds >= p->seconds)
+		asked->seconds = 0;
+	asked->target_error = p->target_error;
+	if (error)
+		asked->target_error = x->target_error;
+	else if (from->ended && from->error <= p->target_error)
+		asked->target_error = 0;
+	keep_cut(p, asked);
+	rc = plan_make(asked, out, e);
+	if (!rc && !same_bits(p, out))
+		rc = error_set(e, EINVAL, "its plan was made by a version with other rules: submit it again");
+	if (!rc && out->rounds < p->rounds && !from->ended)
+		rc = error_set(e, EINVAL, "it would end earlier than it does");
+	if (!rc && out->rounds <= from->rounds)
+		rc = error_set(e, EINVAL, "it has as many samples already");
+	if (!rc && out->seconds > 0 && from->ended && from->seconds >= out->seconds)
+		rc = error_set(e, EINVAL, "it took %.3g s already", from->seconds);
+	return rc;
+}

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/job/jobs.h"
+
+#include <string.h>
+
+double jobs_now(const struct jobs *s)
+{
+	(void)s;
+	return (double)uv_hrtime() * 1e-9;
+}
+
+bool jobs_is_read(const struct jobs *s, uint64_t job)
+{
+	for (const struct found *f = s->found; f; f = f->next)
+		if (f->record.id == job)
+			return true;
+	return s->reading && s->reading->id == job;
+}
+
+static uint64_t found_film_bytes(const struct jobs *s)
+{
+	uint64_t sum = 0;
+	for (const struct found *f = s->found; f; f = f->next)
+		if (f->order && f->order->canvas && !canvas_is_mapped(f->order->canvas))
+			sum += canvas_bytes(&f->order->plan);
+	return sum;
+}
+
+const char *jobs_film_folder(const struct jobs *s, const struct plan *p)
+{
+	uint64_t bytes = canvas_bytes(p) + found_film_bytes(s) + (s->reading ? canvas_bytes(&s->reading->plan) : 0);
+	for (const struct live_job *o = s->orders; o; o = o->next)
+		if (o->canvas && !canvas_is_mapped(o->canvas))
+			bytes += canvas_bytes(&o->plan);
+	return bytes <= s->config.film_bytes ? NULL : spool_canvas(s->spool);
+}
+
+struct live_job *jobs_find(const struct jobs *s, uint64_t job)
+{
+	for (struct live_job *o = s->orders; o; o = o->next)
+		if (o->id == job)
+			return o;
+	return NULL;
+}
+
+int jobs_within_quota(const struct jobs *s, const char *owner, uint64_t job, uint64_t uploading,
+		      const struct plan *plan, const Farm__Submit *m, struct error *e)
+{
+	struct quota_use has = {.asset_bytes = uploading};
+	for (const struct live_job *o = s->orders; o; o = o->next) {
+		if (o->ended || o->id == job || strcmp(o->record.owner, owner) != 0)
+			continue;
+		has.jobs++;
+		has.asset_bytes += live_job_asset_bytes(live_job_submit(o));
+	}
+	return quota_check(&s->config.quota, &has, plan, live_job_asset_bytes(m), e);
+}

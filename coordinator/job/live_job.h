@@ -1,0 +1,182 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * An order: a live job with all its weight, beside the few numbers that the core (coordinator/core) keeps of it. Scene
+ * bundle as submitted, bootstrap, canvas, seeds, the chain states of each (group, part)'s last merged epoch, its log.
+ * The loop's thread, but while `busy` a thread of the pool reads the canvas and nobody adds to it.
+ */
+#ifndef COORDINATOR_JOB_LIVE_JOB_H
+#define COORDINATOR_JOB_LIVE_JOB_H
+
+#include "common/base/log.h"
+#include "common/blob/blob.h"
+#include "common/estimate/canvas_image.h"
+#include "common/estimate/convergence.h"
+#include "common/estimate/merge.h"
+#include "common/wire/batch_wire.h"
+#include "coordinator/job/view.h"
+#include "coordinator/store/journal.h"
+#include "coordinator/store/spool.h"
+
+#include <uv.h>
+
+struct jobs;
+struct live_job;
+
+/* Work on a whole film (coordinator/jobs/publish.h). */
+enum publish_what {
+	PUBLISH_ERROR_ONLY, /* answered by EVENT_ERROR_KNOWN */
+	PUBLISH_PREVIEW,    /* preview.exr */
+	PUBLISH_RESULT,	    /* result.exr */
+};
+
+struct publishing { /* one of an order at a time */
+	uv_work_t work;
+	struct jobs *jobs;
+	struct live_job *order;
+	enum publish_what what;
+	uint64_t rounds;
+	double wall_seconds;
+	enum job_end end;
+	struct canvas_image image;
+	struct convergence agreement;
+	int rc;
+	struct error error;
+};
+
+/* A result that came while the canvas was busy. */
+struct waiting_batch {
+	struct waiting_batch *next;
+	uint64_t peer;
+	struct lease_key key;
+	struct envelope envelope;
+	struct buf payload;
+};
+
+/* Seconds after the job's first lease, in this life and those before: at the last merged batch, when the first round
+ * opened, when the last round was complete. NAN: not yet. */
+struct live_job_times {
+	double elapsed, opened, completed;
+};
+
+/* Results of a worker that count though nobody else made them, too. */
+struct live_job_credit {
+	uint64_t who; /* as the core knows it */
+	uint64_t leases;
+};
+
+/* Where a result lies in the journal that cannot count yet (late.h). */
+struct late_result {
+	struct lease_key key;
+	uint64_t at;
+	uint64_t peer; /* to whom the core has given its lease meanwhile; 0: nobody */
+};
+
+/* Where a batch that is merged lies in the journal (back.h). */
+struct merged_record {
+	uint32_t slot;
+	uint64_t epoch, at;
+};
+
+/* Who gave the last batch; name "": nobody knows. */
+struct live_job_maker {
+	char name[128], certificate[72], home[40];
+	uint64_t restarts;
+};
+
+struct live_job {
+	struct live_job *next;
+	uint64_t id;
+	struct envelope submit; /* owned */
+	struct plan plan;
+	struct job_record record;
+	struct bootstrap *bootstrap; /* until the canvas is there */
+	struct canvas *canvas;	     /* from then on */
+	const char *film_folder;     /* where it goes when it is read from the spool; NULL: into memory */
+	struct bootstrap_result lit;
+	uint64_t *seeds;	       /* [groups][chains / groups]; NULL for samples */
+	struct chain_state **states;   /* [groups x parts]; NULL entries: no epoch merged yet */
+	struct live_job_maker *makers; /* as many: of those */
+	bool *again;		       /* as many: the next batch comes in the place of one that was taken back */
+	struct merged_record *merged;  /* as they were merged */
+	size_t merged_count, merged_capacity;
+	uint64_t kept_bytes; /* of the journal: what is merged in its checkpoint */
+	uint32_t chains_per_lease;
+	int log; /* a file descriptor */
+	uint64_t log_bytes;
+	struct journal *journal;
+	bool pinned;		  /* the journal knows whose it is */
+	struct job_counts counts; /* as they were written down last */
+	struct live_job_times times;
+	char fingerprint[256];	   /* of an earlier life */
+	uint64_t checkpoint_bytes; /* of the last one */
+	double checkpoint_after;   /* s on the loop's clock: not before */
+	double look_written;	   /* work of the last look in the journal */
+	bool lacks_file;	   /* of its scene: it is held for that */
+	bool held;		   /* the disk has no room for a result of so many bytes: */
+	size_t held_bytes;
+	double try_again;
+	bool unsure;		   /* whether the last checkpoint has its name: nothing is stored before the next has */
+	uint64_t generation_least; /* of that one */
+	bool unprepared;	   /* the disk has no room for its films yet */
+	bool unpublished;	   /* it has ended, but its image could not be written yet */
+	uint64_t unpublished_rounds;
+	bool unrecorded; /* ... but its record could not */
+	bool overflowed; /* a sum of its batches left the films' range: they are kept as they are */
+	bool busy, ended;
+	struct publishing publishing; /* while busy */
+	bool black;		      /* as the image that was published, or the bootstrap */
+	double preview_made;	      /* s on the loop's clock; 0: never */
+	double cpu_seconds;	      /* of all merged leases */
+	uint32_t worker_count;	      /* who had leases of it */
+	uint64_t last_workers[64];
+	struct live_job_credit *credits;
+	size_t credit_count;
+	char doubts[512]; /* about those of workers that are set aside by now; "": none */
+	struct late_result *late;
+	size_t late_count, late_capacity;
+	struct waiting_batch *waiting, **waiting_last;
+	size_t waiting_bytes;
+};
+
+/* Takes the submission, writes a record if it is new. The job's folder is there; owner as in the record; submitted: s
+ * since 1970, of a job of an earlier life; 0: now. */
+int live_job_new(struct live_job **o, uint64_t id, struct envelope *submit, const struct plan *plan, const char *owner,
+		 double submitted, struct spool *s, struct error *e);
+/* Frees the memory; blobs and files stay. Not while busy. */
+void live_job_free(struct live_job *o);
+
+const Farm__Submit *live_job_submit(const struct live_job *o);
+__attribute__((format(printf, 3, 4))) void live_job_log(struct live_job *o, enum log_event event, const char *fields,
+							...);
+
+/* A batch that the core has accepted. Takes its states out of it. */
+int live_job_merge(struct live_job *o, struct batch *b, struct error *e);
+/* So many seconds after the first lease the batch was merged, and what comes of it done. rounds: complete before. */
+void live_job_note_times(struct live_job *o, double elapsed, uint64_t rounds);
+uint64_t live_job_rounds(const struct live_job *o); /* complete */
+/* All bootstrap batches are in: b, seeds, canvas. */
+int live_job_prepare(struct live_job *o, const char *canvas_folder, struct error *e);
+/* A lease begins with chain states, those of the epoch before, and they are those of this digest. */
+bool live_job_gives_states(const struct live_job *o, const struct lease_key *k, const struct blob_hash *digest);
+/* The lease as a frame for a worker. anew: with seeds, whatever its epoch. */
+int live_job_pack_lease(const struct live_job *o, const struct lease_key *k, bool anew, unsigned char **frame,
+			size_t *size, struct error *e);
+void live_job_count_worker(struct live_job *o, uint64_t peer);
+
+/* Takes both. false: memory is out. */
+bool live_job_put_off(struct live_job *o, uint64_t peer, const struct lease_key *k, struct envelope *env,
+		      struct buf *payload);
+const struct waiting_batch *live_job_waits_for(const struct live_job *o,
+					       const struct lease_key *k); /* NULL: no result of that lease */
+struct waiting_batch *live_job_take_waiting(struct live_job *o);	   /* NULL: none */
+/* The results of a worker that has gone, of these orders. */
+void orders_drop_waiting(struct live_job *first, uint64_t peer);
+void waiting_batch_free(struct waiting_batch *w);
+
+/* Lets go of the bundle's blobs. */
+void live_job_release_blobs(const Farm__Submit *m, struct blob_store *s);
+uint64_t live_job_asset_bytes(const Farm__Submit *m); /* of its files, as it says */
+/* A file's hash in a message of which the length was checked. */
+struct blob_hash live_job_file_hash(const Farm__File *f);
+
+#endif

@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * How much of the farm one owner may take: the name in a client's certificate, or without TLS all clients together.
+ * Operators are free. Looked at when a job is submitted, before its files are sent; pure.
+ */
+#ifndef COORDINATOR_JOB_QUOTA_H
+#define COORDINATOR_JOB_QUOTA_H
+
+#include "common/base/error.h"
+#include "common/plan/plan.h"
+
+#include <stdint.h>
+
+struct quota {		      /* 0: no limit */
+	uint64_t jobs;	      /* that have not ended, of one owner */
+	uint64_t asset_bytes; /* of their files, each job's counted, and of those that are on their way */
+	uint64_t film_bytes;  /* of a job's films, as canvas_bytes */
+	uint64_t mutations;   /* or samples, of a job; then every job must have such a bound */
+};
+
+/* What the owner has already. */
+struct quota_use {
+	uint64_t jobs, asset_bytes;
+};
+
+/* -EDQUOT with a sentence for the client. */
+int quota_check(const struct quota *q, const struct quota_use *has, const struct plan *p, uint64_t asset_bytes,
+		struct error *e);
+
+#endif

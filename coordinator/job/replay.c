@@ -1,0 +1,273 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/job/replay.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "common/wire/frame.h"
+#include "coordinator/job/back.h"
+#include "coordinator/job/checkpoint_file.h"
+#include "coordinator/job/late.h"
+
+#include <string.h>
+
+enum { DAMAGED_MOST = 16 /* leases that are named */ };
+
+struct replay {
+	struct live_job *order;
+	struct replay_progress *progress; /* NULL: nobody looks */
+	double elapsed;
+	uint64_t batches;
+	struct lease_key damaged[DAMAGED_MOST]; /* whose records are */
+	size_t damaged_count;
+};
+
+int replay_unpack(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
+		  const unsigned char **payload, size_t *payload_size, struct error *e)
+{
+	uint32_t header = 0, rest = 0;
+	*payload = NULL;
+	*payload_size = 0;
+	if (size >= FRAME_PREFIX)
+		frame_prefix_read(frame, &header, &rest);
+	if (size < FRAME_PREFIX || (uint64_t)header + rest != size - FRAME_PREFIX)
+		return error_set(e, EBADMSG, "a frame of another length");
+	int rc = envelope_unpack(env, frame + FRAME_PREFIX, header, e);
+	if (!rc && env->message->body_case != want) {
+		envelope_fini(env);
+		rc = error_set(e, EBADMSG, "another message than was expected");
+	}
+	*payload = frame + FRAME_PREFIX + header;
+	*payload_size = rest;
+	return rc;
+}
+
+/* ---- the journal */
+
+enum replay_place replay_place(const struct live_job *o, const struct lease_key *k)
+{
+	if (k->kind == LEASE_BOOTSTRAP)
+		return o->bootstrap && !bootstrap_has(o->bootstrap, k->group, k->part) ? REPLAY_FITS : REPLAY_MERGED;
+	if (o->bootstrap)
+		return REPLAY_LATE;
+	if (canvas_has(o->canvas, k))
+		return REPLAY_MERGED;
+	struct lease_key before = *k;
+	before.epoch--;
+	bool open = k->epoch <= canvas_rounds(o->canvas) + 1;
+	return open && (k->epoch == 0 || canvas_has(o->canvas, &before)) ? REPLAY_FITS : REPLAY_LATE;
+}
+
+static int merge(struct replay *r, struct batch *b, struct error *e)
+{
+	struct live_job *o = r->order;
+	uint64_t rounds = live_job_rounds(o);
+	int rc = live_job_merge(o, b, e);
+	if (rc == -EEXIST || rc == -EAGAIN) /* of the films, not of the machine */
+		rc = error_prefix(e, -EBADMSG, "a batch out of its order");
+	live_job_note_times(o, r->elapsed, rounds);
+	if (!rc && o->bootstrap && bootstrap_missing(o->bootstrap) == 0)
+		rc = live_job_prepare(o, o->film_folder, e);
+	r->batches++;
+	return rc;
+}
+
+/* It was written whole: by a coordinator with other records. They are not thrown away. */
+static int strange(const struct replay *r, const char *what, size_t size, struct error *e)
+{
+	return error_set(
+		e, EPROTO,
+		"the journal of j%llu has %s of %zu bytes that mean nothing here: another coordinator wrote it",
+		(unsigned long long)r->order->id, what, size);
+}
+
+static int take_batch(struct replay *r, const struct journal_item *item, struct error *e)
+{
+	struct envelope env;
+	struct batch batch = {0};
+	const unsigned char *payload;
+	size_t payload_size;
+	int rc = replay_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->size, &payload, &payload_size,
+			       e);
+	if (rc)
+		return rc == -EBADMSG ? strange(r, "a result", item->size, e) : rc;
+	rc = batch_unpack(&batch, &r->order->plan, env.message->lease_result, payload, payload_size, e);
+	if (rc == -EBADMSG)
+		rc = strange(r, "a result", item->size, e);
+	if (!rc && item->kind == JOURNAL_AGAIN)
+		rc = back_replay(r->order, item->journal, &batch.key, e);
+	if (!rc && item->kind == JOURNAL_KEPT) {
+		r->order->kept_bytes += item->size;
+		back_note(r->order, &batch.key, item->at, env.message->lease_result->maker);
+		batch_fini(&batch);
+		envelope_fini(&env);
+		return 0;
+	}
+	enum replay_place place = rc ? REPLAY_MERGED : replay_place(r->order, &batch.key);
+	if (place == REPLAY_FITS)
+		rc = merge(r, &batch, e);
+	if (place == REPLAY_FITS && !rc)
+		back_note(r->order, &batch.key, item->at, env.message->lease_result->maker);
+	else if (place == REPLAY_LATE)
+		rc = late_add(r->order, &batch.key, item->at, e);
+	batch_fini(&batch);
+	envelope_fini(&env);
+	return rc;
+}
+
+static void note_damage(struct replay *r, const struct journal_item *item)
+{
+	if ((item->kind == JOURNAL_BATCH || item->kind == JOURNAL_AGAIN) && r->damaged_count < DAMAGED_MOST)
+		r->damaged[r->damaged_count++] = item->lease;
+}
+
+static int go_on(void *user, size_t bytes, struct error *e)
+{
+	struct replay_progress *p = ((struct replay *)user)->progress;
+	if (!p)
+		return 0;
+	atomic_fetch_add(&p->read, bytes);
+	return atomic_load(&p->stop) ? error_set(e, ECANCELED, "the coordinator stops") : 0;
+}
+
+static int take_record(void *user, const struct journal_item *item, struct error *e)
+{
+	struct replay *r = user;
+	struct live_job *o = r->order;
+	struct forecast_look look;
+	const unsigned char *body = item->body;
+	size_t size = item->size;
+	int rc = go_on(r, size, e);
+	if (rc)
+		return rc;
+	if (item->missing) {
+		note_damage(r, item);
+		return item->kind == JOURNAL_AGAIN ? back_replay(o, item->journal, &item->lease, e) : 0;
+	}
+	r->elapsed = item->elapsed;
+	switch (item->kind) {
+	case JOURNAL_BATCH:
+	case JOURNAL_AGAIN:
+	case JOURNAL_KEPT:
+		return take_batch(r, item, e);
+	case JOURNAL_PINNED:
+		if (size >= sizeof o->fingerprint)
+			return strange(r, "a fingerprint", size, e);
+		memcpy(o->fingerprint, body, size);
+		o->fingerprint[size] = 0;
+		return 0;
+	case JOURNAL_LOOK:
+		if (size != sizeof look)
+			return strange(r, "a look", size, e);
+		memcpy(&look, body, size);
+		forecast_add_look(&o->record.looks, &look);
+		o->look_written = look.work;
+		return 0;
+	case JOURNAL_COUNTS:
+		if (size != sizeof o->counts)
+			return strange(r, "counts", size, e);
+		memcpy(&o->counts, body, size);
+		return 0;
+	default:
+		return strange(r, "a record", size, e);
+	}
+}
+
+/* Those that waited for others behind them in the file. */
+static int take_late(struct replay *r, struct error *e)
+{
+	struct live_job *o = r->order;
+	size_t kept = 0;
+	int rc = 0;
+	late_sort(o);
+	for (size_t i = 0; i < o->late_count; i++) {
+		struct late_result l = o->late[i];
+		struct journal_item item = {.kind = JOURNAL_BATCH, .at = l.at};
+		unsigned char *body = NULL;
+		enum replay_place place = rc ? REPLAY_LATE : replay_place(o, &l.key);
+		if (place == REPLAY_FITS && (rc = journal_body(o->journal, l.at, &body, &item.size, e)) == 0) {
+			item.body = body;
+			rc = take_batch(r, &item, e);
+			mem_free(body);
+		}
+		if (place == REPLAY_LATE)
+			o->late[kept++] = l;
+	}
+	o->late_count = kept;
+	return rc;
+}
+
+/* Which of the damaged ones are computed again; those that have been since then are there. */
+static void say_damage(const struct replay *r, const struct journal_found *found)
+{
+	struct live_job *o = r->order;
+	char text[400] = "";
+	struct text t = {text, sizeof text};
+	uint64_t open = 0;
+	for (size_t i = 0; i < r->damaged_count; i++) {
+		const struct lease_key *k = &r->damaged[i];
+		if (replay_place(o, k) == REPLAY_MERGED)
+			continue;
+		text_put(&t, "%s%s group %u part %u epoch %llu", open++ ? ", " : ": ",
+			 k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group, k->part,
+			 (unsigned long long)k->epoch);
+	}
+	live_job_log(
+		o, LOG_SPOOL_FAULT,
+		"damaged=%llu waiting=%zu text=\"the journal is damaged: %llu stored records are lost; computed again%s\"",
+		(unsigned long long)found->damaged, o->late_count, (unsigned long long)found->lost,
+		*text ? text : ": none any more");
+}
+
+uint64_t replay_bytes(const struct spool *spool, uint64_t job)
+{
+	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
+	uint64_t sum = 0;
+	struct stat st;
+	spool_job_path(spool, job, NULL, folder);
+	DIR *d = disk_opendir(folder);
+	for (struct dirent *f; d && (f = readdir(d));) {
+		bool checkpoint = strcmp(f->d_name, "checkpoint") == 0;
+		if (!checkpoint && strncmp(f->d_name, "journal.", 8) != 0)
+			continue;
+		spool_job_path(spool, job, f->d_name, path);
+		if (disk_stat(path, &st) == 0)
+			sum += (uint64_t)st.st_size << checkpoint;
+	}
+	if (d)
+		closedir(d);
+	return sum;
+}
+
+int replay_films(const struct spool *spool, struct live_job *o, struct replay_progress *p, struct error *e)
+{
+	struct replay r = {.order = o, .progress = p};
+	struct journal_found found;
+	char folder[SPOOL_PATH_MAX];
+	uint64_t generation = 0;
+	spool_job_path(spool, o->id, NULL, folder);
+	int rc = checkpoint_load(spool, o, &generation, go_on, &r, e);
+	if (rc && rc != -ENOENT)
+		return rc;
+	rc = journal_open(&o->journal, folder, o->id, generation, take_record, &r, &found, e);
+	if (rc == -ENOENT) { /* its batches can be made again */
+		live_job_log(o, LOG_SPOOL_FAULT, "text=\"%s/journal.%llu is gone: what it held is computed again\"",
+			     folder, (unsigned long long)generation);
+		rc = journal_create(&o->journal, folder, o->id, generation, e);
+	}
+	if (!rc && o->late_count)
+		rc = take_late(&r, e);
+	if (rc)
+		return rc;
+	if (found.lost)
+		say_damage(&r, &found);
+	journal_clear(folder, generation);
+	o->pinned = *o->fingerprint != 0;
+	live_job_log(
+		o, LOG_JOB_STATE,
+		"state=restored batches=%llu rounds=%llu elapsed=%.3f checkpoint=%llu journal=%llu cut=%llu damaged=%llu",
+		(unsigned long long)r.batches, (unsigned long long)live_job_rounds(o), o->times.elapsed,
+		(unsigned long long)o->checkpoint_bytes, (unsigned long long)journal_bytes(o->journal),
+		(unsigned long long)found.cut, (unsigned long long)found.damaged);
+	return 0;
+}

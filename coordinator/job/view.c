@@ -1,0 +1,223 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/job/view.h"
+
+#include "common/base/text.h"
+#include "common/json/convergence_json.h"
+#include "common/json/forecast_json.h"
+
+#include <math.h>
+#include <stdio.h>
+#include <string.h>
+
+void view_of_record(struct job_view *v, const struct job_record *r)
+{
+	memset(v, 0, sizeof *v);
+	v->record = *r;
+	v->eta = record_is_ended(r) ? 0 : -1;
+	v->share = v->reading = -1;
+}
+
+void view_add_status(struct job_view *v, const struct job_status *s)
+{
+	struct job_record *r = &v->record;
+	text_copy(r->state, sizeof r->state, job_state_name(s->state));
+	text_copy(r->reason, sizeof r->reason, s->end == END_NONE ? "" : job_end_name(s->end));
+	text_copy(r->why, sizeof r->why, s->text);
+	r->priority = s->priority;
+	r->progress = s->progress;
+	r->rounds = s->rounds;
+	r->mutations = s->mutations;
+	r->exit_code = job_state_is_end(s->state) ? (uint32_t)job_exit_code(s) : 0;
+	v->rate = isfinite(s->rate) ? s->rate : 0;
+	v->eta = isfinite(s->eta) ? s->eta : -1;
+	v->eta_low = isfinite(s->eta_low) ? s->eta_low : -1;
+	v->eta_high = isfinite(s->eta_high) ? s->eta_high : -1;
+	v->leases = s->leases_out;
+	v->workers = s->workers;
+	v->machines = s->machines;
+	v->share = s->share;
+	text_copy(v->place, sizeof v->place, s->place);
+	r->bootstrap_seconds = isfinite(s->bootstrap_seconds) ? s->bootstrap_seconds : 0;
+	r->looks = *s->looks;
+	v->halving_cpu = s->halving_cpu;
+	v->halving_seconds = s->halving_seconds;
+	r->leases_merged = s->leases_merged;
+	r->repeats = s->repeats;
+	r->verify = s->verify;
+	r->verified = s->verified;
+	r->mismatched = s->mismatched;
+	r->refused = s->refused;
+	r->failures = s->failures;
+	r->duplicates = s->duplicates;
+	r->timeouts = s->timeouts;
+	text_copy(v->waiting, sizeof v->waiting, s->waiting);
+	text_copy(v->owners_place, sizeof v->owners_place, s->owners_place);
+	text_copy(v->owners_waiting, sizeof v->owners_waiting, s->owners_waiting);
+}
+
+void view_hide_others(struct job_view *v)
+{
+	memcpy(v->place, v->owners_place, sizeof v->place);
+	memcpy(v->waiting, v->owners_waiting, sizeof v->waiting);
+}
+
+static const char *why_of(const struct job_view *v)
+{
+	return *v->waiting ? v->waiting : v->record.why;
+}
+
+void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
+{
+	const struct job_record *r = &v->record;
+	farm__job_status__init(out);
+	out->job = r->id;
+	out->name = text_borrow(r->name);
+	out->state = text_borrow(r->state);
+	out->progress = r->progress;
+	out->rate = v->rate;
+	out->eta = v->eta;
+	out->rounds = r->rounds;
+	out->submitted = r->submitted;
+	out->error = r->rel_error;
+	out->why = text_borrow(why_of(v));
+	out->reason = text_borrow(r->reason);
+	out->output = text_borrow(r->output);
+	out->priority = r->priority;
+	out->leases = v->leases;
+	out->owner = text_borrow(r->owner);
+	out->workers = v->workers;
+	out->share = v->share;
+	out->place = text_borrow(v->place);
+	out->fetchable = r->has_result;
+	out->ended = record_is_ended(r);
+	out->exit_code = r->exit_code;
+	out->note = text_borrow(r->note);
+	out->verify = r->verify;
+	out->verified = r->verified;
+	out->mismatched = r->mismatched;
+	out->eta_low = v->eta_low;
+	out->eta_high = v->eta_high;
+	out->target_error = r->target_error;
+	out->cpu_seconds = r->cpu_seconds;
+	out->bootstrap_cpu_seconds = r->bootstrap_cpu_seconds;
+	out->bootstrap_seconds = r->bootstrap_seconds;
+	out->halving_cpu_seconds = v->halving_cpu.middle;
+	out->halving_seconds = v->halving_seconds.middle;
+}
+
+void view_looks_to_wire(const struct job_view *v, struct view_looks *looks, Farm__JobStatus *out)
+{
+	const struct forecast_history *h = &v->record.looks;
+	for (uint32_t i = 0; i < h->count; i++) {
+		Farm__Look *l = looks->at[i] = &looks->look[i];
+		farm__look__init(l);
+		l->work = h->looks[i].work;
+		l->cpu_seconds = h->looks[i].cpu_seconds;
+		l->seconds = h->looks[i].seconds;
+		l->rel_mse = h->looks[i].rel_mse;
+		l->rel_mse_upper = h->looks[i].rel_mse_upper;
+		l->degrees = h->looks[i].degrees;
+		l->doubtful = h->looks[i].doubtful != 0;
+	}
+	out->n_looks = h->count;
+	out->looks = looks->at;
+}
+
+static json_t *number_or_null(double x, bool known)
+{
+	return known ? forecast_real(x) : json_null();
+}
+
+/* What is known of the error, and what less of it will cost. */
+static void add_forecast(json_t *o, const struct job_view *v)
+{
+	const struct job_record *r = &v->record;
+	struct forecast_range error, eta = {v->eta_low, v->eta, v->eta_high};
+	bool known = forecast_error(&r->looks, &error), live = !record_is_ended(r);
+	json_object_set_new(o, "targetError", number_or_null(r->target_error, r->target_error > 0));
+	json_object_set_new(o, "cpuSeconds", json_real(r->cpu_seconds));
+	json_object_set_new(o, "bootstrapCpuSeconds", json_real(r->bootstrap_cpu_seconds));
+	json_object_set_new(o, "bootstrapSeconds", json_real(r->bootstrap_seconds));
+	json_object_set_new(o, "errorNow", known ? forecast_range_to_json(&error) : json_null());
+	json_object_set_new(o, "etaRange", live && v->eta >= 0 ? forecast_range_to_json(&eta) : json_null());
+	json_object_set_new(o, "nextHalving",
+			    !known || !live
+				    ? json_null()
+				    : json_pack("{s:o s:o}", "cpuSeconds", forecast_range_to_json(&v->halving_cpu),
+						"wallSeconds", forecast_range_to_json(&v->halving_seconds)));
+	if (live) /* there may be many that have ended */
+		json_object_set_new(o, "looks", forecast_looks_to_json(&r->looks));
+}
+
+/* What its priority means. */
+static void add_share(json_t *o, const struct job_view *v)
+{
+	json_object_set_new(o, "owner", json_string(v->record.owner));
+	json_object_set_new(o, "workers", json_integer(v->workers));
+	json_object_set_new(o, "machines", json_integer(v->machines));
+	json_object_set_new(o, "share", number_or_null(v->share, v->share >= 0 && !record_is_ended(&v->record)));
+	json_object_set_new(o, "place", json_string(v->place));
+}
+
+json_t *view_to_json(const struct job_view *v)
+{
+	const struct job_record *r = &v->record;
+	char id[32];
+	snprintf(id, sizeof id, "j%llu", (unsigned long long)r->id);
+	json_t *o = json_pack("{s:s s:s s:s s:s s:i s:f s:f s:I s:I s:s s:s s:s s:s s:b s:i s:f s:f}",		 /* */
+			      "id", id, "name", r->name, "state", r->state, "integrator", r->integrator,	 /* */
+			      "priority", r->priority, "progress", r->progress, "rate", v->rate,		 /* */
+			      "rounds", (json_int_t)r->rounds, "mutations", (json_int_t)r->mutations,		 /* */
+			      "why", why_of(v), "waiting", v->waiting, "reason", r->reason, "output", r->output, /* */
+			      "result", (int)r->has_result, "leases", (int)v->leases, "submitted", r->submitted, /* */
+			      "ended", r->ended);
+	if (!o)
+		return NULL;
+	json_object_set_new(o, "eta", number_or_null(v->eta, v->eta >= 0));
+	json_object_set_new(o, "error", number_or_null(r->rel_error, r->rel_error >= 0));
+	json_object_set_new(o, "errorDoubt", json_string(r->rel_error_doubt));
+	add_forecast(o, v);
+	add_share(o, v);
+	json_object_set_new(o, "reading", number_or_null(v->reading, v->reading >= 0));
+	json_object_set_new(o, "counts", record_counts(r));
+	json_object_set_new(o, "verify", json_real(r->verify));
+	json_object_set_new(o, "mixture", json_string(r->mixture));
+	json_object_set_new(o, "strategies", record_strategies(r));
+	json_object_set_new(o, "note", json_string(r->note));
+	json_object_set_new(o, "cleared", number_or_null(r->cleared, r->cleared > 0));
+	json_object_set_new(o, "agreement", convergence_to_json(&r->agreement));
+	json_object_set_new(o, "b", number_or_null(r->b, r->b > 0));
+	json_object_set_new(o, "classes", classes_to_json(r->classes));
+	json_object_set_new(o, "effects", record_effects(r));
+	return o;
+}
+
+json_t *view_peer_to_json(const struct peer_status *p, double now)
+{
+	static const char *const states[] = {"active", "silent", "aside"};
+	return json_pack("{s:I s:s s:s s:s s:i s:i s:i s:f s:f s:I s:I s:I s:I s:I s:I s:s}",		  /* */
+			 "id", (json_int_t)p->id, "name", p->name, "state", states[p->state],		  /* */
+			 "fingerprint", p->fingerprint, "threads", (int)p->threads, "want", (int)p->want, /* */
+			 "leases", (int)p->leases, "connected", now - p->joined, "heard", now - p->heard, /* */
+			 "merged", (json_int_t)p->merged, "repeats", (json_int_t)p->repeats,		  /* */
+			 "refused", (json_int_t)p->refused, "failures", (json_int_t)p->failures, "faults",
+			 (json_int_t)p->faults, /* */
+			 "restarts", (json_int_t)p->restarts, "text", p->text);
+}
+
+json_t *view_aside_to_json(const struct worker_status *w)
+{
+	return json_pack("{s:s s:s s:s s:I s:I s:s}", "name", w->name, "certificate", w->certificate, "home",
+			 w->home, /* */
+			 "restarts", (json_int_t)w->restarts, "wrong", (json_int_t)w->wrong, "why", w->text);
+}
+
+json_t *view_lease_to_json(const struct lease_status *l, const char *worker, double now)
+{
+	char id[32];
+	snprintf(id, sizeof id, "j%llu", (unsigned long long)l->key.job);
+	return json_pack("{s:s s:s s:i s:i s:I s:s s:f s:b}", "job", id, "kind",
+			 l->key.kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", "group", (int)l->key.group, "part",
+			 (int)l->key.part, "epoch", (json_int_t)l->key.epoch, "worker", worker, "age", now - l->sent,
+			 "overdue", (int)l->overdue);
+}

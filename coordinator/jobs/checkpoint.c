@@ -1,0 +1,208 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Checkpoints: the films, seeds, chain states and counters of a job in one file, so that its journal can begin anew.
+ *
+ * checkpoint_where_due starts one when a job's journal has grown beyond the last checkpoint or a minimum, one job at a
+ * time. The thread pool writes the next journal (with the last results of each group and part, which may still be taken
+ * back), then checkpoint.tmp, syncs it, renames it to checkpoint and syncs the folder. Results that arrive meanwhile
+ * wait in memory. Then the new journal takes over and older ones are deleted.
+ *
+ * If writing fails, the old checkpoint and journal go on, and another attempt follows after a pause. If only the sync
+ * of the folder fails it is unknown which of the two pairs a crash would leave; both hold everything acknowledged, and
+ * the job is held until a checkpoint succeeds. A checkpoint that is damaged when it is read makes its job begin anew.
+ */
+#include "coordinator/jobs/checkpoint.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "coordinator/job/back.h"
+#include "coordinator/job/checkpoint_file.h"
+#include "coordinator/jobs/durable.h"
+#include "coordinator/jobs/step.h"
+
+#include <assert.h>
+#include <stdio.h>
+#include <string.h>
+
+static const double pause_seconds = 30; /* after one that could not be written */
+
+struct writing {
+	uv_work_t work;
+	struct jobs *jobs;
+	struct live_job *order;
+	struct journal *journal; /* the one that follows */
+	struct checkpoint_head head;
+	uint64_t bytes, kept_most;
+	struct merged_record *merged; /* in that one */
+	size_t merged_count, merged_capacity;
+	char folder[SPOOL_PATH_MAX];
+	int rc;
+	bool unsure; /* it has its name, but perhaps not for good */
+	struct error error;
+};
+
+static void run(uv_work_t *work)
+{
+	struct writing *w = work->data;
+	struct checked_file out = {0};
+	char name[SPOOL_PATH_MAX + 16], temporary[SPOOL_PATH_MAX + 16];
+	snprintf(name, sizeof name, "%s/checkpoint", w->folder);
+	snprintf(temporary, sizeof temporary, "%s/checkpoint.tmp", w->folder);
+	w->rc = journal_create(&w->journal, w->folder, w->head.job, w->head.generation, &w->error);
+	if (!w->rc)
+		back_copy(w->order, w->journal, w->kept_most, &w->merged, &w->merged_count, &w->merged_capacity);
+	if (!w->rc)
+		w->rc = checked_file_create(&out, temporary, &w->error);
+	if (!w->rc)
+		w->rc = checkpoint_write(w->order, &w->head, &out, &w->error);
+	if (!w->rc)
+		w->rc = checked_file_finish(&out, &w->error);
+	checked_file_close(&out);
+	w->bytes = out.bytes;
+	if (!w->rc)
+		w->rc = disk_rename(temporary, name) ? error_set(&w->error, errno, "%s: %s", name, strerror(errno)) : 0;
+	if (!w->rc) {
+		w->rc = disk_sync_folder(w->folder, &w->error);
+		w->unsure = w->rc != 0;
+	}
+	if (w->rc) {
+		if (!w->unsure)
+			disk_unlink(temporary);
+		journal_release(w->journal);
+		w->journal = NULL;
+	}
+}
+
+/* Closing and unlinking a journal of hundreds of megabytes takes as many milliseconds: the pool does it, too. */
+struct tidying {
+	uv_work_t work;
+	struct jobs *jobs;
+	struct journal *old;
+	uint64_t keep;
+	char folder[SPOOL_PATH_MAX];
+};
+
+static void run_tidy(uv_work_t *work)
+{
+	struct tidying *t = work->data;
+	journal_release(t->old); /* what waits for its flush holds it, too */
+	journal_clear(t->folder, t->keep);
+}
+
+static void tidied(uv_work_t *work, int status)
+{
+	struct tidying *t = work->data;
+	(void)status;
+	t->jobs->checkpointing = false; /* until now, so that no younger journal is in the way */
+	mem_free(t);
+}
+
+/* The journals before `keep` go. */
+static void tidy(struct jobs *s, struct journal *old, const char *folder, uint64_t keep)
+{
+	struct tidying *t = mem_alloc(1, sizeof *t);
+	if (!t) {
+		journal_release(old);
+		journal_clear(folder, keep);
+		s->checkpointing = false;
+		return;
+	}
+	*t = (struct tidying){.jobs = s, .old = old, .keep = keep};
+	snprintf(t->folder, sizeof t->folder, "%s", folder);
+	t->work.data = t;
+	int rc = uv_queue_work(s->loop, &t->work, run_tidy, tidied);
+	assert(rc == 0);
+	(void)rc;
+}
+
+static void done(uv_work_t *work, int status)
+{
+	struct writing *w = work->data;
+	struct jobs *s = w->jobs;
+	struct live_job *o = w->order;
+	uint64_t id = o->id;
+	assert(status == 0);
+	(void)status;
+	if (w->rc && (w->unsure ||
+		      o->unsure)) { /* this one and its journal, or the old ones: both hold all that was acknowledged */
+		o->unsure = true;
+		o->generation_least = w->head.generation + 1;
+		o->checkpoint_after = jobs_now(s) + s->config.retry_seconds;
+	} else if (w->rc) { /* the old ones go on */
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+		o->checkpoint_after = jobs_now(s) + pause_seconds;
+		journal_clear(w->folder, journal_generation(o->journal));
+	} else {
+		o->unsure = false;
+		journal_settle(o->journal);
+		log_event(LOG_CHECKPOINT, "job=j%llu rounds=%llu bytes=%llu journal=%llu", (unsigned long long)id,
+			  (unsigned long long)canvas_rounds(o->canvas), (unsigned long long)w->bytes,
+			  (unsigned long long)journal_bytes(o->journal));
+		tidy(s, o->journal, w->folder, w->head.generation);
+		o->journal = w->journal;
+		o->checkpoint_bytes = w->bytes;
+		mem_free(o->merged);
+		o->merged = w->merged;
+		o->merged_count = w->merged_count;
+		o->kept_bytes = journal_bytes(o->journal);
+		o->merged_capacity = w->merged ? w->merged_capacity : 0;
+		w->merged = NULL;
+	}
+	mem_free(w->merged);
+	o->busy = false;
+	s->checkpointing = s->checkpointing && !w->rc;
+	if (!s->stopping && o->unsure)
+		durable_hold(s, o, "its results cannot be stored",
+			     w->error.text); /* which is the end of it, if it was cancelled */
+	if (!s->stopping) {
+		jobs_films_free(s);
+		s->peers.films_free(s->peers.user, id);
+	}
+	mem_free(w);
+}
+
+/* Of a journal. */
+static uint64_t limit_of(const struct jobs *s, const struct live_job *o)
+{
+	return o->checkpoint_bytes > s->config.journal_bytes ? o->checkpoint_bytes : s->config.journal_bytes;
+}
+
+static void start(struct jobs *s, struct live_job *o)
+{
+	struct job_status status;
+	struct writing *w = mem_alloc(1, sizeof *w);
+	if (!w || !farm_job(s->farm, o->id, jobs_now(s), &status)) {
+		mem_free(w);
+		o->checkpoint_after = jobs_now(s) + pause_seconds;
+		return;
+	}
+	w->jobs = s;
+	w->order = o;
+	w->work.data = w;
+	w->kept_most = limit_of(s, o);
+	spool_job_path(s->spool, o->id, NULL, w->folder);
+	checkpoint_head_of(&w->head, o, &status);
+	o->busy = s->checkpointing = true;
+	int rc = uv_queue_work(s->loop, &w->work, run, done);
+	assert(rc == 0);
+	(void)rc;
+}
+
+void checkpoint_where_due(struct jobs *s)
+{
+	if (s->stepping || s->stopping ||
+	    s->checkpointing) /* one at a time: meanwhile results of its job wait in memory */
+		return;
+	for (struct live_job *o = s->orders; o; o = o->next) {
+		if (!o->canvas || o->busy || o->ended || o->late_count) /* what waits is in the journal alone */
+			continue;
+		if (canvas_missing(o->canvas)) /* what was taken back is computed at this time */
+			continue;
+		uint64_t limit = limit_of(s, o);
+		if ((journal_bytes(o->journal) - o->kept_bytes > limit || o->unsure) &&
+		    jobs_now(s) >= o->checkpoint_after)
+			start(s, o);
+		if (s->checkpointing)
+			return;
+	}
+}

@@ -1,0 +1,330 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Carries out what the core answers to an event, action by action: sends leases, revocations and acknowledgements,
+ * merges results, prepares jobs after their bootstrap, starts publishing, records changes of state.
+ *
+ * A result that the core wants merged is first appended to the job's journal (durable_merged), then added to its films;
+ * its acknowledgement waits for the flush (durable_ack). A job that the core has ended is finished as soon as no thread
+ * reads its films: record, ledger, JobEnd to all workers, memory.
+ *
+ * If a result cannot be merged for want of memory the process exits: the films may hold half of it, nobody was told
+ * that it is stored, and the next start has it from the journal or computes it again. Any other failure of a merge ends
+ * the job. A job that cannot be prepared, because the disk is full, is tried again.
+ */
+#include "coordinator/jobs/dispatch.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "common/exr/exr.h"
+#include "coordinator/job/back.h"
+#include "coordinator/job/incoming.h"
+#include "coordinator/job/late.h"
+#include "coordinator/jobs/durable.h"
+#include "coordinator/jobs/extend.h"
+#include "coordinator/jobs/listing.h"
+#include "coordinator/jobs/publish.h"
+#include "coordinator/jobs/results.h"
+#include "coordinator/jobs/step.h"
+#include "coordinator/jobs/trust.h"
+#include "coordinator/retention/ages.h"
+#include "coordinator/retention/clear.h"
+#include "coordinator/retention/keep.h"
+
+#include <assert.h>
+#include <fcntl.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+/* ---- jobs ---- */
+
+static void submitted(struct jobs *s, const struct action *a, struct submission *from)
+{
+	struct live_job *o;
+	struct error e;
+	const Farm__Submit *m = from->submit->message->submit;
+	from->job = a->job;
+	int rc = spool_take_job(s->spool, a->job, &e);
+	if (!rc)
+		rc = live_job_new(&o, a->job, from->submit, from->plan, from->owner, 0, s->spool, &e);
+	if (!rc && (rc = durable_begin(s, o, &e))) {
+		*from->submit = o->submit;
+		memset(&o->submit, 0, sizeof o->submit);
+		live_job_free(o);
+	}
+	if (rc) {
+		text_copy(from->refusal, sizeof from->refusal, e.text);
+		jobs_break(s, a->job, e.text);
+		return;
+	}
+	o->next = s->orders;
+	s->orders = o;
+	char plan[PLAN_TEXT];
+	plan_describe(&o->plan, plan, sizeof plan);
+	live_job_log(o, LOG_JOB_SUBMIT, "name=%s client=%s owner=%s plan=%s rule=%s", log_quote(o->record.name).text,
+		     from->address, *from->owner ? from->owner : "-", log_quote(plan).text, log_quote(from->rule).text);
+	for (size_t i = 0; i < m->n_notes; i++)
+		live_job_log(o, LOG_JOB_NOTE, "text=%s", log_quote(m->notes[i]).text);
+	for (size_t i = 0; i < m->n_effects; i++)
+		live_job_log(o, LOG_JOB_NOTE, "effect=%s on=%d why=%s", log_quote(m->effects[i]->name).text,
+			     (int)m->effects[i]->on, log_quote(m->effects[i]->why).text);
+}
+
+static void rejected(struct jobs *s, const struct action *a)
+{
+	text_copy(s->refusal, sizeof s->refusal, *a->text ? a->text : "refused");
+	s->peers.refused(s->peers.user, a->tag ? a->tag : a->peer, s->refusal);
+}
+
+static void job_changed(struct jobs *s, const struct action *a)
+{
+	struct live_job *o = jobs_find(s, a->job);
+	if (!o)
+		return;
+	live_job_log(o,
+		     a->state == JOB_FAILED ? LOG_JOB_FAILED
+		     : a->state == JOB_DONE ? LOG_JOB_DONE
+					    : LOG_JOB_STATE,
+		     "state=%s reason=%s rounds=%llu text=%s", job_state_name(a->state),
+		     a->end == END_NONE ? "none" : job_end_name(a->end), log_u64(a->rounds), log_quote(a->text).text);
+	o->ended = job_state_is_end(a->state);
+}
+
+void dispatch_prepare(struct jobs *s, struct live_job *o)
+{
+	struct error e = {""};
+	int rc = live_job_prepare(o, jobs_film_folder(s, &o->plan), &e);
+	if (rc && rc != -ENOMEM) {
+		if (!o->unprepared)
+			live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"",
+				     log_quote(e.text).text);
+		o->unprepared = true;
+		o->try_again = jobs_now(s) + s->config.retry_seconds;
+		return;
+	}
+	o->unprepared = false;
+	if (!rc)
+		live_job_log(o, LOG_JOB_STATE, "state=prepared b=%.9g beyond=%.3g black=%d", o->lit.b_pooled,
+			     o->lit.beyond_share, (int)o->lit.black);
+	struct event ev = {.kind = EVENT_PREPARED,
+			   .job = o->id,
+			   .text = e.text,
+			   .prepared = {.job = o->id, .ok = rc == 0, .black = o->lit.black}};
+	jobs_defer(s, &ev);
+}
+
+/* ---- batches ---- */
+
+static void keep_partials(const struct jobs *s, const struct lease_key *k, const struct incoming *in)
+{
+	for (size_t i = 0; i < in->result->n_tile_sizes; i++) {
+		char path[SPOOL_PATH_MAX];
+		size_t size;
+		const unsigned char *bytes = batch_tile_bytes(in->result, in->payload->bytes, i, &size);
+		snprintf(path, sizeof path, "%s/j%llu-e%llu-g%u-p%u-x%u-y%u.exr", s->config.keep_partials,
+			 log_u64(k->job), log_u64(k->epoch), k->group, k->part, in->batch->tiles[i].x,
+			 in->batch->tiles[i].y);
+		int fd = disk_open(path, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+		if (fd < 0 || disk_write_all(fd, bytes, size))
+			log_event(LOG_SPOOL_FAULT, "path=%s text=%s", log_quote(path).text,
+				  log_quote(strerror(errno)).text);
+		if (fd >= 0)
+			disk_close(fd);
+	}
+}
+
+static void merge(struct jobs *s, const struct action *a, const struct incoming *in)
+{
+	struct live_job *o = jobs_find(s, a->job);
+	struct error e;
+	assert(o && in->batch && !o->busy);
+	if (s->config.keep_partials)
+		keep_partials(s, &a->key, in);
+	uint64_t rounds = live_job_rounds(o);
+	uint64_t at = in->stored_at;
+	int rc = in->stored ? 0 : durable_merged(s, o, in, &at, &e);
+	if (!rc)
+		rc = live_job_merge(o, in->batch, &e);
+	if (!rc)
+		back_note(o, &a->key, at, in->result->maker);
+	if (rc == -ENOMEM) { /* half merged; nobody was told that it is stored */
+		log_event(LOG_STOP,
+			  "text=\"no memory to merge a result: to be started again, all goes on from the disk\"");
+		_exit(1);
+	}
+	o->overflowed = o->overflowed || rc == -ERANGE;
+	if (rc)
+		jobs_break(s, a->job, e.text);
+	trust_merged(o, a);
+	live_job_note_times(o, farm_elapsed(s->farm, a->job, jobs_now(s)), rounds);
+	log_event(LOG_BATCH_MERGED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu%s", log_u64(a->job),
+		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch),
+		  in->stored ? " late=1" : "");
+}
+
+static void take_back(struct jobs *s, const struct action *a, const struct incoming *in)
+{
+	struct live_job *o = jobs_find(s, a->job);
+	assert(o && !o->busy && in->back);
+	back_take(o, in->back);
+	trust_taken_back(o, a->who);
+	live_job_log(o, LOG_BATCH_TAKEN_BACK, "kind=%d group=%u part=%u epoch=%llu text=%s", (int)a->key.kind,
+		     a->key.group, a->key.part, log_u64(a->key.epoch), log_quote(a->text).text);
+}
+
+static void acknowledge(struct jobs *s, const struct action *a)
+{
+	const struct live_job *o = jobs_find(s, a->job);
+	const char *name = s->peers.name(s->peers.user, a->peer);
+	if (a->ack == ACK_MERGED || (a->ack == ACK_REPEAT && o)) /* what it repeats may not be on the disk yet */
+		durable_ack(s, o, a->peer, &a->key, a->ack);
+	else
+		s->peers.acknowledge(s->peers.user, a->peer, &a->key, a->ack, a->text);
+	if (a->ack != ACK_MERGED)
+		log_event(a->ack == ACK_REPEAT	? LOG_BATCH_REPEATED
+			  : a->ack == ACK_NOTED ? LOG_BATCH_NOTED
+						: LOG_BATCH_REFUSED,
+			  "job=j%llu peer=%llu worker=%s kind=%d group=%u part=%u epoch=%llu text=%s", log_u64(a->job),
+			  log_u64(a->peer), log_quote(name ? name : "?").text, (int)a->key.kind, a->key.group,
+			  a->key.part, log_u64(a->key.epoch), log_quote(a->text).text);
+}
+
+/* ---- leases and peers ---- */
+
+static void send_lease(struct jobs *s, const struct action *a)
+{
+	struct live_job *o = jobs_find(s, a->job);
+	if (!s->peers.name(s->peers.user, a->peer) || !o || late_withholds(o, &a->key, a->peer))
+		return;
+	live_job_count_worker(o, a->peer);
+	s->peers.send_lease(s->peers.user, a->peer, o, &a->key, a->anew);
+	log_event(LOG_LEASE_GRANTED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", log_u64(a->job),
+		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch));
+}
+
+static void revoke_lease(struct jobs *s, const struct action *a)
+{
+	s->peers.revoke(s->peers.user, a->peer, &a->key);
+	log_event(LOG_LEASE_TAKEN_BACK, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu", log_u64(a->job),
+		  log_u64(a->peer), (int)a->key.kind, a->key.group, a->key.part, log_u64(a->key.epoch));
+}
+
+static void close_peer(struct jobs *s, const struct action *a)
+{
+	orders_drop_waiting(s->orders, a->peer); /* it may come back, with the same */
+	s->peers.dismiss(s->peers.user, a->peer, a->text);
+}
+
+void dispatch_update(struct jobs *s, const struct update *u, const struct incoming *in)
+{
+	for (size_t i = 0; i < u->count; i++) {
+		const struct action *a = &u->actions[i];
+		switch (a->kind) {
+		case ACTION_SUBMITTED:
+			submitted(s, a, in->submission);
+			break;
+		case ACTION_CANCELLED:
+			break;
+		case ACTION_REJECTED:
+			rejected(s, a);
+			break;
+		case ACTION_SEND_LEASE:
+			send_lease(s, a);
+			break;
+		case ACTION_REVOKE:
+			revoke_lease(s, a);
+			break;
+		case ACTION_MERGE:
+			merge(s, a, in);
+			break;
+		case ACTION_ACK:
+			acknowledge(s, a);
+			break;
+		case ACTION_BOOTSTRAP_DONE:
+			dispatch_prepare(s, jobs_find(s, a->job));
+			break;
+		case ACTION_ROUND_DONE:
+			break;
+		case ACTION_EVALUATE_ERROR:
+			publish_start(s, jobs_find(s, a->job), PUBLISH_ERROR_ONLY, a->rounds);
+			break;
+		case ACTION_PUBLISH:
+			publish_start(s, jobs_find(s, a->job), PUBLISH_RESULT, a->rounds);
+			break;
+		case ACTION_JOB_CHANGED:
+			job_changed(s, a);
+			break;
+		case ACTION_JOB_FORGOTTEN:
+			break;
+		case ACTION_TAKE_BACK:
+			take_back(s, a, in);
+			break;
+		case ACTION_CHAINS_ANEW:
+			trust_anew(s, a);
+			break;
+		case ACTION_WRONG:
+			trust_wrong(s, a);
+			break;
+		case ACTION_ASIDE:
+			trust_quarantined(s, a);
+			break;
+		case ACTION_CLOSE_PEER:
+			close_peer(s, a);
+			break;
+		}
+	}
+}
+
+/* ---- the end of an order ---- */
+
+static void finish(struct jobs *s, struct live_job *o)
+{
+	struct job_view v;
+	struct timespec now;
+	clock_gettime(CLOCK_REALTIME, &now);
+	jobs_view(s, o->id, &v);
+	v.record.ended_seen = ages_now(s);
+	v.record.ended = (double)now.tv_sec + (double)now.tv_nsec * 1e-9;
+	o->record = v.record;
+	if (durable_end(s, o)) { /* again, later */
+		o->unrecorded = true;
+		o->try_again = jobs_now(s) + s->config.retry_seconds;
+		return;
+	}
+	jobs_remember(s, &v.record);
+	s->peers.job_ended(s->peers.user, o->id);
+	keep_trim(s);
+	clear_soon(s);
+	live_job_release_blobs(live_job_submit(o), s->blobs);
+	struct live_job **at = &s->orders;
+	while (*at != o)
+		at = &(*at)->next;
+	*at = o->next;
+	struct waiting_batch *late = o->waiting;
+	o->waiting = NULL;
+	o->waiting_last = &o->waiting;
+	live_job_free(o);
+	while (late) { /* the core says that the job is over */
+		struct waiting_batch *next = late->next;
+		results_take(s, late->peer, &late->envelope, &late->payload);
+		waiting_batch_free(late);
+		late = next;
+	}
+}
+
+void dispatch_finish_orders(struct jobs *s)
+{
+	bool finished = false;
+	for (struct live_job *o = s->orders, *next; o; o = next) {
+		next = o->next;
+		if (o->ended && !o->busy && !o->unpublished && !o->unrecorded) {
+			finish(s, o);
+			finished = true;
+			next = s->orders; /* late batches may have ended others */
+		}
+	}
+	if (finished)
+		s->peers.jobs_let_go(s->peers.user);
+	extend_waiting(s);
+}

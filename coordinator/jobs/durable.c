@@ -1,0 +1,493 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What must be on disk before it is acknowledged: submissions, results, the ends of jobs.
+ *
+ * Results: durable_reserve makes room in the journal and the films before the core sees a result, so that merging it
+ * cannot fail for want of space. durable_merged appends it. durable_ack queues its acknowledgement; flush_next syncs
+ * the journals of all queued ones in the thread pool (group commit), and done() sends them.
+ *
+ * A full or failing disk never loses an acknowledged result: the job is held with the reason, its acknowledgements are
+ * parked, and durable_tick tries again every retry_seconds, with a new journal if the old one cannot be trusted. A job
+ * whose end cannot be recorded stays in a list of endings until it can. Only running out of memory for these lists
+ * (some 200 bytes) ends the process.
+ */
+#include "coordinator/jobs/durable.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "common/base/version.h"
+#include "common/wire/frame.h"
+#include "coordinator/job/incoming.h"
+#include "coordinator/jobs/dispatch.h"
+#include "coordinator/jobs/publish.h"
+#include "coordinator/jobs/step.h"
+#include "coordinator/retention/keep.h"
+#include "coordinator/store/row_file.h"
+
+#include <assert.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { PINNED_ROOM = 512 /* for the record of the fingerprint before the first batch */ };
+enum { NOBODY = 0 /* peers are counted from 1 */ };
+
+/* A job that has ended, of which the disk does not know it yet. */
+struct ending {
+	struct ending *next;
+	struct job_record record;
+	bool written; /* the record, but the row of the ledger is not */
+};
+
+struct durable_ack {
+	struct durable_ack *next;
+	uint64_t peer; /* NOBODY: no answer is waited for */
+	struct lease_key key;
+	enum ack ack;
+	bool failed;
+	struct journal *journal; /* held */
+};
+
+/* One flush for all that has come so far. */
+struct flush {
+	uv_work_t work;
+	struct jobs *jobs;
+	struct durable_ack *acks;
+};
+
+/* ---- jobs ---- */
+
+static int pack_plan(const struct live_job *o, unsigned char **frame, size_t *size, struct error *e)
+{
+	Farm__JobInfo info;
+	Farm__Plan plan;
+	Farm__Envelope m;
+	farm__job_info__init(&info);
+	farm__envelope__init(&m);
+	plan_to_wire(&o->plan, &plan);
+	info.job = o->id;
+	info.plan = &plan;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_INFO;
+	m.job_info = &info;
+	return envelope_pack(&m, NULL, 0, frame, size, e);
+}
+
+int durable_pack(const struct live_job *o, struct ledger_job *j, unsigned char **submission, unsigned char **plan,
+		 struct error *e)
+{
+	*submission = *plan = NULL;
+	int rc = envelope_pack(o->submit.message, NULL, 0, submission, &j->submission_size, e);
+	if (!rc)
+		rc = pack_plan(o, plan, &j->plan_size, e);
+	j->submission = *submission;
+	j->plan = *plan;
+	return rc;
+}
+
+int durable_begin(struct jobs *s, struct live_job *o, struct error *e)
+{
+	char folder[SPOOL_PATH_MAX];
+	unsigned char *submission, *plan;
+	struct ledger_job j = {.id = o->id,
+			       .owner = o->record.owner,
+			       .name = o->record.name,
+			       .version = HSLT_VERSION,
+			       .priority = o->record.priority,
+			       .mixed = live_job_submit(o)->mixed,
+			       .submitted = o->record.submitted};
+	spool_job_path(s->spool, o->id, NULL, folder);
+	int rc = durable_pack(o, &j, &submission, &plan, e);
+	if (!rc)
+		rc = journal_create(&o->journal, folder, o->id, 0, e);
+	if (!rc)
+		rc = ledger_add(s->ledger, &j, e);
+	if (!rc) { /* after the row: without one it says that the row was lost */
+		j.held = "";
+		rc = row_file_write(s->spool, &j, e);
+		if (rc)
+			ledger_end(s->ledger, o->id, 0, "failed", NULL);
+	}
+	if (rc) { /* should the row be there all the same: nobody waits for the job */
+		text_copy(o->record.state, sizeof o->record.state, "failed");
+		text_copy(o->record.why, sizeof o->record.why, e ? e->text : "");
+		o->record.exit_code = 3;
+		spool_write_record(s->spool, &o->record, NULL);
+	}
+	mem_free(submission);
+	mem_free(plan);
+	return rc;
+}
+
+/* Its journal goes only when the record says for good that it has ended. kept: the films stay (keep.h). */
+static int write_end(struct jobs *s, const struct job_record *r, bool kept, struct error *e)
+{
+	int rc = spool_write_record(s->spool, r, e);
+	if (rc && !r->has_result) /* what it has merged is for nobody, and may be what fills the disk */
+		keep_drop(s, r->id);
+	if (rc == -ENOSPC)
+		keep_drop_all(s);
+	if (rc)
+		rc = spool_write_record(s->spool, r, e);
+	if (!rc && !kept)
+		keep_drop(s, r->id);
+	return rc;
+}
+
+static void end_later(struct jobs *s, const struct job_record *r, bool written)
+{
+	struct ending *n = mem_alloc(1, sizeof *n);
+	if (!n)
+		return;
+	*n = (struct ending){s->endings, *r, written};
+	s->endings = n;
+	s->endings_again = jobs_now(s) + s->config.retry_seconds;
+}
+
+void durable_end_row(struct jobs *s, const struct job_record *r)
+{
+	struct error e;
+	if (ledger_end(s->ledger, r->id, r->extended, r->state, &e) == 0)
+		return;
+	log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s action=\"it is tried again\"", (unsigned long long)r->id,
+		  log_quote(e.text).text);
+	end_later(s, r, true);
+}
+
+int durable_end(struct jobs *s, struct live_job *o)
+{
+	struct error e;
+	if (journal_write(o->journal, &e)) /* for whoever extends it; what is not stored is computed again */
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	int rc = write_end(s, &o->record, keep_order(s, o), &e);
+	if (rc)
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+	if (rc && o->record.has_result) {
+		text_copy(o->record.why, sizeof o->record.why, e.text);
+		return rc;
+	}
+	if (rc) {
+		end_later(s, &o->record, false);
+	} else {
+		durable_end_row(s, &o->record);
+		journal_settle(o->journal); /* the record says more than what still waits for a flush */
+	}
+	journal_release(o->journal); /* with its last holder it gives up its room, too */
+	o->journal = NULL;
+	return 0;
+}
+
+static void end_again(struct jobs *s)
+{
+	struct error e;
+	if (!s->endings || jobs_now(s) < s->endings_again)
+		return;
+	s->endings_again = jobs_now(s) + s->config.retry_seconds;
+	for (struct ending *n; (n = s->endings);) {
+		const struct job_record *r = &n->record;
+		n->written = n->written || write_end(s, r, false, &e) == 0;
+		if (!n->written || ledger_end(s->ledger, r->id, r->extended, r->state, &e))
+			return;
+		s->endings = n->next;
+		mem_free(n);
+	}
+}
+
+/* ---- batches ---- */
+
+static void hold(struct jobs *s, struct live_job *o, const char *text)
+{
+	struct event ev = {.kind = EVENT_HOLD, .job = o->id, .text = text};
+	if (!*text != !o->held) {
+		live_job_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
+		o->held = *text != 0;
+	}
+	o->try_again = jobs_now(s) + s->config.retry_seconds;
+	jobs_step(s, &ev);
+}
+
+void durable_hold(struct jobs *s, struct live_job *o, const char *what, const char *why)
+{
+	char text[256];
+	text_print(text, sizeof text, "%s: %s", what, why);
+	hold(s, o, text);
+}
+
+int durable_reserve(struct jobs *s, struct live_job *o, struct incoming *in, struct error *e)
+{
+	union {
+		const Farm__LeaseResult *from;
+		Farm__LeaseResult *to;
+	} result = {in->result}; /* generated structures have no const */
+	Farm__Envelope m;
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_LEASE_RESULT;
+	m.lease_result = result.to;
+	if (o->unsure)
+		return error_set(e, EIO, "the job's files cannot be written");
+	int rc = envelope_pack(&m, NULL, 0, &in->frame, &in->frame_size, e);
+	if (rc)
+		return rc;
+	size_t size = in->frame_size + in->payload->size;
+	frame_prefix_write(in->frame, (uint32_t)(in->frame_size - FRAME_PREFIX), (uint32_t)in->payload->size);
+	rc = journal_reserve(o->journal, size + PINNED_ROOM, e);
+	if (rc == -ENOSPC && keep_drop_all(s))
+		rc = journal_reserve(o->journal, size + PINNED_ROOM, e);
+	if (!rc && o->canvas && in->batch->key.kind == LEASE_RENDER)
+		rc = canvas_reserve(o->canvas, in->batch, e);
+	if (!rc)
+		return 0;
+	o->held_bytes = size;
+	durable_hold(s, o, "its results cannot be stored", e->text);
+	return rc;
+}
+
+/* Whose it is, once, before its first batch. */
+static int write_pinned(struct jobs *s, struct live_job *o, double elapsed, struct error *e)
+{
+	struct job_status status;
+	if (o->pinned || !farm_job(s->farm, o->id, jobs_now(s), &status) || !*status.fingerprint)
+		return 0;
+	o->pinned = true;
+	return journal_append(o->journal, JOURNAL_PINNED, NULL, elapsed, status.fingerprint, strlen(status.fingerprint),
+			      NULL, e);
+}
+
+int durable_merged(struct jobs *s, struct live_job *o, const struct incoming *in, uint64_t *at, struct error *e)
+{
+	const struct lease_key *k = &in->batch->key;
+	bool again = k->kind == LEASE_RENDER && o->again[(size_t)k->group * o->plan.parts + k->part];
+	double elapsed = farm_elapsed(s->farm, o->id, jobs_now(s));
+	assert(in->frame);
+	int rc = write_pinned(s, o, elapsed, e);
+	*at = journal_bytes(o->journal);
+	return rc ? rc
+		  : journal_append(o->journal, again ? JOURNAL_AGAIN : JOURNAL_BATCH, k, elapsed, in->frame,
+				   in->frame_size, in->payload, e);
+}
+
+/* ---- group commit ---- */
+
+static void flush_next(struct jobs *s);
+
+static void run(uv_work_t *work)
+{
+	struct flush *w = work->data;
+	for (struct durable_ack *a = w->acks; a; a = a->next) {
+		struct error e;
+		a->failed = journal_sync(a->journal, &e) != 0;
+		if (a->failed)
+			log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	}
+}
+
+static void drop_ack(struct durable_ack *a)
+{
+	journal_release(a->journal);
+	mem_free(a);
+}
+
+static void queue(struct jobs *s, struct durable_ack *a)
+{
+	a->next = NULL;
+	*s->acks_last = a;
+	s->acks_last = &a->next;
+}
+
+/* It waits until the journal is a good one again. */
+static void park(struct jobs *s, struct durable_ack *a)
+{
+	struct live_job *o = s->stopping ? NULL : jobs_find(s, a->key.job);
+	if (!o) {
+		drop_ack(a);
+		return;
+	}
+	if (a->journal != o->journal) { /* which is settled by now */
+		queue(s, a);
+		return;
+	}
+	a->next = s->parked;
+	s->parked = a;
+	if (!o->held)
+		durable_hold(s, o, "its results cannot be stored", "its journal failed to be written");
+}
+
+static void answer(struct jobs *s, struct durable_ack *a)
+{
+	if (a->failed) {
+		park(s, a);
+		return;
+	}
+	if (a->ack == ACK_MERGED)
+		log_event(LOG_BATCH_STORED, "job=j%llu peer=%llu kind=%d group=%u part=%u epoch=%llu",
+			  (unsigned long long)a->key.job, (unsigned long long)a->peer, (int)a->key.kind, a->key.group,
+			  a->key.part, (unsigned long long)a->key.epoch);
+	if (!s->stopping && a->peer != NOBODY)
+		s->peers.acknowledge(s->peers.user, a->peer, &a->key, a->ack, "");
+	drop_ack(a);
+}
+
+static void done(uv_work_t *work, int status)
+{
+	struct flush *w = work->data;
+	struct jobs *s = w->jobs;
+	assert(status == 0);
+	(void)status;
+	s->flushing = false;
+	while (w->acks) {
+		struct durable_ack *a = w->acks;
+		w->acks = a->next;
+		answer(s, a);
+	}
+	mem_free(w);
+	flush_next(s);
+}
+
+static void flush_next(struct jobs *s)
+{
+	if (s->flushing || !s->acks)
+		return;
+	struct flush *w = mem_alloc(1, sizeof *w);
+	if (!w) /* as for an event: without 200 bytes nothing goes on */
+		abort();
+	w->jobs = s;
+	w->acks = s->acks;
+	w->work.data = w;
+	s->acks = NULL;
+	s->acks_last = &s->acks;
+	s->flushing = true;
+	int rc = uv_queue_work(s->loop, &w->work, run, done);
+	assert(rc == 0);
+	(void)rc;
+}
+
+void durable_ack(struct jobs *s, const struct live_job *o, uint64_t peer, const struct lease_key *k, enum ack ack)
+{
+	struct durable_ack *a = mem_alloc(1, sizeof *a);
+	if (!a) /* not answered: the worker offers it again, and it is a repeat */
+		return;
+	*a = (struct durable_ack){.peer = peer, .key = *k, .ack = ack, .journal = o->journal};
+	journal_hold(a->journal);
+	queue(s, a);
+	flush_next(s);
+}
+
+/* ---- the rest ---- */
+
+/* What nobody waits for: it need not be safe at once, but soon. */
+static int append_note(struct jobs *s, const struct live_job *o, enum journal_kind kind, double elapsed,
+		       const void *bytes, size_t size, struct error *e)
+{
+	int rc = journal_append(o->journal, kind, NULL, elapsed, bytes, size, NULL, e);
+	if (!rc)
+		durable_ack(s, o, NOBODY, &(struct lease_key){.job = o->id}, ACK_REPEAT);
+	return rc;
+}
+
+void durable_look(struct jobs *s, uint64_t job)
+{
+	struct live_job *o = jobs_find(s, job);
+	struct job_status status;
+	struct error e;
+	if (!o || !farm_job(s->farm, job, jobs_now(s), &status) || status.looks->count == 0)
+		return;
+	const struct forecast_look *l = &status.looks->looks[status.looks->count - 1];
+	if (l->work <= o->look_written)
+		return;
+	o->look_written = l->work;
+	/* Only forecasts are made of it: the look itself is taken again. */
+	if (append_note(s, o, JOURNAL_LOOK, farm_elapsed(s->farm, job, jobs_now(s)), l, sizeof *l, &e))
+		log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)job, log_quote(e.text).text);
+}
+
+/* Not before each answer: it is for the record alone. Nor while a checkpoint is written, which has the last ones and
+ * takes the journal's place. */
+static void write_counts(struct jobs *s, struct live_job *o)
+{
+	struct job_counts now;
+	struct error e;
+	if (o->ended || o->busy || !farm_counts(s->farm, o->id, &now) || memcmp(&now, &o->counts, sizeof now) == 0)
+		return;
+	if (append_note(s, o, JOURNAL_COUNTS, o->times.elapsed, &now, sizeof now, &e) == 0)
+		o->counts = now;
+}
+
+/* The answers that waited for the journals of jobs that are no longer bad. */
+static void unpark(struct jobs *s)
+{
+	struct durable_ack *list = s->parked;
+	s->parked = NULL;
+	for (struct durable_ack *a, *next = list; (a = next);) {
+		struct live_job *o = jobs_find(s, a->key.job);
+		next = a->next;
+		if (!o) {
+			drop_ack(a);
+		} else if (a->journal == o->journal && journal_is_bad(a->journal)) {
+			a->next = s->parked;
+			s->parked = a;
+		} else {
+			queue(s, a);
+		}
+	}
+	flush_next(s);
+}
+
+/* 0: nothing stands in the way of its results any more. */
+static int mend(struct live_job *o, struct error *e)
+{
+	if (o->unsure)
+		return -EAGAIN;
+	int rc = journal_is_bad(o->journal) ? journal_renew(o->journal, e) : 0;
+	if (rc && rc != -EAGAIN)
+		live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
+	return rc ? rc : journal_reserve(o->journal, 2 * o->held_bytes, e);
+}
+
+void durable_tick(struct jobs *s)
+{
+	for (struct live_job *o = s->orders; o; o = o->next)
+		write_counts(s, o);
+	if (s->parked)
+		unpark(s);
+	end_again(s);
+	for (struct live_job *o = s->orders; o; o = o->next) {
+		struct error e;
+		if (jobs_now(s) < o->try_again || o->busy)
+			continue;
+		if (o->unpublished) {
+			o->unpublished = false;
+			publish_start(s, o, PUBLISH_RESULT, o->unpublished_rounds);
+		}
+		if (o->unrecorded) {
+			o->unrecorded = false;
+			dispatch_finish_orders(s);
+			return; /* as below */
+		}
+		if (o->unprepared && !o->ended) {
+			struct event ev = {.kind = EVENT_TICK};
+			dispatch_prepare(s, o);
+			jobs_step(s, &ev);
+			return;
+		}
+		if (!o->held || o->ended)
+			continue;
+		o->try_again = jobs_now(s) + s->config.retry_seconds;
+		if (mend(o, &e) == 0) {
+			hold(s, o, "");
+			return; /* the list may have changed; the others next time */
+		}
+	}
+}
+
+void durable_close(struct jobs *s)
+{
+	assert(!s->flushing && !s->acks);
+	for (struct durable_ack *a; (a = s->parked);) {
+		s->parked = a->next;
+		drop_ack(a);
+	}
+	for (struct ending *n; (n = s->endings);) {
+		s->endings = n->next;
+		mem_free(n);
+	}
+	ledger_close(s->ledger);
+}

@@ -1,0 +1,396 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Extensions of jobs: what is asked for, until it is answered.
+ *
+ * extend_job puts a request at the end of a list; extend_waiting takes those out whose jobs nobody is at work on. A job
+ * that runs gets its new plan in the ledger and then in the core. One that is done is read from what was kept of it
+ * (keep.h) by a thread of the pool, one at a time, and goes on as after a restart.
+ *
+ * Each request is answered once, unless its peer has gone: then a job that was read for it is dropped again. What
+ * cannot be done is answered with a sentence, and the job stays as it was.
+ */
+#include "coordinator/jobs/extend.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/jobs/durable.h"
+#include "coordinator/jobs/listing.h"
+#include "coordinator/jobs/reconcile.h"
+#include "coordinator/jobs/restore.h"
+#include "coordinator/jobs/step.h"
+#include "coordinator/store/row_file.h"
+
+#include <assert.h>
+#include <math.h>
+#include <string.h>
+
+static const char *const again = "submit it again (hslt-submit)";
+
+/* ---- the new plan ---- */
+
+static double error_of(const struct forecast_history *h)
+{
+	return h->count && !h->looks[h->count - 1].doubtful ? sqrt(h->looks[h->count - 1].rel_mse_upper) : NAN;
+}
+
+static struct extension_from where(const struct live_job *o, double seconds, bool ended)
+{
+	return (struct extension_from){
+		.rounds = live_job_rounds(o), .seconds = seconds, .error = error_of(&o->record.looks), .ended = ended};
+}
+
+static int plan_of(const struct jobs *s, const struct requester *by, const struct live_job *o,
+		   const struct extension *x, const struct extension_from *from, struct plan_request *asked,
+		   struct plan *plan, struct error *e)
+{
+	int rc = plan_request_from_wire(live_job_submit(o)->plan, asked, e);
+	if (!rc)
+		rc = extend_plan(&o->plan, x, from, asked, plan, e);
+	if (rc || by->unbounded)
+		return rc;
+	return jobs_within_quota(s, by->owner, o->id, s->peers.uploading(s->peers.user, by->peer), plan,
+				 live_job_submit(o), e);
+}
+
+static void set_bounds(struct live_job *o, const struct plan_request *asked, const struct plan *plan)
+{
+	Farm__PlanRequest *r = o->submit.message->submit->plan;
+	r->spp = asked->spp;
+	r->mutations = asked->mutations;
+	r->seconds = asked->seconds;
+	r->target_error = asked->target_error;
+	o->plan = *plan;
+	o->record.target_error = plan->target_error;
+	if (o->canvas)
+		canvas_set_rounds(o->canvas, plan->rounds);
+}
+
+static int store(struct jobs *s, const struct live_job *o, struct error *e)
+{
+	struct ledger_job j = {.id = o->id, .extended = o->record.extended};
+	unsigned char *submission, *plan;
+	int rc = durable_pack(o, &j, &submission, &plan, e);
+	if (!rc)
+		rc = ledger_extend(s->ledger, &j, e);
+	if (!rc)
+		reconcile_row(s, o->id);
+	mem_free(submission);
+	mem_free(plan);
+	return rc;
+}
+
+/* The bounds that the job has now, for its log and for the client. */
+static void describe(const struct live_job *o, char *text, size_t size)
+{
+	struct text t = {text, size};
+	const char *comma = "";
+	text_put(&t, "after %llu rounds it goes on until", (unsigned long long)live_job_rounds(o));
+	if (o->plan.rounds != UINT64_MAX) {
+		text_put(&t, " %llu are done", (unsigned long long)o->plan.rounds);
+		comma = " or";
+	}
+	if (o->plan.seconds > 0) {
+		text_put(&t, "%s %.3g s are over", comma, o->plan.seconds);
+		comma = " or";
+	}
+	if (o->plan.target_error > 0)
+		text_put(&t, "%s its error is %.3g %%", comma, 100 * o->plan.target_error);
+}
+
+static void note(const struct requester *by, struct live_job *o, char *text, size_t size)
+{
+	describe(o, text, size);
+	live_job_log(o, LOG_JOB_STATE, "state=extended by=%s text=%s", *by->owner ? by->owner : "-",
+		     log_quote(text).text);
+}
+
+/* ---- a job that runs ---- */
+
+static int extend_live(struct jobs *s, const struct requester *by, struct live_job *o, const struct extension *x,
+		       char *text, size_t size, struct error *e)
+{
+	struct plan_request asked, old_asked;
+	struct plan plan, old = o->plan;
+	double seconds = farm_elapsed(s->farm, o->id, jobs_now(s));
+	struct extension_from from = where(o, isnan(seconds) ? 0 : seconds, false);
+	int rc = plan_request_from_wire(live_job_submit(o)->plan, &old_asked, e);
+	if (!rc)
+		rc = plan_of(s, by, o, x, &from, &asked, &plan, e);
+	if (rc)
+		return rc;
+	set_bounds(o, &asked, &plan);
+	rc = store(s, o, e);
+	if (rc) {
+		set_bounds(o, &old_asked, &old);
+		return rc;
+	}
+	note(by, o, text, size);
+	struct event ev = {.kind = EVENT_EXTEND, .tag = by->peer, .job = o->id, .plan = &o->plan};
+	jobs_step(s, &ev);
+	return 0;
+}
+
+/* ---- a job that is done ---- */
+
+static void forget_end(struct jobs *s, uint64_t job)
+{
+	for (size_t i = 0; i < s->ended_count; i++)
+		if (s->ended[i].id == job) {
+			memmove(&s->ended[i], &s->ended[i + 1], (--s->ended_count - i) * sizeof *s->ended);
+			return;
+		}
+}
+
+/* What is kept of it beside its row. */
+static int read_job(const struct jobs *s, uint64_t job, struct row_file *f, struct error *e)
+{
+	struct ledger_job j;
+	int rc = ledger_get(s->ledger, job, &j, e);
+	rc = rc == 0 ? -ENOENT : rc < 0 ? rc : row_file_read(s->spool, job, f, e);
+	if (rc == -ENOENT)
+		return error_set(e, ENOENT, "its films have been cleared: %s", again);
+	return rc ? error_prefix(e, rc, "what was kept of it") : 0;
+}
+
+/* The journal has them from a while before the end: what the record of the end says is more. */
+static void take_counts(struct job_counts *c, const struct job_record *r)
+{
+	const struct {
+		uint64_t *have, known;
+	} pair[] = {{&c->repeats, r->repeats},	    {&c->refused, r->refused},	     {&c->failures, r->failures},
+		    {&c->timeouts, r->timeouts},    {&c->duplicates, r->duplicates}, {&c->verified, r->verified},
+		    {&c->mismatched, r->mismatched}};
+	for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
+		if (*pair[i].have < pair[i].known)
+			*pair[i].have = pair[i].known;
+}
+
+/* r: as it was remembered. */
+static int begin_again(struct jobs *s, const struct requester *by, struct live_job *o, const struct job_record *r,
+		       struct error *e)
+{
+	o->record.extended++;
+	int rc = store(s, o, e);
+	if (rc)
+		return rc;
+	o->record.has_result = r->has_result;
+	take_counts(&o->counts, r);
+	o->next = s->orders;
+	s->orders = o;
+	forget_end(s, o->id);
+	s->refusal[0] = 0;
+	rc = restore_tell(s, o, "", by->peer, e);
+	if (!rc && !*s->refusal)
+		return 0;
+	if (!rc)
+		rc = error_set(e, EAGAIN, "%s", s->refusal);
+	s->orders = o->next;
+	jobs_remember(s, r);
+	struct job_record over = *r;
+	over.extended = o->record.extended;
+	durable_end_row(s, &over);
+	return rc;
+}
+
+static int extend_read(struct jobs *s, const struct requester *by, struct live_job *o, const struct extension *x,
+		       const struct job_record *r, char *text, size_t size, struct error *e)
+{
+	struct plan_request asked;
+	struct plan plan;
+	if (live_job_rounds(o) == 0)
+		return error_set(e, ENOENT, "its films have been cleared: %s", again);
+	struct extension_from from = where(o, isnan(o->times.completed) ? 0 : o->times.completed, true);
+	int rc = plan_of(s, by, o, x, &from, &asked, &plan, e);
+	if (rc)
+		return rc;
+	set_bounds(o, &asked, &plan);
+	note(by, o, text, size);
+	return begin_again(s, by, o, r, e);
+}
+
+struct extension_request {
+	struct extension_request *next;
+	struct requester by;
+	struct extension what;
+};
+
+static void answer(struct jobs *s, uint64_t peer, int rc, const struct error *e, const char *text)
+{
+	s->peers.extended(s->peers.user, peer, rc ? e->text : NULL, text);
+}
+
+/* Films of hundreds of megabytes, which the pool reads, those of one job at a time. */
+struct reading {
+	uv_work_t work;
+	struct jobs *jobs;
+	struct requester by; /* who may have gone meanwhile */
+	struct extension what;
+	struct job_record record; /* of its end */
+	struct live_job *order;
+	int rc;
+	struct error error;
+};
+
+static void run(uv_work_t *work)
+{
+	struct reading *w = work->data;
+	w->rc = replay_films(w->jobs->spool, w->order, NULL, &w->error);
+	if (!w->rc) /* results from before its end may still wait for a flush of the old file */
+		w->rc = journal_renew(w->order->journal, &w->error);
+}
+
+static void done(uv_work_t *work, int status)
+{
+	struct reading *w = work->data;
+	struct jobs *s = w->jobs;
+	bool here = !s->stopping && s->peers.name(s->peers.user, w->by.peer);
+	char text[256] = "";
+	assert(status == 0);
+	(void)status;
+	s->reading = NULL;
+	s->reading_for = 0;
+	if (w->rc)
+		live_job_log(w->order, LOG_SPOOL_FAULT, "text=%s", log_quote(w->error.text).text);
+	int rc = w->rc ? error_prefix(&w->error, w->rc, "it cannot go on, %s", again) : here ? 0 : -ECANCELED;
+	if (!rc)
+		rc = extend_read(s, &w->by, w->order, &w->what, &w->record, text, sizeof text, &w->error);
+	if (rc)
+		restore_drop(s, w->order);
+	if (here)
+		answer(s, w->by.peer, rc, &w->error, text);
+	mem_free(w);
+	if (!s->stopping)
+		extend_waiting(s);
+}
+
+/* All that can be said without its films: of less than was done, so that nothing is refused which they would allow. */
+static int ask_beforehand(const struct jobs *s, const struct requester *by, const struct live_job *o,
+			  const struct extension *x, const struct job_record *r, struct error *e)
+{
+	struct plan_request asked;
+	struct plan plan;
+	return plan_of(s, by, o, x, &(struct extension_from){.error = error_of(&r->looks), .ended = true}, &asked,
+		       &plan, e);
+}
+
+static int start_reading(struct jobs *s, const struct extension_request *q, const struct job_record *r, struct error *e)
+{
+	struct row_file f;
+	int rc = read_job(s, r->id, &f, e);
+	if (rc)
+		return rc;
+	struct reading *w = mem_alloc(1, sizeof *w);
+	rc = w ? restore_live_job(s, &f.job, &w->order, e) : error_set(e, ENOMEM, "no memory for a job");
+	row_file_free(&f);
+	if (rc) {
+		mem_free(w);
+		return error_prefix(e, rc, "it cannot go on, %s", again);
+	}
+	rc = ask_beforehand(s, &q->by, w->order, &q->what, r, e);
+	if (rc) {
+		restore_drop(s, w->order);
+		mem_free(w);
+		return rc;
+	}
+	w->work.data = w;
+	w->jobs = s;
+	w->by = q->by;
+	w->what = q->what;
+	w->record = *r;
+	s->reading = w->order;
+	s->reading_for = q->by.peer;
+	rc = uv_queue_work(s->loop, &w->work, run, done);
+	assert(rc == 0);
+	return rc;
+}
+
+static int extend_ended(struct jobs *s, const struct extension_request *q, const struct job_record *r, struct error *e)
+{
+	if (strcmp(r->state, job_state_name(JOB_DONE)) != 0)
+		return error_set(e, EINVAL, "it has %s, and nothing of it was kept: %s",
+				 strcmp(r->state, "failed") == 0 ? "failed" : "been cancelled", again);
+	if (strcmp(r->reason, job_end_name(END_BLACK)) == 0)
+		return error_set(e, EINVAL, "it is black: chains have nowhere to begin");
+	return start_reading(s, q, r, e);
+}
+
+/* ---- both ---- */
+
+/* Its films are in use, or those of another job are being read. */
+static bool must_wait(const struct jobs *s, uint64_t job)
+{
+	const struct live_job *o = jobs_find(s, job);
+	return o ? o->busy || o->ended : s->reading != NULL;
+}
+
+static void go_on(struct jobs *s, const struct extension_request *q)
+{
+	struct live_job *o = jobs_find(s, q->what.job);
+	struct job_view v;
+	struct error e = {""};
+	char text[256] = "";
+	int rc;
+	if (o)
+		rc = extend_live(s, &q->by, o, &q->what, text, sizeof text, &e);
+	else if (!jobs_view(s, q->what.job, &v))
+		rc = error_set(&e, ENOENT, "no such job");
+	else
+		rc = extend_ended(s, q, &v.record, &e);
+	if (rc || o) /* else when it is read */
+		answer(s, q->by.peer, rc, &e, text);
+}
+
+/* One that is not answered yet. */
+static bool has_asked(const struct jobs *s, uint64_t peer)
+{
+	const struct extension_request *q = s->extending;
+	while (q && q->by.peer != peer)
+		q = q->next;
+	return q || s->reading_for == peer;
+}
+
+void extend_job(struct jobs *s, const struct requester *by, const struct extension *x)
+{
+	struct extension_request *q = NULL, **at = &s->extending;
+	struct error e;
+	int rc = has_asked(s, by->peer)
+			 ? error_set(&e, EBUSY, "one extension at a time: the one before is not answered yet")
+			 : extend_check(x, &e);
+	if (!rc && !(q = mem_alloc(1, sizeof *q)))
+		rc = error_set(&e, ENOMEM, "no memory for an extension");
+	if (rc) {
+		answer(s, by->peer, rc, &e, "");
+		return;
+	}
+	*q = (struct extension_request){.by = *by, .what = *x};
+	while (*at)
+		at = &(*at)->next;
+	*at = q;
+	extend_waiting(s);
+}
+
+void extend_waiting(struct jobs *s)
+{
+	for (struct extension_request **at = &s->extending, *q; (q = *at);) {
+		if (must_wait(s, q->what.job)) {
+			at = &q->next;
+			continue;
+		}
+		*at = q->next;
+		go_on(s, q);
+		mem_free(q);
+		at = &s->extending; /* others may have been served meanwhile */
+	}
+}
+
+void extend_forget(struct jobs *s, uint64_t peer)
+{
+	for (struct extension_request **at = &s->extending, *q; (q = *at);) {
+		if (q->by.peer != peer) {
+			at = &q->next;
+			continue;
+		}
+		*at = q->next;
+		mem_free(q);
+	}
+}

@@ -1,0 +1,76 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/jobs/files.h"
+
+#include "common/base/text.h"
+#include "coordinator/jobs/step.h"
+
+#include <string.h>
+
+static void hold(struct jobs *s, struct live_job *o, const char *text)
+{
+	struct event ev = {.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_FILES, .text = text};
+	o->lacks_file = *text != 0;
+	live_job_log(o, LOG_JOB_STATE, "state=%s text=%s", *text ? "held" : "released", log_quote(text).text);
+	jobs_step(s, &ev);
+}
+
+/* The first one that is not there; NULL: all are. */
+static const Farm__File *lacking(const struct jobs *s, const struct live_job *o)
+{
+	const Farm__Submit *m = live_job_submit(o);
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = live_job_file_hash(m->files[i]);
+		if (!blob_has(s->blobs, &h, NULL))
+			return m->files[i];
+	}
+	return NULL;
+}
+
+bool files_look(struct jobs *s, struct live_job *o)
+{
+	char text[256];
+	const Farm__File *f = o->ended ? NULL : lacking(s, o);
+	if (f && !o->lacks_file) {
+		text_print(
+			text, sizeof text,
+			"its file %.100s is damaged or gone in the spool: submit the scene again (hslt-submit), and it goes on",
+			f->name);
+		hold(s, o, text);
+	} else if (!f && o->lacks_file) {
+		hold(s, o, "");
+	}
+	return f == NULL;
+}
+
+int files_check(struct jobs *s, const struct blob_hash *h, double seconds, struct error *e)
+{
+	int rc = blob_check(s->blobs, h, seconds, e);
+	if (rc != -EBADMSG && rc != -ENOENT)
+		return rc;
+	if (rc == -EBADMSG)
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
+	for (struct live_job *o = s->orders, *next; o; o = next) {
+		next = o->next;
+		files_look(s, o);
+	}
+	return rc;
+}
+
+bool files_are_right(struct jobs *s, struct live_job *o)
+{
+	const Farm__Submit *m = live_job_submit(o);
+	struct error e;
+	bool right = true;
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = live_job_file_hash(m->files[i]);
+		right = files_check(s, &h, BLOB_SINCE_GIVEN, &e) == 0 && right;
+	}
+	return right;
+}
+
+void files_tick(struct jobs *s)
+{
+	for (struct live_job *o = s->orders; o; o = o->next)
+		if (o->lacks_file && files_look(s, o))
+			return; /* the list may have changed; the others next time */
+}

@@ -1,0 +1,100 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/jobs/late_feed.h"
+
+#include "common/base/mem.h"
+#include "coordinator/job/digest.h"
+#include "coordinator/job/incoming.h"
+#include "coordinator/job/late.h"
+#include "coordinator/jobs/step.h"
+
+/* It is damaged by now, too: its lease is open. */
+static void give_up(struct jobs *s, struct live_job *o, const struct late_result *l, const char *why)
+{
+	struct event ev = {.kind = EVENT_LEASE_RETURNED, .peer = l->peer, .job = o->id, .lease = {.key = l->key}};
+	live_job_log(o, LOG_SPOOL_FAULT, "text=%s", log_quote(why).text);
+	if (l->peer)
+		jobs_step(s, &ev);
+}
+
+/* To the core, which says whether it counts. */
+static int offer(struct jobs *s, const struct live_job *o, const struct late_result *l, struct error *e)
+{
+	struct event ev = {.kind = EVENT_STORED, .job = o->id, .lease = {.key = l->key, .valid = true}};
+	struct envelope env;
+	struct batch batch = {0};
+	struct buf copy = {0};
+	unsigned char *body;
+	const unsigned char *payload;
+	size_t size, payload_size;
+	int rc = journal_body(o->journal, l->at, &body, &size, e);
+	if (rc)
+		return rc;
+	rc = replay_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
+	if (rc) {
+		mem_free(body);
+		return rc;
+	}
+	rc = batch_unpack(&batch, &o->plan, env.message->lease_result, payload, payload_size, e);
+	if (!rc && farm_verifies(s->farm, &l->key))
+		rc = digest_batch(&batch, &ev.lease.digest, e);
+	copy.limit = payload_size;
+	if (!rc && !buf_append(&copy, payload, payload_size))
+		rc = error_set(e, ENOMEM, "no memory for a result");
+	if (!rc) {
+		const struct incoming in = {.batch = &batch,
+					    .result = env.message->lease_result,
+					    .payload = &copy,
+					    .stored = true,
+					    .stored_at = l->at};
+		jobs_step_with(s, &ev, &in);
+	}
+	buf_fini(&copy);
+	batch_fini(&batch);
+	envelope_fini(&env);
+	mem_free(body);
+	return rc;
+}
+
+void late_drop(struct jobs *s, struct live_job *o)
+{
+	while (o->late_count) {
+		struct late_result l = o->late[--o->late_count];
+		give_up(s, o, &l, "a result that waited in the journal is computed again");
+	}
+}
+
+/* true: one more counts, and others may now. */
+static bool feed_one(struct jobs *s, struct live_job *o)
+{
+	for (size_t i = 0; i < o->late_count; i++) {
+		struct late_result l = o->late[i];
+		struct error e;
+		enum replay_place place = replay_place(o, &l.key);
+		if (place == REPLAY_LATE)
+			continue;
+		int rc = place == REPLAY_FITS ? offer(s, o, &l, &e) : 0;
+		if (rc == -ENOMEM) /* later */
+			return false;
+		if (!rc && replay_place(o, &l.key) !=
+				   REPLAY_MERGED) /* the core waits for something: an estimate of the error */
+			continue;
+		l = o->late[i];
+		late_remove(o, i);
+		if (rc)
+			give_up(s, o, &l, e.text);
+		return true;
+	}
+	return false;
+}
+
+void late_feed(struct jobs *s)
+{
+	if (s->feeding || s->stepping || s->stopping)
+		return;
+	s->feeding = true;
+	for (struct live_job *o = s->orders; o;) {
+		bool fed = o->late_count && !o->busy && !o->ended && feed_one(s, o);
+		o = fed ? s->orders : o->next; /* the list may have changed */
+	}
+	s->feeding = false;
+}

@@ -1,0 +1,142 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Jobs as they are listed and shown, wherever they are: among those that run, those that are being read, the last
+ * ENDED_MAX that ended, and then on the disk.
+ */
+#include "coordinator/jobs/listing.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/jobs/recovery.h"
+#include "coordinator/jobs/restore.h"
+#include "coordinator/retention/ages.h"
+#include "coordinator/retention/keep.h"
+
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+
+void jobs_remember(struct jobs *s, const struct job_record *r)
+{
+	if (s->ended_count == ENDED_MAX) {
+		keep_drop(s, s->ended[0].id); /* nobody would count its films any more */
+		memmove(s->ended, s->ended + 1, --s->ended_count * sizeof *s->ended);
+	}
+	s->ended[s->ended_count++] = *r;
+}
+
+static void view_order(struct jobs *s, const struct live_job *o, struct job_view *v)
+{
+	struct job_status status;
+	struct canvas_counts counted;
+	view_of_record(v, &o->record);
+	if (o->canvas) { /* in the end what the image holds, until then all that has come */
+		canvas_counts(o->canvas, !o->ended, &counted);
+		record_take_counted(&v->record, &o->plan, &counted, o->black, o->lit.beyond_share);
+		record_add_note(&v->record, o->doubts);
+	}
+	if (o->ended)
+		record_add_doubt(&v->record);
+	if (!farm_job(s->farm, o->id, jobs_now(s), &status))
+		return;
+	view_add_status(v, &status);
+	if (o->ended && (o->busy || o->unpublished || o->unrecorded)) { /* not before its image is there */
+		text_copy(v->record.state, sizeof v->record.state, job_state_name(JOB_RUNNING));
+		if (*o->record.why)
+			text_print(v->waiting, sizeof v->waiting, "its %s cannot be written: %s",
+				   o->unrecorded ? "record" : "image", o->record.why);
+		else
+			text_copy(v->waiting, sizeof v->waiting, "its image is being written");
+		memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);
+		v->record.reason[0] = 0;
+		v->record.exit_code = 0;
+	}
+}
+
+bool jobs_view(struct jobs *s, uint64_t job, struct job_view *v)
+{
+	struct job_record r;
+	struct live_job *o = jobs_find(s, job);
+	if (o) {
+		view_order(s, o, v);
+		return true;
+	}
+	if (recovery_view(s, job, v))
+		return true;
+	for (size_t i = 0; i < s->ended_count; i++)
+		if (s->ended[i].id == job) {
+			view_of_record(v, &s->ended[i]);
+			return true;
+		}
+	if (spool_read_record(s->spool, job, &r, NULL))
+		return false;
+	view_of_record(v, &r);
+	return true;
+}
+
+static int by_id(const void *a, const void *b)
+{
+	const struct job_view *x = a, *y = b;
+	return (x->record.id > y->record.id) - (x->record.id < y->record.id);
+}
+
+size_t jobs_views(struct jobs *s, struct job_view **views)
+{
+	size_t count = s->ended_count + recovery_views(s, NULL), n = 0;
+	for (struct live_job *o = s->orders; o; o = o->next)
+		count++;
+	*views = mem_alloc(count, sizeof **views);
+	if (!*views)
+		return 0;
+	for (size_t i = 0; i < s->ended_count; i++)
+		view_of_record(&(*views)[n++], &s->ended[i]);
+	for (struct live_job *o = s->orders; o; o = o->next)
+		view_order(s, o, &(*views)[n++]);
+	n += recovery_views(s, *views + n);
+	qsort(*views, count, sizeof **views, by_id);
+	return count;
+}
+
+/* Jobs of an earlier life that have ended, and those that were never accepted: whoever submitted them has no answer. */
+int listing_open(struct jobs *s, struct error *e)
+{
+	uint64_t *ids;
+	size_t count;
+	int rc = spool_jobs(s->spool, &ids, &count, e);
+	if (rc)
+		return rc;
+	s->ended = mem_alloc(ENDED_MAX, sizeof *s->ended);
+	if (!s->ended) {
+		mem_free(ids);
+		return error_set(e, ENOMEM, "no memory for the list of jobs");
+	}
+	for (size_t i = count > ENDED_MAX ? count - ENDED_MAX : 0; i < count; i++) {
+		struct job_record *r = &s->ended[s->ended_count];
+		struct error fault;
+		if (restore_lives(s, ids[i]))
+			continue;
+		rc = spool_read_record(s->spool, ids[i], r, &fault);
+		if (rc == -ENOENT) /* the number of a job that did not get as far as a record */
+			continue;
+		if (rc) {
+			log_event(LOG_SPOOL_FAULT, "job=j%llu text=%s", (unsigned long long)ids[i],
+				  log_quote(fault.text).text);
+			continue;
+		}
+		if (!record_is_ended(r)) {
+			text_copy(r->state, sizeof r->state, "failed");
+			text_copy(r->reason, sizeof r->reason, job_end_name(END_FAILED));
+			text_copy(r->why, sizeof r->why, "the coordinator stopped before the job was accepted");
+			r->exit_code = 3;
+			r->ended = (double)time(NULL);
+			r->ended_seen = ages_now(s);
+			if (spool_write_record(s->spool, r, &fault))
+				log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(fault.text).text);
+		}
+		s->ended_count++;
+	}
+	mem_free(ids);
+	log_event(LOG_SPOOL_READ, "path=%s jobs=%zu next=j%llu", log_quote(s->config.spool).text, s->ended_count,
+		  (unsigned long long)spool_next_job(s->spool));
+	return 0;
+}

@@ -1,0 +1,17 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Jobs as they are listed and shown. The loop's thread. */
+#ifndef COORDINATOR_JOBS_LISTING_H
+#define COORDINATOR_JOBS_LISTING_H
+
+#include "coordinator/job/jobs.h"
+
+/* Reads the records of the last jobs that ended. One that cannot be read is logged and left out. */
+int listing_open(struct jobs *s, struct error *e);
+void jobs_remember(struct jobs *s, const struct job_record *r); /* it has ended */
+
+/* false: no such job. */
+bool jobs_view(struct jobs *s, uint64_t job, struct job_view *v);
+/* All that are listed, ascending by id; mem_alloc'd. */
+size_t jobs_views(struct jobs *s, struct job_view **views);
+
+#endif

@@ -1,0 +1,333 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/jobs/recovery.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/jobs/files.h"
+#include "coordinator/jobs/listing.h"
+#include "coordinator/jobs/restore.h"
+#include "coordinator/retention/ages.h"
+#include "coordinator/retention/keep.h"
+
+#include <assert.h>
+#include <string.h>
+#include <time.h>
+
+struct recovery {
+	uv_work_t work;
+	struct jobs *jobs;
+	struct found **last, *at; /* of jobs.found. at: the one that is read; NULL: none is */
+	uint64_t bytes, read;	  /* of all; of those that are done with */
+	bool under_way;
+	int rc; /* of the one that was read */
+	struct error error;
+};
+
+/* ---- how far it is */
+
+bool recovery_is_on(const struct jobs *s)
+{
+	return s->recovery != NULL;
+}
+
+double recovery_share(const struct jobs *s)
+{
+	const struct recovery *r = s->recovery;
+	uint64_t read = r->read + (r->at ? atomic_load(&r->at->progress.read) : 0);
+	return r->bytes > 0 && read < r->bytes ? (double)read / (double)r->bytes : 1;
+}
+
+static double share_of(const struct found *f)
+{
+	uint64_t read = atomic_load(&f->progress.read);
+	return read < f->bytes ? (double)read / (double)f->bytes : 1;
+}
+
+static void view(const struct found *f, struct job_view *v)
+{
+	view_of_record(v, &f->record);
+	v->reading = share_of(f);
+	text_copy(v->record.state, sizeof v->record.state, "reading");
+	text_print(v->waiting, sizeof v->waiting, "reading, %u %%: its results are read from the spool",
+		   (unsigned)(100 * v->reading));
+	memcpy(v->owners_waiting, v->waiting, sizeof v->waiting);
+}
+
+static const struct found *find(const struct jobs *s, uint64_t job)
+{
+	const struct found *f = s->found;
+	while (f && f->record.id != job)
+		f = f->next;
+	return f;
+}
+
+bool recovery_view(const struct jobs *s, uint64_t job, struct job_view *v)
+{
+	const struct found *f = find(s, job);
+	if (f)
+		view(f, v);
+	return f != NULL;
+}
+
+size_t recovery_views(const struct jobs *s, struct job_view *v)
+{
+	size_t n = 0;
+	for (const struct found *f = s->found; f; f = f->next, n++)
+		if (v)
+			view(f, &v[n]);
+	return n;
+}
+
+/* ---- what cannot be read */
+
+/* What is stored is damaged: the job's batches can be made again, with the same bits. Nothing is deleted: somebody may
+ * want to look at it. */
+static void put_aside(struct jobs *s, struct live_job *o)
+{
+	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX], aside[SPOOL_PATH_MAX];
+	spool_job_path(s->spool, o->id, NULL, folder);
+	spool_job_path(s->spool, o->id, "checkpoint", path);
+	spool_job_path(s->spool, o->id, "checkpoint.damaged", aside);
+	live_job_log(o, LOG_SPOOL_FAULT,
+		     "text=\"the job begins anew; what was merged of it stays in %s, as *.damaged\"", folder);
+	live_job_log(o, LOG_JOB_STATE, "state=anew");
+	disk_rename(path, aside);
+	journal_put_aside(folder);
+}
+
+/* Not of the machine, but of what is stored: the same at every start. ENOENT: its folder is gone. */
+static bool is_lasting(int rc)
+{
+	return rc == -EBADMSG || rc == -ERANGE || rc == -ENOENT;
+}
+
+static void write_end(struct jobs *s, struct job_record *r, const char *why)
+{
+	struct timespec now;
+	struct error e;
+	clock_gettime(CLOCK_REALTIME, &now);
+	text_copy(r->state, sizeof r->state, "failed");
+	text_copy(r->reason, sizeof r->reason, job_end_name(END_FAILED));
+	text_copy(r->why, sizeof r->why, why);
+	r->exit_code = 3;
+	r->ended = (double)now.tv_sec;
+	r->ended_seen = ages_now(s);
+	log_event(LOG_JOB_FAILED, "job=j%llu text=%s", (unsigned long long)r->id, log_quote(why).text);
+	if (spool_take_job(s->spool, r->id, &e) || spool_write_record(s->spool, r, &e) ||
+	    ledger_end(s->ledger, r->id, r->extended, r->state, &e))
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	jobs_remember(s, r);
+}
+
+/* The job has failed, if that is how it would be at every start; else an error of the machine. */
+static int give_up(struct jobs *s, uint64_t id, uint64_t extended, int rc, struct error *e)
+{
+	struct error why = *e;
+	bool there;
+	if (!is_lasting(rc))
+		return error_prefix(e, rc, "j%llu", (unsigned long long)id);
+	struct job_record *r = mem_alloc(1, sizeof *r);
+	rc = r ? restore_record(s, id, r, &there, e) : error_set(e, ENOMEM, "no memory for the jobs");
+	if (!rc && !there)
+		*r = (struct job_record){.id = id, .rel_error = -1};
+	if (!rc) {
+		r->extended = extended;
+		write_end(s, r, why.text);
+	}
+	mem_free(r);
+	return rc;
+}
+
+/* ---- one job after the other */
+
+static void fail(struct jobs *s, int rc, const struct error *e)
+{
+	s->fault = rc;
+	s->fault_error = *e;
+	s->stop(s->stop_user);
+}
+
+/* All have been read, and the core hears of them. */
+static int finish(struct jobs *s, struct error *e)
+{
+	struct recovery *r = s->recovery;
+	int rc = 0;
+	for (struct found *f; !rc && (f = s->found);) {
+		struct ledger_job j;
+		struct job_counts known;
+		struct live_job *o = f->order;
+		s->found = f->next;
+		o->next = s->orders;
+		s->orders = o;
+		mem_free(f);
+		rc = ledger_get(s->ledger, o->id, &j, e);
+		rc = rc > 0 ? restore_tell(s, o, j.held, 0, e) : rc < 0 ? rc : error_set(e, ENOENT, "its row is gone");
+		if (!rc)
+			files_look(s, o);
+		if (!rc && !farm_counts(s->farm, o->id, &known))
+			rc = error_set(e, ENOMEM, "no memory for a job");
+		if (rc)
+			rc = error_prefix(e, rc, "j%llu", (unsigned long long)o->id);
+	}
+	if (rc)
+		return rc;
+	mem_free(r);
+	s->recovery = NULL;
+	s->changes++;
+	blob_store_trim(s->blobs); /* the files of living jobs are held by now */
+	keep_trim(s);
+	s->peers.jobs_read(s->peers.user);
+	return 0;
+}
+
+static void run(uv_work_t *work)
+{
+	struct recovery *r = work->data;
+	r->rc = replay_films(r->jobs->spool, r->at->order, &r->at->progress, &r->error);
+}
+
+static void done(uv_work_t *work, int status);
+
+/* The one at hand, or the end. */
+static int go_on(struct jobs *s, struct error *e)
+{
+	struct recovery *r = s->recovery;
+	if (!r->at)
+		return finish(s, e);
+	r->at->order->film_folder = jobs_film_folder(s, &r->at->order->plan);
+	r->under_way = true;
+	int rc = uv_queue_work(s->loop, &r->work, run, done);
+	assert(rc == 0);
+	return rc;
+}
+
+static void remove_found(struct recovery *r, struct found *f)
+{
+	struct found **at = &r->jobs->found;
+	while (*at != f)
+		at = &(*at)->next;
+	*at = f->next;
+	mem_free(f);
+}
+
+/* It cannot be read. 0: it is read again, or has failed for good. */
+static int take_failure(struct jobs *s, struct error *e)
+{
+	struct recovery *r = s->recovery;
+	struct found *f = r->at;
+	struct ledger_job j;
+	uint64_t id = f->record.id, extended = f->order->record.extended;
+	int rc = r->rc;
+	*e = r->error;
+	live_job_log(f->order, LOG_SPOOL_FAULT, "text=%s", log_quote(e->text).text);
+	bool anew = rc == -EBADMSG && !f->anew;
+	if (anew)
+		put_aside(s, f->order);
+	restore_drop(s, f->order);
+	f->order = NULL;
+	if (anew) {
+		f->anew = true;
+		rc = ledger_get(s->ledger, id, &j, e);
+		rc = rc > 0   ? restore_live_job(s, &j, &f->order, e)
+		     : rc < 0 ? rc
+			      : error_set(e, ENOENT, "its row is gone");
+		if (!rc)
+			return 0;
+	}
+	r->at = f->next;
+	r->read += f->bytes;
+	remove_found(r, f);
+	return give_up(s, id, extended, rc, e);
+}
+
+static void done(uv_work_t *work, int status)
+{
+	struct recovery *r = work->data;
+	struct jobs *s = r->jobs;
+	struct error e;
+	int rc = 0;
+	assert(status == 0);
+	(void)status;
+	r->under_way = false;
+	if (s->stopping)
+		return;
+	if (r->rc) {
+		rc = take_failure(s, &e);
+	} else {
+		r->read += r->at->bytes;
+		r->at = r->at->next;
+	}
+	if (!rc)
+		rc = go_on(s, &e);
+	if (rc)
+		fail(s, rc, &e);
+}
+
+/* ---- life */
+
+static int add(struct jobs *s, const struct ledger_job *j, struct error *e)
+{
+	struct recovery *r = s->recovery;
+	struct found *f = mem_alloc(1, sizeof *f);
+	if (!f)
+		return error_set(e, ENOMEM, "no memory for the jobs");
+	uint64_t id = j->id, extended = j->extended;
+	int rc = restore_live_job(s, j, &f->order, e);
+	if (rc) {
+		mem_free(f);
+		return give_up(s, id, extended, rc, e);
+	}
+	f->record = f->order->record;
+	f->bytes = replay_bytes(s->spool, id);
+	r->bytes += f->bytes;
+	*r->last = f;
+	r->last = &f->next;
+	return 0;
+}
+
+int recovery_begin(struct jobs *s, struct error *e)
+{
+	struct ledger_job j;
+	uint64_t id = 0;
+	int rc;
+	struct recovery *r = s->recovery = mem_alloc(1, sizeof *r);
+	if (!r)
+		return error_set(e, ENOMEM, "no memory for the jobs");
+	r->jobs = s;
+	r->work.data = r;
+	r->last = &s->found;
+	while ((rc = ledger_next(s->ledger, id, &j, e)) > 0) {
+		id = j.id;
+		rc = add(s, &j, e);
+		if (rc)
+			return rc;
+	}
+	if (rc)
+		return rc;
+	r->at = s->found;
+	return go_on(s, e);
+}
+
+void recovery_stop(struct jobs *s)
+{
+	for (struct found *f = s->found; f; f = f->next)
+		atomic_store(&f->progress.stop, true);
+}
+
+void recovery_close(struct jobs *s)
+{
+	struct recovery *r = s->recovery;
+	if (!r)
+		return;
+	assert(!r->under_way);
+	while (s->found) {
+		struct found *next = s->found->next;
+		if (s->found->order)
+			live_job_free(s->found->order);
+		mem_free(s->found);
+		s->found = next;
+	}
+	mem_free(r);
+	s->recovery = NULL;
+}

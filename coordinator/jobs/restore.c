@@ -1,0 +1,216 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/jobs/restore.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "common/base/version.h"
+#include "coordinator/jobs/reconcile.h"
+#include "coordinator/jobs/step.h"
+#include "coordinator/jobs/trust.h"
+
+#include <string.h>
+
+/* ---- the core */
+
+static uint64_t next_epoch(const struct live_job *o, uint32_t group, uint32_t part)
+{
+	if (o->bootstrap)
+		return bootstrap_has(o->bootstrap, group, part);
+	struct lease_key k = {
+		.job = o->id, .kind = LEASE_RENDER, .group = group, .part = part, .epoch = canvas_rounds(o->canvas)};
+	for (struct lease_key before = k; k.epoch > 0; k.epoch--) { /* what was taken back is missing */
+		before.epoch = k.epoch - 1;
+		if (canvas_has(o->canvas, &before))
+			break;
+	}
+	while (k.epoch < o->plan.rounds && canvas_has(o->canvas, &k))
+		k.epoch++;
+	return k.epoch;
+}
+
+const char *restore_held_by(const char *who, char text[256])
+{
+	text_print(text, 256, "held by %s", who);
+	return text;
+}
+
+int restore_tell(struct jobs *s, const struct live_job *o, const char *held, uint64_t tag, struct error *e)
+{
+	uint32_t slots = o->plan.groups * o->plan.parts;
+	uint64_t *next = mem_alloc(slots, sizeof *next);
+	struct event_join *makers = mem_alloc(slots, sizeof *makers);
+	if (!next || !makers) {
+		mem_free(next);
+		mem_free(makers);
+		return error_set(e, ENOMEM, "no memory for a job");
+	}
+	for (uint32_t i = 0; i < slots; i++) {
+		const struct live_job_maker *m = &o->makers[i];
+		next[i] = next_epoch(o, i / o->plan.parts, i % o->plan.parts);
+		makers[i] = (struct event_join){.name = *m->name ? m->name : NULL,
+						.certificate = m->certificate,
+						.home = m->home,
+						.restarts = m->restarts};
+		log_event(LOG_BATCH_RESTORED, "job=j%llu kind=%d group=%u part=%u epochs=%llu",
+			  (unsigned long long)o->id, (int)(o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER),
+			  i / o->plan.parts, i % o->plan.parts, (unsigned long long)next[i]);
+	}
+	char text[256];
+	struct event ev = {.kind = EVENT_RESTORE,
+			   .tag = tag,
+			   .restore = {.job = o->id,
+				       .submit = {.plan = &o->plan,
+						  .name = o->record.name,
+						  .priority = o->record.priority,
+						  .mixed = live_job_submit(o)->mixed,
+						  .owner = o->record.owner,
+						  .verify = trust_share(s, live_job_submit(o))},
+				       .fingerprint = o->fingerprint,
+				       .kind = o->bootstrap ? LEASE_BOOTSTRAP : LEASE_RENDER,
+				       .next = next,
+				       .makers = makers,
+				       .black = o->lit.black,
+				       .elapsed = o->times.elapsed,
+				       .opened = o->times.opened,
+				       .completed = o->times.completed,
+				       .looks = &o->record.looks,
+				       .counts = o->counts}};
+	jobs_step(s, &ev);
+	mem_free(next);
+	mem_free(makers);
+	if (*held) {
+		ev = (struct event){
+			.kind = EVENT_HOLD, .job = o->id, .hold = HOLD_ORDERED, .text = restore_held_by(held, text)};
+		jobs_step(s, &ev);
+	}
+	return 0;
+}
+
+/* ---- one job */
+
+static int hold_blobs(struct jobs *s, const Farm__Submit *m, struct error *e)
+{
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = live_job_file_hash(m->files[i]);
+		int rc = blob_expect(s->blobs, &h, e);
+		if (!rc)
+			continue;
+		while (i-- > 0) {
+			h = live_job_file_hash(m->files[i]);
+			blob_release(s->blobs, &h);
+		}
+		return rc;
+	}
+	return 0;
+}
+
+int restore_record(const struct jobs *s, uint64_t id, struct job_record *r, bool *there, struct error *e)
+{
+	int rc = spool_read_record(s->spool, id, r, e);
+	*there = rc == 0;
+	return rc == -ENOENT || rc == -EBADMSG ? 0 : rc;
+}
+
+/* What the submission does not say, but its earlier end: its image is there until the next one is. */
+static int take_record_of(const struct jobs *s, const struct ledger_job *j, struct live_job *o, struct error *e)
+{
+	o->record.priority = j->priority;
+	o->record.extended = j->extended;
+	struct job_record *r = mem_alloc(1, sizeof *r);
+	bool there;
+	int rc = r ? 0 : error_set(e, ENOMEM, "no memory for a job");
+	if (!rc && j->extended && (rc = restore_record(s, o->id, r, &there, e)) == 0 && there)
+		o->record.has_result = r->has_result;
+	mem_free(r);
+	return rc;
+}
+
+/* Plan or submission cannot be read: they are of another version, or damaged. */
+static int not_known(const struct ledger_job *j, int rc, struct error *e)
+{
+	if (rc != -EBADMSG && rc != -EINVAL)
+		return rc;
+	if (strcmp(j->version, HSLT_VERSION) == 0)
+		return error_prefix(e, -EBADMSG, "what it was submitted with");
+	return error_prefix(e, -EPROTO, "version %.40s of the coordinator took it, and this is %s", j->version,
+			    HSLT_VERSION);
+}
+
+static int make_order(struct jobs *s, const struct ledger_job *j, struct live_job **o, struct error *e)
+{
+	struct envelope submit, info;
+	struct plan plan;
+	const unsigned char *payload;
+	size_t size;
+	int rc = replay_unpack(&info, FARM__ENVELOPE__BODY_JOB_INFO, j->plan, j->plan_size, &payload, &size, e);
+	if (rc)
+		return not_known(j, rc, e);
+	rc = info.message->job_info->plan ? plan_from_wire(info.message->job_info->plan, &plan, e)
+					  : error_set(e, EBADMSG, "there is no plan");
+	envelope_fini(&info);
+	if (!rc)
+		rc = replay_unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size, &payload,
+				   &size, e);
+	if (rc)
+		return not_known(j, rc, e);
+	rc = hold_blobs(s, submit.message->submit, e);
+	if (!rc && (rc = live_job_new(o, j->id, &submit, &plan, j->owner, j->submitted, s->spool, e)))
+		live_job_release_blobs(submit.message->submit, s->blobs);
+	envelope_fini(&submit);
+	return rc;
+}
+
+void restore_drop(struct jobs *s, struct live_job *o)
+{
+	live_job_release_blobs(live_job_submit(o), s->blobs);
+	live_job_free(o);
+}
+
+int restore_live_job(struct jobs *s, const struct ledger_job *j, struct live_job **o, struct error *e)
+{
+	int rc = make_order(s, j, o, e);
+	if (rc)
+		return rc;
+	rc = take_record_of(s, j, *o, e);
+	if (rc)
+		restore_drop(s, *o);
+	else
+		(*o)->film_folder = jobs_film_folder(s, &(*o)->plan);
+	return rc;
+}
+
+int restore_open(struct jobs *s, struct error *e)
+{
+	struct ledger_job j;
+	struct job_record *r = mem_alloc(1, sizeof *r);
+	int rc = r ? reconcile(s, e) : error_set(e, ENOMEM, "no memory for the jobs");
+	uint64_t id = 0;
+	while (!rc && (rc = ledger_next(s->ledger, id, &j, e)) > 0) {
+		id = j.id;
+		bool there;
+		rc = restore_record(s, id, r, &there, e);
+		if (rc)
+			break;
+		/* Its record was written before its end came into the ledger. */
+		if (there && record_is_ended(r) && r->extended == j.extended) {
+			rc = ledger_end(s->ledger, id, r->extended, r->state, e);
+			continue;
+		}
+		uint64_t *more =
+			mem_grow(s->restored, s->restored_count * sizeof *more, (s->restored_count + 1) * sizeof *more);
+		if (!more)
+			rc = error_set(e, ENOMEM, "no memory for the jobs");
+		else
+			(s->restored = more)[s->restored_count++] = id;
+	}
+	mem_free(r);
+	return rc;
+}
+
+bool restore_lives(const struct jobs *s, uint64_t job)
+{
+	for (size_t i = 0; i < s->restored_count; i++)
+		if (s->restored[i] == job)
+			return true;
+	return false;
+}

@@ -1,0 +1,25 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A job of an earlier life, from the ledger into an order and from there into the core; its films come in between
+ * (replay.h). The core hears which leases are merged and no more: what was out when the coordinator stopped comes back
+ * with its worker, or is handed out again.
+ */
+#ifndef COORDINATOR_JOBS_RESTORE_H
+#define COORDINATOR_JOBS_RESTORE_H
+
+#include "coordinator/job/jobs.h"
+
+int restore_open(struct jobs *s, struct error *e);	/* the ledger */
+bool restore_lives(const struct jobs *s, uint64_t job); /* it had not ended */
+/* 0: its record is there, and whole, or not; what cannot be read just now is an error. */
+int restore_record(const struct jobs *s, uint64_t id, struct job_record *r, bool *there, struct error *e);
+
+/* One job from its row, for nobody yet. -EBADMSG: something of it is damaged or gone. */
+int restore_live_job(struct jobs *s, const struct ledger_job *j, struct live_job **o, struct error *e);
+void restore_drop(struct jobs *s, struct live_job *o); /* and lets go of its files */
+/* The sentence for the status. */
+const char *restore_held_by(const char *who, char text[256]);
+/* The core hears of an order that is in the jobs' list. held: by whom, or "". Refusals carry the tag. */
+int restore_tell(struct jobs *s, const struct live_job *o, const char *held, uint64_t tag, struct error *e);
+
+#endif

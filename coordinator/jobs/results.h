@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Results and failures of leases on their way to the core. The loop's thread. */
+#ifndef COORDINATOR_JOBS_RESULTS_H
+#define COORDINATOR_JOBS_RESULTS_H
+
+#include "coordinator/job/jobs.h"
+
+/* A LeaseResult, or a LeaseFailed that says that chain states are bad: now, or when the films are free. May take
+ * either. */
+void results_take(struct jobs *s, uint64_t peer, struct envelope *env, struct buf *payload);
+/* Any other LeaseFailed. */
+void results_take_failure(struct jobs *s, uint64_t peer, const Farm__LeaseFailed *f);
+
+#endif

@@ -1,0 +1,124 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * How an event runs through the core, and what follows from it.
+ *
+ * jobs_step gives it to the core (core/farm.h), which changes its state and answers with a list of actions;
+ * dispatch.c carries these out. Events that come up meanwhile are queued and follow before jobs_step returns. Then jobs
+ * that have ended are finished, results that waited for others are merged, and a checkpoint is begun where one is due.
+ * The core says when it must hear of the time at the latest: the timer `wake`. Results that came while a job's films
+ * were read follow one at a time by the timer `drain`.
+ *
+ * A step does not fail. Without memory for a queued event (300 bytes) the process ends.
+ */
+#include "coordinator/jobs/step.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/job/incoming.h"
+#include "coordinator/jobs/checkpoint.h"
+#include "coordinator/jobs/dispatch.h"
+#include "coordinator/jobs/late_feed.h"
+#include "coordinator/jobs/results.h"
+
+#include <assert.h>
+#include <math.h>
+#include <stdlib.h>
+
+/* ---- the core ---- */
+
+void jobs_defer(struct jobs *s, const struct event *ev)
+{
+	struct deferred *d = mem_alloc(1, sizeof *d);
+	if (!d) /* 300 bytes: without them nothing can go on */
+		abort();
+	d->event = *ev;
+	text_copy(d->text, sizeof d->text, ev->text ? ev->text : "");
+	d->event.text = d->text;
+	*s->deferred_last = d;
+	s->deferred_last = &d->next;
+}
+
+void jobs_break(struct jobs *s, uint64_t job, const char *text)
+{
+	struct event ev = {.kind = EVENT_JOB_BROKEN, .job = job, .text = text};
+	jobs_defer(s, &ev);
+}
+
+static void on_wake(uv_timer_t *t);
+
+static const struct incoming nothing;
+
+static void one_step(struct jobs *s, struct event *ev, const struct incoming *in)
+{
+	struct update u;
+	ev->time = jobs_now(s);
+	ev->unread = ev->time - s->read;
+	if (ev->unread < s->config.heartbeat_seconds + 1e-3 * TICK_MS) /* nobody is missed for so little */
+		ev->unread = 0;
+	farm_step(s->farm, ev, &u);
+	s->changes++;
+	dispatch_update(s, &u, in);
+	if (isfinite(u.wake) && !s->stopping) {
+		double ms = ceil(1000 * (u.wake - jobs_now(s)));
+		uv_timer_start(&s->wake, on_wake, ms > 1 ? (uint64_t)ms : 1, 0);
+	} else {
+		uv_timer_stop(&s->wake);
+	}
+}
+
+void jobs_step(struct jobs *s, struct event *ev)
+{
+	if (s->stepping) /* what sessions say while an update is carried out */
+		jobs_defer(s, ev);
+	else
+		jobs_step_with(s, ev, &nothing);
+}
+
+void jobs_step_with(struct jobs *s, struct event *ev, const struct incoming *in)
+{
+	assert(!s->stepping);
+	s->stepping = true;
+	one_step(s, ev, in);
+	while (s->deferred) {
+		struct deferred *d = s->deferred;
+		s->deferred = d->next;
+		if (!s->deferred)
+			s->deferred_last = &s->deferred;
+		one_step(s, &d->event, &nothing);
+		mem_free(d);
+	}
+	s->stepping = false;
+	dispatch_finish_orders(s);
+	late_feed(s);
+	checkpoint_where_due(s);
+}
+
+static void on_wake(uv_timer_t *t)
+{
+	struct event ev = {.kind = EVENT_TICK};
+	jobs_step(t->data, &ev);
+}
+
+/* One at a time, so that nobody else waits for all of them. */
+static void on_drain(uv_timer_t *t)
+{
+	struct jobs *s = t->data;
+	struct live_job *o = s->orders;
+	while (o && (o->busy || !o->waiting))
+		o = o->next;
+	if (!o)
+		return;
+	struct waiting_batch *w = live_job_take_waiting(o);
+	results_take(s, w->peer, &w->envelope, &w->payload);
+	waiting_batch_free(w);
+	if (!s->stopping)
+		uv_timer_start(&s->drain, on_drain, 0, 0);
+}
+
+void jobs_films_free(struct jobs *s)
+{
+	if (!s->stopping)
+		uv_timer_start(&s->drain, on_drain, 0, 0);
+	dispatch_finish_orders(s);
+	late_feed(s);
+}

@@ -1,0 +1,19 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* How an event runs through the core, and what follows from it. The loop's thread. */
+#ifndef COORDINATOR_JOBS_STEP_H
+#define COORDINATOR_JOBS_STEP_H
+
+#include "coordinator/job/jobs.h"
+
+/* Gives the event to the core and carries out the update and all that follows from it. */
+void jobs_step(struct jobs *s, struct event *ev);
+/* The same, of an event that brought more (incoming.h). Not while an update is carried out. */
+void jobs_step_with(struct jobs *s, struct event *ev, const struct incoming *in);
+/* Later, when the current update is carried out. Copies the text. */
+void jobs_defer(struct jobs *s, const struct event *ev);
+void jobs_break(struct jobs *s, uint64_t job, const char *text); /* it cannot go on */
+
+/* Some order is not busy any more: what waited for its canvas goes on. Orders that have ended are gone then. */
+void jobs_films_free(struct jobs *s);
+
+#endif

@@ -1,0 +1,186 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/jobs/trust.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/jobs/step.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+static const char file[] = "aside";
+
+/* ---- the file */
+
+static int add_worker(json_t *list, const struct worker_status *w, struct error *e)
+{
+	json_error_t fault;
+	json_t *o = json_pack_ex(&fault, 0, "{s:s s:s s:s s:I s:s}", "certificate", w->certificate, "name", w->name,
+				 "home", w->home, "restarts", (json_int_t)w->restarts, "why", w->text);
+	if (!o)
+		return error_set(e, EINVAL, "%s, who is set aside, cannot be written down: %s", w->name, fault.text);
+	return json_array_append_new(list, o)
+		       ? error_set(e, ENOMEM, "no memory for the list of those that are set aside")
+		       : 0;
+}
+
+static void write_quarantined(struct jobs *s)
+{
+	struct worker_status w;
+	struct error e;
+	int rc = 0;
+	json_t *list = json_array(), *o = json_pack("{s:i s:o}", "schema", 1, "workers", list);
+	for (uint64_t who = 0; !rc && (who = farm_next_quarantined(s->farm, who)) && farm_worker(s->farm, who, &w);)
+		rc = add_worker(list, &w, &e);
+	char *text = json_dumps(o, JSON_INDENT(1));
+	json_decref(o);
+	if (!rc && !text)
+		rc = error_set(&e, ENOMEM, "no memory for the list of those that are set aside");
+	if (!rc)
+		rc = spool_write_own(s->spool, file, text, strlen(text), &e);
+	if (rc)
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	free(text);
+}
+
+static const char *text_of(const json_t *o, const char *key)
+{
+	const char *text = json_string_value(json_object_get(o, key));
+	return text ? text : "";
+}
+
+static void tell_core(struct jobs *s, const json_t *w)
+{
+	struct event ev = {.kind = EVENT_ASIDE,
+			   .text = text_of(w, "why"),
+			   .join = {.certificate = text_of(w, "certificate"),
+				    .name = text_of(w, "name"),
+				    .home = text_of(w, "home"),
+				    .restarts = (uint64_t)json_integer_value(json_object_get(w, "restarts"))}};
+	const char *forgiven = s->config.forgive;
+	if (forgiven && strcmp(forgiven, ev.join.name) == 0) {
+		log_event(LOG_WORKER_FORGIVEN, "name=%s why=%s", log_quote(ev.join.name).text, log_quote(ev.text).text);
+		return;
+	}
+	log_event(LOG_WORKER_ASIDE, "name=%s why=%s", log_quote(ev.join.name).text, log_quote(ev.text).text);
+	jobs_step(s, &ev);
+}
+
+/* The farm does not stand still for it: whoever gives wrong results will do so again, and is found again. */
+static int put_by(struct jobs *s, struct error *e)
+{
+	char from[SPOOL_PATH_MAX], to[SPOOL_PATH_MAX], folder[SPOOL_PATH_MAX];
+	spool_path(s->spool, file, from);
+	spool_path(s->spool, "aside.damaged", to);
+	spool_path(s->spool, "", folder);
+	log_event(LOG_SPOOL_FAULT,
+		  "text=\"the file %s is no list of workers: it is kept as %s.damaged, and nobody in it is set aside\"",
+		  file, file);
+	return spool_rename(from, to, folder, e);
+}
+
+int trust_open(struct jobs *s, struct error *e)
+{
+	char *text;
+	size_t size;
+	json_error_t fault;
+	int rc = spool_read_own(s->spool, file, &text, &size, e);
+	if (rc == -EFBIG)
+		return put_by(s, e);
+	if (rc)
+		return rc == -ENOENT ? 0 : rc;
+	json_t *o = json_loadb(text, size, JSON_REJECT_DUPLICATES, &fault);
+	const json_t *list = json_object_get(o, "workers");
+	if (!json_is_array(list))
+		rc = put_by(s, e);
+	for (size_t i = 0; i < json_array_size(list); i++)
+		tell_core(s, json_array_get(list, i));
+	json_decref(o);
+	mem_free(text);
+	if (!rc && s->config.forgive)
+		write_quarantined(s);
+	return rc;
+}
+
+/* ---- what they did */
+
+double trust_share(const struct jobs *s, const Farm__Submit *m)
+{
+	return m->mixed ? 0 : m->verify > s->config.verify ? m->verify : s->config.verify;
+}
+
+void trust_merged(struct live_job *o, const struct action *a)
+{
+	if (a->verified)
+		return;
+	for (size_t i = 0; i < o->credit_count; i++)
+		if (o->credits[i].who == a->who) {
+			o->credits[i].leases++;
+			return;
+		}
+	struct live_job_credit *more =
+		mem_grow(o->credits, o->credit_count * sizeof *more, (o->credit_count + 1) * sizeof *more);
+	if (!more) {
+		live_job_log(o, LOG_SPOOL_FAULT, "text=\"no memory to remember who gave what\"");
+		return;
+	}
+	o->credits = more;
+	o->credits[o->credit_count++] = (struct live_job_credit){a->who, 1};
+}
+
+void trust_taken_back(struct live_job *o, uint64_t who)
+{
+	for (size_t i = 0; i < o->credit_count; i++)
+		if (o->credits[i].who == who && o->credits[i].leases > 0)
+			o->credits[i].leases--;
+}
+
+static const char *name_of(const struct jobs *s, uint64_t who, char name[JOIN_NAME])
+{
+	struct worker_status w;
+	text_copy(name, JOIN_NAME, farm_worker(s->farm, who, &w) ? w.name : "?");
+	return name;
+}
+
+void trust_wrong(struct jobs *s, const struct action *a)
+{
+	char name[JOIN_NAME];
+	struct live_job *o = jobs_find(s, a->job);
+	if (o)
+		live_job_log(o, LOG_WORKER_WRONG, "worker=%s text=%s", log_quote(name_of(s, a->who, name)).text,
+			     log_quote(a->text).text);
+}
+
+static void note(struct live_job *o, const char *text)
+{
+	live_job_log(o, LOG_JOB_NOTE, "text=%s", log_quote(text).text);
+	size_t used = strlen(o->doubts);
+	text_print(o->doubts + used, sizeof o->doubts - used, "%s%s", used ? "; " : "", text);
+}
+
+static void note_credit(struct live_job *o, const char *name, const char *why, uint64_t leases)
+{
+	char text[256];
+	text_print(text, sizeof text, "worker %s is set aside (%s); %llu of its leases were merged unverified", name,
+		   why, (unsigned long long)leases);
+	note(o, text);
+}
+
+void trust_anew(struct jobs *s, const struct action *a)
+{
+	struct live_job *o = jobs_find(s, a->job);
+	if (o)
+		note(o, a->text);
+}
+
+void trust_quarantined(struct jobs *s, const struct action *a)
+{
+	char name[JOIN_NAME];
+	name_of(s, a->who, name);
+	log_event(LOG_WORKER_ASIDE, "name=%s why=%s", log_quote(name).text, log_quote(a->text).text);
+	write_quarantined(s);
+	for (struct live_job *o = s->orders; o; o = o->next)
+		for (size_t i = 0; i < o->credit_count; i++)
+			if (o->credits[i].who == a->who && o->credits[i].leases > 0)
+				note_credit(o, name, a->text, o->credits[i].leases);
+}

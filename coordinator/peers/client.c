@@ -1,0 +1,299 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A client's side of a session: submit, list, watch; fetch.c and control.c have the rest.
+ *
+ * A submission waits in the session until its files are there (upload.h), and then goes to the core, whose answer is
+ * the client's. A client sees its own jobs alone, by the name in its certificate; an operator sees all, and so does
+ * everybody without TLS. Whoever watches a job gets its status when that has changed and the one before has been read.
+ *
+ * A submission that is refused, or beyond its owner's quota, is answered with a sentence, and the client may submit
+ * another. A message that no client sends is answered by Fault, and the connection ends.
+ */
+#include "coordinator/peers/client.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/job/incoming.h"
+#include "coordinator/jobs/listing.h"
+#include "coordinator/jobs/step.h"
+#include "coordinator/jobs/trust.h"
+#include "coordinator/peers/control.h"
+#include "coordinator/peers/fetch.h"
+#include "coordinator/peers/upload.h"
+
+#include <stdio.h>
+#include <string.h>
+
+enum { CHUNK = 1 << 20 };
+
+/* ---- submit ---- */
+
+uint64_t client_uploading(const struct session *p)
+{
+	uint64_t bytes = 0;
+	for (const struct session *other = p->peers->sessions; other; other = other->next)
+		if (other != p && other->upload && strcmp(other->who.name, p->who.name) == 0)
+			bytes += live_job_asset_bytes(other->upload->submit.message->submit);
+	return bytes;
+}
+
+static void answer_submit(struct session *p, uint64_t job, const char *refusal, const struct upload *u)
+{
+	Farm__SubmitAnswer answer;
+	Farm__Envelope m;
+	char text[1024] = "", plan[PLAN_TEXT + 200] = "";
+	struct blob_hash *hashes = NULL;
+	ProtobufCBinaryData *list = NULL;
+	struct job_view v;
+	farm__submit_answer__init(&answer);
+	farm__envelope__init(&m);
+	text_copy(text, sizeof text, refusal);
+	if (u) {
+		plan_describe(&u->plan, plan, PLAN_TEXT);
+		size_t n = strlen(plan);
+		snprintf(plan + n, sizeof plan - n, "%s%s", *u->rule ? "; " : "", u->rule);
+	}
+	if (u && !job) {
+		hashes = mem_alloc(u->missing_count, sizeof *hashes);
+		list = mem_alloc(u->missing_count, sizeof *list);
+	}
+	if (hashes && list) {
+		answer.n_missing = upload_missing(u, hashes);
+		for (size_t i = 0; i < answer.n_missing; i++)
+			list[i] = (ProtobufCBinaryData){BLOB_HASH_SIZE, hashes[i].bytes};
+		answer.missing = list;
+	}
+	answer.job = job;
+	answer.submitted = job && jobs_view(p->jobs, job, &v) ? v.record.submitted : 0;
+	answer.refusal = text;
+	answer.plan = plan;
+	m.body_case = FARM__ENVELOPE__BODY_SUBMIT_ANSWER;
+	m.submit_answer = &answer;
+	session_send(p, &m, NULL, 0);
+	mem_free(hashes);
+	mem_free(list);
+}
+
+void client_upload_abort(struct session *p)
+{
+	if (p->upload)
+		upload_free(p->upload);
+	p->upload = NULL;
+	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, 0});
+}
+
+static int within_quota(const struct session *p, struct error *e)
+{
+	if (p->who.role == TLS_OPERATOR)
+		return 0;
+	return jobs_within_quota(p->jobs, p->who.name, 0, client_uploading(p), &p->upload->plan,
+				 p->upload->submit.message->submit, e);
+}
+
+/* Every blob is there: the core decides. */
+static void submit(struct session *p)
+{
+	const Farm__Submit *m = p->upload->submit.message->submit;
+	char name[128];
+	struct error e;
+	if (within_quota(p, &e)) { /* again: other jobs may have come while its files did */
+		answer_submit(p, 0, e.text, NULL);
+		client_upload_abort(p);
+		return;
+	}
+	text_copy(name, sizeof name, m->name);
+	struct event ev = {.kind = EVENT_SUBMIT,
+			   .tag = p->id,
+			   .submit = {.plan = &p->upload->plan,
+				      .name = name,
+				      .priority = m->priority,
+				      .owner = p->who.name,
+				      .mixed = m->mixed,
+				      .verify = trust_share(p->jobs, m)}};
+	struct submission from = {.submit = &p->upload->submit,
+				  .plan = &p->upload->plan,
+				  .rule = p->upload->rule,
+				  .owner = p->who.name,
+				  .address = p->address};
+	p->rejected[0] = 0;
+	jobs_step_with(p->jobs, &ev, &(struct incoming){.submission = &from});
+	if (*from.refusal)
+		text_copy(p->rejected, sizeof p->rejected, from.refusal);
+	answer_submit(p, *p->rejected ? 0 : from.job, p->rejected, *p->rejected ? NULL : p->upload);
+	client_upload_abort(p);
+}
+
+static void take_submit(struct session *p, struct envelope *env)
+{
+	struct error e;
+	if (p->upload) {
+		session_fault(p, "one submission at a time");
+		return;
+	}
+	if (upload_new(&p->upload, env, p->jobs->blobs, p->jobs->config.worker_bandwidth, &e)) {
+		p->upload = NULL;
+		answer_submit(p, 0, e.text, NULL);
+		return;
+	}
+	if (p->upload->missing_count == 0) {
+		submit(p);
+		return;
+	}
+	if (within_quota(p, &e)) {
+		answer_submit(p, 0, e.text, NULL);
+		client_upload_abort(p);
+		return;
+	}
+	conn_set_limits(p->conn, (struct frame_limits){SESSION_HEADER, CHUNK});
+	answer_submit(p, 0, "", p->upload);
+}
+
+static void take_blob(struct session *p, const Farm__BlobChunk *c, const unsigned char *payload, size_t size)
+{
+	struct error e;
+	if (!p->upload) {
+		session_fault(p, "a blob without a submission");
+		return;
+	}
+	int rc = upload_add(p->upload, c, payload, size, &e);
+	if (rc < 0) {
+		answer_submit(p, 0, e.text, NULL);
+		client_upload_abort(p);
+	} else if (rc) {
+		log_event(LOG_BLOB_STORED, "peer=%llu bytes=%llu", (unsigned long long)p->id,
+			  (unsigned long long)c->size);
+		if (p->upload->missing_count == 0)
+			submit(p);
+	}
+}
+
+/* ---- the rest ---- */
+
+/* Whoever has a certificate sees the own jobs alone, an operator all. Jobs of others are not there: that they are would
+ * be an answer, too. */
+static bool may_see(const struct session *p, struct job_view *v)
+{
+	if (p->who.role == TLS_NOBODY || p->who.role == TLS_OPERATOR)
+		return true;
+	view_hide_others(v);
+	return *p->who.name && strcmp(p->who.name, v->record.owner) == 0;
+}
+
+bool client_finds_job(const struct session *p, uint64_t job, struct job_view *v)
+{
+	return jobs_view(p->jobs, job, v) && may_see(p, v);
+}
+
+static void take_list(struct session *p)
+{
+	struct job_view *views;
+	size_t count = jobs_views(p->jobs, &views);
+	Farm__JobStatus *status = mem_alloc(count, sizeof *status), **list = mem_alloc(count, sizeof *list);
+	Farm__JobListAnswer answer;
+	Farm__Envelope m;
+	farm__job_list_answer__init(&answer);
+	farm__envelope__init(&m);
+	for (size_t i = 0; status && list && i < count; i++) {
+		if (!may_see(p, &views[i]))
+			continue;
+		view_to_wire(&views[i], &status[i]);
+		list[answer.n_jobs++] = &status[i];
+	}
+	answer.jobs = list;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_LIST_ANSWER;
+	m.job_list_answer = &answer;
+	session_send(p, &m, NULL, 0);
+	mem_free(status);
+	mem_free(list);
+	mem_free(views);
+}
+
+void client_send_done(struct session *p, const char *text)
+{
+	char said[256];
+	Farm__Done done;
+	Farm__Envelope m;
+	farm__done__init(&done);
+	farm__envelope__init(&m);
+	done.ok = !*p->rejected;
+	text_copy(said, sizeof said, *p->rejected ? p->rejected : text);
+	done.text = said;
+	m.body_case = FARM__ENVELOPE__BODY_DONE;
+	m.done = &done;
+	session_send(p, &m, NULL, 0);
+}
+
+static void take_watch(struct session *p, uint64_t job)
+{
+	struct job_view v;
+	if (!client_finds_job(p, job, &v)) {
+		session_fault(p, "there is no job j%llu", (unsigned long long)job);
+		return;
+	}
+	p->watched = job;
+	mem_free(p->shown);
+	p->shown = NULL;
+	client_tick(p);
+}
+
+void client_tick(struct session *p)
+{
+	struct job_view v;
+	struct view_looks looks;
+	Farm__JobStatus status;
+	Farm__Envelope m;
+	if (!p->watched || p->state != SESSION_CLIENT || conn_unsent(p->conn))
+		return;
+	if (!client_finds_job(p, p->watched, &v)) {
+		session_fault(p, "the job is no longer known");
+		return;
+	}
+	if (p->shown && memcmp(p->shown, &v, sizeof v) == 0)
+		return;
+	if (!p->shown && !(p->shown = mem_alloc(1, sizeof v)))
+		return;
+	*p->shown = v;
+	farm__envelope__init(&m);
+	view_to_wire(&v, &status);
+	view_looks_to_wire(&v, &looks, &status);
+	m.body_case = FARM__ENVELOPE__BODY_JOB_STATUS;
+	m.job_status = &status;
+	session_send(p, &m, NULL, 0);
+	if (record_is_ended(&v.record))
+		p->watched = 0;
+}
+
+void client_message(struct session *p, struct envelope *env, const unsigned char *payload, size_t size)
+{
+	const Farm__Envelope *m = env->message;
+	switch (m->body_case) {
+	case FARM__ENVELOPE__BODY_HEARTBEAT:
+		break;
+	case FARM__ENVELOPE__BODY_SUBMIT:
+		take_submit(p, env);
+		break;
+	case FARM__ENVELOPE__BODY_BLOB_CHUNK:
+		take_blob(p, m->blob_chunk, payload, size);
+		break;
+	case FARM__ENVELOPE__BODY_JOB_LIST:
+		take_list(p);
+		break;
+	case FARM__ENVELOPE__BODY_CANCEL:
+		control_cancel(p, m->cancel->job);
+		break;
+	case FARM__ENVELOPE__BODY_CONTROL:
+		control_job(p, m->control);
+		break;
+	case FARM__ENVELOPE__BODY_WATCH:
+		take_watch(p, m->watch->job);
+		break;
+	case FARM__ENVELOPE__BODY_FETCH:
+		fetch_begin(p, m->fetch);
+		break;
+	case FARM__ENVELOPE__BODY_BYE:
+		conn_close(p->conn, "the client said goodbye");
+		break;
+	default:
+		session_fault(p, "not a message that a client says");
+	}
+}

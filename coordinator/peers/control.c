@@ -1,0 +1,117 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/peers/control.h"
+
+#include "common/base/text.h"
+#include "coordinator/jobs/extend.h"
+#include "coordinator/jobs/reconcile.h"
+#include "coordinator/jobs/restore.h"
+#include "coordinator/jobs/step.h"
+#include "coordinator/peers/client.h"
+
+/* Without a certificate anybody may call himself anything. */
+static const char *name_of(const struct session *p)
+{
+	return *p->who.name ? p->who.name : "a client";
+}
+
+static int tell(struct session *p, struct event *ev)
+{
+	ev->tag = p->id;
+	jobs_step(p->jobs, ev);
+	return *p->rejected ? -1 : 0;
+}
+
+/* The core knows whether it can be, and is told first. */
+static void not_for_long(struct session *p, const struct error *e)
+{
+	text_print(p->rejected, sizeof p->rejected, "so it is until the coordinator stops, but it cannot be stored: %s",
+		   e->text);
+}
+
+static void hold(struct session *p, uint64_t job, const char *who)
+{
+	struct jobs *s = p->jobs;
+	struct error e;
+	char text[256];
+	struct event ev = {
+		.kind = EVENT_HOLD, .job = job, .hold = HOLD_ORDERED, .text = *who ? restore_held_by(who, text) : ""};
+	if (tell(p, &ev))
+		return;
+	if (ledger_hold(s->ledger, job, who, &e)) {
+		not_for_long(p, &e);
+		return;
+	}
+	reconcile_row(s, job);
+	struct live_job *o = jobs_find(s, job);
+	if (o)
+		live_job_log(o, LOG_JOB_STATE, "state=%s by=%s", *who ? "held" : "released",
+			     log_quote(name_of(p)).text);
+}
+
+static void set_priority(struct session *p, uint64_t job, int priority)
+{
+	struct jobs *s = p->jobs;
+	struct error e;
+	struct event ev = {.kind = EVENT_PRIORITY, .job = job, .priority = priority};
+	if (tell(p, &ev))
+		return;
+	if (ledger_priority(s->ledger, job, priority, &e)) {
+		not_for_long(p, &e);
+		return;
+	}
+	reconcile_row(s, job);
+	struct live_job *o = jobs_find(s, job);
+	if (o)
+		live_job_log(o, LOG_JOB_NOTE, "priority=%d by=%s", priority, log_quote(name_of(p)).text);
+}
+
+/* The core need not know a job that is over any more. false: p->rejected says why. */
+static bool finds(struct session *p, uint64_t job, bool over_too)
+{
+	struct job_view v;
+	bool there = client_finds_job(p, job, &v);
+	text_copy(p->rejected, sizeof p->rejected,
+		  !there				? "no such job"
+		  : over_too || jobs_find(p->jobs, job) ? ""
+							: "the job is over");
+	return !*p->rejected;
+}
+
+void control_cancel(struct session *p, uint64_t job)
+{
+	struct event ev = {.kind = EVENT_CANCEL, .job = job};
+	if (finds(p, job, false))
+		tell(p, &ev);
+	client_send_done(p, "");
+}
+
+void control_job(struct session *p, const Farm__Control *c)
+{
+	bool extends = c->verb == FARM__VERB__VERB_EXTEND;
+	struct requester by = {.peer = p->id, .unbounded = p->who.role == TLS_OPERATOR};
+	text_copy(by.owner, sizeof by.owner, p->who.name);
+	if (finds(p, c->job, extends)) {
+		switch (c->verb) {
+		case FARM__VERB__VERB_HOLD:
+			hold(p, c->job, name_of(p));
+			break;
+		case FARM__VERB__VERB_RELEASE:
+			hold(p, c->job, "");
+			break;
+		case FARM__VERB__VERB_PRIORITY:
+			set_priority(p, c->job, c->priority);
+			break;
+		case FARM__VERB__VERB_EXTEND:
+			extend_job(p->jobs, &by,
+				   &(struct extension){.job = c->job,
+						       .spp = c->more_spp,
+						       .mutations = c->more_mutations,
+						       .seconds = c->more_seconds,
+						       .target_error = c->target_error});
+			return; /* with an answer, or there will be one */
+		default:	/* a number from outside */
+			text_copy(p->rejected, sizeof p->rejected, "nothing that can be done with a job");
+		}
+	}
+	client_send_done(p, "");
+}

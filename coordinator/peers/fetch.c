@@ -1,0 +1,194 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What a client fetches, piece by piece, is one file from its first piece to its last: it is opened once, however often
+ * another one gets its name meanwhile.
+ */
+#include "coordinator/peers/fetch.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "coordinator/jobs/publish.h"
+#include "coordinator/peers/client.h"
+
+#include <fcntl.h>
+#include <string.h>
+#include <time.h>
+
+enum { CHUNK = 1 << 20 };
+static const double preview_seconds = 5; /* a younger one is good enough */
+
+static const char *file_of(Farm__What what)
+{
+	switch (what) {
+	case FARM__WHAT__WHAT_RESULT:
+		return "result.exr";
+	case FARM__WHAT__WHAT_LOG:
+		return "log";
+	case FARM__WHAT__WHAT_PREVIEW:
+		return "preview.exr";
+	default:
+		return NULL; /* a number from outside */
+	}
+}
+
+static int cleared(const struct job_record *r, struct error *e)
+{
+	char day[32];
+	struct tm t;
+	time_t at = (time_t)r->cleared;
+	strftime(day, sizeof day, "%Y-%m-%d", gmtime_r(&at, &t));
+	return error_set(e, ENOENT,
+			 "job j%llu: its result was cleared on %s, by --keep-days or --keep-gb of the coordinator",
+			 (unsigned long long)r->id, day);
+}
+
+void fetch_end(struct session *p)
+{
+	if (!p->fetch.job)
+		return;
+	disk_close(p->fetch.fd);
+	p->fetch = (struct fetch){0};
+	p->peers->fetches--;
+}
+
+/* Who has asked for nothing for longest gives way: clients that begin and stop must not keep out those who go on. */
+static void make_room(struct peers *s)
+{
+	struct session *silent = NULL;
+	if (s->fetches < s->jobs->config.max_fetches)
+		return;
+	for (struct session *p = s->sessions; p; p = p->next)
+		if (p->fetch.job && (!silent || p->fetch.at < silent->fetch.at))
+			silent = p;
+	fetch_end(silent);
+}
+
+static int open_file(struct session *p, const Farm__Fetch *f, const char *file, struct error *e)
+{
+	char path[SPOOL_PATH_MAX];
+	struct stat st;
+	spool_job_path(p->jobs->spool, f->job, file, path);
+	int fd = disk_open(path, O_RDONLY | O_CLOEXEC, 0);
+	if (fd < 0 && errno == ENOENT)
+		return error_set(e, ENOENT, "job j%llu has no %s yet", (unsigned long long)f->job, file);
+	if (fd < 0 || disk_fstat(fd, &st)) {
+		int rc = error_set(e, errno, "%s", strerror(errno));
+		if (fd >= 0)
+			disk_close(fd);
+		return rc;
+	}
+	if (st.st_size > CHUNK) /* else this is its only piece */
+		make_room(p->peers);
+	p->fetch = (struct fetch){.job = f->job, .what = f->what, .fd = fd, .size = (uint64_t)st.st_size};
+	p->peers->fetches++;
+	return 0;
+}
+
+static int begin(struct session *p, const Farm__Fetch *f, struct job_view *v, struct error *e)
+{
+	const char *file = file_of(f->what);
+	fetch_end(p);
+	if (!client_finds_job(p, f->job, v))
+		return error_set(e, ENOENT, "there is no job j%llu", (unsigned long long)f->job);
+	if (!file)
+		return error_set(e, EINVAL, "there is nothing of that kind to fetch");
+	if (f->what == FARM__WHAT__WHAT_RESULT && v->record.cleared > 0)
+		return cleared(&v->record, e);
+	if (f->what == FARM__WHAT__WHAT_RESULT && !v->record.has_result)
+		return error_set(e, ENOENT, "job j%llu is %s: it has no result", (unsigned long long)f->job,
+				 v->record.state);
+	return open_file(p, f, file, e);
+}
+
+static int read_piece(const struct fetch *t, const Farm__Fetch *f, unsigned char *bytes, size_t *count, struct error *e)
+{
+	if (t->job != f->job || t->what != f->what)
+		return error_set(
+			e, ESTALE,
+			"j%llu: this was not fetched from its beginning, or had to give way to others: fetch it again",
+			(unsigned long long)f->job);
+	if (f->offset > t->size)
+		return error_set(e, EINVAL, "the file is shorter than that");
+	uint64_t left = t->size - f->offset;
+	ssize_t n = disk_pread(t->fd, bytes, left < CHUNK ? left : CHUNK, (off_t)f->offset);
+	if (n < 0 || (n == 0 && left))
+		return error_set(e, n < 0 ? errno : EIO, "%s",
+				 n < 0 ? strerror(errno) : "the file is shorter than it was");
+	*count = (size_t)n;
+	return 0;
+}
+
+static void answer(struct session *p, const Farm__Fetch *f)
+{
+	Farm__FetchChunk chunk;
+	Farm__Envelope m;
+	struct job_view v;
+	struct error e = {""};
+	unsigned char *bytes = mem_alloc(CHUNK, 1);
+	size_t count = 0;
+	farm__fetch_chunk__init(&chunk);
+	farm__envelope__init(&m);
+	chunk.job = f->job;
+	chunk.what = f->what;
+	chunk.offset = f->offset;
+	chunk.error = e.text;
+	int rc = !bytes ? error_set(&e, ENOMEM, "no memory") : f->offset ? 0 : begin(p, f, &v, &e);
+	if (!rc && !f->offset)
+		chunk.output = v.record.output;
+	if (!rc)
+		rc = read_piece(&p->fetch, f, bytes, &count, &e);
+	if (!rc)
+		chunk.size = p->fetch.size;
+	p->fetch.at = jobs_now(p->jobs);
+	if (rc || f->offset + count == chunk.size)
+		fetch_end(p);
+	m.body_case = FARM__ENVELOPE__BODY_FETCH_CHUNK;
+	m.fetch_chunk = &chunk;
+	session_send(p, &m, bytes, count);
+	mem_free(bytes);
+}
+
+/* Made when somebody asks: it holds up the job's results for as long as an image takes. */
+static bool is_preview_old(const struct jobs *s, const struct live_job *o)
+{
+	return o && o->canvas && !o->ended && (o->preview_made <= 0 || jobs_now(s) - o->preview_made > preview_seconds);
+}
+
+void fetch_previews(struct peers *s, uint64_t job)
+{
+	for (struct session *p = s->sessions; p; p = p->next) {
+		struct live_job *o = jobs_find(s->jobs, job);
+		if (p->wants_preview != job || (o && o->busy))
+			continue;
+		if (is_preview_old(s->jobs, o)) {
+			publish_start(s->jobs, o, PUBLISH_PREVIEW, 0);
+			continue;
+		}
+		Farm__Fetch f;
+		farm__fetch__init(&f);
+		f.job = job;
+		f.what = FARM__WHAT__WHAT_PREVIEW;
+		p->wants_preview = 0;
+		answer(p, &f);
+	}
+}
+
+void fetch_begin(struct session *p, const Farm__Fetch *f)
+{
+	struct job_view v;
+	if (f->what != FARM__WHAT__WHAT_PREVIEW || f->offset || !client_finds_job(p, f->job, &v)) {
+		answer(p, f);
+		return;
+	}
+	p->wants_preview = f->job;
+	fetch_previews(p->peers, f->job);
+}
+
+bool fetch_uses(const struct peers *s, uint64_t job)
+{
+	static const double fetching_seconds = 60;
+	for (const struct session *p = s->sessions; p; p = p->next)
+		if (p->watched == job || (p->fetch.job == job && jobs_now(s->jobs) - p->fetch.at < fetching_seconds))
+			return true;
+	return false;
+}

@@ -1,0 +1,99 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/peers/held.h"
+
+#include "common/base/mem.h"
+#include "coordinator/jobs/recovery.h"
+
+#include <string.h>
+
+/* Memory of all, and of one peer: a worker asks once for each job that it knows, and says which leases ended it. */
+enum { HELD_MOST = 1 << 28, PEER_MOST = 1 << 23, MESSAGE_COST = 256 };
+
+struct held {
+	struct held *next;
+	struct envelope envelope;
+};
+
+static size_t cost_of(const struct envelope *env)
+{
+	return env->used + MESSAGE_COST;
+}
+
+/* first: nothing of this peer waits. */
+static bool is_answered_at_once(Farm__Envelope__BodyCase what, bool first)
+{
+	return what == FARM__ENVELOPE__BODY_HEARTBEAT || what == FARM__ENVELOPE__BODY_BYE ||
+	       (first && what == FARM__ENVELOPE__BODY_JOB_LIST);
+}
+
+bool held_take(struct session *p, struct envelope *env)
+{
+	struct peers *s = p->peers;
+	if (!recovery_is_on(p->jobs) || is_answered_at_once(env->message->body_case, !p->held))
+		return false;
+	size_t cost = cost_of(env);
+	struct held *h =
+		p->held_bytes + cost <= PEER_MOST && s->held_bytes + cost <= HELD_MOST ? mem_alloc(1, sizeof *h) : NULL;
+	if (!h) {
+		session_fault(
+			p,
+			"the coordinator is still reading its jobs, and no more can wait for that: call again later");
+		return true;
+	}
+	if (!p->held) {
+		p->held_last = &p->held;
+		p->told = jobs_now(p->jobs);
+	}
+	h->envelope = *env;
+	memset(env, 0, sizeof *env);
+	*p->held_last = h;
+	p->held_last = &h->next;
+	p->held_bytes += cost;
+	s->held_bytes += cost;
+	return true;
+}
+
+void held_tick(struct session *p)
+{
+	Farm__Heartbeat beat;
+	Farm__Envelope m;
+	if (!p->held || p->state == SESSION_LEAVING || jobs_now(p->jobs) < p->told + p->jobs->config.heartbeat_seconds)
+		return;
+	p->told = jobs_now(p->jobs);
+	farm__heartbeat__init(&beat);
+	farm__envelope__init(&m);
+	m.body_case = FARM__ENVELOPE__BODY_HEARTBEAT;
+	m.heartbeat = &beat;
+	session_send(p, &m, NULL, 0);
+}
+
+static struct held *take_first(struct session *p)
+{
+	struct held *h = p->held;
+	p->held = h->next;
+	p->held_bytes -= cost_of(&h->envelope);
+	p->peers->held_bytes -= cost_of(&h->envelope);
+	return h;
+}
+
+static void free_held(struct held *h)
+{
+	envelope_fini(&h->envelope);
+	mem_free(h);
+}
+
+void held_drop(struct session *p)
+{
+	while (p->held)
+		free_held(take_first(p));
+}
+
+void held_deliver(struct peers *s)
+{
+	for (struct session *p = s->sessions; p; p = p->next)
+		while (p->held) {
+			struct held *h = take_first(p);
+			session_message(p, &h->envelope, NULL, 0);
+			free_held(h);
+		}
+}

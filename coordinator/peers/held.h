@@ -1,0 +1,18 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What peers ask for while the jobs of an earlier life are read (recovery.h): it waits, and is answered in the order in
+ * which it came. Greetings, heartbeats and lists of jobs are answered at once. Who waits hears a heartbeat as often as
+ * workers must be heard. The loop's thread.
+ */
+#ifndef COORDINATOR_PEERS_HELD_H
+#define COORDINATOR_PEERS_HELD_H
+
+#include "coordinator/peers/session.h"
+
+/* true: it waits, and the envelope is taken; or there is too much that does, and the peer was told so. */
+bool held_take(struct session *p, struct envelope *env);
+void held_tick(struct session *p);
+void held_drop(struct session *p);  /* it goes */
+void held_deliver(struct peers *s); /* to all, now that the jobs are there */
+
+#endif

@@ -1,0 +1,243 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * All connections: letting them in, finding them by number, and what the jobs ask of them.
+ *
+ * peers_accept makes a session of a connection (session.c), which enters the list and leaves it when its connection has
+ * closed. When the maximum of connections is reached the oldest one without a hello gives way; when there is none, or
+ * no memory, the caller is hung up on, or waits for the next tick where not even that can be done.
+ *
+ * What the jobs call is at the end of the file: each function finds the session, and does nothing when it has gone.
+ */
+#include "coordinator/peers/peers.h"
+
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "coordinator/peers/client.h"
+#include "coordinator/peers/fetch.h"
+#include "coordinator/peers/held.h"
+#include "coordinator/peers/session.h"
+#include "coordinator/peers/worker.h"
+
+struct session *peers_find(const struct peers *s, uint64_t id)
+{
+	for (struct session *p = s->by_id[id % SESSION_BUCKETS]; p; p = p->alike)
+		if (p->id == id)
+			return p;
+	return NULL;
+}
+
+static void enlist(struct peers *s, struct session *p)
+{
+	struct session **bucket = &s->by_id[p->id % SESSION_BUCKETS];
+	p->alike = *bucket;
+	*bucket = p;
+	p->next = s->sessions;
+	p->place = &s->sessions;
+	if (p->next)
+		p->next->place = &p->next;
+	s->sessions = p;
+	s->session_count++;
+}
+
+void peers_delist(struct peers *s, struct session *p)
+{
+	struct session **at = &s->by_id[p->id % SESSION_BUCKETS];
+	while (*at != p)
+		at = &(*at)->alike;
+	*at = p->alike;
+	*p->place = p->next;
+	if (p->next)
+		p->next->place = p->place;
+	s->session_count--;
+}
+
+static void on_refused(void *user, const char *why)
+{
+	(void)user;
+	(void)why;
+}
+static const struct conn_events refused_events = {.closed = on_refused};
+
+/* Whoever has not said who they are gives way, the one who has had longest first: strangers who hold connections and
+ * say nothing must not keep out those who can. */
+static bool make_room(struct peers *s)
+{
+	struct session *oldest = NULL;
+	for (struct session *p = s->sessions; p; p = p->next)
+		if (p->state == SESSION_NEW)
+			oldest = p;
+	if (!oldest)
+		return false;
+	oldest->state = SESSION_LEAVING;
+	conn_close(oldest->conn, "as many connections as are allowed, and this one has not said hello");
+	return true;
+}
+
+void peers_accept(struct peers *s)
+{
+	struct conn_config config = {{SESSION_HELLO_HEADER, 0},
+				     SESSION_HELLO_SEND,
+				     s->jobs->config.stall_seconds,
+				     s->jobs->config.hello_seconds,
+				     s->tls};
+	struct error e;
+	bool room = s->session_count < s->jobs->config.max_connections || make_room(s);
+	struct session *p = room ? mem_alloc(1, sizeof *p) : NULL;
+	struct conn *c;
+	s->caller_waits = false;
+	if (!p) {
+		log_event(LOG_PEER_REFUSED, "text=\"as many connections as are allowed\"");
+		if (conn_accept(&c, (uv_stream_t *)&s->listener, &config, &refused_events, NULL, &e) == 0)
+			conn_close(c, "as many connections as are allowed");
+		else
+			s->caller_waits = true;
+		return;
+	}
+	p->peers = s;
+	p->jobs = s->jobs;
+	p->id = ++s->last_peer;
+	if (conn_accept(&p->conn, (uv_stream_t *)&s->listener, &config, &session_events, p, &e)) {
+		log_event(LOG_PEER_REFUSED, "text=%s", log_quote(e.text).text);
+		s->caller_waits = true;
+		mem_free(p);
+		return;
+	}
+	conn_peer_name(p->conn, p->address, sizeof p->address);
+	enlist(s, p);
+	log_event(LOG_PEER_ACCEPT, "peer=%llu address=%s", (unsigned long long)p->id, p->address);
+}
+
+void peers_tick(struct peers *s)
+{
+	if (s->caller_waits)
+		peers_accept(s);
+	for (struct session *p = s->sessions; p; p = p->next) {
+		client_tick(p);
+		held_tick(p);
+	}
+}
+
+void peers_stop(struct peers *s)
+{
+	uv_close((uv_handle_t *)&s->listener, NULL);
+	for (struct session *p = s->sessions; p; p = p->next)
+		conn_close(p->conn, "the coordinator stops");
+}
+
+/* ---- what the jobs ask (peer_calls.h) ---- */
+
+static const char *name(void *user, uint64_t peer)
+{
+	const struct session *p = peers_find(user, peer);
+	return p ? p->name : NULL;
+}
+
+static void send_lease(void *user, uint64_t peer, const struct live_job *o, const struct lease_key *k, bool anew)
+{
+	struct session *p = peers_find(user, peer);
+	if (p)
+		worker_send_lease(p, o, k, anew);
+}
+
+static void revoke_lease(void *user, uint64_t peer, const struct lease_key *k)
+{
+	struct session *p = peers_find(user, peer);
+	if (p)
+		worker_send_revoke(p, k);
+}
+
+static void acknowledge(void *user, uint64_t peer, const struct lease_key *k, enum ack ack, const char *text)
+{
+	struct session *p = peers_find(user, peer);
+	if (p)
+		worker_send_ack(p, k, ack, text);
+}
+
+static void refused(void *user, uint64_t peer, const char *text)
+{
+	struct session *p = peers_find(user, peer);
+	if (p)
+		text_copy(p->rejected, sizeof p->rejected, text);
+}
+
+static void fault(void *user, uint64_t peer, const char *text)
+{
+	struct session *p = peers_find(user, peer);
+	if (p)
+		session_fault(p, "%s", text);
+}
+
+static void dismiss(void *user, uint64_t peer, const char *text)
+{
+	struct session *p = peers_find(user, peer);
+	if (!p)
+		return;
+	p->joined = false;
+	session_fault(p, "%s", text);
+}
+
+static void extended(void *user, uint64_t peer, const char *refusal, const char *text)
+{
+	struct session *p = peers_find(user, peer);
+	if (!p)
+		return;
+	text_copy(p->rejected, sizeof p->rejected, refusal ? refusal : "");
+	client_send_done(p, text);
+}
+
+static void job_ended(void *user, uint64_t job)
+{
+	const struct peers *s = user;
+	for (struct session *p = s->sessions; p; p = p->next)
+		if (p->state == SESSION_WORKER)
+			worker_send_job_end(p, job);
+}
+
+static void jobs_let_go(void *user)
+{
+	const struct peers *s = user;
+	for (struct session *p = s->sessions; p; p = p->next)
+		if (p->watched && p->shown && !jobs_find(s->jobs, p->watched))
+			client_tick(p);
+}
+
+static void films_free(void *user, uint64_t job)
+{
+	fetch_previews(user, job);
+}
+
+static void jobs_read(void *user)
+{
+	held_deliver(user);
+}
+
+static bool uses_result(void *user, uint64_t job)
+{
+	return fetch_uses(user, job);
+}
+
+static uint64_t uploading(void *user, uint64_t peer)
+{
+	const struct session *p = peers_find(user, peer);
+	return p ? client_uploading(p) : 0;
+}
+
+void peers_init(struct peers *s)
+{
+	uv_tcp_init(s->jobs->loop, &s->listener);
+	s->jobs->peers = (struct peer_calls){.user = s,
+					     .name = name,
+					     .send_lease = send_lease,
+					     .revoke = revoke_lease,
+					     .acknowledge = acknowledge,
+					     .refused = refused,
+					     .fault = fault,
+					     .dismiss = dismiss,
+					     .extended = extended,
+					     .job_ended = job_ended,
+					     .jobs_let_go = jobs_let_go,
+					     .films_free = films_free,
+					     .jobs_read = jobs_read,
+					     .uses_result = uses_result,
+					     .uploading = uploading};
+}

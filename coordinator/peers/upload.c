@@ -1,0 +1,288 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/peers/upload.h"
+
+#include "common/base/mem.h"
+#include "coordinator/jobs/files.h"
+
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+
+enum { FILES_MAX = 10000, DEFINES_MAX = 256, EFFECTS_MAX = 64, NOTES_MAX = 1000, NAME_MAX_BYTES = 1024 };
+static const uint64_t job_cache_max = 1ull << 34; /* 16 GiB */
+
+/* A relative path without "..": what a scene may ask for, and what a worker may look up. */
+static bool name_ok(const char *name)
+{
+	if (!envelope_text_ok(name, NAME_MAX_BYTES) || !*name || *name == '/')
+		return false;
+	for (const char *part = name; part; part = strchr(part, '/')) {
+		part += *part == '/';
+		size_t n = strcspn(part, "/");
+		if (n == 0 || (n == 1 && part[0] == '.') || (n == 2 && part[0] == '.' && part[1] == '.'))
+			return false;
+	}
+	return true;
+}
+
+static int check_files(const Farm__Submit *m, struct error *e)
+{
+	uint64_t total = 0;
+	bool scene = false;
+	if (m->n_files == 0 || m->n_files > FILES_MAX)
+		return error_set(e, EINVAL, "a bundle has 1 to %d files, not %zu", FILES_MAX, m->n_files);
+	for (size_t i = 0; i < m->n_files; i++) {
+		const Farm__File *f = m->files[i];
+		if (!name_ok(f->name) || f->hash.len != BLOB_HASH_SIZE)
+			return error_set(e, EINVAL, "file %zu of the bundle has no proper name or hash", i);
+		if (f->size > job_cache_max - total)
+			return error_set(e, EINVAL, "the bundle is larger than %llu bytes",
+					 (unsigned long long)job_cache_max);
+		total += f->size;
+		scene = scene || strcmp(f->name, m->scene) == 0;
+	}
+	return scene ? 0 : error_set(e, EINVAL, "the scene file is not in the bundle");
+}
+
+static int compare_names(const void *x, const void *y)
+{
+	const Farm__File *const *a = x, *const *b = y;
+	return strcmp((*a)->name, (*b)->name);
+}
+
+/* Of two files of a name nobody could say which one the scene means. */
+static int check_names(const Farm__Submit *m, struct error *e)
+{
+	Farm__File **sorted = mem_alloc(m->n_files, sizeof *sorted);
+	int rc = 0;
+	if (!sorted)
+		return error_set(e, ENOMEM, "no memory for a submission");
+	memcpy(sorted, m->files, m->n_files * sizeof *sorted);
+	qsort(sorted, m->n_files, sizeof *sorted, compare_names);
+	for (size_t i = 1; !rc && i < m->n_files; i++)
+		if (compare_names(&sorted[i - 1], &sorted[i]) == 0)
+			rc = error_set(e, EINVAL, "%.256s: the bundle has two files of that name", sorted[i]->name);
+	mem_free(sorted);
+	return rc;
+}
+
+static int check_texts(const Farm__Submit *m, struct error *e)
+{
+	bool ok = envelope_text_ok(m->name, 127) && envelope_text_ok(m->scene, NAME_MAX_BYTES) &&
+		  envelope_text_ok(m->output, 1023) && m->n_defines <= DEFINES_MAX && m->n_effects <= EFFECTS_MAX &&
+		  m->n_notes <= NOTES_MAX;
+	for (size_t i = 0; ok && i < m->n_defines; i++)
+		ok = envelope_text_ok(m->defines[i]->name, 256) && envelope_text_ok(m->defines[i]->value, 4096);
+	for (size_t i = 0; ok && i < m->n_effects; i++)
+		ok = envelope_text_ok(m->effects[i]->name, 64) && envelope_text_ok(m->effects[i]->why, 256) &&
+		     envelope_text_ok(m->effects[i]->saves, 256);
+	for (size_t i = 0; ok && i < m->n_notes; i++)
+		ok = envelope_text_ok(m->notes[i], 2048);
+	return ok ? 0 : error_set(e, EINVAL, "a text or a count of the submission is out of bounds");
+}
+
+static int check(const Farm__Submit *m, double bandwidth, struct plan *plan, char *rule, size_t rule_size,
+		 struct error *e)
+{
+	struct plan_request request;
+	int rc = check_texts(m, e);
+	if (!rc)
+		rc = check_files(m, e);
+	if (!rc)
+		rc = check_names(m, e);
+	if (!rc && (m->render_width > PLAN_MAX_SIZE || m->render_height > PLAN_MAX_SIZE))
+		rc = error_set(e, EINVAL, "a film of %ux%u", m->render_width, m->render_height);
+	if (!rc && !(m->brightest >= 0 && isfinite(m->brightest)))
+		rc = error_set(e, EINVAL, "a brightness of %g", m->brightest);
+	if (!rc && !(m->verify >= 0 && m->verify <= 1))
+		rc = error_set(e, EINVAL, "a share of %g of the epochs to be verified", m->verify);
+	if (!rc && m->verify > 0 && m->mixed)
+		rc = error_set(
+			e, EINVAL,
+			"workers of several fingerprints cannot be held against each other: verify or mixed, not both");
+	if (!rc)
+		rc = plan_request_from_wire(m->plan, &request, e);
+	if (rc)
+		return rc;
+	request.bandwidth = bandwidth;
+	rc = plan_make(&request, plan, e);
+	if (!rc)
+		plan_describe_epoch(&request, plan, rule, rule_size);
+	return rc;
+}
+
+static int compare_hashes(const void *x, const void *y, void *files)
+{
+	Farm__File *const *f = files;
+	return memcmp(f[*(const uint32_t *)x]->hash.data, f[*(const uint32_t *)y]->hash.data, BLOB_HASH_SIZE);
+}
+
+/* Some thousand files, of which each is looked for when it comes: they are put in order once. */
+static int sort_hashes(struct upload *u, struct error *e)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	for (uint32_t i = 0; i < m->n_files; i++)
+		u->by_hash[i] = i;
+	qsort_r(u->by_hash, m->n_files, sizeof *u->by_hash, compare_hashes, m->files);
+	for (size_t i = 1; i < m->n_files; i++) {
+		const Farm__File *a = m->files[u->by_hash[i - 1]], *b = m->files[u->by_hash[i]];
+		if (memcmp(a->hash.data, b->hash.data, BLOB_HASH_SIZE) == 0 && a->size != b->size)
+			return error_set(e, EINVAL, "%.256s: the same content as %.256s, and another size", a->name,
+					 b->name);
+	}
+	return 0;
+}
+
+/* The first place in by_hash that is not before h. */
+static size_t place_of(const struct upload *u, const struct blob_hash *h)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	size_t low = 0, high = m->n_files;
+	while (low < high) {
+		size_t middle = low + (high - low) / 2;
+		if (memcmp(m->files[u->by_hash[middle]]->hash.data, h->bytes, BLOB_HASH_SIZE) < 0)
+			low = middle + 1;
+		else
+			high = middle;
+	}
+	return low;
+}
+
+/* A blob has come: all files that have its content hold it. */
+static void hold_blob(struct upload *u, const struct blob_hash *h)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	for (size_t at = place_of(u, h); at < m->n_files; at++) {
+		uint32_t i = u->by_hash[at];
+		if (memcmp(m->files[i]->hash.data, h->bytes, BLOB_HASH_SIZE) != 0)
+			break;
+		if (!u->held[i])
+			u->missing_count -= u->held[i] = blob_hold(u->blobs, h);
+	}
+}
+
+static void look_for_blobs(struct upload *u)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	u->missing_count = 0;
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = live_job_file_hash(m->files[i]);
+		u->held[i] = blob_check(u->blobs, &h, FILES_CHECKED, NULL) == 0 && blob_hold(u->blobs, &h);
+		u->missing_count += !u->held[i];
+	}
+}
+
+/* A size that is not the blob's would mislead workers. */
+static int check_sizes(const struct upload *u, struct error *e)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	for (size_t i = 0; i < m->n_files; i++) {
+		struct blob_hash h = live_job_file_hash(m->files[i]);
+		uint64_t size;
+		if (u->held[i] && (!blob_has(u->blobs, &h, &size) || size != m->files[i]->size))
+			return error_set(e, EINVAL, "%s: another size than its content has", m->files[i]->name);
+	}
+	return 0;
+}
+
+int upload_new(struct upload **out, struct envelope *submit, struct blob_store *blobs, double bandwidth,
+	       struct error *e)
+{
+	const Farm__Submit *m = submit->message->submit;
+	struct plan plan;
+	char rule[sizeof(*out)->rule];
+	int rc = check(m, bandwidth, &plan, rule, sizeof rule, e);
+	if (rc)
+		return rc;
+	struct upload *u = mem_alloc(1, sizeof *u);
+	bool *held = mem_alloc(m->n_files, sizeof *held);
+	uint32_t *by_hash = mem_alloc(m->n_files, sizeof *by_hash);
+	if (!u || !held || !by_hash) {
+		mem_free(u);
+		mem_free(held);
+		mem_free(by_hash);
+		return error_set(e, ENOMEM, "no memory for a submission");
+	}
+	u->plan = plan;
+	memcpy(u->rule, rule, sizeof rule);
+	u->held = held;
+	u->by_hash = by_hash;
+	u->blobs = blobs;
+	u->submit = *submit;
+	memset(submit, 0, sizeof *submit);
+	rc = sort_hashes(u, e);
+	if (!rc)
+		look_for_blobs(u);
+	if (!rc)
+		rc = check_sizes(u, e);
+	if (rc)
+		upload_free(u);
+	else
+		*out = u;
+	return rc;
+}
+
+void upload_free(struct upload *u)
+{
+	if (u->writer)
+		blob_write_abort(u->writer);
+	const Farm__Submit *m = u->submit.message ? u->submit.message->submit : NULL;
+	for (size_t i = 0; m && i < m->n_files; i++) {
+		struct blob_hash h = live_job_file_hash(m->files[i]);
+		if (u->held[i])
+			blob_release(u->blobs, &h);
+	}
+	envelope_fini(&u->submit);
+	mem_free(u->held);
+	mem_free(u->by_hash);
+	mem_free(u);
+}
+
+static const Farm__File *missing_file(const struct upload *u, const struct blob_hash *h)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	size_t at = place_of(u, h);
+	const Farm__File *f = at < m->n_files ? m->files[u->by_hash[at]] : NULL;
+	return f && !u->held[u->by_hash[at]] && memcmp(f->hash.data, h->bytes, BLOB_HASH_SIZE) == 0 ? f : NULL;
+}
+
+int upload_add(struct upload *u, const Farm__BlobChunk *c, const unsigned char *payload, size_t size, struct error *e)
+{
+	struct blob_hash h;
+	int rc = 0;
+	if (c->hash.len != BLOB_HASH_SIZE)
+		return error_set(e, EINVAL, "a blob's name has %zu bytes", c->hash.len);
+	memcpy(h.bytes, c->hash.data, sizeof h.bytes);
+	if (!u->writer) {
+		const Farm__File *f = missing_file(u, &h);
+		if (!f || f->size != c->size)
+			return error_set(e, EINVAL, "a blob that nobody asked for");
+		rc = blob_write_begin(&u->writer, u->blobs, &h, c->size, e);
+		u->writing = h;
+	}
+	if (!rc && (!blob_hash_equal(&h, &u->writing) || c->offset != blob_write_at(u->writer)))
+		rc = error_set(e, EINVAL, "blobs must be sent one after the other and in order");
+	if (!rc && size)
+		rc = blob_write_add(u->writer, payload, size, e);
+	if (rc || blob_write_at(u->writer) < c->size)
+		return rc;
+	rc = blob_write_commit(u->writer, e);
+	u->writer = NULL;
+	if (rc)
+		return rc;
+	hold_blob(u, &h);
+	blob_release(u->blobs, &h); /* the writer's hold; each file has its own now */
+	return 1;
+}
+
+size_t upload_missing(const struct upload *u, struct blob_hash *hashes)
+{
+	const Farm__Submit *m = u->submit.message->submit;
+	size_t count = 0;
+	for (size_t at = 0; at < m->n_files; at++) {
+		struct blob_hash h = live_job_file_hash(m->files[u->by_hash[at]]);
+		if (!u->held[u->by_hash[at]] && (count == 0 || !blob_hash_equal(&hashes[count - 1], &h)))
+			hashes[count++] = h;
+	}
+	return count;
+}

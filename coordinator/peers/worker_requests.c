@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/peers/worker_requests.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "coordinator/jobs/files.h"
+#include "coordinator/peers/session.h"
+#include "coordinator/peers/worker.h"
+
+enum {
+	BLOB_CHUNK = 1 << 20,
+	AHEAD = 1 << 22, /* bytes that may be unsent when the next answer is made */
+	ASKS_MOST = 512, /* twice what a worker that has leases of as many jobs as it may hold has to ask */
+};
+
+static void send_job_info(struct session *p, uint64_t job)
+{
+	const struct live_job *o = jobs_find(p->jobs, job);
+	if (!o) {
+		worker_send_job_end(p, job);
+		return;
+	}
+	worker_allow_results(p, o);
+	const Farm__Submit *from = live_job_submit(o);
+	Farm__JobInfo info;
+	Farm__Plan plan;
+	Farm__Envelope m;
+	farm__job_info__init(&info);
+	farm__envelope__init(&m);
+	plan_to_wire(&o->plan, &plan);
+	info.job = job;
+	info.name = from->name;
+	info.scene = from->scene;
+	info.n_defines = from->n_defines;
+	info.defines = from->defines;
+	info.render_width = from->render_width;
+	info.render_height = from->render_height;
+	info.plan = &plan;
+	info.n_files = from->n_files;
+	info.files = from->files;
+	m.body_case = FARM__ENVELOPE__BODY_JOB_INFO;
+	m.job_info = &info;
+	session_send(p, &m, NULL, 0);
+}
+
+static void send_piece(struct session *p, const struct worker_request *a)
+{
+	Farm__BlobChunk chunk;
+	Farm__Envelope m;
+	struct error e = {""};
+	struct blob_hash h = a->hash;
+	uint64_t size = 0;
+	farm__blob_chunk__init(&chunk);
+	farm__envelope__init(&m);
+	unsigned char *bytes = mem_alloc(BLOB_CHUNK, 1);
+	ssize_t n = 0;
+	int fd = a->number == 0 && files_check(p->jobs, &h, FILES_CHECKED, &e)
+			 ? -1
+			 : blob_open(p->jobs->blobs, &h, &size, &e);
+	if (fd >= 0 && bytes)
+		n = disk_pread(fd, bytes, BLOB_CHUNK, a->number <= size ? (off_t)a->number : 0);
+	if (fd >= 0 && (!bytes || n < 0 || a->number > size))
+		error_set(&e, EIO, "the blob cannot be read there");
+	chunk.hash = (ProtobufCBinaryData){sizeof h.bytes, h.bytes};
+	chunk.offset = a->number;
+	chunk.size = size;
+	chunk.error = e.text;
+	m.body_case = FARM__ENVELOPE__BODY_BLOB_CHUNK;
+	m.blob_chunk = &chunk;
+	session_send(p, &m, bytes, *e.text ? 0 : (size_t)n);
+	if (fd >= 0)
+		disk_close(fd);
+	mem_free(bytes);
+}
+
+static void answer(struct session *p, const struct worker_request *a)
+{
+	if (a->blob)
+		send_piece(p, a);
+	else
+		send_job_info(p, a->number);
+}
+
+void worker_requests_take(struct session *p, const struct worker_request *a)
+{
+	if (!p->asks && conn_unsent(p->conn) <= AHEAD) {
+		answer(p, a);
+		return;
+	}
+	struct worker_request *last = p->ask_count < ASKS_MOST ? mem_alloc(1, sizeof *last) : NULL;
+	if (!last) {
+		session_fault(p, "%u pieces and jobs asked for and not taken: no worker needs so many", p->ask_count);
+		return;
+	}
+	*last = *a;
+	struct worker_request **at = &p->asks;
+	while (*at)
+		at = &(*at)->next;
+	*at = last;
+	p->ask_count++;
+}
+
+static void drop_first(struct session *p)
+{
+	struct worker_request *a = p->asks;
+	p->asks = a->next;
+	p->ask_count--;
+	mem_free(a);
+}
+
+void worker_requests_go_on(struct session *p)
+{
+	while (p->asks && p->state == SESSION_WORKER && conn_unsent(p->conn) <= AHEAD) {
+		answer(p, p->asks);
+		drop_first(p);
+	}
+}
+
+void worker_requests_drop(struct session *p)
+{
+	while (p->asks)
+		drop_first(p);
+}

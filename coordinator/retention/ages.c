@@ -1,0 +1,68 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/retention/ages.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+
+#include <fcntl.h>
+#include <string.h>
+#include <time.h>
+
+static const char file[] = "clock";
+
+static double seconds_of(clockid_t id)
+{
+	struct timespec t = {0, 0};
+	clock_gettime(id, &t);
+	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
+}
+
+static struct seen clocks(void)
+{
+	struct seen now = {.up = seconds_of(CLOCK_BOOTTIME), .wall = seconds_of(CLOCK_REALTIME)};
+	int fd = disk_open("/proc/sys/kernel/random/boot_id", O_RDONLY | O_CLOEXEC, 0);
+	ssize_t n = fd < 0 ? 0 : disk_read(fd, now.boot, sizeof now.boot - 1);
+	if (fd >= 0)
+		disk_close(fd);
+	now.boot[n > 0 ? n : 0] = 0;
+	now.boot[strcspn(now.boot, " \n")] = 0;
+	return now;
+}
+
+void ages_open(struct jobs *s)
+{
+	struct seen last;
+	struct error e = {""};
+	char *text;
+	size_t size;
+	int rc = spool_read_own(s->spool, file, &text, &size, &e);
+	if (!rc) {
+		if ((rc = seen_from_text(text, size, &last)))
+			error_set(
+				&e, EBADMSG,
+				"the file %s of the spool is damaged: all finished jobs are as if they had just ended",
+				file);
+		mem_free(text);
+	}
+	if (rc && rc != -ENOENT)
+		log_event(LOG_SPOOL_FAULT, "text=%s", log_quote(e.text).text);
+	s->seen = clocks();
+	seen_go_on(&s->seen, rc ? NULL : &last);
+	ages_keep(s);
+}
+
+double ages_now(const struct jobs *s)
+{
+	double since = seconds_of(CLOCK_BOOTTIME) - s->seen.up;
+	return s->seen.seconds + (since > 0 ? since : 0);
+}
+
+void ages_keep(const struct jobs *s)
+{
+	char text[SEEN_TEXT];
+	struct error e;
+	struct seen now = clocks();
+	now.seconds = ages_now(s);
+	if (spool_write_own(s->spool, file, text, seen_to_text(&now, text), &e))
+		log_event(LOG_SPOOL_FAULT, "text=%s action=\"it is tried again\"", log_quote(e.text).text);
+}

@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/retention/keep.h"
+
+#include "common/base/disk.h"
+
+#include <string.h>
+
+bool keep_order(struct jobs *s, const struct live_job *o)
+{
+	char path[SPOOL_PATH_MAX];
+	struct stat st;
+	if (!s->config.keep_bytes || !o->canvas || o->lit.black || canvas_rounds(o->canvas) == 0 ||
+	    (strcmp(o->record.state, job_state_name(JOB_DONE)) != 0 && !o->overflowed))
+		return false;
+	spool_job_path(s->spool, o->id, "order", path);
+	return disk_stat(path, &st) == 0;
+}
+
+void keep_drop(const struct jobs *s, uint64_t job)
+{
+	char path[SPOOL_PATH_MAX];
+	if (jobs_is_read(s, job))
+		return;
+	spool_job_path(s->spool, job, NULL, path);
+	journal_clear(path, UINT64_MAX);
+	spool_job_path(s->spool, job, "checkpoint", path);
+	disk_unlink(path);
+	spool_job_path(s->spool, job, "order", path);
+	disk_unlink(path);
+}
+
+uint64_t keep_bytes(const struct jobs *s, uint64_t job)
+{
+	char folder[SPOOL_PATH_MAX], path[SPOOL_PATH_MAX];
+	uint64_t sum = 0;
+	struct stat st;
+	spool_job_path(s->spool, job, NULL, folder);
+	DIR *d = disk_opendir(folder);
+	for (struct dirent *f; d && (f = readdir(d));) {
+		if (strcmp(f->d_name, "order") != 0 && strcmp(f->d_name, "checkpoint") != 0 &&
+		    strncmp(f->d_name, "journal.", 8) != 0)
+			continue;
+		spool_job_path(s->spool, job, f->d_name, path);
+		sum += disk_stat(path, &st) == 0 ? (uint64_t)st.st_size : 0;
+	}
+	if (d)
+		closedir(d);
+	return sum;
+}
+
+bool keep_drop_all(const struct jobs *s)
+{
+	bool any = false;
+	for (size_t i = 0; i < s->ended_count; i++)
+		if (keep_bytes(s, s->ended[i].id)) {
+			keep_drop(s, s->ended[i].id);
+			any = true;
+		}
+	return any;
+}
+
+void keep_trim(const struct jobs *s)
+{
+	uint64_t left = s->config.keep_bytes;
+	for (size_t i = s->ended_count; i-- > 0;) { /* the latest ones first */
+		uint64_t bytes = keep_bytes(s, s->ended[i].id);
+		if (bytes > left)
+			keep_drop(s, s->ended[i].id);
+		else
+			left -= bytes;
+	}
+}

@@ -1,0 +1,271 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The coordinator's event loop.
+ *
+ * server_open opens the jobs, which begins to read those of the last run (recovery.h), and listens. From then on
+ * sockets, timers and the thread pool drive everything: what peers say becomes an event for the core (step.h). Five
+ * times a second a timer drives what has to happen by itself: status, retries, checkpoints, retention, the service
+ * manager's watchdog.
+ *
+ * SIGTERM and SIGINT stop the loop when the work in the thread pool has ended; nothing needs to be written then, for
+ * everything acknowledged is on disk. Errors of one job hold or end that job. A fault that makes the spool unreadable
+ * stops the coordinator with a message (server_run returns it).
+ */
+#include "coordinator/server/server.h"
+
+#include "common/base/disk.h"
+#include "common/base/mem.h"
+#include "common/base/text.h"
+#include "common/net/notify.h"
+#include "coordinator/jobs/recovery.h"
+#include "coordinator/jobs/start.h"
+#include "coordinator/server/limits.h"
+#include "coordinator/status/status.h"
+
+#include <assert.h>
+#include <fcntl.h>
+#include <signal.h>
+#include <string.h>
+
+enum { BACKLOG = 4096 };
+
+/* Of what this process may have. */
+static uint64_t quarter_of_memory(void)
+{
+	uint64_t all = uv_get_total_memory(), ours = uv_get_constrained_memory();
+	return (ours && ours < all ? ours : all) / 4;
+}
+
+void server_config_init(struct server_config *c)
+{
+	*c = (struct server_config){.listen = "127.0.0.1:7700",
+				    .heartbeat_seconds = 5,
+				    .retry_seconds = 2,
+				    .clear_seconds = 30 * 86400.0,
+				    .max_faults = 3,
+				    .max_fetches = FETCHES_MOST,
+				    .journal_bytes = 64 << 20,
+				    .keep_bytes = 2000000000,
+				    .film_bytes = quarter_of_memory(),
+				    .waiting_bytes = quarter_of_memory(),
+				    .hello_seconds = 10,
+				    .stall_seconds = 30,
+				    .tls_check_seconds = 60};
+}
+
+/* ---- start ---- */
+
+static void on_connection(uv_stream_t *listener, int status)
+{
+	struct server *s = listener->data;
+	if (status == 0 && !s->jobs.stopping)
+		peers_accept(&s->peers);
+}
+
+static int write_port(const char *path, unsigned port, struct error *e)
+{
+	char text[16], temporary[4096];
+	int n = snprintf(text, sizeof text, "%u\n", port);
+	snprintf(temporary, sizeof temporary, "%s.tmp", path);
+	int fd = disk_open(temporary, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644);
+	int rc = fd < 0 || disk_write_all(fd, text, (size_t)n) ? error_set(e, errno, "%s: %s", path, strerror(errno))
+							       : 0;
+	if (fd >= 0)
+		disk_close(fd);
+	if (!rc && disk_rename(temporary, path))
+		rc = error_set(e, errno, "%s: %s", path, strerror(errno));
+	return rc;
+}
+
+static int start_listening(struct server *s, struct error *e)
+{
+	struct net_addr a, bound;
+	char text[80];
+	int length = sizeof bound.storage;
+	int rc = net_addr_resolve(&a, s->jobs.config.listen, e);
+	if (!rc)
+		rc = net_addr_allow(&a, s->jobs.config.listen, s->jobs.config.insecure || s->peers.tls, e);
+	if (rc)
+		return rc;
+	memset(&bound, 0, sizeof bound);
+	rc = uv_tcp_bind(&s->peers.listener, (const struct sockaddr *)&a.storage, 0);
+	if (!rc)
+		rc = uv_listen((uv_stream_t *)&s->peers.listener, BACKLOG, on_connection);
+	if (!rc)
+		rc = uv_tcp_getsockname(&s->peers.listener, (struct sockaddr *)&bound.storage, &length);
+	if (rc)
+		return error_set(e, -rc, "cannot listen at %s: %s", s->jobs.config.listen, uv_strerror(rc));
+	net_addr_format(&bound, text, sizeof text);
+	log_event(LOG_LISTEN, "address=%s tls=%s", text, s->peers.tls ? "yes" : "no");
+	return s->jobs.config.port_file ? write_port(s->jobs.config.port_file, net_addr_port(&bound), e) : 0;
+}
+
+static int open_tls(struct server *s, struct error *e)
+{
+	int rc = tls_open(&s->peers.tls, s->jobs.config.tls, e);
+	if (rc)
+		return rc;
+	tls_set_recheck(s->peers.tls, s->jobs.config.tls_check_seconds);
+	const struct tls_peer *self = tls_self(s->peers.tls);
+	if (self->role == TLS_COORDINATOR)
+		return 0;
+	return error_set(e, EINVAL, "%s: the certificate of %s is a %s's, and nobody would take it for a coordinator's",
+			 s->jobs.config.tls, self->name, tls_role_name(self->role));
+}
+
+/* A list of the revoked or a new certificate is taken up within a second. */
+static void refresh_tls(struct server *s)
+{
+	struct error e;
+	char text[384];
+	if (!s->peers.tls || jobs_now(&s->jobs) < s->tls_next)
+		return;
+	s->tls_next = jobs_now(&s->jobs) + 1;
+	int rc = tls_refresh(s->peers.tls, &e);
+	if (rc > 0)
+		log_event(LOG_TLS_READ, "path=%s", log_quote(s->jobs.config.tls).text);
+	else if (rc < 0)
+		log_event(LOG_TLS_FAULT, "text=%s", log_quote(e.text).text);
+	if (tls_warning_due(s->peers.tls, time(NULL), text, sizeof text))
+		log_event(LOG_TLS_EXPIRY, "text=%s", log_quote(text).text);
+}
+
+/* What came before the loop looked at its sockets has been read when it has. */
+static void on_look(uv_prepare_t *h)
+{
+	struct server *s = h->data;
+	s->looked = jobs_now(&s->jobs);
+}
+
+static void on_read(uv_check_t *h)
+{
+	struct server *s = h->data;
+	s->jobs.read = s->looked;
+}
+
+static void on_tick(uv_timer_t *t)
+{
+	struct server *s = t->data;
+	log_tick();
+	refresh_tls(s);
+	peers_tick(&s->peers);
+	status_tick(s->status);
+	jobs_tick(&s->jobs);
+	if (s->watchdog > 0 && jobs_now(&s->jobs) >= s->watchdog_next) {
+		s->watchdog_next = jobs_now(&s->jobs) + s->watchdog / 3;
+		notify_send("WATCHDOG=1");
+	}
+}
+
+void server_stop(struct server *s)
+{
+	if (s->jobs.stopping)
+		return;
+	notify_send("STOPPING=1");
+	jobs_stop(&s->jobs);
+	peers_stop(&s->peers);
+	uv_close((uv_handle_t *)&s->tick, NULL);
+	uv_close((uv_handle_t *)&s->look, NULL);
+	uv_close((uv_handle_t *)&s->check, NULL);
+	uv_close((uv_handle_t *)&s->on_term, NULL);
+	uv_close((uv_handle_t *)&s->on_int, NULL);
+	status_close(s->status);
+	s->status = NULL;
+}
+
+static void stop(void *user)
+{
+	server_stop(user);
+}
+
+static void on_signal(uv_signal_t *h, int number)
+{
+	log_event(LOG_STOP, "signal=%d", number);
+	server_stop(h->data);
+}
+
+static void init_handles(struct server *s)
+{
+	jobs_init(&s->jobs);
+	peers_init(&s->peers);
+	uv_timer_init(&s->loop, &s->tick);
+	uv_prepare_init(&s->loop, &s->look);
+	uv_check_init(&s->loop, &s->check);
+	uv_signal_init(&s->loop, &s->on_term);
+	uv_signal_init(&s->loop, &s->on_int);
+	s->peers.listener.data = s->tick.data = s->look.data = s->check.data = s->on_term.data = s->on_int.data = s;
+	uv_signal_start(&s->on_term, on_signal, SIGTERM);
+	uv_signal_start(&s->on_int, on_signal, SIGINT);
+	uv_timer_start(&s->tick, on_tick, TICK_MS, TICK_MS);
+	uv_prepare_start(&s->look, on_look);
+	uv_check_start(&s->check, on_read);
+}
+
+void server_close(struct server *s)
+{
+	server_stop(s);
+	uv_run(&s->loop, UV_RUN_DEFAULT);
+	int closed = uv_loop_close(&s->loop);
+	assert(closed == 0);
+	(void)closed;
+	jobs_close(&s->jobs);
+	tls_close(s->peers.tls);
+	mem_free(s);
+}
+
+int server_open(struct server **out, const struct server_config *c, struct error *e)
+{
+	struct server *s = mem_alloc(1, sizeof *s);
+	if (!s)
+		return error_set(e, ENOMEM, "no memory for the server");
+	signal(SIGPIPE, SIG_IGN);
+	s->jobs.config = *c;
+	s->jobs.loop = &s->loop;
+	s->jobs.stop = stop;
+	s->jobs.stop_user = s;
+	s->peers.jobs = &s->jobs;
+	s->watchdog = notify_watchdog();
+	int rc = uv_loop_init(&s->loop);
+	if (rc) {
+		mem_free(s);
+		return error_set(e, -rc, "no event loop: %s", uv_strerror(rc));
+	}
+	init_handles(s);
+	rc = s->jobs.config.tls && *s->jobs.config.tls ? open_tls(s, e) : 0;
+	if (!rc)
+		rc = limits_connections(c->max_connections, &s->jobs.config.max_connections, e);
+	if (!rc)
+		rc = jobs_open(&s->jobs, e);
+	int inherited = notify_inherited_unix();
+	if (!rc && (inherited >= 0 || c->status_socket))
+		rc = status_open(&s->status, &s->peers, inherited, c->status_socket, c->status_group, e);
+	if (!rc)
+		rc = start_listening(s, e);
+	if (rc)
+		server_close(s);
+	else
+		*out = s;
+	return rc;
+}
+
+int server_await_jobs(struct server *s, struct error *e)
+{
+	while (recovery_is_on(&s->jobs) && !s->jobs.stopping)
+		uv_run(&s->loop, UV_RUN_ONCE);
+	*e = s->jobs.fault_error;
+	return s->jobs.fault;
+}
+
+int server_run(const struct server_config *c, struct error *e)
+{
+	struct server *s;
+	int rc = server_open(&s, c, e);
+	if (rc)
+		return rc;
+	notify_send("READY=1");
+	uv_run(&s->loop, UV_RUN_DEFAULT);
+	rc = s->jobs.fault;
+	*e = s->jobs.fault_error;
+	server_close(s);
+	return rc;
+}

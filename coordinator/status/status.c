@@ -1,0 +1,470 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "coordinator/status/status.h"
+
+#include "common/base/mem.h"
+#include "coordinator/jobs/listing.h"
+#include "coordinator/jobs/recovery.h"
+#include "coordinator/peers/session.h"
+
+#include <errno.h>
+#include <fcntl.h>
+#include <grp.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <time.h>
+#include <unistd.h>
+
+enum { READERS_MAX = 64, LINE_BYTES = 4096, UNREAD_MAX = 1 << 20, BACKLOG = 16 };
+
+enum topic { TOPIC_JOBS = 1, TOPIC_WORKERS = 2, TOPIC_SNAPSHOT = 4 };
+
+struct reader {
+	struct reader *next;
+	struct status_socket *socket;
+	uv_pipe_t pipe;
+	unsigned topics;
+	bool closing;
+	size_t line_size;
+	char line[LINE_BYTES];
+};
+
+struct status_socket {
+	const struct peers *peers;
+	struct jobs *jobs;
+	uv_pipe_t listener;
+	struct reader *readers;
+	unsigned reader_count;
+	bool caller_waits;
+	struct job_view *shown; /* as the subscribers saw the jobs last */
+	size_t shown_count;
+	uint64_t shown_changes; /* of the jobs, at the last tick */
+	char *path;		/* NULL: inherited */
+	dev_t device;		/* the file that was made there; inode 0: none */
+	ino_t inode;
+};
+
+/* ---- lines ---- */
+
+static json_t *object(const char *type)
+{
+	struct timespec now;
+	clock_gettime(CLOCK_REALTIME, &now);
+	return json_pack("{s:i s:s s:f}", "schema", 1, "type", type, "time",
+			 (double)now.tv_sec + 1e-9 * (double)now.tv_nsec);
+}
+
+static json_t *jobs_json(const struct job_view *views, size_t count)
+{
+	json_t *list = json_array();
+	for (size_t i = 0; i < count; i++)
+		json_array_append_new(list, view_to_json(&views[i]));
+	return list;
+}
+
+/* What a worker's certificate is, and whether it must be renewed. */
+static void add_certificate(const struct peers *s, uint64_t peer, json_t *worker)
+{
+	char text[192];
+	const struct session *p = s->tls ? peers_find(s, peer) : NULL;
+	if (!p || !*p->who.name)
+		return;
+	json_object_set_new(worker, "certificate", json_string(p->who.name));
+	json_object_set_new(worker, "certificateUntil", json_integer(p->who.until));
+	if (tls_expiry(&p->who, time(NULL), text, sizeof text))
+		json_object_set_new(worker, "warning", json_string(text));
+}
+
+static void add_tls(const struct peers *s, json_t *o)
+{
+	char text[384];
+	if (!s->tls)
+		return;
+	json_t *tls = json_pack("{s:s s:I s:I}", "certificate", tls_self(s->tls)->name, "certificateUntil",
+				(json_int_t)tls_self(s->tls)->until, "authorityUntil",
+				(json_int_t)tls_authority_until(s->tls));
+	if (tls_warning(s->tls, time(NULL), text, sizeof text))
+		json_object_set_new(tls, "warning", json_string(text));
+	json_object_set_new(o, "tls", tls);
+}
+
+/* Here or not. */
+static json_t *quarantined_json(const struct peers *s)
+{
+	json_t *list = json_array();
+	struct worker_status w;
+	for (uint64_t who = 0;
+	     (who = farm_next_quarantined(s->jobs->farm, who)) && farm_worker(s->jobs->farm, who, &w);)
+		json_array_append_new(list, view_aside_to_json(&w));
+	return list;
+}
+
+static void add_workers(const struct peers *s, json_t *o)
+{
+	json_t *workers = json_array(), *leases = json_array();
+	struct peer_status p;
+	struct lease_status l;
+	double now = jobs_now(s->jobs);
+	for (uint64_t id = 0; (id = farm_next_peer(s->jobs->farm, id));) {
+		if (!farm_peer(s->jobs->farm, id, &p))
+			continue;
+		json_t *worker = view_peer_to_json(&p, now);
+		add_certificate(s, id, worker);
+		json_array_append_new(workers, worker);
+		for (uint32_t i = 0; farm_lease(s->jobs->farm, id, i, &l); i++)
+			json_array_append_new(leases, view_lease_to_json(&l, p.name, now));
+	}
+	json_object_set_new(o, "workers", workers);
+	json_object_set_new(o, "aside", quarantined_json(s));
+	json_object_set_new(o, "leases", leases);
+}
+
+static json_t *snapshot(const struct peers *s)
+{
+	struct job_view *views;
+	size_t count = jobs_views(s->jobs, &views);
+	json_t *o = object("snapshot");
+	json_object_set_new(o, "jobs", jobs_json(views, count));
+	add_workers(s, o);
+	add_tls(s, o);
+	json_object_set_new(o, "garbledConnections", json_integer((json_int_t)s->garbled));
+	if (recovery_is_on(s->jobs))
+		json_object_set_new(o, "reading", json_real(recovery_share(s->jobs)));
+	mem_free(views);
+	return o;
+}
+
+/* ---- writing ---- */
+
+struct sending {
+	uv_write_t request;
+	char *text; /* jansson's */
+};
+
+static void on_reader_closed(uv_handle_t *h)
+{
+	struct reader *r = h->data;
+	mem_free(r);
+}
+
+static void drop(struct reader *r)
+{
+	if (r->closing)
+		return;
+	r->closing = true;
+	struct reader **at = &r->socket->readers;
+	while (*at != r)
+		at = &(*at)->next;
+	*at = r->next;
+	r->socket->reader_count--;
+	uv_close((uv_handle_t *)&r->pipe, on_reader_closed);
+}
+
+static void on_written(uv_write_t *w, int status)
+{
+	struct sending *s = w->data;
+	struct reader *r = w->handle->data;
+	free(s->text);
+	mem_free(s);
+	if (status)
+		drop(r);
+}
+
+/* Takes the object. */
+static void say(struct reader *r, json_t *o)
+{
+	char *text = json_dumps(o, JSON_COMPACT);
+	struct sending *s = text ? mem_alloc(1, sizeof *s) : NULL;
+	json_decref(o);
+	size_t size = text ? strlen(text) : 0;
+	if (!s || uv_stream_get_write_queue_size((uv_stream_t *)&r->pipe) > UNREAD_MAX) {
+		mem_free(s);
+		free(text);
+		drop(r);
+		return;
+	}
+	s->text = text;
+	s->request.data = s;
+	static char newline[] = "\n";
+	uv_buf_t parts[2] = {uv_buf_init(text, (unsigned)size), uv_buf_init(newline, 1)};
+	if (uv_write(&s->request, (uv_stream_t *)&r->pipe, parts, 2, on_written)) {
+		free(text);
+		mem_free(s);
+		drop(r);
+	}
+}
+
+/* ---- reading ---- */
+
+static void say_error(struct reader *r, const char *text)
+{
+	json_t *o = object("error");
+	json_object_set_new(o, "text", json_string(text));
+	say(r, o);
+}
+
+static void take_line(struct reader *r, size_t size)
+{
+	static const struct {
+		const char *name;
+		enum topic topic;
+	} topics[] = {{"jobs", TOPIC_JOBS}, {"workers", TOPIC_WORKERS}, {"snapshot", TOPIC_SNAPSHOT}};
+	json_error_t fault;
+	json_t *o = json_loadb(r->line, size, JSON_REJECT_DUPLICATES, &fault);
+	const json_t *list = json_object_get(o, "subscribe");
+	unsigned wanted = 0;
+	bool known = json_is_array(list);
+	for (size_t i = 0; i < json_array_size(list); i++) {
+		const char *name = json_string_value(json_array_get(list, i));
+		unsigned found = 0;
+		for (size_t k = 0; name && k < sizeof topics / sizeof *topics; k++)
+			if (strcmp(name, topics[k].name) == 0)
+				found = topics[k].topic;
+		known = known && found;
+		wanted |= found;
+	}
+	json_decref(o);
+	if (known)
+		r->topics |= wanted;
+	else
+		say_error(r, "expected {\"subscribe\":[...]} with jobs, workers, snapshot");
+}
+
+static void on_alloc(uv_handle_t *h, size_t suggested, uv_buf_t *out)
+{
+	(void)suggested;
+	struct reader *r = h->data;
+	*out = uv_buf_init(r->line + r->line_size, (unsigned)(LINE_BYTES - r->line_size));
+}
+
+static void on_read(uv_stream_t *stream, ssize_t count, const uv_buf_t *b)
+{
+	(void)b;
+	struct reader *r = stream->data;
+	if (count < 0) {
+		drop(r);
+		return;
+	}
+	r->line_size += (size_t)count;
+	for (char *end; !r->closing && (end = memchr(r->line, '\n', r->line_size));) {
+		size_t n = (size_t)(end - r->line);
+		take_line(r, n);
+		r->line_size -= n + 1;
+		memmove(r->line, end + 1, r->line_size);
+	}
+	if (!r->closing && r->line_size == LINE_BYTES)
+		drop(r);
+}
+
+static void on_connection(uv_stream_t *listener, int status)
+{
+	struct status_socket *t = listener->data;
+	struct reader *r = status ? NULL : mem_alloc(1, sizeof *r);
+	t->caller_waits = !r && !status; /* and with it all others, until it is let in */
+	if (!r)
+		return;
+	uv_pipe_init(listener->loop, &r->pipe, 0);
+	r->pipe.data = r;
+	r->socket = t;
+	r->next = t->readers;
+	t->readers = r;
+	t->reader_count++;
+	if (uv_accept(listener, (uv_stream_t *)&r->pipe) || t->reader_count > READERS_MAX ||
+	    uv_read_start((uv_stream_t *)&r->pipe, on_alloc, on_read)) {
+		drop(r);
+		return;
+	}
+	say(r, snapshot(t->peers));
+}
+
+/* ---- changes ---- */
+
+static const struct job_view *shown_before(const struct status_socket *t, uint64_t id)
+{
+	for (size_t i = 0; i < t->shown_count; i++)
+		if (t->shown[i].record.id == id)
+			return &t->shown[i];
+	return NULL;
+}
+
+static void tell(struct status_socket *t, enum topic topic, json_t *o)
+{
+	for (struct reader *r = t->readers, *next; r; r = next) {
+		next = r->next;
+		if (r->topics & topic)
+			say(r, json_incref(o));
+	}
+	json_decref(o);
+}
+
+void status_tick(struct status_socket *t)
+{
+	unsigned topics = 0;
+	if (!t)
+		return;
+	if (t->caller_waits)
+		on_connection((uv_stream_t *)&t->listener, 0);
+	for (struct reader *r = t->readers; r; r = r->next)
+		topics |= r->topics;
+	if (!topics || t->shown_changes == t->jobs->changes)
+		return;
+	t->shown_changes = t->jobs->changes;
+	struct job_view *views;
+	size_t count = jobs_views(t->jobs, &views);
+	for (size_t i = 0; i < count && (topics & TOPIC_JOBS); i++) {
+		const struct job_view *before = shown_before(t, views[i].record.id);
+		if (before && memcmp(before, &views[i], sizeof *before) == 0)
+			continue;
+		json_t *o = object("job");
+		json_object_set_new(o, "job", view_to_json(&views[i]));
+		tell(t, TOPIC_JOBS, o);
+	}
+	mem_free(t->shown);
+	t->shown = views;
+	t->shown_count = count;
+	if (topics & TOPIC_WORKERS) {
+		json_t *o = object("workers");
+		add_workers(t->peers, o);
+		tell(t, TOPIC_WORKERS, o);
+	}
+	if (topics & TOPIC_SNAPSHOT)
+		tell(t, TOPIC_SNAPSHOT, snapshot(t->peers));
+}
+
+/* ---- life ---- */
+
+/* A socket that nobody listens to is left from an earlier life; whatever else is there is somebody's. */
+static int remove_stale(const char *path, const struct sockaddr_un *a, struct error *e)
+{
+	struct stat st;
+	if (lstat(path, &st))
+		return 0;
+	if (!S_ISSOCK(st.st_mode))
+		return error_set(e, EEXIST, "%s: is there already and is no socket", path);
+	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+	if (fd < 0)
+		return error_set(e, errno, "%s: %s", path, strerror(errno));
+	int fault = connect(fd, (const struct sockaddr *)a, sizeof *a) ? errno : 0;
+	close(fd);
+	if (fault == ENOENT)
+		return 0;
+	if (fault == EACCES || fault == EPROTOTYPE)
+		return error_set(e, fault, "%s: somebody else's socket: %s", path, strerror(fault));
+	if (fault != ECONNREFUSED) /* EAGAIN: so many wait there that nobody more can */
+		return error_set(e, EADDRINUSE, "%s: somebody else answers there", path);
+	return unlink(path) ? error_set(e, errno, "%s: %s", path, strerror(errno)) : 0;
+}
+
+/* Through a descriptor of the file that we made: the name may mean another by now. */
+static int share(const char *path, gid_t group, struct error *e)
+{
+	char itself[64];
+	struct stat st;
+	int fd = open(path, O_PATH | O_NOFOLLOW | O_CLOEXEC);
+	snprintf(itself, sizeof itself, "/proc/self/fd/%d", fd);
+	bool ours = fd >= 0 && fstat(fd, &st) == 0 && S_ISSOCK(st.st_mode) && st.st_uid == geteuid();
+	int rc = 0;
+	if (!ours)
+		rc = error_set(e, fd < 0 ? errno : EEXIST, "%s: is not the socket that was made there", path);
+	else if (fchownat(fd, "", (uid_t)-1, group, AT_EMPTY_PATH) || chmod(itself, 0660))
+		rc = error_set(e, errno, "%s: cannot be given to the group: %s", path, strerror(errno));
+	if (fd >= 0)
+		close(fd);
+	return rc;
+}
+
+static int find_group(const char *name, gid_t *group, struct error *e)
+{
+	errno = 0;
+	const struct group *g = getgrnam(name);
+	if (!g)
+		return error_set(e, EINVAL, "--status-group: there is no group '%s'%s%s", name, errno ? ": " : "",
+				 errno ? strerror(errno) : "");
+	*group = g->gr_gid;
+	return 0;
+}
+
+/* A socket of our own at the path, mode 0600 from its first moment on. libuv's own would remove the file when it
+ * closes, and by then it may be another's. */
+static int make(struct status_socket *t, const char *group, struct error *e)
+{
+	struct sockaddr_un a = {.sun_family = AF_UNIX};
+	struct stat st = {0};
+	gid_t gid = 0;
+	if (strlen(t->path) >= sizeof a.sun_path)
+		return error_set(e, ENAMETOOLONG, "%s: at most %zu bytes for a socket's path", t->path,
+				 sizeof a.sun_path - 1);
+	memcpy(a.sun_path, t->path, strlen(t->path));
+	int rc = group ? find_group(group, &gid, e) : 0;
+	if (!rc)
+		rc = remove_stale(t->path, &a, e);
+	if (rc)
+		return rc;
+	int fd = socket(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0);
+	mode_t mask = umask(0177);
+	if (fd < 0 || bind(fd, (struct sockaddr *)&a, sizeof a))
+		rc = error_set(e, errno, "%s: %s", t->path, strerror(errno));
+	umask(mask);
+	if (!rc && lstat(t->path, &st) == 0) {
+		t->device = st.st_dev;
+		t->inode = st.st_ino;
+	}
+	if (!rc && group)
+		rc = share(t->path, gid, e);
+	int fault = rc ? 0 : uv_pipe_open(&t->listener, fd);
+	if (fault)
+		rc = error_set(e, -fault, "%s: %s", t->path, uv_strerror(fault));
+	if (rc && fd >= 0)
+		close(fd);
+	return rc;
+}
+
+int status_open(struct status_socket **out, const struct peers *s, int inherited, const char *path, const char *group,
+		struct error *e)
+{
+	if (inherited >= 0 && group)
+		return error_set(e, EINVAL,
+				 "--status-group: the socket is the service manager's: SocketGroup= in its unit");
+	struct status_socket *t = mem_alloc(1, sizeof *t);
+	if (!t || (inherited < 0 && !(t->path = mem_strdup(path)))) {
+		mem_free(t);
+		return error_set(e, ENOMEM, "no memory for the status socket");
+	}
+	t->peers = s;
+	t->jobs = s->jobs;
+	uv_pipe_init(s->jobs->loop, &t->listener, 0);
+	t->listener.data = t;
+	*out = t;
+	int fault = 0, rc = 0;
+	if (t->path)
+		rc = make(t, group, e);
+	else
+		fault = uv_pipe_open(&t->listener, inherited);
+	if (!rc && !fault)
+		fault = uv_listen((uv_stream_t *)&t->listener, BACKLOG, on_connection);
+	return fault ? error_set(e, -fault, "%s: %s", t->path ? path : "inherited status socket", uv_strerror(fault))
+		     : rc;
+}
+
+static void on_closed(uv_handle_t *h)
+{
+	struct status_socket *t = h->data;
+	mem_free(t->shown);
+	mem_free(t->path);
+	mem_free(t);
+}
+
+void status_close(struct status_socket *t)
+{
+	if (!t)
+		return;
+	while (t->readers)
+		drop(t->readers);
+	struct stat st;
+	if (t->path && t->inode && lstat(t->path, &st) == 0 && st.st_dev == t->device && st.st_ino == t->inode)
+		unlink(t->path);
+	uv_close((uv_handle_t *)&t->listener, on_closed);
+}

@@ -1,0 +1,164 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The plan of a job that goes on: the later bounds, and nothing that decides bits. */
+#include "coordinator/jobs/extend.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+static struct plan_request request(enum plan_kind kind)
+{
+	struct plan_request r = {
+		.integrator = "hslt", .kind = kind, .width = 48, .height = 40, .border = 2, .seed = 5, .max_depth = 16};
+	if (kind == PLAN_CHAINS)
+		strcpy(r.mixture, "independent=0.1,hslt=0.9");
+	else
+		strcpy(r.integrator, "path");
+	return r;
+}
+
+struct job {
+	struct plan_request asked;
+	struct plan plan;
+	struct extension_from from;
+	struct error e;
+};
+
+static void make(struct job *j, const struct plan_request *r, uint64_t rounds, bool ended)
+{
+	j->asked = *r;
+	assert_int_equal(plan_make(r, &j->plan, &j->e), 0);
+	j->from = (struct extension_from){
+		.rounds = rounds ? rounds : j->plan.rounds, .seconds = 10, .error = NAN, .ended = ended};
+}
+
+static int extend(struct job *j, struct extension x)
+{
+	struct plan out;
+	int rc = extend_plan(&j->plan, &x, &j->from, &j->asked, &out, &j->e);
+	if (!rc)
+		j->plan = out;
+	return rc;
+}
+
+static void says(struct job *j, struct extension x, const char *text)
+{
+	assert_int_equal(extend(j, x), -EINVAL);
+	if (!strstr(j->e.text, text))
+		fail_msg("'%s' is not in '%s'", text, j->e.text);
+}
+
+/* In two steps or in three, the plan is that of one long job cut as the short one was. */
+static void as_one_long_one(void **state)
+{
+	(void)state;
+	for (int kind = 0; kind < 2; kind++)
+		for (uint64_t spp = 1; spp < 60; spp += 7) {
+			struct plan_request r = request(kind ? PLAN_CHAINS : PLAN_SAMPLES), all;
+			struct job j;
+			struct plan one;
+			r.spp = spp;
+			make(&j, &r, 0, true);
+			all = r;
+			all.spp = spp + 100 + 3;
+			all.chains = j.plan.chains;
+			all.groups = j.plan.groups;
+			all.parts = j.plan.parts;
+			all.bootstrap = j.plan.bootstrap;
+			all.epoch = j.plan.epoch;
+			assert_int_equal(plan_make(&all, &one, &j.e), 0);
+			assert_int_equal(extend(&j, (struct extension){.spp = 100}), 0);
+			assert_true(j.plan.rounds > j.from.rounds);
+			j.from.ended = spp % 2; /* while it runs or when it is done */
+			j.from.rounds = spp % 2 ? j.plan.rounds : j.plan.rounds - 1;
+			int rc = extend(&j, (struct extension){.mutations = 3 * 48 * 40});
+			if (rc) /* the last round held that many more already */
+				assert_true(j.from.ended && one.rounds == j.plan.rounds);
+			assert_memory_equal(&one, &j.plan, sizeof one);
+		}
+}
+
+static void bounds_that_are_met(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_CHAINS);
+	struct job j;
+	r.spp = 100;
+	r.seconds = 10;
+	r.target_error = 0.05;
+	/* the error was met: more samples lift it, but not the time */
+	make(&j, &r, 3, true);
+	j.from.seconds = 5;
+	j.from.error = 0.04;
+	uint64_t rounds = j.plan.rounds;
+	says(&j, (struct extension){.target_error = 0.045}, "4 % already");
+	make(&j, &r, 3, true);
+	j.from.seconds = 5;
+	j.from.error = 0.04;
+	assert_int_equal(extend(&j, (struct extension){.spp = 100}), 0);
+	assert_true(j.plan.target_error == 0 && j.plan.seconds == 10 && j.plan.rounds > rounds);
+	/* a lower one leaves the rest as it was */
+	make(&j, &r, 3, true);
+	j.from.seconds = 5;
+	j.from.error = 0.04;
+	assert_int_equal(extend(&j, (struct extension){.target_error = 0.01}), 0);
+	assert_true(j.plan.target_error == 0.01 && j.plan.seconds == 10 && j.plan.rounds == rounds);
+	/* the time was up */
+	make(&j, &r, 3, true);
+	assert_int_equal(extend(&j, (struct extension){.spp = 1}), 0);
+	assert_true(j.plan.seconds == 0 && j.plan.target_error == 0.05);
+	make(&j, &r, 3, true);
+	assert_int_equal(extend(&j, (struct extension){.seconds = 3}), 0);
+	assert_true(j.plan.seconds == 13 && j.plan.rounds == rounds);
+	/* all rounds were done: an error, a time say how long it goes on */
+	make(&j, &r, 0, true);
+	j.from.seconds = 5;
+	assert_int_equal(extend(&j, (struct extension){.target_error = 0.01}), 0);
+	assert_true(j.plan.rounds == UINT64_MAX && j.plan.seconds == 10);
+	/* of one that runs nothing is lifted */
+	make(&j, &r, 3, false);
+	j.from.error = 0.04;
+	assert_int_equal(extend(&j, (struct extension){.seconds = 3}), 0);
+	assert_true(j.plan.seconds == 13 && j.plan.rounds == rounds && j.plan.target_error == 0.05);
+}
+
+static void without_a_bound(void **state)
+{
+	(void)state;
+	struct plan_request r = request(PLAN_CHAINS);
+	struct job j;
+	r.seconds = 10;
+	make(&j, &r, 7, true);
+	uint64_t epoch = j.plan.epoch;
+	assert_int_equal(extend(&j, (struct extension){.mutations = 1}), 0); /* beyond what is done */
+	assert_true(j.plan.rounds == 8 && j.plan.seconds == 0 && j.plan.epoch == epoch);
+	make(&j, &r, 7, false);
+	says(&j, (struct extension){.spp = 8}, "without a bound of samples");
+	make(&j, &r, 7, false);
+	says(&j, (struct extension){.job = 1}, "by what");
+	says(&j, (struct extension){.seconds = NAN, .spp = 1}, "that is none");
+	says(&j, (struct extension){.seconds = -1, .spp = 1}, "that is none");
+	says(&j, (struct extension){.target_error = INFINITY}, "that is none");
+	r.seconds = 0;
+	r.spp = 4;
+	make(&j, &r, 0, true);
+	says(&j, (struct extension){.spp = UINT64_MAX}, "can be counted");
+	make(&j, &r, 0, true);
+	says(&j, (struct extension){.mutations = UINT64_MAX}, "can be counted");
+	make(&j, &r, 0, true);
+	assert_int_equal(extend(&j, (struct extension){.mutations = UINT64_C(1) << 63}), -EINVAL);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(as_one_long_one),
+		cmocka_unit_test(bounds_that_are_met),
+		cmocka_unit_test(without_a_bound),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

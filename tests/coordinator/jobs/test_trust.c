@@ -1,0 +1,106 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Who was set aside is known after a restart, however long the list has become; a damaged list stops no farm. */
+#include "coordinator/server/server.h"
+#include "tests/support/folder.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdint.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <cmocka.h>
+
+static char *path(const char *name)
+{
+	static char text[128];
+	snprintf(text, sizeof text, "%s/spool/%s", folder, name);
+	return text;
+}
+
+static struct server *start(void)
+{
+	static char spool[80];
+	struct server_config c;
+	struct server *s = NULL;
+	struct error e = {""};
+	snprintf(spool, sizeof spool, "%s/spool", folder);
+	server_config_init(&c);
+	c.listen = "127.0.0.1:0";
+	c.spool = spool;
+	int shown = dup(2), nowhere = open("/dev/null", O_WRONLY); /* a line for each who is set aside */
+	dup2(nowhere, 2);
+	int rc = server_open(&s, &c, &e);
+	dup2(shown, 2);
+	close(nowhere);
+	close(shown);
+	if (rc)
+		fail_msg("%s", e.text);
+	return s;
+}
+
+static FILE *begin(void)
+{
+	char spool[80];
+	snprintf(spool, sizeof spool, "%s/spool", folder);
+	assert_int_equal(mkdir(spool, 0700), 0);
+	FILE *f = fopen(path("aside"), "w");
+	assert_non_null(f);
+	return f;
+}
+
+/* Far more than 64 KB, as an earlier version could leave it. Of one certificate the last 64 are remembered, and none of
+ * another is forgotten for them. */
+static void a_long_list(void **state)
+{
+	(void)state;
+	FILE *f = begin();
+	fputs("{\"schema\":1,\"workers\":[{\"certificate\":\"b\",\"name\":\"first\",\"home\":\"h\",\"restarts\":2,\"why\":\"torn\"}",
+	      f);
+	for (int i = 0; i < 200; i++)
+		fprintf(f,
+			",{\"certificate\":\"a\",\"name\":\"%0100d\",\"home\":\"%d\",\"restarts\":1,\"why\":\"%0250d\"}",
+			i, i, i);
+	fputs("]}", f);
+	assert_true(ftell(f) > 1 << 16);
+	assert_int_equal(fclose(f), 0);
+	struct server *s = start();
+	struct worker_status w;
+	int count = 0, last = 0;
+	for (uint64_t who = 0; (who = farm_next_quarantined(s->jobs.farm, who)); count++) {
+		assert_true(farm_worker(s->jobs.farm, who, &w));
+		if (count == 0)
+			assert_true(strcmp(w.certificate, "b") == 0 && strcmp(w.name, "first") == 0 &&
+				    strcmp(w.text, "torn") == 0);
+		else
+			assert_int_equal(sscanf(w.home, "%d", &last), 1);
+	}
+	assert_int_equal(count, 65);
+	assert_int_equal(last, 199);
+	server_close(s);
+}
+
+static void a_damaged_list(void **state)
+{
+	(void)state;
+	FILE *f = begin();
+	fputs("{\"schema\":1,\"workers\":[{\"cert", f);
+	assert_int_equal(fclose(f), 0);
+	struct server *s = start();
+	assert_int_equal(farm_next_quarantined(s->jobs.farm, 0), 0);
+	server_close(s);
+	assert_int_equal(access(path("aside"), F_OK), -1);
+	assert_int_equal(access(path("aside.damaged"), F_OK), 0);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(a_long_list, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(a_damaged_list, folder_set_up, folder_tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

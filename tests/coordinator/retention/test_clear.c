@@ -1,0 +1,246 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Finished jobs that are old go, with all that is in their folders and their rows, and nobody waits for it. */
+#include "common/base/disk.h"
+#include "common/base/log.h"
+#include "coordinator/retention/clear.h"
+#include "tests/support/folder.h"
+
+#include <fcntl.h>
+#include <setjmp.h>
+#include <sqlite3.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+#include <time.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+enum { JOBS = 120, LIVING = 7, YOUNG = 9, DAY = 86400 };
+
+static struct jobs jobs;
+
+/* Each look at a file takes 0.2 ms: 120 jobs are more than 20 ms. */
+static int slow_open(const char *path, int flags, mode_t mode)
+{
+	usleep(200);
+	return disk_system.open(path, flags, mode);
+}
+
+static bool nobody_fetches(void *user, uint64_t job)
+{
+	(void)user;
+	(void)job;
+	return false;
+}
+
+static int no_flush(int fd)
+{
+	(void)fd;
+	return 0;
+}
+
+static bool has(uint64_t job, const char *file)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(jobs.spool, job, file, path);
+	return access(path, F_OK) == 0;
+}
+
+static void put(uint64_t job, const char *file)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(jobs.spool, job, file, path);
+	int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+	assert_true(fd >= 0);
+	assert_int_equal(write(fd, "bytes", 5), 5);
+	close(fd);
+}
+
+static void add(uint64_t id, double ended)
+{
+	struct error e;
+	struct job_record *r = calloc(1, sizeof *r);
+	*r = (struct job_record){.id = id,
+				 .state = "done",
+				 .ended = ended,
+				 .ended_seen = 100.0 * DAY - (double)time(NULL) + ended,
+				 .has_result = true,
+				 .rel_error = -1};
+	if (id == LIVING)
+		strcpy(r->state, "running");
+	assert_int_equal(spool_take_job(jobs.spool, id, &e), 0);
+	assert_int_equal(spool_write_record(jobs.spool, r, &e), 0);
+	put(id, "result.exr");
+	put(id, "checkpoint.tmp"); /* of a life that was cut short */
+	free(r);
+}
+
+/* All rows at once: each alone would be flushed. */
+static void add_rows(const char *path, double now)
+{
+	char sql[600];
+	sqlite3 *db;
+	snprintf(
+		sql, sizeof sql,
+		"WITH RECURSIVE n (i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < %d)"
+		" INSERT INTO jobs (id, owner, name, version, priority, mixed, state, submitted, ended)"
+		" SELECT i, '', 'n', '1', 0, 0, 'done', 1, CASE i WHEN %d THEN NULL WHEN %d THEN %.0f ELSE %.0f END FROM n",
+		JOBS, LIVING, YOUNG, now - 2 * DAY, now - 20 * DAY);
+	assert_int_equal(sqlite3_open(path, &db), SQLITE_OK);
+	assert_int_equal(sqlite3_exec(db, sql, NULL, NULL, NULL), SQLITE_OK);
+	assert_int_equal(sqlite3_close(db), SQLITE_OK);
+}
+
+static void open_jobs(void)
+{
+	struct error e;
+	char path[SPOOL_PATH_MAX];
+	memset(&jobs, 0, sizeof jobs);
+	jobs.peers.uses_result = nobody_fetches;
+	snprintf(path, sizeof path, "%s/spool", folder);
+	assert_int_equal(spool_open(&jobs.spool, path, &e), 0);
+	spool_path(jobs.spool, "jobs.db", path);
+	assert_int_equal(ledger_open(&jobs.ledger, path, &e), 0);
+	ledger_close(jobs.ledger);
+	add_rows(path, (double)time(NULL));
+	assert_int_equal(ledger_open(&jobs.ledger, path, &e), 0);
+	jobs.config.clear_seconds = DAY;
+	struct timespec up;
+	clock_gettime(CLOCK_BOOTTIME, &up);
+	jobs.seen = (struct seen){.seconds = 100.0 * DAY, .up = (double)up.tv_sec};
+}
+
+static void old_jobs_go_bit_by_bit(void **state)
+{
+	(void)state;
+	struct disk slow = disk_system;
+	struct ledger_job j;
+	struct error e;
+	double now = (double)time(NULL), longest = 0;
+	unsigned ticks = 0;
+	slow.fsync = no_flush;
+	disk_use(&slow);
+	open_jobs();
+	for (uint64_t id = 1; id <= JOBS; id++)
+		add(id, now - (id == YOUNG ? 2 : 20) * DAY);
+	assert_int_equal(spool_take_job(jobs.spool, JOBS + 1, &e), 0); /* it never came to a record */
+	slow.open = slow_open;
+	do {
+		double begin = jobs_now(&jobs);
+		clear_tick(&jobs);
+		double took = jobs_now(&jobs) - begin;
+		longest = took > longest ? took : longest;
+		ticks++;
+	} while (jobs.clearing);
+	disk_use(NULL);
+	print_message("   %d jobs in %u ticks, the longest %.1f ms\n", JOBS, ticks, 1e3 * longest);
+	assert_true(ticks >= 5);
+	for (uint64_t id = 1; id <= JOBS + 1; id++) {
+		bool stays = id == LIVING || id == YOUNG;
+		assert_true(has(id, NULL) == stays);
+		assert_int_equal(ledger_get(jobs.ledger, id, &j, &e), stays);
+	}
+	assert_true(has(YOUNG, "job.json") && !has(YOUNG, "result.exr") && has(LIVING, "result.exr"));
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+}
+
+/* Records of an earlier version, and of a life whose clock went ahead: they are as young as they can be. */
+static void of_unknown_age(void **state)
+{
+	(void)state;
+	struct disk quick = disk_system;
+	struct error e;
+	struct job_record *r = calloc(1, sizeof *r);
+	quick.fsync = no_flush;
+	disk_use(&quick);
+	open_jobs();
+	for (uint64_t id = 1; id <= 2; id++) {
+		add(id, (double)time(NULL) - 20 * DAY);
+		assert_int_equal(spool_read_record(jobs.spool, id, r, &e), 0);
+		r->ended_seen = id == 1 ? -1 : 1000.0 * DAY;
+		assert_int_equal(spool_write_record(jobs.spool, r, &e), 0);
+	}
+	for (int day = 0; day < 3; day++, jobs.seen.seconds += 0.7 * DAY, jobs.clear_next = 0) {
+		do
+			clear_tick(&jobs);
+		while (jobs.clearing);
+		for (uint64_t id = 1; id <= 2; id++) {
+			assert_true(has(id, "result.exr") == (day < 2));
+			assert_int_equal(spool_read_record(jobs.spool, id, r, &e), 0);
+			assert_true(r->ended_seen >= 100.0 * DAY && r->ended_seen < 100.0 * DAY + 100);
+		}
+	}
+	disk_use(NULL);
+	free(r);
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+}
+
+/* What ended once more between the look and the end of it. */
+static void what_has_changed_stays(void **state)
+{
+	(void)state;
+	struct disk slow = disk_system;
+	double now = (double)time(NULL);
+	slow.fsync = no_flush;
+	slow.open = slow_open;
+	disk_use(&slow);
+	open_jobs();
+	for (uint64_t id = 1; id <= JOBS; id++)
+		add(id, now - 20 * DAY);
+	clear_tick(&jobs);
+	assert_non_null(jobs.clearing);
+	struct error e;
+	struct job_record *r = calloc(1, sizeof *r);
+	assert_int_equal(spool_read_record(jobs.spool, 1, r, &e), 0);
+	r->ended_seen += 20 * DAY;
+	assert_int_equal(spool_write_record(jobs.spool, r, &e), 0);
+	free(r);
+	while (jobs.clearing)
+		clear_tick(&jobs);
+	disk_use(NULL);
+	assert_true(has(1, "result.exr") && !has(2, NULL));
+	clear_close(&jobs);
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+}
+
+/* Films are read while it is looked, and others while what was chosen goes. */
+static void what_is_read_stays(void **state)
+{
+	(void)state;
+	struct disk slow = disk_system;
+	struct live_job first = {.id = 3}, second = {.id = JOBS};
+	slow.fsync = no_flush;
+	slow.open = slow_open;
+	disk_use(&slow);
+	open_jobs();
+	for (uint64_t id = 1; id <= JOBS; id++)
+		add(id, (double)time(NULL) - 20 * DAY);
+	jobs.reading = &first;
+	do { /* the last job goes in a later tick than the first: 120 looks are more than one */
+		clear_tick(&jobs);
+		if (!has(1, "result.exr"))
+			jobs.reading = &second;
+	} while (jobs.clearing);
+	disk_use(NULL);
+	assert_true(has(3, "result.exr") && has(JOBS, "result.exr") && !has(1, NULL) && !has(2, NULL) && !has(4, NULL));
+	ledger_close(jobs.ledger);
+	spool_close(jobs.spool);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(old_jobs_go_bit_by_bit, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(of_unknown_age, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_has_changed_stays, folder_set_up, folder_tear_down),
+		cmocka_unit_test_setup_teardown(what_is_read_stays, folder_set_up, folder_tear_down),
+	};
+	log_set_level(LOG_LEVEL_ERROR);
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

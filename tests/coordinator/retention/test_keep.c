@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Films of finished jobs: those that ended first go when there are too many, all go for a running job; results stay. */
+#include "coordinator/retention/keep.h"
+#include "tests/support/folder.h"
+
+#include <fcntl.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stddef.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cmocka.h>
+
+static struct jobs jobs;
+static struct job_record ended[3];
+
+static void put(uint64_t job, const char *file, off_t size)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(jobs.spool, job, file, path);
+	int fd = open(path, O_WRONLY | O_CREAT | O_TRUNC, 0600);
+	assert_true(fd >= 0);
+	assert_int_equal(ftruncate(fd, size), 0);
+	close(fd);
+}
+
+static bool has(uint64_t job, const char *file)
+{
+	char path[SPOOL_PATH_MAX];
+	spool_job_path(jobs.spool, job, file, path);
+	return access(path, F_OK) == 0;
+}
+
+/* Three jobs of 1,000 bytes each, in the order in which they ended: j3, j1, j2. */
+static void fill(void)
+{
+	static const uint64_t ids[] = {3, 1, 2};
+	for (size_t i = 0; i < 3; i++) {
+		ended[i] = (struct job_record){.id = ids[i]};
+		put(ids[i], "order", 100);
+		put(ids[i], "checkpoint", 400);
+		put(ids[i], "journal.2", 500);
+		put(ids[i], "result.exr", 9000);
+	}
+	jobs.ended = ended;
+	jobs.ended_count = 3;
+}
+
+static void the_first_go_first(void **state)
+{
+	(void)state;
+	struct error e;
+	char path[128];
+	snprintf(path, sizeof path, "%s/spool", folder);
+	assert_int_equal(spool_open(&jobs.spool, path, &e), 0);
+	for (uint64_t id = 1; id <= 3; id++)
+		assert_int_equal(spool_take_job(jobs.spool, id, &e), 0);
+	fill();
+	jobs.config.keep_bytes = 3000;
+	keep_trim(&jobs);
+	assert_true(has(3, "order") && has(1, "checkpoint") && has(2, "journal.2"));
+	jobs.config.keep_bytes = 2999;
+	keep_trim(&jobs);
+	assert_false(has(3, "order") || has(3, "checkpoint") || has(3, "journal.2"));
+	assert_true(has(1, "order") && has(2, "order"));
+	assert_true(keep_drop_all(&jobs));
+	assert_false(has(1, "order") || has(2, "checkpoint"));
+	assert_false(keep_drop_all(&jobs)); /* there is nothing more to be had */
+	for (uint64_t id = 1; id <= 3; id++)
+		assert_true(has(id, "result.exr"));
+	spool_close(jobs.spool);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test_setup_teardown(the_first_go_first, folder_set_up, folder_tear_down),
+	};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
