@@ -98,7 +98,7 @@ static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s,
 		if (k->sent < sent && !k->delivered && !k->overdue) /* overtaken by a copy */
 			peer_was_late(f, k->peer);
 	lease_revoke_slot(f, s);
-	j->verified += verified;
+	j->counts.verified += verified;
 	if (verified)
 		verify_settle(f, j, s, &ev->lease.digest);
 	doubt_settle(f, j, s, p->who, &ev->lease.key);
@@ -117,9 +117,9 @@ static void count(struct peer *p, struct job *j, enum verdict v)
 		p->refused += v == REFUSE || v == FAULT;
 	}
 	if (j) {
-		j->repeats += v == REPEAT;
-		j->refused += v == REFUSE || v == FAULT;
-		j->faults += v == FAULT;
+		j->counts.repeats += v == REPEAT;
+		j->counts.refused += v == REFUSE || v == FAULT;
+		j->counts.faults += v == FAULT;
 	}
 }
 
@@ -282,7 +282,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 	if (l)
 		lease_drop(f, l);
 	if (l && ev->lease.bad_states && j->kind == LEASE_RENDER && j->plan.kind == PLAN_CHAINS && s->next > 0) {
-		j->failures++;
+		j->counts.failures++;
 		doubt_refused(f, j, s, p, ev->lease.can_take_back, ev->text ? ev->text : "");
 		return;
 	}
@@ -291,7 +291,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 	text_copy(p->text, sizeof p->text, ev->text ? ev->text : "");
 	text_print(f->text, sizeof f->text, "%s: %s", p->name, p->text);
 	text_copy(j->text, sizeof j->text, f->text);
-	j->failures++;
+	j->counts.failures++;
 	if (ev->lease.own) /* says nothing about the job */
 		return;
 	j->tries += !again;

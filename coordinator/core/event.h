@@ -9,6 +9,7 @@
 #include "common/film/batch.h"
 #include "common/estimate/forecast.h"
 #include "common/plan/plan.h"
+#include "coordinator/core/counts.h"
 
 enum event_kind {
 	EVENT_TICK,    /* nothing but time: at update.wake at the latest */
@@ -72,11 +73,6 @@ struct event_submit {
 	bool mixed;	/* workers of any numeric fingerprint */
 	double verify;	/* share of its leases that two workers compute; not where it is mixed: only equals can be
 			   compared */
-};
-
-/* What went wrong and cost nothing; what was verified. */
-struct job_counts {
-	uint64_t repeats, refused, faults, failures, timeouts, duplicates, verified, mismatched;
 };
 
 /* Which leases are merged says where a job was. */

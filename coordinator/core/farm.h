@@ -91,7 +91,6 @@ struct job_status {
 	int priority;
 	bool mixed;
 	double verify;
-	uint64_t verified, mismatched; /* leases on which two workers agreed; on which the first two did not */
 	const struct plan *plan;
 	enum job_state state;
 	enum job_end end;
@@ -114,7 +113,7 @@ struct job_status {
 	uint32_t workers, machines; /* that hold its leases, that might */
 	double share;		    /* machines that it would have by its priority: coordinator/core/share.h */
 	char place[160];	    /* both, and who comes first */
-	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
+	struct job_counts counts;
 	char text[256];				     /* why it failed, or the last failure of a lease */
 	char waiting[256];			     /* why nothing is being done for it; "" when something is */
 	char owners_place[160], owners_waiting[256]; /* for its owner: without the ids of other owners' jobs */

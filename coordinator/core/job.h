@@ -43,10 +43,9 @@ struct job {
 	double submitted, started, ended;
 
 	uint32_t slot_count;
-	struct slot *slots;   /* [groups][parts]; NULL when ended */
-	struct proof *proofs; /* as many; NULL: nothing is verified, or ended */
-	uint32_t noted;	      /* slots that have an answer which waits for another */
-	uint64_t verified, mismatched;
+	struct slot *slots;	      /* [groups][parts]; NULL when ended */
+	struct proof *proofs;	      /* as many; NULL: nothing is verified, or ended */
+	uint32_t noted;		      /* slots that have an answer which waits for another */
 	enum lease_kind kind;	      /* of the leases that are open */
 	uint64_t rounds;	      /* complete, of this kind */
 	uint64_t limit;		      /* rounds of this kind */
@@ -72,7 +71,7 @@ struct job {
 	struct forecast_range error_now; /* these, when there are looks */
 	struct forecast_cost stop, halving;
 	uint64_t rel_error_rounds, bootstrap_merged, leases_merged;
-	uint64_t repeats, refused, faults, failures, timeouts, duplicates;
+	struct job_counts counts;
 	struct failure_quorum failure_quorum; /* with any of its leases */
 	uint32_t anew;			      /* leases whose chains began anew, their states lost */
 	uint32_t tries;			      /* that failed; several leases of one worker at once are one */

@@ -56,7 +56,7 @@ void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 	if (s->holders == 0)
 		s->since = f->now;
 	else
-		j->duplicates += s->holders >= verify_copies(j, s);
+		j->counts.duplicates += s->holders >= verify_copies(j, s);
 	s->holders++;
 	j->leases_out++;
 	j->owner->leases_out++;
@@ -122,7 +122,7 @@ void lease_expire(struct farm *f, struct lease *l)
 {
 	l->overdue = true;
 	l->slot->timeouts++;
-	l->job->timeouts++;
+	l->job->counts.timeouts++;
 	l->peer->timeouts++;
 	let_go(f, l);
 	peer_was_late(f, l->peer);

@@ -51,18 +51,6 @@ static void take_looks(struct job *j, const struct forecast_history *looks)
 	job_forecast(j);
 }
 
-static void take_counts(struct job *j, const struct job_counts *c)
-{
-	j->repeats = c->repeats;
-	j->refused = c->refused;
-	j->faults = c->faults;
-	j->failures = c->failures;
-	j->timeouts = c->timeouts;
-	j->duplicates = c->duplicates;
-	j->verified = c->verified;
-	j->mismatched = c->mismatched;
-}
-
 /* Jobs of an earlier life are never too many: nobody would hear that they are refused. */
 static bool make_room(struct farm *f, bool asked)
 {
@@ -105,7 +93,7 @@ void restore_job(struct farm *f, const struct event *ev)
 	if (ended)
 		rounds_forget(f, ended);
 	rounds_enlist(f, j);
-	take_counts(j, &r->counts);
+	j->counts = r->counts;
 	job_restore(j, r->kind, r->next, f->now);
 	take_makers(f, j, r->makers);
 	take_times(f, j, r);

@@ -188,12 +188,7 @@ static void fill_counts(const struct job *j, struct job_status *s)
 	double slots = (double)j->plan.groups * j->plan.parts;
 	s->mutations = (uint64_t)((double)j->leases_merged * ((double)plan_round_mutations(&j->plan) / slots));
 	s->leases_out = j->leases_out;
-	s->repeats = j->repeats;
-	s->refused = j->refused;
-	s->faults = j->faults;
-	s->failures = j->failures;
-	s->timeouts = j->timeouts;
-	s->duplicates = j->duplicates;
+	s->counts = j->counts;
 }
 
 static void fill_share(const struct farm *f, const struct job *j, struct job_status *s)
@@ -219,8 +214,6 @@ bool farm_job(const struct farm *f, uint64_t id, double now, struct job_status *
 		.priority = j->priority,
 		.mixed = j->mixed,
 		.verify = j->verify,
-		.verified = j->verified,
-		.mismatched = j->mismatched,
 		.plan = &j->plan,
 		.state = job_is_held(j) && job_is_live(j) ? JOB_HELD : j->state,
 		.end = j->end,
@@ -255,14 +248,7 @@ bool farm_counts(const struct farm *f, uint64_t id, struct job_counts *c)
 	const struct job *j = farm_find_job(f, id);
 	if (!j)
 		return false;
-	*c = (struct job_counts){.repeats = j->repeats,
-				 .refused = j->refused,
-				 .faults = j->faults,
-				 .failures = j->failures,
-				 .timeouts = j->timeouts,
-				 .duplicates = j->duplicates,
-				 .verified = j->verified,
-				 .mismatched = j->mismatched};
+	*c = j->counts;
 	return true;
 }
 

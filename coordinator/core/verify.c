@@ -89,7 +89,7 @@ enum verify_answer verify_take(struct farm *f, struct job *j, struct slot *s, st
 	if (agrees)
 		return VERIFY_AGREES;
 	j->noted += p->count == 0;
-	j->mismatched += p->count == 1;
+	j->counts.mismatched += p->count == 1;
 	p->who[p->count] = who;
 	p->digest[p->count] = *d;
 	p->count++;

@@ -42,14 +42,8 @@ void view_add_status(struct job_view *v, const struct job_status *s)
 	v->halving_cpu = s->halving_cpu;
 	v->halving_seconds = s->halving_seconds;
 	r->leases_merged = s->leases_merged;
-	r->repeats = s->repeats;
 	r->verify = s->verify;
-	r->verified = s->verified;
-	r->mismatched = s->mismatched;
-	r->refused = s->refused;
-	r->failures = s->failures;
-	r->duplicates = s->duplicates;
-	r->timeouts = s->timeouts;
+	r->counts = s->counts;
 	text_copy(v->waiting, sizeof v->waiting, s->waiting);
 	text_copy(v->owners_place, sizeof v->owners_place, s->owners_place);
 	text_copy(v->owners_waiting, sizeof v->owners_waiting, s->owners_waiting);
@@ -93,8 +87,8 @@ void view_to_wire(const struct job_view *v, Farm__JobStatus *out)
 	out->exit_code = r->exit_code;
 	out->note = text_borrow(r->note);
 	out->verify = r->verify;
-	out->verified = r->verified;
-	out->mismatched = r->mismatched;
+	out->verified = r->counts.verified;
+	out->mismatched = r->counts.mismatched;
 	out->eta_low = v->eta_low;
 	out->eta_high = v->eta_high;
 	out->target_error = r->target_error;

@@ -155,14 +155,11 @@ static int read_job(const struct jobs *s, uint64_t job, struct row_file *f, stru
 /* The journal has them from a while before the end: what the record of the end says is more. */
 static void take_counts(struct job_counts *c, const struct job_record *r)
 {
-	const struct {
-		uint64_t *have, known;
-	} pair[] = {{&c->repeats, r->repeats},	    {&c->refused, r->refused},	     {&c->failures, r->failures},
-		    {&c->timeouts, r->timeouts},    {&c->duplicates, r->duplicates}, {&c->verified, r->verified},
-		    {&c->mismatched, r->mismatched}};
-	for (size_t i = 0; i < sizeof pair / sizeof *pair; i++)
-		if (*pair[i].have < pair[i].known)
-			*pair[i].have = pair[i].known;
+#define X(name, key)                  \
+	if (c->name < r->counts.name) \
+		c->name = r->counts.name;
+	JOB_COUNTS(X)
+#undef X
 }
 
 /* r: as it was remembered. */

@@ -21,14 +21,10 @@ static const struct {
 	{"rounds", offsetof(struct job_record, rounds)},
 	{"mutations", offsetof(struct job_record, mutations)},
 	{"merged", offsetof(struct job_record, leases_merged)},
-	{"repeats", offsetof(struct job_record, repeats)},
-	{"refused", offsetof(struct job_record, refused)},
-	{"failures", offsetof(struct job_record, failures)},
-	{"duplicates", offsetof(struct job_record, duplicates)},
-	{"timeouts", offsetof(struct job_record, timeouts)},
-	{"verified", offsetof(struct job_record, verified)},
-	{"mismatched", offsetof(struct job_record, mismatched)},
-	{"stuck", offsetof(struct job_record, stuck)},
+#define X(name, key) {key, offsetof(struct job_record, counts.name)},
+	JOB_COUNTS(X)
+#undef X
+		{"stuck", offsetof(struct job_record, stuck)},
 	{"longestStuck", offsetof(struct job_record, longest_stuck)},
 };
 
@@ -116,6 +112,8 @@ json_t *record_counts(const struct job_record *r)
 	json_t *o = json_object();
 	for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
 		uint64_t n;
+		if (!counts[i].name)
+			continue;
 		memcpy(&n, (const char *)r + counts[i].offset, sizeof n);
 		json_object_set_new(o, counts[i].name, json_integer((json_int_t)n));
 	}
@@ -125,6 +123,8 @@ json_t *record_counts(const struct job_record *r)
 static void take_counts(const json_t *o, struct job_record *r)
 {
 	for (size_t i = 0; i < sizeof counts / sizeof *counts; i++) {
+		if (!counts[i].name)
+			continue;
 		uint64_t n = (uint64_t)json_integer_value(json_object_get(o, counts[i].name));
 		memcpy((char *)r + counts[i].offset, &n, sizeof n);
 	}

@@ -11,6 +11,7 @@
 #include "common/estimate/forecast.h"
 #include "common/estimate/stated_error.h"
 #include "common/estimate/strategy.h"
+#include "coordinator/core/counts.h"
 
 #include <jansson.h>
 #include <stdbool.h>
@@ -43,9 +44,8 @@ struct job_record {
 	double bootstrap_seconds;		   /* wall clock */
 	struct forecast_history looks;
 	uint64_t rounds, mutations, leases_merged;
-	uint64_t repeats, refused, failures, duplicates, timeouts; /* what went wrong and cost nothing */
-	double verify;						   /* share of its leases that two workers compute */
-	uint64_t verified, mismatched; /* on which two workers agreed; on which the first two did not */
+	struct job_counts counts;
+	double verify; /* share of its leases that two workers compute */
 	uint64_t stuck,
 		longest_stuck; /* times that a chain accepted nothing during an epoch; most rejections in a row */
 	char mixture[PLAN_MUTATIONS_MAX];

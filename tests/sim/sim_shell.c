@@ -151,12 +151,12 @@ static void ended(struct world *w, const struct action *a, struct sim_job *j)
 		sim_wrong(w, "an ended job is forgotten");
 		return;
 	}
-	w->result.copies += s.duplicates;
-	w->result.timeouts += s.timeouts;
-	w->result.repeats += s.repeats;
-	w->result.refused += s.refused;
-	w->result.verified += s.verified;
-	w->result.mismatched += s.mismatched;
+	w->result.copies += s.counts.duplicates;
+	w->result.timeouts += s.counts.timeouts;
+	w->result.repeats += s.counts.repeats;
+	w->result.refused += s.counts.refused;
+	w->result.verified += s.counts.verified;
+	w->result.mismatched += s.counts.mismatched;
 	if (a->state != JOB_DONE)
 		return;
 	if (s.rounds != j->rounds)

@@ -147,7 +147,7 @@ static void back_again(void **state)
 		play(f, line);
 	}
 	assert_int_equal(state_of(f, 1, 21, &s), JOB_BOOTSTRAP);
-	assert_int_equal(s.failures, 0);
+	assert_int_equal(s.counts.failures, 0);
 	farm_free(f);
 }
 
@@ -190,7 +190,7 @@ static void racks(void **state)
 		peer += 4;
 	}
 	assert_true(state_of(f, 1, 15, &s) != JOB_FAILED);
-	assert_int_equal(s.failures, 0);
+	assert_int_equal(s.counts.failures, 0);
 	farm_free(f);
 }
 

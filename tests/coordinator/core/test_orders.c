@@ -64,13 +64,13 @@ static void damaged_files_are_nobodys_fault(void **state)
 				   "[4] w1 fails j1 g1 p0 boot it has the file no more -> w1 gets j1 g1 p0 boot",
 				   NULL,
 			   });
-	assert_int_equal(status(f, 1, 4).failures, 0);
+	assert_int_equal(status(f, 1, 4).counts.failures, 0);
 	transcript_play(f, (const char *const[]){
 				   "[5] w1 lacks j1 g2 p0 boot no memory -> -",
 				   "[6] w1 fails j1 g0 p0 boot it has the file no more -> -",
 				   NULL,
 			   });
-	assert_int_equal(status(f, 1, 6).failures, 2);
+	assert_int_equal(status(f, 1, 6).counts.failures, 2);
 	farm_free(f);
 }
 

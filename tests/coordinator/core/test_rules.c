@@ -114,7 +114,7 @@ static void set_aside_after_faults(void **state)
 	assert_string_equal(p.text, "torn");
 	struct job_status j;
 	assert_true(farm_job(f, 1, 40, &j));
-	assert_int_equal(j.faults, 3);
+	assert_int_equal(j.counts.faults, 3);
 	farm_free(f);
 }
 
@@ -235,8 +235,8 @@ static void straggler(void **state)
 		});
 	struct job_status j;
 	assert_true(farm_job(f, 1, 9, &j));
-	assert_int_equal(j.duplicates, 1);
-	assert_int_equal(j.repeats, 1);
+	assert_int_equal(j.counts.duplicates, 1);
+	assert_int_equal(j.counts.repeats, 1);
 	farm_free(f);
 }
 
@@ -438,7 +438,7 @@ static void three_full_disks(void **state)
 	struct job_status s;
 	assert_true(farm_job(f, 1, 12, &s));
 	assert_int_equal(s.state, JOB_BOOTSTRAP);
-	assert_int_equal(s.failures, 6);
+	assert_int_equal(s.counts.failures, 6);
 	assert_string_equal(
 		s.waiting,
 		"no worker can compute it, for want of something on the machines of w1, w2, w3; the last one: w3: disk full");

@@ -42,9 +42,9 @@ static void agree(void **state)
 		});
 	struct job_status j;
 	assert_true(farm_job(f, 1, 4, &j));
-	assert_int_equal(j.verified, 3);
-	assert_int_equal(j.mismatched, 0);
-	assert_int_equal(j.duplicates, 0);
+	assert_int_equal(j.counts.verified, 3);
+	assert_int_equal(j.counts.mismatched, 0);
+	assert_int_equal(j.counts.duplicates, 0);
 	assert_int_equal(farm_next_quarantined(f, 0), 0);
 	farm_free(f);
 }
@@ -68,9 +68,9 @@ static void third_decides(void **state)
 	struct job_status j;
 	struct peer_status p;
 	assert_true(farm_job(f, 1, 4, &j));
-	assert_int_equal(j.verified, 2);
-	assert_int_equal(j.mismatched, 1);
-	assert_int_equal(j.failures, 0);
+	assert_int_equal(j.counts.verified, 2);
+	assert_int_equal(j.counts.mismatched, 1);
+	assert_int_equal(j.counts.failures, 0);
 	assert_true(farm_peer(f, 1, &p));
 	assert_int_equal(p.faults, 1);
 	assert_string_equal(p.text, "wrong result: j1 render group 0 part 0 epoch 0");
@@ -240,8 +240,8 @@ static void set_aside(void **state)
 	assert_int_equal(w.restarts, 5);
 	assert_string_equal(w.text, "wrong result: j1 render group 0 part 0 epoch 1");
 	assert_true(farm_job(f, 1, 5, &j));
-	assert_int_equal(j.failures, 0);
-	assert_int_equal(j.mismatched, 3);
+	assert_int_equal(j.counts.failures, 0);
+	assert_int_equal(j.counts.mismatched, 3);
 	transcript_play(f, (const char *const[]){
 				   "[6] w1 batch j1 g0 p0 e2 says x -> noted",
 				   NULL,

@@ -354,7 +354,7 @@ static uint64_t failures_after(useconds_t ticks_us)
 	assert_int_equal(spool_open(&s, spool, &e), 0);
 	assert_int_equal(spool_read_record(s, job, &r, &e), 0);
 	spool_close(s);
-	return r.failures;
+	return r.counts.failures;
 }
 
 /* On a machine that is busy enough no tick came: once more, with more time. */

@@ -201,8 +201,8 @@ static void expect_counts_in_spool(const struct plan *plan)
 	assert_int_equal(record_from_json(text, size, &r, &e), 0);
 	uint64_t leases = plan->rounds * plan->groups * plan->parts, chains = plan->chains * plan->rounds;
 	assert_int_equal(r.leases_merged, leases);
-	assert_int_equal(r.repeats, 1);
-	assert_int_equal(r.refused, 2);
+	assert_int_equal(r.counts.repeats, 1);
+	assert_int_equal(r.counts.refused, 2);
 	assert_string_equal(r.mixture, "independent=0.1,hslt=0.9");
 	assert_int_equal(r.strategy[0][STRATEGY_PROPOSED], 3 * leases);
 	assert_int_equal(r.strategy[1][STRATEGY_PROPOSED], plan->rounds * plan_round_mutations(plan) - 3 * leases);

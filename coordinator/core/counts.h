@@ -1,0 +1,30 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The counters of a job: what went wrong and cost nothing, and what was verified. This list is all that there is of
+ * them: core, status, journal, checkpoint, record and the JSON of both status and record follow from it. What counts is
+ * where it happens: job->counts.NAME++. The structure lies in journals and checkpoints as it is: whoever changes the
+ * list counts up the versions of both (journal_file.c, checkpoint_file.c).
+ */
+#ifndef COORDINATOR_CORE_COUNTS_H
+#define COORDINATOR_CORE_COUNTS_H
+
+#include <stdint.h>
+
+/* X(name, its key in JSON; NULL: it is not shown) */
+#define JOB_COUNTS(X)                                                                 \
+	X(repeats, "repeats")	    /* results of leases that were merged already */  \
+	X(refused, "refused")	    /* results that could not count */                \
+	X(faults, NULL)		    /* those of them that no worker may send */       \
+	X(failures, "failures")	    /* leases that a worker tried and could not do */ \
+	X(timeouts, "timeouts")	    /* leases that were handed out again */           \
+	X(duplicates, "duplicates") /* second copies of leases that took long */      \
+	X(verified, "verified")	    /* leases on which two workers agreed */          \
+	X(mismatched, "mismatched") /* ... of which the first two did not */
+
+struct job_counts {
+#define X(name, key) uint64_t name;
+	JOB_COUNTS(X)
+#undef X
+};
+
+#endif
