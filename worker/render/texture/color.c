@@ -26,12 +26,19 @@ double color_d65(double nm)
 	return ((1 - b) * cie_d65[cell] + b * cie_d65[cell + 1]) * (1 / D65_LUMINANCE);
 }
 
+#define STEP(x) ((x) * (x) * (3 - 2 * (x)))
+#define VALUE(k) STEP(STEP((double)(k) / (UPSAMPLE_TABLE_SIZE - 1)))
+#define VALUES(k) VALUE(k), VALUE((k) + 1), VALUE((k) + 2), VALUE((k) + 3)
+/* upsample_table_value, computed once: it is asked for at every textured vertex. */
+static const double values[UPSAMPLE_TABLE_SIZE] = {VALUES(0),  VALUES(4),  VALUES(8),  VALUES(12),
+						   VALUES(16), VALUES(20), VALUES(24), VALUES(28)};
+
 static int table_cell(double value)
 {
 	int low = 0, high = UPSAMPLE_TABLE_SIZE - 1;
 	while (high - low > 1) {
 		int middle = (low + high) / 2;
-		if (value < upsample_table_value(middle))
+		if (value < values[middle])
 			high = middle;
 		else
 			low = middle;
@@ -48,17 +55,18 @@ static void table_lookup(const double rgb[3], double c[3])
 	int xi = (int)x, yi = (int)y, zi = table_cell(z);
 	xi = xi > n - 2 ? n - 2 : xi;
 	yi = yi > n - 2 ? n - 2 : yi;
-	double z0 = upsample_table_value(zi), z1 = upsample_table_value(zi + 1);
-	double fx = x - xi, fy = y - yi, fz = (z - z0) / (z1 - z0);
+	double fx = x - xi, fy = y - yi, fz = (z - values[zi]) / (values[zi + 1] - values[zi]);
+	const double wx[2] = {1 - fx, fx}, wy[2] = {1 - fy, fy}, wz[2] = {1 - fz, fz};
+	double sum[3] = {0, 0, 0};
+	for (int dz = 0; dz < 2; dz++)
+		for (int dy = 0; dy < 2; dy++) {
+			const float *p = table + 3 * (((l * n + zi + dz) * n + yi + dy) * n + xi);
+			double near = wx[0] * wy[dy] * wz[dz], far = wx[1] * wy[dy] * wz[dz];
+			for (int k = 0; k < 3; k++)
+				sum[k] = sum[k] + near * (double)p[k] + far * (double)p[3 + k];
+		}
 	for (int k = 0; k < 3; k++)
-		c[k] = 0;
-	for (int corner = 0; corner < 8; corner++) {
-		int dx = corner & 1, dy = corner >> 1 & 1, dz = corner >> 2;
-		double w = (dx ? fx : 1 - fx) * (dy ? fy : 1 - fy) * (dz ? fz : 1 - fz);
-		const float *p = table + 3 * (((l * n + zi + dz) * n + yi + dy) * n + xi + dx);
-		for (int k = 0; k < 3; k++)
-			c[k] += w * (double)p[k];
-	}
+		c[k] = sum[k];
 }
 
 spectrum color_eval_rgb_reflectance(const double rgb[3], const struct wavelengths *w)
