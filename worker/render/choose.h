@@ -34,8 +34,8 @@ struct render_choice {
 	struct render_found path, bdpt;
 	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe */
 	bool settled;	  /* path alone left no choice: nothing is known of bdpt */
-	uint64_t samples; /* of the pilot, all kinds; at most 1 in 30 of the render's, or 3 times 16,384 where that is
-			     more */
+	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough; at most 1 in 30 of the
+			     render's, or 3 times 16,384 where that is more */
 };
 
 /* Sets integrator, kind and mixture of the request, all else of which stands. Ticks. -ENOMEM, -EINVAL */
