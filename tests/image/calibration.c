@@ -5,7 +5,7 @@
  * made with other seeds. Writes the table of README.md to stdout, and ends with 1 where the intervals that were stated
  * hold the true relMSE in less than 90 % of the renders of a length, or in more than 99 % of a hundred or more. The
  * reference's own variance is subtracted from each comparison; a case whose reference has more than a tenth of the
- * renders' relMSE is left out, and said so.
+ * renders' relMSE is left out, and said so. SIGTERM ends it after the case that is being measured, with its verdict.
  *
  *   calibration [RENDERS [LENGTHS [SCENE]]]    20 renders a case, half as many of each next length; 3 lengths; scenes
  * whose names begin with SCENE
@@ -15,6 +15,7 @@
 
 #include <math.h>
 #include <setjmp.h>
+#include <signal.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -22,13 +23,21 @@
 
 #include <cmocka.h>
 
-enum { SIZE = 16, VALUES = SIZE * SIZE * 3, PARTS = 4, LENGTHS = 3, PILOT_SPP = 64 };
+enum { SIZE = 16, VALUES = SIZE * SIZE * 3, PARTS = 4, INTEGRATORS = 5, LENGTHS = 3, PILOT_SPP = 64 };
 
 static const struct {
 	const char *name;
 	uint64_t spp; /* samples or mutations a pixel of the shortest renders */
-} integrators[] = {{"path", 128}, {"bdpt", 64}, {"pssmlt", 128}, {"hslt", 64}};
-static const uint64_t lengths[LENGTHS] = {1, 6, 36};
+} integrators[INTEGRATORS] = {{"path", 128}, {"bdpt8", 128}, {"bdpt", 64}, {"pssmlt", 128}, {"hslt", 128}};
+static const uint64_t lengths[LENGTHS] = {1, 4, 16};
+
+static volatile sig_atomic_t ended;
+
+static void end(int signal)
+{
+	(void)signal;
+	ended = 1;
+}
 
 struct reference {
 	double rgb[VALUES], variance, floor_square; /* variance: its relMSE */
@@ -94,7 +103,7 @@ static void run_case(const struct calibration_scene *s, const struct world *w, c
 		     int length, uint32_t renders, struct figures *all)
 {
 	char test[96];
-	snprintf(test, sizeof test, "calibration of %s, length %d", s->name, length + 1);
+	snprintf(test, sizeof test, "stated errors of %s, length %d", s->name, length + 1);
 	struct repeats_how how = {.integrator = integrators[k].name,
 				  .test = test,
 				  .count = renders,
@@ -118,36 +127,61 @@ static void run_case(const struct calibration_scene *s, const struct world *w, c
 	all->held += f.held;
 }
 
-static bool judge(const struct figures *all, int length)
+static void run_scene(const struct calibration_scene *s, const struct world *w, uint32_t renders, int last,
+		      struct figures all[INTEGRATORS][LENGTHS])
 {
-	double share = all->stated ? (double)all->held / all->stated : 1;
-	printf("\nLength %d: %d of %d renders state an interval, %d of them (%.1f %%) hold the true relMSE.\n",
-	       length + 1, all->stated, all->renders, all->held, 100 * share);
-	return share >= 0.9 && (all->stated < 100 || share <= 0.99);
+	static struct reference r;
+	make_reference(s, w, &r);
+	for (size_t k = 0; k < INTEGRATORS; k++)
+		for (int length = 0; length < last && !ended; length++)
+			run_case(s, w, &r, k, length, (renders >> length) + !(renders >> length), &all[k][length]);
+}
+
+static double percent(const struct figures *f)
+{
+	return f->stated ? 100.0 * f->held / f->stated : 100;
+}
+
+/* A length, and its integrators one by one. */
+static bool judge(struct figures all[INTEGRATORS][LENGTHS], int length)
+{
+	struct figures sum = {0};
+	for (size_t k = 0; k < INTEGRATORS; k++) {
+		sum.renders += all[k][length].renders;
+		sum.stated += all[k][length].stated;
+		sum.held += all[k][length].held;
+	}
+	printf("\nLength %d: %d of %d renders state an interval, %d of them (%.1f %%) hold the true relMSE", length + 1,
+	       sum.stated, sum.renders, sum.held, percent(&sum));
+	for (size_t k = 0; k < INTEGRATORS; k++) {
+		const struct figures *f = &all[k][length];
+		printf("%s `%s` %d of %d of %d", k ? ";" : ":", integrators[k].name, f->held, f->stated, f->renders);
+	}
+	printf(".\n");
+	return percent(&sum) >= 90 && (sum.stated < 100 || percent(&sum) <= 99);
 }
 
 int main(int argc, char **argv)
 {
 	uint32_t renders = argc > 1 && atoi(argv[1]) > 0 ? (uint32_t)atoi(argv[1]) : 20;
-	int last = argc > 2 && atoi(argv[2]) > 0 && atoi(argv[2]) < LENGTHS ? atoi(argv[2]) : LENGTHS;
-	struct figures all[LENGTHS] = {{0}};
-	static struct reference r;
+	int last = argc > 2 && atoi(argv[2]) > 0 && atoi(argv[2]) < LENGTHS ? atoi(argv[2]) : LENGTHS, scenes = 0;
+	static struct figures all[INTEGRATORS][LENGTHS];
+	signal(SIGTERM, end);
 	printf("| kind | scene | integrator | a pixel | true %% | stated %% | intervals | held | beyond 3 errors %% | CPU s |\n"
 	       "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |\n");
-	for (const struct calibration_scene *s = calibration_scenes; s->name; s++) {
+	for (const struct calibration_scene *s = calibration_scenes; s->name && !ended; s++) {
 		if (argc > 3 && strncmp(s->name, argv[3], strlen(argv[3])) != 0)
 			continue;
 		struct world *w = calibration_world(s, SIZE, SIZE);
 		if (!w)
 			continue;
-		make_reference(s, w, &r);
-		for (size_t k = 0; k < sizeof integrators / sizeof *integrators; k++)
-			for (int length = 0; length < last; length++)
-				run_case(s, w, &r, k, length, (renders >> length) + !(renders >> length), &all[length]);
+		run_scene(s, w, renders, last, all);
 		world_free(w);
+		scenes++;
 	}
+	printf("\n%d scenes%s.\n", scenes, ended ? "; ended by a signal, the last row is of the last scene begun" : "");
 	bool right = true;
 	for (int length = 0; length < last; length++)
-		right &= judge(&all[length], length);
+		right &= judge(all, length);
 	return right ? 0 : 1;
 }

@@ -35,50 +35,51 @@
 	     "<translate y='-0.7'/>", METAL("0.05"))
 #define WARM GREY("0.5,0.45,0.35")
 
+/* Of the three kinds by turns, so that a run that is ended has some of each. */
 const struct calibration_scene calibration_scenes[] = {
-	{"tree", "demo", "demo", "scene.xml", NULL, "path", 15},
-	{"tree", "box", "box", "box.xml", NULL, "path", 10},
-	{"tree", "water", "displaced", "water.xml", NULL, "hslt", 20},
-	{"tree", "frosted", "displaced", "frosted.xml", NULL, "hslt", 20},
-	{"public", "cornell-box", "cornell-box", "scene.xml", NULL, "path", 10},
-	{"public", "veach-mis", "veach-mis", "scene.xml", NULL, "path", 10},
-	{"public", "veach-door", "veach-door", "scene.xml", NULL, "bdpt", 20},
-	{"public", "three-spheres", ".", "three-spheres.xml", NULL, "bdpt", 15},
-	{"public", "half-sunk", ".", "half-sunk-rough.xml", NULL, "bdpt", 20},
+	{"tree", "box", "box", "box.xml", NULL, "path", 25},
+	{"public", "cornell-box", "cornell-box", "scene.xml", NULL, "path", 35},
 	{"made", "room", NULL, NULL,
 	 DEPTH("5") VIEW BOX(WARM) CEILING("0.8", "6,5,4") SPHERE("0,-0.6,-0.3", "0.8", GREY("0.2,0.5,0.7")), "path",
-	 10},
+	 30},
+	{"tree", "demo", "demo", "scene.xml", NULL, "bdpt", 30},
+	{"public", "veach-mis", "veach-mis", "scene.xml", NULL, "bdpt8", 30},
 	{"made", "lamp in a glass shell", NULL, NULL,
 	 DEPTH("8") VIEW BOX(WARM) SPHERE("0,0.4,-0.6", "0.5", GLASS)
 		 SPHERE("0,0.4,-0.6", "0.05", SHINES("600,500,400")),
-	 "path", 20},
+	 "bdpt", 60},
 	{"made", "caustic ring", NULL, NULL,
 	 DEPTH("6") SENSOR("0,3,4", "0,-0.5,0") WALL("<scale value='6'/><rotate x='1' angle='-90'/>",
 						     "<translate y='-1'/>", GREY("0.4,0.4,0.4")) BENT("-60") BENT("-30")
 		 BENT("0") BENT("30") BENT("60") SPHERE("2,2,1", "0.1", SHINES("300,300,250")),
-	 "bdpt", 20},
+	 "bdpt", 30},
+	{"made", "dark checks", NULL, NULL,
+	 DEPTH("6") VIEW BOX(CHECKS("0.02,0.02,0.02", "0.8,0.8,0.7", "8"))
+		 WALL("<scale value='1.2'/><rotate x='1' angle='90'/>", "<translate y='1.2'/>", GREY("0.1,0.1,0.1"))
+			 CEILING("0.5", "30,28,25"),
+	 "bdpt", 35},
+	{"made", "lamp behind cloudy glass", NULL, NULL,
+	 DEPTH("8") VIEW BOX(WARM) SPHERE("0,0.4,-0.6", "0.6", CLOUDY("0.2"))
+		 SPHERE("0,0.4,-0.6", "0.1", SHINES("200,180,150")),
+	 "bdpt", 70},
+	{"tree", "water", "displaced", "water.xml", NULL, "hslt", 40},
+	{"public", "three-spheres", ".", "three-spheres.xml", NULL, "bdpt", 40},
 	{"made", "glossy box", NULL, NULL,
 	 DEPTH("8") VIEW BOX(METAL("0.1")) CEILING("0.3", "20,18,15") SPHERE("0.3,-0.8,-0.5", "0.5", METAL("0.05")),
-	 "bdpt", 15},
+	 "bdpt", 40},
 	{"made", "mirror corridor", NULL, NULL,
 	 DEPTH("12") SENSOR("0,0,1.9", "0.6,-0.2,-1") BOX(GREY("0.3,0.3,0.35"))
 		 WALL("<scale x='1.9' y='1.9'/><rotate y='1' angle='90'/>", "<translate x='-1.5'/>", MIRROR)
 			 WALL("<scale x='1.9' y='1.9'/><rotate y='1' angle='-90'/>", "<translate x='1.5'/>", MIRROR)
 				 CEILING("0.2", "40,38,35"),
-	 "bdpt", 15},
+	 "bdpt", 40},
+	{"public", "half-sunk", ".", "half-sunk-rough.xml", NULL, "bdpt", 40},
 	{"made", "tiny bright emitter", NULL, NULL,
 	 DEPTH("6") VIEW BOX(WARM) SPHERE("-1,1,-1", "0.01", SHINES("30000,28000,25000"))
 		 SPHERE("0.4,-0.8,-0.3", "0.7", GLASS) SPHERE("-0.9,-1.2,-0.2", "0.5", METAL("0.1")),
-	 "bdpt", 20},
-	{"made", "dark checks", NULL, NULL,
-	 DEPTH("6") VIEW BOX(CHECKS("0.02,0.02,0.02", "0.8,0.8,0.7", "8"))
-		 WALL("<scale value='1.2'/><rotate x='1' angle='90'/>", "<translate y='1.2'/>", GREY("0.1,0.1,0.1"))
-			 CEILING("0.5", "30,28,25"),
-	 "path", 15},
-	{"made", "lamp behind cloudy glass", NULL, NULL,
-	 DEPTH("8") VIEW BOX(WARM) SPHERE("0,0.4,-0.6", "0.6", CLOUDY("0.2"))
-		 SPHERE("0,0.4,-0.6", "0.1", SHINES("200,180,150")),
-	 "path", 20},
+	 "bdpt", 40},
+	{"tree", "frosted", "displaced", "frosted.xml", NULL, "hslt", 40},
+	{"public", "veach-door", "veach-door", "scene.xml", NULL, "bdpt", 40},
 	{NULL, NULL, NULL, NULL, NULL, NULL, 0},
 };
 
