@@ -117,6 +117,21 @@ static void test_surfaces(void **state)
 	check("phong", world_of_text(32, 32, ROOM LAMP BALL("<bsdf type='phong'/>")), 1500);
 }
 
+/* A sphere is drawn towards a vertex within the cone in which it is seen, and on all of its area for a light sub-path.
+ */
+static void test_round_lamp(void **state)
+{
+	(void)state;
+	check("round lamp, gold",
+	      world_of_text(
+		      32, 32,
+		      ROOM
+		      "<shape type='sphere'><point name='center' value='0.8,1,-0.5'/><float name='radius' value='0.3'/>"
+		      "<emitter type='area'><rgb name='radiance' value='9,8,7'/></emitter></shape>" BALL(
+			      "<bsdf type='roughconductor'><float name='alpha' value='0.3'/></bsdf>")),
+	      1500);
+}
+
 static void test_environment(void **state)
 {
 	(void)state;
@@ -181,10 +196,8 @@ static void test_sides(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_surfaces),
-		cmocka_unit_test(test_environment),
-		cmocka_unit_test(test_ends),
-		cmocka_unit_test(test_sides),
+		cmocka_unit_test(test_surfaces), cmocka_unit_test(test_round_lamp), cmocka_unit_test(test_environment),
+		cmocka_unit_test(test_ends),	 cmocka_unit_test(test_sides),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
