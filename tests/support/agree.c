@@ -143,7 +143,7 @@ static void *work(void *arg)
 }
 
 static void make_plan(const struct world *w, const char *test, const char *side, const struct agree_side *how,
-		      const char *mutations, struct plan *p)
+		      const char *mutations, uint64_t bootstrap, struct plan *p)
 {
 	const struct render_integrator *i = render_integrator_find(how->integrator);
 	assert_non_null(i);
@@ -173,25 +173,19 @@ static void make_plan(const struct world *w, const char *test, const char *side,
 	if (i->has_mutations && render_mutations(mutations, &summary, p->mutations, &e))
 		fail_msg("%s", e.text);
 	p->chains = i->kind == PLAN_CHAINS ? groups * 8 : 0;
-	p->bootstrap = (uint64_t)groups * 2048;
+	p->bootstrap = groups * bootstrap;
 	uint64_t per = i->kind == PLAN_CHAINS ? spp * pixels / p->chains : spp / groups;
 	p->epoch = per / 2 ? per / 2 : 1;
 	if (plan_check(p, &e))
 		fail_msg("%s", e.text);
 }
 
-void agree_render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
-		  struct agree_image *out)
-{
-	agree_render_mixture(w, test, side, how, NULL, out);
-}
-
-void agree_render_mixture(const struct world *w, const char *test, const char *side, const struct agree_side *how,
-			  const char *mutations, struct agree_image *out)
+static void render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+		   const char *mutations, uint64_t bootstrap, struct agree_image *out)
 {
 	static struct group_run runs[AGREE_MAX_GROUPS];
 	struct plan p;
-	make_plan(w, test, side, how, mutations, &p);
+	make_plan(w, test, side, how, mutations, bootstrap, &p);
 	memset(runs, 0, sizeof runs);
 	*out = (struct agree_image){.groups = p.groups};
 	for (uint32_t g = 0; g < p.groups; g++)
@@ -212,6 +206,24 @@ void agree_render_mixture(const struct world *w, const char *test, const char *s
 				out->strategy[i][k] += runs[g].strategy[i][k];
 	}
 	assert_int_equal(out->counters[COUNT_NAN] + out->counters[COUNT_INFINITE] + out->counters[COUNT_NEGATIVE], 0);
+}
+
+void agree_render(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+		  struct agree_image *out)
+{
+	render(w, test, side, how, NULL, AGREE_BOOTSTRAP, out);
+}
+
+void agree_render_mixture(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+			  const char *mutations, struct agree_image *out)
+{
+	render(w, test, side, how, mutations, AGREE_BOOTSTRAP, out);
+}
+
+void agree_render_bootstrap(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+			    uint64_t bootstrap, struct agree_image *out)
+{
+	render(w, test, side, how, NULL, bootstrap, out);
 }
 
 struct cell {

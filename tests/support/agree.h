@@ -13,7 +13,7 @@
 #include "worker/render/render.h"
 #include "worker/render/world/world.h"
 
-enum { AGREE_BLOCKS = 2, AGREE_CELLS = AGREE_BLOCKS * AGREE_BLOCKS, AGREE_MAX_GROUPS = 64 };
+enum { AGREE_BLOCKS = 2, AGREE_CELLS = AGREE_BLOCKS * AGREE_BLOCKS, AGREE_MAX_GROUPS = 64, AGREE_BOOTSTRAP = 2048 };
 
 struct agree_side {
 	const char *integrator;
@@ -36,6 +36,10 @@ void agree_render(const struct world *w, const char *test, const char *side, con
 /* The same with a mixture of strategies of our own. */
 void agree_render_mixture(const struct world *w, const char *test, const char *side, const struct agree_side *how,
 			  const char *mutations, struct agree_image *out);
+
+/* The same with `bootstrap` independent paths in each group of chains instead of AGREE_BOOTSTRAP. */
+void agree_render_bootstrap(const struct world *w, const char *test, const char *side, const struct agree_side *how,
+			    uint64_t bootstrap, struct agree_image *out);
 
 /* Fails the test when the images differ, or when the comparison is too weak to tell. */
 void agree_check(const char *test, const struct agree_image *a, const struct agree_image *b);
