@@ -1,7 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What workers send back: merged, repeated, refused, failed. */
+#include "coordinator/core/answer.h"
+
 #include "common/base/text.h"
-#include "coordinator/core/state.h"
+#include "coordinator/core/actions.h"
+#include "coordinator/core/doubt.h"
+#include "coordinator/core/failure_quorum.h"
+#include "coordinator/core/find.h"
+#include "coordinator/core/forecast.h"
+#include "coordinator/core/lease.h"
+#include "coordinator/core/lost.h"
+#include "coordinator/core/owner.h"
+#include "coordinator/core/peer.h"
+#include "coordinator/core/quarantine.h"
+#include "coordinator/core/rounds.h"
+#include "coordinator/core/verify.h"
 
 #include <math.h>
 
@@ -48,7 +61,7 @@ static enum verdict judge(const struct peer *p, const struct job *j, const struc
 		*why = ev->text ? ev->text : "invalid content";
 		return FAULT;
 	}
-	if (!job_takes(j, p)) {
+	if (!job_takes(j, p->class)) {
 		*why = "the job belongs to workers with another fingerprint";
 		return REFUSE;
 	}
@@ -100,7 +113,7 @@ static void merge(struct farm *f, struct peer *p, struct job *j, struct slot *s,
 	lease_revoke_slot(f, s);
 	j->counts.verified += verified;
 	if (verified)
-		verify_settle(f, j, s, &ev->lease.digest);
+		quarantine_settle(f, j, s, &ev->lease.digest);
 	doubt_settle(f, j, s, p->who, &ev->lease.key);
 	peer_succeeded(f, p, j->id);
 	if (!j->mixed)
@@ -133,7 +146,7 @@ static enum verdict verify(struct farm *f, struct job *j, struct slot *s, struct
 		return REFUSE;
 	}
 	job_pin(j, p->class);
-	switch (verify_take(f, j, s, p->who, &ev->lease.digest)) {
+	switch (proof_take(j, s, p->who, &ev->lease.digest)) {
 	case VERIFY_AGREES:
 		return MERGE;
 	case VERIFY_NOTED:
@@ -159,7 +172,7 @@ static void give_up_where_hopeless(struct farm *f, struct job *j, struct slot *s
 	char names[160], text[256];
 	if (j->proofs[s - j->slots].count < VERIFY_MOST)
 		return;
-	verify_names(j, s, names, sizeof names);
+	proof_names(j, s, names, sizeof names);
 	text_print(text, sizeof text, "no two of %d workers agree on group %u part %u epoch %llu: %s", VERIFY_MOST,
 		   k->group, k->part, (unsigned long long)k->epoch, names);
 	rounds_end(f, j, END_FAILED, text);
@@ -172,7 +185,7 @@ void answer_batch(struct farm *f, const struct event *ev)
 	const char *why;
 	enum verdict v = judge(p, j, ev, &why);
 	struct slot *s = j && job_is_live(j) ? slot_of(j, &ev->lease.key) : NULL;
-	bool verified = v == MERGE && verify_chosen(j, &ev->lease.key);
+	bool verified = v == MERGE && proof_chosen(j, &ev->lease.key);
 	if (verified)
 		v = verify(f, j, s, p, ev, &why);
 	if (v == MERGE) {
@@ -187,7 +200,7 @@ void answer_batch(struct farm *f, const struct event *ev)
 	else if (v == NOTE)
 		job_place(j, s);
 	if (v == FAULT)
-		peer_fault(f, p, f->text);
+		quarantine_fault(f, p, f->text);
 	if (v == NOTE)
 		give_up_where_hopeless(f, j, s, &ev->lease.key);
 }
@@ -205,8 +218,8 @@ void answer_stored(struct farm *f, const struct event *ev)
 	a->job = j->id;
 	a->verified = true; /* whatever it had to be, it was when it came */
 	lease_revoke_slot(f, s);
-	if (verify_chosen(j, k))
-		verify_settle(f, j, s, &ev->lease.digest);
+	if (proof_chosen(j, k))
+		quarantine_settle(f, j, s, &ev->lease.digest);
 	s->doubt = (struct doubt){0};
 	j->progress_floor = job_progress(j, f->now);
 	if (job_merge(j, s, f->now, NAN))
@@ -218,7 +231,7 @@ bool answer_all_failed(const struct farm *f, const struct job *j)
 	uint32_t here = 0;
 	for (uint32_t i = 0; i < f->peer_count; i++) {
 		const struct peer *p = f->peers[i];
-		if (p->state != PEER_ACTIVE || !job_takes(j, p))
+		if (p->state != PEER_ACTIVE || !job_takes(j, p->class))
 			continue;
 		if (isinf(peer_avoids_until(p, j->id)))
 			return false;
@@ -304,18 +317,6 @@ void answer_failed(struct farm *f, const struct event *ev)
 	rounds_end(f, j, END_FAILED, f->text);
 }
 
-enum farm_delivery farm_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k)
-{
-	const struct event ev = {.peer = peer, .lease = {.key = *k}};
-	const struct peer *p = farm_find_peer(f, peer);
-	const struct job *j = farm_find_job(f, k->job);
-	const struct lease *l = held(f, &ev);
-	if (l && !l->delivered)
-		return DELIVERY_AWAITED;
-	bool open = p && !p->who->aside && j && job_is_live(j) && j->ending == END_NONE && job_takes(j, p);
-	return open && is_next(j, slot_of(j, k), k) ? DELIVERY_OPEN : DELIVERY_USELESS;
-}
-
 void answer_delivered(struct farm *f, const struct event *ev)
 {
 	struct lease *l = held(f, ev);
@@ -328,4 +329,16 @@ void answer_returned(struct farm *f, const struct event *ev)
 	struct lease *l = held(f, ev);
 	if (l)
 		lease_drop(f, l);
+}
+
+enum farm_delivery answer_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k)
+{
+	const struct event ev = {.peer = peer, .lease = {.key = *k}};
+	const struct peer *p = farm_find_peer(f, peer);
+	const struct job *j = farm_find_job(f, k->job);
+	const struct lease *l = held(f, &ev);
+	if (l && !l->delivered)
+		return DELIVERY_AWAITED;
+	bool open = p && !p->who->aside && j && job_is_live(j) && j->ending == END_NONE && job_takes(j, p->class);
+	return open && is_next(j, slot_of(j, k), k) ? DELIVERY_OPEN : DELIVERY_USELESS;
 }

@@ -2,7 +2,13 @@
 #include "coordinator/core/doubt.h"
 
 #include "common/base/text.h"
-#include "coordinator/core/state.h"
+#include "coordinator/core/actions.h"
+#include "coordinator/core/find.h"
+#include "coordinator/core/forecast.h"
+#include "coordinator/core/lease.h"
+#include "coordinator/core/quarantine.h"
+
+#include <assert.h>
 
 static struct identity *known(const struct farm *f, uint64_t who)
 {
@@ -18,7 +24,7 @@ static const char *name_of(const struct farm *f, uint64_t who)
 	return k ? k->name : who ? "a worker that is forgotten" : "a worker before the coordinator's start";
 }
 
-const char *farm_maker(const struct farm *f, const struct lease_key *k)
+const char *doubt_maker(const struct farm *f, const struct lease_key *k)
 {
 	const struct job *j = farm_find_job(f, k->job);
 	bool known_slot =
@@ -39,25 +45,10 @@ static bool third_is_here(const struct farm *f, const struct job *j, const struc
 {
 	for (uint32_t i = 0; i < f->peer_count; i++) {
 		const struct peer *p = f->peers[i];
-		if (p->state == PEER_ACTIVE && job_takes(j, p) && !is_party(s, p->who->id))
+		if (p->state == PEER_ACTIVE && job_takes(j, p->class) && !is_party(s, p->who->id))
 			return true;
 	}
 	return false;
-}
-
-static struct lease_key key_of(const struct job *j, const struct slot *s)
-{
-	uint32_t index = (uint32_t)(s - j->slots);
-	return (struct lease_key){.job = j->id,
-				  .kind = j->kind,
-				  .group = index / j->plan.parts,
-				  .part = index % j->plan.parts,
-				  .epoch = s->next};
-}
-
-bool doubt_waits(const struct slot *s)
-{
-	return s->doubt.refuser && !s->doubt.anew;
 }
 
 bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p)
@@ -65,17 +56,39 @@ bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s,
 	return is_party(s, p->who->id) && third_is_here(f, j, s);
 }
 
+/* The batch of the slot's last epoch is none: that epoch is next again. The rounds that it was in are open again, and
+ * nobody works on what lies more than one round behind them. */
+static void open_again(struct farm *f, struct job *j, struct slot *s)
+{
+	assert(j->kind == LEASE_RENDER && s->next > 0);
+	j->progress_floor = job_progress(j, f->now);
+	lease_revoke_slot(f, s);
+	s->next--;
+	s->timeouts = 0;
+	s->failure_quorum.count = 0;
+	s->lost.count = 0;
+	j->leases_merged--;
+	if (s->next < j->rounds) {
+		j->rounds = s->next;
+		j->evaluating = false; /* the answer is about more */
+	}
+	for (uint32_t i = 0; i < j->slot_count; i++)
+		if (j->slots[i].next - j->rounds > 1)
+			lease_revoke_slot(f, &j->slots[i]);
+	job_place_all(j);
+}
+
 /* The states may be wrong without that epoch's sums being so: it is not asked. */
 static void take_back(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
 	struct doubt *d = &s->doubt;
 	uint64_t maker = d->maker, reach = d->reach > s->next ? d->reach : s->next;
-	job_take_back(f, j, s);
+	open_again(f, j, s);
 	*d = (struct doubt){.maker = d->before, .barred = maker, .reach = reach, .again = d->again + 1};
 	struct action *a = update_add(f, ACTION_TAKE_BACK);
 	a->who = maker;
 	a->job = j->id;
-	a->key = key_of(j, s);
+	a->key = slot_key(j, s);
 	text_print(
 		f->text, sizeof f->text,
 		"group %u part %u epoch %llu is computed again: its chain states, made by %s, could not be read by %s",
@@ -85,7 +98,7 @@ static void take_back(struct farm *f, struct job *j, struct slot *s, const char 
 
 static void begin_anew(struct farm *f, struct job *j, struct slot *s, const char *refusers)
 {
-	const struct lease_key k = key_of(j, s);
+	const struct lease_key k = slot_key(j, s);
 	lease_revoke_slot(f, s); /* who has the states still */
 	s->doubt.anew = true;
 	j->anew++;
@@ -111,7 +124,7 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 		job_place(j, s);
 		return;
 	}
-	struct lease_key made = key_of(j, s);
+	struct lease_key made = slot_key(j, s);
 	made.epoch--;
 	char refusers[2 * JOIN_NAME];
 	if (d->refuser == who)
@@ -124,7 +137,7 @@ void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct p
 	else
 		begin_anew(f, j, s, refusers);
 	if (maker)
-		worker_registry_wrong(f, maker, "wrong chain states", &made);
+		quarantine_wrong(f, maker, "wrong chain states", &made);
 	job_place(j, s);
 }
 
@@ -140,7 +153,7 @@ void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const str
 			    .reach = behind ? d->reach : 0,
 			    .again = behind ? d->again : 0};
 	if (refuser)
-		worker_registry_wrong(f, refuser, "refused good chain states", k);
+		quarantine_wrong(f, refuser, "refused good chain states", k);
 }
 
 bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t size)
@@ -149,7 +162,7 @@ bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t siz
 		const struct slot *s = &j->slots[i];
 		if (!doubt_waits(s) || s->holders)
 			continue;
-		const struct lease_key k = key_of(j, s);
+		const struct lease_key k = slot_key(j, s);
 		text_print(
 			text, size,
 			"a third worker is to say whether the chain states of group %u part %u epoch %llu are wrong: %s made them, %s could not read them",

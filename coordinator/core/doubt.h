@@ -27,25 +27,16 @@ struct job;
 struct peer;
 struct slot;
 
-struct doubt {
-	uint64_t maker;	  /* the worker whose states the next epoch begins with; 0: not known */
-	uint64_t before;  /* the one whose states that worker began with; 0: not known */
-	uint64_t refuser; /* the first that could not read them; 0: nobody */
-	uint64_t barred;  /* whose epoch is computed again; 0: nobody's */
-	uint64_t reach;	  /* epochs were taken back from here */
-	uint32_t again;	  /* so many since then */
-	bool anew;	  /* its chains begin the next epoch from their seeds */
-};
 enum { AGAIN_MOST = 4 };
 
 /* The lease of this worker is dropped already. can: the caller has what it takes to compute the epoch before again. */
 void doubt_refused(struct farm *f, struct job *j, struct slot *s, const struct peer *p, bool can, const char *text);
-/* Somebody else is asked about the states. */
-bool doubt_waits(const struct slot *s);
 bool doubt_bars(const struct farm *f, const struct job *j, const struct slot *s, const struct peer *p);
 /* A result of the slot's next epoch is merged: its sender went on from the states. Before job_merge. */
 void doubt_settle(struct farm *f, const struct job *j, struct slot *s, const struct identity *who,
 		  const struct lease_key *k);
+/* Who made the chain states that go with this lease; "?": it is not the next one of its group and part. */
+const char *doubt_maker(const struct farm *f, const struct lease_key *k);
 /* Why the job waits for another worker; false: it does not. */
 bool doubt_why(const struct farm *f, const struct job *j, char *text, size_t size);
 

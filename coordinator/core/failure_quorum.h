@@ -7,20 +7,13 @@
 #ifndef COORDINATOR_CORE_FAILURE_QUORUM_H
 #define COORDINATOR_CORE_FAILURE_QUORUM_H
 
+#include "coordinator/core/slot.h"
+
 #include <stdbool.h>
 #include <stdint.h>
 
-enum { FAILURE_QUORUM_FATAL = 3 };
-
 struct farm;
 struct identity;
-
-struct failure_quorum {
-	uint32_t count;
-	struct {
-		uint64_t who, certificate; /* ids of struct identity */
-	} of[FAILURE_QUORUM_FATAL];
-};
 
 /* So many certificates must be among those who fail. */
 uint32_t failure_quorum_certificates(const struct farm *f);

@@ -2,47 +2,25 @@
 #include "coordinator/core/farm.h"
 
 #include "common/base/mem.h"
-#include "coordinator/core/state.h"
+#include "coordinator/core/actions.h"
+#include "coordinator/core/answer.h"
+#include "coordinator/core/connection.h"
+#include "coordinator/core/find.h"
+#include "coordinator/core/job.h"
+#include "coordinator/core/orders.h"
+#include "coordinator/core/restore.h"
+#include "coordinator/core/rounds.h"
+#include "coordinator/core/schedule.h"
+#include "coordinator/core/worker_registry.h"
 
 #include <assert.h>
 #include <math.h>
 
 enum { KNOWN_PER_PEER = 4 };
 
-void farm_config_init(struct farm_config *c)
-{
-	*c = (struct farm_config){
-		.first_job = 1,
-		.max_jobs = FARM_JOBS,
-		.max_ended = 1000,
-		.max_peers = 4096,
-		.max_peer_leases = 256,
-		.max_slots = 1 << 16,
-		.max_faults = 3,
-		.silent_after = 30,
-		.forget_after = 300,
-		.first_timeout = 600,
-		.first_copy = 30,
-		.idle_timeout = 120,
-		.min_timeout = 60,
-		.first_pause = 10,
-	};
-}
-
-static int check(const struct farm_config *c, struct error *e)
-{
-	if (c->first_job == 0 || c->max_jobs == 0 || c->max_ended == 0 || c->max_peers == 0 ||
-	    c->max_peer_leases == 0 || c->max_faults == 0)
-		return error_set(e, EINVAL, "a farm without jobs, workers or leases");
-	if (!(c->silent_after > 0 && c->forget_after >= c->silent_after && c->first_timeout > 0 && c->min_timeout > 0 &&
-	      c->first_copy > 0 && c->idle_timeout > 0 && c->first_pause > 0))
-		return error_set(e, EINVAL, "the farm's times are not in order");
-	return 0;
-}
-
 int farm_new(struct farm **out, const struct farm_config *c, struct error *e)
 {
-	int rc = check(c, e);
+	int rc = farm_config_check(c, e);
 	if (rc < 0)
 		return rc;
 	struct farm *f = mem_alloc(1, sizeof *f);
@@ -73,7 +51,7 @@ void farm_free(struct farm *f)
 	if (!f)
 		return;
 	while (f->peer_count)
-		peer_leave(f, f->peers[f->peer_count - 1]);
+		connection_leave(f, f->peers[f->peer_count - 1]);
 	for (uint32_t i = 0; i < f->job_count; i++) {
 		if (f->jobs[i]->class)
 			peer_class_drop(f->jobs[i]->class);
@@ -85,51 +63,6 @@ void farm_free(struct farm *f)
 	mem_free(f->peers);
 	mem_free(f->actions);
 	mem_free(f);
-}
-
-/* The first job whose id is not below `id`. */
-static uint32_t job_place_of(const struct farm *f, uint64_t id)
-{
-	uint32_t low = 0, high = f->job_count;
-	while (low < high) {
-		uint32_t mid = low + (high - low) / 2;
-		if (f->jobs[mid]->id < id)
-			low = mid + 1;
-		else
-			high = mid;
-	}
-	return low;
-}
-
-static uint32_t peer_place_of(const struct farm *f, uint64_t id)
-{
-	uint32_t low = 0, high = f->peer_count;
-	while (low < high) {
-		uint32_t mid = low + (high - low) / 2;
-		if (f->peers[mid]->id < id)
-			low = mid + 1;
-		else
-			high = mid;
-	}
-	return low;
-}
-
-struct job *farm_find_job(const struct farm *f, uint64_t id)
-{
-	uint32_t i = job_place_of(f, id);
-	return i < f->job_count && f->jobs[i]->id == id ? f->jobs[i] : NULL;
-}
-
-struct peer *farm_find_peer(const struct farm *f, uint64_t id)
-{
-	uint32_t i = peer_place_of(f, id);
-	return i < f->peer_count && f->peers[i]->id == id ? f->peers[i] : NULL;
-}
-
-uint64_t farm_next_peer(const struct farm *f, uint64_t after)
-{
-	uint32_t i = after == UINT64_MAX ? f->peer_count : peer_place_of(f, after + 1);
-	return i < f->peer_count ? f->peers[i]->id : 0;
 }
 
 static struct event_join complete(const struct event_join *e)
@@ -145,7 +78,7 @@ static void joined(struct farm *f, const struct event *ev)
 	const struct event_join join = complete(&ev->join);
 	const char *refused = "";
 	assert(join.peer && !farm_find_peer(f, join.peer));
-	if (worker_registry_replace(f, &join, &refused) && peer_join(f, &join, &refused))
+	if (connection_replace(f, &join, &refused) && connection_join(f, &join, &refused))
 		return;
 	struct action *a = update_add(f, ACTION_REJECTED);
 	a->peer = ev->join.peer;
@@ -162,7 +95,7 @@ static void left(struct farm *f, const struct event *ev)
 {
 	struct peer *p = farm_find_peer(f, ev->peer);
 	if (p)
-		peer_lose(f, p);
+		connection_lose(f, p);
 }
 
 static void requested(struct farm *f, const struct event *ev)

@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* How far a job is and how long it will take: the bound that looks nearest decides. */
-#include "coordinator/core/job.h"
+#include "coordinator/core/forecast.h"
 
 #include <math.h>
 

@@ -3,7 +3,8 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/core/state.h"
+#include "coordinator/core/owner.h"
+#include "coordinator/core/proof.h"
 
 #include <assert.h>
 #include <math.h>
@@ -87,11 +88,6 @@ void job_free(struct job *j)
 	mem_free(j);
 }
 
-bool job_state_is_end(enum job_state s)
-{
-	return s == JOB_DONE || s == JOB_FAILED || s == JOB_CANCELLED;
-}
-
 bool job_is_live(const struct job *j)
 {
 	return !job_state_is_end(j->state);
@@ -113,24 +109,6 @@ bool job_is_held(const struct job *j)
 		if (*j->held[i])
 			return true;
 	return false;
-}
-
-void job_hold(struct job *j, enum job_hold which, const char *why, double now)
-{
-	bool was = job_is_held(j);
-	text_copy(j->held[which], sizeof j->held[which], why);
-	if (which == HOLD_FILES)
-		j->files_changed = now;
-	if (!was && job_is_held(j))
-		j->held_since = now;
-	if (!was || job_is_held(j))
-		return;
-	j->progress_floor = job_progress(j, now); /* moving its clock rounds */
-	double pause = now - j->held_since;	  /* its times are as if that had not been; NAN stays */
-	j->started += pause;
-	j->opened += pause;
-	j->looked_at += pause;
-	j->held_since = NAN;
 }
 
 double job_elapsed(const struct job *j, double now)
@@ -159,10 +137,10 @@ void job_place(struct job *j, struct slot *s)
 	uint64_t ahead = s->next - j->rounds;
 	if (ahead > 1)
 		list_append(&j->blocked, &s->link);
-	else if (s->holders >= verify_copies(j, s))
+	else if (s->holders >= proof_copies(j, s))
 		list_append(&j->out[ahead], &s->link);
 	else
-		list_append(verify_waits(j, s) || doubt_waits(s) ? &j->second[ahead] : &j->ready[ahead], &s->link);
+		list_append(proof_waits(j, s) || doubt_waits(s) ? &j->second[ahead] : &j->ready[ahead], &s->link);
 }
 
 double job_lease_timeout(const struct farm_config *c, const struct job *j, const struct slot *s)
@@ -202,7 +180,7 @@ static void add_duration(struct job *j, double duration)
 }
 
 /* Counts and lists, from how far each slot is. */
-static void place_all(struct job *j)
+void job_place_all(struct job *j)
 {
 	j->done = j->ahead = 0;
 	j->spread = false;
@@ -235,7 +213,7 @@ bool job_merge(struct job *j, struct slot *s, double now, double duration)
 	bool complete = j->done == j->slot_count;
 	if (complete && j->spread) {
 		j->rounds++;
-		place_all(j);
+		job_place_all(j);
 	} else if (complete) {
 		j->rounds++;
 		j->done = j->ahead;
@@ -249,26 +227,6 @@ bool job_merge(struct job *j, struct slot *s, double now, double duration)
 	}
 	job_place(j, s);
 	return complete;
-}
-
-void job_take_back(struct farm *f, struct job *j, struct slot *s)
-{
-	assert(j->kind == LEASE_RENDER && s->next > 0);
-	j->progress_floor = job_progress(j, f->now);
-	lease_revoke_slot(f, s);
-	s->next--;
-	s->timeouts = 0;
-	s->failure_quorum.count = 0;
-	s->lost.count = 0;
-	j->leases_merged--;
-	if (s->next < j->rounds) {
-		j->rounds = s->next;
-		j->evaluating = false; /* the answer is about more */
-	}
-	for (uint32_t i = 0; i < j->slot_count; i++)
-		if (j->slots[i].next - j->rounds > 1)
-			lease_revoke_slot(f, &j->slots[i]);
-	place_all(j);
 }
 
 void job_raise_limit(struct job *j)
@@ -301,7 +259,7 @@ void job_restore(struct job *j, enum lease_kind kind, const uint64_t *next, doub
 		j->slots[i].next = next[i];
 		merged += next[i];
 	}
-	place_all(j);
+	job_place_all(j);
 	if (kind == LEASE_RENDER)
 		j->leases_merged = merged;
 	else
@@ -326,7 +284,7 @@ void job_unpin_if_untouched(struct job *j)
 	j->fingerprint[0] = 0;
 }
 
-bool job_takes(const struct job *j, const struct peer *p)
+bool job_takes(const struct job *j, const struct peer_class *c)
 {
-	return j->mixed || !j->class || j->class == p->class;
+	return j->mixed || !j->class || j->class == c;
 }

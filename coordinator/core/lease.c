@@ -1,7 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/core/lease.h"
 
-#include "coordinator/core/state.h"
+#include "coordinator/core/actions.h"
+#include "coordinator/core/job.h"
+#include "coordinator/core/owner.h"
+#include "coordinator/core/peer.h"
+#include "coordinator/core/proof.h"
 
 #include <assert.h>
 
@@ -39,6 +43,15 @@ static struct lease *lease_take(struct farm *f, struct peer *p)
 	return oldest;
 }
 
+static void say(struct farm *f, enum action_kind kind, const struct lease *l)
+{
+	struct action *a = update_add(f, kind);
+	a->peer = l->peer->id;
+	a->key = lease_key(l);
+	a->job = a->key.job;
+	a->anew = l->slot->doubt.anew;
+}
+
 void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 {
 	struct lease *l = lease_of(s, p);
@@ -56,7 +69,7 @@ void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 	if (s->holders == 0)
 		s->since = f->now;
 	else
-		j->counts.duplicates += s->holders >= verify_copies(j, s);
+		j->counts.duplicates += s->holders >= proof_copies(j, s);
 	s->holders++;
 	j->leases_out++;
 	j->owner->leases_out++;
@@ -65,7 +78,7 @@ void lease_send(struct farm *f, struct peer *p, struct job *j, struct slot *s)
 	peer_requeue(f, p);
 	if (!j->mixed)
 		job_pin(j, p->class);
-	update_lease(f, ACTION_SEND_LEASE, l);
+	say(f, ACTION_SEND_LEASE, l);
 }
 
 static void let_go(struct farm *f, struct lease *l)
@@ -114,7 +127,7 @@ void lease_drop(struct farm *f, struct lease *l)
 
 void lease_revoke(struct farm *f, struct lease *l)
 {
-	update_lease(f, ACTION_REVOKE, l);
+	say(f, ACTION_REVOKE, l);
 	lease_drop(f, l);
 }
 

@@ -4,6 +4,7 @@
 #define COORDINATOR_CORE_LEASE_H
 
 #include "common/film/batch.h"
+#include "coordinator/core/slot.h"
 
 #include <stdbool.h>
 
@@ -11,17 +12,6 @@ struct farm;
 struct job;
 struct peer;
 struct slot;
-
-struct lease {
-	bool used;
-	bool overdue;	/* counts no longer as held: handed out again */
-	bool delivered; /* its result waits to be looked at: counts no longer among what its worker has to do */
-	struct peer *peer;
-	struct job *job;
-	struct slot *slot; /* the key is that of the slot's next epoch: a merge ends all leases of the slot */
-	double sent, deadline;
-	struct lease *next; /* of the same slot */
-};
 
 struct lease_key lease_key(const struct lease *l);
 struct lease *lease_of(const struct slot *s, const struct peer *p); /* NULL: holds none */

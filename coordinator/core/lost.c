@@ -2,7 +2,10 @@
 #include "coordinator/core/lost.h"
 
 #include "common/base/text.h"
-#include "coordinator/core/state.h"
+#include "coordinator/core/failure_quorum.h"
+#include "coordinator/core/lease.h"
+#include "coordinator/core/owner.h"
+#include "coordinator/core/rounds.h"
 
 enum { LOST_TOLD = 2 };
 

@@ -1,8 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What people want of jobs that are there: that they wait, go on, come earlier or later, last longer. */
-#include "coordinator/core/state.h"
+#include "coordinator/core/orders.h"
+
+#include "common/base/text.h"
+#include "coordinator/core/find.h"
+#include "coordinator/core/forecast.h"
+#include "coordinator/core/rounds.h"
 
 #include <assert.h>
+#include <math.h>
 #include <string.h>
 
 /* The live job that somebody means; NULL: the answer is given. */
@@ -16,11 +22,29 @@ static struct job *meant(struct farm *f, const struct event *ev)
 	return NULL;
 }
 
+static void hold(struct job *j, enum job_hold which, const char *why, double now)
+{
+	bool was = job_is_held(j);
+	text_copy(j->held[which], sizeof j->held[which], why);
+	if (which == HOLD_FILES)
+		j->files_changed = now;
+	if (!was && job_is_held(j))
+		j->held_since = now;
+	if (!was || job_is_held(j))
+		return;
+	j->progress_floor = job_progress(j, now); /* moving its clock rounds */
+	double pause = now - j->held_since;	  /* its times are as if that had not been; NAN stays */
+	j->started += pause;
+	j->opened += pause;
+	j->looked_at += pause;
+	j->held_since = NAN;
+}
+
 void orders_hold(struct farm *f, const struct event *ev)
 {
 	struct job *j = meant(f, ev);
 	if (j)
-		job_hold(j, ev->hold, ev->text ? ev->text : "", f->now);
+		hold(j, ev->hold, ev->text ? ev->text : "", f->now);
 }
 
 void orders_priority(struct farm *f, const struct event *ev)
@@ -32,9 +56,9 @@ void orders_priority(struct farm *f, const struct event *ev)
 		rounds_reject(f, ev, "a priority is from -100 to 100");
 		return;
 	}
-	orders_delist(f, j);
+	rounds_remove(f, j);
 	j->priority = ev->priority;
-	orders_enlist(f, j);
+	rounds_place(f, j);
 }
 
 void orders_extend(struct farm *f, const struct event *ev)
@@ -55,26 +79,4 @@ void orders_extend(struct farm *f, const struct event *ev)
 	/* While its error was estimated once more for a bound that is none any longer, it goes on. */
 	if (j->ending != END_NONE)
 		j->ending = rounds_bound(j, job_elapsed(j, f->now));
-}
-
-static bool comes_before(const struct job *a, const struct job *b)
-{
-	return a->priority > b->priority || (a->priority == b->priority && a->id < b->id);
-}
-
-void orders_enlist(struct farm *f, struct job *j)
-{
-	uint32_t i = f->live_count++;
-	for (; i > 0 && comes_before(j, f->live[i - 1]); i--)
-		f->live[i] = f->live[i - 1];
-	f->live[i] = j;
-}
-
-void orders_delist(struct farm *f, const struct job *j)
-{
-	uint32_t i = 0;
-	while (f->live[i] != j)
-		i++;
-	f->live_count--;
-	memmove(&f->live[i], &f->live[i + 1], (f->live_count - i) * sizeof *f->live);
 }

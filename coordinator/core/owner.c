@@ -3,7 +3,6 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/core/state.h"
 
 #include <math.h>
 #include <string.h>
@@ -44,18 +43,4 @@ void owner_limit(struct owner *o, double now)
 	enum { DOUBLINGS = 6 };
 	o->limited_until = now + ldexp(first, o->limits < DOUBLINGS ? (int)o->limits : DOUBLINGS);
 	o->limits++;
-}
-
-bool owner_is_limited(const struct farm *f, const struct job *j)
-{
-	return j->owner->limited_until > f->now && !job_is_proven(j);
-}
-
-uint32_t owner_unproven(const struct farm *f, const struct owner *o)
-{
-	uint32_t n = 0;
-	for (uint32_t i = 0; i < f->live_count; i++)
-		if (f->live[i]->owner == o && !job_is_proven(f->live[i]))
-			n += f->live[i]->leases_out;
-	return n;
 }

@@ -26,9 +26,5 @@ void owner_drop(struct owner *o);				/* NULL: nothing */
 /* A job of his has ended workers: for 60 s, twice as long each time up to 64 minutes, his jobs that nothing has been
  * made of get one lease at a time. Forgotten with the last of his jobs. */
 void owner_limit(struct owner *o, double now);
-struct farm;
-struct job;
-bool owner_is_limited(const struct farm *f, const struct job *j);
-uint32_t owner_unproven(const struct farm *f, const struct owner *o); /* leases out of such jobs */
 
 #endif

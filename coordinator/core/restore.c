@@ -1,8 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Jobs of an earlier life, and ended ones that go on: put where their merged leases say that they were. */
-#include "coordinator/core/state.h"
+#include "coordinator/core/restore.h"
 
 #include "common/base/mem.h"
+#include "coordinator/core/actions.h"
+#include "coordinator/core/find.h"
+#include "coordinator/core/forecast.h"
+#include "coordinator/core/rounds.h"
+#include "coordinator/core/worker_registry.h"
 
 #include <assert.h>
 #include <math.h>
@@ -10,7 +15,7 @@
 /* As it was pinned by its first merged batch. Without memory for that the first worker that asks pins it again. */
 static void pin(struct farm *f, struct job *j, const char *fingerprint)
 {
-	struct peer_class *c = *fingerprint ? peer_class_use(f, fingerprint) : NULL;
+	struct peer_class *c = *fingerprint ? peer_class_use(&f->classes, fingerprint) : NULL;
 	if (!c)
 		return;
 	job_pin(j, c);

@@ -1,10 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* What a job goes through: submitted, bootstrap, rounds, the bounds, its end. */
-#include "coordinator/core/state.h"
+#include "coordinator/core/rounds.h"
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/estimate/merge.h"
+#include "coordinator/core/actions.h"
+#include "coordinator/core/find.h"
+#include "coordinator/core/forecast.h"
+#include "coordinator/core/lease.h"
+#include "coordinator/core/verify.h"
 
 #include <assert.h>
 #include <math.h>
@@ -34,13 +39,35 @@ void rounds_reject(struct farm *f, const struct event *ev, const char *text)
 	a->text = text;
 }
 
+static bool comes_before(const struct job *a, const struct job *b)
+{
+	return a->priority > b->priority || (a->priority == b->priority && a->id < b->id);
+}
+
+void rounds_place(struct farm *f, struct job *j)
+{
+	uint32_t i = f->live_count++;
+	for (; i > 0 && comes_before(j, f->live[i - 1]); i--)
+		f->live[i] = f->live[i - 1];
+	f->live[i] = j;
+}
+
+void rounds_remove(struct farm *f, const struct job *j)
+{
+	uint32_t i = 0;
+	while (f->live[i] != j)
+		i++;
+	f->live_count--;
+	memmove(&f->live[i], &f->live[i + 1], (f->live_count - i) * sizeof *f->live);
+}
+
 void rounds_enlist(struct farm *f, struct job *j)
 {
 	uint32_t i = f->job_count++;
 	for (; i > 0 && f->jobs[i - 1]->id > j->id; i--)
 		f->jobs[i] = f->jobs[i - 1];
 	f->jobs[i] = j;
-	orders_enlist(f, j);
+	rounds_place(f, j);
 }
 
 void rounds_forget(struct farm *f, struct job *j)
@@ -128,7 +155,7 @@ void rounds_end(struct farm *f, struct job *j, enum job_end end, const char *tex
 	j->slots = NULL;
 	j->proofs = NULL;
 	j->slot_count = 0;
-	orders_delist(f, j);
+	rounds_remove(f, j);
 	if (j->state == JOB_DONE)
 		about_job(f, ACTION_PUBLISH, j);
 	job_changed(f, j);

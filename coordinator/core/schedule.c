@@ -1,6 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Who gets what, and what has been out for too long. */
-#include "coordinator/core/state.h"
+#include "coordinator/core/schedule.h"
+
+#include "coordinator/core/actions.h"
+#include "coordinator/core/connection.h"
+#include "coordinator/core/doubt.h"
+#include "coordinator/core/job.h"
+#include "coordinator/core/lease.h"
+#include "coordinator/core/owner.h"
+#include "coordinator/core/rounds.h"
+#include "coordinator/core/share.h"
+#include "coordinator/core/verify.h"
 
 #include <math.h>
 
@@ -18,7 +28,7 @@ static struct peer *waiting_in(struct farm *f, const struct peer_class *c, const
 	struct peer *second = NULL;
 	for (struct link *k = c->waiting.next; k != &c->waiting; k = k->next) {
 		struct peer *p = list_entry(k, struct peer, waiting);
-		if (verify_bars(j, s, p) || doubt_bars(f, j, s, p))
+		if (proof_bars(j, s, p) || doubt_bars(f, j, s, p))
 			continue;
 		double until = peer_avoids_until(p, j->id);
 		if (until > f->now) {
@@ -85,7 +95,7 @@ static bool comes_first(const struct job *a, const struct job *b)
 /* Of an owner whose job ended workers: one lease at a time of all his jobs of which nothing has been made yet. */
 static bool must_wait(struct farm *f, const struct job *j)
 {
-	bool waits = owner_is_limited(f, j) && owner_unproven(f, j->owner) > 0;
+	bool waits = share_is_limited(f, j) && share_unproven(f, j->owner) > 0;
 	if (waits)
 		call_again(f, j->owner->limited_until);
 	return waits;
@@ -222,12 +232,12 @@ void schedule_expire(struct farm *f, double read)
 			struct action *a = update_add(f, ACTION_CLOSE_PEER);
 			a->peer = p->id;
 			a->text = "nothing heard for too long";
-			peer_lose(f, p);
+			connection_lose(f, p);
 			continue;
 		}
 		if (p->state != PEER_SILENT && p->heard + f->config.silent_after <= read) {
 			peer_set_state(f, p, PEER_SILENT);
-			peer_lose_leases(f, p);
+			connection_lose_leases(f, p);
 		}
 		double patience = p->state == PEER_SILENT ? f->config.forget_after : f->config.silent_after;
 		f->check_at = fmin(f->check_at, p->heard + patience);

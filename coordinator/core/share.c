@@ -2,7 +2,8 @@
 #include "coordinator/core/share.h"
 
 #include "common/base/text.h"
-#include "coordinator/core/state.h"
+#include "coordinator/core/job.h"
+#include "coordinator/core/owner.h"
 
 #include <math.h>
 
@@ -26,7 +27,7 @@ static uint32_t machines_of(const struct farm *f, const struct job *j, double *l
 	double leases = 0;
 	for (uint32_t i = 0; i < f->peer_count; i++) {
 		const struct peer *p = f->peers[i];
-		if (p->state != PEER_ACTIVE || !job_takes(j, p))
+		if (p->state != PEER_ACTIVE || !job_takes(j, p->class))
 			continue;
 		machines++;
 		leases += p->want;
@@ -160,4 +161,18 @@ void share_of(const struct farm *f, const struct job *j, struct share *out)
 	out->machines_due = due(f, j, out->machines, leases_each);
 	put_place(f, j, NULL, out, leases_each, out->place, sizeof out->place);
 	put_place(f, j, j->owner, out, leases_each, out->owners_place, sizeof out->owners_place);
+}
+
+bool share_is_limited(const struct farm *f, const struct job *j)
+{
+	return j->owner->limited_until > f->now && !job_is_proven(j);
+}
+
+uint32_t share_unproven(const struct farm *f, const struct owner *o)
+{
+	uint32_t n = 0;
+	for (uint32_t i = 0; i < f->live_count; i++)
+		if (f->live[i]->owner == o && !job_is_proven(f->live[i]))
+			n += f->live[i]->leases_out;
+	return n;
 }

@@ -9,9 +9,12 @@
 #ifndef COORDINATOR_CORE_SHARE_H
 #define COORDINATOR_CORE_SHARE_H
 
-#include "coordinator/core/farm.h"
+#include "coordinator/core/state.h"
+
+#include <stdbool.h>
 
 struct job;
+struct owner;
 
 struct share {
 	uint32_t workers;	/* that hold its leases */
@@ -23,5 +26,9 @@ struct share {
 
 void share_of(const struct farm *f, const struct job *j, struct share *out);
 bool share_competes(const struct job *a, const struct job *b); /* for some worker, may be */
+
+/* The job is of an owner who is limited (owner.h), and nothing of it was made yet. */
+bool share_is_limited(const struct farm *f, const struct job *j);
+uint32_t share_unproven(const struct farm *f, const struct owner *o); /* leases out of such jobs of his */
 
 #endif

@@ -1,8 +1,17 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* Answers to questions about the farm. */
+#include "coordinator/core/status.h"
+
 #include "common/base/text.h"
+#include "coordinator/core/answer.h"
+#include "coordinator/core/doubt.h"
+#include "coordinator/core/find.h"
+#include "coordinator/core/forecast.h"
+#include "coordinator/core/lease.h"
+#include "coordinator/core/owner.h"
+#include "coordinator/core/peer.h"
 #include "coordinator/core/share.h"
-#include "coordinator/core/state.h"
+#include "coordinator/core/verify.h"
 
 #include <math.h>
 #include <stdio.h>
@@ -62,7 +71,7 @@ static uint32_t active_workers(const struct farm *f)
 static bool someone_avoids(const struct farm *f, const struct job *j)
 {
 	for (uint32_t i = 0; i < f->peer_count; i++)
-		if (job_takes(j, f->peers[i]) && peer_avoids_until(f->peers[i], j->id) > f->now)
+		if (job_takes(j, f->peers[i]->class) && peer_avoids_until(f->peers[i], j->id) > f->now)
 			return true;
 	return false;
 }
@@ -73,7 +82,8 @@ static void put_failing(const struct farm *f, const struct job *j, char *text, s
 	char names[100] = "";
 	struct text t = {names, sizeof names};
 	for (uint32_t i = 0; i < f->peer_count; i++)
-		if (f->peers[i]->state == PEER_ACTIVE && job_takes(j, f->peers[i]) && peer_lacks(f->peers[i], j->id))
+		if (f->peers[i]->state == PEER_ACTIVE && job_takes(j, f->peers[i]->class) &&
+		    peer_lacks(f->peers[i], j->id))
 			text_put(&t, "%s%s", *names ? ", " : "", f->peers[i]->name);
 	if (*names)
 		text_print(text, size,
@@ -154,7 +164,7 @@ static const struct job *why_waiting(const struct farm *f, const struct job *j, 
 		snprintf(text, size, "no worker with fingerprint %s (%u with others)", j->fingerprint, active);
 	else if (verify_why(f, j, text, size) || doubt_why(f, j, text, size))
 		return NULL;
-	else if (owner_is_limited(f, j) && owner_unproven(f, j->owner))
+	else if (share_is_limited(f, j) && share_unproven(f, j->owner))
 		snprintf(
 			text, size,
 			"a job of its owner ended workers: one lease at a time until something of a job is made (for %.0f s)",
@@ -289,7 +299,7 @@ bool farm_peer(const struct farm *f, uint64_t id, struct peer_status *s)
 bool farm_verifies(const struct farm *f, const struct lease_key *k)
 {
 	const struct job *j = farm_find_job(f, k->job);
-	return j && verify_chosen(j, k);
+	return j && proof_chosen(j, k);
 }
 
 uint64_t farm_next_quarantined(const struct farm *f, uint64_t after)
@@ -339,4 +349,20 @@ bool farm_lease(const struct farm *f, uint64_t peer, uint32_t i, struct lease_st
 		return true;
 	}
 	return false;
+}
+
+const char *farm_maker(const struct farm *f, const struct lease_key *k)
+{
+	return doubt_maker(f, k);
+}
+
+enum farm_delivery farm_awaits(const struct farm *f, uint64_t peer, const struct lease_key *k)
+{
+	return answer_awaits(f, peer, k);
+}
+
+uint64_t farm_next_peer(const struct farm *f, uint64_t after)
+{
+	uint32_t i = after == UINT64_MAX ? f->peer_count : farm_peer_place(f, after + 1);
+	return i < f->peer_count ? f->peers[i]->id : 0;
 }

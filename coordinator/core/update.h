@@ -8,9 +8,18 @@
 
 #include "common/film/batch.h"
 
+#include <stdbool.h>
 #include <stddef.h>
 
 enum job_state { JOB_QUEUED, JOB_BOOTSTRAP, JOB_RUNNING, JOB_HELD, JOB_DONE, JOB_FAILED, JOB_CANCELLED };
+
+/* It has ended. */
+static inline bool job_state_is_end(enum job_state s)
+{
+	return s == JOB_DONE || s == JOB_FAILED || s == JOB_CANCELLED;
+}
+
+enum peer_state { PEER_ACTIVE, PEER_SILENT, PEER_ASIDE };
 
 /* Why a job ended. */
 enum job_end {
@@ -22,6 +31,9 @@ enum job_end {
 	END_CANCELLED,
 	END_FAILED,
 };
+
+/* See farm_awaits (status.h). */
+enum farm_delivery { DELIVERY_AWAITED, DELIVERY_OPEN, DELIVERY_USELESS };
 
 enum action_kind {
 	ACTION_SUBMITTED, /* tag, job: the new job's id */

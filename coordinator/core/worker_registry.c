@@ -3,13 +3,12 @@
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "coordinator/core/state.h"
 
 #include <stdio.h>
 #include <string.h>
 
 /* By its home, else by its name. */
-static struct identity *find(const struct farm *f, const struct event_join *e)
+struct identity *worker_registry_find(const struct farm *f, const struct event_join *e)
 {
 	struct identity *named = NULL;
 	for (uint32_t i = 0; i < f->known_count; i++) {
@@ -58,7 +57,7 @@ static uint64_t certificate_id(const struct farm *f, const char *certificate, ui
 
 struct identity *worker_registry_use(struct farm *f, const struct event_join *e, const char **refused)
 {
-	struct identity *k = find(f, e);
+	struct identity *k = worker_registry_find(f, e);
 	if (!k) {
 		k = room_for_one(f, e->certificate);
 		if (!k) {
@@ -95,43 +94,9 @@ void worker_registry_free(struct farm *f)
 	mem_free(f->known);
 }
 
-static bool is_at(const struct peer *p, const struct event_join *e)
-{
-	return strcmp(p->home, e->home) == 0 && strcmp(p->who->certificate, e->certificate) == 0;
-}
-
-bool worker_registry_replace(struct farm *f, const struct event_join *e, const char **refused)
-{
-	if (!*e->home)
-		return true;
-	const struct identity *k = find(f, e);
-	uint64_t last = k && strcmp(k->home, e->home) == 0 ? k->restarts : 0;
-	for (uint32_t i = 0; i < f->peer_count; i++)
-		if (is_at(f->peers[i], e) && f->peers[i]->restarts > last)
-			last = f->peers[i]->restarts;
-	if (last > e->restarts) {
-		text_print(f->text, sizeof f->text,
-			   "this is start %llu of %s, and start %llu of it has been here before",
-			   (unsigned long long)e->restarts, e->name, (unsigned long long)last);
-		*refused = f->text;
-		return false;
-	}
-	for (uint32_t i = f->peer_count; i-- > 0;) {
-		struct peer *p = f->peers[i];
-		if (!is_at(p, e))
-			continue;
-		struct action *a = update_add(f, ACTION_CLOSE_PEER);
-		a->peer = p->id;
-		a->text = "the same worker has called again";
-		p->returns = true;
-		peer_lose(f, p);
-	}
-	return true;
-}
-
 /* Names cost nothing: of one certificate so many are remembered as set aside, and the one that has been away longest
  * makes room. */
-static void set_aside(struct farm *f, struct identity *who)
+void worker_registry_set_aside(struct farm *f, struct identity *who)
 {
 	struct identity *oldest = NULL;
 	uint32_t count = 0;
@@ -148,46 +113,6 @@ static void set_aside(struct farm *f, struct identity *who)
 	who->aside = true;
 }
 
-void worker_registry_quarantine(struct farm *f, struct identity *who)
-{
-	if (who->aside)
-		return;
-	set_aside(f, who);
-	struct action *a = update_add(f, ACTION_ASIDE);
-	a->who = who->id;
-	a->text = who->text;
-	for (uint32_t i = 0; i < f->peer_count; i++) {
-		struct peer *p = f->peers[i];
-		if (p->who != who)
-			continue;
-		peer_set_state(f, p, PEER_ASIDE);
-		peer_drop_leases(f, p, true);
-	}
-	verify_forget_worker(f, who);
-}
-
-void worker_registry_wrong(struct farm *f, struct identity *who, const char *what, const struct lease_key *k)
-{
-	snprintf(who->text, sizeof who->text, "%s: j%llu %s group %u part %u epoch %llu", what,
-		 (unsigned long long)k->job, k->kind == LEASE_BOOTSTRAP ? "bootstrap" : "render", k->group, k->part,
-		 (unsigned long long)k->epoch);
-	who->wrong++;
-	struct action *a = update_add(f, ACTION_WRONG);
-	a->who = who->id;
-	a->job = k->job;
-	a->key = *k;
-	a->text = who->text;
-	for (uint32_t i = 0; i < f->peer_count; i++) {
-		struct peer *p = f->peers[i];
-		if (p->who != who)
-			continue;
-		p->faults++;
-		memcpy(p->text, who->text, sizeof p->text);
-	}
-	if (who->wrong >= f->config.max_faults)
-		worker_registry_quarantine(f, who);
-}
-
 void worker_registry_restore_quarantined(struct farm *f, const struct event_join *e, const char *text)
 {
 	const char *refused;
@@ -195,6 +120,6 @@ void worker_registry_restore_quarantined(struct farm *f, const struct event_join
 	if (!k)
 		return;
 	text_copy(k->text, sizeof k->text, text);
-	set_aside(f, k);
+	worker_registry_set_aside(f, k);
 	worker_registry_drop(f, k);
 }

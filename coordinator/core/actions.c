@@ -1,8 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "coordinator/core/update.h"
+#include "coordinator/core/actions.h"
 
 #include "common/base/mem.h"
-#include "coordinator/core/state.h"
 
 #include <assert.h>
 
@@ -29,13 +28,4 @@ struct action *update_add(struct farm *f, enum action_kind kind)
 	struct action *a = &f->actions[f->action_count++];
 	*a = (struct action){.kind = kind, .text = ""};
 	return a;
-}
-
-void update_lease(struct farm *f, enum action_kind kind, const struct lease *l)
-{
-	struct action *a = update_add(f, kind);
-	a->peer = l->peer->id;
-	a->key = lease_key(l);
-	a->job = a->key.job;
-	a->anew = l->slot->doubt.anew;
 }

@@ -1,0 +1,41 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A worker, whatever its connection (worker_registry.h). */
+#ifndef COORDINATOR_CORE_IDENTITY_H
+#define COORDINATOR_CORE_IDENTITY_H
+
+#include "coordinator/core/event.h"
+
+enum {
+	IDENTITY_AVOIDED = 8,
+	IDENTITY_QUARANTINED = 64,
+	IDENTITY_CERTIFICATE = 72,
+	IDENTITY_NAME = JOIN_NAME,
+	IDENTITY_HOME = JOIN_HOME
+};
+
+enum { PEER_WINDOW = 8 /* leases that a worker may hold before it has given anything */ };
+
+/* After a failed lease the worker stays away from that job for a while. */
+struct avoid {
+	uint64_t job; /* 0: free */
+	uint32_t failures;
+	double until;
+	bool own; /* each of its failures since the last pause was its own machine's */
+};
+
+struct identity {
+	uint64_t id;		 /* never used twice */
+	uint64_t certificate_id; /* the same for all of one certificate */
+	char certificate[IDENTITY_CERTIFICATE], name[IDENTITY_NAME], home[IDENTITY_HOME];
+	uint64_t restarts; /* of the home, as they were last told */
+	uint64_t calls;	   /* connections so far, and how often it was heard again after a silence */
+	uint32_t uses;	   /* connections, and answers that wait for a second one */
+	uint32_t faults_in_row, wrong;
+	uint32_t window; /* leases that it may hold: see peer_succeeded */
+	bool aside;
+	double seen;
+	struct avoid avoid[IDENTITY_AVOIDED];
+	char text[256]; /* its last fault */
+};
+
+#endif

@@ -1,0 +1,14 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What people want of jobs that are there. */
+#ifndef COORDINATOR_CORE_ORDERS_H
+#define COORDINATOR_CORE_ORDERS_H
+
+#include "coordinator/core/event.h"
+
+struct farm;
+
+void orders_hold(struct farm *f, const struct event *ev);
+void orders_priority(struct farm *f, const struct event *ev);
+void orders_extend(struct farm *f, const struct event *ev);
+
+#endif

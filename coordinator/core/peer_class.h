@@ -1,0 +1,23 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* Workers with the same numeric fingerprint. */
+#ifndef COORDINATOR_CORE_PEER_CLASS_H
+#define COORDINATOR_CORE_PEER_CLASS_H
+
+#include "coordinator/core/list.h"
+
+#include <stdint.h>
+
+enum { FINGERPRINT_SIZE = 128 };
+
+struct peer_class {
+	struct link link;    /* of all classes */
+	struct link waiting; /* peers that have a wish */
+	uint32_t uses;	     /* workers and live jobs */
+	uint32_t active;     /* workers that may get leases */
+	char fingerprint[FINGERPRINT_SIZE];
+};
+
+struct peer_class *peer_class_use(struct link *classes, const char *fingerprint); /* NULL: no memory */
+void peer_class_drop(struct peer_class *c);
+
+#endif

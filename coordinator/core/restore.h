@@ -1,0 +1,12 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A job of an earlier run goes on. */
+#ifndef COORDINATOR_CORE_RESTORE_H
+#define COORDINATOR_CORE_RESTORE_H
+
+#include "coordinator/core/event.h"
+
+struct farm;
+
+void restore_job(struct farm *f, const struct event *ev);
+
+#endif
