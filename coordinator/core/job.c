@@ -1,4 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A job of the core: its slots, in which list each is, and how far the rounds are.
+ *
+ * A slot lies in one list by its next epoch (the first incomplete round, the one after it, or blocked behind both) and
+ * by its holders: ready, out with one, or waiting for a second answer; with two holders it lies in none. job_place puts
+ * it there after each change. When all slots have merged a round, the lists of the next one take its place at once;
+ * only after an epoch was taken back each slot is placed anew.
+ *
+ * Memory is taken when a job is made, which may be refused with a sentence. Nothing after that can fail.
+ */
 #include "coordinator/core/job.h"
 
 #include "common/base/mem.h"

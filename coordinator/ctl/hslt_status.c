@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * hslt-status: what the coordinator's status socket says, for people.
+ *
+ * It connects, reads the snapshot and prints jobs and workers, or one job with its leases; with --watch it subscribes
+ * and prints again when something changes, until the job has ended; with --json it prints the objects as they are.
+ *
+ * Where nobody answers, or what answers is no coordinator, it says so and exits with 75; 1: there is no such job.
+ */
 #include "common/base/progress.h"
 #include "common/base/terminal.h"
 #include "common/base/version.h"

@@ -4,7 +4,7 @@
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "coordinator/job/late.h"
-#include "coordinator/job/replay.h"
+#include "coordinator/job/stored_frame.h"
 
 #include <assert.h>
 #include <string.h>
@@ -68,7 +68,7 @@ static int read_batch(const struct live_job *o, struct journal *j, const struct 
 	int rc = journal_body(j, o->merged[i].at, &body, &size, e);
 	if (rc)
 		return rc;
-	rc = replay_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
+	rc = stored_frame_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
 	if (!rc) {
 		rc = batch_unpack(b, &o->plan, env.message->lease_result, payload, payload_size, e);
 		take_maker(maker, env.message->lease_result->maker);

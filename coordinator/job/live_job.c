@@ -1,4 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * One job that runs: its films, seeds, chain states and log.
+ *
+ * live_job_new takes the submission and begins the record. Bootstrap results are collected until live_job_prepare makes
+ * b, seeds and canvas of them; from then on live_job_merge adds each result to the films and keeps its chain states for
+ * the next lease of its group and part. Results that come while a thread reads the films wait in a list.
+ *
+ * live_job_merge fails with -ENOMEM half way, after which the films are not to be used, or with -ERANGE when a sum
+ * leaves the grid of the films. A log that cannot be written is passed over: no job fails by it.
+ */
 #include "coordinator/job/live_job.h"
 
 #include "common/base/disk.h"

@@ -1,13 +1,25 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * What was merged of a job, from the disk into its films.
+ *
+ * replay_films reads the checkpoint, if there is one, and then the journal that follows it. Each result goes through
+ * the code that live ones go through; one whose predecessor is missing is noted (late.h) and tried again at the end.
+ * The other records bring back fingerprint, times, looks and counters.
+ *
+ * A damaged record is left out, counted, and said in the job's log: its lease is computed again. A damaged checkpoint
+ * is -EBADMSG; a record that is whole and means nothing here was written by another version: -EPROTO. The job is then
+ * only to be dropped. A stop that another thread asks for is -ECANCELED.
+ */
 #include "coordinator/job/replay.h"
 
 #include "common/base/disk.h"
 #include "common/base/mem.h"
 #include "common/base/text.h"
-#include "common/wire/frame.h"
 #include "coordinator/job/back.h"
 #include "coordinator/job/checkpoint_file.h"
 #include "coordinator/job/late.h"
+#include "coordinator/job/stored_frame.h"
+#include "coordinator/store/journal_file.h"
 
 #include <string.h>
 
@@ -21,26 +33,6 @@ struct replay {
 	struct lease_key damaged[DAMAGED_MOST]; /* whose records are */
 	size_t damaged_count;
 };
-
-int replay_unpack(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
-		  const unsigned char **payload, size_t *payload_size, struct error *e)
-{
-	uint32_t header = 0, rest = 0;
-	*payload = NULL;
-	*payload_size = 0;
-	if (size >= FRAME_PREFIX)
-		frame_prefix_read(frame, &header, &rest);
-	if (size < FRAME_PREFIX || (uint64_t)header + rest != size - FRAME_PREFIX)
-		return error_set(e, EBADMSG, "a frame of another length");
-	int rc = envelope_unpack(env, frame + FRAME_PREFIX, header, e);
-	if (!rc && env->message->body_case != want) {
-		envelope_fini(env);
-		rc = error_set(e, EBADMSG, "another message than was expected");
-	}
-	*payload = frame + FRAME_PREFIX + header;
-	*payload_size = rest;
-	return rc;
-}
 
 /* ---- the journal */
 
@@ -87,8 +79,8 @@ static int take_batch(struct replay *r, const struct journal_item *item, struct 
 	struct batch batch = {0};
 	const unsigned char *payload;
 	size_t payload_size;
-	int rc = replay_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->size, &payload, &payload_size,
-			       e);
+	int rc = stored_frame_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, item->body, item->size, &payload,
+				     &payload_size, e);
 	if (rc)
 		return rc == -EBADMSG ? strange(r, "a result", item->size, e) : rc;
 	rc = batch_unpack(&batch, &r->order->plan, env.message->lease_result, payload, payload_size, e);

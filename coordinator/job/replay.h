@@ -24,10 +24,6 @@ uint64_t replay_bytes(const struct spool *spool, uint64_t job);
  * or gone; -EPROTO: of another version) the order is of no use but to be dropped. p: NULL: nobody looks. */
 int replay_films(const struct spool *spool, struct live_job *o, struct replay_progress *p, struct error *e);
 
-/* A frame as it was stored, with this message. -EBADMSG, -ENOMEM. The payload is a part of the frame. */
-int replay_unpack(struct envelope *env, Farm__Envelope__BodyCase want, const unsigned char *frame, size_t size,
-		  const unsigned char **payload, size_t *payload_size, struct error *e);
-
 /* Whether a result can be merged now. */
 enum replay_place { REPLAY_FITS, REPLAY_MERGED /* it is */, REPLAY_LATE /* something is missing before it */ };
 enum replay_place replay_place(const struct live_job *o, const struct lease_key *k);

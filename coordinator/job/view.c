@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A job as it is shown: a record and what only a job that runs has, made into a message or JSON.
+ *
+ * view_of_record begins it, view_add_status adds what the core knows. Whoever may see only his own jobs gets the texts
+ * in which others have no numbers (view_hide_others). A number that is not known is null in JSON and negative in
+ * messages. Messages borrow the view's texts and must be sent while it is there. JSON is NULL without memory.
+ */
 #include "coordinator/job/view.h"
 
 #include "common/base/text.h"

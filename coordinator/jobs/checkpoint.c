@@ -19,6 +19,7 @@
 #include "coordinator/job/checkpoint_file.h"
 #include "coordinator/jobs/durable.h"
 #include "coordinator/jobs/step.h"
+#include "coordinator/store/journal_file.h"
 
 #include <assert.h>
 #include <stdio.h>

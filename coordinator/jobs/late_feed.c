@@ -5,6 +5,8 @@
 #include "coordinator/job/digest.h"
 #include "coordinator/job/incoming.h"
 #include "coordinator/job/late.h"
+#include "coordinator/job/replay.h"
+#include "coordinator/job/stored_frame.h"
 #include "coordinator/jobs/step.h"
 
 /* It is damaged by now, too: its lease is open. */
@@ -29,7 +31,7 @@ static int offer(struct jobs *s, const struct live_job *o, const struct late_res
 	int rc = journal_body(o->journal, l->at, &body, &size, e);
 	if (rc)
 		return rc;
-	rc = replay_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
+	rc = stored_frame_unpack(&env, FARM__ENVELOPE__BODY_LEASE_RESULT, body, size, &payload, &payload_size, e);
 	if (rc) {
 		mem_free(body);
 		return rc;

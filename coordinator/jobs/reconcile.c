@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The database of jobs against the jobs' folders, before any job is read.
+ *
+ * Each folder and each row is looked at once (look_at): its row, its copy of the row (row_file.h) and its record. What
+ * one of them lacks is made from the others: a row from its copy, a copy from the row, the damaged record of an ended
+ * job from the row. A database that cannot be read is put aside and made anew from the copies.
+ *
+ * A job of which neither row nor copy is left, but results are, is lost: without --accept-loss the start ends with
+ * -EBADMSG and the list of what is missing, with it the folder is moved to spool/lost with a sentence. An error of the
+ * machine ends the start and changes nothing more.
+ */
 #include "coordinator/jobs/reconcile.h"
 
 #include "common/base/disk.h"

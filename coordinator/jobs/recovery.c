@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The jobs of the last run, from the spool into the list of jobs.
+ *
+ * recovery_begin makes a job of each row of the ledger (restore.c) and lists them; the pool then reads their films, one
+ * job after the other (replay.h). When the last one is there the core is told of all of them in the order of their
+ * numbers, each takes its place among the jobs that run, and peers are served what they asked for meanwhile.
+ *
+ * A job whose checkpoint or journal is damaged is read again without them, which begins it anew; they stay as
+ * *.damaged. One that has no folder, plan or scene fails, with the reason in its record. An error of the machine, or a
+ * file of another version, stops the coordinator and leaves everything as it was: the next start may go better.
+ */
 #include "coordinator/jobs/recovery.h"
 
 #include "common/base/disk.h"
@@ -9,6 +20,7 @@
 #include "coordinator/jobs/restore.h"
 #include "coordinator/retention/ages.h"
 #include "coordinator/retention/keep.h"
+#include "coordinator/store/journal_file.h"
 
 #include <assert.h>
 #include <string.h>

@@ -1,9 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A job from its row in the ledger: submission, plan and record, then the core.
+ *
+ * restore_open lists the jobs that had not ended. restore_live_job unpacks one, holds the files of its scene and takes
+ * from its record what the submission does not say. When its films are there too, restore_tell says to the core which
+ * epoch of each group and part comes next, and who made the states that it begins with.
+ *
+ * A submission or plan that cannot be unpacked is -EPROTO if another version took the job, else -EBADMSG; the caller
+ * decides what becomes of the job. Nothing is left behind: files that were held are let go.
+ */
 #include "coordinator/jobs/restore.h"
 
 #include "common/base/mem.h"
 #include "common/base/text.h"
 #include "common/base/version.h"
+#include "coordinator/job/stored_frame.h"
 #include "coordinator/jobs/reconcile.h"
 #include "coordinator/jobs/step.h"
 #include "coordinator/jobs/trust.h"
@@ -142,15 +153,15 @@ static int make_order(struct jobs *s, const struct ledger_job *j, struct live_jo
 	struct plan plan;
 	const unsigned char *payload;
 	size_t size;
-	int rc = replay_unpack(&info, FARM__ENVELOPE__BODY_JOB_INFO, j->plan, j->plan_size, &payload, &size, e);
+	int rc = stored_frame_unpack(&info, FARM__ENVELOPE__BODY_JOB_INFO, j->plan, j->plan_size, &payload, &size, e);
 	if (rc)
 		return not_known(j, rc, e);
 	rc = info.message->job_info->plan ? plan_from_wire(info.message->job_info->plan, &plan, e)
 					  : error_set(e, EBADMSG, "there is no plan");
 	envelope_fini(&info);
 	if (!rc)
-		rc = replay_unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size, &payload,
-				   &size, e);
+		rc = stored_frame_unpack(&submit, FARM__ENVELOPE__BODY_SUBMIT, j->submission, j->submission_size,
+					 &payload, &size, e);
 	if (rc)
 		return not_known(j, rc, e);
 	rc = hold_blobs(s, submit.message->submit, e);

@@ -1,4 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A submission on its way from its message to the core.
+ *
+ * upload_new checks it: names and texts, that paths stay inside the bundle, sizes against the limits, and the plan.
+ * Files that the spool has are held at once; the client is told the hashes of the others and sends these, each in
+ * order, and upload_add writes them under their hashes. When none is missing any more the job can be submitted.
+ *
+ * What is wrong is -EINVAL with a sentence for the client; bytes that do not have the hash they were sent for, or come
+ * out of order, too. upload_free lets go of all that is held, whatever was done.
+ */
 #include "coordinator/peers/upload.h"
 
 #include "common/base/mem.h"

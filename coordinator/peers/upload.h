@@ -6,7 +6,9 @@
 #ifndef COORDINATOR_PEERS_UPLOAD_H
 #define COORDINATOR_PEERS_UPLOAD_H
 
-#include "coordinator/peers/session.h"
+#include "common/blob/blob.h"
+#include "common/plan/plan.h"
+#include "common/wire/envelope.h"
 
 struct upload {
 	struct envelope submit; /* owned */

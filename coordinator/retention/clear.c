@@ -1,4 +1,16 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Clearing of finished jobs, by age and by space.
+ *
+ * A round begins every hour, and soon after a job has ended: it lists the jobs of the spool, reads the record of each,
+ * lets age.h choose, and clears those one by one. The work is cut into steps of one job; clear_tick does as many as fit
+ * into 5 ms. A job is cleared in the order record, files, row, so that whoever asks for its result meanwhile is told
+ * when it went.
+ *
+ * A job that runs again, or whose result a client fetches, is passed over. A record that cannot be written leaves its
+ * job for the next round; without memory, or where the folder of jobs cannot be read, the round ends and the next one
+ * tries again.
+ */
 #include "coordinator/retention/clear.h"
 
 #include "common/base/disk.h"

@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "coordinator/retention/keep.h"
+#include "coordinator/store/journal_file.h"
 
 #include "common/base/disk.h"
 

@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The status socket: lines of JSON to whoever connects.
+ *
+ * A reader gets a snapshot at once, and then what it subscribes to: jobs, workers, or the snapshot. status_tick
+ * compares each job with what was said of it last and tells only what has changed; nothing is made when nobody is
+ * subscribed. The file of the socket is removed at the end if it is still the one that was made.
+ *
+ * A line that is no subscription is answered by an error. A reader whose line is too long is dropped, and so is one
+ * that does not read: each has a bound of bytes that wait for it. A path where somebody answers is -EADDRINUSE; a file
+ * that is no socket is never removed.
+ */
 #include "coordinator/status/status.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A job's journal: appending, flushing, and a new file when the old one has failed.
+ *
+ * journal_append puts a record into a queue in memory; journal_sync writes what waits and flushes it, and may run in
+ * the pool while others append. Room is reserved ahead, so that a full disk is noticed before a result is merged.
+ * journal_open reads a file from its head, gives each record to a visitor and cuts off what was not whole at the end.
+ *
+ * After a failed write or flush the file is bad and not touched again; journal_renew copies what is durable and what
+ * waits into a new file. Records damaged in the middle are counted and left out. A full disk is -ENOSPC.
+ */
 #include "coordinator/store/journal.h"
 
 #include "common/base/buf.h"

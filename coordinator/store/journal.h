@@ -98,8 +98,4 @@ void journal_distrust(struct journal *j);
 /* All that was appended is safe elsewhere: journal_sync has nothing more to do, and does not fail. */
 void journal_settle(struct journal *j);
 
-/* journal.G's of the folder but that of `keep` go; UINT64_MAX: all. */
-void journal_clear(const char *folder, uint64_t keep);
-void journal_put_aside(const char *folder); /* all: they are called journal.G.damaged from now on */
-
 #endif

@@ -1,10 +1,19 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The bytes of a journal: its head, its records, and how they are found again where bytes are damaged.
+ *
+ * journal_scan_next returns one piece after the other: a whole record, a record of which the head alone is whole, or a
+ * stretch of which neither is. A record is known by its mark, the salt of its file and a checksum; after a stretch that
+ * fits nothing the file is searched for the next mark. The number in each head says how many records a gap held.
+ *
+ * Damage is a piece and not an error. An error of the disk is -errno and says nothing about the file; without memory
+ * for a body it is -ENOMEM.
+ */
 #include "coordinator/store/journal_file.h"
 
 #include "common/base/crc.h"
 #include "common/base/disk.h"
 #include "common/base/mem.h"
-#include "coordinator/store/journal.h"
 #include "coordinator/store/spool.h"
 
 #include <stdio.h>

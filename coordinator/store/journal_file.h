@@ -89,4 +89,8 @@ void journal_gaps_count(const struct journal_gaps *g, uint64_t stored, uint64_t 
 /* All of it; -ENODATA: the file ends before that. What cannot be read is not what is not there. */
 int journal_read_at(int fd, void *bytes, size_t size, uint64_t at);
 
+/* journal.G's of the folder but that of `keep` go; UINT64_MAX: all. */
+void journal_clear(const char *folder, uint64_t keep);
+void journal_put_aside(const char *folder); /* all: they are called journal.G.damaged from now on */
+
 #endif

@@ -1,4 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The jobs in an SQLite database: one row each, with a checksum over its columns.
+ *
+ * ledger_open brings an older scheme up to date and looks through all rows. A change reads its row first, so that a
+ * damaged one is noticed and not sealed again under a new checksum, and commits before it returns (WAL, synchronous
+ * FULL). ledger_next goes through the jobs that have not ended, ledger_after through all.
+ *
+ * A damaged row is -EBADMSG, with its number still known. A full disk is -ENOSPC, a file that is no
+ * database -EBADMSG, any other fault of SQLite -EIO or -ENOMEM. A newer scheme is -EPROTO.
+ */
 #include "coordinator/store/ledger.h"
 
 #include "common/base/crc.h"

@@ -1,4 +1,14 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A job's record as JSON, with a checksum.
+ *
+ * record_to_json writes all that is remembered of a job, record_from_json reads it back; a key that is missing, because
+ * an older version wrote the file, is zero or the text "". The counters follow from the list of
+ * coordinator/core/counts.h. The checksum is over the content with sorted keys, so that layout does not matter.
+ *
+ * A text that is not UTF-8 is -EINVAL and the record is not written. A damaged file is -EBADMSG, one of another schema
+ * -EPROTO. A record without a checksum is of an earlier version and believed.
+ */
 #include "coordinator/store/record.h"
 
 #include "common/base/crc.h"

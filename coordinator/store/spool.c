@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The coordinator's folder: its lock, the numbers of jobs, and files that appear whole.
+ *
+ * spool_open takes the lock and makes the folders that are missing. A number is written to next-job before a job gets
+ * it, so that none is given twice, and folders that are there count too. Files are written under a temporary name,
+ * flushed, renamed, and the folder flushed.
+ *
+ * A second coordinator on the same folder is -EBUSY. A counter without a number in it is -EBADMSG, a missing one is
+ * made from the folders. A write that fails leaves the old file as it was; a record that cannot be parsed is -EBADMSG,
+ * one that is not there -ENOENT.
+ */
 #include "coordinator/store/spool.h"
 
 #include "common/base/disk.h"

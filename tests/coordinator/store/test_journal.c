@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /* A journal gives back what was appended and whole, wherever the machine stopped and whatever bit fell over. */
 #include "coordinator/store/journal.h"
+#include "coordinator/store/journal_file.h"
 #include "common/base/crc.h"
 #include "common/base/disk.h"
 #include "tests/support/folder.h"
