@@ -47,6 +47,8 @@ static const struct trial_scene {
 	{"window", "tests/bench/scenes/window.xml", true, 160, 90},
 	{"rough-caustic", "tests/bench/scenes/rough-caustic.xml", true, 160, 90},
 	{"glossy-room", "tests/bench/scenes/glossy-room.xml", true, 160, 90},
+	{"ring", "tests/bench/scenes/ring.xml", true, 160, 90},
+	{"torus", "tests/bench/scenes/torus.xml", true, 160, 90},
 };
 
 static const struct method {

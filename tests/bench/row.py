@@ -40,24 +40,17 @@ def render(build, scene, integrator, spp, seed, out):
 
 
 def render_for(build, scene, integrator, seconds, seed, out):
-    spp, low, best = STEP, None, None
-    for _ in range(6):
+    """The last of a few renders, each as long as the one before it says. Programs have a start that costs as much
+    whatever their length: the first two tell it."""
+    spp, known = STEP, []
+    for _ in range(8):
         took, name = render(build, scene, integrator, spp, seed, out)
-        if abs(took - seconds) < 0.08 * seconds:
-            break
-        if low is None:
-            low = (spp, took)
-            rate = took / spp
-        else:
-            rate = (took - low[1]) / (spp - low[0]) if spp > low[0] else rate
-            low = min(low, (spp, took))
-        goal = spp + (seconds - took) / max(rate, 1e-9)
-        if took < 0.1 * seconds:  # what a start costs is no part of the rate: look again before the last step
-            goal = spp + 0.3 * (seconds - took) / rate
-        following = max(STEP, STEP * round(goal / STEP))
-        if following == spp:
-            break
-        spp = following
+        if abs(took - seconds) < 0.12 * seconds:
+            return took, name, spp
+        known.append((spp, took))
+        (n, t), (m, s) = known[0], known[-1]
+        rate = (s - t) / (m - n) if m > n and s > t else took / spp
+        spp = max(STEP, min(8 * spp, STEP * round((spp + (seconds - took) / rate) / STEP)))
     if abs(took - seconds) > 0.25 * seconds:
         raise SystemExit("row.py: %s by %s: %.1f s where %.1f were wanted" % (scene, name, took, seconds))
     return took, name, spp

@@ -37,6 +37,10 @@ static const double rare_clear = 0.4, tail_clear_most = 1;
  * all other scenes that do not call for chains one of them is 1.03 or more but for one pilot of displaced: 0.82, with 3
  * % of the light rare. */
 static const double extreme_least = 0.85, extreme_share = 0.05;
+/* Light so rare that a pilot finds a few of its paths, by one of the two or the other: path sees what bdpt sees, but
+ * for luck. In torus the larger of both shares is 0.16 to 0.57, six seeds, and bdpt's smaller index 0.47 to 0.87;
+ * shares are 0.07 or less where bdpt is the best, but for veach-door: 0.26 to 0.54, and an index of 1.2 or more. */
+static const double rare_some = 0.12, heavy_least = 0.9;
 /* The same of path's tail: 2.1 to 2.8 in cornell-box and veach-mis and more in box, where path is the best by 1.2
  * to 1.4 x; 0.9 to 2.0 but for one of rough-caustic (2.3) in that, three-spheres, demo, displaced and veach-door, where
  * bdpt is, by up to 2.1 x (6 x with fireflies). */
@@ -114,22 +118,37 @@ static bool wants_chains(const struct render_found *f)
 	return !(f->cost > 0) || f->rare > rare_share || (f->rare > extreme_share && f->extreme < extreme_least);
 }
 
+/* Of what path says, as far as it says anything: some light may be for chains alone. */
+static bool is_doubtful(const struct render_choice *c)
+{
+	return c->misses || wants_chains(&c->path) || c->path.rare > rare_some;
+}
+
 bool render_choice_is_settled(const struct render_choice *c)
 {
-	return !c->misses && !wants_chains(&c->path) && c->path.tail < tail_least;
+	return !is_doubtful(c) && c->path.tail < tail_least;
+}
+
+/* Both find light that is rare; or one does, and bdpt's largest fall off as if there were much more of it. */
+static bool both_want_chains(const struct render_choice *c)
+{
+	double rare = fmax(c->misses ? 0 : c->path.rare, c->bdpt.rare);
+	if (wants_chains(&c->bdpt) && (c->misses || wants_chains(&c->path)))
+		return true;
+	return rare > rare_some && fmin(c->bdpt.tail, c->bdpt.extreme) < heavy_least;
 }
 
 const char *render_choice_of(const struct render_choice *c)
 {
 	if (render_choice_is_settled(c))
 		return "bdpt";
-	if (wants_chains(&c->bdpt) && (c->misses || wants_chains(&c->path)))
+	if (both_want_chains(c))
 		return "hslt";
 	bool path =
 		!c->misses && c->path.cost > 0 && c->path.tail >= tail_least && c->path.cost < path_cost * c->bdpt.cost;
 	if (!path)
 		return "bdpt";
-	return c->path.tail >= tail_path ? "path" : "bdpt8";
+	return c->path.tail >= tail_path && c->path.rare <= rare_some ? "path" : "bdpt8";
 }
 
 /* ---- the pilot */
@@ -245,7 +264,7 @@ static void look_at_bdpt(struct pilot *p, struct render_choice *out)
 	uint64_t few = p->samples / SHORTER;
 	out->bdpt = look_on(p, STREAM_BDPT, 0, few, path_trace_both_ways, &t);
 	out->samples += few;
-	bool only_cost = !out->misses && !wants_chains(&out->path);
+	bool only_cost = !is_doubtful(out) && !(out->bdpt.rare > rare_some);
 	if (only_cost || (out->bdpt.rare > rare_clear && out->bdpt.tail < tail_clear_most))
 		return;
 	out->bdpt = look_on(p, STREAM_BDPT, few, p->samples, path_trace_both_ways, &t);

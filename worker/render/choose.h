@@ -9,7 +9,8 @@
  * and how fast the frequency of the largest falls with their size (their tail index, by Hill's estimator). Chains are
  * called for where both integrators find much of the light in rare contributions (caustics through water, panes,
  * frosted glass), or some of it while the largest fall off so slowly that more samples keep on finding larger ones:
- * below a tail index of 1 not even a mean exists. Else it is `path` or `bdpt8` where path's tail is that of a finite
+ * below a tail index of 1 not even a mean exists; or where one of them happens to find a good share of rare light, and
+ * bdpt's largest fall off as slowly. Else it is `path` or `bdpt8` where path's tail is that of a finite
  * variance (2 or more) and its second moment times rays is the smaller one: `path` where the tail is so short that it
  * has no fireflies, else `bdpt8`, whose light sub-paths, one in eight samples, bound them. `bdpt` in all other cases,
  * because the fireflies that a pilot does not see decide the error of a long render.

@@ -118,6 +118,16 @@ static void light_through_water_needs_chains(void **state)
 	world_free(w);
 }
 
+/* Seen through glass and lit through it: a few samples in 16,384 find most of the light, and the others look clean. */
+static void light_that_few_samples_find_needs_chains(void **state)
+{
+	(void)state;
+	struct world *w = world_of_own_scene("../bench/scenes", "torus.xml", 160, 90);
+	for (uint64_t seed = 0; seed < SEEDS; seed++)
+		assert_true(chooses_chains(w, seed));
+	world_free(w);
+}
+
 static void where_no_light_is_found_the_longest_search_goes_on(void **state)
 {
 	(void)state;
@@ -186,7 +196,10 @@ static void the_rule(void **state)
 		{{{1, 0.9, 0.5, 0.5}, {2, 0, 3, 3}, false, false, 0},
 		 "bdpt",
 		 false}, /* bdpt finds what path does not */
-		{{{1, 0, 4, 4}, {2, 0.9, 0.5, 0.5}, false, false, 0}, "path", false},
+		{{{1, 0, 4, 4}, {2, 0.9, 0.5, 0.5}, false, false, 0}, "hslt", false}, /* what bdpt finds path would */
+		{{{1, 0.2, 3.5, 1.5}, {5, 0.04, 2, 0.6}, false, false, 0}, "hslt", false}, /* by luck one of them */
+		{{{1, 0.2, 3.5, 1.5}, {5, 0.04, 2, 1.2}, false, false, 0}, "bdpt8", false},
+		{{{1, 0.5, 1.1, 1.1}, {2, 0.25, 1.4, 1.8}, false, false, 0}, "bdpt", false}, /* rare to path alone */
 		{{{1, 0.5, 0.5, 3}, {2, 0.5, 0.5, 3}, false, false, 0}, "hslt", false},
 		{{{1, 0.1, 1.5, 0.7}, {2, 0.1, 1.5, 0.7}, false, false, 0}, "hslt", false}, /* no mean exists */
 		{{{1, 0.1, 1.5, 0.7}, {2, 0.1, 1.5, 1.2}, false, false, 0},
@@ -268,6 +281,7 @@ int main(void)
 		cmocka_unit_test(a_lamp_in_view_is_not_rare_light),
 		cmocka_unit_test(path_is_not_chosen_where_it_misses_light),
 		cmocka_unit_test(light_through_water_needs_chains),
+		cmocka_unit_test(light_that_few_samples_find_needs_chains),
 		cmocka_unit_test(where_no_light_is_found_the_longest_search_goes_on),
 		cmocka_unit_test(the_same_request_gives_the_same_choice),
 		cmocka_unit_test(a_crop_is_rendered_as_the_whole_is),
