@@ -9,7 +9,7 @@
 struct bend {
 	struct relief relief;
 	struct texture texture;
-	double scale;
+	double scale; /* of heights, or of a normal's first two components */
 };
 
 static double height_of(const double x[3], bool grey)
@@ -34,9 +34,10 @@ static void normal_at(const void *data, double u, double v, struct relief_value 
 	const struct bend *b = data;
 	struct texture_jet j;
 	texture_jet(&b->texture, u, v, &j);
-	out->x = (vec3){2 * j.x[0] - 1, 2 * j.x[1] - 1, 2 * j.x[2] - 1};
-	out->du = (vec3){2 * j.du[0], 2 * j.du[1], 2 * j.du[2]};
-	out->dv = (vec3){2 * j.dv[0], 2 * j.dv[1], 2 * j.dv[2]};
+	double k = b->scale;
+	out->x = (vec3){k * (2 * j.x[0] - 1), k * (2 * j.x[1] - 1), 2 * j.x[2] - 1};
+	out->du = (vec3){2 * k * j.du[0], 2 * k * j.du[1], 2 * j.du[2]};
+	out->dv = (vec3){2 * k * j.dv[0], 2 * k * j.dv[1], 2 * j.dv[2]};
 }
 
 static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, enum relief_kind kind,
@@ -75,7 +76,11 @@ static const struct param bumpmap_params[] = {
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
 	{.name = NULL},
 };
-static const struct param normalmap_params[] = {{.name = NULL}};
+/* scale: as glTF has it. */
+static const struct param normalmap_params[] = {
+	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
+	{.name = NULL},
+};
 
 const struct bsdf_ops bsdf_ops_bumpmap = {
 	.type = "bumpmap",

@@ -22,8 +22,8 @@
 enum { LOBE_DIFFUSE, LOBE_SPECULAR, LOBE_CLEARCOAT, LOBE_TRANSMIT, LOBES };
 
 struct principled {
-	struct texture base, roughness;
-	double metallic, transmission, spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_alpha, aspect, eta;
+	struct texture base, roughness, metallic;
+	double transmission, spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_alpha, aspect, eta;
 	double base_max;
 };
 
@@ -31,7 +31,7 @@ struct principled {
 struct stuff {
 	const struct principled *p;
 	spectrum base, tint;
-	double roughness;
+	double roughness, metallic;
 	struct microfacet facets;
 };
 
@@ -61,17 +61,19 @@ static struct microfacet facets_of(const struct principled *p, double roughness)
 	return m;
 }
 
-/* A texture of roughness is grey: its mean over the lanes. */
-static double roughness_at(const struct principled *p, const struct bsdf_point *at)
+/* Textures of roughness and of metallic are grey: their mean over the lanes. */
+static double share_at(const struct texture *t, const struct bsdf_point *at)
 {
-	return fmin(fmax(spectrum_mean(texture_eval(&p->roughness, at->u, at->v, at->w)), 0), 1);
+	return fmin(fmax(spectrum_mean(texture_eval(t, at->u, at->v, at->w)), 0), 1);
 }
 
 static struct stuff stuff_at(const struct bsdf *b, const struct bsdf_point *at)
 {
 	const struct principled *p = b->data;
-	struct stuff s = {
-		.p = p, .base = texture_eval(&p->base, at->u, at->v, at->w), .roughness = roughness_at(p, at)};
+	struct stuff s = {.p = p,
+			  .base = texture_eval(&p->base, at->u, at->v, at->w),
+			  .roughness = share_at(&p->roughness, at),
+			  .metallic = share_at(&p->metallic, at)};
 	s.facets = facets_of(p, s.roughness);
 	s.tint = p->spec_tint > 0 || p->sheen_tint > 0 ? tint_of(p, at, s.base) : spectrum_of(1);
 	return s;
@@ -87,12 +89,12 @@ static double schlick(double cosine)
 static spectrum fresnel_of(const struct stuff *s, double cosine)
 {
 	const struct principled *p = s->p;
-	double rest = schlick(cosine), clear = 1 - p->metallic, root = (p->eta - 1) / (p->eta + 1);
+	double rest = schlick(cosine), clear = 1 - s->metallic, root = (p->eta - 1) / (p->eta + 1);
 	double boundary = clear * (1 - p->spec_tint) * fresnel_dielectric(fmin(cosine, 1), p->eta).reflected;
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double tinted = fmin(s->tint.v[i] * root * root, 1);
-		f.v[i] = boundary + p->metallic * (s->base.v[i] + (1 - s->base.v[i]) * rest) +
+		f.v[i] = boundary + s->metallic * (s->base.v[i] + (1 - s->base.v[i]) * rest) +
 			 clear * p->spec_tint * (tinted + (1 - tinted) * rest);
 	}
 	return f;
@@ -107,8 +109,8 @@ static spectrum diffuse_of(const struct stuff *s, vec3 wo, vec3 wi, double cos_d
 	double base = (1 - 0.5 * fo) * (1 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1));
 	double ss = (1 + (0.5 * retro - 1) * fo) * (1 + (0.5 * retro - 1) * fi);
 	double flat = 1.25 * (ss * (1 / fmax(wo.z + wi.z, 1e-300) - 0.5) + 0.5);
-	double diffuse = (1 - p->metallic) * (1 - p->transmission) * (base + p->flatness * (flat - base)) / WARP_PI;
-	double sheen = (1 - p->metallic) * p->sheen * schlick(cos_d);
+	double diffuse = (1 - s->metallic) * (1 - p->transmission) * (base + p->flatness * (flat - base)) / WARP_PI;
+	double sheen = (1 - s->metallic) * p->sheen * schlick(cos_d);
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++)
 		f.v[i] = diffuse * s->base.v[i] + sheen * (1 + p->sheen_tint * (s->tint.v[i] - 1));
@@ -136,11 +138,11 @@ static void chances(const struct stuff *s, vec3 wo, double chance[LOBES])
 {
 	const struct principled *p = s->p;
 	bool below = wo.z < 0;
-	double clear = 1 - p->metallic, glass = clear * p->transmission;
+	double clear = 1 - s->metallic, glass = clear * p->transmission;
 	double reflected = fresnel_dielectric(fmin(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflected, sum = 0;
 	/* Where the surface reflects totally, some facets do not. */
 	chance[LOBE_TRANSMIT] = glass * fmax(1 - reflected, 0.05);
-	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + p->metallic * fmax(p->base_max, 0.04);
+	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * fmax(p->base_max, 0.04);
 	chance[LOBE_DIFFUSE] = below ? 0 : clear * fmax((1 - p->transmission) * p->base_max, fmin(p->sheen, 1) * 0.2);
 	chance[LOBE_CLEARCOAT] = below ? 0 : 0.25 * p->clearcoat * (CLEARCOAT_REFLECTANCE + schlick(wo.z));
 	for (int i = 0; i < LOBES; i++)
@@ -176,7 +178,7 @@ static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, d
 	double spread = co * -ci * (eta / length) * (eta / length);
 	double seen = microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo) * spread;
 	double passes =
-		(1 - s->p->metallic) * s->p->transmission * fresnel_between(fmin(co, 1), fmin(-ci, 1), eta).transmitted;
+		(1 - s->metallic) * s->p->transmission * fresnel_between(fmin(co, 1), fmin(-ci, 1), eta).transmitted;
 	double f = seen * passes * microfacet_g1_over_cos(&s->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
 	if (transport == TRANSPORT_RADIANCE)
 		f /= eta * eta;
@@ -198,7 +200,7 @@ static void add_reflected(const struct stuff *s, vec3 wo, vec3 wi, bool below, d
 	double both = seen * microfacet_g1_over_cos(&s->facets, wi);
 	out->pdf = chance[LOBE_SPECULAR] * seen;
 	if (below) {
-		out->f = spectrum_of(both * (1 - p->metallic) * p->transmission *
+		out->f = spectrum_of(both * (1 - s->metallic) * p->transmission *
 				     fresnel_dielectric(cos_d, eta).reflected);
 		return;
 	}
@@ -215,7 +217,7 @@ static struct pair pair_of(const struct stuff *s, vec3 wo, vec3 wi, enum transpo
 	struct pair out = {spectrum_of(0), 0};
 	bool below = wo.z < 0;
 	double chance[LOBES], eta = below ? 1 / s->p->eta : s->p->eta;
-	if (wo.z == 0 || wi.z == 0 || (below && !(s->p->transmission > 0 && s->p->metallic < 1)))
+	if (wo.z == 0 || wi.z == 0 || (below && !(s->p->transmission > 0 && s->metallic < 1)))
 		return out;
 	chances(s, wo, chance);
 	wo = mirror(wo, below);
@@ -296,15 +298,15 @@ static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at,
 	return true;
 }
 
-/* The least roughness, of a texture on a grid: what step sizes go by. */
-static double least_roughness(const struct principled *p)
+/* The least of a share, of a texture on a grid: step sizes go by that of roughness. */
+static double least_share(const struct texture *t)
 {
 	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
 	enum { SIDE = 64 };
 	double least = 1;
 	for (int i = 0; i < SIDE * SIDE; i++) {
 		const struct bsdf_point at = {.u = (i / SIDE + 0.5) / SIDE, .v = (i % SIDE + 0.5) / SIDE, .w = &w};
-		least = fmin(least, roughness_at(p, &at));
+		least = fmin(least, share_at(t, &at));
 	}
 	return least;
 }
@@ -330,10 +332,11 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 	if (!code)
 		code = bsdf_texture(b, &p->roughness, n, "roughness", 0.5, build, e);
 	if (!code)
+		code = bsdf_texture(b, &p->metallic, n, "metallic", 0, build, e);
+	if (!code)
 		code = read_index(p, n, e);
 	if (code)
 		return code;
-	p->metallic = node_float(n, "metallic", 0);
 	p->transmission = node_float(n, "spec_trans", 0);
 	p->spec_tint = node_float(n, "spec_tint", 0);
 	p->sheen = node_float(n, "sheen", 0);
@@ -343,14 +346,15 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 	p->clearcoat_alpha = 0.1 + (0.001 - 0.1) * node_float(n, "clearcoat_gloss", 0);
 	p->aspect = sqrt(1 - 0.9 * node_float(n, "anisotropic", 0));
 	p->base_max = texture_max(&p->base);
-	struct microfacet least = facets_of(p, least_roughness(p));
-	bool glass = p->transmission > 0 && p->metallic < 1;
+	struct microfacet least = facets_of(p, least_share(&p->roughness));
+	double metallic = least_share(&p->metallic);
+	bool glass = p->transmission > 0 && metallic < 1;
 	b->modes = BSDF_REFLECT | (glass ? BSDF_TRANSMIT : 0);
 	b->has_smooth = true;
 	b->two_sided = glass;
 	b->eta = glass ? p->eta : 1;
 	b->alpha = fmin(microfacet_least(&least), p->clearcoat > 0 ? p->clearcoat_alpha : INFINITY);
-	double diffuse = (1 - p->metallic) * (1 - p->transmission);
+	double diffuse = (1 - metallic) * (1 - p->transmission);
 	b->alpha_mean = diffuse + (1 - diffuse) * microfacet_mean(&least);
 	return 0;
 }
@@ -362,7 +366,7 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 static const struct param principled_params[] = {
 	{.name = "base_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 	{.name = "roughness", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-	SHARE("metallic"),
+	{.name = "metallic", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 	SHARE("spec_trans"),
 	SHARE("spec_tint"),
 	SHARE("sheen"),

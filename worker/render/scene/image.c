@@ -42,21 +42,48 @@ static const struct format {
 	const char *magic;
 	size_t size;
 	int (*decode)(const struct image_input *in, struct image *out);
+	bool alpha;
 } formats[] = {
-	{"\x89PNG\r\n\x1a\n", 8, image_decode_png},
-	{"\xff\xd8\xff", 3, image_decode_jpeg},
-	{"\x76\x2f\x31\x01", 4, image_decode_exr},
-	{"#?RADIANCE", 10, image_decode_hdr},
-	{"#?RGBE", 6, image_decode_hdr},
+	{"\x89PNG\r\n\x1a\n", 8, image_decode_png, true}, {"\xff\xd8\xff", 3, image_decode_jpeg, false},
+	{"\x76\x2f\x31\x01", 4, image_decode_exr, false}, {"#?RADIANCE", 10, image_decode_hdr, false},
+	{"#?RGBE", 6, image_decode_hdr, false},
 };
+
+/* One of three, in their place. */
+static void keep_channel(struct image *img, enum image_channel channel)
+{
+	size_t count = (size_t)img->width * img->height;
+	if (img->channels != 3)
+		return;
+	for (size_t i = 0; i < count; i++)
+		img->pixels[i] = img->pixels[3 * i + (size_t)(channel - IMAGE_RED)];
+	img->channels = 1;
+}
 
 static int decode(const struct image_input *in, struct image *out)
 {
-	for (size_t i = 0; i < sizeof formats / sizeof *formats; i++)
-		if (in->size >= formats[i].size && memcmp(in->bytes, formats[i].magic, formats[i].size) == 0)
-			return formats[i].decode(in, out);
+	for (size_t i = 0; i < sizeof formats / sizeof *formats; i++) {
+		if (in->size < formats[i].size || memcmp(in->bytes, formats[i].magic, formats[i].size) != 0)
+			continue;
+		if (in->alpha && !formats[i].alpha)
+			return error_set(in->error, ENOTSUP, "%s: alpha is read of PNG only", in->name);
+		return formats[i].decode(in, out);
+	}
 	return error_set(in->error, EINVAL,
 			 "%s: no image that is understood (supported: PNG, JPEG, OpenEXR, Radiance HDR)", in->name);
+}
+
+int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,
+		 struct arena *arena, struct image *out, struct error *e)
+{
+	const struct image_input in = {name, bytes, size, raw, channel == IMAGE_ALPHA, arena, e};
+	*out = (struct image){0};
+	int r = decode(&in, out);
+	if (r)
+		*out = (struct image){0};
+	else if (channel != IMAGE_ALL && channel != IMAGE_ALPHA)
+		keep_channel(out, channel);
+	return r;
 }
 
 int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
@@ -67,10 +94,7 @@ int image_read(const struct asset_source *assets, const char *name, bool raw, st
 	int r = assets->open(assets->user, name, &a, e);
 	if (r)
 		return r;
-	struct image_input in = {name, a.bytes, a.size, raw, arena, e};
-	r = decode(&in, out);
+	r = image_decode(a.bytes, a.size, name, raw, IMAGE_ALL, arena, out, e);
 	assets->close(assets->user, &a);
-	if (r)
-		*out = (struct image){0};
 	return r;
 }

@@ -18,9 +18,21 @@ struct image {
 	float *pixels;			  /* [height][width][channels], finite, in the arena */
 };
 
+/* A part of each pixel. */
+enum image_channel {
+	IMAGE_ALL,
+	IMAGE_RED,
+	IMAGE_GREEN,
+	IMAGE_BLUE,
+	IMAGE_ALPHA, /* of PNG; 1 where a picture has none, -ENOTSUP of formats whose alpha is not read */
+};
+
 /* raw: no sRGB decoding of integer data. At most 2^27 pixels and 1 GiB of floats, and 4 GiB together with what the
  * arena holds: -EFBIG names the file and its size before it is decoded. */
 int image_read(const struct asset_source *assets, const char *name, bool raw, struct arena *arena, struct image *out,
 	       struct error *e);
+/* The same of bytes in memory; name: for messages. */
+int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,
+		 struct arena *arena, struct image *out, struct error *e);
 
 #endif

@@ -15,7 +15,7 @@ struct image_input {
 	const char *name;
 	const unsigned char *bytes;
 	size_t size;
-	bool raw;
+	bool raw, alpha; /* alpha: nothing but it, as it is stored */
 	struct arena *arena;
 	struct error *error;
 };

@@ -54,7 +54,7 @@ static void on_read(png_structp png, png_bytep out, size_t n)
 	s->at += n;
 }
 
-/* Grey or RGB with 8 or 16 bits: palettes and fewer bits are expanded, alpha is dropped. */
+/* Grey or RGB with 8 or 16 bits, and alpha where that is asked for: palettes and fewer bits are expanded. */
 static int read_header(struct state *s)
 {
 	png_set_read_fn(s->png, s, on_read);
@@ -64,16 +64,21 @@ static int read_header(struct state *s)
 	png_read_info(s->png, s->info);
 	uint32_t width = png_get_image_width(s->png, s->info), height = png_get_image_height(s->png, s->info);
 	png_set_expand(s->png);
-	png_set_strip_alpha(s->png);
+	if (s->in->alpha)
+		png_set_add_alpha(s->png, 0xffff, PNG_FILLER_AFTER); /* where there is none */
+	else
+		png_set_strip_alpha(s->png);
 	png_set_interlace_handling(s->png);
 	png_read_update_info(s->png, s->info);
 	s->channels = png_get_channels(s->png, s->info);
 	s->depth = png_get_bit_depth(s->png, s->info);
-	if ((s->channels != 1 && s->channels != 3) || (s->depth != 8 && s->depth != 16))
+	if ((s->in->alpha ? s->channels != 2 && s->channels != 4 : s->channels != 1 && s->channels != 3) ||
+	    (s->depth != 8 && s->depth != 16))
 		return error_set(s->in->error, EINVAL, "%s: PNG with %u channels of %u bits", s->in->name, s->channels,
 				 s->depth);
 	/* deflate makes at most 1032 bytes of one; a pixel takes at least a bit. */
-	return image_allocate(s->in, s->out, width, height, s->channels, (uint64_t)width * height / (8 * 1032));
+	return image_allocate(s->in, s->out, width, height, s->in->alpha ? 1 : s->channels,
+			      (uint64_t)width * height / (8 * 1032));
 }
 
 static int read_pixels(struct state *s)
@@ -105,13 +110,16 @@ static int convert(struct state *s)
 	float *value = mem_alloc((size_t)max + 1, sizeof *value);
 	if (!value)
 		return error_set(s->in->error, ENOMEM, "%s: out of memory", s->in->name);
-	image_table(value, max, s->in->raw);
-	size_t n = (size_t)s->out->width * s->channels;
+	image_table(value, max, s->in->raw || s->in->alpha);
+	uint32_t step = s->in->alpha ? s->channels : 1, first = step - 1; /* alpha is a pixel's last */
+	size_t n = (size_t)s->out->width * s->out->channels;
 	for (uint32_t y = 0; y < s->out->height; y++) {
 		const png_byte *p = s->rows[y];
 		float *out = s->out->pixels + n * y;
-		for (size_t i = 0; i < n; i++)
-			out[i] = s->depth == 8 ? value[p[i]] : value[p[2 * i] << 8 | p[2 * i + 1]];
+		for (size_t i = 0; i < n; i++) {
+			size_t k = i * step + first;
+			out[i] = s->depth == 8 ? value[p[k]] : value[p[2 * k] << 8 | p[2 * k + 1]];
+		}
 	}
 	mem_free(value);
 	return 0;

@@ -1,10 +1,20 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/texture/raster.h"
 
+#include <string.h>
+
+static enum image_channel channel_of(const char *name)
+{
+	static const char letters[] = "?rgba";
+	const char *at = name[1] ? NULL : strchr(letters, *name);
+	return at && at > letters ? (enum image_channel)(at - letters) : IMAGE_ALL;
+}
+
 int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
 		const struct raster_range *range, struct arena *arena, struct error *e)
 {
-	const char *name = node_string(n, "filename", NULL);
+	struct asset_part part;
+	const char *name = node_string(n, "filename", NULL), *channel = node_string(n, "channel", "all");
 	double gamma = node_float(n, "gamma", 0);
 	if (!name)
 		return node_error(n, e, EINVAL, "\"%s\" needs a filename", n->type);
@@ -13,12 +23,20 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 				  gamma);
 	struct error reason;
 	bool raw = node_bool(n, "raw", range->raw && gamma != -1);
-	int code = image_read(assets, name, gamma == 1 || raw, arena, &r->image, &reason);
+	int code = asset_part_open(&part, n, assets, e);
+	if (code)
+		return code;
+	code = image_decode(part.bytes, part.size, name, gamma == 1 || raw, channel_of(channel), arena, &r->image,
+			    &reason);
+	asset_part_close(&part, assets);
 	if (code)
 		return node_error(n, e, -code, "%s", reason.text);
+	double threshold = node_float(n, "threshold", -1);
 	size_t count = (size_t)r->image.width * r->image.height * r->image.channels;
 	for (size_t i = 0; i < count; i++) {
 		float x = r->image.pixels[i];
+		if (threshold >= 0)
+			x = (double)x >= threshold ? 1 : 0;
 		r->image.pixels[i] = (double)x < range->least	  ? (float)range->least
 				     : (double)x > range->largest ? (float)range->largest
 								  : x;

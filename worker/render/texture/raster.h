@@ -6,6 +6,7 @@
 #ifndef WORKER_RENDER_TEXTURE_RASTER_H
 #define WORKER_RENDER_TEXTURE_RASTER_H
 
+#include "worker/render/scene/asset_part.h"
 #include "worker/render/scene/image.h"
 #include "worker/render/scene/scene.h"
 
@@ -22,14 +23,18 @@ struct raster_range {
 	bool raw;	       /* integers are no sRGB, where the parameters raw and gamma do not say */
 };
 
-/* Reads the property `filename` of n, and the parameters raw and gamma. */
+/* Reads the picture that n names (asset_part.h), and the parameters raw, gamma, channel (r, g, b, a: that one alone, as
+ * three that are equal) and threshold (pixels become 1 from there on, and 0 below). */
 int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
 		const struct raster_range *range, struct arena *arena, struct error *e);
-#define RASTER_PARAMS                                                                       \
-	{.name = "filename", .types = VALUE_STRING}, {.name = "raw", .types = VALUE_BOOL},  \
-		{.name = "gamma", .types = VALUE_FLOAT | VALUE_INT, .min = -1, .max = 100}, \
-	{                                                                                   \
-		.name = "cache", .types = VALUE_BOOL, .status = PARAM_IGNORED               \
+#define RASTER_PARAMS                                                                        \
+	{.name = "filename", .types = VALUE_STRING}, ASSET_PART_PARAMS,                      \
+		{.name = "channel", .types = VALUE_STRING, .choices = "all|r|g|b|a"},        \
+		{.name = "threshold", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 2}, \
+		{.name = "raw", .types = VALUE_BOOL},                                        \
+		{.name = "gamma", .types = VALUE_FLOAT | VALUE_INT, .min = -1, .max = 100},  \
+	{                                                                                    \
+		.name = "cache", .types = VALUE_BOOL, .status = PARAM_IGNORED                \
 	}
 
 void raster_eval(const struct raster *r, double u, double v, double rgb[3]);

@@ -1,12 +1,30 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Another texture times a number: 0.5/0.6. Reflectances end at 1. */
+/* Another texture times a number or, of colours, a colour: 0.5/0.6. Reflectances end at 1. */
 #include "worker/render/texture/texture.h"
 
 struct scale {
 	struct texture inner;
 	double factor;
+	struct color tint; /* its largest component is 1 */
+	bool tinted;
 	enum color_role role;
 };
+
+/* A colour is its largest component times a reflectance. */
+static int read_tint(struct scale *s, const struct scene_node *n, const struct property *p, struct error *e)
+{
+	const double *rgb = p->value.as.rgb;
+	double most = fmax(rgb[0], fmax(rgb[1], rgb[2])), of[3] = {0, 0, 0};
+	if (color_role_is_number(s->role))
+		return node_error(n, e, EINVAL, "scale is a number here, not a colour");
+	if (fmin(rgb[0], fmin(rgb[1], rgb[2])) < 0)
+		return node_error(n, e, ERANGE, "scale makes negative colours");
+	for (int k = 0; k < 3 && most > 0; k++)
+		of[k] = rgb[k] / most;
+	s->factor = most;
+	s->tinted = true;
+	return color_from_rgb(of, COLOR_REFLECTANCE, &s->tint);
+}
 
 static int scale_create(struct texture *t, const struct scene_node *n, enum color_role role,
 			const struct asset_source *assets, bool dialect_3, struct arena *arena, struct error *e)
@@ -16,7 +34,12 @@ static int scale_create(struct texture *t, const struct scene_node *n, enum colo
 		return node_error(n, e, ENOMEM, "out of memory");
 	t->data = s;
 	s->role = role;
-	s->factor = node_float(n, "scale", 1);
+	const struct property *scale = node_find(n, "scale");
+	int code = scale && scale->value.type == VALUE_RGB ? read_tint(s, n, scale, e) : 0;
+	if (code)
+		return code;
+	if (!s->tinted)
+		s->factor = node_float(n, "scale", 1);
 	const struct scene_node *inner = node_child(n, PLUGIN_TEXTURE, 0);
 	if (!inner)
 		return node_error(n, e, EINVAL, "needs a texture inside");
@@ -29,6 +52,8 @@ static spectrum scale_eval(const struct texture *t, double u, double v, const st
 {
 	const struct scale *s = t->data;
 	spectrum x = spectrum_scale(s->factor, texture_eval(&s->inner, u, v, w));
+	if (s->tinted)
+		x = spectrum_mul(x, color_eval(&s->tint, w));
 	for (int i = 0; s->role == COLOR_REFLECTANCE && i < SPECTRUM_LANES; i++)
 		x.v[i] = fmin(x.v[i], 1);
 	return x;
@@ -64,11 +89,15 @@ static double scale_max(const struct texture *t)
 /* What is cut off at 1 has another shape, unless it had none. */
 static enum color_shape scale_shape(const struct texture *t)
 {
-	return texture_shape(&((const struct scale *)t->data)->inner);
+	const struct scale *s = t->data;
+	return s->tinted && s->tint.shape != COLOR_SHAPE_CONSTANT ? COLOR_SHAPE_OTHER : texture_shape(&s->inner);
 }
 
 static const struct param scale_params[] = {
-	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_LIGHT_MAX, .max = PARAM_LIGHT_MAX},
+	{.name = "scale",
+	 .types = VALUE_FLOAT | VALUE_INT | VALUE_RGB,
+	 .min = -PARAM_LIGHT_MAX,
+	 .max = PARAM_LIGHT_MAX},
 	{.name = NULL},
 };
 

@@ -124,12 +124,23 @@ static void test_specular_is_an_index(void **state)
 	same("principled base_color=0 specular=0.5", "principled base_color=0 eta=1.5", 0, 1);
 }
 
+/* A texture that has one value is the number, and one that varies is it at each point. */
+static void test_metallic_texture(void **state)
+{
+	(void)state;
+	same("principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 | @metallic checkerboard color0=0.7 color1=0.7",
+	     "principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 metallic=0.7", 0, 1);
+	/* (0.3, 0.7) lies on a square of color1 */
+	same("principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 | @metallic checkerboard color0=1 color1=0.25",
+	     "principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 metallic=0.25", 1, 1);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_glass_is_roughdielectric), cmocka_unit_test(test_metal_is_schlick_over_ggx),
 		cmocka_unit_test(test_diffuse_is_burleys),	 cmocka_unit_test(test_clearcoat),
-		cmocka_unit_test(test_specular_is_an_index),
+		cmocka_unit_test(test_specular_is_an_index),	 cmocka_unit_test(test_metallic_texture),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -84,6 +84,50 @@ static void test_png(void **state)
 		}
 }
 
+/* One number of each pixel, and alpha, which is 1 where there is none and never decoded as a colour. */
+static void test_channels(void **state)
+{
+	(void)state;
+	static const struct {
+		enum sample_pixels kind;
+		int bits;
+	} kinds[] = {{SAMPLE_RGBA, 8}, {SAMPLE_RGBA, 16}, {SAMPLE_RGB, 8}, {SAMPLE_GREY, 16}, {SAMPLE_PALETTE, 8}};
+	for (size_t n = 0; n < sizeof kinds / sizeof *kinds; n++)
+		for (int channel = IMAGE_RED; channel <= IMAGE_ALPHA; channel++) {
+			size_t size;
+			unsigned char *png = sample_png(13, 9, kinds[n].kind, kinds[n].bits, 0, &size);
+			struct arena arena = {0};
+			struct image img;
+			struct error e;
+			if (image_decode(png, size, "i", false, (enum image_channel)channel, &arena, &img, &e))
+				fail_msg("%s", e.text);
+			assert_true(img.width == 13 && img.height == 9 && img.channels == 1);
+			for (size_t i = 0; i < 13 * 9; i++) {
+				int k = kinds[n].kind == SAMPLE_GREY ? 0 : channel - IMAGE_RED;
+				double v = sample_value(i % 13, i / 13, kinds[n].kind == SAMPLE_PALETTE ? 0 : k);
+				if (kinds[n].kind == SAMPLE_PALETTE)
+					v = k == 0 ? v : k == 1 ? 255 - v : 7;
+				double want = channel != IMAGE_ALPHA	     ? linear(v / 255)
+					      : kinds[n].kind == SAMPLE_RGBA ? v / 255
+									     : 1;
+				if (!(fabs((double)img.pixels[i] - want) < 1e-6))
+					fail_msg("kind %zu, channel %d, pixel %zu: %g, not %g", n, channel, i,
+						 (double)img.pixels[i], want);
+			}
+			arena_fini(&arena);
+			free(png);
+		}
+	size_t size;
+	unsigned char *jpeg = sample_jpeg(8, 8, (const unsigned char[]){200, 100, 50}, 3, 0, &size);
+	struct arena arena = {0};
+	struct image img;
+	struct error e;
+	assert_int_equal(image_decode(jpeg, size, "i", false, IMAGE_ALPHA, &arena, &img, &e), -ENOTSUP);
+	assert_string_equal(e.text, "i: alpha is read of PNG only");
+	arena_fini(&arena);
+	free(jpeg);
+}
+
 static void test_bad_png(void **state)
 {
 	(void)state;
@@ -355,11 +399,17 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_png),	  cmocka_unit_test(test_bad_png),
-		cmocka_unit_test(test_png_bomb),  cmocka_unit_test(test_jpeg),
-		cmocka_unit_test(test_hdr),	  cmocka_unit_test(test_bad_hdr),
-		cmocka_unit_test(test_jpeg_bomb), cmocka_unit_test(test_scene_limit),
-		cmocka_unit_test(test_exr),	  cmocka_unit_test(test_memory_runs_out),
+		cmocka_unit_test(test_channels),
+		cmocka_unit_test(test_png),
+		cmocka_unit_test(test_bad_png),
+		cmocka_unit_test(test_png_bomb),
+		cmocka_unit_test(test_jpeg),
+		cmocka_unit_test(test_hdr),
+		cmocka_unit_test(test_bad_hdr),
+		cmocka_unit_test(test_jpeg_bomb),
+		cmocka_unit_test(test_scene_limit),
+		cmocka_unit_test(test_exr),
+		cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

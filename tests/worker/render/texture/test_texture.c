@@ -191,6 +191,7 @@ static void test_refusals_say_why(void **state)
 		   {"bitmap", "filename"},
 		   {"bitmap filename=nowhere", "nowhere"},
 		   {"bitmap filename=p0 gamma=2.2", "gamma"},
+		   {"bitmap filename=p0 channel=a", "alpha is read of PNG only"},
 		   {"checkerboard color0=3", "color0"}};
 	for (size_t i = 0; i < sizeof bad / sizeof *bad; i++) {
 		struct texture t;
@@ -269,6 +270,59 @@ static void test_scale(void **state)
 	assert_true(fabs(j.du[0] + 1.5) < 1e-12 && fabs(j.x[0] + 0.25) < 1e-12);
 }
 
+static struct texture tinted(struct fixture *f, const char *scale, const char *inner, enum color_role role)
+{
+	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, scale);
+	struct texture t;
+	struct error e;
+	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, inner));
+	if (texture_create(&t, n, role, &f->source, true, &f->arena, &e))
+		fail_msg("%s", e.text);
+	return t;
+}
+
+/* A colour times a colour is, at each wavelength, the product of the two; what a colour has above 1 is a factor. */
+static void test_tint(void **state)
+{
+	struct fixture *f = *state;
+	const double red[3] = {0.5, 0.125, 0.0625}, tint[3] = {0.25, 1, 0.5};
+	struct color other;
+	assert_int_equal(color_from_rgb(tint, COLOR_REFLECTANCE, &other), 0);
+	spectrum a = color_eval_rgb_reflectance(red, &colour), b = color_eval(&other, &colour),
+		 light = color_eval_rgb_illuminant(red, &colour);
+	struct texture t = tinted(f, "scale scale=rgb(0.25,1,0.5)", "bitmap filename=p1", COLOR_REFLECTANCE),
+		       lamp = tinted(f, "scale scale=rgb(1,4,2)", "bitmap filename=p1", COLOR_ILLUMINANT);
+	spectrum x = texture_eval(&t, 0.25, 0.5, &colour), y = texture_eval(&lamp, 0.25, 0.5, &colour);
+	for (int i = 0; i < SPECTRUM_LANES; i++) {
+		assert_true(fabs(x.v[i] - a.v[i] * b.v[i]) < 1e-12);
+		assert_true(fabs(y.v[i] - 4 * light.v[i] * b.v[i]) < 1e-12 * y.v[i]);
+		assert_true(x.v[i] <= texture_max(&t));
+	}
+	t = tinted(f, "scale scale=rgb(0.25,1,0.5)", "bitmap filename=p0", COLOR_REFLECTANCE);
+	assert_int_equal(texture_shape(&t), COLOR_SHAPE_OTHER);
+	t = tinted(f, "scale scale=rgb(0.5,0.5,0.5)", "bitmap filename=p0", COLOR_REFLECTANCE);
+	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
+	assert_value(&t, 0.5 / 3, 0.75, 0.375);
+	struct scene_node *n = node_make(&f->arena, PLUGIN_TEXTURE, "scale scale=rgb(1,1,0)");
+	struct error e;
+	node_add_child(&f->arena, n, node_make(&f->arena, PLUGIN_TEXTURE, "bitmap filename=p0"));
+	assert_true(texture_create(&t, n, COLOR_HEIGHT, &f->source, true, &f->arena, &e) < 0 &&
+		    strstr(e.text, "a number here, not a colour"));
+}
+
+static void test_channel_and_threshold(void **state)
+{
+	struct texture t = make(*state, "bitmap filename=p1 channel=g", COLOR_REFLECTANCE);
+	assert_int_equal(texture_shape(&t), COLOR_SHAPE_CONSTANT);
+	assert_value(&t, 0.25, 0.5, 0.125);
+	t = make(*state, "bitmap filename=p1 channel=b", COLOR_REFLECTANCE);
+	assert_value(&t, 0.25, 0.5, 0.0625);
+	t = make(*state, "bitmap filename=p0 threshold=0.5 filter_type=nearest", COLOR_REFLECTANCE);
+	assert_value(&t, 1.5 / 3, 0.25, 0);
+	assert_value(&t, 2.5 / 3, 0.25, 1); /* 0.5 itself */
+	assert_value(&t, 0.5 / 3, 0.75, 1);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -278,6 +332,8 @@ int main(void)
 		cmocka_unit_test(test_uv_maps),
 		cmocka_unit_test(test_derivatives),
 		cmocka_unit_test(test_scale),
+		cmocka_unit_test(test_tint),
+		cmocka_unit_test(test_channel_and_threshold),
 		cmocka_unit_test(test_colours),
 		cmocka_unit_test(test_checkerboard),
 		cmocka_unit_test(test_plain_values_and_fallback),
