@@ -1,17 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 # Tries every scene file under a folder: `sh corpus.sh HSLT-SCENE FOLDER [OPTION...]` (make corpus DIR=FOLDER). Options go to
-# hslt-scene check: --lenient. Fragments without a <scene>, and those that others include, are no scenes. Prints how many load, what
+# hslt-scene check: --lenient. XML without a <scene>, and those that others include, are no scenes. Prints how many load, what
 # refuses the others first, and how often. Exit code 1 when one crashed or took more than LIMIT (60) seconds.
 set -u
 scene=$1 folder=$2
 shift 2
 [ -d "$folder" ] || { echo "corpus: '$folder' is no folder (make corpus DIR=FOLDER)" >&2; exit 2; }
 work=$(mktemp -d) && trap 'rm -rf "$work"' EXIT
-find "$folder" -type f -name '*.xml' | sort >"$work/all"
+find "$folder" -type f \( -name "*.xml" -o -name "*.gltf" -o -name "*.glb" \) | sort >"$work/all"
 : >"$work/reasons" && : >"$work/bad"
 loaded=0 tried=0
 while IFS= read -r file; do
-	grep -q '<scene' "$file" && grep -q '<\(sensor\|camera\)' "$file" || continue
+	case $file in *.xml) grep -q '<scene' "$file" && grep -q '<\(sensor\|camera\)' "$file" || continue ;; esac
 	tried=$((tried + 1))
 	timeout "${LIMIT:-60}" "$scene" check "$@" "$file" >"$work/out" 2>&1
 	rc=$?

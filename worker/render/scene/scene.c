@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/scene/scene.h"
 
+#include "worker/render/scene/gltf.h"
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/lenient.h"
 #include "worker/render/scene/plugin.h"
@@ -18,6 +19,7 @@
 /* Reads one scene; all pointers lead into the scene's arena. */
 struct maker {
 	struct scene *scene;
+	const char *name; /* of the scene file */
 	const struct asset_source *assets_from;
 	const struct plugin_decl *decls;
 	struct error *error;
@@ -510,7 +512,7 @@ static int list_assets(struct maker *m)
 	if (m->asset_count)
 		qsort(m->assets, m->asset_count, sizeof *m->assets, compare_names);
 	for (size_t i = 0; i < m->asset_count; i++)
-		if (n == 0 || strcmp(m->assets[n - 1], m->assets[i]) != 0)
+		if ((n == 0 || strcmp(m->assets[n - 1], m->assets[i]) != 0) && strcmp(m->assets[i], m->name) != 0)
 			m->assets[n++] = m->assets[i];
 	m->scene->assets = m->assets;
 	m->scene->asset_count = n;
@@ -528,6 +530,8 @@ static int make_scene(struct maker *m)
 	int r = report_problem(&m->report, id_table_make(&m->ids, m->tree, &m->scene->arena, m->error), m->error);
 	if (!r)
 		r = read_top(m, m->tree->root, objects);
+	for (uint32_t i = 0; i < m->tree->note_count && !r; i++)
+		r = note(m, m->tree->root, m->tree->notes[i], "", "%s: %s", m->name, m->tree->notes[i]);
 	if (!r)
 		r = remarks_on(m->scene, &m->report, m->error);
 	return r ? r : list_assets(m);
@@ -544,7 +548,12 @@ static int read_all(struct scene *s, const struct asset_source *assets, const ch
 	int r = m->tree ? report_init(&m->report, &s->arena, m->error) : out_of_memory(m);
 	if (r)
 		return r;
-	r = xml_read(m->tree, assets, name, defines, define_count, &s->arena, m->error);
+	m->name = name;
+	if (gltf_is(name))
+		r = define_count ? error_set(m->error, EINVAL, "%s: a glTF file has no names to define", name)
+				 : gltf_read(m->tree, assets, name, &s->arena, m->error);
+	else
+		r = xml_read(m->tree, assets, name, defines, define_count, &s->arena, m->error);
 	if (r)
 		r = report_problem(&m->report, r, m->error);
 	else

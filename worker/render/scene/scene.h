@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The scene description: Mitsuba's XML (0.5/0.6 and 3.x dialects) as a tree of typed, checked nodes. Knows no
- * physics. docs/design.md, rules 5. The whole description lives in one arena.
+ * The scene description: Mitsuba's XML (0.5/0.6 and 3.x dialects) or glTF 2.0 as a tree of typed, checked nodes. Knows
+ * no physics. docs/design.md, rules 5. The whole description lives in one arena.
  */
 #ifndef WORKER_RENDER_SCENE_SCENE_H
 #define WORKER_RENDER_SCENE_SCENE_H

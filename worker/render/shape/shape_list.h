@@ -3,6 +3,7 @@
 SHAPE(obj)
 SHAPE(ply)
 SHAPE(serialized)
+SHAPE(gltf)
 SHAPE(rectangle)
 SHAPE(cube)
 SHAPE(sphere)

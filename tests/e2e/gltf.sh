@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: Apache-2.0
+# A glTF scene with files beside it, embedded and as .glb: one picture, which is that of its twin in XML, here and on a farm; a
+# normal map is a tilted surface.
+. "$(dirname "$0")/lib.sh"
+need hslt-coordinator hslt-worker hslt-submit hslt-status hslt-job hslt-render hslt-compare hslt-scene
+
+python3 tests/e2e/gltf.py "$DIR"
+
+# picture NAME SCENE OPTION...
+picture() {
+	name=$1 scene=$2
+	shift 2
+	"$BIN/hslt-render" "$DIR/$scene" -o "$DIR/$name.exr" --size 72x48 --quiet "$@" 2>/dev/null
+}
+
+# near A B PERCENT: the relative error of one to the other
+near() {
+	"$BIN/hslt-compare" --json "$DIR/$1.exr" "$DIR/$2.exr" >"$DIR/near"
+	awk -F'"relativeError":' -v most="$3" '{ split($2, x, /[,}]/); e = 100 * x[1]; found = NF > 1 }
+		END { print e " %"; exit !(found && e <= most) }' "$DIR/near" || fail "$1 and $2: $(cat "$DIR/near")"
+}
+
+for form in files.gltf embedded.gltf one.glb twin.xml; do
+	code 0 "$BIN/hslt-scene" check "$DIR/$form"
+	picture "$form" "$form" --integrator path --spp 64
+done
+near files.gltf embedded.gltf 0
+near files.gltf one.glb 0
+near files.gltf twin.xml 0.01
+
+picture map map.glb --integrator path --spp 16
+picture normals normals.glb --integrator path --spp 16
+near map normals 0.01
+
+# on a farm, whose workers have nothing but what they were sent
+start_coordinator -v
+start_worker one --threads 1
+for form in files.gltf one.glb; do
+	picture quiet "$form" --integrator bdpt --spp 8
+	"$BIN/hslt-submit" "$DIR/$form" -o "$DIR/farm.exr" --size 72x48 --integrator bdpt --spp 8 --wait >/dev/null
+	same "$DIR/farm.exr" "$DIR/quiet.exr"
+done
+
+# what is wrong has its line; what is not supported is left out where that is asked for
+sed 's/"alphaMode": "BLEND"/"alphaMode": "BLEND", "extensions": {"KHR_materials_sheen": {}}/' "$DIR/files.gltf" >"$DIR/sheen.gltf"
+code 1 "$BIN/hslt-scene" check "$DIR/sheen.gltf"
+grep -q 'sheen.gltf:[1-9][0-9]*: .*KHR_materials_sheen' "$DIR/out" || fail "$(cat "$DIR/out")"
+code 0 "$BIN/hslt-scene" check --lenient "$DIR/sheen.gltf"
+grep -q 'KHR_materials_sheen` is not supported and left out' "$DIR/out" || fail "$(cat "$DIR/out")"

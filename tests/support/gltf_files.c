@@ -1,0 +1,211 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "tests/support/gltf_files.h"
+
+#include "tests/support/mesh_files.h"
+
+#include <assert.h>
+#include <setjmp.h>
+#include <stdbool.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+/* BUFFER stands for what names the buffer's bytes. One entry a line, as messages name lines. */
+static const char template[] =
+	"{\"asset\": {\"version\": \"2.0\"}, \"scene\": 0, \"extensionsUsed\": [\"KHR_lights_punctual\"],\n"
+	"\"extensions\": {\"KHR_lights_punctual\": {\"lights\": [\n"
+	"{\"type\": \"point\", \"color\": [1, 0.5, 0.25], \"intensity\": 4}]}},\n"
+	"\"scenes\": [{\"nodes\": [0, 1, 4, 5, 6]}],\n"
+	"\"nodes\": [\n"
+	"{\"mesh\": 0, \"translation\": [0, -1, 0], \"scale\": [4, 1, 4]},\n"
+	"{\"translation\": [0, 1, 0], \"children\": [2, 3]},\n"
+	"{\"mesh\": 1, \"translation\": [-1, -0.5, 0], \"rotation\": [0, 0.70710678118654757, 0, 0.70710678118654757]},\n"
+	"{\"mesh\": 2, \"matrix\": [0.5, 0, 0, 0, 0, 0.5, 0, 0, 0, 0, 0.5, 0, 1, -1, 0.5, 1]},\n"
+	"{\"mesh\": 3, \"translation\": [0, 3, 0], \"rotation\": [1, 0, 0, 0]},\n"
+	"{\"camera\": 0, \"translation\": [0, 0.5, 6]},\n"
+	"{\"translation\": [2, 2, 2], \"extensions\": {\"KHR_lights_punctual\": {\"light\": 0}}}],\n"
+	"\"cameras\": [\n"
+	"{\"type\": \"perspective\", \"perspective\": {\"yfov\": 0.75, \"aspectRatio\": 1, \"znear\": 0.01}}],\n"
+	"\"meshes\": [\n"
+	"{\"primitives\": [{\"mode\": 5, \"attributes\": {\"POSITION\": 9, \"TEXCOORD_0\": 11}, \"material\": 0}]},\n"
+	"{\"primitives\": [{\"attributes\": {\"POSITION\": 0, \"NORMAL\": 1, \"TEXCOORD_0\": 2}, \"indices\": 3, "
+	"\"material\": 1}]},\n"
+	"{\"primitives\": [{\"attributes\": {\"POSITION\": 6, \"NORMAL\": 7, \"TEXCOORD_0\": 8}, \"indices\": 4, "
+	"\"material\": 2}]},\n"
+	"{\"primitives\": [{\"mode\": 6, \"attributes\": {\"POSITION\": 10, \"TEXCOORD_0\": 12}, \"material\": 3},\n"
+	"{\"mode\": 0, \"attributes\": {\"POSITION\": 10}}]}],\n"
+	"\"materials\": [\n"
+	"{\"pbrMetallicRoughness\": {\"metallicFactor\": 0, \"baseColorFactor\": [0.8, 0.4, 0.2, 1]}},\n"
+	"{\"pbrMetallicRoughness\": {\"baseColorFactor\": [0.5, 1, 0.25, 1], \"baseColorTexture\": {\"index\": 0},\n"
+	"\"metallicFactor\": 0.5, \"metallicRoughnessTexture\": {\"index\": 0}}},\n"
+	"{\"pbrMetallicRoughness\": {\"metallicFactor\": 0, \"roughnessFactor\": 0.5},\n"
+	"\"extensions\": {\"KHR_materials_transmission\": {\"transmissionFactor\": 1},\n"
+	"\"KHR_materials_ior\": {\"ior\": 1.75}}},\n"
+	"{\"pbrMetallicRoughness\": {\"metallicFactor\": 0}, \"emissiveFactor\": [1, 0.5, 0.5],\n"
+	"\"extensions\": {\"KHR_materials_emissive_strength\": {\"emissiveStrength\": 8}}}],\n"
+	"\"textures\": [{\"source\": 0, \"sampler\": 0}],\n"
+	"\"samplers\": [{\"wrapS\": 33071, \"wrapT\": 33648, \"magFilter\": 9728}],\n"
+	"\"images\": [{\"uri\": \"rgb.hdr\"}],\n"
+	"\"accessors\": [\n"
+	"{\"bufferView\": 0, \"componentType\": 5126, \"count\": 6, \"type\": \"VEC3\", \"min\": [-1, -1, -1], \"max\": "
+	"[1, 1, 1]},\n"
+	"{\"bufferView\": 0, \"componentType\": 5126, \"count\": 6, \"type\": \"VEC3\"},\n"
+	"{\"bufferView\": 1, \"componentType\": 5126, \"count\": 6, \"type\": \"VEC2\"},\n"
+	"{\"bufferView\": 2, \"componentType\": 5123, \"count\": 24, \"type\": \"SCALAR\"},\n"
+	"{\"bufferView\": 3, \"componentType\": 5125, \"count\": 24, \"type\": \"SCALAR\"},\n"
+	"{\"bufferView\": 4, \"componentType\": 5121, \"count\": 24, \"type\": \"SCALAR\"},\n"
+	"{\"bufferView\": 5, \"componentType\": 5126, \"count\": 6, \"type\": \"VEC3\", \"min\": [-1, -1, -1], \"max\": [1, 1, 1]},\n"
+	"{\"bufferView\": 5, \"byteOffset\": 12, \"componentType\": 5126, \"count\": 6, \"type\": \"VEC3\"},\n"
+	"{\"bufferView\": 5, \"byteOffset\": 24, \"componentType\": 5126, \"count\": 6, \"type\": \"VEC2\"},\n"
+	"{\"bufferView\": 6, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC3\", \"min\": [-1, 0, -1], \"max\": [1, 0, 1]},\n"
+	"{\"bufferView\": 7, \"componentType\": 5126, \"count\": 4, \"type\": \"VEC3\", \"min\": [-1, 0, -1], \"max\": [1, 0, 1]},\n"
+	"{\"bufferView\": 8, \"componentType\": 5123, \"normalized\": true, \"count\": 4, \"type\": \"VEC2\"},\n"
+	"{\"bufferView\": 9, \"componentType\": 5121, \"normalized\": true, \"count\": 4, \"type\": \"VEC2\"}],\n"
+	"\"bufferViews\": [\n"
+	"{\"buffer\": 0, \"byteOffset\": 1, \"byteLength\": 72},\n"
+	"{\"buffer\": 0, \"byteOffset\": 73, \"byteLength\": 48},\n"
+	"{\"buffer\": 0, \"byteOffset\": 121, \"byteLength\": 48},\n"
+	"{\"buffer\": 0, \"byteOffset\": 169, \"byteLength\": 96},\n"
+	"{\"buffer\": 0, \"byteOffset\": 265, \"byteLength\": 24},\n"
+	"{\"buffer\": 0, \"byteOffset\": 289, \"byteLength\": 192, \"byteStride\": 32},\n"
+	"{\"buffer\": 0, \"byteOffset\": 481, \"byteLength\": 48},\n"
+	"{\"buffer\": 0, \"byteOffset\": 529, \"byteLength\": 48},\n"
+	"{\"buffer\": 0, \"byteOffset\": 577, \"byteLength\": 16},\n"
+	"{\"buffer\": 0, \"byteOffset\": 593, \"byteLength\": 8}],\n"
+	"\"buffers\": [\n"
+	"{BUFFER \"byteLength\": 601}]}\n";
+
+static void put(struct gltf_files *f, const void *bytes, size_t size)
+{
+	assert(f->buffer_size + size <= sizeof f->buffer);
+	memcpy(f->buffer + f->buffer_size, bytes, size);
+	f->buffer_size += size;
+}
+
+/* Little endian. */
+static void put_bits(struct gltf_files *f, uint32_t bits, int size)
+{
+	for (int i = 0; i < size; i++)
+		put(f, (const unsigned char[]){(unsigned char)(bits >> 8 * i)}, 1);
+}
+
+static void put_floats(struct gltf_files *f, const double *x, int count)
+{
+	for (int i = 0; i < count; i++) {
+		float one = (float)x[i];
+		uint32_t bits;
+		memcpy(&bits, &one, sizeof bits);
+		put_bits(f, bits, 4);
+	}
+}
+
+void gltf_files_make(struct gltf_files *f)
+{
+	static const double strip[4][3] = {{-1, 0, -1}, {-1, 0, 1}, {1, 0, -1}, {1, 0, 1}},
+			    fan[4][3] = {{-1, 0, -1}, {-1, 0, 1}, {1, 0, 1}, {1, 0, -1}};
+	static const int strip_uv[4][2] = {{0, 0}, {0, 1}, {1, 0}, {1, 1}},
+			 fan_uv[4][2] = {{0, 0}, {0, 1}, {1, 1}, {1, 0}};
+	memset(f, 0, sizeof *f);
+	memcpy(f->json, template, sizeof template);
+	put_bits(f, 0x55, 1); /* nothing begins at a multiple of anything */
+	put_floats(f, solid_position[0], 3 * SOLID_VERTICES);
+	put_floats(f, solid_uv[0], 2 * SOLID_VERTICES);
+	for (int size = 2; size > 0; size = size == 2 ? 4 : size == 4 ? 1 : 0)
+		for (int i = 0; i < 3 * SOLID_TRIANGLES; i++)
+			put_bits(f, solid_index[i / 3][i % 3], size);
+	for (int i = 0; i < SOLID_VERTICES; i++) {
+		put_floats(f, solid_position[i], 3);
+		put_floats(f, solid_position[i], 3);
+		put_floats(f, solid_uv[i], 2);
+	}
+	put_floats(f, strip[0], 12);
+	put_floats(f, fan[0], 12);
+	for (int i = 0; i < 8; i++)
+		put_bits(f, strip_uv[i / 2][i % 2] ? 65535 : 0, 2);
+	for (int i = 0; i < 8; i++)
+		put_bits(f, fan_uv[i / 2][i % 2] ? 255 : 0, 1);
+}
+
+void gltf_files_replace(struct gltf_files *f, const char *from, const char *to)
+{
+	static char out[sizeof f->json];
+	size_t used = 0, n = strlen(from), found = 0;
+	for (const char *p = f->json; *p;) {
+		bool here = strncmp(p, from, n) == 0;
+		size_t size = here ? strlen(to) : 1;
+		assert_true(used + size < sizeof out);
+		memcpy(out + used, here ? to : p, size);
+		used += size;
+		p += here ? n : 1;
+		found += here;
+	}
+	if (!found)
+		fail_msg("there is no %s", from);
+	out[used] = 0;
+	memcpy(f->json, out, used + 1);
+}
+
+static void base64(const unsigned char *bytes, size_t n, char *out)
+{
+	static const char letters[] = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+	for (size_t i = 0; i < n; i += 3) {
+		uint32_t x = (uint32_t)bytes[i] << 16 | (uint32_t)(i + 1 < n ? bytes[i + 1] : 0) << 8 |
+			     (uint32_t)(i + 2 < n ? bytes[i + 2] : 0);
+		for (size_t k = 0; k < 4; k++)
+			*out++ = i + k <= n ? letters[x >> (18 - 6 * k) & 63] : '=';
+	}
+	*out = 0;
+}
+
+static void put_word(unsigned char *to, size_t x)
+{
+	for (int i = 0; i < 4; i++)
+		to[i] = (unsigned char)(x >> 8 * i);
+}
+
+/* Header, JSON with blanks behind it, buffer with zeros behind it. */
+static void pack_binary(struct gltf_files *f)
+{
+	size_t json = (strlen(f->json) + 3) / 4 * 4, binary = (f->buffer_size + 3) / 4 * 4;
+	unsigned char *p = f->file;
+	assert_true(28 + json + binary <= sizeof f->file);
+	memset(p, 0, 28 + json + binary);
+	f->file_size = 28 + json + binary;
+	memcpy(p, "glTF", 4);
+	put_word(p + 4, 2);
+	put_word(p + 8, f->file_size);
+	put_word(p + 12, json);
+	memcpy(p + 16, "JSON", 4);
+	memset(p + 20, ' ', json);
+	memcpy(p + 20, f->json, strlen(f->json));
+	put_word(p + 20 + json, binary);
+	memcpy(p + 24 + json, "BIN", 3);
+	memcpy(p + 28 + json, f->buffer, f->buffer_size);
+}
+
+void gltf_files_pack(struct gltf_files *f, enum gltf_form form)
+{
+	static char json[sizeof f->json], uri[2 * sizeof f->buffer];
+	int n = snprintf(uri, sizeof uri, "%s", form == GLTF_EXTERNAL ? "\"uri\": \"the%20mesh.bin\"," : "");
+	if (form == GLTF_EMBEDDED) {
+		n = snprintf(uri, sizeof uri, "\"uri\": \"data:application/octet-stream;base64,");
+		base64(f->buffer, f->buffer_size, uri + n);
+		n = (int)strlen(uri);
+		snprintf(uri + n, sizeof uri - (size_t)n, "\",");
+	}
+	memcpy(json, f->json, sizeof json);
+	gltf_files_replace(f, "BUFFER", uri);
+	if (form == GLTF_BINARY) {
+		pack_binary(f);
+	} else {
+		f->file_size = strlen(f->json);
+		memcpy(f->file, f->json, f->file_size);
+	}
+	memcpy(f->json, json, sizeof json);
+	f->list[0] = (struct memory_file){form == GLTF_BINARY ? "s.glb" : "s.gltf", f->file, f->file_size};
+	f->list[1] = (struct memory_file){"the mesh.bin", f->buffer, f->buffer_size};
+}

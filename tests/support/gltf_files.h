@@ -1,0 +1,28 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A glTF scene made in memory, in the three forms that files have: a floor that is a strip, two octahedra below a node,
+ * a lamp that is a fan, a point light and a camera. Its XML twin is in tests/worker/render/scene/test_gltf.c. One
+ * thread.
+ */
+#ifndef TESTS_SUPPORT_GLTF_FILES_H
+#define TESTS_SUPPORT_GLTF_FILES_H
+
+#include "tests/support/memory_assets.h"
+
+enum gltf_form { GLTF_EXTERNAL, GLTF_EMBEDDED, GLTF_BINARY, GLTF_FORMS };
+
+struct gltf_files {
+	char json[1 << 15];
+	unsigned char buffer[1 << 10], file[1 << 16];
+	size_t buffer_size, file_size;
+	struct memory_file list[8]; /* the scene first */
+};
+
+/* The JSON and the buffer; gltf_files_pack makes files of them, to be called again after a change. The JSON names the
+ * pictures "rgb.hdr"; the caller adds them to the list. */
+void gltf_files_make(struct gltf_files *f);
+void gltf_files_pack(struct gltf_files *f, enum gltf_form form);
+/* Every `from` in the JSON becomes `to`; fails the test where there is none. */
+void gltf_files_replace(struct gltf_files *f, const char *from, const char *to);
+
+#endif

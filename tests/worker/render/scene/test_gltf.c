@@ -1,0 +1,479 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * glTF against its XML twin: the same picture, bit for bit, in each form that files have. What is malformed or not
+ * supported is answered by a sentence; no damaged byte does anything else.
+ */
+#include "common/base/mem.h"
+#include "tests/support/dice.h"
+#include "tests/support/gltf_files.h"
+#include "tests/support/pictures.h"
+#include "tests/support/render_picture.h"
+#include "tests/support/worlds.h"
+#include "worker/render/shape/shape.h"
+#include "worker/render/world/build.h"
+
+#include <math.h>
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+enum { SIDE = 32 };
+#define MATRIX(values) "<transform name='to_world'><matrix value='" values "'/></transform>"
+#define OBJ(name, inner) "<shape type='obj'><string name='filename' value='" name "'/>" inner "</shape>"
+#define BITMAP(name, file)                                                                       \
+	"<texture name='" name "' type='bitmap'><string name='filename' value='" file "'/>"      \
+	"<string name='filter_type' value='nearest'/><string name='wrap_mode_u' value='clamp'/>" \
+	"<string name='wrap_mode_v' value='mirror'/>"
+#define RAW "<boolean name='raw' value='true'/></texture>"
+#define FLOAT(name, value) "<float name='" name "' value='" value "'/>"
+
+static const char solid_obj[] = "v 1 0 0\nv -1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nv 0 0 -1\n"
+				"vn 1 0 0\nvn -1 0 0\nvn 0 1 0\nvn 0 -1 0\nvn 0 0 1\nvn 0 0 -1\n"
+				"vt 0 1\nvt 0.25 0.5\nvt 0.5 0\nvt 0.75 0.875\nvt 1 0.75\nvt -2 -2\n"
+				"f 1/1/1 3/3/3 5/5/5\nf 3/3/3 2/2/2 5/5/5\nf 2/2/2 4/4/4 5/5/5\nf 4/4/4 1/1/1 5/5/5\n"
+				"f 3/3/3 1/1/1 6/6/6\nf 2/2/2 3/3/3 6/6/6\nf 4/4/4 2/2/2 6/6/6\nf 1/1/1 4/4/4 6/6/6\n";
+static const char strip_obj[] = "v -1 0 -1\nv -1 0 1\nv 1 0 -1\nv 1 0 1\nvt 0 1\nvt 0 0\nvt 1 1\nvt 1 0\n"
+				"f 1/1 2/2 3/3\nf 3/3 2/2 4/4\n";
+static const char fan_obj[] = "v -1 0 -1\nv -1 0 1\nv 1 0 1\nv 1 0 -1\nvt 0 1\nvt 0 0\nvt 1 0\nvt 1 1\n"
+			      "f 1/1 2/2 3/3\nf 1/1 3/3 4/4\n";
+
+/* b.hdr and g.hdr hold what rgb.hdr has of these. */
+static const char twin[] = "<scene version='3.0.0'>" OBJ(
+	"strip.obj",
+	"<boolean name='face_normals' value='true'/>" MATRIX(
+		"4 0 0 0 0 1 0 -1 0 0 4 0 0 0 0 1") "<bsdf type='principled'><rgb name='base_color' value='0.8 0.4 0.2'/>" FLOAT("metallic",
+																 "0")
+		FLOAT("roughness", "1") FLOAT("eta", "1.5") "</bsdf>")
+	OBJ("solid.obj",
+	    MATRIX("2.2204460492503131e-16 0 1 -1 0 1 0 0.5 -1 0 2.2204460492503131e-16 0 0 0 0 1") "<bsdf type='principled'>"
+												    "<texture name='base_color' type='scale'><rgb name='scale' value='0.5 1 0.25'/>" BITMAP(
+													    "x",
+													    "rgb.hdr") "</texture></texture><texture name='metallic' type='scale'>" FLOAT("scale",
+																							  "0.5")
+													    BITMAP("x",
+														   "b.hdr")
+														    RAW
+	    "</texture>" BITMAP("roughness", "g.hdr") RAW FLOAT(
+		    "eta",
+		    "1.5") "</bsdf>") OBJ("solid.obj",
+					  MATRIX("0.5 0 0 1 0 0.5 0 0 0 0 0.5 0.5 0 0 0 1") "<bsdf type='principled'><rgb name='base_color' value='1 1 1'/>" FLOAT(
+						  "metallic", "0") FLOAT("roughness", "0.5") FLOAT("eta", "1.75")
+						  FLOAT("spec_trans", "1") "</bsdf>")
+		OBJ("fan.obj",
+		    "<boolean name='face_normals' value='true'/>" MATRIX(
+			    "1 0 0 0 0 -1 0 3 0 0 -1 0 0 0 0 1") "<bsdf type='principled'><rgb name='base_color' value='1 1 1'/>" FLOAT("metallic",
+																	"0")
+			    FLOAT("roughness", "1") FLOAT(
+				    "eta",
+				    "1.5") "</bsdf><emitter type='area'><rgb name='radiance' value='8 4 4'/></emitter>") "<sensor type='perspective'><float name='fov' value='42.971834634811742'/><string name='fov_axis' value='y'/>" MATRIX("-1 0 0 0 0 1 0 0.5 0 0 -1 6 0 0 0 1") "<film type='hdrfilm'><integer name='width' value='768'/>"
+																																		      "<integer name='height' value='768'/></film></sensor>"
+																																		      "<emitter type='point'><rgb name='intensity' value='4 2 1'/><point name='position' x='2' y='2' z='2'/></emitter>"
+																																		      "</scene>";
+
+static struct picture render(const struct memory_file *files)
+{
+	struct picture out;
+	struct world *w = world_of_files(SIDE, SIDE, files);
+	const struct render_picture_how how = {"path", "gltf", 8, 6};
+	render_picture_xyz(w, &how, &out);
+	world_free(w);
+	return out;
+}
+
+static void add_pictures(struct pictures *p)
+{
+	static const double rgb[12] = {0.5, 0.25, 0.75, 0.125, 0.5, 0.25, 0.75, 0.75, 0.5, 0.25, 0.75, 0.875};
+	double green[12], blue[12];
+	for (int i = 0; i < 12; i++) {
+		green[i] = rgb[i / 3 * 3 + 1];
+		blue[i] = rgb[i / 3 * 3 + 2];
+	}
+	*p = (struct pictures){0};
+	pictures_add(p, 2, 2, rgb);
+	pictures_add(p, 2, 2, green);
+	pictures_add(p, 2, 2, blue);
+}
+
+static void test_twin(void **state)
+{
+	(void)state;
+	struct pictures p;
+	static struct gltf_files f;
+	add_pictures(&p);
+	const struct memory_file files[] = {{"twin.xml", twin, sizeof twin - 1},
+					    {"solid.obj", solid_obj, sizeof solid_obj - 1},
+					    {"strip.obj", strip_obj, sizeof strip_obj - 1},
+					    {"fan.obj", fan_obj, sizeof fan_obj - 1},
+					    {"rgb.hdr", p.file[0].bytes, p.file[0].size},
+					    {"g.hdr", p.file[1].bytes, p.file[1].size},
+					    {"b.hdr", p.file[2].bytes, p.file[2].size},
+					    {0}};
+	struct picture want = render(files);
+	gltf_files_make(&f);
+	for (int form = 0; form < GLTF_FORMS; form++) {
+		gltf_files_pack(&f, (enum gltf_form)form);
+		f.list[2] = files[4];
+		struct picture got = render(f.list);
+		double bright = 0;
+		for (int k = 0; k < 3; k++)
+			for (size_t i = 0; i < SIDE * SIDE; i++) {
+				bright += (double)want.rgb[k][i];
+				if (got.rgb[k][i] != want.rgb[k][i])
+					fail_msg("form %d, channel %d, pixel %zu: %a, in the twin %a", form, k, i,
+						 (double)got.rgb[k][i], (double)want.rgb[k][i]);
+			}
+		assert_true(bright > 0.01 * SIDE * SIDE);
+		picture_fini(&got);
+	}
+	picture_fini(&want);
+	pictures_fini(&p);
+}
+
+/* ---- one change each */
+
+static struct gltf_files changed;
+
+/* "s.gltf", with `from` replaced. */
+static const struct memory_file *change(const char *from, const char *to)
+{
+	gltf_files_make(&changed);
+	if (from)
+		gltf_files_replace(&changed, from, to);
+	gltf_files_pack(&changed, GLTF_EXTERNAL);
+	return changed.list;
+}
+
+static int read_files(const struct memory_file *files, bool lenient, struct scene *s, struct error *e)
+{
+	struct asset_source assets = memory_assets(files);
+	return (lenient ? scene_read_lenient : scene_read)(s, &assets, files[0].name, render_plugins(), NULL, 0, e);
+}
+
+static int build_shapes(const struct scene *s, const struct memory_file *files, struct error *e)
+{
+	struct asset_source assets = memory_assets(files);
+	struct arena arena = {.limit = 64 << 20};
+	int rc = 0;
+	for (uint32_t i = 0; !rc && i < s->object_count; i++) {
+		struct shape_geometry g;
+		uint64_t dropped;
+		if (s->objects[i]->cls == PLUGIN_SHAPE)
+			rc = shape_build(s->objects[i], &assets, &arena, &g, &dropped, e);
+	}
+	arena_fini(&arena);
+	return rc;
+}
+
+/* By the reader, or by the shapes. */
+static void refuses(const struct memory_file *files, const char *text)
+{
+	struct scene s;
+	struct error e = {"no error at all"};
+	int rc = read_files(files, false, &s, &e);
+	if (!rc) {
+		rc = build_shapes(&s, files, &e);
+		scene_fini(&s);
+	}
+	if (rc >= 0 || !strstr(e.text, text))
+		fail_msg("gave %d: %s\n not: %s", rc, e.text, text);
+}
+
+static const struct {
+	const char *from, *to, *text;
+} malformed[] = {
+	{"\"scene\": 0,", "\"scene\": 0", "s.gltf:1: "},
+	{"\"2.0\"", "\"1.0\"", "s.gltf: glTF of version \"1.0\""},
+	{"\"2.0\"", "2", "\"version\" is no text"},
+	{"\"scene\": 0", "\"scene\": 1", "there is no scenes[1]"},
+	{"\"scene\": 0", "\"scene\": -1", "\"scene\" is no whole number"},
+	{"\"scene\": 0", "\"scene\": 0, \"scene\": 0", "duplicate"},
+	{"\"extensionsUsed\": [", "\"extensionsRequired\": [\"EXT_x\"], \"y\": [", "requires the extension EXT_x"},
+	{"[0, 1, 4, 5, 6]", "[0, 1, 4, 5, 9]", "there is no nodes[9]"},
+	{"[0, 1, 4, 5, 6]", "[0, \"1\"]", "no indices"},
+	{"\"children\": [2, 3]", "\"children\": [2, 1]", "s.gltf:7: nodes[1]: it is its own ancestor"},
+	{"\"children\": [2, 3]", "\"children\": [2, 0.5]", "nodes[1]: its children are no indices"},
+	{"\"rotation\": [1, 0, 0, 0]", "\"rotation\": [0, 0, 0, 0]", "nodes[4]: its rotation is no quaternion"},
+	{"\"rotation\": [1, 0, 0, 0]", "\"rotation\": [1, 0, 0]", "\"rotation\" is no array of 4 numbers"},
+	{"\"yfov\": 0.75", "\"yfov\": 4", "fov"},
+	{"\"yfov\": 0.75", "\"yfov\": \"wide\"", "cameras[0]: \"yfov\" is no number"},
+	{"\"point\"", "\"lamp\"", "lights[0]: a light of type \"lamp\""},
+	{"\"light\": 0", "\"light\": 7", "there is no lights[7]"},
+	{"\"mode\": 5", "\"mode\": 8", "meshes[0]: a primitive without attributes, or of mode 8"},
+	{"\"POSITION\": 9", "\"POSITION\": 99", "there is no accessors[99]"},
+	{"\"POSITION\": 9", "\"POSITION\": 3", "accessors[3]: of another type than position needs"},
+	{"\"POSITION\": 9,", "", "meshes[0]: a primitive has no POSITION"},
+	{"\"TEXCOORD_0\": 11", "\"TEXCOORD_0\": 2", "not equally many"},
+	{"\"indices\": 3", "\"indices\": 8", "accessors[8]: of another type than index needs"},
+	{"{\"bufferView\": 2, ", "{\"bufferView\": 2, \"sparse\": {}, ", "sparse accessors are not supported"},
+	{"{\"bufferView\": 2, ", "{", "accessors[3]: without a bufferView"},
+	{"5123, \"count\": 24", "5123, \"count\": 25", "accessors[3]: it leads out of bufferViews[2]"},
+	{"5123, \"count\": 24", "5123, \"count\": 23", "no whole triangles"},
+	{"5123, \"count\": 24", "5123, \"count\": 1e300", "\"count\" is no whole number"},
+	{"5123, \"count\": 24", "5125, \"count\": 12", "out of range; there are 6 vertices"},
+	{"\"byteOffset\": 24, \"componentType\"", "\"byteOffset\": 9007199254740992, \"componentType\"", "leads out"},
+	{"\"byteStride\": 32", "\"byteStride\": 4", "it leads out of bufferViews[5]"},
+	{"\"byteOffset\": 593", "\"byteOffset\": 594", "bufferViews[9]: it leads out of buffers[0] of 601 bytes"},
+	{"593, \"byteLength\": 8}],\n\"buffers\": [\n{BUFFER \"byteLength\": 601",
+	 "690, \"byteLength\": 8}],\n\"buffers\": [\n{BUFFER \"byteLength\": 700", "the mesh.bin has 601 bytes"},
+	{"BUFFER", "\"uri\": \"http://x/y.bin\",", "not from a network"},
+	{"BUFFER", "\"uri\": \"../y.bin\",", "y.bin"},
+	{"BUFFER", "\"uri\": \"a%00b\",", "its uri names no file"},
+	{"BUFFER", "\"uri\": \"data:text/plain,abc\",", "buffers[0]: what is embedded in it is not written in base64"},
+	{"BUFFER", "\"uri\": \"data:;base64,AAAA\",", "buffers[0]: it says 601 bytes and has 3"},
+	{"\"index\": 0},", "\"index\": 3},", "there is no textures[3]"},
+	{"{\"source\": 0, ", "{", "textures[0]: it has no source"},
+	{"\"roughnessFactor\": 0.5", "\"roughnessFactor\": 1.5", "s.gltf:25: <float>: roughness=1.5 is outside [0, 1]"},
+	/* known, and not supported */
+	{"\"TEXCOORD_0\": 11", "\"TEXCOORD_0\": 11, \"COLOR_0\": 9", "vertex_colors"},
+	{"{\"index\": 0},\n\"metallicFactor\"", "{\"index\": 0, \"texCoord\": 1},\n\"metallicFactor\"", "tex_coord"},
+	{"\"KHR_materials_ior\"", "\"KHR_materials_sheen\"", "KHR_materials_sheen"},
+	{"\"KHR_materials_ior\": {\"ior\": 1.75}", "\"KHR_materials_specular\": {\"specularTexture\": {}}",
+	 "specularTexture"},
+	{"\"mode\": 5,", "\"mode\": 5, \"extensions\": {\"KHR_draco_mesh_compression\": {}},", "without compression"},
+	{"\"mesh\": 0,", "\"mesh\": 0, \"extensions\": {\"EXT_mesh_gpu_instancing\": {}},", "nodes[0]: EXT_mesh_gpu"},
+};
+
+static void test_malformed(void **state)
+{
+	(void)state;
+	for (size_t i = 0; i < sizeof malformed / sizeof *malformed; i++) {
+		bool buffer = strcmp(malformed[i].from, "BUFFER") == 0; /* what pack would put there */
+		const struct memory_file *files = change(buffer ? NULL : malformed[i].from, malformed[i].to);
+		if (buffer) {
+			gltf_files_replace(&changed, "BUFFER", malformed[i].to);
+			changed.list[0].size = changed.file_size = strlen(changed.json);
+			memcpy(changed.file, changed.json, changed.file_size);
+		}
+		refuses(files, malformed[i].text);
+	}
+}
+
+static void test_malformed_containers(void **state)
+{
+	(void)state;
+	static const struct {
+		size_t at;
+		unsigned char value;
+		const char *text;
+	} damage[] = {
+		{4, 1, "a GLB file of version 1"},
+		{10, 9, "its header says"},
+		{14, 9, "a chunk leads out of the file"},
+		{16, 'X', "a GLB file begins with JSON"},
+		{20, 'x', "s.glb:1: "},
+		{0, 'x', "s.glb:1: "},
+	};
+	for (size_t i = 0; i < sizeof damage / sizeof *damage; i++) {
+		gltf_files_make(&changed);
+		gltf_files_pack(&changed, GLTF_BINARY);
+		changed.file[damage[i].at] = damage[i].value;
+		refuses(changed.list, damage[i].text);
+	}
+	gltf_files_make(&changed);
+	gltf_files_pack(&changed, GLTF_BINARY);
+	changed.list[0].size -= changed.buffer_size;
+	refuses(changed.list, "its header says");
+}
+
+/* A bound on values holds before jansson takes memory for them; brackets within text do not count. */
+static void test_too_much(void **state)
+{
+	(void)state;
+	enum { SIZE = 9 << 20 };
+	char *text = mem_alloc(SIZE, 1);
+	assert_non_null(text);
+	struct memory_file files[] = {{"s.gltf", text, SIZE}, {0}};
+	for (int i = 0; i < SIZE; i++)
+		text[i] = i % 2 ? '[' : ']';
+	text[0] = '[';
+	refuses(files, "more than 4194304 values");
+	memset(text, '[', SIZE);
+	memcpy(text, "{\"a\\\"\": \"", 9);
+	refuses(files, "s.gltf:1: ");
+	mem_free(text);
+}
+
+/* Bytes of a small file damaged, and prefixes of it: a scene, or a sentence. */
+static void test_damaged(void **state)
+{
+	(void)state;
+	struct dice d = dice_of("damaged glTF");
+	for (int form = 0; form < GLTF_FORMS; form++)
+		for (int i = 0; i < 400; i++) {
+			gltf_files_make(&changed);
+			gltf_files_pack(&changed, (enum gltf_form)form);
+			size_t at = dice_below(&d, (uint32_t)changed.file_size);
+			if (i % 4 == 0)
+				changed.list[0].size = at;
+			else
+				changed.file[at] = (unsigned char)dice_below(&d, 256);
+			struct scene s;
+			struct error e = {""};
+			int rc = read_files(changed.list, i % 2, &s, &e);
+			if (!rc) {
+				rc = build_shapes(&s, changed.list, &e);
+				scene_fini(&s);
+			}
+			assert_true(rc == 0 || (rc < 0 && *e.text));
+		}
+}
+
+/* ---- what becomes of materials, cameras and lights */
+
+static struct scene read_changed(const char *from, const char *to, bool lenient)
+{
+	struct scene s;
+	struct error e;
+	if (read_files(change(from, to), lenient, &s, &e))
+		fail_msg("%s", e.text);
+	return s;
+}
+
+static const struct scene_node *find(const struct scene *s, enum plugin_class cls, const char *type)
+{
+	for (uint32_t i = 0; i < s->object_count; i++)
+		if (s->objects[i]->cls == cls && strcmp(s->objects[i]->type, type) == 0)
+			return s->objects[i];
+	fail_msg("there is no %s", type);
+	return NULL;
+}
+
+static bool has_note(const struct scene *s, const char *text)
+{
+	for (uint32_t i = 0; i < s->note_count; i++)
+		if (strstr(s->notes[i], text))
+			return true;
+	return false;
+}
+
+static void assert_near(double got, double want)
+{
+	if (!(fabs(got - want) <= 1e-12 * fabs(want)))
+		fail_msg("%.17g is not %.17g", got, want);
+}
+
+static void test_lights_and_cameras(void **state)
+{
+	(void)state;
+	struct scene s = read_changed(
+		"\"type\": \"point\"",
+		"\"type\": \"spot\", \"spot\": {\"innerConeAngle\": 0.25, \"outerConeAngle\": 0.5}", false);
+	const struct scene_node *spot = find(&s, PLUGIN_EMITTER, "spot");
+	mat4 m = node_transform(spot, "to_world");
+	assert_near(node_float(spot, "cutoff_angle", 0), 0.5 * 180 / M_PI);
+	assert_near(node_float(spot, "beam_width", 0), 0.25 * 180 / M_PI);
+	assert_true(m.m[2][2] == -1 && m.m[0][3] == 2 && m.m[2][3] == 2); /* it shines along -z */
+	scene_fini(&s);
+	s = read_changed("\"type\": \"point\"", "\"type\": \"directional\"", false);
+	m = node_transform(find(&s, PLUGIN_EMITTER, "directional"), "to_world");
+	assert_true(m.m[2][2] == -1);
+	scene_fini(&s);
+	s = read_changed("\"perspective\": {", "\"orthographic\": {\"xmag\": 2, \"ymag\": 1}, \"x\": {", false);
+	const struct scene_node *sensor = find(&s, PLUGIN_SENSOR, "orthographic");
+	m = node_transform(sensor, "to_world");
+	assert_true(m.m[0][0] == -2 && m.m[1][1] == 2 && m.m[2][2] == -1 && m.m[2][3] == 6);
+	assert_int_equal(node_int(node_child(sensor, PLUGIN_FILM, 0), "height", 0), 384);
+	scene_fini(&s);
+}
+
+/* All of the scene's box is within the field of view of the camera that stands in. */
+static void test_no_camera_no_light(void **state)
+{
+	(void)state;
+	gltf_files_make(&changed);
+	gltf_files_replace(&changed, "\"camera\": 0,", "");
+	gltf_files_replace(&changed, "\"emissiveFactor\": [1, 0.5, 0.5],", "");
+	gltf_files_replace(&changed, "{\"translation\": [2, 2, 2], \"ext", "{\"translation\": [2, 2, 2], \"ext_");
+	gltf_files_pack(&changed, GLTF_EXTERNAL);
+	struct scene s;
+	struct error e;
+	if (read_files(changed.list, false, &s, &e))
+		fail_msg("%s", e.text);
+	assert_true(has_note(&s, "it has no camera") && has_note(&s, "it has no light") &&
+		    has_note(&s, "points and lines"));
+	find(&s, PLUGIN_EMITTER, "constant");
+	mat4 m = node_transform(find(&s, PLUGIN_SENSOR, "perspective"), "to_world");
+	vec3 eye = {m.m[0][3], m.m[1][3], m.m[2][3]}, ahead = {m.m[0][2], m.m[1][2], m.m[2][2]};
+	for (int i = 0; i < 8; i++) {
+		vec3 corner = {i & 1 ? 4 : -4, i & 2 ? 3 : -1, i & 4 ? 4 : -4}, to = vec3_sub(corner, eye);
+		assert_true(vec3_dot(vec3_normalize(to), ahead) > cos(20 * M_PI / 180));
+	}
+	scene_fini(&s);
+}
+
+static const struct scene_node *named(const struct scene *s, const char *id)
+{
+	for (uint32_t i = 0; i < s->object_count; i++)
+		if (s->objects[i]->id && strcmp(s->objects[i]->id, id) == 0)
+			return s->objects[i];
+	fail_msg("there is no %s", id);
+	return NULL;
+}
+
+#define IOR "\"KHR_materials_ior\": {"
+static void test_materials(void **state)
+{
+	(void)state;
+	static const char second[] = "bsdf of materials[1]", third[] = "bsdf of materials[2]";
+	struct scene s = read_changed("\"metallicFactor\": 0.5,",
+				      "\"metallicFactor\": 0.5},\n\"alphaMode\": \"MASK\", \"alphaCutoff\": 0.25, "
+				      "\"normalTexture\": {\"index\": 0, \"scale\": 2}, \"x\": {",
+				      false);
+	const struct scene_node *mask = named(&s, second), *map = node_child(mask, PLUGIN_BSDF, 0),
+				*opacity = node_ref(mask, "opacity");
+	assert_string_equal(mask->type, "mask");
+	assert_string_equal(node_string(opacity, "channel", ""), "a");
+	assert_near(node_float(opacity, "threshold", 0), 0.25);
+	assert_string_equal(map->type, "normalmap");
+	assert_true(node_float(map, "scale", 0) == 2);
+	assert_string_equal(node_child(map, PLUGIN_BSDF, 0)->type, "principled");
+	scene_fini(&s);
+
+	/* Abbe's number is 20 / dispersion: (n(d) - 1) / (n(F) - n(C)). */
+	s = read_changed(IOR, "\"KHR_materials_dispersion\": {\"dispersion\": 0.5}, " IOR, false);
+	const struct scene_node *glass = named(&s, third);
+	double b = node_float(glass, "int_cauchy_b", 0);
+	assert_string_equal(glass->type, "roughdielectric");
+	assert_near(0.75 / (b / (0.48613 * 0.48613) - b / (0.65627 * 0.65627)), 40);
+	assert_near(node_float(glass, "alpha", 0), 0.25);
+	scene_fini(&s);
+
+	/* The reflectance at normal incidence is the factor's share of the index's. */
+	s = read_changed(IOR, "\"KHR_materials_specular\": {\"specularFactor\": 0.5}, " IOR, false);
+	double eta = node_float(named(&s, third), "eta", 0), root = (eta - 1) / (eta + 1);
+	assert_near(root * root, 0.5 * (0.75 / 2.75) * (0.75 / 2.75));
+	scene_fini(&s);
+
+	s = read_changed(IOR, "\"KHR_materials_clearcoat\": {\"clearcoatFactor\": 0.5}, " IOR, false);
+	assert_near(node_float(named(&s, third), "clearcoat", 0), 0.5);
+	assert_true(has_note(&s, "clear coats"));
+	scene_fini(&s);
+
+	/* What is known and not supported goes with --lenient, and is said. */
+	s = read_changed(IOR, "\"KHR_materials_sheen\": {}, " IOR, true);
+	assert_true(has_note(&s, "KHR_materials_sheen"));
+	scene_fini(&s);
+
+	s = read_changed(", \"material\": 0}", "}", false);
+	named(&s, "bsdf of materials[4]"); /* the format's own, one behind the last */
+	scene_fini(&s);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {
+		cmocka_unit_test(test_twin),
+		cmocka_unit_test(test_malformed),
+		cmocka_unit_test(test_malformed_containers),
+		cmocka_unit_test(test_too_much),
+		cmocka_unit_test(test_damaged),
+		cmocka_unit_test(test_lights_and_cameras),
+		cmocka_unit_test(test_no_camera_no_light),
+		cmocka_unit_test(test_materials),
+	};
+	return cmocka_run_group_tests_name("gltf", tests, NULL, NULL);
+}

@@ -1,0 +1,343 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The container (GLB header and chunks, or plain JSON), and the scene's nodes: each mesh of a node becomes shapes under
+ * the product of the matrices above it, each light an emitter, each camera a sensor. JSON is read by jansson; where
+ * entries begin is looked for once more, so that messages have lines.
+ *
+ * What a file cannot say in glTF stays a default: the film's size follows the first camera's aspect, a file without
+ * cameras gets one that sees all of it, one without lights a constant environment; both are said.
+ *
+ * Failures: a container that contradicts itself, JSON that is none, indices of entries that are not there, nodes that
+ * are their own ancestors, extensions that a file requires and that are not known. What is known but not supported
+ * becomes a property that the tables of parameters do not have: refused, or left out, there.
+ */
+#include "worker/render/scene/gltf_private.h"
+
+#include <math.h>
+#include <string.h>
+
+enum { NODES_DEEP = 256, INSTANCES_MAX = 1 << 17, GLB_HEADER = 12, GLB_CHUNK = 8 };
+#define GLB_MAGIC 0x46546c67u  /* "glTF" */
+#define GLB_JSON 0x4e4f534au   /* "JSON" */
+#define GLB_BINARY 0x004e4942u /* "BIN" */
+
+bool gltf_is(const char *name)
+{
+	size_t n = strlen(name);
+	return (n > 5 && strcmp(name + n - 5, ".gltf") == 0) || (n > 4 && strcmp(name + n - 4, ".glb") == 0);
+}
+
+static uint32_t little(const unsigned char *p)
+{
+	return (uint32_t)p[0] | (uint32_t)p[1] << 8 | (uint32_t)p[2] << 16 | (uint32_t)p[3] << 24;
+}
+
+/* ---- lines */
+
+/* The array of that name, with room for the lines of its entries; GLTF_ARRAYS: none. */
+static enum gltf_array lines_of(struct gltf *g, const char *key, size_t n)
+{
+	for (int i = 0; i < GLTF_ARRAYS; i++) {
+		const char *name = gltf_array_name((enum gltf_array)i);
+		if (strlen(name) != n || memcmp(name, key, n) != 0)
+			continue;
+		size_t count = json_array_size(json_object_get(g->root, name));
+		if (!g->lines[i] && count)
+			g->lines[i] = arena_alloc(g->arena, count, sizeof *g->lines[i]);
+		g->line_room[i] = g->lines[i] ? count : 0;
+		return (enum gltf_array)i;
+	}
+	return GLTF_ARRAYS;
+}
+
+/* Where the entries of the arrays at the top begin, in JSON that is known to be well formed and to have no key twice.
+ */
+static void find_lines(struct gltf *g, const char *text, size_t size)
+{
+	int depth = 0, line = 1;
+	enum gltf_array array = GLTF_ARRAYS;
+	for (size_t i = 0; i < size; i++) {
+		char c = text[i];
+		if (c == '"') {
+			size_t begin = ++i;
+			for (; i < size && text[i] != '"'; i++)
+				i += text[i] == '\\';
+			if (depth == 1)
+				array = lines_of(g, text + begin, i - begin);
+		} else if (c == '{' || c == '[') {
+			if (depth == 2 && array < GLTF_ARRAYS && g->line_count[array] < g->line_room[array])
+				g->lines[array][g->line_count[array]++] = line;
+			depth++;
+		} else if (c == '}' || c == ']') {
+			depth--;
+		} else if (c == '\n') {
+			line++;
+		}
+	}
+}
+
+/* ---- the container */
+
+/* The JSON and the binary chunk of a .glb; of a .gltf all is JSON. */
+static int find_json(struct gltf *g, const char **text, size_t *size)
+{
+	const unsigned char *p = g->bytes;
+	*text = (const char *)p;
+	*size = g->size;
+	if (g->size < GLB_HEADER || little(p) != GLB_MAGIC)
+		return 0;
+	if (little(p + 4) != 2)
+		return gltf_fail(g, NULL, EINVAL, "a GLB file of version %u; 2 is supported", little(p + 4));
+	if (little(p + 8) > g->size)
+		return gltf_fail(g, NULL, EINVAL, "its header says %u bytes, it has %zu", little(p + 8), g->size);
+	size_t end = little(p + 8), at = GLB_HEADER;
+	*size = 0;
+	for (int i = 0; at + GLB_CHUNK <= end; i++) {
+		size_t length = little(p + at);
+		uint32_t type = little(p + at + 4);
+		at += GLB_CHUNK;
+		if (length > end - at)
+			return gltf_fail(g, NULL, EINVAL, "a chunk leads out of the file");
+		if (i == 0 && type == GLB_JSON) {
+			*text = (const char *)p + at;
+			*size = length;
+		} else if (i == 1 && type == GLB_BINARY) {
+			g->binary_first = at;
+			g->binary_count = length;
+		}
+		at += length;
+	}
+	return *size ? 0 : gltf_fail(g, NULL, EINVAL, "a GLB file begins with JSON");
+}
+
+/* What the reader knows; what comes of it is another matter. */
+static bool is_known(const char *extension)
+{
+	static const char *const known[] = {"KHR_lights_punctual",	  "KHR_materials_clearcoat",
+					    "KHR_materials_dispersion",	  "KHR_materials_emissive_strength",
+					    "KHR_materials_ior",	  "KHR_materials_specular",
+					    "KHR_materials_transmission", "KHR_materials_volume",
+					    "KHR_texture_transform"};
+	for (size_t i = 0; i < sizeof known / sizeof *known; i++)
+		if (strcmp(known[i], extension) == 0)
+			return true;
+	return false;
+}
+
+static void check_file(struct gltf *g)
+{
+	const json_t *asset = gltf_object(g, NULL, g->root, "asset");
+	const char *version = asset ? gltf_text(g, NULL, asset, "version", "") : "";
+	if (strncmp(version, "2.", 2) != 0)
+		gltf_fail(g, NULL, EINVAL, "glTF of version \"%.16s\"; 2.0 is supported", version);
+	const json_t *required = json_object_get(g->root, "extensionsRequired");
+	for (size_t i = 0; i < json_array_size(required); i++) {
+		const char *name = json_string_value(json_array_get(required, i));
+		if (!name || !is_known(name))
+			gltf_fail(g, NULL, ENOTSUP, "it requires the extension %.64s, which is not supported",
+				  name ? name : "(no text)");
+	}
+	if (json_array_size(json_object_get(g->root, "animations")))
+		gltf_note(g, "its animations are ignored: the image is of the nodes as they stand");
+	if (json_array_size(json_object_get(g->root, "skins")))
+		gltf_note(g, "its skins are ignored: meshes are as they were modelled");
+}
+
+/* ---- nodes */
+
+struct walk {
+	struct gltf *g;
+	bool *above; /* by node: it is an ancestor of the one at hand */
+	size_t nodes, visited;
+};
+
+static mat4 matrix_of(struct gltf *g, const struct gltf_at *node)
+{
+	double m[16] = {1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1}, t[3] = {0}, r[4] = {0, 0, 0, 1},
+	       s[3] = {1, 1, 1};
+	gltf_numbers(g, node, node->json, "matrix", m, 16); /* by columns */
+	gltf_numbers(g, node, node->json, "translation", t, 3);
+	gltf_numbers(g, node, node->json, "rotation", r, 4); /* a quaternion x y z w */
+	gltf_numbers(g, node, node->json, "scale", s, 3);
+	mat4 out;
+	for (int i = 0; i < 16; i++)
+		out.m[i % 4][i / 4] = m[i];
+	if (json_object_get(node->json, "matrix"))
+		return out;
+	double norm = r[0] * r[0] + r[1] * r[1] + r[2] * r[2] + r[3] * r[3];
+	if (!(norm > 0) || !isfinite(norm)) {
+		gltf_fail(g, node, EINVAL, "its rotation is no quaternion");
+		return mat4_identity();
+	}
+	double x = r[0], y = r[1], z = r[2], w = r[3], k = 2 / norm;
+	const double turn[3][3] = {{1 - k * (y * y + z * z), k * (x * y - z * w), k * (x * z + y * w)},
+				   {k * (x * y + z * w), 1 - k * (x * x + z * z), k * (y * z - x * w)},
+				   {k * (x * z - y * w), k * (y * z + x * w), 1 - k * (x * x + y * y)}};
+	out = mat4_identity();
+	for (int i = 0; i < 3; i++) {
+		for (int j = 0; j < 3; j++)
+			out.m[i][j] = turn[i][j] * s[j];
+		out.m[i][3] = t[i];
+	}
+	return out;
+}
+
+static void visit_lists(struct gltf *g, const struct gltf_at *node, const mat4 *to_world)
+{
+	struct gltf_at what;
+	if (gltf_extension(g, node, node->json, "EXT_mesh_gpu_instancing"))
+		gltf_fail(g, node, ENOTSUP, "EXT_mesh_gpu_instancing is not supported");
+	if (gltf_follow(g, node, node->json, "mesh", GLTF_MESHES, &what) > 0)
+		gltf_mesh(g, &what, to_world);
+	if (gltf_follow(g, node, node->json, "camera", GLTF_CAMERAS, &what) > 0)
+		gltf_camera(g, &what, to_world);
+	const json_t *light = gltf_extension(g, node, node->json, "KHR_lights_punctual");
+	if (light && gltf_follow(g, node, light, "light", GLTF_LIGHTS, &what) > 0)
+		gltf_light(g, &what, to_world);
+}
+
+static void visit(struct walk *w, uint64_t index, const mat4 *above, int depth)
+{
+	struct gltf *g = w->g;
+	struct gltf_at node;
+	if (g->failed || !gltf_entry(g, GLTF_NODES, index, &node))
+		return;
+	if (w->above[index] || depth > NODES_DEEP) {
+		gltf_fail(g, &node, ELOOP, w->above[index] ? "it is its own ancestor" : "nodes are more than %d deep",
+			  NODES_DEEP);
+		return;
+	}
+	if (++w->visited > INSTANCES_MAX) {
+		gltf_fail(g, &node, E2BIG, "more than %d nodes", INSTANCES_MAX);
+		return;
+	}
+	mat4 own = matrix_of(g, &node), to_world = mat4_mul(*above, own);
+	visit_lists(g, &node, &to_world);
+	const json_t *children = json_object_get(node.json, "children");
+	w->above[index] = true;
+	for (size_t i = 0; i < json_array_size(children) && !g->failed; i++) {
+		const json_t *child = json_array_get(children, i);
+		if (!json_is_integer(child) || json_integer_value(child) < 0)
+			gltf_fail(g, &node, EINVAL, "its children are no indices");
+		else
+			visit(w, (uint64_t)json_integer_value(child), &to_world, depth + 1);
+	}
+	w->above[index] = false;
+}
+
+static void read_scene(struct gltf *g)
+{
+	struct gltf_at scene;
+	struct walk w = {.g = g, .nodes = json_array_size(json_object_get(g->root, "nodes"))};
+	mat4 world = mat4_identity();
+	if (!gltf_entry(g, GLTF_SCENES, gltf_whole(g, NULL, g->root, "scene", 0), &scene))
+		return;
+	w.above = arena_alloc(g->arena, w.nodes ? w.nodes : 1, sizeof *w.above);
+	if (!w.above) {
+		gltf_fail(g, NULL, ENOMEM, "out of memory");
+		return;
+	}
+	memset(w.above, 0, w.nodes * sizeof *w.above);
+	const json_t *roots = json_object_get(scene.json, "nodes");
+	for (size_t i = 0; i < json_array_size(roots) && !g->failed; i++) {
+		const json_t *root = json_array_get(roots, i);
+		if (!json_is_integer(root) || json_integer_value(root) < 0)
+			gltf_fail(g, &scene, EINVAL, "its nodes are no indices");
+		else
+			visit(&w, (uint64_t)json_integer_value(root), &world, 0);
+	}
+}
+
+/* At most so many values: each begins, or comes after, one of these. */
+static bool is_moderate(const char *text, size_t size)
+{
+	size_t values = 0;
+	bool quoted = false;
+	for (size_t i = 0; i < size; i++) {
+		if (text[i] == '"')
+			quoted = !quoted;
+		else if (quoted)
+			i += text[i] == '\\';
+		else
+			values += text[i] == ',' || text[i] == '[' || text[i] == '{';
+	}
+	return values <= GLTF_VALUES_MAX;
+}
+
+static int read_json(struct gltf *g)
+{
+	const char *text;
+	size_t size;
+	json_error_t where;
+	int rc = find_json(g, &text, &size);
+	if (rc)
+		return rc;
+	if (size > GLTF_JSON_MAX)
+		return gltf_fail(g, NULL, EFBIG, "more than %d MB of JSON", GLTF_JSON_MAX >> 20);
+	if (!is_moderate(text, size))
+		return gltf_fail(g, NULL, E2BIG, "more than %d values in its JSON", GLTF_VALUES_MAX);
+	g->root = json_loadb(text, size, JSON_REJECT_DUPLICATES, &where);
+	if (!g->root) {
+		rc = json_error_code(&where) == json_error_out_of_memory ? ENOMEM : EINVAL;
+		g->failed = error_set(g->error, rc, "%s:%d: %.160s", g->file, where.line, where.text);
+		return g->failed;
+	}
+	if (!json_is_object(g->root))
+		return gltf_fail(g, NULL, EINVAL, "it is no JSON object");
+	find_lines(g, text, size);
+	const json_t *lights = gltf_extension(g, NULL, g->root, "KHR_lights_punctual");
+	g->lights = json_object_get(lights, "lights");
+	return g->failed;
+}
+
+static void *allocate(struct gltf *g, enum gltf_array array, size_t size)
+{
+	return arena_alloc(g->arena, json_array_size(json_object_get(g->root, gltf_array_name(array))) + 1, size);
+}
+
+static int read_file(struct gltf *g)
+{
+	if (read_json(g))
+		return g->failed;
+	g->buffers = allocate(g, GLTF_BUFFERS, sizeof *g->buffers);
+	g->images = allocate(g, GLTF_IMAGES, sizeof *g->images);
+	g->material_made = allocate(g, GLTF_MATERIALS, sizeof *g->material_made);
+	if (!g->buffers || !g->images || !g->material_made)
+		return gltf_fail(g, NULL, ENOMEM, "out of memory");
+	g->scene = gltf_element(g, NULL, NULL, "scene");
+	gltf_attribute(g, g->scene, "version", "3.0.0");
+	g->tree->root = g->scene;
+	g->tree->dialect_3 = true;
+	check_file(g);
+	read_scene(g);
+	if (!g->has_camera)
+		gltf_default_camera(g);
+	if (!g->has_light)
+		gltf_default_light(g);
+	return g->failed;
+}
+
+int gltf_read(struct xml_tree *t, const struct asset_source *assets, const char *name, struct arena *arena,
+	      struct error *e)
+{
+	*t = (struct xml_tree){0};
+	struct gltf g = {.tree = t,
+			 .assets = assets,
+			 .arena = arena,
+			 .error = e,
+			 .low = {INFINITY, INFINITY, INFINITY},
+			 .high = {-INFINITY, -INFINITY, -INFINITY}};
+	struct asset file;
+	g.file = arena_strdup(arena, name);
+	if (!g.file)
+		return error_set(e, ENOMEM, "out of memory");
+	int rc = assets->open(assets->user, name, &file, e);
+	if (rc)
+		return rc;
+	g.bytes = file.bytes;
+	g.size = file.size;
+	rc = read_file(&g);
+	json_decref(g.root);
+	assets->close(assets->user, &file);
+	return rc;
+}

@@ -1,0 +1,140 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Where bytes lie: files beside the scene, the binary chunk of a .glb, or base64 in the JSON itself, which is looked
+ * for in the file so that shapes and pictures can be read from there. Failures: other schemes, views that lead out of
+ * their buffer.
+ */
+#include "worker/render/scene/gltf_private.h"
+
+#include <string.h>
+
+static int digit(char c)
+{
+	return c >= '0' && c <= '9' ? c - '0' : (c | 32) >= 'a' && (c | 32) <= 'f' ? (c | 32) - 'a' + 10 : -1;
+}
+
+/* The name of a file in a URI: %20 is a blank. */
+static const char *file_name(struct gltf *g, const struct gltf_at *at, const char *uri)
+{
+	size_t n = strlen(uri), k = 0;
+	char *name = arena_alloc(g->arena, n + 1, 1);
+	if (!name) {
+		gltf_fail(g, at, ENOMEM, "out of memory");
+		return NULL;
+	}
+	for (size_t i = 0; i < n; i++) {
+		int high = uri[i] == '%' && i + 2 < n ? digit(uri[i + 1]) : -1,
+		    low = high >= 0 ? digit(uri[i + 2]) : -1;
+		char c = low >= 0 ? (char)(16 * high + low) : uri[i];
+		i += low >= 0 ? 2 : 0;
+		if (c == 0) {
+			gltf_fail(g, at, EINVAL, "its uri names no file");
+			return NULL;
+		}
+		name[k++] = c;
+	}
+	name[k] = 0;
+	return name;
+}
+
+static int embedded(struct gltf *g, const struct gltf_at *at, const char *uri, struct gltf_range *out)
+{
+	struct gltf_range *known = at->array == GLTF_BUFFERS ? g->buffers : g->images;
+	if (known[at->index].file) {
+		*out = known[at->index];
+		return 0;
+	}
+	if (++g->embedded > GLTF_EMBEDDED_MAX)
+		return gltf_fail(g, at, E2BIG, "more than %d buffers and pictures are embedded", GLTF_EMBEDDED_MAX);
+	const char *comma = strchr(uri, ',');
+	if (!comma || comma - uri < 7 || memcmp(comma - 7, ";base64", 7) != 0)
+		return gltf_fail(g, at, ENOTSUP, "what is embedded in it is not written in base64");
+	size_t n = strlen(comma + 1), padding = 0;
+	const unsigned char *there = n ? memmem(g->bytes, g->size, comma + 1, n) : g->bytes;
+	if (!there)
+		return gltf_fail(g, at, ENOTSUP, "what is embedded in it is written with escapes; .glb has none");
+	while (padding < n && comma[n - padding] == '=')
+		padding++;
+	*out = (struct gltf_range){g->file, (uint64_t)(there - g->bytes), n, true, (n - padding) * 3 / 4};
+	known[at->index] = *out;
+	return 0;
+}
+
+static int range_of_uri(struct gltf *g, const struct gltf_at *at, const char *uri, struct gltf_range *out)
+{
+	if (strncmp(uri, "data:", 5) == 0)
+		return embedded(g, at, uri, out);
+	if (strstr(uri, "://"))
+		return gltf_fail(g, at, ENOTSUP, "\"%.64s\": files come from the scene's folder, not from a network",
+				 uri);
+	*out = (struct gltf_range){.file = file_name(g, at, uri), .count = UINT64_MAX, .size = UINT64_MAX};
+	return g->failed;
+}
+
+static int buffer_range(struct gltf *g, const struct gltf_at *buffer, struct gltf_range *out)
+{
+	const char *uri = gltf_text(g, buffer, buffer->json, "uri", NULL);
+	uint64_t length = gltf_whole(g, buffer, buffer->json, "byteLength", 0);
+	if (!uri && buffer->index > 0)
+		return gltf_fail(g, buffer, EINVAL, "it has no uri");
+	if (!uri)
+		*out = (struct gltf_range){g->file, g->binary_first, g->binary_count, false, g->binary_count};
+	else if (range_of_uri(g, buffer, uri, out))
+		return g->failed;
+	if (length > out->size)
+		return gltf_fail(g, buffer, EINVAL, "it says %llu bytes and has %llu", (unsigned long long)length,
+				 (unsigned long long)out->size);
+	out->size = length;
+	if (!out->base64)
+		out->count = length;
+	return g->failed;
+}
+
+int gltf_buffer_view(struct gltf *g, const struct gltf_at *view, struct gltf_range *buffer, uint64_t *first,
+		     uint64_t *count)
+{
+	struct gltf_at at;
+	if (gltf_extension(g, view, view->json, "EXT_meshopt_compression"))
+		return gltf_fail(g, view, ENOTSUP, "EXT_meshopt_compression is not supported");
+	int rc = gltf_follow(g, view, view->json, "buffer", GLTF_BUFFERS, &at);
+	if (rc <= 0)
+		return rc ? rc : gltf_fail(g, view, EINVAL, "it has no buffer");
+	*first = gltf_whole(g, view, view->json, "byteOffset", 0);
+	*count = gltf_whole(g, view, view->json, "byteLength", 0);
+	if (buffer_range(g, &at, buffer))
+		return g->failed;
+	if (*first > buffer->size || *count > buffer->size - *first)
+		return gltf_fail(g, view, EINVAL, "it leads out of buffers[%zu] of %llu bytes", at.index,
+				 (unsigned long long)buffer->size);
+	return g->failed;
+}
+
+int gltf_image_range(struct gltf *g, const struct gltf_at *image, struct gltf_range *out)
+{
+	struct gltf_at view;
+	struct gltf_range buffer;
+	uint64_t first, count;
+	const char *uri = gltf_text(g, image, image->json, "uri", NULL);
+	if (uri)
+		return range_of_uri(g, image, uri, out);
+	int rc = gltf_follow(g, image, image->json, "bufferView", GLTF_BUFFER_VIEWS, &view);
+	if (rc <= 0)
+		return rc ? rc : gltf_fail(g, image, EINVAL, "it has no uri and no bufferView");
+	if (gltf_buffer_view(g, &view, &buffer, &first, &count))
+		return g->failed;
+	if (buffer.base64)
+		return gltf_fail(g, image, ENOTSUP, "a picture within an embedded buffer; .glb may have these");
+	*out = (struct gltf_range){buffer.file, buffer.first + first, count, false, count};
+	return 0;
+}
+
+void gltf_put_range(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const struct gltf_range *r)
+{
+	gltf_put_text(g, el, at, "filename", r->file ? r->file : "");
+	if (r->count == UINT64_MAX)
+		return;
+	gltf_put_whole(g, el, at, "first_byte", r->first);
+	gltf_put_whole(g, el, at, "byte_count", r->count);
+	if (r->base64)
+		gltf_put_bool(g, el, at, "base64", true);
+}

@@ -1,0 +1,125 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* What the sources that read glTF share. Private to gltf*.c. */
+#ifndef WORKER_RENDER_SCENE_GLTF_PRIVATE_H
+#define WORKER_RENDER_SCENE_GLTF_PRIVATE_H
+
+#include "worker/render/scene/gltf.h"
+
+#include <jansson.h>
+
+#define GLTF_WHOLE_MAX 9007199254740992.0 /* a double holds all up to here */
+
+/* Arrays at the top of the file whose entries are named in messages. */
+enum gltf_array {
+	GLTF_ACCESSORS,
+	GLTF_BUFFERS,
+	GLTF_BUFFER_VIEWS,
+	GLTF_CAMERAS,
+	GLTF_IMAGES,
+	GLTF_LIGHTS,
+	GLTF_MATERIALS,
+	GLTF_MESHES,
+	GLTF_NODES,
+	GLTF_SAMPLERS,
+	GLTF_SCENES,
+	GLTF_TEXTURES,
+	GLTF_ARRAYS
+};
+
+/* An entry of one of them. */
+struct gltf_at {
+	enum gltf_array array;
+	size_t index;
+	const json_t *json; /* an object */
+};
+
+/* Where the bytes of a buffer, a view or an image lie. */
+struct gltf_range {
+	const char *file;
+	uint64_t first, count;
+	bool base64;   /* first and count are of the text; a view's offset is of what it stands for */
+	uint64_t size; /* decoded */
+};
+
+struct gltf {
+	struct xml_tree *tree;
+	const struct asset_source *assets;
+	struct arena *arena;
+	struct error *error;
+	int failed; /* the first error's negative errno: nothing is added to the tree any more */
+	const char *file;
+	const unsigned char *bytes; /* of the file */
+	size_t size;
+	uint64_t binary_first, binary_count; /* the binary chunk of a .glb */
+	json_t *root;
+	const json_t *lights;	 /* NULL: none */
+	int *lines[GLTF_ARRAYS]; /* of each entry */
+	size_t line_count[GLTF_ARRAYS], line_room[GLTF_ARRAYS];
+	struct gltf_range *buffers, *images; /* what is embedded, once it was found: of each */
+	unsigned embedded, primitives;
+	bool *material_made;
+	struct xml_element *scene;
+	bool has_camera, has_light;
+	vec3 low, high; /* of all vertices */
+};
+
+const char *gltf_array_name(enum gltf_array array);
+/* The entry with that index; false: there is none, and that is an error. */
+bool gltf_entry(struct gltf *g, enum gltf_array array, uint64_t index, struct gltf_at *out);
+/* The entry whose index stands under `key`. 1: it is there, 0: no such key, negative: an error. */
+int gltf_follow(struct gltf *g, const struct gltf_at *from, const json_t *object, const char *key,
+		enum gltf_array array, struct gltf_at *out);
+int gltf_line(const struct gltf *g, enum gltf_array array, size_t index);
+/* Sets g->failed with "file:line: array[index]: ". */
+__attribute__((format(printf, 4, 5))) int gltf_fail(struct gltf *g, const struct gltf_at *at, int errno_value,
+						    const char *format, ...);
+
+/* Members of an object, with what stands for them where they are not there; another type is an error. */
+double gltf_number(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double fallback);
+uint64_t gltf_whole(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, uint64_t fallback);
+const char *gltf_text(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, const char *fallback);
+/* `count` numbers into x, which keeps its values where there are none. */
+void gltf_numbers(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key, double *x, size_t count);
+const json_t *gltf_object(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *key); /* or NULL */
+const json_t *gltf_extension(struct gltf *g, const struct gltf_at *at, const json_t *o, const char *name);
+
+/* Elements: of the line of an entry. NULL as a parent: nothing is made, NULL comes back. */
+struct xml_element *gltf_element(struct gltf *g, struct xml_element *parent, const struct gltf_at *at,
+				 const char *name);
+__attribute__((format(printf, 4, 5))) void gltf_attribute(struct gltf *g, struct xml_element *el, const char *name,
+							  const char *format, ...);
+/* <cls type="..." name="..."> (name NULL: without) */
+struct xml_element *gltf_plugin(struct gltf *g, struct xml_element *parent, const struct gltf_at *at, const char *cls,
+				const char *type, const char *name);
+void gltf_put_number(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, double x);
+void gltf_put_whole(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, uint64_t x);
+void gltf_put_bool(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, bool x);
+void gltf_put_text(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
+		   const char *text);
+void gltf_put_rgb(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name,
+		  const double rgb[3]);
+void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const char *name, const mat4 *m);
+/* To be said of the file once. */
+void gltf_note(struct gltf *g, const char *text);
+
+/* gltf_buffer.c */
+int gltf_buffer_view(struct gltf *g, const struct gltf_at *view, struct gltf_range *buffer, uint64_t *first,
+		     uint64_t *count);
+int gltf_image_range(struct gltf *g, const struct gltf_at *image, struct gltf_range *out);
+void gltf_put_range(struct gltf *g, struct xml_element *el, const struct gltf_at *at, const struct gltf_range *r);
+
+/* gltf_mesh.c: the shapes of a mesh under that matrix. */
+void gltf_mesh(struct gltf *g, const struct gltf_at *mesh, const mat4 *to_world);
+
+/* gltf_material.c: what a shape of this material refers to. */
+void gltf_material(struct gltf *g, struct xml_element *shape, const struct gltf_at *material);
+void gltf_default_material(struct gltf *g, struct xml_element *shape);
+
+/* gltf_light.c */
+void gltf_light(struct gltf *g, const struct gltf_at *light, const mat4 *to_world);
+void gltf_camera(struct gltf *g, const struct gltf_at *camera, const mat4 *to_world);
+/* Where the file has none: a camera that sees all of it, an environment. */
+void gltf_default_camera(struct gltf *g);
+void gltf_default_light(struct gltf *g);
+
+#endif

@@ -1,0 +1,180 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A primitive of a glTF 2.0 mesh, as numbers in a buffer: `position`, `normal`, `texcoord` and `index` are each "first
+ * stride count type", bytes from the buffer's beginning, type one of f32 u8 u16 u32 (of texture coordinates u8 and u16
+ * stand for 0 to 1). The reader of glTF scenes (worker/render/scene/gltf.h) writes them; nothing is believed of them
+ * here.
+ *
+ * Failures: numbers that lead out of the buffer, indices out of range, more vertices or triangles than a mesh may have.
+ */
+#include "worker/render/scene/asset_part.h"
+#include "worker/render/scene/number.h"
+#include "worker/render/shape/declare.h"
+#include "worker/render/shape/mesh.h"
+
+#include "common/base/liveness.h"
+
+#include <string.h>
+
+static const struct param params[] = {
+	{"filename", UNDERSTOOD(VALUE_STRING)},
+	ASSET_PART_PARAMS,
+	{"position", UNDERSTOOD(VALUE_STRING)},
+	{"normal", UNDERSTOOD(VALUE_STRING)},
+	{"texcoord", UNDERSTOOD(VALUE_STRING)},
+	{"index", UNDERSTOOD(VALUE_STRING)},
+	{"mode", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "triangles|strip|fan"},
+	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
+	SHAPE_PARAMS_END,
+};
+
+enum number_type { F32, U8, U16, U32, TYPES };
+static const struct {
+	const char *name;
+	size_t size;
+} types[TYPES] = {{"f32", 4}, {"u8", 1}, {"u16", 2}, {"u32", 4}};
+
+/* Vectors of numbers in a buffer. */
+struct accessor {
+	const unsigned char *at;
+	uint64_t stride, count;
+	enum number_type type;
+};
+
+/* 1: there is none. */
+static int read_accessor(struct accessor *a, const struct scene_node *n, const char *name, unsigned components,
+			 unsigned allowed, const struct asset_part *buffer, struct error *e)
+{
+	const char *text = node_string(n, name, NULL);
+	if (!text)
+		return 1;
+	int64_t x[3] = {0};
+	const char *p = text, *end = text + strlen(text);
+	for (int i = 0; i < 3 && p; i++) {
+		p = number_scan_int(p, end, &x[i]);
+		p = p && *p == ' ' && x[i] >= 0 ? p + 1 : NULL;
+	}
+	unsigned t = 0;
+	while (p && t < TYPES && strcmp(p, types[t].name) != 0)
+		t++;
+	if (!p || t == TYPES || !(allowed >> t & 1))
+		return node_error(n, e, EINVAL, "`%s` is \"first stride count type\", bytes, elements, and %s", name,
+				  allowed == 1u << F32 ? "f32" : "a type");
+	uint64_t size = types[t].size * components, first = (uint64_t)x[0], stride = (uint64_t)x[1],
+		 count = (uint64_t)x[2];
+	if (count > UINT32_MAX || (stride < size && count > 1) || stride > buffer->size || first > buffer->size ||
+	    (count > 0 && (buffer->size - first < size || (count - 1) * stride > buffer->size - first - size)))
+		return node_error(n, e, EINVAL, "`%s` leads out of its buffer of %zu bytes", name, buffer->size);
+	*a = (struct accessor){buffer->bytes + first, stride, count, (enum number_type)t};
+	return 0;
+}
+
+static uint32_t whole(const struct accessor *a, uint64_t i, unsigned component)
+{
+	const unsigned char *p = a->at + i * a->stride + types[a->type].size * component;
+	uint32_t x = 0;
+	for (size_t k = 0; k < types[a->type].size; k++)
+		x |= (uint32_t)p[k] << 8 * k;
+	return x;
+}
+
+static double number(const struct accessor *a, uint64_t i, unsigned component)
+{
+	uint32_t bits = whole(a, i, component);
+	float x;
+	if (a->type != F32)
+		return bits / (a->type == U8 ? 255.0 : 65535.0);
+	memcpy(&x, &bits, sizeof x);
+	return (double)x;
+}
+
+enum mode { TRIANGLES, STRIP, FAN };
+
+static uint64_t triangles_of(enum mode mode, uint64_t corners)
+{
+	return mode == TRIANGLES ? corners / 3 : corners > 2 ? corners - 2 : 0;
+}
+
+/* Corner k of triangle t among the indices: of a strip every second triangle is turned round. */
+static uint64_t corner_of(enum mode mode, uint64_t t, unsigned k)
+{
+	if (mode == TRIANGLES)
+		return 3 * t + k;
+	if (mode == FAN)
+		return k == 0 ? 0 : t + k;
+	return t + (k > 0 && t % 2 ? 3 - k : k);
+}
+
+static int fill(struct mesh *m, const struct scene_node *n, const struct accessor *position,
+		const struct accessor *normal, const struct accessor *texcoord, const struct accessor *index,
+		enum mode mode, struct error *e)
+{
+	for (uint32_t i = 0; i < m->vertex_count; i++) {
+		for (unsigned k = 0; k < 3; k++)
+			m->position[i][k] = number(position, i, k);
+		if (!vec3_is_finite(mesh_load(m->position[i])))
+			return node_error(n, e, EINVAL, "vertex %u is not finite", i);
+		if (m->normal) {
+			vec3 v = mesh_unit((vec3){number(normal, i, 0), number(normal, i, 1), number(normal, i, 2)});
+			mesh_store(m->normal[i], vec3_is_finite(v) ? v : (vec3){0, 0, 0});
+		}
+		for (unsigned k = 0; m->uv && k < 2; k++)
+			m->uv[i][k] = number(texcoord, i, k);
+		if (m->uv && !(isfinite(m->uv[i][0]) && isfinite(m->uv[i][1])))
+			return node_error(n, e, EINVAL, "the texture coordinates of vertex %u are not finite", i);
+		if (i % 65536 == 0)
+			tick();
+	}
+	for (uint32_t t = 0; t < m->triangle_count; t++)
+		for (unsigned k = 0; k < 3; k++) {
+			uint64_t c = corner_of(mode, t, k);
+			uint64_t v = index ? whole(index, c, 0) : c;
+			if (v >= m->vertex_count)
+				return node_error(n, e, EINVAL, "index %llu is out of range; there are %u vertices",
+						  (unsigned long long)v, m->vertex_count);
+			m->index[t][k] = (uint32_t)v;
+		}
+	return 0;
+}
+
+static int make_mesh(const struct scene_node *n, const struct asset_part *buffer, struct arena *arena, struct mesh *m,
+		     struct error *e)
+{
+	struct accessor position, normal, texcoord, index;
+	const unsigned floats = 1u << F32, shares = floats | 1u << U8 | 1u << U16,
+		       wholes = 1u << U8 | 1u << U16 | 1u << U32;
+	int rc = read_accessor(&position, n, "position", 3, floats, buffer, e);
+	if (rc > 0)
+		return node_error(n, e, EINVAL, "needs a `position`");
+	int no_normal = rc < 0 ? rc : read_accessor(&normal, n, "normal", 3, floats, buffer, e);
+	int no_uv = no_normal < 0 ? no_normal : read_accessor(&texcoord, n, "texcoord", 2, shares, buffer, e);
+	int no_index = no_uv < 0 ? no_uv : read_accessor(&index, n, "index", 1, wholes, buffer, e);
+	if (no_index < 0)
+		return no_index;
+	if ((!no_normal && normal.count != position.count) || (!no_uv && texcoord.count != position.count))
+		return node_error(n, e, EINVAL, "positions, normals and texture coordinates are not equally many");
+	const char *said = node_string(n, "mode", "triangles");
+	enum mode mode = strcmp(said, "strip") == 0 ? STRIP : strcmp(said, "fan") == 0 ? FAN : TRIANGLES;
+	uint64_t corners = no_index ? position.count : index.count, triangles = triangles_of(mode, corners);
+	if (mode == TRIANGLES && corners % 3)
+		return node_error(n, e, EINVAL, "%llu corners make no whole triangles", (unsigned long long)corners);
+	if (triangles > MESH_TRIANGLES_MAX || position.count > 3ull * MESH_TRIANGLES_MAX)
+		return node_error(n, e, E2BIG, "more than %d triangles", MESH_TRIANGLES_MAX);
+	if (!mesh_alloc(m, (uint32_t)position.count, (uint32_t)triangles, !no_normal, !no_uv, arena))
+		return node_error(n, e, ENOMEM, "out of memory");
+	return fill(m, n, &position, &normal, &texcoord, no_index ? NULL : &index, mode, e);
+}
+
+static int build(const struct scene_node *n, const struct asset_source *assets, struct arena *arena,
+		 struct shape_geometry *out, struct error *e)
+{
+	struct asset_part buffer;
+	int rc = asset_part_open(&buffer, n, assets, e);
+	if (rc)
+		return rc;
+	rc = make_mesh(n, &buffer, arena, &out->mesh, e);
+	asset_part_close(&buffer, assets);
+	return rc;
+}
+
+const struct shape_ops shape_ops_gltf = {.type = "gltf", .params = params, .build = build};
