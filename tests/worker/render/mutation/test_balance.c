@@ -20,7 +20,7 @@ enum { TRIALS = 64 };
 
 /* Proposals from a start. Strategies that choose for themselves get more than forced ones; those that the room has by
  * default so many that all rooms together find a fault of 2 %. */
-enum { REPEAT = 2, REPEAT_DEFAULT = 9, REPEAT_MORE = 14, REPEAT_RARE = 25, STARTS_RARE = 5 };
+enum { REPEAT = 2, REPEAT_DEFAULT = 9, REPEAT_MORE = 14, REPEAT_RARE = 25, STARTS_RARE = 5, MOST_STARTS = 256 };
 #define MUST_FIND 0.02
 
 /* Of the strategies that rooms have by default, over all rooms. */
@@ -48,16 +48,19 @@ static unsigned repeats(const struct world *w, const struct mutation_ops *ops)
 	return noisy ? REPEAT_MORE : REPEAT_DEFAULT;
 }
 
-/* More starts until the room by itself finds 2 %: minutes each. */
-static void check_alone(const struct world *w, const struct room *room, const struct mutation_ops *ops)
+/* So many more starts that the room by itself finds 2 %, by what it finds with few: a minute each. */
+static void check_alone(const struct world *w, const struct room *room, const struct balance_trial *few)
 {
 	static struct balance_trial t;
-	struct balance_verdict v = {.power = INFINITY, .balanced = true};
-	for (size_t more = 4; more <= 256 && v.power > MUST_FIND && v.balanced; more *= 2) {
-		t = (struct balance_trial){.ops = ops, .how = {-1, -1}, .repeat = REPEAT_MORE};
+	struct balance_verdict v = balance_judge(few);
+	double times = pow(v.power / MUST_FIND, 2) * few->repeat / REPEAT_MORE;
+	size_t more = (size_t)fmin(ceil(1.2 * times), MOST_STARTS);
+	do {
+		t = (struct balance_trial){.ops = few->ops, .how = {-1, -1}, .repeat = REPEAT_MORE};
 		balance_run(w, room->name, &t, 1, dice_count(48) * more, 800 * more);
 		v = balance_judge(&t);
-	}
+		more *= 2;
+	} while (more <= MOST_STARTS && v.power > MUST_FIND && v.balanced);
 	balance_print(room->name, &t, &v);
 	assert_true(v.balanced && (v.power <= MUST_FIND || dice_count(48) < 48));
 }
@@ -112,7 +115,7 @@ static void check_room(const struct room *room)
 			else
 				balance_pool_add(&pool[i], &trials[i]);
 			if (is_full())
-				check_alone(w, room, mutation_registry[i]);
+				check_alone(w, room, &trials[i]);
 		}
 	}
 	world_free(w);
