@@ -1,4 +1,15 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A store is a sorted array of entries (hash, size, holds, last use) beside the folder that it describes: opening reads
+ * the folder, looking up is a binary search, and the disk is touched for bytes alone.
+ *
+ * Writing: blob_write_begin makes room and a temporary file, blob_write_add appends and hashes, blob_write_commit
+ * compares the hash, flushes, renames and enters the blob. Until then nobody finds it.
+ *
+ * Failures: bytes of another hash or more than were announced are -EBADMSG, and the temporary file goes; a full disk is
+ * -ENOSPC, after everything that nobody holds has been forgotten; a blob whose file has gone or changed is found by
+ * blob_check and forgotten.
+ */
 #include "common/blob/blob.h"
 
 #include "common/base/disk.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Tiles first (potential scale reduction), then classes of paths (chains against bootstrap, groups against each other),
+ * then chains that stood still; whatever is flagged goes into one sentence. Every criterion asks for significance and
+ * for size: a deviation that cannot be seen in the image is no disagreement, and one that may be chance is none either.
+ *
+ * Nothing fails: numbers that are not known (too few groups, nothing visited) are NAN and never flagged.
+ */
 #include "common/estimate/convergence.h"
 
 #include "common/base/text.h"

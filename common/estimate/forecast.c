@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * fit() turns the looks into a level, a trend and their uncertainty by generalized least squares; play_of() and
+ * play_target() draw renders from that and let each run along the ladder of looks until it stops; costs() sorts what
+ * they cost. The dice are seeded by constants, so that the same looks give the same forecast everywhere.
+ *
+ * Without looks, or without one whose interval is known, there is no forecast (false); costs that no play can pay are
+ * INFINITY.
+ */
 #include "common/estimate/forecast.h"
 
 #include "common/estimate/merge.h"

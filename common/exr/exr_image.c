@@ -1,4 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Writing builds the header by OpenEXRCore and compresses chunk after chunk, storing raw what compression would make
+ * larger. Reading checks the header against the file's size before it allocates, then decodes chunks straight into the
+ * planes of the channels.
+ *
+ * Failures: whatever OpenEXR refuses, headers that promise more pixels than the bytes can hold, other channels than
+ * floats, halves and integers, tiles with levels, deep data; all -EBADMSG or -ENOTSUP with a sentence, and nothing is
+ * kept.
+ */
 #include "common/exr/exr.h"
 
 #include "common/base/mem.h"

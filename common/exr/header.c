@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * One table has each attribute's name, type and whether equal renders may differ in it; header_fill walks through plan,
+ * result and extras in the table's order. Text goes into one buffer of fixed size; what does not fit is cut at its end,
+ * never an error.
+ */
 #include "common/exr/header.h"
 
 #include "common/base/version.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * An image becomes bytes (colours, errors, R-hat as planes), these go into a temporary file beside the target, are
+ * flushed and renamed, so that the target is the old file or the new one. Targets that are no regular files (pipes,
+ * devices, descriptors) are written through.
+ *
+ * Failures carry the path: a folder that is not there, no room, no permission; the temporary file is removed.
+ */
 #include "common/exr/image_file.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * batch_check is what stands between the network and the canvas: counts, tiles within the crop and in order, finite
+ * values, weights, chain states of the plan's size, sums that belong together. What passes can be merged without
+ * further questions.
+ *
+ * Failures are -EBADMSG with a sentence for the log of whoever sent the batch; -ENOMEM where a batch is copied.
+ */
 #include "common/film/batch.h"
 
 #include "common/base/mem.h"

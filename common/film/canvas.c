@@ -1,4 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Adding: find the film of the batch's group and round, reserve the tiles on the disk, add the values as integers on
+ * the grid, note that the batch is there; when the last batch of a round has come its film is added to the prefix and
+ * cleared. Since integers add exactly, the order of batches does not matter, and a batch can be taken back by
+ * subtracting it.
+ *
+ * Failures leave the canvas as it was: -EEXIST and -EAGAIN say that the batch is not for now, -ERANGE that a sum would
+ * leave the grid, -ENOSPC that there is no room for a tile.
+ */
 #include "common/film/canvas_private.h"
 
 #include "common/base/disk.h"

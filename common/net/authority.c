@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Each command locks the folder, reads what it needs, makes certificate or list in memory, and replaces files one by
+ * one in an order in which a crash leaves a usable folder: keys before certificates, the record in issued/ before what
+ * is handed out.
+ *
+ * Failures: a folder that is none of ours or is locked, names that are taken by another role, what OpenSSL refuses
+ * (with its reason); nothing is half issued.
+ */
 #include "common/net/authority.h"
 
 #include "common/base/mem.h"

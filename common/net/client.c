@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * client_open connects and says hello; client_call sends a message and runs the loop until the answer with its number
+ * has come, a deadline is over or the connection is gone. Fetching reads chunk after chunk into a temporary file that
+ * takes the final name when it is whole.
+ *
+ * Failures: -ECONNREFUSED, -ECONNRESET and -ETIMEDOUT may be tried again (client_exit_code has the code for each), a
+ * refusal of the coordinator carries its sentence.
+ */
 #include "common/net/client.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Bytes that libuv reads go through TLS, where there is TLS, into the frame reader, which calls `message` for each
+ * whole frame; what is sent is queued, encrypted where needed, and handed to libuv. A timer of its own notices peers
+ * that are silent or do not take what they are sent, and certificates that run out or are revoked meanwhile.
+ *
+ * Failures end the connection, once, with a reason in words: frames beyond the limits, plain bytes where TLS is wanted
+ * (and the reverse), a peer that stalls, no memory.
+ */
 #include "common/net/conn.h"
 
 #include "common/base/mem.h"

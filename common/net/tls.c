@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A context is made of the folder's files and made again when one of them changes; a link is one connection's state,
+ * between two memory buffers of OpenSSL: bytes from the socket go into one, bytes for the socket come out of the other.
+ * Whom a link talks to is judged in the verification's callback (role, revocation, expiry).
+ *
+ * A folder that cannot be read while it changes keeps the old context; a certificate that the other side does not
+ * accept is explained in words in explain().
+ */
 #include "common/net/tls.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * plan_make cuts a request into groups, parts, chains, epochs and rounds, by sizes that depend on the request alone;
+ * plan_check asks of a plan from the network everything that plan_make promises, so that whoever computes with it needs
+ * no further checks. plan_resample draws the chains' seeds from the weights of the bootstrap by systematic resampling.
+ *
+ * Failures: -EINVAL with a sentence that names the number and its range.
+ */
 #include "common/plan/plan.h"
 
 #include <Random123/threefry.h>

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Packing measures first, then writes message and payload into one frame; unpacking cuts the payload by the sizes that
+ * the message says, each checked against what is left, and decodes tiles and states into a batch that owns its memory.
+ *
+ * Failures: -EBADMSG for sizes that contradict each other or the plan and for states of another digest, -ENOMEM; the
+ * batch is empty then.
+ */
 #include "common/wire/batch_wire.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * connect_now, hello, then a circle: the lease queue says how many leases to ask for, grants start work (work.c),
+ * finished leases are sent and kept until they are acknowledged. Timers: heartbeat, reconnection with growing pauses,
+ * the pulse by which threads that get nowhere are noticed.
+ *
+ * Failures: a connection that is lost is made again for ever; a refusal for good (another version, a certificate) ends
+ * the daemon with its code; a thread that hangs ends the process after its other leases are given back.
+ */
 #include "worker/daemon/agent_private.h"
 
 #include "common/base/log.h"

@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A job arrives as JobInfo; its files are asked for until the cache has them all, then a thread reads the scene through
+ * the cache and builds the world. What this worker reads of film,
+ * integrator, settings and mixture is compared with the plan before a lease runs.
+ *
+ * Failures: a scene that does not build, or builds into another one than was planned, fails the job's leases with the
+ * reason; a file that is gone from the cache is fetched again.
+ */
 #include "worker/daemon/job_cache.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * check() asks whether plan, key and input fit, prepare() takes all memory that the lease needs, run() draws samples or
+ * walks chains into the film of the lease (film/sums.h), whose touched tiles are the batch. Samples are numbered by
+ * pixel and round, chains by their index, so that any thread on any machine draws the same random numbers.
+ *
+ * Failures: -EINVAL where things do not fit, -EILSEQ for states that are none, -EDOM where an invalid operation was
+ * trapped (the place in the sentence); nothing of the batch is kept.
+ */
 #include "worker/render/render.h"
 
 #include "common/base/crash.h"

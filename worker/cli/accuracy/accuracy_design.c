@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The list of settings to compare: the default, the reference, each accuracy setting over its sweep, mixtures of
+ * strategies with one left out or taken in, presets. A value that does nothing in this scene (accuracy_settings'
+ * `place`, effects that are off) is left out with the reason, so that no time goes into it.
+ *
+ * Fails where the user asks for a parameter or value that does not exist (-EINVAL, with the nearest name) or for more
+ * settings than the table holds.
+ */
 #include "worker/cli/accuracy/accuracy.h"
 
 #include "common/base/text.h"

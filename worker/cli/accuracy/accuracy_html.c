@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The report as one HTML page without scripts: a summary in a paragraph, then facts of machine and scene, then tables,
+ * each row with its interval, then plots as SVG (accuracy_plots.h). All text from scenes is escaped. Numbers that are
+ * not known are printed as such, never as 0.
+ */
 #include "common/base/mem.h"
 #include "common/base/version.h"
 #include "worker/cli/accuracy/accuracy_columns.h"

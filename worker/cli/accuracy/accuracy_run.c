@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The settings take turns in short rounds, the one with the least of its share next, so that a machine that changes its
+ * speed changes it for all alike. Worlds are shared by settings that differ in nothing that was built. One thread
+ * measures; leases run as in hslt-render (local.h).
+ *
+ * Failures: no memory for all films (said before anything is rendered), or whatever a lease fails with, with the
+ * setting's name; on a signal what has been measured so far is reported.
+ */
 #include "worker/cli/accuracy/accuracy.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The program: the list of settings to compare (accuracy_design.c), their renders in turns (accuracy_run.c), the
+ * judgement (accuracy_judge.c), and the report as text, CSV, JSON and HTML. Before hours are spent it says how long it
+ * will take and what it will compare; a signal ends the measuring, and what is known is reported.
+ */
 #include "common/base/mem.h"
 #include "common/base/output.h"
 #include "common/base/progress.h"

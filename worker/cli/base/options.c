@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * One argp table: each option checks its argument at once and says what would be right. What only the scene can tell
+ * (the film's shape, the usual mixture) is filled in by render_plan_from_scene, which ends in plan_make.
+ *
+ * Errors go through argp_error: one line, the program's name, exit code 2 (docs/design.md, exit codes).
+ */
 #include "worker/cli/base/options.h"
 
 #include "common/base/mem.h"

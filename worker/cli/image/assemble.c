@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Crops are added one by one: the first decides what all must share (plan, seed, film), each pastes its pixels and adds
+ * its sums, the last closes the header. Pixels that no crop has are cut off if they are a border, else an error.
+ *
+ * Failures name the file and the attribute in which it differs.
+ */
 #include "worker/cli/image/assemble.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The program: two images and what differs between them (compare.h), as text or JSON, with a heat map where one is
+ * asked for; --exact compares bits and headers and says the first difference.
+ *
+ * Exit code 1: a failure (images of different sizes, or with other channels), a difference with --exact, or more than
+ * --max-relmse.
+ */
 #include "common/base/mem.h"
 #include "common/base/output.h"
 #include "common/base/version.h"

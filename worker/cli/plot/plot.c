@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The data becomes a script for gnuplot on its standard input, its SVG or PNG comes back from a temporary file; both
+ * are whole before the other side reads, so that neither waits for the other. Every name and number is quoted or
+ * printed by us.
+ *
+ * Failures: no gnuplot (-ENOENT), one that ends with an error (its own first line is in the sentence), no room for its
+ * output.
+ */
 #include "worker/cli/plot/plot.h"
 
 #include "common/base/mem.h"

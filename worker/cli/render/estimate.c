@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A pilot's history of looks (common/estimate/forecast.h) as a table of errors and what each costs, as JSON and as a
+ * plot. Rows that lie beyond what the pilot can tell say so instead of giving a number.
+ */
 #include "worker/cli/render/estimate.h"
 
 #include "common/base/progress.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The program: options, scene, integrator (choice.h), plan, render (local.h), image. Between phases it looks whether a
+ * signal has come: the image of the complete rounds is written then, and the exit code says that it was ended.
+ *
+ * Every failure ends in one line on stderr and the exit code of its kind (docs/design.md); the image is replaced as a
+ * whole or not at all.
+ */
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/output.h"

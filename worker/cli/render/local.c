@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * phase() hands leases to threads under one lock and merges their results in the order in which they end, which the
+ * sums do not notice; run_bootstrap(), then rounds, each followed by the question whether the job is done
+ * (common/estimate/merge.h), until it is.
+ *
+ * Failures: of a lease (with its key), of the disk under the canvas, no memory; the canvas is freed, since it may hold
+ * a part of a round.
+ */
 #include "worker/cli/render/local.h"
 
 #include "common/base/crash.h"

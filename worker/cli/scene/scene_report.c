@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The scene is read so that everything wrong is found (scene_read_all); where nothing is, meshes, pictures and values
+ * that do not go together are looked at as a worker would. `show` gathers all that is known as JSON, of which the text
+ * is made.
+ *
+ * A scene that cannot be rendered is exit code 1, with a line a problem; files that cannot be read at all say so alone.
+ */
 #include "worker/cli/scene/scene_report.h"
 
 #include "common/base/mem.h"

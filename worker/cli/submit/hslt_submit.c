@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The program: options, the scene's files and their hashes, integrator and plan as hslt-render makes them, submission;
+ * with --wait it shows progress, fetches the image and verifies its hash. A connection that breaks is made again
+ * (reconnect.h); the job goes on meanwhile.
+ *
+ * Exit codes are those of the job where it ended (docs/design.md), 1 for a local failure, and a signal says how to go
+ * on with the job.
+ */
 #include "common/base/crash.h"
 #include "common/base/output.h"
 #include "common/base/text.h"

@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The bundle is read through a folder that notes each file's hash while the scene is read and checked as a worker will;
+ * then the job is sent, the coordinator answers which files it lacks, and those are sent in chunks, each compared with
+ * the hash that was noted.
+ *
+ * Failures: a scene that cannot be rendered (its place), a file that changes while it is sent, a refusal with the
+ * coordinator's sentence, a lost connection (-ECONNRESET, may be tried again).
+ */
 #include "worker/cli/submit/submit.h"
 
 #include "common/base/mem.h"

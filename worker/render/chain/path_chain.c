@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A step: copy the state, let the mixture propose, check the proposal, accept with min(1, ratio); the state that loses
+ * is splatted with the weight that it has gathered. Saving and resuming write a state as bytes (path_bytes.c) at the
+ * end of an epoch.
+ *
+ * A proposal that is not sound (no density, not finite, out of range) is counted by its reason and rejected; a state
+ * that cannot be resumed is -EILSEQ, and the lease fails, not the program.
+ */
 #include "worker/render/chain/path_chain.h"
 
 #include "worker/render/mutation/mixture.h"

@@ -1,4 +1,13 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Building: triangles and spheres become Embree geometries, with filters where a hit must be asked again in double;
+ * large triangles of a scene of mixed scales are a user geometry that is solved in double altogether. Tracing: the ray
+ * enters the scene's box in double, Embree proposes in float, the filter decides, the caller solves the hit again
+ * (surface.h).
+ *
+ * Failures are at building alone: no memory, and what Embree reports, by way of an error; rays never fail, and a ray
+ * that is not finite meets nothing.
+ */
 #include "worker/render/geom/accel.h"
 
 #include "common/base/mem.h"

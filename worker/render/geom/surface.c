@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A hit becomes a site on its primitive (barycentrics, or the direction from a sphere's centre), the site a point with
+ * frame and texture coordinates, and, where half vectors ask for it, the change of all of these along two tangents;
+ * relief bends normal and change in the same way.
+ *
+ * Nothing fails: where texture coordinates are degenerate another tangent stands in that turns as little as it can, and
+ * a normal of no length is the geometric one.
+ */
 #include "worker/render/geom/surface.h"
 
 #include "worker/render/math/sphere.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * path_connect joins s vertices of the light sub-path with t of the camera's, weighs the path by the balance heuristic
+ * over all techniques that could have made it, and splats what remains. Densities are carried as ratios of neighbouring
+ * techniques, whose products stay near 1 where densities themselves leave the range of doubles.
+ *
+ * A connection that is blocked, delta at an end, or below what doubles can weigh contributes nothing; none is an error.
+ */
 #include "worker/render/path/connect.h"
 
 #include "worker/render/path/measure.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Made of sub-paths by full_path_from_subpaths; then f, f_h and densities are products over vertices, with logarithms
+ * kept apart so that long chains of narrow lobes neither over- nor underflow. What a mutation changed is taken over
+ * vertex by vertex, and caches of what it touched are forgotten.
+ *
+ * A vertex whose sides, mode and materials contradict each other has f = 0; nothing fails.
+ */
 #include "worker/render/path/full_path.h"
 
 #include "worker/render/path/connect.h"

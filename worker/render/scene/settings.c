@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Finds sensor (the one that was asked for), film, filter and integrator among the objects and translates each into
+ * numbers of struct scene_settings, with Mitsuba's defaults where a scene is silent.
+ *
+ * Failures have the object's place: a second film, a crop window outside of the film, a camera whose to_world flattens
+ * it, angles that are none.
+ */
 #include "worker/render/scene/settings.h"
 
 #include "common/plan/plan.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Each way of writing a spectrum has a function that fills a table of wavelengths and values or a constant; tables are
+ * checked for order, range and finite values in one place, check_table.
+ *
+ * Failures: lists of different lengths, wavelengths that do not increase, files that are not lines of two numbers,
+ * negative temperatures.
+ */
 #include "worker/render/scene/spectral.h"
 
 #include "worker/render/math/cie.h"

@@ -1,4 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A table has each element's name, its attributes and its reader. Attributes that it does not list are refused with the
+ * nearest name, so that a typing error is never a default.
+ */
 #include "worker/render/scene/value.h"
 
 #include "worker/render/scene/number.h"

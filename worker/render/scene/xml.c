@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * expat calls open_element and on_end; each element goes into the arena with its attributes, $names replaced and files
+ * looked for along the search paths. <include> reads the named file into the place where it stands. Nothing is
+ * interpreted here.
+ *
+ * Failures stop the parser at once, with file and line: what expat refuses, a document type, depth, counts and sizes
+ * beyond the limits of xml.h.
+ */
 #include "worker/render/scene/xml.h"
 
 #include "common/base/mem.h"

@@ -1,4 +1,10 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The list of settings (setting_list.h) is read into one table; texts are parsed against it entry by entry and printed
+ * from it in its order, which is what makes a text canonical.
+ *
+ * Failures: a name that is none (with the nearest), a value outside its range or choices.
+ */
 #include "worker/render/settings/accuracy_settings.h"
 
 #include "common/base/text.h"

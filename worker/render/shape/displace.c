@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * run() cuts every triangle by way of the grid (displace_grid.h): each point is sampled with position, normal and
+ * height, moved, and given the displaced surface's normal by differences; points of edges and corners are added up at
+ * their place first and settled afterwards, so that neighbours agree to the bit.
+ *
+ * Failures: more triangles than a mesh may have (before any memory is taken), heights that are not finite, no memory.
+ */
 #include "worker/render/shape/displace.h"
 
 #include "common/base/liveness.h"

@@ -1,4 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A colour is a scale times a shape: constant, D65, a sigmoid polynomial from rgb, or a table. color_from_* decide once
+ * which it is; color_eval has one loop over the four wavelengths for each. rgb of textures goes through a table of
+ * coefficients made at build time.
+ *
+ * Failures: colours out of the range of their role; evaluation cannot fail.
+ */
 #include "worker/render/texture/color.h"
 
 #include "worker/render/math/cie.h"

@@ -1,4 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * read_shapes() makes geometry in double, rescale() moves the scene into the unit sphere, place_shapes() makes floats
+ * of it, then BSDFs, emitters, camera, effects and what they leave out, and last Embree's structure. render_check stops
+ * before Embree.
+ *
+ * Failures have the object's place and leave nothing behind: the world is one arena. Triangles without an area, shapes
+ * too small beside others and surfaces that coincide are counted and said, not errors.
+ */
 #include "worker/render/world/world.h"
 
 #include "common/base/crash.h"

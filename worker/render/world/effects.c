@@ -1,4 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Reads materials, emitters and shapes once, counts who has what, then decides effect by effect, in the order in which
+ * they depend on each other, what the scene calls for, what the user forces, and the sentence that says why. Nothing
+ * fails: what cannot be forced was refused when the text was parsed (effects_text.c).
+ */
 #include "worker/render/world/effects.h"
 
 #include "common/base/text.h"
