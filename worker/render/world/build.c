@@ -12,6 +12,7 @@
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/liveness.h"
+#include "worker/render/scene/asset_keeper.h"
 #include "worker/render/shape/group.h"
 #include "worker/render/world/coincident.h"
 #include "worker/render/world/displacement.h"
@@ -500,11 +501,14 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 		     const struct render_options *o, struct error *e)
 {
 	*out = NULL;
-	struct builder b = {.scene = s, .assets = assets, .e = e, .w = mem_alloc(1, sizeof *b.w)};
+	struct asset_keeper keeper = {.inner = assets};
+	struct asset_source kept = asset_keeper_source(&keeper);
+	struct builder b = {.scene = s, .assets = &kept, .e = e, .w = mem_alloc(1, sizeof *b.w)};
 	if (!b.w)
 		return out_of_memory(e);
 	crash_place("building the scene", NULL, 0);
 	int rc = prepare(&b, o);
+	asset_keeper_fini(&keeper);
 	crash_place("building Embree's tree", NULL, 0);
 	if (!rc && with_accel)
 		rc = build_accel(&b);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-#include "worker/render/scene/asset.h"
+#include "worker/render/scene/asset_keeper.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -118,8 +118,72 @@ static void test_files_elsewhere(void **state)
 	refuses("fifo", "not a regular file");
 }
 
+/* Counts; two files whose handles tell them apart. */
+struct counts {
+	int opened, closed;
+};
+
+static int count_open(void *user, const char *name, struct asset *out, struct error *e)
+{
+	static unsigned char bytes[2] = {'a', 'b'};
+	if (strcmp(name, "a") != 0 && strcmp(name, "b") != 0)
+		return error_set(e, ENOENT, "%s: no such file", name);
+	((struct counts *)user)->opened++;
+	unsigned char *at = &bytes[*name - 'a'];
+	*out = (struct asset){.bytes = at, .size = 1, .handle = at};
+	return 0;
+}
+
+static void count_close(void *user, struct asset *a)
+{
+	assert_non_null(a->bytes);
+	((struct counts *)user)->closed++;
+	*a = (struct asset){0};
+}
+
+static void use(const struct asset_source *s, const char *name)
+{
+	struct asset a;
+	struct error e;
+	assert_int_equal(s->open(s->user, name, &a, &e), 0);
+	assert_int_equal(*a.bytes, *name);
+	s->close(s->user, &a);
+}
+
+/* A file that is asked for again and again is opened once, and in the end all that was opened is closed. */
+static void test_keeper(void **state)
+{
+	(void)state;
+	struct counts c = {0, 0};
+	const struct asset_source inner = {&c, count_open, count_close};
+	struct asset_keeper keeper = {.inner = &inner};
+	struct asset_source s = asset_keeper_source(&keeper);
+	struct asset first, second, other;
+	struct error e;
+	for (int i = 0; i < 5; i++)
+		use(&s, "a");
+	assert_true(c.opened == 1 && c.closed == 0);
+	use(&s, "b");
+	assert_true(c.opened == 2 && c.closed == 1);
+	assert_int_equal(s.open(s.user, "c", &first, &e), -ENOENT);
+	use(&s, "a");
+	assert_true(c.opened == 3 && c.closed == 2);
+	/* used twice at once, and another beside it */
+	assert_int_equal(s.open(s.user, "a", &first, &e), 0);
+	assert_int_equal(s.open(s.user, "b", &other, &e), 0);
+	assert_int_equal(s.open(s.user, "a", &second, &e), 0);
+	assert_true(first.bytes == second.bytes && c.opened == 4);
+	s.close(s.user, &other);
+	s.close(s.user, &first);
+	assert_true(c.closed == 3 && *second.bytes == 'a');
+	s.close(s.user, &second);
+	asset_keeper_fini(&keeper);
+	assert_true(c.opened == 4 && c.closed == 4);
+}
+
 int main(void)
 {
-	const struct CMUnitTest tests[] = {cmocka_unit_test(test_files_below), cmocka_unit_test(test_files_elsewhere)};
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_files_below), cmocka_unit_test(test_files_elsewhere),
+					   cmocka_unit_test(test_keeper)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }
