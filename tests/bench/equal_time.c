@@ -346,6 +346,10 @@ static double student_95(double degrees)
 static void print_ratio(const char *says, const struct trial *a, const struct trial *b, int t, unsigned seeds)
 {
 	double ratio = a->mean[t] / b->mean[t], square = 0;
+	if (!(a->mean[t] > 0 && b->mean[t] > 0)) { /* the reference's own error is the larger one */
+		printf("  %s: not known, the reference is too noisy\n", says);
+		return;
+	}
 	for (unsigned k = 0; k < seeds; k++) {
 		double x = a->value[t][k] / a->mean[t] - 1, y = b->value[t][k] / b->mean[t] - 1;
 		square += (x - y) * (x - y) / seeds / (seeds - 1);
@@ -389,8 +393,9 @@ static void compare_all(const struct world *w, const struct trial_scene *s, doub
 		snprintf(says, sizeof says, "default over the best, %s (%s)", t ? "trimmed" : "all pixels",
 			 methods[best[t]].name);
 		print_ratio(says, &of[DEFAULT], &of[best[t]], t, seeds);
-		bench_single(t ? "default / best, trimmed" : "default / best",
-			     of[DEFAULT].mean[t] / of[best[t]].mean[t], "of the time", BENCH_INFORMS, 0);
+		if (of[best[t]].mean[t] > 0)
+			bench_single(t ? "default / best, trimmed" : "default / best",
+				     of[DEFAULT].mean[t] / of[best[t]].mean[t], "of the time", BENCH_INFORMS, 0);
 	}
 	printf("  the reference's own relMSE: %.3g\n", error_by_spread(&reference.image, scale));
 	fflush(stdout);
