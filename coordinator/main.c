@@ -98,7 +98,7 @@ static const struct argp_option options[] = {
 	 "Least share of the epochs of each job, or percent, that two workers must compute alike (0)", 0},
 	{"max-faults", OPTION_FAULTS, "N", 0,
 	 "Wrong results, or invalid ones in a row, after which a worker is set aside for good (3)", 0},
-	{"forgive", OPTION_FORGIVE, "NAME", 0, "A worker that was set aside in an earlier life comes back", 0},
+	{"forgive", OPTION_FORGIVE, "NAME", 0, "A worker that was set aside in an earlier run comes back", 0},
 	{"accept-loss", OPTION_LOSS, NULL, 0,
 	 "Start although the spool has lost jobs: what is left of them is put into SPOOL/lost", 0},
 	{"insecure", OPTION_INSECURE, NULL, 0, "Listen on other than loopback addresses without encryption", 0},

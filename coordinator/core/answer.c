@@ -283,7 +283,7 @@ void answer_failed(struct farm *f, const struct event *ev)
 		return;
 	struct peer *p = farm_find_peer(f, ev->peer);
 	struct lease *l = s ? lease_of(s, p) : NULL;
-	/* It may tell of a lease that an earlier life of it had, and that ended that life. */
+	/* It may tell of a lease that an earlier run of it had, and that ended that run. */
 	bool was_lost = s && lost_take(&s->lost, p->who);
 	if (!l && !was_lost)
 		return;

@@ -11,7 +11,7 @@ enum { FARM_JOBS = 256 /* that live at once, unless told otherwise */ };
 
 struct farm_config {
 	uint64_t first_job; /* ids from here on, counted up, never reused */
-	uint32_t max_jobs;  /* not ended; those of an earlier life may be more */
+	uint32_t max_jobs;  /* not ended; those of an earlier run may be more */
 	uint32_t max_ended; /* remembered for status; at least 1 */
 	uint32_t max_peers;
 	uint32_t max_peer_leases; /* held by one worker */

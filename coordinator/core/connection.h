@@ -13,8 +13,8 @@ void connection_lose(struct farm *f, struct peer *p);
 void connection_lose_leases(struct farm *f, struct peer *p);
 void connection_drop_leases(struct farm *f, struct peer *p, bool revoke);
 
-/* The connections of an earlier life of the same home are closed. false with a sentence: this one is of an earlier
- * life. */
+/* The connections of an earlier run of the same home are closed. false with a sentence: this one is of an earlier
+ * run. */
 bool connection_replace(struct farm *f, const struct event_join *e, const char **refused);
 
 #endif

@@ -18,7 +18,7 @@ enum event_kind {
 	EVENT_HEARD,   /* peer: a heartbeat (every other event of a peer counts as one) */
 	EVENT_REQUEST, /* peer, want */
 	EVENT_BATCH,   /* peer, key, valid, text: the result of a lease */
-	EVENT_STORED,  /* key, digest: the result of a lease from an earlier life, which could not count before: it does
+	EVENT_STORED,  /* key, digest: the result of a lease from an earlier run, which could not count before: it does
 			  now if it can */
 	EVENT_DELIVERED, /* peer, key: its result is here and will be looked at later (EVENT_BATCH): it may have another
 			    lease */
@@ -29,12 +29,12 @@ enum event_kind {
 	EVENT_PREPARED,	      /* prepared: the answer to ACTION_BOOTSTRAP_DONE */
 	EVENT_ERROR_KNOWN,    /* error_known: the answer to ACTION_EVALUATE_ERROR */
 	EVENT_IMAGE_KNOWN,    /* image_known: what the final image of ACTION_PUBLISH says; the job has ended */
-	EVENT_RESTORE, /* tag, restore: a job of an earlier life goes on, or one that has ended. Without a tag there are
-			  never too many: only memory can be out */
-	EVENT_HOLD,    /* tag, job, hold, text: no more of its leases go out; without a text this hold is over */
+	EVENT_RESTORE,	/* tag, restore: a job of an earlier run goes on, or one that has ended. Without a tag there are
+			   never too many: only memory can be out */
+	EVENT_HOLD,	/* tag, job, hold, text: no more of its leases go out; without a text this hold is over */
 	EVENT_PRIORITY, /* tag, job, priority: from the next lease on */
 	EVENT_EXTEND,	/* tag, job, plan: its own, but for the bounds; not fewer rounds */
-	EVENT_ASIDE, /* join (but for peer, fingerprint, threads), text: a worker that was set aside in an earlier life
+	EVENT_ASIDE, /* join (but for peer, fingerprint, threads), text: a worker that was set aside in an earlier run
 		      */
 	EVENT_JOB_BROKEN, /* job, text: the caller cannot go on with it (a sum left the grid, the disk is full) */
 };
@@ -55,7 +55,7 @@ struct batch_digest {
 enum { JOIN_HOME = 40, JOIN_NAME = 128 /* bytes of a home's name and of a worker's, their ends included */ };
 
 struct event_join {
-	uint64_t peer;		 /* chosen by the caller, not 0, never used twice while the farm lives */
+	uint64_t peer;		 /* chosen by the caller, not 0, never used twice while the farm is there */
 	const char *name;	 /* not empty */
 	const char *fingerprint; /* compared as a whole */
 	uint32_t threads;
@@ -86,7 +86,7 @@ struct event_restore {
 					    name NULL: not known. NULL: of none of them */
 	bool black;			 /* as EVENT_PREPARED said */
 	/* Seconds after its first lease: now, when the first round opened, when the last round was complete. NAN: was
-	 * not yet. The time in between lives does not count. */
+	 * not yet. The time between runs does not count. */
 	double elapsed, opened, completed;
 	const struct forecast_history *looks;
 	struct job_counts counts; /* so far */

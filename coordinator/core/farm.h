@@ -39,12 +39,12 @@
  *    decides, and a fourth; then the job fails. Who said otherwise than two that agree has given a wrong result.
  *  - A worker is set aside for good, by identity, after three faults in a row or three wrong results. Nothing that it
  * sends counts any more, and no failure of a job is laid to its wrong results.
- *  - A worker that calls again, in the same life or a later one of the same home, takes the place of its old
+ *  - A worker that calls again, in the same run or a later one of the same home, takes the place of its old
  * connection.
- *  - A job of an earlier life goes on where its merged leases say that it was; leases that were out then count when
+ *  - A job of an earlier run goes on where its merged leases say that it was; leases that were out then count when
  * their results come, as any do. A bound that its last complete round had met, or a look at its error, is not
  * forgotten.
- *  - A job may get other bounds while it lives; one that has ended goes on as one of an earlier life does, under its
+ *  - A job may get other bounds while it lives; one that has ended goes on as one of an earlier run does, under its
  * id. Neither changes what its leases compute.
  *  - A job that is held gets no leases out; results that come are merged, and its clock stands still.
  *  - Bounds are tested after complete rounds only. The target error is evaluated when merge_error_due() says so, as

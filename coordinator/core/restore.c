@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* Jobs of an earlier life, and ended ones that go on: put where their merged leases say that they were. */
+/* Jobs of an earlier run, and ended ones that go on: put where their merged leases say that they were. */
 #include "coordinator/core/restore.h"
 
 #include "common/base/mem.h"
@@ -56,7 +56,7 @@ static void take_looks(struct job *j, const struct forecast_history *looks)
 	job_forecast(j);
 }
 
-/* Jobs of an earlier life are never too many: nobody would hear that they are refused. */
+/* Jobs of an earlier run are never too many: nobody would be told that they are refused. */
 static bool make_room(struct farm *f, bool asked)
 {
 	uint32_t room = asked ? f->config.max_jobs : f->live_limit;

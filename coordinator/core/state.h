@@ -104,7 +104,7 @@ struct farm {
 	struct job **jobs; /* by id; ended ones too */
 	uint32_t job_count;
 	struct job **live;		 /* by priority, then id */
-	uint32_t live_count, live_limit; /* more than config.max_jobs when an earlier life left more */
+	uint32_t live_count, live_limit; /* more than config.max_jobs when an earlier run left more */
 	struct peer **peers;		 /* by id */
 	uint32_t peer_count;
 	struct identity **known; /* workers that are or were here */

@@ -24,7 +24,7 @@ void worker_registry_free(struct farm *f);
 struct identity *worker_registry_find(const struct farm *f, const struct event_join *e);
 /* Marks it; the rest is quarantine.h's. */
 void worker_registry_set_aside(struct farm *f, struct identity *who);
-/* As it was in an earlier life of the coordinator. */
+/* As it was in an earlier run of the coordinator. */
 void worker_registry_restore_quarantined(struct farm *f, const struct event_join *e, const char *text);
 
 #endif

@@ -151,7 +151,7 @@ int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *gen
 	char name[SPOOL_PATH_MAX];
 	struct checked_file in;
 	spool_job_path(spool, o->id, "checkpoint.tmp", name);
-	disk_unlink(name); /* of a life that ended before it was whole */
+	disk_unlink(name); /* of a run that ended before it was whole */
 	spool_job_path(spool, o->id, "checkpoint", name);
 	int rc = checked_file_open_heard(&in, name, heard, user, e);
 	if (rc)

@@ -63,16 +63,16 @@ struct jobs {
 	struct deferred *deferred, **deferred_last;
 	char refusal[256];	   /* of the last event that the core refused */
 	struct found *found;	   /* ascending by id */
-	struct recovery *recovery; /* the jobs of an earlier life are being read; NULL: no more */
+	struct recovery *recovery; /* the jobs of an earlier run are being read; NULL: no more */
 	int fault;		   /* why it stops by itself; 0: it does not */
 	struct error fault_error;
-	uint64_t *restored; /* ids of the jobs that went on when this life began */
+	uint64_t *restored; /* ids of the jobs that went on when this run began */
 	size_t restored_count;
 	struct durable_ack *acks, **acks_last; /* that wait for a flush */
 	struct durable_ack *parked;	       /* ... for a journal that failed to be a good one again */
 	struct ending *endings;		       /* jobs that ended and whose records could not be written yet */
 	double endings_again;
-	struct seen seen;	   /* when this life began */
+	struct seen seen;	   /* when this run began */
 	double folders_next;	   /* when jobs' folders are looked for */
 	double clear_next;	   /* when finished jobs are looked at again */
 	struct clearing *clearing; /* they are being looked at */

@@ -14,7 +14,7 @@ int late_add(struct live_job *o, const struct lease_key *k, uint64_t at, struct 
 void late_forget(struct live_job *o, const struct lease_key *k);
 void late_sort(struct live_job *o); /* as they can count */
 void late_remove(struct live_job *o, size_t i);
-/* The core gives a lease to this worker: true: its result is here and will count soon, the worker need not hear of it.
+/* The core gives a lease to this worker: true: its result is here and will count soon, the worker need not be told.
  */
 bool late_withholds(struct live_job *o, const struct lease_key *k, uint64_t peer);
 

@@ -52,7 +52,7 @@ struct waiting_batch {
 	struct buf payload;
 };
 
-/* Seconds after the job's first lease, in this life and those before: at the last merged batch, when the first round
+/* Seconds after the job's first lease, in this run and those before: at the last merged batch, when the first round
  * opened, when the last round was complete. NAN: not yet. */
 struct live_job_times {
 	double elapsed, opened, completed;
@@ -107,7 +107,7 @@ struct live_job {
 	bool pinned;		  /* the journal knows whose it is */
 	struct job_counts counts; /* as they were written down last */
 	struct live_job_times times;
-	char fingerprint[256];	   /* of an earlier life */
+	char fingerprint[256];	   /* of an earlier run */
 	uint64_t checkpoint_bytes; /* of the last one */
 	double checkpoint_after;   /* s on the loop's clock: not before */
 	double look_written;	   /* work of the last look in the journal */
@@ -139,7 +139,7 @@ struct live_job {
 };
 
 /* Takes the submission, writes a record if it is new. The job's folder is there; owner as in the record; submitted: s
- * since 1970, of a job of an earlier life; 0: now. */
+ * since 1970, of a job of an earlier run; 0: now. */
 int live_job_new(struct live_job **o, uint64_t id, struct envelope *submit, const struct plan *plan, const char *owner,
 		 double submitted, struct spool *s, struct error *e);
 /* Frees the memory; blobs and files stay. Not while busy. */

@@ -97,7 +97,7 @@ size_t jobs_views(struct jobs *s, struct job_view **views)
 	return count;
 }
 
-/* Jobs of an earlier life that have ended, and those that were never accepted: whoever submitted them has no answer. */
+/* Jobs of an earlier run that have ended, and those that were never accepted: whoever submitted them has no answer. */
 int listing_open(struct jobs *s, struct error *e)
 {
 	uint64_t *ids;

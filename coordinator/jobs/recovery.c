@@ -160,7 +160,7 @@ static void fail(struct jobs *s, int rc, const struct error *e)
 	s->stop(s->stop_user);
 }
 
-/* All have been read, and the core hears of them. */
+/* All have been read, and the core is told of them. */
 static int finish(struct jobs *s, struct error *e)
 {
 	struct recovery *r = s->recovery;
@@ -276,7 +276,7 @@ static void done(uv_work_t *work, int status)
 		fail(s, rc, &e);
 }
 
-/* ---- life */
+/* ---- begin and end */
 
 static int add(struct jobs *s, const struct ledger_job *j, struct error *e)
 {

@@ -1,9 +1,9 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * The jobs that had not ended when an earlier life did: read by the pool while the coordinator listens, so that a spool
+ * The jobs that had not ended when an earlier run did: read by the pool while the coordinator listens, so that a spool
  * of gigabytes keeps nobody from an answer. Their rows and plans are read before it listens; their films, one job after
- * the other, behind that. The core hears of all of them at once, in the order of their ids, when the last one has been
- * read: until then no lease goes out, what peers ask for waits (held.h), and the status says "reading, N %".
+ * the other, behind that. The core is told of all of them at once, in the order of their ids, when the last one has
+ * been read: until then no lease goes out, what peers ask for waits (held.h), and the status says "reading, N %".
  *
  * Jobs whose checkpoint or journal is damaged begin anew, those without a folder, a plan or a scene fail with a
  * sentence. An error of the machine stops the coordinator, for another start may go better, and so does -EPROTO:

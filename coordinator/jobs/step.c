@@ -5,7 +5,7 @@
  * jobs_step gives it to the core (core/farm.h), which changes its state and answers with a list of actions;
  * dispatch.c carries these out. Events that come up meanwhile are queued and follow before jobs_step returns. Then jobs
  * that have ended are finished, results that waited for others are merged, and a checkpoint is begun where one is due.
- * The core says when it must hear of the time at the latest: the timer `wake`. Results that came while a job's films
+ * The core says when it must be told the time at the latest: the timer `wake`. Results that came while a job's films
  * were read follow one at a time by the timer `drain`.
  *
  * A step does not fail. Without memory for a queued event (300 bytes) the process ends.

@@ -3,7 +3,7 @@
  * Workers that gave wrong results: what is written down about them. Those that are set aside stand in the spool's file
  * `aside`, so that they are after a restart, too; an operator lets one back by --forgive. A job's log and note say how
  * many results of such a worker are in its image that nobody had verified: they cannot be taken out again. Who gave
- * which is known as long as the coordinator lives. The loop's thread.
+ * which is known as long as the coordinator runs. The loop's thread.
  */
 #ifndef COORDINATOR_JOBS_TRUST_H
 #define COORDINATOR_JOBS_TRUST_H

@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What peers ask for while the jobs of an earlier life are read (recovery.h): it waits, and is answered in the order in
- * which it came. Greetings, heartbeats and lists of jobs are answered at once. Who waits hears a heartbeat as often as
- * workers must be heard. The loop's thread.
+ * What peers ask for while the jobs of an earlier run are read (recovery.h): it waits, and is answered in the order in
+ * which it came. Greetings, heartbeats and lists of jobs are answered at once. Who waits is sent a heartbeat as often
+ * as workers must be heard. The loop's thread.
  */
 #ifndef COORDINATOR_PEERS_HELD_H
 #define COORDINATOR_PEERS_HELD_H

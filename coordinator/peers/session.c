@@ -3,13 +3,13 @@
  * One connection: its handshake, the messages of a worker, and what is sent to it. Clients' messages are in client.c.
  *
  * The first message must be hello, within a time limit, and at most 4 KiB long. Version, names and the certificate's
- * role are checked; whoever is refused gets a sentence, and a worker also hears whether calling again can help. A
+ * role are checked; whoever is refused gets a sentence, and a worker is also told whether calling again can help. A
  * worker then asks for leases, sends results or failures, asks for files, and sends heartbeats; each message becomes an
  * event for the core, and each result is checked first (results.c).
  *
  * A message that its sender must not send is answered by Fault, and the connection ends. What a peer does not read is
  * bounded by a send limit. When the maximum of connections is reached the oldest one without a hello is closed. When a
- * connection ends, the core hears EVENT_LEFT, and uploads, fetches and requests of that peer are dropped.
+ * connection ends, the core is told EVENT_LEFT, and uploads, fetches and requests of that peer are dropped.
  */
 #include "coordinator/peers/session.h"
 

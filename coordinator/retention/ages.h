@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * How old finished jobs are, by time that was seen to pass (store/seen.h), which the spool's file `clock` brings from
- * one life to the next. No jump of the wall clock makes anything old. The loop's thread.
+ * one run to the next. No jump of the wall clock makes anything old. The loop's thread.
  */
 #ifndef COORDINATOR_RETENTION_AGES_H
 #define COORDINATOR_RETENTION_AGES_H

@@ -38,8 +38,8 @@ struct clearing {
 	struct job_record record; /* the one at hand */
 };
 
-/* Or comes to life: its films are being read, so that it goes on. */
-static bool lives(const struct jobs *s, uint64_t job)
+/* Or is about to run again: its films are being read, so that it goes on. */
+static bool is_needed(const struct jobs *s, uint64_t job)
 {
 	return jobs_find(s, job) || jobs_is_read(s, job);
 }
@@ -58,7 +58,7 @@ static uint64_t result_bytes(const struct jobs *s, uint64_t job)
 
 static void look(const struct jobs *s, struct clearing *c, uint64_t id)
 {
-	if (lives(s, id))
+	if (is_needed(s, id))
 		return;
 	int rc = spool_read_record(s->spool, id, &c->record, NULL);
 	if (rc == -ENOENT) { /* if nothing is in it */
@@ -132,7 +132,7 @@ static void clear_job(struct jobs *s, struct clearing *c, const struct age_job *
 {
 	if ((!j->no_films || !j->films) && (!j->no_result || !j->result) && !j->no_record)
 		return;
-	if (lives(s, j->id) || s->peers.uses_result(s->peers.user, j->id) ||
+	if (is_needed(s, j->id) || s->peers.uses_result(s->peers.user, j->id) ||
 	    spool_read_record(s->spool, j->id, &c->record, NULL) || c->record.ended_seen != j->ended)
 		return;
 	if (j->no_films && j->films) {

@@ -27,12 +27,12 @@ struct server {
 	struct jobs jobs;
 	struct peers peers;
 	struct status_socket *status;
-	double tls_next; /* when its files are looked at again */
-	double watchdog,
-		watchdog_next; /* the service manager's patience (0: none waits), and when it hears of us again */
+	double tls_next;		/* when its files are looked at again */
+	double watchdog, watchdog_next; /* the service manager's patience (0: none waits), and when it is told again
+					   that we run */
 };
 
-/* It listens; the jobs of an earlier life are read by its loop (recovery.h). */
+/* It listens; the jobs of an earlier run are read by its loop (recovery.h). */
 int server_open(struct server **s, const struct server_config *c, struct error *e);
 int server_await_jobs(struct server *s, struct error *e); /* turns the loop until they are */
 void server_stop(struct server *s);  /* no more is begun; the loop ends when what is under way has ended */

@@ -345,9 +345,9 @@ void status_tick(struct status_socket *t)
 		tell(t, TOPIC_SNAPSHOT, snapshot(t->peers));
 }
 
-/* ---- life ---- */
+/* ---- begin and end ---- */
 
-/* A socket that nobody listens to is left from an earlier life; whatever else is there is somebody's. */
+/* A socket that nobody listens to is left from an earlier run; whatever else is there is somebody's. */
 static int remove_stale(const char *path, const struct sockaddr_un *a, struct error *e)
 {
 	struct stat st;

@@ -167,8 +167,8 @@ uint64_t journal_bytes(struct journal *j)
 	return bytes;
 }
 
-/* All that waited when this began, and no more: on a slow disk more would come for ever, and nobody hear that the first
- * is stored. */
+/* All that waited when this began, and no more: on a slow disk more would come for ever, and nobody be told that the
+ * first is stored. */
 static int write_waiting(struct journal *j)
 {
 	int rc = 0;

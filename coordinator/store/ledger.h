@@ -29,7 +29,7 @@ struct ledger_job {
 	size_t submission_size, plan_size;
 	/* Not looked at by ledger_add and ledger_extend. */
 	const char *state;
-	double ended;	   /* s since 1970; 0: it lives */
+	double ended;	   /* s since 1970; 0: it has not ended */
 	uint64_t revision; /* grows with every change of the row */
 	bool damaged;	   /* as it was read: its checksum does not fit, nothing of it is to be believed */
 };
@@ -41,13 +41,13 @@ void ledger_close(struct ledger *l); /* NULL: nothing */
 int ledger_put(struct ledger *l, const struct ledger_job *j, struct error *e);
 int ledger_forget(struct ledger *l, uint64_t id, struct error *e); /* whatever it is */
 int ledger_add(struct ledger *l, const struct ledger_job *j, struct error *e);
-/* Its life after so many extensions is over; one that was extended since lives on. */
+/* It has ended after so many extensions; one that was extended since goes on. */
 int ledger_end(struct ledger *l, uint64_t id, uint64_t extended, const char *state, struct error *e);
 int ledger_drop(struct ledger *l, const uint64_t *ids, size_t count,
 		struct error *e); /* the rows of these, at once; none of a living job */
 int ledger_hold(struct ledger *l, uint64_t id, const char *who, struct error *e); /* "": no longer */
 int ledger_priority(struct ledger *l, uint64_t id, int priority, struct error *e);
-/* Another submission, plan and number of extensions; a job that has ended lives again. -ENOENT */
+/* Another submission, plan and number of extensions; a job that has ended runs again. -ENOENT */
 int ledger_extend(struct ledger *l, const struct ledger_job *j, struct error *e);
 /* The living job with the smallest id above `after`, whose texts and bytes are valid until the next call. 1: it is
  * there; 0: no more. */

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Time that was seen to pass, in seconds: what the ages of finished jobs are made of. It grows by the clock of the
- * machine since it was started, which nobody sets, while it runs and from one life of the coordinator to the next.
+ * machine since it was started, which nobody sets, while it runs and from one run of the coordinator to the next.
  * Where the machine has been started anew in between, only the wall clock knows how long that took, and may be wrong:
  * SEEN_CREDIT at most is believed. Pure.
  */

@@ -195,7 +195,7 @@ static int read_counter(struct spool *s, struct error *e)
 	return 0;
 }
 
-/* ---- life ---- */
+/* ---- begin and end ---- */
 
 int spool_open(struct spool **out, const char *folder, struct error *e)
 {
