@@ -5,6 +5,7 @@
  * Exit codes: 0 after SIGTERM or SIGINT, 2 for options and settings that cannot be, 1 for anything else; the reason
  * goes to stderr.
  */
+#include "common/base/option.h"
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "common/base/output.h"
@@ -106,15 +107,6 @@ static const struct argp_option options[] = {
 	{0},
 };
 
-static double number(struct argp_state *state, const char *option, const char *arg, double least, double most)
-{
-	char *end;
-	double x = strtod(arg, &end);
-	if (*end || end == arg || !(x >= least && x <= most))
-		argp_error(state, "%s takes a number from %g to %g, not '%s'", option, least, most, arg);
-	return x;
-}
-
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
 	struct server_config *c = state->input;
@@ -138,56 +130,56 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		c->port_file = arg;
 		return 0;
 	case OPTION_HEARTBEAT:
-		c->heartbeat_seconds = number(state, "--heartbeat", arg, 0.05, 3600);
+		c->heartbeat_seconds = option_number(state, "--heartbeat", arg, 0.05, 3600);
 		return 0;
 	case OPTION_BLOBS:
-		c->blob_bytes = (uint64_t)(1e9 * number(state, "--blobs", arg, 0.001, 1e6));
+		c->blob_bytes = (uint64_t)(1e9 * option_number(state, "--blobs", arg, 0.001, 1e6));
 		return 0;
 	case OPTION_TLS:
 		c->tls = arg;
 		return 0;
 	case OPTION_TLS_CHECK:
-		c->tls_check_seconds = number(state, "--tls-check", arg, 0.1, 3600);
+		c->tls_check_seconds = option_number(state, "--tls-check", arg, 0.1, 3600);
 		return 0;
 	case OPTION_JOURNAL:
-		c->journal_bytes = (uint64_t)(1e6 * number(state, "--journal", arg, 0.001, 1e6));
+		c->journal_bytes = (uint64_t)(1e6 * option_number(state, "--journal", arg, 0.001, 1e6));
 		return 0;
 	case OPTION_CONNECTIONS:
-		c->max_connections = (unsigned)number(state, "--connections", arg, 1, CONNECTIONS_MOST);
+		c->max_connections = (unsigned)option_number(state, "--connections", arg, 1, CONNECTIONS_MOST);
 		return 0;
 	case OPTION_FILM_MEMORY:
-		c->film_bytes = (uint64_t)(1e6 * number(state, "--film-memory", arg, 0, 1e9));
+		c->film_bytes = (uint64_t)(1e6 * option_number(state, "--film-memory", arg, 0, 1e9));
 		return 0;
 	case OPTION_KEEP:
-		c->keep_bytes = (uint64_t)(1e6 * number(state, "--keep-films", arg, 0, 1e9));
+		c->keep_bytes = (uint64_t)(1e6 * option_number(state, "--keep-films", arg, 0, 1e9));
 		return 0;
 	case OPTION_DAYS:
-		c->clear_seconds = 86400 * number(state, "--keep-days", arg, 0, 1e6);
+		c->clear_seconds = 86400 * option_number(state, "--keep-days", arg, 0, 1e6);
 		return 0;
 	case OPTION_GB:
-		c->clear_bytes = (uint64_t)(1e9 * number(state, "--keep-gb", arg, 0, 1e9));
+		c->clear_bytes = (uint64_t)(1e9 * option_number(state, "--keep-gb", arg, 0, 1e9));
 		return 0;
 	case OPTION_BANDWIDTH:
-		c->worker_bandwidth = 1e6 * number(state, "--worker-bandwidth", arg, 1e-6, 1e6);
+		c->worker_bandwidth = 1e6 * option_number(state, "--worker-bandwidth", arg, 1e-6, 1e6);
 		return 0;
 	case OPTION_JOBS:
-		c->quota.jobs = (uint64_t)number(state, "--quota-jobs", arg, 1, 1e9);
+		c->quota.jobs = (uint64_t)option_number(state, "--quota-jobs", arg, 1, 1e9);
 		return 0;
 	case OPTION_ASSETS:
-		c->quota.asset_bytes = (uint64_t)(1e6 * number(state, "--quota-assets", arg, 1e-6, 1e12));
+		c->quota.asset_bytes = (uint64_t)(1e6 * option_number(state, "--quota-assets", arg, 1e-6, 1e12));
 		return 0;
 	case OPTION_FILM:
-		c->quota.film_bytes = (uint64_t)(1e6 * number(state, "--quota-film", arg, 1e-6, 1e12));
+		c->quota.film_bytes = (uint64_t)(1e6 * option_number(state, "--quota-film", arg, 1e-6, 1e12));
 		return 0;
 	case OPTION_MUTATIONS:
-		c->quota.mutations = (uint64_t)number(state, "--quota-mutations", arg, 1, 1e18);
+		c->quota.mutations = (uint64_t)option_number(state, "--quota-mutations", arg, 1, 1e18);
 		return 0;
 	case OPTION_VERIFY:
 		if (!text_share(arg, &c->verify))
 			argp_error(state, "--verify takes a share from 0 to 1 or percent, not '%s'", arg);
 		return 0;
 	case OPTION_FAULTS:
-		c->max_faults = (unsigned)number(state, "--max-faults", arg, 1, 1e6);
+		c->max_faults = (unsigned)option_number(state, "--max-faults", arg, 1, 1e6);
 		return 0;
 	case OPTION_FORGIVE:
 		c->forgive = arg;

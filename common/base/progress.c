@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "common/base/clock.h"
 #include "common/base/progress.h"
 
 #include "common/base/terminal.h"
@@ -8,7 +9,6 @@
 #include <stdio.h>
 #include <string.h>
 #include <sys/ioctl.h>
-#include <time.h>
 #include <unistd.h>
 
 enum { BAR_MOST = 40, BAR_LEAST = 10, COLUMNS_ELSE = 80 };
@@ -19,13 +19,6 @@ void progress_start(struct progress *p)
 	memset(p, 0, sizeof *p);
 	p->terminal = terminal_moves_cursor(STDERR_FILENO);
 	p->shown = -1;
-}
-
-static double now(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
 }
 
 static void draw_bar(double fraction, const char *state, const char *detail)
@@ -49,7 +42,7 @@ void progress_show(struct progress *p, double fraction, const char *state, const
 		p->drawn = true;
 		return;
 	}
-	double t = now();
+	double t = clock_seconds();
 	bool due = p->shown < 0 || strcmp(state, p->state) != 0 || fraction >= p->shown + line_fraction ||
 		   (fraction > p->shown && (t >= p->shown_time + line_seconds || fraction >= 1));
 	if (!due)

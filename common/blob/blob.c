@@ -10,6 +10,7 @@
  * -ENOSPC, after everything that nobody holds has been forgotten; a blob whose file has gone or changed is found by
  * blob_check and forgotten.
  */
+#include "common/base/clock.h"
 #include "common/blob/blob.h"
 
 #include "common/base/disk.h"
@@ -124,13 +125,6 @@ static struct entry *find_there(struct blob_store *s, const struct blob_hash *h)
 {
 	struct entry *n = find(s, h);
 	return n && !n->gone ? n : NULL;
-}
-
-static double now(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + (double)t.tv_nsec * 1e-9;
 }
 
 static int reserve(struct blob_store *s, size_t count, struct error *e)
@@ -379,14 +373,14 @@ int blob_check(struct blob_store *s, const struct blob_hash *h, double seconds, 
 	blob_hex(h, hex);
 	if (!n)
 		return error_set(e, ENOENT, "there is no blob %s", hex);
-	if (n->checked > 0 && (seconds == BLOB_SINCE_GIVEN ? !n->given : now() - n->checked <= seconds))
+	if (n->checked > 0 && (seconds == BLOB_SINCE_GIVEN ? !n->given : clock_seconds() - n->checked <= seconds))
 		return 0;
 	blob_path(s, h, path, sizeof path);
 	int rc = hash_file(path, &got, e);
 	if (rc && rc != -ENOENT)
 		return rc;
 	if (!rc && blob_hash_equal(&got, h)) {
-		n->checked = now();
+		n->checked = clock_seconds();
 		n->given = false;
 		return 0;
 	}
@@ -495,7 +489,7 @@ static int finish(struct blob_writer *w, struct error *e)
 		rc = add_entry(s, &w->hash, w->size, 1, e);
 	if (!rc) {
 		n = find(s, &w->hash);
-		n->checked = now();
+		n->checked = clock_seconds();
 		n->given = false;
 	}
 	return rc;

@@ -1,4 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
+#include "common/base/option.h"
 #include "common/base/log.h"
 #include "common/base/mem.h"
 #include "common/base/output.h"
@@ -70,15 +71,6 @@ static const struct argp_option options[] = {
 	{0},
 };
 
-static double number(struct argp_state *state, const char *option, const char *arg, double least, double most)
-{
-	char *end;
-	double x = strtod(arg, &end);
-	if (*end || end == arg || !(x >= least && x <= most))
-		argp_error(state, "%s takes a number from %g to %g, not '%s'", option, least, most, arg);
-	return x;
-}
-
 static error_t parse(int key, char *arg, struct argp_state *state)
 {
 	struct agent_config *c = state->input;
@@ -87,7 +79,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		c->coordinator = arg;
 		return 0;
 	case 't':
-		c->threads = (unsigned)number(state, "--threads", arg, 1, 1024);
+		c->threads = (unsigned)option_number(state, "--threads", arg, 1, 1024);
 		return 0;
 	case OPTION_NAME:
 		if (!*arg || strlen(arg) > 127)
@@ -98,13 +90,13 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		c->cache = arg;
 		return 0;
 	case OPTION_CACHE_SIZE:
-		c->cache_bytes = (uint64_t)(1e9 * number(state, "--cache-size", arg, 0.001, 1e6));
+		c->cache_bytes = (uint64_t)(1e9 * option_number(state, "--cache-size", arg, 0.001, 1e6));
 		return 0;
 	case OPTION_GRACE:
-		c->grace_seconds = number(state, "--grace", arg, 0, 86400);
+		c->grace_seconds = option_number(state, "--grace", arg, 0, 86400);
 		return 0;
 	case OPTION_IDLE:
-		c->idle_seconds = number(state, "--idle-exit", arg, 0, 1e7);
+		c->idle_seconds = option_number(state, "--idle-exit", arg, 0, 1e7);
 		return 0;
 	case OPTION_TLS:
 		c->tls = arg;
@@ -118,26 +110,26 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	case OPTION_LARGE:
 		if (!getenv("HSLT_TEST"))
 			argp_error(state, "--test-large is for tests alone: it makes wrong images");
-		c->large = (unsigned)number(state, "--test-large", arg, 1, 1e6);
+		c->large = (unsigned)option_number(state, "--test-large", arg, 1, 1e6);
 		return 0;
 	case OPTION_LIE:
 		if (!getenv("HSLT_TEST"))
 			argp_error(state, "--test-lie is for tests alone: it makes wrong images");
-		c->lie = (unsigned)number(state, "--test-lie", arg, 1, 1e6);
+		c->lie = (unsigned)option_number(state, "--test-lie", arg, 1, 1e6);
 		return 0;
 	case OPTION_SPOIL:
 		if (!getenv("HSLT_TEST"))
 			argp_error(state, "--test-spoil-states is for tests alone: it makes wrong images");
-		c->spoil = (unsigned)number(state, "--test-spoil-states", arg, 1, 1e6);
+		c->spoil = (unsigned)option_number(state, "--test-spoil-states", arg, 1, 1e6);
 		return 0;
 	case OPTION_STALL:
-		c->stall_seconds = number(state, "--stall", arg, 0, 86400);
+		c->stall_seconds = option_number(state, "--stall", arg, 0, 86400);
 		return 0;
 	case OPTION_HANG:
-		c->hang = (unsigned)number(state, "--test-hang", arg, 1, 1e9);
+		c->hang = (unsigned)option_number(state, "--test-hang", arg, 1, 1e9);
 		return 0;
 	case OPTION_CRASH:
-		c->crash = (unsigned)number(state, "--test-crash", arg, 1, 1e9);
+		c->crash = (unsigned)option_number(state, "--test-crash", arg, 1, 1e9);
 		return 0;
 	case OPTION_REPEAT:
 		c->repeat = true;

@@ -1,6 +1,7 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/daemon/supervise.h"
 
+#include "common/base/clock.h"
 #include "common/base/crash.h"
 #include "common/base/log.h"
 #include "worker/daemon/work.h"
@@ -23,13 +24,6 @@ struct supervisor {
 	int asked;    /* the last signal that was sent on; 0: none */
 	double pause; /* s before the next start */
 };
-
-static double now(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 /* The service manager's watchdog is fed by the process that renders. */
 static void take_over_watchdog(pid_t parent)
@@ -75,8 +69,8 @@ static int wait_for_end(struct supervisor *s)
 /* false: it is to end instead. */
 static bool pause_before_start(struct supervisor *s)
 {
-	double end = now() + s->pause;
-	for (double rest; (rest = end - now()) > 0;) {
+	double end = clock_seconds() + s->pause;
+	for (double rest; (rest = end - clock_seconds()) > 0;) {
 		struct timespec t = {(time_t)rest, (long)(1e9 * (rest - (double)(time_t)rest))};
 		int number = sigtimedwait(&s->heard, NULL, &t);
 		if (number > 0 && number != SIGCHLD)
@@ -100,7 +94,7 @@ int supervise(unsigned threads, int (*run)(void *), void *user)
 	sigaddset(&s.heard, SIGHUP);
 	sigprocmask(SIG_BLOCK, &s.heard, &s.mask);
 	for (;;) {
-		double begun = now();
+		double begun = clock_seconds();
 		int rc = start(&s, run, user);
 		if (rc) {
 			fprintf(stderr, "hslt-worker: no process: %s\n", strerror(-rc));
@@ -114,9 +108,9 @@ int supervise(unsigned threads, int (*run)(void *), void *user)
 			return number == s.asked ? 0 : 1;
 		log_event(LOG_PROCESS_LOST, "signal=%d text=\"the process that renders was ended by %s\" leases=%u",
 			  number, crash_signal_name(number), lost);
-		s.pause = now() - begun > long_life	? first_pause
-			  : s.pause * 2 < longest_pause ? s.pause * 2
-							: longest_pause;
+		s.pause = clock_seconds() - begun > long_life ? first_pause
+			  : s.pause * 2 < longest_pause	      ? s.pause * 2
+							      : longest_pause;
 		if (!pause_before_start(&s))
 			return 0;
 	}

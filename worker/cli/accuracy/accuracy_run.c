@@ -9,20 +9,13 @@
  */
 #include "worker/cli/accuracy/accuracy.h"
 
+#include "common/base/clock.h"
 #include "common/base/mem.h"
 
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 #include <unistd.h>
-
-static double now(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 enum { PILOT_BOOTSTRAP = 16384, PILOT_EPOCH = 16 };
 
@@ -181,10 +174,10 @@ static void show(const struct accuracy_run *r, double fraction, const char *stat
 
 static int rounds(struct accuracy_run *r, double begin, struct error *e)
 {
-	double first = now(), wanted = r->setting_rounds ? (double)r->setting_rounds : r->setting_seconds;
+	double first = clock_seconds(), wanted = r->setting_rounds ? (double)r->setting_rounds : r->setting_seconds;
 	for (;;) {
 		size_t i = next(r);
-		double wall = now();
+		double wall = clock_seconds();
 		bool enough = wanted > 0 ? had(r, i) >= wanted : wall >= begin + r->seconds;
 		/* Two rounds at least, however short the time. */
 		if ((enough && canvas_rounds(r->jobs[i].run.canvas) >= 2) || stopped(r))
@@ -215,7 +208,7 @@ static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 		rc = check_memory(r, &j->plan, e);
 	if (!rc)
 		rc = find_world(r, j, e);
-	double begin = now();
+	double begin = clock_seconds();
 	if (!rc)
 		rc = start(r, ACCURACY_DEFAULT, e);
 	if (!rc && !stopped(r))
@@ -223,7 +216,7 @@ static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 	if (!rc && j->cost_count > 0) {
 		pilot->bootstrap_sample = fmax(j->run.bootstrap_cpu_seconds / (double)j->plan.bootstrap, 1e-9);
 		pilot->mutation = fmax(j->cost[0], 1e-9);
-		pilot->rate = fmax(j->run.cpu_seconds / fmax(now() - begin, 1e-9), 0.05);
+		pilot->rate = fmax(j->run.cpu_seconds / fmax(clock_seconds() - begin, 1e-9), 0.05);
 	}
 	end(j);
 	return rc;
@@ -232,7 +225,7 @@ static int fly(struct accuracy_run *r, struct pilot *pilot, struct error *e)
 int accuracy_render(struct accuracy_run *r, struct error *e)
 {
 	const struct accuracy_design *d = r->design;
-	double begin = now();
+	double begin = clock_seconds();
 	int rc;
 	r->jobs = mem_alloc(d->count, sizeof *r->jobs);
 	if (!r->jobs)
@@ -253,7 +246,7 @@ int accuracy_render(struct accuracy_run *r, struct error *e)
 	}
 	if (!rc && !stopped(r))
 		rc = rounds(r, begin, e);
-	r->wall_seconds = now() - begin;
+	r->wall_seconds = clock_seconds() - begin;
 	r->interrupted = stopped(r);
 	for (size_t i = 0; !rc && i < d->count; i++)
 		if (!r->jobs[i].run.canvas || canvas_rounds(r->jobs[i].run.canvas) < 1)

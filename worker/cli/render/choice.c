@@ -1,26 +1,18 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/render/choice.h"
 
+#include "common/base/clock.h"
 #include "common/json/forecast_json.h"
 #include "worker/render/scene/scene.h"
-
-#include <time.h>
-
-static double now(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 int choice_in_world(const struct world *w, struct render_arguments *a, struct choice *out, struct error *e)
 {
 	*out = (struct choice){.made = integrator_is_open(&a->plan)};
 	if (!out->made)
 		return 0;
-	double begin = now();
+	double begin = clock_seconds();
 	int rc = render_choose(w, &a->plan, &out->found, e);
-	out->seconds = now() - begin;
+	out->seconds = clock_seconds() - begin;
 	if (!rc)
 		render_choice_text(a->plan.integrator, &out->found, out->text, sizeof out->text);
 	return rc;

@@ -6,6 +6,7 @@
  * Every failure ends in one line on stderr and the exit code of its kind (docs/design.md); the image is replaced as a
  * whole or not at all.
  */
+#include "common/base/clock.h"
 #include "common/base/crash.h"
 #include "common/base/mem.h"
 #include "common/base/output.h"
@@ -26,7 +27,6 @@
 #include <math.h>
 #include <stdio.h>
 #include <string.h>
-#include <time.h>
 
 const char *argp_program_version = "hslt-render " HSLT_VERSION;
 
@@ -155,17 +155,10 @@ struct session {
 	bool usage; /* what went wrong was asked for */
 };
 
-static double now(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
-
 static int load(struct session *s, struct error *e)
 {
 	struct scene scene;
-	double begin = now();
+	double begin = clock_seconds();
 	int rc = scene_path_split(s->a->scene, &s->folder, &s->name, e);
 	if (rc)
 		return rc;
@@ -181,7 +174,7 @@ static int load(struct session *s, struct error *e)
 	if (rc)
 		return rc;
 	world_summary(s->world, &s->summary);
-	s->build_seconds = now() - begin;
+	s->build_seconds = clock_seconds() - begin;
 	return 0;
 }
 

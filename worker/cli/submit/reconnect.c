@@ -1,17 +1,11 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/cli/submit/reconnect.h"
 
+#include "common/base/clock.h"
 #include <stdio.h>
 #include <time.h>
 
 static const double first_pause = 0.25, longest_pause = 10;
-
-static double now(void)
-{
-	struct timespec t;
-	clock_gettime(CLOCK_MONOTONIC, &t);
-	return (double)t.tv_sec + 1e-9 * (double)t.tv_nsec;
-}
 
 static void rest(double seconds)
 {
@@ -36,14 +30,14 @@ static int try_once(struct client *cl, const struct submitted *job, const char *
 /* Calls until somebody answers. */
 static int call_again(struct client **cl, const struct reconnect *o, struct error *e)
 {
-	double gone = now(), pause = first_pause;
+	double gone = clock_seconds(), pause = first_pause;
 	int rc;
 	do {
-		double left = gone + o->patience - now();
+		double left = gone + o->patience - clock_seconds();
 		rest(pause < left ? pause : left > 0 ? left : 0);
 		pause = 2 * pause < longest_pause ? 2 * pause : longest_pause;
 		rc = client_open(cl, o->coordinator, o->tls, o->insecure, "hslt-submit", e);
-	} while (is_gone(rc) && now() - gone < o->patience);
+	} while (is_gone(rc) && clock_seconds() - gone < o->patience);
 	return rc;
 }
 
