@@ -14,6 +14,7 @@
 #include "worker/render/scene/gltf_private.h"
 
 #include <math.h>
+#include <stdio.h>
 #include <string.h>
 
 enum { NODES_DEEP = 256, INSTANCES_MAX = 1 << 17, GLB_HEADER = 12, GLB_CHUNK = 8 };
@@ -124,6 +125,30 @@ static bool is_known(const char *extension)
 	return false;
 }
 
+/* Those that the file says it uses and the reader does not know, in one note: what they would have changed is missing.
+ */
+static void note_unknown(struct gltf *g)
+{
+	enum { ROOM = 512 };
+	const json_t *used = json_object_get(g->root, "extensionsUsed");
+	char *text = NULL;
+	size_t length = 0;
+	for (size_t i = 0; i < json_array_size(used) && !g->failed; i++) {
+		const char *name = json_string_value(json_array_get(used, i));
+		if (!name || is_known(name))
+			continue;
+		if (!text && !(text = arena_alloc(g->arena, ROOM, 1))) {
+			gltf_fail(g, NULL, ENOMEM, "out of memory");
+			return;
+		}
+		int n = snprintf(text + length, ROOM - length, "%s%.64s",
+				 length ? ", " : "what these extensions add is not read: ", name);
+		length = n < 0 || length + (size_t)n >= ROOM ? ROOM - 1 : length + (size_t)n;
+	}
+	if (text)
+		gltf_note(g, text);
+}
+
 static void check_file(struct gltf *g)
 {
 	const json_t *asset = gltf_object(g, NULL, g->root, "asset");
@@ -137,6 +162,7 @@ static void check_file(struct gltf *g)
 			gltf_fail(g, NULL, ENOTSUP, "it requires the extension %.64s, which is not supported",
 				  name ? name : "(no text)");
 	}
+	note_unknown(g);
 	if (json_array_size(json_object_get(g->root, "animations")))
 		gltf_note(g, "its animations are ignored: the image is of the nodes as they stand");
 	if (json_array_size(json_object_get(g->root, "skins")))

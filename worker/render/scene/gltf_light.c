@@ -77,6 +77,10 @@ void gltf_light(struct gltf *g, const struct gltf_at *at, const mat4 *to_world)
 		rgb[k] *= intensity;
 	mat4 m = looking(to_world);
 	g->has_light = true;
+	if (json_object_get(at->json, "range"))
+		gltf_note(
+			g,
+			"ranges of lights are ignored: they fall off with the square of the distance, without an end");
 	if (strcmp(type, "directional") == 0) {
 		struct xml_element *el = gltf_plugin(g, g->scene, at, "emitter", "directional", NULL);
 		gltf_put_rgb(g, el, at, "irradiance", rgb);

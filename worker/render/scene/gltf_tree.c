@@ -252,6 +252,9 @@ void gltf_put_matrix(struct gltf *g, struct xml_element *el, const struct gltf_a
 
 void gltf_note(struct gltf *g, const char *text)
 {
+	for (uint32_t i = 0; i < g->tree->note_count; i++)
+		if (strcmp(g->tree->notes[i], text) == 0)
+			return;
 	if (!g->failed && g->tree->note_count < XML_NOTES_MAX)
 		g->tree->notes[g->tree->note_count++] = text;
 }

@@ -463,6 +463,24 @@ static void test_materials(void **state)
 	scene_fini(&s);
 }
 
+/* Nothing is left out in silence. */
+static void test_notes(void **state)
+{
+	(void)state;
+	gltf_files_make(&changed);
+	gltf_files_replace(&changed, "\"extensionsUsed\": [\"KHR_lights_punctual\"]",
+			   "\"extensionsUsed\": [\"KHR_lights_punctual\", \"ACME_fog\", \"ACME_wind\"]");
+	gltf_files_replace(&changed, "\"intensity\": ", "\"range\": 5, \"intensity\": ");
+	gltf_files_pack(&changed, GLTF_EXTERNAL);
+	struct scene s;
+	struct error e;
+	if (read_files(changed.list, false, &s, &e))
+		fail_msg("%s", e.text);
+	assert_true(has_note(&s, "what these extensions add is not read: ACME_fog, ACME_wind"));
+	assert_true(has_note(&s, "ranges of lights are ignored"));
+	scene_fini(&s);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -474,6 +492,7 @@ int main(void)
 		cmocka_unit_test(test_lights_and_cameras),
 		cmocka_unit_test(test_no_camera_no_light),
 		cmocka_unit_test(test_materials),
+		cmocka_unit_test(test_notes),
 	};
 	return cmocka_run_group_tests_name("gltf", tests, NULL, NULL);
 }
