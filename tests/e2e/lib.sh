@@ -28,7 +28,8 @@ finish() {
 			[ -s "$f" ] && echo "---- $(basename "$f")" && tail -n 15 "$f"
 		done
 	fi
-	[ -z "${HSLT_OWN_MOUNTS:-}" ] || umount "$DIR/spool" "$DIR/disk" 2>/dev/null || :
+	# Lazily: the process that renders ends a moment after its supervisor, and has the cache open until then.
+	[ -z "${HSLT_OWN_MOUNTS:-}" ] || umount -l "$DIR/spool" "$DIR/disk" 2>/dev/null || :
 	[ -z "${HSLT_KEEP:-}" ] || cp -r "$TOP" "$HSLT_KEEP"
 	rm -rf "$TOP"
 	exit $code
