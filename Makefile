@@ -121,7 +121,8 @@ LIMIT := $(BUILD)/tests/limit/limit
 $(LIMIT): tests/limit/limit.c
 	@mkdir -p $(@D)
 	$(CC) $(CPPFLAGS) $(filter-out -fsanitize% -fno-sanitize%,$(CFLAGS)) $< -o $@
-tests: $(TEST_BIN) $(LIMIT)
+# The sources of the fuzzers are compiled with every build of the tests; linked they are with clang only.
+tests: $(TEST_BIN) $(LIMIT) $(call obj,$(wildcard tests/fuzz/*.c))
 # Sanitized runs take 1/20 of the samples.
 test: programs tests $(BUILD)/load/load
 	$(if $(SAN),HSLT_TEST_SCALE=$${HSLT_TEST_SCALE:-20}) sh tests/run.sh $(BUILD)

@@ -25,8 +25,8 @@ static struct {
 
 static uint64_t stored(const struct server *s)
 {
-	uint64_t sum = s->ended_count;
-	for (const struct live_job *o = s->orders; o; o = o->next)
+	uint64_t sum = s->jobs.ended_count;
+	for (const struct live_job *o = s->jobs.orders; o; o = o->next)
 		sum += 1000003 + (o->journal ? journal_bytes(o->journal) : 0);
 	return sum;
 }
