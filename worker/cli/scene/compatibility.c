@@ -14,8 +14,8 @@ static const struct {
 } mitsuba[] = {
 	{PLUGIN_SHAPE, "bsplinecurve|deformable|ellipsoids|ellipsoidsmesh|hair|heightfield|linearcurve|sdfgrid"},
 	{PLUGIN_BSDF,
-	 "circular|coating|difftrans|hair|hk|irawan|measured|measured_polarized|mixturebsdf|polarizer|pplastic|"
-	 "principledthin|retarder|roughcoating|roughdiffuse|ward"},
+	 "circular|coating|hair|hk|irawan|measured|measured_polarized|polarizer|pplastic|principledthin|retarder|"
+	 "roughcoating"},
 	{PLUGIN_TEXTURE, "curvature|gridtexture|mesh_attribute|vertexcolors|volume|wireframe"},
 	{PLUGIN_EMITTER, "collimated|directionalarea|projector|timed_sunsky"},
 	{PLUGIN_SENSOR,

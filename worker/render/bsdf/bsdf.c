@@ -88,6 +88,8 @@ static spectrum halfvec_product(const struct bsdf *b, const struct bsdf_point *p
 	bool reflect = wo.z * wi.z > 0;
 	double eta = reflect ? 1 : wo.z > 0 ? bsdf_eta(b, p->w) : 1 / bsdf_eta(b, p->w), length;
 	vec3 h;
+	if (!reflect && eta == 1)
+		return f; /* d wi / d h is 1 / |wi.z| */
 	if (spectrum_is_zero(f) || !microfacet_half(wo, eta, wi, &h, &length))
 		return spectrum_of(0);
 	double ih = vec3_dot(wi, h), solid = reflect ? 2 * length : length * length / (eta * eta * fabs(ih));

@@ -97,6 +97,7 @@ double bsdf_eta(const struct bsdf *b, const struct wavelengths *w);
  * reflected), with wo held: the way a chain is followed from the camera. For microfacets this is
  * W G2 P22(h) |wo.h| / (|wo.z| |h.z|), W = F or (1-F) (n_wo/n_wi)^2, P22 the density of slopes; for others
  * f |wi.z| |h.z|^3 4 |wi.h| where reflected and f |wi.z| |h.z|^3 (wo.h + eta wi.h)^2 / (eta^2 |wi.h|) where refracted.
+ * Where light passes between equal indices the half vector is (wo + wi)_xy, and this is f.
  */
 spectrum bsdf_eval_halfvec(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi);
 

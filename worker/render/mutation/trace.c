@@ -48,6 +48,11 @@ static void turn(const struct path_vertex *from, const struct path_vertex *to, v
 /* Where light from o goes by the half vector h; eta = n_o / n_i. false: total reflection. */
 static bool follow(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
 {
+	if (transmit && eta == 1) { /* matched: h is (i + o)_xy */
+		double x = h.x - o.x, y = h.y - o.y, z2 = 1 - x * x - y * y;
+		*i = (vec3){x, y, copysign(sqrt(fmax(z2, 0)), -o.z)};
+		return z2 > 0;
+	}
 	vec3 n = vec3_scale(1 / sqrt(1 + vec2_dot(h, h)), (vec3){h.x, h.y, 1});
 	double c = vec3_dot(o, n);
 	if (!transmit) {
@@ -59,7 +64,7 @@ static bool follow(vec3 o, vec2 h, bool transmit, double eta, vec3 *i)
 		c = -c;
 	}
 	double k2 = 1 - eta * eta * (1 - c) * (1 + c);
-	if (!(k2 > 0) || eta == 1)
+	if (!(k2 > 0))
 		return false;
 	*i = vec3_madd(vec3_scale(-eta, o), eta * c - sqrt(k2), n);
 	return o.z * i->z < 0;

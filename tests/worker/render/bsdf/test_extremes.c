@@ -30,6 +30,10 @@ static const char *const extremes[] = {
 	"phong exponent=0",
 	"phong exponent=1e9 diffuse_reflectance=0 specular_reflectance=1",
 	"twosided | roughconductor material=Al alpha=",
+	"difftrans transmittance=1",
+	"ward variant=balanced alpha=",
+	"ward variant=ward alpha=",
+	"ward variant=ward-duer alpha=",
 };
 /* Where a text ends in "=", each of these follows. */
 static const double alphas[] = {0, 1e-5, 1e-3, 0.1, 1, 2};

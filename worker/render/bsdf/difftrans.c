@@ -1,0 +1,63 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A sheet that scatters light through to its other side, the same in all directions, and reflects none: paper, leaves
+ * (in a blend with `diffuse`). */
+#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/warp.h"
+
+struct difftrans {
+	struct texture transmittance;
+};
+
+static spectrum difftrans_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	const struct difftrans *d = b->data;
+	if (!(wo.z * wi.z < 0))
+		return spectrum_of(0);
+	return spectrum_scale(1 / WARP_PI, texture_eval(&d->transmittance, p->u, p->v, p->w));
+}
+
+static double difftrans_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	(void)b, (void)p;
+	return wo.z * wi.z < 0 ? fabs(wi.z) / WARP_PI : 0;
+}
+
+static bool difftrans_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			     struct bsdf_sample *out)
+{
+	vec3 wi = warp_cosine_hemisphere(u[0], u[1]);
+	if (wo.z > 0)
+		wi.z = -wi.z;
+	double pdf = difftrans_pdf(b, p, wo, wi);
+	if (!(pdf > 0))
+		return false;
+	*out = (struct bsdf_sample){
+		.wi = wi, .mode = BSDF_TRANSMIT, .pdf = pdf, .f = difftrans_eval(b, p, wo, wi), .eta = 1};
+	return true;
+}
+
+static int difftrans_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct difftrans *d = bsdf_data(b, n, build, sizeof *d, e);
+	if (!d)
+		return -ENOMEM;
+	int code = bsdf_texture(b, &d->transmittance, n, "transmittance", 0.5, build, e);
+	b->black = !code && texture_max(&d->transmittance) == 0;
+	b->modes = BSDF_TRANSMIT;
+	b->has_smooth = true;
+	b->two_sided = true;
+	b->alpha_mean = 1;
+	return code;
+}
+
+static const struct param difftrans_params[] = {{.name = "transmittance", .types = VALUE_TEXTURE, .max = 1},
+						{.name = NULL}};
+
+const struct bsdf_ops bsdf_ops_difftrans = {
+	.type = "difftrans",
+	.params = difftrans_params,
+	.create = difftrans_create,
+	.eval = difftrans_eval,
+	.pdf_solid = difftrans_pdf,
+	.sample = difftrans_sample,
+};
