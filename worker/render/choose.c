@@ -11,39 +11,38 @@
 #include <string.h>
 
 enum {
-	SAMPLES_LEAST =
-		1 << 14, /* of 8,192 the tail says too little: 2.0 to 2.5 in cornell-box, 1.5 to 2.3 in three-spheres */
+	SAMPLES_LEAST = 1 << 12,
+	SAMPLES_USUAL = 1 << 14, /* of fewer the tail says less: README of tests/bench, "What the pilot chooses" */
 	SAMPLES_MOST = 1 << 18,
-	SAMPLES_SHARE = 128, /* one of so many samples of the render, of each kind */
-	SHORTER = 4,   /* of bdpt, where only its cost is asked for, and at first where chains may be called for */
-	IN_PIXEL = 16, /* samples of one pixel */
-	DROPPED = 3,   /* largest terms */
+	SHARE_SHORT = 32,  /* one of so many samples of the render, of each kind, up to SAMPLES_USUAL */
+	SHARE_LONG = 128,  /* and beyond */
+	SHORTER = 4,	   /* of bdpt at first */
+	IN_PIXEL = 16,	   /* samples of one pixel */
+	DROPPED = 1 << 12, /* one of so many terms, the largest: of all of path's as of a quarter of bdpt's */
 	STREAM_MAP = 0,
 	STREAM_PATH,
 	STREAM_BDPT,
 	STREAM_PIXEL, /* steps of RNG_CHOICE */
 };
 
-/* Of the scenes of tests/bench/README.md: more in the four where chains win by factors (pane and frosted, eight seeds
- * each: 15 of 16 pilots of 8,192 samples, 16 of 16 of 16,384), 0.16 or less in all others but veach-door, where it is
- * 0.1 to 0.34. */
-static const double rare_share = 0.28;
-/* A quarter of bdpt's samples is enough where they say so much, and none of a mean: 30 of 44 pilots of frosted, water,
- * pane and window. In veach-door, the nearest of the others, 0.13 to 0.3 and a tail index of 1.25 to 1.73, 12 pilots.
- */
-static const double rare_clear = 0.4, tail_clear_most = 1;
-/* With 16,384 samples, five seeds each: the larger of both extremes is 0.67 to 0.79 in half-sunk, where chains are as
- * good as the others but for fireflies (four times better with them), and the smaller share of rare light 6 to 16 %. In
- * all other scenes that do not call for chains one of them is 1.03 or more but for one pilot of displaced: 0.82, with 3
- * % of the light rare. */
-static const double extreme_least = 0.85, extreme_share = 0.05;
-/* Light so rare that a pilot finds a few of its paths, by one of the two or the other: path sees what bdpt sees, but
- * for luck. In torus the larger of both shares is 0.16 to 0.57, six seeds, and bdpt's smaller index 0.47 to 0.87;
- * shares are 0.07 or less where bdpt is the best, but for veach-door: 0.26 to 0.54, and an index of 1.2 or more. */
-static const double rare_some = 0.12, heavy_least = 0.9;
-/* The same of path's tail: 2.1 to 2.8 in cornell-box and veach-mis and more in box, where path is the best by 1.2
- * to 1.4 x; 0.9 to 2.0 but for one of rough-caustic (2.3) in that, three-spheres, demo, displaced and veach-door, where
- * bdpt is, by up to 2.1 x (6 x with fireflies). */
+/* The figures below are of pilots of 16,384 samples, 40 in each scene of tests/bench/README.md. */
+
+/* Where path finds more, or its largest fall off as if there were no mean, chains may be called for. */
+static const double rare_hint = 0.03, tail_mean = 1;
+/* The larger share of the two, and the smaller of bdpt's two indices: 0.16 or more and 1.1 or less where chains win by
+ * factors; else shares of 0.12 or less, but for two of veach-mis, and for veach-door: 0.33 to 0.55, and an index of 1.1
+ * or more. */
+static const double rare_some = 0.12, heavy_most = 1.1;
+/* Of both, the mean share, the index of bdpt's extremes, and that of both together. 43 of 48 pilots of half-sunk say
+ * so, where chains are as good as the others but for fireflies (four times better with them); of the scenes where bdpt
+ * is the best one of 38 of ring, one of 46 of veach-mis, and none of five others. */
+static const double rare_both = 0.04, extreme_least = 0.85, extreme_both = 0.82;
+/* A quarter of bdpt's samples is enough where they find so much rare light, and none of a mean; or hardly any, and path
+ * little, of which the extremes are no heavier than that. */
+static const double rare_clear = 0.4, rare_none = 0.01;
+/* path's tail: 2.1 to 2.8 in cornell-box and veach-mis and more in box, where path is the best by 1.2 to 1.4 x; 0.9 to
+ * 2.1 in rough-caustic, three-spheres, demo, displaced and veach-door, where bdpt is, by up to 2.1 x (6 x with
+ * fireflies). */
 static const double tail_least = 2.1;
 /* From here on path's largest say that it has no fireflies: 4.0 to 4.6 in box, 2.2 to 2.8 in cornell-box and veach-mis.
  * Below, bdpt8 costs little more and bounds them: without the worst pixels 1.04 and 0.98 of path's relMSE times CPU
@@ -98,7 +97,8 @@ static struct render_found found(const struct tally *t)
 	if (!(t->energy > 0))
 		return f;
 	tail_settle(t->tail);
-	for (size_t i = 0; i < DROPPED && i < tail->held; i++)
+	size_t dropped = t->samples > DROPPED ? (size_t)t->samples / DROPPED : 1;
+	for (size_t i = 0; i < dropped && i < tail->held; i++)
 		square -= tail->y[i] * tail->y[i];
 	f.cost = fmax(square, 0) / t->samples * t->rays / t->samples;
 	f.tail = tail_index(tail, (size_t)t->samples / RENDER_TAIL);
@@ -112,16 +112,10 @@ static struct render_found found(const struct tally *t)
 
 /* ---- the choice */
 
-/* As far as one of the two says. No light: the bootstrap of chains looks for it much longer. */
-static bool wants_chains(const struct render_found *f)
-{
-	return !(f->cost > 0) || f->rare > rare_share || (f->rare > extreme_share && f->extreme < extreme_least);
-}
-
-/* Of what path says, as far as it says anything: some light may be for chains alone. */
+/* By what path says, as far as it says anything: some light may be for chains alone. */
 static bool is_doubtful(const struct render_choice *c)
 {
-	return c->misses || wants_chains(&c->path) || c->path.rare > rare_some;
+	return c->misses || !(c->path.cost > 0) || c->path.rare > rare_hint || c->path.tail < tail_mean;
 }
 
 bool render_choice_is_settled(const struct render_choice *c)
@@ -129,20 +123,33 @@ bool render_choice_is_settled(const struct render_choice *c)
 	return !is_doubtful(c) && c->path.tail < tail_least;
 }
 
-/* Both find light that is rare; or one does, and bdpt's largest fall off as if there were much more of it. */
-static bool both_want_chains(const struct render_choice *c)
+/* What path misses it says nothing of. */
+static bool wants_chains(const struct render_choice *c)
 {
-	double rare = fmax(c->misses ? 0 : c->path.rare, c->bdpt.rare);
-	if (wants_chains(&c->bdpt) && (c->misses || wants_chains(&c->path)))
+	const struct render_found *b = &c->bdpt, *p = c->misses ? b : &c->path;
+	if (!(p->cost > 0) && !(b->cost > 0))
+		return true; /* no light: the bootstrap of chains looks for it much longer */
+	if (fmax(p->rare, b->rare) > rare_some && fmin(b->tail, b->extreme) < heavy_most)
 		return true;
-	return rare > rare_some && fmin(c->bdpt.tail, c->bdpt.extreme) < heavy_least;
+	return 0.5 * (p->rare + b->rare) > rare_both && b->extreme < extreme_least &&
+	       2 / (1 / p->extreme + 1 / b->extreme) < extreme_both;
+}
+
+/* More of bdpt's samples would hardly say anything else. */
+static bool is_clear(const struct render_choice *c)
+{
+	const struct render_found *b = &c->bdpt, *p = &c->path;
+	if (b->rare > rare_clear && b->tail < tail_mean)
+		return true;
+	return !c->misses && p->cost > 0 && b->cost > 0 && b->rare <= rare_none && p->rare <= rare_some &&
+	       p->extreme >= extreme_least;
 }
 
 const char *render_choice_of(const struct render_choice *c)
 {
 	if (render_choice_is_settled(c))
 		return "bdpt";
-	if (both_want_chains(c))
+	if (wants_chains(c))
 		return "hslt";
 	bool path =
 		!c->misses && c->path.cost > 0 && c->path.tail >= tail_least && c->path.cost < path_cost * c->bdpt.cost;
@@ -264,8 +271,7 @@ static void look_at_bdpt(struct pilot *p, struct render_choice *out)
 	uint64_t few = p->samples / SHORTER;
 	out->bdpt = look_on(p, STREAM_BDPT, 0, few, path_trace_both_ways, &t);
 	out->samples += few;
-	bool only_cost = !is_doubtful(out) && !(out->bdpt.rare > rare_some);
-	if (only_cost || (out->bdpt.rare > rare_clear && out->bdpt.tail < tail_clear_most))
+	if (is_clear(out))
 		return;
 	out->bdpt = look_on(p, STREAM_BDPT, few, p->samples, path_trace_both_ways, &t);
 	out->samples += p->samples - few;
@@ -279,7 +285,8 @@ static uint64_t pilot_samples(const struct plan_request *r, uint64_t pixels)
 		total = r->spp * pixels;
 	if (r->mutations && r->mutations < total)
 		total = r->mutations;
-	while (n < SAMPLES_MOST && (double)n * M_SQRT2 < (double)(total / SAMPLES_SHARE))
+	double share = fmax(fmin((double)(total / SHARE_SHORT), SAMPLES_USUAL), (double)(total / SHARE_LONG));
+	while (n < SAMPLES_MOST && (double)n * M_SQRT2 < share)
 		n *= 2;
 	return n;
 }

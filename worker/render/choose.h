@@ -7,13 +7,12 @@
  * The pilot draws samples of `path`, and of `bdpt` where those leave the choice open, and looks at what each brings
  * relative to the brightness of its place: how much light comes in rare contributions of many times that brightness,
  * and how fast the frequency of the largest falls with their size (their tail index, by Hill's estimator). Chains are
- * called for where both integrators find much of the light in rare contributions (caustics through water, panes,
- * frosted glass), or some of it while the largest fall off so slowly that more samples keep on finding larger ones:
- * below a tail index of 1 not even a mean exists; or where one of them happens to find a good share of rare light, and
- * bdpt's largest fall off as slowly. Else it is `path` or `bdpt8` where path's tail is that of a finite
- * variance (2 or more) and its second moment times rays is the smaller one: `path` where the tail is so short that it
- * has no fireflies, else `bdpt8`, whose light sub-paths, one in eight samples, bound them. `bdpt` in all other cases,
- * because the fireflies that a pilot does not see decide the error of a long render.
+ * called for where either finds a good share of rare light and bdpt's largest fall off so slowly that more samples keep
+ * on finding larger ones, below a tail index of about 1 not even a mean exists: caustics through water, panes, frosted
+ * glass; or where both find some, and the largest of both fall off slower still. Else it is `path` or `bdpt8` where
+ * path's tail is that of a finite variance (2 or more) and its second moment times rays is the smaller one: `path`
+ * where the tail is so short that it has no fireflies, else `bdpt8`, whose light sub-paths, one in eight samples, bound
+ * them. `bdpt` in all other cases, because the fireflies that a pilot does not see decide the error of a long render.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H
@@ -35,8 +34,8 @@ struct render_choice {
 	struct render_found path, bdpt;
 	bool misses;	  /* path finds less than there is: light of a point or a direction through a specular lobe */
 	bool settled;	  /* path alone left no choice: nothing is known of bdpt */
-	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough; at most 1 in 30 of the
-			     render's, or 3 times 16,384 where that is more */
+	uint64_t samples; /* of the pilot, all kinds, of bdpt a quarter where that is enough: at most about 1 in 7 of
+			     a short render's, or 3 times 4,096; 1 in 30 of a long one's */
 };
 
 /* Sets integrator, kind and mixture of the request, all else of which stands. Ticks. -ENOMEM, -EINVAL */

@@ -31,11 +31,13 @@ static void choose(const struct world *w, uint64_t seed, uint64_t spp, struct pl
 		fail_msg("%s", e.text);
 }
 
+enum { SPP = 40 }; /* the pilot's usual length, from 30 on at 160x90 */
+
 static bool chooses_chains(struct world *w, uint64_t seed)
 {
 	struct plan_request r;
 	struct render_choice c;
-	choose(w, seed, 16, &r, &c);
+	choose(w, seed, SPP, &r, &c);
 	const struct render_integrator *i = render_integrator_find(r.integrator);
 	assert_non_null(i);
 	assert_int_equal(r.kind, i->kind);
@@ -109,7 +111,7 @@ static void light_through_water_needs_chains(void **state)
 	for (uint64_t seed = 0; seed < SEEDS; seed++) {
 		struct plan_request r;
 		struct render_choice c;
-		choose(w, seed, 16, &r, &c);
+		choose(w, seed, SPP, &r, &c);
 		assert_string_equal(r.integrator, "hslt");
 		assert_true(*r.mixture != 0);
 		early += c.samples == (2 << 14) + (1 << 12);
@@ -199,13 +201,19 @@ static void the_rule(void **state)
 		{{{1, 0, 4, 4}, {2, 0.9, 0.5, 0.5}, false, false, 0}, "hslt", false}, /* what bdpt finds path would */
 		{{{1, 0.2, 3.5, 1.5}, {5, 0.04, 2, 0.6}, false, false, 0}, "hslt", false}, /* by luck one of them */
 		{{{1, 0.2, 3.5, 1.5}, {5, 0.04, 2, 1.2}, false, false, 0}, "bdpt8", false},
-		{{{1, 0.5, 1.1, 1.1}, {2, 0.25, 1.4, 1.8}, false, false, 0}, "bdpt", false}, /* rare to path alone */
+		{{{1, 0.5, 1.1, 1.1}, {2, 0.25, 1.4, 1.8}, false, false, 0}, "bdpt", false},   /* rare to path alone */
+		{{{1, 0.35, 1.4, 1.7}, {5, 0.3, 1.24, 1.95}, false, false, 0}, "bdpt", false}, /* but it has a mean */
 		{{{1, 0.5, 0.5, 3}, {2, 0.5, 0.5, 3}, false, false, 0}, "hslt", false},
-		{{{1, 0.1, 1.5, 0.7}, {2, 0.1, 1.5, 0.7}, false, false, 0}, "hslt", false}, /* no mean exists */
+		{{{1, 0, 0.5, 0.6}, {2, 0.9, 0.3, 0.4}, false, false, 0}, "hslt", false},	/* path says: no mean */
+		{{{1, 0.07, 1.6, 1.7}, {600, 0.5, 1.2, 0.75}, false, false, 0}, "hslt", false}, /* path says: some */
+		{{{1, 0.1, 1.5, 0.7}, {2, 0.1, 1.5, 0.7}, false, false, 0}, "hslt", false},	/* no mean exists */
 		{{{1, 0.1, 1.5, 0.7}, {2, 0.1, 1.5, 1.2}, false, false, 0},
 		 "bdpt",
 		 false}, /* for one of them it does */
-		{{{1, 0.1, 1.5, 0.7}, {2, 0.01, 1.5, 0.7}, false, false, 0},
+		{{{1, 0.1, 1.5, 0.5}, {2, 0.1, 1.5, 1.0}, false, false, 0},
+		 "bdpt",
+		 false}, /* however heavy the other */
+		{{{1, 0.06, 1.5, 0.7}, {2, 0.01, 1.5, 0.7}, false, false, 0},
 		 "bdpt",
 		 false}, /* and it is nearly all there */
 		{{{0, 0, 1, 1}, {0, 0, 1, 1}, false, false, 0}, "hslt", false},
@@ -229,27 +237,29 @@ static void what_is_settled_is_the_same_with_bdpt(void **state)
 	(void)state;
 	static const double costs[] = {0, 1, 1000}, shares[] = {0, 0.1, 0.9}, tails[] = {0.3, 1.5, 4};
 	for (int i = 0; i < 81; i++) {
-		struct render_choice c = {.path = {1, 0.1, 1.9, 0.9},
+		struct render_choice c = {.path = {1, 0.02, 1.9, 0.9},
 					  .bdpt = {costs[i % 3], shares[i / 3 % 3], tails[i / 9 % 3], tails[i / 27]}};
 		assert_true(render_choice_is_settled(&c));
 		assert_string_equal(render_choice_of(&c), "bdpt");
 	}
 }
 
-/* A share of the render, whatever its length; no less than shows a tail. */
+/* A share of the render, whatever its length; no less than says anything of a tail. */
 static void the_pilot_is_a_small_part_of_the_render(void **state)
 {
 	(void)state;
 	struct world *w = world_of_own_scene("box", "box.xml", 60, 50);
-	static const uint64_t spp[] = {1, 700, 3000};
-	for (size_t i = 0; i < sizeof spp / sizeof *spp; i++) {
+	static const struct {
+		uint64_t spp, least; /* samples of one kind */
+	} of[] = {{1, 1 << 12}, {50, 1 << 12}, {100, 1 << 13}, {200, 1 << 14}, {500, 1 << 14}, {3000, 1 << 16}};
+	for (size_t i = 0; i < sizeof of / sizeof *of; i++) {
 		struct plan_request r;
 		struct render_choice c;
-		choose(w, 3, spp[i], &r, &c);
-		double all = 62.0 * 52.0 * (double)spp[i];
-		assert_in_range(c.samples, 2 << 14, (uint64_t)fmax(3 << 14, all / 30));
-		if (spp[i] > 700)
-			assert_true((double)c.samples > all / 100);
+		choose(w, 3, of[i].spp, &r, &c);
+		double all = 62.0 * 52.0 * (double)of[i].spp;
+		assert_in_range(c.samples, 2 * of[i].least, 3 * of[i].least);
+		if (of[i].spp > 1)
+			assert_true((double)of[i].least < all / 22); /* of a thirty-second the nearest power */
 	}
 	world_free(w);
 }
