@@ -27,7 +27,7 @@ int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, 
 }
 
 /* eta^2 (1 - rho' (1 - E)) = eta^2 (1 - rho') + rho' E eta^2. */
-spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double transmitted_o,
+spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double escape, double transmitted_o,
 			 double transmitted_i)
 {
 	spectrum rho = texture_eval(&c->diffuse, p->u, p->v, p->w);
@@ -36,7 +36,7 @@ spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, do
 		return spectrum_of(0);
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double again = c->nonlinear ? rho.v[i] : 1;
-		rho.v[i] *= common / (c->eta * c->eta * (1 - again) + again * c->escape);
+		rho.v[i] *= common / (c->eta * c->eta * (1 - again) + again * escape);
 	}
 	return rho;
 }

@@ -22,12 +22,11 @@
 struct coating {
 	struct texture diffuse, specular;
 	double eta;		/* index of the coating over the one outside */
-	double escape;		/* E eta^2 */
 	double specular_weight; /* share of the specular reflectance, for the choice of a lobe */
 	bool nonlinear;
 };
 
-/* Reads the parameters and enters them into b; `escape` is left to the caller. */
+/* Reads the parameters and enters them into b. */
 int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
 		 struct error *e);
 #define COATING_PARAMS                                                                        \
@@ -38,8 +37,8 @@ int coating_read(struct coating *c, struct bsdf *b, const struct scene_node *n, 
 		.name = "nonlinear", .types = VALUE_BOOL                                      \
 	}
 
-/* f_diffuse, with the two transmittances. */
-spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double transmitted_o,
+/* f_diffuse; escape: E eta^2. */
+spectrum coating_diffuse(const struct coating *c, const struct bsdf_point *p, double escape, double transmitted_o,
 			 double transmitted_i);
 
 /* The probability of sampling the specular lobe where the boundary reflects the share `reflected` of wo's light. */

@@ -7,6 +7,11 @@
 
 #include <float.h>
 
+struct plastic {
+	struct coating coating; /* first: most functions need no more */
+	double escape;		/* coating_diffuse */
+};
+
 static struct fresnel fresnel_at(const struct coating *c, vec3 w)
 {
 	return fresnel_dielectric(fmin(w.z, 1), c->eta);
@@ -14,10 +19,11 @@ static struct fresnel fresnel_at(const struct coating *c, vec3 w)
 
 static spectrum plastic_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
 {
-	const struct coating *c = b->data;
+	const struct plastic *s = b->data;
+	const struct coating *c = &s->coating;
 	if (!(wo.z > 0 && wi.z > 0))
 		return spectrum_of(0);
-	return coating_diffuse(c, p, fresnel_at(c, wo).transmitted, fresnel_at(c, wi).transmitted);
+	return coating_diffuse(c, p, s->escape, fresnel_at(c, wo).transmitted, fresnel_at(c, wi).transmitted);
 }
 
 static double plastic_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
@@ -73,13 +79,13 @@ static double let_in(double eta)
 
 static int plastic_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
 {
-	struct coating *c = bsdf_data(b, n, build, sizeof *c, e);
-	if (!c)
+	struct plastic *s = bsdf_data(b, n, build, sizeof *s, e);
+	if (!s)
 		return -ENOMEM;
-	int code = coating_read(c, b, n, build, e);
+	int code = coating_read(&s->coating, b, n, build, e);
 	if (code)
 		return code;
-	c->escape = let_in(c->eta);
+	s->escape = let_in(s->coating.eta);
 	b->modes |= BSDF_DELTA;
 	b->has_delta = true;
 	b->alpha_mean = 1;

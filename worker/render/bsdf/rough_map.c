@@ -36,6 +36,7 @@ static void find_least(struct rough_map *r)
 		struct microfacet m = rough_map_look_up(r, &at);
 		if (microfacet_least(&m) < microfacet_least(&least))
 			least = m;
+		r->most = fmax(r->most, m.alpha);
 	}
 	r->fixed = least;
 }

@@ -8,6 +8,7 @@
 
 struct rough_map {
 	struct microfacet fixed; /* where it varies: of the least roughness, found on a grid; step sizes go by it */
+	double most;		 /* where it varies: the largest alpha_u found there */
 	bool varies;
 	struct texture u, v; /* where it varies */
 };

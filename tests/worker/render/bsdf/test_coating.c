@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: Apache-2.0 */
-/* plastic, roughplastic and thindielectric against what their formulas stand for. */
+/* plastic, roughplastic, coating, roughcoating and thindielectric against what their formulas stand for. */
 #include "tests/worker/render/bsdf/bsdf_cases.h"
 #include "worker/render/bsdf/fresnel.h"
 #include "worker/render/bsdf/microfacet.h"
@@ -151,6 +151,116 @@ static void test_a_sheet_is_a_series(void **state)
 	arena_fini(&a);
 }
 
+/* A layer of the same index as what is outside is not there; one that absorbs takes what Beer's law says. */
+static void test_a_layer_without_boundary(void **state)
+{
+	(void)state;
+	static const char *const bare[] = {"roughconductor alpha=0.3 material=Au", "phong", "plastic"};
+	const vec3 wo = direction(0.8), wi = {-0.2, 0.4, sqrt(0.8)};
+	for (size_t k = 0; k < sizeof bare / sizeof *bare; k++) {
+		struct arena a = {0};
+		struct bsdf inner, coat, dark;
+		char text[128];
+		bsdf_make(&a, bare[k], &inner);
+		snprintf(text, sizeof text, "coating int_ior=1.3 ext_ior=1.3 | %s", bare[k]);
+		bsdf_make(&a, text, &coat);
+		snprintf(text, sizeof text, "coating int_ior=1.3 ext_ior=1.3 sigma_a=0.2 thickness=3 | %s", bare[k]);
+		bsdf_make(&a, text, &dark);
+		double f = inner.ops->eval(&inner, &point, wo, wi).v[1], beer = exp(-0.6 * (1 / wo.z + 1 / wi.z));
+		assert_true(fabs(coat.ops->eval(&coat, &point, wo, wi).v[1] / f - 1) < 1e-13);
+		assert_true(fabs(dark.ops->eval(&dark, &point, wo, wi).v[1] / (beer * f) - 1) < 1e-6);
+		assert_true(
+			fabs(coat.ops->pdf_solid(&coat, &point, wo, wi) / inner.ops->pdf_solid(&inner, &point, wo, wi) -
+			     1) < 1e-13);
+		arena_fini(&a);
+	}
+}
+
+/* One bounce of a diffuse base, by refraction worked out here; and the mirrors of layer and metal as one lobe. */
+static void test_a_layer_is_what_goes_in_and_out(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf coat, metal, coated;
+	const double eta = 1.6;
+	bsdf_make(&a, "coating int_ior=1.6 ext_ior=1 | diffuse reflectance=0.7", &coat);
+	bsdf_make(&a, "conductor material=Al", &metal);
+	bsdf_make(&a, "coating int_ior=1.6 ext_ior=1 specular_reflectance=0.5 sigma_a=0.1 | conductor material=Al",
+		  &coated);
+	for (double z = 0.1; z < 1; z += 0.2) {
+		vec3 wo = direction(z), wi = {-0.3, 0.5, sqrt(1 - 0.09 - 0.25)}, out;
+		double to = fresnel_dielectric(z, eta).transmitted, ti = fresnel_dielectric(wi.z, eta).transmitted, one;
+		double want = to * ti / (eta * eta) * 0.7 / PI;
+		assert_true(fabs(coat.ops->eval(&coat, &point, wo, wi).v[0] / want - 1) < 1e-12);
+		double inside = sqrt(1 - (1 - z * z) / (eta * eta));
+		double mirror = bsdf_eval_delta(&metal, &point, direction(inside), BSDF_REFLECT, &out, &one).v[0];
+		want = 0.5 * (1 - to) + to * to * mirror * exp(-0.1 * 2 / inside);
+		double got = bsdf_eval_delta(&coated, &point, wo, BSDF_REFLECT, &out, &one).v[0];
+		if (fabs(got / want - 1) > 1e-6 || fabs(out.x + wo.x) > 0 || fabs(one - 1) > 1e-12)
+			fail_msg("from z = %g: %.12g is not %.12g, chance %g", z, got, want, one);
+	}
+	arena_fini(&a);
+}
+
+/* A roughness from a texture is that of a number, at the place where the texture says it: here that of
+ * an end of the table. */
+static void test_textured_coatings(void **state)
+{
+	(void)state;
+	static const char *const kind[] = {"roughplastic diffuse_reflectance=0.9 int_ior=1.8 | ",
+					   "roughcoating int_ior=1.8 | diffuse reflectance=0.9 | "};
+	static const double rough[] = {0.05, 0.6};
+	const vec3 wo = direction(0.3), wi = {-0.3, 0.5, sqrt(1 - 0.09 - 0.25)};
+	for (int k = 0; k < 2; k++)
+		for (int place = 0; place < 2; place++) {
+			struct arena a = {0};
+			struct bsdf map, number;
+			struct bsdf_point p = point;
+			char text[192];
+			snprintf(text, sizeof text, "%s@alpha checkerboard color0=0.05 color1=0.6", kind[k]);
+			bsdf_make(&a, text, &map);
+			snprintf(text, sizeof text, "%s@alpha checkerboard color0=%g color1=%g", kind[k], rough[place],
+				 rough[place]);
+			bsdf_make(&a, text, &number);
+			p.u = place ? 0.75 : 0.25; /* color1 where u and v differ in their halves */
+			p.v = 0.25;
+			assert_true(map.textured && map.alpha == 0.05);
+			double m = map.ops->eval(&map, &p, wo, wi).v[0], n = number.ops->eval(&number, &p, wo, wi).v[0];
+			if (fabs(m / n - 1) > 1e-9)
+				fail_msg("%s at %d: %.12g is not %.12g", kind[k], place, m, n);
+			arena_fini(&a);
+		}
+}
+
+/* A layer over something with two sides has two sides. */
+static void test_a_layer_on_both_sides(void **state)
+{
+	(void)state;
+	struct arena a = {0};
+	struct bsdf b;
+	struct error e;
+	struct scene_node *n = node_make(&a, PLUGIN_BSDF, "roughcoating alpha=0.2"),
+			  *both = node_make(&a, PLUGIN_BSDF, "twosided");
+	const struct bsdf_build build = {.arena = &a, .dialect_3 = true};
+	node_add_child(&a, both, node_make(&a, PLUGIN_BSDF, "plastic"));
+	node_add_child(&a, n, both);
+	assert_int_equal(bsdf_create(&b, n, &build, &e), 0);
+	const vec3 wo = direction(0.6), wi = {-0.3, 0.5, sqrt(1 - 0.09 - 0.25)};
+	const vec3 under_o = {wo.x, wo.y, -wo.z}, under_i = {wi.x, wi.y, -wi.z};
+	assert_true(b.two_sided && b.ops->eval(&b, &point, wo, wi).v[0] > 0);
+	assert_true(fabs(b.ops->eval(&b, &point, under_o, under_i).v[0] / b.ops->eval(&b, &point, wo, wi).v[0] - 1) <
+		    1e-13);
+	assert_true(b.ops->eval(&b, &point, wo, under_i).v[0] == 0);
+	for (int i = 0; i < 100; i++) {
+		struct bsdf_sample s;
+		const double u[3] = {(i + 0.5) / 100, fmod(i * 0.618, 1), fmod(i * 0.414, 1)};
+		if (b.ops->sample(&b, &point, under_o, u, &s))
+			assert_true(s.wi.z < 0 &&
+				    ((s.mode & BSDF_DELTA) || s.pdf == b.ops->pdf_solid(&b, &point, under_o, s.wi)));
+	}
+	arena_fini(&a);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
@@ -160,6 +270,10 @@ int main(void)
 		cmocka_unit_test(test_rough_and_smooth_coatings_meet),
 		cmocka_unit_test(test_the_coating_is_a_dielectric),
 		cmocka_unit_test(test_a_sheet_is_a_series),
+		cmocka_unit_test(test_a_layer_without_boundary),
+		cmocka_unit_test(test_a_layer_is_what_goes_in_and_out),
+		cmocka_unit_test(test_textured_coatings),
+		cmocka_unit_test(test_a_layer_on_both_sides),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }
