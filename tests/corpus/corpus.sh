@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 # Tries every scene file under a folder: `sh corpus.sh HSLT-SCENE FOLDER [OPTION...]` (make corpus DIR=FOLDER). Options go to
-# hslt-scene check: --lenient. XML without a <scene>, and those that others include, are no scenes. Prints how many load, what
-# refuses the others first, and how often. Exit code 1 when one crashed or took more than LIMIT (60) seconds.
+# hslt-scene check: --lenient, --path. XML without a <scene>, without a sensor of its own or included, and those that others include, are no
+# scenes. Prints how many load, what refuses the others first, and how often; with ALL=1 every reason, and in how many scenes it
+# occurs. Exit code 1 when one crashed or took more than LIMIT (60) seconds.
 set -u
 scene=$1 folder=$2
 shift 2
@@ -9,18 +10,30 @@ shift 2
 work=$(mktemp -d) && trap 'rm -rf "$work"' EXIT
 find "$folder" -type f \( -name "*.xml" -o -name "*.gltf" -o -name "*.glb" \) | sort >"$work/all"
 : >"$work/reasons" && : >"$work/bad"
+# What others include. Names are relative to the scene's folder, which may be the one above that of an included file; $NAME is any.
+while IFS= read -r file; do
+	here=${file%/*}
+	sed -n 's/.*<include[^>]*filename="\([^"]*\)".*/\1/p' "$file" | sed 's/\$[A-Za-z_0-9]*/*/g' |
+		while IFS= read -r name; do
+			find "$here" "${here%/*}" -path "$here/$name" -o -path "${here%/*}/$name"
+		done
+done <"$work/all" | sort -u >"$work/included"
+# The first complaints without their places, numbers and the list of what is supported.
+reasons() {
+	grep -v -e '^note: ' -e ' problems\{0,1\}, ' "$1" |
+		sed 's/^hslt-scene: //; s/^[^ ]*:[0-9]*: //; s/ (supported: .*//; s/; supported: .*//; s/"[^"]*\.[a-zA-Z]*"/FILE/g; s/[-+]*[0-9.][0-9.e+-]*/N/g' |
+		cut -c1-110
+}
 loaded=0 tried=0
 while IFS= read -r file; do
-	case $file in *.xml) grep -q '<scene' "$file" && grep -q '<\(sensor\|camera\)' "$file" || continue ;; esac
+	case $file in *.xml) grep -q '<scene' "$file" && grep -q '<\(sensor\|camera\|include\)' "$file" || continue ;; esac
+	grep -qxF "$file" "$work/included" && continue
 	tried=$((tried + 1))
 	timeout "${LIMIT:-60}" "$scene" check "$@" "$file" >"$work/out" 2>&1
 	rc=$?
 	case $rc in
 	0) loaded=$((loaded + 1)) ;;
-	1) # The first complaint without its place, numbers and the list of what is supported.
-		grep -v '^note: ' "$work/out" | head -n 1 |
-			sed 's/^hslt-scene: //; s/^[^ ]*:[0-9]*: //; s/ (supported: .*//; s/; supported: .*//; s/"[^"]*\.[a-zA-Z]*"/FILE/g; s/[-+]*[0-9.][0-9.e+-]*/N/g' |
-			cut -c1-110 >>"$work/reasons" ;;
+	1) if [ -n "${ALL:-}" ]; then reasons "$work/out" | sort -u; else reasons "$work/out" | head -n 1; fi >>"$work/reasons" ;;
 	*) echo "$file: exit code $rc" >>"$work/bad" ;;
 	esac
 done <"$work/all"

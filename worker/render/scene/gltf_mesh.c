@@ -126,7 +126,7 @@ static void put_attributes(struct primitive *p, const json_t *primitive, const j
 	if (gltf_follow(g, p->mesh, attributes, "TEXCOORD_0", GLTF_ACCESSORS, &a) > 0)
 		put_accessor(p, &a, "texcoord", "VEC2", 2);
 	if (json_object_get(attributes, "COLOR_0"))
-		gltf_put_text(g, p->shape, p->mesh, "vertex_colors", "COLOR_0"); /* no parameter: not supported */
+		gltf_put_text(g, p->shape, p->mesh, "vertex_colors", "COLOR_0"); /* refused by the shape */
 	if (gltf_follow(g, p->mesh, primitive, "indices", GLTF_ACCESSORS, &a) > 0)
 		put_accessor(p, &a, "index", "SCALAR", 1);
 }

@@ -41,6 +41,9 @@ enum lenient_way lenient_plugin(enum plugin_class cls, const char *type, const c
 	case PLUGIN_RFILTER:
 		*stand_in = "gaussian"; /* filters with negative lobes are sharper */
 		return LENIENT_REPLACE;
+	case PLUGIN_FILM:
+		*stand_in = "hdrfilm"; /* of the same size, filter and crop window; what else it keeps is left out */
+		return LENIENT_REPLACE;
 	case PLUGIN_SHAPE:
 	case PLUGIN_EMITTER:
 	case PLUGIN_TEXTURE:

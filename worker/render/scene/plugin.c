@@ -2,6 +2,7 @@
 #include "worker/render/scene/plugin.h"
 
 #include <string.h>
+#include <strings.h>
 
 static const char *const class_names[PLUGIN_CLASSES] = {
 	[PLUGIN_SHAPE] = "shape",     [PLUGIN_BSDF] = "bsdf",	    [PLUGIN_TEXTURE] = "texture",
@@ -43,7 +44,8 @@ const struct plugin_decl *plugin_find(const struct plugin_decl *decls, enum plug
 	for (const struct plugin_decl *d = decls; d->type; d++) {
 		if (d->cls != cls)
 			continue;
-		if (strcmp(d->type, type) == 0)
+		if (strcasecmp(d->type, type) ==
+		    0) /* Mitsuba looks for a file of this name: "Sphere" on Windows, too */
 			return d;
 		if (is_any(d->type))
 			any = d;

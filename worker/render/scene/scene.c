@@ -4,6 +4,7 @@
 #include "worker/render/scene/gltf.h"
 #include "worker/render/scene/id_table.h"
 #include "worker/render/scene/lenient.h"
+#include "worker/render/scene/param_check.h"
 #include "worker/render/scene/plugin.h"
 #include "worker/render/scene/remarks.h"
 #include "worker/render/scene/report.h"
@@ -15,6 +16,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <strings.h>
 
 /* Reads one scene; all pointers lead into the scene's arena. */
 struct maker {
@@ -130,61 +132,10 @@ static int refuse_property(const struct draft *d, const struct xml_element *el, 
 			 list);
 }
 
-static int refuse_choice(const struct xml_element *el, const struct param *p, const char *given, struct error *e)
-{
-	char one[64], names[16][64], hint[128], list[512] = "";
-	struct spelling s = {.wanted = given};
-	size_t n = 0;
-	for (const char *rest = p->choices; n < 16 && (rest = value_next_name(rest, one, sizeof one)); n++) {
-		memcpy(names[n], one, sizeof one);
-		spelling_offer(&s, names[n]);
-	}
-	for (const char *rest = p->choices; (rest = value_next_name(rest, one, sizeof one));)
-		spelling_list(list, sizeof list, one);
-	return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not supported%s (supported: %s)", p->name, given,
-			 spelling_hint(&s, hint, sizeof hint), list);
-}
-
-static int check_range(const struct xml_element *el, const struct param *p, const struct value *v, struct error *e)
-{
-	double scratch[3];
-	uint32_t count;
-	const double *x = value_numbers(v, scratch, &count);
-	for (uint32_t i = 0; i < count; i++)
-		if (!(x[i] >= p->min && x[i] <= p->max))
-			return xml_error(el, e, ERANGE, "%s=%g is outside [%g, %g]", p->name, x[i], p->min, p->max);
-	return 0;
-}
-
-static int check_value(const struct xml_element *el, const struct param *p, struct value *v, struct error *e)
-{
-	int r;
-	if (v->type == VALUE_INT && !(p->types & VALUE_INT) && (p->types & VALUE_FLOAT)) {
-		double x = (double)v->as.integer;
-		v->type = VALUE_FLOAT;
-		v->as.number = x;
-	}
-	if (!(v->type & p->types)) {
-		char list[256];
-		value_type_names(p->types, list, sizeof list);
-		return xml_error(el, e, EINVAL, "`%s` cannot be given like this (supported: %s)", p->name, list);
-	}
-	if (p->min < p->max && (r = check_range(el, p, v, e)))
-		return r;
-	if (v->type == VALUE_STRING && p->choices) {
-		char one[64];
-		for (const char *rest = p->choices; (rest = value_next_name(rest, one, sizeof one));)
-			if (strcmp(one, v->as.string) == 0)
-				return 0;
-		return refuse_choice(el, p, v->as.string, e);
-	}
-	return 0;
-}
-
 static int add_property(struct draft *d, const struct xml_element *el, const struct param *p, struct value v,
 			struct error *e)
 {
-	int r = check_value(el, p, &v, e);
+	int r = param_check(el, p, &v, e);
 	if (r)
 		return r;
 	const struct property *before = node_find(d->node, p->name);
@@ -192,6 +143,31 @@ static int add_property(struct draft *d, const struct xml_element *el, const str
 		return xml_error(el, e, EINVAL, "`%s` is given twice (first in line %d)", p->name, before->line);
 	d->properties[d->node->property_count++] = (struct property){p->name, el->line, v};
 	return 0;
+}
+
+/* Forks add parameters of their own. A name that is like none of the table, and that no other plug-in of the class has,
+ * is one of them; others are mistakes. Materials and textures have no place for either: what they set is to be seen. */
+static bool is_foreign_parameter(const struct maker *m, const struct draft *d, const struct xml_element *el,
+				 const char *name)
+{
+	enum plugin_class cls = d->node->cls;
+	struct spelling s = {.wanted = name};
+	if (!value_is_element(el->name) ||
+	    (cls != PLUGIN_SENSOR && cls != PLUGIN_FILM && cls != PLUGIN_SHAPE && cls != PLUGIN_EMITTER))
+		return false;
+	plugin_offer_params(d->decl, &s);
+	for (const struct plugin_decl *other = m->decls; other->type && !s.best; other++)
+		if (other->cls == cls && plugin_param(other, name))
+			return false;
+	return !s.best;
+}
+
+static int note_foreign_parameter(struct maker *m, const struct xml_element *owner, const struct xml_element *el,
+				  const char *name)
+{
+	const char *type = xml_attribute(owner, "type");
+	return note(m, owner, type, name, "%s:%d: <%.64s type=\"%.64s\">: `%.64s` is not known and is ignored",
+		    el->file, el->line, owner->name, type, name);
 }
 
 /* What the table says of a name: *p understood, or NULL with the matter settled (ignored, or an error). */
@@ -204,6 +180,8 @@ static int look_up(struct maker *m, const struct draft *d, const struct xml_elem
 		*p = found && found->status == PARAM_UNDERSTOOD ? found : NULL;
 		return 0;
 	}
+	if (!found && is_foreign_parameter(m, d, el, name))
+		return note_foreign_parameter(m, owner, el, name);
 	if ((!found || found->status == PARAM_REFUSED) && m->lenient)
 		return leave_out(m, el, xml_attribute(owner, "type"), name, "the parameter");
 	if (!found || found->status == PARAM_REFUSED)
@@ -443,6 +421,8 @@ static int make_node(struct maker *m, struct xml_element *el, const struct scene
 		return r;
 	if (!decl) /* *out does */
 		return el->node = *out, 0;
+	if (strcasecmp(type, decl->type) == 0)
+		type = decl->type;
 	if (decl->status == PARAM_IGNORED && (r = note_ignored_plugin(m, el, decl)))
 		return r;
 	struct draft d = {.node = allocate(m, 1, sizeof *d.node), .decl = decl, .stands_in = stands_in};

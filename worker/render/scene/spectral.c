@@ -187,7 +187,7 @@ static int number_of(const struct xml_element *el, const char *what, const char 
 		     struct error *e)
 {
 	const char *end = text + strlen(text), *rest = number_scan(text, end, x);
-	if (rest && rest < end && *rest == 'K' && strcmp(what, "temperature") == 0)
+	if (rest && rest < end && (*rest == 'K' || *rest == 'k') && strcmp(what, "temperature") == 0)
 		rest++;
 	if (!rest || rest != end || !(*x >= least && *x <= VALUE_LARGEST))
 		return xml_error(el, e, EINVAL, "%s=\"%.64s\" is not a number from %g to %g", what, text, least,

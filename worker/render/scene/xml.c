@@ -27,7 +27,7 @@ struct reader {
 	struct error *error;
 	int failed;   /* the first error's negative errno */
 	int includes; /* files around the current one */
-	bool dialect_known;
+	bool mixed;   /* files of both dialects: said */
 	/* the current file */
 	XML_Parser parser;
 	const char *file;
@@ -167,13 +167,13 @@ static int begin_file(struct reader *r, struct xml_element *el)
 	if (!rest || (*rest != 0 && *rest != '.') || major < 0)
 		return xml_error(el, r->error, EINVAL, "needs version=\"0.6.0\" or version=\"3.0.0\" and the like");
 	r->snake = major < 2;
-	if (r->dialect_known && r->tree->dialect_3 != (major >= 2))
-		return xml_error(el, r->error, EINVAL,
-				 "version %.32s: an included file must be of the same dialect "
-				 "(below 2, or 2 and above) as the scene",
-				 version);
-	r->dialect_known = true;
-	r->tree->dialect_3 = major >= 2;
+	bool dialect_3 = major >= 2;
+	if (el->parent && !r->mixed && r->tree->dialect_3 != dialect_3 && r->tree->note_count < XML_NOTES_MAX) {
+		r->mixed = true;
+		r->tree->notes[r->tree->note_count++] =
+			"includes a file of another dialect; all is taken as Mitsuba 3 takes it, with the old names in the old files";
+	}
+	r->tree->dialect_3 |= dialect_3; /* 3.x reads older files, 0.6 no newer ones */
 	return 0;
 }
 
@@ -319,7 +319,7 @@ static int read_include(struct reader *r, struct xml_element *el)
 	if (c && r->file == outer.file)
 		c = error_prefix(r->error, c, "%s:%d: <include>", el->file, el->line);
 	outer.failed = r->failed;
-	outer.dialect_known = r->dialect_known;
+	outer.mixed = r->mixed;
 	outer.defines = r->defines;
 	*r = outer;
 	return c;

@@ -24,6 +24,7 @@ static const struct param params[] = {
 	{"texcoord", UNDERSTOOD(VALUE_STRING)},
 	{"index", UNDERSTOOD(VALUE_STRING)},
 	{"mode", VALUE_STRING, PARAM_UNDERSTOOD, 0, 0, "triangles|strip|fan"},
+	{"vertex_colors", REFUSED}, /* of COLOR_0 */
 	{"face_normals", UNDERSTOOD(VALUE_BOOL)},
 	SHAPE_PARAMS_END,
 };

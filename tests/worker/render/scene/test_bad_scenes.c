@@ -238,6 +238,20 @@ static void test_bad_references(void **state)
 	refuses(S "<bsdf type='diffuse'><bsdf type='diffuse' name='nested'/></bsdf>" END, "has no `nested`");
 }
 
+/* What a fork's parameter is taken for is in test_scene.c. */
+static void test_misplaced_parameters(void **state)
+{
+	(void)state;
+	refuses(S "<sensor type='perspective'><float name='fovv' value='1'/></sensor>" END, "did you mean `fov`?");
+	refuses(S "<shape type='cube'><float name='radius' value='1'/></shape>" END, "has no `radius`");
+	refuses(BSDF("<float name='num_parameters' value='1'/>"), "has no `num_parameters`");
+	refuses(S "<shape type='cube'><texture name='num_parameters' type='checkerboard'/></shape>" END,
+		"has no `num_parameters`");
+	refuses(BSDF("<rgb name='alpha' value='.1 .1 .2'/>"), "`alpha` cannot be given like this");
+	refuses(BSDF("<spectrum name='alpha' value='400:.1, 700:.2'/>"), "`alpha` cannot be given like this");
+	refuses(BSDF("<rgb name='alpha' value='2'/>"), "alpha=2 is outside");
+}
+
 static void test_bad_includes(void **state)
 {
 	(void)state;
@@ -245,14 +259,12 @@ static void test_bad_includes(void **state)
 	refuses(S "<include/>" END, "needs filename");
 	refuses(S "<bsdf type='diffuse'><include filename='s.xml'/></bsdf>" END, "directly in <scene> only");
 	refuses(S "<include filename='s.xml'/>" END, "files include each other more than 8 deep");
-	static const char main_file[] = S "<include filename='i.xml'/>" END, old[] = "<scene version='0.6.0'/>",
+	static const char main_file[] = S "<include filename='i.xml'/>" END,
 			  broken[] = S "\n\n<bsdf type='difuse'/>" END,
 			  doctype[] = "<!DOCTYPE scene><scene version='3.0.0'/>";
 	static const struct {
 		const char *bytes, *text;
-	} cases[] = {{old, "i.xml:1: <scene>: version 0.6.0: an included file must be of the same dialect"},
-		     {broken, "i.xml:3: <bsdf type=\"difuse\">"},
-		     {doctype, "i.xml:1: <!DOCTYPE>"}};
+	} cases[] = {{broken, "i.xml:3: <bsdf type=\"difuse\">"}, {doctype, "i.xml:1: <!DOCTYPE>"}};
 	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
 		const struct memory_file files[] = {{"s.xml", main_file, sizeof main_file - 1},
 						    {"i.xml", cases[i].bytes, strlen(cases[i].bytes)},
@@ -307,12 +319,13 @@ static void test_memory_runs_out(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_broken_xml),	  cmocka_unit_test(test_entity_bomb),
-		cmocka_unit_test(test_parameter_bomb),	  cmocka_unit_test(test_deep_nesting),
-		cmocka_unit_test(test_too_many_elements), cmocka_unit_test(test_unknown_names),
-		cmocka_unit_test(test_bad_values),	  cmocka_unit_test(test_bad_transforms),
-		cmocka_unit_test(test_bad_references),	  cmocka_unit_test(test_bad_includes),
-		cmocka_unit_test(test_bad_films),	  cmocka_unit_test(test_memory_runs_out),
+		cmocka_unit_test(test_broken_xml),	     cmocka_unit_test(test_entity_bomb),
+		cmocka_unit_test(test_parameter_bomb),	     cmocka_unit_test(test_deep_nesting),
+		cmocka_unit_test(test_too_many_elements),    cmocka_unit_test(test_unknown_names),
+		cmocka_unit_test(test_misplaced_parameters), cmocka_unit_test(test_bad_values),
+		cmocka_unit_test(test_bad_transforms),	     cmocka_unit_test(test_bad_references),
+		cmocka_unit_test(test_bad_includes),	     cmocka_unit_test(test_bad_films),
+		cmocka_unit_test(test_memory_runs_out),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

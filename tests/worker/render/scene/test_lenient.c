@@ -33,7 +33,7 @@ static void test_stand_ins(void **state)
 		{PLUGIN_SHAPE, "sdfgrid", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_MEDIUM, "homogeneous", LENIENT_LEAVE_OUT, NULL},
 		{PLUGIN_SENSOR, "fisheye", LENIENT_REFUSE, NULL},
-		{PLUGIN_FILM, "specfilm", LENIENT_REFUSE, NULL},
+		{PLUGIN_FILM, "specfilm", LENIENT_REPLACE, "hdrfilm"},
 	};
 	for (size_t i = 0; i < sizeof expected / sizeof *expected; i++) {
 		const char *stand_in;

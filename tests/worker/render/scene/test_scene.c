@@ -165,6 +165,76 @@ static void test_dialects(void **state)
 	assert_non_null(strstr(e.text, "did you mean `ext_eta`?"));
 }
 
+/* Each file's names are those of its version; all is meant as in 3.x, which alone reads both. */
+static void test_both_dialects(void **state)
+{
+	(void)state;
+	static const char metal_6[] =
+		"<scene version='0.4.0'><bsdf type='roughconductor'><float name='extEta' value='2'/>"
+		"</bsdf></scene>",
+			  metal_3[] =
+				  "<scene version='3.0.0'><bsdf type='roughconductor'><float name='ext_eta' value='2'/>"
+				  "</bsdf></scene>";
+	for (int old = 0; old < 2; old++) {
+		files[1] = old ? (struct memory_file){"m.xml", metal_6, sizeof metal_6 - 1}
+			       : (struct memory_file){"m.xml", metal_3, sizeof metal_3 - 1};
+		char xml[512];
+		snprintf(xml, sizeof xml,
+			 "<scene version='%s'><include filename='m.xml'/><include filename='m.xml'/>"
+			 "<bsdf type='roughconductor'><float name='%s' value='3'/></bsdf></scene>",
+			 old ? "3.0.0" : "0.4.0", old ? "ext_eta" : "extEta");
+		struct scene s = read_ok(xml);
+		assert_true(s.dialect_3);
+		assert_int_equal(s.object_count, 3);
+		assert_true(node_float(s.objects[0], "ext_eta", 0) == 2);
+		assert_true(node_float(s.objects[2], "ext_eta", 0) == 3);
+		assert_int_equal(s.note_count, 1);
+		assert_non_null(strstr(s.notes[0], "s.xml: includes a file of another dialect"));
+		scene_fini(&s);
+	}
+	files[1] = (struct memory_file){0};
+}
+
+static void test_capitals_of_types(void **state)
+{
+	(void)state;
+	struct scene s = read_ok("<scene version='2.0.0'><shape type='Sphere'/><bsdf type='RoughConductor'/></scene>");
+	assert_string_equal(s.objects[0]->type, "sphere");
+	assert_string_equal(s.objects[1]->type, "roughconductor");
+	scene_fini(&s);
+}
+
+/* What forks of Mitsuba add is said, and has no effect. */
+static void test_parameters_of_forks(void **state)
+{
+	(void)state;
+	struct scene s = read_ok(
+		"<scene version='3.0.0'>\n<sensor type='perspective'>\n<vector name='min_bounds' value='?'/></sensor>\n"
+		"<shape type='sphere'><integer name='num_parameters' value='5'/></shape>\n"
+		"<shape type='sphere'><integer name='num_parameters' value='5'/></shape>\n</scene>");
+	assert_int_equal(s.note_count, 3); /* and that there is no light */
+	assert_string_equal(s.notes[0],
+			    "s.xml:3: <sensor type=\"perspective\">: `min_bounds` is not known and is ignored");
+	assert_string_equal(s.notes[1],
+			    "s.xml:4: <shape type=\"sphere\">: `num_parameters` is not known and is ignored");
+	for (uint32_t i = 0; i < s.object_count; i++)
+		assert_int_equal(s.objects[i]->property_count, 0);
+	scene_fini(&s);
+}
+
+static void test_numbers_given_as_colours(void **state)
+{
+	(void)state;
+	static const char *const given[] = {"<rgb name='alpha' value='.25 .25 .25'/>",
+					    "<rgb name='alpha' value='.25'/>", "<spectrum name='alpha' value='.25'/>"};
+	for (int i = 0; i < 3; i++) {
+		struct scene s = read_bsdf("3.0.0", given[i]);
+		assert_int_equal(node_find(s.objects[0], "alpha")->value.type, VALUE_FLOAT);
+		assert_true(node_float(s.objects[0], "alpha", 0) == .25);
+		scene_fini(&s);
+	}
+}
+
 static void test_nesting_and_references(void **state)
 {
 	(void)state;
@@ -315,6 +385,10 @@ int main(void)
 		cmocka_unit_test(test_plain_values),
 		cmocka_unit_test(test_transforms),
 		cmocka_unit_test(test_dialects),
+		cmocka_unit_test(test_both_dialects),
+		cmocka_unit_test(test_capitals_of_types),
+		cmocka_unit_test(test_parameters_of_forks),
+		cmocka_unit_test(test_numbers_given_as_colours),
 		cmocka_unit_test(test_nesting_and_references),
 		cmocka_unit_test(test_forward_references_and_aliases),
 		cmocka_unit_test(test_parameters),

@@ -112,7 +112,7 @@ static void test_blackbody(void **state)
 	double full = at(v, 550);
 	assert_true(fabs(full / 1.2703e4 - 1) < 2e-2);
 	scene_fini(&scene);
-	v = eta_of("0.6.0", "<blackbody name='eta' temperature='5000' scale='0.5'/>");
+	v = eta_of("0.6.0", "<blackbody name='eta' temperature='5000k' scale='0.5'/>");
 	assert_true(fabs(at(v, 550) / full - 0.5) < 1e-15);
 	scene_fini(&scene);
 }
