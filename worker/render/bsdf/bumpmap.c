@@ -50,7 +50,8 @@ static int create(struct bsdf *b, const struct scene_node *n, const struct bsdf_
 	if (!bend)
 		return node_error(n, e, ENOMEM, "out of memory");
 	bend->scale = node_float(n, "scale", 1);
-	bend->relief = (struct relief){kind, kind == RELIEF_HEIGHT ? height_at : normal_at, bend};
+	bend->relief = (struct relief){kind, kind == RELIEF_HEIGHT ? height_at : normal_at, bend,
+				       node_bool(n, "handedness", false)};
 	int code =
 		texture_create(&bend->texture, texture, COLOR_RELIEF, build->assets, build->dialect_3, build->arena, e);
 	if (!code)
@@ -76,9 +77,10 @@ static const struct param bumpmap_params[] = {
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
 	{.name = NULL},
 };
-/* scale: as glTF has it. */
+/* scale and handedness: as glTF has them. */
 static const struct param normalmap_params[] = {
 	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = -PARAM_UV_MAX, .max = PARAM_UV_MAX},
+	{.name = "handedness", .types = VALUE_BOOL},
 	{.name = NULL},
 };
 

@@ -36,11 +36,22 @@ static void bend_height(const struct relief_site *s, const struct relief_step *d
 		out->dm = vec3_scale(hand, vec3_add(vec3_cross(a.dm, b.m), vec3_cross(a.m, b.dm)));
 }
 
+/* Texture coordinates that run as in a mirror, seen from outside with v downwards. */
+static bool mirrored(const struct relief_site *s)
+{
+	return vec3_dot(vec3_cross(s->tu, s->tv), s->n) > 0;
+}
+
 /* The frame turns with n, and about it with the axis: as in worker/render/halfvec/constraint.c. */
-static void bend_normal(const struct relief_site *s, const struct relief_step *d, const struct relief_value *l,
+static void bend_normal(const struct relief_site *s, const struct relief_step *d, struct relief_value *l, bool turned,
 			struct bent *out)
 {
 	struct frame f = frame_along(s->n, s->axis);
+	if (turned) {
+		l->x.y = -l->x.y;
+		l->du.y = -l->du.y;
+		l->dv.y = -l->dv.y;
+	}
 	out->m = frame_to_world(&f, l->x);
 	if (!d)
 		return;
@@ -59,7 +70,10 @@ static bool bend(const struct relief *r, const struct relief_site *s, const stru
 	if (!(vec3_dot(s->tu, s->tu) > 0) || !(vec3_dot(s->tv, s->tv) > 0))
 		return false;
 	r->at(r->data, s->u, s->v, &x);
-	(r->kind == RELIEF_HEIGHT ? bend_height : bend_normal)(s, d, &x, out);
+	if (r->kind == RELIEF_HEIGHT)
+		bend_height(s, d, &x, out);
+	else
+		bend_normal(s, d, &x, r->handed && mirrored(s), out);
 	double square = vec3_dot(out->m, out->m);
 	return vec3_dot(out->m, s->ng) > 0 && square > 0x1p-900 && isfinite(square);
 }

@@ -64,21 +64,28 @@ static vec3 carried_axis(vec3 n)
 	return k > 0x1p-20 ? vec3_madd(a, -vec3_dot(a, n) / k, vec3_add(r, n)) : a;
 }
 
-/* dp/du and dp/dv from the texture coordinates. false: there are none, or they are degenerate. */
-static bool uv_tangents(const struct geom_shape *s, const uint32_t i[3], vec3 e1, vec3 e2, vec3 *tu, vec3 *tv)
+/* dp/du and dp/dv from the texture coordinates. */
+struct tangents {
+	vec3 u, v;
+	bool any; /* false: there are none, or they are degenerate */
+};
+
+static struct tangents tangents_of(const struct geom_shape *s, const uint32_t i[3], vec3 e1, vec3 e2)
 {
+	struct tangents t = {.any = false};
 	if (!s->uv)
-		return false;
+		return t;
 	double du1 = (double)s->uv[i[1]][0] - (double)s->uv[i[0]][0],
 	       dv1 = (double)s->uv[i[1]][1] - (double)s->uv[i[0]][1];
 	double du2 = (double)s->uv[i[2]][0] - (double)s->uv[i[0]][0],
 	       dv2 = (double)s->uv[i[2]][1] - (double)s->uv[i[0]][1];
 	double det = du1 * dv2 - dv1 * du2;
 	if (det == 0)
-		return false;
-	*tu = vec3_scale(1 / det, vec3_sub(vec3_scale(dv2, e1), vec3_scale(dv1, e2)));
-	*tv = vec3_scale(1 / det, vec3_sub(vec3_scale(du1, e2), vec3_scale(du2, e1)));
-	return vec3_is_finite(*tu) && vec3_dot(*tu, *tu) > 0;
+		return t;
+	t.u = vec3_scale(1 / det, vec3_sub(vec3_scale(dv2, e1), vec3_scale(dv1, e2)));
+	t.v = vec3_scale(1 / det, vec3_sub(vec3_scale(du1, e2), vec3_scale(du2, e1)));
+	t.any = vec3_is_finite(t.u) && vec3_dot(t.u, t.u) > 0;
+	return t;
 }
 
 /* A triangle's first vertex and the edges from there. */
@@ -100,13 +107,16 @@ static vec3 interpolated_normal(const struct geom_shape *s, const uint32_t i[3],
 }
 
 /* A triangle's point before relief bends it. Where there are no texture coordinates barycentrics stand in. */
-static struct relief_site site_on_triangle(const struct geom_shape *s, const uint32_t i[3], const struct corner *c,
+static struct relief_site site_on_triangle(const struct geom_shape *s, const struct corner *c, const struct tangents *t,
 					   vec3 n, const struct surface_point *x)
 {
 	struct relief_site r = {
 		.ng = x->ng, .n = n, .axis = x->dpdu, .tu = c->e1, .tv = c->e2, .u = x->u, .v = x->v, .unit = s->unit};
-	if (s->uv && (!uv_tangents(s, i, c->e1, c->e2, &r.tu, &r.tv) || !vec3_is_finite(r.tv)))
-		r.tu = r.tv = (vec3){0, 0, 0};
+	if (s->uv) {
+		bool any = t->any && vec3_is_finite(t->v);
+		r.tu = any ? t->u : (vec3){0, 0, 0};
+		r.tv = any ? t->v : (vec3){0, 0, 0};
+	}
 	return r;
 }
 
@@ -114,13 +124,12 @@ static void fill(const struct geom_shape *s, const uint32_t i[3], const struct c
 		 struct surface_point *x)
 {
 	double b0 = 1 - b1 - b2;
-	vec3 unused;
 	x->b1 = b1;
 	x->b2 = b2;
 	x->p = vec3_madd(vec3_madd(c->v0, b1, c->e1), b2, c->e2);
 	x->ng = vec3_normalize(vec3_cross(c->e1, c->e2));
-	if (!uv_tangents(s, i, c->e1, c->e2, &x->dpdu, &unused))
-		x->dpdu = carried_axis(x->ng);
+	struct tangents t = tangents_of(s, i, c->e1, c->e2);
+	x->dpdu = t.any ? t.u : carried_axis(x->ng);
 	vec3 n = x->ng;
 	if (s->normal) {
 		vec3 m = interpolated_normal(s, i, b1, b2);
@@ -136,7 +145,7 @@ static void fill(const struct geom_shape *s, const uint32_t i[3], const struct c
 		x->v = b0 * (double)s->uv[i[0]][1] + b1 * (double)s->uv[i[1]][1] + b2 * (double)s->uv[i[2]][1];
 	}
 	if (s->relief) {
-		struct relief_site site = site_on_triangle(s, i, c, n, x);
+		struct relief_site site = site_on_triangle(s, c, &t, n, x);
 		n = relief_normal(s->relief, &site);
 	}
 	x->sh = frame_along(n, x->dpdu);
@@ -308,7 +317,8 @@ static void bend_on_triangle(const struct geom_shape *s, const struct surface_po
 {
 	const uint32_t *i = s->index[x->prim.prim];
 	struct corner k = corner_of(s, i);
-	struct relief_site site = site_on_triangle(s, i, &k, n, x);
+	struct tangents t = tangents_of(s, i, k.e1, k.e2);
+	struct relief_site site = site_on_triangle(s, &k, &t, n, x);
 	double t1[2] = {1, 0}, t2[2] = {0, 1}; /* how (u,v) changes with the barycentrics */
 	for (int a = 0; s->uv && a < 2; a++) {
 		t1[a] = (double)s->uv[i[1]][a] - (double)s->uv[i[0]][a];

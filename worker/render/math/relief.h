@@ -8,6 +8,8 @@
 
 #include "worker/render/math/vec3.h"
 
+#include <stdbool.h>
+
 enum relief_kind {
 	RELIEF_HEIGHT, /* a height along the normal: x is its gradient (dh/du, dh/dv, 0), in the scene's units of length
 			*/
@@ -22,6 +24,7 @@ struct relief {
 	enum relief_kind kind;
 	void (*at)(const void *data, double u, double v, struct relief_value *out);
 	const void *data;
+	bool handed; /* of RELIEF_NORMAL: y runs against dp/dv, not along n x dp/du, where the two differ */
 };
 
 #endif

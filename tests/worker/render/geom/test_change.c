@@ -63,7 +63,10 @@ static void wave_normal(const void *data, double u, double v, struct relief_valu
 }
 
 static double wave[3];
-static const struct relief reliefs[2] = {{RELIEF_HEIGHT, wave_height, wave}, {RELIEF_NORMAL, wave_normal, wave}};
+enum { RELIEFS = 3 };
+static const struct relief reliefs[RELIEFS] = {{RELIEF_HEIGHT, wave_height, wave, false},
+					       {RELIEF_NORMAL, wave_normal, wave, false},
+					       {RELIEF_NORMAL, wave_normal, wave, true}};
 
 static struct geom_shape bent(struct geom_shape s, struct dice *d, int kind)
 {
@@ -142,10 +145,11 @@ static void test_differences(void **state)
 {
 	(void)state;
 	struct dice d = dice_of("changes of surface points");
-	double worst[3][5] = {{0}};
-	for (size_t i = 0; i < dice_count(15000); i++) {
+	double worst[1 + RELIEFS][5] = {{0}};
+	for (size_t i = 0; i < dice_count(20000); i++) {
 		int kind = (int)(i % 5),
-		    relief = (int)(i / 5 % 3); /* flat, with and without uv; smooth, with and without uv; sphere */
+		    relief = (int)(i / 5 %
+				   (1 + RELIEFS)); /* flat, with and without uv; smooth, with and without uv; sphere */
 		struct geom_shape s = kind == 4 ? sphere(&d) : triangle(&d, kind >= 2, kind % 2);
 		if (relief)
 			s = bent(s, &d, relief - 1);
@@ -166,12 +170,13 @@ static void test_differences(void **state)
 			continue;
 		worst[relief][kind] = fmax(worst[relief][kind], compare(&s, &x));
 	}
-	for (int relief = 0; relief < 3; relief++) {
+	for (int relief = 0; relief <= RELIEFS; relief++) {
 		const double *at = worst[relief];
 		print_message("%s: flat %.1e %.1e, smooth %.1e %.1e, sphere %.1e\n",
 			      relief == 0   ? "plain"
 			      : relief == 1 ? "bump"
-					    : "normals",
+			      : relief == 2 ? "normals"
+					    : "normals with handedness",
 			      at[0], at[1], at[2], at[3], at[4]);
 		for (int kind = 0; kind < 5; kind++)
 			assert_true(at[kind] < 1e-7);
@@ -222,6 +227,43 @@ static void test_bent_normal_is_that_of_the_surface(void **state)
 	}
 	print_message("flat %.1e, sphere %.1e of the turn\n", worst[0], worst[1]);
 	assert_true(worst[0] < 1e-7 && worst[1] < 1e-3);
+}
+
+static void tilted(const void *data, double u, double v, struct relief_value *out)
+{
+	(void)u, (void)v;
+	*out = (struct relief_value){.x = *(const vec3 *)data};
+}
+
+/* A picture on a square that faces +z, v downwards: the normal (a, b, c) leans a to the picture's right and b to its
+ * top. Where it lies there as in a mirror its right is the other way, its top is not. Mitsuba's frames, n x dp/du, do
+ * not know that. */
+static void test_mirrored_pictures(void **state)
+{
+	(void)state;
+	static const vec3 x = {0.3, 0.4, 0.8};
+	static float corners[3][3] = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, upright[3][2] = {{0, 0}, {1, 0}, {0, -1}},
+		     mirrored[3][2] = {{0, 0}, {-1, 0}, {0, -1}}, turned[3][2] = {{0, 0}, {-1, 0}, {0, 1}};
+	static const struct {
+		float (*uv)[2];
+		bool handed;
+		double right, top;
+	} cases[] = {{upright, false, 1, 1},  {upright, true, 1, 1},   {mirrored, false, -1, -1},
+		     {mirrored, true, -1, 1}, {turned, false, -1, -1}, {turned, true, -1, -1}};
+	for (size_t k = 0; k < sizeof cases / sizeof *cases; k++) {
+		const struct relief r = {RELIEF_NORMAL, tilted, &x, cases[k].handed};
+		const struct geom_shape s = {.vertex_count = 3,
+					     .triangle_count = 1,
+					     .position = corners,
+					     .index = index_,
+					     .uv = cases[k].uv,
+					     .relief = &r,
+					     .unit = 1};
+		struct surface_point p;
+		surface_on_triangle(&s, (struct prim_ref){0, 0}, 0.3, 0.3, &p);
+		vec3 want = vec3_normalize((vec3){cases[k].right * x.x, cases[k].top * x.y, x.z});
+		assert_true(vec3_length(vec3_sub(p.sh.n, want)) < 1e-15);
+	}
 }
 
 static void assert_finite(const struct geom_shape *s, const struct surface_point *x)
@@ -284,6 +326,7 @@ int main(void)
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_differences),
 		cmocka_unit_test(test_bent_normal_is_that_of_the_surface),
+		cmocka_unit_test(test_mirrored_pictures),
 		cmocka_unit_test(test_degenerate),
 	};
 	return cmocka_run_group_tests_name("change", tests, NULL, NULL);
