@@ -13,7 +13,7 @@ static const struct {
 	const char *types;
 } mitsuba[] = {
 	{PLUGIN_SHAPE, "bsplinecurve|deformable|ellipsoids|ellipsoidsmesh|hair|heightfield|linearcurve|sdfgrid"},
-	{PLUGIN_BSDF, "circular|hair|hk|irawan|measured|measured_polarized|polarizer|pplastic|principledthin|retarder"},
+	{PLUGIN_BSDF, "circular|hair|hk|irawan|measured|measured_polarized|polarizer|pplastic|retarder"},
 	{PLUGIN_TEXTURE, "curvature|gridtexture|mesh_attribute|vertexcolors|volume|wireframe"},
 	{PLUGIN_EMITTER, "collimated|directionalarea|projector|timed_sunsky"},
 	{PLUGIN_SENSOR,

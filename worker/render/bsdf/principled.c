@@ -11,29 +11,15 @@
  * are added, not layered: at grazing angles, and with sheen above all, more may come back than arrives, up to 1.5
  * times.
  */
-#include "worker/render/bsdf/create.h"
+#include "worker/render/bsdf/principled.h"
+
 #include "worker/render/bsdf/fresnel.h"
-#include "worker/render/bsdf/microfacet.h"
 #include "worker/render/bsdf/warp.h"
 
 #define PRINCIPLED_ALPHA_MIN 1e-3
 #define CLEARCOAT_REFLECTANCE 0.04 /* of an index of 1.5 */
 
 enum { LOBE_DIFFUSE, LOBE_SPECULAR, LOBE_CLEARCOAT, LOBE_TRANSMIT, LOBES };
-
-struct principled {
-	struct texture base, roughness, metallic;
-	double transmission, spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_alpha, aspect, eta;
-	double base_max;
-};
-
-/* What a point of the surface is made of. */
-struct stuff {
-	const struct principled *p;
-	spectrum base, tint;
-	double roughness, metallic;
-	struct microfacet facets;
-};
 
 /* base_color over its luminance, by eight wavelengths weighted with the eye's sensitivity. */
 static spectrum tint_of(const struct principled *p, const struct bsdf_point *at, spectrum base)
@@ -53,7 +39,7 @@ static spectrum tint_of(const struct principled *p, const struct bsdf_point *at,
 	return sum > 0 ? spectrum_scale(all / sum, base) : spectrum_of(1);
 }
 
-static struct microfacet facets_of(const struct principled *p, double roughness)
+struct microfacet principled_facets(const struct principled *p, double roughness)
 {
 	struct microfacet m;
 	double a = roughness * roughness;
@@ -67,14 +53,13 @@ static double share_at(const struct texture *t, const struct bsdf_point *at)
 	return fmin(fmax(spectrum_mean(texture_eval(t, at->u, at->v, at->w)), 0), 1);
 }
 
-static struct stuff stuff_at(const struct bsdf *b, const struct bsdf_point *at)
+struct stuff principled_stuff(const struct principled *p, const struct bsdf_point *at)
 {
-	const struct principled *p = b->data;
 	struct stuff s = {.p = p,
 			  .base = texture_eval(&p->base, at->u, at->v, at->w),
 			  .roughness = share_at(&p->roughness, at),
 			  .metallic = share_at(&p->metallic, at)};
-	s.facets = facets_of(p, s.roughness);
+	s.facets = principled_facets(p, s.roughness);
 	s.tint = p->spec_tint > 0 || p->sheen_tint > 0 ? tint_of(p, at, s.base) : spectrum_of(1);
 	return s;
 }
@@ -85,8 +70,8 @@ static double schlick(double cosine)
 	return x * x * x * x * x;
 }
 
-/* F of the header comment, for light from above. */
-static spectrum fresnel_of(const struct stuff *s, double cosine)
+/* F of the header comment. */
+spectrum principled_fresnel(const struct stuff *s, double cosine)
 {
 	const struct principled *p = s->p;
 	double rest = schlick(cosine), clear = 1 - s->metallic, root = (p->eta - 1) / (p->eta + 1);
@@ -102,7 +87,7 @@ static spectrum fresnel_of(const struct stuff *s, double cosine)
 
 /* Burley 2012, section 5.3, with his approximation of subsurface scattering (flatness), and sheen, section 5.6. wi is
  * refused below the surface by the caller. */
-static spectrum diffuse_of(const struct stuff *s, vec3 wo, vec3 wi, double cos_d)
+spectrum principled_diffuse(const struct stuff *s, vec3 wo, vec3 wi, double cos_d)
 {
 	const struct principled *p = s->p;
 	double fo = schlick(wo.z), fi = schlick(wi.z), retro = 2 * s->roughness * cos_d * cos_d;
@@ -204,7 +189,7 @@ static void add_reflected(const struct stuff *s, vec3 wo, vec3 wi, bool below, d
 				     fresnel_dielectric(cos_d, eta).reflected);
 		return;
 	}
-	out->f = spectrum_add(spectrum_scale(both, fresnel_of(s, cos_d)), diffuse_of(s, wo, wi, cos_d));
+	out->f = spectrum_add(spectrum_scale(both, principled_fresnel(s, cos_d)), principled_diffuse(s, wo, wi, cos_d));
 	out->pdf += chance[LOBE_DIFFUSE] * wi.z / WARP_PI;
 	if (p->clearcoat > 0) {
 		out->f = spectrum_add(out->f, spectrum_of(clearcoat_of(p, wo, wi, h, cos_d)));
@@ -231,13 +216,13 @@ static struct pair pair_of(const struct stuff *s, vec3 wo, vec3 wi, enum transpo
 
 static spectrum principled_eval(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, vec3 wi)
 {
-	struct stuff s = stuff_at(b, at);
+	struct stuff s = principled_stuff(b->data, at);
 	return pair_of(&s, wo, wi, at->transport).f;
 }
 
 static double principled_pdf(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, vec3 wi)
 {
-	struct stuff s = stuff_at(b, at);
+	struct stuff s = principled_stuff(b->data, at);
 	return pair_of(&s, wo, wi, at->transport).pdf;
 }
 
@@ -273,7 +258,7 @@ static bool follow(const struct stuff *s, int lobe, vec3 wo, double eta, const d
 static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at, vec3 wo, const double u[3],
 			      struct bsdf_sample *out)
 {
-	struct stuff s = stuff_at(b, at);
+	struct stuff s = principled_stuff(b->data, at);
 	bool below = wo.z < 0;
 	double chance[LOBES], rest = u[2], eta = below ? 1 / s.p->eta : s.p->eta;
 	vec3 wi;
@@ -298,8 +283,7 @@ static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at,
 	return true;
 }
 
-/* The least of a share, of a texture on a grid: step sizes go by that of roughness. */
-static double least_share(const struct texture *t)
+double principled_least(const struct texture *t)
 {
 	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
 	enum { SIDE = 64 };
@@ -346,8 +330,8 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 	p->clearcoat_alpha = 0.1 + (0.001 - 0.1) * node_float(n, "clearcoat_gloss", 0);
 	p->aspect = sqrt(1 - 0.9 * node_float(n, "anisotropic", 0));
 	p->base_max = texture_max(&p->base);
-	struct microfacet least = facets_of(p, least_share(&p->roughness));
-	double metallic = least_share(&p->metallic);
+	struct microfacet least = principled_facets(p, principled_least(&p->roughness));
+	double metallic = principled_least(&p->metallic);
 	bool glass = p->transmission > 0 && metallic < 1;
 	b->modes = BSDF_REFLECT | (glass ? BSDF_TRANSMIT : 0);
 	b->has_smooth = true;

@@ -16,13 +16,10 @@ static const struct {
 	enum plugin_class cls;
 	const char *type, *stand_in;
 } likes[] = {
-	{PLUGIN_BSDF, "pplastic", "roughplastic"},
-	{PLUGIN_BSDF, "measured", "roughplastic"},
-	{PLUGIN_BSDF, "principledthin", "principled"},
-	{PLUGIN_BSDF, "polarizer", "null"},
-	{PLUGIN_BSDF, "retarder", "null"},
-	{PLUGIN_BSDF, "circular", "null"},
-	{PLUGIN_EMITTER, "timed_sunsky", "constant"},
+	{PLUGIN_BSDF, "pplastic", "roughplastic"},   {PLUGIN_BSDF, "measured", "roughplastic"},
+
+	{PLUGIN_BSDF, "polarizer", "null"},	     {PLUGIN_BSDF, "retarder", "null"},
+	{PLUGIN_BSDF, "circular", "null"},	     {PLUGIN_EMITTER, "timed_sunsky", "constant"},
 	{PLUGIN_EMITTER, "directionalarea", "area"},
 };
 

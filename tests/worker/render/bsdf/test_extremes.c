@@ -31,6 +31,8 @@ static const char *const extremes[] = {
 	"phong exponent=1e9 diffuse_reflectance=0 specular_reflectance=1",
 	"twosided | roughconductor material=Al alpha=",
 	"difftrans transmittance=1",
+	"principledthin roughness=0 spec_trans=1 eta=10",
+	"principledthin roughness=0.01 spec_trans=0.5 eta=1 diff_trans=2 sheen=1 flatness=1",
 	"coating int_ior=1000 | diffuse reflectance=1",
 	"coating int_ior=1 ext_ior=1.000000001 sigma_a=1e9 thickness=1e9 | conductor material=Al",
 	"coating int_ior=1 ext_ior=1.5 | roughconductor material=Al alpha=",

@@ -135,12 +135,55 @@ static void test_metallic_texture(void **state)
 	     "principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 metallic=0.25", 1, 1);
 }
 
+static double value(const char *text, vec3 wo, vec3 wi)
+{
+	struct arena a = {0};
+	struct bsdf b;
+	bsdf_make(&a, text, &b);
+	double f = b.ops->eval(&b, &point, wo, wi).v[0];
+	arena_fini(&a);
+	return f;
+}
+
+/* The thin sheet: reflects as the rough boundary, passes on what its rougher or smoother twin reflects (Fresnel's share
+ * the other way), spreads the rest over both sides; the same from below. */
+static void test_a_thin_sheet(void **state)
+{
+	(void)state;
+	const vec3 wo = direction(0.7, 0.3), wi = direction(0.5, 2.9), through = {wi.x, wi.y, -wi.z};
+	const double narrow = 0.36 * (0.65 * 1.5 - 0.35) * (0.65 * 1.5 - 0.35); /* alpha of roughness 0.6, scaled */
+	char text[160];
+	double mirror = value("roughconductor material=none distribution=ggx alpha=0.36", wo, wi),
+	       boundary = value("roughdielectric int_ior=1.5 ext_ior=1 distribution=ggx alpha=0.36", wo, wi);
+	snprintf(text, sizeof text, "roughconductor material=none distribution=ggx alpha=%.17g", narrow);
+	double turned = value(text, wo, wi);
+	double sheet = value("principledthin spec_trans=1 roughness=0.6 base_color=0.8", wo, wi),
+	       passed = value("principledthin spec_trans=1 roughness=0.6 base_color=0.8", wo, through);
+	assert_true(fabs(sheet / boundary - 1) < 1e-12);
+	assert_true(fabs(passed / (0.8 * turned * (1 - boundary / mirror)) - 1) < 1e-12);
+	assert_true(fabs(value("principledthin diff_trans=2 base_color=0.8", wo, through) / (0.8 / PI) - 1) < 1e-12);
+	assert_true(value("principledthin diff_trans=2 base_color=0.8", wo, wi) == 0);
+	double all =
+		value("principledthin spec_trans=0.3 diff_trans=0.5 roughness=0.6 base_color=0.8 sheen=0.5", wo, wi);
+	double thick = value("principled roughness=0.6 base_color=0.8 sheen=0.5 eta=1.5", wo, wi) -
+		       value("principled roughness=0.6 base_color=0 eta=1.5", wo, wi);
+	assert_true(fabs(all / (0.3 * boundary + 0.7 * 0.75 * thick) - 1) < 1e-9);
+	assert_true(fabs(value("principledthin spec_trans=1 roughness=0.6 base_color=0.8", vec3_neg(wo),
+			       vec3_neg(through)) /
+				 passed -
+			 1) < 1e-13);
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_glass_is_roughdielectric), cmocka_unit_test(test_metal_is_schlick_over_ggx),
-		cmocka_unit_test(test_diffuse_is_burleys),	 cmocka_unit_test(test_clearcoat),
-		cmocka_unit_test(test_specular_is_an_index),	 cmocka_unit_test(test_metallic_texture),
+		cmocka_unit_test(test_glass_is_roughdielectric),
+		cmocka_unit_test(test_metal_is_schlick_over_ggx),
+		cmocka_unit_test(test_diffuse_is_burleys),
+		cmocka_unit_test(test_clearcoat),
+		cmocka_unit_test(test_specular_is_an_index),
+		cmocka_unit_test(test_metallic_texture),
+		cmocka_unit_test(test_a_thin_sheet),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

@@ -20,6 +20,8 @@
 static inline double explicit_log_turn(const struct full_path_path *x, unsigned j, double n_i)
 {
 	vec2 h = halfvec_of(x, j);
+	if (full_path_eta(x, j) == 1 && (x->v[j].mode & BSDF_TRANSMIT)) /* h is (i + o)_xy: its area is |n.i| d omega */
+		return log(fabs(n_i) / fabs(frame_to_local(&x->v[j].x.sh, x->edge[j - 1].w).z));
 	double length2 = 1 + vec2_dot(h, h), eta = full_path_eta(x, j);
 	vec3 n = vec3_scale(1 / sqrt(length2), (vec3){h.x, h.y, 1});
 	vec3 o = frame_to_local(&x->v[j].x.sh, x->edge[j].w),

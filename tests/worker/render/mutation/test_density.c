@@ -8,6 +8,7 @@
 #include "tests/support/starts.h"
 #include "tests/support/stats.h"
 #include "tests/worker/render/mutation/explicit.h"
+#include "tests/worker/render/mutation/scenes.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -124,11 +125,24 @@ static void test_ratio(void **state)
 	assert_true(bad == 0);
 }
 
+/* Light passes between equal indices, by a narrow lobe and by a wide one. */
+static struct world *thin_sheet(void)
+{
+	return world_of_text(
+		32, 32, "%s",
+		VIEW WALLS LAMP BALL(
+			"0,-0.6,-0.3", "0.8",
+			"<bsdf type='principledthin'><float name='roughness' value='0.5'/>"
+			"<float name='spec_trans' value='0.7'/><float name='diff_trans' value='1'/></bsdf>"));
+}
+
 int main(void)
 {
+	static const struct room sheet = {"thin sheet", thin_sheet};
 	struct CMUnitTest tests[16] = {0};
 	size_t n = 0;
 	for (const struct room *r = rooms; r->name; r++)
 		tests[n++] = (struct CMUnitTest){r->name, test_ratio, NULL, NULL, (void *)(uintptr_t)r};
+	tests[n++] = (struct CMUnitTest){sheet.name, test_ratio, NULL, NULL, (void *)(uintptr_t)&sheet};
 	return _cmocka_run_group_tests("density", tests, n, NULL, NULL);
 }

@@ -1,0 +1,196 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * The thin form of `principled`: a sheet of no thickness, the same from both sides (Burley 2015, section 5.3;
+ * parameters and defaults are those of Mitsuba 3's plug-in). With t = spec_trans, d = diff_trans / 2 and c =
+ * base_color,
+ *
+ *   reflected     t D G1 G1 F / 4 + (1 - t) (1 - d) (diffuse + sheen)
+ *   transmitted   t c D' G1' G1' (1 - F) / 4 + (1 - t) d c / pi
+ *
+ * where light that passes is light that is reflected, turned to the other side, by facets D' of the roughness times
+ * 0.65 eta - 0.35. Nothing bends: both sides have one index.
+ */
+#include "worker/render/bsdf/principled.h"
+
+#include "worker/render/bsdf/fresnel.h"
+#include "worker/render/bsdf/warp.h"
+
+enum { THIN_REFLECT, THIN_TRANSMIT, THIN_DIFFUSE, THIN_THROUGH, THIN_LOBES };
+
+struct thin {
+	struct principled p;
+	double spec_trans, through; /* through: d of the header comment */
+};
+
+/* A point of the surface, and a direction from it, which is taken for the upper side. */
+struct thin_point {
+	const struct thin *t;
+	struct stuff s;
+	struct microfacet passing; /* D' */
+	double chance[THIN_LOBES]; /* of sampling */
+};
+
+static void find_chances(struct thin_point *x, double cosine)
+{
+	const struct thin *t = x->t;
+	double base = t->p.base_max, diffuse = 1 - t->spec_trans, sum = 0;
+	double reflected = fresnel_dielectric(fmin(cosine, 1), t->p.eta).reflected;
+	/* Facets reflect other shares than the plane they lie in: neither lobe is left out. */
+	x->chance[THIN_REFLECT] = t->spec_trans * (0.25 + 0.5 * reflected);
+	x->chance[THIN_TRANSMIT] = t->spec_trans * base * (0.75 - 0.5 * reflected);
+	x->chance[THIN_DIFFUSE] = diffuse * (1 - t->through) * fmax(base, 0.2 * fmin(t->p.sheen, 1));
+	x->chance[THIN_THROUGH] = diffuse * t->through * base;
+	for (int i = 0; i < THIN_LOBES; i++)
+		sum += x->chance[i];
+	for (int i = 0; i < THIN_LOBES; i++)
+		x->chance[i] = sum > 0 ? x->chance[i] / sum : 0;
+}
+
+static struct thin_point thin_at(const struct bsdf *b, const struct bsdf_point *p, vec3 wo)
+{
+	const struct thin *t = b->data;
+	struct thin_point x = {.t = t, .s = principled_stuff(&t->p, p)};
+	x.passing = principled_facets(&t->p, (0.65 * t->p.eta - 0.35) * x.s.roughness);
+	find_chances(&x, fabs(wo.z));
+	return x;
+}
+
+static vec3 upright(vec3 v)
+{
+	return (vec3){v.x, v.y, fabs(v.z)};
+}
+
+/* The value and the density of one pair. */
+struct pair {
+	spectrum f;
+	double pdf;
+};
+
+static struct pair pair_of(const struct thin_point *x, vec3 wo, vec3 wi)
+{
+	struct pair out = {spectrum_of(0), 0};
+	const struct thin *t = x->t;
+	bool reflect = wo.z * wi.z > 0;
+	const struct microfacet *m = reflect ? &x->s.facets : &x->passing;
+	vec3 h, o = upright(wo), i = upright(wi);
+	double length;
+	if (!(o.z > 0 && i.z > 0) || !microfacet_half(o, 1, i, &h, &length))
+		return out;
+	double cosine = fmin(0.5 * length, 1), seen = 0.25 * microfacet_d(m, h) * microfacet_g1_over_cos(m, o),
+	       both = t->spec_trans * seen * microfacet_g1_over_cos(m, i), diffuse = 1 - t->spec_trans;
+	if (reflect) {
+		spectrum d = principled_diffuse(&x->s, o, i, cosine);
+		out.f = spectrum_add(spectrum_scale(both, principled_fresnel(&x->s, cosine)),
+				     spectrum_scale(diffuse * (1 - t->through), d));
+		out.pdf = x->chance[THIN_REFLECT] * seen + x->chance[THIN_DIFFUSE] * i.z / WARP_PI;
+	} else {
+		double passes = both * fresnel_dielectric(cosine, t->p.eta).transmitted;
+		out.f = spectrum_scale(passes + diffuse * t->through / WARP_PI, x->s.base);
+		out.pdf = x->chance[THIN_TRANSMIT] * seen + x->chance[THIN_THROUGH] * i.z / WARP_PI;
+	}
+	return out;
+}
+
+static spectrum thin_eval(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	struct thin_point x = thin_at(b, p, wo);
+	return pair_of(&x, wo, wi).f;
+}
+
+static double thin_pdf(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, vec3 wi)
+{
+	struct thin_point x = thin_at(b, p, wo);
+	return pair_of(&x, wo, wi).pdf;
+}
+
+static bool thin_sample(const struct bsdf *b, const struct bsdf_point *p, vec3 wo, const double u[3],
+			struct bsdf_sample *out)
+{
+	struct thin_point x = thin_at(b, p, wo);
+	vec3 o = upright(wo), wi;
+	double rest = u[2];
+	int lobe = 0;
+	if (wo.z == 0)
+		return false;
+	while (lobe < THIN_LOBES - 1 && rest >= x.chance[lobe])
+		rest -= x.chance[lobe++];
+	if (!(x.chance[lobe] > 0))
+		return false;
+	if (lobe == THIN_DIFFUSE || lobe == THIN_THROUGH) {
+		wi = warp_cosine_hemisphere(u[0], u[1]);
+	} else {
+		vec3 h = microfacet_sample_visible(lobe == THIN_REFLECT ? &x.s.facets : &x.passing, o, u[0], u[1]);
+		wi = vec3_normalize(vec3_sub(vec3_scale(2 * vec3_dot(o, h), h), o));
+	}
+	bool through = lobe == THIN_TRANSMIT || lobe == THIN_THROUGH;
+	if (!(wi.z > 0))
+		return false;
+	wi.z = (wo.z > 0) == through ? -wi.z : wi.z;
+	struct pair pair = pair_of(&x, wo, wi);
+	*out = (struct bsdf_sample){
+		.wi = wi, .mode = through ? BSDF_TRANSMIT : BSDF_REFLECT, .pdf = pair.pdf, .f = pair.f, .eta = 1};
+	return pair.pdf > 0;
+}
+
+static int thin_create(struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build, struct error *e)
+{
+	struct thin *t = bsdf_data(b, n, build, sizeof *t, e);
+	if (!t)
+		return -ENOMEM;
+	struct principled *p = &t->p;
+	int code = bsdf_texture(b, &p->base, n, "base_color", 0.5, build, e);
+	if (!code)
+		code = bsdf_texture(b, &p->roughness, n, "roughness", 0.5, build, e);
+	if (code)
+		return code;
+	p->metallic = (struct texture){.color = color_constant(0)};
+	p->eta = node_float(n, "eta", 1.5);
+	p->spec_tint = node_float(n, "spec_tint", 0);
+	p->sheen = node_float(n, "sheen", 0);
+	p->sheen_tint = node_float(n, "sheen_tint", 0);
+	p->flatness = node_float(n, "flatness", 0);
+	p->aspect = sqrt(1 - 0.9 * node_float(n, "anisotropic", 0));
+	p->base_max = texture_max(&p->base);
+	t->spec_trans = node_float(n, "spec_trans", 0);
+	t->through = 0.5 * node_float(n, "diff_trans", 0);
+	double rough = principled_least(&p->roughness);
+	struct microfacet facets = principled_facets(p, rough),
+			  passing = principled_facets(p, (0.65 * p->eta - 0.35) * rough);
+	b->modes = BSDF_REFLECT | (t->spec_trans > 0 || t->through > 0 ? BSDF_TRANSMIT : 0);
+	b->has_smooth = true;
+	b->two_sided = true;
+	b->alpha = t->spec_trans > 0 ? fmin(microfacet_least(&facets), microfacet_least(&passing)) : INFINITY;
+	b->alpha_mean = 1 - t->spec_trans + t->spec_trans * microfacet_mean(&facets);
+	return 0;
+}
+
+#define SHARE(name_, max_)                                                             \
+	{                                                                              \
+		.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = max_ \
+	}
+static const struct param thin_params[] = {
+	{.name = "base_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	{.name = "roughness", .types = VALUE_TEXTURE, .min = 0, .max = 1},
+	SHARE("anisotropic", 1),
+	SHARE("spec_trans", 1),
+	SHARE("spec_tint", 1),
+	SHARE("sheen", 1),
+	SHARE("sheen_tint", 1),
+	SHARE("flatness", 1),
+	SHARE("diff_trans", 2),
+	{.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
+	{.name = "diffuse_reflectance_sampling_rate", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = "specular_reflectance_sampling_rate", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = "specular_transmittance_sampling_rate", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = "diffuse_transmittance_sampling_rate", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+const struct bsdf_ops bsdf_ops_principledthin = {
+	.type = "principledthin",
+	.params = thin_params,
+	.create = thin_create,
+	.eval = thin_eval,
+	.pdf_solid = thin_pdf,
+	.sample = thin_sample,
+};
