@@ -67,7 +67,7 @@ static void test_diffuse(void **state)
 				DEPTH("3") ROOM LAMP "<shape type='cube'>" AT(
 					"<scale value='0.5'/><rotate y='1' angle='25'/><translate y='-1.5' z='-0.5'/>")
 					DIFFUSE("0.7,0.2,0.1") "</shape>"),
-		  4096, 4096, 1024, 6656, 0);
+		  2048, 2048, 1024, 6656, 0);
 }
 
 static void test_glossy(void **state)
@@ -89,7 +89,7 @@ static void test_glossy(void **state)
 															BALL("-0.5,0.6,-0.9", "0.4", "<bsdf type='roughplastic'><float name='alpha' value='0.2'/></bsdf>") "<shape type='rectangle'>" AT(
 																"<scale value='0.5'/><translate x='0.9' y='0.5' z='-0.3'/>") "<bsdf type='mask'><float name='opacity' value='0.4'/><bsdf type='blendbsdf'><bsdf type='diffuse'/>"
 																							     "<bsdf type='conductor'><string name='material' value='Ag'/></bsdf></bsdf></bsdf></shape>"),
-		6144, 6144, 1536, 0, 0);
+		3072, 3072, 1536, 0, 0);
 }
 
 static void test_glass(void **state)
@@ -100,7 +100,7 @@ static void test_glass(void **state)
 				DEPTH("6") ROOM LAMP BALL("0,-0.6,-0.3", "0.8",
 							  "<bsdf type='dielectric'><float name='int_ior' value='1.5'/>"
 							  "<float name='ext_ior' value='1'/></bsdf>")),
-		  8192, 8192, 3072, 0, 0);
+		  4096, 4096, 2048, 0, 0);
 }
 
 static void test_rough_glass(void **state)
@@ -108,11 +108,11 @@ static void test_rough_glass(void **state)
 	(void)state;
 	check_all("rough glass",
 		  world_of_text(32, 32,
-				DEPTH("5") ROOM LAMP BALL(
+				DEPTH("4") ROOM LAMP BALL(
 					"0,-0.6,-0.3", "0.8",
 					"<bsdf type='roughdielectric'><float name='int_ior' value='1.5'/>"
 					"<float name='ext_ior' value='1'/><float name='alpha' value='0.25'/></bsdf>")),
-		  6144, 6144, 0, 9728, 45056);
+		  3584, 3584, 0, 12800, 21504);
 }
 
 static void test_environment(void **state)
@@ -127,7 +127,7 @@ static void test_environment(void **state)
 				DIFFUSE("0.5,0.5,0.6") "</shape>" BALL(
 					"0,0,0", "1",
 					"<bsdf type='roughdielectric'><float name='alpha' value='0.3'/></bsdf>") "<emitter type='constant'><rgb name='radiance' value='0.8,0.9,1'/></emitter>"),
-		4096, 4096, 0, 6144, 0);
+		2048, 2048, 0, 6144, 0);
 }
 
 int main(void)
