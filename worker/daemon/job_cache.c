@@ -243,7 +243,7 @@ static int build(struct job_cache *b, struct error *e)
 {
 	const Farm__JobInfo *m = info_of(b);
 	struct scene_define defines[DEFINES_MAX];
-	struct asset_source assets = {b, open_asset, close_asset};
+	struct asset_source assets = {.user = b, .open = open_asset, .close = close_asset};
 	struct render_options options = {
 		.width = m->render_width, .height = m->render_height, .max_depth = b->plan.max_depth};
 	memcpy(options.accuracy, b->plan.accuracy, sizeof options.accuracy);

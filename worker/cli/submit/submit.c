@@ -84,7 +84,7 @@ int scene_bundle_read(struct scene_bundle *b, const char *path, const struct sce
 	if (rc)
 		return rc;
 	struct opened opened = {asset_folder(b->folder), b};
-	struct asset_source assets = {&opened, open_remembered, close_remembered};
+	struct asset_source assets = {.user = &opened, .open = open_remembered, .close = close_remembered};
 	rc = render_scene_read(&scene, &assets, b->scene, defines, define_count, o, e);
 	if (!rc) {
 		rc = render_check(&scene, &assets, o, &b->summary, e);

@@ -16,11 +16,14 @@ struct asset {
 	void *handle;
 };
 
+struct picture_cache; /* worker/render/texture/picture_cache.h */
+
 struct asset_source {
 	void *user;
 	/* The whole file, in memory. 0 or negative errno with a sentence. Any thread. */
 	int (*open)(void *user, const char *name, struct asset *out, struct error *e);
 	void (*close)(void *user, struct asset *a);
+	struct picture_cache *decoded; /* NULL: each texture decodes its picture for itself */
 };
 
 /* A folder: names must stay below it (no absolute paths, no "..", no symbolic links that

@@ -33,7 +33,9 @@ static double upper_bound(const struct bitmap *b)
 	if (b->shape == COLOR_SHAPE_CONSTANT)
 		return raster_max(&b->raster);
 	uint32_t w = b->raster.image.width, h = b->raster.image.height;
-	double m = 0;
+	double m = 0, *known = b->raster.shared ? &b->raster.shared->bound : NULL;
+	if (known && *known >= 0)
+		return *known;
 	for (uint32_t y = 0; y < h; y++)
 		for (uint32_t x = 0; x < w; x++) {
 			double rgb[3];
@@ -42,6 +44,8 @@ static double upper_bound(const struct bitmap *b)
 			raster_pixel(&b->raster, x, y, rgb);
 			m = fmax(m, color_max_rgb_reflectance(rgb));
 		}
+	if (known)
+		*known = m;
 	return m;
 }
 

@@ -10,10 +10,40 @@ static enum image_channel channel_of(const char *name)
 	return at && at > letters ? (enum image_channel)(at - letters) : IMAGE_ALL;
 }
 
+static int decode(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
+		  const struct picture_key *k, struct arena *arena, struct error *e)
+{
+	struct asset_part part;
+	struct error reason;
+	int code = asset_part_open(&part, n, assets, e);
+	if (code)
+		return code;
+	code = image_decode(part.bytes, part.size, k->name, k->linear, k->channel, arena, &r->image, &reason);
+	asset_part_close(&part, assets);
+	return code ? node_error(n, e, -code, "%s", reason.text) : 0;
+}
+
+/* Whether a pixel lay outside the range. */
+static bool cut_to(struct image *i, double threshold, const struct raster_range *range)
+{
+	size_t count = (size_t)i->width * i->height * i->channels;
+	bool cut = false;
+	for (size_t k = 0; k < count; k++) {
+		float x = i->pixels[k];
+		if (threshold >= 0)
+			x = (double)x >= threshold ? 1 : 0;
+		float y = (double)x < range->least     ? (float)range->least
+			  : (double)x > range->largest ? (float)range->largest
+						       : x;
+		cut |= y != x;
+		i->pixels[k] = y;
+	}
+	return cut;
+}
+
 int raster_read(struct raster *r, const struct scene_node *n, const struct asset_source *assets,
 		const struct raster_range *range, struct arena *arena, struct error *e)
 {
-	struct asset_part part;
 	const char *name = node_string(n, "filename", NULL), *channel = node_string(n, "channel", "all");
 	double gamma = node_float(n, "gamma", 0);
 	if (!name)
@@ -21,26 +51,27 @@ int raster_read(struct raster *r, const struct scene_node *n, const struct asset
 	if (gamma != 0 && gamma != 1 && gamma != -1)
 		return node_error(n, e, ENOTSUP, "gamma = %g is not supported; it can be 1 (linear) or -1 (sRGB)",
 				  gamma);
-	struct error reason;
-	bool raw = node_bool(n, "raw", range->raw && gamma != -1);
-	int code = asset_part_open(&part, n, assets, e);
+	const struct picture_key key = {
+		.name = name,
+		.first_byte = node_int(n, "first_byte", 0),
+		.byte_count = node_int(n, "byte_count", 0),
+		.base64 = node_bool(n, "base64", false),
+		.linear = gamma == 1 || node_bool(n, "raw", range->raw && gamma != -1),
+		.channel = channel_of(channel),
+		.threshold = node_float(n, "threshold", -1),
+	};
+	struct picture_cache *decoded = assets->decoded && assets->decoded->arena == arena ? assets->decoded : NULL;
+	r->shared = decoded ? picture_find(decoded, &key, range->least, range->largest) : NULL;
+	if (r->shared) {
+		r->image = r->shared->image;
+		return 0;
+	}
+	int code = decode(r, n, assets, &key, arena, e);
 	if (code)
 		return code;
-	code = image_decode(part.bytes, part.size, name, gamma == 1 || raw, channel_of(channel), arena, &r->image,
-			    &reason);
-	asset_part_close(&part, assets);
-	if (code)
-		return node_error(n, e, -code, "%s", reason.text);
-	double threshold = node_float(n, "threshold", -1);
-	size_t count = (size_t)r->image.width * r->image.height * r->image.channels;
-	for (size_t i = 0; i < count; i++) {
-		float x = r->image.pixels[i];
-		if (threshold >= 0)
-			x = (double)x >= threshold ? 1 : 0;
-		r->image.pixels[i] = (double)x < range->least	  ? (float)range->least
-				     : (double)x > range->largest ? (float)range->largest
-								  : x;
-	}
+	bool cut = cut_to(&r->image, key.threshold, range);
+	if (decoded)
+		r->shared = picture_add(decoded, &key, &r->image, range->least, range->largest, cut, arena);
 	return 0;
 }
 

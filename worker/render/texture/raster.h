@@ -9,13 +9,15 @@
 #include "worker/render/scene/asset_part.h"
 #include "worker/render/scene/image.h"
 #include "worker/render/scene/scene.h"
+#include "worker/render/texture/picture_cache.h"
 
 enum raster_wrap { RASTER_REPEAT, RASTER_MIRROR, RASTER_CLAMP };
 
 struct raster {
 	struct image image;
 	enum raster_wrap wrap_u, wrap_v;
-	bool nearest; /* else bilinear */
+	bool nearest;		/* else bilinear */
+	struct picture *shared; /* NULL: the pixels are nobody else's */
 };
 
 struct raster_range {

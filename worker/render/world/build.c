@@ -14,6 +14,7 @@
 #include "common/base/liveness.h"
 #include "worker/render/scene/asset_keeper.h"
 #include "worker/render/shape/group.h"
+#include "worker/render/texture/picture_cache.h"
 #include "worker/render/world/coincident.h"
 #include "worker/render/world/displacement.h"
 #include "worker/render/world/origin.h"
@@ -506,6 +507,8 @@ static int new_world(struct world **out, bool with_accel, const struct scene *s,
 	struct builder b = {.scene = s, .assets = &kept, .e = e, .w = mem_alloc(1, sizeof *b.w)};
 	if (!b.w)
 		return out_of_memory(e);
+	struct picture_cache decoded = {.arena = &b.w->arena};
+	kept.decoded = &decoded;
 	crash_place("building the scene", NULL, 0);
 	int rc = prepare(&b, o);
 	asset_keeper_fini(&keeper);

@@ -155,7 +155,7 @@ static void test_keeper(void **state)
 {
 	(void)state;
 	struct counts c = {0, 0};
-	const struct asset_source inner = {&c, count_open, count_close};
+	const struct asset_source inner = {.user = &c, .open = count_open, .close = count_close};
 	struct asset_keeper keeper = {.inner = &inner};
 	struct asset_source s = asset_keeper_source(&keeper);
 	struct asset first, second, other;

@@ -1,0 +1,82 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* A picture is decoded once for all textures that want the same pixels, and again for those that want others. */
+#include "tests/support/nodes.h"
+#include "tests/support/pictures.h"
+#include "worker/render/texture/picture_cache.h"
+#include "worker/render/texture/raster.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+
+#include <cmocka.h>
+
+static const struct raster_range reflectance = {0, 1, false}, light = {0, 1e30, false}, height = {-1e30, 1e30, true};
+
+struct counted {
+	struct asset_source inner;
+	int opened;
+};
+
+static int open_counted(void *user, const char *name, struct asset *out, struct error *e)
+{
+	struct counted *c = user;
+	c->opened++;
+	return c->inner.open(c->inner.user, name, out, e);
+}
+
+static void close_counted(void *user, struct asset *a)
+{
+	struct counted *c = user;
+	c->inner.close(c->inner.user, a);
+}
+
+static const float *pixels(const struct asset_source *s, const char *text, const struct raster_range *range,
+			   struct arena *a)
+{
+	struct raster r = {.nearest = false};
+	struct error e;
+	char plugin[128];
+	snprintf(plugin, sizeof plugin, "bitmap %s", text);
+	if (raster_read(&r, node_make(a, PLUGIN_TEXTURE, plugin), s, range, a, &e))
+		fail_msg("%s: %s", text, e.text);
+	return r.image.pixels;
+}
+
+static void test_shared(void **state)
+{
+	(void)state;
+	struct pictures p = {.count = 0};
+	struct arena a = {0}, other = {0};
+	struct picture_cache cache = {.arena = &a};
+	/* p0 lies within [0, 1], p1 does not. */
+	pictures_add(&p, 2, 1, (const double[]){0.5, 0.25, 0.75, 0.75, 0.5, 0.5});
+	pictures_add(&p, 2, 1, (const double[]){0.5, 0.25, 4, 0.75, 0.5, 0.5});
+	struct counted c = {.inner = pictures_source(&p)};
+	const struct asset_source s = {.user = &c, .open = open_counted, .close = close_counted, .decoded = &cache};
+	const float *first = pixels(&s, "filename=p0", &reflectance, &a);
+	assert_ptr_equal(pixels(&s, "filename=p0 wrap_mode=clamp", &reflectance, &a), first);
+	assert_ptr_equal(pixels(&s, "filename=p0", &light, &a), first);
+	assert_int_equal(c.opened, 1);
+	assert_ptr_not_equal(pixels(&s, "filename=p0 channel=r", &reflectance, &a), first);
+	assert_ptr_not_equal(pixels(&s, "filename=p0 threshold=0.5", &reflectance, &a), first);
+	assert_ptr_not_equal(pixels(&s, "filename=p0", &height, &a), first); /* not decoded as sRGB */
+	assert_int_equal(c.opened, 4);
+	const float *bright = pixels(&s, "filename=p1", &light, &a), *cut = pixels(&s, "filename=p1", &reflectance, &a);
+	assert_true(bright[2] == 4 && cut[2] == 1);
+	assert_ptr_equal(pixels(&s, "filename=p1", &reflectance, &a), cut);
+	assert_ptr_equal(pixels(&s, "filename=p1", &light, &a), bright);
+	assert_int_equal(c.opened, 6);
+	/* Memory that ends sooner or later is not shared. */
+	assert_ptr_not_equal(pixels(&s, "filename=p0", &reflectance, &other), first);
+	assert_ptr_equal(pixels(&s, "filename=p0", &reflectance, &a), first);
+	arena_fini(&other);
+	arena_fini(&a);
+	pictures_fini(&p);
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_shared)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}

@@ -1,0 +1,57 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+#include "worker/render/texture/picture_cache.h"
+
+#include <string.h>
+
+struct picture_entry {
+	struct picture_key key;
+	struct picture picture;
+	double least, largest; /* what it was cut to; where nothing was cut: the pixels' own */
+	bool cut;
+	struct picture_entry *next;
+};
+
+static bool same_key(const struct picture_key *a, const struct picture_key *b)
+{
+	return a->first_byte == b->first_byte && a->byte_count == b->byte_count && a->base64 == b->base64 &&
+	       a->linear == b->linear && a->channel == b->channel && a->threshold == b->threshold &&
+	       strcmp(a->name, b->name) == 0;
+}
+
+struct picture *picture_find(const struct picture_cache *c, const struct picture_key *k, double least, double largest)
+{
+	for (struct picture_entry *p = c->first; p; p = p->next) {
+		bool fits = p->cut ? p->least == least && p->largest == largest
+				   : p->least >= least && p->largest <= largest;
+		if (fits && same_key(&p->key, k))
+			return &p->picture;
+	}
+	return NULL;
+}
+
+static void own_range(const struct image *i, double *least, double *largest)
+{
+	size_t count = (size_t)i->width * i->height * i->channels;
+	float low = i->pixels[0], high = low;
+	for (size_t k = 1; k < count; k++) {
+		low = i->pixels[k] < low ? i->pixels[k] : low;
+		high = i->pixels[k] > high ? i->pixels[k] : high;
+	}
+	*least = (double)low;
+	*largest = (double)high;
+}
+
+struct picture *picture_add(struct picture_cache *c, const struct picture_key *k, const struct image *image,
+			    double least, double largest, bool cut, struct arena *arena)
+{
+	struct picture_entry *p = arena_alloc(arena, 1, sizeof *p);
+	char *name = arena_strdup(arena, k->name);
+	if (!p || !name)
+		return NULL;
+	*p = (struct picture_entry){*k, {*image, -1}, least, largest, cut, c->first};
+	p->key.name = name;
+	if (!cut)
+		own_range(image, &p->least, &p->largest);
+	c->first = p;
+	return &p->picture;
+}
