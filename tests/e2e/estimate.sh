@@ -54,6 +54,12 @@ awk -v n="$samples" -v low="$1" -v high="$3" 'BEGIN { exit !(low > 0 && high < 8
 echo "3 %: $samples samples, predicted $2 ($1 - $3)"
 grep -q '"end": *"target-error"' "$DIR/stats.json" || fail "the statistics do not say what ended it"
 
+# A pilot without time goes on until its error has been seen twice: a wide answer, no refusal.
+code 0 "$BIN/hslt-render" --estimate $how --pilot 0.001 --quiet --json
+if command -v jq >/dev/null; then
+	jq -e '.targets | length == 5' "$DIR/out" >/dev/null || fail "without time: not five targets: $(cat "$DIR/out")"
+fi
+
 estimates 2 "$BIN/hslt-render" --estimate $how --seed 11 --quiet
 [ "$(grep -cE '^[0-9.]+ %  +[0-9.]+ (s|min|h|days|years) ' "$DIR/out")" -eq 5 ] || fail "the table: $(cat "$DIR/out")"
 if command -v gnuplot >/dev/null; then

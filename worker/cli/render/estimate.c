@@ -8,13 +8,14 @@
 #include "common/base/progress.h"
 #include "common/json/forecast_json.h"
 #include "worker/cli/plot/plot.h"
+#include "worker/cli/render/pilot.h"
 
 #include <errno.h>
 #include <jansson.h>
 #include <math.h>
 #include <stdio.h>
 
-enum { TARGETS_MOST = 5, LOOKS_LEAST = 2 };
+enum { TARGETS_MOST = 5 };
 static const double usual[] = {0.1, 0.05, 0.02, 0.01};
 
 struct row {
@@ -59,12 +60,12 @@ static size_t rows_of(const struct estimate *s, struct row row[TARGETS_MOST])
 
 static int check(const struct estimate *s, struct error *e)
 {
-	if (s->looks->count >= LOOKS_LEAST)
+	if (s->looks->count >= PILOT_LOOKS_LEAST)
 		return 0;
 	return error_set(
 		e, EAGAIN,
 		"the pilot has seen its error %u times only, %d are needed: give it more time (--pilot SECONDS)",
-		s->looks->count, LOOKS_LEAST);
+		s->looks->count, PILOT_LOOKS_LEAST);
 }
 
 /* ---- the table */

@@ -8,9 +8,11 @@ static void look(void *user, const struct local_round *r)
 	struct local_pilot *p = user;
 	if (r->image)
 		forecast_add(&p->looks, &p->plan, r->image, r->cpu_seconds, r->seconds);
-	/* On a busy machine a little longer than asked for, rather than nothing to show. */
+	/* On a busy machine longer than asked for, rather than nothing to show: until there is enough for an estimate,
+	 * which is wide then; but not for ever, where no look says anything. */
 	double seconds = r->bootstrap_seconds + r->seconds;
-	p->over = p->timed && seconds >= (p->looks.count < PILOT_LOOKS ? 4 : 1) * p->seconds;
+	bool enough = p->looks.count >= PILOT_LOOKS_LEAST || r->rounds >= PILOT_ROUNDS_MOST;
+	p->over = p->timed && enough && seconds >= (p->looks.count < PILOT_LOOKS ? 4 : 1) * p->seconds;
 	if (p->over)
 		atomic_store(p->stop, true);
 }

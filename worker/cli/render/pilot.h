@@ -8,7 +8,13 @@
 
 #include "common/plan/plan.h"
 
-enum { PILOT_SECONDS = 60, PILOT_ROUNDS = 16 /* aimed at: a dozen looks */, PILOT_LOOKS = 4 /* at least */ };
+enum {
+	PILOT_SECONDS = 60,
+	PILOT_ROUNDS = 16,	/* aimed at: a dozen looks */
+	PILOT_LOOKS = 4,	/* worth up to four times the time */
+	PILOT_LOOKS_LEAST = 2,	/* worth any time, up to ... */
+	PILOT_ROUNDS_MOST = 64, /* ... so many rounds */
+};
 
 struct render_arguments;
 struct render_summary;

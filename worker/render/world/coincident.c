@@ -72,12 +72,16 @@ static void say(struct render_coincident *out, const struct coincide_shapes *c, 
 		snprintf(text, sizeof out->text[0], "triangles of %s coincide: only the first of them is there",
 			 name_of(nodes[c->hidden], hidden));
 	} else {
+		bool shine = s[c->hidden].rank == SURFACE_SHINES && s[c->by].rank == SURFACE_SHINES;
 		bool refract = s[c->hidden].rank == SURFACE_TRANSMITS && s[c->by].rank == SURFACE_TRANSMITS;
 		snprintf(text, sizeof out->text[0],
 			 "%s and %s coincide: where they overlap only the latter is there, because it %s%s",
 			 name_of(nodes[c->hidden], hidden), name_of(nodes[c->by], by),
 			 reason(s[c->hidden].rank, s[c->by].rank),
-			 refract ? "; where two media touch, one surface with the int_ior and ext_ior of both is meant"
+			 shine && !c->same_side
+				 ? "; light to the other side is lost: a lamp with two sides is two, a little apart"
+			 : refract
+				 ? "; where two media touch, one surface with the int_ior and ext_ior of both is meant"
 				 : "");
 	}
 	text_clean(text);

@@ -59,6 +59,17 @@ static void test_notes(void **state)
 	       "; where two media touch, one surface with the int_ior and ext_ior of both is meant",
 	       "`hole` (line 4) and `glass` (line 2) coincide: where they overlap only the latter is there, because it refracts or scatters",
 	       true);
+	/* Two lamps back to back are one, which shines to its own side; a lamp that is there twice loses nothing. */
+	expect(VIEW LAMP "<shape type='rectangle' id='back'>" AT(
+		       "<scale value='0.3'/><rotate y='1' angle='180'/><translate z='0.5' y='0.5'/>") SHINES
+	       "</shape>\n",
+	       "`back` (line 3) and `lamp` (line 2) coincide: where they overlap only the latter is there, because it comes first in the file"
+	       "; light to the other side is lost: a lamp with two sides is two, a little apart",
+	       NULL, true);
+	expect(VIEW LAMP "<shape type='rectangle' id='twin'>" AT("<scale value='0.3'/><translate z='0.5' y='0.5'/>")
+		       SHINES "</shape>\n",
+	       "`twin` (line 3) and `lamp` (line 2) coincide: where they overlap only the latter is there, because it comes first in the file",
+	       NULL, true);
 	/* A block on a floor shows nothing of it; a picture on the wall that is the wall does. */
 	expect(VIEW FLOOR(GREY) CUBE("block", "0", "0.5", RED), NULL, NULL, true);
 	expect(VIEW FLOOR(GREY) "<shape type='rectangle'>" AT("<rotate x='1' angle='-90'/>") RED "</shape>",
