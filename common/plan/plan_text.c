@@ -54,9 +54,8 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 			"%s: %u chains in %u groups, %llu bootstrap samples, epochs of %llu mutations a chain in %u leases",
 			p->integrator, p->chains, p->groups, bootstrap, epoch, p->groups * p->parts);
 	else
-		text_put(&t,
-			 "%s: %u groups, %llu samples a pixel, group and round in %u leases, grid from %llu samples",
-			 p->integrator, p->groups, epoch, p->groups * p->parts, bootstrap);
+		text_put(&t, "%s: %u groups, rounds of %llu samples a pixel in %u leases, scaled by %llu samples",
+			 p->integrator, p->groups, p->groups * epoch, p->groups * p->parts, bootstrap);
 	if (*p->mutations)
 		text_put(&t, ", mutations %s", p->mutations);
 	if (*p->accuracy)
@@ -68,9 +67,11 @@ void plan_describe(const struct plan *p, char *text, size_t size)
 	if (p->rounds != UINT64_MAX) {
 		unsigned long long rounds = (unsigned long long)p->rounds;
 		if (p->kind == PLAN_CHAINS)
-			text_put(&t, "%llu rounds (%llu mutations)", rounds, rounds * plan_round_mutations(p));
+			text_put(&t, "%llu round%s (%llu mutations)", rounds, rounds == 1 ? "" : "s",
+				 rounds * plan_round_mutations(p));
 		else
-			text_put(&t, "%llu rounds (%llu samples a pixel)", rounds, rounds * p->groups * p->epoch);
+			text_put(&t, "%llu round%s (%llu samples a pixel)", rounds, rounds == 1 ? "" : "s",
+				 rounds * p->groups * p->epoch);
 		or = " or ";
 	}
 	if (p->seconds > 0) {

@@ -185,7 +185,7 @@ static void print_doubt(const json_t *job)
 		printf("       the error's interval is not known: %s\n", text_of(job, "errorDoubt"));
 }
 
-/* "3.2 % (3.0 - 3.5 %), half of it costs 12 min of processors, 6.0 min more; done in 31 min (25 min - 40 min)" */
+/* "3.2 % (3.0 - 3.5 %), halving it costs 12 min of CPU time, 6.0 min more; done in 31 min (25 min - 40 min)" */
 static void print_forecast(const json_t *job)
 {
 	const json_t *error = json_object_get(job, "errorNow"), *half = json_object_get(job, "nextHalving");
@@ -200,7 +200,7 @@ static void print_forecast(const json_t *job)
 	if (json_is_object(half)) {
 		progress_duration(span(json_object_get(half, "cpuSeconds"), "expected"), a, sizeof a);
 		progress_duration(span(json_object_get(half, "wallSeconds"), "expected"), b, sizeof b);
-		printf("; to halve it costs %s of processors, %s", a, b);
+		printf("; halving it costs %s of CPU time, %s more", a, b);
 	}
 	if (json_is_object(eta)) {
 		progress_duration(span(eta, "expected"), a, sizeof a);

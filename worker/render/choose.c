@@ -376,13 +376,13 @@ void render_choice_text(const char *integrator, const struct render_choice *c, c
 	const struct render_found *p = &c->path, *b = &c->bdpt;
 	int n = snprintf(
 		text, size,
-		"%s, by a pilot: path: %.3g %% of the light beyond %d times the brightness of its place, tail index %.2f, "
+		"%s, by a pilot: path: %.3g %% of the light in samples above %d times the local brightness, tail index %.2f, "
 		"of the extreme %.2f, second moment times rays %.3g",
 		integrator, 100 * p->rare, RENDER_RARE, p->tail, p->extreme, p->cost);
 	if (n < 0 || (size_t)n >= size)
 		return;
 	if (c->settled)
-		snprintf(text + n, size - (size_t)n, "; so bdpt was not tried");
+		snprintf(text + n, size - (size_t)n, "; clear without samples of bdpt");
 	else
 		snprintf(text + n, size - (size_t)n, "; bdpt: %.3g %%, %.2f, %.2f, %.3g", 100 * b->rare, b->tail,
 			 b->extreme, b->cost);

@@ -89,10 +89,10 @@ static void print_table(const struct estimate *s, FILE *f)
 	forecast_error(s->looks, &now);
 	progress_duration(s->seconds, text, sizeof text);
 	progress_duration(s->cpu_seconds, cpu, sizeof cpu);
-	fprintf(f, "%s: a pilot of %s (%s of processors) came to an error of %.3g %% (%.3g - %.3g %%)\n", s->scene,
-		text, cpu, 100 * now.middle, 100 * now.low, 100 * now.high);
+	fprintf(f, "%s: a pilot of %s (%s of CPU time) reached an error of %.3g %% (%.3g - %.3g %%)\n", s->scene, text,
+		cpu, 100 * now.middle, 100 * now.low, 100 * now.high);
 	fprintf(f, "each with its 90 %% interval; wall clock on %s\n", s->where);
-	fprintf(f, "%-8s  %-31s  %-31s\n", "error", "time of processors", "wall clock");
+	fprintf(f, "%-8s  %-31s  %-31s\n", "error", "CPU time", "wall clock");
 	for (size_t i = 0; i < count; i++) {
 		snprintf(text, sizeof text, "%.3g %%", 100 * row[i].target);
 		fprintf(f, "%-8s", text);
@@ -243,7 +243,7 @@ static int draw(const struct estimate *s, const char *path, struct error *e)
 	draw_looks(s, &d);
 	draw_band(s, &d, most);
 	struct plot p = {.title = s->scene,
-			 .x_label = "seconds of processors",
+			 .x_label = "seconds of CPU time",
 			 .y_label = "relative error, %",
 			 .log_x = true,
 			 .log_y = true,

@@ -303,10 +303,10 @@ static void say(const struct session *s)
 {
 	const struct canvas_image *i = &s->image;
 	const struct plan *p = &s->plan;
-	fprintf(stderr, "%llu rounds in %.1f s (%.1f s of processors)", (unsigned long long)i->rounds, s->run.seconds,
-		s->run.cpu_seconds);
 	char text[STRATEGY_TABLE];
-	fprintf(stderr, "; ended by %s\n", merge_end_name(s->run.end, s->run.lit.black));
+	fprintf(stderr, "%llu round%s in %.1f s (%.1f s of CPU time); stopped by: %s\n", (unsigned long long)i->rounds,
+		i->rounds == 1 ? "" : "s", s->run.seconds, s->run.cpu_seconds,
+		merge_end_name(s->run.end, s->run.lit.black));
 	stated_error(i, text, sizeof text);
 	if (*text && !i->rel_mse_doubt)
 		fprintf(stderr, "%s\n", text);

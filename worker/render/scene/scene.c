@@ -323,7 +323,7 @@ static int note_ignored_plugin(struct maker *m, const struct xml_element *el, co
 	char list[256];
 	const char *type = xml_attribute(el, "type");
 	plugin_list_params(decl, list, sizeof list);
-	return note(m, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored but for: %s", el->file, el->line,
+	return note(m, el, type, "", "%s:%d: <%.64s type=\"%.64s\"> is ignored except for: %s", el->file, el->line,
 		    el->name, type, list);
 }
 
