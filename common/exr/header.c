@@ -22,6 +22,7 @@
 enum header_name {
 	H_VERSION,
 	H_SCENE,
+	H_CAMERA,
 	H_INTEGRATOR,
 	H_MIXTURE,
 	H_OPTIONS,
@@ -81,6 +82,8 @@ enum { HEADER_STRATEGIES = 5120 };
 const struct header_row header_rows[] = {
 	[H_VERSION] = {"hslt:version", STRING, false, "version of the programs"},
 	[H_SCENE] = {"hslt:scene", STRING, false, "name of the scene file"},
+	[H_CAMERA] = {"hslt:camera", STRING, false,
+		      "the camera as name=value pairs: fov in degrees, to_world by rows (x left, y up, z forward)"},
 	[H_INTEGRATOR] = {"hslt:integrator", STRING, false, "path, bdpt, pssmlt, hslt, ..."},
 	[H_MIXTURE] = {"hslt:mixture", STRING, false,
 		       "strategies that propose mutations, with their shares (Metropolis with several)"},
@@ -317,6 +320,8 @@ static void add_result(struct header *h, const struct canvas_image *img, const s
 static void add_extra(struct header *h, const struct header_extra *x)
 {
 	add_string(h, H_SCENE, x->scene ? x->scene : "");
+	if (x->camera && *x->camera)
+		add_string(h, H_CAMERA, x->camera);
 	add_int(h, H_MIXED, x->mixed);
 	begin_string(h, H_EFFECTS);
 	for (size_t i = 0; i < x->effect_count; i++)

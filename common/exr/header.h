@@ -28,7 +28,8 @@ struct header_effect { /* see render_effects */
 };
 
 struct header_extra {
-	const char *scene; /* the scene file's name, without folders */
+	const char *scene;  /* the scene file's name, without folders */
+	const char *camera; /* render_camera_text; NULL or "": not known */
 	size_t effect_count;
 	const struct header_effect *effects;
 	bool mixed; /* workers of different numeric fingerprints took part: the bits are not reproducible */

@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-enum { FARM_VERSION = 8 };
+enum { FARM_VERSION = 9 };
 
 struct envelope_block;
 

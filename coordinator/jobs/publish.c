@@ -30,6 +30,7 @@ static int write_image(struct publishing *w)
 	const char *slash = strrchr(m->scene, '/');
 	struct header_effect effects[HEADER_EFFECTS_MAX];
 	struct header_extra x = {.scene = slash ? slash + 1 : m->scene,
+				 .camera = m->camera,
 				 .effects = effects,
 				 .mixed = m->mixed,
 				 .wall_seconds = w->wall_seconds,

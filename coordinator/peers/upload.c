@@ -79,8 +79,8 @@ static int check_names(const Farm__Submit *m, struct error *e)
 static int check_texts(const Farm__Submit *m, struct error *e)
 {
 	bool ok = envelope_text_ok(m->name, 127) && envelope_text_ok(m->scene, NAME_MAX_BYTES) &&
-		  envelope_text_ok(m->output, 1023) && m->n_defines <= DEFINES_MAX && m->n_effects <= EFFECTS_MAX &&
-		  m->n_notes <= NOTES_MAX;
+		  envelope_text_ok(m->output, 1023) && envelope_text_ok(m->camera, 1023) &&
+		  m->n_defines <= DEFINES_MAX && m->n_effects <= EFFECTS_MAX && m->n_notes <= NOTES_MAX;
 	for (size_t i = 0; ok && i < m->n_defines; i++)
 		ok = envelope_text_ok(m->defines[i]->name, 256) && envelope_text_ok(m->defines[i]->value, 4096);
 	for (size_t i = 0; ok && i < m->n_effects; i++)

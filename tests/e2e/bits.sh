@@ -28,6 +28,8 @@ if "$BIN/hslt-compare" --exact "$DIR/path.exr" "$DIR/bdpt.exr" >/dev/null 2>&1; 
 	fail "path and bdpt cannot be equal: what compares does not look"
 fi
 
+grep -aq 'hslt:camera' "$DIR/path.exr" || fail "no camera in the header"
+
 start_coordinator
 started=0
 for workers in 1 2 4; do

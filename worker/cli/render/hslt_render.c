@@ -282,7 +282,10 @@ static int write_image(const struct session *s, struct error *e)
 		effects[i] = (struct header_effect){s->summary.lines[i].name, s->summary.lines[i].on,
 						    s->summary.lines[i].forced, s->summary.lines[i].why,
 						    s->summary.lines[i].saves};
+	char camera[RENDER_CAMERA_TEXT];
+	render_camera_text(&s->summary, camera, sizeof camera);
 	struct header_extra x = {.scene = s->name,
+				 .camera = camera,
 				 .effect_count = s->summary.line_count,
 				 .effects = effects,
 				 .wall_seconds = s->run.seconds,

@@ -180,6 +180,7 @@ static int wait_answer(struct client *cl, struct client_message *answer, struct 
 static int send_submit(struct client *cl, const struct submit_request *r, struct scene_bundle *b, struct error *e)
 {
 	struct lists l;
+	char camera[RENDER_CAMERA_TEXT];
 	Farm__Submit s;
 	Farm__PlanRequest plan;
 	Farm__Envelope m;
@@ -197,6 +198,8 @@ static int send_submit(struct client *cl, const struct submit_request *r, struct
 	s.render_height = r->args->render.height;
 	s.plan = &plan;
 	s.priority = r->priority;
+	render_camera_text(&b->summary, camera, sizeof camera);
+	s.camera = camera;
 	s.brightest = b->summary.brightest;
 	s.n_files = b->count;
 	s.files = l.file_at;

@@ -59,6 +59,11 @@ void render_effects_note(const struct render_summary *scene, char *text, size_t 
  * false: there are no more. */
 bool render_scene_note(const struct render_summary *scene, size_t i, char *text, size_t size);
 
+/* The camera in one line of name=value pairs, as the scene language has them: fov in degrees along fov_axis, to_world
+ * by rows (x left on the image, y up, z forward). For the image's header. */
+enum { RENDER_CAMERA_TEXT = 768 };
+void render_camera_text(const struct render_summary *scene, char *text, size_t size);
+
 /* false also where there is no effect of that name. */
 bool render_effect_on(const struct render_summary *scene, const char *name);
 

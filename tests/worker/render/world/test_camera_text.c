@@ -1,0 +1,72 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/* The camera in an image's header: what a scene that is written from it would be. */
+#include "tests/support/worlds.h"
+
+#include <setjmp.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include <cmocka.h>
+
+#define FILM                                                                                                 \
+	"<film type='hdrfilm'><integer name='width' value='16'/><integer name='height' value='8'/><rfilter " \
+	"type='box'/></film>"
+#define LOOK "<transform name='to_world'><lookat origin='1,2,5' target='0.5,0,0' up='0,1,0'/></transform>"
+#define BALL "<shape type='sphere'/><emitter type='constant'/>"
+
+static void camera_of(const char *sensor, char text[RENDER_CAMERA_TEXT], mat4 *m)
+{
+	struct world *w = world_of_text(16, 8, "%s%s", sensor, BALL);
+	struct render_summary s;
+	world_summary(w, &s);
+	render_camera_text(&s, text, RENDER_CAMERA_TEXT);
+	*m = s.settings.to_world;
+	world_free(w);
+}
+
+static void has(const char *text, const char *part)
+{
+	if (!strstr(text, part))
+		fail_msg("\"%s\" does not say \"%s\"", text, part);
+}
+
+static void test_text(void **state)
+{
+	(void)state;
+	char text[RENDER_CAMERA_TEXT];
+	mat4 m;
+	camera_of(
+		"<sensor type='perspective'><float name='fov' value='40'/><string name='fov_axis' value='y'/>" LOOK FILM
+		"</sensor>",
+		text, &m);
+	assert_true(strncmp(text, "perspective fov=40 fov_axis=y near_clip=", 40) == 0);
+	const char *at = strstr(text, " to_world=");
+	assert_non_null(at);
+	at += strlen(" to_world=");
+	for (int i = 0; i < 16; i++) {
+		char *end;
+		double x = strtod(at, &end), want = m.m[i / 4][i % 4];
+		if (!(fabs(x - want) <= 1e-8 * fabs(want)) || *end != (i < 15 ? ',' : 0))
+			fail_msg("%s: %.12g is not %.12g", text, x, want);
+		at = end + 1;
+	}
+	assert_true(m.m[0][3] == 1 && m.m[1][3] == 2 && m.m[2][3] == 5);
+	camera_of("<sensor type='thinlens'><float name='fov' value='30'/><float name='aperture_radius' value='0.25'/>"
+		  "<float name='focus_distance' value='4'/>" LOOK FILM "</sensor>",
+		  text, &m);
+	assert_true(strncmp(text, "thinlens fov=30 fov_axis=x aperture_radius=0.25 focus_distance=4 ", 65) == 0);
+	camera_of("<sensor type='orthographic'>" LOOK FILM "</sensor>", text, &m);
+	has(text, "orthographic half_width=1 near_clip=");
+	camera_of("<sensor type='perspective'><float name='fov' value='40'/><float name='principal_point_offset_x' "
+		  "value='0.25'/>" LOOK FILM "</sensor>",
+		  text, &m);
+	has(text, " principal_point_offset_x=0.25 principal_point_offset_y=0 ");
+}
+
+int main(void)
+{
+	const struct CMUnitTest tests[] = {cmocka_unit_test(test_text)};
+	return cmocka_run_group_tests(tests, NULL, NULL);
+}
