@@ -40,6 +40,21 @@ if grep -q gone.obj "$DIR/gone.xml"; then
 	grep -qi "gone.xml:[0-9]*: .*gone.obj: no such file" "$DIR/out" || fail "a missing mesh: $(cat "$DIR/out")"
 fi
 
+# Files in another folder: found where --path says, with the same picture.
+mkdir "$DIR/apart" "$DIR/library"
+sed 's:<sensor:<path value="../library"/><sensor:' "$BOX" >"$DIR/apart/box.xml"
+cp -r "${BOX%/*}/meshes" "$DIR/library"
+code 1 "$BIN/hslt-scene" check "$DIR/apart/box.xml"
+grep -q 'wedge.obj: No such file' "$DIR/out" || fail "of a mesh elsewhere it says: $(cat "$DIR/out")"
+grep -q 'note: .*"../library".*--path' "$DIR/out" || fail "it does not say how to find files outside: $(cat "$DIR/out")"
+code 0 "$BIN/hslt-scene" check --path "$DIR/library" "$DIR/apart/box.xml"
+code 0 "$BIN/hslt-render" --size 16 --spp 1 -i path --path "$DIR/library" "$DIR/apart/box.xml" -o "$DIR/apart.exr"
+code 0 "$BIN/hslt-render" --size 16 --spp 1 -i path "$BOX" -o "$DIR/whole.exr"
+code 0 "$BIN/hslt-compare" "$DIR/apart.exr" "$DIR/whole.exr"
+grep -q "^relMSE  *0 " "$DIR/out" || fail "the image is another with --path: $(cat "$DIR/out")"
+code 2 "$BIN/hslt-render" --path "$DIR/nowhere" "$BOX" -o "$DIR/x.exr"
+grep -q "is no folder" "$DIR/err.log" || fail "a --path that is not there: $(cat "$DIR/err.log")"
+
 code 0 "$BIN/hslt-scene" check "$BOX"
 grep -q "^box.xml: can be rendered: [0-9]* shapes" "$DIR/out" || fail "of a good scene it says: $(cat "$DIR/out")"
 code 0 "$BIN/hslt-scene" show "$BOX"

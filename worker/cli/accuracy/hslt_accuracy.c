@@ -147,6 +147,7 @@ struct session {
 	char *folder, *name;
 	struct scene scene;
 	bool scene_read, usage; /* usage: what went wrong was asked for */
+	struct asset_folders folders;
 	struct asset_source assets;
 	struct render_summary summary;
 	struct accuracy_design design;
@@ -170,7 +171,8 @@ static int load(struct session *s, struct error *e)
 	int rc = scene_path_split(s->a->scene, &s->folder, &s->name, e);
 	if (rc)
 		return rc;
-	s->assets = asset_folder(s->folder);
+	s->folders = option_folders(r, s->folder);
+	s->assets = asset_search(&s->folders);
 	rc = render_scene_read(&s->scene, &s->assets, s->name, r->defines, r->define_count, &r->render, e);
 	if (rc)
 		return rc;

@@ -16,6 +16,7 @@
 #include <stdlib.h>
 #include <string.h>
 #include <strings.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 enum {
@@ -37,6 +38,7 @@ enum {
 	OPTION_PARTS,
 	OPTION_LENIENT,
 	OPTION_SENSOR,
+	OPTION_PATH,
 };
 
 static const struct argp_option options[] = {
@@ -57,6 +59,8 @@ static const struct argp_option options[] = {
 	 "(hslt-render --explain lists them)",
 	 1},
 	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 1},
+	{"path", OPTION_PATH, "FOLDER", 0,
+	 "Where files that are not in the scene's folder are searched; may be given again", 1},
 	{"sensor", OPTION_SENSOR, "N", 0, "Which of the scene's sensors, from 1 on (1): --set sensor=N", 1},
 	{"lenient", OPTION_LENIENT, NULL, 0,
 	 "What the scene asks for and is not supported is left out or replaced by what is nearest, and noted: --set lenient=yes",
@@ -214,6 +218,21 @@ static void take_set(struct render_arguments *a, const char *arg, const struct a
 		argp_error(state, "--set: %s", e.text);
 }
 
+struct asset_folders option_folders(const struct render_arguments *a, const char *folder)
+{
+	return asset_folders_of(folder, a->paths, a->path_count);
+}
+
+void option_path(const struct argp_state *state, const char *arg, const char **paths, size_t *count)
+{
+	struct stat st;
+	if (stat(arg, &st) || !S_ISDIR(st.st_mode))
+		argp_error(state, "--path: '%s' is no folder", arg);
+	if (*count == OPTION_PATHS_MAX)
+		argp_error(state, "at most %d times --path", OPTION_PATHS_MAX);
+	paths[(*count)++] = arg;
+}
+
 static void take_sensor(struct render_arguments *a, const char *arg, const struct argp_state *state)
 {
 	char set[32];
@@ -313,6 +332,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		return 0;
 	case OPTION_MAX_DEPTH:
 		p->max_depth = a->render.max_depth = whole32(state, "--max-depth", arg);
+		return 0;
+	case OPTION_PATH:
+		option_path(state, arg, a->paths, &a->path_count);
 		return 0;
 	case OPTION_SENSOR:
 		take_sensor(a, arg, state);

@@ -10,13 +10,15 @@
 
 #include <argp.h>
 
-enum { OPTION_DEFINES_MAX = 256 };
+enum { OPTION_DEFINES_MAX = 256, OPTION_PATHS_MAX = ASSET_FOLDERS_MAX - 1 };
 
 struct render_arguments {
 	struct plan_request plan;
 	struct render_options render;
 	struct scene_define defines[OPTION_DEFINES_MAX];
 	size_t define_count;
+	const char *paths[OPTION_PATHS_MAX]; /* of --path, in their order */
+	size_t path_count;
 	const char *mixture; /* of --mutations LIST; NULL: not given */
 };
 
@@ -40,6 +42,12 @@ double option_seconds(const struct argp_state *state, const char *option, const 
 /* The file of an image, which is OpenEXR: the usage error where its name says that it is something else. "-" is
  * /dev/stdout. */
 const char *option_image(const struct argp_state *state, const char *arg);
+
+/* The folders in which the scene's files are searched: its own, then those of --path. */
+struct asset_folders option_folders(const struct render_arguments *a, const char *folder);
+
+/* A folder of --path, which must be there, appended to paths; else a usage error. */
+void option_path(const struct argp_state *state, const char *arg, const char **paths, size_t *count);
 
 /* "a/b/room.xml" -> "a/b" and "room.xml"; both to be mem_free'd. */
 int scene_path_split(const char *path, char **folder, char **name, struct error *e);

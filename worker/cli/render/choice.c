@@ -25,7 +25,8 @@ int choice_make(struct render_arguments *a, const char *folder, const char *name
 	*out = (struct choice){.made = false};
 	if (!integrator_is_open(&a->plan))
 		return 0;
-	struct asset_source assets = asset_folder(folder);
+	struct asset_folders folders = option_folders(a, folder);
+	struct asset_source assets = asset_search(&folders);
 	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &a->render, e);
 	if (rc)
 		return rc;

@@ -72,7 +72,8 @@ static int summarise(const char *folder, const char *name, struct render_argumen
 		     struct error *e)
 {
 	struct scene scene;
-	struct asset_source assets = asset_folder(folder);
+	struct asset_folders folders = option_folders(a, folder);
+	struct asset_source assets = asset_search(&folders);
 	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &a->render, e);
 	if (rc)
 		return rc;

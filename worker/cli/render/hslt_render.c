@@ -162,7 +162,8 @@ static int load(struct session *s, struct error *e)
 	int rc = scene_path_split(s->a->scene, &s->folder, &s->name, e);
 	if (rc)
 		return rc;
-	struct asset_source assets = asset_folder(s->folder);
+	struct asset_folders folders = option_folders(&s->a->render, s->folder);
+	struct asset_source assets = asset_search(&folders);
 	rc = render_scene_read(&scene, &assets, s->name, s->a->render.defines, s->a->render.define_count,
 			       &s->a->render.render, e);
 	if (rc)

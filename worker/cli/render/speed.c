@@ -71,7 +71,8 @@ int speed_measure(const struct render_arguments *a, const char *folder, const ch
 	*speed = 0;
 	if (r.kind == PLAN_SAMPLES)
 		shrink(&o, &r);
-	struct asset_source assets = asset_folder(folder);
+	struct asset_folders folders = option_folders(a, folder);
+	struct asset_source assets = asset_search(&folders);
 	int rc = render_scene_read(&scene, &assets, name, a->defines, a->define_count, &o, e);
 	if (rc)
 		return rc;

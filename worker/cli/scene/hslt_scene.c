@@ -4,6 +4,7 @@
 
 #include "common/base/output.h"
 #include "common/base/version.h"
+#include "worker/cli/base/options.h"
 
 #include <argp.h>
 #include <stdio.h>
@@ -27,6 +28,8 @@ static const char doc[] =
 
 static const struct argp_option options[] = {
 	{"define", 'D', "NAME=VALUE", 0, "For $NAME in the scene", 0},
+	{"path", 'p', "FOLDER", 0, "Where files that are not in the scene's folder are searched; may be given again",
+	 0},
 	{"lenient", 'l', NULL, 0,
 	 "As --lenient of hslt-render: what is not supported is left out or replaced, and is no problem but a note", 0},
 	{"json", 'j', NULL, 0, "show: one JSON object", 0},
@@ -57,6 +60,9 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	switch (key) {
 	case 'D':
 		take_define(&a->request, arg, state);
+		return 0;
+	case 'p':
+		option_path(state, arg, a->request.paths, &a->request.path_count);
 		return 0;
 	case 'l':
 		a->request.lenient = true;

@@ -20,15 +20,18 @@
 /* A scene file opened: its folder, its name there, and what the folder has. */
 struct opened {
 	char *folder, *name;
+	struct asset_folders folders;
 	struct asset_source assets;
 };
 
 static int open_scene(const struct scene_request *r, struct opened *o, struct error *e)
 {
 	int rc = scene_path_split(r->path, &o->folder, &o->name, e);
-	if (!rc)
-		o->assets = asset_folder(o->folder);
-	return rc;
+	if (rc)
+		return rc;
+	o->folders = asset_folders_of(o->folder, r->paths, r->path_count);
+	o->assets = asset_search(&o->folders);
+	return 0;
 }
 
 static void close_scene(struct opened *o)

@@ -9,6 +9,8 @@ struct scene_request {
 	const char *path;
 	struct scene_define defines[256];
 	size_t define_count;
+	const char *paths[ASSET_FOLDERS_MAX - 1]; /* where files that are not in the scene's folder are searched */
+	size_t path_count;
 	bool lenient; /* what is not supported is left out or replaced, and noted */
 };
 

@@ -300,7 +300,7 @@ int main(int argc, char **argv)
 	argp_parse(&(struct argp){options, parse, "SCENE.xml", doc, children, NULL, NULL}, argc, argv, 0, NULL, &a);
 	int rc = a.wait ? image_file_probe(a.output, &e) : a.plot ? image_file_probe(a.plot, &e) : 0;
 	if (!rc)
-		rc = scene_bundle_read(&b, a.scene, a.render.defines, a.render.define_count, &a.render.render, &e);
+		rc = scene_bundle_read(&b, a.scene, &a.render, &e);
 	if (rc) {
 		fprintf(stderr, "hslt-submit: %s\n", e.text);
 		return 1;

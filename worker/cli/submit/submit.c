@@ -75,19 +75,19 @@ static int copy_notes(struct scene_bundle *b, const struct scene *s, struct erro
 	return b->note_count == s->note_count && b->notes ? 0 : error_set(e, ENOMEM, "no memory for the scene's notes");
 }
 
-int scene_bundle_read(struct scene_bundle *b, const char *path, const struct scene_define *defines, size_t define_count,
-		      const struct render_options *o, struct error *e)
+int scene_bundle_read(struct scene_bundle *b, const char *path, const struct render_arguments *a, struct error *e)
 {
 	struct scene scene;
 	memset(b, 0, sizeof *b);
 	int rc = scene_path_split(path, &b->folder, &b->scene, e);
 	if (rc)
 		return rc;
-	struct opened opened = {asset_folder(b->folder), b};
+	b->folders = option_folders(a, b->folder);
+	struct opened opened = {asset_search(&b->folders), b};
 	struct asset_source assets = {.user = &opened, .open = open_remembered, .close = close_remembered};
-	rc = render_scene_read(&scene, &assets, b->scene, defines, define_count, o, e);
+	rc = render_scene_read(&scene, &assets, b->scene, a->defines, a->define_count, &a->render, e);
 	if (!rc) {
-		rc = render_check(&scene, &assets, o, &b->summary, e);
+		rc = render_check(&scene, &assets, &a->render, &b->summary, e);
 		if (!rc)
 			rc = copy_notes(b, &scene, e);
 		scene_fini(&scene);
@@ -241,12 +241,12 @@ static int send_chunk(struct client *cl, const struct scene_bundle_file *f, uint
 	return client_send(cl, &m, bytes, size, e);
 }
 
-/* Opened as it was before, below the scene's folder, and no other bytes than those that were read then leave this
- * machine. */
+/* Opened as it was before, below the scene's folder or one of --path, and no other bytes than those that were read then
+ * leave this machine. */
 static int send_file(struct client *cl, const struct scene_bundle *b, const struct scene_bundle_file *f,
 		     struct error *e)
 {
-	struct asset_source folder = asset_folder(b->folder);
+	struct asset_source folder = asset_search(&b->folders);
 	struct asset a;
 	struct blob_hash hash;
 	int rc = folder.open(folder.user, f->name, &a, e);

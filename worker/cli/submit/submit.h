@@ -14,8 +14,9 @@
 
 /* A scene and its files, as read here. */
 struct scene_bundle {
-	char *folder; /* of the scene file; asset names are relative to it */
-	char *scene;  /* the scene file's name in it */
+	char *folder; /* of the scene file; names of files are relative to it, or to one of the folders of --path */
+	struct asset_folders folders;
+	char *scene; /* the scene file's name in it */
 	size_t count;
 	struct scene_bundle_file {
 		char *name;
@@ -29,8 +30,7 @@ struct scene_bundle {
 
 /* Reads and checks the scene with everything that it calls for; files that its world was built without are not of the
  * bundle. The error names file, line and element. */
-int scene_bundle_read(struct scene_bundle *b, const char *path, const struct scene_define *defines, size_t define_count,
-		      const struct render_options *o, struct error *e);
+int scene_bundle_read(struct scene_bundle *b, const char *path, const struct render_arguments *a, struct error *e);
 void scene_bundle_fini(struct scene_bundle *b);
 
 struct submit_request {

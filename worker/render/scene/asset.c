@@ -125,6 +125,28 @@ static void folder_close(void *user, struct asset *a)
 	*a = (struct asset){0};
 }
 
+static int search_open(void *user, const char *name, struct asset *out, struct error *e)
+{
+	const struct asset_folders *f = user;
+	int rc = -ENOENT;
+	for (size_t i = 0; i < f->count && (rc == -ENOENT || rc == -ENOTDIR); i++)
+		rc = folder_open((void *)(uintptr_t)f->folder[i], name, out, e);
+	return rc;
+}
+
+struct asset_folders asset_folders_of(const char *own, const char *const *others, size_t count)
+{
+	struct asset_folders f = {.count = 1, .folder = {own}};
+	for (size_t i = 0; i < count && f.count < ASSET_FOLDERS_MAX; i++)
+		f.folder[f.count++] = others[i];
+	return f;
+}
+
+struct asset_source asset_search(const struct asset_folders *folders)
+{
+	return (struct asset_source){.user = (void *)(uintptr_t)folders, .open = search_open, .close = folder_close};
+}
+
 struct asset_source asset_folder(const char *folder)
 {
 	return (struct asset_source){.user = (void *)(uintptr_t)folder, .open = folder_open, .close = folder_close};

@@ -30,4 +30,15 @@ struct asset_source {
  * lead out of it, regular files only, at most 4 GB). `folder` must outlive it. */
 struct asset_source asset_folder(const char *folder);
 
+/* Folders in which a file is searched in turn, each as above: the scene's own, then those that the user adds. */
+enum { ASSET_FOLDERS_MAX = 17 };
+struct asset_folders {
+	size_t count;
+	const char *folder[ASSET_FOLDERS_MAX];
+};
+
+/* own, and the first ASSET_FOLDERS_MAX - 1 of others. */
+struct asset_folders asset_folders_of(const char *own, const char *const *others, size_t count);
+struct asset_source asset_search(const struct asset_folders *folders); /* they must outlive it */
+
 #endif

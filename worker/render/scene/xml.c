@@ -210,6 +210,16 @@ static int read_path(struct reader *r, const struct xml_element *el)
 	if (r->tree->path_count == XML_PATHS_MAX)
 		return xml_error(el, r->error, E2BIG, "more than %d search paths", XML_PATHS_MAX);
 	r->tree->paths[r->tree->path_count++] = value;
+	bool outside = *value == '/' || strncmp(value, "..", 2) == 0 || strstr(value, "/..");
+	if (!outside || r->tree->note_count == XML_NOTES_MAX)
+		return 0;
+	enum { TEXT = 256 };
+	char *text = arena_alloc(r->arena, TEXT, 1);
+	if (!text)
+		return out_of_memory(r);
+	snprintf(text, TEXT, "<path value=\"%.128s\"> leads out of the scene's folder; --path FOLDER searches there",
+		 value);
+	r->tree->notes[r->tree->note_count++] = text;
 	return 0;
 }
 

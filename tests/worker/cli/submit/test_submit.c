@@ -129,9 +129,10 @@ static void what_was_checked_is_sent(void **state)
 {
 	(void)state;
 	struct scene_bundle b;
-	struct render_options o = {.max_depth = 4};
+	static struct render_arguments o; /* large */
+	o.render.max_depth = 4;
 	struct error e;
-	assert_int_equal(scene_bundle_read(&b, scene, NULL, 0, &o, &e), 0);
+	assert_int_equal(scene_bundle_read(&b, scene, &o, &e), 0);
 	assert_int_equal(b.count, 2);
 	assert_string_equal(b.files[0].name, "box.xml");
 	assert_string_equal(b.files[1].name, "meshes/wedge.obj");
@@ -144,6 +145,31 @@ static void what_was_checked_is_sent(void **state)
 	assert_int_equal(rename(kept, mesh), 0);
 	assert_string_equal(sent(&b), "");
 	scene_bundle_fini(&b);
+}
+
+/* A library of meshes beside the scene's folder (--path): under the same name. */
+static void what_is_elsewhere_is_sent_too(void **state)
+{
+	(void)state;
+	struct scene_bundle b;
+	static struct render_arguments o; /* large */
+	struct error e;
+	char library[256], moved[300];
+	snprintf(library, sizeof library, "%s/library", folder);
+	snprintf(moved, sizeof moved, "%s/meshes", library);
+	assert_int_equal(mkdir(library, 0700), 0);
+	assert_int_equal(mkdir(moved, 0700), 0);
+	snprintf(moved, sizeof moved, "%s/meshes/wedge.obj", library);
+	assert_int_equal(rename(mesh, moved), 0);
+	o.render.max_depth = 4;
+	assert_int_equal(scene_bundle_read(&b, scene, &o, &e), -ENOENT);
+	o.paths[o.path_count++] = library;
+	assert_int_equal(scene_bundle_read(&b, scene, &o, &e), 0);
+	assert_int_equal(b.count, 2);
+	assert_string_equal(b.files[1].name, "meshes/wedge.obj");
+	assert_string_equal(sent(&b), "");
+	scene_bundle_fini(&b);
+	assert_int_equal(rename(moved, mesh), 0);
 }
 
 static void cancel(uint64_t job)
@@ -176,12 +202,13 @@ static void one_job_is_waited_for(void **state)
 {
 	(void)state;
 	struct scene_bundle b;
-	struct render_options o = {.max_depth = 4};
+	static struct render_arguments o; /* large */
+	o.render.max_depth = 4;
 	struct submit_end end;
 	struct submitted job, other;
 	struct error e;
 	char same[32];
-	assert_int_equal(scene_bundle_read(&b, scene, NULL, 0, &o, &e), 0);
+	assert_int_equal(scene_bundle_read(&b, scene, &o, &e), 0);
 	struct client *cl = call(), *later = call();
 	assert_int_equal(send_to(cl, &b, &job, &e), 0);
 	snprintf(same, sizeof same, "%s", address);
@@ -211,6 +238,7 @@ static void one_job_is_waited_for(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(what_was_checked_is_sent),
+					   cmocka_unit_test(what_is_elsewhere_is_sent_too),
 					   cmocka_unit_test(one_job_is_waited_for)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }

@@ -150,6 +150,49 @@ static void use(const struct asset_source *s, const char *name)
 	s->close(s->user, &a);
 }
 
+/* The scene's own folder first, then the others in turn; each is as closed as the first. */
+static void test_search(void **state)
+{
+	(void)state;
+	char others[2][256];
+	const char *const list[] = {others[0], others[1]};
+	snprintf(others[0], sizeof others[0], "%s/none", root);
+	snprintf(others[1], sizeof others[1], "%s/more", root);
+	assert_int_equal(mkdir(others[1], 0700), 0);
+	write_file("scene/both", "own");
+	write_file("more/both", "other");
+	write_file("more/theirs", "other");
+	write_file("outside", "none of theirs");
+	char path[300];
+	snprintf(path, sizeof path, "%s/out", others[1]);
+	assert_int_equal(symlink("../outside", path), 0);
+	struct asset_folders folders = asset_folders_of(folder, list, 2);
+	struct asset_source s = asset_search(&folders);
+	static const struct {
+		const char *name, *bytes;
+		int rc;
+	} cases[] = {{"both", "own", 0},
+		     {"theirs", "other", 0},
+		     {"nowhere", NULL, -ENOENT},
+		     {"out", NULL, -EXDEV},
+		     {"../more/theirs", NULL, -EINVAL},
+		     {"both/x", NULL, -ENOTDIR}};
+	for (size_t i = 0; i < sizeof cases / sizeof *cases; i++) {
+		struct asset a;
+		struct error e;
+		int rc = s.open(s.user, cases[i].name, &a, &e);
+		if (rc == -ELOOP && cases[i].rc == -EXDEV) /* a kernel without openat2 */
+			rc = -EXDEV;
+		assert_int_equal(rc, cases[i].rc);
+		if (!rc) {
+			assert_int_equal(a.size, strlen(cases[i].bytes));
+			assert_memory_equal(a.bytes, cases[i].bytes, a.size);
+			s.close(s.user, &a);
+		}
+	}
+	assert_int_equal(asset_folders_of(folder, (const char *[40]){0}, 40).count, ASSET_FOLDERS_MAX);
+}
+
 /* A file that is asked for again and again is opened once, and in the end all that was opened is closed. */
 static void test_keeper(void **state)
 {
@@ -184,6 +227,6 @@ static void test_keeper(void **state)
 int main(void)
 {
 	const struct CMUnitTest tests[] = {cmocka_unit_test(test_files_below), cmocka_unit_test(test_files_elsewhere),
-					   cmocka_unit_test(test_keeper)};
+					   cmocka_unit_test(test_search), cmocka_unit_test(test_keeper)};
 	return cmocka_run_group_tests(tests, set_up, tear_down);
 }
