@@ -39,11 +39,11 @@ static spectrum tint_of(const struct principled *p, const struct bsdf_point *at,
 	return sum > 0 ? spectrum_scale(all / sum, base) : spectrum_of(1);
 }
 
-struct microfacet principled_facets(const struct principled *p, double roughness)
+struct microfacet principled_facets(double anisotropic, double roughness)
 {
 	struct microfacet m;
-	double a = roughness * roughness;
-	microfacet_set(&m, true, fmax(PRINCIPLED_ALPHA_MIN, a / p->aspect), fmax(PRINCIPLED_ALPHA_MIN, a * p->aspect));
+	double a = roughness * roughness, aspect = sqrt(1 - 0.9 * anisotropic);
+	microfacet_set(&m, true, fmax(PRINCIPLED_ALPHA_MIN, a / aspect), fmax(PRINCIPLED_ALPHA_MIN, a * aspect));
 	return m;
 }
 
@@ -59,8 +59,10 @@ struct stuff principled_stuff(const struct principled *p, const struct bsdf_poin
 			  .base = texture_eval(&p->base, at->u, at->v, at->w),
 			  .roughness = share_at(&p->roughness, at),
 			  .metallic = share_at(&p->metallic, at)};
-	s.facets = principled_facets(p, s.roughness);
-	s.tint = p->spec_tint > 0 || p->sheen_tint > 0 ? tint_of(p, at, s.base) : spectrum_of(1);
+	for (int i = 0; i < SHARES; i++)
+		s.share[i] = p->varies && p->share[i].ops ? share_at(&p->share[i], at) : p->most[i];
+	s.facets = principled_facets(s.share[ANISOTROPIC], s.roughness);
+	s.tint = s.share[SPEC_TINT] > 0 || s.share[SHEEN_TINT] > 0 ? tint_of(p, at, s.base) : spectrum_of(1);
 	return s;
 }
 
@@ -75,12 +77,12 @@ spectrum principled_fresnel(const struct stuff *s, double cosine)
 {
 	const struct principled *p = s->p;
 	double rest = schlick(cosine), clear = 1 - s->metallic, root = (p->eta - 1) / (p->eta + 1);
-	double boundary = clear * (1 - p->spec_tint) * fresnel_dielectric(fmin(cosine, 1), p->eta).reflected;
+	double boundary = clear * (1 - s->share[SPEC_TINT]) * fresnel_dielectric(fmin(cosine, 1), p->eta).reflected;
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++) {
 		double tinted = fmin(s->tint.v[i] * root * root, 1);
 		f.v[i] = boundary + s->metallic * (s->base.v[i] + (1 - s->base.v[i]) * rest) +
-			 clear * p->spec_tint * (tinted + (1 - tinted) * rest);
+			 clear * s->share[SPEC_TINT] * (tinted + (1 - tinted) * rest);
 	}
 	return f;
 }
@@ -89,32 +91,37 @@ spectrum principled_fresnel(const struct stuff *s, double cosine)
  * refused below the surface by the caller. */
 spectrum principled_diffuse(const struct stuff *s, vec3 wo, vec3 wi, double cos_d)
 {
-	const struct principled *p = s->p;
 	double fo = schlick(wo.z), fi = schlick(wi.z), retro = 2 * s->roughness * cos_d * cos_d;
 	double base = (1 - 0.5 * fo) * (1 - 0.5 * fi) + retro * (fo + fi + fo * fi * (retro - 1));
 	double ss = (1 + (0.5 * retro - 1) * fo) * (1 + (0.5 * retro - 1) * fi);
 	double flat = 1.25 * (ss * (1 / fmax(wo.z + wi.z, 1e-300) - 0.5) + 0.5);
-	double diffuse = (1 - s->metallic) * (1 - p->transmission) * (base + p->flatness * (flat - base)) / WARP_PI;
-	double sheen = (1 - s->metallic) * p->sheen * schlick(cos_d);
+	double diffuse = (1 - s->metallic) * (1 - s->share[TRANSMISSION]) *
+			 (base + s->share[FLATNESS] * (flat - base)) / WARP_PI;
+	double sheen = (1 - s->metallic) * s->share[SHEEN] * schlick(cos_d);
 	spectrum f;
 	for (int i = 0; i < SPECTRUM_LANES; i++)
-		f.v[i] = diffuse * s->base.v[i] + sheen * (1 + p->sheen_tint * (s->tint.v[i] - 1));
+		f.v[i] = diffuse * s->base.v[i] + sheen * (1 + s->share[SHEEN_TINT] * (s->tint.v[i] - 1));
 	return f;
 }
 
-/* GTR1: Burley 2012, appendix B.2. */
-static double clearcoat_d(const struct principled *p, double cos_h)
+static double clearcoat_alpha(double gloss)
 {
-	double a2 = p->clearcoat_alpha * p->clearcoat_alpha;
+	return 0.1 + (0.001 - 0.1) * gloss;
+}
+
+/* GTR1: Burley 2012, appendix B.2. */
+static double clearcoat_d(const struct stuff *s, double cos_h)
+{
+	double alpha = clearcoat_alpha(s->share[CLEARCOAT_GLOSS]), a2 = alpha * alpha;
 	return (a2 - 1) / (WARP_PI * log(a2) * (a2 * cos_h * cos_h + (1 - cos_h) * (1 + cos_h)));
 }
 
-static double clearcoat_of(const struct principled *p, vec3 wo, vec3 wi, vec3 h, double cos_d)
+static double clearcoat_of(const struct stuff *s, vec3 wo, vec3 wi, vec3 h, double cos_d)
 {
 	struct microfacet shadow;
 	microfacet_set(&shadow, true, 0.25, 0.25);
 	double f = CLEARCOAT_REFLECTANCE + (1 - CLEARCOAT_REFLECTANCE) * schlick(cos_d);
-	return 0.25 * p->clearcoat * f * clearcoat_d(p, h.z) * 0.25 * microfacet_g1_over_cos(&shadow, wo) *
+	return 0.25 * s->share[CLEARCOAT] * f * clearcoat_d(s, h.z) * 0.25 * microfacet_g1_over_cos(&shadow, wo) *
 	       microfacet_g1_over_cos(&shadow, wi);
 }
 
@@ -123,13 +130,14 @@ static void chances(const struct stuff *s, vec3 wo, double chance[LOBES])
 {
 	const struct principled *p = s->p;
 	bool below = wo.z < 0;
-	double clear = 1 - s->metallic, glass = clear * p->transmission;
+	double clear = 1 - s->metallic, glass = clear * s->share[TRANSMISSION];
 	double reflected = fresnel_dielectric(fmin(fabs(wo.z), 1), below ? 1 / p->eta : p->eta).reflected, sum = 0;
 	/* Where the surface reflects totally, some facets do not. */
 	chance[LOBE_TRANSMIT] = glass * fmax(1 - reflected, 0.05);
 	chance[LOBE_SPECULAR] = below ? glass * reflected : clear * reflected + s->metallic * fmax(p->base_max, 0.04);
-	chance[LOBE_DIFFUSE] = below ? 0 : clear * fmax((1 - p->transmission) * p->base_max, fmin(p->sheen, 1) * 0.2);
-	chance[LOBE_CLEARCOAT] = below ? 0 : 0.25 * p->clearcoat * (CLEARCOAT_REFLECTANCE + schlick(wo.z));
+	chance[LOBE_DIFFUSE] =
+		below ? 0 : clear * fmax((1 - s->share[TRANSMISSION]) * p->base_max, fmin(s->share[SHEEN], 1) * 0.2);
+	chance[LOBE_CLEARCOAT] = below ? 0 : 0.25 * s->share[CLEARCOAT] * (CLEARCOAT_REFLECTANCE + schlick(wo.z));
 	for (int i = 0; i < LOBES; i++)
 		sum += chance[i];
 	for (int i = 0; i < LOBES; i++)
@@ -162,8 +170,8 @@ static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, d
 		return;
 	double spread = co * -ci * (eta / length) * (eta / length);
 	double seen = microfacet_d(&s->facets, h) * microfacet_g1_over_cos(&s->facets, wo) * spread;
-	double passes =
-		(1 - s->metallic) * s->p->transmission * fresnel_between(fmin(co, 1), fmin(-ci, 1), eta).transmitted;
+	double passes = (1 - s->metallic) * s->share[TRANSMISSION] *
+			fresnel_between(fmin(co, 1), fmin(-ci, 1), eta).transmitted;
 	double f = seen * passes * microfacet_g1_over_cos(&s->facets, (vec3){wi.x, wi.y, fabs(wi.z)});
 	if (transport == TRANSPORT_RADIANCE)
 		f /= eta * eta;
@@ -175,7 +183,6 @@ static void add_refracted(const struct stuff *s, vec3 wo, vec3 wi, double eta, d
 static void add_reflected(const struct stuff *s, vec3 wo, vec3 wi, bool below, double eta, const double chance[LOBES],
 			  struct pair *out)
 {
-	const struct principled *p = s->p;
 	vec3 h;
 	double length;
 	if (!microfacet_half(wo, 1, wi, &h, &length))
@@ -185,15 +192,15 @@ static void add_reflected(const struct stuff *s, vec3 wo, vec3 wi, bool below, d
 	double both = seen * microfacet_g1_over_cos(&s->facets, wi);
 	out->pdf = chance[LOBE_SPECULAR] * seen;
 	if (below) {
-		out->f = spectrum_of(both * (1 - s->metallic) * p->transmission *
+		out->f = spectrum_of(both * (1 - s->metallic) * s->share[TRANSMISSION] *
 				     fresnel_dielectric(cos_d, eta).reflected);
 		return;
 	}
 	out->f = spectrum_add(spectrum_scale(both, principled_fresnel(s, cos_d)), principled_diffuse(s, wo, wi, cos_d));
 	out->pdf += chance[LOBE_DIFFUSE] * wi.z / WARP_PI;
-	if (p->clearcoat > 0) {
-		out->f = spectrum_add(out->f, spectrum_of(clearcoat_of(p, wo, wi, h, cos_d)));
-		out->pdf += chance[LOBE_CLEARCOAT] * clearcoat_d(p, h.z) * h.z / (4 * cos_d);
+	if (s->share[CLEARCOAT] > 0) {
+		out->f = spectrum_add(out->f, spectrum_of(clearcoat_of(s, wo, wi, h, cos_d)));
+		out->pdf += chance[LOBE_CLEARCOAT] * clearcoat_d(s, h.z) * h.z / (4 * cos_d);
 	}
 }
 
@@ -202,7 +209,7 @@ static struct pair pair_of(const struct stuff *s, vec3 wo, vec3 wi, enum transpo
 	struct pair out = {spectrum_of(0), 0};
 	bool below = wo.z < 0;
 	double chance[LOBES], eta = below ? 1 / s->p->eta : s->p->eta;
-	if (wo.z == 0 || wi.z == 0 || (below && !(s->p->transmission > 0 && s->metallic < 1)))
+	if (wo.z == 0 || wi.z == 0 || (below && !(s->share[TRANSMISSION] > 0 && s->metallic < 1)))
 		return out;
 	chances(s, wo, chance);
 	wo = mirror(wo, below);
@@ -227,9 +234,9 @@ static double principled_pdf(const struct bsdf *b, const struct bsdf_point *at, 
 }
 
 /* A half vector of GTR1, exactly: the inverse of its cumulative density. */
-static vec3 clearcoat_normal(const struct principled *p, double u0, double u1)
+static vec3 clearcoat_normal(const struct stuff *s, double u0, double u1)
 {
-	double a2 = p->clearcoat_alpha * p->clearcoat_alpha;
+	double alpha = clearcoat_alpha(s->share[CLEARCOAT_GLOSS]), a2 = alpha * alpha;
 	double cos2 = fmin(fmax((1 - pow(a2, 1 - u0)) / (1 - a2), 0), 1), sine = sqrt(1 - cos2), phi = 2 * WARP_PI * u1;
 	return (vec3){sine * cos(phi), sine * sin(phi), sqrt(cos2)};
 }
@@ -241,7 +248,7 @@ static bool follow(const struct stuff *s, int lobe, vec3 wo, double eta, const d
 		*wi = warp_cosine_hemisphere(u[0], u[1]);
 		return wi->z > 0;
 	}
-	vec3 h = lobe == LOBE_CLEARCOAT ? clearcoat_normal(s->p, u[0], u[1])
+	vec3 h = lobe == LOBE_CLEARCOAT ? clearcoat_normal(s, u[0], u[1])
 					: microfacet_sample_visible(&s->facets, wo, u[0], u[1]);
 	double c = fmin(vec3_dot(wo, h), 1);
 	if (!(c > 0))
@@ -283,16 +290,45 @@ static bool principled_sample(const struct bsdf *b, const struct bsdf_point *at,
 	return true;
 }
 
-double principled_least(const struct texture *t)
+static double range_of(const struct texture *t, bool largest)
 {
 	static const struct wavelengths w = {.nm = {450, 500, 550, 600}};
 	enum { SIDE = 64 };
-	double least = 1;
+	double least = 1, most = 0;
 	for (int i = 0; i < SIDE * SIDE; i++) {
 		const struct bsdf_point at = {.u = (i / SIDE + 0.5) / SIDE, .v = (i % SIDE + 0.5) / SIDE, .w = &w};
-		least = fmin(least, share_at(t, &at));
+		double x = share_at(t, &at);
+		least = fmin(least, x);
+		most = fmax(most, x);
 	}
-	return least;
+	return largest ? most : least;
+}
+
+double principled_least(const struct texture *t)
+{
+	return range_of(t, false);
+}
+
+int principled_shares(struct principled *p, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+		      struct error *e)
+{
+	static const char *const names[SHARES] = {
+		[TRANSMISSION] = "spec_trans",	       [SPEC_TINT] = "spec_tint",    [SHEEN] = "sheen",
+		[SHEEN_TINT] = "sheen_tint",	       [FLATNESS] = "flatness",	     [CLEARCOAT] = "clearcoat",
+		[CLEARCOAT_GLOSS] = "clearcoat_gloss", [ANISOTROPIC] = "anisotropic"};
+	for (int i = 0; i < SHARES; i++) {
+		p->share[i] = (struct texture){.ops = NULL};
+		if (!node_ref(n, names[i])) {
+			p->most[i] = node_float(n, names[i], 0);
+			continue;
+		}
+		int code = bsdf_texture(b, &p->share[i], n, names[i], 0, build, e);
+		if (code)
+			return code;
+		p->most[i] = range_of(&p->share[i], true);
+		p->varies = true;
+	}
+	return 0;
 }
 
 static int read_index(struct principled *p, const struct scene_node *n, struct error *e)
@@ -318,48 +354,39 @@ static int principled_create(struct bsdf *b, const struct scene_node *n, const s
 	if (!code)
 		code = bsdf_texture(b, &p->metallic, n, "metallic", 0, build, e);
 	if (!code)
+		code = principled_shares(p, b, n, build, e);
+	if (!code)
 		code = read_index(p, n, e);
 	if (code)
 		return code;
-	p->transmission = node_float(n, "spec_trans", 0);
-	p->spec_tint = node_float(n, "spec_tint", 0);
-	p->sheen = node_float(n, "sheen", 0);
-	p->sheen_tint = node_float(n, "sheen_tint", 0);
-	p->flatness = node_float(n, "flatness", 0);
-	p->clearcoat = node_float(n, "clearcoat", 0);
-	p->clearcoat_alpha = 0.1 + (0.001 - 0.1) * node_float(n, "clearcoat_gloss", 0);
-	p->aspect = sqrt(1 - 0.9 * node_float(n, "anisotropic", 0));
 	p->base_max = texture_max(&p->base);
-	struct microfacet least = principled_facets(p, principled_least(&p->roughness));
+	struct microfacet least = principled_facets(p->most[ANISOTROPIC], principled_least(&p->roughness));
 	double metallic = principled_least(&p->metallic);
-	bool glass = p->transmission > 0 && metallic < 1;
+	bool glass = p->most[TRANSMISSION] > 0 && metallic < 1;
 	b->modes = BSDF_REFLECT | (glass ? BSDF_TRANSMIT : 0);
 	b->has_smooth = true;
 	b->two_sided = glass;
 	b->eta = glass ? p->eta : 1;
-	b->alpha = fmin(microfacet_least(&least), p->clearcoat > 0 ? p->clearcoat_alpha : INFINITY);
-	double diffuse = (1 - metallic) * (1 - p->transmission);
+	b->alpha = fmin(microfacet_least(&least),
+			p->most[CLEARCOAT] > 0 ? clearcoat_alpha(p->most[CLEARCOAT_GLOSS]) : INFINITY);
+	double diffuse = (1 - metallic) * (1 - p->most[TRANSMISSION]);
 	b->alpha_mean = diffuse + (1 - diffuse) * microfacet_mean(&least);
 	return 0;
 }
 
-#define SHARE(name_)                                                                \
-	{                                                                           \
-		.name = name_, .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1 \
-	}
 static const struct param principled_params[] = {
 	{.name = "base_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 	{.name = "roughness", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 	{.name = "metallic", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-	SHARE("spec_trans"),
-	SHARE("spec_tint"),
-	SHARE("sheen"),
-	SHARE("sheen_tint"),
-	SHARE("flatness"),
-	SHARE("clearcoat"),
-	SHARE("clearcoat_gloss"),
-	SHARE("anisotropic"),
-	SHARE("specular"),
+	PRINCIPLED_SHARE("spec_trans"),
+	PRINCIPLED_SHARE("spec_tint"),
+	PRINCIPLED_SHARE("sheen"),
+	PRINCIPLED_SHARE("sheen_tint"),
+	PRINCIPLED_SHARE("flatness"),
+	PRINCIPLED_SHARE("clearcoat"),
+	PRINCIPLED_SHARE("clearcoat_gloss"),
+	PRINCIPLED_SHARE("anisotropic"),
+	{.name = "specular", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 1},
 	{.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 	{.name = "diffuse_reflectance_sampling_rate", .status = PARAM_IGNORED},
 	{.name = "main_specular_sampling_rate", .status = PARAM_IGNORED},

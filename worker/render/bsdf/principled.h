@@ -7,27 +7,41 @@
 #include "worker/render/bsdf/create.h"
 #include "worker/render/bsdf/microfacet.h"
 
+/* The parameters that are shares, from 0 to 1: numbers or textures. */
+enum { TRANSMISSION, SPEC_TINT, SHEEN, SHEEN_TINT, FLATNESS, CLEARCOAT, CLEARCOAT_GLOSS, ANISOTROPIC, SHARES };
+
 struct principled {
 	struct texture base, roughness, metallic;
-	double transmission, spec_tint, sheen, sheen_tint, flatness, clearcoat, clearcoat_alpha, aspect, eta;
-	double base_max;
+	struct texture share[SHARES];
+	double most[SHARES]; /* the largest of each, of a texture on a grid */
+	double eta, base_max;
+	bool varies; /* some share is a texture */
 };
 
 /* What a point of the surface is made of. */
 struct stuff {
 	const struct principled *p;
 	spectrum base, tint;
-	double roughness, metallic;
+	double roughness, metallic, share[SHARES];
 	struct microfacet facets;
 };
 
 struct stuff principled_stuff(const struct principled *p, const struct bsdf_point *at);
-struct microfacet principled_facets(const struct principled *p, double roughness);
+struct microfacet principled_facets(double anisotropic, double roughness);
 
 /* Fresnel's factor of boundary and metal, for light from above. */
 spectrum principled_fresnel(const struct stuff *s, double cosine);
 /* The diffuse lobe with sheen; cos_d: of either direction against the half vector. Both directions above. */
 spectrum principled_diffuse(const struct stuff *s, vec3 wo, vec3 wi, double cos_d);
+
+/* Reads those of the shares that are among the plug-in's parameters; the others are 0. */
+int principled_shares(struct principled *p, struct bsdf *b, const struct scene_node *n, const struct bsdf_build *build,
+		      struct error *e);
+
+#define PRINCIPLED_SHARE(name_)                                                                  \
+	{                                                                                        \
+		.name = name_, .types = VALUE_FLOAT | VALUE_INT | VALUE_NODE, .min = 0, .max = 1 \
+	}
 
 /* The least of a texture's values from 0 to 1, on a grid: step sizes go by that of roughness. */
 double principled_least(const struct texture *t);

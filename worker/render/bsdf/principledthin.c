@@ -38,7 +38,7 @@ static void find_chances(struct thin_point *x, double cosine)
 	/* Facets reflect other shares than the plane they lie in: neither lobe is left out. */
 	x->chance[THIN_REFLECT] = t->spec_trans * (0.25 + 0.5 * reflected);
 	x->chance[THIN_TRANSMIT] = t->spec_trans * base * (0.75 - 0.5 * reflected);
-	x->chance[THIN_DIFFUSE] = diffuse * (1 - t->through) * fmax(base, 0.2 * fmin(t->p.sheen, 1));
+	x->chance[THIN_DIFFUSE] = diffuse * (1 - t->through) * fmax(base, 0.2 * x->s.share[SHEEN]);
 	x->chance[THIN_THROUGH] = diffuse * t->through * base;
 	for (int i = 0; i < THIN_LOBES; i++)
 		sum += x->chance[i];
@@ -50,7 +50,7 @@ static struct thin_point thin_at(const struct bsdf *b, const struct bsdf_point *
 {
 	const struct thin *t = b->data;
 	struct thin_point x = {.t = t, .s = principled_stuff(&t->p, p)};
-	x.passing = principled_facets(&t->p, (0.65 * t->p.eta - 0.35) * x.s.roughness);
+	x.passing = principled_facets(x.s.share[ANISOTROPIC], (0.65 * t->p.eta - 0.35) * x.s.roughness);
 	find_chances(&x, fabs(wo.z));
 	return x;
 }
@@ -141,21 +141,20 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 	int code = bsdf_texture(b, &p->base, n, "base_color", 0.5, build, e);
 	if (!code)
 		code = bsdf_texture(b, &p->roughness, n, "roughness", 0.5, build, e);
+	if (!code)
+		code = principled_shares(p, b, n, build, e);
 	if (code)
 		return code;
+	/* What passes specularly is not what principled_diffuse leaves out. */
+	t->spec_trans = p->most[TRANSMISSION];
+	p->most[TRANSMISSION] = 0;
 	p->metallic = (struct texture){.color = color_constant(0)};
 	p->eta = node_float(n, "eta", 1.5);
-	p->spec_tint = node_float(n, "spec_tint", 0);
-	p->sheen = node_float(n, "sheen", 0);
-	p->sheen_tint = node_float(n, "sheen_tint", 0);
-	p->flatness = node_float(n, "flatness", 0);
-	p->aspect = sqrt(1 - 0.9 * node_float(n, "anisotropic", 0));
 	p->base_max = texture_max(&p->base);
-	t->spec_trans = node_float(n, "spec_trans", 0);
 	t->through = 0.5 * node_float(n, "diff_trans", 0);
 	double rough = principled_least(&p->roughness);
-	struct microfacet facets = principled_facets(p, rough),
-			  passing = principled_facets(p, (0.65 * p->eta - 0.35) * rough);
+	struct microfacet facets = principled_facets(p->most[ANISOTROPIC], rough),
+			  passing = principled_facets(p->most[ANISOTROPIC], (0.65 * p->eta - 0.35) * rough);
 	b->modes = BSDF_REFLECT | (t->spec_trans > 0 || t->through > 0 ? BSDF_TRANSMIT : 0);
 	b->has_smooth = true;
 	b->two_sided = true;
@@ -171,12 +170,12 @@ static int thin_create(struct bsdf *b, const struct scene_node *n, const struct 
 static const struct param thin_params[] = {
 	{.name = "base_color", .types = VALUE_TEXTURE, .min = 0, .max = 1},
 	{.name = "roughness", .types = VALUE_TEXTURE, .min = 0, .max = 1},
-	SHARE("anisotropic", 1),
+	PRINCIPLED_SHARE("anisotropic"),
 	SHARE("spec_trans", 1),
-	SHARE("spec_tint", 1),
-	SHARE("sheen", 1),
-	SHARE("sheen_tint", 1),
-	SHARE("flatness", 1),
+	PRINCIPLED_SHARE("spec_tint"),
+	PRINCIPLED_SHARE("sheen"),
+	PRINCIPLED_SHARE("sheen_tint"),
+	PRINCIPLED_SHARE("flatness"),
 	SHARE("diff_trans", 2),
 	{.name = "eta", .types = VALUE_FLOAT | VALUE_INT, .min = 1, .max = 10},
 	{.name = "diffuse_reflectance_sampling_rate", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},

@@ -130,6 +130,20 @@ static void test_metallic_texture(void **state)
 	(void)state;
 	same("principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 | @metallic checkerboard color0=0.7 color1=0.7",
 	     "principled base_color=rgb(0.8,0.3,0.1) roughness=0.4 metallic=0.7", 0, 1);
+	/* each of the shares, and the roughness of facets that goes with them */
+	static const char *const shares[] = {"spec_trans", "spec_tint", "sheen",	   "sheen_tint",
+					     "flatness",   "clearcoat", "clearcoat_gloss", "anisotropic"};
+	for (size_t i = 0; i < sizeof shares / sizeof *shares; i++) {
+		static const char base[] = "base_color=rgb(0.8,0.3,0.1) roughness=0.4";
+		const char *with = strcmp(shares[i], "sheen_tint") == 0	       ? "sheen=0.5"
+				   : strcmp(shares[i], "clearcoat_gloss") == 0 ? "clearcoat=0.5"
+									       : "";
+		char map[256], number[256];
+		snprintf(map, sizeof map, "principled %s %s | @%s checkerboard color0=1 color1=0.25", base, with,
+			 shares[i]);
+		snprintf(number, sizeof number, "principled %s %s %s=0.25", base, with, shares[i]);
+		same(map, number, i == 0, 1);
+	}
 	/* (0.3, 0.7) lies on a square of color1 */
 	same("principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 | @metallic checkerboard color0=1 color1=0.25",
 	     "principled base_color=rgb(0.8,0.3,0.1) spec_trans=0.5 metallic=0.25", 1, 1);
