@@ -33,10 +33,11 @@ static const double rare_hint = 0.03, tail_mean = 1;
  * factors; else shares of 0.12 or less, but for two of veach-mis, and for veach-door: 0.33 to 0.55, and an index of 1.1
  * or more. */
 static const double rare_some = 0.12, heavy_most = 1.1;
-/* Of both, the mean share, the index of bdpt's extremes, and that of both together. 43 of 48 pilots of half-sunk say
- * so, where chains are as good as the others but for fireflies (four times better with them); of the scenes where bdpt
- * is the best one of 38 of ring, one of 46 of veach-mis, and none of five others. */
-static const double rare_both = 0.04, extreme_least = 0.85, extreme_both = 0.82;
+/* Of both, the mean share, the index of bdpt's extremes, and that of both together. 39 of 48 pilots of half-sunk say
+ * so, where chains are as good as the others but for fireflies; of the scenes where bdpt is the best one of 46 of
+ * veach-mis, and none of 38 of ring, 100 of displaced and four others. With 0.85 for bdpt's two of displaced did, too.
+ */
+static const double rare_both = 0.04, extreme_least = 0.75, extreme_both = 0.82;
 /* A quarter of bdpt's samples is enough where they find so much rare light, and none of a mean; or hardly any, and path
  * little, of which the extremes are no heavier than that. */
 static const double rare_clear = 0.4, rare_none = 0.01;
