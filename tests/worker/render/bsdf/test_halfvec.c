@@ -112,6 +112,40 @@ static void test_the_jacobian_is_the_derivative(void **state)
 	assert_true(done[0] > 3000 && done[1] > 3000 && worst < 1e-5);
 }
 
+/* Between equal indices the half vector is (wo + wi)_xy: the same differences. */
+static void test_the_jacobian_between_equal_indices(void **state)
+{
+	(void)state;
+	static const struct bsdf_ops ops = {.type = "one", .eval = eval_one};
+	const struct bsdf b = {.ops = &ops, .eta = 1};
+	struct dice d = dice_of(__func__);
+	size_t done = 0;
+	for (int i = 0; i < 2000; i++) {
+		wide wo = widen(dice_direction(&d)), wi = widen(dice_direction(&d)), side[4];
+		long double step = 1e-6L;
+		if (wo.z * wi.z > 0)
+			wi.z = -wi.z;
+		if (fabsl(wi.z) < 0.05L)
+			continue;
+		for (int k = 0; k < 4; k++) {
+			long double x = wi.x + (k == 0	 ? step
+						: k == 1 ? -step
+							 : 0),
+				    y = wi.y + (k == 2	 ? step
+						: k == 3 ? -step
+							 : 0);
+			side[k] = (wide){x, y, copysignl(sqrtl(1 - x * x - y * y), wi.z)};
+		}
+		wide dx = {side[0].x - side[1].x, side[0].y - side[1].y, side[0].z - side[1].z};
+		wide dy = {side[2].x - side[3].x, side[2].y - side[3].y, side[2].z - side[3].z}, n = cross(dx, dy);
+		double solid = (double)(sqrtl(dot(n, n)) / (4 * step * step));
+		double told = bsdf_eval_halfvec(&b, &point, narrow(wo), narrow(wi)).v[1] / fabs((double)wi.z);
+		assert_true(fabs(told / solid - 1) < 1e-5);
+		done++;
+	}
+	assert_true(done > 1500);
+}
+
 /* Of those who cancel by hand, the outer product instead. */
 static double product(const struct bsdf *b, vec3 wo, vec3 wi, int lane)
 {
@@ -324,6 +358,7 @@ int main(void)
 {
 	const struct CMUnitTest tests[] = {
 		cmocka_unit_test(test_the_jacobian_is_the_derivative),
+		cmocka_unit_test(test_the_jacobian_between_equal_indices),
 		cmocka_unit_test(test_every_bsdf_against_its_product),
 		cmocka_unit_test(test_microfacets_against_the_textbook),
 	};
