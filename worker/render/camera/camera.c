@@ -1,22 +1,12 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 #include "worker/render/camera/camera.h"
-
-#include <string.h>
+#include "worker/render/scene/fov.h"
 
 /* Pixels per unit of slope: the same for both axes, so `smaller` and the like only choose which side the angle spans.
  */
 static double pixels_per_slope(const struct scene_settings *s)
 {
-	double w = s->width, h = s->height, side = w;
-	if (strcmp(s->fov_axis, "y") == 0)
-		side = h;
-	else if (strcmp(s->fov_axis, "diagonal") == 0)
-		side = hypot(w, h);
-	else if (strcmp(s->fov_axis, "smaller") == 0)
-		side = fmin(w, h);
-	else if (strcmp(s->fov_axis, "larger") == 0)
-		side = fmax(w, h);
-	return side / (2 * tan(s->fov * (M_PI / 360)));
+	return fov_side(s->fov_axis, s->width, s->height) / (2 * tan(s->fov * (M_PI / 360)));
 }
 
 /* An orthographic camera is a pinhole so far behind that what is twice as far away looks smaller by a part in 2^20

@@ -7,21 +7,43 @@ int delta_create(struct emitter *em, struct delta_light *l, const struct scene_n
 	struct texture t;
 	int code =
 		texture_from_node(&t, n, name, 1, COLOR_ILLUMINANT, build->assets, build->dialect_3, build->arena, e);
+	if (!code)
+		code = delta_place(em, l, n, factor, e);
 	if (code)
 		return code;
+	l->color = t.color;
+	em->shape = l->color.shape;
+	em->brightest = DELTA_HEADROOM * factor * color_max(&l->color);
+	return 0;
+}
+
+int delta_place(struct emitter *em, struct delta_light *l, const struct scene_node *n, double factor, struct error *e)
+{
 	double away = vec3_length(l->x.p);
 	if (!(away <= PARAM_REACH_MAX))
 		return node_error(n, e, ERANGE, "stands %g times the scene's radius away from it, beyond %g", away,
 				  PARAM_REACH_MAX);
 	if (!(factor > 0) || !isfinite(factor))
 		return node_error(n, e, EINVAL, "the scene's size leaves no number for this light's strength");
-	l->color = t.color;
 	l->factor = factor;
 	em->data = l;
 	em->delta = true;
 	em->infinite = l->x.infinite;
-	em->shape = l->color.shape;
-	em->brightest = DELTA_HEADROOM * factor * color_max(&l->color);
+	return 0;
+}
+
+int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e)
+{
+	vec3 x = mat4_vector(to_world, (vec3){1, 0, 0}), y = mat4_vector(to_world, (vec3){0, 1, 0});
+	vec3 z = vec3_normalize(mat4_vector(to_world, (vec3){0, 0, 1}));
+	axes[2] = z;
+	axes[1] = vec3_normalize(vec3_madd(y, -vec3_dot(y, z), z));
+	axes[0] = vec3_cross(axes[1], z);
+	double side = vec3_dot(x, axes[0]);
+	if (side < 0)
+		axes[0] = vec3_neg(axes[0]);
+	if (!vec3_is_finite(z) || !vec3_is_finite(axes[1]) || !(fabs(side) > 0))
+		return node_error(n, e, EINVAL, "the to_world transform is singular");
 	return 0;
 }
 

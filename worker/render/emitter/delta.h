@@ -12,6 +12,7 @@
 #define WORKER_RENDER_EMITTER_DELTA_H
 
 #include "worker/render/emitter/emitter.h"
+#include "worker/render/math/mat4.h"
 
 #define DELTA_HEADROOM 1024.0
 
@@ -25,6 +26,11 @@ struct delta_light {
  * what delta_strength gives. */
 int delta_create(struct emitter *em, struct delta_light *l, const struct scene_node *n, const char *name, double factor,
 		 const struct emitter_build *build, struct error *e);
+/* The same without the colour: shape, brightest and power are the caller's. */
+int delta_place(struct emitter *em, struct delta_light *l, const struct scene_node *n, double factor, struct error *e);
+/* Unit axes of to_world: +z as it is, +y made perpendicular to it, a mirrored transform stays mirrored. -EINVAL with a
+ * sentence when it is singular. */
+int delta_axes(const struct scene_node *n, const mat4 *to_world, vec3 axes[3], struct error *e);
 double delta_strength(const struct delta_light *l);
 /* -EINVAL with a sentence when the node gives both. */
 int delta_either(const struct scene_node *n, const char *name, const char *other, struct error *e);

@@ -2,7 +2,8 @@
 /*
  * A point that shines into a cone around to_world's +z: `intensity` up to the angle `beam_width` from the axis, from
  * there linear in the angle to 0 at `cutoff_angle` (degrees; 20, and 3/4 of the cut-off, where nothing is said). Light
- * paths leave it uniformly over the cone.
+ * paths leave it uniformly over the cone. A `texture` multiplies the intensity: its unit square, upright, is what the
+ * cone circumscribes on a plane across the axis.
  */
 #include "worker/render/emitter/delta.h"
 #include "worker/render/math/frame.h"
@@ -12,6 +13,10 @@ struct spot {
 	struct frame axes;
 	double cutoff, beam; /* radians */
 	double height;	     /* of the cone's cap: 1 - cos(cutoff) */
+	bool textured;
+	struct texture texture;
+	vec3 local[3]; /* of the texture: unit axes */
+	double reach;  /* tan(cutoff) */
 };
 
 static double falloff(const struct spot *s, vec3 w)
@@ -26,7 +31,13 @@ static spectrum radiance(const struct emitter *em, const struct emitter_point *x
 {
 	(void)x;
 	const struct spot *s = em->data;
-	return spectrum_scale(s->light.factor * falloff(s, w), color_eval(&s->light.color, wl));
+	double part = falloff(s, w);
+	spectrum intensity = spectrum_scale(s->light.factor * part, color_eval(&s->light.color, wl));
+	if (!s->textured || !(part > 0))
+		return intensity;
+	double z = 2 * s->reach * vec3_dot(s->local[2], w);
+	return spectrum_mul(intensity, texture_eval(&s->texture, 0.5 + vec3_dot(s->local[0], w) / z,
+						    0.5 + vec3_dot(s->local[1], w) / z, wl));
 }
 
 static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
@@ -45,6 +56,29 @@ static double pdf_direction(const struct emitter *em, const struct emitter_point
 	(void)x;
 	const struct spot *s = em->data;
 	return falloff(s, w) > 0 ? 1 / (2 * M_PI * s->height) : 0;
+}
+
+static int read_texture(struct emitter *em, struct spot *s, const struct scene_node *n, const mat4 *to_world,
+			const struct emitter_build *build, struct error *e)
+{
+	s->textured = node_find(n, "texture") != NULL;
+	if (!s->textured)
+		return 0;
+	if (s->cutoff > 89 * (M_PI / 180))
+		return node_error(n, e, EINVAL, "a texture needs a cutoff_angle of at most 89 degrees");
+	int code = texture_from_node(&s->texture, n, "texture", 1, COLOR_REFLECTANCE, build->assets, build->dialect_3,
+				     build->arena, e);
+	if (!code)
+		code = delta_axes(n, to_world, s->local, e);
+	if (code)
+		return code;
+	s->reach = tan(s->cutoff);
+	em->textured = !texture_is_constant(&s->texture);
+	if (texture_shape(&s->texture) != COLOR_SHAPE_CONSTANT)
+		em->shape = COLOR_SHAPE_OTHER;
+	em->brightest *= texture_max(&s->texture);
+	em->power *= texture_max(&s->texture);
+	return 0;
 }
 
 static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
@@ -70,7 +104,7 @@ static int create(struct emitter *em, const struct scene_node *n, const struct e
 	/* Integral of the fall-off over the cone. */
 	double slope = s->cutoff > s->beam ? (sin(s->cutoff) - sin(s->beam)) / (s->cutoff - s->beam) : cos(s->cutoff);
 	em->power = 2 * M_PI * (1 - slope) * delta_strength(&s->light);
-	return 0;
+	return read_texture(em, s, n, &to_world, build, e);
 }
 
 static const struct param params[] = {
@@ -78,7 +112,7 @@ static const struct param params[] = {
 	{.name = "to_world", .types = VALUE_TRANSFORM},
 	{.name = "cutoff_angle", .types = VALUE_FLOAT | VALUE_INT, .min = 0.01, .max = 180},
 	{.name = "beam_width", .types = VALUE_FLOAT | VALUE_INT, .min = 0, .max = 180},
-	{.name = "texture", .status = PARAM_REFUSED},
+	{.name = "texture", .types = VALUE_TEXTURE, .max = 1},
 	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
 	{.name = NULL},
 };

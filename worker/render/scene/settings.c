@@ -7,6 +7,7 @@
  * it, angles that are none.
  */
 #include "worker/render/scene/settings.h"
+#include "worker/render/scene/fov.h"
 
 #include "common/plan/plan.h"
 #include "worker/render/scene/number.h"
@@ -16,8 +17,6 @@
 #include <string.h>
 
 enum { MAX_DEPTH = 128, FILM_PIXELS_MAX = 1 << 28, DEFAULT_WIDTH = 768, DEFAULT_HEIGHT = 576, RADIUS_MAX = 64 };
-
-#define DIAGONAL_35MM 43.266615305567875 /* of 36 mm x 24 mm */
 
 #define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
 #define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
@@ -265,23 +264,7 @@ static int read_fov(const struct scene_node *sensor, struct scene_settings *out,
 		snprintf(out->fov_axis, sizeof out->fov_axis, "x");
 		return read_scale(sensor, out, e);
 	}
-	const struct property *fov = node_find(sensor, "fov");
-	const char *focal_length = node_string(sensor, "focal_length", NULL);
-	if (fov && focal_length)
-		return node_error(sensor, e, EINVAL, "fov and focal_length say the same thing; give one");
-	if (fov) {
-		out->fov = node_float(sensor, "fov", 0);
-		snprintf(out->fov_axis, sizeof out->fov_axis, "%s", node_string(sensor, "fov_axis", "x"));
-		return 0;
-	}
-	const char *text = focal_length ? focal_length : "50mm";
-	double mm;
-	const char *rest = number_scan(text, text + strlen(text), &mm);
-	if (!rest || strcmp(rest, "mm") != 0 || !(mm >= 0.1) || !(mm <= 1e6))
-		return node_error(sensor, e, EINVAL, "focal_length=\"%.64s\" is not a length like \"50mm\"", text);
-	out->fov = 2 * atan(0.5 * DIAGONAL_35MM / mm) * 57.295779513082320877;
-	snprintf(out->fov_axis, sizeof out->fov_axis, "diagonal");
-	return 0;
+	return fov_read(sensor, &out->fov, out->fov_axis, e);
 }
 
 /* Columns made orthonormal around the view, mirrored ones stay mirrored. */

@@ -121,6 +121,12 @@ static double bitmap_max(const struct texture *t)
 	return ((const struct bitmap *)t->data)->max;
 }
 
+static double bitmap_aspect(const struct texture *t)
+{
+	const struct image *i = &((const struct bitmap *)t->data)->raster.image;
+	return (double)i->width / i->height;
+}
+
 static enum color_shape bitmap_shape(const struct texture *t)
 {
 	return ((const struct bitmap *)t->data)->shape;
@@ -149,4 +155,5 @@ const struct texture_ops texture_ops_bitmap = {
 	.jet = bitmap_jet,
 	.max = bitmap_max,
 	.shape = bitmap_shape,
+	.aspect = bitmap_aspect,
 };

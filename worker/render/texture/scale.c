@@ -86,6 +86,11 @@ static double scale_max(const struct texture *t)
 	return s->role == COLOR_REFLECTANCE ? fmin(m, 1) : m;
 }
 
+static double scale_aspect(const struct texture *t)
+{
+	return texture_aspect(&((const struct scale *)t->data)->inner);
+}
+
 /* What is cut off at 1 has another shape, unless it had none. */
 static enum color_shape scale_shape(const struct texture *t)
 {
@@ -111,4 +116,5 @@ const struct texture_ops texture_ops_scale = {
 	.jet = scale_jet,
 	.max = scale_max,
 	.shape = scale_shape,
+	.aspect = scale_aspect,
 };

@@ -54,6 +54,11 @@ int texture_from_node(struct texture *t, const struct scene_node *n, const char 
 	return code ? node_error(n, e, -code, "%s: %s", name, reason.text) : 0;
 }
 
+double texture_aspect(const struct texture *t)
+{
+	return t->ops && t->ops->aspect ? t->ops->aspect(t) : 1;
+}
+
 double texture_max(const struct texture *t)
 {
 	return t->ops ? t->ops->max(t) : color_max(&t->color);

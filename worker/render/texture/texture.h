@@ -28,6 +28,7 @@ struct texture_ops {
 	void (*jet)(const struct texture *t, double u, double v, struct texture_jet *j); /* the same of COLOR_RELIEF */
 	double (*max)(const struct texture *t); /* upper bound over (u,v) and wavelengths */
 	enum color_shape (*shape)(const struct texture *t);
+	double (*aspect)(const struct texture *t); /* width over height of the picture; NULL: 1 */
 };
 
 struct texture {
@@ -63,6 +64,7 @@ static inline void texture_jet(const struct texture *t, double u, double v, stru
 		*j = (struct texture_jet){.x = {t->color.scale, t->color.scale, t->color.scale}, .grey = true};
 }
 
+double texture_aspect(const struct texture *t);
 double texture_max(const struct texture *t);
 enum color_shape texture_shape(const struct texture *t);
 static inline bool texture_is_constant(const struct texture *t)

@@ -232,7 +232,6 @@ static void test_refusals(void **state)
 	refuses("<emitter type='directional'><vector name='direction' x='0' y='0' z='0'/></emitter>",
 		"a direction of length 0");
 	refuses("<emitter type='spot'><float name='beam_width' value='30'/></emitter>", "exceeds cutoff_angle=20");
-	refuses("<emitter type='spot'><texture type='checkerboard' name='texture'/></emitter>", "texture");
 	refuses("<emitter type='constant'/><emitter type='directional'/><emitter type='constant'/>",
 		"a second environment");
 	refuses("<shape type='sphere'><emitter type='point'/></shape>", "cannot hang on a shape");

@@ -1,0 +1,123 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * A pinhole that throws a picture: the perspective camera the other way round, with the same axes, `fov` and `fov_axis`
+ * (of the picture's shape). The picture is the irradiance across the axis at distance 1, divided by pi: a direction at
+ * the angle t from the axis gets the intensity
+ *
+ *     I = pi scale irradiance(u,v) / cos^3 t,
+ *
+ * so that a plane at distance z has pi scale irradiance / z^2 everywhere, as in Mitsuba. Light paths leave it uniformly
+ * over the picture: with A its area at distance 1 their density is 1 / (A cos^3 t) per solid angle.
+ */
+#include "worker/render/emitter/delta.h"
+#include "worker/render/scene/fov.h"
+
+struct projector {
+	struct delta_light light; /* its colour is unused */
+	struct texture irradiance;
+	vec3 axes[3];	 /* unit; the picture's u goes along -x, v along -y, as a camera's */
+	double reach[2]; /* half the picture's width and height at distance 1 */
+};
+
+/* Where w meets the picture, and the cosine of its angle with the axis. */
+static bool find(const struct projector *p, vec3 w, double uv[2], double *cosine)
+{
+	*cosine = vec3_dot(p->axes[2], w);
+	if (!(*cosine > 0))
+		return false;
+	for (int i = 0; i < 2; i++)
+		uv[i] = 0.5 - 0.5 * vec3_dot(p->axes[i], w) / (*cosine * p->reach[i]);
+	return uv[0] >= 0 && uv[0] <= 1 && uv[1] >= 0 && uv[1] <= 1;
+}
+
+static double area(const struct projector *p)
+{
+	return 4 * p->reach[0] * p->reach[1];
+}
+
+static spectrum radiance(const struct emitter *em, const struct emitter_point *x, vec3 w, const struct wavelengths *wl)
+{
+	(void)x;
+	const struct projector *p = em->data;
+	double uv[2], c;
+	if (!find(p, w, uv, &c))
+		return spectrum_of(0);
+	return spectrum_scale(M_PI * p->light.factor / (c * c * c), texture_eval(&p->irradiance, uv[0], uv[1], wl));
+}
+
+static bool sample_direction(const struct emitter *em, const struct emitter_point *x, const double u[2], vec3 *w,
+			     double *pdf_solid)
+{
+	(void)x;
+	const struct projector *p = em->data;
+	vec3 d = p->axes[2];
+	for (int i = 0; i < 2; i++)
+		d = vec3_madd(d, (1 - 2 * u[i]) * p->reach[i], p->axes[i]);
+	double length = vec3_length(d);
+	*w = vec3_scale(1 / length, d);
+	*pdf_solid = length * length * length / area(p);
+	return true;
+}
+
+static double pdf_direction(const struct emitter *em, const struct emitter_point *x, vec3 w)
+{
+	(void)x;
+	const struct projector *p = em->data;
+	double uv[2], c;
+	return find(p, w, uv, &c) ? 1 / (area(p) * c * c * c) : 0;
+}
+
+static int create(struct emitter *em, const struct scene_node *n, const struct emitter_build *build, struct error *e)
+{
+	struct projector *p = arena_alloc(build->arena, 1, sizeof *p);
+	if (!p)
+		return node_error(n, e, ENOMEM, "out of memory");
+	mat4 to_world = node_transform(n, "to_world");
+	double degrees, scale = node_float(n, "scale", 1);
+	char axis[FOV_AXIS_MAX];
+	p->light.x.p = vec3_scale(build->scale, vec3_sub(mat4_point(&to_world, (vec3){0, 0, 0}), build->center));
+	int code = delta_axes(n, &to_world, p->axes, e);
+	if (!code)
+		code = fov_read(n, &degrees, axis, e);
+	if (!code)
+		code = texture_from_node(&p->irradiance, n, "irradiance", 1, COLOR_ILLUMINANT, build->assets,
+					 build->dialect_3, build->arena, e);
+	if (!code)
+		code = delta_place(em, &p->light, n, scale * build->scale * build->scale, e);
+	if (code)
+		return code;
+	double aspect = texture_aspect(&p->irradiance), slope = tan(degrees * (M_PI / 360)) / fov_side(axis, aspect, 1);
+	p->reach[0] = aspect * slope;
+	p->reach[1] = slope;
+	em->textured = !texture_is_constant(&p->irradiance);
+	em->shape = texture_shape(&p->irradiance);
+	double most = M_PI * p->light.factor * texture_max(&p->irradiance);
+	double corner = sqrt(1 + p->reach[0] * p->reach[0] + p->reach[1] * p->reach[1]);
+	em->power = most * area(p);
+	em->brightest = DELTA_HEADROOM * most * corner * corner * corner;
+	return 0;
+}
+
+static const struct param params[] = {
+	{.name = "irradiance", .types = VALUE_TEXTURE, .max = PARAM_LIGHT_MAX},
+	{.name = "scale", .types = VALUE_FLOAT | VALUE_INT, .min = 1e-30, .max = PARAM_LIGHT_MAX},
+	{.name = "to_world", .types = VALUE_TRANSFORM},
+	{.name = "fov", .types = VALUE_FLOAT | VALUE_INT, .min = 1e-4, .max = 179.9},
+	{.name = "fov_axis", .types = VALUE_STRING, .choices = "x|y|diagonal|smaller|larger"},
+	{.name = "focal_length", .types = VALUE_STRING},
+	{.name = "sampling_weight", .types = VALUE_FLOAT | VALUE_INT, .status = PARAM_IGNORED},
+	{.name = NULL},
+};
+
+const struct emitter_ops emitter_ops_projector = {
+	.type = "projector",
+	.params = params,
+	.create = create,
+	.radiance = radiance,
+	.sample_point = delta_sample_point,
+	.pdf_point = delta_pdf_point,
+	.sample_direction = sample_direction,
+	.pdf_direction = pdf_direction,
+	.sample_toward = delta_sample_toward,
+	.pdf_toward = delta_pdf_toward,
+};
