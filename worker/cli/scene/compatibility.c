@@ -109,7 +109,8 @@ void compatibility_print(FILE *out)
 		"Made by `hslt-scene compatibility` of the tables that the reader works by. Names are those of 3.x; in 0.5/0.6 the same "
 		"in camelCase.\n"
 		"*Ignored*: has no effect on light, and is said once. *Refused*: would change the image. "
-		"[worker/render/scene/README.md](../worker/render/scene/README.md)\nsays what the plug-ins do, and where they differ.\n");
+		"[worker/render/scene/README.md](../worker/render/scene/README.md)\nsays what the plug-ins do, and where they differ,\n"
+		"[tests/corpus/README.md](../tests/corpus/README.md) how many public scenes load.\n");
 	for (int cls = 0; cls < PLUGIN_CLASSES; cls++)
 		print_class(out, (enum plugin_class)cls);
 	print_unsupported(out);

@@ -252,6 +252,8 @@ static int read_object(struct maker *m, struct draft *d, const struct xml_elemen
 	if (p && (p->types & VALUE_COLOR) && cls != PLUGIN_TEXTURE)
 		return xml_error(el, m->error, EINVAL, "`%s` may be a texture, but not a %s", p->name,
 				 plugin_class_name(cls));
+	if (p && m->lenient && !(p->types & VALUE_NODE))
+		return leave_out(m, el, xml_attribute(owner, "type"), p->name, "an object for the parameter");
 	const struct scene_node *child;
 	int r = make_node(m, target, &child);
 	if (r)

@@ -235,6 +235,26 @@ static void test_numbers_given_as_colours(void **state)
 	}
 }
 
+/* Where a number is wanted and a texture given, leniency keeps the default. */
+static void test_lenient_numbers(void **state)
+{
+	(void)state;
+	static const char xml[] =
+		"<scene version='3.0.0'>\n<bsdf type='roughconductor'><texture name='alpha' type='checkerboard'/>"
+		"<float name='ext_eta' value='2'/></bsdf></scene>";
+	struct scene s;
+	struct error e;
+	assert_int_equal(read_with(&s, xml, NULL, 0, &e), -EINVAL);
+	struct asset_source assets = memory_assets(files);
+	assert_int_equal(scene_read_lenient(&s, &assets, "s.xml", scene_tables(), NULL, 0, &e), 0);
+	assert_null(node_find(s.objects[0], "alpha"));
+	assert_true(node_float(s.objects[0], "ext_eta", 0) == 2);
+	assert_int_equal(s.note_count, 1);
+	assert_non_null(
+		strstr(s.notes[0], "an object for the parameter `alpha` is not supported and left out (lenient)"));
+	scene_fini(&s);
+}
+
 static void test_nesting_and_references(void **state)
 {
 	(void)state;
@@ -389,6 +409,7 @@ int main(void)
 		cmocka_unit_test(test_capitals_of_types),
 		cmocka_unit_test(test_parameters_of_forks),
 		cmocka_unit_test(test_numbers_given_as_colours),
+		cmocka_unit_test(test_lenient_numbers),
 		cmocka_unit_test(test_nesting_and_references),
 		cmocka_unit_test(test_forward_references_and_aliases),
 		cmocka_unit_test(test_parameters),
