@@ -46,7 +46,7 @@ static const struct format {
 } formats[] = {
 	{"\x89PNG\r\n\x1a\n", 8, image_decode_png, true}, {"\xff\xd8\xff", 3, image_decode_jpeg, false},
 	{"\x76\x2f\x31\x01", 4, image_decode_exr, false}, {"#?RADIANCE", 10, image_decode_hdr, false},
-	{"#?RGBE", 6, image_decode_hdr, false},
+	{"#?RGBE", 6, image_decode_hdr, false},		  {"BM", 2, image_decode_bmp, false},
 };
 
 /* One of three, in their place. */
@@ -70,7 +70,8 @@ static int decode(const struct image_input *in, struct image *out)
 		return formats[i].decode(in, out);
 	}
 	return error_set(in->error, EINVAL,
-			 "%s: no image that is understood (supported: PNG, JPEG, OpenEXR, Radiance HDR)", in->name);
+			 "%s: no image that is understood (supported: PNG, JPEG, OpenEXR, Radiance HDR, BMP)",
+			 in->name);
 }
 
 int image_decode(const unsigned char *bytes, size_t size, const char *name, bool raw, enum image_channel channel,

@@ -22,6 +22,7 @@ struct image_input {
 
 int image_decode_png(const struct image_input *in, struct image *out);
 int image_decode_jpeg(const struct image_input *in, struct image *out);
+int image_decode_bmp(const struct image_input *in, struct image *out);
 int image_decode_hdr(const struct image_input *in, struct image *out);
 int image_decode_exr(const struct image_input *in, struct image *out);
 

@@ -1,0 +1,134 @@
+/* SPDX-License-Identifier: Apache-2.0 */
+/*
+ * Windows bitmaps without compression: palettes of 1, 4 and 8 bits, and 24 and 32 bits a pixel, from bottom to top or,
+ * with a negative height, from top to bottom. A palette of greys gives one channel. Alpha is not read: most writers
+ * leave 0 there.
+ *
+ * Failures: -EBADMSG for a file that contradicts itself or ends too early, -ENOTSUP for compression, 16 bits and masks
+ * other than the usual ones.
+ */
+#include "worker/render/scene/image_decode.h"
+
+enum { FILE_HEADER = 14, CORE_HEADER = 12, INFO_HEADER = 40, PLAIN = 0, MASKED = 3 };
+
+struct bmp {
+	const struct image_input *in;
+	uint64_t width, height;
+	bool down; /* rows from top to bottom */
+	uint32_t bits, pixels_at;
+	const unsigned char *palette;
+	uint32_t colours, entry; /* entries, and bytes of each: blue, green, red */
+};
+
+static uint32_t little(const unsigned char *p, int bytes)
+{
+	uint32_t x = 0;
+	for (int i = bytes - 1; i >= 0; i--)
+		x = x << 8 | p[i];
+	return x;
+}
+
+static int broken(const struct bmp *b, const char *what)
+{
+	return error_set(b->in->error, EBADMSG, "%s: BMP: %s", b->in->name, what);
+}
+
+static int read_palette(struct bmp *b, uint32_t header, uint32_t used)
+{
+	if (b->bits > 8)
+		return 0;
+	b->entry = header == CORE_HEADER ? 3 : 4;
+	b->colours = used ? used : 1u << b->bits;
+	uint64_t end = FILE_HEADER + (uint64_t)header + (uint64_t)b->colours * b->entry;
+	if (b->colours > 1u << b->bits || end > b->pixels_at || end > b->in->size)
+		return broken(b, "a palette that has no room before the pixels");
+	b->palette = b->in->bytes + FILE_HEADER + header;
+	return 0;
+}
+
+/* Of 32 bits with masks: those that say what is so without them. */
+static bool masks_are_usual(const struct bmp *b)
+{
+	const unsigned char *p = b->in->bytes + FILE_HEADER + INFO_HEADER;
+	return b->in->size >= FILE_HEADER + INFO_HEADER + 12 && b->bits == 32 && little(p, 4) == 0xff0000 &&
+	       little(p + 4, 4) == 0xff00 && little(p + 8, 4) == 0xff;
+}
+
+static int read_header(struct bmp *b)
+{
+	const unsigned char *p = b->in->bytes;
+	if (b->in->size < FILE_HEADER + CORE_HEADER)
+		return broken(b, "the header ends too early");
+	uint32_t header = little(p + FILE_HEADER, 4), compression = PLAIN, used = 0;
+	b->pixels_at = little(p + 10, 4);
+	if (header != CORE_HEADER && (header < INFO_HEADER || header > b->in->size - FILE_HEADER))
+		return broken(b, "a header of an unknown size");
+	if (header == CORE_HEADER) {
+		b->width = little(p + 18, 2);
+		b->height = little(p + 20, 2);
+		b->bits = little(p + 24, 2);
+	} else {
+		int32_t height = (int32_t)little(p + 22, 4);
+		b->width = little(p + 18, 4);
+		b->down = height < 0;
+		b->height = (uint64_t)(height < 0 ? -(int64_t)height : height);
+		b->bits = little(p + 28, 2);
+		compression = little(p + 30, 4);
+		used = little(p + 46, 4);
+	}
+	if (compression != PLAIN && !(compression == MASKED && masks_are_usual(b)))
+		return error_set(b->in->error, ENOTSUP, "%s: BMP: compressed, or with unusual masks", b->in->name);
+	if (b->bits != 1 && b->bits != 4 && b->bits != 8 && b->bits != 24 && b->bits != 32)
+		return error_set(b->in->error, ENOTSUP, "%s: BMP: %u bits a pixel", b->in->name, b->bits);
+	return read_palette(b, header, used);
+}
+
+/* The three bytes of pixel x of a row; NULL: an entry that the palette does not have. */
+static const unsigned char *pixel_at(const struct bmp *b, const unsigned char *row, uint64_t x)
+{
+	if (!b->palette)
+		return row + x * (b->bits / 8);
+	uint64_t bit = x * b->bits;
+	uint32_t i = row[bit / 8] >> (8 - b->bits - bit % 8) & ((1u << b->bits) - 1);
+	return i < b->colours ? b->palette + (size_t)i * b->entry : NULL;
+}
+
+static bool is_grey(const struct bmp *b)
+{
+	for (uint32_t i = 0; i < b->colours; i++) {
+		const unsigned char *c = b->palette + (size_t)i * b->entry;
+		if (c[0] != c[1] || c[0] != c[2])
+			return false;
+	}
+	return b->palette != NULL;
+}
+
+int image_decode_bmp(const struct image_input *in, struct image *out)
+{
+	struct bmp b = {.in = in};
+	float value[256];
+	int r = read_header(&b);
+	if (r)
+		return r;
+	uint32_t channels = is_grey(&b) ? 1 : 3;
+	bool bounded = b.width <= IMAGE_PIXELS_MAX && b.height <= IMAGE_PIXELS_MAX;
+	uint64_t stride = bounded ? (b.width * b.bits + 31) / 32 * 4 : 0;
+	r = image_allocate(in, out, b.width, b.height, channels, stride * b.height);
+	if (r)
+		return r;
+	if (b.pixels_at > in->size || stride * b.height > in->size - b.pixels_at)
+		return broken(&b, "the file ends too early");
+	image_table(value, 255, in->raw);
+	float *to = out->pixels;
+	for (uint64_t y = 0; y < b.height; y++) {
+		const unsigned char *row = in->bytes + b.pixels_at + (b.down ? y : b.height - 1 - y) * stride;
+		for (uint64_t x = 0; x < b.width; x++, to += channels) {
+			const unsigned char *c = pixel_at(&b, row, x);
+			if (!c)
+				return broken(&b, "a pixel beyond the palette");
+			for (uint32_t k = 0; k < channels; k++)
+				to[k] = value[c[2 - k]];
+		}
+	}
+	return 0;
+}
