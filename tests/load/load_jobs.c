@@ -37,7 +37,11 @@ void load_submit(struct load *l, const char *host_port, const char *tls, unsigne
 	static struct render_arguments args;
 	char folder[] = "tests/load", scene[] = "load.xml", text[PLAN_TEXT], name[32];
 	struct scene_bundle_file file = {.name = scene};
-	struct scene_bundle bundle = {.folder = folder, .scene = scene, .count = 1, .files = &file};
+	struct scene_bundle bundle = {.folder = folder,
+				      .folders = asset_folders_of(folder, NULL, 0),
+				      .scene = scene,
+				      .count = 1,
+				      .files = &file};
 	struct submit_request request = {.name = name, .output = "", .args = &args};
 	struct load_job *j = &l->jobs[index];
 	struct asset_source assets = asset_folder(folder);
