@@ -6,7 +6,7 @@
  * the journal says of the batch that comes in its place that it does (JOURNAL_AGAIN), so that a restart does the same.
  * Until then a restart finds the refused states again, and asks again. A checkpoint cuts the journal: the last two
  * batches of each (group, part) go into the next one as long as they have room (JOURNAL_KEPT). Where one is missing
- * nothing is taken back. Of samples nothing is noted. The loop's thread, or whoever has the order alone. Memory: 24
+ * nothing is taken back. Of samples nothing is noted. The loop's thread, or whoever has the live job alone. Memory: 24
  * bytes a batch of the journal.
  */
 #ifndef COORDINATOR_JOB_BACK_H
@@ -26,7 +26,7 @@ void back_note(struct live_job *o, const struct lease_key *k, uint64_t at, const
 /* Reads the last batch of that lease's (group, part). Its epoch must be the one before k's. -ENOENT: it is not known
  * where it lies. */
 int back_read(const struct live_job *o, struct journal *j, const struct lease_key *k, struct back *b, struct error *e);
-/* Takes it out of the order; that cannot fail. Its states go over to the order. */
+/* Takes it out of the live job; that cannot fail. Its states go over to the live job. */
 void back_take(struct live_job *o, struct back *b);
 void back_fini(struct back *b);
 

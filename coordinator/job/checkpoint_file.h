@@ -26,7 +26,8 @@ int checkpoint_write(const struct live_job *o, const struct checkpoint_head *h, 
 		     struct error *e);
 
 /* Into a new order without merged batches, by any thread. -ENOENT: there is none; -EBADMSG: it is damaged; -EPROTO: of
- * another version; the order is of no use then. generation: of the journal that follows. heard: as in checked_file.h.
+ * another version; the live job is of no use then. generation: of the journal that follows. heard: as in
+ * checked_file.h.
  */
 int checkpoint_load(const struct spool *spool, struct live_job *o, uint64_t *generation, checked_file_heard *heard,
 		    void *user, struct error *e);

@@ -2,7 +2,7 @@
 /*
  * Results in a job's journal that cannot count yet, because one that comes before them was damaged (replay.h). They
  * stay where they are, and count as soon as that one has been computed again: nobody computes them a second time. The
- * loop's thread, but for what replay.h does with an order that nobody else has.
+ * loop's thread, but for what replay.h does with a live job that nobody else has.
  */
 #ifndef COORDINATOR_JOB_LATE_H
 #define COORDINATOR_JOB_LATE_H

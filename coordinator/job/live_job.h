@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * An order: a live job with all its weight, beside the few numbers that the core (coordinator/core) keeps of it. Scene
+ * A live job with all its weight, beside the few numbers that the core (coordinator/core) keeps of it. Scene
  * bundle as submitted, bootstrap, canvas, seeds, the chain states of each (group, part)'s last merged epoch, its log.
  * The loop's thread, but while `busy` a thread of the pool reads the canvas and nobody adds to it.
  */
@@ -29,7 +29,7 @@ enum publish_what {
 	PUBLISH_RESULT,	    /* result.exr */
 };
 
-struct publishing { /* one of an order at a time */
+struct publishing { /* one of a live job at a time */
 	uv_work_t work;
 	struct jobs *jobs;
 	struct live_job *order;
@@ -169,7 +169,7 @@ bool live_job_put_off(struct live_job *o, uint64_t peer, const struct lease_key 
 const struct waiting_batch *live_job_waits_for(const struct live_job *o,
 					       const struct lease_key *k); /* NULL: no result of that lease */
 struct waiting_batch *live_job_take_waiting(struct live_job *o);	   /* NULL: none */
-/* The results of a worker that has gone, of these orders. */
+/* The results of a worker that has gone, of these live jobs. */
 void orders_drop_waiting(struct live_job *first, uint64_t peer);
 void waiting_batch_free(struct waiting_batch *w);
 

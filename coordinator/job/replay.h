@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * What was merged of a job, from its checkpoint and its journal into its order, by the code that live batches go
+ * What was merged of a job, from its checkpoint and its journal into its live job, by the code that live batches go
  * through, so that the bits are the same. A result counts when the one before it of its chains is there and its round
  * is open. One that was damaged on the disk is left out, and those that need it wait in the journal until it has been
  * computed again (late.h): the image holds the same.
@@ -20,8 +20,8 @@ struct replay_progress {
 /* How much is read of this job: its journals once, its checkpoint twice. */
 uint64_t replay_bytes(const struct spool *spool, uint64_t job);
 
-/* A second and more. By any thread while nobody else has the order. When it fails (-EBADMSG: something of it is damaged
- * or gone; -EPROTO: of another version) the order is of no use but to be dropped. p: NULL: nobody looks. */
+/* A second and more. By any thread while nobody else has the live job. When it fails (-EBADMSG: something of it is
+ * damaged or gone; -EPROTO: of another version) the live job is of no use but to be dropped. p: NULL: nobody looks. */
 int replay_films(const struct spool *spool, struct live_job *o, struct replay_progress *p, struct error *e);
 
 /* Whether a result can be merged now. */

@@ -276,7 +276,7 @@ void dispatch_update(struct jobs *s, const struct update *u, const struct incomi
 	}
 }
 
-/* ---- the end of an order ---- */
+/* ---- the end of a live job ---- */
 
 static void finish(struct jobs *s, struct live_job *o)
 {

@@ -27,7 +27,7 @@ void durable_end_row(struct jobs *s, const struct job_record *r);
 int durable_reserve(struct jobs *s, struct live_job *o, struct incoming *in, struct error *e);
 /* The core merges the batch. -ENOMEM: the journal has it not, and it must not be acknowledged. */
 int durable_merged(struct jobs *s, struct live_job *o, const struct incoming *in, uint64_t *at, struct error *e);
-/* The answer to a batch that is merged, by now or before, when what the order's journal holds is safe. */
+/* The answer to a batch that is merged, by now or before, when what the job's journal holds is safe. */
 void durable_ack(struct jobs *s, const struct live_job *o, uint64_t peer, const struct lease_key *k, enum ack ack);
 /* The last look at the job's error, if it is new. */
 void durable_look(struct jobs *s, uint64_t job);

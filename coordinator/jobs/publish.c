@@ -60,7 +60,7 @@ static void run(uv_work_t *work)
 		w->rc = write_image(w);
 }
 
-/* The two that tell the core: it may want the next image at once, or end the order, and w is not ours any more. */
+/* The two that tell the core: it may want the next image at once, or end the job, and w is not ours any more. */
 static void tell_error(const struct publishing *w)
 {
 	struct jobs *s = w->jobs;
@@ -108,7 +108,7 @@ static void has_written(struct live_job *o)
 	o->record.why[0] = 0;
 }
 
-/* What came of it, for the order. */
+/* What came of it, for the live job. */
 static void take(struct publishing *w)
 {
 	struct live_job *o = w->order;

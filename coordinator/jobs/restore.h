@@ -1,6 +1,6 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
- * A job of an earlier run, from the ledger into an order and from there into the core; its films come in between
+ * A job of an earlier run, from the ledger into a live job and from there into the core; its films come in between
  * (replay.h). The core is told which leases are merged and no more: what was out when the coordinator stopped comes
  * back with its worker, or is handed out again.
  */
@@ -19,7 +19,7 @@ int restore_live_job(struct jobs *s, const struct ledger_job *j, struct live_job
 void restore_drop(struct jobs *s, struct live_job *o); /* and lets go of its files */
 /* The sentence for the status. */
 const char *restore_held_by(const char *who, char text[256]);
-/* The core is told of an order that is in the jobs' list. held: by whom, or "". Refusals carry the tag. */
+/* The core is told of a live job that is in the jobs' list. held: by whom, or "". Refusals carry the tag. */
 int restore_tell(struct jobs *s, const struct live_job *o, const char *held, uint64_t tag, struct error *e);
 
 #endif

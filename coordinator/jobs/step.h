@@ -13,7 +13,7 @@ void jobs_step_with(struct jobs *s, struct event *ev, const struct incoming *in)
 void jobs_defer(struct jobs *s, const struct event *ev);
 void jobs_break(struct jobs *s, uint64_t job, const char *text); /* it cannot go on */
 
-/* Some order is not busy any more: what waited for its canvas goes on. Orders that have ended are gone then. */
+/* Some live job is no longer busy: what waited for its canvas goes on. Live jobs that have ended are gone then. */
 void jobs_films_free(struct jobs *s);
 
 #endif

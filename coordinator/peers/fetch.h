@@ -8,7 +8,7 @@
 /* A piece is asked for; it is sent now, or when the preview is made. */
 void fetch_begin(struct session *p, const Farm__Fetch *f);
 void fetch_end(struct session *p);
-/* The order's canvas is free, or the order has ended: who waits for its preview gets it, or it is made now. */
+/* The live job's canvas is free, or the job has ended: who waits for its preview gets it, or it is made now. */
 void fetch_previews(struct peers *s, uint64_t job);
 /* Somebody fetches the job's result, or waits for it. */
 bool fetch_uses(const struct peers *s, uint64_t job);
