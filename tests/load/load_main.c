@@ -97,7 +97,7 @@ double load_uniform(struct load *l)
 
 /* ---- options */
 
-static double number(struct argp_state *state, const char *arg, double least, double most)
+static double parse_between(struct argp_state *state, const char *arg, double least, double most)
 {
 	char *end;
 	double x = strtod(arg, &end);
@@ -111,51 +111,51 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 	struct load_settings *s = &load.s;
 	switch (key) {
 	case 'w':
-		s->workers = (unsigned)number(state, arg, 1, 100000);
+		s->workers = (unsigned)parse_between(state, arg, 1, 100000);
 		return 0;
 	case OPTION_MINUTES:
-		s->minutes = number(state, arg, 0.05, 1e4);
+		s->minutes = parse_between(state, arg, 0.05, 1e4);
 		return 0;
 	case OPTION_SIZE:
 		if (sscanf(arg, "%ux%u", &s->width, &s->height) != 2)
 			argp_error(state, "--size takes WxH");
 		return 0;
 	case OPTION_INTERVAL:
-		s->interval = number(state, arg, 0.1, 3600);
+		s->interval = parse_between(state, arg, 0.1, 3600);
 		return 0;
 	case OPTION_JOBS:
-		s->jobs = (unsigned)number(state, arg, 1, 64);
+		s->jobs = (unsigned)parse_between(state, arg, 1, 64);
 		return 0;
 	case OPTION_GROUPS:
-		s->groups = (unsigned)number(state, arg, 1, PLAN_MAX_GROUPS);
+		s->groups = (unsigned)parse_between(state, arg, 1, PLAN_MAX_GROUPS);
 		return 0;
 	case OPTION_PARTS:
-		s->parts = (unsigned)number(state, arg, 1, PLAN_MAX_PARTS);
+		s->parts = (unsigned)parse_between(state, arg, 1, PLAN_MAX_PARTS);
 		return 0;
 	case OPTION_WANT:
-		s->want = (unsigned)number(state, arg, 1, 4);
+		s->want = (unsigned)parse_between(state, arg, 1, 4);
 		return 0;
 	case OPTION_DYING:
-		s->bad[LOAD_DIES] = (unsigned)number(state, arg, 0, 1e5);
+		s->bad[LOAD_DIES] = (unsigned)parse_between(state, arg, 0, 1e5);
 		return 0;
 	case OPTION_LYING:
-		s->bad[LOAD_LIES] = (unsigned)number(state, arg, 0, 1e5);
+		s->bad[LOAD_LIES] = (unsigned)parse_between(state, arg, 0, 1e5);
 		return 0;
 	case OPTION_HOARDING:
-		s->bad[LOAD_HOARDS] = (unsigned)number(state, arg, 0, 1e5);
+		s->bad[LOAD_HOARDS] = (unsigned)parse_between(state, arg, 0, 1e5);
 		return 0;
 	case OPTION_HANGING:
-		s->bad[LOAD_HANGS] = (unsigned)number(state, arg, 0, 1e5);
+		s->bad[LOAD_HANGS] = (unsigned)parse_between(state, arg, 0, 1e5);
 		return 0;
 	case ARGP_KEY_END:
 		if (s->bad[LOAD_DIES] + s->bad[LOAD_LIES] + s->bad[LOAD_HOARDS] + s->bad[LOAD_HANGS] >= s->workers)
 			argp_error(state, "one worker at least must be honest");
 		return 0;
 	case OPTION_RAMP:
-		s->ramp = number(state, arg, 1, 1e4);
+		s->ramp = parse_between(state, arg, 1, 1e4);
 		return 0;
 	case OPTION_HEARTBEAT:
-		s->heartbeat = number(state, arg, 0.1, 3600);
+		s->heartbeat = parse_between(state, arg, 0.1, 3600);
 		return 0;
 	case OPTION_SPOOL:
 		s->spool = arg;

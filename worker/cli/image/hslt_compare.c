@@ -55,7 +55,7 @@ struct arguments {
 	bool exact, json;
 };
 
-static double number(struct argp_state *state, const char *option, const char *arg, double below)
+static double parse_below(struct argp_state *state, const char *option, const char *arg, double below)
 {
 	char *end;
 	double x = strtod(arg, &end);
@@ -81,7 +81,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		a->exact = true;
 		return 0;
 	case OPTION_TRIM:
-		a->trim = number(state, "--trim", arg, 1);
+		a->trim = parse_below(state, "--trim", arg, 1);
 		return 0;
 	case OPTION_SIZE:
 		if (*arg < '0' || *arg > '9' || sscanf(arg, "%ux%u%c", &a->width, &a->height, &rest) != 2 ||
@@ -92,7 +92,7 @@ static error_t parse(int key, char *arg, struct argp_state *state)
 		a->heatmap = arg;
 		return 0;
 	case OPTION_MAX:
-		a->most = number(state, "--max-relmse", arg, HUGE_VAL);
+		a->most = parse_below(state, "--max-relmse", arg, HUGE_VAL);
 		return 0;
 	case OPTION_JSON:
 		a->json = true;
