@@ -39,7 +39,7 @@ static void render(const struct agree_case *k, const char *name, const char *int
 		   struct agree_image *out)
 {
 	struct agree_side side = {integrator, samples(spp), is_table() ? AGREE_MAX_GROUPS : 16, 1, k->max_depth};
-	uint64_t paths = 32 * k->spp > 1 << 13 ? 32 * k->spp : 1 << 13;
+	uint64_t paths = 32 * k->spp > 1 << 14 ? 32 * k->spp : 1 << 14;
 	if (is_table())
 		agree_render_bootstrap(w, name, integrator, &side, rows_full() ? 16 * paths : paths, out);
 	else

@@ -16,8 +16,6 @@
 #include <float.h>
 #include <string.h>
 
-/* Russian roulette begins after this many scattering events, where it is allowed. */
-enum { ROULETTE_FROM = 5 };
 /* Fainter contributions are black: their parts, such as those of path classes, could be denormal and would not add up.
  */
 #define FAINTEST (DBL_MIN / DBL_EPSILON)
@@ -211,7 +209,7 @@ void path_delta_per_solid(const struct surface_point *x, vec3 light, vec3 camera
 
 static bool survives(const struct path_context *c, unsigned scatterings, double start, double u, spectrum *beta)
 {
-	if (!c->roulette || scatterings < ROULETTE_FROM)
+	if (!c->roulette || scatterings < c->w->settings.roulette_depth)
 		return true;
 	double q = fmin(spectrum_max(*beta) / start, 0.95);
 	if (!(u < q))

@@ -17,6 +17,7 @@
 #include <string.h>
 
 enum { MAX_DEPTH = 128, FILM_PIXELS_MAX = 1 << 28, DEFAULT_WIDTH = 768, DEFAULT_HEIGHT = 576, RADIUS_MAX = 64 };
+enum { ROULETTE_DEPTH = 5 }; /* Mitsuba's */
 
 #define UNDERSTOOD(types) types, PARAM_UNDERSTOOD, 0, 0, NULL
 #define RANGE(types, min, max) types, PARAM_UNDERSTOOD, min, max, NULL
@@ -107,6 +108,7 @@ static const struct param sampler_params[] = {
 };
 static const struct param integrator_params[] = {
 	{"max_depth", RANGE(VALUE_INT, -1, 1 << 30)},
+	{"rr_depth", RANGE(VALUE_INT, 1, 1 << 30)},
 	{"hide_emitters", UNDERSTOOD(VALUE_BOOL)},
 	{"*", IGNORED},
 	{NULL, 0, 0, 0, 0, NULL},
@@ -227,14 +229,17 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 	uint32_t count;
 	const struct scene_node *integrator = find_object(s, PLUGIN_INTEGRATOR, 1, &count);
 	out->max_depth = MAX_DEPTH;
+	out->roulette_depth = ROULETTE_DEPTH;
 	if (!integrator)
 		return 0;
 	if (count > 1)
 		return node_error(integrator, e, EINVAL, "a second integrator in the scene");
 	snprintf(out->integrator, sizeof out->integrator, "%s", integrator->type);
-	int64_t depth = -1;
+	int64_t depth = -1, roulette = ROULETTE_DEPTH;
 	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
 		depth = node_int(n, "max_depth", depth);
+	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
+		roulette = node_int(n, "rr_depth", roulette);
 	for (const struct scene_node *n = integrator; n; n = node_child(n, PLUGIN_INTEGRATOR, 0))
 		out->hide_emitters |= node_bool(n, "hide_emitters", false);
 	if (depth == 0)
@@ -242,6 +247,7 @@ static int read_depth(const struct scene *s, struct scene_settings *out, struct 
 				  "a depth of 0 shows nothing; 1 is emitters seen directly, -1 no limit");
 	if (depth > 0 && depth < MAX_DEPTH)
 		out->max_depth = (uint32_t)depth;
+	out->roulette_depth = (uint32_t)roulette;
 	return 0;
 }
 

@@ -19,9 +19,11 @@ struct scene_settings {
 	uint32_t border;	   /* whole pixels by which the kernel reaches beyond a pixel: ceil(radius - 0.5) */
 	uint32_t crop_x, crop_y, crop_width, crop_height; /* what the scene's film wants rendered; width 0: all of it */
 	uint64_t spp;					  /* sampleCount; 0: none given */
-	uint32_t max_depth;  /* edges, 1..128 (-1 and more become 128); 128 when none is given */
-	bool hide_emitters;  /* paths of one edge, emitters seen directly, are not wanted */
-	char integrator[32]; /* the scene's own ("" none): ignored but for its depth */
+	uint32_t max_depth;	 /* edges, 1..128 (-1 and more become 128); 128 when none is given */
+	uint32_t roulette_depth; /* scattering events before Russian roulette begins, rr_depth; from 1 on, 5 when none
+				    is given */
+	bool hide_emitters;	 /* paths of one edge, emitters seen directly, are not wanted */
+	char integrator[32];	 /* the scene's own ("" none): ignored but for its depths */
 	/* perspective, thinlens */
 	mat4 to_world;	   /* camera: +z forward, +x LEFT on the image, +y up; any scale is removed */
 	double half_width; /* above 0: orthographic, half of what the film's width shows, in units of the scene */

@@ -7,7 +7,10 @@
 #include "worker/render/render.h"
 #include "tests/support/agree.h"
 #include "tests/support/dice.h"
+#include "tests/support/stats.h"
 #include "tests/support/worlds.h"
+#include "worker/render/path/path.h"
+#include "worker/render/path/sampler.h"
 
 #include <setjmp.h>
 #include <stdarg.h>
@@ -249,14 +252,57 @@ static void test_rough_in_delta_light(void **state)
 		(struct effort){14336, 12288, 0});
 }
 
+/* In a room of perfect mirrors a path ends by roulette alone: after as many scattering events as the scene says no path
+ * has ended before, and one in twenty ends there: 200 of 4,000, standard deviation 13.8. 130 to 270 are allowed, which
+ * is wrong once in two million; one in 30 or in 14 is found with 95 %. */
+static void test_roulette(void **state)
+{
+	(void)state;
+	enum { EDGES = 64, PATHS = 4000 };
+	static struct path_context c;
+	static const struct {
+		const char *asks;
+		unsigned first;
+	} rows[] = {{"", 5},
+		    {"<integer name='rr_depth' value='1'/>", 1},
+		    {"<integer name='rr_depth' value='40'/>", 40},
+		    {"<integer name='rr_depth' value='64'/>", EDGES}};
+	for (size_t k = 0; k < sizeof rows / sizeof *rows; k++) {
+		struct world *w = world_of_text(
+			8, 8, "<integrator type='path'>%s</integrator>%s", rows[k].asks,
+			SENSOR("0,0.2,0.9",
+			       "0.1,-0.1,-1") "<shape type='cube'><bsdf type='conductor'><string name='material' "
+					      "value='none'/></bsdf></shape>"
+					      "<shape type='sphere'><point name='center' x='0' y='0' z='5'/>"
+					      "<emitter type='area'/></shape>");
+		uint64_t counters[BATCH_COUNTERS] = {0};
+		unsigned there = 0;
+		c = (struct path_context){.w = w,
+					  .window = {0, 0, 8, 8},
+					  .min_depth = 1,
+					  .max_depth = EDGES,
+					  .roulette = true,
+					  .counters = counters};
+		for (uint64_t i = 0; i < PATHS; i++) {
+			struct sampler_random random;
+			double film[2];
+			sampler_random_init(&random, stats_seed(__func__), RNG_TEST, i, 0);
+			unsigned edges = path_walk_camera(&c, &random.base, EDGES + 1, film) - 1;
+			assert_in_range(edges, rows[k].first, EDGES);
+			there += edges == rows[k].first;
+		}
+		if (rows[k].first < EDGES)
+			assert_in_range(there, 130, 270);
+		world_free(w);
+	}
+}
+
 int main(void)
 {
 	const struct CMUnitTest tests[] = {
-		cmocka_unit_test(test_defocus),
-		cmocka_unit_test(test_blurred_rectangle),
-		cmocka_unit_test(test_lit_floor),
-		cmocka_unit_test(test_lit_by_a_mirror),
-		cmocka_unit_test(test_rough_in_delta_light),
+		cmocka_unit_test(test_roulette),	  cmocka_unit_test(test_defocus),
+		cmocka_unit_test(test_blurred_rectangle), cmocka_unit_test(test_lit_floor),
+		cmocka_unit_test(test_lit_by_a_mirror),	  cmocka_unit_test(test_rough_in_delta_light),
 	};
 	return cmocka_run_group_tests(tests, NULL, NULL);
 }

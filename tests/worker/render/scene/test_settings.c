@@ -99,6 +99,7 @@ static void test_sampler_and_integrator(void **state)
 			"<sampler type='sobol'><integer name='sampleCount' value='17'/>"
 			"<integer name='scramble' value='4'/></sampler>");
 	assert_int_equal(s.max_depth, 9);
+	assert_int_equal(s.roulette_depth, 3);
 	assert_string_equal(s.integrator, "bdpt");
 	assert_int_equal(s.spp, 17);
 	assert_false(s.hide_emitters);
@@ -118,6 +119,7 @@ static void test_sampler_and_integrator(void **state)
 			 "value='%s'/></integrator></integrator>",
 			 depths[i].depth);
 		assert_int_equal(read_ok(before, "").max_depth, depths[i].want);
+		assert_int_equal(read_ok(before, "").roulette_depth, 5);
 	}
 }
 
