@@ -1,8 +1,8 @@
 /* SPDX-License-Identifier: Apache-2.0 */
 /*
  * Decoded images: linear Rec. 709 floats, rows from top to bottom. PNG, JPEG, EXR, Radiance HDR, BMP by content. PNG (8
- * and 16 bits), JPEG and BMP are sRGB, whatever gamma they claim. Damaged files are an error, never half an image. Any thread,
- * each with its own arena.
+ * and 16 bits), JPEG and BMP are sRGB, whatever gamma they claim. Damaged files are an error, never half an image. Any
+ * thread, each with its own arena.
  */
 #ifndef WORKER_RENDER_SCENE_IMAGE_H
 #define WORKER_RENDER_SCENE_IMAGE_H

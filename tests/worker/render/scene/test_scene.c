@@ -346,8 +346,9 @@ static void test_ignored_is_noted_once(void **state)
 			"<dpt/></scene>");
 	assert_int_equal(s.note_count, 4);
 	assert_string_equal(s.notes[0], "s.xml:2: <mode> and all inside it is ignored");
-	assert_string_equal(s.notes[1],
-			    "s.xml:3: <integrator type=\"unheard\"> is ignored except for: max_depth, hide_emitters");
+	assert_string_equal(
+		s.notes[1],
+		"s.xml:3: <integrator type=\"unheard\"> is ignored except for: max_depth, rr_depth, hide_emitters");
 	assert_non_null(strstr(s.notes[2], "s.xml:4: <bsdf type=\"roughdielectric\">: `sample_visible`"));
 	assert_non_null(strstr(s.notes[3], "s.xml:6: <dpt>"));
 	assert_int_equal(node_int(s.objects[0], "max_depth", 0), 7);
