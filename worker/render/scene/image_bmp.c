@@ -89,7 +89,7 @@ static const unsigned char *pixel_at(const struct bmp *b, const unsigned char *r
 	if (!b->palette)
 		return row + x * (b->bits / 8);
 	uint64_t bit = x * b->bits;
-	uint32_t i = row[bit / 8] >> (8 - b->bits - bit % 8) & ((1u << b->bits) - 1);
+	uint32_t i = (uint32_t)row[bit / 8] >> (8 - b->bits - bit % 8) & ((1u << b->bits) - 1);
 	return i < b->colours ? b->palette + (size_t)i * b->entry : NULL;
 }
 
