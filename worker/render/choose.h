@@ -11,8 +11,9 @@
  * on finding larger ones, below a tail index of about 1 not even a mean exists: caustics through water, panes, frosted
  * glass; or where both find some, and the largest of both fall off slower still. Else it is `path` or `bdpt8` where
  * path's tail is that of a finite variance (2 or more) and its second moment times rays is the smaller one: `path`
- * where the tail is so short that it has no fireflies, else `bdpt8`, whose light sub-paths, one in eight samples, bound
- * them. `bdpt` in all other cases, because the fireflies that a pilot does not see decide the error of a long render.
+ * where the tail or its end is so short that it has no fireflies, else `bdpt8`, whose light sub-paths, one in eight
+ * samples, bound them. `bdpt` in all other cases, because the fireflies that a pilot does not see decide the error of a
+ * long render.
  */
 #ifndef WORKER_RENDER_CHOOSE_H
 #define WORKER_RENDER_CHOOSE_H

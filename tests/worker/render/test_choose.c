@@ -191,7 +191,13 @@ static void the_rule(void **state)
 		bool settled;
 	} cases[] = {
 		{{{1, 0, 4, 4}, {2, 0, 3, 3}, false, false, 0}, "path", false},
-		{{{1, 0, 3, 3}, {2, 0, 3, 3}, false, false, 0}, "bdpt8", false}, /* not sure that it has no fireflies */
+		{{{1, 0, 3, 2.4}, {2, 0, 3, 3}, false, false, 0},
+		 "bdpt8",
+		 false}, /* not sure that it has no fireflies */
+		{{{1, 0, 3, 3}, {2, 0, 3, 2.4}, false, false, 0}, "bdpt8", false},
+		{{{1, 0, 3, 2.6}, {2, 0, 3, 2.6}, false, false, 0}, "path", false},  /* the extremes of both are */
+		{{{1, 0.002, 3, 3}, {2, 0, 3, 3}, false, false, 0}, "bdpt8", false}, /* but for some rare light */
+		{{{1, 0, 3, 3}, {2, 0.002, 3, 3}, false, false, 0}, "bdpt8", false},
 		{{{1.9, 0, 3, 3}, {2, 0, 3, 3}, false, false, 0}, "bdpt", false},  /* not much better, and less sure */
 		{{{1, 0, 1.9, 1.5}, {0, 0, 1, 1}, false, false, 0}, "bdpt", true}, /* better but for its tail */
 		{{{1, 0, 4, 4}, {2, 0, 1.5, 1.5}, false, false, 0}, "path", false},
